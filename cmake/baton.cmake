@@ -1,0 +1,45 @@
+# Build rules shared by every room of the project.
+
+# Version string in one header.
+configure_file(${CMAKE_SOURCE_DIR}/cmake/version.h.in ${CMAKE_BINARY_DIR}/generated/common/base/version.h @ONLY)
+
+add_library(baton_options INTERFACE)
+target_include_directories(baton_options INTERFACE ${CMAKE_SOURCE_DIR} ${CMAKE_BINARY_DIR}/generated)
+# No value-changing float options anywhere: bytes must not depend on how a loop was compiled.
+target_compile_options(baton_options INTERFACE -Wall -Wextra -Wshadow -Wconversion -Wno-sign-conversion
+  -Wnon-virtual-dtor -Woverloaded-virtual -Wold-style-cast -ffp-contract=off -fno-math-errno)
+# The oldest x86 that renders (SSE4.2, 2009); the inner loops choose AVX2 or AVX-512 when the program starts.
+if(CMAKE_SYSTEM_PROCESSOR MATCHES "x86_64|AMD64")
+  target_compile_options(baton_options INTERFACE -march=x86-64-v2)
+endif()
+if(BATON_WERROR)
+  target_compile_options(baton_options INTERFACE -Werror)
+endif()
+if(BATON_SANITIZE)
+  target_compile_options(baton_options INTERFACE -fsanitize=${BATON_SANITIZE} -fno-omit-frame-pointer)
+  target_link_options(baton_options INTERFACE -fsanitize=${BATON_SANITIZE})
+endif()
+target_link_libraries(baton_options INTERFACE Threads::Threads)
+
+# baton_library(NAME DIR folder DEPS public... PRIVATE private...): all .cpp files of one folder.
+function(baton_library name)
+  cmake_parse_arguments(A "" "DIR" "DEPS;PRIVATE" ${ARGN})
+  file(GLOB sources CONFIGURE_DEPENDS ${CMAKE_SOURCE_DIR}/${A_DIR}/*.cpp)
+  if(sources)
+    add_library(${name} STATIC ${sources})
+    target_link_libraries(${name} PUBLIC baton_options ${A_DEPS} PRIVATE ${A_PRIVATE})
+  else()
+    add_library(${name} INTERFACE)
+    target_link_libraries(${name} INTERFACE baton_options ${A_DEPS} ${A_PRIVATE})
+  endif()
+endfunction()
+
+# baton_program(NAME DIR folder DEPS libraries...): the .cpp files directly in one folder.
+function(baton_program name)
+  cmake_parse_arguments(A "" "DIR" "DEPS" ${ARGN})
+  file(GLOB sources CONFIGURE_DEPENDS ${CMAKE_SOURCE_DIR}/${A_DIR}/*.cpp)
+  if(sources)
+    add_executable(${name} ${sources})
+    target_link_libraries(${name} PRIVATE baton_options ${A_DEPS})
+  endif()
+endfunction()

@@ -1,0 +1,120 @@
+#pragma once
+
+#include <concepts>
+#include <cstdint>
+#include <string>
+#include <type_traits>
+#include <vector>
+
+#include "common/base/bytes.h"
+#include "common/base/digest.h"
+
+namespace baton {
+
+/// The byte form of plain structs that list their members in `template <class A> void fields(A& a)`: members in order,
+/// little-endian, no padding. A bool is one byte 0 or 1; an enum its underlying integer; a string u32 length and bytes;
+/// a vector u32 count and elements; a Digest its two halves. Every enum that is archived has a `last_of(Enum)` beside
+/// it, found by argument-dependent lookup: larger values are refused.
+
+/// Appends what `fields` lists to a ByteWriter.
+class ArchiveWriter {
+ public:
+  template <class... T>
+  void operator()(T&... values) {
+    (write(values), ...);
+  }
+  Bytes take() { return writer_.take(); }
+
+ private:
+  template <class T>
+    requires std::is_arithmetic_v<T>
+  void write(const T& value) {
+    writer_.put(value);
+  }
+  template <class T>
+    requires std::is_enum_v<T>
+  void write(const T& value) {
+    writer_.put(static_cast<std::underlying_type_t<T>>(value));
+  }
+  void write(const std::string& text) { writer_.put_string(text); }
+  void write(const Digest& digest) {
+    writer_.put(digest.high);
+    writer_.put(digest.low);
+  }
+  template <class T>
+  void write(std::vector<T>& values) {
+    writer_.put(static_cast<std::uint32_t>(values.size()));
+    for (T& value : values) write(value);
+  }
+  template <class T>
+    requires requires(T& value, ArchiveWriter& a) { value.fields(a); }
+  void write(T& value) {
+    value.fields(*this);
+  }
+
+  ByteWriter writer_;
+};
+
+/// Reads what ArchiveWriter wrote. Check complete() once, at the end; after a fault the values are arbitrary.
+class ArchiveReader {
+ public:
+  explicit ArchiveReader(ByteView bytes) : reader_(bytes) {}
+
+  template <class... T>
+  void operator()(T&... values) {
+    (read(values), ...);
+  }
+  /// True when every value was there and in range, and nothing is left over.
+  bool complete() const { return in_range_ && reader_.ok() && reader_.at_end(); }
+
+ private:
+  void read(bool& value) {
+    const auto byte = reader_.get<std::uint8_t>();
+    in_range_ = in_range_ && byte <= 1;
+    value = byte == 1;
+  }
+  template <class T>
+    requires std::is_arithmetic_v<T>
+  void read(T& value) {
+    value = reader_.get<T>();
+  }
+  template <class T>
+    requires std::is_enum_v<T>
+  void read(T& value) {
+    value = static_cast<T>(reader_.get<std::underlying_type_t<T>>());
+    if (value > last_of(value)) {
+      in_range_ = false;
+      value = last_of(value);
+    }
+  }
+  void read(std::string& text) { text = reader_.get_string(); }
+  void read(Digest& digest) {
+    digest.high = reader_.get<std::uint64_t>();
+    digest.low = reader_.get<std::uint64_t>();
+  }
+  template <class T>
+  void read(std::vector<T>& values) {
+    // Grow with what is really there: the count alone must not reserve memory.
+    const auto count = reader_.get<std::uint32_t>();
+    values.clear();
+    for (std::uint32_t i = 0; i < count && reader_.ok(); ++i) read(values.emplace_back());
+  }
+  template <class T>
+    requires requires(T& value, ArchiveReader& a) { value.fields(a); }
+  void read(T& value) {
+    value.fields(*this);
+  }
+
+  ByteReader reader_;
+  bool in_range_ = true;
+};
+
+/// The bytes of one struct. Takes a copy because `fields` is shared with the reader and so not const.
+template <class T>
+Bytes to_bytes(T value) {
+  ArchiveWriter writer;
+  writer(value);
+  return writer.take();
+}
+
+}  // namespace baton

@@ -1,0 +1,115 @@
+#include "common/base/files.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <cerrno>
+#include <cstring>
+
+namespace baton {
+namespace {
+
+namespace fs = std::filesystem;
+
+Error io_error(std::string_view what, const fs::path& path) {
+  return {ErrorKind::io, fmt::format("{}: {}: {}", path.string(), what, std::strerror(errno))};
+}
+
+/// Closes on scope exit.
+struct FileDescriptor {
+  int fd = -1;
+  explicit FileDescriptor(int descriptor) : fd(descriptor) {}
+  FileDescriptor(const FileDescriptor&) = delete;
+  FileDescriptor& operator=(const FileDescriptor&) = delete;
+  ~FileDescriptor() {
+    if (fd >= 0) ::close(fd);
+  }
+};
+
+Status sync_path(const fs::path& path, int flags) {
+  const FileDescriptor file(::open(path.c_str(), flags | O_CLOEXEC));
+  if (file.fd < 0) return io_error("cannot open to sync", path);
+  if (::fsync(file.fd) != 0) return io_error("cannot sync", path);
+  return {};
+}
+
+Status write_all(int fd, ByteView bytes, const fs::path& path) {
+  while (!bytes.empty()) {
+    const ssize_t count = ::write(fd, bytes.data(), bytes.size());
+    if (count < 0 && errno == EINTR) continue;
+    if (count < 0) return io_error("cannot write", path);
+    bytes = bytes.subspan(static_cast<std::size_t>(count));
+  }
+  return {};
+}
+
+}  // namespace
+
+Result<Bytes> read_file(const fs::path& path, std::uint64_t max_size_bytes) {
+  // O_NONBLOCK: a named pipe must not make us wait for its writer.
+  const FileDescriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
+  if (file.fd < 0) return io_error("cannot open", path);
+  std::error_code error;
+  if (fs::is_directory(path, error)) {
+    return Error{ErrorKind::bad_input, fmt::format("{}: is a folder, expected a file", path.string())};
+  }
+  const std::uint64_t size = fs::file_size(path, error);
+  if (error) return Error{ErrorKind::io, fmt::format("{}: {}", path.string(), error.message())};
+  if (size > max_size_bytes) {
+    return Error{ErrorKind::bad_input,
+                 fmt::format("{}: {} bytes, at most {} are read", path.string(), size, max_size_bytes)};
+  }
+  Bytes bytes(size);
+  std::size_t done = 0;
+  while (done < bytes.size()) {
+    const ssize_t count = ::read(file.fd, bytes.data() + done, bytes.size() - done);
+    if (count < 0 && errno == EINTR) continue;
+    if (count < 0) return io_error("cannot read", path);
+    if (count == 0) break;
+    done += static_cast<std::size_t>(count);
+  }
+  bytes.resize(done);
+  return bytes;
+}
+
+Result<std::string> read_text_file(const fs::path& path, std::uint64_t max_size_bytes) {
+  BATON_ASSIGN(const Bytes bytes, read_file(path, max_size_bytes));
+  return std::string(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+}
+
+fs::path temporary_sibling(const fs::path& path) {
+  static std::atomic<std::uint64_t> counter{0};
+  fs::path temporary = path;
+  temporary.replace_filename(
+      fmt::format(".{}.{}.{}.tmp", path.filename().string(), ::getpid(), counter.fetch_add(1)));
+  return temporary;
+}
+
+Status publish_file(const fs::path& temporary, const fs::path& path) {
+  BATON_TRY(sync_path(temporary, O_RDONLY));
+  if (::rename(temporary.c_str(), path.c_str()) != 0) return io_error("cannot rename to", path);
+  return sync_folder(path.has_parent_path() ? path.parent_path() : fs::path("."));
+}
+
+Status sync_folder(const fs::path& folder) { return sync_path(folder, O_RDONLY | O_DIRECTORY); }
+
+Status write_file_atomic(const fs::path& path, ByteView bytes) {
+  std::error_code error;
+  if (path.has_parent_path()) fs::create_directories(path.parent_path(), error);
+  const fs::path temporary = temporary_sibling(path);
+  {
+    const FileDescriptor file(::open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644));
+    if (file.fd < 0) return io_error("cannot create", temporary);
+    if (Status written = write_all(file.fd, bytes, temporary); !written) {
+      ::unlink(temporary.c_str());
+      return written;
+    }
+  }
+  Status published = publish_file(temporary, path);
+  if (!published) ::unlink(temporary.c_str());
+  return published;
+}
+
+}  // namespace baton

@@ -1,0 +1,29 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <string_view>
+
+#include "common/base/bytes.h"
+#include "common/base/result.h"
+
+namespace baton {
+
+/// The whole file. Errors name the file: missing, not readable, larger than `max_size_bytes`.
+Result<Bytes> read_file(const std::filesystem::path& path, std::uint64_t max_size_bytes);
+Result<std::string> read_text_file(const std::filesystem::path& path, std::uint64_t max_size_bytes);
+
+/// Publishes `bytes` at `path` whole or not at all: temporary file in the same folder, fsync, rename, fsync of the
+/// folder. Creates missing folders. Two writers of the same path are harmless: the last rename wins.
+Status write_file_atomic(const std::filesystem::path& path, ByteView bytes);
+
+/// A temporary name beside `path` that no other process or thread uses.
+std::filesystem::path temporary_sibling(const std::filesystem::path& path);
+
+/// fsync `temporary`, rename it to `path`, fsync the folder: for files that a library wrote.
+Status publish_file(const std::filesystem::path& temporary, const std::filesystem::path& path);
+
+/// fsync a folder: names made or renamed in it survive a power cut.
+Status sync_folder(const std::filesystem::path& folder);
+
+}  // namespace baton

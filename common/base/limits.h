@@ -1,0 +1,45 @@
+#pragma once
+
+#include <cstddef>
+#include <cstdint>
+
+/// Every limit of the program, in one place.
+namespace baton::limits {
+
+inline constexpr std::uint64_t kMaxJobFileBytes = 16ull << 20;
+inline constexpr std::uint64_t kMaxAssetFileBytes = 8ull << 30;
+inline constexpr std::uint64_t kMaxBlobBytes = 4ull << 30;
+inline constexpr std::uint64_t kMaxMessageBytes = 64ull << 20;
+inline constexpr int kMaxMessageFrames = 4;      // with the peer's identity
+inline constexpr int kMaxQueuedMessages = 4096;  // per connection, either way
+inline constexpr int kMaxSections = 64;  // of one state or film file
+inline constexpr int kMaxChannels = 256;  // of one picture
+inline constexpr int kMaxImageSide = 32768;
+inline constexpr int kMaxFrames = 100000;
+inline constexpr int kMaxFrameNumber = 9999999;
+inline constexpr int kMaxMaterials = 4096;
+inline constexpr int kMaxMeshes = 4096;
+inline constexpr int kMaxObjects = 100000;
+inline constexpr int kMaxMetadata = 256;
+inline constexpr int kMaxNameLength = 100;
+inline constexpr int kMaxTextLength = 4096;
+inline constexpr int kMaxJsonDepth = 32;
+inline constexpr int kMaxFaultsReported = 100;
+inline constexpr int kMinTileSize = 8;
+inline constexpr int kMaxTileSize = 32768;
+inline constexpr int kMaxSites = 16;
+inline constexpr int kMaxParticles = 64;
+inline constexpr int kMaxCandidates = 8192;
+inline constexpr int kMaxDistributions = 64;
+inline constexpr int kMaxReferenceSamples = 1 << 24;
+inline constexpr int kMaxCheckpointEvery = 1000;
+inline constexpr int kMaxEnvironmentSide = 32768;
+inline constexpr std::uint64_t kMaxEnvironmentCacheBytes = 4ull << 30;  ///< per process and kind of entry
+inline constexpr int kMaxTasksPerJob = 4000000;
+inline constexpr int kMaxTaskAttempts = 16;
+inline constexpr int kMaxJobs = 10000;
+inline constexpr int kMaxWorkers = 4096;
+inline constexpr std::size_t kMaxCachedJobs = 4;            ///< loaded scenes a worker keeps
+inline constexpr std::size_t kMaxUnconfirmedReports = 256;  ///< reports a worker can repeat
+
+}  // namespace baton::limits

@@ -1,0 +1,26 @@
+#pragma once
+
+#include <span>
+
+#include "common/image/image_io.h"
+
+namespace baton {
+
+/// The exposure at which the picture's log-average luminance becomes middle grey, 0.18 [Reinhard et
+/// al. 2002, eq. 1]. Only finite pixels brighter than 0 count, so black surroundings do not matter;
+/// 1 when there are none.
+float auto_exposure(const RgbImage& image);
+
+/// Linear RGB to linear display RGB in [0, 1]: times `exposure`, then extended Reinhard [2002, eq.
+/// 4] with white at 8 times the diffuse white. Dark colours keep their hue (the curve runs on
+/// luminance), bright ones fade to white (it runs per channel). Negative and not finite values
+/// count as 0.
+RgbImage tone_map(const RgbImage& image, float exposure);
+
+/// All frames in reading order on one sheet of `columns` columns, `thumb_width` pixels wide each
+/// (height by the aspect of the first frame), 2 pixel gaps between and around them in dark grey.
+/// Frames shrink with a box filter, never grow smooth: an enlarged pixel stays a square. All frames
+/// must have one size; `frames` must not be empty.
+RgbImage contact_sheet(std::span<const RgbImage> frames, int columns, int thumb_width);
+
+}  // namespace baton

@@ -1,0 +1,229 @@
+#include <ImfChannelList.h>
+#include <ImfFrameBuffer.h>
+#include <ImfHeader.h>
+#include <ImfIO.h>
+#include <ImfInputFile.h>
+#include <ImfOutputFile.h>
+#include <ImfStringAttribute.h>
+#include <fmt/format.h>
+#include <half.h>
+
+#include <algorithm>
+#include <exception>
+#include <optional>
+
+#include "common/base/files.h"
+#include "common/base/limits.h"
+#include "common/image/image_io.h"
+
+namespace baton {
+namespace {
+
+/// OpenEXR compresses on the calling thread: the worker has its own threads.
+constexpr int kOpenExrThreads = 0;
+constexpr float kMaxHalf = 65504.0f;
+/// Rows read at a time, so that memory grows only with data that is really there.
+constexpr int kRowsPerRead = 256;
+
+/// Collects what OpenEXR writes. Errors of the disk then belong to write_file_atomic, which reports
+/// them all; OpenEXR's destructors would swallow them.
+class MemoryStream : public Imf::OStream {
+ public:
+  explicit MemoryStream(const char* name) : Imf::OStream(name) {}
+  void write(const char chars[], int count) override {
+    const auto size = static_cast<std::size_t>(count);
+    if (bytes_.size() < position_ + size) bytes_.resize(position_ + size);
+    std::memcpy(bytes_.data() + position_, chars, size);
+    position_ += size;
+  }
+  std::uint64_t tellp() override { return position_; }
+  void seekp(std::uint64_t position) override { position_ = position; }
+  Bytes take() { return std::move(bytes_); }
+
+ private:
+  Bytes bytes_;
+  std::size_t position_ = 0;
+};
+
+std::optional<Imf::Compression> compression_of(const std::string& name) {
+  if (name == "none") return Imf::NO_COMPRESSION;
+  if (name == "rle") return Imf::RLE_COMPRESSION;
+  if (name == "zips") return Imf::ZIPS_COMPRESSION;
+  if (name == "zip") return Imf::ZIP_COMPRESSION;
+  if (name == "piz") return Imf::PIZ_COMPRESSION;
+  return std::nullopt;
+}
+
+/// Channels whose use needs all 32 bits.
+bool always_float(const std::string& channel) {
+  return channel == "depth" || channel == "lns" || channel == "variance" ||
+         channel.starts_with("normal.");
+}
+
+std::vector<half> to_half(std::span<const float> values) {
+  std::vector<half> halves(values.size());
+  for (std::size_t i = 0; i < values.size(); ++i)
+    halves[i] = half(std::clamp(values[i], -kMaxHalf, kMaxHalf));
+  return halves;
+}
+
+/// Header with channels and metadata.
+Result<Imf::Header> make_header(const std::string& name, const FilmTile& image,
+                                const ExrOptions& options) {
+  const std::optional<Imf::Compression> compression = compression_of(options.compression);
+  if (!compression) {
+    return Error{ErrorKind::bad_input,
+                 fmt::format("{}: compression {}, expected none, rle, zips, zip or piz", name,
+                             options.compression)};
+  }
+  Imf::Header header(image.rect.width(), image.rect.height());
+  header.compression() = *compression;
+  for (const std::string& channel : image.channels) {
+    const bool is_half = options.half_float && !always_float(channel);
+    header.channels().insert(channel, Imf::Channel(is_half ? Imf::HALF : Imf::FLOAT));
+  }
+  for (const auto& [key, value] : options.metadata) {
+    if (header.find(key) != header.end()) {
+      return Error{ErrorKind::bad_input,
+                   fmt::format("{}: metadata {} is there already", name, key)};
+    }
+    header.insert(key, Imf::StringAttribute(value));
+  }
+  return header;
+}
+
+/// The whole file in memory. Throws what OpenEXR throws.
+Bytes encode_exr(const std::string& name, const Imf::Header& header, const FilmTile& image) {
+  const std::size_t width = static_cast<std::size_t>(image.rect.width());
+  std::vector<std::vector<half>> halves;
+  halves.reserve(image.channels.size());
+  Imf::FrameBuffer frame_buffer;
+  for (std::size_t c = 0; c < image.channels.size(); ++c) {
+    const Imf::PixelType type = header.channels()[image.channels[c]].type;
+    const float* plane = image.plane(c);
+    const char* base = reinterpret_cast<const char*>(plane);
+    if (type == Imf::HALF) {
+      halves.push_back(to_half({plane, image.num_pixels()}));
+      base = reinterpret_cast<const char*>(halves.back().data());
+    }
+    const std::size_t pixel_bytes = type == Imf::HALF ? sizeof(half) : sizeof(float);
+    // OpenEXR only reads through this pointer when it writes a file.
+    frame_buffer.insert(image.channels[c], Imf::Slice(type, const_cast<char*>(base), pixel_bytes,
+                                                      pixel_bytes * width));
+  }
+  MemoryStream stream(name.c_str());
+  {
+    Imf::OutputFile file(stream, header, kOpenExrThreads);
+    file.setFrameBuffer(frame_buffer);
+    file.writePixels(image.rect.height());
+  }
+  return stream.take();
+}
+
+/// Rectangle and channel names of an open file, checked against the limits.
+Result<FilmTile> describe(const Imf::Header& header, const std::string& name) {
+  const Imath::Box2i& window = header.dataWindow();
+  const std::int64_t width = std::int64_t{window.max.x} - window.min.x + 1;
+  const std::int64_t height = std::int64_t{window.max.y} - window.min.y + 1;
+  if (width < 1 || height < 1 || width > limits::kMaxImageSide || height > limits::kMaxImageSide) {
+    return Error{ErrorKind::bad_input, fmt::format("{}: {} x {} pixels, expected 1 to {} a side",
+                                                   name, width, height, limits::kMaxImageSide)};
+  }
+  FilmTile image{{window.min.x, window.min.y, window.max.x + 1, window.max.y + 1}, {}, {}};
+  for (auto it = header.channels().begin(); it != header.channels().end(); ++it) {
+    const Imf::Channel& channel = it.channel();
+    if (channel.xSampling != 1 || channel.ySampling != 1) {
+      return Error{
+          ErrorKind::bad_input,
+          fmt::format("{}: channel {} is subsampled, expected one value a pixel", name, it.name())};
+    }
+    image.channels.emplace_back(it.name());
+  }
+  if (image.channels.empty() || image.channels.size() > limits::kMaxChannels) {
+    return Error{ErrorKind::bad_input, fmt::format("{}: {} channels, expected 1 to {}", name,
+                                                   image.channels.size(), limits::kMaxChannels)};
+  }
+  return image;
+}
+
+/// Reads `image.channels` into `image.values`. Throws what OpenEXR throws.
+void read_planes(Imf::InputFile& file, FilmTile& image) {
+  const auto width = static_cast<std::size_t>(image.rect.width());
+  const std::size_t row_bytes = width * sizeof(float);
+  std::vector<std::vector<float>> planes(image.channels.size());
+  for (std::int32_t y0 = image.rect.y0; y0 < image.rect.y1; y0 += kRowsPerRead) {
+    const std::int32_t y1 = std::min(y0 + kRowsPerRead, image.rect.y1);
+    Imf::FrameBuffer frame_buffer;
+    for (std::size_t c = 0; c < planes.size(); ++c) {
+      planes[c].resize(width * static_cast<std::size_t>(y1 - image.rect.y0));
+      // OpenEXR wants the address that pixel (0, 0) would have.
+      const auto origin = -static_cast<std::ptrdiff_t>(sizeof(float)) * image.rect.x0 -
+                          static_cast<std::ptrdiff_t>(row_bytes) * image.rect.y0;
+      char* base = reinterpret_cast<char*>(planes[c].data()) + origin;
+      frame_buffer.insert(image.channels[c],
+                          Imf::Slice(Imf::FLOAT, base, sizeof(float), row_bytes));
+    }
+    file.setFrameBuffer(frame_buffer);
+    file.readPixels(y0, y1 - 1);
+  }
+  for (const std::vector<float>& plane : planes)
+    image.values.insert(image.values.end(), plane.begin(), plane.end());
+}
+
+/// Opens an EXR file and calls `use(file)`; turns exceptions of OpenEXR into errors that name the
+/// file.
+template <class Use>
+auto with_exr_file(const std::filesystem::path& path, Use use)
+    -> decltype(use(std::declval<Imf::InputFile&>())) {
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(path, error)) {
+    return Error{ErrorKind::io, fmt::format("{}: no such file", path.string())};
+  }
+  try {
+    Imf::InputFile file(path.c_str(), kOpenExrThreads);
+    return use(file);
+  } catch (const std::exception& fault) {
+    return Error{ErrorKind::bad_input,
+                 fmt::format("{}: not a readable EXR file: {}", path.string(), fault.what())};
+  }
+}
+
+}  // namespace
+
+Status write_exr(const std::filesystem::path& path, const FilmTile& image,
+                 const ExrOptions& options) {
+  BATON_CHECK(image.rect.x0 == 0 && image.rect.y0 == 0 &&
+              image.rect.fits_within(limits::kMaxImageSide));
+  BATON_CHECK(!image.channels.empty() &&
+              image.values.size() == image.channels.size() * image.num_pixels());
+  const std::string name = path.string();
+  try {
+    BATON_ASSIGN(const Imf::Header header, make_header(name, image, options));
+    return write_file_atomic(path, encode_exr(name, header, image));
+  } catch (const std::exception& fault) {
+    return Error{ErrorKind::bad_input,
+                 fmt::format("{}: cannot be written as EXR: {}", name, fault.what())};
+  }
+}
+
+Result<FilmTile> read_exr(const std::filesystem::path& path) {
+  return with_exr_file(path, [&](Imf::InputFile& file) -> Result<FilmTile> {
+    BATON_ASSIGN(FilmTile image, describe(file.header(), path.string()));
+    read_planes(file, image);
+    return image;
+  });
+}
+
+Result<ImageMetadata> read_exr_metadata(const std::filesystem::path& path) {
+  return with_exr_file(path, [](Imf::InputFile& file) -> Result<ImageMetadata> {
+    ImageMetadata metadata;
+    const Imf::Header& header = file.header();
+    for (auto it = header.begin(); it != header.end(); ++it) {
+      const auto* text = dynamic_cast<const Imf::StringAttribute*>(&it.attribute());
+      if (text != nullptr) metadata.emplace_back(it.name(), text->value());
+    }
+    return metadata;
+  });
+}
+
+}  // namespace baton

@@ -1,0 +1,89 @@
+#include "common/image/film_tile.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+
+#include "common/base/limits.h"
+#include "common/base/section_file.h"
+
+namespace baton {
+namespace {
+
+constexpr SectionTag kMagic{'B', 'T', 'F', '1'};
+constexpr std::uint16_t kVersion = 1;
+constexpr SectionTag kMeta{'M', 'E', 'T', 'A'};
+constexpr SectionTag kPixels{'P', 'I', 'X', 'L'};
+constexpr std::array kTags{kMeta, kPixels};
+
+/// Fills rectangle and channel names.
+Status decode_meta(const SectionFile& file, const std::string& name, FilmTile& tile) {
+  const auto fail = [&](const std::string& what) {
+    return Error{ErrorKind::bad_input, fmt::format("{}: section META {}", name, what)};
+  };
+  const Section* meta = file.find(kMeta);
+  if (meta == nullptr) return fail("is missing");
+
+  // Read the rectangle and the names.
+  ByteReader reader(meta->payload);
+  for (std::int32_t* side : {&tile.rect.x0, &tile.rect.y0, &tile.rect.x1, &tile.rect.y1}) {
+    *side = reader.get<std::int32_t>();
+  }
+  const auto num_channels = reader.get<std::uint32_t>();
+  if (num_channels < 1 || num_channels > limits::kMaxChannels) {
+    return fail(
+        fmt::format("has {} channels, expected 1 to {}", num_channels, limits::kMaxChannels));
+  }
+  for (std::uint32_t i = 0; i < num_channels; ++i) {
+    std::string channel = reader.get_string();
+    if (channel.empty()) return fail(fmt::format("has no name for channel {}", i));
+    if (std::ranges::find(tile.channels, channel) != tile.channels.end()) {
+      return fail(fmt::format("has channel {} twice", channel));
+    }
+    tile.channels.push_back(std::move(channel));
+  }
+  if (!reader.ok() || !reader.at_end()) return fail("is not a rectangle and a list of names");
+
+  // Check the rectangle.
+  const PixelRect& rect = tile.rect;
+  if (!rect.fits_within(limits::kMaxImageSide)) {
+    return fail(
+        fmt::format("has rectangle [{}, {}) x [{}, {}), expected a non-empty one within 0..{}",
+                    rect.x0, rect.x1, rect.y0, rect.y1, limits::kMaxImageSide));
+  }
+  return {};
+}
+
+}  // namespace
+
+Bytes encode_film_tile(const FilmTile& tile) {
+  BATON_CHECK(!tile.channels.empty() &&
+              tile.values.size() == tile.channels.size() * tile.num_pixels());
+  ByteWriter meta;
+  for (const std::int32_t side : {tile.rect.x0, tile.rect.y0, tile.rect.x1, tile.rect.y1})
+    meta.put(side);
+  meta.put(static_cast<std::uint32_t>(tile.channels.size()));
+  for (const std::string& channel : tile.channels) meta.put_string(channel);
+  const ByteView pixels = std::as_bytes(std::span(tile.values));
+  return encode_section_file(
+      {kMagic,
+       kVersion,
+       {{kMeta, true, 1, meta.take()},
+        {kPixels, true, sizeof(float), Bytes(pixels.begin(), pixels.end())}}});
+}
+
+Result<FilmTile> decode_film_tile(ByteView bytes, const std::string& name) {
+  BATON_ASSIGN(const SectionFile file, decode_section_file(bytes, kMagic, kVersion, name));
+  BATON_TRY(check_known_sections(file, kTags, name));
+  FilmTile tile;
+  BATON_TRY(decode_meta(file, name, tile));
+  const std::uint64_t num_values = tile.channels.size() * tile.num_pixels();
+  BATON_ASSIGN(const ByteView payload,
+               section_payload(file, kPixels, num_values * sizeof(float), name));
+  tile.values.resize(num_values);
+  std::memcpy(tile.values.data(), payload.data(), payload.size());
+  return tile;
+}
+
+}  // namespace baton

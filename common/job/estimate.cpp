@@ -1,0 +1,71 @@
+#include "common/job/estimate.h"
+
+#include <algorithm>
+
+#include "common/job/sequence.h"
+
+namespace baton {
+namespace {
+
+/// Planes of an EXR that an AOV adds.
+std::int64_t num_channels(Aov aov) { return aov == Aov::source || aov == Aov::normal ? 3 : 1; }
+
+/// In memory: Lns, Lns when fresh and source of a pixel; direction, weight and site of a particle.
+constexpr std::int64_t kStateBytesPerPixel = 9;
+constexpr std::int64_t kStateBytesPerParticle = 9;
+/// As stored: 130 bytes a pixel at N = 16.
+constexpr std::int64_t kStoredBytesPerPixel = 10;
+constexpr double kStoredBytesPerParticle = 7.5;
+
+}  // namespace
+
+JobEstimate estimate_job(const JobSpec& job) {
+  JobEstimate e;
+  const std::int64_t pixels = std::int64_t{job.image.width} * job.image.height;
+
+  // Count tasks and what each waits for: a run for the one before it, a frame for its tiles.
+  e.frames = static_cast<std::int64_t>(job.frames.size());
+  const std::int64_t side = job.image.tile_size;
+  e.tiles = (job.image.width + side - 1) / side * ((job.image.height + side - 1) / side);
+  e.runs = num_runs(job);
+  e.render_tasks = e.tiles * e.runs;
+  e.assemble_tasks = e.frames;
+  e.dependencies = e.frames * e.tiles + (carries_state(job) ? e.tiles * (e.runs - 1) : 0);
+
+  // Count rays; a reference sample is a pair, one from the environment and one from the BRDF.
+  e.primary_rays_per_pixel = job.image.sites;
+  e.shadow_rays_per_pixel = job.sampling.method == Method::reference
+                                ? std::int64_t{2} * job.sampling.reference_samples
+                                : job.sampling.num_particles;
+
+  // Add up the planes: R, G, B, A and the AOVs.
+  std::int64_t wide_channels = 0;
+  e.film_channels = 4;
+  for (const Aov aov : job.output.aovs) {
+    e.film_channels += num_channels(aov);
+    const bool wide =
+        aov == Aov::depth || aov == Aov::lns || aov == Aov::variance || aov == Aov::normal;
+    wide_channels += wide ? num_channels(aov) : 0;
+  }
+  e.film_bytes = pixels * e.film_channels * 4;
+  const std::int64_t sample_bytes = job.output.pixel_type == PixelType::half_float ? 2 : 4;
+  e.frame_bytes = pixels * ((e.film_channels - wide_channels) * sample_bytes + wide_channels * 4);
+
+  // Size the state and the largest blob.
+  const std::int64_t tile_pixels = std::min<std::int64_t>(side, job.image.width) *
+                                   std::min<std::int64_t>(side, job.image.height);
+  const std::int64_t particles = job.sampling.num_particles;
+  e.largest_blob_bytes = tile_pixels * e.film_channels * 4;
+  if (carries_state(job)) {
+    e.state_bytes_per_pixel =
+        kStoredBytesPerPixel +
+        static_cast<std::int64_t>(kStoredBytesPerParticle * static_cast<double>(particles));
+    e.state_bytes = pixels * e.state_bytes_per_pixel;
+    e.largest_blob_bytes =
+        std::max(e.largest_blob_bytes,
+                 tile_pixels * (kStateBytesPerPixel + kStateBytesPerParticle * particles));
+  }
+  return e;
+}
+
+}  // namespace baton

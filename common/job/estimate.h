@@ -1,0 +1,33 @@
+#pragma once
+
+#include <cstdint>
+
+#include "common/job/job_spec.h"
+
+namespace baton {
+
+/// What a job will take, from its numbers alone: for `baton check` and for the limits of the
+/// parser.
+struct JobEstimate {
+  std::int64_t frames = 0;
+  std::int64_t tiles = 0;
+  std::int64_t runs = 0;            ///< per tile
+  std::int64_t render_tasks = 0;    ///< tiles * runs
+  std::int64_t assemble_tasks = 0;  ///< one a frame
+  std::int64_t dependencies = 0;    ///< of a task on another
+  std::int64_t primary_rays_per_pixel = 0;
+  std::int64_t shadow_rays_per_pixel = 0;
+  std::int64_t film_channels = 0;
+  std::int64_t film_bytes = 0;             ///< of one frame as float32 tiles, before compression
+  std::int64_t frame_bytes = 0;            ///< of one EXR, before compression
+  std::int64_t state_bytes_per_pixel = 0;  ///< as stored; 0 when no state is carried
+  std::int64_t state_bytes = 0;            ///< of all tiles at one checkpoint
+  std::int64_t largest_blob_bytes = 0;     ///< one tile's film or state in memory
+
+  std::int64_t tasks() const { return render_tasks + assemble_tasks; }
+};
+
+/// job: each value in its own range; needs no assets.
+JobEstimate estimate_job(const JobSpec& job);
+
+}  // namespace baton

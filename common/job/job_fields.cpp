@@ -1,0 +1,149 @@
+#include "common/job/job_fields.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/base/limits.h"
+#include "common/job/estimate.h"
+#include "common/job/frame_range.h"
+
+namespace baton {
+namespace {
+
+void name_fields(JobArchive& a, JobSpec& job) {
+  if (!a.text(required("name"), job.name)) return;
+  // The name becomes a folder.
+  const bool good = job.name.size() <= limits::kMaxNameLength &&
+                    job.name.find('/') == std::string::npos && job.name.front() != '.';
+  if (!good) {
+    a.fault("name",
+            fmt::format("at most {} bytes without '/' and not starting with '.'",
+                        limits::kMaxNameLength),
+            fmt::format("\"{}\"", job.name.substr(0, 60)));
+  }
+}
+
+void frame_fields(JobArchive& a, JobSpec& job) {
+  std::string text = format_frames(job.frames);
+  if (!a.text("frames", text)) return;
+  Result<std::vector<int>> frames = parse_frames(text);
+  if (frames) {
+    job.frames = std::move(frames).value();
+  } else {
+    a.fault("frames", frames.error().message);
+  }
+}
+
+void fields(JobArchive& a, ImageSpec& image) {
+  a.integer("width", image.width, 1, limits::kMaxImageSide);
+  a.integer("height", image.height, 1, limits::kMaxImageSide);
+  if (a.integer("sites", image.sites, 1, limits::kMaxSites)) {
+    const int root = static_cast<int>(std::lround(std::sqrt(image.sites)));
+    if (root * root != image.sites)
+      a.fault("sites", "one of 1, 4, 9, 16", std::to_string(image.sites));
+  }
+  a.integer("tileSize", image.tile_size, limits::kMinTileSize, limits::kMaxTileSize);
+}
+
+void fields(JobArchive& a, CameraSpec& camera) {
+  a.vector("position", camera.position, kCoordinateRange);
+  a.vector("lookAt", camera.look_at, kCoordinateRange);
+  a.vector("up", camera.up, kCoordinateRange);
+  a.number("verticalFovDeg", camera.vertical_fov_deg,
+           {.min = 0, .max = 180, .min_open = true, .max_open = true});
+
+  // The three vectors must span a view.
+  const Vec3 view = camera.look_at - camera.position;
+  if (!(length(view) > 0)) {
+    a.fault("lookAt", "another point than position", "the same");
+  } else if (!(length(camera.up) > 0)) {
+    a.fault("up", "a direction", "[0, 0, 0]");
+  } else if (length(cross(normalize(view), normalize(camera.up))) < 1e-4f) {
+    a.fault("up", "a direction across the view from position to lookAt", "one along it");
+  }
+}
+
+void fields(JobArchive& a, SamplingSpec& sampling) {
+  a.choice("method", sampling.method, kMethods);
+  a.integer("numParticles", sampling.num_particles, 1, limits::kMaxParticles);
+  a.integer("numCandidates", sampling.num_candidates, 1, limits::kMaxCandidates);
+  if (sampling.num_candidates < sampling.num_particles) {
+    a.fault("numCandidates", fmt::format("at least numParticles ({})", sampling.num_particles),
+            std::to_string(sampling.num_candidates));
+  }
+  a.number("brdfFraction", sampling.brdf_fraction, kUnitRange);
+  a.boolean("misCompensation", sampling.mis_compensation);
+  a.integer("numDistributions", sampling.num_distributions, 1, limits::kMaxDistributions);
+  a.number("essRatioMin", sampling.ess_ratio_min, kUnitRange);
+  a.choice("resampling", sampling.resampling, kResamplingSchemes);
+  a.number("localMoveDeg", sampling.local_move_deg, {.min = 0, .max = 90, .min_open = true});
+  a.number("localMoveFraction", sampling.local_move_fraction, kUnitRange);
+  a.integer("referenceSamples", sampling.reference_samples, 2, limits::kMaxReferenceSamples);
+}
+
+void fields(JobArchive& a, OutputSpec& output, const JobSpec& job) {
+  if (output.directory.empty()) output.directory = job.name + "-frames";
+  a.path("directory", output.directory);
+  a.text("pattern", output.pattern);
+  const auto got = [&] { return fmt::format("\"{}\"", output.pattern.substr(0, 60)); };
+  if (output.pattern.find('/') != std::string::npos || !output.pattern.ends_with(".exr")) {
+    a.fault("pattern", "a file name that ends in .exr, without folders", got());
+  } else if (job.frames.size() > 1 && output.pattern.find('#') == std::string::npos) {
+    a.fault("pattern", "a '#' for each digit of the frame number, as there are several frames",
+            got());
+  }
+  a.choice("background", output.background, kBackgrounds);
+  a.choices("aovs", output.aovs, kAovs);
+  a.choice("pixelType", output.pixel_type, kPixelTypes);
+  a.word("compression", output.compression, kCompressions);
+}
+
+void fields(JobArchive& a, StateSpec& state) {
+  a.boolean("carry", state.carry);
+  a.integer("checkpointEvery", state.checkpoint_every, 1, limits::kMaxCheckpointEvery);
+  a.choice("keep", state.keep, kStateKeeps);
+}
+
+/// What no single value shows: too many tasks, tiles that no blob holds.
+void check_size(JobArchive& a, const JobSpec& job) {
+  const JobEstimate estimate = estimate_job(job);
+  if (estimate.tasks() > limits::kMaxTasksPerJob) {
+    a.fault(
+        "",
+        fmt::format("at most {} tasks (larger image.tileSize or state.checkpointEvery make fewer)",
+                    limits::kMaxTasksPerJob),
+        std::to_string(estimate.tasks()));
+  }
+  if (estimate.largest_blob_bytes > static_cast<std::int64_t>(limits::kMaxBlobBytes)) {
+    a.fault("image",
+            fmt::format("tiles of at most {} bytes (a smaller tileSize makes smaller ones)",
+                        limits::kMaxBlobBytes),
+            std::to_string(estimate.largest_blob_bytes));
+  }
+}
+
+}  // namespace
+
+void fields(JobArchive& a, JobSpec& job) {
+  a.integer("specificationVersion", job.specification_version, 1, 1);
+  name_fields(a, job);
+  a.integer("priority", job.priority, 0, 100);
+  a.texts("metadata", job.metadata, limits::kMaxMetadata);
+  frame_fields(a, job);
+  a.integer("seed", job.seed);
+  a.object("image", [&] { fields(a, job.image); });
+  a.object("camera", [&] { fields(a, job.camera); });
+  a.object(required("scene"), [&] { fields(a, job.scene); }, {.file = true});
+  a.object(required("environment"), [&] { fields(a, job.environment, job.frames); });
+  a.object("sampling", [&] { fields(a, job.sampling); });
+  a.object("output", [&] { fields(a, job.output, job); });
+  a.object("state", [&] { fields(a, job.state); });
+  a.integer("maxRetriesPerTask", job.max_retries_per_task, 0, limits::kMaxTaskAttempts - 1);
+  a.integer("maxFailedTasks", job.max_failed_tasks, 1, limits::kMaxTasksPerJob);
+  a.integer("maxFailuresPerWorker", job.max_failures_per_worker, 1, limits::kMaxTasksPerJob);
+  check_size(a, job);
+}
+
+}  // namespace baton

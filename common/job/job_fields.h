@@ -1,0 +1,43 @@
+#pragma once
+
+#include <array>
+#include <string_view>
+
+#include "common/job/job_archive.h"
+#include "common/job/job_spec.h"
+
+namespace baton {
+
+/// Colours and factors.
+inline constexpr NumberRange kUnitRange{0, 1};
+/// Positions: far beyond it float32 has no digits left for the picture.
+inline constexpr NumberRange kCoordinateRange{-1e9, 1e9};
+/// Lengths and factors above zero.
+inline constexpr NumberRange kPositiveRange{.min = 0, .max = 1e9, .min_open = true};
+/// Angles in degrees.
+inline constexpr NumberRange kAngleRange{-1e6, 1e6};
+
+/// Names of the enumerations in JSON, by value.
+inline constexpr std::array<std::string_view, 3> kMaterialKinds{"diffuse", "phong",
+                                                                "metallicRoughness"};
+inline constexpr std::array<std::string_view, 2> kMapFilters{"nearest", "bilinear"};
+inline constexpr std::array<std::string_view, 6> kMethods{
+    "reference", "environment", "brdf", "mis", "bidirectional", "sequential"};
+inline constexpr std::array<std::string_view, 4> kResamplingSchemes{"systematic", "stratified",
+                                                                    "multinomial", "residual"};
+inline constexpr std::array<std::string_view, 2> kBackgrounds{"environment", "transparent"};
+inline constexpr std::array<std::string_view, 8> kAovs{
+    "lns", "visibility", "ess", "acceptance", "source", "normal", "depth", "variance"};
+inline constexpr std::array<std::string_view, 2> kPixelTypes{"half", "float"};
+inline constexpr std::array<std::string_view, 5> kCompressions{"none", "rle", "zips", "zip", "piz"};
+inline constexpr std::array<std::string_view, 2> kStateKeeps{"last", "all"};
+
+/// The JSON shape of a job and every check that needs nothing but the job. Documented, key by key,
+/// in jobs/schema/job.schema.json.
+void fields(JobArchive& a, JobSpec& job);
+
+/// scene_fields.cpp
+void fields(JobArchive& a, SceneSpec& scene);
+void fields(JobArchive& a, EnvironmentSpec& environment, const std::vector<int>& frames);
+
+}  // namespace baton

@@ -1,0 +1,156 @@
+#include "common/job/job_json.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <set>
+
+#include "common/base/files.h"
+#include "common/base/limits.h"
+#include "common/job/job_fields.h"
+#include "common/job/job_json_reader.h"
+#include "common/job/job_json_text.h"
+#include "common/job/job_json_writer.h"
+
+namespace baton {
+namespace {
+
+using nlohmann::json;
+using nlohmann::ordered_json;
+
+constexpr int kMaxAssets = limits::kMaxMeshes + limits::kMaxFrames;
+
+/// Bytes that are no UTF-8 (a folder's name can hold them) are replaced: the path will then be
+/// reported as missing.
+std::string dump(const ordered_json& value, int indent) {
+  return value.dump(indent, ' ', false, ordered_json::error_handler_t::replace);
+}
+
+void fields(JobArchive& a, AssetDigest& asset) {
+  a.path(required("path"), asset.path);
+  std::string hex = asset.digest.hex();
+  if (!a.text(required("digest"), hex)) return;
+  const std::optional<Digest> digest = Digest::from_hex(hex);
+  if (!digest) a.fault("digest", "32 hexadecimal digits", fmt::format("\"{}\"", hex));
+  asset.digest = digest.value_or(Digest{});
+}
+
+void fields(JobArchive& a, ParsedJobDocument& document) {
+  a.object(required("job"), [&] { fields(a, document.job); });
+  a.list(required("assets"), document.assets, kMaxAssets,
+         [&](AssetDigest& asset) { fields(a, asset); });
+}
+
+template <class T>
+std::string write(T value, int indent) {
+  JobJsonWriter writer;
+  fields(writer, value);
+  return dump(writer.json(), indent);
+}
+
+/// Reads a T; `defaulted`, where wanted, gets the paths of the values that the text does not give.
+template <class T>
+Result<T> read(std::string_view text, const std::string& name,
+               const std::filesystem::path& base_directory,
+               std::set<std::string>* defaulted = nullptr) {
+  BATON_ASSIGN(const json root, parse_json_text(text, name));
+  T value;
+  JobJsonReader reader(name, base_directory);
+  BATON_TRY(reader.read(root, [&] { fields(reader, value); }));
+  if (defaulted != nullptr) *defaulted = reader.defaulted();
+  return value;
+}
+
+/// Digests of all files; one error names each that cannot be read.
+Result<std::vector<AssetDigest>> digest_files(const std::vector<std::string>& paths) {
+  std::vector<AssetDigest> assets;
+  std::string faults;
+  for (const std::string& path : paths) {
+    const Result<Bytes> bytes = read_file(path, limits::kMaxAssetFileBytes);
+    if (bytes) assets.push_back({path, digest_of(*bytes)});
+    if (!bytes) faults += (faults.empty() ? "" : "\n") + bytes.error().message;
+  }
+  if (!faults.empty()) return Error{ErrorKind::bad_input, faults};
+  return assets;
+}
+
+/// Appends the leaves of `value`, in order. given: whether the text says anything about it.
+void collect_settings(const ordered_json& value, const std::string& path,
+                      const std::set<std::string>& defaulted, bool given,
+                      std::vector<JobSetting>& settings) {
+  given = given && !defaulted.contains(path);
+  const bool vector = value.is_array() && (value.empty() || !value.front().is_object());
+  if (value.is_object() && !value.empty()) {
+    for (const auto& [key, inner] : value.items()) {
+      collect_settings(inner, json_path_key(path, key), defaulted, given, settings);
+    }
+  } else if (value.is_array() && !vector) {
+    for (std::size_t i = 0; i < value.size(); ++i) {
+      collect_settings(value[i], json_path_index(path, i), defaulted, given, settings);
+    }
+  } else {
+    settings.push_back({path, dump(value, -1), given});
+  }
+}
+
+}  // namespace
+
+Result<JobSpec> parse_job(std::string_view text, const std::string& name,
+                          const std::filesystem::path& base_directory) {
+  return read<JobSpec>(text, name, base_directory);
+}
+
+Result<JobSpec> load_job(const std::filesystem::path& path) {
+  BATON_ASSIGN(const std::string text, read_text_file(path, limits::kMaxJobFileBytes));
+  return parse_job(text, path.string(), path.parent_path());
+}
+
+std::string to_json(const JobSpec& job) { return write(job, 2); }
+
+Result<std::vector<JobSetting>> explain_job(const std::filesystem::path& path) {
+  BATON_ASSIGN(const std::string text, read_text_file(path, limits::kMaxJobFileBytes));
+  std::set<std::string> defaulted;
+  BATON_ASSIGN(const JobSpec job,
+               read<JobSpec>(text, path.string(), path.parent_path(), &defaulted));
+  std::vector<JobSetting> settings;
+  collect_settings(ordered_json::parse(to_json(job)), "$", defaulted, true, settings);
+  return settings;
+}
+
+std::vector<std::string> asset_paths(const JobSpec& job) {
+  std::set<std::string> paths;
+  for (const auto& item : job.scene.meshes) paths.insert(item.second.path);
+  for (const EnvironmentKey& key : job.environment.keys) paths.insert(key.map);
+  return {paths.begin(), paths.end()};
+}
+
+Result<std::string> make_job_document(const JobSpec& job) {
+  ParsedJobDocument document{.job = job, .assets = {}, .digest = {}};
+  BATON_ASSIGN(document.assets, digest_files(asset_paths(job)));
+  return write(std::move(document), -1);
+}
+
+Result<ParsedJobDocument> parse_job_document(std::string_view text) {
+  BATON_ASSIGN(ParsedJobDocument document, read<ParsedJobDocument>(text, "job document", "/"));
+  document.digest = digest_of(text);
+  return document;
+}
+
+Status verify_assets(const std::vector<AssetDigest>& assets) {
+  std::string faults;
+  for (const AssetDigest& asset : assets) {
+    const Result<std::vector<AssetDigest>> now = digest_files({asset.path});
+    std::string fault;
+    if (!now) {
+      fault = now.error().message;
+    } else if (now->front().digest != asset.digest) {
+      fault = fmt::format("{}: changed since the job was submitted: expected digest {}, got {}",
+                          asset.path, asset.digest.hex(), now->front().digest.hex());
+    }
+    if (!fault.empty()) faults += (faults.empty() ? "" : "\n") + fault;
+  }
+  if (!faults.empty()) return Error{ErrorKind::bad_input, faults};
+  return {};
+}
+
+}  // namespace baton

@@ -1,0 +1,63 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "common/base/digest.h"
+#include "common/base/result.h"
+#include "common/job/job_spec.h"
+
+namespace baton {
+
+/// The job of a JSON text. name goes first in every error line (usually the file); relative paths
+/// are taken relative to base_directory. One Error lists every fault, one per line: `job.json:
+/// $.image.width: expected an integer in [1, 32768], got "wide"`; an unknown key names the likely
+/// one. Schema: jobs/schema/job.schema.json.
+Result<JobSpec> parse_job(std::string_view json, const std::string& name,
+                          const std::filesystem::path& base_directory);
+
+/// Reads and parses a job file.
+Result<JobSpec> load_job(const std::filesystem::path& path);
+
+/// Canonical JSON of a job: every default written out, absolute paths, keys in a fixed order.
+/// parse_job(to_json(j)) == j.
+std::string to_json(const JobSpec& job);
+
+/// One value in force, for `baton check --explain`.
+struct JobSetting {
+  std::string path;    ///< in the canonical JSON, e.g. `$.image.width`
+  std::string value;   ///< as JSON
+  bool given = false;  ///< said by the job file; otherwise a default
+};
+
+/// Every value of a job file in force, in the order of to_json. Errors: those of load_job.
+Result<std::vector<JobSetting>> explain_job(const std::filesystem::path& path);
+
+/// A file that the job reads, with the digest of its contents when the job was submitted.
+struct AssetDigest {
+  std::string path;  ///< absolute
+  Digest digest;
+  bool operator==(const AssetDigest&) const = default;
+};
+
+/// All asset paths of the job (meshes, maps), sorted, no duplicates.
+std::vector<std::string> asset_paths(const JobSpec& job);
+
+/// What is submitted, journalled and sent to workers: to_json(job) plus asset digests, as one JSON
+/// text. Reads every asset; errors name the missing or unreadable ones, all of them.
+Result<std::string> make_job_document(const JobSpec& job);
+
+struct ParsedJobDocument {
+  JobSpec job;
+  std::vector<AssetDigest> assets;
+  Digest digest;  ///< digest_of(text): the identity of the job
+};
+Result<ParsedJobDocument> parse_job_document(std::string_view text);
+
+/// Checks that every asset still has the digest it had at submission. The error names each file
+/// that changed.
+Status verify_assets(const std::vector<AssetDigest>& assets);
+
+}  // namespace baton

@@ -1,0 +1,186 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "common/base/digest.h"
+#include "common/math/vec3.h"
+
+namespace baton {
+
+/// Everything a job says, with every default filled in. Plain data: JSON is known only to job_json.cpp.
+/// Units: lengths in scene units, angles in degrees, colours linear RGB. Paths are absolute after parsing.
+
+// ---- image -------------------------------------------------------------------------------------------------
+struct ImageSpec {
+  int width = 640;     ///< pixels, [1, limits::kMaxImageSide]
+  int height = 360;    ///< pixels
+  int sites = 1;       ///< primary rays per pixel: 1, 4, 9 or 16 (stratified; box filter)
+  int tile_size = 64;  ///< side of a farm tile in pixels; never changes the picture
+
+  bool operator==(const ImageSpec&) const = default;
+};
+
+// ---- camera ------------------------------------------------------------------------------------------------
+struct CameraSpec {
+  Vec3 position{0, 0, 5};
+  Vec3 look_at{0, 0, 0};
+  Vec3 up{0, 1, 0};
+  float vertical_fov_deg = 40;  ///< (0, 180)
+
+  bool operator==(const CameraSpec&) const = default;
+};
+
+// ---- scene -------------------------------------------------------------------------------------------------
+enum class MaterialKind : std::uint8_t { diffuse, phong, metallic_roughness };
+
+/// diffuse: base_color is the albedo. phong: kd * base_color diffuse + ks * specular_color normalised lobe of
+/// `exponent`. metallic_roughness: GGX with base_color, metallic, roughness (glTF 2.0).
+struct MaterialSpec {
+  MaterialKind kind = MaterialKind::diffuse;
+  Rgb base_color{0.8f, 0.8f, 0.8f};
+  Rgb specular_color{1, 1, 1};  ///< phong
+  float kd = 0.5f;              ///< phong, [0, 1]
+  float ks = 0.5f;              ///< phong, [0, 1]; kd + ks <= 1
+  float exponent = 50;          ///< phong, [1, 100000]
+  float metallic = 0;           ///< [0, 1]
+  float roughness = 0.5f;       ///< [0.02, 1]; alpha = roughness^2
+
+  bool operator==(const MaterialSpec&) const = default;
+};
+
+struct MeshSpec {
+  std::string path;           ///< .ply .obj .off .gltf .glb
+  bool smooth_normals = true;  ///< interpolate vertex normals (computed when the file has none)
+
+  bool operator==(const MeshSpec&) const = default;
+};
+
+/// A mesh placed in the world: first scaled, then rotated (x, then y, then z), then translated. `place_on_ground` moves
+/// it so that its lowest point has y = 0 (before `translate`); `fit_height` scales it to that height first.
+struct ObjectSpec {
+  std::string mesh;
+  std::string material;
+  Vec3 translate{0, 0, 0};
+  Vec3 rotate_deg{0, 0, 0};
+  Vec3 scale{1, 1, 1};
+  std::optional<float> fit_height;
+  bool place_on_ground = false;
+
+  bool operator==(const ObjectSpec&) const = default;
+};
+
+/// A horizontal square centred on the origin.
+struct GroundSpec {
+  std::string material;
+  float height = 0;
+  float size = 100;  ///< side length
+
+  bool operator==(const GroundSpec&) const = default;
+};
+
+struct SceneSpec {
+  std::map<std::string, MaterialSpec> materials;
+  std::map<std::string, MeshSpec> meshes;
+  std::vector<ObjectSpec> objects;
+  std::optional<GroundSpec> ground;
+
+  bool operator==(const SceneSpec&) const = default;
+};
+
+// ---- environment -------------------------------------------------------------------------------------------
+enum class MapFilter : std::uint8_t { nearest, bilinear };
+
+/// The map at one frame number; between keys the texels are interpolated linearly, outside they are held.
+struct EnvironmentKey {
+  double frame = 1;
+  std::string map;  ///< lat-long .exr or .hdr
+
+  bool operator==(const EnvironmentKey&) const = default;
+};
+
+/// Numbered frames are keys at every frame with `interpolate` false: the last key at or before the frame holds.
+struct EnvironmentSpec {
+  std::vector<EnvironmentKey> keys;  ///< sorted by frame, at least one
+  bool interpolate = true;
+  MapFilter filter = MapFilter::bilinear;
+  float scale = 1;                 ///< radiance factor, (0, inf)
+  Vec3 rotation_axis{0, 1, 0};
+  double rotation_start_deg = 0;   ///< at the first frame of the job
+  double rotation_deg_per_frame = 0;
+
+  bool operator==(const EnvironmentSpec&) const = default;
+};
+
+// ---- sampling ----------------------------------------------------------------------------------------------
+enum class Method : std::uint8_t { reference, environment, brdf, mis, bidirectional, sequential };
+enum class ResamplingScheme : std::uint8_t { systematic, stratified, multinomial, residual };
+
+struct SamplingSpec {
+  Method method = Method::sequential;
+  int num_particles = 16;          ///< N: shadow rays per pixel, [1, limits::kMaxParticles]
+  int num_candidates = 128;        ///< M: SIR candidates, [N, limits::kMaxCandidates]
+  float brdf_fraction = 0.5f;      ///< share of candidates drawn from the BRDF, [0, 1]; mis and bidirectional
+  bool mis_compensation = false;   ///< [Karlik et al. 2019]; mis
+  int num_distributions = 5;       ///< P: intermediate distributions per frame, [1, limits::kMaxDistributions]
+  float ess_ratio_min = 0.5f;      ///< resample when ESS < ess_ratio_min * N, [0, 1]
+  ResamplingScheme resampling = ResamplingScheme::systematic;
+  float local_move_deg = 4;        ///< half-angle of local moves, (0, 90]
+  float local_move_fraction = 0.5f;  ///< share of moves that are local, [0, 1]
+  int reference_samples = 1024;    ///< paired samples per pixel of `reference`, [2, 2^24]
+
+  bool operator==(const SamplingSpec&) const = default;
+};
+
+// ---- output, state, farm -----------------------------------------------------------------------------------
+enum class Background : std::uint8_t { environment, transparent };
+enum class Aov : std::uint8_t { lns, visibility, ess, acceptance, source, normal, depth, variance };
+enum class PixelType : std::uint8_t { half_float, full_float };
+
+struct OutputSpec {
+  std::string directory;                 ///< absolute
+  std::string pattern = "frame.####.exr";  ///< '#'s are the zero-padded frame number
+  Background background = Background::environment;
+  std::vector<Aov> aovs;                 ///< in the order of the enum, no duplicates
+  PixelType pixel_type = PixelType::half_float;
+  std::string compression = "zip";       ///< none, rle, zips, zip, piz
+
+  bool operator==(const OutputSpec&) const = default;
+};
+
+enum class StateKeep : std::uint8_t { last, all };
+
+struct StateSpec {
+  bool carry = true;           ///< pass samples from frame to frame
+  int checkpoint_every = 12;   ///< frames per lease; the state is durable after each, [1, 1000]
+  StateKeep keep = StateKeep::last;  ///< `all` keeps every checkpoint after the job
+
+  bool operator==(const StateSpec&) const = default;
+};
+
+struct JobSpec {
+  int specification_version = 1;
+  std::string name;
+  int priority = 50;  ///< [0, 100], higher runs first
+  std::map<std::string, std::string> metadata;
+  std::vector<int> frames{1};  ///< ascending, no duplicates
+  ImageSpec image;
+  CameraSpec camera;
+  SceneSpec scene;
+  EnvironmentSpec environment;
+  SamplingSpec sampling;
+  OutputSpec output;
+  StateSpec state;
+  int max_retries_per_task = 3;
+  int max_failed_tasks = 1;       ///< the job fails when so many tasks have failed for good
+  int max_failures_per_worker = 8;  ///< a worker gets no more tasks of the job after so many failures
+  std::uint64_t seed = 1;
+
+  bool operator==(const JobSpec&) const = default;
+};
+
+}  // namespace baton

@@ -1,0 +1,171 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cctype>
+#include <filesystem>
+
+#include "common/base/limits.h"
+#include "common/job/job_fields.h"
+#include "common/job/sequence.h"
+#include "common/job/suggest.h"
+
+namespace baton {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A path whose name ends in one of `extensions`.
+void asset_path(JobArchive& a, Key key, std::string& path,
+                std::initializer_list<std::string_view> extensions) {
+  if (!a.path(key, path)) return;
+  std::string extension = fs::path(path).extension().string();
+  for (char& c : extension) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  if (std::find(extensions.begin(), extensions.end(), extension) != extensions.end()) return;
+
+  std::string expected = "a file name that ends in";
+  for (const std::string_view e : extensions) expected += fmt::format(" {}", e);
+  a.fault(key.name, expected, fmt::format("\"{}\"", fs::path(path).filename().string()));
+}
+
+/// A name that must be a key of `named`.
+template <class T>
+void reference(JobArchive& a, const char* key, std::string& name,
+               const std::map<std::string, T>& named, const char* what) {
+  if (!a.text(required(key), name) || named.contains(name)) return;
+  std::vector<std::string> known;
+  if (a.explains_faults()) {
+    for (const auto& item : named) known.push_back(item.first);
+  }
+  a.fault(key, fmt::format("the name of a {}", what),
+          fmt::format("\"{}\"{}", name, suggestion(name, known)));
+}
+
+void fields(JobArchive& a, MaterialSpec& material) {
+  a.choice(required("type"), material.kind, kMaterialKinds);
+  a.vector("color", material.base_color, kUnitRange);
+  switch (material.kind) {
+    case MaterialKind::diffuse:
+      break;
+    case MaterialKind::phong:
+      a.vector("specularColor", material.specular_color, kUnitRange);
+      a.number("kd", material.kd, kUnitRange);
+      a.number("ks", material.ks, kUnitRange);
+      a.number("exponent", material.exponent, {1, 100000});
+      // Float sums such as 0.7 + 0.3 may be an ulp above 1.
+      if (material.kd + material.ks > 1.000001f) {
+        a.fault("ks", "kd + ks <= 1, or the material makes light",
+                fmt::format("{}", material.kd + material.ks));
+      }
+      break;
+    case MaterialKind::metallic_roughness:
+      a.number("metallic", material.metallic, kUnitRange);
+      a.number("roughness", material.roughness, {0.02, 1});
+      break;
+  }
+}
+
+void fields(JobArchive& a, MeshSpec& mesh) {
+  asset_path(a, required("path"), mesh.path, {".ply", ".obj", ".off", ".gltf", ".glb"});
+  a.boolean("smoothNormals", mesh.smooth_normals);
+}
+
+void fields(JobArchive& a, ObjectSpec& object, const SceneSpec& scene) {
+  reference(a, "mesh", object.mesh, scene.meshes, "mesh");
+  reference(a, "material", object.material, scene.materials, "material");
+  a.vector("translate", object.translate, kCoordinateRange);
+  a.vector("rotateDeg", object.rotate_deg, kAngleRange);
+  a.vector("scale", object.scale, kPositiveRange, true);
+  a.number("fitHeight", object.fit_height, kPositiveRange);
+  a.boolean("placeOnGround", object.place_on_ground);
+}
+
+void fields(JobArchive& a, GroundSpec& ground, const SceneSpec& scene) {
+  reference(a, "material", ground.material, scene.materials, "material");
+  a.number("height", ground.height, kCoordinateRange);
+  a.number("size", ground.size, kPositiveRange);
+}
+
+void fields(JobArchive& a, EnvironmentKey& key) {
+  a.number(required("frame"), key.frame, {0, limits::kMaxFrameNumber});
+  asset_path(a, required("map"), key.map, {".exr", ".hdr"});
+}
+
+/// One key per frame of the job from a numbered name such as "sky.####.exr".
+void expand_numbered(JobArchive& a, const fs::path& numbered, const std::vector<int>& frames,
+                     std::vector<EnvironmentKey>& keys) {
+  const std::string name = numbered.filename().string();
+  if (name.find('#') == std::string::npos) {
+    a.fault("frames", "a numbered file name such as sky.####.exr", fmt::format("\"{}\"", name));
+  }
+  keys.clear();
+  for (const int frame : frames) {
+    keys.push_back({static_cast<double>(frame),
+                    (numbered.parent_path() / frame_file_name(name, frame)).string()});
+  }
+}
+
+}  // namespace
+
+void fields(JobArchive& a, SceneSpec& scene) {
+  a.named("materials", scene.materials, limits::kMaxMaterials,
+          [&](MaterialSpec& item) { fields(a, item); });
+  a.named("meshes", scene.meshes, limits::kMaxMeshes, [&](MeshSpec& item) { fields(a, item); },
+          {.shorthand = "path"});
+  a.list("objects", scene.objects, limits::kMaxObjects,
+         [&](ObjectSpec& item) { fields(a, item, scene); });
+  GroundSpec ground = scene.ground.value_or(GroundSpec{});
+  if (a.object("ground", [&] { fields(a, ground, scene); },
+               {.present = scene.ground.has_value()})) {
+    scene.ground = ground;
+  }
+}
+
+void fields(JobArchive& a, EnvironmentSpec& environment, const std::vector<int>& frames) {
+  std::vector<EnvironmentKey>& keys = environment.keys;
+  int forms = 0;
+
+  // One map for all frames.
+  std::string map;
+  asset_path(a, alternative("map"), map, {".exr", ".hdr"});
+  if (!map.empty()) {
+    keys = {{1, map}};
+    ++forms;
+  }
+
+  // Numbered maps.
+  std::string numbered;
+  asset_path(a, alternative("frames"), numbered, {".exr", ".hdr"});
+  if (!numbered.empty()) {
+    expand_numbered(a, numbered, frames, keys);
+    environment.interpolate = false;
+    ++forms;
+  }
+
+  // Maps at key frames: the form that is written.
+  const int max_keys = limits::kMaxFrames;
+  forms += a.list(alternative("keys"), keys, max_keys, [&](EnvironmentKey& key) { fields(a, key); })
+               ? 1
+               : 0;
+  if (forms != 1 || keys.empty()) {
+    a.fault("", "exactly one of map, keys (at least one) and frames",
+            forms > 1 ? "several" : "none");
+  }
+  for (std::size_t i = 1; i < keys.size(); ++i) {
+    if (keys[i].frame > keys[i - 1].frame) continue;
+    a.fault("keys", "ascending frames without duplicates",
+            fmt::format("{} after {}", keys[i].frame, keys[i - 1].frame));
+    break;
+  }
+
+  a.boolean("interpolate", environment.interpolate);
+  a.choice("filter", environment.filter, kMapFilters);
+  a.number("scale", environment.scale, kPositiveRange);
+  a.object("rotation", [&] {
+    a.vector("axis", environment.rotation_axis, kCoordinateRange);
+    if (length(environment.rotation_axis) == 0) a.fault("axis", "a direction", "[0, 0, 0]");
+    a.number("startDeg", environment.rotation_start_deg, kAngleRange);
+    a.number("degPerFrame", environment.rotation_deg_per_frame, kAngleRange);
+  });
+}
+
+}  // namespace baton

@@ -1,0 +1,86 @@
+#include "common/job/sequence.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "common/base/check.h"
+
+namespace baton {
+namespace {
+
+EnvironmentFrame environment_at(const EnvironmentSpec& environment, int frame_number, int first_frame_number) {
+  const std::vector<EnvironmentKey>& keys = environment.keys;
+  EnvironmentFrame result;
+
+  // The last key at or before the frame holds; before the first key the first one does.
+  const auto next = std::upper_bound(keys.begin(), keys.end(), static_cast<double>(frame_number),
+                                     [](double frame, const EnvironmentKey& key) { return frame < key.frame; });
+  const auto held = next == keys.begin() ? keys.begin() : next - 1;
+  result.map_a = result.map_b = static_cast<std::int32_t>(held - keys.begin());
+
+  // Between two keys the texels are mixed linearly.
+  if (environment.interpolate && next != keys.end() && next != keys.begin()) {
+    result.mix = static_cast<float>((frame_number - held->frame) / (next->frame - held->frame));
+    if (result.mix > 0) result.map_b = static_cast<std::int32_t>(next - keys.begin());
+  }
+
+  const double degrees =
+      environment.rotation_start_deg + environment.rotation_deg_per_frame * (frame_number - first_frame_number);
+  if (degrees != 0) result.rotation = rotation_about(environment.rotation_axis, degrees);
+  return result;
+}
+
+}  // namespace
+
+std::vector<FrameSpec> expand_sequence(const JobSpec& job) {
+  std::vector<FrameSpec> frames;
+  frames.reserve(job.frames.size());
+  for (std::size_t i = 0; i < job.frames.size(); ++i) {
+    frames.push_back({.index = static_cast<std::int32_t>(i),
+                      .number = job.frames[i],
+                      .environment = environment_at(job.environment, job.frames[i], job.frames.front())});
+  }
+  return frames;
+}
+
+TileGrid::TileGrid(int width, int height, int tile_size)
+    : width_(width),
+      height_(height),
+      tile_size_(tile_size),
+      columns_((width + tile_size - 1) / tile_size),
+      rows_((height + tile_size - 1) / tile_size) {
+  BATON_CHECK(width > 0 && height > 0 && tile_size > 0);
+}
+
+PixelRect TileGrid::rect(std::int32_t tile) const {
+  BATON_CHECK(tile >= 0 && tile < count());
+  const std::int32_t x0 = tile % columns_ * tile_size_;
+  const std::int32_t y0 = tile / columns_ * tile_size_;
+  return {x0, y0, std::min(x0 + tile_size_, width_), std::min(y0 + tile_size_, height_)};
+}
+
+std::int32_t num_runs(const JobSpec& job) {
+  const auto frames = static_cast<std::int32_t>(job.frames.size());
+  return (frames + job.state.checkpoint_every - 1) / job.state.checkpoint_every;
+}
+
+TileRun tile_run(const JobSpec& job, std::int32_t tile, std::int32_t run) {
+  const std::int32_t first = run * job.state.checkpoint_every;
+  const auto frames = static_cast<std::int32_t>(job.frames.size());
+  BATON_CHECK(run >= 0 && first < frames);
+  return {tile, run, first, std::min(first + job.state.checkpoint_every, frames) - 1};
+}
+
+bool carries_state(const JobSpec& job) { return job.sampling.method == Method::sequential && job.state.carry; }
+
+std::string frame_file_name(const std::string& pattern, int frame_number) {
+  const std::size_t first = pattern.find('#');
+  if (first == std::string::npos) return pattern;
+  const std::size_t last = pattern.find_first_not_of('#', first);
+  const std::size_t count = (last == std::string::npos ? pattern.size() : last) - first;
+  std::string name = pattern;
+  return name.replace(first, count, fmt::format("{:0{}}", frame_number, count));
+}
+
+}  // namespace baton

@@ -1,0 +1,72 @@
+#pragma once
+
+#include <compare>
+#include <cstdint>
+#include <vector>
+
+#include "common/job/job_spec.h"
+#include "common/math/pixel_rect.h"
+
+namespace baton {
+
+/// The environment at one frame: texels are lerp(map[map_a], map[map_b], mix), directions are turned by `rotation`
+/// (world = rotation * map direction). Maps are indices into JobSpec::environment.keys.
+struct EnvironmentFrame {
+  std::int32_t map_a = 0;
+  std::int32_t map_b = 0;  ///< equal to map_a when mix is 0
+  float mix = 0;           ///< [0, 1)
+  Mat3 rotation;
+
+  bool operator==(const EnvironmentFrame&) const = default;
+  /// True when both frames show the same texels, whatever the rotation.
+  bool same_texels(const EnvironmentFrame& b) const { return map_a == b.map_a && map_b == b.map_b && mix == b.mix; }
+};
+
+/// What is particular to one frame of the sequence.
+struct FrameSpec {
+  std::int32_t index = 0;   ///< 0-based position in the sequence
+  std::int32_t number = 1;  ///< the user's frame number
+  EnvironmentFrame environment;
+};
+
+/// One FrameSpec per frame of the job, in order.
+std::vector<FrameSpec> expand_sequence(const JobSpec& job);
+
+/// The image cut into square tiles, row by row; border tiles are clipped.
+class TileGrid {
+ public:
+  TileGrid(int width, int height, int tile_size);
+  explicit TileGrid(const ImageSpec& image) : TileGrid(image.width, image.height, image.tile_size) {}
+
+  std::int32_t count() const { return columns_ * rows_; }
+  std::int32_t columns() const { return columns_; }
+  std::int32_t rows() const { return rows_; }
+  /// tile in [0, count()).
+  PixelRect rect(std::int32_t tile) const;
+
+ private:
+  std::int32_t width_, height_, tile_size_, columns_, rows_;
+};
+
+/// The unit that a lease hands out: one tile for frames [first_frame, last_frame] (0-based indices, inclusive).
+/// Consecutive runs of a tile are chained by the sample state when the job carries it.
+struct TileRun {
+  std::int32_t tile = 0;
+  std::int32_t run = 0;  ///< 0-based; run r covers frames r * checkpoint_every ...
+  std::int32_t first_frame = 0;
+  std::int32_t last_frame = 0;
+
+  auto operator<=>(const TileRun&) const = default;
+};
+
+/// Number of runs that cover the sequence: ceil(frames / checkpoint_every).
+std::int32_t num_runs(const JobSpec& job);
+/// The run's frames; run in [0, num_runs(job)), tile in [0, TileGrid(job.image).count()).
+TileRun tile_run(const JobSpec& job, std::int32_t tile, std::int32_t run);
+/// True when the method hands samples from frame to frame: `sequential` with state.carry.
+bool carries_state(const JobSpec& job);
+
+/// "frame.####.exr" with frame 7 -> "frame.0007.exr". A pattern without '#' is returned unchanged.
+std::string frame_file_name(const std::string& pattern, int frame_number);
+
+}  // namespace baton

@@ -1,0 +1,78 @@
+#pragma once
+
+#include <compare>
+#include <cstdint>
+#include <vector>
+
+#include "common/base/digest.h"
+
+namespace baton {
+
+/// The words that scheduler, journal, messages and workers share: which piece of work, which attempt at it, which bytes
+/// it needs or made. Plain data; `fields` lists the members for common/base/archive.h.
+
+/// What a task does. Stored and sent; values are for ever.
+enum class TaskKind : std::uint8_t {
+  render = 0,    ///< one TileRun: step is the run, tile the tile
+  assemble = 1,  ///< one frame's EXR from its tile films: step is the 0-based frame index, tile is 0
+};
+constexpr TaskKind last_of(TaskKind) { return TaskKind::assemble; }
+
+struct TaskKey {
+  TaskKind kind = TaskKind::render;
+  std::int32_t step = 0;
+  std::int32_t tile = 0;
+
+  auto operator<=>(const TaskKey&) const = default;
+  template <class A> void fields(A& a) { a(kind, step, tile); }
+};
+
+/// A blob that a task needs or made. `frame` is a 0-based index. Stored and sent; values are for ever.
+enum class BlobKind : std::uint8_t { state = 0, film = 1, image = 2 };
+constexpr BlobKind last_of(BlobKind) { return BlobKind::image; }
+
+struct BlobRef {
+  BlobKind kind = BlobKind::state;
+  std::int32_t frame = 0;
+  std::int32_t tile = 0;
+  Digest digest;           ///< for `image`: digest of the EXR file in the output folder
+  std::uint64_t size_bytes = 0;
+
+  auto operator<=>(const BlobRef&) const = default;
+  template <class A> void fields(A& a) { a(kind, frame, tile, digest, size_bytes); }
+};
+
+/// Where a job stands. Stored and sent; values are for ever.
+enum class JobStatus : std::uint8_t { running = 0, done = 1, failed = 2, cancelled = 3 };
+constexpr JobStatus last_of(JobStatus) { return JobStatus::cancelled; }
+
+/// Names one attempt of one task; the fence against late reports. epoch: the coordinator's start count.
+struct LeaseId {
+  Digest job;
+  TaskKey task;
+  std::uint32_t attempt = 0;
+  std::uint32_t epoch = 0;
+
+  auto operator<=>(const LeaseId&) const = default;
+  template <class A> void fields(A& a) { a(job, task, attempt, epoch); }
+};
+
+/// Counters that workers add up and `baton job show` prints; merging is addition.
+struct RenderStats {
+  std::uint64_t pixels = 0, rays_primary = 0, rays_shadow = 0, target_evaluations = 0;
+  std::uint64_t pixels_background = 0, pixels_fresh = 0, pixels_carried = 0, pixels_restarted = 0, pixels_resampled = 0;
+  std::uint64_t moves_proposed = 0, moves_accepted = 0;
+  double cpu_seconds = 0;
+  /// CPU seconds of the stages; light is shared by all tiles of a frame and counted where it was prepared.
+  double seconds_light = 0, seconds_primary = 0, seconds_sample = 0, seconds_visibility = 0, seconds_shade = 0;
+
+  bool operator==(const RenderStats&) const = default;
+  void merge(const RenderStats& b);
+  template <class A> void fields(A& a) {
+    a(pixels, rays_primary, rays_shadow, target_evaluations, pixels_background, pixels_fresh, pixels_carried,
+      pixels_restarted, pixels_resampled, moves_proposed, moves_accepted, cpu_seconds, seconds_light, seconds_primary,
+      seconds_sample, seconds_visibility, seconds_shade);
+  }
+};
+
+}  // namespace baton

@@ -1,0 +1,157 @@
+// Vectors of directions and the functions of them that every SIMD kernel needs. Included once per Highway target.
+#if defined(BATON_COMMON_MATH_LANES_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef BATON_COMMON_MATH_LANES_INL_H_
+#undef BATON_COMMON_MATH_LANES_INL_H_
+#else
+#define BATON_COMMON_MATH_LANES_INL_H_
+#endif
+
+#include <hwy/highway.h>
+
+#include <cstdint>
+
+#include "common/math/vec3.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace baton::HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+/// All kernels run on (up to) eight float lanes: wide enough for AVX2, and the same grouping on wider machines.
+using DF = hn::CappedTag<float, 8>;
+using DI = hn::RebindToSigned<DF>;
+using DU = hn::RebindToUnsigned<DF>;
+using VF = hn::Vec<DF>;
+using VI = hn::Vec<DI>;
+using VU = hn::Vec<DU>;
+using MF = hn::Mask<DF>;
+
+/// One 3-vector per lane.
+struct Vec3Lanes {
+  VF x, y, z;
+};
+
+HWY_INLINE VF Dot(const Vec3Lanes& a, const Vec3Lanes& b) {
+  return hn::MulAdd(a.x, b.x, hn::MulAdd(a.y, b.y, hn::Mul(a.z, b.z)));
+}
+HWY_INLINE Vec3Lanes Scale(const Vec3Lanes& a, VF s) { return {hn::Mul(a.x, s), hn::Mul(a.y, s), hn::Mul(a.z, s)}; }
+HWY_INLINE Vec3Lanes Add(const Vec3Lanes& a, const Vec3Lanes& b) {
+  return {hn::Add(a.x, b.x), hn::Add(a.y, b.y), hn::Add(a.z, b.z)};
+}
+HWY_INLINE Vec3Lanes Select(MF mask, const Vec3Lanes& yes, const Vec3Lanes& no) {
+  return {hn::IfThenElse(mask, yes.x, no.x), hn::IfThenElse(mask, yes.y, no.y), hn::IfThenElse(mask, yes.z, no.z)};
+}
+/// m * v, m row-major.
+HWY_INLINE Vec3Lanes Transform(const float* m, const Vec3Lanes& v) {
+  const DF d;
+  const auto row = [&](int r) HWY_ATTR {
+    return Dot({hn::Set(d, m[r * 3]), hn::Set(d, m[r * 3 + 1]), hn::Set(d, m[r * 3 + 2])}, v);
+  };
+  return {row(0), row(1), row(2)};
+}
+/// 1 / sqrt(x) to float accuracy.
+HWY_INLINE VF InverseSqrt(VF x) { return hn::Div(hn::Set(DF(), 1.0f), hn::Sqrt(x)); }
+
+/// v.x * frame x + v.y * frame y + v.z * n, the frame around unit n as in common/math/vec3.h [Duff et al. 2017].
+HWY_INLINE Vec3Lanes FrameToWorld(const Vec3Lanes& n, const Vec3Lanes& v) {
+  const DF d;
+  const VF one = hn::Set(d, 1.0f);
+  const VF sign = hn::CopySign(one, n.z);
+  const VF a = hn::Div(hn::Set(d, -1.0f), hn::Add(sign, n.z));
+  const VF b = hn::Mul(hn::Mul(n.x, n.y), a);
+  const Vec3Lanes fx{hn::MulAdd(hn::Mul(sign, n.x), hn::Mul(n.x, a), one), hn::Mul(sign, b),
+                     hn::Neg(hn::Mul(sign, n.x))};
+  const Vec3Lanes fy{b, hn::MulAdd(hn::Mul(n.y, n.y), a, sign), hn::Neg(n.y)};
+  return Add(Add(Scale(fx, v.x), Scale(fy, v.y)), Scale(n, v.z));
+}
+/// Components of world vector v in the same frame.
+HWY_INLINE Vec3Lanes FrameToLocal(const Vec3Lanes& n, const Vec3Lanes& v) {
+  const DF d;
+  const VF one = hn::Set(d, 1.0f);
+  const VF sign = hn::CopySign(one, n.z);
+  const VF a = hn::Div(hn::Set(d, -1.0f), hn::Add(sign, n.z));
+  const VF b = hn::Mul(hn::Mul(n.x, n.y), a);
+  const Vec3Lanes fx{hn::MulAdd(hn::Mul(sign, n.x), hn::Mul(n.x, a), one), hn::Mul(sign, b),
+                     hn::Neg(hn::Mul(sign, n.x))};
+  const Vec3Lanes fy{b, hn::MulAdd(hn::Mul(n.y, n.y), a, sign), hn::Neg(n.y)};
+  return {Dot(fx, v), Dot(fy, v), Dot(n, v)};
+}
+
+/// sin and cos of 2 pi u for u in [0, 1): odd and even minimax polynomials on a quarter turn, error below 4e-7.
+HWY_INLINE void SinCosTurns(VF u, VF& sine, VF& cosine) {
+  const DF d;
+  // Reduce to r in [-1/8, 1/8] turns around the nearest quarter.
+  const VF quarter = hn::Round(hn::Mul(u, hn::Set(d, 4.0f)));
+  const VF r = hn::Mul(hn::NegMulAdd(quarter, hn::Set(d, 0.25f), u), hn::Set(d, 2 * kPi));
+  const VF r2 = hn::Mul(r, r);
+  VF s = hn::MulAdd(r2, hn::Set(d, -1.9515295891e-4f), hn::Set(d, 8.3321608736e-3f));
+  s = hn::MulAdd(hn::MulAdd(r2, s, hn::Set(d, -1.6666654611e-1f)), hn::Mul(r2, r), r);
+  VF c = hn::MulAdd(r2, hn::Set(d, 2.443315711809948e-5f), hn::Set(d, -1.388731625493765e-3f));
+  c = hn::MulAdd(r2, c, hn::Set(d, 4.166664568298827e-2f));
+  c = hn::MulAdd(hn::Mul(r2, r2), c, hn::NegMulAdd(r2, hn::Set(d, 0.5f), hn::Set(d, 1.0f)));
+  // Turn by the quarter: swap for odd quarters, then set signs.
+  const DI di;
+  const VI q = hn::ConvertTo(di, quarter);
+  const MF odd = hn::MaskFromVec(hn::BitCast(d, hn::VecFromMask(di, hn::TestBit(q, hn::Set(di, 1)))));
+  const auto sign_bit = [&](VI bits) HWY_ATTR { return hn::BitCast(d, hn::ShiftLeft<30>(hn::And(bits, hn::Set(di, 2)))); };
+  sine = hn::Xor(hn::IfThenElse(odd, c, s), sign_bit(q));
+  cosine = hn::Xor(hn::IfThenElse(odd, s, c), sign_bit(hn::Add(q, hn::Set(di, 1))));
+}
+
+/// Minimax polynomial of atan(t)/t in t^2 on [0, 1], highest power first; error of atan 4e-8.
+inline constexpr float kAtan[8] = {-4.054394293e-03f, 2.186231616e-02f,  -5.591137602e-02f, 9.642125771e-02f,
+                                   -1.390860080e-01f, 1.994655975e-01f, -3.332986025e-01f, 9.999993354e-01f};
+
+/// atan2(y, x) in (-pi, pi], 0 for (0, 0); minimax polynomial on [0, 1], error below 3e-7.
+HWY_INLINE VF Atan2(VF y, VF x) {
+  const DF d;
+  const VF ax = hn::Abs(x);
+  const VF ay = hn::Abs(y);
+  const VF big = hn::Max(hn::Max(ax, ay), hn::Set(d, 1e-37f));
+  const VF t = hn::Div(hn::Min(ax, ay), big);
+  const VF t2 = hn::Mul(t, t);
+  VF p = hn::Set(d, kAtan[0]);
+  for (int i = 1; i < 8; ++i) p = hn::MulAdd(p, t2, hn::Set(d, kAtan[i]));
+  p = hn::Mul(p, t);
+  p = hn::IfThenElse(hn::Gt(ay, ax), hn::Sub(hn::Set(d, kPi / 2), p), p);
+  p = hn::IfThenElse(hn::Lt(x, hn::Zero(d)), hn::Sub(hn::Set(d, kPi), p), p);
+  return hn::CopySign(p, y);
+}
+
+/// OctDirection of a unit vector, as encode_octahedral().
+HWY_INLINE VU EncodeOctahedral(const Vec3Lanes& w) {
+  const DF d;
+  const DU du;
+  const VF one = hn::Set(d, 1.0f);
+  const VF inv = hn::Div(one, hn::Add(hn::Abs(w.x), hn::Add(hn::Abs(w.y), hn::Abs(w.z))));
+  const VF u = hn::Mul(w.x, inv);
+  const VF v = hn::Mul(w.y, inv);
+  const MF below = hn::Lt(w.z, hn::Zero(d));
+  const VF fold_u = hn::IfThenElse(below, hn::CopySign(hn::Sub(one, hn::Abs(v)), u), u);
+  const VF fold_v = hn::IfThenElse(below, hn::CopySign(hn::Sub(one, hn::Abs(u)), v), v);
+  const auto pack = [&](VF t) HWY_ATTR {
+    const VF half = hn::Set(d, 0.5f);
+    const VF scaled = hn::MulAdd(hn::MulAdd(t, half, half), hn::Set(d, 65535.0f), half);
+    return hn::BitCast(du, hn::ConvertTo(DI(), hn::Clamp(scaled, hn::Zero(d), hn::Set(d, 65535.0f))));
+  };
+  return hn::Or(pack(fold_u), hn::ShiftLeft<16>(pack(fold_v)));
+}
+
+/// Unit vector of an OctDirection, as decode_octahedral().
+HWY_INLINE Vec3Lanes DecodeOctahedral(VU code) {
+  const DF d;
+  const DI di;
+  const VF one = hn::Set(d, 1.0f);
+  const auto unpack = [&](VU bits) HWY_ATTR {
+    return hn::MulAdd(hn::ConvertTo(d, hn::BitCast(di, bits)), hn::Set(d, 2.0f / 65535.0f), hn::Set(d, -1.0f));
+  };
+  const VF u = unpack(hn::And(code, hn::Set(DU(), 0xFFFFu)));
+  const VF v = unpack(hn::ShiftRight<16>(code));
+  const VF z = hn::Sub(hn::Sub(one, hn::Abs(u)), hn::Abs(v));
+  const VF fold = hn::Max(hn::Neg(z), hn::Zero(d));
+  const Vec3Lanes w{hn::Sub(u, hn::CopySign(fold, u)), hn::Sub(v, hn::CopySign(fold, v)), z};
+  return Scale(w, InverseSqrt(Dot(w, w)));
+}
+
+}  // namespace baton::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+#endif

@@ -1,0 +1,29 @@
+#pragma once
+
+#include <chrono>
+#include <string>
+
+#include "common/protocol/messages.h"
+#include "common/protocol/socket.h"
+
+namespace baton {
+
+/// Asks a coordinator one question at a time. Used by one thread.
+class RequestClient {
+ public:
+  /// Succeeds for every well-formed endpoint, whether a coordinator listens there or not.
+  static Result<RequestClient> connect(const std::string& endpoint);
+
+  /// Sends and waits for the answer; a Refused becomes the Error that it carries. ErrorKind::timeout
+  /// when no answer came in time. The connection is then dropped, so that a late answer is never
+  /// taken for that of the next request.
+  Result<Message> request(const Message& message, std::chrono::milliseconds timeout);
+
+ private:
+  RequestClient(std::string endpoint, Socket socket);
+
+  std::string endpoint_;
+  Socket socket_;
+};
+
+}  // namespace baton

@@ -1,0 +1,91 @@
+#include "common/protocol/messages.h"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <utility>
+
+#include "common/base/archive.h"
+#include "common/base/limits.h"
+
+namespace baton {
+namespace {
+
+constexpr std::size_t kNumFrames = 3;
+constexpr std::size_t kNumTypes = std::variant_size_v<Message>;
+
+template <std::size_t Type>
+Result<Message> decode_body(ByteView body) {
+  std::variant_alternative_t<Type, Message> message;
+  ArchiveReader reader(body);
+  reader(message);
+  if (!reader.complete()) {
+    return Error{ErrorKind::bad_input,
+                 fmt::format("message: type {}: {} bytes are no valid body", Type, body.size())};
+  }
+  return Message(std::move(message));
+}
+
+template <std::size_t... Types>
+constexpr auto make_decoders(std::index_sequence<Types...>) {
+  return std::array{&decode_body<Types>...};
+}
+constexpr auto kDecoders = make_decoders(std::make_index_sequence<kNumTypes>());
+
+Status check_header(ByteView header) {
+  ByteReader reader(header);
+  const std::string_view expected_name = kProtocolName;
+  const ByteView name = reader.get_raw(expected_name.size());
+  const auto version = reader.get<std::uint16_t>();
+  if (!reader.ok() || !reader.at_end() ||
+      std::memcmp(name.data(), expected_name.data(), name.size()) != 0) {
+    return Error{ErrorKind::bad_input,
+                 fmt::format("message: the first frame does not name the protocol {}", kProtocolName)};
+  }
+  if (version != kProtocolVersion) {
+    return Error{ErrorKind::version, fmt::format("message: protocol version {}, this program speaks {}",
+                                                 version, kProtocolVersion)};
+  }
+  return {};
+}
+
+}  // namespace
+
+std::vector<Bytes> encode_message(const Message& message) {
+  ByteWriter header;
+  header.put_raw(as_bytes_view(kProtocolName));
+  header.put(kProtocolVersion);
+  ByteWriter type;
+  type.put(static_cast<std::uint16_t>(message.index()));
+  return {header.take(), type.take(),
+          std::visit([](const auto& body) { return to_bytes(body); }, message)};
+}
+
+Result<Message> decode_message(const std::vector<Bytes>& frames) {
+  // The first frame decides whether the rest may be understood.
+  if (frames.empty()) return Error{ErrorKind::bad_input, "message: no frames"};
+  BATON_TRY(check_header(frames[0]));
+  if (frames.size() != kNumFrames) {
+    return Error{ErrorKind::bad_input,
+                 fmt::format("message: {} frames, expected {}", frames.size(), kNumFrames)};
+  }
+
+  ByteReader reader(frames[1]);
+  const auto type = reader.get<std::uint16_t>();
+  if (!reader.ok() || !reader.at_end()) {
+    return Error{ErrorKind::bad_input, fmt::format("message: a type of {} bytes, expected {}",
+                                                   frames[1].size(), sizeof(type))};
+  }
+  if (type >= kNumTypes) {
+    return Error{ErrorKind::bad_input,
+                 fmt::format("message: unknown type {}, expected less than {}", type, kNumTypes)};
+  }
+  if (frames[2].size() > limits::kMaxMessageBytes) {
+    return Error{ErrorKind::bad_input,
+                 fmt::format("message: type {}: a body of {} bytes, at most {} are read", type,
+                             frames[2].size(), limits::kMaxMessageBytes)};
+  }
+  return kDecoders[type](frames[2]);
+}
+
+}  // namespace baton

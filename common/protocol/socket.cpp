@@ -1,0 +1,136 @@
+#include "common/protocol/socket.h"
+
+#include <fmt/format.h>
+#include <sys/eventfd.h>
+#include <unistd.h>
+
+#include <array>
+#include <utility>
+#include <zmq.hpp>
+
+#include "common/base/check.h"
+#include "common/base/limits.h"
+
+namespace baton {
+namespace {
+
+constexpr int kReconnectFirstMs = 50;
+constexpr int kReconnectMaxMs = 2000;
+constexpr int kTransportHeartbeatMs = 2000;  // notices a peer whose machine vanished
+constexpr int kTransportTimeoutMs = 6000;
+
+void set_options(zmq::socket_t& socket, std::chrono::milliseconds linger) {
+  socket.set(zmq::sockopt::linger, static_cast<int>(linger.count()));
+  socket.set(zmq::sockopt::sndhwm, limits::kMaxQueuedMessages);
+  socket.set(zmq::sockopt::rcvhwm, limits::kMaxQueuedMessages);
+  socket.set(zmq::sockopt::maxmsgsize, static_cast<std::int64_t>(limits::kMaxMessageBytes));
+  socket.set(zmq::sockopt::reconnect_ivl, kReconnectFirstMs);
+  socket.set(zmq::sockopt::reconnect_ivl_max, kReconnectMaxMs);
+  socket.set(zmq::sockopt::heartbeat_ivl, kTransportHeartbeatMs);
+  socket.set(zmq::sockopt::heartbeat_timeout, kTransportTimeoutMs);
+}
+
+}  // namespace
+
+struct Socket::Impl {
+  explicit Impl(zmq::socket_type type)
+      : socket(context, type), wake_fd(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {
+    BATON_CHECK(wake_fd >= 0);
+  }
+  Impl(const Impl&) = delete;
+  Impl& operator=(const Impl&) = delete;
+  ~Impl() { ::close(wake_fd); }
+
+  zmq::context_t context;
+  zmq::socket_t socket;
+  int wake_fd;
+  std::string endpoint;
+};
+
+Socket::Socket(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
+Socket::Socket(Socket&&) noexcept = default;
+Socket& Socket::operator=(Socket&&) noexcept = default;
+Socket::~Socket() = default;
+
+Result<Socket> Socket::open(const std::string& endpoint, bool listen,
+                            std::chrono::milliseconds linger) {
+  try {
+    auto impl = std::make_unique<Impl>(listen ? zmq::socket_type::router : zmq::socket_type::dealer);
+    set_options(impl->socket, linger);
+    if (listen) {
+      impl->socket.set(zmq::sockopt::router_mandatory, true);
+      impl->socket.bind(endpoint);
+      impl->endpoint = impl->socket.get(zmq::sockopt::last_endpoint);
+    } else {
+      impl->socket.connect(endpoint);
+      impl->endpoint = endpoint;
+    }
+    return Socket(std::move(impl));
+  } catch (const zmq::error_t& error) {
+    return Error{error.num() == EINVAL ? ErrorKind::usage : ErrorKind::io,
+                 fmt::format("{}: cannot {}: {}; expected an endpoint like tcp://127.0.0.1:5570",
+                             endpoint, listen ? "listen" : "connect", error.what())};
+  }
+}
+
+Result<Socket> Socket::connect(const std::string& endpoint, std::chrono::milliseconds linger) {
+  return open(endpoint, false, linger);
+}
+
+Result<Socket> Socket::bind(const std::string& endpoint, std::chrono::milliseconds linger) {
+  return open(endpoint, true, linger);
+}
+
+bool Socket::send(const std::vector<Bytes>& frames) {
+  // Only the first frame can be refused: the library queues a message whole.
+  try {
+    for (std::size_t i = 0; i < frames.size(); ++i) {
+      const auto more = i + 1 < frames.size() ? zmq::send_flags::sndmore : zmq::send_flags::none;
+      const zmq::const_buffer frame(frames[i].data(), frames[i].size());
+      if (!impl_->socket.send(frame, more | zmq::send_flags::dontwait)) {
+        BATON_CHECK(i == 0);
+        return false;
+      }
+    }
+    return true;
+  } catch (const zmq::error_t& error) {
+    BATON_CHECK(error.num() == EHOSTUNREACH);
+    return false;
+  }
+}
+
+std::optional<std::vector<Bytes>> Socket::receive(std::chrono::milliseconds timeout) {
+  try {
+    // Wait for the first of message, wake-up, timeout.
+    std::array<zmq::pollitem_t, 2> items{
+        zmq::pollitem_t{impl_->socket.handle(), 0, ZMQ_POLLIN, 0},
+        zmq::pollitem_t{nullptr, impl_->wake_fd, ZMQ_POLLIN, 0}};
+    zmq::poll(items.data(), items.size(), timeout);
+    if (items[1].revents & ZMQ_POLLIN) {
+      eventfd_t count = 0;
+      ::eventfd_read(impl_->wake_fd, &count);
+    }
+    if (!(items[0].revents & ZMQ_POLLIN)) return std::nullopt;
+
+    // The frames of one message arrive together.
+    std::vector<Bytes> frames;
+    zmq::message_t frame;
+    do {
+      if (!impl_->socket.recv(frame, zmq::recv_flags::dontwait)) return std::nullopt;
+      if (frames.size() < limits::kMaxMessageFrames) {
+        const auto* data = frame.data<std::byte>();
+        frames.emplace_back(data, data + frame.size());
+      }
+    } while (frame.more());
+    return frames;
+  } catch (const zmq::error_t& error) {
+    BATON_CHECK(error.num() == EINTR);
+    return std::nullopt;
+  }
+}
+
+void Socket::wake() { ::eventfd_write(impl_->wake_fd, 1); }
+
+const std::string& Socket::endpoint() const { return impl_->endpoint; }
+
+}  // namespace baton

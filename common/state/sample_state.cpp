@@ -1,0 +1,242 @@
+#include "common/state/sample_state.h"
+
+#include <fmt/format.h>
+
+#include <array>
+#include <cmath>
+
+#include "common/base/limits.h"
+#include "common/base/section_file.h"
+
+namespace baton {
+namespace {
+
+constexpr SectionTag kMagic{'B', 'S', 'T', '1'};
+constexpr SectionTag kMeta{'M', 'E', 'T', 'A'};
+constexpr SectionTag kSource{'S', 'R', 'C', '_'};
+constexpr SectionTag kLns{'L', 'N', 'S', '_'};
+constexpr SectionTag kLnsFresh{'L', 'N', 'S', 'F'};
+constexpr SectionTag kDirection{'D', 'I', 'R', '_'};
+constexpr SectionTag kWeight{'W', 'G', 'T', '_'};
+constexpr SectionTag kSite{'S', 'I', 'T', 'E'};
+constexpr std::array kTags{kMeta, kSource, kLns, kLnsFresh, kDirection, kWeight, kSite};
+
+constexpr std::size_t kMetaBytes = 2 * sizeof(std::uint64_t) + 7 * sizeof(std::int32_t);
+/// How far the sum of a pixel's weights may be from 1.
+constexpr double kWeightSumTolerance = 1e-3;
+
+/// 0-based indices of the pixels that carry samples, ascending.
+std::vector<std::size_t> surface_pixels(const std::vector<PixelSource>& source) {
+  std::vector<std::size_t> pixels;
+  for (std::size_t i = 0; i < source.size(); ++i) {
+    if (source[i] != PixelSource::background) pixels.push_back(i);
+  }
+  return pixels;
+}
+
+/// A section with `per_pixel` values of each of `pixels`.
+template <class T>
+Section gather(const SectionTag& tag, const std::vector<T>& values,
+               const std::vector<std::size_t>& pixels, std::size_t per_pixel) {
+  ByteWriter writer;
+  for (const std::size_t pixel : pixels) {
+    writer.put_raw(std::as_bytes(std::span(values).subspan(pixel * per_pixel, per_pixel)));
+  }
+  return {tag, true, sizeof(T), writer.take()};
+}
+
+/// Inverse of gather: values of all other pixels are left as they are.
+template <class T>
+Status scatter(const SectionFile& file, const SectionTag& tag,
+               const std::vector<std::size_t>& pixels, std::size_t per_pixel,
+               const std::string& name, std::vector<T>& values) {
+  const std::size_t row_bytes = per_pixel * sizeof(T);
+  BATON_ASSIGN(const ByteView payload, section_payload(file, tag, pixels.size() * row_bytes, name));
+  for (std::size_t i = 0; i < pixels.size(); ++i) {
+    std::memcpy(values.data() + pixels[i] * per_pixel, payload.data() + i * row_bytes, row_bytes);
+  }
+  return {};
+}
+
+Section encode_meta(const SampleState& state) {
+  ByteWriter writer;
+  writer.put(state.job_digest.high);
+  writer.put(state.job_digest.low);
+  for (const std::int32_t value : {state.frame_index, state.tile, state.rect.x0, state.rect.y0,
+                                   state.rect.x1, state.rect.y1, state.num_particles}) {
+    writer.put(value);
+  }
+  return {kMeta, true, 1, writer.take()};
+}
+
+/// Fills everything of `state` but its arrays.
+Status decode_meta(const SectionFile& file, const std::string& name, SampleState& state) {
+  BATON_ASSIGN(const ByteView payload, section_payload(file, kMeta, kMetaBytes, name));
+  ByteReader reader(payload);
+  state.job_digest.high = reader.get<std::uint64_t>();
+  state.job_digest.low = reader.get<std::uint64_t>();
+  for (std::int32_t* value : {&state.frame_index, &state.tile, &state.rect.x0, &state.rect.y0,
+                              &state.rect.x1, &state.rect.y1, &state.num_particles}) {
+    *value = reader.get<std::int32_t>();
+  }
+
+  // Check what sizes the arrays before anything is allocated.
+  const auto fail = [&](const std::string& what) {
+    return Error{ErrorKind::bad_input, fmt::format("{}: section META: {}", name, what)};
+  };
+  const PixelRect& rect = state.rect;
+  if (state.frame_index < 0 || state.frame_index >= limits::kMaxFrames || state.tile < 0) {
+    return fail(fmt::format("frame index {}, tile {}", state.frame_index, state.tile));
+  }
+  if (!rect.fits_within(limits::kMaxImageSide)) {
+    return fail(fmt::format("rectangle [{}, {}) x [{}, {}), expected a non-empty one within 0..{}",
+                            rect.x0, rect.x1, rect.y0, rect.y1, limits::kMaxImageSide));
+  }
+  if (state.num_particles < 1 || state.num_particles > limits::kMaxParticles) {
+    return fail(
+        fmt::format("{} particles, expected 1 to {}", state.num_particles, limits::kMaxParticles));
+  }
+  constexpr std::uint64_t kParticleBytes =
+      sizeof(OctDirection) + sizeof(float) + sizeof(std::uint8_t);
+  if (state.num_pixels() * state.num_particles * kParticleBytes > limits::kMaxBlobBytes) {
+    return fail(fmt::format("{} pixels of {} particles, past the limit of {} bytes",
+                            state.num_pixels(), state.num_particles, limits::kMaxBlobBytes));
+  }
+  return {};
+}
+
+Error value_error(const SampleState& state, const SectionTag& tag, std::size_t pixel,
+                  const std::string& what) {
+  const auto width = static_cast<std::size_t>(state.rect.width());
+  return {ErrorKind::bad_input,
+          fmt::format("{}: pixel ({}, {}): {}", tag_text(tag), state.rect.x0 + pixel % width,
+                      state.rect.y0 + pixel / width, what)};
+}
+
+/// Checks the values of one surface pixel. The error has no file name yet.
+Status check_pixel(const SampleState& state, std::size_t pixel) {
+  // Lns: radiance.
+  for (const auto& [tag, value] :
+       {std::pair{kLns, state.lns[pixel]}, {kLnsFresh, state.lns_fresh[pixel]}}) {
+    if (!(std::isfinite(value) && value >= 0)) {
+      return value_error(state, tag, pixel,
+                         fmt::format("{}, expected a finite number >= 0", value));
+    }
+  }
+
+  // Particles: each weight and site, then the sum.
+  const auto num_particles = static_cast<std::size_t>(state.num_particles);
+  double sum = 0;
+  for (std::size_t i = 0; i < num_particles; ++i) {
+    const float weight = state.weight[pixel * num_particles + i];
+    const int site = state.site[pixel * num_particles + i];
+    if (!(std::isfinite(weight) && weight >= 0)) {
+      return value_error(
+          state, kWeight, pixel,
+          fmt::format("particle {} has weight {}, expected a finite number >= 0", i, weight));
+    }
+    if (site >= limits::kMaxSites) {
+      return value_error(
+          state, kSite, pixel,
+          fmt::format("particle {} has site {}, expected 0 to {}", i, site, limits::kMaxSites - 1));
+    }
+    sum += weight;
+  }
+  if (sum != 0 && std::fabs(sum - 1) > kWeightSumTolerance) {
+    return value_error(state, kWeight, pixel,
+                       fmt::format("weights sum to {}, expected 1 or 0", sum));
+  }
+  return {};
+}
+
+/// Fills `state.source`; resizes all arrays.
+Status decode_sources(const SectionFile& file, const std::string& name, SampleState& state) {
+  BATON_ASSIGN(const ByteView payload, section_payload(file, kSource, state.num_pixels(), name));
+  state.resize(state.rect, state.num_particles);
+  for (std::size_t pixel = 0; pixel < payload.size(); ++pixel) {
+    const auto value = std::to_integer<std::uint8_t>(payload[pixel]);
+    if (value > static_cast<std::uint8_t>(PixelSource::refreshed)) {
+      const Error error =
+          value_error(state, kSource, pixel, fmt::format("source {}, expected 0 to 4", value));
+      return Error{error.kind, fmt::format("{}: section {}", name, error.message)};
+    }
+    state.source[pixel] = static_cast<PixelSource>(value);
+  }
+  return {};
+}
+
+}  // namespace
+
+void SampleState::resize(const PixelRect& new_rect, std::int32_t new_num_particles) {
+  BATON_CHECK(new_rect.width() > 0 && new_rect.height() > 0 && new_num_particles > 0);
+  rect = new_rect;
+  num_particles = new_num_particles;
+  const std::size_t pixels = num_pixels();
+  const std::size_t particles = pixels * static_cast<std::size_t>(num_particles);
+  lns.assign(pixels, 0.0f);
+  lns_fresh.assign(pixels, 0.0f);
+  source.assign(pixels, PixelSource::background);
+  direction.assign(particles, 0);
+  weight.assign(particles, 0.0f);
+  site.assign(particles, 0);
+}
+
+Bytes encode_state(const SampleState& state) {
+  const std::size_t num_pixels = state.num_pixels();
+  const auto num_particles = static_cast<std::size_t>(state.num_particles);
+  BATON_CHECK(state.lns.size() == num_pixels && state.lns_fresh.size() == num_pixels);
+  BATON_CHECK(state.source.size() == num_pixels &&
+              state.direction.size() == num_pixels * num_particles);
+  BATON_CHECK(state.weight.size() == state.direction.size() &&
+              state.site.size() == state.direction.size());
+
+  const std::vector<std::size_t> pixels = surface_pixels(state.source);
+  const ByteView sources = std::as_bytes(std::span(state.source));
+  return encode_section_file({kMagic,
+                              kStateVersion,
+                              {encode_meta(state),
+                               {kSource, true, 1, Bytes(sources.begin(), sources.end())},
+                               gather(kLns, state.lns, pixels, 1),
+                               gather(kLnsFresh, state.lns_fresh, pixels, 1),
+                               gather(kDirection, state.direction, pixels, num_particles),
+                               gather(kWeight, state.weight, pixels, num_particles),
+                               gather(kSite, state.site, pixels, num_particles)}});
+}
+
+Result<SampleState> decode_state(ByteView bytes, const std::string& name) {
+  BATON_ASSIGN(const SectionFile file, decode_section_file(bytes, kMagic, kStateVersion, name));
+  BATON_TRY(check_known_sections(file, kTags, name));
+
+  // Read what sizes the arrays, then the arrays.
+  SampleState state;
+  BATON_TRY(decode_meta(file, name, state));
+  BATON_TRY(decode_sources(file, name, state));
+  const std::vector<std::size_t> pixels = surface_pixels(state.source);
+  const auto num_particles = static_cast<std::size_t>(state.num_particles);
+  BATON_TRY(scatter(file, kLns, pixels, 1, name, state.lns));
+  BATON_TRY(scatter(file, kLnsFresh, pixels, 1, name, state.lns_fresh));
+  BATON_TRY(scatter(file, kDirection, pixels, num_particles, name, state.direction));
+  BATON_TRY(scatter(file, kWeight, pixels, num_particles, name, state.weight));
+  BATON_TRY(scatter(file, kSite, pixels, num_particles, name, state.site));
+
+  // Check every value.
+  for (const std::size_t pixel : pixels) {
+    if (const Status checked = check_pixel(state, pixel); !checked) {
+      return Error{checked.error().kind,
+                   fmt::format("{}: section {}", name, checked.error().message)};
+    }
+  }
+  return state;
+}
+
+Result<std::vector<StateSectionInfo>> state_sections(ByteView bytes, const std::string& name) {
+  BATON_ASSIGN(const std::vector<SectionInfo> sections,
+               list_sections(bytes, kMagic, kStateVersion, name));
+  std::vector<StateSectionInfo> infos;
+  for (const SectionInfo& section : sections) {
+    infos.push_back({tag_text(section.tag), section.stored_bytes, section.raw_bytes});
+  }
+  return infos;
+}
+
+}  // namespace baton

@@ -1,0 +1,65 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "common/base/bytes.h"
+#include "common/base/digest.h"
+#include "common/base/result.h"
+#include "common/math/octahedral.h"
+#include "common/math/pixel_rect.h"
+
+namespace baton {
+
+/// Where a pixel's samples of this frame come from. Stored; values are for ever.
+enum class PixelSource : std::uint8_t {
+  background = 0,  ///< no surface in the pixel
+  fresh = 1,       ///< started with SIR
+  carried = 2,     ///< carried on from the previous frame
+  restarted = 3,   ///< carried, but all weights died: SIR again
+  refreshed = 4,   ///< carried, Lns recomputed by the refresh rule
+};
+
+/// The baton: what one tile hands to its next frame. Structure of arrays; pixels row by row inside `rect`.
+/// The surfaces are not stored: primary hits are a pure function of (job, frame, pixel, site) and are traced again.
+/// A background pixel carries nothing: every array is 0 there, and the file leaves it out.
+struct SampleState {
+  Digest job_digest;
+  std::int32_t frame_index = 0;  ///< 0-based; the frame that these samples belong to
+  std::int32_t tile = 0;
+  PixelRect rect;
+  std::int32_t num_particles = 0;  ///< N
+
+  std::vector<float> lns;           ///< (pixels) estimate of the unshadowed radiance, mean over RGB
+  std::vector<float> lns_fresh;     ///< (pixels) Lns at the last SIR or refresh
+  std::vector<PixelSource> source;  ///< (pixels)
+  std::vector<OctDirection> direction;  ///< (pixels, N)
+  std::vector<float> weight;            ///< (pixels, N) normalised, sum 1, or all 0 when no particle is lit
+  std::vector<std::uint8_t> site;       ///< (pixels, N)
+
+  bool operator==(const SampleState&) const = default;
+  std::size_t num_pixels() const { return static_cast<std::size_t>(rect.area()); }
+  /// Sizes every array for `rect` and `num_particles`, all zero.
+  void resize(const PixelRect& new_rect, std::int32_t new_num_particles);
+};
+
+/// Newest file version that this program reads, and the one that it writes.
+inline constexpr std::uint16_t kStateVersion = 1;
+
+/// Deterministic, little-endian; grammar in common/state/FORMAT.md.
+Bytes encode_state(const SampleState& state);
+/// `name` (usually the file) goes first in every error: wrong magic or version, checksum, sizes that do not agree,
+/// weights or Lns that are negative or not finite, weights whose sum is neither 1 nor 0, sites past 15.
+Result<SampleState> decode_state(ByteView bytes, const std::string& name);
+
+/// One line per section for `baton state show`.
+struct StateSectionInfo {
+  std::string tag;
+  std::uint64_t stored_bytes = 0;
+  std::uint64_t raw_bytes = 0;
+};
+/// The sections of a state file in file order, after every check that needs no unpacking.
+Result<std::vector<StateSectionInfo>> state_sections(ByteView bytes, const std::string& name);
+
+}  // namespace baton

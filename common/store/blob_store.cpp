@@ -1,0 +1,67 @@
+#include "common/store/blob_store.h"
+
+#include <fmt/format.h>
+
+#include "common/base/files.h"
+#include "common/base/limits.h"
+
+namespace baton {
+
+namespace fs = std::filesystem;
+
+Result<BlobStore> BlobStore::open(const fs::path& directory) {
+  // Make every subfolder now and sync the folder once, so that put() need not sync more than one
+  // folder.
+  for (int i = 0; i < 256; ++i) {
+    const fs::path folder = directory / fmt::format("{:02x}", i);
+    std::error_code error;
+    fs::create_directories(folder, error);
+    if (error)
+      return Error{ErrorKind::io,
+                   fmt::format("{}: cannot create: {}", folder.string(), error.message())};
+  }
+  BATON_TRY(sync_folder(directory));
+  return BlobStore(directory);
+}
+
+Result<Digest> BlobStore::put(ByteView bytes) {
+  const Digest digest = digest_of(bytes);
+  if (bytes.size() > limits::kMaxBlobBytes) {
+    return Error{ErrorKind::bad_input,
+                 fmt::format("{}: {} bytes, at most {} are stored", path(digest).string(),
+                             bytes.size(), limits::kMaxBlobBytes)};
+  }
+  BATON_TRY(write_file_atomic(path(digest), bytes));
+  return digest;
+}
+
+Result<Bytes> BlobStore::get(const Digest& digest) const {
+  const fs::path file = path(digest);
+  BATON_ASSIGN(Bytes bytes, read_file(file, limits::kMaxBlobBytes));
+  if (const Digest found = digest_of(bytes); found != digest) {
+    return Error{ErrorKind::corrupt, fmt::format("{}: digest {}, expected {}", file.string(),
+                                                 found.hex(), digest.hex())};
+  }
+  return bytes;
+}
+
+bool BlobStore::contains(const Digest& digest) const {
+  std::error_code error;
+  return fs::is_regular_file(path(digest), error);
+}
+
+Status BlobStore::remove(const Digest& digest) {
+  std::error_code error;
+  fs::remove(path(digest), error);
+  if (error)
+    return Error{ErrorKind::io,
+                 fmt::format("{}: cannot remove: {}", path(digest).string(), error.message())};
+  return {};
+}
+
+fs::path BlobStore::path(const Digest& digest) const {
+  const std::string hex = digest.hex();
+  return directory_ / hex.substr(0, 2) / (hex.substr(2) + ".blob");
+}
+
+}  // namespace baton

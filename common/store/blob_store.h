@@ -1,0 +1,44 @@
+#pragma once
+
+#include <filesystem>
+
+#include "common/base/bytes.h"
+#include "common/base/digest.h"
+#include "common/base/result.h"
+
+namespace baton {
+
+/// Blobs in a folder, named by their digest: `<directory>/ab/cdef....blob`. Any number of processes
+/// may share the folder, on one machine or over a network file system with atomic rename: a blob
+/// appears whole or not at all, and two writers of the same blob write the same bytes.
+class BlobStore {
+ public:
+  /// Creates the folder and its 256 subfolders where they are missing. Errors: a path that cannot
+  /// be created.
+  static Result<BlobStore> open(const std::filesystem::path& directory);
+
+  /// Publishes the bytes; when it returns they survive a power cut. A blob that is there already is
+  /// written again, which is harmless and mends a damaged one. Errors: past limits::kMaxBlobBytes,
+  /// the disk.
+  Result<Digest> put(ByteView bytes);
+
+  /// The bytes with this digest. ErrorKind::corrupt names the file, the digest found and the one
+  /// expected; a missing blob is ErrorKind::io.
+  Result<Bytes> get(const Digest& digest) const;
+
+  /// Whether the blob was published; does not read it.
+  bool contains(const Digest& digest) const;
+
+  /// Forgets the blob. One that is already gone is a success.
+  Status remove(const Digest& digest);
+
+  /// Where the blob is or would be.
+  std::filesystem::path path(const Digest& digest) const;
+
+ private:
+  explicit BlobStore(std::filesystem::path directory) : directory_(std::move(directory)) {}
+
+  std::filesystem::path directory_;
+};
+
+}  // namespace baton

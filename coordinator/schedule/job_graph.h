@@ -1,0 +1,68 @@
+#pragma once
+
+#include <cstdint>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/job/job_spec.h"
+#include "common/job/sequence.h"
+#include "common/job/task.h"
+
+namespace baton {
+
+/// Position of a task in its job: first the assemble tasks by frame, then the render tasks by run, then by tile. This is
+/// also the order in which ready tasks are granted: frames are finished before new ones are begun.
+using TaskIndex = std::int32_t;
+
+/// Number of tasks of a job, before anything is allocated for it.
+std::int64_t count_tasks(const JobSpec& job);
+
+/// The task graph of a job, by arithmetic: nothing is stored per task.
+///
+/// render(run, tile) needs render(run - 1, tile) if the job carries state. assemble(frame) needs all tiles of its run.
+class JobGraph {
+ public:
+  /// count_tasks(job) must be at most limits::kMaxTasksPerJob.
+  explicit JobGraph(const JobSpec& job);
+
+  TaskIndex num_tasks() const { return num_frames_ + num_runs_ * num_tiles_; }
+  std::int32_t num_frames() const { return num_frames_; }
+  std::int32_t num_tiles() const { return num_tiles_; }
+
+  /// nullopt: the job has no such task.
+  std::optional<TaskIndex> find(const TaskKey& key) const;
+  /// The inverse of find; index in [0, num_tasks()).
+  TaskKey key(TaskIndex index) const;
+
+  /// Number of tasks that must be done before this one is ready.
+  std::int32_t num_inputs(const TaskKey& key) const;
+  /// The tasks that need this one.
+  std::vector<TaskIndex> dependents(const TaskKey& key) const;
+  /// The tasks that this one needs; of an assemble task in tile order.
+  std::vector<TaskIndex> inputs(const TaskKey& key) const;
+
+  /// First and last frame (0-based, inclusive) of a run.
+  std::int32_t first_frame(std::int32_t run) const { return run * frames_per_run_; }
+  std::int32_t last_frame(std::int32_t run) const;
+
+  /// Whether a render task hands its samples to the next run.
+  bool carries_state() const { return carries_state_; }
+  /// Pixels of a tile.
+  std::uint64_t num_pixels(std::int32_t tile) const;
+
+  /// Sorts the outputs that a task reported: state first, then films by frame. nullopt when they are exactly what the
+  /// task must make; else what is wrong with them.
+  std::optional<std::string> check_outputs(const TaskKey& key, std::vector<BlobRef>& outputs) const;
+  /// Position of a frame's film in the sorted outputs of a render task.
+  std::size_t film_position(std::int32_t frame) const;
+
+ private:
+  TaskIndex render_index(std::int32_t run, std::int32_t tile) const;
+
+  TileGrid grid_;
+  std::int32_t num_frames_, num_runs_, num_tiles_, frames_per_run_;
+  bool carries_state_;
+};
+
+}  // namespace baton

@@ -1,0 +1,98 @@
+#pragma once
+
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "coordinator/schedule/blob_references.h"
+#include "coordinator/schedule/events.h"
+#include "coordinator/schedule/job_graph.h"
+#include "coordinator/schedule/task_status.h"
+
+namespace baton {
+
+/// What people are shown of a job.
+struct JobProgress {
+  std::uint64_t tasks_total = 0, tasks_done = 0, tasks_leased = 0, tasks_failed = 0;
+  std::uint64_t tasks_open = 0;     ///< blocked, ready or leased
+  std::uint64_t attempts_lost = 0;  ///< failed attempts and lost leases
+  std::uint32_t frames_done = 0;
+  std::uint64_t state_bytes = 0, state_pixels = 0;
+  RenderStats stats;
+};
+
+/// All tasks of one job: their status, outputs and failures. Knows nothing of workers but their names.
+class JobTasks {
+ public:
+  explicit JobTasks(const JobSpec& spec);
+
+  const JobGraph& graph() const { return graph_; }
+  const JobProgress& progress() const { return progress_; }
+  TaskStatus status(TaskIndex task) const { return record(task).status; }
+  /// Sorted; empty unless the task is done.
+  const std::vector<BlobRef>& outputs(TaskIndex task) const { return record(task).outputs; }
+  /// Tasks that a worker may have, in the order in which they should be granted.
+  const std::set<TaskIndex>& ready() const { return ready_; }
+  /// The blobs that the task needs, all of them there: see LeaseGrant in PROTOCOL.md.
+  std::vector<BlobRef> inputs(TaskIndex task) const;
+
+  /// Leases a ready task. Returns the number of the attempt, from 1.
+  std::uint32_t grant(TaskIndex task);
+  /// Ends a leased task: its outputs must be complete and sorted (JobGraph::check_outputs). Releases its dependents, and
+  /// the blobs that nobody needs any more.
+  void complete(TaskIndex task, const Completion& completion, BlobReferences& blobs);
+  /// Makes a leased task ready again.
+  void give_back(TaskIndex task);
+  /// Ends a leased task for good, and cancels what cannot be done without it.
+  void give_up(TaskIndex task);
+  /// Cancels whatever is open.
+  void cancel_open();
+
+  /// Remembers a failed attempt.
+  void add_failure(TaskIndex task, const Failure& failure);
+  /// Remembers a lost lease. Returns how many the task has lost.
+  std::int32_t add_loss(TaskIndex task);
+  std::int32_t num_failures(TaskIndex task) const;
+  std::int32_t num_failures(TaskIndex task, const std::string& worker) const;
+  std::int32_t num_failures(const std::string& worker) const;
+  /// Whether this very attempt is known to have failed.
+  bool has_failed(TaskIndex task, const LeaseId& lease) const;
+
+  /// Forgets every blob, of a job that is to be replaced.
+  void release_all(BlobReferences& blobs);
+  /// The blobs of the store that the job still needs.
+  std::vector<Digest> live_blobs() const;
+
+ private:
+  struct Record {
+    TaskStatus status = TaskStatus::blocked;
+    std::int32_t missing_inputs = 0;
+    std::uint32_t attempts = 0;
+    std::int32_t losses = 0;
+    std::vector<BlobRef> outputs;
+  };
+  struct FailedAttempt {
+    LeaseId lease;
+    std::string worker;
+  };
+
+  Record& record(TaskIndex task) { return records_[static_cast<std::size_t>(task)]; }
+  const Record& record(TaskIndex task) const { return records_[static_cast<std::size_t>(task)]; }
+  bool apply(TaskIndex task, TaskEvent event);
+  bool is_live(TaskIndex task, const BlobRef& output) const;
+  void count_output(const BlobRef& output);
+  void release_inputs(TaskIndex task, BlobReferences& blobs);
+
+  JobGraph graph_;
+  bool keep_all_states_;
+  std::vector<Record> records_;
+  std::set<TaskIndex> ready_;
+  std::map<TaskIndex, std::vector<FailedAttempt>> failures_;
+  std::map<std::string, std::int32_t> failures_of_worker_;
+  JobProgress progress_;
+};
+
+}  // namespace baton

@@ -1,0 +1,190 @@
+#!/usr/bin/env python3
+"""Checks who includes whom, where third-party libraries appear, and a few rules of the house.
+
+usage: check_layers.py ROOT        print every violation as file:line: what, exit 1 when there is any
+       check_layers.py --self-test plant one fault of each kind in a temporary tree and see it found
+"""
+
+import re
+import sys
+import tempfile
+from pathlib import Path
+
+# Room -> rooms whose headers it may include besides its own. A room is a folder with sources.
+COMMON_BASE = {"common/base"}
+COMMON_DATA = COMMON_BASE | {"common/math"}
+COMMON_ALL = COMMON_DATA | {"common/job", "common/state", "common/image", "common/store", "common/protocol"}
+SCENE = COMMON_DATA | {"common/job", "common/image"}
+INTEGRATOR = SCENE | {"common/state", "worker/sampling", "worker/scene", "worker/accel"}
+PASS = INTEGRATOR | {"worker/integrator"}
+RUN = PASS | {"common/protocol", "common/store", "worker/pass"}
+
+MAY_INCLUDE = {
+    "common/base": set(),
+    "common/math": COMMON_BASE,
+    "common/job": COMMON_DATA,
+    "common/state": COMMON_DATA,
+    "common/image": COMMON_DATA,
+    "common/store": COMMON_BASE,
+    "common/protocol": COMMON_DATA | {"common/job"},
+    "worker/sampling": COMMON_DATA,
+    "worker/scene": SCENE,
+    "worker/accel": SCENE | {"worker/scene"},
+    "worker/integrator": INTEGRATOR,
+    "worker/pass": PASS,
+    "worker/run": RUN,
+    "worker": COMMON_BASE | {"worker/run"},
+    "coordinator/schedule": COMMON_DATA | {"common/job"},
+    "coordinator/journal": COMMON_DATA | {"common/job", "coordinator/schedule"},
+    "coordinator/service": COMMON_DATA
+    | {"common/job", "common/protocol", "common/store", "coordinator/schedule", "coordinator/journal"},
+    "coordinator": COMMON_ALL | {"coordinator/schedule", "coordinator/journal", "coordinator/service"},
+    "jobs/cli": COMMON_ALL | {"worker/scene"},  # `baton check` loads the scene
+}
+
+# Library, by how its headers are spelled -> files that may include them (prefix of the path).
+THIRD_PARTY = {
+    r"embree3/": ["worker/accel/"],
+    r"assimp/": ["worker/scene/mesh_loader.cpp"],
+    r"OpenImageIO/|OpenEXR/|Imath/": ["common/image/"],
+    r"zmq": ["common/protocol/"],
+    r"sqlite3": ["coordinator/journal/"],
+    r"zstd|xxhash": ["common/base/"],
+    r"nlohmann/": ["common/job/job_json", "jobs/cli/"],
+    r"httplib": ["coordinator/service/"],
+    r"CLI/": ["worker/main.cpp", "coordinator/main.cpp", "jobs/cli/"],
+}
+
+# Assembled from pieces, so that this file does not find itself.
+FORBIDDEN = ["TO" + "DO", "FIX" + "ME", "ffast" + "-math", "GTEST" + "_SKIP", "#if" + " 0"]
+
+MAX_LINES = 400
+SOURCE_FOLDERS = ["common", "worker", "coordinator", "jobs", "tests", "cmake"]
+CODE = {".h", ".cpp"}
+TEXT = CODE | {".py", ".cmake", ".sh", ".txt"}
+INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]')
+
+
+def room_of(path):
+    """Folder of a path relative to the root: the room it belongs to."""
+    return path.rsplit("/", 1)[0] if "/" in path else ""
+
+
+def check_includes(path, lines, known_files):
+    """Yields (line number, message) for every include that crosses the layer rule."""
+    room = room_of(path)
+    ruled = not path.startswith("tests/")
+    if ruled and room not in MAY_INCLUDE:
+        yield 1, f"folder {room} has no layer rule in check_layers.py"
+        return
+    own_header = path[:-4] + ".h"
+    has_own_header = path.endswith(".cpp") and own_header in known_files
+    first = True
+    for number, line in enumerate(lines, 1):
+        match = INCLUDE.match(line)
+        if not match:
+            continue
+        quote, target = match.groups()
+        if first and has_own_header and target != own_header:
+            yield number, f"includes {target} first, expected its own header {own_header}"
+        first = False
+        if not ruled:
+            continue
+        if quote == "<":
+            yield from ((number, message) for message in check_third_party(path, target))
+        elif "/" not in target:
+            yield number, f'"{target}": expected a path from the root'
+        else:
+            target_room = room_of(target)
+            if target_room != room and target_room not in MAY_INCLUDE[room]:
+                yield number, f"{room} may not include {target}"
+
+
+def check_third_party(path, target):
+    """Yields a message when a library header is included outside its place."""
+    for pattern, places in THIRD_PARTY.items():
+        if re.match(pattern, target) and not any(path.startswith(place) for place in places):
+            yield f"includes <{target}>, allowed only in {', '.join(places)}"
+
+
+def check_text(path, lines):
+    """Yields (line number, message) for length and forbidden words."""
+    if len(lines) > MAX_LINES:
+        yield MAX_LINES + 1, f"{len(lines)} lines, at most {MAX_LINES}"
+    for number, line in enumerate(lines, 1):
+        for word in FORBIDDEN:
+            if word in line:
+                yield number, f"contains {word!r}"
+
+
+def violations(root):
+    """All violations of the tree as 'file:line: message', sorted by file."""
+    files = []
+    for folder in SOURCE_FOLDERS:
+        files += [p for p in (root / folder).rglob("*") if p.is_file() and p.suffix in TEXT]
+    known = frozenset(p.relative_to(root).as_posix() for p in files)
+    found = []
+    for file in sorted(files):
+        path = file.relative_to(root).as_posix()
+        lines = file.read_text(encoding="utf-8").splitlines()
+        checks = list(check_text(path, lines))
+        if file.suffix in CODE:
+            checks += check_includes(path, lines, known)
+        found += [f"{path}:{number}: {message}" for number, message in checks]
+    return found
+
+
+# A planted fault: file, text, and what the message must contain.
+PLANTED = [
+    ("worker/sampling/a.cpp", '#include "worker/scene/scene.h"\n', "may not include worker/scene/scene.h"),
+    ("worker/run/a.cpp", '#include "coordinator/schedule/x.h"\n', "may not include coordinator"),
+    ("coordinator/service/a.cpp", '#include "worker/run/x.h"\n', "may not include worker"),
+    ("common/base/a.cpp", '#include "common/math/vec3.h"\n', "may not include common/math"),
+    ("worker/pass/a.cpp", "#include <embree3/rtcore.h>\n", "<embree3/rtcore.h>"),
+    ("common/job/a.cpp", "#include <nlohmann/json.hpp>\n", "<nlohmann/json.hpp>"),
+    ("coordinator/service/b.cpp", "#include <zmq.hpp>\n", "<zmq.hpp>"),
+    ("common/base/b.cpp", '#include "files.h"\n', "expected a path from the root"),
+    ("worker/run/clean.cpp", '#include "worker/pass/x.h"\n#include <vector>\n', ""),
+    ("common/math/b.cpp", "int x;  // " + FORBIDDEN[0] + "\n", FORBIDDEN[0]),
+    ("cmake/b.cmake", "set(x -" + FORBIDDEN[2] + ")\n", FORBIDDEN[2]),
+    ("worker/accel/long.cpp", "\n" * (MAX_LINES + 1), f"at most {MAX_LINES}"),
+    ("worker/new_room/a.cpp", "int x;\n", "no layer rule"),
+]
+
+
+def self_test():
+    """Plants each fault alone in a clean tree. Returns the number of faults that were not found."""
+    missed = 0
+    for path, text, expected in PLANTED + [("common/state/own.cpp", "#include <vector>\n", "first, expected")]:
+        with tempfile.TemporaryDirectory() as folder:
+            root = Path(folder)
+            (root / "common/state").mkdir(parents=True)
+            (root / "common/state/own.h").write_text("#pragma once\n")
+            (root / path).parent.mkdir(parents=True, exist_ok=True)
+            (root / path).write_text(text)
+            found = violations(root)
+            good = len(found) == 1 and expected in found[0] if expected else not found
+            if not good:
+                missed += 1
+                print(f"self-test: {path}: expected one violation with {expected!r}, got {found}")
+    print(f"self-test: {len(PLANTED) + 1 - missed} of {len(PLANTED) + 1} as expected")
+    return missed
+
+
+def main():
+    if sys.argv[1:] == ["--self-test"]:
+        return 1 if self_test() else 0
+    if len(sys.argv) != 2 or not Path(sys.argv[1]).is_dir():
+        print(__doc__, file=sys.stderr)
+        return 64
+    # The checker is trusted only as long as it finds what it must.
+    if self_test():
+        return 1
+    found = violations(Path(sys.argv[1]))
+    for line in found:
+        print(line)
+    return 1 if found else 0
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,101 @@
+#include "worker/run/frame_output.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "common/base/files.h"
+#include "common/base/limits.h"
+#include "common/base/version.h"
+#include "common/job/sequence.h"
+
+namespace baton {
+namespace {
+
+JobSpec small_job(const std::string& name) {
+  JobSpec job;
+  job.name = "small";
+  job.frames = {7, 9};
+  job.image = {.width = 20, .height = 10, .sites = 1, .tile_size = 8};
+  job.output.directory = testing::TempDir() + "frame_output_" + name;
+  return job;
+}
+
+/// A value that tells channel and pixel apart, not exact in half.
+float value_at(std::size_t channel, int x, int y) {
+  return 0.1f * static_cast<float>(channel) + static_cast<float>(x) +
+         1.0f / static_cast<float>(y + 3);
+}
+
+FilmTile make_tile(const PixelRect& rect) {
+  FilmTile tile{.rect = rect, .channels = {"R", "G", "B"}, .values = {}};
+  for (std::size_t channel = 0; channel < 3; ++channel) {
+    for (int y = rect.y0; y < rect.y1; ++y) {
+      for (int x = rect.x0; x < rect.x1; ++x) tile.values.push_back(value_at(channel, x, y));
+    }
+  }
+  return tile;
+}
+
+FilmTile assembled(const JobSpec& job) {
+  FilmTile image = blank_image(job.image, {"R", "G", "B"});
+  const TileGrid grid(job.image);
+  for (std::int32_t tile = 0; tile < grid.count(); ++tile) {
+    EXPECT_TRUE(paste_tile(make_tile(grid.rect(tile)), image));
+  }
+  return image;
+}
+
+TEST(FrameOutput, TilesMakeTheWholePicture) {
+  const JobSpec job = small_job("whole");
+  EXPECT_EQ(assembled(job), make_tile({0, 0, 20, 10}));
+}
+
+TEST(FrameOutput, ATileThatDoesNotBelongIsAnError) {
+  FilmTile image = blank_image(small_job("alien").image, {"R", "G", "B"});
+  EXPECT_FALSE(paste_tile(make_tile({16, 0, 24, 8}), image));
+  EXPECT_FALSE(paste_tile(make_tile({-1, 0, 4, 4}), image));
+  FilmTile other_channels = make_tile({0, 0, 8, 8});
+  other_channels.channels[2] = "A";
+  const Status status = paste_tile(other_channels, image);
+  ASSERT_FALSE(status);
+  EXPECT_THAT(status.error().message, testing::HasSubstr("expected R G B"));
+}
+
+TEST(FrameOutput, AFrameIsWrittenVerifiedAndNamedByItsDigest) {
+  const JobSpec job = small_job("written");
+  const Digest digest{3, 4};
+  const Result<BlobRef> ref = write_frame(job, digest, 1, assembled(job));
+  ASSERT_TRUE(ref) << ref.error().message;
+  EXPECT_EQ(ref->kind, BlobKind::image);
+  EXPECT_EQ(ref->frame, 1);
+
+  const std::filesystem::path path = frame_path(job, 1);
+  EXPECT_EQ(path.filename(), "frame.0009.exr");
+  const Bytes bytes = read_file(path, limits::kMaxBlobBytes).value();
+  EXPECT_EQ(ref->digest, digest_of(bytes));
+  EXPECT_EQ(ref->size_bytes, bytes.size());
+
+  const ImageMetadata metadata = read_exr_metadata(path).value();
+  EXPECT_THAT(metadata, testing::IsSupersetOf(ImageMetadata{{"baton:version", kVersion},
+                                                            {"baton:jobName", "small"},
+                                                            {"baton:jobDigest", digest.hex()},
+                                                            {"baton:frame", "9"},
+                                                            {"baton:method", "sequential"}}));
+}
+
+TEST(FrameOutput, EqualFramesAreEqualFiles) {
+  const JobSpec job = small_job("equal");
+  const BlobRef first = write_frame(job, {3, 4}, 0, assembled(job)).value();
+  EXPECT_EQ(write_frame(job, {3, 4}, 0, assembled(job)).value(), first);
+}
+
+TEST(FrameOutput, AFolderThatCannotBeMadeIsAnErrorWithItsName) {
+  JobSpec job = small_job("blocked");
+  job.output.directory = "/dev/null/frames";
+  const Result<BlobRef> ref = write_frame(job, {3, 4}, 0, assembled(job));
+  ASSERT_FALSE(ref);
+  EXPECT_THAT(ref.error().message, testing::HasSubstr("/dev/null/frames"));
+}
+
+}  // namespace
+}  // namespace baton

@@ -1,0 +1,84 @@
+#include "worker/run/job_cache.h"
+
+#include <gtest/gtest.h>
+
+#include <atomic>
+#include <thread>
+#include <vector>
+
+#include "common/base/limits.h"
+
+namespace baton {
+namespace {
+
+Result<LoadedJobPtr> empty_job(const Digest& digest, const std::string&) {
+  return LoadedJobPtr(std::make_shared<LoadedJob>(LoadedJob{{}, digest, nullptr}));
+}
+
+TEST(JobCache, ManyWaitersLoadOnce) {
+  std::atomic<int> loads{0};
+  JobEntry entry({1, 1}, [&](const Digest& digest, const std::string& document) {
+    EXPECT_EQ(document, "text");
+    ++loads;
+    return empty_job(digest, document);
+  });
+
+  // All threads wait for the document; then all get the same job.
+  std::vector<LoadedJobPtr> jobs(8);
+  std::vector<std::thread> threads;
+  for (LoadedJobPtr& job : jobs) {
+    threads.emplace_back([&] { job = entry.load({}).value(); });
+  }
+  entry.provide("text");
+  entry.provide("another text");
+  for (std::thread& thread : threads) thread.join();
+  EXPECT_EQ(loads, 1);
+  for (const LoadedJobPtr& job : jobs) EXPECT_EQ(job, jobs.front());
+}
+
+TEST(JobCache, AWaiterCanBeStopped) {
+  JobEntry entry({1, 1}, empty_job);
+  std::stop_source stop;
+  std::thread stopper([&] { stop.request_stop(); });
+  const Result<LoadedJobPtr> job = entry.load(stop.get_token());
+  stopper.join();
+  ASSERT_FALSE(job);
+  EXPECT_EQ(job.error().kind, ErrorKind::cancelled);
+}
+
+TEST(JobCache, AFailureIsForThatEntryAlone) {
+  int loads = 0;
+  JobCache cache([&](const Digest& digest, const std::string& document) -> Result<LoadedJobPtr> {
+    if (++loads == 1) return Error{ErrorKind::io, "mesh.ply: cannot open"};
+    return empty_job(digest, document);
+  });
+  const auto first = cache.entry({1, 1});
+  first->provide("text");
+  EXPECT_FALSE(first->load({}));
+  EXPECT_TRUE(first->failed());
+
+  const auto second = cache.entry({1, 1});
+  EXPECT_NE(first, second);
+  EXPECT_FALSE(second->has_document());
+  second->provide("text");
+  EXPECT_TRUE(second->load({}));
+}
+
+TEST(JobCache, TheOldestJobGoesFirst) {
+  JobCache cache(empty_job);
+  const auto oldest = cache.entry({0, 1});
+  const auto used_again = cache.entry({0, 2});
+  for (std::uint64_t i = 3; i <= limits::kMaxCachedJobs; ++i) (void)cache.entry({0, i});
+  EXPECT_EQ(cache.entry({0, 1}), oldest);
+  (void)cache.entry({9, 9});
+  EXPECT_EQ(cache.entry({0, 1}), oldest);
+  EXPECT_NE(cache.entry({0, 2}), used_again);
+}
+
+TEST(JobCache, ADocumentOfAnotherJobIsRefused) {
+  const Result<LoadedJobPtr> job = load_job_document({1, 1}, "not a document");
+  EXPECT_FALSE(job);
+}
+
+}  // namespace
+}  // namespace baton

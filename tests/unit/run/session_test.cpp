@@ -1,0 +1,221 @@
+#include "worker/run/session.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <algorithm>
+
+namespace baton {
+namespace {
+
+using namespace std::chrono_literals;
+
+/// A session at a clock that the test turns.
+class SessionTest : public testing::Test {
+ protected:
+  std::vector<SessionAction> step(const SessionEvent& event) { return session_.step(event, now_); }
+  std::vector<SessionAction> receive(Message message) {
+    return step(MessageArrived{std::move(message)});
+  }
+  std::vector<SessionAction> welcome() {
+    return receive(WorkerWelcome{.epoch = 1, .heartbeat_ms = 1000, .store_directory = "/store"});
+  }
+  std::vector<SessionAction> grant(const LeaseId& lease) { return receive(LeaseGrant{lease, {}}); }
+  std::vector<SessionAction> finish(const LeaseId& lease) {
+    return step(TaskEnded{lease, TaskOutput{}});
+  }
+  std::vector<SessionAction> fail(const LeaseId& lease, ErrorKind kind) {
+    return step(TaskEnded{lease, Error{kind, "broken"}});
+  }
+  std::vector<SessionAction> tick_after(std::chrono::milliseconds time) {
+    now_ += time;
+    return step(Tick{});
+  }
+
+  static LeaseId lease(std::int32_t tile) {
+    return {.job = {1, 2}, .task = {TaskKind::render, 0, tile}, .attempt = 1, .epoch = 1};
+  }
+
+  TimePoint now_{};
+  Session session_{
+      {.identity =
+           {.worker_id = "w", .host = {}, .num_threads = 2, .instruction_set = {}, .running = {}},
+       .give_up = 60s},
+      now_};
+};
+
+/// The sent messages of one type, in order.
+template <class M>
+std::vector<M> sent(const std::vector<SessionAction>& actions) {
+  std::vector<M> messages;
+  for (const SessionAction& action : actions) {
+    const auto* send = std::get_if<SendMessage>(&action);
+    if (send == nullptr) continue;
+    if (const auto* message = std::get_if<M>(&send->message)) messages.push_back(*message);
+  }
+  return messages;
+}
+
+template <class A>
+const A* find(const std::vector<SessionAction>& actions) {
+  for (const SessionAction& action : actions) {
+    if (const auto* found = std::get_if<A>(&action)) return found;
+  }
+  return nullptr;
+}
+
+TEST_F(SessionTest, SaysHelloUntilItIsWelcome) {
+  EXPECT_EQ(sent<WorkerHello>(tick_after(0ms)).size(), 1u);
+  EXPECT_TRUE(tick_after(500ms).empty());
+  EXPECT_EQ(sent<WorkerHello>(tick_after(500ms)).size(), 1u);
+}
+
+TEST_F(SessionTest, AsksForOneTaskMoreThanThreads) {
+  const auto actions = welcome();
+  ASSERT_NE(find<UseStore>(actions), nullptr);
+  EXPECT_EQ(find<UseStore>(actions)->directory, "/store");
+  ASSERT_EQ(sent<LeaseRequest>(actions).size(), 1u);
+  EXPECT_EQ(sent<LeaseRequest>(actions)[0].count, 3);
+
+  // A grant answers one of the three; the other two are still asked for.
+  const auto after = grant(lease(0));
+  ASSERT_NE(find<StartTask>(after), nullptr);
+  EXPECT_EQ(find<StartTask>(after)->lease, lease(0));
+  EXPECT_TRUE(sent<LeaseRequest>(after).empty());
+}
+
+TEST_F(SessionTest, ReportsAndAsksAgainWhenATaskEnds) {
+  welcome();
+  for (int tile = 0; tile < 3; ++tile) grant(lease(tile));
+  const auto actions = finish(lease(1));
+  ASSERT_EQ(sent<TaskDone>(actions).size(), 1u);
+  EXPECT_EQ(sent<TaskDone>(actions)[0].lease, lease(1));
+  ASSERT_EQ(sent<LeaseRequest>(actions).size(), 1u);
+  EXPECT_EQ(sent<LeaseRequest>(actions)[0].count, 1);
+}
+
+TEST_F(SessionTest, WaitsAsLongAsNoWorkSays) {
+  welcome();
+  receive(NoWork{.retry_ms = 200});
+  EXPECT_TRUE(sent<LeaseRequest>(tick_after(199ms)).empty());
+  EXPECT_EQ(sent<LeaseRequest>(tick_after(1ms)).size(), 1u);
+}
+
+TEST_F(SessionTest, AsksAgainWhenARequestWasLost) {
+  welcome();
+  EXPECT_TRUE(sent<LeaseRequest>(tick_after(1900ms)).empty());
+  EXPECT_EQ(sent<LeaseRequest>(tick_after(100ms)).size(), 1u);
+}
+
+TEST_F(SessionTest, BadInputIsPermanentAndALostDiskIsNot) {
+  welcome();
+  grant(lease(0));
+  grant(lease(1));
+  EXPECT_TRUE(sent<TaskFailed>(fail(lease(0), ErrorKind::bad_input)).at(0).permanent);
+  EXPECT_FALSE(sent<TaskFailed>(fail(lease(1), ErrorKind::io)).at(0).permanent);
+}
+
+TEST_F(SessionTest, ARevokedTaskIsStoppedAndNotReported) {
+  welcome();
+  grant(lease(0));
+  ASSERT_NE(find<StopTask>(receive(LeaseRevoke{lease(0)})), nullptr);
+  const auto actions = fail(lease(0), ErrorKind::cancelled);
+  EXPECT_TRUE(sent<TaskFailed>(actions).empty());
+  EXPECT_TRUE(sent<TaskDone>(actions).empty());
+  EXPECT_EQ(find<StopTask>(receive(LeaseRevoke{lease(0)})), nullptr);
+}
+
+TEST_F(SessionTest, AGrantThatComesTwiceStartsOneTask) {
+  welcome();
+  EXPECT_NE(find<StartTask>(grant(lease(0))), nullptr);
+  EXPECT_EQ(find<StartTask>(grant(lease(0))), nullptr);
+}
+
+TEST_F(SessionTest, HeartbeatsNameTheLeasesInHand) {
+  welcome();
+  grant(lease(0));
+  EXPECT_TRUE(sent<Heartbeat>(tick_after(999ms)).empty());
+  const auto beats = sent<Heartbeat>(tick_after(1ms));
+  ASSERT_EQ(beats.size(), 1u);
+  EXPECT_EQ(beats[0].running, std::vector<LeaseId>{lease(0)});
+}
+
+TEST_F(SessionTest, AfterHelloAgainEveryReportFollowsTheWelcomeInOrder) {
+  welcome();
+  grant(lease(0));
+  grant(lease(1));
+  grant(lease(2));
+  finish(lease(1));
+  finish(lease(0));
+
+  // The hello names what runs and what may have been lost.
+  const auto hellos = sent<WorkerHello>(receive(HelloAgain{}));
+  ASSERT_EQ(hellos.size(), 1u);
+  EXPECT_THAT(hellos[0].running, testing::UnorderedElementsAre(lease(0), lease(1), lease(2)));
+  EXPECT_TRUE(sent<WorkerHello>(receive(HelloAgain{})).empty());
+
+  const auto actions = welcome();
+  const auto done = sent<TaskDone>(actions);
+  ASSERT_EQ(done.size(), 2u);
+  EXPECT_EQ(done[0].lease, lease(1));
+  EXPECT_EQ(done[1].lease, lease(0));
+  EXPECT_TRUE(std::holds_alternative<LeaseRequest>(std::get<SendMessage>(actions.back()).message));
+}
+
+TEST_F(SessionTest, AReportMadeInSilenceWaitsForTheWelcome) {
+  welcome();
+  grant(lease(0));
+  EXPECT_EQ(sent<WorkerHello>(tick_after(3100ms)).size(), 1u);
+  EXPECT_TRUE(sent<TaskDone>(finish(lease(0))).empty());
+  EXPECT_EQ(sent<TaskDone>(welcome()).size(), 1u);
+}
+
+TEST_F(SessionTest, AMissingDocumentIsAskedForUntilItIsHere) {
+  welcome();
+  EXPECT_EQ(sent<JobDocumentRequest>(step(DocumentMissing{{1, 2}})).size(), 1u);
+  EXPECT_TRUE(step(DocumentMissing{{1, 2}}).empty());
+  EXPECT_EQ(sent<JobDocumentRequest>(tick_after(1000ms)).size(), 1u);
+  ASSERT_NE(find<TakeDocument>(receive(JobDocument{{1, 2}, "{}"})), nullptr);
+  EXPECT_TRUE(sent<JobDocumentRequest>(tick_after(1000ms)).empty());
+}
+
+TEST_F(SessionTest, DrainsWhatRunsThenSaysGoodbye) {
+  welcome();
+  grant(lease(0));
+  const auto draining = step(DrainRequested{});
+  EXPECT_NE(find<DropQueuedTasks>(draining), nullptr);
+  EXPECT_EQ(find<Leave>(draining), nullptr);
+  EXPECT_EQ(find<StartTask>(grant(lease(1))), nullptr);
+
+  const auto last = finish(lease(0));
+  EXPECT_EQ(sent<TaskDone>(last).size(), 1u);
+  EXPECT_TRUE(sent<LeaseRequest>(last).empty());
+  EXPECT_EQ(sent<WorkerGoodbye>(last).size(), 1u);
+  ASSERT_NE(find<Leave>(last), nullptr);
+  EXPECT_EQ(find<Leave>(last)->code, ExitCode::ok);
+}
+
+TEST_F(SessionTest, GivesUpOnASilentCoordinator) {
+  EXPECT_EQ(find<Leave>(tick_after(60s)), nullptr);
+  const auto actions = tick_after(1ms);
+  ASSERT_NE(find<Leave>(actions), nullptr);
+  EXPECT_EQ(find<Leave>(actions)->code, ExitCode::unavailable);
+}
+
+TEST_F(SessionTest, ShutdownEndsAtOnce) {
+  welcome();
+  grant(lease(0));
+  ASSERT_NE(find<Leave>(receive(Shutdown{})), nullptr);
+}
+
+TEST_F(SessionTest, AnotherProtocolVersionEndsTheWorkerAndOtherRefusalsDoNot) {
+  EXPECT_NE(find<Leave>(receive(Refused{static_cast<std::uint8_t>(ErrorKind::version), "v2"})),
+            nullptr);
+  const auto actions =
+      receive(Refused{static_cast<std::uint8_t>(ErrorKind::bad_input), "no such job"});
+  EXPECT_EQ(find<Leave>(actions), nullptr);
+  EXPECT_NE(find<Warn>(actions), nullptr);
+}
+
+}  // namespace
+}  // namespace baton

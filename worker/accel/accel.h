@@ -1,0 +1,51 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <span>
+#include <string>
+
+#include "worker/scene/scene.h"
+
+namespace baton {
+
+/// What a primary ray saw.
+struct SurfaceHit {
+  ShadingPoint point;          ///< position, normals turned to the viewer, wo
+  float depth = 0;             ///< distance along the ray; 0 where hit is false
+  std::uint32_t instance = 0;
+  std::uint32_t material = 0;
+  bool hit = false;
+};
+
+/// Rays that only ask "is the way to infinity free?", as structure of arrays; the layout of Embree's streams.
+/// Origins are already lifted off their surface (lift_off).
+struct ShadowRays {
+  std::vector<float> origin_x, origin_y, origin_z, direction_x, direction_y, direction_z;
+  std::vector<float> t_near, t_far;  ///< t_far < 0 after tracing: occluded
+  std::size_t size() const { return origin_x.size(); }
+  void clear();
+  void reserve(std::size_t count);
+  void push(const Vec3& origin, const Vec3& direction);
+};
+
+/// The origin of a shadow ray: `position` lifted along the geometric normal just so far that float error cannot make
+/// the surface shadow itself [Waechter & Binder 2019].
+Vec3 lift_off(const Vec3& position, const Vec3& ng);
+
+/// The ray tracer: the only place that knows Embree. Immutable after construction; any number of threads may trace.
+class Accel {
+ public:
+  /// Keeps a reference to `scene`, which must outlive it. Error: Embree's own message.
+  static Result<std::unique_ptr<Accel>> build(const Scene& scene);
+  virtual ~Accel() = default;
+
+  /// Closest hit of each ray; hits.size() == rays.size().
+  virtual void intersect(std::span<const Ray> rays, std::span<SurfaceHit> hits) const = 0;
+  /// Traces all rays; t_far of the occluded ones becomes -inf.
+  virtual void occluded(ShadowRays& rays) const = 0;
+  /// "Embree 3.13.5, AVX2" for the benchmark and --version.
+  virtual std::string description() const = 0;
+};
+
+}  // namespace baton

@@ -1,0 +1,72 @@
+#include "worker/integrator/candidate_samplers.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "worker/sampling/ess.h"
+#include "worker/sampling/resampling.h"
+
+namespace baton {
+namespace {
+
+/// A pixel that no light reaches: no contribution, whatever the directions.
+void set_dark(const PixelSamples& samples) {
+  std::fill(samples.direction.begin(), samples.direction.end(), OctDirection{0});
+  std::fill(samples.site.begin(), samples.site.end(), std::uint8_t{0});
+  std::fill(samples.weight.begin(), samples.weight.end(), 0.0f);
+  samples.lns = 0;
+}
+
+/// Fills `scratch`; false when there is nothing to choose from.
+bool draw(const PixelInput& input, const CandidateCounts& counts, kernels::CandidateSet& scratch,
+          const PixelSamples& samples) {
+  kernels::draw_candidates(input.sites, input.now, input.light.pool, counts.from_light, counts.from_bsdf,
+                           Rng(input.key, PassId::candidates), scratch);
+  samples.source = PixelSource::fresh;
+  const bool lit = scratch.count > 0 && scratch.total > 0 && std::isfinite(scratch.total);
+  if (!lit) set_dark(samples);
+  samples.lns = samples.lns_fresh = lit ? scratch.total : 0.0f;
+  return lit;
+}
+
+}  // namespace
+
+CandidateCounts split_candidates(std::int32_t total, float brdf_fraction) {
+  const auto from_bsdf = static_cast<std::int32_t>(std::lround(static_cast<float>(total) * brdf_fraction));
+  return {total - from_bsdf, from_bsdf};
+}
+
+PixelDiagnostics DirectSampler::sample(const PixelInput& input, kernels::CandidateSet& scratch,
+                                       const PixelSamples& samples) const {
+  PixelDiagnostics diagnostics{.target_evaluations = counts_.total()};
+  if (!draw(input, counts_, scratch, samples)) return diagnostics;
+  const float inverse = 1.0f / scratch.total;
+  for (std::size_t j = 0; j < samples.weight.size(); ++j) {
+    samples.direction[j] = scratch.code[j];
+    samples.site[j] = static_cast<std::uint8_t>(scratch.site[j]);
+    samples.weight[j] = scratch.weight[j] * inverse;
+  }
+  diagnostics.ess = effective_sample_size(samples.weight);
+  return diagnostics;
+}
+
+PixelDiagnostics BidirectionalSampler::sample(const PixelInput& input, kernels::CandidateSet& scratch,
+                                              const PixelSamples& samples) const {
+  PixelDiagnostics diagnostics{.target_evaluations = counts_.total()};
+  if (!draw(input, counts_, scratch, samples)) return diagnostics;
+  std::array<std::int32_t, limits::kMaxParticles> storage{};
+  const std::span<std::int32_t> chosen = std::span(storage).first(samples.weight.size());
+  const float u = Rng(input.key, PassId::choose).uniforms(0, 0)[0];
+  systematic_choice({scratch.weight, static_cast<std::size_t>(scratch.count)}, scratch.total, u, chosen);
+  for (std::size_t j = 0; j < chosen.size(); ++j) {
+    const auto pick = static_cast<std::size_t>(chosen[j]);
+    samples.direction[j] = scratch.code[pick];
+    samples.site[j] = static_cast<std::uint8_t>(scratch.site[pick]);
+    samples.weight[j] = 1.0f / static_cast<float>(chosen.size());
+  }
+  diagnostics.ess = static_cast<float>(chosen.size());
+  return diagnostics;
+}
+
+}  // namespace baton

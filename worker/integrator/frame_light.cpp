@@ -1,0 +1,104 @@
+#include "worker/integrator/frame_light.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+
+#include "common/base/limits.h"
+
+namespace baton {
+namespace {
+
+std::size_t size_bytes(const EnvironmentMap& map) {
+  return static_cast<std::size_t>(map.stride()) * (map.height() + 2) * sizeof(EnvironmentMap::Texel);
+}
+std::size_t size_bytes(const FrameLight& light) { return light.pool.size_bytes(); }
+
+/// The cached value, moved to the front, or null.
+template <class List>
+auto find_and_touch(List& cache, std::int32_t key) -> decltype(cache.front().second) {
+  const auto found = std::find_if(cache.begin(), cache.end(), [key](const auto& entry) { return entry.first == key; });
+  if (found == cache.end()) return nullptr;
+  cache.splice(cache.begin(), cache, found);
+  return cache.front().second;
+}
+
+/// Puts a value in front and forgets the oldest ones past the budget.
+template <class List, class Value>
+void insert_in_front(List& cache, std::int32_t key, std::shared_ptr<const Value> value) {
+  cache.emplace_front(key, std::move(value));
+  std::size_t total = 0;
+  for (auto it = cache.begin(); it != cache.end();) {
+    total += size_bytes(*it->second);
+    it = total > limits::kMaxEnvironmentCacheBytes && it != cache.begin() ? cache.erase(it) : std::next(it);
+  }
+}
+
+}  // namespace
+
+LightSequence::LightSequence(const JobSpec& job) : job_(job), frames_(expand_sequence(job)) {}
+
+Result<std::shared_ptr<const EnvironmentMap>> LightSequence::key_map(std::int32_t key) {
+  if (auto found = find_and_touch(key_maps_, key)) return found;
+  const std::string& path = job_.environment.keys[static_cast<std::size_t>(key)].map;
+  BATON_ASSIGN(const RgbImage image, read_rgb_image(path));
+  auto map = std::make_shared<const EnvironmentMap>(image, job_.environment.filter, job_.environment.scale,
+                                                    job_.sampling.mis_compensation);
+  if (const auto& repairs = map->repairs(); repairs.total() > 0) {
+    const std::string note = fmt::format("{}: {} negative, {} NaN, {} infinite texels set to 0", path,
+                                         repairs.negative, repairs.nan, repairs.infinite);
+    if (std::find(repair_notes_.begin(), repair_notes_.end(), note) == repair_notes_.end()) {
+      repair_notes_.push_back(note);
+    }
+  }
+  insert_in_front(key_maps_, key, map);
+  return std::shared_ptr<const EnvironmentMap>(map);
+}
+
+Result<std::shared_ptr<const EnvironmentMap>> LightSequence::mixed_map(const EnvironmentFrame& frame) {
+  if (frame.mix <= 0) return key_map(frame.map_a);
+  const auto first = std::find_if(frames_.begin(), frames_.end(), [&](const FrameSpec& f) {
+    return f.environment.same_texels(frame);
+  });
+  const auto name = static_cast<std::int32_t>(first - frames_.begin());
+  if (auto found = find_and_touch(mixed_maps_, name)) return found;
+  BATON_ASSIGN(const auto a, key_map(frame.map_a));
+  BATON_ASSIGN(const auto b, key_map(frame.map_b));
+  if (a->width() != b->width() || a->height() != b->height()) {
+    return Error{ErrorKind::bad_input,
+                 fmt::format("{}: {} x {} texels, expected {} x {} as in {} to interpolate between them",
+                             job_.environment.keys[static_cast<std::size_t>(frame.map_b)].map, b->width(), b->height(),
+                             a->width(), a->height(), job_.environment.keys[static_cast<std::size_t>(frame.map_a)].map)};
+  }
+  auto map = std::make_shared<const EnvironmentMap>(*a, *b, frame.mix, job_.sampling.mis_compensation);
+  insert_in_front(mixed_maps_, name, map);
+  return std::shared_ptr<const EnvironmentMap>(map);
+}
+
+Result<Environment> LightSequence::environment(const EnvironmentFrame& frame) {
+  BATON_ASSIGN(auto map, mixed_map(frame));
+  return Environment{std::move(map), frame.rotation};
+}
+
+Result<std::shared_ptr<const FrameLight>> LightSequence::at(std::int32_t index) {
+  const std::lock_guard lock(mutex_);
+  if (auto found = find_and_touch(lights_, index)) return found;
+  const auto start = std::chrono::steady_clock::now();
+  const FrameSpec& frame = frames_[static_cast<std::size_t>(index)];
+  const FrameSpec& frame_before = frames_[static_cast<std::size_t>(std::max(index - 1, 0))];
+  auto light = std::make_shared<FrameLight>();
+  BATON_ASSIGN(light->now, environment(frame.environment));
+  BATON_ASSIGN(light->before, environment(frame_before.environment));
+  light->pool = make_light_pool(light->now, light->before, job_.seed, static_cast<std::uint32_t>(frame.number));
+  light->prepare_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  insert_in_front(lights_, index, std::shared_ptr<const FrameLight>(light));
+  return std::shared_ptr<const FrameLight>(light);
+}
+
+std::vector<std::string> LightSequence::repair_notes() const {
+  const std::lock_guard lock(mutex_);
+  return repair_notes_;
+}
+
+}  // namespace baton

@@ -1,0 +1,55 @@
+#pragma once
+
+#include <cstdint>
+#include <list>
+#include <memory>
+#include <mutex>
+#include <vector>
+
+#include "common/base/result.h"
+#include "common/job/sequence.h"
+#include "worker/integrator/light_pool.h"
+#include "worker/scene/environment.h"
+
+namespace baton {
+
+/// The light of one frame, ready for its pixels.
+struct FrameLight {
+  Environment now;
+  Environment before;   ///< the frame before; for the first frame the same as now
+  LightPool pool;
+  double prepare_seconds = 0;  ///< time spent on texels, table and pool
+};
+
+/// The environments of a job's frames, prepared on demand and kept while memory allows. Any number of threads may ask;
+/// a frame is prepared once while the others wait. A frame's light is a pure function of (job, frame).
+class LightSequence {
+ public:
+  /// job must outlive the object.
+  explicit LightSequence(const JobSpec& job);
+
+  /// The light of frame `index` (0-based). Errors: a map that cannot be read, or two key frames of different size.
+  Result<std::shared_ptr<const FrameLight>> at(std::int32_t index);
+
+  /// Texels set to 0 because they were negative, NaN or infinite, per map read so far: "path: 12 negative ...".
+  std::vector<std::string> repair_notes() const;
+
+ private:
+  /// Most recently used in front.
+  template <class Key, class Value>
+  using Cache = std::list<std::pair<Key, std::shared_ptr<const Value>>>;
+
+  Result<std::shared_ptr<const EnvironmentMap>> key_map(std::int32_t key);
+  Result<std::shared_ptr<const EnvironmentMap>> mixed_map(const EnvironmentFrame& frame);
+  Result<Environment> environment(const EnvironmentFrame& frame);
+
+  const JobSpec& job_;
+  std::vector<FrameSpec> frames_;
+  mutable std::mutex mutex_;
+  Cache<std::int32_t, EnvironmentMap> key_maps_;
+  Cache<std::int32_t, EnvironmentMap> mixed_maps_;  ///< by the first frame index that shows these texels
+  Cache<std::int32_t, FrameLight> lights_;
+  std::vector<std::string> repair_notes_;
+};
+
+}  // namespace baton

@@ -1,0 +1,300 @@
+#include "worker/integrator/kernels.h"
+
+#include <algorithm>
+#include <bit>
+
+#include "common/base/check.h"
+#include "common/math/low_discrepancy.h"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "worker/integrator/kernels.cpp"
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+
+#include "worker/integrator/target-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace baton::HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+void DecodeDirections(std::span<const OctDirection> code, std::span<float> x, std::span<float> y, std::span<float> z) {
+  const DF d;
+  const DU du;
+  for (std::size_t i = 0; i < code.size(); i += hn::Lanes(d)) {
+    const std::size_t left = std::min(code.size() - i, hn::Lanes(d));
+    HWY_ALIGN std::uint32_t in[hn::MaxLanes(DU())] = {};
+    HWY_ALIGN float out[3][hn::MaxLanes(DF())];
+    std::copy_n(code.data() + i, left, in);
+    const Vec3Lanes w = DecodeOctahedral(hn::Load(du, in));
+    hn::Store(w.x, d, out[0]);
+    hn::Store(w.y, d, out[1]);
+    hn::Store(w.z, d, out[2]);
+    std::copy_n(out[0], left, x.data() + i);
+    std::copy_n(out[1], left, y.data() + i);
+    std::copy_n(out[2], left, z.data() + i);
+  }
+}
+
+/// Up to a vector of floats from `array` at i, the rest zero; and back.
+HWY_INLINE VF LoadSome(std::span<const float> array, std::size_t i) {
+  const DF d;
+  HWY_ALIGN float in[hn::MaxLanes(DF())] = {};
+  std::copy_n(array.data() + i, std::min(array.size() - i, hn::Lanes(d)), in);
+  return hn::Load(d, in);
+}
+HWY_INLINE void StoreSome(VF value, std::span<float> array, std::size_t i) {
+  const DF d;
+  HWY_ALIGN float out[hn::MaxLanes(DF())];
+  hn::Store(value, d, out);
+  std::copy_n(out, std::min(array.size() - i, hn::Lanes(d)), array.data() + i);
+}
+HWY_INLINE VI LoadSomeSites(std::span<const std::int32_t> array, std::size_t i) {
+  const DI di;
+  HWY_ALIGN std::int32_t in[hn::MaxLanes(DI())] = {};
+  std::copy_n(array.data() + i, std::min(array.size() - i, hn::Lanes(di)), in);
+  return hn::Load(di, in);
+}
+
+void EvaluateEnvironmentSpans(const EnvironmentView& view, std::span<const float> x, std::span<const float> y,
+                              std::span<const float> z, std::span<float> r, std::span<float> g, std::span<float> b,
+                              std::span<float> density) {
+  for (std::size_t i = 0; i < x.size(); i += hn::Lanes(DF())) {
+    const RadianceLanes light = EvaluateEnvironment(view, {LoadSome(x, i), LoadSome(y, i), LoadSome(z, i)});
+    StoreSome(light.r, r, i);
+    StoreSome(light.g, g, i);
+    StoreSome(light.b, b, i);
+    StoreSome(light.density, density, i);
+  }
+}
+
+void EvaluateBsdfSpans(const SiteBlock& sites, std::span<const std::int32_t> site, std::span<const float> x,
+                       std::span<const float> y, std::span<const float> z, std::span<float> r, std::span<float> g,
+                       std::span<float> b, std::span<float> pdf) {
+  const VF one = hn::Set(DF(), 1.0f);
+  for (std::size_t i = 0; i < x.size(); i += hn::Lanes(DF())) {
+    const SurfaceLanes surface = LoadSurfaces(sites, LoadSomeSites(site, i));
+    const BsdfLanes f = EvaluateBsdf(surface, {LoadSome(x, i), LoadSome(y, i), LoadSome(z, i)});
+    const Vec3Lanes reflected = ReflectedRadiance(surface, f, one, one, one);
+    StoreSome(reflected.x, r, i);
+    StoreSome(reflected.y, g, i);
+    StoreSome(reflected.z, b, i);
+    StoreSome(f.pdf, pdf, i);
+  }
+}
+
+void SampleBsdfSpans(const SiteBlock& sites, std::span<const std::int32_t> site, std::span<const float> u0,
+                     std::span<const float> u1, std::span<float> x, std::span<float> y, std::span<float> z) {
+  for (std::size_t i = 0; i < u0.size(); i += hn::Lanes(DF())) {
+    const Vec3Lanes w = SampleBsdf(LoadSurfaces(sites, LoadSomeSites(site, i)), LoadSome(u0, i), LoadSome(u1, i));
+    StoreSome(w.x, x, i);
+    StoreSome(w.y, y, i);
+    StoreSome(w.z, z, i);
+  }
+}
+
+/// Everything that the two kinds of candidates share.
+struct CandidateContext {
+  const SiteBlock& sites;
+  VF from_light, from_bsdf;  ///< M_t
+  VF site_share;             ///< num_hits / S
+
+  /// Stores p~ / sum_t M_t q_t for the lanes below `left`.
+  HWY_INLINE VF Weight(const SurfaceLanes& surface, const BsdfLanes& f, VF r, VF g, VF b, VF density, MF used) const {
+    const DF d;
+    const VF target = hn::Mul(MeanLanes(ReflectedRadiance(surface, f, r, g, b)), site_share);
+    const VF proposal = hn::MulAdd(from_light, density, hn::Mul(from_bsdf, f.pdf));
+    const MF live = hn::And(used, hn::And(hn::Gt(target, hn::Zero(d)), hn::Gt(proposal, hn::Zero(d))));
+    return hn::IfThenElseZero(live, hn::Div(target, hn::IfThenElse(live, proposal, hn::Set(d, 1.0f))));
+  }
+  /// Sites of candidates i, i + 1, ... of `count`: even shares with a random start.
+  HWY_INLINE VI Sites(std::size_t i, std::int32_t count, float start) const {
+    const DF d;
+    const VF position = hn::Add(hn::Iota(d, static_cast<float>(i)), hn::Set(d, start));
+    const VF fraction = hn::Mul(position, hn::Set(d, 1.0f / static_cast<float>(count)));
+    return SiteAt(sites, hn::Min(fraction, hn::Set(d, 0x1.fffffep-1f)));
+  }
+};
+
+/// Candidates from the pool: a contiguous block at a random aligned start.
+HWY_INLINE VF LightCandidates(const CandidateContext& context, const LightPool& pool, std::int32_t count,
+                              const Philox4x32::Counter& random, kernels::CandidateSet& out) {
+  const DF d;
+  const DI di;
+  const DU du;
+  VF total = hn::Zero(d);
+  if (count == 0) return total;
+  const std::uint32_t block = std::min(64u, std::bit_floor(static_cast<std::uint32_t>(count)));
+  const std::size_t start = random[0] % (LightPool::kSize / block) * block;
+  const float site_start = uniform_float(random[3]);
+  for (std::size_t i = 0; i < static_cast<std::size_t>(count); i += hn::Lanes(d)) {
+    // Lanes never straddle the wrap-around: vectors that start inside the pool's padding-free end fall back to its start.
+    const std::size_t entry = (start + i) % LightPool::kSize;
+    HWY_ALIGN OctDirection codes[hn::MaxLanes(DU())];
+    const bool straddles = entry + hn::Lanes(d) > LightPool::kSize;
+    const std::size_t from = straddles ? 0 : entry;
+    hn::Store(hn::LoadU(du, pool.code.data() + from), du, codes);
+    const VI site = context.Sites(i, count, site_start);
+    const SurfaceLanes surface = LoadSurfaces(context.sites, site);
+    const BsdfLanes f = EvaluateBsdf(
+        surface, {hn::LoadU(d, pool.x.data() + from), hn::LoadU(d, pool.y.data() + from), hn::LoadU(d, pool.z.data() + from)});
+    const MF used = hn::Lt(hn::Iota(d, static_cast<float>(i)), hn::Set(d, static_cast<float>(count)));
+    const VF weight =
+        context.Weight(surface, f, hn::LoadU(d, pool.r.data() + from), hn::LoadU(d, pool.g.data() + from),
+                       hn::LoadU(d, pool.b.data() + from), hn::LoadU(d, pool.density.data() + from), used);
+    hn::StoreU(hn::Load(du, codes), du, out.code + i);
+    hn::StoreU(site, di, out.site + i);
+    hn::StoreU(weight, d, out.weight + i);
+    total = hn::Add(total, weight);
+  }
+  return total;
+}
+
+/// Candidates from the BRDF: Sobol' points with the pixel's digital shift, snapped to the lattice.
+HWY_INLINE VF BsdfCandidates(const CandidateContext& context, const EnvironmentView& environment, std::int32_t count,
+                             std::int32_t offset, const Philox4x32::Counter& random, kernels::CandidateSet& out) {
+  const DF d;
+  const DI di;
+  const DU du;
+  const SobolTable& table = sobol_table();
+  VF total = hn::Zero(d);
+  const float site_start = uniform_float(random[3] * 0x9E3779B9u);
+  for (std::size_t i = 0; i < static_cast<std::size_t>(count); i += hn::Lanes(d)) {
+    const VU sx = hn::Xor(hn::LoadU(du, table.x.data() + i), hn::Set(du, random[1]));
+    const VU sy = hn::Xor(hn::LoadU(du, table.y.data() + i), hn::Set(du, random[2]));
+    const VI site = context.Sites(i, count, site_start);
+    const SurfaceLanes surface = LoadSurfaces(context.sites, site);
+    const VU code = EncodeOctahedral(SampleBsdf(surface, UniformLanes(d, sx), UniformLanes(d, sy)));
+    const Vec3Lanes w = DecodeOctahedral(code);
+    const BsdfLanes f = EvaluateBsdf(surface, w);
+    const RadianceLanes light = EvaluateEnvironment(environment, w);
+    const MF used = hn::Lt(hn::Iota(d, static_cast<float>(i)), hn::Set(d, static_cast<float>(count)));
+    const VF weight = context.Weight(surface, f, light.r, light.g, light.b, light.density, used);
+    const std::size_t at = static_cast<std::size_t>(offset) + i;
+    hn::StoreU(code, du, out.code + at);
+    hn::StoreU(site, di, out.site + at);
+    hn::StoreU(weight, d, out.weight + at);
+    total = hn::Add(total, weight);
+  }
+  return total;
+}
+
+void DrawCandidates(const SiteBlock& sites, const EnvironmentView& environment, const LightPool& pool,
+                    std::int32_t from_light, std::int32_t from_bsdf, const Rng& rng, kernels::CandidateSet& out) {
+  const DF d;
+  const CandidateContext context{sites, hn::Set(d, static_cast<float>(from_light)),
+                                 hn::Set(d, static_cast<float>(from_bsdf)),
+                                 hn::Set(d, static_cast<float>(sites.num_hits) / static_cast<float>(sites.num_sites))};
+  const Philox4x32::Counter random = rng.bits(0, 0);
+  const VF light = LightCandidates(context, pool, from_light, random, out);
+  const VF bsdf = BsdfCandidates(context, environment, from_bsdf, from_light, random, out);
+  out.count = from_light + from_bsdf;
+  out.total = hn::GetLane(hn::SumOfLanes(d, hn::Add(light, bsdf)));
+}
+
+void ShadeSamples(const SiteBlock& sites, const EnvironmentView& environment, std::span<const OctDirection> code,
+                  std::span<const std::uint8_t> site, kernels::ShadedSamples& out) {
+  const DF d;
+  const DI di;
+  const DU du;
+  for (std::size_t i = 0; i < code.size(); i += hn::Lanes(d)) {
+    HWY_ALIGN std::uint32_t codes[hn::MaxLanes(DU())] = {};
+    HWY_ALIGN std::int32_t site_of[hn::MaxLanes(DI())] = {};
+    const std::size_t left = std::min(code.size() - i, hn::Lanes(d));
+    for (std::size_t lane = 0; lane < left; ++lane) {
+      codes[lane] = code[i + lane];
+      site_of[lane] = site[i + lane];
+    }
+    const Vec3Lanes w = DecodeOctahedral(hn::Load(du, codes));
+    const SurfaceLanes surface = LoadSurfaces(sites, hn::Load(di, site_of));
+    const BsdfLanes f = EvaluateBsdf(surface, w);
+    const RadianceLanes light = EvaluateEnvironment(environment, w);
+    const Vec3Lanes reflected = ReflectedRadiance(surface, f, light.r, light.g, light.b);
+    const VF target = MeanLanes(reflected);
+    const MF live = hn::Gt(target, hn::Set(d, 1e-37f));
+    const VF inverse = hn::IfThenElseZero(live, hn::Div(hn::Set(d, 1.0f), hn::Max(target, hn::Set(d, 1e-37f))));
+    hn::StoreU(w.x, d, out.x + i);
+    hn::StoreU(w.y, d, out.y + i);
+    hn::StoreU(w.z, d, out.z + i);
+    hn::StoreU(hn::Mul(reflected.x, inverse), d, out.r + i);
+    hn::StoreU(hn::Mul(reflected.y, inverse), d, out.g + i);
+    hn::StoreU(hn::Mul(reflected.z, inverse), d, out.b + i);
+  }
+}
+
+SequentialOutcome SequentialPixel(const SiteBlock& sites, const EnvironmentView& before, const EnvironmentView& now,
+                                  const LightPool& pool, const SequentialSettings& settings, float lns_before,
+                                  const RngKey& key, ParticleSpan particles) {
+  const SameSurfaceTarget target{sites, before, now, pool};
+  return SequentialStep(target, settings, lns_before, Rng(key, PassId::move), Rng(key, PassId::resample), particles);
+}
+
+const char* TargetName() { return hwy::TargetName(HWY_TARGET); }
+
+}  // namespace baton::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace baton {
+HWY_EXPORT(DecodeDirections);
+HWY_EXPORT(EvaluateEnvironmentSpans);
+HWY_EXPORT(EvaluateBsdfSpans);
+HWY_EXPORT(SampleBsdfSpans);
+HWY_EXPORT(DrawCandidates);
+HWY_EXPORT(ShadeSamples);
+HWY_EXPORT(SequentialPixel);
+HWY_EXPORT(TargetName);
+
+namespace kernels {
+
+std::string instruction_set() { return HWY_DYNAMIC_DISPATCH(TargetName)(); }
+
+void decode_directions(std::span<const OctDirection> code, std::span<float> x, std::span<float> y, std::span<float> z) {
+  HWY_DYNAMIC_DISPATCH(DecodeDirections)(code, x, y, z);
+}
+
+void evaluate_environment(const EnvironmentView& view, std::span<const float> x, std::span<const float> y,
+                          std::span<const float> z, std::span<float> r, std::span<float> g, std::span<float> b,
+                          std::span<float> density) {
+  HWY_DYNAMIC_DISPATCH(EvaluateEnvironmentSpans)(view, x, y, z, r, g, b, density);
+}
+
+void evaluate_bsdf(const SiteBlock& sites, std::span<const std::int32_t> site, std::span<const float> x,
+                   std::span<const float> y, std::span<const float> z, std::span<float> r, std::span<float> g,
+                   std::span<float> b, std::span<float> pdf) {
+  HWY_DYNAMIC_DISPATCH(EvaluateBsdfSpans)(sites, site, x, y, z, r, g, b, pdf);
+}
+
+void sample_bsdf(const SiteBlock& sites, std::span<const std::int32_t> site, std::span<const float> u0,
+                 std::span<const float> u1, std::span<float> x, std::span<float> y, std::span<float> z) {
+  HWY_DYNAMIC_DISPATCH(SampleBsdfSpans)(sites, site, u0, u1, x, y, z);
+}
+
+void draw_candidates(const SiteBlock& sites, const EnvironmentView& environment, const LightPool& pool,
+                     std::int32_t from_light, std::int32_t from_bsdf, const Rng& rng, CandidateSet& out) {
+  BATON_CHECK(sites.num_hits > 0 && from_light >= 0 && from_bsdf >= 0);
+  BATON_CHECK(from_light + from_bsdf >= 1 && from_light + from_bsdf <= limits::kMaxCandidates);
+  out.count = 0;
+  out.total = 0;
+  if (pool.empty()) return;
+  HWY_DYNAMIC_DISPATCH(DrawCandidates)(sites, environment, pool, from_light, from_bsdf, rng, out);
+}
+
+void shade_samples(const SiteBlock& sites, const EnvironmentView& environment, std::span<const OctDirection> code,
+                   std::span<const std::uint8_t> site, ShadedSamples& out) {
+  BATON_CHECK(code.size() == site.size() && code.size() <= limits::kMaxParticles);
+  HWY_DYNAMIC_DISPATCH(ShadeSamples)(sites, environment, code, site, out);
+}
+
+SequentialOutcome sequential_step(const SiteBlock& sites, const EnvironmentView& environment_before,
+                                  const EnvironmentView& environment_now, const LightPool& pool,
+                                  const SequentialSettings& settings, float lns_before, const RngKey& key,
+                                  ParticleSpan particles) {
+  BATON_CHECK(settings.num_particles >= 1 && settings.num_particles <= limits::kMaxParticles);
+  if (pool.empty() || !(lns_before > 0)) return {};
+  return HWY_DYNAMIC_DISPATCH(SequentialPixel)(sites, environment_before, environment_now, pool, settings, lns_before,
+                                               key, particles);
+}
+
+}  // namespace kernels
+}  // namespace baton
+#endif  // HWY_ONCE

@@ -1,0 +1,54 @@
+#pragma once
+
+#include <memory>
+
+#include "common/job/job_spec.h"
+#include "common/state/sample_state.h"
+#include "worker/integrator/frame_light.h"
+#include "worker/integrator/kernels.h"
+
+namespace baton {
+
+/// What every method is given for one pixel.
+struct PixelInput {
+  const SiteBlock& sites;            ///< at least one of them sees a surface
+  const FrameLight& light;
+  const EnvironmentView& now;        ///< views of light.now and light.before
+  const EnvironmentView& before;
+  RngKey key;
+  bool has_history = false;  ///< the samples hold the previous frame's properly weighted set of the same surfaces
+};
+
+/// The samples of one pixel, in and out: a properly weighted set for p~(site, w) = p~_site(w) / S with
+/// contributions u_j = lns * weight_j, so that E[sum u_j h(w_j)] = integral of p~ h. lns 0: every weight is 0.
+struct PixelSamples {
+  std::span<OctDirection> direction;  ///< (N)
+  std::span<std::uint8_t> site;       ///< (N)
+  std::span<float> weight;            ///< (N) sum 1, or all 0
+  float& lns;
+  float& lns_fresh;
+  PixelSource& source;
+};
+
+/// What a method says about its work on a pixel.
+struct PixelDiagnostics {
+  float ess = 0;         ///< [1, N], 0 without light
+  std::int32_t target_evaluations = 0;
+  std::int32_t moves_proposed = 0;
+  std::int32_t moves_accepted = 0;
+  bool resampled = false;
+};
+
+/// A sampling method: the plug-in over the contract of PixelSamples. Stateless; any number of threads may use one.
+class PixelSampler {
+ public:
+  virtual ~PixelSampler() = default;
+  /// scratch: the caller's, reused from pixel to pixel.
+  virtual PixelDiagnostics sample(const PixelInput& input, kernels::CandidateSet& scratch,
+                                  const PixelSamples& samples) const = 0;
+};
+
+/// The sampler of a job; null for Method::reference, which is no sampler of this kind (reference.h).
+std::unique_ptr<const PixelSampler> make_pixel_sampler(const SamplingSpec& spec);
+
+}  // namespace baton

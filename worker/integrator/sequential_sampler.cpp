@@ -1,0 +1,58 @@
+#include "worker/integrator/sequential_sampler.h"
+
+#include <cmath>
+
+namespace baton {
+
+PixelDiagnostics SequentialSampler::sample(const PixelInput& input, kernels::CandidateSet& scratch,
+                                           const PixelSamples& samples) const {
+  if (!input.has_history) return start_.sample(input, scratch, samples);
+
+  // Carry the particles over.
+  const SequentialOutcome outcome =
+      kernels::sequential_step(input.sites, input.before, input.now, input.light.pool, settings_, samples.lns, input.key,
+                               {samples.direction.data(), samples.site.data(), samples.weight.data()});
+  PixelDiagnostics diagnostics{
+      // Both targets at the old positions and at every proposal.
+      .ess = outcome.ess,
+      .target_evaluations = 2 * settings_.num_particles * (settings_.num_distributions + 1),
+      .moves_proposed = outcome.moves_proposed,
+      .moves_accepted = outcome.moves_accepted,
+      .resampled = outcome.resampled};
+  if (outcome.alive) {
+    samples.lns = outcome.lns;
+    samples.source = PixelSource::carried;
+    return diagnostics;
+  }
+
+  // All weights died: start again, and say so.
+  const PixelDiagnostics restart = start_.sample(input, scratch, samples);
+  samples.source = PixelSource::restarted;
+  diagnostics.ess = restart.ess;
+  diagnostics.target_evaluations += restart.target_evaluations;
+  return diagnostics;
+}
+
+std::unique_ptr<const PixelSampler> make_pixel_sampler(const SamplingSpec& spec) {
+  const std::int32_t n = spec.num_particles;
+  const CandidateCounts candidates = split_candidates(spec.num_candidates, spec.brdf_fraction);
+  switch (spec.method) {
+    case Method::reference: return nullptr;
+    case Method::environment: return std::make_unique<DirectSampler>(CandidateCounts{n, 0});
+    case Method::brdf: return std::make_unique<DirectSampler>(CandidateCounts{0, n});
+    case Method::mis: return std::make_unique<DirectSampler>(split_candidates(n, spec.brdf_fraction));
+    case Method::bidirectional: return std::make_unique<BidirectionalSampler>(candidates);
+    case Method::sequential:
+      return std::make_unique<SequentialSampler>(
+          SequentialSettings{.num_particles = n,
+                             .num_distributions = spec.num_distributions,
+                             .ess_ratio_min = spec.ess_ratio_min,
+                             .resampling = spec.resampling,
+                             .local_move_cosine = std::cos(spec.local_move_deg * kPi / 180),
+                             .local_move_fraction = spec.local_move_fraction},
+          candidates);
+  }
+  return nullptr;
+}
+
+}  // namespace baton

@@ -1,0 +1,91 @@
+// The product target of a pixel in SIMD: where materials meet light. Included once per Highway target.
+#if defined(BATON_WORKER_INTEGRATOR_TARGET_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef BATON_WORKER_INTEGRATOR_TARGET_INL_H_
+#undef BATON_WORKER_INTEGRATOR_TARGET_INL_H_
+#else
+#define BATON_WORKER_INTEGRATOR_TARGET_INL_H_
+#endif
+
+#include <hwy/contrib/math/math-inl.h>
+#include <hwy/highway.h>
+
+#include "worker/integrator/light_pool.h"
+#include "worker/sampling/sequential-inl.h"
+#include "worker/scene/bsdf-inl.h"
+#include "worker/scene/environment-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace baton::HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+/// Reflected radiance (f cos L) per channel.
+HWY_INLINE Vec3Lanes ReflectedRadiance(const SurfaceLanes& s, const BsdfLanes& f, VF r, VF g, VF b) {
+  const auto channel = [&](VF kd, VF ks, VF radiance) HWY_ATTR {
+    return hn::Mul(hn::Mul(hn::MulAdd(f.diffuse, kd, hn::MulAdd(f.lobe, ks, f.white)), f.cosine), radiance);
+  };
+  return {channel(s.kd.x, s.ks.x, r), channel(s.kd.y, s.ks.y, g), channel(s.kd.z, s.ks.z, b)};
+}
+
+/// Mean over R, G, B: the scalar target p~_site.
+HWY_INLINE VF MeanLanes(const Vec3Lanes& c) {
+  return hn::Mul(hn::Add(hn::Add(c.x, c.y), c.z), hn::Set(DF(), 1.0f / 3.0f));
+}
+
+HWY_INLINE VF LogOrZero(VF x) {
+  const DF d;
+  const MF positive = hn::Gt(x, hn::Set(d, 1e-37f));
+  return hn::IfThenElse(positive, hn::Log(d, hn::Max(x, hn::Set(d, 1e-37f))), hn::Set(d, kLogZero));
+}
+
+/// The entry of a uniformly drawn pool index per lane.
+HWY_INLINE VI PoolIndex(VU bits) {
+  static_assert((LightPool::kSize & (LightPool::kSize - 1)) == 0);
+  return hn::BitCast(DI(), hn::And(bits, hn::Set(DU(), LightPool::kSize - 1)));
+}
+
+/// Site of the k-th surface of the pixel, k = floor(fraction * num_hits); fraction in [0, 1).
+HWY_INLINE VI SiteAt(const SiteBlock& block, VF fraction) {
+  const DF d;
+  const DI di;
+  const VI k = hn::Min(hn::ConvertTo(di, hn::Mul(fraction, hn::Set(d, static_cast<float>(block.num_hits)))),
+                       hn::Set(di, block.num_hits - 1));
+  if (block.num_hits == block.num_sites) return k;
+  return hn::GatherIndex(di, block.hit_sites.data(), k);
+}
+
+/// The targets of two frames whose surfaces are the same, for SequentialStep. The factor 1/S is common to all points and
+/// left out. Independent proposals come from the light pool, with the site uniform among those that see a surface.
+struct SameSurfaceTarget {
+  const SiteBlock& sites;
+  const EnvironmentView& before;
+  const EnvironmentView& now;
+  const LightPool& pool;
+
+  HWY_INLINE LogTargets Evaluate(const PointLanes& point) const {
+    const Vec3Lanes w = DecodeOctahedral(point.code);
+    const SurfaceLanes surface = LoadSurfaces(sites, point.site);
+    const BsdfLanes f = EvaluateBsdf(surface, w);
+    const RadianceLanes then = EvaluateEnvironment(before, w);
+    const RadianceLanes light = EvaluateEnvironment(now, w);
+    return {LogOrZero(MeanLanes(ReflectedRadiance(surface, f, then.r, then.g, then.b))),
+            LogOrZero(MeanLanes(ReflectedRadiance(surface, f, light.r, light.g, light.b))), LogOrZero(light.density)};
+  }
+
+  /// Draws `point`; returns its targets.
+  HWY_INLINE LogTargets Propose(VU bits, VF site_fraction, PointLanes& point) const {
+    const DF d;
+    const VI entry = PoolIndex(bits);
+    const auto pick = [&](const std::vector<float>& array) HWY_ATTR { return hn::GatherIndex(d, array.data(), entry); };
+    point.code = hn::BitCast(DU(), hn::GatherIndex(DI(), reinterpret_cast<const std::int32_t*>(pool.code.data()), entry));
+    point.site = SiteAt(sites, site_fraction);
+    const SurfaceLanes surface = LoadSurfaces(sites, point.site);
+    const BsdfLanes f = EvaluateBsdf(surface, {pick(pool.x), pick(pool.y), pick(pool.z)});
+    return {LogOrZero(MeanLanes(ReflectedRadiance(surface, f, pick(pool.before_r), pick(pool.before_g), pick(pool.before_b)))),
+            LogOrZero(MeanLanes(ReflectedRadiance(surface, f, pick(pool.r), pick(pool.g), pick(pool.b)))),
+            LogOrZero(pick(pool.density))};
+  }
+};
+
+}  // namespace baton::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+#endif

@@ -1,0 +1,96 @@
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+#include <CLI/CLI.hpp>
+
+#include <signal.h>
+
+#include <atomic>
+#include <cstdio>
+#include <thread>
+
+#include "common/base/log.h"
+#include "worker/run/crash_handler.h"
+#include "worker/run/replay.h"
+#include "worker/run/worker.h"
+
+namespace {
+
+/// Set by SIGTERM and SIGINT, read by the control thread.
+std::atomic<bool> g_drain{false};
+
+/// The first signal drains, a second one of the same kind ends the process at once.
+void install_drain_handler() {
+  struct sigaction action {};
+  action.sa_handler = [](int) { g_drain = true; };
+  action.sa_flags = static_cast<int>(SA_RESETHAND);
+  ::sigaction(SIGTERM, &action, nullptr);
+  ::sigaction(SIGINT, &action, nullptr);
+}
+
+int replay(const baton::ReplayOptions& options) {
+  const baton::Result<std::string> report = baton::replay_tile(options);
+  if (report) {
+    fmt::print("{}", *report);
+    return 0;
+  }
+  spdlog::error("{}", report.error().message);
+  return static_cast<int>(baton::exit_code_of(report.error().kind));
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app("Renders tiles for a baton-coordinator.");
+  app.set_version_flag("--version", baton::describe_worker);
+  app.require_subcommand(0, 1);
+
+  // Without a subcommand: work for a coordinator.
+  baton::WorkerOptions worker;
+  worker.num_threads = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
+  std::int64_t give_up_s = worker.give_up.count();
+  app.add_option("--coordinator", worker.endpoint, "endpoint, e.g. tcp://127.0.0.1:7700")
+      ->envname("BATON_COORDINATOR");
+  app.add_option("--threads", worker.num_threads, "render threads; default: one per processor")
+      ->envname("BATON_THREADS")
+      ->check(CLI::Range(1, 1024));
+  app.add_option("--name", worker.worker_id,
+                 "unique name in the farm; default: host and process id")
+      ->envname("BATON_WORKER_NAME");
+  app.add_option("--give-up-s", give_up_s,
+                 "ends when no coordinator has answered for so long; 0: never")
+      ->capture_default_str()
+      ->check(CLI::Range(0, 1000000));
+
+  baton::ReplayOptions replay_options;
+  std::vector<int> pixel;
+  CLI::App* const replay_command =
+      app.add_subcommand("replay", "renders one tile in this process, without a farm");
+  replay_command->add_option("JOB", replay_options.job, "job file")->required();
+  replay_command->add_option("--frame", replay_options.frame_number, "frame number")->required();
+  replay_command->add_option("--tile", replay_options.tile, "tile, 0-based, row by row")
+      ->required();
+  replay_command
+      ->add_option("--pixel", pixel, "x,y in the image: prints its channels and particles")
+      ->delimiter(',')
+      ->expected(2);
+  replay_command->add_option("--out", replay_options.out,
+                             "EXR of the tile; default: tile<T>.frame<F>.exr");
+
+  try {
+    app.parse(argc, argv);
+    if (!replay_command->parsed() && worker.endpoint.empty())
+      throw CLI::RequiredError("--coordinator");
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : static_cast<int>(baton::ExitCode::usage);
+  }
+
+  baton::init_logging("baton-worker");
+  baton::install_crash_handler();
+  if (replay_command->parsed()) {
+    if (pixel.size() == 2) replay_options.pixel = baton::PixelPosition{pixel[0], pixel[1]};
+    return replay(replay_options);
+  }
+  install_drain_handler();
+  worker.give_up = std::chrono::seconds(give_up_s);
+  return static_cast<int>(baton::run_worker(worker, g_drain));
+}

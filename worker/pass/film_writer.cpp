@@ -1,0 +1,66 @@
+#include "worker/pass/film_writer.h"
+
+namespace baton {
+namespace {
+
+std::vector<std::string> channel_names(Aov aov) {
+  switch (aov) {
+    case Aov::lns: return {"lns"};
+    case Aov::visibility: return {"visibility"};
+    case Aov::ess: return {"ess"};
+    case Aov::acceptance: return {"acceptance"};
+    case Aov::source: return {"source.R", "source.G", "source.B"};
+    case Aov::normal: return {"normal.X", "normal.Y", "normal.Z"};
+    case Aov::depth: return {"depth"};
+    case Aov::variance: return {"variance"};
+  }
+  return {};
+}
+
+}  // namespace
+
+Rgb source_color(PixelSource source) {
+  switch (source) {
+    case PixelSource::background: return {0, 0, 0};
+    case PixelSource::fresh: return {1, 0, 0};
+    case PixelSource::carried: return {0, 1, 0};
+    case PixelSource::restarted: return {1, 1, 0};
+    case PixelSource::refreshed: return {0, 0, 1};
+  }
+  return {};
+}
+
+FilmWriter::FilmWriter(const PixelRect& rect, const std::vector<Aov>& aovs) : aovs_(aovs) {
+  film_.rect = rect;
+  film_.channels = {"R", "G", "B", "A"};
+  for (const Aov aov : aovs) {
+    for (std::string& name : channel_names(aov)) film_.channels.push_back(std::move(name));
+  }
+  film_.values.resize(film_.channels.size() * film_.num_pixels());
+}
+
+void FilmWriter::write(std::size_t index, const PixelResult& pixel) {
+  std::size_t channel = 0;
+  const auto put = [&](float value) { film_.plane(channel++)[index] = value; };
+  const auto put_vec = [&](const Vec3& v) {
+    put(v.x);
+    put(v.y);
+    put(v.z);
+  };
+  put_vec(pixel.radiance);
+  put(pixel.alpha);
+  for (const Aov aov : aovs_) {
+    switch (aov) {
+      case Aov::lns: put(pixel.lns); break;
+      case Aov::visibility: put(pixel.visibility); break;
+      case Aov::ess: put(pixel.ess_ratio); break;
+      case Aov::acceptance: put(pixel.acceptance); break;
+      case Aov::source: put_vec(source_color(pixel.source)); break;
+      case Aov::normal: put_vec(pixel.normal); break;
+      case Aov::depth: put(pixel.depth); break;
+      case Aov::variance: put(pixel.variance); break;
+    }
+  }
+}
+
+}  // namespace baton

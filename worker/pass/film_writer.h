@@ -1,0 +1,42 @@
+#pragma once
+
+#include <array>
+
+#include "common/image/film_tile.h"
+#include "common/job/job_spec.h"
+#include "common/state/sample_state.h"
+#include "worker/integrator/pixel_sampler.h"
+
+namespace baton {
+
+/// All that is known of a finished pixel.
+struct PixelResult {
+  Rgb radiance;           ///< reflected and background light, mean over the sites
+  float alpha = 0;        ///< share of the sites that see a surface
+  float lns = 0;
+  float visibility = 0;   ///< share of the weight whose rays are free
+  float ess_ratio = 0;    ///< ESS / N
+  float acceptance = 0;   ///< accepted moves / proposed moves
+  PixelSource source = PixelSource::background;
+  Vec3 normal;            ///< mean shading normal of the sites that see a surface
+  float depth = 0;        ///< mean distance of the sites that see a surface
+  float variance = 0;     ///< squared standard error of the mean over RGB; `reference` only
+};
+
+/// Pass: writes pixels into the channels that the job asked for: R, G, B, A, then the AOVs in their order.
+class FilmWriter {
+ public:
+  FilmWriter(const PixelRect& rect, const std::vector<Aov>& aovs);
+  /// index: row by row inside the rectangle.
+  void write(std::size_t index, const PixelResult& pixel);
+  const FilmTile& film() const { return film_; }
+
+ private:
+  FilmTile film_;
+  std::vector<Aov> aovs_;
+};
+
+/// False colour of a pixel's source: green carried, red fresh, yellow restarted, blue refreshed, black background.
+Rgb source_color(PixelSource source);
+
+}  // namespace baton

@@ -1,0 +1,38 @@
+#include "worker/pass/primary.h"
+
+#include <cmath>
+
+namespace baton {
+namespace {
+
+/// Position of a site inside its pixel, [0, 1)^2.
+std::array<float, 2> site_position(const JobSpec& job, std::uint32_t pixel, std::int32_t site) {
+  if (job.image.sites == 1) return {0.5f, 0.5f};
+  const auto side = static_cast<std::int32_t>(std::lround(std::sqrt(static_cast<double>(job.image.sites))));
+  const Rng rng({.job_seed = job.seed, .frame = 0, .pixel = pixel}, PassId::site_position);
+  const auto u = rng.uniforms(0, static_cast<std::uint32_t>(site));
+  const auto cell = 1.0f / static_cast<float>(side);
+  return {(static_cast<float>(site % side) + u[0]) * cell, (static_cast<float>(site / side) + u[1]) * cell};
+}
+
+}  // namespace
+
+TileSurfaces trace_primary(const RenderContext& context, const PixelRect& rect) {
+  const JobSpec& job = context.job;
+  TileSurfaces surfaces{.rect = rect, .num_sites = job.image.sites, .hits = {}, .rays = {}};
+  surfaces.rays.reserve(static_cast<std::size_t>(rect.area() * job.image.sites));
+  for (std::int32_t y = rect.y0; y < rect.y1; ++y) {
+    for (std::int32_t x = rect.x0; x < rect.x1; ++x) {
+      const auto pixel = static_cast<std::uint32_t>(y * job.image.width + x);
+      for (std::int32_t site = 0; site < job.image.sites; ++site) {
+        const auto [dx, dy] = site_position(job, pixel, site);
+        surfaces.rays.push_back(context.scene->camera.ray(static_cast<float>(x) + dx, static_cast<float>(y) + dy));
+      }
+    }
+  }
+  surfaces.hits.resize(surfaces.rays.size());
+  context.accel->intersect(surfaces.rays, surfaces.hits);
+  return surfaces;
+}
+
+}  // namespace baton

@@ -1,0 +1,28 @@
+#pragma once
+
+#include <vector>
+
+#include "worker/pass/render_context.h"
+
+namespace baton {
+
+/// What the sites of a tile see: a pure function of (job, pixel, site) while camera and objects stand still.
+struct TileSurfaces {
+  PixelRect rect;
+  std::int32_t num_sites = 1;    ///< S
+  std::vector<SurfaceHit> hits;  ///< (pixels, S)
+  std::vector<Ray> rays;         ///< (pixels, S) primary rays
+
+  std::span<const SurfaceHit> pixel(std::size_t index) const {
+    return std::span(hits).subspan(index * static_cast<std::size_t>(num_sites), static_cast<std::size_t>(num_sites));
+  }
+  std::span<const Ray> pixel_rays(std::size_t index) const {
+    return std::span(rays).subspan(index * static_cast<std::size_t>(num_sites), static_cast<std::size_t>(num_sites));
+  }
+};
+
+/// Pass 1: one primary ray for each site of each pixel. S = 1 shoots through the pixel's centre, else the sites are
+/// jittered on a sqrt(S) x sqrt(S) grid; the same for all frames.
+TileSurfaces trace_primary(const RenderContext& context, const PixelRect& rect);
+
+}  // namespace baton

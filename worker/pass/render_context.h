@@ -1,0 +1,27 @@
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "common/job/sequence.h"
+#include "worker/accel/accel.h"
+#include "worker/integrator/frame_light.h"
+#include "worker/integrator/pixel_sampler.h"
+#include "worker/pass/tile_renderer.h"
+
+namespace baton {
+
+/// See tile_renderer.h. Immutable but for the lights, which are prepared on demand and guard themselves.
+class RenderContext {
+ public:
+  JobSpec job;
+  Digest digest;
+  TileGrid grid{1, 1, 1};
+  std::vector<FrameSpec> frames;
+  std::unique_ptr<const Scene> scene;
+  std::unique_ptr<const Accel> accel;
+  std::unique_ptr<const PixelSampler> sampler;  ///< null: reference
+  std::unique_ptr<LightSequence> lights;
+};
+
+}  // namespace baton

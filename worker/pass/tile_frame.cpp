@@ -1,0 +1,215 @@
+#include "worker/pass/tile_frame.h"
+
+#include <algorithm>
+
+#include "worker/integrator/reference.h"
+#include "worker/pass/cpu_clock.h"
+
+namespace baton {
+namespace {
+
+using kernels::ShadedSamples;
+
+/// Sums over the sites of a pixel that do not depend on light: coverage, mean normal and depth.
+void add_geometry(std::span<const SurfaceHit> hits, PixelResult& pixel) {
+  float num_hits = 0;
+  for (const SurfaceHit& hit : hits) {
+    if (!hit.hit) continue;
+    num_hits += 1;
+    pixel.normal += hit.point.ns;
+    pixel.depth += hit.depth;
+  }
+  if (num_hits == 0) return;
+  pixel.alpha = num_hits / static_cast<float>(hits.size());
+  pixel.normal = pixel.normal / num_hits;
+  pixel.depth /= num_hits;
+}
+
+}  // namespace
+
+/// The pixels in work: [first, first + count) of the tile, with what one pass hands to the next.
+struct TileFrameRenderer::Batch {
+  std::size_t first = 0;
+  std::size_t count = 0;
+  std::int32_t frame_number = 0;
+  ShadowRays rays;
+  std::vector<std::uint32_t> ray_sample;  ///< batch pixel * N + particle of each ray
+  std::vector<Rgb> sample_color;          ///< (batch pixels, N) u_j (f cos L)_rgb / p~ if the ray is free
+  std::array<PixelResult, kBatchPixels> pixels;
+
+  RngKey key(const RenderContext& context, const PixelRect& rect, std::size_t index) const {
+    const auto width = static_cast<std::size_t>(rect.width());
+    const auto x = rect.x0 + static_cast<std::int32_t>(index % width);
+    const auto y = rect.y0 + static_cast<std::int32_t>(index / width);
+    return {.job_seed = context.job.seed,
+            .frame = static_cast<std::uint32_t>(frame_number),
+            .pixel = static_cast<std::uint32_t>(y * context.job.image.width + x)};
+  }
+};
+
+TileFrameRenderer::TileFrameRenderer(const RenderContext& context, const TileSurfaces& surfaces)
+    : context_(context), surfaces_(surfaces), scratch_(std::make_unique<kernels::CandidateSet>()) {}
+
+FilmTile TileFrameRenderer::render(const FrameSpec& frame, const FrameLight& light, bool has_history,
+                                   SampleState& state) {
+  FilmWriter film(surfaces_.rect, context_.job.output.aovs);
+  Batch batch;
+  batch.frame_number = frame.number;
+  batch.sample_color.resize(kBatchPixels * static_cast<std::size_t>(state.num_particles));
+  const std::size_t num_pixels = state.num_pixels();
+  for (std::size_t first = 0; first < num_pixels; first += kBatchPixels) {
+    batch.first = first;
+    batch.count = std::min(kBatchPixels, num_pixels - first);
+    batch.pixels.fill({});
+    if (context_.sampler != nullptr) {
+      sample(batch, light, has_history, state);
+      trace(batch);
+      shade(batch, state);
+    } else {
+      render_reference(batch, light, state);
+    }
+    finish(batch, light, film);
+  }
+  state.frame_index = frame.index;
+  stats_.pixels += num_pixels;
+  return film.film();
+}
+
+/// Pass: every pixel's properly weighted set, and the colours and rays that follow from it.
+void TileFrameRenderer::sample(Batch& batch, const FrameLight& light, bool has_history, SampleState& state) {
+  const StageTimer timer(stats_.seconds_sample);
+  const EnvironmentView now = view_of(light.now);
+  const EnvironmentView before = view_of(light.before);
+  const auto n = static_cast<std::size_t>(state.num_particles);
+  ShadedSamples shaded;
+  SiteBlock sites;
+  batch.rays.clear();
+  batch.ray_sample.clear();
+  for (std::size_t i = 0; i < batch.count; ++i) {
+    const std::size_t index = batch.first + i;
+    const std::span<const SurfaceHit> hits = surfaces_.pixel(index);
+
+    // Gather the pixel's surfaces.
+    sites.clear(surfaces_.num_sites);
+    for (std::size_t s = 0; s < hits.size(); ++s) {
+      if (hits[s].hit) sites.add(static_cast<int>(s), hits[s].point, context_.scene->materials[hits[s].material]);
+    }
+    if (sites.num_hits == 0) {
+      state.source[index] = PixelSource::background;
+      ++stats_.pixels_background;
+      continue;
+    }
+
+    // Sample.
+    const PixelSamples samples{std::span(state.direction).subspan(index * n, n),
+                               std::span(state.site).subspan(index * n, n),
+                               std::span(state.weight).subspan(index * n, n),
+                               state.lns[index],
+                               state.lns_fresh[index],
+                               state.source[index]};
+    const PixelDiagnostics did = context_.sampler->sample(
+        {sites, light, now, before, batch.key(context_, surfaces_.rect, index), has_history}, *scratch_, samples);
+
+    // Colour the samples and cast their rays.
+    kernels::shade_samples(sites, now, samples.direction, samples.site, shaded);
+    std::array<Vec3, SiteBlock::kMaxSites> origins;
+    for (std::size_t s = 0; s < hits.size(); ++s) {
+      if (hits[s].hit) origins[s] = lift_off(hits[s].point.position, hits[s].point.ng);
+    }
+    for (std::size_t j = 0; j < n; ++j) {
+      const float contribution = samples.lns * samples.weight[j];
+      const Rgb color = Rgb{shaded.r[j], shaded.g[j], shaded.b[j]} * contribution;
+      batch.sample_color[i * n + j] = color;
+      if (!(mean(color) > 0)) continue;
+      batch.rays.push(origins[samples.site[j]], {shaded.x[j], shaded.y[j], shaded.z[j]});
+      batch.ray_sample.push_back(static_cast<std::uint32_t>(i * n + j));
+    }
+
+    // Keep the books.
+    PixelResult& pixel = batch.pixels[i];
+    pixel.lns = samples.lns;
+    pixel.source = samples.source;
+    pixel.ess_ratio = did.ess / static_cast<float>(n);
+    pixel.acceptance = did.moves_proposed > 0
+                           ? static_cast<float>(did.moves_accepted) / static_cast<float>(did.moves_proposed)
+                           : 0.0f;
+    stats_.target_evaluations += static_cast<std::uint64_t>(did.target_evaluations);
+    stats_.moves_proposed += static_cast<std::uint64_t>(did.moves_proposed);
+    stats_.moves_accepted += static_cast<std::uint64_t>(did.moves_accepted);
+    stats_.pixels_resampled += did.resampled ? 1 : 0;
+    stats_.pixels_fresh += samples.source == PixelSource::fresh ? 1 : 0;
+    stats_.pixels_carried += samples.source == PixelSource::carried ? 1 : 0;
+    stats_.pixels_restarted += samples.source == PixelSource::restarted ? 1 : 0;
+  }
+}
+
+/// Pass: visibility of all samples of the batch at once.
+void TileFrameRenderer::trace(Batch& batch) {
+  const StageTimer timer(stats_.seconds_visibility);
+  context_.accel->occluded(batch.rays);
+  stats_.rays_shadow += batch.rays.size();
+}
+
+/// Pass: sums the free samples of each pixel in their fixed order.
+void TileFrameRenderer::shade(Batch& batch, const SampleState& state) {
+  const StageTimer timer(stats_.seconds_shade);
+  const auto n = static_cast<std::size_t>(state.num_particles);
+  for (std::size_t r = 0; r < batch.rays.size(); ++r) {
+    if (batch.rays.t_far[r] < 0) continue;
+    const std::size_t i = batch.ray_sample[r] / n;
+    batch.pixels[i].radiance += batch.sample_color[batch.ray_sample[r]];
+    batch.pixels[i].visibility += state.weight[batch.first * n + batch.ray_sample[r]];
+  }
+}
+
+/// The judge's way: no samples are kept.
+void TileFrameRenderer::render_reference(Batch& batch, const FrameLight& light, SampleState& state) {
+  const StageTimer timer(stats_.seconds_sample);
+  const ReferenceRenderer renderer(*context_.accel, context_.scene->materials);
+  for (std::size_t i = 0; i < batch.count; ++i) {
+    const std::size_t index = batch.first + i;
+    const std::span<const SurfaceHit> hits = surfaces_.pixel(index);
+    const bool seen = std::any_of(hits.begin(), hits.end(), [](const SurfaceHit& hit) { return hit.hit; });
+    state.source[index] = seen ? PixelSource::fresh : PixelSource::background;
+    if (!seen) {
+      ++stats_.pixels_background;
+      continue;
+    }
+    const ReferenceEstimate estimate =
+        renderer.render(hits, light.now, context_.job.sampling.reference_samples,
+                        batch.key(context_, surfaces_.rect, index), batch.rays, stats_.rays_shadow);
+    state.lns[index] = state.lns_fresh[index] = estimate.lns;
+    PixelResult& pixel = batch.pixels[i];
+    pixel.radiance = estimate.radiance;
+    pixel.lns = estimate.lns;
+    pixel.visibility = estimate.visibility;
+    pixel.variance = estimate.mean_variance;
+    pixel.source = PixelSource::fresh;
+    ++stats_.pixels_fresh;
+    stats_.target_evaluations += 2 * static_cast<std::uint64_t>(context_.job.sampling.reference_samples);
+  }
+}
+
+/// Pass: adds what is not sampled and writes the film.
+void TileFrameRenderer::finish(Batch& batch, const FrameLight& light, FilmWriter& film) {
+  const StageTimer timer(stats_.seconds_shade);
+  const bool show_environment = context_.job.output.background == Background::environment;
+  for (std::size_t i = 0; i < batch.count; ++i) {
+    const std::size_t index = batch.first + i;
+    const std::span<const SurfaceHit> hits = surfaces_.pixel(index);
+    PixelResult& pixel = batch.pixels[i];
+    add_geometry(hits, pixel);
+    if (show_environment && pixel.alpha < 1) {
+      const std::span<const Ray> rays = surfaces_.pixel_rays(index);
+      for (std::size_t s = 0; s < hits.size(); ++s) {
+        if (hits[s].hit) continue;
+        const EnvironmentMap::Texel seen = light.now.evaluate(rays[s].direction);
+        pixel.radiance += Rgb{seen.r, seen.g, seen.b} / static_cast<float>(hits.size());
+      }
+      pixel.alpha = 1;
+    }
+    film.write(index, pixel);
+  }
+}
+
+}  // namespace baton

@@ -1,0 +1,45 @@
+#pragma once
+
+#include <functional>
+#include <memory>
+#include <optional>
+#include <stop_token>
+#include <string>
+#include <vector>
+
+#include "common/base/result.h"
+#include "common/image/film_tile.h"
+#include "common/job/job_spec.h"
+#include "common/job/sequence.h"
+#include "common/job/task.h"
+#include "common/state/sample_state.h"
+
+namespace baton {
+
+/// Everything about a job that its tiles share: scene, ray tracer, maps, the environments of its frames. Loaded once
+/// per job and process; any number of threads may render with it.
+class RenderContext;
+
+/// Loads every asset of the job. Errors name the file and what was expected; several faults are joined by newlines.
+Result<std::shared_ptr<const RenderContext>> load_render_context(const JobSpec& job, const Digest& job_digest);
+
+/// Where the finished frames of a tile run go, in frame order. Called on the rendering thread.
+struct TileRunSink {
+  std::function<Status(int frame_index, const FilmTile& film)> film;
+  /// Called for the last frame of the run when the job carries state.
+  std::function<Status(const SampleState& state)> state;
+};
+
+/// Renders one tile for the frames of `run`. previous: the state of frame run.first_frame - 1, required exactly when the
+/// job carries state and the run is not the first. The bytes that reach the sink are a function of (job, run, previous)
+/// alone. Errors: a state of another job, tile or frame; cancelled when `stop` is requested; the sink's own.
+Result<RenderStats> run_tile(const RenderContext& context, const TileRun& run, const std::optional<SampleState>& previous,
+                           const TileRunSink& sink, std::stop_token stop);
+
+/// Texels of the job's maps that were set to 0 because they were negative, NaN or infinite; one line per map read so far.
+std::vector<std::string> repair_notes(const RenderContext& context);
+
+/// Name of the SIMD instruction set in use, e.g. "AVX2".
+std::string instruction_set();
+
+}  // namespace baton

@@ -1,0 +1,108 @@
+#include "worker/run/execute.h"
+
+#include <fmt/format.h>
+
+#include "common/image/film_tile.h"
+#include "common/job/sequence.h"
+#include "common/state/sample_state.h"
+#include "worker/run/frame_output.h"
+
+namespace baton {
+namespace {
+
+std::string blob_name(const BlobRef& ref) {
+  const char* const kind = ref.kind == BlobKind::state ? "state" : "film";
+  return fmt::format("{} of frame index {} tile {} ({})", kind, ref.frame, ref.tile,
+                     ref.digest.hex());
+}
+
+Result<std::optional<SampleState>> read_previous_state(const BlobStore& store,
+                                                       const std::vector<BlobRef>& inputs) {
+  if (inputs.empty()) return std::optional<SampleState>();
+  if (inputs.size() != 1 || inputs.front().kind != BlobKind::state) {
+    return Error{ErrorKind::bad_input, "a render task takes at most one input, the previous state"};
+  }
+  BATON_ASSIGN(const Bytes bytes, store.get(inputs.front().digest));
+  BATON_ASSIGN(SampleState state, decode_state(bytes, blob_name(inputs.front())));
+  return std::optional(std::move(state));
+}
+
+Result<TaskOutput> execute_render(const LoadedJob& loaded, BlobStore& store, const TaskKey& task,
+                                  const std::vector<BlobRef>& inputs, std::stop_token stop) {
+  // Check the key against the job: it came over the wire.
+  if (task.step < 0 || task.step >= num_runs(loaded.job) || task.tile < 0 ||
+      task.tile >= TileGrid(loaded.job.image).count()) {
+    return Error{ErrorKind::bad_input,
+                 fmt::format("the job has no tile {} in run {}", task.tile, task.step)};
+  }
+  BATON_ASSIGN(const std::optional<SampleState> previous, read_previous_state(store, inputs));
+
+  // Render; every film is durable before the next frame starts.
+  TaskOutput output;
+  const auto keep = [&](BlobKind kind, std::int32_t frame, const Bytes& bytes) -> Status {
+    BATON_ASSIGN(const Digest digest, store.put(bytes));
+    output.outputs.push_back({kind, frame, task.tile, digest, bytes.size()});
+    return {};
+  };
+  const TileRunSink sink{.film =
+                             [&](int frame, const FilmTile& film) {
+                               return keep(BlobKind::film, frame, encode_film_tile(film));
+                             },
+                         .state =
+                             [&](const SampleState& state) {
+                               return keep(BlobKind::state, state.frame_index, encode_state(state));
+                             }};
+  const TileRun run = tile_run(loaded.job, task.tile, task.step);
+  BATON_ASSIGN(output.stats, run_tile(*loaded.context, run, previous, sink, stop));
+  return output;
+}
+
+Result<TaskOutput> execute_assemble(const LoadedJob& loaded, const BlobStore& store,
+                                    const TaskKey& task, const std::vector<BlobRef>& inputs,
+                                    std::stop_token stop) {
+  const TileGrid grid(loaded.job.image);
+  const auto num_frames = static_cast<std::int32_t>(loaded.job.frames.size());
+  if (task.step < 0 || task.step >= num_frames ||
+      inputs.size() != static_cast<std::size_t>(grid.count())) {
+    return Error{ErrorKind::bad_input,
+                 fmt::format("frame index {} of {}: got {} films, expected {}", task.step,
+                             num_frames, inputs.size(), grid.count())};
+  }
+
+  // Paste every tile once.
+  FilmTile image;
+  std::vector<bool> pasted(inputs.size(), false);
+  for (const BlobRef& input : inputs) {
+    if (stop.stop_requested()) return Error{ErrorKind::cancelled, "stopped while assembling"};
+    BATON_ASSIGN(const Bytes bytes, store.get(input.digest));
+    BATON_ASSIGN(const FilmTile film, decode_film_tile(bytes, blob_name(input)));
+    const bool fits = input.kind == BlobKind::film && input.frame == task.step && input.tile >= 0 &&
+                      input.tile < grid.count() && film.rect == grid.rect(input.tile) &&
+                      !pasted[static_cast<std::size_t>(input.tile)];
+    if (!fits) {
+      return Error{ErrorKind::bad_input, fmt::format("{}: is not a new tile of frame index {}",
+                                                     blob_name(input), task.step)};
+    }
+    if (image.channels.empty()) image = blank_image(loaded.job.image, film.channels);
+    BATON_TRY(paste_tile(film, image));
+    pasted[static_cast<std::size_t>(input.tile)] = true;
+  }
+
+  BATON_ASSIGN(const BlobRef written, write_frame(loaded.job, loaded.digest, task.step, image));
+  return TaskOutput{{written}, {}};
+}
+
+}  // namespace
+
+Result<TaskOutput> execute_task(const LoadedJob& loaded, BlobStore& store, const TaskKey& task,
+                                const std::vector<BlobRef>& inputs, std::stop_token stop) {
+  switch (task.kind) {
+    case TaskKind::render:
+      return execute_render(loaded, store, task, inputs, stop);
+    case TaskKind::assemble:
+      return execute_assemble(loaded, store, task, inputs, stop);
+  }
+  return Error{ErrorKind::bad_input, "unknown kind of task"};
+}
+
+}  // namespace baton

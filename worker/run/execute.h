@@ -1,0 +1,27 @@
+#pragma once
+
+#include <memory>
+#include <stop_token>
+#include <vector>
+
+#include "common/base/result.h"
+#include "common/job/task.h"
+#include "common/store/blob_store.h"
+#include "worker/run/job_cache.h"
+
+namespace baton {
+
+/// What a finished task hands back.
+struct TaskOutput {
+  std::vector<BlobRef> outputs;
+  RenderStats stats;
+};
+
+/// Runs one task: reads its inputs from `store`, writes its outputs there (an assembled frame goes
+/// to the job's output folder), everything durable on return. Deterministic. Errors: a missing or
+/// damaged input, the disk, bad input of the renderer; ErrorKind::cancelled when `stop` is
+/// requested.
+Result<TaskOutput> execute_task(const LoadedJob& loaded, BlobStore& store, const TaskKey& task,
+                                const std::vector<BlobRef>& inputs, std::stop_token stop);
+
+}  // namespace baton

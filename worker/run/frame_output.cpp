@@ -1,0 +1,118 @@
+#include "worker/run/frame_output.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/base/files.h"
+#include "common/base/limits.h"
+#include "common/base/version.h"
+#include "common/job/job_fields.h"
+#include "common/job/sequence.h"
+
+namespace baton {
+namespace {
+
+/// True when `stored` is `value` after the rounding of a half float (11 bits), or exact.
+bool same_after_rounding(float value, float stored) {
+  constexpr float kHalfMax = 65504.0f;
+  constexpr float kHalfStep = 1.0f / 2048, kHalfSmallest = 6.0e-8f;
+  if (value == stored || (std::isnan(value) && std::isnan(stored))) return true;
+  if (std::fabs(value) >= kHalfMax)
+    return std::fabs(stored) >= kHalfMax && (value > 0) == (stored > 0);
+  return std::fabs(value - stored) <= std::fabs(value) * kHalfStep + kHalfSmallest;
+}
+
+/// Compares a file that was just written with what it must hold. Channels may come in any order.
+Status verify_frame(const std::filesystem::path& path, const FilmTile& image) {
+  BATON_ASSIGN(const FilmTile stored, read_exr(path));
+  if (stored.rect != image.rect || stored.channels.size() != image.channels.size()) {
+    return Error{
+        ErrorKind::corrupt,
+        fmt::format("{}: read back {}x{} pixels of {} channels, wrote {}x{} of {}", path.string(),
+                    stored.rect.width(), stored.rect.height(), stored.channels.size(),
+                    image.rect.width(), image.rect.height(), image.channels.size())};
+  }
+  for (std::size_t channel = 0; channel < image.channels.size(); ++channel) {
+    const std::string& name = image.channels[channel];
+    const auto found = std::find(stored.channels.begin(), stored.channels.end(), name);
+    if (found == stored.channels.end()) {
+      return Error{ErrorKind::corrupt,
+                   fmt::format("{}: channel {} is missing", path.string(), name)};
+    }
+    const float* const wrote = image.plane(channel);
+    const float* const read =
+        stored.plane(static_cast<std::size_t>(found - stored.channels.begin()));
+    for (std::size_t pixel = 0; pixel < image.num_pixels(); ++pixel) {
+      if (same_after_rounding(wrote[pixel], read[pixel])) continue;
+      const auto width = static_cast<std::size_t>(image.rect.width());
+      return Error{ErrorKind::corrupt,
+                   fmt::format("{}: channel {} pixel {},{}: read back {}, wrote {}", path.string(),
+                               name, pixel % width, pixel / width, read[pixel], wrote[pixel])};
+    }
+  }
+  return {};
+}
+
+}  // namespace
+
+FilmTile blank_image(const ImageSpec& spec, std::vector<std::string> channels) {
+  FilmTile image{
+      .rect = {0, 0, spec.width, spec.height}, .channels = std::move(channels), .values = {}};
+  image.values.resize(image.channels.size() * image.num_pixels());
+  return image;
+}
+
+Status paste_tile(const FilmTile& tile, FilmTile& image) {
+  const PixelRect& from = tile.rect;
+  const PixelRect& to = image.rect;
+  if (from.x0 < to.x0 || from.y0 < to.y0 || from.x1 > to.x1 || from.y1 > to.y1 ||
+      from.area() <= 0) {
+    return Error{ErrorKind::bad_input, fmt::format("tile [{},{})x[{},{}) does not lie in the image",
+                                                   from.x0, from.x1, from.y0, from.y1)};
+  }
+  if (tile.channels != image.channels) {
+    return Error{ErrorKind::bad_input,
+                 fmt::format("tile at {},{} has channels {}, expected {}", from.x0, from.y0,
+                             fmt::join(tile.channels, " "), fmt::join(image.channels, " "))};
+  }
+  for (std::size_t channel = 0; channel < tile.channels.size(); ++channel) {
+    for (std::int32_t y = from.y0; y < from.y1; ++y) {
+      const float* const row = tile.plane(channel) + std::ptrdiff_t{y - from.y0} * from.width();
+      std::copy_n(
+          row, from.width(),
+          image.plane(channel) + std::ptrdiff_t{y - to.y0} * to.width() + (from.x0 - to.x0));
+    }
+  }
+  return {};
+}
+
+std::filesystem::path frame_path(const JobSpec& job, std::int32_t frame_index) {
+  const int number = job.frames.at(static_cast<std::size_t>(frame_index));
+  return std::filesystem::path(job.output.directory) / frame_file_name(job.output.pattern, number);
+}
+
+ImageMetadata frame_metadata(const JobSpec& job, const Digest& job_digest, int frame_number) {
+  return {{"baton:version", kVersion},
+          {"baton:jobName", job.name},
+          {"baton:jobDigest", job_digest.hex()},
+          {"baton:frame", std::to_string(frame_number)},
+          {"baton:method", std::string(kMethods[static_cast<std::size_t>(job.sampling.method)])}};
+}
+
+Result<BlobRef> write_frame(const JobSpec& job, const Digest& job_digest, std::int32_t frame_index,
+                            const FilmTile& image) {
+  const std::filesystem::path path = frame_path(job, frame_index);
+  const int number = job.frames.at(static_cast<std::size_t>(frame_index));
+  BATON_TRY(write_exr(path, image,
+                      {.half_float = job.output.pixel_type == PixelType::half_float,
+                       .compression = job.output.compression,
+                       .metadata = frame_metadata(job, job_digest, number)}));
+  BATON_TRY(verify_frame(path, image));
+
+  BATON_ASSIGN(const Bytes bytes, read_file(path, limits::kMaxAssetFileBytes));
+  return BlobRef{BlobKind::image, frame_index, 0, digest_of(bytes), bytes.size()};
+}
+
+}  // namespace baton

@@ -1,0 +1,78 @@
+#include "worker/run/job_cache.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "common/base/limits.h"
+#include "common/job/job_json.h"
+
+namespace baton {
+
+Result<LoadedJobPtr> load_job_document(const Digest& digest, const std::string& document) {
+  BATON_ASSIGN(ParsedJobDocument parsed, parse_job_document(document));
+  if (parsed.digest != digest) {
+    return Error{ErrorKind::corrupt,
+                 fmt::format("job document {}: digest is {}", digest.hex(), parsed.digest.hex())};
+  }
+  BATON_TRY(verify_assets(parsed.assets));
+  BATON_ASSIGN(auto context, load_render_context(parsed.job, digest));
+  return LoadedJobPtr(
+      std::make_shared<LoadedJob>(LoadedJob{std::move(parsed.job), digest, std::move(context)}));
+}
+
+void JobEntry::provide(const std::string& document) {
+  const std::lock_guard lock(mutex_);
+  if (document_) return;
+  document_ = document;
+  changed_.notify_all();
+}
+
+bool JobEntry::has_document() const {
+  const std::lock_guard lock(mutex_);
+  return document_.has_value();
+}
+
+bool JobEntry::failed() const {
+  const std::lock_guard lock(mutex_);
+  return result_ && !result_->ok();
+}
+
+Result<LoadedJobPtr> JobEntry::load(std::stop_token stop) {
+  // Wait until there is something to do or to return.
+  std::unique_lock lock(mutex_);
+  const bool ready =
+      changed_.wait(lock, stop, [this] { return result_ || (document_ && !loading_); });
+  if (!ready) return Error{ErrorKind::cancelled, "stopped while waiting for the job to load"};
+  if (result_) return *result_;
+
+  // Load without the lock: it may take long, and others only wait.
+  loading_ = true;
+  lock.unlock();
+  Result<LoadedJobPtr> result = loader_(digest_, *document_);
+
+  lock.lock();
+  result_ = result;
+  changed_.notify_all();
+  return result;
+}
+
+std::shared_ptr<JobEntry> JobCache::entry(const Digest& digest) {
+  // Move the job to the front.
+  const auto found = std::find_if(entries_.begin(), entries_.end(),
+                                  [&](const auto& entry) { return entry->digest() == digest; });
+  if (found != entries_.end()) {
+    if (!(*found)->failed()) {
+      entries_.splice(entries_.begin(), entries_, found);
+      return entries_.front();
+    }
+    entries_.erase(found);
+  }
+
+  // Make room: the tasks of a dropped job keep its entry alive until they end.
+  entries_.push_front(std::make_shared<JobEntry>(digest, loader_));
+  if (entries_.size() > limits::kMaxCachedJobs) entries_.pop_back();
+  return entries_.front();
+}
+
+}  // namespace baton

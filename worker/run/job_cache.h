@@ -1,0 +1,76 @@
+#pragma once
+
+#include <condition_variable>
+#include <functional>
+#include <list>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <stop_token>
+#include <string>
+
+#include "common/base/digest.h"
+#include "common/job/job_spec.h"
+#include "worker/pass/tile_renderer.h"
+
+namespace baton {
+
+/// A job with all its assets in memory; shared by every task of it.
+struct LoadedJob {
+  JobSpec job;
+  Digest digest;
+  std::shared_ptr<const RenderContext> context;
+};
+
+using LoadedJobPtr = std::shared_ptr<const LoadedJob>;
+/// Turns the text of a job document into a loaded job.
+using JobLoader =
+    std::function<Result<LoadedJobPtr>(const Digest& digest, const std::string& document)>;
+
+/// The loader of the worker: parses the document, checks its digest and those of the assets, loads
+/// the scene and maps.
+Result<LoadedJobPtr> load_job_document(const Digest& digest, const std::string& document);
+
+/// One job on its way from document to loaded scene. The first task that needs it loads it, the
+/// others wait.
+class JobEntry {
+ public:
+  JobEntry(const Digest& digest, JobLoader loader) : digest_(digest), loader_(std::move(loader)) {}
+
+  const Digest& digest() const { return digest_; }
+  /// Hands over the document; a second one is ignored.
+  void provide(const std::string& document);
+  bool has_document() const;
+  /// True once loading has failed.
+  bool failed() const;
+  /// Waits for the document, then loads once for all callers. Cancelled when `stop` is requested
+  /// while waiting.
+  Result<LoadedJobPtr> load(std::stop_token stop);
+
+ private:
+  const Digest digest_;
+  const JobLoader loader_;
+  mutable std::mutex mutex_;
+  std::condition_variable_any changed_;
+  std::optional<std::string> document_;
+  bool loading_ = false;
+  std::optional<Result<LoadedJobPtr>> result_;
+};
+
+/// The jobs that this process has seen last, most recent first. Used by the control thread alone;
+/// the entries it hands out are safe to share and live as long as a task holds them, however many
+/// jobs have come since.
+class JobCache {
+ public:
+  explicit JobCache(JobLoader loader) : loader_(std::move(loader)) {}
+
+  /// The entry of a job, made when there is none. A failed entry is replaced, so that the next
+  /// attempt loads anew.
+  std::shared_ptr<JobEntry> entry(const Digest& digest);
+
+ private:
+  JobLoader loader_;
+  std::list<std::shared_ptr<JobEntry>> entries_;  ///< at most limits::kMaxCachedJobs
+};
+
+}  // namespace baton

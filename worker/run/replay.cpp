@@ -1,0 +1,153 @@
+#include "worker/run/replay.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <iterator>
+
+#include "common/image/film_tile.h"
+#include "common/job/job_json.h"
+#include "common/job/sequence.h"
+#include "worker/pass/tile_renderer.h"
+#include "worker/run/frame_output.h"
+
+namespace baton {
+namespace {
+
+/// What a replay keeps of its run: the last frame.
+struct LastFrame {
+  FilmTile film;
+  std::optional<SampleState> state;
+  RenderStats stats;
+};
+
+Result<std::int32_t> find_frame(const JobSpec& job, int frame_number) {
+  const auto found = std::lower_bound(job.frames.begin(), job.frames.end(), frame_number);
+  if (found == job.frames.end() || *found != frame_number) {
+    return Error{ErrorKind::usage,
+                 fmt::format("--frame {}: the job has no such frame, its frames are {} to {}",
+                             frame_number, job.frames.front(), job.frames.back())};
+  }
+  return static_cast<std::int32_t>(found - job.frames.begin());
+}
+
+Status check_place(const JobSpec& job, const ReplayOptions& options) {
+  const TileGrid grid(job.image);
+  if (options.tile < 0 || options.tile >= grid.count()) {
+    return Error{ErrorKind::usage, fmt::format("--tile {}: expected an integer in [0, {}]",
+                                               options.tile, grid.count() - 1)};
+  }
+  const PixelRect rect = grid.rect(options.tile);
+  if (options.pixel && !rect.contains(options.pixel->x, options.pixel->y)) {
+    return Error{
+        ErrorKind::usage,
+        fmt::format("--pixel {},{}: tile {} has x in [{}, {}] and y in [{}, {}]", options.pixel->x,
+                    options.pixel->y, options.tile, rect.x0, rect.x1 - 1, rect.y0, rect.y1 - 1)};
+  }
+  return {};
+}
+
+Result<LastFrame> render(const JobSpec& job, std::int32_t frame_index, std::int32_t tile) {
+  BATON_ASSIGN(const std::string document, make_job_document(job));
+  BATON_ASSIGN(const auto context, load_render_context(job, digest_of(document)));
+
+  // Carried samples depend on every frame before.
+  LastFrame last;
+  const TileRunSink sink{.film =
+                             [&](int, const FilmTile& film) {
+                               last.film = film;
+                               return Status();
+                             },
+                         .state =
+                             [&](const SampleState& state) {
+                               last.state = state;
+                               return Status();
+                             }};
+  const std::int32_t first_frame = carries_state(job) ? 0 : frame_index;
+  BATON_ASSIGN(last.stats,
+               run_tile(*context, {tile, 0, first_frame, frame_index}, std::nullopt, sink, {}));
+  return last;
+}
+
+std::string describe_stats(const RenderStats& s) {
+  return fmt::format(
+      "pixels {} (background {}, fresh {}, carried {}, restarted {}, resampled {})\n"
+      "rays primary {}, shadow {}; target evaluations {}; moves accepted {} of {}\n"
+      "cpu {:.3f} s (light {:.3f}, primary {:.3f}, sample {:.3f}, visibility {:.3f}, shade "
+      "{:.3f})\n",
+      s.pixels, s.pixels_background, s.pixels_fresh, s.pixels_carried, s.pixels_restarted,
+      s.pixels_resampled, s.rays_primary, s.rays_shadow, s.target_evaluations, s.moves_accepted,
+      s.moves_proposed, s.cpu_seconds, s.seconds_light, s.seconds_primary, s.seconds_sample,
+      s.seconds_visibility, s.seconds_shade);
+}
+
+const char* source_name(PixelSource source) {
+  switch (source) {
+    case PixelSource::background:
+      return "background";
+    case PixelSource::fresh:
+      return "fresh";
+    case PixelSource::carried:
+      return "carried";
+    case PixelSource::restarted:
+      return "restarted";
+    case PixelSource::refreshed:
+      return "refreshed";
+  }
+  return "unknown";
+}
+
+std::string describe_pixel(const LastFrame& last, const PixelPosition& position) {
+  const PixelRect& rect = last.film.rect;
+  const auto pixel =
+      static_cast<std::size_t>((position.y - rect.y0) * rect.width() + position.x - rect.x0);
+  std::string text = fmt::format("pixel {},{}\n", position.x, position.y);
+  const auto out = std::back_inserter(text);
+  for (std::size_t channel = 0; channel < last.film.channels.size(); ++channel) {
+    fmt::format_to(out, "  {:<14} {}\n", last.film.channels[channel],
+                   last.film.plane(channel)[pixel]);
+  }
+  if (!last.state) return text;
+
+  const SampleState& state = *last.state;
+  fmt::format_to(out, "  state: {}, lns {}, lns when fresh {}\n", source_name(state.source[pixel]),
+                 state.lns[pixel], state.lns_fresh[pixel]);
+  const auto num_particles = static_cast<std::size_t>(state.num_particles);
+  for (std::size_t i = 0; i < num_particles; ++i) {
+    const std::size_t particle = pixel * num_particles + i;
+    const Vec3 w = decode_octahedral(state.direction[particle]);
+    fmt::format_to(out, "  particle {:2}: site {:2} weight {:.6f} direction {:.5f} {:.5f} {:.5f}\n",
+                   i, state.site[particle], state.weight[particle], w.x, w.y, w.z);
+  }
+  return text;
+}
+
+}  // namespace
+
+Result<std::string> replay_tile(const ReplayOptions& options) {
+  BATON_ASSIGN(const JobSpec job, load_job(options.job));
+  BATON_ASSIGN(const std::int32_t frame_index, find_frame(job, options.frame_number));
+  BATON_TRY(check_place(job, options));
+  BATON_ASSIGN(const LastFrame last, render(job, frame_index, options.tile));
+
+  // The tile becomes a picture of its own.
+  FilmTile picture = last.film;
+  picture.rect = {0, 0, last.film.rect.width(), last.film.rect.height()};
+  const std::filesystem::path out =
+      options.out.empty() ? std::filesystem::path(fmt::format("tile{}.frame{:04}.exr", options.tile,
+                                                              options.frame_number))
+                          : options.out;
+  BATON_TRY(write_exr(
+      out, picture, {.half_float = false, .compression = job.output.compression, .metadata = {}}));
+
+  std::string report = describe_stats(last.stats);
+  if (options.pixel) report += describe_pixel(last, *options.pixel);
+  return report + fmt::format("wrote {}\n", out.string());
+}
+
+std::string replay_command(const std::filesystem::path& job, int frame_number, int tile) {
+  return fmt::format("baton-worker replay '{}' --frame {} --tile {}", job.string(), frame_number,
+                     tile);
+}
+
+}  // namespace baton

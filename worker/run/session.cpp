@@ -1,0 +1,201 @@
+#include "worker/run/session.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "common/base/limits.h"
+
+namespace baton {
+namespace {
+
+using namespace std::chrono_literals;
+
+/// Silence of so many heartbeats means "introduce yourself again".
+constexpr int kSilentHeartbeats = 3;
+constexpr auto kHelloInterval = 1000ms;
+
+/// True for errors that every attempt on every worker would repeat.
+bool is_permanent(ErrorKind kind) {
+  return kind == ErrorKind::bad_input || kind == ErrorKind::version || kind == ErrorKind::usage;
+}
+
+}  // namespace
+
+Session::Session(SessionOptions options, TimePoint now)
+    : options_(std::move(options)),
+      last_heard_(now),
+      next_hello_(now),
+      next_heartbeat_(now),
+      next_request_(now),
+      request_expires_(now) {}
+
+std::vector<SessionAction> Session::step(const SessionEvent& event, TimePoint now) {
+  Actions actions;
+  std::visit([&](const auto& e) { on(e, now, actions); }, event);
+  if (draining_ && in_hand_.empty()) {
+    actions.push_back(SendMessage{WorkerGoodbye{}});
+    actions.push_back(Leave{ExitCode::ok, "all running tasks are finished"});
+  }
+  return actions;
+}
+
+// ---- events
+// ------------------------------------------------------------------------------------------------
+
+void Session::on(const MessageArrived& event, TimePoint now, Actions& actions) {
+  last_heard_ = now;
+  std::visit(
+      [&](const auto& message) {
+        // A message that no coordinator sends to a worker is ignored.
+        if constexpr (requires { this->receive(message, now, actions); }) {
+          receive(message, now, actions);
+        }
+      },
+      event.message);
+}
+
+void Session::on(const TaskEnded& event, TimePoint now, Actions& actions) {
+  if (in_hand_.erase(event.lease) == 0) return;
+
+  // Report, unless the task was given up.
+  if (event.result) {
+    reports_.push_back(TaskDone{event.lease, event.result->outputs, event.result->stats});
+  } else if (event.result.error().kind != ErrorKind::cancelled) {
+    const Error& error = event.result.error();
+    reports_.push_back(TaskFailed{event.lease, error.message, is_permanent(error.kind)});
+  } else {
+    return request_leases(now, actions);
+  }
+  if (reports_.size() > limits::kMaxUnconfirmedReports) reports_.pop_front();
+  if (welcomed_) actions.push_back(SendMessage{reports_.back()});
+  request_leases(now, actions);
+}
+
+void Session::on(const DocumentMissing& event, TimePoint, Actions& actions) {
+  if (!documents_missing_.insert(event.job).second) return;
+  actions.push_back(SendMessage{JobDocumentRequest{event.job}});
+}
+
+void Session::on(const DrainRequested&, TimePoint, Actions& actions) {
+  draining_ = true;
+  actions.push_back(DropQueuedTasks{});
+}
+
+void Session::on(const Tick&, TimePoint now, Actions& actions) {
+  const auto silence = now - last_heard_;
+  if (options_.give_up > 0s && silence > options_.give_up) {
+    actions.push_back(
+        Leave{ExitCode::unavailable,
+              fmt::format("no coordinator has answered for {} s", options_.give_up.count())});
+    return;
+  }
+  if (silence > kSilentHeartbeats * heartbeat_) welcomed_ = false;
+  if (!welcomed_) {
+    if (now >= next_hello_) introduce(now, actions);
+    return;
+  }
+
+  // A heartbeat names the leases in hand and repeats the questions that were not answered.
+  if (now >= next_heartbeat_) {
+    next_heartbeat_ = now + heartbeat_;
+    actions.push_back(SendMessage{Heartbeat{{in_hand_.begin(), in_hand_.end()}}});
+    for (const Digest& job : documents_missing_) {
+      actions.push_back(SendMessage{JobDocumentRequest{job}});
+    }
+  }
+  if (now >= request_expires_) requested_ = 0;
+  request_leases(now, actions);
+}
+
+// ---- messages
+// ----------------------------------------------------------------------------------------------
+
+void Session::receive(const WorkerWelcome& welcome, TimePoint now, Actions& actions) {
+  welcomed_ = true;
+  heartbeat_ = std::chrono::milliseconds(std::max(1, welcome.heartbeat_ms));
+  next_heartbeat_ = now + heartbeat_;
+  actions.push_back(UseStore{welcome.store_directory});
+
+  // What was reported to a coordinator that died may be lost: tell it again, in order, before
+  // asking for more.
+  for (const Message& report : reports_) actions.push_back(SendMessage{report});
+  requested_ = 0;
+  next_request_ = now;
+  request_leases(now, actions);
+}
+
+void Session::receive(const LeaseGrant& grant, TimePoint now, Actions& actions) {
+  requested_ = std::max(0, requested_ - 1);
+  if (draining_ || !in_hand_.insert(grant.lease).second) return;
+  actions.push_back(StartTask{grant.lease, grant.inputs});
+  request_leases(now, actions);
+}
+
+void Session::receive(const LeaseRevoke& revoke, TimePoint, Actions& actions) {
+  if (in_hand_.contains(revoke.lease)) actions.push_back(StopTask{revoke.lease});
+}
+
+void Session::receive(const NoWork& no_work, TimePoint now, Actions&) {
+  requested_ = 0;
+  next_request_ = now + std::chrono::milliseconds(no_work.retry_ms);
+}
+
+void Session::receive(const HelloAgain&, TimePoint now, Actions& actions) {
+  // One hello is enough, however many messages the coordinator did not understand.
+  if (welcomed_ || now >= next_hello_) introduce(now, actions);
+}
+
+void Session::receive(const JobDocument& document, TimePoint, Actions& actions) {
+  documents_missing_.erase(document.job);
+  actions.push_back(TakeDocument{document});
+}
+
+void Session::receive(const Shutdown&, TimePoint, Actions& actions) {
+  actions.push_back(Leave{ExitCode::ok, "the coordinator shuts down"});
+}
+
+void Session::receive(const Refused& refused, TimePoint, Actions& actions) {
+  // Another version will not change its mind; anything else is worth a line in the log.
+  if (refused.kind == static_cast<std::uint8_t>(ErrorKind::version)) {
+    actions.push_back(Leave{exit_code_of(ErrorKind::version), refused.message});
+  } else {
+    actions.push_back(Warn{refused.message});
+  }
+}
+
+// ---- helpers
+// -----------------------------------------------------------------------------------------------
+
+void Session::introduce(TimePoint now, Actions& actions) {
+  welcomed_ = false;
+  next_hello_ = now + kHelloInterval;
+  WorkerHello hello = options_.identity;
+  hello.running = leases_in_hand();
+  actions.push_back(SendMessage{std::move(hello)});
+}
+
+void Session::request_leases(TimePoint now, Actions& actions) {
+  if (!welcomed_ || draining_ || now < next_request_) return;
+
+  // One task more than threads, so that the next one is here when one ends.
+  const std::int32_t capacity = options_.identity.num_threads + 1;
+  const std::int32_t missing = capacity - static_cast<std::int32_t>(in_hand_.size()) - requested_;
+  if (missing <= 0) return;
+  requested_ += missing;
+  request_expires_ = now + 2 * heartbeat_;
+  actions.push_back(SendMessage{LeaseRequest{missing}});
+}
+
+std::vector<LeaseId> Session::leases_in_hand() const {
+  // A report counts as in hand: a coordinator that lost it must adopt the lease before the report
+  // comes again.
+  std::set<LeaseId> leases = in_hand_;
+  for (const Message& report : reports_) {
+    if (const auto* done = std::get_if<TaskDone>(&report)) leases.insert(done->lease);
+    if (const auto* failed = std::get_if<TaskFailed>(&report)) leases.insert(failed->lease);
+  }
+  return {leases.begin(), leases.end()};
+}
+
+}  // namespace baton

@@ -1,0 +1,117 @@
+#pragma once
+
+#include <chrono>
+#include <cstdint>
+#include <deque>
+#include <set>
+#include <string>
+#include <variant>
+#include <vector>
+
+#include "common/base/exit_codes.h"
+#include "common/protocol/messages.h"
+#include "worker/run/execute.h"
+
+namespace baton {
+
+using TimePoint = std::chrono::steady_clock::time_point;
+
+/// Who the worker is and how patient.
+struct SessionOptions {
+  WorkerHello identity;  ///< `running` is filled in by the session
+  std::chrono::seconds give_up{
+      60};  ///< silence of the coordinator after which the worker ends; 0: never
+};
+
+// ---- events: what happened to the worker
+// -------------------------------------------------------------------
+struct MessageArrived {
+  Message message;
+};
+struct TaskEnded {
+  LeaseId lease;
+  Result<TaskOutput> result;
+};
+struct DocumentMissing {
+  Digest job;
+};                         ///< a started task belongs to a job that this process has not seen
+struct DrainRequested {};  ///< SIGTERM: finish what runs, take nothing new
+struct Tick {};            ///< time has passed
+using SessionEvent = std::variant<MessageArrived, TaskEnded, DocumentMissing, DrainRequested, Tick>;
+
+// ---- actions: what the program around the session must do
+// -------------------------------------------------
+struct SendMessage {
+  Message message;
+};
+struct UseStore {
+  std::string directory;
+};
+struct StartTask {
+  LeaseId lease;
+  std::vector<BlobRef> inputs;
+};
+struct StopTask {
+  LeaseId lease;
+};
+struct DropQueuedTasks {};  ///< forget what no thread has begun
+struct TakeDocument {
+  JobDocument document;
+};
+struct Warn {
+  std::string message;
+};
+struct Leave {
+  ExitCode code = ExitCode::ok;
+  std::string reason;
+};  ///< abandon everything and end
+using SessionAction = std::variant<SendMessage, UseStore, StartTask, StopTask, DropQueuedTasks,
+                                   TakeDocument, Warn, Leave>;
+
+/// The worker's side of the conversation with the coordinator: events in, actions out. Knows no
+/// socket, thread or file; time comes as an argument.
+///
+/// introducing --WorkerWelcome--> working --DrainRequested--> draining --last task ended--> (Leave)
+/// A HelloAgain, or silence of kSilentHeartbeats, leads back to introducing: the hello names the
+/// leases in hand, and the reports that a dead coordinator may have lost follow the welcome in
+/// their order. The coordinator fences what it has seen before, so sending twice is safe.
+class Session {
+ public:
+  explicit Session(SessionOptions options, TimePoint now);
+
+  std::vector<SessionAction> step(const SessionEvent& event, TimePoint now);
+
+ private:
+  using Actions = std::vector<SessionAction>;
+
+  void on(const MessageArrived& event, TimePoint now, Actions& actions);
+  void on(const TaskEnded& event, TimePoint now, Actions& actions);
+  void on(const DocumentMissing& event, TimePoint now, Actions& actions);
+  void on(const DrainRequested& event, TimePoint now, Actions& actions);
+  void on(const Tick& event, TimePoint now, Actions& actions);
+
+  void receive(const WorkerWelcome& welcome, TimePoint now, Actions& actions);
+  void receive(const LeaseGrant& grant, TimePoint now, Actions& actions);
+  void receive(const LeaseRevoke& revoke, TimePoint now, Actions& actions);
+  void receive(const NoWork& no_work, TimePoint now, Actions& actions);
+  void receive(const HelloAgain& again, TimePoint now, Actions& actions);
+  void receive(const JobDocument& document, TimePoint now, Actions& actions);
+  void receive(const Shutdown& shutdown, TimePoint now, Actions& actions);
+  void receive(const Refused& refused, TimePoint now, Actions& actions);
+
+  void introduce(TimePoint now, Actions& actions);
+  void request_leases(TimePoint now, Actions& actions);
+  std::vector<LeaseId> leases_in_hand() const;
+
+  SessionOptions options_;
+  bool welcomed_ = false;
+  bool draining_ = false;
+  std::chrono::milliseconds heartbeat_{1000};
+  std::set<LeaseId> in_hand_;           ///< granted and not ended; at most threads + 1
+  std::set<Digest> documents_missing_;  ///< asked for, not yet here
+  std::deque<Message> reports_;         ///< the newest kMaxUnconfirmedReports, oldest first
+  std::int32_t requested_ = 0;          ///< leases asked for and not answered
+  TimePoint last_heard_, next_hello_, next_heartbeat_, next_request_, request_expires_;
+};
+
+}  // namespace baton

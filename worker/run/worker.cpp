@@ -1,0 +1,213 @@
+#include "worker/run/worker.h"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+#include <unistd.h>
+
+#include <array>
+#include <mutex>
+#include <optional>
+#include <set>
+
+#include "common/base/files.h"
+#include "common/base/version.h"
+#include "common/job/job_json.h"
+#include "common/job/sequence.h"
+#include "common/protocol/worker_channel.h"
+#include "worker/accel/accel.h"
+#include "worker/run/crash_handler.h"
+#include "worker/run/render_pool.h"
+#include "worker/run/replay.h"
+#include "worker/run/session.h"
+
+namespace baton {
+namespace {
+
+/// How long the control thread sleeps when nothing wakes it: bounds how late it sees a signal or a
+/// due heartbeat.
+constexpr std::chrono::milliseconds kTickInterval{50};
+
+std::string host_name() {
+  std::array<char, 256> name{};
+  return ::gethostname(name.data(), name.size() - 1) == 0 ? name.data() : "unknown-host";
+}
+
+SessionOptions session_options(const WorkerOptions& options) {
+  WorkerHello identity;
+  identity.host = host_name();
+  identity.pid = static_cast<std::int32_t>(::getpid());
+  identity.worker_id = options.worker_id.empty() ? fmt::format("{}-{}", identity.host, identity.pid)
+                                                 : options.worker_id;
+  identity.num_threads = options.num_threads;
+  identity.instruction_set = instruction_set();
+  return {std::move(identity), options.give_up};
+}
+
+/// Saves the job where a replay can read it. Returns its path.
+Result<std::filesystem::path> save_job(const LoadedJob& loaded,
+                                       const std::filesystem::path& directory) {
+  const std::filesystem::path path = directory / fmt::format("{}.json", loaded.digest.hex());
+  std::error_code error;
+  if (!std::filesystem::exists(path, error)) {
+    BATON_TRY(write_file_atomic(path, as_bytes_view(to_json(loaded.job))));
+  }
+  return path;
+}
+
+/// Logs each note once in the life of the process.
+class NoteLog {
+ public:
+  void report(const std::vector<std::string>& notes) {
+    const std::lock_guard lock(mutex_);
+    for (const std::string& note : notes) {
+      if (seen_.insert(note).second) spdlog::warn("{}", note);
+    }
+  }
+
+ private:
+  std::mutex mutex_;
+  std::set<std::string> seen_;
+};
+
+/// Runs a task on a render thread. The command that repeats it stands in its error message and,
+/// should the process die, in the crash report.
+Result<TaskOutput> execute_pooled(const PooledTask& task, std::stop_token stop, NoteLog& notes) {
+  BATON_ASSIGN(const LoadedJobPtr loaded, task.job->load(stop));
+  if (task.lease.task.kind != TaskKind::render) {
+    return execute_task(*loaded, *task.store, task.lease.task, task.inputs, stop);
+  }
+
+  // A replay renders up to the last frame of the run.
+  std::string command;
+  if (task.lease.task.step >= 0 && task.lease.task.step < num_runs(loaded->job)) {
+    BATON_ASSIGN(const std::filesystem::path path, save_job(*loaded, task.replay_directory));
+    const TileRun run = tile_run(loaded->job, task.lease.task.tile, task.lease.task.step);
+    command = replay_command(path, loaded->job.frames[static_cast<std::size_t>(run.last_frame)],
+                             run.tile);
+  }
+  const CrashNote note(command);
+  Result<TaskOutput> output =
+      execute_task(*loaded, *task.store, task.lease.task, task.inputs, stop);
+  notes.report(repair_notes(*loaded->context));
+  if (output || output.error().kind == ErrorKind::cancelled) return output;
+  return Error{output.error().kind,
+               fmt::format("{}\nto replay it alone: {}", output.error().message, command)};
+}
+
+/// Carries the session's actions out and feeds it with events.
+class Worker {
+ public:
+  Worker(WorkerChannel channel, const WorkerOptions& options)
+      : channel_(std::move(channel)),
+        session_(session_options(options), now()),
+        jobs_(load_job_document),
+        pool_(
+            options.num_threads,
+            [this](const PooledTask& task, std::stop_token stop) {
+              return execute_pooled(task, std::move(stop), notes_);
+            },
+            [this] { channel_.wake(); }) {}
+
+  ExitCode run(const std::atomic<bool>& drain) {
+    bool draining = false;
+    while (!leave_) {
+      // Results first: they free slots that the tick then asks leases for.
+      for (EndedTask& ended : pool_.collect()) {
+        log_failure(ended);
+        step(TaskEnded{ended.lease, std::move(ended.result)});
+      }
+      if (drain && !std::exchange(draining, true)) step(DrainRequested{});
+      step(Tick{});
+      if (leave_) break;
+
+      // Sleep until a message, a result, a signal or the next tick; then take all that has come.
+      std::optional<Message> message = channel_.receive(kTickInterval);
+      while (message && !leave_) {
+        step(MessageArrived{std::move(*message)});
+        message = channel_.receive(std::chrono::milliseconds(0));
+      }
+    }
+    if (leave_->code == ExitCode::ok) {
+      spdlog::info("ends: {}", leave_->reason);
+    } else {
+      spdlog::error("ends: {}", leave_->reason);
+    }
+    return leave_->code;
+  }
+
+ private:
+  static TimePoint now() { return std::chrono::steady_clock::now(); }
+
+  void step(const SessionEvent& event) {
+    for (SessionAction& action : session_.step(event, now())) {
+      if (leave_) return;
+      std::visit([this](auto& a) { perform(a); }, action);
+    }
+  }
+
+  void perform(SendMessage& action) {
+    if (!channel_.send(action.message)) spdlog::warn("the queue to the coordinator is full");
+  }
+  void perform(UseStore& action) {
+    if (store_ && store_directory_ == action.directory) return;
+    Result<BlobStore> store = BlobStore::open(action.directory);
+    if (!store) {
+      leave_ = Leave{exit_code_of(store.error().kind), store.error().message};
+      return;
+    }
+    store_directory_ = action.directory;
+    store_ = std::make_shared<BlobStore>(std::move(store).value());
+    spdlog::info("the coordinator has answered, blobs are in {}", action.directory);
+  }
+  void perform(StartTask& action) {
+    std::shared_ptr<JobEntry> job = jobs_.entry(action.lease.job);
+    const bool missing = !job->has_document();
+    pool_.submit({action.lease, std::move(action.inputs), std::move(job), store_,
+                  store_directory_ / "jobs"});
+    if (missing) step(DocumentMissing{action.lease.job});
+  }
+  void perform(StopTask& action) { pool_.stop(action.lease); }
+  void perform(DropQueuedTasks&) { pool_.drop_queued(); }
+  void perform(TakeDocument& action) {
+    jobs_.entry(action.document.job)->provide(action.document.json);
+  }
+  void perform(Warn& action) { spdlog::warn("the coordinator says: {}", action.message); }
+  void perform(Leave& action) { leave_ = std::move(action); }
+
+  static void log_failure(const EndedTask& ended) {
+    if (ended.result || ended.result.error().kind == ErrorKind::cancelled) return;
+    spdlog::error("job {} {} step {} tile {} failed: {}", ended.lease.job.short_hex(),
+                  ended.lease.task.kind == TaskKind::render ? "render" : "assemble",
+                  ended.lease.task.step, ended.lease.task.tile, ended.result.error().message);
+  }
+
+  WorkerChannel channel_;
+  Session session_;
+  JobCache jobs_;
+  std::shared_ptr<BlobStore> store_;
+  std::filesystem::path store_directory_;
+  std::optional<Leave> leave_;
+  NoteLog notes_;
+  RenderPool pool_;  ///< last: its threads use the rest and are joined first
+};
+
+}  // namespace
+
+std::string describe_worker() {
+  const Scene empty;
+  const auto accel = Accel::build(empty);
+  return fmt::format("baton-worker {}\nray tracer: {}\nsampling: {}", kVersion,
+                     accel ? (*accel)->description() : accel.error().message, instruction_set());
+}
+
+ExitCode run_worker(const WorkerOptions& options, const std::atomic<bool>& drain) {
+  Result<WorkerChannel> channel = WorkerChannel::connect(options.endpoint);
+  if (!channel) {
+    spdlog::error("{}", channel.error().message);
+    return exit_code_of(channel.error().kind);
+  }
+  Worker worker(std::move(channel).value(), options);
+  return worker.run(drain);
+}
+
+}  // namespace baton

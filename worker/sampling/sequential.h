@@ -1,0 +1,42 @@
+#pragma once
+
+#include <cstdint>
+
+#include "common/job/job_spec.h"
+#include "common/math/octahedral.h"
+
+namespace baton {
+
+/// Settings of the sequential sampler, from SamplingSpec.
+struct SequentialSettings {
+  int num_particles = 16;
+  int num_distributions = 5;  ///< P
+  float ess_ratio_min = 0.5f;
+  ResamplingScheme resampling = ResamplingScheme::systematic;
+  float local_move_cosine = 1;      ///< cosine of the half-angle of local moves
+  float local_move_fraction = 0.5f;
+};
+
+/// The particles of one pixel, borrowed: (N,) each. weight: normalised, sum 1.
+struct ParticleSpan {
+  OctDirection* direction = nullptr;
+  std::uint8_t* site = nullptr;
+  float* weight = nullptr;
+};
+
+/// What one step did.
+struct SequentialOutcome {
+  bool alive = false;       ///< false: all weights died or Lns is not a positive finite number; start again with SIR
+  float lns = 0;            ///< new estimate of the normalising constant
+  float ess = 0;            ///< before resampling, [1, N]
+  bool resampled = false;
+  std::int32_t moves_proposed = 0;
+  std::int32_t moves_accepted = 0;
+};
+
+/// Stands for log 0 where sums and products must stay finite: exp() of any multiple is 0.
+inline constexpr float kLogZero = -1e30f;
+/// Anything below is log 0 or a fraction of it: no positive float has so small a logarithm.
+inline constexpr float kLogAlive = -1e20f;
+
+}  // namespace baton

@@ -1,0 +1,186 @@
+// The materials in SIMD: material.h for a vector of (site, direction) pairs. Included once per Highway target.
+#if defined(BATON_WORKER_SCENE_BSDF_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef BATON_WORKER_SCENE_BSDF_INL_H_
+#undef BATON_WORKER_SCENE_BSDF_INL_H_
+#else
+#define BATON_WORKER_SCENE_BSDF_INL_H_
+#endif
+
+#include <hwy/contrib/math/math-inl.h>
+#include <hwy/highway.h>
+
+#include "common/math/lanes-inl.h"
+#include "worker/scene/site_block.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace baton::HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+/// The surface of each lane's site.
+struct SurfaceLanes {
+  Vec3Lanes ns, ng, wo, mirror, kd, ks;
+  VF shape, lobe_scale, specular_probability;
+  MF is_ggx;
+  bool any_phong, any_ggx;
+};
+
+/// table[site] per lane; site in [0, 16).
+HWY_INLINE VF LookUp(const SiteBlock::Array& table, VI site, int num_sites) {
+  const DF d;
+  if (num_sites == 1) return hn::Set(d, table[0]);
+  if constexpr (hn::MaxLanes(DF()) == 8) {
+    const DI di;
+    const VF low = hn::TableLookupLanes(hn::Load(d, table.data()),
+                                        hn::IndicesFromVec(d, hn::And(site, hn::Set(di, 7))));
+    if (num_sites <= 8) return low;
+    const VF high = hn::TableLookupLanes(hn::Load(d, table.data() + 8),
+                                         hn::IndicesFromVec(d, hn::And(site, hn::Set(di, 7))));
+    return hn::IfThenElse(hn::RebindMask(d, hn::Gt(site, hn::Set(di, 7))), high, low);
+  } else {
+    return hn::GatherIndex(d, table.data(), site);
+  }
+}
+
+HWY_INLINE SurfaceLanes LoadSurfaces(const SiteBlock& b, VI site) {
+  const int n = b.num_sites;
+  const auto vec = [&](const SiteBlock::Array& x, const SiteBlock::Array& y, const SiteBlock::Array& z) HWY_ATTR {
+    return Vec3Lanes{LookUp(x, site, n), LookUp(y, site, n), LookUp(z, site, n)};
+  };
+  return {.ns = vec(b.ns_x, b.ns_y, b.ns_z),
+          .ng = vec(b.ng_x, b.ng_y, b.ng_z),
+          .wo = vec(b.wo_x, b.wo_y, b.wo_z),
+          .mirror = vec(b.mirror_x, b.mirror_y, b.mirror_z),
+          .kd = vec(b.kd_r, b.kd_g, b.kd_b),
+          .ks = vec(b.ks_r, b.ks_g, b.ks_b),
+          .shape = LookUp(b.shape, site, n),
+          .lobe_scale = LookUp(b.lobe_scale, site, n),
+          .specular_probability = LookUp(b.specular_probability, site, n),
+          .is_ggx = hn::Gt(LookUp(b.is_ggx, site, n), hn::Zero(DF())),
+          .any_phong = b.any_phong,
+          .any_ggx = b.any_ggx};
+}
+
+/// f_c = diffuse * kd_c + lobe * ks_c + white, with the cosine to the shading normal; all 0 below either horizon.
+/// pdf: density of sample_bsdf.
+struct BsdfLanes {
+  VF diffuse, lobe, white, cosine, pdf;
+};
+
+/// max(x, 0)^s through exp and log; 0 for x <= 0.
+HWY_INLINE VF CosinePower(VF x, VF s) {
+  const DF d;
+  const VF safe = hn::Max(x, hn::Set(d, 1e-30f));
+  const VF power = hn::Exp(d, hn::Max(hn::Mul(s, hn::Log(d, safe)), hn::Set(d, -80.0f)));
+  return hn::IfThenElse(hn::Gt(x, hn::Set(d, 1e-30f)), power, hn::Zero(d));
+}
+
+/// Smith's Lambda of GGX for cosine c > 0 to the normal [Heitz 2014].
+HWY_INLINE VF SmithLambda(VF c, VF alpha2) {
+  const DF d;
+  const VF one = hn::Set(d, 1.0f);
+  const VF c2 = hn::Mul(c, c);
+  const VF tan2 = hn::Div(hn::Max(hn::Sub(one, c2), hn::Zero(d)), c2);
+  return hn::Mul(hn::Sub(hn::Sqrt(hn::MulAdd(alpha2, tan2, one)), one), hn::Set(d, 0.5f));
+}
+
+/// Evaluates BRDF and density of directions wi.
+HWY_INLINE BsdfLanes EvaluateBsdf(const SurfaceLanes& s, const Vec3Lanes& wi) {
+  const DF d;
+  const VF zero = hn::Zero(d);
+  const VF one = hn::Set(d, 1.0f);
+  const VF n_wi = Dot(s.ns, wi);
+  const MF above = hn::And(hn::Gt(n_wi, zero), hn::Gt(Dot(s.ng, wi), zero));
+
+  BsdfLanes out;
+  out.cosine = hn::IfThenElseZero(above, n_wi);
+  out.diffuse = hn::Set(d, kInvPi);
+  out.lobe = zero;
+  out.white = zero;
+  const VF cosine_pdf = hn::Mul(hn::Max(n_wi, zero), hn::Set(d, kInvPi));
+  VF lobe_pdf = zero;
+
+  if (s.any_phong) {
+    const VF power = CosinePower(Dot(s.mirror, wi), s.shape);
+    out.lobe = hn::Mul(s.lobe_scale, power);
+    // (e + 1) / (2 pi), from lobe_scale = (e + 2) / (2 pi).
+    lobe_pdf = hn::Mul(hn::Sub(s.lobe_scale, hn::Set(d, 0.5f * kInvPi)), power);
+  }
+  if (s.any_ggx) {
+    const VF n_wo = hn::Max(Dot(s.ns, s.wo), hn::Set(d, 1e-4f));
+    const Vec3Lanes sum = Add(wi, s.wo);
+    const Vec3Lanes h = Scale(sum, InverseSqrt(hn::Max(Dot(sum, sum), hn::Set(d, 1e-20f))));
+    const VF n_h = Dot(s.ns, h);
+    const VF o_h = hn::Clamp(Dot(s.wo, h), zero, one);
+    const VF alpha2 = hn::Mul(s.shape, s.shape);
+    // D [Walter et al. 2007], with the sine from the cross product so that sharp lobes keep their digits.
+    const VF cx = hn::MulSub(s.ns.y, h.z, hn::Mul(s.ns.z, h.y));
+    const VF cy = hn::MulSub(s.ns.z, h.x, hn::Mul(s.ns.x, h.z));
+    const VF cz = hn::MulSub(s.ns.x, h.y, hn::Mul(s.ns.y, h.x));
+    const VF sine2 = Dot({cx, cy, cz}, {cx, cy, cz});
+    const VF t = hn::MulAdd(hn::Mul(n_h, n_h), alpha2, sine2);
+    const VF d_term = hn::IfThenElseZero(hn::Gt(n_h, zero),
+                                         hn::Div(hn::Mul(alpha2, hn::Set(d, kInvPi)), hn::Max(hn::Mul(t, t), hn::Set(d, 1e-30f))));
+    const VF lambda_o = SmithLambda(hn::Min(n_wo, one), alpha2);
+    const VF lambda_i = SmithLambda(hn::Clamp(n_wi, hn::Set(d, 1e-6f), one), alpha2);
+    const VF quarter = hn::Div(hn::Mul(d_term, hn::Set(d, 0.25f)), n_wo);
+    // f / F = D G2 / (4 n.wi n.wo); the density is D G1(wo) / (4 n.wo).
+    const VF dv = hn::Div(quarter, hn::Mul(hn::Add(hn::Add(one, lambda_o), lambda_i), hn::Max(n_wi, hn::Set(d, 1e-6f))));
+    const VF m = hn::Sub(one, o_h);
+    const VF m2 = hn::Mul(m, m);
+    const VF schlick = hn::Mul(hn::Mul(m2, m2), m);
+    const VF keep = hn::Sub(one, schlick);
+    out.diffuse = hn::IfThenElse(s.is_ggx, hn::Mul(out.diffuse, keep), out.diffuse);
+    out.lobe = hn::IfThenElse(s.is_ggx, hn::Mul(dv, keep), out.lobe);
+    out.white = hn::IfThenElseZero(s.is_ggx, hn::Mul(dv, schlick));
+    lobe_pdf = hn::IfThenElse(s.is_ggx, hn::Div(quarter, hn::Add(one, lambda_o)), lobe_pdf);
+  }
+  out.pdf = hn::MulAdd(s.specular_probability, hn::Sub(lobe_pdf, cosine_pdf), cosine_pdf);
+  return out;
+}
+
+/// A direction around the surface per lane, density EvaluateBsdf().pdf. u0, u1 uniform in [0, 1).
+HWY_INLINE Vec3Lanes SampleBsdf(const SurfaceLanes& s, VF u0, VF u1) {
+  const DF d;
+  const VF zero = hn::Zero(d);
+  const VF one = hn::Set(d, 1.0f);
+  // One stretch of u0 chooses the lobe, the position within it samples the lobe: well spread points stay so.
+  const MF specular = hn::Lt(u0, s.specular_probability);
+  const VF below = hn::Div(u0, hn::Max(s.specular_probability, hn::Set(d, 1e-20f)));
+  const VF over = hn::Div(hn::Sub(u0, s.specular_probability),
+                          hn::Max(hn::Sub(one, s.specular_probability), hn::Set(d, 1e-20f)));
+  const VF u = hn::Clamp(hn::IfThenElse(specular, below, over), zero, hn::Set(d, 0x1.fffffep-1f));
+  VF sine, cosine;
+  SinCosTurns(u1, sine, cosine);
+
+  // Cosine lobe about ns: z = sqrt(1 - u).
+  const VF radius = hn::Sqrt(u);
+  const VF height = hn::Sqrt(hn::Sub(one, u));
+  Vec3Lanes w = FrameToWorld(s.ns, {hn::Mul(radius, cosine), hn::Mul(radius, sine), height});
+
+  if (s.any_phong && !hn::AllFalse(d, specular)) {
+    const VF z = hn::Exp(d, hn::Div(hn::Log(d, hn::Max(hn::Sub(one, u), hn::Set(d, 1e-30f))), hn::Add(s.shape, one)));
+    const VF r = hn::Sqrt(hn::Max(hn::NegMulAdd(z, z, one), zero));
+    w = Select(specular, FrameToWorld(s.mirror, {hn::Mul(r, cosine), hn::Mul(r, sine), z}), w);
+  }
+  if (s.any_ggx && !hn::AllFalse(d, specular)) {
+    // Visible normals through spherical caps [Dupuy & Benyoub 2023], then mirror wo.
+    const Vec3Lanes wo = FrameToLocal(s.ns, s.wo);
+    const VF oz = hn::Max(wo.z, hn::Set(d, 1e-4f));
+    const Vec3Lanes stretched{hn::Mul(wo.x, s.shape), hn::Mul(wo.y, s.shape), oz};
+    const Vec3Lanes o = Scale(stretched, InverseSqrt(Dot(stretched, stretched)));
+    const VF z = hn::Sub(hn::Mul(hn::Sub(one, u), hn::Add(one, o.z)), o.z);
+    const VF r = hn::Sqrt(hn::Clamp(hn::NegMulAdd(z, z, one), zero, one));
+    const Vec3Lanes cap = Add({hn::Mul(r, cosine), hn::Mul(r, sine), z}, o);
+    const Vec3Lanes normal{hn::Mul(cap.x, s.shape), hn::Mul(cap.y, s.shape), hn::Max(cap.z, hn::Set(d, 1e-6f))};
+    const Vec3Lanes h = FrameToWorld(s.ns, Scale(normal, InverseSqrt(Dot(normal, normal))));
+    const VF twice = hn::Mul(hn::Set(d, 2.0f), Dot(h, s.wo));
+    const Vec3Lanes mirrored{hn::MulSub(h.x, twice, s.wo.x), hn::MulSub(h.y, twice, s.wo.y),
+                             hn::MulSub(h.z, twice, s.wo.z)};
+    w = Select(hn::And(specular, s.is_ggx), mirrored, w);
+  }
+  return w;
+}
+
+}  // namespace baton::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+#endif

@@ -1,0 +1,89 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "common/image/image_io.h"
+#include "common/job/sequence.h"
+
+namespace baton {
+
+/// A lat-long radiance map with its sampling table, in the map's own frame (no rotation).
+///
+/// Mapping (OpenEXR's LATLONG): +Y up, the centre of the picture looks along +Z, u = 1/2 - atan2(x, z) / (2 pi) to the
+/// right, v = angle from +Y / pi downwards; texel (i, j) covers [i, i+1)/W x [j, j+1)/H.
+///
+/// The table's cells: with `nearest` the texels, with `bilinear` the cells of the dual grid between four texel centres
+/// (W x (H+1), the first and last row half as high). A cell's probability is proportional to the mean over RGB and over
+/// its four corners of the radiance, times its solid angle, and the density is constant inside: it is positive wherever
+/// the reconstruction is.
+///
+/// Texels are stored once, padded by one texel on every side, as {R, G, B, density}: texel (i, j) at
+/// [(j + 1) * stride + (i + 1)], i in [-1, W], j in [-1, H]. `density` is the table's pdf in 1/sr of the cell whose
+/// upper left corner (nearest: which itself) is the texel, so that one look-up gives radiance and pdf.
+class EnvironmentMap {
+ public:
+  struct Texel {
+    float r = 0, g = 0, b = 0, density = 0;
+  };
+
+  /// Channels that are negative, NaN or infinite become 0; such texels are counted, each as its worst kind (NaN before
+  /// infinite before negative).
+  struct Repairs {
+    std::uint64_t negative = 0, nan = 0, infinite = 0;
+    std::uint64_t total() const { return negative + nan + infinite; }
+  };
+
+  /// image: at least 1x1. scale: radiance factor. compensate: the table of MIS compensation, max(0, L - mean L)
+  /// [Karlik et al. 2019] (a constant map keeps its plain table).
+  EnvironmentMap(const RgbImage& image, MapFilter filter, float scale, bool compensate);
+  /// Texels (1 - t) a + t b; a and b of one size and filter. t in [0, 1].
+  EnvironmentMap(const EnvironmentMap& a, const EnvironmentMap& b, float t, bool compensate);
+
+  int width() const { return width_; }
+  int height() const { return height_; }
+  int stride() const { return width_ + 2; }
+  MapFilter filter() const { return filter_; }
+  const Texel* texels() const { return texels_.data(); }
+  const Repairs& repairs() const { return repairs_; }
+  /// Integral of the reconstruction over the sphere as the table sees it, mean over RGB; 0 for a black map.
+  double total_power() const { return total_power_; }
+  bool black() const { return !(total_power_ > 0); }
+
+  /// Radiance and density along unit `w` (map frame).
+  Texel evaluate(const Vec3& w) const;
+  /// A direction with density evaluate(w).density. u: 2 uniforms in [0, 1). Monotone in u, so well spread points stay
+  /// well spread. Must not be called on a black map.
+  Vec3 sample(const std::array<float, 2>& u) const;
+
+ private:
+  int cell_rows() const;
+  /// Polar angle of the upper edge of a cell row; `cell_rows()` gives the lower edge of the last.
+  double row_angle(int row) const;
+  /// Index in texels_ of the texel that owns the first cell of a row.
+  std::size_t cell_row(int row) const;
+  /// Mean radiance of the cells of a row to cell[1, W]; returns their sum.
+  double cell_means(int row, double* cell) const;
+  void build_table(bool compensate);
+
+  int width_ = 0, height_ = 0;
+  MapFilter filter_ = MapFilter::bilinear;
+  std::vector<Texel> texels_;
+  std::vector<double> row_cdf_;   ///< (cell rows + 1) cumulative table weight; double loses no dim cell
+  std::vector<double> cell_cdf_;  ///< (cell rows, W + 1) the same within a row, per solid angle
+  Repairs repairs_;
+  double total_power_ = 0;
+};
+
+/// A map turned by a rotation: what one frame is lit by.
+struct Environment {
+  std::shared_ptr<const EnvironmentMap> map;
+  Mat3 rotation;  ///< world = rotation * map direction
+
+  EnvironmentMap::Texel evaluate(const Vec3& world) const { return map->evaluate(rotation.transposed() * world); }
+  Vec3 sample(const std::array<float, 2>& u) const { return rotation * map->sample(u); }
+};
+
+}  // namespace baton

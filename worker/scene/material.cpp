@@ -1,0 +1,188 @@
+#include "worker/scene/material.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace baton {
+namespace {
+
+constexpr float kTwoPi = 2 * kPi;
+
+/// Least n.wo that the ggx lobe is evaluated with.
+constexpr float kMinCosView = 1e-4f;
+
+/// cos^s of the angle between unit a and b, 0 past a right angle. 1 - cos = |a - b|^2 / 2 keeps its
+/// digits where the cosine has lost them, so s = 100000 is as exact as s = 1.
+float cosine_power(const Vec3& a, const Vec3& b, float s) {
+  const Vec3 d = a - b;
+  const float one_minus_cos = 0.5f * dot(d, d);
+  return one_minus_cos < 1 ? std::exp(s * std::log1p(-one_minus_cos)) : 0.0f;
+}
+
+/// wo raised to n.wo >= kMinCosView: interpolated normals may face away from the viewer.
+Vec3 clamped_view(const ShadingPoint& p) {
+  const float cos_view = dot(p.ns, p.wo);
+  if (cos_view >= kMinCosView) return p.wo;
+  return normalize(p.wo + p.ns * (kMinCosView - cos_view));
+}
+
+/// GGX normal distribution D = a^2 / (pi (a^2 (n.h)^2 + |n x h|^2)^2), 1/sr. The cross product
+/// keeps the digits that 1 - (n.h)^2 loses for a near 0.
+float ggx_distribution(const Vec3& n, const Vec3& h, float alpha) {
+  const Vec3 c = cross(n, h);
+  const float cos_h = dot(n, h);
+  const float alpha2 = alpha * alpha;
+  const float t = alpha2 * cos_h * cos_h + dot(c, c);
+  return alpha2 / (kPi * t * t);
+}
+
+/// sqrt(a^2 + (1 - a^2) cos^2): the root in Smith's masking function of GGX.
+float smith_root(float cos_theta, float alpha) {
+  const float alpha2 = alpha * alpha;
+  return std::sqrt(alpha2 + (1 - alpha2) * cos_theta * cos_theta);
+}
+
+/// Specular and diffuse part of ggx. G2 / (4 n.wi n.wo) of the height-correlated Smith function
+/// [Heitz 2014, eq. 99] is 1 / (2 (n.wi root(n.wo) + n.wo root(n.wi))): nothing divides by n.wi.
+Rgb evaluate_ggx(const Material& m, const ShadingPoint& p, const Vec3& wi) {
+  const Vec3 wo = clamped_view(p);
+  const Vec3 h = normalize(wi + wo);
+  const float cos_i = dot(p.ns, wi);
+  const float cos_o = std::max(dot(p.ns, wo), kMinCosView);
+  const float masking_over_4 =
+      0.5f / (cos_i * smith_root(cos_o, m.shape) + cos_o * smith_root(cos_i, m.shape));
+  const float specular = ggx_distribution(p.ns, h, m.shape) * masking_over_4;
+  const float t = 1 - std::clamp(dot(wo, h), 0.0f, 1.0f);
+  const float t2 = t * t;
+  const Rgb fresnel = m.ks + (Rgb{1, 1, 1} - m.ks) * (t2 * t2 * t);
+  return (Rgb{1, 1, 1} - fresnel) * m.kd * kInvPi + fresnel * specular;
+}
+
+/// Density of the reflected visible normal, D G1(wo) / (4 n.wo), with G1 / n.wo = 2 / (n.wo +
+/// root(n.wo)).
+float ggx_pdf(const Material& m, const ShadingPoint& p, const Vec3& wi) {
+  const Vec3 wo = clamped_view(p);
+  const Vec3 sum = wi + wo;
+  if (!(dot(sum, p.ns) > 0)) return 0;
+  const float cos_o = std::max(dot(p.ns, wo), kMinCosView);
+  return ggx_distribution(p.ns, normalize(sum), m.shape) * 0.5f /
+         (cos_o + smith_root(cos_o, m.shape));
+}
+
+/// wo mirrored at a visible normal, drawn through a spherical cap [Dupuy & Benyoub 2023, listing
+/// 1].
+Vec3 sample_ggx(const Material& m, const ShadingPoint& p, float u0, float u1) {
+  const Frame frame(p.ns);
+  const Vec3 wo = clamped_view(p);
+  const Vec3 local = frame.to_local(wo);
+  const Vec3 stretched = normalize({local.x * m.shape, local.y * m.shape, std::max(local.z, 0.0f)});
+
+  // Draw on the cap z > -stretched.z; the sum with the view direction is the hemisphere's visible
+  // normal.
+  const float phi = kTwoPi * u0;
+  const float z_plus_view = (1 - u1) * (1 + stretched.z);
+  const float z = std::clamp(z_plus_view - stretched.z, -1.0f, 1.0f);
+  const float sin_theta = std::sqrt((1 - z) * (1 + z));
+  const Vec3 h{(sin_theta * std::cos(phi) + stretched.x) * m.shape,
+               (sin_theta * std::sin(phi) + stretched.y) * m.shape, z_plus_view};
+  return normalize(reflect(wo, frame.to_world(normalize(h))));
+}
+
+/// Cosine-power lobe about the mirror direction.
+Vec3 sample_phong(const Material& m, const ShadingPoint& p, float u0, float u1) {
+  const float one_minus_cos = -std::expm1(std::log1p(-u1) / (m.shape + 1));
+  const float sin_theta = std::sqrt(one_minus_cos * (2 - one_minus_cos));
+  const float phi = kTwoPi * u0;
+  const Frame frame(normalize(reflect(p.wo, p.ns)));
+  return normalize(
+      frame.to_world({sin_theta * std::cos(phi), sin_theta * std::sin(phi), 1 - one_minus_cos}));
+}
+
+/// Cosine lobe about the shading normal.
+Vec3 sample_cosine(const ShadingPoint& p, float u0, float u1) {
+  const float radius = std::sqrt(u1);
+  const float phi = kTwoPi * u0;
+  return normalize(
+      Frame(p.ns).to_world({radius * std::cos(phi), radius * std::sin(phi), std::sqrt(1 - u1)}));
+}
+
+/// Density of the specular lobe alone, 1/sr.
+float lobe_pdf(const Material& m, const ShadingPoint& p, const Vec3& wi) {
+  switch (m.lobe) {
+    case Material::Lobe::none:
+      return 0;
+    case Material::Lobe::phong:
+      return (m.shape + 1) / kTwoPi * cosine_power(normalize(reflect(p.wo, p.ns)), wi, m.shape);
+    case Material::Lobe::ggx:
+      return ggx_pdf(m, p, wi);
+  }
+  return 0;
+}
+
+/// Share of `specular` in the reflected energy; 0 for a black material.
+float specular_share(float specular, float diffuse) {
+  const float sum = specular + diffuse;
+  return sum > 0 ? specular / sum : 0.0f;
+}
+
+}  // namespace
+
+Material make_material(const MaterialSpec& spec) {
+  switch (spec.kind) {
+    case MaterialKind::diffuse:
+      return {.kd = spec.base_color, .ks = {}};
+    case MaterialKind::phong: {
+      const Rgb kd = spec.base_color * spec.kd;
+      const Rgb ks = spec.specular_color * spec.ks;
+      return {.lobe = mean(ks) > 0 ? Material::Lobe::phong : Material::Lobe::none,
+              .kd = kd,
+              .ks = ks,
+              .shape = spec.exponent,
+              .specular_probability = specular_share(mean(ks), mean(kd))};
+    }
+    case MaterialKind::metallic_roughness: {
+      const Rgb kd = spec.base_color * (1 - spec.metallic);
+      const Rgb f0 =
+          Rgb{0.04f, 0.04f, 0.04f} * (1 - spec.metallic) + spec.base_color * spec.metallic;
+      // Schlick's term averages to 1/21 over the cosine-weighted hemisphere.
+      const float fresnel = mean(f0) + (1 - mean(f0)) / 21;
+      return {.lobe = Material::Lobe::ggx,
+              .kd = kd,
+              .ks = f0,
+              .shape = spec.roughness * spec.roughness,
+              .specular_probability = specular_share(fresnel, mean(kd) * (1 - fresnel))};
+    }
+  }
+  return {};
+}
+
+Rgb evaluate_bsdf(const Material& material, const ShadingPoint& point, const Vec3& wi) {
+  if (!above_horizon(point, wi)) return {};
+  switch (material.lobe) {
+    case Material::Lobe::none:
+      return material.kd * kInvPi;
+    case Material::Lobe::phong: {
+      const Vec3 mirror = normalize(reflect(point.wo, point.ns));
+      return material.kd * kInvPi + material.ks * ((material.shape + 2) / kTwoPi *
+                                                   cosine_power(mirror, wi, material.shape));
+    }
+    case Material::Lobe::ggx:
+      return evaluate_ggx(material, point, wi);
+  }
+  return {};
+}
+
+Vec3 sample_bsdf(const Material& material, const ShadingPoint& point,
+                 const std::array<float, 3>& u) {
+  if (u[2] >= material.specular_probability) return sample_cosine(point, u[0], u[1]);
+  return material.lobe == Material::Lobe::ggx ? sample_ggx(material, point, u[0], u[1])
+                                              : sample_phong(material, point, u[0], u[1]);
+}
+
+float bsdf_pdf_solid_angle(const Material& material, const ShadingPoint& point, const Vec3& wi) {
+  const float cosine = std::max(dot(point.ns, wi), 0.0f) * kInvPi;
+  const float p = material.specular_probability;
+  return (1 - p) * cosine + p * lobe_pdf(material, point, wi);
+}
+
+}  // namespace baton

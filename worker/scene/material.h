@@ -1,0 +1,49 @@
+#pragma once
+
+#include <array>
+
+#include "common/job/job_spec.h"
+#include "common/math/vec3.h"
+
+namespace baton {
+
+/// A material in the one form that all code evaluates:
+///   f = kd/pi [* (1 - F) for ggx] + specular lobe,
+/// lobe phong: ks (s+2)/(2 pi) max(0, r.wi)^s, r the mirror direction of wo about the shading normal
+///   [Lafortune & Willems 1994; the papers' model];
+/// lobe ggx: D G2 F / (4 |n.wi| |n.wo|), F Schlick with F0 = ks [glTF 2.0, appendix B].
+struct Material {
+  enum class Lobe : std::uint8_t { none, phong, ggx };
+
+  Lobe lobe = Lobe::none;
+  Rgb kd;                 ///< diffuse albedo
+  Rgb ks;                 ///< phong: specular albedo; ggx: F0
+  float shape = 1;        ///< phong: exponent s; ggx: alpha = roughness^2
+  float specular_probability = 0;  ///< chance that sample_bsdf draws from the lobe, [0, 1]
+};
+
+/// Material of a specification. specular_probability follows from the mean albedos.
+Material make_material(const MaterialSpec& spec);
+
+/// A surface as light sampling sees it. All directions unit, pointing away from the surface;
+/// ng and ns lie on the side of wo (dot(ng, wo) >= 0, dot(ns, ng) > 0).
+struct ShadingPoint {
+  Vec3 position;
+  Vec3 ng;  ///< geometric normal
+  Vec3 ns;  ///< shading normal
+  Vec3 wo;  ///< to the viewer
+};
+
+/// True when wi is above the shading and the geometric horizon: elsewhere every target is 0.
+inline bool above_horizon(const ShadingPoint& p, const Vec3& wi) { return dot(p.ns, wi) > 0 && dot(p.ng, wi) > 0; }
+
+/// BRDF f(wi, wo) in 1/sr, without the cosine; 0 when not above_horizon. The scalar witness of the SIMD code.
+Rgb evaluate_bsdf(const Material& material, const ShadingPoint& point, const Vec3& wi);
+
+/// A direction from the mixture of the cosine lobe and the specular lobe. u: 3 uniforms in [0, 1). May fall below the
+/// horizon (there the BRDF is 0).
+Vec3 sample_bsdf(const Material& material, const ShadingPoint& point, const std::array<float, 3>& u);
+/// Its density, 1/sr; integrates to 1 over the sphere.
+float bsdf_pdf_solid_angle(const Material& material, const ShadingPoint& point, const Vec3& wi);
+
+}  // namespace baton

@@ -1,0 +1,93 @@
+#include "worker/scene/mesh_builder.h"
+
+#include <algorithm>
+#include <bit>
+#include <cmath>
+
+namespace baton {
+namespace {
+
+/// Triangles whose doubled area is below this share of their longest edge squared have no normal in
+/// float.
+constexpr double kMinRelativeArea = 1e-7;
+
+/// Sums of angle-weighted normals shorter than this are rounding.
+constexpr float kCancelled = 1e-3f;
+
+double squared_length(const Vec3& v) {
+  return double{v.x} * v.x + double{v.y} * v.y + double{v.z} * v.z;
+}
+
+double doubled_area(const Vec3& a, const Vec3& b) {
+  const double x = double{a.y} * b.z - double{a.z} * b.y;
+  const double y = double{a.z} * b.x - double{a.x} * b.z;
+  const double z = double{a.x} * b.y - double{a.y} * b.x;
+  return std::sqrt(x * x + y * y + z * z);
+}
+
+/// Adding 0 makes -0 and 0 one.
+std::uint32_t bits(float f) { return std::bit_cast<std::uint32_t>(f + 0.0f); }
+
+}  // namespace
+
+void MeshBuilder::add(const std::array<Vec3, 3>& corners, const std::array<Vec3, 3>& normals) {
+  const Vec3 a = corners[1] - corners[0];
+  const Vec3 b = corners[2] - corners[0];
+  const double longest =
+      std::max({squared_length(a), squared_length(b), squared_length(corners[2] - corners[1])});
+  if (!(doubled_area(a, b) > kMinRelativeArea * longest)) {
+    ++mesh_.dropped_triangles;
+    return;
+  }
+  std::array<std::uint32_t, 3> triangle{};
+  for (std::size_t k = 0; k < 3; ++k) {
+    triangle[k] = vertex(corners[k], with_normals_ ? normals[k] : Vec3{});
+  }
+  mesh_.triangles.push_back(triangle);
+}
+
+std::size_t MeshBuilder::VertexHash::operator()(const VertexKey& key) const {
+  std::uint64_t hash = 0;
+  for (const std::uint32_t word : key) {
+    hash = (hash ^ word) * 0x9E3779B97F4A7C15u;
+    hash ^= hash >> 32;
+  }
+  return hash;
+}
+
+std::uint32_t MeshBuilder::vertex(const Vec3& position, const Vec3& normal) {
+  const VertexKey key{bits(position.x), bits(position.y), bits(position.z),
+                      bits(normal.x),   bits(normal.y),   bits(normal.z)};
+  const auto next = static_cast<std::uint32_t>(mesh_.positions.size());
+  const auto [found, inserted] = index_.try_emplace(key, next);
+  if (inserted) {
+    mesh_.positions.push_back(position);
+    if (with_normals_) mesh_.normals.push_back(normal);
+  }
+  return found->second;
+}
+
+std::vector<Vec3> smooth_vertex_normals(const TriangleMesh& mesh) {
+  // Sum the face normals at each vertex, weighted by the corner's angle.
+  std::vector<Vec3> sum(mesh.positions.size());
+  std::vector<Vec3> of_one_face(mesh.positions.size());
+  for (const auto& triangle : mesh.triangles) {
+    const std::array<Vec3, 3> p{mesh.positions[triangle[0]], mesh.positions[triangle[1]],
+                                mesh.positions[triangle[2]]};
+    const Vec3 normal = normalize(cross(normalize(p[1] - p[0]), normalize(p[2] - p[0])));
+    for (std::size_t k = 0; k < 3; ++k) {
+      const Vec3 a = normalize(p[(k + 1) % 3] - p[k]);
+      const Vec3 b = normalize(p[(k + 2) % 3] - p[k]);
+      sum[triangle[k]] += normal * std::atan2(length(cross(a, b)), dot(a, b));
+      of_one_face[triangle[k]] = normal;
+    }
+  }
+
+  // Normalise what did not cancel.
+  for (std::size_t i = 0; i < sum.size(); ++i) {
+    sum[i] = length(sum[i]) > kCancelled ? normalize(sum[i]) : of_one_face[i];
+  }
+  return sum;
+}
+
+}  // namespace baton

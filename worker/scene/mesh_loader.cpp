@@ -1,0 +1,151 @@
+#include <assimp/postprocess.h>
+#include <assimp/scene.h>
+
+#include <algorithm>
+#include <assimp/Importer.hpp>
+#include <cmath>
+#include <filesystem>
+#include <optional>
+
+#include "common/base/files.h"
+#include "common/base/limits.h"
+#include "worker/scene/mesh_builder.h"
+#include "worker/scene/mesh_text.h"
+
+namespace baton {
+namespace {
+
+Error bad_mesh(const std::string& path, const std::string& what) {
+  return {ErrorKind::bad_input, path + ": " + what};
+}
+
+bool finite(const aiVector3D& v) {
+  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
+}
+
+/// Looks at every coordinate and index before anything follows them.
+std::optional<std::string> find_fault(const aiMesh& part) {
+  for (unsigned i = 0; i < part.mNumVertices; ++i) {
+    if (!finite(part.mVertices[i])) {
+      return "vertex " + std::to_string(i) + " has a coordinate that is not finite";
+    }
+  }
+  for (unsigned f = 0; f < part.mNumFaces; ++f) {
+    for (unsigned k = 0; k < part.mFaces[f].mNumIndices; ++k) {
+      if (const unsigned index = part.mFaces[f].mIndices[k]; index >= part.mNumVertices) {
+        return "face " + std::to_string(f) + ": expected a vertex index below " +
+               std::to_string(part.mNumVertices) + ", found " + std::to_string(index);
+      }
+    }
+  }
+  return std::nullopt;
+}
+
+/// True when every vertex of the file comes with a usable normal.
+bool has_normals(const aiScene& file) {
+  const auto usable = [](const aiVector3D& n) { return finite(n) && n.SquareLength() > 0; };
+  return std::all_of(file.mMeshes, file.mMeshes + file.mNumMeshes, [&](const aiMesh* part) {
+    return part->HasNormals() &&
+           std::all_of(part->mNormals, part->mNormals + part->mNumVertices, usable);
+  });
+}
+
+/// Adds the triangles of `part`, moved by `to_file`.
+void add_part(const aiMesh& part, const aiMatrix4x4& to_file, bool with_normals,
+              MeshBuilder& builder) {
+  const bool mirrored = to_file.Determinant() < 0;
+  aiMatrix3x3 normal_to_file(to_file);
+  normal_to_file.Inverse().Transpose();
+  for (unsigned f = 0; f < part.mNumFaces; ++f) {
+    const aiFace& face = part.mFaces[f];
+    if (face.mNumIndices != 3) continue;  // points and lines
+    std::array<Vec3, 3> corners, normals;
+    for (std::size_t k = 0; k < 3; ++k) {
+      const unsigned index = face.mIndices[mirrored ? 2 - k : k];
+      const aiVector3D p = to_file * part.mVertices[index];
+      corners[k] = {p.x, p.y, p.z};
+      if (!with_normals) continue;
+      const aiVector3D n = normal_to_file * part.mNormals[index];
+      normals[k] = normalize({n.x, n.y, n.z});
+    }
+    builder.add(corners, normals);
+  }
+}
+
+/// Adds all parts at and below `node`.
+void add_node(const aiScene& file, const aiNode& node, const aiMatrix4x4& parent, bool with_normals,
+              MeshBuilder& builder) {
+  const aiMatrix4x4 to_file = parent * node.mTransformation;
+  for (unsigned m = 0; m < node.mNumMeshes; ++m) {
+    add_part(*file.mMeshes[node.mMeshes[m]], to_file, with_normals, builder);
+  }
+  for (unsigned c = 0; c < node.mNumChildren; ++c) {
+    add_node(file, *node.mChildren[c], to_file, with_normals, builder);
+  }
+}
+
+Result<TriangleMesh> load_with_assimp(const std::string& path, bool smooth_normals) {
+  Assimp::Importer importer;
+  const aiScene* file = importer.ReadFile(path, 0);
+  if (file == nullptr)
+    return bad_mesh(path, std::string("not a mesh: ") + importer.GetErrorString());
+  for (unsigned m = 0; m < file->mNumMeshes; ++m) {
+    if (const auto fault = find_fault(*file->mMeshes[m])) return bad_mesh(path, *fault);
+  }
+  file = importer.ApplyPostProcessing(aiProcess_Triangulate);
+  if (file == nullptr || file->mRootNode == nullptr) {
+    return bad_mesh(path, std::string("not a mesh: ") + importer.GetErrorString());
+  }
+  const bool with_normals = smooth_normals && has_normals(*file);
+  MeshBuilder builder(with_normals);
+  add_node(*file, *file->mRootNode, aiMatrix4x4(), with_normals, builder);
+  return builder.take();
+}
+
+/// Reads the triangles with the reader that fits the file.
+Result<TriangleMesh> read_triangles(const std::string& path, bool smooth_normals) {
+  const std::string extension = std::filesystem::path(path).extension().string();
+  const auto is = [&](std::string_view e) {
+    return std::equal(extension.begin(), extension.end(), e.begin(), e.end(), [](char a, char b) {
+      return std::tolower(static_cast<unsigned char>(a)) == b;
+    });
+  };
+  if (is(".off")) {
+    BATON_ASSIGN(const std::string text, read_text_file(path, limits::kMaxAssetFileBytes));
+    return parse_off(text, path);
+  }
+  if (is(".ply")) {
+    BATON_ASSIGN(const std::string bytes, read_text_file(path, limits::kMaxAssetFileBytes));
+    if (const auto fault = find_ply_truncation(bytes)) return bad_mesh(path, *fault);
+  }
+  return load_with_assimp(path, smooth_normals);
+}
+
+}  // namespace
+
+Result<TriangleMesh> load_mesh(const std::string& path, bool smooth_normals) {
+  // Look at the file before any reader does.
+  std::error_code error;
+  const std::filesystem::file_status status = std::filesystem::status(path, error);
+  if (!std::filesystem::exists(status)) return bad_mesh(path, "missing: expected a mesh file");
+  if (!std::filesystem::is_regular_file(status))
+    return bad_mesh(path, "expected a mesh file, found no regular file");
+  if (std::filesystem::file_size(path, error) > limits::kMaxAssetFileBytes) {
+    return bad_mesh(path, "larger than " + std::to_string(limits::kMaxAssetFileBytes) + " bytes");
+  }
+
+  // assimp throws on some odd files instead of saying so.
+  try {
+    BATON_ASSIGN(TriangleMesh mesh, read_triangles(path, smooth_normals));
+    if (mesh.triangles.empty()) {
+      return bad_mesh(path,
+                      "no triangles (" + std::to_string(mesh.dropped_triangles) + " without area)");
+    }
+    if (smooth_normals && mesh.normals.empty()) mesh.normals = smooth_vertex_normals(mesh);
+    return mesh;
+  } catch (const std::exception& e) {
+    return bad_mesh(path, std::string("not a mesh: ") + e.what());
+  }
+}
+
+}  // namespace baton

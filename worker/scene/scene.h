@@ -1,0 +1,45 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "common/base/result.h"
+#include "common/job/job_spec.h"
+#include "worker/scene/camera.h"
+#include "worker/scene/material.h"
+
+namespace baton {
+
+/// Triangles of one file. Degenerate triangles (zero area, equal corners) are dropped and counted.
+struct TriangleMesh {
+  std::vector<Vec3> positions;
+  std::vector<Vec3> normals;  ///< per vertex, unit; empty: flat shading
+  std::vector<std::array<std::uint32_t, 3>> triangles;
+  std::uint64_t dropped_triangles = 0;
+};
+
+/// Reads .ply .obj .off .gltf .glb. Errors name the file: missing, not a mesh, no triangles, indices out of range,
+/// coordinates that are not finite.
+Result<TriangleMesh> load_mesh(const std::string& path, bool smooth_normals);
+
+/// A mesh placed in the world.
+struct Instance {
+  std::uint32_t mesh = 0;
+  std::uint32_t material = 0;
+  Transform to_world;
+  Mat3 normal_to_world;  ///< inverse transpose of to_world.linear
+};
+
+/// All geometry of a job; immutable once loaded, shared by all threads.
+struct Scene {
+  std::vector<TriangleMesh> meshes;
+  std::vector<Material> materials;
+  std::vector<Instance> instances;
+  Camera camera;
+};
+
+/// Loads every mesh and resolves every name. The ground is a two-triangle mesh of its own.
+Result<Scene> load_scene(const JobSpec& job);
+
+}  // namespace baton

@@ -1,0 +1,40 @@
+#include "worker/scene/site_block.h"
+
+#include "common/base/check.h"
+
+namespace baton {
+
+void SiteBlock::clear(int sites) {
+  BATON_CHECK(sites >= 1 && sites <= kMaxSites);
+  *this = SiteBlock{};
+  num_sites = sites;
+}
+
+void SiteBlock::add(int site, const ShadingPoint& point, const Material& material) {
+  BATON_CHECK(site >= 0 && site < num_sites && num_hits < kMaxSites);
+  const auto s = static_cast<std::size_t>(site);
+  const auto set = [s](Array& x, Array& y, Array& z, const Vec3& v) {
+    x[s] = v.x;
+    y[s] = v.y;
+    z[s] = v.z;
+  };
+  const bool ggx = material.lobe == Material::Lobe::ggx;
+  const bool phong = material.lobe == Material::Lobe::phong;
+
+  set(ns_x, ns_y, ns_z, point.ns);
+  set(ng_x, ng_y, ng_z, point.ng);
+  set(wo_x, wo_y, wo_z, point.wo);
+  set(mirror_x, mirror_y, mirror_z, reflect(point.wo, point.ns));
+  set(kd_r, kd_g, kd_b, ggx ? material.kd * (Rgb{1, 1, 1} - material.ks) : material.kd);
+  set(ks_r, ks_g, ks_b, ggx || phong ? material.ks : Rgb{});
+  shape[s] = material.shape;
+  lobe_scale[s] = phong ? (material.shape + 2) * (0.5f * kInvPi) : (ggx ? 1.0f : 0.0f);
+  specular_probability[s] = ggx || phong ? material.specular_probability : 0.0f;
+  is_ggx[s] = ggx ? 1.0f : 0.0f;
+
+  any_phong = any_phong || phong;
+  any_ggx = any_ggx || ggx;
+  hit_sites[static_cast<std::size_t>(num_hits++)] = site;
+}
+
+}  // namespace baton

@@ -1,0 +1,39 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+
+#include "worker/scene/material.h"
+
+namespace baton {
+
+/// The surfaces that the sites of one pixel see, as structure of arrays for the SIMD kernels. Index: site, [0, S).
+/// A site without a surface has zero reflectance, so its target is 0 everywhere.
+struct alignas(64) SiteBlock {
+  static constexpr int kMaxSites = 16;
+  using Array = std::array<float, kMaxSites>;
+
+  Array ns_x{}, ns_y{}, ns_z{};              ///< shading normal
+  Array ng_x{}, ng_y{}, ng_z{};              ///< geometric normal
+  Array wo_x{}, wo_y{}, wo_z{};              ///< to the viewer
+  Array mirror_x{}, mirror_y{}, mirror_z{};  ///< wo mirrored about ns
+  Array kd_r{}, kd_g{}, kd_b{};              ///< diffuse albedo; ggx: kd (1 - F0)
+  Array ks_r{}, ks_g{}, ks_b{};              ///< phong: specular albedo; ggx: F0
+  Array shape{};                             ///< phong: exponent; ggx: alpha
+  Array lobe_scale{};                        ///< phong: (s + 2) / (2 pi); ggx: 1
+  Array specular_probability{};
+  Array is_ggx{};                            ///< 0 or 1
+
+  std::int32_t num_sites = 1;                       ///< S
+  std::int32_t num_hits = 0;                        ///< sites that see a surface
+  std::array<std::int32_t, kMaxSites> hit_sites{};  ///< their indices, ascending
+  bool any_phong = false;
+  bool any_ggx = false;
+
+  /// Forgets all sites; `sites` in [1, kMaxSites].
+  void clear(int sites);
+  /// Sets site `site` to a surface. Sites must be added in ascending order.
+  void add(int site, const ShadingPoint& point, const Material& material);
+};
+
+}  // namespace baton
