@@ -37,6 +37,7 @@ inline constexpr int kMaxEnvironmentSide = 32768;
 inline constexpr std::uint64_t kMaxEnvironmentCacheBytes = 4ull << 30;  ///< per process and kind of entry
 inline constexpr int kMaxTasksPerJob = 4000000;
 inline constexpr int kMaxTaskAttempts = 16;
+inline constexpr int kMaxLeasesPerWorker = 1024;
 inline constexpr int kMaxJobs = 10000;
 inline constexpr int kMaxWorkers = 4096;
 inline constexpr std::size_t kMaxCachedJobs = 4;            ///< loaded scenes a worker keeps

@@ -22,7 +22,9 @@ class FilesTest : public testing::Test {
     fs::remove_all(folder_);
     fs::create_directories(folder_);
   }
-  auto num_files() const { return std::distance(fs::directory_iterator(folder_), fs::directory_iterator{}); }
+  auto num_files() const {
+    return std::distance(fs::directory_iterator(folder_), fs::directory_iterator{});
+  }
 
   fs::path folder_;
 };

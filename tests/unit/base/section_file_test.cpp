@@ -31,7 +31,9 @@ SectionFile small_file() {
   return {kMagic, 1, {{kPlain, false, 1, bytes_of("raw!")}, {kFloats, true, 4, floats.take()}}};
 }
 
-Result<SectionFile> decode(ByteView bytes) { return decode_section_file(bytes, kMagic, 1, "a.tst"); }
+Result<SectionFile> decode(ByteView bytes) {
+  return decode_section_file(bytes, kMagic, 1, "a.tst");
+}
 
 /// Overwrites `value` at `offset`, then mends the checksum of header and table.
 template <class T>
@@ -116,7 +118,8 @@ TEST(SectionFile, AWrongChecksumNamesFileSectionAndBothSums) {
   const auto decoded = decode(bytes);
   ASSERT_FALSE(decoded.ok());
   EXPECT_EQ(decoded.error().kind, ErrorKind::corrupt);
-  EXPECT_THAT(decoded.error().message, testing::MatchesRegex("a.tst: section FLT_ checksum [0-9a-f]+, expected [0-9a-f]+"));
+  EXPECT_THAT(decoded.error().message,
+              testing::MatchesRegex("a.tst: section FLT_ checksum [0-9a-f]+, expected [0-9a-f]+"));
 }
 
 TEST(SectionFile, AnotherMagicIsAnotherKindOfFile) {

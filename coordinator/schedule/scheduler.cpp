@@ -1,0 +1,213 @@
+#include "coordinator/schedule/scheduler.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "common/base/limits.h"
+
+namespace baton {
+namespace {
+
+std::string describe(const TaskKey& task) {
+  if (task.kind == TaskKind::assemble) return fmt::format("assembly of frame index {}", task.step);
+  return fmt::format("run {} of tile {}", task.step, task.tile);
+}
+
+/// The attempts that a task may fail in all.
+std::int32_t attempts_allowed(const JobSpec& spec) { return spec.max_retries_per_task + 1; }
+
+}  // namespace
+
+Scheduler::Scheduler(std::uint32_t epoch, std::chrono::milliseconds silence_limit)
+    : epoch_(epoch), silence_limit_(silence_limit) {}
+
+std::vector<Action> Scheduler::step(const Event& event, TimePoint now) {
+  Actions actions;
+  std::visit([&](const auto& e) { on(e, now, actions); }, event);
+  serve(now, actions);
+
+  // Answer the one who asked, and name what nobody needs any more.
+  if (const auto* request = std::get_if<WorkRequested>(&event)) {
+    const auto worker = workers_.find(request->worker);
+    if (worker != workers_.end() && worker->second.wanted > 0) actions.push_back(ReportNoWork{request->worker});
+  }
+  if (std::vector<Digest> garbage = blobs_.take_garbage(); !garbage.empty()) {
+    actions.push_back(RemoveBlobs{std::move(garbage)});
+  }
+  return actions;
+}
+
+const Scheduler::Job* Scheduler::find_job(const Digest& job) const {
+  const auto found = jobs_.find(job);
+  return found == jobs_.end() ? nullptr : &found->second;
+}
+
+std::vector<Digest> Scheduler::jobs() const {
+  std::map<std::uint64_t, Digest> by_sequence;
+  for (const auto& [digest, job] : jobs_) by_sequence[job.sequence] = digest;
+  std::vector<Digest> result;
+  for (const auto& [sequence, digest] : by_sequence) result.push_back(digest);
+  return result;
+}
+
+// ---- events: jobs --------------------------------------------------------------------------------------------
+
+void Scheduler::on(const JobAdded& event, TimePoint, Actions& actions) {
+  // A job that has ended makes room for its new life; one that runs goes on.
+  std::uint64_t sequence = next_sequence_;
+  if (Job* old = find(event.job)) {
+    if (old->status == JobStatus::running) return;
+    sequence = old->sequence;
+    old->tasks.release_all(blobs_);
+    jobs_.erase(event.job);
+  } else {
+    ++next_sequence_;
+  }
+
+  // Take up what the journal knows; all else is fresh.
+  Job& job = jobs_.emplace(event.job, Job{event.spec, event.status, sequence, JobTasks(event.spec)}).first->second;
+  replay(job, event);
+  if (event.status != JobStatus::running) {
+    job.tasks.cancel_open();
+    return;
+  }
+  running_.emplace(rank(job), event.job);
+  end_if_finished(event.job, job, actions);
+}
+
+void Scheduler::on(const JobCancelled& event, TimePoint, Actions& actions) {
+  Job* job = find(event.job);
+  if (!job || job->status != JobStatus::running) return;
+  end_job(event.job, *job, JobStatus::cancelled, "cancelled", actions);
+}
+
+// ---- events: reports -----------------------------------------------------------------------------------------
+
+void Scheduler::on(const TaskCompleted& event, TimePoint now, Actions& actions) {
+  if (!touch(event.worker, now)) return;
+  std::vector<BlobRef> outputs = event.outputs;
+
+  // A report that nobody waits for is ignored, but it must agree with what was reported before.
+  const Held held = hold(event.worker, event.lease, now);
+  if (!held.job) {
+    const Job* job = find_job(event.lease.job);
+    const auto task = job ? job->tasks.graph().find(event.lease.task) : std::nullopt;
+    if (!task || job->tasks.graph().check_outputs(event.lease.task, outputs)) return;
+    const std::vector<BlobRef>& expected = job->tasks.outputs(*task);
+    const auto [e, o] = std::mismatch(expected.begin(), expected.end(), outputs.begin());
+    if (e != expected.end()) actions.push_back(ReportConflict{event.lease, event.worker, *e, *o});
+    return;
+  }
+
+  // An incomplete report is a failed attempt.
+  if (const auto fault = held.job->tasks.graph().check_outputs(event.lease.task, outputs)) {
+    fail_attempt(held, {event.lease, event.worker, *fault, false}, actions);
+    return;
+  }
+  Completion completion{event.lease.task, std::move(outputs), event.stats};
+  held.job->tasks.complete(held.task, completion, blobs_);
+  drop_lease(event.lease.job, held.task);
+  actions.push_back(RecordCompletion{event.lease.job, std::move(completion)});
+  end_if_finished(event.lease.job, *held.job, actions);
+}
+
+void Scheduler::on(const AttemptFailed& event, TimePoint now, Actions& actions) {
+  if (!touch(event.worker, now)) return;
+  const Held held = hold(event.worker, event.lease, now);
+  if (held.job) fail_attempt(held, {event.lease, event.worker, event.message, event.permanent}, actions);
+}
+
+// ---- jobs ----------------------------------------------------------------------------------------------------
+
+Scheduler::Job* Scheduler::find(const Digest& job) {
+  const auto found = jobs_.find(job);
+  return found == jobs_.end() ? nullptr : &found->second;
+}
+
+Scheduler::Rank Scheduler::rank(const Job& job) const { return {-job.spec.priority, job.sequence}; }
+
+/// Brings a fresh job to where the journal left it, along the same path as the first time.
+void Scheduler::replay(Job& job, const JobAdded& event) {
+  for (const Completion& completion : event.completions) {
+    const auto task = job.tasks.graph().find(completion.task);
+    Completion sorted = completion;
+    if (!task || !job.tasks.ready().contains(*task)) continue;
+    if (job.tasks.graph().check_outputs(completion.task, sorted.outputs)) continue;
+    job.tasks.grant(*task);
+    job.tasks.complete(*task, sorted, blobs_);
+  }
+  for (const Failure& failure : event.failures) {
+    const auto task = job.tasks.graph().find(failure.lease.task);
+    if (!task) continue;
+    job.tasks.add_failure(*task, failure);
+    if (!job.tasks.ready().contains(*task)) continue;
+    if (failure.permanent || job.tasks.num_failures(*task) >= attempts_allowed(job.spec)) {
+      job.tasks.grant(*task);
+      job.tasks.give_up(*task);
+    }
+  }
+}
+
+void Scheduler::fail_attempt(const Held& held, const Failure& failure, Actions& actions) {
+  const Digest digest = failure.lease.job;
+  Job& job = *held.job;
+  drop_lease(digest, held.task);
+  job.tasks.add_failure(held.task, failure);
+  actions.push_back(RecordFailure{failure});
+
+  // Try again, unless that cannot help or was tried often enough.
+  if (failure.permanent || job.tasks.num_failures(held.task) >= attempts_allowed(job.spec)) {
+    give_up(digest, job, held.task, failure.message, actions);
+  } else {
+    job.tasks.give_back(held.task);
+    if (everyone_is_banned(job)) {
+      end_job(digest, job, JobStatus::failed,
+              fmt::format("every connected worker has failed {} times; the last one: {}",
+                          job.spec.max_failures_per_worker, failure.message),
+              actions);
+    }
+  }
+}
+
+/// Ends a leased task, whose lease is already dropped, as failed; and the job when that is one failure too many.
+void Scheduler::give_up(const Digest& digest, Job& job, TaskIndex task, const std::string& reason, Actions& actions) {
+  job.tasks.give_up(task);
+  if (job.tasks.progress().tasks_failed >= static_cast<std::uint64_t>(job.spec.max_failed_tasks)) {
+    end_job(digest, job, JobStatus::failed,
+            fmt::format("{} failed: {}", describe(job.tasks.graph().key(task)), reason), actions);
+  } else {
+    end_if_finished(digest, job, actions);
+  }
+}
+
+void Scheduler::end_if_finished(const Digest& digest, Job& job, Actions& actions) {
+  const JobProgress& progress = job.tasks.progress();
+  const auto max_failed = static_cast<std::uint64_t>(job.spec.max_failed_tasks);
+  if (progress.tasks_open > 0 && progress.tasks_failed < max_failed) return;
+  if (progress.tasks_failed == 0) {
+    end_job(digest, job, JobStatus::done, "all frames are written", actions);
+  } else {
+    end_job(digest, job, JobStatus::failed, fmt::format("{} tasks failed", progress.tasks_failed), actions);
+  }
+}
+
+void Scheduler::end_job(const Digest& digest, Job& job, JobStatus status, const std::string& reason,
+                        Actions& actions) {
+  // Take back what is leased, then close whatever is open.
+  const auto first = leases_.lower_bound({digest, 0});
+  std::vector<TaskIndex> leased;
+  for (auto lease = first; lease != leases_.end() && lease->first.first == digest; ++lease) {
+    actions.push_back(RevokeLease{lease->second.worker, lease->second.id});
+    leased.push_back(lease->first.second);
+  }
+  for (const TaskIndex task : leased) drop_lease(digest, task);
+  job.tasks.cancel_open();
+
+  job.status = status;
+  running_.erase(rank(job));
+  actions.push_back(RecordJobStatus{digest, status, reason});
+}
+
+}  // namespace baton

@@ -1,0 +1,100 @@
+// Time per pixel of every method over the time of its own occlusion rays alone, on a real scene. Both times are CPU
+// seconds of one run, so the ratios hold on a noisy machine. Usage: bench_methods [JOB.json] [FRAMES]
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cstdlib>
+#include <string>
+#include <vector>
+
+#include "common/job/job_json.h"
+#include "worker/pass/render_context.h"
+
+namespace baton {
+namespace {
+
+struct Case {
+  std::string name;
+  SamplingSpec sampling;
+  double goal = 0;  ///< highest ratio that the project accepts; 0: none
+};
+
+std::vector<Case> make_cases(const SamplingSpec& base) {
+  std::vector<Case> cases;
+  const auto add = [&](std::string name, Method method, double goal, auto change) {
+    SamplingSpec spec = base;
+    spec.method = method;
+    spec.num_particles = 16;
+    change(spec);
+    cases.push_back({std::move(name), spec, goal});
+  };
+  const auto keep = [](SamplingSpec&) {};
+  add("environment", Method::environment, 0, keep);
+  add("brdf", Method::brdf, 0, keep);
+  add("mis", Method::mis, 0, keep);
+  add("bidirectional M=128", Method::bidirectional, 2.2, [](SamplingSpec& s) { s.num_candidates = 128; });
+  add("bidirectional M=800", Method::bidirectional, 3.5, [](SamplingSpec& s) { s.num_candidates = 800; });
+  add("sequential P=1", Method::sequential, 0, [](SamplingSpec& s) { s.num_distributions = 1; });
+  add("sequential P=5", Method::sequential, 2.0, [](SamplingSpec& s) { s.num_distributions = 5; });
+  return cases;
+}
+
+Result<RenderStats> measure(const JobSpec& job) {
+  BATON_ASSIGN(const auto context, load_render_context(job, Digest{1, 1}));
+  RenderStats total;
+  const TileRunSink sink{[](int, const FilmTile&) { return Status(); }, [](const SampleState&) { return Status(); }};
+  for (std::int32_t tile = 0; tile < context->grid.count(); ++tile) {
+    BATON_ASSIGN(const RenderStats stats, run_tile(*context, tile_run(job, tile, 0), std::nullopt, sink, {}));
+    total.merge(stats);
+  }
+  return total;
+}
+
+void print_row(const Case& c, const RenderStats& s) {
+  const double pixels = static_cast<double>(s.pixels - s.pixels_background);
+  const double ratio = s.cpu_seconds / s.seconds_visibility;
+  const auto ns = [&](double seconds) { return seconds / pixels * 1e9; };
+  fmt::print("{:<22} {:>6.2f} {:>6} {:>9.0f} {:>8.0f} {:>8.0f} {:>8.0f} {:>8.0f} {:>8.0f} {:>8.2f} {:>7.3f}\n", c.name, ratio,
+             c.goal > 0 ? fmt::format("{:.1f}", c.goal) : "-", ns(s.cpu_seconds), ns(s.seconds_light),
+             ns(s.seconds_primary), ns(s.seconds_sample), ns(s.seconds_visibility), ns(s.seconds_shade),
+             static_cast<double>(s.rays_shadow) / s.seconds_visibility * 1e-6,
+             s.moves_proposed > 0 ? static_cast<double>(s.moves_accepted) / static_cast<double>(s.moves_proposed) : 0.0);
+}
+
+int run(const std::string& path, int frames) {
+  Result<JobSpec> job = load_job(path);
+  if (!job) {
+    fmt::print(stderr, "{}\n", job.error().message);
+    return 65;
+  }
+  job->frames.resize(std::min(job->frames.size(), static_cast<std::size_t>(frames)));
+  job->state.checkpoint_every = frames;
+  job->output.aovs.clear();
+#ifndef NDEBUG
+  fmt::print("note: assertions are on, the times are not the product's\n");
+#endif
+  for (const int sites : {1, 4, 16}) {
+    job->image.sites = sites;
+    fmt::print("\n{}: {} x {}, {} site(s), {} frames, {}; ns per pixel with a surface\n", path, job->image.width,
+               job->image.height, sites, job->frames.size(), instruction_set());
+    fmt::print("{:<22} {:>6} {:>6} {:>9} {:>8} {:>8} {:>8} {:>8} {:>8} {:>8} {:>7}\n", "method", "ratio", "goal", "total",
+               "light", "primary", "sample", "rays", "shade", "Mrays/s", "accept");
+    for (const Case& c : make_cases(job->sampling)) {
+      job->sampling = c.sampling;
+      const Result<RenderStats> stats = measure(*job);
+      if (!stats) {
+        fmt::print(stderr, "{}\n", stats.error().message);
+        return 65;
+      }
+      print_row(c, *stats);
+    }
+  }
+  return 0;
+}
+
+}  // namespace
+}  // namespace baton
+
+int main(int argc, char** argv) {
+  return baton::run(argc > 1 ? argv[1] : "jobs/examples/demo.json", argc > 2 ? std::atoi(argv[2]) : 6);
+}

@@ -1,0 +1,55 @@
+// send_raw ENDPOINT KIND: sends one message that no program of Baton would send and prints the
+// answer, or "no answer". KIND: version (of another protocol version), garbage, empty, short (a
+// body cut off), many (too many frames).
+
+#include <fmt/format.h>
+
+#include <string_view>
+
+#include "common/protocol/messages.h"
+#include "common/protocol/socket.h"
+
+namespace {
+
+baton::Bytes bytes_of(std::string_view text) {
+  const baton::ByteView view = baton::as_bytes_view(text);
+  return {view.begin(), view.end()};
+}
+
+std::vector<baton::Bytes> make_frames(std::string_view kind) {
+  std::vector<baton::Bytes> frames = baton::encode_message(baton::ShowJob{"0123456789"});
+  if (kind == "version") frames[0].back() = std::byte{0x7F};
+  if (kind == "garbage") frames = {bytes_of("GET / HTTP/1.0"), bytes_of("\xFF\xFE\xFD")};
+  if (kind == "empty") frames = {{}};
+  if (kind == "short") frames[2].resize(frames[2].size() / 2);
+  if (kind == "many") frames.resize(100, bytes_of("more"));
+  return frames;
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  if (argc != 3) return 64;
+  constexpr std::chrono::milliseconds kPatience{2000};
+  auto socket = baton::Socket::connect(argv[1], kPatience);
+  if (!socket) {
+    fmt::print(stderr, "{}\n", socket.error().message);
+    return 1;
+  }
+  socket->send(make_frames(argv[2]));
+
+  const auto answer = socket->receive(kPatience);
+  if (!answer) {
+    fmt::print("no answer\n");
+    return 0;
+  }
+  const auto message = baton::decode_message(*answer);
+  if (!message) {
+    fmt::print("unreadable: {}\n", message.error().message);
+  } else if (const auto* refused = std::get_if<baton::Refused>(&*message)) {
+    fmt::print("refused: {}\n", refused->message);
+  } else {
+    fmt::print("message of type {}\n", message->index());
+  }
+  return 0;
+}

@@ -1,0 +1,175 @@
+#include "worker/pass/tile_renderer.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <limits>
+
+#include "tests/support/small_scene.h"
+
+namespace baton {
+namespace {
+
+using test::box_job;
+using test::channel;
+using test::frame_numbers;
+using test::render_tile;
+using testing::HasSubstr;
+
+JobSpec sequence_job(int frames) {
+  JobSpec job = box_job();
+  job.frames = frame_numbers(frames);
+  job.environment.rotation_deg_per_frame = 0.5;
+  job.image.sites = 4;
+  return job;
+}
+
+/// All films of a job cut into tiles of `tile_size` and runs of `run_length`, pasted together; states go through their
+/// file form between runs.
+std::vector<FilmTile> render_tiled(JobSpec job, int tile_size, int run_length) {
+  job.image.tile_size = tile_size;
+  job.state.checkpoint_every = run_length;
+  const auto context = load_render_context(job, Digest{1, 2});
+  EXPECT_TRUE(context.ok());
+  std::vector<FilmTile> images(job.frames.size());
+  const TileGrid grid(job.image);
+  for (std::int32_t tile = 0; tile < grid.count(); ++tile) {
+    std::optional<SampleState> state;
+    for (std::int32_t run = 0; run < num_runs(job); ++run) {
+      std::optional<SampleState> next;
+      const TileRunSink sink{[&](int frame, const FilmTile& film) {
+                               FilmTile& image = images[static_cast<std::size_t>(frame)];
+                               image.rect = {0, 0, job.image.width, job.image.height};
+                               image.channels = film.channels;
+                               image.values.resize(image.channels.size() * image.num_pixels());
+                               for (std::size_t c = 0; c < film.channels.size(); ++c) {
+                                 for (int y = film.rect.y0; y < film.rect.y1; ++y) {
+                                   const auto width = static_cast<std::size_t>(film.rect.width());
+                                   const float* row = film.plane(c) + static_cast<std::size_t>(y - film.rect.y0) * width;
+                                   std::copy_n(row, width, image.plane(c) + y * job.image.width + film.rect.x0);
+                                 }
+                               }
+                               return Status();
+                             },
+                             [&](const SampleState& s) {
+                               next = *decode_state(encode_state(s), "test");
+                               return Status();
+                             }};
+      EXPECT_TRUE(run_tile(**context, tile_run(job, tile, run), state, sink, {}).ok());
+      state = next;
+    }
+  }
+  return images;
+}
+
+TEST(RunTile, SameBytesForAnyTilingAndAnyRunLength) {
+  const JobSpec job = sequence_job(5);
+  const std::vector<FilmTile> whole = render_tiled(job, 4096, 5);
+  EXPECT_EQ(render_tiled(job, 8, 5), whole);
+  EXPECT_EQ(render_tiled(job, 5, 2), whole);
+  EXPECT_EQ(render_tiled(job, 4096, 1), whole);
+}
+
+TEST(RunTile, CarriesEverySurfacePixelOn) {
+  const test::TileResult carried = render_tile(sequence_job(3));
+  const std::uint64_t surface = (carried.stats.pixels - carried.stats.pixels_background) / 3;
+  EXPECT_GT(surface, 50u);
+  EXPECT_EQ(carried.stats.pixels_fresh, surface);
+  EXPECT_EQ(carried.stats.pixels_carried, 2 * surface);
+
+  JobSpec fresh = sequence_job(3);
+  fresh.state.carry = false;
+  const test::TileResult restarted = render_tile(fresh);
+  EXPECT_EQ(restarted.stats.pixels_fresh, 3 * surface);
+  EXPECT_EQ(restarted.stats.pixels_carried, 0u);
+  for (const float red : channel(restarted.films[1], "source.R")) EXPECT_TRUE(red == 0 || red == 1);
+}
+
+TEST(RunTile, BlackMapGivesBlackAndLightComesBack) {
+  JobSpec job = sequence_job(3);
+  const std::string black = test::write_map("black.exr", test::constant_map(64, 32, {0, 0, 0}));
+  job.environment.keys = {{1, black}, {3, job.environment.keys[0].map}};
+  job.environment.interpolate = false;
+  job.output.background = Background::transparent;
+  const test::TileResult result = render_tile(job);
+  for (const float v : channel(result.films[1], "G")) EXPECT_EQ(v, 0);
+  float brightest = 0;
+  for (const float v : channel(result.films[2], "G")) brightest = std::max(brightest, v);
+  EXPECT_GT(brightest, 0.1f);
+  EXPECT_GT(result.stats.pixels_restarted, 0u);
+}
+
+void expect_all_finite(const test::TileResult& result) {
+  for (const FilmTile& film : result.films) {
+    for (const float v : film.values) ASSERT_TRUE(std::isfinite(v));
+  }
+  for (const float v : result.state.weight) ASSERT_TRUE(std::isfinite(v));
+}
+
+TEST(RunTile, DegenerateInputGivesNoNan) {
+  RgbImage broken = test::sky_map();
+  broken.rgb[0] = std::numeric_limits<float>::quiet_NaN();
+  broken.rgb[100] = std::numeric_limits<float>::infinity();
+  broken.rgb[1000] = -5;
+  JobSpec job = sequence_job(3);
+  job.environment.keys[0].map = test::write_map("broken.exr", broken);
+  expect_all_finite(render_tile(job));
+
+  // A sun that outshines all by 1e8 in one texel; and a camera inside a box; and one that grazes the ground.
+  RgbImage sun = test::constant_map(64, 32, {1e-3f, 1e-3f, 1e-3f});
+  sun.rgb[3 * (8 * 64 + 20)] = 1e5f;
+  job.environment.keys[0].map = test::write_map("sun.exr", sun);
+  expect_all_finite(render_tile(job));
+  job.camera.position = {-0.8f, 0.5f, 0};
+  expect_all_finite(render_tile(job));
+  job.camera.position = {0, 1e-4f, 4};
+  job.camera.look_at = {0, 0, 0};
+  expect_all_finite(render_tile(job));
+}
+
+TEST(RunTile, RefusesTheStateOfAnotherJobTileOrFrame) {
+  const JobSpec job = sequence_job(4);
+  const auto context = load_render_context(job, Digest{7, 7});
+  ASSERT_TRUE(context.ok());
+  SampleState state;
+  state.resize({0, 0, 12, 9}, 16);
+  state.job_digest = {1, 2};
+  const TileRunSink sink{[](int, const FilmTile&) { return Status(); }, [](const SampleState&) { return Status(); }};
+  const TileRun run{.tile = 0, .run = 1, .first_frame = 2, .last_frame = 3};
+  EXPECT_THAT(run_tile(**context, run, state, sink, {}).error().message, HasSubstr("of job"));
+  state.job_digest = {7, 7};
+  state.frame_index = 0;
+  EXPECT_THAT(run_tile(**context, run, state, sink, {}).error().message, HasSubstr("frame index 0"));
+  EXPECT_FALSE(run_tile(**context, run, std::nullopt, sink, {}).ok());
+}
+
+TEST(RunTile, StopsWhenAsked) {
+  const auto context = load_render_context(sequence_job(4), Digest{1, 2});
+  std::stop_source stop;
+  int frames = 0;
+  const TileRunSink sink{[&](int, const FilmTile&) {
+                           ++frames;
+                           stop.request_stop();
+                           return Status();
+                         },
+                         [](const SampleState&) { return Status(); }};
+  const auto stats = run_tile(**context, {0, 0, 0, 3}, std::nullopt, sink, stop.get_token());
+  ASSERT_FALSE(stats.ok());
+  EXPECT_EQ(stats.error().kind, ErrorKind::cancelled);
+  EXPECT_EQ(frames, 1);
+}
+
+TEST(LoadRenderContext, NamesAMissingMap) {
+  JobSpec job = box_job();
+  job.environment.keys[0].map = "/nowhere/sky.exr";
+  const auto context = load_render_context(job, Digest{1, 2});
+  ASSERT_TRUE(context.ok());
+  const TileRunSink sink{[](int, const FilmTile&) { return Status(); }, [](const SampleState&) { return Status(); }};
+  const auto stats = run_tile(**context, {0, 0, 0, 0}, std::nullopt, sink, {});
+  ASSERT_FALSE(stats.ok());
+  EXPECT_THAT(stats.error().message, HasSubstr("/nowhere/sky.exr"));
+}
+
+}  // namespace
+}  // namespace baton

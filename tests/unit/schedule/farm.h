@@ -1,0 +1,92 @@
+#pragma once
+
+#include <algorithm>
+#include <chrono>
+#include <map>
+#include <set>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "coordinator/schedule/scheduler.h"
+
+namespace baton::testing_farm {
+
+using namespace std::chrono_literals;
+
+inline constexpr auto kSilence = std::chrono::milliseconds(4000);
+
+/// A job of `tiles` tiles in one row and `frames` frames, `per_run` of them in a lease.
+inline JobSpec small_job(int tiles, int frames, int per_run, bool carry = true) {
+  JobSpec job;
+  job.image = {.width = 8 * tiles, .height = 8, .sites = 1, .tile_size = 8};
+  job.frames.clear();
+  for (int i = 0; i < frames; ++i) job.frames.push_back(i + 1);
+  job.state.carry = carry;
+  job.state.checkpoint_every = per_run;
+  return job;
+}
+
+/// The one right output of a task; `variant` makes another, wrong one.
+inline Digest blob_digest(const Digest& job, const BlobRef& blob, int variant = 0) {
+  return digest_of(job.hex() + std::to_string(static_cast<int>(blob.kind)) + "/" + std::to_string(blob.frame) + "/" +
+                   std::to_string(blob.tile) + "/" + std::to_string(variant));
+}
+
+inline std::vector<BlobRef> outputs_of(const JobSpec& spec, const Digest& job, const TaskKey& task, int variant = 0) {
+  std::vector<BlobRef> outputs;
+  if (task.kind == TaskKind::assemble) {
+    outputs.push_back({BlobKind::image, task.step, 0, {}, 100});
+  } else {
+    const TileRun run = tile_run(spec, task.tile, task.step);
+    for (int f = run.first_frame; f <= run.last_frame; ++f) outputs.push_back({BlobKind::film, f, task.tile, {}, 10});
+    if (carries_state(spec)) outputs.push_back({BlobKind::state, run.last_frame, task.tile, {}, 20});
+  }
+  for (BlobRef& blob : outputs) blob.digest = blob_digest(job, blob, variant);
+  return outputs;
+}
+
+template <class T>
+std::vector<T> all_of(const std::vector<Action>& actions) {
+  std::vector<T> result;
+  for (const Action& action : actions) {
+    if (const T* match = std::get_if<T>(&action)) result.push_back(*match);
+  }
+  return result;
+}
+
+/// A scheduler with a clock and one job, driven by the words of a test.
+class Farm {
+ public:
+  explicit Farm(JobSpec spec, std::uint32_t epoch = 1)
+      : spec_(std::move(spec)), scheduler(epoch, kSilence), job(digest_of("job")) {}
+
+  std::vector<Action> submit() { return step(JobAdded{job, spec_, JobStatus::running, {}, {}}); }
+  std::vector<Action> step(const Event& event) { return scheduler.step(event, now); }
+  std::vector<GrantLease> ask(const std::string& worker, int count) {
+    return all_of<GrantLease>(step(WorkRequested{worker, count}));
+  }
+  GrantLease ask_one(const std::string& worker) {
+    const auto grants = ask(worker, 1);
+    return grants.empty() ? GrantLease{} : grants.front();
+  }
+  std::vector<Action> finish(const GrantLease& grant, int variant = 0) {
+    return step(TaskCompleted{grant.worker, grant.lease, outputs_of(spec_, job, grant.lease.task, variant), {}});
+  }
+  std::vector<Action> fail(const GrantLease& grant, bool permanent = false) {
+    return step(AttemptFailed{grant.worker, grant.lease, "boom", permanent});
+  }
+  const JobProgress& progress() const { return scheduler.find_job(job)->tasks.progress(); }
+  JobStatus status() const { return scheduler.find_job(job)->status; }
+  const JobSpec& spec() const { return spec_; }
+
+ private:
+  JobSpec spec_;
+
+ public:
+  Scheduler scheduler;
+  Digest job;
+  TimePoint now{};
+};
+
+}  // namespace baton::testing_farm

@@ -1,0 +1,86 @@
+#include <gtest/gtest.h>
+
+#include "coordinator/schedule/blob_references.h"
+#include "coordinator/schedule/job_graph.h"
+#include "tests/unit/schedule/farm.h"
+
+namespace baton {
+namespace {
+
+using testing_farm::outputs_of;
+using testing_farm::small_job;
+
+TEST(JobGraph, IndexAndKeyAreInverse) {
+  const JobGraph graph(small_job(3, 5, 2));
+  ASSERT_EQ(graph.num_tasks(), 5 + 3 * 3);
+  for (TaskIndex i = 0; i < graph.num_tasks(); ++i) EXPECT_EQ(graph.find(graph.key(i)), i);
+}
+
+TEST(JobGraph, UnknownKeysAreNotFound) {
+  const JobGraph graph(small_job(3, 5, 2));
+  EXPECT_FALSE(graph.find({TaskKind::render, 3, 0}));
+  EXPECT_FALSE(graph.find({TaskKind::render, 0, 3}));
+  EXPECT_FALSE(graph.find({TaskKind::render, -1, 0}));
+  EXPECT_FALSE(graph.find({TaskKind::assemble, 5, 0}));
+  EXPECT_FALSE(graph.find({TaskKind::assemble, 0, 1}));
+}
+
+TEST(JobGraph, InputsAndDependentsMirrorEachOther) {
+  for (const bool carry : {true, false}) {
+    const JobGraph graph(small_job(3, 5, 2, carry));
+    for (TaskIndex task = 0; task < graph.num_tasks(); ++task) {
+      const std::vector<TaskIndex> inputs = graph.inputs(graph.key(task));
+      EXPECT_EQ(static_cast<std::int32_t>(inputs.size()), graph.num_inputs(graph.key(task)));
+      for (const TaskIndex input : inputs) {
+        const std::vector<TaskIndex> dependents = graph.dependents(graph.key(input));
+        EXPECT_EQ(std::count(dependents.begin(), dependents.end(), task), 1);
+      }
+    }
+  }
+}
+
+TEST(JobGraph, OutputsMustBeExactlyWhatTheTaskMakes) {
+  const JobSpec spec = small_job(3, 5, 2);
+  const JobGraph graph(spec);
+  const TaskKey task{TaskKind::render, 1, 2};
+  const std::vector<BlobRef> right = outputs_of(spec, {}, task);
+  ASSERT_EQ(right.size(), 3u);
+
+  std::vector<BlobRef> outputs = right;
+  EXPECT_FALSE(graph.check_outputs(task, outputs));
+  EXPECT_EQ(outputs.front().kind, BlobKind::state);
+  EXPECT_EQ(outputs[graph.film_position(3)].frame, 3);
+
+  outputs = {right[0], right[2]};
+  EXPECT_EQ(graph.check_outputs(task, outputs), "the report lacks the film of frame index 3, tile 2");
+  outputs = {right[0], right[1]};
+  EXPECT_EQ(graph.check_outputs(task, outputs), "the report lacks the state of frame index 3, tile 2");
+  outputs = {right[0], right[1], right[1], right[2]};
+  EXPECT_TRUE(graph.check_outputs(task, outputs));
+  outputs = right;
+  outputs[0].tile = 1;
+  EXPECT_TRUE(graph.check_outputs(task, outputs));
+}
+
+TEST(BlobReferences, ASharedBlobIsGarbageWhenItsLastUserLetsGo) {
+  BlobReferences blobs;
+  const Digest shared{1, 2};
+  blobs.add(shared);
+  blobs.add(shared);
+  blobs.release(shared);
+  EXPECT_TRUE(blobs.take_garbage().empty());
+  blobs.release(shared);
+  EXPECT_EQ(blobs.take_garbage(), std::vector<Digest>{shared});
+  EXPECT_TRUE(blobs.take_garbage().empty());
+}
+
+TEST(BlobReferences, ABlobThatIsNeededAgainIsNoGarbage) {
+  BlobReferences blobs;
+  blobs.add({1, 2});
+  blobs.release({1, 2});
+  blobs.add({1, 2});
+  EXPECT_TRUE(blobs.take_garbage().empty());
+}
+
+}  // namespace
+}  // namespace baton

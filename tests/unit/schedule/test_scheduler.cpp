@@ -1,0 +1,400 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/unit/schedule/farm.h"
+
+namespace baton {
+namespace {
+
+using namespace testing_farm;
+using testing::ElementsAre;
+using testing::IsEmpty;
+using testing::SizeIs;
+
+TaskKey render(int run, int tile) { return {TaskKind::render, run, tile}; }
+TaskKey assemble(int frame) { return {TaskKind::assemble, frame, 0}; }
+
+std::vector<TaskKey> tasks_of(const std::vector<GrantLease>& grants) {
+  std::vector<TaskKey> tasks;
+  for (const GrantLease& grant : grants) tasks.push_back(grant.lease.task);
+  return tasks;
+}
+
+/// One job of 2 tiles, 4 frames, 2 frames a run; workers "a" and "b" are there.
+struct SchedulerTest : testing::Test {
+  Farm farm{small_job(2, 4, 2)};
+
+  void SetUp() override {
+    farm.submit();
+    farm.step(WorkerJoined{"a", {}});
+    farm.step(WorkerJoined{"b", {}});
+  }
+};
+
+// ---- dependencies --------------------------------------------------------------------------------------------
+
+TEST_F(SchedulerTest, FirstRunsAreReadyAndNothingElse) {
+  EXPECT_THAT(tasks_of(farm.ask("a", 10)), ElementsAre(render(0, 0), render(0, 1)));
+}
+
+TEST_F(SchedulerTest, NextRunGetsTheStateOfThePreviousOne) {
+  const GrantLease first = farm.ask_one("a");
+  farm.finish(first);
+  const auto grants = farm.ask("a", 10);
+  ASSERT_THAT(tasks_of(grants), ElementsAre(render(0, 1), render(1, 0)));
+  ASSERT_THAT(grants[1].inputs, SizeIs(1));
+  EXPECT_EQ(grants[1].inputs[0].kind, BlobKind::state);
+  EXPECT_EQ(grants[1].inputs[0].frame, 1);
+  EXPECT_EQ(grants[1].inputs[0].digest, blob_digest(farm.job, grants[1].inputs[0]));
+}
+
+TEST_F(SchedulerTest, FramesComeFirstAndGetOneFilmPerTile) {
+  const auto grants = farm.ask("a", 2);
+  farm.finish(grants[1]);
+  farm.finish(grants[0]);
+  const auto next = farm.ask("a", 10);
+  ASSERT_THAT(tasks_of(next), ElementsAre(assemble(0), assemble(1), render(1, 0), render(1, 1)));
+  ASSERT_THAT(next[1].inputs, SizeIs(2));
+  for (int tile = 0; tile < 2; ++tile) {
+    EXPECT_EQ(next[1].inputs[tile].kind, BlobKind::film);
+    EXPECT_EQ(next[1].inputs[tile].frame, 1);
+    EXPECT_EQ(next[1].inputs[tile].tile, tile);
+  }
+}
+
+TEST(SchedulerWithoutState, AllRunsAreReadyAtOnce) {
+  Farm farm(small_job(2, 4, 2, false));
+  farm.submit();
+  farm.step(WorkerJoined{"a", {}});
+  EXPECT_THAT(tasks_of(farm.ask("a", 10)), ElementsAre(render(0, 0), render(0, 1), render(1, 0), render(1, 1)));
+}
+
+TEST_F(SchedulerTest, AHungryWorkerIsServedAsSoonAsThereIsWork) {
+  const GrantLease first = farm.ask_one("a");
+  farm.ask("a", 1);
+  EXPECT_THAT(all_of<ReportNoWork>(farm.step(WorkRequested{"b", 2})), SizeIs(1));
+  const auto actions = farm.finish(first);
+  const auto grants = all_of<GrantLease>(actions);
+  ASSERT_THAT(tasks_of(grants), ElementsAre(render(1, 0)));
+  EXPECT_EQ(grants[0].worker, "b");
+  EXPECT_TRUE(std::holds_alternative<RecordCompletion>(actions.front())) << "recorded before it is used";
+}
+
+TEST_F(SchedulerTest, WorkIsDealtOneByOneToAllWhoWait) {
+  Farm fresh(small_job(4, 1, 1));
+  fresh.step(WorkerJoined{"a", {}});
+  fresh.step(WorkerJoined{"b", {}});
+  fresh.ask("a", 4);
+  fresh.ask("b", 4);
+  fresh.submit();
+  EXPECT_EQ(fresh.scheduler.num_leases("a"), 2u);
+  EXPECT_EQ(fresh.scheduler.num_leases("b"), 2u);
+}
+
+TEST_F(SchedulerTest, AJobEndsWhenItsLastFrameIsWritten) {
+  std::vector<RecordJobStatus> ends;
+  for (auto grants = farm.ask("a", 10); !grants.empty(); grants = farm.ask("a", 10)) {
+    EXPECT_THAT(ends, IsEmpty());
+    for (const GrantLease& grant : grants) ends = all_of<RecordJobStatus>(farm.finish(grant));
+  }
+  ASSERT_THAT(ends, SizeIs(1));
+  EXPECT_EQ(ends[0].status, JobStatus::done);
+  EXPECT_EQ(farm.progress().frames_done, 4u);
+  EXPECT_EQ(farm.progress().state_pixels, 4u * 64);
+}
+
+TEST_F(SchedulerTest, HigherPriorityThenEarlierSubmissionComesFirst) {
+  JobSpec urgent = small_job(1, 1, 1);
+  urgent.priority = 90;
+  farm.step(JobAdded{digest_of("equal"), small_job(1, 1, 1), JobStatus::running, {}, {}});
+  farm.step(JobAdded{digest_of("urgent"), urgent, JobStatus::running, {}, {}});
+  const auto grants = farm.ask("a", 10);
+  ASSERT_THAT(grants, SizeIs(4));
+  EXPECT_EQ(grants[0].lease.job, digest_of("urgent"));
+  EXPECT_EQ(grants[1].lease.job, farm.job);
+  EXPECT_EQ(grants[3].lease.job, digest_of("equal"));
+}
+
+// ---- fences --------------------------------------------------------------------------------------------------
+
+TEST_F(SchedulerTest, ADoubleReportChangesNothing) {
+  const GrantLease grant = farm.ask_one("a");
+  farm.finish(grant);
+  const JobProgress before = farm.progress();
+  EXPECT_THAT(farm.finish(grant), IsEmpty());
+  EXPECT_THAT(farm.fail(grant), IsEmpty());
+  EXPECT_EQ(farm.progress().tasks_done, before.tasks_done);
+}
+
+TEST_F(SchedulerTest, ALateReportIsFencedOnceSomebodyElseHasTheTask) {
+  const GrantLease old = farm.ask_one("a");
+  farm.step(WorkerLeft{"a"});
+  farm.step(WorkerJoined{"a", {}});
+  const GrantLease current = farm.ask_one("b");
+  ASSERT_EQ(current.lease.task, old.lease.task);
+  ASSERT_NE(current.lease, old.lease);
+  EXPECT_THAT(farm.finish(old), IsEmpty());
+  EXPECT_THAT(farm.fail(old), IsEmpty());
+  EXPECT_THAT(all_of<RecordCompletion>(farm.finish(current)), SizeIs(1));
+}
+
+TEST_F(SchedulerTest, ALateReportIsWelcomeWhileTheTaskIsOpen) {
+  const GrantLease old = farm.ask_one("a");
+  farm.step(WorkerLeft{"a"});
+  farm.step(WorkerJoined{"a", {}});
+  EXPECT_THAT(all_of<RecordCompletion>(farm.finish(old)), SizeIs(1));
+}
+
+TEST_F(SchedulerTest, TwoResultsForOneTaskAreABug) {
+  const GrantLease grant = farm.ask_one("a");
+  farm.finish(grant);
+  const auto conflicts = all_of<ReportConflict>(farm.finish(grant, /*variant=*/1));
+  ASSERT_THAT(conflicts, SizeIs(1));
+  EXPECT_NE(conflicts[0].expected.digest, conflicts[0].reported.digest);
+}
+
+TEST_F(SchedulerTest, AReportThatLacksAnOutputIsAFailedAttempt) {
+  const GrantLease grant = farm.ask_one("a");
+  std::vector<BlobRef> outputs = outputs_of(farm.spec(), farm.job, grant.lease.task);
+  outputs.pop_back();
+  const auto failures = all_of<RecordFailure>(farm.step(TaskCompleted{"a", grant.lease, outputs, {}}));
+  ASSERT_THAT(failures, SizeIs(1));
+  EXPECT_THAT(failures[0].failure.message, testing::HasSubstr("lacks the state"));
+}
+
+TEST_F(SchedulerTest, NonsenseIsIgnored) {
+  const LeaseId nowhere{digest_of("other"), render(0, 0), 1, 1};
+  const LeaseId no_such_task{farm.job, render(9, 9), 1, 1};
+  EXPECT_THAT(farm.step(TaskCompleted{"a", nowhere, {}, {}}), IsEmpty());
+  EXPECT_THAT(farm.step(TaskCompleted{"a", no_such_task, {}, {}}), IsEmpty());
+  EXPECT_THAT(farm.step(TaskCompleted{"stranger", {farm.job, render(0, 0), 1, 1}, {}, {}}), IsEmpty());
+  EXPECT_THAT(farm.step(WorkRequested{"stranger", 1}), IsEmpty());
+  EXPECT_THAT(farm.step(WorkRequested{"a", -5}), IsEmpty());
+  EXPECT_THAT(farm.step(JobCancelled{digest_of("other")}), IsEmpty());
+}
+
+// ---- lost workers --------------------------------------------------------------------------------------------
+
+TEST_F(SchedulerTest, ASilentWorkerLosesItsLeases) {
+  const auto held = farm.ask("a", 2);
+  farm.now += kSilence;
+  farm.step(WorkerAlive{"b", {}});
+  EXPECT_THAT(farm.step(ClockTicked{}), IsEmpty());
+  farm.now += 1ms;
+  EXPECT_THAT(all_of<ForgetWorker>(farm.step(ClockTicked{})), SizeIs(1));
+  EXPECT_EQ(farm.progress().attempts_lost, 2u);
+  EXPECT_THAT(tasks_of(farm.ask("b", 2)), ElementsAre(render(0, 0), render(0, 1)));
+}
+
+TEST_F(SchedulerTest, AnyMessageIsASignOfLife) {
+  farm.ask("a", 1);
+  for (int i = 0; i < 5; ++i) {
+    farm.now += kSilence;
+    farm.ask("a", 1);
+  }
+  EXPECT_EQ(all_of<ForgetWorker>(farm.step(ClockTicked{}))[0].worker, "b");
+  EXPECT_EQ(farm.progress().tasks_leased, 2u);
+}
+
+TEST_F(SchedulerTest, AGrantThatNeverArrivedIsFoundByTheHeartbeat) {
+  const GrantLease lost = farm.ask_one("a");
+  farm.step(WorkerAlive{"a", {}});
+  EXPECT_EQ(farm.progress().tasks_leased, 1u) << "it may still be on its way";
+  farm.now += kSilence;
+  farm.step(WorkerAlive{"a", {}});
+  EXPECT_EQ(farm.progress().tasks_leased, 0u);
+  EXPECT_EQ(farm.ask_one("b").lease.task, lost.lease.task);
+}
+
+TEST_F(SchedulerTest, AWorkerThatIntroducesItselfAgainKeepsWhatItNames) {
+  const auto held = farm.ask("a", 2);
+  EXPECT_THAT(farm.step(WorkerJoined{"a", {held[0].lease}}), IsEmpty());
+  EXPECT_EQ(farm.progress().tasks_leased, 1u);
+  EXPECT_THAT(all_of<RecordCompletion>(farm.finish(held[0])), SizeIs(1));
+}
+
+TEST_F(SchedulerTest, ATaskThatKeepsLosingItsWorkersFails) {
+  for (int i = 0; farm.status() == JobStatus::running && i < 100; ++i) {
+    farm.step(WorkerJoined{"a", {}});
+    farm.ask("a", 1);
+  }
+  EXPECT_EQ(farm.status(), JobStatus::failed);
+}
+
+// ---- failures ------------------------------------------------------------------------------------------------
+
+TEST_F(SchedulerTest, ARetryGoesToAnotherWorker) {
+  const GrantLease grant = farm.ask_one("a");
+  farm.fail(grant);
+  EXPECT_NE(farm.ask_one("a").lease.task, grant.lease.task);
+  EXPECT_EQ(farm.ask_one("b").lease.task, grant.lease.task);
+}
+
+TEST_F(SchedulerTest, TheSameWorkerMayRetryWhenItIsAlone) {
+  farm.step(WorkerLeft{"b"});
+  const GrantLease grant = farm.ask_one("a");
+  farm.fail(grant);
+  EXPECT_EQ(farm.ask_one("a").lease.task, grant.lease.task);
+}
+
+TEST_F(SchedulerTest, ATaskFailsAfterAllItsAttempts) {
+  farm.step(WorkerLeft{"b"});
+  for (int attempt = 0; attempt <= farm.spec().max_retries_per_task; ++attempt) {
+    ASSERT_EQ(farm.status(), JobStatus::running);
+    const GrantLease grant = farm.ask_one("a");
+    ASSERT_EQ(grant.lease.task, render(0, 0));
+    farm.fail(grant);
+  }
+  EXPECT_EQ(farm.status(), JobStatus::failed);
+  EXPECT_EQ(farm.progress().tasks_open, 0u);
+}
+
+TEST_F(SchedulerTest, APermanentFailureEndsTheJobAtOnce) {
+  const auto grants = farm.ask("a", 2);
+  const auto actions = farm.fail(grants[0], /*permanent=*/true);
+  EXPECT_EQ(all_of<RecordJobStatus>(actions)[0].status, JobStatus::failed);
+  EXPECT_EQ(all_of<RevokeLease>(actions)[0].lease, grants[1].lease);
+  EXPECT_THAT(farm.ask("b", 1), IsEmpty());
+}
+
+TEST(SchedulerFailures, AJobGoesOnBelowItsLimitOfFailedTasks) {
+  JobSpec spec = small_job(2, 4, 2);
+  spec.max_failed_tasks = 2;
+  Farm farm(spec);
+  farm.submit();
+  farm.step(WorkerJoined{"a", {}});
+  farm.fail(farm.ask_one("a"), /*permanent=*/true);
+  EXPECT_EQ(farm.status(), JobStatus::running);
+
+  // Tile 1 is still rendered to the end; no frame can be written.
+  for (auto grants = farm.ask("a", 10); !grants.empty(); grants = farm.ask("a", 10)) {
+    for (const GrantLease& grant : grants) {
+      EXPECT_EQ(grant.lease.task.kind, TaskKind::render);
+      EXPECT_EQ(grant.lease.task.tile, 1);
+      farm.finish(grant);
+    }
+  }
+  EXPECT_EQ(farm.status(), JobStatus::failed);
+  EXPECT_EQ(farm.progress().tasks_done, 2u);
+}
+
+TEST(SchedulerFailures, AWorkerThatFailsTooOftenGetsNoMoreOfTheJob) {
+  JobSpec spec = small_job(4, 1, 1);
+  spec.max_failures_per_worker = 2;
+  Farm farm(spec);
+  farm.submit();
+  farm.step(WorkerJoined{"bad", {}});
+  farm.step(WorkerJoined{"good", {}});
+  for (const GrantLease& grant : farm.ask("bad", 2)) farm.fail(grant);
+  EXPECT_THAT(farm.ask("bad", 1), IsEmpty());
+  EXPECT_THAT(farm.ask("good", 4), SizeIs(4));
+}
+
+TEST(SchedulerFailures, AJobThatNobodyMayWorkOnFails) {
+  JobSpec spec = small_job(4, 1, 1);
+  spec.max_failures_per_worker = 2;
+  Farm farm(spec);
+  farm.submit();
+  farm.step(WorkerJoined{"bad", {}});
+  for (const GrantLease& grant : farm.ask("bad", 2)) farm.fail(grant);
+  EXPECT_EQ(farm.status(), JobStatus::failed);
+}
+
+// ---- cancelling, blobs, restarts -----------------------------------------------------------------------------
+
+TEST_F(SchedulerTest, ACancelledJobTakesItsLeasesBack) {
+  const auto grants = farm.ask("a", 2);
+  const auto actions = farm.step(JobCancelled{farm.job});
+  EXPECT_THAT(all_of<RevokeLease>(actions), SizeIs(2));
+  EXPECT_EQ(farm.status(), JobStatus::cancelled);
+  EXPECT_THAT(farm.finish(grants[0]), IsEmpty());
+  EXPECT_THAT(farm.step(JobCancelled{farm.job}), IsEmpty());
+}
+
+TEST_F(SchedulerTest, BlobsGoWhenTheirLastUserIsDone) {
+  // Both runs of tile 0: the state of the first is needed no more, the last one is kept.
+  farm.finish(farm.ask_one("a"));
+  const auto next = farm.ask("a", 2);
+  const auto removed = all_of<RemoveBlobs>(farm.finish(next[1]));
+  ASSERT_THAT(removed, SizeIs(1));
+  EXPECT_THAT(removed[0].blobs, ElementsAre(next[1].inputs[0].digest));
+
+  // A frame's films go when it is written.
+  farm.finish(next[0]);
+  const GrantLease frame = farm.ask_one("a");
+  ASSERT_EQ(frame.lease.task, assemble(0));
+  EXPECT_THAT(all_of<RemoveBlobs>(farm.finish(frame))[0].blobs, SizeIs(2));
+  EXPECT_FALSE(farm.scheduler.is_referenced(frame.inputs[0].digest));
+}
+
+TEST(SchedulerBlobs, AllStatesStayWhenTheJobWantsThem) {
+  JobSpec spec = small_job(1, 2, 1);
+  spec.state.keep = StateKeep::all;
+  Farm farm(spec);
+  farm.submit();
+  farm.step(WorkerJoined{"a", {}});
+  for (auto grants = farm.ask("a", 10); !grants.empty(); grants = farm.ask("a", 10)) {
+    for (const GrantLease& grant : grants) farm.finish(grant);
+  }
+  for (int frame = 0; frame < 2; ++frame) {
+    EXPECT_TRUE(farm.scheduler.is_referenced(blob_digest(farm.job, {BlobKind::state, frame, 0, {}, 0})));
+    EXPECT_FALSE(farm.scheduler.is_referenced(blob_digest(farm.job, {BlobKind::film, frame, 0, {}, 0})));
+  }
+}
+
+TEST_F(SchedulerTest, ARestartedCoordinatorTakesUpWhereTheJournalEnds) {
+  const auto held = farm.ask("a", 2);
+  const auto recorded = all_of<RecordCompletion>(farm.finish(held[0]));
+
+  Farm again(farm.spec(), /*epoch=*/2);
+  again.step(JobAdded{farm.job, farm.spec(), JobStatus::running, {recorded[0].completion}, {}});
+  EXPECT_EQ(again.progress().tasks_done, 1u);
+
+  // The lease of the first life is adopted, its report counts, and others get the rest.
+  EXPECT_THAT(again.step(WorkerJoined{"a", {held[0].lease, held[1].lease}}), SizeIs(1)) << "done is revoked";
+  again.step(WorkerJoined{"b", {}});
+  EXPECT_THAT(tasks_of(again.ask("b", 10)), ElementsAre(render(1, 0)));
+  EXPECT_THAT(all_of<RecordCompletion>(again.finish(held[1])), SizeIs(1));
+}
+
+TEST_F(SchedulerTest, AnOldLeaseIsRevokedWhenTheTaskHasAnotherHolder) {
+  const GrantLease old = farm.ask_one("a");
+  Farm again(farm.spec(), /*epoch=*/2);
+  again.submit();
+  again.step(WorkerJoined{"b", {}});
+  const GrantLease current = again.ask_one("b");
+  ASSERT_EQ(current.lease.task, old.lease.task);
+  const auto revoked = all_of<RevokeLease>(again.step(WorkerJoined{"a", {old.lease}}));
+  ASSERT_THAT(revoked, SizeIs(1));
+  EXPECT_EQ(revoked[0].lease, old.lease);
+}
+
+TEST_F(SchedulerTest, AFailureThatWasRecordedIsNotCountedAgainAfterARestart) {
+  const GrantLease grant = farm.ask_one("a");
+  const auto recorded = all_of<RecordFailure>(farm.fail(grant));
+  Farm again(farm.spec(), /*epoch=*/2);
+  again.step(JobAdded{farm.job, farm.spec(), JobStatus::running, {}, {recorded[0].failure}});
+  again.step(WorkerJoined{"a", {grant.lease}});
+  EXPECT_THAT(again.fail(grant), IsEmpty());
+  EXPECT_EQ(again.progress().attempts_lost, 1u);
+}
+
+TEST_F(SchedulerTest, ACancelledJobThatIsSubmittedAgainKeepsWhatIsDone) {
+  const auto recorded = all_of<RecordCompletion>(farm.finish(farm.ask_one("a")));
+  farm.step(JobCancelled{farm.job});
+  const auto actions =
+      farm.step(JobAdded{farm.job, farm.spec(), JobStatus::running, {recorded[0].completion}, {}});
+  EXPECT_THAT(all_of<RemoveBlobs>(actions), IsEmpty());
+  EXPECT_EQ(farm.progress().tasks_done, 1u);
+  EXPECT_THAT(tasks_of(farm.ask("a", 10)), ElementsAre(render(0, 1), render(1, 0)));
+}
+
+TEST_F(SchedulerTest, AJobThatStartsAfreshLetsGoOfItsBlobs) {
+  farm.finish(farm.ask_one("a"));
+  farm.step(JobCancelled{farm.job});
+  EXPECT_THAT(all_of<RemoveBlobs>(farm.submit())[0].blobs, SizeIs(3));
+  EXPECT_EQ(farm.progress().tasks_done, 0u);
+}
+
+}  // namespace
+}  // namespace baton
