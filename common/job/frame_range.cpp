@@ -77,12 +77,12 @@ Result<std::vector<int>> parse_frames(std::string_view text) {
 std::string format_frames(const std::vector<int>& frames) {
   std::string text;
   for (std::size_t i = 0; i < frames.size();) {
-    // The longest run of equal steps that starts here; two frames are only a run when they are
-    // neighbours.
+    // The longest run of equal steps that starts here; with gaps it takes four frames to be worth a
+    // range.
     std::size_t last = i;
     const int step = i + 1 < frames.size() ? frames[i + 1] - frames[i] : 1;
     while (last + 1 < frames.size() && frames[last + 1] - frames[last] == step) ++last;
-    if (step != 1 && last < i + 2) last = i;
+    if (step != 1 && last < i + 3) last = i;
 
     if (!text.empty()) text += ',';
     text += std::to_string(frames[i]);

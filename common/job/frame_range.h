@@ -13,7 +13,7 @@ namespace baton {
 /// limits::kMaxFrames. The error's message is of the form "expected ..., got ...".
 Result<std::vector<int>> parse_frames(std::string_view text);
 
-/// Shortest such text; parse_frames(format_frames(f)) == f for ascending f.
+/// A short text of that kind; parse_frames(format_frames(f)) == f for ascending f.
 std::string format_frames(const std::vector<int>& frames);
 
 }  // namespace baton

@@ -16,31 +16,36 @@ namespace baton::test {
 inline std::filesystem::path test_folder() {
   const auto* info = testing::UnitTest::GetInstance()->current_test_info();
   const std::filesystem::path folder =
-      std::filesystem::path(testing::TempDir()) / (std::string("baton_") + info->test_suite_name() + "_" + info->name());
+      std::filesystem::path(testing::TempDir()) /
+      (std::string("baton_") + info->test_suite_name() + "_" + info->name());
   std::filesystem::create_directories(folder);
   return folder;
 }
 
 /// Writes `image` as a float EXR and returns its path.
 inline std::string write_map(const std::string& name, const RgbImage& image) {
-  FilmTile film{.rect = {0, 0, image.width, image.height}, .channels = {"R", "G", "B"}, .values = {}};
+  FilmTile film{
+      .rect = {0, 0, image.width, image.height}, .channels = {"R", "G", "B"}, .values = {}};
   film.values.resize(film.num_pixels() * 3);
   for (std::size_t i = 0; i < film.num_pixels(); ++i) {
     for (std::size_t c = 0; c < 3; ++c) film.plane(c)[i] = image.rgb[3 * i + c];
   }
   const std::filesystem::path path = test_folder() / name;
-  const Status written = write_exr(path, film, {.half_float = false, .compression = "none", .metadata = {}});
+  const Status written =
+      write_exr(path, film, {.half_float = false, .compression = "none", .metadata = {}});
   EXPECT_TRUE(written.ok());
   return path.string();
 }
 
 inline RgbImage constant_map(int width, int height, const Rgb& color) {
   RgbImage image{width, height, {}};
-  for (int i = 0; i < width * height; ++i) image.rgb.insert(image.rgb.end(), {color.x, color.y, color.z});
+  for (int i = 0; i < width * height; ++i)
+    image.rgb.insert(image.rgb.end(), {color.x, color.y, color.z});
   return image;
 }
 
-/// A dim sky, a darker ground and a warm sun of 2 x 2 texels half-way up on the +Z side: shadows with hard and soft parts.
+/// A dim sky, a darker ground and a warm sun of 2 x 2 texels half-way up on the +Z side: shadows
+/// with hard and soft parts.
 inline RgbImage sky_map(int width = 64, int height = 32, float sun = 60) {
   RgbImage image = constant_map(width, height, {0.3f, 0.4f, 0.6f});
   const auto set = [&](int x, int y, const Rgb& c) {
@@ -53,7 +58,8 @@ inline RgbImage sky_map(int width = 64, int height = 32, float sun = 60) {
     for (int x = 0; x < width; ++x) set(x, y, {0.1f, 0.08f, 0.06f});
   }
   for (int dy = 0; dy < 2; ++dy) {
-    for (int dx = 0; dx < 2; ++dx) set(width / 2 + 3 + dx, height / 4 + dy, {sun, 0.8f * sun, 0.5f * sun});
+    for (int dx = 0; dx < 2; ++dx)
+      set(width / 2 + 3 + dx, height / 4 + dy, {sun, 0.8f * sun, 0.5f * sun});
   }
   return image;
 }
@@ -71,28 +77,42 @@ inline std::string box_obj() {
   return text;
 }
 
-/// A glossy and a diffuse box on a diffuse ground under sky_map(): hard and soft shadow, gloss, silhouettes.
+/// A glossy and a diffuse box on a diffuse ground under sky_map(): hard and soft shadow, gloss,
+/// silhouettes.
 inline JobSpec box_job() {
   const std::filesystem::path mesh = test_folder() / "box.obj";
   std::ofstream(mesh) << box_obj();
   JobSpec job;
   job.name = "boxes";
   job.image = {.width = 12, .height = 9, .sites = 1, .tile_size = 4096};
-  job.camera = {.position = {0, 1.6f, 4}, .look_at = {0, 0.3f, 0}, .up = {0, 1, 0}, .vertical_fov_deg = 35};
+  job.camera = {
+      .position = {0, 1.6f, 4}, .look_at = {0, 0.3f, 0}, .up = {0, 1, 0}, .vertical_fov_deg = 35};
   job.scene.materials["ground"] = {.kind = MaterialKind::diffuse, .base_color = {0.5f, 0.5f, 0.5f}};
-  job.scene.materials["glossy"] = {.kind = MaterialKind::phong, .base_color = {0.7f, 0.3f, 0.2f}, .kd = 0.5f, .ks = 0.5f,
+  job.scene.materials["glossy"] = {.kind = MaterialKind::phong,
+                                   .base_color = {0.7f, 0.3f, 0.2f},
+                                   .kd = 0.5f,
+                                   .ks = 0.5f,
                                    .exponent = 20};
-  job.scene.materials["metal"] = {.kind = MaterialKind::metallic_roughness, .base_color = {0.9f, 0.7f, 0.4f},
-                                  .metallic = 1, .roughness = 0.4f};
+  job.scene.materials["metal"] = {.kind = MaterialKind::metallic_roughness,
+                                  .base_color = {0.9f, 0.7f, 0.4f},
+                                  .metallic = 1,
+                                  .roughness = 0.4f};
   job.scene.meshes["box"] = {.path = mesh.string(), .smooth_normals = false};
-  job.scene.objects = {
-      {.mesh = "box", .material = "glossy", .translate = {-0.8f, 0, 0}, .rotate_deg = {0, 25, 0}, .place_on_ground = true},
-      {.mesh = "box", .material = "metal", .translate = {0.8f, 0, 0.2f}, .rotate_deg = {0, -20, 0}, .place_on_ground = true}};
+  job.scene.objects = {{.mesh = "box",
+                        .material = "glossy",
+                        .translate = {-0.8f, 0, 0},
+                        .rotate_deg = {0, 25, 0},
+                        .place_on_ground = true},
+                       {.mesh = "box",
+                        .material = "metal",
+                        .translate = {0.8f, 0, 0.2f},
+                        .rotate_deg = {0, -20, 0},
+                        .place_on_ground = true}};
   job.scene.ground = GroundSpec{.material = "ground", .height = 0, .size = 40};
   job.environment.keys = {{.frame = 1, .map = write_map("sky.exr", sky_map())}};
   job.output.directory = test_folder().string();
-  job.output.aovs = {Aov::lns, Aov::visibility, Aov::ess, Aov::acceptance, Aov::source, Aov::normal, Aov::depth,
-                     Aov::variance};
+  job.output.aovs = {Aov::lns,    Aov::visibility, Aov::ess,   Aov::acceptance,
+                     Aov::source, Aov::normal,     Aov::depth, Aov::variance};
   job.state.checkpoint_every = 1000;
   return job;
 }

@@ -19,13 +19,6 @@ float cosine_power(const Vec3& a, const Vec3& b, float s) {
   return one_minus_cos < 1 ? std::exp(s * std::log1p(-one_minus_cos)) : 0.0f;
 }
 
-/// wo raised to n.wo >= kMinCosView: interpolated normals may face away from the viewer.
-Vec3 clamped_view(const ShadingPoint& p) {
-  const float cos_view = dot(p.ns, p.wo);
-  if (cos_view >= kMinCosView) return p.wo;
-  return normalize(p.wo + p.ns * (kMinCosView - cos_view));
-}
-
 /// GGX normal distribution D = a^2 / (pi (a^2 (n.h)^2 + |n x h|^2)^2), 1/sr. The cross product
 /// keeps the digits that 1 - (n.h)^2 loses for a near 0.
 float ggx_distribution(const Vec3& n, const Vec3& h, float alpha) {
@@ -154,6 +147,12 @@ Material make_material(const MaterialSpec& spec) {
     }
   }
   return {};
+}
+
+Vec3 clamped_view(const ShadingPoint& point) {
+  const float cos_view = dot(point.ns, point.wo);
+  if (cos_view >= kMinCosView) return point.wo;
+  return normalize(point.wo + point.ns * (kMinCosView - cos_view));
 }
 
 Rgb evaluate_bsdf(const Material& material, const ShadingPoint& point, const Vec3& wi) {

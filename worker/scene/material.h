@@ -37,6 +37,10 @@ struct ShadingPoint {
 /// True when wi is above the shading and the geometric horizon: elsewhere every target is 0.
 inline bool above_horizon(const ShadingPoint& p, const Vec3& wi) { return dot(p.ns, wi) > 0 && dot(p.ng, wi) > 0; }
 
+/// wo, raised until ns.wo >= 1e-4: the view direction of the ggx lobe. Interpolated normals may face away from the
+/// viewer, where visible normals have no density.
+Vec3 clamped_view(const ShadingPoint& point);
+
 /// BRDF f(wi, wo) in 1/sr, without the cosine; 0 when not above_horizon. The scalar witness of the SIMD code.
 Rgb evaluate_bsdf(const Material& material, const ShadingPoint& point, const Vec3& wi);
 

@@ -65,7 +65,7 @@ TEST(Octahedral, DecodedDirectionsAreUnit) {
   }
 }
 
-// All 2^32 codes were tried once by hand with the same result; here a random sample and the
+// All 2^32 codes were tried once with the same result; here a random sample and the
 // critical lines: the rim, its neighbours, the fold (|u| + |v| = 1) and the middle.
 TEST(Octahedral, EncodeUndoesDecodeInsideTheRim) {
   const auto check = [](OctDirection code) {

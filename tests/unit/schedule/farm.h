@@ -76,6 +76,22 @@ class Farm {
   std::vector<Action> fail(const GrantLease& grant, bool permanent = false) {
     return step(AttemptFailed{grant.worker, grant.lease, "boom", permanent});
   }
+  /// Lets the worker do whatever it is given until nothing is left. Returns every action on the way.
+  std::vector<Action> work_off(const std::string& worker) {
+    std::vector<Action> seen = step(WorkRequested{worker, 10});
+    for (std::size_t i = 0; i < seen.size(); ++i) {
+      const GrantLease* found = std::get_if<GrantLease>(&seen[i]);
+      if (!found) continue;
+      const GrantLease grant = *found;
+      for (const Event& event : {Event(TaskCompleted{grant.worker, grant.lease,
+                                                     outputs_of(spec_, job, grant.lease.task), {}}),
+                                 Event(WorkRequested{worker, 10})}) {
+        const std::vector<Action> more = step(event);
+        seen.insert(seen.end(), more.begin(), more.end());
+      }
+    }
+    return seen;
+  }
   const JobProgress& progress() const { return scheduler.find_job(job)->tasks.progress(); }
   JobStatus status() const { return scheduler.find_job(job)->status; }
   const JobSpec& spec() const { return spec_; }

@@ -92,11 +92,7 @@ TEST_F(SchedulerTest, WorkIsDealtOneByOneToAllWhoWait) {
 }
 
 TEST_F(SchedulerTest, AJobEndsWhenItsLastFrameIsWritten) {
-  std::vector<RecordJobStatus> ends;
-  for (auto grants = farm.ask("a", 10); !grants.empty(); grants = farm.ask("a", 10)) {
-    EXPECT_THAT(ends, IsEmpty());
-    for (const GrantLease& grant : grants) ends = all_of<RecordJobStatus>(farm.finish(grant));
-  }
+  const auto ends = all_of<RecordJobStatus>(farm.work_off("a"));
   ASSERT_THAT(ends, SizeIs(1));
   EXPECT_EQ(ends[0].status, JobStatus::done);
   EXPECT_EQ(farm.progress().frames_done, 4u);
@@ -267,12 +263,9 @@ TEST(SchedulerFailures, AJobGoesOnBelowItsLimitOfFailedTasks) {
   EXPECT_EQ(farm.status(), JobStatus::running);
 
   // Tile 1 is still rendered to the end; no frame can be written.
-  for (auto grants = farm.ask("a", 10); !grants.empty(); grants = farm.ask("a", 10)) {
-    for (const GrantLease& grant : grants) {
-      EXPECT_EQ(grant.lease.task.kind, TaskKind::render);
-      EXPECT_EQ(grant.lease.task.tile, 1);
-      farm.finish(grant);
-    }
+  for (const GrantLease& grant : all_of<GrantLease>(farm.work_off("a"))) {
+    EXPECT_EQ(grant.lease.task.kind, TaskKind::render);
+    EXPECT_EQ(grant.lease.task.tile, 1);
   }
   EXPECT_EQ(farm.status(), JobStatus::failed);
   EXPECT_EQ(farm.progress().tasks_done, 2u);
@@ -333,9 +326,7 @@ TEST(SchedulerBlobs, AllStatesStayWhenTheJobWantsThem) {
   Farm farm(spec);
   farm.submit();
   farm.step(WorkerJoined{"a", {}});
-  for (auto grants = farm.ask("a", 10); !grants.empty(); grants = farm.ask("a", 10)) {
-    for (const GrantLease& grant : grants) farm.finish(grant);
-  }
+  farm.work_off("a");
   for (int frame = 0; frame < 2; ++frame) {
     EXPECT_TRUE(farm.scheduler.is_referenced(blob_digest(farm.job, {BlobKind::state, frame, 0, {}, 0})));
     EXPECT_FALSE(farm.scheduler.is_referenced(blob_digest(farm.job, {BlobKind::film, frame, 0, {}, 0})));

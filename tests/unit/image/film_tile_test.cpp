@@ -1,0 +1,75 @@
+#include "common/image/film_tile.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cstring>
+#include <limits>
+
+#include "common/base/section_file.h"
+
+namespace baton {
+namespace {
+
+using testing::HasSubstr;
+
+constexpr SectionTag kMagic{'B', 'T', 'F', '1'};
+
+FilmTile small_tile() {
+  return {{4, 8, 6, 9},
+          {"R", "normal.X"},
+          {0.5f, -0.0f, std::numeric_limits<float>::infinity(), 1e-40f}};
+}
+
+/// The error of a small tile whose META starts with other numbers: 4 sides, number of channels.
+std::string meta_error(std::size_t index, std::int32_t value) {
+  SectionFile file = *decode_section_file(encode_film_tile(small_tile()), kMagic, 1, "t.btf");
+  std::memcpy(file.sections[0].payload.data() + index * sizeof(value), &value, sizeof(value));
+  const Result<FilmTile> decoded = decode_film_tile(encode_section_file(file), "t.btf");
+  return decoded ? "" : decoded.error().message;
+}
+
+TEST(FilmTile, GivesBackTheSameBits) {
+  const FilmTile tile = small_tile();
+  const Bytes bytes = encode_film_tile(tile);
+  const Result<FilmTile> decoded = decode_film_tile(bytes, "t.btf");
+  ASSERT_TRUE(decoded.ok()) << decoded.error().message;
+  EXPECT_TRUE(*decoded == tile);
+  EXPECT_EQ(encode_film_tile(*decoded), bytes);
+}
+
+TEST(FilmTile, AnyChangedByteAndAnyTruncationIsAnError) {
+  const Bytes good = encode_film_tile(small_tile());
+  for (std::size_t i = 0; i < good.size(); ++i) {
+    Bytes bad = good;
+    bad[i] ^= std::byte{0x10};
+    EXPECT_FALSE(decode_film_tile(bad, "t.btf").ok()) << "byte " << i;
+    EXPECT_FALSE(decode_film_tile(ByteView(good).first(i), "t.btf").ok()) << i << " bytes";
+  }
+}
+
+TEST(FilmTile, MetaMustDescribeThePixels) {
+  EXPECT_THAT(meta_error(2, 4), HasSubstr("t.btf: section META has rectangle [4, 4) x [8, 9)"));
+  EXPECT_THAT(meta_error(0, -1), HasSubstr("rectangle [-1, 6)"));
+  EXPECT_THAT(meta_error(2, 7), HasSubstr("section PIXL has 16 bytes, expected 24"));
+  EXPECT_THAT(meta_error(4, 0), HasSubstr("has 0 channels, expected 1 to 256"));
+  EXPECT_THAT(meta_error(4, 1), HasSubstr("is not a rectangle and a list of names"));
+  EXPECT_THAT(meta_error(4, 3), HasSubstr("no name for channel 2"));
+  EXPECT_THAT(meta_error(4, -1), HasSubstr("expected 1 to 256"));
+}
+
+TEST(FilmTile, ChannelNamesDiffer) {
+  FilmTile tile = small_tile();
+  tile.channels[1] = "R";
+  EXPECT_THAT(decode_film_tile(encode_film_tile(tile), "t.btf").error().message,
+              HasSubstr("has channel R twice"));
+}
+
+TEST(FilmTile, AStateIsNotAFilm) {
+  const Bytes state = encode_section_file({{'B', 'S', 'T', '1'}, 1, {}});
+  EXPECT_THAT(decode_film_tile(state, "t.bst").error().message,
+              HasSubstr("t.bst: does not start with BTF1"));
+}
+
+}  // namespace
+}  // namespace baton

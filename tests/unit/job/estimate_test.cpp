@@ -1,0 +1,44 @@
+#include "common/job/estimate.h"
+
+#include <gtest/gtest.h>
+
+namespace baton {
+namespace {
+
+JobSpec small_job() {
+  JobSpec job;
+  job.frames = {1, 2, 3, 4, 5};
+  job.image = {.width = 100, .height = 50, .sites = 4, .tile_size = 32};
+  job.state.checkpoint_every = 2;
+  return job;
+}
+
+TEST(Estimate, CountsTasksAndWhatTheyWaitFor) {
+  const JobEstimate e = estimate_job(small_job());
+  EXPECT_EQ(e.tiles, 4 * 2);
+  EXPECT_EQ(e.runs, 3);
+  EXPECT_EQ(e.tasks(), 8 * 3 + 5);
+  EXPECT_EQ(e.dependencies, 5 * 8 + 8 * 2);  // a frame on its tiles, a run on the one before
+  EXPECT_EQ(e.primary_rays_per_pixel, 4);
+  EXPECT_EQ(e.shadow_rays_per_pixel, 16);
+}
+
+TEST(Estimate, SizesStateOnlyWhereItIsCarried) {
+  JobSpec job = small_job();
+  EXPECT_EQ(estimate_job(job).state_bytes_per_pixel, 130);
+  EXPECT_EQ(estimate_job(job).state_bytes, 130 * 5000);
+  job.sampling.method = Method::bidirectional;
+  EXPECT_EQ(estimate_job(job).state_bytes, 0);
+  EXPECT_EQ(estimate_job(job).dependencies, 5 * 8);
+}
+
+TEST(Estimate, AddsUpTheChannelsOfAFrame) {
+  JobSpec job = small_job();
+  job.output.aovs = {Aov::lns, Aov::source, Aov::normal};
+  const JobEstimate e = estimate_job(job);
+  EXPECT_EQ(e.film_channels, 4 + 1 + 3 + 3);
+  EXPECT_EQ(e.frame_bytes, 5000 * (7 * 2 + 4 * 4));  // lns and normal stay float32
+}
+
+}  // namespace
+}  // namespace baton

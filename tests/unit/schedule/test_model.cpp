@@ -1,0 +1,208 @@
+#include <gtest/gtest.h>
+
+#include <memory>
+#include <random>
+
+#include "tests/unit/schedule/farm.h"
+
+namespace baton {
+namespace {
+
+using namespace testing_farm;
+
+/// A farm where everything goes wrong at random: workers vanish, fail, report late or twice, messages are lost, the
+/// coordinator restarts from what it recorded. Checks after every step what must hold whatever happens.
+class ChaosFarm {
+ public:
+  ChaosFarm(std::uint32_t seed, JobSpec spec) : random_(seed), spec_(std::move(spec)), graph_(spec_) {
+    job_ = digest_of("job");
+    start_coordinator();
+  }
+
+  /// One random thing happens. `trouble`: whether bad things may happen.
+  void advance(bool trouble) {
+    now_ += std::chrono::milliseconds(roll(300));
+    const std::string worker = "w" + std::to_string(roll(5));
+    const int what = roll(100);
+    if (what < 30) {
+      ask(worker);
+    } else if (what < 70) {
+      report(worker);
+    } else if (what < 80) {
+      step(ClockTicked{});
+    } else if (what < 88) {
+      for (int i = 0; i < 5; ++i) heartbeat("w" + std::to_string(i));
+    } else if (!trouble) {
+      return;
+    } else if (what < 91) {
+      held_[worker].clear();
+      if (roll(2)) join(worker);
+    } else if (what < 93) {
+      now_ += kSilence;
+    } else if (what < 96) {
+      fail(worker);
+    } else if (what < 97) {
+      start_coordinator();
+    } else if (!old_reports_.empty()) {
+      step(old_reports_[static_cast<std::size_t>(roll(static_cast<int>(old_reports_.size())))]);
+    }
+  }
+
+  JobStatus status() const { return scheduler_->find_job(job_)->status; }
+  const JobProgress& progress() const { return scheduler_->find_job(job_)->tasks.progress(); }
+  std::size_t num_recorded() const { return completions_.size(); }
+  std::size_t num_tasks() const { return static_cast<std::size_t>(graph_.num_tasks()); }
+  const std::set<Digest>& removed() const { return removed_; }
+
+ private:
+  int roll(int sides) { return static_cast<int>(random_() % static_cast<std::uint32_t>(sides)); }
+
+  void start_coordinator() {
+    scheduler_ = std::make_unique<Scheduler>(++epoch_, kSilence);
+    known_.clear();
+    step(JobAdded{job_, spec_, JobStatus::running, completions_, failures_});
+  }
+
+  void join(const std::string& worker) {
+    known_.insert(worker);
+    step(WorkerJoined{worker, leases(worker)});
+  }
+
+  void ask(const std::string& worker) {
+    if (!known_.contains(worker)) join(worker);
+    step(WorkRequested{worker, 1 + roll(3)});
+  }
+
+  void heartbeat(const std::string& worker) {
+    if (known_.contains(worker)) step(WorkerAlive{worker, leases(worker)});
+  }
+
+  void report(const std::string& worker) {
+    if (held_[worker].empty()) return;
+    if (!known_.contains(worker)) join(worker);
+    if (held_[worker].empty()) return;
+    const LeaseId lease = held_[worker].begin()->first;
+    held_[worker].erase(lease);
+    const TaskCompleted done{worker, lease, outputs_of(spec_, job_, lease.task), {}};
+    old_reports_.push_back(done);
+    step(done);
+  }
+
+  void fail(const std::string& worker) {
+    if (held_[worker].empty() || !known_.contains(worker)) return;
+    const LeaseId lease = held_[worker].begin()->first;
+    held_[worker].erase(lease);
+    step(AttemptFailed{worker, lease, "boom", false});
+  }
+
+  std::vector<LeaseId> leases(const std::string& worker) {
+    std::vector<LeaseId> result;
+    for (const auto& [lease, unused] : held_[worker]) result.push_back(lease);
+    return result;
+  }
+
+  void step(const Event& event) {
+    for (const Action& action : scheduler_->step(event, now_)) {
+      std::visit([this](const auto& a) { on(a); }, action);
+    }
+  }
+
+  void on(const RecordCompletion& a) {
+    EXPECT_TRUE(recorded_.insert(a.completion.task).second) << "a task counts once";
+    for (const TaskIndex input : graph_.inputs(a.completion.task)) {
+      EXPECT_TRUE(recorded_.contains(graph_.key(input))) << "done before its input";
+    }
+    completions_.push_back(a.completion);
+    for (const BlobRef& blob : a.completion.outputs) {
+      if (blob.kind != BlobKind::image) removed_.erase(blob.digest);
+    }
+  }
+  void on(const RecordFailure& a) { failures_.push_back(a.failure); }
+  void on(const RecordJobStatus&) {}
+  void on(const GrantLease& a) {
+    EXPECT_FALSE(recorded_.contains(a.lease.task)) << "granted after it was done";
+    EXPECT_TRUE(issued_.insert(a.lease).second) << "a lease id is used once";
+    for (const TaskIndex input : graph_.inputs(a.lease.task)) {
+      EXPECT_TRUE(recorded_.contains(graph_.key(input))) << "granted before its input was recorded";
+    }
+    for (const BlobRef& input : a.inputs) {
+      EXPECT_TRUE(scheduler_->is_referenced(input.digest));
+      EXPECT_FALSE(removed_.contains(input.digest)) << "granted with an input that is gone";
+    }
+    // Now and then the message is lost.
+    if (roll(20) > 0) held_[a.worker].emplace(a.lease, 0);
+  }
+  void on(const RevokeLease& a) { held_[a.worker].erase(a.lease); }
+  void on(const ReportNoWork&) {}
+  void on(const ForgetWorker& a) { known_.erase(a.worker); }
+  void on(const ReportConflict&) { ADD_FAILURE() << "all results are equal here"; }
+  void on(const RemoveBlobs& a) {
+    for (const Digest& blob : a.blobs) {
+      EXPECT_FALSE(scheduler_->is_referenced(blob));
+      removed_.insert(blob);
+    }
+  }
+
+  std::mt19937 random_;
+  JobSpec spec_;
+  JobGraph graph_;
+  Digest job_;
+  TimePoint now_{};
+  std::uint32_t epoch_ = 0;
+  std::unique_ptr<Scheduler> scheduler_;
+  std::set<std::string> known_;                         ///< to the coordinator, as the workers believe
+  std::map<std::string, std::map<LeaseId, int>> held_;  ///< what each worker has in hand
+  std::vector<Event> old_reports_;
+  std::vector<Completion> completions_;  ///< the journal
+  std::vector<Failure> failures_;
+  std::set<TaskKey> recorded_;
+  std::set<LeaseId> issued_;
+  std::set<Digest> removed_;
+};
+
+TEST(SchedulerModel, EveryTaskIsDoneOnceWhateverHappens) {
+  for (std::uint32_t seed = 1; seed <= 60; ++seed) {
+    SCOPED_TRACE(testing::Message() << "seed " << seed);
+    JobSpec spec = small_job(1 + static_cast<int>(seed % 5), 10, 1 + static_cast<int>(seed % 4), seed % 3 != 0);
+    spec.max_retries_per_task = 1000000;
+    spec.max_failures_per_worker = 1000000;
+    ChaosFarm farm(seed, spec);
+    int steps = 0;
+    for (; farm.status() == JobStatus::running && steps < 20000; ++steps) farm.advance(/*trouble=*/steps < 3000);
+    EXPECT_EQ(farm.status(), JobStatus::done) << "after " << steps << " steps";
+    EXPECT_EQ(farm.num_recorded(), farm.num_tasks());
+    EXPECT_EQ(farm.progress().tasks_open, 0u);
+    EXPECT_EQ(farm.progress().tasks_leased, 0u);
+    EXPECT_GE(farm.removed().size(), 10u) << "the films are gone";
+    if (testing::Test::HasFailure()) return;
+  }
+}
+
+TEST(SchedulerModel, AJobAlwaysEndsWhenAttemptsAreLimited) {
+  for (std::uint32_t seed = 1; seed <= 60; ++seed) {
+    SCOPED_TRACE(testing::Message() << "seed " << seed);
+    JobSpec spec = small_job(4, 12, 3);
+    spec.max_retries_per_task = 1;
+    spec.max_failed_tasks = 2;
+    spec.max_failures_per_worker = 3;
+    ChaosFarm farm(seed, spec);
+    int steps = 0;
+    for (; farm.status() == JobStatus::running && steps < 20000; ++steps) farm.advance(/*trouble=*/true);
+    EXPECT_NE(farm.status(), JobStatus::running);
+    EXPECT_EQ(farm.progress().tasks_open, 0u);
+    EXPECT_EQ(farm.progress().tasks_leased, 0u);
+    if (testing::Test::HasFailure()) return;
+  }
+}
+
+TEST(SchedulerModel, AHundredThousandTasksAreNoTrouble) {
+  Farm farm(small_job(1000, 300, 3));
+  ASSERT_GT(JobGraph(farm.spec()).num_tasks(), 100000);
+  farm.submit();
+  farm.step(WorkerJoined{"a", {}});
+  farm.work_off("a");
+  EXPECT_EQ(farm.status(), JobStatus::done);
+}
+
+}  // namespace
+}  // namespace baton

@@ -1,0 +1,131 @@
+#include "common/store/blob_store.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <iterator>
+#include <string>
+#include <thread>
+#include <vector>
+
+#include "common/base/files.h"
+
+namespace baton {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+
+/// A store in an empty folder of its own.
+class BlobStoreTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    const auto* info = testing::UnitTest::GetInstance()->current_test_info();
+    folder_ = fs::path(testing::TempDir()) / "baton_store" / info->name();
+    fs::remove_all(folder_);
+  }
+  BlobStore open() const { return *BlobStore::open(folder_); }
+  auto num_files() const {
+    std::ptrdiff_t count = 0;
+    for (const auto& entry : fs::recursive_directory_iterator(folder_))
+      count += entry.is_regular_file();
+    return count;
+  }
+
+  fs::path folder_;
+};
+
+std::string text_of(const Bytes& bytes) {
+  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+}
+
+TEST_F(BlobStoreTest, GivesBackWhatWasPut) {
+  BlobStore store = open();
+  const Result<Digest> digest = store.put(as_bytes_view("film"));
+  ASSERT_TRUE(digest.ok()) << digest.error().message;
+  EXPECT_EQ(*digest, digest_of("film"));
+  EXPECT_TRUE(store.contains(*digest));
+  EXPECT_EQ(text_of(*store.get(*digest)), "film");
+  EXPECT_TRUE(store.get(*store.put({}))->empty());
+}
+
+TEST_F(BlobStoreTest, BlobsOutliveTheStoreObject) {
+  const Digest digest = *open().put(as_bytes_view("state"));
+  EXPECT_EQ(text_of(*open().get(digest)), "state");
+}
+
+TEST_F(BlobStoreTest, NamesAreTheDigestSplitAfterTwoDigits) {
+  const BlobStore store = open();
+  const Digest digest{0xab23456789abcdefull, 0x1ull};
+  EXPECT_EQ(store.path(digest), folder_ / "ab" / "23456789abcdef0000000000000001.blob");
+}
+
+TEST_F(BlobStoreTest, PuttingAgainIsASuccessAndLeavesOneFile) {
+  BlobStore store = open();
+  const Digest first = *store.put(as_bytes_view("film"));
+  EXPECT_EQ(*store.put(as_bytes_view("film")), first);
+  EXPECT_EQ(num_files(), 1);
+}
+
+TEST_F(BlobStoreTest, ADamagedBlobIsFoundAndMended) {
+  BlobStore store = open();
+  const Digest digest = *store.put(as_bytes_view("film"));
+  ASSERT_TRUE(write_file_atomic(store.path(digest), as_bytes_view("fi")).ok());
+  const Result<Bytes> damaged = store.get(digest);
+  ASSERT_FALSE(damaged.ok());
+  EXPECT_EQ(damaged.error().kind, ErrorKind::corrupt);
+  EXPECT_EQ(damaged.error().message, store.path(digest).string() + ": digest " +
+                                         digest_of("fi").hex() + ", expected " + digest.hex());
+  ASSERT_TRUE(store.put(as_bytes_view("film")).ok());
+  EXPECT_EQ(text_of(*store.get(digest)), "film");
+}
+
+TEST_F(BlobStoreTest, AMissingBlobIsAnIoErrorWithItsPath) {
+  const BlobStore store = open();
+  const Digest digest = digest_of("never put");
+  EXPECT_FALSE(store.contains(digest));
+  const Result<Bytes> bytes = store.get(digest);
+  ASSERT_FALSE(bytes.ok());
+  EXPECT_EQ(bytes.error().kind, ErrorKind::io);
+  EXPECT_THAT(bytes.error().message, HasSubstr(store.path(digest).string()));
+}
+
+TEST_F(BlobStoreTest, RemovingTwiceIsASuccess) {
+  BlobStore store = open();
+  const Digest digest = *store.put(as_bytes_view("film"));
+  EXPECT_TRUE(store.remove(digest).ok());
+  EXPECT_FALSE(store.contains(digest));
+  EXPECT_TRUE(store.remove(digest).ok());
+}
+
+TEST_F(BlobStoreTest, AFolderThatCannotBeMadeIsAnError) {
+  ASSERT_TRUE(write_file_atomic(folder_, as_bytes_view("a file")).ok());
+  const auto store = BlobStore::open(folder_);
+  ASSERT_FALSE(store.ok());
+  EXPECT_THAT(store.error().message, HasSubstr(folder_.string()));
+}
+
+// As several workers do: each thread has its own store on one folder, all put the same blobs and
+// read them at once.
+TEST_F(BlobStoreTest, ManyWritersOfTheSameBlobsNeverShowHalfOfOne) {
+  const std::string blobs[] = {std::string(100000, 'a'), std::string(50000, 'b')};
+  std::vector<int> faults(4, 0);
+  std::vector<std::thread> threads;
+  for (int& count : faults) {
+    threads.emplace_back([&, this] {
+      BlobStore store = open();
+      for (int round = 0; round < 10; ++round) {
+        for (const std::string& blob : blobs) {
+          const Result<Digest> digest = store.put(as_bytes_view(blob));
+          if (!digest || !store.get(*digest)) ++count;
+        }
+      }
+    });
+  }
+  for (std::thread& thread : threads) thread.join();
+  EXPECT_EQ(faults, std::vector<int>(4, 0));
+  EXPECT_EQ(num_files(), 2);
+}
+
+}  // namespace
+}  // namespace baton
