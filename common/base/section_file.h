@@ -11,17 +11,19 @@
 
 namespace baton {
 
-/// The container shared by sample states (.bst) and tile films (.btf): a header, a table of tagged sections, zstd
-/// payloads, a checksum on everything. common/state/FORMAT.md is the grammar; this header repeats only the constants.
+/// The container shared by sample states (.bst) and tile films (.btf): a header, a table of tagged
+/// sections, zstd payloads, a checksum on everything. common/state/FORMAT.md is the grammar; this
+/// header repeats only the constants.
 
 /// Four ASCII letters. Tags are never reused.
 using SectionTag = std::array<char, 4>;
 
 struct Section {
   SectionTag tag{};
-  bool required = true;       ///< a reader that does not know a required tag must refuse the file
-  std::uint8_t stride = 1;    ///< bytes of one element; bytes are stored plane by plane when > 1, which packs better
-  Bytes payload;              ///< uncompressed
+  bool required = true;  ///< a reader that does not know a required tag must refuse the file
+  std::uint8_t stride =
+      1;  ///< bytes of one element; bytes are stored plane by plane when > 1, which packs better
+  Bytes payload;  ///< uncompressed
 };
 
 struct SectionFile {
@@ -45,24 +47,27 @@ struct SectionInfo {
 /// The tag for people; a byte that is not printable ASCII becomes '?'.
 std::string tag_text(const SectionTag& tag);
 
-/// Deterministic: equal contents give equal bytes (with one version of zstd). Tags must differ, and a stride must divide
-/// the size of its payload.
+/// Deterministic: equal contents give equal bytes (with one version of zstd). Tags must differ, and
+/// a stride must divide the size of its payload.
 Bytes encode_section_file(const SectionFile& file);
 
-/// `name` goes first in every error. `max_version` is the newest version that the caller reads. Checks magic, version,
-/// sizes against limits, every checksum. Any single changed byte is an error.
-Result<SectionFile> decode_section_file(ByteView bytes, const SectionTag& magic, std::uint16_t max_version,
-                                        const std::string& name);
+/// `name` goes first in every error. `max_version` is the newest version that the caller reads.
+/// Checks magic, version, sizes against limits, every checksum. Any single changed byte is an
+/// error.
+Result<SectionFile> decode_section_file(ByteView bytes, const SectionTag& magic,
+                                        std::uint16_t max_version, const std::string& name);
 
 /// The table of a file that passes the same checks, in file order; nothing is unpacked.
-Result<std::vector<SectionInfo>> list_sections(ByteView bytes, const SectionTag& magic, std::uint16_t max_version,
-                                               const std::string& name);
+Result<std::vector<SectionInfo>> list_sections(ByteView bytes, const SectionTag& magic,
+                                               std::uint16_t max_version, const std::string& name);
 
-/// ErrorKind::version when `file` has a required section that is not in `known`; optional strangers are fine.
-Status check_known_sections(const SectionFile& file, std::span<const SectionTag> known, const std::string& name);
+/// ErrorKind::version when `file` has a required section that is not in `known`; optional strangers
+/// are fine.
+Status check_known_sections(const SectionFile& file, std::span<const SectionTag> known,
+                            const std::string& name);
 
 /// The payload of a section that must be there with exactly `expected_bytes` bytes.
-Result<ByteView> section_payload(const SectionFile& file, const SectionTag& tag, std::uint64_t expected_bytes,
-                                 const std::string& name);
+Result<ByteView> section_payload(const SectionFile& file, const SectionTag& tag,
+                                 std::uint64_t expected_bytes, const std::string& name);
 
 }  // namespace baton

@@ -17,31 +17,36 @@ struct RgbImage {
   std::vector<float> rgb;  ///< (height, width, 3)
 };
 
-/// Reads an EXR or Radiance HDR picture as float32 RGB (grey is spread to three channels, alpha dropped).
-/// Errors name the file: missing, not an image, truncated, sides past limits::kMaxEnvironmentSide, neither R, G, B nor
-/// one channel to spread.
+/// Reads an EXR or Radiance HDR picture as float32 RGB (grey is spread to three channels, alpha
+/// dropped). Errors name the file: missing, not an image, truncated, sides past
+/// limits::kMaxEnvironmentSide, neither R, G, B nor one channel to spread.
 Result<RgbImage> read_rgb_image(const std::filesystem::path& path);
 
 /// Header attribute of an EXR file.
 using ImageMetadata = std::vector<std::pair<std::string, std::string>>;
 
 struct ExrOptions {
-  bool half_float = true;          ///< AOVs `depth` and `lns`, `variance` and `normal.*` stay float32 always
+  bool half_float =
+      true;  ///< AOVs `depth` and `lns`, `variance` and `normal.*` stay float32 always
   std::string compression = "zip";  ///< none, rle, zips, zip, piz
   ImageMetadata metadata;
 };
 
-/// Writes all channels of `image` (rect must start at 0, 0) as one scan-line EXR and publishes it atomically, with
-/// missing folders. Bytes are deterministic (no dates, no host names). Values past half's largest, 65504, stop there in
-/// half channels. Errors: unknown compression, a metadata key twice, the disk.
-Status write_exr(const std::filesystem::path& path, const FilmTile& image, const ExrOptions& options);
-/// Reads every channel of a flat EXR file as float32, in file order, which is alphabetical. The rectangle is the data
-/// window. Errors name the file: missing, not an EXR, truncated, subsampled channels, past the limits of picture sides.
+/// Writes all channels of `image` (rect must start at 0, 0) as one scan-line EXR and publishes it
+/// atomically, with missing folders. Bytes are deterministic (no dates, no host names). Values past
+/// half's largest, 65504, stop there in half channels. Errors: unknown compression, a metadata key
+/// twice, the disk.
+Status write_exr(const std::filesystem::path& path, const FilmTile& image,
+                 const ExrOptions& options);
+/// Reads every channel of a flat EXR file as float32, in file order, which is alphabetical. The
+/// rectangle is the data window. Errors name the file: missing, not an EXR, truncated, subsampled
+/// channels, past the limits of picture sides.
 Result<FilmTile> read_exr(const std::filesystem::path& path);
 /// Metadata of an EXR file that `write_exr` made (string attributes only).
 Result<ImageMetadata> read_exr_metadata(const std::filesystem::path& path);
 
-/// 8-bit sRGB PNG from linear RGB, published atomically; values outside [0, 1] are clamped, NaN is black.
+/// 8-bit sRGB PNG from linear RGB, published atomically; values outside [0, 1] are clamped, NaN is
+/// black.
 Status write_png(const std::filesystem::path& path, const RgbImage& image);
 
 }  // namespace baton

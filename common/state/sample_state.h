@@ -21,9 +21,10 @@ enum class PixelSource : std::uint8_t {
   refreshed = 4,   ///< carried, Lns recomputed by the refresh rule
 };
 
-/// The baton: what one tile hands to its next frame. Structure of arrays; pixels row by row inside `rect`.
-/// The surfaces are not stored: primary hits are a pure function of (job, frame, pixel, site) and are traced again.
-/// A background pixel carries nothing: every array is 0 there, and the file leaves it out.
+/// The baton: what one tile hands to its next frame. Structure of arrays; pixels row by row inside
+/// `rect`. The surfaces are not stored: primary hits are a pure function of (job, frame, pixel,
+/// site) and are traced again. A background pixel carries nothing: every array is 0 there, and the
+/// file leaves it out.
 struct SampleState {
   Digest job_digest;
   std::int32_t frame_index = 0;  ///< 0-based; the frame that these samples belong to
@@ -35,8 +36,8 @@ struct SampleState {
   std::vector<float> lns_fresh;     ///< (pixels) Lns at the last SIR or refresh
   std::vector<PixelSource> source;  ///< (pixels)
   std::vector<OctDirection> direction;  ///< (pixels, N)
-  std::vector<float> weight;            ///< (pixels, N) normalised, sum 1, or all 0 when no particle is lit
-  std::vector<std::uint8_t> site;       ///< (pixels, N)
+  std::vector<float> weight;  ///< (pixels, N) normalised, sum 1, or all 0 when no particle is lit
+  std::vector<std::uint8_t> site;  ///< (pixels, N)
 
   bool operator==(const SampleState&) const = default;
   std::size_t num_pixels() const { return static_cast<std::size_t>(rect.area()); }
@@ -49,8 +50,9 @@ inline constexpr std::uint16_t kStateVersion = 1;
 
 /// Deterministic, little-endian; grammar in common/state/FORMAT.md.
 Bytes encode_state(const SampleState& state);
-/// `name` (usually the file) goes first in every error: wrong magic or version, checksum, sizes that do not agree,
-/// weights or Lns that are negative or not finite, weights whose sum is neither 1 nor 0, sites past 15.
+/// `name` (usually the file) goes first in every error: wrong magic or version, checksum, sizes
+/// that do not agree, weights or Lns that are negative or not finite, weights whose sum is neither
+/// 1 nor 0, sites past 15.
 Result<SampleState> decode_state(ByteView bytes, const std::string& name);
 
 /// One line per section for `baton state show`.

@@ -114,12 +114,14 @@ void Scheduler::drop_lease(const Digest& job, TaskIndex task) {
 /// The worker no longer has it. A task that was lost too often probably kills its workers.
 void Scheduler::lose_lease(const Digest& digest, TaskIndex task, Actions& actions) {
   Job& job = jobs_.at(digest);
-  drop_lease(digest, task);
   const std::int32_t losses = job.tasks.add_loss(task);
   if (losses < limits::kMaxTaskAttempts) {
+    drop_lease(digest, task);
     job.tasks.give_back(task);
   } else {
-    give_up(digest, job, task, fmt::format("its workers were lost {} times", losses), actions);
+    const Lease lease = leases_.at({digest, task});
+    fail_attempt({&job, task}, {lease.id, lease.worker, fmt::format("its workers were lost {} times", losses), true},
+                 actions);
   }
 }
 

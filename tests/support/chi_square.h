@@ -100,7 +100,7 @@ struct SphereGrid {
   /// the value. Densities may jump (visible normals do, at grazing view).
   template <class Pdf>
   std::vector<double> integrate(const Pdf& pdf) const {
-    constexpr int kMinSteps = 12;
+    constexpr int kMinSteps = 8;
     constexpr int kMaxSteps = 192;
     const Frame frame(axis);
     std::vector<double> integral(num_cells(), 0.0);
@@ -108,7 +108,7 @@ struct SphereGrid {
       double coarse = integrate_cell(pdf, frame, cell, kMinSteps);
       for (int steps = 2 * kMinSteps; steps <= kMaxSteps; steps *= 2) {
         integral[cell] = integrate_cell(pdf, frame, cell, steps);
-        if (std::fabs(integral[cell] - coarse) < 2e-4 * integral[cell] + 1e-8) break;
+        if (std::fabs(integral[cell] - coarse) < 1e-3 * integral[cell] + 1e-8) break;
         coarse = integral[cell];
       }
     }

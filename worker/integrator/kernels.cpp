@@ -115,7 +115,7 @@ struct CandidateContext {
   }
 };
 
-/// Candidates from the pool: a contiguous block at a random aligned start.
+/// Candidates from the pool: contiguous entries from a random aligned start.
 HWY_INLINE VF LightCandidates(const CandidateContext& context, const LightPool& pool, std::int32_t count,
                               const Philox4x32::Counter& random, kernels::CandidateSet& out) {
   const DF d;
@@ -123,25 +123,21 @@ HWY_INLINE VF LightCandidates(const CandidateContext& context, const LightPool& 
   const DU du;
   VF total = hn::Zero(d);
   if (count == 0) return total;
-  const std::uint32_t block = std::min(64u, std::bit_floor(static_cast<std::uint32_t>(count)));
-  const std::size_t start = random[0] % (LightPool::kSize / block) * block;
+  const std::uint32_t stride = std::clamp(std::bit_floor(static_cast<std::uint32_t>(count)), LightPool::kBlock, 64u);
+  const std::size_t start = random[0] % (LightPool::kSize / stride) * stride;
   const float site_start = uniform_float(random[3]);
   for (std::size_t i = 0; i < static_cast<std::size_t>(count); i += hn::Lanes(d)) {
-    // Lanes never straddle the wrap-around: vectors that start inside the pool's padding-free end fall back to its start.
     const std::size_t entry = (start + i) % LightPool::kSize;
-    HWY_ALIGN OctDirection codes[hn::MaxLanes(DU())];
-    const bool straddles = entry + hn::Lanes(d) > LightPool::kSize;
-    const std::size_t from = straddles ? 0 : entry;
-    hn::Store(hn::LoadU(du, pool.code.data() + from), du, codes);
+    const LightPool::Block& block = pool.blocks[entry / LightPool::kBlock];
+    const std::size_t at = entry % LightPool::kBlock;
     const VI site = context.Sites(i, count, site_start);
     const SurfaceLanes surface = LoadSurfaces(context.sites, site);
-    const BsdfLanes f = EvaluateBsdf(
-        surface, {hn::LoadU(d, pool.x.data() + from), hn::LoadU(d, pool.y.data() + from), hn::LoadU(d, pool.z.data() + from)});
+    const BsdfLanes f =
+        EvaluateBsdf(surface, {hn::Load(d, block.x + at), hn::Load(d, block.y + at), hn::Load(d, block.z + at)});
     const MF used = hn::Lt(hn::Iota(d, static_cast<float>(i)), hn::Set(d, static_cast<float>(count)));
-    const VF weight =
-        context.Weight(surface, f, hn::LoadU(d, pool.r.data() + from), hn::LoadU(d, pool.g.data() + from),
-                       hn::LoadU(d, pool.b.data() + from), hn::LoadU(d, pool.density.data() + from), used);
-    hn::StoreU(hn::Load(du, codes), du, out.code + i);
+    const VF weight = context.Weight(surface, f, hn::Load(d, block.r + at), hn::Load(d, block.g + at),
+                                     hn::Load(d, block.b + at), hn::Load(d, block.density + at), used);
+    hn::StoreU(hn::Load(du, block.code + at), du, out.code + i);
     hn::StoreU(site, di, out.site + i);
     hn::StoreU(weight, d, out.weight + i);
     total = hn::Add(total, weight);

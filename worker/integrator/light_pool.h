@@ -14,16 +14,21 @@ namespace baton {
 /// itself. Each entry's direction has density `density`, so a pixel that chooses entries independently of their contents
 /// stays unbiased; pixels that choose the same entries have correlated errors.
 struct LightPool {
-  static constexpr std::uint32_t kSize = 1u << 16;
+  static constexpr std::uint32_t kSize = 1u << 16;  ///< entries
+  static constexpr std::uint32_t kBlock = 8;        ///< entries that lie together in memory
 
-  std::vector<OctDirection> code;     ///< (kSize) on the lattice of carried directions; empty for a black map
-  std::vector<float> x, y, z;         ///< (kSize) the decoded directions
-  std::vector<float> r, g, b;         ///< (kSize) radiance of this frame
-  std::vector<float> density;         ///< (kSize) 1/sr
-  std::vector<float> before_r, before_g, before_b;  ///< (kSize) radiance of the frame before
+  /// Eight entries, field by field: the unit of SIMD loads.
+  struct alignas(64) Block {
+    OctDirection code[kBlock];                ///< on the lattice of carried directions
+    float x[kBlock], y[kBlock], z[kBlock];    ///< the decoded directions
+    float r[kBlock], g[kBlock], b[kBlock];    ///< radiance of this frame
+    float density[kBlock];                    ///< 1/sr
+    float before_r[kBlock], before_g[kBlock], before_b[kBlock];  ///< radiance of the frame before
+  };
+  std::vector<Block> blocks;  ///< (kSize / kBlock); empty for a black map
 
-  bool empty() const { return code.empty(); }
-  std::size_t size_bytes() const { return code.size() * 11 * sizeof(float); }
+  bool empty() const { return blocks.empty(); }
+  std::size_t size_bytes() const { return blocks.size() * sizeof(Block); }
 };
 
 /// The pool of one frame. before: the environment that `before_*` is read from (the same as `now` for the first frame).

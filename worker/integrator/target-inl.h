@@ -6,7 +6,6 @@
 #define BATON_WORKER_INTEGRATOR_TARGET_INL_H_
 #endif
 
-#include <hwy/contrib/math/math-inl.h>
 #include <hwy/highway.h>
 
 #include "worker/integrator/light_pool.h"
@@ -34,13 +33,7 @@ HWY_INLINE VF MeanLanes(const Vec3Lanes& c) {
 HWY_INLINE VF LogOrZero(VF x) {
   const DF d;
   const MF positive = hn::Gt(x, hn::Set(d, 1e-37f));
-  return hn::IfThenElse(positive, hn::Log(d, hn::Max(x, hn::Set(d, 1e-37f))), hn::Set(d, kLogZero));
-}
-
-/// The entry of a uniformly drawn pool index per lane.
-HWY_INLINE VI PoolIndex(VU bits) {
-  static_assert((LightPool::kSize & (LightPool::kSize - 1)) == 0);
-  return hn::BitCast(DI(), hn::And(bits, hn::Set(DU(), LightPool::kSize - 1)));
+  return hn::IfThenElse(positive, LogLanes(hn::Max(x, hn::Set(d, 1e-37f))), hn::Set(d, kLogZero));
 }
 
 /// Site of the k-th surface of the pixel, k = floor(fraction * num_hits); fraction in [0, 1).
@@ -71,18 +64,26 @@ struct SameSurfaceTarget {
             LogOrZero(MeanLanes(ReflectedRadiance(surface, f, light.r, light.g, light.b))), LogOrZero(light.density)};
   }
 
-  /// Draws `point`; returns its targets.
-  HWY_INLINE LogTargets Propose(VU bits, VF site_fraction, PointLanes& point) const {
+  /// First entry of a uniformly drawn block of proposals.
+  static std::size_t BlockStart(std::uint32_t bits) {
+    static_assert(LightPool::kBlock == kProposalBlock && (LightPool::kSize & (LightPool::kSize - 1)) == 0);
+    return bits & (LightPool::kSize - LightPool::kBlock);
+  }
+
+  /// Draws `point` from the pool's entries entry, entry + 1, ...; returns its targets.
+  HWY_INLINE LogTargets Propose(std::size_t entry, VF site_fraction, PointLanes& point) const {
     const DF d;
-    const VI entry = PoolIndex(bits);
-    const auto pick = [&](const std::vector<float>& array) HWY_ATTR { return hn::GatherIndex(d, array.data(), entry); };
-    point.code = hn::BitCast(DU(), hn::GatherIndex(DI(), reinterpret_cast<const std::int32_t*>(pool.code.data()), entry));
+    const LightPool::Block& block = pool.blocks[entry / LightPool::kBlock];
+    const std::size_t at = entry % LightPool::kBlock;
+    point.code = hn::Load(DU(), block.code + at);
     point.site = SiteAt(sites, site_fraction);
     const SurfaceLanes surface = LoadSurfaces(sites, point.site);
-    const BsdfLanes f = EvaluateBsdf(surface, {pick(pool.x), pick(pool.y), pick(pool.z)});
-    return {LogOrZero(MeanLanes(ReflectedRadiance(surface, f, pick(pool.before_r), pick(pool.before_g), pick(pool.before_b)))),
-            LogOrZero(MeanLanes(ReflectedRadiance(surface, f, pick(pool.r), pick(pool.g), pick(pool.b)))),
-            LogOrZero(pick(pool.density))};
+    const BsdfLanes f = EvaluateBsdf(surface, {hn::Load(d, block.x + at), hn::Load(d, block.y + at), hn::Load(d, block.z + at)});
+    const Vec3Lanes then = ReflectedRadiance(surface, f, hn::Load(d, block.before_r + at), hn::Load(d, block.before_g + at),
+                                             hn::Load(d, block.before_b + at));
+    const Vec3Lanes light =
+        ReflectedRadiance(surface, f, hn::Load(d, block.r + at), hn::Load(d, block.g + at), hn::Load(d, block.b + at));
+    return {LogOrZero(MeanLanes(then)), LogOrZero(MeanLanes(light)), LogOrZero(hn::Load(d, block.density + at))};
   }
 };
 

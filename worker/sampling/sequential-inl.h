@@ -7,7 +7,6 @@
 #define BATON_WORKER_SAMPLING_SEQUENTIAL_INL_H_
 #endif
 
-#include <hwy/contrib/math/math-inl.h>
 #include <hwy/highway.h>
 
 #include <algorithm>
@@ -57,6 +56,11 @@ HWY_INLINE Vec3Lanes PerturbDirection(const Vec3Lanes& w, float cap_cosine, VF u
   return FrameToWorld(w, {hn::Mul(r, cosine), hn::Mul(r, sine), hn::Sub(hn::Set(d, 1.0f), drop)});
 }
 
+/// Independent proposals come in blocks of so many neighbours of the target's supply: each particle's proposal has the
+/// right density, and those of a block are well spread among themselves. The weights need no more: E[sum W_j h(w_j)]
+/// depends only on each particle's own kernel.
+inline constexpr std::size_t kProposalBlock = 8;
+
 /// One Metropolis-Hastings move of every particle that leaves p^(tempering_beta) invariant [eq. 7, 8 and the general
 /// ratio]. All particles of the pixel make the same kind of move, chosen independently of their positions.
 template <class Target>
@@ -71,8 +75,10 @@ HWY_INLINE std::int32_t MoveParticles(const Target& target, const SequentialSett
   const VF rest = hn::Set(d, 1 - tempering_beta);
 
   std::int32_t accepted = 0;
+  std::size_t block_start = 0;
   for (std::size_t i = 0; i < count; i += hn::Lanes(d)) {
     const auto random = PhiloxBlock(du, rng, step, hn::Iota(du, static_cast<std::uint32_t>(i)));
+    if (i % kProposalBlock == 0) block_start = target.BlockStart(hn::GetLane(random.w0));
     const VU code = hn::Load(du, p.code + i);
     const VI site = hn::Load(di, p.site + i);
     const VF before = hn::Load(d, p.log_before + i);
@@ -87,7 +93,7 @@ HWY_INLINE std::int32_t MoveParticles(const Target& target, const SequentialSett
                                                     UniformLanes(d, random.w0), UniformLanes(d, random.w1)));
       next_log = target.Evaluate(next);
     } else {
-      next_log = target.Propose(random.w0, UniformLanes(d, random.w1), next);
+      next_log = target.Propose(block_start + i % kProposalBlock, UniformLanes(d, random.w1), next);
     }
 
     // Accept with min(1, p(next) q(current) / (p(current) q(next))); q cancels in symmetric moves.
@@ -97,7 +103,7 @@ HWY_INLINE std::int32_t MoveParticles(const Target& target, const SequentialSett
     const VF u = hn::Max(UniformLanes(d, random.w2), hn::Set(d, 0x1p-25f));
     const MF possible = hn::Gt(hn::MulAdd(rest, next_log.before, hn::Mul(beta, next_log.now)), hn::Set(d, kLogAlive));
     const MF inside = hn::Lt(hn::Iota(d, static_cast<float>(i)), hn::Set(d, static_cast<float>(count)));
-    const MF accept = hn::And(hn::And(possible, inside), hn::Ge(log_ratio, hn::Log(d, u)));
+    const MF accept = hn::And(hn::And(possible, inside), hn::Ge(log_ratio, LogLanes(u)));
     accepted += static_cast<std::int32_t>(hn::CountTrue(d, accept));
 
     hn::Store(hn::IfThenElse(hn::RebindMask(du, accept), next.code, code), du, p.code + i);
@@ -131,7 +137,7 @@ HWY_INLINE void Reweight(std::size_t count, float lns_before, const ParticleArra
   HWY_ALIGN float gain[ParticleArrays::kCapacity];
   for (std::size_t i = 0; i < count; i += hn::Lanes(d)) {
     const VF shifted = hn::Sub(hn::Load(d, p.log_increment + i), hn::Set(d, largest));
-    hn::Store(hn::Exp(d, hn::Clamp(shifted, hn::Set(d, -87.0f), hn::Zero(d))), d, gain + i);
+    hn::Store(ExpLanes(shifted), d, gain + i);
   }
   double sum = 0;
   for (std::size_t i = 0; i < count; ++i) {

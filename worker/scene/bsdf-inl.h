@@ -6,7 +6,6 @@
 #define BATON_WORKER_SCENE_BSDF_INL_H_
 #endif
 
-#include <hwy/contrib/math/math-inl.h>
 #include <hwy/highway.h>
 
 #include "common/math/lanes-inl.h"
@@ -70,8 +69,8 @@ struct BsdfLanes {
 HWY_INLINE VF CosinePower(VF x, VF s) {
   const DF d;
   const VF safe = hn::Max(x, hn::Set(d, 1e-30f));
-  const VF power = hn::Exp(d, hn::Max(hn::Mul(s, hn::Log(d, safe)), hn::Set(d, -80.0f)));
-  return hn::IfThenElse(hn::Gt(x, hn::Set(d, 1e-30f)), power, hn::Zero(d));
+  const VF exponent = hn::Mul(s, LogLanes(safe));
+  return hn::IfThenElseZero(hn::Gt(exponent, hn::Set(d, -80.0f)), ExpLanes(exponent));
 }
 
 /// Smith's Lambda of GGX for cosine c > 0 to the normal [Heitz 2014].
@@ -158,7 +157,7 @@ HWY_INLINE Vec3Lanes SampleBsdf(const SurfaceLanes& s, VF u0, VF u1) {
   Vec3Lanes w = FrameToWorld(s.ns, {hn::Mul(radius, cosine), hn::Mul(radius, sine), height});
 
   if (s.any_phong && !hn::AllFalse(d, specular)) {
-    const VF z = hn::Exp(d, hn::Div(hn::Log(d, hn::Max(hn::Sub(one, u), hn::Set(d, 1e-30f))), hn::Add(s.shape, one)));
+    const VF z = ExpLanes(hn::Div(LogLanes(hn::Max(hn::Sub(one, u), hn::Set(d, 1e-30f))), hn::Add(s.shape, one)));
     const VF r = hn::Sqrt(hn::Max(hn::NegMulAdd(z, z, one), zero));
     w = Select(specular, FrameToWorld(s.mirror, {hn::Mul(r, cosine), hn::Mul(r, sine), z}), w);
   }

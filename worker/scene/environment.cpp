@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
-#include <span>
 
 #include "common/base/check.h"
 
@@ -12,15 +11,28 @@ namespace {
 
 constexpr double kPiDouble = 3.14159265358979323846;
 
+/// Cells between two kept cumulative sums of a row.
+constexpr int kBlock = 16;
+
+/// Density of cells so dim that float cannot hold theirs.
+constexpr float kMinDensity = std::numeric_limits<float>::min();
+
 /// Compensation that leaves less than this share of the power is noise: the map is constant.
 constexpr double kMinCompensatedShare = 1e-5;
 
-/// A channel that is fit to be radiance; what is not is counted in `kind`: 0 good, 1 negative, 2
-/// infinite, 3 NaN.
-float repaired(float value, int& kind) {
-  if (value >= 0 && value <= std::numeric_limits<float>::max()) return value;
-  kind = std::max(kind, std::isnan(value) ? 3 : value < 0 ? 1 : 2);
-  return 0;
+bool is_radiance(float value) { return value >= 0 && value <= std::numeric_limits<float>::max(); }
+
+/// Zeroes the channels that are no radiance and counts the texel.
+void repair(EnvironmentMap::Texel& texel, EnvironmentMap::Repairs& repairs) {
+  bool nan = false;
+  bool infinite = false;
+  for (float* channel : {&texel.r, &texel.g, &texel.b}) {
+    if (is_radiance(*channel)) continue;
+    nan = nan || std::isnan(*channel);
+    infinite = infinite || std::isinf(*channel);
+    *channel = 0;
+  }
+  (nan ? repairs.nan : infinite ? repairs.infinite : repairs.negative) += 1;
 }
 
 double mean_rgb(const EnvironmentMap::Texel& t) {
@@ -32,15 +44,7 @@ double zone_solid_angle(double a, double b) {
   return 4 * kPiDouble * std::sin(0.5 * (a + b)) * std::sin(0.5 * (b - a));
 }
 
-/// Index of the non-empty interval of the cumulative sums that holds u * sum, and how far through
-/// it, kept `margin` away from both ends.
-int invert_cdf(std::span<const double> cdf, float u, double margin, double& remainder) {
-  const double x = u * cdf.back();
-  const auto upper = std::upper_bound(cdf.begin(), cdf.end(), x);
-  const auto lower = upper - 1;
-  remainder = std::clamp((x - *lower) / (*upper - *lower), margin, 1 - margin);
-  return static_cast<int>(lower - cdf.begin());
-}
+int num_blocks(int width) { return (width + kBlock - 1) / kBlock; }
 
 }  // namespace
 
@@ -56,13 +60,9 @@ EnvironmentMap::EnvironmentMap(const RgbImage& image, MapFilter filter, float sc
   for (int j = 0; j < height_; ++j) {
     Texel* row = &texels_[static_cast<std::size_t>(j + 1) * stride() + 1];
     for (int i = 0; i < width_; ++i, source += 3) {
-      int kind = 0;
-      row[i].r = repaired(source[0] * scale, kind);
-      row[i].g = repaired(source[1] * scale, kind);
-      row[i].b = repaired(source[2] * scale, kind);
-      repairs_.negative += kind == 1;
-      repairs_.infinite += kind == 2;
-      repairs_.nan += kind == 3;
+      row[i] = {source[0] * scale, source[1] * scale, source[2] * scale, 0};
+      if (is_radiance(row[i].r) && is_radiance(row[i].g) && is_radiance(row[i].b)) continue;
+      repair(row[i], repairs_);
     }
 
     // Wrap around horizontally.
@@ -101,67 +101,76 @@ std::size_t EnvironmentMap::cell_row(int row) const {
   return static_cast<std::size_t>(padded_row) * stride() + 1;
 }
 
-double EnvironmentMap::cell_means(int row, double* cell) const {
-  const Texel* upper = &texels_[cell_row(row)];
+double EnvironmentMap::measure_row(int row) {
+  // A nearest cell is one texel; a bilinear cell has corners in two columns of two rows.
+  Texel* upper = &texels_[cell_row(row)];
   double sum = 0;
   if (filter_ == MapFilter::nearest) {
-    for (int i = 0; i < width_; ++i) sum += cell[i + 1] = mean_rgb(upper[i]);
+    for (int i = 0; i < width_; ++i) {
+      upper[i].density = static_cast<float>(mean_rgb(upper[i]));
+      sum += upper[i].density;
+    }
     return sum;
   }
   const Texel* lower = upper + stride();
   double left = mean_rgb(upper[0]) + mean_rgb(lower[0]);
   for (int i = 0; i < width_; ++i) {
     const double right = mean_rgb(upper[i + 1]) + mean_rgb(lower[i + 1]);
-    sum += cell[i + 1] = 0.25 * (left + right);
+    upper[i].density = static_cast<float>(0.25 * (left + right));
+    sum += upper[i].density;
     left = right;
   }
   return sum;
 }
 
+std::pair<double, double> EnvironmentMap::compensation(
+    const std::vector<double>& solid_angle) const {
+  const double offset = total_power_ / (4 * kPiDouble);
+  double power = 0;
+  for (int r = 0; r < cell_rows(); ++r) {
+    const Texel* texel = &texels_[cell_row(r)];
+    double sum = 0;
+    for (int i = 0; i < width_; ++i) sum += std::max(0.0, texel[i].density - offset);
+    power += sum * solid_angle[r];
+  }
+  if (power < kMinCompensatedShare * total_power_) return {0.0, total_power_};
+  return {offset, power};
+}
+
 void EnvironmentMap::build_table(bool compensate) {
-  // Measure every cell and the map's power.
+  // Measure the cells and the map's power.
   const int rows = cell_rows();
-  const std::size_t pitch = static_cast<std::size_t>(width_) + 1;
-  cell_cdf_.resize(static_cast<std::size_t>(rows) * pitch);
   std::vector<double> solid_angle(static_cast<std::size_t>(rows));
   for (int r = 0; r < rows; ++r) {
     solid_angle[r] = zone_solid_angle(row_angle(r), row_angle(r + 1)) / width_;
-    total_power_ += cell_means(r, &cell_cdf_[r * pitch]) * solid_angle[r];
+    total_power_ += measure_row(r) * solid_angle[r];
   }
+  const auto [offset, power] =
+      compensate ? compensation(solid_angle) : std::pair(0.0, total_power_);
+  const double inverse_power = power > 0 ? 1 / power : 0.0;
 
-  // Find what the table leaves out, and what remains.
-  double offset = compensate ? total_power_ / (4 * kPiDouble) : 0.0;
-  double table_power = total_power_;
-  if (compensate) {
-    table_power = 0;
-    for (int r = 0; r < rows; ++r) {
-      double sum = 0;
-      for (int i = 1; i <= width_; ++i) sum += std::max(0.0, cell_cdf_[r * pitch + i] - offset);
-      table_power += sum * solid_angle[r];
-    }
-    if (table_power < kMinCompensatedShare * total_power_) {
-      offset = 0;
-      table_power = total_power_;
-    }
-  }
-
-  // Turn radiance into cumulative sums and densities; a cell that can be drawn has a positive
+  // Turn radiance into densities and cumulative sums; a cell with any weight keeps a positive
   // density.
-  const double inverse_power = table_power > 0 ? 1 / table_power : 0.0;
+  const int blocks = num_blocks(width_);
   row_cdf_.assign(static_cast<std::size_t>(rows) + 1, 0.0);
+  block_cdf_.assign(static_cast<std::size_t>(rows) * (blocks + 1), 0.0);
   for (int r = 0; r < rows; ++r) {
     Texel* texel = &texels_[cell_row(r)];
-    double* cell = &cell_cdf_[r * pitch];
-    double sum = cell[0] = 0;
-    for (int i = 0; i < width_; ++i) {
-      const double weight = std::max(0.0, cell[i + 1] - offset);
-      const auto density = static_cast<float>(weight * inverse_power);
-      texel[i].density = weight > 0 ? std::max(density, std::numeric_limits<float>::min()) : 0.0f;
-      cell[i + 1] = sum += weight;
+    double* block_cdf = &block_cdf_[static_cast<std::size_t>(r) * (blocks + 1)];
+    for (int block = 0; block < blocks; ++block) {
+      double sum = block_cdf[block];
+      const int end = std::min((block + 1) * kBlock, width_);
+      for (int i = block * kBlock; i < end; ++i) {
+        const double weight = texel[i].density - offset;
+        const auto density = static_cast<float>(weight * inverse_power);
+        texel[i].density = weight > 0 ? std::max(density, kMinDensity) : 0.0f;
+        sum += texel[i].density;
+      }
+      block_cdf[block + 1] = sum;
     }
     texel[-1].density = texel[width_ - 1].density;
     texel[width_].density = texel[0].density;
-    row_cdf_[r + 1] = row_cdf_[r] + sum * solid_angle[r];
+    row_cdf_[r + 1] = row_cdf_[r] + block_cdf[blocks] * solid_angle[r];
   }
 }
 
@@ -196,14 +205,25 @@ EnvironmentMap::Texel EnvironmentMap::evaluate(const Vec3& w) const {
 Vec3 EnvironmentMap::sample(const std::array<float, 2>& u) const {
   BATON_CHECK(row_cdf_.back() > 0);
 
-  // Choose row, then cell; the margin keeps a direction that is rounded to float inside its cell.
+  // Choose the row, then the block of cells, then the cell.
+  const auto row_end = std::upper_bound(row_cdf_.begin(), row_cdf_.end(), u[0] * row_cdf_.back());
+  const int row = static_cast<int>(row_end - row_cdf_.begin()) - 1;
+  const int blocks = num_blocks(width_);
+  const double* block_cdf = &block_cdf_[static_cast<std::size_t>(row) * (blocks + 1)];
+  const double x = u[1] * block_cdf[blocks];
+  const int block =
+      static_cast<int>(std::upper_bound(block_cdf, block_cdf + blocks + 1, x) - block_cdf) - 1;
+  const Texel* texel = &texels_[cell_row(row)];
+  int column = block * kBlock;
+  double below = block_cdf[block];
+  while (below + texel[column].density <= x) below += texel[column++].density;
+
+  // The remainders place it in the cell; the margin keeps a direction rounded to float inside.
   const double margin = std::min(0.25, std::max(width_, height_) * 0x1p-21);
-  double down = 0;
-  double right = 0;
-  const int row = invert_cdf(row_cdf_, u[0], margin, down);
-  const std::size_t pitch = static_cast<std::size_t>(width_) + 1;
-  const int column =
-      invert_cdf(std::span(cell_cdf_).subspan(row * pitch, pitch), u[1], margin, right);
+  const double down =
+      std::clamp((u[0] * row_cdf_.back() - row_cdf_[row]) / (row_cdf_[row + 1] - row_cdf_[row]),
+                 margin, 1 - margin);
+  const double right = std::clamp((x - below) / texel[column].density, margin, 1 - margin);
 
   // Place the direction uniformly in the cell's solid angle.
   const double top = row_angle(row);

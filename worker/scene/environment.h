@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <utility>
 #include <vector>
 
 #include "common/image/image_io.h"
@@ -64,15 +65,19 @@ class EnvironmentMap {
   double row_angle(int row) const;
   /// Index in texels_ of the texel that owns the first cell of a row.
   std::size_t cell_row(int row) const;
-  /// Mean radiance of the cells of a row to cell[1, W]; returns their sum.
-  double cell_means(int row, double* cell) const;
+  /// Writes the mean radiance of a row's cells to their densities; returns the sum.
+  double measure_row(int row);
+  /// Radiance that the table leaves out, and the power that remains in the table.
+  std::pair<double, double> compensation(const std::vector<double>& solid_angle) const;
   void build_table(bool compensate);
 
   int width_ = 0, height_ = 0;
   MapFilter filter_ = MapFilter::bilinear;
   std::vector<Texel> texels_;
-  std::vector<double> row_cdf_;   ///< (cell rows + 1) cumulative table weight; double loses no dim cell
-  std::vector<double> cell_cdf_;  ///< (cell rows, W + 1) the same within a row, per solid angle
+  /// Cumulative sums, in double: no dim cell is lost beside a sun. Of a row's cells only every kBlock-th sum is kept;
+  /// between them the densities are added up again, so what is sampled is exactly what evaluate() reports.
+  std::vector<double> row_cdf_;    ///< (cell rows + 1) probability
+  std::vector<double> block_cdf_;  ///< (cell rows, ceil(W / kBlock) + 1) densities of the row
   Repairs repairs_;
   double total_power_ = 0;
 };

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <fstream>
 #include <iterator>
 #include <limits>
 
@@ -28,7 +29,9 @@ class ImageIoTest : public testing::Test {
   }
   fs::path write(const std::string& name, ByteView bytes) const {
     const fs::path path = folder_ / name;
-    EXPECT_TRUE(write_file_atomic(path, bytes).ok());
+    std::ofstream(path, std::ios::binary)
+        .write(reinterpret_cast<const char*>(bytes.data()),
+               static_cast<std::streamsize>(bytes.size()));
     return path;
   }
 
@@ -120,8 +123,9 @@ TEST_F(ImageIoTest, ExrBytesAreDeterministicAndMetadataIsKept) {
 
 TEST_F(ImageIoTest, WritingSaysWhatIsWrong) {
   const FilmTile image = picture({"R"});
-  EXPECT_THAT(write_exr(folder_ / "a.exr", image, {.compression = "jpg"}).error().message,
-              HasSubstr("compression jpg, expected none, rle, zips, zip or piz"));
+  EXPECT_THAT(
+      write_exr(folder_ / "a.exr", image, {.compression = "jpg", .metadata = {}}).error().message,
+      HasSubstr("compression jpg, expected none, rle, zips, zip or piz"));
   EXPECT_THAT(
       write_exr(folder_ / "a.exr", image, {.metadata = {{"channels", "x"}}}).error().message,
       HasSubstr("metadata channels is there already"));
@@ -216,7 +220,8 @@ TEST_F(ImageIoTest, ADamagedExrNeverCrashes) {
     Bytes bad = whole;
     bad[i] ^= std::byte{0xFF};
     const Result<FilmTile> read = read_exr(write("bad.exr", bad));
-    if (!read) EXPECT_THAT(read.error().message, HasSubstr("bad.exr: "));
+    if (read) continue;
+    EXPECT_THAT(read.error().message, HasSubstr("bad.exr: "));
   }
 }
 

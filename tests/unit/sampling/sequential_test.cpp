@@ -1,4 +1,4 @@
-// The sequential sampler on a small exact space: six points with given targets. "Directions" are indices.
+// The sequential sampler on a small exact space: eight points with given targets. "Directions" are indices.
 #include "worker/sampling/sequential-inl.h"
 
 #include <gtest/gtest.h>
@@ -27,8 +27,10 @@ struct DiscreteTarget {
     }
     return {hn::GatherIndex(d, log_before.data(), index), hn::GatherIndex(d, log_now.data(), index), hn::Zero(d)};
   }
-  LogTargets Propose(VU bits, VF /*site_fraction*/, PointLanes& point) const {
-    point.code = hn::And(bits, hn::Set(DU(), kPoints - 1));
+  /// Blocks of neighbours from a random start on the ring of points.
+  static std::size_t BlockStart(std::uint32_t bits) { return bits % kPoints; }
+  LogTargets Propose(std::size_t entry, VF /*site_fraction*/, PointLanes& point) const {
+    point.code = hn::And(hn::Iota(DU(), static_cast<std::uint32_t>(entry)), hn::Set(DU(), kPoints - 1));
     return Evaluate(point);
   }
 };

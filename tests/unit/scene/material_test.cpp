@@ -60,7 +60,7 @@ std::vector<Case> all_cases() {
     cases.push_back({"phong 50", phong(0.5f, 0.5f, 50), view, 2});
     cases.push_back({"phong 1000", phong(0.2f, 0.8f, 1000), view, 4});
     cases.push_back({"phong 100000", phong(0, 1, 100000), view, 6});
-    cases.push_back({"ggx rough metal", ggx(1, 1), view, 1});
+    cases.push_back({"ggx rough metal", ggx(1, 1), view, 2});
     cases.push_back({"ggx 0.5", ggx(0.5f, 0.5f), view, 2});
     cases.push_back({"ggx dielectric", ggx(0, 0.3f), view, 2});
     cases.push_back({"ggx 0.1 metal", ggx(1, 0.1f), view, 5});

@@ -114,7 +114,7 @@ class ChaosFarm {
     }
     completions_.push_back(a.completion);
     for (const BlobRef& blob : a.completion.outputs) {
-      if (blob.kind != BlobKind::image) removed_.erase(blob.digest);
+      removed_.erase(blob.digest);
     }
   }
   void on(const RecordFailure& a) { failures_.push_back(a.failure); }

@@ -1,0 +1,113 @@
+#include "coordinator/journal/database.h"
+
+#include <fmt/format.h>
+#include <sqlite3.h>
+
+#include "common/base/check.h"
+
+namespace baton {
+namespace {
+
+Error database_error(int code, const std::string& name, const char* detail) {
+  switch (code & 0xff) {
+    case SQLITE_BUSY:
+    case SQLITE_LOCKED:
+      return {ErrorKind::io, fmt::format("{}: already in use by another coordinator", name)};
+    case SQLITE_NOTADB:
+    case SQLITE_CORRUPT:
+      return {ErrorKind::corrupt, fmt::format("{}: damaged, or not a journal: {}", name, detail)};
+    default: return {ErrorKind::io, fmt::format("{}: {}", name, detail)};
+  }
+}
+
+}  // namespace
+
+// ---- statements ----------------------------------------------------------------------------------------------
+
+void SqlStatement::Finalize::operator()(sqlite3_stmt* statement) const { sqlite3_finalize(statement); }
+
+SqlStatement& SqlStatement::bind(std::int64_t value) {
+  BATON_CHECK(sqlite3_bind_int64(statement_.get(), ++num_bound_, value) == SQLITE_OK);
+  return *this;
+}
+
+SqlStatement& SqlStatement::bind(std::string_view text) {
+  BATON_CHECK(sqlite3_bind_text64(statement_.get(), ++num_bound_, text.data(), text.size(), SQLITE_TRANSIENT,
+                                  SQLITE_UTF8) == SQLITE_OK);
+  return *this;
+}
+
+SqlStatement& SqlStatement::bind(ByteView blob) {
+  BATON_CHECK(sqlite3_bind_blob64(statement_.get(), ++num_bound_, blob.data(), blob.size(), SQLITE_TRANSIENT) ==
+              SQLITE_OK);
+  return *this;
+}
+
+Result<bool> SqlStatement::step() {
+  const int code = sqlite3_step(statement_.get());
+  if (code == SQLITE_ROW) return true;
+  if (code == SQLITE_DONE) return false;
+  return database_error(code, name_, sqlite3_errmsg(sqlite3_db_handle(statement_.get())));
+}
+
+Status SqlStatement::run() {
+  BATON_ASSIGN(const bool row, step());
+  BATON_CHECK(!row);
+  return {};
+}
+
+std::int64_t SqlStatement::integer(int column) const { return sqlite3_column_int64(statement_.get(), column); }
+
+std::string SqlStatement::text(int column) const {
+  const ByteView bytes = blob(column);
+  return {reinterpret_cast<const char*>(bytes.data()), bytes.size()};
+}
+
+ByteView SqlStatement::blob(int column) const {
+  const auto* data = static_cast<const std::byte*>(sqlite3_column_blob(statement_.get(), column));
+  return {data, static_cast<std::size_t>(sqlite3_column_bytes(statement_.get(), column))};
+}
+
+// ---- database ------------------------------------------------------------------------------------------------
+
+void SqlDatabase::Close::operator()(sqlite3* database) const { sqlite3_close(database); }
+
+Result<SqlDatabase> SqlDatabase::open(const std::filesystem::path& path) {
+  sqlite3* handle = nullptr;
+  const int code = sqlite3_open_v2(path.c_str(), &handle, SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE, nullptr);
+  SqlDatabase database(handle, path.string());
+  if (code != SQLITE_OK) return database_error(code, database.name_, sqlite3_errstr(code));
+
+  // Exclusive from the first access on: no shared memory file, and a second coordinator finds the door closed.
+  BATON_TRY(database.execute("PRAGMA locking_mode = EXCLUSIVE"));
+  BATON_TRY(database.execute("PRAGMA journal_mode = WAL"));
+  BATON_TRY(database.execute("PRAGMA synchronous = FULL"));
+
+  BATON_ASSIGN(SqlStatement check, database.prepare("PRAGMA quick_check(1)"));
+  BATON_ASSIGN(const bool row, check.step());
+  if (!row || check.text(0) != "ok") {
+    return database_error(SQLITE_CORRUPT, database.name_, row ? check.text(0).c_str() : "no answer");
+  }
+  return database;
+}
+
+Status SqlDatabase::execute(const std::string& sql) {
+  const int code = sqlite3_exec(database_.get(), sql.c_str(), nullptr, nullptr, nullptr);
+  if (code != SQLITE_OK) return database_error(code, name_, sqlite3_errmsg(database_.get()));
+  return {};
+}
+
+Result<SqlStatement> SqlDatabase::prepare(std::string_view sql) {
+  sqlite3_stmt* statement = nullptr;
+  const int code = sqlite3_prepare_v2(database_.get(), sql.data(), static_cast<int>(sql.size()), &statement, nullptr);
+  if (code != SQLITE_OK) return database_error(code, name_, sqlite3_errmsg(database_.get()));
+  return SqlStatement(statement, name_);
+}
+
+Result<std::int64_t> SqlDatabase::pragma(std::string_view name) {
+  BATON_ASSIGN(SqlStatement statement, prepare(fmt::format("PRAGMA {}", name)));
+  BATON_ASSIGN(const bool row, statement.step());
+  return row ? statement.integer(0) : 0;
+}
+
+}  // namespace baton

@@ -1,0 +1,70 @@
+#pragma once
+
+#include <cstdint>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <string_view>
+
+#include "common/base/bytes.h"
+#include "common/base/result.h"
+
+struct sqlite3;
+struct sqlite3_stmt;
+
+namespace baton {
+
+/// One prepared statement. Used as: bind all, step until false.
+class SqlStatement {
+ public:
+  /// Parameters are numbered from 1 in the order of the calls.
+  SqlStatement& bind(std::int64_t value);
+  SqlStatement& bind(std::string_view text);
+  SqlStatement& bind(ByteView blob);
+
+  /// True: a row is there. False: done.
+  Result<bool> step();
+  /// For statements without rows.
+  Status run();
+
+  /// Columns are numbered from 0. Views are valid until the next step.
+  std::int64_t integer(int column) const;
+  std::string text(int column) const;
+  ByteView blob(int column) const;
+
+ private:
+  friend class SqlDatabase;
+  struct Finalize {
+    void operator()(sqlite3_stmt* statement) const;
+  };
+  SqlStatement(sqlite3_stmt* statement, std::string name) : statement_(statement), name_(std::move(name)) {}
+
+  std::unique_ptr<sqlite3_stmt, Finalize> statement_;
+  std::string name_;  ///< of the file, for errors
+  int num_bound_ = 0;
+};
+
+/// An SQLite file that one process has to itself. Errors name the file; one that is damaged or no SQLite file is
+/// ErrorKind::corrupt, one in use ErrorKind::io.
+class SqlDatabase {
+ public:
+  /// Opens or creates the file, write-ahead logged; a commit survives a power cut. Reads the whole file once to check it.
+  static Result<SqlDatabase> open(const std::filesystem::path& path);
+
+  Status execute(const std::string& sql);
+  Result<SqlStatement> prepare(std::string_view sql);
+  /// "PRAGMA <name>" as a number.
+  Result<std::int64_t> pragma(std::string_view name);
+  const std::string& name() const { return name_; }
+
+ private:
+  struct Close {
+    void operator()(sqlite3* database) const;
+  };
+  SqlDatabase(sqlite3* database, std::string name) : database_(database), name_(std::move(name)) {}
+
+  std::unique_ptr<sqlite3, Close> database_;
+  std::string name_;
+};
+
+}  // namespace baton

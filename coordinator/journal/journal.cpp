@@ -1,0 +1,227 @@
+#include "coordinator/journal/journal.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "common/base/archive.h"
+
+namespace baton {
+namespace {
+
+constexpr std::int64_t kSchemaVersion = 1;
+constexpr std::int64_t kApplicationId = 0x4241544e;  // "BATN"
+
+// Digests, keys and statuses are written as numbers and hexadecimal text, so that the sqlite3 shell shows them; outputs,
+// statistics and leases in the form of common/base/archive.h.
+constexpr const char* kSchema = R"sql(
+  CREATE TABLE starts (epoch INTEGER NOT NULL);
+  INSERT INTO starts VALUES (0);
+  CREATE TABLE jobs (
+    position INTEGER PRIMARY KEY AUTOINCREMENT,
+    digest TEXT NOT NULL UNIQUE,
+    status INTEGER NOT NULL,
+    document TEXT NOT NULL);
+  CREATE TABLE completions (
+    position INTEGER PRIMARY KEY AUTOINCREMENT,
+    job TEXT NOT NULL,
+    kind INTEGER NOT NULL, step INTEGER NOT NULL, tile INTEGER NOT NULL,
+    outputs BLOB NOT NULL,
+    stats BLOB NOT NULL,
+    UNIQUE (job, kind, step, tile));
+  CREATE TABLE failures (
+    position INTEGER PRIMARY KEY AUTOINCREMENT,
+    job TEXT NOT NULL,
+    lease BLOB NOT NULL,
+    worker TEXT NOT NULL,
+    message TEXT NOT NULL,
+    permanent INTEGER NOT NULL);
+  CREATE INDEX failures_by_job ON failures (job);
+)sql";
+
+template <class T>
+Status read_blob(const SqlDatabase& database, ByteView bytes, const char* column, T& value) {
+  ArchiveReader reader(bytes);
+  reader(value);
+  if (reader.complete()) return {};
+  return Error{ErrorKind::corrupt,
+               fmt::format("{}: {}: {} bytes that cannot be read", database.name(), column, bytes.size())};
+}
+
+}  // namespace
+
+// ---- opening -------------------------------------------------------------------------------------------------
+
+Result<Journal> Journal::open(const std::filesystem::path& path) {
+  BATON_ASSIGN(SqlDatabase database, SqlDatabase::open(path));
+  Journal journal(std::move(database));
+  BATON_TRY(journal.prepare_schema());
+  BATON_TRY(journal.count_start());
+  return journal;
+}
+
+Status Journal::prepare_schema() {
+  BATON_ASSIGN(const std::int64_t version, database_.pragma("user_version"));
+  BATON_ASSIGN(const std::int64_t application, database_.pragma("application_id"));
+  BATON_ASSIGN(const std::int64_t schema_changes, database_.pragma("schema_version"));
+
+  // A file without any table is new, or was left before its first commit.
+  if (schema_changes == 0) {
+    return database_.execute(fmt::format("BEGIN; {} PRAGMA user_version = {}; PRAGMA application_id = {}; COMMIT;",
+                                         kSchema, kSchemaVersion, kApplicationId));
+  }
+  if (application != kApplicationId) {
+    return Error{ErrorKind::corrupt, fmt::format("{}: a database, but not a journal of a coordinator", database_.name())};
+  }
+  if (version != kSchemaVersion) {
+    return Error{ErrorKind::version, fmt::format("{}: journal version {}, this program reads {}", database_.name(),
+                                                 version, kSchemaVersion)};
+  }
+  return {};
+}
+
+Status Journal::count_start() {
+  BATON_TRY(database_.execute("UPDATE starts SET epoch = epoch + 1"));
+  BATON_ASSIGN(SqlStatement query, database_.prepare("SELECT epoch FROM starts"));
+  BATON_ASSIGN(const bool row, query.step());
+  epoch_ = row ? static_cast<std::uint32_t>(query.integer(0)) : 0;
+  return {};
+}
+
+// ---- reading -------------------------------------------------------------------------------------------------
+
+Result<std::vector<Digest>> Journal::jobs() {
+  BATON_ASSIGN(SqlStatement query, database_.prepare("SELECT digest FROM jobs ORDER BY position"));
+  std::vector<Digest> jobs;
+  while (true) {
+    BATON_ASSIGN(const bool row, query.step());
+    if (!row) return jobs;
+    const std::optional<Digest> digest = Digest::from_hex(query.text(0));
+    if (!digest) return Error{ErrorKind::corrupt, fmt::format("{}: jobs: no digest: '{}'", database_.name(), query.text(0))};
+    jobs.push_back(*digest);
+  }
+}
+
+Result<JournalledJob> Journal::load(const Digest& digest) {
+  JournalledJob result;
+  result.job = digest;
+  BATON_ASSIGN(SqlStatement job, database_.prepare("SELECT status, document FROM jobs WHERE digest = ?"));
+  BATON_ASSIGN(const bool found, job.bind(digest.hex()).step());
+  if (!found) return Error{ErrorKind::internal, fmt::format("{}: no job {}", database_.name(), digest.hex())};
+  result.status = static_cast<JobStatus>(std::clamp<std::int64_t>(job.integer(0), 0, 3));
+  result.document = job.text(1);
+
+  BATON_ASSIGN(SqlStatement done, database_.prepare("SELECT kind, step, tile, outputs, stats FROM completions "
+                                                    "WHERE job = ? ORDER BY position"));
+  done.bind(digest.hex());
+  while (true) {
+    BATON_ASSIGN(const bool row, done.step());
+    if (!row) break;
+    Completion& completion = result.completions.emplace_back();
+    completion.task = {static_cast<TaskKind>(std::clamp<std::int64_t>(done.integer(0), 0, 1)),
+                       static_cast<std::int32_t>(done.integer(1)), static_cast<std::int32_t>(done.integer(2))};
+    BATON_TRY(read_blob(database_, done.blob(3), "completions.outputs", completion.outputs));
+    BATON_TRY(read_blob(database_, done.blob(4), "completions.stats", completion.stats));
+  }
+
+  BATON_ASSIGN(SqlStatement failed, database_.prepare("SELECT lease, worker, message, permanent FROM failures "
+                                                      "WHERE job = ? ORDER BY position"));
+  failed.bind(digest.hex());
+  while (true) {
+    BATON_ASSIGN(const bool row, failed.step());
+    if (!row) return result;
+    BATON_ASSIGN(Failure failure, read_failure(failed));
+    result.failures.push_back(std::move(failure));
+  }
+}
+
+Result<std::optional<std::string>> Journal::document(const Digest& job) {
+  BATON_ASSIGN(SqlStatement query, database_.prepare("SELECT document FROM jobs WHERE digest = ?"));
+  BATON_ASSIGN(const bool row, query.bind(job.hex()).step());
+  return row ? std::optional(query.text(0)) : std::nullopt;
+}
+
+Result<std::vector<Failure>> Journal::recent_failures(const Digest& job, int count) {
+  BATON_ASSIGN(SqlStatement query, database_.prepare("SELECT lease, worker, message, permanent FROM failures "
+                                                     "WHERE job = ? ORDER BY position DESC LIMIT ?"));
+  query.bind(job.hex()).bind(count);
+  std::vector<Failure> failures;
+  while (true) {
+    BATON_ASSIGN(const bool row, query.step());
+    if (!row) break;
+    BATON_ASSIGN(Failure failure, read_failure(query));
+    failures.push_back(std::move(failure));
+  }
+  std::reverse(failures.begin(), failures.end());
+  return failures;
+}
+
+/// Columns: lease, worker, message, permanent.
+Result<Failure> Journal::read_failure(const SqlStatement& row) const {
+  Failure failure;
+  BATON_TRY(read_blob(database_, row.blob(0), "failures.lease", failure.lease));
+  failure.worker = row.text(1);
+  failure.message = row.text(2);
+  failure.permanent = row.integer(3) != 0;
+  return failure;
+}
+
+// ---- writing -------------------------------------------------------------------------------------------------
+
+Result<SqlStatement> Journal::write(std::string_view sql) {
+  if (!in_transaction_) BATON_TRY(database_.execute("BEGIN IMMEDIATE"));
+  in_transaction_ = true;
+  return database_.prepare(sql);
+}
+
+Status Journal::add_job(const Digest& job, const std::string& document) {
+  BATON_ASSIGN(SqlStatement insert, write("INSERT INTO jobs (digest, status, document) VALUES (?, ?, ?)"));
+  return insert.bind(job.hex()).bind(static_cast<std::int64_t>(JobStatus::running)).bind(document).run();
+}
+
+Status Journal::restart_job(const Digest& job, bool fresh) {
+  BATON_ASSIGN(SqlStatement failures, write("DELETE FROM failures WHERE job = ?"));
+  BATON_TRY(failures.bind(job.hex()).run());
+  if (fresh) {
+    BATON_ASSIGN(SqlStatement completions, write("DELETE FROM completions WHERE job = ?"));
+    BATON_TRY(completions.bind(job.hex()).run());
+  }
+  return record_status(job, JobStatus::running);
+}
+
+Status Journal::record_status(const Digest& job, JobStatus status) {
+  BATON_ASSIGN(SqlStatement update, write("UPDATE jobs SET status = ? WHERE digest = ?"));
+  return update.bind(static_cast<std::int64_t>(status)).bind(job.hex()).run();
+}
+
+Status Journal::record_completion(const Digest& job, const Completion& completion) {
+  BATON_ASSIGN(SqlStatement insert, write("INSERT OR REPLACE INTO completions (job, kind, step, tile, outputs, stats) "
+                                          "VALUES (?, ?, ?, ?, ?, ?)"));
+  return insert.bind(job.hex())
+      .bind(static_cast<std::int64_t>(completion.task.kind))
+      .bind(completion.task.step)
+      .bind(completion.task.tile)
+      .bind(to_bytes(completion.outputs))
+      .bind(to_bytes(completion.stats))
+      .run();
+}
+
+Status Journal::record_failure(const Failure& failure) {
+  BATON_ASSIGN(SqlStatement insert,
+               write("INSERT INTO failures (job, lease, worker, message, permanent) VALUES (?, ?, ?, ?, ?)"));
+  return insert.bind(failure.lease.job.hex())
+      .bind(to_bytes(failure.lease))
+      .bind(failure.worker)
+      .bind(failure.message)
+      .bind(std::int64_t{failure.permanent})
+      .run();
+}
+
+Status Journal::commit() {
+  if (!in_transaction_) return {};
+  in_transaction_ = false;
+  return database_.execute("COMMIT");
+}
+
+}  // namespace baton

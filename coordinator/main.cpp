@@ -1,0 +1,75 @@
+#include <signal.h>
+#include <spdlog/spdlog.h>
+
+#include <CLI/CLI.hpp>
+#include <algorithm>
+#include <atomic>
+#include <filesystem>
+
+#include "common/base/exit_codes.h"
+#include "common/base/files.h"
+#include "common/base/log.h"
+#include "common/base/version.h"
+#include "coordinator/service/service.h"
+
+namespace {
+
+/// Set by SIGTERM and SIGINT, read by the loop.
+std::atomic<bool> g_stop{false};
+
+/// The first signal stops cleanly, a second one of the same kind ends the process at once.
+void install_stop_handler() {
+  struct sigaction action {};
+  action.sa_handler = [](int) { g_stop = true; };
+  action.sa_flags = static_cast<int>(SA_RESETHAND);
+  ::sigaction(SIGTERM, &action, nullptr);
+  ::sigaction(SIGINT, &action, nullptr);
+}
+
+baton::Status coordinate(const baton::ServiceOptions& options, const std::filesystem::path& endpoint_file) {
+  BATON_ASSIGN(baton::Service service, baton::Service::open(options));
+  if (!endpoint_file.empty()) {
+    BATON_TRY(baton::write_file_atomic(endpoint_file, baton::as_bytes_view(service.endpoint() + "\n")));
+  }
+  spdlog::info("listening on {}, work folder {}", service.endpoint(), options.work_dir.string());
+  return service.run(g_stop);
+}
+
+}  // namespace
+
+int main(int argc, char** argv) {
+  CLI::App app("Splits jobs into tasks and leases them to workers. Killed at any time, it goes on where it was.");
+  app.set_version_flag("--version", baton::kVersion);
+  app.footer(
+      "Examples:\n"
+      "  baton-coordinator --work-dir /srv/baton --listen 'tcp://*:5570'\n"
+      "  baton-coordinator --work-dir farm --listen 'tcp://127.0.0.1:*' --endpoint-file farm/endpoint\n"
+      "The work folder must be on a file system that all workers share.");
+
+  baton::ServiceOptions options;
+  std::filesystem::path endpoint_file;
+  std::int64_t heartbeat_ms = options.heartbeat.count();
+  app.add_option("--listen", options.listen, "endpoint; port * picks a free one")
+      ->envname("BATON_LISTEN")
+      ->capture_default_str();
+  app.add_option("--work-dir", options.work_dir, "folder of the journal and the blob store")
+      ->envname("BATON_WORK_DIR")
+      ->required();
+  app.add_option("--endpoint-file", endpoint_file, "file that gets the concrete endpoint once it listens");
+  app.add_option("--heartbeat-ms", heartbeat_ms, "between signs of life of a worker; four missing ones lose it its leases")
+      ->check(CLI::Range(10, 60000))
+      ->capture_default_str();
+  try {
+    app.parse(argc, argv);
+  } catch (const CLI::ParseError& error) {
+    return app.exit(error) == 0 ? 0 : static_cast<int>(baton::ExitCode::usage);
+  }
+
+  baton::init_logging("baton-coordinator");
+  install_stop_handler();
+  options.heartbeat = std::chrono::milliseconds(heartbeat_ms);
+  const baton::Status status = coordinate(options, endpoint_file);
+  if (status) return static_cast<int>(baton::ExitCode::ok);
+  spdlog::error("{}", status.error().message);
+  return static_cast<int>(baton::exit_code_of(status.error().kind));
+}

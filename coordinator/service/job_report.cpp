@@ -1,0 +1,92 @@
+#include "coordinator/service/job_report.h"
+
+#include <fmt/format.h>
+
+#include <filesystem>
+
+namespace baton {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// The frames that are finished, by user's number. Assemble tasks come first, by frame.
+std::vector<std::int32_t> finished_frames(const Scheduler::Job& job) {
+  std::vector<std::int32_t> frames;
+  for (TaskIndex frame = 0; frame < job.tasks.graph().num_frames(); ++frame) {
+    if (job.tasks.status(frame) == TaskStatus::done) {
+      frames.push_back(job.spec.frames[static_cast<std::size_t>(frame)]);
+    }
+  }
+  return frames;
+}
+
+std::string describe(const Scheduler::Job& job, const Failure& failure) {
+  const TaskKey& task = failure.lease.task;
+  const JobGraph& graph = job.tasks.graph();
+  const auto number = [&](std::int32_t frame) { return job.spec.frames[static_cast<std::size_t>(frame)]; };
+  if (!graph.find(task)) return failure.message;
+  const std::string place =
+      task.kind == TaskKind::assemble
+          ? fmt::format("frame {}", number(task.step))
+          : fmt::format("frames {}-{}, tile {}", number(graph.first_frame(task.step)),
+                        number(graph.last_frame(task.step)), task.tile);
+  return fmt::format("{} on {}: {}", place, failure.worker, failure.message);
+}
+
+}  // namespace
+
+JobSummary summarize(const Digest& digest, const Scheduler::Job& job) {
+  const JobProgress& progress = job.tasks.progress();
+  JobSummary summary;
+  summary.job = digest;
+  summary.name = job.spec.name;
+  summary.output_directory = job.spec.output.directory;
+  summary.status = job.status;
+  summary.priority = job.spec.priority;
+  summary.tasks_total = progress.tasks_total;
+  summary.tasks_done = progress.tasks_done;
+  summary.tasks_leased = progress.tasks_leased;
+  summary.tasks_failed = progress.tasks_failed;
+  summary.attempts_lost = progress.attempts_lost;
+  summary.frames_total = static_cast<std::uint32_t>(job.spec.frames.size());
+  summary.frames_done = progress.frames_done;
+  summary.state_bytes = progress.state_bytes;
+  summary.state_pixels = progress.state_pixels;
+  summary.stats = progress.stats;
+  return summary;
+}
+
+JobDetail describe_job(const Digest& digest, const Scheduler::Job& job, const std::vector<Failure>& failures) {
+  JobDetail detail{summarize(digest, job), finished_frames(job), {}};
+  for (const Failure& failure : failures) detail.failures.push_back(describe(job, failure));
+  return detail;
+}
+
+Result<Digest> resolve_job(const Scheduler& scheduler, const std::string& prefix) {
+  std::vector<Digest> matches;
+  for (const Digest& job : scheduler.jobs()) {
+    if (!prefix.empty() && job.hex().starts_with(prefix)) matches.push_back(job);
+  }
+  if (matches.size() == 1) return matches.front();
+  return Error{ErrorKind::bad_input, matches.empty()
+                                         ? fmt::format("job '{}': no job has this ID", prefix)
+                                         : fmt::format("job '{}': {} jobs have IDs that begin so", prefix, matches.size())};
+}
+
+std::optional<std::string> find_missing_file(const JobAdded& job, const BlobStore& store) {
+  // A scheduler that knows only this job tells what is recorded as done, and which blobs that leaves.
+  Scheduler trial(0, std::chrono::milliseconds(0));
+  trial.step(job, {});
+  const Scheduler::Job& recorded = *trial.find_job(job.job);
+  for (const Digest& blob : recorded.tasks.live_blobs()) {
+    if (!store.contains(blob)) return store.path(blob).string();
+  }
+  for (const std::int32_t frame : finished_frames(recorded)) {
+    const fs::path path = fs::path(job.spec.output.directory) / frame_file_name(job.spec.output.pattern, frame);
+    std::error_code ignored;
+    if (!fs::exists(path, ignored)) return path.string();
+  }
+  return std::nullopt;
+}
+
+}  // namespace baton

@@ -1,0 +1,59 @@
+#include "coordinator/service/peers.h"
+
+#include <algorithm>
+
+#include "common/base/limits.h"
+
+namespace baton {
+
+void Peers::add(const PeerId& peer, const WorkerHello& hello) {
+  remove(worker_of(peer));
+  remove(hello.worker_id);
+  workers_[hello.worker_id] = {peer, hello};
+  names_[peer] = hello.worker_id;
+}
+
+void Peers::remove(const std::string& worker) {
+  const auto found = workers_.find(worker);
+  if (found == workers_.end()) return;
+  names_.erase(found->second.peer);
+  workers_.erase(found);
+}
+
+std::string Peers::worker_of(const PeerId& peer) const {
+  const auto found = names_.find(peer);
+  return found == names_.end() ? std::string() : found->second;
+}
+
+std::optional<PeerId> Peers::peer_of(const std::string& worker) const {
+  const auto found = workers_.find(worker);
+  if (found == workers_.end()) return std::nullopt;
+  return found->second.peer;
+}
+
+std::vector<WorkerSummary> Peers::summaries() const {
+  std::vector<WorkerSummary> result;
+  for (const auto& [name, entry] : workers_) {
+    result.push_back({name, entry.hello.host, entry.hello.pid, entry.hello.num_threads, 0});
+  }
+  return result;
+}
+
+std::vector<PeerId> Peers::connections() const {
+  std::vector<PeerId> result;
+  for (const auto& [name, entry] : workers_) result.push_back(entry.peer);
+  return result;
+}
+
+bool Peers::is_mixed(const std::string& instruction_set) const {
+  return std::any_of(workers_.begin(), workers_.end(), [&](const auto& worker) {
+    return worker.second.hello.instruction_set != instruction_set;
+  });
+}
+
+bool OncePerPeer::first(const PeerId& peer) {
+  if (seen_.size() >= limits::kMaxWorkers) seen_.clear();
+  return seen_.insert(peer).second;
+}
+
+}  // namespace baton

@@ -1,0 +1,51 @@
+#pragma once
+
+#include <map>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "common/protocol/router.h"
+
+namespace baton {
+
+/// Which connection belongs to which worker. A worker that connects again takes its name along.
+class Peers {
+ public:
+  /// Introduces or replaces a worker.
+  void add(const PeerId& peer, const WorkerHello& hello);
+  void remove(const std::string& worker);
+
+  /// Empty: the connection belongs to no worker.
+  std::string worker_of(const PeerId& peer) const;
+  /// nullopt: no such worker.
+  std::optional<PeerId> peer_of(const std::string& worker) const;
+  std::size_t num_workers() const { return workers_.size(); }
+  /// By name, without their leases.
+  std::vector<WorkerSummary> summaries() const;
+  std::vector<PeerId> connections() const;
+  /// True when a connected worker has another instruction set.
+  bool is_mixed(const std::string& instruction_set) const;
+
+ private:
+  struct Entry {
+    PeerId peer;
+    WorkerHello hello;
+  };
+  std::map<std::string, Entry> workers_;
+  std::map<PeerId, std::string> names_;
+};
+
+/// Remembers connections, so that each is told or complained about once. Bounded: forgets all when it is full.
+class OncePerPeer {
+ public:
+  /// True the first time.
+  bool first(const PeerId& peer);
+  void clear() { seen_.clear(); }
+
+ private:
+  std::set<PeerId> seen_;
+};
+
+}  // namespace baton

@@ -1,0 +1,244 @@
+#include "coordinator/service/service.h"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "common/base/limits.h"
+
+namespace baton {
+namespace {
+
+namespace fs = std::filesystem;
+using Clock = std::chrono::steady_clock;
+
+constexpr int kSilentHeartbeats = 4;
+constexpr int kMaxMessagesPerTurn = 1000;
+constexpr std::int32_t kRetryMs = 250;
+constexpr std::chrono::milliseconds kTick{250};
+
+}  // namespace
+
+// ---- the loop ------------------------------------------------------------------------------------------------
+
+Result<Service> Service::open(const ServiceOptions& options) {
+  std::error_code error;
+  fs::create_directories(options.work_dir, error);
+  if (error) {
+    return Error{ErrorKind::io, fmt::format("{}: cannot create: {}", options.work_dir.string(), error.message())};
+  }
+  BATON_ASSIGN(Journal journal, Journal::open(options.work_dir / "journal.sqlite"));
+  BATON_ASSIGN(BlobStore store, BlobStore::open(options.work_dir / "store"));
+  BATON_ASSIGN(Router router, Router::bind(options.listen));
+  Service service(options, std::move(router), std::move(journal), std::move(store));
+  BATON_TRY(service.restore_jobs());
+  return service;
+}
+
+Service::Service(const ServiceOptions& options, Router router, Journal journal, BlobStore store)
+    : options_(options),
+      store_directory_(fs::absolute(options.work_dir / "store").lexically_normal()),
+      router_(std::move(router)),
+      journal_(std::move(journal)),
+      store_(std::move(store)),
+      scheduler_(journal_.epoch(), kSilentHeartbeats * options.heartbeat) {}
+
+Status Service::run(const std::atomic<bool>& stop) {
+  while (!stop && !stop_requested_) BATON_TRY(turn());
+  for (const PeerId& worker : peers_.connections()) router_.send(worker, Shutdown{});
+  return {};
+}
+
+Status Service::turn() {
+  // Take what has arrived, or wait for the next tick.
+  const auto until_tick = std::chrono::ceil<std::chrono::milliseconds>(next_tick_ - Clock::now());
+  std::chrono::milliseconds timeout = std::clamp(until_tick, std::chrono::milliseconds(0), kTick);
+  for (int i = 0; i < kMaxMessagesPerTurn; ++i) {
+    const std::optional<Incoming> incoming = router_.receive(timeout);
+    if (!incoming) break;
+    BATON_TRY(handle(*incoming));
+    timeout = std::chrono::milliseconds(0);
+  }
+  if (Clock::now() >= next_tick_) {
+    next_tick_ = Clock::now() + kTick;
+    asked_for_hello_.clear();
+    BATON_TRY(step(ClockTicked{}));
+  }
+
+  // First durable, then known to others.
+  BATON_TRY(journal_.commit());
+  let_out();
+  return {};
+}
+
+void Service::let_out() {
+  for (const Outgoing& outgoing : std::exchange(outbox_, {})) {
+    if (!router_.send(outgoing.peer, outgoing.message)) spdlog::debug("a peer is gone or does not read; message dropped");
+  }
+  for (const Digest& blob : std::exchange(garbage_, {})) {
+    if (scheduler_.is_referenced(blob)) continue;
+    if (const Status removed = store_.remove(blob); !removed) spdlog::warn("{}", removed.error().message);
+  }
+}
+
+Status Service::step(const Event& event) {
+  for (const Action& action : scheduler_.step(event, Clock::now())) {
+    BATON_TRY(std::visit([this](const auto& a) { return perform(a); }, action));
+  }
+  return {};
+}
+
+Status Service::handle(const Incoming& incoming) {
+  const PeerId& peer = incoming.peer;
+  if (!incoming.message) {
+    if (complained_.first(peer)) spdlog::warn("bad message: {}", incoming.message.error().message);
+    refuse(peer, incoming.message.error());
+    return {};
+  }
+  const std::string worker = peers_.worker_of(peer);
+  return std::visit(
+      [&](const auto& message) -> Status {
+        if constexpr (requires { this->receive(peer, message); }) {
+          return receive(peer, message);
+        } else if constexpr (requires { this->receive_from(worker, message); }) {
+          if (!worker.empty()) return receive_from(worker, message);
+          if (asked_for_hello_.first(peer)) reply(peer, HelloAgain{});
+        } else {
+          refuse(peer, {ErrorKind::bad_input, "this message is not for a coordinator"});
+        }
+        return {};
+      },
+      *incoming.message);
+}
+
+// ---- messages of workers -------------------------------------------------------------------------------------
+
+Status Service::receive(const PeerId& peer, const WorkerHello& hello) {
+  if (hello.worker_id.empty() || hello.worker_id.size() > limits::kMaxTextLength) {
+    refuse(peer, {ErrorKind::bad_input, "a worker needs a name of at most 4096 bytes"});
+    return {};
+  }
+  const bool is_new = !peers_.peer_of(hello.worker_id).has_value();
+  if (is_new && peers_.num_workers() >= limits::kMaxWorkers) {
+    refuse(peer, {ErrorKind::io, fmt::format("the farm is full: {} workers", peers_.num_workers())});
+    return {};
+  }
+  if (peers_.is_mixed(hello.instruction_set)) {
+    spdlog::warn("worker {} computes with {}, others do not: results may differ in the last bits", hello.worker_id,
+                 hello.instruction_set);
+  }
+
+  // Answer before the leases that follow from it.
+  peers_.add(peer, hello);
+  if (is_new) spdlog::info("worker {} joined: {} threads on {}", hello.worker_id, hello.num_threads, hello.host);
+  reply(peer, WorkerWelcome{journal_.epoch(), static_cast<std::int32_t>(options_.heartbeat.count()),
+                            store_directory_.string()});
+  return step(WorkerJoined{hello.worker_id, hello.running});
+}
+
+Status Service::receive_from(const std::string& worker, const LeaseRequest& message) {
+  return step(WorkRequested{worker, message.count});
+}
+
+Status Service::receive_from(const std::string& worker, const Heartbeat& message) {
+  reply_to(worker, Heartbeat{});
+  return step(WorkerAlive{worker, message.running});
+}
+
+Status Service::receive_from(const std::string& worker, const TaskDone& message) {
+  // Accepted results must be there: a blob may have gone between publishing and reporting.
+  if (const auto missing = find_missing_blob(message)) {
+    return step(AttemptFailed{worker, message.lease, fmt::format("{}: reported, but not there", *missing), false});
+  }
+  return step(TaskCompleted{worker, message.lease, message.outputs, message.stats});
+}
+
+Status Service::receive_from(const std::string& worker, const TaskFailed& message) {
+  return step(AttemptFailed{worker, message.lease, message.message.substr(0, limits::kMaxTextLength), message.permanent});
+}
+
+Status Service::receive_from(const std::string& worker, const WorkerGoodbye&) {
+  spdlog::info("worker {} left", worker);
+  peers_.remove(worker);
+  return step(WorkerLeft{worker});
+}
+
+std::optional<std::string> Service::find_missing_blob(const TaskDone& report) const {
+  // Of a task that was done before the blobs may have served their purpose.
+  const Scheduler::Job* job = scheduler_.find_job(report.lease.job);
+  const auto task = job ? job->tasks.graph().find(report.lease.task) : std::nullopt;
+  if (!task || job->tasks.status(*task) == TaskStatus::done) return std::nullopt;
+  for (const BlobRef& output : report.outputs) {
+    if (output.kind != BlobKind::image && !store_.contains(output.digest)) return store_.path(output.digest).string();
+  }
+  return std::nullopt;
+}
+
+// ---- actions -------------------------------------------------------------------------------------------------
+
+Status Service::perform(const RecordCompletion& action) {
+  return journal_.record_completion(action.job, action.completion);
+}
+
+Status Service::perform(const RecordFailure& action) {
+  const Failure& failure = action.failure;
+  spdlog::warn("job {}: attempt {} on {} failed: {}", failure.lease.job.short_hex(), failure.lease.attempt, failure.worker,
+               failure.message);
+  return journal_.record_failure(failure);
+}
+
+Status Service::perform(const RecordJobStatus& action) {
+  const auto level = action.status == JobStatus::failed ? spdlog::level::err : spdlog::level::info;
+  spdlog::log(level, "job {} ended: {}", action.job.short_hex(), action.reason);
+  return journal_.record_status(action.job, action.status);
+}
+
+Status Service::perform(const GrantLease& action) {
+  reply_to(action.worker, LeaseGrant{action.lease, action.inputs});
+  return {};
+}
+
+Status Service::perform(const RevokeLease& action) {
+  reply_to(action.worker, LeaseRevoke{action.lease});
+  return {};
+}
+
+Status Service::perform(const ReportNoWork& action) {
+  reply_to(action.worker, NoWork{kRetryMs});
+  return {};
+}
+
+Status Service::perform(const ForgetWorker& action) {
+  spdlog::warn("worker {} is silent: its leases go to others", action.worker);
+  peers_.remove(action.worker);
+  return {};
+}
+
+Status Service::perform(const ReportConflict& action) {
+  const TaskKey& task = action.lease.task;
+  spdlog::error("BUG: job {}: task {}/{}/{}: worker {} reports {} for frame index {}, tile {}, but {} was reported before",
+                action.lease.job.short_hex(), static_cast<int>(task.kind), task.step, task.tile, action.worker,
+                action.reported.digest.hex(), action.reported.frame, action.reported.tile, action.expected.digest.hex());
+  return {};
+}
+
+Status Service::perform(const RemoveBlobs& action) {
+  garbage_.insert(garbage_.end(), action.blobs.begin(), action.blobs.end());
+  return {};
+}
+
+// ---- answers -------------------------------------------------------------------------------------------------
+
+void Service::reply(const PeerId& peer, Message message) { outbox_.push_back({peer, std::move(message)}); }
+
+void Service::reply_to(const std::string& worker, Message message) {
+  if (const auto peer = peers_.peer_of(worker)) reply(*peer, std::move(message));
+}
+
+void Service::refuse(const PeerId& peer, const Error& error) {
+  reply(peer, Refused{static_cast<std::uint8_t>(error.kind), error.message});
+}
+
+}  // namespace baton

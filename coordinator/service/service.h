@@ -1,0 +1,102 @@
+#pragma once
+
+#include <atomic>
+#include <chrono>
+#include <filesystem>
+#include <string>
+#include <vector>
+
+#include "common/protocol/router.h"
+#include "common/store/blob_store.h"
+#include "coordinator/journal/journal.h"
+#include "coordinator/schedule/scheduler.h"
+#include "coordinator/service/peers.h"
+
+namespace baton {
+
+struct ServiceOptions {
+  std::string listen = "tcp://127.0.0.1:5570";
+  std::filesystem::path work_dir;            ///< holds journal.sqlite and store/
+  std::chrono::milliseconds heartbeat{1000};  ///< of workers; four silent ones lose a worker its leases
+};
+
+/// The coordinator: one thread that turns messages into events, actions into messages. A turn of its loop takes what has
+/// arrived, commits the journal once, and only then lets out what follows: nobody learns of anything that a crash could
+/// undo, and no blob is removed before what replaces it is durable.
+class Service {
+ public:
+  /// Takes up the jobs of the journal. A running job of which a file is missing starts afresh. Errors: the work folder,
+  /// the journal (in use, damaged, newer), the address.
+  static Result<Service> open(const ServiceOptions& options);
+
+  /// The concrete endpoint: with the port that was picked.
+  const std::string& endpoint() const { return router_.endpoint(); }
+
+  /// Works until `stop` or a StopCoordinator, then tells the workers to end. An error (of the journal) means that nothing
+  /// can be promised any more: everything committed is safe, start again.
+  Status run(const std::atomic<bool>& stop);
+
+ private:
+  Service(const ServiceOptions& options, Router router, Journal journal, BlobStore store);
+
+  Status restore_jobs();
+  Status restore_job(const Digest& job);
+  Status turn();
+  Status handle(const Incoming& incoming);
+  Status step(const Event& event);
+  void let_out();
+
+  // Messages of workers; `worker` is empty when the connection is not known.
+  Status receive(const PeerId& peer, const WorkerHello& message);
+  Status receive_from(const std::string& worker, const LeaseRequest& message);
+  Status receive_from(const std::string& worker, const Heartbeat& message);
+  Status receive_from(const std::string& worker, const TaskDone& message);
+  Status receive_from(const std::string& worker, const TaskFailed& message);
+  Status receive_from(const std::string& worker, const WorkerGoodbye& message);
+
+  // Questions of anybody (service_jobs.cpp).
+  Status receive(const PeerId& peer, const JobDocumentRequest& message);
+  Status receive(const PeerId& peer, const SubmitJob& message);
+  Status receive(const PeerId& peer, const ListJobs& message);
+  Status receive(const PeerId& peer, const ShowJob& message);
+  Status receive(const PeerId& peer, const CancelJob& message);
+  Status receive(const PeerId& peer, const StopCoordinator& message);
+  Status start_again(JobAdded event, JobStatus status, bool& already_there);
+  Status answer_detail(const PeerId& peer, const Digest& job);
+
+  // Actions of the scheduler.
+  Status perform(const RecordCompletion& action);
+  Status perform(const RecordFailure& action);
+  Status perform(const RecordJobStatus& action);
+  Status perform(const GrantLease& action);
+  Status perform(const RevokeLease& action);
+  Status perform(const ReportNoWork& action);
+  Status perform(const ForgetWorker& action);
+  Status perform(const ReportConflict& action);
+  Status perform(const RemoveBlobs& action);
+
+  void reply(const PeerId& peer, Message message);
+  void reply_to(const std::string& worker, Message message);
+  void refuse(const PeerId& peer, const Error& error);
+  std::optional<std::string> find_missing_blob(const TaskDone& report) const;
+
+  ServiceOptions options_;
+  std::filesystem::path store_directory_;
+  Router router_;
+  Journal journal_;
+  BlobStore store_;
+  Scheduler scheduler_;
+  Peers peers_;
+  OncePerPeer complained_, asked_for_hello_;
+  TimePoint next_tick_{};
+  bool stop_requested_ = false;
+
+  struct Outgoing {
+    PeerId peer;
+    Message message;
+  };
+  std::vector<Outgoing> outbox_;  ///< waits for the commit
+  std::vector<Digest> garbage_;   ///< likewise
+};
+
+}  // namespace baton

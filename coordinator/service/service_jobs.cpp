@@ -1,0 +1,159 @@
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <utility>
+
+#include "common/base/limits.h"
+#include "common/job/job_json.h"
+#include "coordinator/service/job_report.h"
+#include "coordinator/service/service.h"
+
+namespace baton {
+namespace {
+
+constexpr int kMaxFailuresShown = 100;
+
+}  // namespace
+
+// ---- taking up the journal -----------------------------------------------------------------------------------
+
+Status Service::restore_jobs() {
+  BATON_ASSIGN(const std::vector<Digest> jobs, journal_.jobs());
+  for (const Digest& job : jobs) BATON_TRY(restore_job(job));
+  BATON_TRY(journal_.commit());
+  let_out();
+  return {};
+}
+
+Status Service::restore_job(const Digest& digest) {
+  BATON_ASSIGN(JournalledJob known, journal_.load(digest));
+  Result<ParsedJobDocument> document = parse_job_document(known.document);
+  if (!document) {
+    spdlog::error("job {} of the journal cannot be read and is left out: {}", digest.short_hex(),
+                  document.error().message);
+    return {};
+  }
+  JobAdded event{digest, std::move(document->job), known.status, std::move(known.completions), std::move(known.failures)};
+
+  // A running job needs every file that it counts on; a job that has ended needs none until it is submitted again.
+  if (event.status == JobStatus::running) {
+    if (const auto missing = find_missing_file(event, store_)) {
+      spdlog::warn("job {} starts afresh: {} is gone", digest.short_hex(), *missing);
+      BATON_TRY(journal_.restart_job(digest, /*fresh=*/true));
+      event.completions.clear();
+      event.failures.clear();
+    }
+  }
+  BATON_TRY(step(event));
+  const JobProgress& progress = scheduler_.find_job(digest)->tasks.progress();
+  spdlog::info("job {} of the journal: {} of {} tasks are done", digest.short_hex(), progress.tasks_done,
+               progress.tasks_total);
+  return {};
+}
+
+// ---- questions -----------------------------------------------------------------------------------------------
+
+Status Service::receive(const PeerId& peer, const JobDocumentRequest& message) {
+  BATON_ASSIGN(std::optional<std::string> document, journal_.document(message.job));
+  if (document) {
+    reply(peer, JobDocument{message.job, std::move(*document)});
+  } else {
+    refuse(peer, {ErrorKind::bad_input, fmt::format("job {}: not known here", message.job.hex())});
+  }
+  return {};
+}
+
+Status Service::receive(const PeerId& peer, const SubmitJob& message) {
+  // A job that cannot be run is refused before it leaves a trace.
+  Result<ParsedJobDocument> document = parse_job_document(message.json);
+  if (!document) {
+    refuse(peer, document.error());
+    return {};
+  }
+  if (const std::int64_t count = count_tasks(document->job); count > limits::kMaxTasksPerJob) {
+    refuse(peer, {ErrorKind::bad_input,
+                  fmt::format("job {}: {} tasks, at most {}: use larger tiles or more frames per checkpoint",
+                              document->digest.short_hex(), count, limits::kMaxTasksPerJob)});
+    return {};
+  }
+
+  const Digest digest = document->digest;
+  JobAdded event{digest, std::move(document->job), JobStatus::running, {}, {}};
+  bool already_there = false;
+  if (const Scheduler::Job* known = scheduler_.find_job(digest)) {
+    BATON_TRY(start_again(std::move(event), known->status, already_there));
+  } else {
+    if (scheduler_.jobs().size() >= limits::kMaxJobs) {
+      refuse(peer, {ErrorKind::io, fmt::format("the journal is full: {} jobs", limits::kMaxJobs)});
+      return {};
+    }
+    spdlog::info("job {} submitted: '{}', {} tasks", digest.short_hex(), event.spec.name, count_tasks(event.spec));
+    BATON_TRY(journal_.add_job(digest, message.json));
+    BATON_TRY(step(event));
+  }
+  reply(peer, JobAccepted{digest, already_there});
+  return {};
+}
+
+/// A job that is known already: goes on where it stopped, or starts afresh when a file of it is gone.
+Status Service::start_again(JobAdded event, JobStatus status, bool& already_there) {
+  already_there = true;
+  if (status == JobStatus::running) return {};
+  BATON_ASSIGN(JournalledJob known, journal_.load(event.job));
+  event.completions = std::move(known.completions);
+  const std::optional<std::string> missing = find_missing_file(event, store_);
+  if (!missing && status == JobStatus::done) return {};
+
+  already_there = false;
+  if (missing) {
+    spdlog::info("job {} starts afresh: {} is gone", event.job.short_hex(), *missing);
+    event.completions.clear();
+  } else {
+    spdlog::info("job {} goes on", event.job.short_hex());
+  }
+  BATON_TRY(journal_.restart_job(event.job, missing.has_value()));
+  return step(event);
+}
+
+Status Service::receive(const PeerId& peer, const ListJobs&) {
+  JobList list;
+  for (const Digest& job : scheduler_.jobs()) list.jobs.push_back(summarize(job, *scheduler_.find_job(job)));
+  list.workers = peers_.summaries();
+  for (WorkerSummary& worker : list.workers) {
+    worker.leases = static_cast<std::int32_t>(scheduler_.num_leases(worker.worker_id));
+  }
+  reply(peer, std::move(list));
+  return {};
+}
+
+Status Service::receive(const PeerId& peer, const ShowJob& message) {
+  const Result<Digest> job = resolve_job(scheduler_, message.job);
+  if (job) return answer_detail(peer, *job);
+  refuse(peer, job.error());
+  return {};
+}
+
+Status Service::receive(const PeerId& peer, const CancelJob& message) {
+  const Result<Digest> job = resolve_job(scheduler_, message.job);
+  if (!job) {
+    refuse(peer, job.error());
+    return {};
+  }
+  BATON_TRY(step(JobCancelled{*job}));
+  return answer_detail(peer, *job);
+}
+
+Status Service::receive(const PeerId& peer, const StopCoordinator&) {
+  spdlog::info("asked to stop");
+  stop_requested_ = true;
+  reply(peer, Shutdown{});
+  return {};
+}
+
+Status Service::answer_detail(const PeerId& peer, const Digest& job) {
+  BATON_ASSIGN(const std::vector<Failure> failures, journal_.recent_failures(job, kMaxFailuresShown));
+  reply(peer, describe_job(job, *scheduler_.find_job(job), failures));
+  return {};
+}
+
+}  // namespace baton

@@ -1,0 +1,66 @@
+#include "jobs/cli/asset_report.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <set>
+
+#include "common/image/image_io.h"
+#include "worker/scene/environment.h"
+#include "worker/scene/scene.h"
+
+namespace baton {
+namespace {
+
+Result<MapReport> load_map(const std::string& path, const EnvironmentSpec& environment) {
+  BATON_ASSIGN(const RgbImage image, read_rgb_image(path));
+  const EnvironmentMap map(image, environment.filter, environment.scale, false);
+  return MapReport{path, map.width(), map.height(), map.repairs().total(), map.black()};
+}
+
+void load_maps(const EnvironmentSpec& environment, AssetReport& report,
+               std::vector<std::string>& faults) {
+  std::set<std::string> seen;
+  for (const EnvironmentKey& key : environment.keys) {
+    if (!seen.insert(key.map).second) continue;
+    const Result<MapReport> map = load_map(key.map, environment);
+    if (!map) {
+      faults.push_back(map.error().message);
+      continue;
+    }
+    report.maps.push_back(*map);
+
+    // Mixing goes texel by texel.
+    const MapReport& first = report.maps.front();
+    if (environment.interpolate && (map->width != first.width || map->height != first.height)) {
+      faults.push_back(fmt::format("{}: expected {}x{} texels as in {}, to mix them, got {}x{}",
+                                   map->path, first.width, first.height, first.path, map->width,
+                                   map->height));
+    }
+  }
+}
+
+void load_geometry(const JobSpec& job, AssetReport& report, std::vector<std::string>& faults) {
+  const Result<Scene> scene = load_scene(job);
+  if (!scene) return faults.push_back(scene.error().message);
+  report.meshes = scene->meshes.size();
+  report.instances = scene->instances.size();
+  for (const TriangleMesh& mesh : scene->meshes) report.dropped_triangles += mesh.dropped_triangles;
+  for (const Instance& instance : scene->instances) {
+    report.triangles += scene->meshes[instance.mesh].triangles.size();
+  }
+}
+
+}  // namespace
+
+Result<AssetReport> load_assets(const JobSpec& job) {
+  AssetReport report;
+  std::vector<std::string> faults;
+  load_geometry(job, report, faults);
+  load_maps(job.environment, report, faults);
+  if (!faults.empty())
+    return Error{ErrorKind::bad_input, fmt::format("{}", fmt::join(faults, "\n"))};
+  return report;
+}
+
+}  // namespace baton

@@ -1,0 +1,32 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "common/base/result.h"
+#include "common/job/job_spec.h"
+
+namespace baton {
+
+/// A map of the job, as loaded.
+struct MapReport {
+  std::string path;
+  int width = 0, height = 0;
+  std::uint64_t repaired_texels = 0;  ///< negative, NaN or infinite ones, taken as 0
+  bool black = false;
+};
+
+/// The geometry of the job, as loaded.
+struct AssetReport {
+  std::vector<MapReport> maps;  ///< in the order of their first key
+  std::uint64_t meshes = 0, instances = 0;
+  std::uint64_t triangles = 0;          ///< of all instances
+  std::uint64_t dropped_triangles = 0;  ///< of all meshes: without area
+};
+
+/// Loads everything that the job names. One error lists every fault: files that cannot be loaded,
+/// maps that are to be mixed but differ in size.
+Result<AssetReport> load_assets(const JobSpec& job);
+
+}  // namespace baton

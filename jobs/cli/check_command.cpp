@@ -1,0 +1,141 @@
+#include <fmt/format.h>
+
+#include <nlohmann/json.hpp>
+
+#include "common/job/estimate.h"
+#include "common/job/frame_range.h"
+#include "common/job/job_json.h"
+#include "jobs/cli/asset_report.h"
+#include "jobs/cli/commands.h"
+#include "jobs/cli/text.h"
+
+namespace baton {
+namespace {
+
+using nlohmann::ordered_json;
+
+struct CheckOptions {
+  std::string job;
+  bool explain = false;
+  bool json = false;
+};
+
+ordered_json settings_json(const std::vector<JobSetting>& settings) {
+  ordered_json list = ordered_json::array();
+  for (const JobSetting& s : settings) {
+    list.push_back({{"path", s.path}, {"value", ordered_json::parse(s.value)}, {"given", s.given}});
+  }
+  return list;
+}
+
+void print_json(const JobSpec& job, const JobEstimate& e, const AssetReport& assets,
+                const std::vector<JobSetting>& settings) {
+  ordered_json maps = ordered_json::array();
+  for (const MapReport& map : assets.maps) {
+    maps.push_back({{"path", map.path},
+                    {"width", map.width},
+                    {"height", map.height},
+                    {"repairedTexels", map.repaired_texels},
+                    {"black", map.black}});
+  }
+  ordered_json result = {{"name", job.name},
+                         {"frames", e.frames},
+                         {"tiles", e.tiles},
+                         {"runs", e.runs},
+                         {"renderTasks", e.render_tasks},
+                         {"assembleTasks", e.assemble_tasks},
+                         {"dependencies", e.dependencies},
+                         {"primaryRaysPerPixel", e.primary_rays_per_pixel},
+                         {"shadowRaysPerPixel", e.shadow_rays_per_pixel},
+                         {"filmBytesPerFrame", e.film_bytes},
+                         {"frameBytes", e.frame_bytes},
+                         {"stateBytesPerPixel", e.state_bytes_per_pixel},
+                         {"stateBytes", e.state_bytes},
+                         {"outputDirectory", job.output.directory},
+                         {"meshes", assets.meshes},
+                         {"instances", assets.instances},
+                         {"triangles", assets.triangles},
+                         {"droppedTriangles", assets.dropped_triangles},
+                         {"maps", std::move(maps)}};
+  if (!settings.empty()) result["settings"] = settings_json(settings);
+  fmt::print("{}\n", result.dump(2));
+}
+
+void print_assets(const AssetReport& assets) {
+  fmt::print("geometry   {} triangles in {} instances of {} meshes\n", assets.triangles,
+             assets.instances, assets.meshes);
+  if (assets.dropped_triangles > 0) {
+    fmt::print("           {} triangles without area are left out\n", assets.dropped_triangles);
+  }
+  for (const MapReport& map : assets.maps) {
+    fmt::print("map        {} ({}x{})\n", map.path, map.width, map.height);
+    if (map.repaired_texels > 0) {
+      fmt::print("           {} texels are negative, NaN or infinite and count as 0\n",
+                 map.repaired_texels);
+    }
+    if (map.black) fmt::print("           the map is black: nothing will be lit\n");
+  }
+}
+
+void print_text(const JobSpec& job, const JobEstimate& e, const AssetReport& assets) {
+  const auto total = [&](std::int64_t bytes) {
+    return bytes_text(static_cast<std::uint64_t>(bytes));
+  };
+  fmt::print("job        {}\n", job.name);
+  fmt::print("frames     {} ({})\n", e.frames, format_frames(job.frames));
+  fmt::print("image      {}x{}, {} tiles\n", job.image.width, job.image.height, e.tiles);
+  print_assets(assets);
+  fmt::print("tasks      {}: {} to render ({} a tile), {} to assemble; {} dependencies\n",
+             e.tasks(), e.render_tasks, e.runs, e.assemble_tasks, e.dependencies);
+  fmt::print("rays       {} primary and {} shadow rays a pixel and frame\n",
+             e.primary_rays_per_pixel, e.shadow_rays_per_pixel);
+  if (e.state_bytes > 0) {
+    fmt::print("state      about {} bytes a pixel, {} at each checkpoint\n",
+               e.state_bytes_per_pixel, total(e.state_bytes));
+  }
+  fmt::print("film       {} channels, {} a frame in tiles\n", e.film_channels, total(e.film_bytes));
+  fmt::print("disk       at most {} a frame, {} for all\n", total(e.frame_bytes),
+             total(e.frame_bytes * e.frames));
+  fmt::print("output     {}/{}\n", job.output.directory, job.output.pattern);
+}
+
+void print_settings(const std::vector<JobSetting>& settings) {
+  fmt::print("\n");
+  for (const JobSetting& s : settings) {
+    fmt::print("{} {} = {}\n", s.given ? "given  " : "default", s.path, s.value);
+  }
+}
+
+Result<ExitCode> run_check(const CheckOptions& options) {
+  BATON_ASSIGN(const JobSpec job, load_job(options.job));
+  BATON_ASSIGN(const AssetReport assets, load_assets(job));
+  std::vector<JobSetting> settings;
+  if (options.explain) {
+    BATON_ASSIGN(settings, explain_job(options.job));
+  }
+
+  const JobEstimate estimate = estimate_job(job);
+  if (options.json) {
+    print_json(job, estimate, assets, settings);
+  } else {
+    print_text(job, estimate, assets);
+    if (options.explain) print_settings(settings);
+  }
+  return ExitCode::ok;
+}
+
+}  // namespace
+
+void add_check_command(CLI::App& app, ExitCode& code) {
+  auto options = std::make_shared<CheckOptions>();
+  CLI::App* command =
+      app.add_subcommand("check", "Checks a job with all its files; shows what it will take");
+  command->add_option("JOB", options->job, "job file")->required();
+  command->add_flag("--explain", options->explain, "also every value in force, given or default");
+  command->add_flag("--json", options->json, "for machines");
+  command->footer(
+      "Examples:\n  baton check job.json\n  baton check job.json --explain | grep sampling");
+  command->callback([options, &code] { code = finish(run_check(*options)); });
+}
+
+}  // namespace baton

@@ -1,0 +1,46 @@
+#pragma once
+
+#include <sys/types.h>
+
+#include <chrono>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/base/result.h"
+
+namespace baton {
+
+/// A program that this process started. It has a process group of its own, so that Ctrl-C on the
+/// terminal reaches only this process, and the kernel kills it when this process dies, however that
+/// happens. The destructor kills it.
+class ChildProcess {
+ public:
+  /// command: the program's path, then its arguments. stdout and stderr are appended to `log`.
+  static Result<ChildProcess> start(const std::vector<std::string>& command,
+                                    const std::filesystem::path& log);
+
+  ChildProcess(ChildProcess&& other) noexcept;
+  ChildProcess& operator=(ChildProcess&& other) noexcept;
+  ~ChildProcess();
+
+  /// How it ended: "exit code 2" or "signal 9 (Killed)"; nullopt while it runs.
+  std::optional<std::string> ended();
+  /// Waits at most `patience` for the end; false when it still runs.
+  bool wait_for_end(std::chrono::milliseconds patience);
+  /// Sends a signal, unless it has ended.
+  void send_signal(int signal_number);
+
+ private:
+  explicit ChildProcess(pid_t pid) : pid_(pid) {}
+  void kill_now();
+
+  pid_t pid_ = -1;  ///< -1: moved from
+  std::optional<int> wait_status_;
+};
+
+/// The path of a program in the folder of the running one. Error: it is not there.
+Result<std::string> sibling_program(const std::string& name);
+
+}  // namespace baton

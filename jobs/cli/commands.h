@@ -1,0 +1,19 @@
+#pragma once
+
+#include <CLI/CLI.hpp>
+
+#include "common/base/exit_codes.h"
+
+namespace baton {
+
+/// Each adds one subcommand to the command line. When it was given, parsing runs it and leaves in
+/// `code` how it ended; errors have then been printed to stderr.
+void add_check_command(CLI::App& app, ExitCode& code);
+void add_job_command(CLI::App& app, ExitCode& code);
+void add_render_command(CLI::App& app, ExitCode& code);
+void add_state_command(CLI::App& app, ExitCode& code);
+
+/// Prints the error of a command, if it has one, and gives its exit code.
+ExitCode finish(const Result<ExitCode>& outcome);
+
+}  // namespace baton

@@ -1,0 +1,31 @@
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <chrono>
+#include <string>
+#include <variant>
+
+#include "common/base/exit_codes.h"
+#include "common/protocol/client.h"
+
+namespace baton {
+
+/// Adds --coordinator; the environment's BATON_COORDINATOR and then tcp://127.0.0.1:5570 stand in
+/// for it.
+void add_coordinator_option(CLI::App& command, std::string& endpoint);
+
+/// Asks for an answer of type A. Errors: those of RequestClient::request; internal when another
+/// type came.
+template <class A>
+Result<A> ask(RequestClient& client, const Message& question,
+              std::chrono::milliseconds timeout = std::chrono::seconds(10)) {
+  BATON_ASSIGN(Message answer, client.request(question, timeout));
+  if (A* expected = std::get_if<A>(&answer)) return std::move(*expected);
+  return Error{ErrorKind::internal,
+               "the coordinator answered with another message than was asked for"};
+}
+
+/// Like finish (commands.h), but a timeout means that no coordinator answers.
+ExitCode finish_with_coordinator(const Result<ExitCode>& outcome);
+
+}  // namespace baton

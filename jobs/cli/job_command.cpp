@@ -1,0 +1,140 @@
+#include <fmt/format.h>
+
+#include <chrono>
+#include <thread>
+
+#include "common/job/frame_range.h"
+#include "common/job/job_json.h"
+#include "jobs/cli/commands.h"
+#include "jobs/cli/coordinator_link.h"
+#include "jobs/cli/job_summary.h"
+
+namespace baton {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+using nlohmann::ordered_json;
+
+constexpr std::chrono::milliseconds kPollInterval{500};
+
+struct JobOptions {
+  std::string endpoint;
+  std::string job;       ///< file to submit, or digest or unique prefix
+  double timeout_s = 0;  ///< of wait; 0: none
+  bool json = false;
+};
+
+Result<ExitCode> submit(const JobOptions& options, RequestClient& client) {
+  BATON_ASSIGN(const JobSpec job, load_job(options.job));
+  BATON_ASSIGN(std::string document, make_job_document(job));
+  BATON_ASSIGN(const JobAccepted accepted,
+               ask<JobAccepted>(client, SubmitJob{std::move(document)}));
+  if (options.json) {
+    fmt::print(
+        "{}\n",
+        ordered_json{{"id", accepted.job.hex()}, {"alreadyThere", accepted.already_there}}.dump(2));
+  } else {
+    fmt::print("{}\n", accepted.job.hex());
+    if (accepted.already_there) fmt::print(stderr, "an equal job is there already: it goes on\n");
+  }
+  return ExitCode::ok;
+}
+
+Result<ExitCode> list(const JobOptions& options, RequestClient& client) {
+  BATON_ASSIGN(const JobList found, ask<JobList>(client, ListJobs{}));
+  if (!options.json) {
+    for (const JobSummary& job : found.jobs) fmt::print("{}\n", job_line(job));
+    fmt::print("{} jobs, {} workers\n", found.jobs.size(), found.workers.size());
+    return ExitCode::ok;
+  }
+  ordered_json result = {{"jobs", ordered_json::array()}, {"workers", ordered_json::array()}};
+  for (const JobSummary& job : found.jobs) result["jobs"].push_back(summary_json(job));
+  for (const WorkerSummary& worker : found.workers) {
+    result["workers"].push_back({{"id", worker.worker_id},
+                                 {"host", worker.host},
+                                 {"pid", worker.pid},
+                                 {"threads", worker.num_threads},
+                                 {"leases", worker.leases}});
+  }
+  fmt::print("{}\n", result.dump(2));
+  return ExitCode::ok;
+}
+
+void print_detail(const JobDetail& detail, bool json) {
+  if (json) return fmt::print("{}\n", detail_json(detail).dump(2));
+  fmt::print("{}\n", job_line(detail.summary));
+  fmt::print("output     {}\n", detail.summary.output_directory);
+  if (!detail.frames_done.empty()) fmt::print("frames     {}\n", format_frames(detail.frames_done));
+  fmt::print("{}", job_statistics(detail.summary));
+  for (const std::string& failure : detail.failures) fmt::print("failure    {}\n", failure);
+}
+
+Result<ExitCode> show(const JobOptions& options, RequestClient& client) {
+  BATON_ASSIGN(const JobDetail detail, ask<JobDetail>(client, ShowJob{options.job}));
+  print_detail(detail, options.json);
+  return ExitCode::ok;
+}
+
+Result<ExitCode> wait(const JobOptions& options, RequestClient& client) {
+  const Clock::time_point start = Clock::now();
+  for (;;) {
+    BATON_ASSIGN(const JobDetail detail, ask<JobDetail>(client, ShowJob{options.job}));
+    const std::chrono::duration<double> waited = Clock::now() - start;
+    const bool expired = options.timeout_s > 0 && waited.count() >= options.timeout_s;
+    if (detail.summary.status != JobStatus::running || expired) {
+      print_detail(detail, options.json);
+      return detail.summary.status == JobStatus::running ? ExitCode::timeout
+                                                         : exit_code_of(detail.summary.status);
+    }
+    std::this_thread::sleep_for(kPollInterval);
+  }
+}
+
+Result<ExitCode> cancel(const JobOptions& options, RequestClient& client) {
+  BATON_ASSIGN(const JobDetail detail, ask<JobDetail>(client, CancelJob{options.job}));
+  print_detail(detail, options.json);
+  return ExitCode::ok;
+}
+
+using Action = Result<ExitCode> (*)(const JobOptions&, RequestClient&);
+
+Result<ExitCode> run_job(const JobOptions& options, Action action) {
+  BATON_ASSIGN(RequestClient client, RequestClient::connect(options.endpoint));
+  return action(options, client);
+}
+
+}  // namespace
+
+void add_job_command(CLI::App& app, ExitCode& code) {
+  auto options = std::make_shared<JobOptions>();
+  CLI::App* job = app.add_subcommand("job", "Submits jobs to a coordinator and looks after them");
+  job->require_subcommand(1);
+  job->footer(
+      "Examples:\n"
+      "  baton job submit job.json --coordinator tcp://farm:5570\n"
+      "  baton job wait 3f2a --timeout 600 && echo done\n"
+      "An ID is the digest that submit prints, or its beginning.");
+
+  const auto add = [&](const char* name, const char* what, const char* argument, Action action) {
+    CLI::App* command = job->add_subcommand(name, what);
+    if (argument != nullptr) {
+      command
+          ->add_option(argument, options->job, argument == std::string("JOB") ? "job file" : "job")
+          ->required();
+    }
+    add_coordinator_option(*command, options->endpoint);
+    command->add_flag("--json", options->json, "for machines");
+    command->callback(
+        [options, action, &code] { code = finish_with_coordinator(run_job(*options, action)); });
+    return command;
+  };
+  add("submit", "Hands a job over; prints its ID", "JOB", submit);
+  add("list", "All jobs of the coordinator", nullptr, list);
+  add("show", "One job: progress, statistics, failures", "ID", show);
+  add("cancel", "Ends a job; finished frames stay", "ID", cancel);
+  add("wait", "Returns when the job has ended, with its exit code", "ID", wait)
+      ->add_option("--timeout", options->timeout_s, "seconds; default: as long as it takes")
+      ->check(CLI::PositiveNumber);
+}
+
+}  // namespace baton

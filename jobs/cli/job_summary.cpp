@@ -1,0 +1,109 @@
+#include "jobs/cli/job_summary.h"
+
+#include <fmt/format.h>
+
+#include "jobs/cli/text.h"
+
+namespace baton {
+
+using nlohmann::ordered_json;
+
+const char* job_status_name(JobStatus status) {
+  switch (status) {
+    case JobStatus::running:
+      return "running";
+    case JobStatus::done:
+      return "done";
+    case JobStatus::failed:
+      return "failed";
+    case JobStatus::cancelled:
+      return "cancelled";
+  }
+  return "unknown";
+}
+
+ExitCode exit_code_of(JobStatus status) {
+  switch (status) {
+    case JobStatus::running:
+    case JobStatus::done:
+      return ExitCode::ok;
+    case JobStatus::failed:
+      return ExitCode::failed;
+    case JobStatus::cancelled:
+      return ExitCode::cancelled;
+  }
+  return ExitCode::internal;
+}
+
+std::string job_line(const JobSummary& job) {
+  return fmt::format("{}  {:<9}  {:>11} frames  {:>15} tasks  {}", job.job.short_hex(),
+                     job_status_name(job.status),
+                     fmt::format("{}/{}", job.frames_done, job.frames_total),
+                     fmt::format("{}/{}", job.tasks_done, job.tasks_total), job.name);
+}
+
+std::string job_statistics(const JobSummary& job) {
+  const RenderStats& s = job.stats;
+  const std::uint64_t lit = s.pixels_fresh + s.pixels_carried + s.pixels_restarted;
+  std::string text =
+      fmt::format("pixels     {}: {} carried, {} fresh, {} restarted of those with a surface\n",
+                  count_text(s.pixels), percent_text(s.pixels_carried, lit),
+                  percent_text(s.pixels_fresh, lit), percent_text(s.pixels_restarted, lit));
+  text += fmt::format("rays       {} primary, {} shadow; {} target evaluations\n",
+                      count_text(s.rays_primary), count_text(s.rays_shadow),
+                      count_text(s.target_evaluations));
+  if (s.moves_proposed > 0) {
+    text += fmt::format("moves      {} proposed, {} accepted\n", count_text(s.moves_proposed),
+                        percent_text(s.moves_accepted, s.moves_proposed));
+  }
+  if (job.state_pixels > 0) {
+    text +=
+        fmt::format("state      {:.1f} bytes a pixel, {} in all\n",
+                    static_cast<double>(job.state_bytes) / static_cast<double>(job.state_pixels),
+                    bytes_text(job.state_bytes));
+  }
+  text += fmt::format("cpu        {}\n", duration_text(s.cpu_seconds));
+  if (job.attempts_lost > 0)
+    text += fmt::format("lost       {} attempts, done again\n", job.attempts_lost);
+  return text;
+}
+
+ordered_json summary_json(const JobSummary& job) {
+  const RenderStats& s = job.stats;
+  return {{"id", job.job.hex()},
+          {"name", job.name},
+          {"status", job_status_name(job.status)},
+          {"priority", job.priority},
+          {"outputDirectory", job.output_directory},
+          {"framesTotal", job.frames_total},
+          {"framesDone", job.frames_done},
+          {"tasksTotal", job.tasks_total},
+          {"tasksDone", job.tasks_done},
+          {"tasksLeased", job.tasks_leased},
+          {"tasksFailed", job.tasks_failed},
+          {"attemptsLost", job.attempts_lost},
+          {"stateBytes", job.state_bytes},
+          {"statePixels", job.state_pixels},
+          {"stats",
+           {{"pixels", s.pixels},
+            {"raysPrimary", s.rays_primary},
+            {"raysShadow", s.rays_shadow},
+            {"targetEvaluations", s.target_evaluations},
+            {"pixelsBackground", s.pixels_background},
+            {"pixelsFresh", s.pixels_fresh},
+            {"pixelsCarried", s.pixels_carried},
+            {"pixelsRestarted", s.pixels_restarted},
+            {"pixelsResampled", s.pixels_resampled},
+            {"movesProposed", s.moves_proposed},
+            {"movesAccepted", s.moves_accepted},
+            {"cpuSeconds", s.cpu_seconds}}}};
+}
+
+ordered_json detail_json(const JobDetail& detail) {
+  ordered_json result = summary_json(detail.summary);
+  result["framesDoneNumbers"] = detail.frames_done;
+  result["failures"] = detail.failures;
+  return result;
+}
+
+}  // namespace baton

@@ -1,0 +1,26 @@
+#pragma once
+
+#include <nlohmann/json.hpp>
+#include <string>
+
+#include "common/base/exit_codes.h"
+#include "common/protocol/messages.h"
+
+namespace baton {
+
+/// "running", "done", "failed" or "cancelled".
+const char* job_status_name(JobStatus status);
+
+/// How a command about a job in this status ends; running is ok.
+ExitCode exit_code_of(JobStatus status);
+
+/// The job's line in a list.
+std::string job_line(const JobSummary& job);
+
+/// What the job has done so far, several lines.
+std::string job_statistics(const JobSummary& job);
+
+nlohmann::ordered_json summary_json(const JobSummary& job);
+nlohmann::ordered_json detail_json(const JobDetail& detail);
+
+}  // namespace baton

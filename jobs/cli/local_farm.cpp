@@ -1,0 +1,147 @@
+#include "jobs/cli/local_farm.h"
+
+#include <fcntl.h>
+#include <fmt/format.h>
+#include <signal.h>
+#include <spdlog/spdlog.h>
+#include <sys/file.h>
+#include <unistd.h>
+
+#include <cerrno>
+#include <cstring>
+#include <thread>
+
+#include "common/base/files.h"
+
+namespace baton {
+namespace {
+
+namespace fs = std::filesystem;
+using std::chrono::milliseconds;
+
+constexpr milliseconds kStartPatience{20000};
+constexpr milliseconds kWorkerPatience{10000};
+constexpr milliseconds kCoordinatorPatience{5000};
+constexpr int kMaxRestarts = 5;
+constexpr std::uint64_t kMaxEndpointBytes = 4096;
+
+std::vector<std::string> coordinator_command(const std::string& program,
+                                             const std::string& endpoint, const fs::path& directory,
+                                             const fs::path& endpoint_file) {
+  return {program,
+          "--listen",
+          endpoint,
+          "--work-dir",
+          directory.string(),
+          "--endpoint-file",
+          endpoint_file.string()};
+}
+
+}  // namespace
+
+LocalFarm::Lock::~Lock() {
+  if (file_ >= 0) ::close(file_);
+}
+
+Result<LocalFarm::Lock> LocalFarm::lock_directory(const fs::path& directory) {
+  std::error_code error;
+  fs::create_directories(directory, error);
+  if (error)
+    return Error{ErrorKind::io,
+                 fmt::format("{}: cannot create: {}", directory.string(), error.message())};
+
+  const fs::path path = directory / "lock";
+  Lock lock(::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644));
+  if (lock.file() < 0)
+    return Error{ErrorKind::io,
+                 fmt::format("{}: cannot open: {}", path.string(), std::strerror(errno))};
+  if (::flock(lock.file(), LOCK_EX | LOCK_NB) != 0) {
+    return Error{ErrorKind::io,
+                 fmt::format("{}: another `baton render` works here", directory.string())};
+  }
+  return lock;
+}
+
+Result<LocalFarm> LocalFarm::start(const FarmOptions& options) {
+  BATON_ASSIGN(Lock lock, lock_directory(options.work_directory));
+  LocalFarm farm(options, std::move(lock));
+  BATON_TRY(farm.start_coordinator());
+  BATON_ASSIGN(const std::string worker, sibling_program("baton-worker"));
+  for (int i = 1; i <= options.workers; ++i) {
+    BATON_TRY(farm.add_member(fmt::format("worker-{}", i),
+                              {worker, "--coordinator", farm.endpoint_, "--threads",
+                               std::to_string(options.threads_per_worker)}));
+  }
+  return farm;
+}
+
+Status LocalFarm::start_coordinator() {
+  BATON_ASSIGN(const std::string program, sibling_program("baton-coordinator"));
+  const fs::path endpoint_file = options_.work_directory / "endpoint";
+  std::error_code error;
+  fs::remove(endpoint_file, error);
+  BATON_TRY(add_member("coordinator", coordinator_command(program, "tcp://127.0.0.1:*",
+                                                          options_.work_directory, endpoint_file)));
+
+  // The file appears, whole, when the coordinator listens.
+  const auto deadline = std::chrono::steady_clock::now() + kStartPatience;
+  while (!fs::exists(endpoint_file, error)) {
+    const std::optional<std::string> end = members_.front().process.ended();
+    if (end || std::chrono::steady_clock::now() >= deadline) {
+      return Error{ErrorKind::io, fmt::format("the coordinator did not start ({}); its log: {}",
+                                              end.value_or("no endpoint in time"),
+                                              log_of("coordinator").string())};
+    }
+    std::this_thread::sleep_for(milliseconds(10));
+  }
+  BATON_ASSIGN(endpoint_, read_text_file(endpoint_file, kMaxEndpointBytes));
+  endpoint_.erase(endpoint_.find_last_not_of(" \n") + 1);
+
+  // When it must start again, then on the endpoint that the workers know.
+  members_.front().command =
+      coordinator_command(program, endpoint_, options_.work_directory, endpoint_file);
+  return {};
+}
+
+Status LocalFarm::add_member(const std::string& name, std::vector<std::string> command) {
+  BATON_ASSIGN(ChildProcess process, ChildProcess::start(command, log_of(name)));
+  members_.push_back({name, std::move(command), std::move(process), 0});
+  return {};
+}
+
+Status LocalFarm::tend() {
+  for (Member& member : members_) {
+    const std::optional<std::string> end = member.process.ended();
+    if (!end) continue;
+    const std::string log = log_of(member.name).string();
+    if (member.restarts == kMaxRestarts) {
+      return Error{ErrorKind::io, fmt::format("{} ended again after {} restarts ({}); its log: {}",
+                                              member.name, kMaxRestarts, *end, log)};
+    }
+    ++member.restarts;
+    spdlog::warn("{} ended ({}): started again, {} of {} times; its log: {}", member.name, *end,
+                 member.restarts, kMaxRestarts, log);
+    BATON_ASSIGN(member.process, ChildProcess::start(member.command, log));
+  }
+  return {};
+}
+
+void LocalFarm::stop() {
+  const auto end_members = [&](std::size_t first, std::size_t last, milliseconds patience) {
+    for (std::size_t i = first; i < last; ++i) members_[i].process.send_signal(SIGTERM);
+    const auto deadline = std::chrono::steady_clock::now() + patience;
+    for (std::size_t i = first; i < last; ++i) {
+      const auto left =
+          std::chrono::duration_cast<milliseconds>(deadline - std::chrono::steady_clock::now());
+      if (!members_[i].process.wait_for_end(left)) members_[i].process.send_signal(SIGKILL);
+    }
+  };
+  end_members(1, members_.size(), kWorkerPatience);
+  end_members(0, 1, kCoordinatorPatience);
+}
+
+fs::path LocalFarm::log_of(const std::string& name) const {
+  return options_.work_directory / (name + ".log");
+}
+
+}  // namespace baton

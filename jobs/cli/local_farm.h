@@ -1,0 +1,71 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+#include <utility>
+#include <vector>
+
+#include "common/base/result.h"
+#include "jobs/cli/child_process.h"
+
+namespace baton {
+
+struct FarmOptions {
+  int workers = 1;
+  int threads_per_worker = 1;
+  std::filesystem::path work_directory;  ///< journal, blobs, logs; what a resume needs
+};
+
+/// A coordinator and workers on this machine, as child processes. A program that dies is started
+/// again: the coordinator goes on from its journal on the same endpoint, a worker's lost work is
+/// done again.
+class LocalFarm {
+ public:
+  /// Starts everything and waits until the coordinator listens. Errors: the work directory cannot
+  /// be made or belongs to a farm that runs; a program is missing; the coordinator does not come up
+  /// (its log is named).
+  static Result<LocalFarm> start(const FarmOptions& options);
+
+  /// Replaces programs that have ended, with a warning. Error: one has ended too often.
+  Status tend();
+  /// Ends the workers, which finish what they hold, then the coordinator; kills what takes too
+  /// long.
+  void stop();
+
+  const std::string& endpoint() const { return endpoint_; }
+
+ private:
+  struct Member {
+    std::string name;
+    std::vector<std::string> command;
+    ChildProcess process;
+    int restarts = 0;
+  };
+
+  /// Holds the work directory as long as it lives.
+  class Lock {
+   public:
+    explicit Lock(int file) : file_(file) {}
+    Lock(Lock&& other) noexcept : file_(std::exchange(other.file_, -1)) {}
+    Lock& operator=(Lock&& other) = delete;
+    ~Lock();
+    int file() const { return file_; }
+
+   private:
+    int file_;
+  };
+
+  LocalFarm(FarmOptions options, Lock lock)
+      : options_(std::move(options)), lock_(std::move(lock)) {}
+  static Result<Lock> lock_directory(const std::filesystem::path& directory);
+  Status start_coordinator();
+  Status add_member(const std::string& name, std::vector<std::string> command);
+  std::filesystem::path log_of(const std::string& name) const;
+
+  FarmOptions options_;
+  Lock lock_;
+  std::string endpoint_;
+  std::vector<Member> members_;  ///< the coordinator first
+};
+
+}  // namespace baton

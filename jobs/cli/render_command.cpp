@@ -1,0 +1,168 @@
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <thread>
+
+#include "common/job/job_json.h"
+#include "common/job/sequence.h"
+#include "jobs/cli/commands.h"
+#include "jobs/cli/coordinator_link.h"
+#include "jobs/cli/frame_sheet.h"
+#include "jobs/cli/job_summary.h"
+#include "jobs/cli/local_farm.h"
+#include "jobs/cli/progress.h"
+#include "jobs/cli/signals.h"
+
+namespace baton {
+namespace {
+
+namespace fs = std::filesystem;
+using Clock = std::chrono::steady_clock;
+
+constexpr std::chrono::milliseconds kPollInterval{200};
+constexpr std::chrono::milliseconds kAnswerPatience{2000};
+constexpr int kMaxSilentPolls = 30;
+
+struct RenderOptions {
+  std::string job;
+  int workers = 0;             ///< 0: two, or one on a single processor
+  int threads_per_worker = 0;  ///< 0: the processors shared out
+  std::string work_directory;  ///< empty: .baton in the output folder
+  bool keep_running = false;
+  bool json = false;
+};
+
+FarmOptions farm_options(const RenderOptions& options, const JobSpec& job) {
+  const int processors = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+  FarmOptions farm;
+  farm.workers = options.workers > 0 ? options.workers : std::min(processors, 2);
+  farm.threads_per_worker = options.threads_per_worker > 0 ? options.threads_per_worker
+                                                           : std::max(1, processors / farm.workers);
+  farm.work_directory =
+      fs::absolute(options.work_directory.empty() ? fs::path(job.output.directory) / ".baton"
+                                                  : fs::path(options.work_directory));
+  return farm;
+}
+
+/// Asks until there is an answer, keeping the farm alive meanwhile: a coordinator that died comes
+/// back. nullopt when the user asked to stop.
+template <class A>
+Result<std::optional<A>> ask_farm(LocalFarm& farm, RequestClient& client, const SignalWait& signals,
+                                  const Message& question) {
+  for (int silent = 0;; ++silent) {
+    Result<A> answer = ask<A>(client, question, kAnswerPatience);
+    if (answer) return std::optional<A>(std::move(answer).value());
+    if (answer.error().kind != ErrorKind::timeout || silent == kMaxSilentPolls)
+      return answer.error();
+    if (signals.stop_requested_within(kPollInterval)) return std::optional<A>();
+    BATON_TRY(farm.tend());
+  }
+}
+
+/// Follows the job to its end; nullopt when the user asked to stop.
+Result<std::optional<JobDetail>> follow(LocalFarm& farm, RequestClient& client,
+                                        const SignalWait& signals, const Digest& job) {
+  Progress progress(::isatty(STDERR_FILENO) == 1);
+  for (;;) {
+    BATON_ASSIGN(std::optional<JobDetail> detail,
+                 ask_farm<JobDetail>(farm, client, signals, ShowJob{job.hex()}));
+    if (detail) progress.update(detail->summary, Clock::now());
+    const bool over = !detail || detail->summary.status != JobStatus::running;
+    if (over || signals.stop_requested_within(kPollInterval)) {
+      progress.finish();
+      return over ? detail : std::nullopt;
+    }
+    BATON_TRY(farm.tend());
+  }
+}
+
+void print_failure(const RenderOptions& options, const JobDetail& detail) {
+  for (const std::string& failure : detail.failures) fmt::print(stderr, "failure: {}\n", failure);
+  fmt::print(stderr,
+             "to see one tile fail alone: baton-worker replay {} --frame FRAME --tile TILE\n",
+             options.job);
+}
+
+void print_result(const RenderOptions& options, const JobSpec& job, const JobDetail& detail,
+                  double seconds) {
+  if (options.json) return fmt::print("{}\n", detail_json(detail).dump(2));
+  fmt::print("job        {} in {:.1f} s\n", job_status_name(detail.summary.status), seconds);
+  fmt::print("frames     {} of {} in {}/{}\n", detail.summary.frames_done,
+             detail.summary.frames_total, job.output.directory, job.output.pattern);
+  fmt::print("{}", job_statistics(detail.summary));
+}
+
+/// A sheet that cannot be made is no failure of the job.
+void make_sheet(const RenderOptions& options, const JobSpec& job, const JobDetail& detail) {
+  if (detail.frames_done.empty()) return;
+  const Result<fs::path> sheet = write_frame_sheet(job.output, detail.frames_done);
+  if (!sheet) return spdlog::warn("no contact sheet: {}", sheet.error().message);
+  if (!options.json) fmt::print("sheet      {}\n", sheet->string());
+}
+
+Result<ExitCode> run_render(const RenderOptions& options) {
+  const Clock::time_point start = Clock::now();
+  BATON_ASSIGN(const JobSpec job, load_job(options.job));
+  BATON_ASSIGN(std::string document, make_job_document(job));
+
+  // Start the farm and hand it the job; one that it knows goes on where it stopped.
+  const SignalWait signals;
+  const FarmOptions farm_setup = farm_options(options, job);
+  BATON_ASSIGN(LocalFarm farm, LocalFarm::start(farm_setup));
+  BATON_ASSIGN(RequestClient client, RequestClient::connect(farm.endpoint()));
+  BATON_ASSIGN(const std::optional<JobAccepted> accepted,
+               ask_farm<JobAccepted>(farm, client, signals, SubmitJob{std::move(document)}));
+  if (accepted && accepted->already_there) spdlog::info("going on with what is done already");
+
+  std::optional<JobDetail> detail;
+  if (accepted) {
+    BATON_ASSIGN(detail, follow(farm, client, signals, accepted->job));
+  }
+  if (!detail) {
+    spdlog::info("stopping; finished work is kept");
+    farm.stop();
+    const std::string place =
+        options.work_directory.empty() ? "" : " --work-dir " + options.work_directory;
+    fmt::print(stderr, "to go on: baton render {}{}\n", options.job, place);
+    return ExitCode::cancelled;
+  }
+
+  print_result(options, job, *detail, std::chrono::duration<double>(Clock::now() - start).count());
+  make_sheet(options, job, *detail);
+  if (detail->summary.status == JobStatus::failed) print_failure(options, *detail);
+  if (options.keep_running) {
+    fmt::print(stderr, "the coordinator still answers at {}; Ctrl-C ends it\n", farm.endpoint());
+    while (!signals.stop_requested_within(kPollInterval)) BATON_TRY(farm.tend());
+  }
+  farm.stop();
+  return exit_code_of(detail->summary.status);
+}
+
+}  // namespace
+
+void add_render_command(CLI::App& app, ExitCode& code) {
+  auto options = std::make_shared<RenderOptions>();
+  CLI::App* command = app.add_subcommand("render", "Renders a job on this machine");
+  command->add_option("JOB", options->job, "job file")->required();
+  command->add_option("--workers", options->workers, "worker processes; default: 2")
+      ->check(CLI::Range(1, 256));
+  command
+      ->add_option("--threads-per-worker", options->threads_per_worker,
+                   "default: the processors shared out")
+      ->check(CLI::Range(1, 1024));
+  command->add_option("--work-dir", options->work_directory,
+                      "journal, blobs and logs; default: .baton in the output folder");
+  command->add_flag("--keep-running", options->keep_running,
+                    "keep coordinator and workers until Ctrl-C");
+  command->add_flag("--json", options->json, "the result for machines");
+  command->footer(
+      "Examples:\n"
+      "  baton render job.json\n"
+      "  baton render job.json --workers 4 --threads-per-worker 2\n"
+      "Ctrl-C stops; the same command goes on where it stopped.");
+  command->callback([options, &code] { code = finish_with_coordinator(run_render(*options)); });
+}
+
+}  // namespace baton

@@ -1,0 +1,176 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+#include <fstream>
+
+#include "common/base/files.h"
+#include "coordinator/journal/database.h"
+#include "coordinator/journal/journal.h"
+
+namespace baton {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+
+const Digest kJob = digest_of("job");
+
+Completion completion(std::int32_t tile) {
+  Completion c{{TaskKind::render, 3, tile}, {{BlobKind::film, 7, tile, {1, 2}, 99}, {BlobKind::state, 7, tile, {3, 4}, 5}}, {}};
+  c.stats.rays_shadow = 1000;
+  c.stats.cpu_seconds = 0.125;
+  return c;
+}
+
+struct JournalTest : testing::Test {
+  fs::path folder = fs::path(testing::TempDir()) / testing::UnitTest::GetInstance()->current_test_info()->name();
+  fs::path path = folder / "journal.sqlite";
+
+  void SetUp() override {
+    fs::remove_all(folder);
+    fs::create_directories(folder);
+  }
+  void TearDown() override { fs::remove_all(folder); }
+
+  Journal open() {
+    Result<Journal> journal = Journal::open(path);
+    EXPECT_TRUE(journal.ok());
+    return std::move(journal).value();
+  }
+  /// What a machine would find after the process was killed right now.
+  void kill_and_copy() {
+    const fs::path crashed = folder / "crashed.sqlite";
+    fs::copy_file(path, crashed, fs::copy_options::overwrite_existing);
+    fs::copy_file(path.string() + "-wal", crashed.string() + "-wal", fs::copy_options::overwrite_existing);
+    path = crashed;
+  }
+};
+
+TEST_F(JournalTest, EveryStartIsCounted) {
+  EXPECT_EQ(open().epoch(), 1u);
+  EXPECT_EQ(open().epoch(), 2u);
+}
+
+TEST_F(JournalTest, WhatWasCommittedIsThereAgain) {
+  const Failure failure{{kJob, {TaskKind::assemble, 2, 0}, 4, 1}, "worker \xc3\xa4", "disk full", true};
+  {
+    Journal journal = open();
+    ASSERT_TRUE(journal.add_job(kJob, "{}").ok());
+    ASSERT_TRUE(journal.add_job(digest_of("second"), "[]").ok());
+    ASSERT_TRUE(journal.record_completion(kJob, completion(1)).ok());
+    ASSERT_TRUE(journal.record_completion(kJob, completion(0)).ok());
+    ASSERT_TRUE(journal.record_failure(failure).ok());
+    ASSERT_TRUE(journal.record_status(kJob, JobStatus::failed).ok());
+    ASSERT_TRUE(journal.commit().ok());
+  }
+
+  Journal journal = open();
+  EXPECT_EQ(journal.jobs().value(), (std::vector{kJob, digest_of("second")}));
+  const JournalledJob job = journal.load(kJob).value();
+  EXPECT_EQ(job.document, "{}");
+  EXPECT_EQ(job.status, JobStatus::failed);
+  ASSERT_EQ(job.completions.size(), 2u);
+  EXPECT_EQ(job.completions[0].task, completion(1).task);
+  EXPECT_EQ(job.completions[0].outputs, completion(1).outputs);
+  EXPECT_EQ(job.completions[1].stats, completion(0).stats);
+  ASSERT_EQ(job.failures.size(), 1u);
+  EXPECT_EQ(job.failures[0].lease, failure.lease);
+  EXPECT_EQ(job.failures[0].worker, failure.worker);
+  EXPECT_TRUE(job.failures[0].permanent);
+}
+
+TEST_F(JournalTest, AKilledProcessLosesExactlyWhatItDidNotCommit) {
+  Journal journal = open();
+  ASSERT_TRUE(journal.add_job(kJob, "{}").ok());
+  ASSERT_TRUE(journal.record_completion(kJob, completion(0)).ok());
+  ASSERT_TRUE(journal.commit().ok());
+  ASSERT_TRUE(journal.record_completion(kJob, completion(1)).ok());
+  kill_and_copy();
+  EXPECT_EQ(open().load(kJob).value().completions.size(), 1u);
+}
+
+TEST_F(JournalTest, ARestartedJobForgetsItsFailuresAndIfFreshItsWork) {
+  Journal journal = open();
+  ASSERT_TRUE(journal.add_job(kJob, "{}").ok());
+  ASSERT_TRUE(journal.record_completion(kJob, completion(0)).ok());
+  ASSERT_TRUE(journal.record_failure({{kJob, {}, 1, 1}, "w", "boom", false}).ok());
+  ASSERT_TRUE(journal.record_status(kJob, JobStatus::cancelled).ok());
+
+  ASSERT_TRUE(journal.restart_job(kJob, /*fresh=*/false).ok());
+  JournalledJob job = journal.load(kJob).value();
+  EXPECT_EQ(job.status, JobStatus::running);
+  EXPECT_EQ(job.completions.size(), 1u);
+  EXPECT_TRUE(job.failures.empty());
+
+  ASSERT_TRUE(journal.restart_job(kJob, /*fresh=*/true).ok());
+  EXPECT_TRUE(journal.load(kJob).value().completions.empty());
+}
+
+TEST_F(JournalTest, DocumentsAndFailuresCanBeLookedUp) {
+  Journal journal = open();
+  ASSERT_TRUE(journal.add_job(kJob, std::string(100000, 'x')).ok());
+  for (const char* message : {"one", "two", "three"}) {
+    ASSERT_TRUE(journal.record_failure({{kJob, {}, 1, 1}, "w", message, false}).ok());
+  }
+  EXPECT_EQ(journal.document(kJob).value()->size(), 100000u);
+  EXPECT_FALSE(journal.document(digest_of("other")).value().has_value());
+  const std::vector<Failure> recent = journal.recent_failures(kJob, 2).value();
+  ASSERT_EQ(recent.size(), 2u);
+  EXPECT_EQ(recent[0].message, "two");
+  EXPECT_EQ(recent[1].message, "three");
+}
+
+TEST_F(JournalTest, ASecondCoordinatorIsTurnedAway) {
+  const Journal journal = open();
+  const Result<Journal> second = Journal::open(path);
+  ASSERT_FALSE(second.ok());
+  EXPECT_THAT(second.error().message, HasSubstr("journal.sqlite: already in use by another coordinator"));
+}
+
+TEST_F(JournalTest, ANewerJournalIsRefused) {
+  { open(); }
+  { ASSERT_TRUE(SqlDatabase::open(path).value().execute("PRAGMA user_version = 9").ok()); }
+  const Result<Journal> journal = Journal::open(path);
+  ASSERT_FALSE(journal.ok());
+  EXPECT_EQ(journal.error().kind, ErrorKind::version);
+  EXPECT_THAT(journal.error().message, HasSubstr("journal version 9, this program reads 1"));
+}
+
+TEST_F(JournalTest, AnotherProgramsDatabaseIsRefused) {
+  { ASSERT_TRUE(SqlDatabase::open(path).value().execute("CREATE TABLE songs (title TEXT)").ok()); }
+  EXPECT_EQ(Journal::open(path).error().kind, ErrorKind::corrupt);
+}
+
+TEST_F(JournalTest, RubbishIsRefused) {
+  std::ofstream(path) << std::string(8192, 'z');
+  const Result<Journal> journal = Journal::open(path);
+  ASSERT_FALSE(journal.ok());
+  EXPECT_EQ(journal.error().kind, ErrorKind::corrupt);
+}
+
+TEST_F(JournalTest, ADamagedPageIsNoticed) {
+  {
+    Journal journal = open();
+    ASSERT_TRUE(journal.add_job(kJob, std::string(200000, 'x')).ok());
+    for (int i = 0; i < 2000; ++i) ASSERT_TRUE(journal.record_completion(kJob, completion(i)).ok());
+    ASSERT_TRUE(journal.commit().ok());
+  }
+  const auto size = static_cast<std::streamoff>(fs::file_size(path));
+  std::fstream file(path, std::ios::in | std::ios::out | std::ios::binary);
+  for (std::streamoff at = 4096; at + 8 < size; at += 4096) {
+    file.seekp(at);
+    file.write("damaged!", 8);
+  }
+  file.close();
+  EXPECT_EQ(Journal::open(path).error().kind, ErrorKind::corrupt);
+}
+
+TEST_F(JournalTest, AMissingFolderIsAnErrorThatNamesTheFile) {
+  const Result<Journal> journal = Journal::open(folder / "nowhere" / "journal.sqlite");
+  ASSERT_FALSE(journal.ok());
+  EXPECT_THAT(journal.error().message, HasSubstr("nowhere/journal.sqlite"));
+}
+
+}  // namespace
+}  // namespace baton

@@ -1,0 +1,171 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <array>
+
+#include "common/base/limits.h"
+#include "common/protocol/messages.h"
+
+namespace baton {
+namespace {
+
+using testing::HasSubstr;
+
+const LeaseId kLease{{1, 2}, {TaskKind::assemble, 3, 4}, 5, 6};
+const BlobRef kBlob{BlobKind::film, 7, 8, {9, 10}, 11};
+const RenderStats kStats{1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 0.5};
+const JobSummary kSummary{{1, 2}, "name", "/out", JobStatus::failed, -3, 1, 2, 3, 4, 5, 6, 7, 8, 9, kStats};
+
+/// One of each, in the order of the type codes, no member left at its default.
+const std::vector<Message>& examples() {
+  static const std::vector<Message> messages{
+      WorkerHello{"w", "h\xc3\xb6st", 1, 2, "AVX2", {kLease, kLease}},
+      LeaseRequest{7},
+      Heartbeat{{kLease}},
+      TaskDone{kLease, {kBlob, kBlob}, kStats},
+      TaskFailed{kLease, "no", true},
+      JobDocumentRequest{{1, 2}},
+      WorkerGoodbye{},
+      WorkerWelcome{3, 500, "/store"},
+      LeaseGrant{kLease, {kBlob}},
+      LeaseRevoke{kLease},
+      NoWork{250},
+      HelloAgain{},
+      JobDocument{{3, 4}, "{}"},
+      Shutdown{},
+      SubmitJob{std::string("a\0b", 3)},
+      ListJobs{},
+      ShowJob{"abc"},
+      CancelJob{"def"},
+      StopCoordinator{},
+      JobAccepted{{5, 6}, true},
+      JobList{{kSummary}, {{"w", "h", 1, 2, 3}}},
+      JobDetail{kSummary, {1, 2, 3}, {"one", ""}},
+      Refused{4, "because"},
+  };
+  return messages;
+}
+
+Bytes text(std::string_view value) {
+  const ByteView view = as_bytes_view(value);
+  return {view.begin(), view.end()};
+}
+
+TEST(Messages, EveryTypeSurvivesTheRoundTrip) {
+  ASSERT_EQ(examples().size(), std::variant_size_v<Message>);
+  for (std::size_t type = 0; type < examples().size(); ++type) {
+    ASSERT_EQ(examples()[type].index(), type);
+    const std::vector<Bytes> frames = encode_message(examples()[type]);
+    const Result<Message> decoded = decode_message(frames);
+    ASSERT_TRUE(decoded.ok()) << "type " << type << ": " << decoded.error().message;
+    EXPECT_EQ(decoded->index(), type);
+    EXPECT_EQ(encode_message(*decoded), frames) << "type " << type;
+  }
+}
+
+TEST(Messages, MembersArriveWhereTheyWereSent) {
+  const Message decoded = decode_message(encode_message(examples()[3])).value();
+  const auto& done = std::get<TaskDone>(decoded);
+  EXPECT_EQ(done.lease, kLease);
+  EXPECT_EQ(done.outputs, (std::vector{kBlob, kBlob}));
+  EXPECT_EQ(done.stats, kStats);
+}
+
+TEST(Messages, BytesAreThoseOfTheGrammar) {
+  const std::vector<Bytes> frames = encode_message(NoWork{0x01020304});
+  EXPECT_EQ(frames[0], text(std::string_view("BATON\x01\x00", 7)));
+  EXPECT_EQ(frames[1], text(std::string_view("\x0a\x00", 2)));
+  EXPECT_EQ(frames[2], text("\x04\x03\x02\x01"));
+}
+
+TEST(Messages, TruncatedOrPaddedAtAnyByteIsRefused) {
+  for (const Message& message : examples()) {
+    const std::vector<Bytes> whole = encode_message(message);
+    for (std::size_t frame = 0; frame < whole.size(); ++frame) {
+      for (std::size_t size = 0; size < whole[frame].size(); ++size) {
+        std::vector<Bytes> cut = whole;
+        cut[frame].resize(size);
+        EXPECT_FALSE(decode_message(cut).ok()) << "type " << message.index() << ", frame " << frame << ", " << size;
+      }
+      std::vector<Bytes> padded = whole;
+      padded[frame].push_back(std::byte{0});
+      EXPECT_FALSE(decode_message(padded).ok()) << "type " << message.index() << ", frame " << frame;
+    }
+  }
+}
+
+TEST(Messages, AnyChangedByteIsReadOrRefusedButNeverCrashes) {
+  for (const Message& message : examples()) {
+    for (std::size_t i = 0; i < encode_message(message)[2].size(); ++i) {
+      for (const unsigned value : {0u, 1u, 0x7fu, 0xffu}) {
+        std::vector<Bytes> frames = encode_message(message);
+        frames[2][i] = std::byte(value);
+        const Result<Message> decoded = decode_message(frames);
+        if (decoded.ok()) {
+          EXPECT_EQ(encode_message(*decoded), frames);
+        }
+      }
+    }
+  }
+}
+
+TEST(Messages, AnotherVersionIsAVersionError) {
+  std::vector<Bytes> frames = encode_message(ListJobs{});
+  frames[0][5] = std::byte{9};
+  frames.resize(1);  // nothing after the header may matter
+  const Result<Message> decoded = decode_message(frames);
+  ASSERT_FALSE(decoded.ok());
+  EXPECT_EQ(decoded.error().kind, ErrorKind::version);
+  EXPECT_THAT(decoded.error().message, HasSubstr("version 9, this program speaks 1"));
+}
+
+TEST(Messages, OtherProtocolsAreRefused) {
+  for (const std::vector<Bytes>& frames :
+       {std::vector<Bytes>{}, std::vector<Bytes>{text("")}, std::vector<Bytes>{text("GET / HTTP/1.1")},
+        std::vector<Bytes>{text(std::string_view("CHALK\x01\x00", 7)), text("ab"), text("")}}) {
+    const Result<Message> decoded = decode_message(frames);
+    ASSERT_FALSE(decoded.ok());
+    EXPECT_EQ(decoded.error().kind, ErrorKind::bad_input);
+  }
+}
+
+TEST(Messages, WrongNumberOfFramesIsRefused) {
+  std::vector<Bytes> frames = encode_message(ListJobs{});
+  frames.push_back({});
+  EXPECT_THAT(decode_message(frames).error().message, HasSubstr("4 frames, expected 3"));
+  frames.resize(2);
+  EXPECT_FALSE(decode_message(frames).ok());
+}
+
+TEST(Messages, UnknownTypeIsRefused) {
+  std::vector<Bytes> frames = encode_message(ListJobs{});
+  frames[1] = text("\x17\x7f");
+  EXPECT_THAT(decode_message(frames).error().message, HasSubstr("unknown type 32535"));
+}
+
+TEST(Messages, UnknownEnumValueIsRefused) {
+  std::vector<Bytes> frames = encode_message(LeaseRevoke{kLease});
+  frames[2][16] = std::byte{2};  // TaskKind, after the digest
+  EXPECT_FALSE(decode_message(frames).ok());
+}
+
+TEST(Messages, OversizedBodyIsRefused) {
+  std::vector<Bytes> frames = encode_message(ListJobs{});
+  frames[2].resize(limits::kMaxMessageBytes + 1);
+  EXPECT_THAT(decode_message(frames).error().message, HasSubstr("at most"));
+}
+
+TEST(Messages, AHugeCountReservesNothing) {
+  std::vector<Bytes> frames = encode_message(Heartbeat{});
+  frames[2] = text("\xff\xff\xff\xff");
+  EXPECT_FALSE(decode_message(frames).ok());
+}
+
+TEST(RenderStats, MergingAdds) {
+  RenderStats sum = kStats;
+  sum.merge(kStats);
+  EXPECT_EQ(sum, (RenderStats{2, 4, 6, 8, 10, 12, 14, 16, 18, 20, 22, 1.0}));
+}
+
+}  // namespace
+}  // namespace baton

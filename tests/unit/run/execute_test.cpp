@@ -1,0 +1,258 @@
+#include "worker/run/execute.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <map>
+#include <mutex>
+
+#include "common/base/files.h"
+#include "common/base/limits.h"
+#include "common/job/job_json.h"
+#include "common/job/sequence.h"
+#include "worker/run/frame_output.h"
+#include "worker/run/local_render.h"
+#include "worker/run/replay.h"
+
+namespace baton {
+namespace {
+
+using Images = std::map<std::int32_t, FilmTile>;
+
+/// A tetrahedron on a ground under a map with one lamp: 5 frames of 40x24 pixels in tiles of 16,
+/// checkpoints every 2.
+class ExecuteTest : public testing::Test {
+ protected:
+  void SetUp() override {
+    const std::string name = testing::UnitTest::GetInstance()->current_test_info()->name();
+    folder_ = testing::TempDir() + "execute_" + name + "/";
+    ASSERT_TRUE(write_file_atomic(folder_ + "tetrahedron.off",
+                                  as_bytes_view("OFF\n4 4 0\n1 1 1\n-1 -1 1\n-1 1 -1\n1 -1 -1\n"
+                                                "3 0 2 1\n3 0 1 3\n3 0 3 2\n3 1 2 3\n")));
+    write_map();
+
+    job_.name = "execute";
+    job_.frames = {1, 2, 3, 4, 5};
+    job_.image = {.width = 40, .height = 24, .sites = 1, .tile_size = 16};
+    job_.scene.materials["chalk"] = {};
+    job_.scene.meshes["tetrahedron"] = {.path = folder_ + "tetrahedron.off",
+                                        .smooth_normals = false};
+    ObjectSpec object;
+    object.mesh = "tetrahedron";
+    object.material = "chalk";
+    object.translate = {0, 0.5f, 0};
+    job_.scene.objects = {object};
+    job_.scene.ground = GroundSpec{.material = "chalk", .height = -0.6f, .size = 20};
+    job_.environment.keys = {{.frame = 1, .map = folder_ + "map.exr"}};
+    job_.environment.rotation_deg_per_frame = 3;
+    job_.sampling.num_candidates = 32;
+    job_.output.directory = folder_ + "frames";
+    job_.state.checkpoint_every = 2;
+
+    const Result<LoadedJobPtr> loaded = load();
+    ASSERT_TRUE(loaded) << loaded.error().message;
+    loaded_ = *loaded;
+  }
+
+  void write_map() const {
+    FilmTile map{.rect = {0, 0, 16, 8}, .channels = {"R", "G", "B"}, .values = {}};
+    map.values.assign(3 * map.num_pixels(), 0.5f);
+    for (std::size_t channel = 0; channel < 3; ++channel) map.plane(channel)[2 * 16 + 5] = 50;
+    ASSERT_TRUE(write_exr(folder_ + "map.exr", map, {}));
+  }
+
+  Result<LoadedJobPtr> load() const {
+    BATON_ASSIGN(const std::string document, make_job_document(job_));
+    return load_job_document(digest_of(document), document);
+  }
+
+  Result<TaskOutput> render(std::int32_t step, std::int32_t tile,
+                            const std::vector<BlobRef>& inputs) {
+    return execute_task(*loaded_, store_.value(), {TaskKind::render, step, tile}, inputs, {});
+  }
+
+  /// Every render task in the order of a farm; returns the films by frame, the states in `states_`.
+  std::map<std::int32_t, std::vector<BlobRef>> render_all() {
+    std::map<std::int32_t, std::vector<BlobRef>> films;
+    for (std::int32_t tile = 0; tile < TileGrid(job_.image).count(); ++tile) {
+      std::vector<BlobRef> previous;
+      for (std::int32_t step = 0; step < num_runs(job_); ++step) {
+        const Result<TaskOutput> output = render(step, tile, previous);
+        EXPECT_TRUE(output) << output.error().message;
+        previous.clear();
+        for (const BlobRef& ref : output->outputs) {
+          (ref.kind == BlobKind::film ? films[ref.frame] : previous).push_back(ref);
+        }
+      }
+    }
+    return films;
+  }
+
+  Images render_in_process(int num_threads) {
+    Images images;
+    std::mutex mutex;
+    const auto stats = render_locally(*loaded_->context, job_, num_threads,
+                                      [&](std::int32_t frame, const FilmTile& image) {
+                                        const std::lock_guard lock(mutex);
+                                        EXPECT_TRUE(images.emplace(frame, image).second);
+                                        return Status();
+                                      });
+    EXPECT_TRUE(stats) << stats.error().message;
+    EXPECT_EQ(stats->pixels, 5u * 40 * 24);
+    return images;
+  }
+
+  std::string folder_;
+  JobSpec job_;
+  LoadedJobPtr loaded_;
+  Result<BlobStore> store_ = BlobStore::open(testing::TempDir() + "execute_store");
+};
+
+TEST_F(ExecuteTest, TasksThroughTheStoreMakeTheImagesOfOneProcess) {
+  const Images expected = render_in_process(1);
+  ASSERT_EQ(expected.size(), 5u);
+  job_.output.pixel_type = PixelType::full_float;
+  loaded_ = load().value();
+
+  for (const auto& [frame, films] : render_all()) {
+    const Result<TaskOutput> output =
+        execute_task(*loaded_, *store_, {TaskKind::assemble, frame, 0}, films, {});
+    ASSERT_TRUE(output) << output.error().message;
+    ASSERT_EQ(output->outputs.size(), 1u);
+    EXPECT_EQ(output->outputs[0].kind, BlobKind::image);
+
+    // Compare channel by channel: a file sorts its channels.
+    const FilmTile image = read_exr(frame_path(job_, frame)).value();
+    const FilmTile& in_process = expected.at(frame);
+    for (std::size_t channel = 0; channel < in_process.channels.size(); ++channel) {
+      const auto found =
+          std::find(image.channels.begin(), image.channels.end(), in_process.channels[channel]);
+      ASSERT_NE(found, image.channels.end());
+      EXPECT_TRUE(std::equal(in_process.plane(channel),
+                             in_process.plane(channel) + image.num_pixels(),
+                             image.plane(static_cast<std::size_t>(found - image.channels.begin()))))
+          << *found << " of frame " << frame;
+    }
+  }
+}
+
+TEST_F(ExecuteTest, TheNumberOfThreadsDoesNotShow) {
+  EXPECT_EQ(render_in_process(1), render_in_process(3));
+}
+
+TEST_F(ExecuteTest, ARunHandsOnItsStateAndCountsItsWork) {
+  const Result<TaskOutput> first = render(0, 1, {});
+  ASSERT_TRUE(first) << first.error().message;
+  ASSERT_EQ(first->outputs.size(), 3u);
+  EXPECT_EQ(first->outputs[2].kind, BlobKind::state);
+  EXPECT_EQ(first->outputs[2].frame, 1);
+  EXPECT_EQ(first->stats.pixels, 2u * 16 * 16);
+  EXPECT_EQ(render(0, 1, {})->outputs, first->outputs);
+
+  // The next run needs exactly that state.
+  EXPECT_TRUE(render(1, 1, {first->outputs[2]}));
+  EXPECT_FALSE(render(1, 1, {}));
+  EXPECT_FALSE(render(1, 0, {first->outputs[2]}));
+  EXPECT_FALSE(render(1, 1, {first->outputs[0]}));
+}
+
+TEST_F(ExecuteTest, ADamagedOrMissingStateIsAnErrorThatNamesIt) {
+  const BlobRef state = render(0, 0, {}).value().outputs.back();
+  Bytes bytes = read_file(store_->path(state.digest), limits::kMaxBlobBytes).value();
+  bytes[bytes.size() / 2] ^= std::byte{1};
+  ASSERT_TRUE(write_file_atomic(store_->path(state.digest), bytes));
+  const Result<TaskOutput> damaged = render(1, 0, {state});
+  ASSERT_FALSE(damaged);
+  EXPECT_EQ(damaged.error().kind, ErrorKind::corrupt);
+  EXPECT_THAT(damaged.error().message, testing::HasSubstr(state.digest.hex()));
+
+  ASSERT_TRUE(store_->remove(state.digest));
+  EXPECT_FALSE(render(1, 0, {state}));
+}
+
+TEST_F(ExecuteTest, TasksThatTheJobDoesNotHaveAreBadInput) {
+  for (const TaskKey& task : {TaskKey{TaskKind::render, 3, 0}, TaskKey{TaskKind::render, 0, 6},
+                              TaskKey{TaskKind::render, -1, 0}, TaskKey{TaskKind::assemble, 5, 0},
+                              TaskKey{TaskKind::assemble, 0, 0}}) {
+    const Result<TaskOutput> output = execute_task(*loaded_, *store_, task, {}, {});
+    ASSERT_FALSE(output);
+    EXPECT_EQ(output.error().kind, ErrorKind::bad_input);
+  }
+}
+
+TEST_F(ExecuteTest, AFrameNeedsEveryTileOnce) {
+  auto films = render_all()[0];
+  films[1] = films[0];
+  EXPECT_FALSE(execute_task(*loaded_, *store_, {TaskKind::assemble, 0, 0}, films, {}));
+}
+
+TEST_F(ExecuteTest, AStoppedTaskIsCancelled) {
+  std::stop_source stop;
+  stop.request_stop();
+  const Result<TaskOutput> output =
+      execute_task(*loaded_, *store_, {TaskKind::render, 0, 0}, {}, stop.get_token());
+  ASSERT_FALSE(output);
+  EXPECT_EQ(output.error().kind, ErrorKind::cancelled);
+}
+
+TEST_F(ExecuteTest, AnAssetThatChangedSinceSubmissionIsNamed) {
+  const std::string document = make_job_document(job_).value();
+  ASSERT_TRUE(write_file_atomic(folder_ + "tetrahedron.off", as_bytes_view("OFF\n")));
+  const Result<LoadedJobPtr> loaded = load_job_document(digest_of(document), document);
+  ASSERT_FALSE(loaded);
+  EXPECT_THAT(loaded.error().message, testing::HasSubstr("tetrahedron.off"));
+}
+
+TEST_F(ExecuteTest, AFailingSinkEndsALocalRender) {
+  const auto stats = render_locally(*loaded_->context, job_, 2, [](std::int32_t, const FilmTile&) {
+    return Status(Error{ErrorKind::io, "disk full"});
+  });
+  ASSERT_FALSE(stats);
+  EXPECT_EQ(stats.error().message, "disk full");
+}
+
+TEST_F(ExecuteTest, AReplayMakesTheFarmsTile) {
+  const std::string path = folder_ + "job.json";
+  ASSERT_TRUE(write_file_atomic(path, as_bytes_view(to_json(job_))));
+  const ReplayOptions options{.job = path,
+                              .frame_number = 4,
+                              .tile = 2,
+                              .pixel = PixelPosition{35, 3},
+                              .out = folder_ + "tile.exr"};
+  const Result<std::string> report = replay_tile(options);
+  ASSERT_TRUE(report) << report.error().message;
+  EXPECT_THAT(*report, testing::HasSubstr("particle 15:"));
+
+  // Tile 2 covers x in [32, 40), y in [0, 16).
+  const FilmTile tile = read_exr(options.out).value();
+  const FilmTile expected = render_in_process(1).at(3);
+  ASSERT_EQ(tile.rect, (PixelRect{0, 0, 8, 16}));
+  const auto red = static_cast<std::size_t>(
+      std::find(tile.channels.begin(), tile.channels.end(), "R") - tile.channels.begin());
+  for (int y = 0; y < 16; ++y) {
+    for (int x = 0; x < 8; ++x)
+      EXPECT_EQ(tile.plane(red)[y * 8 + x], expected.plane(0)[y * 40 + 32 + x]);
+  }
+}
+
+TEST_F(ExecuteTest, AReplayOfWhatTheJobDoesNotHaveSaysWhatThereIs) {
+  const std::string path = folder_ + "job.json";
+  ASSERT_TRUE(write_file_atomic(path, as_bytes_view(to_json(job_))));
+  EXPECT_THAT(replay_tile({.job = path, .frame_number = 9, .tile = 0, .pixel = {}, .out = {}})
+                  .error()
+                  .message,
+              testing::HasSubstr("1 to 5"));
+  EXPECT_THAT(replay_tile({.job = path, .frame_number = 1, .tile = 6, .pixel = {}, .out = {}})
+                  .error()
+                  .message,
+              testing::HasSubstr("[0, 5]"));
+  EXPECT_THAT(
+      replay_tile(
+          {.job = path, .frame_number = 1, .tile = 0, .pixel = PixelPosition{16, 0}, .out = {}})
+          .error()
+          .message,
+      testing::HasSubstr("x in [0, 15]"));
+}
+
+}  // namespace
+}  // namespace baton
