@@ -26,10 +26,12 @@ void install_stop_handler() {
   ::sigaction(SIGINT, &action, nullptr);
 }
 
-baton::Status coordinate(const baton::ServiceOptions& options, const std::filesystem::path& endpoint_file) {
+baton::Status coordinate(const baton::ServiceOptions& options,
+                         const std::filesystem::path& endpoint_file) {
   BATON_ASSIGN(baton::Service service, baton::Service::open(options));
   if (!endpoint_file.empty()) {
-    BATON_TRY(baton::write_file_atomic(endpoint_file, baton::as_bytes_view(service.endpoint() + "\n")));
+    BATON_TRY(
+        baton::write_file_atomic(endpoint_file, baton::as_bytes_view(service.endpoint() + "\n")));
   }
   spdlog::info("listening on {}, work folder {}", service.endpoint(), options.work_dir.string());
   return service.run(g_stop);
@@ -38,12 +40,15 @@ baton::Status coordinate(const baton::ServiceOptions& options, const std::filesy
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app("Splits jobs into tasks and leases them to workers. Killed at any time, it goes on where it was.");
+  CLI::App app(
+      "Splits jobs into tasks and leases them to workers. Killed at any time, it goes on where it "
+      "was.");
   app.set_version_flag("--version", baton::kVersion);
   app.footer(
       "Examples:\n"
       "  baton-coordinator --work-dir /srv/baton --listen 'tcp://*:5570'\n"
-      "  baton-coordinator --work-dir farm --listen 'tcp://127.0.0.1:*' --endpoint-file farm/endpoint\n"
+      "  baton-coordinator --work-dir farm --listen 'tcp://127.0.0.1:*' --endpoint-file "
+      "farm/endpoint\n"
       "The work folder must be on a file system that all workers share.");
 
   baton::ServiceOptions options;
@@ -55,8 +60,10 @@ int main(int argc, char** argv) {
   app.add_option("--work-dir", options.work_dir, "folder of the journal and the blob store")
       ->envname("BATON_WORK_DIR")
       ->required();
-  app.add_option("--endpoint-file", endpoint_file, "file that gets the concrete endpoint once it listens");
-  app.add_option("--heartbeat-ms", heartbeat_ms, "between signs of life of a worker; four missing ones lose it its leases")
+  app.add_option("--endpoint-file", endpoint_file,
+                 "file that gets the concrete endpoint once it listens");
+  app.add_option("--heartbeat-ms", heartbeat_ms,
+                 "between signs of life of a worker; four missing ones lose it its leases")
       ->check(CLI::Range(10, 60000))
       ->capture_default_str();
   try {

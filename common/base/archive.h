@@ -11,10 +11,11 @@
 
 namespace baton {
 
-/// The byte form of plain structs that list their members in `template <class A> void fields(A& a)`: members in order,
-/// little-endian, no padding. A bool is one byte 0 or 1; an enum its underlying integer; a string u32 length and bytes;
-/// a vector u32 count and elements; a Digest its two halves. Every enum that is archived has a `last_of(Enum)` beside
-/// it, found by argument-dependent lookup: larger values are refused.
+/// The byte form of plain structs that list their members in `template <class A> void fields(A&
+/// a)`: members in order, little-endian, no padding. A bool is one byte 0 or 1; an enum its
+/// underlying integer; a string u32 length and bytes; a vector u32 count and elements; a Digest its
+/// two halves. Every enum that is archived has a `last_of(Enum)` beside it, found by
+/// argument-dependent lookup: larger values are refused.
 
 /// Appends what `fields` lists to a ByteWriter.
 class ArchiveWriter {
@@ -27,15 +28,11 @@ class ArchiveWriter {
 
  private:
   template <class T>
-    requires std::is_arithmetic_v<T>
-  void write(const T& value) {
-    writer_.put(value);
-  }
+  requires std::is_arithmetic_v<T>
+  void write(const T& value) { writer_.put(value); }
   template <class T>
-    requires std::is_enum_v<T>
-  void write(const T& value) {
-    writer_.put(static_cast<std::underlying_type_t<T>>(value));
-  }
+  requires std::is_enum_v<T>
+  void write(const T& value) { writer_.put(static_cast<std::underlying_type_t<T>>(value)); }
   void write(const std::string& text) { writer_.put_string(text); }
   void write(const Digest& digest) {
     writer_.put(digest.high);
@@ -47,15 +44,14 @@ class ArchiveWriter {
     for (T& value : values) write(value);
   }
   template <class T>
-    requires requires(T& value, ArchiveWriter& a) { value.fields(a); }
-  void write(T& value) {
-    value.fields(*this);
-  }
+  requires requires(T& value, ArchiveWriter& a) { value.fields(a); }
+  void write(T& value) { value.fields(*this); }
 
   ByteWriter writer_;
 };
 
-/// Reads what ArchiveWriter wrote. Check complete() once, at the end; after a fault the values are arbitrary.
+/// Reads what ArchiveWriter wrote. Check complete() once, at the end; after a fault the values are
+/// arbitrary.
 class ArchiveReader {
  public:
   explicit ArchiveReader(ByteView bytes) : reader_(bytes) {}
@@ -74,12 +70,10 @@ class ArchiveReader {
     value = byte == 1;
   }
   template <class T>
-    requires std::is_arithmetic_v<T>
-  void read(T& value) {
-    value = reader_.get<T>();
-  }
+  requires std::is_arithmetic_v<T>
+  void read(T& value) { value = reader_.get<T>(); }
   template <class T>
-    requires std::is_enum_v<T>
+  requires std::is_enum_v<T>
   void read(T& value) {
     value = static_cast<T>(reader_.get<std::underlying_type_t<T>>());
     if (value > last_of(value)) {
@@ -100,16 +94,15 @@ class ArchiveReader {
     for (std::uint32_t i = 0; i < count && reader_.ok(); ++i) read(values.emplace_back());
   }
   template <class T>
-    requires requires(T& value, ArchiveReader& a) { value.fields(a); }
-  void read(T& value) {
-    value.fields(*this);
-  }
+  requires requires(T& value, ArchiveReader& a) { value.fields(a); }
+  void read(T& value) { value.fields(*this); }
 
   ByteReader reader_;
   bool in_range_ = true;
 };
 
-/// The bytes of one struct. Takes a copy because `fields` is shared with the reader and so not const.
+/// The bytes of one struct. Takes a copy because `fields` is shared with the reader and so not
+/// const.
 template <class T>
 Bytes to_bytes(T value) {
   ArchiveWriter writer;

@@ -26,8 +26,8 @@ Result<RgbImage> read_rgb_image(const std::filesystem::path& path);
 using ImageMetadata = std::vector<std::pair<std::string, std::string>>;
 
 struct ExrOptions {
-  bool half_float =
-      true;  ///< AOVs `depth` and `lns`, `variance` and `normal.*` stay float32 always
+  /// `depth`, `lns`, `variance` and `normal.*` stay float32 always.
+  bool half_float = true;
   std::string compression = "zip";  ///< none, rle, zips, zip, piz
   ImageMetadata metadata;
 };

@@ -10,7 +10,7 @@ namespace baton {
 
 /// A unit direction on the octahedral lattice of 2 x 16 bits [Meyer et al. 2010; Cigolle et al.
 /// 2014]: x in the low half. Every carried direction lies on this lattice, in memory as in the
-/// file, so a resume is exact. Neighbours along one axis are at most 0.0043 degrees apart; encoding
+/// file, so a resume is exact. Neighbours along one axis are at most 0.0044 degrees apart; encoding
 /// moves a direction by at most 0.0038 degrees. encode(decode(code)) is code, save on the rim (a
 /// half 0 or 65535), where two codes (all four at the corners) mean one direction: there it is one
 /// of them, always the same.

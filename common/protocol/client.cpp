@@ -32,13 +32,14 @@ Result<Message> RequestClient::request(const Message& message, std::chrono::mill
   std::optional<std::vector<Bytes>> frames;
   if (socket_.send(encode_message(message))) {
     while (!frames && Clock::now() < deadline) {
-      frames = socket_.receive(std::chrono::ceil<std::chrono::milliseconds>(deadline - Clock::now()));
+      frames =
+          socket_.receive(std::chrono::ceil<std::chrono::milliseconds>(deadline - Clock::now()));
     }
   }
   if (!frames) {
     BATON_ASSIGN(socket_, Socket::connect(endpoint_, kLinger));
-    return Error{ErrorKind::timeout, fmt::format("{}: no coordinator answered within {} ms", endpoint_,
-                                                 timeout.count())};
+    return Error{ErrorKind::timeout, fmt::format("{}: no coordinator answered within {} ms",
+                                                 endpoint_, timeout.count())};
   }
 
   BATON_ASSIGN(Message answer, decode_message(*frames));

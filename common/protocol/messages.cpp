@@ -39,12 +39,14 @@ Status check_header(ByteView header) {
   const auto version = reader.get<std::uint16_t>();
   if (!reader.ok() || !reader.at_end() ||
       std::memcmp(name.data(), expected_name.data(), name.size()) != 0) {
-    return Error{ErrorKind::bad_input,
-                 fmt::format("message: the first frame does not name the protocol {}", kProtocolName)};
+    return Error{
+        ErrorKind::bad_input,
+        fmt::format("message: the first frame does not name the protocol {}", kProtocolName)};
   }
   if (version != kProtocolVersion) {
-    return Error{ErrorKind::version, fmt::format("message: protocol version {}, this program speaks {}",
-                                                 version, kProtocolVersion)};
+    return Error{ErrorKind::version,
+                 fmt::format("message: protocol version {}, this program speaks {}", version,
+                             kProtocolVersion)};
   }
   return {};
 }

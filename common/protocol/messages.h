@@ -19,7 +19,7 @@ namespace baton {
 inline constexpr const char* kProtocolName = "BATON";
 inline constexpr std::uint16_t kProtocolVersion = 1;
 
-// ---- worker to coordinator -----------------------------------------------------------------------------------
+// ---- worker to coordinator ----------------------------------------------------------------------
 struct WorkerHello {  ///< first, and again after a reconnect or a new epoch
   std::string worker_id, host;
   std::int32_t pid = 0, num_threads = 0;
@@ -45,7 +45,7 @@ struct TaskFailed {
 struct JobDocumentRequest { Digest job; template <class A> void fields(A& a) { a(job); } };
 struct WorkerGoodbye { template <class A> void fields(A& a) { a(); } };
 
-// ---- coordinator to worker -----------------------------------------------------------------------------------
+// ---- coordinator to worker ----------------------------------------------------------------------
 struct WorkerWelcome {
   std::uint32_t epoch = 0;
   std::int32_t heartbeat_ms = 1000;
@@ -67,14 +67,14 @@ struct JobDocument {
 };
 struct Shutdown { template <class A> void fields(A& a) { a(); } };
 
-// ---- client to coordinator -----------------------------------------------------------------------------------
+// ---- client to coordinator ----------------------------------------------------------------------
 struct SubmitJob { std::string json; template <class A> void fields(A& a) { a(json); } };
 struct ListJobs { template <class A> void fields(A& a) { a(); } };
 struct ShowJob { std::string job; template <class A> void fields(A& a) { a(job); } };  ///< digest or unique prefix
 struct CancelJob { std::string job; template <class A> void fields(A& a) { a(job); } };
 struct StopCoordinator { template <class A> void fields(A& a) { a(); } };
 
-// ---- coordinator to client -----------------------------------------------------------------------------------
+// ---- coordinator to client ----------------------------------------------------------------------
 struct JobSummary {
   Digest job;
   std::string name, output_directory;

@@ -21,7 +21,8 @@ struct Incoming {
 /// The coordinator's side of every connection. Used by one thread, except wake().
 class Router {
  public:
-  /// "tcp://host:*" picks a port. Errors: malformed endpoint, address in use or not of this machine.
+  /// "tcp://host:*" picks a port. Errors: malformed endpoint, address in use or not of this
+  /// machine.
   static Result<Router> bind(const std::string& endpoint);
 
   /// Queues without waiting; false when the peer is gone or its queue is full.

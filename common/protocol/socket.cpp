@@ -55,7 +55,8 @@ Socket::~Socket() = default;
 Result<Socket> Socket::open(const std::string& endpoint, bool listen,
                             std::chrono::milliseconds linger) {
   try {
-    auto impl = std::make_unique<Impl>(listen ? zmq::socket_type::router : zmq::socket_type::dealer);
+    auto impl =
+        std::make_unique<Impl>(listen ? zmq::socket_type::router : zmq::socket_type::dealer);
     set_options(impl->socket, linger);
     if (listen) {
       impl->socket.set(zmq::sockopt::router_mandatory, true);
@@ -102,9 +103,8 @@ bool Socket::send(const std::vector<Bytes>& frames) {
 std::optional<std::vector<Bytes>> Socket::receive(std::chrono::milliseconds timeout) {
   try {
     // Wait for the first of message, wake-up, timeout.
-    std::array<zmq::pollitem_t, 2> items{
-        zmq::pollitem_t{impl_->socket.handle(), 0, ZMQ_POLLIN, 0},
-        zmq::pollitem_t{nullptr, impl_->wake_fd, ZMQ_POLLIN, 0}};
+    std::array<zmq::pollitem_t, 2> items{zmq::pollitem_t{impl_->socket.handle(), 0, ZMQ_POLLIN, 0},
+                                         zmq::pollitem_t{nullptr, impl_->wake_fd, ZMQ_POLLIN, 0}};
     zmq::poll(items.data(), items.size(), timeout);
     if (items[1].revents & ZMQ_POLLIN) {
       eventfd_t count = 0;

@@ -12,14 +12,14 @@
 namespace baton {
 
 /// One ZeroMQ socket that carries multi-frame messages; socket.cpp is the only file that knows the
-/// library. Not thread-safe, except wake(). Nothing here blocks but receive(), and that no longer than
-/// its timeout. Queues are bounded by limits::kMaxQueuedMessages, frames by limits::kMaxMessageBytes.
-/// Broken connections are made again in the background; what was queued is kept, what was on its way
-/// is lost.
+/// library. Not thread-safe, except wake(). Nothing here blocks but receive(), and that no longer
+/// than its timeout. Queues are bounded by limits::kMaxQueuedMessages, frames by
+/// limits::kMaxMessageBytes. Broken connections are made again in the background; what was queued
+/// is kept, what was on its way is lost.
 class Socket {
  public:
-  /// Talks to one listener (DEALER). `linger`: how long closing waits for unsent messages. An endpoint
-  /// that nobody listens on is not an error: messages wait in the queue.
+  /// Talks to one listener (DEALER). `linger`: how long closing waits for unsent messages. An
+  /// endpoint that nobody listens on is not an error: messages wait in the queue.
   static Result<Socket> connect(const std::string& endpoint, std::chrono::milliseconds linger);
   /// Listens for many (ROUTER): the first frame of each message is the peer's identity.
   /// "tcp://host:*" picks a port.
@@ -29,7 +29,8 @@ class Socket {
   Socket& operator=(Socket&&) noexcept;
   ~Socket();
 
-  /// Queues the frames; false when the queue is full or the peer is gone, and then nothing was queued.
+  /// Queues the frames; false when the queue is full or the peer is gone, and then nothing was
+  /// queued.
   bool send(const std::vector<Bytes>& frames);
   /// The next message, or nullopt after `timeout`, a signal or wake(). Of a message with more than
   /// limits::kMaxMessageFrames frames only so many are returned.
@@ -42,7 +43,8 @@ class Socket {
  private:
   struct Impl;
   explicit Socket(std::unique_ptr<Impl> impl);
-  static Result<Socket> open(const std::string& endpoint, bool listen, std::chrono::milliseconds linger);
+  static Result<Socket> open(const std::string& endpoint, bool listen,
+                             std::chrono::milliseconds linger);
 
   std::unique_ptr<Impl> impl_;
 };

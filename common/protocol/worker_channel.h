@@ -15,11 +15,11 @@ class WorkerChannel {
  public:
   static Result<WorkerChannel> connect(const std::string& endpoint);
 
-  /// Queues the message without waiting; false when the queue is full: the coordinator has been away
-  /// for long.
+  /// Queues the message without waiting; false when the queue is full: the coordinator has been
+  /// away for long.
   bool send(const Message& message);
-  /// The next message, or nullopt after `timeout`, a signal or wake(). A message that cannot be read
-  /// is returned as a Refused that says why.
+  /// The next message, or nullopt after `timeout`, a signal or wake(). A message that cannot be
+  /// read is returned as a Refused that says why.
   std::optional<Message> receive(std::chrono::milliseconds timeout);
   /// Ends a receive() early, from any thread: "there is something to send".
   void wake() { socket_.wake(); }

@@ -16,15 +16,18 @@ Error database_error(int code, const std::string& name, const char* detail) {
     case SQLITE_NOTADB:
     case SQLITE_CORRUPT:
       return {ErrorKind::corrupt, fmt::format("{}: damaged, or not a journal: {}", name, detail)};
-    default: return {ErrorKind::io, fmt::format("{}: {}", name, detail)};
+    default:
+      return {ErrorKind::io, fmt::format("{}: {}", name, detail)};
   }
 }
 
 }  // namespace
 
-// ---- statements ----------------------------------------------------------------------------------------------
+// ---- statements ---------------------------------------------------------------------------------
 
-void SqlStatement::Finalize::operator()(sqlite3_stmt* statement) const { sqlite3_finalize(statement); }
+void SqlStatement::Finalize::operator()(sqlite3_stmt* statement) const {
+  sqlite3_finalize(statement);
+}
 
 SqlStatement& SqlStatement::bind(std::int64_t value) {
   BATON_CHECK(sqlite3_bind_int64(statement_.get(), ++num_bound_, value) == SQLITE_OK);
@@ -32,14 +35,14 @@ SqlStatement& SqlStatement::bind(std::int64_t value) {
 }
 
 SqlStatement& SqlStatement::bind(std::string_view text) {
-  BATON_CHECK(sqlite3_bind_text64(statement_.get(), ++num_bound_, text.data(), text.size(), SQLITE_TRANSIENT,
-                                  SQLITE_UTF8) == SQLITE_OK);
+  BATON_CHECK(sqlite3_bind_text64(statement_.get(), ++num_bound_, text.data(), text.size(),
+                                  SQLITE_TRANSIENT, SQLITE_UTF8) == SQLITE_OK);
   return *this;
 }
 
 SqlStatement& SqlStatement::bind(ByteView blob) {
-  BATON_CHECK(sqlite3_bind_blob64(statement_.get(), ++num_bound_, blob.data(), blob.size(), SQLITE_TRANSIENT) ==
-              SQLITE_OK);
+  BATON_CHECK(sqlite3_bind_blob64(statement_.get(), ++num_bound_, blob.data(), blob.size(),
+                                  SQLITE_TRANSIENT) == SQLITE_OK);
   return *this;
 }
 
@@ -56,7 +59,9 @@ Status SqlStatement::run() {
   return {};
 }
 
-std::int64_t SqlStatement::integer(int column) const { return sqlite3_column_int64(statement_.get(), column); }
+std::int64_t SqlStatement::integer(int column) const {
+  return sqlite3_column_int64(statement_.get(), column);
+}
 
 std::string SqlStatement::text(int column) const {
   const ByteView bytes = blob(column);
@@ -68,17 +73,19 @@ ByteView SqlStatement::blob(int column) const {
   return {data, static_cast<std::size_t>(sqlite3_column_bytes(statement_.get(), column))};
 }
 
-// ---- database ------------------------------------------------------------------------------------------------
+// ---- database -----------------------------------------------------------------------------------
 
 void SqlDatabase::Close::operator()(sqlite3* database) const { sqlite3_close(database); }
 
 Result<SqlDatabase> SqlDatabase::open(const std::filesystem::path& path) {
   sqlite3* handle = nullptr;
-  const int code = sqlite3_open_v2(path.c_str(), &handle, SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE, nullptr);
+  const int code =
+      sqlite3_open_v2(path.c_str(), &handle, SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE, nullptr);
   SqlDatabase database(handle, path.string());
   if (code != SQLITE_OK) return database_error(code, database.name_, sqlite3_errstr(code));
 
-  // Exclusive from the first access on: no shared memory file, and a second coordinator finds the door closed.
+  // Exclusive from the first access on: no shared memory file, and a second coordinator finds the
+  // door closed.
   BATON_TRY(database.execute("PRAGMA locking_mode = EXCLUSIVE"));
   BATON_TRY(database.execute("PRAGMA journal_mode = WAL"));
   BATON_TRY(database.execute("PRAGMA synchronous = FULL"));
@@ -86,7 +93,8 @@ Result<SqlDatabase> SqlDatabase::open(const std::filesystem::path& path) {
   BATON_ASSIGN(SqlStatement check, database.prepare("PRAGMA quick_check(1)"));
   BATON_ASSIGN(const bool row, check.step());
   if (!row || check.text(0) != "ok") {
-    return database_error(SQLITE_CORRUPT, database.name_, row ? check.text(0).c_str() : "no answer");
+    return database_error(SQLITE_CORRUPT, database.name_,
+                          row ? check.text(0).c_str() : "no answer");
   }
   return database;
 }
@@ -99,7 +107,8 @@ Status SqlDatabase::execute(const std::string& sql) {
 
 Result<SqlStatement> SqlDatabase::prepare(std::string_view sql) {
   sqlite3_stmt* statement = nullptr;
-  const int code = sqlite3_prepare_v2(database_.get(), sql.data(), static_cast<int>(sql.size()), &statement, nullptr);
+  const int code = sqlite3_prepare_v2(database_.get(), sql.data(), static_cast<int>(sql.size()),
+                                      &statement, nullptr);
   if (code != SQLITE_OK) return database_error(code, name_, sqlite3_errmsg(database_.get()));
   return SqlStatement(statement, name_);
 }

@@ -37,18 +37,20 @@ class SqlStatement {
   struct Finalize {
     void operator()(sqlite3_stmt* statement) const;
   };
-  SqlStatement(sqlite3_stmt* statement, std::string name) : statement_(statement), name_(std::move(name)) {}
+  SqlStatement(sqlite3_stmt* statement, std::string name)
+      : statement_(statement), name_(std::move(name)) {}
 
   std::unique_ptr<sqlite3_stmt, Finalize> statement_;
   std::string name_;  ///< of the file, for errors
   int num_bound_ = 0;
 };
 
-/// An SQLite file that one process has to itself. Errors name the file; one that is damaged or no SQLite file is
-/// ErrorKind::corrupt, one in use ErrorKind::io.
+/// An SQLite file that one process has to itself. Errors name the file; one that is damaged or no
+/// SQLite file is ErrorKind::corrupt, one in use ErrorKind::io.
 class SqlDatabase {
  public:
-  /// Opens or creates the file, write-ahead logged; a commit survives a power cut. Reads the whole file once to check it.
+  /// Opens or creates the file, write-ahead logged; a commit survives a power cut. Reads the whole
+  /// file once to check it.
   static Result<SqlDatabase> open(const std::filesystem::path& path);
 
   Status execute(const std::string& sql);

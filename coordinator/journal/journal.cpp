@@ -13,8 +13,8 @@ namespace {
 constexpr std::int64_t kSchemaVersion = 1;
 constexpr std::int64_t kApplicationId = 0x4241544e;  // "BATN"
 
-// Digests, keys and statuses are written as numbers and hexadecimal text, so that the sqlite3 shell shows them; outputs,
-// statistics and leases in the form of common/base/archive.h.
+// Digests, keys and statuses are written as numbers and hexadecimal text, so that the sqlite3 shell
+// shows them; outputs, statistics and leases in the form of common/base/archive.h.
 constexpr const char* kSchema = R"sql(
   CREATE TABLE starts (epoch INTEGER NOT NULL);
   INSERT INTO starts VALUES (0);
@@ -45,13 +45,13 @@ Status read_blob(const SqlDatabase& database, ByteView bytes, const char* column
   ArchiveReader reader(bytes);
   reader(value);
   if (reader.complete()) return {};
-  return Error{ErrorKind::corrupt,
-               fmt::format("{}: {}: {} bytes that cannot be read", database.name(), column, bytes.size())};
+  return Error{ErrorKind::corrupt, fmt::format("{}: {}: {} bytes that cannot be read",
+                                               database.name(), column, bytes.size())};
 }
 
 }  // namespace
 
-// ---- opening -------------------------------------------------------------------------------------------------
+// ---- opening ------------------------------------------------------------------------------------
 
 Result<Journal> Journal::open(const std::filesystem::path& path) {
   BATON_ASSIGN(SqlDatabase database, SqlDatabase::open(path));
@@ -68,15 +68,18 @@ Status Journal::prepare_schema() {
 
   // A file without any table is new, or was left before its first commit.
   if (schema_changes == 0) {
-    return database_.execute(fmt::format("BEGIN; {} PRAGMA user_version = {}; PRAGMA application_id = {}; COMMIT;",
-                                         kSchema, kSchemaVersion, kApplicationId));
+    return database_.execute(
+        fmt::format("BEGIN; {} PRAGMA user_version = {}; PRAGMA application_id = {}; COMMIT;",
+                    kSchema, kSchemaVersion, kApplicationId));
   }
   if (application != kApplicationId) {
-    return Error{ErrorKind::corrupt, fmt::format("{}: a database, but not a journal of a coordinator", database_.name())};
+    return Error{
+        ErrorKind::corrupt,
+        fmt::format("{}: a database, but not a journal of a coordinator", database_.name())};
   }
   if (version != kSchemaVersion) {
-    return Error{ErrorKind::version, fmt::format("{}: journal version {}, this program reads {}", database_.name(),
-                                                 version, kSchemaVersion)};
+    return Error{ErrorKind::version, fmt::format("{}: journal version {}, this program reads {}",
+                                                 database_.name(), version, kSchemaVersion)};
   }
   return {};
 }
@@ -89,7 +92,7 @@ Status Journal::count_start() {
   return {};
 }
 
-// ---- reading -------------------------------------------------------------------------------------------------
+// ---- reading ------------------------------------------------------------------------------------
 
 Result<std::vector<Digest>> Journal::jobs() {
   BATON_ASSIGN(SqlStatement query, database_.prepare("SELECT digest FROM jobs ORDER BY position"));
@@ -98,7 +101,9 @@ Result<std::vector<Digest>> Journal::jobs() {
     BATON_ASSIGN(const bool row, query.step());
     if (!row) return jobs;
     const std::optional<Digest> digest = Digest::from_hex(query.text(0));
-    if (!digest) return Error{ErrorKind::corrupt, fmt::format("{}: jobs: no digest: '{}'", database_.name(), query.text(0))};
+    if (!digest)
+      return Error{ErrorKind::corrupt,
+                   fmt::format("{}: jobs: no digest: '{}'", database_.name(), query.text(0))};
     jobs.push_back(*digest);
   }
 }
@@ -106,27 +111,32 @@ Result<std::vector<Digest>> Journal::jobs() {
 Result<JournalledJob> Journal::load(const Digest& digest) {
   JournalledJob result;
   result.job = digest;
-  BATON_ASSIGN(SqlStatement job, database_.prepare("SELECT status, document FROM jobs WHERE digest = ?"));
+  BATON_ASSIGN(SqlStatement job,
+               database_.prepare("SELECT status, document FROM jobs WHERE digest = ?"));
   BATON_ASSIGN(const bool found, job.bind(digest.hex()).step());
-  if (!found) return Error{ErrorKind::internal, fmt::format("{}: no job {}", database_.name(), digest.hex())};
+  if (!found)
+    return Error{ErrorKind::internal, fmt::format("{}: no job {}", database_.name(), digest.hex())};
   result.status = static_cast<JobStatus>(std::clamp<std::int64_t>(job.integer(0), 0, 3));
   result.document = job.text(1);
 
-  BATON_ASSIGN(SqlStatement done, database_.prepare("SELECT kind, step, tile, outputs, stats FROM completions "
-                                                    "WHERE job = ? ORDER BY position"));
+  BATON_ASSIGN(SqlStatement done,
+               database_.prepare("SELECT kind, step, tile, outputs, stats FROM completions "
+                                 "WHERE job = ? ORDER BY position"));
   done.bind(digest.hex());
   while (true) {
     BATON_ASSIGN(const bool row, done.step());
     if (!row) break;
     Completion& completion = result.completions.emplace_back();
     completion.task = {static_cast<TaskKind>(std::clamp<std::int64_t>(done.integer(0), 0, 1)),
-                       static_cast<std::int32_t>(done.integer(1)), static_cast<std::int32_t>(done.integer(2))};
+                       static_cast<std::int32_t>(done.integer(1)),
+                       static_cast<std::int32_t>(done.integer(2))};
     BATON_TRY(read_blob(database_, done.blob(3), "completions.outputs", completion.outputs));
     BATON_TRY(read_blob(database_, done.blob(4), "completions.stats", completion.stats));
   }
 
-  BATON_ASSIGN(SqlStatement failed, database_.prepare("SELECT lease, worker, message, permanent FROM failures "
-                                                      "WHERE job = ? ORDER BY position"));
+  BATON_ASSIGN(SqlStatement failed,
+               database_.prepare("SELECT lease, worker, message, permanent FROM failures "
+                                 "WHERE job = ? ORDER BY position"));
   failed.bind(digest.hex());
   while (true) {
     BATON_ASSIGN(const bool row, failed.step());
@@ -143,8 +153,9 @@ Result<std::optional<std::string>> Journal::document(const Digest& job) {
 }
 
 Result<std::vector<Failure>> Journal::recent_failures(const Digest& job, int count) {
-  BATON_ASSIGN(SqlStatement query, database_.prepare("SELECT lease, worker, message, permanent FROM failures "
-                                                     "WHERE job = ? ORDER BY position DESC LIMIT ?"));
+  BATON_ASSIGN(SqlStatement query,
+               database_.prepare("SELECT lease, worker, message, permanent FROM failures "
+                                 "WHERE job = ? ORDER BY position DESC LIMIT ?"));
   query.bind(job.hex()).bind(count);
   std::vector<Failure> failures;
   while (true) {
@@ -167,7 +178,7 @@ Result<Failure> Journal::read_failure(const SqlStatement& row) const {
   return failure;
 }
 
-// ---- writing -------------------------------------------------------------------------------------------------
+// ---- writing ------------------------------------------------------------------------------------
 
 Result<SqlStatement> Journal::write(std::string_view sql) {
   if (!in_transaction_) BATON_TRY(database_.execute("BEGIN IMMEDIATE"));
@@ -176,8 +187,12 @@ Result<SqlStatement> Journal::write(std::string_view sql) {
 }
 
 Status Journal::add_job(const Digest& job, const std::string& document) {
-  BATON_ASSIGN(SqlStatement insert, write("INSERT INTO jobs (digest, status, document) VALUES (?, ?, ?)"));
-  return insert.bind(job.hex()).bind(static_cast<std::int64_t>(JobStatus::running)).bind(document).run();
+  BATON_ASSIGN(SqlStatement insert,
+               write("INSERT INTO jobs (digest, status, document) VALUES (?, ?, ?)"));
+  return insert.bind(job.hex())
+      .bind(static_cast<std::int64_t>(JobStatus::running))
+      .bind(document)
+      .run();
 }
 
 Status Journal::restart_job(const Digest& job, bool fresh) {
@@ -196,8 +211,9 @@ Status Journal::record_status(const Digest& job, JobStatus status) {
 }
 
 Status Journal::record_completion(const Digest& job, const Completion& completion) {
-  BATON_ASSIGN(SqlStatement insert, write("INSERT OR REPLACE INTO completions (job, kind, step, tile, outputs, stats) "
-                                          "VALUES (?, ?, ?, ?, ?, ?)"));
+  BATON_ASSIGN(SqlStatement insert,
+               write("INSERT OR REPLACE INTO completions (job, kind, step, tile, outputs, stats) "
+                     "VALUES (?, ?, ?, ?, ?, ?)"));
   return insert.bind(job.hex())
       .bind(static_cast<std::int64_t>(completion.task.kind))
       .bind(completion.task.step)
@@ -208,8 +224,10 @@ Status Journal::record_completion(const Digest& job, const Completion& completio
 }
 
 Status Journal::record_failure(const Failure& failure) {
-  BATON_ASSIGN(SqlStatement insert,
-               write("INSERT INTO failures (job, lease, worker, message, permanent) VALUES (?, ?, ?, ?, ?)"));
+  BATON_ASSIGN(
+      SqlStatement insert,
+      write(
+          "INSERT INTO failures (job, lease, worker, message, permanent) VALUES (?, ?, ?, ?, ?)"));
   return insert.bind(failure.lease.job.hex())
       .bind(to_bytes(failure.lease))
       .bind(failure.worker)

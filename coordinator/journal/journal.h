@@ -20,13 +20,13 @@ struct JournalledJob {
   std::vector<Failure> failures;
 };
 
-/// What a coordinator must not forget: jobs, completions, failures. Records are collected until commit() makes all of
-/// them durable at once; a process that is killed before leaves none of them. An error of any call leaves the journal
-/// unusable: stop, and start again from what was committed.
+/// What a coordinator must not forget: jobs, completions, failures. Records are collected until
+/// commit() makes all of them durable at once; a process that is killed before leaves none of them.
+/// An error of any call leaves the journal unusable: stop, and start again from what was committed.
 class Journal {
  public:
-  /// Opens or creates the file and counts this start. Errors: in use by another coordinator, damaged, not a journal, made
-  /// by a newer version.
+  /// Opens or creates the file and counts this start. Errors: in use by another coordinator,
+  /// damaged, not a journal, made by a newer version.
   static Result<Journal> open(const std::filesystem::path& path);
 
   /// How often the journal was opened, from 1.

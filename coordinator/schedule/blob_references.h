@@ -8,7 +8,8 @@
 
 namespace baton {
 
-/// Counts who still needs each blob of the store. Equal blobs of different tasks are one blob, needed twice.
+/// Counts who still needs each blob of the store. Equal blobs of different tasks are one blob,
+/// needed twice.
 class BlobReferences {
  public:
   void add(const Digest& blob) { ++counts_[blob]; }

@@ -11,8 +11,8 @@
 
 namespace baton {
 
-/// What the scheduler is told and what it asks for: two closed sets of plain data. Workers are named by the id that they
-/// chose; any event of a worker is a sign of life.
+/// What the scheduler is told and what it asks for: two closed sets of plain data. Workers are
+/// named by the id that they chose; any event of a worker is a sign of life.
 
 using TimePoint = std::chrono::steady_clock::time_point;
 
@@ -31,8 +31,9 @@ struct Failure {
   bool permanent = false;  ///< no retry can help
 };
 
-// ---- events --------------------------------------------------------------------------------------------------
-/// A new job, or one from the journal with what is known of it; replaces a job with this digest that has ended.
+// ---- events -------------------------------------------------------------------------------------
+/// A new job, or one from the journal with what is known of it; replaces a job with this digest
+/// that has ended.
 struct JobAdded {
   Digest job;
   JobSpec spec;
@@ -40,38 +41,89 @@ struct JobAdded {
   std::vector<Completion> completions;  ///< in the order in which they were recorded
   std::vector<Failure> failures;
 };
-struct JobCancelled { Digest job; };
+struct JobCancelled {
+  Digest job;
+};
 /// `running`: the leases that the worker has in hand, of this coordinator or an earlier one.
-struct WorkerJoined { std::string worker; std::vector<LeaseId> running; };
-struct WorkerAlive { std::string worker; std::vector<LeaseId> running; };
-struct WorkerLeft { std::string worker; };
-struct WorkRequested { std::string worker; std::int32_t count = 1; };
-struct TaskCompleted { std::string worker; LeaseId lease; std::vector<BlobRef> outputs; RenderStats stats; };
-struct AttemptFailed { std::string worker; LeaseId lease; std::string message; bool permanent = false; };
+struct WorkerJoined {
+  std::string worker;
+  std::vector<LeaseId> running;
+};
+struct WorkerAlive {
+  std::string worker;
+  std::vector<LeaseId> running;
+};
+struct WorkerLeft {
+  std::string worker;
+};
+struct WorkRequested {
+  std::string worker;
+  std::int32_t count = 1;
+};
+struct TaskCompleted {
+  std::string worker;
+  LeaseId lease;
+  std::vector<BlobRef> outputs;
+  RenderStats stats;
+};
+struct AttemptFailed {
+  std::string worker;
+  LeaseId lease;
+  std::string message;
+  bool permanent = false;
+};
 /// Time has passed: who was silent for too long?
 struct ClockTicked {};
 
-using Event = std::variant<JobAdded, JobCancelled, WorkerJoined, WorkerAlive, WorkerLeft, WorkRequested, TaskCompleted,
-                           AttemptFailed, ClockTicked>;
+using Event = std::variant<JobAdded, JobCancelled, WorkerJoined, WorkerAlive, WorkerLeft,
+                           WorkRequested, TaskCompleted, AttemptFailed, ClockTicked>;
 
-// ---- actions -------------------------------------------------------------------------------------------------
-/// Make it durable; nothing that comes after in the same or a later step may be sent or removed before.
-struct RecordCompletion { Digest job; Completion completion; };
-struct RecordFailure { Failure failure; };
-struct RecordJobStatus { Digest job; JobStatus status = JobStatus::running; std::string reason; };
+// ---- actions ------------------------------------------------------------------------------------
+/// Make it durable; nothing that comes after in the same or a later step may be sent or removed
+/// before.
+struct RecordCompletion {
+  Digest job;
+  Completion completion;
+};
+struct RecordFailure {
+  Failure failure;
+};
+struct RecordJobStatus {
+  Digest job;
+  JobStatus status = JobStatus::running;
+  std::string reason;
+};
 
-struct GrantLease { std::string worker; LeaseId lease; std::vector<BlobRef> inputs; };
-struct RevokeLease { std::string worker; LeaseId lease; };
+struct GrantLease {
+  std::string worker;
+  LeaseId lease;
+  std::vector<BlobRef> inputs;
+};
+struct RevokeLease {
+  std::string worker;
+  LeaseId lease;
+};
 /// There is less work than the worker asked for; it is remembered.
-struct ReportNoWork { std::string worker; };
+struct ReportNoWork {
+  std::string worker;
+};
 /// The worker was silent for too long and is forgotten.
-struct ForgetWorker { std::string worker; };
+struct ForgetWorker {
+  std::string worker;
+};
 /// Two different results for one task: a bug in the renderer or a broken machine.
-struct ReportConflict { LeaseId lease; std::string worker; BlobRef expected, reported; };
-/// Nobody needs these blobs now; a later step may need one again, so ask is_referenced() before removing.
-struct RemoveBlobs { std::vector<Digest> blobs; };
+struct ReportConflict {
+  LeaseId lease;
+  std::string worker;
+  BlobRef expected, reported;
+};
+/// Nobody needs these blobs now; a later step may need one again, so ask is_referenced() before
+/// removing.
+struct RemoveBlobs {
+  std::vector<Digest> blobs;
+};
 
-using Action = std::variant<RecordCompletion, RecordFailure, RecordJobStatus, GrantLease, RevokeLease, ReportNoWork,
-                            ForgetWorker, ReportConflict, RemoveBlobs>;
+using Action = std::variant<RecordCompletion, RecordFailure, RecordJobStatus, GrantLease,
+                            RevokeLease, ReportNoWork, ForgetWorker, ReportConflict, RemoveBlobs>;
 
 }  // namespace baton

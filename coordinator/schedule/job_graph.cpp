@@ -12,9 +12,12 @@ namespace {
 
 std::string_view name_of(BlobKind kind) {
   switch (kind) {
-    case BlobKind::state: return "state";
-    case BlobKind::film: return "film";
-    case BlobKind::image: return "image";
+    case BlobKind::state:
+      return "state";
+    case BlobKind::film:
+      return "film";
+    case BlobKind::image:
+      return "image";
   }
   return "blob";
 }
@@ -39,7 +42,8 @@ JobGraph::JobGraph(const JobSpec& job)
 std::optional<TaskIndex> JobGraph::find(const TaskKey& key) const {
   const std::int32_t num_steps = key.kind == TaskKind::assemble ? num_frames_ : num_runs_;
   const std::int32_t tiles_of_step = key.kind == TaskKind::assemble ? 1 : num_tiles_;
-  if (key.step < 0 || key.step >= num_steps || key.tile < 0 || key.tile >= tiles_of_step) return std::nullopt;
+  if (key.step < 0 || key.step >= num_steps || key.tile < 0 || key.tile >= tiles_of_step)
+    return std::nullopt;
   return key.kind == TaskKind::assemble ? key.step : render_index(key.step, key.tile);
 }
 
@@ -58,8 +62,10 @@ std::int32_t JobGraph::num_inputs(const TaskKey& key) const {
 std::vector<TaskIndex> JobGraph::dependents(const TaskKey& key) const {
   std::vector<TaskIndex> result;
   if (key.kind == TaskKind::assemble) return result;
-  for (std::int32_t frame = first_frame(key.step); frame <= last_frame(key.step); ++frame) result.push_back(frame);
-  if (carries_state_ && key.step + 1 < num_runs_) result.push_back(render_index(key.step + 1, key.tile));
+  for (std::int32_t frame = first_frame(key.step); frame <= last_frame(key.step); ++frame)
+    result.push_back(frame);
+  if (carries_state_ && key.step + 1 < num_runs_)
+    result.push_back(render_index(key.step + 1, key.tile));
   return result;
 }
 
@@ -67,7 +73,8 @@ std::vector<TaskIndex> JobGraph::inputs(const TaskKey& key) const {
   std::vector<TaskIndex> result;
   if (key.kind == TaskKind::assemble) {
     const std::int32_t run = key.step / frames_per_run_;
-    for (std::int32_t tile = 0; tile < num_tiles_; ++tile) result.push_back(render_index(run, tile));
+    for (std::int32_t tile = 0; tile < num_tiles_; ++tile)
+      result.push_back(render_index(run, tile));
   } else if (carries_state_ && key.step > 0) {
     result.push_back(render_index(key.step - 1, key.tile));
   }
@@ -82,14 +89,16 @@ std::uint64_t JobGraph::num_pixels(std::int32_t tile) const {
   return static_cast<std::uint64_t>(grid_.rect(tile).area());
 }
 
-std::optional<std::string> JobGraph::check_outputs(const TaskKey& key, std::vector<BlobRef>& outputs) const {
+std::optional<std::string> JobGraph::check_outputs(const TaskKey& key,
+                                                   std::vector<BlobRef>& outputs) const {
   // What the task must make, in sorted order.
   std::vector<BlobRef> expected;
   if (key.kind == TaskKind::assemble) {
     expected.push_back({.kind = BlobKind::image, .frame = key.step, .tile = 0, .digest = {}});
   } else {
     const std::int32_t last = last_frame(key.step);
-    if (carries_state_) expected.push_back({.kind = BlobKind::state, .frame = last, .tile = key.tile, .digest = {}});
+    if (carries_state_)
+      expected.push_back({.kind = BlobKind::state, .frame = last, .tile = key.tile, .digest = {}});
     for (std::int32_t frame = first_frame(key.step); frame <= last; ++frame) {
       expected.push_back({.kind = BlobKind::film, .frame = frame, .tile = key.tile, .digest = {}});
     }
@@ -101,7 +110,8 @@ std::optional<std::string> JobGraph::check_outputs(const TaskKey& key, std::vect
     const BlobRef& e = expected[i];
     if (i >= outputs.size() || outputs[i].kind != e.kind || outputs[i].frame != e.frame ||
         outputs[i].tile != e.tile) {
-      return fmt::format("the report lacks the {} of frame index {}, tile {}", name_of(e.kind), e.frame, e.tile);
+      return fmt::format("the report lacks the {} of frame index {}, tile {}", name_of(e.kind),
+                         e.frame, e.tile);
     }
   }
   if (outputs.size() > expected.size()) {

@@ -11,8 +11,9 @@
 
 namespace baton {
 
-/// Position of a task in its job: first the assemble tasks by frame, then the render tasks by run, then by tile. This is
-/// also the order in which ready tasks are granted: frames are finished before new ones are begun.
+/// Position of a task in its job: first the assemble tasks by frame, then the render tasks by run,
+/// then by tile. This is also the order in which ready tasks are granted: frames are finished
+/// before new ones are begun.
 using TaskIndex = std::int32_t;
 
 /// Number of tasks of a job, before anything is allocated for it.
@@ -20,7 +21,8 @@ std::int64_t count_tasks(const JobSpec& job);
 
 /// The task graph of a job, by arithmetic: nothing is stored per task.
 ///
-/// render(run, tile) needs render(run - 1, tile) if the job carries state. assemble(frame) needs all tiles of its run.
+/// render(run, tile) needs render(run - 1, tile) if the job carries state. assemble(frame) needs
+/// all tiles of its run.
 class JobGraph {
  public:
   /// count_tasks(job) must be at most limits::kMaxTasksPerJob.
@@ -51,8 +53,8 @@ class JobGraph {
   /// Pixels of a tile.
   std::uint64_t num_pixels(std::int32_t tile) const;
 
-  /// Sorts the outputs that a task reported: state first, then films by frame. nullopt when they are exactly what the
-  /// task must make; else what is wrong with them.
+  /// Sorts the outputs that a task reported: state first, then films by frame. nullopt when they
+  /// are exactly what the task must make; else what is wrong with them.
   std::optional<std::string> check_outputs(const TaskKey& key, std::vector<BlobRef>& outputs) const;
   /// Position of a frame's film in the sorted outputs of a render task.
   std::size_t film_position(std::int32_t frame) const;

@@ -28,9 +28,14 @@ bool JobTasks::apply(TaskIndex task, TaskEvent event) {
   if (r.status == TaskStatus::leased) --progress_.tasks_leased;
   r.status = *next;
   switch (*next) {
-    case TaskStatus::blocked: break;
-    case TaskStatus::ready: ready_.insert(task); break;
-    case TaskStatus::leased: ++progress_.tasks_leased; break;
+    case TaskStatus::blocked:
+      break;
+    case TaskStatus::ready:
+      ready_.insert(task);
+      break;
+    case TaskStatus::leased:
+      ++progress_.tasks_leased;
+      break;
     case TaskStatus::done:
       ++progress_.tasks_done;
       --progress_.tasks_open;
@@ -39,7 +44,9 @@ bool JobTasks::apply(TaskIndex task, TaskEvent event) {
       ++progress_.tasks_failed;
       --progress_.tasks_open;
       break;
-    case TaskStatus::cancelled: --progress_.tasks_open; break;
+    case TaskStatus::cancelled:
+      --progress_.tasks_open;
+      break;
   }
   return true;
 }
@@ -50,7 +57,8 @@ std::vector<BlobRef> JobTasks::inputs(TaskIndex task) const {
   for (const TaskIndex input : graph_.inputs(key)) {
     const std::vector<BlobRef>& made = outputs(input);
     BATON_CHECK(!made.empty());
-    const std::size_t position = key.kind == TaskKind::assemble ? graph_.film_position(key.step) : 0;
+    const std::size_t position =
+        key.kind == TaskKind::assemble ? graph_.film_position(key.step) : 0;
     result.push_back(made[position]);
   }
   return result;
@@ -152,8 +160,10 @@ std::vector<Digest> JobTasks::live_blobs() const {
 /// The mirror of release_inputs.
 bool JobTasks::is_live(TaskIndex task, const BlobRef& output) const {
   switch (output.kind) {
-    case BlobKind::image: return false;
-    case BlobKind::film: return status(output.frame) != TaskStatus::done;
+    case BlobKind::image:
+      return false;
+    case BlobKind::film:
+      return status(output.frame) != TaskStatus::done;
     case BlobKind::state: {
       TaskKey next = graph_.key(task);
       ++next.step;

@@ -24,7 +24,8 @@ struct JobProgress {
   RenderStats stats;
 };
 
-/// All tasks of one job: their status, outputs and failures. Knows nothing of workers but their names.
+/// All tasks of one job: their status, outputs and failures. Knows nothing of workers but their
+/// names.
 class JobTasks {
  public:
   explicit JobTasks(const JobSpec& spec);
@@ -41,8 +42,8 @@ class JobTasks {
 
   /// Leases a ready task. Returns the number of the attempt, from 1.
   std::uint32_t grant(TaskIndex task);
-  /// Ends a leased task: its outputs must be complete and sorted (JobGraph::check_outputs). Releases its dependents, and
-  /// the blobs that nobody needs any more.
+  /// Ends a leased task: its outputs must be complete and sorted (JobGraph::check_outputs).
+  /// Releases its dependents, and the blobs that nobody needs any more.
   void complete(TaskIndex task, const Completion& completion, BlobReferences& blobs);
   /// Makes a leased task ready again.
   void give_back(TaskIndex task);

@@ -31,7 +31,8 @@ std::vector<Action> Scheduler::step(const Event& event, TimePoint now) {
   // Answer the one who asked, and name what nobody needs any more.
   if (const auto* request = std::get_if<WorkRequested>(&event)) {
     const auto worker = workers_.find(request->worker);
-    if (worker != workers_.end() && worker->second.wanted > 0) actions.push_back(ReportNoWork{request->worker});
+    if (worker != workers_.end() && worker->second.wanted > 0)
+      actions.push_back(ReportNoWork{request->worker});
   }
   if (std::vector<Digest> garbage = blobs_.take_garbage(); !garbage.empty()) {
     actions.push_back(RemoveBlobs{std::move(garbage)});
@@ -52,7 +53,7 @@ std::vector<Digest> Scheduler::jobs() const {
   return result;
 }
 
-// ---- events: jobs --------------------------------------------------------------------------------------------
+// ---- events: jobs -------------------------------------------------------------------------------
 
 void Scheduler::on(const JobAdded& event, TimePoint, Actions& actions) {
   // A job that has ended makes room for its new life; one that runs goes on.
@@ -67,7 +68,8 @@ void Scheduler::on(const JobAdded& event, TimePoint, Actions& actions) {
   }
 
   // Take up what the journal knows; all else is fresh.
-  Job& job = jobs_.emplace(event.job, Job{event.spec, event.status, sequence, JobTasks(event.spec)}).first->second;
+  Job& job = jobs_.emplace(event.job, Job{event.spec, event.status, sequence, JobTasks(event.spec)})
+                 .first->second;
   replay(job, event);
   if (event.status != JobStatus::running) {
     job.tasks.cancel_open();
@@ -83,7 +85,7 @@ void Scheduler::on(const JobCancelled& event, TimePoint, Actions& actions) {
   end_job(event.job, *job, JobStatus::cancelled, "cancelled", actions);
 }
 
-// ---- events: reports -----------------------------------------------------------------------------------------
+// ---- events: reports ----------------------------------------------------------------------------
 
 void Scheduler::on(const TaskCompleted& event, TimePoint now, Actions& actions) {
   if (!touch(event.worker, now)) return;
@@ -116,10 +118,11 @@ void Scheduler::on(const TaskCompleted& event, TimePoint now, Actions& actions) 
 void Scheduler::on(const AttemptFailed& event, TimePoint now, Actions& actions) {
   if (!touch(event.worker, now)) return;
   const Held held = hold(event.worker, event.lease, now);
-  if (held.job) fail_attempt(held, {event.lease, event.worker, event.message, event.permanent}, actions);
+  if (held.job)
+    fail_attempt(held, {event.lease, event.worker, event.message, event.permanent}, actions);
 }
 
-// ---- jobs ----------------------------------------------------------------------------------------------------
+// ---- jobs ---------------------------------------------------------------------------------------
 
 Scheduler::Job* Scheduler::find(const Digest& job) {
   const auto found = jobs_.find(job);
@@ -171,8 +174,10 @@ void Scheduler::fail_attempt(const Held& held, const Failure& failure, Actions& 
   }
 }
 
-/// Ends a leased task, whose lease is already dropped, as failed; and the job when that is one failure too many.
-void Scheduler::give_up(const Digest& digest, Job& job, TaskIndex task, const std::string& reason, Actions& actions) {
+/// Ends a leased task, whose lease is already dropped, as failed; and the job when that is one
+/// failure too many.
+void Scheduler::give_up(const Digest& digest, Job& job, TaskIndex task, const std::string& reason,
+                        Actions& actions) {
   job.tasks.give_up(task);
   if (job.tasks.progress().tasks_failed >= static_cast<std::uint64_t>(job.spec.max_failed_tasks)) {
     end_job(digest, job, JobStatus::failed,
@@ -189,7 +194,8 @@ void Scheduler::end_if_finished(const Digest& digest, Job& job, Actions& actions
   if (progress.tasks_failed == 0) {
     end_job(digest, job, JobStatus::done, "all frames are written", actions);
   } else {
-    end_job(digest, job, JobStatus::failed, fmt::format("{} tasks failed", progress.tasks_failed), actions);
+    end_job(digest, job, JobStatus::failed, fmt::format("{} tasks failed", progress.tasks_failed),
+            actions);
   }
 }
 

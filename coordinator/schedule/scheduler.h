@@ -14,11 +14,12 @@
 
 namespace baton {
 
-/// Who gets which task when: a pure state machine. It knows no clock, socket or file; time comes as an argument and
-/// never decides what a task makes, only who makes it.
+/// Who gets which task when: a pure state machine. It knows no clock, socket or file; time comes as
+/// an argument and never decides what a task makes, only who makes it.
 ///
-/// A task goes to the worker that asked first; of the tasks, the job of highest priority comes first, then the job that
-/// was submitted first, then the order of TaskIndex. A retry goes to a worker that has failed the task least.
+/// A task goes to the worker that asked first; of the tasks, the job of highest priority comes
+/// first, then the job that was submitted first, then the order of TaskIndex. A retry goes to a
+/// worker that has failed the task least.
 class Scheduler {
  public:
   struct Job {
@@ -28,11 +29,12 @@ class Scheduler {
     JobTasks tasks;
   };
 
-  /// epoch: how often the coordinator has started; part of each lease. silence_limit: a worker that says nothing for
-  /// longer loses its leases.
+  /// epoch: how often the coordinator has started; part of each lease. silence_limit: a worker that
+  /// says nothing for longer loses its leases.
   Scheduler(std::uint32_t epoch, std::chrono::milliseconds silence_limit);
 
-  /// What follows from the event. Unknown jobs, workers and leases are normal: they are late, and nothing follows.
+  /// What follows from the event. Unknown jobs, workers and leases are normal: they are late, and
+  /// nothing follows.
   std::vector<Action> step(const Event& event, TimePoint now);
 
   /// nullptr: no such job. Valid until the next JobAdded.
@@ -80,8 +82,8 @@ class Scheduler {
   // Leases (scheduler_leases.cpp).
   Worker* touch(const std::string& worker, TimePoint now);
   Held hold(const std::string& worker, const LeaseId& lease, TimePoint now);
-  void reconcile(const std::string& worker, const std::vector<LeaseId>& named, TimePoint granted_until, TimePoint now,
-                 Actions& actions);
+  void reconcile(const std::string& worker, const std::vector<LeaseId>& named,
+                 TimePoint granted_until, TimePoint now, Actions& actions);
   void add_lease(const std::string& worker, const LeaseId& lease, TaskIndex task, TimePoint now);
   void drop_lease(const Digest& job, TaskIndex task);
   void lose_lease(const Digest& job, TaskIndex task, Actions& actions);
@@ -97,9 +99,11 @@ class Scheduler {
   Rank rank(const Job& job) const;
   void replay(Job& job, const JobAdded& event);
   void fail_attempt(const Held& held, const Failure& failure, Actions& actions);
-  void give_up(const Digest& digest, Job& job, TaskIndex task, const std::string& reason, Actions& actions);
+  void give_up(const Digest& digest, Job& job, TaskIndex task, const std::string& reason,
+               Actions& actions);
   void end_if_finished(const Digest& digest, Job& job, Actions& actions);
-  void end_job(const Digest& digest, Job& job, JobStatus status, const std::string& reason, Actions& actions);
+  void end_job(const Digest& digest, Job& job, JobStatus status, const std::string& reason,
+               Actions& actions);
 
   std::uint32_t epoch_;
   std::chrono::milliseconds silence_limit_;

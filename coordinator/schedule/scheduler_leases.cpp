@@ -9,7 +9,7 @@
 
 namespace baton {
 
-// ---- events: workers -----------------------------------------------------------------------------------------
+// ---- events: workers ----------------------------------------------------------------------------
 
 void Scheduler::on(const WorkerJoined& event, TimePoint now, Actions& actions) {
   Worker& worker = workers_[event.worker];
@@ -21,7 +21,8 @@ void Scheduler::on(const WorkerJoined& event, TimePoint now, Actions& actions) {
 
 void Scheduler::on(const WorkerAlive& event, TimePoint now, Actions& actions) {
   // A lease so new that it may still be on its way need not be named.
-  if (touch(event.worker, now)) reconcile(event.worker, event.running, now - silence_limit_, now, actions);
+  if (touch(event.worker, now))
+    reconcile(event.worker, event.running, now - silence_limit_, now, actions);
 }
 
 void Scheduler::on(const WorkerLeft& event, TimePoint, Actions& actions) {
@@ -53,7 +54,7 @@ std::size_t Scheduler::num_leases(const std::string& worker) const {
   return found == workers_.end() ? 0 : found->second.leases.size();
 }
 
-// ---- leases --------------------------------------------------------------------------------------------------
+// ---- leases -------------------------------------------------------------------------------------
 
 /// Notes a sign of life. nullptr: the worker is not known.
 Scheduler::Worker* Scheduler::touch(const std::string& worker, TimePoint now) {
@@ -63,8 +64,9 @@ Scheduler::Worker* Scheduler::touch(const std::string& worker, TimePoint now) {
   return &found->second;
 }
 
-/// The task of a lease that the worker says it has. A lease that was lost, or granted by an earlier coordinator, is taken
-/// up again while nobody else has the task. No job in the answer: the lease is over.
+/// The task of a lease that the worker says it has. A lease that was lost, or granted by an earlier
+/// coordinator, is taken up again while nobody else has the task. No job in the answer: the lease
+/// is over.
 Scheduler::Held Scheduler::hold(const std::string& worker, const LeaseId& lease, TimePoint now) {
   Job* job = find(lease.job);
   if (!job || job->status != JobStatus::running) return {};
@@ -75,15 +77,16 @@ Scheduler::Held Scheduler::hold(const std::string& worker, const LeaseId& lease,
     const Lease& current = leases_.at({lease.job, *task});
     return current.id == lease && current.worker == worker ? Held{job, *task} : Held{};
   }
-  if (job->tasks.status(*task) != TaskStatus::ready || job->tasks.has_failed(*task, lease)) return {};
+  if (job->tasks.status(*task) != TaskStatus::ready || job->tasks.has_failed(*task, lease))
+    return {};
   job->tasks.grant(*task);
   add_lease(worker, lease, *task, now);
   return {job, *task};
 }
 
 /// Compares the leases that a worker names with those it was granted at or before `granted_until`.
-void Scheduler::reconcile(const std::string& worker, const std::vector<LeaseId>& named, TimePoint granted_until,
-                          TimePoint now, Actions& actions) {
+void Scheduler::reconcile(const std::string& worker, const std::vector<LeaseId>& named,
+                          TimePoint granted_until, TimePoint now, Actions& actions) {
   // What it does not name is lost: the worker was started anew, or a message did not arrive.
   const std::set<LeaseId> in_hand(named.begin(), named.end());
   const auto before = workers_.at(worker).leases;
@@ -99,7 +102,8 @@ void Scheduler::reconcile(const std::string& worker, const std::vector<LeaseId>&
   }
 }
 
-void Scheduler::add_lease(const std::string& worker, const LeaseId& lease, TaskIndex task, TimePoint now) {
+void Scheduler::add_lease(const std::string& worker, const LeaseId& lease, TaskIndex task,
+                          TimePoint now) {
   leases_.insert_or_assign({lease.job, task}, Lease{lease, worker, now});
   workers_.at(worker).leases.emplace(lease.job, task);
 }
@@ -120,8 +124,10 @@ void Scheduler::lose_lease(const Digest& digest, TaskIndex task, Actions& action
     job.tasks.give_back(task);
   } else {
     const Lease lease = leases_.at({digest, task});
-    fail_attempt({&job, task}, {lease.id, lease.worker, fmt::format("its workers were lost {} times", losses), true},
-                 actions);
+    fail_attempt(
+        {&job, task},
+        {lease.id, lease.worker, fmt::format("its workers were lost {} times", losses), true},
+        actions);
   }
 }
 
@@ -144,11 +150,14 @@ void Scheduler::remove_worker(const std::string& worker, bool lost, Actions& act
   workers_.erase(found);
 }
 
-// ---- granting ------------------------------------------------------------------------------------------------
+// ---- granting -----------------------------------------------------------------------------------
 
-/// Gives ready tasks to whoever asked, one each in turn, until there is nothing that anyone may have.
+/// Gives ready tasks to whoever asked, one each in turn, until there is nothing that anyone may
+/// have.
 void Scheduler::serve(TimePoint now, Actions& actions) {
-  const auto has_work = [this](const auto& entry) { return !jobs_.at(entry.second).tasks.ready().empty(); };
+  const auto has_work = [this](const auto& entry) {
+    return !jobs_.at(entry.second).tasks.ready().empty();
+  };
   if (hungry_.empty() || std::none_of(running_.begin(), running_.end(), has_work)) return;
   std::deque<std::string> unserved;
   while (!hungry_.empty()) {

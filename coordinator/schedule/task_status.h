@@ -30,7 +30,8 @@ enum class TaskEvent : std::uint8_t {
 ///     blocked -> ready -> leased -> done
 ///                  ^---------+----> failed        and from the first three: -> cancelled
 ///
-/// nullopt: the event comes too late or too early and changes nothing. That is normal, not an error.
+/// nullopt: the event comes too late or too early and changes nothing. That is normal, not an
+/// error.
 std::optional<TaskStatus> next_status(TaskStatus status, TaskEvent event);
 
 }  // namespace baton

@@ -23,7 +23,9 @@ std::vector<std::int32_t> finished_frames(const Scheduler::Job& job) {
 std::string describe(const Scheduler::Job& job, const Failure& failure) {
   const TaskKey& task = failure.lease.task;
   const JobGraph& graph = job.tasks.graph();
-  const auto number = [&](std::int32_t frame) { return job.spec.frames[static_cast<std::size_t>(frame)]; };
+  const auto number = [&](std::int32_t frame) {
+    return job.spec.frames[static_cast<std::size_t>(frame)];
+  };
   if (!graph.find(task)) return failure.message;
   const std::string place =
       task.kind == TaskKind::assemble
@@ -56,7 +58,8 @@ JobSummary summarize(const Digest& digest, const Scheduler::Job& job) {
   return summary;
 }
 
-JobDetail describe_job(const Digest& digest, const Scheduler::Job& job, const std::vector<Failure>& failures) {
+JobDetail describe_job(const Digest& digest, const Scheduler::Job& job,
+                       const std::vector<Failure>& failures) {
   JobDetail detail{summarize(digest, job), finished_frames(job), {}};
   for (const Failure& failure : failures) detail.failures.push_back(describe(job, failure));
   return detail;
@@ -70,11 +73,13 @@ Result<Digest> resolve_job(const Scheduler& scheduler, const std::string& prefix
   if (matches.size() == 1) return matches.front();
   return Error{ErrorKind::bad_input, matches.empty()
                                          ? fmt::format("job '{}': no job has this ID", prefix)
-                                         : fmt::format("job '{}': {} jobs have IDs that begin so", prefix, matches.size())};
+                                         : fmt::format("job '{}': {} jobs have IDs that begin so",
+                                                       prefix, matches.size())};
 }
 
 std::optional<std::string> find_missing_file(const JobAdded& job, const BlobStore& store) {
-  // A scheduler that knows only this job tells what is recorded as done, and which blobs that leaves.
+  // A scheduler that knows only this job tells what is recorded as done, and which blobs that
+  // leaves.
   Scheduler trial(0, std::chrono::milliseconds(0));
   trial.step(job, {});
   const Scheduler::Job& recorded = *trial.find_job(job.job);
@@ -82,7 +87,8 @@ std::optional<std::string> find_missing_file(const JobAdded& job, const BlobStor
     if (!store.contains(blob)) return store.path(blob).string();
   }
   for (const std::int32_t frame : finished_frames(recorded)) {
-    const fs::path path = fs::path(job.spec.output.directory) / frame_file_name(job.spec.output.pattern, frame);
+    const fs::path path =
+        fs::path(job.spec.output.directory) / frame_file_name(job.spec.output.pattern, frame);
     std::error_code ignored;
     if (!fs::exists(path, ignored)) return path.string();
   }

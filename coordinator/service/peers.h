@@ -37,7 +37,8 @@ class Peers {
   std::map<PeerId, std::string> names_;
 };
 
-/// Remembers connections, so that each is told or complained about once. Bounded: forgets all when it is full.
+/// Remembers connections, so that each is told or complained about once. Bounded: forgets all when
+/// it is full.
 class OncePerPeer {
  public:
   /// True the first time.

@@ -21,13 +21,14 @@ constexpr std::chrono::milliseconds kTick{250};
 
 }  // namespace
 
-// ---- the loop ------------------------------------------------------------------------------------------------
+// ---- the loop -----------------------------------------------------------------------------------
 
 Result<Service> Service::open(const ServiceOptions& options) {
   std::error_code error;
   fs::create_directories(options.work_dir, error);
   if (error) {
-    return Error{ErrorKind::io, fmt::format("{}: cannot create: {}", options.work_dir.string(), error.message())};
+    return Error{ErrorKind::io,
+                 fmt::format("{}: cannot create: {}", options.work_dir.string(), error.message())};
   }
   BATON_ASSIGN(Journal journal, Journal::open(options.work_dir / "journal.sqlite"));
   BATON_ASSIGN(BlobStore store, BlobStore::open(options.work_dir / "store"));
@@ -75,11 +76,13 @@ Status Service::turn() {
 
 void Service::let_out() {
   for (const Outgoing& outgoing : std::exchange(outbox_, {})) {
-    if (!router_.send(outgoing.peer, outgoing.message)) spdlog::debug("a peer is gone or does not read; message dropped");
+    if (!router_.send(outgoing.peer, outgoing.message))
+      spdlog::debug("a peer is gone or does not read; message dropped");
   }
   for (const Digest& blob : std::exchange(garbage_, {})) {
     if (scheduler_.is_referenced(blob)) continue;
-    if (const Status removed = store_.remove(blob); !removed) spdlog::warn("{}", removed.error().message);
+    if (const Status removed = store_.remove(blob); !removed)
+      spdlog::warn("{}", removed.error().message);
   }
 }
 
@@ -113,7 +116,7 @@ Status Service::handle(const Incoming& incoming) {
       *incoming.message);
 }
 
-// ---- messages of workers -------------------------------------------------------------------------------------
+// ---- messages of workers ------------------------------------------------------------------------
 
 Status Service::receive(const PeerId& peer, const WorkerHello& hello) {
   if (hello.worker_id.empty() || hello.worker_id.size() > limits::kMaxTextLength) {
@@ -122,17 +125,20 @@ Status Service::receive(const PeerId& peer, const WorkerHello& hello) {
   }
   const bool is_new = !peers_.peer_of(hello.worker_id).has_value();
   if (is_new && peers_.num_workers() >= limits::kMaxWorkers) {
-    refuse(peer, {ErrorKind::io, fmt::format("the farm is full: {} workers", peers_.num_workers())});
+    refuse(peer,
+           {ErrorKind::io, fmt::format("the farm is full: {} workers", peers_.num_workers())});
     return {};
   }
   if (peers_.is_mixed(hello.instruction_set)) {
-    spdlog::warn("worker {} computes with {}, others do not: results may differ in the last bits", hello.worker_id,
-                 hello.instruction_set);
+    spdlog::warn("worker {} computes with {}, others do not: results may differ in the last bits",
+                 hello.worker_id, hello.instruction_set);
   }
 
   // Answer before the leases that follow from it.
   peers_.add(peer, hello);
-  if (is_new) spdlog::info("worker {} joined: {} threads on {}", hello.worker_id, hello.num_threads, hello.host);
+  if (is_new)
+    spdlog::info("worker {} joined: {} threads on {}", hello.worker_id, hello.num_threads,
+                 hello.host);
   reply(peer, WorkerWelcome{journal_.epoch(), static_cast<std::int32_t>(options_.heartbeat.count()),
                             store_directory_.string()});
   return step(WorkerJoined{hello.worker_id, hello.running});
@@ -150,13 +156,15 @@ Status Service::receive_from(const std::string& worker, const Heartbeat& message
 Status Service::receive_from(const std::string& worker, const TaskDone& message) {
   // Accepted results must be there: a blob may have gone between publishing and reporting.
   if (const auto missing = find_missing_blob(message)) {
-    return step(AttemptFailed{worker, message.lease, fmt::format("{}: reported, but not there", *missing), false});
+    return step(AttemptFailed{worker, message.lease,
+                              fmt::format("{}: reported, but not there", *missing), false});
   }
   return step(TaskCompleted{worker, message.lease, message.outputs, message.stats});
 }
 
 Status Service::receive_from(const std::string& worker, const TaskFailed& message) {
-  return step(AttemptFailed{worker, message.lease, message.message.substr(0, limits::kMaxTextLength), message.permanent});
+  return step(AttemptFailed{worker, message.lease,
+                            message.message.substr(0, limits::kMaxTextLength), message.permanent});
 }
 
 Status Service::receive_from(const std::string& worker, const WorkerGoodbye&) {
@@ -171,12 +179,13 @@ std::optional<std::string> Service::find_missing_blob(const TaskDone& report) co
   const auto task = job ? job->tasks.graph().find(report.lease.task) : std::nullopt;
   if (!task || job->tasks.status(*task) == TaskStatus::done) return std::nullopt;
   for (const BlobRef& output : report.outputs) {
-    if (output.kind != BlobKind::image && !store_.contains(output.digest)) return store_.path(output.digest).string();
+    if (output.kind != BlobKind::image && !store_.contains(output.digest))
+      return store_.path(output.digest).string();
   }
   return std::nullopt;
 }
 
-// ---- actions -------------------------------------------------------------------------------------------------
+// ---- actions ------------------------------------------------------------------------------------
 
 Status Service::perform(const RecordCompletion& action) {
   return journal_.record_completion(action.job, action.completion);
@@ -184,8 +193,8 @@ Status Service::perform(const RecordCompletion& action) {
 
 Status Service::perform(const RecordFailure& action) {
   const Failure& failure = action.failure;
-  spdlog::warn("job {}: attempt {} on {} failed: {}", failure.lease.job.short_hex(), failure.lease.attempt, failure.worker,
-               failure.message);
+  spdlog::warn("job {}: attempt {} on {} failed: {}", failure.lease.job.short_hex(),
+               failure.lease.attempt, failure.worker, failure.message);
   return journal_.record_failure(failure);
 }
 
@@ -218,9 +227,12 @@ Status Service::perform(const ForgetWorker& action) {
 
 Status Service::perform(const ReportConflict& action) {
   const TaskKey& task = action.lease.task;
-  spdlog::error("BUG: job {}: task {}/{}/{}: worker {} reports {} for frame index {}, tile {}, but {} was reported before",
-                action.lease.job.short_hex(), static_cast<int>(task.kind), task.step, task.tile, action.worker,
-                action.reported.digest.hex(), action.reported.frame, action.reported.tile, action.expected.digest.hex());
+  spdlog::error(
+      "BUG: job {}: task {}/{}/{}: worker {} reports {} for frame index {}, tile {}, but {} was "
+      "reported before",
+      action.lease.job.short_hex(), static_cast<int>(task.kind), task.step, task.tile,
+      action.worker, action.reported.digest.hex(), action.reported.frame, action.reported.tile,
+      action.expected.digest.hex());
   return {};
 }
 
@@ -229,9 +241,11 @@ Status Service::perform(const RemoveBlobs& action) {
   return {};
 }
 
-// ---- answers -------------------------------------------------------------------------------------------------
+// ---- answers ------------------------------------------------------------------------------------
 
-void Service::reply(const PeerId& peer, Message message) { outbox_.push_back({peer, std::move(message)}); }
+void Service::reply(const PeerId& peer, Message message) {
+  outbox_.push_back({peer, std::move(message)});
+}
 
 void Service::reply_to(const std::string& worker, Message message) {
   if (const auto peer = peers_.peer_of(worker)) reply(*peer, std::move(message));

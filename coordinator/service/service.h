@@ -16,24 +16,27 @@ namespace baton {
 
 struct ServiceOptions {
   std::string listen = "tcp://127.0.0.1:5570";
-  std::filesystem::path work_dir;            ///< holds journal.sqlite and store/
-  std::chrono::milliseconds heartbeat{1000};  ///< of workers; four silent ones lose a worker its leases
+  std::filesystem::path work_dir;  ///< holds journal.sqlite and store/
+  std::chrono::milliseconds heartbeat{
+      1000};  ///< of workers; four silent ones lose a worker its leases
 };
 
-/// The coordinator: one thread that turns messages into events, actions into messages. A turn of its loop takes what has
-/// arrived, commits the journal once, and only then lets out what follows: nobody learns of anything that a crash could
-/// undo, and no blob is removed before what replaces it is durable.
+/// The coordinator: one thread that turns messages into events, actions into messages. A turn of
+/// its loop takes what has arrived, commits the journal once, and only then lets out what follows:
+/// nobody learns of anything that a crash could undo, and no blob is removed before what replaces
+/// it is durable.
 class Service {
  public:
-  /// Takes up the jobs of the journal. A running job of which a file is missing starts afresh. Errors: the work folder,
-  /// the journal (in use, damaged, newer), the address.
+  /// Takes up the jobs of the journal. A running job of which a file is missing starts afresh.
+  /// Errors: the work folder, the journal (in use, damaged, newer), the address.
   static Result<Service> open(const ServiceOptions& options);
 
   /// The concrete endpoint: with the port that was picked.
   const std::string& endpoint() const { return router_.endpoint(); }
 
-  /// Works until `stop` or a StopCoordinator, then tells the workers to end. An error (of the journal) means that nothing
-  /// can be promised any more: everything committed is safe, start again.
+  /// Works until `stop` or a StopCoordinator, then tells the workers to end. An error (of the
+  /// journal) means that nothing can be promised any more: everything committed is safe, start
+  /// again.
   Status run(const std::atomic<bool>& stop);
 
  private:
@@ -46,7 +49,7 @@ class Service {
   Status step(const Event& event);
   void let_out();
 
-  // Messages of workers; `worker` is empty when the connection is not known.
+  // Messages of workers.
   Status receive(const PeerId& peer, const WorkerHello& message);
   Status receive_from(const std::string& worker, const LeaseRequest& message);
   Status receive_from(const std::string& worker, const Heartbeat& message);

@@ -15,7 +15,7 @@ constexpr int kMaxFailuresShown = 100;
 
 }  // namespace
 
-// ---- taking up the journal -----------------------------------------------------------------------------------
+// ---- taking up the journal ----------------------------------------------------------------------
 
 Status Service::restore_jobs() {
   BATON_ASSIGN(const std::vector<Digest> jobs, journal_.jobs());
@@ -33,9 +33,11 @@ Status Service::restore_job(const Digest& digest) {
                   document.error().message);
     return {};
   }
-  JobAdded event{digest, std::move(document->job), known.status, std::move(known.completions), std::move(known.failures)};
+  JobAdded event{digest, std::move(document->job), known.status, std::move(known.completions),
+                 std::move(known.failures)};
 
-  // A running job needs every file that it counts on; a job that has ended needs none until it is submitted again.
+  // A running job needs every file that it counts on; a job that has ended needs none until it is
+  // submitted again.
   if (event.status == JobStatus::running) {
     if (const auto missing = find_missing_file(event, store_)) {
       spdlog::warn("job {} starts afresh: {} is gone", digest.short_hex(), *missing);
@@ -46,12 +48,12 @@ Status Service::restore_job(const Digest& digest) {
   }
   BATON_TRY(step(event));
   const JobProgress& progress = scheduler_.find_job(digest)->tasks.progress();
-  spdlog::info("job {} of the journal: {} of {} tasks are done", digest.short_hex(), progress.tasks_done,
-               progress.tasks_total);
+  spdlog::info("job {} of the journal: {} of {} tasks are done", digest.short_hex(),
+               progress.tasks_done, progress.tasks_total);
   return {};
 }
 
-// ---- questions -----------------------------------------------------------------------------------------------
+// ---- questions ----------------------------------------------------------------------------------
 
 Status Service::receive(const PeerId& peer, const JobDocumentRequest& message) {
   BATON_ASSIGN(std::optional<std::string> document, journal_.document(message.job));
@@ -71,9 +73,11 @@ Status Service::receive(const PeerId& peer, const SubmitJob& message) {
     return {};
   }
   if (const std::int64_t count = count_tasks(document->job); count > limits::kMaxTasksPerJob) {
-    refuse(peer, {ErrorKind::bad_input,
-                  fmt::format("job {}: {} tasks, at most {}: use larger tiles or more frames per checkpoint",
-                              document->digest.short_hex(), count, limits::kMaxTasksPerJob)});
+    refuse(
+        peer,
+        {ErrorKind::bad_input,
+         fmt::format("job {}: {} tasks, at most {}: use larger tiles or more frames per checkpoint",
+                     document->digest.short_hex(), count, limits::kMaxTasksPerJob)});
     return {};
   }
 
@@ -87,7 +91,8 @@ Status Service::receive(const PeerId& peer, const SubmitJob& message) {
       refuse(peer, {ErrorKind::io, fmt::format("the journal is full: {} jobs", limits::kMaxJobs)});
       return {};
     }
-    spdlog::info("job {} submitted: '{}', {} tasks", digest.short_hex(), event.spec.name, count_tasks(event.spec));
+    spdlog::info("job {} submitted: '{}', {} tasks", digest.short_hex(), event.spec.name,
+                 count_tasks(event.spec));
     BATON_TRY(journal_.add_job(digest, message.json));
     BATON_TRY(step(event));
   }
@@ -95,7 +100,8 @@ Status Service::receive(const PeerId& peer, const SubmitJob& message) {
   return {};
 }
 
-/// A job that is known already: goes on where it stopped, or starts afresh when a file of it is gone.
+/// A job that is known already: goes on where it stopped, or starts afresh when a file of it is
+/// gone.
 Status Service::start_again(JobAdded event, JobStatus status, bool& already_there) {
   already_there = true;
   if (status == JobStatus::running) return {};
@@ -117,7 +123,8 @@ Status Service::start_again(JobAdded event, JobStatus status, bool& already_ther
 
 Status Service::receive(const PeerId& peer, const ListJobs&) {
   JobList list;
-  for (const Digest& job : scheduler_.jobs()) list.jobs.push_back(summarize(job, *scheduler_.find_job(job)));
+  for (const Digest& job : scheduler_.jobs())
+    list.jobs.push_back(summarize(job, *scheduler_.find_job(job)));
   list.workers = peers_.summaries();
   for (WorkerSummary& worker : list.workers) {
     worker.leases = static_cast<std::int32_t>(scheduler_.num_leases(worker.worker_id));
@@ -151,7 +158,8 @@ Status Service::receive(const PeerId& peer, const StopCoordinator&) {
 }
 
 Status Service::answer_detail(const PeerId& peer, const Digest& job) {
-  BATON_ASSIGN(const std::vector<Failure> failures, journal_.recent_failures(job, kMaxFailuresShown));
+  BATON_ASSIGN(const std::vector<Failure> failures,
+               journal_.recent_failures(job, kMaxFailuresShown));
   reply(peer, describe_job(job, *scheduler_.find_job(job), failures));
   return {};
 }

@@ -63,10 +63,11 @@ Result<LocalFarm::Lock> LocalFarm::lock_directory(const fs::path& directory) {
 }
 
 Result<LocalFarm> LocalFarm::start(const FarmOptions& options) {
+  BATON_ASSIGN(const std::string coordinator, sibling_program("baton-coordinator"));
+  BATON_ASSIGN(const std::string worker, sibling_program("baton-worker"));
   BATON_ASSIGN(Lock lock, lock_directory(options.work_directory));
   LocalFarm farm(options, std::move(lock));
-  BATON_TRY(farm.start_coordinator());
-  BATON_ASSIGN(const std::string worker, sibling_program("baton-worker"));
+  BATON_TRY(farm.start_coordinator(coordinator));
   for (int i = 1; i <= options.workers; ++i) {
     BATON_TRY(farm.add_member(fmt::format("worker-{}", i),
                               {worker, "--coordinator", farm.endpoint_, "--threads",
@@ -75,8 +76,7 @@ Result<LocalFarm> LocalFarm::start(const FarmOptions& options) {
   return farm;
 }
 
-Status LocalFarm::start_coordinator() {
-  BATON_ASSIGN(const std::string program, sibling_program("baton-coordinator"));
+Status LocalFarm::start_coordinator(const std::string& program) {
   const fs::path endpoint_file = options_.work_directory / "endpoint";
   std::error_code error;
   fs::remove(endpoint_file, error);

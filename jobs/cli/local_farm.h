@@ -58,7 +58,7 @@ class LocalFarm {
   LocalFarm(FarmOptions options, Lock lock)
       : options_(std::move(options)), lock_(std::move(lock)) {}
   static Result<Lock> lock_directory(const std::filesystem::path& directory);
-  Status start_coordinator();
+  Status start_coordinator(const std::string& program);
   Status add_member(const std::string& name, std::vector<std::string> command);
   std::filesystem::path log_of(const std::string& name) const;
 

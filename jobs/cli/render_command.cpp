@@ -78,11 +78,9 @@ Result<std::optional<JobDetail>> follow(LocalFarm& farm, RequestClient& client,
   }
 }
 
-void print_failure(const RenderOptions& options, const JobDetail& detail) {
+/// Each failure ends with the command that replays its tile alone.
+void print_failures(const JobDetail& detail) {
   for (const std::string& failure : detail.failures) fmt::print(stderr, "failure: {}\n", failure);
-  fmt::print(stderr,
-             "to see one tile fail alone: baton-worker replay {} --frame FRAME --tile TILE\n",
-             options.job);
 }
 
 void print_result(const RenderOptions& options, const JobSpec& job, const JobDetail& detail,
@@ -131,7 +129,7 @@ Result<ExitCode> run_render(const RenderOptions& options) {
 
   print_result(options, job, *detail, std::chrono::duration<double>(Clock::now() - start).count());
   make_sheet(options, job, *detail);
-  if (detail->summary.status == JobStatus::failed) print_failure(options, *detail);
+  if (detail->summary.status == JobStatus::failed) print_failures(*detail);
   if (options.keep_running) {
     fmt::print(stderr, "the coordinator still answers at {}; Ctrl-C ends it\n", farm.endpoint());
     while (!signals.stop_requested_within(kPollInterval)) BATON_TRY(farm.tend());

@@ -178,10 +178,10 @@ class Programs:
         """The digests of all states in a store, one line a frame."""
         return self.run("state_digest", store_folder).stdout
 
-    def render(self, job_path, work_folder, workers=1, threads=1, **options):
-        """`baton render` of a whole job in one command."""
+    def render(self, job_path, work_folder, workers=1, threads=1, extra=(), **options):
+        """`baton render` of a whole job in one command. extra: more arguments."""
         return self.run("baton", "render", job_path, "--workers", workers, "--threads-per-worker", threads,
-                        "--work-dir", work_folder, **options)
+                        "--work-dir", work_folder, *extra, **options)
 
 
 class Process:
@@ -265,7 +265,7 @@ class Farm:
     def submit(self, job_path):
         """Submits a job; returns its digest."""
         answer = json.loads(self.baton("job", "submit", job_path, "--json").stdout)
-        return answer["job"]
+        return answer["id"]
 
     def show(self, job):
         """`baton job show` as a dict."""

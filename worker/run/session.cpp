@@ -57,6 +57,7 @@ void Session::on(const MessageArrived& event, TimePoint now, Actions& actions) {
 
 void Session::on(const TaskEnded& event, TimePoint now, Actions& actions) {
   if (in_hand_.erase(event.lease) == 0) return;
+  next_request_ = now;  // what ended may have made work
 
   // Report, unless the task was given up.
   if (event.result) {
@@ -178,13 +179,14 @@ void Session::introduce(TimePoint now, Actions& actions) {
 void Session::request_leases(TimePoint now, Actions& actions) {
   if (!welcomed_ || draining_ || now < next_request_) return;
 
-  // One task more than threads, so that the next one is here when one ends.
+  // One task more than threads, so that the next one is here when one ends. A request replaces the
+  // one before.
   const std::int32_t capacity = options_.identity.num_threads + 1;
-  const std::int32_t missing = capacity - static_cast<std::int32_t>(in_hand_.size()) - requested_;
-  if (missing <= 0) return;
-  requested_ += missing;
+  const std::int32_t wanted = capacity - static_cast<std::int32_t>(in_hand_.size());
+  if (wanted <= requested_) return;
+  requested_ = wanted;
   request_expires_ = now + 2 * heartbeat_;
-  actions.push_back(SendMessage{LeaseRequest{missing}});
+  actions.push_back(SendMessage{LeaseRequest{wanted}});
 }
 
 std::vector<LeaseId> Session::leases_in_hand() const {

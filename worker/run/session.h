@@ -110,7 +110,7 @@ class Session {
   std::set<LeaseId> in_hand_;           ///< granted and not ended; at most threads + 1
   std::set<Digest> documents_missing_;  ///< asked for, not yet here
   std::deque<Message> reports_;         ///< the newest kMaxUnconfirmedReports, oldest first
-  std::int32_t requested_ = 0;          ///< leases asked for and not answered
+  std::int32_t requested_ = 0;          ///< leases that the coordinator knows are wanted
   TimePoint last_heard_, next_hello_, next_heartbeat_, next_request_, request_expires_;
 };
 

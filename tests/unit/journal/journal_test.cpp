@@ -17,14 +17,17 @@ using testing::HasSubstr;
 const Digest kJob = digest_of("job");
 
 Completion completion(std::int32_t tile) {
-  Completion c{{TaskKind::render, 3, tile}, {{BlobKind::film, 7, tile, {1, 2}, 99}, {BlobKind::state, 7, tile, {3, 4}, 5}}, {}};
+  Completion c{{TaskKind::render, 3, tile},
+               {{BlobKind::film, 7, tile, {1, 2}, 99}, {BlobKind::state, 7, tile, {3, 4}, 5}},
+               {}};
   c.stats.rays_shadow = 1000;
   c.stats.cpu_seconds = 0.125;
   return c;
 }
 
 struct JournalTest : testing::Test {
-  fs::path folder = fs::path(testing::TempDir()) / testing::UnitTest::GetInstance()->current_test_info()->name();
+  fs::path folder =
+      fs::path(testing::TempDir()) / testing::UnitTest::GetInstance()->current_test_info()->name();
   fs::path path = folder / "journal.sqlite";
 
   void SetUp() override {
@@ -42,7 +45,8 @@ struct JournalTest : testing::Test {
   void kill_and_copy() {
     const fs::path crashed = folder / "crashed.sqlite";
     fs::copy_file(path, crashed, fs::copy_options::overwrite_existing);
-    fs::copy_file(path.string() + "-wal", crashed.string() + "-wal", fs::copy_options::overwrite_existing);
+    fs::copy_file(path.string() + "-wal", crashed.string() + "-wal",
+                  fs::copy_options::overwrite_existing);
     path = crashed;
   }
 };
@@ -53,7 +57,8 @@ TEST_F(JournalTest, EveryStartIsCounted) {
 }
 
 TEST_F(JournalTest, WhatWasCommittedIsThereAgain) {
-  const Failure failure{{kJob, {TaskKind::assemble, 2, 0}, 4, 1}, "worker \xc3\xa4", "disk full", true};
+  const Failure failure{
+      {kJob, {TaskKind::assemble, 2, 0}, 4, 1}, "worker \xc3\xa4", "disk full", true};
   {
     Journal journal = open();
     ASSERT_TRUE(journal.add_job(kJob, "{}").ok());
@@ -125,7 +130,8 @@ TEST_F(JournalTest, ASecondCoordinatorIsTurnedAway) {
   const Journal journal = open();
   const Result<Journal> second = Journal::open(path);
   ASSERT_FALSE(second.ok());
-  EXPECT_THAT(second.error().message, HasSubstr("journal.sqlite: already in use by another coordinator"));
+  EXPECT_THAT(second.error().message,
+              HasSubstr("journal.sqlite: already in use by another coordinator"));
 }
 
 TEST_F(JournalTest, ANewerJournalIsRefused) {

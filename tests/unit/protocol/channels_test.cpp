@@ -24,7 +24,8 @@ struct ChannelTest : testing::Test {
   template <class F>
   std::jthread answer_once(F answer) {
     return std::jthread([this, answer] {
-      if (std::optional<Incoming> incoming = router.receive(kPatience)) router.send(incoming->peer, answer(*incoming));
+      if (std::optional<Incoming> incoming = router.receive(kPatience))
+        router.send(incoming->peer, answer(*incoming));
     });
   }
 };
@@ -110,7 +111,9 @@ TEST(Channels, AWorkersQueueIsBounded) {
   EXPECT_LT(sent, 3 * limits::kMaxQueuedMessages);
 }
 
-TEST_F(ChannelTest, APeerThatIsGoneCannotBeSentTo) { EXPECT_FALSE(router.send(Bytes{std::byte{1}}, NoWork{})); }
+TEST_F(ChannelTest, APeerThatIsGoneCannotBeSentTo) {
+  EXPECT_FALSE(router.send(Bytes{std::byte{1}}, NoWork{}));
+}
 
 TEST_F(ChannelTest, UnreadableMessagesNameTheirFault) {
   Socket stranger = Socket::connect(router.endpoint(), 0ms).value();

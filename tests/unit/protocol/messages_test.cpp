@@ -14,7 +14,8 @@ using testing::HasSubstr;
 const LeaseId kLease{{1, 2}, {TaskKind::assemble, 3, 4}, 5, 6};
 const BlobRef kBlob{BlobKind::film, 7, 8, {9, 10}, 11};
 const RenderStats kStats{1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 11, 0.5};
-const JobSummary kSummary{{1, 2}, "name", "/out", JobStatus::failed, -3, 1, 2, 3, 4, 5, 6, 7, 8, 9, kStats};
+const JobSummary kSummary{{1, 2}, "name", "/out", JobStatus::failed, -3, 1, 2, 3, 4, 5, 6, 7,
+                          8,      9,      kStats};
 
 /// One of each, in the order of the type codes, no member left at its default.
 const std::vector<Message>& examples() {
@@ -85,11 +86,13 @@ TEST(Messages, TruncatedOrPaddedAtAnyByteIsRefused) {
       for (std::size_t size = 0; size < whole[frame].size(); ++size) {
         std::vector<Bytes> cut = whole;
         cut[frame].resize(size);
-        EXPECT_FALSE(decode_message(cut).ok()) << "type " << message.index() << ", frame " << frame << ", " << size;
+        EXPECT_FALSE(decode_message(cut).ok())
+            << "type " << message.index() << ", frame " << frame << ", " << size;
       }
       std::vector<Bytes> padded = whole;
       padded[frame].push_back(std::byte{0});
-      EXPECT_FALSE(decode_message(padded).ok()) << "type " << message.index() << ", frame " << frame;
+      EXPECT_FALSE(decode_message(padded).ok())
+          << "type " << message.index() << ", frame " << frame;
     }
   }
 }
@@ -121,7 +124,8 @@ TEST(Messages, AnotherVersionIsAVersionError) {
 
 TEST(Messages, OtherProtocolsAreRefused) {
   for (const std::vector<Bytes>& frames :
-       {std::vector<Bytes>{}, std::vector<Bytes>{text("")}, std::vector<Bytes>{text("GET / HTTP/1.1")},
+       {std::vector<Bytes>{}, std::vector<Bytes>{text("")},
+        std::vector<Bytes>{text("GET / HTTP/1.1")},
         std::vector<Bytes>{text(std::string_view("CHALK\x01\x00", 7)), text("ab"), text("")}}) {
     const Result<Message> decoded = decode_message(frames);
     ASSERT_FALSE(decoded.ok());

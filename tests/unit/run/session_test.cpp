@@ -94,6 +94,19 @@ TEST_F(SessionTest, ReportsAndAsksAgainWhenATaskEnds) {
   EXPECT_EQ(sent<LeaseRequest>(actions)[0].count, 1);
 }
 
+TEST_F(SessionTest, ARequestNamesAllThatIsWanted) {
+  welcome();
+  grant(lease(0));
+  EXPECT_EQ(sent<LeaseRequest>(finish(lease(0))).at(0).count, 3);
+}
+
+TEST_F(SessionTest, AnEndedTaskAsksAtOnceWhateverNoWorkSaid) {
+  welcome();
+  grant(lease(0));
+  receive(NoWork{.retry_ms = 200});
+  EXPECT_EQ(sent<LeaseRequest>(finish(lease(0))).at(0).count, 3);
+}
+
 TEST_F(SessionTest, WaitsAsLongAsNoWorkSays) {
   welcome();
   receive(NoWork{.retry_ms = 200});

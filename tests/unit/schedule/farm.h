@@ -1,5 +1,7 @@
 #pragma once
 
+#include <gtest/gtest.h>
+
 #include <algorithm>
 #include <chrono>
 #include <map>
@@ -29,18 +31,22 @@ inline JobSpec small_job(int tiles, int frames, int per_run, bool carry = true) 
 
 /// The one right output of a task; `variant` makes another, wrong one.
 inline Digest blob_digest(const Digest& job, const BlobRef& blob, int variant = 0) {
-  return digest_of(job.hex() + std::to_string(static_cast<int>(blob.kind)) + "/" + std::to_string(blob.frame) + "/" +
-                   std::to_string(blob.tile) + "/" + std::to_string(variant));
+  return digest_of(job.hex() + std::to_string(static_cast<int>(blob.kind)) + "/" +
+                   std::to_string(blob.frame) + "/" + std::to_string(blob.tile) + "/" +
+                   std::to_string(variant));
 }
 
-inline std::vector<BlobRef> outputs_of(const JobSpec& spec, const Digest& job, const TaskKey& task, int variant = 0) {
+inline std::vector<BlobRef> outputs_of(const JobSpec& spec, const Digest& job, const TaskKey& task,
+                                       int variant = 0) {
   std::vector<BlobRef> outputs;
   if (task.kind == TaskKind::assemble) {
     outputs.push_back({BlobKind::image, task.step, 0, {}, 100});
   } else {
     const TileRun run = tile_run(spec, task.tile, task.step);
-    for (int f = run.first_frame; f <= run.last_frame; ++f) outputs.push_back({BlobKind::film, f, task.tile, {}, 10});
-    if (carries_state(spec)) outputs.push_back({BlobKind::state, run.last_frame, task.tile, {}, 20});
+    for (int f = run.first_frame; f <= run.last_frame; ++f)
+      outputs.push_back({BlobKind::film, f, task.tile, {}, 10});
+    if (carries_state(spec))
+      outputs.push_back({BlobKind::state, run.last_frame, task.tile, {}, 20});
   }
   for (BlobRef& blob : outputs) blob.digest = blob_digest(job, blob, variant);
   return outputs;
@@ -53,6 +59,15 @@ std::vector<T> all_of(const std::vector<Action>& actions) {
     if (const T* match = std::get_if<T>(&action)) result.push_back(*match);
   }
   return result;
+}
+
+inline TaskKey render(int run, int tile) { return {TaskKind::render, run, tile}; }
+inline TaskKey assemble(int frame) { return {TaskKind::assemble, frame, 0}; }
+
+inline std::vector<TaskKey> tasks_of(const std::vector<GrantLease>& grants) {
+  std::vector<TaskKey> tasks;
+  for (const GrantLease& grant : grants) tasks.push_back(grant.lease.task);
+  return tasks;
 }
 
 /// A scheduler with a clock and one job, driven by the words of a test.
@@ -71,21 +86,24 @@ class Farm {
     return grants.empty() ? GrantLease{} : grants.front();
   }
   std::vector<Action> finish(const GrantLease& grant, int variant = 0) {
-    return step(TaskCompleted{grant.worker, grant.lease, outputs_of(spec_, job, grant.lease.task, variant), {}});
+    return step(TaskCompleted{
+        grant.worker, grant.lease, outputs_of(spec_, job, grant.lease.task, variant), {}});
   }
   std::vector<Action> fail(const GrantLease& grant, bool permanent = false) {
     return step(AttemptFailed{grant.worker, grant.lease, "boom", permanent});
   }
-  /// Lets the worker do whatever it is given until nothing is left. Returns every action on the way.
+  /// Lets the worker do whatever it is given until nothing is left. Returns every action on the
+  /// way.
   std::vector<Action> work_off(const std::string& worker) {
     std::vector<Action> seen = step(WorkRequested{worker, 10});
     for (std::size_t i = 0; i < seen.size(); ++i) {
       const GrantLease* found = std::get_if<GrantLease>(&seen[i]);
       if (!found) continue;
       const GrantLease grant = *found;
-      for (const Event& event : {Event(TaskCompleted{grant.worker, grant.lease,
-                                                     outputs_of(spec_, job, grant.lease.task), {}}),
-                                 Event(WorkRequested{worker, 10})}) {
+      for (const Event& event :
+           {Event(TaskCompleted{
+                grant.worker, grant.lease, outputs_of(spec_, job, grant.lease.task), {}}),
+            Event(WorkRequested{worker, 10})}) {
         const std::vector<Action> more = step(event);
         seen.insert(seen.end(), more.begin(), more.end());
       }
@@ -103,6 +121,17 @@ class Farm {
   Scheduler scheduler;
   Digest job;
   TimePoint now{};
+};
+
+/// One job of 2 tiles, 4 frames, 2 frames a run; workers "a" and "b" are there.
+struct SchedulerTest : testing::Test {
+  Farm farm{small_job(2, 4, 2)};
+
+  void SetUp() override {
+    farm.submit();
+    farm.step(WorkerJoined{"a", {}});
+    farm.step(WorkerJoined{"b", {}});
+  }
 };
 
 }  // namespace baton::testing_farm

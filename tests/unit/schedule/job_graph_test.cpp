@@ -52,9 +52,11 @@ TEST(JobGraph, OutputsMustBeExactlyWhatTheTaskMakes) {
   EXPECT_EQ(outputs[graph.film_position(3)].frame, 3);
 
   outputs = {right[0], right[2]};
-  EXPECT_EQ(graph.check_outputs(task, outputs), "the report lacks the film of frame index 3, tile 2");
+  EXPECT_EQ(graph.check_outputs(task, outputs),
+            "the report lacks the film of frame index 3, tile 2");
   outputs = {right[0], right[1]};
-  EXPECT_EQ(graph.check_outputs(task, outputs), "the report lacks the state of frame index 3, tile 2");
+  EXPECT_EQ(graph.check_outputs(task, outputs),
+            "the report lacks the state of frame index 3, tile 2");
   outputs = {right[0], right[1], right[1], right[2]};
   EXPECT_TRUE(graph.check_outputs(task, outputs));
   outputs = right;

@@ -10,11 +10,13 @@ namespace {
 
 using namespace testing_farm;
 
-/// A farm where everything goes wrong at random: workers vanish, fail, report late or twice, messages are lost, the
-/// coordinator restarts from what it recorded. Checks after every step what must hold whatever happens.
+/// A farm where everything goes wrong at random: workers vanish, fail, report late or twice,
+/// messages are lost, the coordinator restarts from what it recorded. Checks after every step what
+/// must hold whatever happens.
 class ChaosFarm {
  public:
-  ChaosFarm(std::uint32_t seed, JobSpec spec) : random_(seed), spec_(std::move(spec)), graph_(spec_) {
+  ChaosFarm(std::uint32_t seed, JobSpec spec)
+      : random_(seed), spec_(std::move(spec)), graph_(spec_) {
     job_ = digest_of("job");
     start_coordinator();
   }
@@ -150,7 +152,7 @@ class ChaosFarm {
   TimePoint now_{};
   std::uint32_t epoch_ = 0;
   std::unique_ptr<Scheduler> scheduler_;
-  std::set<std::string> known_;                         ///< to the coordinator, as the workers believe
+  std::set<std::string> known_;  ///< to the coordinator, as the workers believe
   std::map<std::string, std::map<LeaseId, int>> held_;  ///< what each worker has in hand
   std::vector<Event> old_reports_;
   std::vector<Completion> completions_;  ///< the journal
@@ -163,12 +165,14 @@ class ChaosFarm {
 TEST(SchedulerModel, EveryTaskIsDoneOnceWhateverHappens) {
   for (std::uint32_t seed = 1; seed <= 60; ++seed) {
     SCOPED_TRACE(testing::Message() << "seed " << seed);
-    JobSpec spec = small_job(1 + static_cast<int>(seed % 5), 10, 1 + static_cast<int>(seed % 4), seed % 3 != 0);
+    JobSpec spec = small_job(1 + static_cast<int>(seed % 5), 10, 1 + static_cast<int>(seed % 4),
+                             seed % 3 != 0);
     spec.max_retries_per_task = 1000000;
     spec.max_failures_per_worker = 1000000;
     ChaosFarm farm(seed, spec);
     int steps = 0;
-    for (; farm.status() == JobStatus::running && steps < 20000; ++steps) farm.advance(/*trouble=*/steps < 3000);
+    for (; farm.status() == JobStatus::running && steps < 20000; ++steps)
+      farm.advance(/*trouble=*/steps < 3000);
     EXPECT_EQ(farm.status(), JobStatus::done) << "after " << steps << " steps";
     EXPECT_EQ(farm.num_recorded(), farm.num_tasks());
     EXPECT_EQ(farm.progress().tasks_open, 0u);
@@ -187,7 +191,8 @@ TEST(SchedulerModel, AJobAlwaysEndsWhenAttemptsAreLimited) {
     spec.max_failures_per_worker = 3;
     ChaosFarm farm(seed, spec);
     int steps = 0;
-    for (; farm.status() == JobStatus::running && steps < 20000; ++steps) farm.advance(/*trouble=*/true);
+    for (; farm.status() == JobStatus::running && steps < 20000; ++steps)
+      farm.advance(/*trouble=*/true);
     EXPECT_NE(farm.status(), JobStatus::running);
     EXPECT_EQ(farm.progress().tasks_open, 0u);
     EXPECT_EQ(farm.progress().tasks_leased, 0u);

@@ -11,27 +11,7 @@ using testing::ElementsAre;
 using testing::IsEmpty;
 using testing::SizeIs;
 
-TaskKey render(int run, int tile) { return {TaskKind::render, run, tile}; }
-TaskKey assemble(int frame) { return {TaskKind::assemble, frame, 0}; }
-
-std::vector<TaskKey> tasks_of(const std::vector<GrantLease>& grants) {
-  std::vector<TaskKey> tasks;
-  for (const GrantLease& grant : grants) tasks.push_back(grant.lease.task);
-  return tasks;
-}
-
-/// One job of 2 tiles, 4 frames, 2 frames a run; workers "a" and "b" are there.
-struct SchedulerTest : testing::Test {
-  Farm farm{small_job(2, 4, 2)};
-
-  void SetUp() override {
-    farm.submit();
-    farm.step(WorkerJoined{"a", {}});
-    farm.step(WorkerJoined{"b", {}});
-  }
-};
-
-// ---- dependencies --------------------------------------------------------------------------------------------
+// ---- dependencies -------------------------------------------------------------------------------
 
 TEST_F(SchedulerTest, FirstRunsAreReadyAndNothingElse) {
   EXPECT_THAT(tasks_of(farm.ask("a", 10)), ElementsAre(render(0, 0), render(0, 1)));
@@ -66,7 +46,8 @@ TEST(SchedulerWithoutState, AllRunsAreReadyAtOnce) {
   Farm farm(small_job(2, 4, 2, false));
   farm.submit();
   farm.step(WorkerJoined{"a", {}});
-  EXPECT_THAT(tasks_of(farm.ask("a", 10)), ElementsAre(render(0, 0), render(0, 1), render(1, 0), render(1, 1)));
+  EXPECT_THAT(tasks_of(farm.ask("a", 10)),
+              ElementsAre(render(0, 0), render(0, 1), render(1, 0), render(1, 1)));
 }
 
 TEST_F(SchedulerTest, AHungryWorkerIsServedAsSoonAsThereIsWork) {
@@ -77,7 +58,8 @@ TEST_F(SchedulerTest, AHungryWorkerIsServedAsSoonAsThereIsWork) {
   const auto grants = all_of<GrantLease>(actions);
   ASSERT_THAT(tasks_of(grants), ElementsAre(render(1, 0)));
   EXPECT_EQ(grants[0].worker, "b");
-  EXPECT_TRUE(std::holds_alternative<RecordCompletion>(actions.front())) << "recorded before it is used";
+  EXPECT_TRUE(std::holds_alternative<RecordCompletion>(actions.front()))
+      << "recorded before it is used";
 }
 
 TEST_F(SchedulerTest, WorkIsDealtOneByOneToAllWhoWait) {
@@ -111,7 +93,7 @@ TEST_F(SchedulerTest, HigherPriorityThenEarlierSubmissionComesFirst) {
   EXPECT_EQ(grants[3].lease.job, digest_of("equal"));
 }
 
-// ---- fences --------------------------------------------------------------------------------------------------
+// ---- fences -------------------------------------------------------------------------------------
 
 TEST_F(SchedulerTest, ADoubleReportChangesNothing) {
   const GrantLease grant = farm.ask_one("a");
@@ -153,7 +135,8 @@ TEST_F(SchedulerTest, AReportThatLacksAnOutputIsAFailedAttempt) {
   const GrantLease grant = farm.ask_one("a");
   std::vector<BlobRef> outputs = outputs_of(farm.spec(), farm.job, grant.lease.task);
   outputs.pop_back();
-  const auto failures = all_of<RecordFailure>(farm.step(TaskCompleted{"a", grant.lease, outputs, {}}));
+  const auto failures =
+      all_of<RecordFailure>(farm.step(TaskCompleted{"a", grant.lease, outputs, {}}));
   ASSERT_THAT(failures, SizeIs(1));
   EXPECT_THAT(failures[0].failure.message, testing::HasSubstr("lacks the state"));
 }
@@ -163,13 +146,14 @@ TEST_F(SchedulerTest, NonsenseIsIgnored) {
   const LeaseId no_such_task{farm.job, render(9, 9), 1, 1};
   EXPECT_THAT(farm.step(TaskCompleted{"a", nowhere, {}, {}}), IsEmpty());
   EXPECT_THAT(farm.step(TaskCompleted{"a", no_such_task, {}, {}}), IsEmpty());
-  EXPECT_THAT(farm.step(TaskCompleted{"stranger", {farm.job, render(0, 0), 1, 1}, {}, {}}), IsEmpty());
+  EXPECT_THAT(farm.step(TaskCompleted{"stranger", {farm.job, render(0, 0), 1, 1}, {}, {}}),
+              IsEmpty());
   EXPECT_THAT(farm.step(WorkRequested{"stranger", 1}), IsEmpty());
   EXPECT_THAT(farm.step(WorkRequested{"a", -5}), IsEmpty());
   EXPECT_THAT(farm.step(JobCancelled{digest_of("other")}), IsEmpty());
 }
 
-// ---- lost workers --------------------------------------------------------------------------------------------
+// ---- lost workers -------------------------------------------------------------------------------
 
 TEST_F(SchedulerTest, ASilentWorkerLosesItsLeases) {
   const auto held = farm.ask("a", 2);
@@ -217,7 +201,7 @@ TEST_F(SchedulerTest, ATaskThatKeepsLosingItsWorkersFails) {
   EXPECT_EQ(farm.status(), JobStatus::failed);
 }
 
-// ---- failures ------------------------------------------------------------------------------------------------
+// ---- failures -----------------------------------------------------------------------------------
 
 TEST_F(SchedulerTest, ARetryGoesToAnotherWorker) {
   const GrantLease grant = farm.ask_one("a");
@@ -291,100 +275,6 @@ TEST(SchedulerFailures, AJobThatNobodyMayWorkOnFails) {
   farm.step(WorkerJoined{"bad", {}});
   for (const GrantLease& grant : farm.ask("bad", 2)) farm.fail(grant);
   EXPECT_EQ(farm.status(), JobStatus::failed);
-}
-
-// ---- cancelling, blobs, restarts -----------------------------------------------------------------------------
-
-TEST_F(SchedulerTest, ACancelledJobTakesItsLeasesBack) {
-  const auto grants = farm.ask("a", 2);
-  const auto actions = farm.step(JobCancelled{farm.job});
-  EXPECT_THAT(all_of<RevokeLease>(actions), SizeIs(2));
-  EXPECT_EQ(farm.status(), JobStatus::cancelled);
-  EXPECT_THAT(farm.finish(grants[0]), IsEmpty());
-  EXPECT_THAT(farm.step(JobCancelled{farm.job}), IsEmpty());
-}
-
-TEST_F(SchedulerTest, BlobsGoWhenTheirLastUserIsDone) {
-  // Both runs of tile 0: the state of the first is needed no more, the last one is kept.
-  farm.finish(farm.ask_one("a"));
-  const auto next = farm.ask("a", 2);
-  const auto removed = all_of<RemoveBlobs>(farm.finish(next[1]));
-  ASSERT_THAT(removed, SizeIs(1));
-  EXPECT_THAT(removed[0].blobs, ElementsAre(next[1].inputs[0].digest));
-
-  // A frame's films go when it is written.
-  farm.finish(next[0]);
-  const GrantLease frame = farm.ask_one("a");
-  ASSERT_EQ(frame.lease.task, assemble(0));
-  EXPECT_THAT(all_of<RemoveBlobs>(farm.finish(frame))[0].blobs, SizeIs(2));
-  EXPECT_FALSE(farm.scheduler.is_referenced(frame.inputs[0].digest));
-}
-
-TEST(SchedulerBlobs, AllStatesStayWhenTheJobWantsThem) {
-  JobSpec spec = small_job(1, 2, 1);
-  spec.state.keep = StateKeep::all;
-  Farm farm(spec);
-  farm.submit();
-  farm.step(WorkerJoined{"a", {}});
-  farm.work_off("a");
-  for (int frame = 0; frame < 2; ++frame) {
-    EXPECT_TRUE(farm.scheduler.is_referenced(blob_digest(farm.job, {BlobKind::state, frame, 0, {}, 0})));
-    EXPECT_FALSE(farm.scheduler.is_referenced(blob_digest(farm.job, {BlobKind::film, frame, 0, {}, 0})));
-  }
-}
-
-TEST_F(SchedulerTest, ARestartedCoordinatorTakesUpWhereTheJournalEnds) {
-  const auto held = farm.ask("a", 2);
-  const auto recorded = all_of<RecordCompletion>(farm.finish(held[0]));
-
-  Farm again(farm.spec(), /*epoch=*/2);
-  again.step(JobAdded{farm.job, farm.spec(), JobStatus::running, {recorded[0].completion}, {}});
-  EXPECT_EQ(again.progress().tasks_done, 1u);
-
-  // The lease of the first life is adopted, its report counts, and others get the rest.
-  EXPECT_THAT(again.step(WorkerJoined{"a", {held[0].lease, held[1].lease}}), SizeIs(1)) << "done is revoked";
-  again.step(WorkerJoined{"b", {}});
-  EXPECT_THAT(tasks_of(again.ask("b", 10)), ElementsAre(render(1, 0)));
-  EXPECT_THAT(all_of<RecordCompletion>(again.finish(held[1])), SizeIs(1));
-}
-
-TEST_F(SchedulerTest, AnOldLeaseIsRevokedWhenTheTaskHasAnotherHolder) {
-  const GrantLease old = farm.ask_one("a");
-  Farm again(farm.spec(), /*epoch=*/2);
-  again.submit();
-  again.step(WorkerJoined{"b", {}});
-  const GrantLease current = again.ask_one("b");
-  ASSERT_EQ(current.lease.task, old.lease.task);
-  const auto revoked = all_of<RevokeLease>(again.step(WorkerJoined{"a", {old.lease}}));
-  ASSERT_THAT(revoked, SizeIs(1));
-  EXPECT_EQ(revoked[0].lease, old.lease);
-}
-
-TEST_F(SchedulerTest, AFailureThatWasRecordedIsNotCountedAgainAfterARestart) {
-  const GrantLease grant = farm.ask_one("a");
-  const auto recorded = all_of<RecordFailure>(farm.fail(grant));
-  Farm again(farm.spec(), /*epoch=*/2);
-  again.step(JobAdded{farm.job, farm.spec(), JobStatus::running, {}, {recorded[0].failure}});
-  again.step(WorkerJoined{"a", {grant.lease}});
-  EXPECT_THAT(again.fail(grant), IsEmpty());
-  EXPECT_EQ(again.progress().attempts_lost, 1u);
-}
-
-TEST_F(SchedulerTest, ACancelledJobThatIsSubmittedAgainKeepsWhatIsDone) {
-  const auto recorded = all_of<RecordCompletion>(farm.finish(farm.ask_one("a")));
-  farm.step(JobCancelled{farm.job});
-  const auto actions =
-      farm.step(JobAdded{farm.job, farm.spec(), JobStatus::running, {recorded[0].completion}, {}});
-  EXPECT_THAT(all_of<RemoveBlobs>(actions), IsEmpty());
-  EXPECT_EQ(farm.progress().tasks_done, 1u);
-  EXPECT_THAT(tasks_of(farm.ask("a", 10)), ElementsAre(render(0, 1), render(1, 0)));
-}
-
-TEST_F(SchedulerTest, AJobThatStartsAfreshLetsGoOfItsBlobs) {
-  farm.finish(farm.ask_one("a"));
-  farm.step(JobCancelled{farm.job});
-  EXPECT_THAT(all_of<RemoveBlobs>(farm.submit())[0].blobs, SizeIs(3));
-  EXPECT_EQ(farm.progress().tasks_done, 0u);
 }
 
 }  // namespace

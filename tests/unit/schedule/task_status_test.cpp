@@ -23,7 +23,8 @@ constexpr std::array<std::array<std::optional<S>, 6>, 6> kTable{{
 TEST(TaskStatus, EveryTransitionIsTheTables) {
   for (std::size_t status = 0; status < kTable.size(); ++status) {
     for (std::size_t event = 0; event < kTable[status].size(); ++event) {
-      EXPECT_EQ(next_status(static_cast<S>(status), static_cast<TaskEvent>(event)), kTable[status][event])
+      EXPECT_EQ(next_status(static_cast<S>(status), static_cast<TaskEvent>(event)),
+                kTable[status][event])
           << "status " << status << ", event " << event;
     }
   }

@@ -1,0 +1,304 @@
+#include "worker/accel/accel.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+#include <vector>
+
+#include "tests/support/chi_square.h"
+#include "tests/support/mesh_files.h"
+
+namespace baton {
+namespace {
+
+using test::test_uniforms;
+
+/// A sphere of 2 * rings * sectors triangles, its vertices moved by `bumps` along the normal.
+TriangleMesh sphere_mesh(int rings, int sectors, float bumps = 0) {
+  TriangleMesh mesh;
+  for (int i = 0; i <= rings; ++i) {
+    for (int j = 0; j < sectors; ++j) {
+      const float theta = kPi * static_cast<float>(i) / static_cast<float>(rings);
+      const float phi = 2 * kPi * static_cast<float>(j) / static_cast<float>(sectors);
+      const Vec3 n{std::sin(theta) * std::cos(phi), std::cos(theta),
+                   std::sin(theta) * std::sin(phi)};
+      const float u = test_uniforms(9, static_cast<std::uint32_t>(mesh.positions.size()))[0];
+      mesh.positions.push_back(n * (1 + bumps * (u - 0.5f)));
+      mesh.normals.push_back(n);
+    }
+  }
+  const auto at = [sectors](int i, int j) {
+    return static_cast<std::uint32_t>(i * sectors + j % sectors);
+  };
+  for (int i = 0; i < rings; ++i) {
+    for (int j = 0; j < sectors; ++j) {
+      if (i > 0) mesh.triangles.push_back({at(i, j), at(i, j + 1), at(i + 1, j)});
+      if (i + 1 < rings) mesh.triangles.push_back({at(i, j + 1), at(i + 1, j + 1), at(i + 1, j)});
+    }
+  }
+  return mesh;
+}
+
+/// Many small triangles with gaps between them: an edge decides whether a ray gets through.
+TriangleMesh triangle_soup(std::uint32_t count) {
+  TriangleMesh mesh;
+  const auto vector = [](std::uint32_t i) {
+    const auto u = test_uniforms(21, i);
+    return Vec3{u[0] - 0.5f, u[1] - 0.5f, u[2] - 0.5f};
+  };
+  for (std::uint32_t i = 0; i < count; ++i) {
+    const Vec3 centre = vector(4 * i) * 20.0f;
+    for (std::uint32_t k = 1; k <= 3; ++k)
+      mesh.positions.push_back(centre + vector(4 * i + k) * 0.6f);
+    mesh.triangles.push_back({3 * i, 3 * i + 1, 3 * i + 2});
+  }
+  return mesh;
+}
+
+Scene scene_of(TriangleMesh mesh, const Transform& to_world = {},
+               const Mat3& normal_to_world = {}) {
+  Scene scene;
+  scene.meshes.push_back(std::move(mesh));
+  scene.materials.emplace_back();
+  scene.instances.push_back({0, 0, to_world, normal_to_world});
+  return scene;
+}
+
+std::unique_ptr<Accel> build(const Scene& scene) {
+  auto accel = Accel::build(scene);
+  EXPECT_TRUE(accel.ok());
+  return std::move(*accel);
+}
+
+SurfaceHit trace(const Accel& accel, const Vec3& origin, const Vec3& direction) {
+  const Ray ray{origin, normalize(direction)};
+  SurfaceHit hit;
+  accel.intersect({&ray, 1}, {&hit, 1});
+  return hit;
+}
+
+/// Copy of the rays in `order`, not traced yet.
+ShadowRays pick(const ShadowRays& rays, const std::vector<std::size_t>& order) {
+  ShadowRays picked;
+  for (const std::size_t i : order) {
+    picked.push({rays.origin_x[i], rays.origin_y[i], rays.origin_z[i]},
+                {rays.direction_x[i], rays.direction_y[i], rays.direction_z[i]});
+  }
+  return picked;
+}
+
+/// Rays from around the soup to points on its edges and to its vertices.
+ShadowRays rays_at_edges(const TriangleMesh& mesh, std::uint32_t count) {
+  ShadowRays rays;
+  for (std::uint32_t i = 0; i < count; ++i) {
+    const auto u = test_uniforms(22, 2 * i);
+    const auto v = test_uniforms(22, 2 * i + 1);
+    const auto& t =
+        mesh.triangles[static_cast<std::size_t>(u[3] * static_cast<float>(mesh.triangles.size()))];
+    const float along = i % 2 == 0 ? 0.0f : v[0];
+    const Vec3 target = mesh.positions[t[0]] * (1 - along) + mesh.positions[t[1]] * along;
+    Vec3 origin = target + Vec3{u[0] - 0.5f, u[1] - 0.5f, u[2] - 0.5f} * 4.0f;
+    if (i % 3 == 0) origin.x = target.x;
+    rays.push(origin, normalize(target - origin));
+  }
+  return rays;
+}
+
+TEST(Accel, HitTellsTheSurface) {
+  Scene scene = scene_of(sphere_mesh(32, 64), {{{2, 0, 0, 0, 2, 0, 0, 0, 2}}, {10, 0, 0}});
+  scene.instances.push_back({0, 0, {{}, {0, 20, 0}}, {}});
+  const auto accel = build(scene);
+  const SurfaceHit hit = trace(*accel, {10, 0.3f, 9}, {0, 0, -1});
+  ASSERT_TRUE(hit.hit);
+  EXPECT_EQ(hit.instance, 0u);
+  EXPECT_NEAR(hit.point.position.z, std::sqrt(4 - 0.09f), 0.01f);
+  EXPECT_NEAR(hit.depth, 9 - hit.point.position.z, 1e-5f);
+  EXPECT_NEAR(hit.point.position.x, 10, 1e-5f);
+  EXPECT_NEAR(dot(hit.point.ns, normalize(hit.point.position - Vec3{10, 0, 0})), 1, 1e-3f);
+  EXPECT_GT(dot(hit.point.ng, hit.point.ns), 0.99f);
+  EXPECT_EQ(hit.point.wo, (Vec3{0, 0, 1}));
+  EXPECT_EQ(trace(*accel, {0, 20, 9}, {0, 0, -1}).instance, 1u);
+  EXPECT_FALSE(trace(*accel, {0, 0, 9}, {0, 0, 1}).hit);
+}
+
+TEST(Accel, NormalsFaceTheViewerInsideTheMesh) {
+  const Scene scene = scene_of(sphere_mesh(16, 32));
+  const auto accel = build(scene);
+  for (std::uint32_t i = 0; i < 1000; ++i) {
+    const auto u = test_uniforms(1, i);
+    const Vec3 direction = normalize({u[0] - 0.5f, u[1] - 0.5f, u[2] - 0.5f});
+    const SurfaceHit hit = trace(*accel, {0.1f, 0.2f, 0}, direction);
+    ASSERT_TRUE(hit.hit);
+    ASSERT_GE(dot(hit.point.ng, hit.point.wo), 0);
+    ASSERT_GT(dot(hit.point.ns, hit.point.ng), 0);
+    ASSERT_NEAR(length(hit.point.ns), 1, 1e-5f);
+  }
+}
+
+TEST(Accel, MirroredAndStretchedInstancesKeepTheirNormals) {
+  const Mat3 stretch{{-3, 0, 0, 0, 0.5f, 0, 0, 0, 1}};
+  const Mat3 inverse{{-1.0f / 3, 0, 0, 0, 2, 0, 0, 0, 1}};
+  const Scene scene = scene_of(sphere_mesh(64, 128), {stretch, {}}, inverse);
+  const auto accel = build(scene);
+  const SurfaceHit hit = trace(*accel, {-2, 5, 0.1f}, {0, -1, 0});
+  ASSERT_TRUE(hit.hit);
+  const Vec3& p = hit.point.position;
+  EXPECT_NEAR(dot(hit.point.ns, normalize({p.x / 9, p.y * 4, p.z})), 1, 1e-3f);
+  EXPECT_GT(dot(hit.point.ng, hit.point.ns), 0.99f);
+}
+
+TEST(Accel, LiftedRaysDoNotMeetTheirOwnSurface) {
+  // A convex body: nothing above the horizon of a point can be hidden.
+  for (const float scale : {0.01f, 1.0f, 30.0f}) {
+    for (const Vec3& offset : {Vec3{0, 0, 0}, Vec3{0, 1, 0}, Vec3{100, -40, 7}}) {
+      const Scene scene =
+          scene_of(sphere_mesh(40, 80), {{{scale, 0, 0, 0, scale, 0, 0, 0, scale}}, offset});
+      const auto accel = build(scene);
+      ShadowRays rays;
+      for (std::uint32_t i = 0; i < 20000; ++i) {
+        const auto u = test_uniforms(3, 2 * i);
+        const auto v = test_uniforms(3, 2 * i + 1);
+        const Vec3 from = normalize({u[0] - 0.5f, u[1] - 0.5f, u[2] - 0.5f});
+        const SurfaceHit hit = trace(*accel, offset + from * (scale * 3), -from);
+        if (!hit.hit) continue;
+        const float z = 0.01f + 0.99f * v[0] * v[0];  // many rays close to the horizon
+        const float r = std::sqrt(1 - z * z);
+        const Vec3 wi = Frame(hit.point.ng)
+                            .to_world({r * std::cos(6.28f * v[1]), r * std::sin(6.28f * v[1]), z});
+        rays.push(lift_off(hit.point.position, hit.point.ng), normalize(wi));
+      }
+      ASSERT_GT(rays.size(), 19000u);
+      accel->occluded(rays);
+      EXPECT_EQ(std::count_if(rays.t_far.begin(), rays.t_far.end(), [](float t) { return t < 0; }),
+                0)
+          << scale << " at " << offset.x;
+    }
+  }
+}
+
+TEST(Accel, ThinWallStillCastsItsShadow) {
+  // A roof a tenth of a millimetre above the floor, in metres.
+  TriangleMesh mesh;
+  for (const float y : {0.0f, 1e-4f}) {
+    const auto first = static_cast<std::uint32_t>(mesh.positions.size());
+    for (const Vec3& p : {Vec3{-5, y, -5}, Vec3{-5, y, 5}, Vec3{5, y, 5}, Vec3{5, y, -5}})
+      mesh.positions.push_back(p);
+    mesh.triangles.push_back({first, first + 1, first + 2});
+    mesh.triangles.push_back({first, first + 2, first + 3});
+  }
+  const Scene scene = scene_of(mesh);
+  const auto accel = build(scene);
+  ShadowRays rays;
+  rays.push(lift_off({1, 0, 2}, {0, 1, 0}), {0, 1, 0});
+  rays.push(lift_off({1, 1e-4f, 2}, {0, 1, 0}), {0, 1, 0});
+  rays.push(lift_off({1, 0, 2}, {0, -1, 0}), {0, -1, 0});
+  accel->occluded(rays);
+  EXPECT_EQ(rays.t_far[0], -std::numeric_limits<float>::infinity());
+  EXPECT_GT(rays.t_far[1], 0);
+  EXPECT_GT(rays.t_far[2], 0);
+}
+
+TEST(Accel, OcclusionAgreesWithClosestHits) {
+  const Scene scene = scene_of(sphere_mesh(30, 60, 0.2f));
+  const auto accel = build(scene);
+  ShadowRays rays;
+  std::vector<bool> expected;
+  for (std::uint32_t i = 0; i < 20000; ++i) {
+    const auto u = test_uniforms(5, 2 * i);
+    const auto v = test_uniforms(5, 2 * i + 1);
+    const Vec3 origin = Vec3{u[0] - 0.5f, u[1] - 0.5f, u[2] - 0.5f} * 6.0f;
+    const Vec3 direction = normalize({v[0] - 0.5f, v[1] - 0.5f, v[2] - 0.5f});
+    rays.push(origin, direction);
+    expected.push_back(trace(*accel, origin, direction).hit);
+  }
+  accel->occluded(rays);
+  for (std::size_t i = 0; i < rays.size(); ++i) ASSERT_EQ(rays.t_far[i] < 0, expected[i]) << i;
+}
+
+TEST(Accel, OcclusionOfARayDoesNotDependOnItsNeighbours) {
+  const Scene scene = scene_of(triangle_soup(4000));
+  const auto accel = build(scene);
+  const ShadowRays rays = rays_at_edges(scene.meshes[0], 200000);
+  std::vector<std::size_t> order(rays.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  ShadowRays together = pick(rays, order);
+  accel->occluded(together);
+
+  // The rays are on the edge: about half are blocked, and a direction one float step aside changes
+  // some.
+  const auto blocked =
+      std::count_if(together.t_far.begin(), together.t_far.end(), [](float t) { return t < 0; });
+  EXPECT_GT(blocked, 40000);
+  EXPECT_LT(blocked, 160000);
+  ShadowRays aside = pick(rays, order);
+  for (float& x : aside.direction_x) x = std::nextafter(x, 2.0f);
+  accel->occluded(aside);
+  std::size_t changed = 0;
+  for (std::size_t i = 0; i < rays.size(); ++i)
+    changed += (aside.t_far[i] < 0) != (together.t_far[i] < 0);
+  EXPECT_GT(changed, 1000u);
+
+  // Alone, in batches of any size, in any order: the same.
+  for (const std::size_t batch : {1, 3, 8, 16, 17, 1000}) {
+    const std::size_t stride = 7919;  // a prime: visits every ray once
+    for (std::size_t begin = 0; begin < rays.size(); begin += batch) {
+      std::vector<std::size_t> members;
+      for (std::size_t k = begin; k < std::min(begin + batch, rays.size()); ++k) {
+        members.push_back(batch % 2 == 0 ? k : k * stride % rays.size());
+      }
+      ShadowRays part = pick(rays, members);
+      accel->occluded(part);
+      for (std::size_t k = 0; k < members.size(); ++k) {
+        ASSERT_EQ(part.t_far[k] < 0, together.t_far[members[k]] < 0)
+            << "ray " << members[k] << ", batch " << batch;
+      }
+    }
+  }
+}
+
+TEST(Accel, TwoBuildsAnswerAlike) {
+  const Scene scene = scene_of(triangle_soup(4000));
+  const auto first = build(scene);
+  const auto second = build(scene);
+  ShadowRays a = rays_at_edges(scene.meshes[0], 100000);
+  ShadowRays b = a;
+  first->occluded(a);
+  second->occluded(b);
+  EXPECT_EQ(a.t_far, b.t_far);
+}
+
+TEST(Accel, EmptyScenesAndEmptyBatches) {
+  const Scene scene;
+  const auto accel = build(scene);
+  EXPECT_FALSE(trace(*accel, {}, {0, 0, 1}).hit);
+  ShadowRays rays;
+  accel->occluded(rays);
+  rays.push({}, {0, 0, 1});
+  accel->occluded(rays);
+  EXPECT_GT(rays.t_far[0], 0);
+  rays.clear();
+  EXPECT_EQ(rays.size(), 0u);
+}
+
+TEST(Accel, DescriptionNamesEmbree) {
+  const Scene scene;
+  EXPECT_EQ(build(scene)->description().find("Embree 3."), 0u);
+}
+
+TEST(LiftOff, MovesToTheSideOfTheNormal) {
+  for (const float size : {0.0f, 1e-3f, 0.03f, 1.0f, 1000.0f}) {
+    for (const float sign : {-1.0f, 1.0f}) {
+      const Vec3 position{size, -size, size};
+      const Vec3 n = normalize({sign, sign * 0.5f, -sign});
+      const float height = dot(lift_off(position, n) - position, n);
+      EXPECT_GT(height, 0);
+      EXPECT_LT(height, 1e-4f * std::max(size, 1.0f));
+    }
+  }
+}
+
+}  // namespace
+}  // namespace baton

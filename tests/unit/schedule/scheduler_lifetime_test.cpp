@@ -1,0 +1,111 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "tests/unit/schedule/farm.h"
+
+/// Cancelled jobs, blobs that nobody needs, restarts of the coordinator.
+namespace baton {
+namespace {
+
+using namespace testing_farm;
+using testing::ElementsAre;
+using testing::IsEmpty;
+using testing::SizeIs;
+
+TEST_F(SchedulerTest, ACancelledJobTakesItsLeasesBack) {
+  const auto grants = farm.ask("a", 2);
+  const auto actions = farm.step(JobCancelled{farm.job});
+  EXPECT_THAT(all_of<RevokeLease>(actions), SizeIs(2));
+  EXPECT_EQ(farm.status(), JobStatus::cancelled);
+  EXPECT_THAT(farm.finish(grants[0]), IsEmpty());
+  EXPECT_THAT(farm.step(JobCancelled{farm.job}), IsEmpty());
+}
+
+TEST_F(SchedulerTest, BlobsGoWhenTheirLastUserIsDone) {
+  // Both runs of tile 0: the state of the first is needed no more, the last one is kept.
+  farm.finish(farm.ask_one("a"));
+  const auto next = farm.ask("a", 2);
+  const auto removed = all_of<RemoveBlobs>(farm.finish(next[1]));
+  ASSERT_THAT(removed, SizeIs(1));
+  EXPECT_THAT(removed[0].blobs, ElementsAre(next[1].inputs[0].digest));
+
+  // A frame's films go when it is written.
+  farm.finish(next[0]);
+  const GrantLease frame = farm.ask_one("a");
+  ASSERT_EQ(frame.lease.task, assemble(0));
+  EXPECT_THAT(all_of<RemoveBlobs>(farm.finish(frame))[0].blobs, SizeIs(2));
+  EXPECT_FALSE(farm.scheduler.is_referenced(frame.inputs[0].digest));
+}
+
+TEST(SchedulerBlobs, AllStatesStayWhenTheJobWantsThem) {
+  JobSpec spec = small_job(1, 2, 1);
+  spec.state.keep = StateKeep::all;
+  Farm farm(spec);
+  farm.submit();
+  farm.step(WorkerJoined{"a", {}});
+  farm.work_off("a");
+  for (int frame = 0; frame < 2; ++frame) {
+    EXPECT_TRUE(
+        farm.scheduler.is_referenced(blob_digest(farm.job, {BlobKind::state, frame, 0, {}, 0})));
+    EXPECT_FALSE(
+        farm.scheduler.is_referenced(blob_digest(farm.job, {BlobKind::film, frame, 0, {}, 0})));
+  }
+}
+
+TEST_F(SchedulerTest, ARestartedCoordinatorTakesUpWhereTheJournalEnds) {
+  const auto held = farm.ask("a", 2);
+  const auto recorded = all_of<RecordCompletion>(farm.finish(held[0]));
+
+  Farm again(farm.spec(), /*epoch=*/2);
+  again.step(JobAdded{farm.job, farm.spec(), JobStatus::running, {recorded[0].completion}, {}});
+  EXPECT_EQ(again.progress().tasks_done, 1u);
+
+  // The lease of the first life is adopted, its report counts, and others get the rest.
+  EXPECT_THAT(again.step(WorkerJoined{"a", {held[0].lease, held[1].lease}}), SizeIs(1))
+      << "done is revoked";
+  again.step(WorkerJoined{"b", {}});
+  EXPECT_THAT(tasks_of(again.ask("b", 10)), ElementsAre(render(1, 0)));
+  EXPECT_THAT(all_of<RecordCompletion>(again.finish(held[1])), SizeIs(1));
+}
+
+TEST_F(SchedulerTest, AnOldLeaseIsRevokedWhenTheTaskHasAnotherHolder) {
+  const GrantLease old = farm.ask_one("a");
+  Farm again(farm.spec(), /*epoch=*/2);
+  again.submit();
+  again.step(WorkerJoined{"b", {}});
+  const GrantLease current = again.ask_one("b");
+  ASSERT_EQ(current.lease.task, old.lease.task);
+  const auto revoked = all_of<RevokeLease>(again.step(WorkerJoined{"a", {old.lease}}));
+  ASSERT_THAT(revoked, SizeIs(1));
+  EXPECT_EQ(revoked[0].lease, old.lease);
+}
+
+TEST_F(SchedulerTest, AFailureThatWasRecordedIsNotCountedAgainAfterARestart) {
+  const GrantLease grant = farm.ask_one("a");
+  const auto recorded = all_of<RecordFailure>(farm.fail(grant));
+  Farm again(farm.spec(), /*epoch=*/2);
+  again.step(JobAdded{farm.job, farm.spec(), JobStatus::running, {}, {recorded[0].failure}});
+  again.step(WorkerJoined{"a", {grant.lease}});
+  EXPECT_THAT(again.fail(grant), IsEmpty());
+  EXPECT_EQ(again.progress().attempts_lost, 1u);
+}
+
+TEST_F(SchedulerTest, ACancelledJobThatIsSubmittedAgainKeepsWhatIsDone) {
+  const auto recorded = all_of<RecordCompletion>(farm.finish(farm.ask_one("a")));
+  farm.step(JobCancelled{farm.job});
+  const auto actions =
+      farm.step(JobAdded{farm.job, farm.spec(), JobStatus::running, {recorded[0].completion}, {}});
+  EXPECT_THAT(all_of<RemoveBlobs>(actions), IsEmpty());
+  EXPECT_EQ(farm.progress().tasks_done, 1u);
+  EXPECT_THAT(tasks_of(farm.ask("a", 10)), ElementsAre(render(0, 1), render(1, 0)));
+}
+
+TEST_F(SchedulerTest, AJobThatStartsAfreshLetsGoOfItsBlobs) {
+  farm.finish(farm.ask_one("a"));
+  farm.step(JobCancelled{farm.job});
+  EXPECT_THAT(all_of<RemoveBlobs>(farm.submit())[0].blobs, SizeIs(3));
+  EXPECT_EQ(farm.progress().tasks_done, 0u);
+}
+
+}  // namespace
+}  // namespace baton

@@ -1,0 +1,172 @@
+#pragma once
+
+#include <gtest/gtest.h>
+#include <unistd.h>
+
+#include <atomic>
+#include <deque>
+#include <filesystem>
+#include <memory>
+#include <string>
+#include <thread>
+
+#include "common/base/files.h"
+#include "common/job/job_json.h"
+#include "common/protocol/client.h"
+#include "common/protocol/worker_channel.h"
+#include "common/store/blob_store.h"
+#include "coordinator/service/service.h"
+
+namespace baton::testing_service {
+
+using namespace std::chrono_literals;
+namespace fs = std::filesystem;
+
+inline constexpr auto kPatience = 20s;
+inline constexpr std::chrono::milliseconds kHeartbeat{500};
+
+/// A coordinator in a thread of its own.
+class RunningService {
+ public:
+  explicit RunningService(const ServiceOptions& options)
+      : service_(Service::open(options).value()) {
+    endpoint_ = service_.endpoint();
+    thread_ = std::thread([this] { status_ = service_.run(stop_); });
+  }
+  ~RunningService() {
+    stop_ = true;
+    if (thread_.joinable()) thread_.join();
+  }
+  const std::string& endpoint() const { return endpoint_; }
+  Status join() {
+    thread_.join();
+    return status_;
+  }
+
+ private:
+  Service service_;
+  std::string endpoint_;
+  std::atomic<bool> stop_{false};
+  Status status_;
+  std::thread thread_;
+};
+
+/// A worker that talks but does not render: its blobs are the names of what they stand for.
+class FakeWorker {
+ public:
+  FakeWorker(const std::string& endpoint, const fs::path& store, JobSpec job, std::string id = "w")
+      : channel_(WorkerChannel::connect(endpoint).value()),
+        store_(BlobStore::open(store).value()),
+        job_(std::move(job)),
+        id_(std::move(id)) {}
+
+  void say(const Message& message) { ASSERT_TRUE(channel_.send(message)); }
+  void hello(std::vector<LeaseId> running = {}) {
+    say(WorkerHello{id_, "host", 1, 2, "TEST", std::move(running)});
+  }
+
+  /// The next message of type T; others are passed over.
+  template <class T>
+  T expect() {
+    for (const auto deadline = std::chrono::steady_clock::now() + kPatience;
+         std::chrono::steady_clock::now() < deadline;) {
+      const std::optional<Message> message = channel_.receive(100ms);
+      if (message && std::holds_alternative<T>(*message)) return std::get<T>(*message);
+    }
+    ADD_FAILURE() << "no message of type " << Message(T{}).index() << " came";
+    return T{};
+  }
+
+  /// Publishes what the task makes and returns the report.
+  TaskDone work(const LeaseId& lease) {
+    TaskDone done{lease, {}, {}};
+    done.stats.pixels = 1;
+    if (lease.task.kind == TaskKind::assemble) {
+      const int number = job_.frames[static_cast<std::size_t>(lease.task.step)];
+      const fs::path path =
+          fs::path(job_.output.directory) / frame_file_name(job_.output.pattern, number);
+      EXPECT_TRUE(write_file_atomic(path, as_bytes_view("image")).ok());
+      done.outputs.push_back({BlobKind::image, lease.task.step, 0, digest_of("image"), 5});
+      return done;
+    }
+    const TileRun run = tile_run(job_, lease.task.tile, lease.task.step);
+    for (int frame = run.first_frame; frame <= run.last_frame; ++frame)
+      done.outputs.push_back(blob(BlobKind::film, frame, run.tile));
+    if (carries_state(job_))
+      done.outputs.push_back(blob(BlobKind::state, run.last_frame, run.tile));
+    return done;
+  }
+
+  /// Does one task from request to report.
+  LeaseId do_one_task() {
+    say(LeaseRequest{1});
+    const LeaseId lease = expect<LeaseGrant>().lease;
+    say(work(lease));
+    return lease;
+  }
+
+ private:
+  BlobRef blob(BlobKind kind, int frame, int tile) {
+    const std::string text = std::to_string(static_cast<int>(kind)) + " " + std::to_string(frame) +
+                             " " + std::to_string(tile);
+    return {kind, frame, tile, store_.put(as_bytes_view(text)).value(), text.size()};
+  }
+
+  WorkerChannel channel_;
+  BlobStore store_;
+  JobSpec job_;
+  std::string id_;
+};
+
+/// A work folder and a job of 2 tiles, 4 frames in 2 runs: 8 tasks.
+struct ServiceTest : testing::Test {
+  fs::path folder =
+      fs::path(testing::TempDir()) /
+      (std::to_string(::getpid()) + testing::UnitTest::GetInstance()->current_test_info()->name());
+  ServiceOptions options{"tcp://127.0.0.1:*", folder / "work", kHeartbeat};
+  JobSpec job;
+  std::string document;
+
+  void SetUp() override {
+    fs::remove_all(folder);
+    fs::create_directories(folder);
+    ASSERT_TRUE(write_file_atomic(folder / "sky.hdr", as_bytes_view("sky")).ok());
+    job.name = "test";
+    job.frames = {1, 2, 3, 4};
+    job.image = {.width = 16, .height = 8, .sites = 1, .tile_size = 8};
+    job.scene.materials["grey"] = {};
+    job.scene.ground = GroundSpec{.material = "grey"};
+    job.environment.keys = {{1, (folder / "sky.hdr").string()}};
+    job.output.directory = (folder / "out").string();
+    job.state.checkpoint_every = 2;
+    const Result<std::string> made = make_job_document(job);
+    ASSERT_TRUE(made.ok()) << made.error().message;
+    document = *made;
+  }
+  void TearDown() override { fs::remove_all(folder); }
+
+  fs::path store() const { return options.work_dir / "store"; }
+
+  template <class T>
+  T ask(const std::string& endpoint, const Message& question) {
+    RequestClient client = RequestClient::connect(endpoint).value();
+    const Result<Message> answer = client.request(question, kPatience);
+    if (!answer.ok()) {
+      ADD_FAILURE() << answer.error().message;
+      return T{};
+    }
+    EXPECT_TRUE(std::holds_alternative<T>(*answer)) << answer->index();
+    return std::holds_alternative<T>(*answer) ? std::get<T>(*answer) : T{};
+  }
+  Error refused(const std::string& endpoint, const Message& question) {
+    RequestClient client = RequestClient::connect(endpoint).value();
+    const Result<Message> answer = client.request(question, kPatience);
+    EXPECT_FALSE(answer.ok());
+    return answer.ok() ? Error{} : answer.error();
+  }
+  JobDetail show(const std::string& endpoint, const Digest& id) {
+    return ask<JobDetail>(endpoint, ShowJob{id.hex()});
+  }
+};
+
+}  // namespace baton::testing_service

@@ -1,0 +1,240 @@
+#include "coordinator/service/service.h"
+
+#include <gmock/gmock.h>
+
+#include "tests/unit/service/fake_farm.h"
+
+namespace baton {
+namespace {
+
+using namespace testing_service;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::SizeIs;
+
+constexpr int kNumTasks = 8;
+
+std::size_t count_blobs(const fs::path& store) {
+  std::size_t count = 0;
+  for (const auto& entry : fs::recursive_directory_iterator(store))
+    count += entry.is_regular_file() ? 1 : 0;
+  return count;
+}
+
+TEST_F(ServiceTest, AJobGoesFromSubmissionToItsLastFrame) {
+  const RunningService service(options);
+  const auto accepted = ask<JobAccepted>(service.endpoint(), SubmitJob{document});
+  EXPECT_EQ(accepted.job, digest_of(document));
+  EXPECT_FALSE(accepted.already_there);
+  EXPECT_TRUE(ask<JobAccepted>(service.endpoint(), SubmitJob{document}).already_there);
+
+  FakeWorker worker(service.endpoint(), store(), job);
+  worker.hello();
+  const WorkerWelcome welcome = worker.expect<WorkerWelcome>();
+  EXPECT_EQ(welcome.epoch, 1u);
+  EXPECT_EQ(welcome.heartbeat_ms, kHeartbeat.count());
+  EXPECT_TRUE(fs::equivalent(welcome.store_directory, store()));
+  worker.say(JobDocumentRequest{accepted.job});
+  EXPECT_EQ(worker.expect<JobDocument>().json, document);
+  for (int i = 0; i < kNumTasks; ++i) worker.do_one_task();
+  worker.say(LeaseRequest{1});
+  worker.expect<NoWork>();
+
+  const JobDetail detail = show(service.endpoint(), accepted.job);
+  EXPECT_EQ(detail.summary.status, JobStatus::done);
+  EXPECT_EQ(detail.summary.tasks_done, 8u);
+  EXPECT_EQ(detail.summary.stats.pixels, 8u);
+  EXPECT_THAT(detail.frames_done, ElementsAre(1, 2, 3, 4));
+  EXPECT_EQ(count_blobs(store()), 2u) << "the last states are kept, all else is gone";
+
+  const auto list = ask<JobList>(service.endpoint(), ListJobs{});
+  ASSERT_THAT(list.jobs, SizeIs(1));
+  EXPECT_EQ(list.jobs[0].name, "test");
+  ASSERT_THAT(list.workers, SizeIs(1));
+  EXPECT_EQ(list.workers[0].num_threads, 2);
+}
+
+TEST_F(ServiceTest, ARestartedCoordinatorGoesOnWithWhatItsWorkersHold) {
+  LeaseId held;
+  Digest id;
+  {
+    const RunningService service(options);
+    id = ask<JobAccepted>(service.endpoint(), SubmitJob{document}).job;
+    FakeWorker worker(service.endpoint(), store(), job);
+    worker.hello();
+    for (int i = 0; i < 3; ++i) worker.do_one_task();
+    worker.say(LeaseRequest{1});
+    held = worker.expect<LeaseGrant>().lease;
+  }
+  const RunningService service(options);
+  EXPECT_EQ(show(service.endpoint(), id).summary.tasks_done, 3u);
+  FakeWorker worker(service.endpoint(), store(), job);
+  worker.say(worker.work(held));
+  worker.expect<HelloAgain>();
+  worker.hello({held});
+  EXPECT_EQ(worker.expect<WorkerWelcome>().epoch, 2u);
+  worker.say(worker.work(held));
+  for (int i = 4; i < kNumTasks; ++i) EXPECT_NE(worker.do_one_task().task, held.task);
+  worker.say(LeaseRequest{1});
+  worker.expect<NoWork>();
+  EXPECT_EQ(show(service.endpoint(), id).summary.status, JobStatus::done);
+  EXPECT_EQ(count_blobs(store()), 2u);
+}
+
+TEST_F(ServiceTest, ASilentWorkerIsForgottenAndItsTaskGoesOn) {
+  const RunningService service(options);
+  ask<JobAccepted>(service.endpoint(), SubmitJob{document});
+  FakeWorker silent(service.endpoint(), store(), job, "silent");
+  silent.hello();
+  silent.say(LeaseRequest{2});
+  const LeaseId lost = silent.expect<LeaseGrant>().lease;
+
+  FakeWorker other(service.endpoint(), store(), job, "other");
+  other.hello();
+  other.say(LeaseRequest{1});
+  for (int i = 0; i < 8; ++i) {
+    std::this_thread::sleep_for(kHeartbeat / 2);
+    other.say(Heartbeat{});
+  }
+  EXPECT_EQ(other.expect<LeaseGrant>().lease.task, lost.task);
+  silent.say(LeaseRequest{1});
+  silent.expect<HelloAgain>();
+}
+
+TEST_F(ServiceTest, HeartbeatsAreAnswered) {
+  const RunningService service(options);
+  FakeWorker worker(service.endpoint(), store(), job);
+  worker.hello();
+  worker.say(Heartbeat{});
+  worker.expect<Heartbeat>();
+}
+
+TEST_F(ServiceTest, AFailureIsToldWithItsPlace) {
+  const RunningService service(options);
+  const Digest id = ask<JobAccepted>(service.endpoint(), SubmitJob{document}).job;
+  FakeWorker worker(service.endpoint(), store(), job);
+  worker.hello();
+  worker.say(LeaseRequest{2});
+  const LeaseId first = worker.expect<LeaseGrant>().lease;
+  const LeaseId second = worker.expect<LeaseGrant>().lease;
+  worker.say(TaskFailed{second, "mesh.ply: cannot open", true});
+  EXPECT_EQ(worker.expect<LeaseRevoke>().lease, first);
+  const JobDetail detail = show(service.endpoint(), id);
+  EXPECT_EQ(detail.summary.status, JobStatus::failed);
+  EXPECT_THAT(detail.failures, ElementsAre("frames 1-2, tile 1 on w: mesh.ply: cannot open"));
+}
+
+TEST_F(ServiceTest, AReportWithoutItsBlobsIsAFailedAttempt) {
+  const RunningService service(options);
+  const Digest id = ask<JobAccepted>(service.endpoint(), SubmitJob{document}).job;
+  FakeWorker worker(service.endpoint(), store(), job);
+  worker.hello();
+  worker.say(LeaseRequest{1});
+  TaskDone report = worker.work(worker.expect<LeaseGrant>().lease);
+  report.outputs[0].digest = digest_of("never published");
+  worker.say(report);
+  worker.say(LeaseRequest{1});
+  worker.expect<LeaseGrant>();
+  EXPECT_THAT(show(service.endpoint(), id).failures,
+              ElementsAre(HasSubstr("reported, but not there")));
+}
+
+TEST_F(ServiceTest, ACancelledJobGoesOnWhenItIsSubmittedAgain) {
+  const RunningService service(options);
+  const Digest id = ask<JobAccepted>(service.endpoint(), SubmitJob{document}).job;
+  FakeWorker worker(service.endpoint(), store(), job);
+  worker.hello();
+  worker.do_one_task();
+  worker.say(LeaseRequest{1});
+  const LeaseId held = worker.expect<LeaseGrant>().lease;
+  EXPECT_EQ(ask<JobDetail>(service.endpoint(), CancelJob{id.short_hex()}).summary.status,
+            JobStatus::cancelled);
+  EXPECT_EQ(worker.expect<LeaseRevoke>().lease, held);
+
+  EXPECT_FALSE(ask<JobAccepted>(service.endpoint(), SubmitJob{document}).already_there);
+  EXPECT_EQ(show(service.endpoint(), id).summary.tasks_done, 1u);
+  for (int i = 1; i < kNumTasks; ++i) worker.do_one_task();
+  worker.say(LeaseRequest{1});
+  worker.expect<NoWork>();
+  EXPECT_EQ(show(service.endpoint(), id).summary.status, JobStatus::done);
+}
+
+TEST_F(ServiceTest, ADoneJobOfWhichAFrameIsGoneStartsAfresh) {
+  const RunningService service(options);
+  const Digest id = ask<JobAccepted>(service.endpoint(), SubmitJob{document}).job;
+  FakeWorker worker(service.endpoint(), store(), job);
+  worker.hello();
+  for (int i = 0; i < kNumTasks; ++i) worker.do_one_task();
+  worker.say(LeaseRequest{0});
+  worker.say(Heartbeat{});
+  worker.expect<Heartbeat>();
+  EXPECT_TRUE(ask<JobAccepted>(service.endpoint(), SubmitJob{document}).already_there);
+
+  fs::remove(fs::path(job.output.directory) / "frame.0003.exr");
+  EXPECT_FALSE(ask<JobAccepted>(service.endpoint(), SubmitJob{document}).already_there);
+  EXPECT_EQ(show(service.endpoint(), id).summary.tasks_done, 0u);
+}
+
+TEST_F(ServiceTest, ARunningJobOfWhichABlobIsGoneStartsAfresh) {
+  Digest id;
+  {
+    const RunningService service(options);
+    id = ask<JobAccepted>(service.endpoint(), SubmitJob{document}).job;
+    FakeWorker worker(service.endpoint(), store(), job);
+    worker.hello();
+    worker.do_one_task();
+    worker.say(LeaseRequest{1});
+    worker.expect<LeaseGrant>();
+  }
+  fs::remove_all(store());
+  const RunningService service(options);
+  EXPECT_EQ(show(service.endpoint(), id).summary.tasks_done, 0u);
+}
+
+TEST_F(ServiceTest, QuestionsThatCannotBeAnsweredAreRefused) {
+  const RunningService service(options);
+  EXPECT_THAT(refused(service.endpoint(), ShowJob{"abc"}).message,
+              HasSubstr("job 'abc': no job has this ID"));
+  EXPECT_EQ(refused(service.endpoint(), SubmitJob{"{"}).kind, ErrorKind::bad_input);
+  EXPECT_THAT(refused(service.endpoint(), JobDocumentRequest{}).message,
+              HasSubstr("not known here"));
+  EXPECT_THAT(refused(service.endpoint(), JobList{}).message, HasSubstr("not for a coordinator"));
+  EXPECT_THAT(refused(service.endpoint(), WorkerHello{}).message, HasSubstr("needs a name"));
+}
+
+TEST_F(ServiceTest, BadMessagesAreRefusedAndHarmNobody) {
+  const RunningService service(options);
+  Socket stranger = Socket::connect(service.endpoint(), 0ms).value();
+  std::vector<Bytes> frames = encode_message(ListJobs{});
+  frames[0][5] = std::byte{2};
+  for (int i = 0; i < 3; ++i) {
+    ASSERT_TRUE(stranger.send(frames));
+    const auto answer = stranger.receive(kPatience);
+    ASSERT_TRUE(answer.has_value());
+    const auto refusal = std::get<Refused>(decode_message(*answer).value());
+    EXPECT_EQ(refusal.kind, static_cast<std::uint8_t>(ErrorKind::version));
+  }
+  ASSERT_TRUE(stranger.send({{}, {}}));
+  EXPECT_TRUE(stranger.receive(kPatience).has_value());
+  EXPECT_THAT(ask<JobList>(service.endpoint(), ListJobs{}).jobs, SizeIs(0));
+}
+
+TEST_F(ServiceTest, StoppingTellsTheWorkers) {
+  RunningService service(options);
+  FakeWorker worker(service.endpoint(), store(), job);
+  worker.hello();
+  worker.expect<WorkerWelcome>();
+  ask<Shutdown>(service.endpoint(), StopCoordinator{});
+  EXPECT_TRUE(service.join().ok());
+  worker.expect<Shutdown>();
+}
+
+TEST_F(ServiceTest, TheWorkFolderBelongsToOneCoordinator) {
+  const RunningService service(options);
+  const Result<Service> second = Service::open(options);
+  ASSERT_FALSE(second.ok());
+  EXPECT_THAT(second.error().message, HasSubstr("already in use by another coordinator"));
+}
+
+}  // namespace
+}  // namespace baton
