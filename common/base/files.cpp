@@ -95,7 +95,11 @@ Status publish_file(const fs::path& temporary, const fs::path& path) {
 
 Status sync_folder(const fs::path& folder) { return sync_path(folder, O_RDONLY | O_DIRECTORY); }
 
-Status write_file_atomic(const fs::path& path, ByteView bytes) {
+namespace {
+
+/// Writes a temporary file beside `path`, then lets `publish` turn it into `path`; nothing is left behind on failure.
+template <class Publish>
+Status write_then(const fs::path& path, ByteView bytes, Publish publish) {
   std::error_code error;
   if (path.has_parent_path()) fs::create_directories(path.parent_path(), error);
   const fs::path temporary = temporary_sibling(path);
@@ -107,9 +111,29 @@ Status write_file_atomic(const fs::path& path, ByteView bytes) {
       return written;
     }
   }
-  Status published = publish_file(temporary, path);
+  Status published = publish(temporary);
   if (!published) ::unlink(temporary.c_str());
   return published;
+}
+
+}  // namespace
+
+Status write_file_atomic(const fs::path& path, ByteView bytes) {
+  return write_then(path, bytes, [&](const fs::path& temporary) { return publish_file(temporary, path); });
+}
+
+Status write_file_unsynced(const fs::path& path, ByteView bytes) {
+  return write_then(path, bytes, [&](const fs::path& temporary) -> Status {
+    if (::rename(temporary.c_str(), path.c_str()) != 0) return io_error("cannot rename to", path);
+    return {};
+  });
+}
+
+Status sync_file_system(const fs::path& path) {
+  const FileDescriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
+  if (file.fd < 0) return io_error("cannot open to sync", path);
+  if (::syncfs(file.fd) != 0) return io_error("cannot sync the file system of", path);
+  return {};
 }
 
 }  // namespace baton

@@ -17,6 +17,13 @@ Result<std::string> read_text_file(const std::filesystem::path& path, std::uint6
 /// folder. Creates missing folders. Two writers of the same path are harmless: the last rename wins.
 Status write_file_atomic(const std::filesystem::path& path, ByteView bytes);
 
+/// The same without waiting for the disk: other processes see the file whole or not at all, but only sync_file_system()
+/// makes it survive a power cut.
+Status write_file_unsynced(const std::filesystem::path& path, ByteView bytes);
+
+/// Waits until everything written so far to the file system of `path` is on disk (Linux syncfs).
+Status sync_file_system(const std::filesystem::path& path);
+
 /// A temporary name beside `path` that no other process or thread uses.
 std::filesystem::path temporary_sibling(const std::filesystem::path& path);
 

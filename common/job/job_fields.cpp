@@ -80,6 +80,7 @@ void fields(JobArchive& a, SamplingSpec& sampling) {
   a.choice("resampling", sampling.resampling, kResamplingSchemes);
   a.number("localMoveDeg", sampling.local_move_deg, {.min = 0, .max = 90, .min_open = true});
   a.number("localMoveFraction", sampling.local_move_fraction, kUnitRange);
+  a.integer("refreshEvery", sampling.refresh_every, 0, limits::kMaxFrames);
   a.integer("referenceSamples", sampling.reference_samples, 2, limits::kMaxReferenceSamples);
 }
 

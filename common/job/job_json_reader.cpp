@@ -49,7 +49,8 @@ bool has_control_character(const std::string& text) {
 
 JobJsonReader::JobJsonReader(std::string name, const fs::path& base_directory) {
   place_.file = std::move(name);
-  place_.base_directory = fs::absolute(base_directory);
+  std::error_code error;  // without a current folder, relative paths stay so and are not found
+  place_.base_directory = fs::current_path(error) / base_directory;
 }
 
 Status JobJsonReader::read(const json& root, const Body& body) {

@@ -124,13 +124,14 @@ struct SamplingSpec {
   Method method = Method::sequential;
   int num_particles = 16;          ///< N: shadow rays per pixel, [1, limits::kMaxParticles]
   int num_candidates = 128;        ///< M: SIR candidates, [N, limits::kMaxCandidates]
-  float brdf_fraction = 0.5f;      ///< share of candidates drawn from the BRDF, [0, 1]; mis and bidirectional
+  float brdf_fraction = 0.25f;     ///< share of candidates drawn from the BRDF, [0, 1]; mis and bidirectional
   bool mis_compensation = false;   ///< [Karlik et al. 2019]; mis
   int num_distributions = 5;       ///< P: intermediate distributions per frame, [1, limits::kMaxDistributions]
   float ess_ratio_min = 0.5f;      ///< resample when ESS < ess_ratio_min * N, [0, 1]
   ResamplingScheme resampling = ResamplingScheme::systematic;
   float local_move_deg = 4;        ///< half-angle of local moves, (0, 90]
   float local_move_fraction = 0.5f;  ///< share of moves that are local, [0, 1]
+  int refresh_every = 8;  ///< sequential: each pixel starts afresh once in so many frames, staggered; 0: never
   int reference_samples = 1024;    ///< paired samples per pixel of `reference`, [2, 2^24]
 
   bool operator==(const SamplingSpec&) const = default;

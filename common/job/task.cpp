@@ -11,6 +11,7 @@ void RenderStats::merge(const RenderStats& b) {
   pixels_fresh += b.pixels_fresh;
   pixels_carried += b.pixels_carried;
   pixels_restarted += b.pixels_restarted;
+  pixels_refreshed += b.pixels_refreshed;
   pixels_resampled += b.pixels_resampled;
   moves_proposed += b.moves_proposed;
   moves_accepted += b.moves_accepted;

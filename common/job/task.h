@@ -60,7 +60,8 @@ struct LeaseId {
 /// Counters that workers add up and `baton job show` prints; merging is addition.
 struct RenderStats {
   std::uint64_t pixels = 0, rays_primary = 0, rays_shadow = 0, target_evaluations = 0;
-  std::uint64_t pixels_background = 0, pixels_fresh = 0, pixels_carried = 0, pixels_restarted = 0, pixels_resampled = 0;
+  std::uint64_t pixels_background = 0, pixels_fresh = 0, pixels_carried = 0;
+  std::uint64_t pixels_restarted = 0, pixels_refreshed = 0, pixels_resampled = 0;
   std::uint64_t moves_proposed = 0, moves_accepted = 0;
   double cpu_seconds = 0;
   /// CPU seconds of the stages; light is shared by all tiles of a frame and counted where it was prepared.
@@ -70,7 +71,7 @@ struct RenderStats {
   void merge(const RenderStats& b);
   template <class A> void fields(A& a) {
     a(pixels, rays_primary, rays_shadow, target_evaluations, pixels_background, pixels_fresh, pixels_carried,
-      pixels_restarted, pixels_resampled, moves_proposed, moves_accepted, cpu_seconds, seconds_light, seconds_primary,
+      pixels_restarted, pixels_refreshed, pixels_resampled, moves_proposed, moves_accepted, cpu_seconds, seconds_light, seconds_primary,
       seconds_sample, seconds_visibility, seconds_shade);
   }
 };

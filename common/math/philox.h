@@ -40,6 +40,7 @@ enum class PassId : std::uint32_t {
   resample = 5,         ///< resampling of carried particles
   move = 6,             ///< Metropolis-Hastings moves
   reference = 7,        ///< brute force
+  refresh = 8,          ///< a pixel's turn to start afresh
 };
 
 /// uint32 -> float uniform in [0, 1): the top 24 bits.

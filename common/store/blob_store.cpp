@@ -10,8 +10,7 @@ namespace baton {
 namespace fs = std::filesystem;
 
 Result<BlobStore> BlobStore::open(const fs::path& directory) {
-  // Make every subfolder now and sync the folder once, so that put() need not sync more than one
-  // folder.
+  // Make every subfolder now, so that put() need not.
   for (int i = 0; i < 256; ++i) {
     const fs::path folder = directory / fmt::format("{:02x}", i);
     std::error_code error;
@@ -31,9 +30,11 @@ Result<Digest> BlobStore::put(ByteView bytes) {
                  fmt::format("{}: {} bytes, at most {} are stored", path(digest).string(),
                              bytes.size(), limits::kMaxBlobBytes)};
   }
-  BATON_TRY(write_file_atomic(path(digest), bytes));
+  BATON_TRY(write_file_unsynced(path(digest), bytes));
   return digest;
 }
+
+Status BlobStore::sync() const { return sync_file_system(directory_); }
 
 Result<Bytes> BlobStore::get(const Digest& digest) const {
   const fs::path file = path(digest);

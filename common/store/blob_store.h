@@ -17,10 +17,14 @@ class BlobStore {
   /// be created.
   static Result<BlobStore> open(const std::filesystem::path& directory);
 
-  /// Publishes the bytes; when it returns they survive a power cut. A blob that is there already is
-  /// written again, which is harmless and mends a damaged one. Errors: past limits::kMaxBlobBytes,
-  /// the disk.
+  /// Publishes the bytes: from now on every process sees the blob, but it survives a power cut only
+  /// after sync(). A blob that is there already is written again, which is harmless and mends a
+  /// damaged one. Errors: past limits::kMaxBlobBytes, the disk.
   Result<Digest> put(ByteView bytes);
+
+  /// Makes all blobs put so far durable, with one wait for the disk. Whoever reports a blob to others
+  /// calls this first.
+  Status sync() const;
 
   /// The bytes with this digest. ErrorKind::corrupt names the file, the digest found and the one
   /// expected; a missing blob is ErrorKind::io.

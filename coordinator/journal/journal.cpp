@@ -14,7 +14,8 @@ constexpr std::int64_t kSchemaVersion = 1;
 constexpr std::int64_t kApplicationId = 0x4241544e;  // "BATN"
 
 // Digests, keys and statuses are written as numbers and hexadecimal text, so that the sqlite3 shell
-// shows them; outputs, statistics and leases in the form of common/base/archive.h.
+// shows them; outputs, statistics and leases in the form of common/base/archive.h: a change of
+// BlobRef, RenderStats or LeaseId is a new schema version.
 constexpr const char* kSchema = R"sql(
   CREATE TABLE starts (epoch INTEGER NOT NULL);
   INSERT INTO starts VALUES (0);

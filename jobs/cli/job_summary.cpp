@@ -44,11 +44,12 @@ std::string job_line(const JobSummary& job) {
 
 std::string job_statistics(const JobSummary& job) {
   const RenderStats& s = job.stats;
-  const std::uint64_t lit = s.pixels_fresh + s.pixels_carried + s.pixels_restarted;
+  const std::uint64_t lit = s.pixels_fresh + s.pixels_carried + s.pixels_restarted + s.pixels_refreshed;
   std::string text =
-      fmt::format("pixels     {}: {} carried, {} fresh, {} restarted of those with a surface\n",
+      fmt::format("pixels     {}: {} carried, {} fresh, {} refreshed, {} restarted of those with a surface\n",
                   count_text(s.pixels), percent_text(s.pixels_carried, lit),
-                  percent_text(s.pixels_fresh, lit), percent_text(s.pixels_restarted, lit));
+                  percent_text(s.pixels_fresh, lit), percent_text(s.pixels_refreshed, lit),
+                  percent_text(s.pixels_restarted, lit));
   text += fmt::format("rays       {} primary, {} shadow; {} target evaluations\n",
                       count_text(s.rays_primary), count_text(s.rays_shadow),
                       count_text(s.target_evaluations));
@@ -93,6 +94,7 @@ ordered_json summary_json(const JobSummary& job) {
             {"pixelsFresh", s.pixels_fresh},
             {"pixelsCarried", s.pixels_carried},
             {"pixelsRestarted", s.pixels_restarted},
+            {"pixelsRefreshed", s.pixels_refreshed},
             {"pixelsResampled", s.pixels_resampled},
             {"movesProposed", s.moves_proposed},
             {"movesAccepted", s.moves_accepted},

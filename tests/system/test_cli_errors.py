@@ -58,7 +58,8 @@ class CliErrors(unittest.TestCase):
             self.assertEqual(result.stdout, "")
 
     def test_a_good_job_passes(self):
-        result = self.baton("check", self.job())
+        self.job()
+        result = self.baton("check", "job.json")
         self.expect(result, OK)
         self.assertIn("12 triangles", result.stdout)
         self.assertEqual(result.stderr, "")

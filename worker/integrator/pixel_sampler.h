@@ -16,6 +16,7 @@ struct PixelInput {
   const EnvironmentView& now;        ///< views of light.now and light.before
   const EnvironmentView& before;
   RngKey key;
+  std::int32_t frame_index = 0;  ///< 0-based position in the sequence
   bool has_history = false;  ///< the samples hold the previous frame's properly weighted set of the same surfaces
 };
 

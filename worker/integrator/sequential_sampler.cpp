@@ -3,10 +3,28 @@
 #include <cmath>
 
 namespace baton {
+namespace {
+
+/// Whether the pixel starts afresh in this frame. A pixel's turn comes every `refresh_every` frames; the turns are spread
+/// over the image and over the frames but the second, in which every pixel has just begun.
+bool is_refresh_turn(const RngKey& key, std::int32_t frame_index, std::int32_t refresh_every) {
+  if (refresh_every == 0) return false;
+  if (refresh_every <= 2) return frame_index % refresh_every == 0;
+  const Rng rng({.job_seed = key.job_seed, .frame = 0, .pixel = key.pixel}, PassId::refresh);
+  const auto turn = static_cast<std::int32_t>(rng.bits(0, 0)[0] % static_cast<std::uint32_t>(refresh_every - 1));
+  return (frame_index - 2 - turn) % refresh_every == 0;
+}
+
+}  // namespace
 
 PixelDiagnostics SequentialSampler::sample(const PixelInput& input, kernels::CandidateSet& scratch,
                                            const PixelSamples& samples) const {
   if (!input.has_history) return start_.sample(input, scratch, samples);
+  if (is_refresh_turn(input.key, input.frame_index, refresh_every_)) {
+    const PixelDiagnostics diagnostics = start_.sample(input, scratch, samples);
+    samples.source = PixelSource::refreshed;
+    return diagnostics;
+  }
 
   // Carry the particles over.
   const SequentialOutcome outcome =
@@ -50,7 +68,7 @@ std::unique_ptr<const PixelSampler> make_pixel_sampler(const SamplingSpec& spec)
                              .resampling = spec.resampling,
                              .local_move_cosine = std::cos(spec.local_move_deg * kPi / 180),
                              .local_move_fraction = spec.local_move_fraction},
-          candidates);
+          candidates, spec.refresh_every);
   }
   return nullptr;
 }

@@ -5,17 +5,20 @@
 namespace baton {
 
 /// The sequential Monte Carlo sampler [Ghosh, Doucet & Heidrich 2006] for pixels whose surfaces stay. Starts with
-/// BidirectionalSampler; carries the particles from then on; starts again when all weights die.
+/// BidirectionalSampler; carries the particles from then on; starts again when all weights die, and once in
+/// `refresh_every` frames (0: never). The errors of a carried Lns multiply from frame to frame; a refresh on a schedule that
+/// looks at no sample ends them without bias.
 class SequentialSampler final : public PixelSampler {
  public:
-  SequentialSampler(const SequentialSettings& settings, CandidateCounts start_counts)
-      : settings_(settings), start_(start_counts) {}
+  SequentialSampler(const SequentialSettings& settings, CandidateCounts start_counts, std::int32_t refresh_every)
+      : settings_(settings), start_(start_counts), refresh_every_(refresh_every) {}
   PixelDiagnostics sample(const PixelInput& input, kernels::CandidateSet& scratch,
                           const PixelSamples& samples) const override;
 
  private:
   SequentialSettings settings_;
   BidirectionalSampler start_;
+  std::int32_t refresh_every_;
 };
 
 }  // namespace baton

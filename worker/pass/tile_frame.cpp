@@ -32,6 +32,7 @@ struct TileFrameRenderer::Batch {
   std::size_t first = 0;
   std::size_t count = 0;
   std::int32_t frame_number = 0;
+  std::int32_t frame_index = 0;
   ShadowRays rays;
   std::vector<std::uint32_t> ray_sample;  ///< batch pixel * N + particle of each ray
   std::vector<Rgb> sample_color;          ///< (batch pixels, N) u_j (f cos L)_rgb / p~ if the ray is free
@@ -55,6 +56,7 @@ FilmTile TileFrameRenderer::render(const FrameSpec& frame, const FrameLight& lig
   FilmWriter film(surfaces_.rect, context_.job.output.aovs);
   Batch batch;
   batch.frame_number = frame.number;
+  batch.frame_index = frame.index;
   batch.sample_color.resize(kBatchPixels * static_cast<std::size_t>(state.num_particles));
   const std::size_t num_pixels = state.num_pixels();
   for (std::size_t first = 0; first < num_pixels; first += kBatchPixels) {
@@ -81,6 +83,7 @@ void TileFrameRenderer::sample(Batch& batch, const FrameLight& light, bool has_h
   const EnvironmentView now = view_of(light.now);
   const EnvironmentView before = view_of(light.before);
   const auto n = static_cast<std::size_t>(state.num_particles);
+  const std::int32_t frame_index = batch.frame_index;
   ShadedSamples shaded;
   SiteBlock sites;
   batch.rays.clear();
@@ -108,7 +111,7 @@ void TileFrameRenderer::sample(Batch& batch, const FrameLight& light, bool has_h
                                state.lns_fresh[index],
                                state.source[index]};
     const PixelDiagnostics did = context_.sampler->sample(
-        {sites, light, now, before, batch.key(context_, surfaces_.rect, index), has_history}, *scratch_, samples);
+        {sites, light, now, before, batch.key(context_, surfaces_.rect, index), frame_index, has_history}, *scratch_, samples);
 
     // Colour the samples and cast their rays.
     kernels::shade_samples(sites, now, samples.direction, samples.site, shaded);
@@ -139,6 +142,7 @@ void TileFrameRenderer::sample(Batch& batch, const FrameLight& light, bool has_h
     stats_.pixels_resampled += did.resampled ? 1 : 0;
     stats_.pixels_fresh += samples.source == PixelSource::fresh ? 1 : 0;
     stats_.pixels_carried += samples.source == PixelSource::carried ? 1 : 0;
+    stats_.pixels_refreshed += samples.source == PixelSource::refreshed ? 1 : 0;
     stats_.pixels_restarted += samples.source == PixelSource::restarted ? 1 : 0;
   }
 }

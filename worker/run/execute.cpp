@@ -37,7 +37,7 @@ Result<TaskOutput> execute_render(const LoadedJob& loaded, BlobStore& store, con
   }
   BATON_ASSIGN(const std::optional<SampleState> previous, read_previous_state(store, inputs));
 
-  // Render; every film is durable before the next frame starts.
+  // Render; all outputs become durable together, before anybody hears of them.
   TaskOutput output;
   const auto keep = [&](BlobKind kind, std::int32_t frame, const Bytes& bytes) -> Status {
     BATON_ASSIGN(const Digest digest, store.put(bytes));
@@ -54,6 +54,7 @@ Result<TaskOutput> execute_render(const LoadedJob& loaded, BlobStore& store, con
                              }};
   const TileRun run = tile_run(loaded.job, task.tile, task.step);
   BATON_ASSIGN(output.stats, run_tile(*loaded.context, run, previous, sink, stop));
+  BATON_TRY(store.sync());
   return output;
 }
 

@@ -10,7 +10,7 @@
 #include "common/base/files.h"
 #include "common/base/limits.h"
 #include "worker/scene/mesh_builder.h"
-#include "worker/scene/mesh_text.h"
+#include "worker/scene/mesh_readers.h"
 
 namespace baton {
 namespace {
@@ -89,6 +89,7 @@ Result<TriangleMesh> load_with_assimp(const std::string& path, bool smooth_norma
   const aiScene* file = importer.ReadFile(path, 0);
   if (file == nullptr)
     return bad_mesh(path, std::string("not a mesh: ") + importer.GetErrorString());
+  if (file->mNumMeshes == 0) return bad_mesh(path, "not a mesh: nothing found in it");
   for (unsigned m = 0; m < file->mNumMeshes; ++m) {
     if (const auto fault = find_fault(*file->mMeshes[m])) return bad_mesh(path, *fault);
   }
@@ -116,7 +117,7 @@ Result<TriangleMesh> read_triangles(const std::string& path, bool smooth_normals
   }
   if (is(".ply")) {
     BATON_ASSIGN(const std::string bytes, read_text_file(path, limits::kMaxAssetFileBytes));
-    if (const auto fault = find_ply_truncation(bytes)) return bad_mesh(path, *fault);
+    return parse_ply(bytes, path, smooth_normals);
   }
   return load_with_assimp(path, smooth_normals);
 }

@@ -1,10 +1,11 @@
 #include <charconv>
 #include <cmath>
 #include <cstdint>
+#include <optional>
 #include <system_error>
 
 #include "worker/scene/mesh_builder.h"
-#include "worker/scene/mesh_text.h"
+#include "worker/scene/mesh_readers.h"
 
 namespace baton {
 namespace {
@@ -60,9 +61,8 @@ class WordReader {
 };
 
 Error off_error(const std::string& name, WordReader& reader, const std::string& what) {
-  const bool ended = reader.at_end();
-  return {ErrorKind::bad_input, name + ": line " + std::to_string(reader.line()) + ": " + what +
-                                    (ended ? ", but the file ends here" : "")};
+  const std::string place = name + ": line " + std::to_string(reader.line()) + ": ";
+  return {ErrorKind::bad_input, place + what + (reader.at_end() ? ", but the file ends here" : "")};
 }
 
 Result<std::vector<Vec3>> read_vertices(WordReader& reader, std::uint32_t count,

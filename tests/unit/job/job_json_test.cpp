@@ -66,6 +66,12 @@ TEST(JobJson, ReadsBackWhatItWrites) {
   EXPECT_GE(count, 3);
 }
 
+TEST(JobJson, TakesAnEmptyBaseDirectoryForTheCurrentOne) {
+  const Result<JobSpec> job = parse_job(job_text(""), "job.json", "");
+  ASSERT_TRUE(job.ok()) << job.error().message;
+  EXPECT_EQ(job->environment.keys.front().map, (fs::current_path() / "sky.exr").string());
+}
+
 TEST(JobJson, WritesFloatsAsShortDecimals) {
   EXPECT_THAT(to_json(parsed(job_text(R"("sampling": {"essRatioMin": 0.1})"))),
               HasSubstr("\"essRatioMin\": 0.1,"));

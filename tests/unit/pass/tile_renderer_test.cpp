@@ -72,7 +72,9 @@ TEST(RunTile, SameBytesForAnyTilingAndAnyRunLength) {
 }
 
 TEST(RunTile, CarriesEverySurfacePixelOn) {
-  const test::TileResult carried = render_tile(sequence_job(3));
+  JobSpec published = sequence_job(3);
+  published.sampling.refresh_every = 0;
+  const test::TileResult carried = render_tile(published);
   const std::uint64_t surface = (carried.stats.pixels - carried.stats.pixels_background) / 3;
   EXPECT_GT(surface, 50u);
   EXPECT_EQ(carried.stats.pixels_fresh, surface);
@@ -84,6 +86,15 @@ TEST(RunTile, CarriesEverySurfacePixelOn) {
   EXPECT_EQ(restarted.stats.pixels_fresh, 3 * surface);
   EXPECT_EQ(restarted.stats.pixels_carried, 0u);
   for (const float red : channel(restarted.films[1], "source.R")) EXPECT_TRUE(red == 0 || red == 1);
+}
+
+TEST(RunTile, RefreshesEveryPixelOnceInTheCycleButNotInTheSecondFrame) {
+  JobSpec job = sequence_job(2);
+  job.sampling.refresh_every = 4;
+  EXPECT_EQ(render_tile(job).stats.pixels_refreshed, 0u);
+  job.frames = frame_numbers(5);
+  const RenderStats stats = render_tile(job).stats;
+  EXPECT_EQ(stats.pixels_refreshed, stats.pixels_fresh);
 }
 
 TEST(RunTile, BlackMapGivesBlackAndLightComesBack) {

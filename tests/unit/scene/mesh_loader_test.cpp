@@ -31,7 +31,7 @@ void put(std::string& bytes, T value) {
 std::string binary_ply() {
   std::string bytes = kPlyHeader;
   bytes.replace(bytes.find("ascii"), 5, "binary_little_endian");
-  for (const float x : {0, 0, 0, 0, 0, 1, 1, 0, 1, 1, 0, 0}) put(bytes, x);
+  for (const int x : {0, 0, 0, 0, 0, 1, 1, 0, 1, 1, 0, 0}) put(bytes, static_cast<float>(x));
   for (const auto& face : {std::array{0, 1, 2}, std::array{0, 2, 3}}) {
     put(bytes, std::uint8_t{3});
     for (const int index : face) put(bytes, index);
@@ -53,8 +53,8 @@ std::string square_gltf_json(const std::string& buffer) {
 
 std::string square_buffer() {
   std::string bytes;
-  for (const float x : {0, 0, 0, 0, 0, 1, 1, 0, 1, 1, 0, 0}) put(bytes, x);
-  for (const std::uint16_t index : {0, 1, 2, 0, 2, 3}) put(bytes, index);
+  for (const int x : {0, 0, 0, 0, 0, 1, 1, 0, 1, 1, 0, 0}) put(bytes, static_cast<float>(x));
+  for (const int index : {0, 1, 2, 0, 2, 3}) put(bytes, static_cast<std::uint16_t>(index));
   return bytes;
 }
 
@@ -218,7 +218,7 @@ TEST(MeshLoader, ErrorsOfIndicesAndCoordinates) {
                "finite coordinates of vertex 1");
   std::string ply = kPlyHeader + kPlyBody;
   ply.replace(ply.rfind('3'), 1, "9");
-  expect_error(write_test_file("range.ply", ply), "expected a vertex index below 4, found 9");
+  expect_error(write_test_file("range.ply", ply), "face 1: expected a vertex index below 4");
   expect_error(write_test_file("nan.obj", "v 0 0 0\nv nan 0 0\nv 0 1 0\nf 1 2 3\n"), "not finite");
   expect_error(write_test_file("range.obj", "v 0 0 0\nv 1 0 0\nv 0 1 0\nf 1 2 9\n"),
                "not a mesh: ");
@@ -244,12 +244,62 @@ TEST(MeshLoader, EveryTruncationIsAnError) {
   }
 }
 
+TEST(MeshLoader, AnyChangedByteEndsWell) {
+  // A damaged file is an error or another mesh, never a crash or a hang.
+  for (const auto& [name, bytes] :
+       {std::pair<std::string, std::string>{"damaged.ply", binary_ply()},
+        {"damaged_text.ply", kPlyHeader + kPlyBody},
+        {"damaged.off", std::string(test::kSquareOff)}}) {
+    for (std::size_t i = 0; i < bytes.size(); ++i) {
+      for (const int flip : {0x01, 0x10, 0x80}) {
+        std::string damaged = bytes;
+        damaged[i] = static_cast<char>(damaged[i] ^ flip);
+        const auto mesh = load_mesh(write_test_file(name, damaged), true);
+        if (!mesh.ok()) continue;
+        for (const auto& triangle : mesh->triangles) {
+          for (const std::uint32_t corner : triangle) ASSERT_LT(corner, mesh->positions.size());
+        }
+      }
+    }
+  }
+}
+
+TEST(MeshLoader, ReadsBigEndianPlyAndSkipsWhatItDoesNotKnow) {
+  std::string bytes =
+      "ply\nformat binary_big_endian 1.0\ncomment made by hand\nelement camera 1\nproperty double "
+      "focus\n"
+      "element vertex 3\nproperty uchar red\nproperty float x\nproperty float y\nproperty double "
+      "z\n"
+      "element face 1\nproperty list uchar uint vertex_index\nproperty list uchar float "
+      "texcoord\nend_header\n";
+  const auto put_big = [&bytes](auto value) {
+    std::string raw;
+    put(raw, value);
+    bytes.append(raw.rbegin(), raw.rend());
+  };
+  put_big(1.5);
+  for (const int i : {0, 1, 2}) {
+    put_big(std::uint8_t{200});
+    put_big(i == 1 ? 2.0f : 0.0f);
+    put_big(7.0f);
+    put_big(i == 2 ? -3.0 : 0.0);
+  }
+  put_big(std::uint8_t{3});
+  for (const std::uint32_t index : {0u, 1u, 2u}) put_big(index);
+  put_big(std::uint8_t{1});
+  put_big(0.5f);
+  const auto mesh = load_mesh(write_test_file("big.ply", bytes), true);
+  ASSERT_TRUE(mesh.ok()) << mesh.error().message;
+  EXPECT_NEAR(area(*mesh), 3, 1e-6);
+  EXPECT_EQ(mesh->positions[1], (Vec3{2, 7, 0}));
+}
+
 TEST(MeshLoader, CountsThatNoFileCouldHoldAreRefused) {
   expect_error(write_test_file("bomb.off", "OFF\n4000000000 4000000000 0\n0 0 0\n"),
                "too small to hold");
   std::string ply = kPlyHeader;
   ply.replace(ply.find("vertex 4"), 8, "vertex 4000000000");
-  expect_error(write_test_file("bomb.ply", ply + kPlyBody), "truncated");
+  expect_error(write_test_file("bomb.ply", ply + kPlyBody), "expected a number");
 }
 
 }  // namespace

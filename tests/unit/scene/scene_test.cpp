@@ -14,11 +14,18 @@ namespace {
 
 using testing::HasSubstr;
 
+ObjectSpec object_of(const std::string& mesh, const std::string& material) {
+  ObjectSpec object;
+  object.mesh = mesh;
+  object.material = material;
+  return object;
+}
+
 JobSpec cube_job() {
   JobSpec job;
   job.scene.materials["grey"] = {};
   job.scene.meshes["cube"] = {test::write_test_file("scene_cube.off", test::kCubeOff), true};
-  job.scene.objects.push_back({.mesh = "cube", .material = "grey"});
+  job.scene.objects.push_back(object_of("cube", "grey"));
   return job;
 }
 
@@ -103,10 +110,12 @@ TEST(Scene, TellsEveryFaultAtOnce) {
   JobSpec job = cube_job();
   job.scene.meshes["gone"] = {testing::TempDir() + "gone.ply", true};
   job.scene.meshes["flat"] = {test::write_test_file("scene_square.off", test::kSquareOff), true};
-  job.scene.objects.push_back({.mesh = "sphere", .material = "gold"});
-  job.scene.objects.push_back({.mesh = "cube", .material = "grey", .scale = {1, 0, 1}});
-  job.scene.objects.push_back({.mesh = "flat", .material = "grey", .fit_height = 1.0f});
-  job.scene.objects.push_back({.mesh = "gone", .material = "grey"});
+  job.scene.objects.push_back(object_of("sphere", "gold"));
+  job.scene.objects.push_back(object_of("cube", "grey"));
+  job.scene.objects[2].scale = {1, 0, 1};
+  job.scene.objects.push_back(object_of("flat", "grey"));
+  job.scene.objects[3].fit_height = 1.0f;
+  job.scene.objects.push_back(object_of("gone", "grey"));
   job.scene.ground = GroundSpec{.material = "grass"};
   const auto scene = load_scene(job);
   ASSERT_FALSE(scene.ok());
