@@ -30,6 +30,18 @@ void set_options(zmq::socket_t& socket, std::chrono::milliseconds linger) {
   socket.set(zmq::sockopt::heartbeat_timeout, kTransportTimeoutMs);
 }
 
+/// Repeats a call that a signal interrupted.
+template <class F>
+auto despite_signals(F call) {
+  while (true) {
+    try {
+      return call();
+    } catch (const zmq::error_t& error) {
+      if (error.num() != EINTR) throw;
+    }
+  }
+}
+
 }  // namespace
 
 struct Socket::Impl {
@@ -83,17 +95,19 @@ Result<Socket> Socket::bind(const std::string& endpoint, std::chrono::millisecon
 }
 
 bool Socket::send(const std::vector<Bytes>& frames) {
-  // Only the first frame can be refused: the library queues a message whole.
   try {
+    bool queued = true;
     for (std::size_t i = 0; i < frames.size(); ++i) {
       const auto more = i + 1 < frames.size() ? zmq::send_flags::sndmore : zmq::send_flags::none;
       const zmq::const_buffer frame(frames[i].data(), frames[i].size());
-      if (!impl_->socket.send(frame, more | zmq::send_flags::dontwait)) {
-        BATON_CHECK(i == 0);
-        return false;
-      }
+      const bool sent = despite_signals(
+          [&] { return impl_->socket.send(frame, more | zmq::send_flags::dontwait).has_value(); });
+      // Refused at once: nothing is queued. Later: the connection broke, and the library drops the
+      // message, for which it must see all its frames.
+      if (!sent && i == 0) return false;
+      queued = queued && sent;
     }
-    return true;
+    return queued;
   } catch (const zmq::error_t& error) {
     BATON_CHECK(error.num() == EHOSTUNREACH);
     return false;
@@ -101,32 +115,34 @@ bool Socket::send(const std::vector<Bytes>& frames) {
 }
 
 std::optional<std::vector<Bytes>> Socket::receive(std::chrono::milliseconds timeout) {
+  // Wait for the first of message, wake-up, signal, timeout.
+  std::array<zmq::pollitem_t, 2> items{zmq::pollitem_t{impl_->socket.handle(), 0, ZMQ_POLLIN, 0},
+                                       zmq::pollitem_t{nullptr, impl_->wake_fd, ZMQ_POLLIN, 0}};
   try {
-    // Wait for the first of message, wake-up, timeout.
-    std::array<zmq::pollitem_t, 2> items{zmq::pollitem_t{impl_->socket.handle(), 0, ZMQ_POLLIN, 0},
-                                         zmq::pollitem_t{nullptr, impl_->wake_fd, ZMQ_POLLIN, 0}};
     zmq::poll(items.data(), items.size(), timeout);
-    if (items[1].revents & ZMQ_POLLIN) {
-      eventfd_t count = 0;
-      ::eventfd_read(impl_->wake_fd, &count);
-    }
-    if (!(items[0].revents & ZMQ_POLLIN)) return std::nullopt;
-
-    // The frames of one message arrive together.
-    std::vector<Bytes> frames;
-    zmq::message_t frame;
-    do {
-      if (!impl_->socket.recv(frame, zmq::recv_flags::dontwait)) return std::nullopt;
-      if (frames.size() < limits::kMaxMessageFrames) {
-        const auto* data = frame.data<std::byte>();
-        frames.emplace_back(data, data + frame.size());
-      }
-    } while (frame.more());
-    return frames;
   } catch (const zmq::error_t& error) {
     BATON_CHECK(error.num() == EINTR);
     return std::nullopt;
   }
+  if (items[1].revents & ZMQ_POLLIN) {
+    eventfd_t count = 0;
+    ::eventfd_read(impl_->wake_fd, &count);
+  }
+  if (!(items[0].revents & ZMQ_POLLIN)) return std::nullopt;
+
+  // The frames of one message arrive together.
+  std::vector<Bytes> frames;
+  zmq::message_t frame;
+  do {
+    const bool received = despite_signals(
+        [&] { return impl_->socket.recv(frame, zmq::recv_flags::dontwait).has_value(); });
+    if (!received) return std::nullopt;
+    if (frames.size() < limits::kMaxMessageFrames) {
+      const auto* data = frame.data<std::byte>();
+      frames.emplace_back(data, data + frame.size());
+    }
+  } while (frame.more());
+  return frames;
 }
 
 void Socket::wake() { ::eventfd_write(impl_->wake_fd, 1); }

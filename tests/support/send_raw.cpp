@@ -1,5 +1,5 @@
 // send_raw ENDPOINT KIND: sends one message that no program of Baton would send and prints the
-// answer, or "no answer". KIND: version (of another protocol version), garbage, empty, short (a
+// answer, or "no answer". KIND: version (of protocol version 127), garbage, empty, short (a
 // body cut off), many (too many frames).
 
 #include <fmt/format.h>
@@ -18,7 +18,8 @@ baton::Bytes bytes_of(std::string_view text) {
 
 std::vector<baton::Bytes> make_frames(std::string_view kind) {
   std::vector<baton::Bytes> frames = baton::encode_message(baton::ShowJob{"0123456789"});
-  if (kind == "version") frames[0].back() = std::byte{0x7F};
+  // The version is the last two bytes of the first frame, little-endian.
+  if (kind == "version") frames[0][frames[0].size() - 2] = std::byte{127};
   if (kind == "garbage") frames = {bytes_of("GET / HTTP/1.0"), bytes_of("\xFF\xFE\xFD")};
   if (kind == "empty") frames = {{}};
   if (kind == "short") frames[2].resize(frames[2].size() / 2);

@@ -116,7 +116,7 @@ def a_live_coordinator_survives_any_message(programs, folder):
             answer = programs.run("send_raw", farm.endpoint, kind).stdout
             check(not answer.startswith("message"), f"{kind}: was taken for a message: {answer}")
             if kind == "version":
-                check("127" in answer and "1" in answer, f"the refusal names no versions: {answer}")
+                check("version 127" in answer, f"the refusal does not name the version: {answer}")
 
         # Bytes that are not even ZeroMQ.
         host, port = farm.endpoint.removeprefix("tcp://").split(":")
