@@ -116,6 +116,21 @@ HWY_INLINE VF LogLanes(VF x) {
   return hn::MulAdd(e, hn::Set(d, 0.69314718056f), hn::Mul(s, series));
 }
 
+/// log(1 - t) for t in [0, 1], with full relative accuracy near t = 0; large and negative, but finite, at t = 1.
+HWY_INLINE VF LogOneMinusLanes(VF t) {
+  const DF d;
+  const VF one = hn::Set(d, 1.0f);
+  // The series of LogLanes with the difference m - 1 = -t as given, not as what rounding leaves of it.
+  const VF s = hn::Div(hn::Neg(t), hn::Sub(hn::Set(d, 2.0f), t));
+  const VF s2 = hn::Mul(s, s);
+  VF series = hn::MulAdd(s2, hn::Set(d, 2.0f / 7), hn::Set(d, 2.0f / 5));
+  series = hn::MulAdd(s2, series, hn::Set(d, 2.0f / 3));
+  series = hn::Mul(s, hn::MulAdd(s2, series, hn::Set(d, 2.0f)));
+  const MF near_zero = hn::Lt(t, hn::Set(d, 0.25f));
+  if (hn::AllTrue(d, near_zero)) return series;
+  return hn::IfThenElse(near_zero, series, LogLanes(hn::Max(hn::Sub(one, t), hn::Set(d, 1e-30f))));
+}
+
 /// e^x for x in [-87, 88], clamped outside; relative error below 3e-7.
 HWY_INLINE VF ExpLanes(VF x) {
   const DF d;

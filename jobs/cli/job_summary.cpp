@@ -44,12 +44,12 @@ std::string job_line(const JobSummary& job) {
 
 std::string job_statistics(const JobSummary& job) {
   const RenderStats& s = job.stats;
-  const std::uint64_t lit = s.pixels_fresh + s.pixels_carried + s.pixels_restarted + s.pixels_refreshed;
-  std::string text =
-      fmt::format("pixels     {}: {} carried, {} fresh, {} refreshed, {} restarted of those with a surface\n",
-                  count_text(s.pixels), percent_text(s.pixels_carried, lit),
-                  percent_text(s.pixels_fresh, lit), percent_text(s.pixels_refreshed, lit),
-                  percent_text(s.pixels_restarted, lit));
+  const std::uint64_t lit =
+      s.pixels_fresh + s.pixels_carried + s.pixels_restarted + s.pixels_refreshed;
+  std::string text = fmt::format(
+      "pixels     {}: {} carried, {} fresh, {} refreshed, {} restarted of those with a surface\n",
+      count_text(s.pixels), percent_text(s.pixels_carried, lit), percent_text(s.pixels_fresh, lit),
+      percent_text(s.pixels_refreshed, lit), percent_text(s.pixels_restarted, lit));
   text += fmt::format("rays       {} primary, {} shadow; {} target evaluations\n",
                       count_text(s.rays_primary), count_text(s.rays_shadow),
                       count_text(s.target_evaluations));
@@ -65,7 +65,7 @@ std::string job_statistics(const JobSummary& job) {
   }
   text += fmt::format("cpu        {}\n", duration_text(s.cpu_seconds));
   if (job.attempts_lost > 0)
-    text += fmt::format("lost       {} attempts, done again\n", job.attempts_lost);
+    text += fmt::format("attempts   {} lost or failed\n", job.attempts_lost);
   return text;
 }
 

@@ -1,5 +1,5 @@
 #!/usr/bin/env python3
-"""The picture and the samples are the same for any tiling, any number of workers and threads, and any death on the way."""
+"""The picture and the samples are the same for any tiling, number of workers and threads, and death on the way."""
 
 from farm import DEADLINE_S, Farm, check, check_equal, make_job, run_tests, wait_until, write_job
 

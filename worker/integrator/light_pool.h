@@ -14,7 +14,7 @@ namespace baton {
 /// itself. Each entry's direction has density `density`, so a pixel that chooses entries independently of their contents
 /// stays unbiased; pixels that choose the same entries have correlated errors.
 struct LightPool {
-  static constexpr std::uint32_t kSize = 1u << 16;  ///< entries
+  static constexpr std::uint32_t kSize = 1u << 15;  ///< entries
   static constexpr std::uint32_t kBlock = 8;        ///< entries that lie together in memory
 
   /// Eight entries, field by field: the unit of SIMD loads.

@@ -75,10 +75,10 @@ std::string describe_stats(const RenderStats& s) {
       "rays primary {}, shadow {}; target evaluations {}; moves accepted {} of {}\n"
       "cpu {:.3f} s (light {:.3f}, primary {:.3f}, sample {:.3f}, visibility {:.3f}, shade "
       "{:.3f})\n",
-      s.pixels, s.pixels_background, s.pixels_fresh, s.pixels_carried, s.pixels_refreshed, s.pixels_restarted,
-      s.pixels_resampled, s.rays_primary, s.rays_shadow, s.target_evaluations, s.moves_accepted,
-      s.moves_proposed, s.cpu_seconds, s.seconds_light, s.seconds_primary, s.seconds_sample,
-      s.seconds_visibility, s.seconds_shade);
+      s.pixels, s.pixels_background, s.pixels_fresh, s.pixels_carried, s.pixels_refreshed,
+      s.pixels_restarted, s.pixels_resampled, s.rays_primary, s.rays_shadow, s.target_evaluations,
+      s.moves_accepted, s.moves_proposed, s.cpu_seconds, s.seconds_light, s.seconds_primary,
+      s.seconds_sample, s.seconds_visibility, s.seconds_shade);
 }
 
 const char* source_name(PixelSource source) {

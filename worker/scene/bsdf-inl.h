@@ -65,12 +65,14 @@ struct BsdfLanes {
   VF diffuse, lobe, white, cosine, pdf;
 };
 
-/// max(x, 0)^s through exp and log; 0 for x <= 0.
-HWY_INLINE VF CosinePower(VF x, VF s) {
+/// max(a . b, 0)^s of unit vectors, as (1 - |a - b|^2 / 2)^s: sharp lobes keep their digits.
+HWY_INLINE VF CosinePower(const Vec3Lanes& a, const Vec3Lanes& b, VF s) {
   const DF d;
-  const VF safe = hn::Max(x, hn::Set(d, 1e-30f));
-  const VF exponent = hn::Mul(s, LogLanes(safe));
-  return hn::IfThenElseZero(hn::Gt(exponent, hn::Set(d, -80.0f)), ExpLanes(exponent));
+  const Vec3Lanes difference{hn::Sub(a.x, b.x), hn::Sub(a.y, b.y), hn::Sub(a.z, b.z)};
+  const VF t = hn::Min(hn::Mul(Dot(difference, difference), hn::Set(d, 0.5f)), hn::Set(d, 1.0f));
+  const VF exponent = hn::Mul(s, LogOneMinusLanes(t));
+  const MF positive = hn::And(hn::Gt(exponent, hn::Set(d, -80.0f)), hn::Lt(t, hn::Set(d, 1.0f)));
+  return hn::IfThenElseZero(positive, ExpLanes(exponent));
 }
 
 /// Smith's Lambda of GGX for cosine c > 0 to the normal [Heitz 2014].
@@ -99,7 +101,7 @@ HWY_INLINE BsdfLanes EvaluateBsdf(const SurfaceLanes& s, const Vec3Lanes& wi) {
   VF lobe_pdf = zero;
 
   if (s.any_phong) {
-    const VF power = CosinePower(Dot(s.mirror, wi), s.shape);
+    const VF power = CosinePower(s.mirror, wi, s.shape);
     out.lobe = hn::Mul(s.lobe_scale, power);
     // (e + 1) / (2 pi), from lobe_scale = (e + 2) / (2 pi).
     lobe_pdf = hn::Mul(hn::Sub(s.lobe_scale, hn::Set(d, 0.5f * kInvPi)), power);

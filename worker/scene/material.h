@@ -11,7 +11,8 @@ namespace baton {
 ///   f = kd/pi [* (1 - F) for ggx] + specular lobe,
 /// lobe phong: ks (s+2)/(2 pi) max(0, r.wi)^s, r the mirror direction of wo about the shading normal
 ///   [Lafortune & Willems 1994; the papers' model];
-/// lobe ggx: D G2 F / (4 |n.wi| |n.wo|), F Schlick with F0 = ks [glTF 2.0, appendix B].
+/// lobe ggx: D G2 F / (4 |n.wi| |n.wo|), F Schlick with F0 = ks [glTF 2.0, appendix B]. As published, a white and smooth
+///   dielectric gains energy at grazing view (albedo 1.03 at 60, 1.6 at 85 degrees); a metal never does.
 struct Material {
   enum class Lobe : std::uint8_t { none, phong, ggx };
 

@@ -23,8 +23,9 @@ void SiteBlock::add(int site, const ShadingPoint& point, const Material& materia
 
   set(ns_x, ns_y, ns_z, point.ns);
   set(ng_x, ng_y, ng_z, point.ng);
-  set(wo_x, wo_y, wo_z, point.wo);
-  set(mirror_x, mirror_y, mirror_z, reflect(point.wo, point.ns));
+  const Vec3 wo = ggx ? clamped_view(point) : point.wo;
+  set(wo_x, wo_y, wo_z, wo);
+  set(mirror_x, mirror_y, mirror_z, reflect(wo, point.ns));
   set(kd_r, kd_g, kd_b, ggx ? material.kd * (Rgb{1, 1, 1} - material.ks) : material.kd);
   set(ks_r, ks_g, ks_b, ggx || phong ? material.ks : Rgb{});
   shape[s] = material.shape;

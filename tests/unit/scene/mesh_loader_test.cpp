@@ -46,8 +46,10 @@ std::string square_gltf_json(const std::string& buffer) {
 "meshes":[{"primitives":[{"attributes":{"POSITION":0},"indices":1}]}],
 "buffers":[{"byteLength":60)" +
          buffer + R"(}],
-"bufferViews":[{"buffer":0,"byteOffset":0,"byteLength":48},{"buffer":0,"byteOffset":48,"byteLength":12}],
-"accessors":[{"bufferView":0,"componentType":5126,"count":4,"type":"VEC3","min":[0,0,0],"max":[1,0,1]},
+"bufferViews":[{"buffer":0,"byteOffset":0,"byteLength":48},
+{"buffer":0,"byteOffset":48,"byteLength":12}],
+"accessors":[{"bufferView":0,"componentType":5126,"count":4,"type":"VEC3",
+"min":[0,0,0],"max":[1,0,1]},
 {"bufferView":1,"componentType":5123,"count":6,"type":"SCALAR"}]})";
 }
 
