@@ -48,7 +48,7 @@ int main(int argc, char** argv) {
   baton::WorkerOptions worker;
   worker.num_threads = static_cast<int>(std::max(1u, std::thread::hardware_concurrency()));
   std::int64_t give_up_s = worker.give_up.count();
-  app.add_option("--coordinator", worker.endpoint, "endpoint, e.g. tcp://127.0.0.1:7700")
+  app.add_option("--coordinator", worker.endpoint, "endpoint, e.g. tcp://127.0.0.1:5570")
       ->envname("BATON_COORDINATOR");
   app.add_option("--threads", worker.num_threads, "render threads; default: one per processor")
       ->envname("BATON_THREADS")

@@ -68,7 +68,7 @@ struct ObjectSpec {
   Vec3 translate{0, 0, 0};
   Vec3 rotate_deg{0, 0, 0};
   Vec3 scale{1, 1, 1};
-  std::optional<float> fit_height;
+  std::optional<float> fit_height{};
   bool place_on_ground = false;
 
   bool operator==(const ObjectSpec&) const = default;

@@ -203,7 +203,9 @@ TEST(Furnace, NoMaterialCreatesEnergy) {
     const auto lns = channel(result.films.back(), "lns");
     const auto depth = channel(result.films.back(), "depth");
     for (std::size_t i = 0; i < lns.size(); ++i) {
-      if (depth[i] > 0) EXPECT_LT(lns[i], 1.02f) << material;
+      if (depth[i] > 0) {
+        EXPECT_LT(lns[i], 1.02f) << material;
+      }
     }
   }
 }

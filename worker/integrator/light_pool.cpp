@@ -1,9 +1,31 @@
 #include "worker/integrator/light_pool.h"
 
+#include <array>
+#include <numeric>
+#include <utility>
+
 #include "common/math/low_discrepancy.h"
 #include "worker/integrator/kernels.h"
 
 namespace baton {
+namespace {
+
+/// The order in which eight consecutive points of the sequence fill block `index`: random, because the j-th of eight
+/// consecutive Sobol' points always lies in the same eighth of the table, and a reader that always takes the j-th entry
+/// of random blocks must see all of it.
+std::array<std::uint32_t, LightPool::kBlock> shuffled_order(const Rng& rng, std::uint32_t index) {
+  std::array<std::uint32_t, LightPool::kBlock> order{};
+  std::iota(order.begin(), order.end(), 0u);
+  const auto first = rng.bits(1, index);
+  const auto second = rng.bits(2, index);
+  for (std::uint32_t i = LightPool::kBlock - 1; i > 0; --i) {
+    const std::uint32_t bits = i < 4 ? first[i] : second[i - 4];
+    std::swap(order[i], order[static_cast<std::size_t>((std::uint64_t{bits} * (i + 1)) >> 32)]);
+  }
+  return order;
+}
+
+}  // namespace
 
 LightPool make_light_pool(const Environment& now, const Environment& before, std::uint64_t job_seed,
                           std::uint32_t frame) {
@@ -14,12 +36,13 @@ LightPool make_light_pool(const Environment& now, const Environment& before, std
   const EnvironmentView before_view = view_of(before);
   const Rng rng({.job_seed = job_seed, .frame = frame, .pixel = 0}, PassId::light_pool);
   const Philox4x32::Counter seeds = rng.bits(0, 0);
-  std::uint32_t index = 0;
-  for (LightPool::Block& block : pool.blocks) {
+  for (std::uint32_t index = 0; index < pool.blocks.size(); ++index) {
+    LightPool::Block& block = pool.blocks[index];
+    const auto order = shuffled_order(rng, index);
     // Draw the directions and put them on the lattice.
-    for (OctDirection& code : block.code) {
-      const auto [sx, sy] = sobol_2d(index++);
-      code = encode_octahedral(
+    for (std::uint32_t i = 0; i < LightPool::kBlock; ++i) {
+      const auto [sx, sy] = sobol_2d(index * LightPool::kBlock + order[i]);
+      block.code[i] = encode_octahedral(
           now.sample({uniform_float(owen_scramble(sx, seeds[0])), uniform_float(owen_scramble(sy, seeds[1]))}));
     }
 

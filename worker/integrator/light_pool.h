@@ -11,7 +11,7 @@ namespace baton {
 
 /// Directions drawn from a frame's environment before its pixels are rendered; pixels pick candidates and proposals from
 /// it. One Owen-scrambled Sobol' sequence through the map's sampling table, so every aligned block is well spread by
-/// itself. Each entry's direction has density `density`, so a pixel that chooses entries independently of their contents
+/// itself (blocks of eight are shuffled within). Each entry's direction has density `density`, so a pixel that chooses entries independently of their contents
 /// stays unbiased; pixels that choose the same entries have correlated errors.
 struct LightPool {
   static constexpr std::uint32_t kSize = 1u << 15;  ///< entries

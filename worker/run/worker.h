@@ -9,7 +9,7 @@
 namespace baton {
 
 struct WorkerOptions {
-  std::string endpoint;   ///< of the coordinator, e.g. "tcp://127.0.0.1:7700"
+  std::string endpoint;   ///< of the coordinator, e.g. "tcp://127.0.0.1:5570"
   int num_threads = 1;    ///< render threads, at least 1
   std::string worker_id;  ///< unique in the farm; empty: host and process id
   std::chrono::seconds give_up{
