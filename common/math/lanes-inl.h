@@ -97,7 +97,16 @@ HWY_INLINE void SinCosTurns(VF u, VF& sine, VF& cosine) {
   cosine = hn::Xor(hn::IfThenElse(odd, s, c), sign_bit(hn::Add(q, hn::Set(di, 1))));
 }
 
-/// Natural logarithm of normal positive floats: the exponent, and the odd series of log((1+s)/(1-s)) for the mantissa;
+/// log((1 + s) / (1 - s)) for |s| < 0.172: its odd series.
+HWY_INLINE VF LogRatioSeries(VF s) {
+  const DF d;
+  const VF s2 = hn::Mul(s, s);
+  VF series = hn::MulAdd(s2, hn::Set(d, 2.0f / 7), hn::Set(d, 2.0f / 5));
+  series = hn::MulAdd(s2, series, hn::Set(d, 2.0f / 3));
+  return hn::Mul(s, hn::MulAdd(s2, series, hn::Set(d, 2.0f)));
+}
+
+/// Natural logarithm of normal positive floats: the exponent, and LogRatioSeries for the mantissa;
 /// error below 1e-7 relative near 1, 2e-7 absolute elsewhere.
 HWY_INLINE VF LogLanes(VF x) {
   const DF d;
@@ -109,11 +118,7 @@ HWY_INLINE VF LogLanes(VF x) {
   const VF m = hn::BitCast(d, hn::Add(hn::And(shifted, hn::Set(di, 0x007FFFFF)), hn::Set(di, 0x3F3504F3)));
   const VF one = hn::Set(d, 1.0f);
   const VF s = hn::Div(hn::Sub(m, one), hn::Add(m, one));
-  const VF s2 = hn::Mul(s, s);
-  VF series = hn::MulAdd(s2, hn::Set(d, 2.0f / 7), hn::Set(d, 2.0f / 5));
-  series = hn::MulAdd(s2, series, hn::Set(d, 2.0f / 3));
-  series = hn::MulAdd(s2, series, hn::Set(d, 2.0f));
-  return hn::MulAdd(e, hn::Set(d, 0.69314718056f), hn::Mul(s, series));
+  return hn::MulAdd(e, hn::Set(d, 0.69314718056f), LogRatioSeries(s));
 }
 
 /// log(1 - t) for t in [0, 1], with full relative accuracy near t = 0; large and negative, but finite, at t = 1.
@@ -122,10 +127,7 @@ HWY_INLINE VF LogOneMinusLanes(VF t) {
   const VF one = hn::Set(d, 1.0f);
   // The series of LogLanes with the difference m - 1 = -t as given, not as what rounding leaves of it.
   const VF s = hn::Div(hn::Neg(t), hn::Sub(hn::Set(d, 2.0f), t));
-  const VF s2 = hn::Mul(s, s);
-  VF series = hn::MulAdd(s2, hn::Set(d, 2.0f / 7), hn::Set(d, 2.0f / 5));
-  series = hn::MulAdd(s2, series, hn::Set(d, 2.0f / 3));
-  series = hn::Mul(s, hn::MulAdd(s2, series, hn::Set(d, 2.0f)));
+  const VF series = LogRatioSeries(s);
   const MF near_zero = hn::Lt(t, hn::Set(d, 0.25f));
   if (hn::AllTrue(d, near_zero)) return series;
   return hn::IfThenElse(near_zero, series, LogLanes(hn::Max(hn::Sub(one, t), hn::Set(d, 1e-30f))));
