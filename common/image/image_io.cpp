@@ -1,8 +1,7 @@
 #include "common/image/image_io.h"
 
-#include <OpenImageIO/filesystem.h>
-#include <OpenImageIO/imageio.h>
 #include <fmt/format.h>
+#include <png.h>
 
 #include <algorithm>
 #include <array>
@@ -11,6 +10,7 @@
 
 #include "common/base/files.h"
 #include "common/base/limits.h"
+#include "common/image/radiance.h"
 
 namespace baton {
 namespace {
@@ -72,28 +72,10 @@ Result<RgbImage> rgb_from_exr(const std::filesystem::path& path) {
 }
 
 Result<RgbImage> rgb_from_radiance(const std::filesystem::path& path) {
-  const auto fail = [&](const std::string& what) {
-    return Error{ErrorKind::bad_input,
-                 fmt::format("{}: not a readable Radiance HDR file: {}", path.string(), what)};
-  };
-  const std::unique_ptr<OIIO::ImageInput> input = OIIO::ImageInput::create("hdr");
-  if (!input) return fail(OIIO::geterror());
-  OIIO::ImageSpec spec;
-  if (!input->open(path.string(), spec)) return fail(input->geterror());
-  if (!sides_ok(spec.width, spec.height)) return side_error(path, spec.width, spec.height);
-  if (spec.nchannels != 3) return fail(fmt::format("{} channels, expected 3", spec.nchannels));
-
-  // Row by row, so that memory grows only with data that is really there.
-  RgbImage image{spec.width, spec.height, {}};
-  const std::size_t row_values = static_cast<std::size_t>(spec.width) * 3;
-  for (int y = 0; y < spec.height; ++y) {
-    image.rgb.resize(image.rgb.size() + row_values);
-    float* row = image.rgb.data() + image.rgb.size() - row_values;
-    if (!input->read_scanline(y, 0, OIIO::TypeDesc::FLOAT, row)) {
-      return fail(fmt::format("row {} of {}: {}", y, spec.height, input->geterror()));
-    }
-  }
-  return image;
+  BATON_ASSIGN(const Bytes bytes, read_file(path, limits::kMaxAssetFileBytes));
+  BATON_ASSIGN(const RadianceHeader header, read_radiance_header(bytes, path.string()));
+  if (!sides_ok(header.width, header.height)) return side_error(path, header.width, header.height);
+  return read_radiance_pixels(bytes, header, path.string());
 }
 
 /// Linear [0, 1] to 8-bit sRGB [IEC 61966-2-1]; NaN gives 0.
@@ -128,22 +110,19 @@ Status write_png(const std::filesystem::path& path, const RgbImage& image) {
   std::ranges::transform(image.rgb, pixels.begin(), to_srgb8);
 
   // Encode in memory, then publish.
-  std::vector<unsigned char> encoded;
-  OIIO::Filesystem::IOVecOutput proxy(encoded);
-  OIIO::ImageSpec spec(image.width, image.height, 3, OIIO::TypeDesc::UINT8);
-  spec.attribute("oiio:ColorSpace", "sRGB");
-  const std::unique_ptr<OIIO::ImageOutput> output = OIIO::ImageOutput::create("png");
-  if (!output) {
+  png_image png{};
+  png.version = PNG_IMAGE_VERSION;
+  png.width = static_cast<png_uint_32>(image.width);
+  png.height = static_cast<png_uint_32>(image.height);
+  png.format = PNG_FORMAT_RGB;
+  png_alloc_size_t size = PNG_IMAGE_PNG_SIZE_MAX(png);
+  Bytes encoded(size);
+  if (png_image_write_to_memory(&png, encoded.data(), &size, 0, pixels.data(), 0, nullptr) == 0) {
     return Error{ErrorKind::internal,
-                 fmt::format("{}: no PNG writer: {}", path.string(), OIIO::geterror())};
+                 fmt::format("{}: cannot be encoded as PNG: {}", path.string(), png.message)};
   }
-  const bool written = output->set_ioproxy(&proxy) && output->open(path.string(), spec) &&
-                       output->write_image(OIIO::TypeDesc::UINT8, pixels.data()) && output->close();
-  if (!written) {
-    return Error{ErrorKind::io, fmt::format("{}: cannot be written as PNG: {}", path.string(),
-                                            output->geterror())};
-  }
-  return write_file_atomic(path, std::as_bytes(std::span(encoded)));
+  encoded.resize(size);
+  return write_file_atomic(path, encoded);
 }
 
 }  // namespace baton

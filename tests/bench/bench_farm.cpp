@@ -1,13 +1,17 @@
-// What the farm costs: wall time of a job through coordinator and two workers over the wall time of the same job called
-// in this process with two threads, frames written in both. Pairs in one run, so the ratio holds on a noisy machine.
-// Usage: bench_farm [JOB.json] [PAIRS]; needs the programs beside it.
+// What the farm costs: a job through coordinator and workers over the same job called in this
+// process with two threads, frames written in both. Wall time is the goal; CPU seconds (user and
+// system, of all processes) tell what is paid and hold on a busy machine. In one run, so the ratios
+// hold on a noisy one. Usage: bench_farm [JOB.json] [ROUNDS]; needs the programs beside it.
 #include <fmt/format.h>
+#include <sys/resource.h>
 #include <unistd.h>
 
 #include <algorithm>
+#include <array>
 #include <chrono>
 #include <cstdlib>
 #include <filesystem>
+#include <functional>
 #include <vector>
 
 #include "common/base/files.h"
@@ -20,48 +24,91 @@ namespace {
 
 namespace fs = std::filesystem;
 
-double seconds_since(std::chrono::steady_clock::time_point start) {
-  return std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+/// Two render threads each way.
+struct Layout {
+  int workers = 1, threads = 2;
+};
+constexpr std::array kLayouts{Layout{1, 2}, Layout{2, 1}};
+
+struct Cost {
+  double wall_s = 0, cpu_s = 0;
+};
+
+/// User and system time of this process and of all descendants that have ended.
+double cpu_seconds() {
+  double seconds = 0;
+  for (const int who : {RUSAGE_SELF, RUSAGE_CHILDREN}) {
+    rusage usage{};
+    ::getrusage(who, &usage);
+    for (const timeval& t : {usage.ru_utime, usage.ru_stime}) {
+      seconds += static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec);
+    }
+  }
+  return seconds;
 }
 
-Result<double> time_in_process(const JobSpec& job) {
+Result<Cost> measure(const std::function<Status()>& work) {
   const auto start = std::chrono::steady_clock::now();
+  const double cpu_start = cpu_seconds();
+  BATON_TRY(work());
+  const std::chrono::duration<double> wall = std::chrono::steady_clock::now() - start;
+  return Cost{wall.count(), cpu_seconds() - cpu_start};
+}
+
+Status render_in_process(const JobSpec& job) {
   BATON_ASSIGN(const auto context, load_render_context(job, Digest{1, 1}));
   const FrameSink sink = [&](std::int32_t frame, const FilmTile& image) -> Status {
     BATON_ASSIGN(const BlobRef written, write_frame(job, Digest{1, 1}, frame, image));
     return written.size_bytes > 0 ? Status() : Error{ErrorKind::internal, "empty frame"};
   };
   BATON_ASSIGN(const RenderStats stats, render_locally(*context, job, 2, sink));
-  return stats.pixels > 0 ? seconds_since(start) : 0;
+  return stats.pixels > 0 ? Status() : Error{ErrorKind::internal, "nothing was rendered"};
 }
 
-Result<double> time_farm(const fs::path& bin, const fs::path& job_file) {
-  const auto start = std::chrono::steady_clock::now();
-  const std::string command = fmt::format("'{}' render '{}' --workers 2 --threads-per-worker 1 > /dev/null 2>&1",
-                                          (bin / "baton").string(), job_file.string());
-  if (std::system(command.c_str()) != 0) return Error{ErrorKind::internal, command + ": failed"};
-  return seconds_since(start);
+/// `baton render` as a person starts it.
+Status render_on_farm(const fs::path& bin, const fs::path& job_file, const Layout& layout) {
+  const std::string command =
+      fmt::format("'{}' render '{}' --workers {} --threads-per-worker {} > /dev/null 2>&1",
+                  (bin / "baton").string(), job_file.string(), layout.workers, layout.threads);
+  return std::system(command.c_str()) == 0 ? Status()
+                                           : Error{ErrorKind::internal, command + ": failed"};
 }
 
-Status run(const fs::path& bin, const std::string& job_path, int pairs) {
+double median(std::vector<double> values) {
+  std::sort(values.begin(), values.end());
+  return values[values.size() / 2];
+}
+
+Status run(const fs::path& bin, const std::string& job_path, int rounds) {
   BATON_ASSIGN(JobSpec job, load_job(job_path));
   const fs::path folder = fs::temp_directory_path() / fmt::format("baton-bench-{}", ::getpid());
-  std::vector<double> ratios;
-  for (int pair = 0; pair < pairs; ++pair) {
-    job.output.directory = (folder / fmt::format("local{}", pair)).string();
-    BATON_ASSIGN(const double local, time_in_process(job));
-    job.output.directory = (folder / fmt::format("farm{}", pair)).string();
-    const fs::path job_file = folder / fmt::format("job{}.json", pair);
-    const std::string text = to_json(job);
-    BATON_TRY(write_file_atomic(job_file, as_bytes_view(text)));
-    BATON_ASSIGN(const double farm, time_farm(bin, job_file));
-    ratios.push_back(farm / local);
-    fmt::print("in process {:.2f} s, farm {:.2f} s, ratio {:.3f}\n", local, farm, ratios.back());
+  std::array<std::vector<double>, kLayouts.size()> wall_ratios, cpu_ratios;
+  for (int round = 0; round < rounds; ++round) {
+    job.output.directory = (folder / "local").string();
+    BATON_ASSIGN(const Cost local, measure([&] { return render_in_process(job); }));
+    fmt::print("in process, 2 threads: {:.2f} s, {:.2f} CPU s\n", local.wall_s, local.cpu_s);
+    for (std::size_t i = 0; i < kLayouts.size(); ++i) {
+      job.output.directory = (folder / fmt::format("farm{}", i)).string();
+      const fs::path job_file = folder / "job.json";
+      const std::string text = to_json(job);
+      BATON_TRY(write_file_atomic(job_file, as_bytes_view(text)));
+      BATON_ASSIGN(const Cost farm,
+                   measure([&] { return render_on_farm(bin, job_file, kLayouts[i]); }));
+      wall_ratios[i].push_back(farm.wall_s / local.wall_s);
+      cpu_ratios[i].push_back(farm.cpu_s / local.cpu_s);
+      fmt::print("farm, {} x {}: {:.2f} s, {:.2f} CPU s; ratios {:.3f}, {:.3f}\n",
+                 kLayouts[i].workers, kLayouts[i].threads, farm.wall_s, farm.cpu_s,
+                 wall_ratios[i].back(), cpu_ratios[i].back());
+    }
     std::fflush(stdout);
+    fs::remove_all(folder);
   }
-  std::sort(ratios.begin(), ratios.end());
-  fmt::print("median ratio {:.3f} (goal: at most 1.1)\n", ratios[ratios.size() / 2]);
-  fs::remove_all(folder);
+  for (std::size_t i = 0; i < kLayouts.size(); ++i) {
+    fmt::print(
+        "{} workers x {} threads: median ratio of wall time {:.3f} (goal: at most 1.1), of CPU "
+        "time {:.3f}\n",
+        kLayouts[i].workers, kLayouts[i].threads, median(wall_ratios[i]), median(cpu_ratios[i]));
+  }
   return {};
 }
 
@@ -70,8 +117,8 @@ Status run(const fs::path& bin, const std::string& job_path, int pairs) {
 
 int main(int argc, char** argv) {
   const auto bin = std::filesystem::canonical("/proc/self/exe").parent_path();
-  const baton::Status status =
-      baton::run(bin, argc > 1 ? argv[1] : "jobs/examples/demo.json", argc > 2 ? std::atoi(argv[2]) : 3);
+  const baton::Status status = baton::run(bin, argc > 1 ? argv[1] : "jobs/examples/demo.json",
+                                          argc > 2 ? std::max(1, std::atoi(argv[2])) : 3);
   if (status) return 0;
   fmt::print(stderr, "{}\n", status.error().message);
   return 70;

@@ -46,7 +46,7 @@ MAY_INCLUDE = {
 THIRD_PARTY = {
     r"embree3/": ["worker/accel/"],
     r"assimp/": ["worker/scene/mesh_loader.cpp"],
-    r"OpenImageIO/|OpenEXR/|Imath/": ["common/image/"],
+    r"OpenEXR/|Imath/|png\.h": ["common/image/"],
     r"zmq": ["common/protocol/"],
     r"sqlite3": ["coordinator/journal/"],
     r"zstd|xxhash": ["common/base/"],

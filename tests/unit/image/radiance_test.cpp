@@ -1,0 +1,102 @@
+#include "common/image/radiance.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <initializer_list>
+
+namespace baton {
+namespace {
+
+using testing::Each;
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+constexpr const char* kStart = "#?RADIANCE\nFORMAT=32-bit_rle_rgbe\nEXPOSURE=2\n\n";
+
+/// A file of header text and pixel bytes.
+Bytes file_of(const std::string& header, std::initializer_list<int> pixels) {
+  ByteWriter writer;
+  writer.put_raw(as_bytes_view(header));
+  for (const int value : pixels) writer.put(static_cast<std::uint8_t>(value));
+  return writer.take();
+}
+
+Result<RgbImage> read(const Bytes& file) {
+  BATON_ASSIGN(const RadianceHeader header, read_radiance_header(file, "a.hdr"));
+  return read_radiance_pixels(file, header, "a.hdr");
+}
+
+Result<RgbImage> read_rows(const std::string& sides, std::initializer_list<int> pixels) {
+  return read(file_of(kStart + sides, pixels));
+}
+
+/// Red of every pixel.
+std::vector<float> reds(const RgbImage& image) {
+  std::vector<float> values;
+  for (std::size_t i = 0; i < image.rgb.size(); i += 3) values.push_back(image.rgb[i]);
+  return values;
+}
+
+TEST(Radiance, PlainPixelsAreMantissasTimesAPowerOfTwo) {
+  const auto image = read_rows("-Y 1 +X 3\n", {128, 64, 32, 129, 255, 255, 255, 0, 1, 0, 200, 255});
+  ASSERT_TRUE(image.ok()) << image.error().message;
+  EXPECT_THAT(image->rgb, ElementsAre(1, 0.5f, 0.25f, 0, 0, 0, 0x1p119f, 0, 200 * 0x1p119f));
+}
+
+TEST(Radiance, PlanarRowsHoldRunsAndValues) {
+  // Red 10 values of their own, green one run, blue a run and two values, one exponent.
+  const auto image = read_rows("-Y 1 +X 10\n", {2,   2,  0, 10,                        //
+                                                10,  1,  2, 3,  4, 5, 6, 7, 8, 9, 10,  //
+                                                138, 7,                                //
+                                                136, 9,  2, 3,  4,                     //
+                                                138, 136});
+  ASSERT_TRUE(image.ok()) << image.error().message;
+  EXPECT_THAT(reds(*image), ElementsAre(1, 2, 3, 4, 5, 6, 7, 8, 9, 10));
+  EXPECT_EQ(image->rgb[1], 7);
+  EXPECT_EQ(image->rgb[7 * 3 + 2], 9);
+  EXPECT_EQ(image->rgb[9 * 3 + 2], 4);
+}
+
+TEST(Radiance, OldRunsRepeatThePixelBefore) {
+  // 2 + 1 * 256 repeats.
+  const auto image =
+      read_rows("-Y 1 +X 260\n", {5, 0, 0, 136, 1, 1, 1, 2, 1, 1, 1, 1, 6, 0, 0, 136});
+  ASSERT_TRUE(image.ok()) << image.error().message;
+  std::vector<float> values = reds(*image);
+  ASSERT_EQ(values.size(), 260u);
+  EXPECT_EQ(values.back(), 6);
+  values.pop_back();
+  EXPECT_THAT(values, Each(5.0f));
+}
+
+TEST(Radiance, RowsThatDoNotFillTheirWidthAreErrors) {
+  const std::string wide = "-Y 2 +X 8\n";
+  for (const auto& pixels : {
+           std::initializer_list<int>{2, 2, 0, 8, 137, 1},  // a run past the end
+           {2, 2, 0, 8, 0},                                 // a run of nothing
+           {2, 2, 0, 8, 9, 1, 2, 3, 4, 5, 6, 7, 8, 9},      // values past the end
+           {2, 2, 0, 8, 136},                               // a run without its value
+           {1, 1, 1, 3},                                    // nothing to repeat
+           {9, 9, 9, 9, 1, 1, 1, 8},                        // repeats past the end
+       }) {
+    const auto image = read_rows(wide, pixels);
+    ASSERT_FALSE(image.ok());
+    EXPECT_THAT(image.error().message, HasSubstr("a.hdr: not a readable Radiance HDR file: row 0"));
+  }
+}
+
+TEST(Radiance, HeadersSayWhatIsWrong) {
+  const auto fault = [](const std::string& text) {
+    return read_radiance_header(as_bytes_view(text), "a.hdr").error().message;
+  };
+  EXPECT_THAT(fault("P6\n"), HasSubstr("does not begin with #?"));
+  EXPECT_THAT(fault("#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n"), HasSubstr("header does not end"));
+  EXPECT_THAT(fault("#?RADIANCE\nFORMAT=32-bit_rle_xyze\n\n-Y 1 +X 1\n"), HasSubstr("FORMAT="));
+  for (const char* sides : {"+Y 1 +X 1\n", "-Y 1 +X\n", "-Y 1 +X 99999999999\n", "-Y 1 +X 1 \n"}) {
+    EXPECT_THAT(fault(std::string(kStart) + sides), HasSubstr("expected -Y HEIGHT +X WIDTH"));
+  }
+}
+
+}  // namespace
+}  // namespace baton
