@@ -84,6 +84,25 @@ void fields(JobArchive& a, SamplingSpec& sampling) {
   a.integer("referenceSamples", sampling.reference_samples, 2, limits::kMaxReferenceSamples);
 }
 
+void fields(JobArchive& a, VisibilitySpec& visibility, const SamplingSpec& sampling) {
+  a.boolean("correlated", visibility.correlated);
+  a.choice("form", visibility.form, kSecondPassForms);
+  a.choice("mask", visibility.mask, kMaskPolicies);
+  a.integer("tileSize", visibility.tile_size, 2, limits::kMaxExchangeSide);
+  a.integer("partitions", visibility.partitions, 1, limits::kMaxPartitions);
+  a.integer("dilate", visibility.dilate, 0, limits::kMaxDilation);
+  if (!visibility.correlated) return;
+
+  // The second pass needs samples, two independent halves of them unless told otherwise.
+  if (sampling.method == Method::reference) {
+    a.fault("correlated", "false, as sampling.method is reference", "true");
+  }
+  if (visibility.mask != MaskPolicy::same_samples && sampling.num_particles % 2 != 0) {
+    a.fault("mask", "same-samples, or an even sampling.numParticles to be halved",
+            std::to_string(sampling.num_particles));
+  }
+}
+
 void fields(JobArchive& a, OutputSpec& output, const JobSpec& job) {
   if (output.directory.empty()) output.directory = job.name + "-frames";
   a.path("directory", output.directory);
@@ -139,6 +158,7 @@ void fields(JobArchive& a, JobSpec& job) {
   a.object(required("scene"), [&] { fields(a, job.scene); }, {.file = true});
   a.object(required("environment"), [&] { fields(a, job.environment, job.frames); });
   a.object("sampling", [&] { fields(a, job.sampling); });
+  a.object("visibility", [&] { fields(a, job.visibility, job.sampling); });
   a.object("output", [&] { fields(a, job.output, job); });
   a.object("state", [&] { fields(a, job.state); });
   a.integer("maxRetriesPerTask", job.max_retries_per_task, 0, limits::kMaxTaskAttempts - 1);

@@ -25,9 +25,13 @@ inline constexpr std::array<std::string_view, 6> kMethods{
     "reference", "environment", "brdf", "mis", "bidirectional", "sequential"};
 inline constexpr std::array<std::string_view, 4> kResamplingSchemes{"systematic", "stratified",
                                                                     "multinomial", "residual"};
+inline constexpr std::array<std::string_view, 4> kSecondPassForms{
+    "corrected", "published", "published-kept", "extra-samples"};
+inline constexpr std::array<std::string_view, 3> kMaskPolicies{"same-samples", "split",
+                                                               "cross-fold"};
 inline constexpr std::array<std::string_view, 2> kBackgrounds{"environment", "transparent"};
-inline constexpr std::array<std::string_view, 8> kAovs{
-    "lns", "visibility", "ess", "acceptance", "source", "normal", "depth", "variance"};
+inline constexpr std::array<std::string_view, 9> kAovs{
+    "lns", "visibility", "ess", "acceptance", "source", "normal", "depth", "variance", "mask"};
 inline constexpr std::array<std::string_view, 2> kPixelTypes{"half", "float"};
 inline constexpr std::array<std::string_view, 5> kCompressions{"none", "rle", "zips", "zip", "piz"};
 inline constexpr std::array<std::string_view, 2> kStateKeeps{"last", "all"};

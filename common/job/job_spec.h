@@ -137,9 +137,27 @@ struct SamplingSpec {
   bool operator==(const SamplingSpec&) const = default;
 };
 
+// ---- visibility --------------------------------------------------------------------------------------------
+/// What a second pass does with the pixels whose shadow rays did not all agree.
+enum class SecondPassForm : std::uint8_t { corrected, published, published_kept, extra_samples };
+/// Which samples decide that a pixel takes part in the second pass, and which are then used.
+enum class MaskPolicy : std::uint8_t { same_samples, split, cross_fold };
+
+/// Correlated visibility [Ghosh & Heidrich 2006], after any sampling method but `reference`.
+struct VisibilitySpec {
+  bool correlated = false;                          ///< run the second pass
+  SecondPassForm form = SecondPassForm::corrected;
+  MaskPolicy mask = MaskPolicy::cross_fold;
+  int tile_size = 5;    ///< side of the squares in which energy is exchanged, pixels, [2, limits::kMaxExchangeSide]
+  int partitions = 16;  ///< C: offers per free sample, [1, limits::kMaxPartitions]
+  int dilate = 0;       ///< the mask grows by so many pixels, [0, limits::kMaxDilation]
+
+  bool operator==(const VisibilitySpec&) const = default;
+};
+
 // ---- output, state, farm -----------------------------------------------------------------------------------
 enum class Background : std::uint8_t { environment, transparent };
-enum class Aov : std::uint8_t { lns, visibility, ess, acceptance, source, normal, depth, variance };
+enum class Aov : std::uint8_t { lns, visibility, ess, acceptance, source, normal, depth, variance, mask };
 enum class PixelType : std::uint8_t { half_float, full_float };
 
 struct OutputSpec {
@@ -174,6 +192,7 @@ struct JobSpec {
   SceneSpec scene;
   EnvironmentSpec environment;
   SamplingSpec sampling;
+  VisibilitySpec visibility;
   OutputSpec output;
   StateSpec state;
   int max_retries_per_task = 3;

@@ -74,6 +74,14 @@ TileRun tile_run(const JobSpec& job, std::int32_t tile, std::int32_t run) {
 
 bool carries_state(const JobSpec& job) { return job.sampling.method == Method::sequential && job.state.carry; }
 
+std::int32_t num_populations(const JobSpec& job) {
+  return job.visibility.correlated && job.visibility.mask != MaskPolicy::same_samples ? 2 : 1;
+}
+
+std::int32_t exchange_reach_px(const VisibilitySpec& visibility) {
+  return visibility.tile_size - 1 + visibility.dilate;
+}
+
 std::string frame_file_name(const std::string& pattern, int frame_number) {
   const std::size_t first = pattern.find('#');
   if (first == std::string::npos) return pattern;

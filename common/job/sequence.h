@@ -66,6 +66,11 @@ TileRun tile_run(const JobSpec& job, std::int32_t tile, std::int32_t run);
 /// True when the method hands samples from frame to frame: `sequential` with state.carry.
 bool carries_state(const JobSpec& job);
 
+/// Sets of samples of a pixel that never exchange anything: 2 when one decides what is done with the other, else 1.
+std::int32_t num_populations(const JobSpec& job);
+/// How far from a tile the second pass looks: pixels whose samples it exchanges, and whose rays decide the mask.
+std::int32_t exchange_reach_px(const VisibilitySpec& visibility);
+
 /// "frame.####.exr" with frame 7 -> "frame.0007.exr". A pattern without '#' is returned unchanged.
 std::string frame_file_name(const std::string& pattern, int frame_number);
 

@@ -41,6 +41,8 @@ enum class PassId : std::uint32_t {
   move = 6,             ///< Metropolis-Hastings moves
   reference = 7,        ///< brute force
   refresh = 8,          ///< a pixel's turn to start afresh
+  partition = 9,        ///< where the squares of the second pass lie
+  exchange = 10,        ///< who is offered a sample in the second pass
 };
 
 /// uint32 -> float uniform in [0, 1): the top 24 bits.

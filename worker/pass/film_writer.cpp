@@ -13,6 +13,7 @@ std::vector<std::string> channel_names(Aov aov) {
     case Aov::normal: return {"normal.X", "normal.Y", "normal.Z"};
     case Aov::depth: return {"depth"};
     case Aov::variance: return {"variance"};
+    case Aov::mask: return {"mask"};
   }
   return {};
 }
@@ -59,6 +60,7 @@ void FilmWriter::write(std::size_t index, const PixelResult& pixel) {
       case Aov::normal: put_vec(pixel.normal); break;
       case Aov::depth: put(pixel.depth); break;
       case Aov::variance: put(pixel.variance); break;
+      case Aov::mask: put(pixel.mask); break;
     }
   }
 }

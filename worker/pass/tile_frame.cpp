@@ -130,6 +130,7 @@ void TileFrameRenderer::sample(Batch& batch, const FrameLight& light, bool has_h
 
     // Keep the books.
     PixelResult& pixel = batch.pixels[i];
+    pixel.mask = 1;
     pixel.lns = samples.lns;
     pixel.source = samples.source;
     pixel.ess_ratio = did.ess / static_cast<float>(n);
@@ -159,8 +160,11 @@ void TileFrameRenderer::shade(Batch& batch, const SampleState& state) {
   const StageTimer timer(stats_.seconds_shade);
   const auto n = static_cast<std::size_t>(state.num_particles);
   for (std::size_t r = 0; r < batch.rays.size(); ++r) {
-    if (batch.rays.t_far[r] < 0) continue;
     const std::size_t i = batch.ray_sample[r] / n;
+    if (batch.rays.t_far[r] < 0) {
+      batch.pixels[i].mask = 0;
+      continue;
+    }
     batch.pixels[i].radiance += batch.sample_color[batch.ray_sample[r]];
     batch.pixels[i].visibility += state.weight[batch.first * n + batch.ray_sample[r]];
   }
@@ -187,6 +191,7 @@ void TileFrameRenderer::render_reference(Batch& batch, const FrameLight& light, 
     pixel.radiance = estimate.radiance;
     pixel.lns = estimate.lns;
     pixel.visibility = estimate.visibility;
+    pixel.mask = estimate.visibility < 1 ? 0.0f : 1.0f;
     pixel.variance = estimate.mean_variance;
     pixel.source = PixelSource::fresh;
     ++stats_.pixels_fresh;

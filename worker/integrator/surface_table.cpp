@@ -1,0 +1,106 @@
+#include "worker/integrator/surface_table.h"
+
+#include <algorithm>
+
+#include "common/base/check.h"
+
+#undef HWY_TARGET_INCLUDE
+#define HWY_TARGET_INCLUDE "worker/integrator/surface_table.cpp"
+#include <hwy/foreach_target.h>
+#include <hwy/highway.h>
+
+#include "worker/integrator/target-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace baton::HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+HWY_INLINE VI LoadSomeIndices(std::span<const std::int32_t> array, std::size_t i) {
+  const DI di;
+  HWY_ALIGN std::int32_t in[hn::MaxLanes(DI())] = {};
+  std::copy_n(array.data() + i, std::min(array.size() - i, hn::Lanes(di)), in);
+  return hn::Load(di, in);
+}
+HWY_INLINE void StoreSomeFloats(VF value, std::vector<float>& array, std::size_t i) {
+  const DF d;
+  HWY_ALIGN float out[hn::MaxLanes(DF())];
+  hn::Store(value, d, out);
+  std::copy_n(out, std::min(array.size() - i, hn::Lanes(d)), array.data() + i);
+}
+
+HWY_INLINE SurfaceLanes GatherSurfaces(const SurfaceTable& table, VI surface) {
+  const DF d;
+  const VI record = hn::Mul(surface, hn::Set(DI(), SurfaceTable::kStride));
+  const auto field = [&](int at) HWY_ATTR { return hn::GatherIndex(d, table.data() + at, record); };
+  const auto vec = [&](int at) HWY_ATTR {
+    return Vec3Lanes{field(at), field(at + 1), field(at + 2)};
+  };
+  return {.ns = vec(SurfaceTable::ns),
+          .ng = vec(SurfaceTable::ng),
+          .wo = vec(SurfaceTable::wo),
+          .mirror = vec(SurfaceTable::mirror),
+          .kd = vec(SurfaceTable::kd),
+          .ks = vec(SurfaceTable::ks),
+          .shape = field(SurfaceTable::shape),
+          .lobe_scale = field(SurfaceTable::lobe_scale),
+          .specular_probability = hn::Zero(d),
+          .is_ggx = hn::Gt(field(SurfaceTable::is_ggx), hn::Zero(d)),
+          .any_phong = table.any_phong(),
+          .any_ggx = table.any_ggx()};
+}
+
+void ReflectSamples(const SurfaceTable& surfaces, const LightSamples& samples,
+                    std::span<const std::int32_t> surface, std::span<const std::int32_t> light,
+                    ReflectedSamples& out) {
+  const DF d;
+  for (std::size_t i = 0; i < surface.size(); i += hn::Lanes(d)) {
+    const VI sample = LoadSomeIndices(light, i);
+    const auto field = [&](const std::vector<float>& array)
+                           HWY_ATTR { return hn::GatherIndex(d, array.data(), sample); };
+    const SurfaceLanes s = GatherSurfaces(surfaces, LoadSomeIndices(surface, i));
+    const BsdfLanes f = EvaluateBsdf(s, {field(samples.x), field(samples.y), field(samples.z)});
+    const Vec3Lanes reflected =
+        ReflectedRadiance(s, f, field(samples.r), field(samples.g), field(samples.b));
+    StoreSomeFloats(reflected.x, out.r, i);
+    StoreSomeFloats(reflected.y, out.g, i);
+    StoreSomeFloats(reflected.z, out.b, i);
+  }
+}
+
+}  // namespace baton::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+
+#if HWY_ONCE
+namespace baton {
+HWY_EXPORT(ReflectSamples);
+
+void SurfaceTable::add(const ShadingPoint& point, const Material& material,
+                       const Vec3& ray_origin) {
+  SiteBlock one;
+  one.clear(1);
+  one.add(0, point, material);
+  for (const SiteBlock::Array* field :
+       {&one.ns_x,  &one.ns_y,       &one.ns_z,  &one.ng_x,     &one.ng_y,     &one.ng_z,
+        &one.wo_x,  &one.wo_y,       &one.wo_z,  &one.mirror_x, &one.mirror_y, &one.mirror_z,
+        &one.kd_r,  &one.kd_g,       &one.kd_b,  &one.ks_r,     &one.ks_g,     &one.ks_b,
+        &one.shape, &one.lobe_scale, &one.is_ggx}) {
+    records_.push_back((*field)[0]);
+  }
+  records_.insert(records_.end(), {ray_origin.x, ray_origin.y, ray_origin.z});
+  any_phong_ = any_phong_ || one.any_phong;
+  any_ggx_ = any_ggx_ || one.any_ggx;
+}
+
+namespace kernels {
+
+void reflect_samples(const SurfaceTable& surfaces, const LightSamples& samples,
+                     std::span<const std::int32_t> surface, std::span<const std::int32_t> light,
+                     ReflectedSamples& out) {
+  BATON_CHECK(surface.size() == light.size() && out.r.size() == surface.size());
+  if (surface.empty()) return;
+  HWY_DYNAMIC_DISPATCH(ReflectSamples)(surfaces, samples, surface, light, out);
+}
+
+}  // namespace kernels
+}  // namespace baton
+#endif  // HWY_ONCE

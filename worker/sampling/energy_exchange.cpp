@@ -1,0 +1,205 @@
+#include "worker/sampling/energy_exchange.h"
+
+#include <algorithm>
+
+#include "common/base/check.h"
+
+namespace baton {
+namespace {
+
+/// Offers answered together: enough rays for one call of the ray tracer, few enough for the cache.
+constexpr std::size_t kBatchOffers = 2048;
+
+constexpr std::array<Fold, 1> kSameSamples{Fold{}};
+constexpr std::array<Fold, 1> kSplit{Fold{0, 1, 2.0f}};
+constexpr std::array<Fold, 2> kCrossFold{Fold{0, 1, 1.0f}, Fold{1, 0, 1.0f}};
+
+class Exchange {
+ public:
+  Exchange(const ExchangeSettings& settings, const SquarePartitions& partitions,
+           const PixelMask& exchange, const PixelRect& inner, ExchangeScene& scene,
+           std::span<Rgb> radiance)
+      : settings_(settings),
+        partitions_(partitions),
+        exchange_(exchange),
+        inner_(inner),
+        scene_(scene),
+        radiance_(radiance),
+        neighbours_(static_cast<std::size_t>(partitions.count())),
+        strata_(static_cast<std::size_t>(partitions.count())) {}
+
+  /// Puts a pixel into the batch. Givers must come row by row: that is the order in which receivers
+  /// add.
+  void add(std::int32_t x, std::int32_t y) {
+    const bool inside = inner_.contains(x, y);
+    Giver giver{
+        .x = x, .y = y, .inside = inside, .end_sample = 0, .num_lonely = partitions_.count()};
+    const std::size_t first = batch_.size();
+    scene_.append_samples(x, y, batch_);
+    if (exchange_.at(x, y) && batch_.size() > first) {
+      giver.num_lonely = meet_neighbours(x, y);
+      for (std::size_t s = first; s < batch_.size(); ++s) make_offers(s, inside);
+    }
+    giver.end_sample = batch_.size();
+    givers_.push_back(giver);
+    if (offers_.size() >= kBatchOffers) flush();
+  }
+
+  /// Answers and books everything in the batch.
+  void flush() {
+    receptions_.resize(offers_.size());
+    scene_.receive(batch_, offers_, receptions_);
+    std::size_t sample = 0;
+    std::size_t offer = 0;
+    for (const Giver& giver : givers_) {
+      for (; sample < giver.end_sample; ++sample) book(giver, sample, offer);
+    }
+    batch_.clear();
+    offers_.clear();
+    givers_.clear();
+  }
+
+ private:
+  struct Giver {
+    std::int32_t x, y;
+    bool inside;
+    std::size_t end_sample;   ///< past its samples in the batch
+    std::int32_t num_lonely;  ///< partitions in which there is nobody to offer to
+  };
+
+  /// Lists the masked pixels that share a square with (x, y). Returns the number of partitions
+  /// without any.
+  std::int32_t meet_neighbours(std::int32_t x, std::int32_t y) {
+    const Rng rng({.job_seed = settings_.job_seed,
+                   .frame = settings_.frame,
+                   .pixel = static_cast<std::uint32_t>(y * settings_.image_width + x)},
+                  PassId::exchange);
+    std::int32_t num_lonely = 0;
+    Philox4x32::Counter random{};
+    for (std::int32_t c = 0; c < partitions_.count(); ++c) {
+      const auto word = static_cast<std::uint32_t>(c);
+      if (word % 4 == 0) random = rng.bits(settings_.fold, word / 4);
+      strata_[word] = random[word % 4];
+      std::vector<Neighbour>& found = neighbours_[word];
+      found.clear();
+      const PixelRect square = partitions_.square(c, x, y);
+      for (std::int32_t v = square.y0; v < square.y1; ++v) {
+        for (std::int32_t u = square.x0; u < square.x1; ++u) {
+          if ((u == x && v == y) || !exchange_.at(u, v)) continue;
+          found.push_back(
+              {static_cast<std::uint32_t>(exchange_.index(u, v)), inner_.contains(u, v)});
+        }
+      }
+      num_lonely += found.empty() ? 1 : 0;
+    }
+    return num_lonely;
+  }
+
+  /// Draws one (pixel, site) in each partition, uniformly; the slots of a pixel take different
+  /// strata of it. Of a giver outside, only what comes in matters.
+  void make_offers(std::size_t sample, bool inside) {
+    const std::uint32_t shift = static_cast<std::uint32_t>(
+        (std::uint64_t{batch_[sample].slot} << 32) / settings_.num_slots);
+    for (std::size_t c = 0; c < neighbours_.size(); ++c) {
+      const std::vector<Neighbour>& found = neighbours_[c];
+      if (found.empty()) continue;
+      const std::uint64_t position = strata_[c] + shift;  // wraps around in 32 bits
+      const auto pair =
+          static_cast<std::uint32_t>((position * (found.size() * settings_.num_sites)) >> 32);
+      const Neighbour& to = found[pair / settings_.num_sites];
+      if (!inside && !to.inside) continue;
+      offers_.push_back({static_cast<std::uint32_t>(sample), to.pixel, pair % settings_.num_sites});
+    }
+  }
+
+  /// Gives away the accepted shares of one sample; the giver keeps the rest. `offer` moves past the
+  /// sample's offers.
+  void book(const Giver& giver, std::size_t sample, std::size_t& offer) {
+    const GiverSample& given = batch_[sample];
+    const auto c = static_cast<float>(partitions_.count());
+    float accepted = 0;
+    for (; offer < offers_.size() && offers_[offer].sample == sample; ++offer) {
+      const Reception& reception = receptions_[offer];
+      const float share = acceptance(settings_.form, given, reception);
+      if (!(share > 0)) continue;
+      accepted += share;
+      Rgb* const to = inner_pixel(offers_[offer].receiver);
+      if (to != nullptr)
+        *to += reception.reflected * (share * (given.energy / c) / reception.target);
+    }
+    if (!giver.inside) return;
+    const float left = settings_.form == SecondPassForm::published
+                           ? static_cast<float>(giver.num_lonely)
+                           : std::max(c - accepted, 0.0f);
+    radiance_[inner_index(giver.x, giver.y)] +=
+        given.reflected * (left / c * given.energy / given.target);
+  }
+
+  std::size_t inner_index(std::int32_t x, std::int32_t y) const {
+    return static_cast<std::size_t>(y - inner_.y0) * static_cast<std::size_t>(inner_.width()) +
+           static_cast<std::size_t>(x - inner_.x0);
+  }
+  /// The sum of a pixel of the exchange mask, or nullptr outside.
+  Rgb* inner_pixel(std::uint32_t pixel) const {
+    const auto width = static_cast<std::uint32_t>(exchange_.rect().width());
+    const std::int32_t x = exchange_.rect().x0 + static_cast<std::int32_t>(pixel % width);
+    const std::int32_t y = exchange_.rect().y0 + static_cast<std::int32_t>(pixel / width);
+    return inner_.contains(x, y) ? &radiance_[inner_index(x, y)] : nullptr;
+  }
+
+  struct Neighbour {
+    std::uint32_t pixel;
+    bool inside;
+  };
+
+  const ExchangeSettings& settings_;
+  const SquarePartitions& partitions_;
+  const PixelMask& exchange_;
+  const PixelRect inner_;
+  ExchangeScene& scene_;
+  std::span<Rgb> radiance_;
+  std::vector<std::vector<Neighbour>> neighbours_;  ///< (C) of the pixel in work
+  std::vector<std::uint32_t> strata_;               ///< (C) 32 random bits
+  std::vector<Giver> givers_;
+  std::vector<GiverSample> batch_;
+  std::vector<Offer> offers_;
+  std::vector<Reception> receptions_;
+};
+
+}  // namespace
+
+std::span<const Fold> folds_of(MaskPolicy policy) {
+  switch (policy) {
+    case MaskPolicy::same_samples:
+      return kSameSamples;
+    case MaskPolicy::split:
+      return kSplit;
+    case MaskPolicy::cross_fold:
+      return kCrossFold;
+  }
+  return {};
+}
+
+float acceptance(SecondPassForm form, const GiverSample& giver, const Reception& reception) {
+  if (!reception.visible || !(reception.target > 0)) return 0;
+  if (form == SecondPassForm::corrected) return std::min(1.0f, reception.target / giver.target);
+  return giver.lns > 0 ? std::min(1.0f, reception.lns / giver.lns) : 0.0f;
+}
+
+void exchange_energy(const ExchangeSettings& settings, const SquarePartitions& partitions,
+                     const PixelMask& exchange, const PixelMask& recompute, const PixelRect& inner,
+                     ExchangeScene& scene, std::span<Rgb> radiance) {
+  BATON_CHECK(radiance.size() == static_cast<std::size_t>(inner.area()));
+  BATON_CHECK(exchange.rect() == recompute.rect() && settings.num_slots > 0 &&
+              settings.num_sites > 0);
+  Exchange work(settings, partitions, exchange, inner, scene, radiance);
+  const PixelRect& rect = recompute.rect();
+  for (std::int32_t y = rect.y0; y < rect.y1; ++y) {
+    for (std::int32_t x = rect.x0; x < rect.x1; ++x) {
+      if (recompute.at(x, y) && (inner.contains(x, y) || exchange.at(x, y))) work.add(x, y);
+    }
+  }
+  work.flush();
+}
+
+}  // namespace baton
