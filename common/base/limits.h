@@ -12,8 +12,8 @@ inline constexpr std::uint64_t kMaxBlobBytes = 4ull << 30;
 inline constexpr std::uint64_t kMaxMessageBytes = 64ull << 20;
 inline constexpr int kMaxMessageFrames = 4;      // with the peer's identity
 inline constexpr int kMaxQueuedMessages = 4096;  // per connection, either way
-inline constexpr int kMaxSections = 64;  // of one state or film file
-inline constexpr int kMaxChannels = 256;  // of one picture
+inline constexpr int kMaxSections = 64;          // of one state or film file
+inline constexpr int kMaxChannels = 256;         // of one picture
 inline constexpr int kMaxImageSide = 32768;
 inline constexpr int kMaxFrames = 100000;
 inline constexpr int kMaxFrameNumber = 9999999;
@@ -37,7 +37,10 @@ inline constexpr int kMaxDilation = 8;
 inline constexpr int kMaxReferenceSamples = 1 << 24;
 inline constexpr int kMaxCheckpointEvery = 1000;
 inline constexpr int kMaxEnvironmentSide = 32768;
-inline constexpr std::uint64_t kMaxEnvironmentCacheBytes = 4ull << 30;  ///< per process and kind of entry
+inline constexpr std::uint64_t kMaxEnvironmentCacheBytes =
+    4ull << 30;  ///< per process and kind of entry
+inline constexpr std::uint64_t kMaxStateCacheBytes =
+    1ull << 30;  ///< decoded states that a worker keeps, per job
 inline constexpr int kMaxTasksPerJob = 4000000;
 inline constexpr int kMaxTaskAttempts = 16;
 inline constexpr int kMaxLeasesPerWorker = 1024;

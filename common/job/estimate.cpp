@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "common/job/motion.h"
 #include "common/job/sequence.h"
 
 namespace baton {
@@ -9,6 +10,15 @@ namespace {
 
 /// Planes of an EXR that an AOV adds.
 std::int64_t num_channels(Aov aov) { return aov == Aov::source || aov == Aov::normal ? 3 : 1; }
+
+/// Tiles that all tiles of one run together need of the run before.
+std::int64_t count_neighbours(const JobSpec& job) {
+  const TileGrid grid(job.image);
+  std::int64_t count = 0;
+  for (std::int32_t tile = 0; tile < grid.count(); ++tile)
+    count += static_cast<std::int64_t>(grid.tiles_near(tile, history_reach_px(job)).size());
+  return count;
+}
 
 /// In memory: Lns, Lns when fresh and source of a pixel; direction, weight and site of a particle.
 constexpr std::int64_t kStateBytesPerPixel = 9;
@@ -23,14 +33,15 @@ JobEstimate estimate_job(const JobSpec& job) {
   JobEstimate e;
   const std::int64_t pixels = std::int64_t{job.image.width} * job.image.height;
 
-  // Count tasks and what each waits for: a run for the one before it, a frame for its tiles.
+  // Count tasks and what each waits for: a run for those before it, a frame for its tiles.
   e.frames = static_cast<std::int64_t>(job.frames.size());
   const std::int64_t side = job.image.tile_size;
   e.tiles = (job.image.width + side - 1) / side * ((job.image.height + side - 1) / side);
   e.runs = num_runs(job);
   e.render_tasks = e.tiles * e.runs;
   e.assemble_tasks = e.frames;
-  e.dependencies = e.frames * e.tiles + (carries_state(job) ? e.tiles * (e.runs - 1) : 0);
+  e.dependencies = e.frames * e.tiles;
+  if (carries_state(job)) e.dependencies += count_neighbours(job) * (e.runs - 1);
 
   // Count rays; a reference sample is a pair, one from the environment and one from the BRDF.
   e.primary_rays_per_pixel = job.image.sites;

@@ -47,24 +47,6 @@ void fields(JobArchive& a, ImageSpec& image) {
   a.integer("tileSize", image.tile_size, limits::kMinTileSize, limits::kMaxTileSize);
 }
 
-void fields(JobArchive& a, CameraSpec& camera) {
-  a.vector("position", camera.position, kCoordinateRange);
-  a.vector("lookAt", camera.look_at, kCoordinateRange);
-  a.vector("up", camera.up, kCoordinateRange);
-  a.number("verticalFovDeg", camera.vertical_fov_deg,
-           {.min = 0, .max = 180, .min_open = true, .max_open = true});
-
-  // The three vectors must span a view.
-  const Vec3 view = camera.look_at - camera.position;
-  if (!(length(view) > 0)) {
-    a.fault("lookAt", "another point than position", "the same");
-  } else if (!(length(camera.up) > 0)) {
-    a.fault("up", "a direction", "[0, 0, 0]");
-  } else if (length(cross(normalize(view), normalize(camera.up))) < 1e-4f) {
-    a.fault("up", "a direction across the view from position to lookAt", "one along it");
-  }
-}
-
 void fields(JobArchive& a, SamplingSpec& sampling) {
   a.choice("method", sampling.method, kMethods);
   a.integer("numParticles", sampling.num_particles, 1, limits::kMaxParticles);
@@ -157,6 +139,7 @@ void fields(JobArchive& a, JobSpec& job) {
   a.object("camera", [&] { fields(a, job.camera); });
   a.object(required("scene"), [&] { fields(a, job.scene); }, {.file = true});
   a.object(required("environment"), [&] { fields(a, job.environment, job.frames); });
+  a.object("motion", [&] { fields(a, job.motion); });
   a.object("sampling", [&] { fields(a, job.sampling); });
   a.object("visibility", [&] { fields(a, job.visibility, job.sampling); });
   a.object("output", [&] { fields(a, job.output, job); });

@@ -34,6 +34,7 @@ inline constexpr std::array<std::string_view, 9> kAovs{
     "lns", "visibility", "ess", "acceptance", "source", "normal", "depth", "variance", "mask"};
 inline constexpr std::array<std::string_view, 2> kPixelTypes{"half", "float"};
 inline constexpr std::array<std::string_view, 5> kCompressions{"none", "rle", "zips", "zip", "piz"};
+inline constexpr std::array<std::string_view, 2> kKeyCurves{"linear", "smooth"};
 inline constexpr std::array<std::string_view, 2> kStateKeeps{"last", "all"};
 
 /// The JSON shape of a job and every check that needs nothing but the job. Documented, key by key,
@@ -42,6 +43,14 @@ void fields(JobArchive& a, JobSpec& job);
 
 /// scene_fields.cpp
 void fields(JobArchive& a, SceneSpec& scene);
+/// motion_fields.cpp
+void fields(JobArchive& a, CameraSpec& camera);
+void fields(JobArchive& a, MotionSpec& motion);
+/// Keys of an object, or where they come from.
+void motion_fields(JobArchive& a, ObjectSpec& object);
+/// A path whose name ends in one of `extensions`.
+void asset_path(JobArchive& a, Key key, std::string& path,
+                std::initializer_list<std::string_view> extensions);
 void fields(JobArchive& a, EnvironmentSpec& environment, const std::vector<int>& frames);
 
 }  // namespace baton

@@ -11,6 +11,7 @@
 #include "common/job/job_json_reader.h"
 #include "common/job/job_json_text.h"
 #include "common/job/job_json_writer.h"
+#include "common/job/motion.h"
 
 namespace baton {
 namespace {
@@ -39,6 +40,8 @@ void fields(JobArchive& a, ParsedJobDocument& document) {
   a.object(required("job"), [&] { fields(a, document.job); });
   a.list(required("assets"), document.assets, kMaxAssets,
          [&](AssetDigest& asset) { fields(a, asset); });
+  if (!is_settled(document.job))
+    a.fault("job", "motion as keys, and motion.maxPx >= 1", "motion that is not settled");
 }
 
 template <class T>
@@ -125,6 +128,7 @@ std::vector<std::string> asset_paths(const JobSpec& job) {
 }
 
 Result<std::string> make_job_document(const JobSpec& job) {
+  if (!is_settled(job)) return Error{ErrorKind::internal, "the motion of the job is not settled"};
   ParsedJobDocument document{.job = job, .assets = {}, .digest = {}};
   BATON_ASSIGN(document.assets, digest_files(asset_paths(job)));
   return write(std::move(document), -1);

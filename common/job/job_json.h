@@ -46,7 +46,8 @@ struct AssetDigest {
 std::vector<std::string> asset_paths(const JobSpec& job);
 
 /// What is submitted, journalled and sent to workers: to_json(job) plus asset digests, as one JSON
-/// text. Reads every asset; errors name the missing or unreadable ones, all of them.
+/// text. Reads every asset; errors name the missing or unreadable ones, all of them. The motion of
+/// the job must be settled (is_settled in motion.h).
 Result<std::string> make_job_document(const JobSpec& job);
 
 struct ParsedJobDocument {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <map>
 #include <optional>
@@ -25,12 +26,50 @@ struct ImageSpec {
   bool operator==(const ImageSpec&) const = default;
 };
 
+// ---- motion ------------------------------------------------------------------------------------------------
+/// How keys are joined. linear: straight lines. smooth: Catmull-Rom splines through the keys. Quaternions are slerped
+/// either way; before the first key and after the last one the pose holds.
+enum class KeyCurve : std::uint8_t { linear, smooth };
+
+/// How samples follow what moves; says nothing when nothing does (common/job/motion.h).
+struct MotionSpec {
+  KeyCurve curve = KeyCurve::smooth;
+  int max_px = 0;  ///< history is followed so far per frame, in either direction of the image; 0: derived from the scene
+  float depth_tolerance = 0.02f;    ///< history is taken from within this share of the depth off the surface, (0, 1]
+  float normal_tolerance_deg = 25;  ///< and where shading normals differ by at most so much, [0, 180]
+
+  bool operator==(const MotionSpec&) const = default;
+};
+
+/// A node or camera of a glTF file whose animation gives the keys: one a frame, at (frame - start_frame) / fps seconds.
+struct GltfMotion {
+  std::string file;  ///< .gltf .glb
+  std::string node;  ///< its name in the file
+  float fps = 24;
+  int start_frame = 1;
+
+  bool operator==(const GltfMotion&) const = default;
+};
+
 // ---- camera ------------------------------------------------------------------------------------------------
+struct CameraKey {
+  double frame = 1;
+  Vec3 position;
+  Vec3 look_at;
+  Vec3 up{0, 1, 0};
+  std::optional<float> vertical_fov_deg{};  ///< none: the camera's
+
+  bool operator==(const CameraKey&) const = default;
+};
+
+/// With keys, these say where the camera is and what it looks at.
 struct CameraSpec {
   Vec3 position{0, 0, 5};
   Vec3 look_at{0, 0, 0};
   Vec3 up{0, 1, 0};
   float vertical_fov_deg = 40;  ///< (0, 180)
+  std::vector<CameraKey> keys{};  ///< ascending frames
+  std::optional<GltfMotion> gltf{};
 
   bool operator==(const CameraSpec&) const = default;
 };
@@ -60,6 +99,19 @@ struct MeshSpec {
   bool operator==(const MeshSpec&) const = default;
 };
 
+/// A rigid motion, with scale, of an object that is already placed: scaled, turned by `rotate_deg` (x, then y, then z;
+/// angles are joined as numbers, so 0 to 360 is a full turn), turned by `quaternion`, each about the place that the
+/// object's `translate` names, then moved by `translate`.
+struct ObjectKey {
+  double frame = 1;
+  Vec3 translate;
+  Vec3 rotate_deg;
+  std::array<float, 4> quaternion{0, 0, 0, 1};  ///< x, y, z, w; need not be unit
+  Vec3 scale{1, 1, 1};
+
+  bool operator==(const ObjectKey&) const = default;
+};
+
 /// A mesh placed in the world: first scaled, then rotated (x, then y, then z), then translated. `place_on_ground` moves
 /// it so that its lowest point has y = 0 (before `translate`); `fit_height` scales it to that height first.
 struct ObjectSpec {
@@ -70,6 +122,8 @@ struct ObjectSpec {
   Vec3 scale{1, 1, 1};
   std::optional<float> fit_height{};
   bool place_on_ground = false;
+  std::vector<ObjectKey> keys{};  ///< ascending frames; none: stands still
+  std::optional<GltfMotion> gltf{};
 
   bool operator==(const ObjectSpec&) const = default;
 };
@@ -191,6 +245,7 @@ struct JobSpec {
   CameraSpec camera;
   SceneSpec scene;
   EnvironmentSpec environment;
+  MotionSpec motion;
   SamplingSpec sampling;
   VisibilitySpec visibility;
   OutputSpec output;

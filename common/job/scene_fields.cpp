@@ -14,19 +14,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A path whose name ends in one of `extensions`.
-void asset_path(JobArchive& a, Key key, std::string& path,
-                std::initializer_list<std::string_view> extensions) {
-  if (!a.path(key, path)) return;
-  std::string extension = fs::path(path).extension().string();
-  for (char& c : extension) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  if (std::find(extensions.begin(), extensions.end(), extension) != extensions.end()) return;
-
-  std::string expected = "a file name that ends in";
-  for (const std::string_view e : extensions) expected += fmt::format(" {}", e);
-  a.fault(key.name, expected, fmt::format("\"{}\"", fs::path(path).filename().string()));
-}
-
 /// A name that must be a key of `named`.
 template <class T>
 void reference(JobArchive& a, const char* key, std::string& name,
@@ -77,6 +64,7 @@ void fields(JobArchive& a, ObjectSpec& object, const SceneSpec& scene) {
   a.vector("scale", object.scale, kPositiveRange, true);
   a.number("fitHeight", object.fit_height, kPositiveRange);
   a.boolean("placeOnGround", object.place_on_ground);
+  motion_fields(a, object);
 }
 
 void fields(JobArchive& a, GroundSpec& ground, const SceneSpec& scene) {
@@ -105,6 +93,18 @@ void expand_numbered(JobArchive& a, const fs::path& numbered, const std::vector<
 }
 
 }  // namespace
+
+void asset_path(JobArchive& a, Key key, std::string& path,
+                std::initializer_list<std::string_view> extensions) {
+  if (!a.path(key, path)) return;
+  std::string extension = fs::path(path).extension().string();
+  for (char& c : extension) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  if (std::find(extensions.begin(), extensions.end(), extension) != extensions.end()) return;
+
+  std::string expected = "a file name that ends in";
+  for (const std::string_view e : extensions) expected += fmt::format(" {}", e);
+  a.fault(key.name, expected, fmt::format("\"{}\"", fs::path(path).filename().string()));
+}
 
 void fields(JobArchive& a, SceneSpec& scene) {
   a.named("materials", scene.materials, limits::kMaxMaterials,

@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "common/base/check.h"
+#include "common/job/motion.h"
 
 namespace baton {
 namespace {
@@ -60,16 +61,33 @@ PixelRect TileGrid::rect(std::int32_t tile) const {
   return {x0, y0, std::min(x0 + tile_size_, width_), std::min(y0 + tile_size_, height_)};
 }
 
+std::vector<std::int32_t> TileGrid::tiles_near(std::int32_t tile, std::int32_t reach_px) const {
+  const PixelRect r = rect(tile);
+  std::vector<std::int32_t> near;
+  const std::int32_t first_row = std::max(r.y0 - reach_px, 0) / tile_size_;
+  const std::int32_t last_row = std::min(r.y1 - 1 + reach_px, height_ - 1) / tile_size_;
+  const std::int32_t first_column = std::max(r.x0 - reach_px, 0) / tile_size_;
+  const std::int32_t last_column = std::min(r.x1 - 1 + reach_px, width_ - 1) / tile_size_;
+  for (std::int32_t row = first_row; row <= last_row; ++row) {
+    for (std::int32_t column = first_column; column <= last_column; ++column) near.push_back(row * columns_ + column);
+  }
+  return near;
+}
+
+std::int32_t frames_per_run(const JobSpec& job) {
+  return moves(job) && carries_state(job) ? 1 : job.state.checkpoint_every;
+}
+
 std::int32_t num_runs(const JobSpec& job) {
   const auto frames = static_cast<std::int32_t>(job.frames.size());
-  return (frames + job.state.checkpoint_every - 1) / job.state.checkpoint_every;
+  return (frames + frames_per_run(job) - 1) / frames_per_run(job);
 }
 
 TileRun tile_run(const JobSpec& job, std::int32_t tile, std::int32_t run) {
-  const std::int32_t first = run * job.state.checkpoint_every;
+  const std::int32_t first = run * frames_per_run(job);
   const auto frames = static_cast<std::int32_t>(job.frames.size());
   BATON_CHECK(run >= 0 && first < frames);
-  return {tile, run, first, std::min(first + job.state.checkpoint_every, frames) - 1};
+  return {tile, run, first, std::min(first + frames_per_run(job), frames) - 1};
 }
 
 bool carries_state(const JobSpec& job) { return job.sampling.method == Method::sequential && job.state.carry; }

@@ -43,6 +43,9 @@ class TileGrid {
   std::int32_t rows() const { return rows_; }
   /// tile in [0, count()).
   PixelRect rect(std::int32_t tile) const;
+  /// The tiles that have a pixel within `reach_px` of one of `tile`, in either direction; ascending, with `tile` itself.
+  /// The relation is symmetric.
+  std::vector<std::int32_t> tiles_near(std::int32_t tile, std::int32_t reach_px) const;
 
  private:
   std::int32_t width_, height_, tile_size_, columns_, rows_;
@@ -52,14 +55,16 @@ class TileGrid {
 /// Consecutive runs of a tile are chained by the sample state when the job carries it.
 struct TileRun {
   std::int32_t tile = 0;
-  std::int32_t run = 0;  ///< 0-based; run r covers frames r * checkpoint_every ...
+  std::int32_t run = 0;  ///< 0-based; run r covers frames r * frames_per_run ...
   std::int32_t first_frame = 0;
   std::int32_t last_frame = 0;
 
   auto operator<=>(const TileRun&) const = default;
 };
 
-/// Number of runs that cover the sequence: ceil(frames / checkpoint_every).
+/// Frames of a run: state.checkpoint_every, or 1 where samples follow what moves, since a tile then needs its neighbours.
+std::int32_t frames_per_run(const JobSpec& job);
+/// Number of runs that cover the sequence: ceil(frames / frames_per_run).
 std::int32_t num_runs(const JobSpec& job);
 /// The run's frames; run in [0, num_runs(job)), tile in [0, TileGrid(job.image).count()).
 TileRun tile_run(const JobSpec& job, std::int32_t tile, std::int32_t run);

@@ -21,6 +21,7 @@ void RenderStats::merge(const RenderStats& b) {
   seconds_sample += b.seconds_sample;
   seconds_visibility += b.seconds_visibility;
   seconds_shade += b.seconds_shade;
+  seconds_state += b.seconds_state;
 }
 
 }  // namespace baton

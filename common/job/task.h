@@ -66,13 +66,14 @@ struct RenderStats {
   double cpu_seconds = 0;
   /// CPU seconds of the stages; light is shared by all tiles of a frame and counted where it was prepared.
   double seconds_light = 0, seconds_primary = 0, seconds_sample = 0, seconds_visibility = 0, seconds_shade = 0;
+  double seconds_state = 0;  ///< encoding, writing, reading and decoding sample states
 
   bool operator==(const RenderStats&) const = default;
   void merge(const RenderStats& b);
   template <class A> void fields(A& a) {
     a(pixels, rays_primary, rays_shadow, target_evaluations, pixels_background, pixels_fresh, pixels_carried,
       pixels_restarted, pixels_refreshed, pixels_resampled, moves_proposed, moves_accepted, cpu_seconds, seconds_light, seconds_primary,
-      seconds_sample, seconds_visibility, seconds_shade);
+      seconds_sample, seconds_visibility, seconds_shade, seconds_state);
   }
 };
 

@@ -6,6 +6,7 @@
 
 #include "common/base/check.h"
 #include "common/base/limits.h"
+#include "common/job/motion.h"
 
 namespace baton {
 namespace {
@@ -34,7 +35,8 @@ JobGraph::JobGraph(const JobSpec& job)
       num_frames_(static_cast<std::int32_t>(job.frames.size())),
       num_runs_(baton::num_runs(job)),
       num_tiles_(grid_.count()),
-      frames_per_run_(job.state.checkpoint_every),
+      frames_per_run_(baton::frames_per_run(job)),
+      reach_px_(history_reach_px(job)),
       carries_state_(baton::carries_state(job)) {
   BATON_CHECK(count_tasks(job) <= limits::kMaxTasksPerJob);
 }
@@ -56,7 +58,8 @@ TaskKey JobGraph::key(TaskIndex index) const {
 
 std::int32_t JobGraph::num_inputs(const TaskKey& key) const {
   if (key.kind == TaskKind::assemble) return num_tiles_;
-  return carries_state_ && key.step > 0 ? 1 : 0;
+  if (!carries_state_ || key.step == 0) return 0;
+  return static_cast<std::int32_t>(grid_.tiles_near(key.tile, reach_px_).size());
 }
 
 std::vector<TaskIndex> JobGraph::dependents(const TaskKey& key) const {
@@ -64,8 +67,7 @@ std::vector<TaskIndex> JobGraph::dependents(const TaskKey& key) const {
   if (key.kind == TaskKind::assemble) return result;
   for (std::int32_t frame = first_frame(key.step); frame <= last_frame(key.step); ++frame)
     result.push_back(frame);
-  if (carries_state_ && key.step + 1 < num_runs_)
-    result.push_back(render_index(key.step + 1, key.tile));
+  if (carries_state_ && key.step + 1 < num_runs_) add_neighbours(key.step + 1, key.tile, result);
   return result;
 }
 
@@ -76,7 +78,7 @@ std::vector<TaskIndex> JobGraph::inputs(const TaskKey& key) const {
     for (std::int32_t tile = 0; tile < num_tiles_; ++tile)
       result.push_back(render_index(run, tile));
   } else if (carries_state_ && key.step > 0) {
-    result.push_back(render_index(key.step - 1, key.tile));
+    add_neighbours(key.step - 1, key.tile, result);
   }
   return result;
 }
@@ -122,6 +124,12 @@ std::optional<std::string> JobGraph::check_outputs(const TaskKey& key,
 
 std::size_t JobGraph::film_position(std::int32_t frame) const {
   return static_cast<std::size_t>(frame % frames_per_run_) + (carries_state_ ? 1 : 0);
+}
+
+void JobGraph::add_neighbours(std::int32_t run, std::int32_t tile,
+                              std::vector<TaskIndex>& tasks) const {
+  for (const std::int32_t near : grid_.tiles_near(tile, reach_px_))
+    tasks.push_back(render_index(run, near));
 }
 
 TaskIndex JobGraph::render_index(std::int32_t run, std::int32_t tile) const {

@@ -21,8 +21,9 @@ std::int64_t count_tasks(const JobSpec& job);
 
 /// The task graph of a job, by arithmetic: nothing is stored per task.
 ///
-/// render(run, tile) needs render(run - 1, tile) if the job carries state. assemble(frame) needs
-/// all tiles of its run.
+/// If the job carries state, render(run, tile) needs render(run - 1, t) of every tile t that
+/// history may come from: itself, and its neighbours within history_reach_px where something moves.
+/// assemble(frame) needs all tiles of its run.
 class JobGraph {
  public:
   /// count_tasks(job) must be at most limits::kMaxTasksPerJob.
@@ -41,7 +42,7 @@ class JobGraph {
   std::int32_t num_inputs(const TaskKey& key) const;
   /// The tasks that need this one.
   std::vector<TaskIndex> dependents(const TaskKey& key) const;
-  /// The tasks that this one needs; of an assemble task in tile order.
+  /// The tasks that this one needs, in tile order.
   std::vector<TaskIndex> inputs(const TaskKey& key) const;
 
   /// First and last frame (0-based, inclusive) of a run.
@@ -61,9 +62,10 @@ class JobGraph {
 
  private:
   TaskIndex render_index(std::int32_t run, std::int32_t tile) const;
+  void add_neighbours(std::int32_t run, std::int32_t tile, std::vector<TaskIndex>& tasks) const;
 
   TileGrid grid_;
-  std::int32_t num_frames_, num_runs_, num_tiles_, frames_per_run_;
+  std::int32_t num_frames_, num_runs_, num_tiles_, frames_per_run_, reach_px_;
   bool carries_state_;
 };
 

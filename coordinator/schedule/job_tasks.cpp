@@ -77,7 +77,7 @@ void JobTasks::complete(TaskIndex task, const Completion& completion, BlobRefere
   progress_.stats.merge(completion.stats);
   for (const BlobRef& output : completion.outputs) {
     count_output(output);
-    if (output.kind != BlobKind::image) blobs.add(output.digest);
+    for (std::int32_t use = num_uses(task, output); use > 0; --use) blobs.add(output.digest);
   }
 
   // What this task needed may go; what needed this task comes closer.
@@ -92,12 +92,12 @@ void JobTasks::give_back(TaskIndex task) { BATON_CHECK(apply(task, TaskEvent::re
 void JobTasks::give_up(TaskIndex task) {
   BATON_CHECK(apply(task, TaskEvent::exhausted));
 
-  // Every later run of the tile and every frame of these runs needs this task, directly or not.
+  // What needs this task, directly or not, will never be done.
   std::vector<TaskIndex> unreachable = graph_.dependents(graph_.key(task));
   while (!unreachable.empty()) {
     const TaskIndex dependent = unreachable.back();
     unreachable.pop_back();
-    apply(dependent, TaskEvent::cancelled);
+    if (!apply(dependent, TaskEvent::cancelled)) continue;  // reached before, on another way
     const std::vector<TaskIndex> more = graph_.dependents(graph_.key(dependent));
     unreachable.insert(unreachable.end(), more.begin(), more.end());
   }
@@ -144,34 +144,43 @@ bool JobTasks::has_failed(TaskIndex task, const LeaseId& lease) const {
 }
 
 void JobTasks::release_all(BlobReferences& blobs) {
-  for (const Digest& blob : live_blobs()) blobs.release(blob);
+  for (TaskIndex task = 0; task < graph_.num_tasks(); ++task) {
+    for (const BlobRef& output : outputs(task)) {
+      for (std::int32_t use = num_uses(task, output); use > 0; --use) blobs.release(output.digest);
+    }
+  }
 }
 
 std::vector<Digest> JobTasks::live_blobs() const {
   std::vector<Digest> live;
   for (TaskIndex task = 0; task < graph_.num_tasks(); ++task) {
     for (const BlobRef& output : outputs(task)) {
-      if (is_live(task, output)) live.push_back(output.digest);
+      if (num_uses(task, output) > 0) live.push_back(output.digest);
     }
   }
   return live;
 }
 
-/// The mirror of release_inputs.
-bool JobTasks::is_live(TaskIndex task, const BlobRef& output) const {
+/// How many still need an output of a task that is done: the tasks that take it as input, and
+/// whoever keeps it after the job. Completing a dependent makes it one less (release_inputs).
+std::int32_t JobTasks::num_uses(TaskIndex task, const BlobRef& output) const {
   switch (output.kind) {
     case BlobKind::image:
-      return false;
+      return 0;
     case BlobKind::film:
-      return status(output.frame) != TaskStatus::done;
+      return status(output.frame) != TaskStatus::done ? 1 : 0;
     case BlobKind::state: {
-      TaskKey next = graph_.key(task);
-      ++next.step;
-      const std::optional<TaskIndex> consumer = graph_.find(next);
-      return keep_all_states_ || !consumer || status(*consumer) != TaskStatus::done;
+      std::int32_t uses = 0;
+      bool last = true;
+      for (const TaskIndex dependent : graph_.dependents(graph_.key(task))) {
+        if (graph_.key(dependent).kind != TaskKind::render) continue;
+        last = false;
+        uses += status(dependent) != TaskStatus::done ? 1 : 0;
+      }
+      return uses + (last || keep_all_states_ ? 1 : 0);
     }
   }
-  return false;
+  return 0;
 }
 
 void JobTasks::count_output(const BlobRef& output) {
@@ -183,7 +192,6 @@ void JobTasks::count_output(const BlobRef& output) {
 }
 
 void JobTasks::release_inputs(TaskIndex task, BlobReferences& blobs) {
-  if (graph_.key(task).kind == TaskKind::render && keep_all_states_) return;
   for (const BlobRef& input : inputs(task)) blobs.release(input.digest);
 }
 

@@ -83,7 +83,7 @@ class JobTasks {
   Record& record(TaskIndex task) { return records_[static_cast<std::size_t>(task)]; }
   const Record& record(TaskIndex task) const { return records_[static_cast<std::size_t>(task)]; }
   bool apply(TaskIndex task, TaskEvent event);
-  bool is_live(TaskIndex task, const BlobRef& output) const;
+  std::int32_t num_uses(TaskIndex task, const BlobRef& output) const;
   void count_output(const BlobRef& output);
   void release_inputs(TaskIndex task, BlobReferences& blobs);
 

@@ -44,7 +44,7 @@ Result<RenderStats> measure(const JobSpec& job) {
   RenderStats total;
   const TileRunSink sink{[](int, const FilmTile&) { return Status(); }, [](const SampleState&) { return Status(); }};
   for (std::int32_t tile = 0; tile < context->grid.count(); ++tile) {
-    BATON_ASSIGN(const RenderStats stats, run_tile(*context, tile_run(job, tile, 0), std::nullopt, sink, {}));
+    BATON_ASSIGN(const RenderStats stats, run_tile(*context, tile_run(job, tile, 0), {}, sink, {}));
     total.merge(stats);
   }
   return total;

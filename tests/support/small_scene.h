@@ -144,7 +144,7 @@ inline TileResult render_tile(const JobSpec& job, std::int32_t tile = 0) {
                            result.state = state;
                            return Status();
                          }};
-  const auto stats = run_tile(**context, tile_run(job, tile, 0), std::nullopt, sink, {});
+  const auto stats = run_tile(**context, tile_run(job, tile, 0), {}, sink, {});
   if (!stats) {
     ADD_FAILURE() << stats.error().message;
     return result;

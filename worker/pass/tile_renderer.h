@@ -2,7 +2,7 @@
 
 #include <functional>
 #include <memory>
-#include <optional>
+#include <span>
 #include <stop_token>
 #include <string>
 #include <vector>
@@ -30,11 +30,14 @@ struct TileRunSink {
   std::function<Status(const SampleState& state)> state;
 };
 
-/// Renders one tile for the frames of `run`. previous: the state of frame run.first_frame - 1, required exactly when the
-/// job carries state and the run is not the first. The bytes that reach the sink are a function of (job, run, previous)
-/// alone. Errors: a state of another job, tile or frame; cancelled when `stop` is requested; the sink's own.
-Result<RenderStats> run_tile(const RenderContext& context, const TileRun& run, const std::optional<SampleState>& previous,
-                           const TileRunSink& sink, std::stop_token stop);
+using StatePtr = std::shared_ptr<const SampleState>;
+
+/// Renders one tile for the frames of `run`. previous: the states of frame run.first_frame - 1 of all tiles within
+/// history_reach_px (TileGrid::tiles_near, in that order; the tile's own where nothing moves), required exactly when
+/// the job carries state and the run is not the first. The bytes that reach the sink are a function of (job, run,
+/// previous) alone. Errors: a state of another job, tile or frame; cancelled when `stop` is requested; the sink's own.
+Result<RenderStats> run_tile(const RenderContext& context, const TileRun& run, std::span<const StatePtr> previous,
+                             const TileRunSink& sink, std::stop_token stop);
 
 /// Texels of the job's maps that were set to 0 because they were negative, NaN or infinite; one line per map read so far.
 std::vector<std::string> repair_notes(const RenderContext& context);

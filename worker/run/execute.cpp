@@ -3,8 +3,10 @@
 #include <fmt/format.h>
 
 #include "common/image/film_tile.h"
+#include "common/job/motion.h"
 #include "common/job/sequence.h"
 #include "common/state/sample_state.h"
+#include "worker/pass/cpu_clock.h"
 #include "worker/run/frame_output.h"
 
 namespace baton {
@@ -16,15 +18,25 @@ std::string blob_name(const BlobRef& ref) {
                      ref.digest.hex());
 }
 
-Result<std::optional<SampleState>> read_previous_state(const BlobStore& store,
-                                                       const std::vector<BlobRef>& inputs) {
-  if (inputs.empty()) return std::optional<SampleState>();
-  if (inputs.size() != 1 || inputs.front().kind != BlobKind::state) {
-    return Error{ErrorKind::bad_input, "a render task takes at most one input, the previous state"};
+/// The states that a render task starts from, in the order of its inputs.
+Result<std::vector<StatePtr>> read_states(const LoadedJob& loaded, const BlobStore& store,
+                                          const std::vector<BlobRef>& inputs) {
+  std::vector<StatePtr> states;
+  for (const BlobRef& input : inputs) {
+    if (input.kind != BlobKind::state) {
+      return Error{ErrorKind::bad_input,
+                   fmt::format("{}: a render task takes states", blob_name(input))};
+    }
+    StatePtr state = loaded.states->find(input.digest);
+    if (state == nullptr) {
+      BATON_ASSIGN(const Bytes bytes, store.get(input.digest));
+      BATON_ASSIGN(SampleState decoded, decode_state(bytes, blob_name(input)));
+      state = std::make_shared<const SampleState>(std::move(decoded));
+      if (moves(loaded.job)) loaded.states->insert(input.digest, state);
+    }
+    states.push_back(std::move(state));
   }
-  BATON_ASSIGN(const Bytes bytes, store.get(inputs.front().digest));
-  BATON_ASSIGN(SampleState state, decode_state(bytes, blob_name(inputs.front())));
-  return std::optional(std::move(state));
+  return states;
 }
 
 Result<TaskOutput> execute_render(const LoadedJob& loaded, BlobStore& store, const TaskKey& task,
@@ -35,7 +47,12 @@ Result<TaskOutput> execute_render(const LoadedJob& loaded, BlobStore& store, con
     return Error{ErrorKind::bad_input,
                  fmt::format("the job has no tile {} in run {}", task.tile, task.step)};
   }
-  BATON_ASSIGN(const std::optional<SampleState> previous, read_previous_state(store, inputs));
+  double seconds_state = 0;
+  std::vector<StatePtr> previous;
+  {
+    const StageTimer timer(seconds_state);
+    BATON_ASSIGN(previous, read_states(loaded, store, inputs));
+  }
 
   // Render; all outputs become durable together, before anybody hears of them.
   TaskOutput output;
@@ -48,12 +65,18 @@ Result<TaskOutput> execute_render(const LoadedJob& loaded, BlobStore& store, con
                              [&](int frame, const FilmTile& film) {
                                return keep(BlobKind::film, frame, encode_film_tile(film));
                              },
-                         .state =
-                             [&](const SampleState& state) {
-                               return keep(BlobKind::state, state.frame_index, encode_state(state));
-                             }};
+                         .state = [&](const SampleState& state) -> Status {
+                           const StageTimer timer(seconds_state);
+                           BATON_TRY(keep(BlobKind::state, state.frame_index, encode_state(state)));
+                           if (moves(loaded.job)) {
+                             loaded.states->insert(output.outputs.back().digest,
+                                                   std::make_shared<const SampleState>(state));
+                           }
+                           return {};
+                         }};
   const TileRun run = tile_run(loaded.job, task.tile, task.step);
   BATON_ASSIGN(output.stats, run_tile(*loaded.context, run, previous, sink, stop));
+  output.stats.seconds_state = seconds_state;
   BATON_TRY(store.sync());
   return output;
 }

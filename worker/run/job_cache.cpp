@@ -17,8 +17,8 @@ Result<LoadedJobPtr> load_job_document(const Digest& digest, const std::string& 
   }
   BATON_TRY(verify_assets(parsed.assets));
   BATON_ASSIGN(auto context, load_render_context(parsed.job, digest));
-  return LoadedJobPtr(
-      std::make_shared<LoadedJob>(LoadedJob{std::move(parsed.job), digest, std::move(context)}));
+  return LoadedJobPtr(std::make_shared<LoadedJob>(LoadedJob{
+      std::move(parsed.job), digest, std::move(context), std::make_shared<StateCache>()}));
 }
 
 void JobEntry::provide(const std::string& document) {

@@ -12,6 +12,7 @@
 #include "common/base/digest.h"
 #include "common/job/job_spec.h"
 #include "worker/pass/tile_renderer.h"
+#include "worker/run/state_cache.h"
 
 namespace baton {
 
@@ -20,6 +21,7 @@ struct LoadedJob {
   JobSpec job;
   Digest digest;
   std::shared_ptr<const RenderContext> context;
+  std::shared_ptr<StateCache> states = std::make_shared<StateCache>();
 };
 
 using LoadedJobPtr = std::shared_ptr<const LoadedJob>;

@@ -64,8 +64,7 @@ Result<LastFrame> render(const JobSpec& job, std::int32_t frame_index, std::int3
                                return Status();
                              }};
   const std::int32_t first_frame = carries_state(job) ? 0 : frame_index;
-  BATON_ASSIGN(last.stats,
-               run_tile(*context, {tile, 0, first_frame, frame_index}, std::nullopt, sink, {}));
+  BATON_ASSIGN(last.stats, run_tile(*context, {tile, 0, first_frame, frame_index}, {}, sink, {}));
   return last;
 }
 

@@ -35,9 +35,9 @@ std::vector<FilmTile> render_tiled(JobSpec job, int tile_size, int run_length) {
   std::vector<FilmTile> images(job.frames.size());
   const TileGrid grid(job.image);
   for (std::int32_t tile = 0; tile < grid.count(); ++tile) {
-    std::optional<SampleState> state;
+    std::vector<StatePtr> states;
     for (std::int32_t run = 0; run < num_runs(job); ++run) {
-      std::optional<SampleState> next;
+      std::vector<StatePtr> next;
       const TileRunSink sink{[&](int frame, const FilmTile& film) {
                                FilmTile& image = images[static_cast<std::size_t>(frame)];
                                image.rect = {0, 0, job.image.width, job.image.height};
@@ -53,11 +53,11 @@ std::vector<FilmTile> render_tiled(JobSpec job, int tile_size, int run_length) {
                                return Status();
                              },
                              [&](const SampleState& s) {
-                               next = *decode_state(encode_state(s), "test");
+                               next = {std::make_shared<const SampleState>(*decode_state(encode_state(s), "test"))};
                                return Status();
                              }};
-      EXPECT_TRUE(run_tile(**context, tile_run(job, tile, run), state, sink, {}).ok());
-      state = next;
+      EXPECT_TRUE(run_tile(**context, tile_run(job, tile, run), states, sink, {}).ok());
+      states = next;
     }
   }
   return images;
@@ -146,13 +146,14 @@ TEST(RunTile, RefusesTheStateOfAnotherJobTileOrFrame) {
   SampleState state;
   state.resize({0, 0, 12, 9}, 16);
   state.job_digest = {1, 2};
+  const auto given = [](const SampleState& s) { return std::vector{std::make_shared<const SampleState>(s)}; };
   const TileRunSink sink{[](int, const FilmTile&) { return Status(); }, [](const SampleState&) { return Status(); }};
   const TileRun run{.tile = 0, .run = 1, .first_frame = 2, .last_frame = 3};
-  EXPECT_THAT(run_tile(**context, run, state, sink, {}).error().message, HasSubstr("of job"));
+  EXPECT_THAT(run_tile(**context, run, given(state), sink, {}).error().message, HasSubstr("of job"));
   state.job_digest = {7, 7};
   state.frame_index = 0;
-  EXPECT_THAT(run_tile(**context, run, state, sink, {}).error().message, HasSubstr("frame index 0"));
-  EXPECT_FALSE(run_tile(**context, run, std::nullopt, sink, {}).ok());
+  EXPECT_THAT(run_tile(**context, run, given(state), sink, {}).error().message, HasSubstr("frame index 0"));
+  EXPECT_FALSE(run_tile(**context, run, {}, sink, {}).ok());
 }
 
 TEST(RunTile, StopsWhenAsked) {
@@ -165,7 +166,7 @@ TEST(RunTile, StopsWhenAsked) {
                            return Status();
                          },
                          [](const SampleState&) { return Status(); }};
-  const auto stats = run_tile(**context, {0, 0, 0, 3}, std::nullopt, sink, stop.get_token());
+  const auto stats = run_tile(**context, {0, 0, 0, 3}, {}, sink, stop.get_token());
   ASSERT_FALSE(stats.ok());
   EXPECT_EQ(stats.error().kind, ErrorKind::cancelled);
   EXPECT_EQ(frames, 1);
@@ -177,7 +178,7 @@ TEST(LoadRenderContext, NamesAMissingMap) {
   const auto context = load_render_context(job, Digest{1, 2});
   ASSERT_TRUE(context.ok());
   const TileRunSink sink{[](int, const FilmTile&) { return Status(); }, [](const SampleState&) { return Status(); }};
-  const auto stats = run_tile(**context, {0, 0, 0, 0}, std::nullopt, sink, {});
+  const auto stats = run_tile(**context, {0, 0, 0, 0}, {}, sink, {});
   ASSERT_FALSE(stats.ok());
   EXPECT_THAT(stats.error().message, HasSubstr("/nowhere/sky.exr"));
 }

@@ -29,6 +29,14 @@ inline JobSpec small_job(int tiles, int frames, int per_run, bool carry = true) 
   return job;
 }
 
+/// The same with a camera that moves, so that history is followed `reach_px` pixels to either side.
+inline JobSpec moving_job(int tiles, int frames, int reach_px) {
+  JobSpec job = small_job(tiles, frames, 2);
+  job.camera.keys = {{.frame = 1, .position = {0, 0, 5}, .look_at = {}, .up = {0, 1, 0}}};
+  job.motion.max_px = reach_px;
+  return job;
+}
+
 /// The one right output of a task; `variant` makes another, wrong one.
 inline Digest blob_digest(const Digest& job, const BlobRef& blob, int variant = 0) {
   return digest_of(job.hex() + std::to_string(static_cast<int>(blob.kind)) + "/" +

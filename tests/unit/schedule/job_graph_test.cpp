@@ -7,7 +7,9 @@
 namespace baton {
 namespace {
 
+using testing_farm::moving_job;
 using testing_farm::outputs_of;
+using testing_farm::render;
 using testing_farm::small_job;
 
 TEST(JobGraph, IndexAndKeyAreInverse) {
@@ -26,8 +28,9 @@ TEST(JobGraph, UnknownKeysAreNotFound) {
 }
 
 TEST(JobGraph, InputsAndDependentsMirrorEachOther) {
-  for (const bool carry : {true, false}) {
-    const JobGraph graph(small_job(3, 5, 2, carry));
+  for (const JobSpec& spec :
+       {small_job(3, 5, 2), small_job(3, 5, 2, false), moving_job(5, 5, 9), moving_job(5, 5, 1)}) {
+    const JobGraph graph(spec);
     for (TaskIndex task = 0; task < graph.num_tasks(); ++task) {
       const std::vector<TaskIndex> inputs = graph.inputs(graph.key(task));
       EXPECT_EQ(static_cast<std::int32_t>(inputs.size()), graph.num_inputs(graph.key(task)));
@@ -37,6 +40,33 @@ TEST(JobGraph, InputsAndDependentsMirrorEachOther) {
       }
     }
   }
+}
+
+TEST(JobGraph, WhereThingsMoveATileNeedsItsNeighboursInReach) {
+  const auto tiles = [](const JobGraph& graph, const TaskKey& task) {
+    std::vector<std::int32_t> result;
+    for (const TaskIndex input : graph.inputs(task)) {
+      EXPECT_EQ(graph.key(input).step, task.step - 1);
+      result.push_back(graph.key(input).tile);
+    }
+    return result;
+  };
+  // Tiles of 8 pixels in a row; a run is one frame whatever checkpoint_every says.
+  const JobGraph graph(moving_job(5, 4, /*reach_px=*/8));
+  EXPECT_EQ(graph.num_tasks(), 4 + 4 * 5);
+  EXPECT_TRUE(tiles(graph, render(0, 2)).empty());
+  EXPECT_EQ(tiles(graph, render(1, 2)), (std::vector<std::int32_t>{1, 2, 3}));
+  EXPECT_EQ(tiles(graph, render(1, 0)), (std::vector<std::int32_t>{0, 1}));
+  EXPECT_EQ(tiles(JobGraph(moving_job(5, 4, 9)), render(3, 2)),
+            (std::vector<std::int32_t>{0, 1, 2, 3, 4}));
+}
+
+TEST(JobGraph, WithoutCarriedSamplesMotionNeedsNoNeighbours) {
+  JobSpec spec = moving_job(5, 4, 8);
+  spec.state.carry = false;
+  const JobGraph graph(spec);
+  EXPECT_EQ(graph.num_tasks(), 4 + 2 * 5);
+  EXPECT_EQ(graph.num_inputs(render(1, 2)), 0);
 }
 
 TEST(JobGraph, OutputsMustBeExactlyWhatTheTaskMakes) {

@@ -52,6 +52,48 @@ TEST(SchedulerBlobs, AllStatesStayWhenTheJobWantsThem) {
   }
 }
 
+TEST(SchedulerBlobs, AStateStaysUntilEveryNeighbourHasGoneOn) {
+  Farm farm(moving_job(3, 3, 8));
+  farm.submit();
+  const auto state = [&](int frame, int tile) {
+    return blob_digest(farm.job, {BlobKind::state, frame, tile, {}, 0});
+  };
+  std::map<TaskKey, GrantLease> held;
+  const auto take = [&](const std::vector<Action>& actions) {
+    for (const GrantLease& grant : all_of<GrantLease>(actions)) held[grant.lease.task] = grant;
+  };
+  const auto finish = [&](const TaskKey& task) {
+    const GrantLease grant = held.at(task);
+    held.erase(task);
+    take(farm.finish(grant));
+  };
+  take(farm.step(WorkerJoined{"a", {}}));
+  take(farm.step(WorkRequested{"a", 100}));
+  for (int tile = 0; tile < 3; ++tile) finish(render(0, tile));
+
+  // Tile 0 is needed by tiles 0 and 1 of the next frame, tile 1 by all three.
+  EXPECT_THAT(held.at(render(1, 1)).inputs, SizeIs(3));
+  finish(render(1, 0));
+  EXPECT_TRUE(farm.scheduler.is_referenced(state(0, 0)));
+  finish(render(1, 1));
+  EXPECT_FALSE(farm.scheduler.is_referenced(state(0, 0)));
+  EXPECT_TRUE(farm.scheduler.is_referenced(state(0, 1)));
+
+  // The middle tile may not go on before its neighbours.
+  EXPECT_FALSE(held.contains(render(2, 1)));
+  finish(render(1, 2));
+  EXPECT_TRUE(held.contains(render(2, 1)));
+  EXPECT_FALSE(farm.scheduler.is_referenced(state(0, 1)));
+
+  // The last states are kept.
+  while (!held.empty()) finish(held.begin()->first);
+  EXPECT_EQ(farm.status(), JobStatus::done);
+  for (int tile = 0; tile < 3; ++tile) {
+    EXPECT_FALSE(farm.scheduler.is_referenced(state(1, tile)));
+    EXPECT_TRUE(farm.scheduler.is_referenced(state(2, tile)));
+  }
+}
+
 TEST_F(SchedulerTest, ARestartedCoordinatorTakesUpWhereTheJournalEnds) {
   const auto held = farm.ask("a", 2);
   const auto recorded = all_of<RecordCompletion>(farm.finish(held[0]));

@@ -167,6 +167,7 @@ TEST(SchedulerModel, EveryTaskIsDoneOnceWhateverHappens) {
     SCOPED_TRACE(testing::Message() << "seed " << seed);
     JobSpec spec = small_job(1 + static_cast<int>(seed % 5), 10, 1 + static_cast<int>(seed % 4),
                              seed % 3 != 0);
+    if (seed % 4 == 0) spec = moving_job(4, 8, 1 + static_cast<int>(seed % 9));
     spec.max_retries_per_task = 1000000;
     spec.max_failures_per_worker = 1000000;
     ChaosFarm farm(seed, spec);
@@ -177,7 +178,7 @@ TEST(SchedulerModel, EveryTaskIsDoneOnceWhateverHappens) {
     EXPECT_EQ(farm.num_recorded(), farm.num_tasks());
     EXPECT_EQ(farm.progress().tasks_open, 0u);
     EXPECT_EQ(farm.progress().tasks_leased, 0u);
-    EXPECT_GE(farm.removed().size(), 10u) << "the films are gone";
+    EXPECT_GE(farm.removed().size(), 8u) << "the films are gone";
     if (testing::Test::HasFailure()) return;
   }
 }

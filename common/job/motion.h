@@ -1,0 +1,35 @@
+#pragma once
+
+#include <cstdint>
+
+#include "common/job/job_spec.h"
+#include "common/math/vec3.h"
+
+namespace baton {
+
+/// Where camera and objects are at a frame: pure functions of the job.
+
+/// Whether camera or objects have keys.
+bool moves(const JobSpec& job);
+/// Whether the object has keys.
+bool moves(const ObjectSpec& object);
+
+/// Whether all that moves has keys of its own, none in another file, and motion.max_px is known:
+/// what worker/scene/settle_motion.h makes of a job before it is submitted.
+bool is_settled(const JobSpec& job);
+
+/// How far away in the image, per frame and in either direction, a pixel may take its history from:
+/// motion.max_px, or 0 when nothing moves and each pixel keeps to itself.
+std::int32_t history_reach_px(const JobSpec& job);
+
+/// The camera at a frame number, without keys. Position, point looked at, up and angle of view
+/// follow motion.curve.
+CameraSpec camera_at(const JobSpec& job, double frame);
+
+/// What the keys do to the placed object at a frame number; the identity without keys. Translation,
+/// angles and scale follow `curve`, the quaternion is slerped [Shoemake 1985] the short way round.
+/// The map is about the origin of the placed object: world = object.translate + map(placed -
+/// object.translate).
+Transform object_motion_at(const ObjectSpec& object, KeyCurve curve, double frame);
+
+}  // namespace baton

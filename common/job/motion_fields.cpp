@@ -1,0 +1,93 @@
+#include <fmt/format.h>
+
+#include <optional>
+
+#include "common/base/limits.h"
+#include "common/job/job_fields.h"
+
+namespace baton {
+namespace {
+
+constexpr NumberRange kFovRange{.min = 0, .max = 180, .min_open = true, .max_open = true};
+constexpr NumberRange kFrameRange{0, limits::kMaxFrameNumber};
+
+/// The three vectors must span a view.
+void check_view(JobArchive& a, const Vec3& position, const Vec3& look_at, const Vec3& up) {
+  const Vec3 view = look_at - position;
+  if (!(length(view) > 0)) {
+    a.fault("lookAt", "another point than position", "the same");
+  } else if (!(length(up) > 0)) {
+    a.fault("up", "a direction", "[0, 0, 0]");
+  } else if (length(cross(normalize(view), normalize(up))) < 1e-4f) {
+    a.fault("up", "a direction across the view from position to lookAt", "one along it");
+  }
+}
+
+void fields(JobArchive& a, CameraKey& key) {
+  a.number(required("frame"), key.frame, kFrameRange);
+  a.vector(required("position"), key.position, kCoordinateRange);
+  a.vector(required("lookAt"), key.look_at, kCoordinateRange);
+  a.vector("up", key.up, kCoordinateRange);
+  a.number("verticalFovDeg", key.vertical_fov_deg, kFovRange);
+  check_view(a, key.position, key.look_at, key.up);
+}
+
+void fields(JobArchive& a, ObjectKey& key) {
+  a.number(required("frame"), key.frame, kFrameRange);
+  a.vector("translate", key.translate, kCoordinateRange);
+  a.vector("rotateDeg", key.rotate_deg, kAngleRange);
+  std::array<double, 4> quaternion{key.quaternion[0], key.quaternion[1], key.quaternion[2],
+                                   key.quaternion[3]};
+  if (a.numbers("quaternion", quaternion, {-1, 1}, false)) {
+    for (std::size_t i = 0; i < 4; ++i) key.quaternion[i] = static_cast<float>(quaternion[i]);
+    if (key.quaternion == std::array<float, 4>{})
+      a.fault("quaternion", "a rotation", "[0, 0, 0, 0]");
+  }
+  a.vector("scale", key.scale, kPositiveRange, true);
+}
+
+void fields(JobArchive& a, GltfMotion& gltf) {
+  asset_path(a, required("file"), gltf.file, {".gltf", ".glb"});
+  a.text(required("node"), gltf.node);
+  a.number("fps", gltf.fps, kPositiveRange);
+  a.integer("startFrame", gltf.start_frame, 0, limits::kMaxFrameNumber);
+}
+
+/// The two sources of motion: keys and a file.
+template <class K>
+void source_fields(JobArchive& a, std::vector<K>& keys, std::optional<GltfMotion>& gltf) {
+  a.list("keys", keys, limits::kMaxFrames, [&](K& key) { fields(a, key); });
+  for (std::size_t i = 1; i < keys.size(); ++i) {
+    if (keys[i].frame > keys[i - 1].frame) continue;
+    a.fault("keys", "ascending frames without duplicates",
+            fmt::format("{} after {}", keys[i].frame, keys[i - 1].frame));
+    break;
+  }
+  GltfMotion source = gltf.value_or(GltfMotion{});
+  if (a.object("gltf", [&] { fields(a, source); }, {.present = gltf.has_value()})) gltf = source;
+  if (gltf && !keys.empty()) a.fault("gltf", "either keys or gltf", "both");
+}
+
+}  // namespace
+
+void fields(JobArchive& a, CameraSpec& camera) {
+  a.vector("position", camera.position, kCoordinateRange);
+  a.vector("lookAt", camera.look_at, kCoordinateRange);
+  a.vector("up", camera.up, kCoordinateRange);
+  a.number("verticalFovDeg", camera.vertical_fov_deg, kFovRange);
+  check_view(a, camera.position, camera.look_at, camera.up);
+  source_fields(a, camera.keys, camera.gltf);
+}
+
+void motion_fields(JobArchive& a, ObjectSpec& object) {
+  source_fields(a, object.keys, object.gltf);
+}
+
+void fields(JobArchive& a, MotionSpec& motion) {
+  a.choice("curve", motion.curve, kKeyCurves);
+  a.integer("maxPx", motion.max_px, 0, limits::kMaxImageSide);
+  a.number("depthTolerance", motion.depth_tolerance, {.min = 0, .max = 1, .min_open = true});
+  a.number("normalToleranceDeg", motion.normal_tolerance_deg, {0, 180});
+}
+
+}  // namespace baton
