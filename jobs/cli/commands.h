@@ -8,6 +8,7 @@ namespace baton {
 
 /// Each adds one subcommand to the command line. When it was given, parsing runs it and leaves in
 /// `code` how it ended; errors have then been printed to stderr.
+void add_chart_command(CLI::App& app, ExitCode& code);
 void add_check_command(CLI::App& app, ExitCode& code);
 void add_job_command(CLI::App& app, ExitCode& code);
 void add_render_command(CLI::App& app, ExitCode& code);

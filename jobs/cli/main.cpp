@@ -23,6 +23,7 @@ constexpr const char* kFooter = R"(Examples:
   baton render job.json              renders on this machine; again: goes on where it stopped
   baton job submit job.json          hands the job to a coordinator (see --coordinator)
   baton job list
+  baton chart study.json             error against time of several methods, as charts
   baton state show tile.bst          what samples a tile hands to its next frame
 
 Exit codes: 0 ok, 1 timeout, 2 failed, 3 cancelled, 64 wrong command line, 65 bad input,
@@ -42,6 +43,7 @@ int main(int argc, char** argv) {
   baton::add_render_command(app, code);
   baton::add_job_command(app, code);
   baton::add_state_command(app, code);
+  baton::add_chart_command(app, code);
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

@@ -7,23 +7,18 @@
 
 #include "common/job/job_json.h"
 #include "common/job/sequence.h"
+#include "jobs/cli/ask_farm.h"
 #include "jobs/cli/commands.h"
 #include "jobs/cli/coordinator_link.h"
 #include "jobs/cli/frame_sheet.h"
 #include "jobs/cli/job_summary.h"
-#include "jobs/cli/local_farm.h"
 #include "jobs/cli/progress.h"
-#include "jobs/cli/signals.h"
 
 namespace baton {
 namespace {
 
 namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
-
-constexpr std::chrono::milliseconds kPollInterval{200};
-constexpr std::chrono::milliseconds kAnswerPatience{2000};
-constexpr int kMaxSilentPolls = 30;
 
 struct RenderOptions {
   std::string job;
@@ -46,21 +41,6 @@ FarmOptions farm_options(const RenderOptions& options, const JobSpec& job) {
   return farm;
 }
 
-/// Asks until there is an answer, keeping the farm alive meanwhile: a coordinator that died comes
-/// back. nullopt when the user asked to stop.
-template <class A>
-Result<std::optional<A>> ask_farm(LocalFarm& farm, RequestClient& client, const SignalWait& signals,
-                                  const Message& question) {
-  for (int silent = 0;; ++silent) {
-    Result<A> answer = ask<A>(client, question, kAnswerPatience);
-    if (answer) return std::optional<A>(std::move(answer).value());
-    if (answer.error().kind != ErrorKind::timeout || silent == kMaxSilentPolls)
-      return answer.error();
-    if (signals.stop_requested_within(kPollInterval)) return std::optional<A>();
-    BATON_TRY(farm.tend());
-  }
-}
-
 /// Follows the job to its end; nullopt when the user asked to stop.
 Result<std::optional<JobDetail>> follow(LocalFarm& farm, RequestClient& client,
                                         const SignalWait& signals, const Digest& job) {
@@ -70,7 +50,7 @@ Result<std::optional<JobDetail>> follow(LocalFarm& farm, RequestClient& client,
                  ask_farm<JobDetail>(farm, client, signals, ShowJob{job.hex()}));
     if (detail) progress.update(detail->summary, Clock::now());
     const bool over = !detail || detail->summary.status != JobStatus::running;
-    if (over || signals.stop_requested_within(kPollInterval)) {
+    if (over || signals.stop_requested_within(kFarmPollInterval)) {
       progress.finish();
       return over ? detail : std::nullopt;
     }
@@ -132,7 +112,7 @@ Result<ExitCode> run_render(const RenderOptions& options) {
   if (detail->summary.status == JobStatus::failed) print_failures(*detail);
   if (options.keep_running) {
     fmt::print(stderr, "the coordinator still answers at {}; Ctrl-C ends it\n", farm.endpoint());
-    while (!signals.stop_requested_within(kPollInterval)) BATON_TRY(farm.tend());
+    while (!signals.stop_requested_within(kFarmPollInterval)) BATON_TRY(farm.tend());
   }
   farm.stop();
   return exit_code_of(detail->summary.status);

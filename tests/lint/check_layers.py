@@ -39,7 +39,8 @@ MAY_INCLUDE = {
     "coordinator/service": COMMON_DATA
     | {"common/job", "common/protocol", "common/store", "coordinator/schedule", "coordinator/journal"},
     "coordinator": COMMON_ALL | {"coordinator/schedule", "coordinator/journal", "coordinator/service"},
-    "jobs/cli": COMMON_ALL | {"worker/scene"},  # `baton check` loads the scene
+    "jobs/study": COMMON_DATA | {"common/job", "common/image", "common/protocol"},
+    "jobs/cli": COMMON_ALL | {"jobs/study", "worker/scene"},  # `baton check` loads the scene
 }
 
 # Library, by how its headers are spelled -> files that may include them (prefix of the path).
@@ -50,7 +51,7 @@ THIRD_PARTY = {
     r"zmq": ["common/protocol/"],
     r"sqlite3": ["coordinator/journal/"],
     r"zstd|xxhash": ["common/base/"],
-    r"nlohmann/": ["common/job/job_json", "jobs/cli/"],
+    r"nlohmann/": ["common/job/job_json", "jobs/cli/", "jobs/study/"],
     r"httplib": ["coordinator/service/"],
     r"CLI/": ["worker/main.cpp", "coordinator/main.cpp", "jobs/cli/"],
 }

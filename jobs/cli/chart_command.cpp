@@ -1,0 +1,85 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <memory>
+#include <thread>
+
+#include "common/base/files.h"
+#include "jobs/cli/commands.h"
+#include "jobs/cli/farm_job_runner.h"
+#include "jobs/study/study_report.h"
+
+namespace baton {
+namespace {
+
+namespace fs = std::filesystem;
+
+struct ChartOptions {
+  std::string study;
+  std::string output;          ///< empty: NAME-charts beside the study
+  std::string work_directory;  ///< empty: .work in the output folder
+  int threads = 0;             ///< 0: every processor
+  bool check_only = false;
+};
+
+FarmOptions farm_options(const ChartOptions& options, const StudyFolder& folder) {
+  // One process: the light of a frame is then prepared, and counted, once a job.
+  const int processors = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+  FarmOptions farm;
+  farm.threads_per_worker = options.threads > 0 ? options.threads : processors;
+  farm.work_directory = folder.farm_folder();
+  return farm;
+}
+
+/// The processor as Linux names it.
+std::string machine_name() {
+  const Result<std::string> info = read_text_file("/proc/cpuinfo", 1 << 24);
+  const std::string text = info ? *info : "";
+  const std::size_t key = text.find("model name");
+  const std::size_t colon = text.find(": ", key);
+  if (key == std::string::npos || colon == std::string::npos) return "an unknown machine";
+  const std::string model = text.substr(colon + 2, text.find('\n', colon) - colon - 2);
+  return fmt::format("{} ({} logical processors)", model, std::thread::hardware_concurrency());
+}
+
+Result<ExitCode> run_chart(const ChartOptions& options) {
+  BATON_ASSIGN(const Study study, load_study(options.study));
+  fmt::print(stderr, "study {}: {} scenes, {} methods, {} combinations with {} seeds each\n",
+             study.name, study.scenes.size(), study.methods.size(), study.cells.size(),
+             study.num_seeds);
+  if (options.check_only) return ExitCode::ok;
+
+  const fs::path output = fs::absolute(
+      options.output.empty() ? fs::path(options.study).parent_path() / (study.name + "-charts")
+                             : fs::path(options.output));
+  const StudyFolder folder(options.work_directory.empty() ? output / ".work"
+                                                          : fs::absolute(options.work_directory));
+  FarmJobRunner runner(farm_options(options, folder));
+  BATON_ASSIGN(const StudyResults results, run_study(study, folder, runner));
+  BATON_ASSIGN(const fs::path report, write_report(study, results, folder, output, machine_name()));
+  fmt::print("{}\n", report.string());
+  return ExitCode::ok;
+}
+
+}  // namespace
+
+void add_chart_command(CLI::App& app, ExitCode& code) {
+  auto options = std::make_shared<ChartOptions>();
+  CLI::App* command =
+      app.add_subcommand("chart", "Measures methods on scenes: error against time, as charts");
+  command->add_option("STUDY", options->study, "study file (jobs/study/STUDY.md)")->required();
+  command->add_option("--output", options->output,
+                      "folder of charts and tables; default: NAME-charts beside the study");
+  command->add_option("--work-dir", options->work_directory,
+                      "finished runs, journal, logs; default: .work in the output folder");
+  command->add_option("--threads", options->threads, "of the worker; default: all processors")
+      ->check(CLI::Range(1, 1024));
+  command->add_flag("--check", options->check_only, "check every combination, render nothing");
+  command->footer(
+      "Examples:\n"
+      "  baton chart jobs/studies/relighting.json --output charts\n"
+      "Ctrl-C stops; the same command goes on where it stopped.");
+  command->callback([options, &code] { code = finish_with_coordinator(run_chart(*options)); });
+}
+
+}  // namespace baton

@@ -1,0 +1,108 @@
+#include "jobs/cli/farm_job_runner.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+#include <unistd.h>
+
+#include "common/job/job_json.h"
+#include "jobs/cli/job_summary.h"
+#include "jobs/cli/text.h"
+
+namespace baton {
+namespace {
+
+using Clock = std::chrono::steady_clock;
+
+constexpr std::size_t kMaxOpenJobs = 8;
+constexpr std::chrono::milliseconds kPause{20};
+constexpr std::chrono::seconds kLineInterval{5};
+
+Error stopped() { return {ErrorKind::cancelled, "stopped; finished runs are kept"}; }
+
+/// Says now and then how far it is.
+class Count {
+ public:
+  explicit Count(std::size_t total) : total_(total) {}
+
+  void update(std::size_t done) {
+    const Clock::time_point now = Clock::now();
+    const bool terminal = ::isatty(STDERR_FILENO) == 1;
+    if (done < total_ && shown_ && now - *shown_ < (terminal ? kPause : kLineInterval)) return;
+    shown_ = now;
+    const double seconds = std::chrono::duration<double>(now - start_).count();
+    const auto left = static_cast<double>(total_ - done);
+    fmt::print(stderr, "{}runs {}/{}  ETA {}{}", terminal ? "\r" : "", done, total_,
+               done > 0 ? duration_text(left * seconds / static_cast<double>(done)) : "?",
+               terminal && done < total_ ? "\x1b[K" : "\n");
+  }
+
+ private:
+  std::size_t total_;
+  Clock::time_point start_ = Clock::now();
+  std::optional<Clock::time_point> shown_;
+};
+
+}  // namespace
+
+FarmJobRunner::~FarmJobRunner() {
+  if (farm_) farm_->stop();
+}
+
+Status FarmJobRunner::start() {
+  if (farm_) return {};
+  BATON_ASSIGN(LocalFarm farm, LocalFarm::start(options_));
+  BATON_ASSIGN(RequestClient client, RequestClient::connect(farm.endpoint()));
+  farm_.emplace(std::move(farm));
+  client_.emplace(std::move(client));
+  return {};
+}
+
+Status FarmJobRunner::submit(const JobSpec& job, std::size_t index, std::vector<Open>& open) {
+  BATON_ASSIGN(std::string document, make_job_document(job));
+  BATON_ASSIGN(const std::optional<JobAccepted> accepted,
+               ask_farm<JobAccepted>(*farm_, *client_, signals_, SubmitJob{std::move(document)}));
+  if (!accepted) return stopped();
+  open.push_back({index, accepted->job});
+  return {};
+}
+
+Result<std::optional<JobSummary>> FarmJobRunner::ended(const Open& job, const JobSpec& spec) {
+  BATON_ASSIGN(const std::optional<JobDetail> detail,
+               ask_farm<JobDetail>(*farm_, *client_, signals_, ShowJob{job.job.hex()}));
+  if (!detail) return stopped();
+  if (detail->summary.status == JobStatus::running) return std::optional<JobSummary>();
+  if (detail->summary.status == JobStatus::done) return std::optional(detail->summary);
+  return Error{ErrorKind::bad_input, fmt::format("run '{}' seed {} {}: {}", spec.name, spec.seed,
+                                                 job_status_name(detail->summary.status),
+                                                 fmt::join(detail->failures, "\n"))};
+}
+
+Status FarmJobRunner::run(const std::vector<JobSpec>& jobs,
+                          const std::function<Status(std::size_t, const JobSummary&)>& done) {
+  BATON_TRY(start());
+  Count count(jobs.size());
+  std::vector<Open> open;
+  std::size_t next = 0, num_done = 0;
+  while (num_done < jobs.size()) {
+    while (open.size() < kMaxOpenJobs && next < jobs.size()) {
+      BATON_TRY(submit(jobs[next], next, open));
+      ++next;
+    }
+    for (std::size_t i = 0; i < open.size();) {
+      BATON_ASSIGN(const std::optional<JobSummary> summary, ended(open[i], jobs[open[i].index]));
+      if (!summary) {
+        ++i;
+        continue;
+      }
+      BATON_TRY(done(open[i].index, *summary));
+      open.erase(open.begin() + static_cast<std::ptrdiff_t>(i));
+      ++num_done;
+    }
+    count.update(num_done);
+    if (signals_.stop_requested_within(kPause)) return stopped();
+    BATON_TRY(farm_->tend());
+  }
+  return {};
+}
+
+}  // namespace baton

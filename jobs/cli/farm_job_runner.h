@@ -1,0 +1,40 @@
+#pragma once
+
+#include <string>
+
+#include "jobs/cli/ask_farm.h"
+#include "jobs/cli/progress.h"
+#include "jobs/study/study_runner.h"
+
+namespace baton {
+
+/// Renders jobs with a local farm that lives as long as the runner. The farm starts with the first
+/// job. A few jobs are submitted at a time, so that workers never wait for the next; they keep
+/// their place in the farm's journal, and go on where they stopped.
+class FarmJobRunner final : public JobRunner {
+ public:
+  explicit FarmJobRunner(FarmOptions options) : options_(std::move(options)) {}
+  ~FarmJobRunner() override;
+
+  /// Error: cancelled when the user asked to stop.
+  Status run(const std::vector<JobSpec>& jobs,
+             const std::function<Status(std::size_t index, const JobSummary&)>& done) override;
+
+ private:
+  struct Open {
+    std::size_t index = 0;
+    Digest job;
+  };
+
+  Status start();
+  Status submit(const JobSpec& job, std::size_t index, std::vector<Open>& open);
+  /// Asks for the job; nullopt while it runs.
+  Result<std::optional<JobSummary>> ended(const Open& job, const JobSpec& spec);
+
+  FarmOptions options_;
+  SignalWait signals_;
+  std::optional<LocalFarm> farm_;
+  std::optional<RequestClient> client_;
+};
+
+}  // namespace baton

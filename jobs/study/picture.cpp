@@ -1,0 +1,82 @@
+#include "jobs/study/picture.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "common/image/contact_sheet.h"
+#include "jobs/study/flip.h"
+
+namespace baton {
+namespace {
+
+/// A plane by its name; empty when there is none.
+std::vector<float> plane(const FilmTile& film, const std::string& name) {
+  const auto found = std::find(film.channels.begin(), film.channels.end(), name);
+  if (found == film.channels.end()) return {};
+  const float* begin = film.plane(static_cast<std::size_t>(found - film.channels.begin()));
+  return {begin, begin + film.num_pixels()};
+}
+
+}  // namespace
+
+Result<Picture> read_picture(const std::filesystem::path& path) {
+  BATON_ASSIGN(const FilmTile film, read_exr(path));
+  Picture picture;
+  picture.image = {film.rect.width(), film.rect.height(), {}};
+  picture.image.rgb.resize(3 * film.num_pixels());
+  const char* const names[] = {"R", "G", "B"};
+  for (std::size_t channel = 0; channel < 3; ++channel) {
+    const std::vector<float> values = plane(film, names[channel]);
+    for (std::size_t i = 0; i < values.size(); ++i) picture.image.rgb[3 * i + channel] = values[i];
+    if (values.empty())
+      return Error{ErrorKind::bad_input,
+                   fmt::format("{}: expected a channel {}", path.string(), names[channel])};
+  }
+  picture.coverage = plane(film, "A");
+  picture.lns = plane(film, "lns");
+  picture.ess = plane(film, "ess");
+  picture.acceptance = plane(film, "acceptance");
+  picture.variance = plane(film, "variance");
+  if (picture.coverage.empty() || picture.lns.empty())
+    return Error{ErrorKind::bad_input,
+                 fmt::format("{}: expected channels A and lns", path.string())};
+  return picture;
+}
+
+Reference make_reference(Picture a, Picture b) {
+  Reference reference;
+  const std::size_t num_pixels = a.coverage.size();
+  reference.mean = a.image;
+  double sum = 0, sum_squares = 0, sum_relative = 0, sum_variance = 0, sum_lns = 0;
+  for (std::size_t i = 0; i < num_pixels; ++i) {
+    for (std::size_t k = 3 * i; k < 3 * i + 3; ++k)
+      reference.mean.rgb[k] = 0.5f * (a.image.rgb[k] + b.image.rgb[k]);
+    if (!(a.coverage[i] > 0)) continue;
+    reference.lit_pixels.push_back(i);
+    sum_lns += 0.5 * (a.lns[i] + b.lns[i]);
+    sum_variance += 0.25 * (a.variance[i] + b.variance[i]);
+    for (std::size_t k = 3 * i; k < 3 * i + 3; ++k) {
+      const double half_difference = 0.5 * (double{a.image.rgb[k]} - b.image.rgb[k]);
+      sum += reference.mean.rgb[k];
+      sum_squares += half_difference * half_difference;
+      const double relative = half_difference / (reference.mean.rgb[k] + kRelativeFloor);
+      sum_relative += relative * relative;
+    }
+  }
+  const auto count = static_cast<double>(std::max<std::size_t>(reference.lit_pixels.size(), 1));
+  reference.mean_radiance = sum / (3 * count);
+  reference.mse = sum_squares / (3 * count);
+  reference.rel_mse = sum_relative / (3 * count);
+  reference.reported_mse = sum_variance / count;
+  reference.lns_mean = sum_lns / count;
+  reference.exposure = auto_exposure(reference.mean);
+  reference.displayed = tone_map(reference.mean, reference.exposure);
+  const std::vector<float> flip =
+      flip_difference(reference.displayed, tone_map(a.image, reference.exposure));
+  for (const std::size_t i : reference.lit_pixels) reference.flip += flip[i] / count;
+  reference.half = {std::move(a), std::move(b)};
+  return reference;
+}
+
+}  // namespace baton

@@ -1,0 +1,48 @@
+#pragma once
+
+#include <array>
+#include <filesystem>
+#include <vector>
+
+#include "common/image/image_io.h"
+
+namespace baton {
+
+/// One rendered frame of a run as the measures use it.
+struct Picture {
+  RgbImage image;
+  std::vector<float> coverage;    ///< (pixels) alpha: where there is a surface
+  std::vector<float> lns;         ///< (pixels)
+  std::vector<float> ess;         ///< (pixels) ESS / N; empty for references
+  std::vector<float> acceptance;  ///< (pixels) of moves; empty for references
+  std::vector<float> variance;    ///< (pixels) of the mean of R, G, B; empty but for references
+};
+
+/// Reads a frame. Errors name the file: missing, not an EXR, without R, G, B, A or lns.
+Result<Picture> read_picture(const std::filesystem::path& path);
+
+/// Brute force in two independent halves A and B; R is their mean.
+struct Reference {
+  std::array<Picture, 2> half;
+  RgbImage mean;
+  float exposure = 1;  ///< of all pictures that are compared with it
+  RgbImage displayed;  ///< tone-mapped mean
+
+  /// Pixels with a surface, as indices.
+  std::vector<std::size_t> lit_pixels;
+  double mean_radiance = 0;  ///< over lit pixels and R, G, B
+  /// Mean squared error of R by its halves, mean (A - B)^2 / 4: what R cannot resolve.
+  double mse = 0;
+  double rel_mse = 0;  ///< the same over (R + .01)^2
+  double flip = 0;     ///< mean FLIP between R and A, which is as far from R as R from the truth
+  /// The same for the mean of R, G, B, by the variance that brute force reports of itself.
+  double reported_mse = 0;
+  double lns_mean = 0;  ///< over lit pixels
+};
+
+/// (R + this)^2 divides squared errors in relMSE, so that black pixels count finitely.
+inline constexpr double kRelativeFloor = 0.01;
+
+Reference make_reference(Picture a, Picture b);
+
+}  // namespace baton

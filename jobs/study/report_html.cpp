@@ -1,0 +1,148 @@
+#include "jobs/study/report_html.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <iterator>
+
+#include "common/base/version.h"
+#include "jobs/study/svg_text.h"
+
+namespace baton {
+namespace {
+
+constexpr int kFewSeeds = 20;
+
+constexpr const char* kStyle = R"(
+body{font:14px/1.45 Helvetica,Arial,sans-serif;margin:2em auto;max-width:1320px;color:#222}
+table{border-collapse:collapse;margin:1em 0}
+td,th{padding:2px 9px;text-align:right;border-bottom:1px solid #ddd;white-space:nowrap}
+td:first-child,td:nth-child(2),th:first-child,th:nth-child(2){text-align:left}
+.good{color:#00703c;font-weight:bold}.bad{color:#b02a00}.weak{color:#888}
+.charts svg{width:48%;height:auto;min-width:420px}img{max-width:100%;image-rendering:pixelated}
+.note{color:#555}
+)";
+
+std::string base64(ByteView bytes) {
+  constexpr std::string_view kDigits =
+      "ABCDEFGHIJKLMNOPQRSTUVWXYZabcdefghijklmnopqrstuvwxyz0123456789+/";
+  std::string text;
+  for (std::size_t i = 0; i < bytes.size(); i += 3) {
+    std::uint32_t group = 0;
+    for (std::size_t k = 0; k < 3; ++k)
+      group =
+          group << 8 | (i + k < bytes.size() ? std::to_integer<std::uint32_t>(bytes[i + k]) : 0);
+    for (std::size_t k = 0; k < 4; ++k)
+      text += k <= bytes.size() - i ? kDigits[group >> (18 - 6 * k) & 63] : '=';
+  }
+  return text;
+}
+
+/// A ratio of efficiencies with its interval; plainly better or worse ones stand out.
+std::string ratio_cell(const Interval& ratio) {
+  if (std::isnan(ratio.value)) return "<td></td>";
+  const char* const kind = ratio.low > 1 ? "good" : ratio.high < 1 ? "bad" : "weak";
+  return fmt::format("<td class=\"{}\">{:.2f} [{:.2f}, {:.2f}]</td>", kind, ratio.value, ratio.low,
+                     ratio.high);
+}
+
+std::string interval_cell(const Interval& i) {
+  if (std::isnan(i.value)) return "<td></td>";
+  return fmt::format("<td>{:.3g} [{:.3g}, {:.3g}]</td>", i.value, i.low, i.high);
+}
+
+std::string summary_table(const Study& study, std::size_t scene,
+                          const std::vector<CellSummary>& rows) {
+  std::string html =
+      "<table><tr><th>method</th><th>budget</th><th>CPU &micro;s/px</th><th>rays/px</th>"
+      "<th>light ms/frame</th><th>RMSE</th><th>relMSE</th><th>FLIP</th><th>99.9 %</th>"
+      "<th>bias</th><th>flicker</th><th>state B/px</th><th>efficiency / mis</th>"
+      "<th>efficiency / bidirectional</th></tr>\n";
+  for (const CellSummary& row : rows) {
+    const StudyCell& cell = study.cells[row.cell];
+    if (static_cast<std::size_t>(cell.scene) != scene) continue;
+    fmt::format_to(std::back_inserter(html),
+                   "<tr><td>{}</td><td>{}</td><td>{:.3g}</td><td>{:.3g}</td><td>{:.3g}</td>{}{}{}"
+                   "<td>{:.3g}</td><td{}>{:.2g} [{:.2g}, {:.2g}]</td>{}<td>{:.3g}</td>",
+                   escaped(study.methods[static_cast<std::size_t>(cell.method)]),
+                   escaped(cell.budget), row.cost.cpu_us, row.cost.rays, row.cost.light_ms,
+                   interval_cell(row.rmse), interval_cell(row.rel_mse), interval_cell(row.flip),
+                   row.percentile_99_9, row.biased ? " class=\"bad\"" : "", row.bias.value,
+                   row.bias.low, row.bias.high, interval_cell(row.flicker), row.cost.state_bytes);
+    html += row.resolved ? ratio_cell(row.against_mis) + ratio_cell(row.against_bidirectional)
+                         : "<td class=\"weak\" colspan=\"2\">below the reference's own error</td>";
+    html += "</tr>\n";
+  }
+  return html + "</table>\n";
+}
+
+std::string reference_note(const Study& study, const StudyResults& results, std::size_t scene) {
+  double mean = 0;
+  for (const Reference& r : results.references[scene])
+    mean += r.mean_radiance / static_cast<double>(results.references[scene].size());
+  return fmt::format(
+      "<p class=\"note\">Reference: two halves of {} sample pairs a pixel; mean radiance {:.4g}, "
+      "own "
+      "RMSE {:.3g}. Frames measured: {}.</p>\n",
+      study.scenes[scene].reference[0].sampling.reference_samples, mean,
+      reference_error(results.references[scene], ErrorKindOfImage::rmse, {}),
+      study.scenes[scene].frames.size());
+}
+
+std::string charts_block(const std::vector<std::string>& svgs) {
+  std::string html = "<div class=\"charts\">\n";
+  for (const std::string& svg : svgs) html += svg;
+  return html + "</div>\n";
+}
+
+std::string crops_block(const Study& study, const StudyResults& results, std::size_t scene,
+                        const ReportCrops& crops) {
+  std::string caption = "reference";
+  for (const std::size_t cell : crops.cells) {
+    caption +=
+        fmt::format(" &middot; {} {} ({:.2g} &micro;s/px)",
+                    escaped(study.methods[static_cast<std::size_t>(study.cells[cell].method)]),
+                    escaped(study.cells[cell].budget), cell_cost(results.runs[cell]).cpu_us);
+  }
+  return fmt::format(
+      "<h3>About equal time, frame {}, seed 1</h3><img alt=\"crops\" "
+      "src=\"data:image/png;base64,{}\"><p class=\"note\">From left to right: {}. Below: FLIP, "
+      "black "
+      "0 to pale yellow 1.</p>\n",
+      study.scenes[scene].frames.back(), base64(crops.png), caption);
+}
+
+}  // namespace
+
+std::string report_html(const Study& study, const StudyResults& results,
+                        const std::vector<CellSummary>& rows,
+                        const std::vector<ReportScene>& scenes, const std::string& machine) {
+  std::string html = fmt::format(
+      "<!DOCTYPE html>\n<html lang=\"en\"><head><meta charset=\"utf-8\"><title>{0}</title>"
+      "<style>{1}</style></head><body>\n<h1>{0}</h1>\n"
+      "<p class=\"note\">baton {2} on {3}. {4} seeds; bands and brackets are 95 % intervals over "
+      "seeds (bootstrap), each by itself. Errors are over pixels with a surface; squared errors "
+      "are "
+      "taken against two independent halves of the reference, so that its noise drops out. CPU "
+      "time "
+      "is the middle one of the seeds, of primary rays, sampling, visibility and shading; light is "
+      "apart. Efficiency is 1 / (MSE x time), over that of the baseline with the same budget, or "
+      "its "
+      "best; above 1 is better. {5}</p>\n",
+      escaped(study.name), kStyle, kVersion, escaped(machine), study.num_seeds,
+      study.num_seeds < kFewSeeds ? "<b>Fewer than 20 seeds: the bands are rough.</b>" : "");
+  for (std::size_t i = 0; i < scenes.size(); ++i) {
+    html += fmt::format("<h2>{}</h2>\n", escaped(study.scenes[i].name));
+    html += reference_note(study, results, i);
+    html += charts_block(scenes[i].overview);
+    html += summary_table(study, i, rows);
+    html += crops_block(study, results, i, scenes[i].crops);
+    if (!scenes[i].courses.empty())
+      html += "<h3>Over the frames</h3>" + charts_block(scenes[i].courses);
+    html += "<details><summary>Each frame by itself</summary>" + charts_block(scenes[i].frames) +
+            "</details>\n";
+  }
+  return html + "</body></html>\n";
+}
+
+}  // namespace baton

@@ -1,0 +1,52 @@
+#pragma once
+
+#include <array>
+#include <filesystem>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "common/base/result.h"
+#include "common/job/job_spec.h"
+
+namespace baton {
+
+/// Of every job of a study.
+inline constexpr const char* kFramePattern = "frame.####.exr";
+
+/// A scene of a study, with the two halves of its reference: equal jobs with different seeds, so
+/// that their difference tells what the reference can resolve.
+struct StudyScene {
+  std::string name;
+  std::array<JobSpec, 2> reference;  ///< frames: the measured ones
+  std::vector<int> frames;           ///< measured frame numbers; the first frame is among them
+  std::array<int, 4> crop{};         ///< x, y, width, height in pixels, shown side by side
+};
+
+/// One combination: everything but the seed.
+struct StudyCell {
+  int scene = 0, method = 0;  ///< indices into the study's lists
+  std::string budget;
+  JobSpec job;  ///< seed, output folder: filled in run by run
+};
+
+/// What `baton chart` runs: every cell with every seed in [1, num_seeds].
+struct Study {
+  std::string name;
+  int num_seeds = 20;
+  std::vector<StudyScene> scenes;
+  std::vector<std::string> methods;
+  std::vector<StudyCell> cells;  ///< by scene, then method, then budget, in the order of the file
+};
+
+/// The study of a JSON text, every combination checked as a job. name goes first in every error
+/// line (usually the file); relative paths are taken relative to base_directory. One Error lists
+/// every fault with its JSON path in the study, also those inside of patches:
+/// `study.json: $.methods[1].patch.sampling.metod: unknown key`. Grammar: jobs/study/STUDY.md.
+Result<Study> parse_study(std::string_view json, const std::string& name,
+                          const std::filesystem::path& base_directory);
+
+/// Reads and parses a study file.
+Result<Study> load_study(const std::filesystem::path& path);
+
+}  // namespace baton

@@ -1,0 +1,174 @@
+#include "jobs/study/study_runner.h"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <cctype>
+
+#include "common/job/job_json.h"
+#include "common/job/sequence.h"
+
+namespace baton {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// A run that has a name and may be done.
+struct Run {
+  std::size_t cell = 0;
+  int seed = 0;
+  std::string key;
+};
+
+/// Marks a folder whose frames are all there.
+fs::path finished_mark(const fs::path& folder) { return folder / "finished"; }
+
+bool is_there(const fs::path& path) {
+  std::error_code ignored;
+  return fs::exists(path, ignored);
+}
+
+/// What the measures need of a scene.
+Result<std::vector<Reference>> load_references(const StudyScene& scene, const StudyFolder& folder) {
+  std::array<fs::path, 2> frames;
+  for (int half = 0; half < 2; ++half) {
+    BATON_ASSIGN(const std::string key, job_key(scene.reference[half]));
+    frames[half] = folder.frames_folder(key);
+  }
+  std::vector<Reference> references;
+  for (const int frame : scene.frames) {
+    BATON_ASSIGN(Picture a, read_picture(frame_file(frames[0], frame)));
+    BATON_ASSIGN(Picture b, read_picture(frame_file(frames[1], frame)));
+    references.push_back(make_reference(std::move(a), std::move(b)));
+  }
+  return references;
+}
+
+Status render_references(const Study& study, const StudyFolder& folder, JobRunner& runner) {
+  std::vector<JobSpec> jobs;
+  for (const StudyScene& scene : study.scenes) {
+    for (JobSpec job : scene.reference) {
+      BATON_ASSIGN(const std::string key, job_key(job));
+      job.output.directory = folder.frames_folder(key).string();
+      const bool known = std::any_of(jobs.begin(), jobs.end(), [&](const JobSpec& other) {
+        return other.output.directory == job.output.directory;
+      });
+      if (!known && !is_there(finished_mark(job.output.directory))) jobs.push_back(std::move(job));
+    }
+  }
+  if (jobs.empty()) return {};
+  spdlog::info("{} references to render", jobs.size());
+  return runner.run(jobs, [&](std::size_t index, const JobSummary&) {
+    return write_record(finished_mark(jobs[index].output.directory), {});
+  });
+}
+
+/// Measures the frames of a finished run.
+Result<RunRecord> measure_run(const JobSpec& job, const std::vector<int>& frames,
+                              const std::vector<Reference>& references) {
+  RunRecord record;
+  Picture before;
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    BATON_ASSIGN(Picture picture, read_picture(frame_file(job.output.directory, frames[i])));
+    FrameMeasures measures = measure_frame(picture, references[i]);
+    measures.frame = frames[i];
+    // Flicker is between neighbours of the sequence.
+    const auto at = std::lower_bound(job.frames.begin(), job.frames.end(), frames[i]);
+    if (i > 0 && *std::prev(at) == frames[i - 1])
+      measures.flicker = measure_flicker(before, references[i - 1], picture, references[i]);
+    record.frames.push_back(measures);
+    before = std::move(picture);
+  }
+  return record;
+}
+
+}  // namespace
+
+fs::path frame_file(const fs::path& folder, int frame) {
+  return folder / frame_file_name(kFramePattern, frame);
+}
+
+std::string file_slug(const std::string& name) {
+  std::string result;
+  for (const char c : name) {
+    const auto u = static_cast<unsigned char>(c);
+    result += std::isalnum(u) != 0 ? static_cast<char>(std::tolower(u)) : '-';
+  }
+  return result;
+}
+
+fs::path StudyFolder::record_path(const std::string& key) const {
+  return root_ / "records" / (key + ".json");
+}
+fs::path StudyFolder::frames_folder(const std::string& key) const { return root_ / "frames" / key; }
+
+Result<std::string> job_key(JobSpec job) {
+  job.output.directory = "/";
+  BATON_ASSIGN(const std::string document, make_job_document(job));
+  return digest_of(document).hex();
+}
+
+std::string run_key(const std::string& cell_key, int seed) {
+  return fmt::format("{}-{}", cell_key, seed);
+}
+
+Result<StudyResults> run_study(const Study& study, const StudyFolder& folder, JobRunner& runner) {
+  StudyResults results;
+  BATON_TRY(render_references(study, folder, runner));
+  for (const StudyScene& scene : study.scenes) {
+    BATON_ASSIGN(std::vector<Reference> references, load_references(scene, folder));
+    results.references.push_back(std::move(references));
+  }
+
+  // Take over what is done and list the rest.
+  results.runs.resize(study.cells.size());
+  std::vector<Run> runs;
+  std::vector<JobSpec> jobs;
+  for (std::size_t c = 0; c < study.cells.size(); ++c) {
+    results.runs[c].resize(static_cast<std::size_t>(study.num_seeds));
+    BATON_ASSIGN(const std::string cell_key, job_key(study.cells[c].job));
+    for (int seed = 1; seed <= study.num_seeds; ++seed) {
+      const std::string key = run_key(cell_key, seed);
+      std::optional<RunRecord> record = read_record(folder.record_path(key));
+      const std::vector<int>& frames =
+          study.scenes[static_cast<std::size_t>(study.cells[c].scene)].frames;
+      const bool shown = seed == 1;  // its frames are needed for the crops
+      if (record && record->frames.size() == frames.size() &&
+          (!shown || is_there(frame_file(folder.frames_folder(key), frames.back())))) {
+        results.runs[c][static_cast<std::size_t>(seed) - 1] = std::move(*record);
+        continue;
+      }
+      JobSpec job = study.cells[c].job;
+      job.seed = static_cast<std::uint64_t>(seed);
+      job.output.directory = folder.frames_folder(key).string();
+      runs.push_back({c, seed, key});
+      jobs.push_back(std::move(job));
+    }
+  }
+  spdlog::info("{} of {} runs are done already",
+               study.cells.size() * static_cast<std::size_t>(study.num_seeds) - runs.size(),
+               study.cells.size() * static_cast<std::size_t>(study.num_seeds));
+  if (runs.empty()) return results;
+
+  const auto keep = [&](std::size_t index, const JobSummary& summary) -> Status {
+    const Run& run = runs[index];
+    const auto scene = static_cast<std::size_t>(study.cells[run.cell].scene);
+    BATON_ASSIGN(RunRecord record,
+                 measure_run(jobs[index], study.scenes[scene].frames, results.references[scene]));
+    record.key = run.key;
+    record.stats = summary.stats;
+    record.state_bytes = summary.state_bytes;
+    record.state_pixels = summary.state_pixels;
+    record.frames_rendered = summary.frames_done;
+    BATON_TRY(write_record(folder.record_path(run.key), record));
+    std::error_code ignored;
+    if (run.seed != 1) fs::remove_all(jobs[index].output.directory, ignored);
+    results.runs[run.cell][static_cast<std::size_t>(run.seed) - 1] = std::move(record);
+    return {};
+  };
+  BATON_TRY(runner.run(jobs, keep));
+  return results;
+}
+
+}  // namespace baton

@@ -1,0 +1,195 @@
+#include "jobs/study/study_summary.h"
+
+#include <algorithm>
+#include <cmath>
+#include <limits>
+#include <numeric>
+
+namespace baton {
+namespace {
+
+constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+/// Two-sided 95 % of a normal distribution.
+constexpr double kNormal95 = 1.96;
+
+double measure_of(const FrameMeasures& m, ErrorKindOfImage kind) {
+  switch (kind) {
+    case ErrorKindOfImage::rmse:
+      return m.mse;
+    case ErrorKindOfImage::rel_mse:
+      return m.rel_mse;
+    case ErrorKindOfImage::flip:
+      return m.flip;
+  }
+  return kNone;
+}
+
+/// One number a run: a measure at a frame, or its mean over those frames that have it.
+template <class F>
+std::vector<double> per_run(const std::vector<RunRecord>& runs, FrameChoice frame, F measure) {
+  std::vector<double> values;
+  for (const RunRecord& run : runs) {
+    double sum = 0;
+    int count = 0;
+    for (std::size_t f = 0; f < run.frames.size(); ++f) {
+      const double value = measure(run.frames[f]);
+      if ((frame && *frame != f) || std::isnan(value)) continue;
+      sum += value;
+      ++count;
+    }
+    if (count > 0) values.push_back(sum / count);
+  }
+  return values;
+}
+
+std::vector<double> squared_errors(const std::vector<RunRecord>& runs) {
+  return per_run(runs, {}, [](const FrameMeasures& m) { return m.mse; });
+}
+
+Interval root(Interval squared) {
+  const auto safe_root = [](double x) { return std::sqrt(std::max(x, 0.0)); };
+  return {safe_root(squared.low), safe_root(squared.value), safe_root(squared.high)};
+}
+
+/// Standard error of the references' mean radiance over all frames: their pixels are independent.
+double standard_error(const std::vector<Reference>& references) {
+  double variance = 0;
+  for (const Reference& r : references)
+    variance += r.mse / static_cast<double>(std::max<std::size_t>(r.lit_pixels.size(), 1));
+  return std::sqrt(variance) / static_cast<double>(references.size());
+}
+
+/// MSE x time of `base` over that of `cell`.
+Interval efficiency_ratio(const StudyResults& results, std::size_t base, std::size_t cell) {
+  const double time = cell_cost(results.runs[cell]).cpu_us;
+  const double factor = time > 0 ? cell_cost(results.runs[base]).cpu_us / time : kNone;
+  const Interval ratio =
+      ratio_interval(squared_errors(results.runs[base]), squared_errors(results.runs[cell]));
+  return {ratio.low * factor, ratio.value * factor, ratio.high * factor};
+}
+
+/// The cell that `cell` is compared with: same scene, the method, the budget of the same name or
+/// the most efficient one.
+std::optional<std::size_t> baseline(const Study& study, const StudyResults& results,
+                                    std::size_t cell, Method method) {
+  std::optional<std::size_t> best;
+  for (std::size_t c = 0; c < study.cells.size(); ++c) {
+    const StudyCell& other = study.cells[c];
+    if (other.scene != study.cells[cell].scene || other.job.sampling.method != method) continue;
+    if (other.budget == study.cells[cell].budget) return c;
+    if (!best || efficiency_ratio(results, *best, c).value > 1) best = c;
+  }
+  return best;
+}
+
+CellSummary summarize_cell(const Study& study, const StudyResults& results, std::size_t cell) {
+  const std::vector<RunRecord>& runs = results.runs[cell];
+  const std::vector<Reference>& references =
+      results.references[static_cast<std::size_t>(study.cells[cell].scene)];
+  CellSummary row;
+  row.cell = cell;
+  row.cost = cell_cost(runs);
+  row.rmse = cell_error(runs, ErrorKindOfImage::rmse, {});
+  row.rel_mse = cell_error(runs, ErrorKindOfImage::rel_mse, {});
+  row.flip = cell_error(runs, ErrorKindOfImage::flip, {});
+  const auto tails = per_run(runs, {}, [](const FrameMeasures& m) { return m.percentile_99_9; });
+  row.percentile_99_9 = mean_interval(tails).value;
+  const auto flicker = per_run(runs, {}, [](const FrameMeasures& m) { return m.flicker; });
+  row.flicker = flicker.empty() ? Interval{kNone, kNone, kNone} : mean_interval(flicker);
+  row.resolved = row.rmse.value >= reference_error(references, ErrorKindOfImage::rmse, {});
+
+  // The reference's own uncertainty widens the interval of the bias.
+  row.bias = mean_interval(per_run(runs, {}, [](const FrameMeasures& m) { return m.bias; }));
+  const double extra = kNormal95 * standard_error(references);
+  row.bias.low = row.bias.value - std::hypot(row.bias.value - row.bias.low, extra);
+  row.bias.high = row.bias.value + std::hypot(row.bias.high - row.bias.value, extra);
+  row.biased = row.bias.low > 0 || row.bias.high < 0;
+
+  const auto against = [&](Method method) {
+    const auto base = baseline(study, results, cell, method);
+    return base ? efficiency_ratio(results, *base, cell) : Interval{kNone, kNone, kNone};
+  };
+  row.against_mis = against(Method::mis);
+  row.against_bidirectional = against(Method::bidirectional);
+  return row;
+}
+
+}  // namespace
+
+const char* name_of(ErrorKindOfImage kind) {
+  switch (kind) {
+    case ErrorKindOfImage::rmse:
+      return "RMSE";
+    case ErrorKindOfImage::rel_mse:
+      return "relMSE";
+    case ErrorKindOfImage::flip:
+      return "FLIP";
+  }
+  return "";
+}
+
+CellCost cell_cost(const std::vector<RunRecord>& runs) {
+  std::vector<double> cpu, rays, evaluations, light, state;
+  for (const RunRecord& run : runs) {
+    const RenderStats& s = run.stats;
+    const auto lit = static_cast<double>(s.pixels - s.pixels_background);
+    if (!(lit > 0)) continue;
+    cpu.push_back(1e6 / lit *
+                  (s.seconds_primary + s.seconds_sample + s.seconds_visibility + s.seconds_shade));
+    rays.push_back(static_cast<double>(s.rays_shadow) / lit);
+    evaluations.push_back(static_cast<double>(s.target_evaluations) / lit);
+    light.push_back(1e3 * s.seconds_light / static_cast<double>(run.frames_rendered));
+    state.push_back(run.state_pixels > 0 ? static_cast<double>(run.state_bytes) /
+                                               static_cast<double>(run.state_pixels)
+                                         : 0);
+  }
+  return {median(cpu), median(rays), median(evaluations), median(light), median(state)};
+}
+
+Interval cell_error(const std::vector<RunRecord>& runs, ErrorKindOfImage kind, FrameChoice frame) {
+  const auto values =
+      per_run(runs, frame, [kind](const FrameMeasures& m) { return measure_of(m, kind); });
+  const Interval mean = mean_interval(values);
+  return kind == ErrorKindOfImage::rmse ? root(mean) : mean;
+}
+
+double reference_error(const std::vector<Reference>& references, ErrorKindOfImage kind,
+                       FrameChoice frame) {
+  double sum = 0, count = 0;
+  for (std::size_t f = 0; f < references.size(); ++f) {
+    if (frame && *frame != f) continue;
+    sum += kind == ErrorKindOfImage::rmse      ? references[f].mse
+           : kind == ErrorKindOfImage::rel_mse ? references[f].rel_mse
+                                               : references[f].flip;
+    count += 1;
+  }
+  const double mean = count > 0 ? sum / count : 0;
+  return kind == ErrorKindOfImage::rmse ? std::sqrt(mean) : mean;
+}
+
+std::vector<bool> pareto_front(const std::vector<double>& costs,
+                               const std::vector<double>& errors) {
+  // Cheapest first, then every one that is better than all cheaper ones.
+  std::vector<std::size_t> order(costs.size());
+  std::iota(order.begin(), order.end(), std::size_t{0});
+  std::sort(order.begin(), order.end(), [&](std::size_t a, std::size_t b) {
+    return std::pair(costs[a], errors[a]) < std::pair(costs[b], errors[b]);
+  });
+  std::vector<bool> front(costs.size(), false);
+  double best = std::numeric_limits<double>::infinity();
+  for (const std::size_t i : order) {
+    if (!(errors[i] < best)) continue;
+    best = errors[i];
+    front[i] = true;
+  }
+  return front;
+}
+
+std::vector<CellSummary> summarize_study(const Study& study, const StudyResults& results) {
+  std::vector<CellSummary> rows;
+  for (std::size_t c = 0; c < study.cells.size(); ++c)
+    rows.push_back(summarize_cell(study, results, c));
+  return rows;
+}
+
+}  // namespace baton

@@ -1,0 +1,57 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "jobs/study/intervals.h"
+#include "jobs/study/study_runner.h"
+
+namespace baton {
+
+/// How errors are measured in charts.
+enum class ErrorKindOfImage : std::uint8_t { rmse, rel_mse, flip };
+inline constexpr ErrorKindOfImage kImageErrors[] = {
+    ErrorKindOfImage::rmse, ErrorKindOfImage::rel_mse, ErrorKindOfImage::flip};
+const char* name_of(ErrorKindOfImage kind);
+
+/// What a run of a cell costs: middle of its runs, per pixel with a surface and frame.
+struct CellCost {
+  double cpu_us = 0;       ///< primary rays, sampling, visibility, shading
+  double rays = 0;         ///< shadow rays
+  double evaluations = 0;  ///< of the target
+  double light_ms = 0;     ///< preparing the light, per frame, whatever the number of pixels
+  double state_bytes = 0;
+};
+CellCost cell_cost(const std::vector<RunRecord>& runs);
+
+/// Frames of a scene: one by position, or all.
+using FrameChoice = std::optional<std::size_t>;
+
+/// The error of a cell over its runs. All frames: the mean over frames of squared error or FLIP.
+Interval cell_error(const std::vector<RunRecord>& runs, ErrorKindOfImage kind, FrameChoice frame);
+
+/// What the references of a scene cannot resolve, in the same measure.
+double reference_error(const std::vector<Reference>& references, ErrorKindOfImage kind,
+                       FrameChoice frame);
+
+/// Positions of the points that no other one beats in both: not slower and smaller. Equal points
+/// count once. costs, errors: of one length.
+std::vector<bool> pareto_front(const std::vector<double>& costs, const std::vector<double>& errors);
+
+/// One row of the table of efficiencies.
+struct CellSummary {
+  std::size_t cell = 0;
+  CellCost cost;
+  Interval rmse, rel_mse, flip, bias;
+  double percentile_99_9 = 0;
+  Interval flicker;       ///< over runs; NaN when no two measured frames follow each other
+  bool resolved = false;  ///< the squared error is at least that of the reference
+  bool biased = false;    ///< the interval of the bias, with the reference's, leaves out 0
+  /// MSE x time of the baseline over MSE x time of this cell: > 1 is better. The baseline has the
+  /// budget of the same name, or is the best of its method. NaN without the method in the study.
+  Interval against_mis, against_bidirectional;
+};
+std::vector<CellSummary> summarize_study(const Study& study, const StudyResults& results);
+
+}  // namespace baton

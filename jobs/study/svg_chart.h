@@ -1,0 +1,37 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+namespace baton {
+
+struct ChartPoint {
+  double x = 0, y = 0;
+  double low = 0, high = 0;  ///< of the band around y
+  std::string label;         ///< shown when the pointer rests on it, and beside it when `marked`
+  bool marked = false;       ///< on the Pareto front: with a ring
+  bool hollow = false;       ///< not resolved by the reference
+};
+
+struct ChartSeries {
+  std::string name;
+  int colour = 0;                  ///< index into the palette, which repeats after eight
+  std::vector<ChartPoint> points;  ///< in the order in which they are joined
+};
+
+struct Chart {
+  std::string title, x_label, y_label;
+  bool log_x = true, log_y = true;  ///< points at or below 0 are left out
+  std::vector<ChartSeries> series;
+  std::optional<double> floor;  ///< a line across: what the reference cannot resolve
+};
+
+/// A picture of the chart, 620 x 400 pixels, with ticks, bands, markers and a legend.
+/// Deterministic.
+std::string svg_chart(const Chart& chart);
+
+/// The palette's colour for a series, as #rrggbb.
+const char* series_colour(int colour);
+
+}  // namespace baton

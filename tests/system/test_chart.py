@@ -1,0 +1,102 @@
+#!/usr/bin/env python3
+"""`baton chart`: a small study gives its tables, charts and report; killed in the middle it goes on; a bad entry is
+named."""
+
+import json
+
+from farm import BAD_INPUT, Process, check, check_equal, make_job, run_tests, wait_until, write_job
+
+
+def make_study(folder, **changes):
+    """A study of one scene, two methods, two budgets, three seeds."""
+    job = make_job(folder, frames="1-3", image={"width": 48, "height": 32, "tileSize": 16})
+    write_job(folder / "job.json", job)
+    study = {
+        "name": "tiny",
+        "seeds": 3,
+        "referenceSamples": 256,
+        "measureFrames": "2-3",
+        "scenes": [{"name": "lamp", "job": "job.json", "crop": [8, 8, 24, 16]}],
+        "methods": [
+            {"name": "mis", "patch": {"sampling": {"method": "mis"}}},
+            {"name": "sequential", "patch": {"sampling": {"method": "sequential"}}},
+        ],
+        "budgets": [4, 16],
+        **changes,
+    }
+    return write_job(folder / "study.json", study)
+
+
+def chart(programs, study, output, **options):
+    return programs.run("baton", "chart", study, "--output", output, **options)
+
+
+def records(output):
+    return sorted((output / ".work" / "records").glob("*.json"))
+
+
+def a_killed_study_goes_on(programs, folder):
+    # The witness: the same study without any harm.
+    study = make_study(folder)
+    witness = folder / "witness"
+    chart(programs, study, witness)
+    table = (witness / "measurements.csv").read_text(encoding="utf-8")
+    check_equal(len(table.splitlines()), 1 + 2 * 2 * 3 * 3, "lines of measurements.csv")
+    check("nan" not in table, "measurements.csv holds a NaN")
+
+    # Kill the whole process group once some runs are kept.
+    output = folder / "out"
+    process = Process([programs.path("baton"), "chart", str(study), "--output", str(output)], folder / "chart.log")
+    wait_until(lambda: len(records(output)) >= 2, "the first runs are kept")
+    check(process.alive(), f"the study ended too early:\n{process.log()}")
+    process.kill()
+    kept = {path: path.stat().st_mtime_ns for path in records(output)}
+    check(len(kept) < 12, "every run was done before the kill")
+
+    # Once more: what was kept stays, the rest is made equal.
+    chart(programs, study, output)
+    check_equal((output / "measurements.csv").read_text(encoding="utf-8"), table, "measurements after the kill")
+    for path, time in kept.items():
+        check_equal(path.stat().st_mtime_ns, time, f"time of {path.name}")
+
+    # And again, with nothing to do: the same report without a farm.
+    log = (output / ".work/farm/coordinator.log").read_text(encoding="utf-8")
+    chart(programs, study, output)
+    check_equal((output / ".work/farm/coordinator.log").read_text(encoding="utf-8"), log, "the coordinator's log")
+    check_equal((output / "measurements.csv").read_text(encoding="utf-8"), table, "measurements of the third run")
+
+
+def the_report_needs_no_other_file(programs, folder):
+    study = make_study(folder, seeds=1)
+    chart(programs, study, folder / "out")
+    report = (folder / "out/report.html").read_text(encoding="utf-8")
+    for expected in ["<svg", "data:image/png;base64,", "Fewer than 20 seeds", "sequential"]:
+        check(expected in report, f"report.html: expected {expected}")
+    for forbidden in ["src=\"http", "href=", "<script"]:
+        check(forbidden not in report, f"report.html holds {forbidden}")
+    names = {path.name for path in (folder / "out").iterdir()}
+    for name in ["costs.csv", "references.csv", "efficiency.csv", "lamp-rmse-cpu.svg", "lamp-flip-rays-frame3.svg",
+                 "lamp-frames-lns.svg", "lamp-crops.png"]:
+        check(name in names, f"expected {name} among {sorted(names)}")
+
+
+def a_bad_entry_is_named(programs, folder):
+    methods = [{"name": "mis", "patch": {"sampling": {"method": "mis"}}},
+               {"name": "bad", "patch": {"sampling": {"metod": "mis"}}}]
+    study = make_study(folder, methods=methods)
+    done = chart(programs, study, folder / "out", expect=BAD_INPUT)
+    expected = f"{study}: $.methods[1].patch.sampling.metod: unknown key; did you mean \"method\"?"
+    check(expected in done.stderr, f"expected {expected!r} in {done.stderr!r}")
+    check(not (folder / "out").exists(), "a refused study leaves nothing behind")
+
+    # An asset that is gone is found before anything is rendered.
+    study = make_study(folder)
+    job = json.loads((folder / "job.json").read_text(encoding="utf-8"))
+    job["environment"]["keys"][0]["map"] = str(folder / "none.hdr")
+    write_job(folder / "job.json", job)
+    done = chart(programs, study, folder / "out", expect=None)
+    check("none.hdr" in done.stderr and done.returncode != 0, f"expected none.hdr in {done.stderr!r}")
+
+
+if __name__ == "__main__":
+    run_tests([a_killed_study_goes_on, the_report_needs_no_other_file, a_bad_entry_is_named])

@@ -1,0 +1,145 @@
+#include "jobs/study/study_summary.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "common/math/philox.h"
+#include "jobs/study/chart_axis.h"
+#include "jobs/study/svg_chart.h"
+
+namespace baton {
+namespace {
+
+TEST(Intervals, OneValueIsItsOwnInterval) {
+  const double value = 3;
+  const Interval i = mean_interval({&value, 1});
+  EXPECT_EQ(i.low, 3);
+  EXPECT_EQ(i.value, 3);
+  EXPECT_EQ(i.high, 3);
+  EXPECT_EQ(mean_interval({}).value, 0);
+}
+
+// H0: the interval of 20 uniform values holds their mean 1/2 in 95 % of trials. The percentile
+// bootstrap is known to fall a little short at n = 20 (about 93 %). 1000 trials have a standard
+// deviation below 0.008; accepted is [0.90, 0.97]: an interval one third too narrow (81 %) is seen.
+TEST(Intervals, HoldTheMeanAsOftenAsTheySay) {
+  int held = 0;
+  constexpr int kTrials = 1000;
+  for (std::uint32_t trial = 0; trial < kTrials; ++trial) {
+    std::vector<double> values;
+    for (std::uint32_t i = 0; i < 20; ++i)
+      values.push_back(uniform_float(Philox4x32::block({i, trial, 0, 0}, 77)[0]));
+    const Interval interval = mean_interval(values);
+    held += interval.low <= 0.5 && 0.5 <= interval.high ? 1 : 0;
+  }
+  EXPECT_GE(held, 0.90 * kTrials);
+  EXPECT_LE(held, 0.97 * kTrials);
+}
+
+TEST(Intervals, Ratio) {
+  const std::vector<double> above{2, 4, 6}, below{1, 2, 3}, none{0, 0};
+  const Interval ratio = ratio_interval(above, below);
+  EXPECT_EQ(ratio.value, 2);
+  EXPECT_LT(ratio.low, 2);
+  EXPECT_GT(ratio.high, 2);
+  EXPECT_TRUE(std::isnan(ratio_interval(above, none).value));
+}
+
+TEST(Intervals, Median) {
+  EXPECT_EQ(median({}), 0);
+  EXPECT_EQ(median(std::vector<double>{5, 1, 3}), 3);
+}
+
+TEST(ParetoFront, IsWhatNoOtherPointBeats) {
+  const std::vector<double> cost{1, 2, 3, 2, 1}, error{5, 3, 4, 6, 5};
+  EXPECT_EQ(pareto_front(cost, error), (std::vector<bool>{true, true, false, false, false}));
+  EXPECT_TRUE(pareto_front({}, {}).empty());
+}
+
+/// Runs of one frame with the given squared errors and time per pixel.
+std::vector<RunRecord> runs(const std::vector<double>& mse, double cpu_us) {
+  std::vector<RunRecord> records;
+  for (const double value : mse) {
+    RunRecord& record = records.emplace_back();
+    record.frames_rendered = 1;
+    record.stats.pixels = 1100;
+    record.stats.pixels_background = 100;
+    record.stats.rays_shadow = 16000;
+    record.stats.seconds_sample = 1000 * cpu_us * 1e-6;
+    record.stats.seconds_light = 0.002;
+    record.frames.push_back({.frame = 1, .mse = value});
+  }
+  return records;
+}
+
+Study two_methods() {
+  Study study;
+  study.scenes.push_back({.name = "s", .reference = {}, .frames = {1}});
+  study.methods = {"mis", "other"};
+  study.cells = {{0, 0, "16", {}}, {0, 1, "16", {}}};
+  study.cells[0].job.sampling.method = Method::mis;
+  study.cells[1].job.sampling.method = Method::sequential;
+  return study;
+}
+
+StudyResults two_results(double reference_mse) {
+  StudyResults results;
+  results.runs = {runs({4, 6}, 2), runs({2, 3}, 3)};
+  results.references.resize(1);
+  results.references[0].resize(1);
+  results.references[0][0].mse = reference_mse;
+  results.references[0][0].lit_pixels = {0};
+  return results;
+}
+
+TEST(Summary, CostsAreForAPixelWithASurface) {
+  const CellCost cost = cell_cost(runs({1, 1, 1}, 2.5));
+  EXPECT_NEAR(cost.cpu_us, 2.5, 1e-9);
+  EXPECT_EQ(cost.rays, 16);
+  EXPECT_NEAR(cost.light_ms, 2, 1e-9);
+}
+
+TEST(Summary, EfficiencyIsTheRatioOfErrorTimesTime) {
+  const auto rows = summarize_study(two_methods(), two_results(0.1));
+  ASSERT_EQ(rows.size(), 2u);
+  EXPECT_NEAR(rows[0].against_mis.value, 1, 1e-12);
+  EXPECT_NEAR(rows[1].against_mis.value, 5.0 * 2 / (2.5 * 3), 1e-12);
+  EXPECT_TRUE(std::isnan(rows[1].against_bidirectional.value));
+  EXPECT_NEAR(rows[1].rmse.value, std::sqrt(2.5), 1e-12);
+}
+
+TEST(Summary, NothingIsJudgedBelowTheErrorOfItsReference) {
+  const auto rows = summarize_study(two_methods(), two_results(4.0));
+  EXPECT_TRUE(rows[0].resolved);
+  EXPECT_FALSE(rows[1].resolved);
+}
+
+TEST(ChartAxis, TicksAreDecadesOrRoundSteps) {
+  const ChartAxis log({0.01, 10}, true, 0, 100);
+  std::vector<double> labelled;
+  for (const auto& tick : log.ticks()) {
+    if (!tick.label.empty()) labelled.push_back(tick.value);
+  }
+  EXPECT_EQ(labelled, (std::vector<double>{0.01, 0.1, 1, 10}));
+  EXPECT_LT(log.position(0.1), log.position(1));
+
+  const ChartAxis linear({1, 8}, false, 0, 100);
+  for (const auto& tick : linear.ticks()) EXPECT_EQ(tick.value, std::round(tick.value));
+}
+
+TEST(SvgChart, DrawsEveryPointThatItsScaleCanShow) {
+  Chart chart;
+  chart.title = "a < b";
+  chart.series.push_back(
+      {"one", 0, {{1, 1, 0.5, 2, "p"}, {10, 0, 0, 0, "zero"}, {100, 3, 2, 4, "q"}}});
+  const std::string svg = svg_chart(chart);
+  EXPECT_NE(svg.find("a &lt; b"), std::string::npos);
+  EXPECT_NE(svg.find(": p,"), std::string::npos);
+  EXPECT_NE(svg.find(": q,"), std::string::npos);
+  EXPECT_EQ(svg.find(": zero,"), std::string::npos);
+  EXPECT_EQ(svg.find("nan"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace baton
