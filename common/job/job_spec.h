@@ -178,7 +178,7 @@ struct SamplingSpec {
   Method method = Method::sequential;
   int num_particles = 16;          ///< N: shadow rays per pixel, [1, limits::kMaxParticles]
   int num_candidates = 128;        ///< M: SIR candidates, [N, limits::kMaxCandidates]
-  float brdf_fraction = 0.25f;     ///< share of candidates drawn from the BRDF, [0, 1]; mis and bidirectional
+  float brdf_fraction = 0.25f;     ///< [0, 1], of candidates: mis: from the BRDF; SIR: at most, from glossy lobes; 1: whole BRDF
   bool mis_compensation = false;   ///< [Karlik et al. 2019]; mis
   int num_distributions = 5;       ///< P: intermediate distributions per frame, [1, limits::kMaxDistributions]
   float ess_ratio_min = 0.5f;      ///< resample when ESS < ess_ratio_min * N, [0, 1]

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <limits>
 #include <memory>
 #include <span>
 #include <string>
@@ -21,12 +22,27 @@ struct SurfaceHit {
 /// Rays that only ask "is the way to infinity free?", as structure of arrays; the layout of Embree's streams.
 /// Origins are already lifted off their surface (lift_off).
 struct ShadowRays {
+  /// (capacity) of which the first size() are rays.
   std::vector<float> origin_x, origin_y, origin_z, direction_x, direction_y, direction_z;
   std::vector<float> t_near, t_far;  ///< t_far < 0 after tracing: occluded
-  std::size_t size() const { return origin_x.size(); }
-  void clear();
-  void reserve(std::size_t count);
-  void push(const Vec3& origin, const Vec3& direction);
+
+  std::size_t size() const { return count_; }
+  void clear() { count_ = 0; }
+  void push(const Vec3& origin, const Vec3& direction) {
+    if (count_ == t_far.size()) grow();
+    const std::size_t i = count_++;
+    origin_x[i] = origin.x;
+    origin_y[i] = origin.y;
+    origin_z[i] = origin.z;
+    direction_x[i] = direction.x;
+    direction_y[i] = direction.y;
+    direction_z[i] = direction.z;
+    t_far[i] = std::numeric_limits<float>::infinity();
+  }
+
+ private:
+  void grow();
+  std::size_t count_ = 0;
 };
 
 /// The origin of a shadow ray: `position` lifted along the geometric normal just so far that float error cannot make

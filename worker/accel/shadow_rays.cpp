@@ -1,6 +1,6 @@
+#include <algorithm>
 #include <bit>
 #include <cmath>
-#include <limits>
 
 #include "worker/accel/accel.h"
 
@@ -26,29 +26,12 @@ Vec3 lift_off(const Vec3& position, const Vec3& ng) {
   return {lift(position.x, ng.x), lift(position.y, ng.y), lift(position.z, ng.z)};
 }
 
-void ShadowRays::clear() {
+void ShadowRays::grow() {
+  const std::size_t capacity = std::max<std::size_t>(1024, 2 * t_far.size());
   for (auto* array : {&origin_x, &origin_y, &origin_z, &direction_x, &direction_y, &direction_z,
                       &t_near, &t_far}) {
-    array->clear();
+    array->resize(capacity, 0.0f);
   }
-}
-
-void ShadowRays::reserve(std::size_t count) {
-  for (auto* array : {&origin_x, &origin_y, &origin_z, &direction_x, &direction_y, &direction_z,
-                      &t_near, &t_far}) {
-    array->reserve(count);
-  }
-}
-
-void ShadowRays::push(const Vec3& origin, const Vec3& direction) {
-  origin_x.push_back(origin.x);
-  origin_y.push_back(origin.y);
-  origin_z.push_back(origin.z);
-  direction_x.push_back(direction.x);
-  direction_y.push_back(direction.y);
-  direction_z.push_back(direction.z);
-  t_near.push_back(0.0f);
-  t_far.push_back(std::numeric_limits<float>::infinity());
 }
 
 }  // namespace baton

@@ -21,7 +21,7 @@ void set_dark(const PixelSamples& samples) {
 /// Fills `scratch`; false when there is nothing to choose from.
 bool draw(const PixelInput& input, const CandidateCounts& counts, kernels::CandidateSet& scratch,
           const PixelSamples& samples) {
-  kernels::draw_candidates(input.sites, input.now, input.light.pool, counts.from_light, counts.from_bsdf,
+  kernels::draw_candidates(input.sites, input.now, input.light.pool, counts,
                            Rng(input.key, PassId::candidates), scratch);
   samples.source = PixelSource::fresh;
   const bool lit = scratch.count > 0 && scratch.total > 0 && std::isfinite(scratch.total);
@@ -33,7 +33,8 @@ bool draw(const PixelInput& input, const CandidateCounts& counts, kernels::Candi
 }  // namespace
 
 CandidateCounts split_candidates(std::int32_t total, float brdf_fraction) {
-  const auto from_bsdf = static_cast<std::int32_t>(std::lround(static_cast<float>(total) * brdf_fraction));
+  const auto from_bsdf =
+      static_cast<std::int32_t>(std::lround(static_cast<float>(total) * brdf_fraction));
   return {total - from_bsdf, from_bsdf};
 }
 
@@ -51,14 +52,26 @@ PixelDiagnostics DirectSampler::sample(const PixelInput& input, kernels::Candida
   return diagnostics;
 }
 
-PixelDiagnostics BidirectionalSampler::sample(const PixelInput& input, kernels::CandidateSet& scratch,
+CandidateCounts BidirectionalSampler::counts_for(const SiteBlock& sites) const {
+  if (lobe_fraction_ >= 1) return {.from_bsdf = num_candidates_};
+  constexpr std::int32_t kVector = 8;  // candidates that cost as much as one
+  const float wanted = lobe_fraction_ * sites.specular_share * static_cast<float>(num_candidates_);
+  const std::int32_t rounded = static_cast<std::int32_t>(std::ceil(wanted / kVector)) * kVector;
+  const std::int32_t from_bsdf = sites.num_lobes > 0 ? std::min(rounded, num_candidates_ / 2) : 0;
+  return {.from_light = num_candidates_ - from_bsdf, .from_bsdf = from_bsdf, .lobe_only = true};
+}
+
+PixelDiagnostics BidirectionalSampler::sample(const PixelInput& input,
+                                              kernels::CandidateSet& scratch,
                                               const PixelSamples& samples) const {
-  PixelDiagnostics diagnostics{.target_evaluations = counts_.total()};
-  if (!draw(input, counts_, scratch, samples)) return diagnostics;
+  PixelDiagnostics diagnostics{.target_evaluations = num_candidates_};
+  if (!draw(input, counts_for(input.sites), scratch, samples)) return diagnostics;
   std::array<std::int32_t, limits::kMaxParticles> storage{};
   const std::span<std::int32_t> chosen = std::span(storage).first(samples.weight.size());
   const float u = Rng(input.key, PassId::choose).uniforms(0, 0)[0];
-  systematic_choice({scratch.weight, static_cast<std::size_t>(scratch.count)}, scratch.total, u, chosen);
+  const auto count = static_cast<std::size_t>(scratch.count);
+  systematic_choice({scratch.weight, count},
+                    {scratch.running_total, (count + kChoiceBlock - 1) / kChoiceBlock}, u, chosen);
   for (std::size_t j = 0; j < chosen.size(); ++j) {
     const auto pick = static_cast<std::size_t>(chosen[j]);
     samples.direction[j] = scratch.code[pick];

@@ -4,17 +4,13 @@
 
 namespace baton {
 
-/// How many candidates come from the map and how many from the BRDF.
-struct CandidateCounts {
-  std::int32_t from_light = 0;
-  std::int32_t from_bsdf = 0;
-  std::int32_t total() const { return from_light + from_bsdf; }
-};
+using kernels::CandidateCounts;
 
 /// `total` candidates of which `brdf_fraction` (rounded) come from the BRDF.
 CandidateCounts split_candidates(std::int32_t total, float brdf_fraction);
 
-/// Every candidate is a sample: `environment`, `brdf` and, with both counts positive, `mis` (balance heuristic).
+/// Every candidate is a sample: `environment`, `brdf` and, with both counts positive, `mis`
+/// (balance heuristic).
 class DirectSampler final : public PixelSampler {
  public:
   explicit DirectSampler(CandidateCounts counts) : counts_(counts) {}
@@ -25,16 +21,22 @@ class DirectSampler final : public PixelSampler {
   CandidateCounts counts_;
 };
 
-/// Sampling-importance-resampling from the product [Burke et al. 2005]: N of M candidates, chosen systematically with
-/// probability proportional to their weights. Unbiased for any M and N.
+/// Sampling-importance-resampling from the product [Burke et al. 2005]: N of M candidates, chosen
+/// systematically with probability proportional to their weights. Unbiased for any M and N. Of the
+/// M candidates up to `lobe_fraction` come from the lobes of glossy surfaces, in proportion to what
+/// the pixel reflects there; 1: all from the whole BRDF.
 class BidirectionalSampler final : public PixelSampler {
  public:
-  explicit BidirectionalSampler(CandidateCounts counts) : counts_(counts) {}
+  BidirectionalSampler(std::int32_t num_candidates, float lobe_fraction)
+      : num_candidates_(num_candidates), lobe_fraction_(lobe_fraction) {}
   PixelDiagnostics sample(const PixelInput& input, kernels::CandidateSet& scratch,
                           const PixelSamples& samples) const override;
 
  private:
-  CandidateCounts counts_;
+  CandidateCounts counts_for(const SiteBlock& sites) const;
+
+  std::int32_t num_candidates_;
+  float lobe_fraction_;
 };
 
 }  // namespace baton

@@ -1,16 +1,15 @@
 #include "worker/integrator/kernels.h"
 
 #include <algorithm>
-#include <bit>
 
 #include "common/base/check.h"
-#include "common/math/low_discrepancy.h"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "worker/integrator/kernels.cpp"
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
+#include "worker/integrator/candidates-inl.h"
 #include "worker/integrator/target-inl.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -78,113 +77,40 @@ void EvaluateBsdfSpans(const SiteBlock& sites, std::span<const std::int32_t> sit
     StoreSome(reflected.x, r, i);
     StoreSome(reflected.y, g, i);
     StoreSome(reflected.z, b, i);
-    StoreSome(f.pdf, pdf, i);
+    StoreSome(MixturePdf(surface, f), pdf, i);
   }
 }
 
 void SampleBsdfSpans(const SiteBlock& sites, std::span<const std::int32_t> site, std::span<const float> u0,
                      std::span<const float> u1, std::span<float> x, std::span<float> y, std::span<float> z) {
   for (std::size_t i = 0; i < u0.size(); i += hn::Lanes(DF())) {
-    const Vec3Lanes w = SampleBsdf(LoadSurfaces(sites, LoadSomeSites(site, i)), LoadSome(u0, i), LoadSome(u1, i));
+    const SurfaceLanes surface = LoadSurfaces(sites, LoadSomeSites(site, i));
+    const Vec3Lanes w = SampleBsdf(surface, surface.specular_probability, LoadSome(u0, i), LoadSome(u1, i));
     StoreSome(w.x, x, i);
     StoreSome(w.y, y, i);
     StoreSome(w.z, z, i);
   }
 }
 
-/// Everything that the two kinds of candidates share.
-struct CandidateContext {
-  const SiteBlock& sites;
-  VF from_light, from_bsdf;  ///< M_t
-  VF site_share;             ///< num_hits / S
-
-  /// Stores p~ / sum_t M_t q_t for the lanes below `left`.
-  HWY_INLINE VF Weight(const SurfaceLanes& surface, const BsdfLanes& f, VF r, VF g, VF b, VF density, MF used) const {
-    const DF d;
-    const VF target = hn::Mul(MeanLanes(ReflectedRadiance(surface, f, r, g, b)), site_share);
-    const VF proposal = hn::MulAdd(from_light, density, hn::Mul(from_bsdf, f.pdf));
-    const MF live = hn::And(used, hn::And(hn::Gt(target, hn::Zero(d)), hn::Gt(proposal, hn::Zero(d))));
-    return hn::IfThenElseZero(live, hn::Div(target, hn::IfThenElse(live, proposal, hn::Set(d, 1.0f))));
-  }
-  /// Sites of candidates i, i + 1, ... of `count`: even shares with a random start.
-  HWY_INLINE VI Sites(std::size_t i, std::int32_t count, float start) const {
-    const DF d;
-    const VF position = hn::Add(hn::Iota(d, static_cast<float>(i)), hn::Set(d, start));
-    const VF fraction = hn::Mul(position, hn::Set(d, 1.0f / static_cast<float>(count)));
-    return SiteAt(sites, hn::Min(fraction, hn::Set(d, 0x1.fffffep-1f)));
-  }
-};
-
-/// Candidates from the pool: contiguous entries from a random aligned start.
-HWY_INLINE VF LightCandidates(const CandidateContext& context, const LightPool& pool, std::int32_t count,
-                              const Philox4x32::Counter& random, kernels::CandidateSet& out) {
-  const DF d;
-  const DI di;
-  const DU du;
-  VF total = hn::Zero(d);
-  if (count == 0) return total;
-  const std::uint32_t stride = std::clamp(std::bit_floor(static_cast<std::uint32_t>(count)), LightPool::kBlock, 64u);
-  const std::size_t start = random[0] % (LightPool::kSize / stride) * stride;
-  const float site_start = uniform_float(random[3]);
-  for (std::size_t i = 0; i < static_cast<std::size_t>(count); i += hn::Lanes(d)) {
-    const std::size_t entry = (start + i) % LightPool::kSize;
-    const LightPool::Block& block = pool.blocks[entry / LightPool::kBlock];
-    const std::size_t at = entry % LightPool::kBlock;
-    const VI site = context.Sites(i, count, site_start);
-    const SurfaceLanes surface = LoadSurfaces(context.sites, site);
-    const BsdfLanes f =
-        EvaluateBsdf(surface, {hn::Load(d, block.x + at), hn::Load(d, block.y + at), hn::Load(d, block.z + at)});
-    const MF used = hn::Lt(hn::Iota(d, static_cast<float>(i)), hn::Set(d, static_cast<float>(count)));
-    const VF weight = context.Weight(surface, f, hn::Load(d, block.r + at), hn::Load(d, block.g + at),
-                                     hn::Load(d, block.b + at), hn::Load(d, block.density + at), used);
-    hn::StoreU(hn::Load(du, block.code + at), du, out.code + i);
-    hn::StoreU(site, di, out.site + i);
-    hn::StoreU(weight, d, out.weight + i);
-    total = hn::Add(total, weight);
-  }
-  return total;
-}
-
-/// Candidates from the BRDF: Sobol' points with the pixel's digital shift, snapped to the lattice.
-HWY_INLINE VF BsdfCandidates(const CandidateContext& context, const EnvironmentView& environment, std::int32_t count,
-                             std::int32_t offset, const Philox4x32::Counter& random, kernels::CandidateSet& out) {
-  const DF d;
-  const DI di;
-  const DU du;
-  const SobolTable& table = sobol_table();
-  VF total = hn::Zero(d);
-  const float site_start = uniform_float(random[3] * 0x9E3779B9u);
-  for (std::size_t i = 0; i < static_cast<std::size_t>(count); i += hn::Lanes(d)) {
-    const VU sx = hn::Xor(hn::LoadU(du, table.x.data() + i), hn::Set(du, random[1]));
-    const VU sy = hn::Xor(hn::LoadU(du, table.y.data() + i), hn::Set(du, random[2]));
-    const VI site = context.Sites(i, count, site_start);
-    const SurfaceLanes surface = LoadSurfaces(context.sites, site);
-    const VU code = EncodeOctahedral(SampleBsdf(surface, UniformLanes(d, sx), UniformLanes(d, sy)));
-    const Vec3Lanes w = DecodeOctahedral(code);
-    const BsdfLanes f = EvaluateBsdf(surface, w);
-    const RadianceLanes light = EvaluateEnvironment(environment, w);
-    const MF used = hn::Lt(hn::Iota(d, static_cast<float>(i)), hn::Set(d, static_cast<float>(count)));
-    const VF weight = context.Weight(surface, f, light.r, light.g, light.b, light.density, used);
-    const std::size_t at = static_cast<std::size_t>(offset) + i;
-    hn::StoreU(code, du, out.code + at);
-    hn::StoreU(site, di, out.site + at);
-    hn::StoreU(weight, d, out.weight + at);
-    total = hn::Add(total, weight);
-  }
-  return total;
-}
-
 void DrawCandidates(const SiteBlock& sites, const EnvironmentView& environment, const LightPool& pool,
-                    std::int32_t from_light, std::int32_t from_bsdf, const Rng& rng, kernels::CandidateSet& out) {
-  const DF d;
-  const CandidateContext context{sites, hn::Set(d, static_cast<float>(from_light)),
-                                 hn::Set(d, static_cast<float>(from_bsdf)),
-                                 hn::Set(d, static_cast<float>(sites.num_hits) / static_cast<float>(sites.num_sites))};
+                    const kernels::CandidateCounts& counts, const Rng& rng, kernels::CandidateSet& out) {
+  const CandidateContext context{sites, counts, out};
   const Philox4x32::Counter random = rng.bits(0, 0);
-  const VF light = LightCandidates(context, pool, from_light, random, out);
-  const VF bsdf = BsdfCandidates(context, environment, from_bsdf, from_light, random, out);
-  out.count = from_light + from_bsdf;
-  out.total = hn::GetLane(hn::SumOfLanes(d, hn::Add(light, bsdf)));
+  LightCandidates(context, pool, random);
+  BsdfCandidates(context, environment, random);
+  out.count = counts.total();
+
+  // Add up: a running sum per block of candidates, so that choosing N of M looks at N blocks.
+  const DF d;
+  float total = 0;
+  for (std::size_t i = 0; i < static_cast<std::size_t>(out.count); i += kChoiceBlock) {
+    VF sum = hn::Zero(d);
+    const std::size_t end = std::min(i + kChoiceBlock, static_cast<std::size_t>(out.count));
+    for (std::size_t j = i; j < end; j += hn::Lanes(d)) sum = hn::Add(sum, hn::LoadU(d, out.weight + j));
+    total += hn::GetLane(hn::SumOfLanes(d, sum));
+    out.running_total[i / kChoiceBlock] = total;
+  }
+  out.total = total;
 }
 
 void ShadeSamples(const SiteBlock& sites, const EnvironmentView& environment, std::span<const OctDirection> code,
@@ -266,13 +192,14 @@ void sample_bsdf(const SiteBlock& sites, std::span<const std::int32_t> site, std
 }
 
 void draw_candidates(const SiteBlock& sites, const EnvironmentView& environment, const LightPool& pool,
-                     std::int32_t from_light, std::int32_t from_bsdf, const Rng& rng, CandidateSet& out) {
-  BATON_CHECK(sites.num_hits > 0 && from_light >= 0 && from_bsdf >= 0);
-  BATON_CHECK(from_light + from_bsdf >= 1 && from_light + from_bsdf <= limits::kMaxCandidates);
+                     const CandidateCounts& counts, const Rng& rng, CandidateSet& out) {
+  BATON_CHECK(sites.num_hits > 0 && counts.from_light >= 0 && counts.from_bsdf >= 0);
+  BATON_CHECK(counts.total() >= 1 && counts.total() <= limits::kMaxCandidates);
+  BATON_CHECK(!counts.lobe_only || counts.from_bsdf == 0 || (sites.num_lobes > 0 && counts.from_light > 0));
   out.count = 0;
   out.total = 0;
   if (pool.empty()) return;
-  HWY_DYNAMIC_DISPATCH(DrawCandidates)(sites, environment, pool, from_light, from_bsdf, rng, out);
+  HWY_DYNAMIC_DISPATCH(DrawCandidates)(sites, environment, pool, counts, rng, out);
 }
 
 void shade_samples(const SiteBlock& sites, const EnvironmentView& environment, std::span<const OctDirection> code,

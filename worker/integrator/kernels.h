@@ -9,12 +9,13 @@
 #include "common/math/octahedral.h"
 #include "common/math/philox.h"
 #include "worker/integrator/light_pool.h"
+#include "worker/sampling/resampling.h"
 #include "worker/sampling/sequential.h"
 #include "worker/scene/environment_view.h"
 #include "worker/scene/site_block.h"
 
-/// The inner loops, in SIMD with run-time dispatch. No vector type leaves kernels.cpp. Arrays that kernels write in
-/// whole vectors are padded by kPadding elements.
+/// The inner loops, in SIMD with run-time dispatch. No vector type leaves kernels.cpp. Arrays that
+/// kernels write in whole vectors are padded by kPadding elements.
 namespace baton::kernels {
 
 inline constexpr std::size_t kPadding = 16;
@@ -23,53 +24,77 @@ inline constexpr std::size_t kPadding = 16;
 std::string instruction_set();
 
 /// Unit vectors of lattice directions; all spans of one length.
-void decode_directions(std::span<const OctDirection> code, std::span<float> x, std::span<float> y, std::span<float> z);
+void decode_directions(std::span<const OctDirection> code, std::span<float> x, std::span<float> y,
+                       std::span<float> z);
 
 /// Radiance and table density (1/sr) along unit world directions; all spans of one length.
-void evaluate_environment(const EnvironmentView& view, std::span<const float> x, std::span<const float> y,
-                          std::span<const float> z, std::span<float> r, std::span<float> g, std::span<float> b,
-                          std::span<float> density);
+void evaluate_environment(const EnvironmentView& view, std::span<const float> x,
+                          std::span<const float> y, std::span<const float> z, std::span<float> r,
+                          std::span<float> g, std::span<float> b, std::span<float> density);
 
-/// BRDF times cosine (RGB) and density of sample_bsdf for (site, direction) pairs; all spans of one length.
-void evaluate_bsdf(const SiteBlock& sites, std::span<const std::int32_t> site, std::span<const float> x,
-                   std::span<const float> y, std::span<const float> z, std::span<float> r, std::span<float> g,
-                   std::span<float> b, std::span<float> pdf);
+/// BRDF times cosine (RGB) and density of sample_bsdf for (site, direction) pairs; all spans of one
+/// length.
+void evaluate_bsdf(const SiteBlock& sites, std::span<const std::int32_t> site,
+                   std::span<const float> x, std::span<const float> y, std::span<const float> z,
+                   std::span<float> r, std::span<float> g, std::span<float> b,
+                   std::span<float> pdf);
 
 /// Directions drawn from the BRDF for uniforms u0, u1; all spans of one length.
-void sample_bsdf(const SiteBlock& sites, std::span<const std::int32_t> site, std::span<const float> u0,
-                 std::span<const float> u1, std::span<float> x, std::span<float> y, std::span<float> z);
+void sample_bsdf(const SiteBlock& sites, std::span<const std::int32_t> site,
+                 std::span<const float> u0, std::span<const float> u1, std::span<float> x,
+                 std::span<float> y, std::span<float> z);
 
-/// Candidates of one pixel: a properly weighted set for p~(site, w) = p~_site(w) / S. E[sum weight] = Lns.
+/// How many candidates come from where: M_t of each technique.
+struct CandidateCounts {
+  std::int32_t from_light = 0;
+  std::int32_t from_bsdf = 0;
+  /// BRDF candidates come from the lobes of the glossy sites alone; what diffuse reflectance sees
+  /// is left to the light, whose weights it only scales by the cosine. Needs from_light > 0: lobes
+  /// may not reach everywhere.
+  bool lobe_only = false;
+
+  std::int32_t total() const { return from_light + from_bsdf; }
+};
+
+/// Candidates of one pixel: a properly weighted set for p~(site, w) = p~_site(w) / S. E[sum weight]
+/// = Lns.
 struct CandidateSet {
   static constexpr std::size_t kCapacity = limits::kMaxCandidates + 2 * kPadding;
   alignas(64) OctDirection code[kCapacity];
   alignas(64) std::int32_t site[kCapacity];
   alignas(64) float weight[kCapacity];
+  alignas(64) float running_total[kCapacity /
+                                  kChoiceBlock];  ///< sums of the weights, for systematic_choice
   std::int32_t count = 0;
   float total = 0;  ///< sum of the weights
 };
 
-/// Draws `from_light` candidates from the pool and `from_bsdf` from the BRDF, weighted by the balance heuristic
-/// [Veach & Guibas 1995]: p~(y) / sum_t M_t q_t(y). The sites that see a surface share the candidates evenly.
-/// The sum of both counts is in [1, kMaxCandidates]; a black map gives count 0. sites.num_hits must be positive.
-void draw_candidates(const SiteBlock& sites, const EnvironmentView& environment, const LightPool& pool,
-                     std::int32_t from_light, std::int32_t from_bsdf, const Rng& rng, CandidateSet& out);
+/// Draws candidates from the pool and from the BRDF, weighted by the balance heuristic [Veach &
+/// Guibas 1995]: p~(y) / sum_t M_t q_t(y). The sites that see a surface (lobe_only: that have a
+/// lobe) share them evenly. counts.total() is in [1, kMaxCandidates]; a black map gives count 0.
+/// sites.num_hits must be positive, with lobe_only and from_bsdf > 0 also num_lobes.
+void draw_candidates(const SiteBlock& sites, const EnvironmentView& environment,
+                     const LightPool& pool, const CandidateCounts& counts, const Rng& rng,
+                     CandidateSet& out);
 
-/// What is left to do for a sample once its visibility is known: colour[j] = (f cos L)_rgb / p~ at (site, w), 0 where
-/// p~ is 0. directions: unit vectors for the shadow rays. Arrays padded by kPadding.
+/// What is left to do for a sample once its visibility is known: colour[j] = (f cos L)_rgb / p~ at
+/// (site, w), 0 where p~ is 0. directions: unit vectors for the shadow rays. Arrays padded by
+/// kPadding.
 struct ShadedSamples {
   static constexpr std::size_t kCapacity = limits::kMaxParticles + kPadding;
   alignas(64) float x[kCapacity], y[kCapacity], z[kCapacity];
   alignas(64) float r[kCapacity], g[kCapacity], b[kCapacity];
 };
-void shade_samples(const SiteBlock& sites, const EnvironmentView& environment, std::span<const OctDirection> code,
-                   std::span<const std::uint8_t> site, ShadedSamples& out);
+void shade_samples(const SiteBlock& sites, const EnvironmentView& environment,
+                   std::span<const OctDirection> code, std::span<const std::uint8_t> site,
+                   ShadedSamples& out);
 
-/// One frame of the sequential sampler for a pixel whose surfaces did not change (sampling/sequential-inl.h).
-/// environment_before: the frame that the particles come from. lns_before > 0.
+/// One frame of the sequential sampler for a pixel whose surfaces did not change
+/// (sampling/sequential-inl.h). environment_before: the frame that the particles come from.
+/// lns_before > 0.
 SequentialOutcome sequential_step(const SiteBlock& sites, const EnvironmentView& environment_before,
                                   const EnvironmentView& environment_now, const LightPool& pool,
-                                  const SequentialSettings& settings, float lns_before, const RngKey& key,
-                                  ParticleSpan particles);
+                                  const SequentialSettings& settings, float lns_before,
+                                  const RngKey& key, ParticleSpan particles);
 
 }  // namespace baton::kernels

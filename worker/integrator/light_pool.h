@@ -9,20 +9,22 @@
 
 namespace baton {
 
-/// Directions drawn from a frame's environment before its pixels are rendered; pixels pick candidates and proposals from
-/// it. One Owen-scrambled Sobol' sequence through the map's sampling table, so every aligned block is well spread by
-/// itself (blocks of eight are shuffled within). Each entry's direction has density `density`, so a pixel that chooses entries independently of their contents
-/// stays unbiased; pixels that choose the same entries have correlated errors.
+/// Directions drawn from a frame's environment before its pixels are rendered; pixels pick
+/// candidates and proposals from it. One Owen-scrambled Sobol' sequence through the map's sampling
+/// table, so every aligned block is well spread by itself (blocks of eight are shuffled within).
+/// Each entry's direction has density `density`, so a pixel that chooses entries independently of
+/// their contents stays unbiased; pixels that choose the same entries have correlated errors.
 struct LightPool {
-  static constexpr std::uint32_t kSize = 1u << 15;  ///< entries
-  static constexpr std::uint32_t kBlock = 8;        ///< entries that lie together in memory
+  static constexpr std::uint32_t kSize = 1u
+                                         << 13;  ///< entries: few enough to stay in a core's cache
+  static constexpr std::uint32_t kBlock = 8;     ///< entries that lie together in memory
 
   /// Eight entries, field by field: the unit of SIMD loads.
   struct alignas(64) Block {
-    OctDirection code[kBlock];                ///< on the lattice of carried directions
-    float x[kBlock], y[kBlock], z[kBlock];    ///< the decoded directions
-    float r[kBlock], g[kBlock], b[kBlock];    ///< radiance of this frame
-    float density[kBlock];                    ///< 1/sr
+    OctDirection code[kBlock];              ///< on the lattice of carried directions
+    float x[kBlock], y[kBlock], z[kBlock];  ///< the decoded directions
+    float r[kBlock], g[kBlock], b[kBlock];  ///< radiance of this frame
+    float density[kBlock];                  ///< 1/sr
     float before_r[kBlock], before_g[kBlock], before_b[kBlock];  ///< radiance of the frame before
   };
   std::vector<Block> blocks;  ///< (kSize / kBlock); empty for a black map
@@ -31,7 +33,8 @@ struct LightPool {
   std::size_t size_bytes() const { return blocks.size() * sizeof(Block); }
 };
 
-/// The pool of one frame. before: the environment that `before_*` is read from (the same as `now` for the first frame).
+/// The pool of one frame. before: the environment that `before_*` is read from (the same as `now`
+/// for the first frame).
 LightPool make_light_pool(const Environment& now, const Environment& before, std::uint64_t job_seed,
                           std::uint32_t frame);
 

@@ -5,13 +5,15 @@
 namespace baton {
 namespace {
 
-/// Whether the pixel starts afresh in this frame. A pixel's turn comes every `refresh_every` frames; the turns are spread
-/// over the image and over the frames but the second, in which every pixel has just begun.
+/// Whether the pixel starts afresh in this frame. A pixel's turn comes every `refresh_every`
+/// frames; the turns are spread over the image and over the frames but the second, in which every
+/// pixel has just begun.
 bool is_refresh_turn(const RngKey& key, std::int32_t frame_index, std::int32_t refresh_every) {
   if (refresh_every == 0) return false;
   if (refresh_every <= 2) return frame_index % refresh_every == 0;
   const Rng rng({.job_seed = key.job_seed, .frame = 0, .pixel = key.pixel}, PassId::refresh);
-  const auto turn = static_cast<std::int32_t>(rng.bits(0, 0)[0] % static_cast<std::uint32_t>(refresh_every - 1));
+  const auto turn =
+      static_cast<std::int32_t>(rng.bits(0, 0)[0] % static_cast<std::uint32_t>(refresh_every - 1));
   return (frame_index - 2 - turn) % refresh_every == 0;
 }
 
@@ -27,9 +29,11 @@ PixelDiagnostics SequentialSampler::sample(const PixelInput& input, kernels::Can
   }
 
   // Carry the particles over.
-  const SequentialOutcome outcome =
-      kernels::sequential_step(input.sites, input.before, input.now, input.light.pool, settings_, samples.lns, input.key,
-                               {samples.direction.data(), samples.site.data(), samples.weight.data()});
+  SequentialSettings settings = settings_;
+  if (input.sites.num_lobes == 0) settings.local_move_fraction = 0;
+  const SequentialOutcome outcome = kernels::sequential_step(
+      input.sites, input.before, input.now, input.light.pool, settings, samples.lns, input.key,
+      {samples.direction.data(), samples.site.data(), samples.weight.data()});
   PixelDiagnostics diagnostics{
       // Both targets at the old positions and at every proposal.
       .ess = outcome.ess,
@@ -53,13 +57,18 @@ PixelDiagnostics SequentialSampler::sample(const PixelInput& input, kernels::Can
 
 std::unique_ptr<const PixelSampler> make_pixel_sampler(const SamplingSpec& spec) {
   const std::int32_t n = spec.num_particles;
-  const CandidateCounts candidates = split_candidates(spec.num_candidates, spec.brdf_fraction);
+  const BidirectionalSampler bidirectional(spec.num_candidates, spec.brdf_fraction);
   switch (spec.method) {
-    case Method::reference: return nullptr;
-    case Method::environment: return std::make_unique<DirectSampler>(CandidateCounts{n, 0});
-    case Method::brdf: return std::make_unique<DirectSampler>(CandidateCounts{0, n});
-    case Method::mis: return std::make_unique<DirectSampler>(split_candidates(n, spec.brdf_fraction));
-    case Method::bidirectional: return std::make_unique<BidirectionalSampler>(candidates);
+    case Method::reference:
+      return nullptr;
+    case Method::environment:
+      return std::make_unique<DirectSampler>(CandidateCounts{.from_light = n});
+    case Method::brdf:
+      return std::make_unique<DirectSampler>(CandidateCounts{.from_bsdf = n});
+    case Method::mis:
+      return std::make_unique<DirectSampler>(split_candidates(n, spec.brdf_fraction));
+    case Method::bidirectional:
+      return std::make_unique<BidirectionalSampler>(bidirectional);
     case Method::sequential:
       return std::make_unique<SequentialSampler>(
           SequentialSettings{.num_particles = n,
@@ -68,7 +77,7 @@ std::unique_ptr<const PixelSampler> make_pixel_sampler(const SamplingSpec& spec)
                              .resampling = spec.resampling,
                              .local_move_cosine = std::cos(spec.local_move_deg * kPi / 180),
                              .local_move_fraction = spec.local_move_fraction},
-          candidates, spec.refresh_every);
+          bidirectional, spec.refresh_every);
   }
   return nullptr;
 }

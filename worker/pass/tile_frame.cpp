@@ -95,7 +95,11 @@ void TileFrameRenderer::sample(Batch& batch, const FrameLight& light, bool has_h
     // Gather the pixel's surfaces.
     sites.clear(surfaces_.num_sites);
     for (std::size_t s = 0; s < hits.size(); ++s) {
-      if (hits[s].hit) sites.add(static_cast<int>(s), hits[s].point, context_.scene->materials[hits[s].material]);
+      if (hits[s].hit) {
+        sites.add(static_cast<int>(s), hits[s].point, context_.scene->materials[hits[s].material]);
+      } else {
+        sites.add_miss(static_cast<int>(s));
+      }
     }
     if (sites.num_hits == 0) {
       state.source[index] = PixelSource::background;
@@ -159,14 +163,16 @@ void TileFrameRenderer::trace(Batch& batch) {
 void TileFrameRenderer::shade(Batch& batch, const SampleState& state) {
   const StageTimer timer(stats_.seconds_shade);
   const auto n = static_cast<std::size_t>(state.num_particles);
+  std::size_t i = 0;
   for (std::size_t r = 0; r < batch.rays.size(); ++r) {
-    const std::size_t i = batch.ray_sample[r] / n;
+    const std::size_t sample = batch.ray_sample[r];
+    while (sample >= (i + 1) * n) ++i;
     if (batch.rays.t_far[r] < 0) {
       batch.pixels[i].mask = 0;
       continue;
     }
-    batch.pixels[i].radiance += batch.sample_color[batch.ray_sample[r]];
-    batch.pixels[i].visibility += state.weight[batch.first * n + batch.ray_sample[r]];
+    batch.pixels[i].radiance += batch.sample_color[sample];
+    batch.pixels[i].visibility += state.weight[batch.first * n + sample];
   }
 }
 

@@ -14,7 +14,8 @@ namespace {
 constexpr std::size_t kMaxChoices = limits::kMaxParticles;
 
 /// Inverts the distribution function of `weights` at ascending positions in [0, total).
-void invert_sorted(std::span<const float> weights, std::span<const float> positions, std::span<std::int32_t> out) {
+void invert_sorted(std::span<const float> weights, std::span<const float> positions,
+                   std::span<std::int32_t> out) {
   const auto last_positive = [&] {
     std::size_t last = weights.size() - 1;
     while (last > 0 && !(weights[last] > 0)) --last;
@@ -23,7 +24,8 @@ void invert_sorted(std::span<const float> weights, std::span<const float> positi
   std::size_t j = 0;
   float cumulative = weights[0];
   for (std::size_t m = 0; m < positions.size(); ++m) {
-    // Rounding may leave the last positions past the sum: they belong to the last particle that lives.
+    // Rounding may leave the last positions past the sum: they belong to the last particle that
+    // lives.
     while (cumulative <= positions[m] && j < last_positive) cumulative += weights[++j];
     out[m] = static_cast<std::int32_t>(j);
   }
@@ -34,15 +36,16 @@ float uniform_at(const Rng& rng, std::uint32_t step, std::size_t index) {
   return rng.uniforms(step, static_cast<std::uint32_t>(index / 4))[index % 4];
 }
 
-void multinomial(std::span<const float> weights, float total, std::span<std::int32_t> out, const Rng& rng,
-                 std::uint32_t step) {
+void multinomial(std::span<const float> weights, float total, std::span<std::int32_t> out,
+                 const Rng& rng, std::uint32_t step) {
   std::array<float, kMaxChoices> positions{};
   for (std::size_t m = 0; m < out.size(); ++m) positions[m] = uniform_at(rng, step, m) * total;
   std::sort(positions.begin(), positions.begin() + static_cast<std::ptrdiff_t>(out.size()));
   invert_sorted(weights, std::span(positions).first(out.size()), out);
 }
 
-void residual(std::span<const float> weights, std::span<std::int32_t> out, const Rng& rng, std::uint32_t step) {
+void residual(std::span<const float> weights, std::span<std::int32_t> out, const Rng& rng,
+              std::uint32_t step) {
   std::array<float, kMaxChoices> rest{};
   float rest_total = 0;
   std::size_t filled = 0;
@@ -54,56 +57,49 @@ void residual(std::span<const float> weights, std::span<std::int32_t> out, const
     rest_total += rest[j];
   }
   if (filled < out.size()) {
-    multinomial(std::span<const float>(rest).first(weights.size()), rest_total, out.subspan(filled), rng, step);
+    multinomial(std::span<const float>(rest).first(weights.size()), rest_total, out.subspan(filled),
+                rng, step);
   }
 }
 
 }  // namespace
 
-void systematic_choice(std::span<const float> weights, float total, float u, std::span<std::int32_t> chosen) {
-  // Skip whole blocks by their sums first: N may be hundreds, K is small.
-  constexpr std::size_t kBlock = 16;
-  const std::size_t blocks = (weights.size() + kBlock - 1) / kBlock;
-  const float stride = total / static_cast<float>(chosen.size());
+void systematic_choice(std::span<const float> weights, std::span<const float> running_total,
+                       float u, std::span<std::int32_t> chosen) {
+  const std::size_t blocks = (weights.size() + kChoiceBlock - 1) / kChoiceBlock;
+  BATON_CHECK(blocks > 0 && running_total.size() == blocks);
+  const float stride = running_total.back() / static_cast<float>(chosen.size());
   std::size_t block = 0;
-  float before = 0;
-  const auto block_sum = [&](std::size_t b) {
-    float sum = 0;
-    for (std::size_t i = b * kBlock; i < std::min((b + 1) * kBlock, weights.size()); ++i) sum += weights[i];
-    return sum;
-  };
-  float sum = block_sum(0);
-  std::int32_t last_positive = -1;
+  std::size_t next = 0;  // first weight that is not in `cumulative` yet
+  float cumulative = 0;
+  std::int32_t pick = -1;
   for (std::size_t m = 0; m < chosen.size(); ++m) {
     const float position = (static_cast<float>(m) + u) * stride;
-    while (block + 1 < blocks && before + sum <= position) {
-      before += sum;
-      sum = block_sum(++block);
+
+    // Skip whole blocks, then walk within one. Rounding may leave the position past its last
+    // weight, which then is it.
+    while (block + 1 < blocks && running_total[block] <= position) {
+      cumulative = running_total[block++];
+      next = block * kChoiceBlock;
+      pick = -1;
     }
-    float cumulative = before;
-    std::int32_t pick = -1;
-    for (std::size_t i = block * kBlock; i < std::min((block + 1) * kBlock, weights.size()); ++i) {
-      if (!(weights[i] > 0)) continue;
-      cumulative += weights[i];
-      pick = static_cast<std::int32_t>(i);
-      if (cumulative > position) break;
+    const std::size_t end = std::min((block + 1) * kChoiceBlock, weights.size());
+    for (; next < end && (pick < 0 || cumulative <= position); ++next) {
+      cumulative += weights[next];
+      pick = weights[next] > 0 ? static_cast<std::int32_t>(next) : pick;
     }
-    // A block of zeros at the very end (rounding): fall back to the last positive weight of all.
-    if (pick < 0) {
-      if (last_positive < 0) {
-        for (std::size_t i = weights.size(); i-- > 0 && last_positive < 0;) {
-          if (weights[i] > 0) last_positive = static_cast<std::int32_t>(i);
-        }
-      }
-      pick = last_positive;
+
+    // A block of zeros at the very end (rounding): the last positive weight of all.
+    for (std::size_t i = weights.size(); pick < 0 && i-- > 0;) {
+      if (weights[i] > 0) pick = static_cast<std::int32_t>(i);
     }
     BATON_CHECK(pick >= 0);
     chosen[m] = pick;
   }
 }
 
-void resample(ResamplingScheme scheme, std::span<const float> weights, std::span<std::int32_t> ancestors, const Rng& rng,
-              std::uint32_t step) {
+void resample(ResamplingScheme scheme, std::span<const float> weights,
+              std::span<std::int32_t> ancestors, const Rng& rng, std::uint32_t step) {
   BATON_CHECK(!weights.empty() && weights.size() <= kMaxChoices && ancestors.size() <= kMaxChoices);
   std::array<float, kMaxChoices> positions{};
   const std::span<float> used = std::span(positions).first(ancestors.size());
@@ -119,8 +115,10 @@ void resample(ResamplingScheme scheme, std::span<const float> weights, std::span
         used[m] = (static_cast<float>(m) + uniform_at(rng, step, m)) / count;
       }
       return invert_sorted(weights, used, ancestors);
-    case ResamplingScheme::multinomial: return multinomial(weights, 1, ancestors, rng, step);
-    case ResamplingScheme::residual: return residual(weights, ancestors, rng, step);
+    case ResamplingScheme::multinomial:
+      return multinomial(weights, 1, ancestors, rng, step);
+    case ResamplingScheme::residual:
+      return residual(weights, ancestors, rng, step);
   }
 }
 

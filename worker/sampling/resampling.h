@@ -18,8 +18,13 @@ namespace baton {
 void resample(ResamplingScheme scheme, std::span<const float> weights, std::span<std::int32_t> ancestors, const Rng& rng,
               std::uint32_t step);
 
-/// Systematic choice of K from N unnormalised weights that sum to `total` (> 0), u in [0, 1): the inverse distribution
-/// function at (m + u) / K * total. A weight of zero is never chosen.
-void systematic_choice(std::span<const float> weights, float total, float u, std::span<std::int32_t> chosen);
+/// Weights to choose from are summed by blocks of so many.
+inline constexpr std::size_t kChoiceBlock = 16;
+
+/// Systematic choice of K from N unnormalised weights, u in [0, 1): the inverse distribution function at
+/// (m + u) / K of the total. running_total: (ceil(N / kChoiceBlock),) sums of the weights up to the end of each block,
+/// the last one positive. A weight of zero is never chosen.
+void systematic_choice(std::span<const float> weights, std::span<const float> running_total, float u,
+                       std::span<std::int32_t> chosen);
 
 }  // namespace baton

@@ -26,7 +26,6 @@ struct SurfaceLanes {
 /// table[site] per lane; site in [0, 16).
 HWY_INLINE VF LookUp(const SiteBlock::Array& table, VI site, int num_sites) {
   const DF d;
-  if (num_sites == 1) return hn::Set(d, table[0]);
   if constexpr (hn::MaxLanes(DF()) == 8) {
     const DI di;
     const VF low = hn::TableLookupLanes(hn::Load(d, table.data()),
@@ -40,10 +39,10 @@ HWY_INLINE VF LookUp(const SiteBlock::Array& table, VI site, int num_sites) {
   }
 }
 
-HWY_INLINE SurfaceLanes LoadSurfaces(const SiteBlock& b, VI site) {
-  const int n = b.num_sites;
+template <class Read>
+HWY_INLINE SurfaceLanes ReadSurfaces(const SiteBlock& b, const Read& read) {
   const auto vec = [&](const SiteBlock::Array& x, const SiteBlock::Array& y, const SiteBlock::Array& z) HWY_ATTR {
-    return Vec3Lanes{LookUp(x, site, n), LookUp(y, site, n), LookUp(z, site, n)};
+    return Vec3Lanes{read(x), read(y), read(z)};
   };
   return {.ns = vec(b.ns_x, b.ns_y, b.ns_z),
           .ng = vec(b.ng_x, b.ng_y, b.ng_z),
@@ -51,19 +50,35 @@ HWY_INLINE SurfaceLanes LoadSurfaces(const SiteBlock& b, VI site) {
           .mirror = vec(b.mirror_x, b.mirror_y, b.mirror_z),
           .kd = vec(b.kd_r, b.kd_g, b.kd_b),
           .ks = vec(b.ks_r, b.ks_g, b.ks_b),
-          .shape = LookUp(b.shape, site, n),
-          .lobe_scale = LookUp(b.lobe_scale, site, n),
-          .specular_probability = LookUp(b.specular_probability, site, n),
-          .is_ggx = hn::Gt(LookUp(b.is_ggx, site, n), hn::Zero(DF())),
+          .shape = read(b.shape),
+          .lobe_scale = read(b.lobe_scale),
+          .specular_probability = read(b.specular_probability),
+          .is_ggx = hn::Gt(read(b.is_ggx), hn::Zero(DF())),
           .any_phong = b.any_phong,
           .any_ggx = b.any_ggx};
 }
 
+/// One site for all lanes.
+HWY_INLINE SurfaceLanes LoadSurface(const SiteBlock& b, std::size_t site) {
+  return ReadSurfaces(b, [site](const SiteBlock::Array& table) HWY_ATTR { return hn::Set(DF(), table[site]); });
+}
+
+/// A site per lane.
+HWY_INLINE SurfaceLanes LoadSurfaces(const SiteBlock& b, VI site) {
+  if (b.num_sites == 1) return LoadSurface(b, 0);
+  return ReadSurfaces(b, [&](const SiteBlock::Array& table) HWY_ATTR { return LookUp(table, site, b.num_sites); });
+}
+
 /// f_c = diffuse * kd_c + lobe * ks_c + white, with the cosine to the shading normal; all 0 below either horizon.
-/// pdf: density of sample_bsdf.
+/// The densities (1/sr) of sampling by the cosine and by the lobe; lobe_pdf is 0 where there is no lobe.
 struct BsdfLanes {
-  VF diffuse, lobe, white, cosine, pdf;
+  VF diffuse, lobe, white, cosine, cosine_pdf, lobe_pdf;
 };
+
+/// Density of sample_bsdf: the mixture of both lobes.
+HWY_INLINE VF MixturePdf(const SurfaceLanes& s, const BsdfLanes& f) {
+  return hn::MulAdd(s.specular_probability, hn::Sub(f.lobe_pdf, f.cosine_pdf), f.cosine_pdf);
+}
 
 /// max(a . b, 0)^s of unit vectors, as (1 - |a - b|^2 / 2)^s: sharp lobes keep their digits.
 HWY_INLINE VF CosinePower(const Vec3Lanes& a, const Vec3Lanes& b, VF s) {
@@ -97,14 +112,14 @@ HWY_INLINE BsdfLanes EvaluateBsdf(const SurfaceLanes& s, const Vec3Lanes& wi) {
   out.diffuse = hn::Set(d, kInvPi);
   out.lobe = zero;
   out.white = zero;
-  const VF cosine_pdf = hn::Mul(hn::Max(n_wi, zero), hn::Set(d, kInvPi));
-  VF lobe_pdf = zero;
+  out.cosine_pdf = hn::Mul(hn::Max(n_wi, zero), hn::Set(d, kInvPi));
+  out.lobe_pdf = zero;
 
   if (s.any_phong) {
     const VF power = CosinePower(s.mirror, wi, s.shape);
     out.lobe = hn::Mul(s.lobe_scale, power);
     // (e + 1) / (2 pi), from lobe_scale = (e + 2) / (2 pi).
-    lobe_pdf = hn::Mul(hn::Sub(s.lobe_scale, hn::Set(d, 0.5f * kInvPi)), power);
+    out.lobe_pdf = hn::Mul(hn::Max(hn::Sub(s.lobe_scale, hn::Set(d, 0.5f * kInvPi)), zero), power);
   }
   if (s.any_ggx) {
     const VF n_wo = hn::Max(Dot(s.ns, s.wo), hn::Set(d, 1e-4f));
@@ -133,22 +148,22 @@ HWY_INLINE BsdfLanes EvaluateBsdf(const SurfaceLanes& s, const Vec3Lanes& wi) {
     out.diffuse = hn::IfThenElse(s.is_ggx, hn::Mul(out.diffuse, keep), out.diffuse);
     out.lobe = hn::IfThenElse(s.is_ggx, hn::Mul(dv, keep), out.lobe);
     out.white = hn::IfThenElseZero(s.is_ggx, hn::Mul(dv, schlick));
-    lobe_pdf = hn::IfThenElse(s.is_ggx, hn::Div(quarter, hn::Add(one, lambda_o)), lobe_pdf);
+    out.lobe_pdf = hn::IfThenElse(s.is_ggx, hn::Div(quarter, hn::Add(one, lambda_o)), out.lobe_pdf);
   }
-  out.pdf = hn::MulAdd(s.specular_probability, hn::Sub(lobe_pdf, cosine_pdf), cosine_pdf);
   return out;
 }
 
-/// A direction around the surface per lane, density EvaluateBsdf().pdf. u0, u1 uniform in [0, 1).
-HWY_INLINE Vec3Lanes SampleBsdf(const SurfaceLanes& s, VF u0, VF u1) {
+/// A direction around the surface per lane: from the lobe with `specular_probability`, else from the cosine. u0, u1
+/// uniform in [0, 1).
+HWY_INLINE Vec3Lanes SampleBsdf(const SurfaceLanes& s, VF specular_probability, VF u0, VF u1) {
   const DF d;
   const VF zero = hn::Zero(d);
   const VF one = hn::Set(d, 1.0f);
   // One stretch of u0 chooses the lobe, the position within it samples the lobe: well spread points stay so.
-  const MF specular = hn::Lt(u0, s.specular_probability);
-  const VF below = hn::Div(u0, hn::Max(s.specular_probability, hn::Set(d, 1e-20f)));
-  const VF over = hn::Div(hn::Sub(u0, s.specular_probability),
-                          hn::Max(hn::Sub(one, s.specular_probability), hn::Set(d, 1e-20f)));
+  const MF specular = hn::Lt(u0, specular_probability);
+  const VF below = hn::Div(u0, hn::Max(specular_probability, hn::Set(d, 1e-20f)));
+  const VF over = hn::Div(hn::Sub(u0, specular_probability),
+                          hn::Max(hn::Sub(one, specular_probability), hn::Set(d, 1e-20f)));
   const VF u = hn::Clamp(hn::IfThenElse(specular, below, over), zero, hn::Set(d, 0x1.fffffep-1f));
   VF sine, cosine;
   SinCosTurns(u1, sine, cosine);

@@ -6,8 +6,20 @@ namespace baton {
 
 void SiteBlock::clear(int sites) {
   BATON_CHECK(sites >= 1 && sites <= kMaxSites);
-  *this = SiteBlock{};
   num_sites = sites;
+  num_hits = 0;
+  num_lobes = 0;
+  specular_share = 0;
+  any_phong = false;
+  any_ggx = false;
+}
+
+void SiteBlock::add_miss(int site) {
+  const auto s = static_cast<std::size_t>(site);
+  for (Array* array : {&ns_x, &ns_y, &ns_z, &ng_x, &ng_y, &ng_z, &wo_x, &wo_y, &wo_z, &mirror_x, &mirror_y, &mirror_z, &kd_r,
+                       &kd_g, &kd_b, &ks_r, &ks_g, &ks_b, &shape, &lobe_scale, &specular_probability, &is_ggx}) {
+    (*array)[s] = 0;
+  }
 }
 
 void SiteBlock::add(int site, const ShadingPoint& point, const Material& material) {
@@ -35,7 +47,9 @@ void SiteBlock::add(int site, const ShadingPoint& point, const Material& materia
 
   any_phong = any_phong || phong;
   any_ggx = any_ggx || ggx;
+  specular_share += (specular_probability[s] - specular_share) / static_cast<float>(num_hits + 1);
   hit_sites[static_cast<std::size_t>(num_hits++)] = site;
+  if (specular_probability[s] > 0) lobe_sites[static_cast<std::size_t>(num_lobes++)] = site;
 }
 
 }  // namespace baton

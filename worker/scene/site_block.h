@@ -7,8 +7,9 @@
 
 namespace baton {
 
-/// The surfaces that the sites of one pixel see, as structure of arrays for the SIMD kernels. Index: site, [0, S).
-/// A site without a surface has zero reflectance, so its target is 0 everywhere.
+/// The surfaces that the sites of one pixel see, as structure of arrays for the SIMD kernels.
+/// Index: site, [0, S). A site without a surface has zero reflectance, so its target is 0
+/// everywhere.
 struct alignas(64) SiteBlock {
   static constexpr int kMaxSites = 16;
   using Array = std::array<float, kMaxSites>;
@@ -22,18 +23,24 @@ struct alignas(64) SiteBlock {
   Array shape{};                             ///< phong: exponent; ggx: alpha
   Array lobe_scale{};                        ///< phong: (s + 2) / (2 pi); ggx: 1
   Array specular_probability{};
-  Array is_ggx{};                            ///< 0 or 1
+  Array is_ggx{};  ///< 0 or 1
 
-  std::int32_t num_sites = 1;                       ///< S
-  std::int32_t num_hits = 0;                        ///< sites that see a surface
-  std::array<std::int32_t, kMaxSites> hit_sites{};  ///< their indices, ascending
+  std::int32_t num_sites = 1;  ///< S
+  std::int32_t num_hits = 0;   ///< sites that see a surface
+  std::int32_t num_lobes = 0;  ///< sites whose surface has a lobe beside the diffuse one
+  std::array<std::int32_t, kMaxSites> hit_sites{};   ///< their indices, ascending
+  std::array<std::int32_t, kMaxSites> lobe_sites{};  ///< their indices, ascending
+  float specular_share = 0;  ///< mean specular_probability of the sites that see a surface
   bool any_phong = false;
   bool any_ggx = false;
 
-  /// Forgets all sites; `sites` in [1, kMaxSites].
+  /// Starts anew with `sites` in [1, kMaxSites]; each must then be added, in ascending order, with
+  /// add or add_miss.
   void clear(int sites);
-  /// Sets site `site` to a surface. Sites must be added in ascending order.
+  /// Sets site `site` to a surface.
   void add(int site, const ShadingPoint& point, const Material& material);
+  /// Sets site `site` to nothing.
+  void add_miss(int site);
 };
 
 }  // namespace baton

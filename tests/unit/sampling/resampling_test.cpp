@@ -72,9 +72,19 @@ TEST(Resample, OneLivingParticleGetsAll) {
   }
 }
 
+std::vector<float> running_totals(const std::vector<float>& weights) {
+  std::vector<float> totals;
+  float total = 0;
+  for (std::size_t i = 0; i < weights.size(); ++i) {
+    total += weights[i];
+    if (i % kChoiceBlock + 1 == kChoiceBlock || i + 1 == weights.size()) totals.push_back(total);
+  }
+  return totals;
+}
+
 TEST(SystematicChoice, InvertsTheDistributionFunction) {
   std::vector<std::int32_t> chosen(4);
-  systematic_choice(std::vector<float>{1, 1, 0, 2}, 4, 0.5f, chosen);
+  systematic_choice(std::vector<float>{1, 1, 0, 2}, std::vector<float>{4}, 0.5f, chosen);
   EXPECT_THAT(chosen, ElementsAre(0, 1, 3, 3));
 }
 
@@ -86,7 +96,7 @@ TEST(SystematicChoice, AgreesWithResampleOverManyBlocks) {
     total += weights[i];
   }
   std::vector<std::int32_t> chosen(64);
-  systematic_choice(weights, total, 0.37f, chosen);
+  systematic_choice(weights, running_totals(weights), 0.37f, chosen);
   std::size_t j = 0;
   float before = 0;
   for (std::size_t m = 0; m < chosen.size(); ++m) {
@@ -100,9 +110,10 @@ TEST(SystematicChoice, NeverTakesAZeroWeight) {
   std::vector<float> weights(40, 0.0f);
   weights[3] = 1e-20f;
   std::vector<std::int32_t> chosen(16);
-  systematic_choice(weights, 1e-20f, 0.999999f, chosen);
+  systematic_choice(weights, running_totals(weights), 0.999999f, chosen);
   EXPECT_THAT(chosen, Each(3));
-  systematic_choice(weights, 2e-20f, 0.999999f, chosen);  // a total that rounding made too large
+  const std::vector<float> too_large{1e-20f, 1e-20f, 2e-20f};  // as rounding might make them
+  systematic_choice(weights, too_large, 0.999999f, chosen);
   EXPECT_THAT(chosen, Each(3));
 }
 
