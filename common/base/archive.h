@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <concepts>
 #include <cstdint>
 #include <string>
@@ -13,7 +14,7 @@ namespace baton {
 
 /// The byte form of plain structs that list their members in `template <class A> void fields(A&
 /// a)`: members in order, little-endian, no padding. A bool is one byte 0 or 1; an enum its
-/// underlying integer; a string u32 length and bytes; a vector u32 count and elements; a Digest its
+/// underlying integer; a string u32 length and bytes; a vector u32 count and elements; an array its elements; a Digest its
 /// two halves. Every enum that is archived has a `last_of(Enum)` beside it, found by
 /// argument-dependent lookup: larger values are refused.
 
@@ -41,6 +42,10 @@ class ArchiveWriter {
   template <class T>
   void write(std::vector<T>& values) {
     writer_.put(static_cast<std::uint32_t>(values.size()));
+    for (T& value : values) write(value);
+  }
+  template <class T, std::size_t N>
+  void write(std::array<T, N>& values) {
     for (T& value : values) write(value);
   }
   template <class T>
@@ -92,6 +97,10 @@ class ArchiveReader {
     const auto count = reader_.get<std::uint32_t>();
     values.clear();
     for (std::uint32_t i = 0; i < count && reader_.ok(); ++i) read(values.emplace_back());
+  }
+  template <class T, std::size_t N>
+  void read(std::array<T, N>& values) {
+    for (T& value : values) read(value);
   }
   template <class T>
   requires requires(T& value, ArchiveReader& a) { value.fields(a); }

@@ -34,6 +34,7 @@ inline constexpr int kMaxDistributions = 64;
 inline constexpr int kMaxExchangeSide = 16;
 inline constexpr int kMaxPartitions = 64;
 inline constexpr int kMaxDilation = 8;
+inline constexpr int kMaxMoves = 64;  ///< per distribution
 inline constexpr int kMaxReferenceSamples = 1 << 24;
 inline constexpr int kMaxCheckpointEvery = 1000;
 inline constexpr int kMaxEnvironmentSide = 32768;

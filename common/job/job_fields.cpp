@@ -58,11 +58,20 @@ void fields(JobArchive& a, SamplingSpec& sampling) {
   a.number("brdfFraction", sampling.brdf_fraction, kUnitRange);
   a.boolean("misCompensation", sampling.mis_compensation);
   a.integer("numDistributions", sampling.num_distributions, 1, limits::kMaxDistributions);
+  a.integer("numMoves", sampling.num_moves, 1, limits::kMaxMoves);
+  a.choice("lnsUpdate", sampling.lns_update, kLnsUpdates);
   a.number("essRatioMin", sampling.ess_ratio_min, kUnitRange);
   a.choice("resampling", sampling.resampling, kResamplingSchemes);
   a.number("localMoveDeg", sampling.local_move_deg, {.min = 0, .max = 90, .min_open = true});
   a.number("localMoveFraction", sampling.local_move_fraction, kUnitRange);
+  a.choice("startMethod", sampling.start_method, kStartMethods);
   a.integer("refreshEvery", sampling.refresh_every, 0, limits::kMaxFrames);
+  a.number("refreshRatio", sampling.refresh_ratio, {.min = 1, .max = 1e6, .min_open = true});
+  a.integer("refreshCandidates", sampling.refresh_candidates, 1, limits::kMaxCandidates);
+  if (sampling.refresh_ratio && sampling.refresh_candidates < sampling.num_particles) {
+    a.fault("refreshCandidates", fmt::format("at least numParticles ({})", sampling.num_particles),
+            std::to_string(sampling.refresh_candidates));
+  }
   a.integer("referenceSamples", sampling.reference_samples, 2, limits::kMaxReferenceSamples);
 }
 

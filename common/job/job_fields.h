@@ -29,9 +29,14 @@ inline constexpr std::array<std::string_view, 4> kSecondPassForms{
     "corrected", "published", "published-kept", "extra-samples"};
 inline constexpr std::array<std::string_view, 3> kMaskPolicies{"same-samples", "split",
                                                                "cross-fold"};
+inline constexpr std::array<std::string_view, 4> kLnsUpdates{"ratio", "pathLeft", "pathRight",
+                                                             "pathTrapezoid"};
+inline constexpr std::array<std::string_view, 4> kStartMethods{"environment", "brdf", "mis",
+                                                               "bidirectional"};
 inline constexpr std::array<std::string_view, 2> kBackgrounds{"environment", "transparent"};
-inline constexpr std::array<std::string_view, 9> kAovs{
-    "lns", "visibility", "ess", "acceptance", "source", "normal", "depth", "variance", "mask"};
+inline constexpr std::array<std::string_view, 12> kAovs{
+    "lns",   "visibility", "ess",  "acceptance",      "source",                "normal",
+    "depth", "variance",   "mask", "acceptanceLocal", "acceptanceIndependent", "resampled"};
 inline constexpr std::array<std::string_view, 2> kPixelTypes{"half", "float"};
 inline constexpr std::array<std::string_view, 5> kCompressions{"none", "rle", "zips", "zip", "piz"};
 inline constexpr std::array<std::string_view, 2> kKeyCurves{"linear", "smooth"};

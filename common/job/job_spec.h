@@ -173,6 +173,11 @@ struct EnvironmentSpec {
 // ---- sampling ----------------------------------------------------------------------------------------------
 enum class Method : std::uint8_t { reference, environment, brdf, mis, bidirectional, sequential };
 enum class ResamplingScheme : std::uint8_t { systematic, stratified, multinomial, residual };
+/// How `sequential` carries the normalising constant: by the ratio of the weights, or by path sampling with a left, right or
+/// trapezoidal sum over the intermediate distributions.
+enum class LnsUpdate : std::uint8_t { ratio, path_left, path_right, path_trapezoid };
+/// The sampler that starts a pixel of `sequential`.
+enum class StartMethod : std::uint8_t { environment, brdf, mis, bidirectional };
 
 struct SamplingSpec {
   Method method = Method::sequential;
@@ -181,11 +186,18 @@ struct SamplingSpec {
   float brdf_fraction = 0.25f;     ///< [0, 1], of candidates: mis: from the BRDF; SIR: at most, from glossy lobes; 1: whole BRDF
   bool mis_compensation = false;   ///< [Karlik et al. 2019]; mis
   int num_distributions = 5;       ///< P: intermediate distributions per frame, [1, limits::kMaxDistributions]
+  int num_moves = 1;               ///< Metropolis-Hastings moves per distribution, [1, limits::kMaxMoves]
+  LnsUpdate lns_update = LnsUpdate::ratio;
   float ess_ratio_min = 0.5f;      ///< resample when ESS < ess_ratio_min * N, [0, 1]
   ResamplingScheme resampling = ResamplingScheme::systematic;
   float local_move_deg = 4;        ///< half-angle of local moves, (0, 90]
   float local_move_fraction = 0.5f;  ///< share of moves that are local, [0, 1]
+  StartMethod start_method = StartMethod::bidirectional;  ///< of fresh pixels; all but the last give N weighted samples
   int refresh_every = 8;  ///< sequential: each pixel starts afresh once in so many frames, staggered; 0: never
+  /// sequential: a pixel whose carried Lns has left [Lns / rho, Lns * rho] of its last start, rho in (1, 1e6], starts afresh
+  /// with refresh_candidates; none: never. The rule looks at the samples, so it is a (small) bias.
+  std::optional<float> refresh_ratio{};
+  int refresh_candidates = 800;  ///< [N, limits::kMaxCandidates]
   int reference_samples = 1024;    ///< paired samples per pixel of `reference`, [2, 2^24]
 
   bool operator==(const SamplingSpec&) const = default;
@@ -211,7 +223,10 @@ struct VisibilitySpec {
 
 // ---- output, state, farm -----------------------------------------------------------------------------------
 enum class Background : std::uint8_t { environment, transparent };
-enum class Aov : std::uint8_t { lns, visibility, ess, acceptance, source, normal, depth, variance, mask };
+enum class Aov : std::uint8_t {
+  lns, visibility, ess, acceptance, source, normal, depth, variance, mask, acceptance_local, acceptance_independent,
+  resampled
+};
 enum class PixelType : std::uint8_t { half_float, full_float };
 
 struct OutputSpec {

@@ -1,6 +1,27 @@
 #include "common/job/task.h"
 
+#include <algorithm>
+
 namespace baton {
+
+void SamplingStats::count_ess(float ess_ratio) {
+  const auto bin = static_cast<std::size_t>(std::clamp(ess_ratio, 0.0f, 1.0f) * kEssBins);
+  ++ess_histogram[std::min(bin, kEssBins - 1)];
+}
+
+void SamplingStats::merge(const SamplingStats& b) {
+  pixels_fresh += b.pixels_fresh;
+  pixels_carried += b.pixels_carried;
+  pixels_restarted += b.pixels_restarted;
+  pixels_refreshed += b.pixels_refreshed;
+  pixels_refreshed_by_ratio += b.pixels_refreshed_by_ratio;
+  pixels_resampled += b.pixels_resampled;
+  local_proposed += b.local_proposed;
+  local_accepted += b.local_accepted;
+  independent_proposed += b.independent_proposed;
+  independent_accepted += b.independent_accepted;
+  for (std::size_t i = 0; i < kEssBins; ++i) ess_histogram[i] += b.ess_histogram[i];
+}
 
 void RenderStats::merge(const RenderStats& b) {
   pixels += b.pixels;
@@ -8,13 +29,7 @@ void RenderStats::merge(const RenderStats& b) {
   rays_shadow += b.rays_shadow;
   target_evaluations += b.target_evaluations;
   pixels_background += b.pixels_background;
-  pixels_fresh += b.pixels_fresh;
-  pixels_carried += b.pixels_carried;
-  pixels_restarted += b.pixels_restarted;
-  pixels_refreshed += b.pixels_refreshed;
-  pixels_resampled += b.pixels_resampled;
-  moves_proposed += b.moves_proposed;
-  moves_accepted += b.moves_accepted;
+  sampling.merge(b.sampling);
   cpu_seconds += b.cpu_seconds;
   seconds_light += b.seconds_light;
   seconds_primary += b.seconds_primary;

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <compare>
 #include <cstdint>
 #include <vector>
@@ -57,12 +58,46 @@ struct LeaseId {
   template <class A> void fields(A& a) { a(job, task, attempt, epoch); }
 };
 
+/// What the sampler did with the pixels that see a surface; merging is addition.
+struct SamplingStats {
+  static constexpr std::size_t kEssBins = 8;
+
+  std::uint64_t pixels_fresh = 0, pixels_carried = 0, pixels_restarted = 0;
+  std::uint64_t pixels_refreshed = 0;           ///< on schedule or by ratio
+  std::uint64_t pixels_refreshed_by_ratio = 0;  ///< of these, because Lns had moved too far
+  std::uint64_t pixels_resampled = 0;
+  std::uint64_t local_proposed = 0, local_accepted = 0;  ///< moves
+  std::uint64_t independent_proposed = 0, independent_accepted = 0;
+  /// Pixels by ESS / N before resampling: bin b holds [b, b + 1) / kEssBins, the last one 1 as well; dark pixels are in
+  /// bin 0.
+  std::array<std::uint64_t, kEssBins> ess_histogram{};
+
+  bool operator==(const SamplingStats&) const = default;
+  std::uint64_t pixels() const { return pixels_fresh + pixels_carried + pixels_restarted + pixels_refreshed; }
+  /// ess_ratio: ESS / N, [0, 1].
+  void count_ess(float ess_ratio);
+  void merge(const SamplingStats& b);
+  template <class A> void fields(A& a) {
+    a(pixels_fresh, pixels_carried, pixels_restarted, pixels_refreshed, pixels_refreshed_by_ratio, pixels_resampled,
+      local_proposed, local_accepted, independent_proposed, independent_accepted, ess_histogram);
+  }
+};
+
+/// The sampling of one tile in one frame.
+struct FrameStats {
+  std::int32_t frame = 0;  ///< 0-based index
+  std::int32_t tile = 0;
+  SamplingStats sampling;
+
+  bool operator==(const FrameStats&) const = default;
+  template <class A> void fields(A& a) { a(frame, tile, sampling); }
+};
+
 /// Counters that workers add up and `baton job show` prints; merging is addition.
 struct RenderStats {
   std::uint64_t pixels = 0, rays_primary = 0, rays_shadow = 0, target_evaluations = 0;
-  std::uint64_t pixels_background = 0, pixels_fresh = 0, pixels_carried = 0;
-  std::uint64_t pixels_restarted = 0, pixels_refreshed = 0, pixels_resampled = 0;
-  std::uint64_t moves_proposed = 0, moves_accepted = 0;
+  std::uint64_t pixels_background = 0;
+  SamplingStats sampling;
   double cpu_seconds = 0;
   /// CPU seconds of the stages; light is shared by all tiles of a frame and counted where it was prepared.
   double seconds_light = 0, seconds_primary = 0, seconds_sample = 0, seconds_visibility = 0, seconds_shade = 0;
@@ -71,9 +106,8 @@ struct RenderStats {
   bool operator==(const RenderStats&) const = default;
   void merge(const RenderStats& b);
   template <class A> void fields(A& a) {
-    a(pixels, rays_primary, rays_shadow, target_evaluations, pixels_background, pixels_fresh, pixels_carried,
-      pixels_restarted, pixels_refreshed, pixels_resampled, moves_proposed, moves_accepted, cpu_seconds, seconds_light, seconds_primary,
-      seconds_sample, seconds_visibility, seconds_shade, seconds_state);
+    a(pixels, rays_primary, rays_shadow, target_evaluations, pixels_background, sampling, cpu_seconds, seconds_light,
+      seconds_primary, seconds_sample, seconds_visibility, seconds_shade, seconds_state);
   }
 };
 

@@ -17,7 +17,7 @@ namespace baton {
 /// messages carry their digests.
 
 inline constexpr const char* kProtocolName = "BATON";
-inline constexpr std::uint16_t kProtocolVersion = 1;
+inline constexpr std::uint16_t kProtocolVersion = 2;
 
 // ---- worker to coordinator ----------------------------------------------------------------------
 struct WorkerHello {  ///< first, and again after a reconnect or a new epoch
@@ -34,7 +34,8 @@ struct TaskDone {
   LeaseId lease;
   std::vector<BlobRef> outputs;
   RenderStats stats;
-  template <class A> void fields(A& a) { a(lease, outputs, stats); }
+  std::vector<FrameStats> frames = {};  ///< of a render task: one for each frame of the run
+  template <class A> void fields(A& a) { a(lease, outputs, stats, frames); }
 };
 struct TaskFailed {
   LeaseId lease;
@@ -108,7 +109,8 @@ struct JobDetail {
   JobSummary summary;
   std::vector<std::int32_t> frames_done;     ///< user's frame numbers
   std::vector<std::string> failures;         ///< newest last, at most 100
-  template <class A> void fields(A& a) { a(summary, frames_done, failures); }
+  std::vector<FrameStats> frames = {};  ///< the tiles so far of each frame: frame is the user's number, tile -1
+  template <class A> void fields(A& a) { a(summary, frames_done, failures, frames); }
 };
 struct Refused {
   std::uint8_t kind = 0;  ///< ErrorKind

@@ -10,12 +10,12 @@
 namespace baton {
 namespace {
 
-constexpr std::int64_t kSchemaVersion = 1;
+constexpr std::int64_t kSchemaVersion = 2;
 constexpr std::int64_t kApplicationId = 0x4241544e;  // "BATN"
 
 // Digests, keys and statuses are written as numbers and hexadecimal text, so that the sqlite3 shell
 // shows them; outputs, statistics and leases in the form of common/base/archive.h: a change of
-// BlobRef, RenderStats or LeaseId is a new schema version.
+// BlobRef, RenderStats, FrameStats or LeaseId is a new schema version.
 constexpr const char* kSchema = R"sql(
   CREATE TABLE starts (epoch INTEGER NOT NULL);
   INSERT INTO starts VALUES (0);
@@ -30,6 +30,7 @@ constexpr const char* kSchema = R"sql(
     kind INTEGER NOT NULL, step INTEGER NOT NULL, tile INTEGER NOT NULL,
     outputs BLOB NOT NULL,
     stats BLOB NOT NULL,
+    frames BLOB NOT NULL,
     UNIQUE (job, kind, step, tile));
   CREATE TABLE failures (
     position INTEGER PRIMARY KEY AUTOINCREMENT,
@@ -121,7 +122,7 @@ Result<JournalledJob> Journal::load(const Digest& digest) {
   result.document = job.text(1);
 
   BATON_ASSIGN(SqlStatement done,
-               database_.prepare("SELECT kind, step, tile, outputs, stats FROM completions "
+               database_.prepare("SELECT kind, step, tile, outputs, stats, frames FROM completions "
                                  "WHERE job = ? ORDER BY position"));
   done.bind(digest.hex());
   while (true) {
@@ -133,6 +134,7 @@ Result<JournalledJob> Journal::load(const Digest& digest) {
                        static_cast<std::int32_t>(done.integer(2))};
     BATON_TRY(read_blob(database_, done.blob(3), "completions.outputs", completion.outputs));
     BATON_TRY(read_blob(database_, done.blob(4), "completions.stats", completion.stats));
+    BATON_TRY(read_blob(database_, done.blob(5), "completions.frames", completion.frames));
   }
 
   BATON_ASSIGN(SqlStatement failed,
@@ -144,6 +146,20 @@ Result<JournalledJob> Journal::load(const Digest& digest) {
     if (!row) return result;
     BATON_ASSIGN(Failure failure, read_failure(failed));
     result.failures.push_back(std::move(failure));
+  }
+}
+
+Result<std::vector<FrameStats>> Journal::frame_stats(const Digest& job, std::int32_t run) {
+  BATON_ASSIGN(SqlStatement query, database_.prepare("SELECT frames FROM completions "
+                                                     "WHERE job = ? AND kind = ? AND step = ?"));
+  query.bind(job.hex()).bind(static_cast<std::int64_t>(TaskKind::render)).bind(run);
+  std::vector<FrameStats> all;
+  while (true) {
+    BATON_ASSIGN(const bool row, query.step());
+    if (!row) return all;
+    std::vector<FrameStats> of_tile;
+    BATON_TRY(read_blob(database_, query.blob(0), "completions.frames", of_tile));
+    all.insert(all.end(), of_tile.begin(), of_tile.end());
   }
 }
 
@@ -213,14 +229,15 @@ Status Journal::record_status(const Digest& job, JobStatus status) {
 
 Status Journal::record_completion(const Digest& job, const Completion& completion) {
   BATON_ASSIGN(SqlStatement insert,
-               write("INSERT OR REPLACE INTO completions (job, kind, step, tile, outputs, stats) "
-                     "VALUES (?, ?, ?, ?, ?, ?)"));
+               write("INSERT OR REPLACE INTO completions (job, kind, step, tile, outputs, stats, "
+                     "frames) VALUES (?, ?, ?, ?, ?, ?, ?)"));
   return insert.bind(job.hex())
       .bind(static_cast<std::int64_t>(completion.task.kind))
       .bind(completion.task.step)
       .bind(completion.task.tile)
       .bind(to_bytes(completion.outputs))
       .bind(to_bytes(completion.stats))
+      .bind(to_bytes(completion.frames))
       .run();
 }
 

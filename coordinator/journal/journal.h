@@ -38,6 +38,8 @@ class Journal {
   Result<JournalledJob> load(const Digest& job);
   /// nullopt: no such job.
   Result<std::optional<std::string>> document(const Digest& job);
+  /// What the sampler did in the frames of a run, recorded so far: one for each frame and tile, in no order.
+  Result<std::vector<FrameStats>> frame_stats(const Digest& job, std::int32_t run);
   /// At most `count` failed attempts, the newest last.
   Result<std::vector<Failure>> recent_failures(const Digest& job, int count);
 

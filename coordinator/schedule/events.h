@@ -21,6 +21,7 @@ struct Completion {
   TaskKey task;
   std::vector<BlobRef> outputs;
   RenderStats stats;
+  std::vector<FrameStats> frames = {};  ///< of a render task, at most one for each frame of its run
 };
 
 /// An attempt that failed.
@@ -65,6 +66,7 @@ struct TaskCompleted {
   LeaseId lease;
   std::vector<BlobRef> outputs;
   RenderStats stats;
+  std::vector<FrameStats> frames = {};
 };
 struct AttemptFailed {
   std::string worker;

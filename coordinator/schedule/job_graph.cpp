@@ -122,6 +122,19 @@ std::optional<std::string> JobGraph::check_outputs(const TaskKey& key,
   return std::nullopt;
 }
 
+std::optional<std::string> JobGraph::check_frames(const TaskKey& key,
+                                                  const std::vector<FrameStats>& frames) const {
+  std::int32_t next = key.kind == TaskKind::render ? first_frame(key.step) : num_frames_;
+  for (const FrameStats& stats : frames) {
+    if (stats.tile != key.tile || stats.frame < next || stats.frame > last_frame(key.step)) {
+      return fmt::format("the report has statistics of frame index {}, tile {}, out of place",
+                         stats.frame, stats.tile);
+    }
+    next = stats.frame + 1;
+  }
+  return std::nullopt;
+}
+
 std::size_t JobGraph::film_position(std::int32_t frame) const {
   return static_cast<std::size_t>(frame % frames_per_run_) + (carries_state_ ? 1 : 0);
 }

@@ -57,6 +57,8 @@ class JobGraph {
   /// Sorts the outputs that a task reported: state first, then films by frame. nullopt when they
   /// are exactly what the task must make; else what is wrong with them.
   std::optional<std::string> check_outputs(const TaskKey& key, std::vector<BlobRef>& outputs) const;
+  /// nullopt when the statistics are of the task's own tile and frames, each frame once at most; else what is wrong.
+  std::optional<std::string> check_frames(const TaskKey& key, const std::vector<FrameStats>& frames) const;
   /// Position of a frame's film in the sorted outputs of a render task.
   std::size_t film_position(std::int32_t frame) const;
 

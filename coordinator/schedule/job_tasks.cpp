@@ -75,6 +75,9 @@ void JobTasks::complete(TaskIndex task, const Completion& completion, BlobRefere
   // Keep what was made. Images are files of the output folder, not blobs of the store.
   record(task).outputs = completion.outputs;
   progress_.stats.merge(completion.stats);
+  for (const FrameStats& frame : completion.frames) {
+    progress_.frames[frame.frame].merge(frame.sampling);
+  }
   for (const BlobRef& output : completion.outputs) {
     count_output(output);
     for (std::int32_t use = num_uses(task, output); use > 0; --use) blobs.add(output.digest);

@@ -104,11 +104,14 @@ void Scheduler::on(const TaskCompleted& event, TimePoint now, Actions& actions) 
   }
 
   // An incomplete report is a failed attempt.
-  if (const auto fault = held.job->tasks.graph().check_outputs(event.lease.task, outputs)) {
+  const JobGraph& graph = held.job->tasks.graph();
+  std::optional<std::string> fault = graph.check_outputs(event.lease.task, outputs);
+  if (!fault) fault = graph.check_frames(event.lease.task, event.frames);
+  if (fault) {
     fail_attempt(held, {event.lease, event.worker, *fault, false}, actions);
     return;
   }
-  Completion completion{event.lease.task, std::move(outputs), event.stats};
+  Completion completion{event.lease.task, std::move(outputs), event.stats, event.frames};
   held.job->tasks.complete(held.task, completion, blobs_);
   drop_lease(event.lease.job, held.task);
   actions.push_back(RecordCompletion{event.lease.job, std::move(completion)});

@@ -62,6 +62,9 @@ JobDetail describe_job(const Digest& digest, const Scheduler::Job& job,
                        const std::vector<Failure>& failures) {
   JobDetail detail{summarize(digest, job), finished_frames(job), {}};
   for (const Failure& failure : failures) detail.failures.push_back(describe(job, failure));
+  for (const auto& [frame, sampling] : job.tasks.progress().frames) {
+    detail.frames.push_back({job.spec.frames[static_cast<std::size_t>(frame)], -1, sampling});
+  }
   return detail;
 }
 

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "common/base/limits.h"
+#include "coordinator/service/diagnostics_file.h"
 
 namespace baton {
 namespace {
@@ -159,7 +160,8 @@ Status Service::receive_from(const std::string& worker, const TaskDone& message)
     return step(AttemptFailed{worker, message.lease,
                               fmt::format("{}: reported, but not there", *missing), false});
   }
-  return step(TaskCompleted{worker, message.lease, message.outputs, message.stats});
+  return step(TaskCompleted{worker, message.lease, message.outputs, message.stats,
+                            message.frames});
 }
 
 Status Service::receive_from(const std::string& worker, const TaskFailed& message) {
@@ -201,6 +203,12 @@ Status Service::perform(const RecordFailure& action) {
 Status Service::perform(const RecordJobStatus& action) {
   const auto level = action.status == JobStatus::failed ? spdlog::level::err : spdlog::level::info;
   spdlog::log(level, "job {} ended: {}", action.job.short_hex(), action.reason);
+  // Before the status is durable: whoever is killed in between ends the job, and writes, again.
+  const Scheduler::Job* job = scheduler_.find_job(action.job);
+  if (job != nullptr && action.status != JobStatus::running) {
+    const Status written = write_diagnostics(journal_, action.job, job->spec);
+    if (!written) spdlog::warn("no diagnostics: {}", written.error().message);
+  }
   return journal_.record_status(action.job, action.status);
 }
 

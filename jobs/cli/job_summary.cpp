@@ -8,6 +8,25 @@ namespace baton {
 
 using nlohmann::ordered_json;
 
+namespace {
+
+/// Appends the counters to an object.
+void add_sampling(const SamplingStats& s, ordered_json& object) {
+  object["pixelsFresh"] = s.pixels_fresh;
+  object["pixelsCarried"] = s.pixels_carried;
+  object["pixelsRestarted"] = s.pixels_restarted;
+  object["pixelsRefreshed"] = s.pixels_refreshed;
+  object["pixelsRefreshedByRatio"] = s.pixels_refreshed_by_ratio;
+  object["pixelsResampled"] = s.pixels_resampled;
+  object["localMovesProposed"] = s.local_proposed;
+  object["localMovesAccepted"] = s.local_accepted;
+  object["independentMovesProposed"] = s.independent_proposed;
+  object["independentMovesAccepted"] = s.independent_accepted;
+  object["essHistogram"] = s.ess_histogram;
+}
+
+}  // namespace
+
 const char* job_status_name(JobStatus status) {
   switch (status) {
     case JobStatus::running:
@@ -44,18 +63,24 @@ std::string job_line(const JobSummary& job) {
 
 std::string job_statistics(const JobSummary& job) {
   const RenderStats& s = job.stats;
-  const std::uint64_t lit =
-      s.pixels_fresh + s.pixels_carried + s.pixels_restarted + s.pixels_refreshed;
+  const SamplingStats& did = s.sampling;
+  const std::uint64_t lit = did.pixels();
   std::string text = fmt::format(
       "pixels     {}: {} carried, {} fresh, {} refreshed, {} restarted of those with a surface\n",
-      count_text(s.pixels), percent_text(s.pixels_carried, lit), percent_text(s.pixels_fresh, lit),
-      percent_text(s.pixels_refreshed, lit), percent_text(s.pixels_restarted, lit));
+      count_text(s.pixels), percent_text(did.pixels_carried, lit),
+      percent_text(did.pixels_fresh, lit), percent_text(did.pixels_refreshed, lit),
+      percent_text(did.pixels_restarted, lit));
   text += fmt::format("rays       {} primary, {} shadow; {} target evaluations\n",
                       count_text(s.rays_primary), count_text(s.rays_shadow),
                       count_text(s.target_evaluations));
-  if (s.moves_proposed > 0) {
-    text += fmt::format("moves      {} proposed, {} accepted\n", count_text(s.moves_proposed),
-                        percent_text(s.moves_accepted, s.moves_proposed));
+  if (did.local_proposed + did.independent_proposed > 0) {
+    text += fmt::format("moves      {} local, {} of them accepted; {} independent, {} accepted\n",
+                        count_text(did.local_proposed),
+                        percent_text(did.local_accepted, did.local_proposed),
+                        count_text(did.independent_proposed),
+                        percent_text(did.independent_accepted, did.independent_proposed));
+    text += fmt::format("resampled  {} of the pixels with a surface\n",
+                        percent_text(did.pixels_resampled, lit));
   }
   if (job.state_pixels > 0) {
     text +=
@@ -71,7 +96,7 @@ std::string job_statistics(const JobSummary& job) {
 
 ordered_json summary_json(const JobSummary& job) {
   const RenderStats& s = job.stats;
-  return {{"id", job.job.hex()},
+  ordered_json result = {{"id", job.job.hex()},
           {"name", job.name},
           {"status", job_status_name(job.status)},
           {"priority", job.priority},
@@ -91,19 +116,20 @@ ordered_json summary_json(const JobSummary& job) {
             {"raysShadow", s.rays_shadow},
             {"targetEvaluations", s.target_evaluations},
             {"pixelsBackground", s.pixels_background},
-            {"pixelsFresh", s.pixels_fresh},
-            {"pixelsCarried", s.pixels_carried},
-            {"pixelsRestarted", s.pixels_restarted},
-            {"pixelsRefreshed", s.pixels_refreshed},
-            {"pixelsResampled", s.pixels_resampled},
-            {"movesProposed", s.moves_proposed},
-            {"movesAccepted", s.moves_accepted},
             {"cpuSeconds", s.cpu_seconds}}}};
+  add_sampling(s.sampling, result["stats"]);
+  return result;
 }
 
 ordered_json detail_json(const JobDetail& detail) {
   ordered_json result = summary_json(detail.summary);
   result["framesDoneNumbers"] = detail.frames_done;
+  result["frames"] = ordered_json::array();
+  for (const FrameStats& frame : detail.frames) {
+    ordered_json row = {{"frame", frame.frame}};
+    add_sampling(frame.sampling, row);
+    result["frames"].push_back(std::move(row));
+  }
   result["failures"] = detail.failures;
   return result;
 }

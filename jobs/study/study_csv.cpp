@@ -45,7 +45,7 @@ std::string measurements_csv(const Study& study, const StudyResults& results) {
                      number(m.percentile_99_9), number(m.bias), number(m.lns_mean),
                      number(m.lns_median), number(m.ess), number(m.acceptance), number(m.flicker),
                      number(per(s.rays_shadow, lit)), number(per(s.target_evaluations, lit)),
-                     number(per(s.pixels_resampled, lit)), number(per(s.pixels_restarted, lit)));
+                     number(per(s.sampling.pixels_resampled, lit)), number(per(s.sampling.pixels_restarted, lit)));
     }
   });
   return csv;

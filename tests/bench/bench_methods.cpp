@@ -53,12 +53,13 @@ Result<RenderStats> measure(const JobSpec& job) {
 void print_row(const Case& c, const RenderStats& s) {
   const double pixels = static_cast<double>(s.pixels - s.pixels_background);
   const double ratio = s.cpu_seconds / s.seconds_visibility;
+  const auto proposed = static_cast<double>(s.sampling.local_proposed + s.sampling.independent_proposed);
   const auto ns = [&](double seconds) { return seconds / pixels * 1e9; };
   fmt::print("{:<22} {:>6.2f} {:>6} {:>9.0f} {:>8.0f} {:>8.0f} {:>8.0f} {:>8.0f} {:>8.0f} {:>8.2f} {:>7.3f}\n", c.name, ratio,
              c.goal > 0 ? fmt::format("{:.1f}", c.goal) : "-", ns(s.cpu_seconds), ns(s.seconds_light),
              ns(s.seconds_primary), ns(s.seconds_sample), ns(s.seconds_visibility), ns(s.seconds_shade),
              static_cast<double>(s.rays_shadow) / s.seconds_visibility * 1e-6,
-             s.moves_proposed > 0 ? static_cast<double>(s.moves_accepted) / static_cast<double>(s.moves_proposed) : 0.0);
+             proposed > 0 ? static_cast<double>(s.sampling.local_accepted + s.sampling.independent_accepted) / proposed : 0.0);
 }
 
 int run(const std::string& path, int frames) {

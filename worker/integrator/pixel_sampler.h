@@ -35,9 +35,9 @@ struct PixelSamples {
 struct PixelDiagnostics {
   float ess = 0;         ///< [1, N], 0 without light
   std::int32_t target_evaluations = 0;
-  std::int32_t moves_proposed = 0;
-  std::int32_t moves_accepted = 0;
+  MoveCounts local = {}, independent = {};
   bool resampled = false;
+  bool refreshed_by_ratio = false;
 };
 
 /// A sampling method: the plug-in over the contract of PixelSamples. Stateless; any number of threads may use one.

@@ -14,6 +14,9 @@ std::vector<std::string> channel_names(Aov aov) {
     case Aov::depth: return {"depth"};
     case Aov::variance: return {"variance"};
     case Aov::mask: return {"mask"};
+    case Aov::acceptance_local: return {"acceptance.local"};
+    case Aov::acceptance_independent: return {"acceptance.independent"};
+    case Aov::resampled: return {"resampled"};
   }
   return {};
 }
@@ -61,6 +64,9 @@ void FilmWriter::write(std::size_t index, const PixelResult& pixel) {
       case Aov::depth: put(pixel.depth); break;
       case Aov::variance: put(pixel.variance); break;
       case Aov::mask: put(pixel.mask); break;
+      case Aov::acceptance_local: put(pixel.acceptance_local); break;
+      case Aov::acceptance_independent: put(pixel.acceptance_independent); break;
+      case Aov::resampled: put(pixel.resampled ? 1.0f : 0.0f); break;
     }
   }
 }

@@ -17,6 +17,8 @@ struct PixelResult {
   float visibility = 0;   ///< share of the weight whose rays are free
   float ess_ratio = 0;    ///< ESS / N
   float acceptance = 0;   ///< accepted moves / proposed moves
+  float acceptance_local = 0, acceptance_independent = 0;  ///< the same by kind of move, 0 without any
+  bool resampled = false;
   PixelSource source = PixelSource::background;
   Vec3 normal;            ///< mean shading normal of the sites that see a surface
   float depth = 0;        ///< mean distance of the sites that see a surface

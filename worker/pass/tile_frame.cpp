@@ -25,6 +25,25 @@ void add_geometry(std::span<const SurfaceHit> hits, PixelResult& pixel) {
   pixel.depth /= num_hits;
 }
 
+float acceptance_rate(const MoveCounts& moves) {
+  return moves.proposed > 0 ? static_cast<float>(moves.accepted) / static_cast<float>(moves.proposed) : 0.0f;
+}
+
+/// Adds one pixel to the books.
+void count_sampling(const PixelDiagnostics& did, PixelSource source, float ess_ratio, SamplingStats& stats) {
+  stats.pixels_fresh += source == PixelSource::fresh ? 1 : 0;
+  stats.pixels_carried += source == PixelSource::carried ? 1 : 0;
+  stats.pixels_restarted += source == PixelSource::restarted ? 1 : 0;
+  stats.pixels_refreshed += source == PixelSource::refreshed ? 1 : 0;
+  stats.pixels_refreshed_by_ratio += did.refreshed_by_ratio ? 1 : 0;
+  stats.pixels_resampled += did.resampled ? 1 : 0;
+  stats.local_proposed += static_cast<std::uint64_t>(did.local.proposed);
+  stats.local_accepted += static_cast<std::uint64_t>(did.local.accepted);
+  stats.independent_proposed += static_cast<std::uint64_t>(did.independent.proposed);
+  stats.independent_accepted += static_cast<std::uint64_t>(did.independent.accepted);
+  stats.count_ess(ess_ratio);
+}
+
 }  // namespace
 
 /// The pixels in work: [first, first + count) of the tile, with what one pass hands to the next.
@@ -57,6 +76,7 @@ FilmTile TileFrameRenderer::render(const FrameSpec& frame, const FrameLight& lig
   Batch batch;
   batch.frame_number = frame.number;
   batch.frame_index = frame.index;
+  frame_sampling_ = {};
   batch.sample_color.resize(kBatchPixels * static_cast<std::size_t>(state.num_particles));
   const std::size_t num_pixels = state.num_pixels();
   for (std::size_t first = 0; first < num_pixels; first += kBatchPixels) {
@@ -74,6 +94,7 @@ FilmTile TileFrameRenderer::render(const FrameSpec& frame, const FrameLight& lig
   }
   state.frame_index = frame.index;
   stats_.pixels += num_pixels;
+  stats_.sampling.merge(frame_sampling_);
   return film.film();
 }
 
@@ -138,17 +159,13 @@ void TileFrameRenderer::sample(Batch& batch, const FrameLight& light, bool has_h
     pixel.lns = samples.lns;
     pixel.source = samples.source;
     pixel.ess_ratio = did.ess / static_cast<float>(n);
-    pixel.acceptance = did.moves_proposed > 0
-                           ? static_cast<float>(did.moves_accepted) / static_cast<float>(did.moves_proposed)
-                           : 0.0f;
+    pixel.acceptance = acceptance_rate({did.local.proposed + did.independent.proposed,
+                                        did.local.accepted + did.independent.accepted});
+    pixel.acceptance_local = acceptance_rate(did.local);
+    pixel.acceptance_independent = acceptance_rate(did.independent);
+    pixel.resampled = did.resampled;
     stats_.target_evaluations += static_cast<std::uint64_t>(did.target_evaluations);
-    stats_.moves_proposed += static_cast<std::uint64_t>(did.moves_proposed);
-    stats_.moves_accepted += static_cast<std::uint64_t>(did.moves_accepted);
-    stats_.pixels_resampled += did.resampled ? 1 : 0;
-    stats_.pixels_fresh += samples.source == PixelSource::fresh ? 1 : 0;
-    stats_.pixels_carried += samples.source == PixelSource::carried ? 1 : 0;
-    stats_.pixels_refreshed += samples.source == PixelSource::refreshed ? 1 : 0;
-    stats_.pixels_restarted += samples.source == PixelSource::restarted ? 1 : 0;
+    count_sampling(did, samples.source, pixel.ess_ratio, frame_sampling_);
   }
 }
 
@@ -200,7 +217,8 @@ void TileFrameRenderer::render_reference(Batch& batch, const FrameLight& light, 
     pixel.mask = estimate.visibility < 1 ? 0.0f : 1.0f;
     pixel.variance = estimate.mean_variance;
     pixel.source = PixelSource::fresh;
-    ++stats_.pixels_fresh;
+    ++frame_sampling_.pixels_fresh;
+    frame_sampling_.count_ess(0);
     stats_.target_evaluations += 2 * static_cast<std::uint64_t>(context_.job.sampling.reference_samples);
   }
 }

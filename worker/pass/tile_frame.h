@@ -17,6 +17,8 @@ class TileFrameRenderer {
   FilmTile render(const FrameSpec& frame, const FrameLight& light, bool has_history, SampleState& state);
 
   const RenderStats& stats() const { return stats_; }
+  /// Of the frame that was rendered last.
+  const SamplingStats& frame_sampling() const { return frame_sampling_; }
 
  private:
   static constexpr std::size_t kBatchPixels = 64;
@@ -32,6 +34,7 @@ class TileFrameRenderer {
   const TileSurfaces& surfaces_;
   std::unique_ptr<kernels::CandidateSet> scratch_;
   RenderStats stats_;
+  SamplingStats frame_sampling_;
 };
 
 }  // namespace baton

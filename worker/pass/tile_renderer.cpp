@@ -80,6 +80,7 @@ Result<RenderStats> run_tile(const RenderContext& context, const TileRun& run,
     const bool has_history = carries_state(context.job) && (!previous.empty() || f > run.first_frame);
     const FilmTile film = renderer.render(context.frames[static_cast<std::size_t>(f)], *light, has_history, state);
     BATON_TRY(sink.film(f, film));
+    if (sink.diagnostics) sink.diagnostics({f, run.tile, renderer.frame_sampling()});
   }
   if (carries_state(context.job)) BATON_TRY(sink.state(state));
 

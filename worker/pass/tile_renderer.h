@@ -28,6 +28,8 @@ struct TileRunSink {
   std::function<Status(int frame_index, const FilmTile& film)> film;
   /// Called for the last frame of the run when the job carries state.
   std::function<Status(const SampleState& state)> state;
+  /// Called after each film with what the sampler did; may be empty.
+  std::function<void(const FrameStats& stats)> diagnostics = {};
 };
 
 using StatePtr = std::shared_ptr<const SampleState>;

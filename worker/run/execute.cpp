@@ -73,7 +73,9 @@ Result<TaskOutput> execute_render(const LoadedJob& loaded, BlobStore& store, con
                                                    std::make_shared<const SampleState>(state));
                            }
                            return {};
-                         }};
+                         },
+                         .diagnostics =
+                             [&](const FrameStats& stats) { output.frames.push_back(stats); }};
   const TileRun run = tile_run(loaded.job, task.tile, task.step);
   BATON_ASSIGN(output.stats, run_tile(*loaded.context, run, previous, sink, stop));
   output.stats.seconds_state = seconds_state;

@@ -15,6 +15,7 @@ namespace baton {
 struct TaskOutput {
   std::vector<BlobRef> outputs;
   RenderStats stats;
+  std::vector<FrameStats> frames = {};  ///< of a render task, in frame order
 };
 
 /// Runs one task: reads its inputs from `store`, writes its outputs there (an assembled frame goes

@@ -41,7 +41,10 @@ void RenderPool::drop_queued() {
       ++slot;
       continue;
     }
-    ended_.push_back({slot->task.lease, Error{ErrorKind::cancelled, "dropped before it began"}});
+    // A copy: GCC 12 sees unset members in a moved temporary.
+    const EndedTask dropped{slot->task.lease,
+                            Error{ErrorKind::cancelled, "dropped before it began"}};
+    ended_.push_back(dropped);
     slot = slots_.erase(slot);
   }
 }

@@ -69,14 +69,17 @@ Result<LastFrame> render(const JobSpec& job, std::int32_t frame_index, std::int3
 }
 
 std::string describe_stats(const RenderStats& s) {
+  const SamplingStats& did = s.sampling;
   return fmt::format(
       "pixels {} (background {}, fresh {}, carried {}, refreshed {}, restarted {}, resampled {})\n"
-      "rays primary {}, shadow {}; target evaluations {}; moves accepted {} of {}\n"
+      "rays primary {}, shadow {}; target evaluations {}\n"
+      "moves accepted: local {} of {}, independent {} of {}\n"
       "cpu {:.3f} s (light {:.3f}, primary {:.3f}, sample {:.3f}, visibility {:.3f}, shade "
       "{:.3f})\n",
-      s.pixels, s.pixels_background, s.pixels_fresh, s.pixels_carried, s.pixels_refreshed,
-      s.pixels_restarted, s.pixels_resampled, s.rays_primary, s.rays_shadow, s.target_evaluations,
-      s.moves_accepted, s.moves_proposed, s.cpu_seconds, s.seconds_light, s.seconds_primary,
+      s.pixels, s.pixels_background, did.pixels_fresh, did.pixels_carried, did.pixels_refreshed,
+      did.pixels_restarted, did.pixels_resampled, s.rays_primary, s.rays_shadow,
+      s.target_evaluations, did.local_accepted, did.local_proposed, did.independent_accepted,
+      did.independent_proposed, s.cpu_seconds, s.seconds_light, s.seconds_primary,
       s.seconds_sample, s.seconds_visibility, s.seconds_shade);
 }
 

@@ -11,9 +11,11 @@ namespace baton {
 struct SequentialSettings {
   int num_particles = 16;
   int num_distributions = 5;  ///< P
+  int num_moves = 1;          ///< moves per distribution
   float ess_ratio_min = 0.5f;
   ResamplingScheme resampling = ResamplingScheme::systematic;
-  float local_move_cosine = 1;      ///< cosine of the half-angle of local moves
+  LnsUpdate lns_update = LnsUpdate::ratio;
+  float local_move_cosine = 1;  ///< cosine of the half-angle of local moves
   float local_move_fraction = 0.5f;
 };
 
@@ -24,14 +26,21 @@ struct ParticleSpan {
   float* weight = nullptr;
 };
 
+/// Metropolis-Hastings moves of one kind.
+struct MoveCounts {
+  std::int32_t proposed = 0;
+  std::int32_t accepted = 0;
+};
+
 /// What one step did.
 struct SequentialOutcome {
-  bool alive = false;       ///< false: all weights died or Lns is not a positive finite number; start again with SIR
-  float lns = 0;            ///< new estimate of the normalising constant
-  float ess = 0;            ///< before resampling, [1, N]
+  bool alive = false;  ///< false: all weights died or Lns is not a positive finite number; start
+                       ///< again with SIR
+  float lns = 0;       ///< new estimate of the normalising constant
+  float ess = 0;       ///< before resampling, [1, N]
   bool resampled = false;
-  std::int32_t moves_proposed = 0;
-  std::int32_t moves_accepted = 0;
+  MoveCounts local;        ///< perturbations of the particle's direction
+  MoveCounts independent;  ///< fresh directions from the map
 };
 
 /// Stands for log 0 where sums and products must stay finite: exp() of any multiple is 0.

@@ -22,6 +22,8 @@ Completion completion(std::int32_t tile) {
                {}};
   c.stats.rays_shadow = 1000;
   c.stats.cpu_seconds = 0.125;
+  c.frames = {{7, tile, {}}};
+  c.frames[0].sampling.ess_histogram[3] = 5;
   return c;
 }
 
@@ -79,6 +81,9 @@ TEST_F(JournalTest, WhatWasCommittedIsThereAgain) {
   EXPECT_EQ(job.completions[0].task, completion(1).task);
   EXPECT_EQ(job.completions[0].outputs, completion(1).outputs);
   EXPECT_EQ(job.completions[1].stats, completion(0).stats);
+  EXPECT_EQ(job.completions[1].frames, completion(0).frames);
+  EXPECT_EQ(journal.frame_stats(kJob, 3).value().size(), 2u);
+  EXPECT_TRUE(journal.frame_stats(kJob, 2).value().empty());
   ASSERT_EQ(job.failures.size(), 1u);
   EXPECT_EQ(job.failures[0].lease, failure.lease);
   EXPECT_EQ(job.failures[0].worker, failure.worker);

@@ -77,24 +77,24 @@ TEST(RunTile, CarriesEverySurfacePixelOn) {
   const test::TileResult carried = render_tile(published);
   const std::uint64_t surface = (carried.stats.pixels - carried.stats.pixels_background) / 3;
   EXPECT_GT(surface, 50u);
-  EXPECT_EQ(carried.stats.pixels_fresh, surface);
-  EXPECT_EQ(carried.stats.pixels_carried, 2 * surface);
+  EXPECT_EQ(carried.stats.sampling.pixels_fresh, surface);
+  EXPECT_EQ(carried.stats.sampling.pixels_carried, 2 * surface);
 
   JobSpec fresh = sequence_job(3);
   fresh.state.carry = false;
   const test::TileResult restarted = render_tile(fresh);
-  EXPECT_EQ(restarted.stats.pixels_fresh, 3 * surface);
-  EXPECT_EQ(restarted.stats.pixels_carried, 0u);
+  EXPECT_EQ(restarted.stats.sampling.pixels_fresh, 3 * surface);
+  EXPECT_EQ(restarted.stats.sampling.pixels_carried, 0u);
   for (const float red : channel(restarted.films[1], "source.R")) EXPECT_TRUE(red == 0 || red == 1);
 }
 
 TEST(RunTile, RefreshesEveryPixelOnceInTheCycleButNotInTheSecondFrame) {
   JobSpec job = sequence_job(2);
   job.sampling.refresh_every = 4;
-  EXPECT_EQ(render_tile(job).stats.pixels_refreshed, 0u);
+  EXPECT_EQ(render_tile(job).stats.sampling.pixels_refreshed, 0u);
   job.frames = frame_numbers(5);
   const RenderStats stats = render_tile(job).stats;
-  EXPECT_EQ(stats.pixels_refreshed, stats.pixels_fresh);
+  EXPECT_EQ(stats.sampling.pixels_refreshed, stats.sampling.pixels_fresh);
 }
 
 TEST(RunTile, BlackMapGivesBlackAndLightComesBack) {
@@ -108,7 +108,7 @@ TEST(RunTile, BlackMapGivesBlackAndLightComesBack) {
   float brightest = 0;
   for (const float v : channel(result.films[2], "G")) brightest = std::max(brightest, v);
   EXPECT_GT(brightest, 0.1f);
-  EXPECT_GT(result.stats.pixels_restarted, 0u);
+  EXPECT_GT(result.stats.sampling.pixels_restarted, 0u);
 }
 
 void expect_all_finite(const test::TileResult& result) {

@@ -1,118 +1,83 @@
-// The sequential sampler on a small exact space: eight points with given targets. "Directions" are indices.
-#include "worker/sampling/sequential-inl.h"
-
+// The sequential sampler on a small exact space: eight points with given targets. "Directions" are
+// indices.
 #include <gtest/gtest.h>
 
-#include <array>
 #include <cmath>
-#include <numeric>
-#include <vector>
+
+#include "tests/unit/sampling/discrete_target.h"
 
 namespace baton::HWY_NAMESPACE {
 namespace {
 
-constexpr std::uint32_t kPoints = 8;
-
-/// Targets over eight points; proposals are uniform.
-struct DiscreteTarget {
-  std::array<float, kPoints> before, now;
-
-  LogTargets Evaluate(const PointLanes& point) const {
-    const DF d;
-    const VI index = hn::BitCast(DI(), point.code);
-    std::array<float, kPoints> log_before{}, log_now{};
-    for (std::size_t i = 0; i < kPoints; ++i) {
-      log_before[i] = before[i] > 0 ? std::log(before[i]) : kLogZero;
-      log_now[i] = now[i] > 0 ? std::log(now[i]) : kLogZero;
-    }
-    return {hn::GatherIndex(d, log_before.data(), index), hn::GatherIndex(d, log_now.data(), index), hn::Zero(d)};
-  }
-  /// Blocks of neighbours from a random start on the ring of points.
-  static std::size_t BlockStart(std::uint32_t bits) { return bits % kPoints; }
-  LogTargets Propose(std::size_t entry, VF /*site_fraction*/, PointLanes& point) const {
-    point.code = hn::And(hn::Iota(DU(), static_cast<std::uint32_t>(entry)), hn::Set(DU(), kPoints - 1));
-    return Evaluate(point);
-  }
-};
-
-float sum_of(const std::array<float, kPoints>& target) { return std::accumulate(target.begin(), target.end(), 0.0f); }
-
-/// Particles drawn independently from `before`, as SIR would leave them.
-struct Particles {
-  std::vector<OctDirection> code;
-  std::vector<std::uint8_t> site;
-  std::vector<float> weight;
-
-  Particles(const std::array<float, kPoints>& before, std::size_t count, std::uint64_t seed)
-      : code(count), site(count, 0), weight(count, 1.0f / static_cast<float>(count)) {
-    const Rng rng({.job_seed = seed}, PassId::choose);
-    for (std::size_t i = 0; i < count; ++i) {
-      float left = rng.uniforms(0, static_cast<std::uint32_t>(i))[0] * sum_of(before);
-      std::uint32_t point = 0;
-      while (point + 1 < kPoints && left >= before[point]) left -= before[point++];
-      code[i] = point;
-    }
-  }
-};
-
-SequentialOutcome step(const DiscreteTarget& target, const SequentialSettings& settings, std::uint64_t seed, Particles& p) {
-  const RngKey key{.job_seed = seed};
-  return SequentialStep(target, settings, sum_of(target.before), Rng(key, PassId::move), Rng(key, PassId::resample),
-                        {p.code.data(), p.site.data(), p.weight.data()});
+SequentialOutcome step(const DiscreteTarget& target, const SequentialSettings& settings,
+                       std::uint64_t seed, Particles& p) {
+  return step(target, settings, seed, p, sum_of(target.before));
 }
 
 const DiscreteTarget kChange{{1, 2, 3, 4, 5, 6, 2, 1}, {6, 1, 2, 2, 7, 1, 4, 3}};
-SequentialSettings settings_of(int distributions, ResamplingScheme scheme = ResamplingScheme::systematic) {
-  return {.num_particles = 16, .num_distributions = distributions, .ess_ratio_min = 1.0f, .resampling = scheme,
+SequentialSettings settings_of(int distributions,
+                               ResamplingScheme scheme = ResamplingScheme::systematic) {
+  return {.num_particles = 16,
+          .num_distributions = distributions,
+          .ess_ratio_min = 1.0f,
+          .resampling = scheme,
           .local_move_fraction = 0};
 }
 
-struct Moments {
-  double mean = 0, error = 0;
-};
-/// Mean and standard error over `runs` seeds of Lns^ * (1 + fault) or of the estimate of point 0's mass.
+/// Lns^ * (1 + fault), or the estimate of point 0's mass, over `runs` seeds.
 Moments repeat(const SequentialSettings& settings, int runs, bool of_point, double lns_fault = 0) {
-  double sum = 0, squares = 0;
+  Moments moments;
   for (int run = 1; run <= runs; ++run) {
     Particles p(kChange.before, 16, static_cast<std::uint64_t>(run));
     const SequentialOutcome outcome = step(kChange, settings, static_cast<std::uint64_t>(run), p);
     double value = outcome.lns * (1 + lns_fault);
     if (of_point) {
       value = 0;
-      for (std::size_t i = 0; i < p.code.size(); ++i) value += p.code[i] == 0 ? outcome.lns * p.weight[i] : 0;
+      for (std::size_t i = 0; i < p.code.size(); ++i)
+        value += p.code[i] == 0 ? outcome.lns * p.weight[i] : 0;
     }
-    sum += value;
-    squares += value * value;
+    moments.add(value);
   }
-  const double mean = sum / runs;
-  return {mean, std::sqrt((squares / runs - mean * mean) / runs)};
+  return moments;
 }
 
-// Hypothesis: E[Lns^_n] = Lns_n exactly, for each P and scheme. 20000 runs, |z| < 4.4 (level 1e-5 each); the smallest
-// bias that would be seen is 4.4 standard errors, below 0.7 %.
+// Hypothesis: E[Lns^_n] = Lns_n exactly, for each P and scheme. 20000 runs, |z| < 4.4 (level 1e-5
+// each); the smallest bias that would be seen is 4.4 standard errors, below 0.7 %.
 TEST(SequentialStep, NormalisingConstantIsUnbiased) {
   const double truth = sum_of(kChange.now);
   for (const int distributions : {1, 2, 5}) {
-    for (const auto scheme : {ResamplingScheme::systematic, ResamplingScheme::multinomial, ResamplingScheme::residual,
-                              ResamplingScheme::stratified}) {
+    for (const auto scheme : {ResamplingScheme::systematic, ResamplingScheme::multinomial,
+                              ResamplingScheme::residual, ResamplingScheme::stratified}) {
       const Moments m = repeat(settings_of(distributions, scheme), 20000, false);
-      EXPECT_NEAR(m.mean, truth, 4.4 * m.error) << "P " << distributions;
-      EXPECT_LT(4.4 * m.error, 0.011 * truth);
+      EXPECT_NEAR(m.mean(), truth, 4.4 * m.error()) << "P " << distributions;
+      EXPECT_LT(4.4 * m.error(), 0.011 * truth);
     }
   }
 }
 
-// Hypothesis: E[sum_j u_j 1(w_j = point 0)] = p~_n(point 0): the set is properly weighted after moves and resampling.
+// Hypothesis: E[sum_j u_j 1(w_j = point 0)] = p~_n(point 0): the set is properly weighted after
+// moves and resampling.
 TEST(SequentialStep, SetIsProperlyWeighted) {
   for (const int distributions : {1, 5}) {
     const Moments m = repeat(settings_of(distributions), 20000, true);
-    EXPECT_NEAR(m.mean, kChange.now[0], 4.4 * m.error) << "P " << distributions;
+    EXPECT_NEAR(m.mean(), kChange.now[0], 4.4 * m.error()) << "P " << distributions;
   }
+}
+
+TEST(SequentialStep, MovesAreCountedByKind) {
+  Particles p(kChange.before, 16, 1);
+  SequentialSettings settings = settings_of(2);
+  settings.num_moves = 3;
+  const SequentialOutcome outcome = step(kChange, settings, 1, p);
+  EXPECT_EQ(outcome.local.proposed, 0);
+  EXPECT_EQ(outcome.independent.proposed, 2 * 3 * 16);
+  EXPECT_GT(outcome.independent.accepted, 0);
+  EXPECT_LE(outcome.independent.accepted, outcome.independent.proposed);
 }
 
 TEST(SequentialStep, PlantedFaultIsSeen) {
   const Moments m = repeat(settings_of(5), 20000, false, 0.02);
-  EXPECT_GT(std::fabs(m.mean - sum_of(kChange.now)), 4.4 * m.error);
+  EXPECT_GT(std::fabs(m.mean() - sum_of(kChange.now)), 4.4 * m.error());
 }
 
 TEST(SequentialStep, NothingChangesWhenNothingChanges) {

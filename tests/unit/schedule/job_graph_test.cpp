@@ -7,6 +7,7 @@
 namespace baton {
 namespace {
 
+using testing_farm::assemble;
 using testing_farm::moving_job;
 using testing_farm::outputs_of;
 using testing_farm::render;
@@ -92,6 +93,18 @@ TEST(JobGraph, OutputsMustBeExactlyWhatTheTaskMakes) {
   outputs = right;
   outputs[0].tile = 1;
   EXPECT_TRUE(graph.check_outputs(task, outputs));
+}
+
+TEST(JobGraph, StatisticsMustBeOfTheTasksOwnFramesAndTile) {
+  const JobGraph graph(small_job(3, 5, 2));
+  const TaskKey task = render(1, 2);  // frames 2 and 3
+  EXPECT_FALSE(graph.check_frames(task, {}));
+  EXPECT_FALSE(graph.check_frames(task, {{2, 2, {}}, {3, 2, {}}}));
+  EXPECT_TRUE(graph.check_frames(task, {{2, 1, {}}})) << "another tile";
+  EXPECT_TRUE(graph.check_frames(task, {{1, 2, {}}})) << "before the run";
+  EXPECT_TRUE(graph.check_frames(task, {{4, 2, {}}})) << "after the run";
+  EXPECT_TRUE(graph.check_frames(task, {{3, 2, {}}, {3, 2, {}}})) << "twice";
+  EXPECT_TRUE(graph.check_frames(assemble(2), {{2, 0, {}}})) << "an assembly samples nothing";
 }
 
 TEST(BlobReferences, ASharedBlobIsGarbageWhenItsLastUserLetsGo) {

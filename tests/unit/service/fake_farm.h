@@ -90,8 +90,11 @@ class FakeWorker {
       return done;
     }
     const TileRun run = tile_run(job_, lease.task.tile, lease.task.step);
-    for (int frame = run.first_frame; frame <= run.last_frame; ++frame)
+    for (int frame = run.first_frame; frame <= run.last_frame; ++frame) {
       done.outputs.push_back(blob(BlobKind::film, frame, run.tile));
+      done.frames.push_back({frame, run.tile, {}});
+      done.frames.back().sampling.pixels_carried = static_cast<std::uint64_t>(10 + run.tile);
+    }
     if (carries_state(job_))
       done.outputs.push_back(blob(BlobKind::state, run.last_frame, run.tile));
     return done;

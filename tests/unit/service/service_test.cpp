@@ -2,6 +2,9 @@
 
 #include <gmock/gmock.h>
 
+#include <algorithm>
+
+#include "common/base/files.h"
 #include "tests/unit/service/fake_farm.h"
 
 namespace baton {
@@ -46,6 +49,16 @@ TEST_F(ServiceTest, AJobGoesFromSubmissionToItsLastFrame) {
   EXPECT_EQ(detail.summary.stats.pixels, 8u);
   EXPECT_THAT(detail.frames_done, ElementsAre(1, 2, 3, 4));
   EXPECT_EQ(count_blobs(store()), 2u) << "the last states are kept, all else is gone";
+
+  // What the sampler did: frame by frame in the answer, tile by tile in the file.
+  ASSERT_THAT(detail.frames, SizeIs(4));
+  EXPECT_EQ(detail.frames[3].frame, 4);
+  EXPECT_EQ(detail.frames[3].sampling.pixels_carried, 10u + 11u);
+  const Result<std::string> csv = read_text_file(folder / "out/diagnostics.csv", 1 << 20);
+  ASSERT_TRUE(csv.ok());
+  EXPECT_EQ(std::count(csv->begin(), csv->end(), '\n'), 1 + 4 * 3);
+  EXPECT_THAT(*csv, HasSubstr("\n4,all,21,21,0"));
+  EXPECT_THAT(*csv, HasSubstr("\n4,1,11,11,0"));
 
   const auto list = ask<JobList>(service.endpoint(), ListJobs{});
   ASSERT_THAT(list.jobs, SizeIs(1));

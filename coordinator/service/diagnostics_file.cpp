@@ -1,0 +1,71 @@
+#include "coordinator/service/diagnostics_file.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <filesystem>
+#include <tuple>
+
+#include "common/base/files.h"
+#include "common/job/sequence.h"
+
+namespace baton {
+namespace {
+
+std::string line(int frame_number, const std::string& tile, const SamplingStats& s) {
+  std::string text =
+      fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{}", frame_number, tile, s.pixels(),
+                  s.pixels_carried, s.pixels_fresh, s.pixels_refreshed, s.pixels_refreshed_by_ratio,
+                  s.pixels_restarted, s.pixels_resampled, s.local_proposed, s.local_accepted,
+                  s.independent_proposed, s.independent_accepted);
+  for (const std::uint64_t count : s.ess_histogram) text += fmt::format(",{}", count);
+  return text + "\n";
+}
+
+}  // namespace
+
+std::string diagnostics_header() {
+  std::string text =
+      "frame,tile,pixels,carried,fresh,refreshed,refreshedByRatio,restarted,resampled,"
+      "localMovesProposed,localMovesAccepted,independentMovesProposed,independentMovesAccepted";
+  for (std::size_t bin = 0; bin < SamplingStats::kEssBins; ++bin) {
+    text += fmt::format(",essRatioFrom{:.3f}",
+                        static_cast<double>(bin) / static_cast<double>(SamplingStats::kEssBins));
+  }
+  return text + "\n";
+}
+
+std::string diagnostics_lines(std::vector<FrameStats> stats,
+                              const std::vector<int>& frame_numbers) {
+  std::sort(stats.begin(), stats.end(), [](const FrameStats& a, const FrameStats& b) {
+    return std::tie(a.frame, a.tile) < std::tie(b.frame, b.tile);
+  });
+  std::string text;
+  for (auto first = stats.begin(); first != stats.end();) {
+    const auto last = std::find_if(first, stats.end(),
+                                   [&](const FrameStats& s) { return s.frame != first->frame; });
+    const int number = frame_numbers.at(static_cast<std::size_t>(first->frame));
+
+    SamplingStats sum;
+    std::for_each(first, last, [&](const FrameStats& s) { sum.merge(s.sampling); });
+    text += line(number, "all", sum);
+    for (; first != last; ++first)
+      text += line(number, std::to_string(first->tile), first->sampling);
+  }
+  return text;
+}
+
+Status write_diagnostics(Journal& journal, const Digest& digest, const JobSpec& job) {
+  // Run by run: the rows of all tiles of a long job need not be in memory at once, their text may.
+  std::string text;
+  for (std::int32_t run = 0; run < num_runs(job); ++run) {
+    BATON_ASSIGN(std::vector<FrameStats> stats, journal.frame_stats(digest, run));
+    text += diagnostics_lines(std::move(stats), job.frames);
+  }
+  if (text.empty()) return {};
+  text.insert(0, diagnostics_header());
+  const auto path = std::filesystem::path(job.output.directory) / "diagnostics.csv";
+  return write_file_atomic(path, std::as_bytes(std::span(text)));
+}
+
+}  // namespace baton

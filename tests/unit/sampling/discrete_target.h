@@ -1,0 +1,91 @@
+#pragma once
+
+// A small exact space for the sequential sampler: eight points with given targets. "Directions" are
+// indices, proposals uniform. Compiled for the one instruction set of the test.
+#include <array>
+#include <cmath>
+#include <numeric>
+#include <vector>
+
+#include "worker/sampling/sequential-inl.h"
+
+namespace baton::HWY_NAMESPACE {
+
+inline constexpr std::uint32_t kPoints = 8;
+using PointValues = std::array<float, kPoints>;
+
+inline PointValues log_of(const PointValues& target) {
+  PointValues logs{};
+  for (std::size_t i = 0; i < kPoints; ++i)
+    logs[i] = target[i] > 0 ? std::log(target[i]) : kLogZero;
+  return logs;
+}
+
+struct DiscreteTarget {
+  PointValues before, now;
+  PointValues log_before, log_now;
+
+  DiscreteTarget(const PointValues& target_before, const PointValues& target_now)
+      : before(target_before), now(target_now), log_before(log_of(before)), log_now(log_of(now)) {}
+
+  LogTargets Evaluate(const PointLanes& point) const {
+    const DF d;
+    const VI index = hn::BitCast(DI(), point.code);
+    return {hn::GatherIndex(d, log_before.data(), index), hn::GatherIndex(d, log_now.data(), index),
+            hn::Zero(d)};
+  }
+  /// Blocks of neighbours from a random start on the ring of points.
+  static std::size_t BlockStart(std::uint32_t bits) { return bits % kPoints; }
+  LogTargets Propose(std::size_t entry, VF /*site_fraction*/, PointLanes& point) const {
+    point.code =
+        hn::And(hn::Iota(DU(), static_cast<std::uint32_t>(entry)), hn::Set(DU(), kPoints - 1));
+    return Evaluate(point);
+  }
+};
+
+inline float sum_of(const PointValues& target) {
+  return std::accumulate(target.begin(), target.end(), 0.0f);
+}
+
+/// Particles drawn independently from `before`, as SIR would leave them.
+struct Particles {
+  std::vector<OctDirection> code;
+  std::vector<std::uint8_t> site;
+  std::vector<float> weight;
+
+  Particles(const PointValues& before, std::size_t count, std::uint64_t seed)
+      : code(count), site(count, 0), weight(count, 1.0f / static_cast<float>(count)) {
+    const Rng rng({.job_seed = seed}, PassId::choose);
+    for (std::size_t i = 0; i < count; ++i) {
+      float left = rng.uniforms(0, static_cast<std::uint32_t>(i))[0] * sum_of(before);
+      std::uint32_t point = 0;
+      while (point + 1 < kPoints && left >= before[point]) left -= before[point++];
+      code[i] = point;
+    }
+  }
+  ParticleSpan span() { return {code.data(), site.data(), weight.data()}; }
+};
+
+inline SequentialOutcome step(const DiscreteTarget& target, const SequentialSettings& settings,
+                              std::uint64_t seed, Particles& p, float lns_before,
+                              std::uint32_t frame = 0) {
+  const RngKey key{.job_seed = seed, .frame = frame};
+  return SequentialStep(target, settings, lns_before, Rng(key, PassId::move),
+                        Rng(key, PassId::resample), p.span());
+}
+
+/// Mean and standard error of values.
+struct Moments {
+  double sum = 0, squares = 0;
+  int count = 0;
+
+  void add(double value) {
+    sum += value;
+    squares += value * value;
+    ++count;
+  }
+  double mean() const { return sum / count; }
+  double error() const { return std::sqrt((squares / count - mean() * mean()) / (count - 1)); }
+};
+
+}  // namespace baton::HWY_NAMESPACE
