@@ -114,6 +114,11 @@ void TileFrameRenderer::sample(Batch& batch, const FrameLight& light, bool has_h
     const std::span<const SurfaceHit> hits = surfaces_.pixel(index);
 
     // Gather the pixel's surfaces.
+    if (std::none_of(hits.begin(), hits.end(), [](const SurfaceHit& hit) { return hit.hit; })) {
+      state.source[index] = PixelSource::background;
+      ++stats_.pixels_background;
+      continue;
+    }
     sites.clear(surfaces_.num_sites);
     for (std::size_t s = 0; s < hits.size(); ++s) {
       if (hits[s].hit) {
@@ -121,11 +126,6 @@ void TileFrameRenderer::sample(Batch& batch, const FrameLight& light, bool has_h
       } else {
         sites.add_miss(static_cast<int>(s));
       }
-    }
-    if (sites.num_hits == 0) {
-      state.source[index] = PixelSource::background;
-      ++stats_.pixels_background;
-      continue;
     }
 
     // Sample.
