@@ -11,12 +11,12 @@ namespace {
 /// Planes of an EXR that an AOV adds.
 std::int64_t num_channels(Aov aov) { return aov == Aov::source || aov == Aov::normal ? 3 : 1; }
 
-/// Tiles that all tiles of one run together need of the run before.
-std::int64_t count_neighbours(const JobSpec& job) {
+/// Tiles within reach of each tile, all tiles together.
+std::int64_t count_neighbours(const JobSpec& job, std::int32_t reach_px) {
   const TileGrid grid(job.image);
   std::int64_t count = 0;
   for (std::int32_t tile = 0; tile < grid.count(); ++tile)
-    count += static_cast<std::int64_t>(grid.tiles_near(tile, history_reach_px(job)).size());
+    count += static_cast<std::int64_t>(grid.tiles_near(tile, reach_px).size());
   return count;
 }
 
@@ -40,8 +40,10 @@ JobEstimate estimate_job(const JobSpec& job) {
   e.runs = num_runs(job);
   e.render_tasks = e.tiles * e.runs;
   e.assemble_tasks = e.frames;
+  e.second_pass_tasks = job.visibility.correlated ? e.frames * e.tiles : 0;
   e.dependencies = e.frames * e.tiles;
-  if (carries_state(job)) e.dependencies += count_neighbours(job) * (e.runs - 1);
+  if (carries_state(job)) e.dependencies += count_neighbours(job, history_reach_px(job)) * (e.runs - 1);
+  if (job.visibility.correlated) e.dependencies += count_neighbours(job, exchange_reach_px(job.visibility)) * e.frames;
 
   // Count rays; a reference sample is a pair, one from the environment and one from the BRDF.
   e.primary_rays_per_pixel = job.image.sites;

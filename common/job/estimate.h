@@ -13,6 +13,7 @@ struct JobEstimate {
   std::int64_t tiles = 0;
   std::int64_t runs = 0;            ///< per tile
   std::int64_t render_tasks = 0;    ///< tiles * runs
+  std::int64_t second_pass_tasks = 0;  ///< tiles * frames, with correlated visibility
   std::int64_t assemble_tasks = 0;  ///< one a frame
   std::int64_t dependencies = 0;    ///< of a task on another
   std::int64_t primary_rays_per_pixel = 0;
@@ -24,7 +25,7 @@ struct JobEstimate {
   std::int64_t state_bytes = 0;            ///< of all tiles at one checkpoint
   std::int64_t largest_blob_bytes = 0;     ///< one tile's film or state in memory
 
-  std::int64_t tasks() const { return render_tasks + assemble_tasks; }
+  std::int64_t tasks() const { return render_tasks + second_pass_tasks + assemble_tasks; }
 };
 
 /// job: each value in its own range; needs no assets.

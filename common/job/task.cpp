@@ -4,6 +4,15 @@
 
 namespace baton {
 
+std::string_view task_name(TaskKind kind) {
+  switch (kind) {
+    case TaskKind::render: return "render";
+    case TaskKind::assemble: return "assemble";
+    case TaskKind::second_pass: return "second pass";
+  }
+  return "unknown";
+}
+
 void SamplingStats::count_ess(float ess_ratio) {
   const auto bin = static_cast<std::size_t>(std::clamp(ess_ratio, 0.0f, 1.0f) * kEssBins);
   ++ess_histogram[std::min(bin, kEssBins - 1)];
@@ -37,6 +46,10 @@ void RenderStats::merge(const RenderStats& b) {
   seconds_visibility += b.seconds_visibility;
   seconds_shade += b.seconds_shade;
   seconds_state += b.seconds_state;
+  pixels_masked += b.pixels_masked;
+  rays_second_pass += b.rays_second_pass;
+  seconds_second_pass += b.seconds_second_pass;
+  seconds_second_rays += b.seconds_second_rays;
 }
 
 }  // namespace baton

@@ -3,6 +3,7 @@
 #include <array>
 #include <compare>
 #include <cstdint>
+#include <string_view>
 #include <vector>
 
 #include "common/base/digest.h"
@@ -16,8 +17,11 @@ namespace baton {
 enum class TaskKind : std::uint8_t {
   render = 0,    ///< one TileRun: step is the run, tile the tile
   assemble = 1,  ///< one frame's EXR from its tile films: step is the 0-based frame index, tile is 0
+  second_pass = 2,  ///< one tile of one frame: step is the 0-based frame index, tile the tile
 };
-constexpr TaskKind last_of(TaskKind) { return TaskKind::assemble; }
+constexpr TaskKind last_of(TaskKind) { return TaskKind::second_pass; }
+/// "render", "assemble", "second pass".
+std::string_view task_name(TaskKind kind);
 
 struct TaskKey {
   TaskKind kind = TaskKind::render;
@@ -29,8 +33,8 @@ struct TaskKey {
 };
 
 /// A blob that a task needs or made. `frame` is a 0-based index. Stored and sent; values are for ever.
-enum class BlobKind : std::uint8_t { state = 0, film = 1, image = 2 };
-constexpr BlobKind last_of(BlobKind) { return BlobKind::image; }
+enum class BlobKind : std::uint8_t { state = 0, film = 1, image = 2, first_pass = 3 };
+constexpr BlobKind last_of(BlobKind) { return BlobKind::first_pass; }
 
 struct BlobRef {
   BlobKind kind = BlobKind::state;
@@ -97,17 +101,22 @@ struct FrameStats {
 struct RenderStats {
   std::uint64_t pixels = 0, rays_primary = 0, rays_shadow = 0, target_evaluations = 0;
   std::uint64_t pixels_background = 0;
+  std::uint64_t pixels_masked = 0;     ///< that the second pass did again
+  std::uint64_t rays_second_pass = 0;  ///< not in rays_shadow
   SamplingStats sampling;
   double cpu_seconds = 0;
   /// CPU seconds of the stages; light is shared by all tiles of a frame and counted where it was prepared.
   double seconds_light = 0, seconds_primary = 0, seconds_sample = 0, seconds_visibility = 0, seconds_shade = 0;
   double seconds_state = 0;  ///< encoding, writing, reading and decoding sample states
+  double seconds_second_pass = 0;  ///< all of the second pass
+  double seconds_second_rays = 0;  ///< its occlusion rays alone
 
   bool operator==(const RenderStats&) const = default;
   void merge(const RenderStats& b);
   template <class A> void fields(A& a) {
     a(pixels, rays_primary, rays_shadow, target_evaluations, pixels_background, sampling, cpu_seconds, seconds_light,
-      seconds_primary, seconds_sample, seconds_visibility, seconds_shade, seconds_state);
+      seconds_primary, seconds_sample, seconds_visibility, seconds_shade, seconds_state,
+      pixels_masked, rays_second_pass, seconds_second_pass, seconds_second_rays);
   }
 };
 

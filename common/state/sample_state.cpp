@@ -19,17 +19,20 @@ constexpr SectionTag kLnsFresh{'L', 'N', 'S', 'F'};
 constexpr SectionTag kDirection{'D', 'I', 'R', '_'};
 constexpr SectionTag kWeight{'W', 'G', 'T', '_'};
 constexpr SectionTag kSite{'S', 'I', 'T', 'E'};
-constexpr std::array kTags{kMeta, kSource, kLns, kLnsFresh, kDirection, kWeight, kSite};
+constexpr SectionTag kPopulations{'P', 'O', 'P', 'S'};
+constexpr std::array kTags{kMeta,      kSource, kLns,  kLnsFresh,
+                           kDirection, kWeight, kSite, kPopulations};
 
 constexpr std::size_t kMetaBytes = 2 * sizeof(std::uint64_t) + 7 * sizeof(std::int32_t);
 /// How far the sum of a pixel's weights may be from 1.
 constexpr double kWeightSumTolerance = 1e-3;
 
 /// 0-based indices of the pixels that carry samples, ascending.
-std::vector<std::size_t> surface_pixels(const std::vector<PixelSource>& source) {
+std::vector<std::size_t> surface_pixels(const SampleState& state) {
   std::vector<std::size_t> pixels;
-  for (std::size_t i = 0; i < source.size(); ++i) {
-    if (source[i] != PixelSource::background) pixels.push_back(i);
+  const auto populations = static_cast<std::size_t>(state.num_populations);
+  for (std::size_t i = 0; i < state.num_pixels(); ++i) {
+    if (state.source[i * populations] != PixelSource::background) pixels.push_back(i);
   }
   return pixels;
 }
@@ -113,11 +116,26 @@ Error value_error(const SampleState& state, const SectionTag& tag, std::size_t p
                       state.rect.y0 + pixel / width, what)};
 }
 
-/// Checks the values of one surface pixel. The error has no file name yet.
-Status check_pixel(const SampleState& state, std::size_t pixel) {
+/// Reads how many populations there are: one when nothing is said.
+Status decode_populations(const SectionFile& file, const std::string& name, SampleState& state) {
+  state.num_populations = 1;
+  if (file.find(kPopulations) == nullptr) return {};
+  BATON_ASSIGN(const ByteView payload,
+               section_payload(file, kPopulations, sizeof(std::int32_t), name));
+  state.num_populations = ByteReader(payload).get<std::int32_t>();
+  if (state.num_populations == 2 && state.num_particles % 2 == 0) return {};
+  return Error{
+      ErrorKind::bad_input,
+      fmt::format("{}: section POPS: {} populations of {} particles, expected 2 of an even number",
+                  name, state.num_populations, state.num_particles)};
+}
+
+/// Checks the values of one population of a surface pixel. The error has no file name yet.
+Status check_population(const SampleState& state, std::size_t pixel, std::size_t k) {
   // Lns: radiance.
+  const std::size_t row = pixel * static_cast<std::size_t>(state.num_populations) + k;
   for (const auto& [tag, value] :
-       {std::pair{kLns, state.lns[pixel]}, {kLnsFresh, state.lns_fresh[pixel]}}) {
+       {std::pair{kLns, state.lns[row]}, {kLnsFresh, state.lns_fresh[row]}}) {
     if (!(std::isfinite(value) && value >= 0)) {
       return value_error(state, tag, pixel,
                          fmt::format("{}, expected a finite number >= 0", value));
@@ -126,8 +144,9 @@ Status check_pixel(const SampleState& state, std::size_t pixel) {
 
   // Particles: each weight and site, then the sum.
   const auto num_particles = static_cast<std::size_t>(state.num_particles);
+  const std::size_t count = num_particles / static_cast<std::size_t>(state.num_populations);
   double sum = 0;
-  for (std::size_t i = 0; i < num_particles; ++i) {
+  for (std::size_t i = k * count; i < (k + 1) * count; ++i) {
     const float weight = state.weight[pixel * num_particles + i];
     const int site = state.site[pixel * num_particles + i];
     if (!(std::isfinite(weight) && weight >= 0)) {
@@ -151,31 +170,38 @@ Status check_pixel(const SampleState& state, std::size_t pixel) {
 
 /// Fills `state.source`; resizes all arrays.
 Status decode_sources(const SectionFile& file, const std::string& name, SampleState& state) {
-  BATON_ASSIGN(const ByteView payload, section_payload(file, kSource, state.num_pixels(), name));
-  state.resize(state.rect, state.num_particles);
-  for (std::size_t pixel = 0; pixel < payload.size(); ++pixel) {
-    const auto value = std::to_integer<std::uint8_t>(payload[pixel]);
+  const auto populations = static_cast<std::size_t>(state.num_populations);
+  BATON_ASSIGN(const ByteView payload,
+               section_payload(file, kSource, state.num_pixels() * populations, name));
+  state.resize(state.rect, state.num_particles, state.num_populations);
+  for (std::size_t row = 0; row < payload.size(); ++row) {
+    const std::size_t pixel = row / populations;
+    const auto value = std::to_integer<std::uint8_t>(payload[row]);
     if (value > static_cast<std::uint8_t>(PixelSource::refreshed)) {
       const Error error =
           value_error(state, kSource, pixel, fmt::format("source {}, expected 0 to 4", value));
       return Error{error.kind, fmt::format("{}: section {}", name, error.message)};
     }
-    state.source[pixel] = static_cast<PixelSource>(value);
+    state.source[row] = static_cast<PixelSource>(value);
   }
   return {};
 }
 
 }  // namespace
 
-void SampleState::resize(const PixelRect& new_rect, std::int32_t new_num_particles) {
+void SampleState::resize(const PixelRect& new_rect, std::int32_t new_num_particles,
+                         std::int32_t new_num_populations) {
   BATON_CHECK(new_rect.width() > 0 && new_rect.height() > 0 && new_num_particles > 0);
+  BATON_CHECK(new_num_populations > 0 && new_num_particles % new_num_populations == 0);
   rect = new_rect;
   num_particles = new_num_particles;
+  num_populations = new_num_populations;
   const std::size_t pixels = num_pixels();
   const std::size_t particles = pixels * static_cast<std::size_t>(num_particles);
-  lns.assign(pixels, 0.0f);
-  lns_fresh.assign(pixels, 0.0f);
-  source.assign(pixels, PixelSource::background);
+  const std::size_t rows = pixels * static_cast<std::size_t>(num_populations);
+  lns.assign(rows, 0.0f);
+  lns_fresh.assign(rows, 0.0f);
+  source.assign(rows, PixelSource::background);
   direction.assign(particles, 0);
   weight.assign(particles, 0.0f);
   site.assign(particles, 0);
@@ -184,23 +210,31 @@ void SampleState::resize(const PixelRect& new_rect, std::int32_t new_num_particl
 Bytes encode_state(const SampleState& state) {
   const std::size_t num_pixels = state.num_pixels();
   const auto num_particles = static_cast<std::size_t>(state.num_particles);
-  BATON_CHECK(state.lns.size() == num_pixels && state.lns_fresh.size() == num_pixels);
-  BATON_CHECK(state.source.size() == num_pixels &&
+  const auto populations = static_cast<std::size_t>(state.num_populations);
+  BATON_CHECK(state.lns.size() == num_pixels * populations &&
+              state.lns_fresh.size() == state.lns.size());
+  BATON_CHECK(state.source.size() == state.lns.size() &&
               state.direction.size() == num_pixels * num_particles);
   BATON_CHECK(state.weight.size() == state.direction.size() &&
               state.site.size() == state.direction.size());
 
-  const std::vector<std::size_t> pixels = surface_pixels(state.source);
+  const std::vector<std::size_t> pixels = surface_pixels(state);
   const ByteView sources = std::as_bytes(std::span(state.source));
-  return encode_section_file({kMagic,
-                              kStateVersion,
-                              {encode_meta(state),
-                               {kSource, true, 1, Bytes(sources.begin(), sources.end())},
-                               gather(kLns, state.lns, pixels, 1),
-                               gather(kLnsFresh, state.lns_fresh, pixels, 1),
-                               gather(kDirection, state.direction, pixels, num_particles),
-                               gather(kWeight, state.weight, pixels, num_particles),
-                               gather(kSite, state.site, pixels, num_particles)}});
+  SectionFile file{kMagic,
+                   kStateVersion,
+                   {encode_meta(state),
+                    {kSource, true, 1, Bytes(sources.begin(), sources.end())},
+                    gather(kLns, state.lns, pixels, populations),
+                    gather(kLnsFresh, state.lns_fresh, pixels, populations),
+                    gather(kDirection, state.direction, pixels, num_particles),
+                    gather(kWeight, state.weight, pixels, num_particles),
+                    gather(kSite, state.site, pixels, num_particles)}};
+  if (populations > 1) {
+    ByteWriter writer;
+    writer.put(state.num_populations);
+    file.sections.push_back({kPopulations, true, 1, writer.take()});
+  }
+  return encode_section_file(file);
 }
 
 Result<SampleState> decode_state(ByteView bytes, const std::string& name) {
@@ -210,20 +244,24 @@ Result<SampleState> decode_state(ByteView bytes, const std::string& name) {
   // Read what sizes the arrays, then the arrays.
   SampleState state;
   BATON_TRY(decode_meta(file, name, state));
+  BATON_TRY(decode_populations(file, name, state));
   BATON_TRY(decode_sources(file, name, state));
-  const std::vector<std::size_t> pixels = surface_pixels(state.source);
+  const std::vector<std::size_t> pixels = surface_pixels(state);
   const auto num_particles = static_cast<std::size_t>(state.num_particles);
-  BATON_TRY(scatter(file, kLns, pixels, 1, name, state.lns));
-  BATON_TRY(scatter(file, kLnsFresh, pixels, 1, name, state.lns_fresh));
+  const auto populations = static_cast<std::size_t>(state.num_populations);
+  BATON_TRY(scatter(file, kLns, pixels, populations, name, state.lns));
+  BATON_TRY(scatter(file, kLnsFresh, pixels, populations, name, state.lns_fresh));
   BATON_TRY(scatter(file, kDirection, pixels, num_particles, name, state.direction));
   BATON_TRY(scatter(file, kWeight, pixels, num_particles, name, state.weight));
   BATON_TRY(scatter(file, kSite, pixels, num_particles, name, state.site));
 
   // Check every value.
   for (const std::size_t pixel : pixels) {
-    if (const Status checked = check_pixel(state, pixel); !checked) {
-      return Error{checked.error().kind,
-                   fmt::format("{}: section {}", name, checked.error().message)};
+    for (std::size_t k = 0; k < populations; ++k) {
+      if (const Status checked = check_population(state, pixel, k); !checked) {
+        return Error{checked.error().kind,
+                     fmt::format("{}: section {}", name, checked.error().message)};
+      }
     }
   }
   return state;

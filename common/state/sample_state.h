@@ -30,19 +30,23 @@ struct SampleState {
   std::int32_t frame_index = 0;  ///< 0-based; the frame that these samples belong to
   std::int32_t tile = 0;
   PixelRect rect;
-  std::int32_t num_particles = 0;  ///< N
+  std::int32_t num_particles = 0;  ///< N: of all populations
+  std::int32_t num_populations =
+      1;  ///< K: parts that never exchange anything; part k has particles [k N / K, (k + 1) N / K)
 
-  std::vector<float> lns;           ///< (pixels) estimate of the unshadowed radiance, mean over RGB
-  std::vector<float> lns_fresh;     ///< (pixels) Lns at the last SIR or refresh
-  std::vector<PixelSource> source;  ///< (pixels)
+  std::vector<float> lns;        ///< (pixels, K) estimate of the unshadowed radiance, mean over RGB
+  std::vector<float> lns_fresh;  ///< (pixels, K) Lns at the last SIR or refresh
+  std::vector<PixelSource> source;      ///< (pixels, K)
   std::vector<OctDirection> direction;  ///< (pixels, N)
-  std::vector<float> weight;  ///< (pixels, N) normalised, sum 1, or all 0 when no particle is lit
+  std::vector<float> weight;  ///< (pixels, N) normalised, sum 1 in each population, or all 0 when
+                              ///< no particle is lit
   std::vector<std::uint8_t> site;  ///< (pixels, N)
 
   bool operator==(const SampleState&) const = default;
   std::size_t num_pixels() const { return static_cast<std::size_t>(rect.area()); }
-  /// Sizes every array for `rect` and `num_particles`, all zero.
-  void resize(const PixelRect& new_rect, std::int32_t new_num_particles);
+  /// Sizes every array, all zero. new_num_populations divides new_num_particles.
+  void resize(const PixelRect& new_rect, std::int32_t new_num_particles,
+              std::int32_t new_num_populations = 1);
 };
 
 /// Newest file version that this program reads, and the one that it writes.

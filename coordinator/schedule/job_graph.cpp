@@ -19,6 +19,8 @@ std::string_view name_of(BlobKind kind) {
       return "film";
     case BlobKind::image:
       return "image";
+    case BlobKind::first_pass:
+      return "first-pass samples";
   }
   return "blob";
 }
@@ -26,8 +28,10 @@ std::string_view name_of(BlobKind kind) {
 }  // namespace
 
 std::int64_t count_tasks(const JobSpec& job) {
-  return static_cast<std::int64_t>(job.frames.size()) +
-         static_cast<std::int64_t>(num_runs(job)) * TileGrid(job.image).count();
+  const auto frames = static_cast<std::int64_t>(job.frames.size());
+  const std::int64_t tiles = TileGrid(job.image).count();
+  return frames + (job.visibility.correlated ? frames * tiles : 0) +
+         static_cast<std::int64_t>(num_runs(job)) * tiles;
 }
 
 JobGraph::JobGraph(const JobSpec& job)
@@ -37,27 +41,43 @@ JobGraph::JobGraph(const JobSpec& job)
       num_tiles_(grid_.count()),
       frames_per_run_(baton::frames_per_run(job)),
       reach_px_(history_reach_px(job)),
-      carries_state_(baton::carries_state(job)) {
+      carries_state_(baton::carries_state(job)),
+      has_second_pass_(job.visibility.correlated),
+      exchange_reach_px_(baton::exchange_reach_px(job.visibility)) {
   BATON_CHECK(count_tasks(job) <= limits::kMaxTasksPerJob);
+  first_render_ = num_frames_ + (has_second_pass_ ? num_frames_ * num_tiles_ : 0);
 }
 
 std::optional<TaskIndex> JobGraph::find(const TaskKey& key) const {
-  const std::int32_t num_steps = key.kind == TaskKind::assemble ? num_frames_ : num_runs_;
+  const bool known = key.kind != TaskKind::second_pass || has_second_pass_;
+  const std::int32_t num_steps = key.kind == TaskKind::render ? num_runs_ : num_frames_;
   const std::int32_t tiles_of_step = key.kind == TaskKind::assemble ? 1 : num_tiles_;
-  if (key.step < 0 || key.step >= num_steps || key.tile < 0 || key.tile >= tiles_of_step)
+  if (!known || key.step < 0 || key.step >= num_steps || key.tile < 0 || key.tile >= tiles_of_step)
     return std::nullopt;
-  return key.kind == TaskKind::assemble ? key.step : render_index(key.step, key.tile);
+  switch (key.kind) {
+    case TaskKind::assemble:
+      return key.step;
+    case TaskKind::second_pass:
+      return second_pass_index(key.step, key.tile);
+    case TaskKind::render:
+      return render_index(key.step, key.tile);
+  }
+  return std::nullopt;
 }
 
 TaskKey JobGraph::key(TaskIndex index) const {
   BATON_CHECK(index >= 0 && index < num_tasks());
   if (index < num_frames_) return {TaskKind::assemble, index, 0};
-  const std::int32_t render = index - num_frames_;
-  return {TaskKind::render, render / num_tiles_, render % num_tiles_};
+  const bool second = index < first_render_;
+  const std::int32_t place = index - (second ? num_frames_ : first_render_);
+  return {second ? TaskKind::second_pass : TaskKind::render, place / num_tiles_,
+          place % num_tiles_};
 }
 
 std::int32_t JobGraph::num_inputs(const TaskKey& key) const {
   if (key.kind == TaskKind::assemble) return num_tiles_;
+  if (key.kind == TaskKind::second_pass)
+    return static_cast<std::int32_t>(grid_.tiles_near(key.tile, exchange_reach_px_).size());
   if (!carries_state_ || key.step == 0) return 0;
   return static_cast<std::int32_t>(grid_.tiles_near(key.tile, reach_px_).size());
 }
@@ -65,8 +85,15 @@ std::int32_t JobGraph::num_inputs(const TaskKey& key) const {
 std::vector<TaskIndex> JobGraph::dependents(const TaskKey& key) const {
   std::vector<TaskIndex> result;
   if (key.kind == TaskKind::assemble) return result;
-  for (std::int32_t frame = first_frame(key.step); frame <= last_frame(key.step); ++frame)
-    result.push_back(frame);
+  if (key.kind == TaskKind::second_pass) return {key.step};
+  for (std::int32_t frame = first_frame(key.step); frame <= last_frame(key.step); ++frame) {
+    if (!has_second_pass_) {
+      result.push_back(frame);
+      continue;
+    }
+    for (const std::int32_t near : grid_.tiles_near(key.tile, exchange_reach_px_))
+      result.push_back(second_pass_index(frame, near));
+  }
   if (carries_state_ && key.step + 1 < num_runs_) add_neighbours(key.step + 1, key.tile, result);
   return result;
 }
@@ -76,7 +103,11 @@ std::vector<TaskIndex> JobGraph::inputs(const TaskKey& key) const {
   if (key.kind == TaskKind::assemble) {
     const std::int32_t run = key.step / frames_per_run_;
     for (std::int32_t tile = 0; tile < num_tiles_; ++tile)
-      result.push_back(render_index(run, tile));
+      result.push_back(has_second_pass_ ? second_pass_index(key.step, tile)
+                                        : render_index(run, tile));
+  } else if (key.kind == TaskKind::second_pass) {
+    for (const std::int32_t near : grid_.tiles_near(key.tile, exchange_reach_px_))
+      result.push_back(render_index(key.step / frames_per_run_, near));
   } else if (carries_state_ && key.step > 0) {
     add_neighbours(key.step - 1, key.tile, result);
   }
@@ -91,20 +122,25 @@ std::uint64_t JobGraph::num_pixels(std::int32_t tile) const {
   return static_cast<std::uint64_t>(grid_.rect(tile).area());
 }
 
+std::vector<BlobRef> JobGraph::expected_outputs(const TaskKey& key) const {
+  const auto blob = [&](BlobKind kind, std::int32_t frame) {
+    return BlobRef{.kind = kind, .frame = frame, .tile = key.tile, .digest = {}};
+  };
+  if (key.kind == TaskKind::assemble) return {blob(BlobKind::image, key.step)};
+  if (key.kind == TaskKind::second_pass) return {blob(BlobKind::film, key.step)};
+  std::vector<BlobRef> expected;
+  const std::int32_t last = last_frame(key.step);
+  if (carries_state_) expected.push_back(blob(BlobKind::state, last));
+  for (std::int32_t frame = first_frame(key.step); frame <= last; ++frame)
+    expected.push_back(blob(BlobKind::film, frame));
+  for (std::int32_t frame = first_frame(key.step); has_second_pass_ && frame <= last; ++frame)
+    expected.push_back(blob(BlobKind::first_pass, frame));
+  return expected;
+}
+
 std::optional<std::string> JobGraph::check_outputs(const TaskKey& key,
                                                    std::vector<BlobRef>& outputs) const {
-  // What the task must make, in sorted order.
-  std::vector<BlobRef> expected;
-  if (key.kind == TaskKind::assemble) {
-    expected.push_back({.kind = BlobKind::image, .frame = key.step, .tile = 0, .digest = {}});
-  } else {
-    const std::int32_t last = last_frame(key.step);
-    if (carries_state_)
-      expected.push_back({.kind = BlobKind::state, .frame = last, .tile = key.tile, .digest = {}});
-    for (std::int32_t frame = first_frame(key.step); frame <= last; ++frame) {
-      expected.push_back({.kind = BlobKind::film, .frame = frame, .tile = key.tile, .digest = {}});
-    }
-  }
+  const std::vector<BlobRef> expected = expected_outputs(key);
 
   // Compare kind, frame and tile one by one.
   std::sort(outputs.begin(), outputs.end());
@@ -135,8 +171,28 @@ std::optional<std::string> JobGraph::check_frames(const TaskKey& key,
   return std::nullopt;
 }
 
-std::size_t JobGraph::film_position(std::int32_t frame) const {
-  return static_cast<std::size_t>(frame % frames_per_run_) + (carries_state_ ? 1 : 0);
+bool JobGraph::takes(const TaskKey& reader, const TaskKey& maker, const BlobRef& output) const {
+  switch (reader.kind) {
+    case TaskKind::render:
+      return output.kind == BlobKind::state;
+    case TaskKind::assemble:
+      return output.kind == BlobKind::film && output.frame == reader.step;
+    case TaskKind::second_pass:
+      if (output.frame != reader.step) return false;
+      return output.kind == BlobKind::first_pass ||
+             (output.kind == BlobKind::film && maker.tile == reader.tile);
+  }
+  return false;
+}
+
+std::vector<std::size_t> JobGraph::taken_outputs(const TaskKey& reader,
+                                                 const TaskKey& maker) const {
+  std::vector<std::size_t> taken;
+  const std::vector<BlobRef> outputs = expected_outputs(maker);
+  for (std::size_t i = 0; i < outputs.size(); ++i) {
+    if (takes(reader, maker, outputs[i])) taken.push_back(i);
+  }
+  return taken;
 }
 
 void JobGraph::add_neighbours(std::int32_t run, std::int32_t tile,
@@ -146,7 +202,11 @@ void JobGraph::add_neighbours(std::int32_t run, std::int32_t tile,
 }
 
 TaskIndex JobGraph::render_index(std::int32_t run, std::int32_t tile) const {
-  return num_frames_ + run * num_tiles_ + tile;
+  return first_render_ + run * num_tiles_ + tile;
+}
+
+TaskIndex JobGraph::second_pass_index(std::int32_t frame, std::int32_t tile) const {
+  return num_frames_ + frame * num_tiles_ + tile;
 }
 
 }  // namespace baton

@@ -11,9 +11,9 @@
 
 namespace baton {
 
-/// Position of a task in its job: first the assemble tasks by frame, then the render tasks by run,
-/// then by tile. This is also the order in which ready tasks are granted: frames are finished
-/// before new ones are begun.
+/// Position of a task in its job: first the assemble tasks by frame, then the second-pass tasks by
+/// frame and tile, if there is a second pass, then the render tasks by run and tile. This is also
+/// the order in which ready tasks are granted: frames are finished before new ones are begun.
 using TaskIndex = std::int32_t;
 
 /// Number of tasks of a job, before anything is allocated for it.
@@ -23,13 +23,14 @@ std::int64_t count_tasks(const JobSpec& job);
 ///
 /// If the job carries state, render(run, tile) needs render(run - 1, t) of every tile t that
 /// history may come from: itself, and its neighbours within history_reach_px where something moves.
-/// assemble(frame) needs all tiles of its run.
+/// second_pass(frame, tile) needs the render tasks of that frame of all tiles within
+/// exchange_reach_px. assemble(frame) needs all tiles of its run, or all its second passes.
 class JobGraph {
  public:
   /// count_tasks(job) must be at most limits::kMaxTasksPerJob.
   explicit JobGraph(const JobSpec& job);
 
-  TaskIndex num_tasks() const { return num_frames_ + num_runs_ * num_tiles_; }
+  TaskIndex num_tasks() const { return first_render_ + num_runs_ * num_tiles_; }
   std::int32_t num_frames() const { return num_frames_; }
   std::int32_t num_tiles() const { return num_tiles_; }
 
@@ -59,16 +60,22 @@ class JobGraph {
   std::optional<std::string> check_outputs(const TaskKey& key, std::vector<BlobRef>& outputs) const;
   /// nullopt when the statistics are of the task's own tile and frames, each frame once at most; else what is wrong.
   std::optional<std::string> check_frames(const TaskKey& key, const std::vector<FrameStats>& frames) const;
-  /// Position of a frame's film in the sorted outputs of a render task.
-  std::size_t film_position(std::int32_t frame) const;
+  /// What `reader` takes of `maker`, one of its inputs: positions in the sorted outputs of `maker`.
+  std::vector<std::size_t> taken_outputs(const TaskKey& reader, const TaskKey& maker) const;
+  /// Whether `reader`, one of its dependents, takes an output of `maker`.
+  bool takes(const TaskKey& reader, const TaskKey& maker, const BlobRef& output) const;
 
  private:
   TaskIndex render_index(std::int32_t run, std::int32_t tile) const;
+  TaskIndex second_pass_index(std::int32_t frame, std::int32_t tile) const;
+  std::vector<BlobRef> expected_outputs(const TaskKey& key) const;
   void add_neighbours(std::int32_t run, std::int32_t tile, std::vector<TaskIndex>& tasks) const;
 
   TileGrid grid_;
   std::int32_t num_frames_, num_runs_, num_tiles_, frames_per_run_, reach_px_;
-  bool carries_state_;
+  bool carries_state_, has_second_pass_;
+  std::int32_t exchange_reach_px_;
+  TaskIndex first_render_;
 };
 
 }  // namespace baton

@@ -56,10 +56,8 @@ std::vector<BlobRef> JobTasks::inputs(TaskIndex task) const {
   std::vector<BlobRef> result;
   for (const TaskIndex input : graph_.inputs(key)) {
     const std::vector<BlobRef>& made = outputs(input);
-    BATON_CHECK(!made.empty());
-    const std::size_t position =
-        key.kind == TaskKind::assemble ? graph_.film_position(key.step) : 0;
-    result.push_back(made[position]);
+    for (const std::size_t position : graph_.taken_outputs(key, graph_.key(input)))
+      result.push_back(made.at(position));
   }
   return result;
 }
@@ -167,23 +165,17 @@ std::vector<Digest> JobTasks::live_blobs() const {
 /// How many still need an output of a task that is done: the tasks that take it as input, and
 /// whoever keeps it after the job. Completing a dependent makes it one less (release_inputs).
 std::int32_t JobTasks::num_uses(TaskIndex task, const BlobRef& output) const {
-  switch (output.kind) {
-    case BlobKind::image:
-      return 0;
-    case BlobKind::film:
-      return status(output.frame) != TaskStatus::done ? 1 : 0;
-    case BlobKind::state: {
-      std::int32_t uses = 0;
-      bool last = true;
-      for (const TaskIndex dependent : graph_.dependents(graph_.key(task))) {
-        if (graph_.key(dependent).kind != TaskKind::render) continue;
-        last = false;
-        uses += status(dependent) != TaskStatus::done ? 1 : 0;
-      }
-      return uses + (last || keep_all_states_ ? 1 : 0);
-    }
+  if (output.kind == BlobKind::image) return 0;
+  std::int32_t uses = 0;
+  bool last_state = output.kind == BlobKind::state;
+  const TaskKey maker = graph_.key(task);
+  for (const TaskIndex dependent : graph_.dependents(maker)) {
+    if (!graph_.takes(graph_.key(dependent), maker, output)) continue;
+    last_state = false;
+    uses += status(dependent) != TaskStatus::done ? 1 : 0;
   }
-  return 0;
+  const bool kept = last_state || (keep_all_states_ && output.kind == BlobKind::state);
+  return uses + (kept ? 1 : 0);
 }
 
 void JobTasks::count_output(const BlobRef& output) {

@@ -12,6 +12,8 @@ namespace {
 
 std::string describe(const TaskKey& task) {
   if (task.kind == TaskKind::assemble) return fmt::format("assembly of frame index {}", task.step);
+  if (task.kind == TaskKind::second_pass)
+    return fmt::format("second pass of tile {} frame index {}", task.tile, task.step);
   return fmt::format("run {} of tile {}", task.step, task.tile);
 }
 

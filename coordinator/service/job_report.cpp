@@ -28,8 +28,9 @@ std::string describe(const Scheduler::Job& job, const Failure& failure) {
   };
   if (!graph.find(task)) return failure.message;
   const std::string place =
-      task.kind == TaskKind::assemble
-          ? fmt::format("frame {}", number(task.step))
+      task.kind == TaskKind::assemble ? fmt::format("frame {}", number(task.step))
+      : task.kind == TaskKind::second_pass
+          ? fmt::format("frame {}, tile {}, second pass", number(task.step), task.tile)
           : fmt::format("frames {}-{}, tile {}", number(graph.first_frame(task.step)),
                         number(graph.last_frame(task.step)), task.tile);
   return fmt::format("{} on {}: {}", place, failure.worker, failure.message);

@@ -43,6 +43,7 @@ void print_json(const JobSpec& job, const JobEstimate& e, const AssetReport& ass
                          {"tiles", e.tiles},
                          {"runs", e.runs},
                          {"renderTasks", e.render_tasks},
+                         {"secondPassTasks", e.second_pass_tasks},
                          {"assembleTasks", e.assemble_tasks},
                          {"dependencies", e.dependencies},
                          {"primaryRaysPerPixel", e.primary_rays_per_pixel},

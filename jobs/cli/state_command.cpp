@@ -35,14 +35,14 @@ struct StateReport {
       ess_histogram{};  ///< pixels with a surface, by ESS / N in (0, 1]
 };
 
-/// 1 / sum W^2 over the particles of pixel `pixel`; 0 when all weights are 0.
+/// (sum W)^2 / sum W^2 over the particles of pixel `pixel`; 0 when all weights are 0.
 double pixel_ess(const SampleState& state, std::size_t pixel) {
   double squares = 0;
   const auto n = static_cast<std::size_t>(state.num_particles);
   for (std::size_t i = pixel * n; i < (pixel + 1) * n; ++i) {
     squares += static_cast<double>(state.weight[i]) * static_cast<double>(state.weight[i]);
   }
-  return squares > 0 ? 1 / squares : 0;
+  return squares > 0 ? double{1} * state.num_populations * state.num_populations / squares : 0;
 }
 
 Result<StateReport> load_state(const std::string& file) {
@@ -53,7 +53,7 @@ Result<StateReport> load_state(const std::string& file) {
   report.file_bytes = bytes.size();
 
   for (std::size_t pixel = 0; pixel < report.state.num_pixels(); ++pixel) {
-    const PixelSource source = report.state.source[pixel];
+    const PixelSource source = report.state.source[pixel * static_cast<std::size_t>(report.state.num_populations)];
     ++report.sources[static_cast<std::size_t>(source)];
     if (source == PixelSource::background) continue;
     const double ratio = pixel_ess(report.state, pixel) / report.state.num_particles;
@@ -121,6 +121,7 @@ void print_report(const StateReport& report) {
 ordered_json pixel_json(const SampleState& state, std::int32_t x, std::int32_t y) {
   const auto pixel = static_cast<std::size_t>(std::int64_t{y - state.rect.y0} * state.rect.width() +
                                               x - state.rect.x0);
+  const std::size_t row = pixel * static_cast<std::size_t>(state.num_populations);  // the first one
   ordered_json particles = ordered_json::array();
   const auto n = static_cast<std::size_t>(state.num_particles);
   for (std::size_t i = pixel * n; i < (pixel + 1) * n; ++i) {
@@ -130,9 +131,9 @@ ordered_json pixel_json(const SampleState& state, std::int32_t x, std::int32_t y
   }
   return {{"x", x},
           {"y", y},
-          {"source", kSourceNames[static_cast<std::size_t>(state.source[pixel])]},
-          {"lns", state.lns[pixel]},
-          {"lnsFresh", state.lns_fresh[pixel]},
+          {"source", kSourceNames[static_cast<std::size_t>(state.source[row])]},
+          {"lns", state.lns[row]},
+          {"lnsFresh", state.lns_fresh[row]},
           {"ess", pixel_ess(state, pixel)},
           {"particles", std::move(particles)}};
 }

@@ -24,9 +24,12 @@ void add_pixels(const baton::SampleState& state, FramePixels& pixels) {
   const auto num_particles = static_cast<std::size_t>(state.num_particles);
   for (std::size_t pixel = 0; pixel < state.num_pixels(); ++pixel) {
     baton::ByteWriter writer;
-    writer.put(state.lns[pixel]);
-    writer.put(state.lns_fresh[pixel]);
-    writer.put(static_cast<std::uint8_t>(state.source[pixel]));
+    const auto populations = static_cast<std::size_t>(state.num_populations);
+    for (std::size_t row = pixel * populations; row < (pixel + 1) * populations; ++row) {
+      writer.put(state.lns[row]);
+      writer.put(state.lns_fresh[row]);
+      writer.put(static_cast<std::uint8_t>(state.source[row]));
+    }
     for (std::size_t i = pixel * num_particles; i < (pixel + 1) * num_particles; ++i) {
       writer.put(state.direction[i]);
       writer.put(state.weight[i]);

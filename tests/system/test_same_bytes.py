@@ -46,6 +46,24 @@ def four_sites(programs, folder):
     compare_tilings(programs, folder, sites=4)
 
 
+def correlated_visibility(programs, folder):
+    """The second pass reaches into other tiles; no tiling shows."""
+    changes = {"visibility": {"correlated": True, "dilate": 1}, "frames": "1-4"}
+    expected = None
+    for name, workers, threads, tile_size in [
+        ("whole-image", 1, 1, 160),
+        ("small-tiles", 2, 1, 16),
+        ("tiles-of-64", 3, 1, 64),
+    ]:
+        job = make_job(folder / name, image={"tileSize": tile_size, "sites": 4}, **changes)
+        path = write_job(folder / name / "job.json", job)
+        programs.render(path, folder / name / "work", workers, threads)
+        got = programs.pixels(folder / name / "frames")
+        check_equal(len(got), 4, f"frames of {name}")
+        expected = expected or got
+        check_equal(got, expected, f"pixels of {name}")
+
+
 def equal_jobs_make_equal_files(programs, folder):
     """Two runs of the same job file give the same bytes, headers included."""
     files = []
@@ -129,6 +147,7 @@ if __name__ == "__main__":
     run_tests([
         one_site,
         four_sites,
+        correlated_visibility,
         equal_jobs_make_equal_files,
         a_killed_worker,
         a_killed_coordinator,

@@ -41,12 +41,9 @@ class SurfaceTable {
   }
   bool any_phong() const { return any_phong_; }
   bool any_ggx() const { return any_ggx_; }
-  /// Texels of measured BRDFs by k, where is_ggx holds 1 + k; the first is null.
-  const std::vector<const float*>& tables() const { return tables_; }
 
  private:
   std::vector<float> records_;
-  std::vector<const float*> tables_{nullptr};
   bool any_phong_ = false;
   bool any_ggx_ = false;
 };
@@ -58,6 +55,15 @@ struct LightSamples {
   std::size_t size() const { return x.size(); }
   void resize(std::size_t count) {
     for (auto* array : {&x, &y, &z, &r, &g, &b}) array->resize(count);
+  }
+  /// Appends element i of another set.
+  void push_back(const LightSamples& from, std::size_t i) {
+    x.push_back(from.x[i]);
+    y.push_back(from.y[i]);
+    z.push_back(from.z[i]);
+    r.push_back(from.r[i]);
+    g.push_back(from.g[i]);
+    b.push_back(from.b[i]);
   }
 };
 

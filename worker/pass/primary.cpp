@@ -23,16 +23,36 @@ TileSurfaces trace_primary(const RenderContext& context, const PixelRect& rect) 
   surfaces.rays.reserve(static_cast<std::size_t>(rect.area() * job.image.sites));
   for (std::int32_t y = rect.y0; y < rect.y1; ++y) {
     for (std::int32_t x = rect.x0; x < rect.x1; ++x) {
-      const auto pixel = static_cast<std::uint32_t>(y * job.image.width + x);
-      for (std::int32_t site = 0; site < job.image.sites; ++site) {
-        const auto [dx, dy] = site_position(job, pixel, site);
-        surfaces.rays.push_back(context.scene->camera.ray(static_cast<float>(x) + dx, static_cast<float>(y) + dy));
-      }
+      append_primary_rays(context, 0, x, y, surfaces.rays);
     }
   }
   surfaces.hits.resize(surfaces.rays.size());
-  context.accel->intersect(surfaces.rays, surfaces.hits);
+  trace_primary_rays(context, 0, surfaces.rays, surfaces.hits);
   return surfaces;
+}
+
+void append_primary_rays(const RenderContext& context, std::int32_t /*frame_index*/, std::int32_t x, std::int32_t y,
+                         std::vector<Ray>& rays) {
+  const auto pixel = static_cast<std::uint32_t>(y * context.job.image.width + x);
+  for (std::int32_t site = 0; site < context.job.image.sites; ++site) {
+    const auto [dx, dy] = site_position(context.job, pixel, site);
+    rays.push_back(context.scene->camera.ray(static_cast<float>(x) + dx, static_cast<float>(y) + dy));
+  }
+}
+
+void trace_primary_rays(const RenderContext& context, std::int32_t /*frame_index*/, std::span<const Ray> rays,
+                        std::span<SurfaceHit> hits) {
+  context.accel->intersect(rays, hits);
+}
+
+Rgb environment_behind(std::span<const SurfaceHit> hits, std::span<const Ray> rays, const Environment& environment) {
+  Rgb sum;
+  for (std::size_t s = 0; s < hits.size(); ++s) {
+    if (hits[s].hit) continue;
+    const EnvironmentMap::Texel seen = environment.evaluate(rays[s].direction);
+    sum += Rgb{seen.r, seen.g, seen.b} / static_cast<float>(hits.size());
+  }
+  return sum;
 }
 
 }  // namespace baton

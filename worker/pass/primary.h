@@ -25,4 +25,13 @@ struct TileSurfaces {
 /// jittered on a sqrt(S) x sqrt(S) grid; the same for all frames.
 TileSurfaces trace_primary(const RenderContext& context, const PixelRect& rect);
 
+/// The same for pixels one by one: appends the rays of the sites of pixel (x, y) in a frame (0-based index).
+void append_primary_rays(const RenderContext& context, std::int32_t frame_index, std::int32_t x, std::int32_t y,
+                         std::vector<Ray>& rays);
+void trace_primary_rays(const RenderContext& context, std::int32_t frame_index, std::span<const Ray> rays,
+                        std::span<SurfaceHit> hits);
+
+/// Radiance that the sites of a pixel which see no surface show of the environment, as a share of all its sites.
+Rgb environment_behind(std::span<const SurfaceHit> hits, std::span<const Ray> rays, const Environment& environment);
+
 }  // namespace baton

@@ -1,5 +1,7 @@
 #include "worker/pass/render_context.h"
 
+#include "worker/pass/populations.h"
+
 namespace baton {
 
 Result<std::shared_ptr<const RenderContext>> load_render_context(const JobSpec& job, const Digest& job_digest) {
@@ -9,7 +11,7 @@ Result<std::shared_ptr<const RenderContext>> load_render_context(const JobSpec& 
   context->grid = TileGrid(job.image);
   context->frames = expand_sequence(job);
   context->lights = std::make_unique<LightSequence>(context->job);
-  context->sampler = make_pixel_sampler(job.sampling);
+  context->sampler = make_pixel_sampler(population_spec(job));
 
   BATON_ASSIGN(Scene scene, load_scene(job));
   context->scene = std::make_unique<const Scene>(std::move(scene));

@@ -4,6 +4,7 @@
 
 #include "worker/integrator/reference.h"
 #include "worker/pass/cpu_clock.h"
+#include "worker/pass/populations.h"
 
 namespace baton {
 namespace {
@@ -68,7 +69,12 @@ struct TileFrameRenderer::Batch {
 };
 
 TileFrameRenderer::TileFrameRenderer(const RenderContext& context, const TileSurfaces& surfaces)
-    : context_(context), surfaces_(surfaces), scratch_(std::make_unique<kernels::CandidateSet>()) {}
+    : context_(context),
+      surfaces_(surfaces),
+      scratch_(std::make_unique<kernels::CandidateSet>()),
+      collector_(context.job) {
+  for (std::int32_t k = 0; k < num_populations(context.job); ++k) picture_scale_.push_back(picture_scale(context.job, k));
+}
 
 FilmTile TileFrameRenderer::render(const FrameSpec& frame, const FrameLight& light, bool has_history,
                                    SampleState& state) {
@@ -79,6 +85,7 @@ FilmTile TileFrameRenderer::render(const FrameSpec& frame, const FrameLight& lig
   frame_sampling_ = {};
   batch.sample_color.resize(kBatchPixels * static_cast<std::size_t>(state.num_particles));
   const std::size_t num_pixels = state.num_pixels();
+  if (context_.job.visibility.correlated) collector_.begin(state);
   for (std::size_t first = 0; first < num_pixels; first += kBatchPixels) {
     batch.first = first;
     batch.count = std::min(kBatchPixels, num_pixels - first);
@@ -104,6 +111,7 @@ void TileFrameRenderer::sample(Batch& batch, const FrameLight& light, bool has_h
   const EnvironmentView now = view_of(light.now);
   const EnvironmentView before = view_of(light.before);
   const auto n = static_cast<std::size_t>(state.num_particles);
+  const auto num_populations = static_cast<std::size_t>(state.num_populations);
   const std::int32_t frame_index = batch.frame_index;
   ShadedSamples shaded;
   SiteBlock sites;
@@ -114,11 +122,6 @@ void TileFrameRenderer::sample(Batch& batch, const FrameLight& light, bool has_h
     const std::span<const SurfaceHit> hits = surfaces_.pixel(index);
 
     // Gather the pixel's surfaces.
-    if (std::none_of(hits.begin(), hits.end(), [](const SurfaceHit& hit) { return hit.hit; })) {
-      state.source[index] = PixelSource::background;
-      ++stats_.pixels_background;
-      continue;
-    }
     sites.clear(surfaces_.num_sites);
     for (std::size_t s = 0; s < hits.size(); ++s) {
       if (hits[s].hit) {
@@ -127,37 +130,41 @@ void TileFrameRenderer::sample(Batch& batch, const FrameLight& light, bool has_h
         sites.add_miss(static_cast<int>(s));
       }
     }
+    if (sites.num_hits == 0) {
+      set_background(state, index);
+      ++stats_.pixels_background;
+      continue;
+    }
 
     // Sample.
-    const PixelSamples samples{std::span(state.direction).subspan(index * n, n),
-                               std::span(state.site).subspan(index * n, n),
-                               std::span(state.weight).subspan(index * n, n),
-                               state.lns[index],
-                               state.lns_fresh[index],
-                               state.source[index]};
-    const PixelDiagnostics did = context_.sampler->sample(
-        {sites, light, now, before, batch.key(context_, surfaces_.rect, index), frame_index, has_history}, *scratch_, samples);
+    const PixelDiagnostics did = sample_populations(
+        *context_.sampler,
+        {sites, light, now, before, batch.key(context_, surfaces_.rect, index), frame_index, has_history}, index, *scratch_,
+        state);
+    const std::span<const std::uint8_t> site = std::span(state.site).subspan(index * n, n);
 
     // Colour the samples and cast their rays.
-    kernels::shade_samples(sites, now, samples.direction, samples.site, shaded);
+    kernels::shade_samples(sites, now, std::span(state.direction).subspan(index * n, n), site, shaded);
     std::array<Vec3, SiteBlock::kMaxSites> origins;
     for (std::size_t s = 0; s < hits.size(); ++s) {
       if (hits[s].hit) origins[s] = lift_off(hits[s].point.position, hits[s].point.ng);
     }
-    for (std::size_t j = 0; j < n; ++j) {
-      const float contribution = samples.lns * samples.weight[j];
-      const Rgb color = Rgb{shaded.r[j], shaded.g[j], shaded.b[j]} * contribution;
-      batch.sample_color[i * n + j] = color;
-      if (!(mean(color) > 0)) continue;
-      batch.rays.push(origins[samples.site[j]], {shaded.x[j], shaded.y[j], shaded.z[j]});
-      batch.ray_sample.push_back(static_cast<std::uint32_t>(i * n + j));
+    for (std::size_t j = 0, k = 0; k < num_populations; ++k) {
+      const float unit = unit_contribution(state, index, k);
+      for (; j < (k + 1) * n / num_populations; ++j) {
+        const Rgb color = Rgb{shaded.r[j], shaded.g[j], shaded.b[j]} * (unit * state.weight[index * n + j]);
+        batch.sample_color[i * n + j] = color * picture_scale_[k];
+        if (!(mean(color) > 0)) continue;
+        batch.rays.push(origins[site[j]], {shaded.x[j], shaded.y[j], shaded.z[j]});
+        batch.ray_sample.push_back(static_cast<std::uint32_t>(i * n + j));
+      }
     }
 
     // Keep the books.
     PixelResult& pixel = batch.pixels[i];
     pixel.mask = 1;
-    pixel.lns = samples.lns;
-    pixel.source = samples.source;
+    pixel.lns = mean_lns(state, index);
+    pixel.source = latest_source(state, index);
     pixel.ess_ratio = did.ess / static_cast<float>(n);
     pixel.acceptance = acceptance_rate({did.local.proposed + did.independent.proposed,
                                         did.local.accepted + did.independent.accepted});
@@ -165,7 +172,7 @@ void TileFrameRenderer::sample(Batch& batch, const FrameLight& light, bool has_h
     pixel.acceptance_independent = acceptance_rate(did.independent);
     pixel.resampled = did.resampled;
     stats_.target_evaluations += static_cast<std::uint64_t>(did.target_evaluations);
-    count_sampling(did, samples.source, pixel.ess_ratio, frame_sampling_);
+    count_sampling(did, pixel.source, pixel.ess_ratio, frame_sampling_);
   }
 }
 
@@ -180,16 +187,19 @@ void TileFrameRenderer::trace(Batch& batch) {
 void TileFrameRenderer::shade(Batch& batch, const SampleState& state) {
   const StageTimer timer(stats_.seconds_shade);
   const auto n = static_cast<std::size_t>(state.num_particles);
+  const float share = 1.0f / static_cast<float>(state.num_populations);
   std::size_t i = 0;
   for (std::size_t r = 0; r < batch.rays.size(); ++r) {
     const std::size_t sample = batch.ray_sample[r];
     while (sample >= (i + 1) * n) ++i;
-    if (batch.rays.t_far[r] < 0) {
+    const bool occluded = batch.rays.t_far[r] < 0;
+    if (context_.job.visibility.correlated) collector_.add_ray(state, batch.first * n + sample, occluded);
+    if (occluded) {
       batch.pixels[i].mask = 0;
       continue;
     }
     batch.pixels[i].radiance += batch.sample_color[sample];
-    batch.pixels[i].visibility += state.weight[batch.first * n + sample];
+    batch.pixels[i].visibility += state.weight[batch.first * n + sample] * share;
   }
 }
 
@@ -233,12 +243,7 @@ void TileFrameRenderer::finish(Batch& batch, const FrameLight& light, FilmWriter
     PixelResult& pixel = batch.pixels[i];
     add_geometry(hits, pixel);
     if (show_environment && pixel.alpha < 1) {
-      const std::span<const Ray> rays = surfaces_.pixel_rays(index);
-      for (std::size_t s = 0; s < hits.size(); ++s) {
-        if (hits[s].hit) continue;
-        const EnvironmentMap::Texel seen = light.now.evaluate(rays[s].direction);
-        pixel.radiance += Rgb{seen.r, seen.g, seen.b} / static_cast<float>(hits.size());
-      }
+      pixel.radiance += environment_behind(hits, surfaces_.pixel_rays(index), light.now);
       pixel.alpha = 1;
     }
     film.write(index, pixel);

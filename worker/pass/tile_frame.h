@@ -2,6 +2,7 @@
 
 #include "common/job/task.h"
 #include "worker/pass/film_writer.h"
+#include "worker/pass/first_pass_collector.h"
 #include "worker/pass/primary.h"
 
 namespace baton {
@@ -15,6 +16,9 @@ class TileFrameRenderer {
 
   /// state: the samples of the previous frame when has_history, else only its sizes matter; becomes this frame's.
   FilmTile render(const FrameSpec& frame, const FrameLight& light, bool has_history, SampleState& state);
+
+  /// What the second pass needs of the frame that was rendered last; once, and only if the job has a second pass.
+  FirstPassSamples take_first_pass(const SampleState& state) { return collector_.finish(state, state.frame_index); }
 
   const RenderStats& stats() const { return stats_; }
   /// Of the frame that was rendered last.
@@ -33,6 +37,8 @@ class TileFrameRenderer {
   const RenderContext& context_;
   const TileSurfaces& surfaces_;
   std::unique_ptr<kernels::CandidateSet> scratch_;
+  FirstPassCollector collector_;
+  std::vector<float> picture_scale_;  ///< (populations)
   RenderStats stats_;
   SamplingStats frame_sampling_;
 };

@@ -17,7 +17,7 @@ Status check_state(const RenderContext& context, const SampleState& state, std::
   }
   const std::int32_t num_particles = context.job.sampling.num_particles;
   if (state.tile != tile || state.frame_index != frame_index || state.rect != context.grid.rect(tile) ||
-      state.num_particles != num_particles) {
+      state.num_particles != num_particles || state.num_populations != num_populations(context.job)) {
     return Error{ErrorKind::bad_input, fmt::format("sample state: of tile {} frame index {} with {} particles, expected {}, "
                                                    "{}, {}",
                                                    state.tile, state.frame_index, state.num_particles, tile, frame_index,
@@ -53,7 +53,7 @@ Result<RenderStats> run_tile(const RenderContext& context, const TileRun& run,
   if (!previous.empty()) {
     state = *previous.front();
   } else {
-    state.resize(rect, context.job.sampling.num_particles);
+    state.resize(rect, context.job.sampling.num_particles, num_populations(context.job));
   }
   state.job_digest = context.digest;
   state.tile = run.tile;
@@ -81,6 +81,7 @@ Result<RenderStats> run_tile(const RenderContext& context, const TileRun& run,
     const FilmTile film = renderer.render(context.frames[static_cast<std::size_t>(f)], *light, has_history, state);
     BATON_TRY(sink.film(f, film));
     if (sink.diagnostics) sink.diagnostics({f, run.tile, renderer.frame_sampling()});
+    if (context.job.visibility.correlated) BATON_TRY(sink.samples(renderer.take_first_pass(state)));
   }
   if (carries_state(context.job)) BATON_TRY(sink.state(state));
 

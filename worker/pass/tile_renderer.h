@@ -12,6 +12,7 @@
 #include "common/job/job_spec.h"
 #include "common/job/sequence.h"
 #include "common/job/task.h"
+#include "common/state/first_pass_samples.h"
 #include "common/state/sample_state.h"
 
 namespace baton {
@@ -27,9 +28,11 @@ Result<std::shared_ptr<const RenderContext>> load_render_context(const JobSpec& 
 struct TileRunSink {
   std::function<Status(int frame_index, const FilmTile& film)> film;
   /// Called for the last frame of the run when the job carries state.
-  std::function<Status(const SampleState& state)> state;
+  std::function<Status(const SampleState& state)> state = {};
   /// Called after each film with what the sampler did; may be empty.
   std::function<void(const FrameStats& stats)> diagnostics = {};
+  /// Called after each film when the job has a second pass.
+  std::function<Status(FirstPassSamples samples)> samples = {};
 };
 
 using StatePtr = std::shared_ptr<const SampleState>;

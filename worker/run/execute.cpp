@@ -7,13 +7,16 @@
 #include "common/job/sequence.h"
 #include "common/state/sample_state.h"
 #include "worker/pass/cpu_clock.h"
+#include "worker/pass/second_pass.h"
 #include "worker/run/frame_output.h"
 
 namespace baton {
 namespace {
 
 std::string blob_name(const BlobRef& ref) {
-  const char* const kind = ref.kind == BlobKind::state ? "state" : "film";
+  const char* const kind = ref.kind == BlobKind::state        ? "state"
+                           : ref.kind == BlobKind::first_pass ? "first-pass samples"
+                                                              : "film";
   return fmt::format("{} of frame index {} tile {} ({})", kind, ref.frame, ref.tile,
                      ref.digest.hex());
 }
@@ -75,12 +78,49 @@ Result<TaskOutput> execute_render(const LoadedJob& loaded, BlobStore& store, con
                            return {};
                          },
                          .diagnostics =
-                             [&](const FrameStats& stats) { output.frames.push_back(stats); }};
+                             [&](const FrameStats& stats) { output.frames.push_back(stats); },
+                         .samples = [&](const FirstPassSamples& samples) -> Status {
+                           return keep(BlobKind::first_pass, samples.frame_index,
+                                       encode_first_pass_samples(samples));
+                         }};
   const TileRun run = tile_run(loaded.job, task.tile, task.step);
   BATON_ASSIGN(output.stats, run_tile(*loaded.context, run, previous, sink, stop));
   output.stats.seconds_state = seconds_state;
   BATON_TRY(store.sync());
   return output;
+}
+
+/// Inputs: the first-pass samples of the tiles within reach in tile order, the tile's own film
+/// among them.
+Result<TaskOutput> execute_second_pass(const LoadedJob& loaded, BlobStore& store,
+                                       const TaskKey& task, const std::vector<BlobRef>& inputs) {
+  const auto num_frames = static_cast<std::int32_t>(loaded.job.frames.size());
+  if (!loaded.job.visibility.correlated || task.step < 0 || task.step >= num_frames ||
+      task.tile < 0 || task.tile >= TileGrid(loaded.job.image).count()) {
+    return Error{ErrorKind::bad_input,
+                 fmt::format("the job has no second pass of tile {} in frame index {}", task.tile,
+                             task.step)};
+  }
+
+  // Read.
+  FilmTile film;
+  std::vector<FirstPassPtr> near;
+  for (const BlobRef& input : inputs) {
+    BATON_ASSIGN(const Bytes bytes, store.get(input.digest));
+    if (input.kind == BlobKind::first_pass) {
+      BATON_ASSIGN(FirstPassSamples samples, decode_first_pass_samples(bytes, blob_name(input)));
+      near.push_back(std::make_shared<const FirstPassSamples>(std::move(samples)));
+    } else {
+      BATON_ASSIGN(film, decode_film_tile(bytes, blob_name(input)));
+    }
+  }
+
+  BATON_ASSIGN(const SecondPassOutput second,
+               run_second_pass(*loaded.context, task.step, task.tile, film, near));
+  const Bytes bytes = encode_film_tile(second.film);
+  BATON_ASSIGN(const Digest digest, store.put(bytes));
+  BATON_TRY(store.sync());
+  return TaskOutput{{{BlobKind::film, task.step, task.tile, digest, bytes.size()}}, second.stats};
 }
 
 Result<TaskOutput> execute_assemble(const LoadedJob& loaded, const BlobStore& store,
@@ -125,6 +165,8 @@ Result<TaskOutput> execute_task(const LoadedJob& loaded, BlobStore& store, const
   switch (task.kind) {
     case TaskKind::render:
       return execute_render(loaded, store, task, inputs, stop);
+    case TaskKind::second_pass:
+      return execute_second_pass(loaded, store, task, inputs);
     case TaskKind::assemble:
       return execute_assemble(loaded, store, task, inputs, stop);
   }

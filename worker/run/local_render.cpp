@@ -11,6 +11,7 @@
 
 #include "common/job/motion.h"
 #include "common/job/sequence.h"
+#include "worker/pass/second_pass.h"
 #include "worker/run/frame_output.h"
 
 namespace baton {
@@ -19,30 +20,58 @@ namespace {
 /// Collects tiles until their frame is whole, then hands it to the sink.
 class FrameCollector {
  public:
-  FrameCollector(const JobSpec& job, const FrameSink& sink)
-      : job_(job), num_tiles_(TileGrid(job.image).count()), sink_(sink) {}
+  FrameCollector(const RenderContext& context, const JobSpec& job, const FrameSink& sink)
+      : context_(context), job_(job), grid_(job.image), sink_(sink) {}
 
-  Status add(std::int32_t frame_index, const FilmTile& film) {
+  /// samples: null without a second pass.
+  Result<RenderStats> add(std::int32_t frame_index, std::int32_t tile, FilmTile film,
+                          FirstPassPtr samples) {
     std::unique_lock lock(mutex_);
     Frame& frame = frames_[frame_index];
-    if (frame.num_tiles == 0) frame.image = blank_image(job_.image, film.channels);
-    BATON_TRY(paste_tile(film, frame.image));
-    if (++frame.num_tiles < num_tiles_) return {};
+    frame.films.resize(static_cast<std::size_t>(grid_.count()));
+    frame.samples.resize(frame.films.size());
+    frame.films[static_cast<std::size_t>(tile)] = std::move(film);
+    frame.samples[static_cast<std::size_t>(tile)] = std::move(samples);
+    if (++frame.num_tiles < grid_.count()) return RenderStats{};
 
-    // Whole: out of the map, so that the sink may take its time without the lock.
-    const FilmTile image = std::move(frame.image);
+    // Whole: out of the map, so that the rest may take its time without the lock.
+    const Frame whole = std::move(frame);
     frames_.erase(frame_index);
     lock.unlock();
-    return sink_(frame_index, image);
+    return finish(frame_index, whole);
   }
 
  private:
   struct Frame {
-    FilmTile image;
+    std::vector<FilmTile> films;  ///< (tiles)
+    std::vector<FirstPassPtr> samples;
     std::int32_t num_tiles = 0;
   };
+
+  Result<RenderStats> finish(std::int32_t frame_index, const Frame& frame) const {
+    RenderStats stats;
+    FilmTile image = blank_image(job_.image, frame.films.front().channels);
+    for (std::int32_t tile = 0; tile < grid_.count(); ++tile) {
+      const FilmTile& film = frame.films[static_cast<std::size_t>(tile)];
+      if (!job_.visibility.correlated) {
+        BATON_TRY(paste_tile(film, image));
+        continue;
+      }
+      std::vector<FirstPassPtr> near;
+      for (const std::int32_t t : grid_.tiles_near(tile, exchange_reach_px(job_.visibility)))
+        near.push_back(frame.samples[static_cast<std::size_t>(t)]);
+      BATON_ASSIGN(const SecondPassOutput second,
+                   run_second_pass(context_, frame_index, tile, film, near));
+      stats.merge(second.stats);
+      BATON_TRY(paste_tile(second.film, image));
+    }
+    BATON_TRY(sink_(frame_index, image));
+    return stats;
+  }
+
+  const RenderContext& context_;
   const JobSpec& job_;
-  const std::int32_t num_tiles_;
+  const TileGrid grid_;
   const FrameSink& sink_;
   std::mutex mutex_;
   std::map<std::int32_t, Frame> frames_;  ///< begun and not whole
@@ -60,7 +89,7 @@ class LocalRender {
         grid_(job.image),
         reach_px_(history_reach_px(job)),
         chains_(static_cast<std::size_t>(num_tiles_)),
-        frames_(job, sink) {}
+        frames_(context, job, sink) {}
 
   void work(std::stop_token stop) {
     while (const std::optional<TileRun> run = next()) {
@@ -113,15 +142,34 @@ class LocalRender {
       for (const std::int32_t t : near(run.tile))
         previous.push_back(chain(t).states[(run.run + 1) % 2]);
     }
-    const TileRunSink sink{
-        .film = [&](int frame_index,
-                    const FilmTile& film) { return frames_.add(frame_index, film); },
-        .state =
-            [&](const SampleState& next_state) {
-              state = std::make_shared<const SampleState>(next_state);
-              return Status();
-            }};
-    return run_tile(context_, run, previous, sink, stop);
+    RenderStats second;
+    FilmTile first_film;
+    const auto add = [&](std::int32_t frame, FilmTile film, FirstPassPtr samples) -> Status {
+      BATON_ASSIGN(const RenderStats stats,
+                   frames_.add(frame, run.tile, std::move(film), std::move(samples)));
+      second.merge(stats);
+      return {};
+    };
+    const TileRunSink sink{.film = [&](int frame, const FilmTile& film) -> Status {
+                             if (!job_.visibility.correlated) return add(frame, film, nullptr);
+                             first_film = film;
+                             return {};
+                           },
+                           .state =
+                               [&](const SampleState& next_state) {
+                                 state = std::make_shared<const SampleState>(next_state);
+                                 return Status();
+                               },
+                           .samples =
+                               [&](FirstPassSamples samples) {
+                                 const std::int32_t frame = samples.frame_index;
+                                 return add(
+                                     frame, std::move(first_film),
+                                     std::make_shared<const FirstPassSamples>(std::move(samples)));
+                               }};
+    BATON_ASSIGN(RenderStats stats, run_tile(context_, run, previous, sink, stop));
+    stats.merge(second);
+    return stats;
   }
 
   void finish(const TileRun& run, const Result<RenderStats>& stats, StatePtr state) {

@@ -8,6 +8,7 @@
 #include "common/image/film_tile.h"
 #include "common/job/job_json.h"
 #include "common/job/sequence.h"
+#include "worker/pass/second_pass.h"
 #include "worker/pass/tile_renderer.h"
 #include "worker/run/frame_output.h"
 
@@ -47,24 +48,58 @@ Status check_place(const JobSpec& job, const ReplayOptions& options) {
   return {};
 }
 
-Result<LastFrame> render(const JobSpec& job, std::int32_t frame_index, std::int32_t tile) {
-  BATON_ASSIGN(const std::string document, make_job_document(job));
-  BATON_ASSIGN(const auto context, load_render_context(job, digest_of(document)));
-
-  // Carried samples depend on every frame before.
+/// One tile up to a frame, first pass only.
+struct FirstPass {
   LastFrame last;
+  FirstPassPtr samples;
+};
+Result<FirstPass> render_first_pass(const RenderContext& context, const JobSpec& job,
+                                    std::int32_t frame_index, std::int32_t tile) {
+  FirstPass pass;
   const TileRunSink sink{.film =
                              [&](int, const FilmTile& film) {
-                               last.film = film;
+                               pass.last.film = film;
                                return Status();
                              },
                          .state =
                              [&](const SampleState& state) {
-                               last.state = state;
+                               pass.last.state = state;
+                               return Status();
+                             },
+                         .samples =
+                             [&](FirstPassSamples samples) {
+                               pass.samples =
+                                   std::make_shared<const FirstPassSamples>(std::move(samples));
                                return Status();
                              }};
+  // Carried samples depend on every frame before.
   const std::int32_t first_frame = carries_state(job) ? 0 : frame_index;
-  BATON_ASSIGN(last.stats, run_tile(*context, {tile, 0, first_frame, frame_index}, {}, sink, {}));
+  BATON_ASSIGN(pass.last.stats,
+               run_tile(context, {tile, 0, first_frame, frame_index}, {}, sink, {}));
+  return pass;
+}
+
+Result<LastFrame> render(const JobSpec& job, std::int32_t frame_index, std::int32_t tile) {
+  BATON_ASSIGN(const std::string document, make_job_document(job));
+  BATON_ASSIGN(const auto context, load_render_context(job, digest_of(document)));
+  if (!job.visibility.correlated) {
+    BATON_ASSIGN(FirstPass pass, render_first_pass(*context, job, frame_index, tile));
+    return std::move(pass.last);
+  }
+
+  // The second pass needs the tiles around.
+  LastFrame last;
+  std::vector<FirstPassPtr> near;
+  for (const std::int32_t t :
+       TileGrid(job.image).tiles_near(tile, exchange_reach_px(job.visibility))) {
+    BATON_ASSIGN(FirstPass pass, render_first_pass(*context, job, frame_index, t));
+    near.push_back(pass.samples);
+    if (t == tile) last = std::move(pass.last);
+  }
+  BATON_ASSIGN(SecondPassOutput second,
+               run_second_pass(*context, frame_index, tile, last.film, near));
+  last.film = std::move(second.film);
+  last.stats.merge(second.stats);
   return last;
 }
 
@@ -112,8 +147,11 @@ std::string describe_pixel(const LastFrame& last, const PixelPosition& position)
   if (!last.state) return text;
 
   const SampleState& state = *last.state;
-  fmt::format_to(out, "  state: {}, lns {}, lns when fresh {}\n", source_name(state.source[pixel]),
-                 state.lns[pixel], state.lns_fresh[pixel]);
+  const auto populations = static_cast<std::size_t>(state.num_populations);
+  for (std::size_t row = pixel * populations; row < (pixel + 1) * populations; ++row) {
+    fmt::format_to(out, "  state: {}, lns {}, lns when fresh {}\n", source_name(state.source[row]),
+                   state.lns[row], state.lns_fresh[row]);
+  }
   const auto num_particles = static_cast<std::size_t>(state.num_particles);
   for (std::size_t i = 0; i < num_particles; ++i) {
     const std::size_t particle = pixel * num_particles + i;

@@ -73,17 +73,22 @@ class NoteLog {
 /// should the process die, in the crash report.
 Result<TaskOutput> execute_pooled(const PooledTask& task, std::stop_token stop, NoteLog& notes) {
   BATON_ASSIGN(const LoadedJobPtr loaded, task.job->load(stop));
-  if (task.lease.task.kind != TaskKind::render) {
+  const TaskKey& key = task.lease.task;
+  if (key.kind == TaskKind::assemble) {
     return execute_task(*loaded, *task.store, task.lease.task, task.inputs, stop);
   }
 
-  // A replay renders up to the last frame of the run.
+  // A replay renders up to the last frame of the run, or the frame of the second pass.
   std::string command;
-  if (task.lease.task.step >= 0 && task.lease.task.step < num_runs(loaded->job)) {
+  const std::int32_t num_steps = key.kind == TaskKind::render
+                                     ? num_runs(loaded->job)
+                                     : static_cast<std::int32_t>(loaded->job.frames.size());
+  if (key.step >= 0 && key.step < num_steps) {
     BATON_ASSIGN(const std::filesystem::path path, save_job(*loaded, task.replay_directory));
-    const TileRun run = tile_run(loaded->job, task.lease.task.tile, task.lease.task.step);
-    command = replay_command(path, loaded->job.frames[static_cast<std::size_t>(run.last_frame)],
-                             run.tile);
+    const std::int32_t frame = key.kind == TaskKind::render
+                                   ? tile_run(loaded->job, key.tile, key.step).last_frame
+                                   : key.step;
+    command = replay_command(path, loaded->job.frames[static_cast<std::size_t>(frame)], key.tile);
   }
   const CrashNote note(command);
   Result<TaskOutput> output =
@@ -177,8 +182,8 @@ class Worker {
   static void log_failure(const EndedTask& ended) {
     if (ended.result || ended.result.error().kind == ErrorKind::cancelled) return;
     spdlog::error("job {} {} step {} tile {} failed: {}", ended.lease.job.short_hex(),
-                  ended.lease.task.kind == TaskKind::render ? "render" : "assemble",
-                  ended.lease.task.step, ended.lease.task.tile, ended.result.error().message);
+                  task_name(ended.lease.task.kind), ended.lease.task.step, ended.lease.task.tile,
+                  ended.result.error().message);
   }
 
   WorkerChannel channel_;

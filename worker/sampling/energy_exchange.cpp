@@ -80,17 +80,8 @@ class Exchange {
       const auto word = static_cast<std::uint32_t>(c);
       if (word % 4 == 0) random = rng.bits(settings_.fold, word / 4);
       strata_[word] = random[word % 4];
-      std::vector<Neighbour>& found = neighbours_[word];
-      found.clear();
-      const PixelRect square = partitions_.square(c, x, y);
-      for (std::int32_t v = square.y0; v < square.y1; ++v) {
-        for (std::int32_t u = square.x0; u < square.x1; ++u) {
-          if ((u == x && v == y) || !exchange_.at(u, v)) continue;
-          found.push_back(
-              {static_cast<std::uint32_t>(exchange_.index(u, v)), inner_.contains(u, v)});
-        }
-      }
-      num_lonely += found.empty() ? 1 : 0;
+      neighbours_[word] = MaskedSquare(exchange_, partitions_.square(c, x, y), x, y);
+      num_lonely += neighbours_[word].count() == 0 ? 1 : 0;
     }
     return num_lonely;
   }
@@ -101,14 +92,16 @@ class Exchange {
     const std::uint32_t shift = static_cast<std::uint32_t>(
         (std::uint64_t{batch_[sample].slot} << 32) / settings_.num_slots);
     for (std::size_t c = 0; c < neighbours_.size(); ++c) {
-      const std::vector<Neighbour>& found = neighbours_[c];
-      if (found.empty()) continue;
-      const std::uint64_t position = strata_[c] + shift;  // wraps around in 32 bits
-      const auto pair =
-          static_cast<std::uint32_t>((position * (found.size() * settings_.num_sites)) >> 32);
-      const Neighbour& to = found[pair / settings_.num_sites];
-      if (!inside && !to.inside) continue;
-      offers_.push_back({static_cast<std::uint32_t>(sample), to.pixel, pair % settings_.num_sites});
+      const std::uint32_t count = neighbours_[c].count();
+      if (count == 0) continue;
+      const std::uint32_t position = strata_[c] + shift;  // wraps around
+      const auto pair = static_cast<std::uint32_t>(
+          (std::uint64_t{position} * (std::uint64_t{count} * settings_.num_sites)) >> 32);
+      const MaskedSquare::Pixel to = neighbours_[c].pick(pair / settings_.num_sites);
+      if (!inside && !inner_.contains(to.x, to.y)) continue;
+      offers_.push_back({static_cast<std::uint32_t>(sample),
+                         static_cast<std::uint32_t>(exchange_.index(to.x, to.y)),
+                         pair % settings_.num_sites});
     }
   }
 
@@ -131,26 +124,17 @@ class Exchange {
     const float left = settings_.form == SecondPassForm::published
                            ? static_cast<float>(giver.num_lonely)
                            : std::max(c - accepted, 0.0f);
-    radiance_[inner_index(giver.x, giver.y)] +=
+    radiance_[PixelMask::index(inner_, giver.x, giver.y)] +=
         given.reflected * (left / c * given.energy / given.target);
   }
 
-  std::size_t inner_index(std::int32_t x, std::int32_t y) const {
-    return static_cast<std::size_t>(y - inner_.y0) * static_cast<std::size_t>(inner_.width()) +
-           static_cast<std::size_t>(x - inner_.x0);
-  }
   /// The sum of a pixel of the exchange mask, or nullptr outside.
   Rgb* inner_pixel(std::uint32_t pixel) const {
     const auto width = static_cast<std::uint32_t>(exchange_.rect().width());
     const std::int32_t x = exchange_.rect().x0 + static_cast<std::int32_t>(pixel % width);
     const std::int32_t y = exchange_.rect().y0 + static_cast<std::int32_t>(pixel / width);
-    return inner_.contains(x, y) ? &radiance_[inner_index(x, y)] : nullptr;
+    return inner_.contains(x, y) ? &radiance_[PixelMask::index(inner_, x, y)] : nullptr;
   }
-
-  struct Neighbour {
-    std::uint32_t pixel;
-    bool inside;
-  };
 
   const ExchangeSettings& settings_;
   const SquarePartitions& partitions_;
@@ -158,8 +142,8 @@ class Exchange {
   const PixelRect inner_;
   ExchangeScene& scene_;
   std::span<Rgb> radiance_;
-  std::vector<std::vector<Neighbour>> neighbours_;  ///< (C) of the pixel in work
-  std::vector<std::uint32_t> strata_;               ///< (C) 32 random bits
+  std::vector<MaskedSquare> neighbours_;  ///< (C) of the pixel in work
+  std::vector<std::uint32_t> strata_;     ///< (C) 32 random bits
   std::vector<Giver> givers_;
   std::vector<GiverSample> batch_;
   std::vector<Offer> offers_;

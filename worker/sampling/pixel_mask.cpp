@@ -1,12 +1,39 @@
 #include "worker/sampling/pixel_mask.h"
 
 #include <algorithm>
+#include <bit>
 #include <numeric>
 #include <utility>
 
 #include "common/base/check.h"
 
 namespace baton {
+
+MaskedSquare::MaskedSquare(const PixelMask& mask, const PixelRect& rect, std::int32_t x,
+                           std::int32_t y) {
+  x0_ = std::max(rect.x0, mask.rect().x0);
+  y0_ = std::max(rect.y0, mask.rect().y0);
+  const std::int32_t x1 = std::min(rect.x1, mask.rect().x1);
+  const std::int32_t y1 = std::min(rect.y1, mask.rect().y1);
+  BATON_CHECK(x1 - x0_ <= kMaxSide && y1 - y0_ <= kMaxSide);
+  for (std::int32_t row = y0_; row < y1; ++row) {
+    std::uint32_t bits = mask.row_bits(x0_, x1, row);
+    if (row == y) bits &= ~(1u << (x - x0_));
+    rows_[static_cast<std::size_t>(row - y0_)] = static_cast<std::uint16_t>(bits);
+    count_ += static_cast<std::uint32_t>(std::popcount(bits));
+  }
+}
+
+MaskedSquare::Pixel MaskedSquare::pick(std::uint32_t rank) const {
+  std::size_t row = 0;
+  for (auto in_row = static_cast<std::uint32_t>(std::popcount(rows_[row])); rank >= in_row;) {
+    rank -= in_row;
+    in_row = static_cast<std::uint32_t>(std::popcount(rows_[++row]));
+  }
+  std::uint32_t bits = rows_[row];
+  for (; rank > 0; --rank) bits &= bits - 1;
+  return {x0_ + std::countr_zero(bits), y0_ + static_cast<std::int32_t>(row)};
+}
 
 PixelMask dilate(const PixelMask& mask, std::int32_t radius, const PixelMask& allowed,
                  const PixelRect& rect) {

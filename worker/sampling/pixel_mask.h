@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -8,27 +9,69 @@
 
 namespace baton {
 
-/// A yes or no for each pixel of a rectangle; outside of it the answer is no.
+/// A yes or no for each pixel of a rectangle, one bit each; outside of it the answer is no.
 class PixelMask {
  public:
   explicit PixelMask(const PixelRect& rect)
-      : rect_(rect), on_(static_cast<std::size_t>(rect.area()), 0) {}
+      : rect_(rect),
+        words_per_row_(static_cast<std::size_t>(rect.width()) / 64 + 2),
+        words_(words_per_row_ * static_cast<std::size_t>(rect.height()), 0) {}
 
   const PixelRect& rect() const { return rect_; }
   bool at(std::int32_t x, std::int32_t y) const {
-    return rect_.contains(x, y) && on_[index(x, y)] != 0;
+    return rect_.contains(x, y) && row_bits(x, x + 1, y) != 0;
   }
   /// The pixel must lie in the rectangle.
-  void set(std::int32_t x, std::int32_t y) { on_[index(x, y)] = 1; }
-  /// Position of a pixel of the rectangle, row by row.
-  std::size_t index(std::int32_t x, std::int32_t y) const {
-    return static_cast<std::size_t>(y - rect_.y0) * static_cast<std::size_t>(rect_.width()) +
-           static_cast<std::size_t>(x - rect_.x0);
+  void set(std::int32_t x, std::int32_t y) {
+    const auto column = static_cast<std::size_t>(x - rect_.x0);
+    words_[first_word(y) + column / 64] |= std::uint64_t{1} << (column % 64);
+  }
+  /// Bits of pixels [x0, x1) of row y, lowest first; at most 32 pixels, all in the rectangle.
+  std::uint32_t row_bits(std::int32_t x0, std::int32_t x1, std::int32_t y) const {
+    const auto column = static_cast<std::size_t>(x0 - rect_.x0);
+    const std::uint64_t* word = &words_[first_word(y) + column / 64];
+    const std::size_t shift = column % 64;
+    const std::uint64_t bits = shift == 0 ? word[0] : word[0] >> shift | word[1] << (64 - shift);
+    return static_cast<std::uint32_t>(bits & ((std::uint64_t{1} << (x1 - x0)) - 1));
+  }
+  /// Position of a pixel of a rectangle, row by row.
+  std::size_t index(std::int32_t x, std::int32_t y) const { return index(rect_, x, y); }
+  static std::size_t index(const PixelRect& rect, std::int32_t x, std::int32_t y) {
+    return static_cast<std::size_t>(y - rect.y0) * static_cast<std::size_t>(rect.width()) +
+           static_cast<std::size_t>(x - rect.x0);
   }
 
  private:
+  std::size_t first_word(std::int32_t y) const {
+    return static_cast<std::size_t>(y - rect_.y0) * words_per_row_;
+  }
+
   PixelRect rect_;
-  std::vector<std::uint8_t> on_;
+  std::size_t words_per_row_;  ///< one more than needed, so that row_bits may read two
+  std::vector<std::uint64_t> words_;
+};
+
+/// The pixels of a mask in a rectangle of at most kMaxSide pixels a side.
+class MaskedSquare {
+ public:
+  static constexpr std::int32_t kMaxSide = 16;
+
+  MaskedSquare() = default;
+  /// Without the pixel (x, y), which lies in the rectangle. What reaches past the mask is not in
+  /// it.
+  MaskedSquare(const PixelMask& mask, const PixelRect& rect, std::int32_t x, std::int32_t y);
+
+  std::uint32_t count() const { return count_; }
+  struct Pixel {
+    std::int32_t x = 0, y = 0;
+  };
+  /// The pixel of the given rank, row by row; rank < count().
+  Pixel pick(std::uint32_t rank) const;
+
+ private:
+  std::int32_t x0_ = 0, y0_ = 0;
+  std::uint32_t count_ = 0;
+  std::array<std::uint16_t, kMaxSide> rows_{};
 };
 
 /// `mask` grown by `radius` pixels along both axes (radius 1 is the 3 x 3 kernel of [CV Fig. 6]),

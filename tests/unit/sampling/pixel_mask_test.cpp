@@ -16,6 +16,31 @@ TEST(PixelMask, OutsideIsNo) {
   EXPECT_FALSE(mask.at(4, 2));
 }
 
+TEST(PixelMask, RowsOfBitsCrossWords) {
+  PixelMask mask({3, 0, 203, 2});
+  for (std::int32_t x = 3; x < 203; ++x) {
+    if (x % 3 == 0) mask.set(x, 1);
+  }
+  for (std::int32_t x0 = 3; x0 + 16 <= 203; ++x0) {
+    const std::uint32_t bits = mask.row_bits(x0, x0 + 16, 1);
+    for (std::int32_t x = x0; x < x0 + 16; ++x)
+      ASSERT_EQ(bits >> (x - x0) & 1, x % 3 == 0 ? 1u : 0u);
+    EXPECT_EQ(mask.row_bits(x0, x0 + 16, 0), 0u);
+  }
+}
+
+TEST(MaskedSquare, ListsTheOthersRowByRow) {
+  PixelMask mask({0, 0, 9, 9});
+  for (const auto& [x, y] : {std::pair{2, 2}, {4, 2}, {3, 3}, {6, 6}, {7, 2}}) mask.set(x, y);
+  const MaskedSquare square(mask, {2, 2, 7, 7}, 3, 3);
+  ASSERT_EQ(square.count(), 3u);
+  EXPECT_EQ(square.pick(0).x, 2);
+  EXPECT_EQ(square.pick(1).x, 4);
+  EXPECT_EQ(square.pick(2).x, 6);
+  EXPECT_EQ(square.pick(2).y, 6);
+  EXPECT_EQ(MaskedSquare(mask, {7, 0, 12, 5}, 8, 4).count(), 1u);
+}
+
 TEST(Dilate, GrowsASquareWithinWhatIsAllowed) {
   const PixelRect rect{0, 0, 6, 5};
   PixelMask mask(rect);

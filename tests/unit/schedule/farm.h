@@ -49,14 +49,19 @@ inline std::vector<BlobRef> outputs_of(const JobSpec& spec, const Digest& job, c
   std::vector<BlobRef> outputs;
   if (task.kind == TaskKind::assemble) {
     outputs.push_back({BlobKind::image, task.step, 0, {}, 100});
+  } else if (task.kind == TaskKind::second_pass) {
+    outputs.push_back({BlobKind::film, task.step, task.tile, {}, 11});
   } else {
     const TileRun run = tile_run(spec, task.tile, task.step);
     for (int f = run.first_frame; f <= run.last_frame; ++f)
       outputs.push_back({BlobKind::film, f, task.tile, {}, 10});
+    for (int f = run.first_frame; spec.visibility.correlated && f <= run.last_frame; ++f)
+      outputs.push_back({BlobKind::first_pass, f, task.tile, {}, 30});
     if (carries_state(spec))
       outputs.push_back({BlobKind::state, run.last_frame, task.tile, {}, 20});
   }
-  for (BlobRef& blob : outputs) blob.digest = blob_digest(job, blob, variant);
+  const bool second = task.kind == TaskKind::second_pass;  // its film is another
+  for (BlobRef& blob : outputs) blob.digest = blob_digest(job, blob, variant + (second ? 100 : 0));
   return outputs;
 }
 

@@ -70,6 +70,35 @@ TEST(JobGraph, WithoutCarriedSamplesMotionNeedsNoNeighbours) {
   EXPECT_EQ(graph.num_inputs(render(1, 2)), 0);
 }
 
+/// 3 x 2 tiles of 8 pixels, 3 frames, 2 in a run, with a second pass that reaches 4 pixels.
+JobSpec second_pass_job(bool carry) {
+  JobSpec job = small_job(3, 3, 2, carry);
+  job.image.height = 16;
+  job.visibility.correlated = true;
+  return job;
+}
+
+TEST(JobGraph, SecondPassStandsBetweenRenderAndAssembly) {
+  for (const bool carry : {true, false}) {
+    const JobGraph graph(second_pass_job(carry));
+    ASSERT_EQ(graph.num_tasks(), 3 + 3 * 6 + 2 * 6);
+    for (TaskIndex task = 0; task < graph.num_tasks(); ++task) {
+      EXPECT_EQ(graph.find(graph.key(task)), task);
+      const std::vector<TaskIndex> inputs = graph.inputs(graph.key(task));
+      EXPECT_EQ(static_cast<std::int32_t>(inputs.size()), graph.num_inputs(graph.key(task)));
+      for (const TaskIndex input : inputs) {
+        const std::vector<TaskIndex> dependents = graph.dependents(graph.key(input));
+        EXPECT_EQ(std::count(dependents.begin(), dependents.end(), task), 1);
+        EXPECT_FALSE(graph.taken_outputs(graph.key(task), graph.key(input)).empty());
+      }
+    }
+    // The corner tile looks at the four tiles around it, the middle one at all six.
+    EXPECT_EQ(graph.num_inputs({TaskKind::second_pass, 2, 0}), 4);
+    EXPECT_EQ(graph.num_inputs({TaskKind::second_pass, 2, 1}), 6);
+  }
+  EXPECT_FALSE(JobGraph(small_job(3, 3, 2)).find({TaskKind::second_pass, 0, 0}));
+}
+
 TEST(JobGraph, OutputsMustBeExactlyWhatTheTaskMakes) {
   const JobSpec spec = small_job(3, 5, 2);
   const JobGraph graph(spec);
@@ -80,7 +109,8 @@ TEST(JobGraph, OutputsMustBeExactlyWhatTheTaskMakes) {
   std::vector<BlobRef> outputs = right;
   EXPECT_FALSE(graph.check_outputs(task, outputs));
   EXPECT_EQ(outputs.front().kind, BlobKind::state);
-  EXPECT_EQ(outputs[graph.film_position(3)].frame, 3);
+  EXPECT_EQ(graph.taken_outputs({TaskKind::assemble, 3, 0}, task), std::vector<std::size_t>{2});
+  EXPECT_EQ(outputs[2].frame, 3);
 
   outputs = {right[0], right[2]};
   EXPECT_EQ(graph.check_outputs(task, outputs),

@@ -168,6 +168,7 @@ TEST(SchedulerModel, EveryTaskIsDoneOnceWhateverHappens) {
     JobSpec spec = small_job(1 + static_cast<int>(seed % 5), 10, 1 + static_cast<int>(seed % 4),
                              seed % 3 != 0);
     if (seed % 4 == 0) spec = moving_job(4, 8, 1 + static_cast<int>(seed % 9));
+    spec.visibility.correlated = seed % 3 == 1;
     spec.max_retries_per_task = 1000000;
     spec.max_failures_per_worker = 1000000;
     ChaosFarm farm(seed, spec);

@@ -1,0 +1,109 @@
+#include "worker/pass/extra_samples.h"
+
+#include "worker/pass/cpu_clock.h"
+#include "worker/pass/populations.h"
+#include "worker/pass/primary.h"
+#include "worker/sampling/energy_exchange.h"
+
+namespace baton {
+
+ExtraSampler::ExtraSampler(const RenderContext& context, const FrameSpec& frame,
+                           const FrameLight& light, const SampleRegion& samples,
+                           const MaskedSurfaces& surfaces, const PixelMask& mask)
+    : context_(context),
+      frame_(frame),
+      light_(light),
+      samples_(samples),
+      surfaces_(surfaces),
+      mask_(mask),
+      now_(view_of(light.now)),
+      before_(view_of(light.before)),
+      scratch_(std::make_unique<kernels::CandidateSet>()) {
+  drawn_.resize({0, 0, 1, 1}, population_spec(context.job).num_particles);
+}
+
+Rgb ExtraSampler::radiance(std::int32_t x, std::int32_t y, std::size_t fold, bool extra) {
+  const std::int32_t position = surfaces_.find(mask_.index(x, y));
+  gather_sites(surfaces_.hits(position));
+  const Rgb first = first_pass(samples_.find(x, y), fold);
+  if (!extra) return first;
+  draw(x, y, fold, surfaces_.hits(position));
+  const auto& folds = folds_of(context_.job.visibility.mask);
+  const float share = folds[fold].energy_scale / static_cast<float>(num_populations(context_.job));
+  return (first + trace() * share) / static_cast<float>(1 + context_.job.visibility.partitions);
+}
+
+void ExtraSampler::gather_sites(std::span<const SurfaceHit> hits) {
+  sites_.clear(context_.job.image.sites);
+  for (std::size_t s = 0; s < hits.size(); ++s) {
+    if (hits[s].hit) {
+      sites_.add(static_cast<int>(s), hits[s].point, context_.scene->materials[hits[s].material]);
+    } else {
+      sites_.add_miss(static_cast<int>(s));
+    }
+  }
+}
+
+/// What the fold's own free samples say.
+Rgb ExtraSampler::first_pass(const SampleRegion::Place& place, std::size_t fold) {
+  const Fold& use = folds_of(context_.job.visibility.mask)[fold];
+  const FirstPassSamples& from = *place.tile;
+  kernels::ShadedSamples shaded;
+  kernels::shade_samples(sites_, now_, std::span(from.direction).subspan(place.first, place.count),
+                         std::span(from.site).subspan(place.first, place.count), shaded);
+  Rgb sum;
+  for (std::size_t i = 0; i < place.count; ++i) {
+    const std::int32_t population =
+        from.slot[place.first + i] * from.num_populations / from.num_slots;
+    if (use.giver_population >= 0 && population != use.giver_population) continue;
+    sum += Rgb{shaded.r[i], shaded.g[i], shaded.b[i]} *
+           (from.energy[place.first + i] * use.energy_scale);
+  }
+  return sum;
+}
+
+/// Draws all extra sets of one pixel and fold into `rays_`.
+void ExtraSampler::draw(std::int32_t x, std::int32_t y, std::size_t fold,
+                        std::span<const SurfaceHit> hits) {
+  rays_.clear();
+  ray_color_.clear();
+  std::array<Vec3, SiteBlock::kMaxSites> origins;
+  for (std::size_t s = 0; s < hits.size(); ++s) {
+    if (hits[s].hit) origins[s] = lift_off(hits[s].point.position, hits[s].point.ng);
+  }
+  const auto count = static_cast<std::uint32_t>(context_.job.visibility.partitions);
+  kernels::ShadedSamples shaded;
+  for (std::uint32_t c = 0; c < count; ++c) {
+    // Streams 0 and 1 are the first pass's populations.
+    const std::uint32_t stream = 2 + static_cast<std::uint32_t>(fold) * count + c;
+    const RngKey key{.job_seed = stream_seed(context_.job.seed, stream),
+                     .frame = static_cast<std::uint32_t>(frame_.number),
+                     .pixel = static_cast<std::uint32_t>(y * context_.job.image.width + x)};
+    sample_populations(*context_.sampler, {sites_, light_, now_, before_, key, frame_.index, false},
+                       0, *scratch_, drawn_);
+    kernels::shade_samples(sites_, now_, drawn_.direction, drawn_.site, shaded);
+    for (std::size_t j = 0; j < drawn_.direction.size(); ++j) {
+      const Rgb color = Rgb{shaded.r[j], shaded.g[j], shaded.b[j]} *
+                        (unit_contribution(drawn_, 0, 0) * drawn_.weight[j]);
+      if (!(mean(color) > 0)) continue;
+      rays_.push(origins[drawn_.site[j]], {shaded.x[j], shaded.y[j], shaded.z[j]});
+      ray_color_.push_back(color);
+    }
+  }
+}
+
+/// Sum of the extra sets.
+Rgb ExtraSampler::trace() {
+  {
+    const StageTimer timer(seconds_rays_);
+    context_.accel->occluded(rays_);
+  }
+  rays_traced_ += rays_.size();
+  Rgb sum;
+  for (std::size_t r = 0; r < rays_.size(); ++r) {
+    if (!(rays_.t_far[r] < 0)) sum += ray_color_[r];
+  }
+  return sum;
+}
+
+}  // namespace baton

@@ -1,0 +1,45 @@
+#include "worker/pass/sample_region.h"
+
+#include <numeric>
+
+namespace baton {
+
+SampleRegion::SampleRegion(std::span<const FirstPassPtr> tiles) {
+  for (const FirstPassPtr& samples : tiles) {
+    Tile tile{samples.get(), std::vector<std::uint32_t>(samples->count.size())};
+    std::exclusive_scan(samples->count.begin(), samples->count.end(), tile.first.begin(), 0u);
+    tiles_.push_back(std::move(tile));
+  }
+}
+
+SampleRegion::Place SampleRegion::find(std::int32_t x, std::int32_t y) const {
+  for (const Tile& tile : tiles_) {
+    const PixelRect& rect = tile.samples->rect;
+    if (!rect.contains(x, y)) continue;
+    const std::size_t pixel = PixelMask::index(rect, x, y);
+    return {tile.samples, pixel, tile.first[pixel], tile.samples->count[pixel]};
+  }
+  return {};
+}
+
+PixelMask SampleRegion::failed(const PixelRect& rect, int population) const {
+  return flagged(rect, population < 0 ? FirstPassSamples::kFailed[0] | FirstPassSamples::kFailed[1]
+                                      : FirstPassSamples::kFailed[population]);
+}
+
+PixelMask SampleRegion::surfaces(const PixelRect& rect) const {
+  return flagged(rect, FirstPassSamples::kSurface);
+}
+
+PixelMask SampleRegion::flagged(const PixelRect& rect, int bits) const {
+  PixelMask mask(rect);
+  for (std::int32_t y = rect.y0; y < rect.y1; ++y) {
+    for (std::int32_t x = rect.x0; x < rect.x1; ++x) {
+      const Place place = find(x, y);
+      if (place.tile != nullptr && (place.tile->flags[place.pixel] & bits) != 0) mask.set(x, y);
+    }
+  }
+  return mask;
+}
+
+}  // namespace baton
