@@ -18,8 +18,8 @@ inline constexpr NumberRange kPositiveRange{.min = 0, .max = 1e9, .min_open = tr
 inline constexpr NumberRange kAngleRange{-1e6, 1e6};
 
 /// Names of the enumerations in JSON, by value.
-inline constexpr std::array<std::string_view, 3> kMaterialKinds{"diffuse", "phong",
-                                                                "metallicRoughness"};
+inline constexpr std::array<std::string_view, 4> kMaterialKinds{"diffuse", "phong",
+                                                                "metallicRoughness", "measured"};
 inline constexpr std::array<std::string_view, 2> kMapFilters{"nearest", "bilinear"};
 inline constexpr std::array<std::string_view, 6> kMethods{
     "reference", "environment", "brdf", "mis", "bidirectional", "sequential"};

@@ -123,6 +123,9 @@ Result<std::vector<JobSetting>> explain_job(const std::filesystem::path& path) {
 std::vector<std::string> asset_paths(const JobSpec& job) {
   std::set<std::string> paths;
   for (const auto& item : job.scene.meshes) paths.insert(item.second.path);
+  for (const auto& item : job.scene.materials) {
+    if (item.second.kind == MaterialKind::measured) paths.insert(item.second.file);
+  }
   for (const EnvironmentKey& key : job.environment.keys) paths.insert(key.map);
   return {paths.begin(), paths.end()};
 }

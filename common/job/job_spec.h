@@ -75,10 +75,11 @@ struct CameraSpec {
 };
 
 // ---- scene -------------------------------------------------------------------------------------------------
-enum class MaterialKind : std::uint8_t { diffuse, phong, metallic_roughness };
+enum class MaterialKind : std::uint8_t { diffuse, phong, metallic_roughness, measured };
 
 /// diffuse: base_color is the albedo. phong: kd * base_color diffuse + ks * specular_color normalised lobe of
 /// `exponent`. metallic_roughness: GGX with base_color, metallic, roughness (glTF 2.0).
+/// measured: a table in the MERL binary format.
 struct MaterialSpec {
   MaterialKind kind = MaterialKind::diffuse;
   Rgb base_color{0.8f, 0.8f, 0.8f};
@@ -88,6 +89,7 @@ struct MaterialSpec {
   float exponent = 50;          ///< phong, [1, 100000]
   float metallic = 0;           ///< [0, 1]
   float roughness = 0.5f;       ///< [0.02, 1]; alpha = roughness^2
+  std::string file{};           ///< measured: .binary
 
   bool operator==(const MaterialSpec&) const = default;
 };

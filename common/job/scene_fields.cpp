@@ -29,7 +29,7 @@ void reference(JobArchive& a, const char* key, std::string& name,
 
 void fields(JobArchive& a, MaterialSpec& material) {
   a.choice(required("type"), material.kind, kMaterialKinds);
-  a.vector("color", material.base_color, kUnitRange);
+  if (material.kind != MaterialKind::measured) a.vector("color", material.base_color, kUnitRange);
   switch (material.kind) {
     case MaterialKind::diffuse:
       break;
@@ -47,6 +47,9 @@ void fields(JobArchive& a, MaterialSpec& material) {
     case MaterialKind::metallic_roughness:
       a.number("metallic", material.metallic, kUnitRange);
       a.number("roughness", material.roughness, {0.02, 1});
+      break;
+    case MaterialKind::measured:
+      asset_path(a, required("file"), material.file, {".binary"});
       break;
   }
 }

@@ -1,5 +1,5 @@
 // Time per pixel of every method over the time of its own occlusion rays alone, on a real scene. Both times are CPU
-// seconds of one run, so the ratios hold on a noisy machine. Usage: bench_methods [JOB.json] [FRAMES]
+// seconds of one run, so the ratios hold on a noisy machine. Usage: bench_methods [JOB.json] [FRAMES] [METHODS THAT BEGIN SO]
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -19,10 +19,10 @@ struct Case {
   double goal = 0;  ///< highest ratio that the project accepts; 0: none
 };
 
-std::vector<Case> make_cases(const SamplingSpec& base) {
+std::vector<Case> make_cases() {
   std::vector<Case> cases;
   const auto add = [&](std::string name, Method method, double goal, auto change) {
-    SamplingSpec spec = base;
+    SamplingSpec spec;
     spec.method = method;
     spec.num_particles = 16;
     change(spec);
@@ -62,7 +62,7 @@ void print_row(const Case& c, const RenderStats& s) {
              proposed > 0 ? static_cast<double>(s.sampling.local_accepted + s.sampling.independent_accepted) / proposed : 0.0);
 }
 
-int run(const std::string& path, int frames) {
+int run(const std::string& path, int frames, const std::string& only) {
   Result<JobSpec> job = load_job(path);
   if (!job) {
     fmt::print(stderr, "{}\n", job.error().message);
@@ -80,7 +80,8 @@ int run(const std::string& path, int frames) {
                job->image.height, sites, job->frames.size(), instruction_set());
     fmt::print("{:<22} {:>6} {:>6} {:>9} {:>8} {:>8} {:>8} {:>8} {:>8} {:>8} {:>7}\n", "method", "ratio", "goal", "total",
                "light", "primary", "sample", "rays", "shade", "Mrays/s", "accept");
-    for (const Case& c : make_cases(job->sampling)) {
+    for (const Case& c : make_cases()) {
+      if (!c.name.starts_with(only)) continue;
       job->sampling = c.sampling;
       const Result<RenderStats> stats = measure(*job);
       if (!stats) {
@@ -97,5 +98,5 @@ int run(const std::string& path, int frames) {
 }  // namespace baton
 
 int main(int argc, char** argv) {
-  return baton::run(argc > 1 ? argv[1] : "jobs/examples/demo.json", argc > 2 ? std::atoi(argv[2]) : 6);
+  return baton::run(argc > 1 ? argv[1] : "jobs/examples/demo.json", argc > 2 ? std::atoi(argv[2]) : 6, argc > 3 ? argv[3] : "");
 }

@@ -5,6 +5,7 @@
 #include <cmath>
 #include <map>
 
+#include "tests/support/merl_file.h"
 #include "tests/support/small_scene.h"
 
 namespace baton {
@@ -158,6 +159,28 @@ JobSpec turning_job(int distributions) {
 }
 TEST(Methods, SequentialAgreesWithBruteForceWhileTheSkyTurns) { expect_agreement(turning_job(5), 96, 0.02); }
 TEST(Methods, SequentialWithOneDistributionAgrees) { expect_agreement(turning_job(1), 96, 0.03); }
+
+/// The glossy box measured: a MERL table of its own Phong BRDF.
+JobSpec measured_job(Method method, int frames) {
+  JobSpec job = still_job(method);
+  job.frames = frame_numbers(frames);
+  job.environment.rotation_deg_per_frame = 0.3;
+  job.sampling.num_candidates = 256;
+  const MaterialSpec glossy = job.scene.materials["glossy"];
+  const std::string file = (test::test_folder() / "glossy.binary").string();
+  test::write_merl(file, test::phong_by_angles(glossy.base_color * glossy.kd, glossy.specular_color * glossy.ks, glossy.exponent));
+  job.scene.materials["glossy"] = {.kind = MaterialKind::measured, .file = file};
+  return job;
+}
+TEST(Methods, MisOfAMeasuredBrdfAgreesWithBruteForce) { expect_agreement(measured_job(Method::mis, 1), kRuns, 0.02); }
+TEST(Methods, SequentialWithAMeasuredBrdfAgreesWithBruteForce) {
+  expect_agreement(measured_job(Method::sequential, 4), 96, 0.02);
+}
+TEST(Methods, AMeasuredPhongLooksLikePhong) {
+  const Verdict v = compare(repeat(measured_job(Method::bidirectional, 1), kRuns), judge(still_job(Method::bidirectional), 60000));
+  EXPECT_LT(v.worst_pixel, kPixelLimit);
+  EXPECT_LT(v.image, kImageLimit);
+}
 
 // The same machinery must see a ground that reflects 4 % too much.
 TEST(Methods, PlantedFaultIsSeen) {

@@ -35,6 +35,7 @@ HWY_INLINE SurfaceLanes GatherSurfaces(const SurfaceTable& table, VI surface) {
   const auto vec = [&](int at) HWY_ATTR {
     return Vec3Lanes{field(at), field(at + 1), field(at + 2)};
   };
+  const VF kind = field(SurfaceTable::is_ggx);  // 0, 1, or 1 + table
   return {.ns = vec(SurfaceTable::ns),
           .ng = vec(SurfaceTable::ng),
           .wo = vec(SurfaceTable::wo),
@@ -44,9 +45,12 @@ HWY_INLINE SurfaceLanes GatherSurfaces(const SurfaceTable& table, VI surface) {
           .shape = field(SurfaceTable::shape),
           .lobe_scale = field(SurfaceTable::lobe_scale),
           .specular_probability = hn::Zero(d),
-          .is_ggx = hn::Gt(field(SurfaceTable::is_ggx), hn::Zero(d)),
+          .is_ggx = hn::Gt(kind, hn::Zero(d)),
           .any_phong = table.any_phong(),
-          .any_ggx = table.any_ggx()};
+          .any_ggx = table.any_ggx(),
+          .any_measured = table.tables().size() > 1,
+          .tables = table.tables().data(),
+          .table = hn::ConvertTo(DI(), hn::Max(hn::Sub(kind, hn::Set(d, 1.0f)), hn::Zero(d)))};
 }
 
 void ReflectSamples(const SurfaceTable& surfaces, const LightSamples& samples,
@@ -79,6 +83,11 @@ void SurfaceTable::add(const ShadingPoint& point, const Material& material,
   SiteBlock one;
   one.clear(1);
   one.add(0, point, material);
+  if (one.any_measured) {
+    const auto found = std::find(tables_.begin(), tables_.end(), one.measured[0]);
+    one.is_ggx[0] = 1 + static_cast<float>(found - tables_.begin());
+    if (found == tables_.end()) tables_.push_back(one.measured[0]);
+  }
   for (const SiteBlock::Array* field :
        {&one.ns_x,  &one.ns_y,       &one.ns_z,  &one.ng_x,     &one.ng_y,     &one.ng_z,
         &one.wo_x,  &one.wo_y,       &one.wo_z,  &one.mirror_x, &one.mirror_y, &one.mirror_z,

@@ -41,9 +41,12 @@ class SurfaceTable {
   }
   bool any_phong() const { return any_phong_; }
   bool any_ggx() const { return any_ggx_; }
+  /// Texels of measured BRDFs by k, where is_ggx holds 1 + k; the first is null.
+  const std::vector<const float*>& tables() const { return tables_; }
 
  private:
   std::vector<float> records_;
+  std::vector<const float*> tables_{nullptr};
   bool any_phong_ = false;
   bool any_ggx_ = false;
 };

@@ -22,7 +22,10 @@ HWY_INLINE Vec3Lanes ReflectedRadiance(const SurfaceLanes& s, const BsdfLanes& f
   const auto channel = [&](VF kd, VF ks, VF radiance) HWY_ATTR {
     return hn::Mul(hn::Mul(hn::MulAdd(f.diffuse, kd, hn::MulAdd(f.lobe, ks, f.white)), f.cosine), radiance);
   };
-  return {channel(s.kd.x, s.ks.x, r), channel(s.kd.y, s.ks.y, g), channel(s.kd.z, s.ks.z, b)};
+  const Vec3Lanes reflected{channel(s.kd.x, s.ks.x, r), channel(s.kd.y, s.ks.y, g), channel(s.kd.z, s.ks.z, b)};
+  if (!s.any_measured) return reflected;
+  const auto tabulated = [&](VF value, VF radiance) HWY_ATTR { return hn::Mul(hn::Mul(value, f.cosine), radiance); };
+  return Add(reflected, {tabulated(f.measured.x, r), tabulated(f.measured.y, g), tabulated(f.measured.z, b)});
 }
 
 /// Mean over R, G, B: the scalar target p~_site.

@@ -122,6 +122,11 @@ void TileFrameRenderer::sample(Batch& batch, const FrameLight& light, bool has_h
     const std::span<const SurfaceHit> hits = surfaces_.pixel(index);
 
     // Gather the pixel's surfaces.
+    if (std::none_of(hits.begin(), hits.end(), [](const SurfaceHit& hit) { return hit.hit; })) {
+      set_background(state, index);
+      ++stats_.pixels_background;
+      continue;
+    }
     sites.clear(surfaces_.num_sites);
     for (std::size_t s = 0; s < hits.size(); ++s) {
       if (hits[s].hit) {
@@ -129,11 +134,6 @@ void TileFrameRenderer::sample(Batch& batch, const FrameLight& light, bool has_h
       } else {
         sites.add_miss(static_cast<int>(s));
       }
-    }
-    if (sites.num_hits == 0) {
-      set_background(state, index);
-      ++stats_.pixels_background;
-      continue;
     }
 
     // Sample.

@@ -9,6 +9,7 @@
 #include <hwy/highway.h>
 
 #include "common/math/lanes-inl.h"
+#include "worker/scene/measured-inl.h"
 #include "worker/scene/site_block.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -20,7 +21,9 @@ struct SurfaceLanes {
   Vec3Lanes ns, ng, wo, mirror, kd, ks;
   VF shape, lobe_scale, specular_probability;
   MF is_ggx;
-  bool any_phong, any_ggx;
+  bool any_phong, any_ggx, any_measured;
+  const float* const* tables;  ///< texels of measured BRDFs, some of them null
+  VI table;                    ///< index into `tables`
 };
 
 /// table[site] per lane; site in [0, 16).
@@ -40,7 +43,7 @@ HWY_INLINE VF LookUp(const SiteBlock::Array& table, VI site, int num_sites) {
 }
 
 template <class Read>
-HWY_INLINE SurfaceLanes ReadSurfaces(const SiteBlock& b, const Read& read) {
+HWY_INLINE SurfaceLanes ReadSurfaces(const SiteBlock& b, VI site, const Read& read) {
   const auto vec = [&](const SiteBlock::Array& x, const SiteBlock::Array& y, const SiteBlock::Array& z) HWY_ATTR {
     return Vec3Lanes{read(x), read(y), read(z)};
   };
@@ -55,24 +58,29 @@ HWY_INLINE SurfaceLanes ReadSurfaces(const SiteBlock& b, const Read& read) {
           .specular_probability = read(b.specular_probability),
           .is_ggx = hn::Gt(read(b.is_ggx), hn::Zero(DF())),
           .any_phong = b.any_phong,
-          .any_ggx = b.any_ggx};
+          .any_ggx = b.any_ggx,
+          .any_measured = b.any_measured,
+          .tables = b.measured.data(),
+          .table = site};
 }
 
 /// One site for all lanes.
 HWY_INLINE SurfaceLanes LoadSurface(const SiteBlock& b, std::size_t site) {
-  return ReadSurfaces(b, [site](const SiteBlock::Array& table) HWY_ATTR { return hn::Set(DF(), table[site]); });
+  const VI all = hn::Set(DI(), static_cast<std::int32_t>(site));
+  return ReadSurfaces(b, all, [site](const SiteBlock::Array& table) HWY_ATTR { return hn::Set(DF(), table[site]); });
 }
 
 /// A site per lane.
 HWY_INLINE SurfaceLanes LoadSurfaces(const SiteBlock& b, VI site) {
   if (b.num_sites == 1) return LoadSurface(b, 0);
-  return ReadSurfaces(b, [&](const SiteBlock::Array& table) HWY_ATTR { return LookUp(table, site, b.num_sites); });
+  return ReadSurfaces(b, site, [&](const SiteBlock::Array& table) HWY_ATTR { return LookUp(table, site, b.num_sites); });
 }
 
-/// f_c = diffuse * kd_c + lobe * ks_c + white, with the cosine to the shading normal; all 0 below either horizon.
+/// f_c = diffuse * kd_c + lobe * ks_c + white (+ measured_c where there are tables), with the cosine to the shading normal; all 0 below either horizon.
 /// The densities (1/sr) of sampling by the cosine and by the lobe; lobe_pdf is 0 where there is no lobe.
 struct BsdfLanes {
   VF diffuse, lobe, white, cosine, cosine_pdf, lobe_pdf;
+  Vec3Lanes measured;
 };
 
 /// Density of sample_bsdf: the mixture of both lobes.
@@ -147,9 +155,11 @@ HWY_INLINE BsdfLanes EvaluateBsdf(const SurfaceLanes& s, const Vec3Lanes& wi) {
     const VF keep = hn::Sub(one, schlick);
     out.diffuse = hn::IfThenElse(s.is_ggx, hn::Mul(out.diffuse, keep), out.diffuse);
     out.lobe = hn::IfThenElse(s.is_ggx, hn::Mul(dv, keep), out.lobe);
-    out.white = hn::IfThenElseZero(s.is_ggx, hn::Mul(dv, schlick));
+    out.white = hn::IfThenElseZero(s.is_ggx, hn::Mul(hn::Mul(dv, schlick), s.lobe_scale));
     out.lobe_pdf = hn::IfThenElse(s.is_ggx, hn::Div(quarter, hn::Add(one, lambda_o)), out.lobe_pdf);
   }
+  out.measured = {zero, zero, zero};
+  if (s.any_measured) out.measured = EvaluateMeasured(s.tables, s.table, s.ns, wi, s.wo);
   return out;
 }
 

@@ -2,6 +2,9 @@
 
 #include <algorithm>
 #include <cmath>
+#include <utility>
+
+#include "common/base/check.h"
 
 namespace baton {
 namespace {
@@ -107,6 +110,7 @@ float lobe_pdf(const Material& m, const ShadingPoint& p, const Vec3& wi) {
     case Material::Lobe::phong:
       return (m.shape + 1) / kTwoPi * cosine_power(normalize(reflect(p.wo, p.ns)), wi, m.shape);
     case Material::Lobe::ggx:
+    case Material::Lobe::measured:
       return ggx_pdf(m, p, wi);
   }
   return 0;
@@ -145,8 +149,21 @@ Material make_material(const MaterialSpec& spec) {
               .shape = spec.roughness * spec.roughness,
               .specular_probability = specular_share(fresnel, mean(kd) * (1 - fresnel))};
     }
+    case MaterialKind::measured:
+      break;
   }
+  BATON_CHECK(false);
   return {};
+}
+
+Material make_measured_material(std::shared_ptr<const MeasuredBrdf> table) {
+  const MeasuredBrdf::FittedLobe lobe = table->fit_lobe();
+  return {.lobe = Material::Lobe::measured,
+          .kd = {},
+          .ks = {},
+          .shape = lobe.alpha,
+          .specular_probability = lobe.share,
+          .table = std::move(table)};
 }
 
 Vec3 clamped_view(const ShadingPoint& point) {
@@ -167,6 +184,8 @@ Rgb evaluate_bsdf(const Material& material, const ShadingPoint& point, const Vec
     }
     case Material::Lobe::ggx:
       return evaluate_ggx(material, point, wi);
+    case Material::Lobe::measured:
+      return material.table->evaluate(point.ns, wi, clamped_view(point));
   }
   return {};
 }
@@ -174,8 +193,8 @@ Rgb evaluate_bsdf(const Material& material, const ShadingPoint& point, const Vec
 Vec3 sample_bsdf(const Material& material, const ShadingPoint& point,
                  const std::array<float, 3>& u) {
   if (u[2] >= material.specular_probability) return sample_cosine(point, u[0], u[1]);
-  return material.lobe == Material::Lobe::ggx ? sample_ggx(material, point, u[0], u[1])
-                                              : sample_phong(material, point, u[0], u[1]);
+  return material.lobe == Material::Lobe::phong ? sample_phong(material, point, u[0], u[1])
+                                                : sample_ggx(material, point, u[0], u[1]);
 }
 
 float bsdf_pdf_solid_angle(const Material& material, const ShadingPoint& point, const Vec3& wi) {

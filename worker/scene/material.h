@@ -1,30 +1,35 @@
 #pragma once
 
 #include <array>
+#include <memory>
 
 #include "common/job/job_spec.h"
 #include "common/math/vec3.h"
+#include "worker/scene/measured_brdf.h"
 
 namespace baton {
 
-/// A material in the one form that all code evaluates:
+/// A material in the one form that all code evaluates. lobe measured: f is the table. Else:
 ///   f = kd/pi [* (1 - F) for ggx] + specular lobe,
 /// lobe phong: ks (s+2)/(2 pi) max(0, r.wi)^s, r the mirror direction of wo about the shading normal
 ///   [Lafortune & Willems 1994; the papers' model];
 /// lobe ggx: D G2 F / (4 |n.wi| |n.wo|), F Schlick with F0 = ks [glTF 2.0, appendix B]. As published, a white and smooth
 ///   dielectric gains energy at grazing view (albedo 1.03 at 60, 1.6 at 85 degrees); a metal never does.
 struct Material {
-  enum class Lobe : std::uint8_t { none, phong, ggx };
+  enum class Lobe : std::uint8_t { none, phong, ggx, measured };
 
   Lobe lobe = Lobe::none;
   Rgb kd;                 ///< diffuse albedo
   Rgb ks;                 ///< phong: specular albedo; ggx: F0
   float shape = 1;        ///< phong: exponent s; ggx: alpha = roughness^2
   float specular_probability = 0;  ///< chance that sample_bsdf draws from the lobe, [0, 1]
+  std::shared_ptr<const MeasuredBrdf> table{};  ///< measured: the whole BRDF; kd and ks are 0, shape is the sampled lobe's alpha
 };
 
-/// Material of a specification. specular_probability follows from the mean albedos.
+/// Material of a specification of any kind but `measured`. specular_probability follows from the mean albedos.
 Material make_material(const MaterialSpec& spec);
+/// Evaluates the table; samples and densities are those of the GGX lobe that resembles its peak, and of the cosine lobe.
+Material make_measured_material(std::shared_ptr<const MeasuredBrdf> table);
 
 /// A surface as light sampling sees it. All directions unit, pointing away from the surface;
 /// ng and ns lie on the side of wo (dot(ng, wo) >= 0, dot(ns, ng) > 0).

@@ -93,6 +93,15 @@ std::optional<std::uint32_t> find_name(const NameIndex& names, const std::string
   return std::nullopt;
 }
 
+/// A material that fails keeps its place.
+Material load_material(const MaterialSpec& spec, const std::string& name, Faults& faults) {
+  if (spec.kind != MaterialKind::measured) return make_material(spec);
+  Result<std::shared_ptr<const MeasuredBrdf>> table = MeasuredBrdf::load(spec.file);
+  if (table) return make_measured_material(std::move(*table));
+  faults.add(name + ": " + table.error().message);
+  return {};
+}
+
 /// Loads every mesh; a mesh that fails keeps an empty place, so that its users are not reported as
 /// well.
 NameIndex load_meshes(const SceneSpec& spec, Scene& scene, Faults& faults) {
@@ -133,7 +142,7 @@ Result<Scene> load_scene(const JobSpec& job) {
   NameIndex materials;
   for (const auto& [name, material] : job.scene.materials) {
     materials[name] = static_cast<std::uint32_t>(scene.materials.size());
-    scene.materials.push_back(make_material(material));
+    scene.materials.push_back(load_material(material, "scene.materials." + name, faults));
   }
   const NameIndex meshes = load_meshes(job.scene, scene, faults);
 

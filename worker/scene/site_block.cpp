@@ -12,6 +12,7 @@ void SiteBlock::clear(int sites) {
   specular_share = 0;
   any_phong = false;
   any_ggx = false;
+  any_measured = false;
 }
 
 void SiteBlock::add_miss(int site) {
@@ -20,6 +21,7 @@ void SiteBlock::add_miss(int site) {
                        &kd_g, &kd_b, &ks_r, &ks_g, &ks_b, &shape, &lobe_scale, &specular_probability, &is_ggx}) {
     (*array)[s] = 0;
   }
+  measured[s] = nullptr;
 }
 
 void SiteBlock::add(int site, const ShadingPoint& point, const Material& material) {
@@ -30,7 +32,8 @@ void SiteBlock::add(int site, const ShadingPoint& point, const Material& materia
     y[s] = v.y;
     z[s] = v.z;
   };
-  const bool ggx = material.lobe == Material::Lobe::ggx;
+  const bool tabulated = material.lobe == Material::Lobe::measured;
+  const bool ggx = material.lobe == Material::Lobe::ggx || tabulated;
   const bool phong = material.lobe == Material::Lobe::phong;
 
   set(ns_x, ns_y, ns_z, point.ns);
@@ -41,12 +44,14 @@ void SiteBlock::add(int site, const ShadingPoint& point, const Material& materia
   set(kd_r, kd_g, kd_b, ggx ? material.kd * (Rgb{1, 1, 1} - material.ks) : material.kd);
   set(ks_r, ks_g, ks_b, ggx || phong ? material.ks : Rgb{});
   shape[s] = material.shape;
-  lobe_scale[s] = phong ? (material.shape + 2) * (0.5f * kInvPi) : (ggx ? 1.0f : 0.0f);
+  lobe_scale[s] = phong ? (material.shape + 2) * (0.5f * kInvPi) : (ggx && !tabulated ? 1.0f : 0.0f);
   specular_probability[s] = ggx || phong ? material.specular_probability : 0.0f;
   is_ggx[s] = ggx ? 1.0f : 0.0f;
+  measured[s] = tabulated ? material.table->texels() : nullptr;
 
   any_phong = any_phong || phong;
   any_ggx = any_ggx || ggx;
+  any_measured = any_measured || tabulated;
   specular_share += (specular_probability[s] - specular_share) / static_cast<float>(num_hits + 1);
   hit_sites[static_cast<std::size_t>(num_hits++)] = site;
   if (specular_probability[s] > 0) lobe_sites[static_cast<std::size_t>(num_lobes++)] = site;

@@ -21,9 +21,10 @@ struct alignas(64) SiteBlock {
   Array kd_r{}, kd_g{}, kd_b{};              ///< diffuse albedo; ggx: kd (1 - F0)
   Array ks_r{}, ks_g{}, ks_b{};              ///< phong: specular albedo; ggx: F0
   Array shape{};                             ///< phong: exponent; ggx: alpha
-  Array lobe_scale{};                        ///< phong: (s + 2) / (2 pi); ggx: 1
+  Array lobe_scale{};                        ///< phong: (s + 2) / (2 pi); ggx: 1; measured: 0
   Array specular_probability{};
-  Array is_ggx{};  ///< 0 or 1
+  Array is_ggx{};  ///< 1 for ggx, and for measured, which is sampled by such a lobe; else 0
+  std::array<const float*, kMaxSites> measured{};  ///< texels of a MeasuredBrdf, or null
 
   std::int32_t num_sites = 1;  ///< S
   std::int32_t num_hits = 0;   ///< sites that see a surface
@@ -33,6 +34,7 @@ struct alignas(64) SiteBlock {
   float specular_share = 0;  ///< mean specular_probability of the sites that see a surface
   bool any_phong = false;
   bool any_ggx = false;
+  bool any_measured = false;
 
   /// Starts anew with `sites` in [1, kMaxSites]; each must then be added, in ascending order, with
   /// add or add_miss.

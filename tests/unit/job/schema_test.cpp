@@ -31,8 +31,8 @@ std::string show_words(const Words& words) {
   return text;
 }
 
-/// Visits a job only to write down its shape. Each named item is visited thrice, so that each kind
-/// of material is seen.
+/// Visits a job only to write down its shape. Each named item is visited four times, so that
+/// each kind of material is seen.
 class ShapeArchive final : public JobArchive {
  public:
   Shape shape;
@@ -88,7 +88,7 @@ class ShapeArchive final : public JobArchive {
     const std::string item = std::string(key.name) + ".*";
     if (form.shorthand != nullptr) add(item.c_str(), "text");
     add(item.c_str(), "object");
-    for (round_ = 0; round_ < 3; ++round_) nest("." + item, [&] { body("any"); });
+    for (round_ = 0; round_ < 4; ++round_) nest("." + item, [&] { body("any"); });
     round_ = 0;
     return true;
   }
