@@ -159,6 +159,18 @@ JobSpec turning_job(int distributions) {
 }
 TEST(Methods, SequentialAgreesWithBruteForceWhileTheSkyTurns) { expect_agreement(turning_job(5), 96, 0.02); }
 TEST(Methods, SequentialWithOneDistributionAgrees) { expect_agreement(turning_job(1), 96, 0.03); }
+TEST(Methods, SequentialWithFiveMovesAgrees) {
+  JobSpec job = turning_job(1);
+  job.sampling.num_moves = 5;
+  expect_agreement(job, 96, 0.03);
+}
+// Frame 1 with N samples of the map and the BRDF, weighted [section 3]; no pixel starts again.
+TEST(Methods, SequentialStartedWithMisAgrees) {
+  JobSpec job = turning_job(5);
+  job.sampling.start_method = StartMethod::mis;
+  job.sampling.refresh_every = 0;
+  expect_agreement(job, 96, 0.05);
+}
 
 /// The glossy box measured: a MERL table of its own Phong BRDF.
 JobSpec measured_job(Method method, int frames) {

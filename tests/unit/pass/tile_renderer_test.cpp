@@ -97,6 +97,46 @@ TEST(RunTile, RefreshesEveryPixelOnceInTheCycleButNotInTheSecondFrame) {
   EXPECT_EQ(stats.sampling.pixels_refreshed, stats.sampling.pixels_fresh);
 }
 
+TEST(RunTile, RefreshesByRatioAndCountsIt) {
+  JobSpec job = sequence_job(4);
+  job.sampling.refresh_every = 0;
+  job.sampling.refresh_ratio = 1.05f;
+  const test::TileResult result = render_tile(job);
+  const SamplingStats& did = result.stats.sampling;
+  EXPECT_GT(did.pixels_refreshed_by_ratio, 0u);
+  EXPECT_EQ(did.pixels_refreshed_by_ratio, did.pixels_refreshed);
+  EXPECT_GT(did.pixels_carried, 0u);
+
+  // No pixel may have left the band around its last start.
+  const SampleState& state = result.state;
+  for (std::size_t i = 0; i < state.num_pixels(); ++i) {
+    if (state.source[i] != PixelSource::carried) continue;
+    EXPECT_LE(state.lns[i], 1.0501f * state.lns_fresh[i]) << i;
+    EXPECT_GE(1.0501f * state.lns[i], state.lns_fresh[i]) << i;
+  }
+}
+
+TEST(RunTile, CountsEverySurfacePixelOnceInEachFrame) {
+  JobSpec job = sequence_job(3);
+  const auto context = load_render_context(job, Digest{1, 2});
+  ASSERT_TRUE(context.ok());
+  std::vector<FrameStats> rows;
+  const TileRunSink sink{.film = [](int, const FilmTile&) { return Status(); },
+                         .state = [](const SampleState&) { return Status(); },
+                         .diagnostics = [&](const FrameStats& stats) { rows.push_back(stats); }};
+  const auto stats = run_tile(**context, tile_run(job, 0, 0), {}, sink, {});
+  ASSERT_TRUE(stats.ok());
+  SamplingStats sum;
+  for (const FrameStats& row : rows) {
+    std::uint64_t in_bins = 0;
+    for (const std::uint64_t count : row.sampling.ess_histogram) in_bins += count;
+    EXPECT_EQ(in_bins, row.sampling.pixels()) << row.frame;
+    EXPECT_EQ(row.sampling.pixels(), (stats->pixels - stats->pixels_background) / 3);
+    sum.merge(row.sampling);
+  }
+  EXPECT_EQ(sum, stats->sampling);
+}
+
 TEST(RunTile, BlackMapGivesBlackAndLightComesBack) {
   JobSpec job = sequence_job(3);
   const std::string black = test::write_map("black.exr", test::constant_map(64, 32, {0, 0, 0}));
