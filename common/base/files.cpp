@@ -47,6 +47,12 @@ Status write_all(int fd, ByteView bytes, const fs::path& path) {
 
 }  // namespace
 
+Status expect_file(const fs::path& path) {
+  std::error_code error;
+  if (fs::exists(path, error)) return {};
+  return Error{ErrorKind::bad_input, fmt::format("{}: no such file", path.string())};
+}
+
 Result<Bytes> read_file(const fs::path& path, std::uint64_t max_size_bytes) {
   // O_NONBLOCK: a named pipe must not make us wait for its writer.
   const FileDescriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
@@ -54,6 +60,9 @@ Result<Bytes> read_file(const fs::path& path, std::uint64_t max_size_bytes) {
   std::error_code error;
   if (fs::is_directory(path, error)) {
     return Error{ErrorKind::bad_input, fmt::format("{}: is a folder, expected a file", path.string())};
+  }
+  if (!fs::is_regular_file(path, error)) {
+    return Error{ErrorKind::bad_input, fmt::format("{}: is no plain file", path.string())};
   }
   const std::uint64_t size = fs::file_size(path, error);
   if (error) return Error{ErrorKind::io, fmt::format("{}: {}", path.string(), error.message())};

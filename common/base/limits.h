@@ -44,6 +44,7 @@ inline constexpr std::uint64_t kMaxStateCacheBytes =
     1ull << 30;  ///< decoded states that a worker keeps, per job
 inline constexpr int kMaxTasksPerJob = 4000000;
 inline constexpr int kMaxTaskAttempts = 16;
+inline constexpr int kMaxSecondsPerTask = 30 * 24 * 3600;
 inline constexpr int kMaxLeasesPerWorker = 1024;
 inline constexpr int kMaxJobs = 10000;
 inline constexpr int kMaxWorkers = 4096;

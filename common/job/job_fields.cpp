@@ -154,6 +154,7 @@ void fields(JobArchive& a, JobSpec& job) {
   a.object("output", [&] { fields(a, job.output, job); });
   a.object("state", [&] { fields(a, job.state); });
   a.integer("maxRetriesPerTask", job.max_retries_per_task, 0, limits::kMaxTaskAttempts - 1);
+  a.integer("maxSecondsPerTask", job.max_seconds_per_task, 1, limits::kMaxSecondsPerTask);
   a.integer("maxFailedTasks", job.max_failed_tasks, 1, limits::kMaxTasksPerJob);
   a.integer("maxFailuresPerWorker", job.max_failures_per_worker, 1, limits::kMaxTasksPerJob);
   check_size(a, job);

@@ -77,6 +77,11 @@ Result<std::vector<AssetDigest>> digest_files(const std::vector<std::string>& pa
   return assets;
 }
 
+Result<std::string> read_job_text(const std::filesystem::path& path) {
+  BATON_TRY(expect_file(path));
+  return read_text_file(path, limits::kMaxJobFileBytes);
+}
+
 /// Appends the leaves of `value`, in order. given: whether the text says anything about it.
 void collect_settings(const ordered_json& value, const std::string& path,
                       const std::set<std::string>& defaulted, bool given,
@@ -104,14 +109,14 @@ Result<JobSpec> parse_job(std::string_view text, const std::string& name,
 }
 
 Result<JobSpec> load_job(const std::filesystem::path& path) {
-  BATON_ASSIGN(const std::string text, read_text_file(path, limits::kMaxJobFileBytes));
+  BATON_ASSIGN(const std::string text, read_job_text(path));
   return parse_job(text, path.string(), path.parent_path());
 }
 
 std::string to_json(const JobSpec& job) { return write(job, 2); }
 
 Result<std::vector<JobSetting>> explain_job(const std::filesystem::path& path) {
-  BATON_ASSIGN(const std::string text, read_text_file(path, limits::kMaxJobFileBytes));
+  BATON_ASSIGN(const std::string text, read_job_text(path));
   std::set<std::string> defaulted;
   BATON_ASSIGN(const JobSpec job,
                read<JobSpec>(text, path.string(), path.parent_path(), &defaulted));

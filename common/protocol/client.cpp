@@ -2,12 +2,20 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <utility>
 
 namespace baton {
 namespace {
 
 constexpr std::chrono::milliseconds kLinger{0};
+
+/// A coordinator accepts connections at once, however busy it is.
+constexpr std::chrono::milliseconds kConnectPatience{2000};
+
+Result<Socket> connect_to(const std::string& endpoint) {
+  return Socket::connect(endpoint, kLinger, Socket::Unconnected::refuse);
+}
 
 ErrorKind error_kind_of(std::uint8_t kind) {
   return kind <= static_cast<std::uint8_t>(ErrorKind::internal) ? static_cast<ErrorKind>(kind)
@@ -20,7 +28,7 @@ RequestClient::RequestClient(std::string endpoint, Socket socket)
     : endpoint_(std::move(endpoint)), socket_(std::move(socket)) {}
 
 Result<RequestClient> RequestClient::connect(const std::string& endpoint) {
-  BATON_ASSIGN(Socket socket, Socket::connect(endpoint, kLinger));
+  BATON_ASSIGN(Socket socket, connect_to(endpoint));
   return RequestClient(endpoint, std::move(socket));
 }
 
@@ -28,16 +36,20 @@ Result<Message> RequestClient::request(const Message& message, std::chrono::mill
   using Clock = std::chrono::steady_clock;
   const Clock::time_point deadline = Clock::now() + timeout;
 
+  // Nobody there is found out soon.
+  const bool connected = socket_.wait_to_send(std::min(timeout, kConnectPatience));
+  if (!connected || !socket_.send(encode_message(message))) {
+    BATON_ASSIGN(socket_, connect_to(endpoint_));
+    return Error{ErrorKind::timeout, fmt::format("{}: no coordinator listens there", endpoint_)};
+  }
+
   // Wait for the one answer; a signal may end a wait early.
   std::optional<std::vector<Bytes>> frames;
-  if (socket_.send(encode_message(message))) {
-    while (!frames && Clock::now() < deadline) {
-      frames =
-          socket_.receive(std::chrono::ceil<std::chrono::milliseconds>(deadline - Clock::now()));
-    }
+  while (!frames && Clock::now() < deadline) {
+    frames = socket_.receive(std::chrono::ceil<std::chrono::milliseconds>(deadline - Clock::now()));
   }
   if (!frames) {
-    BATON_ASSIGN(socket_, Socket::connect(endpoint_, kLinger));
+    BATON_ASSIGN(socket_, connect_to(endpoint_));
     return Error{ErrorKind::timeout, fmt::format("{}: no coordinator answered within {} ms",
                                                  endpoint_, timeout.count())};
   }

@@ -4,6 +4,7 @@
 #include <sys/eventfd.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <array>
 #include <utility>
 #include <zmq.hpp>
@@ -65,11 +66,12 @@ Socket& Socket::operator=(Socket&&) noexcept = default;
 Socket::~Socket() = default;
 
 Result<Socket> Socket::open(const std::string& endpoint, bool listen,
-                            std::chrono::milliseconds linger) {
+                            std::chrono::milliseconds linger, Unconnected unconnected) {
   try {
     auto impl =
         std::make_unique<Impl>(listen ? zmq::socket_type::router : zmq::socket_type::dealer);
     set_options(impl->socket, linger);
+    impl->socket.set(zmq::sockopt::immediate, unconnected == Unconnected::refuse);
     if (listen) {
       impl->socket.set(zmq::sockopt::router_mandatory, true);
       impl->socket.bind(endpoint);
@@ -86,12 +88,29 @@ Result<Socket> Socket::open(const std::string& endpoint, bool listen,
   }
 }
 
-Result<Socket> Socket::connect(const std::string& endpoint, std::chrono::milliseconds linger) {
-  return open(endpoint, false, linger);
+Result<Socket> Socket::connect(const std::string& endpoint, std::chrono::milliseconds linger,
+                               Unconnected unconnected) {
+  return open(endpoint, false, linger, unconnected);
 }
 
 Result<Socket> Socket::bind(const std::string& endpoint, std::chrono::milliseconds linger) {
-  return open(endpoint, true, linger);
+  return open(endpoint, true, linger, Unconnected::queue);
+}
+
+bool Socket::wait_to_send(std::chrono::milliseconds timeout) {
+  const auto deadline = std::chrono::steady_clock::now() + timeout;
+  zmq::pollitem_t item{impl_->socket.handle(), 0, ZMQ_POLLOUT, 0};
+  while (true) {
+    const auto left =
+        std::chrono::ceil<std::chrono::milliseconds>(deadline - std::chrono::steady_clock::now());
+    try {
+      zmq::poll(&item, 1, std::max(left, std::chrono::milliseconds(0)));
+    } catch (const zmq::error_t& error) {
+      BATON_CHECK(error.num() == EINTR);
+    }
+    if (item.revents & ZMQ_POLLOUT) return true;
+    if (left.count() <= 0) return false;
+  }
 }
 
 bool Socket::send(const std::vector<Bytes>& frames) {

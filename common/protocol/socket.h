@@ -18,9 +18,14 @@ namespace baton {
 /// is kept, what was on its way is lost.
 class Socket {
  public:
+  /// What happens to messages while nobody listens.
+  enum class Unconnected { queue, refuse };
+
   /// Talks to one listener (DEALER). `linger`: how long closing waits for unsent messages. An
-  /// endpoint that nobody listens on is not an error: messages wait in the queue.
-  static Result<Socket> connect(const std::string& endpoint, std::chrono::milliseconds linger);
+  /// endpoint that nobody listens on is not an error: messages wait in the queue, or send() refuses
+  /// them until there is a connection.
+  static Result<Socket> connect(const std::string& endpoint, std::chrono::milliseconds linger,
+                                Unconnected unconnected = Unconnected::queue);
   /// Listens for many (ROUTER): the first frame of each message is the peer's identity.
   /// "tcp://host:*" picks a port.
   static Result<Socket> bind(const std::string& endpoint, std::chrono::milliseconds linger);
@@ -29,6 +34,8 @@ class Socket {
   Socket& operator=(Socket&&) noexcept;
   ~Socket();
 
+  /// Waits until send() takes a message; false when it still does not after `timeout`.
+  bool wait_to_send(std::chrono::milliseconds timeout);
   /// Queues the frames; false when the queue is full or the peer is gone, and then nothing was
   /// queued.
   bool send(const std::vector<Bytes>& frames);
@@ -44,7 +51,7 @@ class Socket {
   struct Impl;
   explicit Socket(std::unique_ptr<Impl> impl);
   static Result<Socket> open(const std::string& endpoint, bool listen,
-                             std::chrono::milliseconds linger);
+                             std::chrono::milliseconds linger, Unconnected unconnected);
 
   std::unique_ptr<Impl> impl_;
 };

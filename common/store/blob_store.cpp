@@ -60,6 +60,10 @@ Status BlobStore::remove(const Digest& digest) {
   return {};
 }
 
+fs::path BlobStore::job_file(const Digest& job) const {
+  return directory_ / "jobs" / (job.hex() + ".json");
+}
+
 fs::path BlobStore::path(const Digest& digest) const {
   const std::string hex = digest.hex();
   return directory_ / hex.substr(0, 2) / (hex.substr(2) + ".blob");

@@ -36,6 +36,9 @@ class BlobStore {
   /// Forgets the blob. One that is already gone is a success.
   Status remove(const Digest& digest);
 
+  /// Where workers save a job's document while it runs, so that a failed tile can be replayed alone.
+  std::filesystem::path job_file(const Digest& job) const;
+
   /// Where the blob is or would be.
   std::filesystem::path path(const Digest& digest) const;
 

@@ -209,6 +209,7 @@ Status Service::perform(const RecordJobStatus& action) {
     const Status written = write_diagnostics(journal_, action.job, job->spec);
     if (!written) spdlog::warn("no diagnostics: {}", written.error().message);
   }
+  remove_job_file(action.job, action.status);
   return journal_.record_status(action.job, action.status);
 }
 
@@ -247,6 +248,14 @@ Status Service::perform(const ReportConflict& action) {
 Status Service::perform(const RemoveBlobs& action) {
   garbage_.insert(garbage_.end(), action.blobs.begin(), action.blobs.end());
   return {};
+}
+
+/// The document for replays outlives its job only if that has failed.
+void Service::remove_job_file(const Digest& job, JobStatus status) {
+  if (status != JobStatus::done && status != JobStatus::cancelled) return;
+  std::error_code error;
+  fs::remove(store_.job_file(job), error);
+  if (error) spdlog::warn("{}: cannot remove: {}", store_.job_file(job).string(), error.message());
 }
 
 // ---- answers ------------------------------------------------------------------------------------

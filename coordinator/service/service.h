@@ -78,6 +78,7 @@ class Service {
   Status perform(const ReportConflict& action);
   Status perform(const RemoveBlobs& action);
 
+  void remove_job_file(const Digest& job, JobStatus status);
   void reply(const PeerId& peer, Message message);
   void reply_to(const std::string& worker, Message message);
   void refuse(const PeerId& peer, const Error& error);

@@ -47,6 +47,7 @@ Status Service::restore_job(const Digest& digest) {
     }
   }
   BATON_TRY(step(event));
+  remove_job_file(digest, event.status);
   const JobProgress& progress = scheduler_.find_job(digest)->tasks.progress();
   spdlog::info("job {} of the journal: {} of {} tasks are done", digest.short_hex(),
                progress.tasks_done, progress.tasks_total);

@@ -1,6 +1,7 @@
 #include <fmt/format.h>
 
 #include <chrono>
+#include <optional>
 #include <thread>
 
 #include "common/job/frame_range.h"
@@ -16,6 +17,7 @@ using Clock = std::chrono::steady_clock;
 using nlohmann::ordered_json;
 
 constexpr std::chrono::milliseconds kPollInterval{500};
+constexpr std::chrono::minutes kAwayPatience{5};
 
 struct JobOptions {
   std::string endpoint;
@@ -75,11 +77,24 @@ Result<ExitCode> show(const JobOptions& options, RequestClient& client) {
   return ExitCode::ok;
 }
 
+/// A coordinator that has answered once may be away for a while: it is started again.
 Result<ExitCode> wait(const JobOptions& options, RequestClient& client) {
   const Clock::time_point start = Clock::now();
+  std::optional<Clock::time_point> last_answer;
   for (;;) {
-    BATON_ASSIGN(const JobDetail detail, ask<JobDetail>(client, ShowJob{options.job}));
+    const Result<JobDetail> answer = ask<JobDetail>(client, ShowJob{options.job});
     const std::chrono::duration<double> waited = Clock::now() - start;
+    if (!answer) {
+      const bool away = answer.error().kind == ErrorKind::timeout && last_answer &&
+                        Clock::now() - *last_answer < kAwayPatience;
+      if (!away) return answer.error();
+      if (options.timeout_s > 0 && waited.count() >= options.timeout_s) return ExitCode::timeout;
+      std::this_thread::sleep_for(kPollInterval);
+      continue;
+    }
+
+    last_answer = Clock::now();
+    const JobDetail& detail = *answer;
     const bool expired = options.timeout_s > 0 && waited.count() >= options.timeout_s;
     if (detail.summary.status != JobStatus::running || expired) {
       print_detail(detail, options.json);
@@ -132,7 +147,9 @@ void add_job_command(CLI::App& app, ExitCode& code) {
   add("list", "All jobs of the coordinator", nullptr, list);
   add("show", "One job: progress, statistics, failures", "ID", show);
   add("cancel", "Ends a job; finished frames stay", "ID", cancel);
-  add("wait", "Returns when the job has ended, with its exit code", "ID", wait)
+  add("wait",
+      "Returns when the job has ended, with its exit code; outlasts a restart of the coordinator",
+      "ID", wait)
       ->add_option("--timeout", options->timeout_s, "seconds; default: as long as it takes")
       ->check(CLI::PositiveNumber);
 }

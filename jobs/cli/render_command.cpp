@@ -22,7 +22,7 @@ using Clock = std::chrono::steady_clock;
 
 struct RenderOptions {
   std::string job;
-  int workers = 0;             ///< 0: two, or one on a single processor
+  int workers = 0;             ///< 0: one, whose threads share scene and light
   int threads_per_worker = 0;  ///< 0: the processors shared out
   std::string work_directory;  ///< empty: .baton in the output folder
   bool keep_running = false;
@@ -32,7 +32,7 @@ struct RenderOptions {
 FarmOptions farm_options(const RenderOptions& options, const JobSpec& job) {
   const int processors = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
   FarmOptions farm;
-  farm.workers = options.workers > 0 ? options.workers : std::min(processors, 2);
+  farm.workers = std::max(1, options.workers);
   farm.threads_per_worker = options.threads_per_worker > 0 ? options.threads_per_worker
                                                            : std::max(1, processors / farm.workers);
   farm.work_directory =
@@ -124,7 +124,7 @@ void add_render_command(CLI::App& app, ExitCode& code) {
   auto options = std::make_shared<RenderOptions>();
   CLI::App* command = app.add_subcommand("render", "Renders a job on this machine");
   command->add_option("JOB", options->job, "job file")->required();
-  command->add_option("--workers", options->workers, "worker processes; default: 2")
+  command->add_option("--workers", options->workers, "worker processes; default: 1, whose threads share scene and light")
       ->check(CLI::Range(1, 256));
   command
       ->add_option("--threads-per-worker", options->threads_per_worker,

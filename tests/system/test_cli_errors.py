@@ -92,7 +92,7 @@ class CliErrors(unittest.TestCase):
         (self.folder / "cube.obj").write_text("no mesh at all\n")
         (self.folder / "sky.hdr").write_bytes(b"no picture")
         self.expect(self.baton("check", self.job()), BAD_INPUT, "cube.obj", "sky.hdr")
-        self.expect(self.baton("check", "missing.json"), IO, "missing.json: cannot open")
+        self.expect(self.baton("check", "missing.json"), BAD_INPUT, "missing.json: no such file")
 
     def test_maps_that_cannot_be_mixed(self):
         (self.folder / "small.hdr").write_bytes(radiance_hdr(2, 1))
@@ -102,7 +102,7 @@ class CliErrors(unittest.TestCase):
 
     def test_no_coordinator(self):
         result = self.baton("job", "list", "--coordinator", "tcp://127.0.0.1:1")
-        self.expect(result, UNAVAILABLE, "tcp://127.0.0.1:1: no coordinator answered")
+        self.expect(result, UNAVAILABLE, "tcp://127.0.0.1:1: no coordinator listens there")
 
     def test_files_that_are_no_states(self):
         (self.folder / "empty.bst").write_bytes(b"")

@@ -1,7 +1,6 @@
 #pragma once
 
 #include <condition_variable>
-#include <filesystem>
 #include <functional>
 #include <list>
 #include <memory>
@@ -20,7 +19,6 @@ struct PooledTask {
   std::vector<BlobRef> inputs;
   std::shared_ptr<JobEntry> job;
   std::shared_ptr<BlobStore> store;
-  std::filesystem::path replay_directory;  ///< where the job is saved for replays
 };
 
 struct EndedTask {

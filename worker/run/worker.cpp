@@ -19,6 +19,7 @@
 #include "worker/run/render_pool.h"
 #include "worker/run/replay.h"
 #include "worker/run/session.h"
+#include "worker/run/task_watch.h"
 
 namespace baton {
 namespace {
@@ -44,9 +45,8 @@ SessionOptions session_options(const WorkerOptions& options) {
 }
 
 /// Saves the job where a replay can read it. Returns its path.
-Result<std::filesystem::path> save_job(const LoadedJob& loaded,
-                                       const std::filesystem::path& directory) {
-  const std::filesystem::path path = directory / fmt::format("{}.json", loaded.digest.hex());
+Result<std::filesystem::path> save_job(const LoadedJob& loaded, const BlobStore& store) {
+  const std::filesystem::path path = store.job_file(loaded.digest);
   std::error_code error;
   if (!std::filesystem::exists(path, error)) {
     BATON_TRY(write_file_atomic(path, as_bytes_view(to_json(loaded.job))));
@@ -71,8 +71,13 @@ class NoteLog {
 
 /// Runs a task on a render thread. The command that repeats it stands in its error message and,
 /// should the process die, in the crash report.
-Result<TaskOutput> execute_pooled(const PooledTask& task, std::stop_token stop, NoteLog& notes) {
+Result<TaskOutput> execute_pooled(const PooledTask& task, std::stop_token stop, NoteLog& notes,
+                                  TaskWatch& watch) {
+  // The time that a task may take does not include the loading of its job.
   BATON_ASSIGN(const LoadedJobPtr loaded, task.job->load(stop));
+  const TaskWatch::Mark mark(
+      watch, task.lease,
+      std::chrono::steady_clock::now() + std::chrono::seconds(loaded->job.max_seconds_per_task));
   const TaskKey& key = task.lease.task;
   if (key.kind == TaskKind::assemble) {
     return execute_task(*loaded, *task.store, task.lease.task, task.inputs, stop);
@@ -84,7 +89,7 @@ Result<TaskOutput> execute_pooled(const PooledTask& task, std::stop_token stop, 
                                      ? num_runs(loaded->job)
                                      : static_cast<std::int32_t>(loaded->job.frames.size());
   if (key.step >= 0 && key.step < num_steps) {
-    BATON_ASSIGN(const std::filesystem::path path, save_job(*loaded, task.replay_directory));
+    BATON_ASSIGN(const std::filesystem::path path, save_job(*loaded, *task.store));
     const std::int32_t frame = key.kind == TaskKind::render
                                    ? tile_run(loaded->job, key.tile, key.step).last_frame
                                    : key.step;
@@ -109,7 +114,7 @@ class Worker {
         pool_(
             options.num_threads,
             [this](const PooledTask& task, std::stop_token stop) {
-              return execute_pooled(task, std::move(stop), notes_);
+              return execute_pooled(task, std::move(stop), notes_, watch_);
             },
             [this] { channel_.wake(); }) {}
 
@@ -121,6 +126,7 @@ class Worker {
         log_failure(ended);
         step(TaskEnded{ended.lease, std::move(ended.result)});
       }
+      end_overdue_tasks();
       if (drain && !std::exchange(draining, true)) step(DrainRequested{});
       step(Tick{});
       if (leave_) break;
@@ -142,6 +148,21 @@ class Worker {
 
  private:
   static TimePoint now() { return std::chrono::steady_clock::now(); }
+
+  /// Reports tasks that take too long as failed and asks them to stop. One that does not would keep
+  /// its thread for ever: nothing but the end of the process frees it.
+  void end_overdue_tasks() {
+    for (const LeaseId& lease : watch_.take_overdue(now())) {
+      pool_.stop(lease);
+      EndedTask ended{lease, Error{ErrorKind::timeout, "ran for longer than maxSecondsPerTask"}};
+      log_failure(ended);
+      step(TaskEnded{ended.lease, std::move(ended.result)});
+    }
+    if (!watch_.is_stuck(now())) return;
+    spdlog::critical("ends: a task has not stopped {} s after its time was up",
+                     TaskWatch::kStopPatience.count());
+    std::_Exit(static_cast<int>(ExitCode::failed));
+  }
 
   void step(const SessionEvent& event) {
     for (SessionAction& action : session_.step(event, now())) {
@@ -167,8 +188,7 @@ class Worker {
   void perform(StartTask& action) {
     std::shared_ptr<JobEntry> job = jobs_.entry(action.lease.job);
     const bool missing = !job->has_document();
-    pool_.submit({action.lease, std::move(action.inputs), std::move(job), store_,
-                  store_directory_ / "jobs"});
+    pool_.submit({action.lease, std::move(action.inputs), std::move(job), store_});
     if (missing) step(DocumentMissing{action.lease.job});
   }
   void perform(StopTask& action) { pool_.stop(action.lease); }
@@ -193,6 +213,7 @@ class Worker {
   std::filesystem::path store_directory_;
   std::optional<Leave> leave_;
   NoteLog notes_;
+  TaskWatch watch_;
   RenderPool pool_;  ///< last: its threads use the rest and are joined first
 };
 

@@ -56,7 +56,12 @@ TEST_F(ChannelTest, ARefusalIsAnError) {
 }
 
 TEST_F(ChannelTest, SilenceIsATimeoutAndALateAnswerIsNotMistaken) {
+  // An answered request first, so that the connection stands.
   RequestClient client = RequestClient::connect(router.endpoint()).value();
+  {
+    const std::jthread server = answer_once([](const Incoming&) -> Message { return JobList{}; });
+    ASSERT_TRUE(client.request(ListJobs{}, kPatience).ok());
+  }
   const Result<Message> silence = client.request(ListJobs{}, kMoment);
   ASSERT_FALSE(silence.ok());
   EXPECT_EQ(silence.error().kind, ErrorKind::timeout);
@@ -70,6 +75,14 @@ TEST_F(ChannelTest, SilenceIsATimeoutAndALateAnswerIsNotMistaken) {
   const Result<Message> answer = client.request(ShowJob{"ab"}, kPatience);
   ASSERT_TRUE(answer.ok());
   EXPECT_TRUE(std::holds_alternative<JobDetail>(*answer));
+}
+
+TEST(RequestClientAlone, NobodyThereIsSaidSo) {
+  RequestClient client = RequestClient::connect("tcp://127.0.0.1:1").value();
+  const Result<Message> answer = client.request(ListJobs{}, kMoment);
+  ASSERT_FALSE(answer.ok());
+  EXPECT_EQ(answer.error().kind, ErrorKind::timeout);
+  EXPECT_EQ(answer.error().message, "tcp://127.0.0.1:1: no coordinator listens there");
 }
 
 TEST_F(ChannelTest, AWorkersMessagesKeepTheirOrder) {

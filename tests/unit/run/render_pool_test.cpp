@@ -13,8 +13,7 @@ LeaseId lease(std::int32_t tile) {
 }
 
 PooledTask task(std::int32_t tile) {
-  return {
-      .lease = lease(tile), .inputs = {}, .job = nullptr, .store = nullptr, .replay_directory = {}};
+  return {.lease = lease(tile), .inputs = {}, .job = nullptr, .store = nullptr};
 }
 
 /// Collects until `count` tasks have ended; each end releases `woken`.

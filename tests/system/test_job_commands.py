@@ -1,0 +1,174 @@
+#!/usr/bin/env python3
+"""`baton job submit|list|show|wait|cancel` against a live coordinator, and what they say when there is none."""
+
+import json
+import time
+
+from farm import BAD_INPUT, FAILED, OK, UNAVAILABLE, Farm, Process, check, check_equal, free_port, make_job, run_tests
+from farm import wait_until, write_job
+
+TIMEOUT, CANCELLED = 1, 3
+
+
+def small_job(folder, **changes):
+    return write_job(folder / "job.json", make_job(folder, **{"frames": "1-2", **changes}))
+
+
+def saved_jobs(farm):
+    """The documents that workers saved for replays."""
+    return sorted((farm.work_folder / "store/jobs").glob("*.json"))
+
+
+def nobody_listens(programs, folder):
+    """Found out in about two seconds, not after the patience for a busy coordinator."""
+    endpoint = f"tcp://127.0.0.1:{free_port()}"
+    for words in [["list"], ["show", "ab"], ["wait", "ab"], ["cancel", "ab"]]:
+        start = time.monotonic()
+        done = programs.run("baton", "job", *words, "--coordinator", endpoint, expect=UNAVAILABLE)
+        check(f"{endpoint}: no coordinator listens there" in done.stderr, done.stderr)
+        check(time.monotonic() - start < 9, f"{words[0]} took {time.monotonic() - start:.1f} s")
+
+
+def a_job_from_submission_to_its_end(programs, folder):
+    with Farm(programs, folder / "farm") as farm:
+        farm.start_coordinator()
+        path = small_job(folder)
+        job = farm.submit(path)
+
+        # Nobody works yet.
+        listed = json.loads(farm.baton("job", "list", "--json").stdout)
+        check_equal([(j["id"], j["status"]) for j in listed["jobs"]], [(job, "running")], "jobs")
+        check_equal(listed["workers"], [], "workers")
+        farm.baton("job", "wait", job, "--timeout", "0.1", expect=TIMEOUT)
+
+        # Now somebody does; a beginning of the ID is enough.
+        farm.start_worker()
+        check("done" in farm.baton("job", "wait", job[:6]).stdout, "wait does not say how it ended")
+        shown = farm.show(job[:6])
+        check_equal((shown["id"], shown["status"], shown["framesDoneNumbers"]), (job, "done", [1, 2]), "show")
+        text = farm.baton("job", "list").stdout
+        check("1 jobs, 1 workers" in text and job[:6] in text, text)
+        check_equal(saved_jobs(farm), [], "documents of a job that is done")
+
+        # The same job again is no new job.
+        again = json.loads(farm.baton("job", "submit", path, "--json").stdout)
+        check_equal(again, {"id": job, "alreadyThere": True}, "second submission")
+
+
+def unknown_and_ambiguous_ids(programs, folder):
+    with Farm(programs, folder / "farm") as farm:
+        farm.start_coordinator()
+        for i in range(17):
+            farm.submit(small_job(folder / str(i), seed=i))
+        jobs = [job["id"] for job in json.loads(farm.baton("job", "list", "--json").stdout)["jobs"]]
+        check_equal(len(set(jobs)), 17, "jobs")
+
+        # Seventeen IDs begin with sixteen digits.
+        digit = next(d for d in "0123456789abcdef" if sum(job.startswith(d) for job in jobs) > 1)
+        for name, words in {digit: "jobs have IDs that begin so", "xyz": "no job has this ID"}.items():
+            for command in ["show", "wait", "cancel"]:
+                done = farm.baton("job", command, name, expect=BAD_INPUT)
+                check(f"job '{name}'" in done.stderr and words in done.stderr, done.stderr)
+
+
+def a_cancelled_job_goes_on_when_submitted_again(programs, folder):
+    with Farm(programs, folder / "farm") as farm:
+        farm.start_coordinator()
+        path = small_job(folder)
+        job = farm.submit(path)
+        check("cancelled" in farm.baton("job", "cancel", job).stdout, "cancel does not say so")
+        farm.baton("job", "wait", job, expect=CANCELLED)
+        check_equal(farm.show(job)["status"], "cancelled", "status")
+        check_equal(farm.submit(path), job, "ID")
+        farm.start_worker()
+        farm.baton("job", "wait", job)
+
+
+def waiting_outlasts_a_restart_of_the_coordinator(programs, folder):
+    with Farm(programs, folder / "farm") as farm:
+        farm.start_coordinator()
+        job = farm.submit(small_job(folder))
+        command = [programs.path("baton"), "job", "wait", job, "--coordinator", farm.endpoint]
+        waiting = Process(command, folder / "wait.log")
+        try:
+            # Long enough for its first question.
+            time.sleep(1)
+            farm.coordinator.kill()
+            time.sleep(1)
+            check(waiting.alive(), f"wait gave up:\n{waiting.log()}")
+            farm.start_coordinator()
+            farm.start_worker()
+            check_equal(waiting.wait(), OK, "exit code of wait")
+        finally:
+            waiting.kill()
+
+
+def a_paused_job_waits_until_it_is_resumed(programs, folder):
+    with Farm(programs, folder / "farm") as farm:
+        farm.start_coordinator()
+        job = farm.submit(small_job(folder))
+        check("paused" in farm.baton("job", "pause", job).stdout, "pause does not say so")
+        farm.start_worker()
+        farm.baton("job", "wait", job, "--timeout", "1", expect=TIMEOUT)
+        check_equal(farm.show(job)["tasksDone"], 0, "tasks done while paused")
+        farm.baton("job", "resume", job)
+        farm.baton("job", "wait", job)
+
+
+def a_drained_worker_ends_and_its_work_goes_on(programs, folder):
+    with Farm(programs, folder / "farm") as farm:
+        farm.start_coordinator()
+        job = farm.submit(small_job(folder))
+        first = farm.start_worker()
+        wait_until(lambda: "worker0" in farm.baton("worker", "list").stdout, "the worker is listed")
+        farm.baton("worker", "drain", "worker0")
+        check_equal(first.wait(), OK, "exit code of the drained worker")
+        wait_until(lambda: json.loads(farm.baton("worker", "list", "--json").stdout) == [], "the worker has left")
+        check("no worker has this name" in farm.baton("worker", "drain", "worker0", expect=BAD_INPUT).stderr,
+              "an unknown worker was drained")
+        farm.start_worker()
+        farm.baton("job", "wait", job)
+
+
+def a_failed_job_is_retried(programs, folder):
+    """What was wrong is mended meanwhile: a mesh that was gone is back."""
+    with Farm(programs, folder / "farm") as farm:
+        farm.start_coordinator()
+        job = farm.submit(small_job(folder))
+        mesh = folder / "sphere.off"
+        mesh.rename(folder / "elsewhere.off")
+        farm.start_worker()
+        farm.baton("job", "wait", job, expect=FAILED)
+        (folder / "elsewhere.off").rename(mesh)
+        check("running" in farm.baton("job", "retry", job).stdout, "retry does not say so")
+        farm.baton("job", "wait", job)
+
+
+def a_task_that_takes_too_long_fails(programs, folder):
+    """One second for billions of samples: the attempt is counted, the reason named, the job kept for a replay."""
+    with Farm(programs, folder / "farm") as farm:
+        farm.start_coordinator()
+        endless = {"method": "reference", "referenceSamples": 1 << 24}
+        job = farm.submit(small_job(folder, sampling=endless, state={"carry": False}, maxSecondsPerTask=1,
+                                    maxRetriesPerTask=0))
+        farm.start_worker()
+        farm.baton("job", "wait", job, expect=FAILED)
+        shown = farm.show(job)
+        check_equal((shown["tasksFailed"], shown["attemptsLost"]), (1, 1), "failures")
+        words = "ran for longer than maxSecondsPerTask"
+        check(words in shown["failures"][0] and words in farm.coordinator.log(), "the reason is not named")
+        wait_until(lambda: [file.stem for file in saved_jobs(farm)] == [job], "the failed job's document stays")
+
+
+if __name__ == "__main__":
+    run_tests([
+        nobody_listens,
+        a_job_from_submission_to_its_end,
+        unknown_and_ambiguous_ids,
+        a_cancelled_job_goes_on_when_submitted_again,
+        waiting_outlasts_a_restart_of_the_coordinator,
+        a_paused_job_waits_until_it_is_resumed,
+        a_drained_worker_ends_and_its_work_goes_on,
+        a_failed_job_is_retried,
+        a_task_that_takes_too_long_fails,
+    ])

@@ -1,0 +1,36 @@
+#include "worker/run/task_watch.h"
+
+#include <algorithm>
+
+namespace baton {
+
+TaskWatch::Mark::Mark(TaskWatch& watch, const LeaseId& lease, TimePoint deadline)
+    : watch_(watch), lease_(lease) {
+  const std::lock_guard lock(watch_.mutex_);
+  watch_.entries_.insert_or_assign(lease, Entry{deadline, false});
+}
+
+TaskWatch::Mark::~Mark() {
+  const std::lock_guard lock(watch_.mutex_);
+  watch_.entries_.erase(lease_);
+}
+
+std::vector<LeaseId> TaskWatch::take_overdue(TimePoint now) {
+  const std::lock_guard lock(mutex_);
+  std::vector<LeaseId> overdue;
+  for (auto& [lease, entry] : entries_) {
+    if (entry.taken || now <= entry.deadline) continue;
+    entry.taken = true;
+    overdue.push_back(lease);
+  }
+  return overdue;
+}
+
+bool TaskWatch::is_stuck(TimePoint now) const {
+  const std::lock_guard lock(mutex_);
+  return std::any_of(entries_.begin(), entries_.end(), [&](const auto& entry) {
+    return now > entry.second.deadline + kStopPatience;
+  });
+}
+
+}  // namespace baton
