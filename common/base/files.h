@@ -9,6 +9,9 @@
 
 namespace baton {
 
+/// ErrorKind::bad_input when nothing has this name. For names that a person typed: no disk has failed.
+Status expect_file(const std::filesystem::path& path);
+
 /// The whole file. Errors name the file: missing, not readable, larger than `max_size_bytes`.
 Result<Bytes> read_file(const std::filesystem::path& path, std::uint64_t max_size_bytes);
 Result<std::string> read_text_file(const std::filesystem::path& path, std::uint64_t max_size_bytes);

@@ -47,9 +47,13 @@ struct BlobRef {
   template <class A> void fields(A& a) { a(kind, frame, tile, digest, size_bytes); }
 };
 
-/// Where a job stands. Stored and sent; values are for ever.
-enum class JobStatus : std::uint8_t { running = 0, done = 1, failed = 2, cancelled = 3 };
-constexpr JobStatus last_of(JobStatus) { return JobStatus::cancelled; }
+/// Where a job stands. Stored and sent; values are for ever. Of a paused job no task is handed out.
+enum class JobStatus : std::uint8_t { running = 0, done = 1, failed = 2, cancelled = 3, paused = 4 };
+constexpr JobStatus last_of(JobStatus) { return JobStatus::paused; }
+/// Whether the job has not ended.
+constexpr bool is_open(JobStatus status) {
+  return status == JobStatus::running || status == JobStatus::paused;
+}
 
 /// Names one attempt of one task; the fence against late reports. epoch: the coordinator's start count.
 struct LeaseId {

@@ -66,12 +66,17 @@ struct JobDocument {
   std::string json;  ///< resolved: absolute paths, asset digests
   template <class A> void fields(A& a) { a(job, json); }
 };
+/// Finish what runs, take nothing new, end.
+struct Drain { template <class A> void fields(A& a) { a(); } };
 struct Shutdown { template <class A> void fields(A& a) { a(); } };
 
 // ---- client to coordinator ----------------------------------------------------------------------
 struct SubmitJob { std::string json; template <class A> void fields(A& a) { a(json); } };
 struct ListJobs { template <class A> void fields(A& a) { a(); } };
 struct ShowJob { std::string job; template <class A> void fields(A& a) { a(job); } };  ///< digest or unique prefix
+struct PauseJob { std::string job; template <class A> void fields(A& a) { a(job); } };
+struct ResumeJob { std::string job; template <class A> void fields(A& a) { a(job); } };
+struct DrainWorker { std::string worker_id; template <class A> void fields(A& a) { a(worker_id); } };
 struct CancelJob { std::string job; template <class A> void fields(A& a) { a(job); } };
 struct StopCoordinator { template <class A> void fields(A& a) { a(); } };
 
@@ -122,7 +127,7 @@ struct Refused {
 using Message = std::variant<WorkerHello, LeaseRequest, Heartbeat, TaskDone, TaskFailed, JobDocumentRequest,
                              WorkerGoodbye, WorkerWelcome, LeaseGrant, LeaseRevoke, NoWork, HelloAgain, JobDocument,
                              Shutdown, SubmitJob, ListJobs, ShowJob, CancelJob, StopCoordinator, JobAccepted, JobList,
-                             JobDetail, Refused>;
+                             JobDetail, Refused, PauseJob, ResumeJob, DrainWorker, Drain>;
 
 /// The frames of one message: [protocol name and version][type][body].
 std::vector<Bytes> encode_message(const Message& message);

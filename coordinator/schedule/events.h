@@ -45,6 +45,13 @@ struct JobAdded {
 struct JobCancelled {
   Digest job;
 };
+/// No more of its tasks are granted until it is resumed; what is leased goes on.
+struct JobPaused {
+  Digest job;
+};
+struct JobResumed {
+  Digest job;
+};
 /// `running`: the leases that the worker has in hand, of this coordinator or an earlier one.
 struct WorkerJoined {
   std::string worker;
@@ -77,7 +84,7 @@ struct AttemptFailed {
 /// Time has passed: who was silent for too long?
 struct ClockTicked {};
 
-using Event = std::variant<JobAdded, JobCancelled, WorkerJoined, WorkerAlive, WorkerLeft,
+using Event = std::variant<JobAdded, JobCancelled, JobPaused, JobResumed, WorkerJoined, WorkerAlive, WorkerLeft,
                            WorkRequested, TaskCompleted, AttemptFailed, ClockTicked>;
 
 // ---- actions ------------------------------------------------------------------------------------

@@ -61,7 +61,7 @@ void Scheduler::on(const JobAdded& event, TimePoint, Actions& actions) {
   // A job that has ended makes room for its new life; one that runs goes on.
   std::uint64_t sequence = next_sequence_;
   if (Job* old = find(event.job)) {
-    if (old->status == JobStatus::running) return;
+    if (is_open(old->status)) return;
     sequence = old->sequence;
     old->tasks.release_all(blobs_);
     jobs_.erase(event.job);
@@ -73,18 +73,34 @@ void Scheduler::on(const JobAdded& event, TimePoint, Actions& actions) {
   Job& job = jobs_.emplace(event.job, Job{event.spec, event.status, sequence, JobTasks(event.spec)})
                  .first->second;
   replay(job, event);
-  if (event.status != JobStatus::running) {
+  if (!is_open(event.status)) {
     job.tasks.cancel_open();
     return;
   }
-  running_.emplace(rank(job), event.job);
+  if (event.status == JobStatus::running) running_.emplace(rank(job), event.job);
   end_if_finished(event.job, job, actions);
 }
 
 void Scheduler::on(const JobCancelled& event, TimePoint, Actions& actions) {
   Job* job = find(event.job);
-  if (!job || job->status != JobStatus::running) return;
+  if (!job || !is_open(job->status)) return;
   end_job(event.job, *job, JobStatus::cancelled, "cancelled", actions);
+}
+
+void Scheduler::on(const JobPaused& event, TimePoint, Actions& actions) {
+  Job* job = find(event.job);
+  if (!job || job->status != JobStatus::running) return;
+  job->status = JobStatus::paused;
+  running_.erase(rank(*job));
+  actions.push_back(RecordJobStatus{event.job, job->status, "paused"});
+}
+
+void Scheduler::on(const JobResumed& event, TimePoint, Actions& actions) {
+  Job* job = find(event.job);
+  if (!job || job->status != JobStatus::paused) return;
+  job->status = JobStatus::running;
+  running_.emplace(rank(*job), event.job);
+  actions.push_back(RecordJobStatus{event.job, job->status, "resumed"});
 }
 
 // ---- events: reports ----------------------------------------------------------------------------

@@ -56,7 +56,7 @@ class Scheduler {
     std::int32_t wanted = 0;
     std::set<std::pair<Digest, TaskIndex>> leases;
   };
-  /// Orders the running jobs.
+  /// Orders the running jobs; a paused one has no rank.
   struct Rank {
     int descending_priority = 0;
     std::uint64_t sequence = 0;
@@ -71,6 +71,8 @@ class Scheduler {
 
   void on(const JobAdded& event, TimePoint now, Actions& actions);
   void on(const JobCancelled& event, TimePoint now, Actions& actions);
+  void on(const JobPaused& event, TimePoint now, Actions& actions);
+  void on(const JobResumed& event, TimePoint now, Actions& actions);
   void on(const WorkerJoined& event, TimePoint now, Actions& actions);
   void on(const WorkerAlive& event, TimePoint now, Actions& actions);
   void on(const WorkerLeft& event, TimePoint now, Actions& actions);

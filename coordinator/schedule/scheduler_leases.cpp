@@ -69,7 +69,7 @@ Scheduler::Worker* Scheduler::touch(const std::string& worker, TimePoint now) {
 /// is over.
 Scheduler::Held Scheduler::hold(const std::string& worker, const LeaseId& lease, TimePoint now) {
   Job* job = find(lease.job);
-  if (!job || job->status != JobStatus::running) return {};
+  if (!job || !is_open(job->status)) return {};
   const std::optional<TaskIndex> task = job->tasks.graph().find(lease.task);
   if (!task) return {};
 

@@ -202,10 +202,10 @@ Status Service::perform(const RecordFailure& action) {
 
 Status Service::perform(const RecordJobStatus& action) {
   const auto level = action.status == JobStatus::failed ? spdlog::level::err : spdlog::level::info;
-  spdlog::log(level, "job {} ended: {}", action.job.short_hex(), action.reason);
+  spdlog::log(level, "job {}: {}", action.job.short_hex(), action.reason);
   // Before the status is durable: whoever is killed in between ends the job, and writes, again.
   const Scheduler::Job* job = scheduler_.find_job(action.job);
-  if (job != nullptr && action.status != JobStatus::running) {
+  if (job != nullptr && !is_open(action.status)) {
     const Status written = write_diagnostics(journal_, action.job, job->spec);
     if (!written) spdlog::warn("no diagnostics: {}", written.error().message);
   }

@@ -63,8 +63,13 @@ class Service {
   Status receive(const PeerId& peer, const ListJobs& message);
   Status receive(const PeerId& peer, const ShowJob& message);
   Status receive(const PeerId& peer, const CancelJob& message);
+  Status receive(const PeerId& peer, const PauseJob& message);
+  Status receive(const PeerId& peer, const ResumeJob& message);
+  Status receive(const PeerId& peer, const DrainWorker& message);
   Status receive(const PeerId& peer, const StopCoordinator& message);
   Status start_again(JobAdded event, JobStatus status, bool& already_there);
+  template <class E>
+  Status change_job(const PeerId& peer, const std::string& prefix);
   Status answer_detail(const PeerId& peer, const Digest& job);
 
   // Actions of the scheduler.

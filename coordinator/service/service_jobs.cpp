@@ -38,7 +38,7 @@ Status Service::restore_job(const Digest& digest) {
 
   // A running job needs every file that it counts on; a job that has ended needs none until it is
   // submitted again.
-  if (event.status == JobStatus::running) {
+  if (is_open(event.status)) {
     if (const auto missing = find_missing_file(event, store_)) {
       spdlog::warn("job {} starts afresh: {} is gone", digest.short_hex(), *missing);
       BATON_TRY(journal_.restart_job(digest, /*fresh=*/true));
@@ -105,6 +105,7 @@ Status Service::receive(const PeerId& peer, const SubmitJob& message) {
 /// gone.
 Status Service::start_again(JobAdded event, JobStatus status, bool& already_there) {
   already_there = true;
+  if (status == JobStatus::paused) return step(JobResumed{event.job});
   if (status == JobStatus::running) return {};
   BATON_ASSIGN(JournalledJob known, journal_.load(event.job));
   event.completions = std::move(known.completions);
@@ -142,13 +143,26 @@ Status Service::receive(const PeerId& peer, const ShowJob& message) {
 }
 
 Status Service::receive(const PeerId& peer, const CancelJob& message) {
-  const Result<Digest> job = resolve_job(scheduler_, message.job);
-  if (!job) {
-    refuse(peer, job.error());
+  return change_job<JobCancelled>(peer, message.job);
+}
+
+Status Service::receive(const PeerId& peer, const PauseJob& message) {
+  return change_job<JobPaused>(peer, message.job);
+}
+
+Status Service::receive(const PeerId& peer, const ResumeJob& message) {
+  return change_job<JobResumed>(peer, message.job);
+}
+
+Status Service::receive(const PeerId& peer, const DrainWorker& message) {
+  if (!peers_.peer_of(message.worker_id)) {
+    refuse(peer, {ErrorKind::bad_input,
+                  fmt::format("worker '{}': no worker has this name", message.worker_id)});
     return {};
   }
-  BATON_TRY(step(JobCancelled{*job}));
-  return answer_detail(peer, *job);
+  spdlog::info("worker {} is told to finish", message.worker_id);
+  reply_to(message.worker_id, Drain{});
+  return receive(peer, ListJobs{});
 }
 
 Status Service::receive(const PeerId& peer, const StopCoordinator&) {
@@ -156,6 +170,18 @@ Status Service::receive(const PeerId& peer, const StopCoordinator&) {
   stop_requested_ = true;
   reply(peer, Shutdown{});
   return {};
+}
+
+/// Event E happens to the job whose ID begins with `prefix`; the answer shows what came of it.
+template <class E>
+Status Service::change_job(const PeerId& peer, const std::string& prefix) {
+  const Result<Digest> job = resolve_job(scheduler_, prefix);
+  if (!job) {
+    refuse(peer, job.error());
+    return {};
+  }
+  BATON_TRY(step(E{*job}));
+  return answer_detail(peer, *job);
 }
 
 Status Service::answer_detail(const PeerId& peer, const Digest& job) {

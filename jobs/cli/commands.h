@@ -13,6 +13,7 @@ void add_check_command(CLI::App& app, ExitCode& code);
 void add_job_command(CLI::App& app, ExitCode& code);
 void add_render_command(CLI::App& app, ExitCode& code);
 void add_state_command(CLI::App& app, ExitCode& code);
+void add_worker_command(CLI::App& app, ExitCode& code);
 
 /// Prints the error of a command, if it has one, and gives its exit code.
 ExitCode finish(const Result<ExitCode>& outcome);

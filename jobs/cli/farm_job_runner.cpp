@@ -70,7 +70,7 @@ Result<std::optional<JobSummary>> FarmJobRunner::ended(const Open& job, const Jo
   BATON_ASSIGN(const std::optional<JobDetail> detail,
                ask_farm<JobDetail>(*farm_, *client_, signals_, ShowJob{job.job.hex()}));
   if (!detail) return stopped();
-  if (detail->summary.status == JobStatus::running) return std::optional<JobSummary>();
+  if (is_open(detail->summary.status)) return std::optional<JobSummary>();
   if (detail->summary.status == JobStatus::done) return std::optional(detail->summary);
   return Error{ErrorKind::bad_input, fmt::format("run '{}' seed {} {}: {}", spec.name, spec.seed,
                                                  job_status_name(detail->summary.status),

@@ -52,11 +52,7 @@ Result<ExitCode> list(const JobOptions& options, RequestClient& client) {
   ordered_json result = {{"jobs", ordered_json::array()}, {"workers", ordered_json::array()}};
   for (const JobSummary& job : found.jobs) result["jobs"].push_back(summary_json(job));
   for (const WorkerSummary& worker : found.workers) {
-    result["workers"].push_back({{"id", worker.worker_id},
-                                 {"host", worker.host},
-                                 {"pid", worker.pid},
-                                 {"threads", worker.num_threads},
-                                 {"leases", worker.leases}});
+    result["workers"].push_back(worker_json(worker));
   }
   fmt::print("{}\n", result.dump(2));
   return ExitCode::ok;
@@ -96,18 +92,31 @@ Result<ExitCode> wait(const JobOptions& options, RequestClient& client) {
     last_answer = Clock::now();
     const JobDetail& detail = *answer;
     const bool expired = options.timeout_s > 0 && waited.count() >= options.timeout_s;
-    if (detail.summary.status != JobStatus::running || expired) {
+    if (!is_open(detail.summary.status) || expired) {
       print_detail(detail, options.json);
-      return detail.summary.status == JobStatus::running ? ExitCode::timeout
-                                                         : exit_code_of(detail.summary.status);
+      return is_open(detail.summary.status) ? ExitCode::timeout
+                                            : exit_code_of(detail.summary.status);
     }
     std::this_thread::sleep_for(kPollInterval);
   }
 }
 
-Result<ExitCode> cancel(const JobOptions& options, RequestClient& client) {
-  BATON_ASSIGN(const JobDetail detail, ask<JobDetail>(client, CancelJob{options.job}));
+/// M: CancelJob, PauseJob or ResumeJob.
+template <class M>
+Result<ExitCode> change(const JobOptions& options, RequestClient& client) {
+  BATON_ASSIGN(const JobDetail detail, ask<JobDetail>(client, M{options.job}));
   print_detail(detail, options.json);
+  return ExitCode::ok;
+}
+
+/// Submits the job's own document again: what is done stays done, failures are forgotten.
+Result<ExitCode> retry(const JobOptions& options, RequestClient& client) {
+  BATON_ASSIGN(const JobDetail before, ask<JobDetail>(client, ShowJob{options.job}));
+  const Digest& id = before.summary.job;
+  BATON_ASSIGN(JobDocument document, ask<JobDocument>(client, JobDocumentRequest{id}));
+  BATON_TRY(ask<JobAccepted>(client, SubmitJob{std::move(document.json)}));
+  BATON_ASSIGN(const JobDetail after, ask<JobDetail>(client, ShowJob{id.hex()}));
+  print_detail(after, options.json);
   return ExitCode::ok;
 }
 
@@ -146,7 +155,11 @@ void add_job_command(CLI::App& app, ExitCode& code) {
   add("submit", "Hands a job over; prints its ID", "JOB", submit);
   add("list", "All jobs of the coordinator", nullptr, list);
   add("show", "One job: progress, statistics, failures", "ID", show);
-  add("cancel", "Ends a job; finished frames stay", "ID", cancel);
+  add("pause", "Hands out no more of a job's tasks; those that run are finished", "ID",
+      change<PauseJob>);
+  add("resume", "Goes on with a paused job", "ID", change<ResumeJob>);
+  add("cancel", "Ends a job; finished frames stay", "ID", change<CancelJob>);
+  add("retry", "Goes on with a failed or cancelled job where it stopped", "ID", retry);
   add("wait",
       "Returns when the job has ended, with its exit code; outlasts a restart of the coordinator",
       "ID", wait)

@@ -37,6 +37,8 @@ const char* job_status_name(JobStatus status) {
       return "failed";
     case JobStatus::cancelled:
       return "cancelled";
+    case JobStatus::paused:
+      return "paused";
   }
   return "unknown";
 }
@@ -44,6 +46,7 @@ const char* job_status_name(JobStatus status) {
 ExitCode exit_code_of(JobStatus status) {
   switch (status) {
     case JobStatus::running:
+    case JobStatus::paused:
     case JobStatus::done:
       return ExitCode::ok;
     case JobStatus::failed:
@@ -92,6 +95,19 @@ std::string job_statistics(const JobSummary& job) {
   if (job.attempts_lost > 0)
     text += fmt::format("attempts   {} lost or failed\n", job.attempts_lost);
   return text;
+}
+
+std::string worker_line(const WorkerSummary& worker) {
+  return fmt::format("{:<24}  {:>3} threads  {:>3} leases  process {} on {}", worker.worker_id,
+                     worker.num_threads, worker.leases, worker.pid, worker.host);
+}
+
+ordered_json worker_json(const WorkerSummary& worker) {
+  return {{"id", worker.worker_id},
+          {"host", worker.host},
+          {"pid", worker.pid},
+          {"threads", worker.num_threads},
+          {"leases", worker.leases}};
 }
 
 ordered_json summary_json(const JobSummary& job) {

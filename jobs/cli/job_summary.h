@@ -8,10 +8,10 @@
 
 namespace baton {
 
-/// "running", "done", "failed" or "cancelled".
+/// "running", "paused", "done", "failed" or "cancelled".
 const char* job_status_name(JobStatus status);
 
-/// How a command about a job in this status ends; running is ok.
+/// How a command about a job in this status ends; running and paused are ok.
 ExitCode exit_code_of(JobStatus status);
 
 /// The job's line in a list.
@@ -19,6 +19,10 @@ std::string job_line(const JobSummary& job);
 
 /// What the job has done so far, several lines.
 std::string job_statistics(const JobSummary& job);
+
+/// The worker's line in a list.
+std::string worker_line(const WorkerSummary& worker);
+nlohmann::ordered_json worker_json(const WorkerSummary& worker);
 
 nlohmann::ordered_json summary_json(const JobSummary& job);
 nlohmann::ordered_json detail_json(const JobDetail& detail);

@@ -23,6 +23,7 @@ constexpr const char* kFooter = R"(Examples:
   baton render job.json              renders on this machine; again: goes on where it stopped
   baton job submit job.json          hands the job to a coordinator (see --coordinator)
   baton job list
+  baton worker list
   baton chart study.json             error against time of several methods, as charts
   baton state show tile.bst          what samples a tile hands to its next frame
 
@@ -42,6 +43,7 @@ int main(int argc, char** argv) {
   baton::add_check_command(app, code);
   baton::add_render_command(app, code);
   baton::add_job_command(app, code);
+  baton::add_worker_command(app, code);
   baton::add_state_command(app, code);
   baton::add_chart_command(app, code);
   try {

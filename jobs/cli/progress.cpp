@@ -33,7 +33,7 @@ std::string Progress::line(const JobSummary& job, TimePoint now) const {
 
 void Progress::update(const JobSummary& job, TimePoint now) {
   if (!start_) start_ = Start{now, job.tasks_done, job.frames_done};
-  const bool last = job.status != JobStatus::running;
+  const bool last = !is_open(job.status);
   if (terminal_) {
     // Erase to the end of the line: the text before may have been longer.
     fmt::print(stderr, "\r{}\x1b[K", line(job, now));

@@ -49,7 +49,7 @@ Result<std::optional<JobDetail>> follow(LocalFarm& farm, RequestClient& client,
     BATON_ASSIGN(std::optional<JobDetail> detail,
                  ask_farm<JobDetail>(farm, client, signals, ShowJob{job.hex()}));
     if (detail) progress.update(detail->summary, Clock::now());
-    const bool over = !detail || detail->summary.status != JobStatus::running;
+    const bool over = !detail || !is_open(detail->summary.status);
     if (over || signals.stop_requested_within(kFarmPollInterval)) {
       progress.finish();
       return over ? detail : std::nullopt;

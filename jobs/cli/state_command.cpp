@@ -47,6 +47,7 @@ double pixel_ess(const SampleState& state, std::size_t pixel) {
 
 Result<StateReport> load_state(const std::string& file) {
   StateReport report;
+  BATON_TRY(expect_file(file));
   BATON_ASSIGN(const Bytes bytes, read_file(file, limits::kMaxBlobBytes));
   BATON_ASSIGN(report.sections, state_sections(bytes, file));
   BATON_ASSIGN(report.state, decode_state(bytes, file));

@@ -153,6 +153,10 @@ void Session::receive(const JobDocument& document, TimePoint, Actions& actions) 
   actions.push_back(TakeDocument{document});
 }
 
+void Session::receive(const Drain&, TimePoint now, Actions& actions) {
+  on(DrainRequested{}, now, actions);
+}
+
 void Session::receive(const Shutdown&, TimePoint, Actions& actions) {
   actions.push_back(Leave{ExitCode::ok, "the coordinator shuts down"});
 }

@@ -35,7 +35,7 @@ struct TaskEnded {
 struct DocumentMissing {
   Digest job;
 };                         ///< a started task belongs to a job that this process has not seen
-struct DrainRequested {};  ///< SIGTERM: finish what runs, take nothing new
+struct DrainRequested {};  ///< SIGTERM or the coordinator: finish what runs, take nothing new
 struct Tick {};            ///< time has passed
 using SessionEvent = std::variant<MessageArrived, TaskEnded, DocumentMissing, DrainRequested, Tick>;
 
@@ -96,6 +96,7 @@ class Session {
   void receive(const NoWork& no_work, TimePoint now, Actions& actions);
   void receive(const HelloAgain& again, TimePoint now, Actions& actions);
   void receive(const JobDocument& document, TimePoint now, Actions& actions);
+  void receive(const Drain& drain, TimePoint now, Actions& actions);
   void receive(const Shutdown& shutdown, TimePoint now, Actions& actions);
   void receive(const Refused& refused, TimePoint now, Actions& actions);
 

@@ -60,6 +60,10 @@ const std::vector<Message>& examples() {
       JobList{{kSummary}, {{"w", "h", 1, 2, 3}}},
       JobDetail{kSummary, {1, 2, 3}, {"one", ""}},
       Refused{4, "because"},
+      PauseJob{"abc"},
+      ResumeJob{"def"},
+      DrainWorker{"w"},
+      Drain{},
   };
   return messages;
 }

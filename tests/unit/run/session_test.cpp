@@ -192,6 +192,16 @@ TEST_F(SessionTest, AMissingDocumentIsAskedForUntilItIsHere) {
   EXPECT_TRUE(sent<JobDocumentRequest>(tick_after(1000ms)).empty());
 }
 
+TEST_F(SessionTest, TheCoordinatorMayAskForTheEndToo) {
+  welcome();
+  grant(lease(0));
+  EXPECT_NE(find<DropQueuedTasks>(step(MessageArrived{Drain{}})), nullptr);
+  const auto last = finish(lease(0));
+  EXPECT_EQ(sent<WorkerGoodbye>(last).size(), 1u);
+  ASSERT_NE(find<Leave>(last), nullptr);
+  EXPECT_EQ(find<Leave>(last)->code, ExitCode::ok);
+}
+
 TEST_F(SessionTest, DrainsWhatRunsThenSaysGoodbye) {
   welcome();
   grant(lease(0));

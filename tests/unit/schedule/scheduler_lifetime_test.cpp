@@ -94,6 +94,38 @@ TEST(SchedulerBlobs, AStateStaysUntilEveryNeighbourHasGoneOn) {
   }
 }
 
+TEST_F(SchedulerTest, APausedJobFinishesWhatIsLeasedAndGrantsNoMore) {
+  const GrantLease held = farm.ask_one("a");
+  const auto paused = all_of<RecordJobStatus>(farm.step(JobPaused{farm.job}));
+  ASSERT_THAT(paused, SizeIs(1));
+  EXPECT_EQ(paused[0].status, JobStatus::paused);
+  EXPECT_THAT(farm.step(JobPaused{farm.job}), IsEmpty()) << "it is paused already";
+
+  // The report counts, but nobody gets what follows from it.
+  EXPECT_THAT(all_of<RecordCompletion>(farm.finish(held)), SizeIs(1));
+  EXPECT_THAT(farm.ask("b", 2), IsEmpty());
+
+  // Whoever has asked meanwhile gets work at once.
+  const auto resumed = farm.step(JobResumed{farm.job});
+  EXPECT_EQ(all_of<RecordJobStatus>(resumed)[0].status, JobStatus::running);
+  EXPECT_THAT(all_of<GrantLease>(resumed), SizeIs(2));
+  farm.work_off("b");
+  EXPECT_THAT(farm.step(JobPaused{Digest{}}), IsEmpty()) << "no such job";
+}
+
+TEST_F(SchedulerTest, APausedJobStaysPausedThroughARestartAndCanBeCancelled) {
+  const GrantLease held = farm.ask_one("a");
+  Farm again(farm.spec(), /*epoch=*/2);
+  again.step(JobAdded{farm.job, farm.spec(), JobStatus::paused, {}, {}});
+  again.step(WorkerJoined{"a", {held.lease}});
+  EXPECT_EQ(again.progress().tasks_leased, 1u) << "the lease of the first life is adopted";
+  EXPECT_THAT(again.ask("a", 2), IsEmpty());
+  const auto cancelled = again.step(JobCancelled{farm.job});
+  EXPECT_THAT(all_of<RevokeLease>(cancelled), SizeIs(1));
+  EXPECT_EQ(again.status(), JobStatus::cancelled);
+  EXPECT_THAT(again.step(JobResumed{farm.job}), IsEmpty()) << "it has ended";
+}
+
 TEST_F(SchedulerTest, ARestartedCoordinatorTakesUpWhereTheJournalEnds) {
   const auto held = farm.ask("a", 2);
   const auto recorded = all_of<RecordCompletion>(farm.finish(held[0]));

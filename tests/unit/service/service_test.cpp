@@ -172,6 +172,40 @@ TEST_F(ServiceTest, ACancelledJobGoesOnWhenItIsSubmittedAgain) {
   EXPECT_EQ(show(service.endpoint(), id).summary.status, JobStatus::done);
 }
 
+TEST_F(ServiceTest, APausedJobIsPausedAfterARestartAndResumedBySubmission) {
+  Digest id;
+  {
+    const RunningService service(options);
+    id = ask<JobAccepted>(service.endpoint(), SubmitJob{document}).job;
+    EXPECT_EQ(ask<JobDetail>(service.endpoint(), PauseJob{id.hex()}).summary.status,
+              JobStatus::paused);
+  }
+  const RunningService service(options);
+  FakeWorker worker(service.endpoint(), store(), job);
+  worker.hello();
+  worker.say(LeaseRequest{1});
+  worker.expect<NoWork>();
+  EXPECT_EQ(ask<JobDetail>(service.endpoint(), ResumeJob{id.hex()}).summary.status,
+            JobStatus::running);
+  worker.expect<LeaseGrant>();
+  EXPECT_EQ(ask<JobDetail>(service.endpoint(), PauseJob{id.hex()}).summary.status,
+            JobStatus::paused);
+  EXPECT_TRUE(ask<JobAccepted>(service.endpoint(), SubmitJob{document}).already_there);
+  EXPECT_EQ(show(service.endpoint(), id).summary.status, JobStatus::running);
+}
+
+TEST_F(ServiceTest, AWorkerIsDrainedByItsName) {
+  const RunningService service(options);
+  FakeWorker worker(service.endpoint(), store(), job, "mill");
+  worker.hello();
+  worker.expect<WorkerWelcome>();
+  EXPECT_THAT(ask<JobList>(service.endpoint(), DrainWorker{"mill"}).workers, SizeIs(1));
+  worker.expect<Drain>();
+  const Error unknown = refused(service.endpoint(), DrainWorker{"mil"});
+  EXPECT_EQ(unknown.kind, ErrorKind::bad_input);
+  EXPECT_EQ(unknown.message, "worker 'mil': no worker has this name");
+}
+
 TEST_F(ServiceTest, ADoneJobOfWhichAFrameIsGoneStartsAfresh) {
   const RunningService service(options);
   const Digest id = ask<JobAccepted>(service.endpoint(), SubmitJob{document}).job;
