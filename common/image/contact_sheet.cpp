@@ -66,6 +66,11 @@ void draw_thumb(const RgbImage& frame, int thumb_width, int thumb_height, int le
   }
 }
 
+int height_by_aspect(const RgbImage& image, int width) {
+  const std::int64_t height = (std::int64_t{image.height} * width + image.width / 2) / image.width;
+  return std::max(1, static_cast<int>(height));
+}
+
 }  // namespace
 
 float auto_exposure(const RgbImage& image) {
@@ -95,6 +100,14 @@ RgbImage tone_map(const RgbImage& image, float exposure) {
   return mapped;
 }
 
+RgbImage resize(const RgbImage& image, int width) {
+  BATON_CHECK(image.width > 0 && image.height > 0 && width > 0);
+  RgbImage resized{width, height_by_aspect(image, width), {}};
+  resized.rgb.resize(static_cast<std::size_t>(resized.width) * resized.height * 3);
+  draw_thumb(image, resized.width, resized.height, 0, 0, resized);
+  return resized;
+}
+
 RgbImage contact_sheet(std::span<const RgbImage> frames, int columns, int thumb_width) {
   BATON_CHECK(!frames.empty() && columns > 0 && thumb_width > 0);
   const RgbImage& first = frames.front();
@@ -107,9 +120,7 @@ RgbImage contact_sheet(std::span<const RgbImage> frames, int columns, int thumb_
   const int num_frames = static_cast<int>(frames.size());
   const int num_columns = std::min(columns, num_frames);
   const int num_rows = (num_frames + num_columns - 1) / num_columns;
-  const int thumb_height = std::max(
-      1,
-      static_cast<int>((std::int64_t{first.height} * thumb_width + first.width / 2) / first.width));
+  const int thumb_height = height_by_aspect(first, thumb_width);
   RgbImage sheet{kGapPixels + num_columns * (thumb_width + kGapPixels),
                  kGapPixels + num_rows * (thumb_height + kGapPixels),
                  {}};

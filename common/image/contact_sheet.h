@@ -17,9 +17,13 @@ float auto_exposure(const RgbImage& image);
 /// count as 0.
 RgbImage tone_map(const RgbImage& image, float exposure);
 
+/// The picture `width` pixels wide, height by its aspect, shrunk with a box filter; an enlarged
+/// pixel stays a rectangle.
+RgbImage resize(const RgbImage& image, int width);
+
 /// All frames in reading order on one sheet of `columns` columns, `thumb_width` pixels wide each
 /// (height by the aspect of the first frame), 2 pixel gaps between and around them in dark grey.
-/// Frames shrink with a box filter, never grow smooth: an enlarged pixel stays a square. All frames
+/// Frames are resized as by resize(). All frames
 /// must have one size; `frames` must not be empty.
 RgbImage contact_sheet(std::span<const RgbImage> frames, int columns, int thumb_width);
 

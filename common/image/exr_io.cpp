@@ -14,6 +14,7 @@
 
 #include "common/base/files.h"
 #include "common/base/limits.h"
+#include "common/image/exr_channels.h"
 #include "common/image/image_io.h"
 
 namespace baton {
@@ -206,12 +207,18 @@ Status write_exr(const std::filesystem::path& path, const FilmTile& image,
   }
 }
 
-Result<FilmTile> read_exr(const std::filesystem::path& path) {
+Result<FilmTile> read_exr_channels(const std::filesystem::path& path, const ChannelChoice& choose) {
   return with_exr_file(path, [&](Imf::InputFile& file) -> Result<FilmTile> {
     BATON_ASSIGN(FilmTile image, describe(file.header(), path.string()));
+    BATON_ASSIGN(image.channels, choose(image.channels));
     read_planes(file, image);
     return image;
   });
+}
+
+Result<FilmTile> read_exr(const std::filesystem::path& path) {
+  const auto every = [](const std::vector<std::string>& all) { return Result(all); };
+  return read_exr_channels(path, every);
 }
 
 Result<ImageMetadata> read_exr_metadata(const std::filesystem::path& path) {

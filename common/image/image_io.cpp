@@ -10,6 +10,7 @@
 
 #include "common/base/files.h"
 #include "common/base/limits.h"
+#include "common/image/exr_channels.h"
 #include "common/image/radiance.h"
 
 namespace baton {
@@ -44,26 +45,29 @@ bool sides_ok(int width, int height) {
          height <= limits::kMaxEnvironmentSide;
 }
 
+/// R, G and B, or the one channel that stands for all three.
+Result<std::vector<std::string>> choose_rgb(const std::filesystem::path& path,
+                                            const std::vector<std::string>& all) {
+  if (all.size() == 1) return all;
+  const std::vector<std::string> rgb{"R", "G", "B"};
+  for (const std::string& wanted : rgb) {
+    if (std::ranges::find(all, wanted) != all.end()) continue;
+    return Error{ErrorKind::bad_input,
+                 fmt::format("{}: no channel {} among {}, expected R, G, B or one channel",
+                             path.string(), wanted, fmt::join(all, ", "))};
+  }
+  return rgb;
+}
+
 Result<RgbImage> rgb_from_exr(const std::filesystem::path& path) {
-  BATON_ASSIGN(const FilmTile film, read_exr(path));
+  BATON_ASSIGN(const FilmTile film,
+               read_exr_channels(path, [&](const auto& all) { return choose_rgb(path, all); }));
   RgbImage image{film.rect.width(), film.rect.height(), {}};
   if (!sides_ok(image.width, image.height)) return side_error(path, image.width, image.height);
 
-  // Find R, G and B, or the one channel that stands for all three.
-  std::array<std::size_t, 3> index{};
-  for (std::size_t c = 0; c < 3 && film.channels.size() > 1; ++c) {
-    const std::string wanted(1, "RGB"[c]);
-    const auto it = std::ranges::find(film.channels, wanted);
-    if (it == film.channels.end()) {
-      return Error{ErrorKind::bad_input,
-                   fmt::format("{}: no channel {} among {}, expected R, G, B or one channel",
-                               path.string(), wanted, fmt::join(film.channels, ", "))};
-    }
-    index[c] = static_cast<std::size_t>(it - film.channels.begin());
-  }
-
-  // Interleave.
-  const std::array planes{film.plane(index[0]), film.plane(index[1]), film.plane(index[2])};
+  // Interleave; a single channel is first, middle and last.
+  const std::size_t last = film.channels.size() - 1;
+  const std::array planes{film.plane(0), film.plane(last / 2), film.plane(last)};
   image.rgb.resize(film.num_pixels() * 3);
   for (std::size_t i = 0; i < film.num_pixels(); ++i) {
     for (std::size_t c = 0; c < 3; ++c) image.rgb[i * 3 + c] = planes[c][i];
@@ -115,6 +119,7 @@ Status write_png(const std::filesystem::path& path, const RgbImage& image) {
   png.width = static_cast<png_uint_32>(image.width);
   png.height = static_cast<png_uint_32>(image.height);
   png.format = PNG_FORMAT_RGB;
+  png.flags = PNG_IMAGE_FLAG_FAST;
   png_alloc_size_t size = PNG_IMAGE_PNG_SIZE_MAX(png);
   Bytes encoded(size);
   if (png_image_write_to_memory(&png, encoded.data(), &size, 0, pixels.data(), 0, nullptr) == 0) {

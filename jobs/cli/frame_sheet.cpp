@@ -2,12 +2,15 @@
 
 #include <algorithm>
 #include <cmath>
+#include <iterator>
 
 #include "common/image/contact_sheet.h"
 #include "common/job/sequence.h"
 
 namespace baton {
 namespace {
+
+namespace fs = std::filesystem;
 
 constexpr std::size_t kMaxFrames = 24;
 constexpr int kMaxColumns = 6;
@@ -25,28 +28,40 @@ std::vector<int> pick_frames(const std::vector<int>& frames) {
 
 }  // namespace
 
-std::filesystem::path frame_path(const OutputSpec& output, int frame_number) {
-  return std::filesystem::path(output.directory) / frame_file_name(output.pattern, frame_number);
+FrameSheet::FrameSheet(const JobSpec& job)
+    : output_(job.output), wanted_(pick_frames(job.frames)) {}
+
+void FrameSheet::add(const std::vector<int>& finished) {
+  for (const int frame : finished) {
+    const bool is_new = read_.ok() && !thumbnails_.contains(frame) &&
+                        std::binary_search(wanted_.begin(), wanted_.end(), frame);
+    if (!is_new) continue;
+    const fs::path path = fs::path(output_.directory) / frame_file_name(output_.pattern, frame);
+    const Result<RgbImage> image = read_rgb_image(path);
+    if (!image) {
+      read_ = image.error();
+      return;
+    }
+    thumbnails_.emplace(frame, resize(*image, std::min(image->width, kMaxThumbWidth)));
+  }
 }
 
-Result<std::filesystem::path> write_frame_sheet(const OutputSpec& output,
-                                                const std::vector<int>& frames) {
-  std::vector<RgbImage> images;
-  for (const int frame : pick_frames(frames)) {
-    BATON_ASSIGN(RgbImage image, read_rgb_image(frame_path(output, frame)));
-    images.push_back(std::move(image));
-  }
+Result<std::optional<fs::path>> FrameSheet::write() const {
+  BATON_TRY(read_);
+  if (thumbnails_.empty()) return std::optional<fs::path>();
 
   // One exposure for all, or changes of the light would not show.
-  const float exposure = auto_exposure(images[images.size() / 2]);
-  for (RgbImage& image : images) image = tone_map(image, exposure);
+  const auto middle = std::next(thumbnails_.begin(), std::ssize(thumbnails_) / 2);
+  const float exposure = auto_exposure(middle->second);
+  std::vector<RgbImage> frames;
+  for (const auto& [frame, thumbnail] : thumbnails_)
+    frames.push_back(tone_map(thumbnail, exposure));
 
-  const auto square = static_cast<int>(std::ceil(std::sqrt(static_cast<double>(images.size()))));
-  const RgbImage sheet = contact_sheet(images, std::min(square, kMaxColumns),
-                                       std::min(images.front().width, kMaxThumbWidth));
-  const std::filesystem::path path = std::filesystem::path(output.directory) / "contact-sheet.png";
+  const auto square = static_cast<int>(std::ceil(std::sqrt(static_cast<double>(frames.size()))));
+  const RgbImage sheet = contact_sheet(frames, std::min(square, kMaxColumns), frames.front().width);
+  const fs::path path = fs::path(output_.directory) / "contact-sheet.png";
   BATON_TRY(write_png(path, sheet));
-  return path;
+  return std::optional(path);
 }
 
 }  // namespace baton

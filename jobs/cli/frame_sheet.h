@@ -1,19 +1,34 @@
 #pragma once
 
 #include <filesystem>
+#include <map>
+#include <optional>
 #include <vector>
 
 #include "common/base/result.h"
+#include "common/image/image_io.h"
 #include "common/job/job_spec.h"
 
 namespace baton {
 
-/// The file that a job writes for a frame number.
-std::filesystem::path frame_path(const OutputSpec& output, int frame_number);
+/// contact-sheet.png of a job: at most 24 of its frames, evenly picked, all at one exposure. Frames
+/// are read as they are finished, so that little is left to do in the end.
+class FrameSheet {
+ public:
+  explicit FrameSheet(const JobSpec& job);
 
-/// Writes contact-sheet.png into the output folder: at most 24 of the frames, evenly picked, all at
-/// one exposure. frames: numbers of finished frames, at least one. Returns the sheet's path.
-Result<std::filesystem::path> write_frame_sheet(const OutputSpec& output,
-                                                const std::vector<int>& frames);
+  /// Reads those of the finished frames that belong on the sheet and are new. A frame that cannot
+  /// be read is the error of write().
+  void add(const std::vector<int>& finished);
+
+  /// Writes what there is into the output folder; no sheet without a frame. Returns its path.
+  Result<std::optional<std::filesystem::path>> write() const;
+
+ private:
+  OutputSpec output_;
+  std::vector<int> wanted_;             ///< ascending
+  std::map<int, RgbImage> thumbnails_;  ///< linear RGB, by frame number
+  Status read_;
+};
 
 }  // namespace baton

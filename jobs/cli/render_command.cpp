@@ -41,14 +41,19 @@ FarmOptions farm_options(const RenderOptions& options, const JobSpec& job) {
   return farm;
 }
 
-/// Follows the job to its end; nullopt when the user asked to stop.
+/// Follows the job to its end, reading finished frames for the sheet; nullopt when the user asked
+/// to stop.
 Result<std::optional<JobDetail>> follow(LocalFarm& farm, RequestClient& client,
-                                        const SignalWait& signals, const Digest& job) {
+                                        const SignalWait& signals, const Digest& job,
+                                        FrameSheet& sheet) {
   Progress progress(::isatty(STDERR_FILENO) == 1);
   for (;;) {
     BATON_ASSIGN(std::optional<JobDetail> detail,
                  ask_farm<JobDetail>(farm, client, signals, ShowJob{job.hex()}));
-    if (detail) progress.update(detail->summary, Clock::now());
+    if (detail) {
+      progress.update(detail->summary, Clock::now());
+      sheet.add(detail->frames_done);
+    }
     const bool over = !detail || !is_open(detail->summary.status);
     if (over || signals.stop_requested_within(kFarmPollInterval)) {
       progress.finish();
@@ -73,11 +78,10 @@ void print_result(const RenderOptions& options, const JobSpec& job, const JobDet
 }
 
 /// A sheet that cannot be made is no failure of the job.
-void make_sheet(const RenderOptions& options, const JobSpec& job, const JobDetail& detail) {
-  if (detail.frames_done.empty()) return;
-  const Result<fs::path> sheet = write_frame_sheet(job.output, detail.frames_done);
-  if (!sheet) return spdlog::warn("no contact sheet: {}", sheet.error().message);
-  if (!options.json) fmt::print("sheet      {}\n", sheet->string());
+void write_sheet(const RenderOptions& options, const FrameSheet& sheet) {
+  const Result<std::optional<fs::path>> path = sheet.write();
+  if (!path) return spdlog::warn("no contact sheet: {}", path.error().message);
+  if (*path && !options.json) fmt::print("sheet      {}\n", (*path)->string());
 }
 
 Result<ExitCode> run_render(const RenderOptions& options) {
@@ -94,9 +98,10 @@ Result<ExitCode> run_render(const RenderOptions& options) {
                ask_farm<JobAccepted>(farm, client, signals, SubmitJob{std::move(document)}));
   if (accepted && accepted->already_there) spdlog::info("going on with what is done already");
 
+  FrameSheet sheet(job);
   std::optional<JobDetail> detail;
   if (accepted) {
-    BATON_ASSIGN(detail, follow(farm, client, signals, accepted->job));
+    BATON_ASSIGN(detail, follow(farm, client, signals, accepted->job, sheet));
   }
   if (!detail) {
     spdlog::info("stopping; finished work is kept");
@@ -108,7 +113,7 @@ Result<ExitCode> run_render(const RenderOptions& options) {
   }
 
   print_result(options, job, *detail, std::chrono::duration<double>(Clock::now() - start).count());
-  make_sheet(options, job, *detail);
+  write_sheet(options, sheet);
   if (detail->summary.status == JobStatus::failed) print_failures(*detail);
   if (options.keep_running) {
     fmt::print(stderr, "the coordinator still answers at {}; Ctrl-C ends it\n", farm.endpoint());
@@ -124,7 +129,9 @@ void add_render_command(CLI::App& app, ExitCode& code) {
   auto options = std::make_shared<RenderOptions>();
   CLI::App* command = app.add_subcommand("render", "Renders a job on this machine");
   command->add_option("JOB", options->job, "job file")->required();
-  command->add_option("--workers", options->workers, "worker processes; default: 1, whose threads share scene and light")
+  command
+      ->add_option("--workers", options->workers,
+                   "worker processes; default: 1, whose threads share scene and light")
       ->check(CLI::Range(1, 256));
   command
       ->add_option("--threads-per-worker", options->threads_per_worker,

@@ -138,6 +138,8 @@ class Worker {
         message = channel_.receive(std::chrono::milliseconds(0));
       }
     }
+    // The render threads are joined next. One that does not stop must not keep the process alive.
+    ::alarm(static_cast<unsigned>(TaskWatch::kStopPatience.count()));
     if (leave_->code == ExitCode::ok) {
       spdlog::info("ends: {}", leave_->reason);
     } else {

@@ -87,6 +87,17 @@ TEST(ContactSheet, ShrinksByTheMeanOfWholeBoxes) {
   EXPECT_EQ(pixel(sheet, 3, 2)[0], 0);
 }
 
+TEST(Resize, KeepsTheAspectAndTheMean) {
+  RgbImage frame = flat(4, 2, 0, 0, 0);
+  for (const int i : {0, 4}) frame.rgb[static_cast<std::size_t>(i) * 3] = 1;
+  const RgbImage half = resize(frame, 2);
+  EXPECT_EQ(half.width, 2);
+  EXPECT_EQ(half.height, 1);
+  EXPECT_EQ(half.rgb, (std::vector<float>{0.5f, 0, 0, 0, 0, 0}));
+  EXPECT_EQ(resize(frame, 4).rgb, frame.rgb);
+  EXPECT_EQ(resize(flat(100, 1, 1, 1, 1), 10).height, 1) << "never empty";
+}
+
 TEST(ContactSheet, EnlargedPixelsBecomeRectangles) {
   RgbImage frame = flat(2, 1, 0, 0, 0);
   frame.rgb[0] = 1;

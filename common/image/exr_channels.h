@@ -1,0 +1,21 @@
+#pragma once
+
+#include <filesystem>
+#include <functional>
+#include <string>
+#include <vector>
+
+#include "common/base/result.h"
+#include "common/image/film_tile.h"
+
+namespace baton {
+
+/// The channels wanted of those that a file has, by name.
+using ChannelChoice =
+    std::function<Result<std::vector<std::string>>(const std::vector<std::string>& all)>;
+
+/// Like read_exr (image_io.h), but only the chosen channels, in the order of the choice: the others
+/// cost neither memory nor conversion. Errors: those of read_exr and of the choice.
+Result<FilmTile> read_exr_channels(const std::filesystem::path& path, const ChannelChoice& choose);
+
+}  // namespace baton
