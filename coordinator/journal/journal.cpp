@@ -118,7 +118,8 @@ Result<JournalledJob> Journal::load(const Digest& digest) {
   BATON_ASSIGN(const bool found, job.bind(digest.hex()).step());
   if (!found)
     return Error{ErrorKind::internal, fmt::format("{}: no job {}", database_.name(), digest.hex())};
-  result.status = static_cast<JobStatus>(std::clamp<std::int64_t>(job.integer(0), 0, 3));
+  result.status = static_cast<JobStatus>(
+      std::clamp<std::int64_t>(job.integer(0), 0, static_cast<std::int64_t>(last_of(JobStatus{}))));
   result.document = job.text(1);
 
   BATON_ASSIGN(SqlStatement done,
