@@ -32,7 +32,9 @@ TEST(RenderPool, RunsEverythingOnceAndWakesForEachResult) {
   RenderPool pool(
       3,
       [](const PooledTask& t, std::stop_token) {
-        return TaskOutput{{}, {.pixels = std::uint64_t(t.lease.task.tile)}};
+        TaskOutput output;
+        output.stats.pixels = static_cast<std::uint64_t>(t.lease.task.tile);
+        return output;
       },
       [&] { woken.release(); });
   for (int tile = 0; tile < 50; ++tile) pool.submit(task(tile));
