@@ -1,0 +1,196 @@
+// Tests of the suite itself: what is wrong on purpose must be seen by the machinery that judges the
+// product.
+#include <gtest/gtest.h>
+
+#include <array>
+#include <cmath>
+#include <limits>
+
+#include "common/base/limits.h"
+#include "tests/stability/grid.h"
+#include "tests/stability/maps.h"
+#include "tests/support/small_scene.h"
+
+namespace baton::stability {
+namespace {
+
+/// The drift of carried samples needs many frames to show, and many runs to be told from chance.
+constexpr Effort kLongEffort{40, 24, false};
+constexpr Effort kShortEffort{8, 12, false};
+constexpr int kThreads = 2;
+
+/// The smooth window of other_map turns over boxes.
+Case turning_case() {
+  return {
+      .name = "machinery",
+      .text = "",
+      .build =
+          [](const Stage& stage, const Timeline&) {
+            JobSpec job = stage.boxes(other_map());
+            job.environment.rotation_deg_per_frame = 1;
+            return job;
+          },
+      .laws = {
+          {Measure::unlawful, 0, 0}, {Measure::bias, 0.01, 0.05}, {Measure::lns_bias, 0.01, 0.05}}};
+}
+
+Subject fresh_subject() {
+  return {kFreshSubject, [](JobSpec& job) { job.sampling.method = Method::bidirectional; }};
+}
+
+/// The second of two subjects, judged.
+Cell judged(const Case& c, const Subject& subject, const Effort& effort) {
+  const auto cells = run_case(c, {fresh_subject(), subject}, effort, test::test_folder(), kThreads);
+  EXPECT_TRUE(cells.ok());
+  return cells->back();
+}
+
+/// A sequential sampler whose number of distributions depends on how well its own particles do: it
+/// takes one distribution and, where their ESS is low, starts the frame again with five. Large
+/// estimates come with a low ESS, so the choice throws large estimates away.
+class SelfAdaptedSampler final : public PixelSampler {
+ public:
+  SelfAdaptedSampler(SamplingSpec spec, float ess_ratio_min) : ess_ratio_min_(ess_ratio_min) {
+    spec.method = Method::bidirectional;
+    start_ = make_pixel_sampler(spec);
+  }
+
+  PixelDiagnostics sample(const PixelInput& input, kernels::CandidateSet& scratch,
+                          const PixelSamples& samples) const override {
+    if (!input.has_history) return start_->sample(input, scratch, samples);
+    const auto count = samples.weight.size();
+    for (const int distributions : {1, 5}) {
+      Particles p;
+      std::copy(samples.direction.begin(), samples.direction.end(), p.direction.begin());
+      std::copy(samples.site.begin(), samples.site.end(), p.site.begin());
+      std::copy(samples.weight.begin(), samples.weight.end(), p.weight.begin());
+      const SequentialSettings settings{.num_particles = static_cast<int>(count),
+                                        .num_distributions = distributions,
+                                        .local_move_cosine = std::cos(4 * kPi / 180)};
+      const SequentialOutcome outcome = kernels::sequential_step(
+          input.sites, input.before, input.now, input.light.pool, settings, samples.lns, input.key,
+          {p.direction.data(), p.site.data(), p.weight.data()});
+      if (!outcome.alive) break;
+      if (distributions == 1 && outcome.ess < ess_ratio_min_ * static_cast<float>(count)) continue;
+      std::copy_n(p.direction.begin(), count, samples.direction.begin());
+      std::copy_n(p.site.begin(), count, samples.site.begin());
+      std::copy_n(p.weight.begin(), count, samples.weight.begin());
+      samples.lns = outcome.lns;
+      samples.source = PixelSource::carried;
+      return {.ess = outcome.ess};
+    }
+    return start_->sample(input, scratch, samples);
+  }
+
+ private:
+  struct Particles {
+    std::array<OctDirection, limits::kMaxParticles> direction{};
+    std::array<std::uint8_t, limits::kMaxParticles> site{};
+    std::array<float, limits::kMaxParticles> weight{};
+  };
+  float ess_ratio_min_;
+  std::unique_ptr<const PixelSampler> start_;
+};
+
+Subject self_adapted(float ess_ratio_min) {
+  return {"planted", [](JobSpec& job) { job.sampling.method = Method::sequential; },
+          [ess_ratio_min](const SamplingSpec& spec) {
+            return std::make_unique<SelfAdaptedSampler>(spec, ess_ratio_min);
+          }};
+}
+
+TEST(Machinery, SeesAScheduleThatIsAdaptedOnItsOwnParticles) {
+  const Cell cell = judged(turning_case(), self_adapted(0.95f), kLongEffort);
+  const Numbers& n = cell.summary.numbers;
+  std::printf("  adapted: %s, mean Lns^/Lns %.3f +- %.3f\n", cell.judgement.number.c_str(),
+              n.lns_mean, n.lns_mean_interval);
+  EXPECT_NE(cell.judgement.verdict, Verdict::holds);
+  EXPECT_LT(n.lns_mean + n.lns_mean_interval, 1);
+}
+TEST(Machinery, AcceptsBothOfItsSchedulesWhenTheyAreFixed) {
+  for (const float ess_ratio_min : {0.0f, 2.0f}) {
+    const Cell cell = judged(turning_case(), self_adapted(ess_ratio_min), kLongEffort);
+    const Numbers& n = cell.summary.numbers;
+    std::printf("  fixed: mean Lns^/Lns %.3f +- %.3f\n", n.lns_mean, n.lns_mean_interval);
+    EXPECT_EQ(cell.judgement.verdict, Verdict::holds) << cell.judgement.number;
+  }
+}
+
+TEST(Machinery, SeesAGroundThatReflectsTooMuch) {
+  const Subject wrong{"planted", [](JobSpec& job) {
+                        job.sampling.method = Method::bidirectional;
+                        job.scene.materials["ground"].base_color = Rgb{0.5f, 0.5f, 0.5f} * 1.05f;
+                      }};
+  EXPECT_NE(judged(turning_case(), wrong, kShortEffort).judgement.verdict, Verdict::holds);
+  EXPECT_EQ(judged(turning_case(), fresh_subject(), kShortEffort).judgement.verdict,
+            Verdict::holds);
+}
+
+// Brute force and the exact sum share only the ray tracer and the scalar materials.
+TEST(Machinery, ExactAnswerOfAWhiteFurnaceIsTheAlbedo) {
+  RgbImage white = black_map();
+  for (float& value : white.rgb) value = 1;
+  JobSpec job = Stage(test::test_folder()).plain(white);
+  const auto truth = exact_truth(job, 4, 1);
+  ASSERT_TRUE(truth.ok());
+  for (const double lns : truth->frames[0].lns) EXPECT_NEAR(lns, 0.5, 1e-3);
+  EXPECT_EQ(truth->frames[0].lns, truth->frames[0].radiance);
+}
+
+TEST(Laws, JudgeByTheWorstLawAndNameIt) {
+  const std::vector<Law> laws{
+      {Measure::unlawful, 0, 0}, {Measure::lns_median, 0.1, 0.3}, {Measure::noise, 2, 5}};
+  const Numbers fresh{.noise = 0.1};
+  EXPECT_EQ(judge(laws, {.lns_median = 0.95, .noise = 0.15}, fresh).verdict, Verdict::holds);
+  EXPECT_EQ(judge(laws, {.lns_median = 1.2, .noise = 0.15}, fresh).verdict, Verdict::degrades);
+  const Judgement noisy = judge(laws, {.lns_median = 1.2, .noise = 0.6}, fresh);
+  EXPECT_EQ(noisy.verdict, Verdict::fails);
+  EXPECT_EQ(noisy.number, "noise x6.0");
+  EXPECT_EQ(judge(laws, {.unlawful = 1, .noise = 0.1}, fresh).verdict, Verdict::fails);
+  EXPECT_EQ(judge(laws, {.noise = std::numeric_limits<double>::quiet_NaN()}, fresh).verdict,
+            Verdict::fails);
+}
+
+TEST(Laws, ABiasInsideItsIntervalIsNone) {
+  const std::vector<Law> laws{{Measure::bias, 0.01, 0.05}};
+  EXPECT_EQ(judge(laws, {.bias = 0.2, .bias_interval = 0.3}, {}).verdict, Verdict::holds);
+  EXPECT_EQ(judge(laws, {.bias = -0.05, .bias_interval = 0.02}, {}).verdict, Verdict::degrades);
+  EXPECT_EQ(judge(laws, {.bias = -0.2, .bias_interval = 0.02}, {}).verdict, Verdict::fails);
+}
+
+// Student's t tables: 9 degrees of freedom.
+TEST(Laws, StudentLimitAgreesWithTheTables) {
+  EXPECT_NEAR(student_limit(9, 0.05), 2.262, 1e-3);
+  EXPECT_NEAR(student_limit(9, 0.001), 4.781, 1e-3);
+}
+
+TEST(Expectations, AChangeIsSeenBothWaysButNotOnTheEdge) {
+  Cell cell{.case_name = "c", .subject = "s", .judgement = {}, .summary = {}};
+  cell.judgement = judge({{Measure::lost, 0.01, 0.1}}, {.lost = 0.05}, {});
+  EXPECT_EQ(change(cell, "degrades"), "");
+  EXPECT_NE(change(cell, "holds"), "");
+  EXPECT_NE(change(cell, "fails"), "");
+  EXPECT_EQ(change(cell, ""), "");
+  cell.judgement = judge({{Measure::lost, 0.01, 0.1}}, {.lost = 0.095}, {});
+  EXPECT_EQ(change(cell, "fails"), "");
+}
+
+TEST(Expectations, SurviveAFileAndNameABadLine) {
+  const auto path = test::test_folder() / "expected.csv";
+  Expectations table;
+  Cell cell{.case_name = "c", .subject = "s", .judgement = {}, .summary = {}};
+  cell.judgement.verdict = Verdict::fails;
+  table.record(cell, false);
+  ASSERT_TRUE(table.write(path).ok());
+  const auto back = Expectations::read(path);
+  ASSERT_TRUE(back.ok());
+  EXPECT_EQ(back->find(cell, false), "fails");
+  EXPECT_EQ(back->find(cell, true), "");
+  std::ofstream(path) << "case,subject,full,quick\nc,s,perhaps,\n";
+  const auto bad = Expectations::read(path);
+  ASSERT_FALSE(bad.ok());
+  EXPECT_NE(bad.error().message.find("expected.csv:2"), std::string::npos);
+}
+
+}  // namespace
+}  // namespace baton::stability
