@@ -15,12 +15,6 @@ HWY_BEFORE_NAMESPACE();
 namespace baton::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-HWY_INLINE VI LoadSomeIndices(std::span<const std::int32_t> array, std::size_t i) {
-  const DI di;
-  HWY_ALIGN std::int32_t in[hn::MaxLanes(DI())] = {};
-  std::copy_n(array.data() + i, std::min(array.size() - i, hn::Lanes(di)), in);
-  return hn::Load(di, in);
-}
 HWY_INLINE void StoreSomeFloats(VF value, std::vector<float>& array, std::size_t i) {
   const DF d;
   HWY_ALIGN float out[hn::MaxLanes(DF())];
@@ -28,10 +22,23 @@ HWY_INLINE void StoreSomeFloats(VF value, std::vector<float>& array, std::size_t
   std::copy_n(out, std::min(array.size() - i, hn::Lanes(d)), array.data() + i);
 }
 
-HWY_INLINE SurfaceLanes GatherSurfaces(const SurfaceTable& table, VI surface) {
+/// The fields of one vector of surfaces or lights, one row a field. Copying lane by lane beats
+/// gathers.
+template <int kFields>
+struct Columns {
+  alignas(64) float value[kFields][hn::MaxLanes(DF())];
+  HWY_INLINE VF Row(int field) const { return hn::Load(DF(), value[field]); }
+};
+
+HWY_INLINE SurfaceLanes LoadTable(const SurfaceTable& table, std::span<const std::int32_t> surface,
+                                  std::size_t i, Columns<SurfaceTable::kStride>& columns) {
   const DF d;
-  const VI record = hn::Mul(surface, hn::Set(DI(), SurfaceTable::kStride));
-  const auto field = [&](int at) HWY_ATTR { return hn::GatherIndex(d, table.data() + at, record); };
+  for (std::size_t lane = 0; lane < hn::Lanes(d); ++lane) {
+    const auto at = static_cast<std::size_t>(surface[std::min(i + lane, surface.size() - 1)]);
+    const float* record = table.data() + at * SurfaceTable::kStride;
+    for (int f = 0; f < SurfaceTable::origin; ++f) columns.value[f][lane] = record[f];
+  }
+  const auto field = [&](int at) HWY_ATTR { return columns.Row(at); };
   const auto vec = [&](int at) HWY_ATTR {
     return Vec3Lanes{field(at), field(at + 1), field(at + 2)};
   };
@@ -57,14 +64,19 @@ void ReflectSamples(const SurfaceTable& surfaces, const LightSamples& samples,
                     std::span<const std::int32_t> surface, std::span<const std::int32_t> light,
                     ReflectedSamples& out) {
   const DF d;
+  Columns<SurfaceTable::kStride> columns;
+  Columns<6> lights;
   for (std::size_t i = 0; i < surface.size(); i += hn::Lanes(d)) {
-    const VI sample = LoadSomeIndices(light, i);
-    const auto field = [&](const std::vector<float>& array)
-                           HWY_ATTR { return hn::GatherIndex(d, array.data(), sample); };
-    const SurfaceLanes s = GatherSurfaces(surfaces, LoadSomeIndices(surface, i));
-    const BsdfLanes f = EvaluateBsdf(s, {field(samples.x), field(samples.y), field(samples.z)});
+    for (std::size_t lane = 0; lane < hn::Lanes(d); ++lane) {
+      const auto j = static_cast<std::size_t>(light[std::min(i + lane, light.size() - 1)]);
+      const float fields[] = {samples.x[j], samples.y[j], samples.z[j],
+                              samples.r[j], samples.g[j], samples.b[j]};
+      for (int f = 0; f < 6; ++f) lights.value[f][lane] = fields[f];
+    }
+    const SurfaceLanes s = LoadTable(surfaces, surface, i, columns);
+    const BsdfLanes f = EvaluateBsdf(s, {lights.Row(0), lights.Row(1), lights.Row(2)});
     const Vec3Lanes reflected =
-        ReflectedRadiance(s, f, field(samples.r), field(samples.g), field(samples.b));
+        ReflectedRadiance(s, f, lights.Row(3), lights.Row(4), lights.Row(5));
     StoreSomeFloats(reflected.x, out.r, i);
     StoreSomeFloats(reflected.y, out.g, i);
     StoreSomeFloats(reflected.z, out.b, i);

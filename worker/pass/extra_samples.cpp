@@ -45,17 +45,15 @@ void ExtraSampler::gather_sites(std::span<const SurfaceHit> hits) {
 }
 
 /// What the fold's own free samples say.
-Rgb ExtraSampler::first_pass(const SampleRegion::Place& place, std::size_t fold) {
+Rgb ExtraSampler::first_pass(const SampleRegion::Place& pixel, std::size_t fold) {
   const Fold& use = folds_of(context_.job.visibility.mask)[fold];
+  const SampleRegion::Place place = pixel.of_population(use.giver_population);
   const FirstPassSamples& from = *place.tile;
   kernels::ShadedSamples shaded;
   kernels::shade_samples(sites_, now_, std::span(from.direction).subspan(place.first, place.count),
                          std::span(from.site).subspan(place.first, place.count), shaded);
   Rgb sum;
   for (std::size_t i = 0; i < place.count; ++i) {
-    const std::int32_t population =
-        from.slot[place.first + i] * from.num_populations / from.num_slots;
-    if (use.giver_population >= 0 && population != use.giver_population) continue;
     sum += Rgb{shaded.r[i], shaded.g[i], shaded.b[i]} *
            (from.energy[place.first + i] * use.energy_scale);
   }

@@ -1,5 +1,6 @@
 #include "worker/pass/sample_region.h"
 
+#include <algorithm>
 #include <numeric>
 
 namespace baton {
@@ -10,6 +11,17 @@ SampleRegion::SampleRegion(std::span<const FirstPassPtr> tiles) {
     std::exclusive_scan(samples->count.begin(), samples->count.end(), tile.first.begin(), 0u);
     tiles_.push_back(std::move(tile));
   }
+}
+
+SampleRegion::Place SampleRegion::Place::of_population(int population) const {
+  if (population < 0 || count == 0) return *this;
+  const auto begin = tile->slot.begin() + static_cast<std::ptrdiff_t>(first);
+  const auto end = begin + static_cast<std::ptrdiff_t>(count);
+  const std::int32_t per_population = tile->num_slots / tile->num_populations;
+  const auto from = std::lower_bound(begin, end, population * per_population);
+  const auto to = std::lower_bound(from, end, (population + 1) * per_population);
+  return {tile, pixel, first + static_cast<std::size_t>(from - begin),
+          static_cast<std::size_t>(to - from)};
 }
 
 SampleRegion::Place SampleRegion::find(std::int32_t x, std::int32_t y) const {

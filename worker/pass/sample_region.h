@@ -25,6 +25,9 @@ class SampleRegion {
     std::size_t pixel = 0;
     std::size_t first = 0;
     std::size_t count = 0;
+
+    /// Those of one population (-1: of all): slots ascend, so they lie together.
+    Place of_population(int population) const;
   };
   Place find(std::int32_t x, std::int32_t y) const;
 

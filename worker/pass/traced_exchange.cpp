@@ -29,7 +29,7 @@ float TracedExchange::lns(std::int32_t x, std::int32_t y) const {
 void TracedExchange::append_samples(std::int32_t x, std::int32_t y,
                                     std::vector<GiverSample>& batch) {
   if (batch.empty()) light_.resize(0);
-  const SampleRegion::Place place = samples_.find(x, y);
+  const SampleRegion::Place place = samples_.find(x, y).of_population(fold_.giver_population);
   if (place.count == 0) return;
   const FirstPassSamples& from = *place.tile;
 
@@ -50,15 +50,12 @@ void TracedExchange::append_samples(std::int32_t x, std::int32_t y,
   std::iota(light_index_.begin(), light_index_.end(), 0);
   kernels::reflect_samples(surfaces_.table(), pixel_light_, surface_, light_index_, reflected_);
 
-  // Keep those of this fold.
+  // Offer what reflects.
   const float pixel_lns = lns(x, y);
   for (std::size_t i = 0; i < place.count; ++i) {
-    const std::int32_t slot = from.slot[place.first + i];
-    const std::int32_t population = slot * from.num_populations / from.num_slots;
     const Rgb reflected{reflected_.r[i], reflected_.g[i], reflected_.b[i]};
-    if (fold_.giver_population >= 0 && population != fold_.giver_population) continue;
     if (!(mean(reflected) > 0)) continue;
-    batch.push_back({.slot = static_cast<std::uint32_t>(slot),
+    batch.push_back({.slot = from.slot[place.first + i],
                      .energy = from.energy[place.first + i] * fold_.energy_scale,
                      .target = mean(reflected),
                      .lns = pixel_lns,

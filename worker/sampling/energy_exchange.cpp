@@ -25,8 +25,17 @@ class Exchange {
         inner_(inner),
         scene_(scene),
         radiance_(radiance),
-        neighbours_(static_cast<std::size_t>(partitions.count())),
-        strata_(static_cast<std::size_t>(partitions.count())) {}
+        squares_(static_cast<std::size_t>(partitions.count())),
+        neighbours_(squares_.size()),
+        strata_(squares_.size()) {
+    const PixelRect& rect = exchange.rect();
+    for (std::int32_t y = rect.y0; y < rect.y1; ++y) {
+      for (std::int32_t x = rect.x0; x < rect.x1; ++x) {
+        inner_index_.push_back(
+            inner.contains(x, y) ? static_cast<std::int32_t>(PixelMask::index(inner, x, y)) : -1);
+      }
+    }
+  }
 
   /// Puts a pixel into the batch. Givers must come row by row: that is the order in which receivers
   /// add.
@@ -80,8 +89,9 @@ class Exchange {
       const auto word = static_cast<std::uint32_t>(c);
       if (word % 4 == 0) random = rng.bits(settings_.fold, word / 4);
       strata_[word] = random[word % 4];
-      neighbours_[word] = MaskedSquare(exchange_, partitions_.square(c, x, y), x, y);
-      num_lonely += neighbours_[word].count() == 0 ? 1 : 0;
+      squares_[word].move_to(exchange_, partitions_, c, y);
+      neighbours_[word] = squares_[word].others(x, y);
+      num_lonely += neighbours_[word].count == 0 ? 1 : 0;
     }
     return num_lonely;
   }
@@ -91,17 +101,17 @@ class Exchange {
   void make_offers(std::size_t sample, bool inside) {
     const std::uint32_t shift = static_cast<std::uint32_t>(
         (std::uint64_t{batch_[sample].slot} << 32) / settings_.num_slots);
+    const std::uint32_t num_sites = settings_.num_sites;
     for (std::size_t c = 0; c < neighbours_.size(); ++c) {
-      const std::uint32_t count = neighbours_[c].count();
-      if (count == 0) continue;
+      const SquareMembers::Others& others = neighbours_[c];
+      if (others.count == 0) continue;
       const std::uint32_t position = strata_[c] + shift;  // wraps around
       const auto pair = static_cast<std::uint32_t>(
-          (std::uint64_t{position} * (std::uint64_t{count} * settings_.num_sites)) >> 32);
-      const MaskedSquare::Pixel to = neighbours_[c].pick(pair / settings_.num_sites);
-      if (!inside && !inner_.contains(to.x, to.y)) continue;
-      offers_.push_back({static_cast<std::uint32_t>(sample),
-                         static_cast<std::uint32_t>(exchange_.index(to.x, to.y)),
-                         pair % settings_.num_sites});
+          (std::uint64_t{position} * (std::uint64_t{others.count} * num_sites)) >> 32);
+      const std::uint32_t receiver = others.pick(num_sites == 1 ? pair : pair / num_sites);
+      if (!inside && inner_index_[receiver] < 0) continue;
+      offers_.push_back(
+          {static_cast<std::uint32_t>(sample), receiver, num_sites == 1 ? 0 : pair % num_sites});
     }
   }
 
@@ -110,15 +120,17 @@ class Exchange {
   void book(const Giver& giver, std::size_t sample, std::size_t& offer) {
     const GiverSample& given = batch_[sample];
     const auto c = static_cast<float>(partitions_.count());
+    const float unit = given.energy / c;
     float accepted = 0;
     for (; offer < offers_.size() && offers_[offer].sample == sample; ++offer) {
       const Reception& reception = receptions_[offer];
       const float share = acceptance(settings_.form, given, reception);
       if (!(share > 0)) continue;
       accepted += share;
-      Rgb* const to = inner_pixel(offers_[offer].receiver);
-      if (to != nullptr)
-        *to += reception.reflected * (share * (given.energy / c) / reception.target);
+      const std::int32_t to = inner_index_[offers_[offer].receiver];
+      if (to < 0) continue;
+      radiance_[static_cast<std::size_t>(to)] +=
+          reception.reflected * (share * unit / reception.target);
     }
     if (!giver.inside) return;
     const float left = settings_.form == SecondPassForm::published
@@ -128,22 +140,16 @@ class Exchange {
         given.reflected * (left / c * given.energy / given.target);
   }
 
-  /// The sum of a pixel of the exchange mask, or nullptr outside.
-  Rgb* inner_pixel(std::uint32_t pixel) const {
-    const auto width = static_cast<std::uint32_t>(exchange_.rect().width());
-    const std::int32_t x = exchange_.rect().x0 + static_cast<std::int32_t>(pixel % width);
-    const std::int32_t y = exchange_.rect().y0 + static_cast<std::int32_t>(pixel / width);
-    return inner_.contains(x, y) ? &radiance_[PixelMask::index(inner_, x, y)] : nullptr;
-  }
-
   const ExchangeSettings& settings_;
   const SquarePartitions& partitions_;
   const PixelMask& exchange_;
   const PixelRect inner_;
   ExchangeScene& scene_;
   std::span<Rgb> radiance_;
-  std::vector<MaskedSquare> neighbours_;  ///< (C) of the pixel in work
-  std::vector<std::uint32_t> strata_;     ///< (C) 32 random bits
+  std::vector<SquareMembers> squares_;             ///< (C)
+  std::vector<SquareMembers::Others> neighbours_;  ///< (C) of the pixel in work
+  std::vector<std::int32_t> inner_index_;  ///< (pixels of the mask) position in `inner`, or -1
+  std::vector<std::uint32_t> strata_;      ///< (C) 32 random bits
   std::vector<Giver> givers_;
   std::vector<GiverSample> batch_;
   std::vector<Offer> offers_;

@@ -1,39 +1,12 @@
 #include "worker/sampling/pixel_mask.h"
 
 #include <algorithm>
-#include <bit>
 #include <numeric>
 #include <utility>
 
 #include "common/base/check.h"
 
 namespace baton {
-
-MaskedSquare::MaskedSquare(const PixelMask& mask, const PixelRect& rect, std::int32_t x,
-                           std::int32_t y) {
-  x0_ = std::max(rect.x0, mask.rect().x0);
-  y0_ = std::max(rect.y0, mask.rect().y0);
-  const std::int32_t x1 = std::min(rect.x1, mask.rect().x1);
-  const std::int32_t y1 = std::min(rect.y1, mask.rect().y1);
-  BATON_CHECK(x1 - x0_ <= kMaxSide && y1 - y0_ <= kMaxSide);
-  for (std::int32_t row = y0_; row < y1; ++row) {
-    std::uint32_t bits = mask.row_bits(x0_, x1, row);
-    if (row == y) bits &= ~(1u << (x - x0_));
-    rows_[static_cast<std::size_t>(row - y0_)] = static_cast<std::uint16_t>(bits);
-    count_ += static_cast<std::uint32_t>(std::popcount(bits));
-  }
-}
-
-MaskedSquare::Pixel MaskedSquare::pick(std::uint32_t rank) const {
-  std::size_t row = 0;
-  for (auto in_row = static_cast<std::uint32_t>(std::popcount(rows_[row])); rank >= in_row;) {
-    rank -= in_row;
-    in_row = static_cast<std::uint32_t>(std::popcount(rows_[++row]));
-  }
-  std::uint32_t bits = rows_[row];
-  for (; rank > 0; --rank) bits &= bits - 1;
-  return {x0_ + std::countr_zero(bits), y0_ + static_cast<std::int32_t>(row)};
-}
 
 PixelMask dilate(const PixelMask& mask, std::int32_t radius, const PixelMask& allowed,
                  const PixelRect& rect) {
@@ -79,6 +52,46 @@ PixelRect SquarePartitions::square(std::int32_t partition, std::int32_t x, std::
   const std::int32_t y0 = (y - image_.y0 + offset.y) / side_ * side_ - offset.y + image_.y0;
   return {std::max(x0, image_.x0), std::max(y0, image_.y0), std::min(x0 + side_, image_.x1),
           std::min(y0 + side_, image_.y1)};
+}
+
+void SquareMembers::move_to(const PixelMask& mask, const SquarePartitions& partitions,
+                            std::int32_t partition, std::int32_t y) {
+  if (y >= y0_ && y < y1_) return;
+  const PixelRect& rect = mask.rect();
+  const PixelRect first_square = partitions.square(partition, rect.x0, y);
+  x0_ = rect.x0;
+  y0_ = std::max(first_square.y0, rect.y0);
+  y1_ = std::min(first_square.y1, rect.y1);
+  width_ = static_cast<std::size_t>(rect.width());
+  members_.clear();
+  first_.resize(width_);
+  end_.resize(width_);
+  rank_.resize(width_ * static_cast<std::size_t>(y1_ - y0_));
+
+  // List square after square, row by row within.
+  for (std::int32_t x = rect.x0; x < rect.x1;) {
+    const std::int32_t x1 = std::min(partitions.square(partition, x, y).x1, rect.x1);
+    const auto first = static_cast<std::uint32_t>(members_.size());
+    for (std::int32_t v = y0_; v < y1_; ++v) {
+      for (std::int32_t u = x; u < x1; ++u) {
+        if (!mask.at(u, v)) continue;
+        rank_[static_cast<std::size_t>(v - y0_) * width_ + static_cast<std::size_t>(u - x0_)] =
+            static_cast<std::uint16_t>(members_.size() - first);
+        members_.push_back(static_cast<std::uint32_t>(mask.index(u, v)));
+      }
+    }
+    for (; x < x1; ++x) {
+      first_[static_cast<std::size_t>(x - x0_)] = first;
+      end_[static_cast<std::size_t>(x - x0_)] = static_cast<std::uint32_t>(members_.size());
+    }
+  }
+}
+
+SquareMembers::Others SquareMembers::others(std::int32_t x, std::int32_t y) const {
+  const auto column = static_cast<std::size_t>(x - x0_);
+  return {members_.data() + first_[column],
+          rank_[static_cast<std::size_t>(y - y0_) * width_ + column],
+          end_[column] - first_[column] - 1};
 }
 
 }  // namespace baton

@@ -1,6 +1,5 @@
 #pragma once
 
-#include <array>
 #include <cstdint>
 #include <vector>
 
@@ -51,29 +50,6 @@ class PixelMask {
   std::vector<std::uint64_t> words_;
 };
 
-/// The pixels of a mask in a rectangle of at most kMaxSide pixels a side.
-class MaskedSquare {
- public:
-  static constexpr std::int32_t kMaxSide = 16;
-
-  MaskedSquare() = default;
-  /// Without the pixel (x, y), which lies in the rectangle. What reaches past the mask is not in
-  /// it.
-  MaskedSquare(const PixelMask& mask, const PixelRect& rect, std::int32_t x, std::int32_t y);
-
-  std::uint32_t count() const { return count_; }
-  struct Pixel {
-    std::int32_t x = 0, y = 0;
-  };
-  /// The pixel of the given rank, row by row; rank < count().
-  Pixel pick(std::uint32_t rank) const;
-
- private:
-  std::int32_t x0_ = 0, y0_ = 0;
-  std::uint32_t count_ = 0;
-  std::array<std::uint16_t, kMaxSide> rows_{};
-};
-
 /// `mask` grown by `radius` pixels along both axes (radius 1 is the 3 x 3 kernel of [CV Fig. 6]),
 /// within `allowed`. Answers for `rect`; right wherever `mask` reaches `radius` pixels past it.
 PixelMask dilate(const PixelMask& mask, std::int32_t radius, const PixelMask& allowed,
@@ -99,6 +75,36 @@ class SquarePartitions {
   PixelRect image_;
   std::int32_t side_;
   std::vector<Offset> offsets_;
+};
+
+/// The masked pixels of the squares of one partition, one row of squares at a time: what a pixel
+/// may offer its samples to.
+class SquareMembers {
+ public:
+  /// Moves to the row of squares that holds row y of the mask; cheap when it is there already. mask
+  /// and partitions must outlive the object. A square that reaches past the mask has fewer members
+  /// here.
+  void move_to(const PixelMask& mask, const SquarePartitions& partitions, std::int32_t partition,
+               std::int32_t y);
+
+  /// The others in the square of a masked pixel (x, y) of this row of squares.
+  struct Others {
+    const std::uint32_t* members =
+        nullptr;              ///< PixelMask::index, row by row, the pixel itself among them
+    std::uint32_t rank = 0;   ///< of the pixel itself
+    std::uint32_t count = 0;  ///< without it
+    /// The k-th other, k < count.
+    std::uint32_t pick(std::uint32_t k) const { return members[k + (k >= rank ? 1 : 0)]; }
+  };
+  Others others(std::int32_t x, std::int32_t y) const;
+
+ private:
+  std::int32_t x0_ = 0, y0_ = 0, y1_ = 0;  ///< of the rows in the lists; none at first
+  std::size_t width_ = 0;
+  std::vector<std::uint32_t> members_;  ///< square after square
+  std::vector<std::uint32_t> first_,
+      end_;                          ///< (columns of the mask) members of the square of this column
+  std::vector<std::uint16_t> rank_;  ///< (rows of squares, columns)
 };
 
 }  // namespace baton

@@ -29,16 +29,35 @@ TEST(PixelMask, RowsOfBitsCrossWords) {
   }
 }
 
-TEST(MaskedSquare, ListsTheOthersRowByRow) {
-  PixelMask mask({0, 0, 9, 9});
-  for (const auto& [x, y] : {std::pair{2, 2}, {4, 2}, {3, 3}, {6, 6}, {7, 2}}) mask.set(x, y);
-  const MaskedSquare square(mask, {2, 2, 7, 7}, 3, 3);
-  ASSERT_EQ(square.count(), 3u);
-  EXPECT_EQ(square.pick(0).x, 2);
-  EXPECT_EQ(square.pick(1).x, 4);
-  EXPECT_EQ(square.pick(2).x, 6);
-  EXPECT_EQ(square.pick(2).y, 6);
-  EXPECT_EQ(MaskedSquare(mask, {7, 0, 12, 5}, 8, 4).count(), 1u);
+TEST(SquareMembers, AreTheOtherMaskedPixelsOfTheSquare) {
+  const PixelRect image{0, 0, 23, 17};
+  PixelMask mask({2, 1, 21, 17});
+  for (std::int32_t y = 1; y < 17; ++y) {
+    for (std::int32_t x = 2; x < 21; ++x) {
+      if ((x * 7 + y * 5) % 3 != 0) mask.set(x, y);
+    }
+  }
+  const SquarePartitions partitions(image, 5, 6, Rng({.job_seed = 3}, PassId::partition));
+  for (std::int32_t c = 0; c < partitions.count(); ++c) {
+    SquareMembers squares;
+    for (std::int32_t y = 1; y < 17; ++y) {
+      squares.move_to(mask, partitions, c, y);
+      for (std::int32_t x = 2; x < 21; ++x) {
+        if (!mask.at(x, y)) continue;
+        const SquareMembers::Others others = squares.others(x, y);
+        std::vector<std::uint32_t> got, expected;
+        for (std::uint32_t k = 0; k < others.count; ++k) got.push_back(others.pick(k));
+        const PixelRect square = partitions.square(c, x, y);
+        for (std::int32_t v = square.y0; v < square.y1; ++v) {
+          for (std::int32_t u = square.x0; u < square.x1; ++u) {
+            if (mask.at(u, v) && (u != x || v != y))
+              expected.push_back(static_cast<std::uint32_t>(mask.index(u, v)));
+          }
+        }
+        ASSERT_EQ(got, expected) << c << ": " << x << "," << y;
+      }
+    }
+  }
 }
 
 TEST(Dilate, GrowsASquareWithinWhatIsAllowed) {
