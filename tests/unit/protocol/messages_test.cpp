@@ -170,7 +170,8 @@ TEST(Messages, UnknownTypeIsRefused) {
 
 TEST(Messages, UnknownEnumValueIsRefused) {
   std::vector<Bytes> frames = encode_message(LeaseRevoke{kLease});
-  frames[2][16] = std::byte{2};  // TaskKind, after the digest
+  frames[2][16] =
+      std::byte{static_cast<unsigned char>(last_of(TaskKind{})) + 1};  // after the digest
   EXPECT_FALSE(decode_message(frames).ok());
 }
 
