@@ -72,6 +72,15 @@ void fields(JobArchive& a, SamplingSpec& sampling) {
     a.fault("refreshCandidates", fmt::format("at least numParticles ({})", sampling.num_particles),
             std::to_string(sampling.refresh_candidates));
   }
+  a.number("targetError", sampling.target_error, {.min = 0, .max = 10, .min_open = true});
+  a.number("timeBudget", sampling.time_budget, {.min = 0, .max = 1e9, .min_open = true});
+  if (sampling.target_error && sampling.time_budget) {
+    a.fault("timeBudget", "at most one of targetError and timeBudget", "both");
+  } else if ((sampling.target_error || sampling.time_budget) &&
+             sampling.method != Method::automatic) {
+    a.fault("method", "\"auto\" with targetError or timeBudget",
+            fmt::format("\"{}\"", kMethods[static_cast<std::size_t>(sampling.method)]));
+  }
   a.integer("referenceSamples", sampling.reference_samples, 2, limits::kMaxReferenceSamples);
 }
 

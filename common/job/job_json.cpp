@@ -136,6 +136,13 @@ std::vector<std::string> asset_paths(const JobSpec& job) {
 }
 
 Result<std::string> make_job_document(const JobSpec& job) {
+  if (job.sampling.method == Method::automatic) {
+    return Error{
+        ErrorKind::bad_input,
+        fmt::format("job '{}': $.sampling.method: \"auto\" is settled by `baton render` and "
+                    "`baton job submit`, expected one that is",
+                    job.name)};
+  }
   if (!is_settled(job)) return Error{ErrorKind::internal, "the motion of the job is not settled"};
   ParsedJobDocument document{.job = job, .assets = {}, .digest = {}};
   BATON_ASSIGN(document.assets, digest_files(asset_paths(job)));
@@ -144,6 +151,11 @@ Result<std::string> make_job_document(const JobSpec& job) {
 
 Result<ParsedJobDocument> parse_job_document(std::string_view text) {
   BATON_ASSIGN(ParsedJobDocument document, read<ParsedJobDocument>(text, "job document", "/"));
+  if (document.job.sampling.method == Method::automatic) {
+    return Error{
+        ErrorKind::bad_input,
+        "job document: $.job.sampling.method: expected a method that is settled, got \"auto\""};
+  }
   document.digest = digest_of(text);
   return document;
 }

@@ -173,7 +173,8 @@ struct EnvironmentSpec {
 };
 
 // ---- sampling ----------------------------------------------------------------------------------------------
-enum class Method : std::uint8_t { reference, environment, brdf, mis, bidirectional, sequential };
+/// automatic: settled by a pilot before the job is submitted; never part of a job document.
+enum class Method : std::uint8_t { reference, environment, brdf, mis, bidirectional, sequential, automatic };
 enum class ResamplingScheme : std::uint8_t { systematic, stratified, multinomial, residual };
 /// How `sequential` carries the normalising constant: by the ratio of the weights, or by path sampling with a left, right or
 /// trapezoidal sum over the intermediate distributions.
@@ -200,6 +201,8 @@ struct SamplingSpec {
   /// with refresh_candidates; none: never. The rule looks at the samples, so it is a (small) bias.
   std::optional<float> refresh_ratio{};
   int refresh_candidates = 800;  ///< [N, limits::kMaxCandidates]
+  std::optional<float> target_error{};  ///< automatic: RMSE over mean radiance to reach, (0, 10]
+  std::optional<float> time_budget{};   ///< automatic: CPU seconds of the whole job to stay within, (0, 1e9]
   int reference_samples = 1024;    ///< paired samples per pixel of `reference`, [2, 2^24]
 
   bool operator==(const SamplingSpec&) const = default;

@@ -1,6 +1,8 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <chrono>
+#include <filesystem>
 #include <optional>
 #include <thread>
 
@@ -9,6 +11,7 @@
 #include "jobs/cli/commands.h"
 #include "jobs/cli/coordinator_link.h"
 #include "jobs/cli/job_summary.h"
+#include "jobs/cli/settle_method.h"
 
 namespace baton {
 namespace {
@@ -26,8 +29,17 @@ struct JobOptions {
   bool json = false;
 };
 
+/// A pilot runs here, whatever machines the farm has.
+FarmOptions pilot_farm(const JobSpec& job) {
+  const int processors = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+  return {.workers = 1,
+          .threads_per_worker = processors,
+          .work_directory = std::filesystem::path(job.output.directory) / ".baton"};
+}
+
 Result<ExitCode> submit(const JobOptions& options, RequestClient& client) {
-  BATON_ASSIGN(const JobSpec job, load_job(options.job));
+  BATON_ASSIGN(JobSpec job, load_job(options.job));
+  BATON_TRY(settle_method(job, pilot_farm(job)));
   BATON_ASSIGN(std::string document, make_job_document(job));
   BATON_ASSIGN(const JobAccepted accepted,
                ask<JobAccepted>(client, SubmitJob{std::move(document)}));

@@ -13,6 +13,7 @@
 #include "jobs/cli/frame_sheet.h"
 #include "jobs/cli/job_summary.h"
 #include "jobs/cli/progress.h"
+#include "jobs/cli/settle_method.h"
 
 namespace baton {
 namespace {
@@ -86,12 +87,13 @@ void write_sheet(const RenderOptions& options, const FrameSheet& sheet) {
 
 Result<ExitCode> run_render(const RenderOptions& options) {
   const Clock::time_point start = Clock::now();
-  BATON_ASSIGN(const JobSpec job, load_job(options.job));
+  BATON_ASSIGN(JobSpec job, load_job(options.job));
+  const FarmOptions farm_setup = farm_options(options, job);
+  BATON_TRY(settle_method(job, farm_setup));
   BATON_ASSIGN(std::string document, make_job_document(job));
 
   // Start the farm and hand it the job; one that it knows goes on where it stopped.
   const SignalWait signals;
-  const FarmOptions farm_setup = farm_options(options, job);
   BATON_ASSIGN(LocalFarm farm, LocalFarm::start(farm_setup));
   BATON_ASSIGN(RequestClient client, RequestClient::connect(farm.endpoint()));
   BATON_ASSIGN(const std::optional<JobAccepted> accepted,

@@ -11,29 +11,22 @@ namespace {
 
 using nlohmann::json;
 
-/// Visits every number of a record with its name; T is RunRecord or const RunRecord.
-template <class Stats, class F>
-void visit_stats(Stats& s, F visit) {
-  visit("pixels", s.pixels);
-  visit("raysPrimary", s.rays_primary);
-  visit("raysShadow", s.rays_shadow);
-  visit("targetEvaluations", s.target_evaluations);
-  visit("pixelsBackground", s.pixels_background);
-  visit("pixelsFresh", s.sampling.pixels_fresh);
-  visit("pixelsCarried", s.sampling.pixels_carried);
-  visit("pixelsRestarted", s.sampling.pixels_restarted);
-  visit("pixelsRefreshed", s.sampling.pixels_refreshed);
-  visit("pixelsResampled", s.sampling.pixels_resampled);
-  visit("localMovesProposed", s.sampling.local_proposed);
-  visit("localMovesAccepted", s.sampling.local_accepted);
-  visit("independentMovesProposed", s.sampling.independent_proposed);
-  visit("independentMovesAccepted", s.sampling.independent_accepted);
-  visit("cpuSeconds", s.cpu_seconds);
-  visit("secondsLight", s.seconds_light);
-  visit("secondsPrimary", s.seconds_primary);
-  visit("secondsSample", s.seconds_sample);
-  visit("secondsVisibility", s.seconds_visibility);
-  visit("secondsShade", s.seconds_shade);
+/// Visits every count with its name; Counts is RunCounts or const RunCounts.
+template <class Counts, class F>
+void visit_counts(Counts& c, F visit) {
+  visit("pixels", c.pixels);
+  visit("pixelsBackground", c.pixels_background);
+  visit("raysShadow", c.rays_shadow);
+  visit("targetEvaluations", c.target_evaluations);
+  visit("movesProposed", c.moves_proposed);
+  visit("pixelsResampled", c.pixels_resampled);
+  visit("pixelsRestarted", c.pixels_restarted);
+  visit("cpuSeconds", c.cpu_seconds);
+  visit("secondsLight", c.seconds_light);
+  visit("secondsPrimary", c.seconds_primary);
+  visit("secondsSample", c.seconds_sample);
+  visit("secondsVisibility", c.seconds_visibility);
+  visit("secondsShade", c.seconds_shade);
 }
 
 template <class Frame, class F>
@@ -70,7 +63,7 @@ RunRecord record_of(const json& root) {
   root.at("stateBytes").get_to(record.state_bytes);
   root.at("statePixels").get_to(record.state_pixels);
   root.at("framesRendered").get_to(record.frames_rendered);
-  visit_stats(record.stats, Read{root.at("stats")});
+  visit_counts(record.counts, Read{root.at("stats")});
   for (const json& item : root.at("frames")) {
     record.frames.emplace_back();
     visit_frame(record.frames.back(), Read{item});
@@ -80,6 +73,22 @@ RunRecord record_of(const json& root) {
 
 }  // namespace
 
+RunCounts counts_of(const RenderStats& stats) {
+  return {.pixels = stats.pixels,
+          .pixels_background = stats.pixels_background,
+          .rays_shadow = stats.rays_shadow,
+          .target_evaluations = stats.target_evaluations,
+          .moves_proposed = stats.sampling.local_proposed + stats.sampling.independent_proposed,
+          .pixels_resampled = stats.sampling.pixels_resampled,
+          .pixels_restarted = stats.sampling.pixels_restarted,
+          .cpu_seconds = stats.cpu_seconds,
+          .seconds_light = stats.seconds_light,
+          .seconds_primary = stats.seconds_primary,
+          .seconds_sample = stats.seconds_sample,
+          .seconds_visibility = stats.seconds_visibility,
+          .seconds_shade = stats.seconds_shade};
+}
+
 Status write_record(const std::filesystem::path& path, const RunRecord& record) {
   json root = {{"key", record.key},
                {"stateBytes", record.state_bytes},
@@ -87,7 +96,7 @@ Status write_record(const std::filesystem::path& path, const RunRecord& record) 
                {"framesRendered", record.frames_rendered},
                {"stats", json::object()},
                {"frames", json::array()}};
-  visit_stats(record.stats, Write{root["stats"]});
+  visit_counts(record.counts, Write{root["stats"]});
   for (const FrameMeasures& frame : record.frames) {
     json item = json::object();
     visit_frame(frame, Write{item});

@@ -37,8 +37,8 @@ std::string measurements_csv(const Study& study, const StudyResults& results) {
       "scene,method,budget,seed,frame,mse,relMse,flip,percentile99.9,bias,lnsMean,lnsMedian,ess,"
       "acceptance,flicker,raysPerPixel,evaluationsPerPixel,resampledShare,restartedShare\n";
   for_each_run(study, results, [&](const std::string& labels, const RunRecord& run) {
-    const RenderStats& s = run.stats;
-    const std::uint64_t lit = s.pixels - s.pixels_background;
+    const RunCounts& s = run.counts;
+    const std::uint64_t lit = s.lit_pixels();
     for (const FrameMeasures& m : run.frames) {
       fmt::format_to(std::back_inserter(csv), "{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n",
                      labels, m.frame, number(m.mse), number(m.rel_mse), number(m.flip),
@@ -56,9 +56,9 @@ std::string costs_csv(const Study& study, const StudyResults& results) {
       "scene,method,budget,seed,frames,litPixels,cpuSeconds,secondsLight,secondsPrimary,"
       "secondsSample,secondsVisibility,secondsShade,stateBytesPerPixel\n";
   for_each_run(study, results, [&](const std::string& labels, const RunRecord& run) {
-    const RenderStats& s = run.stats;
+    const RunCounts& s = run.counts;
     fmt::format_to(std::back_inserter(csv), "{},{},{},{},{},{},{},{},{},{}\n", labels,
-                   run.frames_rendered, s.pixels - s.pixels_background, number(s.cpu_seconds),
+                   run.frames_rendered, s.lit_pixels(), number(s.cpu_seconds),
                    number(s.seconds_light), number(s.seconds_primary), number(s.seconds_sample),
                    number(s.seconds_visibility), number(s.seconds_shade),
                    number(per(run.state_bytes, run.state_pixels)));

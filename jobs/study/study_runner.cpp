@@ -157,7 +157,7 @@ Result<StudyResults> run_study(const Study& study, const StudyFolder& folder, Jo
     BATON_ASSIGN(RunRecord record,
                  measure_run(jobs[index], study.scenes[scene].frames, results.references[scene]));
     record.key = run.key;
-    record.stats = summary.stats;
+    record.counts = counts_of(summary.stats);
     record.state_bytes = summary.state_bytes;
     record.state_pixels = summary.state_pixels;
     record.frames_rendered = summary.frames_done;

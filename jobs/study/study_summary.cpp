@@ -131,8 +131,8 @@ const char* name_of(ErrorKindOfImage kind) {
 CellCost cell_cost(const std::vector<RunRecord>& runs) {
   std::vector<double> cpu, rays, evaluations, light, state;
   for (const RunRecord& run : runs) {
-    const RenderStats& s = run.stats;
-    const auto lit = static_cast<double>(s.pixels - s.pixels_background);
+    const RunCounts& s = run.counts;
+    const auto lit = static_cast<double>(s.lit_pixels());
     if (!(lit > 0)) continue;
     cpu.push_back(1e6 / lit *
                   (s.seconds_primary + s.seconds_sample + s.seconds_visibility + s.seconds_shade));

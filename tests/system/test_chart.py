@@ -1,6 +1,6 @@
 #!/usr/bin/env python3
 """`baton chart`: a small study gives its tables, charts and report; killed in the middle it goes on; a bad entry is
-named."""
+named. `"method": "auto"` is settled by a small study."""
 
 import json
 
@@ -98,5 +98,30 @@ def a_bad_entry_is_named(programs, folder):
     check("none.hdr" in done.stderr and done.returncode != 0, f"expected none.hdr in {done.stderr!r}")
 
 
+def auto_is_settled_once_and_repeatably(programs, folder):
+    def render(place):
+        place.mkdir(parents=True)
+        job = make_job(folder, frames="1-4", image={"width": 48, "height": 32, "tileSize": 16},
+                       sampling={"method": "auto", "numParticles": 8, "targetError": 0.2})
+        job["output"]["directory"] = str(place / "frames")
+        path = write_job(place / "job.json", job)
+        return programs.render(path, place / "work", extra=["--json"])
+
+    def told(done):
+        return [line for line in done.stderr.splitlines() if line.startswith(("pilot", "chosen", "because"))]
+
+    first, second = render(folder / "a"), render(folder / "b")
+    check_equal(json.loads(first.stdout)["status"], "done", "status")
+    check(any(line.startswith("because    the cheapest that reaches") for line in told(first)), first.stderr)
+    check_equal(told(second), told(first), "what another pilot saw")
+    check_equal(programs.pixels(folder / "b/frames"), programs.pixels(folder / "a/frames"), "pixels")
+
+    # The same command again is the same job, with nothing left to render.
+    again = programs.render(folder / "a/job.json", folder / "a/work", extra=["--json"])
+    check_equal(json.loads(again.stdout)["id"], json.loads(first.stdout)["id"], "job of the second run")
+    check("going on with what is done already" in again.stderr, again.stderr)
+
+
 if __name__ == "__main__":
-    run_tests([a_killed_study_goes_on, the_report_needs_no_other_file, a_bad_entry_is_named])
+    run_tests([a_killed_study_goes_on, the_report_needs_no_other_file, auto_is_settled_once_and_repeatably,
+               a_bad_entry_is_named])

@@ -49,7 +49,8 @@ class PixelSampler {
                                   const PixelSamples& samples) const = 0;
 };
 
-/// The sampler of a job; null for Method::reference, which is no sampler of this kind (reference.h).
+/// The sampler of a job; null for Method::reference, which is no sampler of this kind (reference.h);
+/// Method::automatic is in no job that reaches a worker.
 std::unique_ptr<const PixelSampler> make_pixel_sampler(const SamplingSpec& spec);
 
 }  // namespace baton

@@ -100,6 +100,7 @@ std::unique_ptr<const PixelSampler> make_sequential_sampler(const SamplingSpec& 
 std::unique_ptr<const PixelSampler> make_pixel_sampler(const SamplingSpec& spec) {
   switch (spec.method) {
     case Method::reference:
+    case Method::automatic:
       return nullptr;
     case Method::environment:
       return make_fresh_sampler(spec, StartMethod::environment);

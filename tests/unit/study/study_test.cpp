@@ -139,19 +139,19 @@ TEST_F(StudyTest, AFaultOfTheJobItselfNamesTheJob) {
 
 TEST_F(StudyTest, RecordsKeepEveryNumber) {
   RunRecord record{.key = "k",
-                   .stats = {},
+                   .counts = {},
                    .state_bytes = 5,
                    .state_pixels = 2,
                    .frames_rendered = 3,
                    .frames = {}};
-  record.stats.rays_shadow = 17;
-  record.stats.seconds_sample = 0.1;
+  record.counts.rays_shadow = 17;
+  record.counts.seconds_sample = 0.1;
   record.frames.push_back({.frame = 4, .mse = 0.1 + 0.2, .flicker = kNotMeasured});
   ASSERT_TRUE(write_record(folder_ / "r.json", record));
   const std::optional<RunRecord> read = read_record(folder_ / "r.json");
   ASSERT_TRUE(read);
   EXPECT_EQ(read->key, "k");
-  EXPECT_EQ(read->stats, record.stats);
+  EXPECT_EQ(read->counts, record.counts);
   EXPECT_EQ(read->frames_rendered, 3u);
   EXPECT_EQ(read->frames[0].mse, record.frames[0].mse);
   EXPECT_TRUE(std::isnan(read->frames[0].flicker));

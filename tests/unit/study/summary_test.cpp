@@ -63,11 +63,11 @@ std::vector<RunRecord> runs(const std::vector<double>& mse, double cpu_us) {
   for (const double value : mse) {
     RunRecord& record = records.emplace_back();
     record.frames_rendered = 1;
-    record.stats.pixels = 1100;
-    record.stats.pixels_background = 100;
-    record.stats.rays_shadow = 16000;
-    record.stats.seconds_sample = 1000 * cpu_us * 1e-6;
-    record.stats.seconds_light = 0.002;
+    record.counts.pixels = 1100;
+    record.counts.pixels_background = 100;
+    record.counts.rays_shadow = 16000;
+    record.counts.seconds_sample = 1000 * cpu_us * 1e-6;
+    record.counts.seconds_light = 0.002;
     record.frames.push_back({.frame = 1, .mse = value});
   }
   return records;

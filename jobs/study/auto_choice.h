@@ -1,0 +1,49 @@
+#pragma once
+
+#include <span>
+#include <string>
+#include <vector>
+
+#include "common/job/job_spec.h"
+
+namespace baton {
+
+/// A way to render a job, as a pilot may try it.
+struct AutoCandidate {
+  std::string family;  ///< e.g. "bidirectional M=128"; its members differ in N alone
+  SamplingSpec sampling;
+
+  std::string name() const;
+};
+
+/// What `"method": "auto"` tries for a job, simplest first: of equally good ones the first is
+/// taken. Left out is what the job cannot need: carrying samples where there is one frame or no
+/// state, N past what was asked for.
+std::vector<AutoCandidate> auto_candidates(const JobSpec& job);
+
+/// What a pilot saw of a candidate.
+struct PilotNumbers {
+  AutoCandidate candidate;
+  double error = 0;    ///< RMSE over mean radiance
+  double cost_us = 0;  ///< counted_cost_us per pixel with a surface and frame
+};
+
+struct AutoChoice {
+  SamplingSpec sampling;  ///< never `auto`
+  double error = 0;       ///< expected, as PilotNumbers
+  double cost_us = 0;
+  std::string reason;
+};
+
+/// The cheapest of what was tried that reaches the job's targetError, or the most accurate within
+/// its timeBudget, or the one with the best 1 / (error^2 x cost). With a target or budget, N is
+/// chosen between the tried ones by interpolation (logarithms of error and cost against that of N).
+/// A candidate takes over from a simpler one only when it is better by 5 %.
+/// pilot: not empty. lit_pixels: pixels with a surface times frames of the whole job.
+AutoChoice choose_sampling(const JobSpec& job, std::span<const PilotNumbers> pilot,
+                           double lit_pixels);
+
+/// Writes the choice into the job: sampling, and what was seen and why as metadata.
+void apply_choice(const AutoChoice& choice, std::span<const PilotNumbers> pilot, JobSpec& job);
+
+}  // namespace baton

@@ -1,0 +1,22 @@
+#pragma once
+
+#include <vector>
+
+#include "jobs/study/auto_choice.h"
+#include "jobs/study/study_runner.h"
+
+namespace baton {
+
+/// Settles `"method": "auto"`: renders the job small (about 2300 pixels, at most ten frames at its
+/// start and at its end) with every candidate and a few seeds, judges them by error and counted
+/// work, and writes the choice with its reasons into the job. A job with another method is left as
+/// it is. Deterministic given the job and its assets; finished runs are kept in `folder`.
+/// Returns the numbers seen, empty for another method.
+Result<std::vector<PilotNumbers>> settle_auto(JobSpec& job, const StudyFolder& folder,
+                                              JobRunner& runner);
+
+/// The study that the pilot runs: scenes are windows of frames, cells the candidates in their
+/// order.
+Study pilot_study(const JobSpec& job, const std::vector<AutoCandidate>& candidates);
+
+}  // namespace baton

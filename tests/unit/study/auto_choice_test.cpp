@@ -1,0 +1,130 @@
+#include "jobs/study/auto_choice.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "jobs/study/auto_pilot.h"
+
+namespace baton {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+PilotNumbers numbers(const std::string& family, int n, double error, double cost_us) {
+  PilotNumbers result{{family, {}}, error, cost_us};
+  result.candidate.sampling.num_particles = n;
+  return result;
+}
+
+JobSpec automatic_job() {
+  JobSpec job;
+  job.name = "job";
+  job.sampling.method = Method::automatic;
+  return job;
+}
+
+TEST(AutoChoice, TakesTheBestEfficiencyAtTheGivenN) {
+  const std::vector<PilotNumbers> pilot{numbers("a", 16, 0.2, 2), numbers("b", 16, 0.1, 4)};
+  const AutoChoice choice = choose_sampling(automatic_job(), pilot, 1);
+  EXPECT_EQ(choice.error, 0.1);  // 1 / (.01 * 4) = 25 against 1 / (.04 * 2) = 12.5
+  EXPECT_THAT(choice.reason, HasSubstr("at N = 16"));
+}
+
+TEST(AutoChoice, AMoreComplicatedOneMustGainFivePercent) {
+  const std::vector<PilotNumbers> even{numbers("a", 16, 0.1, 1.04), numbers("b", 16, 0.1, 1)};
+  EXPECT_EQ(choose_sampling(automatic_job(), even, 1).cost_us, 1.04);
+  const std::vector<PilotNumbers> better{numbers("a", 16, 0.1, 1.06), numbers("b", 16, 0.1, 1)};
+  EXPECT_EQ(choose_sampling(automatic_job(), better, 1).cost_us, 1);
+}
+
+TEST(AutoChoice, InterpolatesNToTheTargetError) {
+  JobSpec job = automatic_job();
+  job.sampling.target_error = 0.1f;
+  // error = .4 / sqrt(N / 4): 0.1 at N = 64; cost = N.
+  const std::vector<PilotNumbers> pilot{numbers("a", 4, 0.4, 4),
+                                        numbers("a", 32, 0.4 / std::sqrt(8), 32)};
+  const AutoChoice choice = choose_sampling(job, pilot, 1);
+  EXPECT_EQ(choice.sampling.num_particles, 64);
+  EXPECT_NEAR(choice.error, 0.1, 1e-9);
+  EXPECT_NEAR(choice.cost_us, 64, 1e-9);
+}
+
+TEST(AutoChoice, SaysWhenTheTargetIsOutOfReach) {
+  JobSpec job = automatic_job();
+  job.sampling.target_error = 0.01f;
+  const std::vector<PilotNumbers> pilot{numbers("a", 4, 0.4, 4), numbers("a", 32, 0.2, 32)};
+  const AutoChoice choice = choose_sampling(job, pilot, 1);
+  EXPECT_EQ(choice.sampling.num_particles, 64);
+  EXPECT_THAT(choice.reason, HasSubstr("none reaches"));
+}
+
+TEST(AutoChoice, StaysWithinTheTimeBudget) {
+  JobSpec job = automatic_job();
+  job.sampling.time_budget = 0.017f;  // 17 us for each of 1000 pixels
+  const std::vector<PilotNumbers> pilot{numbers("a", 4, 0.4, 4), numbers("a", 32, 0.2, 32)};
+  EXPECT_EQ(choose_sampling(job, pilot, 1000).sampling.num_particles, 16);
+  job.sampling.time_budget = 0.0001f;
+  EXPECT_EQ(choose_sampling(job, pilot, 1000).sampling.num_particles, 1);
+}
+
+TEST(AutoCandidates, NothingIsCarriedWhereThereIsOneFrame) {
+  const auto carries = [](const JobSpec& job) {
+    for (const AutoCandidate& candidate : auto_candidates(job)) {
+      if (candidate.sampling.method == Method::sequential) return true;
+    }
+    return false;
+  };
+  JobSpec job = automatic_job();
+  EXPECT_FALSE(carries(job));
+  job.frames = {1, 2};
+  EXPECT_TRUE(carries(job));
+  job.state.carry = false;
+  EXPECT_FALSE(carries(job));
+}
+
+TEST(AutoCandidates, AreSettledThemselves) {
+  JobSpec job = automatic_job();
+  job.frames = {1, 2};
+  job.sampling.target_error = 0.1f;
+  for (const AutoCandidate& candidate : auto_candidates(job)) {
+    EXPECT_NE(candidate.sampling.method, Method::automatic);
+    EXPECT_FALSE(candidate.sampling.target_error);
+    EXPECT_GE(candidate.sampling.num_candidates, candidate.sampling.num_particles);
+  }
+}
+
+TEST(AutoChoice, IsWrittenIntoTheJob) {
+  JobSpec job = automatic_job();
+  const std::vector<PilotNumbers> pilot{numbers("a", 16, 0.2, 2)};
+  apply_choice({pilot[0].candidate.sampling, 0.2, 2, "because"}, pilot, job);
+  EXPECT_EQ(job.sampling, pilot[0].candidate.sampling);
+  EXPECT_EQ(job.metadata["auto.reason"], "because");
+  EXPECT_EQ(job.metadata["auto.pilot"], "a N=16: error 0.2000, 2.00 us");
+}
+
+TEST(PilotStudy, LooksAtTheStartAndTheEndOfALongJob) {
+  JobSpec job = automatic_job();
+  job.image = {.width = 640, .height = 360};
+  job.environment.rotation_start_deg = 10;
+  job.environment.rotation_deg_per_frame = 0.5;
+  job.frames.clear();
+  for (int frame = 1; frame <= 48; ++frame) job.frames.push_back(frame);
+  const Study study = pilot_study(job, auto_candidates(job));
+  ASSERT_EQ(study.scenes.size(), 2u);
+  EXPECT_THAT(study.scenes[0].frames, ElementsAre(1, 9, 10));
+  EXPECT_THAT(study.scenes[1].frames, ElementsAre(39, 47, 48));
+  const JobSpec& end = study.scenes[1].reference[0];
+  EXPECT_EQ(end.environment.rotation_start_deg, 10 + 38 * 0.5);
+  EXPECT_EQ(end.image.width, 64);
+  EXPECT_EQ(end.image.height, 36);
+
+  // A short one is looked at once.
+  job.frames = {1, 2, 3};
+  EXPECT_EQ(pilot_study(job, auto_candidates(job)).scenes.size(), 1u);
+}
+
+}  // namespace
+}  // namespace baton
