@@ -7,6 +7,7 @@
 #include "common/base/files.h"
 #include "jobs/cli/commands.h"
 #include "jobs/cli/farm_job_runner.h"
+#include "jobs/study/auto_pilot.h"
 #include "jobs/study/study_report.h"
 
 namespace baton {
@@ -43,7 +44,7 @@ std::string machine_name() {
 }
 
 Result<ExitCode> run_chart(const ChartOptions& options) {
-  BATON_ASSIGN(const Study study, load_study(options.study));
+  BATON_ASSIGN(Study study, load_study(options.study));
   fmt::print(stderr, "study {}: {} scenes, {} methods, {} combinations with {} seeds each\n",
              study.name, study.scenes.size(), study.methods.size(), study.cells.size(),
              study.num_seeds);
@@ -55,6 +56,7 @@ Result<ExitCode> run_chart(const ChartOptions& options) {
   const StudyFolder folder(options.work_directory.empty() ? output / ".work"
                                                           : fs::absolute(options.work_directory));
   FarmJobRunner runner(farm_options(options, folder));
+  BATON_TRY(settle_study(study, folder, runner));
   BATON_ASSIGN(const StudyResults results, run_study(study, folder, runner));
   BATON_ASSIGN(const fs::path report, write_report(study, results, folder, output, machine_name()));
   fmt::print("{}\n", report.string());

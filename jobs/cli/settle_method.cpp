@@ -12,6 +12,8 @@ Status settle_method(JobSpec& job, const FarmOptions& farm) {
   const StudyFolder folder(farm.work_directory / "pilot");
   FarmOptions pilot_farm = farm;
   pilot_farm.work_directory = folder.farm_folder();
+  pilot_farm.workers = 1;
+  pilot_farm.threads_per_worker = farm.workers * farm.threads_per_worker;
   FarmJobRunner runner(pilot_farm);
   BATON_ASSIGN(const std::vector<PilotNumbers> pilot, settle_auto(job, folder, runner));
   for (const PilotNumbers& seen : pilot) {

@@ -1,6 +1,7 @@
 #include "jobs/study/auto_pilot.h"
 
 #include <fmt/format.h>
+#include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <cmath>
@@ -129,6 +130,16 @@ Result<std::vector<PilotNumbers>> settle_auto(JobSpec& job, const StudyFolder& f
       1.0 * job.image.width * job.image.height * static_cast<double>(job.frames.size());
   apply_choice(choose_sampling(job, pilot, all_pixels * lit / std::max(pixels, 1.0)), pilot, job);
   return pilot;
+}
+
+Status settle_study(Study& study, const StudyFolder& folder, JobRunner& runner) {
+  for (StudyCell& cell : study.cells) {
+    BATON_ASSIGN(const std::vector<PilotNumbers> pilot, settle_auto(cell.job, folder, runner));
+    if (!pilot.empty())
+      spdlog::info("{}: {}, {}", cell.job.name, cell.job.metadata["auto.choice"],
+                   cell.job.metadata["auto.reason"]);
+  }
+  return {};
 }
 
 }  // namespace baton

@@ -15,6 +15,10 @@ namespace baton {
 Result<std::vector<PilotNumbers>> settle_auto(JobSpec& job, const StudyFolder& folder,
                                               JobRunner& runner);
 
+/// Settles every cell of a study whose method is `auto`, so that the choice is charted against
+/// fixed ones. The cost of the pilots is not part of the cells'.
+Status settle_study(Study& study, const StudyFolder& folder, JobRunner& runner);
+
 /// The study that the pilot runs: scenes are windows of frames, cells the candidates in their
 /// order.
 Study pilot_study(const JobSpec& job, const std::vector<AutoCandidate>& candidates);

@@ -56,19 +56,20 @@ std::string summary_table(const Study& study, std::size_t scene,
   std::string html =
       "<table><tr><th>method</th><th>budget</th><th>CPU &micro;s/px</th><th>rays/px</th>"
       "<th>light ms/frame</th><th>RMSE</th><th>relMSE</th><th>FLIP</th><th>99.9 %</th>"
-      "<th>bias</th><th>flicker</th><th>state B/px</th><th>efficiency / mis</th>"
+      "<th>bias</th><th>flicker</th><th>lag</th><th>state B/px</th><th>efficiency / mis</th>"
       "<th>efficiency / bidirectional</th></tr>\n";
   for (const CellSummary& row : rows) {
     const StudyCell& cell = study.cells[row.cell];
     if (static_cast<std::size_t>(cell.scene) != scene) continue;
     fmt::format_to(std::back_inserter(html),
                    "<tr><td>{}</td><td>{}</td><td>{:.3g}</td><td>{:.3g}</td><td>{:.3g}</td>{}{}{}"
-                   "<td>{:.3g}</td><td{}>{:.2g} [{:.2g}, {:.2g}]</td>{}<td>{:.3g}</td>",
+                   "<td>{:.3g}</td><td{}>{:.2g} [{:.2g}, {:.2g}]</td>{}<td>{}</td><td>{:.3g}</td>",
                    escaped(study.methods[static_cast<std::size_t>(cell.method)]),
                    escaped(cell.budget), row.cost.cpu_us, row.cost.rays, row.cost.light_ms,
                    interval_cell(row.rmse), interval_cell(row.rel_mse), interval_cell(row.flip),
                    row.percentile_99_9, row.biased ? " class=\"bad\"" : "", row.bias.value,
-                   row.bias.low, row.bias.high, interval_cell(row.flicker), row.cost.state_bytes);
+                   row.bias.low, row.bias.high, interval_cell(row.flicker),
+                   std::isnan(row.lag) ? "" : fmt::format("{}", row.lag), row.cost.state_bytes);
     html += row.resolved ? ratio_cell(row.against_mis) + ratio_cell(row.against_bidirectional)
                          : "<td class=\"weak\" colspan=\"2\">below the reference's own error</td>";
     html += "</tr>\n";

@@ -85,7 +85,10 @@ void prepare_output(JobSpec& job) {
   job.output.pixel_type = PixelType::full_float;
   job.output.pattern = kFramePattern;
   job.state.keep = StateKeep::last;
-  job.output.aovs = {Aov::lns, Aov::ess, Aov::acceptance};
+  std::vector<Aov>& aovs = job.output.aovs;
+  aovs.insert(aovs.end(), {Aov::lns, Aov::ess, Aov::acceptance});
+  std::sort(aovs.begin(), aovs.end());
+  aovs.erase(std::unique(aovs.begin(), aovs.end()), aovs.end());
 }
 
 /// The brute-force twin of a job for the given frames.
@@ -153,6 +156,7 @@ void read_scene(StudyObject& object, const Shared& shared, Study& study, StudyFa
   scene.name = object.name("name");
   const fs::path file = object.file("job", shared.base_directory);
   const StudyPatch patch{object.path_of("patch"), object.patch("patch")};
+  scene.cut_frame = object.integer("cutFrame", 0, 1, limits::kMaxFrameNumber);
   if (file.empty()) return;
   const Result<JobSpec> given = load_job(file);
   if (!given) {
@@ -169,6 +173,12 @@ void read_scene(StudyObject& object, const Shared& shared, Study& study, StudyFa
   prepare_output(*plain);
   scene.crop = read_crop(object, plain->image, faults);
   scene.frames = measured_frames(shared.measured, *plain, shared.measured_path, faults);
+  if (scene.cut_frame > 0 &&
+      !std::binary_search(scene.frames.begin() + 1, scene.frames.end(), scene.cut_frame)) {
+    faults.add(object.path_of("cutFrame"),
+               fmt::format("expected a measured frame after the first ({}), got {}",
+                           format_frames(scene.frames), scene.cut_frame));
+  }
   for (int half = 0; half < 2; ++half)
     scene.reference[half] = reference_job(*plain, shared.reference_samples, scene.frames, half);
 
@@ -216,8 +226,8 @@ Result<Study> parse_study(std::string_view text, const std::string& name,
     read_scene(scene, shared, study, faults);
     scene.list("crop", false);
     scene.finish();
-    if (!study.scenes.empty() && !names.insert(scene.name("name")).second)
-      faults.add(scene.path(), "expected each name once, got it twice");
+    if (const std::string given = scene.name("name"); !names.insert(given).second)
+      faults.add(scene.path(), fmt::format("expected each name once, got \"{}\" twice", given));
   }
   object.finish();
   if (faults.any()) return Error{ErrorKind::bad_input, faults.text()};

@@ -20,7 +20,8 @@ struct StudyScene {
   std::string name;
   std::array<JobSpec, 2> reference;  ///< frames: the measured ones
   std::vector<int> frames;           ///< measured frame numbers; the first frame is among them
-  std::array<int, 4> crop{};         ///< x, y, width, height in pixels, shown side by side
+  int cut_frame = 0;          ///< a measured frame at which the light changes at once; 0: none
+  std::array<int, 4> crop{};  ///< x, y, width, height in pixels, shown side by side
 };
 
 /// One combination: everything but the seed.

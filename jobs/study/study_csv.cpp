@@ -45,7 +45,7 @@ std::string measurements_csv(const Study& study, const StudyResults& results) {
                      number(m.percentile_99_9), number(m.bias), number(m.lns_mean),
                      number(m.lns_median), number(m.ess), number(m.acceptance), number(m.flicker),
                      number(per(s.rays_shadow, lit)), number(per(s.target_evaluations, lit)),
-                     number(per(s.sampling.pixels_resampled, lit)), number(per(s.sampling.pixels_restarted, lit)));
+                     number(per(s.pixels_resampled, lit)), number(per(s.pixels_restarted, lit)));
     }
   });
   return csv;
@@ -83,7 +83,7 @@ std::string efficiency_csv(const Study& study, const std::vector<CellSummary>& r
   std::string csv =
       "scene,method,budget,cpuMicrosecondsPerPixel,raysPerPixel,evaluationsPerPixel,"
       "lightMillisecondsPerFrame,stateBytesPerPixel,rmse,rmseLow,rmseHigh,relMse,relMseLow,"
-      "relMseHigh,flip,flipLow,flipHigh,percentile99.9,bias,biasLow,biasHigh,flicker,resolved,"
+      "relMseHigh,flip,flipLow,flipHigh,percentile99.9,bias,biasLow,biasHigh,flicker,lag,resolved,"
       "efficiencyOverMis,overMisLow,overMisHigh,efficiencyOverBidirectional,overBidirectionalLow,"
       "overBidirectionalHigh\n";
   const auto interval = [](const Interval& i) {
@@ -91,14 +91,14 @@ std::string efficiency_csv(const Study& study, const std::vector<CellSummary>& r
   };
   for (const CellSummary& row : rows) {
     const StudyCell& cell = study.cells[row.cell];
-    fmt::format_to(std::back_inserter(csv), "{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n",
-                   study.scenes[static_cast<std::size_t>(cell.scene)].name,
-                   study.methods[static_cast<std::size_t>(cell.method)], cell.budget,
-                   number(row.cost.cpu_us), number(row.cost.rays), number(row.cost.evaluations),
-                   number(row.cost.light_ms), number(row.cost.state_bytes), interval(row.rmse),
-                   interval(row.rel_mse), interval(row.flip), number(row.percentile_99_9),
-                   interval(row.bias), number(row.flicker.value), row.resolved ? 1 : 0,
-                   interval(row.against_mis), interval(row.against_bidirectional));
+    fmt::format_to(
+        std::back_inserter(csv), "{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n",
+        study.scenes[static_cast<std::size_t>(cell.scene)].name,
+        study.methods[static_cast<std::size_t>(cell.method)], cell.budget, number(row.cost.cpu_us),
+        number(row.cost.rays), number(row.cost.evaluations), number(row.cost.light_ms),
+        number(row.cost.state_bytes), interval(row.rmse), interval(row.rel_mse), interval(row.flip),
+        number(row.percentile_99_9), interval(row.bias), number(row.flicker.value), number(row.lag),
+        row.resolved ? 1 : 0, interval(row.against_mis), interval(row.against_bidirectional));
   }
   return csv;
 }

@@ -83,6 +83,17 @@ Result<RunRecord> measure_run(const JobSpec& job, const std::vector<int>& frames
   return record;
 }
 
+/// The record of a finished run; nullopt when it must be done (again). The frames of seed 1 are
+/// needed for the crops.
+std::optional<RunRecord> kept_record(const StudyFolder& folder, const StudyScene& scene,
+                                     const std::string& key, int seed) {
+  std::optional<RunRecord> record = read_record(folder.record_path(key));
+  const bool shown =
+      seed != 1 || is_there(frame_file(folder.frames_folder(key), scene.frames.back()));
+  if (!record || record->frames.size() != scene.frames.size() || !shown) return std::nullopt;
+  return record;
+}
+
 }  // namespace
 
 fs::path frame_file(const fs::path& folder, int frame) {
@@ -121,21 +132,22 @@ Result<StudyResults> run_study(const Study& study, const StudyFolder& folder, Jo
     results.references.push_back(std::move(references));
   }
 
-  // Take over what is done and list the rest.
+  // Take over what is done and list the rest, seed by seed: what is done when somebody stops is a
+  // study with fewer seeds.
   results.runs.resize(study.cells.size());
+  std::vector<std::string> cell_keys;
+  for (std::size_t c = 0; c < study.cells.size(); ++c) {
+    BATON_ASSIGN(std::string key, job_key(study.cells[c].job));
+    cell_keys.push_back(std::move(key));
+    results.runs[c].resize(static_cast<std::size_t>(study.num_seeds));
+  }
   std::vector<Run> runs;
   std::vector<JobSpec> jobs;
-  for (std::size_t c = 0; c < study.cells.size(); ++c) {
-    results.runs[c].resize(static_cast<std::size_t>(study.num_seeds));
-    BATON_ASSIGN(const std::string cell_key, job_key(study.cells[c].job));
-    for (int seed = 1; seed <= study.num_seeds; ++seed) {
-      const std::string key = run_key(cell_key, seed);
-      std::optional<RunRecord> record = read_record(folder.record_path(key));
-      const std::vector<int>& frames =
-          study.scenes[static_cast<std::size_t>(study.cells[c].scene)].frames;
-      const bool shown = seed == 1;  // its frames are needed for the crops
-      if (record && record->frames.size() == frames.size() &&
-          (!shown || is_there(frame_file(folder.frames_folder(key), frames.back())))) {
+  for (int seed = 1; seed <= study.num_seeds; ++seed) {
+    for (std::size_t c = 0; c < study.cells.size(); ++c) {
+      const std::string key = run_key(cell_keys[c], seed);
+      const StudyScene& scene = study.scenes[static_cast<std::size_t>(study.cells[c].scene)];
+      if (std::optional<RunRecord> record = kept_record(folder, scene, key, seed)) {
         results.runs[c][static_cast<std::size_t>(seed) - 1] = std::move(*record);
         continue;
       }

@@ -11,6 +11,8 @@ namespace {
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 /// Two-sided 95 % of a normal distribution.
 constexpr double kNormal95 = 1.96;
+/// Squared error over the settled one at which a cut counts as overcome.
+constexpr double kOvercome = 1.5;
 
 double measure_of(const FrameMeasures& m, ErrorKindOfImage kind) {
   switch (kind) {
@@ -96,6 +98,7 @@ CellSummary summarize_cell(const Study& study, const StudyResults& results, std:
   row.percentile_99_9 = mean_interval(tails).value;
   const auto flicker = per_run(runs, {}, [](const FrameMeasures& m) { return m.flicker; });
   row.flicker = flicker.empty() ? Interval{kNone, kNone, kNone} : mean_interval(flicker);
+  row.lag = lag_after_cut(study.scenes[static_cast<std::size_t>(study.cells[cell].scene)], runs);
   row.resolved = row.rmse.value >= reference_error(references, ErrorKindOfImage::rmse, {});
 
   // The reference's own uncertainty widens the interval of the bias.
@@ -183,6 +186,20 @@ std::vector<bool> pareto_front(const std::vector<double>& costs,
     front[i] = true;
   }
   return front;
+}
+
+double lag_after_cut(const StudyScene& scene, const std::vector<RunRecord>& runs) {
+  std::vector<double> errors;
+  for (std::size_t f = 0; f < scene.frames.size(); ++f) {
+    if (scene.cut_frame == 0 || scene.frames[f] < scene.cut_frame) continue;
+    const auto values = per_run(runs, f, [](const FrameMeasures& m) { return m.mse; });
+    errors.push_back(mean_interval(values).value);
+  }
+  if (errors.empty()) return kNone;
+  const double settled = median(std::span(errors).subspan(errors.size() / 2));
+  const auto overcome = std::find_if(errors.begin(), errors.end(),
+                                     [&](double error) { return error <= kOvercome * settled; });
+  return static_cast<double>(overcome - errors.begin());
 }
 
 std::vector<CellSummary> summarize_study(const Study& study, const StudyResults& results) {

@@ -39,6 +39,10 @@ double reference_error(const std::vector<Reference>& references, ErrorKindOfImag
 /// count once. costs, errors: of one length.
 std::vector<bool> pareto_front(const std::vector<double>& costs, const std::vector<double>& errors);
 
+/// Measured frames from the cut on until the squared error has come down to 1.5 times what it
+/// settles at, its median over the later half of them. 0: at once. NaN without a cut.
+double lag_after_cut(const StudyScene& scene, const std::vector<RunRecord>& runs);
+
 /// One row of the table of efficiencies.
 struct CellSummary {
   std::size_t cell = 0;
@@ -46,6 +50,7 @@ struct CellSummary {
   Interval rmse, rel_mse, flip, bias;
   double percentile_99_9 = 0;
   Interval flicker;       ///< over runs; NaN when no two measured frames follow each other
+  double lag = 0;         ///< lag_after_cut; NaN without a cut
   bool resolved = false;  ///< the squared error is at least that of the reference
   bool biased = false;    ///< the interval of the bias, with the reference's, leaves out 0
   /// MSE x time of the baseline over MSE x time of this cell: > 1 is better. The baseline has the

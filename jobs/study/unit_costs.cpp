@@ -3,10 +3,10 @@
 namespace baton {
 namespace {
 
-constexpr double kPixelUs = 0.6;        // surfaces, film
-constexpr double kShadowRayUs = 0.095;  // trace and shade one sample
-constexpr double kEvaluationUs = 0.0145;
-constexpr double kMoveUs = 0.012;  // a proposal's random numbers and choice, beside its evaluation
+constexpr double kPixelUs = 1.17;       // surfaces, film
+constexpr double kShadowRayUs = 0.107;  // trace and shade one sample
+constexpr double kEvaluationUs = 0.0166;
+constexpr double kMoveUs = 0.0085;  // a proposal's random numbers and choice, beside its evaluation
 
 }  // namespace
 

@@ -111,6 +111,8 @@ TEST_F(StudyTest, EveryFaultHasItsPath) {
       {study(R"("job": "no.json")", plain, ""), "$.scenes[0].job", "no.json"},
       {study(job + R"(, "crop": [0, 0, 33, 1])", plain, ""), "$.scenes[0].crop",
        "inside of 32 x 16 pixels"},
+      {study(job + R"(, "cutFrame": 1)", plain, ""), "$.scenes[0].cutFrame",
+       "expected a measured frame after the first (1-8), got 1"},
       {study(job + R"(, "patch": {"image": {"width": "wide"}})", plain, ""),
        "$.scenes[0].patch.image.width", "expected an integer"},
       {study(job, R"("patch": {"sampling": {"metod": "mis"}})", ""),

@@ -115,6 +115,19 @@ TEST(Summary, NothingIsJudgedBelowTheErrorOfItsReference) {
   EXPECT_FALSE(rows[1].resolved);
 }
 
+TEST(Summary, LagCountsFramesFromTheCut) {
+  StudyScene scene;
+  scene.frames = {1, 2, 3, 4, 5, 6, 7};
+  std::vector<RunRecord> records(1);
+  for (const double mse : {1.0, 1.0, 9.0, 4.0, 2.0, 2.0, 2.0})
+    records[0].frames.push_back({.frame = 0, .mse = mse});
+  EXPECT_TRUE(std::isnan(lag_after_cut(scene, records)));
+  scene.cut_frame = 3;
+  EXPECT_EQ(lag_after_cut(scene, records), 2);
+  scene.cut_frame = 5;
+  EXPECT_EQ(lag_after_cut(scene, records), 0);
+}
+
 TEST(ChartAxis, TicksAreDecadesOrRoundSteps) {
   const ChartAxis log({0.01, 10}, true, 0, 100);
   std::vector<double> labelled;
