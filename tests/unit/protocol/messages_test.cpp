@@ -19,7 +19,21 @@ struct Numbering {
   int next = 0;
   template <class... T>
   void operator()(T&... members) {
-    ((members = static_cast<T>(factor * ++next)), ...);
+    (number(members), ...);
+  }
+
+ private:
+  template <class T>
+  void number(T& member) {
+    if constexpr (requires { member.fields(*this); }) {
+      member.fields(*this);
+    } else {
+      member = static_cast<T>(factor * ++next);
+    }
+  }
+  template <class T, std::size_t N>
+  void number(std::array<T, N>& members) {
+    for (T& member : members) number(member);
   }
 };
 
@@ -40,7 +54,7 @@ const std::vector<Message>& examples() {
       WorkerHello{"w", "h\xc3\xb6st", 1, 2, "AVX2", {kLease, kLease}},
       LeaseRequest{7},
       Heartbeat{{kLease}},
-      TaskDone{kLease, {kBlob, kBlob}, kStats},
+      TaskDone{kLease, {kBlob, kBlob}, kStats, {{3, 4, kStats.sampling}}},
       TaskFailed{kLease, "no", true},
       JobDocumentRequest{{1, 2}},
       WorkerGoodbye{},
@@ -58,7 +72,7 @@ const std::vector<Message>& examples() {
       StopCoordinator{},
       JobAccepted{{5, 6}, true},
       JobList{{kSummary}, {{"w", "h", 1, 2, 3}}},
-      JobDetail{kSummary, {1, 2, 3}, {"one", ""}},
+      JobDetail{kSummary, {1, 2, 3}, {"one", ""}, {{3, -1, kStats.sampling}}},
       Refused{4, "because"},
       PauseJob{"abc"},
       ResumeJob{"def"},
