@@ -27,8 +27,8 @@ class Count {
   void update(std::size_t done) {
     const Clock::time_point now = Clock::now();
     const bool terminal = ::isatty(STDERR_FILENO) == 1;
-    if (done < total_ && shown_ && now - *shown_ < (terminal ? kPause : kLineInterval)) return;
-    shown_ = now;
+    if (done < total_ && now < next_) return;
+    next_ = now + (terminal ? kPause : kLineInterval);
     const double seconds = std::chrono::duration<double>(now - start_).count();
     const auto left = static_cast<double>(total_ - done);
     fmt::print(stderr, "{}runs {}/{}  ETA {}{}", terminal ? "\r" : "", done, total_,
@@ -39,7 +39,7 @@ class Count {
  private:
   std::size_t total_;
   Clock::time_point start_ = Clock::now();
-  std::optional<Clock::time_point> shown_;
+  Clock::time_point next_ = start_;
 };
 
 }  // namespace
