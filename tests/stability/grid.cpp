@@ -37,12 +37,12 @@ Result<std::vector<Cell>> run_case(const Case& c, const std::vector<Subject>& su
                observe(job, time, subjects, effort.runs, threads));
   std::vector<Cell> cells;
   for (std::size_t s = 0; s < subjects.size(); ++s) {
-    cells.push_back({.case_name = c.name,
-                     .subject = subjects[s].name,
-                     .judgement = {},
-                     .summary = summarise(time, truth, seen[s]),
-                     .quadrature_error = truth.quadrature_error,
-                     .cpu_seconds = seen[s].stats.cpu_seconds - seen[s].stats.seconds_light});
+    Cell& cell = cells.emplace_back();
+    cell.case_name = c.name;
+    cell.subject = subjects[s].name;
+    cell.summary = summarise(time, truth, seen[s]);
+    cell.quadrature_error = truth.quadrature_error;
+    cell.cpu_seconds = seen[s].stats.cpu_seconds - seen[s].stats.seconds_light;
   }
 
   // Judge them beside fresh samples.
