@@ -52,7 +52,7 @@ TEST(JobJson, TakesEveryDefaultFromTheSpecification) {
 }
 
 TEST(JobJson, ReadsBackWhatItWrites) {
-  const fs::path examples = fs::path(__FILE__).parent_path() / "../../../jobs/examples";
+  const fs::path examples = fs::path(BATON_SOURCE_DIR) / "jobs/examples";
   int count = 0;
   for (const fs::directory_entry& entry : fs::directory_iterator(examples)) {
     const std::string name = entry.path().filename().string();

@@ -175,7 +175,7 @@ void add_schema(const json& root, const json& schema, const std::string& path, S
 }
 
 json read_schema() {
-  const std::filesystem::path source = std::filesystem::path(__FILE__).parent_path() / "../../..";
+  const std::filesystem::path source = BATON_SOURCE_DIR;
   const Result<std::string> text =
       read_text_file(source / "jobs/schema/job.schema.json", limits::kMaxJobFileBytes);
   EXPECT_TRUE(text.ok()) << (text.ok() ? "" : text.error().message);
