@@ -42,6 +42,8 @@ inline constexpr std::uint64_t kMaxEnvironmentCacheBytes =
     4ull << 30;  ///< per process and kind of entry
 inline constexpr std::uint64_t kMaxStateCacheBytes =
     1ull << 30;  ///< decoded states that a worker keeps, per job
+inline constexpr std::size_t kMaxCachedPoses =
+    16;  ///< frames whose moved geometry a worker keeps, per job
 inline constexpr int kMaxTasksPerJob = 4000000;
 inline constexpr int kMaxTaskAttempts = 16;
 inline constexpr int kMaxSecondsPerTask = 30 * 24 * 3600;

@@ -143,7 +143,7 @@ Result<std::string> make_job_document(const JobSpec& job) {
                     "`baton job submit`, expected one that is",
                     job.name)};
   }
-  if (!is_settled(job)) return Error{ErrorKind::internal, "the motion of the job is not settled"};
+  BATON_TRY(check_settled(job));
   ParsedJobDocument document{.job = job, .assets = {}, .digest = {}};
   BATON_ASSIGN(document.assets, digest_files(asset_paths(job)));
   return write(std::move(document), -1);

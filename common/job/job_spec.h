@@ -54,8 +54,8 @@ struct GltfMotion {
 // ---- camera ------------------------------------------------------------------------------------------------
 struct CameraKey {
   double frame = 1;
-  Vec3 position;
-  Vec3 look_at;
+  Vec3 position{};
+  Vec3 look_at{};
   Vec3 up{0, 1, 0};
   std::optional<float> vertical_fov_deg{};  ///< none: the camera's
 
@@ -106,8 +106,8 @@ struct MeshSpec {
 /// object's `translate` names, then moved by `translate`.
 struct ObjectKey {
   double frame = 1;
-  Vec3 translate;
-  Vec3 rotate_deg;
+  Vec3 translate{};
+  Vec3 rotate_deg{};
   std::array<float, 4> quaternion{0, 0, 0, 1};  ///< x, y, z, w; need not be unit
   Vec3 scale{1, 1, 1};
 

@@ -79,6 +79,14 @@ bool is_settled(const JobSpec& job) {
   return !from_file && (!moves(job) || job.motion.max_px > 0);
 }
 
+Status check_settled(const JobSpec& job) {
+  if (is_settled(job)) return {};
+  return Error{ErrorKind::bad_input,
+               "job \"" + job.name +
+                   "\": the motion is not settled: expected keys, none in a glTF file, and "
+                   "motion.maxPx above 0"};
+}
+
 std::int32_t history_reach_px(const JobSpec& job) { return moves(job) ? job.motion.max_px : 0; }
 
 CameraSpec camera_at(const JobSpec& job, double frame) {

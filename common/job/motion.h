@@ -2,6 +2,7 @@
 
 #include <cstdint>
 
+#include "common/base/result.h"
 #include "common/job/job_spec.h"
 #include "common/math/vec3.h"
 
@@ -17,6 +18,8 @@ bool moves(const ObjectSpec& object);
 /// Whether all that moves has keys of its own, none in another file, and motion.max_px is known:
 /// what worker/scene/settle_motion.h makes of a job before it is submitted.
 bool is_settled(const JobSpec& job);
+/// The same as an error that says what is missing.
+Status check_settled(const JobSpec& job);
 
 /// How far away in the image, per frame and in either direction, a pixel may take its history from:
 /// motion.max_px, or 0 when nothing moves and each pixel keeps to itself.

@@ -33,16 +33,17 @@ struct Philox4x32 {
 
 /// Which part of the program asks: the third word of every address. Values are for ever.
 enum class PassId : std::uint32_t {
-  site_position = 1,    ///< where a pixel's sites lie
-  light_pool = 2,       ///< the frame's presampled environment directions
-  candidates = 3,       ///< SIR candidates
-  choose = 4,           ///< SIR choice
-  resample = 5,         ///< resampling of carried particles
-  move = 6,             ///< Metropolis-Hastings moves
-  reference = 7,        ///< brute force
-  refresh = 8,          ///< a pixel's turn to start afresh
-  partition = 9,        ///< where the squares of the second pass lie
-  exchange = 10,        ///< who is offered a sample in the second pass
+  site_position = 1,  ///< where a pixel's sites lie
+  light_pool = 2,     ///< the frame's presampled environment directions
+  candidates = 3,     ///< SIR candidates
+  choose = 4,         ///< SIR choice
+  resample = 5,       ///< resampling of carried particles
+  move = 6,           ///< Metropolis-Hastings moves
+  reference = 7,      ///< brute force
+  refresh = 8,        ///< a pixel's turn to start afresh
+  partition = 9,      ///< where the squares of the second pass lie
+  exchange = 10,      ///< who is offered a sample in the second pass
+  reproject = 11,     ///< the site that is followed back, and which site inherits a sample
 };
 
 /// uint32 -> float uniform in [0, 1): the top 24 bits.

@@ -9,6 +9,7 @@
 #include "jobs/cli/farm_job_runner.h"
 #include "jobs/study/auto_pilot.h"
 #include "jobs/study/study_report.h"
+#include "worker/scene/settle_motion.h"
 
 namespace baton {
 namespace {
@@ -43,8 +44,22 @@ std::string machine_name() {
   return fmt::format("{} ({} logical processors)", model, std::thread::hardware_concurrency());
 }
 
+/// Settles the motion of every job (worker/scene/settle_motion.h).
+Status settle_jobs(Study& study) {
+  for (StudyScene& scene : study.scenes) {
+    for (JobSpec& job : scene.reference) {
+      BATON_ASSIGN(job, settle_motion(std::move(job)));
+    }
+  }
+  for (StudyCell& cell : study.cells) {
+    BATON_ASSIGN(cell.job, settle_motion(std::move(cell.job)));
+  }
+  return {};
+}
+
 Result<ExitCode> run_chart(const ChartOptions& options) {
   BATON_ASSIGN(Study study, load_study(options.study));
+  BATON_TRY(settle_jobs(study));
   fmt::print(stderr, "study {}: {} scenes, {} methods, {} combinations with {} seeds each\n",
              study.name, study.scenes.size(), study.methods.size(), study.cells.size(),
              study.num_seeds);

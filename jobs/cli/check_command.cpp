@@ -5,9 +5,11 @@
 #include "common/job/estimate.h"
 #include "common/job/frame_range.h"
 #include "common/job/job_json.h"
+#include "common/job/motion.h"
 #include "jobs/cli/asset_report.h"
 #include "jobs/cli/commands.h"
 #include "jobs/cli/text.h"
+#include "worker/scene/settle_motion.h"
 
 namespace baton {
 namespace {
@@ -52,6 +54,7 @@ void print_json(const JobSpec& job, const JobEstimate& e, const AssetReport& ass
                          {"frameBytes", e.frame_bytes},
                          {"stateBytesPerPixel", e.state_bytes_per_pixel},
                          {"stateBytes", e.state_bytes},
+                         {"motionMaxPx", history_reach_px(job)},
                          {"outputDirectory", job.output.directory},
                          {"meshes", assets.meshes},
                          {"instances", assets.instances},
@@ -90,6 +93,9 @@ void print_text(const JobSpec& job, const JobEstimate& e, const AssetReport& ass
              e.tasks(), e.render_tasks, e.runs, e.assemble_tasks, e.dependencies);
   fmt::print("rays       {} primary and {} shadow rays a pixel and frame\n",
              e.primary_rays_per_pixel, e.shadow_rays_per_pixel);
+  if (moves(job)) {
+    fmt::print("motion     history is followed up to {} pixels a frame\n", history_reach_px(job));
+  }
   if (e.state_bytes > 0) {
     fmt::print("state      about {} bytes a pixel, {} at each checkpoint\n",
                e.state_bytes_per_pixel, total(e.state_bytes));
@@ -108,7 +114,8 @@ void print_settings(const std::vector<JobSetting>& settings) {
 }
 
 Result<ExitCode> run_check(const CheckOptions& options) {
-  BATON_ASSIGN(const JobSpec job, load_job(options.job));
+  BATON_ASSIGN(JobSpec written, load_job(options.job));
+  BATON_ASSIGN(const JobSpec job, settle_motion(std::move(written)));
   BATON_ASSIGN(const AssetReport assets, load_assets(job));
   std::vector<JobSetting> settings;
   if (options.explain) {

@@ -12,6 +12,7 @@
 #include "jobs/cli/coordinator_link.h"
 #include "jobs/cli/job_summary.h"
 #include "jobs/cli/settle_method.h"
+#include "worker/scene/settle_motion.h"
 
 namespace baton {
 namespace {
@@ -38,7 +39,8 @@ FarmOptions pilot_farm(const JobSpec& job) {
 }
 
 Result<ExitCode> submit(const JobOptions& options, RequestClient& client) {
-  BATON_ASSIGN(JobSpec job, load_job(options.job));
+  BATON_ASSIGN(JobSpec written, load_job(options.job));
+  BATON_ASSIGN(JobSpec job, settle_motion(std::move(written)));
   BATON_TRY(settle_method(job, pilot_farm(job)));
   BATON_ASSIGN(std::string document, make_job_document(job));
   BATON_ASSIGN(const JobAccepted accepted,

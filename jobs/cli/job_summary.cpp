@@ -87,9 +87,9 @@ std::string job_statistics(const JobSummary& job) {
   }
   if (job.state_pixels > 0) {
     text +=
-        fmt::format("state      {:.1f} bytes a pixel, {} in all\n",
+        fmt::format("state      {:.1f} bytes a pixel, {} in all; {:.1f} % of the CPU time\n",
                     static_cast<double>(job.state_bytes) / static_cast<double>(job.state_pixels),
-                    bytes_text(job.state_bytes));
+                    bytes_text(job.state_bytes), 100 * s.seconds_state / s.cpu_seconds);
   }
   text += fmt::format("cpu        {}\n", duration_text(s.cpu_seconds));
   if (job.attempts_lost > 0)
@@ -113,26 +113,27 @@ ordered_json worker_json(const WorkerSummary& worker) {
 ordered_json summary_json(const JobSummary& job) {
   const RenderStats& s = job.stats;
   ordered_json result = {{"id", job.job.hex()},
-          {"name", job.name},
-          {"status", job_status_name(job.status)},
-          {"priority", job.priority},
-          {"outputDirectory", job.output_directory},
-          {"framesTotal", job.frames_total},
-          {"framesDone", job.frames_done},
-          {"tasksTotal", job.tasks_total},
-          {"tasksDone", job.tasks_done},
-          {"tasksLeased", job.tasks_leased},
-          {"tasksFailed", job.tasks_failed},
-          {"attemptsLost", job.attempts_lost},
-          {"stateBytes", job.state_bytes},
-          {"statePixels", job.state_pixels},
-          {"stats",
-           {{"pixels", s.pixels},
-            {"raysPrimary", s.rays_primary},
-            {"raysShadow", s.rays_shadow},
-            {"targetEvaluations", s.target_evaluations},
-            {"pixelsBackground", s.pixels_background},
-            {"cpuSeconds", s.cpu_seconds}}}};
+                         {"name", job.name},
+                         {"status", job_status_name(job.status)},
+                         {"priority", job.priority},
+                         {"outputDirectory", job.output_directory},
+                         {"framesTotal", job.frames_total},
+                         {"framesDone", job.frames_done},
+                         {"tasksTotal", job.tasks_total},
+                         {"tasksDone", job.tasks_done},
+                         {"tasksLeased", job.tasks_leased},
+                         {"tasksFailed", job.tasks_failed},
+                         {"attemptsLost", job.attempts_lost},
+                         {"stateBytes", job.state_bytes},
+                         {"statePixels", job.state_pixels},
+                         {"stats",
+                          {{"pixels", s.pixels},
+                           {"raysPrimary", s.rays_primary},
+                           {"raysShadow", s.rays_shadow},
+                           {"targetEvaluations", s.target_evaluations},
+                           {"pixelsBackground", s.pixels_background},
+                           {"stateSeconds", s.seconds_state},
+                           {"cpuSeconds", s.cpu_seconds}}}};
   add_sampling(s.sampling, result["stats"]);
   return result;
 }

@@ -14,6 +14,7 @@
 #include "jobs/cli/job_summary.h"
 #include "jobs/cli/progress.h"
 #include "jobs/cli/settle_method.h"
+#include "worker/scene/settle_motion.h"
 
 namespace baton {
 namespace {
@@ -87,7 +88,8 @@ void write_sheet(const RenderOptions& options, const FrameSheet& sheet) {
 
 Result<ExitCode> run_render(const RenderOptions& options) {
   const Clock::time_point start = Clock::now();
-  BATON_ASSIGN(JobSpec job, load_job(options.job));
+  BATON_ASSIGN(JobSpec written, load_job(options.job));
+  BATON_ASSIGN(JobSpec job, settle_motion(std::move(written)));
   const FarmOptions farm_setup = farm_options(options, job);
   BATON_TRY(settle_method(job, farm_setup));
   BATON_ASSIGN(std::string document, make_job_document(job));

@@ -46,7 +46,7 @@ MAY_INCLUDE = {
 # Library, by how its headers are spelled -> files that may include them (prefix of the path).
 THIRD_PARTY = {
     r"embree3/": ["worker/accel/"],
-    r"assimp/": ["worker/scene/mesh_loader.cpp"],
+    r"assimp/": ["worker/scene/mesh_loader.cpp", "worker/scene/gltf_motion.cpp"],
     r"OpenEXR/|Imath/|png\.h": ["common/image/"],
     r"zmq": ["common/protocol/"],
     r"sqlite3": ["coordinator/journal/"],

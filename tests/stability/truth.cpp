@@ -4,6 +4,7 @@
 #include <numbers>
 
 #include "common/base/check.h"
+#include "common/job/motion.h"
 #include "tests/stability/parallel.h"
 #include "worker/pass/primary.h"
 #include "worker/pass/render_context.h"
@@ -40,8 +41,9 @@ std::vector<Node> light_nodes(const Environment& environment, int nodes) {
 }
 
 /// Adds up one pixel. rays and weights: scratch.
-void sum_pixel(const RenderContext& context, const SurfaceHit& hit, const std::vector<Node>& nodes,
-               ShadowRays& rays, std::vector<double>& weights, double& lns, double& radiance) {
+void sum_pixel(const RenderContext& context, const FrameGeometry& geometry, const SurfaceHit& hit,
+               const std::vector<Node>& nodes, ShadowRays& rays, std::vector<double>& weights,
+               double& lns, double& radiance) {
   if (!hit.hit) return;
   rays.clear();
   weights.clear();
@@ -56,22 +58,24 @@ void sum_pixel(const RenderContext& context, const SurfaceHit& hit, const std::v
     rays.push(origin, node.wi);
     weights.push_back(value);
   }
-  context.accel->occluded(rays);
+  geometry.accel->occluded(rays);
   for (std::size_t r = 0; r < weights.size(); ++r) {
     if (!(rays.t_far[r] < 0)) radiance += weights[r];
   }
 }
 
-FrameTruth sum_frame(const RenderContext& context, const Environment& environment, int nodes) {
-  const TileSurfaces surfaces =
-      trace_primary(context, {0, 0, context.job.image.width, context.job.image.height});
+FrameTruth sum_frame(const RenderContext& context, const FrameGeometry& geometry,
+                     const Environment& environment, int nodes) {
+  const TileSurfaces surfaces = trace_primary(
+      context.job, geometry, {0, 0, context.job.image.width, context.job.image.height});
   const std::vector<Node> light = light_nodes(environment, nodes);
   FrameTruth truth{std::vector<double>(surfaces.hits.size()),
                    std::vector<double>(surfaces.hits.size())};
   ShadowRays rays;
   std::vector<double> weights;
   for (std::size_t p = 0; p < surfaces.hits.size(); ++p) {
-    sum_pixel(context, surfaces.hits[p], light, rays, weights, truth.lns[p], truth.radiance[p]);
+    sum_pixel(context, geometry, surfaces.hits[p], light, rays, weights, truth.lns[p],
+              truth.radiance[p]);
   }
   return truth;
 }
@@ -91,8 +95,9 @@ double relative_difference(const std::vector<double>& a, const std::vector<doubl
 }  // namespace
 
 Result<Truth> exact_truth(const JobSpec& job, int nodes, int threads) {
-  BATON_CHECK(nodes > 0 && nodes % 2 == 0 && job.image.sites == 1);
+  BATON_CHECK(nodes > 0 && nodes % 2 == 0 && job.image.sites == 1 && !moves(job));
   BATON_ASSIGN(const auto context, load_render_context(job, Digest{1, 2}));
+  BATON_ASSIGN(const auto geometry, context->geometry->at(0));
 
   // The lights one after the other, the sums side by side.
   std::vector<Environment> lights;
@@ -102,14 +107,15 @@ Result<Truth> exact_truth(const JobSpec& job, int nodes, int threads) {
   }
   Truth truth;
   truth.frames.resize(lights.size());
-  parallel_for(lights.size(), threads,
-               [&](std::size_t f) { truth.frames[f] = sum_frame(*context, lights[f], nodes); });
+  parallel_for(lights.size(), threads, [&](std::size_t f) {
+    truth.frames[f] = sum_frame(*context, *geometry, lights[f], nodes);
+  });
 
   // How much is left to the number of nodes.
   for (std::size_t f = 0; f < lights.size() && truth.quadrature_error == 0; ++f) {
     if (lights[f].map->black()) continue;
-    truth.quadrature_error = relative_difference(sum_frame(*context, lights[f], nodes / 2).radiance,
-                                                 truth.frames[f].radiance);
+    truth.quadrature_error = relative_difference(
+        sum_frame(*context, *geometry, lights[f], nodes / 2).radiance, truth.frames[f].radiance);
   }
   return truth;
 }

@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <filesystem>
 #include <fstream>
 #include <string>
@@ -123,7 +124,29 @@ inline std::vector<int> frame_numbers(int count) {
   return frames;
 }
 
-/// Films and last state of tile 0 over all frames of the job.
+/// Gives the camera of box_job a motion (half a degree round the scene per frame, a little nearer)
+/// and the second box one of its own; both for as many frames as the job has.
+inline void set_in_motion(JobSpec& job, bool camera, bool object) {
+  const auto frames = static_cast<int>(job.frames.size());
+  for (int frame = 1; frame <= frames; ++frame) {
+    const float angle = 0.5f * static_cast<float>(frame - 1) * kPi / 180;
+    const float distance = 4 - 0.02f * static_cast<float>(frame - 1);
+    if (camera) {
+      job.camera.keys.push_back(
+          {.frame = static_cast<double>(frame),
+           .position = {distance * std::sin(angle), 1.6f, distance * std::cos(angle)},
+           .look_at = job.camera.look_at});
+    }
+  }
+  if (object) {
+    job.scene.objects[1].keys = {
+        {.frame = 1}, {.frame = static_cast<double>(frames + 1), .translate = {-0.3f, 0.1f, 0.2f}}};
+  }
+  job.motion.max_px = 4;
+}
+
+/// Films and last state of tile 0 over all frames of the job; where things move, tile 0 must be the
+/// whole image.
 struct TileResult {
   std::vector<FilmTile> films;
   SampleState state;
@@ -144,12 +167,17 @@ inline TileResult render_tile(const JobSpec& job, std::int32_t tile = 0) {
                            result.state = state;
                            return Status();
                          }};
-  const auto stats = run_tile(**context, tile_run(job, tile, 0), {}, sink, {});
-  if (!stats) {
-    ADD_FAILURE() << stats.error().message;
-    return result;
+  for (std::int32_t run = 0; run < num_runs(job); ++run) {
+    std::vector<StatePtr> previous;
+    if (carries_state(job) && run > 0)
+      previous = {std::make_shared<const SampleState>(result.state)};
+    const auto stats = run_tile(**context, tile_run(job, tile, run), previous, sink, {});
+    if (!stats) {
+      ADD_FAILURE() << stats.error().message;
+      return result;
+    }
+    result.stats.merge(*stats);
   }
-  result.stats = *stats;
   return result;
 }
 

@@ -6,21 +6,24 @@
 #include <span>
 #include <string>
 
+#include "worker/scene/camera.h"
 #include "worker/scene/scene.h"
 
 namespace baton {
 
 /// What a primary ray saw.
 struct SurfaceHit {
-  ShadingPoint point;          ///< position, normals turned to the viewer, wo
-  float depth = 0;             ///< distance along the ray; 0 where hit is false
+  ShadingPoint point;  ///< position, normals turned to the viewer, wo
+  float depth = 0;     ///< distance along the ray; 0 where hit is false
   std::uint32_t instance = 0;
   std::uint32_t material = 0;
   bool hit = false;
+
+  bool operator==(const SurfaceHit&) const = default;
 };
 
-/// Rays that only ask "is the way to infinity free?", as structure of arrays; the layout of Embree's streams.
-/// Origins are already lifted off their surface (lift_off).
+/// Rays that only ask "is the way to infinity free?", as structure of arrays; the layout of
+/// Embree's streams. Origins are already lifted off their surface (lift_off).
 struct ShadowRays {
   /// (capacity) of which the first size() are rays.
   std::vector<float> origin_x, origin_y, origin_z, direction_x, direction_y, direction_z;
@@ -45,19 +48,29 @@ struct ShadowRays {
   std::size_t count_ = 0;
 };
 
-/// The origin of a shadow ray: `position` lifted along the geometric normal just so far that float error cannot make
-/// the surface shadow itself [Waechter & Binder 2019].
+/// The origin of a shadow ray: `position` lifted along the geometric normal just so far that float
+/// error cannot make the surface shadow itself [Waechter & Binder 2019].
 Vec3 lift_off(const Vec3& position, const Vec3& ng);
 
-/// The ray tracer: the only place that knows Embree. Immutable after construction; any number of threads may trace.
+/// The ray tracer: the only place that knows Embree. Immutable after construction; any number of
+/// threads may trace.
 class Accel {
  public:
-  /// Keeps a reference to `scene`, which must outlive it. Error: Embree's own message.
+  /// Keeps a reference to `scene`, which must outlive it. What stands still is one flat hierarchy;
+  /// each mesh that moves has its own, placed where the scene says. Error: Embree's own message.
   static Result<std::unique_ptr<Accel>> build(const Scene& scene);
   virtual ~Accel() = default;
 
-  /// Closest hit of each ray; hits.size() == rays.size().
-  virtual void intersect(std::span<const Ray> rays, std::span<SurfaceHit> hits) const = 0;
+  /// The same geometry with its moving instances elsewhere; shares all but their placement.
+  /// instances: those of the scene in its order, moved; must outlive the result. Error: Embree's
+  /// own message.
+  virtual Result<std::unique_ptr<const Accel>> place(std::span<const Instance> instances) const = 0;
+
+  /// Closest hit of each ray; hits.size() == rays.size(). The rays come in groups of `group` (1 to
+  /// 16) that start nearby and point alike, such as the sites of a pixel; a hit depends on no ray
+  /// of another group.
+  virtual void intersect(std::span<const Ray> rays, std::span<SurfaceHit> hits,
+                         std::size_t group = 1) const = 0;
   /// Traces all rays; t_far of the occluded ones becomes -inf.
   virtual void occluded(ShadowRays& rays) const = 0;
   /// "Embree 3.13.5, AVX2" for the benchmark and --version.

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstring>
 #include <limits>
+#include <map>
 #include <vector>
 
 #include "common/base/check.h"
@@ -34,13 +35,12 @@ void fill_buffer(RTCGeometry geometry, RTCBufferType type, RTCFormat format,
   if (buffer != nullptr) std::memcpy(buffer, elements.data(), elements.size() * sizeof(T));
 }
 
-/// Attaches the triangles of an instance in world space; geometry id = index of the instance.
-void attach_instance(RTCDevice device, RTCScene target, const Scene& scene, unsigned index) {
-  const Instance& instance = scene.instances[index];
-  const TriangleMesh& mesh = scene.meshes[instance.mesh];
+/// Attaches the triangles of a mesh, moved by `to_target`, as geometry `index`.
+void attach_instance(RTCDevice device, RTCScene target, const TriangleMesh& mesh,
+                     const Transform& to_target, unsigned index) {
   std::vector<Vec3> positions;
   positions.reserve(mesh.positions.size());
-  for (const Vec3& p : mesh.positions) positions.push_back(instance.to_world.point(p));
+  for (const Vec3& p : mesh.positions) positions.push_back(to_target.point(p));
 
   const Owned<RTCGeometry> geometry(rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE));
   fill_buffer(geometry.get(), RTC_BUFFER_TYPE_VERTEX, RTC_FORMAT_FLOAT3, positions);
@@ -49,19 +49,93 @@ void attach_instance(RTCDevice device, RTCScene target, const Scene& scene, unsi
   rtcAttachGeometryByID(target, geometry.get(), index);
 }
 
-/// Instances are placed in one flat hierarchy: a second level costs a third of the shadow rays'
-/// speed. The floating-point environment stays as it is (Embree suggests flush-to-zero): results
-/// must not depend on the thread that traces.
+/// Attaches an instance that moves; geometry id = index of the instance.
+void attach_moving(RTCDevice device, RTCScene target, RTCScene mesh, const Transform& to_world,
+                   unsigned index) {
+  const auto& m = to_world.linear.m;
+  const Vec3& o = to_world.offset;
+  const std::array<float, 12> rows{m[0], m[1], m[2], o.x,  m[3], m[4],
+                                   m[5], o.y,  m[6], m[7], m[8], o.z};
+  const Owned<RTCGeometry> geometry(rtcNewGeometry(device, RTC_GEOMETRY_TYPE_INSTANCE));
+  rtcSetGeometryInstancedScene(geometry.get(), mesh);
+  rtcSetGeometryTransform(geometry.get(), 0, RTC_FORMAT_FLOAT3X4_ROW_MAJOR, rows.data());
+  rtcCommitGeometry(geometry.get());
+  rtcAttachGeometryByID(target, geometry.get(), index);
+}
+
+/// What all poses of a scene share.
+struct SharedGeometry {
+  Owned<RTCDevice> device;
+  Owned<RTCScene> still;  ///< all that does not move, in world space
+  std::map<std::uint32_t, Owned<RTCScene>>
+      moving_meshes;  ///< by index of the mesh, in its own space
+
+  Owned<RTCScene> new_scene() const {
+    Owned<RTCScene> scene(rtcNewScene(device.get()));
+    rtcSetSceneBuildQuality(scene.get(), RTC_BUILD_QUALITY_HIGH);
+    return scene;
+  }
+};
+
+/// Still instances are placed in one flat hierarchy: a second level costs a third of the shadow
+/// rays' speed. A ray asks it first, then the moving instances, which have a small hierarchy of
+/// their own. The floating-point environment stays as it is (Embree suggests flush-to-zero):
+/// results must not depend on the thread that traces.
 class EmbreeAccel final : public Accel {
  public:
-  EmbreeAccel(const Scene& scene, Owned<RTCDevice> device, Owned<RTCScene> traced)
-      : scene_(scene), device_(std::move(device)), traced_(std::move(traced)) {}
+  /// moving: null when nothing moves.
+  EmbreeAccel(const Scene& scene, std::shared_ptr<const SharedGeometry> geometry,
+              std::span<const Instance> instances, Owned<RTCScene> moving)
+      : scene_(scene),
+        geometry_(std::move(geometry)),
+        instances_(instances),
+        moving_(std::move(moving)) {}
 
-  void intersect(std::span<const Ray> rays, std::span<SurfaceHit> hits) const override {
-    BATON_CHECK(rays.size() == hits.size());
+  static Result<std::unique_ptr<EmbreeAccel>> make(const Scene& scene,
+                                                   std::shared_ptr<const SharedGeometry> geometry,
+                                                   std::span<const Instance> instances) {
+    Owned<RTCScene> moving;
+    std::string message;
+    if (!geometry->moving_meshes.empty()) {
+      RTCDevice device = geometry->device.get();
+      rtcSetDeviceErrorFunction(device, remember_error, &message);
+      moving = geometry->new_scene();
+      for (unsigned i = 0; i < instances.size(); ++i) {
+        if (!instances[i].moves()) continue;
+        attach_moving(device, moving.get(), geometry->moving_meshes.at(instances[i].mesh).get(),
+                      instances[i].to_world, i);
+      }
+      rtcCommitScene(moving.get());
+      rtcSetDeviceErrorFunction(device, nullptr, nullptr);
+    }
+    if (!message.empty()) return Error{ErrorKind::internal, "Embree: " + message};
+    return std::make_unique<EmbreeAccel>(scene, std::move(geometry), instances, std::move(moving));
+  }
+
+  Result<std::unique_ptr<const Accel>> place(std::span<const Instance> instances) const override {
+    BATON_CHECK(instances.size() == instances_.size());
+    BATON_ASSIGN(std::unique_ptr<const Accel> placed, make(scene_, geometry_, instances));
+    return Result<std::unique_ptr<const Accel>>(std::move(placed));
+  }
+
+  /// A group is one packet: the same rays give the same hits, whatever else is traced with them.
+  void intersect(std::span<const Ray> rays, std::span<SurfaceHit> hits,
+                 std::size_t group) const override {
+    BATON_CHECK(rays.size() == hits.size() && group >= 1 && group <= 16 &&
+                rays.size() % group == 0);
     RTCIntersectContext context;
     rtcInitIntersectContext(&context);
-    for (std::size_t i = 0; i < rays.size(); ++i) hits[i] = intersect_one(rays[i], context);
+    context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
+    for (std::size_t i = 0; i < rays.size(); i += group) {
+      const std::span<const Ray> some = rays.subspan(i, group);
+      if (group == 1) {
+        hits[i] = intersect_one(some[0], context);
+      } else if (group <= 4) {
+        intersect_packet<RTCRayHit4, 4>(rtcIntersect4, some, hits.subspan(i, group), context);
+      } else {
+        intersect_packet<RTCRayHit16, 16>(rtcIntersect16, some, hits.subspan(i, group), context);
+      }
+    }
   }
 
   /// One stream of all rays, without the `coherent` flag, which makes scattered rays three times
@@ -82,12 +156,15 @@ class EmbreeAccel final : public Accel {
                           .mask = nullptr,
                           .id = nullptr,
                           .flags = nullptr};
-    rtcOccludedNp(traced_.get(), &context, &stream, static_cast<unsigned>(rays.size()));
+    const auto count = static_cast<unsigned>(rays.size());
+    rtcOccludedNp(geometry_->still.get(), &context, &stream, count);
+    // Rays that are blocked already have t_far = -inf, which Embree leaves alone.
+    if (moving_ != nullptr) rtcOccludedNp(moving_.get(), &context, &stream, count);
   }
 
   std::string description() const override {
     const auto native = [this](RTCDeviceProperty p) {
-      return rtcGetDeviceProperty(device_.get(), p) != 0;
+      return rtcGetDeviceProperty(geometry_->device.get(), p) != 0;
     };
     const char* isa = native(RTC_DEVICE_PROPERTY_NATIVE_RAY16_SUPPORTED)   ? "AVX-512"
                       : !native(RTC_DEVICE_PROPERTY_NATIVE_RAY8_SUPPORTED) ? "SSE"
@@ -97,7 +174,6 @@ class EmbreeAccel final : public Accel {
   }
 
  private:
-  /// Single rays, by construction independent of their neighbours.
   SurfaceHit intersect_one(const Ray& ray, RTCIntersectContext& context) const {
     RTCRayHit query{};
     query.ray = {.org_x = ray.origin.x,
@@ -114,18 +190,56 @@ class EmbreeAccel final : public Accel {
                  .flags = 0};
     query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
     query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
-    rtcIntersect1(traced_.get(), &context, &query);
-    return query.hit.geomID == RTC_INVALID_GEOMETRY_ID ? SurfaceHit{} : surface_at(ray, query);
+    rtcIntersect1(geometry_->still.get(), &context, &query);
+    if (moving_ != nullptr) rtcIntersect1(moving_.get(), &context, &query);
+    return surface_at(ray, {query.ray.tfar, query.hit.u, query.hit.v, query.hit.primID,
+                            query.hit.geomID, query.hit.instID[0]});
   }
+
+  /// Up to Width rays at once; the lanes that are left over are off.
+  template <class Packet, std::size_t Width, class Intersect>
+  void intersect_packet(Intersect intersect_some, std::span<const Ray> rays,
+                        std::span<SurfaceHit> hits, RTCIntersectContext& context) const {
+    alignas(64) Packet query{};
+    alignas(64) std::array<int, Width> valid{};
+    for (std::size_t k = 0; k < rays.size(); ++k) {
+      valid[k] = -1;
+      query.ray.org_x[k] = rays[k].origin.x;
+      query.ray.org_y[k] = rays[k].origin.y;
+      query.ray.org_z[k] = rays[k].origin.z;
+      query.ray.dir_x[k] = rays[k].direction.x;
+      query.ray.dir_y[k] = rays[k].direction.y;
+      query.ray.dir_z[k] = rays[k].direction.z;
+      query.ray.tfar[k] = std::numeric_limits<float>::infinity();
+      query.ray.mask[k] = ~0u;
+      query.hit.geomID[k] = RTC_INVALID_GEOMETRY_ID;
+      query.hit.instID[0][k] = RTC_INVALID_GEOMETRY_ID;
+    }
+    intersect_some(valid.data(), geometry_->still.get(), &context, &query);
+    if (moving_ != nullptr) intersect_some(valid.data(), moving_.get(), &context, &query);
+    for (std::size_t k = 0; k < rays.size(); ++k) {
+      hits[k] =
+          surface_at(rays[k], {query.ray.tfar[k], query.hit.u[k], query.hit.v[k],
+                               query.hit.primID[k], query.hit.geomID[k], query.hit.instID[0][k]});
+    }
+  }
+
+  /// What Embree says of a hit.
+  struct RawHit {
+    float depth, u, v;
+    unsigned triangle, geometry, instance;
+  };
 
   /// The surface at a hit. The position comes from the barycentric coordinates: it lies on the
   /// triangle to a few float steps, however far the ray has come.
-  SurfaceHit surface_at(const Ray& ray, const RTCRayHit& query) const {
-    const Instance& instance = scene_.instances[query.hit.geomID];
+  SurfaceHit surface_at(const Ray& ray, const RawHit& hit) const {
+    if (hit.geometry == RTC_INVALID_GEOMETRY_ID) return {};
+    const unsigned index = hit.instance != RTC_INVALID_GEOMETRY_ID ? hit.instance : hit.geometry;
+    const Instance& instance = instances_[index];
     const TriangleMesh& mesh = scene_.meshes[instance.mesh];
-    const auto& corner = mesh.triangles[query.hit.primID];
-    const float u = query.hit.u;
-    const float v = query.hit.v;
+    const auto& corner = mesh.triangles[hit.triangle];
+    const float u = hit.u;
+    const float v = hit.v;
     const auto interpolate = [u, v](const Vec3& a, const Vec3& b, const Vec3& c) {
       return a * (1 - u - v) + b * u + c * v;
     };
@@ -146,15 +260,16 @@ class EmbreeAccel final : public Accel {
       if (!(dot(ns, ng) > 0)) ns = ng;
     }
     return {.point = {.position = interpolate(a, b, c), .ng = ng, .ns = ns, .wo = wo},
-            .depth = query.ray.tfar,
-            .instance = query.hit.geomID,
+            .depth = hit.depth,
+            .instance = index,
             .material = instance.material,
             .hit = true};
   }
 
   const Scene& scene_;
-  Owned<RTCDevice> device_;
-  Owned<RTCScene> traced_;
+  const std::shared_ptr<const SharedGeometry> geometry_;
+  const std::span<const Instance> instances_;
+  const Owned<RTCScene> moving_;
 };
 
 }  // namespace
@@ -162,24 +277,36 @@ class EmbreeAccel final : public Accel {
 Result<std::unique_ptr<Accel>> Accel::build(const Scene& scene) {
   // One build thread: answers at edges depend on the shape of the tree, which must not depend on
   // the host.
-  Owned<RTCDevice> device(rtcNewDevice("threads=1"));
+  auto geometry = std::make_shared<SharedGeometry>();
+  geometry->device.reset(rtcNewDevice("threads=1"));
+  RTCDevice device = geometry->device.get();
   if (device == nullptr) {
     return Error{ErrorKind::internal, "Embree: cannot make a device, error " +
                                           std::to_string(rtcGetDeviceError(nullptr))};
   }
   std::string message;
-  rtcSetDeviceErrorFunction(device.get(), remember_error, &message);
+  rtcSetDeviceErrorFunction(device, remember_error, &message);
 
-  Owned<RTCScene> traced(rtcNewScene(device.get()));
-  rtcSetSceneBuildQuality(traced.get(), RTC_BUILD_QUALITY_HIGH);
+  // What stands still, in world space; each mesh that moves, in its own.
+  geometry->still = geometry->new_scene();
   for (unsigned i = 0; i < scene.instances.size(); ++i) {
-    attach_instance(device.get(), traced.get(), scene, i);
+    const Instance& instance = scene.instances[i];
+    if (!instance.moves()) {
+      attach_instance(device, geometry->still.get(), scene.meshes[instance.mesh], instance.to_world,
+                      i);
+    } else if (!geometry->moving_meshes.contains(instance.mesh)) {
+      Owned<RTCScene>& own = geometry->moving_meshes[instance.mesh];
+      own = geometry->new_scene();
+      attach_instance(device, own.get(), scene.meshes[instance.mesh], {}, 0);
+      rtcCommitScene(own.get());
+    }
   }
-  rtcCommitScene(traced.get());
-  rtcSetDeviceErrorFunction(device.get(), nullptr, nullptr);
+  rtcCommitScene(geometry->still.get());
+  rtcSetDeviceErrorFunction(device, nullptr, nullptr);
   if (!message.empty()) return Error{ErrorKind::internal, "Embree: " + message};
-  return std::unique_ptr<Accel>(
-      std::make_unique<EmbreeAccel>(scene, std::move(device), std::move(traced)));
+  BATON_ASSIGN(std::unique_ptr<Accel> accel,
+               EmbreeAccel::make(scene, std::move(geometry), scene.instances));
+  return Result<std::unique_ptr<Accel>>(std::move(accel));
 }
 
 }  // namespace baton

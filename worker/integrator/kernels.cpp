@@ -150,6 +150,16 @@ SequentialOutcome SequentialPixel(const SiteBlock& sites, const EnvironmentView&
   return SequentialStep(target, settings, lns_before, Rng(key, PassId::move), Rng(key, PassId::resample), particles);
 }
 
+SequentialOutcome SequentialMovedPixel(const SiteBlock& sites, const OldSurfaces& old,
+                                       const EnvironmentView& before, const EnvironmentView& now,
+                                       const LightPool& pool, const SequentialSettings& settings,
+                                       float lns_before, const RngKey& key,
+                                       ParticleSpan particles) {
+  const MovedSurfaceTarget target{sites, old, before, now, pool};
+  return SequentialStep(target, settings, lns_before, Rng(key, PassId::move),
+                        Rng(key, PassId::resample), particles);
+}
+
 const char* TargetName() { return hwy::TargetName(HWY_TARGET); }
 
 }  // namespace baton::HWY_NAMESPACE
@@ -164,6 +174,7 @@ HWY_EXPORT(SampleBsdfSpans);
 HWY_EXPORT(DrawCandidates);
 HWY_EXPORT(ShadeSamples);
 HWY_EXPORT(SequentialPixel);
+HWY_EXPORT(SequentialMovedPixel);
 HWY_EXPORT(TargetName);
 
 namespace kernels {
@@ -208,12 +219,18 @@ void shade_samples(const SiteBlock& sites, const EnvironmentView& environment, s
   HWY_DYNAMIC_DISPATCH(ShadeSamples)(sites, environment, code, site, out);
 }
 
-SequentialOutcome sequential_step(const SiteBlock& sites, const EnvironmentView& environment_before,
+SequentialOutcome sequential_step(const SiteBlock& sites, const OldSurfaces* old,
+                                  const EnvironmentView& environment_before,
                                   const EnvironmentView& environment_now, const LightPool& pool,
-                                  const SequentialSettings& settings, float lns_before, const RngKey& key,
-                                  ParticleSpan particles) {
+                                  const SequentialSettings& settings, float lns_before,
+                                  const RngKey& key, ParticleSpan particles) {
   BATON_CHECK(settings.num_particles >= 1 && settings.num_particles <= limits::kMaxParticles);
   if (pool.empty() || !(lns_before > 0)) return {};
+  if (old != nullptr) {
+    return HWY_DYNAMIC_DISPATCH(SequentialMovedPixel)(sites, *old, environment_before,
+                                                      environment_now, pool, settings, lns_before,
+                                                      key, particles);
+  }
   return HWY_DYNAMIC_DISPATCH(SequentialPixel)(sites, environment_before, environment_now, pool, settings, lns_before,
                                                key, particles);
 }

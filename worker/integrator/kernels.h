@@ -9,6 +9,7 @@
 #include "common/math/octahedral.h"
 #include "common/math/philox.h"
 #include "worker/integrator/light_pool.h"
+#include "worker/integrator/old_surfaces.h"
 #include "worker/sampling/resampling.h"
 #include "worker/sampling/sequential.h"
 #include "worker/scene/environment_view.h"
@@ -89,10 +90,11 @@ void shade_samples(const SiteBlock& sites, const EnvironmentView& environment,
                    std::span<const OctDirection> code, std::span<const std::uint8_t> site,
                    ShadedSamples& out);
 
-/// One frame of the sequential sampler for a pixel whose surfaces did not change
-/// (sampling/sequential-inl.h). environment_before: the frame that the particles come from.
-/// lns_before > 0.
-SequentialOutcome sequential_step(const SiteBlock& sites, const EnvironmentView& environment_before,
+/// One frame of the sequential sampler for a pixel (sampling/sequential-inl.h). old: the surfaces
+/// that the particles come from, by sites of this frame; null where they are `sites`.
+/// environment_before: the frame that the particles come from. lns_before > 0.
+SequentialOutcome sequential_step(const SiteBlock& sites, const OldSurfaces* old,
+                                  const EnvironmentView& environment_before,
                                   const EnvironmentView& environment_now, const LightPool& pool,
                                   const SequentialSettings& settings, float lns_before,
                                   const RngKey& key, ParticleSpan particles);

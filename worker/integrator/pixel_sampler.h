@@ -6,6 +6,7 @@
 #include "common/state/sample_state.h"
 #include "worker/integrator/frame_light.h"
 #include "worker/integrator/kernels.h"
+#include "worker/integrator/old_surfaces.h"
 
 namespace baton {
 
@@ -17,7 +18,8 @@ struct PixelInput {
   const EnvironmentView& before;
   RngKey key;
   std::int32_t frame_index = 0;  ///< 0-based position in the sequence
-  bool has_history = false;  ///< the samples hold the previous frame's properly weighted set of the same surfaces
+  bool has_history = false;      ///< the samples hold the previous frame's properly weighted set
+  const OldSurfaces* old = nullptr;  ///< the surfaces of that set, where they are not `sites`
 };
 
 /// The samples of one pixel, in and out: a properly weighted set for p~(site, w) = p~_site(w) / S with

@@ -36,8 +36,8 @@ PixelDiagnostics SequentialSampler::sample(const PixelInput& input, kernels::Can
   SequentialSettings settings = settings_;
   if (input.sites.num_lobes == 0) settings.local_move_fraction = 0;
   const SequentialOutcome outcome = kernels::sequential_step(
-      input.sites, input.before, input.now, input.light.pool, settings, samples.lns, input.key,
-      {samples.direction.data(), samples.site.data(), samples.weight.data()});
+      input.sites, input.old, input.before, input.now, input.light.pool, settings, samples.lns,
+      input.key, {samples.direction.data(), samples.site.data(), samples.weight.data()});
   PixelDiagnostics diagnostics{
       // Both targets at the old positions and at every proposal.
       .ess = outcome.ess,

@@ -9,6 +9,7 @@
 #include <hwy/highway.h>
 
 #include "worker/integrator/light_pool.h"
+#include "worker/integrator/old_surfaces.h"
 #include "worker/sampling/sequential-inl.h"
 #include "worker/scene/bsdf-inl.h"
 #include "worker/scene/environment-inl.h"
@@ -87,6 +88,54 @@ struct SameSurfaceTarget {
     const Vec3Lanes light =
         ReflectedRadiance(surface, f, hn::Load(d, block.r + at), hn::Load(d, block.g + at), hn::Load(d, block.b + at));
     return {LogOrZero(MeanLanes(then)), LogOrZero(MeanLanes(light)), LogOrZero(hn::Load(d, block.density + at))};
+  }
+};
+
+/// The targets of two frames whose surfaces differ: those of the frame before are seen through the
+/// sites that inherit them (OldSurfaces). Otherwise like SameSurfaceTarget.
+struct MovedSurfaceTarget {
+  const SiteBlock& sites;
+  const OldSurfaces& old;
+  const EnvironmentView& before;
+  const EnvironmentView& now;
+  const LightPool& pool;
+
+  HWY_INLINE LogTargets Evaluate(const PointLanes& point) const {
+    const Vec3Lanes w = DecodeOctahedral(point.code);
+    const RadianceLanes then = EvaluateEnvironment(before, w);
+    const RadianceLanes light = EvaluateEnvironment(now, w);
+    return Targets(point.site, w, {then.r, then.g, then.b}, {light.r, light.g, light.b},
+                   light.density);
+  }
+
+  static std::size_t BlockStart(std::uint32_t bits) { return SameSurfaceTarget::BlockStart(bits); }
+
+  HWY_INLINE LogTargets Propose(std::size_t entry, VF site_fraction, PointLanes& point) const {
+    const DF d;
+    const LightPool::Block& block = pool.blocks[entry / LightPool::kBlock];
+    const std::size_t at = entry % LightPool::kBlock;
+    const auto load = [&](const float* x, const float* y, const float* z) HWY_ATTR {
+      return Vec3Lanes{hn::Load(d, x + at), hn::Load(d, y + at), hn::Load(d, z + at)};
+    };
+    point.code = hn::Load(DU(), block.code + at);
+    point.site = SiteAt(sites, site_fraction);
+    return Targets(point.site, load(block.x, block.y, block.z),
+                   load(block.before_r, block.before_g, block.before_b),
+                   load(block.r, block.g, block.b), hn::Load(d, block.density + at));
+  }
+
+ private:
+  HWY_INLINE LogTargets Targets(VI site, const Vec3Lanes& w, const Vec3Lanes& then,
+                                const Vec3Lanes& light, VF density) const {
+    const SurfaceLanes surface_then = LoadSurfaces(old.sites, site);
+    const BsdfLanes f_then = EvaluateBsdf(surface_then, w);
+    const SurfaceLanes surface = LoadSurfaces(sites, site);
+    const BsdfLanes f = EvaluateBsdf(surface, w);
+    const VF log_then =
+        LogOrZero(MeanLanes(ReflectedRadiance(surface_then, f_then, then.x, then.y, then.z)));
+    return {hn::Add(log_then, LookUp(old.log_share, site, sites.num_sites)),
+            LogOrZero(MeanLanes(ReflectedRadiance(surface, f, light.x, light.y, light.z))),
+            LogOrZero(density)};
   }
 };
 

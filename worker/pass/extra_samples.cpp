@@ -7,10 +7,12 @@
 
 namespace baton {
 
-ExtraSampler::ExtraSampler(const RenderContext& context, const FrameSpec& frame,
-                           const FrameLight& light, const SampleRegion& samples,
-                           const MaskedSurfaces& surfaces, const PixelMask& mask)
+ExtraSampler::ExtraSampler(const RenderContext& context, const FrameGeometry& geometry,
+                           const FrameSpec& frame, const FrameLight& light,
+                           const SampleRegion& samples, const MaskedSurfaces& surfaces,
+                           const PixelMask& mask)
     : context_(context),
+      geometry_(geometry),
       frame_(frame),
       light_(light),
       samples_(samples),
@@ -94,7 +96,7 @@ void ExtraSampler::draw(std::int32_t x, std::int32_t y, std::size_t fold,
 Rgb ExtraSampler::trace() {
   {
     const StageTimer timer(seconds_rays_);
-    context_.accel->occluded(rays_);
+    geometry_.accel->occluded(rays_);
   }
   rays_traced_ += rays_.size();
   Rgb sum;

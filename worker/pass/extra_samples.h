@@ -14,8 +14,9 @@ namespace baton {
 class ExtraSampler {
  public:
   /// All arguments must outlive the object. mask: the pixels of `surfaces`.
-  ExtraSampler(const RenderContext& context, const FrameSpec& frame, const FrameLight& light,
-               const SampleRegion& samples, const MaskedSurfaces& surfaces, const PixelMask& mask);
+  ExtraSampler(const RenderContext& context, const FrameGeometry& geometry, const FrameSpec& frame,
+               const FrameLight& light, const SampleRegion& samples, const MaskedSurfaces& surfaces,
+               const PixelMask& mask);
 
   /// Share of a fold in the radiance of a pixel of the mask; `extra`: the fold's mask holds it.
   Rgb radiance(std::int32_t x, std::int32_t y, std::size_t fold, bool extra);
@@ -30,6 +31,7 @@ class ExtraSampler {
   Rgb trace();
 
   const RenderContext& context_;
+  const FrameGeometry& geometry_;
   const FrameSpec& frame_;
   const FrameLight& light_;
   const SampleRegion& samples_;

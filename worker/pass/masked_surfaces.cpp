@@ -4,7 +4,7 @@
 
 namespace baton {
 
-MaskedSurfaces::MaskedSurfaces(const RenderContext& context, std::int32_t frame_index,
+MaskedSurfaces::MaskedSurfaces(const RenderContext& context, const FrameGeometry& geometry,
                                const PixelMask& mask)
     : num_sites_(static_cast<std::size_t>(context.job.image.sites)) {
   // Trace.
@@ -13,11 +13,11 @@ MaskedSurfaces::MaskedSurfaces(const RenderContext& context, std::int32_t frame_
   for (std::int32_t y = rect.y0; y < rect.y1; ++y) {
     for (std::int32_t x = rect.x0; x < rect.x1; ++x) {
       position_.push_back(mask.at(x, y) ? count++ : -1);
-      if (position_.back() >= 0) append_primary_rays(context, frame_index, x, y, rays_);
+      if (position_.back() >= 0) append_primary_rays(context.job, geometry, x, y, rays_);
     }
   }
   hits_.resize(rays_.size());
-  trace_primary_rays(context, frame_index, rays_, hits_);
+  trace_primary_rays(context.job, geometry, rays_, hits_);
 
   // Tabulate.
   for (const SurfaceHit& hit : hits_) {

@@ -11,7 +11,8 @@ namespace baton {
 /// What the sites of the pixels of a mask see, traced again exactly as in the first pass.
 class MaskedSurfaces {
  public:
-  MaskedSurfaces(const RenderContext& context, std::int32_t frame_index, const PixelMask& mask);
+  MaskedSurfaces(const RenderContext& context, const FrameGeometry& geometry,
+                 const PixelMask& mask);
 
   /// Position of a masked pixel among them; `index` as PixelMask::index. Negative for the others.
   std::int32_t find(std::size_t index) const { return position_[index]; }

@@ -17,32 +17,33 @@ std::array<float, 2> site_position(const JobSpec& job, std::uint32_t pixel, std:
 
 }  // namespace
 
-TileSurfaces trace_primary(const RenderContext& context, const PixelRect& rect) {
-  const JobSpec& job = context.job;
+TileSurfaces trace_primary(const JobSpec& job, const FrameGeometry& geometry,
+                           const PixelRect& rect) {
   TileSurfaces surfaces{.rect = rect, .num_sites = job.image.sites, .hits = {}, .rays = {}};
   surfaces.rays.reserve(static_cast<std::size_t>(rect.area() * job.image.sites));
   for (std::int32_t y = rect.y0; y < rect.y1; ++y) {
     for (std::int32_t x = rect.x0; x < rect.x1; ++x) {
-      append_primary_rays(context, 0, x, y, surfaces.rays);
+      append_primary_rays(job, geometry, x, y, surfaces.rays);
     }
   }
   surfaces.hits.resize(surfaces.rays.size());
-  trace_primary_rays(context, 0, surfaces.rays, surfaces.hits);
+  trace_primary_rays(job, geometry, surfaces.rays, surfaces.hits);
   return surfaces;
 }
 
-void append_primary_rays(const RenderContext& context, std::int32_t /*frame_index*/, std::int32_t x, std::int32_t y,
-                         std::vector<Ray>& rays) {
-  const auto pixel = static_cast<std::uint32_t>(y * context.job.image.width + x);
-  for (std::int32_t site = 0; site < context.job.image.sites; ++site) {
-    const auto [dx, dy] = site_position(context.job, pixel, site);
-    rays.push_back(context.scene->camera.ray(static_cast<float>(x) + dx, static_cast<float>(y) + dy));
+void append_primary_rays(const JobSpec& job, const FrameGeometry& geometry, std::int32_t x,
+                         std::int32_t y, std::vector<Ray>& rays) {
+  const auto pixel = static_cast<std::uint32_t>(y * job.image.width + x);
+  for (std::int32_t site = 0; site < job.image.sites; ++site) {
+    const auto [dx, dy] = site_position(job, pixel, site);
+    rays.push_back(
+        geometry.pose.camera.ray(static_cast<float>(x) + dx, static_cast<float>(y) + dy));
   }
 }
 
-void trace_primary_rays(const RenderContext& context, std::int32_t /*frame_index*/, std::span<const Ray> rays,
-                        std::span<SurfaceHit> hits) {
-  context.accel->intersect(rays, hits);
+void trace_primary_rays(const JobSpec& job, const FrameGeometry& geometry,
+                        std::span<const Ray> rays, std::span<SurfaceHit> hits) {
+  geometry.accel->intersect(rays, hits, static_cast<std::size_t>(job.image.sites));
 }
 
 Rgb environment_behind(std::span<const SurfaceHit> hits, std::span<const Ray> rays, const Environment& environment) {

@@ -6,7 +6,8 @@
 
 namespace baton {
 
-/// What the sites of a tile see: a pure function of (job, pixel, site) while camera and objects stand still.
+/// What the sites of a tile see in one frame: a pure function of (job, pixel, site), and of the
+/// frame where camera or objects move.
 struct TileSurfaces {
   PixelRect rect;
   std::int32_t num_sites = 1;    ///< S
@@ -23,13 +24,15 @@ struct TileSurfaces {
 
 /// Pass 1: one primary ray for each site of each pixel. S = 1 shoots through the pixel's centre, else the sites are
 /// jittered on a sqrt(S) x sqrt(S) grid; the same for all frames.
-TileSurfaces trace_primary(const RenderContext& context, const PixelRect& rect);
+TileSurfaces trace_primary(const JobSpec& job, const FrameGeometry& geometry,
+                           const PixelRect& rect);
 
-/// The same for pixels one by one: appends the rays of the sites of pixel (x, y) in a frame (0-based index).
-void append_primary_rays(const RenderContext& context, std::int32_t frame_index, std::int32_t x, std::int32_t y,
-                         std::vector<Ray>& rays);
-void trace_primary_rays(const RenderContext& context, std::int32_t frame_index, std::span<const Ray> rays,
-                        std::span<SurfaceHit> hits);
+/// The same for pixels one by one: appends the rays of the sites of pixel (x, y). Hits are the same
+/// as of a whole tile.
+void append_primary_rays(const JobSpec& job, const FrameGeometry& geometry, std::int32_t x,
+                         std::int32_t y, std::vector<Ray>& rays);
+void trace_primary_rays(const JobSpec& job, const FrameGeometry& geometry,
+                        std::span<const Ray> rays, std::span<SurfaceHit> hits);
 
 /// Radiance that the sites of a pixel which see no surface show of the environment, as a share of all its sites.
 Rgb environment_behind(std::span<const SurfaceHit> hits, std::span<const Ray> rays, const Environment& environment);

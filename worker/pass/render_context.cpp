@@ -1,10 +1,12 @@
 #include "worker/pass/render_context.h"
 
+#include "common/job/motion.h"
 #include "worker/pass/populations.h"
 
 namespace baton {
 
 Result<std::shared_ptr<const RenderContext>> load_render_context(const JobSpec& job, const Digest& job_digest) {
+  BATON_TRY(check_settled(job));
   auto context = std::make_shared<RenderContext>();
   context->job = job;
   context->digest = job_digest;
@@ -15,7 +17,7 @@ Result<std::shared_ptr<const RenderContext>> load_render_context(const JobSpec& 
 
   BATON_ASSIGN(Scene scene, load_scene(job));
   context->scene = std::make_unique<const Scene>(std::move(scene));
-  BATON_ASSIGN(context->accel, Accel::build(*context->scene));
+  BATON_ASSIGN(context->geometry, GeometrySequence::build(context->job, *context->scene));
   return std::shared_ptr<const RenderContext>(std::move(context));
 }
 

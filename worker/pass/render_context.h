@@ -4,14 +4,15 @@
 #include <vector>
 
 #include "common/job/sequence.h"
-#include "worker/accel/accel.h"
+#include "worker/accel/geometry_sequence.h"
 #include "worker/integrator/frame_light.h"
 #include "worker/integrator/pixel_sampler.h"
 #include "worker/pass/tile_renderer.h"
 
 namespace baton {
 
-/// See tile_renderer.h. Immutable but for the lights, which are prepared on demand and guard themselves.
+/// See tile_renderer.h. Immutable but for lights and geometry, which are prepared frame by frame on
+/// demand and guard themselves.
 class RenderContext {
  public:
   JobSpec job;
@@ -19,7 +20,7 @@ class RenderContext {
   TileGrid grid{1, 1, 1};
   std::vector<FrameSpec> frames;
   std::unique_ptr<const Scene> scene;
-  std::unique_ptr<const Accel> accel;
+  std::unique_ptr<GeometrySequence> geometry;
   std::unique_ptr<const PixelSampler> sampler;  ///< null: reference
   std::unique_ptr<LightSequence> lights;
 };

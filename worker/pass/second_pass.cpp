@@ -69,6 +69,7 @@ Masks make_masks(const VisibilitySpec& visibility, const SampleRegion& samples,
 /// What the pass needs to know of its tile and frame.
 struct Work {
   const RenderContext& context;
+  const FrameGeometry& geometry;
   const FrameSpec& frame;
   const FrameLight& light;
   const SampleRegion& samples;
@@ -88,7 +89,7 @@ void exchange(const Work& work, std::span<Rgb> radiance, RenderStats& stats) {
                                         PassId::partition));
   const EnvironmentView environment = view_of(work.light.now);
   const PixelRect& rect = work.masks.any.rect();
-  TracedExchange scene(*work.context.accel, environment, work.samples, work.surfaces, rect,
+  TracedExchange scene(*work.geometry.accel, environment, work.samples, work.surfaces, rect,
                        job.image.sites);
   ExchangeSettings settings{.form = job.visibility.form,
                             .num_slots = static_cast<std::uint32_t>(job.sampling.num_particles),
@@ -109,8 +110,8 @@ void exchange(const Work& work, std::span<Rgb> radiance, RenderStats& stats) {
 
 /// The rival: more samples of the pixels themselves.
 void sample_more(const Work& work, std::span<Rgb> radiance, RenderStats& stats) {
-  ExtraSampler sampler(work.context, work.frame, work.light, work.samples, work.surfaces,
-                       work.masks.any);
+  ExtraSampler sampler(work.context, work.geometry, work.frame, work.light, work.samples,
+                       work.surfaces, work.masks.any);
   for (std::int32_t y = work.rect.y0; y < work.rect.y1; ++y) {
     for (std::int32_t x = work.rect.x0; x < work.rect.x1; ++x) {
       if (!work.masks.any.at(x, y)) continue;
@@ -164,13 +165,13 @@ Result<SecondPassOutput> run_second_pass(const RenderContext& context, std::int3
       make_masks(visibility, samples, reach, grown(reach, visibility.dilate, context.job.image));
 
   // Do their pixels again.
-  const MaskedSurfaces surfaces(context, frame_index, masks.any);
+  BATON_ASSIGN(const auto geometry, context.geometry->at(frame_index));
+  const MaskedSurfaces surfaces(context, *geometry, masks.any);
   output.stats.rays_primary = surfaces.num_rays();
   BATON_ASSIGN(const auto light, context.lights->at(frame_index));
-  const Work work{context, context.frames[static_cast<std::size_t>(frame_index)],
-                  *light,  samples,
-                  masks,   surfaces,
-                  rect};
+  const Work work{context,  *geometry, context.frames[static_cast<std::size_t>(frame_index)],
+                  *light,   samples,   masks,
+                  surfaces, rect};
   std::vector<Rgb> radiance(static_cast<std::size_t>(rect.area()));
   if (visibility.form == SecondPassForm::extra_samples) {
     sample_more(work, radiance, output.stats);

@@ -68,8 +68,10 @@ struct TileFrameRenderer::Batch {
   }
 };
 
-TileFrameRenderer::TileFrameRenderer(const RenderContext& context, const TileSurfaces& surfaces)
+TileFrameRenderer::TileFrameRenderer(const RenderContext& context, const FrameGeometry& geometry,
+                                     const TileSurfaces& surfaces)
     : context_(context),
+      geometry_(geometry),
       surfaces_(surfaces),
       scratch_(std::make_unique<kernels::CandidateSet>()),
       collector_(context.job) {
@@ -78,6 +80,22 @@ TileFrameRenderer::TileFrameRenderer(const RenderContext& context, const TileSur
 
 FilmTile TileFrameRenderer::render(const FrameSpec& frame, const FrameLight& light, bool has_history,
                                    SampleState& state) {
+  reprojection_ = nullptr;
+  has_history_ = has_history;
+  return render_batches(frame, light, state);
+}
+
+FilmTile TileFrameRenderer::render(const FrameSpec& frame, const FrameLight& light,
+                                   Reprojection& history, SampleState& state) {
+  reprojection_ = &history;
+  const std::uint64_t rays_before = history.num_rays();
+  const FilmTile film = render_batches(frame, light, state);
+  stats_.rays_primary += history.num_rays() - rays_before;
+  return film;
+}
+
+FilmTile TileFrameRenderer::render_batches(const FrameSpec& frame, const FrameLight& light,
+                                           SampleState& state) {
   FilmWriter film(surfaces_.rect, context_.job.output.aovs);
   Batch batch;
   batch.frame_number = frame.number;
@@ -91,7 +109,11 @@ FilmTile TileFrameRenderer::render(const FrameSpec& frame, const FrameLight& lig
     batch.count = std::min(kBatchPixels, num_pixels - first);
     batch.pixels.fill({});
     if (context_.sampler != nullptr) {
-      sample(batch, light, has_history, state);
+      if (reprojection_ != nullptr) {
+        const StageTimer timer(stats_.seconds_primary);
+        reprojection_->look_up(surfaces_, batch.first, batch.count, frame.number);
+      }
+      sample(batch, light, state);
       trace(batch);
       shade(batch, state);
     } else {
@@ -105,8 +127,16 @@ FilmTile TileFrameRenderer::render(const FrameSpec& frame, const FrameLight& lig
   return film.film();
 }
 
+/// What pixel `index` starts from. state: its samples become those of the frame before, where they
+/// are not already.
+PixelHistory TileFrameRenderer::find_history(std::size_t pixel_of_batch, std::size_t index,
+                                             SampleState& state) {
+  if (reprojection_ != nullptr) return reprojection_->take(pixel_of_batch, index, state, old_);
+  return has_history_ ? PixelHistory::same : PixelHistory::none;
+}
+
 /// Pass: every pixel's properly weighted set, and the colours and rays that follow from it.
-void TileFrameRenderer::sample(Batch& batch, const FrameLight& light, bool has_history, SampleState& state) {
+void TileFrameRenderer::sample(Batch& batch, const FrameLight& light, SampleState& state) {
   const StageTimer timer(stats_.seconds_sample);
   const EnvironmentView now = view_of(light.now);
   const EnvironmentView before = view_of(light.before);
@@ -137,10 +167,17 @@ void TileFrameRenderer::sample(Batch& batch, const FrameLight& light, bool has_h
     }
 
     // Sample.
-    const PixelDiagnostics did = sample_populations(
-        *context_.sampler,
-        {sites, light, now, before, batch.key(context_, surfaces_.rect, index), frame_index, has_history}, index, *scratch_,
-        state);
+    const PixelHistory history = find_history(i, index, state);
+    const PixelInput input{.sites = sites,
+                           .light = light,
+                           .now = now,
+                           .before = before,
+                           .key = batch.key(context_, surfaces_.rect, index),
+                           .frame_index = frame_index,
+                           .has_history = history != PixelHistory::none,
+                           .old = history == PixelHistory::moved ? &old_ : nullptr};
+    const PixelDiagnostics did =
+        sample_populations(*context_.sampler, input, index, *scratch_, state);
     const std::span<const std::uint8_t> site = std::span(state.site).subspan(index * n, n);
 
     // Colour the samples and cast their rays.
@@ -179,7 +216,7 @@ void TileFrameRenderer::sample(Batch& batch, const FrameLight& light, bool has_h
 /// Pass: visibility of all samples of the batch at once.
 void TileFrameRenderer::trace(Batch& batch) {
   const StageTimer timer(stats_.seconds_visibility);
-  context_.accel->occluded(batch.rays);
+  geometry_.accel->occluded(batch.rays);
   stats_.rays_shadow += batch.rays.size();
 }
 
@@ -206,7 +243,7 @@ void TileFrameRenderer::shade(Batch& batch, const SampleState& state) {
 /// The judge's way: no samples are kept.
 void TileFrameRenderer::render_reference(Batch& batch, const FrameLight& light, SampleState& state) {
   const StageTimer timer(stats_.seconds_sample);
-  const ReferenceRenderer renderer(*context_.accel, context_.scene->materials);
+  const ReferenceRenderer renderer(*geometry_.accel, context_.scene->materials);
   for (std::size_t i = 0; i < batch.count; ++i) {
     const std::size_t index = batch.first + i;
     const std::span<const SurfaceHit> hits = surfaces_.pixel(index);

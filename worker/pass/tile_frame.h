@@ -4,6 +4,7 @@
 #include "worker/pass/film_writer.h"
 #include "worker/pass/first_pass_collector.h"
 #include "worker/pass/primary.h"
+#include "worker/pass/reproject.h"
 
 namespace baton {
 
@@ -11,11 +12,17 @@ namespace baton {
 /// that a batch stays in the cache.
 class TileFrameRenderer {
  public:
-  /// surfaces must outlive the object.
-  TileFrameRenderer(const RenderContext& context, const TileSurfaces& surfaces);
+  /// geometry and surfaces: of the frames that are rendered; must outlive the object.
+  TileFrameRenderer(const RenderContext& context, const FrameGeometry& geometry,
+                    const TileSurfaces& surfaces);
 
-  /// state: the samples of the previous frame when has_history, else only its sizes matter; becomes this frame's.
+  /// Where surfaces stay. state: the samples of the previous frame when has_history, else only its
+  /// sizes matter; becomes this frame's.
   FilmTile render(const FrameSpec& frame, const FrameLight& light, bool has_history, SampleState& state);
+  /// Where they move: the samples of the previous frame come from `history`. state: sized, all
+  /// zero.
+  FilmTile render(const FrameSpec& frame, const FrameLight& light, Reprojection& history,
+                  SampleState& state);
 
   /// What the second pass needs of the frame that was rendered last; once, and only if the job has a second pass.
   FirstPassSamples take_first_pass(const SampleState& state) { return collector_.finish(state, state.frame_index); }
@@ -28,14 +35,20 @@ class TileFrameRenderer {
   static constexpr std::size_t kBatchPixels = 64;
   struct Batch;
 
-  void sample(Batch& batch, const FrameLight& light, bool has_history, SampleState& state);
+  FilmTile render_batches(const FrameSpec& frame, const FrameLight& light, SampleState& state);
+  PixelHistory find_history(std::size_t pixel_of_batch, std::size_t index, SampleState& state);
+  void sample(Batch& batch, const FrameLight& light, SampleState& state);
   void trace(Batch& batch);
   void shade(Batch& batch, const SampleState& state);
   void render_reference(Batch& batch, const FrameLight& light, SampleState& state);
   void finish(Batch& batch, const FrameLight& light, FilmWriter& film);
 
   const RenderContext& context_;
+  const FrameGeometry& geometry_;
   const TileSurfaces& surfaces_;
+  Reprojection* reprojection_ = nullptr;  ///< of the frame in work; null where surfaces stay
+  bool has_history_ = false;              ///< of the frame in work, where surfaces stay
+  OldSurfaces old_;
   std::unique_ptr<kernels::CandidateSet> scratch_;
   FirstPassCollector collector_;
   std::vector<float> picture_scale_;  ///< (populations)

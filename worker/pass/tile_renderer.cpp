@@ -2,8 +2,11 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
 #include "common/job/motion.h"
 #include "worker/pass/cpu_clock.h"
+#include "worker/pass/populations.h"
 #include "worker/pass/tile_frame.h"
 
 namespace baton {
@@ -40,54 +43,105 @@ Status check_previous(const RenderContext& context, const TileRun& run, std::spa
   return {};
 }
 
+/// A tile on its way through its frames.
+class TileWalk {
+ public:
+  TileWalk(const RenderContext& context, const TileRun& run)
+      : context_(context), rect_(context.grid.rect(run.tile)) {
+    state_.resize(rect_, context.job.sampling.num_particles, num_populations(context.job));
+    state_.job_digest = context.digest;
+    state_.tile = run.tile;
+  }
+
+  /// Where surfaces stay: the tile's own samples go on.
+  void go_on_from(const SampleState& previous) {
+    state_ = previous;
+    has_history_ = true;
+  }
+
+  /// Renders the next frame with the surfaces of all frames.
+  Result<FilmTile> render_still(const FrameSpec& frame) {
+    BATON_ASSIGN(const std::shared_ptr<const FrameLight> light, light_of(frame));
+    if (renderer_ == nullptr) {
+      BATON_ASSIGN(geometry_, context_.geometry->at(frame.index));
+      renderer_ = std::make_unique<TileFrameRenderer>(context_, *geometry_, trace(*geometry_));
+    }
+    FilmTile film = renderer_->render(frame, *light, has_history_, state_);
+    has_history_ = carries_state(context_.job);
+    return film;
+  }
+
+  /// Renders one frame with surfaces of its own. previous: the states that history may come from,
+  /// or none.
+  Result<FilmTile> render_moving(const FrameSpec& frame, std::span<const StatePtr> previous) {
+    BATON_ASSIGN(const std::shared_ptr<const FrameLight> light, light_of(frame));
+    BATON_ASSIGN(geometry_, context_.geometry->at(frame.index));
+    BATON_ASSIGN(const std::shared_ptr<const FrameGeometry> before,
+                 context_.geometry->at(std::max(frame.index - 1, 0)));
+    state_.resize(rect_, context_.job.sampling.num_particles, num_populations(context_.job));
+    if (renderer_ != nullptr) stats_.merge(renderer_->stats());
+    renderer_ = std::make_unique<TileFrameRenderer>(context_, *geometry_, trace(*geometry_));
+    Reprojection history(context_, *geometry_, *before, previous);
+    return renderer_->render(frame, *light, history, state_);
+  }
+
+  const SampleState& state() const { return state_; }
+  /// Of the frame that was rendered last.
+  const SamplingStats& frame_sampling() const { return renderer_->frame_sampling(); }
+  /// What the second pass needs of that frame.
+  FirstPassSamples take_first_pass() { return renderer_->take_first_pass(state_); }
+  RenderStats stats() const {
+    RenderStats stats = stats_;
+    if (renderer_ != nullptr) stats.merge(renderer_->stats());
+    return stats;
+  }
+
+ private:
+  Result<std::shared_ptr<const FrameLight>> light_of(const FrameSpec& frame) {
+    const StageTimer timer(stats_.seconds_light);
+    return context_.lights->at(frame.index);
+  }
+  const TileSurfaces& trace(const FrameGeometry& geometry) {
+    const StageTimer timer(stats_.seconds_primary);
+    surfaces_ = trace_primary(context_.job, geometry, rect_);
+    stats_.rays_primary += surfaces_.rays.size();
+    return surfaces_;
+  }
+
+  const RenderContext& context_;
+  const PixelRect rect_;
+  SampleState state_;
+  bool has_history_ = false;
+  std::shared_ptr<const FrameGeometry> geometry_;
+  TileSurfaces surfaces_;
+  std::unique_ptr<TileFrameRenderer> renderer_;  ///< of the frame that was rendered last
+  RenderStats stats_;
+};
+
 }  // namespace
 
 Result<RenderStats> run_tile(const RenderContext& context, const TileRun& run,
-                             std::span<const StatePtr> previous, const TileRunSink& sink, std::stop_token stop) {
+                             std::span<const StatePtr> previous, const TileRunSink& sink,
+                             std::stop_token stop) {
   const double start = thread_cpu_seconds();
-  const PixelRect rect = context.grid.rect(run.tile);
   BATON_TRY(check_previous(context, run, previous));
-
-  // Take over the previous samples, or start with none.
-  SampleState state;
-  if (!previous.empty()) {
-    state = *previous.front();
-  } else {
-    state.resize(rect, context.job.sampling.num_particles, num_populations(context.job));
-  }
-  state.job_digest = context.digest;
-  state.tile = run.tile;
-
-  // Surfaces once: nothing but the light changes from frame to frame.
-  RenderStats primary;
-  TileSurfaces surfaces;
-  {
-    const StageTimer timer(primary.seconds_primary);
-    surfaces = trace_primary(context, rect);
-    primary.rays_primary = surfaces.rays.size();
-  }
+  const bool moving = moves(context.job);
+  TileWalk walk(context, run);
+  if (!moving && !previous.empty()) walk.go_on_from(*previous.front());
 
   // Frame by frame.
-  TileFrameRenderer renderer(context, surfaces);
-  double seconds_light = 0;
   for (std::int32_t f = run.first_frame; f <= run.last_frame; ++f) {
     if (stop.stop_requested()) return Error{ErrorKind::cancelled, "stopped"};
-    std::shared_ptr<const FrameLight> light;
-    {
-      const StageTimer timer(seconds_light);
-      BATON_ASSIGN(light, context.lights->at(f));
-    }
-    const bool has_history = carries_state(context.job) && (!previous.empty() || f > run.first_frame);
-    const FilmTile film = renderer.render(context.frames[static_cast<std::size_t>(f)], *light, has_history, state);
+    const FrameSpec& frame = context.frames[static_cast<std::size_t>(f)];
+    BATON_ASSIGN(const FilmTile film,
+                 moving ? walk.render_moving(frame, previous) : walk.render_still(frame));
     BATON_TRY(sink.film(f, film));
-    if (sink.diagnostics) sink.diagnostics({f, run.tile, renderer.frame_sampling()});
-    if (context.job.visibility.correlated) BATON_TRY(sink.samples(renderer.take_first_pass(state)));
+    if (sink.diagnostics) sink.diagnostics({f, run.tile, walk.frame_sampling()});
+    if (context.job.visibility.correlated) BATON_TRY(sink.samples(walk.take_first_pass()));
   }
-  if (carries_state(context.job)) BATON_TRY(sink.state(state));
+  if (carries_state(context.job)) BATON_TRY(sink.state(walk.state()));
 
-  RenderStats stats = renderer.stats();
-  stats.merge(primary);
-  stats.seconds_light += seconds_light;
+  RenderStats stats = walk.stats();
   stats.cpu_seconds += thread_cpu_seconds() - start;
   return stats;
 }

@@ -50,12 +50,13 @@ Result<TaskOutput> execute_render(const LoadedJob& loaded, BlobStore& store, con
     return Error{ErrorKind::bad_input,
                  fmt::format("the job has no tile {} in run {}", task.tile, task.step)};
   }
-  double seconds_state = 0;
+  double seconds_read = 0;
   std::vector<StatePtr> previous;
   {
-    const StageTimer timer(seconds_state);
+    const StageTimer timer(seconds_read);
     BATON_ASSIGN(previous, read_states(loaded, store, inputs));
   }
+  double seconds_state = seconds_read;
 
   // Render; all outputs become durable together, before anybody hears of them.
   TaskOutput output;
@@ -85,7 +86,9 @@ Result<TaskOutput> execute_render(const LoadedJob& loaded, BlobStore& store, con
                          }};
   const TileRun run = tile_run(loaded.job, task.tile, task.step);
   BATON_ASSIGN(output.stats, run_tile(*loaded.context, run, previous, sink, stop));
+  // run_tile counts what its sink does, not what was read before.
   output.stats.seconds_state = seconds_state;
+  output.stats.cpu_seconds += seconds_read;
   BATON_TRY(store.sync());
   return output;
 }

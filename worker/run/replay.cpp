@@ -4,13 +4,18 @@
 
 #include <algorithm>
 #include <iterator>
+#include <map>
+#include <memory>
+#include <set>
 
 #include "common/image/film_tile.h"
 #include "common/job/job_json.h"
+#include "common/job/motion.h"
 #include "common/job/sequence.h"
 #include "worker/pass/second_pass.h"
 #include "worker/pass/tile_renderer.h"
 #include "worker/run/frame_output.h"
+#include "worker/scene/settle_motion.h"
 
 namespace baton {
 namespace {
@@ -48,6 +53,52 @@ Status check_place(const JobSpec& job, const ReplayOptions& options) {
   return {};
 }
 
+/// The tiles of each frame before `frame_index` that a tile depends on: they spread by whole tiles
+/// with each step back.
+std::vector<std::set<std::int32_t>> find_ancestors(const JobSpec& job, std::int32_t frame_index,
+                                                   std::int32_t tile) {
+  const TileGrid grid(job.image);
+  std::vector<std::set<std::int32_t>> ancestors(static_cast<std::size_t>(frame_index));
+  std::set<std::int32_t> heirs{tile};
+  for (auto tiles = ancestors.rbegin(); tiles != ancestors.rend(); ++tiles) {
+    for (const std::int32_t heir : heirs) {
+      for (const std::int32_t near : grid.tiles_near(heir, history_reach_px(job)))
+        tiles->insert(near);
+    }
+    heirs = *tiles;
+  }
+  return ancestors;
+}
+
+/// The states of the frame before `frame_index` that a tile starts from.
+Result<std::vector<StatePtr>> render_history(const RenderContext& context, const JobSpec& job,
+                                             std::int32_t frame_index, std::int32_t tile) {
+  const TileGrid grid(job.image);
+  const std::vector<std::set<std::int32_t>> ancestors = find_ancestors(job, frame_index, tile);
+  std::map<std::int32_t, StatePtr> states;
+  for (std::int32_t frame = 0; frame < frame_index; ++frame) {
+    std::map<std::int32_t, StatePtr> next;
+    for (const std::int32_t t : ancestors[static_cast<std::size_t>(frame)]) {
+      std::vector<StatePtr> previous;
+      for (const std::int32_t near : grid.tiles_near(t, history_reach_px(job))) {
+        if (frame > 0) previous.push_back(states.at(near));
+      }
+      const TileRunSink sink{.film = [](int, const FilmTile&) { return Status(); },
+                             .state =
+                                 [&](const SampleState& state) {
+                                   next[t] = std::make_shared<const SampleState>(state);
+                                   return Status();
+                                 }};
+      BATON_ASSIGN([[maybe_unused]] const RenderStats stats,
+                   run_tile(context, {t, frame, frame, frame}, previous, sink, {}));
+    }
+    states = std::move(next);
+  }
+  std::vector<StatePtr> history;
+  for (const auto& [t, state] : states) history.push_back(state);
+  return history;
+}
+
 /// One tile up to a frame, first pass only.
 struct FirstPass {
   LastFrame last;
@@ -72,10 +123,15 @@ Result<FirstPass> render_first_pass(const RenderContext& context, const JobSpec&
                                    std::make_shared<const FirstPassSamples>(std::move(samples));
                                return Status();
                              }};
-  // Carried samples depend on every frame before.
-  const std::int32_t first_frame = carries_state(job) ? 0 : frame_index;
+  // Carried samples depend on every frame before: where surfaces stay, of this tile alone.
+  const bool moving = moves(job);
+  std::vector<StatePtr> previous;
+  if (carries_state(job) && moving) {
+    BATON_ASSIGN(previous, render_history(context, job, frame_index, tile));
+  }
+  const std::int32_t first_frame = carries_state(job) && !moving ? 0 : frame_index;
   BATON_ASSIGN(pass.last.stats,
-               run_tile(context, {tile, 0, first_frame, frame_index}, {}, sink, {}));
+               run_tile(context, {tile, 0, first_frame, frame_index}, previous, sink, {}));
   return pass;
 }
 
@@ -114,8 +170,8 @@ std::string describe_stats(const RenderStats& s) {
       s.pixels, s.pixels_background, did.pixels_fresh, did.pixels_carried, did.pixels_refreshed,
       did.pixels_restarted, did.pixels_resampled, s.rays_primary, s.rays_shadow,
       s.target_evaluations, did.local_accepted, did.local_proposed, did.independent_accepted,
-      did.independent_proposed, s.cpu_seconds, s.seconds_light, s.seconds_primary,
-      s.seconds_sample, s.seconds_visibility, s.seconds_shade);
+      did.independent_proposed, s.cpu_seconds, s.seconds_light, s.seconds_primary, s.seconds_sample,
+      s.seconds_visibility, s.seconds_shade);
 }
 
 const char* source_name(PixelSource source) {
@@ -165,7 +221,8 @@ std::string describe_pixel(const LastFrame& last, const PixelPosition& position)
 }  // namespace
 
 Result<std::string> replay_tile(const ReplayOptions& options) {
-  BATON_ASSIGN(const JobSpec job, load_job(options.job));
+  BATON_ASSIGN(JobSpec written, load_job(options.job));
+  BATON_ASSIGN(const JobSpec job, settle_motion(std::move(written)));
   BATON_ASSIGN(const std::int32_t frame_index, find_frame(job, options.frame_number));
   BATON_TRY(check_place(job, options));
   BATON_ASSIGN(const LastFrame last, render(job, frame_index, options.tile));

@@ -28,12 +28,23 @@ Camera::Camera(const CameraSpec& spec, int width, int height) : origin_(spec.pos
   const auto pixel = static_cast<float>(2 * std::tan(half_angle) / height);
   right_ = right * pixel;
   down_ = up * -pixel;
+  forward_ = forward;
+  center_x_ = 0.5f * static_cast<float>(width);
+  center_y_ = 0.5f * static_cast<float>(height);
   corner_ = forward - right_ * (0.5f * static_cast<float>(width)) -
             down_ * (0.5f * static_cast<float>(height));
 }
 
 Ray Camera::ray(float x, float y) const {
   return {origin_, normalize(corner_ + right_ * x + down_ * y)};
+}
+
+std::optional<std::array<float, 2>> Camera::project(const Vec3& point) const {
+  const Vec3 view = point - origin_;
+  const float ahead = dot(view, forward_);
+  if (!(ahead > 0)) return std::nullopt;
+  return std::array<float, 2>{center_x_ + dot(view, right_) / (dot(right_, right_) * ahead),
+                              center_y_ + dot(view, down_) / (dot(down_, down_) * ahead)};
 }
 
 }  // namespace baton

@@ -1,5 +1,8 @@
 #pragma once
 
+#include <array>
+#include <optional>
+
 #include "common/job/job_spec.h"
 #include "common/math/vec3.h"
 
@@ -10,7 +13,8 @@ struct Ray {
   Vec3 direction;  ///< unit
 };
 
-/// Pinhole camera. Pixel coordinates: (0, 0) is the upper left corner of the upper left pixel, x to the right, y down.
+/// Pinhole camera. Pixel coordinates: (0, 0) is the upper left corner of the upper left pixel, x to
+/// the right, y down.
 class Camera {
  public:
   Camera() = default;
@@ -18,12 +22,18 @@ class Camera {
 
   /// Ray through image position (x, y) in pixels.
   Ray ray(float x, float y) const;
+  /// Image position in pixels of a point; the inverse of ray(). nullopt behind the camera.
+  std::optional<std::array<float, 2>> project(const Vec3& point) const;
+
+  bool operator==(const Camera&) const = default;
 
  private:
   Vec3 origin_;
+  Vec3 forward_{0, 0, -1};  ///< unit
   Vec3 right_{1, 0, 0};     ///< image-plane step of one pixel
   Vec3 down_{0, -1, 0};
-  Vec3 corner_{0, 0, -1};   ///< direction of position (0, 0), not unit
+  Vec3 corner_{0, 0, -1};              ///< direction of position (0, 0), not unit
+  float center_x_ = 0, center_y_ = 0;  ///< image position straight ahead
 };
 
 }  // namespace baton

@@ -38,6 +38,8 @@ struct ShadingPoint {
   Vec3 ng;  ///< geometric normal
   Vec3 ns;  ///< shading normal
   Vec3 wo;  ///< to the viewer
+
+  bool operator==(const ShadingPoint&) const = default;
 };
 
 /// True when wi is above the shading and the geometric horizon: elsewhere every target is 0.

@@ -6,6 +6,9 @@
 #include <optional>
 #include <unordered_map>
 
+#include "common/job/motion.h"
+#include "common/math/inverse.h"
+
 namespace baton {
 namespace {
 
@@ -21,25 +24,6 @@ class Faults {
  private:
   std::string text_;
 };
-
-/// Inverse transpose of `m` (cofactors over determinant); nullopt when `m` is singular or not
-/// finite.
-std::optional<Mat3> inverse_transposed(const Mat3& m) {
-  const auto& a = m.m;
-  const auto minor = [&a](int i, int j, int k, int l) {
-    return double{a[i]} * a[j] - double{a[k]} * a[l];
-  };
-  const std::array<double, 9> cofactors{minor(4, 8, 5, 7), minor(5, 6, 3, 8), minor(3, 7, 4, 6),
-                                        minor(2, 7, 1, 8), minor(0, 8, 2, 6), minor(1, 6, 0, 7),
-                                        minor(1, 5, 2, 4), minor(2, 3, 0, 5), minor(0, 4, 1, 3)};
-  const double determinant = a[0] * cofactors[0] + a[1] * cofactors[1] + a[2] * cofactors[2];
-  Mat3 result;
-  for (std::size_t i = 0; i < 9; ++i) {
-    result.m[i] = static_cast<float>(cofactors[i] / determinant);
-    if (!std::isfinite(result.m[i])) return std::nullopt;
-  }
-  return result;
-}
 
 /// Lowest and highest y of the mesh after `linear`.
 std::pair<float, float> vertical_bounds(const TriangleMesh& mesh, const Mat3& linear) {
@@ -115,8 +99,8 @@ NameIndex load_meshes(const SceneSpec& spec, Scene& scene, Faults& faults) {
   return names;
 }
 
-void place_object(const ObjectSpec& object, const std::string& name, std::uint32_t mesh,
-                  std::uint32_t material, Scene& scene, Faults& faults) {
+void place_object(const ObjectSpec& object, std::size_t index, const std::string& name,
+                  std::uint32_t mesh, std::uint32_t material, Scene& scene, Faults& faults) {
   if (scene.meshes[mesh].positions.empty()) return;  // its own fault is known
   const Result<Transform> to_world = object_transform(object, scene.meshes[mesh], name);
   if (!to_world) {
@@ -128,7 +112,8 @@ void place_object(const ObjectSpec& object, const std::string& name, std::uint32
     faults.add(name + ": expected a finite scale without zeros");
     return;
   }
-  scene.instances.push_back({mesh, material, *to_world, *normal_to_world});
+  const std::int32_t moving_object = moves(object) ? static_cast<std::int32_t>(index) : -1;
+  scene.instances.push_back({mesh, material, *to_world, *normal_to_world, moving_object});
 }
 
 }  // namespace
@@ -136,7 +121,6 @@ void place_object(const ObjectSpec& object, const std::string& name, std::uint32
 Result<Scene> load_scene(const JobSpec& job) {
   Scene scene;
   Faults faults;
-  scene.camera = Camera(job.camera, job.image.width, job.image.height);
 
   // Materials and meshes, in the order of their names.
   NameIndex materials;
@@ -152,7 +136,7 @@ Result<Scene> load_scene(const JobSpec& job) {
     const std::string name = "scene.objects[" + std::to_string(i) + "]";
     const auto mesh = find_name(meshes, object.mesh, "mesh", name, faults);
     const auto material = find_name(materials, object.material, "material", name, faults);
-    if (mesh && material) place_object(object, name, *mesh, *material, scene, faults);
+    if (mesh && material) place_object(object, i, name, *mesh, *material, scene, faults);
   }
 
   // The ground comes last.
@@ -162,7 +146,7 @@ Result<Scene> load_scene(const JobSpec& job) {
     if (material) {
       const auto mesh = static_cast<std::uint32_t>(scene.meshes.size());
       scene.meshes.push_back(ground_mesh(*job.scene.ground));
-      scene.instances.push_back({mesh, *material, {}, {}});
+      scene.instances.push_back({mesh, *material, {}, {}, -1});
     }
   }
   if (faults.any()) return faults.error();

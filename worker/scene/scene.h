@@ -6,7 +6,6 @@
 
 #include "common/base/result.h"
 #include "common/job/job_spec.h"
-#include "worker/scene/camera.h"
 #include "worker/scene/material.h"
 
 namespace baton {
@@ -19,8 +18,8 @@ struct TriangleMesh {
   std::uint64_t dropped_triangles = 0;
 };
 
-/// Reads .ply .obj .off .gltf .glb. Errors name the file: missing, not a mesh, no triangles, indices out of range,
-/// coordinates that are not finite.
+/// Reads .ply .obj .off .gltf .glb. Errors name the file: missing, not a mesh, no triangles,
+/// indices out of range, coordinates that are not finite.
 Result<TriangleMesh> load_mesh(const std::string& path, bool smooth_normals);
 
 /// A mesh placed in the world.
@@ -28,15 +27,17 @@ struct Instance {
   std::uint32_t mesh = 0;
   std::uint32_t material = 0;
   Transform to_world;
-  Mat3 normal_to_world;  ///< inverse transpose of to_world.linear
+  Mat3 normal_to_world;             ///< inverse transpose of to_world.linear
+  std::int32_t moving_object = -1;  ///< index of the job's object, where that has keys; else -1
+
+  bool moves() const { return moving_object >= 0; }
 };
 
 /// All geometry of a job; immutable once loaded, shared by all threads.
 struct Scene {
   std::vector<TriangleMesh> meshes;
   std::vector<Material> materials;
-  std::vector<Instance> instances;
-  Camera camera;
+  std::vector<Instance> instances;  ///< placed as without keys; pose.h moves them
 };
 
 /// Loads every mesh and resolves every name. The ground is a two-triangle mesh of its own.

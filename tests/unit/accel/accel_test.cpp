@@ -150,6 +150,90 @@ TEST(Accel, MirroredAndStretchedInstancesKeepTheirNormals) {
   EXPECT_GT(dot(hit.point.ng, hit.point.ns), 0.99f);
 }
 
+TEST(Accel, MovedInstancesAreWhereAFreshSceneHasThem) {
+  // A still bumpy sphere and two that move; the witness is a flat scene of all three.
+  Scene scene = scene_of(sphere_mesh(24, 48, 0.2f));
+  const auto add = [&](const Transform& to_world, std::int32_t moving_object) {
+    scene.instances.push_back({0, 0, to_world, {}, moving_object});
+  };
+  add({{}, {50, 0, 0}}, 0);
+  add({{}, {-50, 0, 0}}, 1);
+  const auto rest = build(scene);
+  std::vector<Instance> moved = scene.instances;
+  moved[1].to_world = {rotation_about({1, 2, 3}, 50), {1.5f, 0.2f, 0}};
+  moved[1].normal_to_world = moved[1].to_world.linear;
+  moved[2].to_world = {rotation_about({0, 1, 0}, 20), {-0.4f, 2.1f, 0.3f}};
+  moved[2].normal_to_world = moved[2].to_world.linear;
+  const auto placed = rest->place(moved);
+  ASSERT_TRUE(placed) << placed.error().message;
+
+  Scene flat = scene;
+  flat.instances = moved;
+  for (Instance& instance : flat.instances) instance.moving_object = -1;
+  const auto witness = build(flat);
+  std::array<int, 3> seen{};
+  ShadowRays shadow;
+  for (std::uint32_t i = 0; i < 4000; ++i) {
+    const auto u = test_uniforms(31, 2 * i);
+    const auto v = test_uniforms(31, 2 * i + 1);
+    const Vec3 origin{8 * u[0] - 4, 8 * u[1] - 4, 5};
+    const Vec3 direction = normalize(Vec3{3 * v[0] - 1.5f, 4 * v[1] - 1.5f, 0} - origin);
+    const SurfaceHit hit = trace(**placed, origin, direction);
+    const SurfaceHit expected = trace(*witness, origin, direction);
+    shadow.push(origin, direction);
+    if (hit.hit != expected.hit || hit.instance != expected.instance)
+      continue;  // a ray along an edge
+    if (!hit.hit) continue;
+    ++seen[hit.instance];
+    ASSERT_NEAR(hit.depth, expected.depth, 1e-3f);
+    ASSERT_GT(dot(hit.point.ns, expected.point.ns), 0.999f);
+  }
+  for (const int count : seen) EXPECT_GT(count, 300);
+
+  // Shadow rays agree up to rays along edges.
+  ShadowRays by_witness = shadow;
+  (*placed)->occluded(shadow);
+  witness->occluded(by_witness);
+  int different = 0;
+  for (std::size_t i = 0; i < shadow.size(); ++i)
+    different += (shadow.t_far[i] < 0) != (by_witness.t_far[i] < 0) ? 1 : 0;
+  EXPECT_LT(different, 8);
+}
+
+TEST(Accel, AGroupOfRaysIsTracedTheSameWhateverIsTracedWithIt) {
+  const Scene scene = scene_of(triangle_soup(20000));
+  const auto accel = build(scene);
+  for (const std::size_t group : {1u, 4u, 9u, 16u}) {
+    // Groups like the sites of a pixel, all over the soup.
+    std::vector<Ray> rays;
+    for (std::uint32_t i = 0; i < 300 * group; ++i) {
+      const auto u = test_uniforms(41, i / static_cast<std::uint32_t>(group));
+      const auto v = test_uniforms(42, i);
+      rays.push_back(
+          {{0, 0, 30}, normalize({u[0] - 0.5f + 0.01f * v[0], u[1] - 0.5f + 0.01f * v[1], -1.5f})});
+    }
+    std::vector<SurfaceHit> together(rays.size());
+    accel->intersect(rays, together, group);
+    std::size_t hits = 0, alike = 0;
+    for (std::size_t i = 0; i < rays.size(); i += group) {
+      std::vector<SurfaceHit> alone(group);
+      accel->intersect(std::span(rays).subspan(i, group), alone, group);
+      for (std::size_t k = 0; k < group; ++k) {
+        ASSERT_EQ(alone[k], together[i + k]);
+        // Single rays see the same, but for the last bits.
+        const SurfaceHit single = trace(*accel, rays[i + k].origin, rays[i + k].direction);
+        hits += single.hit ? 1 : 0;
+        alike += single.hit && together[i + k].hit &&
+                         std::fabs(single.depth - together[i + k].depth) < 1e-3f
+                     ? 1
+                     : 0;
+      }
+    }
+    EXPECT_GT(hits, 100u);
+    EXPECT_GE(alike + 2, hits);
+  }
+}
+
 TEST(Accel, LiftedRaysDoNotMeetTheirOwnSurface) {
   // A convex body: nothing above the horizon of a point can be hidden. (A small one far from the
   // origin is not convex: its corners are rounded to the floats out there.)

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "common/job/motion.h"
 #include "tests/support/small_scene.h"
 
 namespace baton {
@@ -34,10 +35,14 @@ std::vector<FilmTile> render_tiled(JobSpec job, int tile_size, int run_length) {
   EXPECT_TRUE(context.ok());
   std::vector<FilmTile> images(job.frames.size());
   const TileGrid grid(job.image);
-  for (std::int32_t tile = 0; tile < grid.count(); ++tile) {
-    std::vector<StatePtr> states;
-    for (std::int32_t run = 0; run < num_runs(job); ++run) {
-      std::vector<StatePtr> next;
+  std::vector<StatePtr> states(static_cast<std::size_t>(grid.count()));
+  for (std::int32_t run = 0; run < num_runs(job); ++run) {
+    std::vector<StatePtr> next(states.size());
+    for (std::int32_t tile = 0; tile < grid.count(); ++tile) {
+      std::vector<StatePtr> previous;
+      for (const std::int32_t near : grid.tiles_near(tile, history_reach_px(job))) {
+        if (run > 0) previous.push_back(states[static_cast<std::size_t>(near)]);
+      }
       const TileRunSink sink{[&](int frame, const FilmTile& film) {
                                FilmTile& image = images[static_cast<std::size_t>(frame)];
                                image.rect = {0, 0, job.image.width, job.image.height};
@@ -53,12 +58,14 @@ std::vector<FilmTile> render_tiled(JobSpec job, int tile_size, int run_length) {
                                return Status();
                              },
                              [&](const SampleState& s) {
-                               next = {std::make_shared<const SampleState>(*decode_state(encode_state(s), "test"))};
+                               next[static_cast<std::size_t>(tile)] =
+                                   std::make_shared<const SampleState>(
+                                       *decode_state(encode_state(s), "test"));
                                return Status();
                              }};
-      EXPECT_TRUE(run_tile(**context, tile_run(job, tile, run), states, sink, {}).ok());
-      states = next;
+      EXPECT_TRUE(run_tile(**context, tile_run(job, tile, run), previous, sink, {}).ok());
     }
+    states = std::move(next);
   }
   return images;
 }
@@ -69,6 +76,38 @@ TEST(RunTile, SameBytesForAnyTilingAndAnyRunLength) {
   EXPECT_EQ(render_tiled(job, 8, 5), whole);
   EXPECT_EQ(render_tiled(job, 5, 2), whole);
   EXPECT_EQ(render_tiled(job, 4096, 1), whole);
+}
+
+TEST(RunTile, SameBytesForAnyTilingWhileCameraAndObjectsMove) {
+  for (const int sites : {1, 4}) {
+    JobSpec job = sequence_job(4);
+    job.image.sites = sites;
+    test::set_in_motion(job, /*camera=*/true, /*object=*/true);
+    const std::vector<FilmTile> whole = render_tiled(job, 4096, 5);
+    EXPECT_EQ(render_tiled(job, 8, 2), whole);
+    EXPECT_EQ(render_tiled(job, 3, 1), whole);
+  }
+}
+
+TEST(RunTile, AMotionThatGoesNowhereIsNoMotion) {
+  JobSpec still = sequence_job(4);
+  JobSpec job = still;
+  job.camera.keys = {
+      {.frame = 1, .position = still.camera.position, .look_at = still.camera.look_at}};
+  job.motion.max_px = 2;
+  EXPECT_EQ(render_tiled(job, 8, 5), render_tiled(still, 8, 5));
+}
+
+TEST(RunTile, MostPixelsAreCarriedThroughMotion) {
+  JobSpec job = sequence_job(5);
+  job.image.width = 48;
+  job.image.height = 36;
+  job.sampling.refresh_every = 0;
+  test::set_in_motion(job, true, true);
+  const RenderStats stats = render_tile(job).stats;
+  const auto surface = static_cast<double>(stats.pixels - stats.pixels_background) * 4 / 5;
+  EXPECT_GT(static_cast<double>(stats.sampling.pixels_carried) / surface, 0.9);
+  EXPECT_GT(stats.sampling.pixels_fresh, stats.pixels / 8) << "what comes into view starts afresh";
 }
 
 TEST(RunTile, CarriesEverySurfacePixelOn) {

@@ -1,0 +1,113 @@
+#pragma once
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <vector>
+
+#include "tests/support/small_scene.h"
+
+/// Estimators against brute force. Runs (seeds) are independent; pixels and frames of one run are
+/// not, so all statistics are taken over runs.
+namespace baton::test {
+
+/// Per-pixel means and squared standard errors of an estimator.
+struct Estimate {
+  std::vector<double> mean, variance;
+  double image_mean = 0, image_variance = 0;
+};
+
+/// The last frame of `job` over independent seeds.
+inline Estimate repeat(JobSpec job, int runs) {
+  Estimate e;
+  std::vector<double> sum, squares;
+  double image_sum = 0, image_squares = 0;
+  for (int run = 1; run <= runs; ++run) {
+    job.seed = static_cast<std::uint64_t>(run);
+    const std::vector<double> pixels = mean_rgb(render_tile(job).films.back());
+    sum.resize(pixels.size());
+    squares.resize(pixels.size());
+    double image = 0;
+    for (std::size_t i = 0; i < pixels.size(); ++i) {
+      sum[i] += pixels[i];
+      squares[i] += pixels[i] * pixels[i];
+      image += pixels[i] / static_cast<double>(pixels.size());
+    }
+    image_sum += image;
+    image_squares += image * image;
+  }
+  const auto variance_of_mean = [runs](double s, double s2) {
+    const double mean = s / runs;
+    return std::max(s2 / runs - mean * mean, 0.0) / (runs - 1);
+  };
+  for (std::size_t i = 0; i < sum.size(); ++i) {
+    e.mean.push_back(sum[i] / runs);
+    e.variance.push_back(variance_of_mean(sum[i], squares[i]));
+  }
+  e.image_mean = image_sum / runs;
+  e.image_variance = variance_of_mean(image_sum, image_squares);
+  return e;
+}
+
+/// Leaves the last frame alone, with the sky as it is then.
+inline void keep_last_frame(JobSpec& job) {
+  job.environment.rotation_start_deg +=
+      job.environment.rotation_deg_per_frame * (job.frames.back() - job.frames.front());
+  job.frames = {job.frames.back()};
+}
+
+/// The last frame by brute force, with its own standard errors.
+inline Estimate judge(JobSpec job, int samples) {
+  job.sampling.method = Method::reference;
+  job.sampling.reference_samples = samples;
+  keep_last_frame(job);
+  job.seed = 99991;
+  const FilmTile film = render_tile(job).films.back();
+  Estimate e;
+  e.mean = mean_rgb(film);
+  const auto variance = channel(film, "variance");
+  const auto n = static_cast<double>(e.mean.size());
+  for (std::size_t i = 0; i < e.mean.size(); ++i) {
+    e.variance.push_back(variance[i]);
+    e.image_mean += e.mean[i] / n;
+    e.image_variance += variance[i] / (n * n);
+  }
+  return e;
+}
+
+/// What the comparison found: the largest |z| of any pixel and that of the image mean.
+struct Verdict {
+  double worst_pixel = 0, image = 0;
+  double resolution =
+      0;  ///< smallest relative bias of the image mean that |z| > 3.9 would have shown
+};
+inline Verdict compare(const Estimate& a, const Estimate& b) {
+  Verdict v;
+  for (std::size_t i = 0; i < a.mean.size(); ++i) {
+    // Float rounding of the film itself is the floor of what can be told apart.
+    const double floor = 1e-6 * b.mean[i] * b.mean[i];
+    v.worst_pixel = std::max(v.worst_pixel, std::fabs(a.mean[i] - b.mean[i]) /
+                                                std::sqrt(a.variance[i] + b.variance[i] + floor));
+  }
+  const double error = std::sqrt(a.image_variance + b.image_variance);
+  v.image = std::fabs(a.image_mean - b.image_mean) / error;
+  v.resolution = 3.9 * error / b.image_mean;
+  return v;
+}
+
+// Level 1e-3 per comparison. 108 pixels with Sidak: 9.3e-6 two-sided per pixel, which for the t
+// distribution of 47 degrees of freedom is |t| = 5.0; the judge's share of the error only lightens
+// the tail. Image mean: |z| = 3.5.
+inline constexpr double kPixelLimit = 5.0;
+inline constexpr double kImageLimit = 3.5;
+
+inline void expect_agreement(const JobSpec& job, int runs, double max_resolution) {
+  const Verdict v = compare(repeat(job, runs), judge(job, 60000));
+  EXPECT_LT(v.worst_pixel, kPixelLimit);
+  EXPECT_LT(v.image, kImageLimit);
+  EXPECT_LT(v.resolution, max_resolution);
+  std::printf("  image |z| %.2f, worst pixel |z| %.2f, resolves a bias of %.2f %%\n", v.image,
+              v.worst_pixel, 100 * v.resolution);
+}
+
+}  // namespace baton::test

@@ -1,0 +1,146 @@
+// The sequential sampler through motion against brute force: ratio form, no refresh, so that
+// nothing mends an error. The scene is of flat faces, whose horizons motion does not change: what
+// was in the dark stays there (METHODS of the paper: unbiased as long as the support does not
+// change). Hypothesis: per-pixel and image means of the last frame are those of brute force; level
+// 1e-3 each, Sidak over the pixels.
+#include <gtest/gtest.h>
+
+#include <array>
+#include <functional>
+
+#include "tests/stat/against_brute_force.h"
+
+namespace baton {
+namespace {
+
+JobSpec moving_job(bool camera, bool object, int sites) {
+  JobSpec job = test::box_job();
+  job.frames = test::frame_numbers(5);
+  job.image.sites = sites;
+  job.environment.rotation_deg_per_frame = 0.3;
+  job.sampling.method = Method::sequential;
+  job.sampling.num_candidates = 256;
+  job.sampling.refresh_every = 0;
+  test::set_in_motion(job, camera, object);
+  return job;
+}
+
+constexpr int kMotionRuns = 128;
+
+TEST(Motion, AMovingCameraIsUnbiased) {
+  test::expect_agreement(moving_job(true, false, 1), kMotionRuns, 0.02);
+}
+TEST(Motion, AMovingObjectIsUnbiased) {
+  test::expect_agreement(moving_job(false, true, 1), kMotionRuns, 0.02);
+}
+
+TEST(Motion, BothAreUnbiasedWithSeveralSites) {
+  // The sites are part of the seed: both sides average over them.
+  const JobSpec job = moving_job(true, true, 4);
+  JobSpec reference = job;
+  reference.sampling.method = Method::reference;
+  reference.sampling.reference_samples = 1000;
+  test::keep_last_frame(reference);
+  const test::Verdict v = test::compare(test::repeat(job, 192), test::repeat(reference, 192));
+  EXPECT_LT(v.worst_pixel, test::kPixelLimit);
+  EXPECT_LT(v.image, test::kImageLimit);
+  EXPECT_LT(v.resolution, 0.02);
+  std::printf("  image |z| %.2f, worst pixel |z| %.2f, resolves a bias of %.2f %%\n", v.image,
+              v.worst_pixel, 100 * v.resolution);
+}
+
+/// Mean of Lns over runs and its squared standard error.
+struct LnsMean {
+  double mean = 0, variance = 0;
+};
+
+/// A glossy surface whose viewer turns by 20 degrees from one frame to the next; the horizon stays.
+class TurningViewer {
+ public:
+  TurningViewer()
+      : job_(moving_job(true, false, 1)), context_(*load_render_context(job_, Digest{1, 2})) {
+    light_ = *context_->lights->at(0);
+    const Material glossy = make_material(job_.scene.materials.at("glossy"));
+    const Vec3 up{0, 1, 0};
+    sites_.clear(1);
+    sites_.add(0, {.position = {}, .ng = up, .ns = up, .wo = normalize({0.1f, 1, 0.6f})}, glossy);
+    old_.sites.clear(1);
+    old_.sites.add(0, {.position = {}, .ng = up, .ns = up, .wo = normalize({0.1f, 1, 0.1f})},
+                   glossy);
+  }
+
+  LnsMean carried(bool told_of_the_old_surface) {
+    return over_runs([&](const RngKey& key, const PixelSamples& samples) {
+      sample(old_.sites, nullptr, false, key, samples);
+      RngKey next = key;
+      next.frame = 2;
+      sample(sites_, told_of_the_old_surface ? &old_ : nullptr, true, next, samples);
+      EXPECT_EQ(samples.source, PixelSource::carried);
+    });
+  }
+  LnsMean fresh() {
+    return over_runs([&](const RngKey& key, const PixelSamples& samples) {
+      sample(sites_, nullptr, false, key, samples);
+    });
+  }
+
+ private:
+  void sample(const SiteBlock& sites, const OldSurfaces* old, bool has_history, const RngKey& key,
+              const PixelSamples& samples) {
+    const EnvironmentView now = view_of(light_->now);
+    const EnvironmentView before = view_of(light_->before);
+    context_->sampler->sample({.sites = sites,
+                               .light = *light_,
+                               .now = now,
+                               .before = before,
+                               .key = key,
+                               .frame_index = 1,
+                               .has_history = has_history,
+                               .old = old},
+                              *scratch_, samples);
+  }
+  LnsMean over_runs(const std::function<void(const RngKey&, const PixelSamples&)>& estimate) {
+    constexpr int kRuns = 3000;
+    double sum = 0, squares = 0;
+    for (int run = 1; run <= kRuns; ++run) {
+      std::array<OctDirection, 16> direction{};
+      std::array<std::uint8_t, 16> site{};
+      std::array<float, 16> weight{};
+      float lns = 0, lns_fresh = 0;
+      PixelSource source = PixelSource::background;
+      estimate({.job_seed = static_cast<std::uint64_t>(run), .frame = 1, .pixel = 1},
+               {direction, site, weight, lns, lns_fresh, source});
+      sum += lns;
+      squares += double{lns} * lns;
+    }
+    const double mean = sum / kRuns;
+    return {mean, (squares / kRuns - mean * mean) / (kRuns - 1)};
+  }
+
+  JobSpec job_;
+  std::shared_ptr<const RenderContext> context_;
+  std::shared_ptr<const FrameLight> light_;
+  SiteBlock sites_;
+  OldSurfaces old_;
+  std::unique_ptr<kernels::CandidateSet> scratch_ = std::make_unique<kernels::CandidateSet>();
+};
+
+double z_score(const LnsMean& a, const LnsMean& b) {
+  return std::fabs(a.mean - b.mean) / std::sqrt(a.variance + b.variance);
+}
+
+// Runs share the frame's pool, which depends on none of their seeds; both sides use the same one,
+// so its error cancels.
+TEST(Motion, LnsFollowsASurfaceThatIsSeenFromElsewhere) {
+  TurningViewer viewer;
+  EXPECT_LT(z_score(viewer.carried(true), viewer.fresh()), test::kImageLimit);
+}
+
+// The same machinery must see samples that are carried as if the surface had stayed.
+TEST(Motion, PlantedFaultIsSeen) {
+  TurningViewer viewer;
+  EXPECT_GT(z_score(viewer.carried(false), viewer.fresh()), 2 * test::kImageLimit);
+}
+
+}  // namespace
+}  // namespace baton

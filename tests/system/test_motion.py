@@ -1,0 +1,100 @@
+#!/usr/bin/env python3
+"""With camera and objects in motion a tile needs its neighbours: the picture and the samples still are the same for any
+tiling, number of workers and death on the way."""
+
+import json
+
+from farm import BAD_INPUT, Farm, check, check_equal, make_job, run_tests, wait_until, write_job
+
+NUM_FRAMES = 5
+
+
+def moving_job(folder, **changes):
+    """The camera goes round the scene and one sphere rolls towards it."""
+    job = make_job(folder, frames=f"1-{NUM_FRAMES}", **changes)
+    job["camera"]["keys"] = [
+        {"frame": 1, "position": [0, 1.2, 5], "lookAt": [0, 0.6, 0]},
+        {"frame": 3, "position": [0.2, 1.25, 4.95], "lookAt": [0, 0.6, 0]},
+        {"frame": 6, "position": [0.6, 1.3, 4.8], "lookAt": [0.05, 0.6, 0]},
+    ]
+    job["scene"]["objects"][1]["keys"] = [
+        {"frame": 1},
+        {"frame": 6, "translate": [-0.3, 0, 0.4], "rotateDeg": [40, 0, 0]},
+    ]
+    return job
+
+
+def result_of(programs, job_folder, work_folder):
+    """Decoded pixels of each frame, samples of each frame."""
+    pixels = programs.pixels(job_folder / "frames")
+    check_equal(len(pixels), NUM_FRAMES, f"frames in {job_folder}")
+    states = programs.states(work_folder)
+    check_equal(len(states.splitlines()), NUM_FRAMES, f"frames with states in {work_folder}")
+    return pixels, states
+
+
+def rendered(programs, folder, name, workers, threads, tile_size, sites=4):
+    """Renders the job with `baton render`; returns its result."""
+    job = moving_job(folder / name, image={"tileSize": tile_size, "sites": sites})
+    path = write_job(folder / name / "job.json", job)
+    programs.render(path, folder / name / "work", workers, threads)
+    return result_of(programs, folder / name, folder / name / "work")
+
+
+def any_tiling_and_workers(programs, folder):
+    """Tiles of 16, 64 and the whole image on 1 to 3 workers with 1 or 2 threads."""
+    expected = rendered(programs, folder, "plain", workers=1, threads=1, tile_size=64)
+    for name, workers, threads, tile_size in [("small-tiles", 2, 1, 16), ("whole-image", 1, 2, 160),
+                                              ("many-workers", 3, 1, 64)]:
+        got = rendered(programs, folder, name, workers, threads, tile_size)
+        check_equal(got[0], expected[0], f"pixels of {name}")
+        check_equal(got[1], expected[1], f"samples of {name}")
+
+
+def a_killed_worker(programs, folder):
+    """A worker dies with what it had in hand; others decode the states that it left."""
+    slow = {"numParticles": 16, "numCandidates": 512, "numDistributions": 48}
+    image = {"tileSize": 32, "sites": 4}
+    path = write_job(folder / "quiet" / "job.json", moving_job(folder / "quiet", image=image, sampling=slow))
+    programs.render(path, folder / "quiet" / "work", workers=2)
+    expected = result_of(programs, folder / "quiet", folder / "quiet" / "work")
+
+    path = write_job(folder / "job.json", moving_job(folder, image=image, sampling=slow))
+    with Farm(programs, folder / "farm") as farm:
+        farm.start_coordinator()
+        first, _ = farm.start_worker(), farm.start_worker()
+        job = farm.submit(path)
+        wait_until(lambda: farm.show(job)["tasksDone"] >= 20, "the first frame is done")
+        check(farm.show(job)["status"] == "running", "the job ended before anybody could be killed")
+        first.kill()
+        farm.wait_for(job)
+        got = result_of(programs, folder, farm.work_folder)
+    check_equal(got, expected, "result after the death of a worker")
+
+
+def a_replay_makes_the_same_tile(programs, folder):
+    """The command that replays a tile renders all of the past that the tile depends on."""
+    path = write_job(folder / "job.json", moving_job(folder, image={"tileSize": 32}, output={"pixelType": "float"}))
+    programs.render(path, folder / "work", workers=2)
+    programs.run("baton-worker", "replay", path, "--frame", 4, "--tile", 7, "--out", folder / "tile.exr")
+    # Tile 7 of 5 columns: x in [64, 96), y in [32, 64).
+    whole = programs.values(folder / "frames" / "frame.0004.exr", "R")
+    tile = programs.values(folder / "tile.exr", "R")
+    check_equal(tile, [whole[y * 160 + x] for y in range(32, 64) for x in range(64, 96)], "pixels of the replay")
+
+
+def the_range_of_motion_is_measured(programs, folder):
+    """`baton check` tells how far history is followed; a glTF file that is not there is named."""
+    path = write_job(folder / "job.json", moving_job(folder))
+    checked = json.loads(programs.run("baton", "check", path, "--json").stdout)
+    check(2 <= checked["motionMaxPx"] <= 12, f"measured {checked['motionMaxPx']} pixels")
+
+    job = moving_job(folder)
+    del job["camera"]["keys"]
+    job["camera"]["gltf"] = {"file": "/nowhere.glb", "node": "eye"}
+    failed = programs.run("baton", "check", write_job(folder / "bad.json", job), expect=BAD_INPUT)
+    check("/nowhere.glb: missing" in failed.stderr, failed.stderr)
+
+
+if __name__ == "__main__":
+    run_tests([any_tiling_and_workers, a_killed_worker, a_replay_makes_the_same_tile, the_range_of_motion_is_measured])

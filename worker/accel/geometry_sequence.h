@@ -1,0 +1,42 @@
+#pragma once
+
+#include <cstdint>
+#include <list>
+#include <memory>
+#include <mutex>
+
+#include "worker/accel/accel.h"
+#include "worker/scene/pose.h"
+
+namespace baton {
+
+/// What rays hit in one frame, and where they start.
+struct FrameGeometry {
+  Pose pose;
+  std::shared_ptr<const Accel> accel;
+};
+
+/// The geometry of a job's frames, placed on demand and kept for the frames used last. What stands
+/// still is built once, moving objects once each; a frame only places them. Any number of threads
+/// may ask. A frame's geometry is a pure function of (job, frame).
+class GeometrySequence {
+ public:
+  /// job and scene must outlive the object. Error: Embree's own message.
+  static Result<std::unique_ptr<GeometrySequence>> build(const JobSpec& job, const Scene& scene);
+
+  /// The geometry of frame `index` (0-based). Error: Embree's own message.
+  Result<std::shared_ptr<const FrameGeometry>> at(std::int32_t index);
+
+ private:
+  GeometrySequence(const JobSpec& job, const Scene& scene, std::shared_ptr<const Accel> rest)
+      : job_(job), scene_(scene), rest_(std::move(rest)) {}
+
+  const JobSpec& job_;
+  const Scene& scene_;
+  const std::shared_ptr<const Accel> rest_;  ///< every frame's, when no object moves
+  std::mutex mutex_;
+  std::list<std::pair<std::int32_t, std::shared_ptr<const FrameGeometry>>>
+      frames_;  ///< most recently used in front
+};
+
+}  // namespace baton

@@ -1,0 +1,229 @@
+#include "worker/pass/reproject.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/job/motion.h"
+#include "worker/pass/populations.h"
+
+namespace baton {
+namespace {
+
+/// The state that holds a pixel, or null.
+const SampleState* find_state(std::span<const StatePtr> states, std::int32_t x, std::int32_t y) {
+  const auto found = std::find_if(states.begin(), states.end(), [&](const StatePtr& state) {
+    return state->rect.contains(x, y);
+  });
+  return found == states.end() ? nullptr : found->get();
+}
+
+/// A hit of the object in front, drawn uniformly: an edge moves with what is in front of it. Null
+/// without hits.
+const SurfaceHit* draw_hit(std::span<const SurfaceHit> hits, const Rng& rng) {
+  const SurfaceHit* nearest = nullptr;
+  for (const SurfaceHit& hit : hits) {
+    if (hit.hit && (nearest == nullptr || hit.depth < nearest->depth)) nearest = &hit;
+  }
+  if (nearest == nullptr) return nullptr;
+  const auto in_front = [&](const SurfaceHit& hit) {
+    return hit.hit && hit.instance == nearest->instance;
+  };
+  const auto count = static_cast<std::uint32_t>(std::count_if(hits.begin(), hits.end(), in_front));
+  std::uint32_t k = rng.bits(0, 0)[0] % count;
+  return &*std::find_if(hits.begin(), hits.end(),
+                        [&](const SurfaceHit& hit) { return in_front(hit) && k-- == 0; });
+}
+
+/// Copies all samples of a pixel.
+void copy_pixel(const SampleState& from, std::size_t source, SampleState& to, std::size_t target) {
+  const auto copy = [&](const auto& in, auto& out, std::int32_t per_pixel) {
+    const auto count = static_cast<std::size_t>(per_pixel);
+    std::copy_n(in.data() + source * count, count, out.data() + target * count);
+  };
+  copy(from.direction, to.direction, to.num_particles);
+  copy(from.site, to.site, to.num_particles);
+  copy(from.weight, to.weight, to.num_particles);
+  copy(from.lns, to.lns, to.num_populations);
+  copy(from.lns_fresh, to.lns_fresh, to.num_populations);
+}
+
+}  // namespace
+
+Reprojection::Reprojection(const RenderContext& context, const FrameGeometry& now,
+                           const FrameGeometry& before, std::span<const StatePtr> states)
+    : context_(context),
+      now_(now),
+      before_(before),
+      states_(states),
+      cos_normal_tolerance_(std::cos(context.job.motion.normal_tolerance_deg * kPi / 180)),
+      still_camera_(now.pose.camera == before.pose.camera) {}
+
+/// The pixel of the frame before in which the surface was; nullopt: outside the image or beyond
+/// reach.
+std::optional<Reprojection::Position> Reprojection::find_source(std::span<const SurfaceHit> hits,
+                                                                const Position& pixel,
+                                                                const Rng& rng) const {
+  const SurfaceHit* const hit = draw_hit(hits, rng);
+  if (hit == nullptr) return std::nullopt;
+  const Instance& instance = now_.pose.instances[hit->instance];
+  if (still_camera_ && !instance.moves()) return pixel;
+
+  const Vec3 point =
+      carry_point(instance, before_.pose.instances[hit->instance], hit->point.position);
+  const auto projected = before_.pose.camera.project(point);
+  if (!projected) return std::nullopt;
+  const auto reach = static_cast<float>(history_reach_px(context_.job)) + 1;
+  const float dx = (*projected)[0] - static_cast<float>(pixel.x);
+  const float dy = (*projected)[1] - static_cast<float>(pixel.y);
+  if (!(std::fabs(dx) <= reach && std::fabs(dy) <= reach)) return std::nullopt;
+  const Position source{static_cast<std::int32_t>(std::floor((*projected)[0])),
+                        static_cast<std::int32_t>(std::floor((*projected)[1]))};
+  const std::int32_t max_px = history_reach_px(context_.job);
+  const bool in_reach =
+      std::abs(source.x - pixel.x) <= max_px && std::abs(source.y - pixel.y) <= max_px;
+  const bool inside = source.x >= 0 && source.y >= 0 && source.x < context_.job.image.width &&
+                      source.y < context_.job.image.height;
+  if (!in_reach || !inside) return std::nullopt;
+  return source;
+}
+
+void Reprojection::look_up(const TileSurfaces& surfaces, std::size_t first, std::size_t count,
+                           std::int32_t frame) {
+  const JobSpec& job = context_.job;
+  slots_.assign(count, {});
+  rays_.clear();
+  for (std::size_t i = 0; i < count; ++i) {
+    // Find the old pixel.
+    const auto width = static_cast<std::size_t>(surfaces.rect.width());
+    const Position pixel{surfaces.rect.x0 + static_cast<std::int32_t>((first + i) % width),
+                         surfaces.rect.y0 + static_cast<std::int32_t>((first + i) / width)};
+    Slot& slot = slots_[i];
+    slot.hits = surfaces.pixel(first + i);
+    slot.key = {.job_seed = job.seed,
+                .frame = static_cast<std::uint32_t>(frame),
+                .pixel = static_cast<std::uint32_t>(pixel.y * job.image.width + pixel.x)};
+    const std::optional<Position> source =
+        find_source(slot.hits, pixel, Rng(slot.key, PassId::reproject));
+    if (!source) continue;
+    const SampleState* const state = find_state(states_, source->x, source->y);
+    if (state == nullptr) continue;
+    slot.index = static_cast<std::size_t>((source->y - state->rect.y0) * state->rect.width() +
+                                          source->x - state->rect.x0);
+    if (latest_source(*state, slot.index) == PixelSource::background) continue;
+
+    // Ask for what it saw.
+    slot.state = state;
+    slot.same_pixel = source->x == pixel.x && source->y == pixel.y;
+    slot.first_hit = rays_.size();
+    append_primary_rays(job, before_, source->x, source->y, rays_);
+  }
+  old_hits_.resize(rays_.size());
+  trace_primary_rays(job, before_, rays_, old_hits_);
+  num_rays_ += rays_.size();
+}
+
+/// Whether a surface of now is one of then: the same object, the point of now on the tangent plane
+/// of then, and normals alike.
+bool Reprojection::agrees(const SurfaceHit& now, const SurfaceHit& old) const {
+  if (!old.hit || old.instance != now.instance) return false;
+  const Instance& from = now_.pose.instances[now.instance];
+  const Instance& to = before_.pose.instances[now.instance];
+  const Vec3 point = from.moves() ? carry_point(from, to, now.point.position) : now.point.position;
+  const Vec3 normal = from.moves() ? carry_normal(from, to, now.point.ns) : now.point.ns;
+  return std::fabs(dot(old.point.ng, point - old.point.position)) <=
+             context_.job.motion.depth_tolerance * old.depth &&
+         dot(old.point.ns, normal) >= cos_normal_tolerance_;
+}
+
+/// Each site inherits from its namesake where that agrees; the others from the agreeing site with
+/// the fewest heirs. Nullopt: a site finds nothing to inherit, or a site of then has no heir.
+std::optional<Reprojection::Inheritance> Reprojection::inherit(
+    std::span<const SurfaceHit> now, std::span<const SurfaceHit> old) const {
+  Inheritance result;
+  std::uint32_t orphans = 0;
+  for (std::size_t t = 0; t < now.size(); ++t) {
+    if (!now[t].hit) continue;
+    if (agrees(now[t], old[t])) {
+      result.from[t] = static_cast<std::uint8_t>(t);
+      ++result.count[t];
+    } else {
+      orphans |= 1u << t;
+    }
+  }
+  for (std::size_t t = 0; orphans >> t != 0; ++t) {
+    if ((orphans >> t & 1) == 0) continue;
+    std::optional<std::size_t> best;
+    for (std::size_t s = 0; s < old.size(); ++s) {
+      if ((!best || result.count[s] < result.count[*best]) && agrees(now[t], old[s])) best = s;
+    }
+    if (!best) return std::nullopt;
+    result.from[t] = static_cast<std::uint8_t>(*best);
+    ++result.count[*best];
+  }
+
+  // Lose no samples: the few that are left of a pixel at an edge would make a speckle that stays.
+  // The choice depends on surfaces alone, so that it cannot bias.
+  for (std::size_t s = 0; s < old.size(); ++s) {
+    if (old[s].hit && result.count[s] == 0) return std::nullopt;
+  }
+  return result;
+}
+
+/// One of the sites that inherit from `old_site`, each as likely; where that saw no surface (its
+/// samples weigh nothing), any site that sees one.
+std::uint8_t Reprojection::draw_heir(std::span<const SurfaceHit> hits,
+                                     const Inheritance& inheritance, std::uint8_t old_site,
+                                     std::uint32_t random) {
+  const std::uint32_t heirs = inheritance.count[old_site];
+  std::uint32_t k = heirs > 1 ? random % heirs : 0;
+  for (std::size_t t = 0; t < hits.size(); ++t) {
+    if (!hits[t].hit) continue;
+    if (heirs == 0 || (inheritance.from[t] == old_site && k-- == 0))
+      return static_cast<std::uint8_t>(t);
+  }
+  return 0;
+}
+
+/// Copies all samples, each to a site that inherits it.
+void Reprojection::copy_samples(const Slot& slot, const Inheritance& inheritance, std::size_t pixel,
+                                SampleState& state) const {
+  copy_pixel(*slot.state, slot.index, state, pixel);
+  const auto num_particles = static_cast<std::size_t>(state.num_particles);
+  const Rng rng(slot.key, PassId::reproject);
+  for (std::size_t j = 0; j < num_particles; ++j) {
+    std::uint8_t& site = state.site[pixel * num_particles + j];
+    site = draw_heir(slot.hits, inheritance, site, rng.bits(1, static_cast<std::uint32_t>(j))[0]);
+  }
+}
+
+PixelHistory Reprojection::take(std::size_t i, std::size_t pixel, SampleState& state,
+                                OldSurfaces& old) const {
+  const Slot& slot = slots_[i];
+  if (slot.state == nullptr) return PixelHistory::none;
+  const std::span<const SurfaceHit> old_hits =
+      std::span(old_hits_).subspan(slot.first_hit, slot.hits.size());
+
+  // Where nothing has changed, everything stays as it is.
+  if (slot.same_pixel && std::equal(old_hits.begin(), old_hits.end(), slot.hits.begin())) {
+    copy_pixel(*slot.state, slot.index, state, pixel);
+    return PixelHistory::same;
+  }
+
+  const std::optional<Inheritance> inheritance = inherit(slot.hits, old_hits);
+  if (!inheritance) return PixelHistory::none;
+  copy_samples(slot, *inheritance, pixel, state);
+  old.sites.clear(static_cast<int>(slot.hits.size()));
+  for (std::size_t t = 0; t < slot.hits.size(); ++t) {
+    if (!slot.hits[t].hit) {
+      old.sites.add_miss(static_cast<int>(t));
+      continue;
+    }
+    const std::size_t from = inheritance->from[t];
+    old.sites.add(static_cast<int>(t), old_hits[from].point,
+                  context_.scene->materials[old_hits[from].material]);
+    old.log_share[t] = -std::log(static_cast<float>(inheritance->count[from]));
+  }
+  return PixelHistory::moved;
+}
+
+}  // namespace baton

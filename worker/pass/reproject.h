@@ -1,0 +1,87 @@
+#pragma once
+
+#include <optional>
+#include <span>
+#include <vector>
+
+#include "worker/accel/geometry_sequence.h"
+#include "worker/integrator/old_surfaces.h"
+#include "worker/pass/primary.h"
+#include "worker/pass/tile_renderer.h"
+
+namespace baton {
+
+/// What a pixel has of the frame before.
+enum class PixelHistory {
+  none,   ///< nothing: it starts afresh
+  same,   ///< samples of the same surfaces
+  moved,  ///< samples of other surfaces
+};
+
+/// Pass: follows each pixel back to where its surface was in the frame before [SS section 6, but
+/// gathering, so that nothing collides]: a hit of the object in front, drawn at random so that
+/// motion by fractions of a pixel is followed on average, goes back with its object and is
+/// projected by the camera of then. The samples of that pixel are taken when each site of now finds
+/// a site of then that saw the same object at about the same place and turned about the same way,
+/// and each of then is found; else there is no history. What the old pixel saw is traced again,
+/// exactly: states hold no surfaces.
+class Reprojection {
+ public:
+  /// states: of the frame before, of every tile within reach. All must outlive the object.
+  Reprojection(const RenderContext& context, const FrameGeometry& now, const FrameGeometry& before,
+               std::span<const StatePtr> states);
+
+  /// Looks for the history of `count` pixels of `surfaces` from `first` on. frame: the user's
+  /// number.
+  void look_up(const TileSurfaces& surfaces, std::size_t first, std::size_t count,
+               std::int32_t frame);
+  /// Copies the samples that pixel first + i of the last look_up takes over to pixel `pixel` of
+  /// `state`. `old` is filled for `moved`.
+  PixelHistory take(std::size_t i, std::size_t pixel, SampleState& state, OldSurfaces& old) const;
+
+  /// Rays traced so far.
+  std::uint64_t num_rays() const { return num_rays_; }
+
+ private:
+  /// A pixel and where its history lies.
+  struct Slot {
+    std::span<const SurfaceHit> hits;  ///< what it sees now
+    RngKey key;
+    const SampleState* state = nullptr;  ///< null: no history
+    std::size_t index = 0;               ///< pixel of `state`
+    std::size_t first_hit = 0;           ///< of its old sites, in old_hits_
+    bool same_pixel = false;
+  };
+  struct Position {
+    std::int32_t x = 0, y = 0;
+  };
+  /// For each site of now, the site of then that it inherits from; and how many inherit from a site
+  /// of then.
+  struct Inheritance {
+    std::array<std::uint8_t, SiteBlock::kMaxSites> from{};
+    std::array<std::uint8_t, SiteBlock::kMaxSites> count{};
+  };
+
+  std::optional<Position> find_source(std::span<const SurfaceHit> hits, const Position& pixel,
+                                      const Rng& rng) const;
+  bool agrees(const SurfaceHit& now, const SurfaceHit& old) const;
+  std::optional<Inheritance> inherit(std::span<const SurfaceHit> now,
+                                     std::span<const SurfaceHit> old) const;
+  static std::uint8_t draw_heir(std::span<const SurfaceHit> hits, const Inheritance& inheritance,
+                                std::uint8_t old_site, std::uint32_t random);
+  void copy_samples(const Slot& slot, const Inheritance& inheritance, std::size_t pixel,
+                    SampleState& state) const;
+
+  const RenderContext& context_;
+  const FrameGeometry& now_;
+  const FrameGeometry& before_;
+  std::span<const StatePtr> states_;
+  const float cos_normal_tolerance_;
+  const bool still_camera_;
+  std::vector<Slot> slots_;
+  std::vector<Ray> rays_;
+  std::vector<SurfaceHit> old_hits_;
+  std::uint64_t num_rays_ = 0;
+};
+
+}  // namespace baton

@@ -1,0 +1,103 @@
+#include "worker/scene/settle_motion.h"
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/job/motion.h"
+#include "worker/scene/gltf_motion.h"
+#include "worker/scene/pose.h"
+
+namespace baton {
+namespace {
+
+/// Vertices that are looked at of each mesh, spread evenly over its list.
+constexpr std::size_t kMeshPoints = 2000;
+/// Rays to the ground along each side of the image.
+constexpr int kGroundRays = 24;
+
+/// The largest step of any visible point between two frames, in pixels along either axis.
+class StepMeter {
+ public:
+  StepMeter(const Camera& now, const Camera& before, const ImageSpec& image)
+      : now_(now), before_(before), image_(image) {}
+
+  /// A point that is at `now` in this frame and was at `before`. What leaves the image has no
+  /// history anyway.
+  void add(const Vec3& now, const Vec3& before) {
+    const auto to = now_.project(now);
+    const auto from = before_.project(before);
+    if (!to || !from || !inside(*to) || !inside(*from)) return;
+    largest_ =
+        std::max({largest_, std::fabs((*to)[0] - (*from)[0]), std::fabs((*to)[1] - (*from)[1])});
+  }
+  float largest() const { return largest_; }
+
+ private:
+  bool inside(const std::array<float, 2>& p) const {
+    return p[0] >= 0 && p[1] >= 0 && p[0] < static_cast<float>(image_.width) &&
+           p[1] < static_cast<float>(image_.height);
+  }
+
+  const Camera& now_;
+  const Camera& before_;
+  const ImageSpec& image_;
+  float largest_ = 0;
+};
+
+void add_meshes(const Scene& scene, const Pose& now, const Pose& before, StepMeter& meter) {
+  for (std::size_t i = 0; i < now.instances.size(); ++i) {
+    const std::vector<Vec3>& points = scene.meshes[now.instances[i].mesh].positions;
+    const std::size_t stride = std::max<std::size_t>(points.size() / kMeshPoints, 1);
+    for (std::size_t k = 0; k < points.size(); k += stride)
+      meter.add(now.instances[i].to_world.point(points[k]),
+                before.instances[i].to_world.point(points[k]));
+  }
+}
+
+/// The ground has corners only: look where a grid of rays hits it.
+void add_ground(const JobSpec& job, const Camera& camera, StepMeter& meter) {
+  for (int i = 0; i < kGroundRays * kGroundRays; ++i) {
+    const float x = (static_cast<float>(i % kGroundRays) + 0.5f) / kGroundRays;
+    const float y = (static_cast<float>(i / kGroundRays) + 0.5f) / kGroundRays;
+    const Ray ray = camera.ray(x * static_cast<float>(job.image.width),
+                               y * static_cast<float>(job.image.height));
+    const float t = (job.scene.ground->height - ray.origin.y) / ray.direction.y;
+    const Vec3 point = ray.origin + ray.direction * t;
+    const float half = 0.5f * job.scene.ground->size;
+    if (t > 0 && std::fabs(point.x) <= half && std::fabs(point.z) <= half) meter.add(point, point);
+  }
+}
+
+/// An estimate is enough: a pixel that moved farther starts afresh.
+int measure_max_px(const JobSpec& job, const Scene& scene) {
+  float largest = 0;
+  Pose before = pose_at(scene, job, job.frames.front());
+  for (const int frame : job.frames) {
+    Pose now = pose_at(scene, job, frame);
+    StepMeter meter(now.camera, before.camera, job.image);
+    add_meshes(scene, now, before, meter);
+    if (job.scene.ground) add_ground(job, now.camera, meter);
+    largest = std::max(largest, meter.largest());
+    before = std::move(now);
+  }
+  // A tenth more for the points between those that were looked at, and one for the rounding to
+  // whole pixels.
+  return std::min(static_cast<int>(std::ceil(1.1f * largest)) + 1,
+                  std::max(job.image.width, job.image.height));
+}
+
+}  // namespace
+
+Result<JobSpec> settle_motion(JobSpec job) {
+  if (job.camera.gltf) BATON_TRY(take_camera_keys(job.frames, job.camera));
+  for (ObjectSpec& object : job.scene.objects) {
+    if (object.gltf) BATON_TRY(take_object_keys(job.frames, object));
+  }
+  if (!is_settled(job)) {
+    BATON_ASSIGN(const Scene scene, load_scene(job));
+    job.motion.max_px = measure_max_px(job, scene);
+  }
+  return job;
+}
+
+}  // namespace baton
