@@ -7,12 +7,6 @@
 
 namespace baton {
 
-Result<std::unique_ptr<GeometrySequence>> GeometrySequence::build(const JobSpec& job,
-                                                                  const Scene& scene) {
-  BATON_ASSIGN(std::shared_ptr<const Accel> rest, Accel::build(scene));
-  return std::unique_ptr<GeometrySequence>(new GeometrySequence(job, scene, std::move(rest)));
-}
-
 Result<std::shared_ptr<const FrameGeometry>> GeometrySequence::at(std::int32_t index) {
   // A job in which nothing moves has one frame for all.
   const std::int32_t name = moves(job_) ? index : 0;

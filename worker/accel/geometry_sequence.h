@@ -21,16 +21,15 @@ struct FrameGeometry {
 /// may ask. A frame's geometry is a pure function of (job, frame).
 class GeometrySequence {
  public:
-  /// job and scene must outlive the object. Error: Embree's own message.
-  static Result<std::unique_ptr<GeometrySequence>> build(const JobSpec& job, const Scene& scene);
+  /// job and scene must outlive the object. rest: the scene's ray tracer, may be shared with other
+  /// jobs.
+  GeometrySequence(const JobSpec& job, const Scene& scene, std::shared_ptr<const Accel> rest)
+      : job_(job), scene_(scene), rest_(std::move(rest)) {}
 
   /// The geometry of frame `index` (0-based). Error: Embree's own message.
   Result<std::shared_ptr<const FrameGeometry>> at(std::int32_t index);
 
  private:
-  GeometrySequence(const JobSpec& job, const Scene& scene, std::shared_ptr<const Accel> rest)
-      : job_(job), scene_(scene), rest_(std::move(rest)) {}
-
   const JobSpec& job_;
   const Scene& scene_;
   const std::shared_ptr<const Accel> rest_;  ///< every frame's, when no object moves

@@ -10,9 +10,7 @@
 namespace baton {
 namespace {
 
-std::size_t size_bytes(const EnvironmentMap& map) {
-  return static_cast<std::size_t>(map.stride()) * (map.height() + 2) * sizeof(EnvironmentMap::Texel);
-}
+std::size_t size_bytes(const EnvironmentMap& map) { return map.size_bytes(); }
 std::size_t size_bytes(const FrameLight& light) { return light.pool.size_bytes(); }
 
 /// The cached value, moved to the front, or null.
@@ -37,14 +35,12 @@ void insert_in_front(List& cache, std::int32_t key, std::shared_ptr<const Value>
 
 }  // namespace
 
-LightSequence::LightSequence(const JobSpec& job) : job_(job), frames_(expand_sequence(job)) {}
+LightSequence::LightSequence(const JobSpec& job, std::shared_ptr<MapCache> maps)
+    : job_(job), maps_(std::move(maps)), frames_(expand_sequence(job)) {}
 
 Result<std::shared_ptr<const EnvironmentMap>> LightSequence::key_map(std::int32_t key) {
-  if (auto found = find_and_touch(key_maps_, key)) return found;
   const std::string& path = job_.environment.keys[static_cast<std::size_t>(key)].map;
-  BATON_ASSIGN(const RgbImage image, read_rgb_image(path));
-  auto map = std::make_shared<const EnvironmentMap>(image, job_.environment.filter, job_.environment.scale,
-                                                    job_.sampling.mis_compensation);
+  BATON_ASSIGN(const auto map, maps_->get(path, job_.environment, job_.sampling.mis_compensation));
   if (const auto& repairs = map->repairs(); repairs.total() > 0) {
     const std::string note = fmt::format("{}: {} negative, {} NaN, {} infinite texels set to 0", path,
                                          repairs.negative, repairs.nan, repairs.infinite);
@@ -52,8 +48,7 @@ Result<std::shared_ptr<const EnvironmentMap>> LightSequence::key_map(std::int32_
       repair_notes_.push_back(note);
     }
   }
-  insert_in_front(key_maps_, key, map);
-  return std::shared_ptr<const EnvironmentMap>(map);
+  return map;
 }
 
 Result<std::shared_ptr<const EnvironmentMap>> LightSequence::mixed_map(const EnvironmentFrame& frame) {

@@ -9,6 +9,7 @@
 #include "common/base/result.h"
 #include "common/job/sequence.h"
 #include "worker/integrator/light_pool.h"
+#include "worker/integrator/map_cache.h"
 #include "worker/scene/environment.h"
 
 namespace baton {
@@ -25,8 +26,8 @@ struct FrameLight {
 /// a frame is prepared once while the others wait. A frame's light is a pure function of (job, frame).
 class LightSequence {
  public:
-  /// job must outlive the object.
-  explicit LightSequence(const JobSpec& job);
+  /// job must outlive the object. maps: may be shared with other jobs.
+  LightSequence(const JobSpec& job, std::shared_ptr<MapCache> maps);
 
   /// The light of frame `index` (0-based). Errors: a map that cannot be read, or two key frames of different size.
   Result<std::shared_ptr<const FrameLight>> at(std::int32_t index);
@@ -44,9 +45,9 @@ class LightSequence {
   Result<Environment> environment(const EnvironmentFrame& frame);
 
   const JobSpec& job_;
+  const std::shared_ptr<MapCache> maps_;
   std::vector<FrameSpec> frames_;
   mutable std::mutex mutex_;
-  Cache<std::int32_t, EnvironmentMap> key_maps_;
   Cache<std::int32_t, EnvironmentMap> mixed_maps_;  ///< by the first frame index that shows these texels
   Cache<std::int32_t, FrameLight> lights_;
   std::vector<std::string> repair_notes_;

@@ -2,22 +2,27 @@
 
 #include "common/job/motion.h"
 #include "worker/pass/populations.h"
+#include "worker/pass/shared_assets.h"
 
 namespace baton {
 
 Result<std::shared_ptr<const RenderContext>> load_render_context(const JobSpec& job, const Digest& job_digest) {
+  BATON_ASSIGN(const auto assets, load_shared_assets(job));
+  return make_render_context(job, job_digest, assets);
+}
+
+Result<std::shared_ptr<const RenderContext>> make_render_context(const JobSpec& job, const Digest& job_digest,
+                                                                 const std::shared_ptr<const SharedAssets>& assets) {
   BATON_TRY(check_settled(job));
   auto context = std::make_shared<RenderContext>();
   context->job = job;
   context->digest = job_digest;
   context->grid = TileGrid(job.image);
   context->frames = expand_sequence(job);
-  context->lights = std::make_unique<LightSequence>(context->job);
+  context->lights = std::make_unique<LightSequence>(context->job, assets->maps);
   context->sampler = make_pixel_sampler(population_spec(job));
-
-  BATON_ASSIGN(Scene scene, load_scene(job));
-  context->scene = std::make_unique<const Scene>(std::move(scene));
-  BATON_ASSIGN(context->geometry, GeometrySequence::build(context->job, *context->scene));
+  context->scene = std::shared_ptr<const Scene>(assets, &assets->scene);
+  context->geometry = std::make_unique<GeometrySequence>(context->job, *context->scene, assets->accel);
   return std::shared_ptr<const RenderContext>(std::move(context));
 }
 

@@ -19,7 +19,7 @@ class RenderContext {
   Digest digest;
   TileGrid grid{1, 1, 1};
   std::vector<FrameSpec> frames;
-  std::unique_ptr<const Scene> scene;
+  std::shared_ptr<const Scene> scene;
   std::unique_ptr<GeometrySequence> geometry;
   std::unique_ptr<const PixelSampler> sampler;  ///< null: reference
   std::unique_ptr<LightSequence> lights;

@@ -20,9 +20,15 @@ namespace baton {
 /// Everything about a job that its tiles share: scene, ray tracer, maps, the environments of its frames. Loaded once
 /// per job and process; any number of threads may render with it.
 class RenderContext;
+struct SharedAssets;
 
 /// Loads every asset of the job. Errors name the file and what was expected; several faults are joined by newlines.
 Result<std::shared_ptr<const RenderContext>> load_render_context(const JobSpec& job, const Digest& job_digest);
+
+/// The same with assets that are loaded already (worker/pass/shared_assets.h): those of the job's scene. Error: motion
+/// that is not settled.
+Result<std::shared_ptr<const RenderContext>> make_render_context(const JobSpec& job, const Digest& job_digest,
+                                                                 const std::shared_ptr<const SharedAssets>& assets);
 
 /// Where the finished frames of a tile run go, in frame order. Called on the rendering thread.
 struct TileRunSink {

@@ -9,14 +9,16 @@
 
 namespace baton {
 
-Result<LoadedJobPtr> load_job_document(const Digest& digest, const std::string& document) {
+Result<LoadedJobPtr> load_job_document(const Digest& digest, const std::string& document,
+                                       AssetShelf& shelf) {
   BATON_ASSIGN(ParsedJobDocument parsed, parse_job_document(document));
   if (parsed.digest != digest) {
     return Error{ErrorKind::corrupt,
                  fmt::format("job document {}: digest is {}", digest.hex(), parsed.digest.hex())};
   }
   BATON_TRY(verify_assets(parsed.assets));
-  BATON_ASSIGN(auto context, load_render_context(parsed.job, digest));
+  BATON_ASSIGN(const auto assets, shelf.get(parsed.job, parsed.assets));
+  BATON_ASSIGN(auto context, make_render_context(parsed.job, digest, assets));
   return LoadedJobPtr(std::make_shared<LoadedJob>(LoadedJob{
       std::move(parsed.job), digest, std::move(context), std::make_shared<StateCache>()}));
 }

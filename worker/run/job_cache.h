@@ -11,6 +11,7 @@
 
 #include "common/base/digest.h"
 #include "common/job/job_spec.h"
+#include "worker/pass/shared_assets.h"
 #include "worker/pass/tile_renderer.h"
 #include "worker/run/state_cache.h"
 
@@ -29,9 +30,10 @@ using LoadedJobPtr = std::shared_ptr<const LoadedJob>;
 using JobLoader =
     std::function<Result<LoadedJobPtr>(const Digest& digest, const std::string& document)>;
 
-/// The loader of the worker: parses the document, checks its digest and those of the assets, loads
-/// the scene and maps.
-Result<LoadedJobPtr> load_job_document(const Digest& digest, const std::string& document);
+/// The loader of the worker: parses the document, checks its digest and those of the assets, and
+/// loads the scene, or shares it with a job on the shelf.
+Result<LoadedJobPtr> load_job_document(const Digest& digest, const std::string& document,
+                                       AssetShelf& shelf);
 
 /// One job on its way from document to loaded scene. The first task that needs it loads it, the
 /// others wait.

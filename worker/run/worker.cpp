@@ -110,7 +110,9 @@ class Worker {
   Worker(WorkerChannel channel, const WorkerOptions& options)
       : channel_(std::move(channel)),
         session_(session_options(options), now()),
-        jobs_(load_job_document),
+        jobs_([this](const Digest& digest, const std::string& document) {
+          return load_job_document(digest, document, shelf_);
+        }),
         pool_(
             options.num_threads,
             [this](const PooledTask& task, std::stop_token stop) {
@@ -210,6 +212,7 @@ class Worker {
 
   WorkerChannel channel_;
   Session session_;
+  AssetShelf shelf_;  ///< what jobs_ loads from
   JobCache jobs_;
   std::shared_ptr<BlobStore> store_;
   std::filesystem::path store_directory_;

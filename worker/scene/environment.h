@@ -48,6 +48,8 @@ class EnvironmentMap {
   int stride() const { return width_ + 2; }
   MapFilter filter() const { return filter_; }
   const Texel* texels() const { return texels_.data(); }
+  /// Memory of the texels; the tables are small beside them.
+  std::size_t size_bytes() const { return texels_.size() * sizeof(Texel); }
   const Repairs& repairs() const { return repairs_; }
   /// Integral of the reconstruction over the sphere as the table sees it, mean over RGB; 0 for a black map.
   double total_power() const { return total_power_; }

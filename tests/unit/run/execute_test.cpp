@@ -63,7 +63,8 @@ class ExecuteTest : public testing::Test {
 
   Result<LoadedJobPtr> load() const {
     BATON_ASSIGN(const std::string document, make_job_document(job_));
-    return load_job_document(digest_of(document), document);
+    AssetShelf shelf;
+    return load_job_document(digest_of(document), document, shelf);
   }
 
   Result<TaskOutput> render(std::int32_t step, std::int32_t tile,
@@ -198,7 +199,8 @@ TEST_F(ExecuteTest, AStoppedTaskIsCancelled) {
 TEST_F(ExecuteTest, AnAssetThatChangedSinceSubmissionIsNamed) {
   const std::string document = make_job_document(job_).value();
   ASSERT_TRUE(write_file_atomic(folder_ + "tetrahedron.off", as_bytes_view("OFF\n")));
-  const Result<LoadedJobPtr> loaded = load_job_document(digest_of(document), document);
+  AssetShelf shelf;
+  const Result<LoadedJobPtr> loaded = load_job_document(digest_of(document), document, shelf);
   ASSERT_FALSE(loaded);
   EXPECT_THAT(loaded.error().message, testing::HasSubstr("tetrahedron.off"));
 }

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "common/base/limits.h"
+#include "tests/support/small_scene.h"
 
 namespace baton {
 namespace {
@@ -76,8 +77,44 @@ TEST(JobCache, TheOldestJobGoesFirst) {
 }
 
 TEST(JobCache, ADocumentOfAnotherJobIsRefused) {
-  const Result<LoadedJobPtr> job = load_job_document({1, 1}, "not a document");
+  AssetShelf shelf;
+  const Result<LoadedJobPtr> job = load_job_document({1, 1}, "not a document", shelf);
   EXPECT_FALSE(job);
+}
+
+TEST(AssetShelf, JobsOfOneSceneShareItWhileOneOfThemLives) {
+  JobSpec job = test::box_job();
+  const std::vector<AssetDigest> files{{"map.exr", {1, 2}}};
+  AssetShelf shelf;
+  auto first = shelf.get(job, files).value();
+  job.seed = 7;
+  job.sampling.num_particles = 3;
+  EXPECT_EQ(shelf.get(job, files).value(), first);
+
+  // Another file content or another scene is loaded anew.
+  EXPECT_NE(shelf.get(job, {{"map.exr", {1, 3}}}).value(), first);
+  job.scene.ground->size += 1;
+  EXPECT_NE(shelf.get(job, files).value(), first);
+  job.scene.ground->size -= 1;
+
+  // Nothing is kept for its own sake.
+  const std::weak_ptr<const SharedAssets> gone = first;
+  first.reset();
+  EXPECT_TRUE(gone.expired());
+}
+
+TEST(MapCache, AMapIsReadOncePerTable) {
+  const JobSpec job = test::box_job();
+  const std::string& path = job.environment.keys.front().map;
+  MapCache maps;
+  const auto first = maps.get(path, job.environment, false).value();
+  EXPECT_EQ(maps.get(path, job.environment, false).value(), first);
+  EXPECT_NE(maps.get(path, job.environment, true).value(), first);
+  EnvironmentSpec brighter = job.environment;
+  brighter.scale *= 2;
+  const auto scaled = maps.get(path, brighter, false).value();
+  EXPECT_FLOAT_EQ(scaled->texels()[0].r, 2 * first->texels()[0].r);
+  EXPECT_FALSE(maps.get("nowhere.exr", job.environment, false));
 }
 
 }  // namespace

@@ -1,0 +1,40 @@
+#pragma once
+
+#include <list>
+#include <memory>
+#include <mutex>
+#include <string>
+#include <utility>
+
+#include "common/base/result.h"
+#include "common/job/job_spec.h"
+#include "worker/scene/environment.h"
+
+namespace baton {
+
+/// Maps as they are in their files, with sampling tables, kept while memory allows
+/// (limits::kMaxEnvironmentCacheBytes). Any number of threads and jobs may ask; a map is read once
+/// while the others wait. Files are taken to keep their contents as long as the cache lives.
+class MapCache {
+ public:
+  using MapPtr = std::shared_ptr<const EnvironmentMap>;
+
+  /// The map of a file with the table that `environment` and `compensate` ask for. Error: a map
+  /// that cannot be read.
+  Result<MapPtr> get(const std::string& path, const EnvironmentSpec& environment, bool compensate);
+
+ private:
+  struct Key {
+    std::string path;
+    MapFilter filter;
+    float scale;
+    bool compensate;
+
+    bool operator==(const Key&) const = default;
+  };
+
+  std::mutex mutex_;
+  std::list<std::pair<Key, MapPtr>> maps_;  ///< most recently used in front
+};
+
+}  // namespace baton

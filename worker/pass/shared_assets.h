@@ -1,0 +1,49 @@
+#pragma once
+
+#include <list>
+#include <memory>
+#include <mutex>
+#include <vector>
+
+#include "common/base/result.h"
+#include "common/job/job_json.h"
+#include "common/job/job_spec.h"
+#include "worker/accel/accel.h"
+#include "worker/integrator/map_cache.h"
+
+namespace baton {
+
+/// What is slow to load, and the same for all jobs that show one scene with one set of files:
+/// a study's jobs differ in their sampling alone. Immutable but for the maps, which guard
+/// themselves.
+struct SharedAssets {
+  Scene scene;
+  std::shared_ptr<const Accel> accel;  ///< of `scene`
+  std::shared_ptr<MapCache> maps;
+};
+
+/// Loads meshes and materials and builds the ray tracer; maps are read when they are asked for.
+/// Errors name the file and what was expected; several faults are joined by newlines.
+Result<std::shared_ptr<const SharedAssets>> load_shared_assets(const JobSpec& job);
+
+/// The assets of those jobs that are still in use. Any number of threads may ask; one loads at a
+/// time.
+class AssetShelf {
+ public:
+  /// The assets of a living job of equal scene and files, or newly loaded ones. files: every asset
+  /// of the job with its digest, already verified.
+  Result<std::shared_ptr<const SharedAssets>> get(const JobSpec& job,
+                                                  const std::vector<AssetDigest>& files);
+
+ private:
+  struct Entry {
+    SceneSpec scene;
+    std::vector<AssetDigest> files;
+    std::weak_ptr<const SharedAssets> assets;
+  };
+
+  std::mutex mutex_;
+  std::list<Entry> entries_;
+};
+
+}  // namespace baton
