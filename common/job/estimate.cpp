@@ -67,7 +67,7 @@ JobEstimate estimate_job(const JobSpec& job) {
   // Size the state and the largest blob.
   const std::int64_t tile_pixels = std::min<std::int64_t>(side, job.image.width) *
                                    std::min<std::int64_t>(side, job.image.height);
-  const std::int64_t particles = job.sampling.num_particles;
+  const std::int64_t particles = num_carried_particles(job.sampling);
   e.largest_blob_bytes = tile_pixels * e.film_channels * 4;
   if (carries_state(job)) {
     e.state_bytes_per_pixel =

@@ -47,6 +47,16 @@ void fields(JobArchive& a, ImageSpec& image) {
   a.integer("tileSize", image.tile_size, limits::kMinTileSize, limits::kMaxTileSize);
 }
 
+/// The pool sampler keeps two halves of everything.
+void check_halves(JobArchive& a, const SamplingSpec& sampling) {
+  if (sampling.method != Method::pool) return;
+  for (const auto& [key, value] :
+       {std::pair{"numParticles", sampling.num_particles}, {"numCarried", sampling.num_carried}}) {
+    if (value % 2 != 0)
+      a.fault(key, "an even count, as method pool keeps two halves", std::to_string(value));
+  }
+}
+
 void fields(JobArchive& a, SamplingSpec& sampling) {
   a.choice("method", sampling.method, kMethods);
   a.integer("numParticles", sampling.num_particles, 1, limits::kMaxParticles);
@@ -81,6 +91,10 @@ void fields(JobArchive& a, SamplingSpec& sampling) {
     a.fault("method", "\"auto\" with targetError or timeBudget",
             fmt::format("\"{}\"", kMethods[static_cast<std::size_t>(sampling.method)]));
   }
+  a.integer("numCarried", sampling.num_carried, 2, limits::kMaxParticles);
+  a.number("poolGain", sampling.pool_gain, {.min = 0, .max = 100});
+  a.boolean("visibilityMemory", sampling.visibility_memory);
+  check_halves(a, sampling);
   a.integer("referenceSamples", sampling.reference_samples, 2, limits::kMaxReferenceSamples);
 }
 
@@ -96,6 +110,9 @@ void fields(JobArchive& a, VisibilitySpec& visibility, const SamplingSpec& sampl
   // The second pass needs samples, two independent halves of them unless told otherwise.
   if (sampling.method == Method::reference) {
     a.fault("correlated", "false, as sampling.method is reference", "true");
+  }
+  if (sampling.method == Method::pool) {
+    a.fault("correlated", "false, as the rays of sampling.method pool are not its samples", "true");
   }
   if (visibility.mask != MaskPolicy::same_samples && sampling.num_particles % 2 != 0) {
     a.fault("mask", "same-samples, or an even sampling.numParticles to be halved",

@@ -174,7 +174,7 @@ struct EnvironmentSpec {
 
 // ---- sampling ----------------------------------------------------------------------------------------------
 /// automatic: settled by a pilot before the job is submitted; never part of a job document.
-enum class Method : std::uint8_t { reference, environment, brdf, mis, bidirectional, sequential, automatic };
+enum class Method : std::uint8_t { reference, environment, brdf, mis, bidirectional, sequential, pool, automatic };
 enum class ResamplingScheme : std::uint8_t { systematic, stratified, multinomial, residual };
 /// How `sequential` carries the normalising constant: by the ratio of the weights, or by path sampling with a left, right or
 /// trapezoidal sum over the intermediate distributions.
@@ -203,6 +203,9 @@ struct SamplingSpec {
   int refresh_candidates = 800;  ///< [N, limits::kMaxCandidates]
   std::optional<float> target_error{};  ///< automatic: RMSE over mean radiance to reach, (0, 10]
   std::optional<float> time_budget{};   ///< automatic: CPU seconds of the whole job to stay within, (0, 1e9]
+  int num_carried = 16;            ///< pool: particles carried per pixel, [2, limits::kMaxParticles], even
+  float pool_gain = 2;             ///< pool: c of the balance of carried and fresh samples, [0, 100]
+  bool visibility_memory = true;   ///< pool: what earlier rays found steers the new ones
   int reference_samples = 1024;    ///< paired samples per pixel of `reference`, [2, 2^24]
 
   bool operator==(const SamplingSpec&) const = default;

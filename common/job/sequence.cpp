@@ -90,7 +90,14 @@ TileRun tile_run(const JobSpec& job, std::int32_t tile, std::int32_t run) {
   return {tile, run, first, std::min(first + frames_per_run(job), frames) - 1};
 }
 
-bool carries_state(const JobSpec& job) { return job.sampling.method == Method::sequential && job.state.carry; }
+bool carries_state(const JobSpec& job) {
+  const Method method = job.sampling.method;
+  return (method == Method::sequential || method == Method::pool) && job.state.carry;
+}
+
+std::int32_t num_carried_particles(const SamplingSpec& sampling) {
+  return sampling.method == Method::pool ? sampling.num_carried : sampling.num_particles;
+}
 
 std::int32_t num_populations(const JobSpec& job) {
   return job.visibility.correlated && job.visibility.mask != MaskPolicy::same_samples ? 2 : 1;

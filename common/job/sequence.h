@@ -68,8 +68,10 @@ std::int32_t frames_per_run(const JobSpec& job);
 std::int32_t num_runs(const JobSpec& job);
 /// The run's frames; run in [0, num_runs(job)), tile in [0, TileGrid(job.image).count()).
 TileRun tile_run(const JobSpec& job, std::int32_t tile, std::int32_t run);
-/// True when the method hands samples from frame to frame: `sequential` with state.carry.
+/// True when the method hands samples from frame to frame: `sequential` and `pool` with state.carry.
 bool carries_state(const JobSpec& job);
+/// Particles per pixel in the job's states.
+std::int32_t num_carried_particles(const SamplingSpec& sampling);
 
 /// Sets of samples of a pixel that never exchange anything: 2 when one decides what is done with the other, else 1.
 std::int32_t num_populations(const JobSpec& job);

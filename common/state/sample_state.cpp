@@ -20,8 +20,10 @@ constexpr SectionTag kDirection{'D', 'I', 'R', '_'};
 constexpr SectionTag kWeight{'W', 'G', 'T', '_'};
 constexpr SectionTag kSite{'S', 'I', 'T', 'E'};
 constexpr SectionTag kPopulations{'P', 'O', 'P', 'S'};
-constexpr std::array kTags{kMeta,      kSource, kLns,  kLnsFresh,
-                           kDirection, kWeight, kSite, kPopulations};
+constexpr SectionTag kMemorySummary{'V', 'I', 'S', 'S'};
+constexpr SectionTag kMemoryGrid{'V', 'I', 'S', 'G'};
+constexpr std::array kTags{kMeta,   kSource, kLns,         kLnsFresh,      kDirection,
+                           kWeight, kSite,   kPopulations, kMemorySummary, kMemoryGrid};
 
 constexpr std::size_t kMetaBytes = 2 * sizeof(std::uint64_t) + 7 * sizeof(std::int32_t);
 /// How far the sum of a pixel's weights may be from 1.
@@ -168,6 +170,54 @@ Status check_population(const SampleState& state, std::size_t pixel, std::size_t
   return {};
 }
 
+/// A memory's bins come first; the two cells after them are its summary.
+constexpr std::size_t kMemoryBins = kMemoryCells - 2;
+constexpr MemoryCell kSawBoth = 3;
+
+/// The summary of each surface pixel, and the bins of those whose rays have disagreed.
+void encode_memory(const SampleState& state, const std::vector<std::size_t>& pixels,
+                   std::vector<Section>& sections) {
+  if (state.memory.empty()) return;
+  ByteWriter summaries, grids;
+  for (const std::size_t pixel : pixels) {
+    const auto cells = std::span(state.memory).subspan(pixel * kMemoryCells, kMemoryCells);
+    summaries.put_raw(std::as_bytes(cells.subspan(kMemoryBins)));
+    if (cells.back() == kSawBoth) grids.put_raw(std::as_bytes(cells.first(kMemoryBins)));
+  }
+  sections.push_back({kMemorySummary, true, 2 * sizeof(MemoryCell), summaries.take()});
+  sections.push_back({kMemoryGrid, true, sizeof(MemoryCell), grids.take()});
+}
+
+/// Inverse of encode_memory; a file without memories leaves the state without them.
+Status decode_memory(const SectionFile& file, const std::vector<std::size_t>& pixels,
+                     const std::string& name, SampleState& state) {
+  if (file.find(kMemorySummary) == nullptr && file.find(kMemoryGrid) == nullptr) return {};
+  constexpr std::size_t kSummaryBytes = 2 * sizeof(MemoryCell);
+  constexpr std::size_t kGridBytes = kMemoryBins * sizeof(MemoryCell);
+  BATON_ASSIGN(const ByteView summaries,
+               section_payload(file, kMemorySummary, pixels.size() * kSummaryBytes, name));
+  state.add_memory();
+
+  // Summaries first: they say how many grids there are.
+  std::vector<std::size_t> with_grid;
+  for (std::size_t i = 0; i < pixels.size(); ++i) {
+    const std::span<MemoryCell> cells = state.memory_of(pixels[i]);
+    std::memcpy(cells.data() + kMemoryBins, summaries.data() + i * kSummaryBytes, kSummaryBytes);
+    if (cells.back() > kSawBoth) {
+      const Error error = value_error(state, kMemorySummary, pixels[i],
+                                      fmt::format("outcomes {}, expected 0 to 3", cells.back()));
+      return Error{error.kind, fmt::format("{}: section {}", name, error.message)};
+    }
+    if (cells.back() == kSawBoth) with_grid.push_back(pixels[i]);
+  }
+  BATON_ASSIGN(const ByteView grids,
+               section_payload(file, kMemoryGrid, with_grid.size() * kGridBytes, name));
+  for (std::size_t i = 0; i < with_grid.size(); ++i) {
+    std::memcpy(state.memory_of(with_grid[i]).data(), grids.data() + i * kGridBytes, kGridBytes);
+  }
+  return {};
+}
+
 /// Fills `state.source`; resizes all arrays.
 Status decode_sources(const SectionFile& file, const std::string& name, SampleState& state) {
   const auto populations = static_cast<std::size_t>(state.num_populations);
@@ -205,6 +255,7 @@ void SampleState::resize(const PixelRect& new_rect, std::int32_t new_num_particl
   direction.assign(particles, 0);
   weight.assign(particles, 0.0f);
   site.assign(particles, 0);
+  memory.clear();
 }
 
 Bytes encode_state(const SampleState& state) {
@@ -217,6 +268,7 @@ Bytes encode_state(const SampleState& state) {
               state.direction.size() == num_pixels * num_particles);
   BATON_CHECK(state.weight.size() == state.direction.size() &&
               state.site.size() == state.direction.size());
+  BATON_CHECK(state.memory.empty() || state.memory.size() == num_pixels * kMemoryCells);
 
   const std::vector<std::size_t> pixels = surface_pixels(state);
   const ByteView sources = std::as_bytes(std::span(state.source));
@@ -234,6 +286,7 @@ Bytes encode_state(const SampleState& state) {
     writer.put(state.num_populations);
     file.sections.push_back({kPopulations, true, 1, writer.take()});
   }
+  encode_memory(state, pixels, file.sections);
   return encode_section_file(file);
 }
 
@@ -254,6 +307,7 @@ Result<SampleState> decode_state(ByteView bytes, const std::string& name) {
   BATON_TRY(scatter(file, kDirection, pixels, num_particles, name, state.direction));
   BATON_TRY(scatter(file, kWeight, pixels, num_particles, name, state.weight));
   BATON_TRY(scatter(file, kSite, pixels, num_particles, name, state.site));
+  BATON_TRY(decode_memory(file, pixels, name, state));
 
   // Check every value.
   for (const std::size_t pixel : pixels) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <span>
 #include <string>
 #include <vector>
 
@@ -20,6 +21,10 @@ enum class PixelSource : std::uint8_t {
   restarted = 3,   ///< carried, but all weights died: SIR again
   refreshed = 4,   ///< carried, Lns recomputed by the refresh rule
 };
+
+/// One bin of a pixel's memory of its shadow rays; worker/sampling/visibility_grid.h says what it means.
+using MemoryCell = std::uint16_t;
+inline constexpr std::size_t kMemoryCells = 258;  ///< of one pixel: 256 bins, all rays, outcomes seen
 
 /// The baton: what one tile hands to its next frame. Structure of arrays; pixels row by row inside
 /// `rect`. The surfaces are not stored: primary hits are a pure function of (job, frame, pixel,
@@ -42,11 +47,20 @@ struct SampleState {
                               ///< no particle is lit
   std::vector<std::uint8_t> site;  ///< (pixels, N)
 
+  std::vector<MemoryCell> memory;  ///< (pixels, kMemoryCells), or empty: nothing is remembered
+
   bool operator==(const SampleState&) const = default;
   std::size_t num_pixels() const { return static_cast<std::size_t>(rect.area()); }
   /// Sizes every array, all zero. new_num_populations divides new_num_particles.
   void resize(const PixelRect& new_rect, std::int32_t new_num_particles,
               std::int32_t new_num_populations = 1);
+  /// Gives each pixel an empty memory.
+  void add_memory() { memory.assign(num_pixels() * kMemoryCells, 0); }
+  /// The memory of a pixel, or nothing.
+  std::span<MemoryCell> memory_of(std::size_t pixel) {
+    if (memory.empty()) return {};
+    return std::span(memory).subspan(pixel * kMemoryCells, kMemoryCells);
+  }
 };
 
 /// Newest file version that this program reads, and the one that it writes.

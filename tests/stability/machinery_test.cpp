@@ -55,7 +55,7 @@ class SelfAdaptedSampler final : public PixelSampler {
     start_ = make_pixel_sampler(spec);
   }
 
-  PixelDiagnostics sample(const PixelInput& input, kernels::CandidateSet& scratch,
+  PixelDiagnostics sample(const PixelInput& input, SamplerScratch& scratch,
                           const PixelSamples& samples) const override {
     if (!input.has_history) return start_->sample(input, scratch, samples);
     const auto count = samples.weight.size();

@@ -110,6 +110,44 @@ TEST(Methods, AMeasuredPhongLooksLikePhong) {
   EXPECT_LT(v.image, kImageLimit);
 }
 
+/// The pool sampler after so many frames of a sky that turns.
+JobSpec pool_job(int frames) {
+  JobSpec job = still_job(Method::pool);
+  job.frames = frame_numbers(frames);
+  job.environment.rotation_deg_per_frame = 1.5;
+  job.sampling.num_candidates = 64;
+  return job;
+}
+TEST(Methods, PoolAgreesWithBruteForceAtItsFirstFrame) { expect_agreement(pool_job(1), 200, 0.01); }
+TEST(Methods, PoolAgreesWithBruteForceAfterFiveFrames) { expect_agreement(pool_job(5), 200, 0.01); }
+TEST(Methods, PoolAgreesWithBruteForceAfterTwentyFrames) { expect_agreement(pool_job(20), 200, 0.01); }
+TEST(Methods, PoolWithoutMemoryAgrees) {
+  JobSpec job = pool_job(5);
+  job.sampling.visibility_memory = false;
+  expect_agreement(job, 200, 0.01);
+}
+
+/// Maps that hold for so many frames each.
+JobSpec changing_job(const std::vector<std::pair<int, std::string>>& maps, int frames) {
+  JobSpec job = pool_job(frames);
+  job.environment.rotation_deg_per_frame = 0;
+  job.environment.interpolate = false;
+  job.environment.keys.clear();
+  for (const auto& [frame, map] : maps) job.environment.keys.push_back({.frame = static_cast<double>(frame), .map = map});
+  return job;
+}
+TEST(Methods, PoolAgreesAfterACut) {
+  const std::string white = test::write_map("white.exr", test::constant_map(64, 32, {1, 1, 1}));
+  const std::string sky = test::write_map("sky.exr", test::sky_map());
+  expect_agreement(changing_job({{1, white}, {4, sky}}, 4), 200, 0.01);
+  expect_agreement(changing_job({{1, white}, {4, sky}, {5, white}}, 6), 200, 0.01);
+}
+TEST(Methods, PoolFindsTheLightAfterBlack) {
+  const std::string black = test::write_map("black.exr", test::constant_map(64, 32, {0, 0, 0}));
+  const std::string sky = test::write_map("sky.exr", test::sky_map());
+  expect_agreement(changing_job({{1, sky}, {2, black}, {4, sky}}, 5), 200, 0.01);
+}
+
 // The same machinery must see a ground that reflects 4 % too much.
 TEST(Methods, PlantedFaultIsSeen) {
   const JobSpec job = still_job(Method::bidirectional);
@@ -129,7 +167,7 @@ TEST(Methods, PlantedFaultInTheSequenceIsSeen) {
 
 // Furnace: a white sky of radiance 1 over a Lambertian ground of albedo a reflects exactly a.
 TEST(Furnace, LambertReflectsItsAlbedo) {
-  for (const Method method : {Method::environment, Method::brdf, Method::mis, Method::bidirectional, Method::sequential}) {
+  for (const Method method : {Method::environment, Method::brdf, Method::mis, Method::bidirectional, Method::sequential, Method::pool}) {
     JobSpec job = still_job(method);
     job.scene.objects.clear();
     job.camera = {.position = {0, 5, 0.1f}, .look_at = {0, 0, 0}, .up = {0, 0, -1}, .vertical_fov_deg = 20};

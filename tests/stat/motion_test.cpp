@@ -1,8 +1,8 @@
-// The sequential sampler through motion against brute force: ratio form, no refresh, so that
-// nothing mends an error. The scene is of flat faces, whose horizons motion does not change: what
-// was in the dark stays there (METHODS of the paper: unbiased as long as the support does not
-// change). Hypothesis: per-pixel and image means of the last frame are those of brute force; level
-// 1e-3 each, Sidak over the pixels.
+// The samplers that carry through motion against brute force. `sequential` in its ratio form and
+// without refresh, so that nothing mends an error: the scene is of flat faces, whose horizons
+// motion does not change: what was in the dark stays there (METHODS of the paper: unbiased as long
+// as the support does not change). Hypothesis: per-pixel and image means of the last frame are
+// those of brute force; level 1e-3 each, Sidak over the pixels.
 #include <gtest/gtest.h>
 
 #include <array>
@@ -34,9 +34,8 @@ TEST(Motion, AMovingObjectIsUnbiased) {
   test::expect_agreement(moving_job(false, true, 1), kMotionRuns, 0.02);
 }
 
-TEST(Motion, BothAreUnbiasedWithSeveralSites) {
-  // The sites are part of the seed: both sides average over them.
-  const JobSpec job = moving_job(true, true, 4);
+/// Both sides average over the sites, which are part of the seed.
+void expect_agreement_over_sites(const JobSpec& job) {
   JobSpec reference = job;
   reference.sampling.method = Method::reference;
   reference.sampling.reference_samples = 1000;
@@ -47,6 +46,29 @@ TEST(Motion, BothAreUnbiasedWithSeveralSites) {
   EXPECT_LT(v.resolution, 0.02);
   std::printf("  image |z| %.2f, worst pixel |z| %.2f, resolves a bias of %.2f %%\n", v.image,
               v.worst_pixel, 100 * v.resolution);
+}
+
+TEST(Motion, BothAreUnbiasedWithSeveralSites) {
+  expect_agreement_over_sites(moving_job(true, true, 4));
+}
+
+/// The memory of the pool's pixels follows the surfaces; the second box is also a shadow that
+/// moves.
+JobSpec moving_pool_job(bool camera, bool object, int sites) {
+  JobSpec job = moving_job(camera, object, sites);
+  job.sampling.method = Method::pool;
+  job.sampling.num_candidates = 64;
+  job.environment.rotation_deg_per_frame = 1.5;
+  return job;
+}
+TEST(Motion, ThePoolIsUnbiasedUnderAMovingCamera) {
+  test::expect_agreement(moving_pool_job(true, false, 1), kMotionRuns, 0.01);
+}
+TEST(Motion, ThePoolIsUnbiasedUnderAMovingOccluder) {
+  test::expect_agreement(moving_pool_job(false, true, 1), kMotionRuns, 0.01);
+}
+TEST(Motion, ThePoolIsUnbiasedUnderBothWithSeveralSites) {
+  expect_agreement_over_sites(moving_pool_job(true, true, 4));
 }
 
 /// Mean of Lns over runs and its squared standard error.
@@ -122,7 +144,7 @@ class TurningViewer {
   std::shared_ptr<const FrameLight> light_;
   SiteBlock sites_;
   OldSurfaces old_;
-  std::unique_ptr<kernels::CandidateSet> scratch_ = std::make_unique<kernels::CandidateSet>();
+  std::unique_ptr<SamplerScratch> scratch_ = std::make_unique<SamplerScratch>();
 };
 
 double z_score(const LnsMean& a, const LnsMean& b) {

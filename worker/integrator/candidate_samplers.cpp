@@ -38,44 +38,47 @@ CandidateCounts split_candidates(std::int32_t total, float brdf_fraction) {
   return {total - from_bsdf, from_bsdf};
 }
 
-PixelDiagnostics DirectSampler::sample(const PixelInput& input, kernels::CandidateSet& scratch,
+CandidateCounts candidate_counts(const SiteBlock& sites, std::int32_t total, float lobe_fraction) {
+  if (lobe_fraction >= 1) return {.from_bsdf = total};
+  constexpr std::int32_t kVector = 8;  // candidates that cost as much as one
+  const float wanted = lobe_fraction * sites.specular_share * static_cast<float>(total);
+  const std::int32_t rounded = static_cast<std::int32_t>(std::ceil(wanted / kVector)) * kVector;
+  const std::int32_t from_bsdf = sites.num_lobes > 0 ? std::min(rounded, total / 2) : 0;
+  return {.from_light = total - from_bsdf, .from_bsdf = from_bsdf, .lobe_only = true};
+}
+
+PixelDiagnostics DirectSampler::sample(const PixelInput& input, SamplerScratch& scratch,
                                        const PixelSamples& samples) const {
   PixelDiagnostics diagnostics{.target_evaluations = counts_.total()};
-  if (!draw(input, counts_, scratch, samples)) return diagnostics;
-  const float inverse = 1.0f / scratch.total;
+  kernels::CandidateSet& candidates = scratch.candidates;
+  if (!draw(input, counts_, candidates, samples)) return diagnostics;
+  const float inverse = 1.0f / candidates.total;
   for (std::size_t j = 0; j < samples.weight.size(); ++j) {
-    samples.direction[j] = scratch.code[j];
-    samples.site[j] = static_cast<std::uint8_t>(scratch.site[j]);
-    samples.weight[j] = scratch.weight[j] * inverse;
+    samples.direction[j] = candidates.code[j];
+    samples.site[j] = static_cast<std::uint8_t>(candidates.site[j]);
+    samples.weight[j] = candidates.weight[j] * inverse;
   }
   diagnostics.ess = effective_sample_size(samples.weight);
   return diagnostics;
 }
 
-CandidateCounts BidirectionalSampler::counts_for(const SiteBlock& sites) const {
-  if (lobe_fraction_ >= 1) return {.from_bsdf = num_candidates_};
-  constexpr std::int32_t kVector = 8;  // candidates that cost as much as one
-  const float wanted = lobe_fraction_ * sites.specular_share * static_cast<float>(num_candidates_);
-  const std::int32_t rounded = static_cast<std::int32_t>(std::ceil(wanted / kVector)) * kVector;
-  const std::int32_t from_bsdf = sites.num_lobes > 0 ? std::min(rounded, num_candidates_ / 2) : 0;
-  return {.from_light = num_candidates_ - from_bsdf, .from_bsdf = from_bsdf, .lobe_only = true};
-}
-
-PixelDiagnostics BidirectionalSampler::sample(const PixelInput& input,
-                                              kernels::CandidateSet& scratch,
+PixelDiagnostics BidirectionalSampler::sample(const PixelInput& input, SamplerScratch& scratch,
                                               const PixelSamples& samples) const {
   PixelDiagnostics diagnostics{.target_evaluations = num_candidates_};
-  if (!draw(input, counts_for(input.sites), scratch, samples)) return diagnostics;
+  kernels::CandidateSet& candidates = scratch.candidates;
+  const CandidateCounts counts = candidate_counts(input.sites, num_candidates_, lobe_fraction_);
+  if (!draw(input, counts, candidates, samples)) return diagnostics;
   std::array<std::int32_t, limits::kMaxParticles> storage{};
   const std::span<std::int32_t> chosen = std::span(storage).first(samples.weight.size());
   const float u = Rng(input.key, PassId::choose).uniforms(0, 0)[0];
-  const auto count = static_cast<std::size_t>(scratch.count);
-  systematic_choice({scratch.weight, count},
-                    {scratch.running_total, (count + kChoiceBlock - 1) / kChoiceBlock}, u, chosen);
+  const auto count = static_cast<std::size_t>(candidates.count);
+  systematic_choice({candidates.weight, count},
+                    {candidates.running_total, (count + kChoiceBlock - 1) / kChoiceBlock}, u,
+                    chosen);
   for (std::size_t j = 0; j < chosen.size(); ++j) {
     const auto pick = static_cast<std::size_t>(chosen[j]);
-    samples.direction[j] = scratch.code[pick];
-    samples.site[j] = static_cast<std::uint8_t>(scratch.site[pick]);
+    samples.direction[j] = candidates.code[pick];
+    samples.site[j] = static_cast<std::uint8_t>(candidates.site[pick]);
     samples.weight[j] = 1.0f / static_cast<float>(chosen.size());
   }
   diagnostics.ess = static_cast<float>(chosen.size());

@@ -55,22 +55,38 @@ struct SiteDeal {
   }
 };
 
+/// Expected density of BRDF candidates at a site, relative to an even deal over all sites with a
+/// surface.
+HWY_INLINE VF BsdfDensity(const SiteBlock& sites, const kernels::CandidateCounts& counts,
+                          const SurfaceLanes& surface, const BsdfLanes& f) {
+  const DF d;
+  if (!counts.lobe_only) return MixturePdf(surface, f);
+  const VF crowd = hn::Set(
+      d, static_cast<float>(sites.num_hits) / static_cast<float>(std::max(sites.num_lobes, 1)));
+  return hn::IfThenElseZero(hn::Gt(surface.specular_probability, hn::Zero(d)),
+                            hn::Mul(f.lobe_pdf, crowd));
+}
+
+/// Sums of weights up to the end of each block of kChoiceBlock, so that choosing looks at blocks. The
+/// weights are padded by zeros to a whole vector. Returns the total.
+HWY_INLINE float RunningTotals(const float* weight, std::int32_t count, float* running) {
+  const DF d;
+  float total = 0;
+  for (std::size_t i = 0; i < static_cast<std::size_t>(count); i += kChoiceBlock) {
+    VF sum = hn::Zero(d);
+    const std::size_t end = std::min(i + kChoiceBlock, static_cast<std::size_t>(count));
+    for (std::size_t j = i; j < end; j += hn::Lanes(d)) sum = hn::Add(sum, hn::LoadU(d, weight + j));
+    total += hn::GetLane(hn::SumOfLanes(d, sum));
+    running[i / kChoiceBlock] = total;
+  }
+  return total;
+}
+
 /// Everything that the two kinds of candidates of a pixel share.
 struct CandidateContext {
   const SiteBlock& sites;
   const kernels::CandidateCounts& counts;
   kernels::CandidateSet& out;
-
-  /// Expected density of BRDF candidates at a site, relative to an even deal over all sites with a
-  /// surface.
-  HWY_INLINE VF BsdfDensity(const SurfaceLanes& surface, const BsdfLanes& f) const {
-    const DF d;
-    if (!counts.lobe_only) return MixturePdf(surface, f);
-    const VF crowd = hn::Set(
-        d, static_cast<float>(sites.num_hits) / static_cast<float>(std::max(sites.num_lobes, 1)));
-    return hn::IfThenElseZero(hn::Gt(surface.specular_probability, hn::Zero(d)),
-                              hn::Mul(f.lobe_pdf, crowd));
-  }
 
   /// Stores candidates at [at, at + lanes) with weight p~ / sum_t M_t q_t, of which the first
   /// `left` count.
@@ -84,7 +100,7 @@ struct CandidateContext {
     VF proposal = hn::Mul(hn::Set(d, static_cast<float>(counts.from_light)), light.density);
     if (counts.from_bsdf > 0) {
       proposal = hn::MulAdd(hn::Set(d, static_cast<float>(counts.from_bsdf)),
-                            BsdfDensity(surface, f), proposal);
+                            BsdfDensity(sites, counts, surface, f), proposal);
     }
     MF live = hn::And(hn::Gt(target, hn::Zero(d)), hn::Gt(proposal, hn::Zero(d)));
     if (left < hn::Lanes(d)) live = hn::And(live, hn::FirstN(d, left));

@@ -85,7 +85,9 @@ Result<std::shared_ptr<const FrameLight>> LightSequence::at(std::int32_t index) 
   auto light = std::make_shared<FrameLight>();
   BATON_ASSIGN(light->now, environment(frame.environment));
   BATON_ASSIGN(light->before, environment(frame_before.environment));
-  light->pool = make_light_pool(light->now, light->before, job_.seed, static_cast<std::uint32_t>(frame.number));
+  light->pool = make_light_pool(
+      light->now, light->before, job_.seed, static_cast<std::uint32_t>(frame.number),
+      job_.sampling.method == Method::pool ? CarriedFrame::environment : CarriedFrame::world);
   light->prepare_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   insert_in_front(lights_, index, std::shared_ptr<const FrameLight>(light));
   return std::shared_ptr<const FrameLight>(light);

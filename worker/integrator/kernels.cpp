@@ -100,17 +100,7 @@ void DrawCandidates(const SiteBlock& sites, const EnvironmentView& environment, 
   BsdfCandidates(context, environment, random);
   out.count = counts.total();
 
-  // Add up: a running sum per block of candidates, so that choosing N of M looks at N blocks.
-  const DF d;
-  float total = 0;
-  for (std::size_t i = 0; i < static_cast<std::size_t>(out.count); i += kChoiceBlock) {
-    VF sum = hn::Zero(d);
-    const std::size_t end = std::min(i + kChoiceBlock, static_cast<std::size_t>(out.count));
-    for (std::size_t j = i; j < end; j += hn::Lanes(d)) sum = hn::Add(sum, hn::LoadU(d, out.weight + j));
-    total += hn::GetLane(hn::SumOfLanes(d, sum));
-    out.running_total[i / kChoiceBlock] = total;
-  }
-  out.total = total;
+  out.total = RunningTotals(out.weight, out.count, out.running_total);
 }
 
 void ShadeSamples(const SiteBlock& sites, const EnvironmentView& environment, std::span<const OctDirection> code,

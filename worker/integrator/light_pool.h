@@ -33,9 +33,14 @@ struct LightPool {
   std::size_t size_bytes() const { return blocks.size() * sizeof(Block); }
 };
 
+/// What carried directions are relative to: the world, or the environment, with which they then
+/// turn.
+enum class CarriedFrame { world, environment };
+
 /// The pool of one frame. before: the environment that `before_*` is read from (the same as `now`
-/// for the first frame).
+/// for the first frame). carried: what `code` and the `before_*` of a direction are relative to;
+/// x, y, z are world directions in either case.
 LightPool make_light_pool(const Environment& now, const Environment& before, std::uint64_t job_seed,
-                          std::uint32_t frame);
+                          std::uint32_t frame, CarriedFrame carried = CarriedFrame::world);
 
 }  // namespace baton

@@ -1,29 +1,35 @@
 #pragma once
 
+#include <array>
 #include <memory>
+#include <span>
 
 #include "common/job/job_spec.h"
 #include "common/state/sample_state.h"
 #include "worker/integrator/frame_light.h"
 #include "worker/integrator/kernels.h"
 #include "worker/integrator/old_surfaces.h"
+#include "worker/integrator/pool_kernels.h"
 
 namespace baton {
 
 /// What every method is given for one pixel.
 struct PixelInput {
-  const SiteBlock& sites;            ///< at least one of them sees a surface
+  const SiteBlock& sites;  ///< at least one of them sees a surface
   const FrameLight& light;
-  const EnvironmentView& now;        ///< views of light.now and light.before
+  const EnvironmentView& now;  ///< views of light.now and light.before
   const EnvironmentView& before;
   RngKey key;
   std::int32_t frame_index = 0;  ///< 0-based position in the sequence
   bool has_history = false;      ///< the samples hold the previous frame's properly weighted set
   const OldSurfaces* old = nullptr;  ///< the surfaces of that set, where they are not `sites`
+  /// (kVisibilityCells) of the frames before, or empty; see remembers()
+  std::span<const VisibilityCell> memory{};
 };
 
-/// The samples of one pixel, in and out: a properly weighted set for p~(site, w) = p~_site(w) / S with
-/// contributions u_j = lns * weight_j, so that E[sum u_j h(w_j)] = integral of p~ h. lns 0: every weight is 0.
+/// The samples of one pixel, in and out: a properly weighted set for p~(site, w) = p~_site(w) / S
+/// with contributions u_j = lns * weight_j, so that E[sum u_j h(w_j)] = integral of p~ h. lns 0:
+/// every weight is 0.
 struct PixelSamples {
   std::span<OctDirection> direction;  ///< (N)
   std::span<std::uint8_t> site;       ///< (N)
@@ -35,20 +41,65 @@ struct PixelSamples {
 
 /// What a method says about its work on a pixel.
 struct PixelDiagnostics {
-  float ess = 0;         ///< [1, N], 0 without light
+  float ess = 0;  ///< [1, N], 0 without light
   std::int32_t target_evaluations = 0;
   MoveCounts local = {}, independent = {};
   bool resampled = false;
   bool refreshed_by_ratio = false;
 };
 
-/// A sampling method: the plug-in over the contract of PixelSamples. Stateless; any number of threads may use one.
+/// The shadow rays of one pixel and what each brings. The pixel is the sum of `constant` and of the
+/// values of the rays that are free, in this order; its expectation must be the pixel's radiance.
+struct PixelRays {
+  /// Colour and share of Lns.
+  struct Value {
+    Rgb color;
+    float visibility = 0;
+  };
+  static constexpr std::size_t kCapacity = limits::kMaxParticles;
+  std::size_t count = 0;
+  std::array<Vec3, kCapacity> direction;
+  std::array<std::uint8_t, kCapacity> site;
+  std::array<Value, kCapacity> value;
+  Value constant;
+  /// Where a method keeps two independent halves: the rays from here on belong to the second, and
+  /// `difference` is the first constant less the second. 0: one whole.
+  std::size_t second_half = 0;
+  Rgb difference;
+
+  void clear() {
+    count = second_half = 0;
+    constant = {};
+    difference = {};
+  }
+  void push(const Vec3& w, std::uint8_t s, const Value& v) {
+    direction[count] = w;
+    site[count] = s;
+    value[count++] = v;
+  }
+};
+
+/// Work space of one thread, reused from pixel to pixel.
+struct SamplerScratch {
+  kernels::CandidateSet candidates;
+  std::array<kernels::PoolHalf, 2> pool;
+  kernels::ShadedSamples shaded;
+};
+
+/// A sampling method: the plug-in over the contract of PixelSamples. Stateless; any number of
+/// threads may use one.
 class PixelSampler {
  public:
   virtual ~PixelSampler() = default;
   /// scratch: the caller's, reused from pixel to pixel.
-  virtual PixelDiagnostics sample(const PixelInput& input, kernels::CandidateSet& scratch,
+  virtual PixelDiagnostics sample(const PixelInput& input, SamplerScratch& scratch,
                                   const PixelSamples& samples) const = 0;
+  /// Whether the method chooses its rays apart from its samples; else they are its samples.
+  virtual bool chooses_rays() const { return false; }
+  /// Chooses them, after sample() and with the scratch as that left it.
+  virtual void choose_rays(const PixelInput& input, SamplerScratch& scratch, PixelRays& rays) const;
+  /// Whether the method wants to be told in later frames what rays found (PixelInput::memory).
+  virtual bool remembers() const { return false; }
 };
 
 /// The sampler of a job; null for Method::reference, which is no sampler of this kind (reference.h);

@@ -23,7 +23,7 @@ bool SequentialSampler::has_wandered(float lns, float lns_fresh) const {
   return refresh_ratio_ && (lns > lns_fresh * *refresh_ratio_ || lns * *refresh_ratio_ < lns_fresh);
 }
 
-PixelDiagnostics SequentialSampler::sample(const PixelInput& input, kernels::CandidateSet& scratch,
+PixelDiagnostics SequentialSampler::sample(const PixelInput& input, SamplerScratch& scratch,
                                            const PixelSamples& samples) const {
   if (!input.has_history) return start_->sample(input, scratch, samples);
   if (is_refresh_turn(input.key, input.frame_index, refresh_every_)) {
@@ -60,60 +60,6 @@ PixelDiagnostics SequentialSampler::sample(const PixelInput& input, kernels::Can
   diagnostics.ess = again.ess;
   diagnostics.target_evaluations += again.target_evaluations;
   return diagnostics;
-}
-
-namespace {
-
-/// The sampler that draws all samples of a pixel anew.
-std::unique_ptr<const PixelSampler> make_fresh_sampler(const SamplingSpec& spec,
-                                                       StartMethod method) {
-  const std::int32_t n = spec.num_particles;
-  switch (method) {
-    case StartMethod::environment:
-      return std::make_unique<DirectSampler>(CandidateCounts{.from_light = n});
-    case StartMethod::brdf:
-      return std::make_unique<DirectSampler>(CandidateCounts{.from_bsdf = n});
-    case StartMethod::mis:
-      return std::make_unique<DirectSampler>(split_candidates(n, spec.brdf_fraction));
-    case StartMethod::bidirectional:
-      return std::make_unique<BidirectionalSampler>(spec.num_candidates, spec.brdf_fraction);
-  }
-  return nullptr;
-}
-
-std::unique_ptr<const PixelSampler> make_sequential_sampler(const SamplingSpec& spec) {
-  const SequentialSettings settings{.num_particles = spec.num_particles,
-                                    .num_distributions = spec.num_distributions,
-                                    .num_moves = spec.num_moves,
-                                    .ess_ratio_min = spec.ess_ratio_min,
-                                    .resampling = spec.resampling,
-                                    .lns_update = spec.lns_update,
-                                    .local_move_cosine = std::cos(spec.local_move_deg * kPi / 180),
-                                    .local_move_fraction = spec.local_move_fraction};
-  return std::make_unique<SequentialSampler>(
-      settings, make_fresh_sampler(spec, spec.start_method), spec.refresh_every, spec.refresh_ratio,
-      BidirectionalSampler(spec.refresh_candidates, spec.brdf_fraction));
-}
-
-}  // namespace
-
-std::unique_ptr<const PixelSampler> make_pixel_sampler(const SamplingSpec& spec) {
-  switch (spec.method) {
-    case Method::reference:
-    case Method::automatic:
-      return nullptr;
-    case Method::environment:
-      return make_fresh_sampler(spec, StartMethod::environment);
-    case Method::brdf:
-      return make_fresh_sampler(spec, StartMethod::brdf);
-    case Method::mis:
-      return make_fresh_sampler(spec, StartMethod::mis);
-    case Method::bidirectional:
-      return make_fresh_sampler(spec, StartMethod::bidirectional);
-    case Method::sequential:
-      return make_sequential_sampler(spec);
-  }
-  return nullptr;
 }
 
 }  // namespace baton

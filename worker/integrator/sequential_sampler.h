@@ -28,7 +28,7 @@ class SequentialSampler final : public PixelSampler {
         refresh_every_(refresh_every),
         refresh_ratio_(refresh_ratio),
         by_ratio_(by_ratio) {}
-  PixelDiagnostics sample(const PixelInput& input, kernels::CandidateSet& scratch,
+  PixelDiagnostics sample(const PixelInput& input, SamplerScratch& scratch,
                           const PixelSamples& samples) const override;
 
  private:

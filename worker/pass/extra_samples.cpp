@@ -20,7 +20,7 @@ ExtraSampler::ExtraSampler(const RenderContext& context, const FrameGeometry& ge
       mask_(mask),
       now_(view_of(light.now)),
       before_(view_of(light.before)),
-      scratch_(std::make_unique<kernels::CandidateSet>()) {
+      scratch_(std::make_unique<SamplerScratch>()) {
   drawn_.resize({0, 0, 1, 1}, population_spec(context.job).num_particles);
 }
 

@@ -38,7 +38,7 @@ class ExtraSampler {
   const MaskedSurfaces& surfaces_;
   const PixelMask& mask_;
   const EnvironmentView now_, before_;
-  std::unique_ptr<kernels::CandidateSet> scratch_;
+  std::unique_ptr<SamplerScratch> scratch_;
   SampleState drawn_;  ///< one population of one pixel
   SiteBlock sites_;
   ShadowRays rays_;

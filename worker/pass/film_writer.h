@@ -23,7 +23,7 @@ struct PixelResult {
   Vec3 normal;            ///< mean shading normal of the sites that see a surface
   float depth = 0;        ///< mean distance of the sites that see a surface
   float mask = 0.5f;      ///< 1 all rays free, 0 some failed, 0.5 background [CV Fig. 2]
-  float variance = 0;     ///< squared standard error of the mean over RGB; `reference` only
+  float variance = 0;     ///< estimated squared error of the mean over RGB; 0 where the method has no estimate
 };
 
 /// Pass: writes pixels into the channels that the job asked for: R, G, B, A, then the AOVs in their order.

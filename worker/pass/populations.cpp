@@ -21,7 +21,7 @@ std::uint64_t stream_seed(std::uint64_t job_seed, std::uint32_t stream) {
 }
 
 PixelDiagnostics sample_populations(const PixelSampler& sampler, const PixelInput& input,
-                                    std::size_t index, kernels::CandidateSet& scratch,
+                                    std::size_t index, SamplerScratch& scratch,
                                     SampleState& state) {
   const auto populations = static_cast<std::size_t>(state.num_populations);
   const std::size_t n = static_cast<std::size_t>(state.num_particles) / populations;

@@ -15,7 +15,7 @@ std::uint64_t stream_seed(std::uint64_t job_seed, std::uint32_t stream);
 /// Runs the sampler once for each population of pixel `index` of the state; they share nothing but
 /// the frame's light pool. The answer counts all of them; its ess is the sum.
 PixelDiagnostics sample_populations(const PixelSampler& sampler, const PixelInput& input,
-                                    std::size_t index, kernels::CandidateSet& scratch,
+                                    std::size_t index, SamplerScratch& scratch,
                                     SampleState& state);
 
 /// What a pixel's populations say together.

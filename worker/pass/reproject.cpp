@@ -34,7 +34,7 @@ const SurfaceHit* draw_hit(std::span<const SurfaceHit> hits, const Rng& rng) {
                         [&](const SurfaceHit& hit) { return in_front(hit) && k-- == 0; });
 }
 
-/// Copies all samples of a pixel.
+/// Copies all samples of a pixel, and its memory.
 void copy_pixel(const SampleState& from, std::size_t source, SampleState& to, std::size_t target) {
   const auto copy = [&](const auto& in, auto& out, std::int32_t per_pixel) {
     const auto count = static_cast<std::size_t>(per_pixel);
@@ -45,6 +45,7 @@ void copy_pixel(const SampleState& from, std::size_t source, SampleState& to, st
   copy(from.weight, to.weight, to.num_particles);
   copy(from.lns, to.lns, to.num_populations);
   copy(from.lns_fresh, to.lns_fresh, to.num_populations);
+  if (!to.memory.empty()) copy(from.memory, to.memory, kMemoryCells);
 }
 
 }  // namespace

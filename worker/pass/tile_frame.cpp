@@ -9,8 +9,6 @@
 namespace baton {
 namespace {
 
-using kernels::ShadedSamples;
-
 /// Sums over the sites of a pixel that do not depend on light: coverage, mean normal and depth.
 void add_geometry(std::span<const SurfaceHit> hits, PixelResult& pixel) {
   float num_hits = 0;
@@ -27,11 +25,14 @@ void add_geometry(std::span<const SurfaceHit> hits, PixelResult& pixel) {
 }
 
 float acceptance_rate(const MoveCounts& moves) {
-  return moves.proposed > 0 ? static_cast<float>(moves.accepted) / static_cast<float>(moves.proposed) : 0.0f;
+  return moves.proposed > 0
+             ? static_cast<float>(moves.accepted) / static_cast<float>(moves.proposed)
+             : 0.0f;
 }
 
 /// Adds one pixel to the books.
-void count_sampling(const PixelDiagnostics& did, PixelSource source, float ess_ratio, SamplingStats& stats) {
+void count_sampling(const PixelDiagnostics& did, PixelSource source, float ess_ratio,
+                    SamplingStats& stats) {
   stats.pixels_fresh += source == PixelSource::fresh ? 1 : 0;
   stats.pixels_carried += source == PixelSource::carried ? 1 : 0;
   stats.pixels_restarted += source == PixelSource::restarted ? 1 : 0;
@@ -54,8 +55,12 @@ struct TileFrameRenderer::Batch {
   std::int32_t frame_number = 0;
   std::int32_t frame_index = 0;
   ShadowRays rays;
-  std::vector<std::uint32_t> ray_sample;  ///< batch pixel * N + particle of each ray
-  std::vector<Rgb> sample_color;          ///< (batch pixels, N) u_j (f cos L)_rgb / p~ if the ray is free
+  std::size_t stride = 1;                 ///< most rays of a pixel
+  std::vector<std::uint32_t> ray_sample;  ///< batch pixel * stride + particle or number of each ray
+  std::vector<PixelRays::Value>
+      value;  ///< (batch pixels, stride) what the ray brings if it is free
+  std::array<std::size_t, kBatchPixels> second_half;  ///< as PixelRays::second_half
+  std::array<Rgb, kBatchPixels> difference;           ///< of the halves
   std::array<PixelResult, kBatchPixels> pixels;
 
   RngKey key(const RenderContext& context, const PixelRect& rect, std::size_t index) const {
@@ -73,13 +78,14 @@ TileFrameRenderer::TileFrameRenderer(const RenderContext& context, const FrameGe
     : context_(context),
       geometry_(geometry),
       surfaces_(surfaces),
-      scratch_(std::make_unique<kernels::CandidateSet>()),
+      scratch_(std::make_unique<SamplerScratch>()),
       collector_(context.job) {
-  for (std::int32_t k = 0; k < num_populations(context.job); ++k) picture_scale_.push_back(picture_scale(context.job, k));
+  for (std::int32_t k = 0; k < num_populations(context.job); ++k)
+    picture_scale_.push_back(picture_scale(context.job, k));
 }
 
-FilmTile TileFrameRenderer::render(const FrameSpec& frame, const FrameLight& light, bool has_history,
-                                   SampleState& state) {
+FilmTile TileFrameRenderer::render(const FrameSpec& frame, const FrameLight& light,
+                                   bool has_history, SampleState& state) {
   reprojection_ = nullptr;
   has_history_ = has_history;
   return render_batches(frame, light, state);
@@ -101,7 +107,9 @@ FilmTile TileFrameRenderer::render_batches(const FrameSpec& frame, const FrameLi
   batch.frame_number = frame.number;
   batch.frame_index = frame.index;
   frame_sampling_ = {};
-  batch.sample_color.resize(kBatchPixels * static_cast<std::size_t>(state.num_particles));
+  batch.stride =
+      static_cast<std::size_t>(std::max(state.num_particles, context_.job.sampling.num_particles));
+  batch.value.resize(kBatchPixels * batch.stride);
   const std::size_t num_pixels = state.num_pixels();
   if (context_.job.visibility.correlated) collector_.begin(state);
   for (std::size_t first = 0; first < num_pixels; first += kBatchPixels) {
@@ -141,12 +149,13 @@ void TileFrameRenderer::sample(Batch& batch, const FrameLight& light, SampleStat
   const EnvironmentView now = view_of(light.now);
   const EnvironmentView before = view_of(light.before);
   const auto n = static_cast<std::size_t>(state.num_particles);
-  const auto num_populations = static_cast<std::size_t>(state.num_populations);
   const std::int32_t frame_index = batch.frame_index;
-  ShadedSamples shaded;
+  PixelRays rays;
   SiteBlock sites;
   batch.rays.clear();
   batch.ray_sample.clear();
+  batch.second_half.fill(0);
+  batch.difference.fill({});
   for (std::size_t i = 0; i < batch.count; ++i) {
     const std::size_t index = batch.first + i;
     const std::span<const SurfaceHit> hits = surfaces_.pixel(index);
@@ -166,7 +175,7 @@ void TileFrameRenderer::sample(Batch& batch, const FrameLight& light, SampleStat
       }
     }
 
-    // Sample.
+    // Sample, and cast the rays.
     const PixelHistory history = find_history(i, index, state);
     const PixelInput input{.sites = sites,
                            .light = light,
@@ -175,26 +184,15 @@ void TileFrameRenderer::sample(Batch& batch, const FrameLight& light, SampleStat
                            .key = batch.key(context_, surfaces_.rect, index),
                            .frame_index = frame_index,
                            .has_history = history != PixelHistory::none,
-                           .old = history == PixelHistory::moved ? &old_ : nullptr};
+                           .old = history == PixelHistory::moved ? &old_ : nullptr,
+                           .memory = state.memory_of(index)};
     const PixelDiagnostics did =
         sample_populations(*context_.sampler, input, index, *scratch_, state);
-    const std::span<const std::uint8_t> site = std::span(state.site).subspan(index * n, n);
-
-    // Colour the samples and cast their rays.
-    kernels::shade_samples(sites, now, std::span(state.direction).subspan(index * n, n), site, shaded);
-    std::array<Vec3, SiteBlock::kMaxSites> origins;
-    for (std::size_t s = 0; s < hits.size(); ++s) {
-      if (hits[s].hit) origins[s] = lift_off(hits[s].point.position, hits[s].point.ng);
-    }
-    for (std::size_t j = 0, k = 0; k < num_populations; ++k) {
-      const float unit = unit_contribution(state, index, k);
-      for (; j < (k + 1) * n / num_populations; ++j) {
-        const Rgb color = Rgb{shaded.r[j], shaded.g[j], shaded.b[j]} * (unit * state.weight[index * n + j]);
-        batch.sample_color[i * n + j] = color * picture_scale_[k];
-        if (!(mean(color) > 0)) continue;
-        batch.rays.push(origins[site[j]], {shaded.x[j], shaded.y[j], shaded.z[j]});
-        batch.ray_sample.push_back(static_cast<std::uint32_t>(i * n + j));
-      }
+    if (context_.sampler->chooses_rays()) {
+      context_.sampler->choose_rays(input, *scratch_, rays);
+      cast_rays(batch, i, rays);
+    } else {
+      cast_samples(batch, i, sites, now, state);
     }
 
     // Keep the books.
@@ -213,6 +211,55 @@ void TileFrameRenderer::sample(Batch& batch, const FrameLight& light, SampleStat
   }
 }
 
+/// Where the shadow rays of a pixel's sites start.
+std::array<Vec3, SiteBlock::kMaxSites> TileFrameRenderer::origins(std::size_t index) const {
+  const std::span<const SurfaceHit> hits = surfaces_.pixel(index);
+  std::array<Vec3, SiteBlock::kMaxSites> origins;
+  for (std::size_t s = 0; s < hits.size(); ++s) {
+    if (hits[s].hit) origins[s] = lift_off(hits[s].point.position, hits[s].point.ng);
+  }
+  return origins;
+}
+
+/// Colours the samples of batch pixel `i` and casts their rays.
+void TileFrameRenderer::cast_samples(Batch& batch, std::size_t i, const SiteBlock& sites,
+                                     const EnvironmentView& now, const SampleState& state) {
+  const std::size_t index = batch.first + i;
+  const auto n = static_cast<std::size_t>(state.num_particles);
+  const auto num_populations = static_cast<std::size_t>(state.num_populations);
+  const float share = 1.0f / static_cast<float>(num_populations);
+  const std::span<const std::uint8_t> site = std::span(state.site).subspan(index * n, n);
+  const auto from = origins(index);
+  kernels::ShadedSamples& shaded = scratch_->shaded;
+  kernels::shade_samples(sites, now, std::span(state.direction).subspan(index * n, n), site,
+                         shaded);
+  for (std::size_t j = 0, k = 0; k < num_populations; ++k) {
+    const float unit = unit_contribution(state, index, k);
+    for (; j < (k + 1) * n / num_populations; ++j) {
+      const float weight = state.weight[index * n + j];
+      const Rgb color = Rgb{shaded.r[j], shaded.g[j], shaded.b[j]} * (unit * weight);
+      batch.value[i * batch.stride + j] = {color * picture_scale_[k], weight * share};
+      if (!(mean(color) > 0)) continue;
+      batch.rays.push(from[site[j]], {shaded.x[j], shaded.y[j], shaded.z[j]});
+      batch.ray_sample.push_back(static_cast<std::uint32_t>(i * batch.stride + j));
+    }
+  }
+}
+
+/// Casts the rays that the sampler chose for batch pixel `i`.
+void TileFrameRenderer::cast_rays(Batch& batch, std::size_t i, const PixelRays& rays) {
+  const auto from = origins(batch.first + i);
+  for (std::size_t j = 0; j < rays.count; ++j) {
+    batch.value[i * batch.stride + j] = rays.value[j];
+    batch.rays.push(from[rays.site[j]], rays.direction[j]);
+    batch.ray_sample.push_back(static_cast<std::uint32_t>(i * batch.stride + j));
+  }
+  batch.pixels[i].radiance = rays.constant.color;
+  batch.pixels[i].visibility = rays.constant.visibility;
+  batch.second_half[i] = rays.second_half;
+  batch.difference[i] = rays.difference;
+}
+
 /// Pass: visibility of all samples of the batch at once.
 void TileFrameRenderer::trace(Batch& batch) {
   const StageTimer timer(stats_.seconds_visibility);
@@ -220,34 +267,50 @@ void TileFrameRenderer::trace(Batch& batch) {
   stats_.rays_shadow += batch.rays.size();
 }
 
-/// Pass: sums the free samples of each pixel in their fixed order.
-void TileFrameRenderer::shade(Batch& batch, const SampleState& state) {
+/// Pass: sums the free rays of each pixel in their fixed order, and remembers what they found.
+void TileFrameRenderer::shade(Batch& batch, SampleState& state) {
   const StageTimer timer(stats_.seconds_shade);
-  const auto n = static_cast<std::size_t>(state.num_particles);
-  const float share = 1.0f / static_cast<float>(state.num_populations);
   std::size_t i = 0;
   for (std::size_t r = 0; r < batch.rays.size(); ++r) {
     const std::size_t sample = batch.ray_sample[r];
-    while (sample >= (i + 1) * n) ++i;
+    while (sample >= (i + 1) * batch.stride) ++i;
     const bool occluded = batch.rays.t_far[r] < 0;
-    if (context_.job.visibility.correlated) collector_.add_ray(state, batch.first * n + sample, occluded);
+    if (context_.job.visibility.correlated)
+      collector_.add_ray(state, batch.first * batch.stride + sample, occluded);
+    if (const std::span<MemoryCell> memory = state.memory_of(batch.first + i); !memory.empty()) {
+      remember_ray(
+          memory, {batch.rays.direction_x[r], batch.rays.direction_y[r], batch.rays.direction_z[r]},
+          !occluded);
+    }
     if (occluded) {
       batch.pixels[i].mask = 0;
       continue;
     }
-    batch.pixels[i].radiance += batch.sample_color[sample];
-    batch.pixels[i].visibility += state.weight[batch.first * n + sample] * share;
+    const PixelRays::Value& value = batch.value[sample];
+    batch.pixels[i].radiance += value.color;
+    batch.pixels[i].visibility += value.visibility;
+    batch.difference[i] +=
+        value.color * (sample - i * batch.stride < batch.second_half[i] ? 1.0f : -1.0f);
+  }
+
+  // Two halves that agree in the mean: the square of half their difference estimates the variance
+  // of their mean.
+  for (i = 0; i < batch.count; ++i) {
+    const float d = mean(batch.difference[i]);
+    batch.pixels[i].variance = batch.second_half[i] > 0 ? d * d : 0.0f;
   }
 }
 
 /// The judge's way: no samples are kept.
-void TileFrameRenderer::render_reference(Batch& batch, const FrameLight& light, SampleState& state) {
+void TileFrameRenderer::render_reference(Batch& batch, const FrameLight& light,
+                                         SampleState& state) {
   const StageTimer timer(stats_.seconds_sample);
   const ReferenceRenderer renderer(*geometry_.accel, context_.scene->materials);
   for (std::size_t i = 0; i < batch.count; ++i) {
     const std::size_t index = batch.first + i;
     const std::span<const SurfaceHit> hits = surfaces_.pixel(index);
-    const bool seen = std::any_of(hits.begin(), hits.end(), [](const SurfaceHit& hit) { return hit.hit; });
+    const bool seen =
+        std::any_of(hits.begin(), hits.end(), [](const SurfaceHit& hit) { return hit.hit; });
     state.source[index] = seen ? PixelSource::fresh : PixelSource::background;
     if (!seen) {
       ++stats_.pixels_background;
@@ -266,7 +329,8 @@ void TileFrameRenderer::render_reference(Batch& batch, const FrameLight& light, 
     pixel.source = PixelSource::fresh;
     ++frame_sampling_.pixels_fresh;
     frame_sampling_.count_ess(0);
-    stats_.target_evaluations += 2 * static_cast<std::uint64_t>(context_.job.sampling.reference_samples);
+    stats_.target_evaluations +=
+        2 * static_cast<std::uint64_t>(context_.job.sampling.reference_samples);
   }
 }
 

@@ -13,30 +13,36 @@ namespace baton {
 namespace {
 
 /// A state must be that of the job, a tile and a frame.
-Status check_state(const RenderContext& context, const SampleState& state, std::int32_t tile, std::int32_t frame_index) {
+Status check_state(const RenderContext& context, const SampleState& state, std::int32_t tile,
+                   std::int32_t frame_index) {
   if (state.job_digest != context.digest) {
-    return Error{ErrorKind::bad_input,
-                 fmt::format("sample state: of job {}, expected {}", state.job_digest.hex(), context.digest.hex())};
+    return Error{ErrorKind::bad_input, fmt::format("sample state: of job {}, expected {}",
+                                                   state.job_digest.hex(), context.digest.hex())};
   }
-  const std::int32_t num_particles = context.job.sampling.num_particles;
-  if (state.tile != tile || state.frame_index != frame_index || state.rect != context.grid.rect(tile) ||
-      state.num_particles != num_particles || state.num_populations != num_populations(context.job)) {
-    return Error{ErrorKind::bad_input, fmt::format("sample state: of tile {} frame index {} with {} particles, expected {}, "
-                                                   "{}, {}",
-                                                   state.tile, state.frame_index, state.num_particles, tile, frame_index,
-                                                   num_particles)};
+  const std::int32_t num_particles = num_carried_particles(context.job.sampling);
+  if (state.tile != tile || state.frame_index != frame_index ||
+      state.rect != context.grid.rect(tile) || state.num_particles != num_particles ||
+      state.num_populations != num_populations(context.job)) {
+    return Error{
+        ErrorKind::bad_input,
+        fmt::format("sample state: of tile {} frame index {} with {} particles, expected {}, "
+                    "{}, {}",
+                    state.tile, state.frame_index, state.num_particles, tile, frame_index,
+                    num_particles)};
   }
   return {};
 }
 
 /// The states must be exactly those that come before the run.
-Status check_previous(const RenderContext& context, const TileRun& run, std::span<const StatePtr> previous) {
+Status check_previous(const RenderContext& context, const TileRun& run,
+                      std::span<const StatePtr> previous) {
   std::vector<std::int32_t> tiles;
   if (carries_state(context.job) && run.first_frame > 0)
     tiles = context.grid.tiles_near(run.tile, history_reach_px(context.job));
   if (previous.size() != tiles.size()) {
-    return Error{ErrorKind::internal, fmt::format("tile {} frame index {}: got {} previous states, expected {}", run.tile,
-                                                  run.first_frame, previous.size(), tiles.size())};
+    return Error{ErrorKind::internal,
+                 fmt::format("tile {} frame index {}: got {} previous states, expected {}",
+                             run.tile, run.first_frame, previous.size(), tiles.size())};
   }
   for (std::size_t i = 0; i < tiles.size(); ++i)
     BATON_TRY(check_state(context, *previous[i], tiles[i], run.first_frame - 1));
@@ -48,7 +54,7 @@ class TileWalk {
  public:
   TileWalk(const RenderContext& context, const TileRun& run)
       : context_(context), rect_(context.grid.rect(run.tile)) {
-    state_.resize(rect_, context.job.sampling.num_particles, num_populations(context.job));
+    start_state();
     state_.job_digest = context.digest;
     state_.tile = run.tile;
   }
@@ -78,7 +84,7 @@ class TileWalk {
     BATON_ASSIGN(geometry_, context_.geometry->at(frame.index));
     BATON_ASSIGN(const std::shared_ptr<const FrameGeometry> before,
                  context_.geometry->at(std::max(frame.index - 1, 0)));
-    state_.resize(rect_, context_.job.sampling.num_particles, num_populations(context_.job));
+    start_state();
     if (renderer_ != nullptr) stats_.merge(renderer_->stats());
     renderer_ = std::make_unique<TileFrameRenderer>(context_, *geometry_, trace(*geometry_));
     Reprojection history(context_, *geometry_, *before, previous);
@@ -97,6 +103,12 @@ class TileWalk {
   }
 
  private:
+  /// Empties the samples.
+  void start_state() {
+    state_.resize(rect_, num_carried_particles(context_.job.sampling),
+                  num_populations(context_.job));
+    if (context_.sampler != nullptr && context_.sampler->remembers()) state_.add_memory();
+  }
   Result<std::shared_ptr<const FrameLight>> light_of(const FrameSpec& frame) {
     const StageTimer timer(stats_.seconds_light);
     return context_.lights->at(frame.index);

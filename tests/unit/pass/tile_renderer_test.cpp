@@ -26,8 +26,8 @@ JobSpec sequence_job(int frames) {
   return job;
 }
 
-/// All films of a job cut into tiles of `tile_size` and runs of `run_length`, pasted together; states go through their
-/// file form between runs.
+/// All films of a job cut into tiles of `tile_size` and runs of `run_length`, pasted together;
+/// states go through their file form between runs.
 std::vector<FilmTile> render_tiled(JobSpec job, int tile_size, int run_length) {
   job.image.tile_size = tile_size;
   job.state.checkpoint_every = run_length;
@@ -43,26 +43,27 @@ std::vector<FilmTile> render_tiled(JobSpec job, int tile_size, int run_length) {
       for (const std::int32_t near : grid.tiles_near(tile, history_reach_px(job))) {
         if (run > 0) previous.push_back(states[static_cast<std::size_t>(near)]);
       }
-      const TileRunSink sink{[&](int frame, const FilmTile& film) {
-                               FilmTile& image = images[static_cast<std::size_t>(frame)];
-                               image.rect = {0, 0, job.image.width, job.image.height};
-                               image.channels = film.channels;
-                               image.values.resize(image.channels.size() * image.num_pixels());
-                               for (std::size_t c = 0; c < film.channels.size(); ++c) {
-                                 for (int y = film.rect.y0; y < film.rect.y1; ++y) {
-                                   const auto width = static_cast<std::size_t>(film.rect.width());
-                                   const float* row = film.plane(c) + static_cast<std::size_t>(y - film.rect.y0) * width;
-                                   std::copy_n(row, width, image.plane(c) + y * job.image.width + film.rect.x0);
-                                 }
-                               }
-                               return Status();
-                             },
-                             [&](const SampleState& s) {
-                               next[static_cast<std::size_t>(tile)] =
-                                   std::make_shared<const SampleState>(
-                                       *decode_state(encode_state(s), "test"));
-                               return Status();
-                             }};
+      const TileRunSink sink{
+          [&](int frame, const FilmTile& film) {
+            FilmTile& image = images[static_cast<std::size_t>(frame)];
+            image.rect = {0, 0, job.image.width, job.image.height};
+            image.channels = film.channels;
+            image.values.resize(image.channels.size() * image.num_pixels());
+            for (std::size_t c = 0; c < film.channels.size(); ++c) {
+              for (int y = film.rect.y0; y < film.rect.y1; ++y) {
+                const auto width = static_cast<std::size_t>(film.rect.width());
+                const float* row =
+                    film.plane(c) + static_cast<std::size_t>(y - film.rect.y0) * width;
+                std::copy_n(row, width, image.plane(c) + y * job.image.width + film.rect.x0);
+              }
+            }
+            return Status();
+          },
+          [&](const SampleState& s) {
+            next[static_cast<std::size_t>(tile)] =
+                std::make_shared<const SampleState>(*decode_state(encode_state(s), "test"));
+            return Status();
+          }};
       EXPECT_TRUE(run_tile(**context, tile_run(job, tile, run), previous, sink, {}).ok());
     }
     states = std::move(next);
@@ -79,9 +80,13 @@ TEST(RunTile, SameBytesForAnyTilingAndAnyRunLength) {
 }
 
 TEST(RunTile, SameBytesForAnyTilingWhileCameraAndObjectsMove) {
-  for (const int sites : {1, 4}) {
+  for (const auto& [method, sites] : {std::pair{Method::sequential, 1},
+                                      {Method::sequential, 4},
+                                      {Method::pool, 1},
+                                      {Method::pool, 4}}) {
     JobSpec job = sequence_job(4);
     job.image.sites = sites;
+    job.sampling.method = method;
     test::set_in_motion(job, /*camera=*/true, /*object=*/true);
     const std::vector<FilmTile> whole = render_tiled(job, 4096, 5);
     EXPECT_EQ(render_tiled(job, 8, 2), whole);
@@ -108,6 +113,16 @@ TEST(RunTile, MostPixelsAreCarriedThroughMotion) {
   const auto surface = static_cast<double>(stats.pixels - stats.pixels_background) * 4 / 5;
   EXPECT_GT(static_cast<double>(stats.sampling.pixels_carried) / surface, 0.9);
   EXPECT_GT(stats.sampling.pixels_fresh, stats.pixels / 8) << "what comes into view starts afresh";
+}
+
+TEST(RunTile, SameBytesForAnyTilingAndAnyRunLengthWithThePool) {
+  JobSpec job = sequence_job(5);
+  job.sampling.method = Method::pool;
+  job.sampling.num_candidates = 32;
+  const std::vector<FilmTile> whole = render_tiled(job, 4096, 5);
+  EXPECT_EQ(render_tiled(job, 8, 5), whole);
+  EXPECT_EQ(render_tiled(job, 5, 2), whole);
+  EXPECT_EQ(render_tiled(job, 4096, 1), whole);
 }
 
 TEST(RunTile, CarriesEverySurfacePixelOn) {
@@ -206,7 +221,8 @@ TEST(RunTile, DegenerateInputGivesNoNan) {
   job.environment.keys[0].map = test::write_map("broken.exr", broken);
   expect_all_finite(render_tile(job));
 
-  // A sun that outshines all by 1e8 in one texel; and a camera inside a box; and one that grazes the ground.
+  // A sun that outshines all by 1e8 in one texel; and a camera inside a box; and one that grazes
+  // the ground.
   RgbImage sun = test::constant_map(64, 32, {1e-3f, 1e-3f, 1e-3f});
   sun.rgb[3 * (8 * 64 + 20)] = 1e5f;
   job.environment.keys[0].map = test::write_map("sun.exr", sun);
@@ -225,13 +241,18 @@ TEST(RunTile, RefusesTheStateOfAnotherJobTileOrFrame) {
   SampleState state;
   state.resize({0, 0, 12, 9}, 16);
   state.job_digest = {1, 2};
-  const auto given = [](const SampleState& s) { return std::vector{std::make_shared<const SampleState>(s)}; };
-  const TileRunSink sink{[](int, const FilmTile&) { return Status(); }, [](const SampleState&) { return Status(); }};
+  const auto given = [](const SampleState& s) {
+    return std::vector{std::make_shared<const SampleState>(s)};
+  };
+  const TileRunSink sink{[](int, const FilmTile&) { return Status(); },
+                         [](const SampleState&) { return Status(); }};
   const TileRun run{.tile = 0, .run = 1, .first_frame = 2, .last_frame = 3};
-  EXPECT_THAT(run_tile(**context, run, given(state), sink, {}).error().message, HasSubstr("of job"));
+  EXPECT_THAT(run_tile(**context, run, given(state), sink, {}).error().message,
+              HasSubstr("of job"));
   state.job_digest = {7, 7};
   state.frame_index = 0;
-  EXPECT_THAT(run_tile(**context, run, given(state), sink, {}).error().message, HasSubstr("frame index 0"));
+  EXPECT_THAT(run_tile(**context, run, given(state), sink, {}).error().message,
+              HasSubstr("frame index 0"));
   EXPECT_FALSE(run_tile(**context, run, {}, sink, {}).ok());
 }
 
@@ -256,7 +277,8 @@ TEST(LoadRenderContext, NamesAMissingMap) {
   job.environment.keys[0].map = "/nowhere/sky.exr";
   const auto context = load_render_context(job, Digest{1, 2});
   ASSERT_TRUE(context.ok());
-  const TileRunSink sink{[](int, const FilmTile&) { return Status(); }, [](const SampleState&) { return Status(); }};
+  const TileRunSink sink{[](int, const FilmTile&) { return Status(); },
+                         [](const SampleState&) { return Status(); }};
   const auto stats = run_tile(**context, {0, 0, 0, 0}, {}, sink, {});
   ASSERT_FALSE(stats.ok());
   EXPECT_THAT(stats.error().message, HasSubstr("/nowhere/sky.exr"));

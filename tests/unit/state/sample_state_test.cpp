@@ -299,5 +299,47 @@ TEST(SampleState, EqualWeightsPackAway) {
   EXPECT_LT(encode_state(state).size() + 40 * state.num_pixels(), before);
 }
 
+/// One surface pixel whose rays agree, one whose rays do not.
+SampleState remembering_state() {
+  SampleState state = tiny_state();
+  state.resize({0, 0, 3, 1}, 2);
+  state.source[1] = state.source[2] = PixelSource::carried;
+  state.add_memory();
+  state.memory_of(1)[256] = 0x8003;
+  state.memory_of(1)[257] = 1;
+  state.memory_of(2)[5] = 0x1234;
+  state.memory_of(2)[256] = 0x7771;
+  state.memory_of(2)[257] = 3;
+  return state;
+}
+
+TEST(SampleState, RemembersRays) {
+  const SampleState state = remembering_state();
+  EXPECT_EQ(*decode_state(encode_state(state), "test"), state);
+}
+
+TEST(SampleState, StoresNoGridWhereRaysAgree) {
+  SampleState state = remembering_state();
+  const auto raw_bytes = [](const SampleState& s, const std::string& tag) {
+    const auto sections = *state_sections(encode_state(s), "test");
+    for (const StateSectionInfo& section : sections) {
+      if (section.tag == tag) return section.raw_bytes;
+    }
+    return std::uint64_t{0};
+  };
+  EXPECT_EQ(raw_bytes(state, "VISG"), 512u);
+  EXPECT_EQ(raw_bytes(state, "VISS"), 8u);
+  state.memory.clear();
+  EXPECT_EQ(raw_bytes(state, "VISS"), 0u);
+}
+
+TEST(SampleState, RefusesOutcomesThatCannotBe) {
+  SampleState state = remembering_state();
+  state.memory_of(1)[257] = 4;
+  const auto decoded = decode_state(encode_state(state), "a.bst");
+  ASSERT_FALSE(decoded.ok());
+  EXPECT_THAT(decoded.error().message, HasSubstr("a.bst: section VISS: pixel (1, 0): outcomes 4, expected 0 to 3"));
+}
+
 }  // namespace
 }  // namespace baton

@@ -1,0 +1,298 @@
+// The pool of a pixel in SIMD: weights of carried particles and fresh candidates (sampling/pool.h).
+// Included once per Highway target.
+#if defined(BATON_WORKER_INTEGRATOR_POOL_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef BATON_WORKER_INTEGRATOR_POOL_INL_H_
+#undef BATON_WORKER_INTEGRATOR_POOL_INL_H_
+#else
+#define BATON_WORKER_INTEGRATOR_POOL_INL_H_
+#endif
+
+#include <hwy/highway.h>
+
+#include "worker/integrator/candidates-inl.h"
+#include "worker/integrator/pool_kernels.h"
+#include "worker/sampling/pool.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace baton::HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+/// A point of the pool per lane with both targets.
+struct PoolPoint {
+  VU code;
+  VI site;
+  Vec3Lanes world;      ///< direction
+  Vec3Lanes reflected;  ///< (f cos L)_rgb now
+  VF target;            ///< their mean
+  VF target_before;
+};
+
+/// Estimated share of free rays per lane, as free_share().
+HWY_INLINE VF FreeShare(const VisibilityCell* memory, const Vec3Lanes& w) {
+  const DF d;
+  const DI di;
+  const VF one = hn::Set(d, 1.0f);
+  const VF half = hn::Set(d, 0.5f);
+  const VF inv = hn::Div(one, hn::Add(hn::Abs(w.x), hn::Add(hn::Abs(w.y), hn::Abs(w.z))));
+  const VF u = hn::Mul(w.x, inv);
+  const VF v = hn::Mul(w.z, inv);
+  const MF below = hn::Lt(w.y, hn::Zero(d));
+  const VF fold_u = hn::IfThenElse(below, hn::CopySign(hn::Sub(one, hn::Abs(v)), u), u);
+  const VF fold_v = hn::IfThenElse(below, hn::CopySign(hn::Sub(one, hn::Abs(u)), v), v);
+  const VF side = hn::Set(d, static_cast<float>(kVisibilityGridSide));
+  const auto cell = [&](VF t) HWY_ATTR {
+    const VI index = hn::ConvertTo(di, hn::Mul(hn::MulAdd(t, half, half), side));
+    return hn::Min(hn::Max(index, hn::Zero(di)), hn::Set(di, kVisibilityGridSide - 1));
+  };
+  const VI bin = hn::Add(hn::ShiftLeft<4>(cell(fold_v)), cell(fold_u));
+
+  // Two cells come with each load; ours is the lower one.
+  static_assert(kVisibilityGridSide == 16 && sizeof(VisibilityCell) == 2 &&
+                kVisibilityCells > kVisibilityBins);
+  const VI pair =
+      hn::GatherOffset(di, reinterpret_cast<const std::int32_t*>(memory), hn::ShiftLeft<1>(bin));
+  const VI own = hn::And(pair, hn::Set(di, 0xFFFF));
+  const VisibilityCell all = memory[kVisibilitySummary];
+  const auto unseen = hn::Eq(hn::And(own, hn::Set(di, 15)), hn::Zero(di));
+  const VI bits = hn::IfThenElse(unseen, hn::Set(di, (all & 15) != 0 ? all : 2048 << 4), own);
+  return hn::Mul(hn::Add(hn::ConvertTo(d, hn::ShiftRight<4>(bits)), half), hn::Set(d, 1.0f / 4096));
+}
+
+/// Targets below it count as none.
+inline constexpr float kDark = 1e-30f;
+
+/// Fills the halves of one pixel's pool.
+class PoolGatherer {
+ public:
+  PoolGatherer(const kernels::PoolInput& input, const PoolSettings& settings)
+      : input_(input),
+        settings_(settings),
+        now_(unturned_view_of(input.now)),
+        before_(unturned_view_of(input.before)),
+        same_surface_(input.old == nullptr && input.now.rotation.m == input.before.rotation.m),
+        same_light_(input.now.map == input.before.map),
+        to_map_(input.now.rotation.transposed()) {}
+
+  /// half: 0 or 1. random: of this half.
+  HWY_INLINE void Gather(std::uint32_t half, const Philox4x32::Counter& random,
+                         kernels::PoolHalf& out) const {
+    const DF d;
+    Sums sums{hn::Zero(d), hn::Zero(d), {hn::Zero(d), hn::Zero(d), hn::Zero(d)}};
+    out.count = 0;
+    if (input_.has_history) AddCarried(half, out, sums);
+    AddLight(random, out, sums);
+    AddBsdf(random, out, sums);
+    const auto sum = [&](VF v) HWY_ATTR { return hn::GetLane(hn::SumOfLanes(d, v)); };
+    out.lns = sum(sums.weight);
+    out.visible = sum(sums.visible);
+    out.visible_color = {sum(sums.color.x), sum(sums.color.y), sum(sums.color.z)};
+    RunningTotals(out.carry_weight, out.count, out.carry_running);
+    RunningTotals(out.ray_weight, out.count, out.ray_running);
+  }
+
+ private:
+  struct Sums {
+    VF weight, visible;
+    Vec3Lanes color;
+  };
+
+  /// The target before, as the site that inherits it sees it (OldSurfaces); f, if the surface
+  /// stayed with the map, is that of now.
+  HWY_INLINE VF TargetBefore(const BsdfLanes& f, const SurfaceLanes& surface, VI site,
+                             const Vec3Lanes& map_direction, VF r, VF g, VF b) const {
+    if (same_surface_) return MeanLanes(ReflectedRadiance(surface, f, r, g, b));
+    const SiteBlock& sites = input_.old != nullptr ? input_.old->sites : input_.sites;
+    const SurfaceLanes old = LoadSurfaces(sites, site);
+    const BsdfLanes old_f =
+        EvaluateBsdf(old, Transform(input_.before.rotation.m.data(), map_direction));
+    const VF target = MeanLanes(ReflectedRadiance(old, old_f, r, g, b));
+    if (input_.old == nullptr) return target;
+    return hn::Mul(target, ExpLanes(LookUp(input_.old->log_share, site, input_.sites.num_sites)));
+  }
+
+  HWY_INLINE VF Gain() const { return hn::Set(DF(), input_.has_history ? settings_.gain : 0.0f); }
+
+  /// fresh_weight() of candidates, of which the first `left` count.
+  HWY_INLINE VF FreshWeight(const PoolPoint& p, const SurfaceLanes& surface, const BsdfLanes& f,
+                            VF light_density, std::size_t left) const {
+    const DF d;
+    const kernels::CandidateCounts& counts = input_.counts;
+    VF proposal = hn::Mul(hn::Set(d, static_cast<float>(counts.from_light)), light_density);
+    if (counts.from_bsdf > 0) {
+      proposal = hn::MulAdd(hn::Set(d, static_cast<float>(counts.from_bsdf)),
+                            BsdfDensity(input_.sites, counts, surface, f), proposal);
+    }
+    MF live = hn::And(hn::Gt(p.target, hn::Set(d, kDark)), hn::Gt(proposal, hn::Zero(d)));
+    if (left < hn::Lanes(d)) live = hn::And(live, hn::FirstN(d, left));
+    const VF one = hn::Set(d, 1.0f);
+    const VF share = hn::Set(
+        d, static_cast<float>(input_.sites.num_hits) / static_cast<float>(input_.sites.num_sites));
+    const VF balance =
+        hn::Div(p.target, hn::IfThenElse(live, hn::MulAdd(Gain(), p.target_before, p.target), one));
+    const VF plain = hn::Div(hn::Mul(p.target, share), hn::IfThenElse(live, proposal, one));
+    return hn::IfThenElseZero(live, hn::Mul(balance, plain));
+  }
+
+  /// Appends a vector of points.
+  HWY_INLINE void Append(const PoolPoint& p, VF weight, kernels::PoolHalf& out, Sums& sums) const {
+    const DF d;
+    const VF one = hn::Set(d, 1.0f);
+    const VF per_target = hn::IfThenElseZero(
+        hn::Gt(weight, hn::Zero(d)), hn::Div(weight, hn::Max(p.target, hn::Set(d, 1e-37f))));
+    const auto at = static_cast<std::size_t>(out.count);
+    const VF r = hn::Mul(p.reflected.x, per_target);
+    const VF g = hn::Mul(p.reflected.y, per_target);
+    const VF b = hn::Mul(p.reflected.z, per_target);
+    hn::StoreU(p.code, DU(), out.code + at);
+    hn::StoreU(p.site, DI(), out.site + at);
+    hn::StoreU(p.world.x, d, out.x + at);
+    hn::StoreU(p.world.y, d, out.y + at);
+    hn::StoreU(p.world.z, d, out.z + at);
+    hn::StoreU(weight, d, out.weight + at);
+    hn::StoreU(r, d, out.r + at);
+    hn::StoreU(g, d, out.g + at);
+    hn::StoreU(b, d, out.b + at);
+    sums.weight = hn::Add(sums.weight, weight);
+    out.count += static_cast<std::int32_t>(hn::Lanes(d));
+
+    // Without memory every direction is alike and nothing is known beforehand.
+    if (input_.memory.empty()) {
+      hn::StoreU(hn::Zero(d), d, out.free + at);
+      hn::StoreU(weight, d, out.carry_weight + at);
+      hn::StoreU(weight, d, out.ray_weight + at);
+      return;
+    }
+    const VF free = FreeShare(input_.memory.data(), p.world);
+    const VF carry = hn::Mul(weight, hn::Max(hn::Sqrt(free), hn::Set(d, kLeastHope)));
+    const VF doubt = hn::Sqrt(hn::Mul(free, hn::Sub(one, free)));
+    const VF ray = hn::Mul(weight, hn::Max(doubt, hn::Set(d, kLeastDoubt)));
+    hn::StoreU(free, d, out.free + at);
+    hn::StoreU(carry, d, out.carry_weight + at);
+    hn::StoreU(ray, d, out.ray_weight + at);
+    sums.visible = hn::MulAdd(weight, free, sums.visible);
+    sums.color = {hn::MulAdd(r, free, sums.color.x), hn::MulAdd(g, free, sums.color.y),
+                  hn::MulAdd(b, free, sums.color.z)};
+  }
+
+  /// The particles of this half with their carried_weight(). A half stands for the whole pixel: it
+  /// counts double.
+  HWY_INLINE void AddCarried(std::uint32_t half, kernels::PoolHalf& out, Sums& sums) const {
+    const DF d;
+    const auto per_half = static_cast<std::size_t>(settings_.num_carried / 2);
+    const std::size_t first = half * per_half;
+    for (std::size_t i = 0; i < per_half; i += hn::Lanes(d)) {
+      HWY_ALIGN std::uint32_t codes[hn::MaxLanes(DU())] = {};
+      HWY_ALIGN std::int32_t sites[hn::MaxLanes(DI())] = {};
+      HWY_ALIGN float contributions[hn::MaxLanes(DF())] = {};
+      for (std::size_t lane = 0; lane < std::min(per_half - i, hn::Lanes(d)); ++lane) {
+        codes[lane] = input_.code[first + i + lane];
+        sites[lane] = input_.site[first + i + lane];
+        contributions[lane] = 2 * input_.contribution[first + i + lane];
+      }
+      PoolPoint p;
+      p.code = hn::Load(DU(), codes);
+      p.site = hn::Load(DI(), sites);
+      const SurfaceLanes surface = LoadSurfaces(input_.sites, p.site);
+      VF density;
+      Evaluate(surface, DecodeOctahedral(p.code), p, density);
+      const MF live =
+          hn::And(hn::Gt(p.target, hn::Set(d, kDark)), hn::Gt(p.target_before, hn::Zero(d)));
+      const VF total =
+          hn::IfThenElse(live, hn::MulAdd(Gain(), p.target_before, p.target), hn::Set(d, 1.0f));
+      const VF share = hn::Div(hn::Mul(Gain(), p.target), total);
+      Append(p, hn::IfThenElseZero(live, hn::Mul(share, hn::Load(d, contributions))), out, sums);
+    }
+  }
+
+  /// Looks everything up at directions in the map's frame; density: of the light's table.
+  HWY_INLINE BsdfLanes Evaluate(const SurfaceLanes& surface, const Vec3Lanes& map_direction,
+                                PoolPoint& p, VF& density) const {
+    p.world = Transform(input_.now.rotation.m.data(), map_direction);
+    const BsdfLanes f = EvaluateBsdf(surface, p.world);
+    const RadianceLanes light = EvaluateEnvironment(now_, map_direction);
+    const RadianceLanes then =
+        same_light_ || !input_.has_history ? light : EvaluateEnvironment(before_, map_direction);
+    SetTargets(surface, f, light, then, map_direction, p);
+    density = light.density;
+    return f;
+  }
+
+  /// Reflected light now, and both targets.
+  HWY_INLINE void SetTargets(const SurfaceLanes& surface, const BsdfLanes& f,
+                             const RadianceLanes& light, const RadianceLanes& then,
+                             const Vec3Lanes& map_direction, PoolPoint& p) const {
+    p.reflected = ReflectedRadiance(surface, f, light.r, light.g, light.b);
+    p.target = MeanLanes(p.reflected);
+    p.target_before = p.target;
+    if (input_.has_history && !(same_surface_ && same_light_)) {
+      p.target_before = TargetBefore(f, surface, p.site, map_direction, then.r, then.g, then.b);
+    }
+  }
+
+  /// Fresh candidates from the light pool: contiguous entries from a random aligned start.
+  HWY_INLINE void AddLight(const Philox4x32::Counter& random, kernels::PoolHalf& out,
+                           Sums& sums) const {
+    const DF d;
+    const auto count = static_cast<std::size_t>(input_.counts.from_light);
+    if (count == 0) return;
+    const std::uint32_t stride =
+        std::clamp(std::bit_floor(static_cast<std::uint32_t>(count)), LightPool::kBlock, 64u);
+    const std::size_t start = random[0] % (LightPool::kSize / stride) * stride;
+    const SiteDeal deal{input_.sites.hit_sites.data(), input_.sites.num_hits,
+                        input_.counts.from_light, uniform_float(random[3])};
+    for (std::size_t i = 0; i < count; i += hn::Lanes(d)) {
+      const std::size_t entry = (start + i) % LightPool::kSize;
+      const LightPool::Block& block = input_.light_pool.blocks[entry / LightPool::kBlock];
+      const std::size_t at = entry % LightPool::kBlock;
+      PoolPoint p;
+      const SurfaceLanes surface = deal.Load(input_.sites, i, p.site);
+      p.code = hn::Load(DU(), block.code + at);
+      p.world = {hn::Load(d, block.x + at), hn::Load(d, block.y + at), hn::Load(d, block.z + at)};
+      const BsdfLanes f = EvaluateBsdf(surface, p.world);
+      const RadianceLanes light{hn::Load(d, block.r + at), hn::Load(d, block.g + at),
+                                hn::Load(d, block.b + at), hn::Load(d, block.density + at)};
+      const RadianceLanes then{hn::Load(d, block.before_r + at), hn::Load(d, block.before_g + at),
+                               hn::Load(d, block.before_b + at), light.density};
+      SetTargets(surface, f, light, then, Transform(to_map_.m.data(), p.world), p);
+      Append(p, FreshWeight(p, surface, f, light.density, count - i), out, sums);
+    }
+  }
+
+  /// Fresh candidates from the BRDF: Sobol' points with the half's digital shift, snapped to the
+  /// lattice.
+  HWY_INLINE void AddBsdf(const Philox4x32::Counter& random, kernels::PoolHalf& out,
+                          Sums& sums) const {
+    const DF d;
+    const DU du;
+    const SobolTable& table = sobol_table();
+    const auto count = static_cast<std::size_t>(input_.counts.from_bsdf);
+    const bool lobe_only = input_.counts.lobe_only;
+    const SiteDeal deal{lobe_only ? input_.sites.lobe_sites.data() : input_.sites.hit_sites.data(),
+                        lobe_only ? input_.sites.num_lobes : input_.sites.num_hits,
+                        input_.counts.from_bsdf, uniform_float(random[3] * 0x9E3779B9u)};
+    for (std::size_t i = 0; i < count; i += hn::Lanes(d)) {
+      const VU sx = hn::Xor(hn::LoadU(du, table.x.data() + i), hn::Set(du, random[1]));
+      const VU sy = hn::Xor(hn::LoadU(du, table.y.data() + i), hn::Set(du, random[2]));
+      PoolPoint p;
+      const SurfaceLanes surface = deal.Load(input_.sites, i, p.site);
+      const VF specular_probability = lobe_only ? hn::Set(d, 1.0f) : surface.specular_probability;
+      const Vec3Lanes drawn =
+          SampleBsdf(surface, specular_probability, UniformLanes(d, sx), UniformLanes(d, sy));
+      p.code = EncodeOctahedral(Transform(to_map_.m.data(), drawn));
+      VF density;
+      const BsdfLanes f = Evaluate(surface, DecodeOctahedral(p.code), p, density);
+      Append(p, FreshWeight(p, surface, f, density, count - i), out, sums);
+    }
+  }
+
+  const kernels::PoolInput& input_;
+  const PoolSettings& settings_;
+  const EnvironmentView now_, before_;  ///< for directions in the map's frame
+  const bool same_surface_;             ///< as seen from the map
+  const bool same_light_;               ///< the map's texels
+  const Mat3 to_map_;
+};
+
+}  // namespace baton::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+#endif
