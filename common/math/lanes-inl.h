@@ -40,6 +40,10 @@ HWY_INLINE Vec3Lanes Add(const Vec3Lanes& a, const Vec3Lanes& b) {
 HWY_INLINE Vec3Lanes Select(MF mask, const Vec3Lanes& yes, const Vec3Lanes& no) {
   return {hn::IfThenElse(mask, yes.x, no.x), hn::IfThenElse(mask, yes.y, no.y), hn::IfThenElse(mask, yes.z, no.z)};
 }
+/// Mean of the three channels.
+HWY_INLINE VF MeanLanes(const Vec3Lanes& c) {
+  return hn::Mul(hn::Add(hn::Add(c.x, c.y), c.z), hn::Set(DF(), 1.0f / 3.0f));
+}
 /// m * v, m row-major.
 HWY_INLINE Vec3Lanes Transform(const float* m, const Vec3Lanes& v) {
   const DF d;

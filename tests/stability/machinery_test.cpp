@@ -69,7 +69,9 @@ class SelfAdaptedSampler final : public PixelSampler {
                                         .local_move_cosine = std::cos(4 * kPi / 180)};
       const SequentialOutcome outcome = kernels::sequential_step(
           input.sites, input.old, input.before, input.now, input.light.pool, settings, samples.lns,
-          input.key, {p.direction.data(), p.site.data(), p.weight.data()});
+          input.key,
+          {p.direction.data(), p.site.data(), p.weight.data(), samples.r.data(), samples.g.data(),
+           samples.b.data()});
       if (!outcome.alive) break;
       if (distributions == 1 && outcome.ess < ess_ratio_min_ * static_cast<float>(count)) continue;
       std::copy_n(p.direction.begin(), count, samples.direction.begin());

@@ -127,11 +127,11 @@ class TurningViewer {
     for (int run = 1; run <= kRuns; ++run) {
       std::array<OctDirection, 16> direction{};
       std::array<std::uint8_t, 16> site{};
-      std::array<float, 16> weight{};
+      std::array<float, 16> weight{}, r{}, g{}, b{};
       float lns = 0, lns_fresh = 0;
       PixelSource source = PixelSource::background;
       estimate({.job_seed = static_cast<std::uint64_t>(run), .frame = 1, .pixel = 1},
-               {direction, site, weight, lns, lns_fresh, source});
+               {direction, site, weight, r, g, b, lns, lns_fresh, source});
       sum += lns;
       squares += double{lns} * lns;
     }

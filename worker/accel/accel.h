@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <cstdint>
 #include <limits>
 #include <memory>
@@ -31,8 +32,18 @@ struct ShadowRays {
 
   std::size_t size() const { return count_; }
   void clear() { count_ = 0; }
+  /// Makes room for `capacity` rays in all.
+  void reserve(std::size_t capacity);
+  /// Counts rays [size(), count) whose origins and directions the caller has written; within the
+  /// reserved capacity.
+  void extend(std::size_t count) {
+    std::fill(t_far.begin() + static_cast<std::ptrdiff_t>(count_),
+              t_far.begin() + static_cast<std::ptrdiff_t>(count),
+              std::numeric_limits<float>::infinity());
+    count_ = count;
+  }
   void push(const Vec3& origin, const Vec3& direction) {
-    if (count_ == t_far.size()) grow();
+    if (count_ == t_far.size()) reserve(std::max<std::size_t>(1024, 2 * count_));
     const std::size_t i = count_++;
     origin_x[i] = origin.x;
     origin_y[i] = origin.y;
@@ -44,7 +55,6 @@ struct ShadowRays {
   }
 
  private:
-  void grow();
   std::size_t count_ = 0;
 };
 

@@ -1,4 +1,3 @@
-#include <algorithm>
 #include <bit>
 #include <cmath>
 
@@ -26,8 +25,8 @@ Vec3 lift_off(const Vec3& position, const Vec3& ng) {
   return {lift(position.x, ng.x), lift(position.y, ng.y), lift(position.z, ng.z)};
 }
 
-void ShadowRays::grow() {
-  const std::size_t capacity = std::max<std::size_t>(1024, 2 * t_far.size());
+void ShadowRays::reserve(std::size_t capacity) {
+  if (capacity <= t_far.size()) return;
   for (auto* array : {&origin_x, &origin_y, &origin_z, &direction_x, &direction_y, &direction_z,
                       &t_near, &t_far}) {
     array->resize(capacity, 0.0f);

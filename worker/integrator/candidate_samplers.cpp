@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "worker/sampling/ess.h"
-#include "worker/sampling/resampling.h"
+#include "worker/sampling/systematic_choice.h"
 
 namespace baton {
 namespace {
@@ -14,8 +14,21 @@ namespace {
 void set_dark(const PixelSamples& samples) {
   std::fill(samples.direction.begin(), samples.direction.end(), OctDirection{0});
   std::fill(samples.site.begin(), samples.site.end(), std::uint8_t{0});
-  std::fill(samples.weight.begin(), samples.weight.end(), 0.0f);
+  for (const std::span<float>& zero : {samples.weight, samples.r, samples.g, samples.b}) {
+    std::fill(zero.begin(), zero.end(), 0.0f);
+  }
   samples.lns = 0;
+}
+
+/// Makes candidate `pick` sample `j`.
+void take(const kernels::CandidateSet& from, std::size_t pick, std::size_t j, float weight,
+          const PixelSamples& samples) {
+  samples.direction[j] = from.code[pick];
+  samples.site[j] = static_cast<std::uint8_t>(from.site[pick]);
+  samples.weight[j] = weight;
+  samples.r[j] = from.r[pick];
+  samples.g[j] = from.g[pick];
+  samples.b[j] = from.b[pick];
 }
 
 /// Fills `scratch`; false when there is nothing to choose from.
@@ -54,9 +67,7 @@ PixelDiagnostics DirectSampler::sample(const PixelInput& input, SamplerScratch& 
   if (!draw(input, counts_, candidates, samples)) return diagnostics;
   const float inverse = 1.0f / candidates.total;
   for (std::size_t j = 0; j < samples.weight.size(); ++j) {
-    samples.direction[j] = candidates.code[j];
-    samples.site[j] = static_cast<std::uint8_t>(candidates.site[j]);
-    samples.weight[j] = candidates.weight[j] * inverse;
+    take(candidates, j, j, candidates.weight[j] * inverse, samples);
   }
   diagnostics.ess = effective_sample_size(samples.weight);
   return diagnostics;
@@ -71,15 +82,10 @@ PixelDiagnostics BidirectionalSampler::sample(const PixelInput& input, SamplerSc
   std::array<std::int32_t, limits::kMaxParticles> storage{};
   const std::span<std::int32_t> chosen = std::span(storage).first(samples.weight.size());
   const float u = Rng(input.key, PassId::choose).uniforms(0, 0)[0];
-  const auto count = static_cast<std::size_t>(candidates.count);
-  systematic_choice({candidates.weight, count},
-                    {candidates.running_total, (count + kChoiceBlock - 1) / kChoiceBlock}, u,
-                    chosen);
+  systematic_choice({candidates.weight, static_cast<std::size_t>(candidates.count)}, u, chosen);
+  const float share = 1.0f / static_cast<float>(chosen.size());
   for (std::size_t j = 0; j < chosen.size(); ++j) {
-    const auto pick = static_cast<std::size_t>(chosen[j]);
-    samples.direction[j] = candidates.code[pick];
-    samples.site[j] = static_cast<std::uint8_t>(candidates.site[pick]);
-    samples.weight[j] = 1.0f / static_cast<float>(chosen.size());
+    take(candidates, static_cast<std::size_t>(chosen[j]), j, share, samples);
   }
   diagnostics.ess = static_cast<float>(chosen.size());
   return diagnostics;

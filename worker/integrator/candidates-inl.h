@@ -67,19 +67,14 @@ HWY_INLINE VF BsdfDensity(const SiteBlock& sites, const kernels::CandidateCounts
                             hn::Mul(f.lobe_pdf, crowd));
 }
 
-/// Sums of weights up to the end of each block of kChoiceBlock, so that choosing looks at blocks. The
-/// weights are padded by zeros to a whole vector. Returns the total.
-HWY_INLINE float RunningTotals(const float* weight, std::int32_t count, float* running) {
+/// Sum of weights that are padded by zeros to a whole vector.
+HWY_INLINE float SumOfWeights(const float* weight, std::int32_t count) {
   const DF d;
-  float total = 0;
-  for (std::size_t i = 0; i < static_cast<std::size_t>(count); i += kChoiceBlock) {
-    VF sum = hn::Zero(d);
-    const std::size_t end = std::min(i + kChoiceBlock, static_cast<std::size_t>(count));
-    for (std::size_t j = i; j < end; j += hn::Lanes(d)) sum = hn::Add(sum, hn::LoadU(d, weight + j));
-    total += hn::GetLane(hn::SumOfLanes(d, sum));
-    running[i / kChoiceBlock] = total;
+  VF sum = hn::Zero(d);
+  for (std::size_t i = 0; i < static_cast<std::size_t>(count); i += hn::Lanes(d)) {
+    sum = hn::Add(sum, hn::LoadU(d, weight + i));
   }
-  return total;
+  return hn::GetLane(hn::SumOfLanes(d, sum));
 }
 
 /// Everything that the two kinds of candidates of a pixel share.
@@ -95,8 +90,8 @@ struct CandidateContext {
     const DF d;
     const VF share =
         hn::Set(d, static_cast<float>(sites.num_hits) / static_cast<float>(sites.num_sites));
-    const VF target =
-        hn::Mul(MeanLanes(ReflectedRadiance(surface, f, light.r, light.g, light.b)), share);
+    const Vec3Lanes reflected = ReflectedRadiance(surface, f, light.r, light.g, light.b);
+    const VF target = hn::Mul(MeanLanes(reflected), share);
     VF proposal = hn::Mul(hn::Set(d, static_cast<float>(counts.from_light)), light.density);
     if (counts.from_bsdf > 0) {
       proposal = hn::MulAdd(hn::Set(d, static_cast<float>(counts.from_bsdf)),
@@ -109,6 +104,9 @@ struct CandidateContext {
     hn::StoreU(code, DU(), out.code + at);
     hn::StoreU(site, DI(), out.site + at);
     hn::StoreU(weight, d, out.weight + at);
+    hn::StoreU(reflected.x, d, out.r + at);
+    hn::StoreU(reflected.y, d, out.g + at);
+    hn::StoreU(reflected.z, d, out.b + at);
   }
 };
 

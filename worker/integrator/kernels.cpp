@@ -100,7 +100,7 @@ void DrawCandidates(const SiteBlock& sites, const EnvironmentView& environment, 
   BsdfCandidates(context, environment, random);
   out.count = counts.total();
 
-  out.total = RunningTotals(out.weight, out.count, out.running_total);
+  out.total = SumOfWeights(out.weight, out.count);
 }
 
 void ShadeSamples(const SiteBlock& sites, const EnvironmentView& environment, std::span<const OctDirection> code,

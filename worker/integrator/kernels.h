@@ -10,7 +10,6 @@
 #include "common/math/philox.h"
 #include "worker/integrator/light_pool.h"
 #include "worker/integrator/old_surfaces.h"
-#include "worker/sampling/resampling.h"
 #include "worker/sampling/sequential.h"
 #include "worker/scene/environment_view.h"
 #include "worker/scene/site_block.h"
@@ -64,8 +63,7 @@ struct CandidateSet {
   alignas(64) OctDirection code[kCapacity];
   alignas(64) std::int32_t site[kCapacity];
   alignas(64) float weight[kCapacity];
-  alignas(64) float running_total[kCapacity /
-                                  kChoiceBlock];  ///< sums of the weights, for systematic_choice
+  alignas(64) float r[kCapacity], g[kCapacity], b[kCapacity];  ///< (f cos L)_rgb
   std::int32_t count = 0;
   float total = 0;  ///< sum of the weights
 };

@@ -22,6 +22,8 @@ struct PixelInput {
   RngKey key;
   std::int32_t frame_index = 0;  ///< 0-based position in the sequence
   bool has_history = false;      ///< the samples hold the previous frame's properly weighted set
+  /// (N) p~ of the previous frame at those samples, where it is known; else empty.
+  std::span<const float> target_before{};
   const OldSurfaces* old = nullptr;  ///< the surfaces of that set, where they are not `sites`
   /// (kVisibilityCells) of the frames before, or empty; see remembers()
   std::span<const VisibilityCell> memory{};
@@ -34,6 +36,7 @@ struct PixelSamples {
   std::span<OctDirection> direction;  ///< (N)
   std::span<std::uint8_t> site;       ///< (N)
   std::span<float> weight;            ///< (N) sum 1, or all 0
+  std::span<float> r, g, b;           ///< (N) out: (f cos L)_rgb at the samples
   float& lns;
   float& lns_fresh;
   PixelSource& source;
@@ -83,7 +86,6 @@ struct PixelRays {
 struct SamplerScratch {
   kernels::CandidateSet candidates;
   std::array<kernels::PoolHalf, 2> pool;
-  kernels::ShadedSamples shaded;
 };
 
 /// A sampling method: the plug-in over the contract of PixelSamples. Stateless; any number of

@@ -86,8 +86,8 @@ class PoolGatherer {
     out.lns = sum(sums.weight);
     out.visible = sum(sums.visible);
     out.visible_color = {sum(sums.color.x), sum(sums.color.y), sum(sums.color.z)};
-    RunningTotals(out.carry_weight, out.count, out.carry_running);
-    RunningTotals(out.ray_weight, out.count, out.ray_running);
+    out.carry_total = SumOfWeights(out.carry_weight, out.count);
+    out.ray_total = SumOfWeights(out.ray_weight, out.count);
   }
 
  private:

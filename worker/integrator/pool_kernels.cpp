@@ -43,7 +43,7 @@ void gather_pool(const PoolInput& input, const PoolSettings& settings, const Rng
   if (input.light_pool.empty()) {
     for (PoolHalf& half : out) {
       half.count = 0;
-      half.lns = half.visible = 0;
+      half.lns = half.visible = half.carry_total = half.ray_total = 0;
       half.visible_color = {};
     }
     return;

@@ -44,18 +44,11 @@ struct PoolHalf {
   alignas(64) float ray_weight[kCapacity];                     ///< weight * ray_factor(V^)
   alignas(64) float r[kCapacity], g[kCapacity], b[kCapacity];  ///< weight * (f cos L)_rgb / p~
   std::int32_t count = 0;
-  alignas(
-      64) float carry_running[kCapacity / kChoiceBlock];  ///< running totals for systematic_choice
-  alignas(64) float ray_running[kCapacity / kChoiceBlock];
-  float lns = 0;      ///< sum of the weights
+  float carry_total = 0, ray_total = 0;  ///< sums of carry_weight and ray_weight
+  float lns = 0;                         ///< sum of the weights
   float visible = 0;  ///< sum of weight * V^
   Rgb visible_color;  ///< sum of (r, g, b) * V^
 };
-
-/// The running totals in use.
-inline std::span<const float> used(const PoolHalf& half, const float* running) {
-  return {running, (static_cast<std::size_t>(half.count) + kChoiceBlock - 1) / kChoiceBlock};
-}
 
 /// Fills both halves of the pool; they share no sample. A black map leaves them empty.
 void gather_pool(const PoolInput& input, const PoolSettings& settings, const Rng& rng,

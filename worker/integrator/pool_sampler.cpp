@@ -5,7 +5,7 @@
 
 #include "worker/integrator/candidate_samplers.h"
 #include "worker/sampling/ess.h"
-#include "worker/sampling/resampling.h"
+#include "worker/sampling/systematic_choice.h"
 
 namespace baton {
 namespace {
@@ -19,8 +19,7 @@ bool is_lit(float total) { return total > 0 && std::isfinite(total); }
 /// stand for half the pixel. Returns the sum of the contributions.
 float carry(const PoolHalf& half, float u, const PixelSamples& samples, std::size_t first,
             std::size_t count) {
-  const std::span<const float> running = used(half, half.carry_running);
-  const float total = running.empty() ? 0.0f : running.back();
+  const float total = half.carry_total;
   const std::span<float> weight = samples.weight.subspan(first, count);
   if (!is_lit(total)) {
     std::fill(weight.begin(), weight.end(), 0.0f);
@@ -31,7 +30,7 @@ float carry(const PoolHalf& half, float u, const PixelSamples& samples, std::siz
   }
   std::array<std::int32_t, limits::kMaxParticles> storage{};
   const std::span<std::int32_t> chosen = std::span(storage).first(count);
-  systematic_choice({half.carry_weight, static_cast<std::size_t>(half.count)}, running, u, chosen);
+  systematic_choice({half.carry_weight, static_cast<std::size_t>(half.count)}, u, chosen);
   const float per_choice = 0.5f * total / static_cast<float>(count);
   float sum = 0;
   for (std::size_t j = 0; j < count; ++j) {
@@ -51,12 +50,11 @@ void choose_half(const PoolHalf& half, float lns, float u, std::size_t count, Pi
   if (!is_lit(half.lns)) return;
   constant += half.visible_color * 0.5f;
   rays.constant.visibility += 0.5f * half.visible / lns;
-  const std::span<const float> running = used(half, half.ray_running);
-  const float total = running.back();
+  const float total = half.ray_total;
   if (!is_lit(total)) return;
   std::array<std::int32_t, limits::kMaxParticles> storage{};
   const std::span<std::int32_t> chosen = std::span(storage).first(count);
-  systematic_choice({half.ray_weight, static_cast<std::size_t>(half.count)}, running, u, chosen);
+  systematic_choice({half.ray_weight, static_cast<std::size_t>(half.count)}, u, chosen);
   const float per_choice = 0.5f * total / static_cast<float>(count);
   for (std::size_t j = 0; j < count;) {
     const auto pick = static_cast<std::size_t>(chosen[j]);

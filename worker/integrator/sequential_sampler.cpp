@@ -37,7 +37,10 @@ PixelDiagnostics SequentialSampler::sample(const PixelInput& input, SamplerScrat
   if (input.sites.num_lobes == 0) settings.local_move_fraction = 0;
   const SequentialOutcome outcome = kernels::sequential_step(
       input.sites, input.old, input.before, input.now, input.light.pool, settings, samples.lns,
-      input.key, {samples.direction.data(), samples.site.data(), samples.weight.data()});
+      input.key,
+      {samples.direction.data(), samples.site.data(), samples.weight.data(), samples.r.data(),
+       samples.g.data(), samples.b.data(),
+       input.target_before.empty() ? nullptr : input.target_before.data()});
   PixelDiagnostics diagnostics{
       // Both targets at the old positions and at every proposal.
       .ess = outcome.ess,

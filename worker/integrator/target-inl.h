@@ -6,6 +6,7 @@
 #define BATON_WORKER_INTEGRATOR_TARGET_INL_H_
 #endif
 
+#include <hwy/cache_control.h>
 #include <hwy/highway.h>
 
 #include "worker/integrator/light_pool.h"
@@ -29,17 +30,6 @@ HWY_INLINE Vec3Lanes ReflectedRadiance(const SurfaceLanes& s, const BsdfLanes& f
   return Add(reflected, {tabulated(f.measured.x, r), tabulated(f.measured.y, g), tabulated(f.measured.z, b)});
 }
 
-/// Mean over R, G, B: the scalar target p~_site.
-HWY_INLINE VF MeanLanes(const Vec3Lanes& c) {
-  return hn::Mul(hn::Add(hn::Add(c.x, c.y), c.z), hn::Set(DF(), 1.0f / 3.0f));
-}
-
-HWY_INLINE VF LogOrZero(VF x) {
-  const DF d;
-  const MF positive = hn::Gt(x, hn::Set(d, 1e-37f));
-  return hn::IfThenElse(positive, LogLanes(hn::Max(x, hn::Set(d, 1e-37f))), hn::Set(d, kLogZero));
-}
-
 /// Site of the k-th surface of the pixel, k = floor(fraction * num_hits); fraction in [0, 1).
 HWY_INLINE VI SiteAt(const SiteBlock& block, VF fraction) {
   const DF d;
@@ -48,6 +38,11 @@ HWY_INLINE VI SiteAt(const SiteBlock& block, VF fraction) {
                        hn::Set(di, block.num_hits - 1));
   if (block.num_hits == block.num_sites) return k;
   return hn::GatherIndex(di, block.hit_sites.data(), k);
+}
+
+/// LogTargets from what is reflected and the proposal's density.
+HWY_INLINE LogTargets TargetsOf(VF log_before, const Vec3Lanes& reflected, VF density) {
+  return {log_before, LogOrZero(MeanLanes(reflected)), LogOrZero(density), reflected};
 }
 
 /// The targets of two frames whose surfaces are the same, for SequentialStep. The factor 1/S is common to all points and
@@ -64,8 +59,25 @@ struct SameSurfaceTarget {
     const BsdfLanes f = EvaluateBsdf(surface, w);
     const RadianceLanes then = EvaluateEnvironment(before, w);
     const RadianceLanes light = EvaluateEnvironment(now, w);
-    return {LogOrZero(MeanLanes(ReflectedRadiance(surface, f, then.r, then.g, then.b))),
-            LogOrZero(MeanLanes(ReflectedRadiance(surface, f, light.r, light.g, light.b))), LogOrZero(light.density)};
+    return TargetsOf(LogOrZero(MeanLanes(ReflectedRadiance(surface, f, then.r, then.g, then.b))),
+                     ReflectedRadiance(surface, f, light.r, light.g, light.b), light.density);
+  }
+
+  /// As Evaluate, but `before` is left 0.
+  HWY_INLINE LogTargets EvaluateNow(const PointLanes& point) const {
+    const Vec3Lanes w = DecodeOctahedral(point.code);
+    const SurfaceLanes surface = LoadSurfaces(sites, point.site);
+    const RadianceLanes light = EvaluateEnvironment(now, w);
+    const Vec3Lanes reflected = ReflectedRadiance(surface, EvaluateBsdf(surface, w), light.r, light.g, light.b);
+    return TargetsOf(hn::Zero(DF()), reflected, light.density);
+  }
+
+  bool ManySites() const { return sites.num_hits > 1; }
+
+  /// Brings the block of proposals that BlockStart(bits) will name into the cache.
+  HWY_INLINE void Prefetch(std::uint32_t bits) const {
+    const auto* block = reinterpret_cast<const char*>(&pool.blocks[BlockStart(bits) / LightPool::kBlock]);
+    for (std::size_t line = 0; line < sizeof(LightPool::Block); line += 64) hwy::Prefetch(block + line);
   }
 
   /// First entry of a uniformly drawn block of proposals.
@@ -87,7 +99,7 @@ struct SameSurfaceTarget {
                                              hn::Load(d, block.before_b + at));
     const Vec3Lanes light =
         ReflectedRadiance(surface, f, hn::Load(d, block.r + at), hn::Load(d, block.g + at), hn::Load(d, block.b + at));
-    return {LogOrZero(MeanLanes(then)), LogOrZero(MeanLanes(light)), LogOrZero(hn::Load(d, block.density + at))};
+    return TargetsOf(LogOrZero(MeanLanes(then)), light, hn::Load(d, block.density + at));
   }
 };
 
@@ -108,6 +120,15 @@ struct MovedSurfaceTarget {
                    light.density);
   }
 
+  /// As Evaluate, but `before` is left 0.
+  HWY_INLINE LogTargets EvaluateNow(const PointLanes& point) const {
+    return SameSurfaceTarget{sites, before, now, pool}.EvaluateNow(point);
+  }
+
+  bool ManySites() const { return sites.num_hits > 1; }
+  HWY_INLINE void Prefetch(std::uint32_t bits) const {
+    SameSurfaceTarget{sites, before, now, pool}.Prefetch(bits);
+  }
   static std::size_t BlockStart(std::uint32_t bits) { return SameSurfaceTarget::BlockStart(bits); }
 
   HWY_INLINE LogTargets Propose(std::size_t entry, VF site_fraction, PointLanes& point) const {
@@ -133,9 +154,8 @@ struct MovedSurfaceTarget {
     const BsdfLanes f = EvaluateBsdf(surface, w);
     const VF log_then =
         LogOrZero(MeanLanes(ReflectedRadiance(surface_then, f_then, then.x, then.y, then.z)));
-    return {hn::Add(log_then, LookUp(old.log_share, site, sites.num_sites)),
-            LogOrZero(MeanLanes(ReflectedRadiance(surface, f, light.x, light.y, light.z))),
-            LogOrZero(density)};
+    return TargetsOf(hn::Add(log_then, LookUp(old.log_share, site, sites.num_sites)),
+                     ReflectedRadiance(surface, f, light.x, light.y, light.z), density);
   }
 };
 

@@ -66,13 +66,13 @@ Rgb ExtraSampler::first_pass(const SampleRegion::Place& pixel, std::size_t fold)
 void ExtraSampler::draw(std::int32_t x, std::int32_t y, std::size_t fold,
                         std::span<const SurfaceHit> hits) {
   rays_.clear();
-  ray_color_.clear();
-  std::array<Vec3, SiteBlock::kMaxSites> origins;
+  SiteOrigins origins{.num_sites = context_.job.image.sites};
   for (std::size_t s = 0; s < hits.size(); ++s) {
-    if (hits[s].hit) origins[s] = lift_off(hits[s].point.position, hits[s].point.ng);
+    if (hits[s].hit) origins.set(s, lift_off(hits[s].point.position, hits[s].point.ng));
   }
   const auto count = static_cast<std::uint32_t>(context_.job.visibility.partitions);
-  kernels::ShadedSamples shaded;
+  SampleColors colors;
+  std::array<float, limits::kMaxParticles> targets{};
   for (std::uint32_t c = 0; c < count; ++c) {
     // Streams 0 and 1 are the first pass's populations.
     const std::uint32_t stream = 2 + static_cast<std::uint32_t>(fold) * count + c;
@@ -80,15 +80,18 @@ void ExtraSampler::draw(std::int32_t x, std::int32_t y, std::size_t fold,
                      .frame = static_cast<std::uint32_t>(frame_.number),
                      .pixel = static_cast<std::uint32_t>(y * context_.job.image.width + x)};
     sample_populations(*context_.sampler, {sites_, light_, now_, before_, key, frame_.index, false},
-                       0, *scratch_, drawn_);
-    kernels::shade_samples(sites_, now_, drawn_.direction, drawn_.site, shaded);
-    for (std::size_t j = 0; j < drawn_.direction.size(); ++j) {
-      const Rgb color = Rgb{shaded.r[j], shaded.g[j], shaded.b[j]} *
-                        (unit_contribution(drawn_, 0, 0) * drawn_.weight[j]);
-      if (!(mean(color) > 0)) continue;
-      rays_.push(origins[drawn_.site[j]], {shaded.x[j], shaded.y[j], shaded.z[j]});
-      ray_color_.push_back(color);
-    }
+                       0, *scratch_, drawn_, colors);
+    cast_samples({.direction = drawn_.direction,
+                  .site = drawn_.site,
+                  .weight = drawn_.weight,
+                  .r = colors.r.data(),
+                  .g = colors.g.data(),
+                  .b = colors.b.data(),
+                  .unit_contribution = unit_contribution(drawn_, 0, 0),
+                  .picture_scale = 1,
+                  .visibility_scale = 1,
+                  .first_sample = 0},
+                 origins, rays_, std::span(targets).first(drawn_.weight.size()));
   }
 }
 
@@ -96,12 +99,12 @@ void ExtraSampler::draw(std::int32_t x, std::int32_t y, std::size_t fold,
 Rgb ExtraSampler::trace() {
   {
     const StageTimer timer(seconds_rays_);
-    geometry_.accel->occluded(rays_);
+    geometry_.accel->occluded(rays_.rays);
   }
   rays_traced_ += rays_.size();
   Rgb sum;
   for (std::size_t r = 0; r < rays_.size(); ++r) {
-    if (!(rays_.t_far[r] < 0)) sum += ray_color_[r];
+    if (!(rays_.rays.t_far[r] < 0)) sum += Rgb{rays_.r[r], rays_.g[r], rays_.b[r]};
   }
   return sum;
 }

@@ -3,6 +3,7 @@
 #include <memory>
 
 #include "common/state/sample_state.h"
+#include "worker/integrator/ray_batch.h"
 #include "worker/pass/masked_surfaces.h"
 #include "worker/pass/sample_region.h"
 
@@ -41,8 +42,7 @@ class ExtraSampler {
   std::unique_ptr<SamplerScratch> scratch_;
   SampleState drawn_;  ///< one population of one pixel
   SiteBlock sites_;
-  ShadowRays rays_;
-  std::vector<Rgb> ray_color_;
+  RayBatch rays_;
   std::uint64_t rays_traced_ = 0;
   double seconds_rays_ = 0;
 };

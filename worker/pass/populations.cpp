@@ -10,7 +10,8 @@ SamplingSpec population_spec(const JobSpec& job) {
   SamplingSpec spec = job.sampling;
   spec.num_particles /= num_populations(job);
   spec.num_candidates = std::max(spec.num_candidates / num_populations(job), spec.num_particles);
-  spec.refresh_candidates = std::max(spec.refresh_candidates / num_populations(job), spec.num_particles);
+  spec.refresh_candidates =
+      std::max(spec.refresh_candidates / num_populations(job), spec.num_particles);
   return spec;
 }
 
@@ -21,8 +22,8 @@ std::uint64_t stream_seed(std::uint64_t job_seed, std::uint32_t stream) {
 }
 
 PixelDiagnostics sample_populations(const PixelSampler& sampler, const PixelInput& input,
-                                    std::size_t index, SamplerScratch& scratch,
-                                    SampleState& state) {
+                                    std::size_t index, SamplerScratch& scratch, SampleState& state,
+                                    SampleColors& colors) {
   const auto populations = static_cast<std::size_t>(state.num_populations);
   const std::size_t n = static_cast<std::size_t>(state.num_particles) / populations;
   PixelDiagnostics sum;
@@ -30,11 +31,15 @@ PixelDiagnostics sample_populations(const PixelSampler& sampler, const PixelInpu
   for (std::size_t k = 0; k < populations; ++k) {
     const std::size_t row = index * populations + k;
     population_input.key.job_seed = stream_seed(input.key.job_seed, static_cast<std::uint32_t>(k));
+    if (!input.target_before.empty()) {
+      population_input.target_before = input.target_before.subspan(k * n, n);
+    }
     const PixelDiagnostics did = sampler.sample(
         population_input, scratch,
         {std::span(state.direction).subspan(row * n, n), std::span(state.site).subspan(row * n, n),
-         std::span(state.weight).subspan(row * n, n), state.lns[row], state.lns_fresh[row],
-         state.source[row]});
+         std::span(state.weight).subspan(row * n, n), std::span(colors.r).subspan(k * n, n),
+         std::span(colors.g).subspan(k * n, n), std::span(colors.b).subspan(k * n, n),
+         state.lns[row], state.lns_fresh[row], state.source[row]});
     sum.ess += did.ess;
     sum.target_evaluations += did.target_evaluations;
     sum.local.proposed += did.local.proposed;

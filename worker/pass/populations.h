@@ -1,5 +1,8 @@
 #pragma once
 
+#include <array>
+
+#include "common/base/limits.h"
 #include "common/state/sample_state.h"
 #include "worker/integrator/pixel_sampler.h"
 
@@ -12,11 +15,16 @@ SamplingSpec population_spec(const JobSpec& job);
 /// job's own.
 std::uint64_t stream_seed(std::uint64_t job_seed, std::uint32_t stream);
 
+/// (f cos L)_rgb at the samples of one pixel.
+struct SampleColors {
+  std::array<float, limits::kMaxParticles> r, g, b;
+};
+
 /// Runs the sampler once for each population of pixel `index` of the state; they share nothing but
 /// the frame's light pool. The answer counts all of them; its ess is the sum.
 PixelDiagnostics sample_populations(const PixelSampler& sampler, const PixelInput& input,
-                                    std::size_t index, SamplerScratch& scratch,
-                                    SampleState& state);
+                                    std::size_t index, SamplerScratch& scratch, SampleState& state,
+                                    SampleColors& colors);
 
 /// What a pixel's populations say together.
 float mean_lns(const SampleState& state, std::size_t index);

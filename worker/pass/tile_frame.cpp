@@ -4,7 +4,6 @@
 
 #include "worker/integrator/reference.h"
 #include "worker/pass/cpu_clock.h"
-#include "worker/pass/populations.h"
 
 namespace baton {
 namespace {
@@ -54,11 +53,8 @@ struct TileFrameRenderer::Batch {
   std::size_t count = 0;
   std::int32_t frame_number = 0;
   std::int32_t frame_index = 0;
-  ShadowRays rays;
-  std::size_t stride = 1;                 ///< most rays of a pixel
-  std::vector<std::uint32_t> ray_sample;  ///< batch pixel * stride + particle or number of each ray
-  std::vector<PixelRays::Value>
-      value;  ///< (batch pixels, stride) what the ray brings if it is free
+  RayBatch rays;           ///< samples are numbered batch pixel * stride + number in the pixel
+  std::size_t stride = 1;  ///< most rays of a pixel
   std::array<std::size_t, kBatchPixels> second_half;  ///< as PixelRays::second_half
   std::array<Rgb, kBatchPixels> difference;           ///< of the halves
   std::array<PixelResult, kBatchPixels> pixels;
@@ -109,8 +105,8 @@ FilmTile TileFrameRenderer::render_batches(const FrameSpec& frame, const FrameLi
   frame_sampling_ = {};
   batch.stride =
       static_cast<std::size_t>(std::max(state.num_particles, context_.job.sampling.num_particles));
-  batch.value.resize(kBatchPixels * batch.stride);
   const std::size_t num_pixels = state.num_pixels();
+  keep_targets(frame.index, num_pixels * static_cast<std::size_t>(state.num_particles));
   if (context_.job.visibility.correlated) collector_.begin(state);
   for (std::size_t first = 0; first < num_pixels; first += kBatchPixels) {
     batch.first = first;
@@ -135,6 +131,16 @@ FilmTile TileFrameRenderer::render_batches(const FrameSpec& frame, const FrameLi
   return film.film();
 }
 
+/// Makes room for the targets of the frame's samples, and says whether those of the frame before
+/// are there. A method that chooses its rays itself tells no targets.
+void TileFrameRenderer::keep_targets(std::int32_t frame_index, std::size_t num_samples) {
+  if (context_.sampler == nullptr || context_.sampler->chooses_rays()) return;
+  knows_targets_ = has_history_ && reprojection_ == nullptr && targets_.size() == num_samples &&
+                   targets_frame_ + 1 == frame_index;
+  targets_.resize(num_samples);
+  targets_frame_ = frame_index;
+}
+
 /// What pixel `index` starts from. state: its samples become those of the frame before, where they
 /// are not already.
 PixelHistory TileFrameRenderer::find_history(std::size_t pixel_of_batch, std::size_t index,
@@ -151,9 +157,9 @@ void TileFrameRenderer::sample(Batch& batch, const FrameLight& light, SampleStat
   const auto n = static_cast<std::size_t>(state.num_particles);
   const std::int32_t frame_index = batch.frame_index;
   PixelRays rays;
+  SampleColors colors;
   SiteBlock sites;
   batch.rays.clear();
-  batch.ray_sample.clear();
   batch.second_half.fill(0);
   batch.difference.fill({});
   for (std::size_t i = 0; i < batch.count; ++i) {
@@ -177,22 +183,24 @@ void TileFrameRenderer::sample(Batch& batch, const FrameLight& light, SampleStat
 
     // Sample, and cast the rays.
     const PixelHistory history = find_history(i, index, state);
-    const PixelInput input{.sites = sites,
-                           .light = light,
-                           .now = now,
-                           .before = before,
-                           .key = batch.key(context_, surfaces_.rect, index),
-                           .frame_index = frame_index,
-                           .has_history = history != PixelHistory::none,
-                           .old = history == PixelHistory::moved ? &old_ : nullptr,
-                           .memory = state.memory_of(index)};
+    const PixelInput input{
+        .sites = sites,
+        .light = light,
+        .now = now,
+        .before = before,
+        .key = batch.key(context_, surfaces_.rect, index),
+        .frame_index = frame_index,
+        .has_history = history != PixelHistory::none,
+        .target_before = knows_targets_ ? targets_of(index, n) : std::span<float>(),
+        .old = history == PixelHistory::moved ? &old_ : nullptr,
+        .memory = state.memory_of(index)};
     const PixelDiagnostics did =
-        sample_populations(*context_.sampler, input, index, *scratch_, state);
+        sample_populations(*context_.sampler, input, index, *scratch_, state, colors);
     if (context_.sampler->chooses_rays()) {
       context_.sampler->choose_rays(input, *scratch_, rays);
       cast_rays(batch, i, rays);
     } else {
-      cast_samples(batch, i, sites, now, state);
+      cast_pixel_samples(batch, i, colors, state);
     }
 
     // Keep the books.
@@ -212,47 +220,46 @@ void TileFrameRenderer::sample(Batch& batch, const FrameLight& light, SampleStat
 }
 
 /// Where the shadow rays of a pixel's sites start.
-std::array<Vec3, SiteBlock::kMaxSites> TileFrameRenderer::origins(std::size_t index) const {
+SiteOrigins TileFrameRenderer::origins(std::size_t index) const {
   const std::span<const SurfaceHit> hits = surfaces_.pixel(index);
-  std::array<Vec3, SiteBlock::kMaxSites> origins;
+  SiteOrigins origins{.num_sites = surfaces_.num_sites};
   for (std::size_t s = 0; s < hits.size(); ++s) {
-    if (hits[s].hit) origins[s] = lift_off(hits[s].point.position, hits[s].point.ng);
+    if (hits[s].hit) origins.set(s, lift_off(hits[s].point.position, hits[s].point.ng));
   }
   return origins;
 }
 
-/// Colours the samples of batch pixel `i` and casts their rays.
-void TileFrameRenderer::cast_samples(Batch& batch, std::size_t i, const SiteBlock& sites,
-                                     const EnvironmentView& now, const SampleState& state) {
+/// Casts the rays of the samples of batch pixel `i`.
+void TileFrameRenderer::cast_pixel_samples(Batch& batch, std::size_t i, const SampleColors& colors,
+                                           const SampleState& state) {
   const std::size_t index = batch.first + i;
-  const auto n = static_cast<std::size_t>(state.num_particles);
   const auto num_populations = static_cast<std::size_t>(state.num_populations);
-  const float share = 1.0f / static_cast<float>(num_populations);
-  const std::span<const std::uint8_t> site = std::span(state.site).subspan(index * n, n);
-  const auto from = origins(index);
-  kernels::ShadedSamples& shaded = scratch_->shaded;
-  kernels::shade_samples(sites, now, std::span(state.direction).subspan(index * n, n), site,
-                         shaded);
-  for (std::size_t j = 0, k = 0; k < num_populations; ++k) {
-    const float unit = unit_contribution(state, index, k);
-    for (; j < (k + 1) * n / num_populations; ++j) {
-      const float weight = state.weight[index * n + j];
-      const Rgb color = Rgb{shaded.r[j], shaded.g[j], shaded.b[j]} * (unit * weight);
-      batch.value[i * batch.stride + j] = {color * picture_scale_[k], weight * share};
-      if (!(mean(color) > 0)) continue;
-      batch.rays.push(from[site[j]], {shaded.x[j], shaded.y[j], shaded.z[j]});
-      batch.ray_sample.push_back(static_cast<std::uint32_t>(i * batch.stride + j));
-    }
+  const auto n = static_cast<std::size_t>(state.num_particles);
+  const std::size_t m = n / num_populations;
+  const SiteOrigins from = origins(index);
+  for (std::size_t k = 0; k < num_populations; ++k) {
+    const std::size_t first = index * n + k * m;
+    cast_samples({.direction = std::span(state.direction).subspan(first, m),
+                  .site = std::span(state.site).subspan(first, m),
+                  .weight = std::span(state.weight).subspan(first, m),
+                  .r = &colors.r[k * m],
+                  .g = &colors.g[k * m],
+                  .b = &colors.b[k * m],
+                  .unit_contribution = unit_contribution(state, index, k),
+                  .picture_scale = picture_scale_[k],
+                  .visibility_scale = 1.0f / static_cast<float>(num_populations),
+                  .first_sample = static_cast<std::uint32_t>(i * batch.stride + k * m)},
+                 from, batch.rays, targets_of(index, n).subspan(k * m, m));
   }
 }
 
 /// Casts the rays that the sampler chose for batch pixel `i`.
 void TileFrameRenderer::cast_rays(Batch& batch, std::size_t i, const PixelRays& rays) {
-  const auto from = origins(batch.first + i);
+  const SiteOrigins from = origins(batch.first + i);
   for (std::size_t j = 0; j < rays.count; ++j) {
-    batch.value[i * batch.stride + j] = rays.value[j];
-    batch.rays.push(from[rays.site[j]], rays.direction[j]);
-    batch.ray_sample.push_back(static_cast<std::uint32_t>(i * batch.stride + j));
+    const std::size_t s = rays.site[j];
+    batch.rays.push({from.x[s], from.y[s], from.z[s]}, rays.direction[j], rays.value[j].color,
+                    rays.value[j].visibility, static_cast<std::uint32_t>(i * batch.stride + j));
   }
   batch.pixels[i].radiance = rays.constant.color;
   batch.pixels[i].visibility = rays.constant.visibility;
@@ -263,34 +270,35 @@ void TileFrameRenderer::cast_rays(Batch& batch, std::size_t i, const PixelRays& 
 /// Pass: visibility of all samples of the batch at once.
 void TileFrameRenderer::trace(Batch& batch) {
   const StageTimer timer(stats_.seconds_visibility);
-  geometry_.accel->occluded(batch.rays);
+  geometry_.accel->occluded(batch.rays.rays);
   stats_.rays_shadow += batch.rays.size();
 }
 
 /// Pass: sums the free rays of each pixel in their fixed order, and remembers what they found.
 void TileFrameRenderer::shade(Batch& batch, SampleState& state) {
   const StageTimer timer(stats_.seconds_shade);
+  const RayBatch& rays = batch.rays;
   std::size_t i = 0;
-  for (std::size_t r = 0; r < batch.rays.size(); ++r) {
-    const std::size_t sample = batch.ray_sample[r];
+  for (std::size_t r = 0; r < rays.size(); ++r) {
+    const std::size_t sample = rays.sample[r];
     while (sample >= (i + 1) * batch.stride) ++i;
-    const bool occluded = batch.rays.t_far[r] < 0;
+    const bool occluded = rays.rays.t_far[r] < 0;
     if (context_.job.visibility.correlated)
       collector_.add_ray(state, batch.first * batch.stride + sample, occluded);
     if (const std::span<MemoryCell> memory = state.memory_of(batch.first + i); !memory.empty()) {
-      remember_ray(
-          memory, {batch.rays.direction_x[r], batch.rays.direction_y[r], batch.rays.direction_z[r]},
-          !occluded);
+      remember_ray(memory,
+                   {rays.rays.direction_x[r], rays.rays.direction_y[r], rays.rays.direction_z[r]},
+                   !occluded);
     }
     if (occluded) {
       batch.pixels[i].mask = 0;
       continue;
     }
-    const PixelRays::Value& value = batch.value[sample];
-    batch.pixels[i].radiance += value.color;
-    batch.pixels[i].visibility += value.visibility;
+    const Rgb color{rays.r[r], rays.g[r], rays.b[r]};
+    batch.pixels[i].radiance += color;
+    batch.pixels[i].visibility += rays.visibility[r];
     batch.difference[i] +=
-        value.color * (sample - i * batch.stride < batch.second_half[i] ? 1.0f : -1.0f);
+        color * (sample - i * batch.stride < batch.second_half[i] ? 1.0f : -1.0f);
   }
 
   // Two halves that agree in the mean: the square of half their difference estimates the variance
@@ -316,9 +324,9 @@ void TileFrameRenderer::render_reference(Batch& batch, const FrameLight& light,
       ++stats_.pixels_background;
       continue;
     }
-    const ReferenceEstimate estimate =
-        renderer.render(hits, light.now, context_.job.sampling.reference_samples,
-                        batch.key(context_, surfaces_.rect, index), batch.rays, stats_.rays_shadow);
+    const ReferenceEstimate estimate = renderer.render(
+        hits, light.now, context_.job.sampling.reference_samples,
+        batch.key(context_, surfaces_.rect, index), batch.rays.rays, stats_.rays_shadow);
     state.lns[index] = state.lns_fresh[index] = estimate.lns;
     PixelResult& pixel = batch.pixels[i];
     pixel.radiance = estimate.radiance;

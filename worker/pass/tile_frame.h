@@ -1,8 +1,10 @@
 #pragma once
 
 #include "common/job/task.h"
+#include "worker/integrator/ray_batch.h"
 #include "worker/pass/film_writer.h"
 #include "worker/pass/first_pass_collector.h"
+#include "worker/pass/populations.h"
 #include "worker/pass/primary.h"
 #include "worker/pass/reproject.h"
 
@@ -40,11 +42,15 @@ class TileFrameRenderer {
   struct Batch;
 
   FilmTile render_batches(const FrameSpec& frame, const FrameLight& light, SampleState& state);
+  void keep_targets(std::int32_t frame_index, std::size_t num_samples);
+  std::span<float> targets_of(std::size_t index, std::size_t n) {
+    return std::span(targets_).subspan(index * n, n);
+  }
   PixelHistory find_history(std::size_t pixel_of_batch, std::size_t index, SampleState& state);
   void sample(Batch& batch, const FrameLight& light, SampleState& state);
-  std::array<Vec3, SiteBlock::kMaxSites> origins(std::size_t index) const;
-  void cast_samples(Batch& batch, std::size_t i, const SiteBlock& sites, const EnvironmentView& now,
-                    const SampleState& state);
+  SiteOrigins origins(std::size_t index) const;
+  void cast_pixel_samples(Batch& batch, std::size_t i, const SampleColors& colors,
+                          const SampleState& state);
   void cast_rays(Batch& batch, std::size_t i, const PixelRays& rays);
   void trace(Batch& batch);
   void shade(Batch& batch, SampleState& state);
@@ -57,6 +63,11 @@ class TileFrameRenderer {
   Reprojection* reprojection_ = nullptr;  ///< of the frame in work; null where surfaces stay
   bool has_history_ = false;              ///< of the frame in work, where surfaces stay
   OldSurfaces old_;
+  /// (pixels, N) p~ at the samples of frame targets_frame_: where surfaces stay, the next frame
+  /// need not evaluate it again.
+  std::vector<float> targets_;
+  std::int32_t targets_frame_ = 0;
+  bool knows_targets_ = false;  ///< targets_ are those of the frame before the one in work
   std::unique_ptr<SamplerScratch> scratch_;
   FirstPassCollector collector_;
   std::vector<float> picture_scale_;  ///< (populations)

@@ -23,7 +23,15 @@ namespace hn = hwy::HWY_NAMESPACE;
 /// log 0.
 struct LogTargets {
   VF before, now, proposal;
+  Vec3Lanes reflected;  ///< (f cos L)_rgb of this frame; `now` is the log of its mean
 };
+
+/// log x, kLogZero where x is (almost) 0.
+HWY_INLINE VF LogOrZero(VF x) {
+  const DF d;
+  const MF positive = hn::Gt(x, hn::Set(d, 1e-37f));
+  return hn::IfThenElse(positive, LogLanes(hn::Max(x, hn::Set(d, 1e-37f))), hn::Set(d, kLogZero));
+}
 
 /// A point of the sampled space per lane.
 struct PointLanes {
@@ -39,6 +47,7 @@ struct ParticleArrays {
   HWY_ALIGN float log_before[kCapacity];
   HWY_ALIGN float log_now[kCapacity];
   HWY_ALIGN float log_proposal[kCapacity];
+  HWY_ALIGN float r[kCapacity], g[kCapacity], b[kCapacity];  ///< LogTargets::reflected
   HWY_ALIGN float
       log_increment[kCapacity];  ///< sum over k of log p^k / p^(k-1) at the particle's positions
 };
@@ -60,26 +69,98 @@ HWY_INLINE Vec3Lanes PerturbDirection(const Vec3Lanes& w, float cap_cosine, VF u
 /// kernel.
 inline constexpr std::size_t kProposalBlock = 8;
 
+/// The random numbers of a pixel's moves, addressed by the move's number and the particle. A block
+/// of Philox has four words: acceptance takes one word a move, so four moves share a block.
+class MoveRandom {
+ public:
+  MoveRandom(const Rng& rng, std::size_t num_particles) : rng_(rng), count_(num_particles) {}
+
+  /// What move `move` (0-based, ascending from call to call) needs beside its proposals.
+  HWY_INLINE void Begin(std::uint32_t move) {
+    if (move % kWindow == 0) {
+      const DU du;
+      for (std::size_t i = 0; i < kWindow; i += hn::Lanes(du)) {
+        const VU index = hn::Iota(du, kChoices + move + static_cast<std::uint32_t>(i));
+        const auto bits = PhiloxBlock(du, rng_, 0, index);
+        hn::Store(bits.w0, du, kind_ + i);
+        hn::Store(bits.w1, du, first_ + i);
+        hn::Store(bits.w2, du, distance_ + i);
+      }
+    }
+    if (move % 4 != 0) return;
+    const DU du;
+    for (std::size_t i = 0; i < count_; i += hn::Lanes(du)) {
+      const auto bits = PhiloxBlock(du, rng_, move / 4,
+                                    hn::Iota(du, kAcceptance + static_cast<std::uint32_t>(i)));
+      hn::Store(bits.w0, du, accept_[0] + i);
+      hn::Store(bits.w1, du, accept_[1] + i);
+      hn::Store(bits.w2, du, accept_[2] + i);
+      hn::Store(bits.w3, du, accept_[3] + i);
+    }
+  }
+
+  /// Decides the kind of the move.
+  bool IsLocal(std::uint32_t move, float local_fraction) const {
+    return uniform_float(kind_[move % kWindow]) < local_fraction;
+  }
+  /// Bits that choose the b-th block of proposals of the move: each uniform, any two independent.
+  std::uint32_t BlockBits(std::uint32_t move, std::uint32_t b) const {
+    return first_[move % kWindow] + b * (distance_[move % kWindow] | 1u);
+  }
+  /// Uniforms that accept particles i, i + 1, ...
+  HWY_INLINE VF Acceptance(std::uint32_t move, std::size_t i) const {
+    return UniformLanes(DF(), hn::Load(DU(), accept_[move % 4] + i));
+  }
+  /// Two words for the proposals of particles i, i + 1, ...
+  HWY_INLINE PhiloxLanes<VU> Proposal(std::uint32_t move, std::size_t i) const {
+    return PhiloxBlock(DU(), rng_, move + 1, hn::Iota(DU(), static_cast<std::uint32_t>(i)));
+  }
+  /// How many moves Begin knows ahead.
+  static constexpr std::uint32_t kWindow = 8;
+
+ private:
+  /// Indices past those of particles.
+  static constexpr std::uint32_t kChoices = 0x80000000u, kAcceptance = 0x40000000u;
+
+  const Rng& rng_;
+  std::size_t count_;
+  HWY_ALIGN std::uint32_t kind_[kWindow];
+  HWY_ALIGN std::uint32_t first_[kWindow];
+  HWY_ALIGN std::uint32_t distance_[kWindow];
+  HWY_ALIGN std::uint32_t accept_[4][ParticleArrays::kCapacity];
+};
+
+/// Fetches the proposals of the moves that `random` knows ahead into the cache.
+template <class Target>
+HWY_INLINE void PrefetchProposals(const Target& target, const SequentialSettings& settings,
+                                  const MoveRandom& random, std::uint32_t first,
+                                  std::uint32_t end) {
+  const auto blocks = static_cast<std::uint32_t>(
+      (static_cast<std::size_t>(settings.num_particles) + kProposalBlock - 1) / kProposalBlock);
+  for (std::uint32_t move = first; move < end; ++move) {
+    if (random.IsLocal(move, settings.local_move_fraction)) continue;
+    for (std::uint32_t b = 0; b < blocks; ++b) target.Prefetch(random.BlockBits(move, b));
+  }
+}
+
 /// One Metropolis-Hastings move of every particle that leaves p^(tempering_beta) invariant [eq. 7,
 /// 8 and the general ratio] and counts it in `outcome`. All particles of the pixel make the same
-/// kind of move, chosen independently of their positions.
+/// kind of move, chosen independently of their positions. keep_before: log_before is still needed
+/// at the new positions; else it is left undefined (tempering_beta must then be 1).
 template <class Target>
 HWY_INLINE void MoveParticles(const Target& target, const SequentialSettings& settings,
-                              float tempering_beta, const Rng& rng, std::uint32_t step,
-                              ParticleArrays& p, SequentialOutcome& outcome) {
+                              float tempering_beta, bool keep_before, const MoveRandom& random,
+                              std::uint32_t move, ParticleArrays& p, SequentialOutcome& outcome) {
   const DF d;
   const DI di;
   const DU du;
   const auto count = static_cast<std::size_t>(settings.num_particles);
-  const bool local = uniform_float(rng.bits(step, 0xFFFFFFFFu)[0]) < settings.local_move_fraction;
+  const bool local = random.IsLocal(move, settings.local_move_fraction);
   const VF beta = hn::Set(d, tempering_beta);
   const VF rest = hn::Set(d, 1 - tempering_beta);
 
   std::int32_t accepted = 0;
-  std::size_t block_start = 0;
   for (std::size_t i = 0; i < count; i += hn::Lanes(d)) {
-    const auto random = PhiloxBlock(du, rng, step, hn::Iota(du, static_cast<std::uint32_t>(i)));
-    if (i % kProposalBlock == 0) block_start = target.BlockStart(hn::GetLane(random.w0));
     const VU code = hn::Load(du, p.code + i);
     const VI site = hn::Load(di, p.site + i);
     const VF before = hn::Load(d, p.log_before + i);
@@ -90,21 +171,30 @@ HWY_INLINE void MoveParticles(const Target& target, const SequentialSettings& se
     PointLanes next{code, site};
     LogTargets next_log;
     if (local) {
-      next.code = EncodeOctahedral(
-          PerturbDirection(DecodeOctahedral(code), settings.local_move_cosine,
-                           UniformLanes(d, random.w0), UniformLanes(d, random.w1)));
-      next_log = target.Evaluate(next);
+      const auto bits = random.Proposal(move, i);
+      next.code =
+          EncodeOctahedral(PerturbDirection(DecodeOctahedral(code), settings.local_move_cosine,
+                                            UniformLanes(d, bits.w0), UniformLanes(d, bits.w1)));
+      next_log = keep_before ? target.Evaluate(next) : target.EvaluateNow(next);
     } else {
-      next_log = target.Propose(block_start + i % kProposalBlock, UniformLanes(d, random.w1), next);
+      const VF site_fraction =
+          target.ManySites() ? UniformLanes(d, random.Proposal(move, i).w0) : hn::Zero(d);
+      const std::size_t start =
+          target.BlockStart(random.BlockBits(move, static_cast<std::uint32_t>(i / kProposalBlock)));
+      next_log = target.Propose(start + i % kProposalBlock, site_fraction, next);
     }
 
     // Accept with min(1, p(next) q(current) / (p(current) q(next))); q cancels in symmetric moves.
-    VF log_ratio = hn::Sub(hn::MulAdd(rest, next_log.before, hn::Mul(beta, next_log.now)),
-                           hn::MulAdd(rest, before, hn::Mul(beta, now)));
+    VF log_next = hn::Mul(beta, next_log.now);
+    VF log_current = hn::Mul(beta, now);
+    if (keep_before) {
+      log_next = hn::MulAdd(rest, next_log.before, log_next);
+      log_current = hn::MulAdd(rest, before, log_current);
+    }
+    VF log_ratio = hn::Sub(log_next, log_current);
     if (!local) log_ratio = hn::Add(log_ratio, hn::Sub(proposal, next_log.proposal));
-    const VF u = hn::Max(UniformLanes(d, random.w2), hn::Set(d, 0x1p-25f));
-    const MF possible = hn::Gt(hn::MulAdd(rest, next_log.before, hn::Mul(beta, next_log.now)),
-                               hn::Set(d, kLogAlive));
+    const VF u = hn::Max(random.Acceptance(move, i), hn::Set(d, 0x1p-25f));
+    const MF possible = hn::Gt(log_next, hn::Set(d, kLogAlive));
     const MF inside =
         hn::Lt(hn::Iota(d, static_cast<float>(i)), hn::Set(d, static_cast<float>(count)));
     const MF accept = hn::And(hn::And(possible, inside), hn::Ge(log_ratio, LogLanes(u)));
@@ -112,9 +202,15 @@ HWY_INLINE void MoveParticles(const Target& target, const SequentialSettings& se
 
     hn::Store(hn::IfThenElse(hn::RebindMask(du, accept), next.code, code), du, p.code + i);
     hn::Store(hn::IfThenElse(hn::RebindMask(di, accept), next.site, site), di, p.site + i);
-    hn::Store(hn::IfThenElse(accept, next_log.before, before), d, p.log_before + i);
-    hn::Store(hn::IfThenElse(accept, next_log.now, now), d, p.log_now + i);
-    hn::Store(hn::IfThenElse(accept, next_log.proposal, proposal), d, p.log_proposal + i);
+    const auto move_to = [&](VF value, float* at) HWY_ATTR {
+      hn::Store(hn::IfThenElse(accept, value, hn::Load(d, at)), d, at);
+    };
+    move_to(next_log.now, p.log_now + i);
+    move_to(next_log.proposal, p.log_proposal + i);
+    move_to(next_log.reflected.x, p.r + i);
+    move_to(next_log.reflected.y, p.g + i);
+    move_to(next_log.reflected.z, p.b + i);
+    if (keep_before) move_to(next_log.before, p.log_before + i);
   }
   MoveCounts& counts = local ? outcome.local : outcome.independent;
   counts.proposed += settings.num_particles;

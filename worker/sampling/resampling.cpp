@@ -64,40 +64,6 @@ void residual(std::span<const float> weights, std::span<std::int32_t> out, const
 
 }  // namespace
 
-void systematic_choice(std::span<const float> weights, std::span<const float> running_total,
-                       float u, std::span<std::int32_t> chosen) {
-  const std::size_t blocks = (weights.size() + kChoiceBlock - 1) / kChoiceBlock;
-  BATON_CHECK(blocks > 0 && running_total.size() == blocks);
-  const float stride = running_total.back() / static_cast<float>(chosen.size());
-  std::size_t block = 0;
-  std::size_t next = 0;  // first weight that is not in `cumulative` yet
-  float cumulative = 0;
-  std::int32_t pick = -1;
-  for (std::size_t m = 0; m < chosen.size(); ++m) {
-    const float position = (static_cast<float>(m) + u) * stride;
-
-    // Skip whole blocks, then walk within one. Rounding may leave the position past its last
-    // weight, which then is it.
-    while (block + 1 < blocks && running_total[block] <= position) {
-      cumulative = running_total[block++];
-      next = block * kChoiceBlock;
-      pick = -1;
-    }
-    const std::size_t end = std::min((block + 1) * kChoiceBlock, weights.size());
-    for (; next < end && (pick < 0 || cumulative <= position); ++next) {
-      cumulative += weights[next];
-      pick = weights[next] > 0 ? static_cast<std::int32_t>(next) : pick;
-    }
-
-    // A block of zeros at the very end (rounding): the last positive weight of all.
-    for (std::size_t i = weights.size(); pick < 0 && i-- > 0;) {
-      if (weights[i] > 0) pick = static_cast<std::int32_t>(i);
-    }
-    BATON_CHECK(pick >= 0);
-    chosen[m] = pick;
-  }
-}
-
 void resample(ResamplingScheme scheme, std::span<const float> weights,
               std::span<std::int32_t> ancestors, const Rng& rng, std::uint32_t step) {
   BATON_CHECK(!weights.empty() && weights.size() <= kMaxChoices && ancestors.size() <= kMaxChoices);

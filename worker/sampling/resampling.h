@@ -8,23 +8,15 @@
 
 namespace baton {
 
-/// Chooses ancestors[m] in [0, N) for m in [0, K) such that particle j has K * weights[j] offspring in expectation
-/// [Douc & Cappe 2005]. weights: (N,) non-negative, sum 1 to float accuracy. ancestors: (K,), ascending for all schemes
-/// but `residual`. rng: addressed randomness of the pixel; `step` sets this use apart from others.
+/// Chooses ancestors[m] in [0, N) for m in [0, K) such that particle j has K * weights[j] offspring
+/// in expectation [Douc & Cappe 2005]. weights: (N,) non-negative, sum 1 to float accuracy.
+/// ancestors: (K,), ascending for all schemes but `residual`. rng: addressed randomness of the
+/// pixel; `step` sets this use apart from others.
 ///   systematic   one uniform u, positions (m + u) / K
 ///   stratified   a uniform for each stratum
 ///   multinomial  K independent uniforms, sorted
 ///   residual     floor(K w_j) copies each, the rest multinomial in what is left
-void resample(ResamplingScheme scheme, std::span<const float> weights, std::span<std::int32_t> ancestors, const Rng& rng,
-              std::uint32_t step);
-
-/// Weights to choose from are summed by blocks of so many.
-inline constexpr std::size_t kChoiceBlock = 16;
-
-/// Systematic choice of K from N unnormalised weights, u in [0, 1): the inverse distribution function at
-/// (m + u) / K of the total. running_total: (ceil(N / kChoiceBlock),) sums of the weights up to the end of each block,
-/// the last one positive. A weight of zero is never chosen.
-void systematic_choice(std::span<const float> weights, std::span<const float> running_total, float u,
-                       std::span<std::int32_t> chosen);
+void resample(ResamplingScheme scheme, std::span<const float> weights,
+              std::span<std::int32_t> ancestors, const Rng& rng, std::uint32_t step);
 
 }  // namespace baton

@@ -120,12 +120,15 @@ HWY_INLINE void ResampleIfNeeded(const SequentialSettings& settings, const Rng& 
     p.log_before[m] = old.log_before[a];
     p.log_now[m] = old.log_now[a];
     p.log_proposal[m] = old.log_proposal[a];
+    p.r[m] = old.r[a];
+    p.g[m] = old.g[a];
+    p.b[m] = old.b[a];
     weight[m] = 1.0f / static_cast<float>(count);
   }
   outcome.resampled = true;
 }
 
-/// Puts the span's particles into arrays of whole vectors and evaluates both targets there.
+/// Puts the span's particles into arrays of whole vectors with both targets there.
 template <class Target>
 HWY_INLINE void LoadParticles(const Target& target, std::size_t count,
                               const ParticleSpan& particles, ParticleArrays& p) {
@@ -135,14 +138,24 @@ HWY_INLINE void LoadParticles(const Target& target, std::size_t count,
     const std::size_t j = std::min(i, count - 1);
     p.code[i] = particles.direction[j];
     p.site[i] = particles.site[j];
+    p.log_before[i] = particles.target_before != nullptr ? particles.target_before[j] : 0;
     p.log_increment[i] = 0;
   }
   for (std::size_t i = 0; i < count; i += hn::Lanes(d)) {
-    const LogTargets log =
-        target.Evaluate({hn::Load(DU(), p.code + i), hn::Load(DI(), p.site + i)});
+    const PointLanes point{hn::Load(DU(), p.code + i), hn::Load(DI(), p.site + i)};
+    LogTargets log;
+    if (particles.target_before != nullptr) {
+      log = target.EvaluateNow(point);
+      log.before = LogOrZero(hn::Load(d, p.log_before + i));
+    } else {
+      log = target.Evaluate(point);
+    }
     hn::Store(log.before, d, p.log_before + i);
     hn::Store(log.now, d, p.log_now + i);
     hn::Store(log.proposal, d, p.log_proposal + i);
+    hn::Store(log.reflected.x, d, p.r + i);
+    hn::Store(log.reflected.y, d, p.g + i);
+    hn::Store(log.reflected.z, d, p.b + i);
   }
 }
 
@@ -174,13 +187,21 @@ HWY_INLINE SequentialOutcome SequentialStep(const Target& target,
   };
 
   // Walk through the intermediate distributions p^k = p_(n-1)^(1 - k/P) p_n^(k/P).
+  MoveRandom random(move_rng, count);
+  const auto num_moves = static_cast<std::uint32_t>(distributions * settings.num_moves);
   for (int k = 1; k <= distributions; ++k) {
     AddIncrement(1.0f / static_cast<float>(distributions), count, p);
     if (distributions == 1 && !weight_and_resample()) return outcome;
     const float tempering_beta = static_cast<float>(k) / static_cast<float>(distributions);
+    const bool keep_before = k < distributions || path.used();
     for (int m = 0; m < settings.num_moves; ++m) {
-      MoveParticles(target, settings, tempering_beta, move_rng,
-                    static_cast<std::uint32_t>((k - 1) * settings.num_moves + m + 1), p, outcome);
+      const auto move = static_cast<std::uint32_t>((k - 1) * settings.num_moves + m);
+      random.Begin(move);
+      if (move % MoveRandom::kWindow == 0) {
+        PrefetchProposals(target, settings, random, move,
+                          std::min(move + MoveRandom::kWindow, num_moves));
+      }
+      MoveParticles(target, settings, tempering_beta, keep_before, random, move, p, outcome);
     }
     if (!path.used()) continue;
     HWY_ALIGN float weight[ParticleArrays::kCapacity];
@@ -197,6 +218,9 @@ HWY_INLINE SequentialOutcome SequentialStep(const Target& target,
   for (std::size_t i = 0; i < count; ++i) {
     particles.direction[i] = p.code[i];
     particles.site[i] = static_cast<std::uint8_t>(p.site[i]);
+    particles.r[i] = p.r[i];
+    particles.g[i] = p.g[i];
+    particles.b[i] = p.b[i];
   }
   return outcome;
 }

@@ -19,11 +19,15 @@ struct SequentialSettings {
   float local_move_fraction = 0.5f;
 };
 
-/// The particles of one pixel, borrowed: (N,) each. weight: normalised, sum 1.
+/// The particles of one pixel, borrowed: (N,) each.
 struct ParticleSpan {
   OctDirection* direction = nullptr;
   std::uint8_t* site = nullptr;
-  float* weight = nullptr;
+  float* weight = nullptr;                         ///< normalised, sum 1
+  float *r = nullptr, *g = nullptr, *b = nullptr;  ///< out: (f cos L)_rgb at the particles
+  /// Target of the frame before at the particles, where it is known from then; null: evaluate it.
+  /// Only with surfaces that stay.
+  const float* target_before = nullptr;
 };
 
 /// Metropolis-Hastings moves of one kind.

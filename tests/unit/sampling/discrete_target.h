@@ -31,9 +31,14 @@ struct DiscreteTarget {
   LogTargets Evaluate(const PointLanes& point) const {
     const DF d;
     const VI index = hn::BitCast(DI(), point.code);
-    return {hn::GatherIndex(d, log_before.data(), index), hn::GatherIndex(d, log_now.data(), index),
-            hn::Zero(d)};
+    return {hn::GatherIndex(d, log_before.data(), index),
+            hn::GatherIndex(d, log_now.data(), index),
+            hn::Zero(d),
+            {hn::Zero(d), hn::Zero(d), hn::Zero(d)}};
   }
+  LogTargets EvaluateNow(const PointLanes& point) const { return Evaluate(point); }
+  static bool ManySites() { return false; }
+  void Prefetch(std::uint32_t /*bits*/) const {}
   /// Blocks of neighbours from a random start on the ring of points.
   static std::size_t BlockStart(std::uint32_t bits) { return bits % kPoints; }
   LogTargets Propose(std::size_t entry, VF /*site_fraction*/, PointLanes& point) const {
@@ -52,9 +57,13 @@ struct Particles {
   std::vector<OctDirection> code;
   std::vector<std::uint8_t> site;
   std::vector<float> weight;
+  std::vector<float> unused;  ///< colours, which this space does not have
 
   Particles(const PointValues& before, std::size_t count, std::uint64_t seed)
-      : code(count), site(count, 0), weight(count, 1.0f / static_cast<float>(count)) {
+      : code(count),
+        site(count, 0),
+        weight(count, 1.0f / static_cast<float>(count)),
+        unused(count) {
     const Rng rng({.job_seed = seed}, PassId::choose);
     for (std::size_t i = 0; i < count; ++i) {
       float left = rng.uniforms(0, static_cast<std::uint32_t>(i))[0] * sum_of(before);
@@ -63,7 +72,9 @@ struct Particles {
       code[i] = point;
     }
   }
-  ParticleSpan span() { return {code.data(), site.data(), weight.data()}; }
+  ParticleSpan span() {
+    return {code.data(), site.data(), weight.data(), unused.data(), unused.data(), unused.data()};
+  }
 };
 
 inline SequentialOutcome step(const DiscreteTarget& target, const SequentialSettings& settings,

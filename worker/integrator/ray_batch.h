@@ -1,0 +1,68 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "common/math/octahedral.h"
+#include "worker/accel/accel.h"
+#include "worker/scene/site_block.h"
+
+namespace baton {
+
+/// The shadow rays of many pixels and, beside each, what it brings if it is free; ascending by
+/// sample.
+struct RayBatch {
+  ShadowRays rays;
+  /// (capacity) of which the first rays.size() count.
+  std::vector<std::uint32_t> sample;  ///< the caller's number of the sample
+  std::vector<float> r, g, b;         ///< u_j (f cos L)_rgb / p~
+  std::vector<float> visibility;      ///< share of the pixel's Lns
+
+  void clear() { rays.clear(); }
+  std::size_t size() const { return rays.size(); }
+  /// Adds one ray; number: of its sample.
+  void push(const Vec3& from, const Vec3& w, const Rgb& color, float share, std::uint32_t number) {
+    reserve(1);
+    const std::size_t i = size();
+    rays.push(from, w);
+    sample[i] = number;
+    r[i] = color.x;
+    g[i] = color.y;
+    b[i] = color.z;
+    visibility[i] = share;
+  }
+  /// Makes room for `more` rays and what a vector may write past them.
+  void reserve(std::size_t more);
+};
+
+/// A properly weighted set of one pixel, (N) each, and what its reflected light counts for.
+struct CastSamples {
+  std::span<const OctDirection> direction;
+  std::span<const std::uint8_t> site;
+  std::span<const float> weight;  ///< sum 1, or all 0
+  const float *r, *g, *b;         ///< (f cos L)_rgb
+  float unit_contribution;        ///< u_j is this times weight_j
+  float picture_scale;            ///< factor of the set's light in the picture
+  float visibility_scale;         ///< factor of its weights in the pixel's visibility
+  std::uint32_t first_sample;     ///< number of sample 0
+};
+
+/// Where the shadow rays of a pixel's sites start.
+struct SiteOrigins {
+  alignas(64) SiteBlock::Array x{}, y{}, z{};
+  std::int32_t num_sites = 1;
+
+  void set(std::size_t site, const Vec3& origin) {
+    x[site] = origin.x;
+    y[site] = origin.y;
+    z[site] = origin.z;
+  }
+};
+
+/// Adds a ray for every sample that brings light. target: (N) out, p~ of each sample's own site,
+/// the mean of its (f cos L)_rgb.
+void cast_samples(const CastSamples& samples, const SiteOrigins& origins, RayBatch& batch,
+                  std::span<float> target);
+
+}  // namespace baton
