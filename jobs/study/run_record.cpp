@@ -27,6 +27,7 @@ void visit_counts(Counts& c, F visit) {
   visit("secondsSample", c.seconds_sample);
   visit("secondsVisibility", c.seconds_visibility);
   visit("secondsShade", c.seconds_shade);
+  visit("secondsSecondPass", c.seconds_second_pass);
 }
 
 template <class Frame, class F>
@@ -76,7 +77,7 @@ RunRecord record_of(const json& root) {
 RunCounts counts_of(const RenderStats& stats) {
   return {.pixels = stats.pixels,
           .pixels_background = stats.pixels_background,
-          .rays_shadow = stats.rays_shadow,
+          .rays_shadow = stats.rays_shadow + stats.rays_second_pass,
           .target_evaluations = stats.target_evaluations,
           .moves_proposed = stats.sampling.local_proposed + stats.sampling.independent_proposed,
           .pixels_resampled = stats.sampling.pixels_resampled,
@@ -86,7 +87,8 @@ RunCounts counts_of(const RenderStats& stats) {
           .seconds_primary = stats.seconds_primary,
           .seconds_sample = stats.seconds_sample,
           .seconds_visibility = stats.seconds_visibility,
-          .seconds_shade = stats.seconds_shade};
+          .seconds_shade = stats.seconds_shade,
+          .seconds_second_pass = stats.seconds_second_pass};
 }
 
 Status write_record(const std::filesystem::path& path, const RunRecord& record) {

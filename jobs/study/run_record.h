@@ -14,11 +14,12 @@ namespace baton {
 /// Counted work and CPU seconds of a run, over all its frames.
 struct RunCounts {
   std::uint64_t pixels = 0, pixels_background = 0;
-  std::uint64_t rays_shadow = 0, target_evaluations = 0, moves_proposed = 0;
+  std::uint64_t rays_shadow = 0;  ///< of both passes
+  std::uint64_t target_evaluations = 0, moves_proposed = 0;
   std::uint64_t pixels_resampled = 0, pixels_restarted = 0;
   double cpu_seconds = 0;
   double seconds_light = 0, seconds_primary = 0, seconds_sample = 0, seconds_visibility = 0,
-         seconds_shade = 0;
+         seconds_shade = 0, seconds_second_pass = 0;
 
   bool operator==(const RunCounts&) const = default;
   std::uint64_t lit_pixels() const { return pixels - pixels_background; }

@@ -138,7 +138,8 @@ CellCost cell_cost(const std::vector<RunRecord>& runs) {
     const auto lit = static_cast<double>(s.lit_pixels());
     if (!(lit > 0)) continue;
     cpu.push_back(1e6 / lit *
-                  (s.seconds_primary + s.seconds_sample + s.seconds_visibility + s.seconds_shade));
+                  (s.seconds_primary + s.seconds_sample + s.seconds_visibility + s.seconds_shade +
+                   s.seconds_second_pass));
     rays.push_back(static_cast<double>(s.rays_shadow) / lit);
     evaluations.push_back(static_cast<double>(s.target_evaluations) / lit);
     light.push_back(1e3 * s.seconds_light / static_cast<double>(run.frames_rendered));

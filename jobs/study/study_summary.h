@@ -17,8 +17,8 @@ const char* name_of(ErrorKindOfImage kind);
 
 /// What a run of a cell costs: middle of its runs, per pixel with a surface and frame.
 struct CellCost {
-  double cpu_us = 0;       ///< primary rays, sampling, visibility, shading
-  double rays = 0;         ///< shadow rays
+  double cpu_us = 0;       ///< primary rays, sampling, visibility, shading, second pass
+  double rays = 0;         ///< shadow rays of both passes
   double evaluations = 0;  ///< of the target
   double light_ms = 0;     ///< preparing the light, per frame, whatever the number of pixels
   double state_bytes = 0;

@@ -147,6 +147,13 @@ void write_pixels(const Work& work, std::span<const Rgb> radiance, FilmTile& fil
   }
 }
 
+/// The light of the frame; preparing it, where the first pass left none, counts as in that pass.
+Result<std::shared_ptr<const FrameLight>> light_of(const RenderContext& context,
+                                                   std::int32_t frame_index, RenderStats& stats) {
+  const StageTimer timer(stats.seconds_light);
+  return context.lights->at(frame_index);
+}
+
 }  // namespace
 
 Result<SecondPassOutput> run_second_pass(const RenderContext& context, std::int32_t frame_index,
@@ -168,7 +175,7 @@ Result<SecondPassOutput> run_second_pass(const RenderContext& context, std::int3
   BATON_ASSIGN(const auto geometry, context.geometry->at(frame_index));
   const MaskedSurfaces surfaces(context, *geometry, masks.any);
   output.stats.rays_primary = surfaces.num_rays();
-  BATON_ASSIGN(const auto light, context.lights->at(frame_index));
+  BATON_ASSIGN(const auto light, light_of(context, frame_index, output.stats));
   const Work work{context,  *geometry, context.frames[static_cast<std::size_t>(frame_index)],
                   *light,   samples,   masks,
                   surfaces, rect};
@@ -179,8 +186,8 @@ Result<SecondPassOutput> run_second_pass(const RenderContext& context, std::int3
     exchange(work, radiance, output.stats);
   }
   write_pixels(work, radiance, output.film, output.stats);
-  output.stats.seconds_second_pass = thread_cpu_seconds() - start;
-  output.stats.cpu_seconds = output.stats.seconds_second_pass;
+  output.stats.cpu_seconds = thread_cpu_seconds() - start;
+  output.stats.seconds_second_pass = output.stats.cpu_seconds - output.stats.seconds_light;
   return output;
 }
 

@@ -100,6 +100,22 @@ TEST(Summary, CostsAreForAPixelWithASurface) {
   EXPECT_NEAR(cost.light_ms, 2, 1e-9);
 }
 
+TEST(Summary, TheSecondPassCountsInTimeAndRays) {
+  RenderStats stats;
+  stats.pixels = 10;
+  stats.rays_shadow = 160;
+  stats.rays_second_pass = 1000;
+  stats.seconds_sample = 30e-6;
+  stats.seconds_second_pass = 70e-6;
+  stats.seconds_second_rays = 50e-6;  // a part of it
+  RunRecord run;
+  run.counts = counts_of(stats);
+  run.frames_rendered = 1;
+  const CellCost cost = cell_cost({run});
+  EXPECT_NEAR(cost.cpu_us, 10, 1e-9);
+  EXPECT_EQ(cost.rays, 116);
+}
+
 TEST(Summary, EfficiencyIsTheRatioOfErrorTimesTime) {
   const auto rows = summarize_study(two_methods(), two_results(0.1));
   ASSERT_EQ(rows.size(), 2u);
