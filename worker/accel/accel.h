@@ -44,7 +44,12 @@ struct ShadowRays {
   }
   void push(const Vec3& origin, const Vec3& direction) {
     if (count_ == t_far.size()) reserve(std::max<std::size_t>(1024, 2 * count_));
-    const std::size_t i = count_++;
+    push_if(true, origin, direction);
+  }
+  /// The same for a ray that may not be wanted, without a branch; there must be room (reserve).
+  void push_if(bool wanted, const Vec3& origin, const Vec3& direction) {
+    const std::size_t i = count_;
+    count_ += wanted ? 1 : 0;
     origin_x[i] = origin.x;
     origin_y[i] = origin.y;
     origin_z[i] = origin.z;

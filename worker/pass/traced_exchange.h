@@ -1,7 +1,6 @@
 #pragma once
 
-#include <array>
-
+#include "worker/integrator/exchange_kernels.h"
 #include "worker/pass/masked_surfaces.h"
 #include "worker/pass/sample_region.h"
 #include "worker/sampling/energy_exchange.h"
@@ -19,14 +18,14 @@ class TracedExchange final : public ExchangeScene {
   /// Gives the samples of this fold's population from here on.
   void use(const Fold& fold) { fold_ = fold; }
   void append_samples(std::int32_t x, std::int32_t y, std::vector<GiverSample>& batch) override;
-  void receive(std::span<const GiverSample> batch, std::span<const Offer> offers,
-               std::span<Reception> receptions) override;
+  void receive(std::span<const Offer> offers, std::span<Reflected> receptions) override;
+  float lns(std::uint32_t receiver) const override;
 
   std::uint64_t rays_traced() const { return rays_traced_; }
   double seconds_rays() const { return seconds_rays_; }
 
  private:
-  float lns(std::int32_t x, std::int32_t y) const;
+  float lns(const SampleRegion::Place& place) const;
 
   const Accel& accel_;
   const EnvironmentView& environment_;
@@ -35,10 +34,9 @@ class TracedExchange final : public ExchangeScene {
   const PixelRect rect_;
   const std::int32_t num_sites_;
   Fold fold_;
-  LightSamples light_;  ///< (batch)
-  LightSamples pixel_light_;
-  ReflectedSamples reflected_;
-  std::vector<std::int32_t> surface_, light_index_;
+  std::vector<LightRecord> light_;  ///< (batch)
+  std::vector<Reflected> own_;      ///< what a giver's own surfaces make of its samples
+  std::vector<LitSurface> pairs_;
   ShadowRays rays_;
   std::vector<std::uint32_t> offer_of_ray_;
   std::uint64_t rays_traced_ = 0;

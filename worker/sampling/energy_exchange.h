@@ -8,6 +8,7 @@
 #include "common/job/job_spec.h"
 #include "common/math/philox.h"
 #include "worker/sampling/pixel_mask.h"
+#include "worker/sampling/reflected.h"
 
 namespace baton {
 
@@ -24,13 +25,12 @@ namespace baton {
 /// `published-kept`: it is kept. Both are biased where the products of a square differ: by sum_x' t
 /// min(Lns, Lns') int V V' (p' - p) for the kept form.
 
-/// A free sample of the first pass. Its colour per energy is reflected / target.
+/// A free sample of the first pass. Its colour per energy is radiance / target of `reflected`.
 struct GiverSample {
   std::uint32_t slot = 0;  ///< its position among the samples of the pixel, [0, num_slots)
-  float energy = 0;        ///< u_j, mean over RGB
-  float target = 0;        ///< p~_s(w) of its site, mean over RGB
+  float energy = 0;        ///< u_j, mean over RGB; positive
   float lns = 0;           ///< of its pixel; read by the published forms only
-  Rgb reflected;           ///< (f cos L)_rgb
+  Reflected reflected;     ///< at its own site; target above kSmallestTarget
 };
 
 /// "May this sample be seen from there?"
@@ -40,23 +40,22 @@ struct Offer {
   std::uint32_t site = 0;      ///< site of the receiver, [0, num_sites)
 };
 
-/// The answer.
-struct Reception {
-  float target = 0;  ///< p~'_s(w), mean over RGB; 0 without a surface or below a horizon
-  float lns = 0;     ///< of the pixel; read by the published forms only
-  Rgb reflected;     ///< (f cos L)_rgb at the receiver
-  bool visible =
-      false;  ///< the way is free; need not be known where the offer would be refused anyway
-};
+/// The answer is what the receiver reflects of the sample's light; nothing without a surface, below
+/// a horizon, or when the way is blocked. Kernels write past the end of their output by this many.
+inline constexpr std::size_t kReceptionPadding = 16;
+/// Smaller targets count as none: their reciprocal may not be finite.
+inline constexpr float kSmallestTarget = 1e-37f;
 
 class ExchangeScene {
  public:
   virtual ~ExchangeScene() = default;
-  /// Appends the free samples of a pixel to the batch; energy and target positive.
+  /// Appends the free samples of a pixel to the batch.
   virtual void append_samples(std::int32_t x, std::int32_t y, std::vector<GiverSample>& batch) = 0;
-  /// Answers offers of samples of the batch.
-  virtual void receive(std::span<const GiverSample> batch, std::span<const Offer> offers,
-                       std::span<Reception> receptions) = 0;
+  /// Answers offers of samples of the batch. receptions: kReceptionPadding longer than the offers.
+  virtual void receive(std::span<const Offer> offers, std::span<Reflected> receptions) = 0;
+  /// Lns of a pixel (position in the rectangle of the exchange mask) as its givers have it; asked
+  /// for by the published forms only.
+  virtual float lns(std::uint32_t receiver) const = 0;
 };
 
 struct ExchangeSettings {
@@ -79,9 +78,6 @@ struct Fold {
 /// The folds of a policy; the picture is their sum when energies are those of all populations
 /// together.
 std::span<const Fold> folds_of(MaskPolicy policy);
-
-/// The share of an offer that is accepted, [0, 1].
-float acceptance(SecondPassForm form, const GiverSample& giver, const Reception& reception);
 
 /// Adds the second-pass radiance of the `recompute` pixels of `inner` to `radiance` (inner pixels,
 /// row by row). Pixels of `exchange` (a part of `recompute`, the same rectangle) give and receive;

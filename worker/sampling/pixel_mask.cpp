@@ -54,9 +54,8 @@ PixelRect SquarePartitions::square(std::int32_t partition, std::int32_t x, std::
           std::min(y0 + side_, image_.y1)};
 }
 
-void SquareMembers::move_to(const PixelMask& mask, const SquarePartitions& partitions,
-                            std::int32_t partition, std::int32_t y) {
-  if (y >= y0_ && y < y1_) return;
+void SquareMembers::list(const PixelMask& mask, const SquarePartitions& partitions,
+                         std::int32_t partition, std::int32_t y) {
   const PixelRect& rect = mask.rect();
   const PixelRect first_square = partitions.square(partition, rect.x0, y);
   x0_ = rect.x0;
@@ -85,13 +84,6 @@ void SquareMembers::move_to(const PixelMask& mask, const SquarePartitions& parti
       end_[static_cast<std::size_t>(x - x0_)] = static_cast<std::uint32_t>(members_.size());
     }
   }
-}
-
-SquareMembers::Others SquareMembers::others(std::int32_t x, std::int32_t y) const {
-  const auto column = static_cast<std::size_t>(x - x0_);
-  return {members_.data() + first_[column],
-          rank_[static_cast<std::size_t>(y - y0_) * width_ + column],
-          end_[column] - first_[column] - 1};
 }
 
 }  // namespace baton

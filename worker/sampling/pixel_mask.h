@@ -85,7 +85,9 @@ class SquareMembers {
   /// and partitions must outlive the object. A square that reaches past the mask has fewer members
   /// here.
   void move_to(const PixelMask& mask, const SquarePartitions& partitions, std::int32_t partition,
-               std::int32_t y);
+               std::int32_t y) {
+    if (y < y0_ || y >= y1_) list(mask, partitions, partition, y);
+  }
 
   /// The others in the square of a masked pixel (x, y) of this row of squares.
   struct Others {
@@ -96,9 +98,17 @@ class SquareMembers {
     /// The k-th other, k < count.
     std::uint32_t pick(std::uint32_t k) const { return members[k + (k >= rank ? 1 : 0)]; }
   };
-  Others others(std::int32_t x, std::int32_t y) const;
+  Others others(std::int32_t x, std::int32_t y) const {
+    const auto column = static_cast<std::size_t>(x - x0_);
+    return {members_.data() + first_[column],
+            rank_[static_cast<std::size_t>(y - y0_) * width_ + column],
+            end_[column] - first_[column] - 1};
+  }
 
  private:
+  void list(const PixelMask& mask, const SquarePartitions& partitions, std::int32_t partition,
+            std::int32_t y);
+
   std::int32_t x0_ = 0, y0_ = 0, y1_ = 0;  ///< of the rows in the lists; none at first
   std::size_t width_ = 0;
   std::vector<std::uint32_t> members_;  ///< square after square

@@ -91,23 +91,23 @@ class Source final : public ExchangeScene {
       if (!given || scene_.visible[s.point] == 0) continue;
       batch.push_back({.slot = s.slot,
                        .energy = s.energy * fold_.energy_scale,
-                       .target = scene_.target(s.point),
                        .lns = static_cast<float>(scene_.lns(pixel)),
-                       .reflected = scene_.reflected[s.point]});
+                       .reflected = {scene_.reflected[s.point], scene_.target(s.point)}});
       points_.push_back(s.point);
     }
   }
 
-  void receive(std::span<const GiverSample>, std::span<const Offer> offers,
-               std::span<Reception> receptions) override {
+  void receive(std::span<const Offer> offers, std::span<Reflected> receptions) override {
     for (std::size_t i = 0; i < offers.size(); ++i) {
       const std::size_t direction = points_[offers[i].sample] % scene_.num_directions;
       const std::size_t point = scene_.at(offers[i].receiver, direction, offers[i].site);
-      receptions[i] = {.target = scene_.target(point),
-                       .lns = static_cast<float>(scene_.lns(offers[i].receiver)),
-                       .reflected = scene_.reflected[point],
-                       .visible = scene_.visible[point] != 0};
+      receptions[i] = {};
+      if (scene_.visible[point] != 0)
+        receptions[i] = {scene_.reflected[point], scene_.target(point)};
     }
+  }
+  float lns(std::uint32_t receiver) const override {
+    return static_cast<float>(scene_.lns(receiver));
   }
 
  private:

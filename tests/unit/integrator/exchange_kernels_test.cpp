@@ -1,0 +1,91 @@
+// The second pass's inner loops against the scalar code.
+#include "worker/integrator/exchange_kernels.h"
+
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "tests/support/merl_file.h"
+#include "worker/integrator/kernels.h"
+
+namespace baton {
+namespace {
+
+/// Directions over the sphere.
+std::vector<OctDirection> random_codes(std::size_t count) {
+  std::vector<OctDirection> codes;
+  const Rng rng({.job_seed = 11}, PassId::reference);
+  for (std::uint32_t i = 0; i < count; ++i) codes.push_back(rng.bits(0, i)[0]);
+  return codes;
+}
+
+Environment checkered_environment() {
+  RgbImage image{16, 8, {}};
+  for (int i = 0; i < 16 * 8 * 3; ++i) image.rgb.push_back(static_cast<float>((i * 37) % 23));
+  return {std::make_shared<EnvironmentMap>(image, MapFilter::bilinear, 1.0f, false),
+          rotation_about({0.2f, 1, 0.1f}, 33)};
+}
+
+TEST(ExchangeKernels, LightsAsTheScalarCode) {
+  const std::vector<OctDirection> codes = random_codes(1003);
+  const Environment environment = checkered_environment();
+  std::vector<LightRecord> lights(codes.size());
+  kernels::look_up_lights(view_of(environment), codes, lights);
+  for (std::size_t i = 0; i < codes.size(); ++i) {
+    const Vec3 w = decode_octahedral(codes[i]);
+    const EnvironmentMap::Texel t = environment.evaluate(w);
+    ASSERT_LT(length(lights[i].direction - w), 4e-7f);
+    ASSERT_NEAR(lights[i].radiance.x, t.r, 2e-3f) << i;
+    ASSERT_NEAR(lights[i].radiance.y, t.g, 2e-3f) << i;
+    ASSERT_NEAR(lights[i].radiance.z, t.b, 2e-3f) << i;
+  }
+}
+
+// Runs of one material and mixtures: whole vectors without a lobe, with one kind, with all kinds.
+TEST(ExchangeKernels, ReflectionsAsTheScalarCode) {
+  const std::vector<Material> materials{
+      make_material({}),
+      make_material({.kind = MaterialKind::phong, .kd = 0.5f, .ks = 0.4f, .exponent = 50}),
+      make_material(
+          {.kind = MaterialKind::metallic_roughness, .metallic = 0.3f, .roughness = 0.4f}),
+      make_measured_material(MeasuredBrdf::tabulate(
+          test::phong_by_angles({0.3f, 0.2f, 0.1f}, {0.5f, 0.4f, 0.3f}, 20)))};
+  const ShadingPoint point{.position = {},
+                           .ng = {0, 1, 0},
+                           .ns = normalize(Vec3{0.1f, 1, 0.2f}),
+                           .wo = normalize(Vec3{0.3f, 0.9f, 0.2f})};
+  SurfaceTable surfaces;
+  for (const Material& material : materials) surfaces.add(point, material, {1, 2, 3});
+  surfaces.add_nothing();
+  EXPECT_EQ(surfaces.ray_origin(2), (Vec3{1, 2, 3}));
+
+  const std::vector<OctDirection> codes = random_codes(4003);
+  std::vector<LightRecord> lights(codes.size());
+  kernels::look_up_lights(view_of(checkered_environment()), codes, lights);
+  std::vector<LitSurface> pairs;
+  for (std::size_t i = 0; i < codes.size(); ++i) {
+    const std::size_t surface = i < 1000 ? i / 200 : i % 5;
+    pairs.push_back({static_cast<std::int32_t>(surface), static_cast<std::int32_t>(i)});
+  }
+  std::vector<Reflected> reflected(pairs.size() + kernels::kPadding);
+  kernels::reflect_lights(surfaces, lights, pairs, reflected);
+  int shining = 0;
+  for (std::size_t i = 0; i < pairs.size(); ++i) {
+    const auto surface = static_cast<std::size_t>(pairs[i].surface);
+    const Vec3& wi = lights[i].direction;
+    Rgb expected;
+    if (surface < materials.size() && dot(point.ng, wi) > 0)
+      expected = evaluate_bsdf(materials[surface], point, wi) * std::max(dot(point.ns, wi), 0.0f) *
+                 lights[i].radiance;
+    const Rgb got = reflected[i].radiance;
+    ASSERT_NEAR(got.x, expected.x, 2e-3f * expected.x + 1e-3f) << surface << " direction " << i;
+    ASSERT_NEAR(got.y, expected.y, 2e-3f * expected.y + 1e-3f) << surface << " direction " << i;
+    ASSERT_NEAR(got.z, expected.z, 2e-3f * expected.z + 1e-3f) << surface << " direction " << i;
+    ASSERT_NEAR(reflected[i].target, mean(got), 1e-6f * mean(got));
+    shining += reflected[i].target > 0 ? 1 : 0;
+  }
+  EXPECT_GT(shining, 1000);
+}
+
+}  // namespace
+}  // namespace baton
