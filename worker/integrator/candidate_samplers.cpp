@@ -54,7 +54,8 @@ CandidateCounts split_candidates(std::int32_t total, float brdf_fraction) {
 CandidateCounts candidate_counts(const SiteBlock& sites, std::int32_t total, float lobe_fraction) {
   if (lobe_fraction >= 1) return {.from_bsdf = total};
   constexpr std::int32_t kVector = 8;  // candidates that cost as much as one
-  const float wanted = lobe_fraction * sites.specular_share * static_cast<float>(total);
+  const float specular = sites.specular_sum / static_cast<float>(std::max(sites.num_hits, 1));
+  const float wanted = lobe_fraction * specular * static_cast<float>(total);
   const std::int32_t rounded = static_cast<std::int32_t>(std::ceil(wanted / kVector)) * kVector;
   const std::int32_t from_bsdf = sites.num_lobes > 0 ? std::min(rounded, total / 2) : 0;
   return {.from_light = total - from_bsdf, .from_bsdf = from_bsdf, .lobe_only = true};

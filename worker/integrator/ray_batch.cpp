@@ -48,6 +48,22 @@ HWY_INLINE SampleLanes LoadSamples(const CastSamples& in, std::size_t i) {
           {hn::Load(d, part[1]), hn::Load(d, part[2]), hn::Load(d, part[3])}};
 }
 
+/// Where each lane comes from when those of `mask` move to the front; kept: how many they are.
+/// (Highway 1.0's Compress copies its table of permutations at every call.)
+HWY_INLINE auto FrontLanes(MF mask, std::size_t& kept) {
+  const DF d;
+  const DI di;
+  HWY_ALIGN std::int32_t is_kept[hn::MaxLanes(DI())];
+  HWY_ALIGN std::int32_t from[hn::MaxLanes(DI()) + 1] = {};
+  hn::Store(hn::VecFromMask(di, hn::RebindMask(di, mask)), di, is_kept);
+  kept = 0;
+  for (std::size_t lane = 0; lane < hn::Lanes(di); ++lane) {
+    from[kept] = static_cast<std::int32_t>(lane);
+    kept -= static_cast<std::size_t>(std::int64_t{is_kept[lane]});
+  }
+  return hn::IndicesFromVec(d, hn::Load(di, from));
+}
+
 void CastRays(const CastSamples& in, const SiteOrigins& origins, RayBatch& batch,
               std::span<float> target) {
   const DF d;
@@ -69,15 +85,16 @@ void CastRays(const CastSamples& in, const SiteOrigins& origins, RayBatch& batch
     hn::Store(p, d, targets);
     std::copy_n(targets, left, target.data() + i);
 
-    // Keep those that bring something. Whole vectors are stored and the next one covers the rest:
-    // stores of a part are slow.
-    const bool all = hn::AllTrue(d, cast);
+    // Keep those that bring something: they move to the front, whole vectors are stored, and the
+    // next one covers the rest.
+    std::size_t kept = 0;
+    const auto front = FrontLanes(cast, kept);
     const auto put = [&](VF value, std::vector<float>& column) HWY_ATTR {
-      hn::StoreU(all ? value : hn::Compress(value, cast), d, column.data() + at);
+      hn::StoreU(hn::TableLookupLanes(value, front), d, column.data() + at);
     };
     const auto origin_of = [&](const SiteBlock::Array& table) HWY_ATTR {
-      return origins.num_sites == 1 ? hn::Set(d, table[0])
-                                    : LookUp(table, s.site, origins.num_sites);
+      if (origins.num_sites == 1) return hn::Set(d, table[0]);
+      return LookUp(table, s.site, origins.num_sites);
     };
     const Vec3Lanes w = DecodeOctahedral(s.code);
     put(origin_of(origins.x), rays.origin_x);
@@ -91,10 +108,9 @@ void CastRays(const CastSamples& in, const SiteOrigins& origins, RayBatch& batch
     put(hn::Mul(color.y, scale), batch.g);
     put(hn::Mul(color.z, scale), batch.b);
     put(hn::Mul(s.weight, hn::Set(d, in.visibility_scale)), batch.visibility);
-    const VU number = hn::Iota(du, in.first_sample + static_cast<std::uint32_t>(i));
-    hn::StoreU(all ? number : hn::Compress(number, hn::RebindMask(du, cast)), du,
-               batch.sample.data() + at);
-    at += hn::CountTrue(d, cast);
+    const VF number = hn::BitCast(d, hn::Iota(du, in.first_sample + static_cast<std::uint32_t>(i)));
+    hn::StoreU(hn::BitCast(du, hn::TableLookupLanes(number, front)), du, batch.sample.data() + at);
+    at += kept;
   }
   rays.extend(at);
 }

@@ -36,8 +36,11 @@ std::span<const SurfaceHit> MaskedSurfaces::hits(std::int32_t position) const {
 
 Rgb MaskedSurfaces::background(std::int32_t position, const Environment& environment) const {
   const std::size_t first = static_cast<std::size_t>(position) * num_sites_;
-  return environment_behind(std::span(hits_).subspan(first, num_sites_),
-                            std::span(rays_).subspan(first, num_sites_), environment);
+  Rgb radiance;
+  add_environment_behind(
+      std::span(hits_).subspan(first, num_sites_), std::span(rays_).subspan(first, num_sites_),
+      static_cast<std::int32_t>(num_sites_), view_of(environment), {&radiance, 1});
+  return radiance;
 }
 
 }  // namespace baton

@@ -1,6 +1,9 @@
 #include "worker/pass/primary.h"
 
+#include <array>
 #include <cmath>
+
+#include "worker/integrator/kernels.h"
 
 namespace baton {
 namespace {
@@ -8,11 +11,13 @@ namespace {
 /// Position of a site inside its pixel, [0, 1)^2.
 std::array<float, 2> site_position(const JobSpec& job, std::uint32_t pixel, std::int32_t site) {
   if (job.image.sites == 1) return {0.5f, 0.5f};
-  const auto side = static_cast<std::int32_t>(std::lround(std::sqrt(static_cast<double>(job.image.sites))));
+  const auto side =
+      static_cast<std::int32_t>(std::lround(std::sqrt(static_cast<double>(job.image.sites))));
   const Rng rng({.job_seed = job.seed, .frame = 0, .pixel = pixel}, PassId::site_position);
   const auto u = rng.uniforms(0, static_cast<std::uint32_t>(site));
   const auto cell = 1.0f / static_cast<float>(side);
-  return {(static_cast<float>(site % side) + u[0]) * cell, (static_cast<float>(site / side) + u[1]) * cell};
+  return {(static_cast<float>(site % side) + u[0]) * cell,
+          (static_cast<float>(site / side) + u[1]) * cell};
 }
 
 }  // namespace
@@ -46,14 +51,32 @@ void trace_primary_rays(const JobSpec& job, const FrameGeometry& geometry,
   geometry.accel->intersect(rays, hits, static_cast<std::size_t>(job.image.sites));
 }
 
-Rgb environment_behind(std::span<const SurfaceHit> hits, std::span<const Ray> rays, const Environment& environment) {
-  Rgb sum;
+void add_environment_behind(std::span<const SurfaceHit> hits, std::span<const Ray> rays,
+                            std::int32_t num_sites, const EnvironmentView& environment,
+                            std::span<Rgb> radiance) {
+  constexpr std::size_t kBatch = 64;
+  std::array<float, kBatch> x, y, z, r, g, b, density;
+  std::array<std::size_t, kBatch> pixel;
+  const float share = 1.0f / static_cast<float>(num_sites);
+  std::size_t count = 0;
+  const auto flush = [&] {
+    const auto used = [count](std::array<float, kBatch>& array) {
+      return std::span(array).first(count);
+    };
+    kernels::evaluate_environment(environment, used(x), used(y), used(z), used(r), used(g), used(b),
+                                  used(density));
+    for (std::size_t i = 0; i < count; ++i) radiance[pixel[i]] += Rgb{r[i], g[i], b[i]} * share;
+    count = 0;
+  };
   for (std::size_t s = 0; s < hits.size(); ++s) {
     if (hits[s].hit) continue;
-    const EnvironmentMap::Texel seen = environment.evaluate(rays[s].direction);
-    sum += Rgb{seen.r, seen.g, seen.b} / static_cast<float>(hits.size());
+    pixel[count] = s / static_cast<std::size_t>(num_sites);
+    x[count] = rays[s].direction.x;
+    y[count] = rays[s].direction.y;
+    z[count] = rays[s].direction.z;
+    if (++count == kBatch) flush();
   }
-  return sum;
+  flush();
 }
 
 }  // namespace baton

@@ -15,15 +15,13 @@ struct TileSurfaces {
   std::vector<Ray> rays;         ///< (pixels, S) primary rays
 
   std::span<const SurfaceHit> pixel(std::size_t index) const {
-    return std::span(hits).subspan(index * static_cast<std::size_t>(num_sites), static_cast<std::size_t>(num_sites));
-  }
-  std::span<const Ray> pixel_rays(std::size_t index) const {
-    return std::span(rays).subspan(index * static_cast<std::size_t>(num_sites), static_cast<std::size_t>(num_sites));
+    return std::span(hits).subspan(index * static_cast<std::size_t>(num_sites),
+                                   static_cast<std::size_t>(num_sites));
   }
 };
 
-/// Pass 1: one primary ray for each site of each pixel. S = 1 shoots through the pixel's centre, else the sites are
-/// jittered on a sqrt(S) x sqrt(S) grid; the same for all frames.
+/// Pass 1: one primary ray for each site of each pixel. S = 1 shoots through the pixel's centre,
+/// else the sites are jittered on a sqrt(S) x sqrt(S) grid; the same for all frames.
 TileSurfaces trace_primary(const JobSpec& job, const FrameGeometry& geometry,
                            const PixelRect& rect);
 
@@ -34,7 +32,10 @@ void append_primary_rays(const JobSpec& job, const FrameGeometry& geometry, std:
 void trace_primary_rays(const JobSpec& job, const FrameGeometry& geometry,
                         std::span<const Ray> rays, std::span<SurfaceHit> hits);
 
-/// Radiance that the sites of a pixel which see no surface show of the environment, as a share of all its sites.
-Rgb environment_behind(std::span<const SurfaceHit> hits, std::span<const Ray> rays, const Environment& environment);
+/// Adds to each pixel what its sites that see no surface show of the environment, as a share of all
+/// its sites. hits, rays: (pixels, num_sites); radiance: (pixels).
+void add_environment_behind(std::span<const SurfaceHit> hits, std::span<const Ray> rays,
+                            std::int32_t num_sites, const EnvironmentView& environment,
+                            std::span<Rgb> radiance);
 
 }  // namespace baton

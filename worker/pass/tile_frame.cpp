@@ -278,34 +278,40 @@ void TileFrameRenderer::trace(Batch& batch) {
 void TileFrameRenderer::shade(Batch& batch, SampleState& state) {
   const StageTimer timer(stats_.seconds_shade);
   const RayBatch& rays = batch.rays;
-  std::size_t i = 0;
-  for (std::size_t r = 0; r < rays.size(); ++r) {
-    const std::size_t sample = rays.sample[r];
-    while (sample >= (i + 1) * batch.stride) ++i;
-    const bool occluded = rays.rays.t_far[r] < 0;
-    if (context_.job.visibility.correlated)
-      collector_.add_ray(state, batch.first * batch.stride + sample, occluded);
-    if (const std::span<MemoryCell> memory = state.memory_of(batch.first + i); !memory.empty()) {
-      remember_ray(memory,
-                   {rays.rays.direction_x[r], rays.rays.direction_y[r], rays.rays.direction_z[r]},
-                   !occluded);
+  for (std::size_t r = 0; r < rays.size();) {
+    const std::size_t i = rays.sample[r] / batch.stride;
+    PixelResult& pixel = batch.pixels[i];
+    const std::span<MemoryCell> memory = state.memory_of(batch.first + i);
+    const std::size_t second_half = i * batch.stride + batch.second_half[i];
+    Rgb radiance = pixel.radiance;
+    Rgb difference = batch.difference[i];
+    float visibility = pixel.visibility;
+    for (; r < rays.size() && rays.sample[r] < (i + 1) * batch.stride; ++r) {
+      const bool occluded = rays.rays.t_far[r] < 0;
+      if (context_.job.visibility.correlated)
+        collector_.add_ray(state, batch.first * batch.stride + rays.sample[r], occluded);
+      if (!memory.empty()) {
+        remember_ray(memory,
+                     {rays.rays.direction_x[r], rays.rays.direction_y[r], rays.rays.direction_z[r]},
+                     !occluded);
+      }
+      if (occluded) {
+        pixel.mask = 0;
+        continue;
+      }
+      const Rgb color{rays.r[r], rays.g[r], rays.b[r]};
+      radiance += color;
+      visibility += rays.visibility[r];
+      if (batch.second_half[i] > 0)
+        difference += color * (rays.sample[r] < second_half ? 1.0f : -1.0f);
     }
-    if (occluded) {
-      batch.pixels[i].mask = 0;
-      continue;
-    }
-    const Rgb color{rays.r[r], rays.g[r], rays.b[r]};
-    batch.pixels[i].radiance += color;
-    batch.pixels[i].visibility += rays.visibility[r];
-    batch.difference[i] +=
-        color * (sample - i * batch.stride < batch.second_half[i] ? 1.0f : -1.0f);
-  }
+    pixel.radiance = radiance;
+    pixel.visibility = visibility;
 
-  // Two halves that agree in the mean: the square of half their difference estimates the variance
-  // of their mean.
-  for (i = 0; i < batch.count; ++i) {
-    const float d = mean(batch.difference[i]);
-    batch.pixels[i].variance = batch.second_half[i] > 0 ? d * d : 0.0f;
+    // Two halves that agree in the mean: the square of half their difference estimates the
+    // variance of their mean.
+    const float d = mean(difference);
+    pixel.variance = batch.second_half[i] > 0 ? d * d : 0.0f;
   }
 }
 
@@ -346,16 +352,20 @@ void TileFrameRenderer::render_reference(Batch& batch, const FrameLight& light,
 void TileFrameRenderer::finish(Batch& batch, const FrameLight& light, FilmWriter& film) {
   const StageTimer timer(stats_.seconds_shade);
   const bool show_environment = context_.job.output.background == Background::environment;
+  std::array<Rgb, kBatchPixels> background{};
+  if (show_environment) {
+    const auto num_sites = static_cast<std::size_t>(surfaces_.num_sites);
+    add_environment_behind(
+        std::span(surfaces_.hits).subspan(batch.first * num_sites, batch.count * num_sites),
+        std::span(surfaces_.rays).subspan(batch.first * num_sites, batch.count * num_sites),
+        surfaces_.num_sites, view_of(light.now), background);
+  }
   for (std::size_t i = 0; i < batch.count; ++i) {
-    const std::size_t index = batch.first + i;
-    const std::span<const SurfaceHit> hits = surfaces_.pixel(index);
     PixelResult& pixel = batch.pixels[i];
-    add_geometry(hits, pixel);
-    if (show_environment && pixel.alpha < 1) {
-      pixel.radiance += environment_behind(hits, surfaces_.pixel_rays(index), light.now);
-      pixel.alpha = 1;
-    }
-    film.write(index, pixel);
+    add_geometry(surfaces_.pixel(batch.first + i), pixel);
+    pixel.radiance += background[i];
+    if (show_environment) pixel.alpha = 1;
+    film.write(batch.first + i, pixel);
   }
 }
 

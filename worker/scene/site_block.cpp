@@ -9,7 +9,7 @@ void SiteBlock::clear(int sites) {
   num_sites = sites;
   num_hits = 0;
   num_lobes = 0;
-  specular_share = 0;
+  specular_sum = 0;
   any_phong = false;
   any_ggx = false;
   any_measured = false;
@@ -52,7 +52,7 @@ void SiteBlock::add(int site, const ShadingPoint& point, const Material& materia
   any_phong = any_phong || phong;
   any_ggx = any_ggx || ggx;
   any_measured = any_measured || tabulated;
-  specular_share += (specular_probability[s] - specular_share) / static_cast<float>(num_hits + 1);
+  specular_sum += specular_probability[s];
   hit_sites[static_cast<std::size_t>(num_hits++)] = site;
   if (specular_probability[s] > 0) lobe_sites[static_cast<std::size_t>(num_lobes++)] = site;
 }

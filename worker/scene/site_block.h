@@ -31,7 +31,7 @@ struct alignas(64) SiteBlock {
   std::int32_t num_lobes = 0;  ///< sites whose surface has a lobe beside the diffuse one
   std::array<std::int32_t, kMaxSites> hit_sites{};   ///< their indices, ascending
   std::array<std::int32_t, kMaxSites> lobe_sites{};  ///< their indices, ascending
-  float specular_share = 0;  ///< mean specular_probability of the sites that see a surface
+  float specular_sum = 0;  ///< specular_probability of all sites that see a surface
   bool any_phong = false;
   bool any_ggx = false;
   bool any_measured = false;
