@@ -44,15 +44,28 @@ std::string machine_name() {
   return fmt::format("{} ({} logical processors)", model, std::thread::hardware_concurrency());
 }
 
-/// Settles the motion of every job (worker/scene/settle_motion.h).
+/// Whether the motion of two jobs is settled alike: it knows nothing else of them.
+bool move_alike(const JobSpec& a, const JobSpec& b) {
+  return a.frames == b.frames && a.image == b.image && a.camera == b.camera && a.scene == b.scene &&
+         a.motion == b.motion;
+}
+
+/// Settles the motion of every job (worker/scene/settle_motion.h), of cells that move alike once.
 Status settle_jobs(Study& study) {
   for (StudyScene& scene : study.scenes) {
     for (JobSpec& job : scene.reference) {
       BATON_ASSIGN(job, settle_motion(std::move(job)));
     }
   }
+  JobSpec given, settled;
   for (StudyCell& cell : study.cells) {
-    BATON_ASSIGN(cell.job, settle_motion(std::move(cell.job)));
+    if (!move_alike(cell.job, given)) {
+      given = cell.job;
+      BATON_ASSIGN(settled, settle_motion(given));
+    }
+    cell.job.camera = settled.camera;
+    cell.job.scene = settled.scene;
+    cell.job.motion = settled.motion;
   }
   return {};
 }

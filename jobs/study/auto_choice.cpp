@@ -23,6 +23,11 @@ bool chooses_particles(const SamplingSpec& sampling) {
   return sampling.target_error.has_value() || sampling.time_budget.has_value();
 }
 
+/// The pool keeps two halves of everything.
+bool can_take(Method method, int num_particles) {
+  return method != Method::pool || num_particles % 2 == 0;
+}
+
 /// A family at some N.
 struct Option {
   AutoCandidate candidate;
@@ -55,6 +60,7 @@ std::vector<Option> options_of(const SamplingSpec& asked, std::span<const PilotN
       continue;
     }
     for (const int n : kParticles) {
+      if (!can_take(family.front().candidate.sampling.method, n)) continue;
       AutoCandidate candidate = family.front().candidate;
       candidate.sampling.num_particles = n;
       candidate.sampling.num_candidates = std::max(candidate.sampling.num_candidates, n);
@@ -97,6 +103,7 @@ std::vector<AutoCandidate> auto_candidates(const JobSpec& job) {
   const auto add = [&](const std::string& family, Method method, int num_candidates,
                        int num_distributions) {
     const auto add_one = [&](int n) {
+      if (!can_take(method, n)) return;
       AutoCandidate candidate{family, job.sampling};
       candidate.sampling.method = method;
       candidate.sampling.num_particles = n;
@@ -118,6 +125,8 @@ std::vector<AutoCandidate> auto_candidates(const JobSpec& job) {
   if (job.frames.size() > 1 && job.state.carry) {
     for (const int p : {1, 5})
       add(fmt::format("sequential P={}", p), Method::sequential, asked.num_candidates, p);
+    if (asked.num_carried % 2 == 0 && !job.visibility.correlated)
+      add("pool M=64", Method::pool, 64, asked.num_distributions);
   }
   return candidates;
 }
@@ -160,7 +169,7 @@ void apply_choice(const AutoChoice& choice, std::span<const PilotNumbers> pilot,
                    seen.empty() ? "" : "; ", numbers.candidate.name(), numbers.error,
                    numbers.cost_us);
   }
-  job.metadata["auto.choice"] =
+  job.metadata[kAutoChoice] =
       fmt::format("{} N={} M={} P={}: expected error {:.4f}, {:.2f} us per pixel and frame",
                   kMethods[static_cast<std::size_t>(choice.sampling.method)],
                   choice.sampling.num_particles, choice.sampling.num_candidates,

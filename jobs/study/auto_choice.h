@@ -8,6 +8,9 @@
 
 namespace baton {
 
+/// Under this name a settled job says in its metadata what was chosen.
+inline constexpr const char* kAutoChoice = "auto.choice";
+
 /// A way to render a job, as a pilot may try it.
 struct AutoCandidate {
   std::string family;  ///< e.g. "bidirectional M=128"; its members differ in N alone

@@ -12,20 +12,20 @@ namespace baton {
 namespace {
 
 constexpr double kPilotPixels = 64 * 36;
-constexpr std::size_t kWindowFrames = 10;
-constexpr int kPilotSeeds = 3;
+constexpr std::size_t kWindowFrames = 12;
+/// Runs of every candidate; then of those whose efficiency is not below the best one's by more than
+/// the factor.
+constexpr int kFirstSeeds = 3;
+constexpr int kSecondSeeds = 12;
+constexpr double kFarFromBest = 2.5;
 constexpr int kReferenceSamples = 512;
 /// Far from the seeds that people give.
 constexpr std::uint64_t kReferenceSeed = 2'000'000'000;
 
 /// The job at a small size for some of its frames.
 JobSpec window_of(const JobSpec& job, std::size_t first, std::size_t last) {
-  JobSpec window = job;
-  window.frames.assign(job.frames.begin() + static_cast<std::ptrdiff_t>(first),
-                       job.frames.begin() + static_cast<std::ptrdiff_t>(last));
-  // Turning starts at the first frame of a job.
-  window.environment.rotation_start_deg +=
-      job.environment.rotation_deg_per_frame * (window.frames.front() - job.frames.front());
+  JobSpec window = job_window(job, {job.frames.begin() + static_cast<std::ptrdiff_t>(first),
+                                    job.frames.begin() + static_cast<std::ptrdiff_t>(last)});
   const double scale =
       std::min(1.0, std::sqrt(kPilotPixels / (1.0 * job.image.width * job.image.height)));
   window.image.width = std::max(1, static_cast<int>(std::lround(job.image.width * scale)));
@@ -42,17 +42,15 @@ JobSpec window_of(const JobSpec& job, std::size_t first, std::size_t last) {
 StudyScene scene_of(const JobSpec& window) {
   StudyScene scene;
   scene.name = fmt::format("frames from {}", window.frames.front());
-  // The last two frames, with the history that a carried sample then has, and the first.
-  scene.frames = {window.frames.front()};
-  for (std::size_t i = window.frames.size() > 2 ? window.frames.size() - 2 : 1;
-       i < window.frames.size(); ++i)
-    scene.frames.push_back(window.frames[i]);
+  // The last two frames, with the history that a carried sample then has.
+  const std::size_t num_measured = std::min<std::size_t>(window.frames.size(), 2);
+  scene.frames.assign(window.frames.end() - static_cast<std::ptrdiff_t>(num_measured),
+                      window.frames.end());
   scene.crop = {0, 0, window.image.width, window.image.height};
   for (std::size_t half = 0; half < 2; ++half) {
     JobSpec& reference = scene.reference[half];
-    reference = window;
+    reference = job_window(window, scene.frames);
     reference.name = "pilot reference";
-    reference.frames = scene.frames;
     reference.sampling = {};
     reference.sampling.method = Method::reference;
     reference.sampling.reference_samples = kReferenceSamples;
@@ -62,16 +60,74 @@ StudyScene scene_of(const JobSpec& window) {
   return scene;
 }
 
-/// Squared error over squared mean radiance of the frames after the first (of the first alone where
-/// there is no other).
+/// Squared error over squared mean radiance.
 double relative_square(const std::vector<RunRecord>& runs,
                        const std::vector<Reference>& references) {
   double sum = 0, mean = 0;
-  for (std::size_t f = references.size() > 1 ? 1 : 0; f < references.size(); ++f) {
+  for (std::size_t f = 0; f < references.size(); ++f) {
     for (const RunRecord& run : runs) sum += run.frames[f].mse / static_cast<double>(runs.size());
     mean += references[f].mean_radiance * references[f].mean_radiance;
   }
   return mean > 0 ? std::max(sum, 0.0) / mean : 0;
+}
+
+/// What a pilot says of its candidates, and the share of pixels with a surface.
+struct PilotResult {
+  std::vector<PilotNumbers> numbers;
+  double lit_share = 0;
+};
+
+/// Runs every candidate with `num_seeds` seeds; what an earlier round did is kept.
+Result<PilotResult> run_pilot(const JobSpec& job, const std::vector<AutoCandidate>& candidates,
+                              int num_seeds, const StudyFolder& folder, JobRunner& runner) {
+  Study study = pilot_study(job, candidates);
+  study.num_seeds = num_seeds;
+  BATON_ASSIGN(const StudyResults results, run_study(study, folder, runner));
+
+  // The mean over windows of squared errors, the sum of counted work.
+  PilotResult pilot;
+  for (const AutoCandidate& candidate : candidates) pilot.numbers.push_back({candidate, 0, 0});
+  std::vector<double> lit(candidates.size());
+  double all_lit = 0, all_pixels = 0;
+  for (std::size_t c = 0; c < study.cells.size(); ++c) {
+    const auto method = static_cast<std::size_t>(study.cells[c].method);
+    const auto scene = static_cast<std::size_t>(study.cells[c].scene);
+    PilotNumbers& seen = pilot.numbers[method];
+    seen.error += relative_square(results.runs[c], results.references[scene]) /
+                  static_cast<double>(study.scenes.size());
+    for (const RunRecord& run : results.runs[c]) {
+      seen.cost_us += counted_cost_us(seen.candidate.sampling.method, run.counts);
+      lit[method] += static_cast<double>(run.counts.lit_pixels());
+      all_pixels += static_cast<double>(run.counts.pixels);
+    }
+  }
+  for (std::size_t c = 0; c < candidates.size(); ++c) {
+    pilot.numbers[c].error = std::sqrt(pilot.numbers[c].error);
+    pilot.numbers[c].cost_us /= std::max(lit[c], 1.0);
+    all_lit += lit[c];
+  }
+  pilot.lit_share = all_lit / std::max(all_pixels, 1.0);
+  return pilot;
+}
+
+double efficiency(const PilotNumbers& seen) {
+  return 1 / std::max(seen.error * seen.error * seen.cost_us, 1e-30);
+}
+
+/// Families of which some member comes near the most efficient candidate.
+std::vector<AutoCandidate> near_the_best(const std::vector<PilotNumbers>& pilot) {
+  double best = 0;
+  for (const PilotNumbers& seen : pilot) best = std::max(best, efficiency(seen));
+  const auto is_near = [&](const std::string& family) {
+    return std::any_of(pilot.begin(), pilot.end(), [&](const PilotNumbers& seen) {
+      return seen.candidate.family == family && efficiency(seen) * kFarFromBest >= best;
+    });
+  };
+  std::vector<AutoCandidate> near;
+  for (const PilotNumbers& seen : pilot) {
+    if (is_near(seen.candidate.family)) near.push_back(seen.candidate);
+  }
+  return near;
 }
 
 }  // namespace
@@ -79,7 +135,6 @@ double relative_square(const std::vector<RunRecord>& runs,
 Study pilot_study(const JobSpec& job, const std::vector<AutoCandidate>& candidates) {
   Study study;
   study.name = "pilot";
-  study.num_seeds = kPilotSeeds;
   for (const AutoCandidate& candidate : candidates) study.methods.push_back(candidate.name());
   const std::size_t num_frames = job.frames.size();
   const std::size_t length = std::min(num_frames, kWindowFrames);
@@ -100,44 +155,33 @@ Study pilot_study(const JobSpec& job, const std::vector<AutoCandidate>& candidat
 
 Result<std::vector<PilotNumbers>> settle_auto(JobSpec& job, const StudyFolder& folder,
                                               JobRunner& runner) {
-  std::vector<PilotNumbers> pilot;
-  if (job.sampling.method != Method::automatic) return pilot;
-  const std::vector<AutoCandidate> candidates = auto_candidates(job);
-  const Study study = pilot_study(job, candidates);
-  BATON_ASSIGN(const StudyResults results, run_study(study, folder, runner));
+  if (job.sampling.method != Method::automatic) return std::vector<PilotNumbers>();
+  BATON_ASSIGN(PilotResult pilot,
+               run_pilot(job, auto_candidates(job), kFirstSeeds, folder, runner));
 
-  // The mean over windows of squared errors, the sum of counted work.
-  const auto num_scenes = static_cast<double>(study.scenes.size());
-  for (const AutoCandidate& candidate : candidates) pilot.push_back({candidate, 0, 0});
-  double lit = 0, pixels = 0;  // of all runs
-  std::vector<double> lit_of(candidates.size());
-  for (std::size_t c = 0; c < study.cells.size(); ++c) {
-    const auto method = static_cast<std::size_t>(study.cells[c].method);
-    const auto scene = static_cast<std::size_t>(study.cells[c].scene);
-    pilot[method].error += relative_square(results.runs[c], results.references[scene]) / num_scenes;
-    for (const RunRecord& run : results.runs[c]) {
-      pilot[method].cost_us += counted_cost_us(run.counts);
-      lit_of[method] += static_cast<double>(run.counts.lit_pixels());
-      pixels += static_cast<double>(run.counts.pixels);
+  // Look again, and closer, at those that may be the best.
+  const std::vector<AutoCandidate> near = near_the_best(pilot.numbers);
+  if (near.size() > 1) {
+    BATON_ASSIGN(const PilotResult closer, run_pilot(job, near, kSecondSeeds, folder, runner));
+    for (const PilotNumbers& seen : closer.numbers) {
+      *std::find_if(pilot.numbers.begin(), pilot.numbers.end(), [&](const PilotNumbers& first) {
+        return first.candidate.name() == seen.candidate.name();
+      }) = seen;
     }
-  }
-  for (std::size_t c = 0; c < candidates.size(); ++c) {
-    lit += lit_of[c];
-    pilot[c].error = std::sqrt(pilot[c].error);
-    pilot[c].cost_us /= std::max(lit_of[c], 1.0);
   }
   const double all_pixels =
       1.0 * job.image.width * job.image.height * static_cast<double>(job.frames.size());
-  apply_choice(choose_sampling(job, pilot, all_pixels * lit / std::max(pixels, 1.0)), pilot, job);
-  return pilot;
+  apply_choice(choose_sampling(job, pilot.numbers, all_pixels * pilot.lit_share), pilot.numbers,
+               job);
+  return std::move(pilot.numbers);
 }
 
 Status settle_study(Study& study, const StudyFolder& folder, JobRunner& runner) {
   for (StudyCell& cell : study.cells) {
     BATON_ASSIGN(const std::vector<PilotNumbers> pilot, settle_auto(cell.job, folder, runner));
     if (!pilot.empty())
-      spdlog::info("{}: {}, {}", cell.job.name, cell.job.metadata["auto.choice"],
-                   cell.job.metadata["auto.reason"]);
+      spdlog::info("{}: {}, {}; seen were {}", cell.job.name, cell.job.metadata[kAutoChoice],
+                   cell.job.metadata["auto.reason"], cell.job.metadata["auto.pilot"]);
   }
   return {};
 }

@@ -7,11 +7,11 @@
 
 namespace baton {
 
-/// Settles `"method": "auto"`: renders the job small (about 2300 pixels, at most ten frames at its
-/// start and at its end) with every candidate and a few seeds, judges them by error and counted
-/// work, and writes the choice with its reasons into the job. A job with another method is left as
-/// it is. Deterministic given the job and its assets; finished runs are kept in `folder`.
-/// Returns the numbers seen, empty for another method.
+/// Settles `"method": "auto"`: renders the job small (about 2300 pixels, at most twelve frames at
+/// its start and at its end) with every candidate and a few seeds, those near the best with more,
+/// judges them by error and counted work, and writes the choice with its reasons into the job. A
+/// job with another method is left as it is. Deterministic given the job and its assets; finished
+/// runs are kept in `folder`. Returns the numbers seen, empty for another method.
 Result<std::vector<PilotNumbers>> settle_auto(JobSpec& job, const StudyFolder& folder,
                                               JobRunner& runner);
 
@@ -20,7 +20,7 @@ Result<std::vector<PilotNumbers>> settle_auto(JobSpec& job, const StudyFolder& f
 Status settle_study(Study& study, const StudyFolder& folder, JobRunner& runner);
 
 /// The study that the pilot runs: scenes are windows of frames, cells the candidates in their
-/// order.
+/// order. Seeds are the caller's.
 Study pilot_study(const JobSpec& job, const std::vector<AutoCandidate>& candidates);
 
 }  // namespace baton

@@ -6,6 +6,7 @@
 #include <iterator>
 
 #include "common/base/version.h"
+#include "jobs/study/auto_table.h"
 #include "jobs/study/svg_text.h"
 
 namespace baton {
@@ -132,6 +133,7 @@ std::string report_html(const Study& study, const StudyResults& results,
       "best; above 1 is better. {5}</p>\n",
       escaped(study.name), kStyle, kVersion, escaped(machine), study.num_seeds,
       study.num_seeds < kFewSeeds ? "<b>Fewer than 20 seeds: the bands are rough.</b>" : "");
+  html += auto_html(study, results);
   for (std::size_t i = 0; i < scenes.size(); ++i) {
     html += fmt::format("<h2>{}</h2>\n", escaped(study.scenes[i].name));
     html += reference_note(study, results, i);

@@ -43,6 +43,7 @@ void visit_frame(Frame& m, F visit) {
   visit("ess", m.ess);
   visit("acceptance", m.acceptance);
   visit("flicker", m.flicker);
+  visit("blockMse", m.block_mse);
 }
 
 /// JSON has no NaN: null stands for it.

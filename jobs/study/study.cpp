@@ -93,18 +93,17 @@ void prepare_output(JobSpec& job) {
 
 /// The brute-force twin of a job for the given frames.
 JobSpec reference_job(const JobSpec& job, int samples, const std::vector<int>& frames, int half) {
-  JobSpec reference = job;
+  JobSpec reference = job_window(job, frames);
   reference.name = "reference";
   reference.sampling = {};
   reference.sampling.method = Method::reference;
   reference.sampling.reference_samples = samples;
-  reference.frames = frames;
   reference.seed = kReferenceSeed + static_cast<std::uint64_t>(half);
   reference.output.aovs = {Aov::lns, Aov::variance};
   return reference;
 }
 
-/// The measured frames: those of `text`, or all, and always the first, as turning starts there.
+/// The measured frames: those of `text`, or all.
 std::vector<int> measured_frames(const std::string& text, const JobSpec& job,
                                  const std::string& path, StudyFaults& faults) {
   if (text.empty()) return job.frames;
@@ -118,7 +117,6 @@ std::vector<int> measured_frames(const std::string& text, const JobSpec& job,
       faults.add(path, fmt::format("expected frames of the job ({}), got {}",
                                    format_frames(job.frames), frame));
   }
-  if (frames->front() != job.frames.front()) frames->insert(frames->begin(), job.frames.front());
   return std::move(frames).value();
 }
 
@@ -201,6 +199,14 @@ void read_scene(StudyObject& object, const Shared& shared, Study& study, StudyFa
 }
 
 }  // namespace
+
+JobSpec job_window(const JobSpec& job, std::vector<int> frames) {
+  JobSpec window = job;
+  window.environment.rotation_start_deg +=
+      job.environment.rotation_deg_per_frame * (frames.front() - job.frames.front());
+  window.frames = std::move(frames);
+  return window;
+}
 
 Result<Study> parse_study(std::string_view text, const std::string& name,
                           const fs::path& base_directory) {

@@ -14,12 +14,16 @@ namespace baton {
 /// Of every job of a study.
 inline constexpr const char* kFramePattern = "frame.####.exr";
 
+/// The job for some of its frames, which are not empty: turning goes on as if it had begun with the
+/// job's first.
+JobSpec job_window(const JobSpec& job, std::vector<int> frames);
+
 /// A scene of a study, with the two halves of its reference: equal jobs with different seeds, so
 /// that their difference tells what the reference can resolve.
 struct StudyScene {
   std::string name;
-  std::array<JobSpec, 2> reference;  ///< frames: the measured ones
-  std::vector<int> frames;           ///< measured frame numbers; the first frame is among them
+  std::array<JobSpec, 2> reference;  ///< of the measured frames alone
+  std::vector<int> frames;           ///< measured frame numbers
   int cut_frame = 0;          ///< a measured frame at which the light changes at once; 0: none
   std::array<int, 4> crop{};  ///< x, y, width, height in pixels, shown side by side
 };

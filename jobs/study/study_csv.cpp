@@ -54,14 +54,18 @@ std::string measurements_csv(const Study& study, const StudyResults& results) {
 std::string costs_csv(const Study& study, const StudyResults& results) {
   std::string csv =
       "scene,method,budget,seed,frames,litPixels,cpuSeconds,secondsLight,secondsPrimary,"
-      "secondsSample,secondsVisibility,secondsShade,secondsSecondPass,stateBytesPerPixel\n";
+      "secondsSample,secondsVisibility,secondsShade,secondsSecondPass,stateBytesPerPixel,"
+      "raysPerPixel,evaluationsPerPixel,movesPerPixel\n";
   for_each_run(study, results, [&](const std::string& labels, const RunRecord& run) {
     const RunCounts& s = run.counts;
-    fmt::format_to(std::back_inserter(csv), "{},{},{},{},{},{},{},{},{},{},{}\n", labels,
+    fmt::format_to(std::back_inserter(csv), "{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n", labels,
                    run.frames_rendered, s.lit_pixels(), number(s.cpu_seconds),
                    number(s.seconds_light), number(s.seconds_primary), number(s.seconds_sample),
                    number(s.seconds_visibility), number(s.seconds_shade),
-                   number(s.seconds_second_pass), number(per(run.state_bytes, run.state_pixels)));
+                   number(s.seconds_second_pass), number(per(run.state_bytes, run.state_pixels)),
+                   number(per(s.rays_shadow, s.lit_pixels())),
+                   number(per(s.target_evaluations, s.lit_pixels())),
+                   number(per(s.moves_proposed, s.lit_pixels())));
   });
   return csv;
 }

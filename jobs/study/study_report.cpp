@@ -6,6 +6,7 @@
 
 #include "common/base/files.h"
 #include "common/base/limits.h"
+#include "jobs/study/auto_table.h"
 #include "jobs/study/crop_strip.h"
 #include "jobs/study/report_html.h"
 #include "jobs/study/study_csv.h"
@@ -58,6 +59,7 @@ Result<fs::path> write_report(const Study& study, const StudyResults& results,
   BATON_TRY(publish(output / "costs.csv", costs_csv(study, results)));
   BATON_TRY(publish(output / "references.csv", references_csv(study, results)));
   BATON_TRY(publish(output / "efficiency.csv", efficiency_csv(study, rows)));
+  BATON_TRY(publish(output / "auto.csv", auto_csv(study, results)));
 
   std::vector<ReportScene> scenes(study.scenes.size());
   for (std::size_t i = 0; i < scenes.size(); ++i) {

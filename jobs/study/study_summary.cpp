@@ -61,15 +61,6 @@ double standard_error(const std::vector<Reference>& references) {
   return std::sqrt(variance) / static_cast<double>(references.size());
 }
 
-/// MSE x time of `base` over that of `cell`.
-Interval efficiency_ratio(const StudyResults& results, std::size_t base, std::size_t cell) {
-  const double time = cell_cost(results.runs[cell]).cpu_us;
-  const double factor = time > 0 ? cell_cost(results.runs[base]).cpu_us / time : kNone;
-  const Interval ratio =
-      ratio_interval(squared_errors(results.runs[base]), squared_errors(results.runs[cell]));
-  return {ratio.low * factor, ratio.value * factor, ratio.high * factor};
-}
-
 /// The cell that `cell` is compared with: same scene, the method, the budget of the same name or
 /// the most efficient one.
 std::optional<std::size_t> baseline(const Study& study, const StudyResults& results,
@@ -169,6 +160,14 @@ double reference_error(const std::vector<Reference>& references, ErrorKindOfImag
   }
   const double mean = count > 0 ? sum / count : 0;
   return kind == ErrorKindOfImage::rmse ? std::sqrt(mean) : mean;
+}
+
+Interval efficiency_ratio(const StudyResults& results, std::size_t base, std::size_t cell) {
+  const double time = cell_cost(results.runs[cell]).cpu_us;
+  const double factor = time > 0 ? cell_cost(results.runs[base]).cpu_us / time : kNone;
+  const Interval ratio =
+      ratio_interval(squared_errors(results.runs[base]), squared_errors(results.runs[cell]));
+  return {ratio.low * factor, ratio.value * factor, ratio.high * factor};
 }
 
 std::vector<bool> pareto_front(const std::vector<double>& costs,

@@ -35,6 +35,10 @@ Interval cell_error(const std::vector<RunRecord>& runs, ErrorKindOfImage kind, F
 double reference_error(const std::vector<Reference>& references, ErrorKindOfImage kind,
                        FrameChoice frame);
 
+/// MSE x time of cell `base` over that of `cell`, over all frames: how much more efficient `cell`
+/// is. NaN when it took no time.
+Interval efficiency_ratio(const StudyResults& results, std::size_t base, std::size_t cell);
+
 /// Positions of the points that no other one beats in both: not slower and smaller. Equal points
 /// count once. costs, errors: of one length.
 std::vector<bool> pareto_front(const std::vector<double>& costs, const std::vector<double>& errors);

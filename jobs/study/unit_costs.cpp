@@ -3,17 +3,35 @@
 namespace baton {
 namespace {
 
-constexpr double kPixelUs = 1.17;       // surfaces, film
-constexpr double kShadowRayUs = 0.107;  // trace and shade one sample
-constexpr double kEvaluationUs = 0.0166;
-constexpr double kMoveUs = 0.0085;  // a proposal's random numbers and choice, beside its evaluation
+/// Microseconds of one of each.
+struct UnitCosts {
+  double pixel;       ///< surfaces, film, the pixel's share of its sampler
+  double shadow_ray;  ///< trace and shade
+  double evaluation;
+  double move;  ///< a proposal's random numbers and choice, with what it evaluates
+};
+
+UnitCosts units_of(Method method) {
+  switch (method) {
+    case Method::sequential:
+      return {1.46, 0.121, 0, 0.0200};
+    case Method::pool:
+      return {1.98, 0.115, 0.0116, 0};
+    case Method::bidirectional:
+      return {0.98, 0.107, 0.0044, 0};
+    default:
+      return {1.06, 0.109, 0.0040, 0};
+  }
+}
 
 }  // namespace
 
-double counted_cost_us(const RunCounts& counts) {
+double counted_cost_us(Method method, const RunCounts& counts) {
   const auto count = [](std::uint64_t n) { return static_cast<double>(n); };
-  return kPixelUs * count(counts.lit_pixels()) + kShadowRayUs * count(counts.rays_shadow) +
-         kEvaluationUs * count(counts.target_evaluations) + kMoveUs * count(counts.moves_proposed);
+  const UnitCosts unit = units_of(method);
+  return unit.pixel * count(counts.lit_pixels()) + unit.shadow_ray * count(counts.rays_shadow) +
+         unit.evaluation * count(counts.target_evaluations) +
+         unit.move * count(counts.moves_proposed);
 }
 
 }  // namespace baton

@@ -1,12 +1,13 @@
 #pragma once
 
+#include "common/job/job_spec.h"
 #include "jobs/study/run_record.h"
 
 namespace baton {
 
-/// CPU microseconds of counted work by fixed unit costs: a stand-in for time that is the same on
-/// every run and machine, for choices that must be repeatable. The units are a least-squares fit
-/// over the runs of jobs/studies/real-scenes.json (docs/charts.md names machine and residual).
-double counted_cost_us(const RunCounts& counts);
+/// CPU microseconds of a method's counted work by fixed unit costs: a stand-in for time that is the
+/// same on every run and machine, for choices that must be repeatable. The units are a fit to the
+/// runs of jobs/studies/unit-costs.json (docs/charts.md names machine and residual).
+double counted_cost_us(Method method, const RunCounts& counts);
 
 }  // namespace baton

@@ -45,6 +45,13 @@ struct Case {
   Timeline timeline(const Effort& effort) const;
 };
 
+/// What every method should keep everywhere. Noise is relative to fresh samples: 1.5 is 2.3 times,
+/// 3 is 9 times the cost for the same error.
+std::vector<Law> usual_laws();
+
+/// The cases in which camera or objects move (moving_cases.cpp).
+std::vector<Case> moving_cases();
+
 /// Every case of the suite, in the order of the report.
 std::vector<Case> all_cases();
 

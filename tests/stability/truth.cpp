@@ -4,7 +4,6 @@
 #include <numbers>
 
 #include "common/base/check.h"
-#include "common/job/motion.h"
 #include "tests/stability/parallel.h"
 #include "worker/pass/primary.h"
 #include "worker/pass/render_context.h"
@@ -95,27 +94,29 @@ double relative_difference(const std::vector<double>& a, const std::vector<doubl
 }  // namespace
 
 Result<Truth> exact_truth(const JobSpec& job, int nodes, int threads) {
-  BATON_CHECK(nodes > 0 && nodes % 2 == 0 && job.image.sites == 1 && !moves(job));
+  BATON_CHECK(nodes > 0 && nodes % 2 == 0 && job.image.sites == 1);
   BATON_ASSIGN(const auto context, load_render_context(job, Digest{1, 2}));
-  BATON_ASSIGN(const auto geometry, context->geometry->at(0));
 
-  // The lights one after the other, the sums side by side.
+  // Lights and geometry one after the other, the sums side by side.
   std::vector<Environment> lights;
+  std::vector<std::shared_ptr<const FrameGeometry>> geometry;
   for (std::size_t f = 0; f < job.frames.size(); ++f) {
     BATON_ASSIGN(const auto light, context->lights->at(static_cast<std::int32_t>(f)));
     lights.push_back(light->now);
+    BATON_ASSIGN(auto placed, context->geometry->at(static_cast<std::int32_t>(f)));
+    geometry.push_back(std::move(placed));
   }
   Truth truth;
   truth.frames.resize(lights.size());
   parallel_for(lights.size(), threads, [&](std::size_t f) {
-    truth.frames[f] = sum_frame(*context, *geometry, lights[f], nodes);
+    truth.frames[f] = sum_frame(*context, *geometry[f], lights[f], nodes);
   });
 
   // How much is left to the number of nodes.
   for (std::size_t f = 0; f < lights.size() && truth.quadrature_error == 0; ++f) {
     if (lights[f].map->black()) continue;
     truth.quadrature_error = relative_difference(
-        sum_frame(*context, *geometry, lights[f], nodes / 2).radiance, truth.frames[f].radiance);
+        sum_frame(*context, *geometry[f], lights[f], nodes / 2).radiance, truth.frames[f].radiance);
   }
   return truth;
 }

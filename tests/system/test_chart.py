@@ -41,7 +41,7 @@ def a_killed_study_goes_on(programs, folder):
     witness = folder / "witness"
     chart(programs, study, witness)
     table = (witness / "measurements.csv").read_text(encoding="utf-8")
-    check_equal(len(table.splitlines()), 1 + 2 * 2 * 3 * 3, "lines of measurements.csv")
+    check_equal(len(table.splitlines()), 1 + 2 * 2 * 3 * 2, "lines of measurements.csv")
     check("nan" not in table, "measurements.csv holds a NaN")
 
     # Kill the whole process group once some runs are kept.

@@ -85,6 +85,7 @@ Result<std::shared_ptr<const FrameLight>> LightSequence::at(std::int32_t index) 
   auto light = std::make_shared<FrameLight>();
   BATON_ASSIGN(light->now, environment(frame.environment));
   BATON_ASSIGN(light->before, environment(frame_before.environment));
+  light->still = frame.environment == frame_before.environment;
   light->pool = make_light_pool(
       light->now, light->before, job_.seed, static_cast<std::uint32_t>(frame.number),
       job_.sampling.method == Method::pool ? CarriedFrame::environment : CarriedFrame::world);

@@ -18,6 +18,7 @@ namespace baton {
 struct FrameLight {
   Environment now;
   Environment before;   ///< the frame before; for the first frame the same as now
+  bool still = false;   ///< now shows what before showed: the same texels, turned alike
   LightPool pool;
   double prepare_seconds = 0;  ///< time spent on texels, table and pool
 };

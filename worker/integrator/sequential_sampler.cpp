@@ -32,9 +32,15 @@ PixelDiagnostics SequentialSampler::sample(const PixelInput& input, SamplerScrat
     return diagnostics;
   }
 
-  // Carry the particles over.
+  // Carry the particles over. Where the target is that of the frame before, they are properly
+  // weighted already and stay as they are.
   SequentialSettings settings = settings_;
   if (input.sites.num_lobes == 0) settings.local_move_fraction = 0;
+  if (input.light.still && input.old == nullptr) {
+    settings.num_distributions = 1;
+    settings.num_moves = 0;
+    settings.ess_ratio_min = 0;
+  }
   const SequentialOutcome outcome = kernels::sequential_step(
       input.sites, input.old, input.before, input.now, input.light.pool, settings, samples.lns,
       input.key,
@@ -45,7 +51,7 @@ PixelDiagnostics SequentialSampler::sample(const PixelInput& input, SamplerScrat
       // Both targets at the old positions and at every proposal.
       .ess = outcome.ess,
       .target_evaluations =
-          2 * settings_.num_particles * (settings_.num_distributions * settings_.num_moves + 1),
+          2 * settings.num_particles * (settings.num_distributions * settings.num_moves + 1),
       .local = outcome.local,
       .independent = outcome.independent,
       .resampled = outcome.resampled};

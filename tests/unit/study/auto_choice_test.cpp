@@ -85,6 +85,23 @@ TEST(AutoCandidates, NothingIsCarriedWhereThereIsOneFrame) {
   EXPECT_FALSE(carries(job));
 }
 
+TEST(AutoCandidates, ThePoolTakesEvenNumbers) {
+  const auto tries_pool = [](const JobSpec& job) {
+    for (const AutoCandidate& candidate : auto_candidates(job)) {
+      if (candidate.sampling.method == Method::pool) return true;
+    }
+    return false;
+  };
+  JobSpec job = automatic_job();
+  job.frames = {1, 2};
+  EXPECT_TRUE(tries_pool(job));
+  job.sampling.num_particles = 3;
+  EXPECT_FALSE(tries_pool(job));
+  job.sampling.num_particles = 4;
+  job.visibility.correlated = true;
+  EXPECT_FALSE(tries_pool(job));
+}
+
 TEST(AutoCandidates, AreSettledThemselves) {
   JobSpec job = automatic_job();
   job.frames = {1, 2};
@@ -114,10 +131,11 @@ TEST(PilotStudy, LooksAtTheStartAndTheEndOfALongJob) {
   for (int frame = 1; frame <= 48; ++frame) job.frames.push_back(frame);
   const Study study = pilot_study(job, auto_candidates(job));
   ASSERT_EQ(study.scenes.size(), 2u);
-  EXPECT_THAT(study.scenes[0].frames, ElementsAre(1, 9, 10));
-  EXPECT_THAT(study.scenes[1].frames, ElementsAre(39, 47, 48));
+  EXPECT_THAT(study.scenes[0].frames, ElementsAre(11, 12));
+  EXPECT_THAT(study.scenes[1].frames, ElementsAre(47, 48));
   const JobSpec& end = study.scenes[1].reference[0];
-  EXPECT_EQ(end.environment.rotation_start_deg, 10 + 38 * 0.5);
+  EXPECT_THAT(end.frames, ElementsAre(47, 48));
+  EXPECT_EQ(end.environment.rotation_start_deg, 10 + 46 * 0.5);
   EXPECT_EQ(end.image.width, 64);
   EXPECT_EQ(end.image.height, 36);
 

@@ -77,12 +77,14 @@ TEST_F(StudyTest, ReferencesAreTwoHalvesOfTheMeasuredFrames) {
   const Result<Study> study = parse(kStudy);
   ASSERT_TRUE(study) << study.error().message;
   const StudyScene& scene = study->scenes[1];
-  EXPECT_THAT(scene.frames, ElementsAre(1, 3, 4)) << "the first frame is where turning starts";
+  EXPECT_THAT(scene.frames, ElementsAre(3, 4));
   EXPECT_THAT(scene.crop, ElementsAre(1, 2, 3, 4));
   EXPECT_EQ(scene.reference[0].sampling.method, Method::reference);
   EXPECT_EQ(scene.reference[0].sampling.reference_samples, 64);
   EXPECT_EQ(scene.reference[0].environment.rotation_deg_per_frame, 2);
   EXPECT_EQ(scene.reference[0].frames, scene.frames);
+  EXPECT_EQ(scene.reference[0].environment.rotation_start_deg, 2 * (3 - 1))
+      << "turning starts at the first frame of a job";
   EXPECT_NE(scene.reference[0].seed, scene.reference[1].seed);
 }
 
@@ -148,7 +150,8 @@ TEST_F(StudyTest, RecordsKeepEveryNumber) {
                    .frames = {}};
   record.counts.rays_shadow = 17;
   record.counts.seconds_sample = 0.1;
-  record.frames.push_back({.frame = 4, .mse = 0.1 + 0.2, .flicker = kNotMeasured});
+  record.frames.push_back(
+      {.frame = 4, .mse = 0.1 + 0.2, .flicker = kNotMeasured, .block_mse = {0.1, 0.2}});
   ASSERT_TRUE(write_record(folder_ / "r.json", record));
   const std::optional<RunRecord> read = read_record(folder_ / "r.json");
   ASSERT_TRUE(read);

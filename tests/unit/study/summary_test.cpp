@@ -5,6 +5,8 @@
 #include <cmath>
 
 #include "common/math/philox.h"
+#include "jobs/study/auto_choice.h"
+#include "jobs/study/auto_table.h"
 #include "jobs/study/chart_axis.h"
 #include "jobs/study/svg_chart.h"
 
@@ -90,6 +92,7 @@ StudyResults two_results(double reference_mse) {
   results.references[0].resize(1);
   results.references[0][0].mse = reference_mse;
   results.references[0][0].lit_pixels = {0};
+  results.references[0][0].mean = {1, 1, {}};
   return results;
 }
 
@@ -142,6 +145,52 @@ TEST(Summary, LagCountsFramesFromTheCut) {
   EXPECT_EQ(lag_after_cut(scene, records), 2);
   scene.cut_frame = 5;
   EXPECT_EQ(lag_after_cut(scene, records), 0);
+}
+
+TEST(AutoTable, StandsBesideTheBestAndTheWorstOfItsScene) {
+  Study study = two_methods();
+  study.num_seeds = 2;
+  study.methods.push_back("auto");
+  study.cells.push_back({0, 2, "16", {}});
+  study.cells[2].job.metadata[kAutoChoice] = "mis N=16 M=16 P=1: expected";
+  StudyResults results = two_results(0.1);
+  results.runs.push_back(runs({2, 2}, 3));
+
+  // MSE x time: 5 x 2, 2.5 x 3, auto 2 x 3.
+  const std::vector<AutoRow> rows = compare_auto(study, results);
+  ASSERT_EQ(rows.size(), 1u);
+  EXPECT_EQ(rows[0].best, 1u);
+  EXPECT_EQ(rows[0].worst, 0u);
+  EXPECT_NEAR(rows[0].over_best.value, 7.5 / 6, 1e-9);
+  EXPECT_NEAR(rows[0].over_worst.value, 10.0 / 6, 1e-9);
+  EXPECT_NE(auto_html(study, results).find("mis N=16 M=16 P=1"), std::string::npos);
+  EXPECT_EQ(compare_auto(two_methods(), two_results(0.1)).size(), 0u);
+}
+
+TEST(AutoTable, ChoosingBySquareGainsWhereMethodsDiffer) {
+  Study study = two_methods();
+  study.num_seeds = 2;
+  StudyResults results = two_results(0.1);
+  // Two squares of equally many pixels, methods of equal cost.
+  Reference& reference = results.references[0][0];
+  reference.mean = {2 * kBlockPx, kBlockPx, {}};
+  reference.lit_pixels = {0, kBlockPx};
+  results.runs = {runs({4, 4}, 1), runs({4, 4}, 1)};
+  const auto set_blocks = [&](std::size_t cell, double left, double right) {
+    for (RunRecord& run : results.runs[cell]) run.frames[0].block_mse = {left, right};
+  };
+  set_blocks(0, 1, 3);
+  set_blocks(1, 3, 1);
+  EXPECT_NEAR(block_headroom(study, results, 0, "16"), 2, 1e-9);
+  set_blocks(1, 3, 4);
+  EXPECT_NEAR(block_headroom(study, results, 0, "16"), 1, 1e-9);
+  EXPECT_TRUE(std::isnan(block_headroom(study, results, 0, "none")));
+}
+
+TEST(Measures, SquaresAreCutAtTheBorder) {
+  EXPECT_EQ(num_blocks(kBlockPx + 1, kBlockPx), 2u);
+  EXPECT_EQ(block_of(kBlockPx, kBlockPx + 1), 1u);
+  EXPECT_EQ(block_of(static_cast<std::size_t>((kBlockPx + 1) * kBlockPx), kBlockPx + 1), 2u);
 }
 
 TEST(ChartAxis, TicksAreDecadesOrRoundSteps) {
