@@ -23,9 +23,10 @@ bool chooses_particles(const SamplingSpec& sampling) {
   return sampling.target_error.has_value() || sampling.time_budget.has_value();
 }
 
-/// The pool keeps two halves of everything.
-bool can_take(Method method, int num_particles) {
-  return method != Method::pool || num_particles % 2 == 0;
+/// The pool and the second pass keep two halves of everything.
+bool can_take(const AutoCandidate& candidate, int num_particles) {
+  const bool halves = candidate.sampling.method == Method::pool || candidate.correlated;
+  return !halves || num_particles % 2 == 0;
 }
 
 /// A family at some N.
@@ -60,7 +61,7 @@ std::vector<Option> options_of(const SamplingSpec& asked, std::span<const PilotN
       continue;
     }
     for (const int n : kParticles) {
-      if (!can_take(family.front().candidate.sampling.method, n)) continue;
+      if (!can_take(family.front().candidate, n)) continue;
       AutoCandidate candidate = family.front().candidate;
       candidate.sampling.num_particles = n;
       candidate.sampling.num_candidates = std::max(candidate.sampling.num_candidates, n);
@@ -89,7 +90,8 @@ double efficiency(const Option& option) {
 }
 
 AutoChoice choice_of(const Option& option, std::string reason) {
-  return {option.candidate.sampling, option.error, option.cost_us, std::move(reason)};
+  return {option.candidate.sampling, option.candidate.correlated, option.error, option.cost_us,
+          std::move(reason)};
 }
 
 }  // namespace
@@ -101,17 +103,16 @@ std::string AutoCandidate::name() const {
 std::vector<AutoCandidate> auto_candidates(const JobSpec& job) {
   std::vector<AutoCandidate> candidates;
   const auto add = [&](const std::string& family, Method method, int num_candidates,
-                       int num_distributions) {
+                       int num_distributions, bool correlated = false) {
     const auto add_one = [&](int n) {
-      if (!can_take(method, n)) return;
-      AutoCandidate candidate{family, job.sampling};
+      AutoCandidate candidate{family, job.sampling, correlated || job.visibility.correlated};
       candidate.sampling.method = method;
       candidate.sampling.num_particles = n;
       candidate.sampling.num_candidates = std::max(num_candidates, n);
       candidate.sampling.num_distributions = num_distributions;
       candidate.sampling.target_error.reset();
       candidate.sampling.time_budget.reset();
-      candidates.push_back(std::move(candidate));
+      if (can_take(candidate, n)) candidates.push_back(std::move(candidate));
     };
     if (!chooses_particles(job.sampling)) return add_one(job.sampling.num_particles);
     for (const int n : kPilotParticles) add_one(n);
@@ -122,6 +123,9 @@ std::vector<AutoCandidate> auto_candidates(const JobSpec& job) {
   add("mis", Method::mis, asked.num_candidates, asked.num_distributions);
   for (const int m : {64, 128, 512})
     add(fmt::format("bidirectional M={}", m), Method::bidirectional, m, asked.num_distributions);
+  if (!job.visibility.correlated)
+    add("bidirectional M=128 with second pass", Method::bidirectional, 128, asked.num_distributions,
+        true);
   if (job.frames.size() > 1 && job.state.carry) {
     for (const int p : {1, 5})
       add(fmt::format("sequential P={}", p), Method::sequential, asked.num_candidates, p);
@@ -170,13 +174,15 @@ void apply_choice(const AutoChoice& choice, std::span<const PilotNumbers> pilot,
                    numbers.cost_us);
   }
   job.metadata[kAutoChoice] =
-      fmt::format("{} N={} M={} P={}: expected error {:.4f}, {:.2f} us per pixel and frame",
+      fmt::format("{}{} N={} M={} P={}: expected error {:.4f}, {:.2f} us per pixel and frame",
                   kMethods[static_cast<std::size_t>(choice.sampling.method)],
-                  choice.sampling.num_particles, choice.sampling.num_candidates,
-                  choice.sampling.num_distributions, choice.error, choice.cost_us);
+                  choice.correlated ? " with second pass" : "", choice.sampling.num_particles,
+                  choice.sampling.num_candidates, choice.sampling.num_distributions, choice.error,
+                  choice.cost_us);
   job.metadata["auto.reason"] = choice.reason;
   job.metadata["auto.pilot"] = seen.substr(0, limits::kMaxTextLength);
   job.sampling = choice.sampling;
+  job.visibility.correlated = choice.correlated;
 }
 
 }  // namespace baton

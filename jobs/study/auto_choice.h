@@ -15,6 +15,7 @@ inline constexpr const char* kAutoChoice = "auto.choice";
 struct AutoCandidate {
   std::string family;  ///< e.g. "bidirectional M=128"; its members differ in N alone
   SamplingSpec sampling;
+  bool correlated = false;  ///< with the second pass of correlated visibility
 
   std::string name() const;
 };
@@ -33,7 +34,8 @@ struct PilotNumbers {
 
 struct AutoChoice {
   SamplingSpec sampling;  ///< never `auto`
-  double error = 0;       ///< expected, as PilotNumbers
+  bool correlated = false;
+  double error = 0;  ///< expected, as PilotNumbers
   double cost_us = 0;
   std::string reason;
 };

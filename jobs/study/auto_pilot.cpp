@@ -96,7 +96,7 @@ Result<PilotResult> run_pilot(const JobSpec& job, const std::vector<AutoCandidat
     seen.error += relative_square(results.runs[c], results.references[scene]) /
                   static_cast<double>(study.scenes.size());
     for (const RunRecord& run : results.runs[c]) {
-      seen.cost_us += counted_cost_us(seen.candidate.sampling.method, run.counts);
+      seen.cost_us += counted_cost_us(study.cells[c].job, run.counts);
       lit[method] += static_cast<double>(run.counts.lit_pixels());
       all_pixels += static_cast<double>(run.counts.pixels);
     }
@@ -145,6 +145,7 @@ Study pilot_study(const JobSpec& job, const std::vector<AutoCandidate>& candidat
     for (std::size_t c = 0; c < candidates.size(); ++c) {
       StudyCell cell{static_cast<int>(study.scenes.size()), static_cast<int>(c), "", window};
       cell.job.sampling = candidates[c].sampling;
+      cell.job.visibility.correlated = candidates[c].correlated;
       cell.job.name = "pilot " + candidates[c].name();
       study.cells.push_back(std::move(cell));
     }

@@ -128,7 +128,8 @@ std::string report_html(const Study& study, const StudyResults& results,
       "taken against two independent halves of the reference, so that its noise drops out. CPU "
       "time "
       "is the middle one of the seeds, of primary rays, sampling, visibility, shading and the "
-      "second pass; light is apart. Efficiency is 1 / (MSE x time), over that of the baseline with the same budget, or "
+      "second pass; light is apart. Efficiency is 1 / (MSE x time), over that of the baseline with "
+      "the same budget, or "
       "its "
       "best; above 1 is better. {5}</p>\n",
       escaped(study.name), kStyle, kVersion, escaped(machine), study.num_seeds,

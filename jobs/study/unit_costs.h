@@ -5,9 +5,9 @@
 
 namespace baton {
 
-/// CPU microseconds of a method's counted work by fixed unit costs: a stand-in for time that is the
+/// CPU microseconds of a job's counted work by fixed unit costs: a stand-in for time that is the
 /// same on every run and machine, for choices that must be repeatable. The units are a fit to the
 /// runs of jobs/studies/unit-costs.json (docs/charts.md names machine and residual).
-double counted_cost_us(Method method, const RunCounts& counts);
+double counted_cost_us(const JobSpec& job, const RunCounts& counts);
 
 }  // namespace baton

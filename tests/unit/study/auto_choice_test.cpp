@@ -14,7 +14,7 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 
 PilotNumbers numbers(const std::string& family, int n, double error, double cost_us) {
-  PilotNumbers result{{family, {}}, error, cost_us};
+  PilotNumbers result{{family, {}, false}, error, cost_us};
   result.candidate.sampling.num_particles = n;
   return result;
 }
@@ -85,12 +85,15 @@ TEST(AutoCandidates, NothingIsCarriedWhereThereIsOneFrame) {
   EXPECT_FALSE(carries(job));
 }
 
-TEST(AutoCandidates, ThePoolTakesEvenNumbers) {
+TEST(AutoCandidates, HalvesTakeEvenNumbers) {
   const auto tries_pool = [](const JobSpec& job) {
+    bool found = false;
     for (const AutoCandidate& candidate : auto_candidates(job)) {
-      if (candidate.sampling.method == Method::pool) return true;
+      const bool halves = candidate.sampling.method == Method::pool || candidate.correlated;
+      EXPECT_TRUE(!halves || candidate.sampling.num_particles % 2 == 0);
+      found = found || candidate.sampling.method == Method::pool;
     }
-    return false;
+    return found;
   };
   JobSpec job = automatic_job();
   job.frames = {1, 2};
@@ -116,7 +119,8 @@ TEST(AutoCandidates, AreSettledThemselves) {
 TEST(AutoChoice, IsWrittenIntoTheJob) {
   JobSpec job = automatic_job();
   const std::vector<PilotNumbers> pilot{numbers("a", 16, 0.2, 2)};
-  apply_choice({pilot[0].candidate.sampling, 0.2, 2, "because"}, pilot, job);
+  apply_choice({pilot[0].candidate.sampling, true, 0.2, 2, "because"}, pilot, job);
+  EXPECT_TRUE(job.visibility.correlated);
   EXPECT_EQ(job.sampling, pilot[0].candidate.sampling);
   EXPECT_EQ(job.metadata["auto.reason"], "because");
   EXPECT_EQ(job.metadata["auto.pilot"], "a N=16: error 0.2000, 2.00 us");
