@@ -71,9 +71,9 @@ std::vector<Case> make_cases() {
   }
   for (const int c : {1, 2, 4, 8, 16, 25}) {
     cases.push_back({fmt::format("corrected C={}", c), Method::bidirectional, 16, 725,
-                     second_pass(corrected, cross_fold, c), "corrected, cross-fold"});
+                     second_pass(corrected, cross_fold, c), "corrected"});
     cases.push_back({fmt::format("corrected C={}, same", c), Method::bidirectional, 16, 725,
-                     second_pass(corrected, same_samples, c), "corrected, same samples"});
+                     second_pass(corrected, same_samples, c), "same-samples mask"});
   }
   for (const int c : {1, 2, 4, 6}) {
     cases.push_back({fmt::format("extra-samples C={}", c), Method::bidirectional, 16, 725,
