@@ -1,5 +1,6 @@
 // Every method against brute force on a scene with hard and soft shadow, gloss, metal and silhouettes. Runs (seeds) are
 // independent; pixels and frames of one run are not, so all statistics are taken over runs.
+#include <fmt/format.h>
 #include <gtest/gtest.h>
 
 #include "tests/stat/against_brute_force.h"
@@ -121,6 +122,9 @@ JobSpec pool_job(int frames) {
 TEST(Methods, PoolAgreesWithBruteForceAtItsFirstFrame) { expect_agreement(pool_job(1), 200, 0.01); }
 TEST(Methods, PoolAgreesWithBruteForceAfterFiveFrames) { expect_agreement(pool_job(5), 200, 0.01); }
 TEST(Methods, PoolAgreesWithBruteForceAfterTwentyFrames) { expect_agreement(pool_job(20), 200, 0.01); }
+TEST(Methods, PoolAgreesWithBruteForceAfterAHundredFrames) {
+  expect_agreement(pool_job(100), kRuns, 0.01);
+}
 TEST(Methods, PoolWithoutMemoryAgrees) {
   JobSpec job = pool_job(5);
   job.sampling.visibility_memory = false;
@@ -146,6 +150,27 @@ TEST(Methods, PoolFindsTheLightAfterBlack) {
   const std::string black = test::write_map("black.exr", test::constant_map(64, 32, {0, 0, 0}));
   const std::string sky = test::write_map("sky.exr", test::sky_map());
   expect_agreement(changing_job({{1, sky}, {2, black}, {4, sky}}, 5), 200, 0.01);
+}
+// One frame of a thousand times the sky without its sun: the frame of the flash, and the next.
+TEST(Methods, PoolAgreesInAFlashAndAfterIt) {
+  RgbImage bright = test::sky_map(64, 32, 0.1f);
+  for (float& value : bright.rgb) value *= 1000;
+  const std::string sky = test::write_map("sky.exr", test::sky_map());
+  const std::string flash = test::write_map("flash.exr", bright);
+  for (const int frames : {4, 5})
+    expect_agreement(changing_job({{1, sky}, {4, flash}, {5, sky}}, frames), 200, 0.02);
+}
+// The map lights up from the top, row by row: there are always directions that no carried
+// sample can know.
+TEST(Methods, PoolAgreesWhileTheSupportGrows) {
+  std::vector<std::pair<int, std::string>> maps;
+  for (int frame = 1; frame <= 5; ++frame) {
+    RgbImage part = test::sky_map();
+    const auto lit = part.rgb.size() * static_cast<std::size_t>(frame + 1) / 12;
+    std::fill(part.rgb.begin() + static_cast<std::ptrdiff_t>(lit), part.rgb.end(), 0.0f);
+    maps.emplace_back(frame, test::write_map(fmt::format("part{}.exr", frame), part));
+  }
+  expect_agreement(changing_job(maps, 5), 200, 0.02);
 }
 
 // The same machinery must see a ground that reflects 4 % too much.

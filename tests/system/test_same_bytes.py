@@ -64,6 +64,26 @@ def correlated_visibility(programs, folder):
         check_equal(got, expected, f"pixels of {name}")
 
 
+def pool(programs, folder):
+    """The sampler with a memory, still and with a camera that moves."""
+    keys = [{"frame": 1, "position": [0, 1.2, 5], "lookAt": [0, 0.6, 0]},
+            {"frame": 4, "position": [0.4, 1.3, 4.9], "lookAt": [0, 0.6, 0]}]
+    for motion in ["still", "moving"]:
+        expected = None
+        for name, workers, threads, tile_size in [("whole-image", 1, 2, 160), ("small-tiles", 2, 1, 16)]:
+            place = folder / motion / name
+            job = make_job(place, frames="1-4", image={"tileSize": tile_size, "sites": 4},
+                           sampling={"method": "pool"})
+            del job["sampling"]["numDistributions"]
+            if motion == "moving":
+                job["camera"]["keys"] = keys
+            programs.render(write_job(place / "job.json", job), place / "work", workers, threads)
+            got = programs.pixels(place / "frames"), programs.states(place / "work")
+            check_equal(len(got[0]), 4, f"frames of {motion} {name}")
+            expected = expected or got
+            check_equal(got, expected, f"pixels and samples of {motion} {name}")
+
+
 def equal_jobs_make_equal_files(programs, folder):
     """Two runs of the same job file give the same bytes, headers included."""
     files = []
@@ -148,6 +168,7 @@ if __name__ == "__main__":
         one_site,
         four_sites,
         correlated_visibility,
+        pool,
         equal_jobs_make_equal_files,
         a_killed_worker,
         a_killed_coordinator,

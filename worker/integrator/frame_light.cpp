@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 
 #include "common/base/limits.h"
 
@@ -31,6 +32,16 @@ void insert_in_front(List& cache, std::int32_t key, std::shared_ptr<const Value>
     total += size_bytes(*it->second);
     it = total > limits::kMaxEnvironmentCacheBytes && it != cache.begin() ? cache.erase(it) : std::next(it);
   }
+}
+
+/// Factor on the weight of carried samples: what the light before is worth now. The ratio of the
+/// powers makes both targets comparable; the overlap says how many samples lie where the light is,
+/// and few of many make more noise than their share. Depends on no sample.
+float kinship(const EnvironmentMap& before, const EnvironmentMap& now) {
+  if (&before == &now) return 1;
+  if (before.black() || now.black()) return 0;
+  return static_cast<float>(now.total_power() / before.total_power() *
+                            std::pow(before.overlap(now), 4));
 }
 
 }  // namespace
@@ -86,9 +97,11 @@ Result<std::shared_ptr<const FrameLight>> LightSequence::at(std::int32_t index) 
   BATON_ASSIGN(light->now, environment(frame.environment));
   BATON_ASSIGN(light->before, environment(frame_before.environment));
   light->still = frame.environment == frame_before.environment;
+  const bool pool = job_.sampling.method == Method::pool;
+  if (pool) light->gain = kinship(*light->before.map, *light->now.map);
   light->pool = make_light_pool(
       light->now, light->before, job_.seed, static_cast<std::uint32_t>(frame.number),
-      job_.sampling.method == Method::pool ? CarriedFrame::environment : CarriedFrame::world);
+      pool ? CarriedFrame::environment : CarriedFrame::world);
   light->prepare_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   insert_in_front(lights_, index, std::shared_ptr<const FrameLight>(light));
   return std::shared_ptr<const FrameLight>(light);

@@ -65,6 +65,7 @@ struct PixelRays {
   std::array<std::uint8_t, kCapacity> site;
   std::array<Value, kCapacity> value;
   Value constant;
+  float lns = 0;  ///< the method's best estimate of Lns
   /// Where a method keeps two independent halves: the rays from here on belong to the second, and
   /// `difference` is the first constant less the second. 0: one whole.
   std::size_t second_half = 0;
@@ -72,6 +73,7 @@ struct PixelRays {
 
   void clear() {
     count = second_half = 0;
+    lns = 0;
     constant = {};
     difference = {};
   }
@@ -104,8 +106,8 @@ class PixelSampler {
   virtual bool remembers() const { return false; }
 };
 
-/// The sampler of a job; null for Method::reference, which is no sampler of this kind (reference.h);
-/// Method::automatic is in no job that reaches a worker.
+/// The sampler of a job; null for Method::reference, which is no sampler of this kind
+/// (reference.h); Method::automatic is in no job that reaches a worker.
 std::unique_ptr<const PixelSampler> make_pixel_sampler(const SamplingSpec& spec);
 
 }  // namespace baton

@@ -58,8 +58,38 @@ HWY_INLINE VF FreeShare(const VisibilityCell* memory, const Vec3Lanes& w) {
   return hn::Mul(hn::Add(hn::ConvertTo(d, hn::ShiftRight<4>(bits)), half), hn::Set(d, 1.0f / 4096));
 }
 
-/// Targets below it count as none.
-inline constexpr float kDark = 1e-30f;
+/// Targets below it count as none; its products with densities are normal numbers.
+inline constexpr float kDark = 1e-20f;
+
+/// The surfaces that carried particles come from, turned with the environment: a direction of now
+/// meets them where the particle's direction of then met the surfaces themselves.
+inline SiteBlock TurnedSurfaces(const kernels::PoolInput& input) {
+  SiteBlock sites = input.old != nullptr ? input.old->sites : input.sites;
+  const Mat3 turn = input.now.rotation * input.before.rotation.transposed();
+  const auto apply = [&](std::size_t s, SiteBlock::Array& x, SiteBlock::Array& y,
+                         SiteBlock::Array& z) {
+    const Vec3 v = turn * Vec3{x[s], y[s], z[s]};
+    x[s] = v.x;
+    y[s] = v.y;
+    z[s] = v.z;
+  };
+  for (std::size_t s = 0; s < static_cast<std::size_t>(sites.num_sites); ++s) {
+    apply(s, sites.ns_x, sites.ns_y, sites.ns_z);
+    apply(s, sites.ng_x, sites.ng_y, sites.ng_z);
+    apply(s, sites.wo_x, sites.wo_y, sites.wo_z);
+    apply(s, sites.mirror_x, sites.mirror_y, sites.mirror_z);
+  }
+  return sites;
+}
+
+/// A vector of carried particles, located before it is needed.
+struct CarriedLanes {
+  VU code;
+  VI site;
+  VF contribution;
+  Vec3Lanes map_direction;
+  TexelLanes texels;
+};
 
 /// Fills the halves of one pixel's pool.
 class PoolGatherer {
@@ -70,49 +100,68 @@ class PoolGatherer {
         now_(unturned_view_of(input.now)),
         before_(unturned_view_of(input.before)),
         same_surface_(input.old == nullptr && input.now.rotation.m == input.before.rotation.m),
-        same_light_(input.now.map == input.before.map),
-        to_map_(input.now.rotation.transposed()) {}
+        same_light_(input.now.map == input.before.map) {
+    if (input.has_history && !same_surface_) surfaces_before_.emplace(TurnedSurfaces(input));
+  }
 
-  /// half: 0 or 1. random: of this half.
-  HWY_INLINE void Gather(std::uint32_t half, const Philox4x32::Counter& random,
-                         kernels::PoolHalf& out) const {
+  /// Fills both halves.
+  HWY_INLINE void Gather(const Rng& rng, std::array<kernels::PoolHalf, 2>& out) const {
+    // The texels of the particles arrive while the light pool's candidates are looked at.
+    const std::size_t vectors = input_.has_history ? VectorsOfHalf() : 0;
+    CarriedLanes carried[2 * kMaxVectors];
+    for (std::size_t v = 0; v < 2 * vectors; ++v) {
+      carried[v] = Locate(v / vectors, v % vectors * hn::Lanes(DF()));
+      PrefetchTexels(now_, carried[v].texels);
+    }
     const DF d;
-    Sums sums{hn::Zero(d), hn::Zero(d), {hn::Zero(d), hn::Zero(d), hn::Zero(d)}};
-    out.count = 0;
-    if (input_.has_history) AddCarried(half, out, sums);
-    AddLight(random, out, sums);
-    AddBsdf(random, out, sums);
     const auto sum = [&](VF v) HWY_ATTR { return hn::GetLane(hn::SumOfLanes(d, v)); };
-    out.lns = sum(sums.weight);
-    out.visible = sum(sums.visible);
-    out.visible_color = {sum(sums.color.x), sum(sums.color.y), sum(sums.color.z)};
-    out.carry_total = SumOfWeights(out.carry_weight, out.count);
-    out.ray_total = SumOfWeights(out.ray_weight, out.count);
+    for (std::uint32_t half = 0; half < 2; ++half) {
+      const Philox4x32::Counter random = rng.bits(0, half);
+      kernels::PoolHalf& pool = out[half];
+      pool.count = 0;
+      Sums sums{hn::Zero(d), hn::Zero(d), hn::Zero(d), {hn::Zero(d), hn::Zero(d), hn::Zero(d)}};
+      AddLight(random, pool, sums);
+      AddBsdf(random, pool, sums);
+      for (std::size_t v = 0; v < vectors; ++v) AddCarried(carried[half * vectors + v], pool, sums);
+      pool.lns = sum(sums.weight);
+      pool.lns_fresh = sum(sums.fresh);
+      pool.visible = sum(sums.visible);
+      pool.visible_color = {sum(sums.color.x), sum(sums.color.y), sum(sums.color.z)};
+      pool.carry_total = SumOfWeights(pool.carry_weight, pool.count);
+      pool.ray_total = SumOfWeights(pool.ray_weight, pool.count);
+    }
   }
 
  private:
+  static constexpr std::size_t kMaxVectors =
+      (limits::kMaxParticles / 2 + hn::MaxLanes(DF()) - 1) / hn::MaxLanes(DF());
   struct Sums {
-    VF weight, visible;
+    VF weight, fresh, visible;
     Vec3Lanes color;
   };
 
-  /// The target before, as the site that inherits it sees it (OldSurfaces); f, if the surface
-  /// stayed with the map, is that of now.
-  HWY_INLINE VF TargetBefore(const BsdfLanes& f, const SurfaceLanes& surface, VI site,
-                             const Vec3Lanes& map_direction, VF r, VF g, VF b) const {
-    if (same_surface_) return MeanLanes(ReflectedRadiance(surface, f, r, g, b));
-    const SiteBlock& sites = input_.old != nullptr ? input_.old->sites : input_.sites;
-    const SurfaceLanes old = LoadSurfaces(sites, site);
-    const BsdfLanes old_f =
-        EvaluateBsdf(old, Transform(input_.before.rotation.m.data(), map_direction));
-    const VF target = MeanLanes(ReflectedRadiance(old, old_f, r, g, b));
-    if (input_.old == nullptr) return target;
-    return hn::Mul(target, ExpLanes(LookUp(input_.old->log_share, site, input_.sites.num_sites)));
+  /// Whether the target before is that of now: nothing has changed, or there is none.
+  bool SameTarget() const { return !input_.has_history || (same_surface_ && same_light_); }
+
+  /// Reflected light now, and both targets. f: of `surface` now. before: the surface that the site
+  /// inherits from, its samples shared among heirs (OldSurfaces).
+  HWY_INLINE void SetTargets(const SurfaceLanes& surface, const SurfaceLanes& before,
+                             const BsdfLanes& f, const RadianceLanes& light,
+                             const RadianceLanes& then, PoolPoint& p) const {
+    p.reflected = ReflectedRadiance(surface, f, light.r, light.g, light.b);
+    p.target = MeanLanes(p.reflected);
+    p.target_before = p.target;
+    if (SameTarget()) return;
+    const BsdfLanes f_before = same_surface_ ? f : EvaluateBsdf(before, p.world);
+    p.target_before = MeanLanes(ReflectedRadiance(before, f_before, then.r, then.g, then.b));
+    if (input_.old == nullptr) return;
+    const VF log_share = LookUp(input_.old->log_share, p.site, input_.sites.num_sites);
+    p.target_before = hn::Mul(p.target_before, ExpLanes(log_share));
   }
 
   HWY_INLINE VF Gain() const { return hn::Set(DF(), input_.has_history ? settings_.gain : 0.0f); }
 
-  /// fresh_weight() of candidates, of which the first `left` count.
+  /// fresh_weight() of candidates over their target; the first `left` count.
   HWY_INLINE VF FreshWeight(const PoolPoint& p, const SurfaceLanes& surface, const BsdfLanes& f,
                             VF light_density, std::size_t left) const {
     const DF d;
@@ -124,21 +173,27 @@ class PoolGatherer {
     }
     MF live = hn::And(hn::Gt(p.target, hn::Set(d, kDark)), hn::Gt(proposal, hn::Zero(d)));
     if (left < hn::Lanes(d)) live = hn::And(live, hn::FirstN(d, left));
-    const VF one = hn::Set(d, 1.0f);
     const VF share = hn::Set(
         d, static_cast<float>(input_.sites.num_hits) / static_cast<float>(input_.sites.num_sites));
-    const VF balance =
-        hn::Div(p.target, hn::IfThenElse(live, hn::MulAdd(Gain(), p.target_before, p.target), one));
-    const VF plain = hn::Div(hn::Mul(p.target, share), hn::IfThenElse(live, proposal, one));
-    return hn::IfThenElseZero(live, hn::Mul(balance, plain));
+    const VF balance = hn::Mul(hn::MulAdd(Gain(), p.target_before, p.target), proposal);
+    return hn::IfThenElseZero(
+        live, hn::Div(hn::Mul(p.target, share), hn::IfThenElse(live, balance, hn::Set(d, 1.0f))));
   }
 
-  /// Appends a vector of points.
-  HWY_INLINE void Append(const PoolPoint& p, VF weight, kernels::PoolHalf& out, Sums& sums) const {
+  /// Appends fresh candidates, which also estimate Lns by themselves.
+  HWY_INLINE void AppendFresh(const PoolPoint& p, VF per_target, kernels::PoolHalf& out,
+                              Sums& sums) const {
+    const VF both = hn::MulAdd(Gain(), p.target_before, p.target);
+    sums.fresh = hn::MulAdd(per_target, both, sums.fresh);
+    Append(p, per_target, out, sums);
+  }
+
+  /// Appends a vector of points. per_target: their weight over their target.
+  HWY_INLINE void Append(const PoolPoint& p, VF per_target, kernels::PoolHalf& out,
+                         Sums& sums) const {
     const DF d;
     const VF one = hn::Set(d, 1.0f);
-    const VF per_target = hn::IfThenElseZero(
-        hn::Gt(weight, hn::Zero(d)), hn::Div(weight, hn::Max(p.target, hn::Set(d, 1e-37f))));
+    const VF weight = hn::Mul(p.target, per_target);
     const auto at = static_cast<std::size_t>(out.count);
     const VF r = hn::Mul(p.reflected.x, per_target);
     const VF g = hn::Mul(p.reflected.y, per_target);
@@ -174,59 +229,73 @@ class PoolGatherer {
                   hn::MulAdd(b, free, sums.color.z)};
   }
 
-  /// The particles of this half with their carried_weight(). A half stands for the whole pixel: it
-  /// counts double.
-  HWY_INLINE void AddCarried(std::uint32_t half, kernels::PoolHalf& out, Sums& sums) const {
-    const DF d;
-    const auto per_half = static_cast<std::size_t>(settings_.num_carried / 2);
-    const std::size_t first = half * per_half;
-    for (std::size_t i = 0; i < per_half; i += hn::Lanes(d)) {
-      HWY_ALIGN std::uint32_t codes[hn::MaxLanes(DU())] = {};
-      HWY_ALIGN std::int32_t sites[hn::MaxLanes(DI())] = {};
-      HWY_ALIGN float contributions[hn::MaxLanes(DF())] = {};
-      for (std::size_t lane = 0; lane < std::min(per_half - i, hn::Lanes(d)); ++lane) {
-        codes[lane] = input_.code[first + i + lane];
-        sites[lane] = input_.site[first + i + lane];
-        contributions[lane] = 2 * input_.contribution[first + i + lane];
-      }
-      PoolPoint p;
-      p.code = hn::Load(DU(), codes);
-      p.site = hn::Load(DI(), sites);
-      const SurfaceLanes surface = LoadSurfaces(input_.sites, p.site);
-      VF density;
-      Evaluate(surface, DecodeOctahedral(p.code), p, density);
-      const MF live =
-          hn::And(hn::Gt(p.target, hn::Set(d, kDark)), hn::Gt(p.target_before, hn::Zero(d)));
-      const VF total =
-          hn::IfThenElse(live, hn::MulAdd(Gain(), p.target_before, p.target), hn::Set(d, 1.0f));
-      const VF share = hn::Div(hn::Mul(Gain(), p.target), total);
-      Append(p, hn::IfThenElseZero(live, hn::Mul(share, hn::Load(d, contributions))), out, sums);
-    }
+  std::size_t ParticlesOfHalf() const {
+    return static_cast<std::size_t>(settings_.num_carried / 2);
+  }
+  std::size_t VectorsOfHalf() const {
+    return (ParticlesOfHalf() + hn::Lanes(DF()) - 1) / hn::Lanes(DF());
   }
 
-  /// Looks everything up at directions in the map's frame; density: of the light's table.
-  HWY_INLINE BsdfLanes Evaluate(const SurfaceLanes& surface, const Vec3Lanes& map_direction,
+  /// Particles i, i + 1, ... of a half, which stands for the whole pixel: they count double.
+  HWY_INLINE CarriedLanes Locate(std::size_t half, std::size_t i) const {
+    const DF d;
+    const std::size_t first = half * ParticlesOfHalf() + i;
+    HWY_ALIGN std::uint32_t codes[hn::MaxLanes(DU())] = {};
+    HWY_ALIGN std::int32_t sites[hn::MaxLanes(DI())] = {};
+    HWY_ALIGN float contributions[hn::MaxLanes(DF())] = {};
+    for (std::size_t lane = 0; lane < std::min(ParticlesOfHalf() - i, hn::Lanes(d)); ++lane) {
+      codes[lane] = input_.code[first + lane];
+      sites[lane] = input_.site[first + lane];
+      contributions[lane] = 2 * input_.contribution[first + lane];
+    }
+    CarriedLanes p;
+    p.code = hn::Load(DU(), codes);
+    p.site = hn::Load(DI(), sites);
+    p.contribution = hn::Load(d, contributions);
+    p.map_direction = DecodeOctahedral(p.code);
+    p.texels = LocateTexels(now_, p.map_direction);
+    return p;
+  }
+
+  /// Particles with their carried_weight().
+  HWY_INLINE void AddCarried(const CarriedLanes& particles, kernels::PoolHalf& out,
+                             Sums& sums) const {
+    const DF d;
+    PoolPoint p;
+    p.code = particles.code;
+    p.site = particles.site;
+    const SurfaceLanes surface = LoadSurfaces(input_.sites, p.site);
+    VF density;
+    Evaluate(surface, same_surface_ ? surface : LoadSurfaces(*surfaces_before_, p.site),
+             particles.map_direction, particles.texels, p, density);
+    const MF live =
+        hn::And(hn::Gt(p.target, hn::Set(d, kDark)), hn::Gt(p.target_before, hn::Zero(d)));
+    const VF total =
+        hn::IfThenElse(live, hn::MulAdd(Gain(), p.target_before, p.target), hn::Set(d, 1.0f));
+    const VF share = hn::Div(Gain(), total);
+    Append(p, hn::IfThenElseZero(live, hn::Mul(share, particles.contribution)), out, sums);
+  }
+
+  /// Looks everything up at directions in the map's frame, which lie on `texels` of the map of now;
+  /// density: of the light's table.
+  HWY_INLINE BsdfLanes Evaluate(const SurfaceLanes& surface, const SurfaceLanes& before,
+                                const Vec3Lanes& map_direction, const TexelLanes& texels,
                                 PoolPoint& p, VF& density) const {
     p.world = Transform(input_.now.rotation.m.data(), map_direction);
     const BsdfLanes f = EvaluateBsdf(surface, p.world);
-    const RadianceLanes light = EvaluateEnvironment(now_, map_direction);
+    const RadianceLanes light = EvaluateTexels(now_, texels);
     const RadianceLanes then =
         same_light_ || !input_.has_history ? light : EvaluateEnvironment(before_, map_direction);
-    SetTargets(surface, f, light, then, map_direction, p);
+    SetTargets(surface, before, f, light, then, p);
     density = light.density;
     return f;
   }
 
-  /// Reflected light now, and both targets.
-  HWY_INLINE void SetTargets(const SurfaceLanes& surface, const BsdfLanes& f,
-                             const RadianceLanes& light, const RadianceLanes& then,
-                             const Vec3Lanes& map_direction, PoolPoint& p) const {
-    p.reflected = ReflectedRadiance(surface, f, light.r, light.g, light.b);
-    p.target = MeanLanes(p.reflected);
-    p.target_before = p.target;
-    if (input_.has_history && !(same_surface_ && same_light_)) {
-      p.target_before = TargetBefore(f, surface, p.site, map_direction, then.r, then.g, then.b);
-    }
+  /// The surfaces before of candidates i, i + 1, ... of a deal; `now`, where they are the same.
+  HWY_INLINE SurfaceLanes LoadBefore(const SiteDeal& deal, std::size_t i,
+                                     const SurfaceLanes& now) const {
+    VI site;
+    return !input_.has_history || same_surface_ ? now : deal.Load(*surfaces_before_, i, site);
   }
 
   /// Fresh candidates from the light pool: contiguous entries from a random aligned start.
@@ -253,8 +322,8 @@ class PoolGatherer {
                                 hn::Load(d, block.b + at), hn::Load(d, block.density + at)};
       const RadianceLanes then{hn::Load(d, block.before_r + at), hn::Load(d, block.before_g + at),
                                hn::Load(d, block.before_b + at), light.density};
-      SetTargets(surface, f, light, then, Transform(to_map_.m.data(), p.world), p);
-      Append(p, FreshWeight(p, surface, f, light.density, count - i), out, sums);
+      SetTargets(surface, LoadBefore(deal, i, surface), f, light, then, p);
+      AppendFresh(p, FreshWeight(p, surface, f, light.density, count - i), out, sums);
     }
   }
 
@@ -280,8 +349,10 @@ class PoolGatherer {
           SampleBsdf(surface, specular_probability, UniformLanes(d, sx), UniformLanes(d, sy));
       p.code = EncodeOctahedral(Transform(to_map_.m.data(), drawn));
       VF density;
-      const BsdfLanes f = Evaluate(surface, DecodeOctahedral(p.code), p, density);
-      Append(p, FreshWeight(p, surface, f, density, count - i), out, sums);
+      const Vec3Lanes w = DecodeOctahedral(p.code);
+      const BsdfLanes f =
+          Evaluate(surface, LoadBefore(deal, i, surface), w, LocateTexels(now_, w), p, density);
+      AppendFresh(p, FreshWeight(p, surface, f, density, count - i), out, sums);
     }
   }
 
@@ -290,7 +361,8 @@ class PoolGatherer {
   const EnvironmentView now_, before_;  ///< for directions in the map's frame
   const bool same_surface_;             ///< as seen from the map
   const bool same_light_;               ///< the map's texels
-  const Mat3 to_map_;
+  const Mat3 to_map_ = input_.now.rotation.transposed();
+  std::optional<SiteBlock> surfaces_before_;  ///< turned; where they differ from those of now
 };
 
 }  // namespace baton::HWY_NAMESPACE

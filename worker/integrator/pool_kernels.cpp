@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <optional>
 
 #include "common/base/check.h"
 #include "common/math/low_discrepancy.h"
@@ -19,10 +20,7 @@ namespace baton::HWY_NAMESPACE {
 
 void GatherPool(const kernels::PoolInput& input, const PoolSettings& settings, const Rng& rng,
                 std::array<kernels::PoolHalf, 2>& out) {
-  const PoolGatherer gatherer(input, settings);
-  for (std::uint32_t half = 0; half < 2; ++half) {
-    gatherer.Gather(half, rng.bits(0, half), out[half]);
-  }
+  PoolGatherer(input, settings).Gather(rng, out);
 }
 
 }  // namespace baton::HWY_NAMESPACE
@@ -43,7 +41,7 @@ void gather_pool(const PoolInput& input, const PoolSettings& settings, const Rng
   if (input.light_pool.empty()) {
     for (PoolHalf& half : out) {
       half.count = 0;
-      half.lns = half.visible = half.carry_total = half.ray_total = 0;
+      half.lns = half.lns_fresh = half.visible = half.carry_total = half.ray_total = 0;
       half.visible_color = {};
     }
     return;

@@ -30,7 +30,7 @@ struct PoolInput {
   std::span<const VisibilityCell> memory;  ///< (kVisibilityCells), or empty: nothing is remembered
 };
 
-/// One half of a pixel's pool: carried particles and fresh candidates under the balance of
+/// One half of a pixel's pool: fresh candidates and then carried particles under the balance of
 /// sampling/pool.h. The sum of the weights has the expectation Lns for each half by itself.
 struct PoolHalf {
   static constexpr std::size_t kCapacity =
@@ -46,8 +46,9 @@ struct PoolHalf {
   std::int32_t count = 0;
   float carry_total = 0, ray_total = 0;  ///< sums of carry_weight and ray_weight
   float lns = 0;                         ///< sum of the weights
-  float visible = 0;  ///< sum of weight * V^
-  Rgb visible_color;  ///< sum of (r, g, b) * V^
+  float lns_fresh = 0;                   ///< what the fresh candidates alone make of Lns
+  float visible = 0;                     ///< sum of weight * V^
+  Rgb visible_color;                     ///< sum of (r, g, b) * V^
 };
 
 /// Fills both halves of the pool; they share no sample. A black map leaves them empty.

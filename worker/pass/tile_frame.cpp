@@ -45,6 +45,12 @@ void count_sampling(const PixelDiagnostics& did, PixelSource source, float ess_r
   stats.count_ess(ess_ratio);
 }
 
+/// Asks for a pixel's memory early: those of a tile are larger than the caches.
+void fetch_ahead(std::span<const MemoryCell> memory) {
+  constexpr std::size_t kCellsOfLine = 64 / sizeof(MemoryCell);
+  for (std::size_t i = 0; i < memory.size(); i += kCellsOfLine) __builtin_prefetch(&memory[i]);
+}
+
 }  // namespace
 
 /// The pixels in work: [first, first + count) of the tile, with what one pass hands to the next.
@@ -182,6 +188,7 @@ void TileFrameRenderer::sample(Batch& batch, const FrameLight& light, SampleStat
     }
 
     // Sample, and cast the rays.
+    if (index + 1 < state.num_pixels()) fetch_ahead(state.memory_of(index + 1));
     const PixelHistory history = find_history(i, index, state);
     const PixelInput input{
         .sites = sites,
@@ -206,7 +213,7 @@ void TileFrameRenderer::sample(Batch& batch, const FrameLight& light, SampleStat
     // Keep the books.
     PixelResult& pixel = batch.pixels[i];
     pixel.mask = 1;
-    pixel.lns = mean_lns(state, index);
+    pixel.lns = context_.sampler->chooses_rays() ? rays.lns : mean_lns(state, index);
     pixel.source = latest_source(state, index);
     pixel.ess_ratio = did.ess / static_cast<float>(n);
     pixel.acceptance = acceptance_rate({did.local.proposed + did.independent.proposed,

@@ -1,4 +1,5 @@
-// Environment look-ups in SIMD: EnvironmentMap::evaluate for a vector of directions. Included once per Highway target.
+// Environment look-ups in SIMD: EnvironmentMap::evaluate for a vector of directions. Included once
+// per Highway target.
 #if defined(BATON_WORKER_SCENE_ENVIRONMENT_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef BATON_WORKER_SCENE_ENVIRONMENT_INL_H_
 #undef BATON_WORKER_SCENE_ENVIRONMENT_INL_H_
@@ -6,6 +7,7 @@
 #define BATON_WORKER_SCENE_ENVIRONMENT_INL_H_
 #endif
 
+#include <hwy/cache_control.h>
 #include <hwy/highway.h>
 
 #include "common/math/lanes-inl.h"
@@ -80,8 +82,15 @@ HWY_INLINE RadianceLanes LoadTexelsBilinear(const EnvironmentView& view, VI inde
   return out;
 }
 
-/// Radiance and density along unit world directions.
-HWY_INLINE RadianceLanes EvaluateEnvironment(const EnvironmentView& view, const Vec3Lanes& world) {
+/// Where a look-up reads: the upper left texel, and with a bilinear map how far it is into the
+/// cell.
+struct TexelLanes {
+  VI index;
+  VF fx, fy;
+};
+
+/// The texels along unit world directions.
+HWY_INLINE TexelLanes LocateTexels(const EnvironmentView& view, const Vec3Lanes& world) {
   const DF d;
   const DI di;
   VF x, y;
@@ -89,7 +98,8 @@ HWY_INLINE RadianceLanes EvaluateEnvironment(const EnvironmentView& view, const 
   if (!view.bilinear) {
     const VI i = hn::Min(hn::ConvertTo(di, x), hn::Set(di, view.width - 1));
     const VI j = hn::Min(hn::ConvertTo(di, y), hn::Set(di, view.height - 1));
-    return LoadTexels(view, TexelIndex(view, hn::Max(i, hn::Zero(di)), hn::Max(j, hn::Zero(di))));
+    return {TexelIndex(view, hn::Max(i, hn::Zero(di)), hn::Max(j, hn::Zero(di))), hn::Zero(d),
+            hn::Zero(d)};
   }
   const VF half = hn::Set(d, 0.5f);
   const VF minus_half = hn::Set(d, -0.5f);
@@ -99,7 +109,28 @@ HWY_INLINE RadianceLanes EvaluateEnvironment(const EnvironmentView& view, const 
   const VF floor_y = hn::Floor(y);
   const VI i = hn::Min(hn::ConvertTo(di, floor_x), hn::Set(di, view.width - 1));
   const VI j = hn::Min(hn::ConvertTo(di, floor_y), hn::Set(di, view.height - 1));
-  return LoadTexelsBilinear(view, TexelIndex(view, i, j), hn::Sub(x, floor_x), hn::Sub(y, floor_y));
+  return {TexelIndex(view, i, j), hn::Sub(x, floor_x), hn::Sub(y, floor_y)};
+}
+
+/// Asks for the texels early: a map is larger than the caches.
+HWY_INLINE void PrefetchTexels(const EnvironmentView& view, const TexelLanes& at) {
+  HWY_ALIGN std::int32_t index[hn::MaxLanes(DI())];
+  hn::Store(at.index, DI(), index);
+  for (std::size_t lane = 0; lane < hn::Lanes(DI()); ++lane) {
+    const float* upper = view.texels + 4 * static_cast<std::ptrdiff_t>(index[lane]);
+    hwy::Prefetch(upper);
+    if (view.bilinear) hwy::Prefetch(upper + 4 * view.stride);
+  }
+}
+
+HWY_INLINE RadianceLanes EvaluateTexels(const EnvironmentView& view, const TexelLanes& at) {
+  if (!view.bilinear) return LoadTexels(view, at.index);
+  return LoadTexelsBilinear(view, at.index, at.fx, at.fy);
+}
+
+/// Radiance and density along unit world directions.
+HWY_INLINE RadianceLanes EvaluateEnvironment(const EnvironmentView& view, const Vec3Lanes& world) {
+  return EvaluateTexels(view, LocateTexels(view, world));
 }
 
 }  // namespace baton::HWY_NAMESPACE

@@ -147,12 +147,15 @@ TEST_P(Pool, WeightsAreThoseOfTheScalarCode) {
       int far_off = 0;
       double sum = 0;
       for (std::size_t i = 0; i < num_carried + 32; ++i) {
-        const float carried = i < num_carried ? 2 * u[8 * h + i] : 0;
+        const float carried = i >= 32 ? 2 * u[8 * h + i - 32] : 0;
         far_off += deviation(half, i, carried, has_history ? settings.gain : 0) > 2e-3 ? 1 : 0;
         sum += half.weight[i];
       }
       EXPECT_LE(far_off, 1);  // a direction on a cell's edge
       EXPECT_NEAR(half.lns, sum, 1e-4 * sum);
+      if (!has_history) {
+        EXPECT_NEAR(half.lns_fresh, half.lns, 1e-5 * half.lns);
+      }
     }
   }
 }
@@ -168,6 +171,15 @@ TEST_P(Pool, ReadsTheMemoryAsTheScalarCode) {
       EXPECT_NEAR(half.ray_weight[i], half.weight[i] * ray_factor(free), 1e-5f * half.weight[i]);
     }
   }
+}
+
+// Whatever the balance, the fresh candidates by themselves are those of a first frame.
+TEST_P(Pool, FreshCandidatesEstimateLnsAlone) {
+  gather(false);
+  const float alone = (*halves)[0].lns_fresh;
+  gather(true);
+  EXPECT_NEAR((*halves)[0].lns_fresh, alone, 1e-4f * alone);
+  EXPECT_NE((*halves)[0].lns, alone);
 }
 
 TEST_P(Pool, HalvesShareNoCandidate) {

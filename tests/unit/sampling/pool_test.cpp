@@ -48,6 +48,8 @@ class Chain {
     memory_.fill(0.5f);
   }
 
+  int with_control = 0, without_control = 0;  ///< halves shaded either way
+
   FrameEstimate step(const Target& before, const Target& now) {
     std::array<double, 2> image{};
     FrameEstimate e;
@@ -110,28 +112,39 @@ class Chain {
   }
 
   double shade(const std::vector<Particle>& pool, Target& learnt) {
+    // Choose the way, then the rays.
+    float expected = 0, doubt = 0;
+    for (const Particle& p : pool) {
+      expected += p.u * memory_[p.state];
+      doubt += p.u * ray_factor(memory_[p.state]);
+    }
+    const bool control = use_control(expected, doubt);
+    const auto factor = [&](float free) { return control ? ray_factor(free) : carry_factor(free); };
     std::vector<float> weight;
     float total = 0;
     for (const Particle& p : pool) {
-      weight.push_back(p.u * ray_factor(memory_[p.state]));
+      weight.push_back(p.u * factor(memory_[p.state]));
       total += weight.back();
     }
     const std::vector<std::size_t> picks = pick(weight, kHalfRays);
+
+    // Trace and learn.
     std::vector<bool> free;
     for (const std::size_t i : picks) {
       free.push_back(uniform() < kVisible[pool[i].state]);
       float& v = learnt[pool[i].state];
       v += ((free.back() ? 1.0f : 0.0f) - v) / 6;
     }
-    double sum = 0;
-    for (const Particle& p : pool) sum += p.u * memory_[p.state];
-    // The fault: a ray counts by the factor that it has itself helped to learn.
+
+    // Add up. The fault: a ray counts by the factor that it has itself helped to learn.
     const Target& factors = fault_ == Fault::rays_of_this_frame ? learnt : memory_;
+    double sum = control ? expected : 0.0f;
     for (std::size_t j = 0; j < picks.size(); ++j) {
       const std::size_t state = pool[picks[j]].state;
-      const double value = total / (static_cast<double>(kHalfRays) * ray_factor(factors[state]));
-      sum += value * ((free[j] ? 1.0 : 0.0) - memory_[state]);
+      const double value = total / (static_cast<double>(kHalfRays) * factor(factors[state]));
+      sum += value * ((free[j] ? 1.0 : 0.0) - (control ? memory_[state] : 0.0f));
     }
+    (control ? with_control : without_control) += 1;
     return sum;
   }
 
@@ -251,6 +264,13 @@ TEST(Pool, IsUnbiasedAtEveryFrame) {
       EXPECT_LT(v.resolution, 0.15) << c.name << " frame " << frame;
     }
   }
+}
+
+TEST(Pool, ShadesEitherWay) {
+  Chain chain(1, Fault::none);
+  for (int f = 0; f < 100; ++f) chain.step(lobe(0, 0.2f), lobe(f < 50 ? 0 : 4, 0.2f));
+  EXPECT_GT(chain.with_control, 20);
+  EXPECT_GT(chain.without_control, 5);
 }
 
 // The same machinery must see each way to spoil it.
