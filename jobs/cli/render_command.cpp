@@ -8,6 +8,7 @@
 #include "common/job/job_json.h"
 #include "common/job/sequence.h"
 #include "jobs/cli/ask_farm.h"
+#include "jobs/cli/asset_report.h"
 #include "jobs/cli/commands.h"
 #include "jobs/cli/coordinator_link.h"
 #include "jobs/cli/frame_sheet.h"
@@ -86,6 +87,13 @@ void write_sheet(const RenderOptions& options, const FrameSheet& sheet) {
   if (*path && !options.json) fmt::print("sheet      {}\n", (*path)->string());
 }
 
+/// Says how the job ended; one that failed because its files cannot be loaded is bad input.
+ExitCode exit_code_of(const JobSpec& job, JobStatus status) {
+  if (status != JobStatus::failed) return exit_code_of(status);
+  const Result<AssetReport> assets = load_assets(job);
+  return assets ? ExitCode::failed : exit_code_of(assets.error().kind);
+}
+
 Result<ExitCode> run_render(const RenderOptions& options) {
   const Clock::time_point start = Clock::now();
   BATON_ASSIGN(JobSpec written, load_job(options.job));
@@ -124,7 +132,7 @@ Result<ExitCode> run_render(const RenderOptions& options) {
     while (!signals.stop_requested_within(kFarmPollInterval)) BATON_TRY(farm.tend());
   }
   farm.stop();
-  return exit_code_of(detail->summary.status);
+  return exit_code_of(job, detail->summary.status);
 }
 
 }  // namespace

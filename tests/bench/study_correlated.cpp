@@ -1,7 +1,10 @@
 // The experiments of [Ghosh & Heidrich 2006] on one scene: error against time and rays, over the
 // image and in the penumbra. The light stands still and each frame has its own random numbers, so
-// frames are independent runs of one picture. Usage: study_correlated JOB.json [RUNS]
-// [REFERENCE_SAMPLES] [FOLDER for pictures]
+// frames are independent runs of one picture. Intervals are 95 % over runs.
+//
+// Usage: study_correlated JOB.json [RUNS] [REFERENCE_SAMPLES] [FOLDER]
+// FOLDER gets the table as CSV, charts of the error in the penumbra against rays and time, and the
+// pictures of the first run.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -11,8 +14,11 @@
 #include <string>
 #include <vector>
 
+#include "common/base/files.h"
 #include "common/image/image_io.h"
 #include "common/job/job_json.h"
+#include "jobs/study/intervals.h"
+#include "jobs/study/svg_chart.h"
 #include "worker/pass/render_context.h"
 #include "worker/pass/second_pass.h"
 
@@ -25,6 +31,7 @@ struct Case {
   int num_particles = 16;
   int num_candidates = 725;
   VisibilitySpec visibility = {};
+  std::string curve = {};  ///< of the charts; none: only in the table
 };
 
 VisibilitySpec second_pass(SecondPassForm form, MaskPolicy mask, int partitions = 16,
@@ -44,12 +51,8 @@ std::vector<Case> make_cases() {
       {"environment N=64", Method::environment, 64, 725},
       {"mis N=64", Method::mis, 64, 725},
       {"bidirectional N=20 M=800", Method::bidirectional, 20, 800},
-      {"bidirectional N=16 M=725", Method::bidirectional, 16, 725},
       {"bidirectional N=64 M=800", Method::bidirectional, 64, 800},
-      {"corrected, same samples", Method::bidirectional, 16, 725,
-       second_pass(corrected, same_samples)},
       {"corrected, split", Method::bidirectional, 16, 725, second_pass(corrected, split)},
-      {"corrected, cross-fold", Method::bidirectional, 16, 725, second_pass(corrected, cross_fold)},
       {"corrected, dilated 3x3", Method::bidirectional, 16, 725,
        second_pass(corrected, cross_fold, 16, 1)},
       {"published, same samples", Method::bidirectional, 16, 725,
@@ -58,13 +61,23 @@ std::vector<Case> make_cases() {
        second_pass(published_kept, same_samples)},
       {"corrected after mis N=64", Method::mis, 64, 725, second_pass(corrected, cross_fold, 4)},
   };
-  for (const int c : {1, 2, 4, 8}) {
-    cases.push_back({fmt::format("corrected C={}", c), Method::bidirectional, 16, 725,
-                     second_pass(corrected, cross_fold, c)});
+  for (const int n : {8, 12, 16, 24, 32, 48, 64}) {
+    cases.push_back({fmt::format("bidirectional N={} M=725", n),
+                     Method::bidirectional,
+                     n,
+                     725,
+                     {},
+                     "no second pass"});
   }
-  for (const int c : {1, 2, 4}) {
+  for (const int c : {1, 2, 4, 8, 16, 25}) {
+    cases.push_back({fmt::format("corrected C={}", c), Method::bidirectional, 16, 725,
+                     second_pass(corrected, cross_fold, c), "corrected"});
+    cases.push_back({fmt::format("corrected C={}, same", c), Method::bidirectional, 16, 725,
+                     second_pass(corrected, same_samples, c), "same-samples mask"});
+  }
+  for (const int c : {1, 2, 4, 6}) {
     cases.push_back({fmt::format("extra-samples C={}", c), Method::bidirectional, 16, 725,
-                     second_pass(extra_samples, cross_fold, c)});
+                     second_pass(extra_samples, cross_fold, c), "extra-samples"});
   }
   return cases;
 }
@@ -90,7 +103,6 @@ Result<Picture> render(const RenderContext& context, std::int32_t frame) {
                                return Status();
                              }};
   BATON_ASSIGN(picture.stats, run_tile(context, {0, 0, frame, frame}, {}, sink, {}));
-  picture.stats.cpu_seconds -= picture.stats.seconds_light;
   if (!context.job.visibility.correlated) return picture;
   BATON_ASSIGN(SecondPassOutput second,
                run_second_pass(context, frame, 0, picture.film, std::span(&samples, 1)));
@@ -150,13 +162,14 @@ Errors compare(const FilmTile& film, const Truth& truth) {
   return {e.image / num_surface, e.mask / num_mask, difference / light};
 }
 
+/// What the runs of a case say. Errors are relative to bidirectional N = 20, M = 800 where they are
+/// ratios.
 struct Row {
-  Errors mse;
-  double bias_error = 0;    ///< standard error of the bias
-  double seconds = 0;       ///< CPU, a picture
-  double second_share = 0;  ///< of the second pass in it
+  Case of;
+  std::vector<double> image, mask, bias, seconds;  ///< (runs)
+  double second_share = 0;                         ///< of the second pass in the time
   double rays =
-      0;  ///< shadow rays per penumbra pixel: all of the second pass, the pixel's own of the first
+      0;  ///< shadow rays per penumbra pixel: all of the second pass, its own of the first
 };
 Result<Row> measure(const JobSpec& base, const Case& c, const Truth& truth, int runs,
                     const std::string& folder) {
@@ -168,28 +181,97 @@ Result<Row> measure(const JobSpec& base, const Case& c, const Truth& truth, int 
   job.frames.clear();
   for (int run = 1; run <= runs; ++run) job.frames.push_back(run);
   BATON_ASSIGN(const auto context, load_render_context(job, Digest{1, 1}));
-  Row row;
-  double bias_squares = 0;
+  Row row{.of = c, .image = {}, .mask = {}, .bias = {}, .seconds = {}};
   for (int run = 0; run < runs; ++run) {
     BATON_ASSIGN(const Picture picture, render(*context, run));
     const Errors e = compare(picture.film, truth);
-    row.mse.image += e.image / runs;
-    row.mse.mask += e.mask / runs;
-    row.mse.bias_mask += e.bias_mask / runs;
-    bias_squares += e.bias_mask * e.bias_mask / runs;
-    row.seconds += picture.stats.cpu_seconds / runs;
-    row.second_share += picture.stats.seconds_second_pass / picture.stats.cpu_seconds / runs;
-    const double masked = std::max<double>(static_cast<double>(picture.stats.pixels_masked), 1);
-    row.rays +=
-        (static_cast<double>(picture.stats.rays_second_pass) / masked + c.num_particles) / runs;
+    const RenderStats& stats = picture.stats;
+    const double seconds = stats.cpu_seconds - stats.seconds_light;
+    row.image.push_back(e.image);
+    row.mask.push_back(e.mask);
+    row.bias.push_back(e.bias_mask);
+    row.seconds.push_back(seconds);
+    row.second_share += stats.seconds_second_pass / seconds / runs;
+    const double masked = std::max<double>(static_cast<double>(stats.pixels_masked), 1);
+    row.rays += (static_cast<double>(stats.rays_second_pass) / masked + c.num_particles) / runs;
     if (run == 0 && !folder.empty()) {
       BATON_TRY(write_exr(std::filesystem::path(folder) / (base.name + " " + c.name + ".exr"),
                           picture.film, {}));
     }
   }
-  row.bias_error = std::sqrt(std::max(bias_squares - row.mse.bias_mask * row.mse.bias_mask, 0.0) /
-                             std::max(runs - 1, 1));
   return row;
+}
+
+double root(double squared) { return std::sqrt(std::max(squared, 0.0)); }
+
+/// Mean squared error in the penumbra times cost, `base` over `row`: above 1, `row` is better.
+Interval efficiency(const Row& base, const Row& row, double base_cost, double row_cost) {
+  const Interval ratio = ratio_interval(base.mask, row.mask);
+  const double factor = base_cost / row_cost;
+  return {ratio.low * factor, ratio.value * factor, ratio.high * factor};
+}
+
+std::string table_line(const Row& base, const Row& row) {
+  const Interval mask = mean_interval(row.mask);
+  const Interval bias = mean_interval(row.bias);
+  const double ms = 1000 * median(row.seconds);
+  const Interval by_time = efficiency(base, row, 1000 * median(base.seconds), ms);
+  const Interval by_rays = efficiency(base, row, base.rays, row.rays);
+  return fmt::format(
+      "{:<26} {:>6.1f} {:>4.0f}% {:>6.1f} {:>8.5f} {:>8.5f} [{:.5f}, {:.5f}] {:>+6.2f} [{:+.2f}, "
+      "{:+.2f}] {:>5.2f} [{:.2f}, {:.2f}] {:>5.2f} [{:.2f}, {:.2f}]\n",
+      row.of.name, ms, 100 * row.second_share, row.rays, root(mean_interval(row.image).value),
+      root(mask.value), root(mask.low), root(mask.high), 100 * bias.value, 100 * bias.low,
+      100 * bias.high, by_time.value, by_time.low, by_time.high, by_rays.value, by_rays.low,
+      by_rays.high);
+}
+
+/// The mean squared error in the penumbra against rays or time, one curve a way to spend them.
+Chart cost_chart(const std::string& name, const std::vector<Row>& rows, bool against_rays) {
+  Chart chart;
+  chart.title = name + ": mean squared error in the penumbra";
+  chart.x_label = against_rays ? "shadow rays of a penumbra pixel, both passes"
+                               : "CPU milliseconds of the picture, both passes";
+  chart.y_label = "mean squared error";
+  for (const Row& row : rows) {
+    if (row.of.curve.empty()) continue;
+    const auto same = [&](const ChartSeries& s) { return s.name == row.of.curve; };
+    auto at = std::find_if(chart.series.begin(), chart.series.end(), same);
+    if (at == chart.series.end()) {
+      chart.series.push_back({row.of.curve, static_cast<int>(chart.series.size()), {}});
+      at = chart.series.end() - 1;
+    }
+    const Interval mask = mean_interval(row.mask);
+    at->points.push_back({.x = against_rays ? row.rays : 1000 * median(row.seconds),
+                          .y = mask.value,
+                          .low = mask.low,
+                          .high = mask.high,
+                          .label = row.of.name});
+  }
+  return chart;
+}
+
+Status write_text(const std::filesystem::path& path, const std::string& text) {
+  return write_file_unsynced(path, as_bytes_view(text));
+}
+
+Status write_files(const std::filesystem::path& folder, const std::string& name,
+                   const std::vector<Row>& rows) {
+  std::string csv =
+      "case,curve,milliseconds,shareOfSecondPass,rays,mseImage,mseMask,mseMaskLow,"
+      "mseMaskHigh,biasMask,biasMaskLow,biasMaskHigh\n";
+  for (const Row& row : rows) {
+    const Interval mask = mean_interval(row.mask);
+    const Interval bias = mean_interval(row.bias);
+    csv += fmt::format(
+        "\"{}\",\"{}\",{:.2f},{:.3f},{:.1f},{:.4g},{:.4g},{:.4g},{:.4g},{:.4g},{:.4g},{:.4g}\n",
+        row.of.name, row.of.curve, 1000 * median(row.seconds), row.second_share, row.rays,
+        mean_interval(row.image).value, mask.value, mask.low, mask.high, bias.value, bias.low,
+        bias.high);
+  }
+  BATON_TRY(write_text(folder / (name + ".csv"), csv));
+  BATON_TRY(write_text(folder / (name + "-rays.svg"), svg_chart(cost_chart(name, rows, true))));
+  return write_text(folder / (name + "-time.svg"), svg_chart(cost_chart(name, rows, false)));
 }
 
 Status run(const std::string& path, int runs, int reference_samples, const std::string& folder) {
@@ -211,40 +293,31 @@ Status run(const std::string& path, int runs, int reference_samples, const std::
              job.name, job.image.width, job.image.height,
              100 * count(truth.penumbra) / count(truth.surface), runs, reference_samples,
              instruction_set());
-  fmt::print("{:<26} {:>8} {:>7} {:>7} {:>9} {:>9} {:>16} {:>8} {:>8}\n", "method", "ms", "pass 2",
-             "rays", "RMS", "RMS mask", "bias in mask", "eff", "per ray");
+  fmt::print("{:<26} {:>6} {:>5} {:>6} {:>8} {:>8} {:>18} {:>21} {:>18} {:>18}\n", "method", "ms",
+             "2nd", "rays", "RMS", "RMS mask", "", "bias in mask, %", "efficiency", "per ray");
 
-  // Efficiencies in the penumbra are relative to bidirectional N = 20, M = 800.
-  std::vector<std::pair<Case, Row>> rows;
-  double unit_time = 0, unit_rays = 0;
+  // Efficiencies in the penumbra are relative to the paper's single pass.
+  std::vector<Row> rows;
   for (const Case& c : make_cases()) {
-    BATON_ASSIGN(const Row row, measure(job, c, truth, runs, folder));
-    if (c.num_particles == 20) {
-      unit_time = row.mse.mask * row.seconds;
-      unit_rays = row.mse.mask * row.rays;
-    }
-    rows.emplace_back(c, row);
+    BATON_ASSIGN(Row row, measure(job, c, truth, runs, folder));
+    rows.push_back(std::move(row));
   }
-  for (const auto& [c, row] : rows) {
-    fmt::print(
-        "{:<26} {:>8.1f} {:>6.0f}% {:>7.1f} {:>9.5f} {:>9.5f} {:>+8.2f} ± {:.2f} % {:>8.2f} "
-        "{:>8.2f}\n",
-        c.name, 1000 * row.seconds, 100 * row.second_share, row.rays,
-        std::sqrt(std::max(row.mse.image, 0.0)), std::sqrt(std::max(row.mse.mask, 0.0)),
-        100 * row.mse.bias_mask, 196 * row.bias_error, unit_time / (row.mse.mask * row.seconds),
-        unit_rays / (row.mse.mask * row.rays));
-  }
-  return {};
+  const auto base = std::find_if(rows.begin(), rows.end(),
+                                 [](const Row& row) { return row.of.num_particles == 20; });
+  for (const Row& row : rows) fmt::print("{}", table_line(*base, row));
+  return folder.empty() ? Status() : write_files(folder, job.name, rows);
 }
 
 }  // namespace
 }  // namespace baton
 
 int main(int argc, char** argv) {
-  const auto number = [&](int i, int fallback) { return argc > i ? std::atoi(argv[i]) : fallback; };
-  const baton::Status done = baton::run(argc > 1 ? argv[1] : "jobs/studies/correlated/fig1.json",
-                                        number(2, 16), number(3, 4096), argc > 4 ? argv[4] : "");
-  if (done) return 0;
-  fmt::print(stderr, "{}\n", done.error().message);
+  const auto number = [&](int i, int otherwise) {
+    return argc > i ? std::atoi(argv[i]) : otherwise;
+  };
+  const baton::Status status = baton::run(argc > 1 ? argv[1] : "jobs/studies/correlated/fig1.json",
+                                          number(2, 20), number(3, 2048), argc > 4 ? argv[4] : "");
+  if (status.ok()) return 0;
+  fmt::print(stderr, "{}\n", status.error().message);
   return 65;
 }

@@ -2,14 +2,18 @@
 // product.
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 #include <limits>
+#include <numeric>
 
 #include "common/base/limits.h"
 #include "tests/stability/grid.h"
 #include "tests/stability/maps.h"
+#include "tests/stability/truth.h"
 #include "tests/support/small_scene.h"
+#include "worker/run/local_render.h"
 
 namespace baton::stability {
 namespace {
@@ -67,11 +71,11 @@ class SelfAdaptedSampler final : public PixelSampler {
       const SequentialSettings settings{.num_particles = static_cast<int>(count),
                                         .num_distributions = distributions,
                                         .local_move_cosine = std::cos(4 * kPi / 180)};
-      const SequentialOutcome outcome = kernels::sequential_step(
-          input.sites, input.old, input.before, input.now, input.light.pool, settings, samples.lns,
-          input.key,
-          {p.direction.data(), p.site.data(), p.weight.data(), samples.r.data(), samples.g.data(),
-           samples.b.data()});
+      const SequentialOutcome outcome =
+          kernels::sequential_step(input.sites, input.old, input.before, input.now,
+                                   input.light.pool, settings, samples.lns, input.key,
+                                   {p.direction.data(), p.site.data(), p.weight.data(),
+                                    samples.r.data(), samples.g.data(), samples.b.data()});
       if (!outcome.alive) break;
       if (distributions == 1 && outcome.ess < ess_ratio_min_ * static_cast<float>(count)) continue;
       std::copy_n(p.direction.begin(), count, samples.direction.begin());
@@ -126,6 +130,89 @@ TEST(Machinery, SeesAGroundThatReflectsTooMuch) {
   EXPECT_NE(judged(turning_case(), wrong, kShortEffort).judgement.verdict, Verdict::holds);
   EXPECT_EQ(judged(turning_case(), fresh_subject(), kShortEffort).judgement.verdict,
             Verdict::holds);
+}
+
+/// A second pass after so few samples that its mask often misses a pixel; many independent frames
+/// of a light that stands still.
+JobSpec second_pass_job(MaskPolicy mask) {
+  JobSpec job = Stage(test::test_folder()).boxes(other_map());
+  job.sampling.method = Method::bidirectional;
+  job.sampling.num_particles = 4;
+  job.visibility = {.correlated = true, .mask = mask};
+  job.state.carry = false;
+  job.frames.resize(2500);
+  std::iota(job.frames.begin(), job.frames.end(), 1);
+  return job;
+}
+
+/// Two-sided limit of |z| at level 1e-3 over 64 pixels [Sidak]; 2500 frames are normal enough.
+constexpr double kPixelLimit = 4.32;
+
+/// What the frames say of one pixel against the exact answer.
+struct PixelVerdict {
+  double worst_z = 0;
+  double bias = 0;        ///< relative, where |z| is largest
+  double resolution = 0;  ///< the middle pixel's smallest relative bias that reaches the limit
+};
+
+/// z-test of every pixel's mean over frames; frames are independent, so no pixel's test depends on
+/// how pixels correlate.
+PixelVerdict judge_pixels(const JobSpec& job) {
+  JobSpec one = job;
+  one.frames = {1};
+  const auto truth = exact_truth(one, 8, 1);
+  const auto context = load_render_context(job, Digest{1, 2});
+  EXPECT_TRUE(truth.ok() && context.ok());
+  const std::vector<double>& expected = truth->frames[0].radiance;
+  std::vector<std::vector<double>> seen(job.frames.size(), std::vector<double>(expected.size()));
+  const FrameSink sink = [&](std::int32_t frame, const FilmTile& film) {
+    for (std::size_t p = 0; p < expected.size(); ++p) {
+      seen[static_cast<std::size_t>(frame)][p] =
+          mean({film.plane(0)[p], film.plane(1)[p], film.plane(2)[p]});
+    }
+    return Status();
+  };
+  EXPECT_TRUE(render_locally(**context, job, kThreads, sink).ok());
+
+  PixelVerdict verdict;
+  std::vector<double> resolution;
+  const auto n = static_cast<double>(seen.size());
+  for (std::size_t p = 0; p < expected.size(); ++p) {
+    double sum = 0;
+    double squares = 0;
+    for (const std::vector<double>& frame : seen) {
+      sum += frame[p];
+      squares += frame[p] * frame[p];
+    }
+    const double m = sum / n;
+    const double variance = std::max(squares / n - m * m, 0.0) / (n - 1);
+    const double error = std::sqrt(variance + std::pow(truth->quadrature_error * m, 2));
+    resolution.push_back(kPixelLimit * error / expected[p]);
+    const double z = (m - expected[p]) / error;
+    if (std::fabs(z) <= std::fabs(verdict.worst_z)) continue;
+    verdict.worst_z = z;
+    verdict.bias = m / expected[p] - 1;
+  }
+  std::nth_element(resolution.begin(), resolution.begin() + 32, resolution.end());
+  verdict.resolution = resolution[32];
+  std::printf("  worst z %+.1f, bias there %+.2f %%, resolves %.2f %%, quadrature %.3f %%\n",
+              verdict.worst_z, 100 * verdict.bias, 100 * verdict.resolution,
+              100 * truth->quadrature_error);
+  return verdict;
+}
+
+// Kirk & Arvo 1991: the second pass moves energy between pixels, so a mask that is made of the
+// samples that it then moves shows in single pixels, not in the mean.
+TEST(Machinery, SeesAMaskThatIsMadeOfTheSamplesItDecidesAbout) {
+  const PixelVerdict v = judge_pixels(second_pass_job(MaskPolicy::same_samples));
+  EXPECT_GT(std::fabs(v.worst_z), kPixelLimit);
+}
+TEST(Machinery, AcceptsAMaskOfOtherSamples) {
+  for (const MaskPolicy mask : {MaskPolicy::cross_fold, MaskPolicy::split}) {
+    const PixelVerdict v = judge_pixels(second_pass_job(mask));
+    EXPECT_LT(std::fabs(v.worst_z), kPixelLimit);
+    EXPECT_LT(v.resolution, 0.03);
+  }
 }
 
 // Brute force and the exact sum share only the ray tracer and the scalar materials.

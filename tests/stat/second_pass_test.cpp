@@ -100,6 +100,14 @@ TEST(SecondPassStat, ExtraSamplesAgreeWithBruteForce) {
   job.visibility.partitions = 3;
   expect_agreement(job);
 }
+// Two instances of one mesh, one of them moving, before a moving camera.
+TEST(SecondPassStat, MovingInstancesAgreeWithBruteForce) {
+  JobSpec job = still_job(SecondPassForm::corrected, MaskPolicy::cross_fold);
+  job.frames = test::frame_numbers(3);
+  test::set_in_motion(job, true, true);
+  job.frames = {2, 3};
+  expect_agreement(job);
+}
 TEST(SecondPassStat, SequentialPopulationsAgreeWithBruteForce) {
   JobSpec job = still_job(SecondPassForm::corrected, MaskPolicy::cross_fold, Method::sequential);
   job.frames = test::frame_numbers(3);

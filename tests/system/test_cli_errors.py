@@ -94,6 +94,12 @@ class CliErrors(unittest.TestCase):
         self.expect(self.baton("check", self.job()), BAD_INPUT, "cube.obj", "sky.hdr")
         self.expect(self.baton("check", "missing.json"), BAD_INPUT, "missing.json: no such file")
 
+    def test_rendering_a_file_that_is_no_picture(self):
+        (self.folder / "sky.hdr").write_bytes(b"no picture")
+        result = self.baton("render", self.job())
+        self.assertEqual(result.returncode, BAD_INPUT, result.stderr)
+        self.assertIn("sky.hdr: neither an EXR nor a Radiance HDR picture", result.stderr)
+
     def test_maps_that_cannot_be_mixed(self):
         (self.folder / "small.hdr").write_bytes(radiance_hdr(2, 1))
         keys = [{"frame": 1, "map": "sky.hdr"}, {"frame": 2, "map": "small.hdr"}]

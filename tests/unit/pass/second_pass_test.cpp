@@ -106,6 +106,28 @@ TEST(SecondPass, DilationGrowsTheMaskOverSurfaces) {
   EXPECT_GT(dilated, plain);
 }
 
+// What the pass is handed is a few bytes for each free sample of a pixel near a failed ray, nothing
+// of surfaces: at most 10 a sample and 2 a pixel in memory, less when encoded.
+TEST(SecondPass, StoresASmallRecordPerSample) {
+  const JobSpec job = correlated_job();
+  const auto context = load_render_context(job, Digest{1, 2});
+  ASSERT_TRUE(context.ok());
+  std::size_t num_pixels = 0, num_samples = 0, num_encoded = 0;
+  const TileRunSink sink{.film = [](int, const FilmTile&) { return Status(); },
+                         .samples =
+                             [&](const FirstPassSamples& s) {
+                               num_pixels = s.num_pixels();
+                               num_samples = s.energy.size();
+                               num_encoded = encode_first_pass_samples(s).size();
+                               return Status();
+                             }};
+  ASSERT_TRUE(run_tile(**context, {0, 0, 0, 0}, {}, sink, {}).ok());
+  const auto n = static_cast<std::size_t>(job.sampling.num_particles);
+  EXPECT_GT(num_samples, 100u);
+  EXPECT_LT(num_samples, num_pixels * n * 3 / 4);  // free pixels away from shadow keep theirs
+  EXPECT_LT(num_encoded, 2 * num_pixels + 10 * num_samples);
+}
+
 TEST(SecondPass, RefusesSamplesOfAnotherTileOrJob) {
   const auto context = load_render_context(correlated_job(), Digest{1, 2});
   ASSERT_TRUE(context.ok());

@@ -125,6 +125,7 @@ TEST(EnergyExchange, CorrectedWithCrossFoldIsUnbiased) {
 }
 TEST(EnergyExchange, CorrectedWithSplitIsUnbiased) {
   expect_unbiased(scaled_penumbra(), {.policy = MaskPolicy::split}, 145000);
+  expect_unbiased(mixed_materials(), {.policy = MaskPolicy::split}, 145000);
   expect_unbiased(extremes(), {.policy = MaskPolicy::split}, 145000);
 }
 TEST(EnergyExchange, SitesAreReceivers) { expect_unbiased(two_sites(), {}, 95000); }
@@ -192,18 +193,43 @@ TEST(EnergyExchange, PublishedKeptHasThePredictedBias) {
   EXPECT_GT(compare(scene, method, 20000, truth(scene)).worst_z, 10 * kLimit);
 }
 
-TEST(EnergyExchange, PublishedLosesWhatIsRefused) {
-  const Scene scene = scaled_penumbra();
-  const exact::Estimate e =
-      exact::estimate(scene, {.form = SecondPassForm::published, .mask_all = true}, 5000);
-  double sum = 0;
-  double expected = 0;
-  for (std::size_t i = 0; i < e.mean.size(); ++i) {
-    sum += e.mean[i];
-    expected += truth(scene)[i];
+/// Predicted mean radiance of a pixel under `published`, every pixel taking part: what it receives
+/// [eq. 8], and its own in partitions where it is alone.
+double predict_published(const Scene& scene, const SquarePartitions& partitions, std::size_t x) {
+  double alone = 1;
+  double value = 0;
+  for (std::size_t y = 0; y < scene.num_pixels(); ++y) {
+    if (y == x) continue;
+    const double offered = transition(scene, partitions, y, x);
+    const double accepted = std::min(1.0, scene.lns(x) / scene.lns(y));
+    for (std::size_t d = 0; d < kDirections; ++d) {
+      if (scene.visible[scene.at(x, d)] != 0 && scene.visible[scene.at(y, d)] != 0)
+        value += offered * accepted * scene.target(scene.at(y, d));
+    }
+    alone -= transition(scene, partitions, x, y);
   }
-  std::printf("  energy %.0f %% of the truth\n", 100 * sum / expected);
-  EXPECT_LT(sum, 0.9 * expected);
+  return value + alone * mean(scene.truth(x));
+}
+
+TEST(EnergyExchange, PublishedLosesWhatIsRefused) {
+  Scene scene = mixed_materials();
+  for (Rgb& r : scene.reflected) r = Rgb{1, 1, 1} * mean(r);
+  const Method method{
+      .form = SecondPassForm::published, .mask_all = true, .side = 4, .partitions = 16};
+  std::vector<double> predicted;
+  double sum = 0;
+  double true_sum = 0;
+  for (std::size_t pixel = 0; pixel < 4; ++pixel) {
+    const double p = predict_published(scene, exact::partitions_of(scene, method, 1), pixel);
+    predicted.insert(predicted.end(), 3, p);
+    sum += p;
+    true_sum += mean(scene.truth(pixel));
+    std::printf("  pixel %zu: %+.1f %%\n", pixel, 100 * (p / mean(scene.truth(pixel)) - 1));
+  }
+  std::printf("  energy %.0f %% of the truth\n", 100 * sum / true_sum);
+  EXPECT_LT(sum, 0.9 * true_sum);
+  EXPECT_LT(compare(scene, method, 20000, predicted).worst_z, kLimit);
+  EXPECT_GT(compare(scene, method, 20000, truth(scene)).worst_z, 10 * kLimit);
 }
 
 TEST(EnergyExchange, EqualPixelsEvenPublishedIsRight) {
@@ -211,6 +237,37 @@ TEST(EnergyExchange, EqualPixelsEvenPublishedIsRight) {
   const Scene scene = penumbra();
   EXPECT_LT(compare(scene, {.form = SecondPassForm::published_kept}, 20000, truth(scene)).worst_z,
             kLimit);
+}
+
+/// Red, green, blue and white pixels side by side.
+Scene coloured() {
+  Scene scene = penumbra();
+  constexpr Rgb kColour[] = {{1, 0, 0}, {0, 2, 0}, {0, 0, 1}, {1, 1, 1}};
+  for (std::size_t i = 0; i < scene.reflected.size(); ++i) {
+    const auto d = static_cast<float>(i % kDirections);
+    scene.reflected[i] = kColour[i / kDirections] * (1 + 0.3f * d);
+  }
+  return scene;
+}
+
+TEST(EnergyExchange, EnergyTakesTheReceiversColour) {
+  const Scene scene = coloured();
+  const std::vector<Rgb> pixels = exact::render(scene, {}, 7);
+  for (std::size_t pixel = 0; pixel < 3; ++pixel) {
+    EXPECT_EQ(pixels[pixel].x > 0, pixel == 0);
+    EXPECT_EQ(pixels[pixel].y > 0, pixel == 1);
+    EXPECT_EQ(pixels[pixel].z > 0, pixel == 2);
+  }
+  // The mean over RGB of each pixel, so that no expectation is 0.
+  const exact::Estimate e = exact::estimate(scene, {}, 75000);
+  for (std::size_t pixel = 0; pixel < 4; ++pixel) {
+    const double expected = mean(scene.truth(pixel));
+    const std::size_t channel = 3 * pixel + std::min<std::size_t>(pixel, 2);
+    const double share = pixel == 3 ? 1.0 : 1.0 / 3;
+    const double error = std::hypot(share * e.error[channel], 1e-5 * expected);
+    EXPECT_LT(std::fabs(share * e.mean[channel] - expected), kLimit * error) << pixel;
+    EXPECT_LT(kLimit * error, 0.003 * expected) << pixel;
+  }
 }
 
 TEST(EnergyExchange, ALonePixelKeepsItsEnergy) {
