@@ -1,5 +1,6 @@
 #include "worker/pass/masked_surfaces.h"
 
+#include "worker/pass/cpu_clock.h"
 #include "worker/pass/primary.h"
 
 namespace baton {
@@ -17,7 +18,10 @@ MaskedSurfaces::MaskedSurfaces(const RenderContext& context, const FrameGeometry
     }
   }
   hits_.resize(rays_.size());
-  trace_primary_rays(context.job, geometry, rays_, hits_);
+  {
+    const StageTimer timer(seconds_rays_);
+    trace_primary_rays(context.job, geometry, rays_, hits_);
+  }
 
   // Tabulate.
   for (const SurfaceHit& hit : hits_) {

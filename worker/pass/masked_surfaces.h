@@ -20,6 +20,8 @@ class MaskedSurfaces {
   std::span<const SurfaceHit> hits(std::int32_t position) const;
   const SurfaceTable& table() const { return table_; }
   std::size_t num_rays() const { return rays_.size(); }
+  /// CPU time of tracing them.
+  double seconds_rays() const { return seconds_rays_; }
   /// Radiance of the environment that the pixel shows past its surfaces, mean over the sites.
   Rgb background(std::int32_t position, const Environment& environment) const;
 
@@ -29,6 +31,7 @@ class MaskedSurfaces {
   std::vector<Ray> rays_;               ///< (masked pixels, S)
   std::vector<SurfaceHit> hits_;        ///< (masked pixels, S)
   SurfaceTable table_;                  ///< (masked pixels, S)
+  double seconds_rays_ = 0;
 };
 
 }  // namespace baton

@@ -161,7 +161,7 @@ Result<SecondPassOutput> run_second_pass(const RenderContext& context, std::int3
                                          std::span<const FirstPassPtr> near) {
   const double start = thread_cpu_seconds();
   BATON_TRY(check_inputs(context, frame_index, tile, first_film, near));
-  SecondPassOutput output{first_film, {}};
+  SecondPassOutput output{.film = first_film};
 
   // Find who takes part.
   const VisibilitySpec& visibility = context.job.visibility;
@@ -175,6 +175,7 @@ Result<SecondPassOutput> run_second_pass(const RenderContext& context, std::int3
   BATON_ASSIGN(const auto geometry, context.geometry->at(frame_index));
   const MaskedSurfaces surfaces(context, *geometry, masks.any);
   output.stats.rays_primary = surfaces.num_rays();
+  output.seconds_primary_rays = surfaces.seconds_rays();
   BATON_ASSIGN(const auto light, light_of(context, frame_index, output.stats));
   const Work work{context,  *geometry, context.frames[static_cast<std::size_t>(frame_index)],
                   *light,   samples,   masks,

@@ -13,7 +13,8 @@ namespace baton {
 /// A finished tile with what it cost.
 struct SecondPassOutput {
   FilmTile film;
-  RenderStats stats;
+  RenderStats stats = {};
+  double seconds_primary_rays = 0;  ///< CPU time of tracing primary rays again
 };
 
 /// The second pass of one tile of one frame: the first pass's film with the pixels of the mask done
