@@ -4,6 +4,7 @@
 #include <zstd.h>
 
 #include <algorithm>
+#include <type_traits>
 
 #include "common/base/digest.h"
 #include "common/base/limits.h"
@@ -50,25 +51,48 @@ Error section_error(ErrorKind kind, const std::string& name, const SectionTag& t
   return {kind, fmt::format("{}: section {} {}", name, tag_text(tag), what)};
 }
 
+/// Copies the bytes of `count` elements of `stride` bytes: element by element on one side, byte 0
+/// of all, then byte 1 of all, ... on the other. Stride: its constant where it is known, so that
+/// the loops become vector code.
+template <class Stride>
+void split(const std::byte* elements, std::size_t count, Stride stride, std::byte* planes) {
+  for (std::size_t plane = 0; plane < stride; ++plane) {
+    std::byte* out = planes + plane * count;
+    for (std::size_t i = 0; i < count; ++i) out[i] = elements[i * stride + plane];
+  }
+}
+template <class Stride>
+void join(const std::byte* planes, std::size_t count, Stride stride, std::byte* elements) {
+  for (std::size_t i = 0; i < count; ++i) {
+    for (std::size_t plane = 0; plane < stride; ++plane)
+      elements[i * stride + plane] = planes[plane * count + i];
+  }
+}
+
+/// Calls `work` with the stride, as a constant if it is that of a common type.
+template <class Work>
+void with_stride(std::size_t stride, const Work& work) {
+  switch (stride) {
+    case 2:
+      return work(std::integral_constant<std::size_t, 2>());
+    case 4:
+      return work(std::integral_constant<std::size_t, 4>());
+    default:
+      return work(stride);
+  }
+}
+
 /// Byte 0 of all elements, then byte 1 of all elements, ...
 Bytes split_planes(ByteView bytes, std::size_t stride) {
-  const std::size_t count = bytes.size() / stride;
   Bytes planes(bytes.size());
-  for (std::size_t plane = 0; plane < stride; ++plane) {
-    std::byte* out = planes.data() + plane * count;
-    for (std::size_t i = 0; i < count; ++i) out[i] = bytes[i * stride + plane];
-  }
+  with_stride(stride, [&](auto s) { split(bytes.data(), bytes.size() / s, s, planes.data()); });
   return planes;
 }
 
 /// Inverse of split_planes.
 Bytes join_planes(ByteView planes, std::size_t stride) {
-  const std::size_t count = planes.size() / stride;
   Bytes bytes(planes.size());
-  for (std::size_t plane = 0; plane < stride; ++plane) {
-    const std::byte* in = planes.data() + plane * count;
-    for (std::size_t i = 0; i < count; ++i) bytes[i * stride + plane] = in[i];
-  }
+  with_stride(stride, [&](auto s) { join(planes.data(), planes.size() / s, s, bytes.data()); });
   return bytes;
 }
 
