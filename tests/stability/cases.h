@@ -63,8 +63,8 @@ struct Subject {
   std::function<std::unique_ptr<const PixelSampler>(const SamplingSpec&)> sampler{};
 };
 
-/// Every value of Method with its default settings, then the published forms of the sequential
-/// sampler and variants.
+/// Every value of Method but `automatic` with its default settings, then the published forms of the
+/// sequential sampler and variants.
 std::vector<Subject> all_subjects();
 /// The name of the method that others are compared with.
 inline constexpr const char* kFreshSubject = "bidirectional";

@@ -37,7 +37,7 @@ double value_of(Measure measure, const Numbers& n, const Numbers& fresh) {
     case Measure::lost:
       return n.lost;
     case Measure::growth:
-      return n.growth;
+      return quotient(n.growth, fresh.growth);
   }
   return 0;
 }
@@ -60,7 +60,7 @@ std::string words_of(Measure measure, const Numbers& n, const Numbers& fresh) {
     case Measure::lost:
       return fmt::format("{:.0f} % of pixels dark", 100 * n.lost);
     case Measure::growth:
-      return fmt::format("Lns error grew x{:.1f}", value);
+      return fmt::format("growth of Lns error x{:.1f}", value);
   }
   return {};
 }

@@ -34,7 +34,7 @@ enum class Measure : std::uint8_t {
   noise,        ///< noise / noise of fresh samples (`bidirectional`, same N and M)
   noise_after,  ///< likewise right after the jump
   lost,
-  growth,
+  growth,  ///< growth / growth of fresh samples, for which only the light has changed
 };
 
 /// A law and its tolerances: the case degrades above one, fails above the other.
