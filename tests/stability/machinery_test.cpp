@@ -20,6 +20,7 @@ namespace {
 
 /// The drift of carried samples needs many frames to show, and many runs to be told from chance.
 constexpr Effort kLongEffort{40, 24, false};
+constexpr Effort kLongestEffort{60, 48, false};  ///< a loss of 13 % +- 2 % where it is looked for
 constexpr Effort kShortEffort{8, 12, false};
 constexpr int kThreads = 2;
 
@@ -106,7 +107,7 @@ Subject self_adapted(float ess_ratio_min) {
 }
 
 TEST(Machinery, SeesAScheduleThatIsAdaptedOnItsOwnParticles) {
-  const Cell cell = judged(turning_case(), self_adapted(0.95f), kLongEffort);
+  const Cell cell = judged(turning_case(), self_adapted(0.8f), kLongestEffort);
   const Numbers& n = cell.summary.numbers;
   std::printf("  adapted: %s, mean Lns^/Lns %.3f +- %.3f\n", cell.judgement.number.c_str(),
               n.lns_mean, n.lns_mean_interval);
