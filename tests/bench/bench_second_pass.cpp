@@ -1,6 +1,7 @@
 // Time of the second pass over the time of its own rays (occlusion rays alone, and with the primary
 // rays that it traces again), and its share of both passes. CPU seconds of one run, so the ratios
-// hold on a noisy machine. Usage: bench_second_pass [JOB.json] [FRAMES]
+// hold on a noisy machine. Usage: bench_second_pass [JOB.json] [FRAMES [REPEAT]]; REPEAT: second
+// passes for each first one.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -21,7 +22,7 @@ constexpr double kGoal = 1.6;
 /// Both passes of all frames and tiles; blobs go through their file form, outside the clock of the
 /// passes.
 Result<RenderStats> measure(const JobSpec& job, std::uint64_t& blob_bytes,
-                            double& seconds_primary_again) {
+                            double& seconds_primary_again, int repeat) {
   BATON_ASSIGN(const auto context, load_render_context(job, Digest{1, 1}));
   RenderStats total;
   blob_bytes = 0;
@@ -50,17 +51,19 @@ Result<RenderStats> measure(const JobSpec& job, std::uint64_t& blob_bytes,
       std::vector<FirstPassPtr> near;
       for (const std::int32_t t : context->grid.tiles_near(tile, exchange_reach_px(job.visibility)))
         near.push_back(samples[static_cast<std::size_t>(t)]);
-      BATON_ASSIGN(
-          const SecondPassOutput second,
-          run_second_pass(*context, frame, tile, films[static_cast<std::size_t>(tile)], near));
-      total.merge(second.stats);
-      seconds_primary_again += second.seconds_primary_rays;
+      for (int k = 0; k < repeat; ++k) {
+        BATON_ASSIGN(
+            const SecondPassOutput second,
+            run_second_pass(*context, frame, tile, films[static_cast<std::size_t>(tile)], near));
+        total.merge(second.stats);
+        seconds_primary_again += second.seconds_primary_rays;
+      }
     }
   }
   return total;
 }
 
-int run(const std::string& path, int frames) {
+int run(const std::string& path, int frames, int repeat) {
   Result<JobSpec> job = load_job(path);
   if (!job) {
     fmt::print(stderr, "{}\n", job.error().message);
@@ -86,12 +89,14 @@ int run(const std::string& path, int frames) {
         job->visibility.mask = mask;
         std::uint64_t blob_bytes = 0;
         double primary_again = 0;
-        const Result<RenderStats> s = measure(*job, blob_bytes, primary_again);
+        const Result<RenderStats> s = measure(*job, blob_bytes, primary_again, repeat);
         if (!s) {
           fmt::print(stderr, "{}\n", s.error().message);
           return 65;
         }
-        const auto masked = static_cast<double>(s->pixels_masked);
+        const double masked = static_cast<double>(s->pixels_masked) / repeat;
+        const double first = s->cpu_seconds - s->seconds_second_pass;
+        const double second = s->seconds_second_pass / repeat;
         fmt::print(
             "{:<6} {:<14} {:<13} {:>9.2f} {:>9.2f} {:>7.1f}% {:>9.1f} {:>9.2f} {:>7.1f}% "
             "{:>9.1f}\n",
@@ -103,9 +108,9 @@ int run(const std::string& path, int frames) {
             s->seconds_second_pass / s->seconds_second_rays,
             s->seconds_second_pass / (s->seconds_second_rays + primary_again),
             100 * masked / static_cast<double>(s->pixels - s->pixels_background),
-            static_cast<double>(s->rays_second_pass) / masked,
+            static_cast<double>(s->rays_second_pass) / repeat / masked,
             static_cast<double>(s->rays_second_pass) / s->seconds_second_rays * 1e-6,
-            100 * s->seconds_second_pass / s->cpu_seconds,
+            100 * second / (first + second),
             static_cast<double>(blob_bytes) / static_cast<double>(s->pixels));
       }
     }
@@ -118,5 +123,5 @@ int run(const std::string& path, int frames) {
 
 int main(int argc, char** argv) {
   return baton::run(argc > 1 ? argv[1] : "jobs/examples/demo.json",
-                    argc > 2 ? std::atoi(argv[2]) : 2);
+                    argc > 2 ? std::atoi(argv[2]) : 2, argc > 3 ? std::atoi(argv[3]) : 1);
 }

@@ -4,8 +4,9 @@
 #include <span>
 
 #include "common/math/octahedral.h"
+#include "worker/accel/accel.h"
 #include "worker/integrator/surface_table.h"
-#include "worker/sampling/reflected.h"
+#include "worker/sampling/energy_exchange.h"
 #include "worker/scene/environment_view.h"
 
 namespace baton {
@@ -17,10 +18,10 @@ struct LightRecord {
   float padding[2] = {};  ///< kernels read groups of four
 };
 
-/// Which light falls on which surface: positions in a table and among records.
-struct LitSurface {
-  std::int32_t surface = 0;
-  std::int32_t light = 0;
+/// The shadow rays of some offers.
+struct OfferRays {
+  ShadowRays rays;
+  std::vector<std::uint32_t> offer;  ///< (capacity) whose ray it is; the first rays.size() count
 };
 
 /// The inner loops of the second pass.
@@ -30,10 +31,15 @@ namespace kernels {
 void look_up_lights(const EnvironmentView& environment, std::span<const OctDirection> code,
                     std::span<LightRecord> lights);
 
-/// What surfaces make of lights; nothing below a horizon. reflected: kPadding longer than `pairs`
-/// (worker/integrator/kernels.h).
+/// What the surfaces of offers make of the lights of their samples; nothing below a horizon.
+/// reflected: kReceptionPadding longer than `offers`.
 void reflect_lights(const SurfaceTable& surfaces, std::span<const LightRecord> lights,
-                    std::span<const LitSurface> pairs, std::span<Reflected> reflected);
+                    std::span<const Offer> offers, std::span<Reflected> reflected);
+
+/// The same, and in place of the last rays one for each offer that reflects anything.
+void reflect_and_cast(const SurfaceTable& surfaces, std::span<const LightRecord> lights,
+                      std::span<const Offer> offers, std::span<Reflected> reflected,
+                      OfferRays& rays);
 
 }  // namespace kernels
 }  // namespace baton

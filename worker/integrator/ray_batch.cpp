@@ -9,6 +9,7 @@
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
+#include "worker/integrator/front_lanes-inl.h"
 #include "worker/scene/bsdf-inl.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -46,22 +47,6 @@ HWY_INLINE SampleLanes LoadSamples(const CastSamples& in, std::size_t i) {
           hn::Load(di, site),
           hn::Load(d, part[0]),
           {hn::Load(d, part[1]), hn::Load(d, part[2]), hn::Load(d, part[3])}};
-}
-
-/// Where each lane comes from when those of `mask` move to the front; kept: how many they are.
-/// (Highway 1.0's Compress copies its table of permutations at every call.)
-HWY_INLINE auto FrontLanes(MF mask, std::size_t& kept) {
-  const DF d;
-  const DI di;
-  HWY_ALIGN std::int32_t is_kept[hn::MaxLanes(DI())];
-  HWY_ALIGN std::int32_t from[hn::MaxLanes(DI()) + 1] = {};
-  hn::Store(hn::VecFromMask(di, hn::RebindMask(di, mask)), di, is_kept);
-  kept = 0;
-  for (std::size_t lane = 0; lane < hn::Lanes(di); ++lane) {
-    from[kept] = static_cast<std::int32_t>(lane);
-    kept -= static_cast<std::size_t>(std::int64_t{is_kept[lane]});
-  }
-  return hn::IndicesFromVec(d, hn::Load(di, from));
 }
 
 void CastRays(const CastSamples& in, const SiteOrigins& origins, RayBatch& batch,

@@ -7,12 +7,13 @@
 
 namespace baton {
 
-/// Surfaces of many pixels for kernels that visit them in any order: one record of floats each, in
+/// Surfaces of many pixels for kernels that visit them in any order: two records of floats each, in
 /// groups of four that kernels turn into lanes. Fields as in SiteBlock; what every surface has
-/// comes first, what only a glossy one has last.
+/// fills a cache line, what only a glossy one has half of another.
 class SurfaceTable {
  public:
-  /// Places in a record.
+  /// Places in a record: those before `wo` in the common one, the others, less `wo`, in the glossy
+  /// one.
   enum Field : int {
     ns = 0,
     lobe_scale = 3,
@@ -27,24 +28,31 @@ class SurfaceTable {
     mirror = 20,
     ks_b = 23
   };
-  static constexpr int kStride = 24;
+  static constexpr std::size_t kCommon = 16, kGlossy = 8;  ///< floats of a record
 
   /// Appends a surface; origin: where its shadow rays start.
   void add(const ShadingPoint& point, const Material& material, const Vec3& ray_origin);
   /// Appends the surface of a site that sees nothing: it reflects nothing.
-  void add_nothing() { records_.resize(records_.size() + kStride); }
+  void add_nothing();
+  /// Makes room for `count` surfaces in all.
+  void reserve(std::size_t count);
 
-  std::size_t size() const { return records_.size() / kStride; }
-  const float* data() const { return records_.data(); }
-  Vec3 ray_origin(std::size_t surface) const {
-    const float* r = &records_[surface * kStride + origin];
-    return {r[0], r[1], r[2]};
-  }
+  /// (surfaces, kCommon), from a multiple of 64 bytes.
+  const float* common() const { return common_.data()->value; }
+  /// (surfaces, kGlossy)
+  const float* glossy() const { return glossy_.data()->value; }
   /// Texels of measured BRDFs; the first is null.
   const std::vector<const float*>& tables() const { return tables_; }
 
  private:
-  std::vector<float> records_;
+  struct alignas(64) Common {
+    float value[kCommon];
+  };
+  struct alignas(32) Glossy {
+    float value[kGlossy];
+  };
+  std::vector<Common> common_;
+  std::vector<Glossy> glossy_;
   std::vector<const float*> tables_{nullptr};
   SiteBlock one_;  ///< the surface in work
 };

@@ -7,39 +7,33 @@
 
 namespace baton {
 
-ExtraSampler::ExtraSampler(const RenderContext& context, const FrameGeometry& geometry,
-                           const FrameSpec& frame, const FrameLight& light,
-                           const SampleRegion& samples, const MaskedSurfaces& surfaces,
-                           const PixelMask& mask)
-    : context_(context),
-      geometry_(geometry),
-      frame_(frame),
-      light_(light),
-      samples_(samples),
-      surfaces_(surfaces),
-      mask_(mask),
-      now_(view_of(light.now)),
-      before_(view_of(light.before)),
+ExtraSampler::ExtraSampler(const SecondPassWork& work)
+    : work_(work),
+      now_(view_of(work.light.now)),
+      before_(view_of(work.light.before)),
       scratch_(std::make_unique<SamplerScratch>()) {
-  drawn_.resize({0, 0, 1, 1}, population_spec(context.job).num_particles);
+  drawn_.resize({0, 0, 1, 1}, population_spec(work.context.job).num_particles);
 }
 
-Rgb ExtraSampler::radiance(std::int32_t x, std::int32_t y, std::size_t fold, bool extra) {
-  const std::int32_t position = surfaces_.find(mask_.index(x, y));
-  gather_sites(surfaces_.hits(position));
-  const Rgb first = first_pass(samples_.find(x, y), fold);
-  if (!extra) return first;
-  draw(x, y, fold, surfaces_.hits(position));
-  const auto& folds = folds_of(context_.job.visibility.mask);
-  const float share = folds[fold].energy_scale / static_cast<float>(num_populations(context_.job));
-  return (first + trace() * share) / static_cast<float>(1 + context_.job.visibility.partitions);
+Rgb ExtraSampler::radiance(std::int32_t x, std::int32_t y, std::size_t fold) {
+  const std::int32_t position = work_.surfaces.find(work_.masks.any.index(x, y));
+  gather_sites(work_.surfaces.hits(position));
+  const Rgb first = first_pass(work_.samples.find(x, y), fold);
+  if (!work_.masks.of_fold[fold].at(x, y)) return first;
+  draw(x, y, fold, work_.surfaces.hits(position));
+  const auto& folds = folds_of(work_.context.job.visibility.mask);
+  const float share =
+      folds[fold].energy_scale / static_cast<float>(num_populations(work_.context.job));
+  return (first + trace() * share) /
+         static_cast<float>(1 + work_.context.job.visibility.partitions);
 }
 
 void ExtraSampler::gather_sites(std::span<const SurfaceHit> hits) {
-  sites_.clear(context_.job.image.sites);
+  sites_.clear(work_.context.job.image.sites);
   for (std::size_t s = 0; s < hits.size(); ++s) {
     if (hits[s].hit) {
-      sites_.add(static_cast<int>(s), hits[s].point, context_.scene->materials[hits[s].material]);
+      sites_.add(static_cast<int>(s), hits[s].point,
+                 work_.context.scene->materials[hits[s].material]);
     } else {
       sites_.add_miss(static_cast<int>(s));
     }
@@ -48,7 +42,7 @@ void ExtraSampler::gather_sites(std::span<const SurfaceHit> hits) {
 
 /// What the fold's own free samples say.
 Rgb ExtraSampler::first_pass(const SampleRegion::Place& pixel, std::size_t fold) {
-  const Fold& use = folds_of(context_.job.visibility.mask)[fold];
+  const Fold& use = folds_of(work_.context.job.visibility.mask)[fold];
   const SampleRegion::Place place = pixel.of_population(use.giver_population);
   const FirstPassSamples& from = *place.tile;
   kernels::ShadedSamples shaded;
@@ -66,21 +60,22 @@ Rgb ExtraSampler::first_pass(const SampleRegion::Place& pixel, std::size_t fold)
 void ExtraSampler::draw(std::int32_t x, std::int32_t y, std::size_t fold,
                         std::span<const SurfaceHit> hits) {
   rays_.clear();
-  SiteOrigins origins{.num_sites = context_.job.image.sites};
+  SiteOrigins origins{.num_sites = work_.context.job.image.sites};
   for (std::size_t s = 0; s < hits.size(); ++s) {
     if (hits[s].hit) origins.set(s, lift_off(hits[s].point.position, hits[s].point.ng));
   }
-  const auto count = static_cast<std::uint32_t>(context_.job.visibility.partitions);
+  const auto count = static_cast<std::uint32_t>(work_.context.job.visibility.partitions);
   SampleColors colors;
   std::array<float, limits::kMaxParticles> targets{};
   for (std::uint32_t c = 0; c < count; ++c) {
     // Streams 0 and 1 are the first pass's populations.
     const std::uint32_t stream = 2 + static_cast<std::uint32_t>(fold) * count + c;
-    const RngKey key{.job_seed = stream_seed(context_.job.seed, stream),
-                     .frame = static_cast<std::uint32_t>(frame_.number),
-                     .pixel = static_cast<std::uint32_t>(y * context_.job.image.width + x)};
-    sample_populations(*context_.sampler, {sites_, light_, now_, before_, key, frame_.index, false},
-                       0, *scratch_, drawn_, colors);
+    const RngKey key{.job_seed = stream_seed(work_.context.job.seed, stream),
+                     .frame = static_cast<std::uint32_t>(work_.frame.number),
+                     .pixel = static_cast<std::uint32_t>(y * work_.context.job.image.width + x)};
+    sample_populations(*work_.context.sampler,
+                       {sites_, work_.light, now_, before_, key, work_.frame.index, false}, 0,
+                       *scratch_, drawn_, colors);
     cast_samples({.direction = drawn_.direction,
                   .site = drawn_.site,
                   .weight = drawn_.weight,
@@ -99,7 +94,7 @@ void ExtraSampler::draw(std::int32_t x, std::int32_t y, std::size_t fold,
 Rgb ExtraSampler::trace() {
   {
     const StageTimer timer(seconds_rays_);
-    geometry_.accel->occluded(rays_.rays);
+    work_.geometry.accel->occluded(rays_.rays);
   }
   rays_traced_ += rays_.size();
   Rgb sum;

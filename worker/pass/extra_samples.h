@@ -4,8 +4,7 @@
 
 #include "common/state/sample_state.h"
 #include "worker/integrator/ray_batch.h"
-#include "worker/pass/masked_surfaces.h"
-#include "worker/pass/sample_region.h"
+#include "worker/pass/second_pass_work.h"
 
 namespace baton {
 
@@ -14,13 +13,11 @@ namespace baton {
 /// first pass's.
 class ExtraSampler {
  public:
-  /// All arguments must outlive the object. mask: the pixels of `surfaces`.
-  ExtraSampler(const RenderContext& context, const FrameGeometry& geometry, const FrameSpec& frame,
-               const FrameLight& light, const SampleRegion& samples, const MaskedSurfaces& surfaces,
-               const PixelMask& mask);
+  /// work must outlive the object.
+  explicit ExtraSampler(const SecondPassWork& work);
 
-  /// Share of a fold in the radiance of a pixel of the mask; `extra`: the fold's mask holds it.
-  Rgb radiance(std::int32_t x, std::int32_t y, std::size_t fold, bool extra);
+  /// Share of a fold in the radiance of a pixel that some fold's mask holds.
+  Rgb radiance(std::int32_t x, std::int32_t y, std::size_t fold);
 
   std::uint64_t rays_traced() const { return rays_traced_; }
   double seconds_rays() const { return seconds_rays_; }
@@ -31,13 +28,7 @@ class ExtraSampler {
   void draw(std::int32_t x, std::int32_t y, std::size_t fold, std::span<const SurfaceHit> hits);
   Rgb trace();
 
-  const RenderContext& context_;
-  const FrameGeometry& geometry_;
-  const FrameSpec& frame_;
-  const FrameLight& light_;
-  const SampleRegion& samples_;
-  const MaskedSurfaces& surfaces_;
-  const PixelMask& mask_;
+  const SecondPassWork& work_;
   const EnvironmentView now_, before_;
   std::unique_ptr<SamplerScratch> scratch_;
   SampleState drawn_;  ///< one population of one pixel

@@ -7,16 +7,11 @@ namespace baton {
 
 MaskedSurfaces::MaskedSurfaces(const RenderContext& context, const FrameGeometry& geometry,
                                const PixelMask& mask)
-    : num_sites_(static_cast<std::size_t>(context.job.image.sites)) {
+    : num_sites_(static_cast<std::size_t>(context.job.image.sites)), position_(mask.ranks()) {
   // Trace.
-  const PixelRect& rect = mask.rect();
-  std::int32_t count = 0;
-  for (std::int32_t y = rect.y0; y < rect.y1; ++y) {
-    for (std::int32_t x = rect.x0; x < rect.x1; ++x) {
-      position_.push_back(mask.at(x, y) ? count++ : -1);
-      if (position_.back() >= 0) append_primary_rays(context.job, geometry, x, y, rays_);
-    }
-  }
+  mask.visit_all([&](std::int32_t x, std::int32_t y) {
+    append_primary_rays(context.job, geometry, x, y, rays_);
+  });
   hits_.resize(rays_.size());
   {
     const StageTimer timer(seconds_rays_);
@@ -24,6 +19,7 @@ MaskedSurfaces::MaskedSurfaces(const RenderContext& context, const FrameGeometry
   }
 
   // Tabulate.
+  table_.reserve(hits_.size());
   for (const SurfaceHit& hit : hits_) {
     if (hit.hit) {
       table_.add(hit.point, context.scene->materials[hit.material],

@@ -27,7 +27,7 @@ class MaskedSurfaces {
 
  private:
   std::size_t num_sites_;
-  std::vector<std::int32_t> position_;  ///< (pixels of the mask)
+  std::vector<std::int32_t> position_;  ///< PixelMask::ranks
   std::vector<Ray> rays_;               ///< (masked pixels, S)
   std::vector<SurfaceHit> hits_;        ///< (masked pixels, S)
   SurfaceTable table_;                  ///< (masked pixels, S)

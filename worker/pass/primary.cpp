@@ -8,11 +8,10 @@
 namespace baton {
 namespace {
 
-/// Position of a site inside its pixel, [0, 1)^2.
-std::array<float, 2> site_position(const JobSpec& job, std::uint32_t pixel, std::int32_t site) {
-  if (job.image.sites == 1) return {0.5f, 0.5f};
-  const auto side =
-      static_cast<std::int32_t>(std::lround(std::sqrt(static_cast<double>(job.image.sites))));
+/// Position of a site inside its pixel, [0, 1)^2; side: sites in a row.
+std::array<float, 2> site_position(const JobSpec& job, std::uint32_t pixel, std::int32_t site,
+                                   std::int32_t side) {
+  if (side == 1) return {0.5f, 0.5f};
   const Rng rng({.job_seed = job.seed, .frame = 0, .pixel = pixel}, PassId::site_position);
   const auto u = rng.uniforms(0, static_cast<std::uint32_t>(site));
   const auto cell = 1.0f / static_cast<float>(side);
@@ -39,8 +38,10 @@ TileSurfaces trace_primary(const JobSpec& job, const FrameGeometry& geometry,
 void append_primary_rays(const JobSpec& job, const FrameGeometry& geometry, std::int32_t x,
                          std::int32_t y, std::vector<Ray>& rays) {
   const auto pixel = static_cast<std::uint32_t>(y * job.image.width + x);
+  const auto side =
+      static_cast<std::int32_t>(std::lround(std::sqrt(static_cast<float>(job.image.sites))));
   for (std::int32_t site = 0; site < job.image.sites; ++site) {
-    const auto [dx, dy] = site_position(job, pixel, site);
+    const auto [dx, dy] = site_position(job, pixel, site, side);
     rays.push_back(
         geometry.pose.camera.ray(static_cast<float>(x) + dx, static_cast<float>(y) + dy));
   }

@@ -45,10 +45,12 @@ PixelMask SampleRegion::surfaces(const PixelRect& rect) const {
 
 PixelMask SampleRegion::flagged(const PixelRect& rect, int bits) const {
   PixelMask mask(rect);
-  for (std::int32_t y = rect.y0; y < rect.y1; ++y) {
-    for (std::int32_t x = rect.x0; x < rect.x1; ++x) {
-      const Place place = find(x, y);
-      if (place.tile != nullptr && (place.tile->flags[place.pixel] & bits) != 0) mask.set(x, y);
+  for (const Tile& tile : tiles_) {
+    const PixelRect& own = tile.samples->rect;
+    for (std::int32_t y = std::max(rect.y0, own.y0); y < std::min(rect.y1, own.y1); ++y) {
+      for (std::int32_t x = std::max(rect.x0, own.x0); x < std::min(rect.x1, own.x1); ++x) {
+        if ((tile.samples->flags[PixelMask::index(own, x, y)] & bits) != 0) mask.set(x, y);
+      }
     }
   }
   return mask;

@@ -43,43 +43,20 @@ PixelRect grown(const PixelRect& rect, std::int32_t margin, const ImageSpec& ima
           std::min(rect.x1 + margin, image.width), std::min(rect.y1 + margin, image.height)};
 }
 
-/// Who takes part: in each fold, and in any of them.
-struct Masks {
-  std::vector<PixelMask> of_fold;
-  PixelMask any;
-};
-Masks make_masks(const VisibilitySpec& visibility, const SampleRegion& samples,
-                 const PixelRect& rect, const PixelRect& rect_before_dilation) {
-  Masks masks{{}, PixelMask(rect)};
+ExchangeMasks make_masks(const VisibilitySpec& visibility, const SampleRegion& samples,
+                         const PixelRect& rect, const PixelRect& rect_before_dilation) {
+  ExchangeMasks masks{{}, PixelMask(rect)};
   const PixelMask surfaces = samples.surfaces(rect);
   for (const Fold& fold : folds_of(visibility.mask)) {
     masks.of_fold.push_back(dilate(samples.failed(rect_before_dilation, fold.mask_population),
                                    visibility.dilate, surfaces, rect));
-  }
-  for (std::int32_t y = rect.y0; y < rect.y1; ++y) {
-    for (std::int32_t x = rect.x0; x < rect.x1; ++x) {
-      for (const PixelMask& mask : masks.of_fold) {
-        if (mask.at(x, y)) masks.any.set(x, y);
-      }
-    }
+    masks.any.add(masks.of_fold.back());
   }
   return masks;
 }
 
-/// What the pass needs to know of its tile and frame.
-struct Work {
-  const RenderContext& context;
-  const FrameGeometry& geometry;
-  const FrameSpec& frame;
-  const FrameLight& light;
-  const SampleRegion& samples;
-  const Masks& masks;
-  const MaskedSurfaces& surfaces;
-  const PixelRect& rect;
-};
-
 /// The exchange, fold by fold.
-void exchange(const Work& work, std::span<Rgb> radiance, RenderStats& stats) {
+void exchange(const SecondPassWork& work, std::span<Rgb> radiance, RenderStats& stats) {
   const JobSpec& job = work.context.job;
   const SquarePartitions partitions({0, 0, job.image.width, job.image.height},
                                     job.visibility.tile_size, job.visibility.partitions,
@@ -87,10 +64,7 @@ void exchange(const Work& work, std::span<Rgb> radiance, RenderStats& stats) {
                                          .frame = static_cast<std::uint32_t>(work.frame.number),
                                          .pixel = 0},
                                         PassId::partition));
-  const EnvironmentView environment = view_of(work.light.now);
-  const PixelRect& rect = work.masks.any.rect();
-  TracedExchange scene(*work.geometry.accel, environment, work.samples, work.surfaces, rect,
-                       job.image.sites);
+  TracedExchange scene(work);
   ExchangeSettings settings{.form = job.visibility.form,
                             .num_slots = static_cast<std::uint32_t>(job.sampling.num_particles),
                             .num_sites = static_cast<std::uint32_t>(job.image.sites),
@@ -109,23 +83,22 @@ void exchange(const Work& work, std::span<Rgb> radiance, RenderStats& stats) {
 }
 
 /// The rival: more samples of the pixels themselves.
-void sample_more(const Work& work, std::span<Rgb> radiance, RenderStats& stats) {
-  ExtraSampler sampler(work.context, work.geometry, work.frame, work.light, work.samples,
-                       work.surfaces, work.masks.any);
-  for (std::int32_t y = work.rect.y0; y < work.rect.y1; ++y) {
-    for (std::int32_t x = work.rect.x0; x < work.rect.x1; ++x) {
-      if (!work.masks.any.at(x, y)) continue;
-      Rgb& pixel = radiance[PixelMask::index(work.rect, x, y)];
+void sample_more(const SecondPassWork& work, std::span<Rgb> radiance, RenderStats& stats) {
+  ExtraSampler sampler(work);
+  const PixelRect& rect = work.rect;
+  for (std::int32_t y = rect.y0; y < rect.y1; ++y) {
+    work.masks.any.visit_row(rect.x0, rect.x1, y, [&](std::int32_t x) {
+      Rgb& pixel = radiance[PixelMask::index(rect, x, y)];
       for (std::size_t fold = 0; fold < work.masks.of_fold.size(); ++fold)
-        pixel += sampler.radiance(x, y, fold, work.masks.of_fold[fold].at(x, y));
-    }
+        pixel += sampler.radiance(x, y, fold);
+    });
   }
   stats.rays_second_pass += sampler.rays_traced();
   stats.seconds_second_rays += sampler.seconds_rays();
 }
 
 /// Puts the pixels of the mask into the film.
-void write_pixels(const Work& work, std::span<const Rgb> radiance, FilmTile& film,
+void write_pixels(const SecondPassWork& work, std::span<const Rgb> radiance, FilmTile& film,
                   RenderStats& stats) {
   const bool show_environment = work.context.job.output.background == Background::environment;
   const auto mask_channel = std::find(film.channels.begin(), film.channels.end(), "mask");
@@ -168,7 +141,7 @@ Result<SecondPassOutput> run_second_pass(const RenderContext& context, std::int3
   const SampleRegion samples(near);
   const PixelRect rect = context.grid.rect(tile);
   const PixelRect reach = grown(rect, visibility.tile_size - 1, context.job.image);
-  const Masks masks =
+  const ExchangeMasks masks =
       make_masks(visibility, samples, reach, grown(reach, visibility.dilate, context.job.image));
 
   // Do their pixels again.
@@ -177,9 +150,10 @@ Result<SecondPassOutput> run_second_pass(const RenderContext& context, std::int3
   output.stats.rays_primary = surfaces.num_rays();
   output.seconds_primary_rays = surfaces.seconds_rays();
   BATON_ASSIGN(const auto light, light_of(context, frame_index, output.stats));
-  const Work work{context,  *geometry, context.frames[static_cast<std::size_t>(frame_index)],
-                  *light,   samples,   masks,
-                  surfaces, rect};
+  const SecondPassWork work{
+      context,  *geometry, context.frames[static_cast<std::size_t>(frame_index)],
+      *light,   samples,   masks,
+      surfaces, rect};
   std::vector<Rgb> radiance(static_cast<std::size_t>(rect.area()));
   if (visibility.form == SecondPassForm::extra_samples) {
     sample_more(work, radiance, output.stats);

@@ -2,100 +2,77 @@
 
 #include <algorithm>
 
-#include "worker/integrator/kernels.h"
 #include "worker/pass/cpu_clock.h"
 
 namespace baton {
 
-TracedExchange::TracedExchange(const Accel& accel, const EnvironmentView& environment,
-                               const SampleRegion& samples, const MaskedSurfaces& surfaces,
-                               const PixelRect& exchange_rect, std::int32_t num_sites)
-    : accel_(accel),
-      environment_(environment),
-      samples_(samples),
-      surfaces_(surfaces),
-      rect_(exchange_rect),
-      num_sites_(num_sites) {}
-
-float TracedExchange::lns(const SampleRegion::Place& place) const {
-  if (place.tile->lns.empty()) return 0;
-  const auto k = static_cast<std::size_t>(place.tile->num_populations);
-  return place.tile
-      ->lns[place.pixel * k + static_cast<std::size_t>(std::max(fold_.giver_population, 0))];
+void TracedExchange::use(const Fold& fold) {
+  fold_ = fold;
+  lns_.clear();
+  const SecondPassForm form = work_.context.job.visibility.form;
+  if (form != SecondPassForm::published && form != SecondPassForm::published_kept) return;
+  work_.masks.any.visit_all([&](std::int32_t x, std::int32_t y) {
+    const SampleRegion::Place place = work_.samples.find(x, y);
+    const auto populations = static_cast<std::size_t>(place.tile->num_populations);
+    const auto population = static_cast<std::size_t>(std::max(fold.giver_population, 0));
+    lns_.push_back(place.tile->lns[place.pixel * populations + population]);
+  });
 }
 
-float TracedExchange::lns(std::uint32_t receiver) const {
-  const auto width = static_cast<std::uint32_t>(rect_.width());
-  return lns(samples_.find(rect_.x0 + static_cast<std::int32_t>(receiver % width),
-                           rect_.y0 + static_cast<std::int32_t>(receiver / width)));
-}
-
-void TracedExchange::append_samples(std::int32_t x, std::int32_t y,
-                                    std::vector<GiverSample>& batch) {
-  if (batch.empty()) light_.clear();
-  const SampleRegion::Place place = samples_.find(x, y).of_population(fold_.giver_population);
-  if (place.count == 0) return;
-  const FirstPassSamples& from = *place.tile;
-
-  // See what its own surfaces make of the light along its samples.
-  const std::size_t first = light_.size();
-  light_.resize(first + place.count);
-  kernels::look_up_lights(environment_, std::span(from.direction).subspan(place.first, place.count),
-                          std::span(light_).subspan(first));
-  const std::int32_t first_surface = surfaces_.find(PixelMask::index(rect_, x, y)) * num_sites_;
-  pairs_.resize(std::max(pairs_.size(), place.count));
-  for (std::size_t i = 0; i < place.count; ++i) {
-    pairs_[i] = {first_surface + from.site[place.first + i], static_cast<std::int32_t>(first + i)};
+void TracedExchange::load_samples(std::span<Giver> givers, std::vector<GiverSample>& batch) {
+  // List the samples and who they are of.
+  const auto num_sites = static_cast<std::uint32_t>(work_.context.job.image.sites);
+  batch.clear();
+  code_.clear();
+  own_offers_.clear();
+  for (Giver& giver : givers) {
+    const SampleRegion::Place place =
+        work_.samples.find(giver.x, giver.y).of_population(fold_.giver_population);
+    for (std::size_t i = place.first; i < place.first + place.count; ++i) {
+      const FirstPassSamples& from = *place.tile;
+      own_offers_.push_back({static_cast<std::uint32_t>(batch.size()), giver.rank,
+                             giver.rank * num_sites + from.site[i]});
+      code_.push_back(from.direction[i]);
+      batch.push_back(
+          {.slot = from.slot[i], .energy = from.energy[i] * fold_.energy_scale, .reflected = {}});
+    }
+    giver.end_sample = batch.size();
   }
-  own_.resize(place.count + kernels::kPadding);
-  kernels::reflect_lights(surfaces_.table(), light_, std::span(pairs_).first(place.count), own_);
 
-  // Offer what reflects.
-  const float pixel_lns = lns(place);
-  std::size_t end = first;
-  for (std::size_t i = 0; i < place.count; ++i) {
-    if (!(own_[i].target > kSmallestTarget)) continue;
-    batch.push_back({.slot = from.slot[place.first + i],
-                     .energy = from.energy[place.first + i] * fold_.energy_scale,
-                     .lns = pixel_lns,
-                     .reflected = own_[i]});
-    light_[end++] = light_[first + i];
+  // See what their own surfaces make of the light along them.
+  light_.resize(code_.size());
+  kernels::look_up_lights(environment_, code_, light_);
+  own_.resize(code_.size() + kReceptionPadding);
+  kernels::reflect_lights(work_.surfaces.table(), light_, own_offers_, own_);
+
+  // Keep what reflects.
+  std::size_t sample = 0;
+  std::size_t end = 0;
+  for (Giver& giver : givers) {
+    for (; sample < giver.end_sample; ++sample) {
+      if (!(own_[sample].target > kSmallestTarget)) continue;
+      batch[end] = batch[sample];
+      batch[end].reflected = own_[sample];
+      light_[end++] = light_[sample];
+    }
+    giver.end_sample = end;
   }
+  batch.resize(end);
   light_.resize(end);
 }
 
 void TracedExchange::receive(std::span<const Offer> offers, std::span<Reflected> receptions) {
-  // Evaluate the products.
-  pairs_.resize(std::max(pairs_.size(), offers.size()));
-  const std::int32_t num_sites = num_sites_;
-  for (std::size_t i = 0; i < offers.size(); ++i) {
-    pairs_[i] = {
-        surfaces_.find(offers[i].receiver) * num_sites + static_cast<std::int32_t>(offers[i].site),
-        static_cast<std::int32_t>(offers[i].sample)};
-  }
-  kernels::reflect_lights(surfaces_.table(), light_, std::span(pairs_).first(offers.size()),
-                          receptions);
-
-  // Trace rays where there is a product.
-  rays_.clear();
-  rays_.reserve(offers.size() + 1);
-  offer_of_ray_.resize(std::max(offer_of_ray_.size(), offers.size() + 1));
-  for (std::size_t i = 0; i < offers.size(); ++i) {
-    offer_of_ray_[rays_.size()] = static_cast<std::uint32_t>(i);
-    rays_.push_if(receptions[i].target > 0,
-                  surfaces_.table().ray_origin(static_cast<std::size_t>(pairs_[i].surface)),
-                  light_[offers[i].sample].direction);
-  }
+  kernels::reflect_and_cast(work_.surfaces.table(), light_, offers, receptions, rays_);
   {
     const StageTimer timer(seconds_rays_);
-    accel_.occluded(rays_);
+    work_.geometry.accel->occluded(rays_.rays);
   }
-  rays_traced_ += rays_.size();
+  rays_traced_ += rays_.rays.size();
 
   // Of the blocked ones nothing is seen; what is free writes into the padding instead: a guess of
   // the processor would fail too often.
-  for (std::size_t r = 0; r < rays_.size(); ++r)
-    receptions[rays_.t_far[r] < 0 ? offer_of_ray_[r] : offers.size()] = {};
+  for (std::size_t r = 0; r < rays_.rays.size(); ++r)
+    receptions[rays_.rays.t_far[r] < 0 ? rays_.offer[r] : offers.size()] = {};
 }
 
 }  // namespace baton

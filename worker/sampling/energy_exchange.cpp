@@ -7,151 +7,183 @@
 namespace baton {
 namespace {
 
-/// Offers answered together: enough rays for one call of the ray tracer, few enough for the cache.
-constexpr std::size_t kBatchOffers = 2048;
+/// Pixels whose offers are answered together: enough rays for one call of the ray tracer, few
+/// enough for the cache.
+constexpr std::size_t kBatchGivers = 32;
 
 constexpr std::array<Fold, 1> kSameSamples{Fold{}};
 constexpr std::array<Fold, 1> kSplit{Fold{0, 1, 2.0f}};
 constexpr std::array<Fold, 2> kCrossFold{Fold{0, 1, 1.0f}, Fold{1, 0, 1.0f}};
 
+/// sum += seen * scale, all four floats at once.
+void add_scaled(Reflected& sum, const Reflected& seen, float scale) {
+  sum.radiance += seen.radiance * scale;
+  sum.target += seen.target * scale;
+}
+
 class Exchange {
  public:
   Exchange(const ExchangeSettings& settings, const SquarePartitions& partitions,
-           const PixelMask& exchange, const PixelRect& inner, ExchangeScene& scene,
-           std::span<Rgb> radiance)
+           const PixelMask& exchange, const PixelMask& recompute, const PixelRect& inner,
+           ExchangeScene& scene)
       : settings_(settings),
         partitions_(partitions),
         exchange_(exchange),
         inner_(inner),
         scene_(scene),
-        radiance_(radiance),
+        ranks_(recompute.ranks()),
         squares_(static_cast<std::size_t>(partitions.count())) {
-    const PixelRect& rect = exchange.rect();
-    for (std::int32_t y = rect.y0; y < rect.y1; ++y) {
-      for (std::int32_t x = rect.x0; x < rect.x1; ++x) {
-        inner_index_.push_back(
-            inner.contains(x, y) ? static_cast<std::int32_t>(PixelMask::index(inner, x, y)) : -1);
-      }
-    }
+    recompute.visit_all([&](std::int32_t x, std::int32_t y) {
+      inner_index_.push_back(
+          inner.contains(x, y) ? static_cast<std::int32_t>(PixelMask::index(inner, x, y)) : -1);
+    });
+    sums_.resize(inner_index_.size());
   }
 
-  /// Puts a pixel into the batch. Givers must come row by row: that is the order in which receivers
-  /// add.
+  /// Puts a pixel to recompute into the batch. Givers must come row by row: that is the order in
+  /// which receivers add.
   void add(std::int32_t x, std::int32_t y) {
-    const bool inside = inner_.contains(x, y);
-    Giver giver{
-        .x = x, .y = y, .inside = inside, .end_sample = 0, .num_lonely = partitions_.count()};
-    const std::size_t first = batch_.size();
-    scene_.append_samples(x, y, batch_);
-    const std::size_t num_samples = batch_.size() - first;
-    if (exchange_.at(x, y) && num_samples > 0) {
-      giver.num_lonely = meet_neighbours(x, y);
-      offers_.resize(std::max(offers_.size(), num_offers_ + num_samples * neighbours_.size()));
-      for (std::size_t s = first; s < batch_.size(); ++s) make_offers(s, inside);
-    }
-    giver.end_sample = batch_.size();
-    givers_.push_back(giver);
-    if (num_offers_ >= kBatchOffers) flush();
+    if (!inner_.contains(x, y) && !exchange_.at(x, y)) return;
+    givers_.push_back({x, y, static_cast<std::uint32_t>(ranks_[exchange_.index(x, y)])});
+    if (givers_.size() == kBatchGivers) flush();
   }
 
-  /// Answers and books everything in the batch.
+  /// Offers, answers and books the samples of the batch.
   void flush() {
-    receptions_.resize(std::max(receptions_.size(), num_offers_ + kReceptionPadding));
-    const std::span<const Offer> offers(offers_.data(), num_offers_);
-    scene_.receive(offers, std::span(receptions_).first(num_offers_ + kReceptionPadding));
+    // Offer.
+    scene_.load_samples(givers_, batch_);
+    num_lonely_.assign(givers_.size(), partitions_.count());
+    offers_.resize(batch_.size() * static_cast<std::size_t>(partitions_.count()));
+    Offer* end = offers_.data();
     std::size_t sample = 0;
-    std::size_t offer = 0;
-    for (const Giver& giver : givers_) {
-      for (; sample < giver.end_sample; ++sample) book(giver, sample, offers, offer);
+    for (std::size_t g = 0; g < givers_.size(); ++g) {
+      const Giver& giver = givers_[g];
+      if (exchange_.at(giver.x, giver.y) && sample < giver.end_sample) {
+        num_lonely_[g] = meet_neighbours(giver);
+        for (std::size_t s = sample; s < giver.end_sample; ++s)
+          end = make_offers(s, inner_index_[giver.rank] >= 0, end);
+      }
+      sample = giver.end_sample;
     }
-    batch_.clear();
+    offers_.resize(static_cast<std::size_t>(end - offers_.data()));
+
+    // Answer.
+    receptions_.resize(std::max(receptions_.size(), offers_.size() + kReceptionPadding));
+    scene_.receive(offers_, std::span(receptions_).first(offers_.size() + kReceptionPadding));
+
+    // Book.
+    if (settings_.form == SecondPassForm::corrected) {
+      book_corrected();
+    } else {
+      book_published();
+    }
     givers_.clear();
-    num_offers_ = 0;
+  }
+
+  /// Adds what the pixels of `inner` got.
+  void finish(std::span<Rgb> radiance) const {
+    for (std::size_t rank = 0; rank < sums_.size(); ++rank) {
+      if (inner_index_[rank] >= 0)
+        radiance[static_cast<std::size_t>(inner_index_[rank])] += sums_[rank].radiance;
+    }
   }
 
  private:
-  struct Giver {
-    std::int32_t x, y;
-    bool inside;
-    std::size_t end_sample;   ///< past its samples in the batch
-    std::int32_t num_lonely;  ///< partitions in which there is nobody to offer to
-  };
-
   /// The others of one square, with 32 random bits.
   struct Neighbours : SquareMembers::Others {
     std::uint32_t stratum = 0;
   };
 
-  /// Lists the masked pixels that share a square with (x, y). Returns the number of partitions
+  /// Lists the masked pixels that share a square with the giver. Returns the number of partitions
   /// without any.
-  std::int32_t meet_neighbours(std::int32_t x, std::int32_t y) {
+  std::int32_t meet_neighbours(const Giver& giver) {
     const Rng rng({.job_seed = settings_.job_seed,
                    .frame = settings_.frame,
-                   .pixel = static_cast<std::uint32_t>(y * settings_.image_width + x)},
+                   .pixel = static_cast<std::uint32_t>(giver.y * settings_.image_width + giver.x)},
                   PassId::exchange);
     neighbours_.clear();
     Philox4x32::Counter random{};
     for (std::int32_t c = 0; c < partitions_.count(); ++c) {
       const auto word = static_cast<std::uint32_t>(c);
       if (word % 4 == 0) random = rng.bits(settings_.fold, word / 4);
-      squares_[word].move_to(exchange_, partitions_, c, y);
-      const SquareMembers::Others others = squares_[word].others(x, y);
+      squares_[word].move_to(exchange_, partitions_, c, giver.y, ranks_);
+      const SquareMembers::Others others = squares_[word].others(giver.x, giver.y);
       if (others.count > 0) neighbours_.push_back({others, random[word % 4]});
     }
     return partitions_.count() - static_cast<std::int32_t>(neighbours_.size());
   }
 
   /// Draws one (pixel, site) in each partition, uniformly; the slots of a pixel take different
-  /// strata of it. Of a giver outside, only what comes in matters.
-  void make_offers(std::size_t sample, bool inside) {
+  /// strata of it. Of a giver outside, only what comes in matters. Returns the end of the offers.
+  Offer* make_offers(std::size_t sample, bool inside, Offer* offer) const {
     const auto shift = static_cast<std::uint32_t>((std::uint64_t{batch_[sample].slot} << 32) /
                                                   settings_.num_slots);
     const std::uint32_t num_sites = settings_.num_sites;
-    const auto* own_pixel = inside ? nullptr : inner_index_.data();
-    Offer* offer = offers_.data() + num_offers_;
     for (const Neighbours& others : neighbours_) {
       const std::uint32_t position = others.stratum + shift;                // wraps around
       const std::uint64_t scaled = std::uint64_t{position} * others.count;  // 32 bits of fraction
       const std::uint32_t receiver = others.pick(static_cast<std::uint32_t>(scaled >> 32));
-      if (own_pixel != nullptr && own_pixel[receiver] < 0) continue;
-      *offer++ = {static_cast<std::uint32_t>(sample), receiver,
-                  static_cast<std::uint32_t>((scaled & 0xffffffffu) * num_sites >> 32)};
+      if (!inside && inner_index_[receiver] < 0) continue;
+      const auto site = static_cast<std::uint32_t>((scaled & 0xffffffffu) * num_sites >> 32);
+      *offer++ = {static_cast<std::uint32_t>(sample), receiver, receiver * num_sites + site};
     }
-    num_offers_ = static_cast<std::size_t>(offer - offers_.data());
+    return offer;
   }
 
-  /// The acceptance over the receiver's target; finite where it reflects nothing.
-  float acceptance_per_target(const GiverSample& given, std::uint32_t receiver,
-                              const Reflected& seen) const {
-    if (settings_.form == SecondPassForm::corrected)
-      return std::min(1 / given.reflected.target, 1 / seen.target);
-    if (!(seen.target > kSmallestTarget && given.lns > 0)) return 0;
-    return std::min(1.0f, scene_.lns(receiver) / given.lns) / seen.target;
+  /// a = min(1, p~' / p~).
+  void book_corrected() {
+    const auto acceptance = [](const GiverSample& given, const Giver&) {
+      return [target = given.reflected.target](const Offer&, const Reflected& seen) {
+        return 1 / std::max(target, seen.target);
+      };
+    };
+    book(acceptance, [c = static_cast<float>(partitions_.count())](float accepted, std::int32_t) {
+      return std::max(c - accepted, 0.0f);
+    });
   }
 
-  /// Gives away the accepted shares of one sample; the giver keeps the rest. `at` moves past the
-  /// sample's offers.
-  void book(const Giver& giver, std::size_t sample, std::span<const Offer> offers,
-            std::size_t& at) {
-    const GiverSample& given = batch_[sample];
+  /// a = min(1, Lns' / Lns); what is refused is lost, or kept.
+  void book_published() {
+    const std::span<const float> lns = scene_.lns();
+    const auto acceptance = [lns](const GiverSample&, const Giver& giver) {
+      const float scale = lns[giver.rank] > 0 ? 1 / lns[giver.rank] : 0.0f;
+      return [lns, scale](const Offer& offer, const Reflected& seen) {
+        return std::min(1.0f, lns[offer.receiver] * scale) / std::max(seen.target, kSmallestTarget);
+      };
+    };
+    const bool lost = settings_.form == SecondPassForm::published;
     const auto c = static_cast<float>(partitions_.count());
-    const float unit = given.energy / c;
-    float accepted = 0;
-    for (; at < offers.size() && offers[at].sample == sample; ++at) {
-      // No branch on what the rays said: nothing reflected adds nothing.
-      const Reflected& seen = receptions_[at];
-      const float share_per_target = acceptance_per_target(given, offers[at].receiver, seen);
-      accepted += share_per_target * seen.target;
-      const std::int32_t to = inner_index_[offers[at].receiver];
-      if (to >= 0)
-        radiance_[static_cast<std::size_t>(to)] += seen.radiance * (share_per_target * unit);
+    book(acceptance, [lost, c](float accepted, std::int32_t num_lonely) {
+      return lost ? static_cast<float>(num_lonely) : std::max(c - accepted, 0.0f);
+    });
+  }
+
+  /// Gives away the accepted shares of all samples of the batch; the giver keeps what is left.
+  /// acceptance(sample, giver) is a function of an offer and what came of it: the probability over
+  /// the receiver's target, finite where it reflects nothing. left(accepted, num_lonely): of C
+  /// shares.
+  template <class Acceptance, class Left>
+  void book(const Acceptance& acceptance, const Left& left) {
+    const auto c = static_cast<float>(partitions_.count());
+    std::size_t sample = 0;
+    std::size_t at = 0;
+    for (std::size_t g = 0; g < givers_.size(); ++g) {
+      for (; sample < givers_[g].end_sample; ++sample) {
+        const GiverSample& given = batch_[sample];
+        const auto accept = acceptance(given, givers_[g]);
+        const float unit = given.energy / c;
+        float accepted = 0;
+        for (; at < offers_.size() && offers_[at].sample == sample; ++at) {
+          // No branch on what the rays said: nothing reflected adds nothing.
+          const Reflected& seen = receptions_[at];
+          const float share_per_target = accept(offers_[at], seen);
+          accepted += share_per_target * seen.target;
+          add_scaled(sums_[offers_[at].receiver], seen, share_per_target * unit);
+        }
+        add_scaled(sums_[givers_[g].rank], given.reflected,
+                   left(accepted, num_lonely_[g]) * unit / given.reflected.target);
+      }
     }
-    if (!giver.inside) return;
-    const float left = settings_.form == SecondPassForm::published
-                           ? static_cast<float>(giver.num_lonely)
-                           : std::max(c - accepted, 0.0f);
-    radiance_[PixelMask::index(inner_, giver.x, giver.y)] +=
-        given.reflected.radiance * (left / c * given.energy / given.reflected.target);
   }
 
   const ExchangeSettings& settings_;
@@ -159,14 +191,15 @@ class Exchange {
   const PixelMask& exchange_;
   const PixelRect inner_;
   ExchangeScene& scene_;
-  std::span<Rgb> radiance_;
+  const std::vector<std::int32_t> ranks_;  ///< (rectangle of the masks)
   std::vector<SquareMembers> squares_;     ///< (C)
   std::vector<Neighbours> neighbours_;     ///< of the pixel in work: at most C
-  std::vector<std::int32_t> inner_index_;  ///< (pixels of the mask) position in `inner`, or -1
+  std::vector<std::int32_t> inner_index_;  ///< (ranks) position in `inner`, or -1
+  std::vector<Reflected> sums_;            ///< (ranks) what each got
   std::vector<Giver> givers_;
+  std::vector<std::int32_t> num_lonely_;  ///< (givers) partitions with nobody to offer to
   std::vector<GiverSample> batch_;
-  std::vector<Offer> offers_;  ///< of which the first num_offers_ are meant
-  std::size_t num_offers_ = 0;
+  std::vector<Offer> offers_;
   std::vector<Reflected> receptions_;
 };
 
@@ -190,14 +223,10 @@ void exchange_energy(const ExchangeSettings& settings, const SquarePartitions& p
   BATON_CHECK(radiance.size() == static_cast<std::size_t>(inner.area()));
   BATON_CHECK(exchange.rect() == recompute.rect() && settings.num_slots > 0 &&
               settings.num_sites > 0);
-  Exchange work(settings, partitions, exchange, inner, scene, radiance);
-  const PixelRect& rect = recompute.rect();
-  for (std::int32_t y = rect.y0; y < rect.y1; ++y) {
-    for (std::int32_t x = rect.x0; x < rect.x1; ++x) {
-      if (recompute.at(x, y) && (inner.contains(x, y) || exchange.at(x, y))) work.add(x, y);
-    }
-  }
+  Exchange work(settings, partitions, exchange, recompute, inner, scene);
+  recompute.visit_all([&](std::int32_t x, std::int32_t y) { work.add(x, y); });
   work.flush();
+  work.finish(radiance);
 }
 
 }  // namespace baton

@@ -29,15 +29,21 @@ namespace baton {
 struct GiverSample {
   std::uint32_t slot = 0;  ///< its position among the samples of the pixel, [0, num_slots)
   float energy = 0;        ///< u_j, mean over RGB; positive
-  float lns = 0;           ///< of its pixel; read by the published forms only
   Reflected reflected;     ///< at its own site; target above kSmallestTarget
+};
+
+/// A pixel whose samples are asked for.
+struct Giver {
+  std::int32_t x = 0, y = 0;
+  std::uint32_t rank = 0;      ///< as in Offer
+  std::size_t end_sample = 0;  ///< past its samples in the batch: the answer
 };
 
 /// "May this sample be seen from there?"
 struct Offer {
   std::uint32_t sample = 0;    ///< position in the batch
-  std::uint32_t receiver = 0;  ///< pixel: position in the rectangle of the exchange mask
-  std::uint32_t site = 0;      ///< site of the receiver, [0, num_sites)
+  std::uint32_t receiver = 0;  ///< pixel: PixelMask::ranks of the pixels to recompute
+  std::uint32_t surface = 0;   ///< receiver * num_sites + site
 };
 
 /// The answer is what the receiver reflects of the sample's light; nothing without a surface, below
@@ -49,13 +55,12 @@ inline constexpr float kSmallestTarget = 1e-37f;
 class ExchangeScene {
  public:
   virtual ~ExchangeScene() = default;
-  /// Appends the free samples of a pixel to the batch.
-  virtual void append_samples(std::int32_t x, std::int32_t y, std::vector<GiverSample>& batch) = 0;
+  /// Puts the free samples of some pixels, one pixel after the other, in place of the last batch.
+  virtual void load_samples(std::span<Giver> givers, std::vector<GiverSample>& batch) = 0;
   /// Answers offers of samples of the batch. receptions: kReceptionPadding longer than the offers.
   virtual void receive(std::span<const Offer> offers, std::span<Reflected> receptions) = 0;
-  /// Lns of a pixel (position in the rectangle of the exchange mask) as its givers have it; asked
-  /// for by the published forms only.
-  virtual float lns(std::uint32_t receiver) const = 0;
+  /// (ranks) Lns of the pixels as their samples have it; asked for by the published forms only.
+  virtual std::span<const float> lns() const = 0;
 };
 
 struct ExchangeSettings {

@@ -8,23 +8,31 @@
 
 namespace baton {
 
+void PixelMask::add(const PixelMask& other) {
+  BATON_CHECK(rect_ == other.rect_);
+  for (std::size_t i = 0; i < words_.size(); ++i) words_[i] |= other.words_[i];
+}
+
+std::vector<std::int32_t> PixelMask::ranks() const {
+  std::vector<std::int32_t> ranks(static_cast<std::size_t>(rect_.area()), -1);
+  std::int32_t count = 0;
+  visit_all([&](std::int32_t x, std::int32_t y) { ranks[index(x, y)] = count++; });
+  return ranks;
+}
+
 PixelMask dilate(const PixelMask& mask, std::int32_t radius, const PixelMask& allowed,
                  const PixelRect& rect) {
   PixelMask grown(rect);
-  const PixelRect& from = mask.rect();
-  for (std::int32_t y = from.y0; y < from.y1; ++y) {
-    for (std::int32_t x = from.x0; x < from.x1; ++x) {
-      if (!mask.at(x, y)) continue;
-      // Spread to the square around the pixel.
-      for (std::int32_t v = std::max(y - radius, rect.y0); v < std::min(y + radius + 1, rect.y1);
-           ++v) {
-        for (std::int32_t u = std::max(x - radius, rect.x0); u < std::min(x + radius + 1, rect.x1);
-             ++u) {
-          if (allowed.at(u, v)) grown.set(u, v);
-        }
+  mask.visit_all([&](std::int32_t x, std::int32_t y) {
+    // Spread to the square around the pixel.
+    for (std::int32_t v = std::max(y - radius, rect.y0); v < std::min(y + radius + 1, rect.y1);
+         ++v) {
+      for (std::int32_t u = std::max(x - radius, rect.x0); u < std::min(x + radius + 1, rect.x1);
+           ++u) {
+        if (allowed.at(u, v)) grown.set(u, v);
       }
     }
-  }
+  });
   return grown;
 }
 
@@ -55,7 +63,8 @@ PixelRect SquarePartitions::square(std::int32_t partition, std::int32_t x, std::
 }
 
 void SquareMembers::list(const PixelMask& mask, const SquarePartitions& partitions,
-                         std::int32_t partition, std::int32_t y) {
+                         std::int32_t partition, std::int32_t y,
+                         std::span<const std::int32_t> names) {
   const PixelRect& rect = mask.rect();
   const PixelRect first_square = partitions.square(partition, rect.x0, y);
   x0_ = rect.x0;
@@ -72,12 +81,11 @@ void SquareMembers::list(const PixelMask& mask, const SquarePartitions& partitio
     const std::int32_t x1 = std::min(partitions.square(partition, x, y).x1, rect.x1);
     const auto first = static_cast<std::uint32_t>(members_.size());
     for (std::int32_t v = y0_; v < y1_; ++v) {
-      for (std::int32_t u = x; u < x1; ++u) {
-        if (!mask.at(u, v)) continue;
+      mask.visit_row(x, x1, v, [&](std::int32_t u) {
         rank_[static_cast<std::size_t>(v - y0_) * width_ + static_cast<std::size_t>(u - x0_)] =
             static_cast<std::uint16_t>(members_.size() - first);
-        members_.push_back(static_cast<std::uint32_t>(mask.index(u, v)));
-      }
+        members_.push_back(static_cast<std::uint32_t>(names[mask.index(u, v)]));
+      });
     }
     for (; x < x1; ++x) {
       first_[static_cast<std::size_t>(x - x0_)] = first;

@@ -1,6 +1,9 @@
 #pragma once
 
+#include <algorithm>
+#include <bit>
 #include <cstdint>
+#include <span>
 #include <vector>
 
 #include "common/math/philox.h"
@@ -33,6 +36,25 @@ class PixelMask {
     const std::uint64_t bits = shift == 0 ? word[0] : word[0] >> shift | word[1] << (64 - shift);
     return static_cast<std::uint32_t>(bits & ((std::uint64_t{1} << (x1 - x0)) - 1));
   }
+  /// Calls visit(x) for the pixels of row y in [x0, x1), ascending; all of them in the rectangle.
+  template <class Visit>
+  void visit_row(std::int32_t x0, std::int32_t x1, std::int32_t y, const Visit& visit) const {
+    for (; x0 < x1; x0 += 32) {
+      for (std::uint32_t bits = row_bits(x0, std::min(x0 + 32, x1), y); bits != 0; bits &= bits - 1)
+        visit(x0 + std::countr_zero(bits));
+    }
+  }
+  /// Calls visit(x, y) for all pixels, row by row.
+  template <class Visit>
+  void visit_all(const Visit& visit) const {
+    for (std::int32_t y = rect_.y0; y < rect_.y1; ++y)
+      visit_row(rect_.x0, rect_.x1, y, [&](std::int32_t x) { visit(x, y); });
+  }
+  /// Adds the pixels of a mask of the same rectangle.
+  void add(const PixelMask& other);
+  /// (pixels of the rectangle) rank of each pixel of the mask, row by row: how many come before
+  /// it; -1 for the others.
+  std::vector<std::int32_t> ranks() const;
   /// Position of a pixel of a rectangle, row by row.
   std::size_t index(std::int32_t x, std::int32_t y) const { return index(rect_, x, y); }
   static std::size_t index(const PixelRect& rect, std::int32_t x, std::int32_t y) {
@@ -81,20 +103,19 @@ class SquarePartitions {
 /// may offer its samples to.
 class SquareMembers {
  public:
-  /// Moves to the row of squares that holds row y of the mask; cheap when it is there already. mask
-  /// and partitions must outlive the object. A square that reaches past the mask has fewer members
-  /// here.
+  /// Moves to the row of squares that holds row y of the mask; cheap when it is there already. A
+  /// square that reaches past the mask has fewer members here. names: (pixels of the rectangle)
+  /// what to call a pixel of the mask.
   void move_to(const PixelMask& mask, const SquarePartitions& partitions, std::int32_t partition,
-               std::int32_t y) {
-    if (y < y0_ || y >= y1_) list(mask, partitions, partition, y);
+               std::int32_t y, std::span<const std::int32_t> names) {
+    if (y < y0_ || y >= y1_) list(mask, partitions, partition, y, names);
   }
 
   /// The others in the square of a masked pixel (x, y) of this row of squares.
   struct Others {
-    const std::uint32_t* members =
-        nullptr;              ///< PixelMask::index, row by row, the pixel itself among them
-    std::uint32_t rank = 0;   ///< of the pixel itself
-    std::uint32_t count = 0;  ///< without it
+    const std::uint32_t* members = nullptr;  ///< names, row by row, the pixel itself among them
+    std::uint32_t rank = 0;                  ///< of the pixel itself
+    std::uint32_t count = 0;                 ///< without it
     /// The k-th other, k < count.
     std::uint32_t pick(std::uint32_t k) const { return members[k + (k >= rank ? 1 : 0)]; }
   };
@@ -107,7 +128,7 @@ class SquareMembers {
 
  private:
   void list(const PixelMask& mask, const SquarePartitions& partitions, std::int32_t partition,
-            std::int32_t y);
+            std::int32_t y, std::span<const std::int32_t> names);
 
   std::int32_t x0_ = 0, y0_ = 0, y1_ = 0;  ///< of the rows in the lists; none at first
   std::size_t width_ = 0;

@@ -6,7 +6,6 @@
 #include <cmath>
 
 #include "tests/support/merl_file.h"
-#include "worker/integrator/kernels.h"
 
 namespace baton {
 namespace {
@@ -55,23 +54,28 @@ TEST(ExchangeKernels, ReflectionsAsTheScalarCode) {
                            .ns = normalize(Vec3{0.1f, 1, 0.2f}),
                            .wo = normalize(Vec3{0.3f, 0.9f, 0.2f})};
   SurfaceTable surfaces;
-  for (const Material& material : materials) surfaces.add(point, material, {1, 2, 3});
+  for (std::size_t k = 0; k < materials.size(); ++k)
+    surfaces.add(point, materials[k], {static_cast<float>(k), 2, 3});
   surfaces.add_nothing();
-  EXPECT_EQ(surfaces.ray_origin(2), (Vec3{1, 2, 3}));
 
   const std::vector<OctDirection> codes = random_codes(4003);
   std::vector<LightRecord> lights(codes.size());
   kernels::look_up_lights(view_of(checkered_environment()), codes, lights);
-  std::vector<LitSurface> pairs;
+  std::vector<Offer> offers;
   for (std::size_t i = 0; i < codes.size(); ++i) {
     const std::size_t surface = i < 1000 ? i / 200 : i % 5;
-    pairs.push_back({static_cast<std::int32_t>(surface), static_cast<std::int32_t>(i)});
+    offers.push_back({.sample = static_cast<std::uint32_t>(i),
+                      .receiver = 0,
+                      .surface = static_cast<std::uint32_t>(surface)});
   }
-  std::vector<Reflected> reflected(pairs.size() + kernels::kPadding);
-  kernels::reflect_lights(surfaces, lights, pairs, reflected);
+  std::vector<Reflected> reflected(offers.size() + kReceptionPadding), again = reflected;
+  kernels::reflect_lights(surfaces, lights, offers, reflected);
+  OfferRays rays;
+  kernels::reflect_and_cast(surfaces, lights, offers, again, rays);
   int shining = 0;
-  for (std::size_t i = 0; i < pairs.size(); ++i) {
-    const auto surface = static_cast<std::size_t>(pairs[i].surface);
+  std::size_t ray = 0;
+  for (std::size_t i = 0; i < offers.size(); ++i) {
+    const std::size_t surface = offers[i].surface;
     const Vec3& wi = lights[i].direction;
     Rgb expected;
     if (surface < materials.size() && dot(point.ng, wi) > 0)
@@ -82,9 +86,22 @@ TEST(ExchangeKernels, ReflectionsAsTheScalarCode) {
     ASSERT_NEAR(got.y, expected.y, 2e-3f * expected.y + 1e-3f) << surface << " direction " << i;
     ASSERT_NEAR(got.z, expected.z, 2e-3f * expected.z + 1e-3f) << surface << " direction " << i;
     ASSERT_NEAR(reflected[i].target, mean(got), 1e-6f * mean(got));
-    shining += reflected[i].target > 0 ? 1 : 0;
+    ASSERT_EQ(again[i].radiance, got);
+    ASSERT_EQ(again[i].target, reflected[i].target);
+    if (!(reflected[i].target > 0)) continue;
+    // Each that shines has its ray, in order.
+    ++shining;
+    ASSERT_LT(ray, rays.rays.size());
+    ASSERT_EQ(rays.offer[ray], i);
+    const ShadowRays& r = rays.rays;
+    ASSERT_EQ((Vec3{r.origin_x[ray], r.origin_y[ray], r.origin_z[ray]}),
+              (Vec3{static_cast<float>(surface), 2, 3}));
+    ASSERT_EQ((Vec3{r.direction_x[ray], r.direction_y[ray], r.direction_z[ray]}), wi);
+    ASSERT_GT(r.t_far[ray], 1e30f);
+    ++ray;
   }
   EXPECT_GT(shining, 1000);
+  EXPECT_EQ(ray, rays.rays.size());
 }
 
 }  // namespace

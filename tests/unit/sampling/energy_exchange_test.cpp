@@ -291,7 +291,8 @@ TEST(EnergyExchange, ABlockedPixelReceives) {
   for (std::uint32_t seed = 1; seed <= 200; ++seed) {
     exact::Source source(scene, 2, 2, seed);
     std::vector<GiverSample> own;
-    source.append_samples(0, 0, own);
+    std::array<Giver, 1> giver;
+    source.load_samples(giver, own);
     received += own.empty() && exact::render(scene, method, seed)[0].x > 0 ? 1 : 0;
   }
   EXPECT_GT(received, 20);

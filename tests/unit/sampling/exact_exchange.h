@@ -62,6 +62,7 @@ class Source final : public ExchangeScene {
         per_population_(num_slots / num_populations),
         samples_(scene.num_pixels() * num_slots) {
     for (std::size_t pixel = 0; pixel < scene.num_pixels(); ++pixel) {
+      lns_.push_back(static_cast<float>(scene.lns(pixel)));
       const Rng rng({.job_seed = seed, .frame = 0, .pixel = static_cast<std::uint32_t>(pixel)},
                     PassId::choose);
       for (std::uint32_t k = 0; k < num_populations; ++k) draw(pixel, k, rng.uniforms(k, 0)[0]);
@@ -82,33 +83,35 @@ class Source final : public ExchangeScene {
     return mask;
   }
 
-  void append_samples(std::int32_t x, std::int32_t y, std::vector<GiverSample>& batch) override {
-    const auto pixel = static_cast<std::size_t>(y * scene_.width + x);
-    if (batch.empty()) points_.clear();
-    for (std::size_t i = pixel * num_slots_; i < (pixel + 1) * num_slots_; ++i) {
-      const Sample& s = samples_[i];
-      const bool given = fold_.giver_population < 0 || population(s) == fold_.giver_population;
-      if (!given || scene_.visible[s.point] == 0) continue;
-      batch.push_back({.slot = s.slot,
-                       .energy = s.energy * fold_.energy_scale,
-                       .lns = static_cast<float>(scene_.lns(pixel)),
-                       .reflected = {scene_.reflected[s.point], scene_.target(s.point)}});
-      points_.push_back(s.point);
+  void load_samples(std::span<Giver> givers, std::vector<GiverSample>& batch) override {
+    batch.clear();
+    points_.clear();
+    for (Giver& giver : givers) {
+      const std::size_t pixel = giver.rank;  // all pixels have one
+      for (std::size_t i = pixel * num_slots_; i < (pixel + 1) * num_slots_; ++i) {
+        const Sample& s = samples_[i];
+        const bool given = fold_.giver_population < 0 || population(s) == fold_.giver_population;
+        if (!given || scene_.visible[s.point] == 0) continue;
+        batch.push_back({.slot = s.slot,
+                         .energy = s.energy * fold_.energy_scale,
+                         .reflected = {scene_.reflected[s.point], scene_.target(s.point)}});
+        points_.push_back(s.point);
+      }
+      giver.end_sample = batch.size();
     }
   }
 
   void receive(std::span<const Offer> offers, std::span<Reflected> receptions) override {
     for (std::size_t i = 0; i < offers.size(); ++i) {
       const std::size_t direction = points_[offers[i].sample] % scene_.num_directions;
-      const std::size_t point = scene_.at(offers[i].receiver, direction, offers[i].site);
+      const std::size_t point =
+          scene_.at(offers[i].receiver, direction, offers[i].surface % scene_.num_sites);
       receptions[i] = {};
       if (scene_.visible[point] != 0)
         receptions[i] = {scene_.reflected[point], scene_.target(point)};
     }
   }
-  float lns(std::uint32_t receiver) const override {
-    return static_cast<float>(scene_.lns(receiver));
-  }
+  std::span<const float> lns() const override { return lns_; }
 
  private:
   int population(const Sample& s) const { return static_cast<int>(s.slot / per_population_); }
@@ -136,6 +139,7 @@ class Source final : public ExchangeScene {
   const Scene& scene_;
   const std::uint32_t num_slots_, per_population_;
   std::vector<Sample> samples_;      ///< (pixels, slots)
+  std::vector<float> lns_;           ///< (pixels)
   std::vector<std::size_t> points_;  ///< of the batch
   Fold fold_;
 };

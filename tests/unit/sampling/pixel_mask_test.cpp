@@ -29,6 +29,20 @@ TEST(PixelMask, RowsOfBitsCrossWords) {
   }
 }
 
+TEST(PixelMask, RanksCountRowByRow) {
+  PixelMask some({3, 1, 80, 4}), more(some.rect());
+  for (const std::int32_t x : {4, 35, 67, 68, 79}) some.set(x, 2);
+  more.set(3, 3);
+  some.add(more);
+  const std::vector<std::int32_t> ranks = some.ranks();
+  std::int32_t expected = 0;
+  for (std::int32_t y = 1; y < 4; ++y) {
+    for (std::int32_t x = 3; x < 80; ++x)
+      ASSERT_EQ(ranks[some.index(x, y)], some.at(x, y) ? expected++ : -1) << x << "," << y;
+  }
+  EXPECT_EQ(expected, 6);
+}
+
 TEST(SquareMembers, AreTheOtherMaskedPixelsOfTheSquare) {
   const PixelRect image{0, 0, 23, 17};
   PixelMask mask({2, 1, 21, 17});
@@ -38,10 +52,11 @@ TEST(SquareMembers, AreTheOtherMaskedPixelsOfTheSquare) {
     }
   }
   const SquarePartitions partitions(image, 5, 6, Rng({.job_seed = 3}, PassId::partition));
+  const std::vector<std::int32_t> names = mask.ranks();
   for (std::int32_t c = 0; c < partitions.count(); ++c) {
     SquareMembers squares;
     for (std::int32_t y = 1; y < 17; ++y) {
-      squares.move_to(mask, partitions, c, y);
+      squares.move_to(mask, partitions, c, y, names);
       for (std::int32_t x = 2; x < 21; ++x) {
         if (!mask.at(x, y)) continue;
         const SquareMembers::Others others = squares.others(x, y);
@@ -51,7 +66,7 @@ TEST(SquareMembers, AreTheOtherMaskedPixelsOfTheSquare) {
         for (std::int32_t v = square.y0; v < square.y1; ++v) {
           for (std::int32_t u = square.x0; u < square.x1; ++u) {
             if (mask.at(u, v) && (u != x || v != y))
-              expected.push_back(static_cast<std::uint32_t>(mask.index(u, v)));
+              expected.push_back(static_cast<std::uint32_t>(names[mask.index(u, v)]));
           }
         }
         ASSERT_EQ(got, expected) << c << ": " << x << "," << y;
