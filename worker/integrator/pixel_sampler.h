@@ -87,6 +87,7 @@ struct PixelRays {
 /// Work space of one thread, reused from pixel to pixel.
 struct SamplerScratch {
   kernels::CandidateSet candidates;
+  kernels::ChoiceScratch choice;
   std::array<kernels::PoolHalf, 2> pool;
 };
 
