@@ -36,6 +36,7 @@ struct SiteDeal {
   /// Site of the k-th share of the vectors.
   std::int32_t SiteOfShare(std::size_t k) const {
     const auto n = static_cast<std::size_t>(num_sites);
+    if (n == 1) return sites[0];
     return sites[(k + static_cast<std::size_t>(start * static_cast<float>(num_sites))) % n];
   }
   /// First vector of the k-th share.
@@ -89,7 +90,7 @@ struct LightRun {
     if (count == 0) return;
     const std::uint32_t stride =
         std::clamp(std::bit_floor(static_cast<std::uint32_t>(count)), LightPool::kBlock, 64u);
-    start = bits % (LightPool::kSize / stride) * stride;
+    start = bits & (LightPool::kSize - stride);  // both are powers of two
   }
   /// Candidates i, i + 1, ...
   HWY_INLINE LightLanes Load(std::size_t i) const {

@@ -152,8 +152,12 @@ inline float ChooseCandidates(const SiteBlock& sites, const EnvironmentView& env
   const auto padded_light = static_cast<std::int32_t>(
       hwy::RoundUpTo(static_cast<std::size_t>(counts.from_light), hn::Lanes(d)));
   const ChosenCandidates chosen(sites, pool, counts, random, padded_light, scratch.from_bsdf);
+  HWY_ALIGN std::int32_t picks[limits::kMaxParticles];
   for (std::size_t j = 0; j < out.code.size(); j += hn::Lanes(d)) {
-    const CandidateLanes c = chosen.Evaluate(SystematicPicks(sums, total, u, j, out.code.size()));
+    hn::Store(SystematicPicks(sums, total, u, j, out.code.size()), di, picks + j);
+  }
+  for (std::size_t j = 0; j < out.code.size(); j += hn::Lanes(d)) {
+    const CandidateLanes c = chosen.Evaluate(hn::Load(di, picks + j));
     HWY_ALIGN std::uint32_t code[hn::MaxLanes(DU())];
     HWY_ALIGN std::int32_t site[hn::MaxLanes(DI())];
     hn::Store(c.code, du, code);

@@ -124,6 +124,14 @@ void ShadeSamples(const SiteBlock& sites, const EnvironmentView& environment, st
   }
 }
 
+void PrefetchDirections(const EnvironmentView& view, std::span<const OctDirection> code) {
+  for (std::size_t i = 0; i < code.size(); i += hn::Lanes(DU())) {
+    HWY_ALIGN std::uint32_t codes[hn::MaxLanes(DU())];
+    for (std::size_t lane = 0; lane < hn::Lanes(DU()); ++lane) codes[lane] = code[std::min(i + lane, code.size() - 1)];
+    PrefetchTexels(view, LocateTexels(view, DecodeOctahedral(hn::Load(DU(), codes))));
+  }
+}
+
 SequentialOutcome SequentialPixel(const SiteBlock& sites, const EnvironmentView& before, const EnvironmentView& now,
                                   const LightPool& pool, const SequentialSettings& settings, float lns_before,
                                   const RngKey& key, ParticleSpan particles) {
@@ -155,6 +163,7 @@ HWY_EXPORT(SampleBsdfSpans);
 HWY_EXPORT(DrawCandidates);
 HWY_EXPORT(ChooseCandidates);
 HWY_EXPORT(ShadeSamples);
+HWY_EXPORT(PrefetchDirections);
 HWY_EXPORT(SequentialPixel);
 HWY_EXPORT(SequentialMovedPixel);
 HWY_EXPORT(TargetName);
@@ -216,6 +225,10 @@ void shade_samples(const SiteBlock& sites, const EnvironmentView& environment, s
                    std::span<const std::uint8_t> site, ShadedSamples& out) {
   BATON_CHECK(code.size() == site.size() && code.size() <= limits::kMaxParticles);
   HWY_DYNAMIC_DISPATCH(ShadeSamples)(sites, environment, code, site, out);
+}
+
+void prefetch_texels(const EnvironmentView& view, std::span<const OctDirection> code) {
+  HWY_DYNAMIC_DISPATCH(PrefetchDirections)(view, code);
 }
 
 SequentialOutcome sequential_step(const SiteBlock& sites, const OldSurfaces* old,

@@ -109,6 +109,10 @@ void shade_samples(const SiteBlock& sites, const EnvironmentView& environment,
                    std::span<const OctDirection> code, std::span<const std::uint8_t> site,
                    ShadedSamples& out);
 
+/// Asks the memory for the texels along lattice directions, which evaluations will soon read: a map
+/// is larger than the caches.
+void prefetch_texels(const EnvironmentView& view, std::span<const OctDirection> code);
+
 /// One frame of the sequential sampler for a pixel (sampling/sequential-inl.h). old: the surfaces
 /// that the particles come from, by sites of this frame; null where they are `sites`.
 /// environment_before: the frame that the particles come from. lns_before > 0.

@@ -116,15 +116,21 @@ struct SameSurfaceTarget {
     return bits & (LightPool::kSize - LightPool::kBlock);
   }
 
-  /// Draws `point` from the pool's entries entry, entry + 1, ...; returns its targets.
-  HWY_INLINE LogTargets Propose(std::size_t entry, VF site_fraction, PointLanes& point) const {
+  /// Draws `point` from the pool's entries entry, entry + 1, ...; returns its targets, `before` only
+  /// where it is wanted.
+  HWY_INLINE LogTargets Propose(std::size_t entry, VF site_fraction, bool want_before,
+                                PointLanes& point) const {
     const LightLanes light = LoadLight(pool, entry);
-    const Vec3Lanes then = LoadLightBefore(pool, entry);
     point.code = light.code;
     point.site = SiteAt(sites, site_fraction);
     const SurfaceLanes surface = LoadSurfaces(sites, point.site);
     const BsdfLanes f = EvaluateBsdf(surface, light.direction);
-    return TargetsOf(LogOrZero(MeanLanes(ReflectedRadiance(surface, f, then.x, then.y, then.z))),
+    VF log_then = hn::Zero(DF());
+    if (want_before) {
+      const Vec3Lanes then = LoadLightBefore(pool, entry);
+      log_then = LogOrZero(MeanLanes(ReflectedRadiance(surface, f, then.x, then.y, then.z)));
+    }
+    return TargetsOf(log_then,
                      ReflectedRadiance(surface, f, light.now.r, light.now.g, light.now.b),
                      light.now.density);
   }
@@ -158,7 +164,11 @@ struct MovedSurfaceTarget {
   }
   static std::size_t BlockStart(std::uint32_t bits) { return SameSurfaceTarget::BlockStart(bits); }
 
-  HWY_INLINE LogTargets Propose(std::size_t entry, VF site_fraction, PointLanes& point) const {
+  HWY_INLINE LogTargets Propose(std::size_t entry, VF site_fraction, bool want_before,
+                                PointLanes& point) const {
+    if (!want_before) {
+      return SameSurfaceTarget{sites, before, now, pool}.Propose(entry, site_fraction, false, point);
+    }
     const LightLanes light = LoadLight(pool, entry);
     point.code = light.code;
     point.site = SiteAt(sites, site_fraction);

@@ -39,6 +39,7 @@ class RunningSums {
       start_[lane] = total;
       total += length_[lane];
       end_[lane] = total;
+      if (length_[lane] > 0) last_ = static_cast<std::int32_t>(lane);
     }
     return total;
   }
@@ -54,9 +55,7 @@ class RunningSums {
       const auto passed = hn::Le(hn::Set(d, end_[k]), position);
       lane = hn::Add(lane, hn::IfThenElseZero(hn::RebindMask(di, passed), hn::Set(di, 1)));
     }
-    std::int32_t last = static_cast<std::int32_t>(kLanes) - 1;
-    while (last > 0 && !(length_[last] > 0)) --last;
-    lane = hn::Min(lane, hn::Set(di, last));
+    lane = hn::Min(lane, hn::Set(di, last_));
     const VF longest = hn::Mul(hn::GatherIndex(d, length_, lane), hn::Set(d, 1 - 0x1p-23f));
     const VF along = hn::Min(hn::Sub(position, hn::GatherIndex(d, start_, lane)), longest);
 
@@ -80,6 +79,7 @@ class RunningSums {
   float* storage_;
   std::size_t size_ = 0;
   VF walked_;
+  std::int32_t last_ = 0;  ///< last lane with a length
   HWY_ALIGN float length_[kLanes];
   HWY_ALIGN float start_[kLanes];
   HWY_ALIGN float end_[kLanes];
