@@ -1,10 +1,8 @@
 #include "common/base/section_file.h"
 
 #include <fmt/format.h>
-#include <zstd.h>
 
 #include <algorithm>
-#include <type_traits>
 
 #include "common/base/digest.h"
 #include "common/base/limits.h"
@@ -17,10 +15,6 @@ constexpr std::uint8_t kFlagStoredRaw = 2;
 constexpr std::size_t kHeaderBytes = 16;
 constexpr std::size_t kEntryBytes = 28;
 constexpr std::size_t kChecksumBytes = sizeof(std::uint32_t);
-constexpr int kZstdLevel = 1;
-/// No zstd frame unpacks to more than this many times its size: 4 bytes make a block of at most 128
-/// KiB [RFC 8878].
-constexpr std::uint64_t kMaxExpansion = (128 << 10) / 4;
 
 /// One checked row of the table with the bytes it points to.
 struct TableEntry {
@@ -51,88 +45,14 @@ Error section_error(ErrorKind kind, const std::string& name, const SectionTag& t
   return {kind, fmt::format("{}: section {} {}", name, tag_text(tag), what)};
 }
 
-/// Copies the bytes of `count` elements of `stride` bytes: element by element on one side, byte 0
-/// of all, then byte 1 of all, ... on the other. Stride: its constant where it is known, so that
-/// the loops become vector code.
-template <class Stride>
-void split(const std::byte* elements, std::size_t count, Stride stride, std::byte* planes) {
-  for (std::size_t plane = 0; plane < stride; ++plane) {
-    std::byte* out = planes + plane * count;
-    for (std::size_t i = 0; i < count; ++i) out[i] = elements[i * stride + plane];
-  }
-}
-template <class Stride>
-void join(const std::byte* planes, std::size_t count, Stride stride, std::byte* elements) {
-  for (std::size_t i = 0; i < count; ++i) {
-    for (std::size_t plane = 0; plane < stride; ++plane)
-      elements[i * stride + plane] = planes[plane * count + i];
-  }
-}
-
-/// Calls `work` with the stride, as a constant if it is that of a common type.
-template <class Work>
-void with_stride(std::size_t stride, const Work& work) {
-  switch (stride) {
-    case 2:
-      return work(std::integral_constant<std::size_t, 2>());
-    case 4:
-      return work(std::integral_constant<std::size_t, 4>());
-    default:
-      return work(stride);
-  }
-}
-
-/// Byte 0 of all elements, then byte 1 of all elements, ...
-Bytes split_planes(ByteView bytes, std::size_t stride) {
-  Bytes planes(bytes.size());
-  with_stride(stride, [&](auto s) { split(bytes.data(), bytes.size() / s, s, planes.data()); });
-  return planes;
-}
-
-/// Inverse of split_planes.
-Bytes join_planes(ByteView planes, std::size_t stride) {
-  Bytes bytes(planes.size());
-  with_stride(stride, [&](auto s) { join(planes.data(), planes.size() / s, s, bytes.data()); });
-  return bytes;
-}
-
-/// The stored form of a payload and its flags.
-std::pair<Bytes, std::uint8_t> pack_section(const Section& section) {
-  BATON_CHECK(section.stride > 0 && section.payload.size() % section.stride == 0);
-  std::uint8_t flags = section.required ? kFlagRequired : 0;
-  Bytes planes =
-      section.stride > 1 ? split_planes(section.payload, section.stride) : section.payload;
-
-  // Keep the plain planes when zstd does not shrink them.
-  Bytes packed(ZSTD_compressBound(planes.size()));
-  const std::size_t size =
-      ZSTD_compress(packed.data(), packed.size(), planes.data(), planes.size(), kZstdLevel);
-  BATON_CHECK(!ZSTD_isError(size));
-  if (size >= planes.size())
-    return {std::move(planes), static_cast<std::uint8_t>(flags | kFlagStoredRaw)};
-  packed.resize(size);
-  return {std::move(packed), flags};
-}
-
-Result<Section> unpack_section(const TableEntry& entry, const std::string& name) {
-  Section section{entry.tag, (entry.flags & kFlagRequired) != 0, entry.stride, {}};
-  if ((entry.flags & kFlagStoredRaw) != 0) {
-    section.payload.assign(entry.stored.begin(), entry.stored.end());
-  } else {
-    section.payload.resize(entry.raw_bytes);
-    const std::size_t size = ZSTD_decompress(section.payload.data(), section.payload.size(),
-                                             entry.stored.data(), entry.stored.size());
-    if (ZSTD_isError(size)) {
-      return section_error(ErrorKind::corrupt, name, entry.tag,
-                           fmt::format("does not unpack: {}", ZSTD_getErrorName(size)));
-    }
-    if (size != entry.raw_bytes) {
-      return section_error(ErrorKind::corrupt, name, entry.tag,
-                           fmt::format("unpacks to {} bytes, expected {}", size, entry.raw_bytes));
-    }
-  }
-  if (entry.stride > 1) section.payload = join_planes(section.payload, entry.stride);
-  return section;
+Result<Section> unpack_section(SectionUnpacker& unpacker, const TableEntry& entry,
+                               const std::string& name) {
+  Result<Bytes> payload = unpacker.unpack(entry.stored, (entry.flags & kFlagStoredRaw) != 0,
+                                          entry.stride, entry.raw_bytes);
+  if (!payload)
+    return section_error(payload.error().kind, name, entry.tag, payload.error().message);
+  return Section{entry.tag, (entry.flags & kFlagRequired) != 0, entry.stride,
+                 std::move(payload.value())};
 }
 
 /// Magic, version, section count and the checksum of header and table. Returns (version, section
@@ -278,44 +198,56 @@ std::string tag_text(const SectionTag& tag) {
   return text;
 }
 
-Bytes encode_section_file(const SectionFile& file) {
-  BATON_CHECK(file.version > 0 && file.sections.size() <= limits::kMaxSections);
+Bytes encode_sections(const SectionTag& magic, std::uint16_t version,
+                      std::span<const SectionView> sections) {
+  BATON_CHECK(version > 0 && sections.size() <= limits::kMaxSections);
 
-  // Write the header.
-  ByteWriter writer;
-  writer.put_raw(std::as_bytes(std::span(file.magic)));
-  writer.put(file.version);
-  writer.put(static_cast<std::uint16_t>(file.sections.size()));
-  writer.put(static_cast<std::uint32_t>(table_end(file.sections.size())));
-  writer.put(std::uint32_t{0});
+  // Start the header and the table.
+  ByteWriter head;
+  head.put_raw(std::as_bytes(std::span(magic)));
+  head.put(version);
+  head.put(static_cast<std::uint16_t>(sections.size()));
+  head.put(static_cast<std::uint32_t>(table_end(sections.size())));
+  head.put(std::uint32_t{0});
 
-  // Write the table.
-  ByteWriter payloads;
-  for (const Section& section : file.sections) {
-    BATON_CHECK(file.find(section.tag) == &section);
-    const auto [stored, flags] = pack_section(section);
-    writer.put_raw(std::as_bytes(std::span(section.tag)));
-    writer.put(flags);
-    writer.put(section.stride);
-    writer.put(std::uint16_t{0});
-    writer.put(static_cast<std::uint64_t>(stored.size()));
-    writer.put(static_cast<std::uint64_t>(section.payload.size()));
-    writer.put(checksum32(stored));
-    payloads.put_raw(stored);
+  // Pack the payloads behind them, and note each in the table.
+  Bytes bytes(table_end(sections.size()));
+  SectionPacker packer;
+  for (const SectionView& section : sections) {
+    BATON_CHECK(&*std::ranges::find(sections, section.tag, &SectionView::tag) == &section);
+    const std::size_t start = bytes.size();
+    const bool raw = packer.append(section.payload, section.stride, section.packing, bytes);
+    const int flags = (section.required ? kFlagRequired : 0) | (raw ? kFlagStoredRaw : 0);
+    head.put_raw(std::as_bytes(std::span(section.tag)));
+    head.put(static_cast<std::uint8_t>(flags));
+    head.put(section.stride);
+    head.put(std::uint16_t{0});
+    head.put(static_cast<std::uint64_t>(bytes.size() - start));
+    head.put(static_cast<std::uint64_t>(section.payload.size()));
+    head.put(checksum32(ByteView(bytes).subspan(start)));
   }
 
-  // Seal both and append the payloads.
-  writer.put(checksum32(writer.bytes()));
-  writer.put_raw(payloads.bytes());
-  return writer.take();
+  // Seal both and put them in front.
+  head.put(checksum32(head.bytes()));
+  std::ranges::copy(head.bytes(), bytes.begin());
+  return bytes;
+}
+
+Bytes encode_section_file(const SectionFile& file) {
+  std::vector<SectionView> views;
+  for (const Section& s : file.sections)
+    views.push_back(
+        {.tag = s.tag, .required = s.required, .stride = s.stride, .payload = s.payload});
+  return encode_sections(file.magic, file.version, views);
 }
 
 Result<SectionFile> decode_section_file(ByteView bytes, const SectionTag& magic,
                                         std::uint16_t max_version, const std::string& name) {
   BATON_ASSIGN(const Table table, read_table(bytes, magic, max_version, name));
   SectionFile file{magic, table.version, {}};
+  SectionUnpacker unpacker;
   for (const TableEntry& entry : table.entries) {
-    BATON_ASSIGN(Section section, unpack_section(entry, name));
+    BATON_ASSIGN(Section section, unpack_section(unpacker, entry, name));
     file.sections.push_back(std::move(section));
   }
   return file;

@@ -8,6 +8,7 @@
 
 #include "common/base/bytes.h"
 #include "common/base/result.h"
+#include "common/base/section_packing.h"
 
 namespace baton {
 
@@ -24,6 +25,15 @@ struct Section {
   std::uint8_t stride =
       1;  ///< bytes of one element; bytes are stored plane by plane when > 1, which packs better
   Bytes payload;  ///< uncompressed
+};
+
+/// A section to be written, whose payload lies somewhere else.
+struct SectionView {
+  SectionTag tag{};
+  bool required = true;
+  std::uint8_t stride = 1;
+  ByteView payload;
+  Packing packing = Packing::zstd;  ///< none: for what does not shrink
 };
 
 struct SectionFile {
@@ -49,6 +59,9 @@ std::string tag_text(const SectionTag& tag);
 
 /// Deterministic: equal contents give equal bytes (with one version of zstd). Tags must differ, and
 /// a stride must divide the size of its payload.
+Bytes encode_sections(const SectionTag& magic, std::uint16_t version,
+                      std::span<const SectionView> sections);
+/// The same of sections that own their payloads.
 Bytes encode_section_file(const SectionFile& file);
 
 /// `name` goes first in every error. `max_version` is the newest version that the caller reads.

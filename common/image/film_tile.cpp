@@ -65,12 +65,11 @@ Bytes encode_film_tile(const FilmTile& tile) {
     meta.put(side);
   meta.put(static_cast<std::uint32_t>(tile.channels.size()));
   for (const std::string& channel : tile.channels) meta.put_string(channel);
-  const ByteView pixels = std::as_bytes(std::span(tile.values));
-  return encode_section_file(
-      {kMagic,
-       kVersion,
-       {{kMeta, true, 1, meta.take()},
-        {kPixels, true, sizeof(float), Bytes(pixels.begin(), pixels.end())}}});
+  const std::array sections{SectionView{.tag = kMeta, .payload = meta.bytes()},
+                            SectionView{.tag = kPixels,
+                                        .stride = sizeof(float),
+                                        .payload = std::as_bytes(std::span(tile.values))}};
+  return encode_sections(kMagic, kVersion, sections);
 }
 
 Result<FilmTile> decode_film_tile(ByteView bytes, const std::string& name) {

@@ -2,8 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <cmath>
+#include <deque>
 
 #include "common/base/limits.h"
 #include "common/base/section_file.h"
@@ -39,16 +41,50 @@ std::vector<std::size_t> surface_pixels(const SampleState& state) {
   return pixels;
 }
 
-/// A section with `per_pixel` values of each of `pixels`.
-template <class T>
-Section gather(const SectionTag& tag, const std::vector<T>& values,
-               const std::vector<std::size_t>& pixels, std::size_t per_pixel) {
-  ByteWriter writer;
-  for (const std::size_t pixel : pixels) {
-    writer.put_raw(std::as_bytes(std::span(values).subspan(pixel * per_pixel, per_pixel)));
+/// The sections of a state file. Values of surface pixels are gathered only where there are others.
+class StateSections {
+ public:
+  explicit StateSections(const SampleState& state)
+      : num_pixels_(state.num_pixels()), pixels_(surface_pixels(state)) {}
+
+  const std::vector<std::size_t>& pixels() const { return pixels_; }
+
+  /// A section with bytes of its own.
+  void add(const SectionTag& tag, std::size_t stride, Bytes payload) {
+    owned_.push_back(std::move(payload));
+    views_.push_back(
+        {.tag = tag, .stride = static_cast<std::uint8_t>(stride), .payload = owned_.back()});
   }
-  return {tag, true, sizeof(T), writer.take()};
-}
+  /// A section with `per_pixel` values of each surface pixel.
+  template <class T>
+  void gather(const SectionTag& tag, const std::vector<T>& values, std::size_t per_pixel) {
+    if (pixels_.size() == num_pixels_) {
+      views_.push_back(
+          {.tag = tag, .stride = sizeof(T), .payload = std::as_bytes(std::span(values))});
+      return;
+    }
+    const std::size_t row_bytes = per_pixel * sizeof(T);
+    Bytes payload(pixels_.size() * row_bytes);
+    for (std::size_t i = 0; i < pixels_.size(); ++i) {
+      std::memcpy(payload.data() + i * row_bytes, values.data() + pixels_[i] * per_pixel,
+                  row_bytes);
+    }
+    add(tag, sizeof(T), std::move(payload));
+  }
+  /// Has the section that was added last stored as it is.
+  void keep_plain() {
+    views_.back().stride = 1;
+    views_.back().packing = Packing::none;
+  }
+  ByteView last_payload() const { return views_.back().payload; }
+  Bytes encode() const { return encode_sections(kMagic, kStateVersion, views_); }
+
+ private:
+  const std::size_t num_pixels_;
+  const std::vector<std::size_t> pixels_;
+  std::deque<Bytes> owned_;
+  std::vector<SectionView> views_;
+};
 
 /// Inverse of gather: values of all other pixels are left as they are.
 template <class T>
@@ -63,7 +99,7 @@ Status scatter(const SectionFile& file, const SectionTag& tag,
   return {};
 }
 
-Section encode_meta(const SampleState& state) {
+Bytes encode_meta(const SampleState& state) {
   ByteWriter writer;
   writer.put(state.job_digest.high);
   writer.put(state.job_digest.low);
@@ -71,7 +107,7 @@ Section encode_meta(const SampleState& state) {
                                    state.rect.x1, state.rect.y1, state.num_particles}) {
     writer.put(value);
   }
-  return {kMeta, true, 1, writer.take()};
+  return writer.take();
 }
 
 /// Fills everything of `state` but its arrays.
@@ -175,17 +211,16 @@ constexpr std::size_t kMemoryBins = kMemoryCells - 2;
 constexpr MemoryCell kSawBoth = 3;
 
 /// The summary of each surface pixel, and the bins of those whose rays have disagreed.
-void encode_memory(const SampleState& state, const std::vector<std::size_t>& pixels,
-                   std::vector<Section>& sections) {
+void encode_memory(const SampleState& state, StateSections& sections) {
   if (state.memory.empty()) return;
   ByteWriter summaries, grids;
-  for (const std::size_t pixel : pixels) {
+  for (const std::size_t pixel : sections.pixels()) {
     const auto cells = std::span(state.memory).subspan(pixel * kMemoryCells, kMemoryCells);
     summaries.put_raw(std::as_bytes(cells.subspan(kMemoryBins)));
     if (cells.back() == kSawBoth) grids.put_raw(std::as_bytes(cells.first(kMemoryBins)));
   }
-  sections.push_back({kMemorySummary, true, 2 * sizeof(MemoryCell), summaries.take()});
-  sections.push_back({kMemoryGrid, true, sizeof(MemoryCell), grids.take()});
+  sections.add(kMemorySummary, 2 * sizeof(MemoryCell), summaries.take());
+  sections.add(kMemoryGrid, sizeof(MemoryCell), grids.take());
 }
 
 /// Inverse of encode_memory; a file without memories leaves the state without them.
@@ -270,24 +305,29 @@ Bytes encode_state(const SampleState& state) {
               state.site.size() == state.direction.size());
   BATON_CHECK(state.memory.empty() || state.memory.size() == num_pixels * kMemoryCells);
 
-  const std::vector<std::size_t> pixels = surface_pixels(state);
+  StateSections sections(state);
   const ByteView sources = std::as_bytes(std::span(state.source));
-  SectionFile file{kMagic,
-                   kStateVersion,
-                   {encode_meta(state),
-                    {kSource, true, 1, Bytes(sources.begin(), sources.end())},
-                    gather(kLns, state.lns, pixels, populations),
-                    gather(kLnsFresh, state.lns_fresh, pixels, populations),
-                    gather(kDirection, state.direction, pixels, num_particles),
-                    gather(kWeight, state.weight, pixels, num_particles),
-                    gather(kSite, state.site, pixels, num_particles)}};
+  sections.add(kMeta, 1, encode_meta(state));
+  sections.add(kSource, 1, Bytes(sources.begin(), sources.end()));
+  sections.gather(kLns, state.lns, populations);
+  sections.gather(kLnsFresh, state.lns_fresh, populations);
+
+  // Directions are as good as random, sites nearly so: looking for repetitions costs more time than
+  // it saves bytes.
+  sections.gather(kDirection, state.direction, num_particles);
+  sections.keep_plain();
+  sections.gather(kWeight, state.weight, num_particles);
+  sections.gather(kSite, state.site, num_particles);
+  const auto is_set = [](std::byte site) { return site != std::byte{0}; };
+  if (std::ranges::any_of(sections.last_payload(), is_set)) sections.keep_plain();
+
   if (populations > 1) {
     ByteWriter writer;
     writer.put(state.num_populations);
-    file.sections.push_back({kPopulations, true, 1, writer.take()});
+    sections.add(kPopulations, 1, writer.take());
   }
-  encode_memory(state, pixels, file.sections);
-  return encode_section_file(file);
+  encode_memory(state, sections);
+  return sections.encode();
 }
 
 Result<SampleState> decode_state(ByteView bytes, const std::string& name) {

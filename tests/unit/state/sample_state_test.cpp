@@ -135,7 +135,7 @@ TEST(SampleState, StoredBytesAreThoseOfTheFormatDocument) {
   EXPECT_EQ(hex(ByteView(bytes).subspan(16 + 4 * 28, 24)),
             "4449525f"
             "03"
-            "04"
+            "01"
             "0000"
             "0800000000000000"
             "0800000000000000");
@@ -161,13 +161,11 @@ TEST(SampleState, StoredBytesAreThoseOfTheFormatDocument) {
             "0000803e"
             "0000403f");
   EXPECT_EQ(hex(section(file, "SITE").payload), "030f");
-  // DIR_ in the file: plane by plane.
+  // DIR_ in the file: as it is.
   const std::size_t dir_at = 16 + 7 * 28 + 4 + 44 + 2 + 4 + 4;
   EXPECT_EQ(hex(ByteView(bytes).subspan(dir_at, 8)),
-            "ff78"
-            "7f56"
-            "0134"
-            "8012");
+            "ff7f0180"
+            "78563412");
 }
 
 TEST(SampleState, AnyChangedByteIsAnError) {
@@ -338,7 +336,8 @@ TEST(SampleState, RefusesOutcomesThatCannotBe) {
   state.memory_of(1)[257] = 4;
   const auto decoded = decode_state(encode_state(state), "a.bst");
   ASSERT_FALSE(decoded.ok());
-  EXPECT_THAT(decoded.error().message, HasSubstr("a.bst: section VISS: pixel (1, 0): outcomes 4, expected 0 to 3"));
+  EXPECT_THAT(decoded.error().message,
+              HasSubstr("a.bst: section VISS: pixel (1, 0): outcomes 4, expected 0 to 3"));
 }
 
 }  // namespace
