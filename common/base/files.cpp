@@ -4,9 +4,12 @@
 #include <fmt/format.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <atomic>
 #include <cerrno>
 #include <cstring>
+
+#include "common/base/limits.h"
 
 namespace baton {
 namespace {
@@ -59,7 +62,8 @@ Result<Bytes> read_file(const fs::path& path, std::uint64_t max_size_bytes) {
   if (file.fd < 0) return io_error("cannot open", path);
   std::error_code error;
   if (fs::is_directory(path, error)) {
-    return Error{ErrorKind::bad_input, fmt::format("{}: is a folder, expected a file", path.string())};
+    return Error{ErrorKind::bad_input,
+                 fmt::format("{}: is a folder, expected a file", path.string())};
   }
   if (!fs::is_regular_file(path, error)) {
     return Error{ErrorKind::bad_input, fmt::format("{}: is no plain file", path.string())};
@@ -67,8 +71,8 @@ Result<Bytes> read_file(const fs::path& path, std::uint64_t max_size_bytes) {
   const std::uint64_t size = fs::file_size(path, error);
   if (error) return Error{ErrorKind::io, fmt::format("{}: {}", path.string(), error.message())};
   if (size > max_size_bytes) {
-    return Error{ErrorKind::bad_input,
-                 fmt::format("{}: {} bytes, at most {} are read", path.string(), size, max_size_bytes)};
+    return Error{ErrorKind::bad_input, fmt::format("{}: {} bytes, at most {} are read",
+                                                   path.string(), size, max_size_bytes)};
   }
   Bytes bytes(size);
   std::size_t done = 0;
@@ -106,14 +110,16 @@ Status sync_folder(const fs::path& folder) { return sync_path(folder, O_RDONLY |
 
 namespace {
 
-/// Writes a temporary file beside `path`, then lets `publish` turn it into `path`; nothing is left behind on failure.
+/// Writes a temporary file beside `path`, then lets `publish` turn it into `path`; nothing is left
+/// behind on failure.
 template <class Publish>
 Status write_then(const fs::path& path, ByteView bytes, Publish publish) {
   std::error_code error;
   if (path.has_parent_path()) fs::create_directories(path.parent_path(), error);
   const fs::path temporary = temporary_sibling(path);
   {
-    const FileDescriptor file(::open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644));
+    const FileDescriptor file(
+        ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644));
     if (file.fd < 0) return io_error("cannot create", temporary);
     if (Status written = write_all(file.fd, bytes, temporary); !written) {
       ::unlink(temporary.c_str());
@@ -128,7 +134,32 @@ Status write_then(const fs::path& path, ByteView bytes, Publish publish) {
 }  // namespace
 
 Status write_file_atomic(const fs::path& path, ByteView bytes) {
-  return write_then(path, bytes, [&](const fs::path& temporary) { return publish_file(temporary, path); });
+  return write_then(path, bytes,
+                    [&](const fs::path& temporary) { return publish_file(temporary, path); });
+}
+
+Status expect_content(const fs::path& path, ByteView bytes) {
+  BATON_ASSIGN(const Bytes stored, read_file(path, limits::kMaxAssetFileBytes));
+  if (stored.size() != bytes.size()) {
+    return Error{ErrorKind::corrupt, fmt::format("{}: {} bytes on disk, wrote {}", path.string(),
+                                                 stored.size(), bytes.size())};
+  }
+  if (stored.empty() || std::memcmp(stored.data(), bytes.data(), bytes.size()) == 0) return {};
+  const auto differs = std::mismatch(stored.begin(), stored.end(), bytes.begin());
+  return Error{ErrorKind::corrupt,
+               fmt::format("{}: byte {} is {:02x} on disk, wrote {:02x}", path.string(),
+                           differs.first - stored.begin(), std::to_integer<int>(*differs.first),
+                           std::to_integer<int>(*differs.second))};
+}
+
+Status write_file_verified(const fs::path& path, ByteView bytes,
+                           const std::function<Status(const fs::path& temporary)>& check) {
+  return write_then(path, bytes, [&](const fs::path& temporary) -> Status {
+    BATON_TRY(sync_path(temporary, O_RDONLY));
+    BATON_TRY(check(temporary));
+    BATON_TRY(expect_content(temporary, bytes));
+    return publish_file(temporary, path);
+  });
 }
 
 Status write_file_unsynced(const fs::path& path, ByteView bytes) {

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <functional>
 #include <string>
 #include <string_view>
 
@@ -9,19 +10,32 @@
 
 namespace baton {
 
-/// ErrorKind::bad_input when nothing has this name. For names that a person typed: no disk has failed.
+/// ErrorKind::bad_input when nothing has this name. For names that a person typed: no disk has
+/// failed.
 Status expect_file(const std::filesystem::path& path);
 
 /// The whole file. Errors name the file: missing, not readable, larger than `max_size_bytes`.
 Result<Bytes> read_file(const std::filesystem::path& path, std::uint64_t max_size_bytes);
 Result<std::string> read_text_file(const std::filesystem::path& path, std::uint64_t max_size_bytes);
 
-/// Publishes `bytes` at `path` whole or not at all: temporary file in the same folder, fsync, rename, fsync of the
-/// folder. Creates missing folders. Two writers of the same path are harmless: the last rename wins.
+/// Publishes `bytes` at `path` whole or not at all: temporary file in the same folder, fsync,
+/// rename, fsync of the folder. Creates missing folders. Two writers of the same path are harmless:
+/// the last rename wins.
 Status write_file_atomic(const std::filesystem::path& path, ByteView bytes);
 
-/// The same without waiting for the disk: other processes see the file whole or not at all, but only sync_file_system()
-/// makes it survive a power cut.
+/// The same for a file that nobody looks at again before it counts: the temporary file, once it is
+/// on disk, is handed to `check`, read back and compared with `bytes` byte by byte; only then it
+/// gets its name. Errors: that of `check`; ErrorKind::corrupt names the first byte that differs.
+/// Nothing is left behind on failure.
+Status write_file_verified(
+    const std::filesystem::path& path, ByteView bytes,
+    const std::function<Status(const std::filesystem::path& temporary)>& check);
+
+/// ErrorKind::corrupt unless the file holds exactly `bytes`.
+Status expect_content(const std::filesystem::path& path, ByteView bytes);
+
+/// The same as write_file_atomic without waiting for the disk: other processes see the file whole
+/// or not at all, but only sync_file_system() makes it survive a power cut.
 Status write_file_unsynced(const std::filesystem::path& path, ByteView bytes);
 
 /// Waits until everything written so far to the file system of `path` is on disk (Linux syncfs).

@@ -22,6 +22,8 @@ namespace {
 
 /// OpenEXR compresses on the calling thread: the worker has its own threads.
 constexpr int kOpenExrThreads = 0;
+/// Of zlib. OpenEXR's own choice is 4: a quarter slower for files that are two per cent smaller.
+constexpr int kZipLevel = 1;
 constexpr float kMaxHalf = 65504.0f;
 /// Rows read at a time, so that memory grows only with data that is really there.
 constexpr int kRowsPerRead = 256;
@@ -79,6 +81,7 @@ Result<Imf::Header> make_header(const std::string& name, const FilmTile& image,
   }
   Imf::Header header(image.rect.width(), image.rect.height());
   header.compression() = *compression;
+  header.zipCompressionLevel() = kZipLevel;
   for (const std::string& channel : image.channels) {
     const bool is_half = options.half_float && !always_float(channel);
     header.channels().insert(channel, Imf::Channel(is_half ? Imf::HALF : Imf::FLOAT));
@@ -94,7 +97,7 @@ Result<Imf::Header> make_header(const std::string& name, const FilmTile& image,
 }
 
 /// The whole file in memory. Throws what OpenEXR throws.
-Bytes encode_exr(const std::string& name, const Imf::Header& header, const FilmTile& image) {
+Bytes encode_planes(const std::string& name, const Imf::Header& header, const FilmTile& image) {
   const std::size_t width = static_cast<std::size_t>(image.rect.width());
   std::vector<std::vector<half>> halves;
   halves.reserve(image.channels.size());
@@ -191,20 +194,25 @@ auto with_exr_file(const std::filesystem::path& path, Use use)
 
 }  // namespace
 
-Status write_exr(const std::filesystem::path& path, const FilmTile& image,
-                 const ExrOptions& options) {
+Result<Bytes> encode_exr(const std::string& name, const FilmTile& image,
+                         const ExrOptions& options) {
   BATON_CHECK(image.rect.x0 == 0 && image.rect.y0 == 0 &&
               image.rect.fits_within(limits::kMaxImageSide));
   BATON_CHECK(!image.channels.empty() &&
               image.values.size() == image.channels.size() * image.num_pixels());
-  const std::string name = path.string();
   try {
     BATON_ASSIGN(const Imf::Header header, make_header(name, image, options));
-    return write_file_atomic(path, encode_exr(name, header, image));
+    return encode_planes(name, header, image);
   } catch (const std::exception& fault) {
     return Error{ErrorKind::bad_input,
                  fmt::format("{}: cannot be written as EXR: {}", name, fault.what())};
   }
+}
+
+Status write_exr(const std::filesystem::path& path, const FilmTile& image,
+                 const ExrOptions& options) {
+  BATON_ASSIGN(const Bytes bytes, encode_exr(path.string(), image, options));
+  return write_file_atomic(path, bytes);
 }
 
 Result<FilmTile> read_exr_channels(const std::filesystem::path& path, const ChannelChoice& choose) {
@@ -219,6 +227,20 @@ Result<FilmTile> read_exr_channels(const std::filesystem::path& path, const Chan
 Result<FilmTile> read_exr(const std::filesystem::path& path) {
   const auto every = [](const std::vector<std::string>& all) { return Result(all); };
   return read_exr_channels(path, every);
+}
+
+Result<FilmTile> read_exr_rows(const std::filesystem::path& path, int y0, int y1) {
+  return with_exr_file(path, [&](Imf::InputFile& file) -> Result<FilmTile> {
+    if (!file.isComplete()) {
+      return Error{ErrorKind::corrupt,
+                   fmt::format("{}: its table of blocks has gaps", path.string())};
+    }
+    BATON_ASSIGN(FilmTile image, describe(file.header(), path.string()));
+    image.rect.y0 = std::max(image.rect.y0, y0);
+    image.rect.y1 = std::min(image.rect.y1, y1);
+    if (image.rect.y0 < image.rect.y1) read_planes(file, image);
+    return image;
+  });
 }
 
 Result<ImageMetadata> read_exr_metadata(const std::filesystem::path& path) {

@@ -5,6 +5,7 @@
 #include <utility>
 #include <vector>
 
+#include "common/base/bytes.h"
 #include "common/base/result.h"
 #include "common/image/film_tile.h"
 
@@ -32,16 +33,20 @@ struct ExrOptions {
   ImageMetadata metadata;
 };
 
-/// Writes all channels of `image` (rect must start at 0, 0) as one scan-line EXR and publishes it
-/// atomically, with missing folders. Bytes are deterministic (no dates, no host names). Values past
-/// half's largest, 65504, stop there in half channels. Errors: unknown compression, a metadata key
-/// twice, the disk.
+/// All channels of `image` (rect must start at 0, 0) as one scan-line EXR file in memory; `name`
+/// goes first in every error. Bytes are deterministic (no dates, no host names). Values past half's
+/// largest, 65504, stop there in half channels. Errors: unknown compression, a metadata key twice.
+Result<Bytes> encode_exr(const std::string& name, const FilmTile& image, const ExrOptions& options);
+/// Publishes the encoded file atomically, with missing folders. Errors: encode_exr's, the disk.
 Status write_exr(const std::filesystem::path& path, const FilmTile& image,
                  const ExrOptions& options);
 /// Reads every channel of a flat EXR file as float32, in file order, which is alphabetical. The
 /// rectangle is the data window. Errors name the file: missing, not an EXR, truncated, subsampled
 /// channels, past the limits of picture sides.
 Result<FilmTile> read_exr(const std::filesystem::path& path);
+/// Rows y0 to y1 - 1 of every channel, clipped to the data window. Errors: read_exr's, a file whose
+/// table of blocks has gaps.
+Result<FilmTile> read_exr_rows(const std::filesystem::path& path, int y0, int y1);
 /// Metadata of an EXR file that `write_exr` made (string attributes only).
 Result<ImageMetadata> read_exr_metadata(const std::filesystem::path& path);
 

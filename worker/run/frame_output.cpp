@@ -6,7 +6,6 @@
 #include <cmath>
 
 #include "common/base/files.h"
-#include "common/base/limits.h"
 #include "common/base/version.h"
 #include "common/job/job_fields.h"
 #include "common/job/sequence.h"
@@ -24,16 +23,24 @@ bool same_after_rounding(float value, float stored) {
   return std::fabs(value - stored) <= std::fabs(value) * kHalfStep + kHalfSmallest;
 }
 
-/// Compares a file that was just written with what it must hold. Channels may come in any order.
-Status verify_frame(const std::filesystem::path& path, const FilmTile& image) {
-  BATON_ASSIGN(const FilmTile stored, read_exr(path));
-  if (stored.rect != image.rect || stored.channels.size() != image.channels.size()) {
+}  // namespace
+
+Status verify_frame(const std::filesystem::path& path, const FilmTile& image, std::int32_t block) {
+  const std::int32_t num_blocks = (image.rect.height() + kRowsVerified - 1) / kRowsVerified;
+  const std::int32_t y0 = block % num_blocks * kRowsVerified;
+  const std::int32_t y1 = std::min(y0 + kRowsVerified, image.rect.height());
+  BATON_ASSIGN(const FilmTile stored, read_exr_rows(path, y0, y1));
+  if (stored.rect != PixelRect{0, y0, image.rect.width(), y1} ||
+      stored.channels.size() != image.channels.size()) {
     return Error{
         ErrorKind::corrupt,
-        fmt::format("{}: read back {}x{} pixels of {} channels, wrote {}x{} of {}", path.string(),
-                    stored.rect.width(), stored.rect.height(), stored.channels.size(),
-                    image.rect.width(), image.rect.height(), image.channels.size())};
+        fmt::format("{}: rows {} to {} are {}x{} pixels of {} channels, wrote {}x{} of {}",
+                    path.string(), y0, y1 - 1, stored.rect.width(), stored.rect.height(),
+                    stored.channels.size(), image.rect.width(), y1 - y0, image.channels.size())};
   }
+
+  // Channels may come in any order.
+  const std::size_t offset = static_cast<std::size_t>(y0) * image.rect.width();
   for (std::size_t channel = 0; channel < image.channels.size(); ++channel) {
     const std::string& name = image.channels[channel];
     const auto found = std::find(stored.channels.begin(), stored.channels.end(), name);
@@ -41,21 +48,20 @@ Status verify_frame(const std::filesystem::path& path, const FilmTile& image) {
       return Error{ErrorKind::corrupt,
                    fmt::format("{}: channel {} is missing", path.string(), name)};
     }
-    const float* const wrote = image.plane(channel);
+    const float* const wrote = image.plane(channel) + offset;
     const float* const read =
         stored.plane(static_cast<std::size_t>(found - stored.channels.begin()));
-    for (std::size_t pixel = 0; pixel < image.num_pixels(); ++pixel) {
+    for (std::size_t pixel = 0; pixel < stored.num_pixels(); ++pixel) {
       if (same_after_rounding(wrote[pixel], read[pixel])) continue;
       const auto width = static_cast<std::size_t>(image.rect.width());
-      return Error{ErrorKind::corrupt,
-                   fmt::format("{}: channel {} pixel {},{}: read back {}, wrote {}", path.string(),
-                               name, pixel % width, pixel / width, read[pixel], wrote[pixel])};
+      return Error{
+          ErrorKind::corrupt,
+          fmt::format("{}: channel {} pixel {},{}: read back {}, wrote {}", path.string(), name,
+                      pixel % width, (offset + pixel) / width, read[pixel], wrote[pixel])};
     }
   }
   return {};
 }
-
-}  // namespace
 
 FilmTile blank_image(const ImageSpec& spec, std::vector<std::string> channels) {
   FilmTile image{
@@ -105,13 +111,14 @@ Result<BlobRef> write_frame(const JobSpec& job, const Digest& job_digest, std::i
                             const FilmTile& image) {
   const std::filesystem::path path = frame_path(job, frame_index);
   const int number = job.frames.at(static_cast<std::size_t>(frame_index));
-  BATON_TRY(write_exr(path, image,
-                      {.half_float = job.output.pixel_type == PixelType::half_float,
-                       .compression = job.output.compression,
-                       .metadata = frame_metadata(job, job_digest, number)}));
-  BATON_TRY(verify_frame(path, image));
-
-  BATON_ASSIGN(const Bytes bytes, read_file(path, limits::kMaxAssetFileBytes));
+  BATON_ASSIGN(const Bytes bytes,
+               encode_exr(path.string(), image,
+                          {.half_float = job.output.pixel_type == PixelType::half_float,
+                           .compression = job.output.compression,
+                           .metadata = frame_metadata(job, job_digest, number)}));
+  BATON_TRY(write_file_verified(path, bytes, [&](const std::filesystem::path& temporary) {
+    return verify_frame(temporary, image, frame_index);
+  }));
   return BlobRef{BlobKind::image, frame_index, 0, digest_of(bytes), bytes.size()};
 }
 

@@ -23,11 +23,20 @@ Status paste_tile(const FilmTile& tile, FilmTile& image);
 /// Where frame `frame_index` (0-based) of the job is written.
 std::filesystem::path frame_path(const JobSpec& job, std::int32_t frame_index);
 
-/// Writes one finished frame as EXR with the job's name, digest and program version in its header,
-/// reads it back and compares every channel; only then is it reported. Error: the disk, or a file
-/// that does not hold what was written.
+/// Rows of a frame that are compared with its film after it was written: one block of compression.
+inline constexpr int kRowsVerified = 16;
+
+/// Writes one finished frame as EXR with the job's name, digest and program version in its header.
+/// Before it gets its name it is read back from disk: every byte must be the encoder's, the header
+/// and the table of blocks must be whole, and one block of rows, another one in each frame, must
+/// unpack to the film. Errors: the disk, or a file that does not hold what was written.
 Result<BlobRef> write_frame(const JobSpec& job, const Digest& job_digest, std::int32_t frame_index,
                             const FilmTile& image);
+
+/// Checks that the EXR file at `path` has the size and the channels of `image`, and in block
+/// `block` (0-based, modulo the number of blocks) its values. ErrorKind::corrupt names channel and
+/// pixel.
+Status verify_frame(const std::filesystem::path& path, const FilmTile& image, std::int32_t block);
 
 /// The header attributes that Baton adds to its pictures.
 ImageMetadata frame_metadata(const JobSpec& job, const Digest& job_digest, int frame_number);

@@ -5,6 +5,7 @@
 #include <sys/stat.h>
 
 #include <algorithm>
+#include <fstream>
 #include <iterator>
 
 namespace baton {
@@ -51,6 +52,50 @@ TEST_F(FilesTest, AFailedPublicationNamesThePathAndLeavesNothing) {
   EXPECT_EQ(status.error().kind, ErrorKind::io);
   EXPECT_THAT(status.error().message, HasSubstr(occupied.string()));
   EXPECT_EQ(num_files(), 1);
+}
+
+TEST_F(FilesTest, AVerifiedFileGetsItsNameOnlyAfterTheCheck) {
+  const fs::path file = folder_ / "frame";
+  fs::path seen;
+  const Status written =
+      write_file_verified(file, as_bytes_view("content"), [&](const fs::path& temporary) {
+        seen = temporary;
+        EXPECT_FALSE(fs::exists(file));
+        return expect_content(temporary, as_bytes_view("content"));
+      });
+  EXPECT_TRUE(written) << written.error().message;
+  EXPECT_NE(seen, file);
+  EXPECT_EQ(read_text_file(file, 100).value(), "content");
+
+  const fs::path refused = folder_ / "refused";
+  const auto refuse = [](const fs::path&) -> Status { return Error{ErrorKind::corrupt, "no"}; };
+  EXPECT_FALSE(write_file_verified(refused, as_bytes_view("x"), refuse));
+  const auto damage = [](const fs::path& temporary) {
+    std::ofstream(temporary, std::ios::in | std::ios::out).seekp(3).put('x');
+    return Status();
+  };
+  const Status damaged = write_file_verified(refused, as_bytes_view("content"), damage);
+  ASSERT_FALSE(damaged);
+  EXPECT_THAT(damaged.error().message, HasSubstr("byte 3 is 78 on disk, wrote 74"));
+  EXPECT_EQ(num_files(), 1);
+}
+
+TEST_F(FilesTest, EveryChangedByteOfAFileIsSeen) {
+  const fs::path file = folder_ / "file";
+  const std::string good = "0123456789";
+  for (std::size_t i = 0; i < good.size(); ++i) {
+    std::string bad = good;
+    bad[i] = 'x';
+    ASSERT_TRUE(write_file_atomic(file, as_bytes_view(bad)));
+    const Status status = expect_content(file, as_bytes_view(good));
+    ASSERT_FALSE(status);
+    EXPECT_EQ(status.error().kind, ErrorKind::corrupt);
+    EXPECT_THAT(status.error().message, HasSubstr("byte " + std::to_string(i) + " is 78"));
+  }
+  for (const std::string other : {"012345678", "01234567890", ""}) {
+    ASSERT_TRUE(write_file_atomic(file, as_bytes_view(other)));
+    EXPECT_FALSE(expect_content(file, as_bytes_view(good))) << other;
+  }
 }
 
 TEST_F(FilesTest, ReadsNothingPastTheLimit) {

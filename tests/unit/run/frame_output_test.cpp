@@ -1,5 +1,6 @@
 #include "worker/run/frame_output.h"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -81,6 +82,38 @@ TEST(FrameOutput, AFrameIsWrittenVerifiedAndNamedByItsDigest) {
                                                             {"baton:jobDigest", digest.hex()},
                                                             {"baton:frame", "9"},
                                                             {"baton:method", "sequential"}}));
+}
+
+TEST(FrameOutput, AWrongValueIsFoundInTheFrameThatLooksAtItsBlock) {
+  JobSpec job = small_job("verified");
+  job.image.height = 40;
+  const FilmTile image = make_tile({0, 0, 20, 40});
+  ASSERT_TRUE(write_frame(job, {3, 4}, 0, image));
+  for (const std::size_t row : {0, 15, 16, 31, 32, 39}) {
+    FilmTile other = image;
+    other.plane(2)[row * 20 + 7] += 1;
+    for (std::int32_t frame = 0; frame < 7; ++frame) {
+      const Status status = verify_frame(frame_path(job, 0), other, frame);
+      const bool looks_there = static_cast<std::size_t>(frame % 3) == row / 16;
+      EXPECT_EQ(status.ok(), !looks_there) << row << " in frame " << frame;
+      if (status) continue;
+      EXPECT_EQ(status.error().kind, ErrorKind::corrupt);
+      EXPECT_THAT(status.error().message,
+                  testing::HasSubstr(fmt::format("channel B pixel 7,{}", row)));
+    }
+  }
+}
+
+TEST(FrameOutput, AFrameOfOtherSizeOrChannelsIsNotTheFrame) {
+  const JobSpec job = small_job("shape");
+  const FilmTile image = assembled(job);
+  ASSERT_TRUE(write_frame(job, {3, 4}, 0, image));
+  EXPECT_TRUE(verify_frame(frame_path(job, 0), image, 0));
+  EXPECT_FALSE(verify_frame(frame_path(job, 0), make_tile({0, 0, 19, 10}), 0));
+  EXPECT_FALSE(verify_frame(frame_path(job, 0), make_tile({0, 0, 20, 11}), 0));
+  FilmTile renamed = image;
+  renamed.channels[1] = "Z";
+  EXPECT_FALSE(verify_frame(frame_path(job, 0), renamed, 0));
 }
 
 TEST(FrameOutput, EqualFramesAreEqualFiles) {
