@@ -259,9 +259,7 @@ class EmbreeAccel final : public Accel {
       if (dot(ns, ng) < 0) ns = -ns;
       if (!(dot(ns, ng) > 0)) ns = ng;
     }
-    const Vec3 position = interpolate(a, b, c);
-    return {.point = {.position = position, .ng = ng, .ns = ns, .wo = wo},
-            .ray_origin = lift_off(position, ng),
+    return {.point = {.position = interpolate(a, b, c), .ng = ng, .ns = ns, .wo = wo},
             .depth = hit.depth,
             .instance = index,
             .material = instance.material,
