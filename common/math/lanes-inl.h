@@ -8,7 +8,9 @@
 
 #include <hwy/highway.h>
 
+#include <algorithm>
 #include <cstdint>
+#include <span>
 
 #include "common/math/vec3.h"
 
@@ -39,6 +41,19 @@ HWY_INLINE Vec3Lanes Add(const Vec3Lanes& a, const Vec3Lanes& b) {
 }
 HWY_INLINE Vec3Lanes Select(MF mask, const Vec3Lanes& yes, const Vec3Lanes& no) {
   return {hn::IfThenElse(mask, yes.x, no.x), hn::IfThenElse(mask, yes.y, no.y), hn::IfThenElse(mask, yes.z, no.z)};
+}
+/// Up to a vector of floats from `array` at i, the rest zero; and back.
+HWY_INLINE VF LoadSome(std::span<const float> array, std::size_t i) {
+  const DF d;
+  HWY_ALIGN float in[hn::MaxLanes(DF())] = {};
+  std::copy_n(array.data() + i, std::min(array.size() - i, hn::Lanes(d)), in);
+  return hn::Load(d, in);
+}
+HWY_INLINE void StoreSome(VF value, std::span<float> array, std::size_t i) {
+  const DF d;
+  HWY_ALIGN float out[hn::MaxLanes(DF())];
+  hn::Store(value, d, out);
+  std::copy_n(out, std::min(array.size() - i, hn::Lanes(d)), array.data() + i);
 }
 /// Mean of the three channels.
 HWY_INLINE VF MeanLanes(const Vec3Lanes& c) {

@@ -47,7 +47,7 @@ void sum_pixel(const RenderContext& context, const FrameGeometry& geometry, cons
   rays.clear();
   weights.clear();
   const Material& material = context.scene->materials[hit.material];
-  const Vec3 origin = lift_off(hit.point.position, hit.point.ng);
+  const Vec3 origin = hit.ray_origin;
   for (const Node& node : nodes) {
     if (!above_horizon(hit.point, node.wi)) continue;
     const double value =

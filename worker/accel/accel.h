@@ -15,6 +15,7 @@ namespace baton {
 /// What a primary ray saw.
 struct SurfaceHit {
   ShadingPoint point;  ///< position, normals turned to the viewer, wo
+  Vec3 ray_origin{};   ///< where shadow rays start: the position, lifted off (lift_off)
   float depth = 0;     ///< distance along the ray; 0 where hit is false
   std::uint32_t instance = 0;
   std::uint32_t material = 0;

@@ -259,7 +259,9 @@ class EmbreeAccel final : public Accel {
       if (dot(ns, ng) < 0) ns = -ns;
       if (!(dot(ns, ng) > 0)) ns = ng;
     }
-    return {.point = {.position = interpolate(a, b, c), .ng = ng, .ns = ns, .wo = wo},
+    const Vec3 position = interpolate(a, b, c);
+    return {.point = {.position = position, .ng = ng, .ns = ns, .wo = wo},
+            .ray_origin = lift_off(position, ng),
             .depth = hit.depth,
             .instance = index,
             .material = instance.material,

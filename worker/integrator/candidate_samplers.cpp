@@ -1,11 +1,9 @@
 #include "worker/integrator/candidate_samplers.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 #include "worker/sampling/ess.h"
-#include "worker/sampling/systematic_choice.h"
 
 namespace baton {
 namespace {
@@ -31,17 +29,22 @@ void take(const kernels::CandidateSet& from, std::size_t pick, std::size_t j, fl
   samples.b[j] = from.b[pick];
 }
 
-/// Fills `scratch`; false when there is nothing to choose from.
-bool draw(const PixelInput& input, const CandidateCounts& counts, kernels::CandidateSet& scratch,
-          const PixelSamples& samples) {
-  kernels::draw_candidates(input.sites, input.now, input.light.pool, counts,
-                           Rng(input.key, PassId::candidates), scratch);
-  samples.source = PixelSource::fresh;
-  const bool lit = scratch.count > 0 && scratch.total > 0 && std::isfinite(scratch.total);
+/// Sets what a pixel's candidates made of Lns; false when there is no light, which makes it dark.
+bool settle_lns(float total, const PixelSamples& samples) {
+  const bool lit = total > 0 && std::isfinite(total);
   if (!lit) set_dark(samples);
-  samples.lns = samples.lns_fresh = lit ? scratch.total : 0.0f;
+  samples.lns = samples.lns_fresh = lit ? total : 0.0f;
   return lit;
 }
+
+}  // namespace
+
+namespace {
+
+/// Most candidates from lobes. One costs as much as ten of the light's, since it reads texels that
+/// no cache holds, and so many well spread points know a lobe: of M = 800, 200 lower the error of a
+/// lacquered bunny by 2 % for 20 % more time, that of gold not at all (8 runs).
+constexpr std::int32_t kMaxLobeCandidates = 64;
 
 }  // namespace
 
@@ -57,7 +60,8 @@ CandidateCounts candidate_counts(const SiteBlock& sites, std::int32_t total, flo
   const float specular = sites.specular_sum / static_cast<float>(std::max(sites.num_hits, 1));
   const float wanted = lobe_fraction * specular * static_cast<float>(total);
   const std::int32_t rounded = static_cast<std::int32_t>(std::ceil(wanted / kVector)) * kVector;
-  const std::int32_t from_bsdf = sites.num_lobes > 0 ? std::min(rounded, total / 2) : 0;
+  const std::int32_t most = std::min(total / 2, kMaxLobeCandidates);
+  const std::int32_t from_bsdf = sites.num_lobes > 0 ? std::min(rounded, most) : 0;
   return {.from_light = total - from_bsdf, .from_bsdf = from_bsdf, .lobe_only = true};
 }
 
@@ -65,7 +69,10 @@ PixelDiagnostics DirectSampler::sample(const PixelInput& input, SamplerScratch& 
                                        const PixelSamples& samples) const {
   PixelDiagnostics diagnostics{.target_evaluations = counts_.total()};
   kernels::CandidateSet& candidates = scratch.candidates;
-  if (!draw(input, counts_, candidates, samples)) return diagnostics;
+  kernels::draw_candidates(input.sites, input.now, input.light.pool, counts_,
+                           Rng(input.key, PassId::candidates), candidates);
+  samples.source = PixelSource::fresh;
+  if (!settle_lns(candidates.total, samples)) return diagnostics;
   const float inverse = 1.0f / candidates.total;
   for (std::size_t j = 0; j < samples.weight.size(); ++j) {
     take(candidates, j, j, candidates.weight[j] * inverse, samples);
@@ -77,18 +84,16 @@ PixelDiagnostics DirectSampler::sample(const PixelInput& input, SamplerScratch& 
 PixelDiagnostics BidirectionalSampler::sample(const PixelInput& input, SamplerScratch& scratch,
                                               const PixelSamples& samples) const {
   PixelDiagnostics diagnostics{.target_evaluations = num_candidates_};
-  kernels::CandidateSet& candidates = scratch.candidates;
   const CandidateCounts counts = candidate_counts(input.sites, num_candidates_, lobe_fraction_);
-  if (!draw(input, counts, candidates, samples)) return diagnostics;
-  std::array<std::int32_t, limits::kMaxParticles> storage{};
-  const std::span<std::int32_t> chosen = std::span(storage).first(samples.weight.size());
-  const float u = Rng(input.key, PassId::choose).uniforms(0, 0)[0];
-  systematic_choice({candidates.weight, static_cast<std::size_t>(candidates.count)}, u, chosen);
-  const float share = 1.0f / static_cast<float>(chosen.size());
-  for (std::size_t j = 0; j < chosen.size(); ++j) {
-    take(candidates, static_cast<std::size_t>(chosen[j]), j, share, samples);
-  }
-  diagnostics.ess = static_cast<float>(chosen.size());
+  const float total = kernels::choose_candidates(
+      input.sites, input.now, input.light.pool, counts, Rng(input.key, PassId::candidates),
+      Rng(input.key, PassId::choose).uniforms(0, 0)[0], scratch.choice,
+      {samples.direction, samples.site, samples.r, samples.g, samples.b});
+  samples.source = PixelSource::fresh;
+  if (!settle_lns(total, samples)) return diagnostics;
+  std::fill(samples.weight.begin(), samples.weight.end(),
+            1.0f / static_cast<float>(samples.weight.size()));
+  diagnostics.ess = static_cast<float>(samples.weight.size());
   return diagnostics;
 }
 

@@ -21,21 +21,28 @@ namespace baton::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
 /// How candidates 0, 1, ... of one kind are dealt to the sites: even shares from a random start.
-/// Many candidates: all lanes of a vector share a site, which needs no table look-ups; few: each
-/// lane has its own.
+/// Many candidates: all lanes of a vector share a site, and a site's vectors are neighbours, which
+/// needs no table look-ups; few: each lane has its own.
 struct SiteDeal {
   const std::int32_t* sites;
   std::int32_t num_sites;
   std::int32_t count;  ///< candidates of this kind
   float start;         ///< uniform in [0, 1)
 
-  bool ByVector() const {
-    return count >= 2 * num_sites * static_cast<std::int32_t>(hn::Lanes(DF()));
+  std::size_t Vectors() const {
+    return (static_cast<std::size_t>(count) + hn::Lanes(DF()) - 1) / hn::Lanes(DF());
   }
-  /// Site of the whole vector of candidates i, i + 1, ...
-  std::int32_t SiteOfVector(std::size_t i) const {
-    const auto first = static_cast<std::size_t>(start * static_cast<float>(num_sites));
-    return sites[(i / hn::Lanes(DF()) + first) % static_cast<std::size_t>(num_sites)];
+  bool ByVector() const { return count >= num_sites * static_cast<std::int32_t>(hn::Lanes(DF())); }
+  /// Site of the k-th share of the vectors.
+  std::int32_t SiteOfShare(std::size_t k) const {
+    const auto n = static_cast<std::size_t>(num_sites);
+    if (n == 1) return sites[0];
+    return sites[(k + static_cast<std::size_t>(start * static_cast<float>(num_sites))) % n];
+  }
+  /// First vector of the k-th share.
+  std::size_t FirstOfShare(std::size_t k) const {
+    const auto n = static_cast<std::size_t>(num_sites);
+    return (k * Vectors() + n - 1) / n;
   }
   HWY_INLINE VI SitesOfLanes(std::size_t i) const {
     const DF d;
@@ -45,13 +52,52 @@ struct SiteDeal {
         hn::Mul(position, hn::Set(d, static_cast<float>(num_sites) / static_cast<float>(count)));
     return hn::GatherIndex(di, sites, hn::Min(hn::ConvertTo(di, turn), hn::Set(di, num_sites - 1)));
   }
-  HWY_INLINE SurfaceLanes Load(const SiteBlock& block, std::size_t i, VI& site) const {
+  /// Site of candidate i, as ForEach deals it.
+  std::int32_t SiteOf(std::size_t i) const {
     if (ByVector()) {
-      site = hn::Set(DI(), SiteOfVector(i));
-      return LoadSurface(block, static_cast<std::size_t>(SiteOfVector(i)));
+      return SiteOfShare(i / hn::Lanes(DF()) * static_cast<std::size_t>(num_sites) / Vectors());
     }
-    site = SitesOfLanes(i);
-    return LoadSurfaces(block, site);
+    const float turn = (static_cast<float>(i) + start) *
+                       (static_cast<float>(num_sites) / static_cast<float>(count));
+    return sites[std::min(static_cast<std::int32_t>(turn), num_sites - 1)];
+  }
+
+  /// use(surface, i) for each vector of candidates i, i + 1, ... in turn.
+  template <class Use>
+  HWY_INLINE void ForEach(const SiteBlock& block, const Use& use) const {
+    const std::size_t lanes = hn::Lanes(DF());
+    if (!ByVector()) {
+      for (std::size_t v = 0; v < Vectors(); ++v) {
+        use(LoadSurfaces(block, SitesOfLanes(v * lanes)), v * lanes);
+      }
+      return;
+    }
+    for (std::size_t k = 0; k < static_cast<std::size_t>(num_sites); ++k) {
+      const SurfaceLanes surface = LoadSurface(block, static_cast<std::size_t>(SiteOfShare(k)));
+      for (std::size_t v = FirstOfShare(k); v < FirstOfShare(k + 1); ++v) use(surface, v * lanes);
+    }
+  }
+};
+
+/// The entries of the light pool that are a pixel's candidates: neighbours from a random aligned
+/// start.
+struct LightRun {
+  const LightPool& pool;
+  std::size_t start;
+
+  LightRun(const LightPool& light_pool, std::int32_t count, std::uint32_t bits)
+      : pool(light_pool), start(0) {
+    if (count == 0) return;
+    const std::uint32_t stride =
+        std::clamp(std::bit_floor(static_cast<std::uint32_t>(count)), LightPool::kBlock, 64u);
+    start = bits & (LightPool::kSize - stride);  // both are powers of two
+  }
+  /// Candidates i, i + 1, ...
+  HWY_INLINE LightLanes Load(std::size_t i) const {
+    return LoadLight(pool, (start + i) % LightPool::kSize);
+  }
+  HWY_INLINE Vec3Lanes LoadBefore(std::size_t i) const {
+    return LoadLightBefore(pool, (start + i) % LightPool::kSize);
   }
 };
 
@@ -77,87 +123,115 @@ HWY_INLINE float SumOfWeights(const float* weight, std::int32_t count) {
   return hn::GetLane(hn::SumOfLanes(d, sum));
 }
 
-/// Everything that the two kinds of candidates of a pixel share.
-struct CandidateContext {
+/// What the two kinds of candidates of a pixel share: their weights p~ / sum_t M_t q_t.
+struct CandidateWeights {
   const SiteBlock& sites;
   const kernels::CandidateCounts& counts;
-  kernels::CandidateSet& out;
 
-  /// Stores candidates at [at, at + lanes) with weight p~ / sum_t M_t q_t, of which the first
-  /// `left` count.
-  HWY_INLINE void Store(const SurfaceLanes& surface, const BsdfLanes& f, const RadianceLanes& light,
-                        VU code, VI site, std::size_t at, std::size_t left) const {
+  /// Of points that reflect `target` in the mean; the first `left` count.
+  HWY_INLINE VF operator()(VF target, const SurfaceLanes& surface, const BsdfLanes& f,
+                           VF light_density, std::size_t left) const {
     const DF d;
-    const VF share =
-        hn::Set(d, static_cast<float>(sites.num_hits) / static_cast<float>(sites.num_sites));
-    const Vec3Lanes reflected = ReflectedRadiance(surface, f, light.r, light.g, light.b);
-    const VF target = hn::Mul(MeanLanes(reflected), share);
-    VF proposal = hn::Mul(hn::Set(d, static_cast<float>(counts.from_light)), light.density);
+    VF proposal = hn::Mul(hn::Set(d, static_cast<float>(counts.from_light)), light_density);
     if (counts.from_bsdf > 0) {
       proposal = hn::MulAdd(hn::Set(d, static_cast<float>(counts.from_bsdf)),
                             BsdfDensity(sites, counts, surface, f), proposal);
     }
     MF live = hn::And(hn::Gt(target, hn::Zero(d)), hn::Gt(proposal, hn::Zero(d)));
     if (left < hn::Lanes(d)) live = hn::And(live, hn::FirstN(d, left));
-    const VF weight =
-        hn::IfThenElseZero(live, hn::Div(target, hn::IfThenElse(live, proposal, hn::Set(d, 1.0f))));
-    hn::StoreU(code, DU(), out.code + at);
-    hn::StoreU(site, DI(), out.site + at);
-    hn::StoreU(weight, d, out.weight + at);
-    hn::StoreU(reflected.x, d, out.r + at);
-    hn::StoreU(reflected.y, d, out.g + at);
-    hn::StoreU(reflected.z, d, out.b + at);
+    const VF share =
+        hn::Set(d, static_cast<float>(sites.num_hits) / static_cast<float>(sites.num_sites));
+    return hn::IfThenElseZero(
+        live, hn::Div(hn::Mul(target, share), hn::IfThenElse(live, proposal, hn::Set(d, 1.0f))));
   }
 };
 
-/// Candidates from the pool: contiguous entries from a random aligned start.
-HWY_INLINE void LightCandidates(const CandidateContext& context, const LightPool& pool,
-                                const Philox4x32::Counter& random) {
+/// A vector of weighted candidates.
+struct CandidateLanes {
+  VU code;
+  VI site;
+  VF weight;
+  Vec3Lanes reflected;  ///< (f cos L)_rgb
+};
+
+HWY_INLINE void StoreCandidates(const CandidateLanes& c, std::size_t at,
+                                kernels::CandidateSet& out) {
   const DF d;
-  const auto count = static_cast<std::size_t>(context.counts.from_light);
-  if (count == 0) return;
-  const std::uint32_t stride =
-      std::clamp(std::bit_floor(static_cast<std::uint32_t>(count)), LightPool::kBlock, 64u);
-  const std::size_t start = random[0] % (LightPool::kSize / stride) * stride;
-  const SiteDeal deal{context.sites.hit_sites.data(), context.sites.num_hits,
-                      context.counts.from_light, uniform_float(random[3])};
-  for (std::size_t i = 0; i < count; i += hn::Lanes(d)) {
-    const std::size_t entry = (start + i) % LightPool::kSize;
-    const LightPool::Block& block = pool.blocks[entry / LightPool::kBlock];
-    const std::size_t at = entry % LightPool::kBlock;
-    VI site;
-    const SurfaceLanes surface = deal.Load(context.sites, i, site);
-    const BsdfLanes f = EvaluateBsdf(
-        surface, {hn::Load(d, block.x + at), hn::Load(d, block.y + at), hn::Load(d, block.z + at)});
-    const RadianceLanes light{hn::Load(d, block.r + at), hn::Load(d, block.g + at),
-                              hn::Load(d, block.b + at), hn::Load(d, block.density + at)};
-    context.Store(surface, f, light, hn::Load(DU(), block.code + at), site, i, count - i);
-  }
+  hn::StoreU(c.code, DU(), out.code + at);
+  hn::StoreU(c.site, DI(), out.site + at);
+  hn::StoreU(c.weight, d, out.weight + at);
+  hn::StoreU(c.reflected.x, d, out.r + at);
+  hn::StoreU(c.reflected.y, d, out.g + at);
+  hn::StoreU(c.reflected.z, d, out.b + at);
 }
 
-/// Candidates from the BRDF: Sobol' points with the pixel's digital shift, snapped to the lattice.
-HWY_INLINE void BsdfCandidates(const CandidateContext& context, const EnvironmentView& environment,
+HWY_INLINE SiteDeal LightSites(const SiteBlock& sites, const kernels::CandidateCounts& counts,
                                const Philox4x32::Counter& random) {
-  const DF d;
-  const DU du;
-  const SobolTable& table = sobol_table();
-  const auto count = static_cast<std::size_t>(context.counts.from_bsdf);
-  const bool lobe_only = context.counts.lobe_only;
-  const SiteDeal deal{lobe_only ? context.sites.lobe_sites.data() : context.sites.hit_sites.data(),
-                      lobe_only ? context.sites.num_lobes : context.sites.num_hits,
-                      context.counts.from_bsdf, uniform_float(random[3] * 0x9E3779B9u)};
-  for (std::size_t i = 0; i < count; i += hn::Lanes(d)) {
+  return {sites.hit_sites.data(), sites.num_hits, counts.from_light, uniform_float(random[3])};
+}
+
+/// use(candidates, i) for the candidates i, i + 1, ... from the pool.
+template <class Use>
+HWY_INLINE void LightCandidates(const SiteBlock& sites, const LightPool& pool,
+                                const kernels::CandidateCounts& counts,
+                                const Philox4x32::Counter& random, const Use& use) {
+  if (counts.from_light == 0) return;
+  const CandidateWeights weigh{sites, counts};
+  const LightRun run(pool, counts.from_light, random[0]);
+  const SiteDeal deal = LightSites(sites, counts, random);
+  deal.ForEach(sites, [&](const SurfaceLanes& surface, std::size_t i) HWY_ATTR {
+    const LightLanes light = run.Load(i);
+    const BsdfLanes f = EvaluateBsdf(surface, light.direction);
+    const Vec3Lanes reflected =
+        ReflectedRadiance(surface, f, light.now.r, light.now.g, light.now.b);
+    const VF weight = weigh(MeanLanes(reflected), surface, f, light.now.density,
+                            static_cast<std::size_t>(counts.from_light) - i);
+    use(CandidateLanes{light.code, surface.site, weight, reflected}, i);
+  });
+}
+
+/// A vector of directions drawn from the BRDF, on the lattice of `to_map` * world.
+struct BsdfRun {
+  const SiteBlock& sites;
+  const kernels::CandidateCounts& counts;
+  const Philox4x32::Counter& random;
+
+  SiteDeal Deal() const {
+    const bool lobes = counts.lobe_only;
+    return {lobes ? sites.lobe_sites.data() : sites.hit_sites.data(),
+            lobes ? sites.num_lobes : sites.num_hits, counts.from_bsdf,
+            uniform_float(random[3] * 0x9E3779B9u)};
+  }
+  /// Directions i, i + 1, ...: Sobol' points with the pixel's digital shift.
+  HWY_INLINE Vec3Lanes Draw(const SurfaceLanes& surface, std::size_t i) const {
+    const DF d;
+    const DU du;
+    const SobolTable& table = sobol_table();
     const VU sx = hn::Xor(hn::LoadU(du, table.x.data() + i), hn::Set(du, random[1]));
     const VU sy = hn::Xor(hn::LoadU(du, table.y.data() + i), hn::Set(du, random[2]));
-    VI site;
-    const SurfaceLanes surface = deal.Load(context.sites, i, site);
-    const VF specular_probability = lobe_only ? hn::Set(d, 1.0f) : surface.specular_probability;
-    const VU code = EncodeOctahedral(
-        SampleBsdf(surface, specular_probability, UniformLanes(d, sx), UniformLanes(d, sy)));
-    const Vec3Lanes w = DecodeOctahedral(code);
-    context.Store(surface, EvaluateBsdf(surface, w), EvaluateEnvironment(environment, w), code,
-                  site, static_cast<std::size_t>(context.counts.from_light) + i, count - i);
+    return SampleBsdf(surface, counts.lobe_only ? hn::Set(d, 1.0f) : surface.specular_probability,
+                      UniformLanes(d, sx), UniformLanes(d, sy));
   }
+};
+
+/// use(candidates, i) for the candidates i, i + 1, ... from the BRDF, snapped to the lattice.
+template <class Use>
+HWY_INLINE void BsdfCandidates(const SiteBlock& sites, const EnvironmentView& environment,
+                               const kernels::CandidateCounts& counts,
+                               const Philox4x32::Counter& random, const Use& use) {
+  if (counts.from_bsdf == 0) return;
+  const CandidateWeights weigh{sites, counts};
+  const BsdfRun run{sites, counts, random};
+  run.Deal().ForEach(sites, [&](const SurfaceLanes& surface, std::size_t i) HWY_ATTR {
+    const VU code = EncodeOctahedral(run.Draw(surface, i));
+    const Vec3Lanes w = DecodeOctahedral(code);
+    const RadianceLanes light = EvaluateEnvironment(environment, w);
+    const BsdfLanes f = EvaluateBsdf(surface, w);
+    const Vec3Lanes reflected = ReflectedRadiance(surface, f, light.r, light.g, light.b);
+    const VF weight = weigh(MeanLanes(reflected), surface, f, light.density,
+                            static_cast<std::size_t>(counts.from_bsdf) - i);
+    use(CandidateLanes{code, surface.site, weight, reflected}, i);
+  });
 }
 
 }  // namespace baton::HWY_NAMESPACE

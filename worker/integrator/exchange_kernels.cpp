@@ -73,8 +73,10 @@ HWY_INLINE SurfaceLanes LoadTable(const SurfaceTable& table, const Records& comm
   s.any_ggx = !hn::AllFalse(d, s.is_ggx);
   s.any_measured = false;
   s.tables = table.tables().data();
-  s.table = hn::Zero(DI());
-  if (!s.any_phong && !s.any_ggx) return s;
+  s.table = s.site = hn::Zero(DI());
+  s.alpha2 = s.view_cosine = s.view_masking = zero;
+  s.any_lobe = s.any_phong || s.any_ggx;
+  if (!s.any_lobe) return s;
   Records glossy;
   for (std::size_t lane = 0; lane < hn::Lanes(d); ++lane)
     glossy[lane] = table.glossy() + (common[lane] - table.common()) / 2;
@@ -83,6 +85,7 @@ HWY_INLINE SurfaceLanes LoadTable(const SurfaceTable& table, const Records& comm
   s.wo = {f.row[0], f.row[1], f.row[2]};
   s.mirror = {g.row[0], g.row[1], g.row[2]};
   s.ks = {ks_r, f.row[3], g.row[3]};
+  if (s.any_ggx) SetViewTerms(s);
   s.any_measured = table.tables().size() > 1 && s.any_ggx;
   s.table = hn::ConvertTo(DI(), hn::Max(hn::Sub(b.row[3], hn::Set(d, 1.0f)), zero));
   return s;

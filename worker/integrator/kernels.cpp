@@ -9,7 +9,7 @@
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
-#include "worker/integrator/candidates-inl.h"
+#include "worker/integrator/choice-inl.h"
 #include "worker/integrator/target-inl.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -34,19 +34,7 @@ void DecodeDirections(std::span<const OctDirection> code, std::span<float> x, st
   }
 }
 
-/// Up to a vector of floats from `array` at i, the rest zero; and back.
-HWY_INLINE VF LoadSome(std::span<const float> array, std::size_t i) {
-  const DF d;
-  HWY_ALIGN float in[hn::MaxLanes(DF())] = {};
-  std::copy_n(array.data() + i, std::min(array.size() - i, hn::Lanes(d)), in);
-  return hn::Load(d, in);
-}
-HWY_INLINE void StoreSome(VF value, std::span<float> array, std::size_t i) {
-  const DF d;
-  HWY_ALIGN float out[hn::MaxLanes(DF())];
-  hn::Store(value, d, out);
-  std::copy_n(out, std::min(array.size() - i, hn::Lanes(d)), array.data() + i);
-}
+/// Up to a vector of sites from `array` at i, the rest zero.
 HWY_INLINE VI LoadSomeSites(std::span<const std::int32_t> array, std::size_t i) {
   const DI di;
   HWY_ALIGN std::int32_t in[hn::MaxLanes(DI())] = {};
@@ -94,12 +82,15 @@ void SampleBsdfSpans(const SiteBlock& sites, std::span<const std::int32_t> site,
 
 void DrawCandidates(const SiteBlock& sites, const EnvironmentView& environment, const LightPool& pool,
                     const kernels::CandidateCounts& counts, const Rng& rng, kernels::CandidateSet& out) {
-  const CandidateContext context{sites, counts, out};
   const Philox4x32::Counter random = rng.bits(0, 0);
-  LightCandidates(context, pool, random);
-  BsdfCandidates(context, environment, random);
+  const auto store = [&out](std::int32_t first) HWY_ATTR {
+    return [&out, first](const CandidateLanes& c, std::size_t i) HWY_ATTR {
+      StoreCandidates(c, static_cast<std::size_t>(first) + i, out);
+    };
+  };
+  LightCandidates(sites, pool, counts, random, store(0));
+  BsdfCandidates(sites, environment, counts, random, store(counts.from_light));
   out.count = counts.total();
-
   out.total = SumOfWeights(out.weight, out.count);
 }
 
@@ -133,6 +124,14 @@ void ShadeSamples(const SiteBlock& sites, const EnvironmentView& environment, st
   }
 }
 
+void PrefetchDirections(const EnvironmentView& view, std::span<const OctDirection> code) {
+  for (std::size_t i = 0; i < code.size(); i += hn::Lanes(DU())) {
+    HWY_ALIGN std::uint32_t codes[hn::MaxLanes(DU())];
+    for (std::size_t lane = 0; lane < hn::Lanes(DU()); ++lane) codes[lane] = code[std::min(i + lane, code.size() - 1)];
+    PrefetchTexels(view, LocateTexels(view, DecodeOctahedral(hn::Load(DU(), codes))));
+  }
+}
+
 SequentialOutcome SequentialPixel(const SiteBlock& sites, const EnvironmentView& before, const EnvironmentView& now,
                                   const LightPool& pool, const SequentialSettings& settings, float lns_before,
                                   const RngKey& key, ParticleSpan particles) {
@@ -162,7 +161,9 @@ HWY_EXPORT(EvaluateEnvironmentSpans);
 HWY_EXPORT(EvaluateBsdfSpans);
 HWY_EXPORT(SampleBsdfSpans);
 HWY_EXPORT(DrawCandidates);
+HWY_EXPORT(ChooseCandidates);
 HWY_EXPORT(ShadeSamples);
+HWY_EXPORT(PrefetchDirections);
 HWY_EXPORT(SequentialPixel);
 HWY_EXPORT(SequentialMovedPixel);
 HWY_EXPORT(TargetName);
@@ -192,21 +193,42 @@ void sample_bsdf(const SiteBlock& sites, std::span<const std::int32_t> site, std
   HWY_DYNAMIC_DISPATCH(SampleBsdfSpans)(sites, site, u0, u1, x, y, z);
 }
 
-void draw_candidates(const SiteBlock& sites, const EnvironmentView& environment, const LightPool& pool,
-                     const CandidateCounts& counts, const Rng& rng, CandidateSet& out) {
+namespace {
+
+void check_counts(const SiteBlock& sites, const CandidateCounts& counts) {
   BATON_CHECK(sites.num_hits > 0 && counts.from_light >= 0 && counts.from_bsdf >= 0);
   BATON_CHECK(counts.total() >= 1 && counts.total() <= limits::kMaxCandidates);
   BATON_CHECK(!counts.lobe_only || counts.from_bsdf == 0 || (sites.num_lobes > 0 && counts.from_light > 0));
+}
+
+}  // namespace
+
+void draw_candidates(const SiteBlock& sites, const EnvironmentView& environment, const LightPool& pool,
+                     const CandidateCounts& counts, const Rng& rng, CandidateSet& out) {
+  check_counts(sites, counts);
   out.count = 0;
   out.total = 0;
   if (pool.empty()) return;
   HWY_DYNAMIC_DISPATCH(DrawCandidates)(sites, environment, pool, counts, rng, out);
 }
 
+float choose_candidates(const SiteBlock& sites, const EnvironmentView& environment, const LightPool& pool,
+                        const CandidateCounts& counts, const Rng& rng, float u, ChoiceScratch& scratch,
+                        const SampleSpan& out) {
+  check_counts(sites, counts);
+  BATON_CHECK(!out.code.empty() && out.code.size() == out.site.size() && out.code.size() == out.r.size());
+  if (pool.empty()) return 0;
+  return HWY_DYNAMIC_DISPATCH(ChooseCandidates)(sites, environment, pool, counts, rng, u, scratch, out);
+}
+
 void shade_samples(const SiteBlock& sites, const EnvironmentView& environment, std::span<const OctDirection> code,
                    std::span<const std::uint8_t> site, ShadedSamples& out) {
   BATON_CHECK(code.size() == site.size() && code.size() <= limits::kMaxParticles);
   HWY_DYNAMIC_DISPATCH(ShadeSamples)(sites, environment, code, site, out);
+}
+
+void prefetch_texels(const EnvironmentView& view, std::span<const OctDirection> code) {
+  HWY_DYNAMIC_DISPATCH(PrefetchDirections)(view, code);
 }
 
 SequentialOutcome sequential_step(const SiteBlock& sites, const OldSurfaces* old,

@@ -76,6 +76,27 @@ void draw_candidates(const SiteBlock& sites, const EnvironmentView& environment,
                      const LightPool& pool, const CandidateCounts& counts, const Rng& rng,
                      CandidateSet& out);
 
+/// Work space of choose_candidates.
+struct ChoiceScratch {
+  alignas(64) float running_sums[CandidateSet::kCapacity];
+  CandidateSet from_bsdf;
+};
+
+/// Samples (N) that a method fills: directions, sites and (f cos L)_rgb.
+struct SampleSpan {
+  std::span<OctDirection> code;
+  std::span<std::uint8_t> site;
+  std::span<float> r, g, b;
+};
+
+/// Draws candidates like draw_candidates and keeps N of them, each with probability proportional to
+/// its weight: systematically with offset u in [0, 1) (sampling/systematic_choice.h). Only weights
+/// are kept of candidates from the pool; what is chosen is evaluated again. Returns the sum of the
+/// weights, an unbiased estimate of Lns; when it is not positive and finite, out is left as it was.
+float choose_candidates(const SiteBlock& sites, const EnvironmentView& environment,
+                        const LightPool& pool, const CandidateCounts& counts, const Rng& rng,
+                        float u, ChoiceScratch& scratch, const SampleSpan& out);
+
 /// What is left to do for a sample once its visibility is known: colour[j] = (f cos L)_rgb / p~ at
 /// (site, w), 0 where p~ is 0. directions: unit vectors for the shadow rays. Arrays padded by
 /// kPadding.
@@ -87,6 +108,10 @@ struct ShadedSamples {
 void shade_samples(const SiteBlock& sites, const EnvironmentView& environment,
                    std::span<const OctDirection> code, std::span<const std::uint8_t> site,
                    ShadedSamples& out);
+
+/// Asks the memory for the texels along lattice directions, which evaluations will soon read: a map
+/// is larger than the caches.
+void prefetch_texels(const EnvironmentView& view, std::span<const OctDirection> code);
 
 /// One frame of the sequential sampler for a pixel (sampling/sequential-inl.h). old: the surfaces
 /// that the particles come from, by sites of this frame; null where they are `sites`.

@@ -87,6 +87,7 @@ struct PixelRays {
 /// Work space of one thread, reused from pixel to pixel.
 struct SamplerScratch {
   kernels::CandidateSet candidates;
+  kernels::ChoiceScratch choice;
   std::array<kernels::PoolHalf, 2> pool;
 };
 
@@ -98,6 +99,8 @@ class PixelSampler {
   /// scratch: the caller's, reused from pixel to pixel.
   virtual PixelDiagnostics sample(const PixelInput& input, SamplerScratch& scratch,
                                   const PixelSamples& samples) const = 0;
+  /// Asks the memory for what sample() will read of these carried directions (N).
+  virtual void fetch_ahead(const EnvironmentView& now, std::span<const OctDirection> carried) const;
   /// Whether the method chooses its rays apart from its samples; else they are its samples.
   virtual bool chooses_rays() const { return false; }
   /// Chooses them, after sample() and with the scratch as that left it.

@@ -291,69 +291,47 @@ class PoolGatherer {
     return f;
   }
 
-  /// The surfaces before of candidates i, i + 1, ... of a deal; `now`, where they are the same.
-  HWY_INLINE SurfaceLanes LoadBefore(const SiteDeal& deal, std::size_t i,
-                                     const SurfaceLanes& now) const {
-    VI site;
-    return !input_.has_history || same_surface_ ? now : deal.Load(*surfaces_before_, i, site);
+  /// The surfaces before of the sites of `now`; `now`, where they are the same.
+  HWY_INLINE SurfaceLanes LoadBefore(const SurfaceLanes& now) const {
+    return !input_.has_history || same_surface_ ? now : LoadSurfaces(*surfaces_before_, now.site);
   }
 
-  /// Fresh candidates from the light pool: contiguous entries from a random aligned start.
+  /// Fresh candidates from the light pool.
   HWY_INLINE void AddLight(const Philox4x32::Counter& random, kernels::PoolHalf& out,
                            Sums& sums) const {
-    const DF d;
     const auto count = static_cast<std::size_t>(input_.counts.from_light);
     if (count == 0) return;
-    const std::uint32_t stride =
-        std::clamp(std::bit_floor(static_cast<std::uint32_t>(count)), LightPool::kBlock, 64u);
-    const std::size_t start = random[0] % (LightPool::kSize / stride) * stride;
-    const SiteDeal deal{input_.sites.hit_sites.data(), input_.sites.num_hits,
-                        input_.counts.from_light, uniform_float(random[3])};
-    for (std::size_t i = 0; i < count; i += hn::Lanes(d)) {
-      const std::size_t entry = (start + i) % LightPool::kSize;
-      const LightPool::Block& block = input_.light_pool.blocks[entry / LightPool::kBlock];
-      const std::size_t at = entry % LightPool::kBlock;
+    const LightRun run(input_.light_pool, input_.counts.from_light, random[0]);
+    const SiteDeal deal = LightSites(input_.sites, input_.counts, random);
+    deal.ForEach(input_.sites, [&](const SurfaceLanes& surface, std::size_t i) HWY_ATTR {
+      const LightLanes light = run.Load(i);
+      const Vec3Lanes then = run.LoadBefore(i);
       PoolPoint p;
-      const SurfaceLanes surface = deal.Load(input_.sites, i, p.site);
-      p.code = hn::Load(DU(), block.code + at);
-      p.world = {hn::Load(d, block.x + at), hn::Load(d, block.y + at), hn::Load(d, block.z + at)};
+      p.code = light.code;
+      p.site = surface.site;
+      p.world = light.direction;
       const BsdfLanes f = EvaluateBsdf(surface, p.world);
-      const RadianceLanes light{hn::Load(d, block.r + at), hn::Load(d, block.g + at),
-                                hn::Load(d, block.b + at), hn::Load(d, block.density + at)};
-      const RadianceLanes then{hn::Load(d, block.before_r + at), hn::Load(d, block.before_g + at),
-                               hn::Load(d, block.before_b + at), light.density};
-      SetTargets(surface, LoadBefore(deal, i, surface), f, light, then, p);
-      AppendFresh(p, FreshWeight(p, surface, f, light.density, count - i), out, sums);
-    }
+      SetTargets(surface, LoadBefore(surface), f, light.now,
+                 {then.x, then.y, then.z, light.now.density}, p);
+      AppendFresh(p, FreshWeight(p, surface, f, light.now.density, count - i), out, sums);
+    });
   }
 
-  /// Fresh candidates from the BRDF: Sobol' points with the half's digital shift, snapped to the
-  /// lattice.
+  /// Fresh candidates from the BRDF, snapped to the lattice of the map's frame.
   HWY_INLINE void AddBsdf(const Philox4x32::Counter& random, kernels::PoolHalf& out,
                           Sums& sums) const {
-    const DF d;
-    const DU du;
-    const SobolTable& table = sobol_table();
     const auto count = static_cast<std::size_t>(input_.counts.from_bsdf);
-    const bool lobe_only = input_.counts.lobe_only;
-    const SiteDeal deal{lobe_only ? input_.sites.lobe_sites.data() : input_.sites.hit_sites.data(),
-                        lobe_only ? input_.sites.num_lobes : input_.sites.num_hits,
-                        input_.counts.from_bsdf, uniform_float(random[3] * 0x9E3779B9u)};
-    for (std::size_t i = 0; i < count; i += hn::Lanes(d)) {
-      const VU sx = hn::Xor(hn::LoadU(du, table.x.data() + i), hn::Set(du, random[1]));
-      const VU sy = hn::Xor(hn::LoadU(du, table.y.data() + i), hn::Set(du, random[2]));
+    if (count == 0) return;
+    const BsdfRun run{input_.sites, input_.counts, random};
+    run.Deal().ForEach(input_.sites, [&](const SurfaceLanes& surface, std::size_t i) HWY_ATTR {
       PoolPoint p;
-      const SurfaceLanes surface = deal.Load(input_.sites, i, p.site);
-      const VF specular_probability = lobe_only ? hn::Set(d, 1.0f) : surface.specular_probability;
-      const Vec3Lanes drawn =
-          SampleBsdf(surface, specular_probability, UniformLanes(d, sx), UniformLanes(d, sy));
-      p.code = EncodeOctahedral(Transform(to_map_.m.data(), drawn));
+      p.code = EncodeOctahedral(Transform(to_map_.m.data(), run.Draw(surface, i)));
+      p.site = surface.site;
       VF density;
       const Vec3Lanes w = DecodeOctahedral(p.code);
-      const BsdfLanes f =
-          Evaluate(surface, LoadBefore(deal, i, surface), w, LocateTexels(now_, w), p, density);
+      const BsdfLanes f = Evaluate(surface, LoadBefore(surface), w, LocateTexels(now_, w), p, density);
       AppendFresh(p, FreshWeight(p, surface, f, density, count - i), out, sums);
-    }
+    });
   }
 
   const kernels::PoolInput& input_;

@@ -55,7 +55,7 @@ ReferenceEstimate ReferenceRenderer::render(std::span<const SurfaceHit> surfaces
       const SurfaceHit& hit = surfaces[static_cast<std::size_t>(u[0] * static_cast<float>(surfaces.size()))];
       if (!hit.hit) continue;
       const Site site{hit.point, materials_[hit.material]};
-      const Vec3 origin = lift_off(hit.point.position, hit.point.ng);
+      const Vec3 origin = hit.ray_origin;
       for (const Vec3& wi : {environment.sample({u[1], u[2]}), sample_bsdf(site.material, site.point, {v[0], v[1], v[2]})}) {
         const Rgb value = weighted_radiance(site, environment, wi);
         if (!(mean(value) > 0)) continue;

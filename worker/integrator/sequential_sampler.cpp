@@ -23,6 +23,11 @@ bool SequentialSampler::has_wandered(float lns, float lns_fresh) const {
   return refresh_ratio_ && (lns > lns_fresh * *refresh_ratio_ || lns * *refresh_ratio_ < lns_fresh);
 }
 
+void SequentialSampler::fetch_ahead(const EnvironmentView& now,
+                                    std::span<const OctDirection> carried) const {
+  kernels::prefetch_texels(now, carried);
+}
+
 PixelDiagnostics SequentialSampler::sample(const PixelInput& input, SamplerScratch& scratch,
                                            const PixelSamples& samples) const {
   if (!input.has_history) return start_->sample(input, scratch, samples);

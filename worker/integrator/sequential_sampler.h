@@ -30,6 +30,8 @@ class SequentialSampler final : public PixelSampler {
         by_ratio_(by_ratio) {}
   PixelDiagnostics sample(const PixelInput& input, SamplerScratch& scratch,
                           const PixelSamples& samples) const override;
+  void fetch_ahead(const EnvironmentView& now,
+                   std::span<const OctDirection> carried) const override;
 
  private:
   bool has_wandered(float lns, float lns_fresh) const;

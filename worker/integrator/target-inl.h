@@ -21,6 +21,11 @@ namespace hn = hwy::HWY_NAMESPACE;
 
 /// Reflected radiance (f cos L) per channel.
 HWY_INLINE Vec3Lanes ReflectedRadiance(const SurfaceLanes& s, const BsdfLanes& f, VF r, VF g, VF b) {
+  if (!s.any_lobe) {
+    const VF each = hn::Mul(f.cosine, hn::Set(DF(), kInvPi));
+    return {hn::Mul(hn::Mul(s.kd.x, each), r), hn::Mul(hn::Mul(s.kd.y, each), g),
+            hn::Mul(hn::Mul(s.kd.z, each), b)};
+  }
   const auto channel = [&](VF kd, VF ks, VF radiance) HWY_ATTR {
     return hn::Mul(hn::Mul(hn::MulAdd(f.diffuse, kd, hn::MulAdd(f.lobe, ks, f.white)), f.cosine), radiance);
   };
@@ -28,6 +33,31 @@ HWY_INLINE Vec3Lanes ReflectedRadiance(const SurfaceLanes& s, const BsdfLanes& f
   if (!s.any_measured) return reflected;
   const auto tabulated = [&](VF value, VF radiance) HWY_ATTR { return hn::Mul(hn::Mul(value, f.cosine), radiance); };
   return Add(reflected, {tabulated(f.measured.x, r), tabulated(f.measured.y, g), tabulated(f.measured.z, b)});
+}
+
+/// A vector of entries of the light pool.
+struct LightLanes {
+  VU code;
+  Vec3Lanes direction;
+  RadianceLanes now;
+};
+/// Entries entry, entry + 1, ..., which lie in one block.
+HWY_INLINE LightLanes LoadLight(const LightPool& pool, std::size_t entry) {
+  const DF d;
+  const LightPool::Block& block = pool.blocks[entry / LightPool::kBlock];
+  const std::size_t at = entry % LightPool::kBlock;
+  return {hn::Load(DU(), block.code + at),
+          {hn::Load(d, block.x + at), hn::Load(d, block.y + at), hn::Load(d, block.z + at)},
+          {hn::Load(d, block.r + at), hn::Load(d, block.g + at), hn::Load(d, block.b + at),
+           hn::Load(d, block.density + at)}};
+}
+/// Radiance of the same entries in the frame before.
+HWY_INLINE Vec3Lanes LoadLightBefore(const LightPool& pool, std::size_t entry) {
+  const DF d;
+  const LightPool::Block& block = pool.blocks[entry / LightPool::kBlock];
+  const std::size_t at = entry % LightPool::kBlock;
+  return {hn::Load(d, block.before_r + at), hn::Load(d, block.before_g + at),
+          hn::Load(d, block.before_b + at)};
 }
 
 /// Site of the k-th surface of the pixel, k = floor(fraction * num_hits); fraction in [0, 1).
@@ -86,20 +116,23 @@ struct SameSurfaceTarget {
     return bits & (LightPool::kSize - LightPool::kBlock);
   }
 
-  /// Draws `point` from the pool's entries entry, entry + 1, ...; returns its targets.
-  HWY_INLINE LogTargets Propose(std::size_t entry, VF site_fraction, PointLanes& point) const {
-    const DF d;
-    const LightPool::Block& block = pool.blocks[entry / LightPool::kBlock];
-    const std::size_t at = entry % LightPool::kBlock;
-    point.code = hn::Load(DU(), block.code + at);
+  /// Draws `point` from the pool's entries entry, entry + 1, ...; returns its targets, `before` only
+  /// where it is wanted.
+  HWY_INLINE LogTargets Propose(std::size_t entry, VF site_fraction, bool want_before,
+                                PointLanes& point) const {
+    const LightLanes light = LoadLight(pool, entry);
+    point.code = light.code;
     point.site = SiteAt(sites, site_fraction);
     const SurfaceLanes surface = LoadSurfaces(sites, point.site);
-    const BsdfLanes f = EvaluateBsdf(surface, {hn::Load(d, block.x + at), hn::Load(d, block.y + at), hn::Load(d, block.z + at)});
-    const Vec3Lanes then = ReflectedRadiance(surface, f, hn::Load(d, block.before_r + at), hn::Load(d, block.before_g + at),
-                                             hn::Load(d, block.before_b + at));
-    const Vec3Lanes light =
-        ReflectedRadiance(surface, f, hn::Load(d, block.r + at), hn::Load(d, block.g + at), hn::Load(d, block.b + at));
-    return TargetsOf(LogOrZero(MeanLanes(then)), light, hn::Load(d, block.density + at));
+    const BsdfLanes f = EvaluateBsdf(surface, light.direction);
+    VF log_then = hn::Zero(DF());
+    if (want_before) {
+      const Vec3Lanes then = LoadLightBefore(pool, entry);
+      log_then = LogOrZero(MeanLanes(ReflectedRadiance(surface, f, then.x, then.y, then.z)));
+    }
+    return TargetsOf(log_then,
+                     ReflectedRadiance(surface, f, light.now.r, light.now.g, light.now.b),
+                     light.now.density);
   }
 };
 
@@ -131,18 +164,16 @@ struct MovedSurfaceTarget {
   }
   static std::size_t BlockStart(std::uint32_t bits) { return SameSurfaceTarget::BlockStart(bits); }
 
-  HWY_INLINE LogTargets Propose(std::size_t entry, VF site_fraction, PointLanes& point) const {
-    const DF d;
-    const LightPool::Block& block = pool.blocks[entry / LightPool::kBlock];
-    const std::size_t at = entry % LightPool::kBlock;
-    const auto load = [&](const float* x, const float* y, const float* z) HWY_ATTR {
-      return Vec3Lanes{hn::Load(d, x + at), hn::Load(d, y + at), hn::Load(d, z + at)};
-    };
-    point.code = hn::Load(DU(), block.code + at);
+  HWY_INLINE LogTargets Propose(std::size_t entry, VF site_fraction, bool want_before,
+                                PointLanes& point) const {
+    if (!want_before) {
+      return SameSurfaceTarget{sites, before, now, pool}.Propose(entry, site_fraction, false, point);
+    }
+    const LightLanes light = LoadLight(pool, entry);
+    point.code = light.code;
     point.site = SiteAt(sites, site_fraction);
-    return Targets(point.site, load(block.x, block.y, block.z),
-                   load(block.before_r, block.before_g, block.before_b),
-                   load(block.r, block.g, block.b), hn::Load(d, block.density + at));
+    return Targets(point.site, light.direction, LoadLightBefore(pool, entry),
+                   {light.now.r, light.now.g, light.now.b}, light.now.density);
   }
 
  private:

@@ -62,7 +62,7 @@ void ExtraSampler::draw(std::int32_t x, std::int32_t y, std::size_t fold,
   rays_.clear();
   SiteOrigins origins{.num_sites = work_.context.job.image.sites};
   for (std::size_t s = 0; s < hits.size(); ++s) {
-    if (hits[s].hit) origins.set(s, lift_off(hits[s].point.position, hits[s].point.ng));
+    if (hits[s].hit) origins.set(s, hits[s].ray_origin);
   }
   const auto count = static_cast<std::uint32_t>(work_.context.job.visibility.partitions);
   SampleColors colors;

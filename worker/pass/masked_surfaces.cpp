@@ -23,7 +23,7 @@ MaskedSurfaces::MaskedSurfaces(const RenderContext& context, const FrameGeometry
   for (const SurfaceHit& hit : hits_) {
     if (hit.hit) {
       table_.add(hit.point, context.scene->materials[hit.material],
-                 lift_off(hit.point.position, hit.point.ng));
+                 hit.ray_origin);
     } else {
       table_.add_nothing();
     }

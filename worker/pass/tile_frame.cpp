@@ -188,7 +188,12 @@ void TileFrameRenderer::sample(Batch& batch, const FrameLight& light, SampleStat
     }
 
     // Sample, and cast the rays.
-    if (index + 1 < state.num_pixels()) fetch_ahead(state.memory_of(index + 1));
+    if (index + 1 < state.num_pixels()) {
+      fetch_ahead(state.memory_of(index + 1));
+      if (has_history_ && reprojection_ == nullptr) {
+        context_.sampler->fetch_ahead(now, std::span(state.direction).subspan((index + 1) * n, n));
+      }
+    }
     const PixelHistory history = find_history(i, index, state);
     const PixelInput input{
         .sites = sites,
@@ -231,7 +236,7 @@ SiteOrigins TileFrameRenderer::origins(std::size_t index) const {
   const std::span<const SurfaceHit> hits = surfaces_.pixel(index);
   SiteOrigins origins{.num_sites = surfaces_.num_sites};
   for (std::size_t s = 0; s < hits.size(); ++s) {
-    if (hits[s].hit) origins.set(s, lift_off(hits[s].point.position, hits[s].point.ng));
+    if (hits[s].hit) origins.set(s, hits[s].ray_origin);
   }
   return origins;
 }

@@ -181,7 +181,7 @@ HWY_INLINE void MoveParticles(const Target& target, const SequentialSettings& se
           target.ManySites() ? UniformLanes(d, random.Proposal(move, i).w0) : hn::Zero(d);
       const std::size_t start =
           target.BlockStart(random.BlockBits(move, static_cast<std::uint32_t>(i / kProposalBlock)));
-      next_log = target.Propose(start + i % kProposalBlock, site_fraction, next);
+      next_log = target.Propose(start + i % kProposalBlock, site_fraction, keep_before, next);
     }
 
     // Accept with min(1, p(next) q(current) / (p(current) q(next))); q cancels in symmetric moves.

@@ -20,8 +20,11 @@ namespace hn = hwy::HWY_NAMESPACE;
 struct SurfaceLanes {
   Vec3Lanes ns, ng, wo, mirror, kd, ks;
   VF shape, lobe_scale, specular_probability;
+  VF alpha2, view_cosine, view_masking;  ///< SiteBlock; of a ggx lobe
   MF is_ggx;
   bool any_phong, any_ggx, any_measured;
+  bool any_lobe;  ///< any of them; if not, only ns, ng and kd matter and the rest is 0
+  VI site;
   const float* const* tables;  ///< texels of measured BRDFs, some of them null
   VI table;                    ///< index into `tables`
 };
@@ -47,21 +50,46 @@ HWY_INLINE SurfaceLanes ReadSurfaces(const SiteBlock& b, VI site, const Read& re
   const auto vec = [&](const SiteBlock::Array& x, const SiteBlock::Array& y, const SiteBlock::Array& z) HWY_ATTR {
     return Vec3Lanes{read(x), read(y), read(z)};
   };
-  return {.ns = vec(b.ns_x, b.ns_y, b.ns_z),
-          .ng = vec(b.ng_x, b.ng_y, b.ng_z),
-          .wo = vec(b.wo_x, b.wo_y, b.wo_z),
-          .mirror = vec(b.mirror_x, b.mirror_y, b.mirror_z),
-          .kd = vec(b.kd_r, b.kd_g, b.kd_b),
-          .ks = vec(b.ks_r, b.ks_g, b.ks_b),
-          .shape = read(b.shape),
-          .lobe_scale = read(b.lobe_scale),
-          .specular_probability = read(b.specular_probability),
-          .is_ggx = hn::Gt(read(b.is_ggx), hn::Zero(DF())),
-          .any_phong = b.any_phong,
-          .any_ggx = b.any_ggx,
-          .any_measured = b.any_measured,
-          .tables = b.measured.data(),
-          .table = site};
+  SurfaceLanes s;
+  s.ns = vec(b.ns_x, b.ns_y, b.ns_z);
+  s.ng = vec(b.ng_x, b.ng_y, b.ng_z);
+  s.kd = vec(b.kd_r, b.kd_g, b.kd_b);
+  s.any_phong = b.any_phong;
+  s.any_ggx = b.any_ggx;
+  s.any_measured = b.any_measured;
+  s.any_lobe = b.any_phong || b.any_ggx || b.any_measured;
+  s.tables = b.measured.data();
+  s.site = s.table = site;
+  if (!s.any_lobe) {
+    const VF zero = hn::Zero(DF());
+    s.wo = s.mirror = s.ks = {zero, zero, zero};
+    s.shape = s.lobe_scale = s.specular_probability = zero;
+    s.alpha2 = s.view_cosine = s.view_masking = zero;
+    s.is_ggx = hn::Gt(zero, zero);
+    return s;
+  }
+  s.wo = vec(b.wo_x, b.wo_y, b.wo_z);
+  s.mirror = vec(b.mirror_x, b.mirror_y, b.mirror_z);
+  s.ks = vec(b.ks_r, b.ks_g, b.ks_b);
+  s.shape = read(b.shape);
+  s.lobe_scale = read(b.lobe_scale);
+  s.specular_probability = read(b.specular_probability);
+  s.alpha2 = read(b.alpha2);
+  s.view_cosine = read(b.view_cosine);
+  s.view_masking = read(b.view_masking);
+  s.is_ggx = hn::Gt(read(b.is_ggx), hn::Zero(DF()));
+  return s;
+}
+
+/// Sets what a ggx lobe needs from ns, wo and shape.
+HWY_INLINE void SetViewTerms(SurfaceLanes& s) {
+  const DF d;
+  const VF half = hn::Set(d, 0.5f);
+  s.alpha2 = hn::Mul(s.shape, s.shape);
+  s.view_cosine = hn::Max(Dot(s.ns, s.wo), hn::Set(d, kMinCosView));
+  const VF c2 = hn::Mul(s.view_cosine, s.view_cosine);
+  const VF root = hn::Sqrt(hn::Add(s.alpha2, hn::NegMulAdd(s.alpha2, c2, c2)));
+  s.view_masking = hn::MulAdd(half, hn::Div(root, s.view_cosine), half);
 }
 
 /// One site for all lanes.
@@ -98,15 +126,6 @@ HWY_INLINE VF CosinePower(const Vec3Lanes& a, const Vec3Lanes& b, VF s) {
   return hn::IfThenElseZero(positive, ExpLanes(exponent));
 }
 
-/// Smith's Lambda of GGX for cosine c > 0 to the normal [Heitz 2014].
-HWY_INLINE VF SmithLambda(VF c, VF alpha2) {
-  const DF d;
-  const VF one = hn::Set(d, 1.0f);
-  const VF c2 = hn::Mul(c, c);
-  const VF tan2 = hn::Div(hn::Max(hn::Sub(one, c2), hn::Zero(d)), c2);
-  return hn::Mul(hn::Sub(hn::Sqrt(hn::MulAdd(alpha2, tan2, one)), one), hn::Set(d, 0.5f));
-}
-
 /// Evaluates BRDF and density of directions wi.
 HWY_INLINE BsdfLanes EvaluateBsdf(const SurfaceLanes& s, const Vec3Lanes& wi) {
   const DF d;
@@ -130,25 +149,27 @@ HWY_INLINE BsdfLanes EvaluateBsdf(const SurfaceLanes& s, const Vec3Lanes& wi) {
     out.lobe_pdf = hn::Mul(hn::Max(hn::Sub(s.lobe_scale, hn::Set(d, 0.5f * kInvPi)), zero), power);
   }
   if (s.any_ggx) {
-    const VF n_wo = hn::Max(Dot(s.ns, s.wo), hn::Set(d, 1e-4f));
-    const Vec3Lanes sum = Add(wi, s.wo);
-    const Vec3Lanes h = Scale(sum, InverseSqrt(hn::Max(Dot(sum, sum), hn::Set(d, 1e-20f))));
+    // Everything from the half vector times its length l: l^2 = |wi + wo|^2, wo . h = l / 2.
+    const Vec3Lanes h = Add(wi, s.wo);
+    const VF l2 = hn::Max(Dot(h, h), hn::Set(d, 1e-20f));
     const VF n_h = Dot(s.ns, h);
-    const VF o_h = hn::Clamp(Dot(s.wo, h), zero, one);
-    const VF alpha2 = hn::Mul(s.shape, s.shape);
+    const VF o_h = hn::Clamp(hn::Mul(Dot(s.wo, h), hn::Div(one, hn::Sqrt(l2))), zero, one);
     // D [Walter et al. 2007], with the sine from the cross product so that sharp lobes keep their digits.
     const VF cx = hn::MulSub(s.ns.y, h.z, hn::Mul(s.ns.z, h.y));
     const VF cy = hn::MulSub(s.ns.z, h.x, hn::Mul(s.ns.x, h.z));
     const VF cz = hn::MulSub(s.ns.x, h.y, hn::Mul(s.ns.y, h.x));
     const VF sine2 = Dot({cx, cy, cz}, {cx, cy, cz});
-    const VF t = hn::MulAdd(hn::Mul(n_h, n_h), alpha2, sine2);
-    const VF d_term = hn::IfThenElseZero(hn::Gt(n_h, zero),
-                                         hn::Div(hn::Mul(alpha2, hn::Set(d, kInvPi)), hn::Max(hn::Mul(t, t), hn::Set(d, 1e-30f))));
-    const VF lambda_o = SmithLambda(hn::Min(n_wo, one), alpha2);
-    const VF lambda_i = SmithLambda(hn::Clamp(n_wi, hn::Set(d, 1e-6f), one), alpha2);
-    const VF quarter = hn::Div(hn::Mul(d_term, hn::Set(d, 0.25f)), n_wo);
+    const VF t = hn::MulAdd(hn::Mul(n_h, n_h), s.alpha2, sine2);
+    const VF t2 = hn::Max(hn::Mul(t, t), hn::Set(d, 1e-30f));
+    // Smith's masking [Heitz 2014]: (1 + Lambda_o + Lambda_i) n.wi without a division.
+    const VF c = hn::Clamp(n_wi, hn::Set(d, 1e-6f), one);
+    const VF slope = hn::Sqrt(hn::MulAdd(hn::NegMulAdd(c, c, one), s.alpha2, hn::Mul(c, c)));
+    const VF masking = hn::MulAdd(c, hn::Sub(s.view_masking, hn::Set(d, 0.5f)), hn::Mul(hn::Set(d, 0.5f), slope));
     // f / F = D G2 / (4 n.wi n.wo); the density is D G1(wo) / (4 n.wo).
-    const VF dv = hn::Div(quarter, hn::Mul(hn::Add(hn::Add(one, lambda_o), lambda_i), hn::Max(n_wi, hn::Set(d, 1e-6f))));
+    const VF numerator = hn::IfThenElseZero(
+        hn::Gt(n_h, zero), hn::Mul(hn::Mul(l2, l2), hn::Mul(s.alpha2, hn::Set(d, 0.25f * kInvPi))));
+    const VF quarter = hn::Div(numerator, hn::Mul(t2, s.view_cosine));
+    const VF dv = hn::Div(quarter, masking);
     const VF m = hn::Sub(one, o_h);
     const VF m2 = hn::Mul(m, m);
     const VF schlick = hn::Mul(hn::Mul(m2, m2), m);
@@ -156,7 +177,7 @@ HWY_INLINE BsdfLanes EvaluateBsdf(const SurfaceLanes& s, const Vec3Lanes& wi) {
     out.diffuse = hn::IfThenElse(s.is_ggx, hn::Mul(out.diffuse, keep), out.diffuse);
     out.lobe = hn::IfThenElse(s.is_ggx, hn::Mul(dv, keep), out.lobe);
     out.white = hn::IfThenElseZero(s.is_ggx, hn::Mul(hn::Mul(dv, schlick), s.lobe_scale));
-    out.lobe_pdf = hn::IfThenElse(s.is_ggx, hn::Div(quarter, hn::Add(one, lambda_o)), out.lobe_pdf);
+    out.lobe_pdf = hn::IfThenElse(s.is_ggx, hn::Div(quarter, s.view_masking), out.lobe_pdf);
   }
   out.measured = {zero, zero, zero};
   if (s.any_measured) out.measured = EvaluateMeasured(s.tables, s.table, s.ns, wi, s.wo);

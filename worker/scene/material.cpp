@@ -11,8 +11,6 @@ namespace {
 
 constexpr float kTwoPi = 2 * kPi;
 
-/// Least n.wo that the ggx lobe is evaluated with.
-constexpr float kMinCosView = 1e-4f;
 
 /// cos^s of the angle between unit a and b, 0 past a right angle. 1 - cos = |a - b|^2 / 2 keeps its
 /// digits where the cosine has lost them, so s = 100000 is as exact as s = 1.
@@ -164,6 +162,10 @@ Material make_measured_material(std::shared_ptr<const MeasuredBrdf> table) {
           .shape = lobe.alpha,
           .specular_probability = lobe.share,
           .table = std::move(table)};
+}
+
+float ggx_view_masking(float cos_view, float alpha) {
+  return 0.5f + 0.5f * smith_root(cos_view, alpha) / cos_view;
 }
 
 Vec3 clamped_view(const ShadingPoint& point) {

@@ -45,7 +45,13 @@ struct ShadingPoint {
 /// True when wi is above the shading and the geometric horizon: elsewhere every target is 0.
 inline bool above_horizon(const ShadingPoint& p, const Vec3& wi) { return dot(p.ns, wi) > 0 && dot(p.ng, wi) > 0; }
 
-/// wo, raised until ns.wo >= 1e-4: the view direction of the ggx lobe. Interpolated normals may face away from the
+/// Least cosine between the shading normal and the view direction of a ggx lobe.
+inline constexpr float kMinCosView = 1e-4f;
+
+/// 1 + Lambda of Smith's masking for a ggx lobe seen at cosine cos_view > 0 [Heitz 2014].
+float ggx_view_masking(float cos_view, float alpha);
+
+/// wo, raised until ns.wo >= kMinCosView: the view direction of the ggx lobe. Interpolated normals may face away from the
 /// viewer, where visible normals have no density.
 Vec3 clamped_view(const ShadingPoint& point);
 

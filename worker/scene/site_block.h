@@ -23,6 +23,9 @@ struct alignas(64) SiteBlock {
   Array shape{};                             ///< phong: exponent; ggx: alpha
   Array lobe_scale{};                        ///< phong: (s + 2) / (2 pi); ggx: 1; measured: 0
   Array specular_probability{};
+  Array alpha2{};        ///< ggx: alpha^2
+  Array view_cosine{};   ///< ggx: n.wo, at least 1e-4
+  Array view_masking{};  ///< ggx: 1 + Lambda(wo) [Heitz 2014]
   Array is_ggx{};  ///< 1 for ggx, and for measured, which is sampled by such a lobe; else 0
   std::array<const float*, kMaxSites> measured{};  ///< texels of a MeasuredBrdf, or null
 

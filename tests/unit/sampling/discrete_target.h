@@ -41,7 +41,7 @@ struct DiscreteTarget {
   void Prefetch(std::uint32_t /*bits*/) const {}
   /// Blocks of neighbours from a random start on the ring of points.
   static std::size_t BlockStart(std::uint32_t bits) { return bits % kPoints; }
-  LogTargets Propose(std::size_t entry, VF /*site_fraction*/, PointLanes& point) const {
+  LogTargets Propose(std::size_t entry, VF /*site_fraction*/, bool /*want_before*/, PointLanes& point) const {
     point.code =
         hn::And(hn::Iota(DU(), static_cast<std::uint32_t>(entry)), hn::Set(DU(), kPoints - 1));
     return Evaluate(point);

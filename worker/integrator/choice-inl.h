@@ -1,0 +1,179 @@
+// Sampling-importance-resampling in SIMD: M candidates are weighed, N are kept. Included once per
+// Highway target.
+#if defined(BATON_WORKER_INTEGRATOR_CHOICE_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef BATON_WORKER_INTEGRATOR_CHOICE_INL_H_
+#undef BATON_WORKER_INTEGRATOR_CHOICE_INL_H_
+#else
+#define BATON_WORKER_INTEGRATOR_CHOICE_INL_H_
+#endif
+
+#include <hwy/highway.h>
+
+#include <cmath>
+
+#include "worker/integrator/candidates-inl.h"
+#include "worker/sampling/systematic-inl.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace baton::HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+/// Weighs the candidates from the pool of a pixel that sees diffuse surfaces alone: cosine times
+/// reflected light over density, and nothing else.
+HWY_INLINE void WeighDiffuse(const SiteBlock& sites, const LightPool& pool,
+                             const kernels::CandidateCounts& counts,
+                             const Philox4x32::Counter& random, RunningSums& sums) {
+  const DF d;
+  const LightRun run(pool, counts.from_light, random[0]);
+  const SiteDeal deal = LightSites(sites, counts, random);
+  const VF scale = hn::Set(d, kInvPi / 3.0f * static_cast<float>(sites.num_hits) /
+                                  static_cast<float>(sites.num_sites * counts.from_light));
+  deal.ForEach(sites, [&](const SurfaceLanes& s, std::size_t i) HWY_ATTR {
+    const LightLanes light = run.Load(i);
+    const VF n_w = Dot(s.ns, light.direction);
+    const VF above = hn::Min(n_w, Dot(s.ng, light.direction));  // its sign alone counts
+    const VF reflected = Dot(s.kd, {light.now.r, light.now.g, light.now.b});
+    const VF target = hn::Mul(hn::Mul(n_w, scale), reflected);
+    const std::size_t left = static_cast<std::size_t>(counts.from_light) - i;
+    MF live = hn::And(hn::Gt(above, hn::Zero(d)), hn::Gt(light.now.density, hn::Zero(d)));
+    if (left < hn::Lanes(d)) live = hn::And(live, hn::FirstN(d, left));
+    sums.Add(hn::IfThenElseZero(live, hn::Div(target, light.now.density)));
+  });
+}
+
+/// Candidates picks of the pixel, the first `padded_light` numbers being those of the pool.
+class ChosenCandidates {
+ public:
+  ChosenCandidates(const SiteBlock& sites, const LightPool& pool,
+                   const kernels::CandidateCounts& counts, const Philox4x32::Counter& random,
+                   std::int32_t padded_light, const kernels::CandidateSet& from_bsdf)
+      : sites_(sites),
+        run_(pool, counts.from_light, random[0]),
+        deal_(LightSites(sites, counts, random)),
+        padded_light_(padded_light),
+        from_bsdf_(from_bsdf) {}
+
+  /// Everything about the candidates; weight is left undefined.
+  HWY_INLINE CandidateLanes Evaluate(VI pick) const {
+    const DI di;
+    const auto from_bsdf = hn::Gt(pick, hn::Set(di, padded_light_ - 1));
+    if (deal_.count == 0) return Stored(pick);
+    CandidateLanes out = FromPool(hn::IfThenElseZero(hn::Not(from_bsdf), pick));
+    if (hn::AllFalse(di, from_bsdf)) return out;
+    const DF d;
+    const CandidateLanes stored =
+        Stored(hn::IfThenElseZero(from_bsdf, hn::Sub(pick, hn::Set(di, padded_light_))));
+    const MF second = hn::RebindMask(d, from_bsdf);
+    out.code = hn::IfThenElse(hn::RebindMask(DU(), from_bsdf), stored.code, out.code);
+    out.site = hn::IfThenElse(from_bsdf, stored.site, out.site);
+    out.reflected = Select(second, stored.reflected, out.reflected);
+    return out;
+  }
+
+ private:
+  HWY_INLINE CandidateLanes FromPool(VI pick) const {
+    const DF d;
+    const DI di;
+    constexpr auto kFields = static_cast<std::int32_t>(sizeof(LightPool::Block) / sizeof(float));
+    static_assert(LightPool::kBlock == 8);
+    const LightPool::Block& first = run_.pool.blocks[0];
+    const VI entry = hn::And(hn::Add(pick, hn::Set(di, static_cast<std::int32_t>(run_.start))),
+                             hn::Set(di, static_cast<std::int32_t>(LightPool::kSize) - 1));
+    const VI at = hn::Add(hn::Mul(hn::ShiftRight<3>(entry), hn::Set(di, kFields)),
+                          hn::And(entry, hn::Set(di, 7)));
+    const auto read = [&](const float* field) HWY_ATTR { return hn::GatherIndex(d, field, at); };
+    CandidateLanes out;
+    out.code = hn::BitCast(
+        DU(), hn::GatherIndex(di, reinterpret_cast<const std::int32_t*>(first.code), at));
+    out.site = SitesOf(pick);
+    const SurfaceLanes surface = LoadSurfaces(sites_, out.site);
+    const BsdfLanes f = EvaluateBsdf(surface, {read(first.x), read(first.y), read(first.z)});
+    out.reflected = ReflectedRadiance(surface, f, read(first.r), read(first.g), read(first.b));
+    return out;
+  }
+
+  HWY_INLINE CandidateLanes Stored(VI index) const {
+    const DF d;
+    const DI di;
+    CandidateLanes out;
+    out.code = hn::BitCast(
+        DU(), hn::GatherIndex(di, reinterpret_cast<const std::int32_t*>(from_bsdf_.code), index));
+    out.site = hn::GatherIndex(di, from_bsdf_.site, index);
+    out.reflected = {hn::GatherIndex(d, from_bsdf_.r, index),
+                     hn::GatherIndex(d, from_bsdf_.g, index),
+                     hn::GatherIndex(d, from_bsdf_.b, index)};
+    return out;
+  }
+
+  /// The sites that the deal gave them.
+  HWY_INLINE VI SitesOf(VI pick) const {
+    const DI di;
+    if (deal_.num_sites == 1) return hn::Set(di, deal_.sites[0]);
+    HWY_ALIGN std::int32_t lane[hn::MaxLanes(DI())];
+    hn::Store(pick, di, lane);
+    for (std::int32_t& l : lane) l = deal_.SiteOf(static_cast<std::size_t>(l));
+    return hn::Load(di, lane);
+  }
+
+  const SiteBlock& sites_;
+  LightRun run_;
+  SiteDeal deal_;
+  std::int32_t padded_light_;
+  const kernels::CandidateSet& from_bsdf_;
+};
+
+inline float ChooseCandidates(const SiteBlock& sites, const EnvironmentView& environment,
+                              const LightPool& pool, const kernels::CandidateCounts& counts,
+                              const Rng& rng, float u, kernels::ChoiceScratch& scratch,
+                              const kernels::SampleSpan& out) {
+  const DF d;
+  const DI di;
+  const DU du;
+  const Philox4x32::Counter random = rng.bits(0, 0);
+
+  // Weigh the candidates.
+  RunningSums sums(scratch.running_sums);
+  const bool diffuse = !(sites.any_phong || sites.any_ggx || sites.any_measured);
+  if (diffuse && counts.from_bsdf == 0) {
+    WeighDiffuse(sites, pool, counts, random, sums);
+  } else {
+    LightCandidates(sites, pool, counts, random,
+                    [&](const CandidateLanes& c, std::size_t) HWY_ATTR { sums.Add(c.weight); });
+    BsdfCandidates(sites, environment, counts, random,
+                   [&](const CandidateLanes& c, std::size_t i) HWY_ATTR {
+                     StoreCandidates(c, i, scratch.from_bsdf);
+                     sums.Add(c.weight);
+                   });
+  }
+  const float total = sums.Finish();
+  if (!(total > 0 && std::isfinite(total))) return total;
+
+  // Keep N of them.
+  const auto padded_light = static_cast<std::int32_t>(
+      hwy::RoundUpTo(static_cast<std::size_t>(counts.from_light), hn::Lanes(d)));
+  const ChosenCandidates chosen(sites, pool, counts, random, padded_light, scratch.from_bsdf);
+  HWY_ALIGN std::int32_t picks[limits::kMaxParticles];
+  for (std::size_t j = 0; j < out.code.size(); j += hn::Lanes(d)) {
+    hn::Store(SystematicPicks(sums, total, u, j, out.code.size()), di, picks + j);
+  }
+  for (std::size_t j = 0; j < out.code.size(); j += hn::Lanes(d)) {
+    const CandidateLanes c = chosen.Evaluate(hn::Load(di, picks + j));
+    HWY_ALIGN std::uint32_t code[hn::MaxLanes(DU())];
+    HWY_ALIGN std::int32_t site[hn::MaxLanes(DI())];
+    hn::Store(c.code, du, code);
+    hn::Store(c.site, di, site);
+    const std::size_t left = std::min(hn::Lanes(d), out.code.size() - j);
+    for (std::size_t lane = 0; lane < left; ++lane) {
+      out.code[j + lane] = code[lane];
+      out.site[j + lane] = static_cast<std::uint8_t>(site[lane]);
+    }
+    StoreSome(c.reflected.x, out.r, j);
+    StoreSome(c.reflected.y, out.g, j);
+    StoreSome(c.reflected.z, out.b, j);
+  }
+  return total;
+}
+
+}  // namespace baton::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+#endif
