@@ -15,6 +15,8 @@ namespace baton {
 /// half 0 or 65535), where two codes (all four at the corners) mean one direction: there it is one
 /// of them, always the same.
 using OctDirection = std::uint32_t;
+/// The most by which encoding moves a direction, radians.
+inline constexpr double kOctahedralError = 6.7e-5;
 
 inline OctDirection encode_octahedral(const Vec3& w) {
   const float inv = 1.0f / (std::fabs(w.x) + std::fabs(w.y) + std::fabs(w.z));

@@ -5,6 +5,7 @@
 #include <limits>
 
 #include "common/base/check.h"
+#include "common/math/octahedral.h"
 
 namespace baton {
 namespace {
@@ -231,12 +232,18 @@ Vec3 EnvironmentMap::sample(const std::array<float, 2>& u) const {
   double below = block_cdf[block];
   while (below + texel[column].density <= x) below += texel[column++].density;
 
-  // The remainders place it in the cell; the margin keeps a direction rounded to float inside.
-  const double margin = std::min(0.25, std::max(width_, height_) * 0x1p-21);
+  // The remainders place it in the cell. The margins keep it there when it is rounded to float or
+  // to the lattice of carried directions: light that slips from a bright cell into a dim one would
+  // be divided by too small a density, and what slips the other way does not make up for it.
+  const double sin_row = std::sin(0.5 * (row_angle(row) + row_angle(row + 1)));
+  const double margin_down = std::min(0.5, kOctahedralError * height_ / kPiDouble);
+  const double margin_right =
+      std::min(0.5, kOctahedralError * width_ / (2 * kPiDouble * std::max(sin_row, 1e-9)));
   const double down =
       std::clamp((u[0] * row_cdf_.back() - row_cdf_[row]) / (row_cdf_[row + 1] - row_cdf_[row]),
-                 margin, 1 - margin);
-  const double right = std::clamp((x - below) / texel[column].density, margin, 1 - margin);
+                 margin_down, 1 - margin_down);
+  const double right =
+      std::clamp((x - below) / texel[column].density, margin_right, 1 - margin_right);
 
   // Place the direction uniformly in the cell's solid angle.
   const double top = row_angle(row);

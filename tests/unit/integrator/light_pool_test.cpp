@@ -52,6 +52,38 @@ TEST(LightPool, EntriesAgreeWithTheEnvironment) {
   }
 }
 
+/// Bright texels on dim ground, 1000 : 1, each with hard edges all around.
+Environment hard_edged_environment() {
+  constexpr int kWidth = 512, kHeight = 256;
+  RgbImage image{kWidth, kHeight, {}};
+  for (int i = 0; i < kWidth * kHeight; ++i) {
+    const float value = i % 7 == 0 ? 1000.0f : 1.0f;
+    image.rgb.insert(image.rgb.end(), {value, value, value});
+  }
+  return {std::make_shared<EnvironmentMap>(image, MapFilter::nearest, 1.0f, false), Mat3{}};
+}
+
+// Hypothesis: rounding to the lattice leaves the density true: the mean of radiance / density over a pool is the map's
+// power. Mean of 30 pools (seeds 1 to 30), z-test at |z| < 4; it sees a bias of 0.002 %. Without the margins of
+// EnvironmentMap::sample light slips out of the bright texels, and the mean is too high by 400 times that.
+TEST(LightPool, EstimatesThePowerOfHardEdgedMapsWithoutBias) {
+  const Environment environment = hard_edged_environment();
+  constexpr int kPools = 30;
+  double sum = 0, squares = 0;
+  for (int seed = 1; seed <= kPools; ++seed) {
+    double mean = 0;
+    for (const LightPool::Block& block : make_light_pool(environment, environment, seed, 1).blocks) {
+      for (std::size_t j = 0; j < LightPool::kBlock; ++j)
+        mean += double{block.r[j]} / block.density[j] / LightPool::kSize;
+    }
+    const double error = mean / environment.map->total_power() - 1;
+    sum += error / kPools;
+    squares += error * error / kPools;
+  }
+  const double interval = 4 * std::sqrt(std::max(squares - sum * sum, 0.0) / (kPools - 1)) + 2e-6;
+  EXPECT_NEAR(sum, 0, interval);
+}
+
 TEST(LightPool, IsAFunctionOfSeedAndFrame) {
   const Environment environment = gradient_environment();
   const auto first_code = [&](std::uint64_t seed, std::uint32_t frame) {
