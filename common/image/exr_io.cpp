@@ -59,7 +59,7 @@ std::optional<Imf::Compression> compression_of(const std::string& name) {
 
 /// Channels whose use needs all 32 bits.
 bool always_float(const std::string& channel) {
-  return channel == "depth" || channel == "lns" || channel == "variance" ||
+  return channel == "depth" || channel == "lns" || channel == "variance" || channel == "material" ||
          channel.starts_with("normal.");
 }
 

@@ -49,7 +49,7 @@ JobEstimate estimate_job(const JobSpec& job) {
   e.primary_rays_per_pixel = job.image.sites;
   e.shadow_rays_per_pixel = job.sampling.method == Method::reference
                                 ? std::int64_t{2} * job.sampling.reference_samples
-                                : job.sampling.num_particles;
+                                : most_particles(job.sampling);
 
   // Add up the planes: R, G, B, A and the AOVs.
   std::int64_t wide_channels = 0;
@@ -57,7 +57,8 @@ JobEstimate estimate_job(const JobSpec& job) {
   for (const Aov aov : job.output.aovs) {
     e.film_channels += num_channels(aov);
     const bool wide =
-        aov == Aov::depth || aov == Aov::lns || aov == Aov::variance || aov == Aov::normal;
+        aov == Aov::depth || aov == Aov::lns || aov == Aov::variance || aov == Aov::material ||
+        aov == Aov::normal;
     wide_channels += wide ? num_channels(aov) : 0;
   }
   e.film_bytes = pixels * e.film_channels * 4;

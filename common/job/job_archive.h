@@ -135,10 +135,20 @@ class JobArchive {
   template <class T, class F>
   bool named(Key key, std::map<std::string, T>& items, int max_count, F body,
              ObjectForm form = {}) {
+    return named_from(
+        key, items, T(), max_count, [&](const std::string&, T& item) { body(item); }, form);
+  }
+
+  /// The same where new items start as `start`, and with the name: body(name, item).
+  template <class T, class F>
+  bool named_from(Key key, std::map<std::string, T>& items, const T& start, int max_count, F body,
+                  ObjectForm form = {}) {
     std::vector<std::string> names;
     for (const auto& item : items) names.push_back(item.first);
     return named_of(
-        key, names, max_count, [&](const std::string& name) { body(items[name]); }, form);
+        key, names, max_count,
+        [&](const std::string& name) { body(name, items.try_emplace(name, start).first->second); },
+        form);
   }
 
  protected:

@@ -8,6 +8,8 @@
 #include "common/base/limits.h"
 #include "common/job/estimate.h"
 #include "common/job/frame_range.h"
+#include "common/job/sequence.h"
+#include "common/job/suggest.h"
 
 namespace baton {
 namespace {
@@ -57,8 +59,9 @@ void check_halves(JobArchive& a, const SamplingSpec& sampling) {
   }
 }
 
-void fields(JobArchive& a, SamplingSpec& sampling) {
-  a.choice("method", sampling.method, kMethods);
+/// N, M and the share of the BRDF; Sampling is SamplingSpec or MaterialSampling.
+template <class Sampling>
+void count_fields(JobArchive& a, Sampling& sampling) {
   a.integer("numParticles", sampling.num_particles, 1, limits::kMaxParticles);
   a.integer("numCandidates", sampling.num_candidates, 1, limits::kMaxCandidates);
   if (sampling.num_candidates < sampling.num_particles) {
@@ -66,7 +69,42 @@ void fields(JobArchive& a, SamplingSpec& sampling) {
             std::to_string(sampling.num_candidates));
   }
   a.number("brdfFraction", sampling.brdf_fraction, kUnitRange);
+}
+
+/// Settings of single materials; what they leave out is as in the rest of the picture.
+void material_fields(JobArchive& a, SamplingSpec& sampling, const SceneSpec& scene) {
+  const auto visit = [&](const std::string& name, MaterialSampling& material) {
+    a.choice("method", material.method, kStartMethods);
+    count_fields(a, material);
+    if (scene.materials.contains(name)) return;
+    std::vector<std::string> names;
+    for (const auto& entry : scene.materials) names.push_back(entry.first);
+    a.fault("", fmt::format("no such material in scene.materials{}", suggestion(name, names)));
+  };
+  const std::optional<StartMethod> method = fresh_method(sampling.method);
+  const MaterialSampling rest{method.value_or(StartMethod::bidirectional), sampling.num_particles,
+                              sampling.num_candidates, sampling.brdf_fraction};
+  a.named_from("byMaterial", sampling.by_material, rest, limits::kMaxMaterials, visit,
+               {.present = false});
+  if (!sampling.by_material.empty() && !method) {
+    a.fault("byMaterial", "none unless sampling.method is environment, brdf, mis or bidirectional",
+            fmt::format("\"{}\"", kMethods[static_cast<std::size_t>(sampling.method)]));
+  }
+  if (!sampling.by_material.empty() && sampling.mis_compensation)
+    a.fault("misCompensation", "false, as sampling.byMaterial is given", "true");
+}
+
+void fields(JobArchive& a, SamplingSpec& sampling, const SceneSpec& scene) {
+  a.choice("method", sampling.method, kMethods);
+  count_fields(a, sampling);
   a.boolean("misCompensation", sampling.mis_compensation);
+  if (sampling.mis_compensation && sampling.method != Method::mis &&
+      sampling.method != Method::automatic) {
+    a.fault("misCompensation",
+            "false unless sampling.method is mis or auto, as what is dim is then left to the "
+            "BRDF's samples",
+            "true");
+  }
   a.integer("numDistributions", sampling.num_distributions, 1, limits::kMaxDistributions);
   a.integer("numMoves", sampling.num_moves, 1, limits::kMaxMoves);
   a.choice("lnsUpdate", sampling.lns_update, kLnsUpdates);
@@ -96,6 +134,7 @@ void fields(JobArchive& a, SamplingSpec& sampling) {
   a.boolean("visibilityMemory", sampling.visibility_memory);
   check_halves(a, sampling);
   a.integer("referenceSamples", sampling.reference_samples, 2, limits::kMaxReferenceSamples);
+  material_fields(a, sampling, scene);
 }
 
 void fields(JobArchive& a, VisibilitySpec& visibility, const SamplingSpec& sampling) {
@@ -113,6 +152,9 @@ void fields(JobArchive& a, VisibilitySpec& visibility, const SamplingSpec& sampl
   }
   if (sampling.method == Method::pool) {
     a.fault("correlated", "false, as the rays of sampling.method pool are not its samples", "true");
+  }
+  if (!sampling.by_material.empty()) {
+    a.fault("correlated", "false, as sampling.byMaterial is given", "true");
   }
   if (visibility.mask != MaskPolicy::same_samples && sampling.num_particles % 2 != 0) {
     a.fault("mask", "same-samples, or an even sampling.numParticles to be halved",
@@ -175,7 +217,7 @@ void fields(JobArchive& a, JobSpec& job) {
   a.object(required("scene"), [&] { fields(a, job.scene); }, {.file = true});
   a.object(required("environment"), [&] { fields(a, job.environment, job.frames); });
   a.object("motion", [&] { fields(a, job.motion); });
-  a.object("sampling", [&] { fields(a, job.sampling); });
+  a.object("sampling", [&] { fields(a, job.sampling, job.scene); });
   a.object("visibility", [&] { fields(a, job.visibility, job.sampling); });
   a.object("output", [&] { fields(a, job.output, job); });
   a.object("state", [&] { fields(a, job.state); });

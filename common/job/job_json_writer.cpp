@@ -70,7 +70,8 @@ bool JobJsonWriter::list_of(Key key, std::size_t count, int, const IndexBody&,
 }
 
 bool JobJsonWriter::named_of(Key key, const std::vector<std::string>& names, int,
-                             const NameBody& body, ObjectForm) {
+                             const NameBody& body, ObjectForm form) {
+  if (names.empty() && !form.present) return false;
   ordered_json objects = ordered_json::object();
   for (const std::string& name : names) objects[name] = nested([&] { body(name); });
   root_[key.name] = std::move(objects);

@@ -179,8 +179,19 @@ enum class ResamplingScheme : std::uint8_t { systematic, stratified, multinomial
 /// How `sequential` carries the normalising constant: by the ratio of the weights, or by path sampling with a left, right or
 /// trapezoidal sum over the intermediate distributions.
 enum class LnsUpdate : std::uint8_t { ratio, path_left, path_right, path_trapezoid };
-/// The sampler that starts a pixel of `sequential`.
+/// The methods that draw all samples of a frame anew: `sequential` starts a pixel with one of them, a material may have its own.
 enum class StartMethod : std::uint8_t { environment, brdf, mis, bidirectional };
+
+/// How the pixels of one material are sampled, where that differs from the rest of the picture; members as in
+/// SamplingSpec. Samples are drawn anew in each frame, so nothing is handed over between settings.
+struct MaterialSampling {
+  StartMethod method = StartMethod::bidirectional;
+  int num_particles = 16;
+  int num_candidates = 128;
+  float brdf_fraction = 0.25f;
+
+  bool operator==(const MaterialSampling&) const = default;
+};
 
 struct SamplingSpec {
   Method method = Method::sequential;
@@ -207,6 +218,9 @@ struct SamplingSpec {
   float pool_gain = 2;             ///< pool: c of the balance of carried and fresh samples, [0, 100]
   bool visibility_memory = true;   ///< pool: what earlier rays found steers the new ones
   int reference_samples = 1024;    ///< paired samples per pixel of `reference`, [2, 2^24]
+  /// By name of a material of the scene: replaces method, N, M and brdf_fraction in the pixels whose first site with a
+  /// surface sees it. Not with methods that carry samples, nor with a second pass.
+  std::map<std::string, MaterialSampling> by_material{};
 
   bool operator==(const SamplingSpec&) const = default;
 };
@@ -233,7 +247,7 @@ struct VisibilitySpec {
 enum class Background : std::uint8_t { environment, transparent };
 enum class Aov : std::uint8_t {
   lns, visibility, ess, acceptance, source, normal, depth, variance, mask, acceptance_local, acceptance_independent,
-  resampled
+  resampled, material
 };
 enum class PixelType : std::uint8_t { half_float, full_float };
 

@@ -95,8 +95,34 @@ bool carries_state(const JobSpec& job) {
   return (method == Method::sequential || method == Method::pool) && job.state.carry;
 }
 
+std::optional<StartMethod> fresh_method(Method method) {
+  switch (method) {
+    case Method::environment:
+      return StartMethod::environment;
+    case Method::brdf:
+      return StartMethod::brdf;
+    case Method::mis:
+      return StartMethod::mis;
+    case Method::bidirectional:
+      return StartMethod::bidirectional;
+    case Method::reference:
+    case Method::sequential:
+    case Method::pool:
+    case Method::automatic:
+      return std::nullopt;
+  }
+  return std::nullopt;
+}
+
 std::int32_t num_carried_particles(const SamplingSpec& sampling) {
-  return sampling.method == Method::pool ? sampling.num_carried : sampling.num_particles;
+  return sampling.method == Method::pool ? sampling.num_carried : most_particles(sampling);
+}
+
+std::int32_t most_particles(const SamplingSpec& sampling) {
+  int most = sampling.num_particles;
+  for (const auto& [name, material] : sampling.by_material)
+    most = std::max(most, material.num_particles);
+  return most;
 }
 
 std::int32_t num_populations(const JobSpec& job) {

@@ -2,6 +2,7 @@
 
 #include <compare>
 #include <cstdint>
+#include <optional>
 #include <vector>
 
 #include "common/job/job_spec.h"
@@ -70,6 +71,10 @@ std::int32_t num_runs(const JobSpec& job);
 TileRun tile_run(const JobSpec& job, std::int32_t tile, std::int32_t run);
 /// True when the method hands samples from frame to frame: `sequential` and `pool` with state.carry.
 bool carries_state(const JobSpec& job);
+/// The method among those that draw all samples anew; nullopt for those that carry, for brute force and for auto.
+std::optional<StartMethod> fresh_method(Method method);
+/// Shadow rays of a pixel: the most of any material.
+std::int32_t most_particles(const SamplingSpec& sampling);
 /// Particles per pixel in the job's states.
 std::int32_t num_carried_particles(const SamplingSpec& sampling);
 

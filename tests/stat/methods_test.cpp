@@ -60,6 +60,12 @@ TEST(Methods, BidirectionalWithFourSitesAgrees) {
   EXPECT_LT(v.worst_pixel, kPixelLimit);
   EXPECT_LT(v.image, kImageLimit);
 }
+TEST(Methods, SettingsByMaterialAgreeWithBruteForce) {
+  JobSpec job = still_job(Method::mis);
+  job.sampling.by_material = {{"ground", {.method = StartMethod::environment, .num_particles = 8}},
+                              {"glossy", {.num_particles = 24, .num_candidates = 64}}};
+  expect_agreement(job, kRuns, 0.03);
+}
 TEST(Methods, NearestFilterAgreesWithBruteForce) {
   JobSpec job = still_job(Method::bidirectional);
   job.environment.filter = MapFilter::nearest;

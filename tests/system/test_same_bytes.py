@@ -64,6 +64,23 @@ def correlated_visibility(programs, folder):
         check_equal(got, expected, f"pixels of {name}")
 
 
+def settings_by_material(programs, folder):
+    """Methods and numbers of samples that differ by material."""
+    sampling = {"method": "mis", "numParticles": 8, "byMaterial": {
+        "ground": {"method": "environment", "numParticles": 4},
+        "glossy": {"method": "bidirectional", "numParticles": 12, "numCandidates": 64}}}
+    expected = None
+    for name, workers, threads, tile_size in [("whole-image", 1, 2, 160), ("small-tiles", 2, 1, 16)]:
+        place = folder / name
+        job = make_job(place, frames="1-2", image={"tileSize": tile_size, "sites": 4})
+        job["sampling"] = sampling
+        programs.render(write_job(place / "job.json", job), place / "work", workers, threads)
+        got = programs.pixels(place / "frames")
+        check_equal(len(got), 2, f"frames of {name}")
+        expected = expected or got
+        check_equal(got, expected, f"pixels of {name}")
+
+
 def pool(programs, folder):
     """The sampler with a memory, still and with a camera that moves."""
     keys = [{"frame": 1, "position": [0, 1.2, 5], "lookAt": [0, 0.6, 0]},

@@ -71,4 +71,12 @@ std::unique_ptr<const PixelSampler> make_pixel_sampler(const SamplingSpec& spec)
   return nullptr;
 }
 
+std::unique_ptr<const PixelSampler> make_material_sampler(const MaterialSampling& material) {
+  SamplingSpec spec;
+  spec.num_particles = material.num_particles;
+  spec.num_candidates = material.num_candidates;
+  spec.brdf_fraction = material.brdf_fraction;
+  return make_fresh_sampler(spec, material.method);
+}
+
 }  // namespace baton

@@ -112,5 +112,7 @@ class PixelSampler {
 /// The sampler of a job; null for Method::reference, which is no sampler of this kind
 /// (reference.h); Method::automatic is in no job that reaches a worker.
 std::unique_ptr<const PixelSampler> make_pixel_sampler(const SamplingSpec& spec);
+/// The sampler of one material that has a setting of its own.
+std::unique_ptr<const PixelSampler> make_material_sampler(const MaterialSampling& material);
 
 }  // namespace baton

@@ -73,7 +73,7 @@ void ExtraSampler::draw(std::int32_t x, std::int32_t y, std::size_t fold,
     const RngKey key{.job_seed = stream_seed(work_.context.job.seed, stream),
                      .frame = static_cast<std::uint32_t>(work_.frame.number),
                      .pixel = static_cast<std::uint32_t>(y * work_.context.job.image.width + x)};
-    sample_populations(*work_.context.sampler,
+    sample_populations(*work_.context.sampler, static_cast<std::size_t>(drawn_.num_particles),
                        {sites_, work_.light, now_, before_, key, work_.frame.index, false}, 0,
                        *scratch_, drawn_, colors);
     cast_samples({.direction = drawn_.direction,

@@ -17,6 +17,7 @@ std::vector<std::string> channel_names(Aov aov) {
     case Aov::acceptance_local: return {"acceptance.local"};
     case Aov::acceptance_independent: return {"acceptance.independent"};
     case Aov::resampled: return {"resampled"};
+    case Aov::material: return {"material"};
   }
   return {};
 }
@@ -67,6 +68,7 @@ void FilmWriter::write(std::size_t index, const PixelResult& pixel) {
       case Aov::acceptance_local: put(pixel.acceptance_local); break;
       case Aov::acceptance_independent: put(pixel.acceptance_independent); break;
       case Aov::resampled: put(pixel.resampled ? 1.0f : 0.0f); break;
+      case Aov::material: put(static_cast<float>(pixel.material)); break;
     }
   }
 }

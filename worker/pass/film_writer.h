@@ -23,6 +23,7 @@ struct PixelResult {
   Vec3 normal;            ///< mean shading normal of the sites that see a surface
   float depth = 0;        ///< mean distance of the sites that see a surface
   float mask = 0.5f;      ///< 1 all rays free, 0 some failed, 0.5 background [CV Fig. 2]
+  std::uint32_t material = 0;  ///< of the first site that sees a surface: index in the scene + 1; 0: none
   float variance = 0;     ///< estimated squared error of the mean over RGB; 0 where the method has no estimate
 };
 

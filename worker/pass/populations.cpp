@@ -21,11 +21,13 @@ std::uint64_t stream_seed(std::uint64_t job_seed, std::uint32_t stream) {
   return std::uint64_t{bits[1]} << 32 | bits[0];
 }
 
-PixelDiagnostics sample_populations(const PixelSampler& sampler, const PixelInput& input,
-                                    std::size_t index, SamplerScratch& scratch, SampleState& state,
+PixelDiagnostics sample_populations(const PixelSampler& sampler, std::size_t num_particles,
+                                    const PixelInput& input, std::size_t index,
+                                    SamplerScratch& scratch, SampleState& state,
                                     SampleColors& colors) {
   const auto populations = static_cast<std::size_t>(state.num_populations);
-  const std::size_t n = static_cast<std::size_t>(state.num_particles) / populations;
+  const std::size_t stride = static_cast<std::size_t>(state.num_particles) / populations;
+  const std::size_t n = num_particles / populations;
   PixelDiagnostics sum;
   PixelInput population_input = input;
   for (std::size_t k = 0; k < populations; ++k) {
@@ -36,8 +38,9 @@ PixelDiagnostics sample_populations(const PixelSampler& sampler, const PixelInpu
     }
     const PixelDiagnostics did = sampler.sample(
         population_input, scratch,
-        {std::span(state.direction).subspan(row * n, n), std::span(state.site).subspan(row * n, n),
-         std::span(state.weight).subspan(row * n, n), std::span(colors.r).subspan(k * n, n),
+        {std::span(state.direction).subspan(row * stride, n),
+         std::span(state.site).subspan(row * stride, n),
+         std::span(state.weight).subspan(row * stride, n), std::span(colors.r).subspan(k * n, n),
          std::span(colors.g).subspan(k * n, n), std::span(colors.b).subspan(k * n, n),
          state.lns[row], state.lns_fresh[row], state.source[row]});
     sum.ess += did.ess;

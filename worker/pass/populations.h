@@ -21,9 +21,11 @@ struct SampleColors {
 };
 
 /// Runs the sampler once for each population of pixel `index` of the state; they share nothing but
-/// the frame's light pool. The answer counts all of them; its ess is the sum.
-PixelDiagnostics sample_populations(const PixelSampler& sampler, const PixelInput& input,
-                                    std::size_t index, SamplerScratch& scratch, SampleState& state,
+/// the frame's light pool. num_particles: of all populations; the rest of the pixel's row in the
+/// state is left alone. The answer counts all of them; its ess is the sum.
+PixelDiagnostics sample_populations(const PixelSampler& sampler, std::size_t num_particles,
+                                    const PixelInput& input, std::size_t index,
+                                    SamplerScratch& scratch, SampleState& state,
                                     SampleColors& colors);
 
 /// What a pixel's populations say together.

@@ -5,6 +5,23 @@
 #include "worker/pass/shared_assets.h"
 
 namespace baton {
+namespace {
+
+/// The setting of each material that has its own.
+std::vector<PixelSetting> make_own_settings(const JobSpec& job) {
+  std::vector<PixelSetting> settings;
+  for (const auto& entry : job.scene.materials) {
+    const auto own = job.sampling.by_material.find(entry.first);
+    if (own == job.sampling.by_material.end()) {
+      settings.emplace_back();
+    } else {
+      settings.push_back({make_material_sampler(own->second), own->second.num_particles});
+    }
+  }
+  return settings;
+}
+
+}  // namespace
 
 Result<std::shared_ptr<const RenderContext>> load_render_context(const JobSpec& job, const Digest& job_digest) {
   BATON_ASSIGN(const auto assets, load_shared_assets(job));
@@ -21,6 +38,7 @@ Result<std::shared_ptr<const RenderContext>> make_render_context(const JobSpec& 
   context->frames = expand_sequence(job);
   context->lights = std::make_unique<LightSequence>(context->job, assets->maps);
   context->sampler = make_pixel_sampler(population_spec(job));
+  context->own_settings = make_own_settings(job);
   context->scene = std::shared_ptr<const Scene>(assets, &assets->scene);
   context->geometry = std::make_unique<GeometrySequence>(context->job, *context->scene, assets->accel);
   return std::shared_ptr<const RenderContext>(std::move(context));

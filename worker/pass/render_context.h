@@ -11,6 +11,12 @@
 
 namespace baton {
 
+/// How pixels are sampled.
+struct PixelSetting {
+  std::unique_ptr<const PixelSampler> sampler;
+  std::int32_t num_particles = 0;  ///< in the state, per pixel
+};
+
 /// See tile_renderer.h. Immutable but for lights and geometry, which are prepared frame by frame on
 /// demand and guard themselves.
 class RenderContext {
@@ -22,6 +28,7 @@ class RenderContext {
   std::shared_ptr<const Scene> scene;
   std::unique_ptr<GeometrySequence> geometry;
   std::unique_ptr<const PixelSampler> sampler;  ///< null: reference
+  std::vector<PixelSetting> own_settings;       ///< (materials); null: `sampler`
   std::unique_ptr<LightSequence> lights;
 };
 

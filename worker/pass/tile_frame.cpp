@@ -13,6 +13,7 @@ void add_geometry(std::span<const SurfaceHit> hits, PixelResult& pixel) {
   float num_hits = 0;
   for (const SurfaceHit& hit : hits) {
     if (!hit.hit) continue;
+    if (num_hits == 0) pixel.material = hit.material + 1;
     num_hits += 1;
     pixel.normal += hit.point.ns;
     pixel.depth += hit.depth;
@@ -43,6 +44,11 @@ void count_sampling(const PixelDiagnostics& did, PixelSource source, float ess_r
   stats.independent_proposed += static_cast<std::uint64_t>(did.independent.proposed);
   stats.independent_accepted += static_cast<std::uint64_t>(did.independent.accepted);
   stats.count_ess(ess_ratio);
+}
+
+/// The first site that sees a surface, of a pixel that has one: its material decides.
+const SurfaceHit& first_surface(std::span<const SurfaceHit> hits) {
+  return *std::find_if(hits.begin(), hits.end(), [](const SurfaceHit& hit) { return hit.hit; });
 }
 
 /// Asks for a pixel's memory early: those of a tile are larger than the caches.
@@ -160,7 +166,6 @@ void TileFrameRenderer::sample(Batch& batch, const FrameLight& light, SampleStat
   const StageTimer timer(stats_.seconds_sample);
   const EnvironmentView now = view_of(light.now);
   const EnvironmentView before = view_of(light.before);
-  const auto n = static_cast<std::size_t>(state.num_particles);
   const std::int32_t frame_index = batch.frame_index;
   PixelRays rays;
   SampleColors colors;
@@ -187,12 +192,15 @@ void TileFrameRenderer::sample(Batch& batch, const FrameLight& light, SampleStat
       }
     }
 
-    // Sample, and cast the rays.
+    // Sample as the pixel's material asks for, and cast the rays.
+    const PixelSetting& own = context_.own_settings[first_surface(hits).material];
+    const PixelSampler& sampler = own.sampler != nullptr ? *own.sampler : *context_.sampler;
+    const std::size_t n = own.sampler != nullptr ? static_cast<std::size_t>(own.num_particles)
+                                                 : num_common_particles(state);
     if (index + 1 < state.num_pixels()) {
       fetch_ahead(state.memory_of(index + 1));
-      if (has_history_ && reprojection_ == nullptr) {
-        context_.sampler->fetch_ahead(now, std::span(state.direction).subspan((index + 1) * n, n));
-      }
+      if (has_history_ && reprojection_ == nullptr)
+        sampler.fetch_ahead(now, std::span(state.direction).subspan((index + 1) * n, n));
     }
     const PixelHistory history = find_history(i, index, state);
     const PixelInput input{
@@ -203,16 +211,16 @@ void TileFrameRenderer::sample(Batch& batch, const FrameLight& light, SampleStat
         .key = batch.key(context_, surfaces_.rect, index),
         .frame_index = frame_index,
         .has_history = history != PixelHistory::none,
-        .target_before = knows_targets_ ? targets_of(index, n) : std::span<float>(),
+        .target_before = knows_targets_ ? targets_of(index, state) : std::span<float>(),
         .old = history == PixelHistory::moved ? &old_ : nullptr,
         .memory = state.memory_of(index)};
     const PixelDiagnostics did =
-        sample_populations(*context_.sampler, input, index, *scratch_, state, colors);
+        sample_populations(sampler, n, input, index, *scratch_, state, colors);
     if (context_.sampler->chooses_rays()) {
       context_.sampler->choose_rays(input, *scratch_, rays);
       cast_rays(batch, i, rays);
     } else {
-      cast_pixel_samples(batch, i, colors, state);
+      cast_pixel_samples(batch, i, n, colors, state);
     }
 
     // Keep the books.
@@ -231,6 +239,13 @@ void TileFrameRenderer::sample(Batch& batch, const FrameLight& light, SampleStat
   }
 }
 
+/// Particles of the pixels whose material has no setting of its own.
+std::size_t TileFrameRenderer::num_common_particles(const SampleState& state) const {
+  const SamplingSpec& sampling = context_.job.sampling;
+  const bool alike = sampling.by_material.empty();
+  return static_cast<std::size_t>(alike ? state.num_particles : sampling.num_particles);
+}
+
 /// Where the shadow rays of a pixel's sites start.
 SiteOrigins TileFrameRenderer::origins(std::size_t index) const {
   const std::span<const SurfaceHit> hits = surfaces_.pixel(index);
@@ -241,16 +256,16 @@ SiteOrigins TileFrameRenderer::origins(std::size_t index) const {
   return origins;
 }
 
-/// Casts the rays of the samples of batch pixel `i`.
-void TileFrameRenderer::cast_pixel_samples(Batch& batch, std::size_t i, const SampleColors& colors,
-                                           const SampleState& state) {
+/// Casts the rays of the `n` samples of batch pixel `i`.
+void TileFrameRenderer::cast_pixel_samples(Batch& batch, std::size_t i, std::size_t n,
+                                           const SampleColors& colors, const SampleState& state) {
   const std::size_t index = batch.first + i;
   const auto num_populations = static_cast<std::size_t>(state.num_populations);
-  const auto n = static_cast<std::size_t>(state.num_particles);
+  const auto row = static_cast<std::size_t>(state.num_particles);
   const std::size_t m = n / num_populations;
   const SiteOrigins from = origins(index);
   for (std::size_t k = 0; k < num_populations; ++k) {
-    const std::size_t first = index * n + k * m;
+    const std::size_t first = index * row + k * m;
     cast_samples({.direction = std::span(state.direction).subspan(first, m),
                   .site = std::span(state.site).subspan(first, m),
                   .weight = std::span(state.weight).subspan(first, m),
@@ -261,7 +276,7 @@ void TileFrameRenderer::cast_pixel_samples(Batch& batch, std::size_t i, const Sa
                   .picture_scale = picture_scale_[k],
                   .visibility_scale = 1.0f / static_cast<float>(num_populations),
                   .first_sample = static_cast<std::uint32_t>(i * batch.stride + k * m)},
-                 from, batch.rays, targets_of(index, n).subspan(k * m, m));
+                 from, batch.rays, targets_of(index, state).subspan(k * m, m));
   }
 }
 

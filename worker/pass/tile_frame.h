@@ -43,13 +43,15 @@ class TileFrameRenderer {
 
   FilmTile render_batches(const FrameSpec& frame, const FrameLight& light, SampleState& state);
   void keep_targets(std::int32_t frame_index, std::size_t num_samples);
-  std::span<float> targets_of(std::size_t index, std::size_t n) {
+  std::span<float> targets_of(std::size_t index, const SampleState& state) {
+    const auto n = static_cast<std::size_t>(state.num_particles);
     return std::span(targets_).subspan(index * n, n);
   }
   PixelHistory find_history(std::size_t pixel_of_batch, std::size_t index, SampleState& state);
   void sample(Batch& batch, const FrameLight& light, SampleState& state);
+  std::size_t num_common_particles(const SampleState& state) const;
   SiteOrigins origins(std::size_t index) const;
-  void cast_pixel_samples(Batch& batch, std::size_t i, const SampleColors& colors,
+  void cast_pixel_samples(Batch& batch, std::size_t i, std::size_t n, const SampleColors& colors,
                           const SampleState& state);
   void cast_rays(Batch& batch, std::size_t i, const PixelRays& rays);
   void trace(Batch& batch);

@@ -77,6 +77,19 @@ TEST(JobJson, WritesFloatsAsShortDecimals) {
               HasSubstr("\"essRatioMin\": 0.1,"));
 }
 
+TEST(JobJson, MaterialsTakeWhatTheyLeaveOutFromTheRest) {
+  const JobSpec job = parsed(R"({"name": "test", "environment": {"map": "sky.exr"},
+      "scene": {"materials": {"wall": {"type": "diffuse"}, "lamp": {"type": "diffuse"}}},
+      "sampling": {"method": "mis", "numParticles": 8, "numCandidates": 32,
+                   "byMaterial": {"wall": {"numParticles": 4}}}})");
+  ASSERT_EQ(job.sampling.by_material.size(), 1u);
+  const MaterialSampling expected{
+      .method = StartMethod::mis, .num_particles = 4, .num_candidates = 32};
+  EXPECT_EQ(job.sampling.by_material.at("wall"), expected);
+  EXPECT_EQ(parsed(to_json(job)), job);
+  EXPECT_EQ(to_json(parsed(job_text(""))).find("byMaterial"), std::string::npos);
+}
+
 TEST(JobJson, ReportsAllFaultsAtOnce) {
   EXPECT_EQ(faults_of(R"({"nam": "x", "priority": 101, "image": {"width": "wide", "tilesize": 64},
                           "environment": {"map": "sky.exr"}})"),
@@ -124,6 +137,22 @@ TEST(JobJson, NamesPlaceAndExpectationOfEachKindOfFault) {
        "$.sampling.numCandidates: expected at least numParticles (16), got 8"},
       {R"("sampling": {"refreshRatio": 2, "refreshCandidates": 8})",
        "$.sampling.refreshCandidates: expected at least numParticles (16), got 8"},
+      {R"("sampling": {"method": "environment", "misCompensation": true})",
+       "$.sampling.misCompensation: expected false unless sampling.method is mis or auto, as what "
+       "is dim is then left to the BRDF's samples, got true"},
+      {R"("sampling": {"method": "mis", "misCompensation": true, "byMaterial": {"a": {}}})",
+       "$.sampling.misCompensation: expected false, as sampling.byMaterial is given, got true"},
+      {R"("sampling": {"method": "mis", "byMaterial": {"a": {"method": "pool"}}})",
+       "$.sampling.byMaterial.a.method: expected one of environment, brdf, mis, bidirectional"},
+      {R"("sampling": {"method": "mis", "byMaterial": {"a": {"numParticles": 200}}})",
+       "$.sampling.byMaterial.a.numParticles: expected an integer in [1, 64], got 200"},
+      {R"("sampling": {"method": "mis", "byMaterial": {"a": {}}})",
+       "$.sampling.byMaterial.a: no such material in scene.materials"},
+      {R"("sampling": {"method": "pool", "byMaterial": {"a": {}}})",
+       "$.sampling.byMaterial: expected none unless sampling.method is environment, brdf, mis or "
+       "bidirectional, got \"pool\""},
+      {R"("sampling": {"method": "mis", "byMaterial": {"a": {}}}, "visibility": {"correlated": true})",
+       "$.visibility.correlated: expected false, as sampling.byMaterial is given, got true"},
       {R"("sampling": {"refreshRatio": 1})",
        "$.sampling.refreshRatio: expected a number in (1, 1000000], got 1"},
       {R"("output": {"aovs": ["lns", "lns"]})",

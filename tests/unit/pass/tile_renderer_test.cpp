@@ -41,7 +41,8 @@ std::vector<FilmTile> render_tiled(JobSpec job, int tile_size, int run_length) {
     for (std::int32_t tile = 0; tile < grid.count(); ++tile) {
       std::vector<StatePtr> previous;
       for (const std::int32_t near : grid.tiles_near(tile, history_reach_px(job))) {
-        if (run > 0) previous.push_back(states[static_cast<std::size_t>(near)]);
+        if (run > 0 && carries_state(job))
+          previous.push_back(states[static_cast<std::size_t>(near)]);
       }
       const TileRunSink sink{
           [&](int frame, const FilmTile& film) {
@@ -64,7 +65,8 @@ std::vector<FilmTile> render_tiled(JobSpec job, int tile_size, int run_length) {
                 std::make_shared<const SampleState>(*decode_state(encode_state(s), "test"));
             return Status();
           }};
-      EXPECT_TRUE(run_tile(**context, tile_run(job, tile, run), previous, sink, {}).ok());
+      const auto done = run_tile(**context, tile_run(job, tile, run), previous, sink, {});
+      EXPECT_TRUE(done.ok()) << (done.ok() ? "" : done.error().message);
     }
     states = std::move(next);
   }
@@ -77,6 +79,57 @@ TEST(RunTile, SameBytesForAnyTilingAndAnyRunLength) {
   EXPECT_EQ(render_tiled(job, 8, 5), whole);
   EXPECT_EQ(render_tiled(job, 5, 2), whole);
   EXPECT_EQ(render_tiled(job, 4096, 1), whole);
+}
+
+/// Box and ground with settings of their own.
+JobSpec job_by_material() {
+  JobSpec job = sequence_job(2);
+  job.sampling.method = Method::mis;
+  job.sampling.num_particles = 8;
+  job.sampling.by_material = {
+      {"glossy", {.method = StartMethod::bidirectional, .num_particles = 12, .num_candidates = 64}},
+      {"ground", {.method = StartMethod::environment, .num_particles = 4}}};
+  job.output.aovs = {Aov::lns, Aov::ess, Aov::material};
+  return job;
+}
+
+TEST(RunTile, SameBytesForAnyTilingByMaterial) {
+  const JobSpec job = job_by_material();
+  const std::vector<FilmTile> whole = render_tiled(job, 4096, 5);
+  EXPECT_EQ(render_tiled(job, 5, 1), whole);
+}
+
+// A pixel has the bytes that it has where its material's setting is that of the whole picture.
+TEST(RunTile, EachMaterialIsSampledByItsOwnSetting) {
+  const JobSpec job = job_by_material();
+  const FilmTile mixed = render_tiled(job, 4096, 5).back();
+  std::map<float, FilmTile> alike;  // by number of the material
+  float number = 0;
+  for (const auto& [name, material] : job.scene.materials) {
+    number += 1;
+    JobSpec whole = job;
+    whole.sampling.by_material.clear();
+    if (const auto own = job.sampling.by_material.find(name);
+        own != job.sampling.by_material.end()) {
+      whole.sampling.method = own->second.method == StartMethod::environment
+                                  ? Method::environment
+                                  : Method::bidirectional;
+      whole.sampling.num_particles = own->second.num_particles;
+      whole.sampling.num_candidates = own->second.num_candidates;
+    }
+    alike[number] = render_tiled(whole, 4096, 5).back();
+  }
+  const std::size_t plane = mixed.channels.size() - 1;
+  ASSERT_EQ(mixed.channels[plane], "material");
+  std::map<float, int> pixels;
+  for (std::size_t i = 0; i < mixed.num_pixels(); ++i) {
+    const float material = mixed.plane(plane)[i];
+    pixels[material] += 1;
+    if (material == 0) continue;
+    for (std::size_t c = 0; c < mixed.channels.size(); ++c)
+      EXPECT_EQ(mixed.plane(c)[i], alike.at(material).plane(c)[i]) << mixed.channels[c] << " " << i;
+  }
+  EXPECT_GE(pixels.size(), 3u) << "background and two materials are seen";
 }
 
 TEST(RunTile, SameBytesForAnyTilingWhileCameraAndObjectsMove) {
