@@ -15,13 +15,6 @@ namespace {
 
 /// What a more complicated candidate must gain.
 constexpr double kGain = 1.05;
-/// N that are tried when N is to be chosen, and those that may be chosen.
-constexpr int kPilotParticles[] = {4, 32};
-constexpr int kParticles[] = {1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64};
-
-bool chooses_particles(const SamplingSpec& sampling) {
-  return sampling.target_error.has_value() || sampling.time_budget.has_value();
-}
 
 /// The pool and the second pass keep two halves of everything.
 bool can_take(const AutoCandidate& candidate, int num_particles) {
@@ -60,7 +53,7 @@ std::vector<Option> options_of(const SamplingSpec& asked, std::span<const PilotN
         options.push_back({seen.candidate, seen.error, seen.cost_us});
       continue;
     }
-    for (const int n : kParticles) {
+    for (const int n : kParticlesToChoose) {
       if (!can_take(family.front().candidate, n)) continue;
       AutoCandidate candidate = family.front().candidate;
       candidate.sampling.num_particles = n;
@@ -96,6 +89,10 @@ AutoChoice choice_of(const Option& option, std::string reason) {
 
 }  // namespace
 
+bool chooses_particles(const SamplingSpec& asked) {
+  return asked.target_error.has_value() || asked.time_budget.has_value();
+}
+
 std::string AutoCandidate::name() const {
   return fmt::format("{} N={}", family, sampling.num_particles);
 }
@@ -110,6 +107,7 @@ std::vector<AutoCandidate> auto_candidates(const JobSpec& job) {
       candidate.sampling.num_particles = n;
       candidate.sampling.num_candidates = std::max(num_candidates, n);
       candidate.sampling.num_distributions = num_distributions;
+      candidate.sampling.mis_compensation = job.sampling.mis_compensation && method == Method::mis;
       candidate.sampling.target_error.reset();
       candidate.sampling.time_budget.reset();
       if (can_take(candidate, n)) candidates.push_back(std::move(candidate));
@@ -173,12 +171,13 @@ void apply_choice(const AutoChoice& choice, std::span<const PilotNumbers> pilot,
                    seen.empty() ? "" : "; ", numbers.candidate.name(), numbers.error,
                    numbers.cost_us);
   }
-  job.metadata[kAutoChoice] =
-      fmt::format("{}{} N={} M={} P={}: expected error {:.4f}, {:.2f} us per pixel and frame",
-                  kMethods[static_cast<std::size_t>(choice.sampling.method)],
+  const std::string alike =
+      fmt::format("{}{} N={} M={} P={}", kMethods[static_cast<std::size_t>(choice.sampling.method)],
                   choice.correlated ? " with second pass" : "", choice.sampling.num_particles,
-                  choice.sampling.num_candidates, choice.sampling.num_distributions, choice.error,
-                  choice.cost_us);
+                  choice.sampling.num_candidates, choice.sampling.num_distributions);
+  job.metadata[kAutoChoice] = fmt::format(
+      "{}: expected error {:.4f}, {:.2f} us per pixel and frame",
+      choice.by_material.empty() ? alike : choice.by_material, choice.error, choice.cost_us);
   job.metadata["auto.reason"] = choice.reason;
   job.metadata["auto.pilot"] = seen.substr(0, limits::kMaxTextLength);
   job.sampling = choice.sampling;

@@ -11,6 +11,12 @@ namespace baton {
 /// Under this name a settled job says in its metadata what was chosen.
 inline constexpr const char* kAutoChoice = "auto.choice";
 
+/// N that are tried when N is to be chosen, and those that may be chosen.
+inline constexpr int kPilotParticles[] = {4, 32};
+inline constexpr int kParticlesToChoose[] = {1, 2, 3, 4, 6, 8, 12, 16, 24, 32, 48, 64};
+/// Whether N is to be chosen: with a target error or a time budget.
+bool chooses_particles(const SamplingSpec& asked);
+
 /// A way to render a job, as a pilot may try it.
 struct AutoCandidate {
   std::string family;  ///< e.g. "bidirectional M=128"; its members differ in N alone
@@ -38,6 +44,7 @@ struct AutoChoice {
   double error = 0;  ///< expected, as PilotNumbers
   double cost_us = 0;
   std::string reason;
+  std::string by_material{};  ///< settings of the materials in words; empty: all alike
 };
 
 /// The cheapest of what was tried that reaches the job's targetError, or the most accurate within

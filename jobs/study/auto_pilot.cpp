@@ -6,70 +6,18 @@
 #include <algorithm>
 #include <cmath>
 
+#include "jobs/study/material_pilot.h"
+#include "jobs/study/pilot_windows.h"
 #include "jobs/study/unit_costs.h"
 
 namespace baton {
 namespace {
 
-constexpr double kPilotPixels = 64 * 36;
-constexpr std::size_t kWindowFrames = 12;
 /// Runs of every candidate; then of those whose efficiency is not below the best one's by more than
 /// the factor.
 constexpr int kFirstSeeds = 3;
 constexpr int kSecondSeeds = 12;
 constexpr double kFarFromBest = 2.5;
-constexpr int kReferenceSamples = 512;
-/// Far from the seeds that people give.
-constexpr std::uint64_t kReferenceSeed = 2'000'000'000;
-
-/// The job at a small size for some of its frames.
-JobSpec window_of(const JobSpec& job, std::size_t first, std::size_t last) {
-  JobSpec window = job_window(job, {job.frames.begin() + static_cast<std::ptrdiff_t>(first),
-                                    job.frames.begin() + static_cast<std::ptrdiff_t>(last)});
-  const double scale =
-      std::min(1.0, std::sqrt(kPilotPixels / (1.0 * job.image.width * job.image.height)));
-  window.image.width = std::max(1, static_cast<int>(std::lround(job.image.width * scale)));
-  window.image.height = std::max(1, static_cast<int>(std::lround(job.image.height * scale)));
-  window.metadata.clear();
-  window.output.background = Background::transparent;
-  window.output.pixel_type = PixelType::full_float;
-  window.output.pattern = kFramePattern;
-  window.output.aovs = {Aov::lns};
-  window.state.keep = StateKeep::last;
-  return window;
-}
-
-StudyScene scene_of(const JobSpec& window) {
-  StudyScene scene;
-  scene.name = fmt::format("frames from {}", window.frames.front());
-  // The last two frames, with the history that a carried sample then has.
-  const std::size_t num_measured = std::min<std::size_t>(window.frames.size(), 2);
-  scene.frames.assign(window.frames.end() - static_cast<std::ptrdiff_t>(num_measured),
-                      window.frames.end());
-  scene.crop = {0, 0, window.image.width, window.image.height};
-  for (std::size_t half = 0; half < 2; ++half) {
-    JobSpec& reference = scene.reference[half];
-    reference = job_window(window, scene.frames);
-    reference.name = "pilot reference";
-    reference.sampling = {};
-    reference.sampling.method = Method::reference;
-    reference.sampling.reference_samples = kReferenceSamples;
-    reference.seed = kReferenceSeed + half;
-    reference.output.aovs = {Aov::lns, Aov::variance};
-  }
-  return scene;
-}
-
-/// Squared error over squared mean radiance.
-double relative_square(const std::vector<RunRecord>& runs,
-                       const std::vector<Reference>& references) {
-  double sum = 0, mean = 0;
-  for (std::size_t f = 0; f < references.size(); ++f) {
-    for (const RunRecord& run : runs) sum += run.frames[f].mse / static_cast<double>(runs.size());
-    mean += references[f].mean_radiance * references[f].mean_radiance;
-  }
-  return mean > 0 ? std::max(sum, 0.0) / mean : 0;
-}
 
 /// What a pilot says of its candidates, and the share of pixels with a surface.
 struct PilotResult {
@@ -136,11 +84,7 @@ Study pilot_study(const JobSpec& job, const std::vector<AutoCandidate>& candidat
   Study study;
   study.name = "pilot";
   for (const AutoCandidate& candidate : candidates) study.methods.push_back(candidate.name());
-  const std::size_t num_frames = job.frames.size();
-  const std::size_t length = std::min(num_frames, kWindowFrames);
-  std::vector<JobSpec> windows{window_of(job, 0, length)};
-  if (num_frames > 2 * kWindowFrames)
-    windows.push_back(window_of(job, num_frames - length, num_frames));
+  const std::vector<JobSpec> windows = pilot_windows(job);
   for (const JobSpec& window : windows) {
     for (std::size_t c = 0; c < candidates.size(); ++c) {
       StudyCell cell{static_cast<int>(study.scenes.size()), static_cast<int>(c), "", window};
@@ -149,7 +93,7 @@ Study pilot_study(const JobSpec& job, const std::vector<AutoCandidate>& candidat
       cell.job.name = "pilot " + candidates[c].name();
       study.cells.push_back(std::move(cell));
     }
-    study.scenes.push_back(scene_of(window));
+    study.scenes.push_back(pilot_scene(window));
   }
   return study;
 }
@@ -170,10 +114,11 @@ Result<std::vector<PilotNumbers>> settle_auto(JobSpec& job, const StudyFolder& f
       }) = seen;
     }
   }
-  const double all_pixels =
-      1.0 * job.image.width * job.image.height * static_cast<double>(job.frames.size());
-  apply_choice(choose_sampling(job, pilot.numbers, all_pixels * pilot.lit_share), pilot.numbers,
-               job);
+  const double lit_pixels = 1.0 * job.image.width * job.image.height *
+                            static_cast<double>(job.frames.size()) * pilot.lit_share;
+  AutoChoice choice = choose_sampling(job, pilot.numbers, lit_pixels);
+  BATON_TRY(vary_by_material(job, lit_pixels, folder, runner, choice));
+  apply_choice(choice, pilot.numbers, job);
   return std::move(pilot.numbers);
 }
 

@@ -139,10 +139,9 @@ double block_headroom(const Study& study, const StudyResults& results, std::size
 
   // The pixels of each block.
   const Reference& reference = results.references[scene].back();
-  const RgbImage& image = reference.mean;
   Blocks blocks;
-  blocks.pixels.resize(num_blocks(image.width, image.height));
-  for (const std::size_t i : reference.lit_pixels) blocks.pixels[block_of(i, image.width)] += 1;
+  blocks.pixels.resize(reference.num_blocks);
+  for (const std::size_t block : reference.block) blocks.pixels[block] += 1;
 
   // Choose on one half of the seeds, judge on the other.
   double log_gain = 0;

@@ -27,20 +27,6 @@ double mean_over(const std::vector<float>& values, const std::vector<std::size_t
 
 }  // namespace
 
-std::size_t block_of(std::size_t index, int width) {
-  const auto x = static_cast<int>(index % static_cast<std::size_t>(width));
-  const auto y = static_cast<int>(index / static_cast<std::size_t>(width));
-  const int columns = (width + kBlockPx - 1) / kBlockPx;
-  return static_cast<std::size_t>(y / kBlockPx * columns + x / kBlockPx);
-}
-
-std::size_t num_blocks(int width, int height) {
-  const auto along = [](int size) {
-    return static_cast<std::size_t>((size + kBlockPx - 1) / kBlockPx);
-  };
-  return along(width) * along(height);
-}
-
 FrameMeasures measure_frame(const Picture& test, const Reference& reference) {
   const auto& a = reference.half[0];
   const auto& b = reference.half[1];
@@ -51,8 +37,9 @@ FrameMeasures measure_frame(const Picture& test, const Reference& reference) {
   // Errors of colour.
   std::vector<double> deviation, lns_ratio;
   double sum = 0, sum_relative = 0, sum_signed = 0, sum_lns = 0;
-  m.block_mse.resize(num_blocks(test.image.width, test.image.height));
-  for (const std::size_t i : reference.lit_pixels) {
+  m.block_mse.resize(reference.num_blocks);
+  for (std::size_t lit = 0; lit < reference.lit_pixels.size(); ++lit) {
+    const std::size_t i = reference.lit_pixels[lit];
     double pixel = 0, pixel_squared = 0;
     for (std::size_t k = 3 * i; k < 3 * i + 3; ++k) {
       const double value = test.image.rgb[k];
@@ -64,7 +51,7 @@ FrameMeasures measure_frame(const Picture& test, const Reference& reference) {
       pixel += std::abs(value - r) / 3;
     }
     sum += pixel_squared;
-    m.block_mse[block_of(i, test.image.width)] += pixel_squared;
+    m.block_mse[reference.block[lit]] += pixel_squared;
     deviation.push_back(pixel);
     const double lns = 0.5 * (double{a.lns[i]} + b.lns[i]);
     sum_lns += test.lns[i];

@@ -26,14 +26,9 @@ struct FrameMeasures {
   /// E[(dI - dR)^2] / (E[(I - R)^2] + E[(I' - R')^2]) with the frame before: 1 for errors that are
   /// independent from frame to frame, 0 for errors that stand still. kNotMeasured without it.
   double flicker = kNotMeasured;
-  /// By square of kBlockPx, row by row: its share of `mse`; they add up to it.
+  /// By block of the reference: its share of `mse`; they add up to it.
   std::vector<double> block_mse{};
 };
-/// Side of the squares of FrameMeasures::block_mse, in pixels; those at the border are cut.
-inline constexpr int kBlockPx = 16;
-/// The square of pixel `index` of an image of that width, and the number of squares.
-std::size_t block_of(std::size_t index, int width);
-std::size_t num_blocks(int width, int height);
 
 /// test: of the size of the reference.
 FrameMeasures measure_frame(const Picture& test, const Reference& reference);

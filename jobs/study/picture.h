@@ -16,7 +16,14 @@ struct Picture {
   std::vector<float> ess;         ///< (pixels) ESS / N; empty for references
   std::vector<float> acceptance;  ///< (pixels) of moves; empty for references
   std::vector<float> variance;    ///< (pixels) of the mean of R, G, B; empty but for references
+  std::vector<float> material;    ///< (pixels) its number, 0: none; empty unless asked for
 };
+
+/// Side of the squares that pictures are divided into, in pixels; those at the border are cut.
+inline constexpr int kBlockPx = 16;
+/// The square of pixel `index` of an image of that width, and the number of squares.
+std::size_t block_of(std::size_t index, int width);
+std::size_t num_blocks(int width, int height);
 
 /// Reads a frame. Errors name the file: missing, not an EXR, without R, G, B, A or lns.
 Result<Picture> read_picture(const std::filesystem::path& path);
@@ -30,6 +37,10 @@ struct Reference {
 
   /// Pixels with a surface, as indices.
   std::vector<std::size_t> lit_pixels;
+  /// By lit pixel: the block in which its error counts: its material's number less 1 where the
+  /// picture tells materials, else its square.
+  std::vector<std::size_t> block;
+  std::size_t num_blocks = 0;
   double mean_radiance = 0;  ///< over lit pixels and R, G, B
   /// Mean squared error of R by its halves, mean (A - B)^2 / 4: what R cannot resolve.
   double mse = 0;

@@ -173,8 +173,9 @@ TEST(AutoTable, ChoosingBySquareGainsWhereMethodsDiffer) {
   StudyResults results = two_results(0.1);
   // Two squares of equally many pixels, methods of equal cost.
   Reference& reference = results.references[0][0];
-  reference.mean = {2 * kBlockPx, kBlockPx, {}};
   reference.lit_pixels = {0, kBlockPx};
+  reference.block = {0, 1};
+  reference.num_blocks = 2;
   results.runs = {runs({4, 4}, 1), runs({4, 4}, 1)};
   const auto set_blocks = [&](std::size_t cell, double left, double right) {
     for (RunRecord& run : results.runs[cell]) run.frames[0].block_mse = {left, right};

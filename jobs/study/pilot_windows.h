@@ -1,0 +1,25 @@
+#pragma once
+
+#include <span>
+#include <vector>
+
+#include "jobs/study/study_runner.h"
+
+namespace baton {
+
+/// The parts of a job that a pilot renders: small (about 2300 pixels), at most twelve frames at its
+/// start and at its end.
+std::vector<JobSpec> pilot_windows(const JobSpec& job);
+
+/// The last two frames of a window, which are measured: with the history that a carried sample then
+/// has.
+std::vector<int> measured_frames(const JobSpec& window);
+
+/// A window as the scene of a study, with its references; they tell materials, so that errors are
+/// known by material (Reference::block).
+StudyScene pilot_scene(const JobSpec& window);
+
+/// Squared error over squared mean radiance, the mean of the runs; not below 0.
+double relative_square(std::span<const RunRecord> runs, const std::vector<Reference>& references);
+
+}  // namespace baton
