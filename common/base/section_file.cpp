@@ -211,7 +211,11 @@ Bytes encode_sections(const SectionTag& magic, std::uint16_t version,
   head.put(std::uint32_t{0});
 
   // Pack the payloads behind them, and note each in the table.
-  Bytes bytes(table_end(sections.size()));
+  std::size_t most = table_end(sections.size());
+  for (const SectionView& section : sections) most += section.payload.size();
+  Bytes bytes;
+  bytes.reserve(most);
+  bytes.resize(table_end(sections.size()));
   SectionPacker packer;
   for (const SectionView& section : sections) {
     BATON_CHECK(&*std::ranges::find(sections, section.tag, &SectionView::tag) == &section);

@@ -63,11 +63,12 @@ class StateSections {
           {.tag = tag, .stride = sizeof(T), .payload = std::as_bytes(std::span(values))});
       return;
     }
-    const std::size_t row_bytes = per_pixel * sizeof(T);
-    Bytes payload(pixels_.size() * row_bytes);
-    for (std::size_t i = 0; i < pixels_.size(); ++i) {
-      std::memcpy(payload.data() + i * row_bytes, values.data() + pixels_[i] * per_pixel,
-                  row_bytes);
+    const std::span all(values);
+    Bytes payload;
+    payload.reserve(pixels_.size() * per_pixel * sizeof(T));
+    for (const std::size_t pixel : pixels_) {
+      const ByteView row = std::as_bytes(all.subspan(pixel * per_pixel, per_pixel));
+      payload.insert(payload.end(), row.begin(), row.end());
     }
     add(tag, sizeof(T), std::move(payload));
   }
@@ -85,6 +86,15 @@ class StateSections {
   std::deque<Bytes> owned_;
   std::vector<SectionView> views_;
 };
+
+/// How many of `pixels` start and end with the same weight, as all do after a resampling.
+std::size_t num_resampled(const SampleState& state, const std::vector<std::size_t>& pixels) {
+  const auto count = static_cast<std::size_t>(state.num_particles);
+  return static_cast<std::size_t>(std::ranges::count_if(pixels, [&](std::size_t pixel) {
+    const float* const weights = state.weight.data() + pixel * count;
+    return weights[0] == weights[count - 1];
+  }));
+}
 
 /// Inverse of gather: values of all other pixels are left as they are.
 template <class T>
@@ -312,11 +322,12 @@ Bytes encode_state(const SampleState& state) {
   sections.gather(kLns, state.lns, populations);
   sections.gather(kLnsFresh, state.lns_fresh, populations);
 
-  // Directions are as good as random, sites nearly so: looking for repetitions costs more time than
-  // it saves bytes.
+  // Directions are as good as random, sites nearly so, and so are weights unless most pixels were
+  // just resampled: looking for repetitions costs more time than it saves bytes.
   sections.gather(kDirection, state.direction, num_particles);
   sections.keep_plain();
   sections.gather(kWeight, state.weight, num_particles);
+  if (2 * num_resampled(state, sections.pixels()) < sections.pixels().size()) sections.keep_plain();
   sections.gather(kSite, state.site, num_particles);
   const auto is_set = [](std::byte site) { return site != std::byte{0}; };
   if (std::ranges::any_of(sections.last_payload(), is_set)) sections.keep_plain();
