@@ -1,5 +1,6 @@
-// Time per pixel of every method over the time of its own occlusion rays alone, on a real scene. Both times are CPU
-// seconds of one run, so the ratios hold on a noisy machine. Usage: bench_methods [JOB.json] [FRAMES] [METHODS THAT BEGIN SO]
+// Time per pixel of every method over the time of its own occlusion rays alone, on a real scene.
+// Both times are CPU seconds of one run, so the ratios hold on a noisy machine.
+// Usage: bench_methods [JOB.json] [FRAMES] [METHODS THAT BEGIN SO] [SITES]
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -32,8 +33,10 @@ std::vector<Case> make_cases() {
   add("environment", Method::environment, 0, keep);
   add("brdf", Method::brdf, 0, keep);
   add("mis", Method::mis, 0, keep);
-  add("bidirectional M=128", Method::bidirectional, 2.2, [](SamplingSpec& s) { s.num_candidates = 128; });
-  add("bidirectional M=800", Method::bidirectional, 3.5, [](SamplingSpec& s) { s.num_candidates = 800; });
+  add("bidirectional M=128", Method::bidirectional, 2.2,
+      [](SamplingSpec& s) { s.num_candidates = 128; });
+  add("bidirectional M=800", Method::bidirectional, 3.5,
+      [](SamplingSpec& s) { s.num_candidates = 800; });
   add("pool M=64", Method::pool, 2.2, [](SamplingSpec& s) { s.num_candidates = 64; });
   add("sequential P=1", Method::sequential, 0, [](SamplingSpec& s) { s.num_distributions = 1; });
   add("sequential P=5", Method::sequential, 2.0, [](SamplingSpec& s) { s.num_distributions = 5; });
@@ -43,7 +46,8 @@ std::vector<Case> make_cases() {
 Result<RenderStats> measure(const JobSpec& job) {
   BATON_ASSIGN(const auto context, load_render_context(job, Digest{1, 1}));
   RenderStats total;
-  const TileRunSink sink{[](int, const FilmTile&) { return Status(); }, [](const SampleState&) { return Status(); }};
+  const TileRunSink sink{[](int, const FilmTile&) { return Status(); },
+                         [](const SampleState&) { return Status(); }};
   for (std::int32_t tile = 0; tile < context->grid.count(); ++tile) {
     BATON_ASSIGN(const RenderStats stats, run_tile(*context, tile_run(job, tile, 0), {}, sink, {}));
     total.merge(stats);
@@ -54,16 +58,22 @@ Result<RenderStats> measure(const JobSpec& job) {
 void print_row(const Case& c, const RenderStats& s) {
   const double pixels = static_cast<double>(s.pixels - s.pixels_background);
   const double ratio = s.cpu_seconds / s.seconds_visibility;
-  const auto proposed = static_cast<double>(s.sampling.local_proposed + s.sampling.independent_proposed);
+  const auto proposed =
+      static_cast<double>(s.sampling.local_proposed + s.sampling.independent_proposed);
   const auto ns = [&](double seconds) { return seconds / pixels * 1e9; };
-  fmt::print("{:<22} {:>6.2f} {:>6} {:>9.0f} {:>8.0f} {:>8.0f} {:>8.0f} {:>8.0f} {:>8.0f} {:>8.2f} {:>7.3f}\n", c.name, ratio,
-             c.goal > 0 ? fmt::format("{:.1f}", c.goal) : "-", ns(s.cpu_seconds), ns(s.seconds_light),
-             ns(s.seconds_primary), ns(s.seconds_sample), ns(s.seconds_visibility), ns(s.seconds_shade),
-             static_cast<double>(s.rays_shadow) / s.seconds_visibility * 1e-6,
-             proposed > 0 ? static_cast<double>(s.sampling.local_accepted + s.sampling.independent_accepted) / proposed : 0.0);
+  fmt::print(
+      "{:<22} {:>6.2f} {:>6} {:>9.0f} {:>8.0f} {:>8.0f} {:>8.0f} {:>8.0f} {:>8.0f} {:>8.2f} "
+      "{:>7.3f}\n",
+      c.name, ratio, c.goal > 0 ? fmt::format("{:.1f}", c.goal) : "-", ns(s.cpu_seconds),
+      ns(s.seconds_light), ns(s.seconds_primary), ns(s.seconds_sample), ns(s.seconds_visibility),
+      ns(s.seconds_shade), static_cast<double>(s.rays_shadow) / s.seconds_visibility * 1e-6,
+      proposed > 0
+          ? static_cast<double>(s.sampling.local_accepted + s.sampling.independent_accepted) /
+                proposed
+          : 0.0);
 }
 
-int run(const std::string& path, int frames, const std::string& only) {
+int run(const std::string& path, int frames, const std::string& only, int only_sites) {
   Result<JobSpec> job = load_job(path);
   if (!job) {
     fmt::print(stderr, "{}\n", job.error().message);
@@ -76,11 +86,13 @@ int run(const std::string& path, int frames, const std::string& only) {
   fmt::print("note: assertions are on, the times are not the product's\n");
 #endif
   for (const int sites : {1, 4, 16}) {
+    if (only_sites > 0 && sites != only_sites) continue;
     job->image.sites = sites;
-    fmt::print("\n{}: {} x {}, {} site(s), {} frames, {}; ns per pixel with a surface\n", path, job->image.width,
-               job->image.height, sites, job->frames.size(), instruction_set());
-    fmt::print("{:<22} {:>6} {:>6} {:>9} {:>8} {:>8} {:>8} {:>8} {:>8} {:>8} {:>7}\n", "method", "ratio", "goal", "total",
-               "light", "primary", "sample", "rays", "shade", "Mrays/s", "accept");
+    fmt::print("\n{}: {} x {}, {} site(s), {} frames, {}; ns per pixel with a surface\n", path,
+               job->image.width, job->image.height, sites, job->frames.size(), instruction_set());
+    fmt::print("{:<22} {:>6} {:>6} {:>9} {:>8} {:>8} {:>8} {:>8} {:>8} {:>8} {:>7}\n", "method",
+               "ratio", "goal", "total", "light", "primary", "sample", "rays", "shade", "Mrays/s",
+               "accept");
     for (const Case& c : make_cases()) {
       if (!c.name.starts_with(only)) continue;
       job->sampling = c.sampling;
@@ -99,5 +111,7 @@ int run(const std::string& path, int frames, const std::string& only) {
 }  // namespace baton
 
 int main(int argc, char** argv) {
-  return baton::run(argc > 1 ? argv[1] : "jobs/examples/demo.json", argc > 2 ? std::atoi(argv[2]) : 6, argc > 3 ? argv[3] : "");
+  return baton::run(argc > 1 ? argv[1] : "jobs/examples/demo.json",
+                    argc > 2 ? std::atoi(argv[2]) : 6, argc > 3 ? argv[3] : "",
+                    argc > 4 ? std::atoi(argv[4]) : 0);
 }

@@ -40,12 +40,12 @@ struct Cost {
 Result<StatePtr> hand_on(const SampleState& state, Cost& cost, double& seconds_decode) {
   Bytes bytes;
   {
-    const StageTimer timer(cost.seconds_encode);
+    const CpuTimer timer(cost.seconds_encode);
     bytes = encode_state(state);
   }
   cost.state_bytes += bytes.size();
   cost.state_pixels += state.num_pixels();
-  const StageTimer timer(seconds_decode);
+  const CpuTimer timer(seconds_decode);
   BATON_ASSIGN(SampleState decoded, decode_state(bytes, "state"));
   return std::make_shared<const SampleState>(std::move(decoded));
 }

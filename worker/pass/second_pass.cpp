@@ -123,7 +123,7 @@ void write_pixels(const SecondPassWork& work, std::span<const Rgb> radiance, Fil
 /// The light of the frame; preparing it, where the first pass left none, counts as in that pass.
 Result<std::shared_ptr<const FrameLight>> light_of(const RenderContext& context,
                                                    std::int32_t frame_index, RenderStats& stats) {
-  const StageTimer timer(stats.seconds_light);
+  const CpuTimer timer(stats.seconds_light);
   return context.lights->at(frame_index);
 }
 
@@ -132,7 +132,7 @@ Result<std::shared_ptr<const FrameLight>> light_of(const RenderContext& context,
 Result<SecondPassOutput> run_second_pass(const RenderContext& context, std::int32_t frame_index,
                                          std::int32_t tile, const FilmTile& first_film,
                                          std::span<const FirstPassPtr> near) {
-  const double start = thread_cpu_seconds();
+  const WorkClock clock;
   BATON_TRY(check_inputs(context, frame_index, tile, first_film, near));
   SecondPassOutput output{.film = first_film};
 
@@ -161,7 +161,10 @@ Result<SecondPassOutput> run_second_pass(const RenderContext& context, std::int3
     exchange(work, radiance, output.stats);
   }
   write_pixels(work, radiance, output.film, output.stats);
-  output.stats.cpu_seconds = thread_cpu_seconds() - start;
+  const double share = clock.running_share();
+  output.stats.seconds_second_rays *= share;
+  output.seconds_primary_rays *= share;
+  output.stats.cpu_seconds = clock.cpu_seconds();
   output.stats.seconds_second_pass = output.stats.cpu_seconds - output.stats.seconds_light;
   return output;
 }

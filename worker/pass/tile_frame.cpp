@@ -67,6 +67,7 @@ struct TileFrameRenderer::Batch {
   std::int32_t frame_index = 0;
   RayBatch rays;           ///< samples are numbered batch pixel * stride + number in the pixel
   std::size_t stride = 1;  ///< most rays of a pixel
+  std::array<std::size_t, kBatchPixels> end_ray;      ///< where each pixel's rays end
   std::array<std::size_t, kBatchPixels> second_half;  ///< as PixelRays::second_half
   std::array<Rgb, kBatchPixels> difference;           ///< of the halves
   std::array<PixelResult, kBatchPixels> pixels;
@@ -110,6 +111,8 @@ FilmTile TileFrameRenderer::render(const FrameSpec& frame, const FrameLight& lig
 
 FilmTile TileFrameRenderer::render_batches(const FrameSpec& frame, const FrameLight& light,
                                            SampleState& state) {
+  const WorkClock clock;
+  stages_ = {};
   FilmWriter film(surfaces_.rect, context_.job.output.aovs);
   Batch batch;
   batch.frame_number = frame.number;
@@ -126,7 +129,7 @@ FilmTile TileFrameRenderer::render_batches(const FrameSpec& frame, const FrameLi
     batch.pixels.fill({});
     if (context_.sampler != nullptr) {
       if (reprojection_ != nullptr) {
-        const StageTimer timer(stats_.seconds_primary);
+        const StageTimer timer(stages_.reproject);
         reprojection_->look_up(surfaces_, batch.first, batch.count, frame.number);
       }
       sample(batch, light, state);
@@ -140,6 +143,11 @@ FilmTile TileFrameRenderer::render_batches(const FrameSpec& frame, const FrameLi
   state.frame_index = frame.index;
   stats_.pixels += num_pixels;
   stats_.sampling.merge(frame_sampling_);
+  const double share = clock.running_share();
+  stats_.seconds_primary += share * stages_.reproject;
+  stats_.seconds_sample += share * stages_.sample;
+  stats_.seconds_visibility += share * stages_.visibility;
+  stats_.seconds_shade += share * stages_.shade;
   return film.film();
 }
 
@@ -163,7 +171,7 @@ PixelHistory TileFrameRenderer::find_history(std::size_t pixel_of_batch, std::si
 
 /// Pass: every pixel's properly weighted set, and the colours and rays that follow from it.
 void TileFrameRenderer::sample(Batch& batch, const FrameLight& light, SampleState& state) {
-  const StageTimer timer(stats_.seconds_sample);
+  const StageTimer timer(stages_.sample);
   const EnvironmentView now = view_of(light.now);
   const EnvironmentView before = view_of(light.before);
   const std::int32_t frame_index = batch.frame_index;
@@ -181,6 +189,7 @@ void TileFrameRenderer::sample(Batch& batch, const FrameLight& light, SampleStat
     if (std::none_of(hits.begin(), hits.end(), [](const SurfaceHit& hit) { return hit.hit; })) {
       set_background(state, index);
       ++stats_.pixels_background;
+      batch.end_ray[i] = batch.rays.size();
       continue;
     }
     sites.clear(surfaces_.num_sites);
@@ -222,6 +231,7 @@ void TileFrameRenderer::sample(Batch& batch, const FrameLight& light, SampleStat
     } else {
       cast_pixel_samples(batch, i, n, colors, state);
     }
+    batch.end_ray[i] = batch.rays.size();
 
     // Keep the books.
     PixelResult& pixel = batch.pixels[i];
@@ -296,42 +306,35 @@ void TileFrameRenderer::cast_rays(Batch& batch, std::size_t i, const PixelRays& 
 
 /// Pass: visibility of all samples of the batch at once.
 void TileFrameRenderer::trace(Batch& batch) {
-  const StageTimer timer(stats_.seconds_visibility);
+  const StageTimer timer(stages_.visibility);
   geometry_.accel->occluded(batch.rays.rays);
   stats_.rays_shadow += batch.rays.size();
 }
 
 /// Pass: sums the free rays of each pixel in their fixed order, and remembers what they found.
 void TileFrameRenderer::shade(Batch& batch, SampleState& state) {
-  const StageTimer timer(stats_.seconds_shade);
+  const StageTimer timer(stages_.shade);
   const RayBatch& rays = batch.rays;
-  for (std::size_t r = 0; r < rays.size();) {
-    const std::size_t i = rays.sample[r] / batch.stride;
+  std::size_t first = 0;
+  for (std::size_t i = 0; i < batch.count; ++i) {
+    const std::size_t end = batch.end_ray[i];
+    if (first == end) continue;
+    remember(batch, i, first, end, state);
     PixelResult& pixel = batch.pixels[i];
-    const std::span<MemoryCell> memory = state.memory_of(batch.first + i);
     const std::size_t second_half = i * batch.stride + batch.second_half[i];
     Rgb radiance = pixel.radiance;
     Rgb difference = batch.difference[i];
     float visibility = pixel.visibility;
-    for (; r < rays.size() && rays.sample[r] < (i + 1) * batch.stride; ++r) {
-      const bool occluded = rays.rays.t_far[r] < 0;
-      if (context_.job.visibility.correlated)
-        collector_.add_ray(state, batch.first * batch.stride + rays.sample[r], occluded);
-      if (!memory.empty()) {
-        remember_ray(memory,
-                     {rays.rays.direction_x[r], rays.rays.direction_y[r], rays.rays.direction_z[r]},
-                     !occluded);
-      }
-      if (occluded) {
-        pixel.mask = 0;
-        continue;
-      }
-      const Rgb color{rays.r[r], rays.g[r], rays.b[r]};
+    std::size_t num_free = 0;
+    for (std::size_t r = first; r < end; ++r) {
+      const float free = rays.rays.t_far[r] < 0 ? 0.0f : 1.0f;  // a product, for want of a pattern
+      const Rgb color = Rgb{rays.r[r], rays.g[r], rays.b[r]} * free;
+      num_free += free > 0 ? 1 : 0;
       radiance += color;
-      visibility += rays.visibility[r];
-      if (batch.second_half[i] > 0)
-        difference += color * (rays.sample[r] < second_half ? 1.0f : -1.0f);
+      visibility += rays.visibility[r] * free;
+      difference += color * (rays.sample[r] < second_half ? 1.0f : -1.0f);
     }
+    if (num_free < end - first) pixel.mask = 0;
     pixel.radiance = radiance;
     pixel.visibility = visibility;
 
@@ -339,13 +342,33 @@ void TileFrameRenderer::shade(Batch& batch, SampleState& state) {
     // variance of their mean.
     const float d = mean(difference);
     pixel.variance = batch.second_half[i] > 0 ? d * d : 0.0f;
+    first = end;
+  }
+}
+
+/// Tells the second pass and the pixel's memory what rays [first, end) of batch pixel `i` found.
+void TileFrameRenderer::remember(const Batch& batch, std::size_t i, std::size_t first,
+                                 std::size_t end, SampleState& state) {
+  const std::span<MemoryCell> memory = state.memory_of(batch.first + i);
+  const bool collects = context_.job.visibility.correlated;
+  if (memory.empty() && !collects) return;
+  const ShadowRays& rays = batch.rays.rays;
+  for (std::size_t r = first; r < end; ++r) {
+    const bool occluded = rays.t_far[r] < 0;
+    if (collects) {
+      collector_.add_ray(state, batch.first * batch.stride + batch.rays.sample[r], occluded);
+    }
+    if (!memory.empty()) {
+      remember_ray(memory, {rays.direction_x[r], rays.direction_y[r], rays.direction_z[r]},
+                   !occluded);
+    }
   }
 }
 
 /// The judge's way: no samples are kept.
 void TileFrameRenderer::render_reference(Batch& batch, const FrameLight& light,
                                          SampleState& state) {
-  const StageTimer timer(stats_.seconds_sample);
+  const StageTimer timer(stages_.sample);
   const ReferenceRenderer renderer(*geometry_.accel, context_.scene->materials);
   for (std::size_t i = 0; i < batch.count; ++i) {
     const std::size_t index = batch.first + i;
@@ -377,7 +400,7 @@ void TileFrameRenderer::render_reference(Batch& batch, const FrameLight& light,
 
 /// Pass: adds what is not sampled and writes the film.
 void TileFrameRenderer::finish(Batch& batch, const FrameLight& light, FilmWriter& film) {
-  const StageTimer timer(stats_.seconds_shade);
+  const StageTimer timer(stages_.shade);
   const bool show_environment = context_.job.output.background == Background::environment;
   std::array<Rgb, kBatchPixels> background{};
   if (show_environment) {

@@ -40,6 +40,10 @@ class TileFrameRenderer {
  private:
   static constexpr std::size_t kBatchPixels = 64;
   struct Batch;
+  /// Wall seconds of the frame in work.
+  struct Stages {
+    double reproject = 0, sample = 0, visibility = 0, shade = 0;
+  };
 
   FilmTile render_batches(const FrameSpec& frame, const FrameLight& light, SampleState& state);
   void keep_targets(std::int32_t frame_index, std::size_t num_samples);
@@ -56,6 +60,8 @@ class TileFrameRenderer {
   void cast_rays(Batch& batch, std::size_t i, const PixelRays& rays);
   void trace(Batch& batch);
   void shade(Batch& batch, SampleState& state);
+  void remember(const Batch& batch, std::size_t i, std::size_t first, std::size_t end,
+                SampleState& state);
   void render_reference(Batch& batch, const FrameLight& light, SampleState& state);
   void finish(Batch& batch, const FrameLight& light, FilmWriter& film);
 
@@ -74,6 +80,7 @@ class TileFrameRenderer {
   FirstPassCollector collector_;
   std::vector<float> picture_scale_;  ///< (populations)
   RenderStats stats_;
+  Stages stages_;
   SamplingStats frame_sampling_;
 };
 

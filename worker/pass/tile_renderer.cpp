@@ -110,11 +110,11 @@ class TileWalk {
     if (context_.sampler != nullptr && context_.sampler->remembers()) state_.add_memory();
   }
   Result<std::shared_ptr<const FrameLight>> light_of(const FrameSpec& frame) {
-    const StageTimer timer(stats_.seconds_light);
+    const CpuTimer timer(stats_.seconds_light);
     return context_.lights->at(frame.index);
   }
   const TileSurfaces& trace(const FrameGeometry& geometry) {
-    const StageTimer timer(stats_.seconds_primary);
+    const CpuTimer timer(stats_.seconds_primary);
     surfaces_ = trace_primary(context_.job, geometry, rect_);
     stats_.rays_primary += surfaces_.rays.size();
     return surfaces_;

@@ -53,7 +53,7 @@ Result<TaskOutput> execute_render(const LoadedJob& loaded, BlobStore& store, con
   double seconds_read = 0;
   std::vector<StatePtr> previous;
   {
-    const StageTimer timer(seconds_read);
+    const CpuTimer timer(seconds_read);
     BATON_ASSIGN(previous, read_states(loaded, store, inputs));
   }
   double seconds_state = seconds_read;
@@ -70,7 +70,7 @@ Result<TaskOutput> execute_render(const LoadedJob& loaded, BlobStore& store, con
                                return keep(BlobKind::film, frame, encode_film_tile(film));
                              },
                          .state = [&](const SampleState& state) -> Status {
-                           const StageTimer timer(seconds_state);
+                           const CpuTimer timer(seconds_state);
                            BATON_TRY(keep(BlobKind::state, state.frame_index, encode_state(state)));
                            if (moves(loaded.job)) {
                              loaded.states->insert(output.outputs.back().digest,
