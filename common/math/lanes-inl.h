@@ -9,6 +9,7 @@
 #include <hwy/highway.h>
 
 #include <algorithm>
+#include <array>
 #include <cstdint>
 #include <span>
 
@@ -55,6 +56,43 @@ HWY_INLINE void StoreSome(VF value, std::span<float> array, std::size_t i) {
   hn::Store(value, d, out);
   std::copy_n(out, std::min(array.size() - i, hn::Lanes(d)), array.data() + i);
 }
+/// Records of floats, one a lane of a vector.
+using Records = std::array<const float*, 8>;
+static_assert(hn::MaxLanes(DF()) == 4 || hn::MaxLanes(DF()) == 8);
+
+/// Four floats of the records k, k + 4, ..., block after block of a vector.
+template <class D>
+HWY_INLINE hn::Vec<D> LoadBlocks(D d, const float* const* record, int field) {
+  if constexpr (hn::MaxLanes(D()) > 4) {
+    const hn::Half<D> half;
+    return hn::Combine(d, LoadBlocks(half, record + 4, field), LoadBlocks(half, record, field));
+  } else {
+    return hn::LoadU(d, *record + field);
+  }
+}
+
+/// Four fields of all records of a vector, a row each.
+struct FourRows {
+  VF row[4];
+};
+/// From blocks as LoadBlocks reads them for k = 0 ... 3: 4 x 4 transposes in registers, which beat
+/// gathers and copies lane by lane.
+HWY_INLINE FourRows TransposeBlocks(VF k0, VF k1, VF k2, VF k3) {
+  const DF d;
+  const VF low02 = hn::InterleaveLower(d, k0, k2);
+  const VF low13 = hn::InterleaveLower(d, k1, k3);
+  const VF high02 = hn::InterleaveUpper(d, k0, k2);
+  const VF high13 = hn::InterleaveUpper(d, k1, k3);
+  return {{hn::InterleaveLower(d, low02, low13), hn::InterleaveUpper(d, low02, low13),
+           hn::InterleaveLower(d, high02, high13), hn::InterleaveUpper(d, high02, high13)}};
+}
+/// Fields first, ..., first + 3 of every record.
+HWY_INLINE FourRows LoadFour(const Records& records, int first) {
+  const DF d;
+  return TransposeBlocks(LoadBlocks(d, &records[0], first), LoadBlocks(d, &records[1], first),
+                         LoadBlocks(d, &records[2], first), LoadBlocks(d, &records[3], first));
+}
+
 /// Mean of the three channels.
 HWY_INLINE VF MeanLanes(const Vec3Lanes& c) {
   return hn::Mul(hn::Add(hn::Add(c.x, c.y), c.z), hn::Set(DF(), 1.0f / 3.0f));

@@ -62,20 +62,27 @@ struct SiteDeal {
     return sites[std::min(static_cast<std::int32_t>(turn), num_sites - 1)];
   }
 
-  /// use(surface, i) for each vector of candidates i, i + 1, ... in turn.
+  /// use(surface, first, last) for vectors [first, last) that share their surface, in turn.
   template <class Use>
-  HWY_INLINE void ForEach(const SiteBlock& block, const Use& use) const {
-    const std::size_t lanes = hn::Lanes(DF());
+  HWY_INLINE void ForEachRun(const SiteBlock& block, const Use& use) const {
     if (!ByVector()) {
       for (std::size_t v = 0; v < Vectors(); ++v) {
-        use(LoadSurfaces(block, SitesOfLanes(v * lanes)), v * lanes);
+        use(LoadSurfaces(block, SitesOfLanes(v * hn::Lanes(DF()))), v, v + 1);
       }
       return;
     }
     for (std::size_t k = 0; k < static_cast<std::size_t>(num_sites); ++k) {
-      const SurfaceLanes surface = LoadSurface(block, static_cast<std::size_t>(SiteOfShare(k)));
-      for (std::size_t v = FirstOfShare(k); v < FirstOfShare(k + 1); ++v) use(surface, v * lanes);
+      use(LoadSurface(block, static_cast<std::size_t>(SiteOfShare(k))), FirstOfShare(k),
+          FirstOfShare(k + 1));
     }
+  }
+  /// use(surface, i) for each vector of candidates i, i + 1, ... in turn.
+  template <class Use>
+  HWY_INLINE void ForEach(const SiteBlock& block, const Use& use) const {
+    ForEachRun(block,
+               [&](const SurfaceLanes& surface, std::size_t first, std::size_t last) HWY_ATTR {
+                 for (std::size_t v = first; v < last; ++v) use(surface, v * hn::Lanes(DF()));
+               });
   }
 };
 
@@ -95,6 +102,12 @@ struct LightRun {
   /// Candidates i, i + 1, ...
   HWY_INLINE LightLanes Load(std::size_t i) const {
     return LoadLight(pool, (start + i) % LightPool::kSize);
+  }
+  /// Their 1 / density.
+  HWY_INLINE VF LoadInverse(std::size_t i) const {
+    const std::size_t entry = (start + i) % LightPool::kSize;
+    return hn::Load(
+        DF(), pool.blocks[entry / LightPool::kBlock].inverse_density + entry % LightPool::kBlock);
   }
   HWY_INLINE Vec3Lanes LoadBefore(std::size_t i) const {
     return LoadLightBefore(pool, (start + i) % LightPool::kSize);
@@ -214,7 +227,8 @@ struct BsdfRun {
   }
 };
 
-/// use(candidates, i) for the candidates i, i + 1, ... from the BRDF, snapped to the lattice.
+/// use(candidates, i) for the candidates i, i + 1, ... from the BRDF, snapped to the lattice. Their
+/// texels are asked for some vectors ahead.
 template <class Use>
 HWY_INLINE void BsdfCandidates(const SiteBlock& sites, const EnvironmentView& environment,
                                const kernels::CandidateCounts& counts,
@@ -222,16 +236,32 @@ HWY_INLINE void BsdfCandidates(const SiteBlock& sites, const EnvironmentView& en
   if (counts.from_bsdf == 0) return;
   const CandidateWeights weigh{sites, counts};
   const BsdfRun run{sites, counts, random};
-  run.Deal().ForEach(sites, [&](const SurfaceLanes& surface, std::size_t i) HWY_ATTR {
-    const VU code = EncodeOctahedral(run.Draw(surface, i));
-    const Vec3Lanes w = DecodeOctahedral(code);
-    const RadianceLanes light = EvaluateEnvironment(environment, w);
-    const BsdfLanes f = EvaluateBsdf(surface, w);
-    const Vec3Lanes reflected = ReflectedRadiance(surface, f, light.r, light.g, light.b);
-    const VF weight = weigh(MeanLanes(reflected), surface, f, light.density,
-                            static_cast<std::size_t>(counts.from_bsdf) - i);
-    use(CandidateLanes{code, surface.site, weight, reflected}, i);
-  });
+  constexpr std::size_t kAhead = 8;
+  const auto evaluate = [&](const SurfaceLanes& surface, std::size_t first,
+                            std::size_t last) HWY_ATTR {
+    VU code[kAhead];
+    TexelLanes texels[kAhead];
+    for (std::size_t v = first; v < last; ++v) {
+      code[v - first] = EncodeOctahedral(run.Draw(surface, v * hn::Lanes(DF())));
+      texels[v - first] = LocateTexels(environment, DecodeOctahedral(code[v - first]));
+      PrefetchTexels(environment, texels[v - first]);
+    }
+    for (std::size_t v = first; v < last; ++v) {
+      const std::size_t i = v * hn::Lanes(DF());
+      const RadianceLanes light = EvaluateTexels(environment, texels[v - first]);
+      const BsdfLanes f = EvaluateBsdf(surface, DecodeOctahedral(code[v - first]));
+      const Vec3Lanes reflected = ReflectedRadiance(surface, f, light.r, light.g, light.b);
+      const VF weight = weigh(MeanLanes(reflected), surface, f, light.density,
+                              static_cast<std::size_t>(counts.from_bsdf) - i);
+      use(CandidateLanes{code[v - first], surface.site, weight, reflected}, i);
+    }
+  };
+  run.Deal().ForEachRun(
+      sites, [&](const SurfaceLanes& surface, std::size_t first, std::size_t last) HWY_ATTR {
+        for (std::size_t v = first; v < last; v += kAhead) {
+          evaluate(surface, v, std::min(v + kAhead, last));
+        }
+      });
 }
 
 }  // namespace baton::HWY_NAMESPACE

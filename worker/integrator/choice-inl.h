@@ -28,16 +28,21 @@ HWY_INLINE void WeighDiffuse(const SiteBlock& sites, const LightPool& pool,
   const SiteDeal deal = LightSites(sites, counts, random);
   const VF scale = hn::Set(d, kInvPi / 3.0f * static_cast<float>(sites.num_hits) /
                                   static_cast<float>(sites.num_sites * counts.from_light));
-  deal.ForEach(sites, [&](const SurfaceLanes& s, std::size_t i) HWY_ATTR {
-    const LightLanes light = run.Load(i);
-    const VF n_w = Dot(s.ns, light.direction);
-    const VF above = hn::Min(n_w, Dot(s.ng, light.direction));  // its sign alone counts
-    const VF reflected = Dot(s.kd, {light.now.r, light.now.g, light.now.b});
-    const VF target = hn::Mul(hn::Mul(n_w, scale), reflected);
-    const std::size_t left = static_cast<std::size_t>(counts.from_light) - i;
-    MF live = hn::And(hn::Gt(above, hn::Zero(d)), hn::Gt(light.now.density, hn::Zero(d)));
-    if (left < hn::Lanes(d)) live = hn::And(live, hn::FirstN(d, left));
-    sums.Add(hn::IfThenElseZero(live, hn::Div(target, light.now.density)));
+  const auto count = static_cast<std::size_t>(counts.from_light);
+  deal.ForEachRun(sites, [&](const SurfaceLanes& s, std::size_t first, std::size_t last) HWY_ATTR {
+    const Vec3Lanes ns = s.ns, ng = s.ng, kd = Scale(s.kd, scale);
+    RunningSums::End end = sums.end;
+    for (std::size_t v = first; v < last; ++v) {
+      const std::size_t i = v * hn::Lanes(d);
+      const LightLanes light = run.Load(i);
+      const VF cosine = Dot(ns, light.direction);
+      const VF above = hn::Min(cosine, Dot(ng, light.direction));  // its sign alone counts
+      const VF reflected = Dot(kd, {light.now.r, light.now.g, light.now.b});
+      MF live = hn::Gt(above, hn::Zero(d));
+      if (i + hn::Lanes(d) > count) live = hn::And(live, hn::FirstN(d, count - i));
+      end.Add(hn::IfThenElseZero(live, hn::Mul(hn::Mul(cosine, reflected), run.LoadInverse(i))));
+    }
+    sums.end = end;
   });
 }
 
@@ -138,11 +143,11 @@ inline float ChooseCandidates(const SiteBlock& sites, const EnvironmentView& env
     WeighDiffuse(sites, pool, counts, random, sums);
   } else {
     LightCandidates(sites, pool, counts, random,
-                    [&](const CandidateLanes& c, std::size_t) HWY_ATTR { sums.Add(c.weight); });
+                    [&](const CandidateLanes& c, std::size_t) HWY_ATTR { sums.end.Add(c.weight); });
     BsdfCandidates(sites, environment, counts, random,
                    [&](const CandidateLanes& c, std::size_t i) HWY_ATTR {
                      StoreCandidates(c, i, scratch.from_bsdf);
-                     sums.Add(c.weight);
+                     sums.end.Add(c.weight);
                    });
   }
   const float total = sums.Finish();
@@ -152,10 +157,8 @@ inline float ChooseCandidates(const SiteBlock& sites, const EnvironmentView& env
   const auto padded_light = static_cast<std::int32_t>(
       hwy::RoundUpTo(static_cast<std::size_t>(counts.from_light), hn::Lanes(d)));
   const ChosenCandidates chosen(sites, pool, counts, random, padded_light, scratch.from_bsdf);
-  HWY_ALIGN std::int32_t picks[limits::kMaxParticles];
-  for (std::size_t j = 0; j < out.code.size(); j += hn::Lanes(d)) {
-    hn::Store(SystematicPicks(sums, total, u, j, out.code.size()), di, picks + j);
-  }
+  HWY_ALIGN std::int32_t picks[limits::kMaxParticles + RunningSums::kGroup];
+  SystematicPicks(sums, total, u, out.code.size(), picks);
   for (std::size_t j = 0; j < out.code.size(); j += hn::Lanes(d)) {
     const CandidateLanes c = chosen.Evaluate(hn::Load(di, picks + j));
     HWY_ALIGN std::uint32_t code[hn::MaxLanes(DU())];

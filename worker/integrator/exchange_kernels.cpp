@@ -19,40 +19,6 @@ namespace hn = hwy::HWY_NAMESPACE;
 
 static_assert(sizeof(LightRecord) == 8 * sizeof(float) && sizeof(Reflected) == 4 * sizeof(float));
 
-/// The records of one vector of surfaces or lights, one a lane.
-using Records = std::array<const float*, 8>;
-
-/// Four floats of the records k, k + 4, ..., block after block of a vector.
-template <class D>
-HWY_INLINE hn::Vec<D> LoadBlocks(D d, const float* const* record, int field) {
-  if constexpr (hn::MaxLanes(D()) > 4) {
-    const hn::Half<D> half;
-    return hn::Combine(d, LoadBlocks(half, record + 4, field), LoadBlocks(half, record, field));
-  } else {
-    return hn::LoadU(d, *record + field);
-  }
-}
-
-/// Fields first, ..., first + 3 of every record, a row each: 4 x 4 transposes in registers, which
-/// beat gathers and copies lane by lane.
-struct FourRows {
-  VF row[4];
-};
-HWY_INLINE FourRows LoadFour(const Records& records, int first) {
-  static_assert(hn::MaxLanes(DF()) == 4 || hn::MaxLanes(DF()) == 8);
-  const DF d;
-  const VF a = LoadBlocks(d, &records[0], first);
-  const VF b = LoadBlocks(d, &records[1], first);
-  const VF c = LoadBlocks(d, &records[2], first);
-  const VF e = LoadBlocks(d, &records[3], first);
-  const VF ac_low = hn::InterleaveLower(d, a, c);
-  const VF be_low = hn::InterleaveLower(d, b, e);
-  const VF ac_high = hn::InterleaveUpper(d, a, c);
-  const VF be_high = hn::InterleaveUpper(d, b, e);
-  return {{hn::InterleaveLower(d, ac_low, be_low), hn::InterleaveUpper(d, ac_low, be_low),
-           hn::InterleaveLower(d, ac_high, be_high), hn::InterleaveUpper(d, ac_high, be_high)}};
-}
-
 /// The surfaces of one vector, their common records given; of diffuse ones only those are read.
 HWY_INLINE SurfaceLanes LoadTable(const SurfaceTable& table, const Records& common, VF ks_r) {
   const DF d;

@@ -1,6 +1,8 @@
 #include "worker/integrator/light_pool.h"
 
+#include <algorithm>
 #include <array>
+#include <iterator>
 #include <numeric>
 #include <utility>
 
@@ -62,6 +64,8 @@ LightPool make_light_pool(const Environment& now, const Environment& before, std
     kernels::decode_directions(block.code, block.x, block.y, block.z);
     kernels::evaluate_environment(now_view, block.x, block.y, block.z, block.r, block.g, block.b,
                                   block.density);
+    std::transform(std::begin(block.density), std::end(block.density), block.inverse_density,
+                   [](float density) { return density > 0 ? 1 / density : 0.0f; });
     float unused[LightPool::kBlock];
     kernels::evaluate_environment(before_view, block.x, block.y, block.z, block.before_r,
                                   block.before_g, block.before_b, unused);

@@ -25,6 +25,7 @@ struct LightPool {
     float x[kBlock], y[kBlock], z[kBlock];  ///< the decoded directions
     float r[kBlock], g[kBlock], b[kBlock];  ///< radiance of this frame
     float density[kBlock];                  ///< 1/sr
+    float inverse_density[kBlock];          ///< sr; 0 where the density is
     float before_r[kBlock], before_g[kBlock], before_b[kBlock];  ///< radiance of the frame before
   };
   std::vector<Block> blocks;  ///< (kSize / kBlock); empty for a black map

@@ -20,79 +20,101 @@ namespace hn = hwy::HWY_NAMESPACE;
 /// stretches grow at once, and what is stored are their lengths so far, which never fall.
 class RunningSums {
  public:
-  /// storage: room for all vectors, aligned.
-  explicit RunningSums(float* storage) : storage_(storage), walked_(hn::Zero(DF())) {}
+  /// Where the line ends so far. A loop that appends works on a copy of it, in registers.
+  struct End {
+    float* next;
+    VF sum;
 
-  /// Appends a vector of non-negative weights.
-  HWY_INLINE void Add(VF weight) {
-    const DF d;
-    walked_ = hn::Add(walked_, weight);
-    hn::Store(walked_, d, storage_ + size_);
-    size_ += hn::Lanes(d);
-  }
+    /// Appends a vector of non-negative weights.
+    HWY_INLINE void Add(VF weight) {
+      sum = hn::Add(sum, weight);
+      hn::Store(sum, DF(), next);
+      next += hn::Lanes(DF());
+    }
+  };
+  End end;
+
+  /// storage: room for all vectors, aligned.
+  explicit RunningSums(float* storage) : end{storage, hn::Zero(DF())}, storage_(storage) {}
 
   /// Ends the line: fixes where each lane's stretch ends and returns the sum of all weights.
   HWY_INLINE float Finish() {
-    hn::Store(walked_, DF(), length_);
+    size_ = static_cast<std::size_t>(end.next - storage_);
+    hn::Store(end.sum, DF(), length_);
     float total = 0;
     for (std::size_t lane = 0; lane < kLanes; ++lane) {
       start_[lane] = total;
       total += length_[lane];
-      end_[lane] = total;
+      stop_[lane] = total;
       if (length_[lane] > 0) last_ = static_cast<std::int32_t>(lane);
     }
     return total;
   }
 
-  /// After Finish: the weights that hold positions, each in [0, total], total > 0; never one of
-  /// weight 0.
-  HWY_INLINE VI Find(VF position) const {
+  static constexpr std::size_t kGroup = 2 * hn::MaxLanes(DF());
+
+  /// After Finish: the weights that hold kGroup positions, each in [0, total], total > 0; never one
+  /// of weight 0. Two searches run side by side: one alone waits for its own look-ups.
+  HWY_INLINE void Find(const VF (&position)[2], std::int32_t* found) const {
     const DF d;
     const DI di;
     // The lane is the first whose stretch ends later; rounding past the end counts to the last.
-    VI lane = hn::Zero(di);
-    for (std::size_t k = 0; k + 1 < kLanes; ++k) {
-      const auto passed = hn::Le(hn::Set(d, end_[k]), position);
-      lane = hn::Add(lane, hn::IfThenElseZero(hn::RebindMask(di, passed), hn::Set(di, 1)));
+    VI lane[2], vector[2];
+    VF along[2];
+    for (std::size_t g = 0; g < 2; ++g) {
+      lane[g] = vector[g] = hn::Zero(di);
+      for (std::size_t k = 0; k + 1 < kLanes; ++k) {
+        const auto passed = hn::Le(hn::Set(d, stop_[k]), position[g]);
+        lane[g] = hn::Sub(lane[g], hn::VecFromMask(di, hn::RebindMask(di, passed)));
+      }
+      lane[g] = hn::Min(lane[g], hn::Set(di, last_));
+      const VF longest = hn::Mul(hn::GatherIndex(d, length_, lane[g]), hn::Set(d, 1 - 0x1p-23f));
+      along[g] = hn::Min(hn::Sub(position[g], hn::GatherIndex(d, start_, lane[g])), longest);
     }
-    lane = hn::Min(lane, hn::Set(di, last_));
-    const VF longest = hn::Mul(hn::GatherIndex(d, length_, lane), hn::Set(d, 1 - 0x1p-23f));
-    const VF along = hn::Min(hn::Sub(position, hn::GatherIndex(d, start_, lane)), longest);
 
     // Within it, the first sum that exceeds the position.
     const auto vectors = static_cast<std::uint32_t>(size_ / kLanes);
-    VI found = hn::Zero(di);
-    for (std::uint32_t step = std::bit_floor(vectors); step > 0; step /= 2) {
-      const VI next = hn::Add(found, hn::Set(di, static_cast<std::int32_t>(step)));
-      const VI probe = hn::Min(hn::Sub(next, hn::Set(di, 1)),
-                               hn::Set(di, static_cast<std::int32_t>(vectors) - 1));
-      const VI at = hn::Add(hn::Mul(probe, hn::Set(di, static_cast<std::int32_t>(kLanes))), lane);
-      const auto passed = hn::Le(hn::GatherIndex(d, storage_, at), along);
-      found = hn::IfThenElse(hn::RebindMask(di, passed), next, found);
+    const VI last = hn::Set(di, static_cast<std::int32_t>(vectors) - 1);
+    constexpr int kShift = std::countr_zero(kLanes);
+    for (std::uint32_t step = std::bit_ceil(vectors) / 2; step > 0; step /= 2) {
+      for (std::size_t g = 0; g < 2; ++g) {
+        const VI next = hn::Add(vector[g], hn::Set(di, static_cast<std::int32_t>(step)));
+        const VI probe = hn::Min(hn::Sub(next, hn::Set(di, 1)), last);
+        const VI at = hn::Add(hn::ShiftLeft<kShift>(probe), lane[g]);
+        const auto passed = hn::Le(hn::GatherIndex(d, storage_, at), along[g]);
+        vector[g] = hn::IfThenElse(hn::RebindMask(di, passed), next, vector[g]);
+      }
     }
-    found = hn::Min(found, hn::Set(di, static_cast<std::int32_t>(vectors) - 1));
-    return hn::Add(hn::Mul(found, hn::Set(di, static_cast<std::int32_t>(kLanes))), lane);
+    for (std::size_t g = 0; g < 2; ++g) {
+      const VI index = hn::Add(hn::ShiftLeft<kShift>(hn::Min(vector[g], last)), lane[g]);
+      hn::StoreU(index, di, found + g * kLanes);
+    }
   }
 
  private:
   static constexpr std::size_t kLanes = hn::MaxLanes(DF());
   float* storage_;
-  std::size_t size_ = 0;
-  VF walked_;
+  std::size_t size_ = 0;   ///< weights, padded
   std::int32_t last_ = 0;  ///< last lane with a length
   HWY_ALIGN float length_[kLanes];
   HWY_ALIGN float start_[kLanes];
-  HWY_ALIGN float end_[kLanes];
+  HWY_ALIGN float stop_[kLanes];
 };
 
-/// The weights that hold positions (m + u) total / count of the line, m = i, i + 1, ...
-HWY_INLINE VI SystematicPicks(const RunningSums& sums, float total, float u, std::size_t i,
-                              std::size_t count) {
+/// picks: the weights that hold positions (m + u) total / count of the line, m = 0 ... count - 1,
+/// and what fills up the last group.
+HWY_INLINE void SystematicPicks(const RunningSums& sums, float total, float u, std::size_t count,
+                                std::int32_t* picks) {
   const DF d;
-  const VF m =
-      hn::Min(hn::Iota(d, static_cast<float>(i)), hn::Set(d, static_cast<float>(count - 1)));
-  return sums.Find(
-      hn::Mul(hn::Add(m, hn::Set(d, u)), hn::Set(d, total / static_cast<float>(count))));
+  const VF last = hn::Set(d, static_cast<float>(count - 1));
+  const VF stride = hn::Set(d, total / static_cast<float>(count));
+  const auto position = [&](std::size_t m) HWY_ATTR {
+    const VF number = hn::Min(hn::Iota(d, static_cast<float>(m)), last);
+    return hn::Mul(hn::Add(number, hn::Set(d, u)), stride);
+  };
+  for (std::size_t m = 0; m < count; m += RunningSums::kGroup) {
+    sums.Find({position(m), position(m + hn::Lanes(d))}, picks + m);
+  }
 }
 
 }  // namespace baton::HWY_NAMESPACE

@@ -38,13 +38,11 @@ void SystematicChoice(std::span<const float> weights, float u, std::span<std::in
   constexpr std::size_t kLanes = hn::MaxLanes(DF());
   HWY_ALIGN float storage[kMaxWeights + kLanes];
   RunningSums sums(storage);
-  for (std::size_t i = 0; i < weights.size(); i += kLanes) sums.Add(LoadWeights(weights, i));
+  for (std::size_t i = 0; i < weights.size(); i += kLanes) sums.end.Add(LoadWeights(weights, i));
   const float total = sums.Finish();
-  for (std::size_t m = 0; m < chosen.size(); m += kLanes) {
-    HWY_ALIGN std::int32_t picks[kLanes];
-    hn::Store(SystematicPicks(sums, total, u, m, chosen.size()), DI(), picks);
-    std::copy_n(picks, std::min(kLanes, chosen.size() - m), chosen.data() + m);
-  }
+  HWY_ALIGN std::int32_t picks[limits::kMaxParticles + RunningSums::kGroup];
+  SystematicPicks(sums, total, u, chosen.size(), picks);
+  std::copy_n(picks, chosen.size(), chosen.data());
 }
 
 }  // namespace baton::HWY_NAMESPACE
@@ -55,7 +53,8 @@ namespace baton {
 HWY_EXPORT(SystematicChoice);
 
 void systematic_choice(std::span<const float> weights, float u, std::span<std::int32_t> chosen) {
-  BATON_CHECK(!weights.empty() && weights.size() <= kMaxWeights && !chosen.empty());
+  BATON_CHECK(!weights.empty() && weights.size() <= kMaxWeights && !chosen.empty() &&
+              chosen.size() <= limits::kMaxParticles);
   HWY_DYNAMIC_DISPATCH(SystematicChoice)(weights, u, chosen);
 }
 

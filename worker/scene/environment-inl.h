@@ -40,46 +40,50 @@ HWY_INLINE VI TexelIndex(const EnvironmentView& view, VI i, VI j) {
   return hn::Add(hn::Mul(hn::Add(j, one), hn::Set(di, view.stride)), hn::Add(i, one));
 }
 
+/// Where the texels of every lane begin.
+HWY_INLINE Records TexelRecords(const EnvironmentView& view, VI index) {
+  HWY_ALIGN std::int32_t offset[hn::MaxLanes(DI())];
+  hn::Store(hn::ShiftLeft<2>(index), DI(), offset);
+  Records texels;
+  for (std::size_t lane = 0; lane < hn::Lanes(DI()); ++lane) {
+    texels[lane] = view.texels + offset[lane];
+  }
+  return texels;
+}
+
 /// One texel per lane, unfiltered.
 HWY_INLINE RadianceLanes LoadTexels(const EnvironmentView& view, VI index) {
+  const FourRows texel = LoadFour(TexelRecords(view, index), 0);
+  return {texel.row[0], texel.row[1], texel.row[2], texel.row[3]};
+}
+
+/// Four texels of lanes k, k + 4, ... weighted bilinearly; the fourth float is the upper left
+/// one's.
+template <int k>
+HWY_INLINE VF BlendBlocks(const Records& upper, const Records& lower, VF fx, VF fy) {
   const DF d;
-  const DI di;
-  const hn::FixedTag<float, 4> d4;
-  HWY_ALIGN std::int32_t offsets[hn::MaxLanes(DI())];
-  HWY_ALIGN float rows[4 * hn::MaxLanes(DF())];
-  hn::Store(hn::ShiftLeft<2>(index), di, offsets);
-  for (std::size_t lane = 0; lane < hn::Lanes(d); ++lane) {
-    hn::Store(hn::LoadU(d4, view.texels + offsets[lane]), d4, rows + 4 * lane);
-  }
-  RadianceLanes out;
-  hn::LoadInterleaved4(d, rows, out.r, out.g, out.b, out.density);
-  return out;
+  const VF x = hn::Broadcast<k>(fx);
+  const VF y = hn::Broadcast<k>(fy);
+  const VF upper_left = LoadBlocks(d, &upper[k], 0);
+  const VF lower_left = LoadBlocks(d, &lower[k], 0);
+  const VF top = hn::MulAdd(x, hn::Sub(LoadBlocks(d, &upper[k], 4), upper_left), upper_left);
+  const VF bottom = hn::MulAdd(x, hn::Sub(LoadBlocks(d, &lower[k], 4), lower_left), lower_left);
+  const MF fourth =
+      hn::RebindMask(d, hn::Eq(hn::And(hn::Iota(DI(), 0), hn::Set(DI(), 3)), hn::Set(DI(), 3)));
+  return hn::IfThenElse(fourth, upper_left, hn::MulAdd(y, hn::Sub(bottom, top), top));
 }
 
 /// Four texels per lane, weighted bilinearly; the density is the upper left texel's.
 HWY_INLINE RadianceLanes LoadTexelsBilinear(const EnvironmentView& view, VI index, VF fx, VF fy) {
-  const DF d;
-  const DI di;
-  const hn::FixedTag<float, 4> d4;
-  HWY_ALIGN std::int32_t offsets[hn::MaxLanes(DI())];
-  HWY_ALIGN float wx[hn::MaxLanes(DF())], wy[hn::MaxLanes(DF())], rows[4 * hn::MaxLanes(DF())];
-  hn::Store(hn::ShiftLeft<2>(index), di, offsets);
-  hn::Store(fx, d, wx);
-  hn::Store(fy, d, wy);
-  for (std::size_t lane = 0; lane < hn::Lanes(d); ++lane) {
-    const float* upper = view.texels + offsets[lane];
-    const float* lower = upper + 4 * view.stride;
-    const auto x = hn::Set(d4, wx[lane]);
-    const auto upper_left = hn::LoadU(d4, upper);
-    const auto lower_left = hn::LoadU(d4, lower);
-    const auto top = hn::MulAdd(x, hn::Sub(hn::LoadU(d4, upper + 4), upper_left), upper_left);
-    const auto bottom = hn::MulAdd(x, hn::Sub(hn::LoadU(d4, lower + 4), lower_left), lower_left);
-    hn::Store(hn::MulAdd(hn::Set(d4, wy[lane]), hn::Sub(bottom, top), top), d4, rows + 4 * lane);
+  const Records upper = TexelRecords(view, index);
+  Records lower;
+  for (std::size_t lane = 0; lane < hn::Lanes(DF()); ++lane) {
+    lower[lane] = upper[lane] + 4 * static_cast<std::ptrdiff_t>(view.stride);
   }
-  RadianceLanes out;
-  hn::LoadInterleaved4(d, rows, out.r, out.g, out.b, out.density);
-  out.density = hn::GatherIndex(d, view.texels + 3, hn::ShiftLeft<2>(index));
-  return out;
+  const FourRows texel =
+      TransposeBlocks(BlendBlocks<0>(upper, lower, fx, fy), BlendBlocks<1>(upper, lower, fx, fy),
+                      BlendBlocks<2>(upper, lower, fx, fy), BlendBlocks<3>(upper, lower, fx, fy));
+  return {texel.row[0], texel.row[1], texel.row[2], texel.row[3]};
 }
 
 /// Where a look-up reads: the upper left texel, and with a bilinear map how far it is into the
