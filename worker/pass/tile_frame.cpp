@@ -4,47 +4,10 @@
 
 #include "worker/integrator/reference.h"
 #include "worker/pass/cpu_clock.h"
+#include "worker/pass/pixel_books.h"
 
 namespace baton {
 namespace {
-
-/// Sums over the sites of a pixel that do not depend on light: coverage, mean normal and depth.
-void add_geometry(std::span<const SurfaceHit> hits, PixelResult& pixel) {
-  float num_hits = 0;
-  for (const SurfaceHit& hit : hits) {
-    if (!hit.hit) continue;
-    if (num_hits == 0) pixel.material = hit.material + 1;
-    num_hits += 1;
-    pixel.normal += hit.point.ns;
-    pixel.depth += hit.depth;
-  }
-  if (num_hits == 0) return;
-  pixel.alpha = num_hits / static_cast<float>(hits.size());
-  pixel.normal = pixel.normal / num_hits;
-  pixel.depth /= num_hits;
-}
-
-float acceptance_rate(const MoveCounts& moves) {
-  return moves.proposed > 0
-             ? static_cast<float>(moves.accepted) / static_cast<float>(moves.proposed)
-             : 0.0f;
-}
-
-/// Adds one pixel to the books.
-void count_sampling(const PixelDiagnostics& did, PixelSource source, float ess_ratio,
-                    SamplingStats& stats) {
-  stats.pixels_fresh += source == PixelSource::fresh ? 1 : 0;
-  stats.pixels_carried += source == PixelSource::carried ? 1 : 0;
-  stats.pixels_restarted += source == PixelSource::restarted ? 1 : 0;
-  stats.pixels_refreshed += source == PixelSource::refreshed ? 1 : 0;
-  stats.pixels_refreshed_by_ratio += did.refreshed_by_ratio ? 1 : 0;
-  stats.pixels_resampled += did.resampled ? 1 : 0;
-  stats.local_proposed += static_cast<std::uint64_t>(did.local.proposed);
-  stats.local_accepted += static_cast<std::uint64_t>(did.local.accepted);
-  stats.independent_proposed += static_cast<std::uint64_t>(did.independent.proposed);
-  stats.independent_accepted += static_cast<std::uint64_t>(did.independent.accepted);
-  stats.count_ess(ess_ratio);
-}
 
 /// The first site that sees a surface, of a pixel that has one: its material decides.
 const SurfaceHit& first_surface(std::span<const SurfaceHit> hits) {
@@ -238,14 +201,8 @@ void TileFrameRenderer::sample(Batch& batch, const FrameLight& light, SampleStat
     pixel.mask = 1;
     pixel.lns = context_.sampler->chooses_rays() ? rays.lns : mean_lns(state, index);
     pixel.source = latest_source(state, index);
-    pixel.ess_ratio = did.ess / static_cast<float>(n);
-    pixel.acceptance = acceptance_rate({did.local.proposed + did.independent.proposed,
-                                        did.local.accepted + did.independent.accepted});
-    pixel.acceptance_local = acceptance_rate(did.local);
-    pixel.acceptance_independent = acceptance_rate(did.independent);
-    pixel.resampled = did.resampled;
+    record_sampling(did, n, pixel, frame_sampling_);
     stats_.target_evaluations += static_cast<std::uint64_t>(did.target_evaluations);
-    count_sampling(did, pixel.source, pixel.ess_ratio, frame_sampling_);
   }
 }
 
@@ -412,7 +369,7 @@ void TileFrameRenderer::finish(Batch& batch, const FrameLight& light, FilmWriter
   }
   for (std::size_t i = 0; i < batch.count; ++i) {
     PixelResult& pixel = batch.pixels[i];
-    add_geometry(surfaces_.pixel(batch.first + i), pixel);
+    record_geometry(surfaces_.pixel(batch.first + i), pixel);
     pixel.radiance += background[i];
     if (show_environment) pixel.alpha = 1;
     film.write(batch.first + i, pixel);
