@@ -2,6 +2,7 @@
 """`baton chart`: a small study gives its tables, charts and report; killed in the middle it goes on; a bad entry is
 named. `"method": "auto"` is settled by a small study."""
 
+import csv
 import json
 
 from farm import BAD_INPUT, Process, check, check_equal, make_job, run_tests, wait_until, write_job
@@ -80,6 +81,22 @@ def the_report_needs_no_other_file(programs, folder):
         check(name in names, f"expected {name} among {sorted(names)}")
 
 
+def the_second_pass_is_paid_for(programs, folder):
+    """Its rays and its time are part of what a method costs, from the worker's task to the tables."""
+    plain = {"sampling": {"method": "bidirectional"}}
+    methods = [{"name": "plain", "patch": plain},
+               {"name": "corrected", "patch": {**plain, "visibility": {"correlated": True}}}]
+    study = make_study(folder, methods=methods, budgets=[16], seeds=1)
+    chart(programs, study, folder / "out")
+    with (folder / "out/costs.csv").open(encoding="utf-8") as file:
+        first, both = csv.DictReader(file)
+    check_equal((first["method"], both["method"]), ("plain", "corrected"), "methods")
+    check_equal(float(first["secondsSecondPass"]), 0.0, "seconds of a second pass that is not there")
+    check(0 < float(both["secondsSecondPass"]) < float(both["cpuSeconds"]), f"seconds of the second pass in {both}")
+    check(float(first["raysPerPixel"]) <= 16, f"rays in {first}")
+    check(float(both["raysPerPixel"]) > 18, f"rays of both passes in {both}")
+
+
 def a_bad_entry_is_named(programs, folder):
     methods = [{"name": "mis", "patch": {"sampling": {"method": "mis"}}},
                {"name": "bad", "patch": {"sampling": {"metod": "mis"}}}]
@@ -123,5 +140,5 @@ def auto_is_settled_once_and_repeatably(programs, folder):
 
 
 if __name__ == "__main__":
-    run_tests([a_killed_study_goes_on, the_report_needs_no_other_file, auto_is_settled_once_and_repeatably,
-               a_bad_entry_is_named])
+    run_tests([a_killed_study_goes_on, the_report_needs_no_other_file, the_second_pass_is_paid_for,
+               auto_is_settled_once_and_repeatably, a_bad_entry_is_named])

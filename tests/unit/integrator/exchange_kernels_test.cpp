@@ -40,13 +40,21 @@ TEST(ExchangeKernels, LightsAsTheScalarCode) {
   }
 }
 
-// Runs of one material and mixtures: whole vectors without a lobe, with one kind, with all kinds.
+// Runs of one material and mixtures, each channel another: whole vectors without a lobe, with one
+// kind, with all kinds.
 TEST(ExchangeKernels, ReflectionsAsTheScalarCode) {
   const std::vector<Material> materials{
-      make_material({}),
-      make_material({.kind = MaterialKind::phong, .kd = 0.5f, .ks = 0.4f, .exponent = 50}),
-      make_material(
-          {.kind = MaterialKind::metallic_roughness, .metallic = 0.3f, .roughness = 0.4f}),
+      make_material({.base_color = {0.2f, 0.5f, 0.8f}}),
+      make_material({.kind = MaterialKind::phong,
+                     .base_color = {0.9f, 0.5f, 0.2f},
+                     .specular_color = {0.3f, 0.7f, 1},
+                     .kd = 0.5f,
+                     .ks = 0.4f,
+                     .exponent = 50}),
+      make_material({.kind = MaterialKind::metallic_roughness,
+                     .base_color = {1, 0.7f, 0.3f},
+                     .metallic = 0.3f,
+                     .roughness = 0.4f}),
       make_measured_material(MeasuredBrdf::tabulate(
           test::phong_by_angles({0.3f, 0.2f, 0.1f}, {0.5f, 0.4f, 0.3f}, 20)))};
   const ShadingPoint point{.position = {},
@@ -102,6 +110,26 @@ TEST(ExchangeKernels, ReflectionsAsTheScalarCode) {
   }
   EXPECT_GT(shining, 1000);
   EXPECT_EQ(ray, rays.rays.size());
+}
+
+// Whole vectors are stored, also when the last offers do not fill one.
+TEST(ExchangeKernels, RaysStopAtTheLastOffer) {
+  SurfaceTable surfaces;
+  surfaces.add({.position = {}, .ng = {0, 1, 0}, .ns = {0, 1, 0}, .wo = {0, 1, 0}},
+               make_material({}), {4, 2, 3});
+  const std::vector<LightRecord> lights{{.direction = {0, 1, 0}, .radiance = {1, 1, 1}}};
+  std::vector<Reflected> reflected(17 + kReceptionPadding);
+  OfferRays rays;
+  for (std::size_t count = 0; count <= 17; ++count) {
+    const std::vector<Offer> offers(count);
+    kernels::reflect_and_cast(surfaces, lights, offers, reflected, rays);
+    ASSERT_EQ(rays.rays.size(), count);
+    for (std::size_t i = 0; i < count; ++i) {
+      EXPECT_EQ(rays.offer[i], i);
+      EXPECT_GT(reflected[i].target, 0);
+      EXPECT_EQ(rays.rays.direction_y[i], 1);
+    }
+  }
 }
 
 }  // namespace

@@ -106,26 +106,35 @@ TEST(SecondPass, DilationGrowsTheMaskOverSurfaces) {
   EXPECT_GT(dilated, plain);
 }
 
-// What the pass is handed is a few bytes for each free sample of a pixel near a failed ray, nothing
-// of surfaces: at most 10 a sample and 2 a pixel in memory, less when encoded.
+// What the pass is handed is 10 bytes for each free sample of a pixel with a failed ray, 2 for each
+// pixel, nothing of surfaces; and a frame around them.
 TEST(SecondPass, StoresASmallRecordPerSample) {
   const JobSpec job = correlated_job();
   const auto context = load_render_context(job, Digest{1, 2});
   ASSERT_TRUE(context.ok());
-  std::size_t num_pixels = 0, num_samples = 0, num_encoded = 0;
+  FirstPassSamples samples;
   const TileRunSink sink{.film = [](int, const FilmTile&) { return Status(); },
                          .samples =
                              [&](const FirstPassSamples& s) {
-                               num_pixels = s.num_pixels();
-                               num_samples = s.energy.size();
-                               num_encoded = encode_first_pass_samples(s).size();
+                               samples = s;
                                return Status();
                              }};
   ASSERT_TRUE(run_tile(**context, {0, 0, 0, 0}, {}, sink, {}).ok());
-  const auto n = static_cast<std::size_t>(job.sampling.num_particles);
-  EXPECT_GT(num_samples, 100u);
-  EXPECT_LT(num_samples, num_pixels * n * 3 / 4);  // free pixels away from shadow keep theirs
-  EXPECT_LT(num_encoded, 2 * num_pixels + 10 * num_samples);
+  std::size_t num_free = 0;
+  for (std::size_t pixel = 0; pixel < samples.num_pixels(); ++pixel) {
+    if ((samples.flags[pixel] & ~FirstPassSamples::kSurface) != 0) {
+      EXPECT_LT(samples.count[pixel], job.sampling.num_particles) << pixel;  // not the blocked one
+    } else {
+      EXPECT_EQ(samples.count[pixel], 0) << pixel;
+      num_free += samples.flags[pixel] != 0 ? 1 : 0;
+    }
+  }
+  EXPECT_GT(num_free, 5u);
+  EXPECT_GT(samples.energy.size(), 100u);
+  const auto bytes = [](const FirstPassSamples& s) { return encode_first_pass_samples(s).size(); };
+  FirstPassSamples nothing;
+  nothing.rect = {0, 0, 0, 0};
+  EXPECT_LE(bytes(samples), bytes(nothing) + 2 * samples.num_pixels() + 10 * samples.energy.size());
 }
 
 TEST(SecondPass, RefusesSamplesOfAnotherTileOrJob) {

@@ -148,8 +148,20 @@ TEST_F(StudyTest, RecordsKeepEveryNumber) {
                    .state_pixels = 2,
                    .frames_rendered = 3,
                    .frames = {}};
-  record.counts.rays_shadow = 17;
-  record.counts.seconds_sample = 0.1;
+  record.counts = {.pixels = 11,
+                   .pixels_background = 12,
+                   .rays_shadow = 13,
+                   .target_evaluations = 14,
+                   .moves_proposed = 15,
+                   .pixels_resampled = 16,
+                   .pixels_restarted = 17,
+                   .cpu_seconds = 0.1,
+                   .seconds_light = 0.2,
+                   .seconds_primary = 0.3,
+                   .seconds_sample = 0.4,
+                   .seconds_visibility = 0.5,
+                   .seconds_shade = 0.6,
+                   .seconds_second_pass = 0.7};
   record.frames.push_back(
       {.frame = 4, .mse = 0.1 + 0.2, .flicker = kNotMeasured, .block_mse = {0.1, 0.2}});
   ASSERT_TRUE(write_record(folder_ / "r.json", record));
