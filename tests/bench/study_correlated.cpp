@@ -21,6 +21,7 @@
 #include "jobs/study/svg_chart.h"
 #include "worker/pass/render_context.h"
 #include "worker/pass/second_pass.h"
+#include "worker/pass/shared_assets.h"
 
 namespace baton {
 namespace {
@@ -166,13 +167,14 @@ Errors compare(const FilmTile& film, const Truth& truth) {
 /// ratios.
 struct Row {
   Case of;
+  std::shared_ptr<const RenderContext> context;
   std::vector<double> image, mask, bias, seconds;  ///< (runs)
   double second_share = 0;                         ///< of the second pass in the time
   double rays =
       0;  ///< shadow rays per penumbra pixel: all of the second pass, its own of the first
 };
-Result<Row> measure(const JobSpec& base, const Case& c, const Truth& truth, int runs,
-                    const std::string& folder) {
+Result<Row> prepare(const JobSpec& base, const Case& c, int runs,
+                    const std::shared_ptr<const SharedAssets>& assets) {
   JobSpec job = base;
   job.sampling.method = c.method;
   job.sampling.num_particles = c.num_particles;
@@ -180,26 +182,30 @@ Result<Row> measure(const JobSpec& base, const Case& c, const Truth& truth, int 
   job.visibility = c.visibility;
   job.frames.clear();
   for (int run = 1; run <= runs; ++run) job.frames.push_back(run);
-  BATON_ASSIGN(const auto context, load_render_context(job, Digest{1, 1}));
-  Row row{.of = c, .image = {}, .mask = {}, .bias = {}, .seconds = {}};
-  for (int run = 0; run < runs; ++run) {
-    BATON_ASSIGN(const Picture picture, render(*context, run));
-    const Errors e = compare(picture.film, truth);
-    const RenderStats& stats = picture.stats;
-    const double seconds = stats.cpu_seconds - stats.seconds_light;
-    row.image.push_back(e.image);
-    row.mask.push_back(e.mask);
-    row.bias.push_back(e.bias_mask);
-    row.seconds.push_back(seconds);
-    row.second_share += stats.seconds_second_pass / seconds / runs;
-    const double masked = std::max<double>(static_cast<double>(stats.pixels_masked), 1);
-    row.rays += (static_cast<double>(stats.rays_second_pass) / masked + c.num_particles) / runs;
-    if (run == 0 && !folder.empty()) {
-      BATON_TRY(write_exr(std::filesystem::path(folder) / (base.name + " " + c.name + ".exr"),
-                          picture.film, {}));
-    }
-  }
+  Row row{.of = c, .context = {}, .image = {}, .mask = {}, .bias = {}, .seconds = {}};
+  BATON_ASSIGN(row.context, make_render_context(job, Digest{1, 1}, assets));
   return row;
+}
+
+/// One more run of a case; the picture of the first goes to the folder.
+Status add_run(Row& row, const Truth& truth, const std::string& folder) {
+  const auto run = static_cast<std::int32_t>(row.image.size());
+  const auto runs = static_cast<double>(row.context->job.frames.size());
+  BATON_ASSIGN(const Picture picture, render(*row.context, run));
+  const Errors e = compare(picture.film, truth);
+  const RenderStats& stats = picture.stats;
+  const double seconds = stats.cpu_seconds - stats.seconds_light;
+  row.image.push_back(e.image);
+  row.mask.push_back(e.mask);
+  row.bias.push_back(e.bias_mask);
+  row.seconds.push_back(seconds);
+  row.second_share += stats.seconds_second_pass / seconds / runs;
+  const double masked = std::max<double>(static_cast<double>(stats.pixels_masked), 1);
+  row.rays += (static_cast<double>(stats.rays_second_pass) / masked + row.of.num_particles) / runs;
+  if (run > 0 || folder.empty()) return {};
+  return write_exr(
+      std::filesystem::path(folder) / (row.context->job.name + " " + row.of.name + ".exr"),
+      picture.film, {});
 }
 
 double root(double squared) { return std::sqrt(std::max(squared, 0.0)); }
@@ -296,12 +302,18 @@ Status run(const std::string& path, int runs, int reference_samples, const std::
   fmt::print("{:<26} {:>6} {:>5} {:>6} {:>8} {:>8} {:>18} {:>21} {:>18} {:>18}\n", "method", "ms",
              "2nd", "rays", "RMS", "RMS mask", "", "bias in mask, %", "efficiency", "per ray");
 
-  // Efficiencies in the penumbra are relative to the paper's single pass.
+  // The cases take turns: what else the machine does meets all of them.
+  BATON_ASSIGN(const auto assets, load_shared_assets(job));
   std::vector<Row> rows;
   for (const Case& c : make_cases()) {
-    BATON_ASSIGN(Row row, measure(job, c, truth, runs, folder));
+    BATON_ASSIGN(Row row, prepare(job, c, runs, assets));
     rows.push_back(std::move(row));
   }
+  for (int run = 0; run < runs; ++run) {
+    for (Row& row : rows) BATON_TRY(add_run(row, truth, folder));
+  }
+
+  // Efficiencies in the penumbra are relative to the paper's single pass.
   const auto base = std::find_if(rows.begin(), rows.end(),
                                  [](const Row& row) { return row.of.num_particles == 20; });
   for (const Row& row : rows) fmt::print("{}", table_line(*base, row));

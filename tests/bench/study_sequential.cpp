@@ -1,144 +1,29 @@
 // The experiments of [Ghosh, Doucet & Heidrich 2006] on a job's scene, as tables: usage:
 // study_sequential JOB.json EXPERIMENT > CSV
-//   moves      RMS error of the first carried frame against the number of moves or distributions
-//   [fig. 2, 3] resampled  fraction of pixels resampled per frame: one distribution with five
-//   moves, five with one [section 7] equal-time sequential and bidirectional over a sequence, the
-//   latter with as many candidates as the same time buys [fig. 1, 4, 5] equal-error error and time
-//   of bidirectional for many M beside sequential: the speed-up of relighting [section 7] drift
-//   mean, median and spread of carried over true Lns through the job's frames, with and without
-//   refresh
+//
+// moves        error of the first carried frame against the number of moves or distributions
+//              [fig. 2, 3]
+// resampled    fraction of pixels resampled per frame: one distribution with five moves, five with
+//              one [section 7]
+// equal-time   sequential and bidirectional over a sequence, the latter with as many candidates as
+//              the same time buys [fig. 1, 4, 5]
+// equal-error  error and time of bidirectional for many M beside sequential [section 7]
+// drift        mean, median and spread of carried over true Lns through the job's frames, with and
+//              without refresh
+//
 // Times are CPU seconds of sampling, visibility and shading; primary rays and the preparation of a
 // frame's light are the same for all methods and left out. One tile, one thread.
-#include <fmt/format.h>
-
-#include <algorithm>
-#include <cmath>
-#include <functional>
 #include <map>
 #include <string>
-#include <vector>
 
-#include "common/job/job_json.h"
-#include "worker/pass/render_context.h"
+#include "tests/bench/sequential_runs.h"
 
 namespace baton {
 namespace {
 
 constexpr int kSeeds = 4;
 
-/// A frame of one run.
-struct FrameResult {
-  FilmTile film;
-  RenderStats stats;
-  SamplingStats sampling;
-  double seconds() const {
-    return stats.seconds_sample + stats.seconds_visibility + stats.seconds_shade;
-  }
-};
-
-std::span<const float> plane(const FilmTile& film, std::string_view name) {
-  const auto found = std::find(film.channels.begin(), film.channels.end(), name);
-  BATON_CHECK(found != film.channels.end());
-  return {film.plane(static_cast<std::size_t>(found - film.channels.begin())), film.num_pixels()};
-}
-
-/// Ends the program with what went wrong.
-template <class T>
-T value_of(Result<T> result) {
-  if (result) return std::move(result).value();
-  fmt::print(stderr, "{}\n", result.error().message);
-  std::exit(65);
-}
-
-/// All frames of a job, frame by frame.
-std::vector<FrameResult> render(JobSpec job) {
-  job.image.tile_size = limits::kMaxTileSize;
-  job.output.background = Background::transparent;
-  job.output.aovs = {Aov::lns};
-  const auto context = value_of(load_render_context(job, Digest{1, 1}));
-  std::vector<FrameResult> frames(job.frames.size());
-  std::vector<std::shared_ptr<const SampleState>> states;
-  for (std::size_t i = 0; i < frames.size(); ++i) {
-    std::vector<std::shared_ptr<const SampleState>> next;
-    const TileRunSink sink{
-        .film =
-            [&](int, const FilmTile& film) {
-              frames[i].film = film;
-              return Status();
-            },
-        .state =
-            [&](const SampleState& s) {
-              next.push_back(std::make_shared<const SampleState>(s));
-              return Status();
-            },
-        .diagnostics = [&](const FrameStats& s) { frames[i].sampling = s.sampling; }};
-    const auto f = static_cast<std::int32_t>(i);
-    frames[i].stats = value_of(run_tile(*context, {0, f, f, f}, states, sink, {}));
-    states = std::move(next);
-  }
-  return frames;
-}
-
-/// The job with only the frame at `index`, under the same light.
-JobSpec frame_of(JobSpec job, std::size_t index) {
-  job.environment.rotation_start_deg +=
-      static_cast<double>(index) * job.environment.rotation_deg_per_frame;
-  job.frames = {job.frames[index]};
-  return job;
-}
-
-JobSpec with(JobSpec job, const std::function<void(SamplingSpec&)>& change) {
-  job.sampling.num_particles = 16;
-  job.sampling.num_candidates = 800;
-  job.sampling.refresh_every = 0;
-  job.sampling.refresh_ratio.reset();
-  change(job.sampling);
-  return job;
-}
-
-JobSpec carried(const JobSpec& job, int distributions, int moves, LnsUpdate update) {
-  return with(job, [&](SamplingSpec& s) {
-    s.method = Method::sequential;
-    s.num_distributions = distributions;
-    s.num_moves = moves;
-    s.lns_update = update;
-  });
-}
-
-JobSpec chosen(const JobSpec& job, int candidates) {
-  return with(job, [&](SamplingSpec& s) {
-    s.method = Method::bidirectional;
-    s.num_candidates = candidates;
-  });
-}
-
-/// Brute force of one frame.
-FilmTile reference(const JobSpec& job, std::size_t index) {
-  const JobSpec judge = with(frame_of(job, index), [](SamplingSpec& s) {
-    s.method = Method::reference;
-    s.reference_samples = 4096;
-  });
-  return render(judge).front().film;
-}
-
-/// Root mean square over pixels with a surface and channels.
-double rmse(const FilmTile& a, const FilmTile& b) {
-  double sum = 0;
-  double count = 0;
-  const std::span<const float> alpha = plane(b, "A");
-  for (const char* channel : {"R", "G", "B"}) {
-    const auto x = plane(a, channel);
-    const auto y = plane(b, channel);
-    for (std::size_t i = 0; i < x.size(); ++i) {
-      if (!(alpha[i] > 0)) continue;
-      sum += (double{x[i]} - y[i]) * (double{x[i]} - y[i]);
-      count += 1;
-    }
-  }
-  return std::sqrt(sum / count);
-}
-
-/// The same of log(a / b) of the unshadowed radiance over pixels where both are positive.
+/// Root mean square of log(a / b) of the unshadowed radiance over pixels where both are positive.
 double log_lns_error(const FilmTile& a, const FilmTile& b) {
   double sum = 0;
   double count = 0;

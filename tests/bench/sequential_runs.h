@@ -1,0 +1,145 @@
+// What the programs study_* of the sequential sampler share: runs of a job in one tile and thread,
+// variants of its sampling, and the judge.
+#pragma once
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+#include <cstdlib>
+#include <functional>
+#include <memory>
+#include <span>
+#include <string_view>
+#include <utility>
+#include <vector>
+
+#include "common/job/job_json.h"
+#include "worker/pass/render_context.h"
+#include "worker/pass/shared_assets.h"
+
+namespace baton {
+
+using SharedAssetsPtr = std::shared_ptr<const SharedAssets>;
+
+/// A frame of one run.
+struct FrameResult {
+  FilmTile film;
+  RenderStats stats;
+  SamplingStats sampling;
+  double seconds() const {
+    return stats.seconds_sample + stats.seconds_visibility + stats.seconds_shade;
+  }
+  /// With primary rays and the search for the pixel's history.
+  double seconds_with_primary() const { return seconds() + stats.seconds_primary; }
+};
+
+inline std::span<const float> plane(const FilmTile& film, std::string_view name) {
+  const auto found = std::find(film.channels.begin(), film.channels.end(), name);
+  BATON_CHECK(found != film.channels.end());
+  return {film.plane(static_cast<std::size_t>(found - film.channels.begin())), film.num_pixels()};
+}
+
+/// Ends the program with what went wrong.
+template <class T>
+T value_of(Result<T> result) {
+  if (result) return std::move(result).value();
+  fmt::print(stderr, "{}\n", result.error().message);
+  std::exit(65);
+}
+
+/// All frames of a job, frame by frame, in one tile with a transparent background. aovs: their
+/// channels.
+inline std::vector<FrameResult> render(JobSpec job, const SharedAssetsPtr& assets,
+                                       const std::vector<Aov>& aovs = {Aov::lns}) {
+  job.image.tile_size = limits::kMaxTileSize;
+  job.output.background = Background::transparent;
+  job.output.aovs = aovs;
+  const auto context = value_of(make_render_context(job, Digest{1, 1}, assets));
+  std::vector<FrameResult> frames(job.frames.size());
+  std::vector<std::shared_ptr<const SampleState>> states;
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    std::vector<std::shared_ptr<const SampleState>> next;
+    const TileRunSink sink{
+        .film =
+            [&](int, const FilmTile& film) {
+              frames[i].film = film;
+              return Status();
+            },
+        .state =
+            [&](const SampleState& s) {
+              next.push_back(std::make_shared<const SampleState>(s));
+              return Status();
+            },
+        .diagnostics = [&](const FrameStats& s) { frames[i].sampling = s.sampling; }};
+    const auto f = static_cast<std::int32_t>(i);
+    frames[i].stats = value_of(run_tile(*context, {0, f, f, f}, states, sink, {}));
+    states = std::move(next);
+  }
+  return frames;
+}
+/// The same with assets of its own.
+inline std::vector<FrameResult> render(const JobSpec& job) {
+  return render(job, value_of(load_shared_assets(job)));
+}
+
+/// The job with only the frame at `index`, under the same light.
+inline JobSpec frame_of(JobSpec job, std::size_t index) {
+  job.environment.rotation_start_deg +=
+      static_cast<double>(index) * job.environment.rotation_deg_per_frame;
+  job.frames = {job.frames[index]};
+  return job;
+}
+
+inline JobSpec with(JobSpec job, const std::function<void(SamplingSpec&)>& change) {
+  job.sampling.num_particles = 16;
+  job.sampling.num_candidates = 800;
+  job.sampling.refresh_every = 0;
+  job.sampling.refresh_ratio.reset();
+  change(job.sampling);
+  return job;
+}
+
+inline JobSpec carried(const JobSpec& job, int distributions, int moves, LnsUpdate update) {
+  return with(job, [&](SamplingSpec& s) {
+    s.method = Method::sequential;
+    s.num_distributions = distributions;
+    s.num_moves = moves;
+    s.lns_update = update;
+  });
+}
+
+inline JobSpec chosen(const JobSpec& job, int candidates) {
+  return with(job, [&](SamplingSpec& s) {
+    s.method = Method::bidirectional;
+    s.num_candidates = candidates;
+  });
+}
+
+/// Brute force of one frame.
+inline FilmTile reference(const JobSpec& job, std::size_t index) {
+  const JobSpec judge = with(frame_of(job, index), [](SamplingSpec& s) {
+    s.method = Method::reference;
+    s.reference_samples = 4096;
+  });
+  return render(judge).front().film;
+}
+
+/// Root mean square over pixels with a surface and channels.
+inline double rmse(const FilmTile& a, const FilmTile& b) {
+  double sum = 0;
+  double count = 0;
+  const std::span<const float> alpha = plane(b, "A");
+  for (const char* channel : {"R", "G", "B"}) {
+    const auto x = plane(a, channel);
+    const auto y = plane(b, channel);
+    for (std::size_t i = 0; i < x.size(); ++i) {
+      if (!(alpha[i] > 0)) continue;
+      sum += (double{x[i]} - y[i]) * (double{x[i]} - y[i]);
+      count += 1;
+    }
+  }
+  return std::sqrt(sum / count);
+}
+
+}  // namespace baton
