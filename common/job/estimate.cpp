@@ -23,9 +23,6 @@ std::int64_t count_neighbours(const JobSpec& job, std::int32_t reach_px) {
 /// In memory: Lns, Lns when fresh and source of a pixel; direction, weight and site of a particle.
 constexpr std::int64_t kStateBytesPerPixel = 9;
 constexpr std::int64_t kStateBytesPerParticle = 9;
-/// As stored: 130 bytes a pixel at N = 16.
-constexpr std::int64_t kStoredBytesPerPixel = 10;
-constexpr double kStoredBytesPerParticle = 7.5;
 
 }  // namespace
 
@@ -42,8 +39,10 @@ JobEstimate estimate_job(const JobSpec& job) {
   e.assemble_tasks = e.frames;
   e.second_pass_tasks = job.visibility.correlated ? e.frames * e.tiles : 0;
   e.dependencies = e.frames * e.tiles;
-  if (carries_state(job)) e.dependencies += count_neighbours(job, history_reach_px(job)) * (e.runs - 1);
-  if (job.visibility.correlated) e.dependencies += count_neighbours(job, exchange_reach_px(job.visibility)) * e.frames;
+  if (carries_state(job))
+    e.dependencies += count_neighbours(job, history_reach_px(job)) * (e.runs - 1);
+  if (job.visibility.correlated)
+    e.dependencies += count_neighbours(job, exchange_reach_px(job.visibility)) * e.frames;
 
   // Count rays; a reference sample is a pair, one from the environment and one from the BRDF.
   e.primary_rays_per_pixel = job.image.sites;
@@ -56,9 +55,8 @@ JobEstimate estimate_job(const JobSpec& job) {
   e.film_channels = 4;
   for (const Aov aov : job.output.aovs) {
     e.film_channels += num_channels(aov);
-    const bool wide =
-        aov == Aov::depth || aov == Aov::lns || aov == Aov::variance || aov == Aov::material ||
-        aov == Aov::normal;
+    const bool wide = aov == Aov::depth || aov == Aov::lns || aov == Aov::variance ||
+                      aov == Aov::material || aov == Aov::normal;
     wide_channels += wide ? num_channels(aov) : 0;
   }
   e.film_bytes = pixels * e.film_channels * 4;
@@ -71,13 +69,10 @@ JobEstimate estimate_job(const JobSpec& job) {
   const std::int64_t particles = num_carried_particles(job.sampling);
   e.largest_blob_bytes = tile_pixels * e.film_channels * 4;
   if (carries_state(job)) {
-    e.state_bytes_per_pixel =
-        kStoredBytesPerPixel +
-        static_cast<std::int64_t>(kStoredBytesPerParticle * static_cast<double>(particles));
+    // What is stored of a pixel with a surface is hardly smaller.
+    e.state_bytes_per_pixel = kStateBytesPerPixel + kStateBytesPerParticle * particles;
     e.state_bytes = pixels * e.state_bytes_per_pixel;
-    e.largest_blob_bytes =
-        std::max(e.largest_blob_bytes,
-                 tile_pixels * (kStateBytesPerPixel + kStateBytesPerParticle * particles));
+    e.largest_blob_bytes = std::max(e.largest_blob_bytes, tile_pixels * e.state_bytes_per_pixel);
   }
   return e;
 }

@@ -25,8 +25,8 @@ TEST(Estimate, CountsTasksAndWhatTheyWaitFor) {
 
 TEST(Estimate, SizesStateOnlyWhereItIsCarried) {
   JobSpec job = small_job();
-  EXPECT_EQ(estimate_job(job).state_bytes_per_pixel, 130);
-  EXPECT_EQ(estimate_job(job).state_bytes, 130 * 5000);
+  EXPECT_EQ(estimate_job(job).state_bytes_per_pixel, 9 + 9 * 16);
+  EXPECT_EQ(estimate_job(job).state_bytes, 153 * 5000);
   job.sampling.method = Method::bidirectional;
   EXPECT_EQ(estimate_job(job).state_bytes, 0);
   EXPECT_EQ(estimate_job(job).dependencies, 5 * 8);
