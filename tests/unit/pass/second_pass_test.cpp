@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "common/base/section_file.h"
 #include "tests/support/second_pass.h"
 #include "worker/pass/primary.h"
 
@@ -107,7 +108,7 @@ TEST(SecondPass, DilationGrowsTheMaskOverSurfaces) {
 }
 
 // What the pass is handed is 10 bytes for each free sample of a pixel with a failed ray, 2 for each
-// pixel, nothing of surfaces; and a frame around them.
+// pixel, nothing of surfaces.
 TEST(SecondPass, StoresASmallRecordPerSample) {
   const JobSpec job = correlated_job();
   const auto context = load_render_context(job, Digest{1, 2});
@@ -131,10 +132,16 @@ TEST(SecondPass, StoresASmallRecordPerSample) {
   }
   EXPECT_GT(num_free, 5u);
   EXPECT_GT(samples.energy.size(), 100u);
-  const auto bytes = [](const FirstPassSamples& s) { return encode_first_pass_samples(s).size(); };
-  FirstPassSamples nothing;
-  nothing.rect = {0, 0, 0, 0};
-  EXPECT_LE(bytes(samples), bytes(nothing) + 2 * samples.num_pixels() + 10 * samples.energy.size());
+
+  // All of what is stored, before it is packed; META says whose it is.
+  const Bytes bytes = encode_first_pass_samples(samples);
+  const auto file = decode_section_file(bytes, {'B', 'F', 'S', '1'}, 1, "test");
+  ASSERT_TRUE(file.ok());
+  std::size_t stored = 0;
+  for (const Section& section : file->sections) stored += section.payload.size();
+  const std::size_t meta = file->find({'M', 'E', 'T', 'A'})->payload.size();
+  EXPECT_LE(meta, 64u);
+  EXPECT_EQ(stored, meta + 2 * samples.num_pixels() + 10 * samples.energy.size());
 }
 
 TEST(SecondPass, RefusesSamplesOfAnotherTileOrJob) {
