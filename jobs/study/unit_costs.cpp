@@ -12,18 +12,18 @@ struct UnitCosts {
 
 UnitCosts units_of(const JobSpec& job) {
   // Fitted with one M alone, so the evaluations are those of bidirectional.
-  if (job.visibility.correlated) return {2.75, 0.111, 0.0053};
+  if (job.visibility.correlated) return {2.50, 0.101, 0.0020};
   switch (job.sampling.method) {
     case Method::sequential:
-      return {1.24, 0.090, 0.0082};
+      return {1.44, 0.087, 0.0075};
     case Method::pool:
-      return {2.02, 0.117, 0.0147};
+      return {2.07, 0.117, 0.0110};
     case Method::bidirectional:
-      return {0.91, 0.070, 0.0053};
+      return {1.00, 0.080, 0.0020};
     case Method::mis:
-      return {1.36, 0.036, 0.0382};
+      return {1.37, 0.073, 0.0};
     default:
-      return {0.82, 0.072, 0.0011};
+      return {0.76, 0.075, 0.0025};
   }
 }
 
