@@ -67,8 +67,8 @@ def correlated_visibility(programs, folder):
 def settings_by_material(programs, folder):
     """Methods and numbers of samples that differ by material."""
     sampling = {"method": "mis", "numParticles": 8, "byMaterial": {
-        "ground": {"method": "environment", "numParticles": 4},
-        "glossy": {"method": "bidirectional", "numParticles": 12, "numCandidates": 64}}}
+        "chalk": {"method": "environment", "numParticles": 4},
+        "lacquer": {"method": "bidirectional", "numParticles": 12, "numCandidates": 64}}}
     expected = None
     for name, workers, threads, tile_size in [("whole-image", 1, 2, 160), ("small-tiles", 2, 1, 16)]:
         place = folder / name
@@ -185,6 +185,7 @@ if __name__ == "__main__":
         one_site,
         four_sites,
         correlated_visibility,
+        settings_by_material,
         pool,
         equal_jobs_make_equal_files,
         a_killed_worker,
