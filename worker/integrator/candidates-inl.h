@@ -215,6 +215,30 @@ struct BsdfRun {
             lobes ? sites.num_lobes : sites.num_hits, counts.from_bsdf,
             uniform_float(random[3] * 0x9E3779B9u)};
   }
+  /// texels = locate(surface, i, code) for the directions i, i + 1, ..., some vectors ahead of
+  /// use(surface, i, code, texels).
+  template <class Locate, class Use>
+  HWY_INLINE void ForEachLocated(const Locate& locate, const Use& use) const {
+    constexpr std::size_t kAhead = 8;
+    const auto some = [&](const SurfaceLanes& surface, std::size_t first, std::size_t last)
+                          HWY_ATTR {
+                            const std::size_t lanes = hn::Lanes(DF());
+                            VU code[kAhead];
+                            TexelLanes texels[kAhead];
+                            for (std::size_t v = first; v < last; ++v) {
+                              texels[v - first] = locate(surface, v * lanes, code[v - first]);
+                            }
+                            for (std::size_t v = first; v < last; ++v) {
+                              use(surface, v * lanes, code[v - first], texels[v - first]);
+                            }
+                          };
+    Deal().ForEachRun(
+        sites, [&](const SurfaceLanes& surface, std::size_t first, std::size_t last) HWY_ATTR {
+          for (std::size_t v = first; v < last; v += kAhead) {
+            some(surface, v, std::min(v + kAhead, last));
+          }
+        });
+  }
   /// Directions i, i + 1, ...: Sobol' points with the pixel's digital shift.
   HWY_INLINE Vec3Lanes Draw(const SurfaceLanes& surface, std::size_t i) const {
     const DF d;
@@ -236,32 +260,21 @@ HWY_INLINE void BsdfCandidates(const SiteBlock& sites, const EnvironmentView& en
   if (counts.from_bsdf == 0) return;
   const CandidateWeights weigh{sites, counts};
   const BsdfRun run{sites, counts, random};
-  constexpr std::size_t kAhead = 8;
-  const auto evaluate = [&](const SurfaceLanes& surface, std::size_t first,
-                            std::size_t last) HWY_ATTR {
-    VU code[kAhead];
-    TexelLanes texels[kAhead];
-    for (std::size_t v = first; v < last; ++v) {
-      code[v - first] = EncodeOctahedral(run.Draw(surface, v * hn::Lanes(DF())));
-      texels[v - first] = LocateTexels(environment, DecodeOctahedral(code[v - first]));
-      PrefetchTexels(environment, texels[v - first]);
-    }
-    for (std::size_t v = first; v < last; ++v) {
-      const std::size_t i = v * hn::Lanes(DF());
-      const RadianceLanes light = EvaluateTexels(environment, texels[v - first]);
-      const BsdfLanes f = EvaluateBsdf(surface, DecodeOctahedral(code[v - first]));
-      const Vec3Lanes reflected = ReflectedRadiance(surface, f, light.r, light.g, light.b);
-      const VF weight = weigh(MeanLanes(reflected), surface, f, light.density,
-                              static_cast<std::size_t>(counts.from_bsdf) - i);
-      use(CandidateLanes{code[v - first], surface.site, weight, reflected}, i);
-    }
+  const auto locate = [&](const SurfaceLanes& surface, std::size_t i, VU& code) HWY_ATTR {
+    code = EncodeOctahedral(run.Draw(surface, i));
+    const TexelLanes texels = LocateTexels(environment, DecodeOctahedral(code));
+    PrefetchTexels(environment, texels);
+    return texels;
   };
-  run.Deal().ForEachRun(
-      sites, [&](const SurfaceLanes& surface, std::size_t first, std::size_t last) HWY_ATTR {
-        for (std::size_t v = first; v < last; v += kAhead) {
-          evaluate(surface, v, std::min(v + kAhead, last));
-        }
-      });
+  run.ForEachLocated(locate, [&](const SurfaceLanes& surface, std::size_t i, VU code,
+                                 const TexelLanes& texels) HWY_ATTR {
+    const RadianceLanes light = EvaluateTexels(environment, texels);
+    const BsdfLanes f = EvaluateBsdf(surface, DecodeOctahedral(code));
+    const Vec3Lanes reflected = ReflectedRadiance(surface, f, light.r, light.g, light.b);
+    const VF weight = weigh(MeanLanes(reflected), surface, f, light.density,
+                            static_cast<std::size_t>(counts.from_bsdf) - i);
+    use(CandidateLanes{code, surface.site, weight, reflected}, i);
+  });
 }
 
 }  // namespace baton::HWY_NAMESPACE

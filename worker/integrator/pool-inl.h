@@ -100,7 +100,8 @@ class PoolGatherer {
         now_(unturned_view_of(input.now)),
         before_(unturned_view_of(input.before)),
         same_surface_(input.old == nullptr && input.now.rotation.m == input.before.rotation.m),
-        same_light_(input.now.map == input.before.map) {
+        same_light_(input.now.map == input.before.map),
+        same_grid_(now_.width == before_.width && now_.height == before_.height) {
     if (input.has_history && !same_surface_) surfaces_before_.emplace(TurnedSurfaces(input));
   }
 
@@ -111,7 +112,7 @@ class PoolGatherer {
     CarriedLanes carried[2 * kMaxVectors];
     for (std::size_t v = 0; v < 2 * vectors; ++v) {
       carried[v] = Locate(v / vectors, v % vectors * hn::Lanes(DF()));
-      PrefetchTexels(now_, carried[v].texels);
+      Prefetch(carried[v].texels);
     }
     const DF d;
     const auto sum = [&](VF v) HWY_ATTR { return hn::GetLane(hn::SumOfLanes(d, v)); };
@@ -142,6 +143,20 @@ class PoolGatherer {
 
   /// Whether the target before is that of now: nothing has changed, or there is none.
   bool SameTarget() const { return !input_.has_history || (same_surface_ && same_light_); }
+
+  /// Whether radiance differs between the frames.
+  bool ReadsBefore() const { return !same_light_ && input_.has_history; }
+
+  HWY_INLINE void Prefetch(const TexelLanes& texels) const {
+    PrefetchTexels(now_, texels);
+    if (ReadsBefore() && same_grid_) PrefetchTexels(before_, texels);
+  }
+
+  /// Radiance of the frame before along map directions, which lie on `texels` of the map of now.
+  HWY_INLINE RadianceLanes Before(const Vec3Lanes& map_direction, const TexelLanes& texels) const {
+    return same_grid_ ? EvaluateTexels(before_, texels)
+                      : EvaluateEnvironment(before_, map_direction);
+  }
 
   /// Reflected light now, and both targets. f: of `surface` now. before: the surface that the site
   /// inherits from, its samples shared among heirs (OldSurfaces).
@@ -284,8 +299,7 @@ class PoolGatherer {
     p.world = Transform(input_.now.rotation.m.data(), map_direction);
     const BsdfLanes f = EvaluateBsdf(surface, p.world);
     const RadianceLanes light = EvaluateTexels(now_, texels);
-    const RadianceLanes then =
-        same_light_ || !input_.has_history ? light : EvaluateEnvironment(before_, map_direction);
+    const RadianceLanes then = ReadsBefore() ? Before(map_direction, texels) : light;
     SetTargets(surface, before, f, light, then, p);
     density = light.density;
     return f;
@@ -323,13 +337,20 @@ class PoolGatherer {
     const auto count = static_cast<std::size_t>(input_.counts.from_bsdf);
     if (count == 0) return;
     const BsdfRun run{input_.sites, input_.counts, random};
-    run.Deal().ForEach(input_.sites, [&](const SurfaceLanes& surface, std::size_t i) HWY_ATTR {
+    const auto locate = [&](const SurfaceLanes& surface, std::size_t i, VU& code) HWY_ATTR {
+      code = EncodeOctahedral(Transform(to_map_.m.data(), run.Draw(surface, i)));
+      const TexelLanes texels = LocateTexels(now_, DecodeOctahedral(code));
+      Prefetch(texels);
+      return texels;
+    };
+    run.ForEachLocated(locate, [&](const SurfaceLanes& surface, std::size_t i, VU code,
+                                   const TexelLanes& texels) HWY_ATTR {
       PoolPoint p;
-      p.code = EncodeOctahedral(Transform(to_map_.m.data(), run.Draw(surface, i)));
+      p.code = code;
       p.site = surface.site;
       VF density;
-      const Vec3Lanes w = DecodeOctahedral(p.code);
-      const BsdfLanes f = Evaluate(surface, LoadBefore(surface), w, LocateTexels(now_, w), p, density);
+      const BsdfLanes f =
+          Evaluate(surface, LoadBefore(surface), DecodeOctahedral(code), texels, p, density);
       AppendFresh(p, FreshWeight(p, surface, f, density, count - i), out, sums);
     });
   }
@@ -339,6 +360,7 @@ class PoolGatherer {
   const EnvironmentView now_, before_;  ///< for directions in the map's frame
   const bool same_surface_;             ///< as seen from the map
   const bool same_light_;               ///< the map's texels
+  const bool same_grid_;                ///< the maps' sizes
   const Mat3 to_map_ = input_.now.rotation.transposed();
   std::optional<SiteBlock> surfaces_before_;  ///< turned; where they differ from those of now
 };
