@@ -7,7 +7,6 @@
 //              one [section 7]
 // equal-time   sequential and bidirectional over a sequence, the latter with as many candidates as
 //              the same time buys [fig. 1, 4, 5]
-// equal-error  error and time of bidirectional for many M beside sequential [section 7]
 // drift        mean, median and spread of carried over true Lns through the job's frames, with and
 //              without refresh
 //
@@ -148,25 +147,6 @@ void study_equal_time(const JobSpec& job) {
   rows("bidirectional, M = 800", chosen(job, 800));
 }
 
-void study_equal_error(const JobSpec& base) {
-  fmt::print("degPerFrame,kind,M,frame,rmse,ms\n");
-  for (const double speed : {0.1, 1.5}) {
-    JobSpec job = base;
-    job.environment.rotation_deg_per_frame = speed;
-    const auto truth = references(job, {1, 4, 16});
-    const auto rows = [&](const char* kind, int candidates, const JobSpec& variant) {
-      for (const auto& [index, s] : score(variant, truth)) {
-        fmt::print("{},{},{},{},{:.6f},{:.3f}\n", speed, kind, candidates, job.frames[index],
-                   std::sqrt(s.squared_error), 1e3 * s.seconds);
-      }
-    };
-    rows("sequential P=5", 800, carried(job, 5, 1, LnsUpdate::path_trapezoid));
-    rows("sequential P=1", 800, carried(job, 1, 1, LnsUpdate::ratio));
-    for (const int candidates : {32, 64, 128, 256, 512, 1024})
-      rows("bidirectional", candidates, chosen(job, candidates));
-  }
-}
-
 void study_drift(const JobSpec& base) {
   fmt::print("degPerFrame,kind,frame,mean,p05,median,p95\n");
   for (const double speed : {0.0, 0.1, 1.5}) {
@@ -215,12 +195,10 @@ int run(const std::string& path, const std::string& experiment) {
       {"moves", study_moves},
       {"resampled", study_resampled},
       {"equal-time", study_equal_time},
-      {"equal-error", study_equal_error},
       {"drift", study_drift}};
   const auto found = experiments.find(experiment);
   if (found == experiments.end()) {
-    fmt::print(stderr,
-               "usage: study_sequential JOB.json moves|resampled|equal-time|equal-error|drift\n");
+    fmt::print(stderr, "usage: study_sequential JOB.json moves|resampled|equal-time|drift\n");
     return 64;
   }
   found->second(value_of(load_job(path)));

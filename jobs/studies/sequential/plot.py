@@ -75,26 +75,35 @@ def draw_equal_time(folder, name):
     save(figure, folder / f"{name}.svg")
 
 
-def draw_equal_error(folder, name):
-    """Error against time of bidirectional for many M, with the sequential sampler as points, for each speed."""
-    with (folder / f"{name}.csv").open() as file:
-        rows = list(csv.DictReader(file))
-    speeds = list(dict.fromkeys(row["degPerFrame"] for row in rows))
-    figure, axes = plt.subplots(1, len(speeds), figsize=(4 * len(speeds), 3.2), squeeze=False)
-    markers = {"bidirectional": "", "sequential P=1": "s", "sequential P=5": "*"}
-    for axis, speed in zip(axes[0], speeds):
-        for colour, frame in enumerate(dict.fromkeys(row["frame"] for row in rows)):
-            for kind, marker in markers.items():
-                points = sorted((float(r["ms"]), float(r["rmse"])) for r in rows
-                                if (r["degPerFrame"], r["frame"], r["kind"]) == (speed, frame, kind))
-                axis.plot(*zip(*points), marker=marker, color=f"C{colour}", markersize=7, label=f"{kind}, frame {frame}")
-        axis.set_xscale("log")
-        axis.set_yscale("log")
+def draw_speed_up(folder):
+    """Section 7: error against time of bidirectional for many M, with the sequential sampler as points."""
+    kinds = {"P = 1": "s", "P = 1, refreshEvery 4": "D", "P = 5": "*", "P = 5, refreshRatio 1.5": "P"}
+    motions = {"slow-light": "light, 0.1\u00b0 a frame", "light": "light, 1.5\u00b0 a frame", "camera": "camera, 2\u00b0 a frame"}
+    figure, axes = plt.subplots(2, len(motions), figsize=(9, 5.6))
+    for line, (suffix, scene) in zip(axes, (("", "interior"), ("-soft", "forest"))):
+        for axis, (motion, title) in zip(line, motions.items()):
+            with (folder / f"speed-up-{motion}{suffix}.csv").open() as file:
+                rows = list(csv.DictReader(file))
+            for colour, frames in enumerate(("2", "2-9")):
+                mine = [r for r in rows if r["frames"] == frames]
+                curve = [(float(r["ms"]), float(r["rmse"])) for r in mine if r["kind"].startswith("bidirectional")]
+                axis.plot(*zip(*curve), marker=".", color=f"C{colour}", label=f"bidirectional, M = 16 to 1024, frames {frames}")
+                for kind, marker in kinds.items():
+                    point = next(r for r in mine if r["kind"] == kind)
+                    axis.plot(float(point["ms"]), float(point["rmse"]), marker, color=f"C{colour}", markersize=7,
+                              label=f"sequential, {kind}, frames {frames}")
+            axis.set_xscale("log")
+            axis.set_xticks((4, 6, 10, 15), ("4", "6", "10", "15"))
+            axis.set_xticks((), minor=True)
+            axis.set_yscale("log")
+            axis.set_title(f"{scene}, {title}", fontsize=9)
+        line[0].set_ylabel("RMS error")
+    for axis in axes[-1]:
         axis.set_xlabel("ms per frame")
-        axis.set_title(f"{float(speed):g}\u00b0 a frame", fontsize=9)
-    axes[0][0].set_ylabel("RMS error")
-    axes[0][0].legend(fontsize=6, frameon=False)
-    save(figure, folder / f"{name}.svg")
+    figure.legend(*axes[0][0].get_legend_handles_labels(), fontsize=7, frameon=False, loc="lower center", ncols=2)
+    figure.tight_layout(rect=(0, 0.17, 1, 1))
+    figure.savefig(folder / "speed-up.svg", metadata={"Date": None})
+    plt.close(figure)
 
 
 def draw_drift(folder):
@@ -134,8 +143,7 @@ def main():
     draw_resampled(folder, "resampled-soft")
     draw_equal_time(folder, "sky-specular")
     draw_equal_time(folder, "sky-mixed")
-    draw_equal_error(folder, "equal-error")
-    draw_equal_error(folder, "equal-error-soft")
+    draw_speed_up(folder)
     draw_drift(folder)
     return 0
 
