@@ -71,9 +71,13 @@ std::shared_ptr<JobEntry> JobCache::entry(const Digest& digest) {
     entries_.erase(found);
   }
 
-  // Make room: the tasks of a dropped job keep its entry alive until they end.
+  // Make room. A job that tasks still hold stays: a document that arrives for it must find it.
+  for (auto oldest = entries_.end();
+       entries_.size() >= limits::kMaxCachedJobs && oldest != entries_.begin();) {
+    --oldest;
+    if (oldest->use_count() == 1) oldest = entries_.erase(oldest);
+  }
   entries_.push_front(std::make_shared<JobEntry>(digest, loader_));
-  if (entries_.size() > limits::kMaxCachedJobs) entries_.pop_back();
   return entries_.front();
 }
 

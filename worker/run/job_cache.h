@@ -61,9 +61,8 @@ class JobEntry {
   std::optional<Result<LoadedJobPtr>> result_;
 };
 
-/// The jobs that this process has seen last, most recent first. Used by the control thread alone;
-/// the entries it hands out are safe to share and live as long as a task holds them, however many
-/// jobs have come since.
+/// The jobs that this process has seen last, most recent first, and all that somebody holds. Used
+/// by the control thread alone; the entries it hands out are safe to share.
 class JobCache {
  public:
   explicit JobCache(JobLoader loader) : loader_(std::move(loader)) {}
@@ -74,7 +73,8 @@ class JobCache {
 
  private:
   JobLoader loader_;
-  std::list<std::shared_ptr<JobEntry>> entries_;  ///< at most limits::kMaxCachedJobs
+  /// At most limits::kMaxCachedJobs, and beyond that those in use.
+  std::list<std::shared_ptr<JobEntry>> entries_;
 };
 
 }  // namespace baton

@@ -67,13 +67,32 @@ TEST(JobCache, AFailureIsForThatEntryAlone) {
 
 TEST(JobCache, TheOldestJobGoesFirst) {
   JobCache cache(empty_job);
-  const auto oldest = cache.entry({0, 1});
-  const auto used_again = cache.entry({0, 2});
+  cache.entry({0, 1})->provide("text");
+  cache.entry({0, 2})->provide("text");
   for (std::uint64_t i = 3; i <= limits::kMaxCachedJobs; ++i) (void)cache.entry({0, i});
-  EXPECT_EQ(cache.entry({0, 1}), oldest);
+  EXPECT_TRUE(cache.entry({0, 1})->has_document());
   (void)cache.entry({9, 9});
-  EXPECT_EQ(cache.entry({0, 1}), oldest);
-  EXPECT_NE(cache.entry({0, 2}), used_again);
+  EXPECT_TRUE(cache.entry({0, 1})->has_document());
+  EXPECT_FALSE(cache.entry({0, 2})->has_document());
+}
+
+// A task waits for its job's document. However many jobs come meanwhile, the document must reach
+// the entry that the task holds, or the task would wait for ever.
+TEST(JobCache, AJobInUseIsNotForgotten) {
+  JobCache cache(empty_job);
+  std::vector<std::shared_ptr<JobEntry>> held;
+  for (std::uint64_t i = 0; i < 3 * limits::kMaxCachedJobs; ++i)
+    held.push_back(cache.entry({0, i}));
+  for (std::uint64_t i = 0; i < held.size(); ++i) {
+    cache.entry({0, i})->provide("text");
+    EXPECT_TRUE(held[i]->has_document()) << i;
+  }
+
+  // Once nobody holds them, they are forgotten like all others.
+  held.clear();
+  for (std::uint64_t i = 0; i < limits::kMaxCachedJobs; ++i) (void)cache.entry({1, i});
+  for (std::uint64_t i = 0; i < 3 * limits::kMaxCachedJobs; ++i)
+    EXPECT_FALSE(cache.entry({0, i})->has_document()) << i;
 }
 
 TEST(JobCache, ADocumentOfAnotherJobIsRefused) {
