@@ -165,6 +165,7 @@ struct EnvironmentSpec {
   bool interpolate = true;
   MapFilter filter = MapFilter::bilinear;
   float scale = 1;                 ///< radiance factor, (0, inf)
+  int max_width = 0;               ///< wider maps are reduced to so many columns, [0, limits::kMaxEnvironmentSide]; 0: none
   Vec3 rotation_axis{0, 1, 0};
   double rotation_start_deg = 0;   ///< at the first frame of the job
   double rotation_deg_per_frame = 0;

@@ -163,6 +163,7 @@ void fields(JobArchive& a, EnvironmentSpec& environment, const std::vector<int>&
   a.boolean("interpolate", environment.interpolate);
   a.choice("filter", environment.filter, kMapFilters);
   a.number("scale", environment.scale, kPositiveRange);
+  a.integer("maxWidth", environment.max_width, 0, limits::kMaxEnvironmentSide);
   a.object("rotation", [&] {
     a.vector("axis", environment.rotation_axis, kCoordinateRange);
     if (length(environment.rotation_axis) == 0) a.fault("axis", "a direction", "[0, 0, 0]");

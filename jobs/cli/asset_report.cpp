@@ -6,7 +6,7 @@
 #include <set>
 
 #include "common/image/image_io.h"
-#include "worker/scene/environment.h"
+#include "worker/scene/map_reduction.h"
 #include "worker/scene/scene.h"
 
 namespace baton {
@@ -14,8 +14,9 @@ namespace {
 
 Result<MapReport> load_map(const std::string& path, const EnvironmentSpec& environment) {
   BATON_ASSIGN(const RgbImage image, read_rgb_image(path));
-  const EnvironmentMap map(image, environment.filter, environment.scale, false);
-  return MapReport{path, map.width(), map.height(), map.repairs().total(), map.black()};
+  const EnvironmentMap map = make_map(image, environment, false);
+  return MapReport{path,         map.width(),           map.height(), image.width,
+                   image.height, map.repairs().total(), map.black()};
 }
 
 void load_maps(const EnvironmentSpec& environment, AssetReport& report,

@@ -12,8 +12,9 @@ namespace baton {
 /// A map of the job, as loaded.
 struct MapReport {
   std::string path;
-  int width = 0, height = 0;
-  std::uint64_t repaired_texels = 0;  ///< negative, NaN or infinite ones, taken as 0
+  int width = 0, height = 0;            ///< texels in force
+  int file_width = 0, file_height = 0;  ///< what the file holds
+  std::uint64_t repaired_texels = 0;    ///< negative, NaN or infinite ones, taken as 0
   bool black = false;
 };
 

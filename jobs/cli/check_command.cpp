@@ -37,6 +37,8 @@ void print_json(const JobSpec& job, const JobEstimate& e, const AssetReport& ass
     maps.push_back({{"path", map.path},
                     {"width", map.width},
                     {"height", map.height},
+                    {"fileWidth", map.file_width},
+                    {"fileHeight", map.file_height},
                     {"repairedTexels", map.repaired_texels},
                     {"black", map.black}});
   }
@@ -72,7 +74,9 @@ void print_assets(const AssetReport& assets) {
     fmt::print("           {} triangles without area are left out\n", assets.dropped_triangles);
   }
   for (const MapReport& map : assets.maps) {
-    fmt::print("map        {} ({}x{})\n", map.path, map.width, map.height);
+    fmt::print("map        {} ({}x{})\n", map.path, map.file_width, map.file_height);
+    if (map.width < map.file_width)
+      fmt::print("           reduced to {}x{}\n", map.width, map.height);
     if (map.repaired_texels > 0) {
       fmt::print("           {} texels are negative, NaN or infinite and count as 0\n",
                  map.repaired_texels);

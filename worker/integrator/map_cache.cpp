@@ -3,12 +3,13 @@
 #include <algorithm>
 
 #include "common/base/limits.h"
+#include "worker/scene/map_reduction.h"
 
 namespace baton {
 
 Result<MapCache::MapPtr> MapCache::get(const std::string& path, const EnvironmentSpec& environment,
                                        bool compensate) {
-  const Key key{path, environment.filter, environment.scale, compensate};
+  const Key key{path, environment.filter, environment.scale, environment.max_width, compensate};
   const std::lock_guard lock(mutex_);
   const auto found =
       std::find_if(maps_.begin(), maps_.end(), [&](const auto& map) { return map.first == key; });
@@ -17,8 +18,8 @@ Result<MapCache::MapPtr> MapCache::get(const std::string& path, const Environmen
     return maps_.front().second;
   }
   BATON_ASSIGN(const RgbImage image, read_rgb_image(path));
-  maps_.emplace_front(key, std::make_shared<const EnvironmentMap>(image, environment.filter,
-                                                                  environment.scale, compensate));
+  maps_.emplace_front(
+      key, std::make_shared<const EnvironmentMap>(make_map(image, environment, compensate)));
 
   // Forget the oldest ones past the budget, never the new one.
   std::size_t total = 0;

@@ -12,15 +12,15 @@
 
 namespace baton {
 
-/// Maps as they are in their files, with sampling tables, kept while memory allows
+/// Maps of files, as large as jobs want them, with sampling tables, kept while memory allows
 /// (limits::kMaxEnvironmentCacheBytes). Any number of threads and jobs may ask; a map is read once
 /// while the others wait. Files are taken to keep their contents as long as the cache lives.
 class MapCache {
  public:
   using MapPtr = std::shared_ptr<const EnvironmentMap>;
 
-  /// The map of a file with the table that `environment` and `compensate` ask for. Error: a map
-  /// that cannot be read.
+  /// The map of a file with the size and table that `environment` and `compensate` ask for. Error:
+  /// a map that cannot be read.
   Result<MapPtr> get(const std::string& path, const EnvironmentSpec& environment, bool compensate);
 
  private:
@@ -28,6 +28,7 @@ class MapCache {
     std::string path;
     MapFilter filter;
     float scale;
+    int max_width;
     bool compensate;
 
     bool operator==(const Key&) const = default;

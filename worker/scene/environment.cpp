@@ -21,21 +21,6 @@ constexpr float kMinDensity = std::numeric_limits<float>::min();
 /// Compensation that leaves less than this share of the power is noise: the map is constant.
 constexpr double kMinCompensatedShare = 1e-5;
 
-bool is_radiance(float value) { return value >= 0 && value <= std::numeric_limits<float>::max(); }
-
-/// Zeroes the channels that are no radiance and counts the texel.
-void repair(EnvironmentMap::Texel& texel, EnvironmentMap::Repairs& repairs) {
-  bool nan = false;
-  bool infinite = false;
-  for (float* channel : {&texel.r, &texel.g, &texel.b}) {
-    if (is_radiance(*channel)) continue;
-    nan = nan || std::isnan(*channel);
-    infinite = infinite || std::isinf(*channel);
-    *channel = 0;
-  }
-  (nan ? repairs.nan : infinite ? repairs.infinite : repairs.negative) += 1;
-}
-
 double mean_rgb(const EnvironmentMap::Texel& t) {
   return (static_cast<double>(t.r) + t.g + t.b) * (1.0 / 3.0);
 }
@@ -50,8 +35,8 @@ int num_blocks(int width) { return (width + kBlock - 1) / kBlock; }
 }  // namespace
 
 EnvironmentMap::EnvironmentMap(const RgbImage& image, MapFilter filter, float scale,
-                               bool compensate)
-    : width_(image.width), height_(image.height), filter_(filter) {
+                               bool compensate, const TexelRepairs& repairs)
+    : width_(image.width), height_(image.height), filter_(filter), repairs_(repairs) {
   BATON_CHECK(width_ > 0 && height_ > 0);
   BATON_CHECK(image.rgb.size() == std::size_t{3} * static_cast<std::size_t>(width_) * height_);
   texels_.resize(static_cast<std::size_t>(stride()) * (height_ + 2));
@@ -61,9 +46,8 @@ EnvironmentMap::EnvironmentMap(const RgbImage& image, MapFilter filter, float sc
   for (int j = 0; j < height_; ++j) {
     Texel* row = &texels_[static_cast<std::size_t>(j + 1) * stride() + 1];
     for (int i = 0; i < width_; ++i, source += 3) {
-      row[i] = {source[0] * scale, source[1] * scale, source[2] * scale, 0};
-      if (is_radiance(row[i].r) && is_radiance(row[i].g) && is_radiance(row[i].b)) continue;
-      repair(row[i], repairs_);
+      const auto [r, g, b] = texel_radiance(source, scale, repairs_);
+      row[i] = {r, g, b, 0};
     }
 
     // Wrap around horizontally.

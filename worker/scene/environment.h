@@ -8,6 +8,7 @@
 
 #include "common/image/image_io.h"
 #include "common/job/sequence.h"
+#include "worker/scene/map_texel.h"
 
 namespace baton {
 
@@ -30,16 +31,9 @@ class EnvironmentMap {
     float r = 0, g = 0, b = 0, density = 0;
   };
 
-  /// Channels that are negative, NaN or infinite become 0; such texels are counted, each as its worst kind (NaN before
-  /// infinite before negative).
-  struct Repairs {
-    std::uint64_t negative = 0, nan = 0, infinite = 0;
-    std::uint64_t total() const { return negative + nan + infinite; }
-  };
-
   /// image: at least 1x1. scale: radiance factor. compensate: the table of MIS compensation, max(0, L - mean L)
-  /// [Karlik et al. 2019] (a constant map keeps its plain table).
-  EnvironmentMap(const RgbImage& image, MapFilter filter, float scale, bool compensate);
+  /// [Karlik et al. 2019] (a constant map keeps its plain table). repairs: of what the image was made from.
+  EnvironmentMap(const RgbImage& image, MapFilter filter, float scale, bool compensate, const TexelRepairs& repairs = {});
   /// Texels (1 - t) a + t b; a and b of one size and filter. t in [0, 1].
   EnvironmentMap(const EnvironmentMap& a, const EnvironmentMap& b, float t, bool compensate);
 
@@ -50,7 +44,7 @@ class EnvironmentMap {
   const Texel* texels() const { return texels_.data(); }
   /// Memory of the texels; the tables are small beside them.
   std::size_t size_bytes() const { return texels_.size() * sizeof(Texel); }
-  const Repairs& repairs() const { return repairs_; }
+  const TexelRepairs& repairs() const { return repairs_; }
   /// Integral of the reconstruction over the sphere as the table sees it, mean over RGB; 0 for a black map.
   double total_power() const { return total_power_; }
   bool black() const { return !(total_power_ > 0); }
@@ -83,7 +77,7 @@ class EnvironmentMap {
   /// between them the densities are added up again, so what is sampled is exactly what evaluate() reports.
   std::vector<double> row_cdf_;    ///< (cell rows + 1) probability
   std::vector<double> block_cdf_;  ///< (cell rows, ceil(W / kBlock) + 1) densities of the row
-  Repairs repairs_;
+  TexelRepairs repairs_;
   double total_power_ = 0;
 };
 

@@ -133,6 +133,9 @@ TEST(MapCache, AMapIsReadOncePerTable) {
   brighter.scale *= 2;
   const auto scaled = maps.get(path, brighter, false).value();
   EXPECT_FLOAT_EQ(scaled->texels()[0].r, 2 * first->texels()[0].r);
+  EnvironmentSpec coarse = job.environment;
+  coarse.max_width = 2;
+  EXPECT_EQ(maps.get(path, coarse, false).value()->width(), 2);
   EXPECT_FALSE(maps.get("nowhere.exr", job.environment, false));
 }
 

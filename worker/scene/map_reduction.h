@@ -1,0 +1,26 @@
+#pragma once
+
+#include "common/image/image_io.h"
+#include "common/job/job_spec.h"
+#include "worker/scene/environment.h"
+
+namespace baton {
+
+/// A map with fewer texels, and what was repaired before they were averaged.
+struct ReducedMap {
+  RgbImage image;
+  TexelRepairs repairs;
+};
+
+/// A lat-long map as `width` columns and round(height * width / its width) rows, at least one. Each
+/// texel is the mean of the radiance, times `scale`, over its part of the sphere: texels of the map
+/// that lie across its edges count for the solid angle inside, so the power of the map, and of
+/// every box, is kept for any sizes (texels taken as constant). width: [1, the map's).
+ReducedMap reduce_map(const RgbImage& map, int width, float scale);
+
+/// The map of a file's picture as the environment asks for it: scaled, repaired, and reduced to
+/// max_width columns where it has more.
+EnvironmentMap make_map(const RgbImage& picture, const EnvironmentSpec& environment,
+                        bool compensate);
+
+}  // namespace baton
