@@ -175,13 +175,19 @@ void apply_choice(const AutoChoice& choice, std::span<const PilotNumbers> pilot,
       fmt::format("{}{} N={} M={} P={}", kMethods[static_cast<std::size_t>(choice.sampling.method)],
                   choice.correlated ? " with second pass" : "", choice.sampling.num_particles,
                   choice.sampling.num_candidates, choice.sampling.num_distributions);
+  const std::string map = choice.max_map_width > 0
+                              ? fmt::format(" with maps {} wide", choice.max_map_width)
+                              : std::string();
   job.metadata[kAutoChoice] = fmt::format(
-      "{}: expected error {:.4f}, {:.2f} us per pixel and frame",
-      choice.by_material.empty() ? alike : choice.by_material, choice.error, choice.cost_us);
+      "{}{}: expected error {:.4f}, {:.2f} us per pixel and frame",
+      choice.by_material.empty() ? alike : choice.by_material, map, choice.error, choice.cost_us);
   job.metadata["auto.reason"] = choice.reason;
   job.metadata["auto.pilot"] = seen.substr(0, limits::kMaxTextLength);
+  if (!choice.maps.empty())
+    job.metadata["auto.maps"] = choice.maps.substr(0, limits::kMaxTextLength);
   job.sampling = choice.sampling;
   job.visibility.correlated = choice.correlated;
+  if (choice.max_map_width > 0) job.environment.max_width = choice.max_map_width;
 }
 
 }  // namespace baton

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "jobs/study/map_pilot.h"
 #include "jobs/study/material_pilot.h"
 #include "jobs/study/pilot_windows.h"
 #include "jobs/study/unit_costs.h"
@@ -118,6 +119,7 @@ Result<std::vector<PilotNumbers>> settle_auto(JobSpec& job, const StudyFolder& f
                             static_cast<double>(job.frames.size()) * pilot.lit_share;
   AutoChoice choice = choose_sampling(job, pilot.numbers, lit_pixels);
   BATON_TRY(vary_by_material(job, lit_pixels, folder, runner, choice));
+  BATON_TRY(coarsen_maps(job, {lit_pixels, pilot.lit_share}, folder, runner, choice));
   apply_choice(choice, pilot.numbers, job);
   return std::move(pilot.numbers);
 }

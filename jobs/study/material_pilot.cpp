@@ -17,9 +17,6 @@
 namespace baton {
 namespace {
 
-/// Seeds by which settings are chosen, and those by which the choice is then judged.
-constexpr int kChoosingSeeds = 12;
-constexpr int kJudgingSeeds = 24;
 constexpr double kGain = 1.05;
 
 /// The candidates of a job that draw their samples anew, at the N that are to be tried.
@@ -44,10 +41,7 @@ std::vector<AutoCandidate> fresh_candidates(const JobSpec& job) {
 Study fresh_study(const JobSpec& job, const std::vector<AutoCandidate>& candidates, int num_seeds) {
   Study study = pilot_study(job, candidates);
   study.num_seeds = num_seeds;
-  for (StudyCell& cell : study.cells) {
-    JobSpec window = job_window(cell.job, measured_frames(cell.job));
-    cell.job = std::move(window);
-  }
+  keep_measured_frames(study);
   return study;
 }
 
@@ -133,14 +127,14 @@ SamplingSpec with_materials(SamplingSpec base, const MaterialTable& table,
 Result<std::vector<double>> judge_settings(const JobSpec& job, const StudyFolder& folder,
                                            JobRunner& runner,
                                            const std::vector<AutoCandidate>& settings) {
-  const Study study = fresh_study(job, settings, kChoosingSeeds + kJudgingSeeds);
+  Study study = fresh_study(job, settings, kJudgingSeeds);
+  study.first_seed = kChoosingSeeds + 1;
   BATON_ASSIGN(const StudyResults results, run_study(study, folder, runner));
   std::vector<double> square(settings.size());
   for (std::size_t c = 0; c < study.cells.size(); ++c) {
     const auto scene = static_cast<std::size_t>(study.cells[c].scene);
     square[static_cast<std::size_t>(study.cells[c].method)] +=
-        relative_square(std::span(results.runs[c]).subspan(kChoosingSeeds),
-                        results.references[scene]) /
+        relative_square(results.runs[c], results.references[scene]) /
         static_cast<double>(study.scenes.size());
   }
   return square;

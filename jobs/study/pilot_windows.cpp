@@ -14,31 +14,29 @@ constexpr int kReferenceSamples = 512;
 /// Far from the seeds that people give.
 constexpr std::uint64_t kReferenceSeed = 2'000'000'000;
 
-/// The job at a small size for some of its frames.
-JobSpec window_of(const JobSpec& job, std::size_t first, std::size_t last) {
-  JobSpec window = job_window(job, {job.frames.begin() + static_cast<std::ptrdiff_t>(first),
-                                    job.frames.begin() + static_cast<std::ptrdiff_t>(last)});
-  const double scale =
-      std::min(1.0, std::sqrt(kPilotPixels / (1.0 * job.image.width * job.image.height)));
-  window.image.width = std::max(1, static_cast<int>(std::lround(job.image.width * scale)));
-  window.image.height = std::max(1, static_cast<int>(std::lround(job.image.height * scale)));
-  window.metadata.clear();
-  window.output.background = Background::transparent;
-  window.output.pixel_type = PixelType::full_float;
-  window.output.pattern = kFramePattern;
-  window.output.aovs = {Aov::lns};
-  window.state.keep = StateKeep::last;
-  return window;
-}
-
 }  // namespace
 
+JobSpec small_job(const JobSpec& job, std::vector<int> frames, double num_pixels) {
+  JobSpec small = job_window(job, std::move(frames));
+  const double scale =
+      std::min(1.0, std::sqrt(num_pixels / (1.0 * job.image.width * job.image.height)));
+  small.image.width = std::max(1, static_cast<int>(std::lround(job.image.width * scale)));
+  small.image.height = std::max(1, static_cast<int>(std::lround(job.image.height * scale)));
+  small.metadata.clear();
+  small.output.background = Background::transparent;
+  small.output.pixel_type = PixelType::full_float;
+  small.output.pattern = kFramePattern;
+  small.output.aovs = {Aov::lns};
+  small.state.keep = StateKeep::last;
+  return small;
+}
+
 std::vector<JobSpec> pilot_windows(const JobSpec& job) {
-  const std::size_t num_frames = job.frames.size();
-  const std::size_t length = std::min(num_frames, kWindowFrames);
-  std::vector<JobSpec> windows{window_of(job, 0, length)};
-  if (num_frames > 2 * kWindowFrames)
-    windows.push_back(window_of(job, num_frames - length, num_frames));
+  const auto length = static_cast<std::ptrdiff_t>(std::min(job.frames.size(), kWindowFrames));
+  const auto begin = job.frames.begin(), end = job.frames.end();
+  std::vector<JobSpec> windows{small_job(job, {begin, begin + length}, kPilotPixels)};
+  if (job.frames.size() > 2 * kWindowFrames)
+    windows.push_back(small_job(job, {end - length, end}, kPilotPixels));
   return windows;
 }
 
@@ -46,6 +44,13 @@ std::vector<int> measured_frames(const JobSpec& window) {
   const auto num_measured =
       static_cast<std::ptrdiff_t>(std::min<std::size_t>(window.frames.size(), 2));
   return {window.frames.end() - num_measured, window.frames.end()};
+}
+
+void keep_measured_frames(Study& study) {
+  for (StudyCell& cell : study.cells) {
+    JobSpec window = job_window(cell.job, measured_frames(cell.job));
+    cell.job = std::move(window);
+  }
 }
 
 StudyScene pilot_scene(const JobSpec& window) {

@@ -35,9 +35,10 @@ struct StudyCell {
   JobSpec job;  ///< seed, output folder: filled in run by run
 };
 
-/// What `baton chart` runs: every cell with every seed in [1, num_seeds].
+/// What `baton chart` runs: every cell with num_seeds seeds from first_seed on.
 struct Study {
   std::string name;
+  int first_seed = 1;
   int num_seeds = 20;
   std::vector<StudyScene> scenes;
   std::vector<std::string> methods;

@@ -47,21 +47,9 @@ Result<std::vector<Reference>> load_references(const StudyScene& scene, const St
 
 Status render_references(const Study& study, const StudyFolder& folder, JobRunner& runner) {
   std::vector<JobSpec> jobs;
-  for (const StudyScene& scene : study.scenes) {
-    for (JobSpec job : scene.reference) {
-      BATON_ASSIGN(const std::string key, job_key(job));
-      job.output.directory = folder.frames_folder(key).string();
-      const bool known = std::any_of(jobs.begin(), jobs.end(), [&](const JobSpec& other) {
-        return other.output.directory == job.output.directory;
-      });
-      if (!known && !is_there(finished_mark(job.output.directory))) jobs.push_back(std::move(job));
-    }
-  }
-  if (jobs.empty()) return {};
-  spdlog::info("{} references to render", jobs.size());
-  return runner.run(jobs, [&](std::size_t index, const JobSummary&) {
-    return write_record(finished_mark(jobs[index].output.directory), {});
-  });
+  for (const StudyScene& scene : study.scenes)
+    jobs.insert(jobs.end(), scene.reference.begin(), scene.reference.end());
+  return render_kept(jobs, folder, runner);
 }
 
 /// Measures the frames of a finished run.
@@ -124,6 +112,23 @@ std::string run_key(const std::string& cell_key, int seed) {
   return fmt::format("{}-{}", cell_key, seed);
 }
 
+Status render_kept(const std::vector<JobSpec>& jobs, const StudyFolder& folder, JobRunner& runner) {
+  std::vector<JobSpec> missing;
+  for (JobSpec job : jobs) {
+    BATON_ASSIGN(const std::string key, job_key(job));
+    job.output.directory = folder.frames_folder(key).string();
+    const bool known = std::any_of(missing.begin(), missing.end(), [&](const JobSpec& other) {
+      return other.output.directory == job.output.directory;
+    });
+    if (!known && !is_there(finished_mark(job.output.directory))) missing.push_back(std::move(job));
+  }
+  if (missing.empty()) return {};
+  spdlog::info("{} pictures to render", missing.size());
+  return runner.run(missing, [&](std::size_t index, const JobSummary&) {
+    return write_record(finished_mark(missing[index].output.directory), {});
+  });
+}
+
 Result<StudyResults> run_study(const Study& study, const StudyFolder& folder, JobRunner& runner) {
   StudyResults results;
   BATON_TRY(render_references(study, folder, runner));
@@ -143,12 +148,13 @@ Result<StudyResults> run_study(const Study& study, const StudyFolder& folder, Jo
   }
   std::vector<Run> runs;
   std::vector<JobSpec> jobs;
-  for (int seed = 1; seed <= study.num_seeds; ++seed) {
+  for (int index = 0; index < study.num_seeds; ++index) {
+    const int seed = study.first_seed + index;
     for (std::size_t c = 0; c < study.cells.size(); ++c) {
       const std::string key = run_key(cell_keys[c], seed);
       const StudyScene& scene = study.scenes[static_cast<std::size_t>(study.cells[c].scene)];
       if (std::optional<RunRecord> record = kept_record(folder, scene, key, seed)) {
-        results.runs[c][static_cast<std::size_t>(seed) - 1] = std::move(*record);
+        results.runs[c][static_cast<std::size_t>(index)] = std::move(*record);
         continue;
       }
       JobSpec job = study.cells[c].job;
@@ -176,7 +182,8 @@ Result<StudyResults> run_study(const Study& study, const StudyFolder& folder, Jo
     BATON_TRY(write_record(folder.record_path(run.key), record));
     std::error_code ignored;
     if (run.seed != 1) fs::remove_all(jobs[index].output.directory, ignored);
-    results.runs[run.cell][static_cast<std::size_t>(run.seed) - 1] = std::move(record);
+    results.runs[run.cell][static_cast<std::size_t>(run.seed - study.first_seed)] =
+        std::move(record);
     return {};
   };
   BATON_TRY(runner.run(jobs, keep));

@@ -24,7 +24,7 @@ class JobRunner {
 
 /// Everything that a study measured.
 struct StudyResults {
-  /// By cell and seed - 1.
+  /// By cell and seed less the first.
   std::vector<std::vector<RunRecord>> runs;
   /// By scene and position in StudyScene::frames.
   std::vector<std::vector<Reference>> references;
@@ -53,6 +53,10 @@ std::string file_slug(const std::string& name);
 Result<std::string> job_key(JobSpec job);
 /// Names a run of a cell; cell_key: job_key of the cell's job. seed counts from 1.
 std::string run_key(const std::string& cell_key, int seed);
+
+/// Renders those of the jobs whose frames are not kept yet, each into the folder's frames_folder of
+/// its job_key.
+Status render_kept(const std::vector<JobSpec>& jobs, const StudyFolder& folder, JobRunner& runner);
 
 /// Runs what is not yet done: references first, then cells and seeds; measures each run when its
 /// frames are there and keeps the record. The frames of seed 1 stay, for the crops. Errors name the

@@ -10,4 +10,8 @@ namespace baton {
 /// runs of jobs/studies/unit-costs.json (docs/charts.md names machine and residual).
 double counted_cost_us(const JobSpec& job, const RunCounts& counts);
 
+/// The same of the light of all frames of a job under maps of `file_texels` that are reduced to
+/// `texels`: reading, reducing and mixing maps, tables and pools.
+double counted_light_us(const JobSpec& job, double file_texels, double texels);
+
 }  // namespace baton

@@ -77,15 +77,20 @@ def write_sphere(path, rings=8, segments=12):
     path.write_text("\n".join(lines) + "\n", encoding="ascii")
 
 
-def write_map(path, width=32, height=16):
-    """A lat-long Radiance HDR map: a gradient sky, a dark floor and one small bright lamp."""
+def lamp(x, y, width, height):
+    """Colour of a texel: a gradient sky, a dark floor and one small bright lamp."""
+    if abs(x - width // 4) <= 1 and abs(y - height // 4) <= 1:
+        return (40.0, 36.0, 30.0)
+    sky = 0.2 + 0.8 * (height - y) / height if y < height / 2 else 0.05
+    return (sky * 0.7, sky * 0.8, sky)
+
+
+def write_map(path, width=32, height=16, colour=lamp):
+    """A lat-long Radiance HDR map of colour(x, y, width, height), no texel of it black."""
     rows = bytearray()
     for y in range(height):
         for x in range(width):
-            sky = 0.2 + 0.8 * (height - y) / height if y < height / 2 else 0.05
-            rgb = (sky * 0.7, sky * 0.8, sky)
-            if abs(x - width // 4) <= 1 and abs(y - height // 4) <= 1:
-                rgb = (40.0, 36.0, 30.0)
+            rgb = colour(x, y, width, height)
             mantissa, exponent = math.frexp(max(rgb))
             scale = mantissa * 256.0 / max(rgb)
             rows += struct.pack("4B", *(int(c * scale) for c in rgb), exponent + 128)
