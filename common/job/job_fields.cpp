@@ -18,7 +18,7 @@ void name_fields(JobArchive& a, JobSpec& job) {
   if (!a.text(required("name"), job.name)) return;
   // The name becomes a folder.
   const bool good = job.name.size() <= limits::kMaxNameLength &&
-                    job.name.find('/') == std::string::npos && job.name.front() != '.';
+                    job.name.find('/') == std::string::npos && !job.name.starts_with('.');
   if (!good) {
     a.fault("name",
             fmt::format("at most {} bytes without '/' and not starting with '.'",

@@ -11,6 +11,7 @@ import tempfile
 import time
 import unittest
 
+PATIENCE = int(os.environ.get("BATON_TEST_PATIENCE", "1"))
 OK, USAGE, BAD_INPUT, UNAVAILABLE, IO = 0, 64, 65, 69, 74
 BIN = SOURCE = None
 
@@ -43,7 +44,7 @@ class CliErrors(unittest.TestCase):
         environment = {k: v for k, v in os.environ.items() if not k.startswith("BATON_")}
         return subprocess.run(
             [program or BIN / "baton", *map(str, arguments)],
-            cwd=self.folder, env=environment, capture_output=True, text=True, timeout=120)
+            cwd=self.folder, env=environment, capture_output=True, text=True, timeout=120 * PATIENCE)
 
     def job(self, **changes):
         path = self.folder / "job.json"
@@ -140,11 +141,11 @@ class CliErrors(unittest.TestCase):
         self.wait_until(pid_file.exists)
         child = int(pid_file.read_text())
         render.send_signal(signal.SIGKILL)
-        render.wait(timeout=30)
+        render.wait(timeout=30 * PATIENCE)
         self.wait_until(lambda: not is_running(child))
 
     def wait_until(self, condition):
-        deadline = time.monotonic() + 30
+        deadline = time.monotonic() + 30 * PATIENCE
         while not condition():
             self.assertLess(time.monotonic(), deadline, "waited in vain")
             time.sleep(0.02)
