@@ -109,16 +109,52 @@ void shade_samples(const SiteBlock& sites, const EnvironmentView& environment,
                    std::span<const OctDirection> code, std::span<const std::uint8_t> site,
                    ShadedSamples& out);
 
-/// Asks the memory for the texels along lattice directions, which evaluations will soon read: a map
-/// is larger than the caches.
-void prefetch_texels(const EnvironmentView& view, std::span<const OctDirection> code);
+/// Directions that were decoded and found in the map ahead of their evaluation, (N) each.
+struct LocatedSpan {
+  /// Where a direction lies in a map: the upper left texel, and how far right and down of it
+  /// (bilinear maps).
+  struct Place {
+    const std::int32_t* texel;
+    const float *right, *down;
+  };
+  const float *x, *y, *z;  ///< unit world vectors
+  Place now;
+  Place before;  ///< null where it was not asked for
+
+  LocatedSpan from(std::size_t first) const;
+};
+struct LocatedDirections {
+  static constexpr std::size_t kCapacity = limits::kMaxParticles + kPadding;
+  struct Place {
+    alignas(64) std::int32_t texel[kCapacity];
+    alignas(64) float right[kCapacity], down[kCapacity];
+  };
+  alignas(64) float x[kCapacity], y[kCapacity], z[kCapacity];
+  Place now, before;
+  bool has_before = false;
+
+  LocatedSpan span() const;
+};
+/// Finds lattice directions (at most kMaxParticles) in the map of now, and where it is not null in
+/// that of the frame before, and asks the memory for the texels there: maps are larger than the
+/// caches.
+void locate_directions(const EnvironmentView& now, const EnvironmentView* before,
+                       std::span<const OctDirection> code, LocatedDirections& out);
+
+/// The light of two frames for a sampler that carries.
+struct CarriedLight {
+  const EnvironmentView& before;
+  const EnvironmentView& now;
+  bool still = false;  ///< both are the same
+  const LightPool& pool;
+};
 
 /// One frame of the sequential sampler for a pixel (sampling/sequential-inl.h). old: the surfaces
-/// that the particles come from, by sites of this frame; null where they are `sites`.
-/// environment_before: the frame that the particles come from. lns_before > 0.
+/// that the particles come from, by sites of this frame; null where they are `sites`. light.before:
+/// the frame that the particles come from. located: the particles in its maps, or null. lns_before
+/// > 0.
 SequentialOutcome sequential_step(const SiteBlock& sites, const OldSurfaces* old,
-                                  const EnvironmentView& environment_before,
-                                  const EnvironmentView& environment_now, const LightPool& pool,
+                                  const CarriedLight& light, const LocatedSpan* located,
                                   const SequentialSettings& settings, float lns_before,
                                   const RngKey& key, ParticleSpan particles);
 

@@ -13,8 +13,6 @@ void PixelSampler::choose_rays(const PixelInput&, SamplerScratch&, PixelRays& ra
   rays.clear();
 }
 
-void PixelSampler::fetch_ahead(const EnvironmentView&, std::span<const OctDirection>) const {}
-
 namespace {
 
 /// The sampler that draws all samples of a pixel anew.

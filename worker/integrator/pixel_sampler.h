@@ -25,9 +25,19 @@ struct PixelInput {
   /// (N) p~ of the previous frame at those samples, where it is known; else empty.
   std::span<const float> target_before{};
   const OldSurfaces* old = nullptr;  ///< the surfaces of that set, where they are not `sites`
+  /// That set in the maps, where it was looked up ahead; else null.
+  const kernels::LocatedSpan* located = nullptr;
   /// (kVisibilityCells) of the frames before, or empty; see remembers()
   std::span<const VisibilityCell> memory{};
 };
+
+/// The light of the pixel's two frames.
+inline kernels::CarriedLight carried_light(const PixelInput& input) {
+  return {.before = input.before,
+          .now = input.now,
+          .still = input.light.still,
+          .pool = input.light.pool};
+}
 
 /// The samples of one pixel, in and out: a properly weighted set for p~(site, w) = p~_site(w) / S
 /// with contributions u_j = lns * weight_j, so that E[sum u_j h(w_j)] = integral of p~ h. lns 0:
@@ -99,8 +109,9 @@ class PixelSampler {
   /// scratch: the caller's, reused from pixel to pixel.
   virtual PixelDiagnostics sample(const PixelInput& input, SamplerScratch& scratch,
                                   const PixelSamples& samples) const = 0;
-  /// Asks the memory for what sample() will read of these carried directions (N).
-  virtual void fetch_ahead(const EnvironmentView& now, std::span<const OctDirection> carried) const;
+  /// Whether sample() evaluates carried directions, so that it pays to look them up ahead
+  /// (PixelInput::located).
+  virtual bool evaluates_carried() const { return false; }
   /// Whether the method chooses its rays apart from its samples; else they are its samples.
   virtual bool chooses_rays() const { return false; }
   /// Chooses them, after sample() and with the scratch as that left it.

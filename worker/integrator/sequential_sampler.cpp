@@ -23,11 +23,6 @@ bool SequentialSampler::has_wandered(float lns, float lns_fresh) const {
   return refresh_ratio_ && (lns > lns_fresh * *refresh_ratio_ || lns * *refresh_ratio_ < lns_fresh);
 }
 
-void SequentialSampler::fetch_ahead(const EnvironmentView& now,
-                                    std::span<const OctDirection> carried) const {
-  kernels::prefetch_texels(now, carried);
-}
-
 PixelDiagnostics SequentialSampler::sample(const PixelInput& input, SamplerScratch& scratch,
                                            const PixelSamples& samples) const {
   if (!input.has_history) return start_->sample(input, scratch, samples);
@@ -47,8 +42,7 @@ PixelDiagnostics SequentialSampler::sample(const PixelInput& input, SamplerScrat
     settings.ess_ratio_min = 0;
   }
   const SequentialOutcome outcome = kernels::sequential_step(
-      input.sites, input.old, input.before, input.now, input.light.pool, settings, samples.lns,
-      input.key,
+      input.sites, input.old, carried_light(input), input.located, settings, samples.lns, input.key,
       {samples.direction.data(), samples.site.data(), samples.weight.data(), samples.r.data(),
        samples.g.data(), samples.b.data(),
        input.target_before.empty() ? nullptr : input.target_before.data()});

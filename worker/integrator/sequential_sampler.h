@@ -30,8 +30,7 @@ class SequentialSampler final : public PixelSampler {
         by_ratio_(by_ratio) {}
   PixelDiagnostics sample(const PixelInput& input, SamplerScratch& scratch,
                           const PixelSamples& samples) const override;
-  void fetch_ahead(const EnvironmentView& now,
-                   std::span<const OctDirection> carried) const override;
+  bool evaluates_carried() const override { return true; }
 
  private:
   bool has_wandered(float lns, float lns_fresh) const;

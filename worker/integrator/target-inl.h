@@ -1,4 +1,5 @@
-// The product target of a pixel in SIMD: where materials meet light. Included once per Highway target.
+// The product target of a pixel in SIMD: where materials meet light. Included once per Highway
+// target.
 #if defined(BATON_WORKER_INTEGRATOR_TARGET_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef BATON_WORKER_INTEGRATOR_TARGET_INL_H_
 #undef BATON_WORKER_INTEGRATOR_TARGET_INL_H_
@@ -9,6 +10,7 @@
 #include <hwy/cache_control.h>
 #include <hwy/highway.h>
 
+#include "worker/integrator/kernels.h"
 #include "worker/integrator/light_pool.h"
 #include "worker/integrator/old_surfaces.h"
 #include "worker/sampling/sequential-inl.h"
@@ -20,19 +22,24 @@ namespace baton::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
 /// Reflected radiance (f cos L) per channel.
-HWY_INLINE Vec3Lanes ReflectedRadiance(const SurfaceLanes& s, const BsdfLanes& f, VF r, VF g, VF b) {
+HWY_INLINE Vec3Lanes ReflectedRadiance(const SurfaceLanes& s, const BsdfLanes& f, VF r, VF g,
+                                       VF b) {
   if (!s.any_lobe) {
     const VF each = hn::Mul(f.cosine, hn::Set(DF(), kInvPi));
     return {hn::Mul(hn::Mul(s.kd.x, each), r), hn::Mul(hn::Mul(s.kd.y, each), g),
             hn::Mul(hn::Mul(s.kd.z, each), b)};
   }
   const auto channel = [&](VF kd, VF ks, VF radiance) HWY_ATTR {
-    return hn::Mul(hn::Mul(hn::MulAdd(f.diffuse, kd, hn::MulAdd(f.lobe, ks, f.white)), f.cosine), radiance);
+    return hn::Mul(hn::Mul(hn::MulAdd(f.diffuse, kd, hn::MulAdd(f.lobe, ks, f.white)), f.cosine),
+                   radiance);
   };
-  const Vec3Lanes reflected{channel(s.kd.x, s.ks.x, r), channel(s.kd.y, s.ks.y, g), channel(s.kd.z, s.ks.z, b)};
+  const Vec3Lanes reflected{channel(s.kd.x, s.ks.x, r), channel(s.kd.y, s.ks.y, g),
+                            channel(s.kd.z, s.ks.z, b)};
   if (!s.any_measured) return reflected;
-  const auto tabulated = [&](VF value, VF radiance) HWY_ATTR { return hn::Mul(hn::Mul(value, f.cosine), radiance); };
-  return Add(reflected, {tabulated(f.measured.x, r), tabulated(f.measured.y, g), tabulated(f.measured.z, b)});
+  const auto tabulated = [&](VF value, VF radiance)
+                             HWY_ATTR { return hn::Mul(hn::Mul(value, f.cosine), radiance); };
+  return Add(reflected,
+             {tabulated(f.measured.x, r), tabulated(f.measured.y, g), tabulated(f.measured.z, b)});
 }
 
 /// A vector of entries of the light pool.
@@ -40,6 +47,7 @@ struct LightLanes {
   VU code;
   Vec3Lanes direction;
   RadianceLanes now;
+  VF inverse_density;
 };
 /// Entries entry, entry + 1, ..., which lie in one block.
 HWY_INLINE LightLanes LoadLight(const LightPool& pool, std::size_t entry) {
@@ -49,7 +57,8 @@ HWY_INLINE LightLanes LoadLight(const LightPool& pool, std::size_t entry) {
   return {hn::Load(DU(), block.code + at),
           {hn::Load(d, block.x + at), hn::Load(d, block.y + at), hn::Load(d, block.z + at)},
           {hn::Load(d, block.r + at), hn::Load(d, block.g + at), hn::Load(d, block.b + at),
-           hn::Load(d, block.density + at)}};
+           hn::Load(d, block.density + at)},
+          hn::Load(d, block.inverse_density + at)};
 }
 /// Radiance of the same entries in the frame before.
 HWY_INLINE Vec3Lanes LoadLightBefore(const LightPool& pool, std::size_t entry) {
@@ -64,129 +73,130 @@ HWY_INLINE Vec3Lanes LoadLightBefore(const LightPool& pool, std::size_t entry) {
 HWY_INLINE VI SiteAt(const SiteBlock& block, VF fraction) {
   const DF d;
   const DI di;
-  const VI k = hn::Min(hn::ConvertTo(di, hn::Mul(fraction, hn::Set(d, static_cast<float>(block.num_hits)))),
-                       hn::Set(di, block.num_hits - 1));
+  const VI k =
+      hn::Min(hn::ConvertTo(di, hn::Mul(fraction, hn::Set(d, static_cast<float>(block.num_hits)))),
+              hn::Set(di, block.num_hits - 1));
   if (block.num_hits == block.num_sites) return k;
   return hn::GatherIndex(di, block.hit_sites.data(), k);
 }
 
-/// LogTargets from what is reflected and the proposal's density.
-HWY_INLINE LogTargets TargetsOf(VF log_before, const Vec3Lanes& reflected, VF density) {
-  return {log_before, LogOrZero(MeanLanes(reflected)), LogOrZero(density), reflected};
+/// Directions i, i + 1, ... of those that were located ahead, and the light from there.
+HWY_INLINE Vec3Lanes LocatedDirection(const kernels::LocatedSpan& at, std::size_t i) {
+  const DF d;
+  return {hn::LoadU(d, at.x + i), hn::LoadU(d, at.y + i), hn::LoadU(d, at.z + i)};
+}
+HWY_INLINE RadianceLanes LocatedLight(const EnvironmentView& view,
+                                      const kernels::LocatedSpan::Place& at, std::size_t i) {
+  const DF d;
+  return EvaluateTexels(
+      view, {hn::LoadU(DI(), at.texel + i), hn::LoadU(d, at.right + i), hn::LoadU(d, at.down + i)});
 }
 
-/// The targets of two frames whose surfaces are the same, for SequentialStep. The factor 1/S is common to all points and
-/// left out. Independent proposals come from the light pool, with the site uniform among those that see a surface.
-struct SameSurfaceTarget {
+/// The targets of two frames for SequentialStep, as far as they do not depend on which surfaces the
+/// frame before saw. The factor 1/S is common to all points and left out. Independent proposals
+/// come from the light pool, with the site uniform among those that see a surface. Surface: has
+/// LogTargetBefore(site, w, surface and BRDF of now, light of then), the log of the target of the
+/// frame before.
+template <class Surface>
+struct CarriedTarget {
   const SiteBlock& sites;
-  const EnvironmentView& before;
-  const EnvironmentView& now;
-  const LightPool& pool;
+  const kernels::CarriedLight& light;
+  const kernels::LocatedSpan* located;  ///< the carried particles, or null
 
-  HWY_INLINE LogTargets Evaluate(const PointLanes& point) const {
-    const Vec3Lanes w = DecodeOctahedral(point.code);
-    const SurfaceLanes surface = LoadSurfaces(sites, point.site);
-    const BsdfLanes f = EvaluateBsdf(surface, w);
-    const RadianceLanes then = EvaluateEnvironment(before, w);
-    const RadianceLanes light = EvaluateEnvironment(now, w);
-    return TargetsOf(LogOrZero(MeanLanes(ReflectedRadiance(surface, f, then.r, then.g, then.b))),
-                     ReflectedRadiance(surface, f, light.r, light.g, light.b), light.density);
+  HWY_INLINE TargetLanes Evaluate(const PointLanes& point) const { return EvaluateAt(point, true); }
+
+  /// As Evaluate, but `log_before` is left 0.
+  HWY_INLINE TargetLanes EvaluateNow(const PointLanes& point) const {
+    return EvaluateAt(point, false);
   }
 
-  /// As Evaluate, but `before` is left 0.
-  HWY_INLINE LogTargets EvaluateNow(const PointLanes& point) const {
-    const Vec3Lanes w = DecodeOctahedral(point.code);
-    const SurfaceLanes surface = LoadSurfaces(sites, point.site);
-    const RadianceLanes light = EvaluateEnvironment(now, w);
-    const Vec3Lanes reflected = ReflectedRadiance(surface, EvaluateBsdf(surface, w), light.r, light.g, light.b);
-    return TargetsOf(hn::Zero(DF()), reflected, light.density);
+  /// Evaluates the carried particles i, i + 1, ..., `log_before` only where it is wanted.
+  HWY_INLINE TargetLanes EvaluateCarried(std::size_t i, const PointLanes& point,
+                                         bool want_before) const {
+    if (located == nullptr) return want_before ? Evaluate(point) : EvaluateNow(point);
+    const Vec3Lanes w = LocatedDirection(*located, i);
+    const RadianceLanes now = LocatedLight(light.now, located->now, i);
+    RadianceLanes then = now;
+    if (want_before && !light.still) {
+      then = located->before.texel != nullptr ? LocatedLight(light.before, located->before, i)
+                                              : EvaluateEnvironment(light.before, w);
+    }
+    return Targets(point.site, w, now, InverseOrZero(now.density), then, want_before);
   }
 
   bool ManySites() const { return sites.num_hits > 1; }
 
   /// Brings the block of proposals that BlockStart(bits) will name into the cache.
   HWY_INLINE void Prefetch(std::uint32_t bits) const {
-    const auto* block = reinterpret_cast<const char*>(&pool.blocks[BlockStart(bits) / LightPool::kBlock]);
-    for (std::size_t line = 0; line < sizeof(LightPool::Block); line += 64) hwy::Prefetch(block + line);
+    const auto* block =
+        reinterpret_cast<const char*>(&light.pool.blocks[BlockStart(bits) / LightPool::kBlock]);
+    for (std::size_t line = 0; line < sizeof(LightPool::Block); line += 64) {
+      hwy::Prefetch(block + line);
+    }
   }
 
   /// First entry of a uniformly drawn block of proposals.
   static std::size_t BlockStart(std::uint32_t bits) {
-    static_assert(LightPool::kBlock == kProposalBlock && (LightPool::kSize & (LightPool::kSize - 1)) == 0);
+    static_assert(LightPool::kBlock == kProposalBlock &&
+                  (LightPool::kSize & (LightPool::kSize - 1)) == 0);
     return bits & (LightPool::kSize - LightPool::kBlock);
   }
 
-  /// Draws `point` from the pool's entries entry, entry + 1, ...; returns its targets, `before` only
-  /// where it is wanted.
-  HWY_INLINE LogTargets Propose(std::size_t entry, VF site_fraction, bool want_before,
-                                PointLanes& point) const {
-    const LightLanes light = LoadLight(pool, entry);
-    point.code = light.code;
+  /// Draws `point` from the pool's entries entry, entry + 1, ...; returns its targets, `log_before`
+  /// only where it is wanted.
+  HWY_INLINE TargetLanes Propose(std::size_t entry, VF site_fraction, bool want_before,
+                                 PointLanes& point) const {
+    const LightLanes from = LoadLight(light.pool, entry);
+    point.code = from.code;
     point.site = SiteAt(sites, site_fraction);
-    const SurfaceLanes surface = LoadSurfaces(sites, point.site);
-    const BsdfLanes f = EvaluateBsdf(surface, light.direction);
-    VF log_then = hn::Zero(DF());
+    RadianceLanes then = from.now;
     if (want_before) {
-      const Vec3Lanes then = LoadLightBefore(pool, entry);
-      log_then = LogOrZero(MeanLanes(ReflectedRadiance(surface, f, then.x, then.y, then.z)));
+      const Vec3Lanes before = LoadLightBefore(light.pool, entry);
+      then = {before.x, before.y, before.z, then.density};
     }
-    return TargetsOf(log_then,
-                     ReflectedRadiance(surface, f, light.now.r, light.now.g, light.now.b),
-                     light.now.density);
-  }
-};
-
-/// The targets of two frames whose surfaces differ: those of the frame before are seen through the
-/// sites that inherit them (OldSurfaces). Otherwise like SameSurfaceTarget.
-struct MovedSurfaceTarget {
-  const SiteBlock& sites;
-  const OldSurfaces& old;
-  const EnvironmentView& before;
-  const EnvironmentView& now;
-  const LightPool& pool;
-
-  HWY_INLINE LogTargets Evaluate(const PointLanes& point) const {
-    const Vec3Lanes w = DecodeOctahedral(point.code);
-    const RadianceLanes then = EvaluateEnvironment(before, w);
-    const RadianceLanes light = EvaluateEnvironment(now, w);
-    return Targets(point.site, w, {then.r, then.g, then.b}, {light.r, light.g, light.b},
-                   light.density);
-  }
-
-  /// As Evaluate, but `before` is left 0.
-  HWY_INLINE LogTargets EvaluateNow(const PointLanes& point) const {
-    return SameSurfaceTarget{sites, before, now, pool}.EvaluateNow(point);
-  }
-
-  bool ManySites() const { return sites.num_hits > 1; }
-  HWY_INLINE void Prefetch(std::uint32_t bits) const {
-    SameSurfaceTarget{sites, before, now, pool}.Prefetch(bits);
-  }
-  static std::size_t BlockStart(std::uint32_t bits) { return SameSurfaceTarget::BlockStart(bits); }
-
-  HWY_INLINE LogTargets Propose(std::size_t entry, VF site_fraction, bool want_before,
-                                PointLanes& point) const {
-    if (!want_before) {
-      return SameSurfaceTarget{sites, before, now, pool}.Propose(entry, site_fraction, false, point);
-    }
-    const LightLanes light = LoadLight(pool, entry);
-    point.code = light.code;
-    point.site = SiteAt(sites, site_fraction);
-    return Targets(point.site, light.direction, LoadLightBefore(pool, entry),
-                   {light.now.r, light.now.g, light.now.b}, light.now.density);
+    return Targets(point.site, from.direction, from.now, from.inverse_density, then, want_before);
   }
 
  private:
-  HWY_INLINE LogTargets Targets(VI site, const Vec3Lanes& w, const Vec3Lanes& then,
-                                const Vec3Lanes& light, VF density) const {
-    const SurfaceLanes surface_then = LoadSurfaces(old.sites, site);
-    const BsdfLanes f_then = EvaluateBsdf(surface_then, w);
+  HWY_INLINE TargetLanes EvaluateAt(const PointLanes& point, bool want_before) const {
+    const Vec3Lanes w = DecodeOctahedral(point.code);
+    const RadianceLanes now = EvaluateEnvironment(light.now, w);
+    const bool same = !want_before || light.still;
+    const RadianceLanes then = same ? now : EvaluateEnvironment(light.before, w);
+    return Targets(point.site, w, now, InverseOrZero(now.density), then, want_before);
+  }
+  HWY_INLINE TargetLanes Targets(VI site, const Vec3Lanes& w, const RadianceLanes& now,
+                                 VF inverse_density, const RadianceLanes& then,
+                                 bool want_before) const {
     const SurfaceLanes surface = LoadSurfaces(sites, site);
     const BsdfLanes f = EvaluateBsdf(surface, w);
-    const VF log_then =
-        LogOrZero(MeanLanes(ReflectedRadiance(surface_then, f_then, then.x, then.y, then.z)));
-    return TargetsOf(hn::Add(log_then, LookUp(old.log_share, site, sites.num_sites)),
-                     ReflectedRadiance(surface, f, light.x, light.y, light.z), density);
+    const Vec3Lanes reflected = ReflectedRadiance(surface, f, now.r, now.g, now.b);
+    VF log_before = hn::Zero(DF());
+    if (want_before) {
+      log_before = static_cast<const Surface*>(this)->LogTargetBefore(site, w, surface, f, then);
+    }
+    return {log_before, LogOrZero(MeanLanes(reflected)), now.density, inverse_density, reflected};
+  }
+};
+
+/// Surfaces that stay.
+struct SameSurfaceTarget : CarriedTarget<SameSurfaceTarget> {
+  HWY_INLINE VF LogTargetBefore(VI /*site*/, const Vec3Lanes& /*w*/, const SurfaceLanes& surface,
+                                const BsdfLanes& f, const RadianceLanes& then) const {
+    return LogOrZero(MeanLanes(ReflectedRadiance(surface, f, then.r, then.g, then.b)));
+  }
+};
+
+/// Surfaces that differ: those of the frame before are seen through the sites that inherit them.
+struct MovedSurfaceTarget : CarriedTarget<MovedSurfaceTarget> {
+  const OldSurfaces& old;
+
+  HWY_INLINE VF LogTargetBefore(VI site, const Vec3Lanes& w, const SurfaceLanes& /*now*/,
+                                const BsdfLanes& /*f*/, const RadianceLanes& then) const {
+    const SurfaceLanes surface = LoadSurfaces(old.sites, site);
+    const BsdfLanes f = EvaluateBsdf(surface, w);
+    return hn::Add(LogOrZero(MeanLanes(ReflectedRadiance(surface, f, then.r, then.g, then.b))),
+                   LookUp(old.log_share, site, sites.num_sites));
   }
 };
 

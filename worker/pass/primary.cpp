@@ -8,15 +8,11 @@
 namespace baton {
 namespace {
 
-/// Position of a site inside its pixel, [0, 1)^2; side: sites in a row.
-std::array<float, 2> site_position(const JobSpec& job, std::uint32_t pixel, std::int32_t site,
-                                   std::int32_t side) {
-  if (side == 1) return {0.5f, 0.5f};
-  const Rng rng({.job_seed = job.seed, .frame = 0, .pixel = pixel}, PassId::site_position);
-  const auto u = rng.uniforms(0, static_cast<std::uint32_t>(site));
+/// Position of a site inside its pixel, [0, 1)^2, from two uniforms; side: sites in a row.
+std::array<float, 2> site_position(std::int32_t site, std::int32_t side, float u, float v) {
   const auto cell = 1.0f / static_cast<float>(side);
-  return {(static_cast<float>(site % side) + u[0]) * cell,
-          (static_cast<float>(site / side) + u[1]) * cell};
+  return {(static_cast<float>(site % side) + u) * cell,
+          (static_cast<float>(site / side) + v) * cell};
 }
 
 }  // namespace
@@ -37,13 +33,19 @@ TileSurfaces trace_primary(const JobSpec& job, const FrameGeometry& geometry,
 
 void append_primary_rays(const JobSpec& job, const FrameGeometry& geometry, std::int32_t x,
                          std::int32_t y, std::vector<Ray>& rays) {
+  const auto add = [&](const std::array<float, 2>& position) {
+    rays.push_back(geometry.pose.camera.ray(static_cast<float>(x) + position[0],
+                                            static_cast<float>(y) + position[1]));
+  };
+  if (job.image.sites == 1) return add({0.5f, 0.5f});
   const auto pixel = static_cast<std::uint32_t>(y * job.image.width + x);
-  const auto side =
-      static_cast<std::int32_t>(std::lround(std::sqrt(static_cast<float>(job.image.sites))));
+  const auto side = static_cast<std::int32_t>(std::sqrt(static_cast<float>(job.image.sites)));
+  const Rng rng({.job_seed = job.seed, .frame = 0, .pixel = pixel}, PassId::site_position);
+  std::array<float, 4> u{};  // of two sites
   for (std::int32_t site = 0; site < job.image.sites; ++site) {
-    const auto [dx, dy] = site_position(job, pixel, site, side);
-    rays.push_back(
-        geometry.pose.camera.ray(static_cast<float>(x) + dx, static_cast<float>(y) + dy));
+    if (site % 2 == 0) u = rng.uniforms(0, static_cast<std::uint32_t>(site / 2));
+    const auto k = static_cast<std::size_t>(site % 2 * 2);
+    add(site_position(site, side, u[k], u[k + 1]));
   }
 }
 

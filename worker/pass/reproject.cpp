@@ -170,17 +170,15 @@ std::optional<Reprojection::Inheritance> Reprojection::inherit(
   return result;
 }
 
-/// One of the sites that inherit from `old_site`, each as likely; where that saw no surface (its
-/// samples weigh nothing), any site that sees one.
-std::uint8_t Reprojection::draw_heir(std::span<const SurfaceHit> hits,
+/// The k-th of the sites that inherit from `old_site`; where that saw no surface (its samples weigh
+/// nothing), the first site that sees one.
+std::uint8_t Reprojection::find_heir(std::span<const SurfaceHit> hits,
                                      const Inheritance& inheritance, std::uint8_t old_site,
-                                     std::uint32_t random) {
-  const std::uint32_t heirs = inheritance.count[old_site];
-  std::uint32_t k = heirs > 1 ? random % heirs : 0;
+                                     std::uint32_t k) {
+  const bool none = inheritance.count[old_site] == 0;
   for (std::size_t t = 0; t < hits.size(); ++t) {
     if (!hits[t].hit) continue;
-    if (heirs == 0 || (inheritance.from[t] == old_site && k-- == 0))
-      return static_cast<std::uint8_t>(t);
+    if (none || (inheritance.from[t] == old_site && k-- == 0)) return static_cast<std::uint8_t>(t);
   }
   return 0;
 }
@@ -193,7 +191,9 @@ void Reprojection::copy_samples(const Slot& slot, const Inheritance& inheritance
   const Rng rng(slot.key, PassId::reproject);
   for (std::size_t j = 0; j < num_particles; ++j) {
     std::uint8_t& site = state.site[pixel * num_particles + j];
-    site = draw_heir(slot.hits, inheritance, site, rng.bits(1, static_cast<std::uint32_t>(j))[0]);
+    const std::uint32_t heirs = inheritance.count[site];
+    const std::uint32_t k = heirs > 1 ? rng.bits(1, static_cast<std::uint32_t>(j))[0] % heirs : 0;
+    site = find_heir(slot.hits, inheritance, site, k);
   }
 }
 

@@ -67,8 +67,8 @@ class Reprojection {
   bool agrees(const SurfaceHit& now, const SurfaceHit& old) const;
   std::optional<Inheritance> inherit(std::span<const SurfaceHit> now,
                                      std::span<const SurfaceHit> old) const;
-  static std::uint8_t draw_heir(std::span<const SurfaceHit> hits, const Inheritance& inheritance,
-                                std::uint8_t old_site, std::uint32_t random);
+  static std::uint8_t find_heir(std::span<const SurfaceHit> hits, const Inheritance& inheritance,
+                                std::uint8_t old_site, std::uint32_t k);
   void copy_samples(const Slot& slot, const Inheritance& inheritance, std::size_t pixel,
                     SampleState& state) const;
 

@@ -9,6 +9,10 @@
 namespace baton {
 namespace {
 
+bool sees_surface(std::span<const SurfaceHit> hits) {
+  return std::any_of(hits.begin(), hits.end(), [](const SurfaceHit& hit) { return hit.hit; });
+}
+
 /// The first site that sees a surface, of a pixel that has one: its material decides.
 const SurfaceHit& first_surface(std::span<const SurfaceHit> hits) {
   return *std::find_if(hits.begin(), hits.end(), [](const SurfaceHit& hit) { return hit.hit; });
@@ -124,12 +128,22 @@ void TileFrameRenderer::keep_targets(std::int32_t frame_index, std::size_t num_s
   targets_frame_ = frame_index;
 }
 
-/// What pixel `index` starts from. state: its samples become those of the frame before, where they
-/// are not already.
-PixelHistory TileFrameRenderer::find_history(std::size_t pixel_of_batch, std::size_t index,
-                                             SampleState& state) {
-  if (reprojection_ != nullptr) return reprojection_->take(pixel_of_batch, index, state, old_);
-  return has_history_ ? PixelHistory::same : PixelHistory::none;
+/// What pixel `index` starts from: its samples in `state` become those of the frame before, where
+/// they are not already, and the memory is asked for what evaluating them will read.
+void TileFrameRenderer::look_ahead(std::size_t pixel_of_batch, std::size_t index,
+                                   const kernels::CarriedLight& light, SampleState& state) {
+  if (!sees_surface(surfaces_.pixel(index))) return;
+  Ahead& ahead = ahead_[index % 2];
+  fetch_ahead(state.memory_of(index));
+  ahead.history = has_history_ ? PixelHistory::same : PixelHistory::none;
+  if (reprojection_ != nullptr) {
+    ahead.history = reprojection_->take(pixel_of_batch, index, state, ahead.old);
+  }
+  ahead.is_located = ahead.history != PixelHistory::none && context_.sampler->evaluates_carried();
+  if (!ahead.is_located) return;
+  const auto n = static_cast<std::size_t>(state.num_particles);
+  kernels::locate_directions(light.now, knows_targets_ || light.still ? nullptr : &light.before,
+                             std::span(state.direction).subspan(index * n, n), ahead.located);
 }
 
 /// Pass: every pixel's properly weighted set, and the colours and rays that follow from it.
@@ -144,12 +158,15 @@ void TileFrameRenderer::sample(Batch& batch, const FrameLight& light, SampleStat
   batch.rays.clear();
   batch.second_half.fill(0);
   batch.difference.fill({});
+  const kernels::CarriedLight carried{before, now, light.still, light.pool};
+  look_ahead(0, batch.first, carried, state);
   for (std::size_t i = 0; i < batch.count; ++i) {
     const std::size_t index = batch.first + i;
+    if (i + 1 < batch.count) look_ahead(i + 1, index + 1, carried, state);
     const std::span<const SurfaceHit> hits = surfaces_.pixel(index);
 
     // Gather the pixel's surfaces.
-    if (std::none_of(hits.begin(), hits.end(), [](const SurfaceHit& hit) { return hit.hit; })) {
+    if (!sees_surface(hits)) {
       set_background(state, index);
       ++stats_.pixels_background;
       batch.end_ray[i] = batch.rays.size();
@@ -169,12 +186,8 @@ void TileFrameRenderer::sample(Batch& batch, const FrameLight& light, SampleStat
     const PixelSampler& sampler = own.sampler != nullptr ? *own.sampler : *context_.sampler;
     const std::size_t n = own.sampler != nullptr ? static_cast<std::size_t>(own.num_particles)
                                                  : num_common_particles(state);
-    if (index + 1 < state.num_pixels()) {
-      fetch_ahead(state.memory_of(index + 1));
-      if (has_history_ && reprojection_ == nullptr)
-        sampler.fetch_ahead(now, std::span(state.direction).subspan((index + 1) * n, n));
-    }
-    const PixelHistory history = find_history(i, index, state);
+    const Ahead& ahead = ahead_[index % 2];
+    const kernels::LocatedSpan located = ahead.located.span();
     const PixelInput input{
         .sites = sites,
         .light = light,
@@ -182,9 +195,10 @@ void TileFrameRenderer::sample(Batch& batch, const FrameLight& light, SampleStat
         .before = before,
         .key = batch.key(context_, surfaces_.rect, index),
         .frame_index = frame_index,
-        .has_history = history != PixelHistory::none,
+        .has_history = ahead.history != PixelHistory::none,
         .target_before = knows_targets_ ? targets_of(index, state) : std::span<float>(),
-        .old = history == PixelHistory::moved ? &old_ : nullptr,
+        .old = ahead.history == PixelHistory::moved ? &ahead.old : nullptr,
+        .located = ahead.is_located ? &located : nullptr,
         .memory = state.memory_of(index)};
     const PixelDiagnostics did =
         sample_populations(sampler, n, input, index, *scratch_, state, colors);
@@ -330,8 +344,7 @@ void TileFrameRenderer::render_reference(Batch& batch, const FrameLight& light,
   for (std::size_t i = 0; i < batch.count; ++i) {
     const std::size_t index = batch.first + i;
     const std::span<const SurfaceHit> hits = surfaces_.pixel(index);
-    const bool seen =
-        std::any_of(hits.begin(), hits.end(), [](const SurfaceHit& hit) { return hit.hit; });
+    const bool seen = sees_surface(hits);
     state.source[index] = seen ? PixelSource::fresh : PixelSource::background;
     if (!seen) {
       ++stats_.pixels_background;

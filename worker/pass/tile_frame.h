@@ -1,5 +1,9 @@
 #pragma once
 
+#include <array>
+#include <memory>
+#include <vector>
+
 #include "common/job/task.h"
 #include "worker/integrator/ray_batch.h"
 #include "worker/pass/film_writer.h"
@@ -40,6 +44,13 @@ class TileFrameRenderer {
  private:
   static constexpr std::size_t kBatchPixels = 64;
   struct Batch;
+  /// What is known of a pixel when the one before it is sampled.
+  struct Ahead {
+    PixelHistory history = PixelHistory::none;
+    OldSurfaces old;  ///< for `moved`
+    kernels::LocatedDirections located;
+    bool is_located = false;
+  };
   /// Wall seconds of the frame in work.
   struct Stages {
     double reproject = 0, sample = 0, visibility = 0, shade = 0;
@@ -51,8 +62,9 @@ class TileFrameRenderer {
     const auto n = static_cast<std::size_t>(state.num_particles);
     return std::span(targets_).subspan(index * n, n);
   }
-  PixelHistory find_history(std::size_t pixel_of_batch, std::size_t index, SampleState& state);
   void sample(Batch& batch, const FrameLight& light, SampleState& state);
+  void look_ahead(std::size_t pixel_of_batch, std::size_t index, const kernels::CarriedLight& light,
+                  SampleState& state);
   std::size_t num_common_particles(const SampleState& state) const;
   SiteOrigins origins(std::size_t index) const;
   void cast_pixel_samples(Batch& batch, std::size_t i, std::size_t n, const SampleColors& colors,
@@ -70,7 +82,7 @@ class TileFrameRenderer {
   const TileSurfaces& surfaces_;
   Reprojection* reprojection_ = nullptr;  ///< of the frame in work; null where surfaces stay
   bool has_history_ = false;              ///< of the frame in work, where surfaces stay
-  OldSurfaces old_;
+  std::array<Ahead, 2> ahead_;            ///< of odd and even pixels
   /// (pixels, N) p~ at the samples of frame targets_frame_: where surfaces stay, the next frame
   /// need not evaluate it again.
   std::vector<float> targets_;

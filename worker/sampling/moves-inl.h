@@ -18,13 +18,21 @@ HWY_BEFORE_NAMESPACE();
 namespace baton::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-/// What the sampler asks of a point (site, direction): the logs of the unnormalised targets of the
-/// frame before and of this frame, and of the density of independent proposals. kLogZero stands for
-/// log 0.
-struct LogTargets {
-  VF before, now, proposal;
-  Vec3Lanes reflected;  ///< (f cos L)_rgb of this frame; `now` is the log of its mean
+/// What the sampler asks of a point (site, direction).
+struct TargetLanes {
+  VF log_before, log_now;  ///< of the unnormalised targets of the frame before and of this frame;
+                           ///< kLogZero stands for log 0
+  VF density;              ///< of independent proposals
+  VF inverse_density;      ///< 0 where the density is
+  Vec3Lanes reflected;     ///< (f cos L)_rgb of this frame; `log_now` is the log of its mean
 };
+
+/// 1 / x, 0 where x is not positive.
+HWY_INLINE VF InverseOrZero(VF x) {
+  const DF d;
+  const MF positive = hn::Gt(x, hn::Zero(d));
+  return hn::IfThenElseZero(positive, hn::Div(hn::Set(d, 1.0f), x));
+}
 
 /// log x, kLogZero where x is (almost) 0.
 HWY_INLINE VF LogOrZero(VF x) {
@@ -44,10 +52,11 @@ struct ParticleArrays {
   static constexpr std::size_t kCapacity = limits::kMaxParticles;
   HWY_ALIGN std::uint32_t code[kCapacity];
   HWY_ALIGN std::int32_t site[kCapacity];
+  HWY_ALIGN float weight[kCapacity];  ///< sum 1; 0 past the last particle
   HWY_ALIGN float log_before[kCapacity];
   HWY_ALIGN float log_now[kCapacity];
-  HWY_ALIGN float log_proposal[kCapacity];
-  HWY_ALIGN float r[kCapacity], g[kCapacity], b[kCapacity];  ///< LogTargets::reflected
+  HWY_ALIGN float inverse_density[kCapacity];
+  HWY_ALIGN float r[kCapacity], g[kCapacity], b[kCapacity];  ///< TargetLanes::reflected
   HWY_ALIGN float
       log_increment[kCapacity];  ///< sum over k of log p^k / p^(k-1) at the particle's positions
 };
@@ -70,7 +79,7 @@ HWY_INLINE Vec3Lanes PerturbDirection(const Vec3Lanes& w, float cap_cosine, VF u
 inline constexpr std::size_t kProposalBlock = 8;
 
 /// The random numbers of a pixel's moves, addressed by the move's number and the particle. A block
-/// of Philox has four words: acceptance takes one word a move, so four moves share a block.
+/// of Philox has 128 bits and a uniform takes 24: the acceptances of five moves share one.
 class MoveRandom {
  public:
   MoveRandom(const Rng& rng, std::size_t num_particles) : rng_(rng), count_(num_particles) {}
@@ -85,17 +94,23 @@ class MoveRandom {
         hn::Store(bits.w0, du, kind_ + i);
         hn::Store(bits.w1, du, first_ + i);
         hn::Store(bits.w2, du, distance_ + i);
+        hn::Store(bits.w3, du, site_ + i);
       }
     }
-    if (move % 4 != 0) return;
+    if (move % kShare != 0) return;
     const DU du;
+    const VU byte = hn::Set(du, 0xFFu);
     for (std::size_t i = 0; i < count_; i += hn::Lanes(du)) {
-      const auto bits = PhiloxBlock(du, rng_, move / 4,
+      const auto bits = PhiloxBlock(du, rng_, move / kShare,
                                     hn::Iota(du, kAcceptance + static_cast<std::uint32_t>(i)));
       hn::Store(bits.w0, du, accept_[0] + i);
       hn::Store(bits.w1, du, accept_[1] + i);
       hn::Store(bits.w2, du, accept_[2] + i);
       hn::Store(bits.w3, du, accept_[3] + i);
+      // The fifth has the bits that the others leave over.
+      const VU upper =
+          hn::Or(hn::ShiftLeft<24>(bits.w0), hn::ShiftLeft<16>(hn::And(bits.w1, byte)));
+      hn::Store(hn::Or(upper, hn::ShiftLeft<8>(hn::And(bits.w2, byte))), du, accept_[4] + i);
     }
   }
 
@@ -107,11 +122,19 @@ class MoveRandom {
   std::uint32_t BlockBits(std::uint32_t move, std::uint32_t b) const {
     return first_[move % kWindow] + b * (distance_[move % kWindow] | 1u);
   }
+  /// Uniforms that place the independent proposals of particles i, i + 1, ...: multiples of the
+  /// golden ratio from a random start, so that sites are shared out evenly.
+  HWY_INLINE VF SiteFraction(std::uint32_t move, std::size_t i) const {
+    const DU du;
+    const VU number = hn::Iota(du, static_cast<std::uint32_t>(i));
+    const VU steps = hn::Mul(number, hn::Set(du, 0x9E3779B9u));
+    return UniformLanes(DF(), hn::Add(hn::Set(du, site_[move % kWindow]), steps));
+  }
   /// Uniforms that accept particles i, i + 1, ...
   HWY_INLINE VF Acceptance(std::uint32_t move, std::size_t i) const {
-    return UniformLanes(DF(), hn::Load(DU(), accept_[move % 4] + i));
+    return UniformLanes(DF(), hn::Load(DU(), accept_[move % kShare] + i));
   }
-  /// Two words for the proposals of particles i, i + 1, ...
+  /// Two words for the local proposals of particles i, i + 1, ...
   HWY_INLINE PhiloxLanes<VU> Proposal(std::uint32_t move, std::size_t i) const {
     return PhiloxBlock(DU(), rng_, move + 1, hn::Iota(DU(), static_cast<std::uint32_t>(i)));
   }
@@ -119,6 +142,8 @@ class MoveRandom {
   static constexpr std::uint32_t kWindow = 8;
 
  private:
+  /// Moves whose acceptances share a block.
+  static constexpr std::uint32_t kShare = 5;
   /// Indices past those of particles.
   static constexpr std::uint32_t kChoices = 0x80000000u, kAcceptance = 0x40000000u;
 
@@ -127,7 +152,8 @@ class MoveRandom {
   HWY_ALIGN std::uint32_t kind_[kWindow];
   HWY_ALIGN std::uint32_t first_[kWindow];
   HWY_ALIGN std::uint32_t distance_[kWindow];
-  HWY_ALIGN std::uint32_t accept_[4][ParticleArrays::kCapacity];
+  HWY_ALIGN std::uint32_t site_[kWindow];
+  HWY_ALIGN std::uint32_t accept_[kShare][ParticleArrays::kCapacity];
 };
 
 /// Fetches the proposals of the moves that `random` knows ahead into the cache.
@@ -165,39 +191,41 @@ HWY_INLINE void MoveParticles(const Target& target, const SequentialSettings& se
     const VI site = hn::Load(di, p.site + i);
     const VF before = hn::Load(d, p.log_before + i);
     const VF now = hn::Load(d, p.log_now + i);
-    const VF proposal = hn::Load(d, p.log_proposal + i);
+    const VF inverse_density = hn::Load(d, p.inverse_density + i);
 
     // Propose.
     PointLanes next{code, site};
-    LogTargets next_log;
+    TargetLanes at_next;
     if (local) {
       const auto bits = random.Proposal(move, i);
       next.code =
           EncodeOctahedral(PerturbDirection(DecodeOctahedral(code), settings.local_move_cosine,
                                             UniformLanes(d, bits.w0), UniformLanes(d, bits.w1)));
-      next_log = keep_before ? target.Evaluate(next) : target.EvaluateNow(next);
+      at_next = keep_before ? target.Evaluate(next) : target.EvaluateNow(next);
     } else {
-      const VF site_fraction =
-          target.ManySites() ? UniformLanes(d, random.Proposal(move, i).w0) : hn::Zero(d);
+      const VF site_fraction = target.ManySites() ? random.SiteFraction(move, i) : hn::Zero(d);
       const std::size_t start =
           target.BlockStart(random.BlockBits(move, static_cast<std::uint32_t>(i / kProposalBlock)));
-      next_log = target.Propose(start + i % kProposalBlock, site_fraction, keep_before, next);
+      at_next = target.Propose(start + i % kProposalBlock, site_fraction, keep_before, next);
     }
 
-    // Accept with min(1, p(next) q(current) / (p(current) q(next))); q cancels in symmetric moves.
-    VF log_next = hn::Mul(beta, next_log.now);
+    // Accept when p(next) / p(current) >= u q(next) / q(current); q cancels in symmetric moves.
+    VF log_next = hn::Mul(beta, at_next.log_now);
     VF log_current = hn::Mul(beta, now);
     if (keep_before) {
-      log_next = hn::MulAdd(rest, next_log.before, log_next);
+      log_next = hn::MulAdd(rest, at_next.log_before, log_next);
       log_current = hn::MulAdd(rest, before, log_current);
     }
-    VF log_ratio = hn::Sub(log_next, log_current);
-    if (!local) log_ratio = hn::Add(log_ratio, hn::Sub(proposal, next_log.proposal));
-    const VF u = hn::Max(random.Acceptance(move, i), hn::Set(d, 0x1p-25f));
+    VF least = hn::Max(random.Acceptance(move, i), hn::Set(d, 0x1p-25f));
+    if (!local) {
+      least = hn::Mul(least, hn::Mul(at_next.density, inverse_density));
+      least = hn::Clamp(least, hn::Set(d, 1e-37f), hn::Set(d, 1e37f));
+    }
     const MF possible = hn::Gt(log_next, hn::Set(d, kLogAlive));
     const MF inside =
         hn::Lt(hn::Iota(d, static_cast<float>(i)), hn::Set(d, static_cast<float>(count)));
-    const MF accept = hn::And(hn::And(possible, inside), hn::Ge(log_ratio, LogLanes(u)));
+    const MF accept =
+        hn::And(hn::And(possible, inside), hn::Ge(hn::Sub(log_next, log_current), LogLanes(least)));
     accepted += static_cast<std::int32_t>(hn::CountTrue(d, accept));
 
     hn::Store(hn::IfThenElse(hn::RebindMask(du, accept), next.code, code), du, p.code + i);
@@ -205,12 +233,12 @@ HWY_INLINE void MoveParticles(const Target& target, const SequentialSettings& se
     const auto move_to = [&](VF value, float* at) HWY_ATTR {
       hn::Store(hn::IfThenElse(accept, value, hn::Load(d, at)), d, at);
     };
-    move_to(next_log.now, p.log_now + i);
-    move_to(next_log.proposal, p.log_proposal + i);
-    move_to(next_log.reflected.x, p.r + i);
-    move_to(next_log.reflected.y, p.g + i);
-    move_to(next_log.reflected.z, p.b + i);
-    if (keep_before) move_to(next_log.before, p.log_before + i);
+    move_to(at_next.log_now, p.log_now + i);
+    move_to(at_next.inverse_density, p.inverse_density + i);
+    move_to(at_next.reflected.x, p.r + i);
+    move_to(at_next.reflected.y, p.g + i);
+    move_to(at_next.reflected.z, p.b + i);
+    if (keep_before) move_to(at_next.log_before, p.log_before + i);
   }
   MoveCounts& counts = local ? outcome.local : outcome.independent;
   counts.proposed += settings.num_particles;

@@ -13,7 +13,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "worker/sampling/ess.h"
 #include "worker/sampling/moves-inl.h"
 #include "worker/sampling/resampling.h"
 
@@ -32,31 +31,47 @@ HWY_INLINE void AddIncrement(float inverse_distributions, std::size_t count, Par
 }
 
 /// out_j = weight_j exp(log_increment_j), normalised; returns the log of the factor taken out, log
-/// sum_j weight_j exp(...), or kLogZero when every weight is 0. weight: (N,), sum 1. out may be
-/// weight.
-HWY_INLINE double ApplyIncrements(std::size_t count, const ParticleArrays& p, const float* weight,
-                                  float* out) {
+/// sum_j weight_j exp(...), or kLogZero when every weight is 0. out: (N padded), may be p.weight.
+HWY_INLINE double ApplyIncrements(std::size_t count, const ParticleArrays& p, float* out) {
   const DF d;
   // The largest increment of a living particle is factored out so that no exp overflows.
-  float largest = kLogZero;
-  for (std::size_t i = 0; i < count; ++i) {
-    if (weight[i] > 0) largest = std::max(largest, p.log_increment[i]);
-  }
-  HWY_ALIGN float gain[ParticleArrays::kCapacity];
+  VF most = hn::Set(d, kLogZero);
   for (std::size_t i = 0; i < count; i += hn::Lanes(d)) {
-    const VF shifted = hn::Sub(hn::Load(d, p.log_increment + i), hn::Set(d, largest));
-    hn::Store(ExpLanes(shifted), d, gain + i);
+    const MF lives = hn::Gt(hn::Load(d, p.weight + i), hn::Zero(d));
+    most = hn::Max(most, hn::IfThenElse(lives, hn::Load(d, p.log_increment + i), most));
   }
-  double sum = 0;
-  for (std::size_t i = 0; i < count; ++i) {
+  const VF largest = hn::MaxOfLanes(d, most);
+  VF sums = hn::Zero(d);
+  for (std::size_t i = 0; i < count; i += hn::Lanes(d)) {
+    const VF shifted = hn::Sub(hn::Load(d, p.log_increment + i), largest);
     // exp(-87) stands in for everything smaller: a weight that small is zero.
-    out[i] = p.log_increment[i] - largest <= -87.0f ? 0.0f : weight[i] * gain[i];
-    sum += out[i];
+    const MF counts = hn::Gt(shifted, hn::Set(d, -87.0f));
+    const VF weight =
+        hn::IfThenElseZero(counts, hn::Mul(hn::Load(d, p.weight + i), ExpLanes(shifted)));
+    hn::Store(weight, d, out + i);
+    sums = hn::Add(sums, weight);
   }
-  if (!(largest > kLogAlive && sum > 0)) return kLogZero;
-  const auto inverse = static_cast<float>(1 / sum);
-  for (std::size_t i = 0; i < count; ++i) out[i] *= inverse;
-  return largest + std::log(sum);
+  const float sum = hn::GetLane(hn::SumOfLanes(d, sums));
+  if (!(hn::GetLane(largest) > kLogAlive && sum > 0)) return kLogZero;
+  const VF inverse = hn::Set(d, 1 / sum);
+  for (std::size_t i = 0; i < count; i += hn::Lanes(d)) {
+    hn::Store(hn::Mul(hn::Load(d, out + i), inverse), d, out + i);
+  }
+  return double{hn::GetLane(largest)} + std::log(double{sum});
+}
+
+/// Effective sample size of the normalised weights [Kong et al. 1994]: (sum w)^2 / sum w^2.
+HWY_INLINE float EffectiveSize(std::size_t count, const float* weight) {
+  const DF d;
+  VF sums = hn::Zero(d);
+  VF squares = hn::Zero(d);
+  for (std::size_t i = 0; i < count; i += hn::Lanes(d)) {
+    const VF w = hn::Load(d, weight + i);
+    sums = hn::Add(sums, w);
+    squares = hn::MulAdd(w, w, squares);
+  }
+  const float sum = hn::GetLane(hn::SumOfLanes(d, sums));
+  return sum * sum / hn::GetLane(hn::SumOfLanes(d, squares));
 }
 
 /// Mean of log p_n / p_(n-1) over the weighted particles, and the share of the weight that it is
@@ -105,26 +120,27 @@ class PathSum {
   double log_ratio_ = 0;
 };
 
+/// column_m = column_(ancestors_m).
+template <class T>
+HWY_INLINE void Inherit(std::size_t count, const std::int32_t* ancestors, T* column) {
+  T old[ParticleArrays::kCapacity];
+  std::copy_n(column, count, old);
+  for (std::size_t m = 0; m < count; ++m) column[m] = old[ancestors[m]];
+}
+
 /// Resamples when the effective sample size is below the threshold; all weights become 1/N.
 HWY_INLINE void ResampleIfNeeded(const SequentialSettings& settings, const Rng& rng,
-                                 ParticleArrays& p, float* weight, SequentialOutcome& outcome) {
+                                 ParticleArrays& p, SequentialOutcome& outcome) {
   const auto count = static_cast<std::size_t>(settings.num_particles);
   if (!(outcome.ess < settings.ess_ratio_min * static_cast<float>(count))) return;
   std::int32_t ancestors[ParticleArrays::kCapacity];
-  resample(settings.resampling, {weight, count}, {ancestors, count}, rng, 0);
-  const ParticleArrays old = p;
-  for (std::size_t m = 0; m < count; ++m) {
-    const auto a = static_cast<std::size_t>(ancestors[m]);
-    p.code[m] = old.code[a];
-    p.site[m] = old.site[a];
-    p.log_before[m] = old.log_before[a];
-    p.log_now[m] = old.log_now[a];
-    p.log_proposal[m] = old.log_proposal[a];
-    p.r[m] = old.r[a];
-    p.g[m] = old.g[a];
-    p.b[m] = old.b[a];
-    weight[m] = 1.0f / static_cast<float>(count);
+  resample(settings.resampling, {p.weight, count}, {ancestors, count}, rng, 0);
+  Inherit(count, ancestors, p.code);
+  Inherit(count, ancestors, p.site);
+  for (float* column : {p.log_before, p.log_now, p.inverse_density, p.r, p.g, p.b}) {
+    Inherit(count, ancestors, column);
   }
+  std::fill_n(p.weight, count, 1.0f / static_cast<float>(count));
   outcome.resampled = true;
 }
 
@@ -134,28 +150,29 @@ HWY_INLINE void LoadParticles(const Target& target, std::size_t count,
                               const ParticleSpan& particles, ParticleArrays& p) {
   const DF d;
   const std::size_t padded = hwy::RoundUpTo(count, hn::Lanes(d));
-  for (std::size_t i = 0; i < padded; ++i) {
-    const std::size_t j = std::min(i, count - 1);
-    p.code[i] = particles.direction[j];
-    p.site[i] = particles.site[j];
-    p.log_before[i] = particles.target_before != nullptr ? particles.target_before[j] : 0;
-    p.log_increment[i] = 0;
+  const bool knows_before = particles.target_before != nullptr;
+  std::copy_n(particles.direction, count, p.code);
+  std::copy_n(particles.site, count, p.site);
+  std::copy_n(particles.weight, count, p.weight);
+  if (knows_before) std::copy_n(particles.target_before, count, p.log_before);
+  std::fill_n(p.log_increment, padded, 0.0f);
+  // Past the last particle lie copies of it that weigh nothing.
+  for (std::size_t i = count; i < padded; ++i) {
+    p.code[i] = p.code[count - 1];
+    p.site[i] = p.site[count - 1];
+    p.log_before[i] = p.log_before[count - 1];
+    p.weight[i] = 0;
   }
   for (std::size_t i = 0; i < count; i += hn::Lanes(d)) {
     const PointLanes point{hn::Load(DU(), p.code + i), hn::Load(DI(), p.site + i)};
-    LogTargets log;
-    if (particles.target_before != nullptr) {
-      log = target.EvaluateNow(point);
-      log.before = LogOrZero(hn::Load(d, p.log_before + i));
-    } else {
-      log = target.Evaluate(point);
-    }
-    hn::Store(log.before, d, p.log_before + i);
-    hn::Store(log.now, d, p.log_now + i);
-    hn::Store(log.proposal, d, p.log_proposal + i);
-    hn::Store(log.reflected.x, d, p.r + i);
-    hn::Store(log.reflected.y, d, p.g + i);
-    hn::Store(log.reflected.z, d, p.b + i);
+    TargetLanes at = target.EvaluateCarried(i, point, !knows_before);
+    if (knows_before) at.log_before = LogOrZero(hn::Load(d, p.log_before + i));
+    hn::Store(at.log_before, d, p.log_before + i);
+    hn::Store(at.log_now, d, p.log_now + i);
+    hn::Store(at.inverse_density, d, p.inverse_density + i);
+    hn::Store(at.reflected.x, d, p.r + i);
+    hn::Store(at.reflected.y, d, p.g + i);
+    hn::Store(at.reflected.z, d, p.b + i);
   }
 }
 
@@ -176,13 +193,13 @@ HWY_INLINE SequentialOutcome SequentialStep(const Target& target,
   LoadParticles(target, count, particles, p);
 
   PathSum path(settings.lns_update, distributions);
-  if (path.used()) path.Add(0, MeanLogRatio(count, p, particles.weight));
+  if (path.used()) path.Add(0, MeanLogRatio(count, p, p.weight));
   double log_ratio = 0;
   const auto weight_and_resample = [&]() HWY_ATTR {
-    log_ratio = ApplyIncrements(count, p, particles.weight, particles.weight);
+    log_ratio = ApplyIncrements(count, p, p.weight);
     if (!(log_ratio > kLogAlive)) return false;
-    outcome.ess = effective_sample_size({particles.weight, count});
-    ResampleIfNeeded(settings, resample_rng, p, particles.weight, outcome);
+    outcome.ess = EffectiveSize(count, p.weight);
+    ResampleIfNeeded(settings, resample_rng, p, outcome);
     return true;
   };
 
@@ -205,8 +222,8 @@ HWY_INLINE SequentialOutcome SequentialStep(const Target& target,
     }
     if (!path.used()) continue;
     HWY_ALIGN float weight[ParticleArrays::kCapacity];
-    std::copy_n(particles.weight, count, weight);
-    if (distributions > 1) ApplyIncrements(count, p, particles.weight, weight);
+    std::copy_n(p.weight, count, weight);
+    if (distributions > 1) ApplyIncrements(count, p, weight);
     path.Add(k, MeanLogRatio(count, p, weight));
   }
   if (distributions > 1 && !weight_and_resample()) return outcome;
@@ -218,6 +235,7 @@ HWY_INLINE SequentialOutcome SequentialStep(const Target& target,
   for (std::size_t i = 0; i < count; ++i) {
     particles.direction[i] = p.code[i];
     particles.site[i] = static_cast<std::uint8_t>(p.site[i]);
+    particles.weight[i] = p.weight[i];
     particles.r[i] = p.r[i];
     particles.g[i] = p.g[i];
     particles.b[i] = p.b[i];

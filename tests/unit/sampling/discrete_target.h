@@ -28,20 +28,26 @@ struct DiscreteTarget {
   DiscreteTarget(const PointValues& target_before, const PointValues& target_now)
       : before(target_before), now(target_now), log_before(log_of(before)), log_now(log_of(now)) {}
 
-  LogTargets Evaluate(const PointLanes& point) const {
+  TargetLanes Evaluate(const PointLanes& point) const {
     const DF d;
     const VI index = hn::BitCast(DI(), point.code);
     return {hn::GatherIndex(d, log_before.data(), index),
             hn::GatherIndex(d, log_now.data(), index),
-            hn::Zero(d),
+            hn::Set(d, 1.0f / kPoints),
+            hn::Set(d, kPoints),
             {hn::Zero(d), hn::Zero(d), hn::Zero(d)}};
   }
-  LogTargets EvaluateNow(const PointLanes& point) const { return Evaluate(point); }
+  TargetLanes EvaluateCarried(std::size_t /*i*/, const PointLanes& point,
+                              bool /*want_before*/) const {
+    return Evaluate(point);
+  }
+  TargetLanes EvaluateNow(const PointLanes& point) const { return Evaluate(point); }
   static bool ManySites() { return false; }
   void Prefetch(std::uint32_t /*bits*/) const {}
   /// Blocks of neighbours from a random start on the ring of points.
   static std::size_t BlockStart(std::uint32_t bits) { return bits % kPoints; }
-  LogTargets Propose(std::size_t entry, VF /*site_fraction*/, bool /*want_before*/, PointLanes& point) const {
+  TargetLanes Propose(std::size_t entry, VF /*site_fraction*/, bool /*want_before*/,
+                      PointLanes& point) const {
     point.code =
         hn::And(hn::Iota(DU(), static_cast<std::uint32_t>(entry)), hn::Set(DU(), kPoints - 1));
     return Evaluate(point);
