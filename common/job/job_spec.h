@@ -206,7 +206,7 @@ struct SamplingSpec {
   float ess_ratio_min = 0.5f;      ///< resample when ESS < ess_ratio_min * N, [0, 1]
   ResamplingScheme resampling = ResamplingScheme::systematic;
   float local_move_deg = 4;        ///< half-angle of local moves, (0, 90]
-  float local_move_fraction = 0.25f;  ///< share of moves that are local, [0, 1]
+  float local_move_fraction = 0.125f;  ///< share of moves that are local, [0, 1]
   StartMethod start_method = StartMethod::bidirectional;  ///< of fresh pixels; all but the last give N weighted samples
   int refresh_every = 8;  ///< sequential: each pixel starts afresh once in so many frames, staggered; 0: never
   /// sequential: a pixel whose carried Lns has left [Lns / rho, Lns * rho] of its last start, rho in (1, 1e6], starts afresh

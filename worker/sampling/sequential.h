@@ -16,7 +16,7 @@ struct SequentialSettings {
   ResamplingScheme resampling = ResamplingScheme::systematic;
   LnsUpdate lns_update = LnsUpdate::ratio;
   float local_move_cosine = 1;  ///< cosine of the half-angle of local moves
-  float local_move_fraction = 0.25f;
+  float local_move_fraction = 0.125f;
 };
 
 /// The particles of one pixel, borrowed: (N,) each.
