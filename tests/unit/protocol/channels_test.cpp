@@ -7,6 +7,7 @@
 #include "common/protocol/client.h"
 #include "common/protocol/router.h"
 #include "common/protocol/worker_channel.h"
+#include "tests/support/patience.h"
 
 namespace baton {
 namespace {
@@ -14,8 +15,8 @@ namespace {
 using namespace std::chrono_literals;
 using testing::HasSubstr;
 
-constexpr auto kPatience = 10s;  // for what must come
-constexpr auto kMoment = 20ms;   // for what must not come
+const auto kPatience = with_patience(10s);  // for what must come
+constexpr auto kMoment = 20ms;              // for what must not come
 
 struct ChannelTest : testing::Test {
   Router router = Router::bind("tcp://127.0.0.1:*").value();
@@ -73,7 +74,7 @@ TEST_F(ChannelTest, SilenceIsATimeoutAndALateAnswerIsNotMistaken) {
   router.send(late->peer, JobList{});
   const std::jthread server = answer_once([](const Incoming&) -> Message { return JobDetail{}; });
   const Result<Message> answer = client.request(ShowJob{"ab"}, kPatience);
-  ASSERT_TRUE(answer.ok());
+  ASSERT_TRUE(answer.ok()) << answer.error().message;
   EXPECT_TRUE(std::holds_alternative<JobDetail>(*answer));
 }
 

@@ -16,14 +16,15 @@
 #include "common/protocol/worker_channel.h"
 #include "common/store/blob_store.h"
 #include "coordinator/service/service.h"
+#include "tests/support/patience.h"
 
 namespace baton::testing_service {
 
 using namespace std::chrono_literals;
 namespace fs = std::filesystem;
 
-inline constexpr auto kPatience = 20s;
-inline constexpr std::chrono::milliseconds kHeartbeat{500};
+inline const auto kPatience = with_patience(20s);
+inline const auto kHeartbeat = with_patience(500ms);
 
 /// A coordinator in a thread of its own.
 class RunningService {
