@@ -161,7 +161,7 @@ def auto_takes_no_finer_map_than_it_needs(programs, folder):
         job["output"].update(directory=str(place / "frames"), background="transparent")
         job["environment"]["keys"][0]["map"] = str(place / "map.hdr")
         write_map(place / "map.hdr", width, width // 2, colour)
-        return programs.render(write_job(place / "job.json", job), place / "work").stderr
+        return programs.render(write_job(place / "job.json", job), place / "work", deadline_s=300).stderr
 
     said = settled("grain", 512, grain)
     check("with maps 64 wide" in said and "maps of 64 columns, which are" in said, said)
