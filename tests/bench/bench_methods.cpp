@@ -1,5 +1,6 @@
 // Time per pixel of every method over the time of its own occlusion rays alone, on a real scene.
-// Both times are CPU seconds of one run, so the ratios hold on a noisy machine.
+// Both times are CPU seconds of one run, so the ratios hold on a noisy machine. Reading the maps and
+// tracing the primary rays of a still camera are paid once for all frames.
 // Usage: bench_methods [JOB.json] [FRAMES] [METHODS THAT BEGIN SO] [SITES]
 #include <fmt/format.h>
 
@@ -112,6 +113,6 @@ int run(const std::string& path, int frames, const std::string& only, int only_s
 
 int main(int argc, char** argv) {
   return baton::run(argc > 1 ? argv[1] : "jobs/examples/demo.json",
-                    argc > 2 ? std::atoi(argv[2]) : 6, argc > 3 ? argv[3] : "",
+                    argc > 2 ? std::atoi(argv[2]) : 16, argc > 3 ? argv[3] : "",
                     argc > 4 ? std::atoi(argv[4]) : 0);
 }
