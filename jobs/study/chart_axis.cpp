@@ -25,8 +25,8 @@ std::string tick_label(double value) {
 
 }  // namespace
 
-ChartAxis::ChartAxis(const std::vector<double>& values, bool log, double begin, double end)
-    : log_(log), begin_(begin), end_(end) {
+ChartAxis::ChartAxis(const std::vector<double>& values, AxisScale scale, double begin, double end)
+    : scale_(scale), begin_(begin), end_(end) {
   bool first = true;
   for (const double value : values) {
     if (!shows(value) || !std::isfinite(value)) continue;
@@ -36,13 +36,15 @@ ChartAxis::ChartAxis(const std::vector<double>& values, bool log, double begin, 
     first = false;
   }
   if (first) high_ = (low_ = 0) + 1;
-  const double least = log_ ? 0.3 : 1e-6 + 0.02 * std::abs(high_);
+  const double least = scale_ == AxisScale::log ? 0.3 : 1e-6 + 0.02 * std::abs(high_);
   const double margin = std::max((high_ - low_) * kMargin, 0.5 * (least - (high_ - low_)));
   low_ -= margin;
   high_ += margin;
 }
 
-double ChartAxis::scaled(double value) const { return log_ ? std::log10(value) : value; }
+double ChartAxis::scaled(double value) const {
+  return scale_ == AxisScale::log ? std::log10(value) : value;
+}
 
 double ChartAxis::position(double value) const {
   return begin_ + (scaled(value) - low_) / (high_ - low_) * (end_ - begin_);
@@ -50,7 +52,7 @@ double ChartAxis::position(double value) const {
 
 std::vector<ChartAxis::Tick> ChartAxis::ticks() const {
   std::vector<Tick> ticks;
-  if (log_) {
+  if (scale_ == AxisScale::log) {
     const bool wide = high_ - low_ > kWideDecades;
     for (int decade = static_cast<int>(std::floor(low_)); decade <= high_; ++decade) {
       for (const int digit : {1, 2, 5}) {
@@ -70,6 +72,7 @@ std::vector<ChartAxis::Tick> ChartAxis::ticks() const {
   for (const double factor : {5.0, 2.0, 1.0}) {
     if (factor * power >= rough) step = factor * power;
   }
+  if (scale_ == AxisScale::whole) step = std::max(step, 1.0);
   for (double i = std::ceil(low_ / step); i * step <= high_; ++i) {
     const double value = i == 0 ? 0 : i * step;
     ticks.push_back({value, tick_label(value)});

@@ -5,14 +5,18 @@
 
 namespace baton {
 
+/// How values are laid out: by their logarithm (those at or below 0 are left out), evenly, or
+/// evenly with ticks at whole numbers only.
+enum class AxisScale { log, linear, whole };
+
 /// An axis of a chart: from values to positions in pixels.
 class ChartAxis {
  public:
-  /// values: what must lie on it; those at or below 0 are ignored when `log`. begin, end: pixels.
-  ChartAxis(const std::vector<double>& values, bool log, double begin, double end);
+  /// values: what must lie on it; those that the scale leaves out are ignored. begin, end: pixels.
+  ChartAxis(const std::vector<double>& values, AxisScale scale, double begin, double end);
 
   double position(double value) const;
-  bool shows(double value) const { return !log_ || value > 0; }
+  bool shows(double value) const { return scale_ != AxisScale::log || value > 0; }
 
   struct Tick {
     double value = 0;
@@ -24,7 +28,7 @@ class ChartAxis {
  private:
   double scaled(double value) const;
 
-  bool log_;
+  AxisScale scale_;
   double low_ = 0, high_ = 1;  ///< scaled
   double begin_, end_;
 };

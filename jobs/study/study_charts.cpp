@@ -60,14 +60,15 @@ struct Course {
   const char* name;
   const char* label;
   double FrameMeasures::*value;
-  bool log;
+  AxisScale scale;
 };
 constexpr Course kCourses[] = {
-    {"rmse", "RMSE", &FrameMeasures::mse, true},
-    {"bias", "bias over mean radiance", &FrameMeasures::bias, false},
-    {"lns", "Lns / Lns of the reference, median", &FrameMeasures::lns_median, false},
-    {"ess", "ESS / N", &FrameMeasures::ess, false},
-    {"acceptance", "moves accepted", &FrameMeasures::acceptance, false},
+    {"rmse", "RMSE", &FrameMeasures::mse, AxisScale::log},
+    {"bias", "bias over mean radiance", &FrameMeasures::bias, AxisScale::linear},
+    {"lns", "Lns / Lns of the reference, median", &FrameMeasures::lns_median, AxisScale::linear},
+    {"ess", "ESS / N", &FrameMeasures::ess, AxisScale::linear},
+    {"acceptance", "moves accepted", &FrameMeasures::acceptance, AxisScale::linear},
+    {"flicker", "flicker", &FrameMeasures::flicker, AxisScale::linear},
 };
 
 ChartPoint course_point(const Course& course, const StudyResults& results, std::size_t scene,
@@ -113,8 +114,8 @@ std::vector<NamedChart> temporal_charts(const Study& study, const StudyResults& 
     chart.title = fmt::format("{}: {}", study.scenes[scene].name, course.label);
     chart.x_label = "frame (each method at about equal time)";
     chart.y_label = course.label;
-    chart.log_x = false;
-    chart.log_y = course.log;
+    chart.x_scale = AxisScale::whole;
+    chart.y_scale = course.scale;
     for (const std::size_t cell : equal_time_cells(study, results, scene)) {
       const int method = study.cells[cell].method;
       ChartSeries series{fmt::format("{} {}", study.methods[static_cast<std::size_t>(method)],

@@ -27,8 +27,8 @@ class Drawing {
  public:
   explicit Drawing(const Chart& chart)
       : chart_(chart),
-        x_(values(chart, true), chart.log_x, kLeft, kRight),
-        y_(values(chart, false), chart.log_y, kBottom, kTop) {}
+        x_(values(chart, true), chart.x_scale, kLeft, kRight),
+        y_(values(chart, false), chart.y_scale, kBottom, kTop) {}
 
   std::string draw() {
     add(R"(<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {} {}" width="{}" height="{}" )"
@@ -59,12 +59,13 @@ class Drawing {
   /// Every x, or every y, that must be on the axis.
   static std::vector<double> values(const Chart& chart, bool x) {
     std::vector<double> result;
+    const bool log_x = chart.x_scale == AxisScale::log, log_y = chart.y_scale == AxisScale::log;
     for (const ChartSeries& series : chart.series) {
       for (const ChartPoint& point : series.points) {
-        if ((chart.log_x && !(point.x > 0)) || (chart.log_y && !(point.y > 0))) continue;
+        if ((log_x && !(point.x > 0)) || (log_y && !(point.y > 0))) continue;
         result.push_back(x ? point.x : point.y);
         // A band that reaches far down on a log scale must not flatten the rest.
-        if (!x) result.push_back(chart.log_y ? std::max(point.low, point.y / 4) : point.low);
+        if (!x) result.push_back(log_y ? std::max(point.low, point.y / 4) : point.low);
         if (!x) result.push_back(point.high);
       }
     }

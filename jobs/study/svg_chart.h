@@ -4,6 +4,8 @@
 #include <string>
 #include <vector>
 
+#include "jobs/study/chart_axis.h"
+
 namespace baton {
 
 struct ChartPoint {
@@ -22,7 +24,7 @@ struct ChartSeries {
 
 struct Chart {
   std::string title, x_label, y_label;
-  bool log_x = true, log_y = true;  ///< points at or below 0 are left out
+  AxisScale x_scale = AxisScale::log, y_scale = AxisScale::log;
   std::vector<ChartSeries> series;
   std::optional<double> floor;  ///< a line across: what the reference cannot resolve
 };

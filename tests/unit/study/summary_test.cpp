@@ -195,7 +195,7 @@ TEST(Measures, SquaresAreCutAtTheBorder) {
 }
 
 TEST(ChartAxis, TicksAreDecadesOrRoundSteps) {
-  const ChartAxis log({0.01, 10}, true, 0, 100);
+  const ChartAxis log({0.01, 10}, AxisScale::log, 0, 100);
   std::vector<double> labelled;
   for (const auto& tick : log.ticks()) {
     if (!tick.label.empty()) labelled.push_back(tick.value);
@@ -203,8 +203,13 @@ TEST(ChartAxis, TicksAreDecadesOrRoundSteps) {
   EXPECT_EQ(labelled, (std::vector<double>{0.01, 0.1, 1, 10}));
   EXPECT_LT(log.position(0.1), log.position(1));
 
-  const ChartAxis linear({1, 8}, false, 0, 100);
+  const ChartAxis linear({1, 8}, AxisScale::linear, 0, 100);
   for (const auto& tick : linear.ticks()) EXPECT_EQ(tick.value, std::round(tick.value));
+
+  // Two frames: nothing lies between them.
+  const ChartAxis frames({15, 16}, AxisScale::whole, 0, 100);
+  ASSERT_EQ(frames.ticks().size(), 2u);
+  for (const auto& tick : frames.ticks()) EXPECT_EQ(tick.value, std::round(tick.value));
 }
 
 TEST(SvgChart, DrawsEveryPointThatItsScaleCanShow) {
