@@ -86,32 +86,61 @@ struct SiteDeal {
   }
 };
 
-/// The entries of the light pool that are a pixel's candidates: neighbours from a random aligned
-/// start.
-struct LightRun {
-  const LightPool& pool;
-  std::size_t start;
-
-  LightRun(const LightPool& light_pool, std::int32_t count, std::uint32_t bits)
-      : pool(light_pool), start(0) {
+/// The entries of the light pool that are a pixel's candidates: blocks spread evenly over a random
+/// run, in the order of its curve; or, if one run has too few, neighbours from a random place on.
+class LightRun {
+ public:
+  /// bits: random. Which blocks are taken depends on `count` and on them alone, and each block is
+  /// as likely as any other.
+  LightRun(const LightPool& pool, std::int32_t count, std::uint32_t bits) : pool_(pool) {
     if (count == 0) return;
-    const std::uint32_t stride =
-        std::clamp(std::bit_floor(static_cast<std::uint32_t>(count)), LightPool::kBlock, 64u);
-    start = bits & (LightPool::kSize - stride);  // both are powers of two
+    const std::uint32_t num_blocks =
+        (static_cast<std::uint32_t>(count) + LightPool::kBlock - 1) / LightPool::kBlock;
+    const bool in_one_run = num_blocks <= pool.run_blocks;
+    const std::uint32_t region = in_one_run ? pool.run_blocks : LightPool::kNumBlocks;
+    // Whole runs are read from their beginning; of others the ends are joined.
+    if (num_blocks % pool.run_blocks == 0) bits &= ~(pool.run_blocks - 1);
+    within_ = static_cast<std::int32_t>(region - 1);
+    first_ = static_cast<std::int32_t>(bits & (LightPool::kNumBlocks - 1) & ~(region - 1));
+    start_ = static_cast<std::int32_t>(bits & (region - 1));
+    if (in_one_run) step_ = static_cast<std::int32_t>((region << kStepBits) / num_blocks);
   }
+  const LightPool& pool() const { return pool_; }
+
   /// Candidates i, i + 1, ...
-  HWY_INLINE LightLanes Load(std::size_t i) const {
-    return LoadLight(pool, (start + i) % LightPool::kSize);
-  }
+  HWY_INLINE LightLanes Load(std::size_t i) const { return LoadLight(pool_, Entry(i)); }
   /// Their 1 / density.
   HWY_INLINE VF LoadInverse(std::size_t i) const {
-    const std::size_t entry = (start + i) % LightPool::kSize;
+    const std::size_t entry = Entry(i);
     return hn::Load(
-        DF(), pool.blocks[entry / LightPool::kBlock].inverse_density + entry % LightPool::kBlock);
+        DF(), pool_.blocks[entry / LightPool::kBlock].inverse_density + entry % LightPool::kBlock);
   }
-  HWY_INLINE Vec3Lanes LoadBefore(std::size_t i) const {
-    return LoadLightBefore(pool, (start + i) % LightPool::kSize);
+  HWY_INLINE Vec3Lanes LoadBefore(std::size_t i) const { return LoadLightBefore(pool_, Entry(i)); }
+
+  /// Block of the pool that holds candidate i.
+  HWY_INLINE VI BlockOf(VI i) const {
+    const DI di;
+    const VI along = hn::ShiftRight<kStepBits>(hn::Mul(hn::ShiftRight<3>(i), hn::Set(di, step_)));
+    const VI within = hn::And(hn::Add(along, hn::Set(di, start_)), hn::Set(di, within_));
+    return hn::Add(within, hn::Set(di, first_));
   }
+
+ private:
+  static_assert(LightPool::kBlock == 8);
+  static constexpr int kStepBits = 16;  // times the blocks of kMaxCandidates: below 2^31
+
+  std::size_t Entry(std::size_t i) const {
+    const std::int32_t along =
+        static_cast<std::int32_t>(i / LightPool::kBlock) * step_ >> kStepBits;
+    const std::int32_t block = first_ + ((along + start_) & within_);
+    return static_cast<std::size_t>(block) * LightPool::kBlock + i % LightPool::kBlock;
+  }
+
+  const LightPool& pool_;
+  std::int32_t first_ = 0;              ///< block at which the region begins that is read from
+  std::int32_t start_ = 0;              ///< where in it the reading begins
+  std::int32_t within_ = 0;             ///< its blocks, less one; a power of two, less one
+  std::int32_t step_ = 1 << kStepBits;  ///< blocks from one vector to the next
 };
 
 /// Expected density of BRDF candidates at a site, relative to an even deal over all sites with a

@@ -81,11 +81,9 @@ class ChosenCandidates {
     const DI di;
     constexpr auto kFields = static_cast<std::int32_t>(sizeof(LightPool::Block) / sizeof(float));
     static_assert(LightPool::kBlock == 8);
-    const LightPool::Block& first = run_.pool.blocks[0];
-    const VI entry = hn::And(hn::Add(pick, hn::Set(di, static_cast<std::int32_t>(run_.start))),
-                             hn::Set(di, static_cast<std::int32_t>(LightPool::kSize) - 1));
-    const VI at = hn::Add(hn::Mul(hn::ShiftRight<3>(entry), hn::Set(di, kFields)),
-                          hn::And(entry, hn::Set(di, 7)));
+    const LightPool::Block& first = run_.pool().blocks[0];
+    const VI at =
+        hn::Add(hn::Mul(run_.BlockOf(pick), hn::Set(di, kFields)), hn::And(pick, hn::Set(di, 7)));
     const auto read = [&](const float* field) HWY_ATTR { return hn::GatherIndex(d, field, at); };
     CandidateLanes out;
     out.code = hn::BitCast(

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "common/base/limits.h"
+#include "worker/integrator/candidate_samplers.h"
 
 namespace baton {
 namespace {
@@ -17,7 +18,8 @@ std::size_t size_bytes(const FrameLight& light) { return light.pool.size_bytes()
 /// The cached value, moved to the front, or null.
 template <class List>
 auto find_and_touch(List& cache, std::int32_t key) -> decltype(cache.front().second) {
-  const auto found = std::find_if(cache.begin(), cache.end(), [key](const auto& entry) { return entry.first == key; });
+  const auto found = std::find_if(cache.begin(), cache.end(),
+                                  [key](const auto& entry) { return entry.first == key; });
   if (found == cache.end()) return nullptr;
   cache.splice(cache.begin(), cache, found);
   return cache.front().second;
@@ -30,7 +32,8 @@ void insert_in_front(List& cache, std::int32_t key, std::shared_ptr<const Value>
   std::size_t total = 0;
   for (auto it = cache.begin(); it != cache.end();) {
     total += size_bytes(*it->second);
-    it = total > limits::kMaxEnvironmentCacheBytes && it != cache.begin() ? cache.erase(it) : std::next(it);
+    it = total > limits::kMaxEnvironmentCacheBytes && it != cache.begin() ? cache.erase(it)
+                                                                          : std::next(it);
   }
 }
 
@@ -44,6 +47,59 @@ float kinship(const EnvironmentMap& before, const EnvironmentMap& now) {
                             std::pow(before.overlap(now), 4));
 }
 
+/// Entries of the light pool that a pixel takes when its N samples are drawn anew, from M
+/// candidates.
+std::int32_t num_taken(StartMethod method, std::int32_t n, std::int32_t m, float brdf_fraction) {
+  switch (method) {
+    case StartMethod::environment:
+      return n;
+    case StartMethod::brdf:
+      return 1;
+    case StartMethod::mis:
+      return split_candidates(n, brdf_fraction).from_light;
+    case StartMethod::bidirectional:
+      return m;
+  }
+  return m;
+}
+
+/// The pool as most pixels read it.
+LightPoolLayout pool_layout(const JobSpec& job) {
+  const SamplingSpec& spec = job.sampling;
+  const auto fresh = [&](StartMethod method) {
+    return num_taken(method, spec.num_particles, spec.num_candidates, spec.brdf_fraction);
+  };
+  std::int32_t taken = 1;
+  switch (spec.method) {
+    case Method::environment:
+      taken = fresh(StartMethod::environment);
+      break;
+    case Method::mis:
+      taken = fresh(StartMethod::mis);
+      break;
+    case Method::bidirectional:
+      taken = fresh(StartMethod::bidirectional);
+      break;
+    case Method::sequential:
+      taken = fresh(spec.start_method);
+      break;
+    case Method::pool:
+      taken = spec.num_candidates / 2;
+      break;
+    case Method::brdf:
+    case Method::reference:
+    case Method::automatic:
+      break;
+  }
+  for (const auto& [name, own] : spec.by_material) {
+    taken = std::max(
+        taken, num_taken(own.method, own.num_particles, own.num_candidates, own.brdf_fraction));
+  }
+  const bool pool = spec.method == Method::pool;
+  return {.carried = pool ? CarriedFrame::environment : CarriedFrame::world,
+          .num_taken = static_cast<std::uint32_t>(std::max(taken / num_populations(job), 1))};
+}
+
 }  // namespace
 
 LightSequence::LightSequence(const JobSpec& job, std::shared_ptr<MapCache> maps)
@@ -53,8 +109,8 @@ Result<std::shared_ptr<const EnvironmentMap>> LightSequence::key_map(std::int32_
   const std::string& path = job_.environment.keys[static_cast<std::size_t>(key)].map;
   BATON_ASSIGN(const auto map, maps_->get(path, job_.environment, job_.sampling.mis_compensation));
   if (const auto& repairs = map->repairs(); repairs.total() > 0) {
-    const std::string note = fmt::format("{}: {} negative, {} NaN, {} infinite texels set to 0", path,
-                                         repairs.negative, repairs.nan, repairs.infinite);
+    const std::string note = fmt::format("{}: {} negative, {} NaN, {} infinite texels set to 0",
+                                         path, repairs.negative, repairs.nan, repairs.infinite);
     if (std::find(repair_notes_.begin(), repair_notes_.end(), note) == repair_notes_.end()) {
       repair_notes_.push_back(note);
     }
@@ -62,7 +118,8 @@ Result<std::shared_ptr<const EnvironmentMap>> LightSequence::key_map(std::int32_
   return map;
 }
 
-Result<std::shared_ptr<const EnvironmentMap>> LightSequence::mixed_map(const EnvironmentFrame& frame) {
+Result<std::shared_ptr<const EnvironmentMap>> LightSequence::mixed_map(
+    const EnvironmentFrame& frame) {
   if (frame.mix <= 0) return key_map(frame.map_a);
   const auto first = std::find_if(frames_.begin(), frames_.end(), [&](const FrameSpec& f) {
     return f.environment.same_texels(frame);
@@ -72,12 +129,15 @@ Result<std::shared_ptr<const EnvironmentMap>> LightSequence::mixed_map(const Env
   BATON_ASSIGN(const auto a, key_map(frame.map_a));
   BATON_ASSIGN(const auto b, key_map(frame.map_b));
   if (a->width() != b->width() || a->height() != b->height()) {
-    return Error{ErrorKind::bad_input,
-                 fmt::format("{}: {} x {} texels, expected {} x {} as in {} to interpolate between them",
-                             job_.environment.keys[static_cast<std::size_t>(frame.map_b)].map, b->width(), b->height(),
-                             a->width(), a->height(), job_.environment.keys[static_cast<std::size_t>(frame.map_a)].map)};
+    return Error{
+        ErrorKind::bad_input,
+        fmt::format("{}: {} x {} texels, expected {} x {} as in {} to interpolate between them",
+                    job_.environment.keys[static_cast<std::size_t>(frame.map_b)].map, b->width(),
+                    b->height(), a->width(), a->height(),
+                    job_.environment.keys[static_cast<std::size_t>(frame.map_a)].map)};
   }
-  auto map = std::make_shared<const EnvironmentMap>(*a, *b, frame.mix, job_.sampling.mis_compensation);
+  auto map =
+      std::make_shared<const EnvironmentMap>(*a, *b, frame.mix, job_.sampling.mis_compensation);
   insert_in_front(mixed_maps_, name, map);
   return std::shared_ptr<const EnvironmentMap>(map);
 }
@@ -97,12 +157,13 @@ Result<std::shared_ptr<const FrameLight>> LightSequence::at(std::int32_t index) 
   BATON_ASSIGN(light->now, environment(frame.environment));
   BATON_ASSIGN(light->before, environment(frame_before.environment));
   light->still = frame.environment == frame_before.environment;
-  const bool pool = job_.sampling.method == Method::pool;
-  if (pool) light->gain = kinship(*light->before.map, *light->now.map);
-  light->pool = make_light_pool(
-      light->now, light->before, job_.seed, static_cast<std::uint32_t>(frame.number),
-      pool ? CarriedFrame::environment : CarriedFrame::world);
-  light->prepare_seconds = std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  if (job_.sampling.method == Method::pool) {
+    light->gain = kinship(*light->before.map, *light->now.map);
+  }
+  light->pool = make_light_pool(light->now, light->before, job_.seed,
+                                static_cast<std::uint32_t>(frame.number), pool_layout(job_));
+  light->prepare_seconds =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
   insert_in_front(lights_, index, std::shared_ptr<const FrameLight>(light));
   return std::shared_ptr<const FrameLight>(light);
 }

@@ -17,24 +17,27 @@ namespace baton {
 /// The light of one frame, ready for its pixels.
 struct FrameLight {
   Environment now;
-  Environment before;   ///< the frame before; for the first frame the same as now
-  bool still = false;   ///< now shows what before showed: the same texels, turned alike
+  Environment before;  ///< the frame before; for the first frame the same as now
+  bool still = false;  ///< now shows what before showed: the same texels, turned alike
   LightPool pool;
-  float gain = 1;       ///< kinship() of both; 1 where samples are not weighed by it
+  float gain = 1;              ///< kinship() of both; 1 where samples are not weighed by it
   double prepare_seconds = 0;  ///< time spent on texels, table and pool
 };
 
-/// The environments of a job's frames, prepared on demand and kept while memory allows. Any number of threads may ask;
-/// a frame is prepared once while the others wait. A frame's light is a pure function of (job, frame).
+/// The environments of a job's frames, prepared on demand and kept while memory allows. Any number
+/// of threads may ask; a frame is prepared once while the others wait. A frame's light is a pure
+/// function of (job, frame).
 class LightSequence {
  public:
   /// job must outlive the object. maps: may be shared with other jobs.
   LightSequence(const JobSpec& job, std::shared_ptr<MapCache> maps);
 
-  /// The light of frame `index` (0-based). Errors: a map that cannot be read, or two key frames of different size.
+  /// The light of frame `index` (0-based). Errors: a map that cannot be read, or two key frames of
+  /// different size.
   Result<std::shared_ptr<const FrameLight>> at(std::int32_t index);
 
-  /// Texels set to 0 because they were negative, NaN or infinite, per map read so far: "path: 12 negative ...".
+  /// Texels set to 0 because they were negative, NaN or infinite, per map read so far: "path: 12
+  /// negative ...".
   std::vector<std::string> repair_notes() const;
 
  private:
@@ -50,7 +53,8 @@ class LightSequence {
   const std::shared_ptr<MapCache> maps_;
   std::vector<FrameSpec> frames_;
   mutable std::mutex mutex_;
-  Cache<std::int32_t, EnvironmentMap> mixed_maps_;  ///< by the first frame index that shows these texels
+  Cache<std::int32_t, EnvironmentMap>
+      mixed_maps_;  ///< by the first frame index that shows these texels
   Cache<std::int32_t, FrameLight> lights_;
   std::vector<std::string> repair_notes_;
 };

@@ -1,30 +1,52 @@
 #include "worker/integrator/light_pool.h"
 
 #include <algorithm>
-#include <array>
+#include <bit>
 #include <iterator>
-#include <numeric>
+#include <span>
 #include <utility>
 
+#include "common/math/hilbert.h"
 #include "common/math/low_discrepancy.h"
 #include "worker/integrator/kernels.h"
 
 namespace baton {
 namespace {
 
-/// The order in which eight consecutive points of the sequence fill block `index`: random, because
-/// the j-th of eight consecutive Sobol' points always lies in the same eighth of the table, and a
-/// reader that always takes the j-th entry of random blocks must see all of it.
-std::array<std::uint32_t, LightPool::kBlock> shuffled_order(const Rng& rng, std::uint32_t index) {
-  std::array<std::uint32_t, LightPool::kBlock> order{};
-  std::iota(order.begin(), order.end(), 0u);
-  const auto first = rng.bits(1, index);
-  const auto second = rng.bits(2, index);
-  for (std::uint32_t i = LightPool::kBlock - 1; i > 0; --i) {
-    const std::uint32_t bits = i < 4 ? first[i] : second[i - 4];
-    std::swap(order[i], order[static_cast<std::size_t>((std::uint64_t{bits} * (i + 1)) >> 32)]);
+/// The directions of all entries, in the order of the sequence.
+std::vector<OctDirection> draw_directions(const Environment& now, const Philox4x32::Counter& seeds,
+                                          CarriedFrame carried) {
+  std::vector<OctDirection> directions(LightPool::kSize);
+  for (std::uint32_t i = 0; i < LightPool::kSize; ++i) {
+    const auto [sx, sy] = sobol_2d(i);
+    const Vec3 w = now.map->sample(
+        {uniform_float(owen_scramble(sx, seeds[0])), uniform_float(owen_scramble(sy, seeds[1]))});
+    directions[i] = encode_octahedral(carried == CarriedFrame::world ? now.rotation * w : w);
   }
-  return order;
+  return directions;
+}
+
+/// Sorts directions along the curve.
+void sort_along_curve(std::span<OctDirection> directions) {
+  std::vector<std::pair<std::uint32_t, OctDirection>> order;
+  order.reserve(directions.size());
+  for (const OctDirection w : directions)
+    order.emplace_back(hilbert_index(w & 0xFFFFu, w >> 16), w);
+  std::sort(order.begin(), order.end());
+  std::transform(order.begin(), order.end(), directions.begin(),
+                 [](const auto& entry) { return entry.second; });
+}
+
+/// Puts a sorted run into its blocks; place 0 of them gets the eighth `first` of the curve.
+void lay_out(std::span<const OctDirection> sorted, std::uint32_t first,
+             std::span<LightPool::Block> blocks) {
+  constexpr std::uint32_t kReversed[] = {0, 4, 2, 6, 1, 5, 3, 7};
+  for (std::uint32_t place = 0; place < LightPool::kBlock; ++place) {
+    const std::uint32_t eighth = (kReversed[place] + first) % LightPool::kBlock;
+    for (std::uint32_t b = 0; b < blocks.size(); ++b) {
+      blocks[b].code[place] = sorted[eighth * blocks.size() + b];
+    }
+  }
 }
 
 /// Turns the directions into the world.
@@ -40,27 +62,28 @@ void turn(const Mat3& rotation, LightPool::Block& block) {
 }  // namespace
 
 LightPool make_light_pool(const Environment& now, const Environment& before, std::uint64_t job_seed,
-                          std::uint32_t frame, CarriedFrame carried) {
+                          std::uint32_t frame, const LightPoolLayout& layout) {
   LightPool pool;
   if (now.map->black()) return pool;
-  pool.blocks.resize(LightPool::kSize / LightPool::kBlock);
-  const bool turns = carried == CarriedFrame::environment;
+  const Rng rng({.job_seed = job_seed, .frame = frame, .pixel = 0}, PassId::light_pool);
+
+  // Draw the directions, run by run.
+  pool.blocks.resize(LightPool::kNumBlocks);
+  const std::uint32_t num_blocks = (layout.num_taken + LightPool::kBlock - 1) / LightPool::kBlock;
+  pool.run_blocks = std::bit_floor(std::clamp(num_blocks, 1u, LightPool::kMaxRunBlocks));
+  std::vector<OctDirection> directions = draw_directions(now, rng.bits(0, 0), layout.carried);
+  for (std::uint32_t first = 0; first < LightPool::kNumBlocks; first += pool.run_blocks) {
+    const auto run = std::span(directions)
+                         .subspan(first * LightPool::kBlock, pool.run_blocks * LightPool::kBlock);
+    sort_along_curve(run);
+    lay_out(run, first / pool.run_blocks, std::span(pool.blocks).subspan(first, pool.run_blocks));
+  }
+
+  // Look everything up at the lattice directions, with the look-up that the pixels use.
+  const bool turns = layout.carried == CarriedFrame::environment;
   const EnvironmentView now_view = turns ? unturned_view_of(now) : view_of(now);
   const EnvironmentView before_view = turns ? unturned_view_of(before) : view_of(before);
-  const Rng rng({.job_seed = job_seed, .frame = frame, .pixel = 0}, PassId::light_pool);
-  const Philox4x32::Counter seeds = rng.bits(0, 0);
-  for (std::uint32_t index = 0; index < pool.blocks.size(); ++index) {
-    LightPool::Block& block = pool.blocks[index];
-    const auto order = shuffled_order(rng, index);
-    // Draw the directions and put them on the lattice.
-    for (std::uint32_t i = 0; i < LightPool::kBlock; ++i) {
-      const auto [sx, sy] = sobol_2d(index * LightPool::kBlock + order[i]);
-      const Vec3 w = now.map->sample(
-          {uniform_float(owen_scramble(sx, seeds[0])), uniform_float(owen_scramble(sy, seeds[1]))});
-      block.code[i] = encode_octahedral(turns ? w : now.rotation * w);
-    }
-
-    // Look everything up at the lattice directions, with the look-up that the pixels use.
+  for (LightPool::Block& block : pool.blocks) {
     kernels::decode_directions(block.code, block.x, block.y, block.z);
     kernels::evaluate_environment(now_view, block.x, block.y, block.z, block.r, block.g, block.b,
                                   block.density);

@@ -11,13 +11,24 @@ namespace baton {
 
 /// Directions drawn from a frame's environment before its pixels are rendered; pixels pick
 /// candidates and proposals from it. One Owen-scrambled Sobol' sequence through the map's sampling
-/// table, so every aligned block is well spread by itself (blocks of eight are shuffled within).
-/// Each entry's direction has density `density`, so a pixel that chooses entries independently of
-/// their contents stays unbiased; pixels that choose the same entries have correlated errors.
+/// table. Each entry's direction has density `density`, so a pixel that chooses entries
+/// independently of their contents stays unbiased; pixels that choose the same entries have
+/// correlated errors.
+///
+/// Every aligned run of `run_blocks` blocks is a net of the sequence, laid out along a Hilbert
+/// curve over the lattice of directions. Each place in a block stands for an eighth of the curve,
+/// which the run's blocks hold in order; neighbouring places stand for distant eighths, as in the
+/// van der Corput sequence, so that half a block still covers the map. A systematic choice
+/// (systematic_choice.h) goes through the places in the order of their eighths: it takes directions
+/// that are spread over the light, and so its shadow rays are stratified. In each run place 0 is
+/// another eighth, so that one who takes the same place of random blocks sees the whole map.
 struct LightPool {
   static constexpr std::uint32_t kSize = 1u
                                          << 13;  ///< entries: few enough to stay in a core's cache
   static constexpr std::uint32_t kBlock = 8;     ///< entries that lie together in memory
+
+  static constexpr std::uint32_t kNumBlocks = kSize / kBlock;
+  static constexpr std::uint32_t kMaxRunBlocks = kNumBlocks / kBlock;
 
   /// Eight entries, field by field: the unit of SIMD loads.
   struct alignas(64) Block {
@@ -28,7 +39,8 @@ struct LightPool {
     float inverse_density[kBlock];          ///< sr; 0 where the density is
     float before_r[kBlock], before_g[kBlock], before_b[kBlock];  ///< radiance of the frame before
   };
-  std::vector<Block> blocks;  ///< (kSize / kBlock); empty for a black map
+  std::vector<Block> blocks;     ///< (kNumBlocks); empty for a black map
+  std::uint32_t run_blocks = 1;  ///< a power of two, at most kMaxRunBlocks
 
   bool empty() const { return blocks.empty(); }
   std::size_t size_bytes() const { return blocks.size() * sizeof(Block); }
@@ -38,10 +50,18 @@ struct LightPool {
 /// turn.
 enum class CarriedFrame { world, environment };
 
+/// How a pool is laid out.
+struct LightPoolLayout {
+  /// What `code` and the `before_*` of a direction are relative to; x, y, z are world directions in
+  /// either case.
+  CarriedFrame carried = CarriedFrame::world;
+  /// Entries that most pixels take: a run has so many, rounded down to a power of two.
+  std::uint32_t num_taken = 64;
+};
+
 /// The pool of one frame. before: the environment that `before_*` is read from (the same as `now`
-/// for the first frame). carried: what `code` and the `before_*` of a direction are relative to;
-/// x, y, z are world directions in either case.
+/// for the first frame).
 LightPool make_light_pool(const Environment& now, const Environment& before, std::uint64_t job_seed,
-                          std::uint32_t frame, CarriedFrame carried = CarriedFrame::world);
+                          std::uint32_t frame, const LightPoolLayout& layout = {});
 
 }  // namespace baton

@@ -16,8 +16,10 @@ HWY_BEFORE_NAMESPACE();
 namespace baton::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-/// Weights on a line, lane by lane: first those at 0, 8, 16, ..., then those at 1, 9, ... Eight
-/// stretches grow at once, and what is stored are their lengths so far, which never fall.
+/// Weights on a line, lane by lane in the order of the van der Corput sequence: those at 0, 8, 16,
+/// ..., then those at 4, 12, ..., at 2, 6, 1, 5, 3 and 7 and so on. Eight stretches grow at once,
+/// and what is stored are their lengths so far, which never fall. Where eight neighbours are points
+/// of a low-discrepancy sequence, which jumps to and fro, this order goes through them smoothly.
 class RunningSums {
  public:
   /// Where the line ends so far. A loop that appends works on a copy of it, in registers.
@@ -42,11 +44,12 @@ class RunningSums {
     size_ = static_cast<std::size_t>(end.next - storage_);
     hn::Store(end.sum, DF(), length_);
     float total = 0;
-    for (std::size_t lane = 0; lane < kLanes; ++lane) {
+    for (std::size_t k = 0; k < kLanes; ++k) {
+      const auto lane = static_cast<std::size_t>(kLaneOf[k]);
       start_[lane] = total;
       total += length_[lane];
-      stop_[lane] = total;
-      if (length_[lane] > 0) last_ = static_cast<std::int32_t>(lane);
+      stop_[k] = total;
+      if (length_[lane] > 0) last_ = static_cast<std::int32_t>(k);
     }
     return total;
   }
@@ -58,7 +61,7 @@ class RunningSums {
   HWY_INLINE void Find(const VF (&position)[2], std::int32_t* found) const {
     const DF d;
     const DI di;
-    // The lane is the first whose stretch ends later; rounding past the end counts to the last.
+    // The first stretch that ends later, and its lane; rounding past the end counts to the last.
     VI lane[2], vector[2];
     VF along[2];
     for (std::size_t g = 0; g < 2; ++g) {
@@ -67,7 +70,7 @@ class RunningSums {
         const auto passed = hn::Le(hn::Set(d, stop_[k]), position[g]);
         lane[g] = hn::Sub(lane[g], hn::VecFromMask(di, hn::RebindMask(di, passed)));
       }
-      lane[g] = hn::Min(lane[g], hn::Set(di, last_));
+      lane[g] = hn::GatherIndex(di, kLaneOf, hn::Min(lane[g], hn::Set(di, last_)));
       const VF longest = hn::Mul(hn::GatherIndex(d, length_, lane[g]), hn::Set(d, 1 - 0x1p-23f));
       along[g] = hn::Min(hn::Sub(position[g], hn::GatherIndex(d, start_, lane[g])), longest);
     }
@@ -93,12 +96,15 @@ class RunningSums {
 
  private:
   static constexpr std::size_t kLanes = hn::MaxLanes(DF());
+  static_assert(kLanes == 4 || kLanes == 8);
+  /// Lane of the k-th stretch: its bits reversed.
+  static constexpr std::int32_t kLaneOf[] = {0, kLanes / 2, kLanes / 4, 3 * kLanes / 4, 1, 5, 3, 7};
   float* storage_;
-  std::size_t size_ = 0;   ///< weights, padded
-  std::int32_t last_ = 0;  ///< last lane with a length
-  HWY_ALIGN float length_[kLanes];
-  HWY_ALIGN float start_[kLanes];
-  HWY_ALIGN float stop_[kLanes];
+  std::size_t size_ = 0;            ///< weights, padded
+  std::int32_t last_ = 0;           ///< last stretch with a length
+  HWY_ALIGN float length_[kLanes];  ///< by lane
+  HWY_ALIGN float start_[kLanes];   ///< by lane
+  HWY_ALIGN float stop_[kLanes];    ///< by stretch
 };
 
 /// picks: the weights that hold positions (m + u) total / count of the line, m = 0 ... count - 1,

@@ -116,7 +116,7 @@ class Pool : public testing::TestWithParam<std::int64_t> {
   Pixel now_pixel{0.1f}, old_pixel{0.15f};
   OldSurfaces old;
   Environment now = turned_sky(30, 1), before = turned_sky(28, 0.7f);
-  LightPool light_pool = make_light_pool(now, before, 3, 2, CarriedFrame::environment);
+  LightPool light_pool = make_light_pool(now, before, 3, 2, {.carried = CarriedFrame::environment});
   CandidateCounts counts{.from_light = 24, .from_bsdf = 8};
   PoolSettings settings{.num_carried = 16, .gain = 2};
   std::vector<VisibilityCell> memory = std::vector<VisibilityCell>(kVisibilityCells, 0);
