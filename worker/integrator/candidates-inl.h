@@ -98,8 +98,10 @@ class LightRun {
         (static_cast<std::uint32_t>(count) + LightPool::kBlock - 1) / LightPool::kBlock;
     const bool in_one_run = num_blocks <= pool.run_blocks;
     const std::uint32_t region = in_one_run ? pool.run_blocks : LightPool::kNumBlocks;
-    // Whole runs are read from their beginning; of others the ends are joined.
-    if (num_blocks % pool.run_blocks == 0) bits &= ~(pool.run_blocks - 1);
+    // Whole runs are read from their beginning. Else, also where the last block is not read to its
+    // end, the reading begins anywhere, and the ends are joined.
+    const std::uint32_t run = pool.run_blocks * LightPool::kBlock;
+    if (static_cast<std::uint32_t>(count) % run == 0) bits &= ~(pool.run_blocks - 1);
     within_ = static_cast<std::int32_t>(region - 1);
     first_ = static_cast<std::int32_t>(bits & (LightPool::kNumBlocks - 1) & ~(region - 1));
     start_ = static_cast<std::int32_t>(bits & (region - 1));

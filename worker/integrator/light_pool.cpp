@@ -70,7 +70,7 @@ LightPool make_light_pool(const Environment& now, const Environment& before, std
   // Draw the directions, run by run.
   pool.blocks.resize(LightPool::kNumBlocks);
   const std::uint32_t num_blocks = (layout.num_taken + LightPool::kBlock - 1) / LightPool::kBlock;
-  pool.run_blocks = std::bit_floor(std::clamp(num_blocks, 1u, LightPool::kMaxRunBlocks));
+  pool.run_blocks = std::bit_ceil(std::clamp(num_blocks, 1u, LightPool::kMaxRunBlocks));
   std::vector<OctDirection> directions = draw_directions(now, rng.bits(0, 0), layout.carried);
   for (std::uint32_t first = 0; first < LightPool::kNumBlocks; first += pool.run_blocks) {
     const auto run = std::span(directions)

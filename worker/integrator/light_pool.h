@@ -55,7 +55,7 @@ struct LightPoolLayout {
   /// What `code` and the `before_*` of a direction are relative to; x, y, z are world directions in
   /// either case.
   CarriedFrame carried = CarriedFrame::world;
-  /// Entries that most pixels take: a run has so many, rounded down to a power of two.
+  /// Entries that most pixels take: a run has so many, rounded up to a power of two.
   std::uint32_t num_taken = 64;
 };
 
