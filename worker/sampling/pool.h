@@ -44,9 +44,9 @@ inline float ray_factor(float free) { return std::max(std::sqrt(free * (1 - free
 
 /// Whether rays are chosen by doubt, with the control variate. That subtracts what was expected of
 /// a blocked ray, and falls below zero where light that was sure to come is blocked: it is used
-/// where the expected light is so many times the weight of doubt that the stability suite saw 83
-/// such values among a hundred million. Elsewhere rays are chosen by carry_factor, and each counts what it brings. Either
-/// way is without bias: pool and memory decide before any ray is chosen.
+/// where the expected light is so many times the weight of doubt that the stability suite saw 87
+/// such values among a hundred million. Elsewhere rays are chosen by carry_factor, and each counts
+/// what it brings. Either way is without bias: pool and memory decide before any ray is chosen.
 inline constexpr float kSafeControl = 4;
 inline bool use_control(float expected, float doubt) { return expected > kSafeControl * doubt; }
 

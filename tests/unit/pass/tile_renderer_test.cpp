@@ -81,14 +81,17 @@ TEST(RunTile, SameBytesForAnyTilingAndAnyRunLength) {
   EXPECT_EQ(render_tiled(job, 4096, 1), whole);
 }
 
-/// Box and ground with settings of their own.
+/// Box and ground with settings of their own, and the largest M for a material that no pixel sees:
+/// the light pool is laid out for that.
 JobSpec job_by_material() {
   JobSpec job = sequence_job(2);
   job.sampling.method = Method::mis;
   job.sampling.num_particles = 8;
   job.sampling.by_material = {
       {"glossy", {.method = StartMethod::bidirectional, .num_particles = 12, .num_candidates = 64}},
-      {"ground", {.method = StartMethod::environment, .num_particles = 4}}};
+      {"ground", {.method = StartMethod::environment, .num_particles = 4}},
+      {"unseen", {.method = StartMethod::bidirectional, .num_candidates = 100}}};
+  job.scene.materials["unseen"] = {};
   job.output.aovs = {Aov::lns, Aov::ess, Aov::material};
   return job;
 }
@@ -99,7 +102,8 @@ TEST(RunTile, SameBytesForAnyTilingByMaterial) {
   EXPECT_EQ(render_tiled(job, 5, 1), whole);
 }
 
-// A pixel has the bytes that it has where its material's setting is that of the whole picture.
+// A pixel has the bytes that it has where its material's setting is that of the whole picture and
+// the light pool is laid out alike.
 TEST(RunTile, EachMaterialIsSampledByItsOwnSetting) {
   const JobSpec job = job_by_material();
   const FilmTile mixed = render_tiled(job, 4096, 5).back();
@@ -108,7 +112,8 @@ TEST(RunTile, EachMaterialIsSampledByItsOwnSetting) {
   for (const auto& [name, material] : job.scene.materials) {
     number += 1;
     JobSpec whole = job;
-    whole.sampling.by_material.clear();
+    std::erase_if(whole.sampling.by_material,
+                  [](const auto& own) { return own.first != "unseen"; });
     if (const auto own = job.sampling.by_material.find(name);
         own != job.sampling.by_material.end()) {
       whole.sampling.method = own->second.method == StartMethod::environment
