@@ -5,13 +5,15 @@
 #include <algorithm>
 #include <utility>
 
+#include "common/base/patience.h"
+
 namespace baton {
 namespace {
 
 constexpr std::chrono::milliseconds kLinger{0};
 
 /// A coordinator accepts connections at once, however busy it is.
-constexpr std::chrono::milliseconds kConnectPatience{2000};
+constexpr std::chrono::milliseconds kConnectPatience{2000 * kPatienceFactor};
 
 Result<Socket> connect_to(const std::string& endpoint) {
   return Socket::connect(endpoint, kLinger, Socket::Unconnected::refuse);

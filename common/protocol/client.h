@@ -15,8 +15,9 @@ class RequestClient {
   static Result<RequestClient> connect(const std::string& endpoint);
 
   /// Sends and waits for the answer; a Refused becomes the Error that it carries.
-  /// ErrorKind::timeout when nobody listens (known after 2 s) or no answer came in time. The
-  /// connection is then dropped, so that a late answer is never taken for that of the next request.
+  /// ErrorKind::timeout when nobody listens (known after 2 s times kPatienceFactor) or no answer
+  /// came in time. The connection is then dropped, so that a late answer is never taken for that of
+  /// the next request.
   Result<Message> request(const Message& message, std::chrono::milliseconds timeout);
 
  private:

@@ -12,6 +12,7 @@
 #include <thread>
 
 #include "common/base/files.h"
+#include "common/base/patience.h"
 
 namespace baton {
 namespace {
@@ -19,9 +20,9 @@ namespace {
 namespace fs = std::filesystem;
 using std::chrono::milliseconds;
 
-constexpr milliseconds kStartPatience{20000};
-constexpr milliseconds kWorkerPatience{10000};
-constexpr milliseconds kCoordinatorPatience{5000};
+constexpr milliseconds kStartPatience{20000 * kPatienceFactor};
+constexpr milliseconds kWorkerPatience{10000 * kPatienceFactor};
+constexpr milliseconds kCoordinatorPatience{5000 * kPatienceFactor};
 constexpr int kMaxRestarts = 5;
 constexpr std::uint64_t kMaxEndpointBytes = 4096;
 

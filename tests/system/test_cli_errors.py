@@ -11,7 +11,7 @@ import tempfile
 import time
 import unittest
 
-PATIENCE = int(os.environ.get("BATON_TEST_PATIENCE", "1"))
+PATIENCE = int(os.environ.get("BATON_PATIENCE", "1"))
 OK, USAGE, BAD_INPUT, UNAVAILABLE, IO = 0, 64, 65, 69, 74
 BIN = SOURCE = None
 

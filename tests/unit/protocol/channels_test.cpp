@@ -15,8 +15,8 @@ namespace {
 using namespace std::chrono_literals;
 using testing::HasSubstr;
 
-const auto kPatience = with_patience(10s);  // for what must come
-constexpr auto kMoment = 20ms;              // for what must not come
+constexpr auto kPatience = with_patience(10s);  // for what must come
+constexpr auto kMoment = 20ms;                  // for what must not come
 
 struct ChannelTest : testing::Test {
   Router router = Router::bind("tcp://127.0.0.1:*").value();

@@ -23,8 +23,8 @@ namespace baton::testing_service {
 using namespace std::chrono_literals;
 namespace fs = std::filesystem;
 
-inline const auto kPatience = with_patience(20s);
-inline const auto kHeartbeat = with_patience(500ms);
+inline constexpr auto kPatience = with_patience(20s);
+inline constexpr auto kHeartbeat = with_patience(500ms);
 
 /// A coordinator in a thread of its own.
 class RunningService {
