@@ -22,7 +22,7 @@ if(BATON_WERROR)
   target_compile_options(baton_options INTERFACE -Werror)
 endif()
 # Sanitizer builds: every finding ends the program, and containers check their indices. The SIMD kernels are built for SSE4
-# and AVX2 only: GCC takes minutes for each target of an instrumented kernel. What AVX-512 would add is other instructions
+# and AVX2 only: GCC takes minutes for each target of the instrumented kernels. What AVX-512 would add is other instructions
 # for the same eight lanes (common/math/lanes-inl.h); that the best target is chosen, and computes what the others do, is
 # tested in release builds. GCC warns of uninitialized values in sanitized code that are not.
 if(BATON_SANITIZE)
@@ -43,6 +43,14 @@ function(baton_library name)
   else()
     add_library(${name} INTERFACE)
     target_link_libraries(${name} INTERFACE baton_options ${A_DEPS} ${A_PRIVATE})
+  endif()
+endfunction()
+
+# baton_simd_kernels(FILES...): where every vector passes through lambdas that are inlined. Looking for uses of their
+# temporaries after their scope keeps all of them in memory, and GCC then takes a quarter of an hour for one file.
+function(baton_simd_kernels)
+  if(BATON_SANITIZE)
+    set_source_files_properties(${ARGN} PROPERTIES COMPILE_OPTIONS -fno-sanitize-address-use-after-scope)
   endif()
 endfunction()
 
