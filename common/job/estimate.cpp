@@ -23,6 +23,8 @@ std::int64_t count_neighbours(const JobSpec& job, std::int32_t reach_px) {
 /// In memory: Lns, Lns when fresh and source of a pixel; direction, weight and site of a particle.
 constexpr std::int64_t kStateBytesPerPixel = 9;
 constexpr std::int64_t kStateBytesPerParticle = 9;
+/// Of a pixel's memory of its rays; only pixels whose rays disagree have all of it.
+constexpr std::int64_t kMemoryBytes = 516;
 
 }  // namespace
 
@@ -69,8 +71,9 @@ JobEstimate estimate_job(const JobSpec& job) {
   const std::int64_t particles = num_carried_particles(job.sampling);
   e.largest_blob_bytes = tile_pixels * e.film_channels * 4;
   if (carries_state(job)) {
-    // What is stored of a pixel with a surface is hardly smaller.
-    e.state_bytes_per_pixel = kStateBytesPerPixel + kStateBytesPerParticle * particles;
+    // What is stored of a pixel's particles is hardly smaller; its memory is, by half and more.
+    e.state_bytes_per_pixel = kStateBytesPerPixel + kStateBytesPerParticle * particles +
+                              (job.sampling.method == Method::pool ? kMemoryBytes : 0);
     e.state_bytes = pixels * e.state_bytes_per_pixel;
     e.largest_blob_bytes = std::max(e.largest_blob_bytes, tile_pixels * e.state_bytes_per_pixel);
   }

@@ -49,16 +49,6 @@ void fields(JobArchive& a, ImageSpec& image) {
   a.integer("tileSize", image.tile_size, limits::kMinTileSize, limits::kMaxTileSize);
 }
 
-/// The pool sampler keeps two halves of everything.
-void check_halves(JobArchive& a, const SamplingSpec& sampling) {
-  if (sampling.method != Method::pool) return;
-  for (const auto& [key, value] :
-       {std::pair{"numParticles", sampling.num_particles}, {"numCarried", sampling.num_carried}}) {
-    if (value % 2 != 0)
-      a.fault(key, "an even count, as method pool keeps two halves", std::to_string(value));
-  }
-}
-
 /// N, M and the share of the BRDF; Sampling is SamplingSpec or MaterialSampling.
 template <class Sampling>
 void count_fields(JobArchive& a, Sampling& sampling) {
@@ -129,10 +119,6 @@ void fields(JobArchive& a, SamplingSpec& sampling, const SceneSpec& scene) {
     a.fault("method", "\"auto\" with targetError or timeBudget",
             fmt::format("\"{}\"", kMethods[static_cast<std::size_t>(sampling.method)]));
   }
-  a.integer("numCarried", sampling.num_carried, 2, limits::kMaxParticles);
-  a.number("poolGain", sampling.pool_gain, {.min = 0, .max = 100});
-  a.boolean("visibilityMemory", sampling.visibility_memory);
-  check_halves(a, sampling);
   a.integer("referenceSamples", sampling.reference_samples, 2, limits::kMaxReferenceSamples);
   material_fields(a, sampling, scene);
 }

@@ -215,9 +215,6 @@ struct SamplingSpec {
   int refresh_candidates = 800;  ///< [N, limits::kMaxCandidates]
   std::optional<float> target_error{};  ///< automatic: RMSE over mean radiance to reach, (0, 10]
   std::optional<float> time_budget{};   ///< automatic: CPU seconds of the whole job to stay within, (0, 1e9]
-  int num_carried = 16;            ///< pool: particles carried per pixel, [2, limits::kMaxParticles], even
-  float pool_gain = 2;             ///< pool: c of the balance of carried and fresh samples, [0, 100]
-  bool visibility_memory = true;   ///< pool: what earlier rays found steers the new ones
   int reference_samples = 1024;    ///< paired samples per pixel of `reference`, [2, 2^24]
   /// By name of a material of the scene: replaces method, N, M and brdf_fraction in the pixels whose first site with a
   /// surface sees it. Not with methods that carry samples, nor with a second pass.

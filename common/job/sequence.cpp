@@ -115,7 +115,7 @@ std::optional<StartMethod> fresh_method(Method method) {
 }
 
 std::int32_t num_carried_particles(const SamplingSpec& sampling) {
-  return sampling.method == Method::pool ? sampling.num_carried : most_particles(sampling);
+  return sampling.method == Method::pool ? 0 : most_particles(sampling);
 }
 
 std::int32_t most_particles(const SamplingSpec& sampling) {

@@ -75,7 +75,7 @@ bool carries_state(const JobSpec& job);
 std::optional<StartMethod> fresh_method(Method method);
 /// Shadow rays of a pixel: the most of any material.
 std::int32_t most_particles(const SamplingSpec& sampling);
-/// Particles per pixel in the job's states.
+/// Particles per pixel in the job's states; 0 with `pool`, which remembers rays instead.
 std::int32_t num_carried_particles(const SamplingSpec& sampling);
 
 /// Sets of samples of a pixel that never exchange anything: 2 when one decides what is done with the other, else 1.

@@ -90,6 +90,7 @@ class StateSections {
 /// How many of `pixels` start and end with the same weight, as all do after a resampling.
 std::size_t num_resampled(const SampleState& state, const std::vector<std::size_t>& pixels) {
   const auto count = static_cast<std::size_t>(state.num_particles);
+  if (count == 0) return 0;
   return static_cast<std::size_t>(std::ranges::count_if(pixels, [&](std::size_t pixel) {
     const float* const weights = state.weight.data() + pixel * count;
     return weights[0] == weights[count - 1];
@@ -143,9 +144,9 @@ Status decode_meta(const SectionFile& file, const std::string& name, SampleState
     return fail(fmt::format("rectangle [{}, {}) x [{}, {}), expected a non-empty one within 0..{}",
                             rect.x0, rect.x1, rect.y0, rect.y1, limits::kMaxImageSide));
   }
-  if (state.num_particles < 1 || state.num_particles > limits::kMaxParticles) {
+  if (state.num_particles < 0 || state.num_particles > limits::kMaxParticles) {
     return fail(
-        fmt::format("{} particles, expected 1 to {}", state.num_particles, limits::kMaxParticles));
+        fmt::format("{} particles, expected 0 to {}", state.num_particles, limits::kMaxParticles));
   }
   constexpr std::uint64_t kParticleBytes =
       sizeof(OctDirection) + sizeof(float) + sizeof(std::uint8_t);
@@ -286,7 +287,7 @@ Status decode_sources(const SectionFile& file, const std::string& name, SampleSt
 
 void SampleState::resize(const PixelRect& new_rect, std::int32_t new_num_particles,
                          std::int32_t new_num_populations) {
-  BATON_CHECK(new_rect.width() > 0 && new_rect.height() > 0 && new_num_particles > 0);
+  BATON_CHECK(new_rect.width() > 0 && new_rect.height() > 0 && new_num_particles >= 0);
   BATON_CHECK(new_num_populations > 0 && new_num_particles % new_num_populations == 0);
   rect = new_rect;
   num_particles = new_num_particles;

@@ -35,7 +35,7 @@ struct SampleState {
   std::int32_t frame_index = 0;  ///< 0-based; the frame that these samples belong to
   std::int32_t tile = 0;
   PixelRect rect;
-  std::int32_t num_particles = 0;  ///< N: of all populations
+  std::int32_t num_particles = 0;  ///< N: of all populations; 0 where only a memory is carried
   std::int32_t num_populations =
       1;  ///< K: parts that never exchange anything; part k has particles [k N / K, (k + 1) N / K)
 

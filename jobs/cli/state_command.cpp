@@ -56,7 +56,7 @@ Result<StateReport> load_state(const std::string& file) {
   for (std::size_t pixel = 0; pixel < report.state.num_pixels(); ++pixel) {
     const PixelSource source = report.state.source[pixel * static_cast<std::size_t>(report.state.num_populations)];
     ++report.sources[static_cast<std::size_t>(source)];
-    if (source == PixelSource::background) continue;
+    if (source == PixelSource::background || report.state.num_particles == 0) continue;
     const double ratio = pixel_ess(report.state, pixel) / report.state.num_particles;
     const auto bin = static_cast<std::size_t>(ratio * kEssBins);
     ++report.ess_histogram[std::min(bin, kEssBins - 1)];
@@ -109,6 +109,7 @@ void print_report(const StateReport& report) {
   }
 
   // A bar of 40 characters is all pixels with a surface.
+  if (state.num_particles == 0) return;
   const std::uint64_t lit = state.num_pixels() - report.sources[0];
   for (std::size_t i = 0; i < kEssBins; ++i) {
     const std::uint64_t count = report.ess_histogram[i];

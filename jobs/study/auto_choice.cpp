@@ -16,10 +16,9 @@ namespace {
 /// What a more complicated candidate must gain.
 constexpr double kGain = 1.05;
 
-/// The pool and the second pass keep two halves of everything.
+/// The second pass keeps two halves of everything.
 bool can_take(const AutoCandidate& candidate, int num_particles) {
-  const bool halves = candidate.sampling.method == Method::pool || candidate.correlated;
-  return !halves || num_particles % 2 == 0;
+  return !candidate.correlated || num_particles % 2 == 0;
 }
 
 /// A family at some N.
@@ -127,8 +126,9 @@ std::vector<AutoCandidate> auto_candidates(const JobSpec& job) {
   if (job.frames.size() > 1 && job.state.carry) {
     for (const int p : {1, 5})
       add(fmt::format("sequential P={}", p), Method::sequential, asked.num_candidates, p);
-    if (asked.num_carried % 2 == 0 && !job.visibility.correlated)
-      add("pool M=64", Method::pool, 64, asked.num_distributions);
+    if (!job.visibility.correlated)
+      for (const int m : {128, 512})
+        add(fmt::format("pool M={}", m), Method::pool, m, asked.num_distributions);
   }
   return candidates;
 }

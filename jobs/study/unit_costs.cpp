@@ -31,7 +31,7 @@ UnitCosts units_of(const JobSpec& job) {
     case Method::sequential:
       return {1.44, 0.087, 0.0075};
     case Method::pool:
-      return {2.07, 0.117, 0.0110};
+      return {1.35, 0.090, 0.0036};
     case Method::bidirectional:
       return {1.00, 0.080, 0.0020};
     case Method::mis:

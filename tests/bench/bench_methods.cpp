@@ -38,7 +38,8 @@ std::vector<Case> make_cases() {
       [](SamplingSpec& s) { s.num_candidates = 128; });
   add("bidirectional M=800", Method::bidirectional, 3.5,
       [](SamplingSpec& s) { s.num_candidates = 800; });
-  add("pool M=64", Method::pool, 2.2, [](SamplingSpec& s) { s.num_candidates = 64; });
+  add("pool M=128", Method::pool, 2.2, [](SamplingSpec& s) { s.num_candidates = 128; });
+  add("pool M=256", Method::pool, 2.2, [](SamplingSpec& s) { s.num_candidates = 256; });
   add("sequential P=1", Method::sequential, 0, [](SamplingSpec& s) { s.num_distributions = 1; });
   add("sequential P=5", Method::sequential, 2.0, [](SamplingSpec& s) { s.num_distributions = 5; });
   return cases;

@@ -4,7 +4,7 @@
 #include <cmath>
 #include <map>
 #include <numeric>
-#include <tuple>
+#include <utility>
 
 #include "tests/stability/parallel.h"
 #include "worker/pass/render_context.h"
@@ -63,9 +63,7 @@ class SharedLights {
   Status render(const JobSpec& job, const std::vector<int>& judged, const Subject& subject,
                 Run& run) {
     BATON_ASSIGN(const auto loaded, load_render_context(job, Digest{1, 2}));
-    // The pool's proposals are relative to the environment, the others' to the world.
-    auto& owner = owners_[{carries_state(job), job.sampling.mis_compensation,
-                           job.sampling.method == Method::pool}];
+    auto& owner = owners_[{carries_state(job), job.sampling.mis_compensation}];
     if (owner == nullptr) {
       BATON_ASSIGN(const auto first, load_render_context(job, Digest{1, 2}));
       owner = std::const_pointer_cast<RenderContext>(first);
@@ -96,7 +94,7 @@ class SharedLights {
   }
 
   /// Each with the job that its LightSequence refers to.
-  std::map<std::tuple<bool, bool, bool>, std::shared_ptr<RenderContext>> owners_;
+  std::map<std::pair<bool, bool>, std::shared_ptr<RenderContext>> owners_;
 };
 
 /// One seed with every subject. Methods that carry samples render every frame, the others only the

@@ -131,12 +131,6 @@ TEST(Methods, PoolAgreesWithBruteForceAfterTwentyFrames) { expect_agreement(pool
 TEST(Methods, PoolAgreesWithBruteForceAfterAHundredFrames) {
   expect_agreement(pool_job(100), kRuns, 0.01);
 }
-TEST(Methods, PoolWithoutMemoryAgrees) {
-  JobSpec job = pool_job(5);
-  job.sampling.visibility_memory = false;
-  expect_agreement(job, 200, 0.01);
-}
-
 /// Maps that hold for so many frames each.
 JobSpec changing_job(const std::vector<std::pair<int, std::string>>& maps, int frames) {
   JobSpec job = pool_job(frames);

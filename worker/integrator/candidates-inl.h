@@ -167,7 +167,8 @@ HWY_INLINE float SumOfWeights(const float* weight, std::int32_t count) {
   return hn::GetLane(hn::SumOfLanes(d, sum));
 }
 
-/// What the two kinds of candidates of a pixel share: their weights p~ / sum_t M_t q_t.
+/// What the two kinds of candidates of a pixel share: their weights over their targets, 1 / sum_t
+/// M_t q_t, and 0 where the target is.
 struct CandidateWeights {
   const SiteBlock& sites;
   const kernels::CandidateCounts& counts;
@@ -185,8 +186,8 @@ struct CandidateWeights {
     if (left < hn::Lanes(d)) live = hn::And(live, hn::FirstN(d, left));
     const VF share =
         hn::Set(d, static_cast<float>(sites.num_hits) / static_cast<float>(sites.num_sites));
-    return hn::IfThenElseZero(
-        live, hn::Div(hn::Mul(target, share), hn::IfThenElse(live, proposal, hn::Set(d, 1.0f))));
+    return hn::IfThenElseZero(live,
+                              hn::Div(share, hn::IfThenElse(live, proposal, hn::Set(d, 1.0f))));
   }
 };
 
@@ -195,6 +196,7 @@ struct CandidateLanes {
   VU code;
   VI site;
   VF weight;
+  VF per_target;        ///< weight / p~
   Vec3Lanes reflected;  ///< (f cos L)_rgb
 };
 
@@ -228,9 +230,12 @@ HWY_INLINE void LightCandidates(const SiteBlock& sites, const LightPool& pool,
     const BsdfLanes f = EvaluateBsdf(surface, light.direction);
     const Vec3Lanes reflected =
         ReflectedRadiance(surface, f, light.now.r, light.now.g, light.now.b);
-    const VF weight = weigh(MeanLanes(reflected), surface, f, light.now.density,
-                            static_cast<std::size_t>(counts.from_light) - i);
-    use(CandidateLanes{light.code, surface.site, weight, reflected}, i);
+    const VF target = MeanLanes(reflected);
+    const VF per_target = weigh(target, surface, f, light.now.density,
+                                static_cast<std::size_t>(counts.from_light) - i);
+    use(CandidateLanes{light.code, surface.site, hn::Mul(target, per_target), per_target,
+                       reflected},
+        i);
   });
 }
 
@@ -302,9 +307,10 @@ HWY_INLINE void BsdfCandidates(const SiteBlock& sites, const EnvironmentView& en
     const RadianceLanes light = EvaluateTexels(environment, texels);
     const BsdfLanes f = EvaluateBsdf(surface, DecodeOctahedral(code));
     const Vec3Lanes reflected = ReflectedRadiance(surface, f, light.r, light.g, light.b);
-    const VF weight = weigh(MeanLanes(reflected), surface, f, light.density,
-                            static_cast<std::size_t>(counts.from_bsdf) - i);
-    use(CandidateLanes{code, surface.site, weight, reflected}, i);
+    const VF target = MeanLanes(reflected);
+    const VF per_target =
+        weigh(target, surface, f, light.density, static_cast<std::size_t>(counts.from_bsdf) - i);
+    use(CandidateLanes{code, surface.site, hn::Mul(target, per_target), per_target, reflected}, i);
   });
 }
 

@@ -19,10 +19,12 @@ namespace baton::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
 /// Weighs the candidates from the pool of a pixel that sees diffuse surfaces alone: cosine times
-/// reflected light over density, and nothing else.
+/// reflected light over density, and nothing else. line: has Add(code, weight, colour), where
+/// colour() is w (f cos L)_rgb / p~; a copy of it that stays in registers is what adds.
+template <class Line>
 HWY_INLINE void WeighDiffuse(const SiteBlock& sites, const LightPool& pool,
                              const kernels::CandidateCounts& counts,
-                             const Philox4x32::Counter& random, RunningSums& sums) {
+                             const Philox4x32::Counter& random, Line& line) {
   const DF d;
   const LightRun run(pool, counts.from_light, random[0]);
   const SiteDeal deal = LightSites(sites, counts, random);
@@ -31,7 +33,7 @@ HWY_INLINE void WeighDiffuse(const SiteBlock& sites, const LightPool& pool,
   const auto count = static_cast<std::size_t>(counts.from_light);
   deal.ForEachRun(sites, [&](const SurfaceLanes& s, std::size_t first, std::size_t last) HWY_ATTR {
     const Vec3Lanes ns = s.ns, ng = s.ng, kd = Scale(s.kd, scale);
-    RunningSums::End end = sums.end;
+    Line adding = line;
     for (std::size_t v = first; v < last; ++v) {
       const std::size_t i = v * hn::Lanes(d);
       const LightLanes light = run.Load(i);
@@ -40,22 +42,66 @@ HWY_INLINE void WeighDiffuse(const SiteBlock& sites, const LightPool& pool,
       const VF reflected = Dot(kd, {light.now.r, light.now.g, light.now.b});
       MF live = hn::Gt(above, hn::Zero(d));
       if (i + hn::Lanes(d) > count) live = hn::And(live, hn::FirstN(d, count - i));
-      end.Add(hn::IfThenElseZero(live, hn::Mul(hn::Mul(cosine, reflected), run.LoadInverse(i))));
+      const VF inverse = run.LoadInverse(i);
+      const auto color = [&]() HWY_ATTR {
+        const VF each =
+            hn::IfThenElseZero(live, hn::Mul(hn::Mul(cosine, hn::Set(d, 3.0f)), inverse));
+        return Vec3Lanes{hn::Mul(hn::Mul(kd.x, light.now.r), each),
+                         hn::Mul(hn::Mul(kd.y, light.now.g), each),
+                         hn::Mul(hn::Mul(kd.z, light.now.b), each)};
+      };
+      adding.Add(light.code, hn::IfThenElseZero(live, hn::Mul(hn::Mul(cosine, reflected), inverse)),
+                 color);
     }
-    sums.end = end;
+    line = adding;
   });
 }
 
-/// Candidates picks of the pixel, the first `padded_light` numbers being those of the pool.
+/// Weighs all candidates of a pixel; those from the BRDF are kept. line: as for WeighDiffuse.
+template <class Line>
+HWY_INLINE void WeighCandidates(const SiteBlock& sites, const EnvironmentView& environment,
+                                const LightPool& pool, const kernels::CandidateCounts& counts,
+                                const Philox4x32::Counter& random, kernels::CandidateSet& from_bsdf,
+                                Line& line) {
+  const bool diffuse = !(sites.any_phong || sites.any_ggx || sites.any_measured);
+  if (diffuse && counts.from_bsdf == 0) {
+    WeighDiffuse(sites, pool, counts, random, line);
+    return;
+  }
+  const auto add = [&](const CandidateLanes& c) HWY_ATTR {
+    line.Add(c.code, c.weight, [&]() HWY_ATTR { return Scale(c.reflected, c.per_target); });
+  };
+  LightCandidates(sites, pool, counts, random,
+                  [&](const CandidateLanes& c, std::size_t) HWY_ATTR { add(c); });
+  BsdfCandidates(sites, environment, counts, random,
+                 [&](const CandidateLanes& c, std::size_t i) HWY_ATTR {
+                   StoreCandidates(c, i, from_bsdf);
+                   add(c);
+                 });
+}
+
+/// The line of weights alone.
+struct WeightLine {
+  RunningSums::End end;
+
+  template <class Color>
+  HWY_INLINE void Add(VU /*code*/, VF weight, const Color& /*color*/) {
+    end.Add(weight);
+  }
+};
+
+/// Candidates of the pixel by their number on the line: first those of the pool, padded to whole
+/// vectors, then those of the BRDF.
 class ChosenCandidates {
  public:
   ChosenCandidates(const SiteBlock& sites, const LightPool& pool,
                    const kernels::CandidateCounts& counts, const Philox4x32::Counter& random,
-                   std::int32_t padded_light, const kernels::CandidateSet& from_bsdf)
+                   const kernels::CandidateSet& from_bsdf)
       : sites_(sites),
         run_(pool, counts.from_light, random[0]),
         deal_(LightSites(sites, counts, random)),
-        padded_light_(padded_light),
+        padded_light_(static_cast<std::int32_t>(
+            hwy::RoundUpTo(static_cast<std::size_t>(counts.from_light), hn::Lanes(DF())))),
         from_bsdf_(from_bsdf) {}
 
   /// Everything about the candidates; weight is left undefined.
@@ -129,41 +175,29 @@ inline float ChooseCandidates(const SiteBlock& sites, const EnvironmentView& env
                               const LightPool& pool, const kernels::CandidateCounts& counts,
                               const Rng& rng, float u, kernels::ChoiceScratch& scratch,
                               const kernels::SampleSpan& out) {
-  const DF d;
   const DI di;
   const DU du;
   const Philox4x32::Counter random = rng.bits(0, 0);
 
   // Weigh the candidates.
   RunningSums sums(scratch.running_sums);
-  const bool diffuse = !(sites.any_phong || sites.any_ggx || sites.any_measured);
-  if (diffuse && counts.from_bsdf == 0) {
-    WeighDiffuse(sites, pool, counts, random, sums);
-  } else {
-    LightCandidates(sites, pool, counts, random,
-                    [&](const CandidateLanes& c, std::size_t) HWY_ATTR { sums.end.Add(c.weight); });
-    BsdfCandidates(sites, environment, counts, random,
-                   [&](const CandidateLanes& c, std::size_t i) HWY_ATTR {
-                     StoreCandidates(c, i, scratch.from_bsdf);
-                     sums.end.Add(c.weight);
-                   });
-  }
+  WeightLine line{sums.end};
+  WeighCandidates(sites, environment, pool, counts, random, scratch.from_bsdf, line);
+  sums.end = line.end;
   const float total = sums.Finish();
   if (!(total > 0 && std::isfinite(total))) return total;
 
   // Keep N of them.
-  const auto padded_light = static_cast<std::int32_t>(
-      hwy::RoundUpTo(static_cast<std::size_t>(counts.from_light), hn::Lanes(d)));
-  const ChosenCandidates chosen(sites, pool, counts, random, padded_light, scratch.from_bsdf);
+  const ChosenCandidates chosen(sites, pool, counts, random, scratch.from_bsdf);
   HWY_ALIGN std::int32_t picks[limits::kMaxParticles + RunningSums::kGroup];
   SystematicPicks(sums, total, u, out.code.size(), picks);
-  for (std::size_t j = 0; j < out.code.size(); j += hn::Lanes(d)) {
+  for (std::size_t j = 0; j < out.code.size(); j += hn::Lanes(DF())) {
     const CandidateLanes c = chosen.Evaluate(hn::Load(di, picks + j));
     HWY_ALIGN std::uint32_t code[hn::MaxLanes(DU())];
     HWY_ALIGN std::int32_t site[hn::MaxLanes(DI())];
     hn::Store(c.code, du, code);
     hn::Store(c.site, di, site);
-    const std::size_t left = std::min(hn::Lanes(d), out.code.size() - j);
+    const std::size_t left = std::min(hn::Lanes(DF()), out.code.size() - j);
     for (std::size_t lane = 0; lane < left; ++lane) {
       out.code[j + lane] = code[lane];
       out.site[j + lane] = static_cast<std::uint8_t>(site[lane]);

@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <chrono>
-#include <cmath>
 
 #include "common/base/limits.h"
 #include "worker/integrator/candidate_samplers.h"
@@ -35,16 +34,6 @@ void insert_in_front(List& cache, std::int32_t key, std::shared_ptr<const Value>
     it = total > limits::kMaxEnvironmentCacheBytes && it != cache.begin() ? cache.erase(it)
                                                                           : std::next(it);
   }
-}
-
-/// Factor on the weight of carried samples: what the light before is worth now. The ratio of the
-/// powers makes both targets comparable; the overlap says how many samples lie where the light is,
-/// and few of many make more noise than their share. Depends on no sample.
-float kinship(const EnvironmentMap& before, const EnvironmentMap& now) {
-  if (&before == &now) return 1;
-  if (before.black() || now.black()) return 0;
-  return static_cast<float>(now.total_power() / before.total_power() *
-                            std::pow(before.overlap(now), 4));
 }
 
 /// Entries of the light pool that a pixel takes when its N samples are drawn anew, from M
@@ -84,7 +73,7 @@ LightPoolLayout pool_layout(const JobSpec& job) {
       taken = fresh(spec.start_method);
       break;
     case Method::pool:
-      taken = spec.num_candidates / 2;
+      taken = spec.num_candidates;
       break;
     case Method::brdf:
     case Method::reference:
@@ -95,9 +84,7 @@ LightPoolLayout pool_layout(const JobSpec& job) {
     taken = std::max(
         taken, num_taken(own.method, own.num_particles, own.num_candidates, own.brdf_fraction));
   }
-  const bool pool = spec.method == Method::pool;
-  return {.carried = pool ? CarriedFrame::environment : CarriedFrame::world,
-          .num_taken = static_cast<std::uint32_t>(std::max(taken / num_populations(job), 1))};
+  return {.num_taken = static_cast<std::uint32_t>(std::max(taken / num_populations(job), 1))};
 }
 
 }  // namespace
@@ -157,9 +144,6 @@ Result<std::shared_ptr<const FrameLight>> LightSequence::at(std::int32_t index) 
   BATON_ASSIGN(light->now, environment(frame.environment));
   BATON_ASSIGN(light->before, environment(frame_before.environment));
   light->still = frame.environment == frame_before.environment;
-  if (job_.sampling.method == Method::pool) {
-    light->gain = kinship(*light->before.map, *light->now.map);
-  }
   light->pool = make_light_pool(light->now, light->before, job_.seed,
                                 static_cast<std::uint32_t>(frame.number), pool_layout(job_));
   light->prepare_seconds =

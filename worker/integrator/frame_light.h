@@ -20,7 +20,6 @@ struct FrameLight {
   Environment before;  ///< the frame before; for the first frame the same as now
   bool still = false;  ///< now shows what before showed: the same texels, turned alike
   LightPool pool;
-  float gain = 1;              ///< kinship() of both; 1 where samples are not weighed by it
   double prepare_seconds = 0;  ///< time spent on texels, table and pool
 };
 

@@ -227,16 +227,12 @@ void sample_bsdf(const SiteBlock& sites, std::span<const std::int32_t> site,
   HWY_DYNAMIC_DISPATCH(SampleBsdfSpans)(sites, site, u0, u1, x, y, z);
 }
 
-namespace {
-
 void check_counts(const SiteBlock& sites, const CandidateCounts& counts) {
   BATON_CHECK(sites.num_hits > 0 && counts.from_light >= 0 && counts.from_bsdf >= 0);
   BATON_CHECK(counts.total() >= 1 && counts.total() <= limits::kMaxCandidates);
   BATON_CHECK(!counts.lobe_only || counts.from_bsdf == 0 ||
               (sites.num_lobes > 0 && counts.from_light > 0));
 }
-
-}  // namespace
 
 void draw_candidates(const SiteBlock& sites, const EnvironmentView& environment,
                      const LightPool& pool, const CandidateCounts& counts, const Rng& rng,

@@ -56,6 +56,10 @@ struct CandidateCounts {
   std::int32_t total() const { return from_light + from_bsdf; }
 };
 
+/// Checks what every caller owes: total() in [1, kMaxCandidates], sites that the candidates can go
+/// to.
+void check_counts(const SiteBlock& sites, const CandidateCounts& counts);
+
 /// Candidates of one pixel: a properly weighted set for p~(site, w) = p~_site(w) / S. E[sum weight]
 /// = Lns.
 struct CandidateSet {
@@ -90,7 +94,7 @@ struct SampleSpan {
 };
 
 /// Draws candidates like draw_candidates and keeps N of them, each with probability proportional to
-/// its weight: systematically with offset u in [0, 1) (sampling/systematic_choice.h). Only weights
+/// its weight: systematically with offset u in [0, 1) (sampling/systematic-inl.h). Only weights
 /// are kept of candidates from the pool; what is chosen is evaluated again. Returns the sum of the
 /// weights, an unbiased estimate of Lns; when it is not positive and finite, out is left as it was.
 float choose_candidates(const SiteBlock& sites, const EnvironmentView& environment,

@@ -14,14 +14,14 @@ namespace baton {
 namespace {
 
 /// The directions of all entries, in the order of the sequence.
-std::vector<OctDirection> draw_directions(const Environment& now, const Philox4x32::Counter& seeds,
-                                          CarriedFrame carried) {
+std::vector<OctDirection> draw_directions(const Environment& now,
+                                          const Philox4x32::Counter& seeds) {
   std::vector<OctDirection> directions(LightPool::kSize);
   for (std::uint32_t i = 0; i < LightPool::kSize; ++i) {
     const auto [sx, sy] = sobol_2d(i);
     const Vec3 w = now.map->sample(
         {uniform_float(owen_scramble(sx, seeds[0])), uniform_float(owen_scramble(sy, seeds[1]))});
-    directions[i] = encode_octahedral(carried == CarriedFrame::world ? now.rotation * w : w);
+    directions[i] = encode_octahedral(now.rotation * w);
   }
   return directions;
 }
@@ -49,16 +49,6 @@ void lay_out(std::span<const OctDirection> sorted, std::uint32_t first,
   }
 }
 
-/// Turns the directions into the world.
-void turn(const Mat3& rotation, LightPool::Block& block) {
-  for (std::uint32_t i = 0; i < LightPool::kBlock; ++i) {
-    const Vec3 w = rotation * Vec3{block.x[i], block.y[i], block.z[i]};
-    block.x[i] = w.x;
-    block.y[i] = w.y;
-    block.z[i] = w.z;
-  }
-}
-
 }  // namespace
 
 LightPool make_light_pool(const Environment& now, const Environment& before, std::uint64_t job_seed,
@@ -71,7 +61,7 @@ LightPool make_light_pool(const Environment& now, const Environment& before, std
   pool.blocks.resize(LightPool::kNumBlocks);
   const std::uint32_t num_blocks = (layout.num_taken + LightPool::kBlock - 1) / LightPool::kBlock;
   pool.run_blocks = std::bit_ceil(std::clamp(num_blocks, 1u, LightPool::kMaxRunBlocks));
-  std::vector<OctDirection> directions = draw_directions(now, rng.bits(0, 0), layout.carried);
+  std::vector<OctDirection> directions = draw_directions(now, rng.bits(0, 0));
   for (std::uint32_t first = 0; first < LightPool::kNumBlocks; first += pool.run_blocks) {
     const auto run = std::span(directions)
                          .subspan(first * LightPool::kBlock, pool.run_blocks * LightPool::kBlock);
@@ -80,9 +70,8 @@ LightPool make_light_pool(const Environment& now, const Environment& before, std
   }
 
   // Look everything up at the lattice directions, with the look-up that the pixels use.
-  const bool turns = layout.carried == CarriedFrame::environment;
-  const EnvironmentView now_view = turns ? unturned_view_of(now) : view_of(now);
-  const EnvironmentView before_view = turns ? unturned_view_of(before) : view_of(before);
+  const EnvironmentView now_view = view_of(now);
+  const EnvironmentView before_view = view_of(before);
   for (LightPool::Block& block : pool.blocks) {
     kernels::decode_directions(block.code, block.x, block.y, block.z);
     kernels::evaluate_environment(now_view, block.x, block.y, block.z, block.r, block.g, block.b,
@@ -92,7 +81,6 @@ LightPool make_light_pool(const Environment& now, const Environment& before, std
     float unused[LightPool::kBlock];
     kernels::evaluate_environment(before_view, block.x, block.y, block.z, block.before_r,
                                   block.before_g, block.before_b, unused);
-    if (turns) turn(now.rotation, block);
   }
   return pool;
 }

@@ -19,7 +19,7 @@ namespace baton {
 /// curve over the lattice of directions. Each place in a block stands for an eighth of the curve,
 /// which the run's blocks hold in order; neighbouring places stand for distant eighths, as in the
 /// van der Corput sequence, so that half a block still covers the map. A systematic choice
-/// (systematic_choice.h) goes through the places in the order of their eighths: it takes directions
+/// (systematic-inl.h) goes through the places in the order of their eighths: it takes directions
 /// that are spread over the light, and so its shadow rays are stratified. In each run place 0 is
 /// another eighth, so that one who takes the same place of random blocks sees the whole map.
 struct LightPool {
@@ -46,15 +46,8 @@ struct LightPool {
   std::size_t size_bytes() const { return blocks.size() * sizeof(Block); }
 };
 
-/// What carried directions are relative to: the world, or the environment, with which they then
-/// turn.
-enum class CarriedFrame { world, environment };
-
 /// How a pool is laid out.
 struct LightPoolLayout {
-  /// What `code` and the `before_*` of a direction are relative to; x, y, z are world directions in
-  /// either case.
-  CarriedFrame carried = CarriedFrame::world;
   /// Entries that most pixels take: a run has so many, rounded up to a power of two.
   std::uint32_t num_taken = 64;
 };

@@ -9,10 +9,6 @@ namespace baton {
 
 static_assert(kMemoryCells == kVisibilityCells && sizeof(MemoryCell) == sizeof(VisibilityCell));
 
-void PixelSampler::choose_rays(const PixelInput&, SamplerScratch&, PixelRays& rays) const {
-  rays.clear();
-}
-
 namespace {
 
 /// The sampler that draws all samples of a pixel anew.

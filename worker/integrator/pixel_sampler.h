@@ -27,7 +27,7 @@ struct PixelInput {
   const OldSurfaces* old = nullptr;  ///< the surfaces of that set, where they are not `sites`
   /// That set in the maps, where it was looked up ahead; else null.
   const kernels::LocatedSpan* located = nullptr;
-  /// (kVisibilityCells) of the frames before, or empty; see remembers()
+  /// (kVisibilityCells) of the frames before, or empty; see chooses_rays()
   std::span<const VisibilityCell> memory{};
 };
 
@@ -61,44 +61,12 @@ struct PixelDiagnostics {
   bool refreshed_by_ratio = false;
 };
 
-/// The shadow rays of one pixel and what each brings. The pixel is the sum of `constant` and of the
-/// values of the rays that are free, in this order; its expectation must be the pixel's radiance.
-struct PixelRays {
-  /// Colour and share of Lns.
-  struct Value {
-    Rgb color;
-    float visibility = 0;
-  };
-  static constexpr std::size_t kCapacity = limits::kMaxParticles;
-  std::size_t count = 0;
-  std::array<Vec3, kCapacity> direction;
-  std::array<std::uint8_t, kCapacity> site;
-  std::array<Value, kCapacity> value;
-  Value constant;
-  float lns = 0;  ///< the method's best estimate of Lns
-  /// Where a method keeps two independent halves: the rays from here on belong to the second, and
-  /// `difference` is the first constant less the second. 0: one whole.
-  std::size_t second_half = 0;
-  Rgb difference;
-
-  void clear() {
-    count = second_half = 0;
-    lns = 0;
-    constant = {};
-    difference = {};
-  }
-  void push(const Vec3& w, std::uint8_t s, const Value& v) {
-    direction[count] = w;
-    site[count] = s;
-    value[count++] = v;
-  }
-};
-
 /// Work space of one thread, reused from pixel to pixel.
 struct SamplerScratch {
   kernels::CandidateSet candidates;
   kernels::ChoiceScratch choice;
-  std::array<kernels::PoolHalf, 2> pool;
+  kernels::PoolScratch pool;
+  PixelRays rays;  ///< of the pixel, where the method chooses them apart from its samples
 };
 
 /// A sampling method: the plug-in over the contract of PixelSamples. Stateless; any number of
@@ -112,12 +80,10 @@ class PixelSampler {
   /// Whether sample() evaluates carried directions, so that it pays to look them up ahead
   /// (PixelInput::located).
   virtual bool evaluates_carried() const { return false; }
-  /// Whether the method chooses its rays apart from its samples; else they are its samples.
+  /// Whether the method chooses its rays apart from its samples, which sample() then leaves in
+  /// SamplerScratch::rays, and is told in later frames what they found (PixelInput::memory). Else
+  /// its samples are its rays.
   virtual bool chooses_rays() const { return false; }
-  /// Chooses them, after sample() and with the scratch as that left it.
-  virtual void choose_rays(const PixelInput& input, SamplerScratch& scratch, PixelRays& rays) const;
-  /// Whether the method wants to be told in later frames what rays found (PixelInput::memory).
-  virtual bool remembers() const { return false; }
 };
 
 /// The sampler of a job; null for Method::reference, which is no sampler of this kind

@@ -16,37 +16,26 @@
 #include "worker/integrator/pool-inl.h"
 
 HWY_BEFORE_NAMESPACE();
-namespace baton::HWY_NAMESPACE {
-
-void GatherPool(const kernels::PoolInput& input, const PoolSettings& settings, const Rng& rng,
-                std::array<kernels::PoolHalf, 2>& out) {
-  PoolGatherer(input, settings).Gather(rng, out);
-}
-
-}  // namespace baton::HWY_NAMESPACE
+namespace baton::HWY_NAMESPACE {}  // namespace baton::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
 namespace baton {
-HWY_EXPORT(GatherPool);
+HWY_EXPORT(ChoosePoolRays);
 
 namespace kernels {
 
-void gather_pool(const PoolInput& input, const PoolSettings& settings, const Rng& rng,
-                 std::array<PoolHalf, 2>& out) {
-  BATON_CHECK(input.sites.num_hits > 0 && settings.num_carried % 2 == 0);
-  BATON_CHECK(input.counts.total() >= 1 && 2 * input.counts.total() <= limits::kMaxCandidates);
-  BATON_CHECK(!input.counts.lobe_only || input.counts.from_bsdf == 0 || input.sites.num_lobes > 0);
-  BATON_CHECK(input.memory.empty() || input.memory.size() == kVisibilityCells);
-  if (input.light_pool.empty()) {
-    for (PoolHalf& half : out) {
-      half.count = 0;
-      half.lns = half.lns_fresh = half.visible = half.carry_total = half.ray_total = 0;
-      half.visible_color = {};
-    }
-    return;
-  }
-  HWY_DYNAMIC_DISPATCH(GatherPool)(input, settings, rng, out);
+float choose_pool_rays(const SiteBlock& sites, const EnvironmentView& environment,
+                       const LightPool& pool, const CandidateCounts& counts, const Rng& rng,
+                       float u, std::int32_t num_rays, std::span<const VisibilityCell> memory,
+                       PoolScratch& scratch, PixelRays& out) {
+  check_counts(sites, counts);
+  BATON_CHECK(num_rays >= 1 && num_rays <= static_cast<std::int32_t>(limits::kMaxParticles));
+  BATON_CHECK(memory.size() == kVisibilityCells);
+  out.clear();
+  if (pool.empty()) return 0;
+  return HWY_DYNAMIC_DISPATCH(ChoosePoolRays)(sites, environment, pool, counts, rng, u, num_rays,
+                                              memory, scratch, out);
 }
 
 }  // namespace kernels

@@ -34,9 +34,9 @@ struct TileFrameRenderer::Batch {
   std::int32_t frame_index = 0;
   RayBatch rays;           ///< samples are numbered batch pixel * stride + number in the pixel
   std::size_t stride = 1;  ///< most rays of a pixel
-  std::array<std::size_t, kBatchPixels> end_ray;      ///< where each pixel's rays end
-  std::array<std::size_t, kBatchPixels> second_half;  ///< as PixelRays::second_half
-  std::array<Rgb, kBatchPixels> difference;           ///< of the halves
+  std::array<std::size_t, kBatchPixels> end_ray;  ///< where each pixel's rays end
+  std::array<Rgb, kBatchPixels> difference;       ///< as PixelRays::difference
+  std::vector<std::uint8_t> bin;                  ///< as PixelRays::bin, by sample
   std::array<PixelResult, kBatchPixels> pixels;
 
   RngKey key(const RenderContext& context, const PixelRect& rect, std::size_t index) const {
@@ -85,8 +85,11 @@ FilmTile TileFrameRenderer::render_batches(const FrameSpec& frame, const FrameLi
   batch.frame_number = frame.number;
   batch.frame_index = frame.index;
   frame_sampling_ = {};
-  batch.stride =
-      static_cast<std::size_t>(std::max(state.num_particles, context_.job.sampling.num_particles));
+  const bool chooses_rays = context_.sampler != nullptr && context_.sampler->chooses_rays();
+  batch.stride = chooses_rays ? PixelRays::kCapacity
+                              : static_cast<std::size_t>(std::max(
+                                    state.num_particles, context_.job.sampling.num_particles));
+  if (chooses_rays) batch.bin.resize(kBatchPixels * batch.stride);
   const std::size_t num_pixels = state.num_pixels();
   keep_targets(frame.index, num_pixels * static_cast<std::size_t>(state.num_particles));
   if (context_.job.visibility.correlated) collector_.begin(state);
@@ -152,11 +155,9 @@ void TileFrameRenderer::sample(Batch& batch, const FrameLight& light, SampleStat
   const EnvironmentView now = view_of(light.now);
   const EnvironmentView before = view_of(light.before);
   const std::int32_t frame_index = batch.frame_index;
-  PixelRays rays;
   SampleColors colors;
   SiteBlock sites;
   batch.rays.clear();
-  batch.second_half.fill(0);
   batch.difference.fill({});
   const kernels::CarriedLight carried{before, now, light.still, light.pool};
   look_ahead(0, batch.first, carried, state);
@@ -203,8 +204,7 @@ void TileFrameRenderer::sample(Batch& batch, const FrameLight& light, SampleStat
     const PixelDiagnostics did =
         sample_populations(sampler, n, input, index, *scratch_, state, colors);
     if (context_.sampler->chooses_rays()) {
-      context_.sampler->choose_rays(input, *scratch_, rays);
-      cast_rays(batch, i, rays);
+      cast_rays(batch, i, scratch_->rays);
     } else {
       cast_pixel_samples(batch, i, n, colors, state);
     }
@@ -213,9 +213,10 @@ void TileFrameRenderer::sample(Batch& batch, const FrameLight& light, SampleStat
     // Keep the books.
     PixelResult& pixel = batch.pixels[i];
     pixel.mask = 1;
-    pixel.lns = context_.sampler->chooses_rays() ? rays.lns : mean_lns(state, index);
+    pixel.lns = mean_lns(state, index);
     pixel.source = latest_source(state, index);
-    record_sampling(did, n, pixel, frame_sampling_);
+    record_sampling(did, n > 0 ? n : static_cast<std::size_t>(context_.job.sampling.num_particles),
+                    pixel, frame_sampling_);
     stats_.target_evaluations += static_cast<std::uint64_t>(did.target_evaluations);
   }
 }
@@ -268,10 +269,10 @@ void TileFrameRenderer::cast_rays(Batch& batch, std::size_t i, const PixelRays& 
     const std::size_t s = rays.site[j];
     batch.rays.push({from.x[s], from.y[s], from.z[s]}, rays.direction[j], rays.value[j].color,
                     rays.value[j].visibility, static_cast<std::uint32_t>(i * batch.stride + j));
+    batch.bin[i * batch.stride + j] = rays.bin[j];
   }
   batch.pixels[i].radiance = rays.constant.color;
   batch.pixels[i].visibility = rays.constant.visibility;
-  batch.second_half[i] = rays.second_half;
   batch.difference[i] = rays.difference;
 }
 
@@ -292,7 +293,6 @@ void TileFrameRenderer::shade(Batch& batch, SampleState& state) {
     if (first == end) continue;
     remember(batch, i, first, end, state);
     PixelResult& pixel = batch.pixels[i];
-    const std::size_t second_half = i * batch.stride + batch.second_half[i];
     Rgb radiance = pixel.radiance;
     Rgb difference = batch.difference[i];
     float visibility = pixel.visibility;
@@ -303,16 +303,17 @@ void TileFrameRenderer::shade(Batch& batch, SampleState& state) {
       num_free += free > 0 ? 1 : 0;
       radiance += color;
       visibility += rays.visibility[r] * free;
-      difference += color * (rays.sample[r] < second_half ? 1.0f : -1.0f);
+      difference += color * ((r - first) % 2 == 0 ? 1.0f : -1.0f);
     }
     if (num_free < end - first) pixel.mask = 0;
     pixel.radiance = radiance;
     pixel.visibility = visibility;
 
-    // Two halves that agree in the mean: the square of half their difference estimates the
-    // variance of their mean.
+    // The even and the odd ray of each pair, and candidates likewise, make two estimates that agree
+    // in the mean: the square of half their difference is at least the variance of the whole, as
+    // neighbours differ least.
     const float d = mean(difference);
-    pixel.variance = batch.second_half[i] > 0 ? d * d : 0.0f;
+    pixel.variance = context_.sampler->chooses_rays() ? d * d : 0.0f;
     first = end;
   }
 }
@@ -330,8 +331,7 @@ void TileFrameRenderer::remember(const Batch& batch, std::size_t i, std::size_t 
       collector_.add_ray(state, batch.first * batch.stride + batch.rays.sample[r], occluded);
     }
     if (!memory.empty()) {
-      remember_ray(memory, {rays.direction_x[r], rays.direction_y[r], rays.direction_z[r]},
-                   !occluded);
+      remember_ray(memory, batch.bin[batch.rays.sample[r]], !occluded);
     }
   }
 }

@@ -2,52 +2,44 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstdint>
 
 namespace baton {
 
-/// The arithmetic of the pool sampler. Particles (u_j, w_j) of the frame before and M fresh
-/// candidates y_i ~ q meet under the balance m_old(w) = c p_before(w) / (c p_before(w) + p_now(w)):
-/// wherever one of them has little to say the other one speaks. The weights are at most c u_j and
-/// p_now / (M q); the sum over both has the expectation of p_now's integral for every c that does
-/// not depend on the particles. An estimated normalising constant must not enter. So c is a
-/// function of map and surfaces: the job's gain, less where the light or a lobe has changed
-/// (FrameLight::gain, lobe_kinship), as few particles in a new place make more noise than fresh
-/// candidates do.
+/// The arithmetic of the pool sampler. A pixel's M fresh candidates y_i have weights w_i, which sum
+/// to Lns; its memory of earlier rays guesses V^, the share of free rays around each. V^ steers
+/// which candidates get a ray and how many, and it cannot bias: candidates and memory decide before
+/// any ray is chosen, and each ray is divided by the factor that chose it. Each factor is the
+/// standard deviation of what is left to find out, so that the choice is the one of least variance.
 
-/// Weight of a carried particle of contribution u: m_old p_now / p_before u. gain: c > 0. Targets
-/// >= 0.
-inline float carried_weight(float gain, float target_before, float target_now, float u) {
-  if (!(target_before > 0)) return 0;
-  return gain * target_now / (gain * target_before + target_now) * u;
-}
-
-/// Weight of a fresh candidate: (1 - m_old) p_now / (M q). gain 0: there are no carried particles.
-/// proposal: M q, > 0 wherever target_now is.
-inline float fresh_weight(float gain, float target_before, float target_now, float proposal) {
-  if (!(target_now > 0 && proposal > 0)) return 0;
-  return target_now / (gain * target_before + target_now) * (target_now / proposal);
-}
-
-/// The estimate of the share of free rays V^ steers two choices, neither of which it can bias:
-/// which particles are carried and which directions get a ray. Both factors are standard
-/// deviations, so that each choice is the one of least variance.
-
-/// Factor on the weight for carrying: sqrt(E[V^2]) = sqrt(V^), as a pixel is a sum of V. Light that
-/// will be blocked needs few particles. In [kLeastHope, 1].
+/// Factor on the weight where rays count what they bring: sqrt(E[V^2]) = sqrt(V^), as a pixel is a
+/// sum of V. In [kLeastHope, 1].
 inline constexpr float kLeastHope = 0.2f;
-inline float carry_factor(float free) { return std::max(std::sqrt(free), kLeastHope); }
+inline float hope_factor(float free) { return std::max(std::sqrt(free), kLeastHope); }
 
-/// Factor on the weight for a ray: sqrt(E[(V - V^)^2]) = sqrt(V^ (1 - V^)), as V^ itself is a
-/// control variate. What is known needs few rays. In [kLeastDoubt, 1/2].
-inline constexpr float kLeastDoubt = 0.02f;
-inline float ray_factor(float free) { return std::max(std::sqrt(free * (1 - free)), kLeastDoubt); }
+/// Factor on the weight where V^ is a control variate: sqrt(E[(V - V^)^2]) = sqrt(V^ (1 - V^)).
+/// What is known needs few rays. In [kLeastDoubt, 1/2].
+inline constexpr float kLeastDoubt = 0.05f;
+inline float doubt_factor(float free) {
+  return std::max(std::sqrt(free * (1 - free)), kLeastDoubt);
+}
 
-/// Whether rays are chosen by doubt, with the control variate. That subtracts what was expected of
-/// a blocked ray, and falls below zero where light that was sure to come is blocked: it is used
-/// where the expected light is so many times the weight of doubt that the stability suite saw 87
-/// such values among a hundred million. Elsewhere rays are chosen by carry_factor, and each counts
-/// what it brings. Either way is without bias: pool and memory decide before any ray is chosen.
-inline constexpr float kSafeControl = 4;
+/// Whether V^ is the control variate. That subtracts what was expected of a blocked ray, and can
+/// fall below zero where light that was sure to come is blocked, as no unbiased estimator that
+/// gives sure light fewer rays than its share is free of: it is used where the expected light is
+/// twice the weight of doubt. Where little light is expected rays count what they bring. expected:
+/// sum of w V^. doubt: sum of w doubt_factor(V^).
+inline constexpr float kSafeControl = 2;
 inline bool use_control(float expected, float doubt) { return expected > kSafeControl * doubt; }
+
+/// Rays of a pixel with a memory: N where the standard deviation of what is in doubt is 15 % of its
+/// light, else in proportion to its root, from N / 2 to 2 N, at most `most`. light: sum of w, > 0.
+inline constexpr float kUsualDoubt = 0.15f;
+inline std::int32_t rays_for_doubt(std::int32_t num_rays, float doubt, float light,
+                                   std::int32_t most) {
+  const float share = std::clamp(std::sqrt(doubt / (kUsualDoubt * light)), 0.5f, 2.0f);
+  const auto wanted = static_cast<std::int32_t>(std::ceil(share * static_cast<float>(num_rays)));
+  return std::min(wanted, most);
+}
 
 }  // namespace baton

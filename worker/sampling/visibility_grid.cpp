@@ -1,7 +1,7 @@
 #include "worker/sampling/visibility_grid.h"
 
 #include <algorithm>
-#include <cmath>
+#include <array>
 
 #include "common/base/check.h"
 
@@ -14,32 +14,24 @@ constexpr std::int32_t kMaxSeen = 15;
 std::int32_t seen(VisibilityCell cell) { return cell & 15; }
 std::int32_t share(VisibilityCell cell) { return cell >> 4; }
 
+/// 2^16 over the rays that a cell has seen, its guess and the new one: a table, as divisions by a
+/// variable cost more than all else here.
+constexpr auto kStep = [] {
+  std::array<std::int32_t, kMaxSeen + 1> step{};
+  for (std::int32_t n = 0; n <= kMaxSeen; ++n)
+    step[static_cast<std::size_t>(n)] = (1 << 16) / (n + 2);
+  return step;
+}();
+
 /// The cell after one more ray; `guess` is what it starts from, worth one ray.
 VisibilityCell add_ray(VisibilityCell cell, std::int32_t guess, bool free) {
   const std::int32_t before = seen(cell) > 0 ? share(cell) : guess;
-  const std::int32_t after = before + ((free ? kShareOfOne : 0) - before) / (seen(cell) + 2);
+  const std::int32_t step = kStep[static_cast<std::size_t>(seen(cell))];
+  const std::int32_t after = before + (((free ? kShareOfOne : 0) - before) * step >> 16);
   return static_cast<VisibilityCell>(after << 4 | std::min(seen(cell) + 1, kMaxSeen));
 }
 
 }  // namespace
-
-std::size_t visibility_bin(const Vec3& w) {
-  const float inv = 1.0f / (std::fabs(w.x) + std::fabs(w.y) + std::fabs(w.z));
-  float u = w.x * inv;
-  float v = w.z * inv;
-  if (w.y < 0) {
-    const float fold_u = std::copysign(1.0f - std::fabs(v), u);
-    const float fold_v = std::copysign(1.0f - std::fabs(u), v);
-    u = fold_u;
-    v = fold_v;
-  }
-  const auto cell = [](float t) {
-    const auto index =
-        static_cast<std::int32_t>((t * 0.5f + 0.5f) * static_cast<float>(kVisibilityGridSide));
-    return std::clamp(index, 0, kVisibilityGridSide - 1);
-  };
-  return static_cast<std::size_t>(cell(v) * kVisibilityGridSide + cell(u));
-}
 
 float free_share(std::span<const VisibilityCell> grid, std::size_t bin) {
   BATON_CHECK(grid.size() == kVisibilityCells && bin < kVisibilityBins);
@@ -48,15 +40,14 @@ float free_share(std::span<const VisibilityCell> grid, std::size_t bin) {
   return (static_cast<float>(share(cell)) + 0.5f) * (1.0f / (kShareOfOne + 1));
 }
 
-void remember_ray(std::span<VisibilityCell> grid, const Vec3& direction, bool free) {
-  BATON_CHECK(grid.size() == kVisibilityCells);
+void remember_ray(std::span<VisibilityCell> grid, std::size_t bin, bool free) {
+  BATON_CHECK(grid.size() == kVisibilityCells && bin < kVisibilityBins);
   VisibilityCell& outcomes = grid[kVisibilityOutcomes];
   VisibilityCell& summary = grid[kVisibilitySummary];
   outcomes = static_cast<VisibilityCell>(outcomes | (free ? kSawFree : kSawBlocked));
   const std::int32_t guess = seen(summary) > 0 ? share(summary) : kShareOfOne / 2;
   if (outcomes == (kSawFree | kSawBlocked)) {
-    VisibilityCell& bin = grid[visibility_bin(direction)];
-    bin = add_ray(bin, guess, free);
+    grid[bin] = add_ray(grid[bin], guess, free);
   }
   summary = add_ray(summary, guess, free);
 }

@@ -4,7 +4,7 @@
 #include <cstdint>
 #include <span>
 
-#include "common/math/vec3.h"
+#include "common/math/octahedral.h"
 
 namespace baton {
 
@@ -14,9 +14,9 @@ namespace baton {
 ///
 /// A cell holds the share of free rays in 1/4095 (high 12 bits) and the rays seen, up to 15 (low 4
 /// bits); from then on a new ray counts 1/17, so that old ones fade. Cells 0 to 255 are bins of the
-/// octahedral map of the sphere about +Y, row by row; one more cell counts all rays, one more says
-/// which outcomes were ever seen. Bins are kept only once the rays have disagreed: a pixel in the
-/// open needs no grid.
+/// octahedral lattice of directions (common/math/octahedral.h), row by row; one more cell counts
+/// all rays, one more says which outcomes were ever seen. Bins are kept only once the rays have
+/// disagreed: a pixel in the open needs no grid.
 using VisibilityCell = std::uint16_t;
 
 inline constexpr std::int32_t kVisibilityGridSide = 16;
@@ -28,14 +28,16 @@ inline constexpr std::size_t kVisibilityOutcomes =
 inline constexpr std::size_t kVisibilityCells = kVisibilityBins + 2;
 inline constexpr VisibilityCell kSawFree = 1, kSawBlocked = 2;  ///< bits of the cell of outcomes
 
-/// Bin of a unit direction, [0, 256).
-std::size_t visibility_bin(const Vec3& w);
+/// Bin of a direction, [0, 256): the upper four bits of each half of its code.
+inline std::size_t visibility_bin(OctDirection code) {
+  return (code >> 12 & 0x0F) | (code >> 24 & 0xF0);
+}
 
 /// Estimated share of free rays in a bin, in (0, 1): the bin's own, or that of all rays where it
 /// has seen none. grid: (kVisibilityCells).
 float free_share(std::span<const VisibilityCell> grid, std::size_t bin);
 
-/// Adds one ray. grid: (kVisibilityCells), all 0 at first.
-void remember_ray(std::span<VisibilityCell> grid, const Vec3& direction, bool free);
+/// Adds one ray in bin `bin`. grid: (kVisibilityCells), all 0 at first.
+void remember_ray(std::span<VisibilityCell> grid, std::size_t bin, bool free);
 
 }  // namespace baton

@@ -159,19 +159,6 @@ void EnvironmentMap::build_table(bool compensate) {
   }
 }
 
-double EnvironmentMap::overlap(const EnvironmentMap& other) const {
-  if (width_ != other.width_ || height_ != other.height_ || filter_ != other.filter_) return 0;
-  double sum = 0;
-  for (int row = 0; row < cell_rows(); ++row) {
-    const std::size_t first = cell_row(row);
-    double in_row = 0;
-    for (std::size_t i = first; i < first + static_cast<std::size_t>(width_); ++i)
-      in_row += std::min(texels_[i].density, other.texels_[i].density);
-    sum += in_row * zone_solid_angle(row_angle(row), row_angle(row + 1)) / width_;
-  }
-  return sum;
-}
-
 EnvironmentMap::Texel EnvironmentMap::evaluate(const Vec3& w) const {
   // Find the place in texels.
   const float longitude = std::atan2(w.x, w.z);

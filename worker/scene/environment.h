@@ -48,10 +48,6 @@ class EnvironmentMap {
   /// Integral of the reconstruction over the sphere as the table sees it, mean over RGB; 0 for a black map.
   double total_power() const { return total_power_; }
   bool black() const { return !(total_power_ > 0); }
-  /// Integral over the sphere of the smaller of both tables' densities: 1 for maps that differ by a
-  /// factor only, 0 for maps that share no light. Maps of other sizes or filters count as strangers: 0.
-  double overlap(const EnvironmentMap& other) const;
-
   /// Radiance and density along unit `w` (map frame).
   Texel evaluate(const Vec3& w) const;
   /// A direction with density evaluate(w).density. u: 2 uniforms in [0, 1). Monotone in u, so well spread points stay

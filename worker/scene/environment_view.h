@@ -22,11 +22,4 @@ inline EnvironmentView view_of(const Environment& environment) {
           .to_map = environment.rotation.transposed().m};
 }
 
-/// The same for directions in the map's own frame.
-inline EnvironmentView unturned_view_of(const Environment& environment) {
-  EnvironmentView view = view_of(environment);
-  view.to_map = {1, 0, 0, 0, 1, 0, 0, 0, 1};
-  return view;
-}
-
 }  // namespace baton

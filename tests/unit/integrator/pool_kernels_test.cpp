@@ -1,4 +1,5 @@
-// The pool of a pixel against the scalar arithmetic, on every instruction set of this machine.
+// The rays of the pool sampler against the candidates they are chosen from, on every instruction
+// set of this machine.
 #include "worker/integrator/pool_kernels.h"
 
 #include <gtest/gtest.h>
@@ -15,14 +16,12 @@ namespace baton {
 namespace {
 
 using kernels::CandidateCounts;
-using kernels::PoolHalf;
 
-Environment turned_sky(float degrees, float brightness) {
+Environment sky() {
   RgbImage image{32, 16, {}};
-  for (int i = 0; i < 32 * 16 * 3; ++i)
-    image.rgb.push_back(brightness * static_cast<float>(1 + (i * 37) % 23));
+  for (int i = 0; i < 32 * 16 * 3; ++i) image.rgb.push_back(static_cast<float>(1 + (i * 37) % 23));
   return {std::make_shared<EnvironmentMap>(image, MapFilter::bilinear, 1.0f, false),
-          rotation_about({0, 1, 0}, degrees)};
+          rotation_about({0, 1, 0}, 30)};
 }
 
 Material material_of(MaterialKind kind) {
@@ -33,97 +32,64 @@ Material material_of(MaterialKind kind) {
   return make_material(spec);
 }
 
-/// A pixel that sees three things, one of its four sites nothing.
-struct Pixel {
-  std::vector<Material> materials{material_of(MaterialKind::diffuse),
-                                  material_of(MaterialKind::phong),
-                                  material_of(MaterialKind::metallic_roughness)};
-  std::vector<ShadingPoint> points;
+/// A pixel of four sites, one of which sees nothing; the others see diffuse things, or one of each
+/// kind.
+SiteBlock pixel(bool glossy) {
+  const std::vector<Material> materials{
+      material_of(MaterialKind::diffuse),
+      material_of(glossy ? MaterialKind::phong : MaterialKind::diffuse),
+      material_of(glossy ? MaterialKind::metallic_roughness : MaterialKind::diffuse)};
   SiteBlock sites;
-
-  explicit Pixel(float tilt) {
-    sites.clear(4);
-    for (int s = 0; s < 3; ++s) {
-      const Vec3 normal = normalize({tilt * static_cast<float>(s), 1, 0.2f});
-      points.push_back(
-          {.position = {}, .ng = normal, .ns = normal, .wo = normalize({0.3f, 0.8f, 0.4f})});
-      sites.add(s, points.back(), materials[static_cast<std::size_t>(s)]);
-    }
-    sites.add_miss(3);
+  sites.clear(4);
+  for (int s = 0; s < 3; ++s) {
+    const Vec3 normal = normalize({0.1f * static_cast<float>(s), 1, 0.2f});
+    sites.add(s, {.position = {}, .ng = normal, .ns = normal, .wo = normalize({0.3f, 0.8f, 0.4f})},
+              materials[static_cast<std::size_t>(s)]);
   }
-  float target(std::size_t site, const Environment& light, const Vec3& w) const {
-    const EnvironmentMap::Texel seen = light.evaluate(w);
-    const float cosine = std::max(dot(points[site].ns, w), 0.0f);
-    return mean(evaluate_bsdf(materials[site], points[site], w) * Rgb{seen.r, seen.g, seen.b}) *
-           cosine;
-  }
-};
+  sites.add_miss(3);
+  return sites;
+}
 
-class Pool : public testing::TestWithParam<std::int64_t> {
+/// Half the sky is blocked, and some of the rest.
+bool is_free(const Vec3& w) { return w.x + 0.3f * w.z > -0.1f && w.y < 0.9f; }
+
+/// What a pixel remembers after so many rays; mistaken about every seventh bin.
+std::vector<VisibilityCell> memory_after(std::uint32_t rays) {
+  std::vector<VisibilityCell> memory(kVisibilityCells, 0);
+  for (std::uint32_t i = 0; i < rays; ++i) {
+    const OctDirection code = (i + 1) * 2654435761u;
+    const std::size_t bin = visibility_bin(code);
+    remember_ray(memory, bin, is_free(decode_octahedral(code)) != (bin % 7 == 0));
+  }
+  return memory;
+}
+
+class PoolRays : public testing::TestWithParam<std::int64_t> {
  protected:
   void SetUp() override {
     hwy::SetSupportedTargetsForTest(GetParam());
     hwy::GetChosenTarget().Update(hwy::SupportedTargets());
-    for (std::size_t bin = 0; bin < kVisibilityBins; bin += 2) {
-      memory[bin] = static_cast<VisibilityCell>(bin << 8 | 3);
-    }
-    memory[kVisibilitySummary] = 3000 << 4 | 15;
-    for (std::uint32_t j = 0; j < 16; ++j) {
-      code.push_back((j + 1) * 2654435761u);
-      site.push_back(static_cast<std::uint8_t>(j % 3));
-      u.push_back(0.1f * static_cast<float>(j + 1));
-    }
-    old.sites = old_pixel.sites;
-    old.log_share[1] = -std::log(2.0f);
   }
   void TearDown() override {
     hwy::SetSupportedTargetsForTest(0);
     hwy::GetChosenTarget().Update(hwy::SupportedTargets());
   }
 
-  void gather(bool has_history) {
-    kernels::gather_pool({.sites = now_pixel.sites,
-                          .old = &old,
-                          .now = now,
-                          .before = before,
-                          .light_pool = light_pool,
-                          .counts = counts,
-                          .has_history = has_history,
-                          .code = code,
-                          .site = site,
-                          .contribution = u,
-                          .memory = memory},
-                         settings, Rng({.job_seed = 5}, PassId::candidates), *halves);
+  float choose(const SiteBlock& sites, std::span<const VisibilityCell> memory, float u) {
+    return kernels::choose_pool_rays(sites, view, light_pool, counts(sites), rng, u, 16, memory,
+                                     *scratch, *rays);
   }
-  /// Relative difference of an entry's weight from the scalar one; carried: contribution of the
-  /// particle, or 0.
-  double deviation(const PoolHalf& half, std::size_t i, float carried, float gain) const {
-    const auto s = static_cast<std::size_t>(half.site[i]);
-    const Vec3 w = now.rotation * decode_octahedral(half.code[i]);
-    const float target = now_pixel.target(s, now, w);
-    const float target_before =
-        old_pixel.target(s, before, before.rotation * decode_octahedral(half.code[i])) *
-        std::exp(old.log_share[s]);
-    const float proposal = static_cast<float>(counts.from_light) * now.evaluate(w).density +
-                           static_cast<float>(counts.from_bsdf) *
-                               bsdf_pdf_solid_angle(now_pixel.materials[s], now_pixel.points[s], w);
-    const float expected = carried > 0
-                               ? carried_weight(gain, target_before, target, carried)
-                               : 0.75f * fresh_weight(gain, target_before, target, proposal);
-    return std::fabs(half.weight[i] - expected) / (expected + 1e-4);
+  static CandidateCounts counts(const SiteBlock& sites) {
+    if (sites.num_lobes == 0) return {.from_light = 40};
+    return {.from_light = 24, .from_bsdf = 16, .lobe_only = true};
   }
 
-  Pixel now_pixel{0.1f}, old_pixel{0.15f};
-  OldSurfaces old;
-  Environment now = turned_sky(30, 1), before = turned_sky(28, 0.7f);
-  LightPool light_pool = make_light_pool(now, before, 3, 2, {.carried = CarriedFrame::environment});
-  CandidateCounts counts{.from_light = 24, .from_bsdf = 8};
-  PoolSettings settings{.num_carried = 16, .gain = 2};
-  std::vector<VisibilityCell> memory = std::vector<VisibilityCell>(kVisibilityCells, 0);
-  std::vector<OctDirection> code;
-  std::vector<std::uint8_t> site;
-  std::vector<float> u;
-  std::unique_ptr<std::array<PoolHalf, 2>> halves = std::make_unique<std::array<PoolHalf, 2>>();
+  const Environment light = sky();
+  const EnvironmentView view = view_of(light);
+  const LightPool light_pool = make_light_pool(light, light, 3, 2);
+  const Rng rng{{.job_seed = 5}, PassId::candidates};
+  std::unique_ptr<kernels::PoolScratch> scratch = std::make_unique<kernels::PoolScratch>();
+  std::unique_ptr<PixelRays> rays = std::make_unique<PixelRays>();
 };
 
 std::vector<std::int64_t> available_targets() {
@@ -133,60 +99,95 @@ std::vector<std::int64_t> available_targets() {
   }
   return targets;
 }
-INSTANTIATE_TEST_SUITE_P(Sets, Pool, testing::ValuesIn(available_targets()), [](const auto& param) {
-  return std::string(hwy::TargetName(param.param));
-});
+INSTANTIATE_TEST_SUITE_P(Sets, PoolRays, testing::ValuesIn(available_targets()),
+                         [](const auto& param) {
+                           return std::string(hwy::TargetName(param.param));
+                         });
 
-TEST_P(Pool, WeightsAreThoseOfTheScalarCode) {
-  for (const bool has_history : {false, true}) {
-    gather(has_history);
-    for (std::size_t h = 0; h < 2; ++h) {
-      const PoolHalf& half = (*halves)[h];
-      const std::size_t num_carried = has_history ? 8 : 0;
-      ASSERT_EQ(half.count, static_cast<std::int32_t>(num_carried + 32));
-      int far_off = 0;
-      double sum = 0;
-      for (std::size_t i = 0; i < num_carried + 32; ++i) {
-        const float carried = i >= 32 ? 2 * u[8 * h + i - 32] : 0;
-        far_off += deviation(half, i, carried, has_history ? settings.gain : 0) > 2e-3 ? 1 : 0;
-        sum += half.weight[i];
+// The mean over the offset u is an integral that a fine grid of offsets solves: it must be the sum
+// of w V (f cos L) / p~ over all candidates, whatever the memory says; the same for Lns and for
+// each way of choosing.
+TEST_P(PoolRays, AverageToTheirCandidates) {
+  for (const bool glossy : {false, true}) {
+    const SiteBlock sites = pixel(glossy);
+    auto candidates = std::make_unique<kernels::CandidateSet>();
+    kernels::draw_candidates(sites, view, light_pool, counts(sites), rng, *candidates);
+    Rgb expected{};
+    double seen = 0;
+    for (std::size_t i = 0; i < static_cast<std::size_t>(candidates->count); ++i) {
+      const bool dark = !(candidates->weight[i] > 0);
+      if (dark || !is_free(decode_octahedral(candidates->code[i]))) continue;
+      const Rgb reflected{candidates->r[i], candidates->g[i], candidates->b[i]};
+      expected += reflected * (candidates->weight[i] / mean(reflected));
+      seen += candidates->weight[i];
+    }
+    for (const std::uint32_t remembered : {0u, 3u, 3000u}) {
+      const std::vector<VisibilityCell> memory = memory_after(remembered);
+      constexpr int kOffsets = 4000;
+      double sum[4] = {};
+      for (int k = 0; k < kOffsets; ++k) {
+        const float lns =
+            choose(sites, memory, (static_cast<float>(k) + 0.5f) / static_cast<float>(kOffsets));
+        ASSERT_NEAR(lns, candidates->total, 1e-4f * candidates->total);
+        PixelRays::Value value = rays->constant;
+        for (std::size_t j = 0; j < rays->count; ++j) {
+          if (!is_free(rays->direction[j])) continue;
+          value.color += rays->value[j].color;
+          value.visibility += rays->value[j].visibility;
+        }
+        sum[0] += value.color.x / kOffsets;
+        sum[1] += value.color.y / kOffsets;
+        sum[2] += value.color.z / kOffsets;
+        sum[3] += value.visibility / kOffsets;
       }
-      EXPECT_LE(far_off, 1);  // a direction on a cell's edge
-      EXPECT_NEAR(half.lns, sum, 1e-4 * sum);
-      if (!has_history) {
-        EXPECT_NEAR(half.lns_fresh, half.lns, 1e-5 * half.lns);
-      }
+      EXPECT_NEAR(sum[0], expected.x, 2e-3 * expected.x) << glossy << " " << remembered;
+      EXPECT_NEAR(sum[1], expected.y, 2e-3 * expected.y) << glossy << " " << remembered;
+      EXPECT_NEAR(sum[2], expected.z, 2e-3 * expected.z) << glossy << " " << remembered;
+      EXPECT_NEAR(sum[3], seen / candidates->total, 2e-3) << glossy << " " << remembered;
     }
   }
 }
 
-TEST_P(Pool, ReadsTheMemoryAsTheScalarCode) {
-  gather(true);
-  for (const PoolHalf& half : *halves) {
-    for (std::size_t i = 0; i < static_cast<std::size_t>(half.count); ++i) {
-      const float free = free_share(memory, visibility_bin({half.x[i], half.y[i], half.z[i]}));
-      EXPECT_NEAR(half.free[i], free, 1e-6f);
-      EXPECT_NEAR(half.carry_weight[i], half.weight[i] * carry_factor(free),
-                  1e-5f * half.weight[i]);
-      EXPECT_NEAR(half.ray_weight[i], half.weight[i] * ray_factor(free), 1e-5f * half.weight[i]);
-    }
+TEST_P(PoolRays, ReadTheMemoryAsTheScalarCode) {
+  const SiteBlock sites = pixel(true);
+  const std::vector<VisibilityCell> memory = memory_after(200);
+  choose(sites, memory, 0.5f);
+  auto candidates = std::make_unique<kernels::CandidateSet>();
+  kernels::draw_candidates(sites, view, light_pool, counts(sites), rng, *candidates);
+  for (std::size_t i = 0; i < static_cast<std::size_t>(candidates->count); ++i) {
+    const float free = free_share(memory, visibility_bin(candidates->code[i]));
+    EXPECT_NEAR(scratch->free[i], free, 1e-6f);
+  }
+  for (std::size_t j = 0; j < rays->count; ++j) {
+    EXPECT_EQ(rays->bin[j], visibility_bin(encode_octahedral(rays->direction[j])));
   }
 }
 
-// Whatever the balance, the fresh candidates by themselves are those of a first frame.
-TEST_P(Pool, FreshCandidatesEstimateLnsAlone) {
-  gather(false);
-  const float alone = (*halves)[0].lns_fresh;
-  gather(true);
-  EXPECT_NEAR((*halves)[0].lns_fresh, alone, 1e-4f * alone);
-  EXPECT_NE((*halves)[0].lns, alone);
+TEST_P(PoolRays, AreNWithoutAMemoryAndByDoubtWithOne) {
+  const SiteBlock sites = pixel(false);
+  const auto num_rays = [&](std::span<const VisibilityCell> memory) {
+    kernels::choose_pool_rays(sites, view, light_pool, {.from_light = 400}, rng, 0.5f, 16, memory,
+                              *scratch, *rays);
+    return rays->count;  // less what was chosen twice
+  };
+  EXPECT_LE(num_rays(memory_after(0)), 16u);
+  EXPECT_GT(num_rays(memory_after(10)), 20u);
+  std::vector<VisibilityCell> open(kVisibilityCells, 0);
+  for (std::size_t bin = 0; bin < kVisibilityBins; ++bin) remember_ray(open, bin, true);
+  EXPECT_LE(num_rays(open), 12u);
+  EXPECT_NEAR(rays->constant.visibility, 0, 1e-5) << "what is known alike everywhere cancels";
 }
 
-TEST_P(Pool, HalvesShareNoCandidate) {
-  gather(false);
-  for (std::int32_t i = 24; i < 32; ++i) {
-    for (std::int32_t j = 24; j < 32; ++j) EXPECT_NE((*halves)[0].code[i], (*halves)[1].code[j]);
-  }
+TEST_P(PoolRays, AreNoneWithoutLight) {
+  SiteBlock sites = pixel(false);
+  RgbImage black{2, 1, std::vector<float>(6, 0.0f)};
+  const Environment dark{std::make_shared<EnvironmentMap>(black, MapFilter::bilinear, 1.0f, false),
+                         Mat3{}};
+  const LightPool none = make_light_pool(dark, dark, 1, 1);
+  EXPECT_EQ(kernels::choose_pool_rays(sites, view_of(dark), none, {.from_light = 8}, rng, 0.5f, 16,
+                                      memory_after(10), *scratch, *rays),
+            0);
+  EXPECT_EQ(rays->count, 0u);
 }
 
 }  // namespace

@@ -27,6 +27,9 @@ TEST(Estimate, SizesStateOnlyWhereItIsCarried) {
   JobSpec job = small_job();
   EXPECT_EQ(estimate_job(job).state_bytes_per_pixel, 9 + 9 * 16);
   EXPECT_EQ(estimate_job(job).state_bytes, 153 * 5000);
+  job.sampling.method = Method::pool;
+  EXPECT_EQ(estimate_job(job).state_bytes_per_pixel, 9 + 516);
+  job.sampling.method = Method::sequential;
   job.sampling.method = Method::bidirectional;
   EXPECT_EQ(estimate_job(job).state_bytes, 0);
   EXPECT_EQ(estimate_job(job).dependencies, 5 * 8);

@@ -183,6 +183,38 @@ TEST(RunTile, SameBytesForAnyTilingAndAnyRunLengthWithThePool) {
   EXPECT_EQ(render_tiled(job, 4096, 1), whole);
 }
 
+// The variance that the pool states from its even and odd samples is, on average, at least what is
+// seen over 64 seeds (whose own error is 5 % of it), and not many times more.
+TEST(RunTile, PoolStatesItsVariance) {
+  JobSpec job = sequence_job(4);
+  job.image.sites = 1;
+  job.sampling.method = Method::pool;
+  job.sampling.num_candidates = 64;
+  job.output.aovs = {Aov::variance};
+  constexpr int kSeeds = 64;
+  std::vector<double> sum, squares;
+  double stated = 0;
+  for (int seed = 1; seed <= kSeeds; ++seed) {
+    job.seed = static_cast<std::uint64_t>(seed);
+    const FilmTile film = render_tile(job).films.back();
+    const auto r = channel(film, "R"), g = channel(film, "G"), b = channel(film, "B");
+    sum.resize(r.size());
+    squares.resize(r.size());
+    for (std::size_t i = 0; i < r.size(); ++i) {
+      const double value = (r[i] + g[i] + b[i]) / 3;
+      sum[i] += value / kSeeds;
+      squares[i] += value * value / kSeeds;
+    }
+    for (const float v : channel(film, "variance")) stated += v / kSeeds;
+  }
+  double seen = 0;
+  for (std::size_t i = 0; i < sum.size(); ++i)
+    seen += (squares[i] - sum[i] * sum[i]) * kSeeds / (kSeeds - 1);
+  std::printf("  stated over seen: %.2f\n", stated / seen);
+  EXPECT_GT(stated, 0.9 * seen);
+  EXPECT_LT(stated, 3 * seen);
+}
+
 TEST(RunTile, CarriesEverySurfacePixelOn) {
   JobSpec published = sequence_job(3);
   published.sampling.refresh_every = 0;

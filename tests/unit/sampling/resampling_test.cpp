@@ -1,5 +1,5 @@
 #include "worker/sampling/resampling.h"
-#include "worker/sampling/systematic_choice.h"
+#include "tests/unit/sampling/systematic_choice.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -85,12 +85,11 @@ TEST(AutoCandidates, NothingIsCarriedWhereThereIsOneFrame) {
   EXPECT_FALSE(carries(job));
 }
 
-TEST(AutoCandidates, HalvesTakeEvenNumbers) {
+TEST(AutoCandidates, SecondPassTakesEvenNumbersAndNoPool) {
   const auto tries_pool = [](const JobSpec& job) {
     bool found = false;
     for (const AutoCandidate& candidate : auto_candidates(job)) {
-      const bool halves = candidate.sampling.method == Method::pool || candidate.correlated;
-      EXPECT_TRUE(!halves || candidate.sampling.num_particles % 2 == 0);
+      EXPECT_TRUE(!candidate.correlated || candidate.sampling.num_particles % 2 == 0);
       found = found || candidate.sampling.method == Method::pool;
     }
     return found;
@@ -99,7 +98,7 @@ TEST(AutoCandidates, HalvesTakeEvenNumbers) {
   job.frames = {1, 2};
   EXPECT_TRUE(tries_pool(job));
   job.sampling.num_particles = 3;
-  EXPECT_FALSE(tries_pool(job));
+  EXPECT_TRUE(tries_pool(job));
   job.sampling.num_particles = 4;
   job.visibility.correlated = true;
   EXPECT_FALSE(tries_pool(job));

@@ -1,4 +1,4 @@
-#include "worker/sampling/systematic_choice.h"
+#include "tests/unit/sampling/systematic_choice.h"
 
 #include <algorithm>
 
@@ -6,16 +6,16 @@
 #include "common/base/limits.h"
 
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "worker/sampling/systematic_choice.cpp"
+#define HWY_TARGET_INCLUDE "tests/unit/sampling/systematic_choice.cpp"
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
 #include "worker/sampling/systematic-inl.h"
 
-#ifndef BATON_WORKER_SAMPLING_SYSTEMATIC_CHOICE_ONCE
-#define BATON_WORKER_SAMPLING_SYSTEMATIC_CHOICE_ONCE
+#ifndef BATON_TESTS_UNIT_SAMPLING_SYSTEMATIC_CHOICE_ONCE
+#define BATON_TESTS_UNIT_SAMPLING_SYSTEMATIC_CHOICE_ONCE
 namespace baton {
-/// Room for the candidates and the carried particles of a pixel, padded.
+/// Room for the candidates of a pixel, padded.
 inline constexpr std::size_t kMaxWeights = limits::kMaxCandidates + limits::kMaxParticles + 64;
 }  // namespace baton
 #endif
