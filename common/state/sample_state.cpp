@@ -144,9 +144,10 @@ Status decode_meta(const SectionFile& file, const std::string& name, SampleState
     return fail(fmt::format("rectangle [{}, {}) x [{}, {}), expected a non-empty one within 0..{}",
                             rect.x0, rect.x1, rect.y0, rect.y1, limits::kMaxImageSide));
   }
-  if (state.num_particles < 0 || state.num_particles > limits::kMaxParticles) {
-    return fail(
-        fmt::format("{} particles, expected 0 to {}", state.num_particles, limits::kMaxParticles));
+  const int fewest = file.find(kMemorySummary) != nullptr ? 0 : 1;
+  if (state.num_particles < fewest || state.num_particles > limits::kMaxParticles) {
+    return fail(fmt::format("{} particles, expected {} to {}", state.num_particles, fewest,
+                            limits::kMaxParticles));
   }
   constexpr std::uint64_t kParticleBytes =
       sizeof(OctDirection) + sizeof(float) + sizeof(std::uint8_t);

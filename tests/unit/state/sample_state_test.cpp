@@ -316,6 +316,19 @@ TEST(SampleState, RemembersRays) {
   EXPECT_EQ(*decode_state(encode_state(state), "test"), state);
 }
 
+TEST(SampleState, NeedsNoParticlesBesideAMemory) {
+  SampleState state = remembering_state();
+  state.num_particles = 0;
+  state.direction.clear();
+  state.weight.clear();
+  state.site.clear();
+  EXPECT_EQ(*decode_state(encode_state(state), "test"), state);
+  state.memory.clear();
+  const auto decoded = decode_state(encode_state(state), "a.bst");
+  ASSERT_FALSE(decoded.ok());
+  EXPECT_THAT(decoded.error().message, HasSubstr("section META: 0 particles, expected 1 to 64"));
+}
+
 TEST(SampleState, StoresNoGridWhereRaysAgree) {
   SampleState state = remembering_state();
   const auto raw_bytes = [](const SampleState& s, const std::string& tag) {
