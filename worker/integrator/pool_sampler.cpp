@@ -1,6 +1,6 @@
 #include "worker/integrator/pool_sampler.h"
 
-#include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "worker/integrator/candidate_samplers.h"
@@ -14,11 +14,12 @@ PoolSampler::PoolSampler(const SamplingSpec& spec)
 
 PixelDiagnostics PoolSampler::sample(const PixelInput& input, SamplerScratch& scratch,
                                      const PixelSamples& samples) const {
+  static constexpr std::array<VisibilityCell, kVisibilityCells> kNothing{};
   const float total = kernels::choose_pool_rays(
       input.sites, input.now, input.light.pool,
       candidate_counts(input.sites, num_candidates_, lobe_fraction_),
       Rng(input.key, PassId::candidates), Rng(input.key, PassId::choose).uniforms(0, 0)[0],
-      num_rays_, input.memory, scratch.pool, scratch.rays);
+      num_rays_, input.memory.empty() ? kNothing : input.memory, scratch.pool, scratch.rays);
   samples.lns = samples.lns_fresh = total > 0 && std::isfinite(total) ? total : 0.0f;
   samples.source = input.has_history ? PixelSource::carried : PixelSource::fresh;
   return {.ess = samples.lns > 0 ? static_cast<float>(num_rays_) : 0.0f,

@@ -107,7 +107,8 @@ class TileWalk {
   void start_state() {
     state_.resize(rect_, num_carried_particles(context_.job.sampling),
                   num_populations(context_.job));
-    if (context_.sampler != nullptr && context_.sampler->chooses_rays()) state_.add_memory();
+    const bool chooses_rays = context_.sampler != nullptr && context_.sampler->chooses_rays();
+    if (chooses_rays && carries_state(context_.job)) state_.add_memory();
   }
   Result<std::shared_ptr<const FrameLight>> light_of(const FrameSpec& frame) {
     const CpuTimer timer(stats_.seconds_light);

@@ -181,6 +181,10 @@ TEST(RunTile, SameBytesForAnyTilingAndAnyRunLengthWithThePool) {
   EXPECT_EQ(render_tiled(job, 8, 5), whole);
   EXPECT_EQ(render_tiled(job, 5, 2), whole);
   EXPECT_EQ(render_tiled(job, 4096, 1), whole);
+  job.state.carry = false;
+  const std::vector<FilmTile> forgetful = render_tiled(job, 4096, 5);
+  EXPECT_EQ(render_tiled(job, 4096, 1), forgetful);
+  EXPECT_NE(forgetful, whole);
 }
 
 // The variance that the pool states from its even and odd samples is, on average, at least what is
