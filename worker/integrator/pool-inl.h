@@ -88,14 +88,9 @@ struct PoolLines {
     light = hn::Add(light, weight);
     expected = hn::MulAdd(weight, free, expected);
     const Vec3Lanes seen = Scale(color(), free);
-    visible = Sum(visible, seen);
-    difference = Sum(difference, Scale(seen, sign));
+    visible = HWY_NAMESPACE::Add(visible, seen);
+    difference = HWY_NAMESPACE::Add(difference, Scale(seen, sign));
     sign = hn::Neg(sign);
-  }
-
- private:
-  static HWY_INLINE Vec3Lanes Sum(const Vec3Lanes& a, const Vec3Lanes& b) {
-    return {hn::Add(a.x, b.x), hn::Add(a.y, b.y), hn::Add(a.z, b.z)};
   }
 };
 
@@ -146,8 +141,8 @@ HWY_INLINE void LookUpRays(const ChosenCandidates& chosen, const RayPlan& plan,
   }
 }
 
-/// Hands out the rays, each once; with the control variate, less what was expected of them. A pick
-/// is the even or the odd half's by its number.
+/// Hands out the rays, each once; with the control variate, less what was expected of them. Rays
+/// are of the even and the odd half in turn.
 inline void PushRays(const RayPlan& plan, const std::int32_t* picks, const ChosenRays& chosen,
                      float lns, PixelRays& out) {
   const auto count = static_cast<std::size_t>(plan.count);
