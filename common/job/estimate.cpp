@@ -25,6 +25,13 @@ constexpr std::int64_t kStateBytesPerPixel = 9;
 constexpr std::int64_t kStateBytesPerParticle = 9;
 /// Of a pixel's memory of its rays; only pixels whose rays disagree have all of it.
 constexpr std::int64_t kMemoryBytes = 516;
+constexpr std::int64_t kConfidenceBytes = 2;
+
+/// Of a pixel beside its particles.
+std::int64_t pixel_bytes(Method method) {
+  if (method == Method::pool) return kStateBytesPerPixel + kMemoryBytes;
+  return kStateBytesPerPixel + (method == Method::restir ? kConfidenceBytes : 0);
+}
 
 }  // namespace
 
@@ -72,8 +79,7 @@ JobEstimate estimate_job(const JobSpec& job) {
   e.largest_blob_bytes = tile_pixels * e.film_channels * 4;
   if (carries_state(job)) {
     // What is stored of a pixel's particles is hardly smaller; its memory is, by half and more.
-    e.state_bytes_per_pixel = kStateBytesPerPixel + kStateBytesPerParticle * particles +
-                              (job.sampling.method == Method::pool ? kMemoryBytes : 0);
+    e.state_bytes_per_pixel = pixel_bytes(job.sampling.method) + kStateBytesPerParticle * particles;
     e.state_bytes = pixels * e.state_bytes_per_pixel;
     e.largest_blob_bytes = std::max(e.largest_blob_bytes, tile_pixels * e.state_bytes_per_pixel);
   }

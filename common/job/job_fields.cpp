@@ -110,6 +110,10 @@ void fields(JobArchive& a, SamplingSpec& sampling, const SceneSpec& scene) {
     a.fault("refreshCandidates", fmt::format("at least numParticles ({})", sampling.num_particles),
             std::to_string(sampling.refresh_candidates));
   }
+  a.integer("historyLimit", sampling.history_limit, 1, limits::kMaxHistoryLimit);
+  a.integer("numNeighbors", sampling.num_neighbors, 0, limits::kMaxNeighbors);
+  a.integer("neighborRadius", sampling.neighbor_radius, 1, limits::kMaxNeighborRadius);
+  a.boolean("reuseVisibility", sampling.reuse_visibility);
   a.number("targetError", sampling.target_error, {.min = 0, .max = 10, .min_open = true});
   a.number("timeBudget", sampling.time_budget, {.min = 0, .max = 1e9, .min_open = true});
   if (sampling.target_error && sampling.time_budget) {
@@ -136,8 +140,15 @@ void fields(JobArchive& a, VisibilitySpec& visibility, const SamplingSpec& sampl
   if (sampling.method == Method::reference) {
     a.fault("correlated", "false, as sampling.method is reference", "true");
   }
-  if (sampling.method == Method::pool) {
-    a.fault("correlated", "false, as the rays of sampling.method pool are not its samples", "true");
+  if (chooses_rays(sampling.method)) {
+    a.fault("correlated",
+            fmt::format("false, as the rays of sampling.method {} are not its samples",
+                        kMethods[static_cast<std::size_t>(sampling.method)]),
+            "true");
+  }
+  if (sampling.method == Method::restir) {
+    a.fault("correlated", "false, as sampling.method is restir, whose samples are carried as one set",
+            "true");
   }
   if (!sampling.by_material.empty()) {
     a.fault("correlated", "false, as sampling.byMaterial is given", "true");

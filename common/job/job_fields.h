@@ -21,9 +21,9 @@ inline constexpr NumberRange kAngleRange{-1e6, 1e6};
 inline constexpr std::array<std::string_view, 4> kMaterialKinds{"diffuse", "phong",
                                                                 "metallicRoughness", "measured"};
 inline constexpr std::array<std::string_view, 2> kMapFilters{"nearest", "bilinear"};
-inline constexpr std::array<std::string_view, 8> kMethods{
-    "reference",     "environment", "brdf", "mis",
-    "bidirectional", "sequential",  "pool", "auto"};
+inline constexpr std::array<std::string_view, 10> kMethods{
+    "reference",  "environment", "brdf",  "mis",    "bidirectional",
+    "sequential", "pool",        "ratio", "restir", "auto"};
 inline constexpr std::array<std::string_view, 4> kResamplingSchemes{"systematic", "stratified",
                                                                     "multinomial", "residual"};
 inline constexpr std::array<std::string_view, 4> kSecondPassForms{

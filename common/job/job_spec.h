@@ -175,7 +175,7 @@ struct EnvironmentSpec {
 
 // ---- sampling ----------------------------------------------------------------------------------------------
 /// automatic: settled by a pilot before the job is submitted; never part of a job document.
-enum class Method : std::uint8_t { reference, environment, brdf, mis, bidirectional, sequential, pool, automatic };
+enum class Method : std::uint8_t { reference, environment, brdf, mis, bidirectional, sequential, pool, ratio, restir, automatic };
 enum class ResamplingScheme : std::uint8_t { systematic, stratified, multinomial, residual };
 /// How `sequential` carries the normalising constant: by the ratio of the weights, or by path sampling with a left, right or
 /// trapezoidal sum over the intermediate distributions.
@@ -213,6 +213,11 @@ struct SamplingSpec {
   /// with refresh_candidates; none: never. The rule looks at the samples, so it is a (small) bias.
   std::optional<float> refresh_ratio{};
   int refresh_candidates = 800;  ///< [N, limits::kMaxCandidates]
+  int history_limit = 20;    ///< restir: a carried set counts as at most so many fresh ones, [1, limits::kMaxHistoryLimit]
+  int num_neighbors = 0;     ///< restir: other pixels of the frame before whose samples a pixel weighs, [0, limits::kMaxNeighbors]
+  int neighbor_radius = 30;  ///< restir: how far from the pixel's own history they are, pixels, [1, limits::kMaxNeighborRadius]
+  /// restir: only samples whose ray was free are carried on. Unbiased while nothing moves and no neighbours are asked, else not.
+  bool reuse_visibility = false;
   std::optional<float> target_error{};  ///< automatic: RMSE over mean radiance to reach, (0, 10]
   std::optional<float> time_budget{};   ///< automatic: CPU seconds of the whole job to stay within, (0, 1e9]
   int reference_samples = 1024;    ///< paired samples per pixel of `reference`, [2, 2^24]

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/job/sequence.h"
 #include "common/math/quaternion.h"
 
 namespace baton {
@@ -87,7 +88,12 @@ Status check_settled(const JobSpec& job) {
                    "motion.maxPx above 0"};
 }
 
-std::int32_t history_reach_px(const JobSpec& job) { return moves(job) ? job.motion.max_px : 0; }
+bool shares_history(const JobSpec& job) { return moves(job) || asks_neighbors(job.sampling); }
+
+std::int32_t history_reach_px(const JobSpec& job) {
+  return (moves(job) ? job.motion.max_px : 0) +
+         (asks_neighbors(job.sampling) ? job.sampling.neighbor_radius : 0);
+}
 
 CameraSpec camera_at(const JobSpec& job, double frame) {
   CameraSpec camera = job.camera;

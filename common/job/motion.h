@@ -21,8 +21,12 @@ bool is_settled(const JobSpec& job);
 /// The same as an error that says what is missing.
 Status check_settled(const JobSpec& job);
 
+/// Whether pixels take history from other pixels: camera or objects move, or neighbours are asked.
+/// A tile then needs the states of those near it, frame by frame.
+bool shares_history(const JobSpec& job);
 /// How far away in the image, per frame and in either direction, a pixel may take its history from:
-/// motion.max_px, or 0 when nothing moves and each pixel keeps to itself.
+/// motion.max_px, where something moves, and sampling.neighbor_radius, where neighbours are asked;
+/// 0 when each pixel keeps to itself.
 std::int32_t history_reach_px(const JobSpec& job);
 
 /// The camera at a frame number, without keys. Position, point looked at, up and angle of view

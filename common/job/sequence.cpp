@@ -75,7 +75,7 @@ std::vector<std::int32_t> TileGrid::tiles_near(std::int32_t tile, std::int32_t r
 }
 
 std::int32_t frames_per_run(const JobSpec& job) {
-  return moves(job) && carries_state(job) ? 1 : job.state.checkpoint_every;
+  return shares_history(job) && carries_state(job) ? 1 : job.state.checkpoint_every;
 }
 
 std::int32_t num_runs(const JobSpec& job) {
@@ -92,8 +92,13 @@ TileRun tile_run(const JobSpec& job, std::int32_t tile, std::int32_t run) {
 
 bool carries_state(const JobSpec& job) {
   const Method method = job.sampling.method;
-  return (method == Method::sequential || method == Method::pool) && job.state.carry;
+  const bool carries = method == Method::sequential || method == Method::pool || method == Method::restir;
+  return carries && job.state.carry;
 }
+
+bool chooses_rays(Method method) { return method == Method::pool || method == Method::ratio; }
+
+bool asks_neighbors(const SamplingSpec& sampling) { return sampling.method == Method::restir && sampling.num_neighbors > 0; }
 
 std::optional<StartMethod> fresh_method(Method method) {
   switch (method) {
@@ -108,6 +113,8 @@ std::optional<StartMethod> fresh_method(Method method) {
     case Method::reference:
     case Method::sequential:
     case Method::pool:
+    case Method::ratio:
+    case Method::restir:
     case Method::automatic:
       return std::nullopt;
   }
@@ -115,7 +122,7 @@ std::optional<StartMethod> fresh_method(Method method) {
 }
 
 std::int32_t num_carried_particles(const SamplingSpec& sampling) {
-  return sampling.method == Method::pool ? 0 : most_particles(sampling);
+  return chooses_rays(sampling.method) ? 0 : most_particles(sampling);
 }
 
 std::int32_t most_particles(const SamplingSpec& sampling) {

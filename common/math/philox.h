@@ -44,6 +44,7 @@ enum class PassId : std::uint32_t {
   partition = 9,      ///< where the squares of the second pass lie
   exchange = 10,      ///< who is offered a sample in the second pass
   reproject = 11,     ///< the site that is followed back, and which site inherits a sample
+  neighbor = 12,      ///< which neighbours a pixel asks
 };
 
 /// uint32 -> float uniform in [0, 1): the top 24 bits.

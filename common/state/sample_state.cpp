@@ -24,8 +24,9 @@ constexpr SectionTag kSite{'S', 'I', 'T', 'E'};
 constexpr SectionTag kPopulations{'P', 'O', 'P', 'S'};
 constexpr SectionTag kMemorySummary{'V', 'I', 'S', 'S'};
 constexpr SectionTag kMemoryGrid{'V', 'I', 'S', 'G'};
-constexpr std::array kTags{kMeta,   kSource, kLns,         kLnsFresh,      kDirection,
-                           kWeight, kSite,   kPopulations, kMemorySummary, kMemoryGrid};
+constexpr SectionTag kConfidence{'C', 'O', 'N', 'F'};
+constexpr std::array kTags{kMeta, kSource,      kLns,           kLnsFresh,   kDirection, kWeight,
+                           kSite, kPopulations, kMemorySummary, kMemoryGrid, kConfidence};
 
 constexpr std::size_t kMetaBytes = 2 * sizeof(std::uint64_t) + 7 * sizeof(std::int32_t);
 /// How far the sum of a pixel's weights may be from 1.
@@ -303,6 +304,7 @@ void SampleState::resize(const PixelRect& new_rect, std::int32_t new_num_particl
   weight.assign(particles, 0.0f);
   site.assign(particles, 0);
   memory.clear();
+  confidence.clear();
 }
 
 Bytes encode_state(const SampleState& state) {
@@ -316,6 +318,7 @@ Bytes encode_state(const SampleState& state) {
   BATON_CHECK(state.weight.size() == state.direction.size() &&
               state.site.size() == state.direction.size());
   BATON_CHECK(state.memory.empty() || state.memory.size() == num_pixels * kMemoryCells);
+  BATON_CHECK(state.confidence.empty() || state.confidence.size() == num_pixels);
 
   StateSections sections(state);
   const ByteView sources = std::as_bytes(std::span(state.source));
@@ -340,6 +343,7 @@ Bytes encode_state(const SampleState& state) {
     sections.add(kPopulations, 1, writer.take());
   }
   encode_memory(state, sections);
+  if (!state.confidence.empty()) sections.gather(kConfidence, state.confidence, 1);
   return sections.encode();
 }
 
@@ -361,6 +365,10 @@ Result<SampleState> decode_state(ByteView bytes, const std::string& name) {
   BATON_TRY(scatter(file, kWeight, pixels, num_particles, name, state.weight));
   BATON_TRY(scatter(file, kSite, pixels, num_particles, name, state.site));
   BATON_TRY(decode_memory(file, pixels, name, state));
+  if (file.find(kConfidence) != nullptr) {
+    state.add_confidence();
+    BATON_TRY(scatter(file, kConfidence, pixels, 1, name, state.confidence));
+  }
 
   // Check every value.
   for (const std::size_t pixel : pixels) {

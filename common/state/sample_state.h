@@ -48,12 +48,17 @@ struct SampleState {
   std::vector<std::uint8_t> site;  ///< (pixels, N)
 
   std::vector<MemoryCell> memory;  ///< (pixels, kMemoryCells), or empty: nothing is remembered
+  /// (pixels) how many fresh sets a pixel's samples count as when they are weighed against fresh ones, 0: they are no
+  /// history; or empty: nobody asks.
+  std::vector<std::uint16_t> confidence;
 
   bool operator==(const SampleState&) const = default;
   std::size_t num_pixels() const { return static_cast<std::size_t>(rect.area()); }
   /// Sizes every array, all zero. new_num_populations divides new_num_particles.
   void resize(const PixelRect& new_rect, std::int32_t new_num_particles,
               std::int32_t new_num_populations = 1);
+  /// Lets each pixel's samples count for nothing yet.
+  void add_confidence() { confidence.assign(num_pixels(), 0); }
   /// Gives each pixel an empty memory.
   void add_memory() { memory.assign(num_pixels() * kMemoryCells, 0); }
   /// The memory of a pixel, or nothing.

@@ -22,7 +22,7 @@ std::int64_t count_tasks(const JobSpec& job);
 /// The task graph of a job, by arithmetic: nothing is stored per task.
 ///
 /// If the job carries state, render(run, tile) needs render(run - 1, t) of every tile t that
-/// history may come from: itself, and its neighbours within history_reach_px where something moves.
+/// history may come from: itself, and its neighbours within history_reach_px.
 /// second_pass(frame, tile) needs the render tasks of that frame of all tiles within
 /// exchange_reach_px. assemble(frame) needs all tiles of its run, or all its second passes.
 class JobGraph {

@@ -56,7 +56,7 @@ void print_json(const JobSpec& job, const JobEstimate& e, const AssetReport& ass
                          {"frameBytes", e.frame_bytes},
                          {"stateBytesPerPixel", e.state_bytes_per_pixel},
                          {"stateBytes", e.state_bytes},
-                         {"motionMaxPx", history_reach_px(job)},
+                         {"motionMaxPx", moves(job) ? job.motion.max_px : 0},
                          {"outputDirectory", job.output.directory},
                          {"meshes", assets.meshes},
                          {"instances", assets.instances},
@@ -98,7 +98,7 @@ void print_text(const JobSpec& job, const JobEstimate& e, const AssetReport& ass
   fmt::print("rays       {} primary and {} shadow rays a pixel and frame\n",
              e.primary_rays_per_pixel, e.shadow_rays_per_pixel);
   if (moves(job)) {
-    fmt::print("motion     history is followed up to {} pixels a frame\n", history_reach_px(job));
+    fmt::print("motion     history is followed up to {} pixels a frame\n", job.motion.max_px);
   }
   if (e.state_bytes > 0) {
     fmt::print("state      about {} bytes a pixel, {} at each checkpoint\n",

@@ -71,6 +71,24 @@ TEST(Motion, ThePoolIsUnbiasedUnderBothWithSeveralSites) {
   expect_agreement_over_sites(moving_pool_job(true, true, 4));
 }
 
+/// ReSTIR, whose neighbours are asked around the place that the pixel comes from.
+JobSpec moving_restir_job(bool camera, bool object, int sites, int neighbors) {
+  JobSpec job = moving_pool_job(camera, object, sites);
+  job.sampling.method = Method::restir;
+  job.sampling.num_neighbors = neighbors;
+  job.sampling.neighbor_radius = 4;
+  return job;
+}
+TEST(Motion, RestirIsUnbiasedUnderAMovingCamera) {
+  test::expect_agreement(moving_restir_job(true, false, 1, 0), kMotionRuns, 0.01);
+}
+TEST(Motion, RestirIsUnbiasedUnderAMovingObjectWithNeighbors) {
+  test::expect_agreement(moving_restir_job(false, true, 1, 2), kMotionRuns, 0.01);
+}
+TEST(Motion, RestirIsUnbiasedUnderBothWithSeveralSites) {
+  expect_agreement_over_sites(moving_restir_job(true, true, 4, 1));
+}
+
 /// Mean of Lns over runs and its squared standard error.
 struct LnsMean {
   double mean = 0, variance = 0;

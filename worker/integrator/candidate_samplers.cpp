@@ -8,16 +8,6 @@
 namespace baton {
 namespace {
 
-/// A pixel that no light reaches: no contribution, whatever the directions.
-void set_dark(const PixelSamples& samples) {
-  std::fill(samples.direction.begin(), samples.direction.end(), OctDirection{0});
-  std::fill(samples.site.begin(), samples.site.end(), std::uint8_t{0});
-  for (const std::span<float>& zero : {samples.weight, samples.r, samples.g, samples.b}) {
-    std::fill(zero.begin(), zero.end(), 0.0f);
-  }
-  samples.lns = 0;
-}
-
 /// Makes candidate `pick` sample `j`.
 void take(const kernels::CandidateSet& from, std::size_t pick, std::size_t j, float weight,
           const PixelSamples& samples) {
@@ -43,6 +33,15 @@ bool settle_lns(float total, const PixelSamples& samples) {
 constexpr std::int32_t kMaxLobeCandidates = 64;
 
 }  // namespace
+
+void set_dark(const PixelSamples& samples) {
+  std::fill(samples.direction.begin(), samples.direction.end(), OctDirection{0});
+  std::fill(samples.site.begin(), samples.site.end(), std::uint8_t{0});
+  for (const std::span<float>& zero : {samples.weight, samples.r, samples.g, samples.b}) {
+    std::fill(zero.begin(), zero.end(), 0.0f);
+  }
+  samples.lns = 0;
+}
 
 CandidateCounts split_candidates(std::int32_t total, float brdf_fraction) {
   const auto from_bsdf =

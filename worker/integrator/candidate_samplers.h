@@ -13,6 +13,9 @@ CandidateCounts split_candidates(std::int32_t total, float brdf_fraction);
 /// proportion to what the pixel reflects there; 1: all from the whole BRDF.
 CandidateCounts candidate_counts(const SiteBlock& sites, std::int32_t total, float lobe_fraction);
 
+/// Makes a pixel one that no light reaches: no contribution, whatever the directions.
+void set_dark(const PixelSamples& samples);
+
 /// Every candidate is a sample: `environment`, `brdf` and, with both counts positive, `mis`
 /// (balance heuristic).
 class DirectSampler final : public PixelSampler {

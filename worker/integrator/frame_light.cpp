@@ -73,6 +73,8 @@ LightPoolLayout pool_layout(const JobSpec& job) {
       taken = fresh(spec.start_method);
       break;
     case Method::pool:
+    case Method::ratio:
+    case Method::restir:
       taken = spec.num_candidates;
       break;
     case Method::brdf:

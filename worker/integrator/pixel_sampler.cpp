@@ -3,6 +3,8 @@
 #include <cmath>
 
 #include "worker/integrator/pool_sampler.h"
+#include "worker/integrator/ratio_sampler.h"
+#include "worker/integrator/restir_sampler.h"
 #include "worker/integrator/sequential_sampler.h"
 
 namespace baton {
@@ -61,6 +63,10 @@ std::unique_ptr<const PixelSampler> make_pixel_sampler(const SamplingSpec& spec)
       return make_sequential_sampler(spec);
     case Method::pool:
       return std::make_unique<PoolSampler>(spec);
+    case Method::ratio:
+      return std::make_unique<RatioSampler>(spec);
+    case Method::restir:
+      return std::make_unique<RestirSampler>(spec);
   }
   return nullptr;
 }

@@ -6,10 +6,12 @@
 
 #include "common/job/job_spec.h"
 #include "common/state/sample_state.h"
+#include "worker/integrator/carried_set.h"
 #include "worker/integrator/frame_light.h"
 #include "worker/integrator/kernels.h"
 #include "worker/integrator/old_surfaces.h"
 #include "worker/integrator/pool_kernels.h"
+#include "worker/integrator/restir_kernels.h"
 
 namespace baton {
 
@@ -27,8 +29,10 @@ struct PixelInput {
   const OldSurfaces* old = nullptr;  ///< the surfaces of that set, where they are not `sites`
   /// That set in the maps, where it was looked up ahead; else null.
   const kernels::LocatedSpan* located = nullptr;
-  /// (kVisibilityCells) of the frames before, or empty; see chooses_rays()
+  /// (kVisibilityCells) of the frames before, or empty; see keeps_memory()
   std::span<const VisibilityCell> memory{};
+  /// What the neighbours that the pixel asks held in the frame before; at most kMaxNeighbors.
+  std::span<const CarriedSet> neighbors{};
 };
 
 /// The light of the pixel's two frames.
@@ -50,6 +54,7 @@ struct PixelSamples {
   float& lns;
   float& lns_fresh;
   PixelSource& source;
+  std::uint16_t* confidence = nullptr;  ///< SampleState::confidence; null where nobody asks
 };
 
 /// What a method says about its work on a pixel.
@@ -66,6 +71,7 @@ struct SamplerScratch {
   kernels::CandidateSet candidates;
   kernels::ChoiceScratch choice;
   kernels::PoolScratch pool;
+  kernels::RestirPoints restir;
   PixelRays rays;  ///< of the pixel, where the method chooses them apart from its samples
 };
 
@@ -81,9 +87,15 @@ class PixelSampler {
   /// (PixelInput::located).
   virtual bool evaluates_carried() const { return false; }
   /// Whether the method chooses its rays apart from its samples, which sample() then leaves in
-  /// SamplerScratch::rays, and is told in later frames what they found (PixelInput::memory). Else
-  /// its samples are its rays.
+  /// SamplerScratch::rays. Else its samples are its rays.
   virtual bool chooses_rays() const { return false; }
+  /// Whether a method that chooses its rays is told in later frames what they found
+  /// (PixelInput::memory).
+  virtual bool keeps_memory() const { return false; }
+  /// Whether the method weighs sets by their confidence (PixelSamples::confidence).
+  virtual bool asks_confidence() const { return false; }
+  /// Whether a sample whose ray was blocked is to be forgotten once it is traced.
+  virtual bool forgets_blocked() const { return false; }
 };
 
 /// The sampler of a job; null for Method::reference, which is no sampler of this kind

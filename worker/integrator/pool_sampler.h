@@ -14,6 +14,7 @@ class PoolSampler final : public PixelSampler {
   PixelDiagnostics sample(const PixelInput& input, SamplerScratch& scratch,
                           const PixelSamples& samples) const override;
   bool chooses_rays() const override { return true; }
+  bool keeps_memory() const override { return true; }
 
  private:
   std::int32_t num_candidates_;

@@ -17,7 +17,7 @@ ExtraSampler::ExtraSampler(const SecondPassWork& work)
 
 Rgb ExtraSampler::radiance(std::int32_t x, std::int32_t y, std::size_t fold) {
   const std::int32_t position = work_.surfaces.find(work_.masks.any.index(x, y));
-  gather_sites(work_.surfaces.hits(position));
+  work_.context.gather_sites(work_.surfaces.hits(position), sites_);
   const Rgb first = first_pass(work_.samples.find(x, y), fold);
   if (!work_.masks.of_fold[fold].at(x, y)) return first;
   draw(x, y, fold, work_.surfaces.hits(position));
@@ -26,18 +26,6 @@ Rgb ExtraSampler::radiance(std::int32_t x, std::int32_t y, std::size_t fold) {
       folds[fold].energy_scale / static_cast<float>(num_populations(work_.context.job));
   return (first + trace() * share) /
          static_cast<float>(1 + work_.context.job.visibility.partitions);
-}
-
-void ExtraSampler::gather_sites(std::span<const SurfaceHit> hits) {
-  sites_.clear(work_.context.job.image.sites);
-  for (std::size_t s = 0; s < hits.size(); ++s) {
-    if (hits[s].hit) {
-      sites_.add(static_cast<int>(s), hits[s].point,
-                 work_.context.scene->materials[hits[s].material]);
-    } else {
-      sites_.add_miss(static_cast<int>(s));
-    }
-  }
 }
 
 /// What the fold's own free samples say.

@@ -23,7 +23,6 @@ class ExtraSampler {
   double seconds_rays() const { return seconds_rays_; }
 
  private:
-  void gather_sites(std::span<const SurfaceHit> hits);
   Rgb first_pass(const SampleRegion::Place& pixel, std::size_t fold);
   void draw(std::int32_t x, std::int32_t y, std::size_t fold, std::span<const SurfaceHit> hits);
   Rgb trace();

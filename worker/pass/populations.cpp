@@ -47,7 +47,8 @@ PixelDiagnostics sample_populations(const PixelSampler& sampler, std::size_t num
          std::span(state.site).subspan(row * stride, n),
          std::span(state.weight).subspan(row * stride, n), std::span(colors.r).subspan(k * n, n),
          std::span(colors.g).subspan(k * n, n), std::span(colors.b).subspan(k * n, n),
-         state.lns[row], state.lns_fresh[row], state.source[row]});
+         state.lns[row], state.lns_fresh[row], state.source[row],
+         state.confidence.empty() ? nullptr : &state.confidence[row]});
     sum.ess += did.ess;
     sum.target_evaluations += did.target_evaluations;
     sum.local.proposed += did.local.proposed;

@@ -44,6 +44,17 @@ Result<std::shared_ptr<const RenderContext>> make_render_context(const JobSpec& 
   return std::shared_ptr<const RenderContext>(std::move(context));
 }
 
+void RenderContext::gather_sites(std::span<const SurfaceHit> hits, SiteBlock& sites) const {
+  sites.clear(static_cast<int>(hits.size()));
+  for (std::size_t s = 0; s < hits.size(); ++s) {
+    if (hits[s].hit) {
+      sites.add(static_cast<int>(s), hits[s].point, scene->materials[hits[s].material]);
+    } else {
+      sites.add_miss(static_cast<int>(s));
+    }
+  }
+}
+
 std::vector<std::string> repair_notes(const RenderContext& context) { return context.lights->repair_notes(); }
 
 std::string instruction_set() { return kernels::instruction_set(); }

@@ -30,6 +30,9 @@ class RenderContext {
   std::unique_ptr<const PixelSampler> sampler;  ///< null: reference
   std::vector<PixelSetting> own_settings;       ///< (materials); null: `sampler`
   std::unique_ptr<LightSequence> lights;
+
+  /// The surfaces of one pixel, which its sites hit, with their materials.
+  void gather_sites(std::span<const SurfaceHit> hits, SiteBlock& sites) const;
 };
 
 }  // namespace baton

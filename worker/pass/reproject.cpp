@@ -9,14 +9,6 @@
 namespace baton {
 namespace {
 
-/// The state that holds a pixel, or null.
-const SampleState* find_state(std::span<const StatePtr> states, std::int32_t x, std::int32_t y) {
-  const auto found = std::find_if(states.begin(), states.end(), [&](const StatePtr& state) {
-    return state->rect.contains(x, y);
-  });
-  return found == states.end() ? nullptr : found->get();
-}
-
 /// A hit of the object in front, drawn uniformly: an edge moves with what is in front of it. Null
 /// without hits.
 const SurfaceHit* draw_hit(std::span<const SurfaceHit> hits, const Rng& rng) {
@@ -34,7 +26,7 @@ const SurfaceHit* draw_hit(std::span<const SurfaceHit> hits, const Rng& rng) {
                         [&](const SurfaceHit& hit) { return in_front(hit) && k-- == 0; });
 }
 
-/// Copies all samples of a pixel, and its memory.
+/// Copies all that a pixel carries.
 void copy_pixel(const SampleState& from, std::size_t source, SampleState& to, std::size_t target) {
   const auto copy = [&](const auto& in, auto& out, std::int32_t per_pixel) {
     const auto count = static_cast<std::size_t>(per_pixel);
@@ -46,6 +38,7 @@ void copy_pixel(const SampleState& from, std::size_t source, SampleState& to, st
   copy(from.lns, to.lns, to.num_populations);
   copy(from.lns_fresh, to.lns_fresh, to.num_populations);
   if (!to.memory.empty()) copy(from.memory, to.memory, kMemoryCells);
+  if (!to.confidence.empty()) copy(from.confidence, to.confidence, 1);
 }
 
 }  // namespace
@@ -55,9 +48,11 @@ Reprojection::Reprojection(const RenderContext& context, const FrameGeometry& no
     : context_(context),
       now_(now),
       before_(before),
-      states_(states),
+      old_pixels_(context.job, before, states),
       cos_normal_tolerance_(std::cos(context.job.motion.normal_tolerance_deg * kPi / 180)),
-      still_camera_(now.pose.camera == before.pose.camera) {}
+      still_camera_(now.pose.camera == before.pose.camera) {
+  if (asks_neighbors(context.job.sampling)) neighborhood_.emplace(context, now, old_pixels_);
+}
 
 /// The pixel of the frame before in which the surface was; nullopt: outside the image or beyond
 /// reach.
@@ -73,13 +68,13 @@ std::optional<Reprojection::Position> Reprojection::find_source(std::span<const 
       carry_point(instance, before_.pose.instances[hit->instance], hit->point.position);
   const auto projected = before_.pose.camera.project(point);
   if (!projected) return std::nullopt;
-  const auto reach = static_cast<float>(history_reach_px(context_.job)) + 1;
+  const std::int32_t max_px = context_.job.motion.max_px;
+  const auto reach = static_cast<float>(max_px) + 1;
   const float dx = (*projected)[0] - static_cast<float>(pixel.x);
   const float dy = (*projected)[1] - static_cast<float>(pixel.y);
   if (!(std::fabs(dx) <= reach && std::fabs(dy) <= reach)) return std::nullopt;
   const Position source{static_cast<std::int32_t>(std::floor((*projected)[0])),
                         static_cast<std::int32_t>(std::floor((*projected)[1]))};
-  const std::int32_t max_px = history_reach_px(context_.job);
   const bool in_reach =
       std::abs(source.x - pixel.x) <= max_px && std::abs(source.y - pixel.y) <= max_px;
   const bool inside = source.x >= 0 && source.y >= 0 && source.x < context_.job.image.width &&
@@ -92,9 +87,9 @@ void Reprojection::look_up(const TileSurfaces& surfaces, std::size_t first, std:
                            std::int32_t frame) {
   const JobSpec& job = context_.job;
   slots_.assign(count, {});
-  rays_.clear();
+  old_pixels_.clear();
+  if (neighborhood_) neighborhood_->clear(count);
   for (std::size_t i = 0; i < count; ++i) {
-    // Find the old pixel.
     const auto width = static_cast<std::size_t>(surfaces.rect.width());
     const Position pixel{surfaces.rect.x0 + static_cast<std::int32_t>((first + i) % width),
                          surfaces.rect.y0 + static_cast<std::int32_t>((first + i) / width)};
@@ -106,21 +101,11 @@ void Reprojection::look_up(const TileSurfaces& surfaces, std::size_t first, std:
     const std::optional<Position> source =
         find_source(slot.hits, pixel, Rng(slot.key, PassId::reproject));
     if (!source) continue;
-    const SampleState* const state = find_state(states_, source->x, source->y);
-    if (state == nullptr) continue;
-    slot.index = static_cast<std::size_t>((source->y - state->rect.y0) * state->rect.width() +
-                                          source->x - state->rect.x0);
-    if (latest_source(*state, slot.index) == PixelSource::background) continue;
-
-    // Ask for what it saw.
-    slot.state = state;
     slot.same_pixel = source->x == pixel.x && source->y == pixel.y;
-    slot.first_hit = rays_.size();
-    append_primary_rays(job, before_, source->x, source->y, rays_);
+    slot.old = old_pixels_.ask(source->x, source->y);
+    if (neighborhood_) neighborhood_->look_up(i, slot.hits, slot.key, source->x, source->y);
   }
-  old_hits_.resize(rays_.size());
-  trace_primary_rays(job, before_, rays_, old_hits_);
-  num_rays_ += rays_.size();
+  old_pixels_.trace();
 }
 
 /// Whether a surface of now is one of then: the same object, the point of now on the tangent plane
@@ -186,7 +171,7 @@ std::uint8_t Reprojection::find_heir(std::span<const SurfaceHit> hits,
 /// Copies all samples, each to a site that inherits it.
 void Reprojection::copy_samples(const Slot& slot, const Inheritance& inheritance, std::size_t pixel,
                                 SampleState& state) const {
-  copy_pixel(*slot.state, slot.index, state, pixel);
+  copy_pixel(*slot.old->state, slot.old->index, state, pixel);
   const auto num_particles = static_cast<std::size_t>(state.num_particles);
   const Rng rng(slot.key, PassId::reproject);
   for (std::size_t j = 0; j < num_particles; ++j) {
@@ -200,13 +185,12 @@ void Reprojection::copy_samples(const Slot& slot, const Inheritance& inheritance
 PixelHistory Reprojection::take(std::size_t i, std::size_t pixel, SampleState& state,
                                 OldSurfaces& old) const {
   const Slot& slot = slots_[i];
-  if (slot.state == nullptr) return PixelHistory::none;
-  const std::span<const SurfaceHit> old_hits =
-      std::span(old_hits_).subspan(slot.first_hit, slot.hits.size());
+  if (!slot.old) return PixelHistory::none;
+  const std::span<const SurfaceHit> old_hits = old_pixels_.hits(*slot.old);
 
   // Where nothing has changed, everything stays as it is.
   if (slot.same_pixel && std::equal(old_hits.begin(), old_hits.end(), slot.hits.begin())) {
-    copy_pixel(*slot.state, slot.index, state, pixel);
+    copy_pixel(*slot.old->state, slot.old->index, state, pixel);
     return PixelHistory::same;
   }
 
@@ -225,6 +209,11 @@ PixelHistory Reprojection::take(std::size_t i, std::size_t pixel, SampleState& s
     old.log_share[t] = -std::log(static_cast<float>(inheritance->count[from]));
   }
   return PixelHistory::moved;
+}
+
+std::span<const CarriedSet> Reprojection::neighbors(std::size_t i) {
+  if (!neighborhood_) return {};
+  return neighborhood_->sets(i, slots_[i].hits);
 }
 
 }  // namespace baton

@@ -6,8 +6,9 @@
 
 #include "worker/accel/geometry_sequence.h"
 #include "worker/integrator/old_surfaces.h"
+#include "worker/pass/neighborhood.h"
+#include "worker/pass/old_pixels.h"
 #include "worker/pass/primary.h"
-#include "worker/pass/tile_renderer.h"
 
 namespace baton {
 
@@ -23,8 +24,8 @@ enum class PixelHistory {
 /// motion by fractions of a pixel is followed on average, goes back with its object and is
 /// projected by the camera of then. The samples of that pixel are taken when each site of now finds
 /// a site of then that saw the same object at about the same place and turned about the same way,
-/// and each of then is found; else there is no history. What the old pixel saw is traced again,
-/// exactly: states hold no surfaces.
+/// and each of then is found; else there is no history. Neighbours, where they are asked, are found
+/// around the same place.
 class Reprojection {
  public:
   /// states: of the frame before, of every tile within reach. All must outlive the object.
@@ -39,17 +40,18 @@ class Reprojection {
   /// `state`. `old` is filled for `moved`.
   PixelHistory take(std::size_t i, std::size_t pixel, SampleState& state, OldSurfaces& old) const;
 
+  /// What the neighbours of pixel first + i hold, until the next call.
+  std::span<const CarriedSet> neighbors(std::size_t i);
+
   /// Rays traced so far.
-  std::uint64_t num_rays() const { return num_rays_; }
+  std::uint64_t num_rays() const { return old_pixels_.num_rays(); }
 
  private:
   /// A pixel and where its history lies.
   struct Slot {
     std::span<const SurfaceHit> hits;  ///< what it sees now
     RngKey key;
-    const SampleState* state = nullptr;  ///< null: no history
-    std::size_t index = 0;               ///< pixel of `state`
-    std::size_t first_hit = 0;           ///< of its old sites, in old_hits_
+    std::optional<OldPixels::Place> old;  ///< none: no history
     bool same_pixel = false;
   };
   struct Position {
@@ -75,13 +77,11 @@ class Reprojection {
   const RenderContext& context_;
   const FrameGeometry& now_;
   const FrameGeometry& before_;
-  std::span<const StatePtr> states_;
+  OldPixels old_pixels_;
+  std::optional<Neighborhood> neighborhood_;  ///< where the job asks neighbours
   const float cos_normal_tolerance_;
   const bool still_camera_;
   std::vector<Slot> slots_;
-  std::vector<Ray> rays_;
-  std::vector<SurfaceHit> old_hits_;
-  std::uint64_t num_rays_ = 0;
 };
 
 }  // namespace baton

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "worker/integrator/reference.h"
+#include "worker/pass/blocked_samples.h"
 #include "worker/pass/cpu_clock.h"
 #include "worker/pass/pixel_books.h"
 
@@ -173,14 +174,7 @@ void TileFrameRenderer::sample(Batch& batch, const FrameLight& light, SampleStat
       batch.end_ray[i] = batch.rays.size();
       continue;
     }
-    sites.clear(surfaces_.num_sites);
-    for (std::size_t s = 0; s < hits.size(); ++s) {
-      if (hits[s].hit) {
-        sites.add(static_cast<int>(s), hits[s].point, context_.scene->materials[hits[s].material]);
-      } else {
-        sites.add_miss(static_cast<int>(s));
-      }
-    }
+    context_.gather_sites(hits, sites);
 
     // Sample as the pixel's material asks for, and cast the rays.
     const PixelSetting& own = context_.own_settings[first_surface(hits).material];
@@ -200,7 +194,9 @@ void TileFrameRenderer::sample(Batch& batch, const FrameLight& light, SampleStat
         .target_before = knows_targets_ ? targets_of(index, state) : std::span<float>(),
         .old = ahead.history == PixelHistory::moved ? &ahead.old : nullptr,
         .located = ahead.is_located ? &located : nullptr,
-        .memory = state.memory_of(index)};
+        .memory = state.memory_of(index),
+        .neighbors = reprojection_ != nullptr ? reprojection_->neighbors(i)
+                                              : std::span<const CarriedSet>()};
     const PixelDiagnostics did =
         sample_populations(sampler, n, input, index, *scratch_, state, colors);
     if (context_.sampler->chooses_rays()) {
@@ -318,11 +314,16 @@ void TileFrameRenderer::shade(Batch& batch, SampleState& state) {
   }
 }
 
-/// Tells the second pass and the pixel's memory what rays [first, end) of batch pixel `i` found.
+/// Tells the second pass, the pixel's memory and its samples what rays [first, end) of batch pixel
+/// `i` found.
 void TileFrameRenderer::remember(const Batch& batch, std::size_t i, std::size_t first,
                                  std::size_t end, SampleState& state) {
   const std::span<MemoryCell> memory = state.memory_of(batch.first + i);
   const bool collects = context_.job.visibility.correlated;
+  if (context_.sampler->forgets_blocked()) {
+    forget_blocked(batch.rays, first, end, static_cast<std::uint32_t>(i * batch.stride),
+                   batch.first + i, state);
+  }
   if (memory.empty() && !collects) return;
   const ShadowRays& rays = batch.rays.rays;
   for (std::size_t r = first; r < end; ++r) {

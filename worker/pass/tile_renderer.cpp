@@ -77,9 +77,9 @@ class TileWalk {
     return film;
   }
 
-  /// Renders one frame with surfaces of its own. previous: the states that history may come from,
-  /// or none.
-  Result<FilmTile> render_moving(const FrameSpec& frame, std::span<const StatePtr> previous) {
+  /// Renders one frame with surfaces of its own, its history taken from `previous`: the states of
+  /// all tiles that it may come from, or none.
+  Result<FilmTile> render_sharing(const FrameSpec& frame, std::span<const StatePtr> previous) {
     BATON_ASSIGN(const std::shared_ptr<const FrameLight> light, light_of(frame));
     BATON_ASSIGN(geometry_, context_.geometry->at(frame.index));
     BATON_ASSIGN(const std::shared_ptr<const FrameGeometry> before,
@@ -107,8 +107,9 @@ class TileWalk {
   void start_state() {
     state_.resize(rect_, num_carried_particles(context_.job.sampling),
                   num_populations(context_.job));
-    const bool chooses_rays = context_.sampler != nullptr && context_.sampler->chooses_rays();
-    if (chooses_rays && carries_state(context_.job)) state_.add_memory();
+    if (context_.sampler == nullptr || !carries_state(context_.job)) return;
+    if (context_.sampler->keeps_memory()) state_.add_memory();
+    if (context_.sampler->asks_confidence()) state_.add_confidence();
   }
   Result<std::shared_ptr<const FrameLight>> light_of(const FrameSpec& frame) {
     const CpuTimer timer(stats_.seconds_light);
@@ -138,16 +139,16 @@ Result<RenderStats> run_tile(const RenderContext& context, const TileRun& run,
                              std::stop_token stop) {
   const double start = thread_cpu_seconds();
   BATON_TRY(check_previous(context, run, previous));
-  const bool moving = moves(context.job);
+  const bool shares = shares_history(context.job);
   TileWalk walk(context, run);
-  if (!moving && !previous.empty()) walk.go_on_from(*previous.front());
+  if (!shares && !previous.empty()) walk.go_on_from(*previous.front());
 
   // Frame by frame.
   for (std::int32_t f = run.first_frame; f <= run.last_frame; ++f) {
     if (stop.stop_requested()) return Error{ErrorKind::cancelled, "stopped"};
     const FrameSpec& frame = context.frames[static_cast<std::size_t>(f)];
     BATON_ASSIGN(const FilmTile film,
-                 moving ? walk.render_moving(frame, previous) : walk.render_still(frame));
+                 shares ? walk.render_sharing(frame, previous) : walk.render_still(frame));
     BATON_TRY(sink.film(f, film));
     if (sink.diagnostics) sink.diagnostics({f, run.tile, walk.frame_sampling()});
     if (context.job.visibility.correlated) BATON_TRY(sink.samples(walk.take_first_pass()));

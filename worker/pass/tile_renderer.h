@@ -44,7 +44,7 @@ struct TileRunSink {
 using StatePtr = std::shared_ptr<const SampleState>;
 
 /// Renders one tile for the frames of `run`. previous: the states of frame run.first_frame - 1 of all tiles within
-/// history_reach_px (TileGrid::tiles_near, in that order; the tile's own where nothing moves), required exactly when
+/// history_reach_px (TileGrid::tiles_near, in that order; the tile's own where pixels keep to themselves), required exactly when
 /// the job carries state and the run is not the first. The bytes that reach the sink are a function of (job, run,
 /// previous) alone. Errors: a state of another job, tile or frame; cancelled when `stop` is requested; the sink's own.
 Result<RenderStats> run_tile(const RenderContext& context, const TileRun& run, std::span<const StatePtr> previous,

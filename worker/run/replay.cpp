@@ -123,13 +123,14 @@ Result<FirstPass> render_first_pass(const RenderContext& context, const JobSpec&
                                    std::make_shared<const FirstPassSamples>(std::move(samples));
                                return Status();
                              }};
-  // Carried samples depend on every frame before: where surfaces stay, of this tile alone.
-  const bool moving = moves(job);
+  // Carried samples depend on every frame before: where pixels keep to themselves, of this tile
+  // alone.
+  const bool shares = shares_history(job);
   std::vector<StatePtr> previous;
-  if (carries_state(job) && moving) {
+  if (carries_state(job) && shares) {
     BATON_ASSIGN(previous, render_history(context, job, frame_index, tile));
   }
-  const std::int32_t first_frame = carries_state(job) && !moving ? 0 : frame_index;
+  const std::int32_t first_frame = carries_state(job) && !shares ? 0 : frame_index;
   BATON_ASSIGN(pass.last.stats,
                run_tile(context, {tile, 0, first_frame, frame_index}, previous, sink, {}));
   return pass;

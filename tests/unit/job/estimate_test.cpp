@@ -29,10 +29,25 @@ TEST(Estimate, SizesStateOnlyWhereItIsCarried) {
   EXPECT_EQ(estimate_job(job).state_bytes, 153 * 5000);
   job.sampling.method = Method::pool;
   EXPECT_EQ(estimate_job(job).state_bytes_per_pixel, 9 + 516);
-  job.sampling.method = Method::sequential;
-  job.sampling.method = Method::bidirectional;
-  EXPECT_EQ(estimate_job(job).state_bytes, 0);
+  job.sampling.method = Method::restir;
+  EXPECT_EQ(estimate_job(job).state_bytes_per_pixel, 9 + 9 * 16 + 2);
+  for (const Method method : {Method::bidirectional, Method::ratio}) {
+    job.sampling.method = method;
+    EXPECT_EQ(estimate_job(job).state_bytes, 0);
+  }
   EXPECT_EQ(estimate_job(job).dependencies, 5 * 8);
+}
+
+// A pixel that asks its neighbours needs the tiles around it, frame by frame.
+TEST(Estimate, CountsTheTilesThatNeighborsLieIn) {
+  JobSpec job = small_job();
+  job.sampling.method = Method::restir;
+  job.sampling.num_neighbors = 1;
+  job.sampling.neighbor_radius = 32;
+  EXPECT_EQ(estimate_job(job).runs, 5);
+  EXPECT_EQ(estimate_job(job).dependencies, 5 * 8 + 4 * (2 * 2 * (2 + 3 + 3 + 2)));
+  job.sampling.method = Method::sequential;
+  EXPECT_EQ(estimate_job(job).runs, 3);
 }
 
 TEST(Estimate, AddsUpTheChannelsOfAFrame) {

@@ -153,6 +153,21 @@ TEST(JobJson, NamesPlaceAndExpectationOfEachKindOfFault) {
        "bidirectional, got \"pool\""},
       {R"("sampling": {"method": "mis", "byMaterial": {"a": {}}}, "visibility": {"correlated": true})",
        "$.visibility.correlated: expected false, as sampling.byMaterial is given, got true"},
+      {R"("sampling": {"method": "restir", "byMaterial": {"a": {}}})",
+       "$.sampling.byMaterial: expected none unless sampling.method is environment, brdf, mis or "
+       "bidirectional, got \"restir\""},
+      {R"("sampling": {"method": "restir"}, "visibility": {"correlated": true})",
+       "$.visibility.correlated: expected false, as sampling.method is restir, whose samples are "
+       "carried as one set, got true"},
+      {R"("sampling": {"method": "ratio"}, "visibility": {"correlated": true})",
+       "$.visibility.correlated: expected false, as the rays of sampling.method ratio are not its "
+       "samples, got true"},
+      {R"("sampling": {"historyLimit": 0})",
+       "$.sampling.historyLimit: expected an integer in [1, 1000], got 0"},
+      {R"("sampling": {"numNeighbors": 9})",
+       "$.sampling.numNeighbors: expected an integer in [0, 8], got 9"},
+      {R"("sampling": {"neighborRadius": 65})",
+       "$.sampling.neighborRadius: expected an integer in [1, 64], got 65"},
       {R"("sampling": {"refreshRatio": 1})",
        "$.sampling.refreshRatio: expected a number in (1, 1000000], got 1"},
       {R"("output": {"aovs": ["lns", "lns"]})",

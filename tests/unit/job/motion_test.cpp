@@ -97,6 +97,7 @@ TEST(Motion, SaysWhatMovesAndWhetherThatIsSettled) {
   EXPECT_TRUE(moves(job));
   EXPECT_TRUE(is_settled(job));
   EXPECT_EQ(history_reach_px(job), 7);
+  EXPECT_TRUE(shares_history(job));
   EXPECT_EQ(frames_per_run(job), 1);
   job.state.carry = false;
   EXPECT_EQ(frames_per_run(job), job.state.checkpoint_every);

@@ -316,6 +316,15 @@ TEST(SampleState, RemembersRays) {
   EXPECT_EQ(*decode_state(encode_state(state), "test"), state);
 }
 
+TEST(SampleState, KeepsConfidences) {
+  SampleState state = remembering_state();
+  state.memory.clear();
+  state.add_confidence();
+  state.confidence[1] = 1;
+  state.confidence[2] = 1000;
+  EXPECT_EQ(*decode_state(encode_state(state), "test"), state);
+}
+
 TEST(SampleState, NeedsNoParticlesBesideAMemory) {
   SampleState state = remembering_state();
   state.num_particles = 0;

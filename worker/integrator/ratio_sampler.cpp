@@ -1,0 +1,28 @@
+#include "worker/integrator/ratio_sampler.h"
+
+#include <cmath>
+
+#include "worker/integrator/candidate_samplers.h"
+#include "worker/integrator/ratio_kernels.h"
+
+namespace baton {
+
+RatioSampler::RatioSampler(const SamplingSpec& spec)
+    : num_candidates_(spec.num_candidates),
+      lobe_fraction_(spec.brdf_fraction),
+      num_rays_(spec.num_particles) {}
+
+PixelDiagnostics RatioSampler::sample(const PixelInput& input, SamplerScratch& scratch,
+                                      const PixelSamples& samples) const {
+  const float total = kernels::choose_ratio_rays(
+      input.sites, input.now, input.light.pool,
+      candidate_counts(input.sites, num_candidates_, lobe_fraction_),
+      Rng(input.key, PassId::candidates), Rng(input.key, PassId::choose).uniforms(0, 0)[0],
+      num_rays_, scratch.choice, scratch.rays);
+  samples.lns = samples.lns_fresh = total > 0 && std::isfinite(total) ? total : 0.0f;
+  samples.source = PixelSource::fresh;
+  return {.ess = samples.lns > 0 ? static_cast<float>(num_rays_) : 0.0f,
+          .target_evaluations = num_candidates_};
+}
+
+}  // namespace baton

@@ -1,0 +1,33 @@
+#pragma once
+
+#include "worker/integrator/kernels.h"
+#include "worker/sampling/restir.h"
+
+namespace baton::kernels {
+
+/// The samples of all sets of one pixel, set after set, and what they are worth.
+struct RestirPoints {
+  static constexpr std::size_t kCapacity = kMaxRestirSets * limits::kMaxParticles + kPadding;
+  alignas(64) OctDirection code[kCapacity];
+  alignas(64) std::uint8_t site[kCapacity];
+  alignas(64) float r[kCapacity], g[kCapacity], b[kCapacity];  ///< (f cos L)_rgb of now
+  alignas(64) float target_now[kCapacity];                     ///< p~, their mean
+  alignas(64) float target_before[kMaxRestirSets - 1][kCapacity];  ///< p~ of each carried set
+  alignas(64) float contribution[kCapacity];                       ///< u
+  alignas(64) float weight[kCapacity];
+};
+
+/// What is asked of the points [first, last).
+struct PointRange {
+  std::size_t first = 0, last = 0;
+  bool wants_now = false;     ///< colours and target of now
+  std::size_t first_old = 0;  ///< targets of the carried sets first_old, ...
+};
+
+/// Evaluates points under the surfaces and the light of now, and under those that the carried sets
+/// come from: the light of the frame before, and `old` surfaces by sites of this frame, null where
+/// they are `sites`. Codes and sites past the last point are read up to a vector's end.
+void evaluate_points(const SiteBlock& sites, std::span<const OldSurfaces* const> old,
+                     const CarriedLight& light, const PointRange& range, RestirPoints& points);
+
+}  // namespace baton::kernels
