@@ -147,8 +147,8 @@ void fields(JobArchive& a, VisibilitySpec& visibility, const SamplingSpec& sampl
             "true");
   }
   if (sampling.method == Method::restir) {
-    a.fault("correlated", "false, as sampling.method is restir, whose samples are carried as one set",
-            "true");
+    a.fault("correlated",
+            "false, as sampling.method is restir, whose samples are carried as one set", "true");
   }
   if (!sampling.by_material.empty()) {
     a.fault("correlated", "false, as sampling.byMaterial is given", "true");

@@ -81,8 +81,13 @@ def settings_by_material(programs, folder):
         check_equal(got, expected, f"pixels of {name}")
 
 
-def pool(programs, folder):
-    """The sampler with a memory, still and with a camera that moves."""
+def carrying(programs, folder):
+    """The sampler with a memory and the one that asks neighbours, still and with a camera that moves."""
+    for sampling in [{"method": "pool"}, {"method": "restir", "numNeighbors": 1, "neighborRadius": 5}]:
+        carrying_with(programs, folder / sampling["method"], sampling)
+
+
+def carrying_with(programs, folder, sampling):
     keys = [{"frame": 1, "position": [0, 1.2, 5], "lookAt": [0, 0.6, 0]},
             {"frame": 4, "position": [0.4, 1.3, 4.9], "lookAt": [0, 0.6, 0]}]
     for motion in ["still", "moving"]:
@@ -90,7 +95,7 @@ def pool(programs, folder):
         for name, workers, threads, tile_size in [("whole-image", 1, 2, 160), ("small-tiles", 2, 1, 16)]:
             place = folder / motion / name
             job = make_job(place, frames="1-4", image={"tileSize": tile_size, "sites": 4},
-                           sampling={"method": "pool"})
+                           sampling=dict(sampling))
             del job["sampling"]["numDistributions"]
             if motion == "moving":
                 job["camera"]["keys"] = keys
@@ -186,7 +191,7 @@ if __name__ == "__main__":
         four_sites,
         correlated_visibility,
         settings_by_material,
-        pool,
+        carrying,
         equal_jobs_make_equal_files,
         a_killed_worker,
         a_killed_coordinator,

@@ -41,8 +41,7 @@ HWY_INLINE void LookUpColors(const ChosenCandidates& chosen, const std::int32_t*
   for (std::size_t j = 0; j < count; j += hn::Lanes(d)) {
     const CandidateLanes c = chosen.Evaluate(hn::Load(DI(), picks + j));
     const Vec3Lanes w = DecodeOctahedral(c.code);
-    const Vec3Lanes color =
-        Scale(c.reflected, hn::Div(hn::Set(d, 1.0f), MeanLanes(c.reflected)));
+    const Vec3Lanes color = Scale(c.reflected, hn::Div(hn::Set(d, 1.0f), MeanLanes(c.reflected)));
     hn::Store(w.x, d, out.x + j);
     hn::Store(w.y, d, out.y + j);
     hn::Store(w.z, d, out.z + j);

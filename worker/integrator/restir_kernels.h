@@ -10,8 +10,8 @@ struct RestirPoints {
   static constexpr std::size_t kCapacity = kMaxRestirSets * limits::kMaxParticles + kPadding;
   alignas(64) OctDirection code[kCapacity];
   alignas(64) std::uint8_t site[kCapacity];
-  alignas(64) float r[kCapacity], g[kCapacity], b[kCapacity];  ///< (f cos L)_rgb of now
-  alignas(64) float target_now[kCapacity];                     ///< p~, their mean
+  alignas(64) float r[kCapacity], g[kCapacity], b[kCapacity];      ///< (f cos L)_rgb of now
+  alignas(64) float target_now[kCapacity];                         ///< p~, their mean
   alignas(64) float target_before[kMaxRestirSets - 1][kCapacity];  ///< p~ of each carried set
   alignas(64) float contribution[kCapacity];                       ///< u
   alignas(64) float weight[kCapacity];

@@ -160,8 +160,8 @@ PixelDiagnostics RestirSampler::sample(const PixelInput& input, SamplerScratch& 
   // Weigh them together and choose.
   diagnostics.target_evaluations += static_cast<std::int32_t>(
       evaluate(input, all, has_own, has_own && !input.target_before.empty(), points));
-  const double total = weigh_restir_sets(
-      all.sets(), points.contribution, points.target_now, std::span(points.weight).first(all.count()));
+  const double total = weigh_restir_sets(all.sets(), points.contribution, points.target_now,
+                                         std::span(points.weight).first(all.count()));
   *samples.confidence = next_confidence(all.sets(), history_limit_);
   samples.source = PixelSource::carried;
   const auto new_lns = static_cast<float>(total);

@@ -195,8 +195,8 @@ void TileFrameRenderer::sample(Batch& batch, const FrameLight& light, SampleStat
         .old = ahead.history == PixelHistory::moved ? &ahead.old : nullptr,
         .located = ahead.is_located ? &located : nullptr,
         .memory = state.memory_of(index),
-        .neighbors = reprojection_ != nullptr ? reprojection_->neighbors(i)
-                                              : std::span<const CarriedSet>()};
+        .neighbors =
+            reprojection_ != nullptr ? reprojection_->neighbors(i) : std::span<const CarriedSet>()};
     const PixelDiagnostics did =
         sample_populations(sampler, n, input, index, *scratch_, state, colors);
     if (context_.sampler->chooses_rays()) {

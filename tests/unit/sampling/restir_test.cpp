@@ -120,10 +120,12 @@ Target lobe(std::size_t centre, std::size_t dark) {
 
 /// Frame by frame: lobes that turn, and supports that grow from two states to all.
 Target pixel_target(int frame) {
-  return lobe(static_cast<std::size_t>(frame), static_cast<std::size_t>(std::max(6 - 2 * frame, 0)));
+  return lobe(static_cast<std::size_t>(frame),
+              static_cast<std::size_t>(std::max(6 - 2 * frame, 0)));
 }
 Target neighbor_target(int frame) {
-  return lobe(static_cast<std::size_t>(frame + 2), static_cast<std::size_t>(std::max(4 - frame, 0)));
+  return lobe(static_cast<std::size_t>(frame + 2),
+              static_cast<std::size_t>(std::max(4 - frame, 0)));
 }
 
 /// The largest |z| of the expected contribution at any state after `frames`.
@@ -182,7 +184,8 @@ TEST(Restir, PicksInProportionAndNeverWhatWeighsNothing) {
 }
 
 TEST(Restir, ConfidenceIsTheSumUpToTheLimit) {
-  const std::array<RestirSet, 3> sets{RestirSet{.confidence = 1}, {.confidence = 7}, {.confidence = 20}};
+  const std::array<RestirSet, 3> sets{
+      RestirSet{.confidence = 1}, {.confidence = 7}, {.confidence = 20}};
   EXPECT_EQ(next_confidence(sets, 1000), 28);
   EXPECT_EQ(next_confidence(sets, 20), 20);
 }
