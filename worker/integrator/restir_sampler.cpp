@@ -5,6 +5,7 @@
 #include <cmath>
 
 #include "common/base/check.h"
+#include "common/math/hilbert.h"
 
 namespace baton {
 namespace {
@@ -70,6 +71,45 @@ class SetGatherer {
   std::size_t num_sets_ = 0;
   std::size_t count_ = 0;
 };
+
+/// Places along a Hilbert curve through 64 x 64 cells of the lattice of directions.
+class DirectionCurve {
+ public:
+  DirectionCurve() {
+    for (std::uint32_t cell = 0; cell < place_.size(); ++cell) {
+      const std::uint32_t index =
+          hilbert_index(cell % kSide << kShift, cell / kSide << kShift) >> 2 * kShift;
+      place_[cell] = static_cast<std::uint16_t>(index);
+    }
+  }
+  std::uint32_t place(OctDirection code) const {
+    return place_[(code >> (16 + kShift)) * kSide + ((code & 0xFFFFu) >> kShift)];
+  }
+
+ private:
+  static constexpr std::uint32_t kBits = 6, kSide = 1u << kBits, kShift = 16 - kBits;
+  std::array<std::uint16_t, kSide * kSide> place_;
+};
+
+/// Chooses systematically along the curve of directions, not set after set: what is kept is spread
+/// over the reflected light, as fresh samples are.
+void pick_along_curve(const RestirPoints& points, std::size_t count, double total, float u,
+                      std::span<std::uint32_t> picks) {
+  static const DirectionCurve curve;
+  constexpr int kIndexBits = 12;
+  static_assert(RestirPoints::kCapacity <= 1u << kIndexBits);
+  std::array<std::uint32_t, RestirPoints::kCapacity> order;
+  for (std::uint32_t i = 0; i < count; ++i)
+    order[i] = curve.place(points.code[i]) << kIndexBits | i;
+  std::sort(order.begin(), order.begin() + static_cast<std::ptrdiff_t>(count));
+  std::array<float, RestirPoints::kCapacity> weight;
+  for (std::size_t k = 0; k < count; ++k) {
+    order[k] &= (1u << kIndexBits) - 1;
+    weight[k] = points.weight[order[k]];
+  }
+  pick_systematically(std::span(weight).first(count), total, u, picks);
+  for (std::uint32_t& pick : picks) pick = order[pick];
+}
 
 /// Makes points `picks` the samples of the pixel.
 void take(const RestirPoints& from, std::span<const std::uint32_t> picks,
@@ -172,9 +212,8 @@ PixelDiagnostics RestirSampler::sample(const PixelInput& input, SamplerScratch& 
     return diagnostics;
   }
   std::array<std::uint32_t, limits::kMaxParticles> picks;
-  pick_systematically(std::span(points.weight).first(all.count()), total,
-                      Rng(input.key, PassId::resample).uniforms(0, 0)[0],
-                      std::span(picks).first(n));
+  pick_along_curve(points, all.count(), total, Rng(input.key, PassId::resample).uniforms(0, 0)[0],
+                   std::span(picks).first(n));
   take(points, std::span(picks).first(n), samples);
   samples.lns = samples.lns_fresh = new_lns;
   diagnostics.ess = static_cast<float>(n);

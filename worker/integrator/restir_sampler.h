@@ -11,7 +11,8 @@ namespace baton {
 ///  - the set that the pixel carries, shifted by keeping its direction;
 ///  - the sets of neighbours, of the frame before as in the spatiotemporal pass of Wyman &
 ///    Panteleev [2021]: tiles of one frame need not wait for each other;
-///  - N samples chosen systematically from all of them, whose rays are all traced.
+///  - N samples chosen systematically from all of them, along a curve of directions; all their
+///    rays are traced.
 /// Unbiased, as targets carry no visibility: fresh samples reach wherever light does. With
 /// `reuse_visibility` blocked samples are forgotten, so a carried set stands for p~ V. While V
 /// stays that of the pixel, this is unbiased too: at a free direction the shares of all sets sum to

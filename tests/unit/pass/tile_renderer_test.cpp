@@ -6,8 +6,7 @@
 #include <cmath>
 #include <limits>
 
-#include "common/job/motion.h"
-#include "tests/support/small_scene.h"
+#include "tests/support/render_tiled.h"
 
 namespace baton {
 namespace {
@@ -16,62 +15,9 @@ using test::box_job;
 using test::channel;
 using test::frame_numbers;
 using test::render_tile;
+using test::render_tiled;
+using test::sequence_job;
 using testing::HasSubstr;
-
-JobSpec sequence_job(int frames) {
-  JobSpec job = box_job();
-  job.frames = frame_numbers(frames);
-  job.environment.rotation_deg_per_frame = 0.5;
-  job.image.sites = 4;
-  return job;
-}
-
-/// All films of a job cut into tiles of `tile_size` and runs of `run_length`, pasted together;
-/// states go through their file form between runs.
-std::vector<FilmTile> render_tiled(JobSpec job, int tile_size, int run_length) {
-  job.image.tile_size = tile_size;
-  job.state.checkpoint_every = run_length;
-  const auto context = load_render_context(job, Digest{1, 2});
-  EXPECT_TRUE(context.ok());
-  std::vector<FilmTile> images(job.frames.size());
-  const TileGrid grid(job.image);
-  std::vector<StatePtr> states(static_cast<std::size_t>(grid.count()));
-  for (std::int32_t run = 0; run < num_runs(job); ++run) {
-    std::vector<StatePtr> next(states.size());
-    for (std::int32_t tile = 0; tile < grid.count(); ++tile) {
-      std::vector<StatePtr> previous;
-      for (const std::int32_t near : grid.tiles_near(tile, history_reach_px(job))) {
-        if (run > 0 && carries_state(job))
-          previous.push_back(states[static_cast<std::size_t>(near)]);
-      }
-      const TileRunSink sink{
-          [&](int frame, const FilmTile& film) {
-            FilmTile& image = images[static_cast<std::size_t>(frame)];
-            image.rect = {0, 0, job.image.width, job.image.height};
-            image.channels = film.channels;
-            image.values.resize(image.channels.size() * image.num_pixels());
-            for (std::size_t c = 0; c < film.channels.size(); ++c) {
-              for (int y = film.rect.y0; y < film.rect.y1; ++y) {
-                const auto width = static_cast<std::size_t>(film.rect.width());
-                const float* row =
-                    film.plane(c) + static_cast<std::size_t>(y - film.rect.y0) * width;
-                std::copy_n(row, width, image.plane(c) + y * job.image.width + film.rect.x0);
-              }
-            }
-            return Status();
-          },
-          [&](const SampleState& s) {
-            next[static_cast<std::size_t>(tile)] =
-                std::make_shared<const SampleState>(*decode_state(encode_state(s), "test"));
-            return Status();
-          }};
-      const auto done = run_tile(**context, tile_run(job, tile, run), previous, sink, {});
-      EXPECT_TRUE(done.ok()) << (done.ok() ? "" : done.error().message);
-    }
-    states = std::move(next);
-  }
-  return images;
-}
 
 TEST(RunTile, SameBytesForAnyTilingAndAnyRunLength) {
   const JobSpec job = sequence_job(5);
@@ -151,67 +97,6 @@ TEST(RunTile, SameBytesForAnyTilingWhileCameraAndObjectsMove) {
     const std::vector<FilmTile> whole = render_tiled(job, 4096, 5);
     EXPECT_EQ(render_tiled(job, 8, 2), whole);
     EXPECT_EQ(render_tiled(job, 3, 1), whole);
-  }
-}
-
-/// The rival that carries: alone, with neighbours and with free samples only.
-JobSpec restir_job(int neighbors, bool reuse_visibility) {
-  JobSpec job = sequence_job(5);
-  job.sampling.method = Method::restir;
-  job.sampling.num_candidates = 32;
-  job.sampling.num_neighbors = neighbors;
-  job.sampling.neighbor_radius = 5;
-  job.sampling.reuse_visibility = reuse_visibility;
-  return job;
-}
-
-TEST(RunTile, SameBytesForAnyTilingAndAnyRunLengthWithRestir) {
-  for (const bool reuse_visibility : {false, true}) {
-    const JobSpec job = restir_job(0, reuse_visibility);
-    const std::vector<FilmTile> whole = render_tiled(job, 4096, 5);
-    EXPECT_EQ(render_tiled(job, 8, 5), whole);
-    EXPECT_EQ(render_tiled(job, 5, 2), whole);
-    EXPECT_EQ(render_tiled(job, 4096, 1), whole);
-  }
-}
-
-TEST(RunTile, SameBytesForAnyTilingWithNeighbors) {
-  for (const bool moving : {false, true}) {
-    JobSpec job = restir_job(2, moving);
-    if (moving) test::set_in_motion(job, true, true);
-    const std::vector<FilmTile> whole = render_tiled(job, 4096, 5);
-    EXPECT_EQ(render_tiled(job, 8, 2), whole);
-    EXPECT_EQ(render_tiled(job, 3, 1), whole);
-    job.sampling.num_neighbors = 1;
-    EXPECT_NE(render_tiled(job, 4096, 5), whole);
-  }
-}
-
-// Forgetting says nothing of the frame in which the ray was blocked.
-TEST(RunTile, FreeSamplesAloneAreCarriedOn) {
-  JobSpec job = restir_job(0, true);
-  const test::TileResult lit = render_tile(job);
-  job.sampling.reuse_visibility = false;
-  const test::TileResult all = render_tile(job);
-  EXPECT_EQ(lit.films[0], all.films[0]);
-  EXPECT_NE(lit.films[1], all.films[1]);
-  std::size_t forgotten = 0;
-  for (std::size_t j = 0; j < lit.state.weight.size(); ++j)
-    forgotten += lit.state.weight[j] == 0 && all.state.weight[j] > 0 ? 1 : 0;
-  EXPECT_GT(forgotten, 0u);
-  EXPECT_EQ(*decode_state(encode_state(lit.state), "test"), lit.state);
-}
-
-TEST(RunTile, ConfidenceGrowsByAFrameUpToTheLimit) {
-  JobSpec job = restir_job(0, false);
-  job.sampling.history_limit = 3;
-  for (const int frames : {1, 2, 5}) {
-    job.frames = frame_numbers(frames);
-    const SampleState state = render_tile(job).state;
-    for (std::size_t i = 0; i < state.num_pixels(); ++i) {
-      const bool seen = state.source[i] != PixelSource::background;
-      EXPECT_EQ(state.confidence[i], seen ? std::min(frames, 3) : 0);
-    }
   }
 }
 

@@ -1,0 +1,67 @@
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "common/job/motion.h"
+#include "tests/support/small_scene.h"
+
+namespace baton::test {
+
+/// box_job with four sites under a sky that turns.
+inline JobSpec sequence_job(int frames) {
+  JobSpec job = box_job();
+  job.frames = frame_numbers(frames);
+  job.environment.rotation_deg_per_frame = 0.5;
+  job.image.sites = 4;
+  return job;
+}
+
+/// All films of a job cut into tiles of `tile_size` and runs of `run_length`, pasted together;
+/// states go through their file form between runs.
+inline std::vector<FilmTile> render_tiled(JobSpec job, int tile_size, int run_length) {
+  job.image.tile_size = tile_size;
+  job.state.checkpoint_every = run_length;
+  const auto context = load_render_context(job, Digest{1, 2});
+  EXPECT_TRUE(context.ok());
+  std::vector<FilmTile> images(job.frames.size());
+  const TileGrid grid(job.image);
+  std::vector<StatePtr> states(static_cast<std::size_t>(grid.count()));
+  for (std::int32_t run = 0; run < num_runs(job); ++run) {
+    std::vector<StatePtr> next(states.size());
+    for (std::int32_t tile = 0; tile < grid.count(); ++tile) {
+      std::vector<StatePtr> previous;
+      for (const std::int32_t near : grid.tiles_near(tile, history_reach_px(job))) {
+        if (run > 0 && carries_state(job))
+          previous.push_back(states[static_cast<std::size_t>(near)]);
+      }
+      const TileRunSink sink{
+          [&](int frame, const FilmTile& film) {
+            FilmTile& image = images[static_cast<std::size_t>(frame)];
+            image.rect = {0, 0, job.image.width, job.image.height};
+            image.channels = film.channels;
+            image.values.resize(image.channels.size() * image.num_pixels());
+            for (std::size_t c = 0; c < film.channels.size(); ++c) {
+              for (int y = film.rect.y0; y < film.rect.y1; ++y) {
+                const auto width = static_cast<std::size_t>(film.rect.width());
+                const float* row =
+                    film.plane(c) + static_cast<std::size_t>(y - film.rect.y0) * width;
+                std::copy_n(row, width, image.plane(c) + y * job.image.width + film.rect.x0);
+              }
+            }
+            return Status();
+          },
+          [&](const SampleState& s) {
+            next[static_cast<std::size_t>(tile)] =
+                std::make_shared<const SampleState>(*decode_state(encode_state(s), "test"));
+            return Status();
+          }};
+      const auto done = run_tile(**context, tile_run(job, tile, run), previous, sink, {});
+      EXPECT_TRUE(done.ok()) << (done.ok() ? "" : done.error().message);
+    }
+    states = std::move(next);
+  }
+  return images;
+}
+
+}  // namespace baton::test
