@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Checks who includes whom, where third-party libraries appear, and a few rules of the house.
 
-usage: check_layers.py ROOT        print every violation as file:line: what, exit 1 when there is any
+usage: check_layers.py [ROOT]      print every violation as file:line: what, exit 1 when there is any
        check_layers.py --self-test plant one fault of each kind in a temporary tree and see it found
 """
 
@@ -175,13 +175,14 @@ def self_test():
 def main():
     if sys.argv[1:] == ["--self-test"]:
         return 1 if self_test() else 0
-    if len(sys.argv) != 2 or not Path(sys.argv[1]).is_dir():
+    root = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).resolve().parents[2]
+    if len(sys.argv) > 2 or not root.is_dir():
         print(__doc__, file=sys.stderr)
         return 64
     # The checker is trusted only as long as it finds what it must.
     if self_test():
         return 1
-    found = violations(Path(sys.argv[1]))
+    found = violations(root)
     for line in found:
         print(line)
     return 1 if found else 0
