@@ -23,6 +23,7 @@ namespace hn = hwy::HWY_NAMESPACE;
 using DF = hn::CappedTag<float, 8>;
 using DI = hn::RebindToSigned<DF>;
 using DU = hn::RebindToUnsigned<DF>;
+using DB = hn::Rebind<std::uint8_t, DF>;
 using VF = hn::Vec<DF>;
 using VI = hn::Vec<DI>;
 using VU = hn::Vec<DU>;
@@ -43,18 +44,30 @@ HWY_INLINE Vec3Lanes Add(const Vec3Lanes& a, const Vec3Lanes& b) {
 HWY_INLINE Vec3Lanes Select(MF mask, const Vec3Lanes& yes, const Vec3Lanes& no) {
   return {hn::IfThenElse(mask, yes.x, no.x), hn::IfThenElse(mask, yes.y, no.y), hn::IfThenElse(mask, yes.z, no.z)};
 }
-/// Up to a vector of floats from `array` at i, the rest zero; and back.
-HWY_INLINE VF LoadSome(std::span<const float> array, std::size_t i) {
-  const DF d;
-  HWY_ALIGN float in[hn::MaxLanes(DF())] = {};
-  std::copy_n(array.data() + i, std::min(array.size() - i, hn::Lanes(d)), in);
+/// Up to a vector from `array` at i, the rest zero; and back. Whole vectors, which most are, pass no
+/// memory in between: what is stored in pieces and loaded at once waits for the stores.
+template <class D>
+HWY_INLINE hn::Vec<D> LoadSome(D d, std::span<const hn::TFromD<D>> array, std::size_t i) {
+  if (i + hn::Lanes(d) <= array.size()) return hn::LoadU(d, array.data() + i);
+  HWY_ALIGN hn::TFromD<D> in[hn::MaxLanes(d)] = {};
+  std::copy_n(array.data() + i, array.size() - i, in);
   return hn::Load(d, in);
 }
-HWY_INLINE void StoreSome(VF value, std::span<float> array, std::size_t i) {
-  const DF d;
-  HWY_ALIGN float out[hn::MaxLanes(DF())];
+template <class D>
+HWY_INLINE void StoreSome(D d, hn::Vec<D> value, std::span<hn::TFromD<D>> array, std::size_t i) {
+  if (i + hn::Lanes(d) <= array.size()) return hn::StoreU(value, d, array.data() + i);
+  HWY_ALIGN hn::TFromD<D> out[hn::MaxLanes(d)];
   hn::Store(value, d, out);
-  std::copy_n(out, std::min(array.size() - i, hn::Lanes(d)), array.data() + i);
+  std::copy_n(out, array.size() - i, array.data() + i);
+}
+HWY_INLINE VF LoadSome(std::span<const float> array, std::size_t i) { return LoadSome(DF(), array, i); }
+HWY_INLINE void StoreSome(VF value, std::span<float> array, std::size_t i) { StoreSome(DF(), value, array, i); }
+/// Small numbers, such as sites, that are kept in bytes; and back.
+HWY_INLINE VI LoadBytes(std::span<const std::uint8_t> array, std::size_t i) {
+  return hn::PromoteTo(DI(), LoadSome(DB(), array, i));
+}
+HWY_INLINE void StoreBytes(VI value, std::span<std::uint8_t> array, std::size_t i) {
+  StoreSome(DB(), hn::DemoteTo(DB(), value), array, i);
 }
 /// Records of floats, one a lane of a vector.
 using Records = std::array<const float*, 8>;

@@ -9,6 +9,7 @@
 
 #include <hwy/highway.h>
 
+#include <algorithm>
 #include <cmath>
 
 #include "worker/integrator/candidates-inl.h"
@@ -171,12 +172,31 @@ class ChosenCandidates {
   const kernels::CandidateSet& from_bsdf_;
 };
 
+/// Candidates that were chosen, each once, in the order of the line.
+struct DistinctPicks {
+  static constexpr std::size_t kCapacity = limits::kMaxParticles + RunningSums::kGroup;
+  HWY_ALIGN std::int32_t pick[kCapacity];
+  HWY_ALIGN float times[kCapacity];
+  std::size_t count = 0;
+
+  /// picks: `chosen` of them, > 0, equal ones side by side.
+  DistinctPicks(const std::int32_t* picks, std::size_t chosen) {
+    for (std::size_t j = 0; j < chosen; ++j) {
+      const bool again = j > 0 && picks[j] == picks[j - 1];
+      count += again ? 0 : 1;
+      pick[count - 1] = picks[j];
+      times[count - 1] = again ? times[count - 1] + 1 : 1;
+    }
+    // Fill up the last vector with rays that bring nothing.
+    std::fill_n(pick + count, hn::MaxLanes(DF()), pick[0]);
+    std::fill_n(times + count, hn::MaxLanes(DF()), 0.0f);
+  }
+};
+
 inline float ChooseCandidates(const SiteBlock& sites, const EnvironmentView& environment,
                               const LightPool& pool, const kernels::CandidateCounts& counts,
                               const Rng& rng, float u, kernels::ChoiceScratch& scratch,
                               const kernels::SampleSpan& out) {
-  const DI di;
-  const DU du;
   const Philox4x32::Counter random = rng.bits(0, 0);
 
   // Weigh the candidates.
@@ -192,16 +212,9 @@ inline float ChooseCandidates(const SiteBlock& sites, const EnvironmentView& env
   HWY_ALIGN std::int32_t picks[limits::kMaxParticles + RunningSums::kGroup];
   SystematicPicks(sums, total, u, out.code.size(), picks);
   for (std::size_t j = 0; j < out.code.size(); j += hn::Lanes(DF())) {
-    const CandidateLanes c = chosen.Evaluate(hn::Load(di, picks + j));
-    HWY_ALIGN std::uint32_t code[hn::MaxLanes(DU())];
-    HWY_ALIGN std::int32_t site[hn::MaxLanes(DI())];
-    hn::Store(c.code, du, code);
-    hn::Store(c.site, di, site);
-    const std::size_t left = std::min(hn::Lanes(DF()), out.code.size() - j);
-    for (std::size_t lane = 0; lane < left; ++lane) {
-      out.code[j + lane] = code[lane];
-      out.site[j + lane] = static_cast<std::uint8_t>(site[lane]);
-    }
+    const CandidateLanes c = chosen.Evaluate(hn::Load(DI(), picks + j));
+    StoreSome(DU(), c.code, out.code, j);
+    StoreBytes(c.site, out.site, j);
     StoreSome(c.reflected.x, out.r, j);
     StoreSome(c.reflected.y, out.g, j);
     StoreSome(c.reflected.z, out.b, j);

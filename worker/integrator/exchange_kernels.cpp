@@ -90,10 +90,7 @@ void LookUpLights(const EnvironmentView& environment, std::span<const OctDirecti
     TexelLanes at[kVectors];
     const std::size_t vectors = std::min(kVectors, (code.size() - first + lanes - 1) / lanes);
     for (std::size_t v = 0; v < vectors; ++v) {
-      HWY_ALIGN std::uint32_t some[hn::MaxLanes(DU())] = {};
-      const std::size_t i = first + v * lanes;
-      std::copy_n(code.data() + i, std::min(lanes, code.size() - i), some);
-      w[v] = DecodeOctahedral(hn::Load(DU(), some));
+      w[v] = DecodeOctahedral(LoadSome(DU(), code, first + v * lanes));
       at[v] = LocateTexels(environment, w[v]);
       PrefetchTexels(environment, at[v]);
     }

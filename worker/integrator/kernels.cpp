@@ -18,29 +18,12 @@ namespace hn = hwy::HWY_NAMESPACE;
 
 void DecodeDirections(std::span<const OctDirection> code, std::span<float> x, std::span<float> y,
                       std::span<float> z) {
-  const DF d;
-  const DU du;
-  for (std::size_t i = 0; i < code.size(); i += hn::Lanes(d)) {
-    const std::size_t left = std::min(code.size() - i, hn::Lanes(d));
-    HWY_ALIGN std::uint32_t in[hn::MaxLanes(DU())] = {};
-    HWY_ALIGN float out[3][hn::MaxLanes(DF())];
-    std::copy_n(code.data() + i, left, in);
-    const Vec3Lanes w = DecodeOctahedral(hn::Load(du, in));
-    hn::Store(w.x, d, out[0]);
-    hn::Store(w.y, d, out[1]);
-    hn::Store(w.z, d, out[2]);
-    std::copy_n(out[0], left, x.data() + i);
-    std::copy_n(out[1], left, y.data() + i);
-    std::copy_n(out[2], left, z.data() + i);
+  for (std::size_t i = 0; i < code.size(); i += hn::Lanes(DF())) {
+    const Vec3Lanes w = DecodeOctahedral(LoadSome(DU(), code, i));
+    StoreSome(w.x, x, i);
+    StoreSome(w.y, y, i);
+    StoreSome(w.z, z, i);
   }
-}
-
-/// Up to a vector of sites from `array` at i, the rest zero.
-HWY_INLINE VI LoadSomeSites(std::span<const std::int32_t> array, std::size_t i) {
-  const DI di;
-  HWY_ALIGN std::int32_t in[hn::MaxLanes(DI())] = {};
-  std::copy_n(array.data() + i, std::min(array.size() - i, hn::Lanes(di)), in);
-  return hn::Load(di, in);
 }
 
 void EvaluateEnvironmentSpans(const EnvironmentView& view, std::span<const float> x,
@@ -63,7 +46,7 @@ void EvaluateBsdfSpans(const SiteBlock& sites, std::span<const std::int32_t> sit
                        std::span<float> pdf) {
   const VF one = hn::Set(DF(), 1.0f);
   for (std::size_t i = 0; i < x.size(); i += hn::Lanes(DF())) {
-    const SurfaceLanes surface = LoadSurfaces(sites, LoadSomeSites(site, i));
+    const SurfaceLanes surface = LoadSurfaces(sites, LoadSome(DI(), site, i));
     const BsdfLanes f = EvaluateBsdf(surface, {LoadSome(x, i), LoadSome(y, i), LoadSome(z, i)});
     const Vec3Lanes reflected = ReflectedRadiance(surface, f, one, one, one);
     StoreSome(reflected.x, r, i);
@@ -77,7 +60,7 @@ void SampleBsdfSpans(const SiteBlock& sites, std::span<const std::int32_t> site,
                      std::span<const float> u0, std::span<const float> u1, std::span<float> x,
                      std::span<float> y, std::span<float> z) {
   for (std::size_t i = 0; i < u0.size(); i += hn::Lanes(DF())) {
-    const SurfaceLanes surface = LoadSurfaces(sites, LoadSomeSites(site, i));
+    const SurfaceLanes surface = LoadSurfaces(sites, LoadSome(DI(), site, i));
     const Vec3Lanes w =
         SampleBsdf(surface, surface.specular_probability, LoadSome(u0, i), LoadSome(u1, i));
     StoreSome(w.x, x, i);
@@ -104,18 +87,9 @@ void ShadeSamples(const SiteBlock& sites, const EnvironmentView& environment,
                   std::span<const OctDirection> code, std::span<const std::uint8_t> site,
                   kernels::ShadedSamples& out) {
   const DF d;
-  const DI di;
-  const DU du;
   for (std::size_t i = 0; i < code.size(); i += hn::Lanes(d)) {
-    HWY_ALIGN std::uint32_t codes[hn::MaxLanes(DU())] = {};
-    HWY_ALIGN std::int32_t site_of[hn::MaxLanes(DI())] = {};
-    const std::size_t left = std::min(code.size() - i, hn::Lanes(d));
-    for (std::size_t lane = 0; lane < left; ++lane) {
-      codes[lane] = code[i + lane];
-      site_of[lane] = site[i + lane];
-    }
-    const Vec3Lanes w = DecodeOctahedral(hn::Load(du, codes));
-    const SurfaceLanes surface = LoadSurfaces(sites, hn::Load(di, site_of));
+    const Vec3Lanes w = DecodeOctahedral(LoadSome(DU(), code, i));
+    const SurfaceLanes surface = LoadSurfaces(sites, LoadBytes(site, i));
     const BsdfLanes f = EvaluateBsdf(surface, w);
     const RadianceLanes light = EvaluateEnvironment(environment, w);
     const Vec3Lanes reflected = ReflectedRadiance(surface, f, light.r, light.g, light.b);

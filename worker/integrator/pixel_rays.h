@@ -1,6 +1,5 @@
 #pragma once
 
-#include <array>
 #include <cstddef>
 #include <cstdint>
 
@@ -18,12 +17,14 @@ struct PixelRays {
     Rgb color;
     float visibility = 0;
   };
-  static constexpr std::size_t kCapacity = limits::kMaxParticles;
+  /// Arrays are written in whole vectors.
+  static constexpr std::size_t kCapacity = limits::kMaxParticles + 16;
   std::size_t count = 0;
-  std::array<Vec3, kCapacity> direction;
-  std::array<std::uint8_t, kCapacity> site;
-  std::array<std::uint8_t, kCapacity> bin;  ///< of the pixel's memory, visibility_bin()
-  std::array<Value, kCapacity> value;
+  alignas(64) float x[kCapacity], y[kCapacity], z[kCapacity];  ///< unit directions
+  alignas(64) float r[kCapacity], g[kCapacity], b[kCapacity];  ///< what a free ray brings
+  alignas(64) float visibility[kCapacity];                     ///< and its share of Lns
+  alignas(64) std::uint8_t site[kCapacity];
+  alignas(64) std::uint8_t bin[kCapacity];  ///< of the pixel's memory, visibility_bin()
   Value constant;
   /// What the even ones of all samples brought to `constant` more than the odd ones. With the
   /// values of the rays, of alternating sign, it tells two interleaved halves of the pixel apart.
@@ -33,12 +34,6 @@ struct PixelRays {
     count = 0;
     constant = {};
     difference = {};
-  }
-  void push(const Vec3& w, std::uint8_t s, std::uint8_t b, const Value& v) {
-    direction[count] = w;
-    site[count] = s;
-    bin[count] = b;
-    value[count++] = v;
   }
 };
 

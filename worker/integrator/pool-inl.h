@@ -10,6 +10,8 @@
 
 #include <hwy/highway.h>
 
+#include <algorithm>
+
 #include "worker/integrator/choice-inl.h"
 #include "worker/integrator/pool_kernels.h"
 #include "worker/sampling/pool.h"
@@ -25,6 +27,11 @@ HWY_INLINE VI VisibilityBins(VU code) {
   const VU across = hn::And(hn::ShiftRight<12>(code), hn::Set(du, 0x0F));
   const VU down = hn::And(hn::ShiftRight<24>(code), hn::Set(du, 0xF0));
   return hn::BitCast(DI(), hn::Or(across, down));
+}
+
+HWY_INLINE Rgb SumOfLanes(const Vec3Lanes& v) {
+  const auto sum = [](VF x) HWY_ATTR { return hn::GetLane(hn::SumOfLanes(DF(), x)); };
+  return {sum(v.x), sum(v.y), sum(v.z)};
 }
 
 /// A pixel's memory: the estimated share of free rays per lane, as free_share().
@@ -103,65 +110,48 @@ struct RayPlan {
   std::int32_t count;
 };
 
-/// What is looked up of the chosen candidates, lane after lane.
-struct ChosenRays {
-  static constexpr std::size_t kCapacity = limits::kMaxParticles + hn::MaxLanes(DF());
-  HWY_ALIGN float x[kCapacity], y[kCapacity], z[kCapacity];
-  HWY_ALIGN float r[kCapacity], g[kCapacity], b[kCapacity];  ///< contribution of one pick, if free
-  HWY_ALIGN float light[kCapacity];                          ///< its part of Lns
-  HWY_ALIGN float free[kCapacity];                           ///< V^
-  HWY_ALIGN std::int32_t site[kCapacity];
-  HWY_ALIGN std::int32_t bin[kCapacity];
-};
-
-/// Looks up the candidates `picks` and what each contributes: as it was chosen with probability
-/// proportional to w times a factor, w cancels.
+/// Looks up the rays and what each brings: as a candidate was chosen with probability proportional
+/// to w times a factor, w cancels. With the control variate, less what was expected of them. Rays
+/// are of the even and the odd half in turn.
 HWY_INLINE void LookUpRays(const ChosenCandidates& chosen, const RayPlan& plan,
-                           const std::int32_t* picks, const float* free, ChosenRays& out) {
+                           const DistinctPicks& picks, const float* free, float lns,
+                           PixelRays& out) {
   const DF d;
   const DI di;
   const VF per_pick = hn::Set(d, plan.total / static_cast<float>(plan.count));
-  for (std::size_t j = 0; j < static_cast<std::size_t>(plan.count); j += hn::Lanes(d)) {
-    const VI pick = hn::Load(di, picks + j);
+  const VF per_light = hn::Set(d, 1 / lns);
+  const VI odd = hn::And(hn::Iota(di, 0), hn::Set(di, 1));
+  const VF half = hn::ConvertTo(d, hn::Sub(hn::Set(di, 1), hn::Add(odd, odd)));  // 1, -1, 1, ...
+  Vec3Lanes expected{hn::Zero(d), hn::Zero(d), hn::Zero(d)}, difference = expected;
+  VF expected_share = hn::Zero(d);
+  for (std::size_t j = 0; j < picks.count; j += hn::Lanes(d)) {
+    const VI pick = hn::Load(di, picks.pick + j);
     const CandidateLanes c = chosen.Evaluate(pick);
     const Vec3Lanes w = DecodeOctahedral(c.code);
     const VF seen = hn::GatherIndex(d, free, pick);
-    const VF light = hn::Div(per_pick, plan.control ? DoubtFactor(seen) : HopeFactor(seen));
-    const VF scale = hn::Div(light, MeanLanes(c.reflected));
+    const VF light = hn::Div(hn::Mul(per_pick, hn::Load(d, picks.times + j)),
+                             plan.control ? DoubtFactor(seen) : HopeFactor(seen));
+    const Vec3Lanes color = Scale(c.reflected, hn::Div(light, MeanLanes(c.reflected)));
+    const VF share = hn::Mul(light, per_light);
     hn::Store(w.x, d, out.x + j);
     hn::Store(w.y, d, out.y + j);
     hn::Store(w.z, d, out.z + j);
-    hn::Store(hn::Mul(c.reflected.x, scale), d, out.r + j);
-    hn::Store(hn::Mul(c.reflected.y, scale), d, out.g + j);
-    hn::Store(hn::Mul(c.reflected.z, scale), d, out.b + j);
-    hn::Store(light, d, out.light + j);
-    hn::Store(seen, d, out.free + j);
-    hn::Store(c.site, di, out.site + j);
-    hn::Store(VisibilityBins(c.code), di, out.bin + j);
+    hn::Store(color.x, d, out.r + j);
+    hn::Store(color.y, d, out.g + j);
+    hn::Store(color.z, d, out.b + j);
+    hn::Store(share, d, out.visibility + j);
+    hn::StoreU(hn::DemoteTo(DB(), c.site), DB(), out.site + j);
+    hn::StoreU(hn::DemoteTo(DB(), VisibilityBins(c.code)), DB(), out.bin + j);
+    const Vec3Lanes sure = Scale(color, seen);
+    expected = HWY_NAMESPACE::Add(expected, sure);
+    difference = HWY_NAMESPACE::Add(difference, Scale(sure, half));
+    expected_share = hn::MulAdd(share, seen, expected_share);
   }
-}
-
-/// Hands out the rays, each once; with the control variate, less what was expected of them. Rays
-/// are of the even and the odd half in turn.
-inline void PushRays(const RayPlan& plan, const std::int32_t* picks, const ChosenRays& chosen,
-                     float lns, PixelRays& out) {
-  const auto count = static_cast<std::size_t>(plan.count);
-  for (std::size_t j = 0; j < count;) {
-    const std::size_t first = j;
-    while (j < count && picks[j] == picks[first]) ++j;
-    const auto times = static_cast<float>(j - first);
-    const Rgb color = Rgb{chosen.r[first], chosen.g[first], chosen.b[first]} * times;
-    const float visibility = chosen.light[first] * times / lns;
-    if (plan.control) {
-      const Rgb expected = color * chosen.free[first];
-      out.constant.color += expected * -1.0f;
-      out.constant.visibility -= visibility * chosen.free[first];
-      out.difference += expected * (out.count % 2 == 0 ? -1.0f : 1.0f);
-    }
-    out.push({chosen.x[first], chosen.y[first], chosen.z[first]},
-             static_cast<std::uint8_t>(chosen.site[first]),
-             static_cast<std::uint8_t>(chosen.bin[first]), {color, visibility});
-  }
+  out.count = picks.count;
+  if (!plan.control) return;
+  out.constant.color += SumOfLanes(expected) * -1.0f;
+  out.constant.visibility -= hn::GetLane(hn::SumOfLanes(d, expected_share));
+  out.difference += SumOfLanes(difference) * -1.0f;
 }
 
 inline float ChoosePoolRays(const SiteBlock& sites, const EnvironmentView& environment,
@@ -171,7 +161,6 @@ inline float ChoosePoolRays(const SiteBlock& sites, const EnvironmentView& envir
                             PixelRays& out) {
   const DF d;
   const auto sum = [&](VF v) HWY_ATTR { return hn::GetLane(hn::SumOfLanes(d, v)); };
-  const auto color = [&](const Vec3Lanes& v) HWY_ATTR { return Rgb{sum(v.x), sum(v.y), sum(v.z)}; };
   const Philox4x32::Counter random = rng.bits(0, 0);
 
   // Weigh the candidates.
@@ -190,16 +179,14 @@ inline float ChoosePoolRays(const SiteBlock& sites, const EnvironmentView& envir
   const auto most = static_cast<std::int32_t>(limits::kMaxParticles);
   const RayPlan plan{control ? doubt : hope, control ? in_doubt : hope.Finish(), control,
                      knows ? rays_for_doubt(num_rays, in_doubt, lns, most) : num_rays};
-  out.difference = color(lines.difference);
-  if (control) out.constant = {color(lines.visible), sum(lines.expected) / lns};
+  out.difference = SumOfLanes(lines.difference);
+  if (control) out.constant = {SumOfLanes(lines.visible), sum(lines.expected) / lns};
 
   // Choose them.
   HWY_ALIGN std::int32_t picks[limits::kMaxParticles + RunningSums::kGroup];
   SystematicPicks(plan.line, plan.total, u, static_cast<std::size_t>(plan.count), picks);
-  ChosenRays chosen;
-  LookUpRays(ChosenCandidates(sites, pool, counts, random, scratch.from_bsdf), plan, picks,
-             scratch.free, chosen);
-  PushRays(plan, picks, chosen, lns, out);
+  LookUpRays(ChosenCandidates(sites, pool, counts, random, scratch.from_bsdf), plan,
+             DistinctPicks(picks, static_cast<std::size_t>(plan.count)), scratch.free, lns, out);
   return lns;
 }
 

@@ -27,54 +27,45 @@ struct ColorLine {
   }
 };
 
-/// Colours of the chosen candidates, lane after lane.
-struct ChosenColors {
-  static constexpr std::size_t kCapacity = limits::kMaxParticles + hn::MaxLanes(DF());
-  HWY_ALIGN float x[kCapacity], y[kCapacity], z[kCapacity];
-  HWY_ALIGN float r[kCapacity], g[kCapacity], b[kCapacity];  ///< (f cos L) / p~
-  HWY_ALIGN std::int32_t site[kCapacity];
-};
-
-HWY_INLINE void LookUpColors(const ChosenCandidates& chosen, const std::int32_t* picks,
-                             std::size_t count, ChosenColors& out) {
+/// Looks up the rays and what each brings. reflected: of all candidates.
+HWY_INLINE void LookUpShares(const ChosenCandidates& chosen, const DistinctPicks& picks,
+                             const Vec3Lanes& reflected, float num_rays, PixelRays& out) {
   const DF d;
-  for (std::size_t j = 0; j < count; j += hn::Lanes(d)) {
-    const CandidateLanes c = chosen.Evaluate(hn::Load(DI(), picks + j));
+  Vec3Lanes sum{hn::Zero(d), hn::Zero(d), hn::Zero(d)};
+  for (std::size_t j = 0; j < picks.count; j += hn::Lanes(d)) {
+    const CandidateLanes c = chosen.Evaluate(hn::Load(DI(), picks.pick + j));
     const Vec3Lanes w = DecodeOctahedral(c.code);
-    const Vec3Lanes color = Scale(c.reflected, hn::Div(hn::Set(d, 1.0f), MeanLanes(c.reflected)));
+    const VF times = hn::Load(d, picks.times + j);
+    const Vec3Lanes color = Scale(c.reflected, hn::Div(times, MeanLanes(c.reflected)));
+    sum = HWY_NAMESPACE::Add(sum, color);
     hn::Store(w.x, d, out.x + j);
     hn::Store(w.y, d, out.y + j);
     hn::Store(w.z, d, out.z + j);
     hn::Store(color.x, d, out.r + j);
     hn::Store(color.y, d, out.g + j);
     hn::Store(color.z, d, out.b + j);
-    hn::Store(c.site, DI(), out.site + j);
+    hn::Store(hn::Div(times, hn::Set(d, num_rays)), d, out.visibility + j);
+    hn::StoreU(hn::DemoteTo(DB(), c.site), DB(), out.site + j);
   }
-}
+  out.count = picks.count;
+  std::fill_n(out.bin, picks.count, std::uint8_t{0});
 
-/// Hands out the rays, each once. reflected: of all candidates.
-inline void PushShares(const std::int32_t* picks, std::size_t count, const ChosenColors& chosen,
-                       const Rgb& reflected, PixelRays& out) {
-  Rgb sum;
-  for (std::size_t j = 0; j < count; ++j) sum += Rgb{chosen.r[j], chosen.g[j], chosen.b[j]};
-  const auto over = [](float a, float b) { return b > 0 ? a / b : 0.0f; };
-  const Rgb scale{over(reflected.x, sum.x), over(reflected.y, sum.y), over(reflected.z, sum.z)};
-  for (std::size_t j = 0; j < count;) {
-    const std::size_t first = j;
-    while (j < count && picks[j] == picks[first]) ++j;
-    const auto times = static_cast<float>(j - first);
-    const Rgb color = Rgb{chosen.r[first], chosen.g[first], chosen.b[first]} * scale * times;
-    out.push({chosen.x[first], chosen.y[first], chosen.z[first]},
-             static_cast<std::uint8_t>(chosen.site[first]), 0,
-             {color, times / static_cast<float>(count)});
-  }
+  // Scale them to what all candidates reflect, channel by channel.
+  const auto scale = [&](VF all, VF chosen_ones, float* column) HWY_ATTR {
+    const float a = hn::GetLane(hn::SumOfLanes(d, all));
+    const float b = hn::GetLane(hn::SumOfLanes(d, chosen_ones));
+    const float factor = b > 0 ? a / b : 0.0f;
+    for (std::size_t j = 0; j < picks.count; ++j) column[j] *= factor;
+  };
+  scale(reflected.x, sum.x, out.r);
+  scale(reflected.y, sum.y, out.g);
+  scale(reflected.z, sum.z, out.b);
 }
 
 inline float ChooseRatioRays(const SiteBlock& sites, const EnvironmentView& environment,
                              const LightPool& pool, const kernels::CandidateCounts& counts,
                              const Rng& rng, float u, std::int32_t num_rays,
                              kernels::ChoiceScratch& scratch, PixelRays& out) {
-  const DF d;
   const Philox4x32::Counter random = rng.bits(0, 0);
 
   // Weigh the candidates.
@@ -89,12 +80,8 @@ inline float ChooseRatioRays(const SiteBlock& sites, const EnvironmentView& envi
   const auto count = static_cast<std::size_t>(num_rays);
   HWY_ALIGN std::int32_t picks[limits::kMaxParticles + RunningSums::kGroup];
   SystematicPicks(sums, total, u, count, picks);
-  ChosenColors chosen;
-  LookUpColors(ChosenCandidates(sites, pool, counts, random, scratch.from_bsdf), picks, count,
-               chosen);
-  const auto sum = [&](VF v) HWY_ATTR { return hn::GetLane(hn::SumOfLanes(d, v)); };
-  PushShares(picks, count, chosen,
-             {sum(line.reflected.x), sum(line.reflected.y), sum(line.reflected.z)}, out);
+  LookUpShares(ChosenCandidates(sites, pool, counts, random, scratch.from_bsdf),
+               DistinctPicks(picks, count), line.reflected, static_cast<float>(num_rays), out);
   return total;
 }
 

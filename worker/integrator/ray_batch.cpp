@@ -24,29 +24,47 @@ struct SampleLanes {
   Vec3Lanes reflected;
 };
 HWY_INLINE SampleLanes LoadSamples(const CastSamples& in, std::size_t i) {
+  const std::size_t n = in.weight.size();
+  const auto color = [&](const float* c) HWY_ATTR { return LoadSome(std::span(c, n), i); };
+  return {LoadSome(DU(), in.direction, i),
+          LoadBytes(in.site, i),
+          LoadSome(in.weight, i),
+          {color(in.r), color(in.g), color(in.b)}};
+}
+
+HWY_INLINE Vec3Lanes OriginsOf(const SiteOrigins& origins, VI site) {
   const DF d;
-  const DI di;
-  const DU du;
-  const std::size_t left = std::min(in.weight.size() - i, hn::Lanes(d));
-  HWY_ALIGN std::int32_t site[hn::MaxLanes(DI())] = {};
-  for (std::size_t lane = 0; lane < left; ++lane) site[lane] = in.site[i + lane];
-  if (left == hn::Lanes(d)) {
-    return {hn::LoadU(du, in.direction.data() + i),
-            hn::Load(di, site),
-            hn::LoadU(d, in.weight.data() + i),
-            {hn::LoadU(d, in.r + i), hn::LoadU(d, in.g + i), hn::LoadU(d, in.b + i)}};
+  if (origins.num_sites == 1) {
+    return {hn::Set(d, origins.x[0]), hn::Set(d, origins.y[0]), hn::Set(d, origins.z[0])};
   }
-  HWY_ALIGN OctDirection code[hn::MaxLanes(DU())] = {};
-  HWY_ALIGN float part[4][hn::MaxLanes(DF())] = {};
-  std::copy_n(in.direction.data() + i, left, code);
-  std::copy_n(in.weight.data() + i, left, part[0]);
-  std::copy_n(in.r + i, left, part[1]);
-  std::copy_n(in.g + i, left, part[2]);
-  std::copy_n(in.b + i, left, part[3]);
-  return {hn::Load(du, code),
-          hn::Load(di, site),
-          hn::Load(d, part[0]),
-          {hn::Load(d, part[1]), hn::Load(d, part[2]), hn::Load(d, part[3])}};
+  return {LookUp(origins.x, site, origins.num_sites), LookUp(origins.y, site, origins.num_sites),
+          LookUp(origins.z, site, origins.num_sites)};
+}
+
+void CastPixelRays(const PixelRays& in, const SiteOrigins& origins, std::uint32_t first_sample,
+                   RayBatch& batch) {
+  const DF d;
+  const DU du;
+  const std::size_t first = batch.size();
+  ShadowRays& rays = batch.rays;
+  for (std::size_t i = 0; i < in.count; i += hn::Lanes(d)) {
+    const auto put = [&](VF value, std::vector<float>& column)
+                         HWY_ATTR { hn::StoreU(value, d, column.data() + first + i); };
+    const Vec3Lanes from = OriginsOf(origins, hn::PromoteTo(DI(), hn::LoadU(DB(), in.site + i)));
+    put(from.x, rays.origin_x);
+    put(from.y, rays.origin_y);
+    put(from.z, rays.origin_z);
+    put(hn::Load(d, in.x + i), rays.direction_x);
+    put(hn::Load(d, in.y + i), rays.direction_y);
+    put(hn::Load(d, in.z + i), rays.direction_z);
+    put(hn::Load(d, in.r + i), batch.r);
+    put(hn::Load(d, in.g + i), batch.g);
+    put(hn::Load(d, in.b + i), batch.b);
+    put(hn::Load(d, in.visibility + i), batch.visibility);
+    const VU number = hn::Iota(du, first_sample + static_cast<std::uint32_t>(i));
+    hn::StoreU(number, du, batch.sample.data() + first + i);
+  }
+  rays.extend(first + in.count);
 }
 
 void CastRays(const CastSamples& in, const SiteOrigins& origins, RayBatch& batch,
@@ -65,10 +83,7 @@ void CastRays(const CastSamples& in, const SiteOrigins& origins, RayBatch& batch
     const VF factor = hn::IfThenElseZero(live, hn::Div(u, hn::Max(p, hn::Set(d, 1e-37f))));
     const Vec3Lanes color = Scale(s.reflected, factor);
     const MF cast = hn::Gt(MeanLanes(color), hn::Zero(d));
-    const std::size_t left = std::min(in.weight.size() - i, hn::Lanes(d));
-    HWY_ALIGN float targets[hn::MaxLanes(DF())];
-    hn::Store(p, d, targets);
-    std::copy_n(targets, left, target.data() + i);
+    StoreSome(p, target, i);
 
     // Keep those that bring something: they move to the front, whole vectors are stored, and the
     // next one covers the rest.
@@ -77,14 +92,11 @@ void CastRays(const CastSamples& in, const SiteOrigins& origins, RayBatch& batch
     const auto put = [&](VF value, std::vector<float>& column) HWY_ATTR {
       hn::StoreU(hn::TableLookupLanes(value, front), d, column.data() + at);
     };
-    const auto origin_of = [&](const SiteBlock::Array& table) HWY_ATTR {
-      if (origins.num_sites == 1) return hn::Set(d, table[0]);
-      return LookUp(table, s.site, origins.num_sites);
-    };
+    const Vec3Lanes from = OriginsOf(origins, s.site);
     const Vec3Lanes w = DecodeOctahedral(s.code);
-    put(origin_of(origins.x), rays.origin_x);
-    put(origin_of(origins.y), rays.origin_y);
-    put(origin_of(origins.z), rays.origin_z);
+    put(from.x, rays.origin_x);
+    put(from.y, rays.origin_y);
+    put(from.z, rays.origin_z);
     put(w.x, rays.direction_x);
     put(w.y, rays.direction_y);
     put(w.z, rays.direction_z);
@@ -106,6 +118,7 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace baton {
 HWY_EXPORT(CastRays);
+HWY_EXPORT(CastPixelRays);
 
 void RayBatch::reserve(std::size_t more) {
   constexpr std::size_t kPadding = 16;
@@ -115,6 +128,12 @@ void RayBatch::reserve(std::size_t more) {
   rays.reserve(capacity);
   sample.resize(capacity);
   for (auto* column : {&r, &g, &b, &visibility}) column->resize(capacity);
+}
+
+void cast_rays(const PixelRays& rays, const SiteOrigins& origins, std::uint32_t first_sample,
+               RayBatch& batch) {
+  batch.reserve(rays.count);
+  HWY_DYNAMIC_DISPATCH(CastPixelRays)(rays, origins, first_sample, batch);
 }
 
 void cast_samples(const CastSamples& samples, const SiteOrigins& origins, RayBatch& batch,

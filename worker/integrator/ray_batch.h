@@ -6,6 +6,7 @@
 
 #include "common/math/octahedral.h"
 #include "worker/accel/accel.h"
+#include "worker/integrator/pixel_rays.h"
 #include "worker/scene/site_block.h"
 
 namespace baton {
@@ -21,17 +22,6 @@ struct RayBatch {
 
   void clear() { rays.clear(); }
   std::size_t size() const { return rays.size(); }
-  /// Adds one ray; number: of its sample.
-  void push(const Vec3& from, const Vec3& w, const Rgb& color, float share, std::uint32_t number) {
-    reserve(1);
-    const std::size_t i = size();
-    rays.push(from, w);
-    sample[i] = number;
-    r[i] = color.x;
-    g[i] = color.y;
-    b[i] = color.z;
-    visibility[i] = share;
-  }
   /// Makes room for `more` rays and what a vector may write past them.
   void reserve(std::size_t more);
 };
@@ -59,6 +49,10 @@ struct SiteOrigins {
     z[site] = origin.z;
   }
 };
+
+/// Adds the rays of one pixel; first_sample: number of the first.
+void cast_rays(const PixelRays& rays, const SiteOrigins& origins, std::uint32_t first_sample,
+               RayBatch& batch);
 
 /// Adds a ray for every sample that brings light. target: (N) out, p~ of each sample's own site,
 /// the mean of its (f cos L)_rgb.

@@ -1,6 +1,7 @@
 #include "worker/pass/tile_frame.h"
 
 #include <algorithm>
+#include <bit>
 
 #include "worker/integrator/reference.h"
 #include "worker/pass/blocked_samples.h"
@@ -260,13 +261,9 @@ void TileFrameRenderer::cast_pixel_samples(Batch& batch, std::size_t i, std::siz
 
 /// Casts the rays that the sampler chose for batch pixel `i`.
 void TileFrameRenderer::cast_rays(Batch& batch, std::size_t i, const PixelRays& rays) {
-  const SiteOrigins from = origins(batch.first + i);
-  for (std::size_t j = 0; j < rays.count; ++j) {
-    const std::size_t s = rays.site[j];
-    batch.rays.push({from.x[s], from.y[s], from.z[s]}, rays.direction[j], rays.value[j].color,
-                    rays.value[j].visibility, static_cast<std::uint32_t>(i * batch.stride + j));
-    batch.bin[i * batch.stride + j] = rays.bin[j];
-  }
+  const std::size_t first = i * batch.stride;
+  baton::cast_rays(rays, origins(batch.first + i), static_cast<std::uint32_t>(first), batch.rays);
+  std::copy_n(rays.bin, rays.count, &batch.bin[first]);
   batch.pixels[i].radiance = rays.constant.color;
   batch.pixels[i].visibility = rays.constant.visibility;
   batch.difference[i] = rays.difference;
@@ -287,21 +284,20 @@ void TileFrameRenderer::shade(Batch& batch, SampleState& state) {
   for (std::size_t i = 0; i < batch.count; ++i) {
     const std::size_t end = batch.end_ray[i];
     if (first == end) continue;
-    remember(batch, i, first, end, state);
     PixelResult& pixel = batch.pixels[i];
     Rgb radiance = pixel.radiance;
     Rgb difference = batch.difference[i];
     float visibility = pixel.visibility;
-    std::size_t num_free = 0;
+    std::uint64_t is_free = 0;  // bit by bit
     for (std::size_t r = first; r < end; ++r) {
       const float free = rays.rays.t_far[r] < 0 ? 0.0f : 1.0f;  // a product, for want of a pattern
       const Rgb color = Rgb{rays.r[r], rays.g[r], rays.b[r]} * free;
-      num_free += free > 0 ? 1 : 0;
+      is_free |= std::uint64_t{free > 0} << (r - first);
       radiance += color;
       visibility += rays.visibility[r] * free;
       difference += color * ((r - first) % 2 == 0 ? 1.0f : -1.0f);
     }
-    if (num_free < end - first) pixel.mask = 0;
+    if (static_cast<std::size_t>(std::popcount(is_free)) < end - first) pixel.mask = 0;
     pixel.radiance = radiance;
     pixel.visibility = visibility;
 
@@ -310,6 +306,7 @@ void TileFrameRenderer::shade(Batch& batch, SampleState& state) {
     // neighbours differ least.
     const float d = mean(difference);
     pixel.variance = context_.sampler->chooses_rays() ? d * d : 0.0f;
+    remember(batch, i, first, end, is_free, state);
     first = end;
   }
 }
@@ -317,23 +314,19 @@ void TileFrameRenderer::shade(Batch& batch, SampleState& state) {
 /// Tells the second pass, the pixel's memory and its samples what rays [first, end) of batch pixel
 /// `i` found.
 void TileFrameRenderer::remember(const Batch& batch, std::size_t i, std::size_t first,
-                                 std::size_t end, SampleState& state) {
+                                 std::size_t end, std::uint64_t is_free, SampleState& state) {
   const std::span<MemoryCell> memory = state.memory_of(batch.first + i);
-  const bool collects = context_.job.visibility.correlated;
   if (context_.sampler->forgets_blocked()) {
     forget_blocked(batch.rays, first, end, static_cast<std::uint32_t>(i * batch.stride),
                    batch.first + i, state);
   }
-  if (memory.empty() && !collects) return;
-  const ShadowRays& rays = batch.rays.rays;
+  if (!memory.empty()) {
+    remember_rays(memory, std::span(batch.bin).subspan(i * batch.stride, end - first), is_free);
+  }
+  if (!context_.job.visibility.correlated) return;
   for (std::size_t r = first; r < end; ++r) {
-    const bool occluded = rays.t_far[r] < 0;
-    if (collects) {
-      collector_.add_ray(state, batch.first * batch.stride + batch.rays.sample[r], occluded);
-    }
-    if (!memory.empty()) {
-      remember_ray(memory, batch.bin[batch.rays.sample[r]], !occluded);
-    }
+    collector_.add_ray(state, batch.first * batch.stride + batch.rays.sample[r],
+                       (is_free >> (r - first) & 1) == 0);
   }
 }
 

@@ -73,7 +73,7 @@ class TileFrameRenderer {
   void trace(Batch& batch);
   void shade(Batch& batch, SampleState& state);
   void remember(const Batch& batch, std::size_t i, std::size_t first, std::size_t end,
-                SampleState& state);
+                std::uint64_t is_free, SampleState& state);
   void render_reference(Batch& batch, const FrameLight& light, SampleState& state);
   void finish(Batch& batch, const FrameLight& light, FilmWriter& film);
 

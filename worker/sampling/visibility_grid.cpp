@@ -40,16 +40,22 @@ float free_share(std::span<const VisibilityCell> grid, std::size_t bin) {
   return (static_cast<float>(share(cell)) + 0.5f) * (1.0f / (kShareOfOne + 1));
 }
 
-void remember_ray(std::span<VisibilityCell> grid, std::size_t bin, bool free) {
-  BATON_CHECK(grid.size() == kVisibilityCells && bin < kVisibilityBins);
-  VisibilityCell& outcomes = grid[kVisibilityOutcomes];
-  VisibilityCell& summary = grid[kVisibilitySummary];
-  outcomes = static_cast<VisibilityCell>(outcomes | (free ? kSawFree : kSawBlocked));
-  const std::int32_t guess = seen(summary) > 0 ? share(summary) : kShareOfOne / 2;
-  if (outcomes == (kSawFree | kSawBlocked)) {
-    grid[bin] = add_ray(grid[bin], guess, free);
+void remember_rays(std::span<VisibilityCell> grid, std::span<const std::uint8_t> bin,
+                   std::uint64_t free) {
+  BATON_CHECK(grid.size() == kVisibilityCells && bin.size() <= 64);
+  VisibilityCell outcomes = grid[kVisibilityOutcomes];
+  VisibilityCell summary = grid[kVisibilitySummary];
+  for (std::size_t j = 0; j < bin.size(); ++j) {
+    const bool is_free = (free >> j & 1) != 0;
+    outcomes = static_cast<VisibilityCell>(outcomes | (is_free ? kSawFree : kSawBlocked));
+    const std::int32_t guess = seen(summary) > 0 ? share(summary) : kShareOfOne / 2;
+    if (outcomes == (kSawFree | kSawBlocked)) {
+      grid[bin[j]] = add_ray(grid[bin[j]], guess, is_free);
+    }
+    summary = add_ray(summary, guess, is_free);
   }
-  summary = add_ray(summary, guess, free);
+  grid[kVisibilityOutcomes] = outcomes;
+  grid[kVisibilitySummary] = summary;
 }
 
 }  // namespace baton

@@ -37,7 +37,13 @@ inline std::size_t visibility_bin(OctDirection code) {
 /// has seen none. grid: (kVisibilityCells).
 float free_share(std::span<const VisibilityCell> grid, std::size_t bin);
 
-/// Adds one ray in bin `bin`. grid: (kVisibilityCells), all 0 at first.
-void remember_ray(std::span<VisibilityCell> grid, std::size_t bin, bool free);
+/// Adds rays, one after the other: ray j in bin[j], free where bit j of `free` is set; at most 64.
+/// grid: (kVisibilityCells), all 0 at first.
+void remember_rays(std::span<VisibilityCell> grid, std::span<const std::uint8_t> bin,
+                   std::uint64_t free);
+inline void remember_ray(std::span<VisibilityCell> grid, std::size_t bin, bool free) {
+  const auto byte = static_cast<std::uint8_t>(bin);
+  remember_rays(grid, {&byte, 1}, free ? 1 : 0);
+}
 
 }  // namespace baton
