@@ -44,6 +44,16 @@ HWY_INLINE Vec3Lanes Add(const Vec3Lanes& a, const Vec3Lanes& b) {
 HWY_INLINE Vec3Lanes Select(MF mask, const Vec3Lanes& yes, const Vec3Lanes& no) {
   return {hn::IfThenElse(mask, yes.x, no.x), hn::IfThenElse(mask, yes.y, no.y), hn::IfThenElse(mask, yes.z, no.z)};
 }
+HWY_INLINE Rgb SumOfLanes(const Vec3Lanes& v) {
+  const auto sum = [](VF x) HWY_ATTR { return hn::GetLane(hn::SumOfLanes(DF(), x)); };
+  return {sum(v.x), sum(v.y), sum(v.z)};
+}
+/// 1, -1, 1, ...
+HWY_INLINE VF AlternateSigns() {
+  const DI di;
+  const VI odd = hn::And(hn::Iota(di, 0), hn::Set(di, 1));
+  return hn::ConvertTo(DF(), hn::Sub(hn::Set(di, 1), hn::Add(odd, odd)));
+}
 /// Up to a vector from `array` at i, the rest zero; and back. Whole vectors, which most are, pass no
 /// memory in between: what is stored in pieces and loaded at once waits for the stores.
 template <class D>

@@ -29,11 +29,6 @@ HWY_INLINE VI VisibilityBins(VU code) {
   return hn::BitCast(DI(), hn::Or(across, down));
 }
 
-HWY_INLINE Rgb SumOfLanes(const Vec3Lanes& v) {
-  const auto sum = [](VF x) HWY_ATTR { return hn::GetLane(hn::SumOfLanes(DF(), x)); };
-  return {sum(v.x), sum(v.y), sum(v.z)};
-}
-
 /// A pixel's memory: the estimated share of free rays per lane, as free_share().
 class RememberedLanes {
  public:
@@ -120,8 +115,7 @@ HWY_INLINE void LookUpRays(const ChosenCandidates& chosen, const RayPlan& plan,
   const DI di;
   const VF per_pick = hn::Set(d, plan.total / static_cast<float>(plan.count));
   const VF per_light = hn::Set(d, 1 / lns);
-  const VI odd = hn::And(hn::Iota(di, 0), hn::Set(di, 1));
-  const VF half = hn::ConvertTo(d, hn::Sub(hn::Set(di, 1), hn::Add(odd, odd)));  // 1, -1, 1, ...
+  const VF half = AlternateSigns();
   Vec3Lanes expected{hn::Zero(d), hn::Zero(d), hn::Zero(d)}, difference = expected;
   VF expected_share = hn::Zero(d);
   for (std::size_t j = 0; j < picks.count; j += hn::Lanes(d)) {

@@ -112,6 +112,31 @@ void CastRays(const CastSamples& in, const SiteOrigins& origins, RayBatch& batch
   rays.extend(at);
 }
 
+FreeLight SumFree(const RayBatch& batch, std::size_t first, std::size_t end) {
+  const DF d;
+  const auto load = [&](const std::vector<float>& column, std::size_t i)
+                        HWY_ATTR { return hn::LoadU(d, column.data() + first + i); };
+  Vec3Lanes color{hn::Zero(d), hn::Zero(d), hn::Zero(d)};
+  VF visibility = hn::Zero(d);
+  FreeLight out;
+  const std::size_t count = end - first;
+  for (std::size_t i = 0; i < count; i += hn::Lanes(d)) {
+    MF free = hn::Not(hn::Lt(load(batch.rays.t_far, i), hn::Zero(d)));
+    if (i + hn::Lanes(d) > count) free = hn::And(free, hn::FirstN(d, count - i));
+    std::uint8_t bits[8] = {};
+    hn::StoreMaskBits(d, free, bits);
+    out.is_free |= std::uint64_t{bits[0]} << i;
+    color = Add(color, {hn::IfThenElseZero(free, load(batch.r, i)),
+                        hn::IfThenElseZero(free, load(batch.g, i)),
+                        hn::IfThenElseZero(free, load(batch.b, i))});
+    visibility = hn::Add(visibility, hn::IfThenElseZero(free, load(batch.visibility, i)));
+  }
+  out.color = SumOfLanes(color);
+  out.difference = SumOfLanes(Scale(color, AlternateSigns()));
+  out.visibility = hn::GetLane(hn::SumOfLanes(d, visibility));
+  return out;
+}
+
 }  // namespace baton::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 
@@ -119,6 +144,7 @@ HWY_AFTER_NAMESPACE();
 namespace baton {
 HWY_EXPORT(CastRays);
 HWY_EXPORT(CastPixelRays);
+HWY_EXPORT(SumFree);
 
 void RayBatch::reserve(std::size_t more) {
   constexpr std::size_t kPadding = 16;
@@ -143,6 +169,11 @@ void cast_samples(const CastSamples& samples, const SiteOrigins& origins, RayBat
               target.size() == samples.weight.size());
   batch.reserve(samples.weight.size());
   HWY_DYNAMIC_DISPATCH(CastRays)(samples, origins, batch, target);
+}
+
+FreeLight sum_free(const RayBatch& batch, std::size_t first, std::size_t end) {
+  BATON_CHECK(first <= end && end - first <= 64 && end <= batch.size());
+  return HWY_DYNAMIC_DISPATCH(SumFree)(batch, first, end);
 }
 
 }  // namespace baton

@@ -38,6 +38,17 @@ struct CastSamples {
   std::uint32_t first_sample;     ///< number of sample 0
 };
 
+/// What the rays of one pixel found.
+struct FreeLight {
+  Rgb color;  ///< sum of what the free ones bring
+  float visibility = 0;
+  Rgb difference;             ///< what the even ones bring more than the odd ones
+  std::uint64_t is_free = 0;  ///< bit by bit
+};
+/// Sums rays [first, end) of a traced batch, at most 64, in an order that only their number
+/// decides.
+FreeLight sum_free(const RayBatch& batch, std::size_t first, std::size_t end);
+
 /// Where the shadow rays of a pixel's sites start.
 struct SiteOrigins {
   alignas(64) SiteBlock::Array x{}, y{}, z{};

@@ -276,45 +276,34 @@ void TileFrameRenderer::trace(Batch& batch) {
   stats_.rays_shadow += batch.rays.size();
 }
 
-/// Pass: sums the free rays of each pixel in their fixed order, and remembers what they found.
+/// Pass: sums the free rays of each pixel, and remembers what they found.
 void TileFrameRenderer::shade(Batch& batch, SampleState& state) {
   const StageTimer timer(stages_.shade);
-  const RayBatch& rays = batch.rays;
   std::size_t first = 0;
   for (std::size_t i = 0; i < batch.count; ++i) {
     const std::size_t end = batch.end_ray[i];
     if (first == end) continue;
+    const FreeLight found = sum_free(batch.rays, first, end);
     PixelResult& pixel = batch.pixels[i];
-    Rgb radiance = pixel.radiance;
-    Rgb difference = batch.difference[i];
-    float visibility = pixel.visibility;
-    std::uint64_t is_free = 0;  // bit by bit
-    for (std::size_t r = first; r < end; ++r) {
-      const float free = rays.rays.t_far[r] < 0 ? 0.0f : 1.0f;  // a product, for want of a pattern
-      const Rgb color = Rgb{rays.r[r], rays.g[r], rays.b[r]} * free;
-      is_free |= std::uint64_t{free > 0} << (r - first);
-      radiance += color;
-      visibility += rays.visibility[r] * free;
-      difference += color * ((r - first) % 2 == 0 ? 1.0f : -1.0f);
-    }
-    if (static_cast<std::size_t>(std::popcount(is_free)) < end - first) pixel.mask = 0;
-    pixel.radiance = radiance;
-    pixel.visibility = visibility;
+    pixel.radiance += found.color;
+    pixel.visibility += found.visibility;
+    if (static_cast<std::size_t>(std::popcount(found.is_free)) < end - first) pixel.mask = 0;
 
     // The even and the odd ray of each pair, and candidates likewise, make two estimates that agree
     // in the mean: the square of half their difference is at least the variance of the whole, as
     // neighbours differ least.
-    const float d = mean(difference);
+    const float d = mean(batch.difference[i] + found.difference);
     pixel.variance = context_.sampler->chooses_rays() ? d * d : 0.0f;
-    remember(batch, i, first, end, is_free, state);
+    remember(batch, i, first, found.is_free, state);
     first = end;
   }
 }
 
-/// Tells the second pass, the pixel's memory and its samples what rays [first, end) of batch pixel
-/// `i` found.
+/// Tells the second pass, the pixel's memory and its samples what the rays of batch pixel `i` found,
+/// from `first` on.
 void TileFrameRenderer::remember(const Batch& batch, std::size_t i, std::size_t first,
-                                 std::size_t end, std::uint64_t is_free, SampleState& state) {
+                                 std::uint64_t is_free, SampleState& state) {
+  const std::size_t end = batch.end_ray[i];
   const std::span<MemoryCell> memory = state.memory_of(batch.first + i);
   if (context_.sampler->forgets_blocked()) {
     forget_blocked(batch.rays, first, end, static_cast<std::uint32_t>(i * batch.stride),

@@ -72,8 +72,8 @@ class TileFrameRenderer {
   void cast_rays(Batch& batch, std::size_t i, const PixelRays& rays);
   void trace(Batch& batch);
   void shade(Batch& batch, SampleState& state);
-  void remember(const Batch& batch, std::size_t i, std::size_t first, std::size_t end,
-                std::uint64_t is_free, SampleState& state);
+  void remember(const Batch& batch, std::size_t i, std::size_t first, std::uint64_t is_free,
+                SampleState& state);
   void render_reference(Batch& batch, const FrameLight& light, SampleState& state);
   void finish(Batch& batch, const FrameLight& light, FilmWriter& film);
 

@@ -23,13 +23,17 @@ constexpr auto kStep = [] {
   return step;
 }();
 
-/// The cell after one more ray; `guess` is what it starts from, worth one ray.
-VisibilityCell add_ray(VisibilityCell cell, std::int32_t guess, bool free) {
-  const std::int32_t before = seen(cell) > 0 ? share(cell) : guess;
-  const std::int32_t step = kStep[static_cast<std::size_t>(seen(cell))];
-  const std::int32_t after = before + (((free ? kShareOfOne : 0) - before) * step >> 16);
-  return static_cast<VisibilityCell>(after << 4 | std::min(seen(cell) + 1, kMaxSeen));
-}
+/// A cell, taken apart.
+struct Tally {
+  std::int32_t share, seen;
+
+  explicit Tally(VisibilityCell cell) : share(baton::share(cell)), seen(baton::seen(cell)) {}
+  VisibilityCell cell() const { return static_cast<VisibilityCell>(share << 4 | seen); }
+  void add(bool free) {
+    share += ((free ? kShareOfOne : 0) - share) * kStep[static_cast<std::size_t>(seen)] >> 16;
+    seen = std::min(seen + 1, kMaxSeen);
+  }
+};
 
 }  // namespace
 
@@ -43,19 +47,22 @@ float free_share(std::span<const VisibilityCell> grid, std::size_t bin) {
 void remember_rays(std::span<VisibilityCell> grid, std::span<const std::uint8_t> bin,
                    std::uint64_t free) {
   BATON_CHECK(grid.size() == kVisibilityCells && bin.size() <= 64);
-  VisibilityCell outcomes = grid[kVisibilityOutcomes];
-  VisibilityCell summary = grid[kVisibilitySummary];
+  std::uint32_t outcomes = grid[kVisibilityOutcomes];
+  Tally all(grid[kVisibilitySummary]);
+  if (all.seen == 0) all.share = kShareOfOne / 2;
   for (std::size_t j = 0; j < bin.size(); ++j) {
     const bool is_free = (free >> j & 1) != 0;
-    outcomes = static_cast<VisibilityCell>(outcomes | (is_free ? kSawFree : kSawBlocked));
-    const std::int32_t guess = seen(summary) > 0 ? share(summary) : kShareOfOne / 2;
+    outcomes |= is_free ? kSawFree : kSawBlocked;
     if (outcomes == (kSawFree | kSawBlocked)) {
-      grid[bin[j]] = add_ray(grid[bin[j]], guess, is_free);
+      Tally own(grid[bin[j]]);
+      if (own.seen == 0) own.share = all.share;  // a guess, worth one ray
+      own.add(is_free);
+      grid[bin[j]] = own.cell();
     }
-    summary = add_ray(summary, guess, is_free);
+    all.add(is_free);
   }
-  grid[kVisibilityOutcomes] = outcomes;
-  grid[kVisibilitySummary] = summary;
+  grid[kVisibilityOutcomes] = static_cast<VisibilityCell>(outcomes);
+  if (!bin.empty()) grid[kVisibilitySummary] = all.cell();
 }
 
 }  // namespace baton

@@ -136,8 +136,8 @@ TEST_P(RivalKernels, FreeRaysOfTheRatioBringAllCandidates) {
   Rgb sum;
   float visibility = 0;
   for (std::size_t j = 0; j < rays->count; ++j) {
-    sum += rays->value[j].color;
-    visibility += rays->value[j].visibility;
+    sum += {rays->r[j], rays->g[j], rays->b[j]};
+    visibility += rays->visibility[j];
   }
   EXPECT_NEAR(sum.x, wanted.x, 1e-4f * wanted.x);
   EXPECT_NEAR(sum.y, wanted.y, 1e-4f * wanted.y);
