@@ -33,7 +33,9 @@ HWY_INLINE SurfaceLanes LoadTable(const SurfaceTable& table, const Records& comm
   s.is_ggx = hn::Gt(b.row[3], zero);
   s.kd = {c.row[0], c.row[1], c.row[2]};
   s.shape = c.row[3];
-  s.wo = s.mirror = s.ks = {zero, zero, zero};
+  SetZero(s.wo);
+  SetZero(s.mirror);
+  SetZero(s.ks);
   s.specular_probability = zero;
   s.any_phong = !hn::AllFalse(d, hn::AndNot(s.is_ggx, hn::Gt(s.lobe_scale, zero)));
   s.any_ggx = !hn::AllFalse(d, s.is_ggx);

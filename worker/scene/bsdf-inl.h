@@ -62,7 +62,9 @@ HWY_INLINE SurfaceLanes ReadSurfaces(const SiteBlock& b, VI site, const Read& re
   s.site = s.table = site;
   if (!s.any_lobe) {
     const VF zero = hn::Zero(DF());
-    s.wo = s.mirror = s.ks = {zero, zero, zero};
+    SetZero(s.wo);
+    SetZero(s.mirror);
+    SetZero(s.ks);
     s.shape = s.lobe_scale = s.specular_probability = zero;
     s.alpha2 = s.view_cosine = s.view_masking = zero;
     s.is_ggx = hn::Gt(zero, zero);
@@ -179,7 +181,7 @@ HWY_INLINE BsdfLanes EvaluateBsdf(const SurfaceLanes& s, const Vec3Lanes& wi) {
     out.white = hn::IfThenElseZero(s.is_ggx, hn::Mul(hn::Mul(dv, schlick), s.lobe_scale));
     out.lobe_pdf = hn::IfThenElse(s.is_ggx, hn::Div(quarter, s.view_masking), out.lobe_pdf);
   }
-  out.measured = {zero, zero, zero};
+  SetZero(out.measured);
   if (s.any_measured) out.measured = EvaluateMeasured(s.tables, s.table, s.ns, wi, s.wo);
   return out;
 }
