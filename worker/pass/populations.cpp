@@ -28,11 +28,25 @@ PixelDiagnostics sample_populations(const PixelSampler& sampler, std::size_t num
   const auto populations = static_cast<std::size_t>(state.num_populations);
   const std::size_t stride = static_cast<std::size_t>(state.num_particles) / populations;
   const std::size_t n = num_particles / populations;
+  const auto samples_of = [&](std::size_t k) {
+    const std::size_t row = index * populations + k;
+    return PixelSamples{std::span(state.direction).subspan(row * stride, n),
+                        std::span(state.site).subspan(row * stride, n),
+                        std::span(state.weight).subspan(row * stride, n),
+                        std::span(colors.r).subspan(k * n, n),
+                        std::span(colors.g).subspan(k * n, n),
+                        std::span(colors.b).subspan(k * n, n),
+                        state.lns[row],
+                        state.lns_fresh[row],
+                        state.source[row],
+                        state.confidence.empty() ? nullptr : &state.confidence[row]};
+  };
+  if (populations == 1) return sampler.sample(input, scratch, samples_of(0));
+
   PixelDiagnostics sum;
   PixelInput population_input = input;
   kernels::LocatedSpan located{};
   for (std::size_t k = 0; k < populations; ++k) {
-    const std::size_t row = index * populations + k;
     population_input.key.job_seed = stream_seed(input.key.job_seed, static_cast<std::uint32_t>(k));
     if (!input.target_before.empty()) {
       population_input.target_before = input.target_before.subspan(k * n, n);
@@ -41,14 +55,7 @@ PixelDiagnostics sample_populations(const PixelSampler& sampler, std::size_t num
       located = input.located->from(k * n);
       population_input.located = &located;
     }
-    const PixelDiagnostics did = sampler.sample(
-        population_input, scratch,
-        {std::span(state.direction).subspan(row * stride, n),
-         std::span(state.site).subspan(row * stride, n),
-         std::span(state.weight).subspan(row * stride, n), std::span(colors.r).subspan(k * n, n),
-         std::span(colors.g).subspan(k * n, n), std::span(colors.b).subspan(k * n, n),
-         state.lns[row], state.lns_fresh[row], state.source[row],
-         state.confidence.empty() ? nullptr : &state.confidence[row]});
+    const PixelDiagnostics did = sampler.sample(population_input, scratch, samples_of(k));
     sum.ess += did.ess;
     sum.target_evaluations += did.target_evaluations;
     sum.local.proposed += did.local.proposed;

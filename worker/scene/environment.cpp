@@ -86,24 +86,25 @@ std::size_t EnvironmentMap::cell_row(int row) const {
   return static_cast<std::size_t>(padded_row) * stride() + 1;
 }
 
-double EnvironmentMap::measure_row(int row) {
+std::vector<double> EnvironmentMap::row_means(int row) const {
+  const Texel* texel = &texels_[cell_row(row)];
+  std::vector<double> means(static_cast<std::size_t>(width_) + 1);
+  for (int i = 0; i <= width_; ++i) means[static_cast<std::size_t>(i)] = mean_rgb(texel[i]);
+  return means;
+}
+
+double EnvironmentMap::measure_row(int row, const std::vector<double>& means,
+                                   const std::vector<double>& means_below) {
   // A nearest cell is one texel; a bilinear cell has corners in two columns of two rows.
-  Texel* upper = &texels_[cell_row(row)];
+  Texel* texel = &texels_[cell_row(row)];
   double sum = 0;
-  if (filter_ == MapFilter::nearest) {
-    for (int i = 0; i < width_; ++i) {
-      upper[i].density = static_cast<float>(mean_rgb(upper[i]));
-      sum += upper[i].density;
-    }
-    return sum;
-  }
-  const Texel* lower = upper + stride();
-  double left = mean_rgb(upper[0]) + mean_rgb(lower[0]);
-  for (int i = 0; i < width_; ++i) {
-    const double right = mean_rgb(upper[i + 1]) + mean_rgb(lower[i + 1]);
-    upper[i].density = static_cast<float>(0.25 * (left + right));
-    sum += upper[i].density;
-    left = right;
+  const bool nearest = filter_ == MapFilter::nearest;
+  for (std::size_t i = 0; i < static_cast<std::size_t>(width_); ++i) {
+    const double mean =
+        nearest ? means[i]
+                : 0.25 * ((means[i] + means_below[i]) + (means[i + 1] + means_below[i + 1]));
+    texel[i].density = static_cast<float>(mean);
+    sum += texel[i].density;
   }
   return sum;
 }
@@ -126,9 +127,13 @@ void EnvironmentMap::build_table(bool compensate) {
   // Measure the cells and the map's power.
   const int rows = cell_rows();
   std::vector<double> solid_angle(static_cast<std::size_t>(rows));
+  std::vector<double> means = row_means(0);
   for (int r = 0; r < rows; ++r) {
     solid_angle[r] = zone_solid_angle(row_angle(r), row_angle(r + 1)) / width_;
-    total_power_ += measure_row(r) * solid_angle[r];
+    const bool ends = filter_ == MapFilter::nearest && r + 1 == rows;
+    std::vector<double> below = ends ? std::vector<double>() : row_means(r + 1);
+    total_power_ += measure_row(r, means, below) * solid_angle[r];
+    means = std::move(below);
   }
   const auto [offset, power] =
       compensate ? compensation(solid_angle) : std::pair(0.0, total_power_);

@@ -60,8 +60,12 @@ class EnvironmentMap {
   double row_angle(int row) const;
   /// Index in texels_ of the texel that owns the first cell of a row.
   std::size_t cell_row(int row) const;
-  /// Writes the mean radiance of a row's cells to their densities; returns the sum.
-  double measure_row(int row);
+  /// Mean over RGB of the texels of a row of cells, and of the first one again: (width + 1).
+  std::vector<double> row_means(int row) const;
+  /// Writes the mean radiance of a row's cells to their densities; returns the sum. means: of the
+  /// row, and of the one below where the map is bilinear.
+  double measure_row(int row, const std::vector<double>& means,
+                     const std::vector<double>& means_below);
   /// Radiance that the table leaves out, and the power that remains in the table.
   std::pair<double, double> compensation(const std::vector<double>& solid_angle) const;
   void build_table(bool compensate);
