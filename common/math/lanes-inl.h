@@ -44,6 +44,11 @@ HWY_INLINE Vec3Lanes Add(const Vec3Lanes& a, const Vec3Lanes& b) {
 HWY_INLINE Vec3Lanes Select(MF mask, const Vec3Lanes& yes, const Vec3Lanes& no) {
   return {hn::IfThenElse(mask, yes.x, no.x), hn::IfThenElse(mask, yes.y, no.y), hn::IfThenElse(mask, yes.z, no.z)};
 }
+/// first, first + 1, ... (Highway 1.0's Iota of a variable stores them one by one and waits for them.)
+template <class D>
+HWY_INLINE hn::Vec<D> CountFrom(D d, hn::TFromD<D> first) {
+  return hn::Add(hn::Iota(d, 0), hn::Set(d, first));
+}
 /// v = 0, lane by lane: what GCC copies as a whole it loads in larger pieces than it has just stored.
 HWY_INLINE void SetZero(Vec3Lanes& v) { v.x = v.y = v.z = hn::Zero(DF()); }
 HWY_INLINE Rgb SumOfLanes(const Vec3Lanes& v) {

@@ -47,7 +47,7 @@ struct SiteDeal {
   HWY_INLINE VI SitesOfLanes(std::size_t i) const {
     const DF d;
     const DI di;
-    const VF position = hn::Add(hn::Iota(d, static_cast<float>(i)), hn::Set(d, start));
+    const VF position = hn::Add(CountFrom(d, static_cast<float>(i)), hn::Set(d, start));
     const VF turn =
         hn::Mul(position, hn::Set(d, static_cast<float>(num_sites) / static_cast<float>(count)));
     return hn::GatherIndex(di, sites, hn::Min(hn::ConvertTo(di, turn), hn::Set(di, num_sites - 1)));

@@ -155,7 +155,7 @@ void ReflectAndCast(const SurfaceTable& surfaces, std::span<const LightRecord> l
                         VF target) HWY_ATTR {
     // Those that reflect something move to the front, whole vectors are stored, and the next one
     // covers the rest.
-    const VI number = hn::Iota(di, static_cast<std::int32_t>(i));
+    const VI number = CountFrom(di, static_cast<std::int32_t>(i));
     const VI count = hn::Set(di, static_cast<std::int32_t>(offers.size()));
     const MF wanted =
         hn::And(hn::Gt(target, hn::Zero(d)), hn::RebindMask(d, hn::Gt(count, number)));

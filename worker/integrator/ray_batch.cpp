@@ -61,7 +61,7 @@ void CastPixelRays(const PixelRays& in, const SiteOrigins& origins, std::uint32_
     put(hn::Load(d, in.g + i), batch.g);
     put(hn::Load(d, in.b + i), batch.b);
     put(hn::Load(d, in.visibility + i), batch.visibility);
-    const VU number = hn::Iota(du, first_sample + static_cast<std::uint32_t>(i));
+    const VU number = CountFrom(du, first_sample + static_cast<std::uint32_t>(i));
     hn::StoreU(number, du, batch.sample.data() + first + i);
   }
   rays.extend(first + in.count);
@@ -105,7 +105,8 @@ void CastRays(const CastSamples& in, const SiteOrigins& origins, RayBatch& batch
     put(hn::Mul(color.y, scale), batch.g);
     put(hn::Mul(color.z, scale), batch.b);
     put(hn::Mul(s.weight, hn::Set(d, in.visibility_scale)), batch.visibility);
-    const VF number = hn::BitCast(d, hn::Iota(du, in.first_sample + static_cast<std::uint32_t>(i)));
+    const VF number =
+        hn::BitCast(d, CountFrom(du, in.first_sample + static_cast<std::uint32_t>(i)));
     hn::StoreU(hn::BitCast(du, hn::TableLookupLanes(number, front)), du, batch.sample.data() + at);
     at += kept;
   }

@@ -89,7 +89,7 @@ class MoveRandom {
     if (move % kWindow == 0) {
       const DU du;
       for (std::size_t i = 0; i < kWindow; i += hn::Lanes(du)) {
-        const VU index = hn::Iota(du, kChoices + move + static_cast<std::uint32_t>(i));
+        const VU index = CountFrom(du, kChoices + move + static_cast<std::uint32_t>(i));
         const auto bits = PhiloxBlock(du, rng_, 0, index);
         hn::Store(bits.w0, du, kind_ + i);
         hn::Store(bits.w1, du, first_ + i);
@@ -102,7 +102,7 @@ class MoveRandom {
     const VU byte = hn::Set(du, 0xFFu);
     for (std::size_t i = 0; i < count_; i += hn::Lanes(du)) {
       const auto bits = PhiloxBlock(du, rng_, move / kShare,
-                                    hn::Iota(du, kAcceptance + static_cast<std::uint32_t>(i)));
+                                    CountFrom(du, kAcceptance + static_cast<std::uint32_t>(i)));
       hn::Store(bits.w0, du, accept_[0] + i);
       hn::Store(bits.w1, du, accept_[1] + i);
       hn::Store(bits.w2, du, accept_[2] + i);
@@ -126,7 +126,7 @@ class MoveRandom {
   /// golden ratio from a random start, so that sites are shared out evenly.
   HWY_INLINE VF SiteFraction(std::uint32_t move, std::size_t i) const {
     const DU du;
-    const VU number = hn::Iota(du, static_cast<std::uint32_t>(i));
+    const VU number = CountFrom(du, static_cast<std::uint32_t>(i));
     const VU steps = hn::Mul(number, hn::Set(du, 0x9E3779B9u));
     return UniformLanes(DF(), hn::Add(hn::Set(du, site_[move % kWindow]), steps));
   }
@@ -136,7 +136,7 @@ class MoveRandom {
   }
   /// Two words for the local proposals of particles i, i + 1, ...
   HWY_INLINE PhiloxLanes<VU> Proposal(std::uint32_t move, std::size_t i) const {
-    return PhiloxBlock(DU(), rng_, move + 1, hn::Iota(DU(), static_cast<std::uint32_t>(i)));
+    return PhiloxBlock(DU(), rng_, move + 1, CountFrom(DU(), static_cast<std::uint32_t>(i)));
   }
   /// How many moves Begin knows ahead.
   static constexpr std::uint32_t kWindow = 8;
@@ -223,7 +223,7 @@ HWY_INLINE void MoveParticles(const Target& target, const SequentialSettings& se
     }
     const MF possible = hn::Gt(log_next, hn::Set(d, kLogAlive));
     const MF inside =
-        hn::Lt(hn::Iota(d, static_cast<float>(i)), hn::Set(d, static_cast<float>(count)));
+        hn::Lt(CountFrom(d, static_cast<float>(i)), hn::Set(d, static_cast<float>(count)));
     const MF accept =
         hn::And(hn::And(possible, inside), hn::Ge(hn::Sub(log_next, log_current), LogLanes(least)));
     accepted += static_cast<std::int32_t>(hn::CountTrue(d, accept));

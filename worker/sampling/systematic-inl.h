@@ -115,7 +115,7 @@ HWY_INLINE void SystematicPicks(const RunningSums& sums, float total, float u, s
   const VF last = hn::Set(d, static_cast<float>(count - 1));
   const VF stride = hn::Set(d, total / static_cast<float>(count));
   const auto position = [&](std::size_t m) HWY_ATTR {
-    const VF number = hn::Min(hn::Iota(d, static_cast<float>(m)), last);
+    const VF number = hn::Min(CountFrom(d, static_cast<float>(m)), last);
     return hn::Mul(hn::Add(number, hn::Set(d, u)), stride);
   };
   for (std::size_t m = 0; m < count; m += RunningSums::kGroup) {
