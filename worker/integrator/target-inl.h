@@ -103,25 +103,25 @@ struct CarriedTarget {
   const kernels::CarriedLight& light;
   const kernels::LocatedSpan* located;  ///< the carried particles, or null
 
-  HWY_INLINE TargetLanes Evaluate(const PointLanes& point) const { return EvaluateAt(point, true); }
-
-  /// As Evaluate, but `log_before` is left 0.
-  HWY_INLINE TargetLanes EvaluateNow(const PointLanes& point) const {
-    return EvaluateAt(point, false);
+  /// Sets `out` for `point`, log_before only where it is wanted.
+  HWY_INLINE void Evaluate(const PointLanes& point, bool want_before, TargetLanes& out) const {
+    const Vec3Lanes w = DecodeOctahedral(point.code);
+    const RadianceLanes now = EvaluateEnvironment(light.now, w);
+    const auto then = [&]() HWY_ATTR { return EvaluateEnvironment(light.before, w); };
+    SetTargets(point.site, w, now, InverseOrZero(now.density), want_before, then, out);
   }
 
-  /// Evaluates the carried particles i, i + 1, ..., `log_before` only where it is wanted.
-  HWY_INLINE TargetLanes EvaluateCarried(std::size_t i, const PointLanes& point,
-                                         bool want_before) const {
-    if (located == nullptr) return want_before ? Evaluate(point) : EvaluateNow(point);
+  /// The same for the carried particles i, i + 1, ...
+  HWY_INLINE void EvaluateCarried(std::size_t i, const PointLanes& point, bool want_before,
+                                  TargetLanes& out) const {
+    if (located == nullptr) return Evaluate(point, want_before, out);
     const Vec3Lanes w = LocatedDirection(*located, i);
     const RadianceLanes now = LocatedLight(light.now, located->now, i);
-    RadianceLanes then = now;
-    if (want_before && !light.still) {
-      then = located->before.texel != nullptr ? LocatedLight(light.before, located->before, i)
-                                              : EvaluateEnvironment(light.before, w);
-    }
-    return Targets(point.site, w, now, InverseOrZero(now.density), then, want_before);
+    const auto then = [&]() HWY_ATTR {
+      if (located->before.texel != nullptr) return LocatedLight(light.before, located->before, i);
+      return EvaluateEnvironment(light.before, w);
+    };
+    SetTargets(point.site, w, now, InverseOrZero(now.density), want_before, then, out);
   }
 
   bool ManySites() const { return sites.num_hits > 1; }
@@ -142,40 +142,39 @@ struct CarriedTarget {
     return bits & (LightPool::kSize - LightPool::kBlock);
   }
 
-  /// Draws `point` from the pool's entries entry, entry + 1, ...; returns its targets, `log_before`
-  /// only where it is wanted.
-  HWY_INLINE TargetLanes Propose(std::size_t entry, VF site_fraction, bool want_before,
-                                 PointLanes& point) const {
+  /// Draws `point` from the pool's entries entry, entry + 1, ... and sets `out`, log_before only
+  /// where it is wanted.
+  HWY_INLINE void Propose(std::size_t entry, VF site_fraction, bool want_before, PointLanes& point,
+                          TargetLanes& out) const {
     const LightLanes from = LoadLight(light.pool, entry);
     point.code = from.code;
     point.site = SiteAt(sites, site_fraction);
-    RadianceLanes then = from.now;
-    if (want_before) {
+    const auto then = [&]() HWY_ATTR {
       const Vec3Lanes before = LoadLightBefore(light.pool, entry);
-      then = {before.x, before.y, before.z, then.density};
-    }
-    return Targets(point.site, from.direction, from.now, from.inverse_density, then, want_before);
+      return RadianceLanes{before.x, before.y, before.z, from.now.density};
+    };
+    SetTargets(point.site, from.direction, from.now, from.inverse_density, want_before, then, out);
   }
 
  private:
-  HWY_INLINE TargetLanes EvaluateAt(const PointLanes& point, bool want_before) const {
-    const Vec3Lanes w = DecodeOctahedral(point.code);
-    const RadianceLanes now = EvaluateEnvironment(light.now, w);
-    const bool same = !want_before || light.still;
-    const RadianceLanes then = same ? now : EvaluateEnvironment(light.before, w);
-    return Targets(point.site, w, now, InverseOrZero(now.density), then, want_before);
-  }
-  HWY_INLINE TargetLanes Targets(VI site, const Vec3Lanes& w, const RadianceLanes& now,
-                                 VF inverse_density, const RadianceLanes& then,
-                                 bool want_before) const {
+  /// then(): the light of the frame before. (Members one by one: SetZero.)
+  template <class Then>
+  HWY_INLINE void SetTargets(VI site, const Vec3Lanes& w, const RadianceLanes& now,
+                             VF inverse_density, bool want_before, const Then& then,
+                             TargetLanes& out) const {
     const SurfaceLanes surface = LoadSurfaces(sites, site);
     const BsdfLanes f = EvaluateBsdf(surface, w);
     const Vec3Lanes reflected = ReflectedRadiance(surface, f, now.r, now.g, now.b);
-    VF log_before = hn::Zero(DF());
-    if (want_before) {
-      log_before = static_cast<const Surface*>(this)->LogTargetBefore(site, w, surface, f, then);
-    }
-    return {log_before, LogOrZero(MeanLanes(reflected)), now.density, inverse_density, reflected};
+    out.reflected.x = reflected.x;
+    out.reflected.y = reflected.y;
+    out.reflected.z = reflected.z;
+    out.log_now = LogOrZero(MeanLanes(reflected));
+    out.density = now.density;
+    out.inverse_density = inverse_density;
+    out.log_before = hn::Zero(DF());
+    if (!want_before) return;
+    out.log_before =
+        static_cast<const Surface*>(this)->LogTargetBefore(site, w, surface, f, then());
   }
 };
 

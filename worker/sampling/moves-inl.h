@@ -201,12 +201,12 @@ HWY_INLINE void MoveParticles(const Target& target, const SequentialSettings& se
       next.code =
           EncodeOctahedral(PerturbDirection(DecodeOctahedral(code), settings.local_move_cosine,
                                             UniformLanes(d, bits.w0), UniformLanes(d, bits.w1)));
-      at_next = keep_before ? target.Evaluate(next) : target.EvaluateNow(next);
+      target.Evaluate(next, keep_before, at_next);
     } else {
       const VF site_fraction = target.ManySites() ? random.SiteFraction(move, i) : hn::Zero(d);
       const std::size_t start =
           target.BlockStart(random.BlockBits(move, static_cast<std::uint32_t>(i / kProposalBlock)));
-      at_next = target.Propose(start + i % kProposalBlock, site_fraction, keep_before, next);
+      target.Propose(start + i % kProposalBlock, site_fraction, keep_before, next, at_next);
     }
 
     // Accept when p(next) / p(current) >= u q(next) / q(current); q cancels in symmetric moves.

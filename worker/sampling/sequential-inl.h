@@ -152,7 +152,9 @@ HWY_INLINE void LoadParticles(const Target& target, std::size_t count,
   const std::size_t padded = hwy::RoundUpTo(count, hn::Lanes(d));
   const bool knows_before = particles.target_before != nullptr;
   std::copy_n(particles.direction, count, p.code);
-  std::copy_n(particles.site, count, p.site);
+  for (std::size_t i = 0; i < count; i += hn::Lanes(d)) {
+    hn::Store(LoadBytes({particles.site, count}, i), DI(), p.site + i);
+  }
   std::copy_n(particles.weight, count, p.weight);
   if (knows_before) std::copy_n(particles.target_before, count, p.log_before);
   std::fill_n(p.log_increment, padded, 0.0f);
@@ -165,7 +167,8 @@ HWY_INLINE void LoadParticles(const Target& target, std::size_t count,
   }
   for (std::size_t i = 0; i < count; i += hn::Lanes(d)) {
     const PointLanes point{hn::Load(DU(), p.code + i), hn::Load(DI(), p.site + i)};
-    TargetLanes at = target.EvaluateCarried(i, point, !knows_before);
+    TargetLanes at;
+    target.EvaluateCarried(i, point, !knows_before, at);
     if (knows_before) at.log_before = LogOrZero(hn::Load(d, p.log_before + i));
     hn::Store(at.log_before, d, p.log_before + i);
     hn::Store(at.log_now, d, p.log_now + i);
@@ -232,13 +235,14 @@ HWY_INLINE SequentialOutcome SequentialStep(const Target& target,
   outcome.lns =
       static_cast<float>(lns_before * std::exp(path.used() ? path.log_ratio() : log_ratio));
   outcome.alive = outcome.lns > 0 && std::isfinite(outcome.lns);
-  for (std::size_t i = 0; i < count; ++i) {
-    particles.direction[i] = p.code[i];
-    particles.site[i] = static_cast<std::uint8_t>(p.site[i]);
-    particles.weight[i] = p.weight[i];
-    particles.r[i] = p.r[i];
-    particles.g[i] = p.g[i];
-    particles.b[i] = p.b[i];
+  const DF d;
+  for (std::size_t i = 0; i < count; i += hn::Lanes(d)) {
+    StoreSome(DU(), hn::Load(DU(), p.code + i), {particles.direction, count}, i);
+    StoreBytes(hn::Load(DI(), p.site + i), {particles.site, count}, i);
+    StoreSome(hn::Load(d, p.weight + i), {particles.weight, count}, i);
+    StoreSome(hn::Load(d, p.r + i), {particles.r, count}, i);
+    StoreSome(hn::Load(d, p.g + i), {particles.g, count}, i);
+    StoreSome(hn::Load(d, p.b + i), {particles.b, count}, i);
   }
   return outcome;
 }

@@ -28,29 +28,28 @@ struct DiscreteTarget {
   DiscreteTarget(const PointValues& target_before, const PointValues& target_now)
       : before(target_before), now(target_now), log_before(log_of(before)), log_now(log_of(now)) {}
 
-  TargetLanes Evaluate(const PointLanes& point) const {
+  void Evaluate(const PointLanes& point, bool /*want_before*/, TargetLanes& out) const {
     const DF d;
     const VI index = hn::BitCast(DI(), point.code);
-    return {hn::GatherIndex(d, log_before.data(), index),
-            hn::GatherIndex(d, log_now.data(), index),
-            hn::Set(d, 1.0f / kPoints),
-            hn::Set(d, kPoints),
-            {hn::Zero(d), hn::Zero(d), hn::Zero(d)}};
+    out.log_before = hn::GatherIndex(d, log_before.data(), index);
+    out.log_now = hn::GatherIndex(d, log_now.data(), index);
+    out.density = hn::Set(d, 1.0f / kPoints);
+    out.inverse_density = hn::Set(d, kPoints);
+    SetZero(out.reflected);
   }
-  TargetLanes EvaluateCarried(std::size_t /*i*/, const PointLanes& point,
-                              bool /*want_before*/) const {
-    return Evaluate(point);
+  void EvaluateCarried(std::size_t /*i*/, const PointLanes& point, bool want_before,
+                       TargetLanes& out) const {
+    Evaluate(point, want_before, out);
   }
-  TargetLanes EvaluateNow(const PointLanes& point) const { return Evaluate(point); }
   static bool ManySites() { return false; }
   void Prefetch(std::uint32_t /*bits*/) const {}
   /// Blocks of neighbours from a random start on the ring of points.
   static std::size_t BlockStart(std::uint32_t bits) { return bits % kPoints; }
-  TargetLanes Propose(std::size_t entry, VF /*site_fraction*/, bool /*want_before*/,
-                      PointLanes& point) const {
+  void Propose(std::size_t entry, VF /*site_fraction*/, bool want_before, PointLanes& point,
+               TargetLanes& out) const {
     point.code =
-        hn::And(hn::Iota(DU(), static_cast<std::uint32_t>(entry)), hn::Set(DU(), kPoints - 1));
-    return Evaluate(point);
+        hn::And(CountFrom(DU(), static_cast<std::uint32_t>(entry)), hn::Set(DU(), kPoints - 1));
+    Evaluate(point, want_before, out);
   }
 };
 
