@@ -29,9 +29,8 @@ struct PlacedPoints {
 HWY_INLINE PlacedPoints PlacePoints(const kernels::RestirPoints& points, std::size_t i,
                                     const kernels::CarriedLight& light,
                                     const WantedLights& wanted) {
-  const hn::Rebind<std::uint8_t, DI> bytes;
   PlacedPoints p;
-  p.site = hn::PromoteTo(DI(), hn::LoadU(bytes, points.site + i));
+  p.site = hn::PromoteTo(DI(), hn::LoadU(DB(), points.site + i));
   p.w = DecodeOctahedral(hn::LoadU(DU(), points.code + i));
   if (wanted.now) {
     p.now = LocateTexels(light.now, p.w);
