@@ -108,7 +108,9 @@ TEST_P(RivalKernels, PointsAreEvaluatedInTheirRangeAlone) {
         expect(points_->target_now[i], target(sites, now, i), true);
         expect(points_->target_before[0][i], target(sites, before, i), first_old == 0);
         expect(points_->target_before[1][i], target(other.sites, before, i) / 2, true);
-        if (!inside) EXPECT_EQ(points_->r[i], kUntouched);
+        if (!inside) {
+          EXPECT_EQ(points_->r[i], kUntouched);
+        }
       }
     }
   }
