@@ -127,7 +127,7 @@ std::vector<AutoCandidate> auto_candidates(const JobSpec& job) {
     for (const int p : {1, 5})
       add(fmt::format("sequential P={}", p), Method::sequential, asked.num_candidates, p);
     if (!job.visibility.correlated)
-      for (const int m : {128, 512})
+      for (const int m : {128, 256, 512})
         add(fmt::format("pool M={}", m), Method::pool, m, asked.num_distributions);
   }
   return candidates;
