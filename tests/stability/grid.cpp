@@ -42,7 +42,11 @@ Result<std::vector<Cell>> run_case(const Case& c, const std::vector<Subject>& su
     cell.subject = subjects[s].name;
     cell.summary = summarise(time, truth, seen[s]);
     cell.quadrature_error = truth.quadrature_error;
-    cell.cpu_seconds = seen[s].stats.cpu_seconds - seen[s].stats.seconds_light;
+    const RenderStats& stats = seen[s].stats;
+    cell.cpu_seconds = stats.cpu_seconds - stats.seconds_light;
+    cell.pixel_us =
+        1e6 * (stats.seconds_sample + stats.seconds_visibility + stats.seconds_shade) /
+        static_cast<double>(std::max<std::uint64_t>(stats.pixels - stats.pixels_background, 1));
   }
 
   // Judge them beside fresh samples.
@@ -114,7 +118,7 @@ Status write_tables(const std::filesystem::path& folder, const std::vector<Cell>
       "case,subject,verdict,expected,number,unlawful,bias,bias_interval,lns_mean,lns_mean_interval,"
       "lns_median,noise,"
       "noise_after,p999,lost,growth,flicker,ess,acceptance,restarted,refreshed,resampled,"
-      "quadrature_error,cpu_seconds\n";
+      "quadrature_error,cpu_seconds,pixel_us\n";
   std::string series = "case,subject,frame,lns_mean,lns_median,lns_p5,lns_p95,bias,noise,ess\n";
   for (const Cell& cell : cells) {
     const Numbers& n = cell.summary.numbers;
@@ -124,7 +128,7 @@ Status write_tables(const std::filesystem::path& folder, const std::vector<Cell>
     for (const double value :
          {n.bias, n.bias_interval, n.lns_mean, n.lns_mean_interval, n.lns_median, n.noise,
           n.noise_after, n.tail, n.lost, n.growth, n.flicker, n.ess, n.acceptance, n.restarted,
-          n.refreshed, n.resampled, cell.quadrature_error, cell.cpu_seconds}) {
+          n.refreshed, n.resampled, cell.quadrature_error, cell.cpu_seconds, cell.pixel_us}) {
       grid += fmt::format(",{:.5g}", value);
     }
     grid += "\n";
