@@ -154,8 +154,23 @@ TEST(Methods, RestirAgreesWithBruteForceAfterFiveFrames) { expect_agreement(rest
 // Errors stay: what twenty frames see is hardly more than what their first ones saw, so less can be told.
 TEST(Methods, RestirAgreesWithBruteForceAfterTwentyFrames) { expect_agreement(restir_job(20, 0), 200, 0.02); }
 TEST(Methods, RestirWithTwoNeighborsAgreesWithBruteForce) { expect_agreement(restir_job(5, 2), 200, 0.01); }
+/// Samples turn with a small sun, and the lattice rounds them in each frame.
+JobSpec sunny_job(int frames, double deg_per_frame) {
+  JobSpec job = restir_job(frames, 0);
+  job.environment.keys[0].map = test::write_map("sun.exr", test::sky_map(512, 256, 3000));
+  job.environment.rotation_deg_per_frame = deg_per_frame;
+  return job;
+}
+TEST(Methods, RestirAgreesWhileASmallSunTurns) { expect_agreement(sunny_job(20, 0.5), 200, 0.01); }
+TEST(Methods, RestirAgreesWhileASmallSunCreeps) { expect_agreement(sunny_job(20, 0.07), 200, 0.01); }
+TEST(Methods, RestirUnderATurningNearestMapAgrees) {
+  JobSpec job = restir_job(5, 0);
+  job.environment.filter = MapFilter::nearest;
+  expect_agreement(job, kRuns, 0.02);
+}
 TEST(Methods, RestirThatCarriesFreeSamplesAgreesWhereNothingMoves) {
   JobSpec job = restir_job(10, 0);
+  job.environment.rotation_deg_per_frame = 0;
   job.sampling.reuse_visibility = true;
   expect_agreement(job, 200, 0.01);
 }

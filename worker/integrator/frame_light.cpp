@@ -4,8 +4,10 @@
 
 #include <algorithm>
 #include <chrono>
+#include <cmath>
 
 #include "common/base/limits.h"
+#include "common/math/octahedral.h"
 #include "worker/integrator/candidate_samplers.h"
 
 namespace baton {
@@ -91,6 +93,21 @@ LightPoolLayout pool_layout(const JobSpec& job) {
 
 }  // namespace
 
+std::optional<Mat3> turn_between(const Environment& before, const Environment& now) {
+  constexpr double kMinTurn = 15 * kOctahedralError;
+  if (now.map->filter() == MapFilter::nearest) return std::nullopt;
+  const Mat3 turn = now.rotation * before.rotation.transposed();
+
+  // |turn - 1|^2 = 8 sin^2(angle / 2), exact for small angles, too.
+  double squares = 0;
+  for (std::size_t i = 0; i < turn.m.size(); ++i) {
+    const double difference = double{turn.m[i]} - Mat3{}.m[i];
+    squares += difference * difference;
+  }
+  if (std::sqrt(squares / 2) < kMinTurn) return std::nullopt;
+  return turn;
+}
+
 LightSequence::LightSequence(const JobSpec& job, std::shared_ptr<MapCache> maps)
     : job_(job), maps_(std::move(maps)), frames_(expand_sequence(job)) {}
 
@@ -146,6 +163,8 @@ Result<std::shared_ptr<const FrameLight>> LightSequence::at(std::int32_t index) 
   BATON_ASSIGN(light->now, environment(frame.environment));
   BATON_ASSIGN(light->before, environment(frame_before.environment));
   light->still = frame.environment == frame_before.environment;
+  if (frame.environment.same_texels(frame_before.environment))
+    light->turn = turn_between(light->before, light->now);
   light->pool = make_light_pool(light->now, light->before, job_.seed,
                                 static_cast<std::uint32_t>(frame.number), pool_layout(job_));
   light->prepare_seconds =

@@ -4,6 +4,7 @@
 #include <list>
 #include <memory>
 #include <mutex>
+#include <optional>
 #include <vector>
 
 #include "common/base/result.h"
@@ -19,9 +20,18 @@ struct FrameLight {
   Environment now;
   Environment before;  ///< the frame before; for the first frame the same as now
   bool still = false;  ///< now shows what before showed: the same texels, turned alike
+  /// How directions turn with the light from the frame before to now, if that is all that it does;
+  /// see turn_between()
+  std::optional<Mat3> turn;
   LightPool pool;
   double prepare_seconds = 0;  ///< time spent on texels, table and pool
 };
+
+/// R_now R_before^-1 of a map whose texels stay: along it, directions on the lattice are carried
+/// with their light. None for turns below 0.06 degrees, of which the lattice could swallow more
+/// than a fifteenth, and with `nearest`: there a direction that is rounded into the next texel has
+/// another light at once.
+std::optional<Mat3> turn_between(const Environment& before, const Environment& now);
 
 /// The environments of a job's frames, prepared on demand and kept while memory allows. Any number
 /// of threads may ask; a frame is prepared once while the others wait. A frame's light is a pure

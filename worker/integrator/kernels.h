@@ -151,6 +151,7 @@ struct CarriedLight {
   const EnvironmentView& now;
   bool still = false;  ///< both are the same
   const LightPool& pool;
+  const Mat3* turn = nullptr;  ///< FrameLight::turn; `restir` alone asks
 };
 
 /// One frame of the sequential sampler for a pixel (sampling/sequential-inl.h). old: the surfaces

@@ -40,7 +40,8 @@ inline kernels::CarriedLight carried_light(const PixelInput& input) {
   return {.before = input.before,
           .now = input.now,
           .still = input.light.still,
-          .pool = input.light.pool};
+          .pool = input.light.pool,
+          .turn = input.light.turn ? &*input.light.turn : nullptr};
 }
 
 /// The samples of one pixel, in and out: a properly weighted set for p~(site, w) = p~_site(w) / S

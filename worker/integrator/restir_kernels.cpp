@@ -20,10 +20,17 @@ struct WantedLights {
   bool now, before;
 };
 
+/// Turns back what `turn`, if there is one, has turned.
+HWY_INLINE Vec3Lanes TurnBack(const Mat3* turn, const Vec3Lanes& w) {
+  if (turn == nullptr) return w;
+  return Transform(turn->transposed().m.data(), w);
+}
+
 /// A vector of points and where they lie in the maps.
 struct PlacedPoints {
   VI site;
   Vec3Lanes w;
+  Vec3Lanes w_before;  ///< where carried samples at w came from: w, or turned back with the map
   TexelLanes now, before;
 };
 HWY_INLINE PlacedPoints PlacePoints(const kernels::RestirPoints& points, std::size_t i,
@@ -32,6 +39,7 @@ HWY_INLINE PlacedPoints PlacePoints(const kernels::RestirPoints& points, std::si
   PlacedPoints p;
   p.site = hn::PromoteTo(DI(), hn::LoadU(DB(), points.site + i));
   p.w = DecodeOctahedral(hn::LoadU(DU(), points.code + i));
+  p.w_before = TurnBack(light.turn, p.w);
   if (wanted.now) {
     p.now = LocateTexels(light.now, p.w);
     PrefetchTexels(light.now, p.now);
@@ -47,7 +55,7 @@ HWY_INLINE PlacedPoints PlacePoints(const kernels::RestirPoints& points, std::si
 HWY_INLINE VF OldTarget(const OldSurfaces& old, std::int32_t num_sites, const PlacedPoints& p,
                         const RadianceLanes& then) {
   const SurfaceLanes surface = LoadSurfaces(old.sites, p.site);
-  const BsdfLanes f = EvaluateBsdf(surface, p.w);
+  const BsdfLanes f = EvaluateBsdf(surface, p.w_before);
   const VF target = MeanLanes(ReflectedRadiance(surface, f, then.r, then.g, then.b));
   return hn::Mul(target, ExpLanes(LookUp(old.log_share, p.site, num_sites)));
 }
@@ -57,8 +65,8 @@ void EvaluatePoints(const SiteBlock& sites, std::span<const OldSurfaces* const> 
                     kernels::RestirPoints& points) {
   const DF d;
   const bool wants_old = range.first_old < old.size();
-  const WantedLights wanted{range.wants_now || (wants_old && light.still),
-                            wants_old && !light.still};
+  const bool same_light = light.still || light.turn != nullptr;
+  const WantedLights wanted{range.wants_now || (wants_old && same_light), wants_old && !same_light};
   const bool wants_surface =
       range.wants_now ||
       std::any_of(old.begin() + static_cast<std::ptrdiff_t>(range.first_old), old.end(),
@@ -93,14 +101,27 @@ void EvaluatePoints(const SiteBlock& sites, std::span<const OldSurfaces* const> 
         put(MeanLanes(reflected), points.target_now, i);
       }
       if (!wants_old) continue;
-      then = light.still ? now : EvaluateTexels(light.before, p.before);
+      then = same_light ? now : EvaluateTexels(light.before, p.before);
       for (std::size_t k = range.first_old; k < old.size(); ++k) {
-        const VF target = old[k] == nullptr
-                              ? MeanLanes(ReflectedRadiance(surface, f, then.r, then.g, then.b))
-                              : OldTarget(*old[k], sites.num_sites, p, then);
-        put(target, points.target_before[k], i);
+        if (old[k] != nullptr) {
+          put(OldTarget(*old[k], sites.num_sites, p, then), points.target_before[k], i);
+          continue;
+        }
+        if (light.turn != nullptr) f = EvaluateBsdf(surface, p.w_before);
+        put(MeanLanes(ReflectedRadiance(surface, f, then.r, then.g, then.b)),
+            points.target_before[k], i);
       }
     }
+  }
+}
+
+void TurnPoints(const Mat3& turn, std::size_t first, std::size_t last,
+                kernels::RestirPoints& points) {
+  const DU du;
+  for (std::size_t i = first; i < last; i += hn::Lanes(du)) {
+    const Vec3Lanes w = DecodeOctahedral(hn::LoadU(du, points.code + i));
+    const VU turned = EncodeOctahedral(Transform(turn.m.data(), w));
+    StoreSome(du, turned, std::span(points.code, last), i);
   }
 }
 
@@ -110,8 +131,14 @@ HWY_AFTER_NAMESPACE();
 #if HWY_ONCE
 namespace baton {
 HWY_EXPORT(EvaluatePoints);
+HWY_EXPORT(TurnPoints);
 
 namespace kernels {
+
+void turn_points(const Mat3& turn, std::size_t first, std::size_t last, RestirPoints& points) {
+  BATON_CHECK(last + kPadding <= RestirPoints::kCapacity);
+  HWY_DYNAMIC_DISPATCH(TurnPoints)(turn, first, last, points);
+}
 
 void evaluate_points(const SiteBlock& sites, std::span<const OldSurfaces* const> old,
                      const CarriedLight& light, const PointRange& range, RestirPoints& points) {

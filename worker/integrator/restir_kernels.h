@@ -24,9 +24,15 @@ struct PointRange {
   std::size_t first_old = 0;  ///< targets of the carried sets first_old, ...
 };
 
+/// Turns the directions of points [first, last) and rounds them to the lattice. Codes past the last
+/// one are read up to a vector's end.
+void turn_points(const Mat3& turn, std::size_t first, std::size_t last, RestirPoints& points);
+
 /// Evaluates points under the surfaces and the light of now, and under those that the carried sets
 /// come from: the light of the frame before, and `old` surfaces by sites of this frame, null where
-/// they are `sites`. Codes and sites past the last point are read up to a vector's end.
+/// they are `sites`. With light.turn the carried sets are taken to have been turned by it: their
+/// target at y is that of then at turn^-1 y, so their surfaces are seen from there, under the light
+/// of now at y. Codes and sites past the last point are read up to a vector's end.
 void evaluate_points(const SiteBlock& sites, std::span<const OldSurfaces* const> old,
                      const CarriedLight& light, const PointRange& range, RestirPoints& points);
 

@@ -49,10 +49,12 @@ class SetGatherer {
     }
     end_set(std::min(static_cast<float>(set.confidence), history_limit_), set.surfaces);
   }
-  /// Gives the vector that covers the last points directions and sites to evaluate.
-  void pad() {
+  /// Gives the vector that covers the last points directions and sites to evaluate, and turns the
+  /// carried samples, unless `turn` is null.
+  void finish(const Mat3* turn) {
     std::fill_n(points_.code + count_, kernels::kPadding, OctDirection{0});
     std::fill_n(points_.site + count_, kernels::kPadding, std::uint8_t{0});
+    if (turn != nullptr) kernels::turn_points(*turn, sets_[0].end, count_, points_);
   }
 
  private:
@@ -127,9 +129,9 @@ void take(const RestirPoints& from, std::span<const std::uint32_t> picks,
 
 /// Targets of all sets at all points; returns how many were evaluated. own_is_known: those of set 1
 /// at its own points.
-std::size_t evaluate(const PixelInput& input, const SetGatherer& all, bool has_own,
-                     bool own_is_known, RestirPoints& points) {
-  const kernels::CarriedLight light = carried_light(input);
+std::size_t evaluate(const PixelInput& input, const kernels::CarriedLight& light,
+                     const SetGatherer& all, bool has_own, bool own_is_known,
+                     RestirPoints& points) {
   const std::span<const RestirSet> sets = all.sets();
   const std::size_t num_old = all.surfaces().size();
   const bool unchanged = has_own && input.old == nullptr && light.still;
@@ -182,7 +184,11 @@ PixelDiagnostics RestirSampler::sample(const PixelInput& input, SamplerScratch& 
        std::span(points.contribution).first(n), std::span(points.r).first(n),
        std::span(points.g).first(n), std::span(points.b).first(n), lns, lns_fresh, source});
 
-  // The sets of the frame before.
+  // The sets of the frame before. Their own targets are those of the directions that they had: a
+  // direction that has been turned is rounded anew, and all densities of a weight must be taken at
+  // one place, since only there the light, which may change steeply, is the same in all of them.
+  const kernels::CarriedLight light = carried_light(input);
+  const bool own_is_known = has_own && !input.target_before.empty() && light.turn == nullptr;
   SetGatherer all(points, history_limit_);
   all.add_fresh(n, lns);
   if (has_own) {
@@ -192,14 +198,14 @@ PixelDiagnostics RestirSampler::sample(const PixelInput& input, SamplerScratch& 
                      .lns = samples.lns,
                      .confidence = *samples.confidence,
                      .surfaces = input.old},
-                    input.target_before);
+                    own_is_known ? input.target_before : std::span<const float>());
   }
   for (const CarriedSet& neighbor : input.neighbors) all.add_carried(neighbor, {});
-  all.pad();
+  all.finish(light.turn);
 
   // Weigh them together and choose.
-  diagnostics.target_evaluations += static_cast<std::int32_t>(
-      evaluate(input, all, has_own, has_own && !input.target_before.empty(), points));
+  diagnostics.target_evaluations +=
+      static_cast<std::int32_t>(evaluate(input, light, all, has_own, own_is_known, points));
   const double total = weigh_restir_sets(all.sets(), points.contribution, points.target_now,
                                          std::span(points.weight).first(all.count()));
   *samples.confidence = next_confidence(all.sets(), history_limit_);

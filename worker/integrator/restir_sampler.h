@@ -8,7 +8,9 @@ namespace baton {
 /// (sampling/restir.h). Each frame:
 ///  - a fresh set, the N samples of `bidirectional`: one stratified choice from M candidates
 ///    instead of N independent streams, which is the stronger form;
-///  - the set that the pixel carries, shifted by keeping its direction;
+///  - the set that the pixel carries, shifted by keeping its texel, as real-time ReSTIR keeps the
+///    light that it has chosen: where the map only turned (FrameLight::turn), directions turn with
+///    it, and where its texels changed, they stay;
 ///  - the sets of neighbours, of the frame before as in the spatiotemporal pass of Wyman &
 ///    Panteleev [2021]: tiles of one frame need not wait for each other;
 ///  - N samples chosen systematically from all of them, along a curve of directions; all their

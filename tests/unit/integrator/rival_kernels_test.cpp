@@ -7,6 +7,7 @@
 #include <memory>
 #include <vector>
 
+#include "worker/integrator/frame_light.h"
 #include "worker/integrator/ratio_kernels.h"
 #include "worker/integrator/restir_kernels.h"
 #include "worker/scene/material.h"
@@ -54,9 +55,10 @@ class RivalKernels : public testing::TestWithParam<std::int64_t> {
     hwy::GetChosenTarget().Update(hwy::SupportedTargets());
   }
 
-  /// Mean over RGB of what point i reflects, by the kernels that everybody uses.
-  float target(const SiteBlock& sites, const EnvironmentView& light, std::size_t i) const {
-    const Vec3 w = decode_octahedral(points_->code[i]);
+  /// Mean over RGB of what point i, turned back, reflects, by the kernels that everybody uses.
+  float target(const SiteBlock& sites, const EnvironmentView& light, std::size_t i,
+               const Mat3& turn = {}) const {
+    const Vec3 w = turn.transposed() * decode_octahedral(points_->code[i]);
     const std::int32_t site = points_->site[i];
     float l[4], f[4];
     const auto one = [](const float& v) { return std::span(&v, 1); };
@@ -114,6 +116,59 @@ TEST_P(RivalKernels, PointsAreEvaluatedInTheirRangeAlone) {
       }
     }
   }
+}
+
+// What was drawn before a map turned is judged where it lay then: by light and surfaces of then.
+TEST_P(RivalKernels, PointsThatTurnedAreSeenFromWhereTheyCame) {
+  const SiteBlock sites = pixel(0.1f);
+  OldSurfaces other{.sites = pixel(0.5f)};
+  other.log_share.fill(-std::log(2.0f));
+  const OldSurfaces* const old[] = {nullptr, &other};
+  const EnvironmentView now = view_of(now_), before = view_of(before_);
+  const std::optional<Mat3> turn = turn_between(before_, now_);
+  ASSERT_TRUE(turn);
+  constexpr std::size_t kLast = 83;
+  kernels::evaluate_points(sites, old,
+                           {.before = before, .now = now, .pool = light_pool_, .turn = &*turn},
+                           {.first = 0, .last = kLast, .wants_now = true}, *points_);
+  for (std::size_t i = 0; i < kLast; ++i) {
+    const auto expect = [&](float got, float wanted) {
+      EXPECT_NEAR(got, wanted, 1e-4f * (1 + std::fabs(wanted))) << i;
+    };
+    expect(points_->target_now[i], target(sites, now, i));
+    expect(points_->target_before[0][i], target(sites, before, i, *turn));
+    expect(points_->target_before[1][i], target(other.sites, before, i, *turn) / 2);
+  }
+}
+
+TEST_P(RivalKernels, DirectionsTurnInTheirRangeAlone) {
+  const Mat3 turn = rotation_about({0.3f, 1, -0.2f}, 7);
+  constexpr std::size_t kFirst = 5, kLast = 5 + 83;
+  kernels::turn_points(turn, kFirst, kLast, *points_);
+  for (std::uint32_t i = 0; i < 120; ++i) {
+    const OctDirection code = (i + 1) * 2654435761u;
+    const Vec3 turned = turn * decode_octahedral(code);
+    if (i >= kFirst && i < kLast) {
+      EXPECT_LT(length(decode_octahedral(points_->code[i]) - turned), 1.01 * kOctahedralError);
+    } else {
+      EXPECT_EQ(points_->code[i], code);
+    }
+  }
+}
+
+TEST(TurnBetween, KnowsHowABilinearMapTurnedUnlessItIsNextToNothing) {
+  const std::optional<Mat3> turn = turn_between(sky(20), sky(30));
+  ASSERT_TRUE(turn);
+  EXPECT_LT(length(*turn * Vec3{0, 0, 1} - rotation_about({0, 1, 0}, 10) * Vec3{0, 0, 1}), 1e-6f);
+  EXPECT_TRUE(turn_between(sky(0), sky(180)));
+  EXPECT_TRUE(turn_between(sky(20), sky(19.9)));
+  EXPECT_FALSE(turn_between(sky(20), sky(20.05)));
+  EXPECT_FALSE(turn_between(sky(20), sky(20)));
+
+  Environment nearest = sky(20);
+  nearest.map =
+      std::make_shared<EnvironmentMap>(RgbImage{1, 1, {1, 1, 1}}, MapFilter::nearest, 1.0f, false);
+  EXPECT_FALSE(turn_between(nearest, {nearest.map, rotation_about({0, 1, 0}, 90)}));
 }
 
 // Without shadows the ratio estimator is the sum of all candidates, per channel.
