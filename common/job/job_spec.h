@@ -216,7 +216,7 @@ struct SamplingSpec {
   int history_limit = 20;    ///< restir: a carried set counts as at most so many fresh ones, [1, limits::kMaxHistoryLimit]
   int num_neighbors = 0;     ///< restir: other pixels of the frame before whose samples a pixel weighs, [0, limits::kMaxNeighbors]
   int neighbor_radius = 30;  ///< restir: how far from the pixel's own history they are, pixels, [1, limits::kMaxNeighborRadius]
-  /// restir: only samples whose ray was free are carried on. Unbiased while nothing moves and no neighbours are asked, else not.
+  /// restir: only samples whose ray was free are carried on. Unbiased while nothing moves or turns and no neighbours are asked.
   bool reuse_visibility = false;
   std::optional<float> target_error{};  ///< automatic: RMSE over mean radiance to reach, (0, 10]
   std::optional<float> time_budget{};   ///< automatic: CPU seconds of the whole job to stay within, (0, 1e9]

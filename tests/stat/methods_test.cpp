@@ -163,6 +163,7 @@ JobSpec sunny_job(int frames, double deg_per_frame) {
 }
 TEST(Methods, RestirAgreesWhileASmallSunTurns) { expect_agreement(sunny_job(20, 0.5), 200, 0.01); }
 TEST(Methods, RestirAgreesWhileASmallSunCreeps) { expect_agreement(sunny_job(20, 0.07), 200, 0.01); }
+// Directions stay: rounded into another texel, they would change their light.
 TEST(Methods, RestirUnderATurningNearestMapAgrees) {
   JobSpec job = restir_job(5, 0);
   job.environment.filter = MapFilter::nearest;
@@ -173,6 +174,14 @@ TEST(Methods, RestirThatCarriesFreeSamplesAgreesWhereNothingMoves) {
   job.environment.rotation_deg_per_frame = 0;
   job.sampling.reuse_visibility = true;
   expect_agreement(job, 200, 0.01);
+}
+// ... and elsewhere are biased: a direction that was blocked turns into one that is free.
+TEST(Methods, FreeSamplesThatTurnAreBiased) {
+  JobSpec job = restir_job(10, 0);
+  job.sampling.reuse_visibility = true;
+  const Verdict v = compare(repeat(job, kRuns), judge(job, 60000));
+  EXPECT_GT(v.image, kImageLimit);
+  EXPECT_GT(v.worst_pixel, kPixelLimit);
 }
 /// Eight near neighbours under a sky that stands still.
 JobSpec crowded_job(bool reuse_visibility) {

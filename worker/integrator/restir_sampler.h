@@ -19,8 +19,9 @@ namespace baton {
 /// `reuse_visibility` blocked samples are forgotten, so a carried set stands for p~ V. While V
 /// stays that of the pixel, this is unbiased too: at a free direction the shares of all sets sum to
 /// 1 as before, and at a blocked one what is missing from Lns is not seen. A set from other
-/// surfaces, by motion or from a neighbour, lacks directions that were blocked there and are free
-/// here: a bias, that of RTXDI's basic correction, which traces no rays for its weights, too.
+/// surfaces, by motion or from a neighbour, or one that turned with the map, lacks directions that
+/// were blocked there and are free here: a bias, that of RTXDI's basic correction, which traces no
+/// rays for its weights, too.
 class RestirSampler final : public PixelSampler {
  public:
   explicit RestirSampler(const SamplingSpec& spec);
