@@ -131,6 +131,25 @@ class Drawing {
         forth, back, series_colour(series.colour));
   }
 
+  /// Where the palette repeats, lines are dashed and markers squares.
+  static bool repeats(const ChartSeries& series) {
+    return static_cast<std::size_t>(series.colour) >= kPalette.size();
+  }
+  static const char* dash_of(const ChartSeries& series) {
+    return repeats(series) ? R"( stroke-dasharray="5 3")" : "";
+  }
+  void draw_marker(const ChartSeries& series, double x, double y, const char* fill,
+                   const std::string& title) {
+    const char* const colour = series_colour(series.colour);
+    if (repeats(series)) {
+      add(R"(<rect x="{:.1f}" y="{:.1f}" width="{}" height="{}" fill="{}" stroke="{}">{}</rect>)",
+          x - kMarker, y - kMarker, 2 * kMarker, 2 * kMarker, fill, colour, title);
+    } else {
+      add(R"(<circle cx="{:.1f}" cy="{:.1f}" r="{}" fill="{}" stroke="{}">{}</circle>)", x, y,
+          kMarker, fill, colour, title);
+    }
+  }
+
   void draw_series(const ChartSeries& series) {
     const char* const colour = series_colour(series.colour);
     std::string path;
@@ -140,16 +159,16 @@ class Drawing {
                           y_.position(point.y));
     }
     if (path.empty()) return;
-    add(R"(<path d="{}" fill="none" stroke="{}" stroke-width="1.6"/>)"
+    add(R"(<path d="{}" fill="none" stroke="{}" stroke-width="1.6"{}/>)"
         "\n",
-        path, colour);
+        path, colour, dash_of(series));
     for (const ChartPoint& point : series.points) {
       if (!shows(point)) continue;
       const double x = x_.position(point.x), y = y_.position(point.y);
-      add(R"(<circle cx="{:.1f}" cy="{:.1f}" r="{}" fill="{}" stroke="{}"><title>{}: {}, {:.4g}, )"
-          R"({:.4g} [{:.4g}, {:.4g}]</title></circle>)",
-          x, y, kMarker, point.hollow ? "#fff" : colour, colour, escaped(series.name),
-          escaped(point.label), point.x, point.y, point.low, point.high);
+      draw_marker(series, x, y, point.hollow ? "#fff" : colour,
+                  fmt::format("<title>{}: {}, {:.4g}, {:.4g} [{:.4g}, {:.4g}]</title>",
+                              escaped(series.name), escaped(point.label), point.x, point.y,
+                              point.low, point.high));
       if (point.marked) {
         add(R"(<circle cx="{:.1f}" cy="{:.1f}" r="{}" fill="none" stroke="#000"/>)"
             R"(<text x="{:.1f}" y="{:.1f}" font-size="9" fill="#333">{}</text>)",
@@ -163,11 +182,13 @@ class Drawing {
     double y = kTop + 8;
     bool marked = false, hollow = false;
     for (const ChartSeries& series : chart_.series) {
-      add(R"(<path d="M{} {}h18" stroke="{}" stroke-width="2"/><circle cx="{}" cy="{}" r="{}" )"
-          R"(fill="{}"/><text x="{}" y="{}">{}</text>)"
+      const char* const colour = series_colour(series.colour);
+      add(R"(<path d="M{} {}h18" stroke="{}" stroke-width="2"{}/>)", kLegendLeft, y, colour,
+          dash_of(series));
+      draw_marker(series, kLegendLeft + 9, y, colour, "");
+      add(R"(<text x="{}" y="{}">{}</text>)"
           "\n",
-          kLegendLeft, y, series_colour(series.colour), kLegendLeft + 9, y, kMarker,
-          series_colour(series.colour), kLegendLeft + 24, y + 4, escaped(series.name));
+          kLegendLeft + 24, y + 4, escaped(series.name));
       y += kLegendStep;
       for (const ChartPoint& point : series.points) {
         marked = marked || point.marked;

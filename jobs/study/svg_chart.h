@@ -18,7 +18,7 @@ struct ChartPoint {
 
 struct ChartSeries {
   std::string name;
-  int colour = 0;                  ///< index into the palette, which repeats after eight
+  int colour = 0;                  ///< index into the palette, which repeats after eight, dashed
   std::vector<ChartPoint> points;  ///< in the order in which they are joined
 };
 
