@@ -13,6 +13,7 @@
 #include <cmath>
 
 #include "worker/integrator/candidates-inl.h"
+#include "worker/integrator/pixel_rays.h"
 #include "worker/sampling/systematic-inl.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -192,6 +193,20 @@ struct DistinctPicks {
     std::fill_n(times + count, hn::MaxLanes(DF()), 0.0f);
   }
 };
+
+/// Writes a vector of rays from j on: directions, what each brings if it is free, its share of Lns.
+HWY_INLINE void StoreRays(const Vec3Lanes& w, const Vec3Lanes& color, VF share, VI site,
+                          std::size_t j, PixelRays& out) {
+  const DF d;
+  hn::Store(w.x, d, out.x + j);
+  hn::Store(w.y, d, out.y + j);
+  hn::Store(w.z, d, out.z + j);
+  hn::Store(color.x, d, out.r + j);
+  hn::Store(color.y, d, out.g + j);
+  hn::Store(color.z, d, out.b + j);
+  hn::Store(share, d, out.visibility + j);
+  hn::StoreU(hn::DemoteTo(DB(), site), DB(), out.site + j);
+}
 
 inline float ChooseCandidates(const SiteBlock& sites, const EnvironmentView& environment,
                               const LightPool& pool, const kernels::CandidateCounts& counts,

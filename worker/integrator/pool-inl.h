@@ -127,14 +127,7 @@ HWY_INLINE void LookUpRays(const ChosenCandidates& chosen, const RayPlan& plan,
                              plan.control ? DoubtFactor(seen) : HopeFactor(seen));
     const Vec3Lanes color = Scale(c.reflected, hn::Div(light, MeanLanes(c.reflected)));
     const VF share = hn::Mul(light, per_light);
-    hn::Store(w.x, d, out.x + j);
-    hn::Store(w.y, d, out.y + j);
-    hn::Store(w.z, d, out.z + j);
-    hn::Store(color.x, d, out.r + j);
-    hn::Store(color.y, d, out.g + j);
-    hn::Store(color.z, d, out.b + j);
-    hn::Store(share, d, out.visibility + j);
-    hn::StoreU(hn::DemoteTo(DB(), c.site), DB(), out.site + j);
+    StoreRays(w, color, share, c.site, j, out);
     hn::StoreU(hn::DemoteTo(DB(), VisibilityBins(c.code)), DB(), out.bin + j);
     const Vec3Lanes sure = Scale(color, seen);
     expected = HWY_NAMESPACE::Add(expected, sure);

@@ -38,14 +38,7 @@ HWY_INLINE void LookUpShares(const ChosenCandidates& chosen, const DistinctPicks
     const VF times = hn::Load(d, picks.times + j);
     const Vec3Lanes color = Scale(c.reflected, hn::Div(times, MeanLanes(c.reflected)));
     sum = HWY_NAMESPACE::Add(sum, color);
-    hn::Store(w.x, d, out.x + j);
-    hn::Store(w.y, d, out.y + j);
-    hn::Store(w.z, d, out.z + j);
-    hn::Store(color.x, d, out.r + j);
-    hn::Store(color.y, d, out.g + j);
-    hn::Store(color.z, d, out.b + j);
-    hn::Store(hn::Div(times, hn::Set(d, num_rays)), d, out.visibility + j);
-    hn::StoreU(hn::DemoteTo(DB(), c.site), DB(), out.site + j);
+    StoreRays(w, color, hn::Div(times, hn::Set(d, num_rays)), c.site, j, out);
   }
   out.count = picks.count;
   std::fill_n(out.bin, picks.count, std::uint8_t{0});
