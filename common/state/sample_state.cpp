@@ -105,6 +105,7 @@ Status scatter(const SectionFile& file, const SectionTag& tag,
                const std::string& name, std::vector<T>& values) {
   const std::size_t row_bytes = per_pixel * sizeof(T);
   BATON_ASSIGN(const ByteView payload, section_payload(file, tag, pixels.size() * row_bytes, name));
+  if (row_bytes == 0) return {};
   for (std::size_t i = 0; i < pixels.size(); ++i) {
     std::memcpy(values.data() + pixels[i] * per_pixel, payload.data() + i * row_bytes, row_bytes);
   }

@@ -79,7 +79,7 @@ class RivalKernels : public testing::TestWithParam<std::int64_t> {
 std::vector<std::int64_t> available_targets() {
   std::vector<std::int64_t> targets;
   for (const std::int64_t target : {HWY_SSE4, HWY_AVX2, HWY_AVX3}) {
-    if ((hwy::SupportedTargets() & target) != 0) targets.push_back(target);
+    if ((hwy::SupportedTargets() & HWY_TARGETS & target) != 0) targets.push_back(target);
   }
   return targets;
 }
