@@ -216,7 +216,7 @@ Bytes encode_sections(const SectionTag& magic, std::uint16_t version,
   Bytes bytes;
   bytes.reserve(most);
   bytes.resize(table_end(sections.size()));
-  SectionPacker packer;
+  static thread_local SectionPacker packer;  // its memory is worth keeping
   for (const SectionView& section : sections) {
     BATON_CHECK(&*std::ranges::find(sections, section.tag, &SectionView::tag) == &section);
     const std::size_t start = bytes.size();
@@ -249,7 +249,7 @@ Result<SectionFile> decode_section_file(ByteView bytes, const SectionTag& magic,
                                         std::uint16_t max_version, const std::string& name) {
   BATON_ASSIGN(const Table table, read_table(bytes, magic, max_version, name));
   SectionFile file{magic, table.version, {}};
-  SectionUnpacker unpacker;
+  static thread_local SectionUnpacker unpacker;
   for (const TableEntry& entry : table.entries) {
     BATON_ASSIGN(Section section, unpack_section(unpacker, entry, name));
     file.sections.push_back(std::move(section));

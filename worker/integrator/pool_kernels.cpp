@@ -15,10 +15,6 @@
 
 #include "worker/integrator/pool-inl.h"
 
-HWY_BEFORE_NAMESPACE();
-namespace baton::HWY_NAMESPACE {}  // namespace baton::HWY_NAMESPACE
-HWY_AFTER_NAMESPACE();
-
 #if HWY_ONCE
 namespace baton {
 HWY_EXPORT(ChoosePoolRays);

@@ -1,5 +1,6 @@
 #include "worker/pass/primary.h"
 
+#include <algorithm>
 #include <array>
 #include <cmath>
 
@@ -19,7 +20,7 @@ std::array<float, 2> site_position(std::int32_t site, std::int32_t side, float u
 
 TileSurfaces trace_primary(const JobSpec& job, const FrameGeometry& geometry,
                            const PixelRect& rect) {
-  TileSurfaces surfaces{.rect = rect, .num_sites = job.image.sites, .hits = {}, .rays = {}};
+  TileSurfaces surfaces{.rect = rect, .num_sites = job.image.sites, .hits = {}, .rays = {}, .first_site = {}};
   surfaces.rays.reserve(static_cast<std::size_t>(rect.area() * job.image.sites));
   for (std::int32_t y = rect.y0; y < rect.y1; ++y) {
     for (std::int32_t x = rect.x0; x < rect.x1; ++x) {
@@ -28,6 +29,12 @@ TileSurfaces trace_primary(const JobSpec& job, const FrameGeometry& geometry,
   }
   surfaces.hits.resize(surfaces.rays.size());
   trace_primary_rays(job, geometry, surfaces.rays, surfaces.hits);
+  for (std::size_t i = 0; i < static_cast<std::size_t>(rect.area()); ++i) {
+    const std::span<const SurfaceHit> hits = surfaces.pixel(i);
+    const auto first =
+        std::find_if(hits.begin(), hits.end(), [](const SurfaceHit& hit) { return hit.hit; });
+    surfaces.first_site.push_back(static_cast<std::uint8_t>(first - hits.begin()));
+  }
   return surfaces;
 }
 

@@ -13,7 +13,15 @@ struct TileSurfaces {
   std::int32_t num_sites = 1;    ///< S
   std::vector<SurfaceHit> hits;  ///< (pixels, S)
   std::vector<Ray> rays;         ///< (pixels, S) primary rays
+  /// (pixels) The first site that sees a surface, S where none does: hits are large, and whether
+  /// there is one is asked several times a frame.
+  std::vector<std::uint8_t> first_site;
 
+  bool sees_surface(std::size_t index) const { return first_site[index] < num_sites; }
+  /// Of a pixel that sees one.
+  const SurfaceHit& first_surface(std::size_t index) const {
+    return hits[index * static_cast<std::size_t>(num_sites) + first_site[index]];
+  }
   std::span<const SurfaceHit> pixel(std::size_t index) const {
     return std::span(hits).subspan(index * static_cast<std::size_t>(num_sites),
                                    static_cast<std::size_t>(num_sites));

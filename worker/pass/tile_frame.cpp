@@ -11,15 +11,6 @@
 namespace baton {
 namespace {
 
-bool sees_surface(std::span<const SurfaceHit> hits) {
-  return std::any_of(hits.begin(), hits.end(), [](const SurfaceHit& hit) { return hit.hit; });
-}
-
-/// The first site that sees a surface, of a pixel that has one: its material decides.
-const SurfaceHit& first_surface(std::span<const SurfaceHit> hits) {
-  return *std::find_if(hits.begin(), hits.end(), [](const SurfaceHit& hit) { return hit.hit; });
-}
-
 /// Asks for a pixel's memory early: those of a tile are larger than the caches.
 void fetch_ahead(std::span<const MemoryCell> memory) {
   constexpr std::size_t kCellsOfLine = 64 / sizeof(MemoryCell);
@@ -137,7 +128,7 @@ void TileFrameRenderer::keep_targets(std::int32_t frame_index, std::size_t num_s
 /// they are not already, and the memory is asked for what evaluating them will read.
 void TileFrameRenderer::look_ahead(std::size_t pixel_of_batch, std::size_t index,
                                    const kernels::CarriedLight& light, SampleState& state) {
-  if (!sees_surface(surfaces_.pixel(index))) return;
+  if (!surfaces_.sees_surface(index)) return;
   Ahead& ahead = ahead_[index % 2];
   fetch_ahead(state.memory_of(index));
   ahead.history = has_history_ ? PixelHistory::same : PixelHistory::none;
@@ -166,19 +157,18 @@ void TileFrameRenderer::sample(Batch& batch, const FrameLight& light, SampleStat
   for (std::size_t i = 0; i < batch.count; ++i) {
     const std::size_t index = batch.first + i;
     if (i + 1 < batch.count) look_ahead(i + 1, index + 1, carried, state);
-    const std::span<const SurfaceHit> hits = surfaces_.pixel(index);
 
     // Gather the pixel's surfaces.
-    if (!sees_surface(hits)) {
+    if (!surfaces_.sees_surface(index)) {
       set_background(state, index);
       ++stats_.pixels_background;
       batch.end_ray[i] = batch.rays.size();
       continue;
     }
-    context_.gather_sites(hits, sites);
+    context_.gather_sites(surfaces_.pixel(index), sites);
 
-    // Sample as the pixel's material asks for, and cast the rays.
-    const PixelSetting& own = context_.own_settings[first_surface(hits).material];
+    // Sample as the material of its first surface asks for, and cast the rays.
+    const PixelSetting& own = context_.own_settings[surfaces_.first_surface(index).material];
     const PixelSampler& sampler = own.sampler != nullptr ? *own.sampler : *context_.sampler;
     const std::size_t n = own.sampler != nullptr ? static_cast<std::size_t>(own.num_particles)
                                                  : num_common_particles(state);
@@ -327,7 +317,7 @@ void TileFrameRenderer::render_reference(Batch& batch, const FrameLight& light,
   for (std::size_t i = 0; i < batch.count; ++i) {
     const std::size_t index = batch.first + i;
     const std::span<const SurfaceHit> hits = surfaces_.pixel(index);
-    const bool seen = sees_surface(hits);
+    const bool seen = surfaces_.sees_surface(index);
     state.source[index] = seen ? PixelSource::fresh : PixelSource::background;
     if (!seen) {
       ++stats_.pixels_background;

@@ -58,7 +58,7 @@ Result<TaskOutput> execute_render(const LoadedJob& loaded, BlobStore& store, con
   }
   double seconds_state = seconds_read;
 
-  // Render; all outputs become durable together, before anybody hears of them.
+  // Render.
   TaskOutput output;
   const auto keep = [&](BlobKind kind, std::int32_t frame, const Bytes& bytes) -> Status {
     BATON_ASSIGN(const Digest digest, store.put(bytes));
@@ -89,7 +89,6 @@ Result<TaskOutput> execute_render(const LoadedJob& loaded, BlobStore& store, con
   // run_tile counts what its sink does, not what was read before.
   output.stats.seconds_state = seconds_state;
   output.stats.cpu_seconds += seconds_read;
-  BATON_TRY(store.sync());
   return output;
 }
 
@@ -122,7 +121,6 @@ Result<TaskOutput> execute_second_pass(const LoadedJob& loaded, BlobStore& store
                run_second_pass(*loaded.context, task.step, task.tile, film, near));
   const Bytes bytes = encode_film_tile(second.film);
   BATON_ASSIGN(const Digest digest, store.put(bytes));
-  BATON_TRY(store.sync());
   return TaskOutput{{{BlobKind::film, task.step, task.tile, digest, bytes.size()}}, second.stats};
 }
 

@@ -19,7 +19,8 @@ struct TaskOutput {
 };
 
 /// Runs one task: reads its inputs from `store`, writes its outputs there (an assembled frame goes
-/// to the job's output folder), everything durable on return. Deterministic. Errors: a missing or
+/// to the job's output folder and is durable on return; blobs are after store.sync(), which comes
+/// before anybody hears of them). Deterministic. Errors: a missing or
 /// damaged input, the disk, bad input of the renderer; ErrorKind::cancelled when `stop` is
 /// requested.
 Result<TaskOutput> execute_task(const LoadedJob& loaded, BlobStore& store, const TaskKey& task,

@@ -4,9 +4,11 @@
 
 namespace baton {
 
-RenderPool::RenderPool(int num_threads, Execute execute, std::function<void()> wake)
-    : execute_(std::move(execute)), wake_(std::move(wake)) {
+RenderPool::RenderPool(int num_threads, Execute execute, Publish publish,
+                       std::function<void()> wake)
+    : execute_(std::move(execute)), publish_(std::move(publish)), wake_(std::move(wake)) {
   for (int i = 0; i < num_threads; ++i) threads_.emplace_back([this] { work(); });
+  threads_.emplace_back([this] { publish_executed(); });
 }
 
 RenderPool::~RenderPool() {
@@ -16,6 +18,7 @@ RenderPool::~RenderPool() {
     for (Slot& slot : slots_) slot.stop.request_stop();
   }
   changed_.notify_all();
+  executed_any_.notify_all();
   for (std::thread& thread : threads_) thread.join();
 }
 
@@ -49,6 +52,11 @@ void RenderPool::drop_queued() {
   }
 }
 
+std::vector<LeaseId> RenderPool::take_executed() {
+  const std::lock_guard lock(mutex_);
+  return std::exchange(left_thread_, {});
+}
+
 std::vector<EndedTask> RenderPool::collect() {
   const std::lock_guard lock(mutex_);
   return std::exchange(ended_, {});
@@ -73,8 +81,35 @@ void RenderPool::work() {
                                     ? Error{ErrorKind::cancelled, "stopped before it began"}
                                     : execute_(slot->task, stop);
     lock.lock();
-    ended_.push_back({slot->task.lease, std::move(result)});
+    left_thread_.push_back(slot->task.lease);
+    executed_.tasks.push_back(std::move(slot->task));
+    executed_.results.push_back(std::move(result));
     slots_.erase(slot);
+    executed_any_.notify_one();
+    wake_();
+  }
+}
+
+void RenderPool::publish_executed() {
+  std::unique_lock lock(mutex_);
+  while (true) {
+    executed_any_.wait(lock, [&] { return closing_ || !executed_.tasks.empty(); });
+    if (closing_) return;
+    Executed batch = std::exchange(executed_, {});
+
+    // One wait for all that went well, without the lock.
+    lock.unlock();
+    std::vector<PooledTask> good;
+    for (std::size_t i = 0; i < batch.tasks.size(); ++i) {
+      if (batch.results[i]) good.push_back(batch.tasks[i]);
+    }
+    const Status published = good.empty() ? Status() : publish_(good);
+    lock.lock();
+    for (std::size_t i = 0; i < batch.tasks.size(); ++i) {
+      Result<TaskOutput>& result = batch.results[i];
+      if (result && !published) result = published.error();
+      ended_.push_back({batch.tasks[i].lease, std::move(result)});
+    }
     wake_();
   }
 }

@@ -5,6 +5,7 @@
 #include <list>
 #include <memory>
 #include <mutex>
+#include <span>
 #include <stop_token>
 #include <thread>
 #include <vector>
@@ -26,16 +27,19 @@ struct EndedTask {
   Result<TaskOutput> result;
 };
 
-/// The render threads. The control thread submits, stops and collects; it never renders. Each
-/// thread takes the oldest queued task, runs it with a stop token of its own, and leaves the result
-/// for `collect`. The queue is bounded by the session, which asks for no more leases than threads
-/// + 1.
+/// The render threads, and one more that waits for the disk. The control thread submits, stops and
+/// collects; it never renders. Each render thread takes the oldest queued task, runs it with a stop
+/// token of its own and goes on with the next; the publisher makes durable what has been executed,
+/// all that came up during one wait by the next, and leaves the results for `collect`. The queue is
+/// bounded by the session, which asks for few more leases than there are threads.
 class RenderPool {
  public:
   using Execute = std::function<Result<TaskOutput>(const PooledTask& task, std::stop_token stop)>;
+  /// Makes the outputs of tasks that went well durable; an error becomes that of each of them.
+  using Publish = std::function<Status(std::span<const PooledTask> tasks)>;
 
-  /// `wake` is called on a render thread whenever a result is ready.
-  RenderPool(int num_threads, Execute execute, std::function<void()> wake);
+  /// `wake` is called on a thread of the pool whenever there is something to take or to collect.
+  RenderPool(int num_threads, Execute execute, Publish publish, std::function<void()> wake);
   /// Stops every task and joins.
   ~RenderPool();
   RenderPool(const RenderPool&) = delete;
@@ -47,6 +51,8 @@ class RenderPool {
   void stop(const LeaseId& lease);
   /// Ends every task that no thread has begun as cancelled.
   void drop_queued();
+  /// Tasks that have left their thread since the last call; each will end.
+  std::vector<LeaseId> take_executed();
   /// Results since the last call, in the order in which they ended.
   std::vector<EndedTask> collect();
 
@@ -57,13 +63,23 @@ class RenderPool {
     bool running = false;
   };
 
+  struct Executed {
+    std::vector<PooledTask> tasks;
+    std::vector<Result<TaskOutput>> results;  ///< of each
+  };
+
   void work();
+  void publish_executed();
 
   const Execute execute_;
+  const Publish publish_;
   const std::function<void()> wake_;
   std::mutex mutex_;
-  std::condition_variable changed_;
-  std::list<Slot> slots_;  ///< oldest first; queued and running
+  std::condition_variable changed_;       ///< for the render threads
+  std::condition_variable executed_any_;  ///< for the publisher
+  std::list<Slot> slots_;                 ///< oldest first; queued and running
+  Executed executed_;                     ///< not yet durable
+  std::vector<LeaseId> left_thread_;
   std::vector<EndedTask> ended_;
   bool closing_ = false;
   std::vector<std::thread> threads_;

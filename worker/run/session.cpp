@@ -55,7 +55,14 @@ void Session::on(const MessageArrived& event, TimePoint now, Actions& actions) {
       event.message);
 }
 
+void Session::on(const TaskExecuted& event, TimePoint now, Actions& actions) {
+  if (!in_hand_.contains(event.lease)) return;
+  executed_.insert(event.lease);
+  request_leases(now, actions);
+}
+
 void Session::on(const TaskEnded& event, TimePoint now, Actions& actions) {
+  executed_.erase(event.lease);
   if (in_hand_.erase(event.lease) == 0) return;
   next_request_ = now;  // what ended may have made work
 
@@ -184,10 +191,13 @@ void Session::introduce(TimePoint now, Actions& actions) {
 void Session::request_leases(TimePoint now, Actions& actions) {
   if (!welcomed_ || draining_ || now < next_request_) return;
 
-  // One task more than threads, so that the next one is here when one ends. A request replaces the
-  // one before.
-  const std::int32_t capacity = options_.identity.num_threads + 1;
-  const std::int32_t wanted = capacity - static_cast<std::int32_t>(in_hand_.size());
+  // One task more than threads, so that the next one is here when one ends. What waits for the disk
+  // needs no thread; when it is one for each thread, the disk is what is short. A request replaces
+  // the one before.
+  const std::int32_t threads = options_.identity.num_threads;
+  const auto waiting = static_cast<std::int32_t>(executed_.size());
+  const std::int32_t wanted =
+      threads + 1 + std::min(waiting, threads) - static_cast<std::int32_t>(in_hand_.size());
   if (wanted <= requested_) return;
   requested_ = wanted;
   request_expires_ = now + 2 * heartbeat_;

@@ -28,6 +28,9 @@ struct SessionOptions {
 struct MessageArrived {
   Message message;
 };
+struct TaskExecuted {
+  LeaseId lease;
+};  ///< its thread is free, its outputs are on their way to the disk: it will end
 struct TaskEnded {
   LeaseId lease;
   Result<TaskOutput> result;
@@ -37,7 +40,8 @@ struct DocumentMissing {
 };                         ///< a started task belongs to a job that this process has not seen
 struct DrainRequested {};  ///< SIGTERM or the coordinator: finish what runs, take nothing new
 struct Tick {};            ///< time has passed
-using SessionEvent = std::variant<MessageArrived, TaskEnded, DocumentMissing, DrainRequested, Tick>;
+using SessionEvent =
+    std::variant<MessageArrived, TaskExecuted, TaskEnded, DocumentMissing, DrainRequested, Tick>;
 
 // ---- actions: what the program around the session must do
 // -------------------------------------------------
@@ -85,6 +89,7 @@ class Session {
   using Actions = std::vector<SessionAction>;
 
   void on(const MessageArrived& event, TimePoint now, Actions& actions);
+  void on(const TaskExecuted& event, TimePoint now, Actions& actions);
   void on(const TaskEnded& event, TimePoint now, Actions& actions);
   void on(const DocumentMissing& event, TimePoint now, Actions& actions);
   void on(const DrainRequested& event, TimePoint now, Actions& actions);
@@ -108,7 +113,8 @@ class Session {
   bool welcomed_ = false;
   bool draining_ = false;
   std::chrono::milliseconds heartbeat_{1000};
-  std::set<LeaseId> in_hand_;           ///< granted and not ended; at most threads + 1
+  std::set<LeaseId> in_hand_;           ///< granted and not ended
+  std::set<LeaseId> executed_;          ///< those of them that have left their thread
   std::set<Digest> documents_missing_;  ///< asked for, not yet here
   std::deque<Message> reports_;         ///< the newest kMaxUnconfirmedReports, oldest first
   std::int32_t requested_ = 0;          ///< leases that the coordinator knows are wanted

@@ -5,9 +5,11 @@
 #include <unistd.h>
 
 #include <array>
+#include <list>
 #include <mutex>
 #include <optional>
 #include <set>
+#include <span>
 
 #include "common/base/files.h"
 #include "common/base/version.h"
@@ -104,6 +106,23 @@ Result<TaskOutput> execute_pooled(const PooledTask& task, std::stop_token stop, 
                fmt::format("{}\nto replay it alone: {}", output.error().message, command)};
 }
 
+/// What waiting for the disk may take; after it the tasks count as failed.
+constexpr std::chrono::seconds kDiskPatience{300};
+
+/// Makes the blobs of executed tasks durable. An assembled frame is already.
+Status publish_pooled(std::span<const PooledTask> tasks, TaskWatch& watch) {
+  const auto deadline = std::chrono::steady_clock::now() + kDiskPatience;
+  std::list<TaskWatch::Mark> marks;
+  std::set<std::shared_ptr<BlobStore>> stores;
+  for (const PooledTask& task : tasks) {
+    if (task.lease.task.kind == TaskKind::assemble) continue;
+    marks.emplace_back(watch, task.lease, deadline);
+    stores.insert(task.store);
+  }
+  for (const auto& store : stores) BATON_TRY(store->sync());
+  return {};
+}
+
 /// Carries the session's actions out and feeds it with events.
 class Worker {
  public:
@@ -118,12 +137,14 @@ class Worker {
             [this](const PooledTask& task, std::stop_token stop) {
               return execute_pooled(task, std::move(stop), notes_, watch_);
             },
+            [this](std::span<const PooledTask> tasks) { return publish_pooled(tasks, watch_); },
             [this] { channel_.wake(); }) {}
 
   ExitCode run(const std::atomic<bool>& drain) {
     bool draining = false;
     while (!leave_) {
       // Results first: they free slots that the tick then asks leases for.
+      for (const LeaseId& lease : pool_.take_executed()) step(TaskExecuted{lease});
       for (EndedTask& ended : pool_.collect()) {
         log_failure(ended);
         step(TaskEnded{ended.lease, std::move(ended.result)});

@@ -151,19 +151,20 @@ HWY_INLINE void LoadParticles(const Target& target, std::size_t count,
   const DF d;
   const std::size_t padded = hwy::RoundUpTo(count, hn::Lanes(d));
   const bool knows_before = particles.target_before != nullptr;
-  std::copy_n(particles.direction, count, p.code);
   for (std::size_t i = 0; i < count; i += hn::Lanes(d)) {
+    hn::Store(LoadSome(DU(), {particles.direction, count}, i), DU(), p.code + i);
     hn::Store(LoadBytes({particles.site, count}, i), DI(), p.site + i);
+    hn::Store(LoadSome({particles.weight, count}, i), d, p.weight + i);
+    if (knows_before) {
+      hn::Store(LoadSome({particles.target_before, count}, i), d, p.log_before + i);
+    }
+    hn::Store(hn::Zero(d), d, p.log_increment + i);
   }
-  std::copy_n(particles.weight, count, p.weight);
-  if (knows_before) std::copy_n(particles.target_before, count, p.log_before);
-  std::fill_n(p.log_increment, padded, 0.0f);
   // Past the last particle lie copies of it that weigh nothing.
   for (std::size_t i = count; i < padded; ++i) {
     p.code[i] = p.code[count - 1];
     p.site[i] = p.site[count - 1];
     p.log_before[i] = p.log_before[count - 1];
-    p.weight[i] = 0;
   }
   for (std::size_t i = 0; i < count; i += hn::Lanes(d)) {
     const PointLanes point{hn::Load(DU(), p.code + i), hn::Load(DI(), p.site + i)};

@@ -30,7 +30,8 @@ struct Tally {
   explicit Tally(VisibilityCell cell) : share(baton::share(cell)), seen(baton::seen(cell)) {}
   VisibilityCell cell() const { return static_cast<VisibilityCell>(share << 4 | seen); }
   void add(bool free) {
-    share += ((free ? kShareOfOne : 0) - share) * kStep[static_cast<std::size_t>(seen)] >> 16;
+    const std::int32_t outcome = -static_cast<std::int32_t>(free) & kShareOfOne;  // no branch
+    share += (outcome - share) * kStep[static_cast<std::size_t>(seen)] >> 16;
     seen = std::min(seen + 1, kMaxSeen);
   }
 };

@@ -2,11 +2,11 @@
 #include "worker/integrator/kernels.h"
 
 #include <gtest/gtest.h>
-#include <hwy/targets.h>
 
 #include <cmath>
 #include <vector>
 
+#include "tests/support/instruction_sets.h"
 #include "worker/scene/material.h"
 
 namespace baton {
@@ -48,29 +48,9 @@ ShadingPoint tilted_point(const Vec3& ns, const Vec3& wo) {
   return {.position = {0, 0, 0}, .ng = normalize(ns + Vec3{0.1f, 0.05f, 0}), .ns = ns, .wo = wo};
 }
 
-/// Runs the test body on each instruction set that this machine has, then restores the choice.
-class Kernels : public testing::TestWithParam<std::int64_t> {
- protected:
-  void SetUp() override {
-    hwy::SetSupportedTargetsForTest(GetParam());
-    hwy::GetChosenTarget().Update(hwy::SupportedTargets());
-  }
-  void TearDown() override {
-    hwy::SetSupportedTargetsForTest(0);
-    hwy::GetChosenTarget().Update(hwy::SupportedTargets());
-  }
-};
-
-std::vector<std::int64_t> available_targets() {
-  std::vector<std::int64_t> targets;
-  for (const std::int64_t target : {HWY_SSE4, HWY_AVX2, HWY_AVX3}) {
-    if ((hwy::SupportedTargets() & HWY_TARGETS & target) != 0) targets.push_back(target);
-  }
-  return targets;
-}
-
-INSTANTIATE_TEST_SUITE_P(Sets, Kernels, testing::ValuesIn(available_targets()),
-                         [](const auto& param) { return std::string(hwy::TargetName(param.param)); });
+class Kernels : public OnInstructionSet {};
+INSTANTIATE_TEST_SUITE_P(Sets, Kernels, testing::ValuesIn(instruction_sets()),
+                         instruction_set_name);
 
 TEST_P(Kernels, RunOnTheChosenSet) { EXPECT_EQ(kernels::instruction_set(), hwy::TargetName(GetParam())); }
 

@@ -3,12 +3,12 @@
 #include "worker/integrator/pool_kernels.h"
 
 #include <gtest/gtest.h>
-#include <hwy/targets.h>
 
 #include <cmath>
 #include <memory>
 #include <vector>
 
+#include "tests/support/instruction_sets.h"
 #include "worker/sampling/pool.h"
 #include "worker/scene/material.h"
 
@@ -64,17 +64,8 @@ std::vector<VisibilityCell> memory_after(std::uint32_t rays) {
   return memory;
 }
 
-class PoolRays : public testing::TestWithParam<std::int64_t> {
+class PoolRays : public OnInstructionSet {
  protected:
-  void SetUp() override {
-    hwy::SetSupportedTargetsForTest(GetParam());
-    hwy::GetChosenTarget().Update(hwy::SupportedTargets());
-  }
-  void TearDown() override {
-    hwy::SetSupportedTargetsForTest(0);
-    hwy::GetChosenTarget().Update(hwy::SupportedTargets());
-  }
-
   float choose(const SiteBlock& sites, std::span<const VisibilityCell> memory, float u) {
     return kernels::choose_pool_rays(sites, view, light_pool, counts(sites), rng, u, 16, memory,
                                      *scratch, *rays);
@@ -93,17 +84,8 @@ class PoolRays : public testing::TestWithParam<std::int64_t> {
   std::unique_ptr<PixelRays> rays = std::make_unique<PixelRays>();
 };
 
-std::vector<std::int64_t> available_targets() {
-  std::vector<std::int64_t> targets;
-  for (const std::int64_t target : {HWY_SSE4, HWY_AVX2, HWY_AVX3}) {
-    if ((hwy::SupportedTargets() & HWY_TARGETS & target) != 0) targets.push_back(target);
-  }
-  return targets;
-}
-INSTANTIATE_TEST_SUITE_P(Sets, PoolRays, testing::ValuesIn(available_targets()),
-                         [](const auto& param) {
-                           return std::string(hwy::TargetName(param.param));
-                         });
+INSTANTIATE_TEST_SUITE_P(Sets, PoolRays, testing::ValuesIn(instruction_sets()),
+                         instruction_set_name);
 
 // The mean over the offset u is an integral that a fine grid of offsets solves: it must be the sum
 // of w V (f cos L) / p~ over all candidates, whatever the memory says; the same for Lns and for

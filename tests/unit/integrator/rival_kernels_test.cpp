@@ -1,12 +1,12 @@
 // The kernels of `restir` and `ratio` against others that say the same, on every instruction set of
 // this machine.
 #include <gtest/gtest.h>
-#include <hwy/targets.h>
 
 #include <cmath>
 #include <memory>
 #include <vector>
 
+#include "tests/support/instruction_sets.h"
 #include "worker/integrator/frame_light.h"
 #include "worker/integrator/ratio_kernels.h"
 #include "worker/integrator/restir_kernels.h"
@@ -38,21 +38,16 @@ SiteBlock pixel(float tilt) {
   return sites;
 }
 
-class RivalKernels : public testing::TestWithParam<std::int64_t> {
+class RivalKernels : public OnInstructionSet {
  protected:
   void SetUp() override {
-    hwy::SetSupportedTargetsForTest(GetParam());
-    hwy::GetChosenTarget().Update(hwy::SupportedTargets());
+    OnInstructionSet::SetUp();
     for (std::uint32_t i = 0; i < kernels::RestirPoints::kCapacity; ++i) {
       points_->code[i] = (i + 1) * 2654435761u;
       points_->site[i] = static_cast<std::uint8_t>(i % 4);
       points_->r[i] = points_->target_now[i] = points_->target_before[0][i] =
           points_->target_before[1][i] = kUntouched;
     }
-  }
-  void TearDown() override {
-    hwy::SetSupportedTargetsForTest(0);
-    hwy::GetChosenTarget().Update(hwy::SupportedTargets());
   }
 
   /// Mean over RGB of what point i, turned back, reflects, by the kernels that everybody uses.
@@ -76,15 +71,8 @@ class RivalKernels : public testing::TestWithParam<std::int64_t> {
   const std::unique_ptr<kernels::RestirPoints> points_ = std::make_unique<kernels::RestirPoints>();
 };
 
-std::vector<std::int64_t> available_targets() {
-  std::vector<std::int64_t> targets;
-  for (const std::int64_t target : {HWY_SSE4, HWY_AVX2, HWY_AVX3}) {
-    if ((hwy::SupportedTargets() & HWY_TARGETS & target) != 0) targets.push_back(target);
-  }
-  return targets;
-}
-INSTANTIATE_TEST_SUITE_P(Sets, RivalKernels, testing::ValuesIn(available_targets()),
-                         [](const auto& set) { return hwy::TargetName(set.param); });
+INSTANTIATE_TEST_SUITE_P(Sets, RivalKernels, testing::ValuesIn(instruction_sets()),
+                         instruction_set_name);
 
 // Two carried sets: of the same surfaces, and of others of which each two heirs share.
 TEST_P(RivalKernels, PointsAreEvaluatedInTheirRangeAlone) {

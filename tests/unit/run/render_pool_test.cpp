@@ -5,8 +5,12 @@
 #include <algorithm>
 #include <semaphore>
 
+#include "tests/support/patience.h"
+
 namespace baton {
 namespace {
+
+using namespace std::chrono_literals;
 
 LeaseId lease(std::int32_t tile) {
   return {.job = {}, .task = {TaskKind::render, 0, tile}, .attempt = 1, .epoch = 1};
@@ -15,6 +19,8 @@ LeaseId lease(std::int32_t tile) {
 PooledTask task(std::int32_t tile) {
   return {.lease = lease(tile), .inputs = {}, .job = nullptr, .store = nullptr};
 }
+
+Status at_once(std::span<const PooledTask> /*tasks*/) { return {}; }
 
 /// Collects until `count` tasks have ended; each end releases `woken`.
 std::vector<EndedTask> collect(RenderPool& pool, std::counting_semaphore<>& woken,
@@ -36,7 +42,7 @@ TEST(RenderPool, RunsEverythingOnceAndWakesForEachResult) {
         output.stats.pixels = static_cast<std::uint64_t>(t.lease.task.tile);
         return output;
       },
-      [&] { woken.release(); });
+      at_once, [&] { woken.release(); });
   for (int tile = 0; tile < 50; ++tile) pool.submit(task(tile));
   std::vector<EndedTask> ended = collect(pool, woken, 50);
 
@@ -58,7 +64,7 @@ TEST(RenderPool, StopReachesTheRunningTaskAlone) {
         if (stop.stop_requested()) return Error{ErrorKind::cancelled, "stopped"};
         return TaskOutput{};
       },
-      [&] { woken.release(); });
+      at_once, [&] { woken.release(); });
   pool.submit(task(0));
   pool.submit(task(1));
   started.acquire();
@@ -80,7 +86,7 @@ TEST(RenderPool, DroppedTasksEndAsCancelledAndNeverRun) {
         let_go.acquire();
         return TaskOutput{};
       },
-      [&] { woken.release(); });
+      at_once, [&] { woken.release(); });
   for (int tile = 0; tile < 3; ++tile) pool.submit(task(tile));
   started.acquire();
   pool.drop_queued();
@@ -88,6 +94,48 @@ TEST(RenderPool, DroppedTasksEndAsCancelledAndNeverRun) {
   const std::vector<EndedTask> ended = collect(pool, woken, 3);
   EXPECT_EQ(std::count_if(ended.begin(), ended.end(), [](const auto& e) { return e.result.ok(); }),
             1);
+}
+
+// A pool of one thread and a disk that takes its time: the thread goes on, nothing counts as ended
+// before it is on the disk, and what came up meanwhile shares the next wait.
+TEST(RenderPool, NoThreadWaitsForTheDisk) {
+  std::counting_semaphore<> woken(0), waiting(0), let_go(0);
+  std::vector<std::size_t> waits;
+  RenderPool pool(
+      1, [](const PooledTask&, std::stop_token) { return TaskOutput{}; },
+      [&](std::span<const PooledTask> tasks) {
+        waits.push_back(tasks.size());
+        waiting.release();
+        let_go.acquire();
+        return Status();
+      },
+      [&] { woken.release(); });
+  pool.submit(task(0));
+  waiting.acquire();
+  for (int tile = 1; tile < 4; ++tile) pool.submit(task(tile));
+  std::size_t left_thread = 0;
+  while (left_thread < 4 && woken.try_acquire_for(with_patience(10s))) {
+    left_thread += pool.take_executed().size();
+  }
+  EXPECT_EQ(left_thread, 4u);
+  EXPECT_TRUE(pool.collect().empty());
+  let_go.release(8);  // more than there are waits
+  EXPECT_EQ(collect(pool, woken, 4).size(), 4u);
+  EXPECT_EQ(waits, (std::vector<std::size_t>{1, 3}));
+}
+
+TEST(RenderPool, WhatTheDiskRefusesHasFailed) {
+  std::counting_semaphore<> woken(0);
+  RenderPool pool(
+      1, [](const PooledTask&, std::stop_token) { return TaskOutput{}; },
+      [](std::span<const PooledTask>) {
+        return Status(Error{ErrorKind::io, "disk full"});
+      },
+      [&] { woken.release(); });
+  pool.submit(task(0));
+  const std::vector<EndedTask> ended = collect(pool, woken, 1);
+  ASSERT_FALSE(ended[0].result);
+  EXPECT_EQ(ended[0].result.error().message, "disk full");
 }
 
 TEST(RenderPool, ClosingStopsWhatRuns) {
@@ -99,7 +147,7 @@ TEST(RenderPool, ClosingStopsWhatRuns) {
         while (!stop.stop_requested()) std::this_thread::yield();
         return Error{ErrorKind::cancelled, "stopped"};
       },
-      [] {});
+      at_once, [] {});
   pool.submit(task(0));
   pool.submit(task(1));
   started.acquire();

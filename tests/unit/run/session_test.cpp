@@ -94,6 +94,23 @@ TEST_F(SessionTest, ReportsAndAsksAgainWhenATaskEnds) {
   EXPECT_EQ(sent<LeaseRequest>(actions)[0].count, 1);
 }
 
+// What waits for the disk needs no thread, but is still in hand; and the disk may fall behind only
+// so far.
+TEST_F(SessionTest, AnExecutedTaskMakesRoomAndIsNotReported) {
+  welcome();
+  for (int tile = 0; tile < 3; ++tile) grant(lease(tile));
+  const auto actions = step(TaskExecuted{lease(0)});
+  EXPECT_EQ(sent<LeaseRequest>(actions).at(0).count, 1);
+  EXPECT_TRUE(sent<TaskDone>(actions).empty());
+  grant(lease(3));
+  EXPECT_EQ(sent<Heartbeat>(tick_after(1000ms)).at(0).running.size(), 4u);
+
+  step(TaskExecuted{lease(1)});
+  grant(lease(4));
+  EXPECT_TRUE(sent<LeaseRequest>(step(TaskExecuted{lease(2)})).empty());
+  EXPECT_EQ(sent<TaskDone>(finish(lease(0))).size(), 1u);
+}
+
 TEST_F(SessionTest, ARequestNamesAllThatIsWanted) {
   welcome();
   grant(lease(0));
