@@ -29,17 +29,37 @@ HWY_INLINE VI VisibilityBins(VU code) {
   return hn::BitCast(DI(), hn::Or(across, down));
 }
 
-/// A pixel's memory: the estimated share of free rays per lane, as free_share().
+HWY_INLINE VF HopeFactor(VF free) { return hn::Max(hn::Sqrt(free), hn::Set(DF(), kLeastHope)); }
+HWY_INLINE VF DoubtFactor(VF free) {
+  const DF d;
+  const VF variance = hn::Mul(free, hn::Sub(hn::Set(d, 1.0f), free));
+  return hn::Max(hn::Sqrt(variance), hn::Set(d, kLeastDoubt));
+}
+
+/// What is remembered of a vector of directions: the estimated share of free rays, as free_share(),
+/// and what it makes of a candidate's weight on the two lines.
+struct ProspectLanes {
+  VF free, hope, doubt;
+};
+
+/// A pixel's memory.
 class RememberedLanes {
  public:
   explicit RememberedLanes(const VisibilityCell* memory)
       : memory_(memory),
         has_bins_(memory[kVisibilityOutcomes] == (kSawFree | kSawBlocked)),
-        all_((memory[kVisibilitySummary] & 15) != 0 ? memory[kVisibilitySummary] : 2048 << 4) {}
+        all_((memory[kVisibilitySummary] & 15) != 0 ? memory[kVisibilitySummary] : 2048 << 4),
+        everywhere_(Prospect(Share(hn::Set(DI(), all_)))) {}
 
-  HWY_INLINE VF Free(VU code) const {
+  /// A pixel whose rays have always agreed expects the same everywhere.
+  HWY_INLINE ProspectLanes Look(VU code) const {
+    if (!has_bins_) return everywhere_;
+    return Prospect(FreeInBins(code));
+  }
+
+ private:
+  HWY_INLINE VF FreeInBins(VU code) const {
     const DI di;
-    if (!has_bins_) return Share(hn::Set(di, all_));
     // Two cells come with each load; ours is the lower one.
     static_assert(sizeof(VisibilityCell) == 2 && kVisibilityCells > kVisibilityBins);
     const VI pair = hn::GatherOffset(di, reinterpret_cast<const std::int32_t*>(memory_),
@@ -48,8 +68,9 @@ class RememberedLanes {
     const auto unseen = hn::Eq(hn::And(own, hn::Set(di, 15)), hn::Zero(di));
     return Share(hn::IfThenElse(unseen, hn::Set(di, all_), own));
   }
-
- private:
+  static HWY_INLINE ProspectLanes Prospect(VF free) {
+    return {free, HopeFactor(free), DoubtFactor(free)};
+  }
   static HWY_INLINE VF Share(VI cells) {
     const DF d;
     return hn::Mul(hn::Add(hn::ConvertTo(d, hn::ShiftRight<4>(cells)), hn::Set(d, 0.5f)),
@@ -58,14 +79,8 @@ class RememberedLanes {
   const VisibilityCell* memory_;
   bool has_bins_;
   std::int32_t all_;
+  ProspectLanes everywhere_;
 };
-
-HWY_INLINE VF HopeFactor(VF free) { return hn::Max(hn::Sqrt(free), hn::Set(DF(), kLeastHope)); }
-HWY_INLINE VF DoubtFactor(VF free) {
-  const DF d;
-  const VF variance = hn::Mul(free, hn::Sub(hn::Set(d, 1.0f), free));
-  return hn::Max(hn::Sqrt(variance), hn::Set(d, kLeastDoubt));
-}
 
 /// Where weighed candidates go: two lines to choose from, and what is known of the pixel by then.
 /// A loop that adds works on a copy, in registers.
@@ -82,14 +97,14 @@ struct PoolLines {
   template <class Color>
   HWY_INLINE void Add(VU code, VF weight, const Color& color) {
     const DF d;
-    const VF free = memory.Free(code);
-    hn::Store(free, d, next_free);
+    const ProspectLanes prospect = memory.Look(code);
+    hn::Store(prospect.free, d, next_free);
     next_free += hn::Lanes(d);
-    hope.Add(hn::Mul(weight, HopeFactor(free)));
-    doubt.Add(hn::Mul(weight, DoubtFactor(free)));
+    hope.Add(hn::Mul(weight, prospect.hope));
+    doubt.Add(hn::Mul(weight, prospect.doubt));
     light = hn::Add(light, weight);
-    expected = hn::MulAdd(weight, free, expected);
-    const Vec3Lanes seen = Scale(color(), free);
+    expected = hn::MulAdd(weight, prospect.free, expected);
+    const Vec3Lanes seen = Scale(color(), prospect.free);
     visible = HWY_NAMESPACE::Add(visible, seen);
     difference = HWY_NAMESPACE::Add(difference, Scale(seen, sign));
     sign = hn::Neg(sign);

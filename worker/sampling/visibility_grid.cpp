@@ -51,6 +51,14 @@ void remember_rays(std::span<VisibilityCell> grid, std::span<const std::uint8_t>
   std::uint32_t outcomes = grid[kVisibilityOutcomes];
   Tally all(grid[kVisibilitySummary]);
   if (all.seen == 0) all.share = kShareOfOne / 2;
+
+  // Of a pixel that has long been in the open, or in the dark, one more ray says nothing new.
+  const std::uint64_t every = bin.empty() ? 0 : ~std::uint64_t{0} >> (64 - bin.size());
+  if ((outcomes == kSawFree && free == every) || (outcomes == kSawBlocked && free == 0)) {
+    Tally next = all;
+    next.add(free != 0);
+    if (next.cell() == all.cell()) return;
+  }
   for (std::size_t j = 0; j < bin.size(); ++j) {
     const bool is_free = (free >> j & 1) != 0;
     outcomes |= is_free ? kSawFree : kSawBlocked;
