@@ -53,8 +53,8 @@ class RememberedLanes {
 
   /// A pixel whose rays have always agreed expects the same everywhere.
   HWY_INLINE ProspectLanes Look(VU code) const {
-    if (!has_bins_) return everywhere_;
-    return Prospect(FreeInBins(code));
+    if (has_bins_) return Prospect(FreeInBins(code));
+    return {everywhere_.free, everywhere_.hope, everywhere_.doubt};
   }
 
  private:
