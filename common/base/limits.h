@@ -23,6 +23,8 @@ inline constexpr int kMaxObjects = 100000;
 inline constexpr int kMaxMetadata = 256;
 inline constexpr int kMaxNameLength = 100;
 inline constexpr int kMaxTextLength = 4096;
+/// Of a frame's file name: file systems take 255, a temporary name has some more.
+inline constexpr std::size_t kMaxFileNameLength = 200;
 inline constexpr int kMaxJsonDepth = 32;
 inline constexpr int kMaxFaultsReported = 100;
 inline constexpr int kMinTileSize = 8;

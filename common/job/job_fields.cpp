@@ -166,6 +166,9 @@ void fields(JobArchive& a, OutputSpec& output, const JobSpec& job) {
   const auto got = [&] { return fmt::format("\"{}\"", output.pattern.substr(0, 60)); };
   if (output.pattern.find('/') != std::string::npos || !output.pattern.ends_with(".exr")) {
     a.fault("pattern", "a file name that ends in .exr, without folders", got());
+  } else if (output.pattern.size() > limits::kMaxFileNameLength) {
+    a.fault("pattern", fmt::format("a file name of at most {} bytes", limits::kMaxFileNameLength),
+            got());
   } else if (job.frames.size() > 1 && output.pattern.find('#') == std::string::npos) {
     a.fault("pattern", "a '#' for each digit of the frame number, as there are several frames",
             got());

@@ -67,6 +67,12 @@ Socket::~Socket() = default;
 
 Result<Socket> Socket::open(const std::string& endpoint, bool listen,
                             std::chrono::milliseconds linger, Unconnected unconnected) {
+  // ZeroMQ takes a port modulo 65536.
+  const std::string port = endpoint.substr(endpoint.rfind(':') + 1);
+  const bool is_number = !port.empty() && port.find_first_not_of("0123456789") == std::string::npos;
+  if (is_number && (port.size() > 5 || std::stoi(port) > 65535)) {
+    return Error{ErrorKind::usage, fmt::format("{}: expected a port up to 65535", endpoint)};
+  }
   try {
     auto impl =
         std::make_unique<Impl>(listen ? zmq::socket_type::router : zmq::socket_type::dealer);

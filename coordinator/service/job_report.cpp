@@ -90,11 +90,14 @@ std::optional<std::string> find_missing_file(const JobAdded& job, const BlobStor
   for (const Digest& blob : recorded.tasks.live_blobs()) {
     if (!store.contains(blob)) return store.path(blob).string();
   }
-  for (const std::int32_t frame : finished_frames(recorded)) {
+  for (TaskIndex frame = 0; frame < recorded.tasks.graph().num_frames(); ++frame) {
+    if (recorded.tasks.status(frame) != TaskStatus::done) continue;
+    const int number = job.spec.frames[static_cast<std::size_t>(frame)];
     const fs::path path =
-        fs::path(job.spec.output.directory) / frame_file_name(job.spec.output.pattern, frame);
-    std::error_code ignored;
-    if (!fs::exists(path, ignored)) return path.string();
+        fs::path(job.spec.output.directory) / frame_file_name(job.spec.output.pattern, number);
+    std::error_code error;
+    const std::uintmax_t size = fs::file_size(path, error);
+    if (error || size != recorded.tasks.outputs(frame).front().size_bytes) return path.string();
   }
   return std::nullopt;
 }

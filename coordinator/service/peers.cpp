@@ -31,6 +31,11 @@ std::optional<PeerId> Peers::peer_of(const std::string& worker) const {
   return found->second.peer;
 }
 
+const WorkerHello* Peers::hello_of(const std::string& worker) const {
+  const auto found = workers_.find(worker);
+  return found == workers_.end() ? nullptr : &found->second.hello;
+}
+
 std::vector<WorkerSummary> Peers::summaries() const {
   std::vector<WorkerSummary> result;
   for (const auto& [name, entry] : workers_) {

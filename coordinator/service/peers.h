@@ -21,6 +21,8 @@ class Peers {
   std::string worker_of(const PeerId& peer) const;
   /// nullopt: no such worker.
   std::optional<PeerId> peer_of(const std::string& worker) const;
+  /// What it said of itself; null: no such worker.
+  const WorkerHello* hello_of(const std::string& worker) const;
   std::size_t num_workers() const { return workers_.size(); }
   /// By name, without their leases.
   std::vector<WorkerSummary> summaries() const;

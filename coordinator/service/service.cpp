@@ -124,7 +124,17 @@ Status Service::receive(const PeerId& peer, const WorkerHello& hello) {
     refuse(peer, {ErrorKind::bad_input, "a worker needs a name of at most 4096 bytes"});
     return {};
   }
-  const bool is_new = !peers_.peer_of(hello.worker_id).has_value();
+  // A name belongs to one process until that falls silent; a new connection of it keeps the name.
+  const WorkerHello* const known = peers_.hello_of(hello.worker_id);
+  if (known != nullptr && (known->pid != hello.pid || known->host != hello.host)) {
+    refuse(peer,
+           {ErrorKind::usage,
+            fmt::format("worker {}: process {} on {} has this name; a worker needs one of its "
+                        "own, or waits until the other is silent",
+                        hello.worker_id, known->pid, known->host)});
+    return {};
+  }
+  const bool is_new = known == nullptr;
   if (is_new && peers_.num_workers() >= limits::kMaxWorkers) {
     refuse(peer,
            {ErrorKind::io, fmt::format("the farm is full: {} workers", peers_.num_workers())});

@@ -40,7 +40,7 @@ Status Service::restore_job(const Digest& digest) {
   // submitted again.
   if (is_open(event.status)) {
     if (const auto missing = find_missing_file(event, store_)) {
-      spdlog::warn("job {} starts afresh: {} is gone", digest.short_hex(), *missing);
+      spdlog::warn("job {} starts afresh: {} is gone or damaged", digest.short_hex(), *missing);
       BATON_TRY(journal_.restart_job(digest, /*fresh=*/true));
       event.completions.clear();
       event.failures.clear();
@@ -102,7 +102,7 @@ Status Service::receive(const PeerId& peer, const SubmitJob& message) {
 }
 
 /// A job that is known already: goes on where it stopped, or starts afresh when a file of it is
-/// gone.
+/// gone or has another size.
 Status Service::start_again(JobAdded event, JobStatus status, bool& already_there) {
   already_there = true;
   if (status == JobStatus::paused) return step(JobResumed{event.job});
@@ -114,7 +114,7 @@ Status Service::start_again(JobAdded event, JobStatus status, bool& already_ther
 
   already_there = false;
   if (missing) {
-    spdlog::info("job {} starts afresh: {} is gone", event.job.short_hex(), *missing);
+    spdlog::info("job {} starts afresh: {} is gone or damaged", event.job.short_hex(), *missing);
     event.completions.clear();
   } else {
     spdlog::info("job {} goes on", event.job.short_hex());

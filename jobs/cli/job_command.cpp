@@ -41,6 +41,8 @@ FarmOptions pilot_farm(const JobSpec& job) {
 Result<ExitCode> submit(const JobOptions& options, RequestClient& client) {
   BATON_ASSIGN(JobSpec written, load_job(options.job));
   BATON_ASSIGN(JobSpec job, settle_motion(std::move(written)));
+  // A pilot takes its time: first see that there is somebody to submit to.
+  if (job.sampling.method == Method::automatic) BATON_TRY(ask<JobList>(client, ListJobs{}));
   BATON_TRY(settle_method(job, pilot_farm(job)));
   BATON_ASSIGN(std::string document, make_job_document(job));
   BATON_ASSIGN(const JobAccepted accepted,
@@ -178,7 +180,7 @@ void add_job_command(CLI::App& app, ExitCode& code) {
       "Returns when the job has ended, with its exit code; outlasts a restart of the coordinator",
       "ID", wait)
       ->add_option("--timeout", options->timeout_s, "seconds; default: as long as it takes")
-      ->check(CLI::PositiveNumber);
+      ->check(CLI::Range(0.0, 1e9));
 }
 
 }  // namespace baton

@@ -25,7 +25,7 @@ constexpr const char* kFooter = R"(Examples:
   baton job list
   baton worker list
   baton chart study.json             error against time of several methods, as charts
-  baton state show tile.bst          what samples a tile hands to its next frame
+  baton state show STATE.blob        what samples a tile hands to its next frame
 
 Exit codes: 0 ok, 1 timeout, 2 failed, 3 cancelled, 64 wrong command line, 65 bad input,
 69 no coordinator answers, 70 a bug, 74 disk or network.)";

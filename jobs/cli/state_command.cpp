@@ -196,8 +196,9 @@ void add_state_command(CLI::App& app, ExitCode& code) {
   CLI::App* state = app.add_subcommand("state", "Looks into sample state files");
   state->require_subcommand(1);
   state->footer(
-      "Examples:\n  baton state show tile.bst --pixel 12,40\n  baton state verify "
-      ".baton/store/*.bst");
+      "Examples, for the states that a job keeps in its work folder:\n"
+      "  baton state show frames/.baton/store/ab/cdef.blob --pixel 12,40\n"
+      "  baton state verify frames/.baton/store/*/*.blob");
 
   CLI::App* show_command = state->add_subcommand("show", "Sections, sizes, effective sample sizes");
   show_command->add_option("FILE", options->files, "state file")->required()->expected(1);

@@ -241,6 +241,7 @@ Result<Study> parse_study(std::string_view text, const std::string& name,
 }
 
 Result<Study> load_study(const fs::path& path) {
+  BATON_TRY(expect_file(path));
   BATON_ASSIGN(const std::string text, read_text_file(path, limits::kMaxJobFileBytes));
   return parse_study(text, path.string(), path.parent_path());
 }

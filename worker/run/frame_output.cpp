@@ -100,11 +100,15 @@ std::filesystem::path frame_path(const JobSpec& job, std::int32_t frame_index) {
 }
 
 ImageMetadata frame_metadata(const JobSpec& job, const Digest& job_digest, int frame_number) {
-  return {{"baton:version", kVersion},
-          {"baton:jobName", job.name},
-          {"baton:jobDigest", job_digest.hex()},
-          {"baton:frame", std::to_string(frame_number)},
-          {"baton:method", std::string(kMethods[static_cast<std::size_t>(job.sampling.method)])}};
+  ImageMetadata metadata{
+      {"baton:version", kVersion},
+      {"baton:jobName", job.name},
+      {"baton:jobDigest", job_digest.hex()},
+      {"baton:frame", std::to_string(frame_number)},
+      {"baton:method", std::string(kMethods[static_cast<std::size_t>(job.sampling.method)])}};
+  for (const auto& [name, text] : job.metadata)
+    metadata.emplace_back("baton:metadata:" + name, text);
+  return metadata;
 }
 
 Result<BlobRef> write_frame(const JobSpec& job, const Digest& job_digest, std::int32_t frame_index,

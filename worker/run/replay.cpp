@@ -88,7 +88,8 @@ Result<std::vector<StatePtr>> render_history(const RenderContext& context, const
                                  [&](const SampleState& state) {
                                    next[t] = std::make_shared<const SampleState>(state);
                                    return Status();
-                                 }};
+                                 },
+                             .samples = [](const FirstPassSamples&) { return Status(); }};
       BATON_ASSIGN([[maybe_unused]] const RenderStats stats,
                    run_tile(context, {t, frame, frame, frame}, previous, sink, {}));
     }

@@ -107,6 +107,8 @@ TEST(JobJson, ListsTheKnownKeysWhenNoneIsNear) {
 }
 
 TEST(JobJson, NamesPlaceAndExpectationOfEachKindOfFault) {
+  const std::string long_pattern =
+      R"("output": {"pattern": ")" + std::string(200, 'a') + R"(.exr"})";
   const std::pair<const char*, const char*> cases[] = {
       {R"("specificationVersion": 2)", "$.specificationVersion: expected 1, got 2"},
       {R"("seed": -1)", "$.seed: expected an integer in [0, 18446744073709551615], got -1"},
@@ -178,6 +180,7 @@ TEST(JobJson, NamesPlaceAndExpectationOfEachKindOfFault) {
       {R"("output": {"directory": "a\u0000b"})",
        "$.output.directory: expected a text of 1 to 4096 bytes without"},
       {R"("frames": "1-2", "output": {"pattern": "a.exr"})", "$.output.pattern: expected a '#'"},
+      {long_pattern.c_str(), "$.output.pattern: expected a file name of at most 200 bytes"},
       {R"("frames": "1-100000", "image": {"width": 32768, "height": 32768, "tileSize": 8})",
        "$: expected at most 4000000 tasks"},
       {R"("image": {"width": 32768, "height": 32768, "tileSize": 32768})",

@@ -237,6 +237,19 @@ TEST_F(ExecuteTest, AReplayMakesTheFarmsTile) {
   }
 }
 
+TEST_F(ExecuteTest, AReplayOfAMovingCorrelatedTileFindsItsHistory) {
+  job_.scene.objects[0].keys = {{.frame = 1}, {.frame = 5, .translate = Vec3{0.4f, 0.5f, 0}}};
+  job_.motion.max_px = 4;
+  job_.visibility.correlated = true;
+  const std::string path = folder_ + "job.json";
+  ASSERT_TRUE(write_file_atomic(path, as_bytes_view(to_json(job_))));
+  const ReplayOptions options{
+      .job = path, .frame_number = 3, .tile = 1, .pixel = {}, .out = folder_ + "tile.exr"};
+  const Result<std::string> report = replay_tile(options);
+  ASSERT_TRUE(report) << report.error().message;
+  EXPECT_EQ(read_exr(options.out)->rect, (PixelRect{0, 0, 16, 16}));
+}
+
 TEST_F(ExecuteTest, AReplayOfWhatTheJobDoesNotHaveSaysWhatThereIs) {
   const std::string path = folder_ + "job.json";
   ASSERT_TRUE(write_file_atomic(path, as_bytes_view(to_json(job_))));

@@ -63,7 +63,8 @@ TEST(FrameOutput, ATileThatDoesNotBelongIsAnError) {
 }
 
 TEST(FrameOutput, AFrameIsWrittenVerifiedAndNamedByItsDigest) {
-  const JobSpec job = small_job("written");
+  JobSpec job = small_job("written");
+  job.metadata["owner"] = "lighting";
   const Digest digest{3, 4};
   const Result<BlobRef> ref = write_frame(job, digest, 1, assembled(job));
   ASSERT_TRUE(ref) << ref.error().message;
@@ -81,7 +82,8 @@ TEST(FrameOutput, AFrameIsWrittenVerifiedAndNamedByItsDigest) {
                                                             {"baton:jobName", "small"},
                                                             {"baton:jobDigest", digest.hex()},
                                                             {"baton:frame", "9"},
-                                                            {"baton:method", "sequential"}}));
+                                                            {"baton:method", "sequential"},
+                                                            {"baton:metadata:owner", "lighting"}}));
 }
 
 TEST(FrameOutput, AWrongValueIsFoundInTheFrameThatLooksAtItsBlock) {

@@ -62,8 +62,8 @@ class FakeWorker {
         id_(std::move(id)) {}
 
   void say(const Message& message) { ASSERT_TRUE(channel_.send(message)); }
-  void hello(std::vector<LeaseId> running = {}) {
-    say(WorkerHello{id_, "host", 1, 2, "TEST", std::move(running)});
+  void hello(std::vector<LeaseId> running = {}, std::int32_t pid = 1) {
+    say(WorkerHello{id_, "host", pid, 2, "TEST", std::move(running)});
   }
 
   /// The next message of type T; others are passed over.
@@ -76,6 +76,13 @@ class FakeWorker {
     }
     ADD_FAILURE() << "no message of type " << Message(T{}).index() << " came";
     return T{};
+  }
+
+  /// Whether the next message, if one comes in time, has type T.
+  template <class T>
+  bool answers(std::chrono::milliseconds time) {
+    const std::optional<Message> message = channel_.receive(time);
+    return message && std::holds_alternative<T>(*message);
   }
 
   /// Publishes what the task makes and returns the report.

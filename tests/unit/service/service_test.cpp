@@ -206,20 +206,47 @@ TEST_F(ServiceTest, AWorkerIsDrainedByItsName) {
   EXPECT_EQ(unknown.message, "worker 'mil': no worker has this name");
 }
 
-TEST_F(ServiceTest, ADoneJobOfWhichAFrameIsGoneStartsAfresh) {
+TEST_F(ServiceTest, ADoneJobOfWhichAFrameIsGoneOrCutStartsAfresh) {
   const RunningService service(options);
+  const fs::path frame = fs::path(job.output.directory) / "frame.0003.exr";
   const Digest id = ask<JobAccepted>(service.endpoint(), SubmitJob{document}).job;
   FakeWorker worker(service.endpoint(), store(), job);
   worker.hello();
-  for (int i = 0; i < kNumTasks; ++i) worker.do_one_task();
-  worker.say(LeaseRequest{0});
-  worker.say(Heartbeat{});
-  worker.expect<Heartbeat>();
-  EXPECT_TRUE(ask<JobAccepted>(service.endpoint(), SubmitJob{document}).already_there);
+  for (const bool cut : {false, true}) {
+    for (int i = 0; i < kNumTasks; ++i) worker.do_one_task();
+    worker.say(LeaseRequest{0});
+    worker.say(Heartbeat{});
+    worker.expect<Heartbeat>();
+    EXPECT_TRUE(ask<JobAccepted>(service.endpoint(), SubmitJob{document}).already_there);
 
-  fs::remove(fs::path(job.output.directory) / "frame.0003.exr");
-  EXPECT_FALSE(ask<JobAccepted>(service.endpoint(), SubmitJob{document}).already_there);
-  EXPECT_EQ(show(service.endpoint(), id).summary.tasks_done, 0u);
+    if (cut) {
+      fs::resize_file(frame, 3);
+    } else {
+      fs::remove(frame);
+    }
+    EXPECT_FALSE(ask<JobAccepted>(service.endpoint(), SubmitJob{document}).already_there);
+    EXPECT_EQ(show(service.endpoint(), id).summary.tasks_done, 0u);
+  }
+}
+
+// A name belongs to one process; another one gets it when the first has fallen silent.
+TEST_F(ServiceTest, ANameIsRefusedToASecondProcessWhileTheFirstLives) {
+  const RunningService service(options);
+  FakeWorker first(service.endpoint(), store(), job), second(service.endpoint(), store(), job);
+  first.hello();
+  first.expect<WorkerWelcome>();
+  second.hello({}, 2);
+  EXPECT_THAT(second.expect<Refused>().message, HasSubstr("process 1 on host has this name"));
+  first.hello();
+  first.expect<WorkerWelcome>();
+
+  const auto deadline = std::chrono::steady_clock::now() + kPatience;
+  bool welcome = false;
+  while (!welcome && std::chrono::steady_clock::now() < deadline) {
+    second.hello({}, 2);
+    welcome = second.answers<WorkerWelcome>(kHeartbeat);
+  }
+  EXPECT_TRUE(welcome);
 }
 
 TEST_F(ServiceTest, ARunningJobOfWhichABlobIsGoneStartsAfresh) {
