@@ -1,9 +1,13 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cstdio>
+#include <string>
+#include <vector>
 
 #include "common/base/log.h"
 #include "common/base/version.h"
+#include "common/job/suggest.h"
 #include "jobs/cli/commands.h"
 
 namespace baton {
@@ -30,6 +34,23 @@ constexpr const char* kFooter = R"(Examples:
 Exit codes: 0 ok, 1 timeout, 2 failed, 3 cancelled, 64 wrong command line, 65 bad input,
 69 no coordinator answers, 70 a bug, 74 disk or network.)";
 
+/// The first word that should be a command and is none, with what is near it; empty: there is none.
+std::string unknown_command(const CLI::App& app, int argc, char** argv) {
+  const CLI::App* group = &app;
+  for (int i = 1; i < argc; ++i) {
+    std::vector<std::string> names;
+    for (const CLI::App* command : group->get_subcommands({})) names.push_back(command->get_name());
+    const std::string word = argv[i];
+    if (names.empty() || word.starts_with('-')) return {};
+    const auto found = std::find(names.begin(), names.end(), word);
+    if (found == names.end())
+      return fmt::format("{} {}: no such command{}", group->get_name(), word,
+                         baton::suggestion(word, names));
+    group = group->get_subcommand(word);
+  }
+  return {};
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -46,6 +67,10 @@ int main(int argc, char** argv) {
   baton::add_worker_command(app, code);
   baton::add_state_command(app, code);
   baton::add_chart_command(app, code);
+  if (const std::string fault = unknown_command(app, argc, argv); !fault.empty()) {
+    fmt::print(stderr, "{}\n", fault);
+    return static_cast<int>(baton::ExitCode::usage);
+  }
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

@@ -72,6 +72,8 @@ class CliErrors(unittest.TestCase):
 
     def test_wrong_command_lines(self):
         self.expect(self.baton(), USAGE, "subcommand is required")
+        self.expect(self.baton("rendr", "job.json"), USAGE, "baton rendr: no such command; did you mean \"render\"?")
+        self.expect(self.baton("job", "lst"), USAGE, "job lst: no such command; did you mean \"list\"?")
         self.expect(self.baton("rendr"), USAGE)
         self.expect(self.baton("check"), USAGE, "JOB is required")
         self.expect(self.baton("job", "wait", "abc", "--timeout", "-1"), USAGE, "--timeout")
