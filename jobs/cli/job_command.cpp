@@ -117,11 +117,20 @@ Result<ExitCode> wait(const JobOptions& options, RequestClient& client) {
   }
 }
 
+/// What became of a job, and a word where nothing did: one that is done cannot be paused.
+void print_change(const JobDetail& before, const JobDetail& after, bool json) {
+  print_detail(after, json);
+  if (before.summary.status != after.summary.status) return;
+  fmt::print(stderr, "nothing changed: the job was {} before\n",
+             job_status_name(before.summary.status));
+}
+
 /// M: CancelJob, PauseJob or ResumeJob.
 template <class M>
 Result<ExitCode> change(const JobOptions& options, RequestClient& client) {
-  BATON_ASSIGN(const JobDetail detail, ask<JobDetail>(client, M{options.job}));
-  print_detail(detail, options.json);
+  BATON_ASSIGN(const JobDetail before, ask<JobDetail>(client, ShowJob{options.job}));
+  BATON_ASSIGN(const JobDetail after, ask<JobDetail>(client, M{options.job}));
+  print_change(before, after, options.json);
   return ExitCode::ok;
 }
 
@@ -132,7 +141,7 @@ Result<ExitCode> retry(const JobOptions& options, RequestClient& client) {
   BATON_ASSIGN(JobDocument document, ask<JobDocument>(client, JobDocumentRequest{id}));
   BATON_TRY(ask<JobAccepted>(client, SubmitJob{std::move(document.json)}));
   BATON_ASSIGN(const JobDetail after, ask<JobDetail>(client, ShowJob{id.hex()}));
-  print_detail(after, options.json);
+  print_change(before, after, options.json);
   return ExitCode::ok;
 }
 
