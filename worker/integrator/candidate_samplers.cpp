@@ -60,6 +60,14 @@ CandidateCounts candidate_counts(const SiteBlock& sites, std::int32_t total, flo
   return {.from_light = total - from_bsdf, .from_bsdf = from_bsdf, .lobe_only = true};
 }
 
+PixelDiagnostics settle_rays(float total, std::int32_t num_rays, std::int32_t num_candidates,
+                             PixelSource source, const PixelSamples& samples) {
+  samples.lns = samples.lns_fresh = total > 0 && std::isfinite(total) ? total : 0.0f;
+  samples.source = source;
+  return {.ess = samples.lns > 0 ? static_cast<float>(num_rays) : 0.0f,
+          .target_evaluations = num_candidates};
+}
+
 PixelDiagnostics DirectSampler::sample(const PixelInput& input, SamplerScratch& scratch,
                                        const PixelSamples& samples) const {
   PixelDiagnostics diagnostics{.target_evaluations = counts_.total()};

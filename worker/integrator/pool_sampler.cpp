@@ -1,7 +1,6 @@
 #include "worker/integrator/pool_sampler.h"
 
 #include <array>
-#include <cmath>
 
 #include "worker/integrator/candidate_samplers.h"
 
@@ -20,10 +19,8 @@ PixelDiagnostics PoolSampler::sample(const PixelInput& input, SamplerScratch& sc
       candidate_counts(input.sites, num_candidates_, lobe_fraction_),
       Rng(input.key, PassId::candidates), Rng(input.key, PassId::choose).uniforms(0, 0)[0],
       num_rays_, input.memory.empty() ? kNothing : input.memory, scratch.pool, scratch.rays);
-  samples.lns = samples.lns_fresh = total > 0 && std::isfinite(total) ? total : 0.0f;
-  samples.source = input.has_history ? PixelSource::carried : PixelSource::fresh;
-  return {.ess = samples.lns > 0 ? static_cast<float>(num_rays_) : 0.0f,
-          .target_evaluations = num_candidates_};
+  const auto source = input.has_history ? PixelSource::carried : PixelSource::fresh;
+  return settle_rays(total, num_rays_, num_candidates_, source, samples);
 }
 
 }  // namespace baton

@@ -1,7 +1,5 @@
 #include "worker/integrator/ratio_sampler.h"
 
-#include <cmath>
-
 #include "worker/integrator/candidate_samplers.h"
 #include "worker/integrator/ratio_kernels.h"
 
@@ -19,10 +17,7 @@ PixelDiagnostics RatioSampler::sample(const PixelInput& input, SamplerScratch& s
       candidate_counts(input.sites, num_candidates_, lobe_fraction_),
       Rng(input.key, PassId::candidates), Rng(input.key, PassId::choose).uniforms(0, 0)[0],
       num_rays_, scratch.choice, scratch.rays);
-  samples.lns = samples.lns_fresh = total > 0 && std::isfinite(total) ? total : 0.0f;
-  samples.source = PixelSource::fresh;
-  return {.ess = samples.lns > 0 ? static_cast<float>(num_rays_) : 0.0f,
-          .target_evaluations = num_candidates_};
+  return settle_rays(total, num_rays_, num_candidates_, PixelSource::fresh, samples);
 }
 
 }  // namespace baton
