@@ -134,25 +134,9 @@ class MoveRandom {
   HWY_INLINE VF Acceptance(std::uint32_t move, std::size_t i) const {
     return UniformLanes(DF(), hn::Load(DU(), accept_[move % kShare] + i));
   }
-  /// What the next local move needs: two of them share a block.
-  HWY_INLINE void BeginLocal() {
-    const DU du;
-    at_word_ = num_local_ % 2 * 2;
-    if (at_word_ == 0) {
-      for (std::size_t i = 0; i < count_; i += hn::Lanes(du)) {
-        const VU index = CountFrom(du, static_cast<std::uint32_t>(i));
-        const auto bits = PhiloxBlock(du, rng_, num_local_ / 2 + 1, index);
-        hn::Store(bits.w0, du, proposal_[0] + i);
-        hn::Store(bits.w1, du, proposal_[1] + i);
-        hn::Store(bits.w2, du, proposal_[2] + i);
-        hn::Store(bits.w3, du, proposal_[3] + i);
-      }
-    }
-    ++num_local_;
-  }
-  /// The k-th of two uniforms that place the local proposals of particles i, i + 1, ...
-  HWY_INLINE VF Proposal(std::size_t k, std::size_t i) const {
-    return UniformLanes(DF(), hn::Load(DU(), proposal_[at_word_ + k] + i));
+  /// Two words for the local proposals of particles i, i + 1, ...
+  HWY_INLINE PhiloxLanes<VU> Proposal(std::uint32_t move, std::size_t i) const {
+    return PhiloxBlock(DU(), rng_, move + 1, CountFrom(DU(), static_cast<std::uint32_t>(i)));
   }
   /// How many moves Begin knows ahead.
   static constexpr std::uint32_t kWindow = 8;
@@ -170,9 +154,6 @@ class MoveRandom {
   HWY_ALIGN std::uint32_t distance_[kWindow];
   HWY_ALIGN std::uint32_t site_[kWindow];
   HWY_ALIGN std::uint32_t accept_[kShare][ParticleArrays::kCapacity];
-  HWY_ALIGN std::uint32_t proposal_[4][ParticleArrays::kCapacity];
-  std::uint32_t num_local_ = 0;  ///< local moves begun so far
-  std::size_t at_word_ = 0;      ///< of their block
 };
 
 /// Fetches the proposals of the moves that `random` knows ahead into the cache.
@@ -194,7 +175,7 @@ HWY_INLINE void PrefetchProposals(const Target& target, const SequentialSettings
 /// at the new positions; else it is left undefined (tempering_beta must then be 1).
 template <class Target>
 HWY_INLINE void MoveParticles(const Target& target, const SequentialSettings& settings,
-                              float tempering_beta, bool keep_before, MoveRandom& random,
+                              float tempering_beta, bool keep_before, const MoveRandom& random,
                               std::uint32_t move, ParticleArrays& p, SequentialOutcome& outcome) {
   const DF d;
   const DI di;
@@ -203,7 +184,6 @@ HWY_INLINE void MoveParticles(const Target& target, const SequentialSettings& se
   const bool local = random.IsLocal(move, settings.local_move_fraction);
   const VF beta = hn::Set(d, tempering_beta);
   const VF rest = hn::Set(d, 1 - tempering_beta);
-  if (local) random.BeginLocal();
 
   std::int32_t accepted = 0;
   for (std::size_t i = 0; i < count; i += hn::Lanes(d)) {
@@ -217,9 +197,10 @@ HWY_INLINE void MoveParticles(const Target& target, const SequentialSettings& se
     PointLanes next{code, site};
     TargetLanes at_next;
     if (local) {
+      const auto bits = random.Proposal(move, i);
       next.code =
           EncodeOctahedral(PerturbDirection(DecodeOctahedral(code), settings.local_move_cosine,
-                                            random.Proposal(0, i), random.Proposal(1, i)));
+                                            UniformLanes(d, bits.w0), UniformLanes(d, bits.w1)));
       target.Evaluate(next, keep_before, at_next);
     } else {
       const VF site_fraction = target.ManySites() ? random.SiteFraction(move, i) : hn::Zero(d);
