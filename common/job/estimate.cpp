@@ -23,8 +23,8 @@ std::int64_t count_neighbours(const JobSpec& job, std::int32_t reach_px) {
 /// In memory: Lns, Lns when fresh and source of a pixel; direction, weight and site of a particle.
 constexpr std::int64_t kStateBytesPerPixel = 9;
 constexpr std::int64_t kStateBytesPerParticle = 9;
-/// Of a pixel's memory of its rays; only pixels whose rays disagree have all of it.
-constexpr std::int64_t kMemoryBytes = 516;
+/// Of a pixel's memory; only pixels whose rays disagree have all of it.
+constexpr std::int64_t kMemoryBytes = 518;
 constexpr std::int64_t kConfidenceBytes = 2;
 
 /// Of a pixel beside its particles.

@@ -9,6 +9,7 @@
 
 #include "common/base/limits.h"
 #include "common/base/section_file.h"
+#include "common/state/pixel_memory.h"
 
 namespace baton {
 namespace {
@@ -22,11 +23,10 @@ constexpr SectionTag kDirection{'D', 'I', 'R', '_'};
 constexpr SectionTag kWeight{'W', 'G', 'T', '_'};
 constexpr SectionTag kSite{'S', 'I', 'T', 'E'};
 constexpr SectionTag kPopulations{'P', 'O', 'P', 'S'};
-constexpr SectionTag kMemorySummary{'V', 'I', 'S', 'S'};
-constexpr SectionTag kMemoryGrid{'V', 'I', 'S', 'G'};
 constexpr SectionTag kConfidence{'C', 'O', 'N', 'F'};
-constexpr std::array kTags{kMeta, kSource,      kLns,           kLnsFresh,   kDirection, kWeight,
-                           kSite, kPopulations, kMemorySummary, kMemoryGrid, kConfidence};
+constexpr std::array kTags{kMeta,          kSource,     kLns,         kLnsFresh,
+                           kDirection,     kWeight,     kSite,        kPopulations,
+                           kMemorySummary, kMemoryGrid, kMemoryNoise, kConfidence};
 
 constexpr std::size_t kMetaBytes = 2 * sizeof(std::uint64_t) + 7 * sizeof(std::int32_t);
 /// How far the sum of a pixel's weights may be from 1.
@@ -160,14 +160,6 @@ Status decode_meta(const SectionFile& file, const std::string& name, SampleState
   return {};
 }
 
-Error value_error(const SampleState& state, const SectionTag& tag, std::size_t pixel,
-                  const std::string& what) {
-  const auto width = static_cast<std::size_t>(state.rect.width());
-  return {ErrorKind::bad_input,
-          fmt::format("{}: pixel ({}, {}): {}", tag_text(tag), state.rect.x0 + pixel % width,
-                      state.rect.y0 + pixel / width, what)};
-}
-
 /// Reads how many populations there are: one when nothing is said.
 Status decode_populations(const SectionFile& file, const std::string& name, SampleState& state) {
   state.num_populations = 1;
@@ -216,53 +208,6 @@ Status check_population(const SampleState& state, std::size_t pixel, std::size_t
   if (sum != 0 && std::fabs(sum - 1) > kWeightSumTolerance) {
     return value_error(state, kWeight, pixel,
                        fmt::format("weights sum to {}, expected 1 or 0", sum));
-  }
-  return {};
-}
-
-/// A memory's bins come first; the two cells after them are its summary.
-constexpr std::size_t kMemoryBins = kMemoryCells - 2;
-constexpr MemoryCell kSawBoth = 3;
-
-/// The summary of each surface pixel, and the bins of those whose rays have disagreed.
-void encode_memory(const SampleState& state, StateSections& sections) {
-  if (state.memory.empty()) return;
-  ByteWriter summaries, grids;
-  for (const std::size_t pixel : sections.pixels()) {
-    const auto cells = std::span(state.memory).subspan(pixel * kMemoryCells, kMemoryCells);
-    summaries.put_raw(std::as_bytes(cells.subspan(kMemoryBins)));
-    if (cells.back() == kSawBoth) grids.put_raw(std::as_bytes(cells.first(kMemoryBins)));
-  }
-  sections.add(kMemorySummary, 2 * sizeof(MemoryCell), summaries.take());
-  sections.add(kMemoryGrid, sizeof(MemoryCell), grids.take());
-}
-
-/// Inverse of encode_memory; a file without memories leaves the state without them.
-Status decode_memory(const SectionFile& file, const std::vector<std::size_t>& pixels,
-                     const std::string& name, SampleState& state) {
-  if (file.find(kMemorySummary) == nullptr && file.find(kMemoryGrid) == nullptr) return {};
-  constexpr std::size_t kSummaryBytes = 2 * sizeof(MemoryCell);
-  constexpr std::size_t kGridBytes = kMemoryBins * sizeof(MemoryCell);
-  BATON_ASSIGN(const ByteView summaries,
-               section_payload(file, kMemorySummary, pixels.size() * kSummaryBytes, name));
-  state.add_memory();
-
-  // Summaries first: they say how many grids there are.
-  std::vector<std::size_t> with_grid;
-  for (std::size_t i = 0; i < pixels.size(); ++i) {
-    const std::span<MemoryCell> cells = state.memory_of(pixels[i]);
-    std::memcpy(cells.data() + kMemoryBins, summaries.data() + i * kSummaryBytes, kSummaryBytes);
-    if (cells.back() > kSawBoth) {
-      const Error error = value_error(state, kMemorySummary, pixels[i],
-                                      fmt::format("outcomes {}, expected 0 to 3", cells.back()));
-      return Error{error.kind, fmt::format("{}: section {}", name, error.message)};
-    }
-    if (cells.back() == kSawBoth) with_grid.push_back(pixels[i]);
-  }
-  BATON_ASSIGN(const ByteView grids,
-               section_payload(file, kMemoryGrid, with_grid.size() * kGridBytes, name));
-  for (std::size_t i = 0; i < with_grid.size(); ++i) {
-    std::memcpy(state.memory_of(with_grid[i]).data(), grids.data() + i * kGridBytes, kGridBytes);
   }
   return {};
 }
@@ -343,7 +288,12 @@ Bytes encode_state(const SampleState& state) {
     writer.put(state.num_populations);
     sections.add(kPopulations, 1, writer.take());
   }
-  encode_memory(state, sections);
+  if (!state.memory.empty()) {
+    MemoryPayloads memory = encode_memory(state, sections.pixels());
+    sections.add(kMemorySummary, kMemorySummaryStride, std::move(memory.summaries));
+    sections.add(kMemoryGrid, kMemoryCellStride, std::move(memory.grids));
+    sections.add(kMemoryNoise, kMemoryCellStride, std::move(memory.noise));
+  }
   if (!state.confidence.empty()) sections.gather(kConfidence, state.confidence, 1);
   return sections.encode();
 }

@@ -22,9 +22,11 @@ enum class PixelSource : std::uint8_t {
   refreshed = 4,   ///< carried, Lns recomputed by the refresh rule
 };
 
-/// One bin of a pixel's memory of its shadow rays; worker/sampling/visibility_grid.h says what it means.
+/// One bin of a pixel's memory of its shadow rays; worker/sampling/visibility_grid.h says what it
+/// means.
 using MemoryCell = std::uint16_t;
-inline constexpr std::size_t kMemoryCells = 258;  ///< of one pixel: 256 bins, all rays, outcomes seen
+inline constexpr std::size_t kMemoryCells =
+    259;  ///< of one pixel: 256 bins, all rays, outcomes seen, noise of its light
 
 /// The baton: what one tile hands to its next frame. Structure of arrays; pixels row by row inside
 /// `rect`. The surfaces are not stored: primary hits are a pure function of (job, frame, pixel,
@@ -48,8 +50,8 @@ struct SampleState {
   std::vector<std::uint8_t> site;  ///< (pixels, N)
 
   std::vector<MemoryCell> memory;  ///< (pixels, kMemoryCells), or empty: nothing is remembered
-  /// (pixels) how many fresh sets a pixel's samples count as when they are weighed against fresh ones, 0: they are no
-  /// history; or empty: nobody asks.
+  /// (pixels) how many fresh sets a pixel's samples count as when they are weighed against fresh
+  /// ones, 0: they are no history; or empty: nobody asks.
   std::vector<std::uint16_t> confidence;
 
   bool operator==(const SampleState&) const = default;

@@ -1,7 +1,7 @@
 // Time per pixel of every method over the time of its own occlusion rays alone, on a real scene.
-// Both times are CPU seconds of one run, so the ratios hold on a noisy machine. Reading the maps and
-// tracing the primary rays of a still camera are paid once for all frames.
-// Usage: bench_methods [JOB.json] [FRAMES] [METHODS THAT BEGIN SO] [SITES]
+// Both times are CPU seconds of one run, so the ratios hold on a noisy machine. Reading the maps
+// and tracing the primary rays of a still camera are paid once for all frames. Usage: bench_methods
+// [JOB.json] [FRAMES] [METHODS THAT BEGIN SO] [SITES]
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -38,6 +38,7 @@ std::vector<Case> make_cases() {
       [](SamplingSpec& s) { s.num_candidates = 128; });
   add("bidirectional M=800", Method::bidirectional, 3.5,
       [](SamplingSpec& s) { s.num_candidates = 800; });
+  add("pool M=64", Method::pool, 2.2, [](SamplingSpec& s) { s.num_candidates = 64; });
   add("pool M=128", Method::pool, 2.2, [](SamplingSpec& s) { s.num_candidates = 128; });
   add("pool M=256", Method::pool, 2.2, [](SamplingSpec& s) { s.num_candidates = 256; });
   add("sequential P=1", Method::sequential, 0, [](SamplingSpec& s) { s.num_distributions = 1; });

@@ -75,6 +75,7 @@ LightPoolLayout pool_layout(const JobSpec& job) {
       taken = fresh(spec.start_method);
       break;
     case Method::pool:
+      return {.one_run = true};
     case Method::ratio:
     case Method::restir:
       taken = spec.num_candidates;

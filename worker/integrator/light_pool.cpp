@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <iterator>
+#include <numbers>
 #include <span>
 #include <utility>
 
@@ -49,6 +50,16 @@ void lay_out(std::span<const OctDirection> sorted, std::uint32_t first,
   }
 }
 
+/// Mean radiance over the sphere, grey.
+float mean_radiance(std::span<const LightPool::Block> blocks) {
+  double sum = 0;
+  for (const LightPool::Block& block : blocks) {
+    for (std::uint32_t i = 0; i < LightPool::kBlock; ++i)
+      sum += double{block.r[i] + block.g[i] + block.b[i]} * block.inverse_density[i];
+  }
+  return static_cast<float>(sum / (3 * 4 * std::numbers::pi * LightPool::kSize));
+}
+
 }  // namespace
 
 LightPool make_light_pool(const Environment& now, const Environment& before, std::uint64_t job_seed,
@@ -60,7 +71,9 @@ LightPool make_light_pool(const Environment& now, const Environment& before, std
   // Draw the directions, run by run.
   pool.blocks.resize(LightPool::kNumBlocks);
   const std::uint32_t num_blocks = (layout.num_taken + LightPool::kBlock - 1) / LightPool::kBlock;
-  pool.run_blocks = std::bit_ceil(std::clamp(num_blocks, 1u, LightPool::kMaxRunBlocks));
+  pool.run_blocks = layout.one_run
+                        ? LightPool::kNumBlocks
+                        : std::bit_ceil(std::clamp(num_blocks, 1u, LightPool::kMaxRunBlocks));
   std::vector<OctDirection> directions = draw_directions(now, rng.bits(0, 0));
   for (std::uint32_t first = 0; first < LightPool::kNumBlocks; first += pool.run_blocks) {
     const auto run = std::span(directions)
@@ -82,6 +95,7 @@ LightPool make_light_pool(const Environment& now, const Environment& before, std
     kernels::evaluate_environment(before_view, block.x, block.y, block.z, block.before_r,
                                   block.before_g, block.before_b, unused);
   }
+  pool.mean_radiance = mean_radiance(pool.blocks);
   return pool;
 }
 

@@ -28,6 +28,7 @@ struct LightPool {
   static constexpr std::uint32_t kBlock = 8;     ///< entries that lie together in memory
 
   static constexpr std::uint32_t kNumBlocks = kSize / kBlock;
+  /// Most blocks of a run, but where all are one: there are runs for each eighth of the curve.
   static constexpr std::uint32_t kMaxRunBlocks = kNumBlocks / kBlock;
 
   /// Eight entries, field by field: the unit of SIMD loads.
@@ -40,7 +41,8 @@ struct LightPool {
     float before_r[kBlock], before_g[kBlock], before_b[kBlock];  ///< radiance of the frame before
   };
   std::vector<Block> blocks;     ///< (kNumBlocks); empty for a black map
-  std::uint32_t run_blocks = 1;  ///< a power of two, at most kMaxRunBlocks
+  std::uint32_t run_blocks = 1;  ///< a power of two
+  float mean_radiance = 0;       ///< of the environment over the sphere, grey; by its entries
 
   bool empty() const { return blocks.empty(); }
   std::size_t size_bytes() const { return blocks.size() * sizeof(Block); }
@@ -50,6 +52,8 @@ struct LightPool {
 struct LightPoolLayout {
   /// Entries that most pixels take: a run has so many, rounded up to a power of two.
   std::uint32_t num_taken = 64;
+  /// All entries are one run: best where pixels differ in how many they take.
+  bool one_run = false;
 };
 
 /// The pool of one frame. before: the environment that `before_*` is read from (the same as `now`

@@ -28,12 +28,15 @@ struct PixelRays {
   Value constant;
   /// What the even ones of all samples brought to `constant` more than the odd ones. With the
   /// values of the rays, of alternating sign, it tells two interleaved halves of the pixel apart.
-  Rgb difference;
+  float difference = 0;
+  /// Variance of the candidates' light that one of them would have, light_variance().
+  float light_variance = 0;
 
   void clear() {
     count = 0;
     constant = {};
-    difference = {};
+    difference = 0;
+    light_variance = 0;
   }
 };
 

@@ -14,6 +14,7 @@
 
 #include "worker/integrator/choice-inl.h"
 #include "worker/integrator/pool_kernels.h"
+#include "worker/sampling/light_noise.h"
 #include "worker/sampling/pool.h"
 
 HWY_BEFORE_NAMESPACE();
@@ -88,10 +89,12 @@ struct PoolLines {
   RememberedLanes memory;
   RunningSums::End hope, doubt;
   float* next_free;
-  VF light = hn::Zero(DF());                                             ///< sum of w
-  Vec3Lanes visible{hn::Zero(DF()), hn::Zero(DF()), hn::Zero(DF())};     ///< of w V^ colour
-  Vec3Lanes difference{hn::Zero(DF()), hn::Zero(DF()), hn::Zero(DF())};  ///< even less odd vectors
-  VF expected = hn::Zero(DF());                                          ///< of w V^
+  const float* second = next_free + hn::Lanes(DF());  ///< where those of the second vector go
+  VF light = hn::Zero(DF());                          ///< sum of w
+  Vec3Lanes visible{hn::Zero(DF()), hn::Zero(DF()), hn::Zero(DF())};  ///< of w V^ colour
+  VF difference = hn::Zero(DF());                                     ///< even less odd w V^
+  VF previous = hn::Zero(DF());                                       ///< w V^ before
+  VF steps = hn::Zero(DF());  ///< of the squares of its steps from vector to vector
   VF sign = hn::Set(DF(), 1.0f);
 
   template <class Color>
@@ -103,10 +106,13 @@ struct PoolLines {
     hope.Add(hn::Mul(weight, prospect.hope));
     doubt.Add(hn::Mul(weight, prospect.doubt));
     light = hn::Add(light, weight);
-    expected = hn::MulAdd(weight, prospect.free, expected);
-    const Vec3Lanes seen = Scale(color(), prospect.free);
-    visible = HWY_NAMESPACE::Add(visible, seen);
-    difference = HWY_NAMESPACE::Add(difference, Scale(seen, sign));
+    const VF likely = hn::Mul(weight, prospect.free);
+    if (next_free == second) previous = likely;  // the first has none before it
+    const VF step = hn::Sub(likely, previous);
+    steps = hn::MulAdd(step, step, steps);
+    previous = likely;
+    visible = HWY_NAMESPACE::Add(visible, Scale(color(), prospect.free));
+    difference = hn::MulAdd(likely, sign, difference);
     sign = hn::Neg(sign);
   }
 };
@@ -131,8 +137,8 @@ HWY_INLINE void LookUpRays(const ChosenCandidates& chosen, const RayPlan& plan,
   const VF per_pick = hn::Set(d, plan.total / static_cast<float>(plan.count));
   const VF per_light = hn::Set(d, 1 / lns);
   const VF half = AlternateSigns();
-  Vec3Lanes expected{hn::Zero(d), hn::Zero(d), hn::Zero(d)}, difference = expected;
-  VF expected_share = hn::Zero(d);
+  Vec3Lanes expected{hn::Zero(d), hn::Zero(d), hn::Zero(d)};
+  VF expected_share = hn::Zero(d), difference = hn::Zero(d);
   for (std::size_t j = 0; j < picks.count; j += hn::Lanes(d)) {
     const VI pick = hn::Load(di, picks.pick + j);
     const CandidateLanes c = chosen.Evaluate(pick);
@@ -146,14 +152,14 @@ HWY_INLINE void LookUpRays(const ChosenCandidates& chosen, const RayPlan& plan,
     hn::StoreU(hn::DemoteTo(DB(), VisibilityBins(c.code)), DB(), out.bin + j);
     const Vec3Lanes sure = Scale(color, seen);
     expected = HWY_NAMESPACE::Add(expected, sure);
-    difference = HWY_NAMESPACE::Add(difference, Scale(sure, half));
+    difference = hn::MulAdd(hn::Mul(light, seen), half, difference);
     expected_share = hn::MulAdd(share, seen, expected_share);
   }
   out.count = picks.count;
   if (!plan.control) return;
   out.constant.color += SumOfLanes(expected) * -1.0f;
   out.constant.visibility -= hn::GetLane(hn::SumOfLanes(d, expected_share));
-  out.difference += SumOfLanes(difference) * -1.0f;
+  out.difference -= hn::GetLane(hn::SumOfLanes(d, difference));
 }
 
 inline float ChoosePoolRays(const SiteBlock& sites, const EnvironmentView& environment,
@@ -176,13 +182,21 @@ inline float ChoosePoolRays(const SiteBlock& sites, const EnvironmentView& envir
 
   // Decide what rays are worth.
   const float in_doubt = doubt.Finish();
-  const bool control = use_control(sum(lines.expected), in_doubt);
+  const Rgb visible = SumOfLanes(lines.visible);
+  const float expected = mean(visible);
+  const bool control = use_control(expected, in_doubt);
   const bool knows = memory[kVisibilityOutcomes] != 0;
+  const float scale = noise_scale(lns, pool.mean_radiance);
   const auto most = static_cast<std::int32_t>(limits::kMaxParticles);
   const RayPlan plan{control ? doubt : hope, control ? in_doubt : hope.Finish(), control,
-                     knows ? rays_for_doubt(num_rays, in_doubt, lns, most) : num_rays};
-  out.difference = SumOfLanes(lines.difference);
-  if (control) out.constant = {SumOfLanes(lines.visible), sum(lines.expected) / lns};
+                     knows ? rays_for_doubt(num_rays, in_doubt, scale, most) : num_rays};
+  out.difference = sum(lines.difference);
+  // Neighbours along the curve are strata of their own, and two of them differ by the noise of
+  // both.
+  const float variance =
+      0.5f * sum(lines.steps) / scale / scale * static_cast<float>(counts.total());
+  out.light_variance = std::isfinite(variance) ? variance : 0.0f;
+  if (control) out.constant = {visible, expected / lns};
 
   // Choose them.
   HWY_ALIGN std::int32_t picks[limits::kMaxParticles + RunningSums::kGroup];

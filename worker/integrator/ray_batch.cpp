@@ -133,7 +133,7 @@ FreeLight SumFree(const RayBatch& batch, std::size_t first, std::size_t end) {
     visibility = hn::Add(visibility, hn::IfThenElseZero(free, load(batch.visibility, i)));
   }
   out.color = SumOfLanes(color);
-  out.difference = SumOfLanes(Scale(color, AlternateSigns()));
+  out.difference = hn::GetLane(hn::SumOfLanes(d, hn::Mul(MeanLanes(color), AlternateSigns())));
   out.visibility = hn::GetLane(hn::SumOfLanes(d, visibility));
   return out;
 }

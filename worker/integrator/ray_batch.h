@@ -42,7 +42,7 @@ struct CastSamples {
 struct FreeLight {
   Rgb color;  ///< sum of what the free ones bring
   float visibility = 0;
-  Rgb difference;             ///< what the even ones bring more than the odd ones
+  float difference = 0;       ///< what the even ones bring more than the odd ones, grey
   std::uint64_t is_free = 0;  ///< bit by bit
 };
 /// Sums rays [first, end) of a traced batch, at most 64, in an order that only their number

@@ -7,6 +7,7 @@
 #include "worker/pass/blocked_samples.h"
 #include "worker/pass/cpu_clock.h"
 #include "worker/pass/pixel_books.h"
+#include "worker/sampling/light_noise.h"
 
 namespace baton {
 namespace {
@@ -27,9 +28,10 @@ struct TileFrameRenderer::Batch {
   std::int32_t frame_index = 0;
   RayBatch rays;           ///< samples are numbered batch pixel * stride + number in the pixel
   std::size_t stride = 1;  ///< most rays of a pixel
-  std::array<std::size_t, kBatchPixels> end_ray;  ///< where each pixel's rays end
-  std::array<Rgb, kBatchPixels> difference;       ///< as PixelRays::difference
-  std::vector<std::uint8_t> bin;                  ///< as PixelRays::bin, by sample
+  std::array<std::size_t, kBatchPixels> end_ray;   ///< where each pixel's rays end
+  std::array<float, kBatchPixels> difference;      ///< as PixelRays::difference
+  std::array<float, kBatchPixels> light_variance;  ///< as PixelRays::light_variance
+  std::vector<std::uint8_t> bin;                   ///< as PixelRays::bin, by sample
   std::array<PixelResult, kBatchPixels> pixels;
 
   RngKey key(const RenderContext& context, const PixelRect& rect, std::size_t index) const {
@@ -151,7 +153,8 @@ void TileFrameRenderer::sample(Batch& batch, const FrameLight& light, SampleStat
   SampleColors colors;
   SiteBlock sites;
   batch.rays.clear();
-  batch.difference.fill({});
+  batch.difference.fill(0);
+  batch.light_variance.fill(0);
   const kernels::CarriedLight carried{before, now, light.still, light.pool};
   look_ahead(0, batch.first, carried, state);
   for (std::size_t i = 0; i < batch.count; ++i) {
@@ -257,6 +260,7 @@ void TileFrameRenderer::cast_rays(Batch& batch, std::size_t i, const PixelRays& 
   batch.pixels[i].radiance = rays.constant.color;
   batch.pixels[i].visibility = rays.constant.visibility;
   batch.difference[i] = rays.difference;
+  batch.light_variance[i] = rays.light_variance;
 }
 
 /// Pass: visibility of all samples of the batch at once.
@@ -282,15 +286,15 @@ void TileFrameRenderer::shade(Batch& batch, SampleState& state) {
     // The even and the odd ray of each pair, and candidates likewise, make two estimates that agree
     // in the mean: the square of half their difference is at least the variance of the whole, as
     // neighbours differ least.
-    const float d = mean(batch.difference[i] + found.difference);
+    const float d = batch.difference[i] + found.difference;
     pixel.variance = context_.sampler->chooses_rays() ? d * d : 0.0f;
     remember(batch, i, first, found.is_free, state);
     first = end;
   }
 }
 
-/// Tells the second pass, the pixel's memory and its samples what the rays of batch pixel `i` found,
-/// from `first` on.
+/// Tells the second pass, the pixel's memory and its samples what the rays of batch pixel `i`
+/// found, from `first` on.
 void TileFrameRenderer::remember(const Batch& batch, std::size_t i, std::size_t first,
                                  std::uint64_t is_free, SampleState& state) {
   const std::size_t end = batch.end_ray[i];
@@ -301,6 +305,7 @@ void TileFrameRenderer::remember(const Batch& batch, std::size_t i, std::size_t 
   }
   if (!memory.empty()) {
     remember_rays(memory, std::span(batch.bin).subspan(i * batch.stride, end - first), is_free);
+    remember_light_variance(memory, batch.light_variance[i]);
   }
   if (!context_.job.visibility.correlated) return;
   for (std::size_t r = first; r < end; ++r) {

@@ -32,12 +32,14 @@ inline float doubt_factor(float free) {
 inline constexpr float kSafeControl = 2;
 inline bool use_control(float expected, float doubt) { return expected > kSafeControl * doubt; }
 
-/// Rays of a pixel with a memory: N where the standard deviation of what is in doubt is 15 % of its
-/// light, else in proportion to its root, from N / 2 to 2 N, at most `most`. light: sum of w, > 0.
-inline constexpr float kUsualDoubt = 0.15f;
-inline std::int32_t rays_for_doubt(std::int32_t num_rays, float doubt, float light,
+/// Rays of a pixel with a memory: N where the standard deviation of what is in doubt is 2.5 % of
+/// `scale`, else in proportion to its power of 3/4, from N / 2 to 4 N, at most `most`. scale:
+/// noise_scale(), > 0. (In proportion to doubt itself would be best if memories were right.)
+inline constexpr float kUsualDoubt = 0.025f;
+inline std::int32_t rays_for_doubt(std::int32_t num_rays, float doubt, float scale,
                                    std::int32_t most) {
-  const float share = std::clamp(std::sqrt(doubt / (kUsualDoubt * light)), 0.5f, 2.0f);
+  const float root = std::sqrt(doubt / (kUsualDoubt * scale));
+  const float share = std::clamp(root * std::sqrt(root), 0.5f, 4.0f);
   const auto wanted = static_cast<std::int32_t>(std::ceil(share * static_cast<float>(num_rays)));
   return std::min(wanted, most);
 }

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "tests/support/instruction_sets.h"
+#include "worker/sampling/light_noise.h"
 #include "worker/sampling/pool.h"
 #include "worker/scene/material.h"
 
@@ -143,6 +144,31 @@ TEST_P(PoolRays, ReadTheMemoryAsTheScalarCode) {
   }
   for (std::size_t j = 0; j < rays->count; ++j) {
     EXPECT_EQ(rays->bin[j], visibility_bin(encode_octahedral(direction(j))));
+  }
+}
+
+// What a pixel learns of the noise of its light, against the variance that 2000 runs show. Steps
+// along the curve overrate what is stratified, here by up to eleven times.
+TEST_P(PoolRays, TellTheVarianceOfTheirLight) {
+  const LightPool one_run = make_light_pool(light, light, 3, 2, {.one_run = true});
+  for (const bool glossy : {false, true}) {
+    const SiteBlock sites = pixel(glossy);
+    const std::vector<VisibilityCell> memory = memory_after(0);
+    double sum = 0, squares = 0, variance = 0;
+    constexpr int kRuns = 2000;
+    for (std::uint32_t k = 0; k < kRuns; ++k) {
+      const Rng own({.job_seed = k}, PassId::candidates);
+      const double lns = double{kernels::choose_pool_rays(sites, view, one_run, counts(sites), own,
+                                                          0.5f, 16, memory, *scratch, *rays)};
+      sum += lns / kRuns;
+      squares += lns * lns / kRuns;
+      const double scale = noise_scale(static_cast<float>(lns), one_run.mean_radiance);
+      variance += double{rays->light_variance} * scale * scale / counts(sites).total() / kRuns;
+    }
+    // Half of the light was expected to come: nothing is known of shadows.
+    const double truth = 0.25 * (squares - sum * sum);
+    EXPECT_GT(variance, truth) << glossy;
+    EXPECT_LT(variance, 16 * truth) << glossy;
   }
 }
 

@@ -135,6 +135,20 @@ TEST(RunTile, SameBytesForAnyTilingAndAnyRunLengthWithThePool) {
   EXPECT_NE(forgetful, whole);
 }
 
+TEST(RunTile, ThePoolTakesMoreCandidatesWhereItWasNoisy) {
+  JobSpec job = sequence_job(4);
+  job.sampling.method = Method::pool;
+  job.sampling.num_candidates = 64;
+  const auto per_pixel = [&] {
+    const RenderStats stats = render_tile(job).stats;
+    return static_cast<double>(stats.target_evaluations) /
+           static_cast<double>(stats.pixels - stats.pixels_background);
+  };
+  EXPECT_GT(per_pixel(), 80);
+  job.state.carry = false;
+  EXPECT_EQ(per_pixel(), 64) << "noise of this frame must not count";
+}
+
 // The variance that the pool states from its even and odd samples is, on average, at least what is
 // seen over 64 seeds (whose own error is 5 % of it), and not many times more.
 TEST(RunTile, PoolStatesItsVariance) {

@@ -1,5 +1,6 @@
 #include "common/state/sample_state.h"
 
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -308,6 +309,7 @@ SampleState remembering_state() {
   state.memory_of(2)[5] = 0x1234;
   state.memory_of(2)[256] = 0x7771;
   state.memory_of(2)[257] = 3;
+  state.memory_of(2)[258] = 0x3B12;
   return state;
 }
 
@@ -349,6 +351,7 @@ TEST(SampleState, StoresNoGridWhereRaysAgree) {
   };
   EXPECT_EQ(raw_bytes(state, "VISG"), 512u);
   EXPECT_EQ(raw_bytes(state, "VISS"), 8u);
+  EXPECT_EQ(raw_bytes(state, "NOIS"), 4u);
   state.memory.clear();
   EXPECT_EQ(raw_bytes(state, "VISS"), 0u);
 }
@@ -360,6 +363,19 @@ TEST(SampleState, RefusesOutcomesThatCannotBe) {
   ASSERT_FALSE(decoded.ok());
   EXPECT_THAT(decoded.error().message,
               HasSubstr("a.bst: section VISS: pixel (1, 0): outcomes 4, expected 0 to 3"));
+}
+
+TEST(SampleState, RefusesNoiseThatIsNoNumber) {
+  for (const MemoryCell noise : {MemoryCell{0x7F80}, MemoryCell{0x8001}}) {  // infinite, negative
+    SampleState state = remembering_state();
+    state.memory_of(2)[258] = noise;
+    const auto decoded = decode_state(encode_state(state), "a.bst");
+    ASSERT_FALSE(decoded.ok());
+    EXPECT_THAT(
+        decoded.error().message,
+        HasSubstr(fmt::format(
+            "a.bst: section NOIS: pixel (2, 0): noise {:#06x}, expected 0 to 0x7f7f", noise)));
+  }
 }
 
 }  // namespace
