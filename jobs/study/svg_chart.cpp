@@ -204,7 +204,7 @@ class Drawing {
     };
     y += 6;
     if (marked) note("none", kMarker + 3, "#000", "Pareto front");
-    if (hollow) note("#fff", kMarker, "#555", "below the reference's error");
+    if (hollow) note("#fff", kMarker, "#555", "not resolved");
   }
 
   const Chart& chart_;
