@@ -10,25 +10,27 @@
 namespace baton {
 namespace {
 
-/// A memory's bins come first; the two cells after them are its summary, the last is the noise.
-constexpr std::size_t kMemoryBins = kMemoryCells - 3;
+/// A memory's bins come first; the two cells after them are its summary, the last are the noise.
+constexpr std::size_t kMemoryBins = kMemoryCells - 4;
 constexpr std::size_t kMemoryOutcomes = kMemoryBins + 1;
+constexpr std::size_t kLightNoiseCell = kMemoryBins + 2, kLobeNoiseCell = kMemoryBins + 3;
 constexpr std::size_t kSummaryCells = kMemorySummaryStride / sizeof(MemoryCell);
 constexpr MemoryCell kSawBoth = 3;
 
-/// The last cells of all memories; a file from before they were kept leaves them unknown.
-Status decode_noise(const SectionFile& file, const std::vector<std::size_t>& pixels,
-                    const std::string& name, SampleState& state) {
-  if (file.find(kMemoryNoise) == nullptr) return {};
+/// A cell of noise of all memories; a file from before it was kept leaves it unknown.
+Status decode_noise(const SectionFile& file, const SectionTag& tag, std::size_t cell,
+                    const std::vector<std::size_t>& pixels, const std::string& name,
+                    SampleState& state) {
+  if (file.find(tag) == nullptr) return {};
   constexpr MemoryCell kLargest = 0x7F7F;  // upper half of the largest float
   BATON_ASSIGN(const ByteView payload,
-               section_payload(file, kMemoryNoise, pixels.size() * sizeof(MemoryCell), name));
+               section_payload(file, tag, pixels.size() * sizeof(MemoryCell), name));
   for (std::size_t i = 0; i < pixels.size(); ++i) {
-    MemoryCell& noise = state.memory_of(pixels[i]).back();
+    MemoryCell& noise = state.memory_of(pixels[i])[cell];
     std::memcpy(&noise, payload.data() + i * sizeof(MemoryCell), sizeof(MemoryCell));
     if (noise <= kLargest) continue;
     const Error error =
-        value_error(state, kMemoryNoise, pixels[i],
+        value_error(state, tag, pixels[i],
                     fmt::format("noise {:#06x}, expected 0 to {:#06x}", noise, kLargest));
     return Error{error.kind, fmt::format("{}: section {}", name, error.message)};
   }
@@ -39,14 +41,15 @@ Status decode_noise(const SectionFile& file, const std::vector<std::size_t>& pix
 
 MemoryPayloads encode_memory(const SampleState& state, const std::vector<std::size_t>& pixels) {
   BATON_CHECK(!state.memory.empty());
-  ByteWriter summaries, grids, noise;
+  ByteWriter summaries, grids, light_noise, lobe_noise;
   for (const std::size_t pixel : pixels) {
     const auto cells = std::span(state.memory).subspan(pixel * kMemoryCells, kMemoryCells);
     summaries.put_raw(std::as_bytes(cells.subspan(kMemoryBins, kSummaryCells)));
-    noise.put_raw(std::as_bytes(cells.last(1)));
+    light_noise.put_raw(std::as_bytes(cells.subspan(kLightNoiseCell, 1)));
+    lobe_noise.put_raw(std::as_bytes(cells.subspan(kLobeNoiseCell, 1)));
     if (cells[kMemoryOutcomes] == kSawBoth) grids.put_raw(std::as_bytes(cells.first(kMemoryBins)));
   }
-  return {summaries.take(), grids.take(), noise.take()};
+  return {summaries.take(), grids.take(), light_noise.take(), lobe_noise.take()};
 }
 
 Status decode_memory(const SectionFile& file, const std::vector<std::size_t>& pixels,
@@ -76,7 +79,8 @@ Status decode_memory(const SectionFile& file, const std::vector<std::size_t>& pi
   for (std::size_t i = 0; i < with_grid.size(); ++i) {
     std::memcpy(state.memory_of(with_grid[i]).data(), grids.data() + i * kGridBytes, kGridBytes);
   }
-  return decode_noise(file, pixels, name, state);
+  BATON_TRY(decode_noise(file, kMemoryLightNoise, kLightNoiseCell, pixels, name, state));
+  return decode_noise(file, kMemoryLobeNoise, kLobeNoiseCell, pixels, name, state);
 }
 
 Error value_error(const SampleState& state, const SectionTag& tag, std::size_t pixel,

@@ -11,13 +11,14 @@ namespace baton {
 /// The sections of a state file that hold what pixels remember (FORMAT.md).
 inline constexpr SectionTag kMemorySummary{'V', 'I', 'S', 'S'};
 inline constexpr SectionTag kMemoryGrid{'V', 'I', 'S', 'G'};
-inline constexpr SectionTag kMemoryNoise{'N', 'O', 'I', 'S'};
+inline constexpr SectionTag kMemoryLightNoise{'N', 'O', 'I', 'S'};
+inline constexpr SectionTag kMemoryLobeNoise{'N', 'O', 'I', 'L'};
 /// Sizes of their elements in bytes.
 inline constexpr std::size_t kMemorySummaryStride = 2 * sizeof(MemoryCell);
 inline constexpr std::size_t kMemoryCellStride = sizeof(MemoryCell);
 
 struct MemoryPayloads {
-  Bytes summaries, grids, noise;
+  Bytes summaries, grids, light_noise, lobe_noise;
 };
 
 /// Summary and noise of each of `pixels` (0-based, ascending), and the bins of those whose rays

@@ -24,9 +24,10 @@ constexpr SectionTag kWeight{'W', 'G', 'T', '_'};
 constexpr SectionTag kSite{'S', 'I', 'T', 'E'};
 constexpr SectionTag kPopulations{'P', 'O', 'P', 'S'};
 constexpr SectionTag kConfidence{'C', 'O', 'N', 'F'};
-constexpr std::array kTags{kMeta,          kSource,     kLns,         kLnsFresh,
-                           kDirection,     kWeight,     kSite,        kPopulations,
-                           kMemorySummary, kMemoryGrid, kMemoryNoise, kConfidence};
+constexpr std::array kTags{
+    kMeta,      kSource,      kLns,           kLnsFresh,   kDirection,        kWeight,
+    kSite,      kPopulations, kMemorySummary, kMemoryGrid, kMemoryLightNoise, kMemoryLobeNoise,
+    kConfidence};
 
 constexpr std::size_t kMetaBytes = 2 * sizeof(std::uint64_t) + 7 * sizeof(std::int32_t);
 /// How far the sum of a pixel's weights may be from 1.
@@ -292,7 +293,8 @@ Bytes encode_state(const SampleState& state) {
     MemoryPayloads memory = encode_memory(state, sections.pixels());
     sections.add(kMemorySummary, kMemorySummaryStride, std::move(memory.summaries));
     sections.add(kMemoryGrid, kMemoryCellStride, std::move(memory.grids));
-    sections.add(kMemoryNoise, kMemoryCellStride, std::move(memory.noise));
+    sections.add(kMemoryLightNoise, kMemoryCellStride, std::move(memory.light_noise));
+    sections.add(kMemoryLobeNoise, kMemoryCellStride, std::move(memory.lobe_noise));
   }
   if (!state.confidence.empty()) sections.gather(kConfidence, state.confidence, 1);
   return sections.encode();

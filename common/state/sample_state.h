@@ -26,7 +26,7 @@ enum class PixelSource : std::uint8_t {
 /// means.
 using MemoryCell = std::uint16_t;
 inline constexpr std::size_t kMemoryCells =
-    259;  ///< of one pixel: 256 bins, all rays, outcomes seen, noise of its light
+    260;  ///< of one pixel: 256 bins, all rays, outcomes seen, two of the noise of its light
 
 /// The baton: what one tile hands to its next frame. Structure of arrays; pixels row by row inside
 /// `rect`. The surfaces are not stored: primary hits are a pure function of (job, frame, pixel,

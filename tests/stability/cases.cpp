@@ -202,6 +202,7 @@ void add_shadow_cases(std::vector<Case>& cases) {
            },
        // What arrives is so rare that noise is all there is: only bias and Lns are judged.
        .laws = {{Measure::unlawful, 0, 0},
+                {Measure::negative, 1e-4, 1e-2},
                 {Measure::bias, 0.01, 0.05},
                 {Measure::lns_bias, 0.01, 0.05},
                 {Measure::lns_median, 0.1, 0.3},
@@ -281,9 +282,10 @@ Timeline Case::timeline(const Effort& effort) const {
 }
 
 std::vector<Law> usual_laws() {
-  return {{Measure::unlawful, 0, 0},       {Measure::bias, 0.01, 0.05},
-          {Measure::lns_bias, 0.01, 0.05}, {Measure::lns_median, 0.1, 0.3},
-          {Measure::noise, 2, 5},          {Measure::lost, 0.01, 0.1}};
+  return {{Measure::unlawful, 0, 0},       {Measure::negative, 1e-4, 1e-2},
+          {Measure::bias, 0.01, 0.05},     {Measure::lns_bias, 0.01, 0.05},
+          {Measure::lns_median, 0.1, 0.3}, {Measure::noise, 2, 5},
+          {Measure::lost, 0.01, 0.1}};
 }
 
 std::vector<Case> all_cases() {

@@ -24,6 +24,8 @@ double value_of(Measure measure, const Numbers& n, const Numbers& fresh) {
   switch (measure) {
     case Measure::unlawful:
       return static_cast<double>(n.unlawful);
+    case Measure::negative:
+      return n.negative;
     case Measure::bias:
       return beyond_interval(n.bias, n.bias_interval);
     case Measure::lns_bias:
@@ -47,6 +49,8 @@ std::string words_of(Measure measure, const Numbers& n, const Numbers& fresh) {
   switch (measure) {
     case Measure::unlawful:
       return fmt::format("{} unlawful values", n.unlawful);
+    case Measure::negative:
+      return fmt::format("{:.1g} % of pixels negative", 100 * n.negative);
     case Measure::bias:
       return fmt::format("bias {:+.1f} ± {:.1f} %", 100 * n.bias, 100 * n.bias_interval);
     case Measure::lns_bias:

@@ -10,7 +10,8 @@ namespace baton::stability {
 /// of the frames. Intervals are Student's over independent runs at kIntervalLevel, two-sided.
 struct Numbers {
   std::uint64_t unlawful =
-      0;  ///< values that are NaN, infinite or negative, or light where the map is black
+      0;  ///< values that are NaN or infinite, or pixels with light where the map is black
+  double negative = 0;                         ///< share of pixels with a value below 0
   double bias = 0, bias_interval = 0;          ///< late: mean radiance - 1, and its half-width
   double lns_mean = 1, lns_mean_interval = 0;  ///< late: mean Lns^/Lns, and its half-width
   double lns_median = 1;           ///< late: median Lns^/Lns over pixels, frames and runs
@@ -28,6 +29,7 @@ inline constexpr double kIntervalLevel = 1e-4;
 /// What a law looks at.
 enum class Measure : std::uint8_t {
   unlawful,
+  negative,
   bias,         ///< how far the interval of `bias` stays from 0
   lns_bias,     ///< how far the interval of `lns_mean` stays from 1
   lns_median,   ///< max(m, 1/m) - 1 of lns_median

@@ -237,6 +237,9 @@ TEST(Laws, JudgeByTheWorstLawAndNameIt) {
   EXPECT_EQ(noisy.verdict, Verdict::fails);
   EXPECT_EQ(noisy.number, "noise x6.0");
   EXPECT_EQ(judge(laws, {.unlawful = 1, .noise = 0.1}, fresh).verdict, Verdict::fails);
+  const Judgement dark = judge({{Measure::negative, 1e-4, 1e-2}}, {.negative = 2e-4}, fresh);
+  EXPECT_EQ(dark.verdict, Verdict::degrades);
+  EXPECT_EQ(dark.number, "0.02 % of pixels negative");
   EXPECT_EQ(judge(laws, {.noise = std::numeric_limits<double>::quiet_NaN()}, fresh).verdict,
             Verdict::fails);
 }

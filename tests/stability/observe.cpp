@@ -34,7 +34,7 @@ double masked_mean(std::span<const float> values, std::span<const float> mask) {
 struct Run {
   std::vector<std::vector<float>> radiance, lns;
   std::vector<double> ess, acceptance;
-  std::uint64_t unlawful = 0;
+  std::uint64_t unlawful = 0, negative = 0, pixels = 0;
   RenderStats stats;
 
   void resize(std::size_t num_frames) {
@@ -42,6 +42,17 @@ struct Run {
     lns.resize(num_frames);
     ess.resize(num_frames);
     acceptance.resize(num_frames);
+  }
+  void count_values(const FilmTile& film) {
+    const auto finite = [](float v) { return std::isfinite(v); };
+    unlawful += static_cast<std::uint64_t>(
+        std::count_if(film.values.begin(), film.values.end(), std::not_fn(finite)));
+    for (std::size_t p = 0; p < film.num_pixels(); ++p) {
+      bool below = false;
+      for (std::size_t c = 0; c < film.channels.size(); ++c) below |= film.plane(c)[p] < 0;
+      negative += below ? 1 : 0;
+    }
+    pixels += film.num_pixels();
   }
   void keep(std::size_t slot, const FilmTile& film) {
     radiance[slot].resize(film.num_pixels());
@@ -80,9 +91,7 @@ class SharedLights {
   static Status render_run(const RenderContext& context, const std::vector<int>& judged, Run& run) {
     run.resize(judged.size());
     const FrameSink sink = [&](std::int32_t index, const FilmTile& film) {
-      const auto lawful = [](float v) { return v >= 0 && std::isfinite(v); };
-      run.unlawful += static_cast<std::uint64_t>(
-          std::count_if(film.values.begin(), film.values.end(), std::not_fn(lawful)));
+      run.count_values(film);
       const int number = context.job.frames[static_cast<std::size_t>(index)];
       const auto slot = std::lower_bound(judged.begin(), judged.end(), number);
       if (slot != judged.end() && *slot == number)
@@ -119,6 +128,8 @@ Status render_subjects(const JobSpec& job, const Timeline& time,
 /// Adds a run to a subject's observations.
 void merge(Run run, Observations& out) {
   out.unlawful += run.unlawful;
+  out.negative += run.negative;
+  out.pixels += run.pixels;
   out.stats.merge(run.stats);
   out.radiance.resize(run.radiance.size());
   out.lns.resize(run.lns.size());

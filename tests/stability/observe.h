@@ -16,8 +16,9 @@ struct Observations {
   Values lns;
   std::vector<double> ess,
       acceptance;              ///< (judged frames) mean over runs and surface pixels; ess: / N
-  std::uint64_t unlawful = 0;  ///< values of any frame that are NaN, infinite or negative
-  RenderStats stats;           ///< of all runs and frames; light is shared by the subjects
+  std::uint64_t unlawful = 0;  ///< values of any frame that are NaN or infinite
+  std::uint64_t negative = 0, pixels = 0;  ///< of any frame: with a value below 0, and all
+  RenderStats stats;  ///< of all runs and frames; light is shared by the subjects
 };
 
 /// Renders every frame of the case's job with every subject in `runs` runs with seeds 1, 2, ... in

@@ -153,6 +153,8 @@ Summary summarise(const Timeline& time, const Truth& truth, const Observations& 
   Summary summary;
   Numbers& n = summary.numbers;
   n.unlawful = seen.unlawful;
+  if (seen.pixels > 0)
+    n.negative = static_cast<double>(seen.negative) / static_cast<double>(seen.pixels);
 
   // Compare frame by frame.
   std::vector<FrameErrors> errors;

@@ -59,7 +59,8 @@ HWY_INLINE void WeighDiffuse(const SiteBlock& sites, const LightPool& pool,
   });
 }
 
-/// Weighs all candidates of a pixel; those from the BRDF are kept. line: as for WeighDiffuse.
+/// Weighs all candidates of a pixel; those from the BRDF are kept. line: as for WeighDiffuse, and
+/// has BeginBsdf(), called between those of the light and those of the BRDF.
 template <class Line>
 HWY_INLINE void WeighCandidates(const SiteBlock& sites, const EnvironmentView& environment,
                                 const LightPool& pool, const kernels::CandidateCounts& counts,
@@ -68,6 +69,7 @@ HWY_INLINE void WeighCandidates(const SiteBlock& sites, const EnvironmentView& e
   const bool diffuse = !(sites.any_phong || sites.any_ggx || sites.any_measured);
   if (diffuse && counts.from_bsdf == 0) {
     WeighDiffuse(sites, pool, counts, random, line);
+    line.BeginBsdf();
     return;
   }
   const auto add = [&](const CandidateLanes& c) HWY_ATTR {
@@ -75,6 +77,7 @@ HWY_INLINE void WeighCandidates(const SiteBlock& sites, const EnvironmentView& e
   };
   LightCandidates(sites, pool, counts, random,
                   [&](const CandidateLanes& c, std::size_t) HWY_ATTR { add(c); });
+  line.BeginBsdf();
   BsdfCandidates(sites, environment, counts, random,
                  [&](const CandidateLanes& c, std::size_t i) HWY_ATTR {
                    StoreCandidates(c, i, from_bsdf);
@@ -90,6 +93,7 @@ struct WeightLine {
   HWY_INLINE void Add(VU /*code*/, VF weight, const Color& /*color*/) {
     end.Add(weight);
   }
+  void BeginBsdf() {}
 };
 
 /// Candidates of the pixel by their number on the line: first those of the pool, padded to whole

@@ -5,6 +5,7 @@
 
 #include "common/base/limits.h"
 #include "common/math/vec3.h"
+#include "worker/sampling/light_noise.h"
 
 namespace baton {
 
@@ -29,14 +30,13 @@ struct PixelRays {
   /// What the even ones of all samples brought to `constant` more than the odd ones. With the
   /// values of the rays, of alternating sign, it tells two interleaved halves of the pixel apart.
   float difference = 0;
-  /// Variance of the candidates' light that one of them would have, light_variance().
-  float light_variance = 0;
+  LightVariance light_variance;  ///< of this frame's candidates
 
   void clear() {
     count = 0;
     constant = {};
     difference = 0;
-    light_variance = 0;
+    light_variance = {};
   }
 };
 

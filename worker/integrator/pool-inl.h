@@ -89,12 +89,14 @@ struct PoolLines {
   RememberedLanes memory;
   RunningSums::End hope, doubt;
   float* next_free;
-  const float* second = next_free + hn::Lanes(DF());  ///< where those of the second vector go
-  VF light = hn::Zero(DF());                          ///< sum of w
+  const float* first_free = next_free;  ///< where those of this kind of candidates begin
+  VF light = hn::Zero(DF());            ///< sum of w
   Vec3Lanes visible{hn::Zero(DF()), hn::Zero(DF()), hn::Zero(DF())};  ///< of w V^ colour
   VF difference = hn::Zero(DF());                                     ///< even less odd w V^
   VF previous = hn::Zero(DF());                                       ///< w V^ before
-  VF steps = hn::Zero(DF());  ///< of the squares of its steps from vector to vector
+  VF last_step = hn::Zero(DF());                                      ///< to it
+  VF bends = hn::Zero(DF());        ///< of the squares of its second differences
+  VF light_bends = hn::Zero(DF());  ///< those of the candidates from the light, once they are done
   VF sign = hn::Set(DF(), 1.0f);
 
   template <class Color>
@@ -107,15 +109,35 @@ struct PoolLines {
     doubt.Add(hn::Mul(weight, prospect.doubt));
     light = hn::Add(light, weight);
     const VF likely = hn::Mul(weight, prospect.free);
-    if (next_free == second) previous = likely;  // the first has none before it
+    const auto number = next_free - first_free;
+    if (number <= 2 * std::ptrdiff_t{hn::MaxLanes(d)}) {  // the first two are too few
+      if (number <= std::ptrdiff_t{hn::MaxLanes(d)}) previous = likely;
+      last_step = hn::Sub(likely, previous);
+    }
     const VF step = hn::Sub(likely, previous);
-    steps = hn::MulAdd(step, step, steps);
+    const VF bend = hn::Sub(step, last_step);
+    bends = hn::MulAdd(bend, bend, bends);
+    last_step = step;
     previous = likely;
     visible = HWY_NAMESPACE::Add(visible, Scale(color(), prospect.free));
     difference = hn::MulAdd(likely, sign, difference);
     sign = hn::Neg(sign);
   }
+  HWY_INLINE void BeginBsdf() {
+    light_bends = bends;
+    bends = hn::Zero(DF());
+    first_free = next_free;
+  }
 };
+
+/// Variance that one of `count` candidates would have, from the squares of their second
+/// differences: neighbours along the curve are strata of their own, and what changes evenly from
+/// one to the next is no noise.
+HWY_INLINE float VarianceOfOne(VF bends, std::int32_t count, float scale) {
+  const float sum = hn::GetLane(hn::SumOfLanes(DF(), bends));
+  const float variance = sum / 6 / scale / scale * static_cast<float>(count);
+  return std::isfinite(variance) ? variance : 0.0f;
+}
 
 /// How the rays of a pixel are chosen and counted. Either way is unbiased; which one, candidates
 /// and memory say before any ray is chosen.
@@ -191,11 +213,8 @@ inline float ChoosePoolRays(const SiteBlock& sites, const EnvironmentView& envir
   const RayPlan plan{control ? doubt : hope, control ? in_doubt : hope.Finish(), control,
                      knows ? rays_for_doubt(num_rays, in_doubt, scale, most) : num_rays};
   out.difference = sum(lines.difference);
-  // Neighbours along the curve are strata of their own, and two of them differ by the noise of
-  // both.
-  const float variance =
-      0.5f * sum(lines.steps) / scale / scale * static_cast<float>(counts.total());
-  out.light_variance = std::isfinite(variance) ? variance : 0.0f;
+  out.light_variance = {VarianceOfOne(lines.light_bends, counts.from_light, scale),
+                        VarianceOfOne(lines.bends, counts.from_bsdf, scale)};
   if (control) out.constant = {visible, expected / lns};
 
   // Choose them.

@@ -1,11 +1,31 @@
 #include "worker/integrator/pool_sampler.h"
 
+#include <algorithm>
 #include <array>
 
 #include "worker/integrator/candidate_samplers.h"
 #include "worker/sampling/light_noise.h"
 
 namespace baton {
+namespace {
+
+/// As many candidates of each kind as their noise in earlier frames asks for. Where sites see
+/// nothing but gloss, twice as many as usual come from the lobes: narrow ones see little of the
+/// light's.
+kernels::CandidateCounts counts_for_noise(const SiteBlock& sites, std::int32_t num_candidates,
+                                          float lobe_fraction, const LightVariance& known) {
+  const float specular = sites.specular_sum / static_cast<float>(std::max(sites.num_hits, 1));
+  const float of_lobes = std::min(lobe_fraction * (1 + specular), 0.5f);
+  kernels::CandidateCounts counts =
+      candidate_counts(sites, num_candidates, lobe_fraction < 1 ? of_lobes : 1.0f);
+  counts.from_light = candidates_for_noise(counts.from_light, known.from_light, kNeedOfLight,
+                                           limits::kMaxCandidates - counts.from_bsdf);
+  counts.from_bsdf = candidates_for_noise(counts.from_bsdf, known.from_lobes, kNeedOfLobes,
+                                          limits::kMaxCandidates - counts.from_light);
+  return counts;
+}
+
+}  // namespace
 
 PoolSampler::PoolSampler(const SamplingSpec& spec)
     : num_candidates_(spec.num_candidates),
@@ -16,15 +36,14 @@ PixelDiagnostics PoolSampler::sample(const PixelInput& input, SamplerScratch& sc
                                      const PixelSamples& samples) const {
   static constexpr std::array<VisibilityCell, kVisibilityCells> kNothing{};
   const std::span<const VisibilityCell> memory = input.memory.empty() ? kNothing : input.memory;
-  const std::int32_t num_candidates =
-      candidates_for_noise(num_candidates_, light_variance(memory), limits::kMaxCandidates);
-  const float total = kernels::choose_pool_rays(
-      input.sites, input.now, input.light.pool,
-      candidate_counts(input.sites, num_candidates, lobe_fraction_),
-      Rng(input.key, PassId::candidates), Rng(input.key, PassId::choose).uniforms(0, 0)[0],
-      num_rays_, memory, scratch.pool, scratch.rays);
+  const kernels::CandidateCounts counts =
+      counts_for_noise(input.sites, num_candidates_, lobe_fraction_, light_variance(memory));
+  const float total = kernels::choose_pool_rays(input.sites, input.now, input.light.pool, counts,
+                                                Rng(input.key, PassId::candidates),
+                                                Rng(input.key, PassId::choose).uniforms(0, 0)[0],
+                                                num_rays_, memory, scratch.pool, scratch.rays);
   const auto source = input.has_history ? PixelSource::carried : PixelSource::fresh;
-  return settle_rays(total, num_rays_, num_candidates, source, samples);
+  return settle_rays(total, num_rays_, counts.total(), source, samples);
 }
 
 }  // namespace baton

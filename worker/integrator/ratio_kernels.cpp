@@ -25,6 +25,7 @@ struct ColorLine {
     end.Add(weight);
     reflected = HWY_NAMESPACE::Add(reflected, color());
   }
+  void BeginBsdf() {}
 };
 
 /// Looks up the rays and what each brings. reflected: of all candidates.

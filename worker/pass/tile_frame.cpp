@@ -28,10 +28,10 @@ struct TileFrameRenderer::Batch {
   std::int32_t frame_index = 0;
   RayBatch rays;           ///< samples are numbered batch pixel * stride + number in the pixel
   std::size_t stride = 1;  ///< most rays of a pixel
-  std::array<std::size_t, kBatchPixels> end_ray;   ///< where each pixel's rays end
-  std::array<float, kBatchPixels> difference;      ///< as PixelRays::difference
-  std::array<float, kBatchPixels> light_variance;  ///< as PixelRays::light_variance
-  std::vector<std::uint8_t> bin;                   ///< as PixelRays::bin, by sample
+  std::array<std::size_t, kBatchPixels> end_ray;           ///< where each pixel's rays end
+  std::array<float, kBatchPixels> difference;              ///< as PixelRays::difference
+  std::array<LightVariance, kBatchPixels> light_variance;  ///< as PixelRays::light_variance
+  std::vector<std::uint8_t> bin;                           ///< as PixelRays::bin, by sample
   std::array<PixelResult, kBatchPixels> pixels;
 
   RngKey key(const RenderContext& context, const PixelRect& rect, std::size_t index) const {
@@ -154,7 +154,7 @@ void TileFrameRenderer::sample(Batch& batch, const FrameLight& light, SampleStat
   SiteBlock sites;
   batch.rays.clear();
   batch.difference.fill(0);
-  batch.light_variance.fill(0);
+  batch.light_variance.fill({});
   const kernels::CarriedLight carried{before, now, light.still, light.pool};
   look_ahead(0, batch.first, carried, state);
   for (std::size_t i = 0; i < batch.count; ++i) {

@@ -22,28 +22,51 @@ inline float noise_scale(float light, float mean_radiance) {
   return light + kSurroundings * mean_radiance;
 }
 
-/// Variance of a pixel's light, in squares of noise_scale(), that one candidate would have; 0:
-/// nothing is known. The memory's last cell holds the upper half of the float.
-inline float light_variance(std::span<const VisibilityCell> memory) {
-  return std::bit_cast<float>(static_cast<std::uint32_t>(memory[kLightNoise]) << 16);
+/// Variance of a pixel's light, in squares of noise_scale(), that one candidate of each kind would
+/// have; 0: nothing is known. Kinds are apart because they do not help each other: to a mirror that
+/// sees a lamp only candidates from its lobe are of use.
+struct LightVariance {
+  float from_light = 0;  ///< candidates from the environment's pool
+  float from_lobes = 0;  ///< candidates from glossy lobes
+};
+
+/// A cell holds the upper half of a float.
+inline LightVariance light_variance(std::span<const VisibilityCell> memory) {
+  const auto of = [&](std::size_t cell) {
+    return std::bit_cast<float>(static_cast<std::uint32_t>(memory[cell]) << 16);
+  };
+  return {of(kLightNoise), of(kLobeNoise)};
 }
 
 /// Enters what a frame saw, finite and >= 0; a new frame counts 1/4.
-inline void remember_light_variance(std::span<VisibilityCell> memory, float variance) {
-  const float before = light_variance(memory);
-  const float mean = before > 0 ? before + 0.25f * (variance - before) : variance;
-  memory[kLightNoise] = static_cast<VisibilityCell>(std::bit_cast<std::uint32_t>(mean) >> 16);
+inline void remember_light_variance(std::span<VisibilityCell> memory, const LightVariance& seen) {
+  const LightVariance known = light_variance(memory);
+  const auto enter = [&](std::size_t cell, float before, float now) {
+    const float mean = before > 0 ? before + 0.25f * (now - before) : now;
+    memory[cell] = static_cast<VisibilityCell>(std::bit_cast<std::uint32_t>(mean) >> 16);
+  };
+  enter(kLightNoise, known.from_light, seen.from_light);
+  enter(kLobeNoise, known.from_lobes, seen.from_lobes);
 }
 
-/// Candidates of a pixel: M where that leaves a noise of 0.3 %, else in proportion to the noise
-/// that M would leave, from M / 2 to 64 M, in eights, at most `most`; M where nothing is known.
-/// Least squared error for a given sum of candidates, as variance falls like 1 / M at least.
-inline constexpr float kUsualNoise = 0.003f;
+/// What a kind of candidates needs.
+struct CandidateNeed {
+  float usual_noise;  ///< that M of them may leave
+  float least;        ///< part of M that every pixel gets
+};
+inline constexpr CandidateNeed kNeedOfLight{0.0015f, 0.25f};
+/// Those from lobes take more time, and few of them do not see what they miss.
+inline constexpr CandidateNeed kNeedOfLobes{0.008f, 1};
+
+/// Candidates of a kind: M where that leaves the usual noise, else in proportion to the noise
+/// that M would leave, up to 64 M, in eights, at most `most`; M where nothing is known. Least
+/// squared error for a given sum of candidates, as variance falls like 1 / M at least.
 inline std::int32_t candidates_for_noise(std::int32_t num_candidates, float variance,
-                                         std::int32_t most) {
+                                         const CandidateNeed& need, std::int32_t most) {
   if (!(variance > 0)) return num_candidates;
   const auto usual = static_cast<float>(num_candidates);
-  const float share = std::clamp(std::sqrt(variance / usual) / kUsualNoise, 0.5f, 64.0f);
+  const float noise = std::sqrt(variance / usual);
+  const float share = std::clamp(noise / need.usual_noise, need.least, 64.0f);
   const auto wanted = static_cast<std::int32_t>(share * usual);
   return std::min((wanted + 7) / 8 * 8, std::max(most, num_candidates));
 }

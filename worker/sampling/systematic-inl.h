@@ -70,9 +70,13 @@ class RunningSums {
         const auto passed = hn::Le(hn::Set(d, stop_[k]), position[g]);
         lane[g] = hn::Sub(lane[g], hn::VecFromMask(di, hn::RebindMask(di, passed)));
       }
-      lane[g] = hn::GatherIndex(di, kLaneOf, hn::Min(lane[g], hn::Set(di, last_)));
-      const VF longest = hn::Mul(hn::GatherIndex(d, length_, lane[g]), hn::Set(d, 1 - 0x1p-23f));
-      along[g] = hn::Min(hn::Sub(position[g], hn::GatherIndex(d, start_, lane[g])), longest);
+      const auto stretch = hn::IndicesFromVec(di, hn::Min(lane[g], hn::Set(di, last_)));
+      lane[g] = hn::TableLookupLanes(hn::Load(di, kLaneOf), stretch);
+      const auto its = hn::IndicesFromVec(d, lane[g]);
+      const VF longest =
+          hn::Mul(hn::TableLookupLanes(hn::Load(d, length_), its), hn::Set(d, 1 - 0x1p-23f));
+      const VF start = hn::TableLookupLanes(hn::Load(d, start_), its);
+      along[g] = hn::Min(hn::Sub(position[g], start), longest);
     }
 
     // Within it, the first sum that exceeds the position.
@@ -98,7 +102,8 @@ class RunningSums {
   static constexpr std::size_t kLanes = hn::MaxLanes(DF());
   static_assert(kLanes == 4 || kLanes == 8);
   /// Lane of the k-th stretch: its bits reversed.
-  static constexpr std::int32_t kLaneOf[] = {0, kLanes / 2, kLanes / 4, 3 * kLanes / 4, 1, 5, 3, 7};
+  HWY_ALIGN static constexpr std::int32_t kLaneOf[] = {0, kLanes / 2, kLanes / 4, 3 * kLanes / 4,
+                                                       1, 5,          3,          7};
   float* storage_;
   std::size_t size_ = 0;            ///< weights, padded
   std::int32_t last_ = 0;           ///< last stretch with a length

@@ -15,9 +15,9 @@ namespace baton {
 /// A cell holds the share of free rays in 1/4095 (high 12 bits) and the rays seen, up to 15 (low 4
 /// bits); from then on a new ray counts 1/17, so that old ones fade. Cells 0 to 255 are bins of the
 /// octahedral lattice of directions (common/math/octahedral.h), row by row; one more cell counts
-/// all rays, one more says which outcomes were ever seen, and the last belongs to the noise of the
-/// pixel's light (light_noise.h). Bins are kept only once the rays have disagreed: a pixel in the
-/// open needs no grid.
+/// all rays, one more says which outcomes were ever seen, and the last two belong to the noise
+/// of the pixel's light (light_noise.h). Bins are kept only once the rays have disagreed: a pixel
+/// in the open needs no grid.
 using VisibilityCell = std::uint16_t;
 
 inline constexpr std::int32_t kVisibilityGridSide = 16;
@@ -26,8 +26,9 @@ inline constexpr std::size_t kVisibilitySummary =
     kVisibilityBins;  ///< index of the cell of all rays
 inline constexpr std::size_t kVisibilityOutcomes =
     kVisibilityBins + 1;                                         ///< index of the cell of outcomes
-inline constexpr std::size_t kLightNoise = kVisibilityBins + 2;  ///< index of the cell of noise
-inline constexpr std::size_t kVisibilityCells = kVisibilityBins + 3;
+inline constexpr std::size_t kLightNoise = kVisibilityBins + 2;  ///< index of the cells of noise
+inline constexpr std::size_t kLobeNoise = kVisibilityBins + 3;
+inline constexpr std::size_t kVisibilityCells = kVisibilityBins + 4;
 inline constexpr VisibilityCell kSawFree = 1, kSawBlocked = 2;  ///< bits of the cell of outcomes
 
 /// Bin of a direction, [0, 256): the upper four bits of each half of its code.

@@ -4,6 +4,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <memory>
 #include <vector>
@@ -163,7 +164,10 @@ TEST_P(PoolRays, TellTheVarianceOfTheirLight) {
       sum += lns / kRuns;
       squares += lns * lns / kRuns;
       const double scale = noise_scale(static_cast<float>(lns), one_run.mean_radiance);
-      variance += double{rays->light_variance} * scale * scale / counts(sites).total() / kRuns;
+      const LightVariance& of_one = rays->light_variance;
+      const double share = double{of_one.from_light} / counts(sites).from_light +
+                           double{of_one.from_lobes} / std::max(counts(sites).from_bsdf, 1);
+      variance += share * scale * scale / kRuns;
     }
     // Half of the light was expected to come: nothing is known of shadows.
     const double truth = 0.25 * (squares - sum * sum);

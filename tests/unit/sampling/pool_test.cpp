@@ -19,7 +19,7 @@ constexpr std::size_t kStates = 12, kCandidates = 12;
 constexpr int kRays = 5, kMostRays = 10;
 constexpr int kMostCandidates = 48;
 constexpr float kMeanRadiance = 12;     // so that pixels get few rays and many
-constexpr float kBrightRadiance = 300;  // the same for candidates
+constexpr float kBrightRadiance = 600;  // the same for candidates
 using Target = std::array<float, kStates>;
 
 constexpr Target kVisible{1, 1,    1, 0.5f, 0, 0,
@@ -68,8 +68,8 @@ class Chain {
       known = variance_of(draw(now, kCandidates));
       count_ = begin;
     }
-    const auto count =
-        static_cast<std::size_t>(candidates_for_noise(kCandidates, known, kMostCandidates));
+    const auto count = static_cast<std::size_t>(
+        candidates_for_noise(kCandidates, known, kNeedOfLight, kMostCandidates));
     const std::vector<Candidate> candidates = draw(now, count);
     fewest_candidates = std::min(fewest_candidates, count);
     most_candidates = std::max(most_candidates, count);

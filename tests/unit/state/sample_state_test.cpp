@@ -310,6 +310,7 @@ SampleState remembering_state() {
   state.memory_of(2)[256] = 0x7771;
   state.memory_of(2)[257] = 3;
   state.memory_of(2)[258] = 0x3B12;
+  state.memory_of(1)[259] = 0x3C01;
   return state;
 }
 
@@ -352,6 +353,7 @@ TEST(SampleState, StoresNoGridWhereRaysAgree) {
   EXPECT_EQ(raw_bytes(state, "VISG"), 512u);
   EXPECT_EQ(raw_bytes(state, "VISS"), 8u);
   EXPECT_EQ(raw_bytes(state, "NOIS"), 4u);
+  EXPECT_EQ(raw_bytes(state, "NOIL"), 4u);
   state.memory.clear();
   EXPECT_EQ(raw_bytes(state, "VISS"), 0u);
 }
@@ -366,15 +368,18 @@ TEST(SampleState, RefusesOutcomesThatCannotBe) {
 }
 
 TEST(SampleState, RefusesNoiseThatIsNoNumber) {
-  for (const MemoryCell noise : {MemoryCell{0x7F80}, MemoryCell{0x8001}}) {  // infinite, negative
-    SampleState state = remembering_state();
-    state.memory_of(2)[258] = noise;
-    const auto decoded = decode_state(encode_state(state), "a.bst");
-    ASSERT_FALSE(decoded.ok());
-    EXPECT_THAT(
-        decoded.error().message,
-        HasSubstr(fmt::format(
-            "a.bst: section NOIS: pixel (2, 0): noise {:#06x}, expected 0 to 0x7f7f", noise)));
+  const std::pair<std::size_t, const char*> cells[] = {{258, "NOIS"}, {259, "NOIL"}};
+  for (const auto& [cell, section] : cells) {
+    for (const MemoryCell noise : {MemoryCell{0x7F80}, MemoryCell{0x8001}}) {  // infinite, negative
+      SampleState state = remembering_state();
+      state.memory_of(2)[cell] = noise;
+      const auto decoded = decode_state(encode_state(state), "a.bst");
+      ASSERT_FALSE(decoded.ok());
+      EXPECT_THAT(decoded.error().message,
+                  HasSubstr(fmt::format(
+                      "a.bst: section {}: pixel (2, 0): noise {:#06x}, expected 0 to 0x7f7f",
+                      section, noise)));
+    }
   }
 }
 
