@@ -66,15 +66,15 @@ struct Run {
   }
 };
 
-/// The lights of one run, shared by the subjects for which they are the same: preparing them costs
-/// more than a tiny image does.
+/// The lights of one run, shared by the subjects of one method, which lay out the pool alike:
+/// preparing them costs more than a tiny image does.
 class SharedLights {
  public:
   /// Renders `job` with the lights of earlier jobs of the same run.
   Status render(const JobSpec& job, const std::vector<int>& judged, const Subject& subject,
                 Run& run) {
     BATON_ASSIGN(const auto loaded, load_render_context(job, Digest{1, 2}));
-    auto& owner = owners_[{carries_state(job), job.sampling.mis_compensation}];
+    auto& owner = owners_[{job.sampling.method, job.sampling.mis_compensation}];
     if (owner == nullptr) {
       BATON_ASSIGN(const auto first, load_render_context(job, Digest{1, 2}));
       owner = std::const_pointer_cast<RenderContext>(first);
@@ -103,7 +103,7 @@ class SharedLights {
   }
 
   /// Each with the job that its LightSequence refers to.
-  std::map<std::pair<bool, bool>, std::shared_ptr<RenderContext>> owners_;
+  std::map<std::pair<Method, bool>, std::shared_ptr<RenderContext>> owners_;
 };
 
 /// One seed with every subject. Methods that carry samples render every frame, the others only the

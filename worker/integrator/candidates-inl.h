@@ -117,7 +117,6 @@ class LightRun {
     return hn::Load(
         DF(), pool_.blocks[entry / LightPool::kBlock].inverse_density + entry % LightPool::kBlock);
   }
-  HWY_INLINE Vec3Lanes LoadBefore(std::size_t i) const { return LoadLightBefore(pool_, Entry(i)); }
 
   /// Block of the pool that holds candidate i.
   HWY_INLINE VI BlockOf(VI i) const {

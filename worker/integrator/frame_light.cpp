@@ -89,7 +89,8 @@ LightPoolLayout pool_layout(const JobSpec& job) {
     taken = std::max(
         taken, num_taken(own.method, own.num_particles, own.num_candidates, own.brdf_fraction));
   }
-  return {.num_taken = static_cast<std::uint32_t>(std::max(taken / num_populations(job), 1))};
+  return {.num_taken = static_cast<std::uint32_t>(std::max(taken / num_populations(job), 1)),
+          .with_before = spec.method == Method::sequential};
 }
 
 }  // namespace

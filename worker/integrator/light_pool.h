@@ -32,20 +32,26 @@ struct LightPool {
   static constexpr std::uint32_t kMaxRunBlocks = kNumBlocks / kBlock;
 
   /// Eight entries, field by field: the unit of SIMD loads.
-  struct alignas(64) Block {
+  struct alignas(32) Block {
     OctDirection code[kBlock];              ///< on the lattice of carried directions
     float x[kBlock], y[kBlock], z[kBlock];  ///< the decoded directions
     float r[kBlock], g[kBlock], b[kBlock];  ///< radiance of this frame
     float density[kBlock];                  ///< 1/sr
     float inverse_density[kBlock];          ///< sr; 0 where the density is
-    float before_r[kBlock], before_g[kBlock], before_b[kBlock];  ///< radiance of the frame before
   };
-  std::vector<Block> blocks;     ///< (kNumBlocks); empty for a black map
-  std::uint32_t run_blocks = 1;  ///< a power of two
-  float mean_radiance = 0;       ///< of the environment over the sphere, grey; by its entries
+  /// Radiance of the same entries in the frame before.
+  struct alignas(32) OldRadiance {
+    float r[kBlock], g[kBlock], b[kBlock];
+  };
+  std::vector<Block> blocks;        ///< (kNumBlocks); empty for a black map
+  std::vector<OldRadiance> before;  ///< (kNumBlocks) where the layout asks for it, else empty
+  std::uint32_t run_blocks = 1;     ///< a power of two
+  float mean_radiance = 0;          ///< of the environment over the sphere, grey; by its entries
 
   bool empty() const { return blocks.empty(); }
-  std::size_t size_bytes() const { return blocks.size() * sizeof(Block); }
+  std::size_t size_bytes() const {
+    return blocks.size() * sizeof(Block) + before.size() * sizeof(OldRadiance);
+  }
 };
 
 /// How a pool is laid out.
@@ -54,10 +60,12 @@ struct LightPoolLayout {
   std::uint32_t num_taken = 64;
   /// All entries are one run: best where pixels differ in how many they take.
   bool one_run = false;
+  /// For moves of carried samples, which are compared with the light of the frame before.
+  bool with_before = false;
 };
 
-/// The pool of one frame. before: the environment that `before_*` is read from (the same as `now`
-/// for the first frame).
+/// The pool of one frame. before: the environment of the frame before (the same as `now` for the
+/// first frame).
 LightPool make_light_pool(const Environment& now, const Environment& before, std::uint64_t job_seed,
                           std::uint32_t frame, const LightPoolLayout& layout = {});
 
