@@ -157,7 +157,7 @@ struct CarriedLight {
 /// One frame of the sequential sampler for a pixel (sampling/sequential-inl.h). old: the surfaces
 /// that the particles come from, by sites of this frame; null where they are `sites`. light.before:
 /// the frame that the particles come from, of which the pool must have the radiance
-/// (LightPool::before). located: the particles in its maps, or null. lns_before > 0.
+/// (LightPool::has_before). located: the particles in its maps, or null. lns_before > 0.
 SequentialOutcome sequential_step(const SiteBlock& sites, const OldSurfaces* old,
                                   const CarriedLight& light, const LocatedSpan* located,
                                   const SequentialSettings& settings, float lns_before,

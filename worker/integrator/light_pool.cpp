@@ -50,19 +50,6 @@ void lay_out(std::span<const OctDirection> sorted, std::uint32_t first,
   }
 }
 
-/// Radiance of another environment along the directions of the entries.
-std::vector<LightPool::OldRadiance> look_up(const EnvironmentView& environment,
-                                            std::span<const LightPool::Block> blocks) {
-  std::vector<LightPool::OldRadiance> radiance(blocks.size());
-  float unused[LightPool::kBlock];
-  for (std::size_t b = 0; b < blocks.size(); ++b) {
-    const LightPool::Block& at = blocks[b];
-    kernels::evaluate_environment(environment, at.x, at.y, at.z, radiance[b].r, radiance[b].g,
-                                  radiance[b].b, unused);
-  }
-  return radiance;
-}
-
 /// Mean radiance over the sphere, grey.
 float mean_radiance(std::span<const LightPool::Block> blocks) {
   double sum = 0;
@@ -97,14 +84,19 @@ LightPool make_light_pool(const Environment& now, const Environment& before, std
 
   // Look everything up at the lattice directions, with the look-up that the pixels use.
   const EnvironmentView now_view = view_of(now);
+  const EnvironmentView before_view = view_of(before);
+  pool.has_before = layout.with_before;
   for (LightPool::Block& block : pool.blocks) {
     kernels::decode_directions(block.code, block.x, block.y, block.z);
     kernels::evaluate_environment(now_view, block.x, block.y, block.z, block.r, block.g, block.b,
                                   block.density);
     std::transform(std::begin(block.density), std::end(block.density), block.inverse_density,
                    [](float density) { return density > 0 ? 1 / density : 0.0f; });
+    if (!pool.has_before) continue;
+    float unused[LightPool::kBlock];
+    kernels::evaluate_environment(before_view, block.x, block.y, block.z, block.before_r,
+                                  block.before_g, block.before_b, unused);
   }
-  if (layout.with_before) pool.before = look_up(view_of(before), pool.blocks);
   pool.mean_radiance = mean_radiance(pool.blocks);
   return pool;
 }

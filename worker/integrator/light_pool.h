@@ -32,26 +32,21 @@ struct LightPool {
   static constexpr std::uint32_t kMaxRunBlocks = kNumBlocks / kBlock;
 
   /// Eight entries, field by field: the unit of SIMD loads.
-  struct alignas(32) Block {
+  struct alignas(64) Block {
     OctDirection code[kBlock];              ///< on the lattice of carried directions
     float x[kBlock], y[kBlock], z[kBlock];  ///< the decoded directions
     float r[kBlock], g[kBlock], b[kBlock];  ///< radiance of this frame
     float density[kBlock];                  ///< 1/sr
     float inverse_density[kBlock];          ///< sr; 0 where the density is
+    float before_r[kBlock], before_g[kBlock], before_b[kBlock];  ///< radiance of the frame before
   };
-  /// Radiance of the same entries in the frame before.
-  struct alignas(32) OldRadiance {
-    float r[kBlock], g[kBlock], b[kBlock];
-  };
-  std::vector<Block> blocks;        ///< (kNumBlocks); empty for a black map
-  std::vector<OldRadiance> before;  ///< (kNumBlocks) where the layout asks for it, else empty
-  std::uint32_t run_blocks = 1;     ///< a power of two
-  float mean_radiance = 0;          ///< of the environment over the sphere, grey; by its entries
+  std::vector<Block> blocks;     ///< (kNumBlocks); empty for a black map
+  bool has_before = false;       ///< whether before_* are set, as the layout asks; else they are 0
+  std::uint32_t run_blocks = 1;  ///< a power of two
+  float mean_radiance = 0;       ///< of the environment over the sphere, grey; by its entries
 
   bool empty() const { return blocks.empty(); }
-  std::size_t size_bytes() const {
-    return blocks.size() * sizeof(Block) + before.size() * sizeof(OldRadiance);
-  }
+  std::size_t size_bytes() const { return blocks.size() * sizeof(Block); }
 };
 
 /// How a pool is laid out.

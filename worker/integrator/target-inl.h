@@ -63,9 +63,10 @@ HWY_INLINE LightLanes LoadLight(const LightPool& pool, std::size_t entry) {
 /// Radiance of the same entries in the frame before; the pool must have it.
 HWY_INLINE Vec3Lanes LoadLightBefore(const LightPool& pool, std::size_t entry) {
   const DF d;
-  const LightPool::OldRadiance& block = pool.before[entry / LightPool::kBlock];
+  const LightPool::Block& block = pool.blocks[entry / LightPool::kBlock];
   const std::size_t at = entry % LightPool::kBlock;
-  return {hn::Load(d, block.r + at), hn::Load(d, block.g + at), hn::Load(d, block.b + at)};
+  return {hn::Load(d, block.before_r + at), hn::Load(d, block.before_g + at),
+          hn::Load(d, block.before_b + at)};
 }
 
 /// Site of the k-th surface of the pixel, k = floor(fraction * num_hits); fraction in [0, 1).
@@ -127,14 +128,11 @@ struct CarriedTarget {
 
   /// Brings the block of proposals that BlockStart(bits) will name into the cache.
   HWY_INLINE void Prefetch(std::uint32_t bits) const {
-    const std::size_t block = BlockStart(bits) / LightPool::kBlock;
-    const auto fetch = [](const auto& entries) {
-      const auto* first = reinterpret_cast<const char*>(&entries);
-      for (std::size_t at = 0; at < sizeof(entries); at += 64) hwy::Prefetch(first + at);
-      hwy::Prefetch(first + sizeof(entries) - 1);  // blocks do not begin with a cache line
-    };
-    fetch(light.pool.blocks[block]);
-    fetch(light.pool.before[block]);
+    const auto* block =
+        reinterpret_cast<const char*>(&light.pool.blocks[BlockStart(bits) / LightPool::kBlock]);
+    for (std::size_t line = 0; line < sizeof(LightPool::Block); line += 64) {
+      hwy::Prefetch(block + line);
+    }
   }
 
   /// First entry of a uniformly drawn block of proposals.

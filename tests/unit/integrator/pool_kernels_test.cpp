@@ -148,8 +148,9 @@ TEST_P(PoolRays, ReadTheMemoryAsTheScalarCode) {
   }
 }
 
-// What a pixel learns of the noise of its light, against the variance that 2000 runs show. Steps
-// along the curve overrate what is stratified, here by up to eleven times.
+// What a pixel learns of the noise of its light, against the variance that 2000 runs show. Second
+// differences along the curve overrate it by 2.2 and 2.5 times here; first ones, which take what
+// changes evenly for noise, by up to eleven.
 TEST_P(PoolRays, TellTheVarianceOfTheirLight) {
   const LightPool one_run = make_light_pool(light, light, 3, 2, {.one_run = true});
   for (const bool glossy : {false, true}) {
@@ -172,7 +173,7 @@ TEST_P(PoolRays, TellTheVarianceOfTheirLight) {
     // Half of the light was expected to come: nothing is known of shadows.
     const double truth = 0.25 * (squares - sum * sum);
     EXPECT_GT(variance, truth) << glossy;
-    EXPECT_LT(variance, 16 * truth) << glossy;
+    EXPECT_LT(variance, 4 * truth) << glossy;
   }
 }
 
