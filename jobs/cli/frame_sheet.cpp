@@ -12,7 +12,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-constexpr std::size_t kMaxFrames = 24;
+constexpr std::size_t kMaxFrames = 12;
 constexpr int kMaxColumns = 6;
 constexpr int kMaxThumbWidth = 320;
 

@@ -11,7 +11,7 @@
 
 namespace baton {
 
-/// contact-sheet.png of a job: at most 24 of its frames, evenly picked, all at one exposure. Frames
+/// contact-sheet.png of a job: at most 12 of its frames, evenly picked, all at one exposure. Frames
 /// are read as they are finished, so that little is left to do in the end.
 class FrameSheet {
  public:
