@@ -41,6 +41,14 @@ HWY_INLINE Vec3Lanes Scale(const Vec3Lanes& a, VF s) { return {hn::Mul(a.x, s), 
 HWY_INLINE Vec3Lanes Add(const Vec3Lanes& a, const Vec3Lanes& b) {
   return {hn::Add(a.x, b.x), hn::Add(a.y, b.y), hn::Add(a.z, b.z)};
 }
+/// a s + b.
+HWY_INLINE Vec3Lanes AddScaled(const Vec3Lanes& a, VF s, const Vec3Lanes& b) {
+  return {hn::MulAdd(a.x, s, b.x), hn::MulAdd(a.y, s, b.y), hn::MulAdd(a.z, s, b.z)};
+}
+/// a b + c, component by component.
+HWY_INLINE Vec3Lanes AddProduct(const Vec3Lanes& a, const Vec3Lanes& b, const Vec3Lanes& c) {
+  return {hn::MulAdd(a.x, b.x, c.x), hn::MulAdd(a.y, b.y, c.y), hn::MulAdd(a.z, b.z, c.z)};
+}
 HWY_INLINE Vec3Lanes Select(MF mask, const Vec3Lanes& yes, const Vec3Lanes& no) {
   return {hn::IfThenElse(mask, yes.x, no.x), hn::IfThenElse(mask, yes.y, no.y), hn::IfThenElse(mask, yes.z, no.z)};
 }

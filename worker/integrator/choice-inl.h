@@ -21,8 +21,10 @@ namespace baton::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
 /// Weighs the candidates from the pool of a pixel that sees diffuse surfaces alone: cosine times
-/// reflected light over density, and nothing else. line: has Add(code, weight, colour), where
-/// colour() is w (f cos L)_rgb / p~; a copy of it that stays in registers is what adds.
+/// reflected light over density, and nothing else. line: has Add(code, weight, add_color), where
+/// add_color(share, sum) adds share w (f cos L)_rgb / p~ to a sum of colours, and kHasColors: it
+/// keeps such a sum, `colors`, which the albedo is multiplied to once for all. A copy of the line
+/// that stays in registers is what adds.
 template <class Line>
 HWY_INLINE void WeighDiffuse(const SiteBlock& sites, const LightPool& pool,
                              const kernels::CandidateCounts& counts,
@@ -36,24 +38,23 @@ HWY_INLINE void WeighDiffuse(const SiteBlock& sites, const LightPool& pool,
   deal.ForEachRun(sites, [&](const SurfaceLanes& s, std::size_t first, std::size_t last) HWY_ATTR {
     const Vec3Lanes ns = s.ns, ng = s.ng, kd = Scale(s.kd, scale);
     Line adding = line;
+    if constexpr (Line::kHasColors) SetZero(adding.colors);
     for (std::size_t v = first; v < last; ++v) {
       const std::size_t i = v * hn::Lanes(d);
       const LightLanes light = run.Load(i);
       const VF cosine = Dot(ns, light.direction);
       const VF above = hn::Min(cosine, Dot(ng, light.direction));  // its sign alone counts
-      const VF reflected = Dot(kd, {light.now.r, light.now.g, light.now.b});
       MF live = hn::Gt(above, hn::Zero(d));
       if (i + hn::Lanes(d) > count) live = hn::And(live, hn::FirstN(d, count - i));
-      const VF inverse = run.LoadInverse(i);
-      const auto color = [&]() HWY_ATTR {
-        const VF each =
-            hn::IfThenElseZero(live, hn::Mul(hn::Mul(cosine, hn::Set(d, 3.0f)), inverse));
-        return Vec3Lanes{hn::Mul(hn::Mul(kd.x, light.now.r), each),
-                         hn::Mul(hn::Mul(kd.y, light.now.g), each),
-                         hn::Mul(hn::Mul(kd.z, light.now.b), each)};
+      const VF each = hn::IfThenElseZero(live, hn::Mul(cosine, run.LoadInverse(i)));
+      const auto add_color = [&](VF share, Vec3Lanes& sum) HWY_ATTR {
+        sum = AddScaled({light.now.r, light.now.g, light.now.b}, hn::Mul(each, share), sum);
       };
-      adding.Add(light.code, hn::IfThenElseZero(live, hn::Mul(hn::Mul(cosine, reflected), inverse)),
-                 color);
+      const VF reflected = Dot(kd, {light.now.r, light.now.g, light.now.b});
+      adding.Add(light.code, hn::Mul(each, reflected), add_color);
+    }
+    if constexpr (Line::kHasColors) {
+      adding.colors = AddProduct(Scale(kd, hn::Set(d, 3.0f)), adding.colors, line.colors);
     }
     line = adding;
   });
@@ -73,7 +74,9 @@ HWY_INLINE void WeighCandidates(const SiteBlock& sites, const EnvironmentView& e
     return;
   }
   const auto add = [&](const CandidateLanes& c) HWY_ATTR {
-    line.Add(c.code, c.weight, [&]() HWY_ATTR { return Scale(c.reflected, c.per_target); });
+    line.Add(c.code, c.weight, [&](VF share, Vec3Lanes& sum) HWY_ATTR {
+      sum = AddScaled(c.reflected, hn::Mul(c.per_target, share), sum);
+    });
   };
   LightCandidates(sites, pool, counts, random,
                   [&](const CandidateLanes& c, std::size_t) HWY_ATTR { add(c); });
@@ -87,10 +90,11 @@ HWY_INLINE void WeighCandidates(const SiteBlock& sites, const EnvironmentView& e
 
 /// The line of weights alone.
 struct WeightLine {
+  static constexpr bool kHasColors = false;
   RunningSums::End end;
 
-  template <class Color>
-  HWY_INLINE void Add(VU /*code*/, VF weight, const Color& /*color*/) {
+  template <class AddColor>
+  HWY_INLINE void Add(VU /*code*/, VF weight, const AddColor& /*add_color*/) {
     end.Add(weight);
   }
   void BeginBsdf() {}

@@ -61,21 +61,25 @@ class RememberedLanes {
  private:
   HWY_INLINE VF FreeInBins(VU code) const {
     const DI di;
+    const DU du;
     // Two cells come with each load; ours is the lower one.
     static_assert(sizeof(VisibilityCell) == 2 && kVisibilityCells > kVisibilityBins);
+    static_assert(kVisibilityGridSide == 16);
+    const VU across = hn::And(hn::ShiftRight<11>(code), hn::Set(du, 2 * 0x0F));
+    const VU down = hn::And(hn::ShiftRight<23>(code), hn::Set(du, 2 * 0xF0));
     const VI pair = hn::GatherOffset(di, reinterpret_cast<const std::int32_t*>(memory_),
-                                     hn::ShiftLeft<1>(VisibilityBins(code)));
-    const VI own = hn::And(pair, hn::Set(di, 0xFFFF));
-    const auto unseen = hn::Eq(hn::And(own, hn::Set(di, 15)), hn::Zero(di));
-    return Share(hn::IfThenElse(unseen, hn::Set(di, all_), own));
+                                     hn::BitCast(di, hn::Or(across, down)));
+    const auto unseen = hn::Eq(hn::And(pair, hn::Set(di, 15)), hn::Zero(di));
+    return Share(hn::IfThenElse(unseen, hn::Set(di, all_), pair));
   }
   static HWY_INLINE ProspectLanes Prospect(VF free) {
     return {free, HopeFactor(free), DoubtFactor(free)};
   }
+  /// Of cells in the lower halves.
   static HWY_INLINE VF Share(VI cells) {
     const DF d;
-    return hn::Mul(hn::Add(hn::ConvertTo(d, hn::ShiftRight<4>(cells)), hn::Set(d, 0.5f)),
-                   hn::Set(d, 1.0f / 4096));
+    const VI share = hn::And(cells, hn::Set(DI(), 0xFFF0));
+    return hn::MulAdd(hn::ConvertTo(d, share), hn::Set(d, 1.0f / 65536), hn::Set(d, 0.5f / 4096));
   }
   const VisibilityCell* memory_;
   bool has_bins_;
@@ -86,12 +90,13 @@ class RememberedLanes {
 /// Where weighed candidates go: two lines to choose from, and what is known of the pixel by then.
 /// A loop that adds works on a copy, in registers.
 struct PoolLines {
-  RememberedLanes memory;
+  static constexpr bool kHasColors = true;
+  const RememberedLanes* memory;
   RunningSums::End hope, doubt;
   float* next_free;
   const float* first_free = next_free;  ///< where those of this kind of candidates begin
   VF light = hn::Zero(DF());            ///< sum of w
-  Vec3Lanes visible{hn::Zero(DF()), hn::Zero(DF()), hn::Zero(DF())};  ///< of w V^ colour
+  Vec3Lanes colors{hn::Zero(DF()), hn::Zero(DF()), hn::Zero(DF())};  ///< of w V^ (f cos L) / p~
   VF difference = hn::Zero(DF());                                     ///< even less odd w V^
   VF previous = hn::Zero(DF());                                       ///< w V^ before
   VF last_step = hn::Zero(DF());                                      ///< to it
@@ -99,10 +104,10 @@ struct PoolLines {
   VF light_bends = hn::Zero(DF());  ///< those of the candidates from the light, once they are done
   VF sign = hn::Set(DF(), 1.0f);
 
-  template <class Color>
-  HWY_INLINE void Add(VU code, VF weight, const Color& color) {
+  template <class AddColor>
+  HWY_INLINE void Add(VU code, VF weight, const AddColor& add_color) {
     const DF d;
-    const ProspectLanes prospect = memory.Look(code);
+    const ProspectLanes prospect = memory->Look(code);
     hn::Store(prospect.free, d, next_free);
     next_free += hn::Lanes(d);
     hope.Add(hn::Mul(weight, prospect.hope));
@@ -119,7 +124,7 @@ struct PoolLines {
     bends = hn::MulAdd(bend, bend, bends);
     last_step = step;
     previous = likely;
-    visible = HWY_NAMESPACE::Add(visible, Scale(color(), prospect.free));
+    add_color(prospect.free, colors);
     difference = hn::MulAdd(likely, sign, difference);
     sign = hn::Neg(sign);
   }
@@ -195,7 +200,8 @@ inline float ChoosePoolRays(const SiteBlock& sites, const EnvironmentView& envir
 
   // Weigh the candidates.
   RunningSums hope(scratch.hope_sums), doubt(scratch.doubt_sums);
-  PoolLines lines{RememberedLanes(memory.data()), hope.end, doubt.end, scratch.free};
+  const RememberedLanes remembered(memory.data());
+  PoolLines lines{&remembered, hope.end, doubt.end, scratch.free};
   WeighCandidates(sites, environment, pool, counts, random, scratch.from_bsdf, lines);
   hope.end = lines.hope;
   doubt.end = lines.doubt;
@@ -204,7 +210,7 @@ inline float ChoosePoolRays(const SiteBlock& sites, const EnvironmentView& envir
 
   // Decide what rays are worth.
   const float in_doubt = doubt.Finish();
-  const Rgb visible = SumOfLanes(lines.visible);
+  const Rgb visible = SumOfLanes(lines.colors);
   const float expected = mean(visible);
   const bool control = use_control(expected, in_doubt);
   const bool knows = memory[kVisibilityOutcomes] != 0;

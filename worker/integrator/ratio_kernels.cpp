@@ -18,12 +18,13 @@ namespace hn = hwy::HWY_NAMESPACE;
 /// The line of weights, and what all candidates reflect together.
 struct ColorLine {
   RunningSums::End end;
-  Vec3Lanes reflected{hn::Zero(DF()), hn::Zero(DF()), hn::Zero(DF())};  ///< of w (f cos L) / p~
+  static constexpr bool kHasColors = true;
+  Vec3Lanes colors{hn::Zero(DF()), hn::Zero(DF()), hn::Zero(DF())};  ///< of w (f cos L) / p~
 
-  template <class Color>
-  HWY_INLINE void Add(VU /*code*/, VF weight, const Color& color) {
+  template <class AddColor>
+  HWY_INLINE void Add(VU /*code*/, VF weight, const AddColor& add_color) {
     end.Add(weight);
-    reflected = HWY_NAMESPACE::Add(reflected, color());
+    add_color(hn::Set(DF(), 1.0f), colors);
   }
   void BeginBsdf() {}
 };
@@ -75,7 +76,7 @@ inline float ChooseRatioRays(const SiteBlock& sites, const EnvironmentView& envi
   HWY_ALIGN std::int32_t picks[limits::kMaxParticles + RunningSums::kGroup];
   SystematicPicks(sums, total, u, count, picks);
   LookUpShares(ChosenCandidates(sites, pool, counts, random, scratch.from_bsdf),
-               DistinctPicks(picks, count), line.reflected, static_cast<float>(num_rays), out);
+               DistinctPicks(picks, count), line.colors, static_cast<float>(num_rays), out);
   return total;
 }
 
