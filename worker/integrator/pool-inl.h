@@ -97,9 +97,9 @@ struct PoolLines {
   const float* first_free = next_free;  ///< where those of this kind of candidates begin
   VF light = hn::Zero(DF());            ///< sum of w
   Vec3Lanes colors{hn::Zero(DF()), hn::Zero(DF()), hn::Zero(DF())};  ///< of w V^ (f cos L) / p~
-  VF difference = hn::Zero(DF());                                     ///< even less odd w V^
-  VF previous = hn::Zero(DF());                                       ///< w V^ before
-  VF last_step = hn::Zero(DF());                                      ///< to it
+  VF difference = hn::Zero(DF());                                    ///< even less odd w V^
+  VF previous = hn::Zero(DF());                                      ///< w V^ before
+  VF last_step = hn::Zero(DF());                                     ///< to it
   VF bends = hn::Zero(DF());        ///< of the squares of its second differences
   VF light_bends = hn::Zero(DF());  ///< those of the candidates from the light, once they are done
   VF sign = hn::Set(DF(), 1.0f);
