@@ -47,6 +47,8 @@ inline constexpr std::uint64_t kMaxEnvironmentCacheBytes =
     4ull << 30;  ///< per process and kind of entry
 inline constexpr std::uint64_t kMaxStateCacheBytes =
     1ull << 30;  ///< decoded states that a worker keeps, per job
+inline constexpr std::uint64_t kMaxSurfaceCacheBytes =
+    1ull << 29;  ///< surfaces that a worker keeps where things move, per job
 inline constexpr std::size_t kMaxCachedPoses =
     16;  ///< frames whose moved geometry a worker keeps, per job
 inline constexpr int kMaxTasksPerJob = 4000000;

@@ -18,17 +18,20 @@ inline JobSpec sequence_job(int frames) {
 }
 
 /// All films of a job cut into tiles of `tile_size` and runs of `run_length`, pasted together;
-/// states go through their file form between runs.
-inline std::vector<FilmTile> render_tiled(JobSpec job, int tile_size, int run_length) {
+/// states go through their file form between runs. each_run_alone: as in a process of its own,
+/// which keeps nothing from the runs before.
+inline std::vector<FilmTile> render_tiled(JobSpec job, int tile_size, int run_length,
+                                          bool each_run_alone = false) {
   job.image.tile_size = tile_size;
   job.state.checkpoint_every = run_length;
-  const auto context = load_render_context(job, Digest{1, 2});
+  auto context = load_render_context(job, Digest{1, 2});
   EXPECT_TRUE(context.ok());
   std::vector<FilmTile> images(job.frames.size());
   const TileGrid grid(job.image);
   std::vector<StatePtr> states(static_cast<std::size_t>(grid.count()));
   for (std::int32_t run = 0; run < num_runs(job); ++run) {
     std::vector<StatePtr> next(states.size());
+    if (each_run_alone) context = load_render_context(job, Digest{1, 2});
     for (std::int32_t tile = 0; tile < grid.count(); ++tile) {
       std::vector<StatePtr> previous;
       for (const std::int32_t near : grid.tiles_near(tile, history_reach_px(job))) {

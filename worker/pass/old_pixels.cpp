@@ -3,8 +3,16 @@
 #include <algorithm>
 
 #include "worker/pass/populations.h"
+#include "worker/pass/surface_cache.h"
 
 namespace baton {
+
+OldPixels::OldPixels(const RenderContext& context, const FrameGeometry& before,
+                     std::span<const StatePtr> states)
+    : job_(context.job), before_(before), states_(states) {
+  for (const StatePtr& state : states)
+    kept_.push_back(context.surfaces->find(state->frame_index, state->tile));
+}
 
 std::optional<OldPixels::Place> OldPixels::ask(std::int32_t x, std::int32_t y) {
   const auto found = std::find_if(states_.begin(), states_.end(), [&](const StatePtr& state) {
@@ -15,7 +23,10 @@ std::optional<OldPixels::Place> OldPixels::ask(std::int32_t x, std::int32_t y) {
   const auto index =
       static_cast<std::size_t>((y - state.rect.y0) * state.rect.width() + x - state.rect.x0);
   if (latest_source(state, index) == PixelSource::background) return std::nullopt;
-  const Place place{&state, index, rays_.size()};
+  num_rays_ += static_cast<std::uint64_t>(job_.image.sites);
+  const TileSurfaces* const kept = kept_[static_cast<std::size_t>(found - states_.begin())].get();
+  if (kept != nullptr) return Place{&state, index, kept};
+  const Place place{&state, index, nullptr, rays_.size()};
   append_primary_rays(job_, before_, x, y, rays_);
   return place;
 }
@@ -23,7 +34,6 @@ std::optional<OldPixels::Place> OldPixels::ask(std::int32_t x, std::int32_t y) {
 void OldPixels::trace() {
   hits_.resize(rays_.size());
   trace_primary_rays(job_, before_, rays_, hits_);
-  num_rays_ += rays_.size();
 }
 
 }  // namespace baton

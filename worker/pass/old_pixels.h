@@ -1,5 +1,6 @@
 #pragma once
 
+#include <memory>
 #include <optional>
 #include <span>
 #include <vector>
@@ -10,19 +11,20 @@
 
 namespace baton {
 
-/// Pixels of the frame before, by their place in the image: what they carry, and what they saw,
-/// which is traced again, exactly: states hold no surfaces.
+/// Pixels of the frame before, by their place in the image: what they carry, and what they saw.
+/// States hold no surfaces: those that this process no longer keeps are traced again, exactly.
 class OldPixels {
  public:
   struct Place {
     const SampleState* state = nullptr;
-    std::size_t index = 0;      ///< pixel of `state`
-    std::size_t first_hit = 0;  ///< of its sites
+    std::size_t index = 0;               ///< pixel of `state`
+    const TileSurfaces* kept = nullptr;  ///< what the tile saw; null: traced again
+    std::size_t first_hit = 0;           ///< of those traced again, of its sites
   };
 
   /// states: of the frame before, of every tile within reach. All must outlive the object.
-  OldPixels(const JobSpec& job, const FrameGeometry& before, std::span<const StatePtr> states)
-      : job_(job), before_(before), states_(states) {}
+  OldPixels(const RenderContext& context, const FrameGeometry& before,
+            std::span<const StatePtr> states);
 
   const FrameGeometry& geometry() const { return before_; }
 
@@ -30,21 +32,24 @@ class OldPixels {
   void clear() { rays_.clear(); }
   /// Asks for a pixel; nullopt where it lies in no state or saw no surface.
   std::optional<Place> ask(std::int32_t x, std::int32_t y);
-  /// Traces what was asked for since clear().
+  /// Traces what was asked for since clear() and is not kept.
   void trace();
   /// What the sites of a pixel saw; after trace().
   std::span<const SurfaceHit> hits(const Place& place) const {
+    if (place.kept != nullptr) return place.kept->pixel(place.index);
     const auto num_sites = static_cast<std::size_t>(job_.image.sites);
     return std::span(hits_).subspan(place.first_hit, num_sites);
   }
 
-  /// Rays traced so far.
+  /// Rays of all pixels asked for so far; those of kept tiles count, too, so that the number does
+  /// not depend on who rendered what.
   std::uint64_t num_rays() const { return num_rays_; }
 
  private:
   const JobSpec& job_;
   const FrameGeometry& before_;
   std::span<const StatePtr> states_;
+  std::vector<std::shared_ptr<const TileSurfaces>> kept_;  ///< (states)
   std::vector<Ray> rays_;
   std::vector<SurfaceHit> hits_;
   std::uint64_t num_rays_ = 0;

@@ -3,6 +3,7 @@
 #include "common/job/motion.h"
 #include "worker/pass/populations.h"
 #include "worker/pass/shared_assets.h"
+#include "worker/pass/surface_cache.h"
 
 namespace baton {
 namespace {
@@ -37,6 +38,7 @@ Result<std::shared_ptr<const RenderContext>> make_render_context(const JobSpec& 
   context->grid = TileGrid(job.image);
   context->frames = expand_sequence(job);
   context->lights = std::make_unique<LightSequence>(context->job, assets->maps);
+  context->surfaces = std::make_shared<SurfaceCache>();
   context->sampler = make_pixel_sampler(population_spec(job));
   context->own_settings = make_own_settings(job);
   context->scene = std::shared_ptr<const Scene>(assets, &assets->scene);

@@ -11,14 +11,16 @@
 
 namespace baton {
 
+class SurfaceCache;
+
 /// How pixels are sampled.
 struct PixelSetting {
   std::unique_ptr<const PixelSampler> sampler;
   std::int32_t num_particles = 0;  ///< in the state, per pixel
 };
 
-/// See tile_renderer.h. Immutable but for lights and geometry, which are prepared frame by frame on
-/// demand and guard themselves.
+/// See tile_renderer.h. Immutable but for lights, geometry and surfaces, which are prepared frame
+/// by frame on demand and guard themselves.
 class RenderContext {
  public:
   JobSpec job;
@@ -30,6 +32,7 @@ class RenderContext {
   std::unique_ptr<const PixelSampler> sampler;  ///< null: reference
   std::vector<PixelSetting> own_settings;       ///< (materials); null: `sampler`
   std::unique_ptr<LightSequence> lights;
+  std::shared_ptr<SurfaceCache> surfaces;  ///< of the last frames, where things move
 
   /// The surfaces of one pixel, which its sites hit, with their materials.
   void gather_sites(std::span<const SurfaceHit> hits, SiteBlock& sites) const;

@@ -48,7 +48,7 @@ Reprojection::Reprojection(const RenderContext& context, const FrameGeometry& no
     : context_(context),
       now_(now),
       before_(before),
-      old_pixels_(context.job, before, states),
+      old_pixels_(context, before, states),
       cos_normal_tolerance_(std::cos(context.job.motion.normal_tolerance_deg * kPi / 180)),
       still_camera_(now.pose.camera == before.pose.camera) {
   if (asks_neighbors(context.job.sampling)) neighborhood_.emplace(context, now, old_pixels_);

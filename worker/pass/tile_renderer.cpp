@@ -7,6 +7,7 @@
 #include "common/job/motion.h"
 #include "worker/pass/cpu_clock.h"
 #include "worker/pass/populations.h"
+#include "worker/pass/surface_cache.h"
 #include "worker/pass/tile_frame.h"
 
 namespace baton {
@@ -87,6 +88,7 @@ class TileWalk {
     start_state();
     if (renderer_ != nullptr) stats_.merge(renderer_->stats());
     renderer_ = std::make_unique<TileFrameRenderer>(context_, *geometry_, trace(*geometry_));
+    context_.surfaces->insert(frame.index, state_.tile, surfaces_);
     Reprojection history(context_, *geometry_, *before, previous);
     return renderer_->render(frame, *light, history, state_);
   }
@@ -117,9 +119,9 @@ class TileWalk {
   }
   const TileSurfaces& trace(const FrameGeometry& geometry) {
     const CpuTimer timer(stats_.seconds_primary);
-    surfaces_ = trace_primary(context_.job, geometry, rect_);
-    stats_.rays_primary += surfaces_.rays.size();
-    return surfaces_;
+    surfaces_ = std::make_shared<const TileSurfaces>(trace_primary(context_.job, geometry, rect_));
+    stats_.rays_primary += surfaces_->rays.size();
+    return *surfaces_;
   }
 
   const RenderContext& context_;
@@ -127,7 +129,7 @@ class TileWalk {
   SampleState state_;
   bool has_history_ = false;
   std::shared_ptr<const FrameGeometry> geometry_;
-  TileSurfaces surfaces_;
+  std::shared_ptr<const TileSurfaces> surfaces_;
   std::unique_ptr<TileFrameRenderer> renderer_;  ///< of the frame that was rendered last
   RenderStats stats_;
 };

@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "tests/support/render_tiled.h"
+#include "worker/pass/surface_cache.h"
 
 namespace baton {
 namespace {
@@ -97,7 +98,18 @@ TEST(RunTile, SameBytesForAnyTilingWhileCameraAndObjectsMove) {
     const std::vector<FilmTile> whole = render_tiled(job, 4096, 5);
     EXPECT_EQ(render_tiled(job, 8, 2), whole);
     EXPECT_EQ(render_tiled(job, 3, 1), whole);
+    EXPECT_EQ(render_tiled(job, 8, 1, /*each_run_alone=*/true), whole) << "nothing is kept";
   }
+}
+
+TEST(SurfaceCache, KeepsTheLastFrames) {
+  SurfaceCache cache;
+  const auto surfaces = std::make_shared<const TileSurfaces>();
+  for (int frame = 0; frame < 10; ++frame) cache.insert(frame, 3, surfaces);
+  EXPECT_EQ(cache.find(9, 3), surfaces);
+  EXPECT_EQ(cache.find(8, 3), surfaces);
+  EXPECT_EQ(cache.find(9, 2), nullptr) << "another tile";
+  EXPECT_EQ(cache.find(2, 3), nullptr) << "long ago";
 }
 
 TEST(RunTile, AMotionThatGoesNowhereIsNoMotion) {

@@ -1,0 +1,33 @@
+#pragma once
+
+#include <cstdint>
+#include <deque>
+#include <map>
+#include <memory>
+#include <mutex>
+#include <utility>
+
+#include "worker/pass/primary.h"
+
+namespace baton {
+
+/// What the tiles of this process saw last, where things move: the next frame asks for it again,
+/// and tracing it a second time is the same work with the same result. Holds the last
+/// frames, limits::kMaxSurfaceCacheBytes at most; the oldest go first. Any number of threads.
+class SurfaceCache {
+ public:
+  /// Null: not here.
+  std::shared_ptr<const TileSurfaces> find(std::int32_t frame_index, std::int32_t tile);
+  void insert(std::int32_t frame_index, std::int32_t tile,
+              std::shared_ptr<const TileSurfaces> surfaces);
+
+ private:
+  using Key = std::pair<std::int32_t, std::int32_t>;  ///< (frame index, tile)
+
+  std::mutex mutex_;
+  std::map<Key, std::shared_ptr<const TileSurfaces>> surfaces_;
+  std::deque<Key> by_age_;  ///< oldest in front
+  std::size_t size_bytes_ = 0;
+};
+
+}  // namespace baton
