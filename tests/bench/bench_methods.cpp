@@ -43,6 +43,10 @@ std::vector<Case> make_cases() {
   add("pool M=256", Method::pool, 2.2, [](SamplingSpec& s) { s.num_candidates = 256; });
   add("sequential P=1", Method::sequential, 0, [](SamplingSpec& s) { s.num_distributions = 1; });
   add("sequential P=5", Method::sequential, 2.0, [](SamplingSpec& s) { s.num_distributions = 5; });
+  add("sequential P=5 path", Method::sequential, 2.0, [](SamplingSpec& s) {
+    s.num_distributions = 5;
+    s.lns_update = LnsUpdate::path_trapezoid;
+  });
   return cases;
 }
 

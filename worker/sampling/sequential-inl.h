@@ -75,19 +75,26 @@ HWY_INLINE float EffectiveSize(std::size_t count, const float* weight) {
 }
 
 /// Mean of log p_n / p_(n-1) over the weighted particles, and the share of the weight that it is
-/// taken over: particles outside the support that both frames have in common do not count.
+/// taken over: particles outside the support that both frames have in common do not count. weight:
+/// (N padded by zeros).
 struct PathMean {
   double mean = 0;
   double share = 0;
 };
 HWY_INLINE PathMean MeanLogRatio(std::size_t count, const ParticleArrays& p, const float* weight) {
-  double sum = 0;
-  double share = 0;
-  for (std::size_t i = 0; i < count; ++i) {
-    if (!(weight[i] > 0 && p.log_before[i] > kLogAlive && p.log_now[i] > kLogAlive)) continue;
-    share += weight[i];
-    sum += double{weight[i]} * (double{p.log_now[i]} - p.log_before[i]);
+  const DF d;
+  VF sums = hn::Zero(d);
+  VF shares = hn::Zero(d);
+  for (std::size_t i = 0; i < count; i += hn::Lanes(d)) {
+    const VF before = hn::Load(d, p.log_before + i);
+    const VF now = hn::Load(d, p.log_now + i);
+    const MF common = hn::Gt(hn::Min(before, now), hn::Set(d, kLogAlive));
+    const VF w = hn::IfThenElseZero(common, hn::Load(d, weight + i));
+    shares = hn::Add(shares, w);
+    sums = hn::MulAdd(w, hn::Sub(now, before), sums);
   }
+  const double share = hn::GetLane(hn::SumOfLanes(d, shares));
+  const double sum = hn::GetLane(hn::SumOfLanes(d, sums));
   return {share > 0 ? sum / share : 0.0, share};
 }
 
@@ -226,7 +233,7 @@ HWY_INLINE SequentialOutcome SequentialStep(const Target& target,
     }
     if (!path.used()) continue;
     HWY_ALIGN float weight[ParticleArrays::kCapacity];
-    std::copy_n(p.weight, count, weight);
+    std::copy_n(p.weight, hwy::RoundUpTo(count, hn::Lanes(DF())), weight);
     if (distributions > 1) ApplyIncrements(count, p, weight);
     path.Add(k, MeanLogRatio(count, p, weight));
   }
