@@ -1,7 +1,5 @@
 #include "worker/pass/surface_cache.h"
 
-#include "common/base/limits.h"
-
 namespace baton {
 namespace {
 
@@ -30,8 +28,8 @@ void SurfaceCache::insert(std::int32_t frame_index, std::int32_t tile,
   size_bytes_ += added;
 
   // Make room; whoever still reads a tile keeps it alive.
-  while (size_bytes_ > limits::kMaxSurfaceCacheBytes ||
-         by_age_.front().first + kFramesKept <= frame_index) {
+  while (size_bytes_ > max_bytes_ ||
+         (!by_age_.empty() && by_age_.front().first + kFramesKept <= frame_index)) {
     const auto oldest = surfaces_.find(by_age_.front());
     size_bytes_ -= size_bytes(*oldest->second);
     surfaces_.erase(oldest);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <deque>
 #include <map>
@@ -7,15 +8,19 @@
 #include <mutex>
 #include <utility>
 
+#include "common/base/limits.h"
 #include "worker/pass/primary.h"
 
 namespace baton {
 
 /// What the tiles of this process saw last, where things move: the next frame asks for it again,
-/// and tracing it a second time is the same work with the same result. Holds the last
-/// frames, limits::kMaxSurfaceCacheBytes at most; the oldest go first. Any number of threads.
+/// and tracing it a second time is the same work with the same result. Holds the last frames, of at
+/// most `max_bytes` in all; the oldest go first. Any number of threads.
 class SurfaceCache {
  public:
+  explicit SurfaceCache(std::size_t max_bytes = limits::kMaxSurfaceCacheBytes)
+      : max_bytes_(max_bytes) {}
+
   /// Null: not here.
   std::shared_ptr<const TileSurfaces> find(std::int32_t frame_index, std::int32_t tile);
   void insert(std::int32_t frame_index, std::int32_t tile,
@@ -24,6 +29,7 @@ class SurfaceCache {
  private:
   using Key = std::pair<std::int32_t, std::int32_t>;  ///< (frame index, tile)
 
+  const std::size_t max_bytes_;
   std::mutex mutex_;
   std::map<Key, std::shared_ptr<const TileSurfaces>> surfaces_;
   std::deque<Key> by_age_;  ///< oldest in front

@@ -112,6 +112,22 @@ TEST(SurfaceCache, KeepsTheLastFrames) {
   EXPECT_EQ(cache.find(2, 3), nullptr) << "long ago";
 }
 
+TEST(SurfaceCache, KeepsNothingThatIsTooLarge) {
+  SurfaceCache cache(3);
+  const auto surfaces = [](std::size_t bytes) {
+    TileSurfaces of_size;
+    of_size.first_site.resize(bytes);
+    return std::make_shared<const TileSurfaces>(std::move(of_size));
+  };
+  const auto small = surfaces(2);
+  cache.insert(1, 0, surfaces(4));
+  EXPECT_EQ(cache.find(1, 0), nullptr);
+  cache.insert(1, 1, small);
+  EXPECT_EQ(cache.find(1, 1), small);
+  cache.insert(1, 2, surfaces(2));
+  EXPECT_EQ(cache.find(1, 1), nullptr) << "the oldest goes first";
+}
+
 TEST(RunTile, AMotionThatGoesNowhereIsNoMotion) {
   JobSpec still = sequence_job(4);
   JobSpec job = still;
