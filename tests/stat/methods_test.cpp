@@ -234,6 +234,16 @@ TEST(Methods, PoolAgreesInAFlashAndAfterIt) {
   for (const int frames : {4, 5})
     expect_agreement(changing_job({{1, sky}, {4, flash}, {5, sky}}, frames), 200, 0.02);
 }
+// One lamp in the dark, whose rays are chosen evenly.
+TEST(Methods, PoolAgreesUnderALoneLamp) {
+  RgbImage lamp = test::constant_map(64, 32, {0, 0, 0});
+  for (const std::size_t texel : {9u * 64 + 20, 9u * 64 + 21})
+    std::fill_n(lamp.rgb.begin() + static_cast<std::ptrdiff_t>(3 * texel), 3, 100.0f);
+  JobSpec job = pool_job(5);
+  job.environment.keys[0].map = test::write_map("lamp.exr", lamp);
+  job.environment.filter = MapFilter::nearest;
+  expect_agreement(job, 200, 0.01);
+}
 // The map lights up from the top, row by row: there are always directions that no carried
 // sample can know.
 TEST(Methods, PoolAgreesWhileTheSupportGrows) {

@@ -182,22 +182,65 @@ class ChosenCandidates {
 };
 
 /// Candidates that were chosen, each once, in the order of the line.
-struct DistinctPicks {
+class DistinctPicks {
+ public:
   static constexpr std::size_t kCapacity = limits::kMaxParticles + RunningSums::kGroup;
   HWY_ALIGN std::int32_t pick[kCapacity];
-  HWY_ALIGN float times[kCapacity];
+  HWY_ALIGN float times[kCapacity];  ///< each counts
   std::size_t count = 0;
 
-  /// picks: `chosen` of them, > 0, equal ones side by side.
-  DistinctPicks(const std::int32_t* picks, std::size_t chosen) {
-    for (std::size_t j = 0; j < chosen; ++j) {
-      const bool again = j > 0 && picks[j] == picks[j - 1];
-      count += again ? 0 : 1;
-      pick[count - 1] = picks[j];
-      times[count - 1] = again ? times[count - 1] + 1 : 1;
+  /// `count` systematic picks, > 0.
+  static DistinctPicks Systematic(const RunningSums& line, float total, float u,
+                                  std::size_t count) {
+    HWY_ALIGN std::int32_t picks[kCapacity];
+    SystematicPicks(line, total, u, count, picks);
+    DistinctPicks out;
+    for (std::size_t j = 0; j < count; ++j) {
+      if (j > 0 && picks[j] == picks[j - 1]) {
+        out.times[out.count - 1] += 1;
+      } else {
+        out.Append(picks[j], 1);
+      }
     }
-    // Fill up the last vector with rays that bring nothing.
-    std::fill_n(pick + count, hn::MaxLanes(DF()), pick[0]);
+    out.FillUp();
+    return out;
+  }
+
+  /// Of `candidates` of a lone light, `chosen` at even distances, both powers of two, candidates a
+  /// whole number of blocks: they are a net. Each counts as its weight on the line says; who has
+  /// none is left out.
+  static DistinctPicks Even(const RunningSums& line, float total, float u, std::int32_t candidates,
+                            std::int32_t chosen) {
+    constexpr std::int32_t kBlock = LightPool::kBlock;
+    const std::int32_t blocks = candidates / kBlock;
+    const std::int32_t places = std::min(chosen, kBlock);               // chosen in a block
+    const std::int32_t step = candidates * places / (chosen * kBlock);  // from block to block
+    const auto sets = static_cast<float>(candidates / chosen);
+    const std::int32_t set = std::min(static_cast<std::int32_t>(u * sets), candidates / chosen - 1);
+    const float scale = static_cast<float>(candidates) / total;
+    DistinctPicks out;
+    for (std::int32_t eighth = 0; eighth < kBlock; ++eighth) {
+      const auto place = static_cast<std::int32_t>(LightPool::kEighthOf[eighth]);
+      if (place / places != set / step) continue;
+      for (std::int32_t block = set % step; block < blocks; block += step) {
+        const std::int32_t candidate = block * kBlock + place;
+        const float weight = line.Weight(static_cast<std::size_t>(candidate));
+        if (weight > 0) out.Append(candidate, weight * scale);
+      }
+    }
+    out.FillUp();
+    return out;
+  }
+
+ private:
+  void Append(std::int32_t candidate, float counts) {
+    pick[count] = candidate;
+    times[count] = counts;
+    ++count;
+  }
+  /// Fills up the last vector with rays that bring nothing.
+  void FillUp() {
+    std::fill_n(pick + count, hn::MaxLanes(DF()), count > 0 ? pick[0] : 0);
     std::fill_n(times + count, hn::MaxLanes(DF()), 0.0f);
   }
 };

@@ -38,12 +38,29 @@ void sort_along_curve(std::span<OctDirection> directions) {
                  [](const auto& entry) { return entry.second; });
 }
 
+/// Whether directions keep close together: those spread evenly over a disc have a radius of eleven
+/// degrees at most.
+bool close_together(std::span<const OctDirection> directions) {
+  constexpr float kMeanLength = 0.99f;
+  Vec3 sum{0, 0, 0};
+  for (const OctDirection w : directions) sum = sum + decode_octahedral(w);
+  return length(sum) > kMeanLength * static_cast<float>(directions.size());
+}
+
+/// Sorts directions by their numbers in the sequence, bits reversed: those at even distances, a
+/// power of two of them, followed each other in the sequence, which makes them a net.
+void sort_into_nets(std::span<OctDirection> directions) {
+  const int unused_bits = 32 - std::countr_zero(directions.size());  // sobol_2d reverses all 32
+  const std::vector<OctDirection> sequence(directions.begin(), directions.end());
+  for (std::uint32_t i = 0; i < sequence.size(); ++i)
+    directions[sobol_2d(i)[0] >> unused_bits] = sequence[i];
+}
+
 /// Puts a sorted run into its blocks; place 0 of them gets the eighth `first` of the curve.
 void lay_out(std::span<const OctDirection> sorted, std::uint32_t first,
              std::span<LightPool::Block> blocks) {
-  constexpr std::uint32_t kReversed[] = {0, 4, 2, 6, 1, 5, 3, 7};
   for (std::uint32_t place = 0; place < LightPool::kBlock; ++place) {
-    const std::uint32_t eighth = (kReversed[place] + first) % LightPool::kBlock;
+    const std::uint32_t eighth = (LightPool::kEighthOf[place] + first) % LightPool::kBlock;
     for (std::uint32_t b = 0; b < blocks.size(); ++b) {
       blocks[b].code[place] = sorted[eighth * blocks.size() + b];
     }
@@ -78,7 +95,8 @@ LightPool make_light_pool(const Environment& now, const Environment& before, std
   for (std::uint32_t first = 0; first < LightPool::kNumBlocks; first += pool.run_blocks) {
     const auto run = std::span(directions)
                          .subspan(first * LightPool::kBlock, pool.run_blocks * LightPool::kBlock);
-    sort_along_curve(run);
+    pool.lone_light = layout.one_run && close_together(run);
+    pool.lone_light ? sort_into_nets(run) : sort_along_curve(run);
     lay_out(run, first / pool.run_blocks, std::span(pool.blocks).subspan(first, pool.run_blocks));
   }
 

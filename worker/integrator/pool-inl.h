@@ -11,6 +11,7 @@
 #include <hwy/highway.h>
 
 #include <algorithm>
+#include <bit>
 
 #include "worker/integrator/choice-inl.h"
 #include "worker/integrator/pool_kernels.h"
@@ -151,6 +152,12 @@ struct RayPlan {
   float total;  ///< of the line
   bool control;
   std::int32_t count;
+
+  /// Of candidates of a lone light some at even distances: as many rays as make a net.
+  DistinctPicks ChooseEvenly(float u, std::int32_t candidates) {
+    count = static_cast<std::int32_t>(std::bit_ceil(static_cast<std::uint32_t>(count)));
+    return DistinctPicks::Even(line, total, u, candidates, count);
+  }
 };
 
 /// Looks up the rays and what each brings: as a candidate was chosen with probability proportional
@@ -215,19 +222,20 @@ inline float ChoosePoolRays(const SiteBlock& sites, const EnvironmentView& envir
   const bool control = use_control(expected, in_doubt);
   const bool knows = memory[kVisibilityOutcomes] != 0;
   const float scale = noise_scale(lns, pool.mean_radiance);
-  const auto most = static_cast<std::int32_t>(limits::kMaxParticles);
-  const RayPlan plan{control ? doubt : hope, control ? in_doubt : hope.Finish(), control,
-                     knows ? rays_for_doubt(num_rays, in_doubt, scale, most) : num_rays};
+  RayPlan plan{control ? doubt : hope, control ? in_doubt : hope.Finish(), control,
+               knows ? rays_for_doubt(num_rays, in_doubt, scale) : num_rays};
   out.difference = sum(lines.difference);
   out.light_variance = {VarianceOfOne(lines.light_bends, counts.from_light, scale),
                         VarianceOfOne(lines.bends, counts.from_bsdf, scale)};
   if (control) out.constant = {visible, expected / lns};
 
   // Choose them.
-  HWY_ALIGN std::int32_t picks[limits::kMaxParticles + RunningSums::kGroup];
-  SystematicPicks(plan.line, plan.total, u, static_cast<std::size_t>(plan.count), picks);
-  LookUpRays(ChosenCandidates(sites, pool, counts, random, scratch.from_bsdf), plan,
-             DistinctPicks(picks, static_cast<std::size_t>(plan.count)), scratch.free, lns, out);
+  const DistinctPicks picks = kernels::chooses_evenly(pool, counts)
+                                  ? plan.ChooseEvenly(u, counts.from_light)
+                                  : DistinctPicks::Systematic(plan.line, plan.total, u,
+                                                              static_cast<std::size_t>(plan.count));
+  LookUpRays(ChosenCandidates(sites, pool, counts, random, scratch.from_bsdf), plan, picks,
+             scratch.free, lns, out);
   return lns;
 }
 

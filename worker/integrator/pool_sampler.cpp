@@ -2,12 +2,24 @@
 
 #include <algorithm>
 #include <array>
+#include <bit>
 
 #include "worker/integrator/candidate_samplers.h"
 #include "worker/sampling/light_noise.h"
+#include "worker/sampling/pool.h"
 
 namespace baton {
 namespace {
+
+/// Candidates from a lone light, which leaves nothing to choose: what every pixel gets, and no less
+/// than the most rays; a power of two, so that rays to some of them are a net.
+std::int32_t candidates_from_lone_light(std::int32_t num_candidates, std::int32_t num_rays) {
+  const float least = kNeedOfLight.least * static_cast<float>(num_candidates);
+  const std::int32_t wanted = std::max(static_cast<std::int32_t>(least), most_rays(num_rays));
+  constexpr auto kBlock = static_cast<std::int32_t>(LightPool::kBlock);
+  return static_cast<std::int32_t>(
+      std::bit_ceil(static_cast<std::uint32_t>(std::max(wanted, kBlock))));
+}
 
 /// As many candidates of each kind as their noise in earlier frames asks for. Where sites see
 /// nothing but gloss, twice as many as usual come from the lobes: narrow ones see little of the
@@ -36,8 +48,10 @@ PixelDiagnostics PoolSampler::sample(const PixelInput& input, SamplerScratch& sc
                                      const PixelSamples& samples) const {
   static constexpr std::array<VisibilityCell, kVisibilityCells> kNothing{};
   const std::span<const VisibilityCell> memory = input.memory.empty() ? kNothing : input.memory;
-  const kernels::CandidateCounts counts =
+  kernels::CandidateCounts counts =
       counts_for_noise(input.sites, num_candidates_, lobe_fraction_, light_variance(memory));
+  if (kernels::chooses_evenly(input.light.pool, counts))
+    counts.from_light = candidates_from_lone_light(num_candidates_, num_rays_);
   const float total = kernels::choose_pool_rays(input.sites, input.now, input.light.pool, counts,
                                                 Rng(input.key, PassId::candidates),
                                                 Rng(input.key, PassId::choose).uniforms(0, 0)[0],

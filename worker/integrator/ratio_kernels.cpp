@@ -73,10 +73,8 @@ inline float ChooseRatioRays(const SiteBlock& sites, const EnvironmentView& envi
 
   // Choose the rays.
   const auto count = static_cast<std::size_t>(num_rays);
-  HWY_ALIGN std::int32_t picks[limits::kMaxParticles + RunningSums::kGroup];
-  SystematicPicks(sums, total, u, count, picks);
   LookUpShares(ChosenCandidates(sites, pool, counts, random, scratch.from_bsdf),
-               DistinctPicks(picks, count), line.colors, static_cast<float>(num_rays), out);
+               DistinctPicks::Systematic(sums, total, u, count), line.colors, static_cast<float>(num_rays), out);
   return total;
 }
 

@@ -4,6 +4,8 @@
 #include <cmath>
 #include <cstdint>
 
+#include "common/base/limits.h"
+
 namespace baton {
 
 /// The arithmetic of the pool sampler. A pixel's M fresh candidates y_i have weights w_i, which sum
@@ -33,15 +35,19 @@ inline constexpr float kSafeControl = 2;
 inline bool use_control(float expected, float doubt) { return expected > kSafeControl * doubt; }
 
 /// Rays of a pixel with a memory: N where the standard deviation of what is in doubt is 2.5 % of
-/// `scale`, else in proportion to its power of 3/4, from N / 2 to 4 N, at most `most`. scale:
+/// `scale`, else in proportion to its power of 3/4, from N / 2 to most_rays(N). scale:
 /// noise_scale(), > 0. (In proportion to doubt itself would be best if memories were right.)
 inline constexpr float kUsualDoubt = 0.025f;
-inline std::int32_t rays_for_doubt(std::int32_t num_rays, float doubt, float scale,
-                                   std::int32_t most) {
+inline constexpr float kMostRays = 4;
+inline std::int32_t most_rays(std::int32_t num_rays) {
+  return std::min(static_cast<std::int32_t>(kMostRays) * num_rays,
+                  static_cast<std::int32_t>(limits::kMaxParticles));
+}
+inline std::int32_t rays_for_doubt(std::int32_t num_rays, float doubt, float scale) {
   const float root = std::sqrt(doubt / (kUsualDoubt * scale));
-  const float share = std::clamp(root * std::sqrt(root), 0.5f, 4.0f);
+  const float share = std::clamp(root * std::sqrt(root), 0.5f, kMostRays);
   const auto wanted = static_cast<std::int32_t>(std::ceil(share * static_cast<float>(num_rays)));
-  return std::min(wanted, most);
+  return std::min(wanted, most_rays(num_rays));
 }
 
 }  // namespace baton

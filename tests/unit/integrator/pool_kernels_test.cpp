@@ -67,6 +67,14 @@ std::vector<VisibilityCell> memory_after(std::uint32_t rays) {
   return memory;
 }
 
+/// One lamp on black, nine degrees wide; the pixel's normals see it at different angles.
+Environment lamp() {
+  RgbImage image{80, 40, std::vector<float>(80 * 40 * 3, 0.0f)};
+  for (const int texel : {9 * 80 + 20, 9 * 80 + 21, 10 * 80 + 20, 10 * 80 + 21})
+    std::fill_n(image.rgb.begin() + 3 * texel, 3, 100.0f);
+  return {std::make_shared<EnvironmentMap>(image, MapFilter::nearest, 1.0f, false), Mat3{}};
+}
+
 class PoolRays : public OnInstructionSet {
  protected:
   float choose(const SiteBlock& sites, std::span<const VisibilityCell> memory, float u) {
@@ -77,6 +85,49 @@ class PoolRays : public OnInstructionSet {
   static CandidateCounts counts(const SiteBlock& sites) {
     if (sites.num_lobes == 0) return {.from_light = 40};
     return {.from_light = 24, .from_bsdf = 16, .lobe_only = true};
+  }
+
+  /// The mean over `num_offsets` offsets u is an integral that a fine grid solves: it must be the
+  /// sum of w V (f cos L) / p~ over all candidates, whatever the memory says; the same for Lns.
+  template <class IsFree>
+  void expect_mean(const SiteBlock& sites, const EnvironmentView& map, const LightPool& pool,
+                   const CandidateCounts& of, int num_rays, int num_offsets,
+                   const IsFree& is_free_ray) {
+    auto candidates = std::make_unique<kernels::CandidateSet>();
+    kernels::draw_candidates(sites, map, pool, of, rng, *candidates);
+    Rgb expected{};
+    double seen = 0;
+    for (std::size_t i = 0; i < static_cast<std::size_t>(candidates->count); ++i) {
+      const bool dark = !(candidates->weight[i] > 0);
+      if (dark || !is_free_ray(decode_octahedral(candidates->code[i]))) continue;
+      const Rgb reflected{candidates->r[i], candidates->g[i], candidates->b[i]};
+      expected += reflected * (candidates->weight[i] / mean(reflected));
+      seen += candidates->weight[i];
+    }
+    for (const std::uint32_t remembered : {0u, 3u, 3000u}) {
+      const std::vector<VisibilityCell> memory = memory_after(remembered);
+      double sum[4] = {};
+      for (int k = 0; k < num_offsets; ++k) {
+        const float u = (static_cast<float>(k) + 0.5f) / static_cast<float>(num_offsets);
+        const float lns = kernels::choose_pool_rays(sites, map, pool, of, rng, u, num_rays, memory,
+                                                    *scratch, *rays);
+        ASSERT_NEAR(lns, candidates->total, 1e-4f * candidates->total);
+        PixelRays::Value value = rays->constant;
+        for (std::size_t j = 0; j < rays->count; ++j) {
+          if (!is_free_ray(direction(j))) continue;
+          value.color += {rays->r[j], rays->g[j], rays->b[j]};
+          value.visibility += rays->visibility[j];
+        }
+        sum[0] += double{value.color.x} / num_offsets;
+        sum[1] += double{value.color.y} / num_offsets;
+        sum[2] += double{value.color.z} / num_offsets;
+        sum[3] += double{value.visibility} / num_offsets;
+      }
+      EXPECT_NEAR(sum[0], expected.x, 2e-3 * expected.x) << remembered;
+      EXPECT_NEAR(sum[1], expected.y, 2e-3 * expected.y) << remembered;
+      EXPECT_NEAR(sum[2], expected.z, 2e-3 * expected.z) << remembered;
+      EXPECT_NEAR(sum[3], seen / candidates->total, 2e-3) << remembered;
+    }
   }
 
   const Environment light = sky();
@@ -90,47 +141,25 @@ class PoolRays : public OnInstructionSet {
 INSTANTIATE_TEST_SUITE_P(Sets, PoolRays, testing::ValuesIn(instruction_sets()),
                          instruction_set_name);
 
-// The mean over the offset u is an integral that a fine grid of offsets solves: it must be the sum
-// of w V (f cos L) / p~ over all candidates, whatever the memory says; the same for Lns and for
-// each way of choosing.
+// By doubt, by hope, and without a memory.
 TEST_P(PoolRays, AverageToTheirCandidates) {
   for (const bool glossy : {false, true}) {
+    SCOPED_TRACE(glossy);
     const SiteBlock sites = pixel(glossy);
-    auto candidates = std::make_unique<kernels::CandidateSet>();
-    kernels::draw_candidates(sites, view, light_pool, counts(sites), rng, *candidates);
-    Rgb expected{};
-    double seen = 0;
-    for (std::size_t i = 0; i < static_cast<std::size_t>(candidates->count); ++i) {
-      const bool dark = !(candidates->weight[i] > 0);
-      if (dark || !is_free(decode_octahedral(candidates->code[i]))) continue;
-      const Rgb reflected{candidates->r[i], candidates->g[i], candidates->b[i]};
-      expected += reflected * (candidates->weight[i] / mean(reflected));
-      seen += candidates->weight[i];
-    }
-    for (const std::uint32_t remembered : {0u, 3u, 3000u}) {
-      const std::vector<VisibilityCell> memory = memory_after(remembered);
-      constexpr int kOffsets = 4000;
-      double sum[4] = {};
-      for (int k = 0; k < kOffsets; ++k) {
-        const float lns =
-            choose(sites, memory, (static_cast<float>(k) + 0.5f) / static_cast<float>(kOffsets));
-        ASSERT_NEAR(lns, candidates->total, 1e-4f * candidates->total);
-        PixelRays::Value value = rays->constant;
-        for (std::size_t j = 0; j < rays->count; ++j) {
-          if (!is_free(direction(j))) continue;
-          value.color += {rays->r[j], rays->g[j], rays->b[j]};
-          value.visibility += rays->visibility[j];
-        }
-        sum[0] += value.color.x / kOffsets;
-        sum[1] += value.color.y / kOffsets;
-        sum[2] += value.color.z / kOffsets;
-        sum[3] += value.visibility / kOffsets;
-      }
-      EXPECT_NEAR(sum[0], expected.x, 2e-3 * expected.x) << glossy << " " << remembered;
-      EXPECT_NEAR(sum[1], expected.y, 2e-3 * expected.y) << glossy << " " << remembered;
-      EXPECT_NEAR(sum[2], expected.z, 2e-3 * expected.z) << glossy << " " << remembered;
-      EXPECT_NEAR(sum[3], seen / candidates->total, 2e-3) << glossy << " " << remembered;
-    }
+    expect_mean(sites, view, light_pool, counts(sites), 16, 4000, is_free);
+  }
+}
+
+// Few rays and many, at even distances: each of the sets that can be chosen comes up equally often.
+TEST_P(PoolRays, AverageToTheirCandidatesUnderALoneLight) {
+  const Environment lone = lamp();
+  const LightPool pool = make_light_pool(lone, lone, 3, 2, {.one_run = true});
+  ASSERT_TRUE(pool.lone_light);
+  const SiteBlock sites = pixel(false);
+  for (const int num_rays : {1, 2, 5, 16, 64}) {
+    SCOPED_TRACE(num_rays);
+    const auto half = [](const Vec3& w) { return w.x > w.z; };
+    expect_mean(sites, view_of(lone), pool, {.from_light = 256}, num_rays, 256, half);
   }
 }
 

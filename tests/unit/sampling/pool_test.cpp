@@ -16,7 +16,7 @@ namespace baton {
 namespace {
 
 constexpr std::size_t kStates = 12, kCandidates = 12;
-constexpr int kRays = 5, kMostRays = 10;
+constexpr int kRays = 5;
 constexpr int kMostCandidates = 48;
 constexpr float kMeanRadiance = 12;     // so that pixels get few rays and many
 constexpr float kBrightRadiance = 600;  // the same for candidates
@@ -57,7 +57,7 @@ class Chain {
   }
 
   int with_control = 0, without_control = 0;           ///< frames shaded either way
-  std::size_t fewest_rays = kMostRays, most_rays = 0;  ///< of a frame
+  std::size_t fewest_rays = limits::kMaxParticles, most_rays = 0;  ///< of a frame
   std::size_t fewest_candidates = kMostCandidates, most_candidates = 0;
 
   FrameEstimate step(const Target& now) {
@@ -140,7 +140,7 @@ class Chain {
       total += line.back();
     }
     auto count = static_cast<std::size_t>(
-        rays_for_doubt(kRays, doubt, noise_scale(lns, kMeanRadiance), kMostRays));
+        rays_for_doubt(kRays, doubt, noise_scale(lns, kMeanRadiance)));
     fewest_rays = std::min(fewest_rays, count);
     most_rays = std::max(most_rays, count);
     std::vector<std::size_t> picks = pick(line, count);
@@ -275,12 +275,12 @@ TEST(Pool, ShadesEitherWayWithFewAndMany) {
 }
 
 TEST(Pool, RaysGoWhereDoubtIs) {
-  EXPECT_EQ(rays_for_doubt(16, 0.025f, 1, 64), 16);
-  EXPECT_EQ(rays_for_doubt(16, 0.001f, 1, 64), 8);
-  EXPECT_EQ(rays_for_doubt(16, 3, 60, 64), 27);
-  EXPECT_EQ(rays_for_doubt(16, 30, 60, 64), 64);
-  EXPECT_EQ(rays_for_doubt(64, 0.5f, 1, 64), 64);
-  EXPECT_EQ(rays_for_doubt(1, 0.0f, 1, 64), 1);
+  EXPECT_EQ(rays_for_doubt(16, 0.025f, 1), 16);
+  EXPECT_EQ(rays_for_doubt(16, 0.001f, 1), 8);
+  EXPECT_EQ(rays_for_doubt(16, 3, 60), 27);
+  EXPECT_EQ(rays_for_doubt(16, 30, 60), 64);
+  EXPECT_EQ(rays_for_doubt(64, 0.5f, 1), 64);
+  EXPECT_EQ(rays_for_doubt(1, 0.0f, 1), 1);
 }
 
 // The same machinery must see each way to spoil it.
