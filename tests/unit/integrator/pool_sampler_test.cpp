@@ -1,0 +1,117 @@
+// How many candidates a pixel of the pool sampler gets.
+#include "worker/integrator/pool_sampler.h"
+
+#include <gtest/gtest.h>
+
+#include <bit>
+#include <cmath>
+#include <memory>
+#include <vector>
+
+#include "worker/sampling/light_noise.h"
+#include "worker/scene/material.h"
+
+namespace baton {
+namespace {
+
+/// The light of a map of 64 x 32 texels, a function of their number.
+template <class Radiance>
+FrameLight light_of(const Radiance& radiance) {
+  RgbImage image{64, 32, {}};
+  for (int i = 0; i < 64 * 32; ++i) {
+    const float value = radiance(i);
+    image.rgb.insert(image.rgb.end(), {value, value, value});
+  }
+  const Environment map{std::make_shared<EnvironmentMap>(image, MapFilter::nearest, 1.0f, false),
+                        Mat3{}};
+  return {.now = map,
+          .before = map,
+          .still = true,
+          .turn = {},
+          .pool = make_light_pool(map, map, 3, 1, {.one_run = true})};
+}
+FrameLight sky() {
+  return light_of([](int i) { return static_cast<float>(1 + (i * 37) % 23); });
+}
+FrameLight lamp() {
+  return light_of([](int i) { return i == 9 * 64 + 20 ? 100.0f : 0.0f; });
+}
+
+/// A pixel that sees a diffuse floor, or a glossy one.
+SiteBlock pixel(bool glossy) {
+  MaterialSpec spec;
+  spec.kind = glossy ? MaterialKind::metallic_roughness : MaterialKind::diffuse;
+  spec.roughness = 0.2f;
+  SiteBlock sites;
+  sites.clear(1);
+  sites.add(0,
+            {.position = {}, .ng = {0, 1, 0}, .ns = {0, 1, 0}, .wo = normalize({0.3f, 0.8f, 0.4f})},
+            make_material(spec));
+  return sites;
+}
+
+class PoolCounts : public testing::Test {
+ protected:
+  /// Candidates of a pixel in all. The noise that they show is then in scratch->rays.
+  std::int32_t sample(const FrameLight& light, const SiteBlock& sites, std::int32_t num_candidates,
+                      const LightVariance& known) {
+    SamplingSpec spec;
+    spec.num_candidates = num_candidates;
+    spec.num_particles = 16;
+    std::vector<VisibilityCell> memory(kVisibilityCells, 0);
+    remember_ray(memory, 0, true);
+    remember_light_variance(memory, known);
+    const EnvironmentView view = view_of(light.now);
+    float lns = 0, lns_fresh = 0;
+    PixelSource source{};
+    const PixelInput input{.sites = sites,
+                           .light = light,
+                           .now = view,
+                           .before = view,
+                           .key = {.job_seed = 5},
+                           .memory = memory};
+    const PixelSamples samples{{}, {}, {}, {}, {}, {}, lns, lns_fresh, source};
+    return PoolSampler(spec).sample(input, *scratch, samples).target_evaluations;
+  }
+
+  std::unique_ptr<SamplerScratch> scratch = std::make_unique<SamplerScratch>();
+};
+
+// Too few to tell their noise would stay too few for good: with M = 16 and 32 glossy pixels had
+// five to twenty times the error of M = 64.
+TEST_F(PoolCounts, AreAlwaysEnoughToTellTheirNoise) {
+  const FrameLight light = sky();
+  for (const bool glossy : {false, true}) {
+    for (const std::int32_t num_candidates : {8, 16, 32, 64, 100}) {
+      for (const float noise : {0.0f, 1e-12f}) {
+        sample(light, pixel(glossy), num_candidates, {noise, noise});
+        EXPECT_GT(scratch->rays.light_variance.from_light, 0) << num_candidates << " " << noise;
+        if (glossy) {
+          EXPECT_GT(scratch->rays.light_variance.from_lobes, 0) << num_candidates << " " << noise;
+        }
+      }
+    }
+  }
+}
+
+TEST_F(PoolCounts, NeverExceedTheMost) {
+  const FrameLight light = sky();
+  for (const std::int32_t num_candidates : {8, 8000, 8190, 8192}) {
+    const std::int32_t count = sample(light, pixel(true), num_candidates, {1e6f, 1e6f});
+    EXPECT_LE(count, limits::kMaxCandidates) << num_candidates;
+    EXPECT_GE(count, std::min(num_candidates * 32, limits::kMaxCandidates)) << num_candidates;
+  }
+}
+
+TEST_F(PoolCounts, OfALoneLightArePowersOfTwo) {
+  const FrameLight light = lamp();
+  for (const std::int32_t num_candidates : {1, 100, 1000, 8192}) {
+    const auto count =
+        static_cast<std::uint32_t>(sample(light, pixel(false), num_candidates, {1, 1}));
+    EXPECT_TRUE(std::has_single_bit(count)) << num_candidates << " " << count;
+    EXPECT_GE(count, 64u) << "four times N";
+  }
+}
+
+}  // namespace
+}  // namespace baton
