@@ -38,6 +38,7 @@ std::vector<Case> make_cases() {
       [](SamplingSpec& s) { s.num_candidates = 128; });
   add("bidirectional M=800", Method::bidirectional, 3.5,
       [](SamplingSpec& s) { s.num_candidates = 800; });
+  add("pool M=32", Method::pool, 2.2, [](SamplingSpec& s) { s.num_candidates = 32; });
   add("pool M=64", Method::pool, 2.2, [](SamplingSpec& s) { s.num_candidates = 64; });
   add("pool M=128", Method::pool, 2.2, [](SamplingSpec& s) { s.num_candidates = 128; });
   add("pool M=256", Method::pool, 2.2, [](SamplingSpec& s) { s.num_candidates = 256; });

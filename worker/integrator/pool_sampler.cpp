@@ -21,9 +21,14 @@ std::int32_t candidates_from_lone_light(std::int32_t num_candidates, std::int32_
       std::bit_ceil(static_cast<std::uint32_t>(std::max(wanted, kBlock))));
 }
 
-/// Fewest candidates of a kind that is drawn at all: their noise is told by second differences,
-/// which take three vectors of eight, and a pixel that cannot tell it would keep too few for good.
+/// Fewest candidates of the light: noise is told by second differences, which take three vectors of
+/// eight, and who cannot tell would keep too few for good. (Glossy pixels that usually have 64 may
+/// go below: where they once had little noise, it is candidates from lobes that they live on.)
 constexpr std::int32_t kFewestJudged = 24;
+std::int32_t least_of_light(const kernels::CandidateCounts& usual) {
+  const bool may_go_below = usual.from_bsdf > 0 && usual.from_light >= 64;
+  return usual.from_light == 0 || may_go_below ? 0 : kFewestJudged;
+}
 
 /// As many candidates of each kind as their noise in earlier frames asks for. Where sites see
 /// nothing but gloss, twice as many as usual come from the lobes: narrow ones see little of the
@@ -34,12 +39,10 @@ kernels::CandidateCounts counts_for_noise(const SiteBlock& sites, std::int32_t n
   const float of_lobes = std::min(lobe_fraction * (1 + specular), 0.5f);
   kernels::CandidateCounts counts =
       candidate_counts(sites, num_candidates, lobe_fraction < 1 ? of_lobes : 1.0f);
-  if (counts.from_bsdf > 0) counts.from_bsdf = std::max(counts.from_bsdf, kFewestJudged);
   const std::int32_t most_of_light = limits::kMaxCandidates - counts.from_bsdf;
-  const std::int32_t least_of_light = counts.from_light > 0 ? kFewestJudged : 0;
   counts.from_light = std::clamp(
       candidates_for_noise(counts.from_light, known.from_light, kNeedOfLight, most_of_light),
-      least_of_light, most_of_light);
+      least_of_light(counts), most_of_light);
   counts.from_bsdf = candidates_for_noise(counts.from_bsdf, known.from_lobes, kNeedOfLobes,
                                           limits::kMaxCandidates - counts.from_light);
   return counts;
