@@ -47,6 +47,22 @@ bool close_together(std::span<const OctDirection> directions) {
   return length(sum) > kMeanLength * static_cast<float>(directions.size());
 }
 
+/// Whether directions bring the same light over their density, but for a tenth (rms).
+bool equally_bright(std::span<const OctDirection> directions, const EnvironmentView& now) {
+  constexpr double kMostVariation = 0.1;
+  const std::size_t n = directions.size();
+  std::vector<float> x(n), y(n), z(n), r(n), g(n), b(n), density(n);
+  kernels::decode_directions(directions, x, y, z);
+  kernels::evaluate_environment(now, x, y, z, r, g, b, density);
+  double sum = 0, squares = 0;
+  for (std::size_t i = 0; i < n; ++i) {
+    const double light = density[i] > 0 ? double{r[i] + g[i] + b[i]} / density[i] : 0;
+    sum += light;
+    squares += light * light;
+  }
+  return squares * static_cast<double>(n) < (1 + kMostVariation * kMostVariation) * sum * sum;
+}
+
 /// Sorts directions by their numbers in the sequence, bits reversed: those at even distances, a
 /// power of two of them, followed each other in the sequence, which makes them a net.
 void sort_into_nets(std::span<OctDirection> directions) {
@@ -86,6 +102,7 @@ LightPool make_light_pool(const Environment& now, const Environment& before, std
   const Rng rng({.job_seed = job_seed, .frame = frame, .pixel = 0}, PassId::light_pool);
 
   // Draw the directions, run by run.
+  const EnvironmentView now_view = view_of(now);
   pool.blocks.resize(LightPool::kNumBlocks);
   const std::uint32_t num_blocks = (layout.num_taken + LightPool::kBlock - 1) / LightPool::kBlock;
   pool.run_blocks = layout.one_run
@@ -95,13 +112,12 @@ LightPool make_light_pool(const Environment& now, const Environment& before, std
   for (std::uint32_t first = 0; first < LightPool::kNumBlocks; first += pool.run_blocks) {
     const auto run = std::span(directions)
                          .subspan(first * LightPool::kBlock, pool.run_blocks * LightPool::kBlock);
-    pool.lone_light = layout.one_run && close_together(run);
+    pool.lone_light = layout.one_run && close_together(run) && equally_bright(run, now_view);
     pool.lone_light ? sort_into_nets(run) : sort_along_curve(run);
     lay_out(run, first / pool.run_blocks, std::span(pool.blocks).subspan(first, pool.run_blocks));
   }
 
   // Look everything up at the lattice directions, with the look-up that the pixels use.
-  const EnvironmentView now_view = view_of(now);
   const EnvironmentView before_view = view_of(before);
   pool.has_before = layout.with_before;
   for (LightPool::Block& block : pool.blocks) {

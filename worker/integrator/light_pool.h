@@ -23,9 +23,10 @@ namespace baton {
 /// that are spread over the light, and so its shadow rays are stratified. In each run place 0 is
 /// another eighth, so that one who takes the same place of random blocks sees the whole map.
 ///
-/// A lone light, all of it within a narrow cone, leaves nothing to choose: one entry is as good as
-/// another. A pool of one run is then not sorted along the curve but so that entries at even
-/// distances, a power of two of them, are nets of the sequence: rays to a single lamp want no more.
+/// A lone light, all of it within a narrow cone and equally bright, leaves nothing to choose: one
+/// entry is as good as another. A pool of one run is then not sorted along the curve but so that
+/// entries at even distances, a power of two of them, are nets of the sequence: rays to a single
+/// lamp want no more.
 struct LightPool {
   static constexpr std::uint32_t kSize = 1u
                                          << 13;  ///< entries: few enough to stay in a core's cache

@@ -197,10 +197,10 @@ TEST(LightPool, PixelsTakeEveryEntryEquallyOften) {
 }
 
 /// A map that is black but for some texels.
-Environment lamps(std::initializer_list<int> texels) {
+Environment lamps(std::initializer_list<int> texels, MapFilter filter = MapFilter::nearest) {
   RgbImage image{64, 32, std::vector<float>(64 * 32 * 3, 0.0f)};
   for (const int texel : texels) std::fill_n(image.rgb.begin() + 3 * texel, 3, 100.0f);
-  return {std::make_shared<EnvironmentMap>(image, MapFilter::nearest, 1.0f, false), Mat3{}};
+  return {std::make_shared<EnvironmentMap>(image, filter, 1.0f, false), Mat3{}};
 }
 
 TEST(LightPool, KnowsALoneLight) {
@@ -210,6 +210,7 @@ TEST(LightPool, KnowsALoneLight) {
   EXPECT_TRUE(is_lone(lamps({9 * 64 + 20})));
   EXPECT_TRUE(is_lone(lamps({9 * 64 + 20, 9 * 64 + 21, 10 * 64 + 20})));
   EXPECT_FALSE(is_lone(lamps({9 * 64 + 20, 9 * 64 + 40}))) << "two lamps";
+  EXPECT_FALSE(is_lone(lamps({9 * 64 + 20}, MapFilter::bilinear))) << "brighter in its middle";
   EXPECT_FALSE(is_lone(gradient_environment()));
 }
 
