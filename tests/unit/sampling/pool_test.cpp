@@ -56,7 +56,7 @@ class Chain {
     memory_.fill(0.5f);
   }
 
-  int with_control = 0, without_control = 0;           ///< frames shaded either way
+  int with_control = 0, without_control = 0;                       ///< frames shaded either way
   std::size_t fewest_rays = limits::kMaxParticles, most_rays = 0;  ///< of a frame
   std::size_t fewest_candidates = kMostCandidates, most_candidates = 0;
 
@@ -139,8 +139,8 @@ class Chain {
       line.push_back(c.weight * factor(memory_[c.state]));
       total += line.back();
     }
-    auto count = static_cast<std::size_t>(
-        rays_for_doubt(kRays, doubt, noise_scale(lns, kMeanRadiance)));
+    auto count =
+        static_cast<std::size_t>(rays_for_doubt(kRays, doubt, noise_scale(lns, kMeanRadiance)));
     fewest_rays = std::min(fewest_rays, count);
     most_rays = std::max(most_rays, count);
     std::vector<std::size_t> picks = pick(line, count);
