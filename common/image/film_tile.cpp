@@ -12,13 +12,14 @@ namespace baton {
 namespace {
 
 constexpr SectionTag kMagic{'B', 'T', 'F', '1'};
-constexpr std::uint16_t kVersion = 1;
+constexpr std::uint16_t kVersion = 2;
 constexpr SectionTag kMeta{'M', 'E', 'T', 'A'};
 constexpr SectionTag kPixels{'P', 'I', 'X', 'L'};
 constexpr std::array kTags{kMeta, kPixels};
 
-/// Fills rectangle and channel names.
-Status decode_meta(const SectionFile& file, const std::string& name, FilmTile& tile) {
+/// Fills rectangle, channel names and origin.
+Status decode_meta(const SectionFile& file, const std::string& name, StoredFilm& stored) {
+  FilmTile& tile = stored.film;
   const auto fail = [&](const std::string& what) {
     return Error{ErrorKind::bad_input, fmt::format("{}: section META {}", name, what)};
   };
@@ -43,7 +44,19 @@ Status decode_meta(const SectionFile& file, const std::string& name, FilmTile& t
     }
     tile.channels.push_back(std::move(channel));
   }
-  if (!reader.ok() || !reader.at_end()) return fail("is not a rectangle and a list of names");
+  stored.origin.job.high = reader.get<std::uint64_t>();
+  stored.origin.job.low = reader.get<std::uint64_t>();
+  stored.origin.frame_index = reader.get<std::int32_t>();
+  const auto pass = reader.get<std::uint8_t>();
+  if (!reader.ok() || !reader.at_end())
+    return fail("is not a rectangle, a list of names, a job, a frame and a pass");
+  if (pass > static_cast<std::uint8_t>(FilmPass::second))
+    return fail(fmt::format("has pass {}, expected 0 or 1", pass));
+  stored.origin.pass = static_cast<FilmPass>(pass);
+  if (stored.origin.frame_index < 0 || stored.origin.frame_index >= limits::kMaxFrames) {
+    return fail(fmt::format("has frame index {}, expected 0 to {}", stored.origin.frame_index,
+                            limits::kMaxFrames - 1));
+  }
 
   // Check the rectangle.
   const PixelRect& rect = tile.rect;
@@ -57,7 +70,7 @@ Status decode_meta(const SectionFile& file, const std::string& name, FilmTile& t
 
 }  // namespace
 
-Bytes encode_film_tile(const FilmTile& tile) {
+Bytes encode_film_tile(const FilmTile& tile, const FilmOrigin& origin) {
   BATON_CHECK(!tile.channels.empty() &&
               tile.values.size() == tile.channels.size() * tile.num_pixels());
   ByteWriter meta;
@@ -65,6 +78,10 @@ Bytes encode_film_tile(const FilmTile& tile) {
     meta.put(side);
   meta.put(static_cast<std::uint32_t>(tile.channels.size()));
   for (const std::string& channel : tile.channels) meta.put_string(channel);
+  meta.put(origin.job.high);
+  meta.put(origin.job.low);
+  meta.put(origin.frame_index);
+  meta.put(static_cast<std::uint8_t>(origin.pass));
   const std::array sections{SectionView{.tag = kMeta, .payload = meta.bytes()},
                             SectionView{.tag = kPixels,
                                         .stride = sizeof(float),
@@ -72,17 +89,18 @@ Bytes encode_film_tile(const FilmTile& tile) {
   return encode_sections(kMagic, kVersion, sections);
 }
 
-Result<FilmTile> decode_film_tile(ByteView bytes, const std::string& name) {
+Result<StoredFilm> decode_film_tile(ByteView bytes, const std::string& name) {
   BATON_ASSIGN(const SectionFile file, decode_section_file(bytes, kMagic, kVersion, name));
   BATON_TRY(check_known_sections(file, kTags, name));
-  FilmTile tile;
-  BATON_TRY(decode_meta(file, name, tile));
+  StoredFilm stored;
+  BATON_TRY(decode_meta(file, name, stored));
+  FilmTile& tile = stored.film;
   const std::uint64_t num_values = tile.channels.size() * tile.num_pixels();
   BATON_ASSIGN(const ByteView payload,
                section_payload(file, kPixels, num_values * sizeof(float), name));
   tile.values.resize(num_values);
   std::memcpy(tile.values.data(), payload.data(), payload.size());
-  return tile;
+  return stored;
 }
 
 }  // namespace baton

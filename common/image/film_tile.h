@@ -1,9 +1,11 @@
 #pragma once
 
+#include <cstdint>
 #include <string>
 #include <vector>
 
 #include "common/base/bytes.h"
+#include "common/base/digest.h"
 #include "common/base/result.h"
 #include "common/math/pixel_rect.h"
 
@@ -22,8 +24,30 @@ struct FilmTile {
   const float* plane(std::size_t channel) const { return values.data() + channel * num_pixels(); }
 };
 
-/// Deterministic bytes for the blob store; container of common/base/section_file.h.
-Bytes encode_film_tile(const FilmTile& tile);
-Result<FilmTile> decode_film_tile(ByteView bytes, const std::string& name);
+/// Which pass made a film. Stored; values are for ever.
+enum class FilmPass : std::uint8_t { first = 0, second = 1 };
+
+/// Where a film comes from. It stands in the file so that films that look alike, such as empty
+/// tiles of two frames, are different blobs: what one task no longer needs is never what another
+/// made.
+struct FilmOrigin {
+  Digest job;
+  std::int32_t frame_index = 0;  ///< 0-based
+  FilmPass pass = FilmPass::first;
+
+  bool operator==(const FilmOrigin&) const = default;
+};
+
+/// A film file, read.
+struct StoredFilm {
+  FilmOrigin origin;
+  FilmTile film;
+};
+
+/// Deterministic bytes for the blob store, different for every (origin, rectangle); container of
+/// common/base/section_file.h.
+Bytes encode_film_tile(const FilmTile& tile, const FilmOrigin& origin);
+/// `name` goes first in every error: wrong magic or version, checksum, values out of range.
+Result<StoredFilm> decode_film_tile(ByteView bytes, const std::string& name);
 
 }  // namespace baton

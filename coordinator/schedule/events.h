@@ -81,11 +81,18 @@ struct AttemptFailed {
   std::string message;
   bool permanent = false;
 };
+/// The task is done as the worker says, but an output of it is not in the store: it went between
+/// publishing and reporting. Nobody is to blame; the task is done again.
+struct ResultMissing {
+  std::string worker;
+  LeaseId lease;
+};
 /// Time has passed: who was silent for too long?
 struct ClockTicked {};
 
-using Event = std::variant<JobAdded, JobCancelled, JobPaused, JobResumed, WorkerJoined, WorkerAlive, WorkerLeft,
-                           WorkRequested, TaskCompleted, AttemptFailed, ClockTicked>;
+using Event = std::variant<JobAdded, JobCancelled, JobPaused, JobResumed, WorkerJoined, WorkerAlive,
+                           WorkerLeft, WorkRequested, TaskCompleted, AttemptFailed, ResultMissing,
+                           ClockTicked>;
 
 // ---- actions ------------------------------------------------------------------------------------
 /// Make it durable; nothing that comes after in the same or a later step may be sent or removed

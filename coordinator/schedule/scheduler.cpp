@@ -143,6 +143,12 @@ void Scheduler::on(const AttemptFailed& event, TimePoint now, Actions& actions) 
     fail_attempt(held, {event.lease, event.worker, event.message, event.permanent}, actions);
 }
 
+void Scheduler::on(const ResultMissing& event, TimePoint now, Actions& actions) {
+  if (!touch(event.worker, now)) return;
+  const Held held = hold(event.worker, event.lease, now);
+  if (held.job) lose_lease(event.lease.job, held.task, actions);
+}
+
 // ---- jobs ---------------------------------------------------------------------------------------
 
 Scheduler::Job* Scheduler::find(const Digest& job) {

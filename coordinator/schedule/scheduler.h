@@ -79,6 +79,7 @@ class Scheduler {
   void on(const WorkRequested& event, TimePoint now, Actions& actions);
   void on(const TaskCompleted& event, TimePoint now, Actions& actions);
   void on(const AttemptFailed& event, TimePoint now, Actions& actions);
+  void on(const ResultMissing& event, TimePoint now, Actions& actions);
   void on(const ClockTicked& event, TimePoint now, Actions& actions);
 
   // Leases (scheduler_leases.cpp).

@@ -115,7 +115,8 @@ void Scheduler::drop_lease(const Digest& job, TaskIndex task) {
   leases_.erase(found);
 }
 
-/// The worker no longer has it. A task that was lost too often probably kills its workers.
+/// The worker no longer has it, or nobody has what it made. A task that was lost too often probably
+/// kills its workers.
 void Scheduler::lose_lease(const Digest& digest, TaskIndex task, Actions& actions) {
   Job& job = jobs_.at(digest);
   const std::int32_t losses = job.tasks.add_loss(task);
@@ -126,7 +127,7 @@ void Scheduler::lose_lease(const Digest& digest, TaskIndex task, Actions& action
     const Lease lease = leases_.at({digest, task});
     fail_attempt(
         {&job, task},
-        {lease.id, lease.worker, fmt::format("its workers were lost {} times", losses), true},
+        {lease.id, lease.worker, fmt::format("its workers or results were lost {} times", losses), true},
         actions);
   }
 }

@@ -167,11 +167,11 @@ Status Service::receive_from(const std::string& worker, const Heartbeat& message
 Status Service::receive_from(const std::string& worker, const TaskDone& message) {
   // Accepted results must be there: a blob may have gone between publishing and reporting.
   if (const auto missing = find_missing_blob(message)) {
-    return step(AttemptFailed{worker, message.lease,
-                              fmt::format("{}: reported, but not there", *missing), false});
+    spdlog::warn("worker {}: {}: reported, but not there; the task is done again", worker,
+                 *missing);
+    return step(ResultMissing{worker, message.lease});
   }
-  return step(TaskCompleted{worker, message.lease, message.outputs, message.stats,
-                            message.frames});
+  return step(TaskCompleted{worker, message.lease, message.outputs, message.stats, message.frames});
 }
 
 Status Service::receive_from(const std::string& worker, const TaskFailed& message) {

@@ -119,6 +119,20 @@ def equal_jobs_make_equal_files(programs, folder):
     check(files[0] == files[1], "the files of two equal runs differ")
 
 
+def tiles_that_look_alike(programs, folder):
+    """Empty tiles have the same pixels in every frame; what one task no longer needs is never what another made."""
+    job = make_job(folder, frames="1-8", image={"width": 256, "height": 256, "tileSize": 16},
+                   camera={"verticalFovDeg": 80}, sampling={"method": "bidirectional"},
+                   output={"background": "transparent"})
+    del job["scene"]["ground"], job["sampling"]["numDistributions"]
+    with Farm(programs, folder / "farm") as farm:
+        farm.start_coordinator()
+        farm.start_worker(threads=2)
+        ident = farm.submit(write_job(folder / "job.json", job))
+        farm.wait_for(ident)
+        check_equal(farm.show(ident)["attemptsLost"], 0, "attempts lost though nothing was disturbed")
+
+
 def slow_job(folder):
     return write_job(folder / "job.json", make_job(folder, image={"tileSize": 32}, sampling=SLOW))
 
@@ -193,6 +207,7 @@ if __name__ == "__main__":
         settings_by_material,
         carrying,
         equal_jobs_make_equal_files,
+        tiles_that_look_alike,
         a_killed_worker,
         a_killed_coordinator,
         a_terminated_worker_finishes_its_task,

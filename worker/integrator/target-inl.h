@@ -21,13 +21,16 @@ HWY_BEFORE_NAMESPACE();
 namespace baton::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-/// Reflected radiance (f cos L) per channel.
+/// Reflected radiance (f cos L) per channel. A lane's value is the same to the bit whatever surfaces
+/// the other lanes see: which those are depends, in the second pass, on the tiling.
 HWY_INLINE Vec3Lanes ReflectedRadiance(const SurfaceLanes& s, const BsdfLanes& f, VF r, VF g,
                                        VF b) {
   if (!s.any_lobe) {
-    const VF each = hn::Mul(f.cosine, hn::Set(DF(), kInvPi));
-    return {hn::Mul(hn::Mul(s.kd.x, each), r), hn::Mul(hn::Mul(s.kd.y, each), g),
-            hn::Mul(hn::Mul(s.kd.z, each), b)};
+    // What is left of the general case without a lobe, in the same order.
+    const auto diffuse = [&](VF kd, VF radiance) HWY_ATTR {
+      return hn::Mul(hn::Mul(hn::Mul(hn::Set(DF(), kInvPi), kd), f.cosine), radiance);
+    };
+    return {diffuse(s.kd.x, r), diffuse(s.kd.y, g), diffuse(s.kd.z, b)};
   }
   const auto channel = [&](VF kd, VF ks, VF radiance) HWY_ATTR {
     return hn::Mul(hn::Mul(hn::MulAdd(f.diffuse, kd, hn::MulAdd(f.lobe, ks, f.white)), f.cosine),

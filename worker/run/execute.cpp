@@ -21,6 +21,19 @@ std::string blob_name(const BlobRef& ref) {
                      ref.digest.hex());
 }
 
+/// A film of the job's frame, as one pass made it.
+Result<FilmTile> read_film(const LoadedJob& loaded, const BlobStore& store, const BlobRef& ref,
+                           FilmPass pass) {
+  BATON_ASSIGN(const Bytes bytes, store.get(ref.digest));
+  BATON_ASSIGN(StoredFilm stored, decode_film_tile(bytes, blob_name(ref)));
+  if (stored.origin == FilmOrigin{loaded.digest, ref.frame, pass}) return std::move(stored.film);
+  return Error{ErrorKind::bad_input,
+               fmt::format("{}: of job {} frame index {} pass {}, expected {}, {}, {}",
+                           blob_name(ref), stored.origin.job.hex(), stored.origin.frame_index,
+                           static_cast<int>(stored.origin.pass), loaded.digest.hex(), ref.frame,
+                           static_cast<int>(pass))};
+}
+
 /// The states that a render task starts from, in the order of its inputs.
 Result<std::vector<StatePtr>> read_states(const LoadedJob& loaded, const BlobStore& store,
                                           const std::vector<BlobRef>& inputs) {
@@ -65,25 +78,24 @@ Result<TaskOutput> execute_render(const LoadedJob& loaded, BlobStore& store, con
     output.outputs.push_back({kind, frame, task.tile, digest, bytes.size()});
     return {};
   };
-  const TileRunSink sink{.film =
-                             [&](int frame, const FilmTile& film) {
-                               return keep(BlobKind::film, frame, encode_film_tile(film));
-                             },
-                         .state = [&](const SampleState& state) -> Status {
-                           const CpuTimer timer(seconds_state);
-                           BATON_TRY(keep(BlobKind::state, state.frame_index, encode_state(state)));
-                           if (moves(loaded.job)) {
-                             loaded.states->insert(output.outputs.back().digest,
-                                                   std::make_shared<const SampleState>(state));
-                           }
-                           return {};
-                         },
-                         .diagnostics =
-                             [&](const FrameStats& stats) { output.frames.push_back(stats); },
-                         .samples = [&](const FirstPassSamples& samples) -> Status {
-                           return keep(BlobKind::first_pass, samples.frame_index,
-                                       encode_first_pass_samples(samples));
-                         }};
+  const TileRunSink sink{
+      .film =
+          [&](int frame, const FilmTile& film) {
+            return keep(BlobKind::film, frame, encode_film_tile(film, {loaded.digest, frame}));
+          },
+      .state = [&](const SampleState& state) -> Status {
+        const CpuTimer timer(seconds_state);
+        BATON_TRY(keep(BlobKind::state, state.frame_index, encode_state(state)));
+        if (moves(loaded.job)) {
+          loaded.states->insert(output.outputs.back().digest,
+                                std::make_shared<const SampleState>(state));
+        }
+        return {};
+      },
+      .diagnostics = [&](const FrameStats& stats) { output.frames.push_back(stats); },
+      .samples = [&](const FirstPassSamples& samples) -> Status {
+        return keep(BlobKind::first_pass, samples.frame_index, encode_first_pass_samples(samples));
+      }};
   const TileRun run = tile_run(loaded.job, task.tile, task.step);
   BATON_ASSIGN(output.stats, run_tile(*loaded.context, run, previous, sink, stop));
   // run_tile counts what its sink does, not what was read before.
@@ -108,18 +120,18 @@ Result<TaskOutput> execute_second_pass(const LoadedJob& loaded, BlobStore& store
   FilmTile film;
   std::vector<FirstPassPtr> near;
   for (const BlobRef& input : inputs) {
-    BATON_ASSIGN(const Bytes bytes, store.get(input.digest));
     if (input.kind == BlobKind::first_pass) {
+      BATON_ASSIGN(const Bytes bytes, store.get(input.digest));
       BATON_ASSIGN(FirstPassSamples samples, decode_first_pass_samples(bytes, blob_name(input)));
       near.push_back(std::make_shared<const FirstPassSamples>(std::move(samples)));
     } else {
-      BATON_ASSIGN(film, decode_film_tile(bytes, blob_name(input)));
+      BATON_ASSIGN(film, read_film(loaded, store, input, FilmPass::first));
     }
   }
 
   BATON_ASSIGN(const SecondPassOutput second,
                run_second_pass(*loaded.context, task.step, task.tile, film, near));
-  const Bytes bytes = encode_film_tile(second.film);
+  const Bytes bytes = encode_film_tile(second.film, {loaded.digest, task.step, FilmPass::second});
   BATON_ASSIGN(const Digest digest, store.put(bytes));
   return TaskOutput{{{BlobKind::film, task.step, task.tile, digest, bytes.size()}}, second.stats};
 }
@@ -141,8 +153,8 @@ Result<TaskOutput> execute_assemble(const LoadedJob& loaded, const BlobStore& st
   std::vector<bool> pasted(inputs.size(), false);
   for (const BlobRef& input : inputs) {
     if (stop.stop_requested()) return Error{ErrorKind::cancelled, "stopped while assembling"};
-    BATON_ASSIGN(const Bytes bytes, store.get(input.digest));
-    BATON_ASSIGN(const FilmTile film, decode_film_tile(bytes, blob_name(input)));
+    const FilmPass pass = loaded.job.visibility.correlated ? FilmPass::second : FilmPass::first;
+    BATON_ASSIGN(const FilmTile film, read_film(loaded, store, input, pass));
     const bool fits = input.kind == BlobKind::film && input.frame == task.step && input.tile >= 0 &&
                       input.tile < grid.count() && film.rect == grid.rect(input.tile) &&
                       !pasted[static_cast<std::size_t>(input.tile)];

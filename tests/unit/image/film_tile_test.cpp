@@ -5,6 +5,7 @@
 
 #include <cstring>
 #include <limits>
+#include <set>
 
 #include "common/base/section_file.h"
 
@@ -14,6 +15,7 @@ namespace {
 using testing::HasSubstr;
 
 constexpr SectionTag kMagic{'B', 'T', 'F', '1'};
+const FilmOrigin kOrigin{digest_of("job"), 7, FilmPass::second};
 
 FilmTile small_tile() {
   return {{4, 8, 6, 9},
@@ -23,23 +25,39 @@ FilmTile small_tile() {
 
 /// The error of a small tile whose META starts with other numbers: 4 sides, number of channels.
 std::string meta_error(std::size_t index, std::int32_t value) {
-  SectionFile file = *decode_section_file(encode_film_tile(small_tile()), kMagic, 1, "t.btf");
+  SectionFile file = *decode_section_file(encode_film_tile(small_tile(), kOrigin), kMagic, 2, "t.btf");
   std::memcpy(file.sections[0].payload.data() + index * sizeof(value), &value, sizeof(value));
-  const Result<FilmTile> decoded = decode_film_tile(encode_section_file(file), "t.btf");
+  const Result<StoredFilm> decoded = decode_film_tile(encode_section_file(file), "t.btf");
   return decoded ? "" : decoded.error().message;
 }
 
 TEST(FilmTile, GivesBackTheSameBits) {
   const FilmTile tile = small_tile();
-  const Bytes bytes = encode_film_tile(tile);
-  const Result<FilmTile> decoded = decode_film_tile(bytes, "t.btf");
+  const Bytes bytes = encode_film_tile(tile, kOrigin);
+  const Result<StoredFilm> decoded = decode_film_tile(bytes, "t.btf");
   ASSERT_TRUE(decoded.ok()) << decoded.error().message;
-  EXPECT_TRUE(*decoded == tile);
-  EXPECT_EQ(encode_film_tile(*decoded), bytes);
+  EXPECT_TRUE(decoded->film == tile);
+  EXPECT_TRUE(decoded->origin == kOrigin);
+  EXPECT_EQ(encode_film_tile(decoded->film, decoded->origin), bytes);
+}
+
+// The store names blobs by their content: alike pixels of two tasks must not be one blob.
+TEST(FilmTile, FilmsThatLookAlikeAreDifferentBlobs) {
+  std::set<Digest> digests;
+  for (const char* job : {"job", "other"}) {
+    for (const std::int32_t frame : {0, 1}) {
+      for (const FilmPass pass : {FilmPass::first, FilmPass::second})
+        digests.insert(digest_of(encode_film_tile(small_tile(), {digest_of(job), frame, pass})));
+    }
+  }
+  FilmTile beside = small_tile();
+  beside.rect = {6, 8, 8, 9};
+  digests.insert(digest_of(encode_film_tile(beside, {digest_of("job"), 0, FilmPass::first})));
+  EXPECT_EQ(digests.size(), 9u);
 }
 
 TEST(FilmTile, AnyChangedByteAndAnyTruncationIsAnError) {
-  const Bytes good = encode_film_tile(small_tile());
+  const Bytes good = encode_film_tile(small_tile(), kOrigin);
   for (std::size_t i = 0; i < good.size(); ++i) {
     Bytes bad = good;
     bad[i] ^= std::byte{0x10};
@@ -53,7 +71,7 @@ TEST(FilmTile, MetaMustDescribeThePixels) {
   EXPECT_THAT(meta_error(0, -1), HasSubstr("rectangle [-1, 6)"));
   EXPECT_THAT(meta_error(2, 7), HasSubstr("section PIXL has 16 bytes, expected 24"));
   EXPECT_THAT(meta_error(4, 0), HasSubstr("has 0 channels, expected 1 to 256"));
-  EXPECT_THAT(meta_error(4, 1), HasSubstr("is not a rectangle and a list of names"));
+  EXPECT_THAT(meta_error(4, 1), HasSubstr("is not a rectangle, a list of names, a job"));
   EXPECT_THAT(meta_error(4, 3), HasSubstr("no name for channel 2"));
   EXPECT_THAT(meta_error(4, -1), HasSubstr("expected 1 to 256"));
 }
@@ -61,7 +79,7 @@ TEST(FilmTile, MetaMustDescribeThePixels) {
 TEST(FilmTile, ChannelNamesDiffer) {
   FilmTile tile = small_tile();
   tile.channels[1] = "R";
-  EXPECT_THAT(decode_film_tile(encode_film_tile(tile), "t.btf").error().message,
+  EXPECT_THAT(decode_film_tile(encode_film_tile(tile, kOrigin), "t.btf").error().message,
               HasSubstr("has channel R twice"));
 }
 

@@ -30,6 +30,24 @@ TEST(SecondPass, SameBytesForAnyTiling) {
   }
 }
 
+// What a sample is worth at a surface must not depend on the surfaces that share its vector: which
+// ones do depends on the tiling.
+TEST(SecondPass, SameBytesForAnyTilingWhereMaterialsMeet) {
+  for (const Method method : {Method::mis, Method::bidirectional}) {
+    JobSpec job = correlated_job(method);
+    job.image = {.width = 33, .height = 21, .sites = 4, .tile_size = 4096};
+    job.sampling.num_particles = 20;
+    job.visibility.mask = MaskPolicy::same_samples;
+    job.visibility.dilate = 4;
+    job.scene.materials["ground"].base_color = {0.37f, 0.53f, 0.71f};
+    const FilmTile whole = render_correlated(job).film;
+    for (const int tile_size : {8, 13, 16}) {
+      job.image.tile_size = tile_size;
+      EXPECT_EQ(render_correlated(job).film, whole) << tile_size;
+    }
+  }
+}
+
 TEST(SecondPass, AllPoliciesAndMethodsRun) {
   for (const Method method : {Method::environment, Method::brdf, Method::mis, Method::bidirectional,
                               Method::sequential}) {
