@@ -149,4 +149,9 @@ std::string frame_file_name(const std::string& pattern, int frame_number) {
   return name.replace(first, count, fmt::format("{:0{}}", frame_number, count));
 }
 
+std::filesystem::path frame_path(const JobSpec& job, std::int32_t frame_index) {
+  const int number = job.frames.at(static_cast<std::size_t>(frame_index));
+  return std::filesystem::path(job.output.directory) / frame_file_name(job.output.pattern, number);
+}
+
 }  // namespace baton

@@ -51,6 +51,17 @@ Status read_blob(const SqlDatabase& database, ByteView bytes, const char* column
                                                database.name(), column, bytes.size())};
 }
 
+/// Values that this program does not know are an error: taken for another one, they would be wrong.
+template <class E>
+Status read_enum(const SqlDatabase& database, std::int64_t number, const char* column, E& value) {
+  if (number < 0 || number > static_cast<std::int64_t>(last_of(E{}))) {
+    return Error{ErrorKind::corrupt, fmt::format("{}: {}: {}, expected 0 to {}", database.name(),
+                                                 column, number, static_cast<int>(last_of(E{})))};
+  }
+  value = static_cast<E>(number);
+  return {};
+}
+
 }  // namespace
 
 // ---- opening ------------------------------------------------------------------------------------
@@ -118,8 +129,7 @@ Result<JournalledJob> Journal::load(const Digest& digest) {
   BATON_ASSIGN(const bool found, job.bind(digest.hex()).step());
   if (!found)
     return Error{ErrorKind::internal, fmt::format("{}: no job {}", database_.name(), digest.hex())};
-  result.status = static_cast<JobStatus>(
-      std::clamp<std::int64_t>(job.integer(0), 0, static_cast<std::int64_t>(last_of(JobStatus{}))));
+  BATON_TRY(read_enum(database_, job.integer(0), "jobs.status", result.status));
   result.document = job.text(1);
 
   BATON_ASSIGN(SqlStatement done,
@@ -130,9 +140,9 @@ Result<JournalledJob> Journal::load(const Digest& digest) {
     BATON_ASSIGN(const bool row, done.step());
     if (!row) break;
     Completion& completion = result.completions.emplace_back();
-    completion.task = {static_cast<TaskKind>(std::clamp<std::int64_t>(done.integer(0), 0, 1)),
-                       static_cast<std::int32_t>(done.integer(1)),
-                       static_cast<std::int32_t>(done.integer(2))};
+    BATON_TRY(read_enum(database_, done.integer(0), "completions.kind", completion.task.kind));
+    completion.task.step = static_cast<std::int32_t>(done.integer(1));
+    completion.task.tile = static_cast<std::int32_t>(done.integer(2));
     BATON_TRY(read_blob(database_, done.blob(3), "completions.outputs", completion.outputs));
     BATON_TRY(read_blob(database_, done.blob(4), "completions.stats", completion.stats));
     BATON_TRY(read_blob(database_, done.blob(5), "completions.frames", completion.frames));
@@ -213,13 +223,9 @@ Status Journal::add_job(const Digest& job, const std::string& document) {
       .run();
 }
 
-Status Journal::restart_job(const Digest& job, bool fresh) {
+Status Journal::restart_job(const Digest& job) {
   BATON_ASSIGN(SqlStatement failures, write("DELETE FROM failures WHERE job = ?"));
   BATON_TRY(failures.bind(job.hex()).run());
-  if (fresh) {
-    BATON_ASSIGN(SqlStatement completions, write("DELETE FROM completions WHERE job = ?"));
-    BATON_TRY(completions.bind(job.hex()).run());
-  }
   return record_status(job, JobStatus::running);
 }
 
@@ -253,6 +259,20 @@ Status Journal::record_failure(const Failure& failure) {
       .bind(failure.message)
       .bind(std::int64_t{failure.permanent})
       .run();
+}
+
+Status Journal::record_reopened(const Digest& job, const std::vector<TaskKey>& tasks) {
+  for (const TaskKey& task : tasks) {
+    BATON_ASSIGN(SqlStatement remove,
+                 write("DELETE FROM completions WHERE job = ? AND kind = ? AND "
+                       "step = ? AND tile = ?"));
+    BATON_TRY(remove.bind(job.hex())
+                  .bind(static_cast<std::int64_t>(task.kind))
+                  .bind(task.step)
+                  .bind(task.tile)
+                  .run());
+  }
+  return {};
 }
 
 Status Journal::commit() {

@@ -38,17 +38,20 @@ class Journal {
   Result<JournalledJob> load(const Digest& job);
   /// nullopt: no such job.
   Result<std::optional<std::string>> document(const Digest& job);
-  /// What the sampler did in the frames of a run, recorded so far: one for each frame and tile, in no order.
+  /// What the sampler did in the frames of a run, recorded so far: one for each frame and tile, in
+  /// no order.
   Result<std::vector<FrameStats>> frame_stats(const Digest& job, std::int32_t run);
   /// At most `count` failed attempts, the newest last.
   Result<std::vector<Failure>> recent_failures(const Digest& job, int count);
 
   Status add_job(const Digest& job, const std::string& document);
-  /// Forgets the failures of a job and lets it run again; with `fresh` also what it has done.
-  Status restart_job(const Digest& job, bool fresh);
+  /// Forgets the failures of a job and lets it run again.
+  Status restart_job(const Digest& job);
   Status record_status(const Digest& job, JobStatus status);
   Status record_completion(const Digest& job, const Completion& completion);
   Status record_failure(const Failure& failure);
+  /// Forgets that these tasks were done.
+  Status record_reopened(const Digest& job, const std::vector<TaskKey>& tasks);
 
   /// Makes durable what was recorded since the last commit; nothing to do is a success.
   Status commit();

@@ -15,6 +15,8 @@ class BlobReferences {
   void add(const Digest& blob) { ++counts_[blob]; }
   /// One need less. The last one makes the blob garbage.
   void release(const Digest& blob);
+  /// A blob that nobody needs: garbage at once, unless another task's equal blob is needed.
+  void discard(const Digest& blob) { garbage_.push_back(blob); }
   bool contains(const Digest& blob) const { return counts_.contains(blob); }
 
   /// The blobs that became garbage since the last call and are not needed again.

@@ -39,8 +39,9 @@ struct JobAdded {
   Digest job;
   JobSpec spec;
   JobStatus status = JobStatus::running;
-  std::vector<Completion> completions;  ///< in the order in which they were recorded
+  std::vector<Completion> completions;
   std::vector<Failure> failures;
+  std::vector<TaskKey> lost = {};  ///< of the completed tasks, those whose outputs are gone
 };
 struct JobCancelled {
   Digest job;
@@ -49,8 +50,10 @@ struct JobCancelled {
 struct JobPaused {
   Digest job;
 };
+/// lost: done tasks whose outputs are gone.
 struct JobResumed {
   Digest job;
+  std::vector<TaskKey> lost = {};
 };
 /// `running`: the leases that the worker has in hand, of this coordinator or an earlier one.
 struct WorkerJoined {
@@ -87,12 +90,18 @@ struct ResultMissing {
   std::string worker;
   LeaseId lease;
 };
+/// An attempt failed because inputs of its task are gone or damaged: what made them is done again.
+struct InputsLost {
+  std::string worker;
+  LeaseId lease;
+  std::vector<BlobRef> inputs;
+};
 /// Time has passed: who was silent for too long?
 struct ClockTicked {};
 
 using Event = std::variant<JobAdded, JobCancelled, JobPaused, JobResumed, WorkerJoined, WorkerAlive,
                            WorkerLeft, WorkRequested, TaskCompleted, AttemptFailed, ResultMissing,
-                           ClockTicked>;
+                           InputsLost, ClockTicked>;
 
 // ---- actions ------------------------------------------------------------------------------------
 /// Make it durable; nothing that comes after in the same or a later step may be sent or removed
@@ -103,6 +112,11 @@ struct RecordCompletion {
 };
 struct RecordFailure {
   Failure failure;
+};
+/// These tasks were done and are open again; their completions are void.
+struct RecordReopened {
+  Digest job;
+  std::vector<TaskKey> tasks;
 };
 struct RecordJobStatus {
   Digest job;
@@ -139,7 +153,8 @@ struct RemoveBlobs {
   std::vector<Digest> blobs;
 };
 
-using Action = std::variant<RecordCompletion, RecordFailure, RecordJobStatus, GrantLease,
-                            RevokeLease, ReportNoWork, ForgetWorker, ReportConflict, RemoveBlobs>;
+using Action =
+    std::variant<RecordCompletion, RecordFailure, RecordReopened, RecordJobStatus, GrantLease,
+                 RevokeLease, ReportNoWork, ForgetWorker, ReportConflict, RemoveBlobs>;
 
 }  // namespace baton

@@ -58,8 +58,10 @@ class JobGraph {
   /// Sorts the outputs that a task reported: state first, then films by frame. nullopt when they
   /// are exactly what the task must make; else what is wrong with them.
   std::optional<std::string> check_outputs(const TaskKey& key, std::vector<BlobRef>& outputs) const;
-  /// nullopt when the statistics are of the task's own tile and frames, each frame once at most; else what is wrong.
-  std::optional<std::string> check_frames(const TaskKey& key, const std::vector<FrameStats>& frames) const;
+  /// nullopt when the statistics are of the task's own tile and frames, each frame once at most;
+  /// else what is wrong.
+  std::optional<std::string> check_frames(const TaskKey& key,
+                                          const std::vector<FrameStats>& frames) const;
   /// What `reader` takes of `maker`, one of its inputs: positions in the sorted outputs of `maker`.
   std::vector<std::size_t> taken_outputs(const TaskKey& reader, const TaskKey& maker) const;
   /// Whether `reader`, one of its dependents, takes an output of `maker`.

@@ -1,6 +1,7 @@
 #include "coordinator/schedule/job_tasks.h"
 
 #include <algorithm>
+#include <utility>
 
 #include "common/base/check.h"
 
@@ -26,6 +27,10 @@ bool JobTasks::apply(TaskIndex task, TaskEvent event) {
   // Leave the old status, enter the new one.
   if (r.status == TaskStatus::ready) ready_.erase(task);
   if (r.status == TaskStatus::leased) --progress_.tasks_leased;
+  if (r.status == TaskStatus::done) {
+    --progress_.tasks_done;
+    ++progress_.tasks_open;
+  }
   r.status = *next;
   switch (*next) {
     case TaskStatus::blocked:
@@ -68,18 +73,8 @@ std::uint32_t JobTasks::grant(TaskIndex task) {
 }
 
 void JobTasks::complete(TaskIndex task, const Completion& completion, BlobReferences& blobs) {
-  BATON_CHECK(apply(task, TaskEvent::completed));
-
-  // Keep what was made. Images are files of the output folder, not blobs of the store.
-  record(task).outputs = completion.outputs;
-  progress_.stats.merge(completion.stats);
-  for (const FrameStats& frame : completion.frames) {
-    progress_.frames[frame.frame].merge(frame.sampling);
-  }
-  for (const BlobRef& output : completion.outputs) {
-    count_output(output);
-    for (std::int32_t use = num_uses(task, output); use > 0; --use) blobs.add(output.digest);
-  }
+  force_done(task, completion);
+  add_outputs(task, blobs);
 
   // What this task needed may go; what needed this task comes closer.
   release_inputs(task, blobs);
@@ -88,7 +83,97 @@ void JobTasks::complete(TaskIndex task, const Completion& completion, BlobRefere
   }
 }
 
-void JobTasks::give_back(TaskIndex task) { BATON_CHECK(apply(task, TaskEvent::returned)); }
+/// Brings a task to done, along the legal way, and keeps what it made.
+void JobTasks::force_done(TaskIndex task, const Completion& completion) {
+  apply(task, TaskEvent::inputs_done);
+  apply(task, TaskEvent::granted);
+  BATON_CHECK(apply(task, TaskEvent::completed));
+  record(task).outputs = completion.outputs;
+  const bool again = former_outputs_.contains(task);
+  if (!again) progress_.stats.merge(completion.stats);
+  for (const FrameStats& frame : completion.frames) {
+    if (!again) progress_.frames[frame.frame].merge(frame.sampling);
+  }
+  for (const BlobRef& output : completion.outputs) count_output(output, true);
+}
+
+void JobTasks::restore(const std::vector<Completion>& completions, BlobReferences& blobs) {
+  // First all statuses: who needs what follows from them.
+  std::vector<TaskIndex> done;
+  for (Completion completion : completions) {
+    const std::optional<TaskIndex> task = graph_.find(completion.task);
+    if (!task || status(*task) == TaskStatus::done) continue;
+    if (graph_.check_outputs(completion.task, completion.outputs)) continue;
+    force_done(*task, completion);
+    done.push_back(*task);
+  }
+  for (const TaskIndex task : done) {
+    for (const TaskIndex dependent : graph_.dependents(graph_.key(task)))
+      --record(dependent).missing_inputs;
+  }
+  for (TaskIndex task = 0; task < graph_.num_tasks(); ++task) {
+    if (record(task).missing_inputs == 0) apply(task, TaskEvent::inputs_done);
+  }
+  for (const TaskIndex task : done) add_outputs(task, blobs);
+}
+
+void JobTasks::give_back(TaskIndex task) {
+  BATON_CHECK(apply(task, TaskEvent::returned));
+  if (record(task).missing_inputs > 0) apply(task, TaskEvent::input_lost);
+}
+
+std::vector<TaskIndex> JobTasks::reopen(TaskIndex task, BlobReferences& blobs) {
+  std::vector<TaskIndex> reopened;
+  std::vector<TaskIndex> lost{task};
+  while (!lost.empty()) {
+    const TaskIndex next = lost.back();
+    lost.pop_back();
+    if (status(next) != TaskStatus::done) continue;  // reached before, on another way
+
+    // Forget what it made; who waits for that waits longer.
+    release_outputs(next, blobs);
+    for (const BlobRef& output : outputs(next)) count_output(output, false);
+    former_outputs_[next] = std::exchange(record(next).outputs, {});
+    BATON_CHECK(apply(next, TaskEvent::output_lost));
+    reopened.push_back(next);
+    for (const TaskIndex dependent : graph_.dependents(graph_.key(next))) {
+      ++record(dependent).missing_inputs;
+      apply(dependent, TaskEvent::input_lost);
+    }
+
+    // It needs its inputs again: what nobody kept must be made again, too.
+    const std::vector<TaskIndex> gone = ask_inputs_again(next, blobs);
+    lost.insert(lost.end(), gone.begin(), gone.end());
+  }
+  for (const TaskIndex again : reopened) {
+    if (record(again).missing_inputs == 0) apply(again, TaskEvent::inputs_done);
+  }
+  return reopened;
+}
+
+/// A task that is open again takes its part in the blobs of its inputs. Returns the inputs that are
+/// done, but have lost a blob that it takes.
+std::vector<TaskIndex> JobTasks::ask_inputs_again(TaskIndex task, BlobReferences& blobs) const {
+  std::vector<TaskIndex> gone;
+  const TaskKey key = graph_.key(task);
+  for (const TaskIndex input : graph_.inputs(key)) {
+    if (status(input) != TaskStatus::done) continue;
+    bool is_there = true;
+    for (const std::size_t position : graph_.taken_outputs(key, graph_.key(input))) {
+      const Digest& blob = outputs(input).at(position).digest;
+      is_there = is_there && blobs.contains(blob);
+      blobs.add(blob);
+    }
+    if (!is_there) gone.push_back(input);
+  }
+  return gone;
+}
+
+const std::vector<BlobRef>& JobTasks::former_outputs(TaskIndex task) const {
+  static const std::vector<BlobRef> kNone;
+  const auto found = former_outputs_.find(task);
+  return found == former_outputs_.end() ? kNone : found->second;
+}
 
 void JobTasks::give_up(TaskIndex task) {
   BATON_CHECK(apply(task, TaskEvent::exhausted));
@@ -145,19 +230,13 @@ bool JobTasks::has_failed(TaskIndex task, const LeaseId& lease) const {
 }
 
 void JobTasks::release_all(BlobReferences& blobs) {
-  for (TaskIndex task = 0; task < graph_.num_tasks(); ++task) {
-    for (const BlobRef& output : outputs(task)) {
-      for (std::int32_t use = num_uses(task, output); use > 0; --use) blobs.release(output.digest);
-    }
-  }
+  for (TaskIndex task = 0; task < graph_.num_tasks(); ++task) release_outputs(task, blobs);
 }
 
-std::vector<Digest> JobTasks::live_blobs() const {
-  std::vector<Digest> live;
-  for (TaskIndex task = 0; task < graph_.num_tasks(); ++task) {
-    for (const BlobRef& output : outputs(task)) {
-      if (num_uses(task, output) > 0) live.push_back(output.digest);
-    }
+std::vector<BlobRef> JobTasks::live_blobs(TaskIndex task) const {
+  std::vector<BlobRef> live;
+  for (const BlobRef& output : outputs(task)) {
+    if (num_uses(task, output) > 0) live.push_back(output);
   }
   return live;
 }
@@ -178,16 +257,40 @@ std::int32_t JobTasks::num_uses(TaskIndex task, const BlobRef& output) const {
   return uses + (kept ? 1 : 0);
 }
 
-void JobTasks::count_output(const BlobRef& output) {
-  if (output.kind == BlobKind::image) ++progress_.frames_done;
+/// made: whether it is there now, or there no longer. (Unsigned sums wrap to what they were.)
+void JobTasks::count_output(const BlobRef& output, bool made) {
+  const std::uint64_t sign = made ? 1 : ~std::uint64_t{0};
+  if (output.kind == BlobKind::image) progress_.frames_done += made ? 1u : ~0u;
   if (output.kind == BlobKind::state) {
-    progress_.state_bytes += output.size_bytes;
-    progress_.state_pixels += graph_.num_pixels(output.tile);
+    progress_.state_bytes += sign * output.size_bytes;
+    progress_.state_pixels += sign * graph_.num_pixels(output.tile);
   }
 }
 
-void JobTasks::release_inputs(TaskIndex task, BlobReferences& blobs) {
-  for (const BlobRef& input : inputs(task)) blobs.release(input.digest);
+/// Counts everybody's need of what a done task made. Images are files of the output folder, not
+/// blobs of the store.
+void JobTasks::add_outputs(TaskIndex task, BlobReferences& blobs) const {
+  for (const BlobRef& output : outputs(task)) {
+    const std::int32_t uses = num_uses(task, output);
+    for (std::int32_t use = 0; use < uses; ++use) blobs.add(output.digest);
+    if (uses == 0 && output.kind != BlobKind::image) blobs.discard(output.digest);
+  }
+}
+
+void JobTasks::release_outputs(TaskIndex task, BlobReferences& blobs) const {
+  for (const BlobRef& output : outputs(task)) {
+    for (std::int32_t use = num_uses(task, output); use > 0; --use) blobs.release(output.digest);
+  }
+}
+
+/// Of inputs that were opened again meanwhile nothing is left to release.
+void JobTasks::release_inputs(TaskIndex task, BlobReferences& blobs) const {
+  const TaskKey key = graph_.key(task);
+  for (const TaskIndex input : graph_.inputs(key)) {
+    if (status(input) != TaskStatus::done) continue;
+    for (const std::size_t position : graph_.taken_outputs(key, graph_.key(input)))
+      blobs.release(outputs(input).at(position).digest);
+  }
 }
 
 }  // namespace baton

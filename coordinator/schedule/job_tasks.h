@@ -41,13 +41,22 @@ class JobTasks {
   /// The blobs that the task needs, all of them there: see LeaseGrant in PROTOCOL.md.
   std::vector<BlobRef> inputs(TaskIndex task) const;
 
+  /// Takes up what an earlier coordinator recorded as done, in any order; of a fresh job only.
+  /// Completions that are none of the job's are left out.
+  void restore(const std::vector<Completion>& completions, BlobReferences& blobs);
+
   /// Leases a ready task. Returns the number of the attempt, from 1.
   std::uint32_t grant(TaskIndex task);
   /// Ends a leased task: its outputs must be complete and sorted (JobGraph::check_outputs).
   /// Releases its dependents, and the blobs that nobody needs any more.
   void complete(TaskIndex task, const Completion& completion, BlobReferences& blobs);
-  /// Makes a leased task ready again.
+  /// Opens a leased task again: ready, or blocked when an input was lost meanwhile.
   void give_back(TaskIndex task);
+  /// What a done task made is gone: it is done again, and so is whatever it needs and nobody kept,
+  /// as far back as that goes. Returns those tasks; none where the task is not done.
+  std::vector<TaskIndex> reopen(TaskIndex task, BlobReferences& blobs);
+  /// What the task made when it was done before it was opened again; sorted, or empty.
+  const std::vector<BlobRef>& former_outputs(TaskIndex task) const;
   /// Ends a leased task for good, and cancels what cannot be done without it.
   void give_up(TaskIndex task);
   /// Cancels whatever is open.
@@ -65,13 +74,13 @@ class JobTasks {
 
   /// Forgets every blob, of a job that is to be replaced.
   void release_all(BlobReferences& blobs);
-  /// The blobs of the store that the job still needs.
-  std::vector<Digest> live_blobs() const;
+  /// The blobs of the store that are still needed of what the task made.
+  std::vector<BlobRef> live_blobs(TaskIndex task) const;
 
  private:
   struct Record {
     TaskStatus status = TaskStatus::blocked;
-    std::int32_t missing_inputs = 0;
+    std::int32_t missing_inputs = 0;  ///< input tasks that are not done, whatever its own status
     std::uint32_t attempts = 0;
     std::int32_t losses = 0;
     std::vector<BlobRef> outputs;
@@ -85,14 +94,19 @@ class JobTasks {
   const Record& record(TaskIndex task) const { return records_[static_cast<std::size_t>(task)]; }
   bool apply(TaskIndex task, TaskEvent event);
   std::int32_t num_uses(TaskIndex task, const BlobRef& output) const;
-  void count_output(const BlobRef& output);
-  void release_inputs(TaskIndex task, BlobReferences& blobs);
+  void count_output(const BlobRef& output, bool made);
+  void force_done(TaskIndex task, const Completion& completion);
+  void add_outputs(TaskIndex task, BlobReferences& blobs) const;
+  void release_outputs(TaskIndex task, BlobReferences& blobs) const;
+  void release_inputs(TaskIndex task, BlobReferences& blobs) const;
+  std::vector<TaskIndex> ask_inputs_again(TaskIndex task, BlobReferences& blobs) const;
 
   JobGraph graph_;
   bool keep_all_states_;
   std::vector<Record> records_;
   std::set<TaskIndex> ready_;
   std::map<TaskIndex, std::vector<FailedAttempt>> failures_;
+  std::map<TaskIndex, std::vector<BlobRef>> former_outputs_;
   std::map<std::string, std::int32_t> failures_of_worker_;
   JobProgress progress_;
 };

@@ -72,7 +72,7 @@ void Scheduler::on(const JobAdded& event, TimePoint, Actions& actions) {
   // Take up what the journal knows; all else is fresh.
   Job& job = jobs_.emplace(event.job, Job{event.spec, event.status, sequence, JobTasks(event.spec)})
                  .first->second;
-  replay(job, event);
+  replay(job, event, actions);
   if (!is_open(event.status)) {
     job.tasks.cancel_open();
     return;
@@ -100,6 +100,7 @@ void Scheduler::on(const JobResumed& event, TimePoint, Actions& actions) {
   if (!job || job->status != JobStatus::paused) return;
   job->status = JobStatus::running;
   running_.emplace(rank(*job), event.job);
+  reopen(event.job, *job, event.lost, actions);
   actions.push_back(RecordJobStatus{event.job, job->status, "resumed"});
 }
 
@@ -129,6 +130,10 @@ void Scheduler::on(const TaskCompleted& event, TimePoint now, Actions& actions) 
     fail_attempt(held, {event.lease, event.worker, *fault, false}, actions);
     return;
   }
+  // What was done before must come out alike.
+  const std::vector<BlobRef>& former = held.job->tasks.former_outputs(held.task);
+  const auto [f, o] = std::mismatch(former.begin(), former.end(), outputs.begin());
+  if (f != former.end()) actions.push_back(ReportConflict{event.lease, event.worker, *f, *o});
   Completion completion{event.lease.task, std::move(outputs), event.stats, event.frames};
   held.job->tasks.complete(held.task, completion, blobs_);
   drop_lease(event.lease.job, held.task);
@@ -149,6 +154,23 @@ void Scheduler::on(const ResultMissing& event, TimePoint now, Actions& actions) 
   if (held.job) lose_lease(event.lease.job, held.task, actions);
 }
 
+void Scheduler::on(const InputsLost& event, TimePoint now, Actions& actions) {
+  if (!touch(event.worker, now)) return;
+  const Held held = hold(event.worker, event.lease, now);
+  if (!held.job) return;
+  const JobTasks& tasks = held.job->tasks;
+  std::vector<TaskKey> makers;
+  for (const TaskIndex input : tasks.graph().inputs(event.lease.task)) {
+    const std::vector<BlobRef>& made = tasks.outputs(input);
+    const bool lost = std::any_of(made.begin(), made.end(), [&](const BlobRef& output) {
+      return std::find(event.inputs.begin(), event.inputs.end(), output) != event.inputs.end();
+    });
+    if (lost) makers.push_back(tasks.graph().key(input));
+  }
+  lose_lease(event.lease.job, held.task, actions);
+  if (is_open(held.job->status)) reopen(event.lease.job, *held.job, makers, actions);
+}
+
 // ---- jobs ---------------------------------------------------------------------------------------
 
 Scheduler::Job* Scheduler::find(const Digest& job) {
@@ -158,16 +180,10 @@ Scheduler::Job* Scheduler::find(const Digest& job) {
 
 Scheduler::Rank Scheduler::rank(const Job& job) const { return {-job.spec.priority, job.sequence}; }
 
-/// Brings a fresh job to where the journal left it, along the same path as the first time.
-void Scheduler::replay(Job& job, const JobAdded& event) {
-  for (const Completion& completion : event.completions) {
-    const auto task = job.tasks.graph().find(completion.task);
-    Completion sorted = completion;
-    if (!task || !job.tasks.ready().contains(*task)) continue;
-    if (job.tasks.graph().check_outputs(completion.task, sorted.outputs)) continue;
-    job.tasks.grant(*task);
-    job.tasks.complete(*task, sorted, blobs_);
-  }
+/// Brings a fresh job to where the journal left it, less what is gone.
+void Scheduler::replay(Job& job, const JobAdded& event, Actions& actions) {
+  job.tasks.restore(event.completions, blobs_);
+  reopen(event.job, job, event.lost, actions);
   for (const Failure& failure : event.failures) {
     const auto task = job.tasks.graph().find(failure.lease.task);
     if (!task) continue;
@@ -178,6 +194,19 @@ void Scheduler::replay(Job& job, const JobAdded& event) {
       job.tasks.give_up(*task);
     }
   }
+}
+
+/// Opens done tasks again whose outputs are gone, and what they need.
+void Scheduler::reopen(const Digest& digest, Job& job, const std::vector<TaskKey>& tasks,
+                       Actions& actions) {
+  RecordReopened record{digest, {}};
+  for (const TaskKey& key : tasks) {
+    const std::optional<TaskIndex> task = job.tasks.graph().find(key);
+    if (!task) continue;
+    for (const TaskIndex again : job.tasks.reopen(*task, blobs_))
+      record.tasks.push_back(job.tasks.graph().key(again));
+  }
+  if (!record.tasks.empty()) actions.push_back(std::move(record));
 }
 
 void Scheduler::fail_attempt(const Held& held, const Failure& failure, Actions& actions) {

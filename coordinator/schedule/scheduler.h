@@ -80,6 +80,7 @@ class Scheduler {
   void on(const TaskCompleted& event, TimePoint now, Actions& actions);
   void on(const AttemptFailed& event, TimePoint now, Actions& actions);
   void on(const ResultMissing& event, TimePoint now, Actions& actions);
+  void on(const InputsLost& event, TimePoint now, Actions& actions);
   void on(const ClockTicked& event, TimePoint now, Actions& actions);
 
   // Leases (scheduler_leases.cpp).
@@ -100,7 +101,8 @@ class Scheduler {
   // Jobs (scheduler.cpp).
   Job* find(const Digest& job);
   Rank rank(const Job& job) const;
-  void replay(Job& job, const JobAdded& event);
+  void replay(Job& job, const JobAdded& event, Actions& actions);
+  void reopen(const Digest& digest, Job& job, const std::vector<TaskKey>& tasks, Actions& actions);
   void fail_attempt(const Held& held, const Failure& failure, Actions& actions);
   void give_up(const Digest& digest, Job& job, TaskIndex task, const std::string& reason,
                Actions& actions);

@@ -125,10 +125,10 @@ void Scheduler::lose_lease(const Digest& digest, TaskIndex task, Actions& action
     job.tasks.give_back(task);
   } else {
     const Lease lease = leases_.at({digest, task});
-    fail_attempt(
-        {&job, task},
-        {lease.id, lease.worker, fmt::format("its workers or results were lost {} times", losses), true},
-        actions);
+    fail_attempt({&job, task},
+                 {lease.id, lease.worker,
+                  fmt::format("its workers or results were lost {} times", losses), true},
+                 actions);
   }
 }
 

@@ -10,6 +10,7 @@ std::optional<TaskStatus> next_status(TaskStatus status, TaskEvent event) {
       return std::nullopt;
     case TaskStatus::ready:
       if (event == TaskEvent::granted) return TaskStatus::leased;
+      if (event == TaskEvent::input_lost) return TaskStatus::blocked;
       if (event == TaskEvent::cancelled) return TaskStatus::cancelled;
       return std::nullopt;
     case TaskStatus::leased:
@@ -19,6 +20,8 @@ std::optional<TaskStatus> next_status(TaskStatus status, TaskEvent event) {
       if (event == TaskEvent::cancelled) return TaskStatus::cancelled;
       return std::nullopt;
     case TaskStatus::done:
+      if (event == TaskEvent::output_lost) return TaskStatus::blocked;
+      return std::nullopt;
     case TaskStatus::failed:
     case TaskStatus::cancelled:
       return std::nullopt;

@@ -18,17 +18,20 @@ enum class TaskStatus : std::uint8_t {
 /// What can happen to a task.
 enum class TaskEvent : std::uint8_t {
   inputs_done,  ///< the last of its inputs is there
+  input_lost,   ///< an input that was there is gone
   granted,      ///< leased to a worker
   completed,    ///< the leased attempt reported all outputs
   returned,     ///< the leased attempt failed or was lost; another one may follow
   exhausted,    ///< the leased attempt failed or was lost, and it was the last one
+  output_lost,  ///< what it made is gone and needed again
   cancelled,
 };
 
 /// The only rule by which a status changes:
 ///
-///     blocked -> ready -> leased -> done
-///                  ^---------+----> failed        and from the first three: -> cancelled
+///        ^-----------------------------+
+///     blocked <-> ready -> leased -> done
+///                   ^---------+----> failed        and from the first three: -> cancelled
 ///
 /// nullopt: the event comes too late or too early and changes nothing. That is normal, not an
 /// error.

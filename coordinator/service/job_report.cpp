@@ -81,25 +81,44 @@ Result<Digest> resolve_job(const Scheduler& scheduler, const std::string& prefix
                                                        prefix, matches.size())};
 }
 
-std::optional<std::string> find_missing_file(const JobAdded& job, const BlobStore& store) {
+LostFiles find_lost_files(const JobAdded& job, const BlobStore& store) {
   // A scheduler that knows only this job tells what is recorded as done, and which blobs that
   // leaves.
   Scheduler trial(0, std::chrono::milliseconds(0));
   trial.step(job, {});
-  const Scheduler::Job& recorded = *trial.find_job(job.job);
-  for (const Digest& blob : recorded.tasks.live_blobs()) {
-    if (!store.contains(blob)) return store.path(blob).string();
-  }
-  for (TaskIndex frame = 0; frame < recorded.tasks.graph().num_frames(); ++frame) {
-    if (recorded.tasks.status(frame) != TaskStatus::done) continue;
-    const int number = job.spec.frames[static_cast<std::size_t>(frame)];
-    const fs::path path =
-        fs::path(job.spec.output.directory) / frame_file_name(job.spec.output.pattern, number);
+  const JobTasks& recorded = trial.find_job(job.job)->tasks;
+  const JobGraph& graph = recorded.graph();
+  LostFiles lost;
+  const auto look = [&](TaskIndex task, const fs::path& path, std::uint64_t size_bytes) {
     std::error_code error;
     const std::uintmax_t size = fs::file_size(path, error);
-    if (error || size != recorded.tasks.outputs(frame).front().size_bytes) return path.string();
+    if (!error && size == size_bytes) return true;
+    if (error && error != std::errc::no_such_file_or_directory) {
+      if (!lost.unreadable) lost.unreadable = fmt::format("{}: {}", path.string(), error.message());
+      return true;
+    }
+    if (lost.tasks.empty()) lost.first = path.string();
+    lost.tasks.push_back(graph.key(task));
+    return false;
+  };
+
+  for (TaskIndex task = graph.num_frames(); task < graph.num_tasks(); ++task) {
+    for (const BlobRef& blob : recorded.live_blobs(task)) {
+      if (!look(task, store.path(blob.digest), blob.size_bytes)) break;
+    }
   }
-  return std::nullopt;
+  for (TaskIndex frame = 0; frame < graph.num_frames(); ++frame) {
+    if (recorded.status(frame) != TaskStatus::done) continue;
+    look(frame, frame_path(job.spec, frame), recorded.outputs(frame).front().size_bytes);
+  }
+
+  // A folder that is not there is not mounted rather than empty.
+  std::error_code error;
+  const fs::path& folder = job.spec.output.directory;
+  const bool any_frame = trial.find_job(job.job)->tasks.progress().frames_done > 0;
+  if (any_frame && !fs::is_directory(folder, error) && !lost.unreadable)
+    lost.unreadable = fmt::format("{}: the output folder is not there", folder.string());
+  return lost;
 }
 
 }  // namespace baton

@@ -19,8 +19,13 @@ JobDetail describe_job(const Digest& digest, const Scheduler::Job& job,
 /// The one job whose digest starts with the hexadecimal `prefix`. Errors: none, or more than one.
 Result<Digest> resolve_job(const Scheduler& scheduler, const std::string& prefix);
 
-/// The first file that the job's recorded completions promise and that is not there: a blob that is
-/// still needed, or a finished frame. nullopt: everything is in its place.
-std::optional<std::string> find_missing_file(const JobAdded& job, const BlobStore& store);
+/// What is not there of the files that a job's recorded completions promise: blobs that are still
+/// needed, and finished frames. Sizes are compared, contents are not read.
+struct LostFiles {
+  std::vector<TaskKey> tasks;             ///< that made them
+  std::string first;                      ///< one of the files
+  std::optional<std::string> unreadable;  ///< why it cannot be told now, of a file or folder
+};
+LostFiles find_lost_files(const JobAdded& job, const BlobStore& store);
 
 }  // namespace baton

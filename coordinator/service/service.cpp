@@ -49,7 +49,11 @@ Service::Service(const ServiceOptions& options, Router router, Journal journal, 
 
 Status Service::run(const std::atomic<bool>& stop) {
   while (!stop && !stop_requested_) BATON_TRY(turn());
-  for (const PeerId& worker : peers_.connections()) router_.send(worker, Shutdown{});
+  // Who is told to stop the farm sends the workers home; who is merely ended, by a signal, will be
+  // started again, and the workers wait for that.
+  if (stop_requested_) {
+    for (const PeerId& worker : peers_.connections()) router_.send(worker, Shutdown{});
+  }
   return {};
 }
 
@@ -165,7 +169,16 @@ Status Service::receive_from(const std::string& worker, const Heartbeat& message
 }
 
 Status Service::receive_from(const std::string& worker, const TaskDone& message) {
-  // Accepted results must be there: a blob may have gone between publishing and reporting.
+  // Accepted results must be there: a blob may have gone between publishing and reporting. A frame
+  // that is not where it belongs is on a disk that only the worker sees.
+  if (const auto missing = find_missing_frame(message)) {
+    return step(AttemptFailed{
+        worker, message.lease,
+        fmt::format("{}: reported, but not there as the coordinator sees it: is the output folder "
+                    "mounted where the worker runs?",
+                    *missing),
+        false});
+  }
   if (const auto missing = find_missing_blob(message)) {
     spdlog::warn("worker {}: {}: reported, but not there; the task is done again", worker,
                  *missing);
@@ -175,6 +188,15 @@ Status Service::receive_from(const std::string& worker, const TaskDone& message)
 }
 
 Status Service::receive_from(const std::string& worker, const TaskFailed& message) {
+  // Inputs that are gone or damaged are nobody's fault: what made them is done again.
+  const std::vector<BlobRef> bad = find_bad_inputs(message.lease);
+  for (const BlobRef& input : bad) {
+    spdlog::warn("job {}: {} is gone or damaged and is made again", message.lease.job.short_hex(),
+                 store_.path(input.digest).string());
+    if (const Status removed = store_.remove(input.digest); !removed)
+      spdlog::warn("{}", removed.error().message);
+  }
+  if (!bad.empty()) return step(InputsLost{worker, message.lease, bad});
   return step(AttemptFailed{worker, message.lease,
                             message.message.substr(0, limits::kMaxTextLength), message.permanent});
 }
@@ -185,16 +207,44 @@ Status Service::receive_from(const std::string& worker, const WorkerGoodbye&) {
   return step(WorkerLeft{worker});
 }
 
+/// The job of a task that is not done; null: there is none.
+const Scheduler::Job* Service::job_of_open_task(const LeaseId& lease) const {
+  const Scheduler::Job* job = scheduler_.find_job(lease.job);
+  const auto task = job ? job->tasks.graph().find(lease.task) : std::nullopt;
+  return task && job->tasks.status(*task) != TaskStatus::done ? job : nullptr;
+}
+
 std::optional<std::string> Service::find_missing_blob(const TaskDone& report) const {
   // Of a task that was done before the blobs may have served their purpose.
-  const Scheduler::Job* job = scheduler_.find_job(report.lease.job);
-  const auto task = job ? job->tasks.graph().find(report.lease.task) : std::nullopt;
-  if (!task || job->tasks.status(*task) == TaskStatus::done) return std::nullopt;
+  if (job_of_open_task(report.lease) == nullptr) return std::nullopt;
   for (const BlobRef& output : report.outputs) {
     if (output.kind != BlobKind::image && !store_.contains(output.digest))
       return store_.path(output.digest).string();
   }
   return std::nullopt;
+}
+
+std::optional<std::string> Service::find_missing_frame(const TaskDone& report) const {
+  const Scheduler::Job* job = job_of_open_task(report.lease);
+  if (job == nullptr || report.lease.task.kind != TaskKind::assemble) return std::nullopt;
+  const fs::path path = frame_path(job->spec, report.lease.task.step);
+  for (const BlobRef& output : report.outputs) {
+    std::error_code error;
+    if (fs::file_size(path, error) != output.size_bytes || error) return path.string();
+  }
+  return std::nullopt;
+}
+
+std::vector<BlobRef> Service::find_bad_inputs(const LeaseId& lease) const {
+  std::vector<BlobRef> bad;
+  const Scheduler::Job* job = job_of_open_task(lease);
+  if (job == nullptr) return bad;
+  const auto task = job->tasks.graph().find(lease.task);
+  if (job->tasks.status(*task) != TaskStatus::leased) return bad;
+  for (const BlobRef& input : job->tasks.inputs(*task)) {
+    if (store_.is_bad(input.digest)) bad.push_back(input);
+  }
+  return bad;
 }
 
 // ---- actions ------------------------------------------------------------------------------------
@@ -208,6 +258,12 @@ Status Service::perform(const RecordFailure& action) {
   spdlog::warn("job {}: attempt {} on {} failed: {}", failure.lease.job.short_hex(),
                failure.lease.attempt, failure.worker, failure.message);
   return journal_.record_failure(failure);
+}
+
+Status Service::perform(const RecordReopened& action) {
+  spdlog::warn("job {}: {} finished tasks are done again, since something of them is gone",
+               action.job.short_hex(), action.tasks.size());
+  return journal_.record_reopened(action.job, action.tasks);
 }
 
 Status Service::perform(const RecordJobStatus& action) {

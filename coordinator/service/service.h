@@ -10,6 +10,7 @@
 #include "common/store/blob_store.h"
 #include "coordinator/journal/journal.h"
 #include "coordinator/schedule/scheduler.h"
+#include "coordinator/service/job_report.h"
 #include "coordinator/service/peers.h"
 
 namespace baton {
@@ -27,15 +28,16 @@ struct ServiceOptions {
 /// it is durable.
 class Service {
  public:
-  /// Takes up the jobs of the journal. A running job of which a file is missing starts afresh.
+  /// Takes up the jobs of the journal. What is missing of a running job is made again; where that
+  /// cannot be told now, the job is paused.
   /// Errors: the work folder, the journal (in use, damaged, newer), the address.
   static Result<Service> open(const ServiceOptions& options);
 
   /// The concrete endpoint: with the port that was picked.
   const std::string& endpoint() const { return router_.endpoint(); }
 
-  /// Works until `stop` or a StopCoordinator, then tells the workers to end. An error (of the
-  /// journal) means that nothing can be promised any more: everything committed is safe, start
+  /// Works until `stop`, or a StopCoordinator, which also tells the workers to end. An error (of
+  /// the journal) means that nothing can be promised any more: everything committed is safe, start
   /// again.
   Status run(const std::atomic<bool>& stop);
 
@@ -68,6 +70,8 @@ class Service {
   Status receive(const PeerId& peer, const DrainWorker& message);
   Status receive(const PeerId& peer, const StopCoordinator& message);
   Status start_again(JobAdded event, JobStatus status, bool& already_there);
+  Result<LostFiles> lost_files_of(const Digest& job);
+  static void tell_lost(const Digest& job, const LostFiles& lost);
   template <class E>
   Status change_job(const PeerId& peer, const std::string& prefix);
   Status answer_detail(const PeerId& peer, const Digest& job);
@@ -75,6 +79,7 @@ class Service {
   // Actions of the scheduler.
   Status perform(const RecordCompletion& action);
   Status perform(const RecordFailure& action);
+  Status perform(const RecordReopened& action);
   Status perform(const RecordJobStatus& action);
   Status perform(const GrantLease& action);
   Status perform(const RevokeLease& action);
@@ -87,7 +92,10 @@ class Service {
   void reply(const PeerId& peer, Message message);
   void reply_to(const std::string& worker, Message message);
   void refuse(const PeerId& peer, const Error& error);
+  const Scheduler::Job* job_of_open_task(const LeaseId& lease) const;
   std::optional<std::string> find_missing_blob(const TaskDone& report) const;
+  std::optional<std::string> find_missing_frame(const TaskDone& report) const;
+  std::vector<BlobRef> find_bad_inputs(const LeaseId& lease) const;
 
   ServiceOptions options_;
   std::filesystem::path store_directory_;

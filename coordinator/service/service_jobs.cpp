@@ -37,13 +37,17 @@ Status Service::restore_job(const Digest& digest) {
                  std::move(known.failures)};
 
   // A running job needs every file that it counts on; a job that has ended needs none until it is
-  // submitted again.
+  // submitted again. What cannot be looked at now is not gone: the job waits to be resumed.
   if (is_open(event.status)) {
-    if (const auto missing = find_missing_file(event, store_)) {
-      spdlog::warn("job {} starts afresh: {} is gone or damaged", digest.short_hex(), *missing);
-      BATON_TRY(journal_.restart_job(digest, /*fresh=*/true));
-      event.completions.clear();
-      event.failures.clear();
+    LostFiles lost = find_lost_files(event, store_);
+    if (lost.unreadable) {
+      spdlog::error("job {} is paused, resume it when that is mended: {}", digest.short_hex(),
+                    *lost.unreadable);
+      event.status = JobStatus::paused;
+      BATON_TRY(journal_.record_status(digest, event.status));
+    } else {
+      tell_lost(digest, lost);
+      event.lost = std::move(lost.tasks);
     }
   }
   BATON_TRY(step(event));
@@ -101,25 +105,33 @@ Status Service::receive(const PeerId& peer, const SubmitJob& message) {
   return {};
 }
 
-/// A job that is known already: goes on where it stopped, or starts afresh when a file of it is
-/// gone or has another size.
+void Service::tell_lost(const Digest& job, const LostFiles& lost) {
+  if (lost.tasks.empty()) return;
+  spdlog::warn("job {}: {} is gone or has another size{}", job.short_hex(), lost.first,
+               lost.tasks.size() > 1
+                   ? fmt::format(", and something of {} more tasks", lost.tasks.size() - 1)
+                   : "");
+}
+
+/// A job that is known already: goes on where it stopped, and makes again what is gone. Who submits
+/// it wants it as it now is: a folder that is not there is empty.
 Status Service::start_again(JobAdded event, JobStatus status, bool& already_there) {
   already_there = true;
-  if (status == JobStatus::paused) return step(JobResumed{event.job});
   if (status == JobStatus::running) return {};
+  BATON_ASSIGN(LostFiles lost, lost_files_of(event.job));
+  if (status == JobStatus::paused) {
+    tell_lost(event.job, lost);
+    return step(JobResumed{event.job, std::move(lost.tasks)});
+  }
   BATON_ASSIGN(JournalledJob known, journal_.load(event.job));
   event.completions = std::move(known.completions);
-  const std::optional<std::string> missing = find_missing_file(event, store_);
-  if (!missing && status == JobStatus::done) return {};
+  if (lost.tasks.empty() && status == JobStatus::done) return {};
 
   already_there = false;
-  if (missing) {
-    spdlog::info("job {} starts afresh: {} is gone or damaged", event.job.short_hex(), *missing);
-    event.completions.clear();
-  } else {
-    spdlog::info("job {} goes on", event.job.short_hex());
-  }
-  BATON_TRY(journal_.restart_job(event.job, missing.has_value()));
+  spdlog::info("job {} goes on", event.job.short_hex());
+  tell_lost(event.job, lost);
+  event.lost = std::move(lost.tasks);
+  BATON_TRY(journal_.restart_job(event.job));
   return step(event);
 }
 
@@ -151,7 +163,30 @@ Status Service::receive(const PeerId& peer, const PauseJob& message) {
 }
 
 Status Service::receive(const PeerId& peer, const ResumeJob& message) {
-  return change_job<JobResumed>(peer, message.job);
+  const Result<Digest> job = resolve_job(scheduler_, message.job);
+  if (!job) {
+    refuse(peer, job.error());
+    return {};
+  }
+  if (scheduler_.find_job(*job)->status == JobStatus::paused) {
+    BATON_ASSIGN(LostFiles lost, lost_files_of(*job));
+    if (lost.unreadable) {
+      refuse(peer, {ErrorKind::io,
+                    fmt::format("job {} stays paused: {}", job->short_hex(), *lost.unreadable)});
+      return {};
+    }
+    tell_lost(*job, lost);
+    BATON_TRY(step(JobResumed{*job, std::move(lost.tasks)}));
+  }
+  return answer_detail(peer, *job);
+}
+
+/// Of a job that the scheduler knows.
+Result<LostFiles> Service::lost_files_of(const Digest& job) {
+  BATON_ASSIGN(JournalledJob known, journal_.load(job));
+  return find_lost_files(
+      {job, scheduler_.find_job(job)->spec, JobStatus::running, std::move(known.completions), {}},
+      store_);
 }
 
 Status Service::receive(const PeerId& peer, const DrainWorker& message) {

@@ -94,11 +94,6 @@ Status paste_tile(const FilmTile& tile, FilmTile& image) {
   return {};
 }
 
-std::filesystem::path frame_path(const JobSpec& job, std::int32_t frame_index) {
-  const int number = job.frames.at(static_cast<std::size_t>(frame_index));
-  return std::filesystem::path(job.output.directory) / frame_file_name(job.output.pattern, number);
-}
-
 ImageMetadata frame_metadata(const JobSpec& job, const Digest& job_digest, int frame_number) {
   ImageMetadata metadata{
       {"baton:version", kVersion},

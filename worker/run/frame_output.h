@@ -20,9 +20,6 @@ FilmTile blank_image(const ImageSpec& spec, std::vector<std::string> channels);
 /// image.
 Status paste_tile(const FilmTile& tile, FilmTile& image);
 
-/// Where frame `frame_index` (0-based) of the job is written.
-std::filesystem::path frame_path(const JobSpec& job, std::int32_t frame_index);
-
 /// Rows of a frame that are compared with its film after it was written: one block of compression.
 inline constexpr int kRowsVerified = 16;
 

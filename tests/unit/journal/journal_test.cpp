@@ -100,21 +100,44 @@ TEST_F(JournalTest, AKilledProcessLosesExactlyWhatItDidNotCommit) {
   EXPECT_EQ(open().load(kJob).value().completions.size(), 1u);
 }
 
-TEST_F(JournalTest, ARestartedJobForgetsItsFailuresAndIfFreshItsWork) {
+TEST_F(JournalTest, ARestartedJobForgetsItsFailuresAndKeepsItsWork) {
   Journal journal = open();
   ASSERT_TRUE(journal.add_job(kJob, "{}").ok());
   ASSERT_TRUE(journal.record_completion(kJob, completion(0)).ok());
   ASSERT_TRUE(journal.record_failure({{kJob, {}, 1, 1}, "w", "boom", false}).ok());
   ASSERT_TRUE(journal.record_status(kJob, JobStatus::cancelled).ok());
 
-  ASSERT_TRUE(journal.restart_job(kJob, /*fresh=*/false).ok());
+  ASSERT_TRUE(journal.restart_job(kJob).ok());
   JournalledJob job = journal.load(kJob).value();
   EXPECT_EQ(job.status, JobStatus::running);
   EXPECT_EQ(job.completions.size(), 1u);
   EXPECT_TRUE(job.failures.empty());
+}
 
-  ASSERT_TRUE(journal.restart_job(kJob, /*fresh=*/true).ok());
-  EXPECT_TRUE(journal.load(kJob).value().completions.empty());
+// A kind that is read as another one makes a half-done job start from nothing, or fail.
+TEST_F(JournalTest, EveryKindOfTaskComesBackAsItWas) {
+  Journal journal = open();
+  ASSERT_TRUE(journal.add_job(kJob, "{}").ok());
+  for (int kind = 0; kind <= static_cast<int>(last_of(TaskKind{})); ++kind) {
+    Completion one = completion(kind);
+    one.task.kind = static_cast<TaskKind>(kind);
+    ASSERT_TRUE(journal.record_completion(kJob, one).ok());
+  }
+  const std::vector<Completion> read = journal.load(kJob).value().completions;
+  ASSERT_EQ(read.size(), static_cast<std::size_t>(last_of(TaskKind{})) + 1);
+  for (std::size_t kind = 0; kind < read.size(); ++kind)
+    EXPECT_EQ(read[kind].task.kind, static_cast<TaskKind>(kind));
+}
+
+TEST_F(JournalTest, TasksThatAreOpenAgainAreNotDone) {
+  Journal journal = open();
+  ASSERT_TRUE(journal.add_job(kJob, "{}").ok());
+  for (const std::int32_t tile : {0, 1, 2})
+    ASSERT_TRUE(journal.record_completion(kJob, completion(tile)).ok());
+  ASSERT_TRUE(journal.record_reopened(kJob, {completion(0).task, completion(2).task}).ok());
+  const std::vector<Completion> left = journal.load(kJob).value().completions;
+  ASSERT_EQ(left.size(), 1u);
+  EXPECT_EQ(left[0].task, completion(1).task);
 }
 
 TEST_F(JournalTest, DocumentsAndFailuresCanBeLookedUp) {

@@ -11,8 +11,9 @@ namespace {
 using namespace testing_farm;
 
 /// A farm where everything goes wrong at random: workers vanish, fail, report late or twice,
-/// messages are lost, the coordinator restarts from what it recorded. Workers publish their outputs
-/// some time before they report them. Checks after every step what must hold whatever happens.
+/// messages are lost, blobs and frames vanish, the coordinator restarts from what it recorded.
+/// Workers publish their outputs some time before they report them. Checks after every step what
+/// must hold whatever happens.
 class ChaosFarm {
  public:
   /// alike: films of many tasks have the same bytes, and so are one blob.
@@ -48,6 +49,8 @@ class ChaosFarm {
       fail(worker);
     } else if (what < 97) {
       start_coordinator();
+    } else if (what < 98) {
+      lose_a_file();
     } else if (!old_reports_.empty()) {
       receive(old_reports_[static_cast<std::size_t>(roll(static_cast<int>(old_reports_.size())))]);
     }
@@ -61,14 +64,47 @@ class ChaosFarm {
   std::size_t num_removed() const { return num_removed_; }
   std::size_t num_missing() const { return num_missing_; }
   std::size_t num_failures() const { return failures_.size(); }
+  std::size_t num_lost() const { return num_lost_; }
+  std::size_t num_reopened() const { return num_reopened_; }
 
  private:
+  struct Held {
+    std::vector<BlobRef> inputs;
+    bool published = false;
+  };
+
   int roll(int sides) { return static_cast<int>(random_() % static_cast<std::uint32_t>(sides)); }
 
   void start_coordinator() {
     scheduler_ = std::make_unique<Scheduler>(++epoch_, kSilence);
     known_.clear();
-    step(JobAdded{job_, spec_, JobStatus::running, completions_, failures_});
+    JobAdded added{job_, spec_, JobStatus::running, completions_, failures_};
+    // It looks for every file that it counts on.
+    Scheduler trial(0, kSilence);
+    trial.step(added, now_);
+    const JobTasks& tasks = trial.find_job(job_)->tasks;
+    for (const Completion& done : completions_) {
+      const auto live = tasks.live_blobs(*graph_.find(done.task));
+      const bool lost = std::any_of(live.begin(), live.end(), [this](const BlobRef& blob) {
+        return !store_.contains(blob.digest);
+      });
+      if (lost || lost_frames_.erase(done.task) > 0) added.lost.push_back(done.task);
+    }
+    step(added);
+  }
+
+  /// A blob that somebody counts on, or a finished frame, which a restart notices.
+  void lose_a_file() {
+    if (roll(3) == 0 && !completions_.empty()) {
+      const Completion& any =
+          completions_[static_cast<std::size_t>(roll(static_cast<int>(completions_.size())))];
+      if (any.task.kind == TaskKind::assemble) lost_frames_.insert(any.task);
+    } else if (!store_.empty()) {
+      const auto blob = std::next(store_.begin(), roll(static_cast<int>(store_.size())));
+      lost_.insert(*blob);
+      store_.erase(blob);
+      ++num_lost_;
+    }
   }
 
   void join(const std::string& worker) {
@@ -89,9 +125,14 @@ class ChaosFarm {
     if (held_[worker].empty()) return;
     if (!known_.contains(worker)) join(worker);
     if (held_[worker].empty()) return;
-    const auto [lease, published] = *held_[worker].begin();
-    if (!published) publish(lease);
+    const auto [lease, held] = *held_[worker].begin();
+    const std::vector<BlobRef> unread = missing_inputs(held);
     held_[worker].erase(lease);
+    if (!held.published && !unread.empty()) {
+      step(InputsLost{worker, lease, unread});
+      return;
+    }
+    if (!held.published) publish(lease);
     const TaskCompleted done{worker, lease, outputs(lease.task), {}};
     old_reports_.push_back(done);
     receive(done);
@@ -114,11 +155,19 @@ class ChaosFarm {
 
   /// The worker's next task is rendered; its report is still to come.
   void publish(const std::string& worker) {
-    for (auto& [lease, published] : held_[worker]) {
-      if (std::exchange(published, true)) continue;
+    for (auto& [lease, held] : held_[worker]) {
+      if (held.published || !missing_inputs(held).empty()) continue;
+      held.published = true;
       publish(lease);
       return;
     }
+  }
+  std::vector<BlobRef> missing_inputs(const Held& held) const {
+    std::vector<BlobRef> missing;
+    for (const BlobRef& input : held.inputs) {
+      if (!store_.contains(input.digest)) missing.push_back(input);
+    }
+    return missing;
   }
   void publish(const LeaseId& lease) {
     for (const BlobRef& blob : outputs(lease.task)) store_.insert(blob.digest);
@@ -154,10 +203,15 @@ class ChaosFarm {
 
   void on(const RecordCompletion& a) {
     EXPECT_TRUE(recorded_.insert(a.completion.task).second) << "a task counts once";
-    for (const TaskIndex input : graph_.inputs(a.completion.task)) {
-      EXPECT_TRUE(recorded_.contains(graph_.key(input))) << "done before its input";
-    }
     completions_.push_back(a.completion);
+    lost_frames_.erase(a.completion.task);
+  }
+  void on(const RecordReopened& a) {
+    for (const TaskKey& task : a.tasks) {
+      EXPECT_EQ(recorded_.erase(task), 1u) << "only what was done is done again";
+      std::erase_if(completions_, [&](const Completion& c) { return c.task == task; });
+    }
+    num_reopened_ += a.tasks.size();
   }
   void on(const RecordFailure& a) { failures_.push_back(a.failure); }
   void on(const RecordJobStatus&) {}
@@ -169,10 +223,11 @@ class ChaosFarm {
     }
     for (const BlobRef& input : a.inputs) {
       EXPECT_TRUE(scheduler_->is_referenced(input.digest));
-      EXPECT_TRUE(store_.contains(input.digest)) << "granted with an input that is gone";
+      EXPECT_TRUE(store_.contains(input.digest) || lost_.contains(input.digest))
+          << "granted with an input that was removed";
     }
     // Now and then the message is lost.
-    if (roll(20) > 0) held_[a.worker].emplace(a.lease, false);
+    if (roll(20) > 0) held_[a.worker].emplace(a.lease, Held{a.inputs});
   }
   void on(const RevokeLease& a) { held_[a.worker].erase(a.lease); }
   void on(const ReportNoWork&) {}
@@ -194,19 +249,20 @@ class ChaosFarm {
   std::uint32_t epoch_ = 0;
   std::unique_ptr<Scheduler> scheduler_;
   std::set<std::string> known_;  ///< to the coordinator, as the workers believe
-  /// What each worker has in hand, and whether its outputs are published.
-  std::map<std::string, std::map<LeaseId, bool>> held_;
+  std::map<std::string, std::map<LeaseId, Held>> held_;  ///< what each worker has in hand
   std::vector<TaskCompleted> old_reports_;
   std::vector<Completion> completions_;  ///< the journal
   std::vector<Failure> failures_;
   std::set<TaskKey> recorded_;
   std::set<LeaseId> issued_;
   std::set<Digest> store_;  ///< the blobs that are there
-  std::size_t num_removed_ = 0, num_missing_ = 0;
+  std::set<Digest> lost_;   ///< that somebody took
+  std::set<TaskKey> lost_frames_;
+  std::size_t num_removed_ = 0, num_missing_ = 0, num_lost_ = 0, num_reopened_ = 0;
 };
 
 TEST(SchedulerModel, EveryTaskIsDoneOnceWhateverHappens) {
-  std::size_t num_missing = 0;
+  std::size_t num_missing = 0, num_lost = 0, num_reopened = 0;
   for (std::uint32_t seed = 1; seed <= 1000; ++seed) {
     SCOPED_TRACE(testing::Message() << "seed " << seed);
     JobSpec spec = small_job(1 + static_cast<int>(seed % 5), 10, 1 + static_cast<int>(seed % 4),
@@ -225,8 +281,12 @@ TEST(SchedulerModel, EveryTaskIsDoneOnceWhateverHappens) {
     EXPECT_EQ(farm.progress().tasks_leased, 0u);
     EXPECT_GE(farm.num_removed(), 4u) << "the films are gone";
     num_missing += farm.num_missing();
+    num_lost += farm.num_lost();
+    num_reopened += farm.num_reopened();
     if (testing::Test::HasFailure()) return;
   }
+  EXPECT_GT(num_lost, 1000u);
+  EXPECT_GT(num_reopened, 1000u) << "something was done again";
   EXPECT_GT(num_missing, 20u) << "alike blobs went between publishing and reporting";
 }
 

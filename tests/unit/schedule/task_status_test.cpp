@@ -10,14 +10,15 @@ namespace {
 using S = TaskStatus;
 constexpr std::optional<S> kNone;
 
-// Rows: status; columns: inputs_done, granted, completed, returned, exhausted, cancelled.
-constexpr std::array<std::array<std::optional<S>, 6>, 6> kTable{{
-    /* blocked   */ {S::ready, kNone, kNone, kNone, kNone, S::cancelled},
-    /* ready     */ {kNone, S::leased, kNone, kNone, kNone, S::cancelled},
-    /* leased    */ {kNone, kNone, S::done, S::ready, S::failed, S::cancelled},
-    /* done      */ {kNone, kNone, kNone, kNone, kNone, kNone},
-    /* failed    */ {kNone, kNone, kNone, kNone, kNone, kNone},
-    /* cancelled */ {kNone, kNone, kNone, kNone, kNone, kNone},
+// Rows: status; columns: inputs_done, input_lost, granted, completed, returned, exhausted,
+// output_lost, cancelled.
+constexpr std::array<std::array<std::optional<S>, 8>, 6> kTable{{
+    /* blocked   */ {S::ready, kNone, kNone, kNone, kNone, kNone, kNone, S::cancelled},
+    /* ready     */ {kNone, S::blocked, S::leased, kNone, kNone, kNone, kNone, S::cancelled},
+    /* leased    */ {kNone, kNone, kNone, S::done, S::ready, S::failed, kNone, S::cancelled},
+    /* done      */ {kNone, kNone, kNone, kNone, kNone, kNone, S::blocked, kNone},
+    /* failed    */ {kNone, kNone, kNone, kNone, kNone, kNone, kNone, kNone},
+    /* cancelled */ {kNone, kNone, kNone, kNone, kNone, kNone, kNone, kNone},
 }};
 
 TEST(TaskStatus, EveryTransitionIsTheTables) {

@@ -207,14 +207,16 @@ TEST_F(ServiceTest, AWorkerIsDrainedByItsName) {
   EXPECT_EQ(unknown.message, "worker 'mil': no worker has this name");
 }
 
-TEST_F(ServiceTest, ADoneJobOfWhichAFrameIsGoneOrCutStartsAfresh) {
+// The films of a frame are gone once it is written, and so are the states before them: the tiles of
+// frames 1 to 4 are rendered again, but only one frame is written.
+TEST_F(ServiceTest, ADoneJobOfWhichAFrameIsGoneOrCutMakesThatFrameAgain) {
   const RunningService service(options);
   const fs::path frame = fs::path(job.output.directory) / "frame.0003.exr";
   const Digest id = ask<JobAccepted>(service.endpoint(), SubmitJob{document}).job;
   FakeWorker worker(service.endpoint(), store(), job);
   worker.hello();
   for (const bool cut : {false, true}) {
-    for (int i = 0; i < kNumTasks; ++i) worker.do_one_task();
+    for (int i = 0; i < (cut ? 5 : kNumTasks); ++i) worker.do_one_task();
     worker.say(LeaseRequest{0});
     worker.say(Heartbeat{});
     worker.expect<Heartbeat>();
@@ -226,8 +228,84 @@ TEST_F(ServiceTest, ADoneJobOfWhichAFrameIsGoneOrCutStartsAfresh) {
       fs::remove(frame);
     }
     EXPECT_FALSE(ask<JobAccepted>(service.endpoint(), SubmitJob{document}).already_there);
-    EXPECT_EQ(show(service.endpoint(), id).summary.tasks_done, 0u);
+    const JobDetail detail = show(service.endpoint(), id);
+    EXPECT_THAT(detail.frames_done, ElementsAre(1, 2, 4));
+    EXPECT_EQ(detail.summary.tasks_done, 3u);
   }
+}
+
+// What is read of a folder that is not mounted is not the truth.
+TEST_F(ServiceTest, ARunningJobWaitsForItsOutputFolder) {
+  Digest id;
+  {
+    const RunningService service(options);
+    id = ask<JobAccepted>(service.endpoint(), SubmitJob{document}).job;
+    FakeWorker worker(service.endpoint(), store(), job);
+    worker.hello();
+    for (int i = 0; i < kNumTasks - 1; ++i) worker.do_one_task();
+  }
+  fs::rename(job.output.directory, job.output.directory + ".away");
+  const RunningService service(options);
+  EXPECT_EQ(show(service.endpoint(), id).summary.status, JobStatus::paused);
+  EXPECT_EQ(show(service.endpoint(), id).summary.tasks_done, 7u);
+  EXPECT_THAT(refused(service.endpoint(), ResumeJob{id.hex()}).message,
+              HasSubstr("stays paused: " + job.output.directory));
+  fs::rename(job.output.directory + ".away", job.output.directory);
+  const JobDetail resumed = ask<JobDetail>(service.endpoint(), ResumeJob{id.hex()});
+  EXPECT_EQ(resumed.summary.status, JobStatus::running);
+  EXPECT_EQ(resumed.summary.tasks_done, 7u);
+}
+
+TEST_F(ServiceTest, AFrameThatOnlyItsWorkerSeesCountsAgainstTheWorker) {
+  const RunningService service(options);
+  const Digest id = ask<JobAccepted>(service.endpoint(), SubmitJob{document}).job;
+  FakeWorker worker(service.endpoint(), store(), job);
+  worker.hello();
+  TaskDone report;
+  do {
+    worker.say(LeaseRequest{1});
+    report = worker.work(worker.expect<LeaseGrant>().lease);
+    if (report.lease.task.kind == TaskKind::assemble) {
+      fs::remove(fs::path(job.output.directory) / "frame.0001.exr");
+    }
+    worker.say(report);
+  } while (report.lease.task.kind != TaskKind::assemble);
+  worker.say(LeaseRequest{1});
+  worker.expect<LeaseGrant>();
+  EXPECT_THAT(show(service.endpoint(), id).failures,
+              ElementsAre(HasSubstr("frame.0001.exr: reported, but not there")));
+}
+
+TEST_F(ServiceTest, ADamagedBlobIsMadeAgainWithoutBlame) {
+  const RunningService service(options);
+  const Digest id = ask<JobAccepted>(service.endpoint(), SubmitJob{document}).job;
+  FakeWorker worker(service.endpoint(), store(), job);
+  worker.hello();
+  worker.say(LeaseRequest{1});
+  const TaskDone first = worker.work(worker.expect<LeaseGrant>().lease);
+  worker.say(first);
+  worker.say(LeaseRequest{2});
+  LeaseGrant reader = worker.expect<LeaseGrant>();
+  if (reader.inputs.empty()) reader = worker.expect<LeaseGrant>();
+  ASSERT_FALSE(reader.inputs.empty());
+  const fs::path blob = BlobStore::open(store())->path(reader.inputs[0].digest);
+  fs::resize_file(blob, fs::file_size(blob) - 1);
+  worker.say(TaskFailed{reader.lease, "cannot read", false});
+  worker.say(LeaseRequest{2});
+  EXPECT_EQ(worker.expect<LeaseGrant>().lease.task, first.lease.task) << "made again";
+  const JobDetail detail = show(service.endpoint(), id);
+  EXPECT_THAT(detail.failures, SizeIs(0));
+  EXPECT_EQ(detail.summary.status, JobStatus::running);
+}
+
+// Who is ended by a signal will be started again.
+TEST_F(ServiceTest, WorkersAreSentHomeOnlyByWhoeverStopsTheFarm) {
+  std::optional<RunningService> service(std::in_place, options);
+  FakeWorker worker(service->endpoint(), store(), job);
+  worker.hello();
+  worker.expect<WorkerWelcome>();
+  service.reset();
+  EXPECT_FALSE(worker.answers<Shutdown>(300ms));
 }
 
 // A name belongs to one process; another one gets it when the first has fallen silent.
@@ -250,7 +328,7 @@ TEST_F(ServiceTest, ANameIsRefusedToASecondProcessWhileTheFirstLives) {
   EXPECT_TRUE(welcome);
 }
 
-TEST_F(ServiceTest, ARunningJobOfWhichABlobIsGoneStartsAfresh) {
+TEST_F(ServiceTest, ARunningJobMakesAgainWhatIsGoneFromTheStore) {
   Digest id;
   {
     const RunningService service(options);
