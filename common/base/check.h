@@ -11,5 +11,14 @@ namespace baton::detail {
 }  // namespace baton::detail
 
 /// A broken invariant stops the process with its location. Always on: it guards data, not speed.
-#define BATON_CHECK(condition) \
-  ((condition) ? static_cast<void>(0) : ::baton::detail::check_failed(#condition, __FILE__, __LINE__))
+#define BATON_CHECK(condition)        \
+  ((condition) ? static_cast<void>(0) \
+               : ::baton::detail::check_failed(#condition, __FILE__, __LINE__))
+
+/// The same in checked builds alone (BATON_CHECKED in cmake/baton.cmake): it guards what inner
+/// loops do.
+#ifdef BATON_CHECKED
+#define BATON_DCHECK(condition) BATON_CHECK(condition)
+#else
+#define BATON_DCHECK(condition) static_cast<void>(0)
+#endif

@@ -31,6 +31,7 @@ inline constexpr int kMinTileSize = 8;
 inline constexpr int kMaxTileSize = 32768;
 inline constexpr int kMaxSites = 16;
 inline constexpr int kMaxParticles = 64;
+inline constexpr int kMaxPopulations = 2;  // of a pixel's particles
 inline constexpr int kMaxCandidates = 8192;
 inline constexpr int kMaxDistributions = 64;
 inline constexpr int kMaxExchangeSide = 16;

@@ -73,7 +73,8 @@ class SelfAdaptedSampler final : public PixelSampler {
                                         .num_distributions = distributions,
                                         .local_move_cosine = std::cos(4 * kPi / 180)};
       const SequentialOutcome outcome =
-          kernels::sequential_step(input.sites, input.old, carried_light(input), input.located,
+          kernels::sequential_step(input.sites, input.old, carried_light(input),
+                                   input.located.empty() ? nullptr : &input.located.front(),
                                    settings, samples.lns, input.key,
                                    {p.direction.data(), p.site.data(), p.weight.data(),
                                     samples.r.data(), samples.g.data(), samples.b.data()});

@@ -145,10 +145,11 @@ inline void set_in_motion(JobSpec& job, bool camera, bool object) {
   job.motion.max_px = 4;
 }
 
-/// Films and last state of tile 0 over all frames of the job; where things move, tile 0 must be the
-/// whole image.
+/// Films, what a second pass needs of them and last state of tile 0 over all frames of the job;
+/// where things move, tile 0 must be the whole image.
 struct TileResult {
   std::vector<FilmTile> films;
+  std::vector<FirstPassSamples> samples;
   SampleState state;
   RenderStats stats;
 };
@@ -159,14 +160,21 @@ inline TileResult render_tile(const JobSpec& job, std::int32_t tile = 0) {
     ADD_FAILURE() << context.error().message;
     return result;
   }
-  const TileRunSink sink{[&](int, const FilmTile& film) {
-                           result.films.push_back(film);
-                           return Status();
-                         },
-                         [&](const SampleState& state) {
-                           result.state = state;
-                           return Status();
-                         }};
+  const TileRunSink sink{.film =
+                             [&](int, const FilmTile& film) {
+                               result.films.push_back(film);
+                               return Status();
+                             },
+                         .state =
+                             [&](const SampleState& state) {
+                               result.state = state;
+                               return Status();
+                             },
+                         .samples =
+                             [&](FirstPassSamples samples) {
+                               result.samples.push_back(std::move(samples));
+                               return Status();
+                             }};
   for (std::int32_t run = 0; run < num_runs(job); ++run) {
     std::vector<StatePtr> previous;
     if (carries_state(job) && run > 0)

@@ -157,11 +157,12 @@ HWY_INLINE VF BsdfDensity(const SiteBlock& sites, const kernels::CandidateCounts
 }
 
 /// Sum of weights that are padded by zeros to a whole vector.
-HWY_INLINE float SumOfWeights(const float* weight, std::int32_t count) {
+HWY_INLINE float SumOfWeights(const kernels::CandidateSet::Column<float>& weight,
+                              std::int32_t count) {
   const DF d;
   VF sum = hn::Zero(d);
   for (std::size_t i = 0; i < static_cast<std::size_t>(count); i += hn::Lanes(d)) {
-    sum = hn::Add(sum, hn::LoadU(d, weight + i));
+    sum = hn::Add(sum, hn::Load(d, weight.from(i)));
   }
   return hn::GetLane(hn::SumOfLanes(d, sum));
 }
@@ -202,12 +203,12 @@ struct CandidateLanes {
 HWY_INLINE void StoreCandidates(const CandidateLanes& c, std::size_t at,
                                 kernels::CandidateSet& out) {
   const DF d;
-  hn::StoreU(c.code, DU(), out.code + at);
-  hn::StoreU(c.site, DI(), out.site + at);
-  hn::StoreU(c.weight, d, out.weight + at);
-  hn::StoreU(c.reflected.x, d, out.r + at);
-  hn::StoreU(c.reflected.y, d, out.g + at);
-  hn::StoreU(c.reflected.z, d, out.b + at);
+  hn::StoreU(c.code, DU(), out.code.from(at));
+  hn::StoreU(c.site, DI(), out.site.from(at));
+  hn::StoreU(c.weight, d, out.weight.from(at));
+  hn::StoreU(c.reflected.x, d, out.r.from(at));
+  hn::StoreU(c.reflected.y, d, out.g.from(at));
+  hn::StoreU(c.reflected.z, d, out.b.from(at));
 }
 
 HWY_INLINE SiteDeal LightSites(const SiteBlock& sites, const kernels::CandidateCounts& counts,
@@ -279,8 +280,8 @@ struct BsdfRun {
     const DF d;
     const DU du;
     const SobolTable& table = sobol_table();
-    const VU sx = hn::Xor(hn::LoadU(du, table.x.data() + i), hn::Set(du, random[1]));
-    const VU sy = hn::Xor(hn::LoadU(du, table.y.data() + i), hn::Set(du, random[2]));
+    const VU sx = hn::Xor(hn::Load(du, table.x.from(i)), hn::Set(du, random[1]));
+    const VU sy = hn::Xor(hn::Load(du, table.y.from(i)), hn::Set(du, random[2]));
     return SampleBsdf(surface, counts.lobe_only ? hn::Set(d, 1.0f) : surface.specular_probability,
                       UniformLanes(d, sx), UniformLanes(d, sy));
   }

@@ -156,11 +156,12 @@ class ChosenCandidates {
     const DI di;
     CandidateLanes out;
     out.code = hn::BitCast(
-        DU(), hn::GatherIndex(di, reinterpret_cast<const std::int32_t*>(from_bsdf_.code), index));
-    out.site = hn::GatherIndex(di, from_bsdf_.site, index);
-    out.reflected = {hn::GatherIndex(d, from_bsdf_.r, index),
-                     hn::GatherIndex(d, from_bsdf_.g, index),
-                     hn::GatherIndex(d, from_bsdf_.b, index)};
+        DU(),
+        hn::GatherIndex(di, reinterpret_cast<const std::int32_t*>(from_bsdf_.code.from(0)), index));
+    out.site = hn::GatherIndex(di, from_bsdf_.site.from(0), index);
+    out.reflected = {hn::GatherIndex(d, from_bsdf_.r.from(0), index),
+                     hn::GatherIndex(d, from_bsdf_.g.from(0), index),
+                     hn::GatherIndex(d, from_bsdf_.b.from(0), index)};
     return out;
   }
 
@@ -184,15 +185,14 @@ class ChosenCandidates {
 /// Candidates that were chosen, each once, in the order of the line.
 class DistinctPicks {
  public:
-  static constexpr std::size_t kCapacity = limits::kMaxParticles + RunningSums::kGroup;
-  HWY_ALIGN std::int32_t pick[kCapacity];
-  HWY_ALIGN float times[kCapacity];  ///< each counts
+  PaddedArray<std::int32_t, limits::kMaxParticles> pick;
+  PaddedArray<float, limits::kMaxParticles> times;  ///< each counts
   std::size_t count = 0;
 
   /// `count` systematic picks, > 0.
   static DistinctPicks Systematic(const RunningSums& line, float total, float u,
                                   std::size_t count) {
-    HWY_ALIGN std::int32_t picks[kCapacity];
+    PaddedArray<std::int32_t, limits::kMaxParticles> picks;
     SystematicPicks(line, total, u, count, picks);
     DistinctPicks out;
     for (std::size_t j = 0; j < count; ++j) {
@@ -240,8 +240,8 @@ class DistinctPicks {
   }
   /// Fills up the last vector with rays that bring nothing.
   void FillUp() {
-    std::fill_n(pick + count, hn::MaxLanes(DF()), count > 0 ? pick[0] : 0);
-    std::fill_n(times + count, hn::MaxLanes(DF()), 0.0f);
+    pick.pad(count, count > 0 ? pick[0] : 0);
+    times.pad(count, 0.0f);
   }
 };
 
@@ -249,14 +249,14 @@ class DistinctPicks {
 HWY_INLINE void StoreRays(const Vec3Lanes& w, const Vec3Lanes& color, VF share, VI site,
                           std::size_t j, PixelRays& out) {
   const DF d;
-  hn::Store(w.x, d, out.x + j);
-  hn::Store(w.y, d, out.y + j);
-  hn::Store(w.z, d, out.z + j);
-  hn::Store(color.x, d, out.r + j);
-  hn::Store(color.y, d, out.g + j);
-  hn::Store(color.z, d, out.b + j);
-  hn::Store(share, d, out.visibility + j);
-  hn::StoreU(hn::DemoteTo(DB(), site), DB(), out.site + j);
+  hn::Store(w.x, d, out.x.from(j));
+  hn::Store(w.y, d, out.y.from(j));
+  hn::Store(w.z, d, out.z.from(j));
+  hn::Store(color.x, d, out.r.from(j));
+  hn::Store(color.y, d, out.g.from(j));
+  hn::Store(color.z, d, out.b.from(j));
+  hn::Store(share, d, out.visibility.from(j));
+  hn::StoreU(hn::DemoteTo(DB(), site), DB(), out.site.from(j));
 }
 
 inline float ChooseCandidates(const SiteBlock& sites, const EnvironmentView& environment,
@@ -266,7 +266,7 @@ inline float ChooseCandidates(const SiteBlock& sites, const EnvironmentView& env
   const Philox4x32::Counter random = rng.bits(0, 0);
 
   // Weigh the candidates.
-  RunningSums sums(scratch.running_sums);
+  RunningSums sums(scratch.running_sums.from(0));
   WeightLine line{sums.end};
   WeighCandidates(sites, environment, pool, counts, random, scratch.from_bsdf, line);
   sums.end = line.end;
@@ -275,10 +275,10 @@ inline float ChooseCandidates(const SiteBlock& sites, const EnvironmentView& env
 
   // Keep N of them.
   const ChosenCandidates chosen(sites, pool, counts, random, scratch.from_bsdf);
-  HWY_ALIGN std::int32_t picks[limits::kMaxParticles + RunningSums::kGroup];
+  PaddedArray<std::int32_t, limits::kMaxParticles> picks;
   SystematicPicks(sums, total, u, out.code.size(), picks);
   for (std::size_t j = 0; j < out.code.size(); j += hn::Lanes(DF())) {
-    const CandidateLanes c = chosen.Evaluate(hn::Load(DI(), picks + j));
+    const CandidateLanes c = chosen.Evaluate(hn::Load(DI(), picks.from(j)));
     StoreSome(DU(), c.code, out.code, j);
     StoreBytes(c.site, out.site, j);
     StoreSome(c.reflected.x, out.r, j);

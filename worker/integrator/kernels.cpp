@@ -80,6 +80,7 @@ void DrawCandidates(const SiteBlock& sites, const EnvironmentView& environment,
   LightCandidates(sites, pool, counts, random, store(0));
   BsdfCandidates(sites, environment, counts, random, store(counts.from_light));
   out.count = counts.total();
+  out.weight.pad(static_cast<std::size_t>(out.count), 0.0f);
   out.total = SumOfWeights(out.weight, out.count);
 }
 
@@ -97,12 +98,12 @@ void ShadeSamples(const SiteBlock& sites, const EnvironmentView& environment,
     const MF live = hn::Gt(target, hn::Set(d, 1e-37f));
     const VF inverse =
         hn::IfThenElseZero(live, hn::Div(hn::Set(d, 1.0f), hn::Max(target, hn::Set(d, 1e-37f))));
-    hn::StoreU(w.x, d, out.x + i);
-    hn::StoreU(w.y, d, out.y + i);
-    hn::StoreU(w.z, d, out.z + i);
-    hn::StoreU(hn::Mul(reflected.x, inverse), d, out.r + i);
-    hn::StoreU(hn::Mul(reflected.y, inverse), d, out.g + i);
-    hn::StoreU(hn::Mul(reflected.z, inverse), d, out.b + i);
+    hn::Store(w.x, d, out.x.from(i));
+    hn::Store(w.y, d, out.y.from(i));
+    hn::Store(w.z, d, out.z.from(i));
+    hn::Store(hn::Mul(reflected.x, inverse), d, out.r.from(i));
+    hn::Store(hn::Mul(reflected.y, inverse), d, out.g.from(i));
+    hn::Store(hn::Mul(reflected.z, inverse), d, out.b.from(i));
   }
 }
 
@@ -112,9 +113,9 @@ HWY_INLINE void Locate(const EnvironmentView& view, const Vec3Lanes& w, std::siz
   const DF d;
   const TexelLanes at = LocateTexels(view, w);
   PrefetchTexels(view, at);
-  hn::StoreU(at.index, DI(), out.texel + i);
-  hn::StoreU(at.fx, d, out.right + i);
-  hn::StoreU(at.fy, d, out.down + i);
+  hn::Store(at.index, DI(), out.texel.from(i));
+  hn::Store(at.fx, d, out.right.from(i));
+  hn::Store(at.fy, d, out.down.from(i));
 }
 
 void LocateDirections(const EnvironmentView& now, const EnvironmentView* before,
@@ -126,9 +127,9 @@ void LocateDirections(const EnvironmentView& now, const EnvironmentView* before,
       codes[lane] = code[std::min(i + lane, code.size() - 1)];
     }
     const Vec3Lanes w = DecodeOctahedral(hn::Load(DU(), codes));
-    hn::StoreU(w.x, d, out.x + i);
-    hn::StoreU(w.y, d, out.y + i);
-    hn::StoreU(w.z, d, out.z + i);
+    hn::Store(w.x, d, out.x.from(i));
+    hn::Store(w.y, d, out.y.from(i));
+    hn::Store(w.z, d, out.z.from(i));
     Locate(now, w, i, out.now);
     if (before != nullptr) Locate(*before, w, i, out.before);
   }
@@ -136,7 +137,7 @@ void LocateDirections(const EnvironmentView& now, const EnvironmentView* before,
 }
 
 SequentialOutcome SequentialPixel(const SiteBlock& sites, const kernels::CarriedLight& light,
-                                  const kernels::LocatedSpan* located,
+                                  const kernels::LocatedDirections* located,
                                   const SequentialSettings& settings, float lns_before,
                                   const RngKey& key, ParticleSpan particles) {
   const SameSurfaceTarget target{sites, light, located};
@@ -146,7 +147,7 @@ SequentialOutcome SequentialPixel(const SiteBlock& sites, const kernels::Carried
 
 SequentialOutcome SequentialMovedPixel(const SiteBlock& sites, const OldSurfaces& old,
                                        const kernels::CarriedLight& light,
-                                       const kernels::LocatedSpan* located,
+                                       const kernels::LocatedDirections* located,
                                        const SequentialSettings& settings, float lns_before,
                                        const RngKey& key, ParticleSpan particles) {
   const MovedSurfaceTarget target{{sites, light, located}, old};
@@ -236,22 +237,6 @@ void shade_samples(const SiteBlock& sites, const EnvironmentView& environment,
   HWY_DYNAMIC_DISPATCH(ShadeSamples)(sites, environment, code, site, out);
 }
 
-LocatedSpan LocatedSpan::from(std::size_t first) const {
-  const auto later = [first](const Place& place) {
-    return Place{place.texel + first, place.right + first, place.down + first};
-  };
-  return {x + first, y + first, z + first, later(now), before.texel ? later(before) : before};
-}
-
-LocatedSpan LocatedDirections::span() const {
-  return {x,
-          y,
-          z,
-          {now.texel, now.right, now.down},
-          has_before ? LocatedSpan::Place{before.texel, before.right, before.down}
-                     : LocatedSpan::Place{}};
-}
-
 void locate_directions(const EnvironmentView& now, const EnvironmentView* before,
                        std::span<const OctDirection> code, LocatedDirections& out) {
   BATON_CHECK(code.size() <= limits::kMaxParticles);
@@ -259,7 +244,7 @@ void locate_directions(const EnvironmentView& now, const EnvironmentView* before
 }
 
 SequentialOutcome sequential_step(const SiteBlock& sites, const OldSurfaces* old,
-                                  const CarriedLight& light, const LocatedSpan* located,
+                                  const CarriedLight& light, const LocatedDirections* located,
                                   const SequentialSettings& settings, float lns_before,
                                   const RngKey& key, ParticleSpan particles) {
   BATON_CHECK(settings.num_particles >= 1 && settings.num_particles <= limits::kMaxParticles);

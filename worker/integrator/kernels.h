@@ -7,6 +7,7 @@
 
 #include "common/base/limits.h"
 #include "common/math/octahedral.h"
+#include "common/math/padded_array.h"
 #include "common/math/philox.h"
 #include "worker/integrator/light_pool.h"
 #include "worker/integrator/old_surfaces.h"
@@ -14,11 +15,9 @@
 #include "worker/scene/environment_view.h"
 #include "worker/scene/site_block.h"
 
-/// The inner loops, in SIMD with run-time dispatch. No vector type leaves kernels.cpp. Arrays that
-/// kernels write in whole vectors are padded by kPadding elements.
+/// The inner loops, in SIMD with run-time dispatch. No vector type leaves kernels.cpp. Work space
+/// is read and written in whole vectors (PaddedArray), what spans hold is not.
 namespace baton::kernels {
-
-inline constexpr std::size_t kPadding = 16;
 
 /// Name of the instruction set in use, e.g. "AVX2".
 std::string instruction_set();
@@ -63,11 +62,12 @@ void check_counts(const SiteBlock& sites, const CandidateCounts& counts);
 /// Candidates of one pixel: a properly weighted set for p~(site, w) = p~_site(w) / S. E[sum weight]
 /// = Lns.
 struct CandidateSet {
-  static constexpr std::size_t kCapacity = limits::kMaxCandidates + 2 * kPadding;
-  alignas(64) OctDirection code[kCapacity];
-  alignas(64) std::int32_t site[kCapacity];
-  alignas(64) float weight[kCapacity];
-  alignas(64) float r[kCapacity], g[kCapacity], b[kCapacity];  ///< (f cos L)_rgb
+  template <class T>
+  using Column = PaddedArray<T, limits::kMaxCandidates>;
+  Column<OctDirection> code;
+  Column<std::int32_t> site;
+  Column<float> weight;
+  Column<float> r, g, b;  ///< (f cos L)_rgb
   std::int32_t count = 0;
   float total = 0;  ///< sum of the weights
 };
@@ -80,9 +80,13 @@ void draw_candidates(const SiteBlock& sites, const EnvironmentView& environment,
                      const LightPool& pool, const CandidateCounts& counts, const Rng& rng,
                      CandidateSet& out);
 
+/// Something of every candidate of a pixel: those of the light to the end of their last vector,
+/// then those of the BRDF.
+using CandidateLine = PaddedArray<float, limits::kMaxCandidates + kVectorPadding>;
+
 /// Work space of choose_candidates.
 struct ChoiceScratch {
-  alignas(64) float running_sums[CandidateSet::kCapacity];
+  CandidateLine running_sums;
   CandidateSet from_bsdf;
 };
 
@@ -102,42 +106,31 @@ float choose_candidates(const SiteBlock& sites, const EnvironmentView& environme
                         float u, ChoiceScratch& scratch, const SampleSpan& out);
 
 /// What is left to do for a sample once its visibility is known: colour[j] = (f cos L)_rgb / p~ at
-/// (site, w), 0 where p~ is 0. directions: unit vectors for the shadow rays. Arrays padded by
-/// kPadding.
+/// (site, w), 0 where p~ is 0. directions: unit vectors for the shadow rays.
 struct ShadedSamples {
-  static constexpr std::size_t kCapacity = limits::kMaxParticles + kPadding;
-  alignas(64) float x[kCapacity], y[kCapacity], z[kCapacity];
-  alignas(64) float r[kCapacity], g[kCapacity], b[kCapacity];
+  using Column = PaddedArray<float, limits::kMaxParticles>;
+  Column x, y, z;
+  Column r, g, b;
 };
 void shade_samples(const SiteBlock& sites, const EnvironmentView& environment,
                    std::span<const OctDirection> code, std::span<const std::uint8_t> site,
                    ShadedSamples& out);
 
-/// Directions that were decoded and found in the map ahead of their evaluation, (N) each.
-struct LocatedSpan {
+/// Directions of one population that were decoded and found in the map ahead of their evaluation,
+/// (N) each; the last vector is filled up with copies of the last one.
+struct LocatedDirections {
+  template <class T>
+  using Column = PaddedArray<T, limits::kMaxParticles>;
   /// Where a direction lies in a map: the upper left texel, and how far right and down of it
   /// (bilinear maps).
   struct Place {
-    const std::int32_t* texel;
-    const float *right, *down;
+    Column<std::int32_t> texel;
+    Column<float> right, down;
   };
-  const float *x, *y, *z;  ///< unit world vectors
+  Column<float> x, y, z;  ///< unit world vectors
   Place now;
-  Place before;  ///< null where it was not asked for
-
-  LocatedSpan from(std::size_t first) const;
-};
-struct LocatedDirections {
-  static constexpr std::size_t kCapacity = limits::kMaxParticles + kPadding;
-  struct Place {
-    alignas(64) std::int32_t texel[kCapacity];
-    alignas(64) float right[kCapacity], down[kCapacity];
-  };
-  alignas(64) float x[kCapacity], y[kCapacity], z[kCapacity];
-  Place now, before;
+  Place before;  ///< where it was asked for
   bool has_before = false;
-
-  LocatedSpan span() const;
 };
 /// Finds lattice directions (at most kMaxParticles) in the map of now, and where it is not null in
 /// that of the frame before, and asks the memory for the texels there: maps are larger than the
@@ -159,7 +152,7 @@ struct CarriedLight {
 /// the frame that the particles come from, of which the pool must have the radiance
 /// (LightPool::has_before). located: the particles in its maps, or null. lns_before > 0.
 SequentialOutcome sequential_step(const SiteBlock& sites, const OldSurfaces* old,
-                                  const CarriedLight& light, const LocatedSpan* located,
+                                  const CarriedLight& light, const LocatedDirections* located,
                                   const SequentialSettings& settings, float lns_before,
                                   const RngKey& key, ParticleSpan particles);
 

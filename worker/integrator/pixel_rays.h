@@ -4,6 +4,7 @@
 #include <cstdint>
 
 #include "common/base/limits.h"
+#include "common/math/padded_array.h"
 #include "common/math/vec3.h"
 #include "worker/sampling/light_noise.h"
 
@@ -18,14 +19,14 @@ struct PixelRays {
     Rgb color;
     float visibility = 0;
   };
-  /// Arrays are written in whole vectors.
-  static constexpr std::size_t kCapacity = limits::kMaxParticles + 16;
+  template <class T>
+  using Column = PaddedArray<T, limits::kMaxParticles>;
   std::size_t count = 0;
-  alignas(64) float x[kCapacity], y[kCapacity], z[kCapacity];  ///< unit directions
-  alignas(64) float r[kCapacity], g[kCapacity], b[kCapacity];  ///< what a free ray brings
-  alignas(64) float visibility[kCapacity];                     ///< and its share of Lns
-  alignas(64) std::uint8_t site[kCapacity];
-  alignas(64) std::uint8_t bin[kCapacity];  ///< of the pixel's memory, visibility_bin()
+  Column<float> x, y, z;     ///< unit directions
+  Column<float> r, g, b;     ///< what a free ray brings
+  Column<float> visibility;  ///< and its share of Lns
+  Column<std::uint8_t> site;
+  Column<std::uint8_t> bin;  ///< of the pixel's memory, visibility_bin()
   Value constant;
   /// What the even ones of all samples brought to `constant` more than the odd ones. With the
   /// values of the rays, of alternating sign, it tells two interleaved halves of the pixel apart.

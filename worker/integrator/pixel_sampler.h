@@ -27,8 +27,8 @@ struct PixelInput {
   /// (N) p~ of the previous frame at those samples, where it is known; else empty.
   std::span<const float> target_before{};
   const OldSurfaces* old = nullptr;  ///< the surfaces of that set, where they are not `sites`
-  /// That set in the maps, where it was looked up ahead; else null.
-  const kernels::LocatedSpan* located = nullptr;
+  /// (populations) That set in the maps, where it was looked up ahead; else empty.
+  std::span<const kernels::LocatedDirections> located{};
   /// (kVisibilityCells) of the frames before, or empty; see keeps_memory()
   std::span<const VisibilityCell> memory{};
   /// What the neighbours that the pixel asks held in the frame before; at most kMaxNeighbors.

@@ -174,16 +174,16 @@ HWY_INLINE void LookUpRays(const ChosenCandidates& chosen, const RayPlan& plan,
   Vec3Lanes expected{hn::Zero(d), hn::Zero(d), hn::Zero(d)};
   VF expected_share = hn::Zero(d), difference = hn::Zero(d);
   for (std::size_t j = 0; j < picks.count; j += hn::Lanes(d)) {
-    const VI pick = hn::Load(di, picks.pick + j);
+    const VI pick = hn::Load(di, picks.pick.from(j));
     const CandidateLanes c = chosen.Evaluate(pick);
     const Vec3Lanes w = DecodeOctahedral(c.code);
     const VF seen = hn::GatherIndex(d, free, pick);
-    const VF light = hn::Div(hn::Mul(per_pick, hn::Load(d, picks.times + j)),
+    const VF light = hn::Div(hn::Mul(per_pick, hn::Load(d, picks.times.from(j))),
                              plan.control ? DoubtFactor(seen) : HopeFactor(seen));
     const Vec3Lanes color = Scale(c.reflected, hn::Div(light, MeanLanes(c.reflected)));
     const VF share = hn::Mul(light, per_light);
     StoreRays(w, color, share, c.site, j, out);
-    hn::StoreU(hn::DemoteTo(DB(), VisibilityBins(c.code)), DB(), out.bin + j);
+    hn::StoreU(hn::DemoteTo(DB(), VisibilityBins(c.code)), DB(), out.bin.from(j));
     const Vec3Lanes sure = Scale(color, seen);
     expected = HWY_NAMESPACE::Add(expected, sure);
     difference = hn::MulAdd(hn::Mul(light, seen), half, difference);
@@ -206,9 +206,9 @@ inline float ChoosePoolRays(const SiteBlock& sites, const EnvironmentView& envir
   const Philox4x32::Counter random = rng.bits(0, 0);
 
   // Weigh the candidates.
-  RunningSums hope(scratch.hope_sums), doubt(scratch.doubt_sums);
+  RunningSums hope(scratch.hope_sums.from(0)), doubt(scratch.doubt_sums.from(0));
   const RememberedLanes remembered(memory.data());
-  PoolLines lines{&remembered, hope.end, doubt.end, scratch.free};
+  PoolLines lines{&remembered, hope.end, doubt.end, scratch.free.from(0)};
   WeighCandidates(sites, environment, pool, counts, random, scratch.from_bsdf, lines);
   hope.end = lines.hope;
   doubt.end = lines.doubt;
@@ -235,7 +235,7 @@ inline float ChoosePoolRays(const SiteBlock& sites, const EnvironmentView& envir
                                   : DistinctPicks::Systematic(plan.line, plan.total, u,
                                                               static_cast<std::size_t>(plan.count));
   LookUpRays(ChosenCandidates(sites, pool, counts, random, scratch.from_bsdf), plan, picks,
-             scratch.free, lns, out);
+             scratch.free.from(0), lns, out);
   return lns;
 }
 

@@ -8,9 +8,8 @@ namespace baton::kernels {
 
 /// Work space of choose_pool_rays.
 struct PoolScratch {
-  alignas(64) float hope_sums[CandidateSet::kCapacity];
-  alignas(64) float doubt_sums[CandidateSet::kCapacity];
-  alignas(64) float free[CandidateSet::kCapacity];  ///< V^ of each candidate
+  CandidateLine hope_sums, doubt_sums;
+  CandidateLine free;  ///< V^ of each candidate
   CandidateSet from_bsdf;
 };
 

@@ -35,18 +35,18 @@ HWY_INLINE void LookUpShares(const ChosenCandidates& chosen, const DistinctPicks
   const DF d;
   Vec3Lanes sum{hn::Zero(d), hn::Zero(d), hn::Zero(d)};
   for (std::size_t j = 0; j < picks.count; j += hn::Lanes(d)) {
-    const CandidateLanes c = chosen.Evaluate(hn::Load(DI(), picks.pick + j));
+    const CandidateLanes c = chosen.Evaluate(hn::Load(DI(), picks.pick.from(j)));
     const Vec3Lanes w = DecodeOctahedral(c.code);
-    const VF times = hn::Load(d, picks.times + j);
+    const VF times = hn::Load(d, picks.times.from(j));
     const Vec3Lanes color = Scale(c.reflected, hn::Div(times, MeanLanes(c.reflected)));
     sum = HWY_NAMESPACE::Add(sum, color);
     StoreRays(w, color, hn::Div(times, hn::Set(d, num_rays)), c.site, j, out);
   }
   out.count = picks.count;
-  std::fill_n(out.bin, picks.count, std::uint8_t{0});
+  std::fill_n(out.bin.from(0), picks.count, std::uint8_t{0});
 
   // Scale them to what all candidates reflect, channel by channel.
-  const auto scale = [&](VF all, VF chosen_ones, float* column) HWY_ATTR {
+  const auto scale = [&](VF all, VF chosen_ones, PixelRays::Column<float>& column) HWY_ATTR {
     const float a = hn::GetLane(hn::SumOfLanes(d, all));
     const float b = hn::GetLane(hn::SumOfLanes(d, chosen_ones));
     const float factor = b > 0 ? a / b : 0.0f;
@@ -64,7 +64,7 @@ inline float ChooseRatioRays(const SiteBlock& sites, const EnvironmentView& envi
   const Philox4x32::Counter random = rng.bits(0, 0);
 
   // Weigh the candidates.
-  RunningSums sums(scratch.running_sums);
+  RunningSums sums(scratch.running_sums.from(0));
   ColorLine line{sums.end};
   WeighCandidates(sites, environment, pool, counts, random, scratch.from_bsdf, line);
   sums.end = line.end;

@@ -50,17 +50,18 @@ void CastPixelRays(const PixelRays& in, const SiteOrigins& origins, std::uint32_
   for (std::size_t i = 0; i < in.count; i += hn::Lanes(d)) {
     const auto put = [&](VF value, std::vector<float>& column)
                          HWY_ATTR { hn::StoreU(value, d, column.data() + first + i); };
-    const Vec3Lanes from = OriginsOf(origins, hn::PromoteTo(DI(), hn::LoadU(DB(), in.site + i)));
+    const Vec3Lanes from =
+        OriginsOf(origins, hn::PromoteTo(DI(), hn::LoadU(DB(), in.site.from(i))));
     put(from.x, rays.origin_x);
     put(from.y, rays.origin_y);
     put(from.z, rays.origin_z);
-    put(hn::Load(d, in.x + i), rays.direction_x);
-    put(hn::Load(d, in.y + i), rays.direction_y);
-    put(hn::Load(d, in.z + i), rays.direction_z);
-    put(hn::Load(d, in.r + i), batch.r);
-    put(hn::Load(d, in.g + i), batch.g);
-    put(hn::Load(d, in.b + i), batch.b);
-    put(hn::Load(d, in.visibility + i), batch.visibility);
+    put(hn::Load(d, in.x.from(i)), rays.direction_x);
+    put(hn::Load(d, in.y.from(i)), rays.direction_y);
+    put(hn::Load(d, in.z.from(i)), rays.direction_z);
+    put(hn::Load(d, in.r.from(i)), batch.r);
+    put(hn::Load(d, in.g.from(i)), batch.g);
+    put(hn::Load(d, in.b.from(i)), batch.b);
+    put(hn::Load(d, in.visibility.from(i)), batch.visibility);
     const VU number = CountFrom(du, first_sample + static_cast<std::uint32_t>(i));
     hn::StoreU(number, du, batch.sample.data() + first + i);
   }
@@ -148,8 +149,7 @@ HWY_EXPORT(CastPixelRays);
 HWY_EXPORT(SumFree);
 
 void RayBatch::reserve(std::size_t more) {
-  constexpr std::size_t kPadding = 16;
-  const std::size_t needed = size() + more + kPadding;
+  const std::size_t needed = size() + more + kVectorPadding;
   if (needed <= sample.size()) return;
   const std::size_t capacity = std::max(needed, 2 * sample.size());
   rays.reserve(capacity);

@@ -37,8 +37,8 @@ HWY_INLINE PlacedPoints PlacePoints(const kernels::RestirPoints& points, std::si
                                     const kernels::CarriedLight& light,
                                     const WantedLights& wanted) {
   PlacedPoints p;
-  p.site = hn::PromoteTo(DI(), hn::LoadU(DB(), points.site + i));
-  p.w = DecodeOctahedral(hn::LoadU(DU(), points.code + i));
+  p.site = hn::PromoteTo(DI(), hn::LoadU(DB(), points.site.from(i)));
+  p.w = DecodeOctahedral(hn::LoadU(DU(), points.code.from(i)));
   p.w_before = TurnBack(light.turn, p.w);
   if (wanted.now) {
     p.now = LocateTexels(light.now, p.w);
@@ -72,8 +72,8 @@ void EvaluatePoints(const SiteBlock& sites, std::span<const OldSurfaces* const> 
       std::any_of(old.begin() + static_cast<std::ptrdiff_t>(range.first_old), old.end(),
                   [](const OldSurfaces* surfaces) { return surfaces == nullptr; });
 
-  const auto put = [&](VF value, float* column, std::size_t i)
-                       HWY_ATTR { StoreSome(value, std::span(column, range.last), i); };
+  const auto put = [&](VF value, kernels::RestirPoints::Column<float>& column, std::size_t i)
+                       HWY_ATTR { StoreSome(value, column.first(range.last), i); };
 
   // A few vectors at a time, so that one's texels come while another's are asked for.
   constexpr std::size_t kAhead = 8;
@@ -119,9 +119,9 @@ void TurnPoints(const Mat3& turn, std::size_t first, std::size_t last,
                 kernels::RestirPoints& points) {
   const DU du;
   for (std::size_t i = first; i < last; i += hn::Lanes(du)) {
-    const Vec3Lanes w = DecodeOctahedral(hn::LoadU(du, points.code + i));
+    const Vec3Lanes w = DecodeOctahedral(hn::LoadU(du, points.code.from(i)));
     const VU turned = EncodeOctahedral(Transform(turn.m.data(), w));
-    StoreSome(du, turned, std::span(points.code, last), i);
+    StoreSome(du, turned, points.code.first(last), i);
   }
 }
 
@@ -136,14 +136,14 @@ HWY_EXPORT(TurnPoints);
 namespace kernels {
 
 void turn_points(const Mat3& turn, std::size_t first, std::size_t last, RestirPoints& points) {
-  BATON_CHECK(last + kPadding <= RestirPoints::kCapacity);
+  BATON_CHECK(last <= RestirPoints::kMost);
   HWY_DYNAMIC_DISPATCH(TurnPoints)(turn, first, last, points);
 }
 
 void evaluate_points(const SiteBlock& sites, std::span<const OldSurfaces* const> old,
                      const CarriedLight& light, const PointRange& range, RestirPoints& points) {
   BATON_CHECK(old.size() < kMaxRestirSets && range.first_old <= old.size());
-  BATON_CHECK(range.last + kPadding <= RestirPoints::kCapacity);
+  BATON_CHECK(range.last <= RestirPoints::kMost);
   HWY_DYNAMIC_DISPATCH(EvaluatePoints)(sites, old, light, range, points);
 }
 

@@ -7,14 +7,16 @@ namespace baton::kernels {
 
 /// The samples of all sets of one pixel, set after set, and what they are worth.
 struct RestirPoints {
-  static constexpr std::size_t kCapacity = kMaxRestirSets * limits::kMaxParticles + kPadding;
-  alignas(64) OctDirection code[kCapacity];
-  alignas(64) std::uint8_t site[kCapacity];
-  alignas(64) float r[kCapacity], g[kCapacity], b[kCapacity];      ///< (f cos L)_rgb of now
-  alignas(64) float target_now[kCapacity];                         ///< p~, their mean
-  alignas(64) float target_before[kMaxRestirSets - 1][kCapacity];  ///< p~ of each carried set
-  alignas(64) float contribution[kCapacity];                       ///< u
-  alignas(64) float weight[kCapacity];
+  static constexpr std::size_t kMost = kMaxRestirSets * limits::kMaxParticles;
+  template <class T>
+  using Column = PaddedArray<T, kMost>;
+  Column<OctDirection> code;
+  Column<std::uint8_t> site;
+  Column<float> r, g, b;                            ///< (f cos L)_rgb of now
+  Column<float> target_now;                         ///< p~, their mean
+  Column<float> target_before[kMaxRestirSets - 1];  ///< p~ of each carried set
+  Column<float> contribution;                       ///< u
+  Column<float> weight;
 };
 
 /// What is asked of the points [first, last).

@@ -38,7 +38,7 @@ class SetGatherer {
   }
   /// A carried set. target_before: its own targets, if they are known; else empty.
   void add_carried(const CarriedSet& set, std::span<const float> target_before) {
-    float* const known = points_.target_before[num_sets_ - 1];
+    RestirPoints::Column<float>& known = points_.target_before[num_sets_ - 1];
     for (std::size_t j = 0; j < set.weight.size(); ++j) {
       if (!(set.weight[j] > 0)) continue;
       points_.code[count_] = set.direction[j];
@@ -52,8 +52,8 @@ class SetGatherer {
   /// Gives the vector that covers the last points directions and sites to evaluate, and turns the
   /// carried samples, unless `turn` is null.
   void finish(const Mat3* turn) {
-    std::fill_n(points_.code + count_, kernels::kPadding, OctDirection{0});
-    std::fill_n(points_.site + count_, kernels::kPadding, std::uint8_t{0});
+    points_.code.pad(count_, OctDirection{0});
+    points_.site.pad(count_, std::uint8_t{0});
     if (turn != nullptr) kernels::turn_points(*turn, sets_[0].end, count_, points_);
   }
 
@@ -61,7 +61,7 @@ class SetGatherer {
   void end_set(float confidence, const OldSurfaces* surfaces) {
     const bool is_fresh = num_sets_ == 0;
     sets_[num_sets_] = {count_, confidence,
-                        is_fresh ? nullptr : points_.target_before[num_sets_ - 1]};
+                        is_fresh ? nullptr : points_.target_before[num_sets_ - 1].from(0)};
     if (!is_fresh) surfaces_[num_sets_ - 1] = surfaces;
     ++num_sets_;
   }
@@ -99,12 +99,12 @@ void pick_along_curve(const RestirPoints& points, std::size_t count, double tota
                       std::span<std::uint32_t> picks) {
   static const DirectionCurve curve;
   constexpr int kIndexBits = 12;
-  static_assert(RestirPoints::kCapacity <= 1u << kIndexBits);
-  std::array<std::uint32_t, RestirPoints::kCapacity> order;
+  static_assert(RestirPoints::kMost <= 1u << kIndexBits);
+  std::array<std::uint32_t, RestirPoints::kMost> order;
   for (std::uint32_t i = 0; i < count; ++i)
     order[i] = curve.place(points.code[i]) << kIndexBits | i;
   std::sort(order.begin(), order.begin() + static_cast<std::ptrdiff_t>(count));
-  std::array<float, RestirPoints::kCapacity> weight;
+  std::array<float, RestirPoints::kMost> weight;
   for (std::size_t k = 0; k < count; ++k) {
     order[k] &= (1u << kIndexBits) - 1;
     weight[k] = points.weight[order[k]];
@@ -152,7 +152,8 @@ std::size_t evaluate(const PixelInput& input, const kernels::CarriedLight& light
        .wants_now = true,
        .first_old = own_is_known ? 1 : first_old});
   ask({.first = end_of_own, .last = all.count(), .wants_now = true, .first_old = first_old});
-  if (unchanged) std::copy_n(points.target_now, all.count(), points.target_before[0]);
+  if (unchanged)
+    std::copy_n(points.target_now.from(0), all.count(), points.target_before[0].from(0));
   return evaluations;
 }
 
@@ -180,9 +181,8 @@ PixelDiagnostics RestirSampler::sample(const PixelInput& input, SamplerScratch& 
   BATON_CHECK(samples.confidence != nullptr && input.neighbors.size() <= limits::kMaxNeighbors);
   PixelDiagnostics diagnostics = fresh_.sample(
       input, scratch,
-      {std::span(points.code).first(n), std::span(points.site).first(n),
-       std::span(points.contribution).first(n), std::span(points.r).first(n),
-       std::span(points.g).first(n), std::span(points.b).first(n), lns, lns_fresh, source});
+      {points.code.first(n), points.site.first(n), points.contribution.first(n), points.r.first(n),
+       points.g.first(n), points.b.first(n), lns, lns_fresh, source});
 
   // The sets of the frame before. Their own targets are those of the directions that they had: a
   // direction that has been turned is rounded anew, and all densities of a weight must be taken at
@@ -206,8 +206,9 @@ PixelDiagnostics RestirSampler::sample(const PixelInput& input, SamplerScratch& 
   // Weigh them together and choose.
   diagnostics.target_evaluations +=
       static_cast<std::int32_t>(evaluate(input, light, all, has_own, own_is_known, points));
-  const double total = weigh_restir_sets(all.sets(), points.contribution, points.target_now,
-                                         std::span(points.weight).first(all.count()));
+  const double total =
+      weigh_restir_sets(all.sets(), points.contribution.first(all.count()),
+                        points.target_now.first(all.count()), points.weight.first(all.count()));
   *samples.confidence = next_confidence(all.sets(), history_limit_);
   samples.source = PixelSource::carried;
   const auto new_lns = static_cast<float>(total);

@@ -42,7 +42,8 @@ PixelDiagnostics SequentialSampler::sample(const PixelInput& input, SamplerScrat
     settings.ess_ratio_min = 0;
   }
   const SequentialOutcome outcome = kernels::sequential_step(
-      input.sites, input.old, carried_light(input), input.located, settings, samples.lns, input.key,
+      input.sites, input.old, carried_light(input),
+      input.located.empty() ? nullptr : &input.located.front(), settings, samples.lns, input.key,
       {samples.direction.data(), samples.site.data(), samples.weight.data(), samples.r.data(),
        samples.g.data(), samples.b.data(),
        input.target_before.empty() ? nullptr : input.target_before.data()});

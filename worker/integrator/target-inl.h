@@ -84,15 +84,15 @@ HWY_INLINE VI SiteAt(const SiteBlock& block, VF fraction) {
 }
 
 /// Directions i, i + 1, ... of those that were located ahead, and the light from there.
-HWY_INLINE Vec3Lanes LocatedDirection(const kernels::LocatedSpan& at, std::size_t i) {
+HWY_INLINE Vec3Lanes LocatedDirection(const kernels::LocatedDirections& at, std::size_t i) {
   const DF d;
-  return {hn::LoadU(d, at.x + i), hn::LoadU(d, at.y + i), hn::LoadU(d, at.z + i)};
+  return {hn::Load(d, at.x.from(i)), hn::Load(d, at.y.from(i)), hn::Load(d, at.z.from(i))};
 }
 HWY_INLINE RadianceLanes LocatedLight(const EnvironmentView& view,
-                                      const kernels::LocatedSpan::Place& at, std::size_t i) {
+                                      const kernels::LocatedDirections::Place& at, std::size_t i) {
   const DF d;
-  return EvaluateTexels(
-      view, {hn::LoadU(DI(), at.texel + i), hn::LoadU(d, at.right + i), hn::LoadU(d, at.down + i)});
+  return EvaluateTexels(view, {hn::Load(DI(), at.texel.from(i)), hn::Load(d, at.right.from(i)),
+                               hn::Load(d, at.down.from(i))});
 }
 
 /// The targets of two frames for SequentialStep, as far as they do not depend on which surfaces the
@@ -104,7 +104,7 @@ template <class Surface>
 struct CarriedTarget {
   const SiteBlock& sites;
   const kernels::CarriedLight& light;
-  const kernels::LocatedSpan* located;  ///< the carried particles, or null
+  const kernels::LocatedDirections* located;  ///< the carried particles, or null
 
   /// Sets `out` for `point`, log_before only where it is wanted.
   HWY_INLINE void Evaluate(const PointLanes& point, bool want_before, TargetLanes& out) const {
@@ -121,7 +121,7 @@ struct CarriedTarget {
     const Vec3Lanes w = LocatedDirection(*located, i);
     const RadianceLanes now = LocatedLight(light.now, located->now, i);
     const auto then = [&]() HWY_ATTR {
-      if (located->before.texel != nullptr) return LocatedLight(light.before, located->before, i);
+      if (located->has_before) return LocatedLight(light.before, located->before, i);
       return EvaluateEnvironment(light.before, w);
     };
     SetTargets(point.site, w, now, InverseOrZero(now.density), want_before, then, out);

@@ -45,16 +45,12 @@ PixelDiagnostics sample_populations(const PixelSampler& sampler, std::size_t num
 
   PixelDiagnostics sum;
   PixelInput population_input = input;
-  kernels::LocatedSpan located{};
   for (std::size_t k = 0; k < populations; ++k) {
     population_input.key.job_seed = stream_seed(input.key.job_seed, static_cast<std::uint32_t>(k));
     if (!input.target_before.empty()) {
       population_input.target_before = input.target_before.subspan(k * n, n);
     }
-    if (input.located != nullptr) {
-      located = input.located->from(k * n);
-      population_input.located = &located;
-    }
+    if (!input.located.empty()) population_input.located = input.located.subspan(k, 1);
     const PixelDiagnostics did = sampler.sample(population_input, scratch, samples_of(k));
     sum.ess += did.ess;
     sum.target_evaluations += did.target_evaluations;

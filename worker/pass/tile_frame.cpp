@@ -81,7 +81,7 @@ FilmTile TileFrameRenderer::render_batches(const FrameSpec& frame, const FrameLi
   batch.frame_index = frame.index;
   frame_sampling_ = {};
   const bool chooses_rays = context_.sampler != nullptr && context_.sampler->chooses_rays();
-  batch.stride = chooses_rays ? PixelRays::kCapacity
+  batch.stride = chooses_rays ? limits::kMaxParticles
                               : static_cast<std::size_t>(std::max(
                                     state.num_particles, context_.job.sampling.num_particles));
   if (chooses_rays) batch.bin.resize(kBatchPixels * batch.stride);
@@ -139,9 +139,13 @@ void TileFrameRenderer::look_ahead(std::size_t pixel_of_batch, std::size_t index
   }
   ahead.is_located = ahead.history != PixelHistory::none && context_.sampler->evaluates_carried();
   if (!ahead.is_located) return;
-  const auto n = static_cast<std::size_t>(state.num_particles);
-  kernels::locate_directions(light.now, knows_targets_ || light.still ? nullptr : &light.before,
-                             std::span(state.direction).subspan(index * n, n), ahead.located);
+  const auto populations = static_cast<std::size_t>(state.num_populations);
+  const std::size_t n = static_cast<std::size_t>(state.num_particles) / populations;
+  for (std::size_t k = 0; k < populations; ++k) {
+    kernels::locate_directions(light.now, knows_targets_ || light.still ? nullptr : &light.before,
+                               std::span(state.direction).subspan((index * populations + k) * n, n),
+                               ahead.located[k]);
+  }
 }
 
 /// Pass: every pixel's properly weighted set, and the colours and rays that follow from it.
@@ -150,6 +154,7 @@ void TileFrameRenderer::sample(Batch& batch, const FrameLight& light, SampleStat
   const EnvironmentView now = view_of(light.now);
   const EnvironmentView before = view_of(light.before);
   const std::int32_t frame_index = batch.frame_index;
+  const auto populations = static_cast<std::size_t>(state.num_populations);
   SampleColors colors;
   SiteBlock sites;
   batch.rays.clear();
@@ -176,7 +181,6 @@ void TileFrameRenderer::sample(Batch& batch, const FrameLight& light, SampleStat
     const std::size_t n = own.sampler != nullptr ? static_cast<std::size_t>(own.num_particles)
                                                  : num_common_particles(state);
     const Ahead& ahead = ahead_[index % 2];
-    const kernels::LocatedSpan located = ahead.located.span();
     const PixelInput input{
         .sites = sites,
         .light = light,
@@ -187,7 +191,8 @@ void TileFrameRenderer::sample(Batch& batch, const FrameLight& light, SampleStat
         .has_history = ahead.history != PixelHistory::none,
         .target_before = knows_targets_ ? targets_of(index, state) : std::span<float>(),
         .old = ahead.history == PixelHistory::moved ? &ahead.old : nullptr,
-        .located = ahead.is_located ? &located : nullptr,
+        .located = ahead.is_located ? std::span(ahead.located).first(populations)
+                                    : std::span<const kernels::LocatedDirections>(),
         .memory = state.memory_of(index),
         .neighbors =
             reprojection_ != nullptr ? reprojection_->neighbors(i) : std::span<const CarriedSet>()};
@@ -256,7 +261,7 @@ void TileFrameRenderer::cast_pixel_samples(Batch& batch, std::size_t i, std::siz
 void TileFrameRenderer::cast_rays(Batch& batch, std::size_t i, const PixelRays& rays) {
   const std::size_t first = i * batch.stride;
   baton::cast_rays(rays, origins(batch.first + i), static_cast<std::uint32_t>(first), batch.rays);
-  std::copy_n(rays.bin, rays.count, &batch.bin[first]);
+  std::copy_n(rays.bin.from(0), rays.count, &batch.bin[first]);
   batch.pixels[i].radiance = rays.constant.color;
   batch.pixels[i].visibility = rays.constant.visibility;
   batch.difference[i] = rays.difference;

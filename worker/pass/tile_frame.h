@@ -48,7 +48,7 @@ class TileFrameRenderer {
   struct Ahead {
     PixelHistory history = PixelHistory::none;
     OldSurfaces old;  ///< for `moved`
-    kernels::LocatedDirections located;
+    std::array<kernels::LocatedDirections, limits::kMaxPopulations> located;
     bool is_located = false;
   };
   /// Wall seconds of the frame in work.

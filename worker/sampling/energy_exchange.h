@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "common/job/job_spec.h"
+#include "common/math/padded_array.h"
 #include "common/math/philox.h"
 #include "worker/sampling/pixel_mask.h"
 #include "worker/sampling/reflected.h"
@@ -48,7 +49,7 @@ struct Offer {
 
 /// The answer is what the receiver reflects of the sample's light; nothing without a surface, below
 /// a horizon, or when the way is blocked. Kernels write past the end of their output by this many.
-inline constexpr std::size_t kReceptionPadding = 16;
+inline constexpr std::size_t kReceptionPadding = kVectorPadding;
 /// Smaller targets count as none: their reciprocal may not be finite.
 inline constexpr float kSmallestTarget = 1e-37f;
 

@@ -11,6 +11,7 @@
 
 #include "common/base/limits.h"
 #include "common/math/lanes-inl.h"
+#include "common/math/padded_array.h"
 #include "common/math/philox-inl.h"
 #include "worker/sampling/sequential.h"
 
@@ -47,18 +48,18 @@ struct PointLanes {
   VI site;
 };
 
-/// The particles of one pixel with everything the step needs, padded to whole vectors.
+/// The particles of one pixel with everything the step needs, (N) each; the last vector is filled
+/// up with particles without weight.
 struct ParticleArrays {
-  static constexpr std::size_t kCapacity = limits::kMaxParticles;
-  HWY_ALIGN std::uint32_t code[kCapacity];
-  HWY_ALIGN std::int32_t site[kCapacity];
-  HWY_ALIGN float weight[kCapacity];  ///< sum 1; 0 past the last particle
-  HWY_ALIGN float log_before[kCapacity];
-  HWY_ALIGN float log_now[kCapacity];
-  HWY_ALIGN float inverse_density[kCapacity];
-  HWY_ALIGN float r[kCapacity], g[kCapacity], b[kCapacity];  ///< TargetLanes::reflected
-  HWY_ALIGN float
-      log_increment[kCapacity];  ///< sum over k of log p^k / p^(k-1) at the particle's positions
+  template <class T>
+  using Column = PaddedArray<T, limits::kMaxParticles>;
+  Column<std::uint32_t> code;
+  Column<std::int32_t> site;
+  Column<float> weight;  ///< sum 1
+  Column<float> log_before, log_now;
+  Column<float> inverse_density;
+  Column<float> r, g, b;        ///< TargetLanes::reflected
+  Column<float> log_increment;  ///< sum over k of log p^k / p^(k-1) at the particle's positions
 };
 
 /// Uniform in the cap of cosine `cap_cosine` around w: symmetric, so it cancels in the acceptance
@@ -103,14 +104,14 @@ class MoveRandom {
     for (std::size_t i = 0; i < count_; i += hn::Lanes(du)) {
       const auto bits = PhiloxBlock(du, rng_, move / kShare,
                                     CountFrom(du, kAcceptance + static_cast<std::uint32_t>(i)));
-      hn::Store(bits.w0, du, accept_[0] + i);
-      hn::Store(bits.w1, du, accept_[1] + i);
-      hn::Store(bits.w2, du, accept_[2] + i);
-      hn::Store(bits.w3, du, accept_[3] + i);
+      hn::Store(bits.w0, du, accept_[0].from(i));
+      hn::Store(bits.w1, du, accept_[1].from(i));
+      hn::Store(bits.w2, du, accept_[2].from(i));
+      hn::Store(bits.w3, du, accept_[3].from(i));
       // The fifth has the bits that the others leave over.
       const VU upper =
           hn::Or(hn::ShiftLeft<24>(bits.w0), hn::ShiftLeft<16>(hn::And(bits.w1, byte)));
-      hn::Store(hn::Or(upper, hn::ShiftLeft<8>(hn::And(bits.w2, byte))), du, accept_[4] + i);
+      hn::Store(hn::Or(upper, hn::ShiftLeft<8>(hn::And(bits.w2, byte))), du, accept_[4].from(i));
     }
   }
 
@@ -132,7 +133,7 @@ class MoveRandom {
   }
   /// Uniforms that accept particles i, i + 1, ...
   HWY_INLINE VF Acceptance(std::uint32_t move, std::size_t i) const {
-    return UniformLanes(DF(), hn::Load(DU(), accept_[move % kShare] + i));
+    return UniformLanes(DF(), hn::Load(DU(), accept_[move % kShare].from(i)));
   }
   /// Two words for the local proposals of particles i, i + 1, ...
   HWY_INLINE PhiloxLanes<VU> Proposal(std::uint32_t move, std::size_t i) const {
@@ -153,7 +154,7 @@ class MoveRandom {
   HWY_ALIGN std::uint32_t first_[kWindow];
   HWY_ALIGN std::uint32_t distance_[kWindow];
   HWY_ALIGN std::uint32_t site_[kWindow];
-  HWY_ALIGN std::uint32_t accept_[kShare][ParticleArrays::kCapacity];
+  ParticleArrays::Column<std::uint32_t> accept_[kShare];
 };
 
 /// Fetches the proposals of the moves that `random` knows ahead into the cache.
@@ -187,11 +188,11 @@ HWY_INLINE void MoveParticles(const Target& target, const SequentialSettings& se
 
   std::int32_t accepted = 0;
   for (std::size_t i = 0; i < count; i += hn::Lanes(d)) {
-    const VU code = hn::Load(du, p.code + i);
-    const VI site = hn::Load(di, p.site + i);
-    const VF before = hn::Load(d, p.log_before + i);
-    const VF now = hn::Load(d, p.log_now + i);
-    const VF inverse_density = hn::Load(d, p.inverse_density + i);
+    const VU code = hn::Load(du, p.code.from(i));
+    const VI site = hn::Load(di, p.site.from(i));
+    const VF before = hn::Load(d, p.log_before.from(i));
+    const VF now = hn::Load(d, p.log_now.from(i));
+    const VF inverse_density = hn::Load(d, p.inverse_density.from(i));
 
     // Propose.
     PointLanes next{code, site};
@@ -228,17 +229,17 @@ HWY_INLINE void MoveParticles(const Target& target, const SequentialSettings& se
         hn::And(hn::And(possible, inside), hn::Ge(hn::Sub(log_next, log_current), LogLanes(least)));
     accepted += static_cast<std::int32_t>(hn::CountTrue(d, accept));
 
-    hn::Store(hn::IfThenElse(hn::RebindMask(du, accept), next.code, code), du, p.code + i);
-    hn::Store(hn::IfThenElse(hn::RebindMask(di, accept), next.site, site), di, p.site + i);
-    const auto move_to = [&](VF value, float* at) HWY_ATTR {
-      hn::Store(hn::IfThenElse(accept, value, hn::Load(d, at)), d, at);
+    hn::Store(hn::IfThenElse(hn::RebindMask(du, accept), next.code, code), du, p.code.from(i));
+    hn::Store(hn::IfThenElse(hn::RebindMask(di, accept), next.site, site), di, p.site.from(i));
+    const auto move_to = [&](VF value, ParticleArrays::Column<float>& column) HWY_ATTR {
+      hn::Store(hn::IfThenElse(accept, value, hn::Load(d, column.from(i))), d, column.from(i));
     };
-    move_to(at_next.log_now, p.log_now + i);
-    move_to(at_next.inverse_density, p.inverse_density + i);
-    move_to(at_next.reflected.x, p.r + i);
-    move_to(at_next.reflected.y, p.g + i);
-    move_to(at_next.reflected.z, p.b + i);
-    if (keep_before) move_to(at_next.log_before, p.log_before + i);
+    move_to(at_next.log_now, p.log_now);
+    move_to(at_next.inverse_density, p.inverse_density);
+    move_to(at_next.reflected.x, p.r);
+    move_to(at_next.reflected.y, p.g);
+    move_to(at_next.reflected.z, p.b);
+    if (keep_before) move_to(at_next.log_before, p.log_before);
   }
   MoveCounts& counts = local ? outcome.local : outcome.independent;
   counts.proposed += settings.num_particles;

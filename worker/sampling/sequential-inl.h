@@ -25,48 +25,50 @@ HWY_INLINE void AddIncrement(float inverse_distributions, std::size_t count, Par
   const DF d;
   const VF share = hn::Set(d, inverse_distributions);
   for (std::size_t i = 0; i < count; i += hn::Lanes(d)) {
-    const VF ratio = hn::Sub(hn::Load(d, p.log_now + i), hn::Load(d, p.log_before + i));
-    hn::Store(hn::MulAdd(share, ratio, hn::Load(d, p.log_increment + i)), d, p.log_increment + i);
+    const VF ratio = hn::Sub(hn::Load(d, p.log_now.from(i)), hn::Load(d, p.log_before.from(i)));
+    hn::Store(hn::MulAdd(share, ratio, hn::Load(d, p.log_increment.from(i))), d,
+              p.log_increment.from(i));
   }
 }
 
 /// out_j = weight_j exp(log_increment_j), normalised; returns the log of the factor taken out, log
-/// sum_j weight_j exp(...), or kLogZero when every weight is 0. out: (N padded), may be p.weight.
-HWY_INLINE double ApplyIncrements(std::size_t count, const ParticleArrays& p, float* out) {
+/// sum_j weight_j exp(...), or kLogZero when every weight is 0. out: may be p.weight.
+HWY_INLINE double ApplyIncrements(std::size_t count, const ParticleArrays& p,
+                                  ParticleArrays::Column<float>& out) {
   const DF d;
   // The largest increment of a living particle is factored out so that no exp overflows.
   VF most = hn::Set(d, kLogZero);
   for (std::size_t i = 0; i < count; i += hn::Lanes(d)) {
-    const MF lives = hn::Gt(hn::Load(d, p.weight + i), hn::Zero(d));
-    most = hn::Max(most, hn::IfThenElse(lives, hn::Load(d, p.log_increment + i), most));
+    const MF lives = hn::Gt(hn::Load(d, p.weight.from(i)), hn::Zero(d));
+    most = hn::Max(most, hn::IfThenElse(lives, hn::Load(d, p.log_increment.from(i)), most));
   }
   const VF largest = hn::MaxOfLanes(d, most);
   VF sums = hn::Zero(d);
   for (std::size_t i = 0; i < count; i += hn::Lanes(d)) {
-    const VF shifted = hn::Sub(hn::Load(d, p.log_increment + i), largest);
+    const VF shifted = hn::Sub(hn::Load(d, p.log_increment.from(i)), largest);
     // exp(-87) stands in for everything smaller: a weight that small is zero.
     const MF counts = hn::Gt(shifted, hn::Set(d, -87.0f));
     const VF weight =
-        hn::IfThenElseZero(counts, hn::Mul(hn::Load(d, p.weight + i), ExpLanes(shifted)));
-    hn::Store(weight, d, out + i);
+        hn::IfThenElseZero(counts, hn::Mul(hn::Load(d, p.weight.from(i)), ExpLanes(shifted)));
+    hn::Store(weight, d, out.from(i));
     sums = hn::Add(sums, weight);
   }
   const float sum = hn::GetLane(hn::SumOfLanes(d, sums));
   if (!(hn::GetLane(largest) > kLogAlive && sum > 0)) return kLogZero;
   const VF inverse = hn::Set(d, 1 / sum);
   for (std::size_t i = 0; i < count; i += hn::Lanes(d)) {
-    hn::Store(hn::Mul(hn::Load(d, out + i), inverse), d, out + i);
+    hn::Store(hn::Mul(hn::Load(d, out.from(i)), inverse), d, out.from(i));
   }
   return double{hn::GetLane(largest)} + std::log(double{sum});
 }
 
 /// Effective sample size of the normalised weights [Kong et al. 1994]: (sum w)^2 / sum w^2.
-HWY_INLINE float EffectiveSize(std::size_t count, const float* weight) {
+HWY_INLINE float EffectiveSize(std::size_t count, const ParticleArrays::Column<float>& weight) {
   const DF d;
   VF sums = hn::Zero(d);
   VF squares = hn::Zero(d);
   for (std::size_t i = 0; i < count; i += hn::Lanes(d)) {
-    const VF w = hn::Load(d, weight + i);
+    const VF w = hn::Load(d, weight.from(i));
     sums = hn::Add(sums, w);
     squares = hn::MulAdd(w, w, squares);
   }
@@ -75,21 +77,21 @@ HWY_INLINE float EffectiveSize(std::size_t count, const float* weight) {
 }
 
 /// Mean of log p_n / p_(n-1) over the weighted particles, and the share of the weight that it is
-/// taken over: particles outside the support that both frames have in common do not count. weight:
-/// (N padded by zeros).
+/// taken over: particles outside the support that both frames have in common do not count.
 struct PathMean {
   double mean = 0;
   double share = 0;
 };
-HWY_INLINE PathMean MeanLogRatio(std::size_t count, const ParticleArrays& p, const float* weight) {
+HWY_INLINE PathMean MeanLogRatio(std::size_t count, const ParticleArrays& p,
+                                 const ParticleArrays::Column<float>& weight) {
   const DF d;
   VF sums = hn::Zero(d);
   VF shares = hn::Zero(d);
   for (std::size_t i = 0; i < count; i += hn::Lanes(d)) {
-    const VF before = hn::Load(d, p.log_before + i);
-    const VF now = hn::Load(d, p.log_now + i);
+    const VF before = hn::Load(d, p.log_before.from(i));
+    const VF now = hn::Load(d, p.log_now.from(i));
     const MF common = hn::Gt(hn::Min(before, now), hn::Set(d, kLogAlive));
-    const VF w = hn::IfThenElseZero(common, hn::Load(d, weight + i));
+    const VF w = hn::IfThenElseZero(common, hn::Load(d, weight.from(i)));
     shares = hn::Add(shares, w);
     sums = hn::MulAdd(w, hn::Sub(now, before), sums);
   }
@@ -129,9 +131,10 @@ class PathSum {
 
 /// column_m = column_(ancestors_m).
 template <class T>
-HWY_INLINE void Inherit(std::size_t count, const std::int32_t* ancestors, T* column) {
-  T old[ParticleArrays::kCapacity];
-  std::copy_n(column, count, old);
+HWY_INLINE void Inherit(std::size_t count, const std::int32_t* ancestors,
+                        ParticleArrays::Column<T>& column) {
+  T old[limits::kMaxParticles];
+  std::copy_n(column.from(0), count, old);
   for (std::size_t m = 0; m < count; ++m) column[m] = old[ancestors[m]];
 }
 
@@ -140,14 +143,14 @@ HWY_INLINE void ResampleIfNeeded(const SequentialSettings& settings, const Rng& 
                                  ParticleArrays& p, SequentialOutcome& outcome) {
   const auto count = static_cast<std::size_t>(settings.num_particles);
   if (!(outcome.ess < settings.ess_ratio_min * static_cast<float>(count))) return;
-  std::int32_t ancestors[ParticleArrays::kCapacity];
-  resample(settings.resampling, {p.weight, count}, {ancestors, count}, rng, 0);
+  std::int32_t ancestors[limits::kMaxParticles];
+  resample(settings.resampling, p.weight.first(count), {ancestors, count}, rng, 0);
   Inherit(count, ancestors, p.code);
   Inherit(count, ancestors, p.site);
-  for (float* column : {p.log_before, p.log_now, p.inverse_density, p.r, p.g, p.b}) {
-    Inherit(count, ancestors, column);
+  for (auto* column : {&p.log_before, &p.log_now, &p.inverse_density, &p.r, &p.g, &p.b}) {
+    Inherit(count, ancestors, *column);
   }
-  std::fill_n(p.weight, count, 1.0f / static_cast<float>(count));
+  std::fill_n(p.weight.from(0), count, 1.0f / static_cast<float>(count));
   outcome.resampled = true;
 }
 
@@ -156,34 +159,31 @@ template <class Target>
 HWY_INLINE void LoadParticles(const Target& target, std::size_t count,
                               const ParticleSpan& particles, ParticleArrays& p) {
   const DF d;
-  const std::size_t padded = hwy::RoundUpTo(count, hn::Lanes(d));
   const bool knows_before = particles.target_before != nullptr;
   for (std::size_t i = 0; i < count; i += hn::Lanes(d)) {
-    hn::Store(LoadSome(DU(), {particles.direction, count}, i), DU(), p.code + i);
-    hn::Store(LoadBytes({particles.site, count}, i), DI(), p.site + i);
-    hn::Store(LoadSome({particles.weight, count}, i), d, p.weight + i);
+    hn::Store(LoadSome(DU(), {particles.direction, count}, i), DU(), p.code.from(i));
+    hn::Store(LoadBytes({particles.site, count}, i), DI(), p.site.from(i));
+    hn::Store(LoadSome({particles.weight, count}, i), d, p.weight.from(i));
     if (knows_before) {
-      hn::Store(LoadSome({particles.target_before, count}, i), d, p.log_before + i);
+      hn::Store(LoadSome({particles.target_before, count}, i), d, p.log_before.from(i));
     }
-    hn::Store(hn::Zero(d), d, p.log_increment + i);
+    hn::Store(hn::Zero(d), d, p.log_increment.from(i));
   }
   // Past the last particle lie copies of it that weigh nothing.
-  for (std::size_t i = count; i < padded; ++i) {
-    p.code[i] = p.code[count - 1];
-    p.site[i] = p.site[count - 1];
-    p.log_before[i] = p.log_before[count - 1];
-  }
+  p.code.pad(count, p.code[count - 1]);
+  p.site.pad(count, p.site[count - 1]);
+  if (knows_before) p.log_before.pad(count, p.log_before[count - 1]);
   for (std::size_t i = 0; i < count; i += hn::Lanes(d)) {
-    const PointLanes point{hn::Load(DU(), p.code + i), hn::Load(DI(), p.site + i)};
+    const PointLanes point{hn::Load(DU(), p.code.from(i)), hn::Load(DI(), p.site.from(i))};
     TargetLanes at;
     target.EvaluateCarried(i, point, !knows_before, at);
-    if (knows_before) at.log_before = LogOrZero(hn::Load(d, p.log_before + i));
-    hn::Store(at.log_before, d, p.log_before + i);
-    hn::Store(at.log_now, d, p.log_now + i);
-    hn::Store(at.inverse_density, d, p.inverse_density + i);
-    hn::Store(at.reflected.x, d, p.r + i);
-    hn::Store(at.reflected.y, d, p.g + i);
-    hn::Store(at.reflected.z, d, p.b + i);
+    if (knows_before) at.log_before = LogOrZero(hn::Load(d, p.log_before.from(i)));
+    hn::Store(at.log_before, d, p.log_before.from(i));
+    hn::Store(at.log_now, d, p.log_now.from(i));
+    hn::Store(at.inverse_density, d, p.inverse_density.from(i));
+    hn::Store(at.reflected.x, d, p.r.from(i));
+    hn::Store(at.reflected.y, d, p.g.from(i));
+    hn::Store(at.reflected.z, d, p.b.from(i));
   }
 }
 
@@ -232,8 +232,8 @@ HWY_INLINE SequentialOutcome SequentialStep(const Target& target,
       MoveParticles(target, settings, tempering_beta, keep_before, random, move, p, outcome);
     }
     if (!path.used()) continue;
-    HWY_ALIGN float weight[ParticleArrays::kCapacity];
-    std::copy_n(p.weight, hwy::RoundUpTo(count, hn::Lanes(DF())), weight);
+    ParticleArrays::Column<float> weight;
+    std::copy_n(p.weight.from(0), hwy::RoundUpTo(count, hn::Lanes(DF())), weight.from(0));
     if (distributions > 1) ApplyIncrements(count, p, weight);
     path.Add(k, MeanLogRatio(count, p, weight));
   }
@@ -245,12 +245,12 @@ HWY_INLINE SequentialOutcome SequentialStep(const Target& target,
   outcome.alive = outcome.lns > 0 && std::isfinite(outcome.lns);
   const DF d;
   for (std::size_t i = 0; i < count; i += hn::Lanes(d)) {
-    StoreSome(DU(), hn::Load(DU(), p.code + i), {particles.direction, count}, i);
-    StoreBytes(hn::Load(DI(), p.site + i), {particles.site, count}, i);
-    StoreSome(hn::Load(d, p.weight + i), {particles.weight, count}, i);
-    StoreSome(hn::Load(d, p.r + i), {particles.r, count}, i);
-    StoreSome(hn::Load(d, p.g + i), {particles.g, count}, i);
-    StoreSome(hn::Load(d, p.b + i), {particles.b, count}, i);
+    StoreSome(DU(), hn::Load(DU(), p.code.from(i)), {particles.direction, count}, i);
+    StoreBytes(hn::Load(DI(), p.site.from(i)), {particles.site, count}, i);
+    StoreSome(hn::Load(d, p.weight.from(i)), {particles.weight, count}, i);
+    StoreSome(hn::Load(d, p.r.from(i)), {particles.r, count}, i);
+    StoreSome(hn::Load(d, p.g.from(i)), {particles.g, count}, i);
+    StoreSome(hn::Load(d, p.b.from(i)), {particles.b, count}, i);
   }
   return outcome;
 }

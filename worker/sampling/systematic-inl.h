@@ -10,7 +10,9 @@
 
 #include <bit>
 
+#include "common/base/limits.h"
 #include "common/math/lanes-inl.h"
+#include "common/math/padded_array.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace baton::HWY_NAMESPACE {
@@ -55,6 +57,7 @@ class RunningSums {
   }
 
   static constexpr std::size_t kGroup = 2 * hn::MaxLanes(DF());
+  static_assert(kGroup <= kVectorPadding);
 
   /// After Finish: the weights that hold kGroup positions, each in [0, total], total > 0; never one
   /// of weight 0. Two searches run side by side: one alone waits for its own look-ups.
@@ -120,7 +123,7 @@ class RunningSums {
 /// picks: the weights that hold positions (m + u) total / count of the line, m = 0 ... count - 1,
 /// and what fills up the last group.
 HWY_INLINE void SystematicPicks(const RunningSums& sums, float total, float u, std::size_t count,
-                                std::int32_t* picks) {
+                                PaddedArray<std::int32_t, limits::kMaxParticles>& picks) {
   const DF d;
   const VF last = hn::Set(d, static_cast<float>(count - 1));
   const VF stride = hn::Set(d, total / static_cast<float>(count));
@@ -129,7 +132,7 @@ HWY_INLINE void SystematicPicks(const RunningSums& sums, float total, float u, s
     return hn::Mul(hn::Add(number, hn::Set(d, u)), stride);
   };
   for (std::size_t m = 0; m < count; m += RunningSums::kGroup) {
-    sums.Find({position(m), position(m + hn::Lanes(d))}, picks + m);
+    sums.Find({position(m), position(m + hn::Lanes(d))}, picks.from(m));
   }
 }
 

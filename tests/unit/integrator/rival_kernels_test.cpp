@@ -42,7 +42,7 @@ class RivalKernels : public OnInstructionSet {
  protected:
   void SetUp() override {
     OnInstructionSet::SetUp();
-    for (std::uint32_t i = 0; i < kernels::RestirPoints::kCapacity; ++i) {
+    for (std::uint32_t i = 0; i < kernels::RestirPoints::kMost; ++i) {
       points_->code[i] = (i + 1) * 2654435761u;
       points_->site[i] = static_cast<std::uint8_t>(i % 4);
       points_->r[i] = points_->target_now[i] = points_->target_before[0][i] =
@@ -157,6 +157,23 @@ TEST(TurnBetween, KnowsHowABilinearMapTurnedUnlessItIsNextToNothing) {
   nearest.map =
       std::make_shared<EnvironmentMap>(RgbImage{1, 1, {1, 1, 1}}, MapFilter::nearest, 1.0f, false);
   EXPECT_FALSE(turn_between(nearest, {nearest.map, rotation_about({0, 1, 0}, 90)}));
+}
+
+// The sum of the weights is theirs alone, however the two kinds of candidates fill their vectors.
+TEST_P(RivalKernels, CandidatesOfAnyNumberIgnoreWhatTheSetHeld) {
+  const SiteBlock sites = pixel(0.1f);
+  const Rng rng({.job_seed = 5}, PassId::candidates);
+  const auto set = std::make_unique<kernels::CandidateSet>();
+  for (std::int32_t from_light = 0; from_light <= 17; ++from_light) {
+    for (std::int32_t from_bsdf = from_light == 0 ? 1 : 0; from_bsdf <= 17; ++from_bsdf) {
+      for (std::size_t i = 0; i < 64; ++i) set->weight[i] = kUntouched;
+      kernels::draw_candidates(sites, view_of(now_), light_pool_,
+                               {.from_light = from_light, .from_bsdf = from_bsdf}, rng, *set);
+      double sum = 0;
+      for (std::size_t i = 0; i < static_cast<std::size_t>(set->count); ++i) sum += set->weight[i];
+      ASSERT_NEAR(set->total, sum, 1e-5 * sum) << from_light << " + " << from_bsdf;
+    }
+  }
 }
 
 // Without shadows the ratio estimator is the sum of all candidates, per channel.

@@ -40,9 +40,9 @@ void SystematicChoice(std::span<const float> weights, float u, std::span<std::in
   RunningSums sums(storage);
   for (std::size_t i = 0; i < weights.size(); i += kLanes) sums.end.Add(LoadWeights(weights, i));
   const float total = sums.Finish();
-  HWY_ALIGN std::int32_t picks[limits::kMaxParticles + RunningSums::kGroup];
+  PaddedArray<std::int32_t, limits::kMaxParticles> picks;
   SystematicPicks(sums, total, u, chosen.size(), picks);
-  std::copy_n(picks, chosen.size(), chosen.data());
+  std::copy_n(picks.from(0), chosen.size(), chosen.data());
 }
 
 }  // namespace baton::HWY_NAMESPACE
