@@ -57,6 +57,12 @@ struct ParsedJobDocument {
 };
 Result<ParsedJobDocument> parse_job_document(std::string_view text);
 
+/// What decides the pixels of two jobs and differs: the JSON paths, and the files whose content
+/// changed; sorted. Left out are settings: which frames, in which tiles, when and by whom, and how
+/// they are stored.
+std::vector<std::string> picture_differences(const ParsedJobDocument& a,
+                                             const ParsedJobDocument& b);
+
 /// Checks that every asset still has the digest it had at submission. The error names each file
 /// that changed.
 Status verify_assets(const std::vector<AssetDigest>& assets);

@@ -13,6 +13,17 @@ std::string_view task_name(TaskKind kind) {
   return "unknown";
 }
 
+std::string_view job_status_name(JobStatus status) {
+  switch (status) {
+    case JobStatus::running: return "running";
+    case JobStatus::done: return "done";
+    case JobStatus::failed: return "failed";
+    case JobStatus::cancelled: return "cancelled";
+    case JobStatus::paused: return "paused";
+  }
+  return "unknown";
+}
+
 void SamplingStats::count_ess(float ess_ratio) {
   const auto bin = static_cast<std::size_t>(std::clamp(ess_ratio, 0.0f, 1.0f) * kEssBins);
   ++ess_histogram[std::min(bin, kEssBins - 1)];

@@ -50,6 +50,8 @@ struct BlobRef {
 /// Where a job stands. Stored and sent; values are for ever. Of a paused job no task is handed out.
 enum class JobStatus : std::uint8_t { running = 0, done = 1, failed = 2, cancelled = 3, paused = 4 };
 constexpr JobStatus last_of(JobStatus) { return JobStatus::paused; }
+/// "running" ... "paused".
+std::string_view job_status_name(JobStatus status);
 /// Whether the job has not ended.
 constexpr bool is_open(JobStatus status) {
   return status == JobStatus::running || status == JobStatus::paused;

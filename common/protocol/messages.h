@@ -17,7 +17,7 @@ namespace baton {
 /// messages carry their digests.
 
 inline constexpr const char* kProtocolName = "BATON";
-inline constexpr std::uint16_t kProtocolVersion = 2;
+inline constexpr std::uint16_t kProtocolVersion = 3;
 
 // ---- worker to coordinator ----------------------------------------------------------------------
 struct WorkerHello {  ///< first, and again after a reconnect or a new epoch
@@ -71,7 +71,8 @@ struct Drain { template <class A> void fields(A& a) { a(); } };
 struct Shutdown { template <class A> void fields(A& a) { a(); } };
 
 // ---- client to coordinator ----------------------------------------------------------------------
-struct SubmitJob { std::string json; template <class A> void fields(A& a) { a(json); } };
+/// restart: frames of another picture in the output folder may be replaced.
+struct SubmitJob { std::string json; bool restart = false; template <class A> void fields(A& a) { a(json, restart); } };
 struct ListJobs { template <class A> void fields(A& a) { a(); } };
 struct ShowJob { std::string job; template <class A> void fields(A& a) { a(job); } };  ///< digest or unique prefix
 struct PauseJob { std::string job; template <class A> void fields(A& a) { a(job); } };

@@ -46,6 +46,11 @@ struct JobAdded {
 struct JobCancelled {
   Digest job;
 };
+/// Another job's frames take the place of some of this one's: it ends, and those are gone.
+struct JobSuperseded {
+  Digest job;
+  std::vector<TaskKey> replaced;
+};
 /// No more of its tasks are granted until it is resumed; what is leased goes on.
 struct JobPaused {
   Digest job;
@@ -99,7 +104,7 @@ struct InputsLost {
 /// Time has passed: who was silent for too long?
 struct ClockTicked {};
 
-using Event = std::variant<JobAdded, JobCancelled, JobPaused, JobResumed, WorkerJoined, WorkerAlive,
+using Event = std::variant<JobAdded, JobCancelled, JobSuperseded, JobPaused, JobResumed, WorkerJoined, WorkerAlive,
                            WorkerLeft, WorkRequested, TaskCompleted, AttemptFailed, ResultMissing,
                            InputsLost, ClockTicked>;
 

@@ -87,6 +87,20 @@ void Scheduler::on(const JobCancelled& event, TimePoint, Actions& actions) {
   end_job(event.job, *job, JobStatus::cancelled, "cancelled", actions);
 }
 
+void Scheduler::on(const JobSuperseded& event, TimePoint, Actions& actions) {
+  Job* job = find(event.job);
+  if (!job) return;
+  const std::string reason = "frames of another job take the place of its own";
+  if (is_open(job->status)) {
+    end_job(event.job, *job, JobStatus::cancelled, reason, actions);
+  } else if (job->status == JobStatus::done) {
+    job->status = JobStatus::cancelled;
+    actions.push_back(RecordJobStatus{event.job, job->status, reason});
+  }
+  reopen(event.job, *job, event.replaced, actions);
+  job->tasks.cancel_open();
+}
+
 void Scheduler::on(const JobPaused& event, TimePoint, Actions& actions) {
   Job* job = find(event.job);
   if (!job || job->status != JobStatus::running) return;

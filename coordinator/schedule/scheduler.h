@@ -71,6 +71,7 @@ class Scheduler {
 
   void on(const JobAdded& event, TimePoint now, Actions& actions);
   void on(const JobCancelled& event, TimePoint now, Actions& actions);
+  void on(const JobSuperseded& event, TimePoint now, Actions& actions);
   void on(const JobPaused& event, TimePoint now, Actions& actions);
   void on(const JobResumed& event, TimePoint now, Actions& actions);
   void on(const WorkerJoined& event, TimePoint now, Actions& actions);

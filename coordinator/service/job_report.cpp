@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <filesystem>
+#include <set>
 
 namespace baton {
 namespace {
@@ -79,6 +80,23 @@ Result<Digest> resolve_job(const Scheduler& scheduler, const std::string& prefix
                                          ? fmt::format("job '{}': no job has this ID", prefix)
                                          : fmt::format("job '{}': {} jobs have IDs that begin so",
                                                        prefix, matches.size())};
+}
+
+std::vector<TaskKey> replaced_frames(const Scheduler::Job& rival, const JobSpec& job) {
+  std::vector<TaskKey> replaced;
+  if (fs::path(rival.spec.output.directory).lexically_normal() !=
+      fs::path(job.output.directory).lexically_normal())
+    return replaced;
+  std::set<std::string> names;
+  for (const int frame : job.frames) names.insert(frame_file_name(job.output.pattern, frame));
+  for (TaskIndex frame = 0; frame < rival.tasks.graph().num_frames(); ++frame) {
+    const bool is_there = rival.tasks.status(frame) == TaskStatus::done;
+    const int number = rival.spec.frames[static_cast<std::size_t>(frame)];
+    if ((is_there || is_open(rival.status)) &&
+        names.contains(frame_file_name(rival.spec.output.pattern, number)))
+      replaced.push_back(rival.tasks.graph().key(frame));
+  }
+  return replaced;
 }
 
 LostFiles find_lost_files(const JobAdded& job, const BlobStore& store) {

@@ -19,6 +19,10 @@ JobDetail describe_job(const Digest& digest, const Scheduler::Job& job,
 /// The one job whose digest starts with the hexadecimal `prefix`. Errors: none, or more than one.
 Result<Digest> resolve_job(const Scheduler& scheduler, const std::string& prefix);
 
+/// The assemble tasks of `rival` whose frames a job would write over: those that are done, or of an
+/// open job all.
+std::vector<TaskKey> replaced_frames(const Scheduler::Job& rival, const JobSpec& job);
+
 /// What is not there of the files that a job's recorded completions promise: blobs that are still
 /// needed, and finished frames. Sizes are compared, contents are not read.
 struct LostFiles {

@@ -6,6 +6,7 @@
 #include <string>
 #include <vector>
 
+#include "common/job/job_json.h"
 #include "common/protocol/router.h"
 #include "common/store/blob_store.h"
 #include "coordinator/journal/journal.h"
@@ -69,6 +70,7 @@ class Service {
   Status receive(const PeerId& peer, const ResumeJob& message);
   Status receive(const PeerId& peer, const DrainWorker& message);
   Status receive(const PeerId& peer, const StopCoordinator& message);
+  Status make_way(const ParsedJobDocument& document, bool restart);
   Status start_again(JobAdded event, JobStatus status, bool& already_there);
   Result<LostFiles> lost_files_of(const Digest& job);
   static void tell_lost(const Digest& job, const LostFiles& lost);

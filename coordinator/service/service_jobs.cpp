@@ -1,6 +1,8 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
+#include <algorithm>
+#include <span>
 #include <utility>
 
 #include "common/base/limits.h"
@@ -86,6 +88,12 @@ Status Service::receive(const PeerId& peer, const SubmitJob& message) {
     return {};
   }
 
+  if (const Status way = make_way(*document, message.restart); !way) {
+    if (way.error().kind != ErrorKind::bad_input) return way;
+    refuse(peer, way.error());
+    return {};
+  }
+
   const Digest digest = document->digest;
   JobAdded event{digest, std::move(document->job), JobStatus::running, {}, {}};
   bool already_there = false;
@@ -102,6 +110,42 @@ Status Service::receive(const PeerId& peer, const SubmitJob& message) {
     BATON_TRY(step(event));
   }
   reply(peer, JobAccepted{digest, already_there});
+  return {};
+}
+
+/// A frame belongs to one job. Those whose frames the new one would replace end, if that is wanted
+/// or their pictures are the same; bad_input: it is not.
+Status Service::make_way(const ParsedJobDocument& document, bool restart) {
+  std::vector<JobSuperseded> superseded;
+  for (const Digest& digest : scheduler_.jobs()) {
+    if (digest == document.digest) continue;
+    const Scheduler::Job& rival = *scheduler_.find_job(digest);
+    std::vector<TaskKey> replaced = replaced_frames(rival, document.job);
+    if (replaced.empty()) continue;
+    BATON_ASSIGN(const std::optional<std::string> text, journal_.document(digest));
+    const Result<ParsedJobDocument> other = parse_job_document(text.value_or(""));
+    const std::vector<std::string> differing =
+        other ? picture_differences(*other, document) : std::vector<std::string>{"the whole job"};
+    if (!differing.empty() && !restart) {
+      constexpr std::size_t kMost = 8;
+      const auto shown = std::span(differing).first(std::min(kMost, differing.size()));
+      return Error{
+          ErrorKind::bad_input,
+          fmt::format("job '{}': its frames would replace those of job {} ('{}', {}, {} of {} "
+                      "frames) in {}, which is another picture; what differs: {}{}\n"
+                      "--restart replaces them, another output.directory keeps them",
+                      document.job.name, digest.short_hex(), rival.spec.name,
+                      job_status_name(rival.status), rival.tasks.progress().frames_done,
+                      rival.spec.frames.size(), document.job.output.directory,
+                      fmt::join(shown, ", "), differing.size() > kMost ? ", ..." : "")};
+    }
+    superseded.push_back({digest, std::move(replaced)});
+  }
+  for (JobSuperseded& event : superseded) {
+    spdlog::info("job {} makes way for job {}: {} frames", event.job.short_hex(),
+                 document.digest.short_hex(), event.replaced.size());
+    BATON_TRY(step(std::move(event)));
+  }
   return {};
 }
 

@@ -27,6 +27,7 @@ struct JobOptions {
   std::string endpoint;
   std::string job;       ///< file to submit, or digest or unique prefix
   double timeout_s = 0;  ///< of wait; 0: none
+  bool restart = false;  ///< of submit
   bool json = false;
 };
 
@@ -46,7 +47,7 @@ Result<ExitCode> submit(const JobOptions& options, RequestClient& client) {
   BATON_TRY(settle_method(job, pilot_farm(job)));
   BATON_ASSIGN(std::string document, make_job_document(job));
   BATON_ASSIGN(const JobAccepted accepted,
-               ask<JobAccepted>(client, SubmitJob{std::move(document)}));
+               ask<JobAccepted>(client, SubmitJob{std::move(document), options.restart}));
   if (options.json) {
     fmt::print(
         "{}\n",
@@ -177,7 +178,9 @@ void add_job_command(CLI::App& app, ExitCode& code) {
         [options, action, &code] { code = finish_with_coordinator(run_job(*options, action)); });
     return command;
   };
-  add("submit", "Hands a job over; prints its ID", "JOB", submit);
+  add("submit", "Hands a job over; prints its ID", "JOB", submit)
+      ->add_flag("--restart", options->restart,
+                 "replace the frames of another picture in the output folder");
   add("list", "All jobs of the coordinator", nullptr, list);
   add("show", "One job: progress, statistics, failures", "ID", show);
   add("pause", "Hands out no more of a job's tasks; those that run are finished", "ID",

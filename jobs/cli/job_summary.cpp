@@ -27,22 +27,6 @@ void add_sampling(const SamplingStats& s, ordered_json& object) {
 
 }  // namespace
 
-const char* job_status_name(JobStatus status) {
-  switch (status) {
-    case JobStatus::running:
-      return "running";
-    case JobStatus::done:
-      return "done";
-    case JobStatus::failed:
-      return "failed";
-    case JobStatus::cancelled:
-      return "cancelled";
-    case JobStatus::paused:
-      return "paused";
-  }
-  return "unknown";
-}
-
 ExitCode exit_code_of(JobStatus status) {
   switch (status) {
     case JobStatus::running:

@@ -8,9 +8,6 @@
 
 namespace baton {
 
-/// "running", "paused", "done", "failed" or "cancelled".
-const char* job_status_name(JobStatus status);
-
 /// How a command about a job in this status ends; running and paused are ok.
 ExitCode exit_code_of(JobStatus status);
 

@@ -28,6 +28,7 @@ struct RenderOptions {
   int workers = 0;             ///< 0: one, whose threads share scene and light
   int threads_per_worker = 0;  ///< 0: the processors shared out
   std::string work_directory;  ///< empty: .baton in the output folder
+  bool restart = false;
   bool keep_running = false;
   bool json = false;
 };
@@ -107,7 +108,8 @@ Result<ExitCode> run_render(const RenderOptions& options) {
   BATON_ASSIGN(LocalFarm farm, LocalFarm::start(farm_setup));
   BATON_ASSIGN(RequestClient client, RequestClient::connect(farm.endpoint()));
   BATON_ASSIGN(const std::optional<JobAccepted> accepted,
-               ask_farm<JobAccepted>(farm, client, signals, SubmitJob{std::move(document)}));
+               ask_farm<JobAccepted>(farm, client, signals,
+                                     SubmitJob{std::move(document), options.restart}));
   if (accepted && accepted->already_there) spdlog::info("going on with what is done already");
 
   FrameSheet sheet(job);
@@ -151,6 +153,8 @@ void add_render_command(CLI::App& app, ExitCode& code) {
       ->check(CLI::Range(1, 1024));
   command->add_option("--work-dir", options->work_directory,
                       "journal, blobs and logs; default: .baton in the output folder");
+  command->add_flag("--restart", options->restart,
+                    "replace the frames of another picture in the output folder");
   command->add_flag("--keep-running", options->keep_running,
                     "keep coordinator and workers until Ctrl-C");
   command->add_flag("--json", options->json, "the result for machines");

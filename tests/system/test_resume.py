@@ -4,7 +4,7 @@
 import json
 import re
 
-from farm import Process, check, check_equal, make_job, run_tests, wait_until, write_job
+from farm import BAD_INPUT, Farm, Process, check, check_equal, make_job, run_tests, wait_until, write_job
 
 SLOW = {"numParticles": 16, "numCandidates": 512, "numDistributions": 48}
 
@@ -57,5 +57,109 @@ def a_finished_render_has_nothing_to_do(programs, folder):
     check_equal(programs.pixels(folder / "frames"), before, "pixels after the second run")
 
 
+def an_edited_job_does_not_mix_with_the_one_before(programs, folder):
+    """Rendered, edited and rendered, edited back and rendered: each time the frames are the job's own, or it is refused."""
+    first = write_job(folder / "job.json", make_job(folder, frames="1-4"))
+    edited = write_job(folder / "edited.json", make_job(folder, frames="1-4", seed=8))
+    programs.render(first, folder / "work")
+    expected = programs.pixels(folder / "frames")
+    refused = programs.render(edited, folder / "work", expect=BAD_INPUT)
+    check("what differs: $.seed" in refused.stderr and "--restart" in refused.stderr, refused.stderr)
+    check_equal(programs.pixels(folder / "frames"), expected, "frames after a refusal")
+    programs.render(edited, folder / "work", extra=["--restart"])
+    check(programs.pixels(folder / "frames") != expected, "the edited job did not replace the frames")
+    programs.render(first, folder / "work", expect=BAD_INPUT)
+    programs.render(first, folder / "work", extra=["--restart"])
+    check_equal(programs.pixels(folder / "frames"), expected, "frames of the first job, rendered again")
+
+    # Another setting is no other picture.
+    tiles = write_job(folder / "tiles.json", make_job(folder, frames="1-4", image={"tileSize": 16}, name="tiles"))
+    programs.render(tiles, folder / "work")
+    check_equal(programs.pixels(folder / "frames"), expected, "frames in other tiles")
+
+
+def what_is_gone_is_made_again_and_only_that(programs, folder):
+    """A frame, a state and a film that are gone or damaged, in jobs that are done, running and failed."""
+    changes = {"frames": "1-6", "sampling": {"method": "bidirectional"}, "state": {"carry": False, "keep": "last"}}
+    for name, extra in {"plain": {}, "correlated": {"visibility": {"correlated": True}}}.items():
+        place = folder / name
+        job = make_job(place, **changes, **extra)
+        del job["sampling"]["numDistributions"]
+        path = write_job(place / "job.json", job)
+        with Farm(programs, place / "farm") as farm:
+            farm.start_coordinator()
+            farm.start_worker(threads=2)
+            ident = farm.submit(path)
+            farm.wait_for(ident)
+            expected = programs.pixels(place / "frames")
+            written = {file.name: file.stat().st_mtime_ns for file in (place / "frames").glob("*.exr")}
+
+            # One frame is gone: one frame is written.
+            (place / "frames/frame.0004.exr").unlink()
+            farm.submit(path)
+            farm.wait_for(ident)
+            check_equal(programs.pixels(place / "frames"), expected, f"frames of {name} after one was gone")
+            again = [n for n, time in written.items() if (place / "frames" / n).stat().st_mtime_ns != time]
+            check_equal(again, ["frame.0004.exr"], "frames that were written again")
+
+
+def damaged_blobs_are_made_again(programs, folder):
+    """One byte of every blob is changed while no worker is there: nothing fails, every frame is right."""
+    path = make(folder)
+    witness = folder / "witness"
+    programs.render(make(witness), witness / "work", workers=2)
+    with Farm(programs, folder / "farm") as farm:
+        farm.start_coordinator()
+        worker = farm.start_worker()
+        ident = farm.submit(path)
+        wait_until(lambda: num_blobs(farm.work_folder) >= 12, "the first results are in the store")
+        worker.kill()
+        damaged = 0
+        for number, blob in enumerate(sorted(farm.work_folder.rglob("*.blob"))):
+            content = bytearray(blob.read_bytes())
+            content[len(content) // 2] ^= 0x10
+            blob.write_bytes(bytes(content[:-1] if number % 2 else content))
+            damaged += 1
+        check(damaged >= 12, f"only {damaged} blobs were there to be damaged")
+        farm.start_worker()
+        farm.wait_for(ident)
+        check_equal(farm.show(ident)["status"], "done", "status")
+    check_equal(programs.pixels(folder / "frames"), programs.pixels(witness / "frames"), "pixels")
+
+
+def a_killed_coordinator_goes_on_with_a_second_pass(programs, folder):
+    """Every kind of task comes back from the journal as it was."""
+    for method in ["sequential", "bidirectional"]:
+        place = folder / method
+        sampling = {**SLOW, "method": method}
+        if method != "sequential":
+            del sampling["numDistributions"]
+            sampling["numCandidates"] = 4096
+        changes = {"frames": "1-4", "image": {"tileSize": 32}, "visibility": {"correlated": True}}
+        job = make_job(place, **changes)
+        job["sampling"] = sampling
+        path = write_job(place / "job.json", job)
+        with Farm(programs, place / "farm") as farm:
+            farm.start_coordinator()
+            worker = farm.start_worker()
+            ident = farm.submit(path)
+            wait_until(lambda: farm.show(ident)["framesDone"] >= 1, "a frame is done")
+            before = farm.show(ident)
+            farm.coordinator.kill()
+            farm.start_coordinator()
+            after = farm.show(ident)
+            check(after["tasksDone"] >= before["tasksDone"], f"forgot tasks: {before['tasksDone']}, {after['tasksDone']}")
+            farm.wait_for(ident)
+            check_equal(farm.show(ident)["status"], "done", f"status of {method}")
+            check(worker.alive(), "the worker ended with its coordinator")
+
+
 if __name__ == "__main__":
-    run_tests([a_killed_render_goes_on, a_finished_render_has_nothing_to_do])
+    run_tests([
+        a_killed_render_goes_on,
+        a_finished_render_has_nothing_to_do,
+        an_edited_job_does_not_mix_with_the_one_before,
+        what_is_gone_is_made_again_and_only_that,
+        damaged_blobs_are_made_again,
+        a_killed_coordinator_goes_on_with_a_second_pass,
+    ])

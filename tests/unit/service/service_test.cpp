@@ -234,6 +234,45 @@ TEST_F(ServiceTest, ADoneJobOfWhichAFrameIsGoneOrCutMakesThatFrameAgain) {
   }
 }
 
+// A frame belongs to one job: another picture is refused, another setting takes its place.
+TEST_F(ServiceTest, AnOutputFolderBelongsToOneJob) {
+  const RunningService service(options);
+  const Digest id = ask<JobAccepted>(service.endpoint(), SubmitJob{document}).job;
+  JobSpec other = job;
+  other.seed = 99;
+  other.sampling.num_particles += 1;
+  const std::string edited = make_job_document(other).value();
+  const Error refusal = refused(service.endpoint(), SubmitJob{edited});
+  EXPECT_EQ(refusal.kind, ErrorKind::bad_input);
+  EXPECT_THAT(refusal.message, HasSubstr("what differs: $.sampling.numParticles, $.seed"));
+  EXPECT_EQ(show(service.endpoint(), id).summary.status, JobStatus::running);
+
+  // Who wants it replaces the frames; then the first picture is the other one.
+  const Digest second = ask<JobAccepted>(service.endpoint(), SubmitJob{edited, true}).job;
+  EXPECT_EQ(show(service.endpoint(), id).summary.status, JobStatus::cancelled);
+  FakeWorker worker(service.endpoint(), store(), other);
+  worker.hello();
+  for (int i = 0; i < kNumTasks; ++i) worker.do_one_task();
+  worker.say(LeaseRequest{0});
+  worker.say(Heartbeat{});
+  worker.expect<Heartbeat>();
+  EXPECT_EQ(show(service.endpoint(), second).summary.status, JobStatus::done);
+  EXPECT_THAT(refused(service.endpoint(), SubmitJob{document}).message, HasSubstr("4 of 4 frames"));
+  EXPECT_FALSE(ask<JobAccepted>(service.endpoint(), SubmitJob{document, true}).already_there);
+  EXPECT_EQ(show(service.endpoint(), second).summary.status, JobStatus::cancelled);
+  EXPECT_THAT(show(service.endpoint(), second).frames_done, SizeIs(0));
+
+  // The same picture with another priority, and other frames, are no rivals.
+  JobSpec urgent = job;
+  urgent.priority = 7;
+  EXPECT_FALSE(ask<JobAccepted>(service.endpoint(), SubmitJob{make_job_document(urgent).value()})
+                   .already_there);
+  EXPECT_EQ(show(service.endpoint(), id).summary.status, JobStatus::cancelled);
+  JobSpec later = other;
+  later.frames = {5, 6};
+  ask<JobAccepted>(service.endpoint(), SubmitJob{make_job_document(later).value()});
+}
+
 // What is read of a folder that is not mounted is not the truth.
 TEST_F(ServiceTest, ARunningJobWaitsForItsOutputFolder) {
   Digest id;
