@@ -10,7 +10,7 @@ from random_job_schema import SchemaDraw
 
 # Particles and candidates: every remainder modulo 8, one, powers of two and the most.
 NUM_PARTICLES = [1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 12, 13, 14, 16, 16, 18, 20, 23, 24, 31, 32, 34, 40, 57, 63, 64]
-NUM_CANDIDATES = [1, 2, 7, 8, 9, 16, 24, 25, 27, 33, 50, 64, 70, 100, 128, 130, 257, 400, 1000]
+NUM_CANDIDATES = [1, 2, 7, 8, 9, 13, 16, 24, 25, 27, 33, 50, 64, 70, 100, 128, 130, 257, 400, 1000]
 FRESH_METHODS = {"environment", "brdf", "mis", "bidirectional"}
 # What no draw may cost, in about 50 ns: surfaces, candidates and moves of all pixels and frames.
 MOST_WORK = 4e6
@@ -173,8 +173,8 @@ class Draw:
     def key_frames(self):
         """Ascending frames, at times between those of the job or beyond them."""
         last = self.first_frame + self.step * self.count
-        frames = {float(self.first_frame), self.rng.uniform(self.first_frame, last), float(last)}
-        return [round(frame, 2) for frame in sorted(frames)][: self.pick(1, 2, 2, 3)]
+        frames = {float(self.first_frame), round(self.rng.uniform(self.first_frame, last), 2), float(last)}
+        return sorted(frames)[: self.pick(1, 2, 2, 3)]
 
     def object_keys(self):
         size = self.pick(0.05, 0.05, 1.0)
@@ -204,6 +204,8 @@ class Draw:
             for frame in self.key_frames():
                 moved = [round(p + self.rng.uniform(-size, size), 3) for p in position]
                 camera["keys"].append({"frame": frame, "position": moved, "lookAt": look_at})
+                if "up" in camera:
+                    camera["keys"][-1]["up"] = camera["up"]
                 if self.chance(0.2):
                     camera["keys"][-1]["verticalFovDeg"] = self.pick(20, 60)
         elif self.chance(0.02):

@@ -12,7 +12,7 @@ import subprocess
 import threading
 from pathlib import Path
 
-from farm import BAD_INPUT, DEADLINE_S, OK, PATIENCE
+from farm import BAD_INPUT, DEADLINE_S, IO, OK, PATIENCE
 from random_job_files import raw_state_bytes, read_frame, values_by, write_file
 from random_job_means import judge_means
 
@@ -113,9 +113,12 @@ class Judge:
                    "--threads-per-worker", split["threads"], "--work-dir", work, "--json"]
         code, output, errors = self.run(command, interruption)
         if interruption:
-            allowed = {"render": (OK, CANCELLED, -signal.SIGINT), "all": (OK, -signal.SIGKILL)}.get(interruption["who"], (OK,))
-            require(code in allowed, "render failed", f"exit code {code} after an interruption\n{errors[-3000:]}")
-            if interruption["who"] in ("render", "all"):
+            # A coordinator that dies before it listens has not started.
+            none = "did not start" in errors
+            allowed = {"render": (OK, CANCELLED, -signal.SIGINT), "all": (OK, -signal.SIGKILL),
+                       "coordinator": (OK, IO) if none else (OK,)}.get(interruption["who"], (OK,))
+            require(code in allowed, "interrupted render failed", f"exit code {code}\n{errors[-3000:]}")
+            if interruption["who"] in ("render", "all") or none:
                 # Once more, at times with other tiles: that is another job, which must not mind what lies there.
                 tile_size = interruption.get("tileSize") or split["tileSize"]
                 split = {**split, "tileSize": tile_size}
@@ -158,13 +161,13 @@ def text_of(output):
 def write_job(case, split, folder, name):
     """The job, split so; returns its path."""
     job = copy.deepcopy(case["job"])
-    for section, key in (("image", "tileSize"), ("state", "checkpointEvery"), ("output", "compression")):
-        if key in split and isinstance(job.setdefault(section, {}), dict):
-            job[section][key] = split[key]
-    if isinstance(job.get("output"), dict):
-        job["output"]["directory"] = name
-    if name == "first" and isinstance(job.get("state"), dict):
-        job["state"]["keep"] = "all"
+    changes = [("image", "tileSize", split["tileSize"]), ("state", "checkpointEvery", split["checkpointEvery"]),
+               ("output", "directory", name), ("output", "compression", split.get("compression")),
+               ("state", "keep", "all" if name == "first" else None)]
+    for section, key, value in changes:
+        # A section that was made wrong on purpose stays so.
+        if value is not None and isinstance(job.setdefault(section, {}), dict):
+            job[section][key] = value
     path = folder / f"{name}.json"
     path.write_text(json.dumps(job, indent=1), encoding="utf-8")
     return path
@@ -243,7 +246,8 @@ def compare_prediction(predicted, summary, job):
 
     # A run traces its surfaces once where pixels take history from themselves alone, else in each frame; old surfaces
     # and those of the second pass, whose tiles overlap, are traced again.
-    asks = job["sampling"].get("numNeighbors", 0) if job["sampling"].get("method") == "restir" else 0
+    sampling = job.get("sampling", {})
+    asks = sampling.get("numNeighbors", 0) if sampling.get("method") == "restir" else 0
     shares = asks > 0 or predicted["motionMaxPx"] > 0
     of_frame = pixels * predicted["primaryRaysPerPixel"]
     least = of_frame * (predicted["frames"] if shares else predicted["runs"])

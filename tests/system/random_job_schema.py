@@ -126,7 +126,7 @@ class SchemaDraw:
         return value
 
 
-def text_paths(schema):
+def key_paths(schema):
     """The paths of all keys of a schema, as SchemaDraw names them."""
     walk = SchemaDraw(schema, None, {})
     paths = set()
@@ -142,8 +142,9 @@ def text_paths(schema):
                 visit(form, path)
         if isinstance(node.get("additionalProperties"), dict):
             visit(node["additionalProperties"], f"{path}.*")
-        if isinstance(node.get("items"), dict):
-            visit(node["items"], f"{path}[]")
+        items = walk.resolve(node.get("items", {}))
+        if items.get("type") == "object":
+            visit(items, f"{path}[]")
 
     visit(schema, "")
-    return paths
+    return {path for path in paths if not path.endswith("[]")}

@@ -16,7 +16,7 @@ SIMPLER = {
 PLAIN_MESH = {"kind": "card"}
 PLAIN_MAP = {"kind": "flat", "width": 1, "height": 1}
 # What a job costs much more without: defaults are large pictures.
-NEVER_DROPPED = {"width", "height", "name", "firstSeed"}
+NEVER_DROPPED = {("job", "image"), ("job", "image", "width"), ("job", "image", "height"), ("job", "name")}
 
 
 def shrink(case, fails, seconds, clock=time.monotonic):
@@ -41,7 +41,10 @@ def smaller_forms(case):
              ("one split", lambda c: {**c, "second": {**c["first"], **interruption_of(c)}}),
              ("inline scene", inline_scene)]
     paths = sorted(places(case), key=len)
-    forms += [(path, lambda c, p=path: drop(c, p)) for path in paths if path[0] != "files"]
+    quick = [(path, lambda c, p=path, v=value: replace(c, p, v))
+             for path in paths if path[-1] in ("frames", "width", "height") and path[0] == "job"
+             for value in SIMPLER[path[-1]][:3]]
+    forms += quick + [(path, lambda c, p=path: drop(c, p)) for path in paths if path[0] != "files"]
     for path in paths:
         for value in SIMPLER.get(path[-1], []):
             forms.append((path, lambda c, p=path, v=value: replace(c, p, v)))
@@ -87,7 +90,8 @@ def drop(case, path):
         look_up(case, path)
     except (KeyError, IndexError, TypeError):
         return None
-    if path[-1] in NEVER_DROPPED or len(path) == 1 or (isinstance(container, list) and is_vector(container)):
+    of_split = path[0] in ("first", "second", "means") and path[-1] not in ("interruption", "compression")
+    if path in NEVER_DROPPED or len(path) == 1 or of_split or (isinstance(container, list) and is_vector(container)):
         return None
     del container[path[-1]]
     return case
@@ -99,7 +103,10 @@ def replace(case, path, value):
         container, old = look_up(case, path[:-1]), look_up(case, path)
     except (KeyError, IndexError, TypeError):
         return None
-    if isinstance(value, int) and isinstance(old, (int, float)) and path[-1] in SIMPLER and path[0] == "job" and value >= old:
+    order = SIMPLER.get(path[-1], [])
+    if value in order and old in order and order.index(value) >= order.index(old):
+        return None  # or two values would replace each other for ever
+    if path[0] == "job" and value in order and isinstance(old, (int, float)) and value >= old:
         return None
     container[path[-1]] = value
     return case

@@ -40,6 +40,8 @@ class Run:
 
     def __init__(self, judge, schema, options, folder):
         self.judge, self.schema, self.options, self.folder = judge, schema, options, Path(folder)
+        self.keep = Path(options.keep or folder)
+        self.keep.mkdir(parents=True, exist_ok=True)
         self.counts, self.failures, self.shrunk = Counter(), [], Counter()
         self.lock = threading.Lock()
         self.next_folder = 0
@@ -82,15 +84,18 @@ class Run:
         print(f"job {number} of seed {self.options.seed}: {found}", flush=True)
         if first and self.options.shrink > 0:
             case = shrink(case, lambda smaller: self.fails_as(smaller, found.kind), self.options.shrink)
-        path = self.folder / f"failed-{self.options.seed}-{number}.json"
+        path = self.keep / f"failed-{self.options.seed}-{number}.json"
         path.write_text(json.dumps(case, indent=1), encoding="utf-8")
-        print(f"job {number}: {found.kind}: {json.dumps(case)}\nrepeat: python3 {sys.argv[0]} --bin {self.options.bin} "
+        print(f"job {number}, {found.kind}: {json.dumps(case)}\nrepeat: python3 {Path(__file__).resolve()} --bin {self.options.bin} "
               f"--source {self.options.source} --case {path}", flush=True)
 
     def fails_as(self, case, kind):
         """Whether the case fails in that way; what depends on the moment of an interruption has three tries."""
         for _ in range(3 if "interruption" in case["second"] else 1):
-            found = self.verdict(case)
+            try:
+                found = self.verdict(case)
+            except (LookupError, TypeError, ValueError, AttributeError):
+                return False  # no longer a case that can be judged
             if isinstance(found, Wrong) and found.kind == kind:
                 return True
         return False
@@ -130,8 +135,7 @@ def parse_options(arguments=None):
 def run_jobs(options):
     """Judges the jobs that the options ask for; returns the number of failures."""
     schema = json.loads((Path(options.source) / "jobs/schema/job.schema.json").read_text(encoding="utf-8"))
-    folder = Path(options.keep or tempfile.mkdtemp(prefix="baton-random-"))
-    folder.mkdir(parents=True, exist_ok=True)
+    folder = Path(tempfile.mkdtemp(prefix="baton-random-"))
     run = Run(Judge(Programs(options.bin), folder), schema, options, folder)
     start = time.monotonic()
     run.all()
@@ -145,8 +149,8 @@ def run_jobs(options):
         run.failures.append("refusals")
         print("`baton check` refuses too many: the generator draws what is not legal", flush=True)
     if run.failures:
-        print(f"failed cases are in {folder}")
-    elif not options.keep:
+        print(f"failed cases are in {run.keep}")
+    if not run.failures or options.keep:
         remove(folder)
     return len(run.failures)
 
