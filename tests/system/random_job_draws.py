@@ -2,6 +2,7 @@
 what keys demand of each other. Standard library only."""
 
 import copy
+import json
 import math
 import random
 
@@ -57,6 +58,8 @@ class Draw:
         self.by_material(job)
         mend(job, self.rng)
         self.cheapen(job)
+        if '"table.binary"' not in json.dumps(job["scene"]):
+            self.files.pop("table.binary", None)
         if self.chance(0.04):
             self.files["scene.json"] = {"kind": "json", "value": job["scene"]}
             job["scene"] = "scene.json"
@@ -121,7 +124,7 @@ class Draw:
     def method(self):
         methods = self.schema.schema["properties"]["sampling"]["properties"]["method"]["enum"]
         plain = [method for method in methods if method != "auto"]
-        return "auto" if "auto" in methods and self.chance(0.004) else self.rng.choice(plain + ["sequential", "pool"])
+        return "auto" if "auto" in methods and self.chance(0.01) else self.rng.choice(plain + ["sequential", "pool"])
 
     def frames(self):
         self.first_frame = self.pick(0, 1, 1, 7, 1001)
@@ -144,8 +147,7 @@ class Draw:
         keys = node["properties"]
         scene = self.schema.object(node, "scene")
         names = [f"m{i}" for i in range(self.pick(1, 2, 3))]
-        scene["materials"] = {name: self.schema.value(keys["materials"]["additionalProperties"], "scene.materials.*")
-                              for name in names}
+        scene["materials"] = {name: self.material(keys["materials"]["additionalProperties"]) for name in names}
         for material in scene["materials"].values():
             if material.get("kd", 0.5) + material.get("ks", 0.5) > 1:
                 material["kd"], material["ks"] = 0.5, 0.4
@@ -156,6 +158,13 @@ class Draw:
         scene["meshes"] = {}
         scene["objects"] = [self.object(scene, keys, names, i) for i in range(self.pick(0, 1, 1, 2, 2, 3))]
         return scene
+
+    def material(self, node):
+        """Seldom a measured one: each process reads its 35 MB."""
+        material = self.schema.value(node, "scene.materials.*")
+        while "file" in material and self.chance(0.9):
+            material = self.schema.value(node, "scene.materials.*")
+        return material
 
     def object(self, scene, keys, names, number):
         mesh = f"mesh{number}"
@@ -219,6 +228,7 @@ class Draw:
         return {"file": "walk.gltf", "node": node, "fps": self.pick(4, 24), "startFrame": self.first_frame}
 
     def table(self):
+        # Overwritten when there is a second one; unused when the material is drawn again.
         self.files["table.binary"] = {"kind": "merl", "lobe": self.pick(3, 60), "base": self.pick(0.05, 0.4)}
         return "table.binary"
 

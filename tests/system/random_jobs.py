@@ -31,6 +31,8 @@ from random_job_shrink import shrink
 # A failure is made smaller for so long; only the first few of a kind and method are.
 SHRINK_SECONDS = 60
 SHRUNK_OF_A_KIND = 1
+# Failures that do not come every time.
+TIMELY = {"lost attempts", "not done", "no end"}
 # More refusals than this are a fault of the generator.
 MOST_REFUSED = 0.2
 
@@ -90,8 +92,8 @@ class Run:
               f"--source {self.options.source} --case {path}", flush=True)
 
     def fails_as(self, case, kind):
-        """Whether the case fails in that way; what depends on the moment of an interruption has three tries."""
-        for _ in range(3 if "interruption" in case["second"] else 1):
+        """Whether the case fails in that way; what depends on the moment has three tries."""
+        for _ in range(3 if "interruption" in case["second"] or kind in TIMELY else 1):
             try:
                 found = self.verdict(case)
             except (LookupError, TypeError, ValueError, AttributeError):
