@@ -41,6 +41,7 @@ inline constexpr int kMaxMoves = 64;  ///< per distribution
 inline constexpr int kMaxHistoryLimit = 1000;
 inline constexpr int kMaxNeighbors = 8;  ///< per pixel
 inline constexpr int kMaxNeighborRadius = 64;
+inline constexpr int kMostPoolRays = 4;       ///< of a pixel of method pool, in numParticles
 inline constexpr int kMaxReferenceSamples = 1 << 24;
 inline constexpr int kMaxCheckpointEvery = 1000;
 inline constexpr int kMaxEnvironmentSide = 32768;

@@ -1,9 +1,12 @@
 #include "common/job/estimate.h"
 
 #include <algorithm>
+#include <bit>
 
+#include "common/base/limits.h"
 #include "common/job/motion.h"
 #include "common/job/sequence.h"
+#include "common/state/sample_state.h"
 
 namespace baton {
 namespace {
@@ -20,17 +23,21 @@ std::int64_t count_neighbours(const JobSpec& job, std::int32_t reach_px) {
   return count;
 }
 
-/// In memory: Lns, Lns when fresh and source of a pixel; direction, weight and site of a particle.
-constexpr std::int64_t kStateBytesPerPixel = 9;
-constexpr std::int64_t kStateBytesPerParticle = 9;
-/// Of a pixel's memory; only pixels whose rays disagree have all of it.
-constexpr std::int64_t kMemoryBytes = 518;
-constexpr std::int64_t kConfidenceBytes = 2;
+/// Rays of a pixel at most: of `pool`, whose pixels choose their number, a power of two where light
+/// is evenly bright.
+std::int64_t most_shadow_rays(const SamplingSpec& sampling) {
+  if (sampling.method == Method::reference) return std::int64_t{2} * sampling.reference_samples;
+  const std::int32_t n = most_particles(sampling);
+  if (sampling.method != Method::pool) return n;
+  const auto most = static_cast<std::uint32_t>(limits::kMostPoolRays * n);
+  return std::min<std::int64_t>(std::bit_ceil(most), limits::kMaxParticles);
+}
 
-/// Of a pixel beside its particles.
-std::int64_t pixel_bytes(Method method) {
-  if (method == Method::pool) return kStateBytesPerPixel + kMemoryBytes;
-  return kStateBytesPerPixel + (method == Method::restir ? kConfidenceBytes : 0);
+std::int64_t state_bytes_per_pixel(const JobSpec& job) {
+  return static_cast<std::int64_t>(SampleState::bytes_per_pixel(
+      static_cast<std::size_t>(num_carried_particles(job.sampling)),
+      static_cast<std::size_t>(num_populations(job)), job.sampling.method == Method::pool,
+      job.sampling.method == Method::restir));
 }
 
 }  // namespace
@@ -55,9 +62,7 @@ JobEstimate estimate_job(const JobSpec& job) {
 
   // Count rays; a reference sample is a pair, one from the environment and one from the BRDF.
   e.primary_rays_per_pixel = job.image.sites;
-  e.shadow_rays_per_pixel = job.sampling.method == Method::reference
-                                ? std::int64_t{2} * job.sampling.reference_samples
-                                : most_particles(job.sampling);
+  e.shadow_rays_per_pixel = most_shadow_rays(job.sampling);
 
   // Add up the planes: R, G, B, A and the AOVs.
   std::int64_t wide_channels = 0;
@@ -75,11 +80,10 @@ JobEstimate estimate_job(const JobSpec& job) {
   // Size the state and the largest blob.
   const std::int64_t tile_pixels = std::min<std::int64_t>(side, job.image.width) *
                                    std::min<std::int64_t>(side, job.image.height);
-  const std::int64_t particles = num_carried_particles(job.sampling);
   e.largest_blob_bytes = tile_pixels * e.film_channels * 4;
   if (carries_state(job)) {
     // What is stored of a pixel's particles is hardly smaller; its memory is, by half and more.
-    e.state_bytes_per_pixel = pixel_bytes(job.sampling.method) + kStateBytesPerParticle * particles;
+    e.state_bytes_per_pixel = state_bytes_per_pixel(job);
     e.state_bytes = pixels * e.state_bytes_per_pixel;
     e.largest_blob_bytes = std::max(e.largest_blob_bytes, tile_pixels * e.state_bytes_per_pixel);
   }

@@ -17,11 +17,11 @@ struct JobEstimate {
   std::int64_t assemble_tasks = 0;     ///< one a frame
   std::int64_t dependencies = 0;       ///< of a task on another
   std::int64_t primary_rays_per_pixel = 0;
-  std::int64_t shadow_rays_per_pixel = 0;
+  std::int64_t shadow_rays_per_pixel = 0;  ///< at most, in the first pass
   std::int64_t film_channels = 0;
   std::int64_t film_bytes = 0;             ///< of one frame as float32 tiles, before compression
   std::int64_t frame_bytes = 0;            ///< of one EXR, before compression
-  std::int64_t state_bytes_per_pixel = 0;  ///< of one with a surface; 0 when no state is carried
+  std::int64_t state_bytes_per_pixel = 0;  ///< in memory; 0 when no state is carried
   std::int64_t state_bytes = 0;            ///< of all tiles at one checkpoint
   std::int64_t largest_blob_bytes = 0;     ///< one tile's film or state in memory
 

@@ -95,7 +95,7 @@ void print_text(const JobSpec& job, const JobEstimate& e, const AssetReport& ass
   print_assets(assets);
   fmt::print("tasks      {}: {} to render ({} a tile), {} to assemble; {} dependencies\n",
              e.tasks(), e.render_tasks, e.runs, e.assemble_tasks, e.dependencies);
-  fmt::print("rays       {} primary and {} shadow rays a pixel and frame\n",
+  fmt::print("rays       {} primary and at most {} shadow rays a pixel and frame\n",
              e.primary_rays_per_pixel, e.shadow_rays_per_pixel);
   if (moves(job)) {
     fmt::print("motion     history is followed up to {} pixels a frame\n", job.motion.max_px);

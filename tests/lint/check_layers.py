@@ -22,7 +22,7 @@ RUN = PASS | {"common/protocol", "common/store", "worker/pass"}
 MAY_INCLUDE = {
     "common/base": set(),
     "common/math": COMMON_BASE,
-    "common/job": COMMON_DATA,
+    "common/job": COMMON_DATA | {"common/state"},  # how large a state is
     "common/state": COMMON_DATA,
     "common/image": COMMON_DATA,
     "common/store": COMMON_BASE,

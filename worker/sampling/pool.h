@@ -38,14 +38,12 @@ inline bool use_control(float expected, float doubt) { return expected > kSafeCo
 /// `scale`, else in proportion to its power of 3/4, from N / 2 to most_rays(N). scale:
 /// noise_scale(), > 0. (In proportion to doubt itself would be best if memories were right.)
 inline constexpr float kUsualDoubt = 0.025f;
-inline constexpr float kMostRays = 4;
 inline std::int32_t most_rays(std::int32_t num_rays) {
-  return std::min(static_cast<std::int32_t>(kMostRays) * num_rays,
-                  static_cast<std::int32_t>(limits::kMaxParticles));
+  return std::min<std::int32_t>(limits::kMostPoolRays * num_rays, limits::kMaxParticles);
 }
 inline std::int32_t rays_for_doubt(std::int32_t num_rays, float doubt, float scale) {
   const float root = std::sqrt(doubt / (kUsualDoubt * scale));
-  const float share = std::clamp(root * std::sqrt(root), 0.5f, kMostRays);
+  const float share = std::clamp(root * std::sqrt(root), 0.5f, float{limits::kMostPoolRays});
   const auto wanted = static_cast<std::int32_t>(std::ceil(share * static_cast<float>(num_rays)));
   return std::min(wanted, most_rays(num_rays));
 }

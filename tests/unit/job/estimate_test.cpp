@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <utility>
+
 namespace baton {
 namespace {
 
@@ -28,7 +30,7 @@ TEST(Estimate, SizesStateOnlyWhereItIsCarried) {
   EXPECT_EQ(estimate_job(job).state_bytes_per_pixel, 9 + 9 * 16);
   EXPECT_EQ(estimate_job(job).state_bytes, 153 * 5000);
   job.sampling.method = Method::pool;
-  EXPECT_EQ(estimate_job(job).state_bytes_per_pixel, 9 + 518);
+  EXPECT_EQ(estimate_job(job).state_bytes_per_pixel, 9 + 520);
   job.sampling.method = Method::restir;
   EXPECT_EQ(estimate_job(job).state_bytes_per_pixel, 9 + 9 * 16 + 2);
   for (const Method method : {Method::bidirectional, Method::ratio}) {
@@ -36,6 +38,27 @@ TEST(Estimate, SizesStateOnlyWhereItIsCarried) {
     EXPECT_EQ(estimate_job(job).state_bytes, 0);
   }
   EXPECT_EQ(estimate_job(job).dependencies, 5 * 8);
+}
+
+// What a pixel has once for each of its populations.
+TEST(Estimate, SizesBothPopulationsOfASecondPass) {
+  JobSpec job = small_job();
+  job.visibility.correlated = true;
+  EXPECT_EQ(estimate_job(job).state_bytes_per_pixel, 2 * 9 + 9 * 16);
+  job.visibility.mask = MaskPolicy::same_samples;
+  EXPECT_EQ(estimate_job(job).state_bytes_per_pixel, 9 + 9 * 16);
+}
+
+// Pixels of `pool` choose the number of their rays.
+TEST(Estimate, CountsTheMostRaysThatAPixelMayHave) {
+  JobSpec job = small_job();
+  job.sampling.method = Method::pool;
+  for (const auto [n, most] : {std::pair{1, 4}, {3, 16}, {5, 32}, {16, 64}, {17, 64}, {64, 64}}) {
+    job.sampling.num_particles = n;
+    EXPECT_EQ(estimate_job(job).shadow_rays_per_pixel, most) << n;
+  }
+  job.sampling.method = Method::reference;
+  EXPECT_EQ(estimate_job(job).shadow_rays_per_pixel, 2 * job.sampling.reference_samples);
 }
 
 // A pixel that asks its neighbours needs the tiles around it, frame by frame.

@@ -1,0 +1,388 @@
+"""Random legal jobs: the schema says what a key may be, this file what is meaningful (files, geometry, frames, split) and
+what keys demand of each other. Standard library only."""
+
+import copy
+import json
+import math
+import random
+
+from random_job_means import tame
+from random_job_schema import SchemaDraw
+
+# Particles and candidates: every remainder modulo 8, one, powers of two and the most.
+NUM_PARTICLES = [1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 12, 13, 14, 16, 16, 18, 20, 23, 24, 31, 32, 34, 40, 57, 63, 64]
+NUM_CANDIDATES = [1, 2, 7, 8, 9, 13, 16, 24, 25, 27, 33, 50, 64, 70, 100, 128, 130, 257, 400, 1000]
+FRESH_METHODS = {"environment", "brdf", "mis", "bidirectional"}
+# What no draw may cost, in about 50 ns: surfaces, candidates and moves of all pixels and frames.
+MOST_WORK = 4e6
+
+
+class Draw:
+    """One random case: {"job", "files", "first", "second"}, as random_job_judge.py takes it."""
+
+    def __init__(self, schema, rng):
+        self.rng = rng
+        self.files = {}
+        self.first_frame, self.step, self.count = 1, 1, 1
+        self.schema = SchemaDraw(schema, rng, self.hand())
+
+    def chance(self, probability):
+        return self.rng.random() < probability
+
+    def pick(self, *values):
+        return self.rng.choice(values)
+
+    def vector(self, size):
+        return [round(self.rng.uniform(-size, size), 3) for _ in range(3)]
+
+    # ---- the whole ------------------------------------------------------------------------------------------
+
+    def case(self):
+        """The job, its files, and how both renderings are split."""
+        node = self.schema.schema
+        keys = node["properties"]
+        job = {"name": self.name()}
+        job["frames"] = self.frames()
+        job["image"] = self.schema.value(keys["image"], "image")
+        job["scene"] = self.scene()
+        job["camera"] = self.camera()
+        for key, inner in keys.items():
+            if key in job:
+                continue
+            always = key in node["required"] or key in ("sampling", "output")
+            if always or self.chance(0.5):
+                value = self.schema.value(inner, key)
+                if value is not None:
+                    job[key] = value
+        self.maps(job)
+        self.by_material(job)
+        mend(job, self.rng)
+        self.cheapen(job)
+        if '"table.binary"' not in json.dumps(job["scene"]):
+            self.files.pop("table.binary", None)
+        if self.chance(0.04):
+            self.files["scene.json"] = {"kind": "json", "value": job["scene"]}
+            job["scene"] = "scene.json"
+        first = self.split(job)
+        second = {**self.split(job), "compression": self.pick("none", "none", "zip", "rle")}
+        if self.chance(0.35):
+            second["interruption"] = self.interruption()
+        return {"job": job, "files": self.files, "first": first, "second": second}
+
+    def hand(self):
+        """What the schema cannot say, by path."""
+        def nothing():
+            return None
+        return {
+            # Given elsewhere.
+            "name": self.name, "frames": self.frames, "scene": nothing, "camera": nothing,
+            "environment.map": nothing, "environment.frames": nothing, "environment.keys": nothing,
+            "sampling.byMaterial": nothing, "scene.meshes": nothing, "scene.materials": nothing,
+            "scene.objects": nothing, "scene.ground": nothing,
+            # Texts and sizes.
+            "metadata.*": lambda: self.pick("x", "two words", "a \u00e4 \u4e2d \" \\ text", "long " * 200),
+            "image.width": lambda: self.side(), "image.height": lambda: self.side(),
+            "image.tileSize": lambda: self.tile_size(),
+            "output.directory": nothing,
+            "output.pattern": lambda: self.pick(None, "f.#.exr", "a b ######.exr", "\u00e4####x.exr"),
+            # Counts that cost time, and the ways to fail that are meant to fail.
+            "sampling.method": self.method,
+            "sampling.numParticles": lambda: self.rng.choice(NUM_PARTICLES),
+            "sampling.numCandidates": lambda: self.rng.choice(NUM_CANDIDATES),
+            "sampling.refreshCandidates": lambda: self.pick(None, 64, 65, 300),
+            "sampling.referenceSamples": lambda: self.pick(2, 3, 8, 17),
+            "sampling.byMaterial.*.numParticles": lambda: self.rng.choice([None, *NUM_PARTICLES]),
+            "sampling.byMaterial.*.numCandidates": lambda: self.rng.choice([None, *NUM_CANDIDATES]),
+            "sampling.targetError": lambda: self.pick(None, 0.3), "sampling.timeBudget": lambda: self.pick(None, 1.0),
+            "visibility.correlated": lambda: self.chance(0.9),
+            "maxRetriesPerTask": nothing, "maxSecondsPerTask": nothing, "maxFailuresPerWorker": nothing,
+            # Geometry.
+            "scene.materials.*.file": self.table,
+            "scene.objects[].translate": lambda: self.vector(1.3),
+            "scene.objects[].rotateDeg": lambda: self.pick(None, self.vector(180)),
+            "scene.objects[].scale": lambda: self.pick(None, 0.3, 1.7, [0.2, 1, 1.5], 1e-3, 30),
+            "scene.objects[].fitHeight": lambda: self.pick(None, None, None, 1.2),
+            "scene.objects[].keys": lambda: self.object_keys() if self.chance(0.2) else None,
+            "scene.objects[].gltf": lambda: self.gltf("hip") if self.chance(0.03) else None,
+            "scene.ground.height": lambda: self.pick(None, -1.0, 0.3),
+            "scene.ground.size": lambda: self.pick(None, 2.0, 50.0),
+            "environment.scale": lambda: self.pick(None, None, 0.1, 7.0, 1e-9, 1e9),
+            "environment.maxWidth": lambda: self.pick(None, None, 0, 1, 3, 8, 16),
+            "environment.rotation.axis": lambda: self.pick(None, [1, 2, 3], [0, 0, -1], [1e-9, 0, 0]),
+            "environment.rotation.degPerFrame": lambda: self.pick(0.0, 0.1, 1.5, 20.0, -90.0, 1e6),
+        }
+
+    def name(self):
+        return self.pick("any", "any", "a name", "\u00e4\u4e2d", "x" * 100)
+
+    def side(self):
+        return self.pick(1, 1, 2, 5, 8, 9, 16, 17, 24, 33, 40)
+
+    def tile_size(self):
+        return self.pick(8, 8, 9, 13, 16, 19, 64, 32768)
+
+    def method(self):
+        methods = self.schema.schema["properties"]["sampling"]["properties"]["method"]["enum"]
+        plain = [method for method in methods if method != "auto"]
+        return "auto" if "auto" in methods and self.chance(0.01) else self.rng.choice(plain + ["sequential", "pool"])
+
+    def frames(self):
+        self.first_frame = self.pick(0, 1, 1, 7, 1001)
+        self.step = self.pick(1, 1, 1, 2, 5)
+        self.count = self.pick(1, 2, 2, 3, 4, 5, 9)
+        first, last = self.first_frame, self.first_frame + self.step * (self.count - 1)
+        if self.count == 1:
+            return str(first)
+        if self.step > 1:
+            return f"{first}-{last}x{self.step}"
+        return f"{first},{first + 1}-{last}" if self.count > 2 and self.chance(0.2) else f"{first}-{last}"
+
+    def frame_numbers(self):
+        return [self.first_frame + self.step * i for i in range(self.count)]
+
+    # ---- geometry -------------------------------------------------------------------------------------------
+
+    def scene(self):
+        node = self.schema.resolve(self.schema.schema["definitions"]["scene"])
+        keys = node["properties"]
+        scene = self.schema.object(node, "scene")
+        names = [f"m{i}" for i in range(self.pick(1, 2, 3))]
+        scene["materials"] = {name: self.material(keys["materials"]["additionalProperties"]) for name in names}
+        for material in scene["materials"].values():
+            if material.get("kd", 0.5) + material.get("ks", 0.5) > 1:
+                material["kd"], material["ks"] = 0.5, 0.4
+        if self.chance(0.75):
+            ground = self.schema.resolve(keys["ground"])
+            self.schema.hand["scene.ground.material"] = lambda: self.rng.choice(names)
+            scene["ground"] = self.schema.object(ground, "scene.ground")
+        scene["meshes"] = {}
+        scene["objects"] = [self.object(scene, keys, names, i) for i in range(self.pick(0, 1, 1, 2, 2, 3))]
+        return scene
+
+    def material(self, node):
+        """Seldom a measured one: each process reads its 35 MB."""
+        material = self.schema.value(node, "scene.materials.*")
+        while "file" in material and self.chance(0.9):
+            material = self.schema.value(node, "scene.materials.*")
+        return material
+
+    def object(self, scene, keys, names, number):
+        mesh = f"mesh{number}"
+        path = mesh + self.pick(".off", ".obj", ".ply")
+        self.files[path] = self.pick(
+            {"kind": "sphere", "rings": self.pick(2, 5, 9), "segments": self.pick(3, 6, 13)},
+            {"kind": "sphere", "rings": 8, "segments": 12},
+            {"kind": "card"}, {"kind": "shards", "count": self.pick(1, 6, 40), "seed": self.rng.randrange(1000)})
+        smooth = self.pick(None, True, False)
+        scene["meshes"][mesh] = path if smooth is None else {"path": path, "smoothNormals": smooth}
+        self.schema.hand["scene.objects[].mesh"] = lambda: mesh
+        self.schema.hand["scene.objects[].material"] = lambda: self.rng.choice(names)
+        return self.schema.value(keys["objects"]["items"], "scene.objects[]")
+
+    def key_frames(self):
+        """Ascending frames, at times between those of the job or beyond them."""
+        last = self.first_frame + self.step * self.count
+        frames = {float(self.first_frame), round(self.rng.uniform(self.first_frame, last), 2), float(last)}
+        return sorted(frames)[: self.pick(1, 2, 2, 3)]
+
+    def object_keys(self):
+        size = self.pick(0.05, 0.05, 1.0)
+        node = self.schema.schema["definitions"]["objectKey"]
+        keys = []
+        for frame in self.key_frames():
+            key = self.schema.object(node, "objectKey", share=0.1)
+            key.update(frame=frame, translate=self.vector(size), rotateDeg=self.vector(200 * size))
+            if key.get("quaternion") == [0, 0, 0, 0]:
+                del key["quaternion"]
+            key.pop("scale", None)
+            if self.chance(0.2):
+                key["scale"] = self.pick(1.1, [0.9, 1.0, 1.2])
+            keys.append(key)
+        return keys
+
+    def camera(self):
+        """Outside, inside a mesh, below the ground, far away, with the sky alone in view; still or moving."""
+        position = self.pick([0, 1, 4.5], self.vector(3), self.vector(0.2), [0.5, -2, 3], [0, 2, 400], [0, 1, 4.5])
+        look_at = self.pick([0, 0.3, 0], self.vector(0.5), [0, 0.3, 0], [0.1, 90, 2])
+        camera = {"position": position, "lookAt": look_at, "verticalFovDeg": self.pick(5, 30, 40, 40, 90, 170, 0.01)}
+        if self.chance(0.2):
+            camera["up"] = self.pick([0, 0, 1], [0.3, 1, 0.1], [0, -1, 0])
+        if self.chance(0.3):
+            size = self.pick(0.05, 0.05, 0.5, 3)
+            camera["keys"] = []
+            for frame in self.key_frames():
+                moved = [round(p + self.rng.uniform(-size, size), 3) for p in position]
+                camera["keys"].append({"frame": frame, "position": moved, "lookAt": look_at})
+                if "up" in camera:
+                    camera["keys"][-1]["up"] = camera["up"]
+                if self.chance(0.2):
+                    camera["keys"][-1]["verticalFovDeg"] = self.pick(20, 60)
+        elif self.chance(0.02):
+            camera["gltf"] = self.gltf("eye")
+        for view in [camera, *camera.get("keys", [])]:
+            mend_view(view, self.rng)
+        return camera
+
+    def gltf(self, node):
+        self.files["walk.gltf"] = {"kind": "walk", "distance": self.pick(3.0, 5.0)}
+        return {"file": "walk.gltf", "node": node, "fps": self.pick(4, 24), "startFrame": self.first_frame}
+
+    def table(self):
+        # Overwritten when there is a second one; unused when the material is drawn again.
+        self.files["table.binary"] = {"kind": "merl", "lobe": self.pick(3, 60), "base": self.pick(0.05, 0.4)}
+        return "table.binary"
+
+    # ---- light ----------------------------------------------------------------------------------------------
+
+    def maps(self, job):
+        """One map, keys or numbered maps, all of one size where they may be mixed."""
+        form = self.pick("map", "map", "keys", "keys", "frames")
+        width, height = self.pick((1, 1), (2, 1), (3, 7), (4, 2), (16, 8), (32, 16), (64, 32), (33, 17))
+        if self.chance(0.01):
+            width, height = 2048, 1024
+            self.shorten(job, 2)
+        ending = self.pick(".hdr", ".exr")
+
+        def add(name):
+            kinds = ["sky", "lamp", "lamp", "sun", "dots", "flat", "halves", "black"] + ["wild"] * (ending == ".exr")
+            self.files[name] = {"kind": self.rng.choice(kinds), "width": width, "height": height,
+                                "seed": self.rng.randrange(1000), "count": self.pick(1, 1, 3, 20),
+                                "level": self.pick(1.0, 1.0, 1.0, 1e-3, 100.0)}
+            return name
+
+        environment = job["environment"]
+        if form == "map":
+            environment["map"] = add("map" + ending)
+        elif form == "frames":
+            environment["frames"] = "map.####" + ending
+            for number in self.frame_numbers():
+                add(f"map.{number:04}{ending}")
+        else:
+            frames = self.key_frames()
+            environment["keys"] = [{"frame": f, "map": add(f"map{i}{ending}")} for i, f in enumerate(frames)]
+
+    def by_material(self, job):
+        """Settings of single materials, where the method allows them; names are known only now."""
+        sampling = job["sampling"]
+        if sampling["method"] not in FRESH_METHODS or not self.chance(0.3):
+            return
+        node = self.schema.schema["properties"]["sampling"]["properties"]["byMaterial"]["additionalProperties"]
+        materials = sorted(job["scene"]["materials"])
+        chosen = [name for name in materials if self.chance(0.7)]
+        sampling["byMaterial"] = {name: self.schema.value(node, "sampling.byMaterial.*") for name in chosen}
+        if sampling["byMaterial"] and self.chance(0.9):
+            job.pop("visibility", None)
+
+    # ---- cost and split -------------------------------------------------------------------------------------
+
+    def shorten(self, job, count):
+        """At most so many frames."""
+        self.count = min(self.count, count)
+        last = self.frame_numbers()[-1]
+        step = f"x{self.step}" if self.step > 1 else ""
+        job["frames"] = str(self.first_frame) if self.count == 1 else f"{self.first_frame}-{last}{step}"
+
+    def cheapen(self, job):
+        """Fewer frames, then fewer pixels, until the job is no dearer than MOST_WORK."""
+        while work_of(job, self.count) > MOST_WORK and self.count > 2:
+            self.shorten(job, self.count - 1)
+        while work_of(job, self.count) > MOST_WORK:
+            side = max("width", "height", key=lambda key: job["image"].get(key, 1))
+            if job["image"][side] == 1:
+                return
+            job["image"][side] = (job["image"][side] + 1) // 2
+
+    def split(self, job):
+        """What never changes the picture."""
+        split = {"tileSize": self.tile_size(), "workers": self.pick(1, 1, 2), "threads": self.pick(1, 2),
+                 "checkpointEvery": self.pick(1, 2, 3, 12, 1000)}
+        if job["image"]["width"] * job["image"]["height"] > 600 and split["tileSize"] < 13:
+            split["tileSize"] = 13
+        return split
+
+    def interruption(self):
+        """Somebody dies after some seconds; then all is started again, maybe with other tiles."""
+        return {"who": self.pick("render", "render", "worker", "worker", "coordinator", "all"),
+                "after": round(self.rng.uniform(0.02, 0.4), 3), "tileSize": self.pick(None, None, self.tile_size())}
+
+
+def work_of(job, num_frames):
+    """About what the job costs: surfaces, candidates, moves and rays of all pixels and frames."""
+    image, sampling = job["image"], job["sampling"]
+    n, m = sampling["numParticles"], sampling["numCandidates"]
+    moves = sampling.get("numDistributions", 5) * sampling.get("numMoves", 1)
+    of_pixel = 5 * image.get("sites", 1) + m + n * (4 + (moves if sampling["method"] == "sequential" else 0))
+    if sampling["method"] == "pool":
+        of_pixel += 8 * m
+    if sampling["method"] == "reference":
+        of_pixel = 10 * sampling["referenceSamples"]
+    if job.get("visibility", {}).get("correlated"):
+        visibility = job["visibility"]
+        of_pixel += n * visibility.get("partitions", 16) * visibility.get("tileSize", 5) ** 2 / 4
+    return image["width"] * image["height"] * num_frames * of_pixel
+
+
+def mend_view(view, rng):
+    """The three vectors must span a view."""
+    up = view.get("up", [0, 1, 0])
+    for _ in range(20):
+        way = [a - p for a, p in zip(view["lookAt"], view["position"])]
+        cross = [way[1] * up[2] - way[2] * up[1], way[2] * up[0] - way[0] * up[2], way[0] * up[1] - way[1] * up[0]]
+        if math.hypot(*cross) > 1e-3 * math.hypot(*way) * math.hypot(*up) > 0:
+            return
+        view["position"] = [round(p + rng.uniform(-1, 1), 3) for p in view["position"]]
+
+
+def mend(job, rng):
+    """What the keys of a legal job demand of each other."""
+    sampling, visibility = job["sampling"], job.setdefault("visibility", {})
+    method = sampling["method"]
+    for counts in [sampling, *sampling.get("byMaterial", {}).values()]:
+        n = counts.get("numParticles", sampling["numParticles"])
+        counts["numCandidates"] = max(counts.get("numCandidates", sampling["numCandidates"]), n)
+    if "refreshCandidates" in sampling:
+        sampling["refreshCandidates"] = max(sampling["refreshCandidates"], sampling["numParticles"])
+    if method != "mis" or sampling.get("byMaterial"):
+        sampling.pop("misCompensation", None)
+    for key in ("targetError", "timeBudget"):
+        if method != "auto" or (key == "timeBudget" and "targetError" in sampling):
+            sampling.pop(key, None)
+    if method in ("reference", "pool", "ratio", "restir", "auto") or sampling.get("byMaterial"):
+        visibility["correlated"] = False
+    if visibility.get("correlated") and visibility.get("mask") != "same-samples" and sampling["numParticles"] % 2:
+        if rng.random() < 0.5:
+            visibility["mask"] = "same-samples"
+        else:
+            sampling["numParticles"] += 1 if sampling["numParticles"] < 64 else -1
+            sampling["numCandidates"] = max(sampling["numCandidates"], sampling["numParticles"])
+    for movable in [job["camera"], *job["scene"]["objects"]]:
+        if movable.get("keys"):
+            movable.pop("gltf", None)
+
+
+def spoil(case, rng):
+    """The case with one value of its job made wrong: what `baton check` must refuse, or take for good reason."""
+    case = copy.deepcopy(case)
+    places = []
+
+    def visit(value):
+        for key in value if isinstance(value, dict) else range(len(value)):
+            places.append((value, key))
+            if isinstance(value[key], (dict, list)):
+                visit(value[key])
+
+    visit(case["job"])
+    container, key = rng.choice(places)
+    container[key] = rng.choice([None, -1, 1e30, "", "x", [], {}, True, [1, 2], {"a": 1}, 0.5, "\u0000", -1e30])
+    return case
+
+
+def draw_case(schema, seed, number):
+    """Case `number` of a seed; the same for ever as long as schema and this file stay."""
+    rng = random.Random(f"{seed}/{number}")
+    case = Draw(schema, rng).case()
+    if rng.random() < 0.03:
+        case = {**spoil(case, rng), "spoiled": True}
+    elif rng.random() < 0.03:
+        case = tame(case, rng)
+    return case

@@ -1,0 +1,326 @@
+"""The files of random jobs: written from recipes that are plain data, so that one JSON file repeats a job; and a reader
+of frames that shares nothing with the programs. Standard library only."""
+
+import base64
+import json
+import math
+import os
+import random
+import struct
+import subprocess
+import zlib
+from array import array
+from pathlib import Path
+
+from farm import Fault, write_sphere
+
+# ---- recipes ------------------------------------------------------------------------------------------------
+# A recipe is {"kind": ..., its numbers}; the file's ending says the format.
+
+
+def write_file(path, recipe, shared):
+    """Writes the file of a recipe. shared: folder of the large files that several jobs use."""
+    kind = recipe["kind"]
+    path.parent.mkdir(parents=True, exist_ok=True)
+    if kind == "json":
+        path.write_text(json.dumps(recipe["value"], indent=1), encoding="utf-8")
+    elif kind in MESHES:
+        MESHES[kind](path, recipe)
+    elif kind in SKIES:
+        write_map(path, recipe)
+    elif kind == "merl":
+        link_table(path, recipe, shared)
+    elif kind == "walk":
+        path.write_text(json.dumps(walk_gltf(recipe)), encoding="ascii")
+    else:
+        raise ValueError(f"{path}: no recipe of kind {kind!r}")
+
+
+def write_triangles(path, vertices, triangles):
+    """A mesh as OFF, OBJ or PLY."""
+    ending = path.suffix
+    points = [" ".join(repr(float(x)) for x in vertex) for vertex in vertices]
+    if ending == ".off":
+        lines = ["OFF", f"{len(points)} {len(triangles)} 0", *points]
+        lines += ["3 " + " ".join(map(str, triangle)) for triangle in triangles]
+    elif ending == ".obj":
+        lines = [f"v {point}" for point in points]
+        lines += ["f " + " ".join(str(i + 1) for i in triangle) for triangle in triangles]
+    else:
+        lines = ["ply", "format ascii 1.0", f"element vertex {len(points)}"]
+        lines += [f"property float {axis}" for axis in "xyz"]
+        lines += [f"element face {len(triangles)}", "property list uchar int vertex_indices", "end_header", *points]
+        lines += ["3 " + " ".join(map(str, triangle)) for triangle in triangles]
+    path.write_text("\n".join(lines) + "\n", encoding="ascii")
+
+
+def sphere(path, recipe):
+    """A closed unit sphere: a camera can be inside."""
+    off = path.with_suffix(".off")
+    write_sphere(off, recipe["rings"], recipe["segments"])
+    if off == path:
+        return
+    words = off.read_text(encoding="ascii").split()[1:]
+    off.unlink()
+    count, faces = int(words[0]), int(words[1])
+    numbers = words[3:]
+    vertices = [tuple(map(float, numbers[3 * i:3 * i + 3])) for i in range(count)]
+    rest = numbers[3 * count:]
+    write_triangles(path, vertices, [tuple(map(int, rest[4 * i + 1:4 * i + 4])) for i in range(faces)])
+
+
+def card(path, _):
+    """A square that has a back."""
+    write_triangles(path, [(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)], [(0, 1, 2), (0, 2, 3)])
+
+
+def shards(path, recipe):
+    """Triangles anywhere, some of them without area."""
+    rng = random.Random(recipe["seed"])
+    vertices = [tuple(rng.uniform(-1, 1) for _ in range(3)) for _ in range(3 * recipe["count"])]
+    triangles = [(3 * i, 3 * i + 1, 3 * i + (2 if i % 4 or i == 0 else 1)) for i in range(recipe["count"])]
+    write_triangles(path, vertices, triangles)
+
+
+MESHES = {"sphere": sphere, "card": card, "shards": shards}
+
+
+def gradient(v):
+    return (0.2 + v, 0.5, 1.2 - v)
+
+
+# Kind of map -> (colour of a row at height v in [0, 1], colour of its special texels).
+SKIES = {
+    "sky": (gradient, None),
+    "flat": (lambda v: (0.7, 0.6, 0.5), None),
+    "black": (lambda v: (0.0, 0.0, 0.0), None),
+    "lamp": (gradient, (20.0, 18.0, 15.0)),
+    "sun": (lambda v: (0.3, 0.3, 0.4), (3e4, 2e4, 1e4)),
+    "dots": (lambda v: (0.0, 0.0, 0.0), (50.0, 4.0, 2.0)),
+    "halves": (lambda v: (1.0, 0.9, 0.8) if v < 0.5 else (0.0, 0.0, 0.0), None),
+    "wild": (gradient, (float("nan"), float("inf"), -1.0)),  # what a reader must repair; EXR only
+}
+
+
+def write_map(path, recipe):
+    """A lat-long map: rows of one colour each, and `count` special texels at places that `seed` draws."""
+    width, height = recipe["width"], recipe["height"]
+    row_colour, special = SKIES[recipe["kind"]]
+    level = recipe.get("level", 1.0)
+    encode = exr_texel if path.suffix == ".exr" else rgbe
+
+    def texel(rgb):
+        return encode(tuple(level * c for c in rgb))
+
+    rows = [bytearray(texel(row_colour((y + 0.5) / height)) * width) for y in range(height)]
+    size = len(rows[0]) // width
+    rng = random.Random(recipe.get("seed", 0))
+    for _ in range(recipe.get("count", 0) if special else 0):
+        x, y = rng.randrange(width), rng.randrange(height)
+        rows[y][x * size:(x + 1) * size] = texel(special)
+    if path.suffix == ".exr":
+        write_exr(path, width, rows)
+    else:
+        header = f"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y {height} +X {width}\n"
+        path.write_bytes(header.encode("ascii") + b"".join(rows))
+
+
+def rgbe(rgb):
+    """A texel of a Radiance file."""
+    largest = max(rgb)
+    if largest < 1e-32:
+        return b"\0\0\0\0"
+    exponent = math.frexp(largest)[1]
+    return bytes([*(min(255, int(c * math.ldexp(256, -exponent))) for c in rgb), exponent + 128])
+
+
+def exr_texel(rgb):
+    return struct.pack("<3f", *rgb)
+
+
+def write_exr(path, width, rows):
+    """An uncompressed scan-line EXR of float B, G, R. rows: interleaved float R, G, B."""
+
+    def attribute(name, kind, value):
+        return name + b"\0" + kind + b"\0" + struct.pack("<i", len(value)) + value
+
+    channels = b"".join(name + b"\0" + struct.pack("<iiii", 2, 0, 1, 1) for name in (b"B", b"G", b"R")) + b"\0"
+    window = struct.pack("<4i", 0, 0, width - 1, len(rows) - 1)
+    header = b"\x76\x2f\x31\x01\x02\0\0\0" + b"".join([
+        attribute(b"channels", b"chlist", channels),
+        attribute(b"compression", b"compression", b"\0"),
+        attribute(b"dataWindow", b"box2i", window),
+        attribute(b"displayWindow", b"box2i", window),
+        attribute(b"lineOrder", b"lineOrder", b"\0"),
+        attribute(b"pixelAspectRatio", b"float", struct.pack("<f", 1)),
+        attribute(b"screenWindowCenter", b"v2f", struct.pack("<2f", 0, 0)),
+        attribute(b"screenWindowWidth", b"float", struct.pack("<f", 1))]) + b"\0"
+    first, size = len(header) + 8 * len(rows), 8 + 12 * width
+    with path.open("wb") as file:
+        file.write(header + b"".join(struct.pack("<Q", first + size * y) for y in range(len(rows))))
+        for y, row in enumerate(rows):
+            floats = array("f", bytes(row))
+            file.write(struct.pack("<2i", y, 12 * width))
+            for channel in (2, 1, 0):
+                file.write(floats[channel::3].tobytes())
+
+
+def link_table(path, recipe, shared):
+    """A table in the MERL format, 35 MB: a lobe that depends on the half vector alone, over a diffuse base."""
+    table = Path(shared) / f"merl-{recipe['lobe']}-{recipe['base']}.binary"
+    if not table.exists():
+        temporary = table.with_suffix(f".{os.getpid()}.{id(recipe)}")
+        with temporary.open("wb") as file:
+            array("i", (90, 90, 180)).tofile(file)
+            for scale in (1 / 1500, 1.15 / 1500, 1.66 / 1500):
+                for h in range(90):
+                    theta = ((h + 0.5) / 90) ** 2 * math.pi / 2
+                    value = (recipe["base"] + 0.3 * math.cos(theta) ** recipe["lobe"]) / math.pi / scale
+                    array("d", [value]).__mul__(90 * 180).tofile(file)
+        temporary.rename(table)
+    path.symlink_to(table.resolve())
+
+
+def walk_gltf(recipe):
+    """An animation of node "hip" and of the camera "eye", which goes round at some distance."""
+    times = [i / 4 for i in range(5)]
+    hip = [(0.3 * i, 0.1 * (i % 2), -0.2 * i) for i in range(5)]
+    eye = [(0.2 * i, 1.0, recipe["distance"]) for i in range(5)]
+    turn = [(0.0, math.sin(0.2 * i), 0.0, math.cos(0.2 * i)) for i in range(5)]
+    views, data = [], b""
+    for rows in ([(t,) for t in times], hip, eye, turn):
+        part = b"".join(struct.pack(f"<{len(row)}f", *row) for row in rows)
+        views.append({"buffer": 0, "byteOffset": len(data), "byteLength": len(part)})
+        data += part
+    kinds = ["SCALAR", "VEC3", "VEC3", "VEC4"]
+    accessors = [{"bufferView": i, "componentType": 5126, "count": 5, "type": kind} for i, kind in enumerate(kinds)]
+    accessors[0].update(min=[0.0], max=[1.0])
+    uri = "data:application/octet-stream;base64," + base64.b64encode(data).decode("ascii")
+    targets = [(0, "translation", 1), (1, "translation", 2), (0, "rotation", 3)]
+    return {
+        "asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0, 1]}],
+        "nodes": [{"name": "hip"}, {"name": "eye", "camera": 0}],
+        "cameras": [{"type": "perspective", "name": "eye", "perspective": {"yfov": 0.7, "znear": 0.1}}],
+        "buffers": [{"byteLength": len(data), "uri": uri}], "bufferViews": views, "accessors": accessors,
+        "animations": [{"samplers": [{"input": 0, "output": output} for _, _, output in targets],
+                        "channels": [{"sampler": i, "target": {"node": node, "path": path}}
+                                     for i, (node, path, _) in enumerate(targets)]}],
+    }
+
+
+# ---- frames -------------------------------------------------------------------------------------------------
+
+COMPRESSIONS = ["none", "rle", "zips", "zip", "piz"]
+ROWS_OF_A_BLOCK = {"none": 1, "rle": 1, "zips": 1, "zip": 16}
+TYPES = {0: ("I", 4), 1: ("e", 2), 2: ("f", 4)}
+
+
+class Frame:
+    """A decoded EXR file: channels[name] is an array of floats, row by row; sample_bytes: of all samples, unpacked."""
+
+    def __init__(self, width, height, channels, sample_bytes):
+        self.width, self.height, self.channels, self.sample_bytes = width, height, channels, sample_bytes
+
+
+def read_frame(path, values):
+    """Decodes a frame. values(path, channel): all pixels of a channel, for the one compression that is foreign here."""
+    data = Path(path).read_bytes()
+    at, layout, window, compression = 8, [], None, None
+    while data[at]:
+        name_end = data.index(0, at)
+        kind_end = data.index(0, name_end + 1)
+        size, = struct.unpack_from("<i", data, kind_end + 1)
+        value = data[kind_end + 5:kind_end + 5 + size]
+        name = data[at:name_end].decode()
+        at = kind_end + 5 + size
+        if name == "channels":
+            layout = read_channel_list(value)
+        elif name == "dataWindow":
+            window = struct.unpack("<4i", value)
+        elif name == "compression":
+            compression = COMPRESSIONS[value[0]]
+    width, height = window[2] - window[0] + 1, window[3] - window[1] + 1
+    sample_bytes = width * height * sum(TYPES[kind][1] for _, kind in layout)
+    if compression == "piz":
+        channels = {name: array("f", values(path, name)) for name, _ in layout}
+    else:
+        channels = read_blocks(data, at + 1, width, height, layout, compression)
+    for name, plane in channels.items():
+        if len(plane) != width * height:
+            raise Fault(f"{path}: {name}: {len(plane)} pixels, expected {width * height}")
+    return Frame(width, height, channels, sample_bytes)
+
+
+def read_channel_list(value):
+    """[(name, type)], in file order."""
+    at, layout = 0, []
+    while value[at]:
+        end = value.index(0, at)
+        layout.append((value[at:end].decode(), struct.unpack_from("<i", value, end + 1)[0]))
+        at = end + 17
+    return layout
+
+
+def read_blocks(data, table, width, height, layout, compression):
+    """The planes of a scan-line file whose offset table is at `table`."""
+    rows = ROWS_OF_A_BLOCK[compression]
+    planes = {name: array("f") for name, _ in layout}
+    row_bytes = width * sum(TYPES[kind][1] for _, kind in layout)
+    for block in range((height + rows - 1) // rows):
+        offset, = struct.unpack_from("<Q", data, table + 8 * block)
+        size, = struct.unpack_from("<i", data, offset + 4)
+        count = min(rows, height - block * rows)
+        packed = data[offset + 8:offset + 8 + size]
+        raw = packed if size == count * row_bytes else unpack(packed, compression)
+        at = 0
+        for _ in range(count):
+            for name, kind in layout:
+                letter, letter_bytes = TYPES[kind]
+                planes[name].extend(struct.unpack_from(f"<{width}{letter}", raw, at))
+                at += width * letter_bytes
+    return planes
+
+
+def unpack(packed, compression):
+    """Undoes run lengths or zlib, then the differences and the two halves that both store."""
+    coded = bytearray(unpack_runs(packed) if compression == "rle" else zlib.decompress(packed))
+    for i in range(1, len(coded)):
+        coded[i] = (coded[i - 1] + coded[i] - 128) & 255
+    half = (len(coded) + 1) // 2
+    raw = bytearray(len(coded))
+    raw[0::2], raw[1::2] = coded[:half], coded[half:]
+    return bytes(raw)
+
+
+def unpack_runs(packed):
+    at, raw = 0, bytearray()
+    while at < len(packed):
+        count = packed[at] - 256 if packed[at] > 127 else packed[at]
+        if count < 0:
+            raw += packed[at + 1:at + 1 - count]
+            at += 1 - count
+        else:
+            raw += packed[at + 1:at + 2] * (count + 1)
+            at += 2
+    return raw
+
+
+def raw_state_bytes(path):
+    """Bytes that a sample state holds when unpacked, its description apart; None for any other blob."""
+    with Path(path).open("rb") as file:
+        head = file.read(16)
+        if head[:4] != b"BST1":
+            return None
+        table = file.read(28 * struct.unpack_from("<H", head, 6)[0])
+    entries = [table[i:i + 28] for i in range(0, len(table), 28)]
+    return sum(struct.unpack_from("<Q", entry, 16)[0] for entry in entries if entry[:4] != b"META")
+
+
+def values_by(program):
+    """read_frame's `values` by a program that prints them."""
+
+    def values(path, channel):
+        done = subprocess.run([program, str(path), channel], capture_output=True, text=True, check=True)
+        return [float(text) for text in done.stdout.split()]
+
+    return values

@@ -1,0 +1,277 @@
+"""Renders one random job twice, split in two ways, and judges what came of it. Standard library only."""
+
+import contextlib
+import copy
+import json
+import math
+import os
+import re
+import shutil
+import signal
+import subprocess
+import threading
+from pathlib import Path
+
+from farm import BAD_INPUT, DEADLINE_S, IO, OK, PATIENCE
+from random_job_files import raw_state_bytes, read_frame, values_by, write_file
+from random_job_means import judge_means
+
+# A job this small that takes longer hangs.
+JOB_DEADLINE_S = min(DEADLINE_S, 60 * PATIENCE)
+# Exit code of a `baton render` that was asked to stop.
+CANCELLED = 3
+# How each fault of a job or of its files begins.
+FAULT_LINE = re.compile(r"\S.*: .")
+
+
+class Wrong(Exception):
+    """What is wrong with a job. kind: a word that stays the same while the job is made smaller."""
+
+    def __init__(self, kind, detail):
+        super().__init__(f"{kind}: {detail}")
+        self.kind = kind
+
+
+class Refused(Exception):
+    """`baton check` did not take the job, with good messages."""
+
+
+def require(condition, kind, detail):
+    """Raises Wrong unless the condition holds."""
+    if not condition:
+        raise Wrong(kind, detail)
+
+
+class Judge:
+    """Judges cases. shared: a folder for the large files of all of them."""
+
+    def __init__(self, programs, shared):
+        self.programs = programs
+        self.shared = Path(shared)
+        self.values = values_by(programs.path("exr_values"))
+
+    def judge(self, case, folder):
+        """Renders and compares; the folder must not exist. Raises Wrong or Refused."""
+        folder = Path(folder)
+        folder.mkdir(parents=True)
+        for name, recipe in case["files"].items():
+            write_file(folder / name, recipe, self.shared)
+        predicted = self.checked(case, folder)
+        first = self.rendered(case, case["first"], folder, "first", predicted)
+        second = self.rendered(case, case["second"], folder, "second", predicted)
+        compare(first, second)
+        if "means" in case:
+            found = judge_means(case, lambda of, seed: self.rendered_once(of, seed, folder))
+            require(found is None, "biased", found)
+
+    # ---- programs -------------------------------------------------------------------------------------------
+
+    def run(self, command, interruption=None):
+        """(exit code, standard output, standard error); somebody is killed on the way if an interruption says so."""
+        process = subprocess.Popen([self.programs.path(command[0]), *map(str, command[1:])], stdout=subprocess.PIPE,
+                                   stderr=subprocess.PIPE, start_new_session=True)
+        timer = threading.Timer(interruption["after"], interrupt, (process, interruption["who"])) if interruption else None
+        if timer:
+            timer.start()
+        try:
+            output, errors = process.communicate(timeout=JOB_DEADLINE_S)
+        except subprocess.TimeoutExpired:
+            process.kill()
+            output, errors = process.communicate()
+            errors += b"\n" + self.logs(command)
+            raise Wrong("no end", f"{command[1]}: runs after {JOB_DEADLINE_S} s\n{text_of(errors)[-3000:]}") from None
+        finally:
+            if timer:
+                timer.cancel()
+                timer.join()
+        return process.returncode, text_of(output), text_of(errors)
+
+    @staticmethod
+    def logs(command):
+        """The last of what coordinator and workers wrote, where the command has a work folder."""
+        if "--work-dir" not in command:
+            return b""
+        folder = Path(command[command.index("--work-dir") + 1])
+        return b"\n".join(log.read_bytes()[-1500:] for log in sorted(folder.glob("*.log")))
+
+    def checked(self, case, folder):
+        """What `baton check` predicts of the job."""
+        code, output, errors = self.run(["baton", "check", write_job(case, case["first"], folder, "first"), "--json"])
+        if code == BAD_INPUT:
+            lines = errors.strip().split("\n")
+            bad = [line for line in lines if not FAULT_LINE.match(line)]
+            require(not bad and lines != [""] and len(lines) < 200, "bad message", errors[:1000])
+            raise Refused(errors.strip())
+        require(code == OK, "check failed", f"exit code {code}\n{errors[-2000:]}")
+        return json.loads(output)
+
+    def rendered(self, case, split, folder, name, predicted):
+        """Renders the job to its end, through the interruption if there is one; returns the decoded frames."""
+        work = folder / f"{name}-work"
+        interruption = split.get("interruption")
+        command = ["baton", "render", write_job(case, split, folder, name), "--workers", split["workers"],
+                   "--threads-per-worker", split["threads"], "--work-dir", work, "--json"]
+        code, output, errors = self.run(command, interruption)
+        if interruption:
+            # A coordinator that dies before it listens has not started.
+            none = "did not start" in errors
+            allowed = {"render": (OK, CANCELLED, -signal.SIGINT), "all": (OK, -signal.SIGKILL),
+                       "coordinator": (OK, IO) if none else (OK,)}.get(interruption["who"], (OK,))
+            require(code in allowed, "interrupted render failed", f"exit code {code}\n{errors[-3000:]}")
+            if interruption["who"] in ("render", "all") or none:
+                # Once more, at times with other tiles: that is another job, which must not mind what lies there.
+                tile_size = interruption.get("tileSize") or split["tileSize"]
+                split = {**split, "tileSize": tile_size}
+                write_job(case, split, folder, name)
+                code, output, errors = self.run(command)
+        log = text_of(self.logs(command))
+        require(code == OK, "render failed", f"exit code {code}\n{errors[-2000:]}\n{log}")
+        summary = json.loads(output)
+        require(summary["status"] == "done" and summary["framesDone"] == summary["framesTotal"] == predicted["frames"],
+                "not done", f"{summary['status']}, {summary['framesDone']} of {predicted['frames']} frames")
+        if not interruption:
+            require(summary["attemptsLost"] == 0 and "ended (" not in errors, "lost attempts",
+                    f"{summary['attemptsLost']} attempts lost\n{errors[-1500:]}\n{log}")
+            if name == "first" and not is_auto(case["job"]):
+                compare_prediction(predicted, summary, case["job"])
+        frames = {path.name: read_frame(path, self.values) for path in sorted((folder / name).glob("*.exr"))}
+        require(len(frames) == predicted["frames"], "frames", f"{len(frames)} files, expected {predicted['frames']}")
+        judge_frames(frames, case["job"], predicted)
+        if name == "first" and not is_auto(case["job"]):
+            side = split["tileSize"]
+            judge_states(work, min(side, case["job"]["image"]["width"]) * min(side, case["job"]["image"]["height"]),
+                         predicted)
+        return frames
+
+
+    def rendered_once(self, case, seed, folder):
+        """The folder of the frames of the job with that seed."""
+        of_seed = {**case, "job": {**case["job"], "seed": seed}}
+        name = f"seed{seed}-{case['job']['sampling']['method']}"
+        path = write_job(of_seed, case["first"], folder, name)
+        code, _, errors = self.run(["baton", "render", path, "--workers", 1, "--threads-per-worker", 1])
+        require(code == OK, "render failed", f"exit code {code}\n{errors[-2000:]}")
+        return folder / name
+
+
+def is_auto(job):
+    """Whether a pilot chooses the method, of which `baton check` cannot tell what it will take."""
+    return job.get("sampling", {}).get("method") == "auto"
+
+
+def text_of(output):
+    return output.decode("utf-8", errors="replace")
+
+
+def write_job(case, split, folder, name):
+    """The job, split so; returns its path."""
+    job = copy.deepcopy(case["job"])
+    changes = [("image", "tileSize", split["tileSize"]), ("state", "checkpointEvery", split["checkpointEvery"]),
+               ("output", "directory", name), ("output", "compression", split.get("compression")),
+               ("state", "keep", "all" if name == "first" else None)]
+    for section, key, value in changes:
+        # A section that was made wrong on purpose stays so.
+        if value is not None and isinstance(job.setdefault(section, {}), dict):
+            job[section][key] = value
+    path = folder / f"{name}.json"
+    path.write_text(json.dumps(job, indent=1), encoding="utf-8")
+    return path
+
+
+# ---- interruptions ------------------------------------------------------------------------------------------
+
+
+def interrupt(process, who):
+    """SIGINT for `baton render` itself, SIGKILL for a program that it has started, or for all at once."""
+    with contextlib.suppress(ProcessLookupError, OSError):
+        if who == "render":
+            process.send_signal(signal.SIGINT)
+        elif who == "all":
+            process.kill()  # the others die with it
+        else:
+            for child in children_of(process.pid):
+                command = Path(f"/proc/{child}/cmdline").read_bytes().split(b"\0")[0]
+                if command.endswith(b"baton-" + who.encode()):
+                    os.kill(child, signal.SIGKILL)
+                    return
+
+
+def children_of(pid):
+    """Process ids; which thread started them does not count."""
+    children = []
+    for task in Path(f"/proc/{pid}/task").glob("*/children"):
+        children += map(int, task.read_text(encoding="ascii").split())
+    return children
+
+
+# ---- judgements ---------------------------------------------------------------------------------------------
+
+
+def judge_frames(frames, job, predicted):
+    """All numbers are finite, and the frames have the size that was predicted."""
+    for name, frame in frames.items():
+        for channel, values in frame.channels.items():
+            # A sum of finite floats is finite in double precision.
+            if not math.isfinite(math.fsum(values) if all(map(math.isfinite, values)) else math.nan):
+                places = [i for i, value in enumerate(values) if not math.isfinite(value)]
+                raise Wrong("not finite", f"{name}: {channel}: {len(places)} of {len(values)}, first at "
+                            f"({places[0] % frame.width}, {places[0] // frame.width}): {values[places[0]]}")
+        require(frame.sample_bytes == predicted["frameBytes"], "frame bytes",
+                f"{name}: {frame.sample_bytes} bytes of samples, predicted {predicted['frameBytes']}")
+        image = job.get("image", {})
+        require((frame.width, frame.height) == (image.get("width", 640), image.get("height", 360)), "size",
+                f"{name}: {frame.width}x{frame.height}")
+
+
+def compare(first, second):
+    """Both renderings show the same, bit by bit."""
+    require(first.keys() == second.keys(), "frames", f"{sorted(first)} and {sorted(second)}")
+    for name in first:
+        a, b = first[name], second[name]
+        require(a.channels.keys() == b.channels.keys(), "channels", name)
+        differ = {channel: [i for i, (x, y) in enumerate(zip(a.channels[channel], b.channels[channel])) if x != y]
+                  for channel in a.channels if a.channels[channel].tobytes() != b.channels[channel].tobytes()}
+        if differ:
+            channel, places = next(iter(differ.items()))
+            place = places[0] if places else 0
+            raise Wrong("split shows", f"{name}: {', '.join(differ)}: {len(places)} of {a.width * a.height} pixels of "
+                        f"{channel}, first at ({place % a.width}, {place // a.width}): {a.channels[channel][place]!r} and "
+                        f"{b.channels[channel][place]!r}")
+
+
+def compare_prediction(predicted, summary, job):
+    """Tasks and rays are as `baton check` said."""
+    stats = summary["stats"]
+    tasks = predicted["renderTasks"] + predicted["secondPassTasks"] + predicted["assembleTasks"]
+    require(summary["tasksTotal"] == tasks, "predicted tasks", f"{summary['tasksTotal']}, predicted {tasks}")
+    pixels = job.get("image", {}).get("width", 640) * job.get("image", {}).get("height", 360)
+    second_pass = predicted["secondPassTasks"] > 0
+    require(stats["pixels"] == pixels * predicted["frames"], "predicted pixels",
+            f"{stats['pixels']}, predicted {pixels * predicted['frames']}")
+
+    # A run traces its surfaces once where pixels take history from themselves alone, else in each frame; old surfaces
+    # and those of the second pass, whose tiles overlap, are traced again.
+    sampling = job.get("sampling", {})
+    asks = sampling.get("numNeighbors", 0) if sampling.get("method") == "restir" else 0
+    shares = asks > 0 or predicted["motionMaxPx"] > 0
+    of_frame = pixels * predicted["primaryRaysPerPixel"]
+    least = of_frame * (predicted["frames"] if shares else predicted["runs"])
+    most = least * (2 + asks if shares else 1) + (9 * of_frame * predicted["frames"] if second_pass else 0)
+    require(least <= stats["raysPrimary"] <= most, "predicted primary rays",
+            f"{stats['raysPrimary']}, predicted {least} to {most}")
+    shadow = pixels * predicted["frames"] * predicted["shadowRaysPerPixel"]
+    require(stats["raysShadow"] <= shadow, "predicted shadow rays",
+            f"{stats['raysShadow']}, predicted at most {shadow}")
+
+
+def judge_states(work, tile_pixels, predicted):
+    """What states hold is at most what was predicted."""
+    states = [size for size in map(raw_state_bytes, work.rglob("*.blob")) if size is not None]
+    most = tile_pixels * predicted["stateBytesPerPixel"] + 4
+    require(not states or max(states) <= most, "predicted state bytes",
+            f"{max(states, default=0)} bytes in a tile of at most {tile_pixels} pixels, predicted {most}")
+
+
+def remove(folder):
+    shutil.rmtree(folder, ignore_errors=True)
+

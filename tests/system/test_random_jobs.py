@@ -1,0 +1,62 @@
+#!/usr/bin/env python3
+"""A hundred random jobs, always the same, and the test of that test. More: random_jobs.py by hand."""
+
+import os
+import tempfile
+from pathlib import Path
+
+from farm import check, check_equal, make_job, run_tests
+from random_job_files import read_frame
+from random_job_judge import Judge, Wrong
+from random_job_self_test import self_test
+from random_jobs import parse_options, run_jobs
+
+SEED = 1
+JOBS = 100
+MEMORY = "/dev/shm"
+SOURCE = Path(__file__).resolve().parents[2]
+
+
+def planted_faults_are_found(_, folder):
+    check_equal(self_test(SOURCE), 0, "failures of the test itself")
+
+
+class Saboteur(Judge):
+    """Turns one bit of the last pixel of the second rendering."""
+
+    def rendered(self, case, split, folder, name, predicted):
+        frames = super().rendered(case, split, folder, name, predicted)
+        if name == "second":
+            path = sorted((folder / name).glob("*.exr"))[-1]
+            data = bytearray(path.read_bytes())
+            data[-4] ^= 1
+            path.write_bytes(data)
+            frames[path.name] = read_frame(path, None)
+        return frames
+
+
+def a_wrong_bit_is_found(programs, folder):
+    job = make_job(folder / "files", frames="1-2", image={"width": 20, "height": 12},
+                   output={"pixelType": "float", "aovs": []})
+    case = {"job": job, "files": {}, "first": {"tileSize": 8, "workers": 1, "threads": 2, "checkpointEvery": 2}}
+    case["second"] = {**case["first"], "tileSize": 64, "compression": "none"}
+    Judge(programs, folder).judge(case, folder / "untouched")
+    try:
+        Saboteur(programs, folder).judge(case, folder / "touched")
+    except Wrong as found:
+        check("frame.0002.exr" in str(found) and "1 of 240 pixels of R, first at (19, 11)" in str(found), str(found))
+        return
+    check(False, "nobody saw a bit that was turned")
+
+
+def random_jobs_render(programs, folder):
+    """In memory where there is some: the store waits for the disk."""
+    if os.access(MEMORY, os.W_OK):
+        tempfile.tempdir = MEMORY
+    options = parse_options(["--bin", str(programs.bin), "--source", str(SOURCE), "--seed", str(SEED),
+                             "--jobs", str(JOBS), "--keep", str(folder), "--shrink", "20"])
+    check_equal(run_jobs(options), 0, f"failures of {JOBS} random jobs with seed {SEED}")
+
+
+if __name__ == "__main__":
+    run_tests([planted_faults_are_found, a_wrong_bit_is_found, random_jobs_render])
