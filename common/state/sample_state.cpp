@@ -152,12 +152,6 @@ Status decode_meta(const SectionFile& file, const std::string& name, SampleState
     return fail(fmt::format("{} particles, expected {} to {}", state.num_particles, fewest,
                             limits::kMaxParticles));
   }
-  constexpr std::uint64_t kParticleBytes =
-      sizeof(OctDirection) + sizeof(float) + sizeof(std::uint8_t);
-  if (state.num_pixels() * state.num_particles * kParticleBytes > limits::kMaxBlobBytes) {
-    return fail(fmt::format("{} pixels of {} particles, past the limit of {} bytes",
-                            state.num_pixels(), state.num_particles, limits::kMaxBlobBytes));
-  }
   return {};
 }
 
@@ -213,9 +207,20 @@ Status check_population(const SampleState& state, std::size_t pixel, std::size_t
   return {};
 }
 
-/// Fills `state.source`; resizes all arrays.
+/// Fills `state.source`; resizes all arrays, which must not be larger than a file may be.
 Status decode_sources(const SectionFile& file, const std::string& name, SampleState& state) {
   const auto populations = static_cast<std::size_t>(state.num_populations);
+  const std::uint64_t bytes =
+      state.num_pixels() *
+      SampleState::bytes_per_pixel(static_cast<std::size_t>(state.num_particles), populations,
+                                   file.find(kMemorySummary) != nullptr,
+                                   file.find(kConfidence) != nullptr);
+  if (bytes > limits::kMaxBlobBytes) {
+    return Error{ErrorKind::bad_input,
+                 fmt::format("{}: {} pixels of {} particles take {} bytes, past the limit of {}",
+                             name, state.num_pixels(), state.num_particles, bytes,
+                             limits::kMaxBlobBytes)};
+  }
   BATON_ASSIGN(const ByteView payload,
                section_payload(file, kSource, state.num_pixels() * populations, name));
   state.resize(state.rect, state.num_particles, state.num_populations);

@@ -67,6 +67,12 @@ struct SampleState {
            (with_memory ? kMemoryCells * sizeof(memory[0]) : 0) +
            (with_confidence ? sizeof(confidence[0]) : 0);
   }
+  /// Of all arrays.
+  std::size_t size_bytes() const {
+    return num_pixels() * bytes_per_pixel(static_cast<std::size_t>(num_particles),
+                                          static_cast<std::size_t>(num_populations),
+                                          !memory.empty(), !confidence.empty());
+  }
   /// Lets each pixel's samples count for nothing yet.
   void add_confidence() { confidence.assign(num_pixels(), 0); }
   /// Gives each pixel an empty memory.

@@ -1,7 +1,10 @@
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cstring>
 #include <vector>
 
+#include "common/base/section_file.h"
 #include "common/state/sample_state.h"
 
 namespace baton {
@@ -23,6 +26,40 @@ TEST(SampleState, SizeOfAPixelIsThatOfItsArrays) {
                               bytes_of(state.weight) + bytes_of(state.site) +
                               bytes_of(state.memory) + bytes_of(state.confidence);
     EXPECT_EQ(10 * SampleState::bytes_per_pixel(6, 2, memory, !memory), bytes);
+    EXPECT_EQ(state.size_bytes(), bytes);
+  }
+}
+
+/// The bytes of a small state whose META claims another rectangle: x1 at byte 32, y1 at 36.
+Bytes claiming(std::int32_t width, std::int32_t height, bool with_memory) {
+  SampleState state;
+  state.resize({0, 0, 1, 1}, with_memory ? 0 : 1);
+  if (with_memory) state.add_memory();
+  const SectionTag magic{'B', 'S', 'T', '1'};
+  SectionFile file = *decode_section_file(encode_state(state), magic, kStateVersion, "t.bst");
+  for (Section& section : file.sections) {
+    if (section.tag == SectionTag{'M', 'E', 'T', 'A'}) {
+      std::memcpy(section.payload.data() + 32, &width, sizeof(width));
+      std::memcpy(section.payload.data() + 36, &height, sizeof(height));
+    }
+    if (section.tag == SectionTag{'S', 'R', 'C', '_'})
+      section.payload.resize(static_cast<std::size_t>(width) * static_cast<std::size_t>(height));
+  }
+  return encode_section_file(file);
+}
+
+// A file of a few kilobytes must not ask for hundreds of gigabytes.
+TEST(SampleState, AFileThatAsksForTooMuchIsRefusedBeforeAnythingIsAllocated) {
+  for (const bool with_memory : {false, true}) {
+    const std::int32_t height = with_memory ? 1000 : 32768;
+    const Bytes bytes = claiming(with_memory ? 10000 : 20000, height, with_memory);
+    EXPECT_LT(bytes.size(), 100000u);
+    const auto decoded = decode_state(bytes, "t.bst");
+    ASSERT_FALSE(decoded.ok());
+    EXPECT_THAT(decoded.error().message,
+                testing::HasSubstr(with_memory ? "t.bst: 10000000 pixels of 0 particles take"
+                                               : "t.bst: 655360000 pixels of 1 particles take"));
+    EXPECT_THAT(decoded.error().message, testing::HasSubstr("past the limit of 4294967296"));
   }
 }
 
