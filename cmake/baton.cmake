@@ -23,6 +23,10 @@ endif()
 if(BATON_WERROR)
   target_compile_options(baton_options INTERFACE -Werror)
 endif()
+# Checked builds: what inner loops do is checked, too, and tests can fill work space with patterns (common/base/poison.h).
+if(BATON_CHECKED)
+  target_compile_definitions(baton_options INTERFACE BATON_CHECKED _GLIBCXX_ASSERTIONS HWY_IS_DEBUG_BUILD=1)
+endif()
 # Sanitizer builds: every finding ends the program, and containers check their indices. The SIMD kernels are built for SSE4
 # and AVX2 only: GCC takes minutes for each target of the instrumented kernels. What AVX-512 would add is other instructions
 # for the same eight lanes (common/math/lanes-inl.h); that the best target is chosen, and computes what the others do, is

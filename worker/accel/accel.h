@@ -7,6 +7,7 @@
 #include <span>
 #include <string>
 
+#include "common/base/poison.h"
 #include "worker/scene/camera.h"
 #include "worker/scene/scene.h"
 
@@ -32,7 +33,12 @@ struct ShadowRays {
   std::vector<float> t_near, t_far;  ///< t_far < 0 after tracing: occluded
 
   std::size_t size() const { return count_; }
-  void clear() { count_ = 0; }
+  void clear() {
+    count_ = 0;
+    for (auto* column : {&origin_x, &origin_y, &origin_z, &direction_x, &direction_y, &direction_z})
+      poison(*column);
+    poison(t_far);
+  }
   /// Makes room for `capacity` rays in all.
   void reserve(std::size_t capacity);
   /// Counts rays [size(), count) whose origins and directions the caller has written; within the

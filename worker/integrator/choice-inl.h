@@ -12,6 +12,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/base/poison.h"
 #include "worker/integrator/candidates-inl.h"
 #include "worker/integrator/pixel_rays.h"
 #include "worker/sampling/systematic-inl.h"
@@ -189,10 +190,15 @@ class DistinctPicks {
   PaddedArray<float, limits::kMaxParticles> times;  ///< each counts
   std::size_t count = 0;
 
+  DistinctPicks() {
+    poison(pick);
+    poison(times);
+  }
   /// `count` systematic picks, > 0.
   static DistinctPicks Systematic(const RunningSums& line, float total, float u,
                                   std::size_t count) {
     PaddedArray<std::int32_t, limits::kMaxParticles> picks;
+    poison(picks);
     SystematicPicks(line, total, u, count, picks);
     DistinctPicks out;
     for (std::size_t j = 0; j < count; ++j) {
@@ -276,6 +282,7 @@ inline float ChooseCandidates(const SiteBlock& sites, const EnvironmentView& env
   // Keep N of them.
   const ChosenCandidates chosen(sites, pool, counts, random, scratch.from_bsdf);
   PaddedArray<std::int32_t, limits::kMaxParticles> picks;
+  poison(picks);
   SystematicPicks(sums, total, u, out.code.size(), picks);
   for (std::size_t j = 0; j < out.code.size(); j += hn::Lanes(DF())) {
     const CandidateLanes c = chosen.Evaluate(hn::Load(DI(), picks.from(j)));

@@ -4,6 +4,7 @@
 #include <array>
 
 #include "common/base/check.h"
+#include "common/base/poison.h"
 
 #undef HWY_TARGET_INCLUDE
 #define HWY_TARGET_INCLUDE "worker/integrator/exchange_kernels.cpp"
@@ -209,6 +210,7 @@ void reflect_and_cast(const SurfaceTable& surfaces, std::span<const LightRecord>
   rays.rays.clear();
   rays.rays.reserve(capacity);
   rays.offer.resize(std::max(rays.offer.size(), capacity));
+  poison(rays.offer);
   HWY_DYNAMIC_DISPATCH(ReflectAndCast)(surfaces, lights, offers, reflected, rays);
 }
 

@@ -4,6 +4,7 @@
 #include <span>
 #include <vector>
 
+#include "common/base/poison.h"
 #include "common/math/octahedral.h"
 #include "worker/accel/accel.h"
 #include "worker/integrator/pixel_rays.h"
@@ -20,7 +21,11 @@ struct RayBatch {
   std::vector<float> r, g, b;         ///< u_j (f cos L)_rgb / p~
   std::vector<float> visibility;      ///< share of the pixel's Lns
 
-  void clear() { rays.clear(); }
+  void clear() {
+    rays.clear();
+    poison(sample);
+    for (auto* column : {&r, &g, &b, &visibility}) poison(*column);
+  }
   std::size_t size() const { return rays.size(); }
   /// Makes room for `more` rays and what a vector may write past them.
   void reserve(std::size_t more);

@@ -1,5 +1,6 @@
 #include "worker/pass/extra_samples.h"
 
+#include "common/base/poison.h"
 #include "worker/pass/cpu_clock.h"
 #include "worker/pass/populations.h"
 #include "worker/pass/primary.h"
@@ -17,6 +18,7 @@ ExtraSampler::ExtraSampler(const SecondPassWork& work)
 
 Rgb ExtraSampler::radiance(std::int32_t x, std::int32_t y, std::size_t fold) {
   const std::int32_t position = work_.surfaces.find(work_.masks.any.index(x, y));
+  poison(sites_);
   work_.context.gather_sites(work_.surfaces.hits(position), sites_);
   const Rgb first = first_pass(work_.samples.find(x, y), fold);
   if (!work_.masks.of_fold[fold].at(x, y)) return first;
@@ -34,6 +36,7 @@ Rgb ExtraSampler::first_pass(const SampleRegion::Place& pixel, std::size_t fold)
   const SampleRegion::Place place = pixel.of_population(use.giver_population);
   const FirstPassSamples& from = *place.tile;
   kernels::ShadedSamples shaded;
+  poison(shaded);
   kernels::shade_samples(sites_, now_, std::span(from.direction).subspan(place.first, place.count),
                          std::span(from.site).subspan(place.first, place.count), shaded);
   Rgb sum;

@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/base/poison.h"
+
 namespace baton {
 namespace {
 
@@ -62,6 +64,7 @@ std::span<const CarriedSet> Neighborhood::sets(std::size_t i, std::span<const Su
     const std::span<const SurfaceHit> old = old_pixels_.hits(place);
     const SampleState& state = *place.state;
     if (!agrees(hits, old) || state.confidence[place.index] == 0) continue;
+    poison(surfaces_[count].sites);
     context_.gather_sites(old, surfaces_[count].sites);
     const auto n = static_cast<std::size_t>(state.num_particles);
     const std::size_t first = place.index * n;

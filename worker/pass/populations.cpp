@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "common/base/poison.h"
 #include "common/job/sequence.h"
 
 namespace baton {
@@ -41,6 +42,8 @@ PixelDiagnostics sample_populations(const PixelSampler& sampler, std::size_t num
                         state.source[row],
                         state.confidence.empty() ? nullptr : &state.confidence[row]};
   };
+  poison(scratch);
+  poison(colors);
   if (populations == 1) return sampler.sample(input, scratch, samples_of(0));
 
   PixelDiagnostics sum;

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 
+#include "common/base/poison.h"
 #include "worker/integrator/reference.h"
 #include "worker/pass/blocked_samples.h"
 #include "worker/pass/cpu_clock.h"
@@ -132,6 +133,8 @@ void TileFrameRenderer::look_ahead(std::size_t pixel_of_batch, std::size_t index
                                    const kernels::CarriedLight& light, SampleState& state) {
   if (!surfaces_.sees_surface(index)) return;
   Ahead& ahead = ahead_[index % 2];
+  poison(ahead.located);
+  poison(ahead.old);
   fetch_ahead(state.memory_of(index));
   ahead.history = has_history_ ? PixelHistory::same : PixelHistory::none;
   if (reprojection_ != nullptr) {
@@ -158,6 +161,8 @@ void TileFrameRenderer::sample(Batch& batch, const FrameLight& light, SampleStat
   SampleColors colors;
   SiteBlock sites;
   batch.rays.clear();
+  poison(batch.bin);
+  poison(batch.end_ray);
   batch.difference.fill(0);
   batch.light_variance.fill({});
   const kernels::CarriedLight carried{before, now, light.still, light.pool};
@@ -173,6 +178,7 @@ void TileFrameRenderer::sample(Batch& batch, const FrameLight& light, SampleStat
       batch.end_ray[i] = batch.rays.size();
       continue;
     }
+    poison(sites);
     context_.gather_sites(surfaces_.pixel(index), sites);
 
     // Sample as the material of its first surface asks for, and cast the rays.

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "common/base/poison.h"
 #include "worker/pass/cpu_clock.h"
 
 namespace baton {
@@ -41,8 +42,10 @@ void TracedExchange::load_samples(std::span<Giver> givers, std::vector<GiverSamp
 
   // See what their own surfaces make of the light along them.
   light_.resize(code_.size());
+  poison(light_);
   kernels::look_up_lights(environment_, code_, light_);
   own_.resize(code_.size() + kReceptionPadding);
+  poison(own_);
   kernels::reflect_lights(work_.surfaces.table(), light_, own_offers_, own_);
 
   // Keep what reflects.

@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "common/base/check.h"
+#include "common/base/poison.h"
 
 namespace baton {
 namespace {
@@ -69,6 +70,7 @@ class Exchange {
 
     // Answer.
     receptions_.resize(std::max(receptions_.size(), offers_.size() + kReceptionPadding));
+    poison(receptions_);
     scene_.receive(offers_, std::span(receptions_).first(offers_.size() + kReceptionPadding));
 
     // Book.

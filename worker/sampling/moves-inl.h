@@ -10,6 +10,7 @@
 #include <hwy/highway.h>
 
 #include "common/base/limits.h"
+#include "common/base/poison.h"
 #include "common/math/lanes-inl.h"
 #include "common/math/padded_array.h"
 #include "common/math/philox-inl.h"
@@ -83,7 +84,10 @@ inline constexpr std::size_t kProposalBlock = 8;
 /// of Philox has 128 bits and a uniform takes 24: the acceptances of five moves share one.
 class MoveRandom {
  public:
-  MoveRandom(const Rng& rng, std::size_t num_particles) : rng_(rng), count_(num_particles) {}
+  MoveRandom(const Rng& rng, std::size_t num_particles) : rng_(rng), count_(num_particles) {
+    for (auto* words : {&kind_, &first_, &distance_, &site_}) poison(*words);
+    poison(accept_);
+  }
 
   /// What move `move` (0-based, ascending from call to call) needs beside its proposals.
   HWY_INLINE void Begin(std::uint32_t move) {

@@ -201,6 +201,7 @@ HWY_INLINE SequentialOutcome SequentialStep(const Target& target,
   const int distributions = settings.num_distributions;
   SequentialOutcome outcome;
   ParticleArrays p;
+  poison(p);
   LoadParticles(target, count, particles, p);
 
   PathSum path(settings.lns_update, distributions);
@@ -233,6 +234,7 @@ HWY_INLINE SequentialOutcome SequentialStep(const Target& target,
     }
     if (!path.used()) continue;
     ParticleArrays::Column<float> weight;
+    poison(weight);
     std::copy_n(p.weight.from(0), hwy::RoundUpTo(count, hn::Lanes(DF())), weight.from(0));
     if (distributions > 1) ApplyIncrements(count, p, weight);
     path.Add(k, MeanLogRatio(count, p, weight));
