@@ -88,8 +88,8 @@ class Run:
             case = shrink(case, lambda smaller: self.fails_as(smaller, found.kind), self.options.shrink)
         path = self.keep / f"failed-{self.options.seed}-{number}.json"
         path.write_text(json.dumps(case, indent=1), encoding="utf-8")
-        print(f"job {number}, {found.kind}: {json.dumps(case)}\nrepeat: python3 {Path(__file__).resolve()} --bin {self.options.bin} "
-              f"--source {self.options.source} --case {path}", flush=True)
+        print(f"job {number}, {found.kind}: {json.dumps(case)}\nrepeat: python3 {Path(__file__).resolve()} "
+              f"--bin {self.options.bin} --source {self.options.source} --case {path}", flush=True)
 
     def fails_as(self, case, kind):
         """Whether the case fails in that way; what depends on the moment has three tries."""
