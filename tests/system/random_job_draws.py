@@ -165,7 +165,8 @@ class Draw:
             self.schema.hand["scene.ground.material"] = lambda: self.rng.choice(names)
             scene["ground"] = self.schema.object(ground, "scene.ground")
         scene["meshes"] = {}
-        scene["objects"] = [self.object(scene, keys, names, i) for i in range(2 if self.plain else self.pick(0, 1, 1, 2, 2, 3))]
+        count = 2 if self.plain else self.pick(0, 1, 1, 2, 2, 3)
+        scene["objects"] = [self.object(scene, keys, names, i) for i in range(count)]
         return scene
 
     def material(self, node):

@@ -1,4 +1,4 @@
-"""What the keys of a legal job demand of each other, what a job costs, and how one is spoiled. Standard library only."""
+"""What the keys of a legal job demand of each other, what a job costs, and how one is spoiled."""
 
 import copy
 import math

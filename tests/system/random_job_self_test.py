@@ -20,7 +20,7 @@ from random_job_shrink import shrink
 
 # Keys that are meant to stay away: what makes a job fail by itself, and the form of a file that is drawn apart.
 NEVER_DRAWN = {"maxRetriesPerTask", "maxSecondsPerTask", "maxFailuresPerWorker", "output.directory"}
-CASES = 800
+CASES = 1500
 
 
 def load_schema(source):

@@ -8,7 +8,7 @@ one JSON file with everything that is needed to repeat it.
 
 usage: random_jobs.py --bin build/release/bin --source . [--seed S] [--jobs N] [--seconds T] [--parallel P] [--keep DIR]
        random_jobs.py --bin build/release/bin --source . --case FILE      repeat one case
-       random_jobs.py --self-test                                         generator, judge and shrinker, without programs
+       random_jobs.py --self-test      generator, judge and shrinker, without programs
 TMPDIR=/dev/shm makes long runs faster. Exits 1 when a job fails. Standard library only."""
 
 import argparse
