@@ -1,12 +1,11 @@
-"""Random legal jobs: the schema says what a key may be, this file what is meaningful (files, geometry, frames, split) and
-what keys demand of each other. Standard library only."""
+"""Random legal jobs: the schema says what a key may be, this file what is meaningful (files, geometry, frames, split).
+Standard library only."""
 
-import copy
 import json
-import math
 import random
 
 from random_job_means import tame
+from random_job_rules import mend, mend_view, spoil, work_of
 from random_job_schema import SchemaDraw
 
 # Particles and candidates: every remainder modulo 8, one, powers of two and the most.
@@ -14,7 +13,7 @@ NUM_PARTICLES = [1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 12, 13, 14, 16, 16, 18, 20, 23, 
 NUM_CANDIDATES = [1, 2, 7, 8, 9, 13, 16, 24, 25, 27, 33, 50, 64, 70, 100, 128, 130, 257, 400, 1000]
 FRESH_METHODS = {"environment", "brdf", "mis", "bidirectional"}
 # What no draw may cost, in about 50 ns: surfaces, candidates and moves of all pixels and frames.
-MOST_WORK = 4e6
+MOST_WORK = 5e6
 
 
 class Draw:
@@ -24,6 +23,8 @@ class Draw:
         self.rng = rng
         self.files = {}
         self.first_frame, self.step, self.count = 1, 1, 1
+        # Every other job shows spheres on the ground under a lamp, as users' jobs do: penumbras are where much happens.
+        self.plain = rng.random() < 0.5
         self.schema = SchemaDraw(schema, rng, self.hand())
 
     def chance(self, probability):
@@ -85,6 +86,8 @@ class Draw:
             "image.tileSize": lambda: self.tile_size(),
             "output.directory": nothing,
             "output.pattern": lambda: self.pick(None, "f.#.exr", "a b ######.exr", "\u00e4####x.exr"),
+            # 16 bits hide what differs in the last ones.
+            "output.pixelType": lambda: "half" if self.chance(0.15) else "float",
             # Counts that cost time, and the ways to fail that are meant to fail.
             "sampling.method": self.method,
             "sampling.numParticles": lambda: self.rng.choice(NUM_PARTICLES),
@@ -93,8 +96,10 @@ class Draw:
             "sampling.referenceSamples": lambda: self.pick(2, 3, 8, 17),
             "sampling.byMaterial.*.numParticles": lambda: self.rng.choice([None, *NUM_PARTICLES]),
             "sampling.byMaterial.*.numCandidates": lambda: self.rng.choice([None, *NUM_CANDIDATES]),
-            "sampling.targetError": lambda: self.pick(None, 0.3), "sampling.timeBudget": lambda: self.pick(None, 1.0),
+            "sampling.targetError": lambda: self.pick(None, 0.3), "sampling.timeBudget": lambda: 1.0,
             "visibility.correlated": lambda: self.chance(0.9),
+            "visibility.mask": lambda: self.rng.choice(self.enum("visibility", "mask") + ["same-samples"]),
+            "image.sites": lambda: self.rng.choice(self.enum("image", "sites") + [4]),
             "maxRetriesPerTask": nothing, "maxSecondsPerTask": nothing, "maxFailuresPerWorker": nothing,
             # Geometry.
             "scene.materials.*.file": self.table,
@@ -112,17 +117,21 @@ class Draw:
             "environment.rotation.degPerFrame": lambda: self.pick(0.0, 0.1, 1.5, 20.0, -90.0, 1e6),
         }
 
+    def enum(self, section, key):
+        """All values of a key."""
+        return self.schema.schema["properties"][section]["properties"][key]["enum"]
+
     def name(self):
         return self.pick("any", "any", "a name", "\u00e4\u4e2d", "x" * 100)
 
     def side(self):
-        return self.pick(1, 1, 2, 5, 8, 9, 16, 17, 24, 33, 40)
+        return self.pick(20, 24, 33, 40) if self.plain else self.pick(1, 1, 2, 5, 8, 9, 16, 17, 24, 33, 40)
 
     def tile_size(self):
         return self.pick(8, 8, 9, 13, 16, 19, 64, 32768)
 
     def method(self):
-        methods = self.schema.schema["properties"]["sampling"]["properties"]["method"]["enum"]
+        methods = self.enum("sampling", "method")
         plain = [method for method in methods if method != "auto"]
         return "auto" if "auto" in methods and self.chance(0.01) else self.rng.choice(plain + ["sequential", "pool"])
 
@@ -151,12 +160,13 @@ class Draw:
         for material in scene["materials"].values():
             if material.get("kd", 0.5) + material.get("ks", 0.5) > 1:
                 material["kd"], material["ks"] = 0.5, 0.4
-        if self.chance(0.75):
+        if self.plain or self.chance(0.75):
             ground = self.schema.resolve(keys["ground"])
             self.schema.hand["scene.ground.material"] = lambda: self.rng.choice(names)
             scene["ground"] = self.schema.object(ground, "scene.ground")
         scene["meshes"] = {}
-        scene["objects"] = [self.object(scene, keys, names, i) for i in range(self.pick(0, 1, 1, 2, 2, 3))]
+        count = 2 if self.plain else self.pick(0, 1, 1, 2, 2, 3)
+        scene["objects"] = [self.object(scene, keys, names, i) for i in range(count)]
         return scene
 
     def material(self, node):
@@ -173,11 +183,17 @@ class Draw:
             {"kind": "sphere", "rings": self.pick(2, 5, 9), "segments": self.pick(3, 6, 13)},
             {"kind": "sphere", "rings": 8, "segments": 12},
             {"kind": "card"}, {"kind": "shards", "count": self.pick(1, 6, 40), "seed": self.rng.randrange(1000)})
+        if self.plain:
+            self.files[path] = {"kind": "sphere", "rings": 8, "segments": 12}
         smooth = self.pick(None, True, False)
         scene["meshes"][mesh] = path if smooth is None else {"path": path, "smoothNormals": smooth}
         self.schema.hand["scene.objects[].mesh"] = lambda: mesh
         self.schema.hand["scene.objects[].material"] = lambda: self.rng.choice(names)
-        return self.schema.value(keys["objects"]["items"], "scene.objects[]")
+        item = self.schema.value(keys["objects"]["items"], "scene.objects[]")
+        if self.plain:
+            item.pop("placeOnGround", None)
+            item.update(translate=[0.9 - 1.8 * number, 0.7, 0.3 * number], scale=0.7)
+        return item
 
     def key_frames(self):
         """Ascending frames, at times between those of the job or beyond them."""
@@ -201,10 +217,13 @@ class Draw:
         return keys
 
     def camera(self):
-        """Outside, inside a mesh, below the ground, far away, with the sky alone in view; still or moving."""
-        position = self.pick([0, 1, 4.5], self.vector(3), self.vector(0.2), [0.5, -2, 3], [0, 2, 400], [0, 1, 4.5])
-        look_at = self.pick([0, 0.3, 0], self.vector(0.5), [0, 0.3, 0], [0.1, 90, 2])
-        camera = {"position": position, "lookAt": look_at, "verticalFovDeg": self.pick(5, 30, 40, 40, 90, 170, 0.01)}
+        """Mostly outside; inside a mesh, below the ground, far away, with the sky alone in view; still or moving."""
+        camera = {"position": [0, 1.2, 4.5], "lookAt": [0, 0.3, 0], "verticalFovDeg": self.pick(30, 40, 60)}
+        if not self.plain and self.chance(0.6):
+            camera = {"position": self.pick(self.vector(3), self.vector(0.2), [0.5, -2, 3], [0, 2, 400], [0, 1, 4.5]),
+                      "lookAt": self.pick([0, 0.3, 0], self.vector(0.5), [0, 0.3, 0], [0.1, 90, 2]),
+                      "verticalFovDeg": self.pick(5, 30, 40, 90, 170, 0.01)}
+        position, look_at = camera["position"], camera["lookAt"]
         if self.chance(0.2):
             camera["up"] = self.pick([0, 0, 1], [0.3, 1, 0.1], [0, -1, 0])
         if self.chance(0.3):
@@ -248,6 +267,8 @@ class Draw:
             self.files[name] = {"kind": self.rng.choice(kinds), "width": width, "height": height,
                                 "seed": self.rng.randrange(1000), "count": self.pick(1, 1, 3, 20),
                                 "level": self.pick(1.0, 1.0, 1.0, 1e-3, 100.0)}
+            if self.plain and self.chance(0.8):
+                self.files[name].update(kind="lamp", level=1.0)
             return name
 
         environment = job["environment"]
@@ -304,77 +325,6 @@ class Draw:
         """Somebody dies after some seconds; then all is started again, maybe with other tiles."""
         return {"who": self.pick("render", "render", "worker", "worker", "coordinator", "all"),
                 "after": round(self.rng.uniform(0.02, 0.4), 3), "tileSize": self.pick(None, None, self.tile_size())}
-
-
-def work_of(job, num_frames):
-    """About what the job costs: surfaces, candidates, moves and rays of all pixels and frames."""
-    image, sampling = job["image"], job["sampling"]
-    n, m = sampling["numParticles"], sampling["numCandidates"]
-    moves = sampling.get("numDistributions", 5) * sampling.get("numMoves", 1)
-    of_pixel = 5 * image.get("sites", 1) + m + n * (4 + (moves if sampling["method"] == "sequential" else 0))
-    if sampling["method"] == "pool":
-        of_pixel += 8 * m
-    if sampling["method"] == "reference":
-        of_pixel = 10 * sampling["referenceSamples"]
-    if job.get("visibility", {}).get("correlated"):
-        visibility = job["visibility"]
-        of_pixel += n * visibility.get("partitions", 16) * visibility.get("tileSize", 5) ** 2 / 4
-    return image["width"] * image["height"] * num_frames * of_pixel
-
-
-def mend_view(view, rng):
-    """The three vectors must span a view."""
-    up = view.get("up", [0, 1, 0])
-    for _ in range(20):
-        way = [a - p for a, p in zip(view["lookAt"], view["position"])]
-        cross = [way[1] * up[2] - way[2] * up[1], way[2] * up[0] - way[0] * up[2], way[0] * up[1] - way[1] * up[0]]
-        if math.hypot(*cross) > 1e-3 * math.hypot(*way) * math.hypot(*up) > 0:
-            return
-        view["position"] = [round(p + rng.uniform(-1, 1), 3) for p in view["position"]]
-
-
-def mend(job, rng):
-    """What the keys of a legal job demand of each other."""
-    sampling, visibility = job["sampling"], job.setdefault("visibility", {})
-    method = sampling["method"]
-    for counts in [sampling, *sampling.get("byMaterial", {}).values()]:
-        n = counts.get("numParticles", sampling["numParticles"])
-        counts["numCandidates"] = max(counts.get("numCandidates", sampling["numCandidates"]), n)
-    if "refreshCandidates" in sampling:
-        sampling["refreshCandidates"] = max(sampling["refreshCandidates"], sampling["numParticles"])
-    if method != "mis" or sampling.get("byMaterial"):
-        sampling.pop("misCompensation", None)
-    for key in ("targetError", "timeBudget"):
-        if method != "auto" or (key == "timeBudget" and "targetError" in sampling):
-            sampling.pop(key, None)
-    if method in ("reference", "pool", "ratio", "restir", "auto") or sampling.get("byMaterial"):
-        visibility["correlated"] = False
-    if visibility.get("correlated") and visibility.get("mask") != "same-samples" and sampling["numParticles"] % 2:
-        if rng.random() < 0.5:
-            visibility["mask"] = "same-samples"
-        else:
-            sampling["numParticles"] += 1 if sampling["numParticles"] < 64 else -1
-            sampling["numCandidates"] = max(sampling["numCandidates"], sampling["numParticles"])
-    for movable in [job["camera"], *job["scene"]["objects"]]:
-        if movable.get("keys"):
-            movable.pop("gltf", None)
-
-
-def spoil(case, rng):
-    """The case with one value of its job made wrong: what `baton check` must refuse, or take for good reason."""
-    case = copy.deepcopy(case)
-    places = []
-
-    def visit(value):
-        for key in value if isinstance(value, dict) else range(len(value)):
-            places.append((value, key))
-            if isinstance(value[key], (dict, list)):
-                visit(value[key])
-
-    visit(case["job"])
-    container, key = rng.choice(places)
-    container[key] = rng.choice([None, -1, 1e30, "", "x", [], {}, True, [1, 2], {"a": 1}, 0.5, "\u0000", -1e30])
-    return case
 
 
 def draw_case(schema, seed, number):

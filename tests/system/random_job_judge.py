@@ -70,8 +70,9 @@ class Judge:
         """(exit code, standard output, standard error); somebody is killed on the way if an interruption says so."""
         process = subprocess.Popen([self.programs.path(command[0]), *map(str, command[1:])], stdout=subprocess.PIPE,
                                    stderr=subprocess.PIPE, start_new_session=True)
-        timer = threading.Timer(interruption["after"], interrupt, (process, interruption["who"])) if interruption else None
-        if timer:
+        timer = None
+        if interruption:
+            timer = threading.Timer(interruption["after"], interrupt, (process, interruption["who"]))
             timer.start()
         try:
             output, errors = process.communicate(timeout=JOB_DEADLINE_S)
@@ -233,10 +234,10 @@ def compare(first, second):
                   for channel in a.channels if a.channels[channel].tobytes() != b.channels[channel].tobytes()}
         if differ:
             channel, places = next(iter(differ.items()))
-            place = places[0] if places else 0
+            place = places[0] if places else 0  # none where signs of zero differ
+            x, y = a.channels[channel][place], b.channels[channel][place]
             raise Wrong("split shows", f"{name}: {', '.join(differ)}: {len(places)} of {a.width * a.height} pixels of "
-                        f"{channel}, first at ({place % a.width}, {place // a.width}): {a.channels[channel][place]!r} and "
-                        f"{b.channels[channel][place]!r}")
+                        f"{channel}, first at ({place % a.width}, {place // a.width}): {x!r} and {y!r}")
 
 
 def compare_prediction(predicted, summary, job):

@@ -99,7 +99,7 @@ class SchemaDraw:
         return [self.value(node["items"], f"{path}[]") for _ in range(count)]
 
     def number(self, node, integer):
-        """Often at an edge or near the default, else anywhere; integers stay near their defaults, since they cost time."""
+        """Often at an edge or near the default, else anywhere; integers near their defaults, since they cost time."""
         low = node.get("minimum", node.get("exclusiveMinimum", 0))
         high = node.get("maximum", node.get("exclusiveMaximum", 1e9))
         default = node.get("default")
@@ -115,7 +115,7 @@ class SchemaDraw:
         elif most - low > 1000 and low >= 0:
             value = low + math.expm1(self.rng.uniform(0, math.log1p(most - low)))
         else:
-            value = self.rng.uniform(max(low, -1000), min(most, 1000)) if not integer else self.rng.uniform(low, most)
+            value = self.rng.uniform(low, most) if integer else self.rng.uniform(max(low, -1000), min(most, 1000))
         if integer:
             return min(max(round(value), low), most)
         value = float(f"{min(max(value, low), high):.6g}")

@@ -60,7 +60,8 @@ def smaller_forms(case):
     for path in paths:
         value = look_up(case, path)
         if isinstance(value, (int, float)) and not isinstance(value, bool) and path[0] == "job" and abs(value) > 1:
-            forms.append((path, lambda c, p=path, v=value: replace(c, p, v // 2 if isinstance(v, int) else float(round(v / 2)))))
+            half = value // 2 if isinstance(value, int) else float(round(value / 2))
+            forms.append((path, lambda c, p=path, h=half: replace(c, p, h)))
     forms.append(("unused files", drop_unused_files))
     return forms
 

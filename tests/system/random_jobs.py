@@ -8,7 +8,7 @@ one JSON file with everything that is needed to repeat it.
 
 usage: random_jobs.py --bin build/release/bin --source . [--seed S] [--jobs N] [--seconds T] [--parallel P] [--keep DIR]
        random_jobs.py --bin build/release/bin --source . --case FILE      repeat one case
-       random_jobs.py --self-test                                         generator, judge and shrinker, without programs
+       random_jobs.py --self-test      generator, judge and shrinker, without programs
 TMPDIR=/dev/shm makes long runs faster. Exits 1 when a job fails. Standard library only."""
 
 import argparse
@@ -88,8 +88,8 @@ class Run:
             case = shrink(case, lambda smaller: self.fails_as(smaller, found.kind), self.options.shrink)
         path = self.keep / f"failed-{self.options.seed}-{number}.json"
         path.write_text(json.dumps(case, indent=1), encoding="utf-8")
-        print(f"job {number}, {found.kind}: {json.dumps(case)}\nrepeat: python3 {Path(__file__).resolve()} --bin {self.options.bin} "
-              f"--source {self.options.source} --case {path}", flush=True)
+        print(f"job {number}, {found.kind}: {json.dumps(case)}\nrepeat: python3 {Path(__file__).resolve()} "
+              f"--bin {self.options.bin} --source {self.options.source} --case {path}", flush=True)
 
     def fails_as(self, case, kind):
         """Whether the case fails in that way; what depends on the moment has three tries."""
