@@ -133,7 +133,8 @@ class Draw:
     def method(self):
         methods = self.enum("sampling", "method")
         plain = [method for method in methods if method != "auto"]
-        return "auto" if "auto" in methods and self.chance(0.01) else self.rng.choice(plain + ["sequential", "pool"])
+        # The pilots of `auto` are up to 500 renderings.
+        return "auto" if "auto" in methods and self.chance(0.001) else self.rng.choice(plain + ["sequential", "pool"])
 
     def frames(self):
         self.first_frame = self.pick(0, 1, 1, 7, 1001)

@@ -16,8 +16,9 @@ from farm import BAD_INPUT, DEADLINE_S, IO, OK, PATIENCE
 from random_job_files import raw_state_bytes, read_frame, values_by, write_file
 from random_job_means import judge_means
 
-# A job this small that takes longer hangs.
+# A job this small that takes longer hangs; one of `auto` renders pilots first.
 JOB_DEADLINE_S = min(DEADLINE_S, 60 * PATIENCE)
+AUTO_DEADLINE_S = 10 * JOB_DEADLINE_S
 # Exit code of a `baton render` that was asked to stop.
 CANCELLED = 3
 # How each fault of a job or of its files begins.
@@ -66,7 +67,7 @@ class Judge:
 
     # ---- programs -------------------------------------------------------------------------------------------
 
-    def run(self, command, interruption=None):
+    def run(self, command, interruption=None, deadline_s=JOB_DEADLINE_S):
         """(exit code, standard output, standard error); somebody is killed on the way if an interruption says so."""
         process = subprocess.Popen([self.programs.path(command[0]), *map(str, command[1:])], stdout=subprocess.PIPE,
                                    stderr=subprocess.PIPE, start_new_session=True)
@@ -75,12 +76,12 @@ class Judge:
             timer = threading.Timer(interruption["after"], interrupt, (process, interruption["who"]))
             timer.start()
         try:
-            output, errors = process.communicate(timeout=JOB_DEADLINE_S)
+            output, errors = process.communicate(timeout=deadline_s)
         except subprocess.TimeoutExpired:
             process.kill()
             output, errors = process.communicate()
             errors += b"\n" + self.logs(command)
-            raise Wrong("no end", f"{command[1]}: runs after {JOB_DEADLINE_S} s\n{text_of(errors)[-3000:]}") from None
+            raise Wrong("no end", f"{command[1]}: runs after {deadline_s} s\n{text_of(errors)[-3000:]}") from None
         finally:
             if timer:
                 timer.cancel()
@@ -112,7 +113,8 @@ class Judge:
         interruption = split.get("interruption")
         command = ["baton", "render", write_job(case, split, folder, name), "--workers", split["workers"],
                    "--threads-per-worker", split["threads"], "--work-dir", work, "--json"]
-        code, output, errors = self.run(command, interruption)
+        deadline_s = AUTO_DEADLINE_S if is_auto(case["job"]) else JOB_DEADLINE_S
+        code, output, errors = self.run(command, interruption, deadline_s)
         if interruption:
             # A coordinator that dies before it listens has not started.
             none = "did not start" in errors
@@ -124,7 +126,7 @@ class Judge:
                 tile_size = interruption.get("tileSize") or split["tileSize"]
                 split = {**split, "tileSize": tile_size}
                 write_job(case, split, folder, name)
-                code, output, errors = self.run(command)
+                code, output, errors = self.run(command, None, deadline_s)
         log = text_of(self.logs(command))
         require(code == OK, "render failed", f"exit code {code}\n{errors[-2000:]}\n{log}")
         summary = json.loads(output)

@@ -18,8 +18,10 @@ from random_job_rules import spoil
 from random_job_schema import key_paths
 from random_job_shrink import shrink
 
-# Keys that are meant to stay away: what makes a job fail by itself, and the form of a file that is drawn apart.
-NEVER_DRAWN = {"maxRetriesPerTask", "maxSecondsPerTask", "maxFailuresPerWorker", "output.directory"}
+# Keys that are meant to stay away: what makes a job fail by itself, what is set when it is rendered, and those of
+# `auto`, which is rare.
+NEVER_DRAWN = {"maxRetriesPerTask", "maxSecondsPerTask", "maxFailuresPerWorker", "output.directory",
+               "sampling.targetError", "sampling.timeBudget"}
 CASES = 1500
 
 
