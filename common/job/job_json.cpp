@@ -162,18 +162,20 @@ Result<ParsedJobDocument> parse_job_document(std::string_view text) {
 
 Status verify_assets(const std::vector<AssetDigest>& assets) {
   std::string faults;
+  ErrorKind kind = ErrorKind::io;
   for (const AssetDigest& asset : assets) {
     const Result<std::vector<AssetDigest>> now = digest_files({asset.path});
     std::string fault;
     if (!now) {
       fault = now.error().message;
     } else if (now->front().digest != asset.digest) {
+      kind = ErrorKind::bad_input;
       fault = fmt::format("{}: changed since the job was submitted: expected digest {}, got {}",
                           asset.path, asset.digest.hex(), now->front().digest.hex());
     }
     if (!fault.empty()) faults += (faults.empty() ? "" : "\n") + fault;
   }
-  if (!faults.empty()) return Error{ErrorKind::bad_input, faults};
+  if (!faults.empty()) return Error{kind, faults};
   return {};
 }
 

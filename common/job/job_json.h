@@ -64,7 +64,7 @@ std::vector<std::string> picture_differences(const ParsedJobDocument& a,
                                              const ParsedJobDocument& b);
 
 /// Checks that every asset still has the digest it had at submission. The error names each file
-/// that changed.
+/// that changed (bad_input) or cannot be read here (io, if that is all: another machine may).
 Status verify_assets(const std::vector<AssetDigest>& assets);
 
 }  // namespace baton

@@ -22,10 +22,11 @@ inline constexpr std::uint16_t kProtocolVersion = 3;
 // ---- worker to coordinator ----------------------------------------------------------------------
 struct WorkerHello {  ///< first, and again after a reconnect or a new epoch
   std::string worker_id, host;
+  std::uint64_t instance = 0;       ///< drawn when the process starts: who the worker is, whatever its name
   std::int32_t pid = 0, num_threads = 0;
   std::string instruction_set;      ///< e.g. "AVX2": results are the same bytes only on one of them
   std::vector<LeaseId> running;     ///< leases in hand: a restarted coordinator may adopt them
-  template <class A> void fields(A& a) { a(worker_id, host, pid, num_threads, instruction_set, running); }
+  template <class A> void fields(A& a) { a(worker_id, host, instance, pid, num_threads, instruction_set, running); }
 };
 /// `count` more leases are wanted; replaces what was asked before.
 struct LeaseRequest { std::int32_t count = 1; template <class A> void fields(A& a) { a(count); } };

@@ -130,7 +130,7 @@ Status Service::receive(const PeerId& peer, const WorkerHello& hello) {
   }
   // A name belongs to one process until that falls silent; a new connection of it keeps the name.
   const WorkerHello* const known = peers_.hello_of(hello.worker_id);
-  if (known != nullptr && (known->pid != hello.pid || known->host != hello.host)) {
+  if (known != nullptr && known->instance != hello.instance) {
     refuse(peer,
            {ErrorKind::usage,
             fmt::format("worker {}: process {} on {} has this name; a worker needs one of its "

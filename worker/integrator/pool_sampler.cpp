@@ -43,6 +43,11 @@ kernels::CandidateCounts counts_for_noise(const SiteBlock& sites, std::int32_t n
   counts.from_light = std::clamp(
       candidates_for_noise(counts.from_light, known.from_light, kNeedOfLight, most_of_light),
       least_of_light(counts), most_of_light);
+  // Whole blocks: of a block that is not read to its end the same eighths of the curve are missing
+  // in every pixel (M = 25: the mean 4 % low).
+  constexpr std::int32_t kBlock = LightPool::kBlock;
+  counts.from_light =
+      std::min((counts.from_light + kBlock - 1) / kBlock * kBlock, most_of_light / kBlock * kBlock);
   counts.from_bsdf = candidates_for_noise(counts.from_bsdf, known.from_lobes, kNeedOfLobes,
                                           limits::kMaxCandidates - counts.from_light);
   return counts;

@@ -8,6 +8,7 @@
 #include <list>
 #include <mutex>
 #include <optional>
+#include <random>
 #include <set>
 #include <span>
 
@@ -39,6 +40,9 @@ SessionOptions session_options(const WorkerOptions& options) {
   WorkerHello identity;
   identity.host = host_name();
   identity.pid = static_cast<std::int32_t>(::getpid());
+  // Host and process id do not tell containers apart.
+  std::random_device random;
+  identity.instance = std::uint64_t{random()} << 32 | random();
   identity.worker_id = options.worker_id.empty() ? fmt::format("{}-{}", identity.host, identity.pid)
                                                  : options.worker_id;
   identity.num_threads = options.num_threads;
@@ -71,12 +75,20 @@ class NoteLog {
   std::set<std::string> seen_;
 };
 
+/// What loading a job may take, the wait for its document and for another thread's loading included.
+constexpr std::chrono::minutes kLoadPatience{15};
+
 /// Runs a task on a render thread. The command that repeats it stands in its error message and,
 /// should the process die, in the crash report.
 Result<TaskOutput> execute_pooled(const PooledTask& task, std::stop_token stop, NoteLog& notes,
                                   TaskWatch& watch) {
-  // The time that a task may take does not include the loading of its job.
-  BATON_ASSIGN(const LoadedJobPtr loaded, task.job->load(stop));
+  // The time that a task may take does not include the loading of its job, which has its own.
+  LoadedJobPtr loaded;
+  {
+    const TaskWatch::Mark loading(watch, task.lease,
+                                  std::chrono::steady_clock::now() + kLoadPatience);
+    BATON_ASSIGN(loaded, task.job->load(stop));
+  }
   const TaskWatch::Mark mark(
       watch, task.lease,
       std::chrono::steady_clock::now() + std::chrono::seconds(loaded->job.max_seconds_per_task));
@@ -179,7 +191,7 @@ class Worker {
   void end_overdue_tasks() {
     for (const LeaseId& lease : watch_.take_overdue(now())) {
       pool_.stop(lease);
-      EndedTask ended{lease, Error{ErrorKind::timeout, "ran for longer than maxSecondsPerTask"}};
+      EndedTask ended{lease, Error{ErrorKind::timeout, "ran for longer than maxSecondsPerTask, or loaded its job for a quarter of an hour"}};
       log_failure(ended);
       step(TaskEnded{ended.lease, std::move(ended.result)});
     }

@@ -150,7 +150,8 @@ class Exchange {
     const auto acceptance = [lns](const GiverSample&, const Giver& giver) {
       const float scale = lns[giver.rank] > 0 ? 1 / lns[giver.rank] : 0.0f;
       return [lns, scale](const Offer& offer, const Reflected& seen) {
-        return std::min(1.0f, lns[offer.receiver] * scale) / std::max(seen.target, kSmallestTarget);
+        const float accepted = std::min(1.0f, lns[offer.receiver] * scale);
+        return seen.target > kSmallestTarget ? accepted / seen.target : 0.0f;
       };
     };
     const bool lost = settings_.form == SecondPassForm::published;

@@ -51,7 +51,7 @@ const JobSummary kSummary{{1, 2}, "name", "/out", JobStatus::failed, -3, 1, 2, 3
 /// One of each, in the order of the type codes, no member left at its default.
 const std::vector<Message>& examples() {
   static const std::vector<Message> messages{
-      WorkerHello{"w", "h\xc3\xb6st", 1, 2, "AVX2", {kLease, kLease}},
+      WorkerHello{"w", "h\xc3\xb6st", 77, 1, 2, "AVX2", {kLease, kLease}},
       LeaseRequest{7},
       Heartbeat{{kLease}},
       TaskDone{kLease, {kBlob, kBlob}, kStats, {{3, 4, kStats.sampling}}},

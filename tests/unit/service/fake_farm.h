@@ -63,7 +63,8 @@ class FakeWorker {
 
   void say(const Message& message) { ASSERT_TRUE(channel_.send(message)); }
   void hello(std::vector<LeaseId> running = {}, std::int32_t pid = 1) {
-    say(WorkerHello{id_, "host", pid, 2, "TEST", std::move(running)});
+    say(WorkerHello{id_, "host", static_cast<std::uint64_t>(pid), pid, 2, "TEST",
+                    std::move(running)});
   }
 
   /// The next message of type T; others are passed over.
