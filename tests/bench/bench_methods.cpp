@@ -90,7 +90,7 @@ int run(const std::string& path, int frames, const std::string& only, int only_s
   job->frames.resize(std::min(job->frames.size(), static_cast<std::size_t>(frames)));
   job->state.checkpoint_every = frames;
   job->output.aovs.clear();
-#ifndef NDEBUG
+#if !defined(NDEBUG) || defined(BATON_CHECKED)
   fmt::print("note: assertions are on, the times are not the product's\n");
 #endif
   for (const int sites : {1, 4, 16}) {

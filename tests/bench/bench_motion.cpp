@@ -130,7 +130,7 @@ Status run(const std::string& path, int frames) {
   written.output.aovs.clear();
   if (!moves(written)) set_in_orbit(written);
   BATON_ASSIGN(JobSpec job, settle_motion(std::move(written)));
-#ifndef NDEBUG
+#if !defined(NDEBUG) || defined(BATON_CHECKED)
   fmt::print("note: assertions are on, the times are not the product's\n");
 #endif
   fmt::print(
