@@ -29,7 +29,7 @@ template <class T>
 void poison(std::span<T> work_space) {
   static_assert(std::is_trivially_copyable_v<T>);
   const std::uint32_t pattern = detail::poison_pattern.load(std::memory_order_relaxed);
-  if (pattern == 0) return;
+  if (pattern == 0 || work_space.empty()) return;
   auto* const bytes = reinterpret_cast<unsigned char*>(work_space.data());
   const std::size_t words = work_space.size_bytes() / sizeof(pattern);
   for (std::size_t i = 0; i < words; ++i)

@@ -69,8 +69,8 @@ TEST_F(Poison, FreshSamplesOfAnyNumber) {
 
 // Candidates of every remainder beside samples of every remainder, at rest and in motion.
 TEST_F(Poison, ChosenAndCarriedSamplesOfAnyNumber) {
-  for (const Method method : {Method::bidirectional, Method::sequential, Method::pool,
-                              Method::ratio, Method::restir}) {
+  for (const Method method :
+       {Method::bidirectional, Method::sequential, Method::pool, Method::ratio, Method::restir}) {
     for (int n = 1; n <= 16; ++n) {
       for (int more = 0; more < 8; ++more) {
         const int i = n + more;
