@@ -57,6 +57,7 @@ bool JobTasks::apply(TaskIndex task, TaskEvent event) {
 }
 
 std::vector<BlobRef> JobTasks::inputs(TaskIndex task) const {
+  BATON_CHECK(has_inputs(task));
   const TaskKey key = graph_.key(task);
   std::vector<BlobRef> result;
   for (const TaskIndex input : graph_.inputs(key)) {

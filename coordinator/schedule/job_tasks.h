@@ -38,7 +38,9 @@ class JobTasks {
   const std::vector<BlobRef>& outputs(TaskIndex task) const { return record(task).outputs; }
   /// Tasks that a worker may have, in the order in which they should be granted.
   const std::set<TaskIndex>& ready() const { return ready_; }
-  /// The blobs that the task needs, all of them there: see LeaseGrant in PROTOCOL.md.
+  /// Whether all tasks that it needs are done. A leased task may lose one of them.
+  bool has_inputs(TaskIndex task) const { return record(task).missing_inputs == 0; }
+  /// The blobs that the task needs: see LeaseGrant in PROTOCOL.md. It must have its inputs.
   std::vector<BlobRef> inputs(TaskIndex task) const;
 
   /// Takes up what an earlier coordinator recorded as done, in any order; of a fresh job only.

@@ -189,14 +189,14 @@ Status Service::receive_from(const std::string& worker, const TaskDone& message)
 
 Status Service::receive_from(const std::string& worker, const TaskFailed& message) {
   // Inputs that are gone or damaged are nobody's fault: what made them is done again.
-  const std::vector<BlobRef> bad = find_bad_inputs(message.lease);
-  for (const BlobRef& input : bad) {
+  const std::optional<std::vector<BlobRef>> bad = find_bad_inputs(message.lease);
+  for (const BlobRef& input : bad.value_or(std::vector<BlobRef>())) {
     spdlog::warn("job {}: {} is gone or damaged and is made again", message.lease.job.short_hex(),
                  store_.path(input.digest).string());
     if (const Status removed = store_.remove(input.digest); !removed)
       spdlog::warn("{}", removed.error().message);
   }
-  if (!bad.empty()) return step(InputsLost{worker, message.lease, bad});
+  if (bad) return step(InputsLost{worker, message.lease, *bad});
   return step(AttemptFailed{worker, message.lease,
                             message.message.substr(0, limits::kMaxTextLength), message.permanent});
 }
@@ -235,15 +235,19 @@ std::optional<std::string> Service::find_missing_frame(const TaskDone& report) c
   return std::nullopt;
 }
 
-std::vector<BlobRef> Service::find_bad_inputs(const LeaseId& lease) const {
+/// The inputs of a leased task that are gone or damaged; none of them where a task that makes them is
+/// being done again meanwhile. nullopt: the inputs are sound.
+std::optional<std::vector<BlobRef>> Service::find_bad_inputs(const LeaseId& lease) const {
   std::vector<BlobRef> bad;
   const Scheduler::Job* job = job_of_open_task(lease);
-  if (job == nullptr) return bad;
+  if (job == nullptr) return std::nullopt;
   const auto task = job->tasks.graph().find(lease.task);
-  if (job->tasks.status(*task) != TaskStatus::leased) return bad;
+  if (job->tasks.status(*task) != TaskStatus::leased) return std::nullopt;
+  if (!job->tasks.has_inputs(*task)) return bad;
   for (const BlobRef& input : job->tasks.inputs(*task)) {
     if (store_.is_bad(input.digest)) bad.push_back(input);
   }
+  if (bad.empty()) return std::nullopt;
   return bad;
 }
 

@@ -97,7 +97,7 @@ class Service {
   const Scheduler::Job* job_of_open_task(const LeaseId& lease) const;
   std::optional<std::string> find_missing_blob(const TaskDone& report) const;
   std::optional<std::string> find_missing_frame(const TaskDone& report) const;
-  std::vector<BlobRef> find_bad_inputs(const LeaseId& lease) const;
+  std::optional<std::vector<BlobRef>> find_bad_inputs(const LeaseId& lease) const;
 
   ServiceOptions options_;
   std::filesystem::path store_directory_;

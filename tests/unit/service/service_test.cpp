@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 
 #include <algorithm>
+#include <map>
 
 #include "common/base/files.h"
 #include "tests/unit/service/fake_farm.h"
@@ -335,6 +336,30 @@ TEST_F(ServiceTest, ADamagedBlobIsMadeAgainWithoutBlame) {
   const JobDetail detail = show(service.endpoint(), id);
   EXPECT_THAT(detail.failures, SizeIs(0));
   EXPECT_EQ(detail.summary.status, JobStatus::running);
+}
+
+// What made an input is being done again while a reader of it is leased: the reader's failure is
+// nobody's fault, and it waits.
+TEST_F(ServiceTest, ALeasedTaskMayLoseAnInput) {
+  const RunningService service(options);
+  const Digest id = ask<JobAccepted>(service.endpoint(), SubmitJob{document}).job;
+  FakeWorker worker(service.endpoint(), store(), job);
+  worker.hello();
+  for (int i = 0; i < 2; ++i) worker.do_one_task();
+  worker.say(LeaseRequest{4});
+  std::map<TaskKind, LeaseGrant> grants;
+  for (int i = 0; i < 4; ++i) {
+    const LeaseGrant grant = worker.expect<LeaseGrant>();
+    grants.emplace(grant.lease.task.kind, grant);
+  }
+  const LeaseGrant& reader = grants.at(TaskKind::render);
+  const fs::path state = BlobStore::open(store())->path(reader.inputs.at(0).digest);
+  fs::resize_file(state, fs::file_size(state) - 1);
+  worker.say(TaskFailed{reader.lease, "cannot read", false});
+  worker.say(TaskFailed{grants.at(TaskKind::assemble).lease, "cannot read", false});
+  worker.say(LeaseRequest{1});
+  EXPECT_EQ(worker.expect<LeaseGrant>().lease.task.kind, TaskKind::render);
+  EXPECT_THAT(show(service.endpoint(), id).failures, SizeIs(0));
 }
 
 // Who is ended by a signal will be started again.
