@@ -22,7 +22,7 @@ TEST(PaddedArray, HasRoomForVectorsThatBeginAtAnyElement) {
 }
 
 TEST(PaddedArrayDeathTest, CheckedBuildsCheckIndices) {
-  if (!kCanPoison) GTEST_SKIP() << "not a checked build";
+  if (!kCanPoison) return;  // only checked builds check
   PaddedArray<float, 5> array{};
   std::vector<int> vector(3);
   const volatile std::size_t past = 5;
@@ -33,7 +33,7 @@ TEST(PaddedArrayDeathTest, CheckedBuildsCheckIndices) {
 }
 
 TEST(Poison, FillsWorkSpaceWhileAPatternIsSet) {
-  if (!kCanPoison) GTEST_SKIP() << "not a checked build";
+  if (!kCanPoison) return;  // only checked builds check
   std::array<std::uint8_t, 6> bytes{};
   std::vector<std::uint32_t> words(2);
   set_poison(0x04030201u);

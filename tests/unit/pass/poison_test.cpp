@@ -19,9 +19,7 @@ constexpr int kSites[] = {1, 4, 9, 16};
 
 class Poison : public testing::Test {
  protected:
-  void SetUp() override {
-    if (!kCanPoison) GTEST_SKIP() << "only checked builds fill work space";
-  }
+  /// (Only checked builds fill work space; in others there is nothing to find.)
   void TearDown() override { set_poison(0); }
 
   /// box_job, small.

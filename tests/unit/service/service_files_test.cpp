@@ -1,0 +1,202 @@
+#include <gmock/gmock.h>
+
+#include <algorithm>
+#include <map>
+
+#include "common/base/files.h"
+#include "coordinator/service/service.h"
+#include "tests/unit/service/fake_farm.h"
+
+/// Files that are gone, damaged, or another job's.
+namespace baton {
+namespace {
+
+using namespace testing_service;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::SizeIs;
+
+constexpr int kNumTasks = 8;
+
+// The films of a frame are gone once it is written, and so are the states before them: the tiles of
+// frames 1 to 4 are rendered again, but only one frame is written.
+TEST_F(ServiceTest, ADoneJobOfWhichAFrameIsGoneOrCutMakesThatFrameAgain) {
+  const RunningService service(options);
+  const fs::path frame = fs::path(job.output.directory) / "frame.0003.exr";
+  const Digest id = ask<JobAccepted>(service.endpoint(), SubmitJob{document}).job;
+  FakeWorker worker(service.endpoint(), store(), job);
+  worker.hello();
+  for (const bool cut : {false, true}) {
+    for (int i = 0; i < (cut ? 5 : kNumTasks); ++i) worker.do_one_task();
+    worker.say(LeaseRequest{0});
+    worker.say(Heartbeat{});
+    worker.expect<Heartbeat>();
+    EXPECT_TRUE(ask<JobAccepted>(service.endpoint(), SubmitJob{document}).already_there);
+
+    if (cut) {
+      fs::resize_file(frame, 3);
+    } else {
+      fs::remove(frame);
+    }
+    EXPECT_FALSE(ask<JobAccepted>(service.endpoint(), SubmitJob{document}).already_there);
+    const JobDetail detail = show(service.endpoint(), id);
+    EXPECT_THAT(detail.frames_done, ElementsAre(1, 2, 4));
+    EXPECT_EQ(detail.summary.tasks_done, 3u);
+  }
+}
+
+// A frame belongs to one job: another picture is refused, another setting takes its place.
+TEST_F(ServiceTest, AnOutputFolderBelongsToOneJob) {
+  const RunningService service(options);
+  const Digest id = ask<JobAccepted>(service.endpoint(), SubmitJob{document}).job;
+  JobSpec other = job;
+  other.seed = 99;
+  other.sampling.num_particles += 1;
+  const std::string edited = make_job_document(other).value();
+  const Error refusal = refused(service.endpoint(), SubmitJob{edited});
+  EXPECT_EQ(refusal.kind, ErrorKind::bad_input);
+  EXPECT_THAT(refusal.message, HasSubstr("what differs: $.sampling.numParticles, $.seed"));
+  EXPECT_EQ(show(service.endpoint(), id).summary.status, JobStatus::running);
+
+  // Who wants it replaces the frames; then the first picture is the other one.
+  const Digest second = ask<JobAccepted>(service.endpoint(), SubmitJob{edited, true}).job;
+  EXPECT_EQ(show(service.endpoint(), id).summary.status, JobStatus::cancelled);
+  FakeWorker worker(service.endpoint(), store(), other);
+  worker.hello();
+  for (int i = 0; i < kNumTasks; ++i) worker.do_one_task();
+  worker.say(LeaseRequest{0});
+  worker.say(Heartbeat{});
+  worker.expect<Heartbeat>();
+  EXPECT_EQ(show(service.endpoint(), second).summary.status, JobStatus::done);
+  EXPECT_THAT(refused(service.endpoint(), SubmitJob{document}).message, HasSubstr("4 of 4 frames"));
+  EXPECT_FALSE(ask<JobAccepted>(service.endpoint(), SubmitJob{document, true}).already_there);
+  EXPECT_EQ(show(service.endpoint(), second).summary.status, JobStatus::cancelled);
+  EXPECT_THAT(show(service.endpoint(), second).frames_done, SizeIs(0));
+
+  // The same picture with another priority, and other frames, are no rivals.
+  JobSpec urgent = job;
+  urgent.priority = 7;
+  EXPECT_FALSE(ask<JobAccepted>(service.endpoint(), SubmitJob{make_job_document(urgent).value()})
+                   .already_there);
+  EXPECT_EQ(show(service.endpoint(), id).summary.status, JobStatus::cancelled);
+  JobSpec later = other;
+  later.frames = {5, 6};
+  ask<JobAccepted>(service.endpoint(), SubmitJob{make_job_document(later).value()});
+}
+
+// What is read of a folder that is not mounted is not the truth.
+TEST_F(ServiceTest, ARunningJobWaitsForItsOutputFolder) {
+  Digest id;
+  {
+    const RunningService service(options);
+    id = ask<JobAccepted>(service.endpoint(), SubmitJob{document}).job;
+    FakeWorker worker(service.endpoint(), store(), job);
+    worker.hello();
+    for (int i = 0; i < kNumTasks - 1; ++i) worker.do_one_task();
+  }
+  fs::rename(job.output.directory, job.output.directory + ".away");
+  const RunningService service(options);
+  EXPECT_EQ(show(service.endpoint(), id).summary.status, JobStatus::paused);
+  EXPECT_EQ(show(service.endpoint(), id).summary.tasks_done, 7u);
+  EXPECT_THAT(refused(service.endpoint(), ResumeJob{id.hex()}).message,
+              HasSubstr("stays paused: " + job.output.directory));
+  fs::rename(job.output.directory + ".away", job.output.directory);
+  const JobDetail resumed = ask<JobDetail>(service.endpoint(), ResumeJob{id.hex()});
+  EXPECT_EQ(resumed.summary.status, JobStatus::running);
+  EXPECT_EQ(resumed.summary.tasks_done, 7u);
+}
+
+TEST_F(ServiceTest, AFrameThatOnlyItsWorkerSeesCountsAgainstTheWorker) {
+  const RunningService service(options);
+  const Digest id = ask<JobAccepted>(service.endpoint(), SubmitJob{document}).job;
+  FakeWorker worker(service.endpoint(), store(), job);
+  worker.hello();
+  TaskDone report;
+  do {
+    worker.say(LeaseRequest{1});
+    report = worker.work(worker.expect<LeaseGrant>().lease);
+    if (report.lease.task.kind == TaskKind::assemble) {
+      fs::remove(fs::path(job.output.directory) / "frame.0001.exr");
+    }
+    worker.say(report);
+  } while (report.lease.task.kind != TaskKind::assemble);
+  worker.say(LeaseRequest{1});
+  worker.expect<LeaseGrant>();
+  EXPECT_THAT(show(service.endpoint(), id).failures,
+              ElementsAre(HasSubstr("frame.0001.exr: reported, but not there")));
+}
+
+TEST_F(ServiceTest, ADamagedBlobIsMadeAgainWithoutBlame) {
+  const RunningService service(options);
+  const Digest id = ask<JobAccepted>(service.endpoint(), SubmitJob{document}).job;
+  FakeWorker worker(service.endpoint(), store(), job);
+  worker.hello();
+  worker.say(LeaseRequest{1});
+  const TaskDone first = worker.work(worker.expect<LeaseGrant>().lease);
+  worker.say(first);
+  worker.say(LeaseRequest{2});
+  LeaseGrant reader = worker.expect<LeaseGrant>();
+  if (reader.inputs.empty()) reader = worker.expect<LeaseGrant>();
+  ASSERT_FALSE(reader.inputs.empty());
+  const fs::path blob = BlobStore::open(store())->path(reader.inputs[0].digest);
+  fs::resize_file(blob, fs::file_size(blob) - 1);
+  worker.say(TaskFailed{reader.lease, "cannot read", false});
+  worker.say(LeaseRequest{2});
+  EXPECT_EQ(worker.expect<LeaseGrant>().lease.task, first.lease.task) << "made again";
+  const JobDetail detail = show(service.endpoint(), id);
+  EXPECT_THAT(detail.failures, SizeIs(0));
+  EXPECT_EQ(detail.summary.status, JobStatus::running);
+}
+
+// What made an input is being done again while a reader of it is leased: the reader's failure is
+// nobody's fault, and it waits.
+TEST_F(ServiceTest, ALeasedTaskMayLoseAnInput) {
+  const RunningService service(options);
+  const Digest id = ask<JobAccepted>(service.endpoint(), SubmitJob{document}).job;
+  FakeWorker worker(service.endpoint(), store(), job);
+  worker.hello();
+  for (int i = 0; i < 2; ++i) worker.do_one_task();
+  worker.say(LeaseRequest{4});
+  std::map<TaskKind, LeaseGrant> grants;
+  for (int i = 0; i < 4; ++i) {
+    const LeaseGrant grant = worker.expect<LeaseGrant>();
+    grants.emplace(grant.lease.task.kind, grant);
+  }
+  const LeaseGrant& reader = grants.at(TaskKind::render);
+  const fs::path state = BlobStore::open(store())->path(reader.inputs.at(0).digest);
+  fs::resize_file(state, fs::file_size(state) - 1);
+  worker.say(TaskFailed{reader.lease, "cannot read", false});
+  worker.say(TaskFailed{grants.at(TaskKind::assemble).lease, "cannot read", false});
+  worker.say(LeaseRequest{1});
+  EXPECT_EQ(worker.expect<LeaseGrant>().lease.task.kind, TaskKind::render);
+  EXPECT_THAT(show(service.endpoint(), id).failures, SizeIs(0));
+}
+
+// Who is ended by a signal will be started again.
+TEST_F(ServiceTest, WorkersAreSentHomeOnlyByWhoeverStopsTheFarm) {
+  std::optional<RunningService> service(std::in_place, options);
+  FakeWorker worker(service->endpoint(), store(), job);
+  worker.hello();
+  worker.expect<WorkerWelcome>();
+  service.reset();
+  EXPECT_FALSE(worker.answers<Shutdown>(300ms));
+}
+
+TEST_F(ServiceTest, ARunningJobMakesAgainWhatIsGoneFromTheStore) {
+  Digest id;
+  {
+    const RunningService service(options);
+    id = ask<JobAccepted>(service.endpoint(), SubmitJob{document}).job;
+    FakeWorker worker(service.endpoint(), store(), job);
+    worker.hello();
+    worker.do_one_task();
+    worker.say(LeaseRequest{1});
+    worker.expect<LeaseGrant>();
+  }
+  fs::remove_all(store());
+  const RunningService service(options);
+  EXPECT_EQ(show(service.endpoint(), id).summary.tasks_done, 0u);
+}
+
+}  // namespace
+}  // namespace baton
