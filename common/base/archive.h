@@ -14,9 +14,9 @@ namespace baton {
 
 /// The byte form of plain structs that list their members in `template <class A> void fields(A&
 /// a)`: members in order, little-endian, no padding. A bool is one byte 0 or 1; an enum its
-/// underlying integer; a string u32 length and bytes; a vector u32 count and elements; an array its elements; a Digest its
-/// two halves. Every enum that is archived has a `last_of(Enum)` beside it, found by
-/// argument-dependent lookup: larger values are refused.
+/// underlying integer; a string u32 length and bytes; a vector u32 count and elements; an array its
+/// elements; a Digest its two halves. Every enum that is archived has a `last_of(Enum)` beside it,
+/// found by argument-dependent lookup: larger values are refused.
 
 /// Appends what `fields` lists to a ByteWriter.
 class ArchiveWriter {

@@ -12,7 +12,8 @@
 
 namespace baton {
 
-static_assert(std::endian::native == std::endian::little, "stored and sent integers are little-endian");
+static_assert(std::endian::native == std::endian::little,
+              "stored and sent integers are little-endian");
 
 /// Raw bytes of a blob, a message body or a file.
 using Bytes = std::vector<std::byte>;
@@ -26,10 +27,8 @@ inline ByteView as_bytes_view(std::string_view text) {
 class ByteWriter {
  public:
   template <class T>
-    requires std::is_arithmetic_v<T>
-  void put(T value) {
-    put_raw(std::as_bytes(std::span(&value, 1)));
-  }
+  requires std::is_arithmetic_v<T>
+  void put(T value) { put_raw(std::as_bytes(std::span(&value, 1))); }
   void put_raw(ByteView bytes) {
     if (bytes.empty()) return;
     const std::size_t old_size = bytes_.size();
@@ -48,16 +47,17 @@ class ByteWriter {
   Bytes bytes_;
 };
 
-/// Reads what ByteWriter wrote. Past the end every read gives zero and ok() is false: check once, at the end.
+/// Reads what ByteWriter wrote. Past the end every read gives zero and ok() is false: check once,
+/// at the end.
 class ByteReader {
  public:
   explicit ByteReader(ByteView bytes) : bytes_(bytes) {}
 
   template <class T>
-    requires std::is_arithmetic_v<T>
-  T get() {
+  requires std::is_arithmetic_v<T> T get() {
     T value{};
-    if (const ByteView raw = get_raw(sizeof(T)); !raw.empty()) std::memcpy(&value, raw.data(), sizeof(T));
+    if (const ByteView raw = get_raw(sizeof(T)); !raw.empty())
+      std::memcpy(&value, raw.data(), sizeof(T));
     return value;
   }
   /// `count` bytes, or an empty view when fewer are left.

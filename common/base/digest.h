@@ -11,7 +11,8 @@
 
 namespace baton {
 
-/// 128-bit content digest (XXH3-128). Names blobs and jobs; guards against damage, not against an adversary.
+/// 128-bit content digest (XXH3-128). Names blobs and jobs; guards against damage, not against an
+/// adversary.
 struct Digest {
   std::uint64_t high = 0;
   std::uint64_t low = 0;

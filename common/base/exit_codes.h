@@ -8,10 +8,10 @@ namespace baton {
 enum class ExitCode : int {
   ok = 0,
   timeout = 1,
-  failed = 2,      ///< the job or the operation failed
+  failed = 2,  ///< the job or the operation failed
   cancelled = 3,
-  usage = 64,      ///< the command line is wrong
-  bad_input = 65,  ///< a job, scene, image or state file is wrong
+  usage = 64,        ///< the command line is wrong
+  bad_input = 65,    ///< a job, scene, image or state file is wrong
   unavailable = 69,  ///< no coordinator answers
   internal = 70,
   io = 74,
@@ -19,14 +19,20 @@ enum class ExitCode : int {
 
 constexpr ExitCode exit_code_of(ErrorKind kind) {
   switch (kind) {
-    case ErrorKind::usage: return ExitCode::usage;
+    case ErrorKind::usage:
+      return ExitCode::usage;
     case ErrorKind::bad_input:
     case ErrorKind::corrupt:
-    case ErrorKind::version: return ExitCode::bad_input;
-    case ErrorKind::io: return ExitCode::io;
-    case ErrorKind::timeout: return ExitCode::timeout;
-    case ErrorKind::cancelled: return ExitCode::cancelled;
-    case ErrorKind::internal: return ExitCode::internal;
+    case ErrorKind::version:
+      return ExitCode::bad_input;
+    case ErrorKind::io:
+      return ExitCode::io;
+    case ErrorKind::timeout:
+      return ExitCode::timeout;
+    case ErrorKind::cancelled:
+      return ExitCode::cancelled;
+    case ErrorKind::internal:
+      return ExitCode::internal;
   }
   return ExitCode::internal;
 }

@@ -9,7 +9,8 @@
 
 namespace baton {
 
-/// What kind of thing went wrong; decides the exit code (exit_codes.h) and whether a retry can help.
+/// What kind of thing went wrong; decides the exit code (exit_codes.h) and whether a retry can
+/// help.
 enum class ErrorKind {
   usage,      ///< the command line is wrong
   bad_input,  ///< a job, scene, image, state or message is not what it must be
@@ -18,7 +19,7 @@ enum class ErrorKind {
   version,    ///< made by another version than this program reads
   timeout,
   cancelled,
-  internal,   ///< a bug in this program
+  internal,  ///< a bug in this program
 };
 
 /// An error of operation: the message names the file, the place and what was expected.
@@ -86,15 +87,15 @@ using Status = Result<void>;
 }  // namespace baton
 
 /// Leaves the enclosing function with the error of `expr`, or goes on.
-#define BATON_TRY(expr)                                                   \
-  do {                                                                    \
+#define BATON_TRY(expr)                                                            \
+  do {                                                                             \
     if (auto baton_status_ = (expr); !baton_status_) return baton_status_.error(); \
   } while (false)
 
 /// Declares `decl` with the value of `expr`, or leaves the enclosing function with its error.
 #define BATON_ASSIGN(decl, expr) BATON_ASSIGN_IMPL_(decl, expr, __LINE__)
 #define BATON_ASSIGN_IMPL_(decl, expr, line) BATON_ASSIGN_IMPL2_(decl, expr, line)
-#define BATON_ASSIGN_IMPL2_(decl, expr, line)                        \
-  auto baton_result_##line = (expr);                                 \
-  if (!baton_result_##line) return baton_result_##line.error();      \
+#define BATON_ASSIGN_IMPL2_(decl, expr, line)                   \
+  auto baton_result_##line = (expr);                            \
+  if (!baton_result_##line) return baton_result_##line.error(); \
   decl = std::move(baton_result_##line).value()

@@ -35,9 +35,19 @@ inline constexpr std::array<std::string_view, 4> kLnsUpdates{"ratio", "pathLeft"
 inline constexpr std::array<std::string_view, 4> kStartMethods{"environment", "brdf", "mis",
                                                                "bidirectional"};
 inline constexpr std::array<std::string_view, 2> kBackgrounds{"environment", "transparent"};
-inline constexpr std::array<std::string_view, 13> kAovs{
-    "lns",   "visibility", "ess",  "acceptance",      "source",                "normal",
-    "depth", "variance",   "mask", "acceptanceLocal", "acceptanceIndependent", "resampled", "material"};
+inline constexpr std::array<std::string_view, 13> kAovs{"lns",
+                                                        "visibility",
+                                                        "ess",
+                                                        "acceptance",
+                                                        "source",
+                                                        "normal",
+                                                        "depth",
+                                                        "variance",
+                                                        "mask",
+                                                        "acceptanceLocal",
+                                                        "acceptanceIndependent",
+                                                        "resampled",
+                                                        "material"};
 inline constexpr std::array<std::string_view, 2> kPixelTypes{"half", "float"};
 inline constexpr std::array<std::string_view, 5> kCompressions{"none", "rle", "zips", "zip", "piz"};
 inline constexpr std::array<std::string_view, 2> kKeyCurves{"linear", "smooth"};

@@ -13,10 +13,12 @@
 
 namespace baton {
 
-/// Everything a job says, with every default filled in. Plain data: JSON is known only to job_json.cpp.
-/// Units: lengths in scene units, angles in degrees, colours linear RGB. Paths are absolute after parsing.
+/// Everything a job says, with every default filled in. Plain data: JSON is known only to
+/// job_json.cpp. Units: lengths in scene units, angles in degrees, colours linear RGB. Paths are
+/// absolute after parsing.
 
-// ---- image -------------------------------------------------------------------------------------------------
+// ---- image
+// -------------------------------------------------------------------------------------------------
 struct ImageSpec {
   int width = 640;     ///< pixels, [1, limits::kMaxImageSide]
   int height = 360;    ///< pixels
@@ -26,22 +28,27 @@ struct ImageSpec {
   bool operator==(const ImageSpec&) const = default;
 };
 
-// ---- motion ------------------------------------------------------------------------------------------------
-/// How keys are joined. linear: straight lines. smooth: Catmull-Rom splines through the keys. Quaternions are slerped
-/// either way; before the first key and after the last one the pose holds.
+// ---- motion
+// ------------------------------------------------------------------------------------------------
+/// How keys are joined. linear: straight lines. smooth: Catmull-Rom splines through the keys.
+/// Quaternions are slerped either way; before the first key and after the last one the pose holds.
 enum class KeyCurve : std::uint8_t { linear, smooth };
 
 /// How samples follow what moves; says nothing when nothing does (common/job/motion.h).
 struct MotionSpec {
   KeyCurve curve = KeyCurve::smooth;
-  int max_px = 0;  ///< history is followed so far per frame, in either direction of the image; 0: derived from the scene
-  float depth_tolerance = 0.02f;    ///< history is taken from within this share of the depth off the surface, (0, 1]
-  float normal_tolerance_deg = 25;  ///< and where shading normals differ by at most so much, [0, 180]
+  int max_px = 0;  ///< history is followed so far per frame, in either direction of the image; 0:
+                   ///< derived from the scene
+  float depth_tolerance =
+      0.02f;  ///< history is taken from within this share of the depth off the surface, (0, 1]
+  float normal_tolerance_deg =
+      25;  ///< and where shading normals differ by at most so much, [0, 180]
 
   bool operator==(const MotionSpec&) const = default;
 };
 
-/// A node or camera of a glTF file whose animation gives the keys: one a frame, at (frame - start_frame) / fps seconds.
+/// A node or camera of a glTF file whose animation gives the keys: one a frame, at (frame -
+/// start_frame) / fps seconds.
 struct GltfMotion {
   std::string file;  ///< .gltf .glb
   std::string node;  ///< its name in the file
@@ -51,7 +58,8 @@ struct GltfMotion {
   bool operator==(const GltfMotion&) const = default;
 };
 
-// ---- camera ------------------------------------------------------------------------------------------------
+// ---- camera
+// ------------------------------------------------------------------------------------------------
 struct CameraKey {
   double frame = 1;
   Vec3 position{};
@@ -67,19 +75,20 @@ struct CameraSpec {
   Vec3 position{0, 0, 5};
   Vec3 look_at{0, 0, 0};
   Vec3 up{0, 1, 0};
-  float vertical_fov_deg = 40;  ///< (0, 180)
+  float vertical_fov_deg = 40;    ///< (0, 180)
   std::vector<CameraKey> keys{};  ///< ascending frames
   std::optional<GltfMotion> gltf{};
 
   bool operator==(const CameraSpec&) const = default;
 };
 
-// ---- scene -------------------------------------------------------------------------------------------------
+// ---- scene
+// -------------------------------------------------------------------------------------------------
 enum class MaterialKind : std::uint8_t { diffuse, phong, metallic_roughness, measured };
 
-/// diffuse: base_color is the albedo. phong: kd * base_color diffuse + ks * specular_color normalised lobe of
-/// `exponent`. metallic_roughness: GGX with base_color, metallic, roughness (glTF 2.0).
-/// measured: a table in the MERL binary format.
+/// diffuse: base_color is the albedo. phong: kd * base_color diffuse + ks * specular_color
+/// normalised lobe of `exponent`. metallic_roughness: GGX with base_color, metallic, roughness
+/// (glTF 2.0). measured: a table in the MERL binary format.
 struct MaterialSpec {
   MaterialKind kind = MaterialKind::diffuse;
   Rgb base_color{0.8f, 0.8f, 0.8f};
@@ -95,15 +104,16 @@ struct MaterialSpec {
 };
 
 struct MeshSpec {
-  std::string path;           ///< .ply .obj .off .gltf .glb
+  std::string path;            ///< .ply .obj .off .gltf .glb
   bool smooth_normals = true;  ///< interpolate vertex normals (computed when the file has none)
 
   bool operator==(const MeshSpec&) const = default;
 };
 
-/// A rigid motion, with scale, of an object that is already placed: scaled, turned by `rotate_deg` (x, then y, then z;
-/// angles are joined as numbers, so 0 to 360 is a full turn), turned by `quaternion`, each about the place that the
-/// object's `translate` names, then moved by `translate`.
+/// A rigid motion, with scale, of an object that is already placed: scaled, turned by `rotate_deg`
+/// (x, then y, then z; angles are joined as numbers, so 0 to 360 is a full turn), turned by
+/// `quaternion`, each about the place that the object's `translate` names, then moved by
+/// `translate`.
 struct ObjectKey {
   double frame = 1;
   Vec3 translate{};
@@ -114,8 +124,9 @@ struct ObjectKey {
   bool operator==(const ObjectKey&) const = default;
 };
 
-/// A mesh placed in the world: first scaled, then rotated (x, then y, then z), then translated. `place_on_ground` moves
-/// it so that its lowest point has y = 0 (before `translate`); `fit_height` scales it to that height first.
+/// A mesh placed in the world: first scaled, then rotated (x, then y, then z), then translated.
+/// `place_on_ground` moves it so that its lowest point has y = 0 (before `translate`); `fit_height`
+/// scales it to that height first.
 struct ObjectSpec {
   std::string mesh;
   std::string material;
@@ -148,10 +159,12 @@ struct SceneSpec {
   bool operator==(const SceneSpec&) const = default;
 };
 
-// ---- environment -------------------------------------------------------------------------------------------
+// ---- environment
+// -------------------------------------------------------------------------------------------
 enum class MapFilter : std::uint8_t { nearest, bilinear };
 
-/// The map at one frame number; between keys the texels are interpolated linearly, outside they are held.
+/// The map at one frame number; between keys the texels are interpolated linearly, outside they are
+/// held.
 struct EnvironmentKey {
   double frame = 1;
   std::string map;  ///< lat-long .exr or .hdr
@@ -159,32 +172,48 @@ struct EnvironmentKey {
   bool operator==(const EnvironmentKey&) const = default;
 };
 
-/// Numbered frames are keys at every frame with `interpolate` false: the last key at or before the frame holds.
+/// Numbered frames are keys at every frame with `interpolate` false: the last key at or before the
+/// frame holds.
 struct EnvironmentSpec {
   std::vector<EnvironmentKey> keys;  ///< sorted by frame, at least one
   bool interpolate = true;
   MapFilter filter = MapFilter::bilinear;
-  float scale = 1;                 ///< radiance factor, (0, inf)
-  int max_width = 0;               ///< wider maps are reduced to so many columns, [0, limits::kMaxEnvironmentSide]; 0: none
+  float scale = 1;  ///< radiance factor, (0, inf)
+  int max_width =
+      0;  ///< wider maps are reduced to so many columns, [0, limits::kMaxEnvironmentSide]; 0: none
   Vec3 rotation_axis{0, 1, 0};
-  double rotation_start_deg = 0;   ///< at the first frame of the job
+  double rotation_start_deg = 0;  ///< at the first frame of the job
   double rotation_deg_per_frame = 0;
 
   bool operator==(const EnvironmentSpec&) const = default;
 };
 
-// ---- sampling ----------------------------------------------------------------------------------------------
+// ---- sampling
+// ----------------------------------------------------------------------------------------------
 /// automatic: settled by a pilot before the job is submitted; never part of a job document.
-enum class Method : std::uint8_t { reference, environment, brdf, mis, bidirectional, sequential, pool, ratio, restir, automatic };
+enum class Method : std::uint8_t {
+  reference,
+  environment,
+  brdf,
+  mis,
+  bidirectional,
+  sequential,
+  pool,
+  ratio,
+  restir,
+  automatic
+};
 enum class ResamplingScheme : std::uint8_t { systematic, stratified, multinomial, residual };
-/// How `sequential` carries the normalising constant: by the ratio of the weights, or by path sampling with a left, right or
-/// trapezoidal sum over the intermediate distributions.
+/// How `sequential` carries the normalising constant: by the ratio of the weights, or by path
+/// sampling with a left, right or trapezoidal sum over the intermediate distributions.
 enum class LnsUpdate : std::uint8_t { ratio, path_left, path_right, path_trapezoid };
-/// The methods that draw all samples of a frame anew: `sequential` starts a pixel with one of them, a material may have its own.
+/// The methods that draw all samples of a frame anew: `sequential` starts a pixel with one of them,
+/// a material may have its own.
 enum class StartMethod : std::uint8_t { environment, brdf, mis, bidirectional };
 
-/// How the pixels of one material are sampled, where that differs from the rest of the picture; members as in
-/// SamplingSpec. Samples are drawn anew in each frame, so nothing is handed over between settings.
+/// How the pixels of one material are sampled, where that differs from the rest of the picture;
+/// members as in SamplingSpec. Samples are drawn anew in each frame, so nothing is handed over
+/// between settings.
 struct MaterialSampling {
   StartMethod method = StartMethod::bidirectional;
   int num_particles = 16;
@@ -196,39 +225,51 @@ struct MaterialSampling {
 
 struct SamplingSpec {
   Method method = Method::sequential;
-  int num_particles = 16;          ///< N: shadow rays per pixel, [1, limits::kMaxParticles]
-  int num_candidates = 128;        ///< M: SIR candidates, [N, limits::kMaxCandidates]
-  float brdf_fraction = 0.25f;     ///< [0, 1], of candidates: mis: from the BRDF; SIR: at most, from glossy lobes; 1: whole BRDF
-  bool mis_compensation = false;   ///< [Karlik et al. 2019]; mis
-  int num_distributions = 5;       ///< P: intermediate distributions per frame, [1, limits::kMaxDistributions]
-  int num_moves = 1;               ///< Metropolis-Hastings moves per distribution, [1, limits::kMaxMoves]
+  int num_particles = 16;         ///< N: shadow rays per pixel, [1, limits::kMaxParticles]
+  int num_candidates = 128;       ///< M: SIR candidates, [N, limits::kMaxCandidates]
+  float brdf_fraction = 0.25f;    ///< [0, 1], of candidates: mis: from the BRDF; SIR: at most, from
+                                  ///< glossy lobes; 1: whole BRDF
+  bool mis_compensation = false;  ///< [Karlik et al. 2019]; mis
+  int num_distributions =
+      5;              ///< P: intermediate distributions per frame, [1, limits::kMaxDistributions]
+  int num_moves = 1;  ///< Metropolis-Hastings moves per distribution, [1, limits::kMaxMoves]
   LnsUpdate lns_update = LnsUpdate::ratio;
-  float ess_ratio_min = 0.5f;      ///< resample when ESS < ess_ratio_min * N, [0, 1]
+  float ess_ratio_min = 0.5f;  ///< resample when ESS < ess_ratio_min * N, [0, 1]
   ResamplingScheme resampling = ResamplingScheme::systematic;
-  float local_move_deg = 4;        ///< half-angle of local moves, (0, 90]
+  float local_move_deg = 4;            ///< half-angle of local moves, (0, 90]
   float local_move_fraction = 0.125f;  ///< share of moves that are local, [0, 1]
-  StartMethod start_method = StartMethod::bidirectional;  ///< of fresh pixels; all but the last give N weighted samples
-  int refresh_every = 8;  ///< sequential: each pixel starts afresh once in so many frames, staggered; 0: never
-  /// sequential: a pixel whose carried Lns has left [Lns / rho, Lns * rho] of its last start, rho in (1, 1e6], starts afresh
-  /// with refresh_candidates; none: never. The rule looks at the samples, so it is a (small) bias.
+  StartMethod start_method =
+      StartMethod::bidirectional;  ///< of fresh pixels; all but the last give N weighted samples
+  int refresh_every =
+      8;  ///< sequential: each pixel starts afresh once in so many frames, staggered; 0: never
+  /// sequential: a pixel whose carried Lns has left [Lns / rho, Lns * rho] of its last start, rho
+  /// in (1, 1e6], starts afresh with refresh_candidates; none: never. The rule looks at the
+  /// samples, so it is a (small) bias.
   std::optional<float> refresh_ratio{};
   int refresh_candidates = 800;  ///< [N, limits::kMaxCandidates]
-  int history_limit = 20;    ///< restir: a carried set counts as at most so many fresh ones, [1, limits::kMaxHistoryLimit]
-  int num_neighbors = 0;     ///< restir: other pixels of the frame before whose samples a pixel weighs, [0, limits::kMaxNeighbors]
-  int neighbor_radius = 30;  ///< restir: how far from the pixel's own history they are, pixels, [1, limits::kMaxNeighborRadius]
-  /// restir: only samples whose ray was free are carried on. Unbiased while nothing moves or turns and no neighbours are asked.
+  int history_limit = 20;    ///< restir: a carried set counts as at most so many fresh ones, [1,
+                             ///< limits::kMaxHistoryLimit]
+  int num_neighbors = 0;     ///< restir: other pixels of the frame before whose samples a pixel
+                             ///< weighs, [0, limits::kMaxNeighbors]
+  int neighbor_radius = 30;  ///< restir: how far from the pixel's own history they are, pixels, [1,
+                             ///< limits::kMaxNeighborRadius]
+  /// restir: only samples whose ray was free are carried on. Unbiased while nothing moves or turns
+  /// and no neighbours are asked.
   bool reuse_visibility = false;
   std::optional<float> target_error{};  ///< automatic: RMSE over mean radiance to reach, (0, 10]
-  std::optional<float> time_budget{};   ///< automatic: CPU seconds of the whole job to stay within, (0, 1e9]
-  int reference_samples = 1024;    ///< paired samples per pixel of `reference`, [2, 2^24]
-  /// By name of a material of the scene: replaces method, N, M and brdf_fraction in the pixels whose first site with a
-  /// surface sees it. Not with methods that carry samples, nor with a second pass.
+  std::optional<float>
+      time_budget{};  ///< automatic: CPU seconds of the whole job to stay within, (0, 1e9]
+  int reference_samples = 1024;  ///< paired samples per pixel of `reference`, [2, 2^24]
+  /// By name of a material of the scene: replaces method, N, M and brdf_fraction in the pixels
+  /// whose first site with a surface sees it. Not with methods that carry samples, nor with a
+  /// second pass.
   std::map<std::string, MaterialSampling> by_material{};
 
   bool operator==(const SamplingSpec&) const = default;
 };
 
-// ---- visibility --------------------------------------------------------------------------------------------
+// ---- visibility
+// --------------------------------------------------------------------------------------------
 /// What a second pass does with the pixels whose shadow rays did not all agree.
 enum class SecondPassForm : std::uint8_t { corrected, published, published_kept, extra_samples };
 /// Which samples decide that a pixel takes part in the second pass, and which are then used.
@@ -236,31 +277,44 @@ enum class MaskPolicy : std::uint8_t { same_samples, split, cross_fold };
 
 /// Correlated visibility [Ghosh & Heidrich 2006], after any sampling method but `reference`.
 struct VisibilitySpec {
-  bool correlated = false;                          ///< run the second pass
+  bool correlated = false;  ///< run the second pass
   SecondPassForm form = SecondPassForm::corrected;
   MaskPolicy mask = MaskPolicy::cross_fold;
-  int tile_size = 5;    ///< side of the squares in which energy is exchanged, pixels, [2, limits::kMaxExchangeSide]
+  int tile_size = 5;    ///< side of the squares in which energy is exchanged, pixels, [2,
+                        ///< limits::kMaxExchangeSide]
   int partitions = 16;  ///< C: offers per free sample, [1, limits::kMaxPartitions]
   int dilate = 0;       ///< the mask grows by so many pixels, [0, limits::kMaxDilation]
 
   bool operator==(const VisibilitySpec&) const = default;
 };
 
-// ---- output, state, farm -----------------------------------------------------------------------------------
+// ---- output, state, farm
+// -----------------------------------------------------------------------------------
 enum class Background : std::uint8_t { environment, transparent };
 enum class Aov : std::uint8_t {
-  lns, visibility, ess, acceptance, source, normal, depth, variance, mask, acceptance_local, acceptance_independent,
-  resampled, material
+  lns,
+  visibility,
+  ess,
+  acceptance,
+  source,
+  normal,
+  depth,
+  variance,
+  mask,
+  acceptance_local,
+  acceptance_independent,
+  resampled,
+  material
 };
 enum class PixelType : std::uint8_t { half_float, full_float };
 
 struct OutputSpec {
-  std::string directory;                 ///< absolute
+  std::string directory;                   ///< absolute
   std::string pattern = "frame.####.exr";  ///< '#'s are the zero-padded frame number
   Background background = Background::environment;
-  std::vector<Aov> aovs;                 ///< in the order of the enum, no duplicates
+  std::vector<Aov> aovs;  ///< in the order of the enum, no duplicates
   PixelType pixel_type = PixelType::half_float;
-  std::string compression = "zip";       ///< none, rle, zips, zip, piz
+  std::string compression = "zip";  ///< none, rle, zips, zip, piz
 
   bool operator==(const OutputSpec&) const = default;
 };
@@ -268,8 +322,8 @@ struct OutputSpec {
 enum class StateKeep : std::uint8_t { last, all };
 
 struct StateSpec {
-  bool carry = true;           ///< pass samples from frame to frame
-  int checkpoint_every = 12;   ///< frames per lease; the state is durable after each, [1, 1000]
+  bool carry = true;          ///< pass samples from frame to frame
+  int checkpoint_every = 12;  ///< frames per lease; the state is durable after each, [1, 1000]
   StateKeep keep = StateKeep::last;  ///< `all` keeps every checkpoint after the job
 
   bool operator==(const StateSpec&) const = default;
@@ -292,8 +346,9 @@ struct JobSpec {
   StateSpec state;
   int max_retries_per_task = 3;
   int max_seconds_per_task = 3600;  ///< a task that takes longer has failed
-  int max_failed_tasks = 1;       ///< the job fails when so many tasks have failed for good
-  int max_failures_per_worker = 8;  ///< a worker gets no more tasks of the job after so many failures
+  int max_failed_tasks = 1;         ///< the job fails when so many tasks have failed for good
+  int max_failures_per_worker =
+      8;  ///< a worker gets no more tasks of the job after so many failures
   std::uint64_t seed = 1;
 
   bool operator==(const JobSpec&) const = default;

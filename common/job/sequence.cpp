@@ -10,13 +10,15 @@
 namespace baton {
 namespace {
 
-EnvironmentFrame environment_at(const EnvironmentSpec& environment, int frame_number, int first_frame_number) {
+EnvironmentFrame environment_at(const EnvironmentSpec& environment, int frame_number,
+                                int first_frame_number) {
   const std::vector<EnvironmentKey>& keys = environment.keys;
   EnvironmentFrame result;
 
   // The last key at or before the frame holds; before the first key the first one does.
-  const auto next = std::upper_bound(keys.begin(), keys.end(), static_cast<double>(frame_number),
-                                     [](double frame, const EnvironmentKey& key) { return frame < key.frame; });
+  const auto next =
+      std::upper_bound(keys.begin(), keys.end(), static_cast<double>(frame_number),
+                       [](double frame, const EnvironmentKey& key) { return frame < key.frame; });
   const auto held = next == keys.begin() ? keys.begin() : next - 1;
   result.map_a = result.map_b = static_cast<std::int32_t>(held - keys.begin());
 
@@ -26,8 +28,8 @@ EnvironmentFrame environment_at(const EnvironmentSpec& environment, int frame_nu
     if (result.mix > 0) result.map_b = static_cast<std::int32_t>(next - keys.begin());
   }
 
-  const double degrees =
-      environment.rotation_start_deg + environment.rotation_deg_per_frame * (frame_number - first_frame_number);
+  const double degrees = environment.rotation_start_deg +
+                         environment.rotation_deg_per_frame * (frame_number - first_frame_number);
   if (degrees != 0) result.rotation = rotation_about(environment.rotation_axis, degrees);
   return result;
 }
@@ -38,9 +40,10 @@ std::vector<FrameSpec> expand_sequence(const JobSpec& job) {
   std::vector<FrameSpec> frames;
   frames.reserve(job.frames.size());
   for (std::size_t i = 0; i < job.frames.size(); ++i) {
-    frames.push_back({.index = static_cast<std::int32_t>(i),
-                      .number = job.frames[i],
-                      .environment = environment_at(job.environment, job.frames[i], job.frames.front())});
+    frames.push_back(
+        {.index = static_cast<std::int32_t>(i),
+         .number = job.frames[i],
+         .environment = environment_at(job.environment, job.frames[i], job.frames.front())});
   }
   return frames;
 }
@@ -69,7 +72,8 @@ std::vector<std::int32_t> TileGrid::tiles_near(std::int32_t tile, std::int32_t r
   const std::int32_t first_column = std::max(r.x0 - reach_px, 0) / tile_size_;
   const std::int32_t last_column = std::min(r.x1 - 1 + reach_px, width_ - 1) / tile_size_;
   for (std::int32_t row = first_row; row <= last_row; ++row) {
-    for (std::int32_t column = first_column; column <= last_column; ++column) near.push_back(row * columns_ + column);
+    for (std::int32_t column = first_column; column <= last_column; ++column)
+      near.push_back(row * columns_ + column);
   }
   return near;
 }
@@ -92,13 +96,16 @@ TileRun tile_run(const JobSpec& job, std::int32_t tile, std::int32_t run) {
 
 bool carries_state(const JobSpec& job) {
   const Method method = job.sampling.method;
-  const bool carries = method == Method::sequential || method == Method::pool || method == Method::restir;
+  const bool carries =
+      method == Method::sequential || method == Method::pool || method == Method::restir;
   return carries && job.state.carry;
 }
 
 bool chooses_rays(Method method) { return method == Method::pool || method == Method::ratio; }
 
-bool asks_neighbors(const SamplingSpec& sampling) { return sampling.method == Method::restir && sampling.num_neighbors > 0; }
+bool asks_neighbors(const SamplingSpec& sampling) {
+  return sampling.method == Method::restir && sampling.num_neighbors > 0;
+}
 
 std::optional<StartMethod> fresh_method(Method method) {
   switch (method) {

@@ -11,8 +11,9 @@
 
 namespace baton {
 
-/// The environment at one frame: texels are lerp(map[map_a], map[map_b], mix), directions are turned by `rotation`
-/// (world = rotation * map direction). Maps are indices into JobSpec::environment.keys.
+/// The environment at one frame: texels are lerp(map[map_a], map[map_b], mix), directions are
+/// turned by `rotation` (world = rotation * map direction). Maps are indices into
+/// JobSpec::environment.keys.
 struct EnvironmentFrame {
   std::int32_t map_a = 0;
   std::int32_t map_b = 0;  ///< equal to map_a when mix is 0
@@ -21,7 +22,9 @@ struct EnvironmentFrame {
 
   bool operator==(const EnvironmentFrame&) const = default;
   /// True when both frames show the same texels, whatever the rotation.
-  bool same_texels(const EnvironmentFrame& b) const { return map_a == b.map_a && map_b == b.map_b && mix == b.mix; }
+  bool same_texels(const EnvironmentFrame& b) const {
+    return map_a == b.map_a && map_b == b.map_b && mix == b.mix;
+  }
 };
 
 /// What is particular to one frame of the sequence.
@@ -38,23 +41,24 @@ std::vector<FrameSpec> expand_sequence(const JobSpec& job);
 class TileGrid {
  public:
   TileGrid(int width, int height, int tile_size);
-  explicit TileGrid(const ImageSpec& image) : TileGrid(image.width, image.height, image.tile_size) {}
+  explicit TileGrid(const ImageSpec& image)
+      : TileGrid(image.width, image.height, image.tile_size) {}
 
   std::int32_t count() const { return columns_ * rows_; }
   std::int32_t columns() const { return columns_; }
   std::int32_t rows() const { return rows_; }
   /// tile in [0, count()).
   PixelRect rect(std::int32_t tile) const;
-  /// The tiles that have a pixel within `reach_px` of one of `tile`, in either direction; ascending, with `tile` itself.
-  /// The relation is symmetric.
+  /// The tiles that have a pixel within `reach_px` of one of `tile`, in either direction;
+  /// ascending, with `tile` itself. The relation is symmetric.
   std::vector<std::int32_t> tiles_near(std::int32_t tile, std::int32_t reach_px) const;
 
  private:
   std::int32_t width_, height_, tile_size_, columns_, rows_;
 };
 
-/// The unit that a lease hands out: one tile for frames [first_frame, last_frame] (0-based indices, inclusive).
-/// Consecutive runs of a tile are chained by the sample state when the job carries it.
+/// The unit that a lease hands out: one tile for frames [first_frame, last_frame] (0-based indices,
+/// inclusive). Consecutive runs of a tile are chained by the sample state when the job carries it.
 struct TileRun {
   std::int32_t tile = 0;
   std::int32_t run = 0;  ///< 0-based; run r covers frames r * frames_per_run ...
@@ -64,30 +68,33 @@ struct TileRun {
   auto operator<=>(const TileRun&) const = default;
 };
 
-/// Frames of a run: state.checkpoint_every, or 1 where pixels take samples from others, since a tile then needs its neighbours.
+/// Frames of a run: state.checkpoint_every, or 1 where pixels take samples from others, since a
+/// tile then needs its neighbours.
 std::int32_t frames_per_run(const JobSpec& job);
 /// Number of runs that cover the sequence: ceil(frames / frames_per_run).
 std::int32_t num_runs(const JobSpec& job);
 /// The run's frames; run in [0, num_runs(job)), tile in [0, TileGrid(job.image).count()).
 TileRun tile_run(const JobSpec& job, std::int32_t tile, std::int32_t run);
-/// True when the method hands samples, or what it remembers, from frame to frame: `sequential`, `pool` and `restir` with
-/// state.carry.
+/// True when the method hands samples, or what it remembers, from frame to frame: `sequential`,
+/// `pool` and `restir` with state.carry.
 bool carries_state(const JobSpec& job);
 /// Whether the method chooses its rays apart from its samples, of which its states then hold none.
 bool chooses_rays(Method method);
 /// Whether pixels weigh the samples of their neighbours: `restir` with neighbours.
 bool asks_neighbors(const SamplingSpec& sampling);
-/// The method among those that a material may have for itself; nullopt for those that carry, for the ratio estimator, for
-/// brute force and for auto.
+/// The method among those that a material may have for itself; nullopt for those that carry, for
+/// the ratio estimator, for brute force and for auto.
 std::optional<StartMethod> fresh_method(Method method);
 /// Shadow rays of a pixel: the most of any material.
 std::int32_t most_particles(const SamplingSpec& sampling);
 /// Particles per pixel in the job's states; 0 where rays are chosen apart from samples.
 std::int32_t num_carried_particles(const SamplingSpec& sampling);
 
-/// Sets of samples of a pixel that never exchange anything: 2 when one decides what is done with the other, else 1.
+/// Sets of samples of a pixel that never exchange anything: 2 when one decides what is done with
+/// the other, else 1.
 std::int32_t num_populations(const JobSpec& job);
-/// How far from a tile the second pass looks: pixels whose samples it exchanges, and whose rays decide the mask.
+/// How far from a tile the second pass looks: pixels whose samples it exchanges, and whose rays
+/// decide the mask.
 std::int32_t exchange_reach_px(const VisibilitySpec& visibility);
 
 /// "frame.####.exr" with frame 7 -> "frame.0007.exr". A pattern without '#' is returned unchanged.

@@ -6,20 +6,28 @@ namespace baton {
 
 std::string_view task_name(TaskKind kind) {
   switch (kind) {
-    case TaskKind::render: return "render";
-    case TaskKind::assemble: return "assemble";
-    case TaskKind::second_pass: return "second pass";
+    case TaskKind::render:
+      return "render";
+    case TaskKind::assemble:
+      return "assemble";
+    case TaskKind::second_pass:
+      return "second pass";
   }
   return "unknown";
 }
 
 std::string_view job_status_name(JobStatus status) {
   switch (status) {
-    case JobStatus::running: return "running";
-    case JobStatus::done: return "done";
-    case JobStatus::failed: return "failed";
-    case JobStatus::cancelled: return "cancelled";
-    case JobStatus::paused: return "paused";
+    case JobStatus::running:
+      return "running";
+    case JobStatus::done:
+      return "done";
+    case JobStatus::failed:
+      return "failed";
+    case JobStatus::cancelled:
+      return "cancelled";
+    case JobStatus::paused:
+      return "paused";
   }
   return "unknown";
 }

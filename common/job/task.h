@@ -10,13 +10,15 @@
 
 namespace baton {
 
-/// The words that scheduler, journal, messages and workers share: which piece of work, which attempt at it, which bytes
-/// it needs or made. Plain data; `fields` lists the members for common/base/archive.h.
+/// The words that scheduler, journal, messages and workers share: which piece of work, which
+/// attempt at it, which bytes it needs or made. Plain data; `fields` lists the members for
+/// common/base/archive.h.
 
 /// What a task does. Stored and sent; values are for ever.
 enum class TaskKind : std::uint8_t {
-  render = 0,    ///< one TileRun: step is the run, tile the tile
-  assemble = 1,  ///< one frame's EXR from its tile films: step is the 0-based frame index, tile is 0
+  render = 0,  ///< one TileRun: step is the run, tile the tile
+  assemble =
+      1,  ///< one frame's EXR from its tile films: step is the 0-based frame index, tile is 0
   second_pass = 2,  ///< one tile of one frame: step is the 0-based frame index, tile the tile
 };
 constexpr TaskKind last_of(TaskKind) { return TaskKind::second_pass; }
@@ -29,10 +31,14 @@ struct TaskKey {
   std::int32_t tile = 0;
 
   auto operator<=>(const TaskKey&) const = default;
-  template <class A> void fields(A& a) { a(kind, step, tile); }
+  template <class A>
+  void fields(A& a) {
+    a(kind, step, tile);
+  }
 };
 
-/// A blob that a task needs or made. `frame` is a 0-based index. Stored and sent; values are for ever.
+/// A blob that a task needs or made. `frame` is a 0-based index. Stored and sent; values are for
+/// ever.
 enum class BlobKind : std::uint8_t { state = 0, film = 1, image = 2, first_pass = 3 };
 constexpr BlobKind last_of(BlobKind) { return BlobKind::first_pass; }
 
@@ -40,15 +46,24 @@ struct BlobRef {
   BlobKind kind = BlobKind::state;
   std::int32_t frame = 0;
   std::int32_t tile = 0;
-  Digest digest;           ///< for `image`: digest of the EXR file in the output folder
+  Digest digest;  ///< for `image`: digest of the EXR file in the output folder
   std::uint64_t size_bytes = 0;
 
   auto operator<=>(const BlobRef&) const = default;
-  template <class A> void fields(A& a) { a(kind, frame, tile, digest, size_bytes); }
+  template <class A>
+  void fields(A& a) {
+    a(kind, frame, tile, digest, size_bytes);
+  }
 };
 
 /// Where a job stands. Stored and sent; values are for ever. Of a paused job no task is handed out.
-enum class JobStatus : std::uint8_t { running = 0, done = 1, failed = 2, cancelled = 3, paused = 4 };
+enum class JobStatus : std::uint8_t {
+  running = 0,
+  done = 1,
+  failed = 2,
+  cancelled = 3,
+  paused = 4
+};
 constexpr JobStatus last_of(JobStatus) { return JobStatus::paused; }
 /// "running" ... "paused".
 std::string_view job_status_name(JobStatus status);
@@ -57,7 +72,8 @@ constexpr bool is_open(JobStatus status) {
   return status == JobStatus::running || status == JobStatus::paused;
 }
 
-/// Names one attempt of one task; the fence against late reports. epoch: the coordinator's start count.
+/// Names one attempt of one task; the fence against late reports. epoch: the coordinator's start
+/// count.
 struct LeaseId {
   Digest job;
   TaskKey task;
@@ -65,7 +81,10 @@ struct LeaseId {
   std::uint32_t epoch = 0;
 
   auto operator<=>(const LeaseId&) const = default;
-  template <class A> void fields(A& a) { a(job, task, attempt, epoch); }
+  template <class A>
+  void fields(A& a) {
+    a(job, task, attempt, epoch);
+  }
 };
 
 /// What the sampler did with the pixels that see a surface; merging is addition.
@@ -78,18 +97,22 @@ struct SamplingStats {
   std::uint64_t pixels_resampled = 0;
   std::uint64_t local_proposed = 0, local_accepted = 0;  ///< moves
   std::uint64_t independent_proposed = 0, independent_accepted = 0;
-  /// Pixels by ESS / N before resampling: bin b holds [b, b + 1) / kEssBins, the last one 1 as well; dark pixels are in
-  /// bin 0.
+  /// Pixels by ESS / N before resampling: bin b holds [b, b + 1) / kEssBins, the last one 1 as
+  /// well; dark pixels are in bin 0.
   std::array<std::uint64_t, kEssBins> ess_histogram{};
 
   bool operator==(const SamplingStats&) const = default;
-  std::uint64_t pixels() const { return pixels_fresh + pixels_carried + pixels_restarted + pixels_refreshed; }
+  std::uint64_t pixels() const {
+    return pixels_fresh + pixels_carried + pixels_restarted + pixels_refreshed;
+  }
   /// ess_ratio: ESS / N, [0, 1].
   void count_ess(float ess_ratio);
   void merge(const SamplingStats& b);
-  template <class A> void fields(A& a) {
-    a(pixels_fresh, pixels_carried, pixels_restarted, pixels_refreshed, pixels_refreshed_by_ratio, pixels_resampled,
-      local_proposed, local_accepted, independent_proposed, independent_accepted, ess_histogram);
+  template <class A>
+  void fields(A& a) {
+    a(pixels_fresh, pixels_carried, pixels_restarted, pixels_refreshed, pixels_refreshed_by_ratio,
+      pixels_resampled, local_proposed, local_accepted, independent_proposed, independent_accepted,
+      ess_histogram);
   }
 };
 
@@ -100,7 +123,10 @@ struct FrameStats {
   SamplingStats sampling;
 
   bool operator==(const FrameStats&) const = default;
-  template <class A> void fields(A& a) { a(frame, tile, sampling); }
+  template <class A>
+  void fields(A& a) {
+    a(frame, tile, sampling);
+  }
 };
 
 /// Counters that workers add up and `baton job show` prints; merging is addition.
@@ -111,18 +137,22 @@ struct RenderStats {
   std::uint64_t rays_second_pass = 0;  ///< not in rays_shadow
   SamplingStats sampling;
   double cpu_seconds = 0;
-  /// CPU seconds of the stages; light is shared by all tiles of a frame and counted where it was prepared.
-  double seconds_light = 0, seconds_primary = 0, seconds_sample = 0, seconds_visibility = 0, seconds_shade = 0;
-  double seconds_state = 0;  ///< encoding, writing, reading and decoding sample states
+  /// CPU seconds of the stages; light is shared by all tiles of a frame and counted where it was
+  /// prepared.
+  double seconds_light = 0, seconds_primary = 0, seconds_sample = 0, seconds_visibility = 0,
+         seconds_shade = 0;
+  double seconds_state = 0;        ///< encoding, writing, reading and decoding sample states
   double seconds_second_pass = 0;  ///< all of the second pass
   double seconds_second_rays = 0;  ///< its occlusion rays alone
 
   bool operator==(const RenderStats&) const = default;
   void merge(const RenderStats& b);
-  template <class A> void fields(A& a) {
-    a(pixels, rays_primary, rays_shadow, target_evaluations, pixels_background, sampling, cpu_seconds, seconds_light,
-      seconds_primary, seconds_sample, seconds_visibility, seconds_shade, seconds_state,
-      pixels_masked, rays_second_pass, seconds_second_pass, seconds_second_rays);
+  template <class A>
+  void fields(A& a) {
+    a(pixels, rays_primary, rays_shadow, target_evaluations, pixels_background, sampling,
+      cpu_seconds, seconds_light, seconds_primary, seconds_sample, seconds_visibility,
+      seconds_shade, seconds_state, pixels_masked, rays_second_pass, seconds_second_pass,
+      seconds_second_rays);
   }
 };
 

@@ -1,4 +1,5 @@
-// Vectors of directions and the functions of them that every SIMD kernel needs. Included once per Highway target.
+// Vectors of directions and the functions of them that every SIMD kernel needs. Included once per
+// Highway target.
 #if defined(BATON_COMMON_MATH_LANES_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef BATON_COMMON_MATH_LANES_INL_H_
 #undef BATON_COMMON_MATH_LANES_INL_H_
@@ -19,7 +20,8 @@ HWY_BEFORE_NAMESPACE();
 namespace baton::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-/// All kernels run on (up to) eight float lanes: wide enough for AVX2, and the same grouping on wider machines.
+/// All kernels run on (up to) eight float lanes: wide enough for AVX2, and the same grouping on
+/// wider machines.
 using DF = hn::CappedTag<float, 8>;
 using DI = hn::RebindToSigned<DF>;
 using DU = hn::RebindToUnsigned<DF>;
@@ -37,7 +39,9 @@ struct Vec3Lanes {
 HWY_INLINE VF Dot(const Vec3Lanes& a, const Vec3Lanes& b) {
   return hn::MulAdd(a.x, b.x, hn::MulAdd(a.y, b.y, hn::Mul(a.z, b.z)));
 }
-HWY_INLINE Vec3Lanes Scale(const Vec3Lanes& a, VF s) { return {hn::Mul(a.x, s), hn::Mul(a.y, s), hn::Mul(a.z, s)}; }
+HWY_INLINE Vec3Lanes Scale(const Vec3Lanes& a, VF s) {
+  return {hn::Mul(a.x, s), hn::Mul(a.y, s), hn::Mul(a.z, s)};
+}
 HWY_INLINE Vec3Lanes Add(const Vec3Lanes& a, const Vec3Lanes& b) {
   return {hn::Add(a.x, b.x), hn::Add(a.y, b.y), hn::Add(a.z, b.z)};
 }
@@ -50,14 +54,17 @@ HWY_INLINE Vec3Lanes AddProduct(const Vec3Lanes& a, const Vec3Lanes& b, const Ve
   return {hn::MulAdd(a.x, b.x, c.x), hn::MulAdd(a.y, b.y, c.y), hn::MulAdd(a.z, b.z, c.z)};
 }
 HWY_INLINE Vec3Lanes Select(MF mask, const Vec3Lanes& yes, const Vec3Lanes& no) {
-  return {hn::IfThenElse(mask, yes.x, no.x), hn::IfThenElse(mask, yes.y, no.y), hn::IfThenElse(mask, yes.z, no.z)};
+  return {hn::IfThenElse(mask, yes.x, no.x), hn::IfThenElse(mask, yes.y, no.y),
+          hn::IfThenElse(mask, yes.z, no.z)};
 }
-/// first, first + 1, ... (Highway 1.0's Iota of a variable stores them one by one and waits for them.)
+/// first, first + 1, ... (Highway 1.0's Iota of a variable stores them one by one and waits for
+/// them.)
 template <class D>
 HWY_INLINE hn::Vec<D> CountFrom(D d, hn::TFromD<D> first) {
   return hn::Add(hn::Iota(d, 0), hn::Set(d, first));
 }
-/// v = 0, lane by lane: what GCC copies as a whole it loads in larger pieces than it has just stored.
+/// v = 0, lane by lane: what GCC copies as a whole it loads in larger pieces than it has just
+/// stored.
 HWY_INLINE void SetZero(Vec3Lanes& v) { v.x = v.y = v.z = hn::Zero(DF()); }
 HWY_INLINE Rgb SumOfLanes(const Vec3Lanes& v) {
   const auto sum = [](VF x) HWY_ATTR { return hn::GetLane(hn::SumOfLanes(DF(), x)); };
@@ -69,8 +76,8 @@ HWY_INLINE VF AlternateSigns() {
   const VI odd = hn::And(hn::Iota(di, 0), hn::Set(di, 1));
   return hn::ConvertTo(DF(), hn::Sub(hn::Set(di, 1), hn::Add(odd, odd)));
 }
-/// Up to a vector from `array` at i, the rest zero; and back. Whole vectors, which most are, pass no
-/// memory in between: what is stored in pieces and loaded at once waits for the stores.
+/// Up to a vector from `array` at i, the rest zero; and back. Whole vectors, which most are, pass
+/// no memory in between: what is stored in pieces and loaded at once waits for the stores.
 template <class D>
 HWY_INLINE hn::Vec<D> LoadSome(D d, std::span<const hn::TFromD<D>> array, std::size_t i) {
   if (i + hn::Lanes(d) <= array.size()) return hn::LoadU(d, array.data() + i);
@@ -85,8 +92,12 @@ HWY_INLINE void StoreSome(D d, hn::Vec<D> value, std::span<hn::TFromD<D>> array,
   hn::Store(value, d, out);
   std::copy_n(out, array.size() - i, array.data() + i);
 }
-HWY_INLINE VF LoadSome(std::span<const float> array, std::size_t i) { return LoadSome(DF(), array, i); }
-HWY_INLINE void StoreSome(VF value, std::span<float> array, std::size_t i) { StoreSome(DF(), value, array, i); }
+HWY_INLINE VF LoadSome(std::span<const float> array, std::size_t i) {
+  return LoadSome(DF(), array, i);
+}
+HWY_INLINE void StoreSome(VF value, std::span<float> array, std::size_t i) {
+  StoreSome(DF(), value, array, i);
+}
 /// Small numbers, such as sites, that are kept in bytes; and back.
 HWY_INLINE VI LoadBytes(std::span<const std::uint8_t> array, std::size_t i) {
   return hn::PromoteTo(DI(), LoadSome(DB(), array, i));
@@ -146,7 +157,8 @@ HWY_INLINE Vec3Lanes Transform(const float* m, const Vec3Lanes& v) {
 /// 1 / sqrt(x) to float accuracy.
 HWY_INLINE VF InverseSqrt(VF x) { return hn::Div(hn::Set(DF(), 1.0f), hn::Sqrt(x)); }
 
-/// v.x * frame x + v.y * frame y + v.z * n, the frame around unit n as in common/math/vec3.h [Duff et al. 2017].
+/// v.x * frame x + v.y * frame y + v.z * n, the frame around unit n as in common/math/vec3.h [Duff
+/// et al. 2017].
 HWY_INLINE Vec3Lanes FrameToWorld(const Vec3Lanes& n, const Vec3Lanes& v) {
   const DF d;
   const VF one = hn::Set(d, 1.0f);
@@ -171,7 +183,8 @@ HWY_INLINE Vec3Lanes FrameToLocal(const Vec3Lanes& n, const Vec3Lanes& v) {
   return {Dot(fx, v), Dot(fy, v), Dot(n, v)};
 }
 
-/// sin and cos of 2 pi u for u in [0, 1): odd and even minimax polynomials on a quarter turn, error below 4e-7.
+/// sin and cos of 2 pi u for u in [0, 1): odd and even minimax polynomials on a quarter turn, error
+/// below 4e-7.
 HWY_INLINE void SinCosTurns(VF u, VF& sine, VF& cosine) {
   const DF d;
   // Reduce to r in [-1/8, 1/8] turns around the nearest quarter.
@@ -186,8 +199,11 @@ HWY_INLINE void SinCosTurns(VF u, VF& sine, VF& cosine) {
   // Turn by the quarter: swap for odd quarters, then set signs.
   const DI di;
   const VI q = hn::ConvertTo(di, quarter);
-  const MF odd = hn::MaskFromVec(hn::BitCast(d, hn::VecFromMask(di, hn::TestBit(q, hn::Set(di, 1)))));
-  const auto sign_bit = [&](VI bits) HWY_ATTR { return hn::BitCast(d, hn::ShiftLeft<30>(hn::And(bits, hn::Set(di, 2)))); };
+  const MF odd =
+      hn::MaskFromVec(hn::BitCast(d, hn::VecFromMask(di, hn::TestBit(q, hn::Set(di, 1)))));
+  const auto sign_bit = [&](VI bits) HWY_ATTR {
+    return hn::BitCast(d, hn::ShiftLeft<30>(hn::And(bits, hn::Set(di, 2))));
+  };
   sine = hn::Xor(hn::IfThenElse(odd, c, s), sign_bit(q));
   cosine = hn::Xor(hn::IfThenElse(odd, s, c), sign_bit(hn::Add(q, hn::Set(di, 1))));
 }
@@ -210,17 +226,20 @@ HWY_INLINE VF LogLanes(VF x) {
   const VI bits = hn::BitCast(di, x);
   const VI shifted = hn::Sub(bits, hn::Set(di, 0x3F3504F3));
   const VF e = hn::ConvertTo(d, hn::ShiftRight<23>(shifted));
-  const VF m = hn::BitCast(d, hn::Add(hn::And(shifted, hn::Set(di, 0x007FFFFF)), hn::Set(di, 0x3F3504F3)));
+  const VF m =
+      hn::BitCast(d, hn::Add(hn::And(shifted, hn::Set(di, 0x007FFFFF)), hn::Set(di, 0x3F3504F3)));
   const VF one = hn::Set(d, 1.0f);
   const VF s = hn::Div(hn::Sub(m, one), hn::Add(m, one));
   return hn::MulAdd(e, hn::Set(d, 0.69314718056f), LogRatioSeries(s));
 }
 
-/// log(1 - t) for t in [0, 1], with full relative accuracy near t = 0; large and negative, but finite, at t = 1.
+/// log(1 - t) for t in [0, 1], with full relative accuracy near t = 0; large and negative, but
+/// finite, at t = 1.
 HWY_INLINE VF LogOneMinusLanes(VF t) {
   const DF d;
   const VF one = hn::Set(d, 1.0f);
-  // The series of LogLanes with the difference m - 1 = -t as given, not as what rounding leaves of it.
+  // The series of LogLanes with the difference m - 1 = -t as given, not as what rounding leaves of
+  // it.
   const VF s = hn::Div(hn::Neg(t), hn::Sub(hn::Set(d, 2.0f), t));
   const VF series = LogRatioSeries(s);
   const MF near_zero = hn::Lt(t, hn::Set(d, 0.25f));
@@ -231,7 +250,8 @@ HWY_INLINE VF LogOneMinusLanes(VF t) {
 /// e^x for x in [-87, 88], clamped outside; relative error below 3e-7.
 HWY_INLINE VF ExpLanes(VF x) {
   const DF d;
-  const VF octaves = hn::Mul(hn::Clamp(x, hn::Set(d, -87.0f), hn::Set(d, 88.0f)), hn::Set(d, 1.44269504089f));
+  const VF octaves =
+      hn::Mul(hn::Clamp(x, hn::Set(d, -87.0f), hn::Set(d, 88.0f)), hn::Set(d, 1.44269504089f));
   const VF n = hn::Round(octaves);
   const VF f = hn::Mul(hn::Sub(octaves, n), hn::Set(d, 0.69314718056f));
   VF p = hn::MulAdd(f, hn::Set(d, 1.0f / 720), hn::Set(d, 1.0f / 120));
@@ -244,8 +264,9 @@ HWY_INLINE VF ExpLanes(VF x) {
 }
 
 /// Minimax polynomial of atan(t)/t in t^2 on [0, 1], highest power first; error of atan 4e-8.
-inline constexpr float kAtan[8] = {-4.054394293e-03f, 2.186231616e-02f,  -5.591137602e-02f, 9.642125771e-02f,
-                                   -1.390860080e-01f, 1.994655975e-01f, -3.332986025e-01f, 9.999993354e-01f};
+inline constexpr float kAtan[8] = {-4.054394293e-03f, 2.186231616e-02f,  -5.591137602e-02f,
+                                   9.642125771e-02f,  -1.390860080e-01f, 1.994655975e-01f,
+                                   -3.332986025e-01f, 9.999993354e-01f};
 
 /// atan2(y, x) in (-pi, pi], 0 for (0, 0); minimax polynomial on [0, 1], error below 3e-7.
 HWY_INLINE VF Atan2(VF y, VF x) {
@@ -277,7 +298,8 @@ HWY_INLINE VU EncodeOctahedral(const Vec3Lanes& w) {
   const auto pack = [&](VF t) HWY_ATTR {
     const VF half = hn::Set(d, 0.5f);
     const VF scaled = hn::MulAdd(hn::MulAdd(t, half, half), hn::Set(d, 65535.0f), half);
-    return hn::BitCast(du, hn::ConvertTo(DI(), hn::Clamp(scaled, hn::Zero(d), hn::Set(d, 65535.0f))));
+    return hn::BitCast(du,
+                       hn::ConvertTo(DI(), hn::Clamp(scaled, hn::Zero(d), hn::Set(d, 65535.0f))));
   };
   return hn::Or(pack(fold_u), hn::ShiftLeft<16>(pack(fold_v)));
 }
@@ -288,7 +310,8 @@ HWY_INLINE Vec3Lanes DecodeOctahedral(VU code) {
   const DI di;
   const VF one = hn::Set(d, 1.0f);
   const auto unpack = [&](VU bits) HWY_ATTR {
-    return hn::MulAdd(hn::ConvertTo(d, hn::BitCast(di, bits)), hn::Set(d, 2.0f / 65535.0f), hn::Set(d, -1.0f));
+    return hn::MulAdd(hn::ConvertTo(d, hn::BitCast(di, bits)), hn::Set(d, 2.0f / 65535.0f),
+                      hn::Set(d, -1.0f));
   };
   const VF u = unpack(hn::And(code, hn::Set(DU(), 0xFFFFu)));
   const VF v = unpack(hn::ShiftRight<16>(code));

@@ -1,4 +1,5 @@
-// Philox4x32-10 in SIMD: the same numbers as common/math/philox.h. Included once per Highway target.
+// Philox4x32-10 in SIMD: the same numbers as common/math/philox.h. Included once per Highway
+// target.
 #if defined(BATON_COMMON_MATH_PHILOX_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef BATON_COMMON_MATH_PHILOX_INL_H_
 #undef BATON_COMMON_MATH_PHILOX_INL_H_
@@ -36,15 +37,16 @@ template <class DU, class VU>
 HWY_INLINE PhiloxLanes<VU> PhiloxBlock(DU du, const Rng& rng, std::uint32_t step, VU index) {
   auto k0 = static_cast<std::uint32_t>(rng.key().job_seed);
   auto k1 = static_cast<std::uint32_t>(rng.key().job_seed >> 32);
-  PhiloxLanes<VU> c{hn::Set(du, rng.key().pixel), hn::Set(du, rng.key().frame), hn::Set(du, rng.pass_word(step)),
-                    index};
+  PhiloxLanes<VU> c{hn::Set(du, rng.key().pixel), hn::Set(du, rng.key().frame),
+                    hn::Set(du, rng.pass_word(step)), index};
   const VU m0 = hn::Set(du, Philox4x32::kMultiplier0);
   const VU m1 = hn::Set(du, Philox4x32::kMultiplier1);
   for (int round = 0; round < Philox4x32::kRounds; ++round) {
     VU low0, high0, low1, high1;
     MulWide(du, c.w0, m0, low0, high0);
     MulWide(du, c.w2, m1, low1, high1);
-    c = {hn::Xor(hn::Xor(high1, c.w1), hn::Set(du, k0)), low1, hn::Xor(hn::Xor(high0, c.w3), hn::Set(du, k1)), low0};
+    c = {hn::Xor(hn::Xor(high1, c.w1), hn::Set(du, k0)), low1,
+         hn::Xor(hn::Xor(high0, c.w3), hn::Set(du, k1)), low0};
     k0 += Philox4x32::kWeyl0;
     k1 += Philox4x32::kWeyl1;
   }

@@ -5,8 +5,9 @@
 
 namespace baton {
 
-/// Philox4x32-10 [Salmon et al. 2011, "Parallel random numbers: as easy as 1, 2, 3"]: 128 random bits from a
-/// 128-bit counter and a 64-bit key. Randomness is addressed, not consumed. philox-inl.h is the same in SIMD.
+/// Philox4x32-10 [Salmon et al. 2011, "Parallel random numbers: as easy as 1, 2, 3"]: 128 random
+/// bits from a 128-bit counter and a 64-bit key. Randomness is addressed, not consumed.
+/// philox-inl.h is the same in SIMD.
 struct Philox4x32 {
   static constexpr std::uint32_t kMultiplier0 = 0xD2511F53u;
   static constexpr std::uint32_t kMultiplier1 = 0xCD9E8D57u;
@@ -48,10 +49,13 @@ enum class PassId : std::uint32_t {
 };
 
 /// uint32 -> float uniform in [0, 1): the top 24 bits.
-constexpr float uniform_float(std::uint32_t bits) { return static_cast<float>(bits >> 8) * 0x1p-24f; }
+constexpr float uniform_float(std::uint32_t bits) {
+  return static_cast<float>(bits >> 8) * 0x1p-24f;
+}
 
 /// The address of a pixel's randomness: (job seed, frame, pixel, pass, step, index).
-/// pixel: y * image_width + x, so no tiling enters. Equal addresses give equal numbers, on any thread or host.
+/// pixel: y * image_width + x, so no tiling enters. Equal addresses give equal numbers, on any
+/// thread or host.
 struct RngKey {
   std::uint64_t job_seed = 0;
   std::uint32_t frame = 0;

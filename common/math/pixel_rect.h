@@ -13,7 +13,9 @@ struct PixelRect {
   constexpr std::int32_t width() const { return x1 - x0; }
   constexpr std::int32_t height() const { return y1 - y0; }
   constexpr std::int64_t area() const { return std::int64_t{width()} * height(); }
-  constexpr bool contains(std::int32_t x, std::int32_t y) const { return x >= x0 && x < x1 && y >= y0 && y < y1; }
+  constexpr bool contains(std::int32_t x, std::int32_t y) const {
+    return x >= x0 && x < x1 && y >= y0 && y < y1;
+  }
   /// Not empty, and inside [0, max_side) both ways.
   constexpr bool fits_within(std::int32_t max_side) const {
     return x0 >= 0 && y0 >= 0 && x0 < x1 && y0 < y1 && x1 <= max_side && y1 <= max_side;

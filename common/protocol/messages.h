@@ -12,9 +12,9 @@
 
 namespace baton {
 
-/// Every message between coordinator, workers and the command line. PROTOCOL.md describes the conversation; each
-/// struct's `fields` is at once its encoder and its decoder. Bulk data never travels here: blobs go through the store,
-/// messages carry their digests.
+/// Every message between coordinator, workers and the command line. PROTOCOL.md describes the
+/// conversation; each struct's `fields` is at once its encoder and its decoder. Bulk data never
+/// travels here: blobs go through the store, messages carry their digests.
 
 inline constexpr const char* kProtocolName = "BATON";
 inline constexpr std::uint16_t kProtocolVersion = 3;
@@ -22,65 +22,181 @@ inline constexpr std::uint16_t kProtocolVersion = 3;
 // ---- worker to coordinator ----------------------------------------------------------------------
 struct WorkerHello {  ///< first, and again after a reconnect or a new epoch
   std::string worker_id, host;
-  std::uint64_t instance = 0;       ///< drawn when the process starts: who the worker is, whatever its name
+  std::uint64_t instance =
+      0;  ///< drawn when the process starts: who the worker is, whatever its name
   std::int32_t pid = 0, num_threads = 0;
-  std::string instruction_set;      ///< e.g. "AVX2": results are the same bytes only on one of them
-  std::vector<LeaseId> running;     ///< leases in hand: a restarted coordinator may adopt them
-  template <class A> void fields(A& a) { a(worker_id, host, instance, pid, num_threads, instruction_set, running); }
+  std::string instruction_set;   ///< e.g. "AVX2": results are the same bytes only on one of them
+  std::vector<LeaseId> running;  ///< leases in hand: a restarted coordinator may adopt them
+  template <class A>
+  void fields(A& a) {
+    a(worker_id, host, instance, pid, num_threads, instruction_set, running);
+  }
 };
 /// `count` more leases are wanted; replaces what was asked before.
-struct LeaseRequest { std::int32_t count = 1; template <class A> void fields(A& a) { a(count); } };
-struct Heartbeat { std::vector<LeaseId> running; template <class A> void fields(A& a) { a(running); } };
+struct LeaseRequest {
+  std::int32_t count = 1;
+  template <class A>
+  void fields(A& a) {
+    a(count);
+  }
+};
+struct Heartbeat {
+  std::vector<LeaseId> running;
+  template <class A>
+  void fields(A& a) {
+    a(running);
+  }
+};
 struct TaskDone {
   LeaseId lease;
   std::vector<BlobRef> outputs;
   RenderStats stats;
   std::vector<FrameStats> frames = {};  ///< of a render task: one for each frame of the run
-  template <class A> void fields(A& a) { a(lease, outputs, stats, frames); }
+  template <class A>
+  void fields(A& a) {
+    a(lease, outputs, stats, frames);
+  }
 };
 struct TaskFailed {
   LeaseId lease;
   std::string message;
   bool permanent = false;  ///< bad input: no retry can help
-  template <class A> void fields(A& a) { a(lease, message, permanent); }
+  template <class A>
+  void fields(A& a) {
+    a(lease, message, permanent);
+  }
 };
-struct JobDocumentRequest { Digest job; template <class A> void fields(A& a) { a(job); } };
-struct WorkerGoodbye { template <class A> void fields(A& a) { a(); } };
+struct JobDocumentRequest {
+  Digest job;
+  template <class A>
+  void fields(A& a) {
+    a(job);
+  }
+};
+struct WorkerGoodbye {
+  template <class A>
+  void fields(A& a) {
+    a();
+  }
+};
 
 // ---- coordinator to worker ----------------------------------------------------------------------
 struct WorkerWelcome {
   std::uint32_t epoch = 0;
   std::int32_t heartbeat_ms = 1000;
   std::string store_directory;  ///< shared by coordinator and workers
-  template <class A> void fields(A& a) { a(epoch, heartbeat_ms, store_directory); }
+  template <class A>
+  void fields(A& a) {
+    a(epoch, heartbeat_ms, store_directory);
+  }
 };
 struct LeaseGrant {
   LeaseId lease;
   std::vector<BlobRef> inputs;
-  template <class A> void fields(A& a) { a(lease, inputs); }
+  template <class A>
+  void fields(A& a) {
+    a(lease, inputs);
+  }
 };
-struct LeaseRevoke { LeaseId lease; template <class A> void fields(A& a) { a(lease); } };
-struct NoWork { std::int32_t retry_ms = 200; template <class A> void fields(A& a) { a(retry_ms); } };
-struct HelloAgain { template <class A> void fields(A& a) { a(); } };  ///< "I do not know you": send WorkerHello
+struct LeaseRevoke {
+  LeaseId lease;
+  template <class A>
+  void fields(A& a) {
+    a(lease);
+  }
+};
+struct NoWork {
+  std::int32_t retry_ms = 200;
+  template <class A>
+  void fields(A& a) {
+    a(retry_ms);
+  }
+};
+struct HelloAgain {
+  template <class A>
+  void fields(A& a) {
+    a();
+  }
+};  ///< "I do not know you": send WorkerHello
 struct JobDocument {
   Digest job;
   std::string json;  ///< resolved: absolute paths, asset digests
-  template <class A> void fields(A& a) { a(job, json); }
+  template <class A>
+  void fields(A& a) {
+    a(job, json);
+  }
 };
 /// Finish what runs, take nothing new, end.
-struct Drain { template <class A> void fields(A& a) { a(); } };
-struct Shutdown { template <class A> void fields(A& a) { a(); } };
+struct Drain {
+  template <class A>
+  void fields(A& a) {
+    a();
+  }
+};
+struct Shutdown {
+  template <class A>
+  void fields(A& a) {
+    a();
+  }
+};
 
 // ---- client to coordinator ----------------------------------------------------------------------
 /// restart: frames of another picture in the output folder may be replaced.
-struct SubmitJob { std::string json; bool restart = false; template <class A> void fields(A& a) { a(json, restart); } };
-struct ListJobs { template <class A> void fields(A& a) { a(); } };
-struct ShowJob { std::string job; template <class A> void fields(A& a) { a(job); } };  ///< digest or unique prefix
-struct PauseJob { std::string job; template <class A> void fields(A& a) { a(job); } };
-struct ResumeJob { std::string job; template <class A> void fields(A& a) { a(job); } };
-struct DrainWorker { std::string worker_id; template <class A> void fields(A& a) { a(worker_id); } };
-struct CancelJob { std::string job; template <class A> void fields(A& a) { a(job); } };
-struct StopCoordinator { template <class A> void fields(A& a) { a(); } };
+struct SubmitJob {
+  std::string json;
+  bool restart = false;
+  template <class A>
+  void fields(A& a) {
+    a(json, restart);
+  }
+};
+struct ListJobs {
+  template <class A>
+  void fields(A& a) {
+    a();
+  }
+};
+struct ShowJob {
+  std::string job;
+  template <class A>
+  void fields(A& a) {
+    a(job);
+  }
+};  ///< digest or unique prefix
+struct PauseJob {
+  std::string job;
+  template <class A>
+  void fields(A& a) {
+    a(job);
+  }
+};
+struct ResumeJob {
+  std::string job;
+  template <class A>
+  void fields(A& a) {
+    a(job);
+  }
+};
+struct DrainWorker {
+  std::string worker_id;
+  template <class A>
+  void fields(A& a) {
+    a(worker_id);
+  }
+};
+struct CancelJob {
+  std::string job;
+  template <class A>
+  void fields(A& a) {
+    a(job);
+  }
+};
+struct StopCoordinator {
+  template <class A>
+  void fields(A& a) {
+    a();
+  }
+};
 
 // ---- coordinator to client ----------------------------------------------------------------------
 struct JobSummary {
@@ -88,53 +204,72 @@ struct JobSummary {
   std::string name, output_directory;
   JobStatus status = JobStatus::running;
   std::int32_t priority = 0;
-  std::uint64_t tasks_total = 0, tasks_done = 0, tasks_leased = 0, tasks_failed = 0, attempts_lost = 0;
+  std::uint64_t tasks_total = 0, tasks_done = 0, tasks_leased = 0, tasks_failed = 0,
+                attempts_lost = 0;
   std::uint32_t frames_total = 0, frames_done = 0;
   std::uint64_t state_bytes = 0, state_pixels = 0;  ///< of all states published so far
   RenderStats stats;
-  template <class A> void fields(A& a) {
-    a(job, name, output_directory, status, priority, tasks_total, tasks_done, tasks_leased, tasks_failed,
-      attempts_lost, frames_total, frames_done, state_bytes, state_pixels, stats);
+  template <class A>
+  void fields(A& a) {
+    a(job, name, output_directory, status, priority, tasks_total, tasks_done, tasks_leased,
+      tasks_failed, attempts_lost, frames_total, frames_done, state_bytes, state_pixels, stats);
   }
 };
 struct WorkerSummary {
   std::string worker_id, host;
   std::int32_t pid = 0, num_threads = 0, leases = 0;
-  template <class A> void fields(A& a) { a(worker_id, host, pid, num_threads, leases); }
+  template <class A>
+  void fields(A& a) {
+    a(worker_id, host, pid, num_threads, leases);
+  }
 };
 struct JobAccepted {
   Digest job;
   bool already_there = false;  ///< equal digest: the same job goes on (a success)
-  template <class A> void fields(A& a) { a(job, already_there); }
+  template <class A>
+  void fields(A& a) {
+    a(job, already_there);
+  }
 };
 struct JobList {
   std::vector<JobSummary> jobs;
   std::vector<WorkerSummary> workers;
-  template <class A> void fields(A& a) { a(jobs, workers); }
+  template <class A>
+  void fields(A& a) {
+    a(jobs, workers);
+  }
 };
 struct JobDetail {
   JobSummary summary;
-  std::vector<std::int32_t> frames_done;     ///< user's frame numbers
-  std::vector<std::string> failures;         ///< newest last, at most 100
-  std::vector<FrameStats> frames = {};  ///< the tiles so far of each frame: frame is the user's number, tile -1
-  template <class A> void fields(A& a) { a(summary, frames_done, failures, frames); }
+  std::vector<std::int32_t> frames_done;  ///< user's frame numbers
+  std::vector<std::string> failures;      ///< newest last, at most 100
+  std::vector<FrameStats> frames =
+      {};  ///< the tiles so far of each frame: frame is the user's number, tile -1
+  template <class A>
+  void fields(A& a) {
+    a(summary, frames_done, failures, frames);
+  }
 };
 struct Refused {
   std::uint8_t kind = 0;  ///< ErrorKind
   std::string message;
-  template <class A> void fields(A& a) { a(kind, message); }
+  template <class A>
+  void fields(A& a) {
+    a(kind, message);
+  }
 };
 
 /// The closed set; the index is the type code on the wire, so new messages go at the end.
-using Message = std::variant<WorkerHello, LeaseRequest, Heartbeat, TaskDone, TaskFailed, JobDocumentRequest,
-                             WorkerGoodbye, WorkerWelcome, LeaseGrant, LeaseRevoke, NoWork, HelloAgain, JobDocument,
-                             Shutdown, SubmitJob, ListJobs, ShowJob, CancelJob, StopCoordinator, JobAccepted, JobList,
-                             JobDetail, Refused, PauseJob, ResumeJob, DrainWorker, Drain>;
+using Message =
+    std::variant<WorkerHello, LeaseRequest, Heartbeat, TaskDone, TaskFailed, JobDocumentRequest,
+                 WorkerGoodbye, WorkerWelcome, LeaseGrant, LeaseRevoke, NoWork, HelloAgain,
+                 JobDocument, Shutdown, SubmitJob, ListJobs, ShowJob, CancelJob, StopCoordinator,
+                 JobAccepted, JobList, JobDetail, Refused, PauseJob, ResumeJob, DrainWorker, Drain>;
 
 /// The frames of one message: [protocol name and version][type][body].
 std::vector<Bytes> encode_message(const Message& message);
-/// Errors: wrong protocol name, another version (ErrorKind::version, names both), unknown type, short or long body,
-/// past limits::kMaxMessageBytes.
+/// Errors: wrong protocol name, another version (ErrorKind::version, names both), unknown type,
+/// short or long body, past limits::kMaxMessageBytes.
 Result<Message> decode_message(const std::vector<Bytes>& frames);
 
 }  // namespace baton

@@ -216,10 +216,10 @@ Status decode_sources(const SectionFile& file, const std::string& name, SampleSt
                                    file.find(kMemorySummary) != nullptr,
                                    file.find(kConfidence) != nullptr);
   if (bytes > limits::kMaxBlobBytes) {
-    return Error{ErrorKind::bad_input,
-                 fmt::format("{}: {} pixels of {} particles take {} bytes, past the limit of {}",
-                             name, state.num_pixels(), state.num_particles, bytes,
-                             limits::kMaxBlobBytes)};
+    return Error{
+        ErrorKind::bad_input,
+        fmt::format("{}: {} pixels of {} particles take {} bytes, past the limit of {}", name,
+                    state.num_pixels(), state.num_particles, bytes, limits::kMaxBlobBytes)};
   }
   BATON_ASSIGN(const ByteView payload,
                section_payload(file, kSource, state.num_pixels() * populations, name));

@@ -22,8 +22,8 @@ class BlobStore {
   /// damaged one. Errors: past limits::kMaxBlobBytes, the disk.
   Result<Digest> put(ByteView bytes);
 
-  /// Makes all blobs put so far durable, with one wait for the disk. Whoever reports a blob to others
-  /// calls this first.
+  /// Makes all blobs put so far durable, with one wait for the disk. Whoever reports a blob to
+  /// others calls this first.
   Status sync() const;
 
   /// The bytes with this digest. ErrorKind::corrupt names the file, the digest found and the one
@@ -40,7 +40,8 @@ class BlobStore {
   /// Forgets the blob. One that is already gone is a success.
   Status remove(const Digest& digest);
 
-  /// Where workers save a job's document while it runs, so that a failed tile can be replayed alone.
+  /// Where workers save a job's document while it runs, so that a failed tile can be replayed
+  /// alone.
   std::filesystem::path job_file(const Digest& job) const;
 
   /// Where the blob is or would be.

@@ -104,9 +104,9 @@ struct InputsLost {
 /// Time has passed: who was silent for too long?
 struct ClockTicked {};
 
-using Event = std::variant<JobAdded, JobCancelled, JobSuperseded, JobPaused, JobResumed, WorkerJoined, WorkerAlive,
-                           WorkerLeft, WorkRequested, TaskCompleted, AttemptFailed, ResultMissing,
-                           InputsLost, ClockTicked>;
+using Event = std::variant<JobAdded, JobCancelled, JobSuperseded, JobPaused, JobResumed,
+                           WorkerJoined, WorkerAlive, WorkerLeft, WorkRequested, TaskCompleted,
+                           AttemptFailed, ResultMissing, InputsLost, ClockTicked>;
 
 // ---- actions ------------------------------------------------------------------------------------
 /// Make it durable; nothing that comes after in the same or a later step may be sent or removed

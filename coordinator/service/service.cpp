@@ -235,8 +235,8 @@ std::optional<std::string> Service::find_missing_frame(const TaskDone& report) c
   return std::nullopt;
 }
 
-/// The inputs of a leased task that are gone or damaged; none of them where a task that makes them is
-/// being done again meanwhile. nullopt: the inputs are sound.
+/// The inputs of a leased task that are gone or damaged; none of them where a task that makes them
+/// is being done again meanwhile. nullopt: the inputs are sound.
 std::optional<std::vector<BlobRef>> Service::find_bad_inputs(const LeaseId& lease) const {
   std::vector<BlobRef> bad;
   const Scheduler::Job* job = job_of_open_task(lease);

@@ -60,7 +60,8 @@ Status FarmJobRunner::start() {
 Status FarmJobRunner::submit(const JobSpec& job, std::size_t index, std::vector<Open>& open) {
   BATON_ASSIGN(std::string document, make_job_document(job));
   BATON_ASSIGN(const std::optional<JobAccepted> accepted,
-               ask_farm<JobAccepted>(*farm_, *client_, signals_, SubmitJob{std::move(document), /*restart=*/true}));
+               ask_farm<JobAccepted>(*farm_, *client_, signals_,
+                                     SubmitJob{std::move(document), /*restart=*/true}));
   if (!accepted) return stopped();
   open.push_back({index, accepted->job});
   return {};

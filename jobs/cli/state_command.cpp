@@ -54,7 +54,8 @@ Result<StateReport> load_state(const std::string& file) {
   report.file_bytes = bytes.size();
 
   for (std::size_t pixel = 0; pixel < report.state.num_pixels(); ++pixel) {
-    const PixelSource source = report.state.source[pixel * static_cast<std::size_t>(report.state.num_populations)];
+    const PixelSource source =
+        report.state.source[pixel * static_cast<std::size_t>(report.state.num_populations)];
     ++report.sources[static_cast<std::size_t>(source)];
     if (source == PixelSource::background || report.state.num_particles == 0) continue;
     const double ratio = pixel_ess(report.state, pixel) / report.state.num_particles;

@@ -203,10 +203,10 @@ void read_scene(StudyObject& object, const Shared& shared, Study& study, StudyFa
 
 JobSpec job_window(const JobSpec& job, std::vector<int> frames) {
   JobSpec window = job;
-  window.environment.rotation_start_deg = std::remainder(
-      job.environment.rotation_start_deg +
-          job.environment.rotation_deg_per_frame * (frames.front() - job.frames.front()),
-      360.0);
+  window.environment.rotation_start_deg =
+      std::remainder(job.environment.rotation_start_deg + job.environment.rotation_deg_per_frame *
+                                                              (frames.front() - job.frames.front()),
+                     360.0);
   window.frames = std::move(frames);
   return window;
 }

@@ -115,7 +115,8 @@ std::string change(const Cell& cell, const std::string& recorded) {
 Status write_tables(const std::filesystem::path& folder, const std::vector<Cell>& cells,
                     const Expectations& expectations, bool quick) {
   std::string grid =
-      "case,subject,verdict,expected,number,unlawful,negative,bias,bias_interval,lns_mean,lns_mean_interval,"
+      "case,subject,verdict,expected,number,unlawful,negative,bias,bias_interval,lns_mean,lns_mean_"
+      "interval,"
       "lns_median,noise,"
       "noise_after,p999,lost,growth,flicker,ess,acceptance,restarted,refreshed,resampled,"
       "quadrature_error,cpu_seconds,pixel_us\n";
@@ -125,10 +126,26 @@ Status write_tables(const std::filesystem::path& folder, const std::vector<Cell>
     grid += fmt::format("{},{},{},{},{},{}", cell.case_name, cell.subject,
                         to_string(cell.judgement.verdict), expectations.find(cell, quick),
                         cell.judgement.number, n.unlawful);
-    for (const double value :
-         {n.negative, n.bias, n.bias_interval, n.lns_mean, n.lns_mean_interval, n.lns_median, n.noise,
-          n.noise_after, n.tail, n.lost, n.growth, n.flicker, n.ess, n.acceptance, n.restarted,
-          n.refreshed, n.resampled, cell.quadrature_error, cell.cpu_seconds, cell.pixel_us}) {
+    for (const double value : {n.negative,
+                               n.bias,
+                               n.bias_interval,
+                               n.lns_mean,
+                               n.lns_mean_interval,
+                               n.lns_median,
+                               n.noise,
+                               n.noise_after,
+                               n.tail,
+                               n.lost,
+                               n.growth,
+                               n.flicker,
+                               n.ess,
+                               n.acceptance,
+                               n.restarted,
+                               n.refreshed,
+                               n.resampled,
+                               cell.quadrature_error,
+                               cell.cpu_seconds,
+                               cell.pixel_us}) {
       grid += fmt::format(",{:.5g}", value);
     }
     grid += "\n";

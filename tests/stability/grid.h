@@ -17,7 +17,8 @@ struct Cell {
   Summary summary;
   double quadrature_error = 0;
   double cpu_seconds = 0;
-  double pixel_us = 0;  ///< CPU microseconds per pixel with a surface and frame: samples, rays, shade
+  double pixel_us =
+      0;  ///< CPU microseconds per pixel with a surface and frame: samples, rays, shade
 };
 
 /// Runs one case with every subject. stage_folder: for its maps and meshes. Subjects are compared

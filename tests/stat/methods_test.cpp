@@ -1,5 +1,6 @@
-// Every method against brute force on a scene with hard and soft shadow, gloss, metal and silhouettes. Runs (seeds) are
-// independent; pixels and frames of one run are not, so all statistics are taken over runs.
+// Every method against brute force on a scene with hard and soft shadow, gloss, metal and
+// silhouettes. Runs (seeds) are independent; pixels and frames of one run are not, so all
+// statistics are taken over runs.
 #include <fmt/format.h>
 #include <gtest/gtest.h>
 
@@ -32,7 +33,9 @@ JobSpec still_job(Method method) {
   return job;
 }
 
-TEST(Methods, EnvironmentAgreesWithBruteForce) { expect_agreement(still_job(Method::environment), kRuns, 0.05); }
+TEST(Methods, EnvironmentAgreesWithBruteForce) {
+  expect_agreement(still_job(Method::environment), kRuns, 0.05);
+}
 TEST(Methods, BrdfAgreesWithBruteForce) {
   // Rare hits of the sun give the BRDF's samples a heavy tail: a larger sun keeps the z-test valid.
   JobSpec job = still_job(Method::brdf);
@@ -46,13 +49,15 @@ TEST(Methods, CompensatedMisAgreesWithBruteForce) {
   job.sampling.mis_compensation = true;
   expect_agreement(job, kRuns, 0.02);
 }
-TEST(Methods, BidirectionalAgreesWithBruteForce) { expect_agreement(still_job(Method::bidirectional), kRuns, 0.01); }
+TEST(Methods, BidirectionalAgreesWithBruteForce) {
+  expect_agreement(still_job(Method::bidirectional), kRuns, 0.01);
+}
 TEST(Methods, BidirectionalWithFourSitesAgrees) {
   JobSpec job = still_job(Method::bidirectional);
   job.image.sites = 4;
   job.seed = 5;
-  // The sites are part of the seed; compare at equal sites by keeping them out of the silhouettes' way: many runs average
-  // over site positions on both sides.
+  // The sites are part of the seed; compare at equal sites by keeping them out of the silhouettes'
+  // way: many runs average over site positions on both sides.
   const Estimate a = repeat(job, 192);
   JobSpec reference = job;
   reference.sampling.method = Method::reference;
@@ -81,7 +86,9 @@ JobSpec turning_job(int distributions) {
   job.sampling.num_candidates = 256;
   return job;
 }
-TEST(Methods, SequentialAgreesWithBruteForceWhileTheSkyTurns) { expect_agreement(turning_job(5), 96, 0.02); }
+TEST(Methods, SequentialAgreesWithBruteForceWhileTheSkyTurns) {
+  expect_agreement(turning_job(5), 96, 0.02);
+}
 TEST(Methods, SequentialWithOneDistributionAgrees) { expect_agreement(turning_job(1), 96, 0.03); }
 TEST(Methods, SequentialWithFiveMovesAgrees) {
   JobSpec job = turning_job(1);
@@ -104,16 +111,20 @@ JobSpec measured_job(Method method, int frames) {
   job.sampling.num_candidates = 256;
   const MaterialSpec glossy = job.scene.materials["glossy"];
   const std::string file = (test::test_folder() / "glossy.binary").string();
-  test::write_merl(file, test::phong_by_angles(glossy.base_color * glossy.kd, glossy.specular_color * glossy.ks, glossy.exponent));
+  test::write_merl(file, test::phong_by_angles(glossy.base_color * glossy.kd,
+                                               glossy.specular_color * glossy.ks, glossy.exponent));
   job.scene.materials["glossy"] = {.kind = MaterialKind::measured, .file = file};
   return job;
 }
-TEST(Methods, MisOfAMeasuredBrdfAgreesWithBruteForce) { expect_agreement(measured_job(Method::mis, 1), kRuns, 0.02); }
+TEST(Methods, MisOfAMeasuredBrdfAgreesWithBruteForce) {
+  expect_agreement(measured_job(Method::mis, 1), kRuns, 0.02);
+}
 TEST(Methods, SequentialWithAMeasuredBrdfAgreesWithBruteForce) {
   expect_agreement(measured_job(Method::sequential, 4), 96, 0.02);
 }
 TEST(Methods, AMeasuredPhongLooksLikePhong) {
-  const Verdict v = compare(repeat(measured_job(Method::bidirectional, 1), kRuns), judge(still_job(Method::bidirectional), 60000));
+  const Verdict v = compare(repeat(measured_job(Method::bidirectional, 1), kRuns),
+                            judge(still_job(Method::bidirectional), 60000));
   EXPECT_LT(v.worst_pixel, kPixelLimit);
   EXPECT_LT(v.image, kImageLimit);
 }
@@ -126,9 +137,15 @@ JobSpec pool_job(int frames) {
   job.sampling.num_candidates = 64;
   return job;
 }
-TEST(Methods, PoolAgreesWithBruteForceAtItsFirstFrame) { expect_agreement(pool_job(1), 200, kFine); }
-TEST(Methods, PoolAgreesWithBruteForceAfterFiveFrames) { expect_agreement(pool_job(5), 200, kFine); }
-TEST(Methods, PoolAgreesWithBruteForceAfterTwentyFrames) { expect_agreement(pool_job(20), 200, kFine); }
+TEST(Methods, PoolAgreesWithBruteForceAtItsFirstFrame) {
+  expect_agreement(pool_job(1), 200, kFine);
+}
+TEST(Methods, PoolAgreesWithBruteForceAfterFiveFrames) {
+  expect_agreement(pool_job(5), 200, kFine);
+}
+TEST(Methods, PoolAgreesWithBruteForceAfterTwentyFrames) {
+  expect_agreement(pool_job(20), 200, kFine);
+}
 TEST(Methods, PoolAgreesWithBruteForceAfterAHundredFrames) {
   expect_agreement(pool_job(100), 200, kFine);
 }
@@ -136,7 +153,8 @@ TEST(Methods, PoolAgreesWithBruteForceAfterAHundredFrames) {
 TEST(Methods, RatioAgreesWithBruteForceInAGreyScene) {
   JobSpec job = still_job(Method::ratio);
   RgbImage grey = test::sky_map();
-  for (std::size_t i = 0; i < grey.rgb.size(); i += 3) grey.rgb[i + 1] = grey.rgb[i + 2] = grey.rgb[i];
+  for (std::size_t i = 0; i < grey.rgb.size(); i += 3)
+    grey.rgb[i + 1] = grey.rgb[i + 2] = grey.rgb[i];
   job.environment.keys[0].map = test::write_map("grey.exr", grey);
   job.scene.materials["glossy"].base_color = {0.4f, 0.4f, 0.4f};
   job.scene.materials["metal"].base_color = {0.7f, 0.7f, 0.7f};
@@ -151,10 +169,17 @@ JobSpec restir_job(int frames, int neighbors) {
   job.sampling.neighbor_radius = 4;
   return job;
 }
-TEST(Methods, RestirAgreesWithBruteForceAfterFiveFrames) { expect_agreement(restir_job(5, 0), 200, 0.01); }
-// Errors stay: what twenty frames see is hardly more than what their first ones saw, so less can be told.
-TEST(Methods, RestirAgreesWithBruteForceAfterTwentyFrames) { expect_agreement(restir_job(20, 0), 200, 0.02); }
-TEST(Methods, RestirWithTwoNeighborsAgreesWithBruteForce) { expect_agreement(restir_job(5, 2), 200, 0.01); }
+TEST(Methods, RestirAgreesWithBruteForceAfterFiveFrames) {
+  expect_agreement(restir_job(5, 0), 200, 0.01);
+}
+// Errors stay: what twenty frames see is hardly more than what their first ones saw, so less can be
+// told.
+TEST(Methods, RestirAgreesWithBruteForceAfterTwentyFrames) {
+  expect_agreement(restir_job(20, 0), 200, 0.02);
+}
+TEST(Methods, RestirWithTwoNeighborsAgreesWithBruteForce) {
+  expect_agreement(restir_job(5, 2), 200, 0.01);
+}
 /// Samples turn with a small sun, and the lattice rounds them in each frame.
 JobSpec sunny_job(int frames, double deg_per_frame) {
   JobSpec job = restir_job(frames, 0);
@@ -163,7 +188,9 @@ JobSpec sunny_job(int frames, double deg_per_frame) {
   return job;
 }
 TEST(Methods, RestirAgreesWhileASmallSunTurns) { expect_agreement(sunny_job(20, 0.5), 200, 0.01); }
-TEST(Methods, RestirAgreesWhileASmallSunCreeps) { expect_agreement(sunny_job(20, 0.07), 200, 0.01); }
+TEST(Methods, RestirAgreesWhileASmallSunCreeps) {
+  expect_agreement(sunny_job(20, 0.07), 200, 0.01);
+}
 // Directions stay: rounded into another texel, they would change their light.
 TEST(Methods, RestirUnderATurningNearestMapAgrees) {
   JobSpec job = restir_job(5, 0);
@@ -192,7 +219,9 @@ JobSpec crowded_job(bool reuse_visibility) {
   job.sampling.reuse_visibility = reuse_visibility;
   return job;
 }
-TEST(Methods, RestirAmongEightNeighborsAgreesWithBruteForce) { expect_agreement(crowded_job(false), kRuns, 0.01); }
+TEST(Methods, RestirAmongEightNeighborsAgreesWithBruteForce) {
+  expect_agreement(crowded_job(false), kRuns, 0.01);
+}
 // What is labelled biased is seen to be: neighbours forget directions that are free here.
 TEST(Methods, NeighborsThatCarryFreeSamplesAreBiased) {
   const Verdict v = compare(repeat(crowded_job(true), kRuns), judge(crowded_job(true), 60000));
@@ -205,7 +234,8 @@ JobSpec changing_job(const std::vector<std::pair<int, std::string>>& maps, int f
   job.environment.rotation_deg_per_frame = 0;
   job.environment.interpolate = false;
   job.environment.keys.clear();
-  for (const auto& [frame, map] : maps) job.environment.keys.push_back({.frame = static_cast<double>(frame), .map = map});
+  for (const auto& [frame, map] : maps)
+    job.environment.keys.push_back({.frame = static_cast<double>(frame), .map = map});
   return job;
 }
 TEST(Methods, PoolAgreesAfterACut) {
@@ -215,9 +245,10 @@ TEST(Methods, PoolAgreesAfterACut) {
   expect_agreement(changing_job({{1, white}, {4, sky}, {5, white}}, 6), 200, kFine);
 }
 TEST(Methods, RestirAgreesAfterACut) {
-  JobSpec job = changing_job({{1, test::write_map("white.exr", test::constant_map(64, 32, {1, 1, 1}))},
-                              {4, test::write_map("sky.exr", test::sky_map())}},
-                             4);
+  JobSpec job =
+      changing_job({{1, test::write_map("white.exr", test::constant_map(64, 32, {1, 1, 1}))},
+                    {4, test::write_map("sky.exr", test::sky_map())}},
+                   4);
   job.sampling.method = Method::restir;
   expect_agreement(job, 200, 0.01);
 }
@@ -267,7 +298,8 @@ TEST(Methods, PlantedFaultIsSeen) {
   EXPECT_GT(v.image, kImageLimit);
   EXPECT_GT(v.worst_pixel, kPixelLimit);
 }
-// ... and a sequential sampler whose Lns is off by 4 % (a scaled sky after frame 1 stands in for it).
+// ... and a sequential sampler whose Lns is off by 4 % (a scaled sky after frame 1 stands in for
+// it).
 TEST(Methods, PlantedFaultInTheSequenceIsSeen) {
   JobSpec wrong = turning_job(5);
   wrong.environment.scale = 1.04f;
@@ -277,12 +309,14 @@ TEST(Methods, PlantedFaultInTheSequenceIsSeen) {
 
 // Furnace: a white sky of radiance 1 over a Lambertian ground of albedo a reflects exactly a.
 TEST(Furnace, LambertReflectsItsAlbedo) {
-  for (const Method method : {Method::environment, Method::brdf, Method::mis, Method::bidirectional, Method::sequential, Method::pool,
-                              Method::ratio, Method::restir}) {
+  for (const Method method : {Method::environment, Method::brdf, Method::mis, Method::bidirectional,
+                              Method::sequential, Method::pool, Method::ratio, Method::restir}) {
     JobSpec job = still_job(method);
     job.scene.objects.clear();
-    job.camera = {.position = {0, 5, 0.1f}, .look_at = {0, 0, 0}, .up = {0, 0, -1}, .vertical_fov_deg = 20};
-    job.environment.keys[0].map = test::write_map("white.exr", test::constant_map(16, 8, {1, 1, 1}));
+    job.camera = {
+        .position = {0, 5, 0.1f}, .look_at = {0, 0, 0}, .up = {0, 0, -1}, .vertical_fov_deg = 20};
+    job.environment.keys[0].map =
+        test::write_map("white.exr", test::constant_map(16, 8, {1, 1, 1}));
     job.sampling.num_candidates = 800;
     const std::vector<double> pixels = mean_rgb(render_tile(job).films.back());
     double mean = 0;
@@ -296,7 +330,8 @@ TEST(Furnace, NoMaterialCreatesEnergy) {
     job.scene.materials["ground"] = job.scene.materials[material];
     job.scene.materials["ground"].base_color = {1, 1, 1};
     job.scene.objects.clear();
-    job.environment.keys[0].map = test::write_map("white.exr", test::constant_map(16, 8, {1, 1, 1}));
+    job.environment.keys[0].map =
+        test::write_map("white.exr", test::constant_map(16, 8, {1, 1, 1}));
     job.sampling.num_candidates = 4000;
     job.camera.look_at = {0, -2, 0};
     const test::TileResult result = render_tile(job);

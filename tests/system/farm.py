@@ -5,9 +5,11 @@ import contextlib
 import json
 import math
 import os
+import random
 import re
 import shutil
 import signal
+import socket
 import struct
 import subprocess
 import sys
@@ -283,12 +285,15 @@ class Farm:
 
 
 def free_port():
-    """A TCP port that nobody listens on at this moment."""
-    import socket
+    """A TCP port that nobody listens on at this moment, and that the system gives to nobody by itself.
 
-    with socket.socket() as probe:
-        probe.bind(("127.0.0.1", 0))
-        return probe.getsockname()[1]
+    A coordinator that was killed and comes back would otherwise find another test's in its place.
+    """
+    while True:
+        port = random.SystemRandom().randrange(10000, 32000)
+        with socket.socket() as probe, contextlib.suppress(OSError):
+            probe.bind(("127.0.0.1", port))
+            return port
 
 
 # ---- a test script ------------------------------------------------------------------------------------------

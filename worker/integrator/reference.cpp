@@ -32,9 +32,10 @@ Rgb weighted_radiance(const Site& site, const Environment& environment, const Ve
 
 }  // namespace
 
-ReferenceEstimate ReferenceRenderer::render(std::span<const SurfaceHit> surfaces, const Environment& environment,
-                                            std::int32_t num_samples, const RngKey& key, ShadowRays& rays,
-                                            std::uint64_t& rays_traced) const {
+ReferenceEstimate ReferenceRenderer::render(std::span<const SurfaceHit> surfaces,
+                                            const Environment& environment,
+                                            std::int32_t num_samples, const RngKey& key,
+                                            ShadowRays& rays, std::uint64_t& rays_traced) const {
   const Rng rng(key, PassId::reference);
   std::array<double, 3> sum{};
   double sum_lns = 0;
@@ -52,11 +53,13 @@ ReferenceEstimate ReferenceRenderer::render(std::span<const SurfaceHit> surfaces
       const auto step = static_cast<std::uint32_t>(first + pair);
       const auto u = rng.uniforms(step, 0);
       const auto v = rng.uniforms(step, 1);
-      const SurfaceHit& hit = surfaces[static_cast<std::size_t>(u[0] * static_cast<float>(surfaces.size()))];
+      const SurfaceHit& hit =
+          surfaces[static_cast<std::size_t>(u[0] * static_cast<float>(surfaces.size()))];
       if (!hit.hit) continue;
       const Site site{hit.point, materials_[hit.material]};
       const Vec3 origin = hit.ray_origin;
-      for (const Vec3& wi : {environment.sample({u[1], u[2]}), sample_bsdf(site.material, site.point, {v[0], v[1], v[2]})}) {
+      for (const Vec3& wi : {environment.sample({u[1], u[2]}),
+                             sample_bsdf(site.material, site.point, {v[0], v[1], v[2]})}) {
         const Rgb value = weighted_radiance(site, environment, wi);
         if (!(mean(value) > 0)) continue;
         rays.push(origin, wi);
@@ -85,8 +88,10 @@ ReferenceEstimate ReferenceRenderer::render(std::span<const SurfaceHit> surfaces
 
   const double n = num_samples;
   const double mean_radiance = sum_mean / n;
-  const double variance = std::max(sum_mean_squared / n - mean_radiance * mean_radiance, 0.0) / std::max(n - 1, 1.0);
-  return {.radiance = {static_cast<float>(sum[0] / n), static_cast<float>(sum[1] / n), static_cast<float>(sum[2] / n)},
+  const double variance =
+      std::max(sum_mean_squared / n - mean_radiance * mean_radiance, 0.0) / std::max(n - 1, 1.0);
+  return {.radiance = {static_cast<float>(sum[0] / n), static_cast<float>(sum[1] / n),
+                       static_cast<float>(sum[2] / n)},
           .lns = static_cast<float>(sum_lns / n),
           .visibility = sum_lns > 0 ? static_cast<float>(sum_mean / sum_lns) : 0.0f,
           .mean_variance = static_cast<float>(variance)};

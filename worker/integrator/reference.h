@@ -11,21 +11,25 @@ namespace baton {
 
 /// Brute-force estimate of one pixel with its own error.
 struct ReferenceEstimate {
-  Rgb radiance;               ///< mean over the sites of the reflected, shadowed radiance
-  float lns = 0;              ///< the same without shadows, mean over RGB
-  float visibility = 0;       ///< share of the unshadowed light that arrives, mean over RGB; 0 without light
-  float mean_variance = 0;    ///< squared standard error of mean(radiance)
+  Rgb radiance;   ///< mean over the sites of the reflected, shadowed radiance
+  float lns = 0;  ///< the same without shadows, mean over RGB
+  float visibility =
+      0;  ///< share of the unshadowed light that arrives, mean over RGB; 0 without light
+  float mean_variance = 0;  ///< squared standard error of mean(radiance)
 };
 
-/// The judge of all methods: `num_samples` independent pairs of one environment and one BRDF sample under the balance
-/// heuristic, each pair at a site drawn uniformly, plain random numbers, scalar code and exact directions throughout; it
-/// shares nothing with the SIMD kernels but the ray tracer. surfaces: the pixel's sites (1 to 16), some may see nothing.
+/// The judge of all methods: `num_samples` independent pairs of one environment and one BRDF sample
+/// under the balance heuristic, each pair at a site drawn uniformly, plain random numbers, scalar
+/// code and exact directions throughout; it shares nothing with the SIMD kernels but the ray
+/// tracer. surfaces: the pixel's sites (1 to 16), some may see nothing.
 class ReferenceRenderer {
  public:
-  ReferenceRenderer(const Accel& accel, std::span<const Material> materials) : accel_(accel), materials_(materials) {}
+  ReferenceRenderer(const Accel& accel, std::span<const Material> materials)
+      : accel_(accel), materials_(materials) {}
   /// rays: scratch, reused. Returns the number of shadow rays in rays_traced.
-  ReferenceEstimate render(std::span<const SurfaceHit> surfaces, const Environment& environment, std::int32_t num_samples,
-                           const RngKey& key, ShadowRays& rays, std::uint64_t& rays_traced) const;
+  ReferenceEstimate render(std::span<const SurfaceHit> surfaces, const Environment& environment,
+                           std::int32_t num_samples, const RngKey& key, ShadowRays& rays,
+                           std::uint64_t& rays_traced) const;
 
  private:
   const Accel& accel_;

@@ -21,8 +21,8 @@ HWY_BEFORE_NAMESPACE();
 namespace baton::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-/// Reflected radiance (f cos L) per channel. A lane's value is the same to the bit whatever surfaces
-/// the other lanes see: which those are depends, in the second pass, on the tiling.
+/// Reflected radiance (f cos L) per channel. A lane's value is the same to the bit whatever
+/// surfaces the other lanes see: which those are depends, in the second pass, on the tiling.
 HWY_INLINE Vec3Lanes ReflectedRadiance(const SurfaceLanes& s, const BsdfLanes& f, VF r, VF g,
                                        VF b) {
   if (!s.any_lobe) {

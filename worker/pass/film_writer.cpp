@@ -5,19 +5,32 @@ namespace {
 
 std::vector<std::string> channel_names(Aov aov) {
   switch (aov) {
-    case Aov::lns: return {"lns"};
-    case Aov::visibility: return {"visibility"};
-    case Aov::ess: return {"ess"};
-    case Aov::acceptance: return {"acceptance"};
-    case Aov::source: return {"source.R", "source.G", "source.B"};
-    case Aov::normal: return {"normal.X", "normal.Y", "normal.Z"};
-    case Aov::depth: return {"depth"};
-    case Aov::variance: return {"variance"};
-    case Aov::mask: return {"mask"};
-    case Aov::acceptance_local: return {"acceptance.local"};
-    case Aov::acceptance_independent: return {"acceptance.independent"};
-    case Aov::resampled: return {"resampled"};
-    case Aov::material: return {"material"};
+    case Aov::lns:
+      return {"lns"};
+    case Aov::visibility:
+      return {"visibility"};
+    case Aov::ess:
+      return {"ess"};
+    case Aov::acceptance:
+      return {"acceptance"};
+    case Aov::source:
+      return {"source.R", "source.G", "source.B"};
+    case Aov::normal:
+      return {"normal.X", "normal.Y", "normal.Z"};
+    case Aov::depth:
+      return {"depth"};
+    case Aov::variance:
+      return {"variance"};
+    case Aov::mask:
+      return {"mask"};
+    case Aov::acceptance_local:
+      return {"acceptance.local"};
+    case Aov::acceptance_independent:
+      return {"acceptance.independent"};
+    case Aov::resampled:
+      return {"resampled"};
+    case Aov::material:
+      return {"material"};
   }
   return {};
 }
@@ -26,11 +39,16 @@ std::vector<std::string> channel_names(Aov aov) {
 
 Rgb source_color(PixelSource source) {
   switch (source) {
-    case PixelSource::background: return {0, 0, 0};
-    case PixelSource::fresh: return {1, 0, 0};
-    case PixelSource::carried: return {0, 1, 0};
-    case PixelSource::restarted: return {1, 1, 0};
-    case PixelSource::refreshed: return {0, 0, 1};
+    case PixelSource::background:
+      return {0, 0, 0};
+    case PixelSource::fresh:
+      return {1, 0, 0};
+    case PixelSource::carried:
+      return {0, 1, 0};
+    case PixelSource::restarted:
+      return {1, 1, 0};
+    case PixelSource::refreshed:
+      return {0, 0, 1};
   }
   return {};
 }
@@ -56,19 +74,45 @@ void FilmWriter::write(std::size_t index, const PixelResult& pixel) {
   put(pixel.alpha);
   for (const Aov aov : aovs_) {
     switch (aov) {
-      case Aov::lns: put(pixel.lns); break;
-      case Aov::visibility: put(pixel.visibility); break;
-      case Aov::ess: put(pixel.ess_ratio); break;
-      case Aov::acceptance: put(pixel.acceptance); break;
-      case Aov::source: put_vec(source_color(pixel.source)); break;
-      case Aov::normal: put_vec(pixel.normal); break;
-      case Aov::depth: put(pixel.depth); break;
-      case Aov::variance: put(pixel.variance); break;
-      case Aov::mask: put(pixel.mask); break;
-      case Aov::acceptance_local: put(pixel.acceptance_local); break;
-      case Aov::acceptance_independent: put(pixel.acceptance_independent); break;
-      case Aov::resampled: put(pixel.resampled ? 1.0f : 0.0f); break;
-      case Aov::material: put(static_cast<float>(pixel.material)); break;
+      case Aov::lns:
+        put(pixel.lns);
+        break;
+      case Aov::visibility:
+        put(pixel.visibility);
+        break;
+      case Aov::ess:
+        put(pixel.ess_ratio);
+        break;
+      case Aov::acceptance:
+        put(pixel.acceptance);
+        break;
+      case Aov::source:
+        put_vec(source_color(pixel.source));
+        break;
+      case Aov::normal:
+        put_vec(pixel.normal);
+        break;
+      case Aov::depth:
+        put(pixel.depth);
+        break;
+      case Aov::variance:
+        put(pixel.variance);
+        break;
+      case Aov::mask:
+        put(pixel.mask);
+        break;
+      case Aov::acceptance_local:
+        put(pixel.acceptance_local);
+        break;
+      case Aov::acceptance_independent:
+        put(pixel.acceptance_independent);
+        break;
+      case Aov::resampled:
+        put(pixel.resampled ? 1.0f : 0.0f);
+        break;
+      case Aov::material:
+        put(static_cast<float>(pixel.material));
+        break;
     }
   }
 }

@@ -11,23 +11,27 @@ namespace baton {
 
 /// All that is known of a finished pixel.
 struct PixelResult {
-  Rgb radiance;           ///< reflected and background light, mean over the sites
-  float alpha = 0;        ///< share of the sites that see a surface
+  Rgb radiance;     ///< reflected and background light, mean over the sites
+  float alpha = 0;  ///< share of the sites that see a surface
   float lns = 0;
-  float visibility = 0;   ///< share of the weight whose rays are free
-  float ess_ratio = 0;    ///< ESS / N
-  float acceptance = 0;   ///< accepted moves / proposed moves
-  float acceptance_local = 0, acceptance_independent = 0;  ///< the same by kind of move, 0 without any
+  float visibility = 0;  ///< share of the weight whose rays are free
+  float ess_ratio = 0;   ///< ESS / N
+  float acceptance = 0;  ///< accepted moves / proposed moves
+  float acceptance_local = 0,
+        acceptance_independent = 0;  ///< the same by kind of move, 0 without any
   bool resampled = false;
   PixelSource source = PixelSource::background;
-  Vec3 normal;            ///< mean shading normal of the sites that see a surface
-  float depth = 0;        ///< mean distance of the sites that see a surface
-  float mask = 0.5f;      ///< 1 all rays free, 0 some failed, 0.5 background [CV Fig. 2]
-  std::uint32_t material = 0;  ///< of the first site that sees a surface: index in the scene + 1; 0: none
-  float variance = 0;     ///< estimated squared error of the mean over RGB; 0 where the method has no estimate
+  Vec3 normal;        ///< mean shading normal of the sites that see a surface
+  float depth = 0;    ///< mean distance of the sites that see a surface
+  float mask = 0.5f;  ///< 1 all rays free, 0 some failed, 0.5 background [CV Fig. 2]
+  std::uint32_t material =
+      0;  ///< of the first site that sees a surface: index in the scene + 1; 0: none
+  float variance =
+      0;  ///< estimated squared error of the mean over RGB; 0 where the method has no estimate
 };
 
-/// Pass: writes pixels into the channels that the job asked for: R, G, B, A, then the AOVs in their order.
+/// Pass: writes pixels into the channels that the job asked for: R, G, B, A, then the AOVs in their
+/// order.
 class FilmWriter {
  public:
   FilmWriter(const PixelRect& rect, const std::vector<Aov>& aovs);
@@ -40,7 +44,8 @@ class FilmWriter {
   std::vector<Aov> aovs_;
 };
 
-/// False colour of a pixel's source: green carried, red fresh, yellow restarted, blue refreshed, black background.
+/// False colour of a pixel's source: green carried, red fresh, yellow restarted, blue refreshed,
+/// black background.
 Rgb source_color(PixelSource source);
 
 }  // namespace baton

@@ -22,8 +22,7 @@ MaskedSurfaces::MaskedSurfaces(const RenderContext& context, const FrameGeometry
   table_.reserve(hits_.size());
   for (const SurfaceHit& hit : hits_) {
     if (hit.hit) {
-      table_.add(hit.point, context.scene->materials[hit.material],
-                 hit.ray_origin);
+      table_.add(hit.point, context.scene->materials[hit.material], hit.ray_origin);
     } else {
       table_.add_nothing();
     }

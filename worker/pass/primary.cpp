@@ -20,7 +20,8 @@ std::array<float, 2> site_position(std::int32_t site, std::int32_t side, float u
 
 TileSurfaces trace_primary(const JobSpec& job, const FrameGeometry& geometry,
                            const PixelRect& rect) {
-  TileSurfaces surfaces{.rect = rect, .num_sites = job.image.sites, .hits = {}, .rays = {}, .first_site = {}};
+  TileSurfaces surfaces{
+      .rect = rect, .num_sites = job.image.sites, .hits = {}, .rays = {}, .first_site = {}};
   surfaces.rays.reserve(static_cast<std::size_t>(rect.area() * job.image.sites));
   for (std::int32_t y = rect.y0; y < rect.y1; ++y) {
     for (std::int32_t x = rect.x0; x < rect.x1; ++x) {

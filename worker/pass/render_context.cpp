@@ -24,13 +24,15 @@ std::vector<PixelSetting> make_own_settings(const JobSpec& job) {
 
 }  // namespace
 
-Result<std::shared_ptr<const RenderContext>> load_render_context(const JobSpec& job, const Digest& job_digest) {
+Result<std::shared_ptr<const RenderContext>> load_render_context(const JobSpec& job,
+                                                                 const Digest& job_digest) {
   BATON_ASSIGN(const auto assets, load_shared_assets(job));
   return make_render_context(job, job_digest, assets);
 }
 
-Result<std::shared_ptr<const RenderContext>> make_render_context(const JobSpec& job, const Digest& job_digest,
-                                                                 const std::shared_ptr<const SharedAssets>& assets) {
+Result<std::shared_ptr<const RenderContext>> make_render_context(
+    const JobSpec& job, const Digest& job_digest,
+    const std::shared_ptr<const SharedAssets>& assets) {
   BATON_TRY(check_settled(job));
   auto context = std::make_shared<RenderContext>();
   context->job = job;
@@ -42,7 +44,8 @@ Result<std::shared_ptr<const RenderContext>> make_render_context(const JobSpec& 
   context->sampler = make_pixel_sampler(population_spec(job));
   context->own_settings = make_own_settings(job);
   context->scene = std::shared_ptr<const Scene>(assets, &assets->scene);
-  context->geometry = std::make_unique<GeometrySequence>(context->job, *context->scene, assets->accel);
+  context->geometry =
+      std::make_unique<GeometrySequence>(context->job, *context->scene, assets->accel);
   return std::shared_ptr<const RenderContext>(std::move(context));
 }
 
@@ -57,7 +60,9 @@ void RenderContext::gather_sites(std::span<const SurfaceHit> hits, SiteBlock& si
   }
 }
 
-std::vector<std::string> repair_notes(const RenderContext& context) { return context.lights->repair_notes(); }
+std::vector<std::string> repair_notes(const RenderContext& context) {
+  return context.lights->repair_notes();
+}
 
 std::string instruction_set() { return kernels::instruction_set(); }
 

@@ -17,18 +17,21 @@
 
 namespace baton {
 
-/// Everything about a job that its tiles share: scene, ray tracer, maps, the environments of its frames. Loaded once
-/// per job and process; any number of threads may render with it.
+/// Everything about a job that its tiles share: scene, ray tracer, maps, the environments of its
+/// frames. Loaded once per job and process; any number of threads may render with it.
 class RenderContext;
 struct SharedAssets;
 
-/// Loads every asset of the job. Errors name the file and what was expected; several faults are joined by newlines.
-Result<std::shared_ptr<const RenderContext>> load_render_context(const JobSpec& job, const Digest& job_digest);
+/// Loads every asset of the job. Errors name the file and what was expected; several faults are
+/// joined by newlines.
+Result<std::shared_ptr<const RenderContext>> load_render_context(const JobSpec& job,
+                                                                 const Digest& job_digest);
 
-/// The same with assets that are loaded already (worker/pass/shared_assets.h): those of the job's scene. Error: motion
-/// that is not settled.
-Result<std::shared_ptr<const RenderContext>> make_render_context(const JobSpec& job, const Digest& job_digest,
-                                                                 const std::shared_ptr<const SharedAssets>& assets);
+/// The same with assets that are loaded already (worker/pass/shared_assets.h): those of the job's
+/// scene. Error: motion that is not settled.
+Result<std::shared_ptr<const RenderContext>> make_render_context(
+    const JobSpec& job, const Digest& job_digest,
+    const std::shared_ptr<const SharedAssets>& assets);
 
 /// Where the finished frames of a tile run go, in frame order. Called on the rendering thread.
 struct TileRunSink {
@@ -43,14 +46,17 @@ struct TileRunSink {
 
 using StatePtr = std::shared_ptr<const SampleState>;
 
-/// Renders one tile for the frames of `run`. previous: the states of frame run.first_frame - 1 of all tiles within
-/// history_reach_px (TileGrid::tiles_near, in that order; the tile's own where pixels keep to themselves), required exactly when
-/// the job carries state and the run is not the first. The bytes that reach the sink are a function of (job, run,
-/// previous) alone. Errors: a state of another job, tile or frame; cancelled when `stop` is requested; the sink's own.
-Result<RenderStats> run_tile(const RenderContext& context, const TileRun& run, std::span<const StatePtr> previous,
-                             const TileRunSink& sink, std::stop_token stop);
+/// Renders one tile for the frames of `run`. previous: the states of frame run.first_frame - 1 of
+/// all tiles within history_reach_px (TileGrid::tiles_near, in that order; the tile's own where
+/// pixels keep to themselves), required exactly when the job carries state and the run is not the
+/// first. The bytes that reach the sink are a function of (job, run, previous) alone. Errors: a
+/// state of another job, tile or frame; cancelled when `stop` is requested; the sink's own.
+Result<RenderStats> run_tile(const RenderContext& context, const TileRun& run,
+                             std::span<const StatePtr> previous, const TileRunSink& sink,
+                             std::stop_token stop);
 
-/// Texels of the job's maps that were set to 0 because they were negative, NaN or infinite; one line per map read so far.
+/// Texels of the job's maps that were set to 0 because they were negative, NaN or infinite; one
+/// line per map read so far.
 std::vector<std::string> repair_notes(const RenderContext& context);
 
 /// Name of the SIMD instruction set in use, e.g. "AVX2".

@@ -35,8 +35,8 @@ Result<BlobRef> write_frame(const JobSpec& job, const Digest& job_digest, std::i
 /// pixel.
 Status verify_frame(const std::filesystem::path& path, const FilmTile& image, std::int32_t block);
 
-/// The header attributes that Baton adds to its pictures: what they are made from, and the job's own
-/// metadata as baton:metadata:NAME.
+/// The header attributes that Baton adds to its pictures: what they are made from, and the job's
+/// own metadata as baton:metadata:NAME.
 ImageMetadata frame_metadata(const JobSpec& job, const Digest& job_digest, int frame_number);
 
 }  // namespace baton

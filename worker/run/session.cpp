@@ -68,8 +68,8 @@ void Session::on(const TaskEnded& event, TimePoint now, Actions& actions) {
 
   // Report, unless the task was given up.
   if (event.result) {
-    reports_.push_back(TaskDone{event.lease, event.result->outputs, event.result->stats,
-                                event.result->frames});
+    reports_.push_back(
+        TaskDone{event.lease, event.result->outputs, event.result->stats, event.result->frames});
   } else if (event.result.error().kind != ErrorKind::cancelled) {
     const Error& error = event.result.error();
     reports_.push_back(TaskFailed{event.lease, error.message, is_permanent(error.kind)});

@@ -75,7 +75,8 @@ class NoteLog {
   std::set<std::string> seen_;
 };
 
-/// What loading a job may take, the wait for its document and for another thread's loading included.
+/// What loading a job may take, the wait for its document and for another thread's loading
+/// included.
 constexpr std::chrono::minutes kLoadPatience{15};
 
 /// Runs a task on a render thread. The command that repeats it stands in its error message and,
@@ -191,7 +192,11 @@ class Worker {
   void end_overdue_tasks() {
     for (const LeaseId& lease : watch_.take_overdue(now())) {
       pool_.stop(lease);
-      EndedTask ended{lease, Error{ErrorKind::timeout, "ran for longer than maxSecondsPerTask, or loaded its job for a quarter of an hour"}};
+      EndedTask ended{
+          lease,
+          Error{
+              ErrorKind::timeout,
+              "ran for longer than maxSecondsPerTask, or loaded its job for a quarter of an hour"}};
       log_failure(ended);
       step(TaskEnded{ended.lease, std::move(ended.result)});
     }

@@ -1,4 +1,5 @@
-// The materials in SIMD: material.h for a vector of (site, direction) pairs. Included once per Highway target.
+// The materials in SIMD: material.h for a vector of (site, direction) pairs. Included once per
+// Highway target.
 #if defined(BATON_WORKER_SCENE_BSDF_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef BATON_WORKER_SCENE_BSDF_INL_H_
 #undef BATON_WORKER_SCENE_BSDF_INL_H_
@@ -47,7 +48,8 @@ HWY_INLINE VF LookUp(const SiteBlock::Array& table, VI site, int num_sites) {
 
 template <class Read>
 HWY_INLINE SurfaceLanes ReadSurfaces(const SiteBlock& b, VI site, const Read& read) {
-  const auto vec = [&](const SiteBlock::Array& x, const SiteBlock::Array& y, const SiteBlock::Array& z) HWY_ATTR {
+  const auto vec = [&](const SiteBlock::Array& x, const SiteBlock::Array& y,
+                       const SiteBlock::Array& z) HWY_ATTR {
     return Vec3Lanes{read(x), read(y), read(z)};
   };
   SurfaceLanes s;
@@ -97,17 +99,22 @@ HWY_INLINE void SetViewTerms(SurfaceLanes& s) {
 /// One site for all lanes.
 HWY_INLINE SurfaceLanes LoadSurface(const SiteBlock& b, std::size_t site) {
   const VI all = hn::Set(DI(), static_cast<std::int32_t>(site));
-  return ReadSurfaces(b, all, [site](const SiteBlock::Array& table) HWY_ATTR { return hn::Set(DF(), table[site]); });
+  return ReadSurfaces(b, all, [site](const SiteBlock::Array& table) HWY_ATTR {
+    return hn::Set(DF(), table[site]);
+  });
 }
 
 /// A site per lane.
 HWY_INLINE SurfaceLanes LoadSurfaces(const SiteBlock& b, VI site) {
   if (b.num_sites == 1) return LoadSurface(b, 0);
-  return ReadSurfaces(b, site, [&](const SiteBlock::Array& table) HWY_ATTR { return LookUp(table, site, b.num_sites); });
+  return ReadSurfaces(b, site, [&](const SiteBlock::Array& table) HWY_ATTR {
+    return LookUp(table, site, b.num_sites);
+  });
 }
 
-/// f_c = diffuse * kd_c + lobe * ks_c + white (+ measured_c where there are tables), with the cosine to the shading normal; all 0 below either horizon.
-/// The densities (1/sr) of sampling by the cosine and by the lobe; lobe_pdf is 0 where there is no lobe.
+/// f_c = diffuse * kd_c + lobe * ks_c + white (+ measured_c where there are tables), with the
+/// cosine to the shading normal; all 0 below either horizon. The densities (1/sr) of sampling by
+/// the cosine and by the lobe; lobe_pdf is 0 where there is no lobe.
 struct BsdfLanes {
   VF diffuse, lobe, white, cosine, cosine_pdf, lobe_pdf;
   Vec3Lanes measured;
@@ -156,7 +163,8 @@ HWY_INLINE BsdfLanes EvaluateBsdf(const SurfaceLanes& s, const Vec3Lanes& wi) {
     const VF l2 = hn::Max(Dot(h, h), hn::Set(d, 1e-20f));
     const VF n_h = Dot(s.ns, h);
     const VF o_h = hn::Clamp(hn::Mul(Dot(s.wo, h), hn::Div(one, hn::Sqrt(l2))), zero, one);
-    // D [Walter et al. 2007], with the sine from the cross product so that sharp lobes keep their digits.
+    // D [Walter et al. 2007], with the sine from the cross product so that sharp lobes keep their
+    // digits.
     const VF cx = hn::MulSub(s.ns.y, h.z, hn::Mul(s.ns.z, h.y));
     const VF cy = hn::MulSub(s.ns.z, h.x, hn::Mul(s.ns.x, h.z));
     const VF cz = hn::MulSub(s.ns.x, h.y, hn::Mul(s.ns.y, h.x));
@@ -166,7 +174,8 @@ HWY_INLINE BsdfLanes EvaluateBsdf(const SurfaceLanes& s, const Vec3Lanes& wi) {
     // Smith's masking [Heitz 2014]: (1 + Lambda_o + Lambda_i) n.wi without a division.
     const VF c = hn::Clamp(n_wi, hn::Set(d, 1e-6f), one);
     const VF slope = hn::Sqrt(hn::MulAdd(hn::NegMulAdd(c, c, one), s.alpha2, hn::Mul(c, c)));
-    const VF masking = hn::MulAdd(c, hn::Sub(s.view_masking, hn::Set(d, 0.5f)), hn::Mul(hn::Set(d, 0.5f), slope));
+    const VF masking =
+        hn::MulAdd(c, hn::Sub(s.view_masking, hn::Set(d, 0.5f)), hn::Mul(hn::Set(d, 0.5f), slope));
     // f / F = D G2 / (4 n.wi n.wo); the density is D G1(wo) / (4 n.wo).
     const VF numerator = hn::IfThenElseZero(
         hn::Gt(n_h, zero), hn::Mul(hn::Mul(l2, l2), hn::Mul(s.alpha2, hn::Set(d, 0.25f * kInvPi))));
@@ -186,13 +195,14 @@ HWY_INLINE BsdfLanes EvaluateBsdf(const SurfaceLanes& s, const Vec3Lanes& wi) {
   return out;
 }
 
-/// A direction around the surface per lane: from the lobe with `specular_probability`, else from the cosine. u0, u1
-/// uniform in [0, 1).
+/// A direction around the surface per lane: from the lobe with `specular_probability`, else from
+/// the cosine. u0, u1 uniform in [0, 1).
 HWY_INLINE Vec3Lanes SampleBsdf(const SurfaceLanes& s, VF specular_probability, VF u0, VF u1) {
   const DF d;
   const VF zero = hn::Zero(d);
   const VF one = hn::Set(d, 1.0f);
-  // One stretch of u0 chooses the lobe, the position within it samples the lobe: well spread points stay so.
+  // One stretch of u0 chooses the lobe, the position within it samples the lobe: well spread points
+  // stay so.
   const MF specular = hn::Lt(u0, specular_probability);
   const VF below = hn::Div(u0, hn::Max(specular_probability, hn::Set(d, 1e-20f)));
   const VF over = hn::Div(hn::Sub(u0, specular_probability),
@@ -207,7 +217,8 @@ HWY_INLINE Vec3Lanes SampleBsdf(const SurfaceLanes& s, VF specular_probability, 
   Vec3Lanes w = FrameToWorld(s.ns, {hn::Mul(radius, cosine), hn::Mul(radius, sine), height});
 
   if (s.any_phong && !hn::AllFalse(d, specular)) {
-    const VF z = ExpLanes(hn::Div(LogLanes(hn::Max(hn::Sub(one, u), hn::Set(d, 1e-30f))), hn::Add(s.shape, one)));
+    const VF z = ExpLanes(
+        hn::Div(LogLanes(hn::Max(hn::Sub(one, u), hn::Set(d, 1e-30f))), hn::Add(s.shape, one)));
     const VF r = hn::Sqrt(hn::Max(hn::NegMulAdd(z, z, one), zero));
     w = Select(specular, FrameToWorld(s.mirror, {hn::Mul(r, cosine), hn::Mul(r, sine), z}), w);
   }
@@ -220,7 +231,8 @@ HWY_INLINE Vec3Lanes SampleBsdf(const SurfaceLanes& s, VF specular_probability, 
     const VF z = hn::Sub(hn::Mul(hn::Sub(one, u), hn::Add(one, o.z)), o.z);
     const VF r = hn::Sqrt(hn::Clamp(hn::NegMulAdd(z, z, one), zero, one));
     const Vec3Lanes cap = Add({hn::Mul(r, cosine), hn::Mul(r, sine), z}, o);
-    const Vec3Lanes normal{hn::Mul(cap.x, s.shape), hn::Mul(cap.y, s.shape), hn::Max(cap.z, hn::Set(d, 1e-6f))};
+    const Vec3Lanes normal{hn::Mul(cap.x, s.shape), hn::Mul(cap.y, s.shape),
+                           hn::Max(cap.z, hn::Set(d, 1e-6f))};
     const Vec3Lanes h = FrameToWorld(s.ns, Scale(normal, InverseSqrt(Dot(normal, normal))));
     const VF twice = hn::Mul(hn::Set(d, 2.0f), Dot(h, s.wo));
     const Vec3Lanes mirrored{hn::MulSub(h.x, twice, s.wo.x), hn::MulSub(h.y, twice, s.wo.y),

@@ -14,26 +14,31 @@ namespace baton {
 
 /// A lat-long radiance map with its sampling table, in the map's own frame (no rotation).
 ///
-/// Mapping (OpenEXR's LATLONG): +Y up, the centre of the picture looks along +Z, u = 1/2 - atan2(x, z) / (2 pi) to the
-/// right, v = angle from +Y / pi downwards; texel (i, j) covers [i, i+1)/W x [j, j+1)/H.
+/// Mapping (OpenEXR's LATLONG): +Y up, the centre of the picture looks along +Z, u = 1/2 - atan2(x,
+/// z) / (2 pi) to the right, v = angle from +Y / pi downwards; texel (i, j) covers [i, i+1)/W x [j,
+/// j+1)/H.
 ///
-/// The table's cells: with `nearest` the texels, with `bilinear` the cells of the dual grid between four texel centres
-/// (W x (H+1), the first and last row half as high). A cell's probability is proportional to the mean over RGB and over
-/// its four corners of the radiance, times its solid angle, and the density is constant inside: it is positive wherever
-/// the reconstruction is.
+/// The table's cells: with `nearest` the texels, with `bilinear` the cells of the dual grid between
+/// four texel centres (W x (H+1), the first and last row half as high). A cell's probability is
+/// proportional to the mean over RGB and over its four corners of the radiance, times its solid
+/// angle, and the density is constant inside: it is positive wherever the reconstruction is.
 ///
-/// Texels are stored once, padded by one texel on every side, as {R, G, B, density}: texel (i, j) at
-/// [(j + 1) * stride + (i + 1)], i in [-1, W], j in [-1, H]. `density` is the table's pdf in 1/sr of the cell whose
-/// upper left corner (nearest: which itself) is the texel, so that one look-up gives radiance and pdf.
+/// Texels are stored once, padded by one texel on every side, as {R, G, B, density}: texel (i, j)
+/// at
+/// [(j + 1) * stride + (i + 1)], i in [-1, W], j in [-1, H]. `density` is the table's pdf in 1/sr
+/// of the cell whose upper left corner (nearest: which itself) is the texel, so that one look-up
+/// gives radiance and pdf.
 class EnvironmentMap {
  public:
   struct Texel {
     float r = 0, g = 0, b = 0, density = 0;
   };
 
-  /// image: at least 1x1. scale: radiance factor. compensate: the table of MIS compensation, max(0, L - mean L)
-  /// [Karlik et al. 2019] (a constant map keeps its plain table). repairs: of what the image was made from.
-  EnvironmentMap(const RgbImage& image, MapFilter filter, float scale, bool compensate, const TexelRepairs& repairs = {});
+  /// image: at least 1x1. scale: radiance factor. compensate: the table of MIS compensation, max(0,
+  /// L - mean L) [Karlik et al. 2019] (a constant map keeps its plain table). repairs: of what the
+  /// image was made from.
+  EnvironmentMap(const RgbImage& image, MapFilter filter, float scale, bool compensate,
+                 const TexelRepairs& repairs = {});
   /// Texels (1 - t) a + t b; a and b of one size and filter. t in [0, 1].
   EnvironmentMap(const EnvironmentMap& a, const EnvironmentMap& b, float t, bool compensate);
 
@@ -45,13 +50,14 @@ class EnvironmentMap {
   /// Memory of the texels; the tables are small beside them.
   std::size_t size_bytes() const { return texels_.size() * sizeof(Texel); }
   const TexelRepairs& repairs() const { return repairs_; }
-  /// Integral of the reconstruction over the sphere as the table sees it, mean over RGB; 0 for a black map.
+  /// Integral of the reconstruction over the sphere as the table sees it, mean over RGB; 0 for a
+  /// black map.
   double total_power() const { return total_power_; }
   bool black() const { return !(total_power_ > 0); }
   /// Radiance and density along unit `w` (map frame).
   Texel evaluate(const Vec3& w) const;
-  /// A direction with density evaluate(w).density. u: 2 uniforms in [0, 1). Monotone in u, so well spread points stay
-  /// well spread. Must not be called on a black map.
+  /// A direction with density evaluate(w).density. u: 2 uniforms in [0, 1). Monotone in u, so well
+  /// spread points stay well spread. Must not be called on a black map.
   Vec3 sample(const std::array<float, 2>& u) const;
 
  private:
@@ -73,8 +79,9 @@ class EnvironmentMap {
   int width_ = 0, height_ = 0;
   MapFilter filter_ = MapFilter::bilinear;
   std::vector<Texel> texels_;
-  /// Cumulative sums, in double: no dim cell is lost beside a sun. Of a row's cells only every kBlock-th sum is kept;
-  /// between them the densities are added up again, so what is sampled is exactly what evaluate() reports.
+  /// Cumulative sums, in double: no dim cell is lost beside a sun. Of a row's cells only every
+  /// kBlock-th sum is kept; between them the densities are added up again, so what is sampled is
+  /// exactly what evaluate() reports.
   std::vector<double> row_cdf_;    ///< (cell rows + 1) probability
   std::vector<double> block_cdf_;  ///< (cell rows, ceil(W / kBlock) + 1) densities of the row
   TexelRepairs repairs_;
@@ -86,7 +93,9 @@ struct Environment {
   std::shared_ptr<const EnvironmentMap> map;
   Mat3 rotation;  ///< world = rotation * map direction
 
-  EnvironmentMap::Texel evaluate(const Vec3& world) const { return map->evaluate(rotation.transposed() * world); }
+  EnvironmentMap::Texel evaluate(const Vec3& world) const {
+    return map->evaluate(rotation.transposed() * world);
+  }
   Vec3 sample(const std::array<float, 2>& u) const { return rotation * map->sample(u); }
 };
 

@@ -11,7 +11,6 @@ namespace {
 
 constexpr float kTwoPi = 2 * kPi;
 
-
 /// cos^s of the angle between unit a and b, 0 past a right angle. 1 - cos = |a - b|^2 / 2 keeps its
 /// digits where the cosine has lost them, so s = 100000 is as exact as s = 1.
 float cosine_power(const Vec3& a, const Vec3& b, float s) {

@@ -11,24 +11,30 @@ namespace baton {
 
 /// A material in the one form that all code evaluates. lobe measured: f is the table. Else:
 ///   f = kd/pi [* (1 - F) for ggx] + specular lobe,
-/// lobe phong: ks (s+2)/(2 pi) max(0, r.wi)^s, r the mirror direction of wo about the shading normal
+/// lobe phong: ks (s+2)/(2 pi) max(0, r.wi)^s, r the mirror direction of wo about the shading
+/// normal
 ///   [Lafortune & Willems 1994; the papers' model];
-/// lobe ggx: D G2 F / (4 |n.wi| |n.wo|), F Schlick with F0 = ks [glTF 2.0, appendix B]. As published, a white and smooth
-///   dielectric gains energy at grazing view (albedo 1.03 at 60, 1.6 at 85 degrees); a metal never does.
+/// lobe ggx: D G2 F / (4 |n.wi| |n.wo|), F Schlick with F0 = ks [glTF 2.0, appendix B]. As
+/// published, a white and smooth
+///   dielectric gains energy at grazing view (albedo 1.03 at 60, 1.6 at 85 degrees); a metal never
+///   does.
 struct Material {
   enum class Lobe : std::uint8_t { none, phong, ggx, measured };
 
   Lobe lobe = Lobe::none;
-  Rgb kd;                 ///< diffuse albedo
-  Rgb ks;                 ///< phong: specular albedo; ggx: F0
-  float shape = 1;        ///< phong: exponent s; ggx: alpha = roughness^2
+  Rgb kd;                          ///< diffuse albedo
+  Rgb ks;                          ///< phong: specular albedo; ggx: F0
+  float shape = 1;                 ///< phong: exponent s; ggx: alpha = roughness^2
   float specular_probability = 0;  ///< chance that sample_bsdf draws from the lobe, [0, 1]
-  std::shared_ptr<const MeasuredBrdf> table{};  ///< measured: the whole BRDF; kd and ks are 0, shape is the sampled lobe's alpha
+  std::shared_ptr<const MeasuredBrdf>
+      table{};  ///< measured: the whole BRDF; kd and ks are 0, shape is the sampled lobe's alpha
 };
 
-/// Material of a specification of any kind but `measured`. specular_probability follows from the mean albedos.
+/// Material of a specification of any kind but `measured`. specular_probability follows from the
+/// mean albedos.
 Material make_material(const MaterialSpec& spec);
-/// Evaluates the table; samples and densities are those of the GGX lobe that resembles its peak, and of the cosine lobe.
+/// Evaluates the table; samples and densities are those of the GGX lobe that resembles its peak,
+/// and of the cosine lobe.
 Material make_measured_material(std::shared_ptr<const MeasuredBrdf> table);
 
 /// A surface as light sampling sees it. All directions unit, pointing away from the surface;
@@ -43,7 +49,9 @@ struct ShadingPoint {
 };
 
 /// True when wi is above the shading and the geometric horizon: elsewhere every target is 0.
-inline bool above_horizon(const ShadingPoint& p, const Vec3& wi) { return dot(p.ns, wi) > 0 && dot(p.ng, wi) > 0; }
+inline bool above_horizon(const ShadingPoint& p, const Vec3& wi) {
+  return dot(p.ns, wi) > 0 && dot(p.ng, wi) > 0;
+}
 
 /// Least cosine between the shading normal and the view direction of a ggx lobe.
 inline constexpr float kMinCosView = 1e-4f;
@@ -51,16 +59,18 @@ inline constexpr float kMinCosView = 1e-4f;
 /// 1 + Lambda of Smith's masking for a ggx lobe seen at cosine cos_view > 0 [Heitz 2014].
 float ggx_view_masking(float cos_view, float alpha);
 
-/// wo, raised until ns.wo >= kMinCosView: the view direction of the ggx lobe. Interpolated normals may face away from the
-/// viewer, where visible normals have no density.
+/// wo, raised until ns.wo >= kMinCosView: the view direction of the ggx lobe. Interpolated normals
+/// may face away from the viewer, where visible normals have no density.
 Vec3 clamped_view(const ShadingPoint& point);
 
-/// BRDF f(wi, wo) in 1/sr, without the cosine; 0 when not above_horizon. The scalar witness of the SIMD code.
+/// BRDF f(wi, wo) in 1/sr, without the cosine; 0 when not above_horizon. The scalar witness of the
+/// SIMD code.
 Rgb evaluate_bsdf(const Material& material, const ShadingPoint& point, const Vec3& wi);
 
-/// A direction from the mixture of the cosine lobe and the specular lobe. u: 3 uniforms in [0, 1). May fall below the
-/// horizon (there the BRDF is 0).
-Vec3 sample_bsdf(const Material& material, const ShadingPoint& point, const std::array<float, 3>& u);
+/// A direction from the mixture of the cosine lobe and the specular lobe. u: 3 uniforms in [0, 1).
+/// May fall below the horizon (there the BRDF is 0).
+Vec3 sample_bsdf(const Material& material, const ShadingPoint& point,
+                 const std::array<float, 3>& u);
 /// Its density, 1/sr; integrates to 1 over the sphere.
 float bsdf_pdf_solid_angle(const Material& material, const ShadingPoint& point, const Vec3& wi);
 

@@ -19,9 +19,15 @@ void SiteBlock::clear(int sites) {
 
 void SiteBlock::add_miss(int site) {
   const auto s = static_cast<std::size_t>(site);
-  for (Array* array : {&ns_x, &ns_y, &ns_z, &ng_x, &ng_y, &ng_z, &wo_x, &wo_y, &wo_z, &mirror_x, &mirror_y, &mirror_z, &kd_r,
-                       &kd_g, &kd_b, &ks_r, &ks_g, &ks_b, &shape, &lobe_scale, &specular_probability, &alpha2, &view_cosine,
-                       &view_masking, &is_ggx}) {
+  for (Array* array : {&ns_x,     &ns_y,        &ns_z,
+                       &ng_x,     &ng_y,        &ng_z,
+                       &wo_x,     &wo_y,        &wo_z,
+                       &mirror_x, &mirror_y,    &mirror_z,
+                       &kd_r,     &kd_g,        &kd_b,
+                       &ks_r,     &ks_g,        &ks_b,
+                       &shape,    &lobe_scale,  &specular_probability,
+                       &alpha2,   &view_cosine, &view_masking,
+                       &is_ggx}) {
     (*array)[s] = 0;
   }
   measured[s] = nullptr;
@@ -47,7 +53,8 @@ void SiteBlock::add(int site, const ShadingPoint& point, const Material& materia
   set(kd_r, kd_g, kd_b, ggx ? material.kd * (Rgb{1, 1, 1} - material.ks) : material.kd);
   set(ks_r, ks_g, ks_b, ggx || phong ? material.ks : Rgb{});
   shape[s] = material.shape;
-  lobe_scale[s] = phong ? (material.shape + 2) * (0.5f * kInvPi) : (ggx && !tabulated ? 1.0f : 0.0f);
+  lobe_scale[s] =
+      phong ? (material.shape + 2) * (0.5f * kInvPi) : (ggx && !tabulated ? 1.0f : 0.0f);
   specular_probability[s] = ggx || phong ? material.specular_probability : 0.0f;
   is_ggx[s] = ggx ? 1.0f : 0.0f;
   alpha2[s] = ggx ? material.shape * material.shape : 0.0f;

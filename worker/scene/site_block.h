@@ -26,7 +26,7 @@ struct alignas(64) SiteBlock {
   Array alpha2{};        ///< ggx: alpha^2
   Array view_cosine{};   ///< ggx: n.wo, at least 1e-4
   Array view_masking{};  ///< ggx: 1 + Lambda(wo) [Heitz 2014]
-  Array is_ggx{};  ///< 1 for ggx, and for measured, which is sampled by such a lobe; else 0
+  Array is_ggx{};        ///< 1 for ggx, and for measured, which is sampled by such a lobe; else 0
   std::array<const float*, kMaxSites> measured{};  ///< texels of a MeasuredBrdf, or null
 
   std::int32_t num_sites = 1;  ///< S

@@ -25,7 +25,8 @@ FilmTile small_tile() {
 
 /// The error of a small tile whose META starts with other numbers: 4 sides, number of channels.
 std::string meta_error(std::size_t index, std::int32_t value) {
-  SectionFile file = *decode_section_file(encode_film_tile(small_tile(), kOrigin), kMagic, 2, "t.btf");
+  SectionFile file =
+      *decode_section_file(encode_film_tile(small_tile(), kOrigin), kMagic, 2, "t.btf");
   std::memcpy(file.sections[0].payload.data() + index * sizeof(value), &value, sizeof(value));
   const Result<StoredFilm> decoded = decode_film_tile(encode_section_file(file), "t.btf");
   return decoded ? "" : decoded.error().message;

@@ -1,11 +1,11 @@
-// The corners where SIMD and scalar code are easily told apart: sharp lobes and views below the shading horizon.
+// The corners where SIMD and scalar code are easily told apart: sharp lobes and views below the
+// shading horizon.
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
 
 #include "worker/integrator/kernels.h"
-
 
 namespace baton {
 namespace {
@@ -21,8 +21,8 @@ Pair evaluate_both(const Material& material, const ShadingPoint& point, const Ve
   const std::int32_t site = 0;
   Pair p{};
   float unused[2];
-  kernels::evaluate_bsdf(sites, {&site, 1}, {&wi.x, 1}, {&wi.y, 1}, {&wi.z, 1}, {&p.simd_f, 1}, {unused, 1},
-                         {unused + 1, 1}, {&p.simd_pdf, 1});
+  kernels::evaluate_bsdf(sites, {&site, 1}, {&wi.x, 1}, {&wi.y, 1}, {&wi.z, 1}, {&p.simd_f, 1},
+                         {unused, 1}, {unused + 1, 1}, {&p.simd_pdf, 1});
   p.scalar_f = evaluate_bsdf(material, point, wi).x * std::max(dot(point.ns, wi), 0.0f);
   p.scalar_pdf = bsdf_pdf_solid_angle(material, point, wi);
   return p;
@@ -37,7 +37,8 @@ TEST(Corners, VerySharpPhongKeepsItsDigits) {
   const Vec3 mirror = reflect(wo, n);
   for (const float offset : {0.0f, 0.001f, 0.003f, 0.006f}) {
     const Vec3 wi = normalize(mirror + Vec3{offset, 0, -offset});
-    const Pair p = evaluate_both(make_material(spec), {.position = {}, .ng = n, .ns = n, .wo = wo}, wi);
+    const Pair p =
+        evaluate_both(make_material(spec), {.position = {}, .ng = n, .ns = n, .wo = wo}, wi);
     EXPECT_NEAR(p.simd_f, p.scalar_f, 2e-3f * p.scalar_f) << offset;
     EXPECT_NEAR(p.simd_pdf, p.scalar_pdf, 2e-3f * p.scalar_pdf) << offset;
   }

@@ -52,7 +52,9 @@ class Kernels : public OnInstructionSet {};
 INSTANTIATE_TEST_SUITE_P(Sets, Kernels, testing::ValuesIn(instruction_sets()),
                          instruction_set_name);
 
-TEST_P(Kernels, RunOnTheChosenSet) { EXPECT_EQ(kernels::instruction_set(), hwy::TargetName(GetParam())); }
+TEST_P(Kernels, RunOnTheChosenSet) {
+  EXPECT_EQ(kernels::instruction_set(), hwy::TargetName(GetParam()));
+}
 
 TEST_P(Kernels, DecodeAsTheScalarCode) {
   std::vector<OctDirection> codes;
@@ -69,7 +71,8 @@ TEST_P(Kernels, EnvironmentAsTheScalarCode) {
   RgbImage image{16, 8, {}};
   for (int i = 0; i < 16 * 8 * 3; ++i) image.rgb.push_back(static_cast<float>((i * 37) % 23));
   std::vector<Vec3> directions = random_directions(5000, 3);
-  for (const Vec3& axis : {Vec3{0, 1, 0}, Vec3{0, -1, 0}, Vec3{1, 0, 0}, Vec3{0, 0, 1}, Vec3{0, 0, -1}}) {
+  for (const Vec3& axis :
+       {Vec3{0, 1, 0}, Vec3{0, -1, 0}, Vec3{1, 0, 0}, Vec3{0, 0, 1}, Vec3{0, 0, -1}}) {
     directions.push_back(axis);
   }
   const Lanes w(directions);
@@ -93,15 +96,18 @@ TEST_P(Kernels, EnvironmentAsTheScalarCode) {
 TEST_P(Kernels, BsdfAsTheScalarCode) {
   const std::vector<Vec3> directions = random_directions(4000, 5);
   const Lanes w(directions);
-  const std::vector<Material> materials{material_of(MaterialKind::diffuse), material_of(MaterialKind::phong),
+  const std::vector<Material> materials{material_of(MaterialKind::diffuse),
+                                        material_of(MaterialKind::phong),
                                         material_of(MaterialKind::metallic_roughness)};
   for (const Vec3& wo : {normalize(Vec3{0.3f, 0.9f, 0.2f}), normalize(Vec3{1, 0.02f, 0})}) {
     // All three materials in one pixel, and sites in mixed order within a vector.
     SiteBlock sites;
     sites.clear(4);
-    for (int s = 0; s < 3; ++s) sites.add(s, tilted_point({0, 1, 0}, wo), materials[static_cast<std::size_t>(s)]);
+    for (int s = 0; s < 3; ++s)
+      sites.add(s, tilted_point({0, 1, 0}, wo), materials[static_cast<std::size_t>(s)]);
     std::vector<std::int32_t> site;
-    for (std::size_t i = 0; i < directions.size(); ++i) site.push_back(static_cast<std::int32_t>(i % 3));
+    for (std::size_t i = 0; i < directions.size(); ++i)
+      site.push_back(static_cast<std::int32_t>(i % 3));
     std::vector<float> r(w.x.size()), g(r), b(r), pdf(r);
     kernels::evaluate_bsdf(sites, site, w.x, w.y, w.z, r, g, b, pdf);
     for (std::size_t i = 0; i < directions.size(); ++i) {
@@ -112,7 +118,8 @@ TEST_P(Kernels, BsdfAsTheScalarCode) {
       ASSERT_NEAR(r[i], f.x, tolerance) << "material " << i % 3 << " direction " << i;
       ASSERT_NEAR(b[i], f.z, tolerance);
       const float expected_pdf = bsdf_pdf_solid_angle(material, point, directions[i]);
-      ASSERT_NEAR(pdf[i], expected_pdf, 1e-5f + 2e-3f * expected_pdf) << "material " << i % 3 << " direction " << i;
+      ASSERT_NEAR(pdf[i], expected_pdf, 1e-5f + 2e-3f * expected_pdf)
+          << "material " << i % 3 << " direction " << i;
     }
   }
 }
@@ -131,7 +138,8 @@ TEST_P(Kernels, ManySitesAreLookedUpRight) {
   const std::vector<float> x(64, 0.0f), y(64, 1.0f), z(64, 0.0f);
   std::vector<float> r(64), g(64), b(64), pdf(64);
   kernels::evaluate_bsdf(sites, site, x, y, z, r, g, b, pdf);
-  for (std::size_t i = 0; i < 64; ++i) EXPECT_NEAR(r[i], kInvPi * static_cast<float>(site[i]) / 16, 1e-6f);
+  for (std::size_t i = 0; i < 64; ++i)
+    EXPECT_NEAR(r[i], kInvPi * static_cast<float>(site[i]) / 16, 1e-6f);
 }
 
 TEST_P(Kernels, SampledDirectionsAreUnitAndFinite) {
@@ -145,8 +153,10 @@ TEST_P(Kernels, SampledDirectionsAreUnitAndFinite) {
   u0[0] = 0;
   u1[0] = 0;
   u0[1] = 0x1.fffffep-1f;
-  for (const MaterialKind kind : {MaterialKind::diffuse, MaterialKind::phong, MaterialKind::metallic_roughness}) {
-    for (const Vec3& wo : {Vec3{0, 1, 0}, normalize(Vec3{1, 1e-4f, 0}), normalize(Vec3{1, -1e-4f, 0})}) {
+  for (const MaterialKind kind :
+       {MaterialKind::diffuse, MaterialKind::phong, MaterialKind::metallic_roughness}) {
+    for (const Vec3& wo :
+         {Vec3{0, 1, 0}, normalize(Vec3{1, 1e-4f, 0}), normalize(Vec3{1, -1e-4f, 0})}) {
       SiteBlock sites;
       sites.clear(1);
       sites.add(0, tilted_point({0, 1, 0}, wo), material_of(kind));

@@ -77,9 +77,9 @@ class PoolCounts : public testing::Test {
   std::unique_ptr<SamplerScratch> scratch = std::make_unique<SamplerScratch>();
 };
 
-// A pixel without memory reads whole blocks of the pool, whatever M is: else the same eighths of the
-// curve would be missing in all pixels. H0: the mean over pixels is the albedo under a flat map of
-// radiance 1; bound 1 % (M = 25 was 4.2 % low, M = 63 1.5 % high), standard error 0.1 %.
+// A pixel without memory reads whole blocks of the pool, whatever M is: else the same eighths of
+// the curve would be missing in all pixels. H0: the mean over pixels is the albedo under a flat map
+// of radiance 1; bound 1 % (M = 25 was 4.2 % low, M = 63 1.5 % high), standard error 0.1 %.
 TEST_F(PoolCounts, AnyNumberOfCandidatesSeesTheWholeMap) {
   const FrameLight flat = light_of([](int) { return 1.0f; });
   const SiteBlock sites = pixel(false);

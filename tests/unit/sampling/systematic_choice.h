@@ -5,8 +5,8 @@
 
 namespace baton {
 
-/// What RunningSums and SystematicPicks (worker/sampling/systematic-inl.h) do, for tests: systematic
-/// choice of K from M unnormalised weights: each is chosen K weight / total times in
+/// What RunningSums and SystematicPicks (worker/sampling/systematic-inl.h) do, for tests:
+/// systematic choice of K from M unnormalised weights: each is chosen K weight / total times in
 /// expectation, rounded down or up. The weights lie on the line by lanes of a vector (first those
 /// at 0, 8, 16, ..., then those at 4, 12, ..., then at 2, 6, 1, 5, 3, 7 and so on), which lets
 /// eight walk along it at once.
