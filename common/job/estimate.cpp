@@ -1,7 +1,6 @@
 #include "common/job/estimate.h"
 
 #include <algorithm>
-#include <bit>
 
 #include "common/base/limits.h"
 #include "common/job/motion.h"
@@ -23,21 +22,12 @@ std::int64_t count_neighbours(const JobSpec& job, std::int32_t reach_px) {
   return count;
 }
 
-/// Rays of a pixel at most: of `pool`, whose pixels choose their number, a power of two where light
-/// is evenly bright.
-std::int64_t most_shadow_rays(const SamplingSpec& sampling) {
-  if (sampling.method == Method::reference) return std::int64_t{2} * sampling.reference_samples;
-  const std::int32_t n = most_particles(sampling);
-  if (sampling.method != Method::pool) return n;
-  const auto most = static_cast<std::uint32_t>(limits::kMostPoolRays * n);
-  return std::min<std::int64_t>(std::bit_ceil(most), limits::kMaxParticles);
-}
-
 std::int64_t state_bytes_per_pixel(const JobSpec& job) {
+  const Carried carried = traits(job.sampling.method).carried;
   return static_cast<std::int64_t>(SampleState::bytes_per_pixel(
       static_cast<std::size_t>(num_carried_particles(job.sampling)),
-      static_cast<std::size_t>(num_populations(job)), job.sampling.method == Method::pool,
-      job.sampling.method == Method::restir));
+      static_cast<std::size_t>(num_populations(job)), carried == Carried::memory,
+      carried == Carried::weighed_samples));
 }
 
 }  // namespace
@@ -60,9 +50,9 @@ JobEstimate estimate_job(const JobSpec& job) {
   if (job.visibility.correlated)
     e.dependencies += count_neighbours(job, exchange_reach_px(job.visibility)) * e.frames;
 
-  // Count rays; a reference sample is a pair, one from the environment and one from the BRDF.
+  // Count rays.
   e.primary_rays_per_pixel = job.image.sites;
-  e.shadow_rays_per_pixel = most_shadow_rays(job.sampling);
+  e.shadow_rays_per_pixel = traits(job.sampling.method).most_rays(job.sampling);
 
   // Add up the planes: R, G, B, A and the AOVs.
   std::int64_t wide_channels = 0;

@@ -49,6 +49,15 @@ void fields(JobArchive& a, ImageSpec& image) {
   a.integer("tileSize", image.tile_size, limits::kMinTileSize, limits::kMaxTileSize);
 }
 
+void method_that_draws_anew(JobArchive& a, Key key, Method& method) {
+  std::vector<std::string_view> names;
+  for (const std::string_view name : kMethodNames) {
+    if (traits(method_of(name)).draws_anew) names.push_back(name);
+  }
+  std::string name(traits(method).name);
+  if (a.word(key, name, names)) method = method_of(name);
+}
+
 /// N, M and the share of the BRDF; Sampling is SamplingSpec or MaterialSampling.
 template <class Sampling>
 void count_fields(JobArchive& a, Sampling& sampling) {
@@ -64,28 +73,29 @@ void count_fields(JobArchive& a, Sampling& sampling) {
 /// Settings of single materials; what they leave out is as in the rest of the picture.
 void material_fields(JobArchive& a, SamplingSpec& sampling, const SceneSpec& scene) {
   const auto visit = [&](const std::string& name, MaterialSampling& material) {
-    a.choice("method", material.method, kStartMethods);
+    method_that_draws_anew(a, "method", material.method);
     count_fields(a, material);
     if (scene.materials.contains(name)) return;
     std::vector<std::string> names;
     for (const auto& entry : scene.materials) names.push_back(entry.first);
     a.fault("", fmt::format("no such material in scene.materials{}", suggestion(name, names)));
   };
-  const std::optional<StartMethod> method = fresh_method(sampling.method);
-  const MaterialSampling rest{method.value_or(StartMethod::bidirectional), sampling.num_particles,
-                              sampling.num_candidates, sampling.brdf_fraction};
+  const bool draws_anew = traits(sampling.method).draws_anew;
+  const MaterialSampling rest{draws_anew ? sampling.method : Method::bidirectional,
+                              sampling.num_particles, sampling.num_candidates,
+                              sampling.brdf_fraction};
   a.named_from("byMaterial", sampling.by_material, rest, limits::kMaxMaterials, visit,
                {.present = false});
-  if (!sampling.by_material.empty() && !method) {
+  if (!sampling.by_material.empty() && !draws_anew) {
     a.fault("byMaterial", "none unless sampling.method is environment, brdf, mis or bidirectional",
-            fmt::format("\"{}\"", kMethods[static_cast<std::size_t>(sampling.method)]));
+            fmt::format("\"{}\"", traits(sampling.method).name));
   }
   if (!sampling.by_material.empty() && sampling.mis_compensation)
     a.fault("misCompensation", "false, as sampling.byMaterial is given", "true");
 }
 
 void fields(JobArchive& a, SamplingSpec& sampling, const SceneSpec& scene) {
-  a.choice("method", sampling.method, kMethods);
+  a.choice("method", sampling.method, kMethodNames);
   count_fields(a, sampling);
   a.boolean("misCompensation", sampling.mis_compensation);
   if (sampling.mis_compensation && sampling.method != Method::mis &&
@@ -102,7 +112,7 @@ void fields(JobArchive& a, SamplingSpec& sampling, const SceneSpec& scene) {
   a.choice("resampling", sampling.resampling, kResamplingSchemes);
   a.number("localMoveDeg", sampling.local_move_deg, {.min = 0, .max = 90, .min_open = true});
   a.number("localMoveFraction", sampling.local_move_fraction, kUnitRange);
-  a.choice("startMethod", sampling.start_method, kStartMethods);
+  method_that_draws_anew(a, "startMethod", sampling.start_method);
   a.integer("refreshEvery", sampling.refresh_every, 0, limits::kMaxFrames);
   a.number("refreshRatio", sampling.refresh_ratio, {.min = 1, .max = 1e6, .min_open = true});
   a.integer("refreshCandidates", sampling.refresh_candidates, 1, limits::kMaxCandidates);
@@ -121,7 +131,7 @@ void fields(JobArchive& a, SamplingSpec& sampling, const SceneSpec& scene) {
   } else if ((sampling.target_error || sampling.time_budget) &&
              sampling.method != Method::automatic) {
     a.fault("method", "\"auto\" with targetError or timeBudget",
-            fmt::format("\"{}\"", kMethods[static_cast<std::size_t>(sampling.method)]));
+            fmt::format("\"{}\"", traits(sampling.method).name));
   }
   a.integer("referenceSamples", sampling.reference_samples, 2, limits::kMaxReferenceSamples);
   material_fields(a, sampling, scene);
@@ -137,18 +147,10 @@ void fields(JobArchive& a, VisibilitySpec& visibility, const SamplingSpec& sampl
   if (!visibility.correlated) return;
 
   // The second pass needs samples, two independent halves of them unless told otherwise.
-  if (sampling.method == Method::reference) {
-    a.fault("correlated", "false, as sampling.method is reference", "true");
-  }
-  if (chooses_rays(sampling.method)) {
+  if (const MethodTraits& method = traits(sampling.method); !method.no_second_pass.empty()) {
     a.fault("correlated",
-            fmt::format("false, as the rays of sampling.method {} are not its samples",
-                        kMethods[static_cast<std::size_t>(sampling.method)]),
+            fmt::format("false, as sampling.method is {}, {}", method.name, method.no_second_pass),
             "true");
-  }
-  if (sampling.method == Method::restir) {
-    a.fault("correlated",
-            "false, as sampling.method is restir, whose samples are carried as one set", "true");
   }
   if (!sampling.by_material.empty()) {
     a.fault("correlated", "false, as sampling.byMaterial is given", "true");

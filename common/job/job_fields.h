@@ -21,9 +21,6 @@ inline constexpr NumberRange kAngleRange{-1e6, 1e6};
 inline constexpr std::array<std::string_view, 4> kMaterialKinds{"diffuse", "phong",
                                                                 "metallicRoughness", "measured"};
 inline constexpr std::array<std::string_view, 2> kMapFilters{"nearest", "bilinear"};
-inline constexpr std::array<std::string_view, 10> kMethods{
-    "reference",  "environment", "brdf",  "mis",    "bidirectional",
-    "sequential", "pool",        "ratio", "restir", "auto"};
 inline constexpr std::array<std::string_view, 4> kResamplingSchemes{"systematic", "stratified",
                                                                     "multinomial", "residual"};
 inline constexpr std::array<std::string_view, 4> kSecondPassForms{
@@ -32,8 +29,6 @@ inline constexpr std::array<std::string_view, 3> kMaskPolicies{"same-samples", "
                                                                "cross-fold"};
 inline constexpr std::array<std::string_view, 4> kLnsUpdates{"ratio", "pathLeft", "pathRight",
                                                              "pathTrapezoid"};
-inline constexpr std::array<std::string_view, 4> kStartMethods{"environment", "brdf", "mis",
-                                                               "bidirectional"};
 inline constexpr std::array<std::string_view, 2> kBackgrounds{"environment", "transparent"};
 inline constexpr std::array<std::string_view, 13> kAovs{"lns",
                                                         "visibility",

@@ -19,7 +19,7 @@ constexpr std::array<std::string_view, 12> kSettings{"/name",
                                                      "/output",
                                                      "/state/",
                                                      "/maxRetriesPerTask",
-                                                     "/maxFailedTasksCount",
+                                                     "/maxFailedTasks",
                                                      "/maxFailuresPerWorker",
                                                      "/maxSecondsPerTask",
                                                      "/specificationVersion"};

@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "common/base/digest.h"
+#include "common/job/method.h"
 #include "common/math/vec3.h"
 
 namespace baton {
@@ -190,32 +191,15 @@ struct EnvironmentSpec {
 
 // ---- sampling
 // ----------------------------------------------------------------------------------------------
-/// automatic: settled by a pilot before the job is submitted; never part of a job document.
-enum class Method : std::uint8_t {
-  reference,
-  environment,
-  brdf,
-  mis,
-  bidirectional,
-  sequential,
-  pool,
-  ratio,
-  restir,
-  automatic
-};
 enum class ResamplingScheme : std::uint8_t { systematic, stratified, multinomial, residual };
 /// How `sequential` carries the normalising constant: by the ratio of the weights, or by path
 /// sampling with a left, right or trapezoidal sum over the intermediate distributions.
 enum class LnsUpdate : std::uint8_t { ratio, path_left, path_right, path_trapezoid };
-/// The methods that draw all samples of a frame anew: `sequential` starts a pixel with one of them,
-/// a material may have its own.
-enum class StartMethod : std::uint8_t { environment, brdf, mis, bidirectional };
-
 /// How the pixels of one material are sampled, where that differs from the rest of the picture;
 /// members as in SamplingSpec. Samples are drawn anew in each frame, so nothing is handed over
 /// between settings.
 struct MaterialSampling {
-  StartMethod method = StartMethod::bidirectional;
+  Method method = Method::bidirectional;  ///< one that draws anew
   int num_particles = 16;
   int num_candidates = 128;
   float brdf_fraction = 0.25f;
@@ -224,7 +208,7 @@ struct MaterialSampling {
 };
 
 struct SamplingSpec {
-  Method method = Method::sequential;
+  Method method = Method::pool;   ///< holds in every case of the stability suite
   int num_particles = 16;         ///< N: shadow rays per pixel, [1, limits::kMaxParticles]
   int num_candidates = 128;       ///< M: SIR candidates, [N, limits::kMaxCandidates]
   float brdf_fraction = 0.25f;    ///< [0, 1], of candidates: mis: from the BRDF; SIR: at most, from
@@ -236,10 +220,9 @@ struct SamplingSpec {
   LnsUpdate lns_update = LnsUpdate::ratio;
   float ess_ratio_min = 0.5f;  ///< resample when ESS < ess_ratio_min * N, [0, 1]
   ResamplingScheme resampling = ResamplingScheme::systematic;
-  float local_move_deg = 4;            ///< half-angle of local moves, (0, 90]
-  float local_move_fraction = 0.125f;  ///< share of moves that are local, [0, 1]
-  StartMethod start_method =
-      StartMethod::bidirectional;  ///< of fresh pixels; all but the last give N weighted samples
+  float local_move_deg = 4;                     ///< half-angle of local moves, (0, 90]
+  float local_move_fraction = 0.125f;           ///< share of moves that are local, [0, 1]
+  Method start_method = Method::bidirectional;  ///< of fresh pixels; one that draws anew
   int refresh_every =
       8;  ///< sequential: each pixel starts afresh once in so many frames, staggered; 0: never
   /// sequential: a pixel whose carried Lns has left [Lns / rho, Lns * rho] of its last start, rho

@@ -95,41 +95,24 @@ TileRun tile_run(const JobSpec& job, std::int32_t tile, std::int32_t run) {
 }
 
 bool carries_state(const JobSpec& job) {
-  const Method method = job.sampling.method;
-  const bool carries =
-      method == Method::sequential || method == Method::pool || method == Method::restir;
-  return carries && job.state.carry;
+  return traits(job.sampling.method).carries() && job.state.carry;
 }
-
-bool chooses_rays(Method method) { return method == Method::pool || method == Method::ratio; }
 
 bool asks_neighbors(const SamplingSpec& sampling) {
-  return sampling.method == Method::restir && sampling.num_neighbors > 0;
+  return traits(sampling.method).asks_neighbors && sampling.num_neighbors > 0;
 }
 
-std::optional<StartMethod> fresh_method(Method method) {
-  switch (method) {
-    case Method::environment:
-      return StartMethod::environment;
-    case Method::brdf:
-      return StartMethod::brdf;
-    case Method::mis:
-      return StartMethod::mis;
-    case Method::bidirectional:
-      return StartMethod::bidirectional;
-    case Method::reference:
-    case Method::sequential:
-    case Method::pool:
-    case Method::ratio:
-    case Method::restir:
-    case Method::automatic:
-      return std::nullopt;
-  }
-  return std::nullopt;
+SamplingSpec as_sampling(const MaterialSampling& material) {
+  SamplingSpec spec;
+  spec.method = material.method;
+  spec.num_particles = material.num_particles;
+  spec.num_candidates = material.num_candidates;
+  spec.brdf_fraction = material.brdf_fraction;
+  return spec;
 }
 
 std::int32_t num_carried_particles(const SamplingSpec& sampling) {
-  return chooses_rays(sampling.method) ? 0 : most_particles(sampling);
+  return traits(sampling.method).keeps_samples ? most_particles(sampling) : 0;
 }
 
 std::int32_t most_particles(const SamplingSpec& sampling) {

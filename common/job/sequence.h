@@ -75,17 +75,13 @@ std::int32_t frames_per_run(const JobSpec& job);
 std::int32_t num_runs(const JobSpec& job);
 /// The run's frames; run in [0, num_runs(job)), tile in [0, TileGrid(job.image).count()).
 TileRun tile_run(const JobSpec& job, std::int32_t tile, std::int32_t run);
-/// True when the method hands samples, or what it remembers, from frame to frame: `sequential`,
-/// `pool` and `restir` with state.carry.
+/// True when the method hands something from frame to frame and state.carry lets it.
 bool carries_state(const JobSpec& job);
-/// Whether the method chooses its rays apart from its samples, of which its states then hold none.
-bool chooses_rays(Method method);
 /// Whether pixels weigh the samples of their neighbours: `restir` with neighbours.
 bool asks_neighbors(const SamplingSpec& sampling);
-/// The method among those that a material may have for itself; nullopt for those that carry, for
-/// the ratio estimator, for brute force and for auto.
-std::optional<StartMethod> fresh_method(Method method);
-/// Shadow rays of a pixel: the most of any material.
+/// A material's setting as one of the whole picture.
+SamplingSpec as_sampling(const MaterialSampling& material);
+/// Samples of a pixel: the most of any material.
 std::int32_t most_particles(const SamplingSpec& sampling);
 /// Particles per pixel in the job's states; 0 where rays are chosen apart from samples.
 std::int32_t num_carried_particles(const SamplingSpec& sampling);

@@ -172,7 +172,7 @@ void apply_choice(const AutoChoice& choice, std::span<const PilotNumbers> pilot,
                    numbers.cost_us);
   }
   const std::string alike =
-      fmt::format("{}{} N={} M={} P={}", kMethods[static_cast<std::size_t>(choice.sampling.method)],
+      fmt::format("{}{} N={} M={} P={}", traits(choice.sampling.method).name,
                   choice.correlated ? " with second pass" : "", choice.sampling.num_particles,
                   choice.sampling.num_candidates, choice.sampling.num_distributions);
   const std::string map = choice.max_map_width > 0

@@ -176,7 +176,7 @@ std::string MaterialChoice::name(std::span<const SeenMaterial> materials) const 
   for (std::size_t k = 0; k < materials.size(); ++k) {
     const SamplingSpec& s = sampling[k];
     fmt::format_to(std::back_inserter(text), "{}{} {} N={}", k > 0 ? " + " : "", materials[k].name,
-                   kMethods[static_cast<std::size_t>(s.method)], s.num_particles);
+                   traits(s.method).name, s.num_particles);
     if (s.method == Method::bidirectional)
       fmt::format_to(std::back_inserter(text), " M={}", s.num_candidates);
   }

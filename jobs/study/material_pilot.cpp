@@ -178,8 +178,7 @@ Status vary_by_material(const JobSpec& job, double lit_pixels, const StudyFolder
     return {};
   }
   choice.reason += fmt::format("; by material {:.2f} times as efficient as {} N={} for all", gain,
-                               kMethods[static_cast<std::size_t>(choice.sampling.method)],
-                               choice.sampling.num_particles);
+                               traits(choice.sampling.method).name, choice.sampling.num_particles);
   choice.sampling = mixed;
   choice.error = std::sqrt(square[1]);
   choice.cost_us = materials->cost_us;

@@ -45,8 +45,8 @@ struct Case {
   Timeline timeline(const Effort& effort) const;
 };
 
-/// What every method should keep everywhere. Noise is relative to fresh samples: 1.5 is 2.3 times,
-/// 3 is 9 times the cost for the same error.
+/// What every method should keep everywhere. Noise is relative to fresh samples: a factor of 2 is 4
+/// times the cost for the same error.
 std::vector<Law> usual_laws();
 
 /// The cases in which camera or objects move (moving_cases.cpp).

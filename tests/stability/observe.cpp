@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "tests/stability/parallel.h"
+#include "worker/integrator/weighted_method.h"
 #include "worker/pass/render_context.h"
 #include "worker/run/local_render.h"
 
@@ -80,7 +81,8 @@ class SharedLights {
       owner = std::const_pointer_cast<RenderContext>(first);
     }
     const auto context = std::const_pointer_cast<RenderContext>(loaded);
-    if (subject.sampler) context->sampler = subject.sampler(job.sampling);
+    if (subject.sampler)
+      context->method = std::make_unique<WeightedMethod>(job, subject.sampler(job.sampling));
     std::swap(context->lights, owner->lights);
     const Status status = render_run(*context, judged, run);
     std::swap(context->lights, owner->lights);

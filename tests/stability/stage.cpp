@@ -35,6 +35,7 @@ std::string Stage::mesh(const std::string& name, const std::string& obj) const {
 
 JobSpec Stage::plain(const RgbImage& light) const {
   JobSpec job;
+  job.sampling.method = Method::sequential;
   job.name = "stability";
   job.image = {.width = 8, .height = 8, .sites = 1, .tile_size = 4096};
   job.camera = {

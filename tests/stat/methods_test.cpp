@@ -68,7 +68,7 @@ TEST(Methods, BidirectionalWithFourSitesAgrees) {
 }
 TEST(Methods, SettingsByMaterialAgreeWithBruteForce) {
   JobSpec job = still_job(Method::mis);
-  job.sampling.by_material = {{"ground", {.method = StartMethod::environment, .num_particles = 8}},
+  job.sampling.by_material = {{"ground", {.method = Method::environment, .num_particles = 8}},
                               {"glossy", {.num_particles = 24, .num_candidates = 64}}};
   expect_agreement(job, kRuns, 0.03);
 }
@@ -98,7 +98,7 @@ TEST(Methods, SequentialWithFiveMovesAgrees) {
 // Frame 1 with N samples of the map and the BRDF, weighted [section 3]; no pixel starts again.
 TEST(Methods, SequentialStartedWithMisAgrees) {
   JobSpec job = turning_job(5);
-  job.sampling.start_method = StartMethod::mis;
+  job.sampling.start_method = Method::mis;
   job.sampling.refresh_every = 0;
   expect_agreement(job, 96, 0.05);
 }

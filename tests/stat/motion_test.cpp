@@ -9,6 +9,7 @@
 #include <functional>
 
 #include "tests/stat/against_brute_force.h"
+#include "worker/integrator/populations.h"
 
 namespace baton {
 namespace {
@@ -129,15 +130,15 @@ class TurningViewer {
               const PixelSamples& samples) {
     const EnvironmentView now = view_of(light_->now);
     const EnvironmentView before = view_of(light_->before);
-    context_->sampler->sample({.sites = sites,
-                               .light = *light_,
-                               .now = now,
-                               .before = before,
-                               .key = key,
-                               .frame_index = 1,
-                               .has_history = has_history,
-                               .old = old},
-                              *scratch_, samples);
+    sampler_->sample({.sites = sites,
+                      .light = *light_,
+                      .now = now,
+                      .before = before,
+                      .key = key,
+                      .frame_index = 1,
+                      .has_history = has_history,
+                      .old = old},
+                     *scratch_, samples);
   }
   LnsMean over_runs(const std::function<void(const RngKey&, const PixelSamples&)>& estimate) {
     constexpr int kRuns = 3000;
@@ -159,6 +160,7 @@ class TurningViewer {
 
   JobSpec job_;
   std::shared_ptr<const RenderContext> context_;
+  std::unique_ptr<const PixelSampler> sampler_ = make_pixel_sampler(population_spec(job_));
   std::shared_ptr<const FrameLight> light_;
   SiteBlock sites_;
   OldSurfaces old_;

@@ -85,6 +85,7 @@ inline JobSpec box_job() {
   const std::filesystem::path mesh = test_folder() / "box.obj";
   std::ofstream(mesh) << box_obj();
   JobSpec job;
+  job.sampling.method = Method::sequential;
   job.name = "boxes";
   job.image = {.width = 12, .height = 9, .sites = 1, .tile_size = 4096};
   job.camera = {

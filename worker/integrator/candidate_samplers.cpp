@@ -44,8 +44,7 @@ void set_dark(const PixelSamples& samples) {
 }
 
 CandidateCounts split_candidates(std::int32_t total, float brdf_fraction) {
-  const auto from_bsdf =
-      static_cast<std::int32_t>(std::lround(static_cast<float>(total) * brdf_fraction));
+  const std::int32_t from_bsdf = num_from_brdf(total, brdf_fraction);
   return {total - from_bsdf, from_bsdf};
 }
 
@@ -58,14 +57,6 @@ CandidateCounts candidate_counts(const SiteBlock& sites, std::int32_t total, flo
   const std::int32_t most = std::min(total / 2, kMaxLobeCandidates);
   const std::int32_t from_bsdf = sites.num_lobes > 0 ? std::min(rounded, most) : 0;
   return {.from_light = total - from_bsdf, .from_bsdf = from_bsdf, .lobe_only = true};
-}
-
-PixelDiagnostics settle_rays(float total, std::int32_t num_rays, std::int32_t num_candidates,
-                             PixelSource source, const PixelSamples& samples) {
-  samples.lns = samples.lns_fresh = total > 0 && std::isfinite(total) ? total : 0.0f;
-  samples.source = source;
-  return {.ess = samples.lns > 0 ? static_cast<float>(num_rays) : 0.0f,
-          .target_evaluations = num_candidates};
 }
 
 PixelDiagnostics DirectSampler::sample(const PixelInput& input, SamplerScratch& scratch,

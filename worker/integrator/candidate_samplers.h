@@ -16,10 +16,6 @@ CandidateCounts candidate_counts(const SiteBlock& sites, std::int32_t total, flo
 /// Makes a pixel one that no light reaches: no contribution, whatever the directions.
 void set_dark(const PixelSamples& samples);
 
-/// Settles a pixel whose sampler chose `num_rays` rays itself among candidates that weigh `total`.
-PixelDiagnostics settle_rays(float total, std::int32_t num_rays, std::int32_t num_candidates,
-                             PixelSource source, const PixelSamples& samples);
-
 /// Every candidate is a sample: `environment`, `brdf` and, with both counts positive, `mis`
 /// (balance heuristic).
 class DirectSampler final : public PixelSampler {

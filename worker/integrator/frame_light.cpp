@@ -8,7 +8,6 @@
 
 #include "common/base/limits.h"
 #include "common/math/octahedral.h"
-#include "worker/integrator/candidate_samplers.h"
 
 namespace baton {
 namespace {
@@ -38,59 +37,15 @@ void insert_in_front(List& cache, std::int32_t key, std::shared_ptr<const Value>
   }
 }
 
-/// Entries of the light pool that a pixel takes when its N samples are drawn anew, from M
-/// candidates.
-std::int32_t num_taken(StartMethod method, std::int32_t n, std::int32_t m, float brdf_fraction) {
-  switch (method) {
-    case StartMethod::environment:
-      return n;
-    case StartMethod::brdf:
-      return 1;
-    case StartMethod::mis:
-      return split_candidates(n, brdf_fraction).from_light;
-    case StartMethod::bidirectional:
-      return m;
-  }
-  return m;
-}
-
 /// The pool as most pixels read it.
 LightPoolLayout pool_layout(const JobSpec& job) {
-  const SamplingSpec& spec = job.sampling;
-  const auto fresh = [&](StartMethod method) {
-    return num_taken(method, spec.num_particles, spec.num_candidates, spec.brdf_fraction);
-  };
-  std::int32_t taken = 1;
-  switch (spec.method) {
-    case Method::environment:
-      taken = fresh(StartMethod::environment);
-      break;
-    case Method::mis:
-      taken = fresh(StartMethod::mis);
-      break;
-    case Method::bidirectional:
-      taken = fresh(StartMethod::bidirectional);
-      break;
-    case Method::sequential:
-      taken = fresh(spec.start_method);
-      break;
-    case Method::pool:
-      return {.one_run = true};
-    case Method::ratio:
-    case Method::restir:
-      taken = spec.num_candidates;
-      break;
-    case Method::brdf:
-    case Method::reference:
-    case Method::automatic:
-      break;
-  }
-  for (const auto& [name, own] : spec.by_material) {
-    taken = std::max(
-        taken, num_taken(own.method, own.num_particles, own.num_candidates, own.brdf_fraction));
-  }
-  return {.num_taken = static_cast<std::uint32_t>(std::max(taken / num_populations(job), 1)),
-          .with_before = spec.method == Method::sequential};
+  LightUse use = traits(job.sampling.method).light(job.sampling);
+  for (const auto& [name, own] : job.sampling.by_material)
+    use.num_taken = std::max(use.num_taken, traits(own.method).light(as_sampling(own)).num_taken);
+  return {
+      .num_taken = static_cast<std::uint32_t>(std::max(use.num_taken / num_populations(job), 1)),
+      .one_run = use.one_run,
+      .with_before = use.with_before};
 }
 
 }  // namespace

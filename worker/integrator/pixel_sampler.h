@@ -6,6 +6,7 @@
 
 #include "common/job/job_spec.h"
 #include "common/state/sample_state.h"
+#include "worker/accel/accel.h"
 #include "worker/integrator/carried_set.h"
 #include "worker/integrator/frame_light.h"
 #include "worker/integrator/kernels.h"
@@ -29,10 +30,11 @@ struct PixelInput {
   const OldSurfaces* old = nullptr;  ///< the surfaces of that set, where they are not `sites`
   /// (populations) That set in the maps, where it was looked up ahead; else empty.
   std::span<const kernels::LocatedDirections> located{};
-  /// (kVisibilityCells) of the frames before, or empty; see keeps_memory()
-  std::span<const VisibilityCell> memory{};
+  std::span<float> target{};  ///< (N) out: p~ at this frame's samples; may be target_before
   /// What the neighbours that the pixel asks held in the frame before; at most kMaxNeighbors.
   std::span<const CarriedSet> neighbors{};
+  std::span<const SurfaceHit> hits{};  ///< (S) what the sites were made of, for who traces itself
+  const Accel* accel = nullptr;        ///< of the frame
 };
 
 /// The light of the pixel's two frames.
@@ -60,11 +62,13 @@ struct PixelSamples {
 
 /// What a method says about its work on a pixel.
 struct PixelDiagnostics {
-  float ess = 0;  ///< [1, N], 0 without light
+  float ess = 0;                 ///< [1, N], 0 without light
+  std::int32_t num_samples = 1;  ///< N
   std::int32_t target_evaluations = 0;
   MoveCounts local = {}, independent = {};
   bool resampled = false;
   bool refreshed_by_ratio = false;
+  std::uint64_t rays_traced = 0;  ///< by the method itself
 };
 
 /// Work space of one thread, reused from pixel to pixel.
@@ -76,33 +80,17 @@ struct SamplerScratch {
   PixelRays rays;  ///< of the pixel, where the method chooses them apart from its samples
 };
 
-/// A sampling method: the plug-in over the contract of PixelSamples. Stateless; any number of
-/// threads may use one.
+/// Draws one properly weighted set, the contract of PixelSamples. Stateless; any number of threads
+/// may use one.
 class PixelSampler {
  public:
   virtual ~PixelSampler() = default;
   /// scratch: the caller's, reused from pixel to pixel.
   virtual PixelDiagnostics sample(const PixelInput& input, SamplerScratch& scratch,
                                   const PixelSamples& samples) const = 0;
-  /// Whether sample() evaluates carried directions, so that it pays to look them up ahead
-  /// (PixelInput::located).
-  virtual bool evaluates_carried() const { return false; }
-  /// Whether the method chooses its rays apart from its samples, which sample() then leaves in
-  /// SamplerScratch::rays. Else its samples are its rays.
-  virtual bool chooses_rays() const { return false; }
-  /// Whether a method that chooses its rays is told in later frames what they found
-  /// (PixelInput::memory).
-  virtual bool keeps_memory() const { return false; }
-  /// Whether the method weighs sets by their confidence (PixelSamples::confidence).
-  virtual bool asks_confidence() const { return false; }
-  /// Whether a sample whose ray was blocked is to be forgotten once it is traced.
-  virtual bool forgets_blocked() const { return false; }
 };
 
-/// The sampler of a job; null for Method::reference, which is no sampler of this kind
-/// (reference.h); Method::automatic is in no job that reaches a worker.
+/// The sampler of a method that keeps samples; null for the others.
 std::unique_ptr<const PixelSampler> make_pixel_sampler(const SamplingSpec& spec);
-/// The sampler of one material that has a setting of its own.
-std::unique_ptr<const PixelSampler> make_material_sampler(const MaterialSampling& material);
 
 }  // namespace baton

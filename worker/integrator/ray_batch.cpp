@@ -41,8 +41,7 @@ HWY_INLINE Vec3Lanes OriginsOf(const SiteOrigins& origins, VI site) {
           LookUp(origins.z, site, origins.num_sites)};
 }
 
-void CastPixelRays(const PixelRays& in, const SiteOrigins& origins, std::uint32_t first_sample,
-                   RayBatch& batch) {
+void CastPixelRays(const PixelRays& in, const SiteOrigins& origins, RayBatch& batch) {
   const DF d;
   const DU du;
   const std::size_t first = batch.size();
@@ -62,9 +61,10 @@ void CastPixelRays(const PixelRays& in, const SiteOrigins& origins, std::uint32_
     put(hn::Load(d, in.g.from(i)), batch.g);
     put(hn::Load(d, in.b.from(i)), batch.b);
     put(hn::Load(d, in.visibility.from(i)), batch.visibility);
-    const VU number = CountFrom(du, first_sample + static_cast<std::uint32_t>(i));
+    const VU number = CountFrom(du, static_cast<std::uint32_t>(i));
     hn::StoreU(number, du, batch.sample.data() + first + i);
   }
+  std::copy_n(in.bin.from(0), in.count, batch.tag.data() + first);
   rays.extend(first + in.count);
 }
 
@@ -154,13 +154,13 @@ void RayBatch::reserve(std::size_t more) {
   const std::size_t capacity = std::max(needed, 2 * sample.size());
   rays.reserve(capacity);
   sample.resize(capacity);
+  tag.resize(capacity);
   for (auto* column : {&r, &g, &b, &visibility}) column->resize(capacity);
 }
 
-void cast_rays(const PixelRays& rays, const SiteOrigins& origins, std::uint32_t first_sample,
-               RayBatch& batch) {
+void cast_rays(const PixelRays& rays, const SiteOrigins& origins, RayBatch& batch) {
   batch.reserve(rays.count);
-  HWY_DYNAMIC_DISPATCH(CastPixelRays)(rays, origins, first_sample, batch);
+  HWY_DYNAMIC_DISPATCH(CastPixelRays)(rays, origins, batch);
 }
 
 void cast_samples(const CastSamples& samples, const SiteOrigins& origins, RayBatch& batch,

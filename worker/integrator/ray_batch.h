@@ -12,18 +12,20 @@
 
 namespace baton {
 
-/// The shadow rays of many pixels and, beside each, what it brings if it is free; ascending by
-/// sample.
+/// The shadow rays of many pixels, one pixel after the other and ascending by sample, and beside
+/// each what it brings if it is free.
 struct RayBatch {
   ShadowRays rays;
   /// (capacity) of which the first rays.size() count.
-  std::vector<std::uint32_t> sample;  ///< the caller's number of the sample
+  std::vector<std::uint32_t> sample;  ///< number of the sample in its pixel
   std::vector<float> r, g, b;         ///< u_j (f cos L)_rgb / p~
   std::vector<float> visibility;      ///< share of the pixel's Lns
+  std::vector<std::uint8_t> tag;      ///< what the method wants to hear again: PixelRays::bin
 
   void clear() {
     rays.clear();
     poison(sample);
+    poison(tag);
     for (auto* column : {&r, &g, &b, &visibility}) poison(*column);
   }
   std::size_t size() const { return rays.size(); }
@@ -40,7 +42,7 @@ struct CastSamples {
   float unit_contribution;        ///< u_j is this times weight_j
   float picture_scale;            ///< factor of the set's light in the picture
   float visibility_scale;         ///< factor of its weights in the pixel's visibility
-  std::uint32_t first_sample;     ///< number of sample 0
+  std::uint32_t first_sample;     ///< number of sample 0 in the pixel
 };
 
 /// What the rays of one pixel found.
@@ -66,13 +68,57 @@ struct SiteOrigins {
   }
 };
 
-/// Adds the rays of one pixel; first_sample: number of the first.
-void cast_rays(const PixelRays& rays, const SiteOrigins& origins, std::uint32_t first_sample,
-               RayBatch& batch);
+/// Adds the rays of one pixel.
+void cast_rays(const PixelRays& rays, const SiteOrigins& origins, RayBatch& batch);
 
 /// Adds a ray for every sample that brings light. target: (N) out, p~ of each sample's own site,
 /// the mean of its (f cos L)_rgb.
 void cast_samples(const CastSamples& samples, const SiteOrigins& origins, RayBatch& batch,
                   std::span<float> target);
+
+/// What is known of a pixel whatever its rays find; they add to it.
+struct KnownLight {
+  Rgb color;
+  float visibility = 0;
+  /// Rays and `color` alternate between two estimates of the pixel that agree in the mean:
+  bool has_halves = false;
+  float difference = 0;  ///< what the even one has more than the odd one in `color`, grey
+  float variance = 0;    ///< of the grey mean, where the method tells it itself
+  bool blocked = false;  ///< some of the light is known not to arrive
+};
+
+/// Where a method writes a pixel: what it knows, and the rays that tell the rest.
+class RayWriter {
+ public:
+  RayWriter(const SiteOrigins& origins, RayBatch& batch) : origins_(origins), batch_(batch) {}
+
+  KnownLight known;
+
+  /// See cast_samples().
+  void add(const CastSamples& samples, std::span<float> target) {
+    cast_samples(samples, origins_, batch_, target);
+  }
+  /// Rays and constant.
+  void add(const PixelRays& rays) {
+    cast_rays(rays, origins_, batch_);
+    known = {.color = rays.constant.color,
+             .visibility = rays.constant.visibility,
+             .has_halves = true,
+             .difference = rays.difference};
+  }
+
+ private:
+  const SiteOrigins& origins_;
+  RayBatch& batch_;
+};
+
+/// The traced rays of one pixel; at most 64.
+struct FoundRays {
+  std::span<const std::uint32_t> sample;  ///< as RayBatch::sample
+  std::span<const std::uint8_t> tag;
+  std::uint64_t is_free = 0;  ///< bit by bit
+
+  bool free(std::size_t i) const { return (is_free >> i & 1) != 0; }
+};
 
 }  // namespace baton

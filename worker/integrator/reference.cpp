@@ -97,4 +97,21 @@ ReferenceEstimate ReferenceRenderer::render(std::span<const SurfaceHit> surfaces
           .mean_variance = static_cast<float>(variance)};
 }
 
+PixelDiagnostics ReferenceMethod::sample(const PixelInput& input, const PixelState& pixel,
+                                         SamplerScratch& /*scratch*/, RayWriter& rays) const {
+  PixelDiagnostics did{.target_evaluations = 2 * num_samples_};
+  ShadowRays own;
+  const ReferenceEstimate estimate =
+      ReferenceRenderer(*input.accel, materials_)
+          .render(input.hits, input.light.now, num_samples_, input.key, own, did.rays_traced);
+  rays.known = {.color = estimate.radiance,
+                .visibility = estimate.visibility,
+                .variance = estimate.mean_variance,
+                .blocked = estimate.visibility < 1};
+  SampleState& state = pixel.tile;
+  state.lns[pixel.index] = state.lns_fresh[pixel.index] = estimate.lns;
+  state.source[pixel.index] = PixelSource::fresh;
+  return did;
+}
+
 }  // namespace baton

@@ -5,7 +5,7 @@
 
 #include "common/math/philox.h"
 #include "worker/accel/accel.h"
-#include "worker/scene/environment.h"
+#include "worker/integrator/pixel_method.h"
 
 namespace baton {
 
@@ -18,7 +18,7 @@ struct ReferenceEstimate {
   float mean_variance = 0;  ///< squared standard error of mean(radiance)
 };
 
-/// The judge of all methods: `num_samples` independent pairs of one environment and one BRDF sample
+/// `reference`, brute force: `num_samples` independent pairs of one environment and one BRDF sample
 /// under the balance heuristic, each pair at a site drawn uniformly, plain random numbers, scalar
 /// code and exact directions throughout; it shares nothing with the SIMD kernels but the ray
 /// tracer. surfaces: the pixel's sites (1 to 16), some may see nothing.
@@ -33,6 +33,19 @@ class ReferenceRenderer {
 
  private:
   const Accel& accel_;
+  std::span<const Material> materials_;
+};
+
+/// ReferenceRenderer as a method: it traces its rays itself and knows the whole pixel.
+class ReferenceMethod final : public PixelMethod {
+ public:
+  ReferenceMethod(std::int32_t num_samples, std::span<const Material> materials)
+      : num_samples_(num_samples), materials_(materials) {}
+  PixelDiagnostics sample(const PixelInput& input, const PixelState& pixel, SamplerScratch& scratch,
+                          RayWriter& rays) const override;
+
+ private:
+  std::int32_t num_samples_;
   std::span<const Material> materials_;
 };
 

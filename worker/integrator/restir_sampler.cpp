@@ -160,9 +160,7 @@ std::size_t evaluate(const PixelInput& input, const kernels::CarriedLight& light
 }  // namespace
 
 RestirSampler::RestirSampler(const SamplingSpec& spec)
-    : fresh_(spec.num_candidates, spec.brdf_fraction),
-      history_limit_(spec.history_limit),
-      reuse_visibility_(spec.reuse_visibility) {}
+    : fresh_(spec.num_candidates, spec.brdf_fraction), history_limit_(spec.history_limit) {}
 
 PixelDiagnostics RestirSampler::sample(const PixelInput& input, SamplerScratch& scratch,
                                        const PixelSamples& samples) const {

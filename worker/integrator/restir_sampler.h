@@ -27,13 +27,10 @@ class RestirSampler final : public PixelSampler {
   explicit RestirSampler(const SamplingSpec& spec);
   PixelDiagnostics sample(const PixelInput& input, SamplerScratch& scratch,
                           const PixelSamples& samples) const override;
-  bool asks_confidence() const override { return true; }
-  bool forgets_blocked() const override { return reuse_visibility_; }
 
  private:
   BidirectionalSampler fresh_;
   std::int32_t history_limit_;
-  bool reuse_visibility_;
 };
 
 }  // namespace baton

@@ -30,7 +30,6 @@ class SequentialSampler final : public PixelSampler {
         by_ratio_(by_ratio) {}
   PixelDiagnostics sample(const PixelInput& input, SamplerScratch& scratch,
                           const PixelSamples& samples) const override;
-  bool evaluates_carried() const override { return true; }
 
  private:
   bool has_wandered(float lns, float lns_fresh) const;

@@ -1,8 +1,8 @@
 #include "worker/pass/extra_samples.h"
 
 #include "common/base/poison.h"
+#include "worker/integrator/populations.h"
 #include "worker/pass/cpu_clock.h"
-#include "worker/pass/populations.h"
 #include "worker/pass/primary.h"
 #include "worker/sampling/energy_exchange.h"
 
@@ -12,6 +12,7 @@ ExtraSampler::ExtraSampler(const SecondPassWork& work)
     : work_(work),
       now_(view_of(work.light.now)),
       before_(view_of(work.light.before)),
+      sampler_(make_pixel_sampler(population_spec(work.context.job))),
       scratch_(std::make_unique<SamplerScratch>()) {
   drawn_.resize({0, 0, 1, 1}, population_spec(work.context.job).num_particles);
 }
@@ -64,7 +65,8 @@ void ExtraSampler::draw(std::int32_t x, std::int32_t y, std::size_t fold,
     const RngKey key{.job_seed = stream_seed(work_.context.job.seed, stream),
                      .frame = static_cast<std::uint32_t>(work_.frame.number),
                      .pixel = static_cast<std::uint32_t>(y * work_.context.job.image.width + x)};
-    sample_populations(*work_.context.sampler, static_cast<std::size_t>(drawn_.num_particles),
+    poison(*scratch_);
+    sample_populations(*sampler_, static_cast<std::size_t>(drawn_.num_particles),
                        {sites_, work_.light, now_, before_, key, work_.frame.index, false}, 0,
                        *scratch_, drawn_, colors);
     cast_samples({.direction = drawn_.direction,

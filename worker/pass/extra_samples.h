@@ -3,6 +3,7 @@
 #include <memory>
 
 #include "common/state/sample_state.h"
+#include "worker/integrator/pixel_sampler.h"
 #include "worker/integrator/ray_batch.h"
 #include "worker/pass/second_pass_work.h"
 
@@ -29,6 +30,7 @@ class ExtraSampler {
 
   const SecondPassWork& work_;
   const EnvironmentView now_, before_;
+  const std::unique_ptr<const PixelSampler> sampler_;
   std::unique_ptr<SamplerScratch> scratch_;
   SampleState drawn_;  ///< one population of one pixel
   SiteBlock sites_;

@@ -2,19 +2,10 @@
 
 #include <utility>
 
-#include "worker/pass/populations.h"
-#include "worker/sampling/energy_exchange.h"
+#include "worker/integrator/populations.h"
+#include "worker/integrator/weighted_method.h"
 
 namespace baton {
-
-float picture_scale(const JobSpec& job, std::int32_t population) {
-  if (num_populations(job) == 1) return 1;
-  float scale = 0;
-  for (const Fold& fold : folds_of(job.visibility.mask)) {
-    if (fold.giver_population == population) scale += fold.energy_scale;
-  }
-  return scale;
-}
 
 void FirstPassCollector::begin(const SampleState& state) {
   samples_ = {};

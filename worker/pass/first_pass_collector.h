@@ -23,8 +23,4 @@ class FirstPassCollector {
   FirstPassSamples samples_;
 };
 
-/// Factor of population k's contributions in the picture of the first pass: 1, but where one half
-/// only decides.
-float picture_scale(const JobSpec& job, std::int32_t population);
-
 }  // namespace baton

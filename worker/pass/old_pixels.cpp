@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "worker/pass/populations.h"
+#include "worker/integrator/populations.h"
 #include "worker/pass/surface_cache.h"
 
 namespace baton {

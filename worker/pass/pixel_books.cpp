@@ -26,9 +26,8 @@ void record_geometry(std::span<const SurfaceHit> hits, PixelResult& pixel) {
   pixel.depth /= num_hits;
 }
 
-void record_sampling(const PixelDiagnostics& did, std::size_t num_particles, PixelResult& pixel,
-                     SamplingStats& stats) {
-  pixel.ess_ratio = did.ess / static_cast<float>(num_particles);
+void record_sampling(const PixelDiagnostics& did, PixelResult& pixel, SamplingStats& stats) {
+  pixel.ess_ratio = did.ess / static_cast<float>(did.num_samples);
   pixel.acceptance = acceptance_rate({did.local.proposed + did.independent.proposed,
                                       did.local.accepted + did.independent.accepted});
   pixel.acceptance_local = acceptance_rate(did.local);

@@ -14,8 +14,7 @@ namespace baton {
 /// pixel, and the material of the first that sees a surface.
 void record_geometry(std::span<const SurfaceHit> hits, PixelResult& pixel);
 
-/// Enters what a method said about its work on a pixel of `num_particles`, whose source is set.
-void record_sampling(const PixelDiagnostics& did, std::size_t num_particles, PixelResult& pixel,
-                     SamplingStats& stats);
+/// Enters what a method said about its work on a pixel whose source is set.
+void record_sampling(const PixelDiagnostics& did, PixelResult& pixel, SamplingStats& stats);
 
 }  // namespace baton

@@ -1,25 +1,21 @@
 #include "worker/pass/render_context.h"
 
 #include "common/job/motion.h"
-#include "worker/pass/populations.h"
 #include "worker/pass/shared_assets.h"
 #include "worker/pass/surface_cache.h"
 
 namespace baton {
 namespace {
 
-/// The setting of each material that has its own.
-std::vector<PixelSetting> make_own_settings(const JobSpec& job) {
-  std::vector<PixelSetting> settings;
+/// The method of each material that has a setting of its own.
+std::vector<std::unique_ptr<const PixelMethod>> make_own_methods(const JobSpec& job) {
+  std::vector<std::unique_ptr<const PixelMethod>> methods;
   for (const auto& entry : job.scene.materials) {
     const auto own = job.sampling.by_material.find(entry.first);
-    if (own == job.sampling.by_material.end()) {
-      settings.emplace_back();
-    } else {
-      settings.push_back({make_material_sampler(own->second), own->second.num_particles});
-    }
+    methods.push_back(own == job.sampling.by_material.end() ? nullptr
+                                                            : make_material_method(own->second));
   }
-  return settings;
+  return methods;
 }
 
 }  // namespace
@@ -41,9 +37,9 @@ Result<std::shared_ptr<const RenderContext>> make_render_context(
   context->frames = expand_sequence(job);
   context->lights = std::make_unique<LightSequence>(context->job, assets->maps);
   context->surfaces = std::make_shared<SurfaceCache>();
-  context->sampler = make_pixel_sampler(population_spec(job));
-  context->own_settings = make_own_settings(job);
   context->scene = std::shared_ptr<const Scene>(assets, &assets->scene);
+  context->method = make_pixel_method(context->job, context->scene->materials);
+  context->own_methods = make_own_methods(job);
   context->geometry =
       std::make_unique<GeometrySequence>(context->job, *context->scene, assets->accel);
   return std::shared_ptr<const RenderContext>(std::move(context));

@@ -6,18 +6,12 @@
 #include "common/job/sequence.h"
 #include "worker/accel/geometry_sequence.h"
 #include "worker/integrator/frame_light.h"
-#include "worker/integrator/pixel_sampler.h"
+#include "worker/integrator/pixel_method.h"
 #include "worker/pass/tile_renderer.h"
 
 namespace baton {
 
 class SurfaceCache;
-
-/// How pixels are sampled.
-struct PixelSetting {
-  std::unique_ptr<const PixelSampler> sampler;
-  std::int32_t num_particles = 0;  ///< in the state, per pixel
-};
 
 /// See tile_renderer.h. Immutable but for lights, geometry and surfaces, which are prepared frame
 /// by frame on demand and guard themselves.
@@ -29,8 +23,8 @@ class RenderContext {
   std::vector<FrameSpec> frames;
   std::shared_ptr<const Scene> scene;
   std::unique_ptr<GeometrySequence> geometry;
-  std::unique_ptr<const PixelSampler> sampler;  ///< null: reference
-  std::vector<PixelSetting> own_settings;       ///< (materials); null: `sampler`
+  std::unique_ptr<const PixelMethod> method;
+  std::vector<std::unique_ptr<const PixelMethod>> own_methods;  ///< (materials); null: `method`
   std::unique_ptr<LightSequence> lights;
   std::shared_ptr<SurfaceCache> surfaces;  ///< of the last frames, where things move
 

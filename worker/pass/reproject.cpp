@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "common/job/motion.h"
-#include "worker/pass/populations.h"
+#include "worker/integrator/populations.h"
 
 namespace baton {
 namespace {

@@ -5,17 +5,16 @@
 #include <vector>
 
 #include "common/job/task.h"
-#include "worker/integrator/ray_batch.h"
+#include "worker/integrator/pixel_method.h"
 #include "worker/pass/film_writer.h"
 #include "worker/pass/first_pass_collector.h"
-#include "worker/pass/populations.h"
 #include "worker/pass/primary.h"
 #include "worker/pass/reproject.h"
 
 namespace baton {
 
-/// Renders one frame of one tile through the passes sample -> visibility -> shade -> film, a batch
-/// of pixels at a time so that a batch stays in the cache.
+/// Renders one frame of one tile: look ahead, sample, trace, learn, film, a batch of pixels at a
+/// time so that a batch stays in the cache. What the method does is its own affair (PixelMethod).
 class TileFrameRenderer {
  public:
   /// geometry and surfaces: of the frames that are rendered; must outlive the object.
@@ -48,7 +47,7 @@ class TileFrameRenderer {
   struct Ahead {
     PixelHistory history = PixelHistory::none;
     OldSurfaces old;  ///< for `moved`
-    std::array<kernels::LocatedDirections, limits::kMaxPopulations> located;
+    LocatedPopulations located;
     bool is_located = false;
   };
   /// Wall seconds of the frame in work.
@@ -63,18 +62,13 @@ class TileFrameRenderer {
     return std::span(targets_).subspan(index * n, n);
   }
   void sample(Batch& batch, const FrameLight& light, SampleState& state);
+  const PixelMethod& method_of(std::size_t index) const;
   void look_ahead(std::size_t pixel_of_batch, std::size_t index, const kernels::CarriedLight& light,
                   SampleState& state);
-  std::size_t num_common_particles(const SampleState& state) const;
   SiteOrigins origins(std::size_t index) const;
-  void cast_pixel_samples(Batch& batch, std::size_t i, std::size_t n, const SampleColors& colors,
-                          const SampleState& state);
-  void cast_rays(Batch& batch, std::size_t i, const PixelRays& rays);
   void trace(Batch& batch);
-  void shade(Batch& batch, SampleState& state);
-  void remember(const Batch& batch, std::size_t i, std::size_t first, std::uint64_t is_free,
-                SampleState& state);
-  void render_reference(Batch& batch, const FrameLight& light, SampleState& state);
+  void learn(Batch& batch, SampleState& state);
+  void collect(const FoundRays& found, std::size_t index, const SampleState& state);
   void finish(Batch& batch, const FrameLight& light, FilmWriter& film);
 
   const RenderContext& context_;
@@ -90,7 +84,6 @@ class TileFrameRenderer {
   bool knows_targets_ = false;  ///< targets_ are those of the frame before the one in work
   std::unique_ptr<SamplerScratch> scratch_;
   FirstPassCollector collector_;
-  std::vector<float> picture_scale_;  ///< (populations)
   RenderStats stats_;
   Stages stages_;
   SamplingStats frame_sampling_;

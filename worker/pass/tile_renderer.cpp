@@ -6,7 +6,6 @@
 
 #include "common/job/motion.h"
 #include "worker/pass/cpu_clock.h"
-#include "worker/pass/populations.h"
 #include "worker/pass/surface_cache.h"
 #include "worker/pass/tile_frame.h"
 
@@ -109,9 +108,10 @@ class TileWalk {
   void start_state() {
     state_.resize(rect_, num_carried_particles(context_.job.sampling),
                   num_populations(context_.job));
-    if (context_.sampler == nullptr || !carries_state(context_.job)) return;
-    if (context_.sampler->keeps_memory()) state_.add_memory();
-    if (context_.sampler->asks_confidence()) state_.add_confidence();
+    if (!carries_state(context_.job)) return;
+    const Carried carried = traits(context_.job.sampling.method).carried;
+    if (carried == Carried::memory) state_.add_memory();
+    if (carried == Carried::weighed_samples) state_.add_confidence();
   }
   Result<std::shared_ptr<const FrameLight>> light_of(const FrameSpec& frame) {
     const CpuTimer timer(stats_.seconds_light);

@@ -95,12 +95,11 @@ Status paste_tile(const FilmTile& tile, FilmTile& image) {
 }
 
 ImageMetadata frame_metadata(const JobSpec& job, const Digest& job_digest, int frame_number) {
-  ImageMetadata metadata{
-      {"baton:version", kVersion},
-      {"baton:jobName", job.name},
-      {"baton:jobDigest", job_digest.hex()},
-      {"baton:frame", std::to_string(frame_number)},
-      {"baton:method", std::string(kMethods[static_cast<std::size_t>(job.sampling.method)])}};
+  ImageMetadata metadata{{"baton:version", kVersion},
+                         {"baton:jobName", job.name},
+                         {"baton:jobDigest", job_digest.hex()},
+                         {"baton:frame", std::to_string(frame_number)},
+                         {"baton:method", std::string(traits(job.sampling.method).name)}};
   for (const auto& [name, text] : job.metadata)
     metadata.emplace_back("baton:metadata:" + name, text);
   return metadata;

@@ -9,6 +9,7 @@ namespace {
 
 JobSpec small_job() {
   JobSpec job;
+  job.sampling.method = Method::sequential;
   job.frames = {1, 2, 3, 4, 5};
   job.image = {.width = 100, .height = 50, .sites = 4, .tile_size = 32};
   job.state.checkpoint_every = 2;

@@ -83,8 +83,7 @@ TEST(JobJson, MaterialsTakeWhatTheyLeaveOutFromTheRest) {
       "sampling": {"method": "mis", "numParticles": 8, "numCandidates": 32,
                    "byMaterial": {"wall": {"numParticles": 4}}}})");
   ASSERT_EQ(job.sampling.by_material.size(), 1u);
-  const MaterialSampling expected{
-      .method = StartMethod::mis, .num_particles = 4, .num_candidates = 32};
+  const MaterialSampling expected{.method = Method::mis, .num_particles = 4, .num_candidates = 32};
   EXPECT_EQ(job.sampling.by_material.at("wall"), expected);
   EXPECT_EQ(parsed(to_json(job)), job);
   EXPECT_EQ(to_json(parsed(job_text(""))).find("byMaterial"), std::string::npos);
@@ -162,7 +161,8 @@ TEST(JobJson, NamesPlaceAndExpectationOfEachKindOfFault) {
        "$.visibility.correlated: expected false, as sampling.method is restir, whose samples are "
        "carried as one set, got true"},
       {R"("sampling": {"method": "ratio"}, "visibility": {"correlated": true})",
-       "$.visibility.correlated: expected false, as the rays of sampling.method ratio are not its "
+       "$.visibility.correlated: expected false, as sampling.method is ratio, whose rays are not "
+       "its "
        "samples, got true"},
       {R"("sampling": {"historyLimit": 0})",
        "$.sampling.historyLimit: expected an integer in [1, 1000], got 0"},
@@ -364,6 +364,26 @@ TEST(JobDocument, RefusesADocumentThatIsDamaged) {
           .error()
           .message,
       HasSubstr("job document: $.assets[0].digest: expected 32 hexadecimal digits, got \"1\""));
+}
+
+// Settings may change without another picture; everything else is named.
+TEST(JobDifference, NamesWhatDecidesPixelsAlone) {
+  const auto document = [](const std::string& keys) {
+    return ParsedJobDocument{.job = parsed(job_text(keys)), .assets = {}, .digest = {}};
+  };
+  const ParsedJobDocument plain = document(R"("seed": 0)");
+  for (const char* setting :
+       {R"("priority": 7)", R"("metadata": {"a": "b"})", R"("frames": "1-8")",
+        R"("image": {"tileSize": 32})", R"("output": {"compression": "rle"})",
+        R"("state": {"checkpointEvery": 3})", R"("maxRetriesPerTask": 1)", R"("maxFailedTasks": 3)",
+        R"("maxFailuresPerWorker": 2)", R"("maxSecondsPerTask": 77)"}) {
+    const auto differences = picture_differences(plain, document(setting));
+    EXPECT_TRUE(differences.empty()) << setting << " " << differences.front();
+  }
+  EXPECT_EQ(picture_differences(plain, document(R"("seed": 3)")),
+            std::vector{std::string("$.seed")});
+  EXPECT_EQ(picture_differences(plain, document(R"("state": {"carry": false})")),
+            std::vector{std::string("$.state.carry")});
 }
 
 }  // namespace

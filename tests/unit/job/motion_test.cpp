@@ -14,6 +14,7 @@ using testing::HasSubstr;
 
 JobSpec moving_camera(KeyCurve curve) {
   JobSpec job;
+  job.sampling.method = Method::sequential;
   job.motion.curve = curve;
   for (const auto& [frame, x] : {std::pair{1.0, 0.0f}, {3.0, 4.0f}, {7.0, 36.0f}})
     job.camera.keys.push_back({.frame = frame, .position = {x, 1, 9}, .look_at = {x, 0, 0}});
@@ -87,6 +88,7 @@ TEST(Motion, AnObjectIsScaledThenTurnedThenMoved) {
 
 TEST(Motion, SaysWhatMovesAndWhetherThatIsSettled) {
   JobSpec job;
+  job.sampling.method = Method::sequential;
   EXPECT_FALSE(moves(job));
   EXPECT_TRUE(is_settled(job));
   EXPECT_EQ(frames_per_run(job), job.state.checkpoint_every);

@@ -24,7 +24,7 @@ class Poison : public testing::Test {
 
   /// box_job, small.
   static JobSpec small_job(Method method, int num_particles, int sites) {
-    JobSpec job = test::sequence_job(fresh_method(method) || method == Method::ratio ? 1 : 3);
+    JobSpec job = test::sequence_job(traits(method).carries() ? 3 : 1);
     job.image = {.width = 8, .height = 6, .sites = sites, .tile_size = 4096};
     job.sampling.method = method;
     job.sampling.num_particles = num_particles;
@@ -103,10 +103,12 @@ TEST_F(Poison, PopulationsOfAnyNumberAndTheSecondPass) {
 }
 
 TEST_F(Poison, MaterialsWithNumbersOfTheirOwn) {
+  constexpr Method kDrawAnew[] = {Method::environment, Method::brdf, Method::mis,
+                                  Method::bidirectional};
   for (int i = 0; i < 64; ++i) {
     JobSpec job = small_job(Method::mis, 1 + i % 16, kSites[i % 4]);
     const auto own = [&](int k) {
-      return MaterialSampling{.method = static_cast<StartMethod>((i + k) % 4),
+      return MaterialSampling{.method = kDrawAnew[(i + k) % 4],
                               .num_particles = 1 + (5 * i + 7 * k) % 19,
                               .num_candidates = 32 + (3 * i + k) % 8};
     };

@@ -35,9 +35,9 @@ JobSpec job_by_material() {
   job.sampling.method = Method::mis;
   job.sampling.num_particles = 8;
   job.sampling.by_material = {
-      {"glossy", {.method = StartMethod::bidirectional, .num_particles = 12, .num_candidates = 64}},
-      {"ground", {.method = StartMethod::environment, .num_particles = 4}},
-      {"unseen", {.method = StartMethod::bidirectional, .num_candidates = 100}}};
+      {"glossy", {.method = Method::bidirectional, .num_particles = 12, .num_candidates = 64}},
+      {"ground", {.method = Method::environment, .num_particles = 4}},
+      {"unseen", {.method = Method::bidirectional, .num_candidates = 100}}};
   job.scene.materials["unseen"] = {};
   job.output.aovs = {Aov::lns, Aov::ess, Aov::material};
   return job;
@@ -63,9 +63,8 @@ TEST(RunTile, EachMaterialIsSampledByItsOwnSetting) {
                   [](const auto& own) { return own.first != "unseen"; });
     if (const auto own = job.sampling.by_material.find(name);
         own != job.sampling.by_material.end()) {
-      whole.sampling.method = own->second.method == StartMethod::environment
-                                  ? Method::environment
-                                  : Method::bidirectional;
+      whole.sampling.method =
+          own->second.method == Method::environment ? Method::environment : Method::bidirectional;
       whole.sampling.num_particles = own->second.num_particles;
       whole.sampling.num_candidates = own->second.num_candidates;
     }

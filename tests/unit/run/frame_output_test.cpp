@@ -14,6 +14,7 @@ namespace {
 
 JobSpec small_job(const std::string& name) {
   JobSpec job;
+  job.sampling.method = Method::sequential;
   job.name = "small";
   job.frames = {7, 9};
   job.image = {.width = 20, .height = 10, .sites = 1, .tile_size = 8};

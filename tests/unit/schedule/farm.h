@@ -21,6 +21,7 @@ inline constexpr auto kSilence = std::chrono::milliseconds(4000);
 /// A job of `tiles` tiles in one row and `frames` frames, `per_run` of them in a lease.
 inline JobSpec small_job(int tiles, int frames, int per_run, bool carry = true) {
   JobSpec job;
+  job.sampling.method = Method::sequential;
   job.image = {.width = 8 * tiles, .height = 8, .sites = 1, .tile_size = 8};
   job.frames.clear();
   for (int i = 0; i < frames; ++i) job.frames.push_back(i + 1);

@@ -144,6 +144,7 @@ struct ServiceTest : testing::Test {
     fs::create_directories(folder);
     ASSERT_TRUE(write_file_atomic(folder / "sky.hdr", as_bytes_view("sky")).ok());
     job.name = "test";
+    job.sampling.method = Method::sequential;
     job.frames = {1, 2, 3, 4};
     job.image = {.width = 16, .height = 8, .sites = 1, .tile_size = 8};
     job.scene.materials["grey"] = {};

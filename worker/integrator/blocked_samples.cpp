@@ -1,4 +1,4 @@
-#include "worker/pass/blocked_samples.h"
+#include "worker/integrator/blocked_samples.h"
 
 #include <numeric>
 #include <span>
@@ -7,13 +7,12 @@
 
 namespace baton {
 
-void forget_blocked(const RayBatch& rays, std::size_t first, std::size_t end,
-                    std::uint32_t first_sample, std::size_t index, SampleState& state) {
+void forget_blocked(const FoundRays& found, std::size_t index, SampleState& state) {
   BATON_CHECK(state.num_populations == 1);
   const auto n = static_cast<std::size_t>(state.num_particles);
   const std::span<float> weights = std::span(state.weight).subspan(index * n, n);
-  for (std::size_t r = first; r < end; ++r) {
-    if (rays.rays.t_far[r] < 0) weights[rays.sample[r] - first_sample] = 0;
+  for (std::size_t i = 0; i < found.sample.size(); ++i) {
+    if (!found.free(i)) weights[found.sample[i]] = 0;
   }
   const float left = std::accumulate(weights.begin(), weights.end(), 0.0f);
   if (left > 0) {

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "worker/integrator/pixel_sampler.h"
+#include "worker/integrator/pixel_method.h"
 
 namespace baton {
 
@@ -11,13 +11,11 @@ namespace baton {
 /// colour cancels; under grey light on grey surfaces the two methods are one. Consistent, not
 /// unbiased: a ratio of two estimates, off at finite N where the colours of the samples differ. It
 /// carries nothing.
-class RatioSampler final : public PixelSampler {
+class RatioMethod final : public PixelMethod {
  public:
-  explicit RatioSampler(const SamplingSpec& spec);
-  /// samples: empty but for Lns and source.
-  PixelDiagnostics sample(const PixelInput& input, SamplerScratch& scratch,
-                          const PixelSamples& samples) const override;
-  bool chooses_rays() const override { return true; }
+  explicit RatioMethod(const SamplingSpec& spec);
+  PixelDiagnostics sample(const PixelInput& input, const PixelState& pixel, SamplerScratch& scratch,
+                          RayWriter& rays) const override;
 
  private:
   std::int32_t num_candidates_;

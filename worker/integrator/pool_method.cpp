@@ -1,10 +1,11 @@
-#include "worker/integrator/pool_sampler.h"
+#include "worker/integrator/pool_method.h"
 
 #include <algorithm>
 #include <array>
 #include <bit>
 
 #include "worker/integrator/candidate_samplers.h"
+#include "worker/integrator/populations.h"
 #include "worker/sampling/light_noise.h"
 #include "worker/sampling/pool.h"
 
@@ -55,15 +56,17 @@ kernels::CandidateCounts counts_for_noise(const SiteBlock& sites, std::int32_t n
 
 }  // namespace
 
-PoolSampler::PoolSampler(const SamplingSpec& spec)
+PoolMethod::PoolMethod(const SamplingSpec& spec)
     : num_candidates_(spec.num_candidates),
       lobe_fraction_(spec.brdf_fraction),
       num_rays_(spec.num_particles) {}
 
-PixelDiagnostics PoolSampler::sample(const PixelInput& input, SamplerScratch& scratch,
-                                     const PixelSamples& samples) const {
+PixelDiagnostics PoolMethod::sample(const PixelInput& input, const PixelState& pixel,
+                                    SamplerScratch& scratch, RayWriter& rays) const {
   static constexpr std::array<VisibilityCell, kVisibilityCells> kNothing{};
-  const std::span<const VisibilityCell> memory = input.memory.empty() ? kNothing : input.memory;
+  const std::span<MemoryCell> own = pixel.memory();
+  const std::span<const VisibilityCell> memory =
+      own.empty() ? std::span<const VisibilityCell>(kNothing) : own;
   kernels::CandidateCounts counts =
       counts_for_noise(input.sites, num_candidates_, lobe_fraction_, light_variance(memory));
   if (kernels::chooses_evenly(input.light.pool, counts))
@@ -72,8 +75,15 @@ PixelDiagnostics PoolSampler::sample(const PixelInput& input, SamplerScratch& sc
                                                 Rng(input.key, PassId::candidates),
                                                 Rng(input.key, PassId::choose).uniforms(0, 0)[0],
                                                 num_rays_, memory, scratch.pool, scratch.rays);
+  if (!own.empty() && scratch.rays.count > 0)
+    remember_light_variance(own, scratch.rays.light_variance);
+  rays.add(scratch.rays);
   const auto source = input.has_history ? PixelSource::carried : PixelSource::fresh;
-  return settle_rays(total, num_rays_, counts.total(), source, samples);
+  return settle_rays(total, num_rays_, counts.total(), source, pixel);
+}
+
+void PoolMethod::learn(const FoundRays& found, const PixelState& pixel) const {
+  if (!pixel.memory().empty()) remember_rays(pixel.memory(), found.tag, found.is_free);
 }
 
 }  // namespace baton

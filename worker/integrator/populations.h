@@ -4,7 +4,7 @@
 
 #include "common/base/limits.h"
 #include "common/state/sample_state.h"
-#include "worker/integrator/pixel_sampler.h"
+#include "worker/integrator/pixel_method.h"
 
 namespace baton {
 
@@ -27,6 +27,10 @@ PixelDiagnostics sample_populations(const PixelSampler& sampler, std::size_t num
                                     const PixelInput& input, std::size_t index,
                                     SamplerScratch& scratch, SampleState& state,
                                     SampleColors& colors);
+
+/// Settles a pixel whose method chose `num_rays` rays among candidates that weigh `total`.
+PixelDiagnostics settle_rays(float total, std::int32_t num_rays, std::int32_t num_candidates,
+                             PixelSource source, const PixelState& pixel);
 
 /// What a pixel's populations say together.
 float mean_lns(const SampleState& state, std::size_t index);

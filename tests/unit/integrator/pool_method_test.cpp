@@ -1,5 +1,5 @@
-// How many candidates a pixel of the pool sampler gets.
-#include "worker/integrator/pool_sampler.h"
+// How many candidates a pixel of `pool` gets.
+#include "worker/integrator/pool_method.h"
 
 #include <gtest/gtest.h>
 
@@ -50,31 +50,47 @@ SiteBlock pixel(bool glossy) {
   return sites;
 }
 
+/// One pixel without a memory and what sampling it needs.
+struct OnePixel {
+  OnePixel() { state.resize({0, 0, 1, 1}, 0); }
+  PixelDiagnostics sample(const SamplingSpec& spec, const FrameLight& light, const SiteBlock& sites,
+                          std::uint32_t number) {
+    const EnvironmentView view = view_of(light.now);
+    RayBatch batch;
+    const SiteOrigins origins{};
+    RayWriter rays(origins, batch);
+    return PoolMethod(spec).sample({.sites = sites,
+                                    .light = light,
+                                    .now = view,
+                                    .before = view,
+                                    .key = {.job_seed = 5, .pixel = number}},
+                                   {state, 0}, *scratch, rays);
+  }
+
+  SampleState state;
+  std::unique_ptr<SamplerScratch> scratch = std::make_unique<SamplerScratch>();
+};
+
+SamplingSpec spec_of(std::int32_t num_candidates) {
+  SamplingSpec spec;
+  spec.num_candidates = num_candidates;
+  spec.num_particles = 16;
+  return spec;
+}
+
 class PoolCounts : public testing::Test {
  protected:
   /// Candidates of a pixel in all. The noise that they show is then in scratch->rays.
   std::int32_t sample(const FrameLight& light, const SiteBlock& sites, std::int32_t num_candidates,
                       const LightVariance& known) {
-    SamplingSpec spec;
-    spec.num_candidates = num_candidates;
-    spec.num_particles = 16;
-    std::vector<VisibilityCell> memory(kVisibilityCells, 0);
-    remember_ray(memory, 0, true);
-    remember_light_variance(memory, known);
-    const EnvironmentView view = view_of(light.now);
-    float lns = 0, lns_fresh = 0;
-    PixelSource source{};
-    const PixelInput input{.sites = sites,
-                           .light = light,
-                           .now = view,
-                           .before = view,
-                           .key = {.job_seed = 5},
-                           .memory = memory};
-    const PixelSamples samples{{}, {}, {}, {}, {}, {}, lns, lns_fresh, source};
-    return PoolSampler(spec).sample(input, *scratch, samples).target_evaluations;
+    pixel_.state.add_memory();
+    remember_ray(pixel_.state.memory, 0, true);
+    remember_light_variance(pixel_.state.memory, known);
+    return pixel_.sample(spec_of(num_candidates), light, sites, 0).target_evaluations;
   }
 
-  std::unique_ptr<SamplerScratch> scratch = std::make_unique<SamplerScratch>();
+  OnePixel pixel_;
+  SamplerScratch* const scratch = pixel_.scratch.get();
 };
 
 // A pixel without memory reads whole blocks of the pool, whatever M is: else the same eighths of
@@ -83,26 +99,13 @@ class PoolCounts : public testing::Test {
 TEST_F(PoolCounts, AnyNumberOfCandidatesSeesTheWholeMap) {
   const FrameLight flat = light_of([](int) { return 1.0f; });
   const SiteBlock sites = pixel(false);
-  const EnvironmentView view = view_of(flat.now);
   for (const std::int32_t num_candidates : {25, 50, 63, 64, 130}) {
-    SamplingSpec spec;
-    spec.num_candidates = num_candidates;
-    spec.num_particles = 16;
-    const PoolSampler sampler(spec);
     double sum = 0;
-    constexpr int kPixels = 4000;
-    for (int i = 0; i < kPixels; ++i) {
-      const std::vector<VisibilityCell> memory(kVisibilityCells, 0);
-      float lns = 0, lns_fresh = 0;
-      PixelSource source{};
-      const PixelInput input{.sites = sites,
-                             .light = flat,
-                             .now = view,
-                             .before = view,
-                             .key = {.job_seed = 5, .pixel = static_cast<std::uint32_t>(i)},
-                             .memory = memory};
-      sampler.sample(input, *scratch, {{}, {}, {}, {}, {}, {}, lns, lns_fresh, source});
-      sum += lns;
+    constexpr std::uint32_t kPixels = 4000;
+    OnePixel pixel;
+    for (std::uint32_t i = 0; i < kPixels; ++i) {
+      pixel.sample(spec_of(num_candidates), flat, sites, i);
+      sum += pixel.state.lns[0];
     }
     const double albedo = sites.kd_r[0];
     EXPECT_NEAR(sum / kPixels / albedo, 1, 0.01) << "M = " << num_candidates;

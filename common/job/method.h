@@ -1,0 +1,76 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <string_view>
+
+namespace baton {
+
+struct SamplingSpec;
+
+/// How pixels are sampled. automatic: settled by a pilot before the job is submitted; never part of
+/// a job document.
+enum class Method : std::uint8_t {
+  reference,
+  environment,
+  brdf,
+  mis,
+  bidirectional,
+  sequential,
+  pool,
+  ratio,
+  restir,
+  automatic
+};
+inline constexpr std::size_t kNumMethods = 10;
+
+/// What a method hands from frame to frame.
+enum class Carried : std::uint8_t {
+  nothing,
+  samples,          ///< the pixel's weighted samples
+  weighed_samples,  ///< with the confidence that they are weighed by
+  memory,           ///< what its rays found, and how noisy its light was
+};
+
+/// How a method reads the directions that are drawn from the environment once a frame.
+struct LightUse {
+  std::int32_t num_taken = 1;  ///< by most pixels
+  bool one_run = false;        ///< pixels differ in how many they take
+  bool with_before = false;    ///< their light in the frame before is asked for as well
+};
+
+/// All that sets a method apart outside its own code: who else switches on Method is mistaken.
+struct MethodTraits {
+  std::string_view name;  ///< in a job
+  Carried carried = Carried::nothing;
+  /// Its rays are N weighted samples, which its states hold; else rays are chosen apart from them.
+  bool keeps_samples = false;
+  /// All samples are drawn anew in each frame, so that it may start `sequential` and serve a single
+  /// material.
+  bool draws_anew = false;
+  /// Pixels may weigh the samples of SamplingSpec::num_neighbors others.
+  bool asks_neighbors = false;
+  /// Why the second pass can't follow; empty: it can.
+  std::string_view no_second_pass = {};
+  LightUse (*light)(const SamplingSpec&) = nullptr;
+  /// Shadow rays of a pixel at most.
+  std::int64_t (*most_rays)(const SamplingSpec&) = nullptr;
+
+  bool carries() const { return carried != Carried::nothing; }
+};
+
+/// The row of a method.
+const MethodTraits& traits(Method method);
+
+/// Names of all methods in a job, in the order of the enumeration.
+inline constexpr std::array<std::string_view, kNumMethods> kMethodNames{
+    "reference",  "environment", "brdf",  "mis",    "bidirectional",
+    "sequential", "pool",        "ratio", "restir", "auto"};
+
+/// name: one of kMethodNames.
+Method method_of(std::string_view name);
+
+/// Of `total` samples those from the BRDF, rounded.
+std::int32_t num_from_brdf(std::int32_t total, float brdf_fraction);
+
+}  // namespace baton
