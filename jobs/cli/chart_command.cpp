@@ -7,7 +7,7 @@
 #include "common/base/files.h"
 #include "jobs/cli/commands.h"
 #include "jobs/cli/farm_job_runner.h"
-#include "jobs/study/auto_pilot.h"
+#include "jobs/auto/auto_pilot.h"
 #include "jobs/study/study_report.h"
 #include "worker/scene/settle_motion.h"
 

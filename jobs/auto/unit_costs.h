@@ -1,0 +1,27 @@
+#pragma once
+
+#include <cstdint>
+
+#include "common/job/job_spec.h"
+#include "jobs/study/run_record.h"
+
+namespace baton {
+
+/// How much dearer a shadow ray is in a scene than in those that the unit costs were fitted to:
+/// (triangles / 20000)^0.16, twice that where objects move, as rays then ask two hierarchies.
+/// A rule instead of a measurement, because only a clock could measure it, and what `auto` chooses
+/// must not depend on one: Embree counts no steps. The rule is a fit to the runs of
+/// jobs/studies/ray-costs.json, over which the time of a ray goes from 0.03 to 0.18 us; it is off
+/// by 20 to 30 % (rms), as it sees neither the view nor how much of the sky is free.
+/// num_triangles: of all instances, the ground included.
+double ray_cost_factor(std::uint64_t num_triangles, bool objects_move);
+/// The same for the geometry of a job, which is loaded. Errors: those of load_scene.
+Result<double> ray_cost_factor(const JobSpec& job);
+
+/// CPU microseconds of a job's counted work: a stand-in for time that is the same on every run and
+/// machine, for choices that must be repeatable. Rays count with ray_factor (ray_cost_factor), the
+/// rest with fixed unit costs, a fit to the runs of jobs/studies/unit-costs.json (docs/charts.md
+/// names machine and residual).
+double counted_cost_us(const JobSpec& job, double ray_factor, const RunCounts& counts);
+
+}  // namespace baton
