@@ -9,9 +9,9 @@ namespace baton {
 namespace {
 
 /// Of the fit to jobs/studies/ray-costs.json.
-constexpr double kFittedTriangles = 20'000;
-constexpr double kTriangleExponent = 0.16;
-constexpr double kMovingFactor = 2;
+constexpr double kFittedTriangles = 75'000;
+constexpr double kTriangleExponent = 0.14;
+constexpr double kMovingFactor = 3;
 
 /// Microseconds of one of each. A move costs what it evaluates.
 struct UnitCosts {

@@ -8,11 +8,11 @@
 namespace baton {
 
 /// How much dearer a shadow ray is in a scene than in those that the unit costs were fitted to:
-/// (triangles / 20000)^0.16, twice that where objects move, as rays then ask two hierarchies.
-/// A rule instead of a measurement, because only a clock could measure it, and what `auto` chooses
-/// must not depend on one: Embree counts no steps. The rule is a fit to the runs of
-/// jobs/studies/ray-costs.json, over which the time of a ray goes from 0.03 to 0.18 us; it is off
-/// by 20 to 30 % (rms), as it sees neither the view nor how much of the sky is free.
+/// (triangles / 75000)^0.14, three times that where objects move, as rays then ask two hierarchies.
+/// A rule, because only a clock could measure it (Embree counts no steps), and what `auto` chooses
+/// must not depend on one. Fitted to the runs of jobs/studies/ray-costs.json (14 to 3 million
+/// triangles, 0.02 to 0.16 us a ray, still), which it meets within 23 % (rms): it sees neither the
+/// view nor how much of the sky is free.
 /// num_triangles: of all instances, the ground included.
 double ray_cost_factor(std::uint64_t num_triangles, bool objects_move);
 /// The same for the geometry of a job, which is loaded. Errors: those of load_scene.

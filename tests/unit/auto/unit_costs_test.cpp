@@ -8,10 +8,10 @@ namespace baton {
 namespace {
 
 TEST(RayCostFactor, GrowsWithTheSceneAndWhereObjectsMove) {
-  EXPECT_EQ(ray_cost_factor(20'000, false), 1);
-  EXPECT_NEAR(ray_cost_factor(40'000, false), std::exp2(0.16), 1e-12);
+  EXPECT_EQ(ray_cost_factor(75'000, false), 1);
+  EXPECT_NEAR(ray_cost_factor(150'000, false), std::exp2(0.14), 1e-12);
   EXPECT_LT(ray_cost_factor(2, false), 0.3);
-  EXPECT_EQ(ray_cost_factor(5'000, true), 2 * ray_cost_factor(5'000, false));
+  EXPECT_EQ(ray_cost_factor(5'000, true), 3 * ray_cost_factor(5'000, false));
   EXPECT_GT(ray_cost_factor(0, false), 0);
 }
 
@@ -24,7 +24,7 @@ TEST(RayCostFactor, OfAJobIsThatOfItsTriangles) {
   ASSERT_TRUE(factor.ok()) << factor.error().message;
   EXPECT_EQ(*factor, ray_cost_factor(2, false));
 
-  job.scene.meshes["gone"] = "/none/gone.obj";
+  job.scene.meshes["gone"].path = "/none/gone.obj";
   job.scene.objects.push_back({});
   job.scene.objects.back().mesh = "gone";
   job.scene.objects.back().material = "grey";
