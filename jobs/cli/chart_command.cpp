@@ -5,9 +5,9 @@
 #include <thread>
 
 #include "common/base/files.h"
+#include "jobs/auto/auto_pilot.h"
 #include "jobs/cli/commands.h"
 #include "jobs/cli/farm_job_runner.h"
-#include "jobs/study/auto_pilot.h"
 #include "jobs/study/study_report.h"
 #include "worker/scene/settle_motion.h"
 

@@ -2,8 +2,8 @@
 
 #include <fmt/format.h>
 
+#include "jobs/auto/auto_pilot.h"
 #include "jobs/cli/farm_job_runner.h"
-#include "jobs/study/auto_pilot.h"
 
 namespace baton {
 
@@ -20,8 +20,6 @@ Status settle_method(JobSpec& job, const FarmOptions& farm) {
     fmt::print(stderr, "pilot      {:<26} error {:.4f}  {:.2f} us per pixel and frame\n",
                seen.candidate.name(), seen.error, seen.cost_us);
   }
-  if (const auto maps = job.metadata.find("auto.maps"); maps != job.metadata.end())
-    fmt::print(stderr, "maps       {}\n", maps->second);
   fmt::print(stderr, "chosen     {}\nbecause    {}\n", job.metadata["auto.choice"],
              job.metadata["auto.reason"]);
   return {};

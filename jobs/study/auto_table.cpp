@@ -5,13 +5,12 @@
 #include <cmath>
 #include <iterator>
 
-#include "jobs/study/auto_choice.h"
 #include "jobs/study/svg_text.h"
 
 namespace baton {
 namespace {
 
-bool is_auto(const StudyCell& cell) { return cell.job.metadata.contains(kAutoChoice); }
+bool is_auto(const StudyCell& cell) { return !cell.chosen.empty(); }
 
 /// The fixed cells of a scene and budget.
 std::vector<std::size_t> fixed_cells(const Study& study, std::size_t scene,
@@ -109,8 +108,7 @@ std::string interval_text(const Interval& i) {
 }
 
 std::string choice_text(const StudyCell& cell) {
-  const std::string& choice = cell.job.metadata.at(kAutoChoice);
-  return choice.substr(0, choice.find(':'));
+  return cell.chosen.substr(0, cell.chosen.find(':'));
 }
 
 }  // namespace

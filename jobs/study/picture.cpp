@@ -38,7 +38,6 @@ Result<Picture> read_picture(const std::filesystem::path& path) {
   picture.ess = plane(film, "ess");
   picture.acceptance = plane(film, "acceptance");
   picture.variance = plane(film, "variance");
-  picture.material = plane(film, "material");
   if (picture.coverage.empty() || picture.lns.empty())
     return Error{ErrorKind::bad_input,
                  fmt::format("{}: expected channels A and lns", path.string())};
@@ -69,9 +68,7 @@ Reference make_reference(Picture a, Picture b) {
       reference.mean.rgb[k] = 0.5f * (a.image.rgb[k] + b.image.rgb[k]);
     if (!(a.coverage[i] > 0)) continue;
     reference.lit_pixels.push_back(i);
-    const bool by_square = a.material.empty();
-    reference.block.push_back(by_square ? block_of(i, a.image.width)
-                                        : static_cast<std::size_t>(a.material[i]) - 1);
+    reference.block.push_back(block_of(i, a.image.width));
     sum_lns += 0.5 * (a.lns[i] + b.lns[i]);
     sum_variance += 0.25 * (a.variance[i] + b.variance[i]);
     for (std::size_t k = 3 * i; k < 3 * i + 3; ++k) {
@@ -83,10 +80,6 @@ Reference make_reference(Picture a, Picture b) {
     }
   }
   reference.num_blocks = num_blocks(a.image.width, a.image.height);
-  if (!a.material.empty()) {
-    const auto last = std::max_element(reference.block.begin(), reference.block.end());
-    reference.num_blocks = last == reference.block.end() ? 0 : *last + 1;
-  }
   const auto count = static_cast<double>(std::max<std::size_t>(reference.lit_pixels.size(), 1));
   reference.mean_radiance = sum / (3 * count);
   reference.mse = sum_squares / (3 * count);

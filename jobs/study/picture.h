@@ -16,7 +16,6 @@ struct Picture {
   std::vector<float> ess;         ///< (pixels) ESS / N; empty for references
   std::vector<float> acceptance;  ///< (pixels) of moves; empty for references
   std::vector<float> variance;    ///< (pixels) of the mean of R, G, B; empty but for references
-  std::vector<float> material;    ///< (pixels) its number, 0: none; empty unless asked for
 };
 
 /// Side of the squares that pictures are divided into, in pixels; those at the border are cut.
@@ -37,9 +36,7 @@ struct Reference {
 
   /// Pixels with a surface, as indices.
   std::vector<std::size_t> lit_pixels;
-  /// By lit pixel: the block in which its error counts: its material's number less 1 where the
-  /// picture tells materials, else its square.
-  std::vector<std::size_t> block;
+  std::vector<std::size_t> block;  ///< by lit pixel: the square in which its error counts
   std::size_t num_blocks = 0;
   double mean_radiance = 0;  ///< over lit pixels and R, G, B
   /// Mean squared error of R by its halves, mean (A - B)^2 / 4: what R cannot resolve.

@@ -33,12 +33,13 @@ struct StudyCell {
   int scene = 0, method = 0;  ///< indices into the study's lists
   std::string budget;
   JobSpec job;  ///< seed, output folder: filled in run by run
+  /// What `auto` chose for it, "CHOICE: what is expected of it"; empty: its job was fixed.
+  std::string chosen{};
 };
 
-/// What `baton chart` runs: every cell with num_seeds seeds from first_seed on.
+/// What `baton chart` runs: every cell with num_seeds seeds, 1, 2, ...
 struct Study {
   std::string name;
-  int first_seed = 1;
   int num_seeds = 20;
   std::vector<StudyScene> scenes;
   std::vector<std::string> methods;

@@ -29,6 +29,14 @@ bool is_there(const fs::path& path) {
   return fs::exists(path, ignored);
 }
 
+/// Names a job whatever its output folder: digest of its document. Errors: assets that cannot be
+/// read.
+Result<std::string> job_key(JobSpec job) {
+  job.output.directory = "/";
+  BATON_ASSIGN(const std::string document, make_job_document(job));
+  return digest_of(document).hex();
+}
+
 /// What the measures need of a scene.
 Result<std::vector<Reference>> load_references(const StudyScene& scene, const StudyFolder& folder) {
   std::array<fs::path, 2> frames;
@@ -43,6 +51,25 @@ Result<std::vector<Reference>> load_references(const StudyScene& scene, const St
     references.push_back(make_reference(std::move(a), std::move(b)));
   }
   return references;
+}
+
+/// Renders those of the jobs whose frames are not kept yet, each into the folder's frames_folder of
+/// its job_key.
+Status render_kept(const std::vector<JobSpec>& jobs, const StudyFolder& folder, JobRunner& runner) {
+  std::vector<JobSpec> missing;
+  for (JobSpec job : jobs) {
+    BATON_ASSIGN(const std::string key, job_key(job));
+    job.output.directory = folder.frames_folder(key).string();
+    const bool known = std::any_of(missing.begin(), missing.end(), [&](const JobSpec& other) {
+      return other.output.directory == job.output.directory;
+    });
+    if (!known && !is_there(finished_mark(job.output.directory))) missing.push_back(std::move(job));
+  }
+  if (missing.empty()) return {};
+  spdlog::info("{} pictures to render", missing.size());
+  return runner.run(missing, [&](std::size_t index, const JobSummary&) {
+    return write_record(finished_mark(missing[index].output.directory), {});
+  });
 }
 
 Status render_references(const Study& study, const StudyFolder& folder, JobRunner& runner) {
@@ -102,31 +129,8 @@ fs::path StudyFolder::record_path(const std::string& key) const {
 }
 fs::path StudyFolder::frames_folder(const std::string& key) const { return root_ / "frames" / key; }
 
-Result<std::string> job_key(JobSpec job) {
-  job.output.directory = "/";
-  BATON_ASSIGN(const std::string document, make_job_document(job));
-  return digest_of(document).hex();
-}
-
 std::string run_key(const std::string& cell_key, int seed) {
   return fmt::format("{}-{}", cell_key, seed);
-}
-
-Status render_kept(const std::vector<JobSpec>& jobs, const StudyFolder& folder, JobRunner& runner) {
-  std::vector<JobSpec> missing;
-  for (JobSpec job : jobs) {
-    BATON_ASSIGN(const std::string key, job_key(job));
-    job.output.directory = folder.frames_folder(key).string();
-    const bool known = std::any_of(missing.begin(), missing.end(), [&](const JobSpec& other) {
-      return other.output.directory == job.output.directory;
-    });
-    if (!known && !is_there(finished_mark(job.output.directory))) missing.push_back(std::move(job));
-  }
-  if (missing.empty()) return {};
-  spdlog::info("{} pictures to render", missing.size());
-  return runner.run(missing, [&](std::size_t index, const JobSummary&) {
-    return write_record(finished_mark(missing[index].output.directory), {});
-  });
 }
 
 Result<StudyResults> run_study(const Study& study, const StudyFolder& folder, JobRunner& runner) {
@@ -148,13 +152,12 @@ Result<StudyResults> run_study(const Study& study, const StudyFolder& folder, Jo
   }
   std::vector<Run> runs;
   std::vector<JobSpec> jobs;
-  for (int index = 0; index < study.num_seeds; ++index) {
-    const int seed = study.first_seed + index;
+  for (int seed = 1; seed <= study.num_seeds; ++seed) {
     for (std::size_t c = 0; c < study.cells.size(); ++c) {
       const std::string key = run_key(cell_keys[c], seed);
       const StudyScene& scene = study.scenes[static_cast<std::size_t>(study.cells[c].scene)];
       if (std::optional<RunRecord> record = kept_record(folder, scene, key, seed)) {
-        results.runs[c][static_cast<std::size_t>(index)] = std::move(*record);
+        results.runs[c][static_cast<std::size_t>(seed - 1)] = std::move(*record);
         continue;
       }
       JobSpec job = study.cells[c].job;
@@ -182,8 +185,7 @@ Result<StudyResults> run_study(const Study& study, const StudyFolder& folder, Jo
     BATON_TRY(write_record(folder.record_path(run.key), record));
     std::error_code ignored;
     if (run.seed != 1) fs::remove_all(jobs[index].output.directory, ignored);
-    results.runs[run.cell][static_cast<std::size_t>(run.seed - study.first_seed)] =
-        std::move(record);
+    results.runs[run.cell][static_cast<std::size_t>(run.seed - 1)] = std::move(record);
     return {};
   };
   BATON_TRY(runner.run(jobs, keep));

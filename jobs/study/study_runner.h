@@ -24,7 +24,7 @@ class JobRunner {
 
 /// Everything that a study measured.
 struct StudyResults {
-  /// By cell and seed less the first.
+  /// By cell and seed less 1.
   std::vector<std::vector<RunRecord>> runs;
   /// By scene and position in StudyScene::frames.
   std::vector<std::vector<Reference>> references;
@@ -48,15 +48,9 @@ std::filesystem::path frame_file(const std::filesystem::path& folder, int frame)
 /// For file names: lower case, nothing but letters, digits and '-'.
 std::string file_slug(const std::string& name);
 
-/// Names a job whatever its output folder: digest of its document. Errors: assets that cannot be
-/// read.
-Result<std::string> job_key(JobSpec job);
-/// Names a run of a cell; cell_key: job_key of the cell's job. seed counts from 1.
+/// Names a run of a cell; cell_key: digest of its job, whatever the output folder. seed counts
+/// from 1.
 std::string run_key(const std::string& cell_key, int seed);
-
-/// Renders those of the jobs whose frames are not kept yet, each into the folder's frames_folder of
-/// its job_key.
-Status render_kept(const std::vector<JobSpec>& jobs, const StudyFolder& folder, JobRunner& runner);
 
 /// Runs what is not yet done: references first, then cells and seeds; measures each run when its
 /// frames are there and keeps the record. The frames of seed 1 stay, for the crops. Errors name the

@@ -40,7 +40,8 @@ MAY_INCLUDE = {
     | {"common/job", "common/protocol", "common/store", "coordinator/schedule", "coordinator/journal"},
     "coordinator": COMMON_ALL | {"coordinator/schedule", "coordinator/journal", "coordinator/service"},
     "jobs/study": COMMON_DATA | {"common/job", "common/image", "common/protocol"},
-    "jobs/cli": COMMON_ALL | {"jobs/study", "worker/scene"},  # `baton check` loads the scene
+    "jobs/auto": COMMON_DATA | {"common/job", "jobs/study", "worker/scene"},  # how large a scene is
+    "jobs/cli": COMMON_ALL | {"jobs/study", "jobs/auto", "worker/scene"},  # `baton check` loads the scene
 }
 
 # Library, by how its headers are spelled -> files that may include them (prefix of the path).

@@ -4,10 +4,8 @@ named. `"method": "auto"` is settled by a small study."""
 
 import csv
 import json
-import random
 
-from farm import (BAD_INPUT, Process, check, check_equal, make_job, run_tests, wait_until, write_job,
-                  write_map)
+from farm import (BAD_INPUT, Process, check, check_equal, make_job, run_tests, wait_until, write_job)
 
 
 def make_study(folder, **changes):
@@ -141,34 +139,6 @@ def auto_is_settled_once_and_repeatably(programs, folder):
     check("going on with what is done already" in again.stderr, again.stderr)
 
 
-def auto_takes_no_finer_map_than_it_needs(programs, folder):
-    grains = random.Random(1)
-
-    def grain(_x, _y, _width, _height):
-        """Far finer than what a matte surface can tell."""
-        return (0.1 + grains.random(),) * 3
-
-    def sun(x, y, _width, _height):
-        return (3000.0,) * 3 if (x, y) == (35, 12) else (0.3,) * 3
-
-    def settled(name, width, colour):
-        place = folder / name
-        job = make_job(place, frames="1-8", image={"width": 32, "height": 20, "tileSize": 32},
-                       sampling={"method": "auto", "numParticles": 8}, state={"carry": False})
-        for thing in job["scene"]["objects"]:
-            thing["material"] = "chalk"
-        del job["scene"]["materials"]["lacquer"]
-        job["output"].update(directory=str(place / "frames"), background="transparent")
-        job["environment"]["keys"][0]["map"] = str(place / "map.hdr")
-        write_map(place / "map.hdr", width, width // 2, colour)
-        return programs.render(write_job(place / "job.json", job), place / "work", deadline_s=300).stderr
-
-    said = settled("grain", 512, grain)
-    check("with maps 64 wide" in said and "maps of 64 columns, which are" in said, said)
-    said = settled("sun", 128, sun)
-    check("64 columns: too coarse" in said and "as coarser ones change the pictures" in said, said)
-
-
 if __name__ == "__main__":
     run_tests([a_killed_study_goes_on, the_report_needs_no_other_file, the_second_pass_is_paid_for,
-               auto_is_settled_once_and_repeatably, auto_takes_no_finer_map_than_it_needs, a_bad_entry_is_named])
+               auto_is_settled_once_and_repeatably, a_bad_entry_is_named])

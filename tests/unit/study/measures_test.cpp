@@ -53,20 +53,6 @@ TEST(Measures, AConstantOffset) {
   EXPECT_GT(m.flip, 0);
 }
 
-TEST(Measures, ErrorsByMaterialAddUp) {
-  Picture half = flat(0.5f);
-  half.material.assign(kPixels, 1);
-  for (std::size_t i = 0; i < kPixels / 4; ++i) half.material[i] = 3;
-  Picture test = flat(0.5f);
-  test.image.rgb[0] = 1.5f;  // in a pixel of material 3
-  const FrameMeasures m = measure_frame(test, make_reference(half, half));
-  ASSERT_EQ(m.block_mse.size(), 3u);
-  EXPECT_EQ(m.block_mse[0], 0);
-  EXPECT_EQ(m.block_mse[1], 0);
-  EXPECT_NEAR(m.block_mse[2], m.mse, 1e-12);
-  EXPECT_GT(m.mse, 0);
-}
-
 TEST(Measures, OnlyPixelsWithASurfaceCount) {
   Picture half = flat(0.5f);
   Picture test = flat(0.5f);

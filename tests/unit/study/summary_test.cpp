@@ -5,7 +5,6 @@
 #include <cmath>
 
 #include "common/math/philox.h"
-#include "jobs/study/auto_choice.h"
 #include "jobs/study/auto_table.h"
 #include "jobs/study/chart_axis.h"
 #include "jobs/study/svg_chart.h"
@@ -152,7 +151,7 @@ TEST(AutoTable, StandsBesideTheBestAndTheWorstOfItsScene) {
   study.num_seeds = 2;
   study.methods.push_back("auto");
   study.cells.push_back({0, 2, "16", {}});
-  study.cells[2].job.metadata[kAutoChoice] = "mis N=16 M=16 P=1: expected";
+  study.cells[2].chosen = "mis N=16 M=16 P=1: expected";
   StudyResults results = two_results(0.1);
   results.runs.push_back(runs({2, 2}, 3));
 

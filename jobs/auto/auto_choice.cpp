@@ -1,4 +1,4 @@
-#include "jobs/study/auto_choice.h"
+#include "jobs/auto/auto_choice.h"
 
 #include <fmt/format.h>
 
@@ -127,7 +127,7 @@ std::vector<AutoCandidate> auto_candidates(const JobSpec& job) {
     for (const int p : {1, 5})
       add(fmt::format("sequential P={}", p), Method::sequential, asked.num_candidates, p);
     if (!job.visibility.correlated)
-      for (const int m : {128, 256, 512})
+      for (const int m : {64, 128, 256, 512})
         add(fmt::format("pool M={}", m), Method::pool, m, asked.num_distributions);
   }
   return candidates;
@@ -171,23 +171,15 @@ void apply_choice(const AutoChoice& choice, std::span<const PilotNumbers> pilot,
                    seen.empty() ? "" : "; ", numbers.candidate.name(), numbers.error,
                    numbers.cost_us);
   }
-  const std::string alike =
-      fmt::format("{}{} N={} M={} P={}", traits(choice.sampling.method).name,
-                  choice.correlated ? " with second pass" : "", choice.sampling.num_particles,
-                  choice.sampling.num_candidates, choice.sampling.num_distributions);
-  const std::string map = choice.max_map_width > 0
-                              ? fmt::format(" with maps {} wide", choice.max_map_width)
-                              : std::string();
-  job.metadata[kAutoChoice] = fmt::format(
-      "{}{}: expected error {:.4f}, {:.2f} us per pixel and frame",
-      choice.by_material.empty() ? alike : choice.by_material, map, choice.error, choice.cost_us);
+  job.metadata[kAutoChoice] =
+      fmt::format("{}{} N={} M={} P={}: expected error {:.4f}, {:.2f} us per pixel and frame",
+                  traits(choice.sampling.method).name, choice.correlated ? " with second pass" : "",
+                  choice.sampling.num_particles, choice.sampling.num_candidates,
+                  choice.sampling.num_distributions, choice.error, choice.cost_us);
   job.metadata["auto.reason"] = choice.reason;
   job.metadata["auto.pilot"] = seen.substr(0, limits::kMaxTextLength);
-  if (!choice.maps.empty())
-    job.metadata["auto.maps"] = choice.maps.substr(0, limits::kMaxTextLength);
   job.sampling = choice.sampling;
   job.visibility.correlated = choice.correlated;
-  if (choice.max_map_width > 0) job.environment.max_width = choice.max_map_width;
 }
 
 }  // namespace baton

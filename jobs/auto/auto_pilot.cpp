@@ -1,4 +1,4 @@
-#include "jobs/study/auto_pilot.h"
+#include "jobs/auto/auto_pilot.h"
 
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
@@ -6,10 +6,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "jobs/study/map_pilot.h"
-#include "jobs/study/material_pilot.h"
-#include "jobs/study/pilot_windows.h"
-#include "jobs/study/unit_costs.h"
+#include "jobs/auto/pilot_windows.h"
+#include "jobs/auto/unit_costs.h"
 
 namespace baton {
 namespace {
@@ -27,8 +25,10 @@ struct PilotResult {
 };
 
 /// Runs every candidate with `num_seeds` seeds; what an earlier round did is kept.
-Result<PilotResult> run_pilot(const JobSpec& job, const std::vector<AutoCandidate>& candidates,
-                              int num_seeds, const StudyFolder& folder, JobRunner& runner) {
+/// ray_factor: ray_cost_factor of the job.
+Result<PilotResult> run_pilot(const JobSpec& job, double ray_factor,
+                              const std::vector<AutoCandidate>& candidates, int num_seeds,
+                              const StudyFolder& folder, JobRunner& runner) {
   Study study = pilot_study(job, candidates);
   study.num_seeds = num_seeds;
   BATON_ASSIGN(const StudyResults results, run_study(study, folder, runner));
@@ -45,7 +45,7 @@ Result<PilotResult> run_pilot(const JobSpec& job, const std::vector<AutoCandidat
     seen.error += relative_square(results.runs[c], results.references[scene]) /
                   static_cast<double>(study.scenes.size());
     for (const RunRecord& run : results.runs[c]) {
-      seen.cost_us += counted_cost_us(study.cells[c].job, run.counts);
+      seen.cost_us += counted_cost_us(study.cells[c].job, ray_factor, run.counts);
       lit[method] += static_cast<double>(run.counts.lit_pixels());
       all_pixels += static_cast<double>(run.counts.pixels);
     }
@@ -102,13 +102,15 @@ Study pilot_study(const JobSpec& job, const std::vector<AutoCandidate>& candidat
 Result<std::vector<PilotNumbers>> settle_auto(JobSpec& job, const StudyFolder& folder,
                                               JobRunner& runner) {
   if (job.sampling.method != Method::automatic) return std::vector<PilotNumbers>();
+  BATON_ASSIGN(const double ray_factor, ray_cost_factor(job));
   BATON_ASSIGN(PilotResult pilot,
-               run_pilot(job, auto_candidates(job), kFirstSeeds, folder, runner));
+               run_pilot(job, ray_factor, auto_candidates(job), kFirstSeeds, folder, runner));
 
   // Look again, and closer, at those that may be the best.
   const std::vector<AutoCandidate> near = near_the_best(pilot.numbers);
   if (near.size() > 1) {
-    BATON_ASSIGN(const PilotResult closer, run_pilot(job, near, kSecondSeeds, folder, runner));
+    BATON_ASSIGN(const PilotResult closer,
+                 run_pilot(job, ray_factor, near, kSecondSeeds, folder, runner));
     for (const PilotNumbers& seen : closer.numbers) {
       *std::find_if(pilot.numbers.begin(), pilot.numbers.end(), [&](const PilotNumbers& first) {
         return first.candidate.name() == seen.candidate.name();
@@ -117,19 +119,17 @@ Result<std::vector<PilotNumbers>> settle_auto(JobSpec& job, const StudyFolder& f
   }
   const double lit_pixels = 1.0 * job.image.width * job.image.height *
                             static_cast<double>(job.frames.size()) * pilot.lit_share;
-  AutoChoice choice = choose_sampling(job, pilot.numbers, lit_pixels);
-  BATON_TRY(vary_by_material(job, lit_pixels, folder, runner, choice));
-  BATON_TRY(coarsen_maps(job, {lit_pixels, pilot.lit_share}, folder, runner, choice));
-  apply_choice(choice, pilot.numbers, job);
+  apply_choice(choose_sampling(job, pilot.numbers, lit_pixels), pilot.numbers, job);
   return std::move(pilot.numbers);
 }
 
 Status settle_study(Study& study, const StudyFolder& folder, JobRunner& runner) {
   for (StudyCell& cell : study.cells) {
     BATON_ASSIGN(const std::vector<PilotNumbers> pilot, settle_auto(cell.job, folder, runner));
-    if (!pilot.empty())
-      spdlog::info("{}: {}, {}; seen were {}", cell.job.name, cell.job.metadata[kAutoChoice],
-                   cell.job.metadata["auto.reason"], cell.job.metadata["auto.pilot"]);
+    if (pilot.empty()) continue;
+    cell.chosen = cell.job.metadata[kAutoChoice];
+    spdlog::info("{}: {}, {}; seen were {}", cell.job.name, cell.chosen,
+                 cell.job.metadata["auto.reason"], cell.job.metadata["auto.pilot"]);
   }
   return {};
 }

@@ -2,7 +2,7 @@
 
 #include <vector>
 
-#include "jobs/study/auto_choice.h"
+#include "jobs/auto/auto_choice.h"
 #include "jobs/study/study_runner.h"
 
 namespace baton {

@@ -1,11 +1,11 @@
-#include "jobs/study/auto_choice.h"
+#include "jobs/auto/auto_choice.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
 
-#include "jobs/study/auto_pilot.h"
+#include "jobs/auto/auto_pilot.h"
 
 namespace baton {
 namespace {
@@ -102,6 +102,17 @@ TEST(AutoCandidates, SecondPassTakesEvenNumbersAndNoPool) {
   job.sampling.num_particles = 4;
   job.visibility.correlated = true;
   EXPECT_FALSE(tries_pool(job));
+}
+
+TEST(AutoCandidates, PoolComesWithFewCandidatesFirst) {
+  JobSpec job = automatic_job();
+  job.frames = {1, 2};
+  std::vector<int> num_candidates;
+  for (const AutoCandidate& candidate : auto_candidates(job)) {
+    if (candidate.sampling.method == Method::pool)
+      num_candidates.push_back(candidate.sampling.num_candidates);
+  }
+  EXPECT_THAT(num_candidates, ElementsAre(64, 128, 256, 512));
 }
 
 TEST(AutoCandidates, AreSettledThemselves) {

@@ -44,9 +44,6 @@ struct AutoChoice {
   double error = 0;  ///< expected, as PilotNumbers
   double cost_us = 0;
   std::string reason;
-  std::string by_material{};  ///< settings of the materials in words; empty: all alike
-  int max_map_width = 0;      ///< EnvironmentSpec::max_width; 0: as the job says
-  std::string maps{};         ///< what was seen of coarser maps; empty: none was looked at
 };
 
 /// The cheapest of what was tried that reaches the job's targetError, or the most accurate within
@@ -57,7 +54,7 @@ struct AutoChoice {
 AutoChoice choose_sampling(const JobSpec& job, std::span<const PilotNumbers> pilot,
                            double lit_pixels);
 
-/// Writes the choice into the job: sampling and maps, and what was seen and why as metadata.
+/// Writes the choice into the job, and what was seen and why as metadata.
 void apply_choice(const AutoChoice& choice, std::span<const PilotNumbers> pilot, JobSpec& job);
 
 }  // namespace baton

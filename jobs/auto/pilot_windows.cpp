@@ -1,4 +1,4 @@
-#include "jobs/study/pilot_windows.h"
+#include "jobs/auto/pilot_windows.h"
 
 #include <fmt/format.h>
 
@@ -10,16 +10,16 @@ namespace {
 
 constexpr double kPilotPixels = 64 * 36;
 constexpr std::size_t kWindowFrames = 12;
+constexpr std::size_t kMeasured = 2;
 constexpr int kReferenceSamples = 512;
 /// Far from the seeds that people give.
 constexpr std::uint64_t kReferenceSeed = 2'000'000'000;
 
-}  // namespace
-
-JobSpec small_job(const JobSpec& job, std::vector<int> frames, double num_pixels) {
+/// The job with at most kPilotPixels a picture, for some of its frames.
+JobSpec small_job(const JobSpec& job, std::vector<int> frames) {
   JobSpec small = job_window(job, std::move(frames));
   const double scale =
-      std::min(1.0, std::sqrt(num_pixels / (1.0 * job.image.width * job.image.height)));
+      std::min(1.0, std::sqrt(kPilotPixels / (1.0 * job.image.width * job.image.height)));
   small.image.width = std::max(1, static_cast<int>(std::lround(job.image.width * scale)));
   small.image.height = std::max(1, static_cast<int>(std::lround(job.image.height * scale)));
   small.metadata.clear();
@@ -31,32 +31,21 @@ JobSpec small_job(const JobSpec& job, std::vector<int> frames, double num_pixels
   return small;
 }
 
+}  // namespace
+
 std::vector<JobSpec> pilot_windows(const JobSpec& job) {
   const auto length = static_cast<std::ptrdiff_t>(std::min(job.frames.size(), kWindowFrames));
   const auto begin = job.frames.begin(), end = job.frames.end();
-  std::vector<JobSpec> windows{small_job(job, {begin, begin + length}, kPilotPixels)};
-  if (job.frames.size() > 2 * kWindowFrames)
-    windows.push_back(small_job(job, {end - length, end}, kPilotPixels));
+  std::vector<JobSpec> windows{small_job(job, {begin, begin + length})};
+  if (job.frames.size() > 2 * kWindowFrames) windows.push_back(small_job(job, {end - length, end}));
   return windows;
-}
-
-std::vector<int> measured_frames(const JobSpec& window) {
-  const auto num_measured =
-      static_cast<std::ptrdiff_t>(std::min<std::size_t>(window.frames.size(), 2));
-  return {window.frames.end() - num_measured, window.frames.end()};
-}
-
-void keep_measured_frames(Study& study) {
-  for (StudyCell& cell : study.cells) {
-    JobSpec window = job_window(cell.job, measured_frames(cell.job));
-    cell.job = std::move(window);
-  }
 }
 
 StudyScene pilot_scene(const JobSpec& window) {
   StudyScene scene;
   scene.name = fmt::format("frames from {}", window.frames.front());
-  scene.frames = measured_frames(window);
+  const auto num_measured = static_cast<std::ptrdiff_t>(std::min(window.frames.size(), kMeasured));
+  scene.frames = {window.frames.end() - num_measured, window.frames.end()};
   scene.crop = {0, 0, window.image.width, window.image.height};
   for (std::size_t half = 0; half < 2; ++half) {
     JobSpec& reference = scene.reference[half];
@@ -66,7 +55,7 @@ StudyScene pilot_scene(const JobSpec& window) {
     reference.sampling.method = Method::reference;
     reference.sampling.reference_samples = kReferenceSamples;
     reference.seed = kReferenceSeed + half;
-    reference.output.aovs = {Aov::lns, Aov::variance, Aov::material};
+    reference.output.aovs = {Aov::lns, Aov::variance};
   }
   return scene;
 }
