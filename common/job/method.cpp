@@ -1,7 +1,6 @@
 #include "common/job/method.h"
 
 #include <algorithm>
-#include <bit>
 #include <cmath>
 
 #include "common/base/check.h"
@@ -21,10 +20,9 @@ LightUse of_sequential(const SamplingSpec& s) {
   return use;
 }
 
-/// Pixels choose their number; it is a power of two where light is evenly bright.
+/// Pixels choose their number.
 std::int64_t rays_of_pool(const SamplingSpec& s) {
-  const auto most = static_cast<std::uint32_t>(limits::kMostPoolRays * s.num_particles);
-  return std::min<std::int64_t>(std::bit_ceil(most), limits::kMaxParticles);
+  return std::min<std::int64_t>(limits::kMostPoolRays * s.num_particles, limits::kMaxParticles);
 }
 
 /// In the order of the enumeration.

@@ -266,7 +266,7 @@ TEST(Methods, PoolAgreesInAFlashAndAfterIt) {
   for (const int frames : {4, 5})
     expect_agreement(changing_job({{1, sky}, {4, flash}, {5, sky}}, frames), 200, kFine);
 }
-// One lamp in the dark, whose rays are chosen evenly.
+// One lamp in the dark.
 TEST(Methods, PoolAgreesUnderALoneLamp) {
   RgbImage lamp = test::constant_map(64, 32, {0, 0, 0});
   for (const std::size_t texel : {9u * 64 + 20, 9u * 64 + 21})

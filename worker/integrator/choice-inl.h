@@ -212,32 +212,6 @@ class DistinctPicks {
     return out;
   }
 
-  /// Of `candidates` of a lone light, `chosen` at even distances, both powers of two, candidates a
-  /// whole number of blocks: they are a net. Each counts as its weight on the line says; who has
-  /// none is left out.
-  static DistinctPicks Even(const RunningSums& line, float total, float u, std::int32_t candidates,
-                            std::int32_t chosen) {
-    constexpr std::int32_t kBlock = LightPool::kBlock;
-    const std::int32_t blocks = candidates / kBlock;
-    const std::int32_t places = std::min(chosen, kBlock);               // chosen in a block
-    const std::int32_t step = candidates * places / (chosen * kBlock);  // from block to block
-    const auto sets = static_cast<float>(candidates / chosen);
-    const std::int32_t set = std::min(static_cast<std::int32_t>(u * sets), candidates / chosen - 1);
-    const float scale = static_cast<float>(candidates) / total;
-    DistinctPicks out;
-    for (std::int32_t eighth = 0; eighth < kBlock; ++eighth) {
-      const auto place = static_cast<std::int32_t>(LightPool::kEighthOf[eighth]);
-      if (place / places != set / step) continue;
-      for (std::int32_t block = set % step; block < blocks; block += step) {
-        const std::int32_t candidate = block * kBlock + place;
-        const float weight = line.Weight(static_cast<std::size_t>(candidate));
-        if (weight > 0) out.Append(candidate, weight * scale);
-      }
-    }
-    out.FillUp();
-    return out;
-  }
-
  private:
   void Append(std::int32_t candidate, float counts) {
     pick[count] = candidate;

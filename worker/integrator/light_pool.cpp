@@ -38,40 +38,6 @@ void sort_along_curve(std::span<OctDirection> directions) {
                  [](const auto& entry) { return entry.second; });
 }
 
-/// Whether directions keep close together: those spread evenly over a disc have a radius of eleven
-/// degrees at most.
-bool close_together(std::span<const OctDirection> directions) {
-  constexpr float kMeanLength = 0.99f;
-  Vec3 sum{0, 0, 0};
-  for (const OctDirection w : directions) sum = sum + decode_octahedral(w);
-  return length(sum) > kMeanLength * static_cast<float>(directions.size());
-}
-
-/// Whether directions bring the same light over their density, but for a tenth (rms).
-bool equally_bright(std::span<const OctDirection> directions, const EnvironmentView& now) {
-  constexpr double kMostVariation = 0.1;
-  const std::size_t n = directions.size();
-  std::vector<float> x(n), y(n), z(n), r(n), g(n), b(n), density(n);
-  kernels::decode_directions(directions, x, y, z);
-  kernels::evaluate_environment(now, x, y, z, r, g, b, density);
-  double sum = 0, squares = 0;
-  for (std::size_t i = 0; i < n; ++i) {
-    const double light = density[i] > 0 ? double{r[i] + g[i] + b[i]} / density[i] : 0;
-    sum += light;
-    squares += light * light;
-  }
-  return squares * static_cast<double>(n) < (1 + kMostVariation * kMostVariation) * sum * sum;
-}
-
-/// Sorts directions by their numbers in the sequence, bits reversed: those at even distances, a
-/// power of two of them, followed each other in the sequence, which makes them a net.
-void sort_into_nets(std::span<OctDirection> directions) {
-  const int unused_bits = 32 - std::countr_zero(directions.size());  // sobol_2d reverses all 32
-  const std::vector<OctDirection> sequence(directions.begin(), directions.end());
-  for (std::uint32_t i = 0; i < sequence.size(); ++i)
-    directions[sobol_2d(i)[0] >> unused_bits] = sequence[i];
-}
-
 /// Puts a sorted run into its blocks; place 0 of them gets the eighth `first` of the curve.
 void lay_out(std::span<const OctDirection> sorted, std::uint32_t first,
              std::span<LightPool::Block> blocks) {
@@ -112,8 +78,7 @@ LightPool make_light_pool(const Environment& now, const Environment& before, std
   for (std::uint32_t first = 0; first < LightPool::kNumBlocks; first += pool.run_blocks) {
     const auto run = std::span(directions)
                          .subspan(first * LightPool::kBlock, pool.run_blocks * LightPool::kBlock);
-    pool.lone_light = layout.one_run && close_together(run) && equally_bright(run, now_view);
-    pool.lone_light ? sort_into_nets(run) : sort_along_curve(run);
+    sort_along_curve(run);
     lay_out(run, first / pool.run_blocks, std::span(pool.blocks).subspan(first, pool.run_blocks));
   }
 

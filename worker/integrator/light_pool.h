@@ -22,11 +22,6 @@ namespace baton {
 /// (systematic-inl.h) goes through the places in the order of their eighths: it takes directions
 /// that are spread over the light, and so its shadow rays are stratified. In each run place 0 is
 /// another eighth, so that one who takes the same place of random blocks sees the whole map.
-///
-/// A lone light, all of it within a narrow cone and equally bright, leaves nothing to choose: one
-/// entry is as good as another. A pool of one run is then not sorted along the curve but so that
-/// entries at even distances, a power of two of them, are nets of the sequence: rays to a single
-/// lamp want no more.
 struct LightPool {
   static constexpr std::uint32_t kSize = 1u
                                          << 13;  ///< entries: few enough to stay in a core's cache
@@ -51,7 +46,6 @@ struct LightPool {
   std::vector<Block> blocks;     ///< (kNumBlocks); empty for a black map
   bool has_before = false;       ///< whether before_* are set, as the layout asks; else they are 0
   std::uint32_t run_blocks = 1;  ///< a power of two
-  bool lone_light = false;       ///< whether entries are laid out for a lone light
   float mean_radiance = 0;       ///< of the environment over the sphere, grey; by its entries
 
   bool empty() const { return blocks.empty(); }

@@ -11,7 +11,6 @@
 #include <hwy/highway.h>
 
 #include <algorithm>
-#include <bit>
 
 #include "worker/integrator/choice-inl.h"
 #include "worker/integrator/pool_kernels.h"
@@ -152,12 +151,6 @@ struct RayPlan {
   float total;  ///< of the line
   bool control;
   std::int32_t count;
-
-  /// Of candidates of a lone light some at even distances: as many rays as make a net.
-  DistinctPicks ChooseEvenly(float u, std::int32_t candidates) {
-    count = static_cast<std::int32_t>(std::bit_ceil(static_cast<std::uint32_t>(count)));
-    return DistinctPicks::Even(line, total, u, candidates, count);
-  }
 };
 
 /// Looks up the rays and what each brings: as a candidate was chosen with probability proportional
@@ -222,18 +215,16 @@ inline float ChoosePoolRays(const SiteBlock& sites, const EnvironmentView& envir
   const bool control = use_control(expected, in_doubt);
   const bool knows = memory[kVisibilityOutcomes] != 0;
   const float scale = noise_scale(lns, pool.mean_radiance);
-  RayPlan plan{control ? doubt : hope, control ? in_doubt : hope.Finish(), control,
-               knows ? rays_for_doubt(num_rays, in_doubt, scale) : num_rays};
+  const RayPlan plan{control ? doubt : hope, control ? in_doubt : hope.Finish(), control,
+                     knows ? rays_for_doubt(num_rays, in_doubt, scale) : num_rays};
   out.difference = sum(lines.difference);
   out.light_variance = {VarianceOfOne(lines.light_bends, counts.from_light, scale),
                         VarianceOfOne(lines.bends, counts.from_bsdf, scale)};
   if (control) out.constant = {visible, expected / lns};
 
   // Choose them.
-  const DistinctPicks picks = kernels::chooses_evenly(pool, counts)
-                                  ? plan.ChooseEvenly(u, counts.from_light)
-                                  : DistinctPicks::Systematic(plan.line, plan.total, u,
-                                                              static_cast<std::size_t>(plan.count));
+  const auto picks =
+      DistinctPicks::Systematic(plan.line, plan.total, u, static_cast<std::size_t>(plan.count));
   LookUpRays(ChosenCandidates(sites, pool, counts, random, scratch.from_bsdf), plan, picks,
              scratch.free.from(0), lns, out);
   return lns;

@@ -1,7 +1,6 @@
 #include "worker/integrator/pool_kernels.h"
 
 #include <algorithm>
-#include <bit>
 #include <optional>
 
 #include "common/base/check.h"
@@ -27,11 +26,7 @@ float choose_pool_rays(const SiteBlock& sites, const EnvironmentView& environmen
                        PoolScratch& scratch, PixelRays& out) {
   check_counts(sites, counts);
   BATON_CHECK(num_rays >= 1 && num_rays <= static_cast<std::int32_t>(limits::kMaxParticles));
-  constexpr auto kBlock = static_cast<std::int32_t>(LightPool::kBlock);
   BATON_CHECK(memory.size() == kVisibilityCells);
-  BATON_CHECK(!chooses_evenly(pool, counts) ||
-              (std::has_single_bit(static_cast<std::uint32_t>(counts.from_light)) &&
-               counts.from_light >= std::max(most_rays(num_rays), kBlock)));
   out.clear();
   if (pool.empty()) return 0;
   return HWY_DYNAMIC_DISPATCH(ChoosePoolRays)(sites, environment, pool, counts, rng, u, num_rays,

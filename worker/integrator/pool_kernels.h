@@ -13,17 +13,11 @@ struct PoolScratch {
   CandidateSet from_bsdf;
 };
 
-/// Whether there is nothing to choose by: all candidates are of a lone light, each like another.
-inline bool chooses_evenly(const LightPool& pool, const CandidateCounts& counts) {
-  return pool.lone_light && counts.from_bsdf == 0;
-}
-
 /// Draws candidates like draw_candidates and chooses the rays of one pixel from them by what its
 /// memory says of their directions (sampling/pool.h): systematically, u in [0, 1). A candidate that
 /// is chosen twice is traced once. memory: (kVisibilityCells), as the frames before left it, all 0
 /// where there is none. num_rays: N, [1, kMaxParticles]; with a memory a pixel gets N / 2 to 4 N
-/// rays, at most kMaxParticles (rays_for_doubt), rounded up to a power of two where
-/// chooses_evenly(). Candidates must then be a power of two, no less than a block and most_rays(N).
+/// rays, at most kMaxParticles (rays_for_doubt).
 /// Returns the sum of the weights, an unbiased estimate of Lns; when it is not positive and finite,
 /// out is empty.
 float choose_pool_rays(const SiteBlock& sites, const EnvironmentView& environment,

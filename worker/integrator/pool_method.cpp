@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <bit>
 
 #include "worker/integrator/candidate_samplers.h"
 #include "worker/integrator/populations.h"
@@ -11,16 +10,6 @@
 
 namespace baton {
 namespace {
-
-/// Candidates from a lone light, which leaves nothing to choose: what every pixel gets, and no less
-/// than the most rays; a power of two, so that rays to some of them are a net.
-std::int32_t candidates_from_lone_light(std::int32_t num_candidates, std::int32_t num_rays) {
-  const float least = kNeedOfLight.least * static_cast<float>(num_candidates);
-  const std::int32_t wanted = std::max(static_cast<std::int32_t>(least), most_rays(num_rays));
-  constexpr auto kBlock = static_cast<std::int32_t>(LightPool::kBlock);
-  return static_cast<std::int32_t>(
-      std::bit_ceil(static_cast<std::uint32_t>(std::max(wanted, kBlock))));
-}
 
 /// Fewest candidates of the light: noise is told by second differences, which take three vectors of
 /// eight, and who cannot tell would keep too few for good. (Glossy pixels that usually have 64 may
@@ -67,10 +56,8 @@ PixelDiagnostics PoolMethod::sample(const PixelInput& input, const PixelState& p
   const std::span<MemoryCell> own = pixel.memory();
   const std::span<const VisibilityCell> memory =
       own.empty() ? std::span<const VisibilityCell>(kNothing) : own;
-  kernels::CandidateCounts counts =
+  const kernels::CandidateCounts counts =
       counts_for_noise(input.sites, num_candidates_, lobe_fraction_, light_variance(memory));
-  if (kernels::chooses_evenly(input.light.pool, counts))
-    counts.from_light = candidates_from_lone_light(num_candidates_, num_rays_);
   const float total = kernels::choose_pool_rays(input.sites, input.now, input.light.pool, counts,
                                                 Rng(input.key, PassId::candidates),
                                                 Rng(input.key, PassId::choose).uniforms(0, 0)[0],

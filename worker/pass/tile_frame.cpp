@@ -170,10 +170,10 @@ void TileFrameRenderer::sample(Batch& batch, const FrameLight& light, SampleStat
         .frame_index = batch.frame_index,
         .has_history = ahead.history != PixelHistory::none,
         .target_before = knows_targets_ ? targets_of(index, state) : std::span<float>(),
-        .target = targets_of(index, state),
         .old = ahead.history == PixelHistory::moved ? &ahead.old : nullptr,
         .located = ahead.is_located ? std::span(ahead.located).first(populations)
                                     : std::span<const kernels::LocatedDirections>(),
+        .target = targets_of(index, state),
         .neighbors =
             reprojection_ != nullptr ? reprojection_->neighbors(i) : std::span<const CarriedSet>(),
         .hits = surfaces_.pixel(index),

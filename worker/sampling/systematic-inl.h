@@ -101,11 +101,6 @@ class RunningSums {
     }
   }
 
-  /// Weight i.
-  HWY_INLINE float Weight(std::size_t i) const {
-    return storage_[i] - (i < kLanes ? 0.0f : storage_[i - kLanes]);
-  }
-
  private:
   static constexpr std::size_t kLanes = hn::MaxLanes(DF());
   static_assert(kLanes == 4 || kLanes == 8);

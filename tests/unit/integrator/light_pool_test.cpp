@@ -9,8 +9,6 @@
 #include <initializer_list>
 #include <map>
 #include <memory>
-#include <numeric>
-#include <set>
 #include <utility>
 #include <vector>
 
@@ -194,67 +192,6 @@ TEST(LightPool, PixelsTakeEveryEntryEquallyOften) {
         EXPECT_LT(std::abs(n - kPixels * mean), 4.5 * sigma + 1e-6) << count << " of " << most;
     }
   }
-}
-
-/// A map that is black but for some texels.
-Environment lamps(std::initializer_list<int> texels, MapFilter filter = MapFilter::nearest) {
-  RgbImage image{64, 32, std::vector<float>(64 * 32 * 3, 0.0f)};
-  for (const int texel : texels) std::fill_n(image.rgb.begin() + 3 * texel, 3, 100.0f);
-  return {std::make_shared<EnvironmentMap>(image, filter, 1.0f, false), Mat3{}};
-}
-
-TEST(LightPool, KnowsALoneLight) {
-  const auto is_lone = [](const Environment& environment) {
-    return make_light_pool(environment, environment, 5, 1, {.one_run = true}).lone_light;
-  };
-  EXPECT_TRUE(is_lone(lamps({9 * 64 + 20})));
-  EXPECT_TRUE(is_lone(lamps({9 * 64 + 20, 9 * 64 + 21, 10 * 64 + 20})));
-  EXPECT_FALSE(is_lone(lamps({9 * 64 + 20, 9 * 64 + 40}))) << "two lamps";
-  EXPECT_FALSE(is_lone(lamps({9 * 64 + 20}, MapFilter::bilinear))) << "brighter in its middle";
-  EXPECT_FALSE(is_lone(gradient_environment()));
-}
-
-/// Ranks of values, in [0, 1).
-std::vector<double> ranks(const std::vector<float>& values) {
-  std::vector<std::size_t> order(values.size());
-  std::iota(order.begin(), order.end(), std::size_t{0});
-  std::stable_sort(order.begin(), order.end(),
-                   [&](std::size_t a, std::size_t b) { return values[a] < values[b]; });
-  std::vector<double> rank(values.size());
-  for (std::size_t i = 0; i < order.size(); ++i)
-    rank[order[i]] = static_cast<double>(i) / static_cast<double>(order.size());
-  return rank;
-}
-
-// Under a lone light 16 entries at even distances along the line are a net: each sixteenth of the
-// lamp holds one, however it is cut across and down (by rank, so that no formula of the map is
-// needed). Rounding to the lattice moves a few into the next part: measured as 0.2 % of empty
-// parts. Along the Hilbert curve it is 28 %.
-TEST(LightPool, ALoneLightIsLaidOutInNets) {
-  constexpr std::size_t kNet = 16, kDistance = LightPool::kSize / kNet;
-  const Environment environment = lamps({9 * 64 + 20});
-  const LightPool pool = make_light_pool(environment, environment, 5, 1, {.one_run = true});
-  std::vector<float> azimuth, height;  // in the order of the line
-  for (const std::uint32_t place : LightPool::kEighthOf) {
-    for (const LightPool::Block& block : pool.blocks) {
-      azimuth.push_back(std::atan2(block.x[place], block.z[place]));
-      height.push_back(block.y[place]);
-    }
-  }
-  const std::vector<double> across = ranks(azimuth), down = ranks(height);
-  int parts = 0, empty = 0;
-  for (std::size_t first = 0; first < kDistance; ++first) {
-    for (std::size_t columns = 1; columns <= kNet; columns *= 2) {
-      std::set<std::pair<int, int>> filled;
-      for (std::size_t i = first; i < across.size(); i += kDistance) {
-        filled.emplace(static_cast<int>(across[i] * static_cast<double>(columns)),
-                       static_cast<int>(down[i] * static_cast<double>(kNet / columns)));
-      }
-      parts += kNet;
-      empty += static_cast<int>(kNet - filled.size());
-    }
-  }
-  EXPECT_LT(empty, 0.02 * parts);
 }
 
 // Hypothesis: a systematic choice from a run is spread over the sphere: under a shadow that covers

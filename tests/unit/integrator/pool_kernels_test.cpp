@@ -67,14 +67,6 @@ std::vector<VisibilityCell> memory_after(std::uint32_t rays) {
   return memory;
 }
 
-/// One lamp on black, nine degrees wide; the pixel's normals see it at different angles.
-Environment lamp() {
-  RgbImage image{80, 40, std::vector<float>(80 * 40 * 3, 0.0f)};
-  for (const int texel : {9 * 80 + 20, 9 * 80 + 21, 10 * 80 + 20, 10 * 80 + 21})
-    std::fill_n(image.rgb.begin() + 3 * texel, 3, 100.0f);
-  return {std::make_shared<EnvironmentMap>(image, MapFilter::nearest, 1.0f, false), Mat3{}};
-}
-
 class PoolRays : public OnInstructionSet {
  protected:
   float choose(const SiteBlock& sites, std::span<const VisibilityCell> memory, float u) {
@@ -147,19 +139,6 @@ TEST_P(PoolRays, AverageToTheirCandidates) {
     SCOPED_TRACE(glossy);
     const SiteBlock sites = pixel(glossy);
     expect_mean(sites, view, light_pool, counts(sites), 16, 4000, is_free);
-  }
-}
-
-// Few rays and many, at even distances: each of the sets that can be chosen comes up equally often.
-TEST_P(PoolRays, AverageToTheirCandidatesUnderALoneLight) {
-  const Environment lone = lamp();
-  const LightPool pool = make_light_pool(lone, lone, 3, 2, {.one_run = true});
-  ASSERT_TRUE(pool.lone_light);
-  const SiteBlock sites = pixel(false);
-  for (const int num_rays : {1, 2, 5, 16, 64}) {
-    SCOPED_TRACE(num_rays);
-    const auto half = [](const Vec3& w) { return w.x > w.z; };
-    expect_mean(sites, view_of(lone), pool, {.from_light = 256}, num_rays, 256, half);
   }
 }
 

@@ -33,9 +33,6 @@ FrameLight light_of(const Radiance& radiance) {
 FrameLight sky() {
   return light_of([](int i) { return static_cast<float>(1 + (i * 37) % 23); });
 }
-FrameLight lamp() {
-  return light_of([](int i) { return i == 9 * 64 + 20 ? 100.0f : 0.0f; });
-}
 
 /// A pixel that sees a diffuse floor, or a glossy one.
 SiteBlock pixel(bool glossy) {
@@ -132,16 +129,6 @@ TEST_F(PoolCounts, NeverExceedTheMost) {
     const std::int32_t count = sample(light, pixel(true), num_candidates, {1e6f, 1e6f});
     EXPECT_LE(count, limits::kMaxCandidates) << num_candidates;
     EXPECT_GE(count, std::min(num_candidates * 32, limits::kMaxCandidates)) << num_candidates;
-  }
-}
-
-TEST_F(PoolCounts, OfALoneLightArePowersOfTwo) {
-  const FrameLight light = lamp();
-  for (const std::int32_t num_candidates : {1, 100, 1000, 8192}) {
-    const auto count =
-        static_cast<std::uint32_t>(sample(light, pixel(false), num_candidates, {1, 1}));
-    EXPECT_TRUE(std::has_single_bit(count)) << num_candidates << " " << count;
-    EXPECT_GE(count, 64u) << "four times N";
   }
 }
 
