@@ -10,6 +10,7 @@ namespace baton {
 /// `code` how it ended; errors have then been printed to stderr.
 void add_chart_command(CLI::App& app, ExitCode& code);
 void add_check_command(CLI::App& app, ExitCode& code);
+void add_compare_command(CLI::App& app, ExitCode& code);
 void add_job_command(CLI::App& app, ExitCode& code);
 void add_render_command(CLI::App& app, ExitCode& code);
 void add_state_command(CLI::App& app, ExitCode& code);

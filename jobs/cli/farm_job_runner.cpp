@@ -4,6 +4,8 @@
 #include <fmt/ranges.h>
 #include <unistd.h>
 
+#include <numeric>
+
 #include "common/job/job_json.h"
 #include "jobs/cli/job_summary.h"
 #include "jobs/cli/text.h"
@@ -22,22 +24,29 @@ Error stopped() { return {ErrorKind::cancelled, "stopped; finished runs are kept
 /// Says now and then how far it is.
 class Count {
  public:
-  explicit Count(std::size_t total) : total_(total) {}
+  explicit Count(const std::vector<JobSpec>& jobs)
+      : num_jobs_(jobs.size()), frames_done_(num_jobs_) {
+    for (const JobSpec& job : jobs) num_frames_ += job.frames.size();
+  }
 
-  void update(std::size_t done) {
+  void has_frames(std::size_t job, std::size_t done) { frames_done_[job] = done; }
+  void update(std::size_t jobs_done) {
     const Clock::time_point now = Clock::now();
     const bool terminal = ::isatty(STDERR_FILENO) == 1;
-    if (done < total_ && now < next_) return;
+    if (jobs_done < num_jobs_ && now < next_) return;
     next_ = now + (terminal ? kPause : kLineInterval);
     const double seconds = std::chrono::duration<double>(now - start_).count();
-    const auto left = static_cast<double>(total_ - done);
-    fmt::print(stderr, "{}runs {}/{}  ETA {}{}", terminal ? "\r" : "", done, total_,
+    const auto done = std::accumulate(frames_done_.begin(), frames_done_.end(), std::size_t{0});
+    const auto left = static_cast<double>(num_frames_ - done);
+    fmt::print(stderr, "{}runs {}/{}  frames {}/{}  ETA {}{}", terminal ? "\r" : "", jobs_done,
+               num_jobs_, done, num_frames_,
                done > 0 ? duration_text(left * seconds / static_cast<double>(done)) : "?",
-               terminal && done < total_ ? "\x1b[K" : "\n");
+               terminal && jobs_done < num_jobs_ ? "\x1b[K" : "\n");
   }
 
  private:
-  std::size_t total_;
+  std::size_t num_jobs_, num_frames_ = 0;
+  std::vector<std::size_t> frames_done_;  ///< by job
   Clock::time_point start_ = Clock::now();
   Clock::time_point next_ = start_;
 };
@@ -67,12 +76,12 @@ Status FarmJobRunner::submit(const JobSpec& job, std::size_t index, std::vector<
   return {};
 }
 
-Result<std::optional<JobSummary>> FarmJobRunner::ended(const Open& job, const JobSpec& spec) {
+Result<JobSummary> FarmJobRunner::ask(const Open& job, const JobSpec& spec) {
   BATON_ASSIGN(const std::optional<JobDetail> detail,
                ask_farm<JobDetail>(*farm_, *client_, signals_, ShowJob{job.job.hex()}));
   if (!detail) return stopped();
-  if (is_open(detail->summary.status)) return std::optional<JobSummary>();
-  if (detail->summary.status == JobStatus::done) return std::optional(detail->summary);
+  const JobSummary& summary = detail->summary;
+  if (is_open(summary.status) || summary.status == JobStatus::done) return summary;
   return Error{ErrorKind::bad_input, fmt::format("run '{}' seed {} {}: {}", spec.name, spec.seed,
                                                  job_status_name(detail->summary.status),
                                                  fmt::join(detail->failures, "\n"))};
@@ -81,7 +90,7 @@ Result<std::optional<JobSummary>> FarmJobRunner::ended(const Open& job, const Jo
 Status FarmJobRunner::run(const std::vector<JobSpec>& jobs,
                           const std::function<Status(std::size_t, const JobSummary&)>& done) {
   BATON_TRY(start());
-  Count count(jobs.size());
+  Count count(jobs);
   std::vector<Open> open;
   std::size_t next = 0, num_done = 0;
   while (num_done < jobs.size()) {
@@ -90,12 +99,13 @@ Status FarmJobRunner::run(const std::vector<JobSpec>& jobs,
       ++next;
     }
     for (std::size_t i = 0; i < open.size();) {
-      BATON_ASSIGN(const std::optional<JobSummary> summary, ended(open[i], jobs[open[i].index]));
-      if (!summary) {
+      BATON_ASSIGN(const JobSummary summary, ask(open[i], jobs[open[i].index]));
+      count.has_frames(open[i].index, summary.frames_done);
+      if (is_open(summary.status)) {
         ++i;
         continue;
       }
-      BATON_TRY(done(open[i].index, *summary));
+      BATON_TRY(done(open[i].index, summary));
       open.erase(open.begin() + static_cast<std::ptrdiff_t>(i));
       ++num_done;
     }

@@ -28,8 +28,8 @@ class FarmJobRunner final : public JobRunner {
 
   Status start();
   Status submit(const JobSpec& job, std::size_t index, std::vector<Open>& open);
-  /// Asks for the job; nullopt while it runs.
-  Result<std::optional<JobSummary>> ended(const Open& job, const JobSpec& spec);
+  /// How far the job is. Error: it has failed.
+  Result<JobSummary> ask(const Open& job, const JobSpec& spec);
 
   FarmOptions options_;
   SignalWait signals_;

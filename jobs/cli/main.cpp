@@ -29,6 +29,7 @@ constexpr const char* kFooter = R"(Examples:
   baton job list
   baton worker list
   baton chart study.json             error against time of several methods, as charts
+  baton compare a.json b.json        two ways to render the same frames, side by side
   baton state show STATE.blob        what samples a tile hands to its next frame
 
 Exit codes: 0 ok, 1 timeout, 2 failed, 3 cancelled, 64 wrong command line, 65 bad input,
@@ -67,6 +68,7 @@ int main(int argc, char** argv) {
   baton::add_worker_command(app, code);
   baton::add_state_command(app, code);
   baton::add_chart_command(app, code);
+  baton::add_compare_command(app, code);
   if (const std::string fault = unknown_command(app, argc, argv); !fault.empty()) {
     fmt::print(stderr, "{}\n", fault);
     return static_cast<int>(baton::ExitCode::usage);
