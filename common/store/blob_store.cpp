@@ -68,6 +68,20 @@ Status BlobStore::remove(const Digest& digest) {
   return {};
 }
 
+std::size_t BlobStore::sweep() const {
+  std::size_t count = 0;
+  const auto oldest = fs::file_time_type::clock::now() - kLeftoverAge;
+  std::error_code error;
+  for (fs::recursive_directory_iterator entry(directory_, error), end; !error && entry != end;
+       entry.increment(error)) {
+    if (entry->path().extension() != ".tmp") continue;
+    std::error_code gone;
+    const auto written = entry->last_write_time(gone);
+    if (!gone && written < oldest && fs::remove(entry->path(), gone)) ++count;
+  }
+  return count;
+}
+
 fs::path BlobStore::job_file(const Digest& job) const {
   return directory_ / "jobs" / (job.hex() + ".json");
 }

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <filesystem>
 
 #include "common/base/bytes.h"
@@ -39,6 +40,11 @@ class BlobStore {
 
   /// Forgets the blob. One that is already gone is a success.
   Status remove(const Digest& digest);
+
+  /// Removes what processes that died while they wrote have left: temporary files that nobody has
+  /// touched for kLeftoverAge, longer than any write takes. Returns how many.
+  std::size_t sweep() const;
+  static constexpr std::chrono::hours kLeftoverAge{1};
 
   /// Where workers save a job's document while it runs, so that a failed tile can be replayed
   /// alone.

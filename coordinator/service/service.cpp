@@ -33,6 +33,8 @@ Result<Service> Service::open(const ServiceOptions& options) {
   }
   BATON_ASSIGN(Journal journal, Journal::open(options.work_dir / "journal.sqlite"));
   BATON_ASSIGN(BlobStore store, BlobStore::open(options.work_dir / "store"));
+  if (const std::size_t swept = store.sweep(); swept > 0)
+    spdlog::info("{} files that were never finished are removed from the store", swept);
   BATON_ASSIGN(Router router, Router::bind(options.listen));
   Service service(options, std::move(router), std::move(journal), std::move(store));
   BATON_TRY(service.restore_jobs());

@@ -200,6 +200,10 @@ class Process:
         self._log = open(self.log_path, "ab")
         self._process = subprocess.Popen(command, stdout=self._log, stderr=self._log, start_new_session=True)
 
+    @property
+    def pid(self):
+        return self._process.pid
+
     def alive(self):
         return self._process.poll() is None
 
@@ -258,9 +262,9 @@ class Farm:
         wait_until(lambda: self.baton("job", "list", expect=None, deadline_s=20).returncode == OK,
                    "the coordinator answers")
 
-    def start_worker(self, threads=1):
+    def start_worker(self, threads=1, name=None):
         """Starts one more worker; returns it."""
-        name = f"worker{len(self.workers)}"
+        name = name or f"worker{len(self.workers)}"
         command = [self.programs.path("baton-worker"), "--coordinator", self.endpoint, "--threads", str(threads),
                    "--name", name]
         self.workers.append(Process(command, self.folder / f"{name}.log"))

@@ -45,6 +45,7 @@ class ExecuteTest : public testing::Test {
     job_.scene.ground = GroundSpec{.material = "chalk", .height = -0.6f, .size = 20};
     job_.environment.keys = {{.frame = 1, .map = folder_ + "map.exr"}};
     job_.environment.rotation_deg_per_frame = 3;
+    job_.sampling.method = Method::sequential;
     job_.sampling.num_candidates = 32;
     job_.output.directory = folder_ + "frames";
     job_.state.checkpoint_every = 2;

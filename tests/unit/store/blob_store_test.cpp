@@ -127,5 +127,21 @@ TEST_F(BlobStoreTest, ManyWritersOfTheSameBlobsNeverShowHalfOfOne) {
   EXPECT_EQ(num_files(), 2);
 }
 
+TEST_F(BlobStoreTest, SweepsWhatTheDeadLeftAndNothingElse) {
+  BlobStore store = open();
+  const Digest digest = *store.put(as_bytes_view("blob"));
+  const fs::path old = folder_ / "00" / ".a.blob.1.1.tmp",
+                 young = folder_ / "00" / ".b.blob.1.2.tmp";
+  for (const fs::path& path : {old, young})
+    ASSERT_TRUE(write_file_atomic(path, as_bytes_view("x")).ok());
+  const auto long_ago = fs::file_time_type::clock::now() - 2 * BlobStore::kLeftoverAge;
+  fs::last_write_time(old, long_ago);
+  fs::last_write_time(store.path(digest), long_ago);
+  EXPECT_EQ(store.sweep(), 1u);
+  EXPECT_FALSE(fs::exists(old));
+  EXPECT_TRUE(fs::exists(young));
+  EXPECT_TRUE(store.contains(digest));
+}
+
 }  // namespace
 }  // namespace baton
