@@ -168,7 +168,7 @@ void read_scene(StudyObject& object, const Shared& shared, Study& study, StudyFa
       patched_job(base, object.path_of("job"), patches, shared.base_directory, faults);
   if (!plain) return;
 
-  // The judge.
+  // The reference.
   prepare_output(*plain);
   scene.crop = read_crop(object, plain->image, faults);
   scene.frames = measured_frames(shared.measured, *plain, shared.measured_path, faults);

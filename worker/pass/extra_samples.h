@@ -9,7 +9,7 @@
 
 namespace baton {
 
-/// The rival of the exchange: in each masked pixel `partitions` more draws of the job's own
+/// The baseline of the exchange: in each masked pixel `partitions` more draws of the job's own
 /// sampler, started afresh, each with as many samples as a population has; their mean with the
 /// first pass's.
 class ExtraSampler {

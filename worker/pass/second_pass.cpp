@@ -82,7 +82,7 @@ void exchange(const SecondPassWork& work, std::span<Rgb> radiance, RenderStats& 
   stats.seconds_second_rays += scene.seconds_rays();
 }
 
-/// The rival: more samples of the pixels themselves.
+/// The baseline: more samples of the pixels themselves.
 void sample_more(const SecondPassWork& work, std::span<Rgb> radiance, RenderStats& stats) {
   ExtraSampler sampler(work);
   const PixelRect& rect = work.rect;
