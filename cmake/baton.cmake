@@ -45,6 +45,14 @@ if(BATON_SANITIZE)
 endif()
 target_link_libraries(baton_options INTERFACE Threads::Threads)
 
+# baton_decides_only(TARGET): it moves no pixels. Sanitizer builds compile it without optimisation, in half the time.
+function(baton_decides_only target)
+  get_target_property(type ${target} TYPE)
+  if(BATON_SANITIZE AND NOT type STREQUAL "INTERFACE_LIBRARY")
+    target_compile_options(${target} PRIVATE -O0)
+  endif()
+endfunction()
+
 # baton_library(NAME DIR folder DEPS public... PRIVATE private...): all .cpp files of one folder.
 function(baton_library name)
   cmake_parse_arguments(A "" "DIR" "DEPS;PRIVATE" ${ARGN})
