@@ -2,10 +2,12 @@
 #include <fmt/ranges.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <memory>
 #include <thread>
 
+#include "common/base/limits.h"
 #include "common/image/contact_sheet.h"
 #include "common/job/job_json.h"
 #include "common/job/sequence.h"
@@ -13,6 +15,7 @@
 #include "jobs/cli/farm_job_runner.h"
 #include "jobs/cli/settle_method.h"
 #include "jobs/cli/text.h"
+#include "jobs/study/picture.h"
 #include "worker/scene/settle_motion.h"
 
 namespace baton {
@@ -20,9 +23,12 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A second seed renders so many frames, of which the last ones tell the noise: by then what is
+/// Two more seeds render so many frames, of which the last ones tell the noise: by then what is
 /// carried has settled.
-constexpr std::size_t kSecondSeedFrames = 12, kNoiseFrames = 4;
+constexpr std::size_t kSeedFrames = 12, kNoiseFrames = 4;
+/// Pixels of which both see the same: their sites lie elsewhere, and what that changes is no noise
+/// of a method.
+constexpr float kMaxTurn = 0.05f, kMaxDepthRatio = 0.01f;
 constexpr std::size_t kSheetColumns = 6;
 constexpr int kThumbWidth = 320;
 
@@ -34,17 +40,20 @@ struct CompareOptions {
 
 /// One of the jobs and what was seen of it.
 struct Compared {
-  JobSpec job, second_seed;
+  JobSpec job;
+  std::array<JobSpec, 2> seeds;  ///< for its noise
   JobSummary summary;
-  double noise = 0;  ///< RMSE over the mean radiance
+  double noise = 0;  ///< relative standard deviation of a pixel, rms over pixels
 };
 
-JobSpec with_second_seed(JobSpec job, const fs::path& folder) {
-  job.seed += 1;
-  job.frames.resize(std::min(job.frames.size(), kSecondSeedFrames));
-  job.output.directory = folder / (job.name + "-second-seed");
-  job.output.aovs.clear();
-  job.name += " second seed";
+JobSpec with_seed(JobSpec job, std::uint64_t more, const fs::path& folder) {
+  job.seed += more;
+  job.frames.resize(std::min(job.frames.size(), kSeedFrames));
+  job.name = fmt::format("{} seed {}", job.name.substr(0, limits::kMaxNameLength / 2), job.seed);
+  job.output.directory = folder / job.name;
+  job.output.background = Background::transparent;
+  job.output.aovs = {Aov::normal, Aov::depth};
+  job.output.pixel_type = PixelType::full_float;
   return job;
 }
 
@@ -53,7 +62,8 @@ Result<Compared> load(const std::string& path, const FarmOptions& farm) {
   Compared compared;
   BATON_ASSIGN(compared.job, settle_motion(std::move(written)));
   BATON_TRY(settle_method(compared.job, farm));
-  compared.second_seed = with_second_seed(compared.job, farm.work_directory);
+  for (std::size_t i = 0; i < compared.seeds.size(); ++i)
+    compared.seeds[i] = with_seed(compared.job, i + 1, farm.work_directory);
   return compared;
 }
 
@@ -78,23 +88,50 @@ Status check_alike(const std::vector<Compared>& jobs, const CompareOptions& opti
   return {};
 }
 
-/// Noise of both seeds together: their difference has twice the variance of one.
+/// A frame's planes by name.
+class Planes {
+ public:
+  explicit Planes(const FilmTile& film) : film_(film) {}
+  float at(const char* channel, std::size_t pixel) const {
+    const auto found = std::find(film_.channels.begin(), film_.channels.end(), channel);
+    return film_.plane(static_cast<std::size_t>(found - film_.channels.begin()))[pixel];
+  }
+  Vec3 three(const char* x, const char* y, const char* z, std::size_t pixel) const {
+    return {at(x, pixel), at(y, pixel), at(z, pixel)};
+  }
+
+ private:
+  const FilmTile& film_;
+};
+
+bool see_the_same(const Planes& a, const Planes& b, std::size_t pixel) {
+  if (a.at("A", pixel) < 1 || b.at("A", pixel) < 1) return false;
+  const auto normal = [&](const Planes& of) {
+    return of.three("normal.X", "normal.Y", "normal.Z", pixel);
+  };
+  const float depth = a.at("depth", pixel);
+  return length(normal(a) - normal(b)) < kMaxTurn &&
+         std::abs(b.at("depth", pixel) - depth) < kMaxDepthRatio * depth;
+}
+
+/// From the difference of two seeds, which has twice the variance of one.
 Result<double> noise_of(const Compared& compared) {
-  const std::vector<int>& frames = compared.second_seed.frames;
-  double squares = 0, sum = 0;
-  const auto count = static_cast<std::int32_t>(frames.size());
-  for (std::int32_t i = std::max(count - static_cast<std::int32_t>(kNoiseFrames), 0); i < count;
-       ++i) {
-    BATON_ASSIGN(const RgbImage a, read_rgb_image(frame_path(compared.job, i)));
-    BATON_ASSIGN(const RgbImage b, read_rgb_image(frame_path(compared.second_seed, i)));
-    for (std::size_t k = 0; k < a.rgb.size(); ++k) {
-      const double difference = double{a.rgb[k]} - b.rgb[k];
-      squares += difference * difference / (2 * static_cast<double>(a.rgb.size()));
-      sum += (double{a.rgb[k]} + b.rgb[k]) / (2 * static_cast<double>(a.rgb.size()));
+  const auto count = static_cast<std::int32_t>(compared.seeds[0].frames.size());
+  double squares = 0, pixels = 0;
+  for (std::int32_t f = std::max(count - static_cast<std::int32_t>(kNoiseFrames), 0); f < count;
+       ++f) {
+    BATON_ASSIGN(const FilmTile first, read_exr(frame_path(compared.seeds[0], f)));
+    BATON_ASSIGN(const FilmTile second, read_exr(frame_path(compared.seeds[1], f)));
+    const Planes a(first), b(second);
+    for (std::size_t i = 0; i < first.num_pixels(); ++i) {
+      if (!see_the_same(a, b, i)) continue;
+      const Vec3 x = a.three("R", "G", "B", i), y = b.three("R", "G", "B", i);
+      const double relative = (mean(x) - mean(y)) / ((mean(x) + mean(y)) / 2 + kRelativeFloor);
+      squares += relative * relative / 2;
+      pixels += 1;
     }
   }
-  const auto seen = static_cast<double>(std::min(frames.size(), kNoiseFrames));
-  return sum > 0 ? std::sqrt(squares * seen) / sum : 0.0;
+  return pixels > 0 ? std::sqrt(squares / pixels) : 0.0;
 }
 
 /// A row of frames for each job, all at one exposure.
@@ -127,7 +164,9 @@ void print_table(const std::vector<Compared>& jobs, const fs::path& sheet) {
                compared.job.output.pattern);
   }
   fmt::print(
-      "noise: RMSE over mean radiance, from a second seed; handed on: from frame to frame\n");
+      "noise: relative standard deviation of a pixel, from two more seeds; handed on: from frame "
+      "to "
+      "frame\n");
   fmt::print("sheet, a row for each job: {}\n", sheet.string());
 }
 
@@ -147,10 +186,11 @@ Result<ExitCode> run_compare(const CompareOptions& options) {
   }
   BATON_TRY(check_alike(jobs, options));
 
-  // Render all of them, and each with a second seed.
+  // Render all of them, and each with two more seeds.
   std::vector<JobSpec> all;
   for (const Compared& compared : jobs) all.push_back(compared.job);
-  for (const Compared& compared : jobs) all.push_back(compared.second_seed);
+  for (const Compared& compared : jobs)
+    all.insert(all.end(), compared.seeds.begin(), compared.seeds.end());
   {
     FarmJobRunner runner(farm);
     BATON_TRY(runner.run(all, [&](std::size_t index, const JobSummary& summary) {
