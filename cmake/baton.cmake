@@ -45,7 +45,7 @@ if(BATON_SANITIZE)
 endif()
 target_link_libraries(baton_options INTERFACE Threads::Threads)
 
-# baton_decides_only(TARGET): it moves no pixels. Sanitizer builds compile it without optimisation, in half the time.
+# baton_decides_only(TARGET): it moves no pixels. Sanitizer builds compile it without optimisation, which takes less time.
 function(baton_decides_only target)
   get_target_property(type ${target} TYPE)
   if(BATON_SANITIZE AND NOT type STREQUAL "INTERFACE_LIBRARY")

@@ -70,6 +70,16 @@ Status decode_meta(const SectionFile& file, const std::string& name, StoredFilm&
 
 }  // namespace
 
+const float* FilmTile::find(std::string_view channel) const {
+  const auto found = std::find(channels.begin(), channels.end(), channel);
+  return found == channels.end() ? nullptr
+                                 : plane(static_cast<std::size_t>(found - channels.begin()));
+}
+
+float* FilmTile::find(std::string_view channel) {
+  return const_cast<float*>(std::as_const(*this).find(channel));
+}
+
 Bytes encode_film_tile(const FilmTile& tile, const FilmOrigin& origin) {
   BATON_CHECK(!tile.channels.empty() &&
               tile.values.size() == tile.channels.size() * tile.num_pixels());

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "common/base/bytes.h"
@@ -22,6 +23,9 @@ struct FilmTile {
   std::size_t num_pixels() const { return static_cast<std::size_t>(rect.area()); }
   float* plane(std::size_t channel) { return values.data() + channel * num_pixels(); }
   const float* plane(std::size_t channel) const { return values.data() + channel * num_pixels(); }
+  /// The plane of a channel by its name; null when there is none.
+  float* find(std::string_view channel);
+  const float* find(std::string_view channel) const;
 };
 
 /// Which pass made a film. Stored; values are for ever.

@@ -51,7 +51,7 @@ void fields(JobArchive& a, ImageSpec& image) {
 
 void method_that_draws_anew(JobArchive& a, Key key, Method& method) {
   std::vector<std::string_view> names;
-  for (const std::string_view name : kMethodNames) {
+  for (const std::string_view name : method_names()) {
     if (traits(method_of(name)).draws_anew) names.push_back(name);
   }
   std::string name(traits(method).name);
@@ -95,7 +95,7 @@ void material_fields(JobArchive& a, SamplingSpec& sampling, const SceneSpec& sce
 }
 
 void fields(JobArchive& a, SamplingSpec& sampling, const SceneSpec& scene) {
-  a.choice("method", sampling.method, kMethodNames);
+  a.choice("method", sampling.method, method_names());
   count_fields(a, sampling);
   a.boolean("misCompensation", sampling.mis_compensation);
   if (sampling.mis_compensation && sampling.method != Method::mis &&

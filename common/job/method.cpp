@@ -1,7 +1,9 @@
 #include "common/job/method.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
+#include <iterator>
 
 #include "common/base/check.h"
 #include "common/base/limits.h"
@@ -26,23 +28,23 @@ std::int64_t rays_of_pool(const SamplingSpec& s) {
 }
 
 /// In the order of the enumeration.
-constexpr std::array<MethodTraits, kNumMethods> kTraits{{
-    {.name = kMethodNames[0],
+constexpr MethodTraits kTraits[] = {
+    {.name = "reference",
      .no_second_pass = "which keeps no samples",
      .light = no_light,
      // A sample is a pair, one from the environment and one from the BRDF.
      .most_rays = [](const SamplingSpec& s) { return std::int64_t{2} * s.reference_samples; }},
-    {.name = kMethodNames[1],
+    {.name = "environment",
      .keeps_samples = true,
      .draws_anew = true,
      .light = [](const SamplingSpec& s) { return LightUse{.num_taken = s.num_particles}; },
      .most_rays = as_many_as_samples},
-    {.name = kMethodNames[2],
+    {.name = "brdf",
      .keeps_samples = true,
      .draws_anew = true,
      .light = no_light,
      .most_rays = as_many_as_samples},
-    {.name = kMethodNames[3],
+    {.name = "mis",
      .keeps_samples = true,
      .draws_anew = true,
      .light =
@@ -51,46 +53,54 @@ constexpr std::array<MethodTraits, kNumMethods> kTraits{{
                                s.num_particles - num_from_brdf(s.num_particles, s.brdf_fraction)};
          },
      .most_rays = as_many_as_samples},
-    {.name = kMethodNames[4],
+    {.name = "bidirectional",
      .keeps_samples = true,
      .draws_anew = true,
      .light = by_candidates,
      .most_rays = as_many_as_samples},
-    {.name = kMethodNames[5],
+    {.name = "sequential",
      .carried = Carried::samples,
      .keeps_samples = true,
      .light = of_sequential,
      .most_rays = as_many_as_samples},
-    {.name = kMethodNames[6],
+    {.name = "pool",
      .carried = Carried::memory,
      .no_second_pass = "whose rays are not its samples",
      .light = [](const SamplingSpec&) { return LightUse{.one_run = true}; },
      .most_rays = rays_of_pool},
-    {.name = kMethodNames[7],
+    {.name = "ratio",
      .no_second_pass = "whose rays are not its samples",
      .light = by_candidates,
      .most_rays = as_many_as_samples},
-    {.name = kMethodNames[8],
+    {.name = "restir",
      .carried = Carried::weighed_samples,
      .keeps_samples = true,
      .asks_neighbors = true,
      .no_second_pass = "whose samples are carried as one set",
      .light = by_candidates,
      .most_rays = as_many_as_samples},
-    {.name = kMethodNames[9],
-     .keeps_samples = true,
-     .light = no_light,
-     .most_rays = as_many_as_samples},
-}};
+    // Settled before anything is rendered; until then its numbers are those of the usual methods.
+    {.name = "auto", .keeps_samples = true, .light = no_light, .most_rays = as_many_as_samples},
+};
+static_assert(std::size(kTraits) == static_cast<std::size_t>(Method::automatic) + 1);
+
+constexpr auto kNames = [] {
+  std::array<std::string_view, std::size(kTraits)> names;
+  std::transform(std::begin(kTraits), std::end(kTraits), names.begin(),
+                 [](const MethodTraits& row) { return row.name; });
+  return names;
+}();
 
 }  // namespace
 
 const MethodTraits& traits(Method method) { return kTraits[static_cast<std::size_t>(method)]; }
 
+std::span<const std::string_view> method_names() { return kNames; }
+
 Method method_of(std::string_view name) {
-  const auto* const found = std::find(kMethodNames.begin(), kMethodNames.end(), name);
-  BATON_CHECK(found != kMethodNames.end());
-  return static_cast<Method>(found - kMethodNames.begin());
+  const auto* const found = std::find(kNames.begin(), kNames.end(), name);
+  BATON_CHECK(found != kNames.end());
+  return static_cast<Method>(found - kNames.begin());
 }
 
 std::int32_t num_from_brdf(std::int32_t total, float brdf_fraction) {

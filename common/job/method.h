@@ -1,7 +1,7 @@
 #pragma once
 
-#include <array>
 #include <cstdint>
+#include <span>
 #include <string_view>
 
 namespace baton {
@@ -22,7 +22,6 @@ enum class Method : std::uint8_t {
   restir,
   automatic
 };
-inline constexpr std::size_t kNumMethods = 10;
 
 /// What a method hands from frame to frame.
 enum class Carried : std::uint8_t {
@@ -39,7 +38,8 @@ struct LightUse {
   bool with_before = false;    ///< their light in the frame before is asked for as well
 };
 
-/// All that sets a method apart outside its own code: who else switches on Method is mistaken.
+/// All that sets a method apart outside the code that samples, which make_pixel_method() finds, and
+/// the prices that `auto` counts with: who else switches on Method is mistaken.
 struct MethodTraits {
   std::string_view name;  ///< in a job
   Carried carried = Carried::nothing;
@@ -63,11 +63,9 @@ struct MethodTraits {
 const MethodTraits& traits(Method method);
 
 /// Names of all methods in a job, in the order of the enumeration.
-inline constexpr std::array<std::string_view, kNumMethods> kMethodNames{
-    "reference",  "environment", "brdf",  "mis",    "bidirectional",
-    "sequential", "pool",        "ratio", "restir", "auto"};
+std::span<const std::string_view> method_names();
 
-/// name: one of kMethodNames.
+/// name: one of method_names().
 Method method_of(std::string_view name);
 
 /// Of `total` samples those from the BRDF, rounded.

@@ -1,21 +1,19 @@
 #include <fmt/format.h>
-#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <array>
-#include <cmath>
 #include <memory>
 #include <thread>
 
-#include "common/base/limits.h"
-#include "common/image/contact_sheet.h"
+#include "common/image/image_io.h"
 #include "common/job/job_json.h"
 #include "common/job/sequence.h"
 #include "jobs/cli/commands.h"
 #include "jobs/cli/farm_job_runner.h"
+#include "jobs/cli/frame_sheet.h"
 #include "jobs/cli/settle_method.h"
 #include "jobs/cli/text.h"
-#include "jobs/study/picture.h"
+#include "jobs/study/seed_noise.h"
 #include "worker/scene/settle_motion.h"
 
 namespace baton {
@@ -26,15 +24,11 @@ namespace fs = std::filesystem;
 /// Two more seeds render so many frames, of which the last ones tell the noise: by then what is
 /// carried has settled.
 constexpr std::size_t kSeedFrames = 12, kNoiseFrames = 4;
-/// Pixels of which both see the same: their sites lie elsewhere, and what that changes is no noise
-/// of a method.
-constexpr float kMaxTurn = 0.05f, kMaxDepthRatio = 0.01f;
 constexpr std::size_t kSheetColumns = 6;
-constexpr int kThumbWidth = 320;
 
 struct CompareOptions {
   std::vector<std::string> jobs;
-  std::string output;  ///< empty: NAME-compared beside the first job
+  std::string output;  ///< empty: FILE-compared beside the first job
   int workers = 1;
 };
 
@@ -43,13 +37,14 @@ struct Compared {
   JobSpec job;
   std::array<JobSpec, 2> seeds;  ///< for its noise
   JobSummary summary;
-  double noise = 0;  ///< relative standard deviation of a pixel, rms over pixels
+  double noise = 0;  ///< SeedNoise::deviation()
 };
 
-JobSpec with_seed(JobSpec job, std::uint64_t more, const fs::path& folder) {
+/// The first frames of job `number` with another seed, and with all that SeedNoise asks for.
+JobSpec with_seed(JobSpec job, std::size_t number, std::uint64_t more, const fs::path& folder) {
   job.seed += more;
   job.frames.resize(std::min(job.frames.size(), kSeedFrames));
-  job.name = fmt::format("{} seed {}", job.name.substr(0, limits::kMaxNameLength / 2), job.seed);
+  job.name = fmt::format("job {} seed {}", number + 1, job.seed);
   job.output.directory = folder / job.name;
   job.output.background = Background::transparent;
   job.output.aovs = {Aov::normal, Aov::depth};
@@ -57,13 +52,16 @@ JobSpec with_seed(JobSpec job, std::uint64_t more, const fs::path& folder) {
   return job;
 }
 
-Result<Compared> load(const std::string& path, const FarmOptions& farm) {
-  BATON_ASSIGN(JobSpec written, load_job(path));
+/// The job as it is, but for its folder: the frames that somebody has rendered stay.
+Result<Compared> load(const CompareOptions& options, std::size_t number, const fs::path& output,
+                      const FarmOptions& farm) {
+  BATON_ASSIGN(JobSpec written, load_job(options.jobs[number]));
   Compared compared;
   BATON_ASSIGN(compared.job, settle_motion(std::move(written)));
   BATON_TRY(settle_method(compared.job, farm));
+  compared.job.output.directory = output / compared.job.name;
   for (std::size_t i = 0; i < compared.seeds.size(); ++i)
-    compared.seeds[i] = with_seed(compared.job, i + 1, farm.work_directory);
+    compared.seeds[i] = with_seed(compared.job, number, i + 1, farm.work_directory);
   return compared;
 }
 
@@ -80,76 +78,37 @@ Status check_alike(const std::vector<Compared>& jobs, const CompareOptions& opti
     if (job.image.width != first.image.width || job.image.height != first.image.height)
       return differ("image", "the size of that of");
     for (std::size_t j = 0; j < i; ++j) {
-      if (jobs[j].job.output.directory == job.output.directory)
-        return differ("output.directory", "another than that of");
       if (jobs[j].job.name == job.name) return differ("name", "another than that of");
     }
   }
   return {};
 }
 
-/// A frame's planes by name.
-class Planes {
- public:
-  explicit Planes(const FilmTile& film) : film_(film) {}
-  float at(const char* channel, std::size_t pixel) const {
-    const auto found = std::find(film_.channels.begin(), film_.channels.end(), channel);
-    return film_.plane(static_cast<std::size_t>(found - film_.channels.begin()))[pixel];
-  }
-  Vec3 three(const char* x, const char* y, const char* z, std::size_t pixel) const {
-    return {at(x, pixel), at(y, pixel), at(z, pixel)};
-  }
-
- private:
-  const FilmTile& film_;
-};
-
-bool see_the_same(const Planes& a, const Planes& b, std::size_t pixel) {
-  if (a.at("A", pixel) < 1 || b.at("A", pixel) < 1) return false;
-  const auto normal = [&](const Planes& of) {
-    return of.three("normal.X", "normal.Y", "normal.Z", pixel);
-  };
-  const float depth = a.at("depth", pixel);
-  return length(normal(a) - normal(b)) < kMaxTurn &&
-         std::abs(b.at("depth", pixel) - depth) < kMaxDepthRatio * depth;
-}
-
-/// From the difference of two seeds, which has twice the variance of one.
 Result<double> noise_of(const Compared& compared) {
   const auto count = static_cast<std::int32_t>(compared.seeds[0].frames.size());
-  double squares = 0, pixels = 0;
+  SeedNoise noise;
   for (std::int32_t f = std::max(count - static_cast<std::int32_t>(kNoiseFrames), 0); f < count;
        ++f) {
     BATON_ASSIGN(const FilmTile first, read_exr(frame_path(compared.seeds[0], f)));
     BATON_ASSIGN(const FilmTile second, read_exr(frame_path(compared.seeds[1], f)));
-    const Planes a(first), b(second);
-    for (std::size_t i = 0; i < first.num_pixels(); ++i) {
-      if (!see_the_same(a, b, i)) continue;
-      const Vec3 x = a.three("R", "G", "B", i), y = b.three("R", "G", "B", i);
-      const double relative = (mean(x) - mean(y)) / ((mean(x) + mean(y)) / 2 + kRelativeFloor);
-      squares += relative * relative / 2;
-      pixels += 1;
-    }
+    BATON_TRY(noise.add(first, second));
   }
-  return pixels > 0 ? std::sqrt(squares / pixels) : 0.0;
+  return noise.deviation();
 }
 
-/// A row of frames for each job, all at one exposure.
-Status write_sheet(const std::vector<Compared>& jobs, const fs::path& path) {
-  const std::vector<int>& frames = jobs.front().job.frames;
-  const std::size_t columns = std::min(frames.size(), kSheetColumns);
-  std::vector<RgbImage> cells;
+/// A row of frames for each job.
+Status write_rows(const std::vector<Compared>& jobs, const fs::path& path) {
+  const std::vector<int> frames = pick_frames(jobs.front().job.frames, kSheetColumns);
+  std::vector<RgbImage> thumbnails;
   for (const Compared& compared : jobs) {
-    for (std::size_t c = 0; c < columns; ++c) {
-      const std::size_t index = columns > 1 ? c * (frames.size() - 1) / (columns - 1) : 0;
-      BATON_ASSIGN(const RgbImage image,
-                   read_rgb_image(frame_path(compared.job, static_cast<std::int32_t>(index))));
-      cells.push_back(resize(image, std::min(image.width, kThumbWidth)));
+    const OutputSpec& out = compared.job.output;
+    for (const int frame : frames) {
+      BATON_ASSIGN(RgbImage thumbnail,
+                   read_thumbnail(fs::path(out.directory) / frame_file_name(out.pattern, frame)));
+      thumbnails.push_back(std::move(thumbnail));
     }
   }
-  const float exposure = auto_exposure(cells[columns / 2]);
-  for (RgbImage& cell : cells) cell = tone_map(cell, exposure);
-  return write_png(path, contact_sheet(cells, static_cast<int>(columns), cells.front().width));
+  return write_sheet(path, std::move(thumbnails), frames.size(), static_cast<int>(frames.size()));
 }
 
 void print_table(const std::vector<Compared>& jobs, const fs::path& sheet) {
@@ -163,10 +122,8 @@ void print_table(const std::vector<Compared>& jobs, const fs::path& sheet) {
                bytes_text(compared.summary.state_bytes), compared.job.output.directory,
                compared.job.output.pattern);
   }
-  fmt::print(
-      "noise: relative standard deviation of a pixel, from two more seeds; handed on: from frame "
-      "to "
-      "frame\n");
+  fmt::print("noise: relative standard deviation of a pixel, by two more seeds\n");
+  fmt::print("handed on: sample state, packed, from frame to frame\n");
   fmt::print("sheet, a row for each job: {}\n", sheet.string());
 }
 
@@ -180,8 +137,8 @@ Result<ExitCode> run_compare(const CompareOptions& options) {
                          .threads_per_worker = std::max(1, processors / options.workers),
                          .work_directory = output / ".baton"};
   std::vector<Compared> jobs;
-  for (const std::string& path : options.jobs) {
-    BATON_ASSIGN(Compared compared, load(path, farm));
+  for (std::size_t number = 0; number < options.jobs.size(); ++number) {
+    BATON_ASSIGN(Compared compared, load(options, number, output, farm));
     jobs.push_back(std::move(compared));
   }
   BATON_TRY(check_alike(jobs, options));
@@ -203,7 +160,7 @@ Result<ExitCode> run_compare(const CompareOptions& options) {
     BATON_ASSIGN(compared.noise, noise_of(compared));
   }
   const fs::path sheet = output / "comparison.png";
-  BATON_TRY(write_sheet(jobs, sheet));
+  BATON_TRY(write_rows(jobs, sheet));
   print_table(jobs, sheet);
   return ExitCode::ok;
 }
@@ -212,13 +169,13 @@ Result<ExitCode> run_compare(const CompareOptions& options) {
 
 void add_compare_command(CLI::App& app, ExitCode& code) {
   auto options = std::make_shared<CompareOptions>();
-  CLI::App* command =
-      app.add_subcommand("compare", "Renders jobs of the same frames and sets them side by side");
+  CLI::App* command = app.add_subcommand(
+      "compare", "Renders jobs of the same frames into one folder and sets them side by side");
   command->add_option("JOBS", options->jobs, "job files with alike frames")
       ->required()
       ->expected(2, 8);
   command->add_option("--output", options->output,
-                      "folder of the sheet; default: NAME-compared beside the first job");
+                      "folder of frames and sheet; default: FILE-compared beside the first job");
   command->add_option("--workers", options->workers, "worker processes; default: 1")
       ->check(CLI::Range(1, 256));
   command->footer(

@@ -16,20 +16,30 @@ constexpr std::size_t kMaxFrames = 12;
 constexpr int kMaxColumns = 6;
 constexpr int kMaxThumbWidth = 320;
 
-/// At most kMaxFrames of `frames`, the first and the last among them.
-std::vector<int> pick_frames(const std::vector<int>& frames) {
-  if (frames.size() <= kMaxFrames) return frames;
+}  // namespace
+
+std::vector<int> pick_frames(const std::vector<int>& frames, std::size_t count) {
+  if (frames.size() <= count) return frames;
   std::vector<int> picked;
-  for (std::size_t i = 0; i < kMaxFrames; ++i) {
-    picked.push_back(frames[i * (frames.size() - 1) / (kMaxFrames - 1)]);
-  }
+  for (std::size_t i = 0; i < count; ++i)
+    picked.push_back(frames[i * (frames.size() - 1) / (count - 1)]);
   return picked;
 }
 
-}  // namespace
+Result<RgbImage> read_thumbnail(const fs::path& path) {
+  BATON_ASSIGN(const RgbImage image, read_rgb_image(path));
+  return resize(image, std::min(image.width, kMaxThumbWidth));
+}
+
+Status write_sheet(const fs::path& path, std::vector<RgbImage> thumbnails, std::size_t row,
+                   int columns) {
+  const float exposure = auto_exposure(thumbnails[row / 2]);
+  for (RgbImage& thumbnail : thumbnails) thumbnail = tone_map(thumbnail, exposure);
+  return write_png(path, contact_sheet(thumbnails, columns, thumbnails.front().width));
+}
 
 FrameSheet::FrameSheet(const JobSpec& job)
-    : output_(job.output), wanted_(pick_frames(job.frames)) {}
+    : output_(job.output), wanted_(pick_frames(job.frames, kMaxFrames)) {}
 
 void FrameSheet::add(const std::vector<int>& finished) {
   for (const int frame : finished) {
@@ -37,12 +47,12 @@ void FrameSheet::add(const std::vector<int>& finished) {
                         std::binary_search(wanted_.begin(), wanted_.end(), frame);
     if (!is_new) continue;
     const fs::path path = fs::path(output_.directory) / frame_file_name(output_.pattern, frame);
-    const Result<RgbImage> image = read_rgb_image(path);
-    if (!image) {
-      read_ = image.error();
+    Result<RgbImage> thumbnail = read_thumbnail(path);
+    if (!thumbnail) {
+      read_ = thumbnail.error();
       return;
     }
-    thumbnails_.emplace(frame, resize(*image, std::min(image->width, kMaxThumbWidth)));
+    thumbnails_.emplace(frame, std::move(thumbnail).value());
   }
 }
 
@@ -50,17 +60,12 @@ Result<std::optional<fs::path>> FrameSheet::write() const {
   BATON_TRY(read_);
   if (thumbnails_.empty()) return std::optional<fs::path>();
 
-  // One exposure for all, or changes of the light would not show.
-  const auto middle = std::next(thumbnails_.begin(), std::ssize(thumbnails_) / 2);
-  const float exposure = auto_exposure(middle->second);
   std::vector<RgbImage> frames;
-  for (const auto& [frame, thumbnail] : thumbnails_)
-    frames.push_back(tone_map(thumbnail, exposure));
-
+  for (const auto& [frame, thumbnail] : thumbnails_) frames.push_back(thumbnail);
   const auto square = static_cast<int>(std::ceil(std::sqrt(static_cast<double>(frames.size()))));
-  const RgbImage sheet = contact_sheet(frames, std::min(square, kMaxColumns), frames.front().width);
   const fs::path path = fs::path(output_.directory) / "contact-sheet.png";
-  BATON_TRY(write_png(path, sheet));
+  const std::size_t count = frames.size();
+  BATON_TRY(write_sheet(path, std::move(frames), count, std::min(square, kMaxColumns)));
   return std::optional(path);
 }
 

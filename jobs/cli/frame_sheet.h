@@ -11,6 +11,17 @@
 
 namespace baton {
 
+/// At most `count` of `frames` (> 1), evenly picked, the first and the last among them.
+std::vector<int> pick_frames(const std::vector<int>& frames, std::size_t count);
+
+/// A frame small enough for a sheet. Errors: read_rgb_image's.
+Result<RgbImage> read_thumbnail(const std::filesystem::path& path);
+
+/// Writes linear thumbnails in reading order, all at the exposure of the middle one of the first
+/// `row`, or changes of the light would not show.
+Status write_sheet(const std::filesystem::path& path, std::vector<RgbImage> thumbnails,
+                   std::size_t row, int columns);
+
 /// contact-sheet.png of a job: at most 12 of its frames, evenly picked, all at one exposure. Frames
 /// are read as they are finished, so that little is left to do in the end.
 class FrameSheet {

@@ -12,9 +12,8 @@ namespace {
 
 /// A plane by its name; empty when there is none.
 std::vector<float> plane(const FilmTile& film, const std::string& name) {
-  const auto found = std::find(film.channels.begin(), film.channels.end(), name);
-  if (found == film.channels.end()) return {};
-  const float* begin = film.plane(static_cast<std::size_t>(found - film.channels.begin()));
+  const float* const begin = film.find(name);
+  if (begin == nullptr) return {};
   return {begin, begin + film.num_pixels()};
 }
 

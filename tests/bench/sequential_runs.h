@@ -35,9 +35,8 @@ struct FrameResult {
 };
 
 inline std::span<const float> plane(const FilmTile& film, std::string_view name) {
-  const auto found = std::find(film.channels.begin(), film.channels.end(), name);
-  BATON_CHECK(found != film.channels.end());
-  return {film.plane(static_cast<std::size_t>(found - film.channels.begin())), film.num_pixels()};
+  BATON_CHECK(film.find(name) != nullptr);
+  return {film.find(name), film.num_pixels()};
 }
 
 /// Ends the program with what went wrong.

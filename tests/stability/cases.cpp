@@ -309,9 +309,9 @@ std::vector<Case> all_cases() {
 
 std::vector<Subject> all_subjects() {
   std::vector<Subject> subjects;
-  for (std::size_t method = 0; method < kMethodNames.size(); ++method) {
+  for (std::size_t method = 0; method < method_names().size(); ++method) {
     if (static_cast<Method>(method) == Method::automatic) continue;
-    subjects.push_back({std::string(kMethodNames[method]), [method](JobSpec& job) {
+    subjects.push_back({std::string(method_names()[method]), [method](JobSpec& job) {
                           job.sampling.method = static_cast<Method>(method);
                           job.sampling.reference_samples = 128;
                         }});

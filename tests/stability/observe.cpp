@@ -15,8 +15,7 @@ namespace baton::stability {
 namespace {
 
 std::span<const float> channel(const FilmTile& film, const std::string& name) {
-  const auto found = std::find(film.channels.begin(), film.channels.end(), name);
-  return {film.plane(static_cast<std::size_t>(found - film.channels.begin())), film.num_pixels()};
+  return {film.find(name), film.num_pixels()};
 }
 
 /// Mean of the values where `mask` is positive; 0 without any.

@@ -13,14 +13,12 @@ int main(int argc, char** argv) {
     fmt::print(stderr, "{}\n", image.error().message);
     return 1;
   }
-  const auto found = std::find(image->channels.begin(), image->channels.end(), argv[2]);
-  if (found == image->channels.end()) {
+  const float* const plane = image->find(argv[2]);
+  if (plane == nullptr) {
     fmt::print(stderr, "{}: no channel {}, it has {}\n", argv[1], argv[2],
                fmt::join(image->channels, " "));
     return 1;
   }
-  const float* const plane =
-      image->plane(static_cast<std::size_t>(found - image->channels.begin()));
   for (std::int32_t y = 0; y < image->rect.height(); ++y) {
     const float* const row = plane + std::ptrdiff_t{y} * image->rect.width();
     fmt::print("{}\n", fmt::join(row, row + image->rect.width(), " "));

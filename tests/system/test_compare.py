@@ -23,7 +23,8 @@ def both_rows_are_measured_and_shown(programs, folder):
     check(all(0 < float(noise) < 1 for noise in rows.values()), f"noise of some kind, got {rows}")
     check((folder / "out/comparison.png").stat().st_size > 1000, "a sheet")
     for name in rows:
-        check_equal(len(list((folder / name).glob("*.exr"))), 5, f"frames of {name}")
+        check_equal(len(list((folder / "out" / name).glob("*.exr"))), 5, f"frames of {name}")
+        check(not (folder / name).exists(), "the jobs' own folders are left alone")
 
 
 def jobs_that_cannot_be_compared_are_told_apart(programs, folder):

@@ -4,7 +4,6 @@
 #include <array>
 
 #include "worker/integrator/candidate_samplers.h"
-#include "worker/integrator/populations.h"
 #include "worker/sampling/light_noise.h"
 #include "worker/sampling/pool.h"
 
@@ -45,11 +44,6 @@ kernels::CandidateCounts counts_for_noise(const SiteBlock& sites, std::int32_t n
 
 }  // namespace
 
-PoolMethod::PoolMethod(const SamplingSpec& spec)
-    : num_candidates_(spec.num_candidates),
-      lobe_fraction_(spec.brdf_fraction),
-      num_rays_(spec.num_particles) {}
-
 PixelDiagnostics PoolMethod::sample(const PixelInput& input, const PixelState& pixel,
                                     SamplerScratch& scratch, RayWriter& rays) const {
   static constexpr std::array<VisibilityCell, kVisibilityCells> kNothing{};
@@ -64,9 +58,8 @@ PixelDiagnostics PoolMethod::sample(const PixelInput& input, const PixelState& p
                                                 num_rays_, memory, scratch.pool, scratch.rays);
   if (!own.empty() && scratch.rays.count > 0)
     remember_light_variance(own, scratch.rays.light_variance);
-  rays.add(scratch.rays);
   const auto source = input.has_history ? PixelSource::carried : PixelSource::fresh;
-  return settle_rays(total, num_rays_, counts.total(), source, pixel);
+  return settle(total, counts.total(), source, scratch.rays, pixel, rays);
 }
 
 void PoolMethod::learn(const FoundRays& found, const PixelState& pixel) const {

@@ -1,23 +1,18 @@
 #pragma once
 
-#include "worker/integrator/pixel_method.h"
+#include "worker/integrator/chosen_rays_method.h"
 
 namespace baton {
 
-/// `pool`: fresh candidates, and rays where the pixel's memory of earlier rays leaves
-/// their visibility in doubt (sampling/pool.h). What is known stands in for the rest as control
+/// `pool`: fresh candidates, and rays where the pixel's memory of earlier rays leaves their
+/// visibility in doubt (sampling/pool.h). What is known stands in for the rest as control
 /// variate. Unbiased whatever the memory says. It carries no samples, only the memory.
-class PoolMethod final : public PixelMethod {
+class PoolMethod final : public ChosenRaysMethod {
  public:
-  explicit PoolMethod(const SamplingSpec& spec);
+  explicit PoolMethod(const SamplingSpec& spec) : ChosenRaysMethod(spec) {}
   PixelDiagnostics sample(const PixelInput& input, const PixelState& pixel, SamplerScratch& scratch,
                           RayWriter& rays) const override;
   void learn(const FoundRays& found, const PixelState& pixel) const override;
-
- private:
-  std::int32_t num_candidates_;
-  float lobe_fraction_;
-  std::int32_t num_rays_;
 };
 
 }  // namespace baton

@@ -1,7 +1,6 @@
 #include "worker/integrator/populations.h"
 
 #include <algorithm>
-#include <cmath>
 
 #include "common/base/poison.h"
 #include "common/job/sequence.h"
@@ -44,13 +43,7 @@ PixelDiagnostics sample_populations(const PixelSampler& sampler, std::size_t num
                         state.confidence.empty() ? nullptr : &state.confidence[row]};
   };
   poison(colors);
-  PixelDiagnostics sum;
-  if (populations == 1) {
-    sum = sampler.sample(input, scratch, samples_of(0));
-    sum.num_samples = static_cast<std::int32_t>(n);
-    return sum;
-  }
-  sum.num_samples = static_cast<std::int32_t>(n * populations);
+  PixelDiagnostics sum{.num_samples = static_cast<std::int32_t>(n * populations)};
   PixelInput population_input = input;
   for (std::size_t k = 0; k < populations; ++k) {
     population_input.key.job_seed = stream_seed(input.key.job_seed, static_cast<std::uint32_t>(k));
@@ -69,17 +62,6 @@ PixelDiagnostics sample_populations(const PixelSampler& sampler, std::size_t num
     sum.resampled = sum.resampled || did.resampled;
   }
   return sum;
-}
-
-PixelDiagnostics settle_rays(float total, std::int32_t num_rays, std::int32_t num_candidates,
-                             PixelSource source, const PixelState& pixel) {
-  SampleState& state = pixel.tile;
-  const bool lit = total > 0 && std::isfinite(total);
-  state.lns[pixel.index] = state.lns_fresh[pixel.index] = lit ? total : 0.0f;
-  state.source[pixel.index] = source;
-  return {.ess = lit ? static_cast<float>(num_rays) : 0.0f,
-          .num_samples = num_rays,
-          .target_evaluations = num_candidates};
 }
 
 void set_background(SampleState& state, std::size_t index) {

@@ -28,10 +28,6 @@ PixelDiagnostics sample_populations(const PixelSampler& sampler, std::size_t num
                                     SamplerScratch& scratch, SampleState& state,
                                     SampleColors& colors);
 
-/// Settles a pixel whose method chose `num_rays` rays among candidates that weigh `total`.
-PixelDiagnostics settle_rays(float total, std::int32_t num_rays, std::int32_t num_candidates,
-                             PixelSource source, const PixelState& pixel);
-
 /// What a pixel's populations say together.
 float mean_lns(const SampleState& state, std::size_t index);
 PixelSource latest_source(const SampleState& state, std::size_t index);

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "worker/integrator/pixel_method.h"
+#include "worker/integrator/chosen_rays_method.h"
 
 namespace baton {
 
@@ -11,16 +11,11 @@ namespace baton {
 /// colour cancels; under grey light on grey surfaces the two methods are one. Consistent, not
 /// unbiased: a ratio of two estimates, off at finite N where the colours of the samples differ. It
 /// carries nothing.
-class RatioMethod final : public PixelMethod {
+class RatioMethod final : public ChosenRaysMethod {
  public:
-  explicit RatioMethod(const SamplingSpec& spec);
+  explicit RatioMethod(const SamplingSpec& spec) : ChosenRaysMethod(spec) {}
   PixelDiagnostics sample(const PixelInput& input, const PixelState& pixel, SamplerScratch& scratch,
                           RayWriter& rays) const override;
-
- private:
-  std::int32_t num_candidates_;
-  float lobe_fraction_;
-  std::int32_t num_rays_;
 };
 
 }  // namespace baton

@@ -9,13 +9,12 @@ namespace {
 
 /// The method of each material that has a setting of its own, beside methods that draw anew.
 std::vector<std::unique_ptr<const PixelMethod>> make_own_methods(const JobSpec& job) {
-  std::vector<std::unique_ptr<const PixelMethod>> methods(job.scene.materials.size());
-  if (!traits(job.sampling.method).draws_anew) return methods;
-  methods.clear();
-  for (const auto& entry : job.scene.materials) {
-    const auto own = job.sampling.by_material.find(entry.first);
-    methods.push_back(own == job.sampling.by_material.end() ? nullptr
-                                                            : make_material_method(own->second));
+  std::vector<std::unique_ptr<const PixelMethod>> methods;
+  for (const auto& [name, material] : job.scene.materials) {
+    const auto own = job.sampling.by_material.find(name);
+    const bool is_used =
+        traits(job.sampling.method).draws_anew && own != job.sampling.by_material.end();
+    methods.push_back(is_used ? make_material_method(own->second) : nullptr);
   }
   return methods;
 }

@@ -101,7 +101,7 @@ void sample_more(const SecondPassWork& work, std::span<Rgb> radiance, RenderStat
 void write_pixels(const SecondPassWork& work, std::span<const Rgb> radiance, FilmTile& film,
                   RenderStats& stats) {
   const bool show_environment = work.context.job.output.background == Background::environment;
-  const auto mask_channel = std::find(film.channels.begin(), film.channels.end(), "mask");
+  float* const mask = film.find("mask");
   for (std::int32_t y = work.rect.y0; y < work.rect.y1; ++y) {
     for (std::int32_t x = work.rect.x0; x < work.rect.x1; ++x) {
       if (!work.masks.any.at(x, y)) continue;
@@ -113,8 +113,7 @@ void write_pixels(const SecondPassWork& work, std::span<const Rgb> radiance, Fil
       film.plane(0)[pixel] = value.x;
       film.plane(1)[pixel] = value.y;
       film.plane(2)[pixel] = value.z;
-      if (mask_channel != film.channels.end())
-        film.plane(static_cast<std::size_t>(mask_channel - film.channels.begin()))[pixel] = 0;
+      if (mask != nullptr) mask[pixel] = 0;
       ++stats.pixels_masked;
     }
   }

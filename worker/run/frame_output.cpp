@@ -43,14 +43,12 @@ Status verify_frame(const std::filesystem::path& path, const FilmTile& image, st
   const std::size_t offset = static_cast<std::size_t>(y0) * image.rect.width();
   for (std::size_t channel = 0; channel < image.channels.size(); ++channel) {
     const std::string& name = image.channels[channel];
-    const auto found = std::find(stored.channels.begin(), stored.channels.end(), name);
-    if (found == stored.channels.end()) {
+    const float* const read = stored.find(name);
+    if (read == nullptr) {
       return Error{ErrorKind::corrupt,
                    fmt::format("{}: channel {} is missing", path.string(), name)};
     }
     const float* const wrote = image.plane(channel) + offset;
-    const float* const read =
-        stored.plane(static_cast<std::size_t>(found - stored.channels.begin()));
     for (std::size_t pixel = 0; pixel < stored.num_pixels(); ++pixel) {
       if (same_after_rounding(wrote[pixel], read[pixel])) continue;
       const auto width = static_cast<std::size_t>(image.rect.width());

@@ -127,13 +127,12 @@ TEST_F(ExecuteTest, TasksThroughTheStoreMakeTheImagesOfOneProcess) {
     const FilmTile image = read_exr(frame_path(job_, frame)).value();
     const FilmTile& in_process = expected.at(frame);
     for (std::size_t channel = 0; channel < in_process.channels.size(); ++channel) {
-      const auto found =
-          std::find(image.channels.begin(), image.channels.end(), in_process.channels[channel]);
-      ASSERT_NE(found, image.channels.end());
+      const std::string& name = in_process.channels[channel];
+      const float* const found = image.find(name);
+      ASSERT_NE(found, nullptr) << name;
       EXPECT_TRUE(std::equal(in_process.plane(channel),
-                             in_process.plane(channel) + image.num_pixels(),
-                             image.plane(static_cast<std::size_t>(found - image.channels.begin()))))
-          << *found << " of frame " << frame;
+                             in_process.plane(channel) + image.num_pixels(), found))
+          << name << " of frame " << frame;
     }
   }
 }
@@ -230,11 +229,9 @@ TEST_F(ExecuteTest, AReplayMakesTheFarmsTile) {
   const FilmTile tile = read_exr(options.out).value();
   const FilmTile expected = render_in_process(1).at(3);
   ASSERT_EQ(tile.rect, (PixelRect{0, 0, 8, 16}));
-  const auto red = static_cast<std::size_t>(
-      std::find(tile.channels.begin(), tile.channels.end(), "R") - tile.channels.begin());
   for (int y = 0; y < 16; ++y) {
     for (int x = 0; x < 8; ++x)
-      EXPECT_EQ(tile.plane(red)[y * 8 + x], expected.plane(0)[y * 40 + 32 + x]);
+      EXPECT_EQ(tile.find("R")[y * 8 + x], expected.plane(0)[y * 40 + 32 + x]);
   }
 }
 

@@ -20,6 +20,9 @@
 
 namespace baton::testing_service {
 
+/// Of the job of ServiceTest: two tiles in two runs, and four frames.
+inline constexpr int kNumTasks = 8;
+
 using namespace std::chrono_literals;
 namespace fs = std::filesystem;
 

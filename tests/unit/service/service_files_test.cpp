@@ -16,8 +16,6 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::SizeIs;
 
-constexpr int kNumTasks = 8;
-
 // The films of a frame are gone once it is written, and so are the states before them: the tiles of
 // frames 1 to 4 are rendered again, but only one frame is written.
 TEST_F(ServiceTest, ADoneJobOfWhichAFrameIsGoneOrCutMakesThatFrameAgain) {

@@ -15,8 +15,6 @@ using testing::ElementsAre;
 using testing::HasSubstr;
 using testing::SizeIs;
 
-constexpr int kNumTasks = 8;
-
 std::size_t count_blobs(const fs::path& store) {
   std::size_t count = 0;
   for (const auto& entry : fs::recursive_directory_iterator(store))
