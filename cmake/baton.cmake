@@ -66,9 +66,11 @@ function(baton_library name)
   endif()
 endfunction()
 
-# baton_simd_kernels(FILES...): where every vector passes through lambdas that are inlined. Looking for uses of their
-# temporaries after their scope keeps all of them in memory, and GCC then takes a quarter of an hour for one file.
+# baton_simd_kernels(FILES...): they include themselves once for each instruction set, so each is compiled by itself. Every
+# vector passes through lambdas that are inlined; looking for uses of their temporaries after their scope would keep all of
+# them in memory, and GCC then takes a quarter of an hour for one file.
 function(baton_simd_kernels)
+  set_source_files_properties(${ARGN} PROPERTIES SKIP_UNITY_BUILD_INCLUSION ON)
   if(BATON_SANITIZE)
     set_source_files_properties(${ARGN} PROPERTIES COMPILE_OPTIONS -fno-sanitize-address-use-after-scope)
   endif()

@@ -10,13 +10,13 @@
 namespace baton {
 namespace {
 
-constexpr std::chrono::milliseconds kLinger{0};
+constexpr std::chrono::milliseconds kClientLinger{0};
 
 /// A coordinator accepts connections at once, however busy it is.
 constexpr std::chrono::milliseconds kConnectPatience{2000 * kPatienceFactor};
 
 Result<Socket> connect_to(const std::string& endpoint) {
-  return Socket::connect(endpoint, kLinger, Socket::Unconnected::refuse);
+  return Socket::connect(endpoint, kClientLinger, Socket::Unconnected::refuse);
 }
 
 ErrorKind error_kind_of(std::uint8_t kind) {

@@ -5,12 +5,12 @@
 namespace baton {
 namespace {
 
-constexpr std::chrono::milliseconds kLinger{1000};  // so that a Shutdown reaches the workers
+constexpr std::chrono::milliseconds kRouterLinger{1000};  // so that a Shutdown reaches the workers
 
 }  // namespace
 
 Result<Router> Router::bind(const std::string& endpoint) {
-  BATON_ASSIGN(Socket socket, Socket::bind(endpoint, kLinger));
+  BATON_ASSIGN(Socket socket, Socket::bind(endpoint, kRouterLinger));
   return Router(std::move(socket));
 }
 

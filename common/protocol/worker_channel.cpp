@@ -5,12 +5,12 @@
 namespace baton {
 namespace {
 
-constexpr std::chrono::milliseconds kLinger{500};
+constexpr std::chrono::milliseconds kWorkerLinger{500};
 
 }  // namespace
 
 Result<WorkerChannel> WorkerChannel::connect(const std::string& endpoint) {
-  BATON_ASSIGN(Socket socket, Socket::connect(endpoint, kLinger));
+  BATON_ASSIGN(Socket socket, Socket::connect(endpoint, kWorkerLinger));
   return WorkerChannel(std::move(socket));
 }
 

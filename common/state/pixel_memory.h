@@ -1,37 +1,33 @@
 #pragma once
 
-#include <string>
-#include <vector>
-
-#include "common/base/section_file.h"
-#include "common/state/sample_state.h"
+#include <array>
+#include <cstddef>
+#include <cstdint>
 
 namespace baton {
 
-/// The sections of a state file that hold what pixels remember (FORMAT.md).
-inline constexpr SectionTag kMemorySummary{'V', 'I', 'S', 'S'};
-inline constexpr SectionTag kMemoryGrid{'V', 'I', 'S', 'G'};
-inline constexpr SectionTag kMemoryLightNoise{'N', 'O', 'I', 'S'};
-inline constexpr SectionTag kMemoryLobeNoise{'N', 'O', 'I', 'L'};
-/// Sizes of their elements in bytes.
-inline constexpr std::size_t kMemorySummaryStride = 2 * sizeof(MemoryCell);
-inline constexpr std::size_t kMemoryCellStride = sizeof(MemoryCell);
+/// The share of free rays in 1/4095 (high 12 bits) and the rays seen, up to 15 (low 4 bits).
+using VisibilityCell = std::uint16_t;
 
-struct MemoryPayloads {
-  Bytes summaries, grids, light_noise, lobe_noise;
+/// What a pixel of `pool` remembers of the frames before: how visible the light was, and how noisy.
+/// A guess, never a fact: whoever uses it must stay right whatever it says, and may only use what
+/// the frames before left. All 0: nothing is known.
+struct PixelMemory {
+  static constexpr std::size_t kSide = 16, kBins = kSide * kSide;
+  static constexpr std::uint16_t kSawFree = 1, kSawBlocked = 2, kSawBoth = 3;
+
+  /// Bins of the octahedral lattice of directions (common/math/octahedral.h), row by row: the upper
+  /// four bits of each half of a code. Kept once rays have disagreed: a pixel in the open needs
+  /// none.
+  std::array<VisibilityCell, kBins> bins{};
+  VisibilityCell all_rays = 0;
+  std::uint16_t outcomes = 0;  ///< that were ever seen: kSawFree, kSawBlocked
+  /// The variance of its unshadowed light by candidates of either kind, the upper half of a float
+  /// (worker/sampling/light_noise.h).
+  std::uint16_t light_noise = 0, lobe_noise = 0;
+
+  bool operator==(const PixelMemory&) const = default;
 };
-
-/// Summary and noise of each of `pixels` (0-based, ascending), and the bins of those whose rays
-/// have disagreed. The state must have memories.
-MemoryPayloads encode_memory(const SampleState& state, const std::vector<std::size_t>& pixels);
-
-/// Inverse of encode_memory; a file without memories leaves the state without them, one without
-/// noise leaves that unknown. Errors name file, section and pixel.
-Status decode_memory(const SectionFile& file, const std::vector<std::size_t>& pixels,
-                     const std::string& name, SampleState& state);
-
-/// "TAG_: pixel (x, y): what", of kind bad_input.
-Error value_error(const SampleState& state, const SectionTag& tag, std::size_t pixel,
-                  const std::string& what);
+static_assert(sizeof(PixelMemory) == 520);
 
 }  // namespace baton

@@ -9,7 +9,7 @@
 
 #include "common/base/limits.h"
 #include "common/base/section_file.h"
-#include "common/state/pixel_memory.h"
+#include "common/state/memory_sections.h"
 
 namespace baton {
 namespace {
@@ -269,7 +269,7 @@ Bytes encode_state(const SampleState& state) {
               state.direction.size() == num_pixels * num_particles);
   BATON_CHECK(state.weight.size() == state.direction.size() &&
               state.site.size() == state.direction.size());
-  BATON_CHECK(state.memory.empty() || state.memory.size() == num_pixels * kMemoryCells);
+  BATON_CHECK(state.memory.empty() || state.memory.size() == num_pixels);
   BATON_CHECK(state.confidence.empty() || state.confidence.size() == num_pixels);
 
   StateSections sections(state);

@@ -10,6 +10,7 @@
 #include "common/base/result.h"
 #include "common/math/octahedral.h"
 #include "common/math/pixel_rect.h"
+#include "common/state/pixel_memory.h"
 
 namespace baton {
 
@@ -21,12 +22,6 @@ enum class PixelSource : std::uint8_t {
   restarted = 3,   ///< carried, but all weights died: SIR again
   refreshed = 4,   ///< carried, Lns recomputed by the refresh rule
 };
-
-/// One bin of a pixel's memory of its shadow rays; worker/sampling/visibility_grid.h says what it
-/// means.
-using MemoryCell = std::uint16_t;
-inline constexpr std::size_t kMemoryCells =
-    260;  ///< of one pixel: 256 bins, all rays, outcomes seen, two of the noise of its light
 
 /// The baton: what one tile hands to its next frame. Structure of arrays; pixels row by row inside
 /// `rect`. The surfaces are not stored: primary hits are a pure function of (job, frame, pixel,
@@ -49,7 +44,7 @@ struct SampleState {
                               ///< no particle is lit
   std::vector<std::uint8_t> site;  ///< (pixels, N)
 
-  std::vector<MemoryCell> memory;  ///< (pixels, kMemoryCells), or empty: nothing is remembered
+  std::vector<PixelMemory> memory;  ///< (pixels), or empty: nothing is remembered
   /// (pixels) how many fresh sets a pixel's samples count as when they are weighed against fresh
   /// ones, 0: they are no history; or empty: nobody asks.
   std::vector<std::uint16_t> confidence;
@@ -64,8 +59,7 @@ struct SampleState {
                                                bool with_memory, bool with_confidence) {
     return populations * (sizeof(lns[0]) + sizeof(lns_fresh[0]) + sizeof(source[0])) +
            particles * (sizeof(direction[0]) + sizeof(weight[0]) + sizeof(site[0])) +
-           (with_memory ? kMemoryCells * sizeof(memory[0]) : 0) +
-           (with_confidence ? sizeof(confidence[0]) : 0);
+           (with_memory ? sizeof(memory[0]) : 0) + (with_confidence ? sizeof(confidence[0]) : 0);
   }
   /// Of all arrays.
   std::size_t size_bytes() const {
@@ -76,12 +70,9 @@ struct SampleState {
   /// Lets each pixel's samples count for nothing yet.
   void add_confidence() { confidence.assign(num_pixels(), 0); }
   /// Gives each pixel an empty memory.
-  void add_memory() { memory.assign(num_pixels() * kMemoryCells, 0); }
-  /// The memory of a pixel, or nothing.
-  std::span<MemoryCell> memory_of(std::size_t pixel) {
-    if (memory.empty()) return {};
-    return std::span(memory).subspan(pixel * kMemoryCells, kMemoryCells);
-  }
+  void add_memory() { memory.assign(num_pixels(), {}); }
+  /// The memory of a pixel, or null.
+  PixelMemory* memory_of(std::size_t pixel) { return memory.empty() ? nullptr : &memory[pixel]; }
 };
 
 /// Newest file version that this program reads, and the one that it writes.

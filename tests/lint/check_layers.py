@@ -27,7 +27,7 @@ MAY_INCLUDE = {
     "common/image": COMMON_DATA,
     "common/store": COMMON_BASE,
     "common/protocol": COMMON_DATA | {"common/job"},
-    "worker/sampling": COMMON_DATA | {"common/job"},
+    "worker/sampling": COMMON_DATA | {"common/job", "common/state"},
     "worker/scene": SCENE,
     "worker/accel": SCENE | {"worker/scene"},
     "worker/integrator": INTEGRATOR,

@@ -14,8 +14,7 @@
 
 #include "common/base/poison.h"
 #include "worker/integrator/candidates-inl.h"
-#include "worker/integrator/pixel_rays.h"
-#include "worker/sampling/systematic-inl.h"
+#include "worker/sampling/chosen_rays-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace baton::HWY_NAMESPACE {
@@ -182,62 +181,6 @@ class ChosenCandidates {
   std::int32_t padded_light_;
   const kernels::CandidateSet& from_bsdf_;
 };
-
-/// Candidates that were chosen, each once, in the order of the line.
-class DistinctPicks {
- public:
-  PaddedArray<std::int32_t, limits::kMaxParticles> pick;
-  PaddedArray<float, limits::kMaxParticles> times;  ///< each counts
-  std::size_t count = 0;
-
-  DistinctPicks() {
-    poison(pick);
-    poison(times);
-  }
-  /// `count` systematic picks, > 0.
-  static DistinctPicks Systematic(const RunningSums& line, float total, float u,
-                                  std::size_t count) {
-    PaddedArray<std::int32_t, limits::kMaxParticles> picks;
-    poison(picks);
-    SystematicPicks(line, total, u, count, picks);
-    DistinctPicks out;
-    for (std::size_t j = 0; j < count; ++j) {
-      if (j > 0 && picks[j] == picks[j - 1]) {
-        out.times[out.count - 1] += 1;
-      } else {
-        out.Append(picks[j], 1);
-      }
-    }
-    out.FillUp();
-    return out;
-  }
-
- private:
-  void Append(std::int32_t candidate, float counts) {
-    pick[count] = candidate;
-    times[count] = counts;
-    ++count;
-  }
-  /// Fills up the last vector with rays that bring nothing.
-  void FillUp() {
-    pick.pad(count, count > 0 ? pick[0] : 0);
-    times.pad(count, 0.0f);
-  }
-};
-
-/// Writes a vector of rays from j on: directions, what each brings if it is free, its share of Lns.
-HWY_INLINE void StoreRays(const Vec3Lanes& w, const Vec3Lanes& color, VF share, VI site,
-                          std::size_t j, PixelRays& out) {
-  const DF d;
-  hn::Store(w.x, d, out.x.from(j));
-  hn::Store(w.y, d, out.y.from(j));
-  hn::Store(w.z, d, out.z.from(j));
-  hn::Store(color.x, d, out.r.from(j));
-  hn::Store(color.y, d, out.g.from(j));
-  hn::Store(color.z, d, out.b.from(j));
-  hn::Store(share, d, out.visibility.from(j));
-  hn::StoreU(hn::DemoteTo(DB(), site), DB(), out.site.from(j));
-}
 
 inline float ChooseCandidates(const SiteBlock& sites, const EnvironmentView& environment,
                               const LightPool& pool, const kernels::CandidateCounts& counts,

@@ -11,6 +11,7 @@
 #include "common/math/philox.h"
 #include "worker/integrator/light_pool.h"
 #include "worker/integrator/old_surfaces.h"
+#include "worker/sampling/pool.h"
 #include "worker/sampling/sequential.h"
 #include "worker/scene/environment_view.h"
 #include "worker/scene/site_block.h"
@@ -79,10 +80,6 @@ struct CandidateSet {
 void draw_candidates(const SiteBlock& sites, const EnvironmentView& environment,
                      const LightPool& pool, const CandidateCounts& counts, const Rng& rng,
                      CandidateSet& out);
-
-/// Something of every candidate of a pixel: those of the light to the end of their last vector,
-/// then those of the BRDF.
-using CandidateLine = PaddedArray<float, limits::kMaxCandidates + kVectorPadding>;
 
 /// Work space of choose_candidates.
 struct ChoiceScratch {

@@ -14,7 +14,7 @@ struct PixelState {
   SampleState& tile;
   std::size_t index;
 
-  std::span<MemoryCell> memory() const { return tile.memory_of(index); }
+  PixelMemory* memory() const { return tile.memory_of(index); }
 };
 
 /// Where carried directions lie in the maps, by population, looked up one pixel ahead.

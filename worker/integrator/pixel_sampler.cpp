@@ -7,8 +7,6 @@
 
 namespace baton {
 
-static_assert(kMemoryCells == kVisibilityCells && sizeof(MemoryCell) == sizeof(VisibilityCell));
-
 namespace {
 
 std::unique_ptr<const PixelSampler> make_sequential_sampler(const SamplingSpec& spec) {

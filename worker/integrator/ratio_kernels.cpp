@@ -74,8 +74,8 @@ inline float ChooseRatioRays(const SiteBlock& sites, const EnvironmentView& envi
   // Choose the rays.
   const auto count = static_cast<std::size_t>(num_rays);
   LookUpShares(ChosenCandidates(sites, pool, counts, random, scratch.from_bsdf),
-               DistinctPicks::Systematic(sums, total, u, count), line.colors,
-               static_cast<float>(num_rays), out);
+               DistinctPicks(sums, total, u, count), line.colors, static_cast<float>(num_rays),
+               out);
   return total;
 }
 

@@ -1,7 +1,7 @@
 #pragma once
 
 #include "worker/integrator/kernels.h"
-#include "worker/integrator/pixel_rays.h"
+#include "worker/sampling/pixel_rays.h"
 
 namespace baton::kernels {
 

@@ -7,7 +7,7 @@
 #include "common/base/poison.h"
 #include "common/math/octahedral.h"
 #include "worker/accel/accel.h"
-#include "worker/integrator/pixel_rays.h"
+#include "worker/sampling/pixel_rays.h"
 #include "worker/scene/site_block.h"
 
 namespace baton {

@@ -12,9 +12,10 @@ namespace baton {
 namespace {
 
 /// Asks for a pixel's memory early: those of a tile are larger than the caches.
-void fetch_ahead(std::span<const MemoryCell> memory) {
-  constexpr std::size_t kCellsOfLine = 64 / sizeof(MemoryCell);
-  for (std::size_t i = 0; i < memory.size(); i += kCellsOfLine) __builtin_prefetch(&memory[i]);
+void fetch_ahead(const PixelMemory* memory) {
+  if (memory == nullptr) return;
+  const auto* bytes = reinterpret_cast<const std::byte*>(memory);
+  for (std::size_t at = 0; at < sizeof(*memory); at += 64) __builtin_prefetch(bytes + at);
 }
 
 }  // namespace

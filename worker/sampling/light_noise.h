@@ -4,9 +4,9 @@
 #include <bit>
 #include <cmath>
 #include <cstdint>
-#include <span>
 
-#include "worker/sampling/visibility_grid.h"
+#include "common/state/pixel_memory.h"
+#include "worker/sampling/pool_tuning.h"
 
 namespace baton {
 
@@ -15,60 +15,51 @@ namespace baton {
 /// their lobe. The candidates of one frame do not tell soon enough, and a number that depends on
 /// their own values would be bias; what earlier frames saw of the pixel is free of it.
 
-/// What noise is compared with: a pixel's light and that of its surroundings, three times the mean
-/// radiance of the environment, so that pixels that are dark among bright ones may be noisier.
-inline constexpr float kSurroundings = 3;
-inline float noise_scale(float light, float mean_radiance) {
-  return light + kSurroundings * mean_radiance;
+/// What noise is compared with: a pixel's light and that of its surroundings.
+inline float noise_scale(const PoolTuning& tuning, float light, float mean_radiance) {
+  return light + tuning.surroundings * mean_radiance;
 }
 
 /// Variance of a pixel's light, in squares of noise_scale(), that one candidate of each kind would
 /// have; 0: nothing is known. Kinds are apart because they do not help each other: to a mirror that
 /// sees a lamp only candidates from its lobe are of use.
 struct LightVariance {
-  float from_light = 0;  ///< candidates from the environment's pool
+  float from_light = 0;  ///< presampled candidates of the environment
   float from_lobes = 0;  ///< candidates from glossy lobes
 };
 
-/// A cell holds the upper half of a float.
-inline LightVariance light_variance(std::span<const VisibilityCell> memory) {
-  const auto of = [&](std::size_t cell) {
-    return std::bit_cast<float>(static_cast<std::uint32_t>(memory[cell]) << 16);
+inline LightVariance light_variance(const PixelMemory& memory) {
+  const auto of = [](std::uint16_t upper_half) {
+    return std::bit_cast<float>(std::uint32_t{upper_half} << 16);
   };
-  return {of(kLightNoise), of(kLobeNoise)};
+  return {of(memory.light_noise), of(memory.lobe_noise)};
 }
 
-/// Enters what a frame saw, finite and >= 0; a new frame counts 1/4.
-inline void remember_light_variance(std::span<VisibilityCell> memory, const LightVariance& seen) {
+/// Enters what a frame saw, finite and >= 0.
+inline void remember_light_variance(const PoolTuning& tuning, const LightVariance& seen,
+                                    PixelMemory& memory) {
   const LightVariance known = light_variance(memory);
-  const auto enter = [&](std::size_t cell, float before, float now) {
-    const float mean = before > 0 ? before + 0.25f * (now - before) : now;
-    memory[cell] = static_cast<VisibilityCell>(std::bit_cast<std::uint32_t>(mean) >> 16);
+  const auto mean = [&](float before, float now) {
+    const float sum = before > 0 ? before + tuning.new_frame * (now - before) : now;
+    return static_cast<std::uint16_t>(std::bit_cast<std::uint32_t>(sum) >> 16);
   };
-  enter(kLightNoise, known.from_light, seen.from_light);
-  enter(kLobeNoise, known.from_lobes, seen.from_lobes);
+  memory.light_noise = mean(known.from_light, seen.from_light);
+  memory.lobe_noise = mean(known.from_lobes, seen.from_lobes);
 }
 
-/// What a kind of candidates needs.
-struct CandidateNeed {
-  float usual_noise;  ///< that M of them may leave
-  float least;        ///< part of M that every pixel gets
-};
-inline constexpr CandidateNeed kNeedOfLight{0.0015f, 0.25f};
-/// Those from lobes take more time, and few of them do not see what they miss.
-inline constexpr CandidateNeed kNeedOfLobes{0.008f, 1};
-
-/// Candidates of a kind: M where that leaves the usual noise, else in proportion to the noise
-/// that M would leave, up to 64 M, in eights, at most `most`; M where nothing is known. Least
-/// squared error for a given sum of candidates, as variance falls like 1 / M at least.
-inline std::int32_t candidates_for_noise(std::int32_t num_candidates, float variance,
-                                         const CandidateNeed& need, std::int32_t most) {
-  if (!(variance > 0)) return num_candidates;
-  const auto usual = static_cast<float>(num_candidates);
+/// Candidates of a kind: the usual number where that leaves the usual noise, else in proportion to
+/// the noise that it would leave, in eights, at most `most`; the usual number where nothing is
+/// known. Least squared error for a given sum of candidates, as variance falls like 1 / M at least.
+inline std::int32_t candidates_for_noise(const PoolTuning& tuning,
+                                         const PoolTuning::Candidates& kind,
+                                         std::int32_t usual_number, float variance,
+                                         std::int32_t most) {
+  if (!(variance > 0)) return usual_number;
+  const auto usual = static_cast<float>(usual_number);
   const float noise = std::sqrt(variance / usual);
-  const float share = std::clamp(noise / need.usual_noise, need.least, 64.0f);
+  const float share = std::clamp(noise / kind.usual_noise, kind.least, tuning.most_candidates);
   const auto wanted = static_cast<std::int32_t>(share * usual);
-  return std::min((wanted + 7) / 8 * 8, std::max(most, num_candidates));
+  return std::min((wanted + 7) / 8 * 8, std::max(most, usual_number));
 }
 
 }  // namespace baton

@@ -3,14 +3,13 @@
 #include <algorithm>
 #include <cmath>
 #include <limits>
+#include <numbers>
 
 #include "common/base/check.h"
 #include "common/math/octahedral.h"
 
 namespace baton {
 namespace {
-
-constexpr double kPiDouble = 3.14159265358979323846;
 
 /// Cells between two kept cumulative sums of a row.
 constexpr int kBlock = 16;
@@ -27,7 +26,7 @@ double mean_rgb(const EnvironmentMap::Texel& t) {
 
 /// Solid angle between two polar angles, cos a - cos b without cancellation, times 2 pi.
 double zone_solid_angle(double a, double b) {
-  return 4 * kPiDouble * std::sin(0.5 * (a + b)) * std::sin(0.5 * (b - a));
+  return 4 * std::numbers::pi * std::sin(0.5 * (a + b)) * std::sin(0.5 * (b - a));
 }
 
 int num_blocks(int width) { return (width + kBlock - 1) / kBlock; }
@@ -78,7 +77,7 @@ int EnvironmentMap::cell_rows() const { return height_ + (filter_ == MapFilter::
 
 double EnvironmentMap::row_angle(int row) const {
   const double shift = filter_ == MapFilter::bilinear ? 0.5 : 0.0;
-  return std::clamp((row - shift) / height_, 0.0, 1.0) * kPiDouble;
+  return std::clamp((row - shift) / height_, 0.0, 1.0) * std::numbers::pi;
 }
 
 std::size_t EnvironmentMap::cell_row(int row) const {
@@ -111,7 +110,7 @@ double EnvironmentMap::measure_row(int row, const std::vector<double>& means,
 
 std::pair<double, double> EnvironmentMap::compensation(
     const std::vector<double>& solid_angle) const {
-  const double offset = total_power_ / (4 * kPiDouble);
+  const double offset = total_power_ / (4 * std::numbers::pi);
   double power = 0;
   for (int r = 0; r < cell_rows(); ++r) {
     const Texel* texel = &texels_[cell_row(r)];
@@ -212,9 +211,9 @@ Vec3 EnvironmentMap::sample(const std::array<float, 2>& u) const {
   // to the lattice of carried directions: light that slips from a bright cell into a dim one would
   // be divided by too small a density, and what slips the other way does not make up for it.
   const double sin_row = std::sin(0.5 * (row_angle(row) + row_angle(row + 1)));
-  const double margin_down = std::min(0.5, kOctahedralError * height_ / kPiDouble);
+  const double margin_down = std::min(0.5, kOctahedralError * height_ / std::numbers::pi);
   const double margin_right =
-      std::min(0.5, kOctahedralError * width_ / (2 * kPiDouble * std::max(sin_row, 1e-9)));
+      std::min(0.5, kOctahedralError * width_ / (2 * std::numbers::pi * std::max(sin_row, 1e-9)));
   const double down =
       std::clamp((u[0] * row_cdf_.back() - row_cdf_[row]) / (row_cdf_[row + 1] - row_cdf_[row]),
                  margin_down, 1 - margin_down);
@@ -223,11 +222,11 @@ Vec3 EnvironmentMap::sample(const std::array<float, 2>& u) const {
 
   // Place the direction uniformly in the cell's solid angle.
   const double top = row_angle(row);
-  const double drop = zone_solid_angle(top, row_angle(row + 1)) / (2 * kPiDouble);
+  const double drop = zone_solid_angle(top, row_angle(row + 1)) / (2 * std::numbers::pi);
   const double y = std::cos(top) - drop * down;
   const double sin_polar = std::sqrt(std::max(0.0, (1 - y) * (1 + y)));
   const double shift = filter_ == MapFilter::bilinear ? 0.5 : 0.0;
-  const double longitude = (0.5 - (column + shift + right) / width_) * 2 * kPiDouble;
+  const double longitude = (0.5 - (column + shift + right) / width_) * 2 * std::numbers::pi;
   return {static_cast<float>(sin_polar * std::sin(longitude)), static_cast<float>(y),
           static_cast<float>(sin_polar * std::cos(longitude))};
 }

@@ -3,13 +3,12 @@
 #include <algorithm>
 #include <cmath>
 #include <cstdint>
+#include <numbers>
 
 #include "common/base/check.h"
 
 namespace baton {
 namespace {
-
-constexpr double kPiDouble = 3.14159265358979323846;
 
 /// Adds a row's radiance, times `weight`, to the columns that it lies in. In units of 1 / columns
 /// texel i of the row is [i columns, (i + 1) columns), column k is [k width, (k + 1) width): a
@@ -46,7 +45,7 @@ ReducedMap reduce_map(const RgbImage& map, int width, float scale) {
   ReducedMap reduced{{width, height, {}}, {}};
   reduced.image.rgb.reserve(std::size_t{3} * static_cast<std::size_t>(width) * height);
   const auto angle = [&](std::int64_t edge) {
-    return kPiDouble * static_cast<double>(edge) / (1.0 * map.height * height);
+    return std::numbers::pi * static_cast<double>(edge) / (1.0 * map.height * height);
   };
 
   // Row by row, with edges in units of pi / (both heights): a row of the map that lies in two

@@ -11,8 +11,7 @@
 #include <vector>
 
 #include "tests/support/instruction_sets.h"
-#include "worker/sampling/light_noise.h"
-#include "worker/sampling/pool.h"
+#include "tests/support/remembered.h"
 #include "worker/scene/material.h"
 
 namespace baton {
@@ -57,8 +56,8 @@ SiteBlock pixel(bool glossy) {
 bool is_free(const Vec3& w) { return w.x + 0.3f * w.z > -0.1f && w.y < 0.9f; }
 
 /// What a pixel remembers after so many rays; mistaken about every seventh bin.
-std::vector<VisibilityCell> memory_after(std::uint32_t rays) {
-  std::vector<VisibilityCell> memory(kVisibilityCells, 0);
+PixelMemory memory_after(std::uint32_t rays) {
+  PixelMemory memory;
   for (std::uint32_t i = 0; i < rays; ++i) {
     const OctDirection code = (i + 1) * 2654435761u;
     const std::size_t bin = visibility_bin(code);
@@ -69,9 +68,9 @@ std::vector<VisibilityCell> memory_after(std::uint32_t rays) {
 
 class PoolRays : public OnInstructionSet {
  protected:
-  float choose(const SiteBlock& sites, std::span<const VisibilityCell> memory, float u) {
-    return kernels::choose_pool_rays(sites, view, light_pool, counts(sites), rng, u, 16, memory,
-                                     *scratch, *rays);
+  float choose(const SiteBlock& sites, const PixelMemory& memory, float u) {
+    return kernels::choose_pool_rays(tuning, sites, view, light_pool, counts(sites), rng, u, 16,
+                                     memory, *scratch, *rays);
   }
   Vec3 direction(std::size_t j) const { return {rays->x[j], rays->y[j], rays->z[j]}; }
   static CandidateCounts counts(const SiteBlock& sites) {
@@ -97,12 +96,12 @@ class PoolRays : public OnInstructionSet {
       seen += candidates->weight[i];
     }
     for (const std::uint32_t remembered : {0u, 3u, 3000u}) {
-      const std::vector<VisibilityCell> memory = memory_after(remembered);
+      const PixelMemory memory = memory_after(remembered);
       double sum[4] = {};
       for (int k = 0; k < num_offsets; ++k) {
         const float u = (static_cast<float>(k) + 0.5f) / static_cast<float>(num_offsets);
-        const float lns = kernels::choose_pool_rays(sites, map, pool, of, rng, u, num_rays, memory,
-                                                    *scratch, *rays);
+        const float lns = kernels::choose_pool_rays(tuning, sites, map, pool, of, rng, u, num_rays,
+                                                    memory, *scratch, *rays);
         ASSERT_NEAR(lns, candidates->total, 1e-4f * candidates->total);
         PixelRays::Value value = rays->constant;
         for (std::size_t j = 0; j < rays->count; ++j) {
@@ -122,6 +121,7 @@ class PoolRays : public OnInstructionSet {
     }
   }
 
+  const PoolTuning tuning;
   const Environment light = sky();
   const EnvironmentView view = view_of(light);
   const LightPool light_pool = make_light_pool(light, light, 3, 2);
@@ -133,7 +133,7 @@ class PoolRays : public OnInstructionSet {
 INSTANTIATE_TEST_SUITE_P(Sets, PoolRays, testing::ValuesIn(instruction_sets()),
                          instruction_set_name);
 
-// By doubt, by hope, and without a memory.
+// By deviation, by contribution, and without a memory.
 TEST_P(PoolRays, AverageToTheirCandidates) {
   for (const bool glossy : {false, true}) {
     SCOPED_TRACE(glossy);
@@ -142,15 +142,15 @@ TEST_P(PoolRays, AverageToTheirCandidates) {
   }
 }
 
-TEST_P(PoolRays, ReadTheMemoryAsTheScalarCode) {
+TEST_P(PoolRays, ReadTheMemoryAlikeOnEverySet) {
   const SiteBlock sites = pixel(true);
-  const std::vector<VisibilityCell> memory = memory_after(200);
+  const PixelMemory memory = memory_after(200);
   choose(sites, memory, 0.5f);
   auto candidates = std::make_unique<kernels::CandidateSet>();
   kernels::draw_candidates(sites, view, light_pool, counts(sites), rng, *candidates);
   for (std::size_t i = 0; i < static_cast<std::size_t>(candidates->count); ++i) {
-    const float free = free_share(memory, visibility_bin(candidates->code[i]));
-    EXPECT_NEAR(scratch->free[i], free, 1e-6f);
+    EXPECT_NEAR(scratch->lines.expected[i], expected_visibility(memory, candidates->code[i]),
+                1e-6f);
   }
   for (std::size_t j = 0; j < rays->count; ++j) {
     EXPECT_EQ(rays->bin[j], visibility_bin(encode_octahedral(direction(j))));
@@ -164,16 +164,16 @@ TEST_P(PoolRays, TellTheVarianceOfTheirLight) {
   const LightPool one_run = make_light_pool(light, light, 3, 2, {.one_run = true});
   for (const bool glossy : {false, true}) {
     const SiteBlock sites = pixel(glossy);
-    const std::vector<VisibilityCell> memory = memory_after(0);
+    const PixelMemory memory = memory_after(0);
     double sum = 0, squares = 0, variance = 0;
     constexpr int kRuns = 2000;
     for (std::uint32_t k = 0; k < kRuns; ++k) {
       const Rng own({.job_seed = k}, PassId::candidates);
-      const double lns = double{kernels::choose_pool_rays(sites, view, one_run, counts(sites), own,
-                                                          0.5f, 16, memory, *scratch, *rays)};
+      const double lns = double{kernels::choose_pool_rays(
+          tuning, sites, view, one_run, counts(sites), own, 0.5f, 16, memory, *scratch, *rays)};
       sum += lns / kRuns;
       squares += lns * lns / kRuns;
-      const double scale = noise_scale(static_cast<float>(lns), one_run.mean_radiance);
+      const double scale = noise_scale(tuning, static_cast<float>(lns), one_run.mean_radiance);
       const LightVariance& of_one = rays->light_variance;
       const double share = double{of_one.from_light} / counts(sites).from_light +
                            double{of_one.from_lobes} / std::max(counts(sites).from_bsdf, 1);
@@ -186,17 +186,17 @@ TEST_P(PoolRays, TellTheVarianceOfTheirLight) {
   }
 }
 
-TEST_P(PoolRays, AreNWithoutAMemoryAndByDoubtWithOne) {
+TEST_P(PoolRays, AreNWithoutAMemoryAndByDeviationWithOne) {
   const SiteBlock sites = pixel(false);
-  const auto num_rays = [&](std::span<const VisibilityCell> memory) {
-    kernels::choose_pool_rays(sites, view, light_pool, {.from_light = 400}, rng, 0.5f, 16, memory,
-                              *scratch, *rays);
+  const auto num_rays = [&](const PixelMemory& memory) {
+    kernels::choose_pool_rays(tuning, sites, view, light_pool, {.from_light = 400}, rng, 0.5f, 16,
+                              memory, *scratch, *rays);
     return rays->count;  // less what was chosen twice
   };
   EXPECT_LE(num_rays(memory_after(0)), 16u);
   EXPECT_GT(num_rays(memory_after(10)), 20u);
-  std::vector<VisibilityCell> open(kVisibilityCells, 0);
-  for (std::size_t bin = 0; bin < kVisibilityBins; ++bin) remember_ray(open, bin, true);
+  PixelMemory open;
+  for (std::size_t bin = 0; bin < PixelMemory::kBins; ++bin) remember_ray(open, bin, true);
   EXPECT_LE(num_rays(open), 12u);
   EXPECT_NEAR(rays->constant.visibility, 0, 1e-5) << "what is known alike everywhere cancels";
 }
@@ -207,8 +207,8 @@ TEST_P(PoolRays, AreNoneWithoutLight) {
   const Environment dark{std::make_shared<EnvironmentMap>(black, MapFilter::bilinear, 1.0f, false),
                          Mat3{}};
   const LightPool none = make_light_pool(dark, dark, 1, 1);
-  EXPECT_EQ(kernels::choose_pool_rays(sites, view_of(dark), none, {.from_light = 8}, rng, 0.5f, 16,
-                                      memory_after(10), *scratch, *rays),
+  EXPECT_EQ(kernels::choose_pool_rays(tuning, sites, view_of(dark), none, {.from_light = 8}, rng,
+                                      0.5f, 16, memory_after(10), *scratch, *rays),
             0);
   EXPECT_EQ(rays->count, 0u);
 }

@@ -8,6 +8,7 @@
 #include <memory>
 #include <vector>
 
+#include "tests/support/remembered.h"
 #include "worker/sampling/light_noise.h"
 #include "worker/scene/material.h"
 
@@ -81,8 +82,8 @@ class PoolCounts : public testing::Test {
   std::int32_t sample(const FrameLight& light, const SiteBlock& sites, std::int32_t num_candidates,
                       const LightVariance& known) {
     pixel_.state.add_memory();
-    remember_ray(pixel_.state.memory, 0, true);
-    remember_light_variance(pixel_.state.memory, known);
+    remember_ray(pixel_.state.memory[0], 0, true);
+    remember_light_variance(PoolTuning{}, known, pixel_.state.memory[0]);
     return pixel_.sample(spec_of(num_candidates), light, sites, 0).target_evaluations;
   }
 

@@ -304,13 +304,15 @@ SampleState remembering_state() {
   state.resize({0, 0, 3, 1}, 2);
   state.source[1] = state.source[2] = PixelSource::carried;
   state.add_memory();
-  state.memory_of(1)[256] = 0x8003;
-  state.memory_of(1)[257] = 1;
-  state.memory_of(2)[5] = 0x1234;
-  state.memory_of(2)[256] = 0x7771;
-  state.memory_of(2)[257] = 3;
-  state.memory_of(2)[258] = 0x3B12;
-  state.memory_of(1)[259] = 0x3C01;
+  PixelMemory& agreed = state.memory[1];
+  agreed.all_rays = 0x8003;
+  agreed.outcomes = PixelMemory::kSawFree;
+  agreed.lobe_noise = 0x3C01;
+  PixelMemory& disagreed = state.memory[2];
+  disagreed.bins[5] = 0x1234;
+  disagreed.all_rays = 0x7771;
+  disagreed.outcomes = PixelMemory::kSawBoth;
+  disagreed.light_noise = 0x3B12;
   return state;
 }
 
@@ -360,7 +362,7 @@ TEST(SampleState, StoresNoGridWhereRaysAgree) {
 
 TEST(SampleState, RefusesOutcomesThatCannotBe) {
   SampleState state = remembering_state();
-  state.memory_of(1)[257] = 4;
+  state.memory[1].outcomes = 4;
   const auto decoded = decode_state(encode_state(state), "a.bst");
   ASSERT_FALSE(decoded.ok());
   EXPECT_THAT(decoded.error().message,
@@ -368,11 +370,13 @@ TEST(SampleState, RefusesOutcomesThatCannotBe) {
 }
 
 TEST(SampleState, RefusesNoiseThatIsNoNumber) {
-  const std::pair<std::size_t, const char*> cells[] = {{258, "NOIS"}, {259, "NOIL"}};
-  for (const auto& [cell, section] : cells) {
-    for (const MemoryCell noise : {MemoryCell{0x7F80}, MemoryCell{0x8001}}) {  // infinite, negative
+  const std::pair<std::uint16_t PixelMemory::*, const char*> kinds[] = {
+      {&PixelMemory::light_noise, "NOIS"}, {&PixelMemory::lobe_noise, "NOIL"}};
+  for (const auto& [kind, section] : kinds) {
+    for (const std::uint16_t noise :
+         {std::uint16_t{0x7F80}, std::uint16_t{0x8001}}) {  // infinite, negative
       SampleState state = remembering_state();
-      state.memory_of(2)[cell] = noise;
+      state.memory[2].*kind = noise;
       const auto decoded = decode_state(encode_state(state), "a.bst");
       ASSERT_FALSE(decoded.ok());
       EXPECT_THAT(decoded.error().message,

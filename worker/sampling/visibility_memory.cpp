@@ -1,4 +1,4 @@
-#include "worker/sampling/visibility_grid.h"
+#include "worker/sampling/visibility_memory.h"
 
 #include <algorithm>
 #include <array>
@@ -10,9 +10,6 @@ namespace {
 
 constexpr std::int32_t kShareOfOne = 4095;
 constexpr std::int32_t kMaxSeen = 15;
-
-std::int32_t seen(VisibilityCell cell) { return cell & 15; }
-std::int32_t share(VisibilityCell cell) { return cell >> 4; }
 
 /// 2^16 over the rays that a cell has seen, its guess and the new one: a table, as divisions by a
 /// variable cost more than all else here.
@@ -27,7 +24,7 @@ constexpr auto kStep = [] {
 struct Tally {
   std::int32_t share, seen;
 
-  explicit Tally(VisibilityCell cell) : share(baton::share(cell)), seen(baton::seen(cell)) {}
+  explicit Tally(VisibilityCell cell) : share(cell >> 4), seen(cell & kMaxSeen) {}
   VisibilityCell cell() const { return static_cast<VisibilityCell>(share << 4 | seen); }
   void add(bool free) {
     const std::int32_t outcome = -static_cast<std::int32_t>(free) & kShareOfOne;  // no branch
@@ -38,40 +35,33 @@ struct Tally {
 
 }  // namespace
 
-float free_share(std::span<const VisibilityCell> grid, std::size_t bin) {
-  BATON_CHECK(grid.size() == kVisibilityCells && bin < kVisibilityBins);
-  const VisibilityCell cell = seen(grid[bin]) > 0 ? grid[bin] : grid[kVisibilitySummary];
-  if (seen(cell) == 0) return 0.5f;
-  return (static_cast<float>(share(cell)) + 0.5f) * (1.0f / (kShareOfOne + 1));
-}
-
-void remember_rays(std::span<VisibilityCell> grid, std::span<const std::uint8_t> bin,
-                   std::uint64_t free) {
-  BATON_CHECK(grid.size() == kVisibilityCells && bin.size() <= 64);
-  std::uint32_t outcomes = grid[kVisibilityOutcomes];
-  Tally all(grid[kVisibilitySummary]);
+void remember_rays(PixelMemory& memory, std::span<const std::uint8_t> bin, std::uint64_t free) {
+  BATON_CHECK(bin.size() <= 64);
+  std::uint32_t outcomes = memory.outcomes;
+  Tally all(memory.all_rays);
   if (all.seen == 0) all.share = kShareOfOne / 2;
 
   // Of a pixel that has long been in the open, or in the dark, one more ray says nothing new.
   const std::uint64_t every = bin.empty() ? 0 : ~std::uint64_t{0} >> (64 - bin.size());
-  if ((outcomes == kSawFree && free == every) || (outcomes == kSawBlocked && free == 0)) {
+  if ((outcomes == PixelMemory::kSawFree && free == every) ||
+      (outcomes == PixelMemory::kSawBlocked && free == 0)) {
     Tally next = all;
     next.add(free != 0);
     if (next.cell() == all.cell()) return;
   }
   for (std::size_t j = 0; j < bin.size(); ++j) {
     const bool is_free = (free >> j & 1) != 0;
-    outcomes |= is_free ? kSawFree : kSawBlocked;
-    if (outcomes == (kSawFree | kSawBlocked)) {
-      Tally own(grid[bin[j]]);
-      if (own.seen == 0) own.share = all.share;  // a guess, worth one ray
+    outcomes |= is_free ? PixelMemory::kSawFree : PixelMemory::kSawBlocked;
+    if (outcomes == PixelMemory::kSawBoth) {
+      Tally own(memory.bins[bin[j]]);
+      if (own.seen == 0) own.share = all.share;
       own.add(is_free);
-      grid[bin[j]] = own.cell();
+      memory.bins[bin[j]] = own.cell();
     }
     all.add(is_free);
   }
-  grid[kVisibilityOutcomes] = static_cast<VisibilityCell>(outcomes);
-  if (!bin.empty()) grid[kVisibilitySummary] = all.cell();
+  memory.outcomes = static_cast<std::uint16_t>(outcomes);
+  if (!bin.empty()) memory.all_rays = all.cell();
 }
 
 }  // namespace baton

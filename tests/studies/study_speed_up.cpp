@@ -13,7 +13,7 @@
 #include <string>
 
 #include "common/math/philox.h"
-#include "tests/bench/sequential_runs.h"
+#include "tests/studies/sequential_runs.h"
 #include "worker/scene/settle_motion.h"
 
 namespace baton {

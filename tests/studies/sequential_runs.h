@@ -1,4 +1,4 @@
-// What the programs study_* of the sequential sampler share: runs of a job in one tile and thread,
+// What the programs study_* share: runs of a job in one tile and thread,
 // variants of its sampling, and the judge.
 #pragma once
 
@@ -48,13 +48,16 @@ T value_of(Result<T> result) {
 }
 
 /// All frames of a job, frame by frame, in one tile with a transparent background. aovs: their
-/// channels.
+/// channels. change: of what renders, before it does.
 inline std::vector<FrameResult> render(JobSpec job, const SharedAssetsPtr& assets,
-                                       const std::vector<Aov>& aovs = {Aov::lns}) {
+                                       const std::vector<Aov>& aovs = {Aov::lns},
+                                       const std::function<void(RenderContext&)>& change = {}) {
   job.image.tile_size = limits::kMaxTileSize;
   job.output.background = Background::transparent;
   job.output.aovs = aovs;
-  const auto context = value_of(make_render_context(job, Digest{1, 1}, assets));
+  const auto context = std::const_pointer_cast<RenderContext>(
+      value_of(make_render_context(job, Digest{1, 1}, assets)));
+  if (change) change(*context);
   std::vector<FrameResult> frames(job.frames.size());
   std::vector<std::shared_ptr<const SampleState>> states;
   for (std::size_t i = 0; i < frames.size(); ++i) {

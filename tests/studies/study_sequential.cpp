@@ -15,7 +15,7 @@
 #include <map>
 #include <string>
 
-#include "tests/bench/sequential_runs.h"
+#include "tests/studies/sequential_runs.h"
 
 namespace baton {
 namespace {

@@ -8,7 +8,7 @@
 
 #include "common/image/contact_sheet.h"
 #include "common/image/image_io.h"
-#include "tests/bench/sequential_runs.h"
+#include "tests/studies/sequential_runs.h"
 #include "worker/scene/settle_motion.h"
 
 namespace baton {

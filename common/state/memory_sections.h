@@ -1,0 +1,37 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "common/base/section_file.h"
+#include "common/state/sample_state.h"
+
+namespace baton {
+
+/// The sections of a state file that hold what pixels remember (FORMAT.md).
+inline constexpr SectionTag kMemorySummary{'V', 'I', 'S', 'S'};
+inline constexpr SectionTag kMemoryGrid{'V', 'I', 'S', 'G'};
+inline constexpr SectionTag kMemoryLightNoise{'N', 'O', 'I', 'S'};
+inline constexpr SectionTag kMemoryLobeNoise{'N', 'O', 'I', 'L'};
+/// Sizes of their elements in bytes.
+inline constexpr std::size_t kMemoryCellStride = sizeof(VisibilityCell);
+inline constexpr std::size_t kMemorySummaryStride = 2 * kMemoryCellStride;
+
+struct MemoryPayloads {
+  Bytes summaries, grids, light_noise, lobe_noise;
+};
+
+/// Summary and noise of each of `pixels` (0-based, ascending), and the bins of those whose rays
+/// have disagreed. The state must have memories.
+MemoryPayloads encode_memory(const SampleState& state, const std::vector<std::size_t>& pixels);
+
+/// Inverse of encode_memory; a file without memories leaves the state without them, one without
+/// noise leaves that unknown. Errors name file, section and pixel.
+Status decode_memory(const SectionFile& file, const std::vector<std::size_t>& pixels,
+                     const std::string& name, SampleState& state);
+
+/// "TAG_: pixel (x, y): what", of kind bad_input.
+Error value_error(const SampleState& state, const SectionTag& tag, std::size_t pixel,
+                  const std::string& what);
+
+}  // namespace baton

@@ -1,0 +1,252 @@
+// One frame of the pool sampler (pool.h) for one pixel, in SIMD: candidates are weighed, what the
+// pixel remembers of their directions decides which of them get a ray. Knows no scene: everything
+// about candidates comes from the Candidates. Included once per Highway target.
+#if defined(BATON_WORKER_SAMPLING_POOL_INL_H_) == defined(HWY_TARGET_TOGGLE)
+#ifdef BATON_WORKER_SAMPLING_POOL_INL_H_
+#undef BATON_WORKER_SAMPLING_POOL_INL_H_
+#else
+#define BATON_WORKER_SAMPLING_POOL_INL_H_
+#endif
+
+#include <hwy/highway.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "worker/sampling/chosen_rays-inl.h"
+#include "worker/sampling/light_noise.h"
+#include "worker/sampling/pool.h"
+
+HWY_BEFORE_NAMESPACE();
+namespace baton::HWY_NAMESPACE {
+namespace hn = hwy::HWY_NAMESPACE;
+
+/// Bins of PixelMemory per lane.
+HWY_INLINE VI VisibilityBins(VU code) {
+  static_assert(PixelMemory::kSide == 16);
+  const DU du;
+  const VU across = hn::And(hn::ShiftRight<12>(code), hn::Set(du, 0x0F));
+  const VU down = hn::And(hn::ShiftRight<24>(code), hn::Set(du, 0xF0));
+  return hn::BitCast(DI(), hn::Or(across, down));
+}
+
+HWY_INLINE VF ContributionFactor(const PoolTuning& tuning, VF expected) {
+  return hn::Max(hn::Sqrt(expected), hn::Set(DF(), tuning.least_contribution));
+}
+HWY_INLINE VF DeviationFactor(const PoolTuning& tuning, VF expected) {
+  const DF d;
+  const VF variance = hn::Mul(expected, hn::Sub(hn::Set(d, 1.0f), expected));
+  return hn::Max(hn::Sqrt(variance), hn::Set(d, tuning.least_deviation));
+}
+
+/// What is remembered of a vector of directions: V^, in (0, 1), and what it makes of a candidate's
+/// weight on the two lines.
+struct ProspectLanes {
+  VF expected, contribution, deviation;
+};
+
+/// A pixel's memory: the share of free rays in a direction's bin, or that of all rays where the bin
+/// has seen none, or 1/2.
+class RememberedLanes {
+ public:
+  RememberedLanes(const PoolTuning& tuning, const PixelMemory& memory)
+      : tuning_(tuning),
+        memory_(memory),
+        has_bins_(memory.outcomes == PixelMemory::kSawBoth),
+        all_((memory.all_rays & 15) != 0 ? memory.all_rays : 2048 << 4),
+        everywhere_(Prospect(Share(hn::Set(DI(), all_)))) {}
+
+  /// A pixel whose rays have always agreed expects the same everywhere.
+  HWY_INLINE ProspectLanes Look(VU code) const {
+    if (has_bins_) return Prospect(ShareInBins(code));
+    return {everywhere_.expected, everywhere_.contribution, everywhere_.deviation};
+  }
+
+ private:
+  HWY_INLINE VF ShareInBins(VU code) const {
+    const DI di;
+    const DU du;
+    // Two cells come with each load; ours is the lower one. The last bin's other is all_rays.
+    static_assert(sizeof(VisibilityCell) == 2 && PixelMemory::kSide == 16);
+    static_assert(offsetof(PixelMemory, all_rays) == 2 * PixelMemory::kBins);
+    const VU across = hn::And(hn::ShiftRight<11>(code), hn::Set(du, 2 * 0x0F));
+    const VU down = hn::And(hn::ShiftRight<23>(code), hn::Set(du, 2 * 0xF0));
+    const VI pair = hn::GatherOffset(di, reinterpret_cast<const std::int32_t*>(&memory_),
+                                     hn::BitCast(di, hn::Or(across, down)));
+    const auto unseen = hn::Eq(hn::And(pair, hn::Set(di, 15)), hn::Zero(di));
+    return Share(hn::IfThenElse(unseen, hn::Set(di, all_), pair));
+  }
+  HWY_INLINE ProspectLanes Prospect(VF expected) const {
+    return {expected, ContributionFactor(tuning_, expected), DeviationFactor(tuning_, expected)};
+  }
+  /// Of cells in the lower halves.
+  static HWY_INLINE VF Share(VI cells) {
+    const DF d;
+    const VI share = hn::And(cells, hn::Set(DI(), 0xFFF0));
+    return hn::MulAdd(hn::ConvertTo(d, share), hn::Set(d, 1.0f / 65536), hn::Set(d, 0.5f / 4096));
+  }
+  const PoolTuning& tuning_;
+  const PixelMemory& memory_;
+  bool has_bins_;
+  std::int32_t all_;
+  ProspectLanes everywhere_;
+};
+
+/// Where weighed candidates go: two lines to choose from, and what is known of the pixel by then.
+/// A loop that adds works on a copy, in registers.
+struct WeighedLines {
+  static constexpr bool kHasColors = true;
+  const RememberedLanes* memory;
+  RunningSums::End contribution, deviation;
+  float* next_expected;
+  const float* first_expected = next_expected;  ///< where those of this kind of candidates begin
+  VF light = hn::Zero(DF());                    ///< sum of w
+  Vec3Lanes colors{hn::Zero(DF()), hn::Zero(DF()), hn::Zero(DF())};  ///< of w V^ (f cos L) / p~
+  VF difference = hn::Zero(DF());                                    ///< even less odd w V^
+  VF previous = hn::Zero(DF());                                      ///< w V^ before
+  VF last_step = hn::Zero(DF());                                     ///< to it
+  VF bends = hn::Zero(DF());        ///< of the squares of its second differences
+  VF light_bends = hn::Zero(DF());  ///< those of the candidates from the light, once they are done
+  VF sign = hn::Set(DF(), 1.0f);
+
+  /// A vector of candidates. add_color(share, sum) adds share w (f cos L)_rgb / p~ to `sum`.
+  template <class AddColor>
+  HWY_INLINE void Add(VU code, VF weight, const AddColor& add_color) {
+    const DF d;
+    const ProspectLanes prospect = memory->Look(code);
+    hn::Store(prospect.expected, d, next_expected);
+    next_expected += hn::Lanes(d);
+    contribution.Add(hn::Mul(weight, prospect.contribution));
+    deviation.Add(hn::Mul(weight, prospect.deviation));
+    light = hn::Add(light, weight);
+    const VF likely = hn::Mul(weight, prospect.expected);
+    const auto number = next_expected - first_expected;
+    if (number <= 2 * std::ptrdiff_t{hn::MaxLanes(d)}) {  // the first two are too few
+      if (number <= std::ptrdiff_t{hn::MaxLanes(d)}) previous = likely;
+      last_step = hn::Sub(likely, previous);
+    }
+    const VF step = hn::Sub(likely, previous);
+    const VF bend = hn::Sub(step, last_step);
+    bends = hn::MulAdd(bend, bend, bends);
+    last_step = step;
+    previous = likely;
+    add_color(prospect.expected, colors);
+    difference = hn::MulAdd(likely, sign, difference);
+    sign = hn::Neg(sign);
+  }
+  /// Between the candidates from the light and those from the BRDF.
+  HWY_INLINE void BeginBsdf() {
+    light_bends = bends;
+    bends = hn::Zero(DF());
+    first_expected = next_expected;
+  }
+};
+
+/// Variance that one of `count` candidates would have, from the squares of their second
+/// differences: neighbours along the curve are strata of their own, and what changes evenly from
+/// one to the next is no noise.
+HWY_INLINE float VarianceOfOne(VF bends, std::int32_t count, float scale) {
+  const float sum = hn::GetLane(hn::SumOfLanes(DF(), bends));
+  const float variance = sum / 6 / scale / scale * static_cast<float>(count);
+  return std::isfinite(variance) ? variance : 0.0f;
+}
+
+/// How the rays of a pixel are chosen and counted. Either way is unbiased; which one, candidates
+/// and memory say before any ray is chosen.
+struct RayPlan {
+  const RunningSums& line;
+  float total;  ///< of the line
+  bool control;
+  std::int32_t count;
+  float lns;
+};
+
+/// Looks up the rays and what each brings: as a candidate was chosen with probability proportional
+/// to w times a factor, w cancels. With the control variate, less what was expected of them. Rays
+/// are of the even and the odd half in turn.
+template <class Chosen>
+HWY_INLINE void LookUpRays(const PoolTuning& tuning, const Chosen& chosen, const RayPlan& plan,
+                           const DistinctPicks& picks, const float* expected_of, PixelRays& out) {
+  const DF d;
+  const DI di;
+  const VF per_pick = hn::Set(d, plan.total / static_cast<float>(plan.count));
+  const VF per_light = hn::Set(d, 1 / plan.lns);
+  const VF half = AlternateSigns();
+  Vec3Lanes expected{hn::Zero(d), hn::Zero(d), hn::Zero(d)};
+  VF expected_share = hn::Zero(d), difference = hn::Zero(d);
+  for (std::size_t j = 0; j < picks.count; j += hn::Lanes(d)) {
+    const VI pick = hn::Load(di, picks.pick.from(j));
+    const auto c = chosen.Evaluate(pick);
+    const Vec3Lanes w = DecodeOctahedral(c.code);
+    const VF seen = hn::GatherIndex(d, expected_of, pick);
+    const VF light =
+        hn::Div(hn::Mul(per_pick, hn::Load(d, picks.times.from(j))),
+                plan.control ? DeviationFactor(tuning, seen) : ContributionFactor(tuning, seen));
+    const Vec3Lanes color = Scale(c.reflected, hn::Div(light, MeanLanes(c.reflected)));
+    const VF share = hn::Mul(light, per_light);
+    StoreRays(w, color, share, c.site, j, out);
+    hn::StoreU(hn::DemoteTo(DB(), VisibilityBins(c.code)), DB(), out.bin.from(j));
+    const Vec3Lanes sure = Scale(color, seen);
+    expected = HWY_NAMESPACE::Add(expected, sure);
+    difference = hn::MulAdd(hn::Mul(light, seen), half, difference);
+    expected_share = hn::MulAdd(share, seen, expected_share);
+  }
+  out.count = picks.count;
+  if (!plan.control) return;
+  out.constant.color += SumOfLanes(expected) * -1.0f;
+  out.constant.visibility -= hn::GetLane(hn::SumOfLanes(d, expected_share));
+  out.difference -= hn::GetLane(hn::SumOfLanes(d, difference));
+}
+
+/// Chooses the rays of a pixel from its candidates by what its memory says of their directions:
+/// systematically, u in [0, 1). A candidate that is chosen twice is traced once. candidates: has
+/// Weigh(lines), which adds all of them in turn, those of the light first; Chosen(), whose
+/// Evaluate(picks) gives `code`, `site` and `reflected` by their number on the line; the numbers
+/// from_light and from_bsdf; and mean_radiance, of the environment. memory: as the frames before
+/// left it. num_rays: N, > 0; with a memory a pixel gets N / 2 to 4 N rays, at most kMaxParticles.
+/// out: empty. Returns the sum of the weights, an unbiased estimate of Lns; when it is not positive
+/// and finite, out stays empty.
+template <class Candidates>
+HWY_INLINE float PoolStep(const PoolTuning& tuning, const Candidates& candidates, float u,
+                          std::int32_t num_rays, const PixelMemory& memory, PoolLines& scratch,
+                          PixelRays& out) {
+  const DF d;
+  const auto sum = [&](VF v) HWY_ATTR { return hn::GetLane(hn::SumOfLanes(d, v)); };
+
+  // Weigh the candidates.
+  RunningSums contribution(scratch.contribution_sums.from(0));
+  RunningSums deviation(scratch.deviation_sums.from(0));
+  const RememberedLanes remembered(tuning, memory);
+  WeighedLines lines{&remembered, contribution.end, deviation.end, scratch.expected.from(0)};
+  candidates.Weigh(lines);
+  contribution.end = lines.contribution;
+  deviation.end = lines.deviation;
+  const float lns = sum(lines.light);
+  if (!(lns > 0 && std::isfinite(lns))) return lns;
+
+  // Decide what rays are worth.
+  const float total_deviation = deviation.Finish();
+  const Rgb visible = SumOfLanes(lines.colors);
+  const float expected = mean(visible);
+  const bool control = use_control(tuning, expected, total_deviation);
+  const float scale = noise_scale(tuning, lns, candidates.mean_radiance);
+  const RayPlan plan{control ? deviation : contribution,
+                     control ? total_deviation : contribution.Finish(), control,
+                     memory.outcomes != 0
+                         ? rays_for_deviation(tuning, num_rays, total_deviation, scale)
+                         : num_rays,
+                     lns};
+  out.difference = sum(lines.difference);
+  out.light_variance = {VarianceOfOne(lines.light_bends, candidates.from_light, scale),
+                        VarianceOfOne(lines.bends, candidates.from_bsdf, scale)};
+  if (control) out.constant = {visible, expected / lns};
+
+  // Choose them.
+  const DistinctPicks picks(plan.line, plan.total, u, static_cast<std::size_t>(plan.count));
+  LookUpRays(tuning, candidates.Chosen(), plan, picks, scratch.expected.from(0), out);
+  return lns;
+}
+
+}  // namespace baton::HWY_NAMESPACE
+HWY_AFTER_NAMESPACE();
+#endif

@@ -1,0 +1,48 @@
+#pragma once
+
+#include <cstdint>
+
+namespace baton {
+
+/// The numbers of the pool sampler that no theory gives. None of them can bias: they say where
+/// candidates and rays go. docs/studies-pool.md shows what half and twice of each does
+/// (tests/studies/study_pool_tuning.cpp).
+struct PoolTuning {
+  /// What a pixel's noise is compared with: its light and so many times the mean radiance of the
+  /// environment, as nobody sees the noise of dark pixels among bright ones.
+  float surroundings = 3;
+
+  /// Least factor on a candidate's weight where V^ is the control variate: what memory is sure of
+  /// still gets some rays.
+  float least_deviation = 0.05f;
+  /// The same where rays count what they bring.
+  float least_contribution = 0.2f;
+  /// V^ is the control variate where the expected light is so many times its deviation. Less often
+  /// would be worse, more often leaves more values below zero.
+  float control_from = 2;
+  /// Deviation beside noise_scale() of the light that N rays are for.
+  float usual_deviation = 0.025f;
+  /// Least share of N rays.
+  float least_rays = 0.5f;
+
+  /// Candidates of a kind.
+  struct Candidates {
+    float usual_noise;  ///< beside noise_scale() that as many as usual may leave
+    float least;        ///< share of the usual number that every pixel gets
+  };
+  Candidates light{0.0015f, 0.25f};
+  /// Those from lobes take more time, and few of them do not see what they miss.
+  Candidates lobes{0.008f, 1};
+  /// Most candidates of a kind, times the usual number.
+  float most_candidates = 64;
+  /// Fewest candidates of the light: noise is told by second differences, which take three vectors
+  /// of eight, and who cannot tell would keep too few for good.
+  std::int32_t fewest_judged = 24;
+  /// Glossy pixels that usually have so many may go below: where they once had little noise, it is
+  /// candidates from lobes that they live on.
+  std::int32_t enough_beside_lobes = 64;
+  /// Weight of a new frame in the noise that is remembered.
+  float new_frame = 0.25f;
+};
+
+}  // namespace baton
