@@ -53,10 +53,10 @@ function(baton_decides_only target)
   endif()
 endfunction()
 
-# baton_library(NAME DIR folder DEPS public... PRIVATE private...): all .cpp files of one folder.
+# baton_library(NAME DIR folder DEPS public... PRIVATE private...): all .cpp files of one folder and those below.
 function(baton_library name)
   cmake_parse_arguments(A "" "DIR" "DEPS;PRIVATE" ${ARGN})
-  file(GLOB sources CONFIGURE_DEPENDS ${CMAKE_SOURCE_DIR}/${A_DIR}/*.cpp)
+  file(GLOB_RECURSE sources CONFIGURE_DEPENDS ${CMAKE_SOURCE_DIR}/${A_DIR}/*.cpp)
   if(sources)
     add_library(${name} STATIC ${sources})
     target_link_libraries(${name} PUBLIC baton_options ${A_DEPS} PRIVATE ${A_PRIVATE})

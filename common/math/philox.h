@@ -34,18 +34,18 @@ struct Philox4x32 {
 
 /// Which part of the program asks: the third word of every address. Values are for ever.
 enum class PassId : std::uint32_t {
-  site_position = 1,  ///< where a pixel's sites lie
-  light_pool = 2,     ///< the frame's presampled environment directions
-  candidates = 3,     ///< SIR candidates
-  choose = 4,         ///< SIR choice
-  resample = 5,       ///< resampling of carried particles
-  move = 6,           ///< Metropolis-Hastings moves
-  reference = 7,      ///< brute force
-  refresh = 8,        ///< a pixel's turn to start afresh
-  partition = 9,      ///< where the squares of the second pass lie
-  exchange = 10,      ///< who is offered a sample in the second pass
-  reproject = 11,     ///< the site that is followed back, and which site inherits a sample
-  neighbor = 12,      ///< which neighbours a pixel asks
+  site_position = 1,     ///< where a pixel's sites lie
+  presampled_light = 2,  ///< the frame's presampled environment directions
+  candidates = 3,        ///< SIR candidates
+  choose = 4,            ///< SIR choice
+  resample = 5,          ///< resampling of carried particles
+  move = 6,              ///< Metropolis-Hastings moves
+  reference = 7,         ///< brute force
+  refresh = 8,           ///< a pixel's turn to start afresh
+  partition = 9,         ///< where the squares of the second pass lie
+  exchange = 10,         ///< who is offered a sample in the second pass
+  reproject = 11,        ///< the site that is followed back, and which site inherits a sample
+  neighbor = 12,         ///< which neighbours a pixel asks
 };
 
 /// uint32 -> float uniform in [0, 1): the top 24 bits.
@@ -61,6 +61,12 @@ struct RngKey {
   std::uint32_t frame = 0;
   std::uint32_t pixel = 0;
 };
+/// The address of pixel (x, y) of frame number `frame` in images of `image_width` pixels.
+constexpr RngKey pixel_key(std::uint64_t job_seed, std::int32_t frame, std::int32_t image_width,
+                           std::int32_t x, std::int32_t y) {
+  return {job_seed, static_cast<std::uint32_t>(frame),
+          static_cast<std::uint32_t>(y * image_width + x)};
+}
 
 class Rng {
  public:

@@ -10,8 +10,8 @@
 #include <vector>
 
 #include "common/job/job_json.h"
+#include "worker/exchange/second_pass.h"
 #include "worker/pass/render_context.h"
-#include "worker/pass/second_pass.h"
 
 namespace baton {
 namespace {

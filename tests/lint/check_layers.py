@@ -15,9 +15,12 @@ COMMON_BASE = {"common/base"}
 COMMON_DATA = COMMON_BASE | {"common/math"}
 COMMON_ALL = COMMON_DATA | {"common/job", "common/state", "common/image", "common/store", "common/protocol"}
 SCENE = COMMON_DATA | {"common/job", "common/image"}
-INTEGRATOR = SCENE | {"common/state", "worker/sampling", "worker/scene", "worker/accel"}
-PASS = INTEGRATOR | {"worker/integrator"}
-RUN = PASS | {"common/protocol", "common/store", "worker/pass"}
+LIGHT = SCENE | {"common/state", "worker/sampling", "worker/scene"}
+METHOD = LIGHT | {"worker/accel", "worker/light"}
+METHODS = {f"worker/method/{name}" for name in ("fresh", "pool", "ratio", "reference", "restir", "sequential")}
+PASS = METHOD | {"worker/method"}
+EXCHANGE = PASS | {"worker/pass"}
+RUN = EXCHANGE | {"common/protocol", "common/store", "worker/exchange"}
 
 MAY_INCLUDE = {
     "common/base": set(),
@@ -30,8 +33,11 @@ MAY_INCLUDE = {
     "worker/sampling": COMMON_DATA | {"common/job", "common/state"},
     "worker/scene": SCENE,
     "worker/accel": SCENE | {"worker/scene"},
-    "worker/integrator": INTEGRATOR,
+    "worker/light": LIGHT,
+    "worker/method": METHOD | METHODS,
+    **{method: METHOD | {"worker/method", "worker/method/fresh"} for method in METHODS},
     "worker/pass": PASS,
+    "worker/exchange": EXCHANGE,
     "worker/run": RUN,
     "worker": COMMON_BASE | {"worker/run"},
     "coordinator/schedule": COMMON_DATA | {"common/job"},

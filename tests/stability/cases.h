@@ -6,7 +6,7 @@
 
 #include "tests/stability/laws.h"
 #include "tests/stability/stage.h"
-#include "worker/integrator/pixel_sampler.h"
+#include "worker/method/pixel_sampler.h"
 
 namespace baton::stability {
 

@@ -13,6 +13,7 @@
 #include "tests/stability/maps.h"
 #include "tests/stability/truth.h"
 #include "tests/support/small_scene.h"
+#include "worker/method/sequential/sequential_kernels.h"
 #include "worker/run/local_render.h"
 
 namespace baton::stability {

@@ -7,7 +7,7 @@
 #include <utility>
 
 #include "tests/stability/parallel.h"
-#include "worker/integrator/weighted_method.h"
+#include "worker/method/weighted_method.h"
 #include "worker/pass/render_context.h"
 #include "worker/run/local_render.h"
 

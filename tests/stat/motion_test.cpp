@@ -9,7 +9,7 @@
 #include <functional>
 
 #include "tests/stat/against_brute_force.h"
-#include "worker/integrator/populations.h"
+#include "worker/method/populations.h"
 
 namespace baton {
 namespace {

@@ -19,8 +19,8 @@
 #include "common/job/job_json.h"
 #include "jobs/study/intervals.h"
 #include "jobs/study/svg_chart.h"
+#include "worker/exchange/second_pass.h"
 #include "worker/pass/render_context.h"
-#include "worker/pass/second_pass.h"
 #include "worker/pass/shared_assets.h"
 
 namespace baton {

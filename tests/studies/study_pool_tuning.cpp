@@ -10,7 +10,7 @@
 #include "common/math/philox.h"
 #include "jobs/study/study.h"
 #include "tests/studies/sequential_runs.h"
-#include "worker/integrator/pool_method.h"
+#include "worker/method/pool/pool_method.h"
 #include "worker/scene/settle_motion.h"
 
 namespace baton {

@@ -4,7 +4,7 @@
 #include <mutex>
 
 #include "tests/support/small_scene.h"
-#include "worker/pass/second_pass.h"
+#include "worker/exchange/second_pass.h"
 
 namespace baton::test {
 

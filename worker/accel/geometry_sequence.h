@@ -1,10 +1,11 @@
 #pragma once
 
 #include <cstdint>
-#include <list>
 #include <memory>
 #include <mutex>
 
+#include "common/base/limits.h"
+#include "common/base/lru_cache.h"
 #include "worker/accel/accel.h"
 #include "worker/scene/pose.h"
 
@@ -33,9 +34,9 @@ class GeometrySequence {
   const JobSpec& job_;
   const Scene& scene_;
   const std::shared_ptr<const Accel> rest_;  ///< every frame's, when no object moves
-  std::mutex mutex_;
-  std::list<std::pair<std::int32_t, std::shared_ptr<const FrameGeometry>>>
-      frames_;  ///< most recently used in front
+  std::mutex placing_;
+  LruCache<std::int32_t, FrameGeometry> frames_{
+      limits::kMaxCachedPoses, [](const FrameGeometry&) { return std::size_t{1}; }};
 };
 
 }  // namespace baton

@@ -5,7 +5,7 @@
 #include "common/image/film_tile.h"
 #include "common/job/job_spec.h"
 #include "common/state/sample_state.h"
-#include "worker/integrator/pixel_sampler.h"
+#include "worker/method/pixel_sampler.h"
 
 namespace baton {
 

@@ -2,8 +2,8 @@
 
 #include <utility>
 
-#include "worker/integrator/populations.h"
-#include "worker/integrator/weighted_method.h"
+#include "worker/method/populations.h"
+#include "worker/method/weighted_method.h"
 
 namespace baton {
 

@@ -2,8 +2,7 @@
 
 #include <algorithm>
 
-#include "worker/integrator/populations.h"
-#include "worker/pass/surface_cache.h"
+#include "worker/method/populations.h"
 
 namespace baton {
 
@@ -11,7 +10,7 @@ OldPixels::OldPixels(const RenderContext& context, const FrameGeometry& before,
                      std::span<const StatePtr> states)
     : job_(context.job), before_(before), states_(states) {
   for (const StatePtr& state : states)
-    kept_.push_back(context.surfaces->find(state->frame_index, state->tile));
+    kept_.push_back(context.surfaces->find({state->frame_index, state->tile}));
 }
 
 std::optional<OldPixels::Place> OldPixels::ask(std::int32_t x, std::int32_t y) {

@@ -4,7 +4,8 @@
 #include <array>
 #include <cmath>
 
-#include "worker/integrator/kernels.h"
+#include "worker/light/candidates.h"
+#include "worker/scene/scene_kernels.h"
 
 namespace baton {
 namespace {
@@ -46,9 +47,8 @@ void append_primary_rays(const JobSpec& job, const FrameGeometry& geometry, std:
                                             static_cast<float>(y) + position[1]));
   };
   if (job.image.sites == 1) return add({0.5f, 0.5f});
-  const auto pixel = static_cast<std::uint32_t>(y * job.image.width + x);
   const auto side = static_cast<std::int32_t>(std::sqrt(static_cast<float>(job.image.sites)));
-  const Rng rng({.job_seed = job.seed, .frame = 0, .pixel = pixel}, PassId::site_position);
+  const Rng rng(pixel_key(job.seed, 0, job.image.width, x, y), PassId::site_position);
   std::array<float, 4> u{};  // of two sites
   for (std::int32_t site = 0; site < job.image.sites; ++site) {
     if (site % 2 == 0) u = rng.uniforms(0, static_cast<std::uint32_t>(site / 2));

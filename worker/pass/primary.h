@@ -1,7 +1,10 @@
 #pragma once
 
+#include <utility>
 #include <vector>
 
+#include "common/base/limits.h"
+#include "common/base/lru_cache.h"
 #include "worker/pass/render_context.h"
 
 namespace baton {
@@ -26,6 +29,18 @@ struct TileSurfaces {
     return std::span(hits).subspan(index * static_cast<std::size_t>(num_sites),
                                    static_cast<std::size_t>(num_sites));
   }
+  std::size_t size_bytes() const {
+    return hits.size() * sizeof(hits[0]) + rays.size() * sizeof(rays[0]) + first_site.size();
+  }
+};
+
+/// What the tiles of this process saw last, by frame index and tile, where things move: the next
+/// frame asks for it again, and tracing it a second time is the same work with the same result.
+/// Counted in bytes.
+class SurfaceCache : public LruCache<std::pair<std::int32_t, std::int32_t>, TileSurfaces> {
+ public:
+  explicit SurfaceCache(std::size_t max_bytes = limits::kMaxSurfaceCacheBytes)
+      : LruCache(max_bytes, [](const TileSurfaces& surfaces) { return surfaces.size_bytes(); }) {}
 };
 
 /// Pass 1: one primary ray for each site of each pixel. S = 1 shoots through the pixel's centre,

@@ -1,8 +1,9 @@
 #include "worker/pass/render_context.h"
 
 #include "common/job/motion.h"
+#include "worker/pass/primary.h"
 #include "worker/pass/shared_assets.h"
-#include "worker/pass/surface_cache.h"
+#include "worker/scene/scene_kernels.h"
 
 namespace baton {
 namespace {

@@ -5,8 +5,8 @@
 
 #include "common/job/sequence.h"
 #include "worker/accel/geometry_sequence.h"
-#include "worker/integrator/frame_light.h"
-#include "worker/integrator/pixel_method.h"
+#include "worker/light/frame_light.h"
+#include "worker/method/pixel_method.h"
 #include "worker/pass/tile_renderer.h"
 
 namespace baton {

@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "common/job/motion.h"
-#include "worker/integrator/populations.h"
+#include "worker/method/populations.h"
 
 namespace baton {
 namespace {
@@ -95,9 +95,7 @@ void Reprojection::look_up(const TileSurfaces& surfaces, std::size_t first, std:
                          surfaces.rect.y0 + static_cast<std::int32_t>((first + i) / width)};
     Slot& slot = slots_[i];
     slot.hits = surfaces.pixel(first + i);
-    slot.key = {.job_seed = job.seed,
-                .frame = static_cast<std::uint32_t>(frame),
-                .pixel = static_cast<std::uint32_t>(pixel.y * job.image.width + pixel.x)};
+    slot.key = pixel_key(job.seed, frame, job.image.width, pixel.x, pixel.y);
     const std::optional<Position> source =
         find_source(slot.hits, pixel, Rng(slot.key, PassId::reproject));
     if (!source) continue;

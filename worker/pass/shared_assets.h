@@ -9,7 +9,7 @@
 #include "common/job/job_json.h"
 #include "common/job/job_spec.h"
 #include "worker/accel/accel.h"
-#include "worker/integrator/map_cache.h"
+#include "worker/light/map_cache.h"
 
 namespace baton {
 

@@ -4,7 +4,8 @@
 #include <bit>
 
 #include "common/base/poison.h"
-#include "worker/integrator/populations.h"
+#include "worker/light/carried_light.h"
+#include "worker/method/populations.h"
 #include "worker/pass/cpu_clock.h"
 #include "worker/pass/pixel_books.h"
 
@@ -35,9 +36,7 @@ struct TileFrameRenderer::Batch {
     const auto width = static_cast<std::size_t>(rect.width());
     const auto x = rect.x0 + static_cast<std::int32_t>(index % width);
     const auto y = rect.y0 + static_cast<std::int32_t>(index / width);
-    return {.job_seed = context.job.seed,
-            .frame = static_cast<std::uint32_t>(frame_number),
-            .pixel = static_cast<std::uint32_t>(y * context.job.image.width + x)};
+    return pixel_key(context.job.seed, frame_number, context.job.image.width, x, y);
   }
 };
 
@@ -144,7 +143,7 @@ void TileFrameRenderer::sample(Batch& batch, const FrameLight& light, SampleStat
   batch.rays.clear();
   poison(batch.end_ray);
   batch.known.fill({});
-  const kernels::CarriedLight carried{before, now, light.still, light.pool};
+  const kernels::CarriedLight carried{before, now, light.still, light.presampled};
   look_ahead(0, batch.first, carried, state);
   for (std::size_t i = 0; i < batch.count; ++i) {
     const std::size_t index = batch.first + i;

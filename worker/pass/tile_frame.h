@@ -5,7 +5,8 @@
 #include <vector>
 
 #include "common/job/task.h"
-#include "worker/integrator/pixel_method.h"
+#include "worker/light/carried_light.h"
+#include "worker/method/pixel_method.h"
 #include "worker/pass/film_writer.h"
 #include "worker/pass/first_pass_collector.h"
 #include "worker/pass/primary.h"

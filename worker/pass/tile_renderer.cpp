@@ -6,7 +6,6 @@
 
 #include "common/job/motion.h"
 #include "worker/pass/cpu_clock.h"
-#include "worker/pass/surface_cache.h"
 #include "worker/pass/tile_frame.h"
 
 namespace baton {
@@ -87,7 +86,7 @@ class TileWalk {
     start_state();
     if (renderer_ != nullptr) stats_.merge(renderer_->stats());
     renderer_ = std::make_unique<TileFrameRenderer>(context_, *geometry_, trace(*geometry_));
-    context_.surfaces->insert(frame.index, state_.tile, surfaces_);
+    context_.surfaces->insert({frame.index, state_.tile}, surfaces_);
     Reprojection history(context_, *geometry_, *before, previous);
     return renderer_->render(frame, *light, history, state_);
   }

@@ -6,8 +6,8 @@
 #include "common/job/motion.h"
 #include "common/job/sequence.h"
 #include "common/state/sample_state.h"
+#include "worker/exchange/second_pass.h"
 #include "worker/pass/cpu_clock.h"
-#include "worker/pass/second_pass.h"
 #include "worker/run/frame_output.h"
 
 namespace baton {

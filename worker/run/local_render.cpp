@@ -11,7 +11,7 @@
 
 #include "common/job/motion.h"
 #include "common/job/sequence.h"
-#include "worker/pass/second_pass.h"
+#include "worker/exchange/second_pass.h"
 #include "worker/run/frame_output.h"
 
 namespace baton {

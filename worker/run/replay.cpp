@@ -12,7 +12,7 @@
 #include "common/job/job_json.h"
 #include "common/job/motion.h"
 #include "common/job/sequence.h"
-#include "worker/pass/second_pass.h"
+#include "worker/exchange/second_pass.h"
 #include "worker/pass/tile_renderer.h"
 #include "worker/run/frame_output.h"
 #include "worker/scene/settle_motion.h"

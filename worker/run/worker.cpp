@@ -19,7 +19,7 @@
 #include "common/protocol/worker_channel.h"
 #include "worker/accel/accel.h"
 #include "worker/run/crash_handler.h"
-#include "worker/run/render_pool.h"
+#include "worker/run/render_threads.h"
 #include "worker/run/replay.h"
 #include "worker/run/session.h"
 #include "worker/run/task_watch.h"
@@ -257,7 +257,7 @@ class Worker {
   std::optional<Leave> leave_;
   NoteLog notes_;
   TaskWatch watch_;
-  RenderPool pool_;  ///< last: its threads use the rest and are joined first
+  RenderThreads pool_;  ///< last: its threads use the rest and are joined first
 };
 
 }  // namespace

@@ -242,6 +242,30 @@ HWY_INLINE Vec3Lanes SampleBsdf(const SurfaceLanes& s, VF specular_probability, 
   return w;
 }
 
+/// Reflected radiance (f cos L) per channel. A lane's value is the same to the bit whatever
+/// surfaces the other lanes see: which those are depends, in the second pass, on the tiling.
+HWY_INLINE Vec3Lanes ReflectedRadiance(const SurfaceLanes& s, const BsdfLanes& f, VF r, VF g,
+                                       VF b) {
+  if (!s.any_lobe) {
+    // What is left of the general case without a lobe, in the same order.
+    const auto diffuse = [&](VF kd, VF radiance) HWY_ATTR {
+      return hn::Mul(hn::Mul(hn::Mul(hn::Set(DF(), kInvPi), kd), f.cosine), radiance);
+    };
+    return {diffuse(s.kd.x, r), diffuse(s.kd.y, g), diffuse(s.kd.z, b)};
+  }
+  const auto channel = [&](VF kd, VF ks, VF radiance) HWY_ATTR {
+    return hn::Mul(hn::Mul(hn::MulAdd(f.diffuse, kd, hn::MulAdd(f.lobe, ks, f.white)), f.cosine),
+                   radiance);
+  };
+  const Vec3Lanes reflected{channel(s.kd.x, s.ks.x, r), channel(s.kd.y, s.ks.y, g),
+                            channel(s.kd.z, s.ks.z, b)};
+  if (!s.any_measured) return reflected;
+  const auto tabulated = [&](VF value, VF radiance)
+                             HWY_ATTR { return hn::Mul(hn::Mul(value, f.cosine), radiance); };
+  return Add(reflected,
+             {tabulated(f.measured.x, r), tabulated(f.measured.y, g), tabulated(f.measured.z, b)});
+}
+
 }  // namespace baton::HWY_NAMESPACE
 HWY_AFTER_NAMESPACE();
 #endif

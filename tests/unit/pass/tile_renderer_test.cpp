@@ -7,7 +7,6 @@
 #include <limits>
 
 #include "tests/support/render_tiled.h"
-#include "worker/pass/surface_cache.h"
 
 namespace baton {
 namespace {
@@ -29,7 +28,7 @@ TEST(RunTile, SameBytesForAnyTilingAndAnyRunLength) {
 }
 
 /// Box and ground with settings of their own, and the largest M for a material that no pixel sees:
-/// the light pool is laid out for that.
+/// the presampled light is laid out for that.
 JobSpec job_by_material() {
   JobSpec job = sequence_job(2);
   job.sampling.method = Method::mis;
@@ -50,7 +49,7 @@ TEST(RunTile, SameBytesForAnyTilingByMaterial) {
 }
 
 // A pixel has the bytes that it has where its material's setting is that of the whole picture and
-// the light pool is laid out alike.
+// the presampled light is laid out alike.
 TEST(RunTile, EachMaterialIsSampledByItsOwnSetting) {
   const JobSpec job = job_by_material();
   const FilmTile mixed = render_tiled(job, 4096, 5).back();
@@ -99,32 +98,6 @@ TEST(RunTile, SameBytesForAnyTilingWhileCameraAndObjectsMove) {
     EXPECT_EQ(render_tiled(job, 3, 1), whole);
     EXPECT_EQ(render_tiled(job, 8, 1, /*each_run_alone=*/true), whole) << "nothing is kept";
   }
-}
-
-TEST(SurfaceCache, KeepsTheLastFrames) {
-  SurfaceCache cache;
-  const auto surfaces = std::make_shared<const TileSurfaces>();
-  for (int frame = 0; frame < 10; ++frame) cache.insert(frame, 3, surfaces);
-  EXPECT_EQ(cache.find(9, 3), surfaces);
-  EXPECT_EQ(cache.find(8, 3), surfaces);
-  EXPECT_EQ(cache.find(9, 2), nullptr) << "another tile";
-  EXPECT_EQ(cache.find(2, 3), nullptr) << "long ago";
-}
-
-TEST(SurfaceCache, KeepsNothingThatIsTooLarge) {
-  SurfaceCache cache(3);
-  const auto surfaces = [](std::size_t bytes) {
-    TileSurfaces of_size;
-    of_size.first_site.resize(bytes);
-    return std::make_shared<const TileSurfaces>(std::move(of_size));
-  };
-  const auto small = surfaces(2);
-  cache.insert(1, 0, surfaces(4));
-  EXPECT_EQ(cache.find(1, 0), nullptr);
-  cache.insert(1, 1, small);
-  EXPECT_EQ(cache.find(1, 1), small);
-  cache.insert(1, 2, surfaces(2));
-  EXPECT_EQ(cache.find(1, 1), nullptr) << "the oldest goes first";
 }
 
 TEST(RunTile, AMotionThatGoesNowhereIsNoMotion) {
@@ -176,8 +149,8 @@ TEST(RunTile, ThePoolTakesMoreCandidatesWhereItWasNoisy) {
   EXPECT_EQ(per_pixel(), 64) << "noise of this frame must not count";
 }
 
-// The variance that the pool states from its even and odd samples is, on average, at least what is
-// seen over 64 seeds (whose own error is 5 % of it), and not many times more.
+// The variance that the presampled light states from its even and odd samples is, on average, at
+// least what is seen over 64 seeds (whose own error is 5 % of it), and not many times more.
 TEST(RunTile, PoolStatesItsVariance) {
   JobSpec job = sequence_job(4);
   job.image.sites = 1;

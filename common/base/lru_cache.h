@@ -1,0 +1,63 @@
+#pragma once
+
+#include <algorithm>
+#include <cstddef>
+#include <list>
+#include <memory>
+#include <mutex>
+#include <utility>
+
+namespace baton {
+
+/// Values by key, as many as fit into a budget: the least recently used go first, and the one used
+/// last always stays. Whoever holds a value keeps it alive. A search is linear: for hundreds of
+/// large values. Any number of threads.
+template <class Key, class Value>
+class LruCache {
+ public:
+  using ValuePtr = std::shared_ptr<const Value>;
+  /// What a value takes of the budget.
+  using SizeOf = std::size_t (*)(const Value&);
+
+  LruCache(std::size_t budget, SizeOf size_of) : budget_(budget), size_of_(size_of) {}
+
+  /// Null: not here.
+  ValuePtr find(const Key& key) {
+    const std::lock_guard lock(mutex_);
+    return use(key);
+  }
+  /// Keeps a value, unless there is one, and returns what is there.
+  ValuePtr insert(const Key& key, ValuePtr value) {
+    const std::lock_guard lock(mutex_);
+    if (ValuePtr there = use(key)) return there;
+    entries_.emplace_front(key, value);
+    size_ += size_of_(*value);
+    while (size_ > budget_ && entries_.size() > 1) {
+      size_ -= size_of_(*entries_.back().second);
+      entries_.pop_back();
+    }
+    return value;
+  }
+  /// What all values take now.
+  std::size_t size() const {
+    const std::lock_guard lock(mutex_);
+    return size_;
+  }
+
+ private:
+  ValuePtr use(const Key& key) {
+    const auto found = std::find_if(entries_.begin(), entries_.end(),
+                                    [&](const auto& entry) { return entry.first == key; });
+    if (found == entries_.end()) return nullptr;
+    entries_.splice(entries_.begin(), entries_, found);
+    return found->second;
+  }
+
+  const std::size_t budget_;
+  const SizeOf size_of_;
+  mutable std::mutex mutex_;
+  std::list<std::pair<Key, ValuePtr>> entries_;  ///< most recently used in front
+  std::size_t size_ = 0;
+};
+
+}  // namespace baton

@@ -1,0 +1,157 @@
+#include "worker/run/render_threads.h"
+
+#include <gtest/gtest.h>
+
+#include <algorithm>
+#include <semaphore>
+
+#include "tests/support/patience.h"
+
+namespace baton {
+namespace {
+
+using namespace std::chrono_literals;
+
+LeaseId lease(std::int32_t tile) {
+  return {.job = {}, .task = {TaskKind::render, 0, tile}, .attempt = 1, .epoch = 1};
+}
+
+PooledTask task(std::int32_t tile) {
+  return {.lease = lease(tile), .inputs = {}, .job = nullptr, .store = nullptr};
+}
+
+Status at_once(std::span<const PooledTask> /*tasks*/) { return {}; }
+
+/// Collects until `count` tasks have ended; each end releases `woken`.
+std::vector<EndedTask> collect(RenderThreads& pool, std::counting_semaphore<>& woken,
+                               std::size_t count) {
+  std::vector<EndedTask> all;
+  while (all.size() < count) {
+    for (EndedTask& ended : pool.collect()) all.push_back(std::move(ended));
+    if (all.size() < count) woken.acquire();
+  }
+  return all;
+}
+
+TEST(RenderThreads, RunsEverythingOnceAndWakesForEachResult) {
+  std::counting_semaphore<> woken(0);
+  RenderThreads pool(
+      3,
+      [](const PooledTask& t, std::stop_token) {
+        TaskOutput output;
+        output.stats.pixels = static_cast<std::uint64_t>(t.lease.task.tile);
+        return output;
+      },
+      at_once, [&] { woken.release(); });
+  for (int tile = 0; tile < 50; ++tile) pool.submit(task(tile));
+  std::vector<EndedTask> ended = collect(pool, woken, 50);
+
+  std::sort(ended.begin(), ended.end(),
+            [](const auto& a, const auto& b) { return a.lease < b.lease; });
+  for (int tile = 0; tile < 50; ++tile) {
+    EXPECT_EQ(ended[tile].lease, lease(tile));
+    EXPECT_EQ(ended[tile].result->stats.pixels, std::uint64_t(tile));
+  }
+}
+
+TEST(RenderThreads, StopReachesTheRunningTaskAlone) {
+  std::counting_semaphore<> woken(0), started(0), let_go(0);
+  RenderThreads pool(
+      2,
+      [&](const PooledTask&, std::stop_token stop) -> Result<TaskOutput> {
+        started.release();
+        let_go.acquire();
+        if (stop.stop_requested()) return Error{ErrorKind::cancelled, "stopped"};
+        return TaskOutput{};
+      },
+      at_once, [&] { woken.release(); });
+  pool.submit(task(0));
+  pool.submit(task(1));
+  started.acquire();
+  started.acquire();
+  pool.stop(lease(1));
+  let_go.release(2);
+  for (const EndedTask& ended : collect(pool, woken, 2)) {
+    EXPECT_EQ(ended.result.ok(), ended.lease == lease(0));
+  }
+}
+
+TEST(RenderThreads, DroppedTasksEndAsCancelledAndNeverRun) {
+  std::counting_semaphore<> woken(0), started(0), let_go(0);
+  RenderThreads pool(
+      1,
+      [&](const PooledTask& t, std::stop_token) {
+        EXPECT_EQ(t.lease, lease(0));
+        started.release();
+        let_go.acquire();
+        return TaskOutput{};
+      },
+      at_once, [&] { woken.release(); });
+  for (int tile = 0; tile < 3; ++tile) pool.submit(task(tile));
+  started.acquire();
+  pool.drop_queued();
+  let_go.release();
+  const std::vector<EndedTask> ended = collect(pool, woken, 3);
+  EXPECT_EQ(std::count_if(ended.begin(), ended.end(), [](const auto& e) { return e.result.ok(); }),
+            1);
+}
+
+// A pool of one thread and a disk that takes its time: the thread goes on, nothing counts as ended
+// before it is on the disk, and what came up meanwhile shares the next wait.
+TEST(RenderThreads, NoThreadWaitsForTheDisk) {
+  std::counting_semaphore<> woken(0), waiting(0), let_go(0);
+  std::vector<std::size_t> waits;
+  RenderThreads pool(
+      1, [](const PooledTask&, std::stop_token) { return TaskOutput{}; },
+      [&](std::span<const PooledTask> tasks) {
+        waits.push_back(tasks.size());
+        waiting.release();
+        let_go.acquire();
+        return Status();
+      },
+      [&] { woken.release(); });
+  pool.submit(task(0));
+  waiting.acquire();
+  for (int tile = 1; tile < 4; ++tile) pool.submit(task(tile));
+  std::size_t left_thread = 0;
+  while (left_thread < 4 && woken.try_acquire_for(with_patience(10s))) {
+    left_thread += pool.take_executed().size();
+  }
+  EXPECT_EQ(left_thread, 4u);
+  EXPECT_TRUE(pool.collect().empty());
+  let_go.release(8);  // more than there are waits
+  EXPECT_EQ(collect(pool, woken, 4).size(), 4u);
+  EXPECT_EQ(waits, (std::vector<std::size_t>{1, 3}));
+}
+
+TEST(RenderThreads, WhatTheDiskRefusesHasFailed) {
+  std::counting_semaphore<> woken(0);
+  RenderThreads pool(
+      1, [](const PooledTask&, std::stop_token) { return TaskOutput{}; },
+      [](std::span<const PooledTask>) {
+        return Status(Error{ErrorKind::io, "disk full"});
+      },
+      [&] { woken.release(); });
+  pool.submit(task(0));
+  const std::vector<EndedTask> ended = collect(pool, woken, 1);
+  ASSERT_FALSE(ended[0].result);
+  EXPECT_EQ(ended[0].result.error().message, "disk full");
+}
+
+TEST(RenderThreads, ClosingStopsWhatRuns) {
+  std::counting_semaphore<> started(0);
+  RenderThreads pool(
+      1,
+      [&](const PooledTask&, std::stop_token stop) -> Result<TaskOutput> {
+        started.release();
+        while (!stop.stop_requested()) std::this_thread::yield();
+        return Error{ErrorKind::cancelled, "stopped"};
+      },
+      at_once, [] {});
+  pool.submit(task(0));
+  pool.submit(task(1));
+  started.acquire();
+}
+
+}  // namespace
+}  // namespace baton

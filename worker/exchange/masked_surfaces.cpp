@@ -1,0 +1,45 @@
+#include "worker/exchange/masked_surfaces.h"
+
+#include "worker/pass/cpu_clock.h"
+#include "worker/pass/primary.h"
+
+namespace baton {
+
+MaskedSurfaces::MaskedSurfaces(const RenderContext& context, const FrameGeometry& geometry,
+                               const PixelMask& mask)
+    : num_sites_(static_cast<std::size_t>(context.job.image.sites)), position_(mask.ranks()) {
+  // Trace.
+  mask.visit_all([&](std::int32_t x, std::int32_t y) {
+    append_primary_rays(context.job, geometry, x, y, rays_);
+  });
+  hits_.resize(rays_.size());
+  {
+    const StageTimer timer(seconds_rays_);
+    trace_primary_rays(context.job, geometry, rays_, hits_);
+  }
+
+  // Tabulate.
+  table_.reserve(hits_.size());
+  for (const SurfaceHit& hit : hits_) {
+    if (hit.hit) {
+      table_.add(hit.point, context.scene->materials[hit.material], hit.ray_origin);
+    } else {
+      table_.add_nothing();
+    }
+  }
+}
+
+std::span<const SurfaceHit> MaskedSurfaces::hits(std::int32_t position) const {
+  return std::span(hits_).subspan(static_cast<std::size_t>(position) * num_sites_, num_sites_);
+}
+
+Rgb MaskedSurfaces::background(std::int32_t position, const Environment& environment) const {
+  const std::size_t first = static_cast<std::size_t>(position) * num_sites_;
+  Rgb radiance;
+  add_environment_behind(
+      std::span(hits_).subspan(first, num_sites_), std::span(rays_).subspan(first, num_sites_),
+      static_cast<std::int32_t>(num_sites_), view_of(environment), {&radiance, 1});
+  return radiance;
+}
+
+}  // namespace baton

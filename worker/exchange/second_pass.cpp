@@ -1,0 +1,172 @@
+#include "worker/exchange/second_pass.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+#include "worker/exchange/extra_samples.h"
+#include "worker/exchange/traced_exchange.h"
+#include "worker/pass/cpu_clock.h"
+#include "worker/sampling/folds.h"
+
+namespace baton {
+namespace {
+
+Status check_inputs(const RenderContext& context, std::int32_t frame_index, std::int32_t tile,
+                    const FilmTile& film, std::span<const FirstPassPtr> near) {
+  const std::vector<std::int32_t> tiles =
+      context.grid.tiles_near(tile, exchange_reach_px(context.job.visibility));
+  if (near.size() != tiles.size()) {
+    return Error{ErrorKind::bad_input,
+                 fmt::format("tile {} frame index {}: samples of {} tiles, expected {}", tile,
+                             frame_index, near.size(), tiles.size())};
+  }
+  for (std::size_t i = 0; i < near.size(); ++i) {
+    const FirstPassSamples& s = *near[i];
+    if (s.job_digest == context.digest && s.frame_index == frame_index && s.tile == tiles[i] &&
+        s.rect == context.grid.rect(tiles[i]) &&
+        s.num_slots == context.job.sampling.num_particles &&
+        s.num_populations == num_populations(context.job)) {
+      continue;
+    }
+    return Error{
+        ErrorKind::bad_input,
+        fmt::format("first-pass samples: of job {} tile {} frame index {}, expected {}, {}, {}",
+                    s.job_digest.hex(), s.tile, s.frame_index, context.digest.hex(), tiles[i],
+                    frame_index)};
+  }
+  if (film.rect == context.grid.rect(tile)) return {};
+  return Error{ErrorKind::bad_input, fmt::format("film: of another tile than {}", tile)};
+}
+
+PixelRect grown(const PixelRect& rect, std::int32_t margin, const ImageSpec& image) {
+  return {std::max(rect.x0 - margin, 0), std::max(rect.y0 - margin, 0),
+          std::min(rect.x1 + margin, image.width), std::min(rect.y1 + margin, image.height)};
+}
+
+ExchangeMasks make_masks(const VisibilitySpec& visibility, const SampleRegion& samples,
+                         const PixelRect& rect, const PixelRect& rect_before_dilation) {
+  ExchangeMasks masks{{}, PixelMask(rect)};
+  const PixelMask surfaces = samples.surfaces(rect);
+  for (const Fold& fold : folds_of(visibility.mask)) {
+    masks.of_fold.push_back(dilate(samples.failed(rect_before_dilation, fold.mask_population),
+                                   visibility.dilate, surfaces, rect));
+    masks.any.add(masks.of_fold.back());
+  }
+  return masks;
+}
+
+/// The exchange, fold by fold.
+void exchange(const SecondPassWork& work, std::span<Rgb> radiance, RenderStats& stats) {
+  const JobSpec& job = work.context.job;
+  const SquarePartitions partitions({0, 0, job.image.width, job.image.height},
+                                    job.visibility.tile_size, job.visibility.partitions,
+                                    Rng({.job_seed = job.seed,
+                                         .frame = static_cast<std::uint32_t>(work.frame.number),
+                                         .pixel = 0},
+                                        PassId::partition));
+  TracedExchange scene(work);
+  ExchangeSettings settings{.form = job.visibility.form,
+                            .num_slots = static_cast<std::uint32_t>(job.sampling.num_particles),
+                            .num_sites = static_cast<std::uint32_t>(job.image.sites),
+                            .fold = 0,
+                            .job_seed = job.seed,
+                            .frame = work.frame.number,
+                            .image_width = job.image.width};
+  for (const Fold& fold : folds_of(job.visibility.mask)) {
+    scene.use(fold);
+    exchange_energy(settings, partitions, work.masks.of_fold[settings.fold], work.masks.any,
+                    work.rect, scene, radiance);
+    ++settings.fold;
+  }
+  stats.rays_second_pass += scene.rays_traced();
+  stats.seconds_second_rays += scene.seconds_rays();
+}
+
+/// The baseline: more samples of the pixels themselves.
+void sample_more(const SecondPassWork& work, std::span<Rgb> radiance, RenderStats& stats) {
+  ExtraSampler sampler(work);
+  const PixelRect& rect = work.rect;
+  for (std::int32_t y = rect.y0; y < rect.y1; ++y) {
+    work.masks.any.visit_row(rect.x0, rect.x1, y, [&](std::int32_t x) {
+      Rgb& pixel = radiance[PixelMask::index(rect, x, y)];
+      for (std::size_t fold = 0; fold < work.masks.of_fold.size(); ++fold)
+        pixel += sampler.radiance(x, y, fold);
+    });
+  }
+  stats.rays_second_pass += sampler.rays_traced();
+  stats.seconds_second_rays += sampler.seconds_rays();
+}
+
+/// Puts the pixels of the mask into the film.
+void write_pixels(const SecondPassWork& work, std::span<const Rgb> radiance, FilmTile& film,
+                  RenderStats& stats) {
+  const bool show_environment = work.context.job.output.background == Background::environment;
+  float* const mask = film.find("mask");
+  for (std::int32_t y = work.rect.y0; y < work.rect.y1; ++y) {
+    for (std::int32_t x = work.rect.x0; x < work.rect.x1; ++x) {
+      if (!work.masks.any.at(x, y)) continue;
+      const std::size_t pixel = PixelMask::index(work.rect, x, y);
+      Rgb value = radiance[pixel];
+      if (show_environment)
+        value += work.surfaces.background(work.surfaces.find(work.masks.any.index(x, y)),
+                                          work.light.now);
+      film.plane(0)[pixel] = value.x;
+      film.plane(1)[pixel] = value.y;
+      film.plane(2)[pixel] = value.z;
+      if (mask != nullptr) mask[pixel] = 0;
+      ++stats.pixels_masked;
+    }
+  }
+}
+
+/// The light of the frame; preparing it, where the first pass left none, counts as in that pass.
+Result<std::shared_ptr<const FrameLight>> light_of(const RenderContext& context,
+                                                   std::int32_t frame_index, RenderStats& stats) {
+  const CpuTimer timer(stats.seconds_light);
+  return context.lights->at(frame_index);
+}
+
+}  // namespace
+
+Result<SecondPassOutput> run_second_pass(const RenderContext& context, std::int32_t frame_index,
+                                         std::int32_t tile, const FilmTile& first_film,
+                                         std::span<const FirstPassPtr> near) {
+  const WorkClock clock;
+  BATON_TRY(check_inputs(context, frame_index, tile, first_film, near));
+  SecondPassOutput output{.film = first_film};
+
+  // Find who takes part.
+  const VisibilitySpec& visibility = context.job.visibility;
+  const SampleRegion samples(near);
+  const PixelRect rect = context.grid.rect(tile);
+  const PixelRect reach = grown(rect, visibility.tile_size - 1, context.job.image);
+  const ExchangeMasks masks =
+      make_masks(visibility, samples, reach, grown(reach, visibility.dilate, context.job.image));
+
+  // Do their pixels again.
+  BATON_ASSIGN(const auto geometry, context.geometry->at(frame_index));
+  const MaskedSurfaces surfaces(context, *geometry, masks.any);
+  output.stats.rays_primary = surfaces.num_rays();
+  output.seconds_primary_rays = surfaces.seconds_rays();
+  BATON_ASSIGN(const auto light, light_of(context, frame_index, output.stats));
+  const SecondPassWork work{
+      context,  *geometry, context.frames[static_cast<std::size_t>(frame_index)],
+      *light,   samples,   masks,
+      surfaces, rect};
+  std::vector<Rgb> radiance(static_cast<std::size_t>(rect.area()));
+  if (visibility.form == SecondPassForm::extra_samples) {
+    sample_more(work, radiance, output.stats);
+  } else {
+    exchange(work, radiance, output.stats);
+  }
+  write_pixels(work, radiance, output.film, output.stats);
+  const double share = clock.running_share();
+  output.stats.seconds_second_rays *= share;
+  output.seconds_primary_rays *= share;
+  output.stats.cpu_seconds = clock.cpu_seconds();
+  output.stats.seconds_second_pass = output.stats.cpu_seconds - output.stats.seconds_light;
+  return output;
+}
+
+}  // namespace baton

@@ -1,0 +1,117 @@
+#include "worker/light/frame_light.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <chrono>
+#include <cmath>
+
+#include "common/base/limits.h"
+#include "common/math/octahedral.h"
+
+namespace baton {
+namespace {
+
+/// The presampled light as most pixels read it.
+PresampledLightLayout presampled_layout(const JobSpec& job) {
+  LightUse use = traits(job.sampling.method).light(job.sampling);
+  for (const auto& [name, own] : job.sampling.by_material)
+    use.num_taken = std::max(use.num_taken, traits(own.method).light(as_sampling(own)).num_taken);
+  return {
+      .num_taken = static_cast<std::uint32_t>(std::max(use.num_taken / num_populations(job), 1)),
+      .one_run = use.one_run,
+      .with_before = use.with_before};
+}
+
+}  // namespace
+
+std::optional<Mat3> turn_between(const Environment& before, const Environment& now) {
+  constexpr double kMinTurn = 15 * kOctahedralError;
+  if (now.map->filter() == MapFilter::nearest) return std::nullopt;
+  const Mat3 turn = now.rotation * before.rotation.transposed();
+
+  // |turn - 1|^2 = 8 sin^2(angle / 2), exact for small angles, too.
+  double squares = 0;
+  for (std::size_t i = 0; i < turn.m.size(); ++i) {
+    const double difference = double{turn.m[i]} - Mat3{}.m[i];
+    squares += difference * difference;
+  }
+  if (std::sqrt(squares / 2) < kMinTurn) return std::nullopt;
+  return turn;
+}
+
+LightSequence::LightSequence(const JobSpec& job, std::shared_ptr<MapCache> maps)
+    : job_(job),
+      maps_(std::move(maps)),
+      frames_(expand_sequence(job)),
+      mixed_maps_(limits::kMaxEnvironmentCacheBytes,
+                  [](const EnvironmentMap& map) { return map.size_bytes(); }),
+      lights_(limits::kMaxEnvironmentCacheBytes,
+              [](const FrameLight& light) { return light.presampled.size_bytes(); }) {}
+
+Result<std::shared_ptr<const EnvironmentMap>> LightSequence::key_map(std::int32_t key) {
+  const std::string& path = job_.environment.keys[static_cast<std::size_t>(key)].map;
+  BATON_ASSIGN(const auto map, maps_->get(path, job_.environment, job_.sampling.mis_compensation));
+  if (const auto& repairs = map->repairs(); repairs.total() > 0) {
+    const std::string note = fmt::format("{}: {} negative, {} NaN, {} infinite texels set to 0",
+                                         path, repairs.negative, repairs.nan, repairs.infinite);
+    if (std::find(repair_notes_.begin(), repair_notes_.end(), note) == repair_notes_.end()) {
+      repair_notes_.push_back(note);
+    }
+  }
+  return map;
+}
+
+Result<std::shared_ptr<const EnvironmentMap>> LightSequence::mixed_map(
+    const EnvironmentFrame& frame) {
+  if (frame.mix <= 0) return key_map(frame.map_a);
+  const auto first = std::find_if(frames_.begin(), frames_.end(), [&](const FrameSpec& f) {
+    return f.environment.same_texels(frame);
+  });
+  const auto name = static_cast<std::int32_t>(first - frames_.begin());
+  if (auto found = mixed_maps_.find(name)) return found;
+  BATON_ASSIGN(const auto a, key_map(frame.map_a));
+  BATON_ASSIGN(const auto b, key_map(frame.map_b));
+  if (a->width() != b->width() || a->height() != b->height()) {
+    return Error{
+        ErrorKind::bad_input,
+        fmt::format("{}: {} x {} texels, expected {} x {} as in {} to interpolate between them",
+                    job_.environment.keys[static_cast<std::size_t>(frame.map_b)].map, b->width(),
+                    b->height(), a->width(), a->height(),
+                    job_.environment.keys[static_cast<std::size_t>(frame.map_a)].map)};
+  }
+  return mixed_maps_.insert(name, std::make_shared<const EnvironmentMap>(
+                                      *a, *b, frame.mix, job_.sampling.mis_compensation));
+}
+
+Result<Environment> LightSequence::environment(const EnvironmentFrame& frame) {
+  BATON_ASSIGN(auto map, mixed_map(frame));
+  return Environment{std::move(map), frame.rotation};
+}
+
+Result<std::shared_ptr<const FrameLight>> LightSequence::at(std::int32_t index) {
+  const std::lock_guard lock(mutex_);
+  if (auto found = lights_.find(index)) return found;
+  const auto start = std::chrono::steady_clock::now();
+  const FrameSpec& frame = frames_[static_cast<std::size_t>(index)];
+  const FrameSpec& frame_before = frames_[static_cast<std::size_t>(std::max(index - 1, 0))];
+  auto light = std::make_shared<FrameLight>();
+  BATON_ASSIGN(light->now, environment(frame.environment));
+  BATON_ASSIGN(light->before, environment(frame_before.environment));
+  light->still = frame.environment == frame_before.environment;
+  if (frame.environment.same_texels(frame_before.environment))
+    light->turn = turn_between(light->before, light->now);
+  light->presampled =
+      presample_light(light->now, light->before, job_.seed,
+                      static_cast<std::uint32_t>(frame.number), presampled_layout(job_));
+  light->prepare_seconds =
+      std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
+  return lights_.insert(index, std::move(light));
+}
+
+std::vector<std::string> LightSequence::repair_notes() const {
+  const std::lock_guard lock(mutex_);
+  return repair_notes_;
+}
+
+}  // namespace baton

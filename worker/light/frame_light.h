@@ -1,0 +1,67 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+#include <mutex>
+#include <optional>
+#include <vector>
+
+#include "common/base/lru_cache.h"
+#include "common/base/result.h"
+#include "common/job/sequence.h"
+#include "worker/light/map_cache.h"
+#include "worker/light/presampled_light.h"
+#include "worker/scene/environment.h"
+
+namespace baton {
+
+/// The light of one frame, ready for its pixels.
+struct FrameLight {
+  Environment now;
+  Environment before;  ///< the frame before; for the first frame the same as now
+  bool still = false;  ///< now shows what before showed: the same texels, turned alike
+  /// How directions turn with the light from the frame before to now, if that is all that it does;
+  /// see turn_between()
+  std::optional<Mat3> turn;
+  PresampledLight presampled;
+  double prepare_seconds = 0;  ///< time spent on texels, table and presampled
+};
+
+/// R_now R_before^-1 of a map whose texels stay: along it, directions on the lattice are carried
+/// with their light. None for turns below 0.06 degrees, of which the lattice could swallow more
+/// than a fifteenth, and with `nearest`: there a direction that is rounded into the next texel has
+/// another light at once.
+std::optional<Mat3> turn_between(const Environment& before, const Environment& now);
+
+/// The environments of a job's frames, prepared on demand and kept while memory allows. Any number
+/// of threads may ask; a frame is prepared once while the others wait. A frame's light is a pure
+/// function of (job, frame).
+class LightSequence {
+ public:
+  /// job must outlive the object. maps: may be shared with other jobs.
+  LightSequence(const JobSpec& job, std::shared_ptr<MapCache> maps);
+
+  /// The light of frame `index` (0-based). Errors: a map that cannot be read, or two key frames of
+  /// different size.
+  Result<std::shared_ptr<const FrameLight>> at(std::int32_t index);
+
+  /// Texels set to 0 because they were negative, NaN or infinite, per map read so far: "path: 12
+  /// negative ...".
+  std::vector<std::string> repair_notes() const;
+
+ private:
+  Result<std::shared_ptr<const EnvironmentMap>> key_map(std::int32_t key);
+  Result<std::shared_ptr<const EnvironmentMap>> mixed_map(const EnvironmentFrame& frame);
+  Result<Environment> environment(const EnvironmentFrame& frame);
+
+  const JobSpec& job_;
+  const std::shared_ptr<MapCache> maps_;
+  std::vector<FrameSpec> frames_;
+  mutable std::mutex mutex_;
+  /// By the first frame index that shows these texels.
+  LruCache<std::int32_t, EnvironmentMap> mixed_maps_;
+  LruCache<std::int32_t, FrameLight> lights_;
+  std::vector<std::string> repair_notes_;
+};
+
+}  // namespace baton

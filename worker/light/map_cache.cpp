@@ -1,0 +1,17 @@
+#include "worker/light/map_cache.h"
+
+#include "worker/scene/map_reduction.h"
+
+namespace baton {
+
+Result<MapCache::MapPtr> MapCache::get(const std::string& path, const EnvironmentSpec& environment,
+                                       bool compensate) {
+  const Key key{path, environment.filter, environment.scale, environment.max_width, compensate};
+  const std::lock_guard lock(reading_);
+  if (MapPtr found = maps_.find(key)) return found;
+  BATON_ASSIGN(const RgbImage image, read_rgb_image(path));
+  return maps_.insert(
+      key, std::make_shared<const EnvironmentMap>(make_map(image, environment, compensate)));
+}
+
+}  // namespace baton

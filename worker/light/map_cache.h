@@ -1,0 +1,42 @@
+#pragma once
+
+#include <memory>
+#include <mutex>
+#include <string>
+
+#include "common/base/limits.h"
+#include "common/base/lru_cache.h"
+#include "common/base/result.h"
+#include "common/job/job_spec.h"
+#include "worker/scene/environment.h"
+
+namespace baton {
+
+/// Maps of files, as large as jobs want them, with sampling tables, kept while memory allows
+/// (limits::kMaxEnvironmentCacheBytes). Any number of threads and jobs may ask; a map is read once
+/// while the others wait. Files are taken to keep their contents as long as the cache lives.
+class MapCache {
+ public:
+  using MapPtr = std::shared_ptr<const EnvironmentMap>;
+
+  /// The map of a file with the size and table that `environment` and `compensate` ask for. Error:
+  /// a map that cannot be read.
+  Result<MapPtr> get(const std::string& path, const EnvironmentSpec& environment, bool compensate);
+
+ private:
+  struct Key {
+    std::string path;
+    MapFilter filter;
+    float scale;
+    int max_width;
+    bool compensate;
+
+    bool operator==(const Key&) const = default;
+  };
+
+  std::mutex reading_;
+  LruCache<Key, EnvironmentMap> maps_{limits::kMaxEnvironmentCacheBytes,
+                                      [](const EnvironmentMap& map) { return map.size_bytes(); }};
+};
+
+}  // namespace baton

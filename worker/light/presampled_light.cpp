@@ -1,0 +1,110 @@
+#include "worker/light/presampled_light.h"
+
+#include <algorithm>
+#include <bit>
+#include <iterator>
+#include <numbers>
+#include <span>
+#include <utility>
+
+#include "common/math/hilbert.h"
+#include "common/math/low_discrepancy.h"
+#include "worker/light/candidates.h"
+#include "worker/scene/scene_kernels.h"
+
+namespace baton {
+namespace {
+
+/// The directions of all entries, in the order of the sequence.
+std::vector<OctDirection> draw_directions(const Environment& now,
+                                          const Philox4x32::Counter& seeds) {
+  std::vector<OctDirection> directions(PresampledLight::kSize);
+  for (std::uint32_t i = 0; i < PresampledLight::kSize; ++i) {
+    const auto [sx, sy] = sobol_2d(i);
+    const Vec3 w = now.map->sample(
+        {uniform_float(owen_scramble(sx, seeds[0])), uniform_float(owen_scramble(sy, seeds[1]))});
+    directions[i] = encode_octahedral(now.rotation * w);
+  }
+  return directions;
+}
+
+/// Sorts directions along the curve.
+void sort_along_curve(std::span<OctDirection> directions) {
+  std::vector<std::pair<std::uint32_t, OctDirection>> order;
+  order.reserve(directions.size());
+  for (const OctDirection w : directions)
+    order.emplace_back(hilbert_index(w & 0xFFFFu, w >> 16), w);
+  std::sort(order.begin(), order.end());
+  std::transform(order.begin(), order.end(), directions.begin(),
+                 [](const auto& entry) { return entry.second; });
+}
+
+/// Puts a sorted run into its blocks; place 0 of them gets the eighth `first` of the curve.
+void lay_out(std::span<const OctDirection> sorted, std::uint32_t first,
+             std::span<PresampledLight::Block> blocks) {
+  for (std::uint32_t place = 0; place < PresampledLight::kBlock; ++place) {
+    const std::uint32_t eighth =
+        (PresampledLight::kEighthOf[place] + first) % PresampledLight::kBlock;
+    for (std::uint32_t b = 0; b < blocks.size(); ++b) {
+      blocks[b].code[place] = sorted[eighth * blocks.size() + b];
+    }
+  }
+}
+
+/// Mean radiance over the sphere, grey.
+float mean_radiance(std::span<const PresampledLight::Block> blocks) {
+  double sum = 0;
+  for (const PresampledLight::Block& block : blocks) {
+    for (std::uint32_t i = 0; i < PresampledLight::kBlock; ++i)
+      sum += double{block.r[i] + block.g[i] + block.b[i]} * block.inverse_density[i];
+  }
+  return static_cast<float>(sum / (3 * 4 * std::numbers::pi * PresampledLight::kSize));
+}
+
+}  // namespace
+
+PresampledLight presample_light(const Environment& now, const Environment& before,
+                                std::uint64_t job_seed, std::uint32_t frame,
+                                const PresampledLightLayout& layout) {
+  PresampledLight presampled;
+  if (now.map->black()) return presampled;
+  const Rng rng({.job_seed = job_seed, .frame = frame, .pixel = 0}, PassId::presampled_light);
+
+  // Draw the directions, run by run.
+  const EnvironmentView now_view = view_of(now);
+  presampled.blocks.resize(PresampledLight::kNumBlocks);
+  const std::uint32_t num_blocks =
+      (layout.num_taken + PresampledLight::kBlock - 1) / PresampledLight::kBlock;
+  presampled.run_blocks =
+      layout.one_run ? PresampledLight::kNumBlocks
+                     : std::bit_ceil(std::clamp(num_blocks, 1u, PresampledLight::kMaxRunBlocks));
+  std::vector<OctDirection> directions = draw_directions(now, rng.bits(0, 0));
+  for (std::uint32_t first = 0; first < PresampledLight::kNumBlocks;
+       first += presampled.run_blocks) {
+    const auto run = std::span(directions)
+                         .subspan(first * PresampledLight::kBlock,
+                                  presampled.run_blocks * PresampledLight::kBlock);
+    sort_along_curve(run);
+    lay_out(run, first / presampled.run_blocks,
+            std::span(presampled.blocks).subspan(first, presampled.run_blocks));
+  }
+
+  // Look everything up at the lattice directions, with the look-up that the pixels use.
+  const EnvironmentView before_view = view_of(before);
+  presampled.has_before = layout.with_before;
+  for (PresampledLight::Block& block : presampled.blocks) {
+    kernels::decode_directions(block.code, block.x, block.y, block.z);
+    kernels::evaluate_environment(now_view, block.x, block.y, block.z, block.r, block.g, block.b,
+                                  block.density);
+    std::transform(std::begin(block.density), std::end(block.density), block.inverse_density,
+                   [](float density) { return density > 0 ? 1 / density : 0.0f; });
+    if (!presampled.has_before) continue;
+    float unused[PresampledLight::kBlock];
+    kernels::evaluate_environment(before_view, block.x, block.y, block.z, block.before_r,
+                                  block.before_g, block.before_b, unused);
+  }
+  presampled.mean_radiance = mean_radiance(presampled.blocks);
+  return presampled;
+}
+
+}  // namespace baton

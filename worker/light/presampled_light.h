@@ -1,0 +1,71 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "common/math/octahedral.h"
+#include "common/math/philox.h"
+#include "worker/scene/environment_view.h"
+
+namespace baton {
+
+/// Directions drawn from a frame's environment before its pixels are rendered; pixels pick
+/// candidates and proposals from it. One Owen-scrambled Sobol' sequence through the map's sampling
+/// table. Each entry's direction has density `density`, so a pixel that chooses entries
+/// independently of their contents stays unbiased; pixels that choose the same entries have
+/// correlated errors.
+///
+/// Every aligned run of `run_blocks` blocks is a net of the sequence, laid out along a Hilbert
+/// curve over the lattice of directions. Each place in a block stands for an eighth of the curve,
+/// which the run's blocks hold in order; neighbouring places stand for distant eighths, as in the
+/// van der Corput sequence, so that half a block still covers the map. A systematic choice
+/// (systematic-inl.h) goes through the places in the order of their eighths: it takes directions
+/// that are spread over the light, and so its shadow rays are stratified. In each run place 0 is
+/// another eighth, so that one who takes the same place of random blocks sees the whole map.
+struct PresampledLight {
+  static constexpr std::uint32_t kSize = 1u
+                                         << 13;  ///< entries: few enough to stay in a core's cache
+  static constexpr std::uint32_t kBlock = 8;     ///< entries that lie together in memory
+
+  /// Which eighth of the curve each place in the first run's blocks stands for; its own inverse.
+  static constexpr std::uint32_t kEighthOf[kBlock] = {0, 4, 2, 6, 1, 5, 3, 7};
+
+  static constexpr std::uint32_t kNumBlocks = kSize / kBlock;
+  /// Most blocks of a run, but where all are one: there are runs for each eighth of the curve.
+  static constexpr std::uint32_t kMaxRunBlocks = kNumBlocks / kBlock;
+
+  /// Eight entries, field by field: the unit of SIMD loads.
+  struct alignas(64) Block {
+    OctDirection code[kBlock];              ///< on the lattice of carried directions
+    float x[kBlock], y[kBlock], z[kBlock];  ///< the decoded directions
+    float r[kBlock], g[kBlock], b[kBlock];  ///< radiance of this frame
+    float density[kBlock];                  ///< 1/sr
+    float inverse_density[kBlock];          ///< sr; 0 where the density is
+    float before_r[kBlock], before_g[kBlock], before_b[kBlock];  ///< radiance of the frame before
+  };
+  std::vector<Block> blocks;     ///< (kNumBlocks); empty for a black map
+  bool has_before = false;       ///< whether before_* are set, as the layout asks; else they are 0
+  std::uint32_t run_blocks = 1;  ///< a power of two
+  float mean_radiance = 0;       ///< of the environment over the sphere, grey; by its entries
+
+  bool empty() const { return blocks.empty(); }
+  std::size_t size_bytes() const { return blocks.size() * sizeof(Block); }
+};
+
+/// How presampled light is laid out.
+struct PresampledLightLayout {
+  /// Entries that most pixels take: a run has so many, rounded up to a power of two.
+  std::uint32_t num_taken = 64;
+  /// All entries are one run: best where pixels differ in how many they take.
+  bool one_run = false;
+  /// For moves of carried samples, which are compared with the light of the frame before.
+  bool with_before = false;
+};
+
+/// The presampled light of one frame. before: the environment of the frame before (the same as
+/// `now` for the first frame).
+PresampledLight presample_light(const Environment& now, const Environment& before,
+                                std::uint64_t job_seed, std::uint32_t frame,
+                                const PresampledLightLayout& layout = {});
+
+}  // namespace baton

@@ -1,0 +1,117 @@
+#include "worker/method/reference/reference.h"
+
+#include <algorithm>
+#include <vector>
+
+namespace baton {
+namespace {
+
+/// Pairs traced together.
+constexpr std::int32_t kBatch = 64;
+
+/// One half of a pair: what it adds if its ray is free.
+struct Contribution {
+  Rgb value;
+  std::int32_t pair = 0;
+};
+
+struct Site {
+  const ShadingPoint& point;
+  const Material& material;
+};
+
+/// f cos L / (q_environment + q_bsdf): the balance heuristic with one sample of each kind.
+Rgb weighted_radiance(const Site& site, const Environment& environment, const Vec3& wi) {
+  if (!above_horizon(site.point, wi)) return {};
+  const EnvironmentMap::Texel light = environment.evaluate(wi);
+  const float density = light.density + bsdf_pdf_solid_angle(site.material, site.point, wi);
+  if (!(density > 0)) return {};
+  return evaluate_bsdf(site.material, site.point, wi) * Rgb{light.r, light.g, light.b} *
+         (dot(site.point.ns, wi) / density);
+}
+
+}  // namespace
+
+ReferenceEstimate ReferenceRenderer::render(std::span<const SurfaceHit> surfaces,
+                                            const Environment& environment,
+                                            std::int32_t num_samples, const RngKey& key,
+                                            ShadowRays& rays, std::uint64_t& rays_traced) const {
+  const Rng rng(key, PassId::reference);
+  std::array<double, 3> sum{};
+  double sum_lns = 0;
+  double sum_mean = 0;
+  double sum_mean_squared = 0;
+  if (environment.map->black()) return {};
+  std::vector<Contribution> contributions;
+  for (std::int32_t first = 0; first < num_samples; first += kBatch) {
+    const std::int32_t count = std::min(kBatch, num_samples - first);
+
+    // Draw the pairs of this batch.
+    rays.clear();
+    contributions.clear();
+    for (std::int32_t pair = 0; pair < count; ++pair) {
+      const auto step = static_cast<std::uint32_t>(first + pair);
+      const auto u = rng.uniforms(step, 0);
+      const auto v = rng.uniforms(step, 1);
+      const SurfaceHit& hit =
+          surfaces[static_cast<std::size_t>(u[0] * static_cast<float>(surfaces.size()))];
+      if (!hit.hit) continue;
+      const Site site{hit.point, materials_[hit.material]};
+      const Vec3 origin = hit.ray_origin;
+      for (const Vec3& wi : {environment.sample({u[1], u[2]}),
+                             sample_bsdf(site.material, site.point, {v[0], v[1], v[2]})}) {
+        const Rgb value = weighted_radiance(site, environment, wi);
+        if (!(mean(value) > 0)) continue;
+        rays.push(origin, wi);
+        contributions.push_back({value, pair});
+      }
+    }
+    accel_.occluded(rays);
+    rays_traced += rays.size();
+
+    // Add them up, pair by pair.
+    std::array<double, kBatch> mean_of_pair{};
+    for (std::size_t i = 0; i < contributions.size(); ++i) {
+      const Contribution& c = contributions[i];
+      sum_lns += mean(c.value);
+      if (rays.t_far[i] < 0) continue;
+      sum[0] += c.value.x;
+      sum[1] += c.value.y;
+      sum[2] += c.value.z;
+      mean_of_pair[static_cast<std::size_t>(c.pair)] += mean(c.value);
+    }
+    for (const double m : mean_of_pair) {
+      sum_mean += m;
+      sum_mean_squared += m * m;
+    }
+  }
+
+  const double n = num_samples;
+  const double mean_radiance = sum_mean / n;
+  const double variance =
+      std::max(sum_mean_squared / n - mean_radiance * mean_radiance, 0.0) / std::max(n - 1, 1.0);
+  return {.radiance = {static_cast<float>(sum[0] / n), static_cast<float>(sum[1] / n),
+                       static_cast<float>(sum[2] / n)},
+          .lns = static_cast<float>(sum_lns / n),
+          .visibility = sum_lns > 0 ? static_cast<float>(sum_mean / sum_lns) : 0.0f,
+          .mean_variance = static_cast<float>(variance)};
+}
+
+PixelDiagnostics ReferenceMethod::sample(const PixelInput& input, const PixelState& pixel,
+                                         SamplerScratch& /*scratch*/, RayWriter& rays) const {
+  PixelDiagnostics did{.target_evaluations = 2 * num_samples_};
+  ShadowRays own;
+  const ReferenceEstimate estimate =
+      ReferenceRenderer(*input.accel, materials_)
+          .render(input.hits, input.light.now, num_samples_, input.key, own, did.rays_traced);
+  rays.known = {.color = estimate.radiance,
+                .visibility = estimate.visibility,
+                .variance = estimate.mean_variance,
+                .blocked = estimate.visibility < 1};
+  SampleState& state = pixel.tile;
+  state.lns[pixel.index] = state.lns_fresh[pixel.index] = estimate.lns;
+  state.source[pixel.index] = PixelSource::fresh;
+  return did;
+}
+
+}  // namespace baton

@@ -1,0 +1,117 @@
+#include "worker/run/render_threads.h"
+
+#include <algorithm>
+
+namespace baton {
+
+RenderThreads::RenderThreads(int num_threads, Execute execute, Publish publish,
+                             std::function<void()> wake)
+    : execute_(std::move(execute)), publish_(std::move(publish)), wake_(std::move(wake)) {
+  for (int i = 0; i < num_threads; ++i) threads_.emplace_back([this] { work(); });
+  threads_.emplace_back([this] { publish_executed(); });
+}
+
+RenderThreads::~RenderThreads() {
+  {
+    const std::lock_guard lock(mutex_);
+    closing_ = true;
+    for (Slot& slot : slots_) slot.stop.request_stop();
+  }
+  changed_.notify_all();
+  executed_any_.notify_all();
+  for (std::thread& thread : threads_) thread.join();
+}
+
+void RenderThreads::submit(PooledTask task) {
+  {
+    const std::lock_guard lock(mutex_);
+    slots_.push_back({std::move(task), {}, false});
+  }
+  changed_.notify_one();
+}
+
+void RenderThreads::stop(const LeaseId& lease) {
+  const std::lock_guard lock(mutex_);
+  for (Slot& slot : slots_) {
+    if (slot.task.lease == lease) slot.stop.request_stop();
+  }
+}
+
+void RenderThreads::drop_queued() {
+  const std::lock_guard lock(mutex_);
+  for (auto slot = slots_.begin(); slot != slots_.end();) {
+    if (slot->running) {
+      ++slot;
+      continue;
+    }
+    // A copy: GCC 12 sees unset members in a moved temporary.
+    const EndedTask dropped{slot->task.lease,
+                            Error{ErrorKind::cancelled, "dropped before it began"}};
+    ended_.push_back(dropped);
+    slot = slots_.erase(slot);
+  }
+}
+
+std::vector<LeaseId> RenderThreads::take_executed() {
+  const std::lock_guard lock(mutex_);
+  return std::exchange(left_thread_, {});
+}
+
+std::vector<EndedTask> RenderThreads::collect() {
+  const std::lock_guard lock(mutex_);
+  return std::exchange(ended_, {});
+}
+
+void RenderThreads::work() {
+  std::unique_lock lock(mutex_);
+  while (true) {
+    // Take the oldest task that nobody has begun.
+    auto slot = slots_.end();
+    changed_.wait(lock, [&] {
+      slot = std::find_if(slots_.begin(), slots_.end(), [](const Slot& s) { return !s.running; });
+      return closing_ || slot != slots_.end();
+    });
+    if (closing_) return;
+    slot->running = true;
+
+    // Run it without the lock; list nodes do not move.
+    lock.unlock();
+    const std::stop_token stop = slot->stop.get_token();
+    Result<TaskOutput> result = stop.stop_requested()
+                                    ? Error{ErrorKind::cancelled, "stopped before it began"}
+                                    : execute_(slot->task, stop);
+    lock.lock();
+    left_thread_.push_back(slot->task.lease);
+    executed_.tasks.push_back(std::move(slot->task));
+    executed_.results.push_back(std::move(result));
+    slots_.erase(slot);
+    executed_any_.notify_one();
+    wake_();
+  }
+}
+
+void RenderThreads::publish_executed() {
+  std::unique_lock lock(mutex_);
+  while (true) {
+    executed_any_.wait(lock, [&] { return closing_ || !executed_.tasks.empty(); });
+    if (closing_) return;
+    Executed batch = std::exchange(executed_, {});
+
+    // One wait for all that went well, without the lock.
+    lock.unlock();
+    std::vector<PooledTask> good;
+    for (std::size_t i = 0; i < batch.tasks.size(); ++i) {
+      if (batch.results[i]) good.push_back(batch.tasks[i]);
+    }
+    const Status published = good.empty() ? Status() : publish_(good);
+    lock.lock();
+    for (std::size_t i = 0; i < batch.tasks.size(); ++i) {
+      Result<TaskOutput>& result = batch.results[i];
+      if (result && !published) result = published.error();
+      ended_.push_back({batch.tasks[i].lease, std::move(result)});
+    }
+    wake_();
+  }
+}
+
+}  // namespace baton

@@ -1,0 +1,88 @@
+#pragma once
+
+#include <condition_variable>
+#include <functional>
+#include <list>
+#include <memory>
+#include <mutex>
+#include <span>
+#include <stop_token>
+#include <thread>
+#include <vector>
+
+#include "worker/run/execute.h"
+
+namespace baton {
+
+/// What a render thread needs to run one task without asking anybody.
+struct PooledTask {
+  LeaseId lease;
+  std::vector<BlobRef> inputs;
+  std::shared_ptr<JobEntry> job;
+  std::shared_ptr<BlobStore> store;
+};
+
+struct EndedTask {
+  LeaseId lease;
+  Result<TaskOutput> result;
+};
+
+/// The render threads, and one more that waits for the disk. The control thread submits, stops and
+/// collects; it never renders. Each render thread takes the oldest queued task, runs it with a stop
+/// token of its own and goes on with the next; the publisher makes durable what has been executed,
+/// all that came up during one wait by the next, and leaves the results for `collect`. The queue is
+/// bounded by the session, which asks for few more leases than there are threads.
+class RenderThreads {
+ public:
+  using Execute = std::function<Result<TaskOutput>(const PooledTask& task, std::stop_token stop)>;
+  /// Makes the outputs of tasks that went well durable; an error becomes that of each of them.
+  using Publish = std::function<Status(std::span<const PooledTask> tasks)>;
+
+  /// `wake` is called on a thread of the pool whenever there is something to take or to collect.
+  RenderThreads(int num_threads, Execute execute, Publish publish, std::function<void()> wake);
+  /// Stops every task and joins.
+  ~RenderThreads();
+  RenderThreads(const RenderThreads&) = delete;
+  RenderThreads& operator=(const RenderThreads&) = delete;
+
+  void submit(PooledTask task);
+  /// Asks a queued or running task to end soon; its result will be ErrorKind::cancelled unless it
+  /// was about to end.
+  void stop(const LeaseId& lease);
+  /// Ends every task that no thread has begun as cancelled.
+  void drop_queued();
+  /// Tasks that have left their thread since the last call; each will end.
+  std::vector<LeaseId> take_executed();
+  /// Results since the last call, in the order in which they ended.
+  std::vector<EndedTask> collect();
+
+ private:
+  struct Slot {
+    PooledTask task;
+    std::stop_source stop;
+    bool running = false;
+  };
+
+  struct Executed {
+    std::vector<PooledTask> tasks;
+    std::vector<Result<TaskOutput>> results;  ///< of each
+  };
+
+  void work();
+  void publish_executed();
+
+  const Execute execute_;
+  const Publish publish_;
+  const std::function<void()> wake_;
+  std::mutex mutex_;
+  std::condition_variable changed_;       ///< for the render threads
+  std::condition_variable executed_any_;  ///< for the publisher
+  std::list<Slot> slots_;                 ///< oldest first; queued and running
+  Executed executed_;                     ///< not yet durable
+  std::vector<LeaseId> left_thread_;
+  std::vector<EndedTask> ended_;
+  bool closing_ = false;
+  std::vector<std::thread> threads_;
+};
+
+}  // namespace baton
