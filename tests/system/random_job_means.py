@@ -1,7 +1,7 @@
 """Random jobs of unbiased methods have the brightness that brute force finds.
 
 Hypothesis: the mean of the picture (all pixels, mean of R, G, B) has the same expectation under a method as under
-`reference`. Pixels of one run read the same light pool and are correlated, so a run is one observation: both sides are
+`reference`. Pixels of one run read the same presampled light and are correlated, so a run is one observation: both sides are
 rendered with 8 seeds and compared by Welch's t-test [Welch 1947], its degrees of freedom taken as the fewest that they
 can be, 7. What is significant at 0.2 % (two-sided) is rendered again with 24 fresh seeds a side and must be
 significant there, too. A job without a fault is thus reported with probability 4e-6, one in 10,000 jobs, of which about
