@@ -183,7 +183,8 @@ struct EnvironmentSpec {
   int max_width =
       0;  ///< wider maps are reduced to so many columns, [0, limits::kMaxEnvironmentSide]; 0: none
   Vec3 rotation_axis{0, 1, 0};
-  double rotation_start_deg = 0;  ///< at the first frame of the job
+  std::int32_t rotation_start_frame = 1;
+  double rotation_start_deg = 0;  ///< at that frame, whichever frames the job has
   double rotation_deg_per_frame = 0;
 
   bool operator==(const EnvironmentSpec&) const = default;

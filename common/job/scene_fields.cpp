@@ -167,6 +167,7 @@ void fields(JobArchive& a, EnvironmentSpec& environment, const std::vector<int>&
   a.object("rotation", [&] {
     a.vector("axis", environment.rotation_axis, kCoordinateRange);
     if (length(environment.rotation_axis) == 0) a.fault("axis", "a direction", "[0, 0, 0]");
+    a.integer("startFrame", environment.rotation_start_frame, 0, limits::kMaxFrameNumber);
     a.number("startDeg", environment.rotation_start_deg, kAngleRange);
     a.number("degPerFrame", environment.rotation_deg_per_frame, kAngleRange);
   });

@@ -10,8 +10,7 @@
 namespace baton {
 namespace {
 
-EnvironmentFrame environment_at(const EnvironmentSpec& environment, int frame_number,
-                                int first_frame_number) {
+EnvironmentFrame environment_at(const EnvironmentSpec& environment, int frame_number) {
   const std::vector<EnvironmentKey>& keys = environment.keys;
   EnvironmentFrame result;
 
@@ -29,7 +28,7 @@ EnvironmentFrame environment_at(const EnvironmentSpec& environment, int frame_nu
   }
 
   const double degrees = environment.rotation_start_deg +
-                         environment.rotation_deg_per_frame * (frame_number - first_frame_number);
+                         environment.rotation_deg_per_frame * (frame_number - environment.rotation_start_frame);
   if (degrees != 0) result.rotation = rotation_about(environment.rotation_axis, degrees);
   return result;
 }
@@ -43,7 +42,7 @@ std::vector<FrameSpec> expand_sequence(const JobSpec& job) {
     frames.push_back(
         {.index = static_cast<std::int32_t>(i),
          .number = job.frames[i],
-         .environment = environment_at(job.environment, job.frames[i], job.frames.front())});
+         .environment = environment_at(job.environment, job.frames[i])});
   }
   return frames;
 }

@@ -17,7 +17,8 @@ constexpr std::uint64_t kReferenceSeed = 2'000'000'000;
 
 /// The job with at most kPilotPixels a picture, for some of its frames.
 JobSpec small_job(const JobSpec& job, std::vector<int> frames) {
-  JobSpec small = job_window(job, std::move(frames));
+  JobSpec small = job;
+  small.frames = std::move(frames);
   const double scale =
       std::min(1.0, std::sqrt(kPilotPixels / (1.0 * job.image.width * job.image.height)));
   small.image.width = std::max(1, static_cast<int>(std::lround(job.image.width * scale)));
@@ -49,7 +50,8 @@ StudyScene pilot_scene(const JobSpec& window) {
   scene.crop = {0, 0, window.image.width, window.image.height};
   for (std::size_t half = 0; half < 2; ++half) {
     JobSpec& reference = scene.reference[half];
-    reference = job_window(window, scene.frames);
+    reference = window;
+    reference.frames = scene.frames;
     reference.name = "pilot reference";
     reference.sampling = {};
     reference.sampling.method = Method::reference;

@@ -94,7 +94,8 @@ void prepare_output(JobSpec& job) {
 
 /// The brute-force twin of a job for the given frames.
 JobSpec reference_job(const JobSpec& job, int samples, const std::vector<int>& frames, int half) {
-  JobSpec reference = job_window(job, frames);
+  JobSpec reference = job;
+  reference.frames = frames;
   reference.name = "reference";
   reference.sampling = {};
   reference.sampling.method = Method::reference;
@@ -200,16 +201,6 @@ void read_scene(StudyObject& object, const Shared& shared, Study& study, StudyFa
 }
 
 }  // namespace
-
-JobSpec job_window(const JobSpec& job, std::vector<int> frames) {
-  JobSpec window = job;
-  window.environment.rotation_start_deg =
-      std::remainder(job.environment.rotation_start_deg + job.environment.rotation_deg_per_frame *
-                                                              (frames.front() - job.frames.front()),
-                     360.0);
-  window.frames = std::move(frames);
-  return window;
-}
 
 Result<Study> parse_study(std::string_view text, const std::string& name,
                           const fs::path& base_directory) {

@@ -14,10 +14,6 @@ namespace baton {
 /// Of every job of a study.
 inline constexpr const char* kFramePattern = "frame.####.exr";
 
-/// The job for some of its frames, which are not empty: turning goes on as if it had begun with the
-/// job's first.
-JobSpec job_window(const JobSpec& job, std::vector<int> frames);
-
 /// A scene of a study, with the two halves of its reference: equal jobs with different seeds, so
 /// that their difference tells what the reference can resolve.
 struct StudyScene {

@@ -49,12 +49,8 @@ inline Estimate repeat(JobSpec job, int runs) {
   return e;
 }
 
-/// Leaves the last frame alone, with the sky as it is then.
-inline void keep_last_frame(JobSpec& job) {
-  job.environment.rotation_start_deg +=
-      job.environment.rotation_deg_per_frame * (job.frames.back() - job.frames.front());
-  job.frames = {job.frames.back()};
-}
+/// Leaves the last frame alone.
+inline void keep_last_frame(JobSpec& job) { job.frames = {job.frames.back()}; }
 
 /// The last frame by brute force, with its own standard errors.
 inline Estimate judge(JobSpec job, int samples) {

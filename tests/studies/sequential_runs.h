@@ -85,10 +85,8 @@ inline std::vector<FrameResult> render(const JobSpec& job) {
   return render(job, value_of(load_shared_assets(job)));
 }
 
-/// The job with only the frame at `index`, under the same light.
+/// The job with only the frame at `index`.
 inline JobSpec frame_of(JobSpec job, std::size_t index) {
-  job.environment.rotation_start_deg +=
-      static_cast<double>(index) * job.environment.rotation_deg_per_frame;
   job.frames = {job.frames[index]};
   return job;
 }

@@ -139,8 +139,6 @@ TEST(AutoChoice, IsWrittenIntoTheJob) {
 TEST(PilotStudy, LooksAtTheStartAndTheEndOfALongJob) {
   JobSpec job = automatic_job();
   job.image = {.width = 640, .height = 360};
-  job.environment.rotation_start_deg = 10;
-  job.environment.rotation_deg_per_frame = 0.5;
   job.frames.clear();
   for (int frame = 1; frame <= 48; ++frame) job.frames.push_back(frame);
   const Study study = pilot_study(job, auto_candidates(job));
@@ -149,7 +147,6 @@ TEST(PilotStudy, LooksAtTheStartAndTheEndOfALongJob) {
   EXPECT_THAT(study.scenes[1].frames, ElementsAre(47, 48));
   const JobSpec& end = study.scenes[1].reference[0];
   EXPECT_THAT(end.frames, ElementsAre(47, 48));
-  EXPECT_EQ(end.environment.rotation_start_deg, 10 + 46 * 0.5);
   EXPECT_EQ(end.image.width, 64);
   EXPECT_EQ(end.image.height, 36);
 

@@ -1,0 +1,36 @@
+#include "common/job/sequence.h"
+
+#include <gtest/gtest.h>
+
+namespace baton {
+namespace {
+
+JobSpec turning(std::vector<int> frames) {
+  JobSpec job;
+  job.frames = std::move(frames);
+  job.environment.keys = {{1, "a.exr"}, {20, "b.exr"}};
+  job.environment.interpolate = true;
+  job.environment.rotation_start_deg = 10;
+  job.environment.rotation_deg_per_frame = 15;
+  return job;
+}
+
+TEST(Sequence, LightsAFrameAlikeInEveryJobThatHasIt) {
+  std::vector<int> all;
+  for (int frame = 1; frame <= 24; ++frame) all.push_back(frame);
+  const EnvironmentFrame of_all = expand_sequence(turning(all))[11].environment;
+  EXPECT_EQ(of_all, expand_sequence(turning({12}))[0].environment);
+  EXPECT_EQ(of_all, expand_sequence(turning({3, 12, 20}))[1].environment);
+  EXPECT_EQ(of_all.rotation, rotation_about({0, 1, 0}, 10 + 11 * 15));
+}
+
+TEST(Sequence, TurnsFromTheFrameThatIsSaid) {
+  JobSpec job = turning({1001, 1003});
+  job.environment.rotation_start_frame = 1001;
+  const std::vector<FrameSpec> frames = expand_sequence(job);
+  EXPECT_EQ(frames[0].environment.rotation, rotation_about({0, 1, 0}, 10));
+  EXPECT_EQ(frames[1].environment.rotation, rotation_about({0, 1, 0}, 40));
+}
+
+}  // namespace
+}  // namespace baton
