@@ -27,8 +27,9 @@ EnvironmentFrame environment_at(const EnvironmentSpec& environment, int frame_nu
     if (result.mix > 0) result.map_b = static_cast<std::int32_t>(next - keys.begin());
   }
 
-  const double degrees = environment.rotation_start_deg +
-                         environment.rotation_deg_per_frame * (frame_number - environment.rotation_start_frame);
+  const double degrees =
+      environment.rotation_start_deg +
+      environment.rotation_deg_per_frame * (frame_number - environment.rotation_start_frame);
   if (degrees != 0) result.rotation = rotation_about(environment.rotation_axis, degrees);
   return result;
 }
@@ -39,10 +40,9 @@ std::vector<FrameSpec> expand_sequence(const JobSpec& job) {
   std::vector<FrameSpec> frames;
   frames.reserve(job.frames.size());
   for (std::size_t i = 0; i < job.frames.size(); ++i) {
-    frames.push_back(
-        {.index = static_cast<std::int32_t>(i),
-         .number = job.frames[i],
-         .environment = environment_at(job.environment, job.frames[i])});
+    frames.push_back({.index = static_cast<std::int32_t>(i),
+                      .number = job.frames[i],
+                      .environment = environment_at(job.environment, job.frames[i])});
   }
   return frames;
 }

@@ -1,5 +1,4 @@
 #include "worker/method/restir/restir_sampler.h"
-#include "worker/light/carried_light.h"
 
 #include <algorithm>
 #include <array>
@@ -7,6 +6,7 @@
 
 #include "common/base/check.h"
 #include "common/math/hilbert.h"
+#include "worker/light/carried_light.h"
 
 namespace baton {
 namespace {

@@ -1,7 +1,8 @@
 #include "worker/method/sequential/sequential_sampler.h"
-#include "worker/method/sequential/sequential_kernels.h"
 
 #include <cmath>
+
+#include "worker/method/sequential/sequential_kernels.h"
 
 namespace baton {
 namespace {

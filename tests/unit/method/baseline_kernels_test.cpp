@@ -40,7 +40,7 @@ SiteBlock pixel(float tilt) {
   return sites;
 }
 
-class RivalKernels : public OnInstructionSet {
+class BaselineKernels : public OnInstructionSet {
  protected:
   void SetUp() override {
     OnInstructionSet::SetUp();
@@ -73,11 +73,11 @@ class RivalKernels : public OnInstructionSet {
   const std::unique_ptr<kernels::RestirPoints> points_ = std::make_unique<kernels::RestirPoints>();
 };
 
-INSTANTIATE_TEST_SUITE_P(Sets, RivalKernels, testing::ValuesIn(instruction_sets()),
+INSTANTIATE_TEST_SUITE_P(Sets, BaselineKernels, testing::ValuesIn(instruction_sets()),
                          instruction_set_name);
 
 // Two carried sets: of the same surfaces, and of others of which each two heirs share.
-TEST_P(RivalKernels, PointsAreEvaluatedInTheirRangeAlone) {
+TEST_P(BaselineKernels, PointsAreEvaluatedInTheirRangeAlone) {
   const SiteBlock sites = pixel(0.1f);
   OldSurfaces other{.sites = pixel(0.5f)};
   other.log_share.fill(-std::log(2.0f));
@@ -109,7 +109,7 @@ TEST_P(RivalKernels, PointsAreEvaluatedInTheirRangeAlone) {
 }
 
 // What was drawn before a map turned is judged where it lay then: by light and surfaces of then.
-TEST_P(RivalKernels, PointsThatTurnedAreSeenFromWhereTheyCame) {
+TEST_P(BaselineKernels, PointsThatTurnedAreSeenFromWhereTheyCame) {
   const SiteBlock sites = pixel(0.1f);
   OldSurfaces other{.sites = pixel(0.5f)};
   other.log_share.fill(-std::log(2.0f));
@@ -131,7 +131,7 @@ TEST_P(RivalKernels, PointsThatTurnedAreSeenFromWhereTheyCame) {
   }
 }
 
-TEST_P(RivalKernels, DirectionsTurnInTheirRangeAlone) {
+TEST_P(BaselineKernels, DirectionsTurnInTheirRangeAlone) {
   const Mat3 turn = rotation_about({0.3f, 1, -0.2f}, 7);
   constexpr std::size_t kFirst = 5, kLast = 5 + 83;
   kernels::turn_points(turn, kFirst, kLast, *points_);
@@ -162,7 +162,7 @@ TEST(TurnBetween, KnowsHowABilinearMapTurnedUnlessItIsNextToNothing) {
 }
 
 // The sum of the weights is theirs alone, however the two kinds of candidates fill their vectors.
-TEST_P(RivalKernels, CandidatesOfAnyNumberIgnoreWhatTheSetHeld) {
+TEST_P(BaselineKernels, CandidatesOfAnyNumberIgnoreWhatTheSetHeld) {
   const SiteBlock sites = pixel(0.1f);
   const Rng rng({.job_seed = 5}, PassId::candidates);
   const auto set = std::make_unique<kernels::CandidateSet>();
@@ -183,7 +183,7 @@ TEST_P(RivalKernels, CandidatesOfAnyNumberIgnoreWhatTheSetHeld) {
 }
 
 // Without shadows the ratio estimator is the sum of all candidates, per channel.
-TEST_P(RivalKernels, FreeRaysOfTheRatioBringAllCandidates) {
+TEST_P(BaselineKernels, FreeRaysOfTheRatioBringAllCandidates) {
   const SiteBlock sites = pixel(0.1f);
   const kernels::CandidateCounts counts{.from_light = 40, .from_bsdf = 24, .lobe_only = true};
   const Rng rng({.job_seed = 5}, PassId::candidates);
