@@ -173,9 +173,10 @@ def write_job(case, split, folder, name):
                ("output", "directory", name), ("output", "compression", split.get("compression")),
                ("state", "keep", "all" if name == "first" else None)]
     for section, key, value in changes:
-        # A section that was made wrong on purpose stays so.
-        if value is not None and isinstance(job.setdefault(section, {}), dict):
-            job[section][key] = value
+        # What was made wrong on purpose stays so.
+        place = job.setdefault(section, {})
+        if value is not None and isinstance(place, dict) and not ("spoiled" in case and key in place):
+            place[key] = value
     path = folder / f"{name}.json"
     path.write_text(json.dumps(job, indent=1), encoding="utf-8")
     return path
