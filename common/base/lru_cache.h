@@ -1,8 +1,8 @@
 #pragma once
 
-#include <algorithm>
 #include <cstddef>
 #include <list>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <utility>
@@ -10,8 +10,7 @@
 namespace baton {
 
 /// Values by key, as many as fit into a budget: the least recently used go first, and the one used
-/// last always stays. Whoever holds a value keeps it alive. A search is linear: for hundreds of
-/// large values. Any number of threads.
+/// last always stays. Whoever holds a value keeps it alive. Any number of threads. Key: ordered.
 template <class Key, class Value>
 class LruCache {
  public:
@@ -31,9 +30,11 @@ class LruCache {
     const std::lock_guard lock(mutex_);
     if (ValuePtr there = use(key)) return there;
     entries_.emplace_front(key, value);
+    index_.emplace(key, entries_.begin());
     size_ += size_of_(*value);
     while (size_ > budget_ && entries_.size() > 1) {
       size_ -= size_of_(*entries_.back().second);
+      index_.erase(entries_.back().first);
       entries_.pop_back();
     }
     return value;
@@ -46,17 +47,18 @@ class LruCache {
 
  private:
   ValuePtr use(const Key& key) {
-    const auto found = std::find_if(entries_.begin(), entries_.end(),
-                                    [&](const auto& entry) { return entry.first == key; });
-    if (found == entries_.end()) return nullptr;
-    entries_.splice(entries_.begin(), entries_, found);
-    return found->second;
+    const auto found = index_.find(key);
+    if (found == index_.end()) return nullptr;
+    entries_.splice(entries_.begin(), entries_, found->second);
+    return entries_.front().second;
   }
 
   const std::size_t budget_;
   const SizeOf size_of_;
   mutable std::mutex mutex_;
-  std::list<std::pair<Key, ValuePtr>> entries_;  ///< most recently used in front
+  using Entries = std::list<std::pair<Key, ValuePtr>>;
+  Entries entries_;  ///< most recently used in front
+  std::map<Key, typename Entries::iterator> index_;
   std::size_t size_ = 0;
 };
 

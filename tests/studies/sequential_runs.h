@@ -9,12 +9,15 @@
 #include <cstdlib>
 #include <functional>
 #include <memory>
+#include <numeric>
 #include <span>
 #include <string_view>
 #include <utility>
 #include <vector>
 
 #include "common/job/job_json.h"
+#include "common/math/philox.h"
+#include "jobs/study/intervals.h"
 #include "worker/pass/render_context.h"
 #include "worker/pass/shared_assets.h"
 
@@ -37,6 +40,26 @@ struct FrameResult {
 inline std::span<const float> plane(const FilmTile& film, std::string_view name) {
   BATON_CHECK(film.find(name) != nullptr);
   return {film.find(name), film.num_pixels()};
+}
+
+/// of(seeds), and its 95 % interval by resampling the seeds, for everything that it looks at alike.
+/// of: takes 0-based seeds, as often as they were drawn.
+template <class Of>
+Interval over_seeds(std::size_t num_seeds, const Of& of) {
+  constexpr std::uint32_t kResamples = 1000;
+  std::vector<std::size_t> seeds(num_seeds);
+  std::iota(seeds.begin(), seeds.end(), std::size_t{0});
+  const double value = of(seeds);
+  std::vector<double> resampled;
+  for (std::uint32_t r = 0; r < kResamples; ++r) {
+    for (std::uint32_t i = 0; i < num_seeds; ++i) {
+      const std::uint32_t bits = Philox4x32::block({i, r, 0, 0}, 0)[0];
+      seeds[i] = static_cast<std::size_t>((std::uint64_t{bits} * num_seeds) >> 32);
+    }
+    resampled.push_back(of(seeds));
+  }
+  std::sort(resampled.begin(), resampled.end());
+  return {resampled[kResamples / 40], value, resampled[kResamples - 1 - kResamples / 40]};
 }
 
 /// Ends the program with what went wrong.

@@ -4,10 +4,8 @@
 // in one process.
 //
 // Usage: study_pool_tuning STUDY.json [SEEDS] > CSV; the study's cells with method `pool`
-#include <numeric>
 #include <string>
 
-#include "common/math/philox.h"
 #include "jobs/study/study.h"
 #include "tests/studies/sequential_runs.h"
 #include "worker/method/pool/pool_method.h"
@@ -15,8 +13,6 @@
 
 namespace baton {
 namespace {
-
-constexpr std::uint32_t kResamples = 1000;
 
 struct Number {
   const char* name;
@@ -96,24 +92,15 @@ double efficiency(const Variant& variant, const Variant& usual,
 }
 
 void print_row(const std::string& scene, const Variant& variant, const Variant& usual) {
-  std::vector<std::size_t> seeds(variant.seconds.size());
-  std::iota(seeds.begin(), seeds.end(), std::size_t{0});
-  std::vector<double> resampled;
-  std::vector<std::size_t> some(seeds.size());
-  for (std::uint32_t r = 0; r < kResamples; ++r) {
-    for (std::uint32_t i = 0; i < some.size(); ++i) {
-      const std::uint32_t bits = Philox4x32::block({i, r, 0, 0}, 0)[0];
-      some[i] = static_cast<std::size_t>((std::uint64_t{bits} * seeds.size()) >> 32);
-    }
-    resampled.push_back(efficiency(variant, usual, some));
-  }
-  std::sort(resampled.begin(), resampled.end());
+  const auto gain = [&](const std::vector<std::size_t>& seeds) {
+    return efficiency(variant, usual, seeds);
+  };
+  const Interval interval = over_seeds(variant.seconds.size(), gain);
+  const auto mean = [](const std::vector<double>& values) { return mean_interval(values).value; };
   fmt::print("{},{},{:.3f},{:.3f},{:.3f},{:.3f},{:.3f},{:.1f}\n", scene, variant.name,
-             efficiency(variant, usual, seeds), resampled[kResamples / 40],
-             resampled[kResamples - 1 - kResamples / 40],
-             mean_of(variant.squared_error, seeds) / mean_of(usual.squared_error, seeds),
-             mean_of(variant.seconds, seeds) / mean_of(usual.seconds, seeds),
-             mean_of(variant.below_zero, seeds));
+             interval.value, interval.low, interval.high,
+             mean(variant.squared_error) / mean(usual.squared_error),
+             mean(variant.seconds) / mean(usual.seconds), mean(variant.below_zero));
 }
 
 int run(const std::string& path, int num_seeds) {

@@ -12,7 +12,6 @@
 #include <numeric>
 #include <string>
 
-#include "common/math/philox.h"
 #include "tests/studies/sequential_runs.h"
 #include "worker/scene/settle_motion.h"
 
@@ -20,7 +19,6 @@ namespace baton {
 namespace {
 
 constexpr std::array kCandidates{16, 32, 64, 128, 256, 512, 1024};
-constexpr std::uint32_t kResamples = 1000;
 
 /// A variant with what its runs measured.
 struct Variant {
@@ -109,21 +107,11 @@ void print_row(const std::string& frames, const std::vector<Variant>& curve, con
     fmt::print(",,,\n");
     return;
   }
-
-  // Resample the seeds, of all variants alike.
-  std::vector<double> resampled;
-  std::vector<std::size_t> some(seeds.size());
-  for (std::uint32_t r = 0; r < kResamples; ++r) {
-    for (std::uint32_t i = 0; i < some.size(); ++i) {
-      const std::uint32_t bits = Philox4x32::block({i, r, 0, 0}, 0)[0];
-      some[i] = static_cast<std::size_t>((std::uint64_t{bits} * seeds.size()) >> 32);
-    }
-    resampled.push_back(speed_up(curve, variant, some, first, end).value);
-  }
-  std::sort(resampled.begin(), resampled.end());
+  const Interval interval = over_seeds(seeds.size(), [&](const std::vector<std::size_t>& some) {
+    return speed_up(curve, variant, some, first, end).value;
+  });
   const SpeedUp all = speed_up(curve, variant, seeds, first, end);
-  fmt::print("{:.3f},{:.3f},{:.3f},{}\n", all.value, resampled[kResamples / 40],
-             resampled[kResamples - 1 - kResamples / 40],
+  fmt::print("{:.3f},{:.3f},{:.3f},{}\n", interval.value, interval.low, interval.high,
              all.bound < 0   ? "at most"
              : all.bound > 0 ? "at least"
                              : "");

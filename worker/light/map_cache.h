@@ -31,7 +31,7 @@ class MapCache {
     int max_width;
     bool compensate;
 
-    bool operator==(const Key&) const = default;
+    auto operator<=>(const Key&) const = default;
   };
 
   std::mutex reading_;

@@ -1,4 +1,5 @@
 // How each method is made.
+#include <algorithm>
 #include <cmath>
 #include <iterator>
 
@@ -61,22 +62,24 @@ SamplerPtr make_sequential(const SamplingSpec& s) {
 }
 
 struct Maker {
+  Method name;
   MethodPtr (*method)(const JobSpec&, Materials);
   SamplerPtr (*sampler)(const SamplingSpec&);  ///< of methods that keep samples
 };
 /// In the order of the enumeration.
 constexpr Maker kMakers[] = {
-    {make_reference, nullptr},
-    {of_job<WeightedMethod>, make_environment},
-    {of_job<WeightedMethod>, make_brdf},
-    {of_job<WeightedMethod>, make_mis},
-    {of_job<WeightedMethod>, make_bidirectional},
-    {of_job<SequentialMethod>, make_sequential},
-    {of_sampling<PoolMethod>, nullptr},
-    {of_sampling<RatioMethod>, nullptr},
-    {of_job<RestirMethod>, make_restir},
+    {Method::reference, make_reference, nullptr},
+    {Method::environment, of_job<WeightedMethod>, make_environment},
+    {Method::brdf, of_job<WeightedMethod>, make_brdf},
+    {Method::mis, of_job<WeightedMethod>, make_mis},
+    {Method::bidirectional, of_job<WeightedMethod>, make_bidirectional},
+    {Method::sequential, of_job<SequentialMethod>, make_sequential},
+    {Method::pool, of_sampling<PoolMethod>, nullptr},
+    {Method::ratio, of_sampling<RatioMethod>, nullptr},
+    {Method::restir, of_job<RestirMethod>, make_restir},
 };
 static_assert(std::size(kMakers) == static_cast<std::size_t>(Method::automatic));
+static_assert(std::ranges::is_sorted(kMakers, {}, &Maker::name));
 
 const Maker& maker(Method method) { return kMakers[static_cast<std::size_t>(method)]; }
 

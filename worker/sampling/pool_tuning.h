@@ -17,8 +17,8 @@ struct PoolTuning {
   float least_deviation = 0.05f;
   /// The same where rays count what they bring.
   float least_contribution = 0.2f;
-  /// V^ is the control variate where the expected light is so many times its deviation. Less often
-  /// would be worse, more often leaves more values below zero.
+  /// V^ is the control variate where the expected light is so many times its deviation. Later
+  /// loses; earlier, a blocked ray may leave a value below zero more often.
   float control_from = 2;
   /// Deviation beside noise_scale() of the light that N rays are for.
   float usual_deviation = 0.025f;
