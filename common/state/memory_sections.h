@@ -10,7 +10,8 @@ namespace baton {
 
 /// The sections of a state file that hold what pixels remember (FORMAT.md).
 inline constexpr SectionTag kMemorySummary{'V', 'I', 'S', 'S'};
-inline constexpr SectionTag kMemoryGrid{'V', 'I', 'S', 'G'};
+inline constexpr SectionTag kMemoryMasks{'V', 'I', 'S', 'M'};
+inline constexpr SectionTag kMemoryCells{'V', 'I', 'S', 'C'};
 inline constexpr SectionTag kMemoryLightNoise{'N', 'O', 'I', 'S'};
 inline constexpr SectionTag kMemoryLobeNoise{'N', 'O', 'I', 'L'};
 /// Sizes of their elements in bytes.
@@ -18,7 +19,7 @@ inline constexpr std::size_t kMemoryCellStride = sizeof(VisibilityCell);
 inline constexpr std::size_t kMemorySummaryStride = 2 * kMemoryCellStride;
 
 struct MemoryPayloads {
-  Bytes summaries, grids, light_noise, lobe_noise;
+  Bytes summaries, masks, cells, light_noise, lobe_noise;
 };
 
 /// Summary and noise of each of `pixels` (0-based, ascending), and the bins of those whose rays

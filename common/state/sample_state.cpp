@@ -24,10 +24,20 @@ constexpr SectionTag kWeight{'W', 'G', 'T', '_'};
 constexpr SectionTag kSite{'S', 'I', 'T', 'E'};
 constexpr SectionTag kPopulations{'P', 'O', 'P', 'S'};
 constexpr SectionTag kConfidence{'C', 'O', 'N', 'F'};
-constexpr std::array kTags{
-    kMeta,      kSource,      kLns,           kLnsFresh,   kDirection,        kWeight,
-    kSite,      kPopulations, kMemorySummary, kMemoryGrid, kMemoryLightNoise, kMemoryLobeNoise,
-    kConfidence};
+constexpr std::array kTags{kMeta,
+                           kSource,
+                           kLns,
+                           kLnsFresh,
+                           kDirection,
+                           kWeight,
+                           kSite,
+                           kPopulations,
+                           kMemorySummary,
+                           kMemoryMasks,
+                           kMemoryCells,
+                           kMemoryLightNoise,
+                           kMemoryLobeNoise,
+                           kConfidence};
 
 constexpr std::size_t kMetaBytes = 2 * sizeof(std::uint64_t) + 7 * sizeof(std::int32_t);
 /// How far the sum of a pixel's weights may be from 1.
@@ -239,6 +249,14 @@ Status decode_sources(const SectionFile& file, const std::string& name, SampleSt
 
 }  // namespace
 
+std::size_t SampleState::size_bytes() const {
+  std::size_t bytes = num_pixels() * bytes_per_pixel(static_cast<std::size_t>(num_particles),
+                                                     static_cast<std::size_t>(num_populations),
+                                                     false, !confidence.empty());
+  for (const PixelMemory& m : memory) bytes += sizeof(m) + m.bins.size_bytes();
+  return bytes;
+}
+
 void SampleState::resize(const PixelRect& new_rect, std::int32_t new_num_particles,
                          std::int32_t new_num_populations) {
   BATON_CHECK(new_rect.width() > 0 && new_rect.height() > 0 && new_num_particles >= 0);
@@ -297,7 +315,9 @@ Bytes encode_state(const SampleState& state) {
   if (!state.memory.empty()) {
     MemoryPayloads memory = encode_memory(state, sections.pixels());
     sections.add(kMemorySummary, kMemorySummaryStride, std::move(memory.summaries));
-    sections.add(kMemoryGrid, kMemoryCellStride, std::move(memory.grids));
+    sections.add(kMemoryMasks, 1, std::move(memory.masks));
+    sections.add(kMemoryCells, kMemoryCellStride, std::move(memory.cells));
+    sections.keep_plain();
     sections.add(kMemoryLightNoise, kMemoryCellStride, std::move(memory.light_noise));
     sections.add(kMemoryLobeNoise, kMemoryCellStride, std::move(memory.lobe_noise));
   }

@@ -54,19 +54,17 @@ struct SampleState {
   /// Sizes every array, all zero. new_num_populations divides new_num_particles.
   void resize(const PixelRect& new_rect, std::int32_t new_num_particles,
               std::int32_t new_num_populations = 1);
-  /// Of a pixel in all arrays, as the flags say with a memory or a confidence.
+  /// Of a pixel in a file before packing, at most, and about in memory; as the flags say with a
+  /// memory or a confidence.
   static constexpr std::size_t bytes_per_pixel(std::size_t particles, std::size_t populations,
                                                bool with_memory, bool with_confidence) {
     return populations * (sizeof(lns[0]) + sizeof(lns_fresh[0]) + sizeof(source[0])) +
            particles * (sizeof(direction[0]) + sizeof(weight[0]) + sizeof(site[0])) +
-           (with_memory ? sizeof(memory[0]) : 0) + (with_confidence ? sizeof(confidence[0]) : 0);
+           (with_memory ? PixelMemory::kMaxStoredBytes : 0) +
+           (with_confidence ? sizeof(confidence[0]) : 0);
   }
-  /// Of all arrays.
-  std::size_t size_bytes() const {
-    return num_pixels() * bytes_per_pixel(static_cast<std::size_t>(num_particles),
-                                          static_cast<std::size_t>(num_populations),
-                                          !memory.empty(), !confidence.empty());
-  }
+  /// What all arrays take in memory.
+  std::size_t size_bytes() const;
   /// Lets each pixel's samples count for nothing yet.
   void add_confidence() { confidence.assign(num_pixels(), 0); }
   /// Gives each pixel an empty memory.

@@ -9,7 +9,7 @@ namespace baton {
 
 inline std::size_t visibility_bin(OctDirection code) {
   using namespace HWY_NAMESPACE;
-  return static_cast<std::size_t>(hn::GetLane(VisibilityBins(hn::Set(DU(), code))));
+  return static_cast<std::size_t>(hn::GetLane(BinsOf(hn::Set(DU(), code))));
 }
 
 /// V^ of a direction.

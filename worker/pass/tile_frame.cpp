@@ -12,11 +12,11 @@
 namespace baton {
 namespace {
 
-/// Asks for a pixel's memory early: those of a tile are larger than the caches.
+/// Asks for a pixel's bins early: those of a tile are larger than the caches.
 void fetch_ahead(const PixelMemory* memory) {
   if (memory == nullptr) return;
-  const auto* bytes = reinterpret_cast<const std::byte*>(memory);
-  for (std::size_t at = 0; at < sizeof(*memory); at += 64) __builtin_prefetch(bytes + at);
+  const auto* bytes = reinterpret_cast<const std::byte*>(memory->bins.data());
+  for (std::size_t at = 0; at < memory->bins.size_bytes(); at += 64) __builtin_prefetch(bytes + at);
 }
 
 }  // namespace

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <utility>
 
 #include "common/job/motion.h"
 #include "worker/pass/cpu_clock.h"
@@ -91,7 +92,8 @@ class TileWalk {
     return renderer_->render(frame, *light, history, state_);
   }
 
-  const SampleState& state() const { return state_; }
+  /// At the end of the walk.
+  SampleState take_state() { return std::move(state_); }
   /// Of the frame that was rendered last.
   const SamplingStats& frame_sampling() const { return renderer_->frame_sampling(); }
   /// What the second pass needs of that frame.
@@ -154,7 +156,7 @@ Result<RenderStats> run_tile(const RenderContext& context, const TileRun& run,
     if (sink.diagnostics) sink.diagnostics({f, run.tile, walk.frame_sampling()});
     if (context.job.visibility.correlated) BATON_TRY(sink.samples(walk.take_first_pass()));
   }
-  if (carries_state(context.job)) BATON_TRY(sink.state(walk.state()));
+  if (carries_state(context.job)) BATON_TRY(sink.state(walk.take_state()));
 
   RenderStats stats = walk.stats();
   stats.cpu_seconds += thread_cpu_seconds() - start;

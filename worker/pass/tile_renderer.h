@@ -37,7 +37,7 @@ Result<std::shared_ptr<const RenderContext>> make_render_context(
 struct TileRunSink {
   std::function<Status(int frame_index, const FilmTile& film)> film;
   /// Called for the last frame of the run when the job carries state.
-  std::function<Status(const SampleState& state)> state = {};
+  std::function<Status(SampleState state)> state = {};
   /// Called after each film with what the sampler did; may be empty.
   std::function<void(const FrameStats& stats)> diagnostics = {};
   /// Called after each film when the job has a second pass.

@@ -83,12 +83,12 @@ Result<TaskOutput> execute_render(const LoadedJob& loaded, BlobStore& store, con
           [&](int frame, const FilmTile& film) {
             return keep(BlobKind::film, frame, encode_film_tile(film, {loaded.digest, frame}));
           },
-      .state = [&](const SampleState& state) -> Status {
+      .state = [&](SampleState state) -> Status {
         const CpuTimer timer(seconds_state);
         BATON_TRY(keep(BlobKind::state, state.frame_index, encode_state(state)));
         if (moves(loaded.job)) {
           loaded.states->insert(output.outputs.back().digest,
-                                std::make_shared<const SampleState>(state));
+                                std::make_shared<const SampleState>(std::move(state)));
         }
         return {};
       },

@@ -26,7 +26,7 @@ struct PixelRays {
   Column<float> r, g, b;     ///< what a free ray brings
   Column<float> visibility;  ///< and its share of Lns
   Column<std::uint8_t> site;
-  Column<std::uint8_t> bin;  ///< of PixelMemory::bins
+  Column<std::uint8_t> bin;  ///< of VisibilityBins
   Value constant;
   /// What the even ones of all samples brought to `constant` more than the odd ones. With the
   /// values of the rays, of alternating sign, it tells two interleaved halves of the pixel apart.

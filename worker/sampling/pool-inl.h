@@ -21,9 +21,9 @@ HWY_BEFORE_NAMESPACE();
 namespace baton::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-/// Bins of PixelMemory per lane.
-HWY_INLINE VI VisibilityBins(VU code) {
-  static_assert(PixelMemory::kSide == 16);
+/// A lane's bin of VisibilityBins.
+HWY_INLINE VI BinsOf(VU code) {
+  static_assert(VisibilityBins::kSide == 16);
   const DU du;
   const VU across = hn::And(hn::ShiftRight<12>(code), hn::Set(du, 0x0F));
   const VU down = hn::And(hn::ShiftRight<24>(code), hn::Set(du, 0xF0));
@@ -51,14 +51,13 @@ class RememberedLanes {
  public:
   RememberedLanes(const PoolTuning& tuning, const PixelMemory& memory)
       : tuning_(tuning),
-        memory_(memory),
-        has_bins_(memory.outcomes == PixelMemory::kSawBoth),
+        bins_(memory.bins.data()),
         all_((memory.all_rays & 15) != 0 ? memory.all_rays : 2048 << 4),
         everywhere_(Prospect(Share(hn::Set(DI(), all_)))) {}
 
   /// A pixel whose rays have always agreed expects the same everywhere.
   HWY_INLINE ProspectLanes Look(VU code) const {
-    if (has_bins_) return Prospect(ShareInBins(code));
+    if (bins_ != nullptr) return Prospect(ShareInBins(code));
     return {everywhere_.expected, everywhere_.contribution, everywhere_.deviation};
   }
 
@@ -66,12 +65,11 @@ class RememberedLanes {
   HWY_INLINE VF ShareInBins(VU code) const {
     const DI di;
     const DU du;
-    // Two cells come with each load; ours is the lower one. The last bin's other is all_rays.
-    static_assert(sizeof(VisibilityCell) == 2 && PixelMemory::kSide == 16);
-    static_assert(offsetof(PixelMemory, all_rays) == 2 * PixelMemory::kBins);
+    // Two cells come with each load; ours is the lower one. The last bin's other is padding.
+    static_assert(sizeof(VisibilityCell) == 2 && VisibilityBins::kSide == 16);
     const VU across = hn::And(hn::ShiftRight<11>(code), hn::Set(du, 2 * 0x0F));
     const VU down = hn::And(hn::ShiftRight<23>(code), hn::Set(du, 2 * 0xF0));
-    const VI pair = hn::GatherOffset(di, reinterpret_cast<const std::int32_t*>(&memory_),
+    const VI pair = hn::GatherOffset(di, reinterpret_cast<const std::int32_t*>(bins_),
                                      hn::BitCast(di, hn::Or(across, down)));
     const auto unseen = hn::Eq(hn::And(pair, hn::Set(di, 15)), hn::Zero(di));
     return Share(hn::IfThenElse(unseen, hn::Set(di, all_), pair));
@@ -86,8 +84,7 @@ class RememberedLanes {
     return hn::MulAdd(hn::ConvertTo(d, share), hn::Set(d, 1.0f / 65536), hn::Set(d, 0.5f / 4096));
   }
   const PoolTuning& tuning_;
-  const PixelMemory& memory_;
-  bool has_bins_;
+  const VisibilityCell* bins_;  ///< null: rays have always agreed
   std::int32_t all_;
   ProspectLanes everywhere_;
 };
@@ -185,7 +182,7 @@ HWY_INLINE void LookUpRays(const PoolTuning& tuning, const Chosen& chosen, const
     const Vec3Lanes color = Scale(c.reflected, hn::Div(light, MeanLanes(c.reflected)));
     const VF share = hn::Mul(light, per_light);
     StoreRays(w, color, share, c.site, j, out);
-    hn::StoreU(hn::DemoteTo(DB(), VisibilityBins(c.code)), DB(), out.bin.from(j));
+    hn::StoreU(hn::DemoteTo(DB(), BinsOf(c.code)), DB(), out.bin.from(j));
     const Vec3Lanes sure = Scale(color, seen);
     expected = HWY_NAMESPACE::Add(expected, sure);
     difference = hn::MulAdd(hn::Mul(light, seen), half, difference);

@@ -53,10 +53,11 @@ void remember_rays(PixelMemory& memory, std::span<const std::uint8_t> bin, std::
     const bool is_free = (free >> j & 1) != 0;
     outcomes |= is_free ? PixelMemory::kSawFree : PixelMemory::kSawBlocked;
     if (outcomes == PixelMemory::kSawBoth) {
-      Tally own(memory.bins[bin[j]]);
+      VisibilityCell& cell = memory.bins.make()[bin[j]];
+      Tally own(cell);
       if (own.seen == 0) own.share = all.share;
       own.add(is_free);
-      memory.bins[bin[j]] = own.cell();
+      cell = own.cell();
     }
     all.add(is_free);
   }

@@ -17,6 +17,13 @@ namespace {
 
 constexpr int kSites[] = {1, 4, 9, 16};
 
+/// The jobs use one thread, where the thread sanitizer has nothing to find, and takes half an hour.
+#ifdef __SANITIZE_THREAD__
+constexpr int kOneOf = 16;
+#else
+constexpr int kOneOf = 1;
+#endif
+
 class Poison : public testing::Test {
  protected:
   /// (Only checked builds fill work space; in others there is nothing to find.)
@@ -33,7 +40,8 @@ class Poison : public testing::Test {
     return job;
   }
 
-  static void expect_written(const JobSpec& job) {
+  void expect_written(const JobSpec& job) {
+    if (num_jobs_++ % kOneOf != 0) return;
     // NaN as a float and far outside as an index; a plain number, and as far outside.
     const Outcome a = render(job, 0xFFC1FFC1u), b = render(job, 0x42F642F6u);
     const auto equal = [&] {
@@ -49,6 +57,8 @@ class Poison : public testing::Test {
     test::TileResult first_pass;
     FilmTile second_pass;
   };
+  int num_jobs_ = 0;
+
   static Outcome render(const JobSpec& job, std::uint32_t pattern) {
     set_poison(pattern);
     Outcome outcome{test::render_tile(job), {}};

@@ -199,7 +199,7 @@ TEST_P(PoolRays, AreNWithoutAMemoryAndByDeviationWithOne) {
   EXPECT_LE(num_rays(memory_after(0)), 16u);
   EXPECT_GT(num_rays(memory_after(10)), 20u);
   PixelMemory open;
-  for (std::size_t bin = 0; bin < PixelMemory::kBins; ++bin) remember_ray(open, bin, true);
+  for (std::size_t bin = 0; bin < VisibilityBins::kCount; ++bin) remember_ray(open, bin, true);
   EXPECT_LE(num_rays(open), 12u);
   EXPECT_NEAR(rays->constant.visibility, 0, 1e-5) << "what is known alike everywhere cancels";
 }

@@ -11,16 +11,17 @@ StatePtr state_of(std::int32_t side, bool with_memory) {
   SampleState state;
   state.resize({0, 0, side, side}, with_memory ? 0 : 16);
   if (with_memory) state.add_memory();
+  if (with_memory) state.memory[7].bins.make();
   return std::make_shared<const SampleState>(std::move(state));
 }
 
-// A pixel of `pool` takes 529 bytes, most of them its memory of rays.
+// A pixel of `pool` takes 25 bytes, and 514 more where it needs bins.
 TEST(StateCache, CountsWhatStatesTake) {
   StateCache cache(1 << 20);
   cache.insert(digest_of("pool"), state_of(10, true));
-  EXPECT_EQ(cache.size(), 100u * 529);
+  EXPECT_EQ(cache.size(), 100u * 25 + 514);
   cache.insert(digest_of("sequential"), state_of(10, false));
-  EXPECT_EQ(cache.size(), 100u * (529 + 9 + 16 * 9));
+  EXPECT_EQ(cache.size(), 100u * (25 + 9 + 16 * 9) + 514);
 }
 
 }  // namespace

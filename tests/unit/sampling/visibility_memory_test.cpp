@@ -16,8 +16,8 @@ const OctDirection kSide = encode_octahedral(normalize({1, 0.2f, 0}));
 TEST(VisibilityMemory, EveryBinIsTheBinOfSomeDirection) {
   std::set<std::size_t> bins;
   for (std::uint32_t i = 0; i < 20000; ++i) bins.insert(visibility_bin(i * 2654435761u));
-  EXPECT_EQ(bins.size(), PixelMemory::kBins);
-  EXPECT_LT(*bins.rbegin(), PixelMemory::kBins);
+  EXPECT_EQ(bins.size(), VisibilityBins::kCount);
+  EXPECT_LT(*bins.rbegin(), VisibilityBins::kCount);
 }
 
 TEST(VisibilityMemory, KnowsNothingAtFirst) {
@@ -29,7 +29,7 @@ TEST(VisibilityMemory, KeepsNoBinsWhileRaysAgree) {
   for (const bool free : {true, false}) {
     PixelMemory memory;
     for (int i = 0; i < 50; ++i) remember_ray(memory, 77, free);
-    EXPECT_EQ(memory.bins, PixelMemory{}.bins);
+    EXPECT_TRUE(memory.bins.empty());
     EXPECT_EQ(memory.outcomes, free ? PixelMemory::kSawFree : PixelMemory::kSawBlocked);
     // Every direction gets the share of all rays, which comes close to certainty but never reaches
     // it.
@@ -64,8 +64,8 @@ TEST(VisibilityMemory, IsReadBinByBin) {
   PixelMemory memory;
   memory.outcomes = PixelMemory::kSawBoth;
   memory.all_rays = 100 << 4 | 15;
-  for (std::size_t bin = 0; bin < PixelMemory::kBins; ++bin)
-    memory.bins[bin] = static_cast<VisibilityCell>(bin << 8 | bin % 3);
+  for (std::size_t bin = 0; bin < VisibilityBins::kCount; ++bin)
+    memory.bins.make()[bin] = static_cast<VisibilityCell>(bin << 8 | bin % 3);
   for (std::uint32_t i = 0; i < 20000; ++i) {
     const OctDirection code = i * 2654435761u;
     const std::size_t bin = visibility_bin(code);

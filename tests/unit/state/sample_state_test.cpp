@@ -10,32 +10,12 @@
 
 #include "common/base/section_file.h"
 #include "common/math/philox.h"
+#include "tests/unit/state/state_files.h"
 
 namespace baton {
 namespace {
 
 using testing::HasSubstr;
-
-constexpr SectionTag kMagic{'B', 'S', 'T', '1'};
-
-/// A background pixel and a surface pixel of two particles.
-SampleState tiny_state() {
-  SampleState state;
-  state.job_digest = {0x0011223344556677ull, 0x8899aabbccddeeffull};
-  state.frame_index = 5;
-  state.tile = 7;
-  state.resize({10, 20, 12, 21}, 2);
-  state.source[1] = PixelSource::carried;
-  state.lns[1] = 1.5f;
-  state.lns_fresh[1] = 2.0f;
-  state.direction[2] = 0x80017fffu;
-  state.direction[3] = 0x12345678u;
-  state.weight[2] = 0.25f;
-  state.weight[3] = 0.75f;
-  state.site[2] = 3;
-  state.site[3] = 15;
-  return state;
-}
 
 /// 64 x 64 pixels of 16 particles as a renderer leaves them after some frames: noisy weights,
 /// scattered directions.
@@ -60,25 +40,6 @@ SampleState large_state() {
     for (std::uint32_t i = 0; i < 16; ++i) state.weight[pixel * std::size_t{16} + i] /= sum;
   }
   return state;
-}
-
-/// The container inside a state, to change it with good checksums.
-SectionFile sections_of(const SampleState& state) {
-  return *decode_section_file(encode_state(state), kMagic, kStateVersion, "t.bst");
-}
-
-/// The error that decoding `file` gives; its message is empty when decoding works.
-Error error_of(const SectionFile& file) {
-  const Result<SampleState> decoded = decode_state(encode_section_file(file), "t.bst");
-  return decoded ? Error{ErrorKind::internal, ""} : decoded.error();
-}
-
-Section& section(SectionFile& file, const std::string& tag) {
-  for (Section& s : file.sections) {
-    if (tag_text(s.tag) == tag) return s;
-  }
-  ADD_FAILURE() << "no section " << tag;
-  return file.sections.front();
 }
 
 /// tiny_state with `value` at `offset` of a section's payload.
@@ -296,95 +257,6 @@ TEST(SampleState, EqualWeightsPackAway) {
   const std::size_t before = encode_state(state).size();
   for (float& weight : state.weight) weight = weight > 0 ? 1.0f / 16 : 0.0f;
   EXPECT_LT(encode_state(state).size() + 40 * state.num_pixels(), before);
-}
-
-/// One surface pixel whose rays agree, one whose rays do not.
-SampleState remembering_state() {
-  SampleState state = tiny_state();
-  state.resize({0, 0, 3, 1}, 2);
-  state.source[1] = state.source[2] = PixelSource::carried;
-  state.add_memory();
-  PixelMemory& agreed = state.memory[1];
-  agreed.all_rays = 0x8003;
-  agreed.outcomes = PixelMemory::kSawFree;
-  agreed.lobe_noise = 0x3C01;
-  PixelMemory& disagreed = state.memory[2];
-  disagreed.bins[5] = 0x1234;
-  disagreed.all_rays = 0x7771;
-  disagreed.outcomes = PixelMemory::kSawBoth;
-  disagreed.light_noise = 0x3B12;
-  return state;
-}
-
-TEST(SampleState, RemembersRays) {
-  const SampleState state = remembering_state();
-  EXPECT_EQ(*decode_state(encode_state(state), "test"), state);
-}
-
-TEST(SampleState, KeepsConfidences) {
-  SampleState state = remembering_state();
-  state.memory.clear();
-  state.add_confidence();
-  state.confidence[1] = 1;
-  state.confidence[2] = 1000;
-  EXPECT_EQ(*decode_state(encode_state(state), "test"), state);
-}
-
-TEST(SampleState, NeedsNoParticlesBesideAMemory) {
-  SampleState state = remembering_state();
-  state.num_particles = 0;
-  state.direction.clear();
-  state.weight.clear();
-  state.site.clear();
-  EXPECT_EQ(*decode_state(encode_state(state), "test"), state);
-  state.memory.clear();
-  const auto decoded = decode_state(encode_state(state), "a.bst");
-  ASSERT_FALSE(decoded.ok());
-  EXPECT_THAT(decoded.error().message, HasSubstr("section META: 0 particles, expected 1 to 64"));
-}
-
-TEST(SampleState, StoresNoGridWhereRaysAgree) {
-  SampleState state = remembering_state();
-  const auto raw_bytes = [](const SampleState& s, const std::string& tag) {
-    const auto sections = *state_sections(encode_state(s), "test");
-    for (const StateSectionInfo& section : sections) {
-      if (section.tag == tag) return section.raw_bytes;
-    }
-    return std::uint64_t{0};
-  };
-  EXPECT_EQ(raw_bytes(state, "VISG"), 512u);
-  EXPECT_EQ(raw_bytes(state, "VISS"), 8u);
-  EXPECT_EQ(raw_bytes(state, "NOIS"), 4u);
-  EXPECT_EQ(raw_bytes(state, "NOIL"), 4u);
-  state.memory.clear();
-  EXPECT_EQ(raw_bytes(state, "VISS"), 0u);
-}
-
-TEST(SampleState, RefusesOutcomesThatCannotBe) {
-  SampleState state = remembering_state();
-  state.memory[1].outcomes = 4;
-  const auto decoded = decode_state(encode_state(state), "a.bst");
-  ASSERT_FALSE(decoded.ok());
-  EXPECT_THAT(decoded.error().message,
-              HasSubstr("a.bst: section VISS: pixel (1, 0): outcomes 4, expected 0 to 3"));
-}
-
-TEST(SampleState, RefusesNoiseThatIsNoNumber) {
-  const std::pair<std::uint16_t PixelMemory::*, const char*> kinds[] = {
-      {&PixelMemory::light_noise, "NOIS"}, {&PixelMemory::lobe_noise, "NOIL"}};
-  for (const auto& [kind, section] : kinds) {
-    for (const std::uint16_t noise :
-         {std::uint16_t{0x7F80}, std::uint16_t{0x8001}}) {  // infinite, negative
-      SampleState state = remembering_state();
-      state.memory[2].*kind = noise;
-      const auto decoded = decode_state(encode_state(state), "a.bst");
-      ASSERT_FALSE(decoded.ok());
-      EXPECT_THAT(decoded.error().message,
-                  HasSubstr(fmt::format(
-                      "a.bst: section {}: pixel (2, 0): noise {:#06x}, expected 0 to 0x7f7f",
-                      section, noise)));
-    }
-  }
 }
 
 }  // namespace

@@ -40,7 +40,7 @@ kernels::CandidateCounts counts_for_noise(const PoolTuning& tuning, const SiteBl
 
 PixelDiagnostics PoolMethod::sample(const PixelInput& input, const PixelState& pixel,
                                     SamplerScratch& scratch, RayWriter& rays) const {
-  static constexpr PixelMemory kNothing{};
+  static const PixelMemory kNothing{};
   PixelMemory* own = pixel.memory();
   const PixelMemory& memory = own != nullptr ? *own : kNothing;
   const kernels::CandidateCounts counts = counts_for_noise(tuning_, input.sites, num_candidates_,
