@@ -306,8 +306,8 @@ struct OutputSpec {
 enum class StateKeep : std::uint8_t { last, all };
 
 struct StateSpec {
-  bool carry = true;          ///< pass samples from frame to frame
-  int checkpoint_every = 12;  ///< frames per lease; the state is durable after each, [1, 1000]
+  bool carry = true;                 ///< pass samples from frame to frame
+  int checkpoint_every = 12;         ///< frames between checkpoints; at rest, of a lease, [1, 1000]
   StateKeep keep = StateKeep::last;  ///< `all` keeps every checkpoint after the job
 
   bool operator==(const StateSpec&) const = default;

@@ -41,7 +41,8 @@ struct JobAdded {
   JobStatus status = JobStatus::running;
   std::vector<Completion> completions;
   std::vector<Failure> failures;
-  std::vector<TaskKey> lost = {};  ///< of the completed tasks, those whose outputs are gone
+  std::vector<TaskKey> lost = {};         ///< of the completed tasks, those whose outputs are gone
+  std::vector<TaskKey> lost_spares = {};  ///< those whose states nobody needs now (Checkpoints)
 };
 struct JobCancelled {
   Digest job;

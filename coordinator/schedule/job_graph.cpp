@@ -40,8 +40,10 @@ JobGraph::JobGraph(const JobSpec& job)
       num_runs_(baton::num_runs(job)),
       num_tiles_(grid_.count()),
       frames_per_run_(baton::frames_per_run(job)),
+      runs_per_checkpoint_((job.state.checkpoint_every + frames_per_run_ - 1) / frames_per_run_),
       reach_px_(history_reach_px(job)),
       carries_state_(baton::carries_state(job)),
+      shares_history_(baton::shares_history(job)),
       has_second_pass_(job.visibility.correlated),
       exchange_reach_px_(baton::exchange_reach_px(job.visibility)) {
   BATON_CHECK(count_tasks(job) <= limits::kMaxTasksPerJob);

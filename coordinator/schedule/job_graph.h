@@ -33,6 +33,7 @@ class JobGraph {
   TaskIndex num_tasks() const { return first_render_ + num_runs_ * num_tiles_; }
   std::int32_t num_frames() const { return num_frames_; }
   std::int32_t num_tiles() const { return num_tiles_; }
+  std::int32_t num_runs() const { return num_runs_; }
 
   /// nullopt: the job has no such task.
   std::optional<TaskIndex> find(const TaskKey& key) const;
@@ -52,6 +53,10 @@ class JobGraph {
 
   /// Whether a render task hands its samples to the next run.
   bool carries_state() const { return carries_state_; }
+  /// Whether a render task needs states of other tiles than its own.
+  bool shares_history() const { return shares_history_; }
+  /// Runs in state.checkpointEvery frames.
+  std::int32_t runs_per_checkpoint() const { return runs_per_checkpoint_; }
   /// Pixels of a tile.
   std::uint64_t num_pixels(std::int32_t tile) const;
 
@@ -74,8 +79,8 @@ class JobGraph {
   void add_neighbours(std::int32_t run, std::int32_t tile, std::vector<TaskIndex>& tasks) const;
 
   TileGrid grid_;
-  std::int32_t num_frames_, num_runs_, num_tiles_, frames_per_run_, reach_px_;
-  bool carries_state_, has_second_pass_;
+  std::int32_t num_frames_, num_runs_, num_tiles_, frames_per_run_, runs_per_checkpoint_, reach_px_;
+  bool carries_state_, shares_history_, has_second_pass_;
   std::int32_t exchange_reach_px_;
   TaskIndex first_render_;
 };

@@ -9,6 +9,7 @@ namespace baton {
 
 JobTasks::JobTasks(const JobSpec& spec)
     : graph_(spec),
+      checkpoints_(graph_),
       keep_all_states_(spec.state.keep == StateKeep::all),
       records_(static_cast<std::size_t>(graph_.num_tasks())) {
   progress_.tasks_total = progress_.tasks_open = records_.size();
@@ -79,6 +80,7 @@ void JobTasks::complete(TaskIndex task, const Completion& completion, BlobRefere
 
   // What this task needed may go; what needed this task comes closer.
   release_inputs(task, blobs);
+  let_checkpoints_go(completion.task, blobs);
   for (const TaskIndex dependent : graph_.dependents(completion.task)) {
     if (--record(dependent).missing_inputs == 0) apply(dependent, TaskEvent::inputs_done);
   }
@@ -98,7 +100,8 @@ void JobTasks::force_done(TaskIndex task, const Completion& completion) {
   for (const BlobRef& output : completion.outputs) count_output(output, true);
 }
 
-void JobTasks::restore(const std::vector<Completion>& completions, BlobReferences& blobs) {
+void JobTasks::restore(const std::vector<Completion>& completions, const std::vector<TaskKey>& gone,
+                       BlobReferences& blobs) {
   // First all statuses: who needs what follows from them.
   std::vector<TaskIndex> done;
   for (Completion completion : completions) {
@@ -114,6 +117,13 @@ void JobTasks::restore(const std::vector<Completion>& completions, BlobReference
   }
   for (TaskIndex task = 0; task < graph_.num_tasks(); ++task) {
     if (record(task).missing_inputs == 0) apply(task, TaskEvent::inputs_done);
+  }
+  for (const TaskIndex task : done) {
+    if (const TaskKey key = graph_.key(task); key.kind == TaskKind::render)
+      checkpoints_.complete(key);
+  }
+  for (const TaskKey& key : gone) {
+    if (graph_.find(key) && key.kind == TaskKind::render) checkpoints_.let_go(key);
   }
   for (const TaskIndex task : done) add_outputs(task, blobs);
 }
@@ -134,6 +144,8 @@ std::vector<TaskIndex> JobTasks::reopen(TaskIndex task, BlobReferences& blobs) {
     // Forget what it made; who waits for that waits longer.
     release_outputs(next, blobs);
     for (const BlobRef& output : outputs(next)) count_output(output, false);
+    if (const TaskKey key = graph_.key(next); key.kind == TaskKind::render)
+      checkpoints_.reopen(key);
     former_outputs_[next] = std::exchange(record(next).outputs, {});
     BATON_CHECK(apply(next, TaskEvent::output_lost));
     reopened.push_back(next);
@@ -237,14 +249,22 @@ void JobTasks::release_all(BlobReferences& blobs) {
 std::vector<BlobRef> JobTasks::live_blobs(TaskIndex task) const {
   std::vector<BlobRef> live;
   for (const BlobRef& output : outputs(task)) {
-    if (num_uses(task, output) > 0) live.push_back(output);
+    if (num_needs(task, output) > 0) live.push_back(output);
   }
   return live;
 }
 
+std::vector<BlobRef> JobTasks::spare_blobs(TaskIndex task) const {
+  std::vector<BlobRef> spare;
+  for (const BlobRef& output : outputs(task)) {
+    if (num_needs(task, output) == 0 && num_uses(task, output) > 0) spare.push_back(output);
+  }
+  return spare;
+}
+
 /// How many still need an output of a task that is done: the tasks that take it as input, and
 /// whoever keeps it after the job. Completing a dependent makes it one less (release_inputs).
-std::int32_t JobTasks::num_uses(TaskIndex task, const BlobRef& output) const {
+std::int32_t JobTasks::num_needs(TaskIndex task, const BlobRef& output) const {
   if (output.kind == BlobKind::image) return 0;
   std::int32_t uses = 0;
   bool last_state = output.kind == BlobKind::state;
@@ -256,6 +276,12 @@ std::int32_t JobTasks::num_uses(TaskIndex task, const BlobRef& output) const {
   }
   const bool kept = last_state || (keep_all_states_ && output.kind == BlobKind::state);
   return uses + (kept ? 1 : 0);
+}
+
+/// The same, and whether it stays for what may be lost.
+std::int32_t JobTasks::num_uses(TaskIndex task, const BlobRef& output) const {
+  const bool stays = output.kind == BlobKind::state && checkpoints_.keeps(graph_.key(task));
+  return num_needs(task, output) + (stays ? 1 : 0);
 }
 
 /// made: whether it is there now, or there no longer. (Unsigned sums wrap to what they were.)
@@ -281,6 +307,16 @@ void JobTasks::add_outputs(TaskIndex task, BlobReferences& blobs) const {
 void JobTasks::release_outputs(TaskIndex task, BlobReferences& blobs) const {
   for (const BlobRef& output : outputs(task)) {
     for (std::int32_t use = num_uses(task, output); use > 0; --use) blobs.release(output.digest);
+  }
+}
+
+/// A render task that is done may be the last that older checkpoints stayed for.
+void JobTasks::let_checkpoints_go(const TaskKey& done, BlobReferences& blobs) {
+  if (done.kind != TaskKind::render) return;
+  for (const TaskKey& key : checkpoints_.complete(done)) {
+    for (const BlobRef& output : outputs(*graph_.find(key))) {
+      if (output.kind == BlobKind::state) blobs.release(output.digest);
+    }
   }
 }
 

@@ -8,6 +8,7 @@
 #include <vector>
 
 #include "coordinator/schedule/blob_references.h"
+#include "coordinator/schedule/checkpoints.h"
 #include "coordinator/schedule/events.h"
 #include "coordinator/schedule/job_graph.h"
 #include "coordinator/schedule/task_status.h"
@@ -44,8 +45,10 @@ class JobTasks {
   std::vector<BlobRef> inputs(TaskIndex task) const;
 
   /// Takes up what an earlier coordinator recorded as done, in any order; of a fresh job only.
-  /// Completions that are none of the job's are left out.
-  void restore(const std::vector<Completion>& completions, BlobReferences& blobs);
+  /// Completions that are none of the job's are left out. gone: render tasks whose spare_blobs()
+  /// are not there.
+  void restore(const std::vector<Completion>& completions, const std::vector<TaskKey>& gone,
+               BlobReferences& blobs);
 
   /// Leases a ready task. Returns the number of the attempt, from 1.
   std::uint32_t grant(TaskIndex task);
@@ -76,8 +79,10 @@ class JobTasks {
 
   /// Forgets every blob, of a job that is to be replaced.
   void release_all(BlobReferences& blobs);
-  /// The blobs of the store that are still needed of what the task made.
+  /// The blobs of the store that open tasks and the job's result need of what the task made.
   std::vector<BlobRef> live_blobs(TaskIndex task) const;
+  /// Those that stay only for what may be lost (Checkpoints).
+  std::vector<BlobRef> spare_blobs(TaskIndex task) const;
 
  private:
   struct Record {
@@ -95,15 +100,18 @@ class JobTasks {
   Record& record(TaskIndex task) { return records_[static_cast<std::size_t>(task)]; }
   const Record& record(TaskIndex task) const { return records_[static_cast<std::size_t>(task)]; }
   bool apply(TaskIndex task, TaskEvent event);
+  std::int32_t num_needs(TaskIndex task, const BlobRef& output) const;
   std::int32_t num_uses(TaskIndex task, const BlobRef& output) const;
   void count_output(const BlobRef& output, bool made);
   void force_done(TaskIndex task, const Completion& completion);
   void add_outputs(TaskIndex task, BlobReferences& blobs) const;
   void release_outputs(TaskIndex task, BlobReferences& blobs) const;
   void release_inputs(TaskIndex task, BlobReferences& blobs) const;
+  void let_checkpoints_go(const TaskKey& done, BlobReferences& blobs);
   std::vector<TaskIndex> ask_inputs_again(TaskIndex task, BlobReferences& blobs) const;
 
   JobGraph graph_;
+  Checkpoints checkpoints_;
   bool keep_all_states_;
   std::vector<Record> records_;
   std::set<TaskIndex> ready_;

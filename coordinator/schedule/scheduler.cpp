@@ -196,7 +196,7 @@ Scheduler::Rank Scheduler::rank(const Job& job) const { return {-job.spec.priori
 
 /// Brings a fresh job to where the journal left it, less what is gone.
 void Scheduler::replay(Job& job, const JobAdded& event, Actions& actions) {
-  job.tasks.restore(event.completions, blobs_);
+  job.tasks.restore(event.completions, event.lost_spares, blobs_);
   reopen(event.job, job, event.lost, actions);
   for (const Failure& failure : event.failures) {
     const auto task = job.tasks.graph().find(failure.lease.task);

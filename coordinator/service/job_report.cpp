@@ -124,6 +124,9 @@ LostFiles find_lost_files(const JobAdded& job, const BlobStore& store) {
     for (const BlobRef& blob : recorded.live_blobs(task)) {
       if (!look(task, store.path(blob.digest), blob.size_bytes)) break;
     }
+    for (const BlobRef& blob : recorded.spare_blobs(task)) {
+      if (!store.contains(blob.digest)) lost.spares.push_back(graph.key(task));
+    }
   }
   for (TaskIndex frame = 0; frame < graph.num_frames(); ++frame) {
     if (recorded.status(frame) != TaskStatus::done) continue;

@@ -27,6 +27,7 @@ std::vector<TaskKey> replaced_frames(const Scheduler::Job& rival, const JobSpec&
 /// needed, and finished frames. Sizes are compared, contents are not read.
 struct LostFiles {
   std::vector<TaskKey> tasks;             ///< that made them
+  std::vector<TaskKey> spares;            ///< that made older checkpoints, which nobody needs now
   std::string first;                      ///< one of the files
   std::optional<std::string> unreadable;  ///< why it cannot be told now, of a file or folder
 };

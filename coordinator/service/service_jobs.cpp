@@ -50,6 +50,7 @@ Status Service::restore_job(const Digest& digest) {
     } else {
       tell_lost(digest, lost);
       event.lost = std::move(lost.tasks);
+      event.lost_spares = std::move(lost.spares);
     }
   }
   BATON_TRY(step(event));
@@ -175,6 +176,7 @@ Status Service::start_again(JobAdded event, JobStatus status, bool& already_ther
   spdlog::info("job {} goes on", event.job.short_hex());
   tell_lost(event.job, lost);
   event.lost = std::move(lost.tasks);
+  event.lost_spares = std::move(lost.spares);
   BATON_TRY(journal_.restart_job(event.job));
   return step(event);
 }

@@ -141,7 +141,7 @@ class Judge:
         require(len(frames) == predicted["frames"], "frames", f"{len(frames)} files, expected {predicted['frames']}")
         judge_frames(frames, case["job"], predicted)
         if name == "first" and not is_auto(case["job"]):
-            side = split["tileSize"]
+            side = int(json.loads(command[2].read_text(encoding="utf-8"))["image"]["tileSize"])
             judge_states(work, min(side, case["job"]["image"]["width"]) * min(side, case["job"]["image"]["height"]),
                          predicted)
         return frames

@@ -89,6 +89,9 @@ class ChaosFarm {
         return !store_.contains(blob.digest);
       });
       if (lost || lost_frames_.erase(done.task) > 0) added.lost.push_back(done.task);
+      for (const BlobRef& spare : tasks.spare_blobs(*graph_.find(done.task))) {
+        if (!store_.contains(spare.digest)) added.lost_spares.push_back(done.task);
+      }
     }
     step(added);
   }

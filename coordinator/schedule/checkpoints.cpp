@@ -1,0 +1,66 @@
+#include "coordinator/schedule/checkpoints.h"
+
+namespace baton {
+
+Checkpoints::Checkpoints(const JobGraph& graph)
+    : runs_per_stage_(graph.runs_per_checkpoint()),
+      num_runs_(graph.num_runs()),
+      num_tiles_(graph.num_tiles()),
+      tiles_per_stage_(graph.shares_history() ? static_cast<std::size_t>(num_tiles_) : 1),
+      stages_per_step_(static_cast<std::size_t>(num_tiles_) / tiles_per_stage_) {
+  if (!graph.carries_state()) return;
+  const std::int32_t num_steps = (num_runs_ + runs_per_stage_ - 1) / runs_per_stage_;
+  stages_.resize(static_cast<std::size_t>(num_steps) * stages_per_step_);
+  for (std::int32_t run = 0; run < num_runs_; ++run) {
+    for (std::int32_t tile = 0; tile < num_tiles_; ++tile)
+      ++stages_[stage_of({TaskKind::render, run, tile})].open;
+  }
+}
+
+std::size_t Checkpoints::stage_of(const TaskKey& render) const {
+  return static_cast<std::size_t>(render.step / runs_per_stage_) * stages_per_step_ +
+         static_cast<std::size_t>(render.tile) / tiles_per_stage_;
+}
+
+/// Whether everything in it is done, or there is no such stage.
+bool Checkpoints::is_over(std::size_t stage) const {
+  return stage >= stages_.size() || stages_[stage].open == 0;
+}
+
+bool Checkpoints::keeps(const TaskKey& render) const {
+  if (stages_.empty() || (render.step + 1) % runs_per_stage_ != 0) return false;
+  const std::size_t stage = stage_of(render);
+  return stage + stages_per_step_ < stages_.size() && !stages_[stage].let_go;
+}
+
+std::vector<TaskKey> Checkpoints::complete(const TaskKey& render) {
+  std::vector<TaskKey> gone;
+  if (stages_.empty() || --stages_[stage_of(render)].open > 0) return gone;
+
+  // Of the two checkpoints before.
+  for (std::int32_t back = 1; back <= 2; ++back) {
+    const std::int32_t step = render.step / runs_per_stage_ - back;
+    if (step < 0) break;
+    const std::int32_t run = (step + 1) * runs_per_stage_ - 1;
+    const std::size_t stage = stage_of({TaskKind::render, run, render.tile});
+    if (stages_[stage].let_go || !is_over(stage + stages_per_step_) ||
+        !is_over(stage + 2 * stages_per_step_))
+      continue;
+    stages_[stage].let_go = true;
+    const auto count = static_cast<std::int32_t>(tiles_per_stage_);
+    const std::int32_t first = render.tile / count * count;
+    for (std::int32_t tile = first; tile < first + count; ++tile)
+      gone.push_back({TaskKind::render, run, tile});
+  }
+  return gone;
+}
+
+void Checkpoints::reopen(const TaskKey& render) {
+  if (!stages_.empty()) ++stages_[stage_of(render)].open;
+}
+
+void Checkpoints::let_go(const TaskKey& render) {
+  if (!stages_.empty()) stages_[stage_of(render)].let_go = true;
+}
+
+}  // namespace baton

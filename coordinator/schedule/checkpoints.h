@@ -1,0 +1,43 @@
+#pragma once
+
+#include <cstdint>
+#include <vector>
+
+#include "common/job/task.h"
+#include "coordinator/schedule/job_graph.h"
+
+namespace baton {
+
+/// Which states stay although all who need them have read them, so that what is lost later is made
+/// again from there and not from the first frame. A *checkpoint* is the state of every
+/// state.checkpointEvery-th frame; it stays until the two after it, or those that there are, are
+/// complete: of the tile itself where pixels keep to themselves, else of all tiles. Once let go it
+/// is never asked for again.
+class Checkpoints {
+ public:
+  explicit Checkpoints(const JobGraph& graph);
+
+  /// Whether the state of a render task is such a checkpoint.
+  bool keeps(const TaskKey& render) const;
+  /// A render task is done. Returns those whose states need not stay any more.
+  std::vector<TaskKey> complete(const TaskKey& render);
+  /// A render task that was done is open again.
+  void reopen(const TaskKey& render);
+  /// The state of a render task is gone, and with it the use of the checkpoint.
+  void let_go(const TaskKey& render);
+
+ private:
+  /// The runs up to a checkpoint of the tiles that share it.
+  struct Stage {
+    std::int32_t open = 0;  ///< render tasks that are not done
+    bool let_go = false;    ///< its checkpoint
+  };
+  std::size_t stage_of(const TaskKey& render) const;
+  bool is_over(std::size_t stage) const;
+
+  std::int32_t runs_per_stage_, num_runs_, num_tiles_;
+  std::size_t tiles_per_stage_, stages_per_step_;  ///< a step: from one checkpoint to the next
+  std::vector<Stage> stages_;                      ///< by step, then tile
+};
+
+}  // namespace baton
