@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstddef>
+#include <limits>
 #include <list>
 #include <map>
 #include <memory>
@@ -10,7 +11,8 @@
 namespace baton {
 
 /// Values by key, as many as fit into a budget: the least recently used go first, and the one used
-/// last always stays. Whoever holds a value keeps it alive. Any number of threads. Key: ordered.
+/// last always stays. Whoever holds a value keeps it alive, so a value should not hold one of
+/// another cache. Any number of threads. Key: ordered.
 template <class Key, class Value>
 class LruCache {
  public:
@@ -18,7 +20,10 @@ class LruCache {
   /// What a value takes of the budget.
   using SizeOf = std::size_t (*)(const Value&);
 
-  LruCache(std::size_t budget, SizeOf size_of) : budget_(budget), size_of_(size_of) {}
+  /// most: entries.
+  LruCache(std::size_t budget, SizeOf size_of,
+           std::size_t most = std::numeric_limits<std::size_t>::max())
+      : budget_(budget), most_(most), size_of_(size_of) {}
 
   /// Null: not here.
   ValuePtr find(const Key& key) {
@@ -32,7 +37,7 @@ class LruCache {
     entries_.emplace_front(key, value);
     index_.emplace(key, entries_.begin());
     size_ += size_of_(*value);
-    while (size_ > budget_ && entries_.size() > 1) {
+    while ((size_ > budget_ || entries_.size() > most_) && entries_.size() > 1) {
       size_ -= size_of_(*entries_.back().second);
       index_.erase(entries_.back().first);
       entries_.pop_back();
@@ -53,7 +58,7 @@ class LruCache {
     return entries_.front().second;
   }
 
-  const std::size_t budget_;
+  const std::size_t budget_, most_;
   const SizeOf size_of_;
   mutable std::mutex mutex_;
   using Entries = std::list<std::pair<Key, ValuePtr>>;

@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <chrono>
 #include <cmath>
 
 #include "common/base/limits.h"
@@ -21,6 +20,12 @@ PresampledLightLayout presampled_layout(const JobSpec& job) {
       .num_taken = static_cast<std::uint32_t>(std::max(use.num_taken / num_populations(job), 1)),
       .one_run = use.one_run,
       .with_before = use.with_before};
+}
+
+/// Frames that tasks in hand may ask for: those of a run and of the one before it that somebody has
+/// not ended yet, and some more in motion, where runs are short.
+std::size_t frames_in_hand(const JobSpec& job) {
+  return 2 * static_cast<std::size_t>(frames_per_run(job)) + 6;
 }
 
 }  // namespace
@@ -44,10 +49,12 @@ LightSequence::LightSequence(const JobSpec& job, std::shared_ptr<MapCache> maps)
     : job_(job),
       maps_(std::move(maps)),
       frames_(expand_sequence(job)),
-      mixed_maps_(limits::kMaxEnvironmentCacheBytes,
-                  [](const EnvironmentMap& map) { return map.size_bytes(); }),
-      lights_(limits::kMaxEnvironmentCacheBytes,
-              [](const FrameLight& light) { return light.presampled.size_bytes(); }) {}
+      mixed_maps_(
+          limits::kMaxEnvironmentCacheBytes,
+          [](const EnvironmentMap& map) { return map.size_bytes(); }, frames_in_hand(job)),
+      presampled_(
+          limits::kMaxEnvironmentCacheBytes,
+          [](const PresampledLight& light) { return light.size_bytes(); }, frames_in_hand(job)) {}
 
 Result<std::shared_ptr<const EnvironmentMap>> LightSequence::key_map(std::int32_t key) {
   const std::string& path = job_.environment.keys[static_cast<std::size_t>(key)].map;
@@ -91,8 +98,6 @@ Result<Environment> LightSequence::environment(const EnvironmentFrame& frame) {
 
 Result<std::shared_ptr<const FrameLight>> LightSequence::at(std::int32_t index) {
   const std::lock_guard lock(mutex_);
-  if (auto found = lights_.find(index)) return found;
-  const auto start = std::chrono::steady_clock::now();
   const FrameSpec& frame = frames_[static_cast<std::size_t>(index)];
   const FrameSpec& frame_before = frames_[static_cast<std::size_t>(std::max(index - 1, 0))];
   auto light = std::make_shared<FrameLight>();
@@ -101,12 +106,14 @@ Result<std::shared_ptr<const FrameLight>> LightSequence::at(std::int32_t index) 
   light->still = frame.environment == frame_before.environment;
   if (frame.environment.same_texels(frame_before.environment))
     light->turn = turn_between(light->before, light->now);
-  light->presampled =
-      presample_light(light->now, light->before, job_.seed,
-                      static_cast<std::uint32_t>(frame.number), presampled_layout(job_));
-  light->prepare_seconds =
-      std::chrono::duration<double>(std::chrono::steady_clock::now() - start).count();
-  return lights_.insert(index, std::move(light));
+  light->presampled = presampled_.find(index);
+  if (light->presampled == nullptr) {
+    light->presampled = presampled_.insert(
+        index, std::make_shared<const PresampledLight>(presample_light(
+                   light->now, light->before, job_.seed, static_cast<std::uint32_t>(frame.number),
+                   presampled_layout(job_))));
+  }
+  return std::shared_ptr<const FrameLight>(std::move(light));
 }
 
 std::vector<std::string> LightSequence::repair_notes() const {

@@ -23,8 +23,7 @@ struct FrameLight {
   /// How directions turn with the light from the frame before to now, if that is all that it does;
   /// see turn_between()
   std::optional<Mat3> turn;
-  PresampledLight presampled;
-  double prepare_seconds = 0;  ///< time spent on texels, table and presampled
+  std::shared_ptr<const PresampledLight> presampled;
 };
 
 /// R_now R_before^-1 of a map whose texels stay: along it, directions on the lattice are carried
@@ -33,9 +32,10 @@ struct FrameLight {
 /// another light at once.
 std::optional<Mat3> turn_between(const Environment& before, const Environment& now);
 
-/// The environments of a job's frames, prepared on demand and kept while memory allows. Any number
-/// of threads may ask; a frame is prepared once while the others wait. A frame's light is a pure
-/// function of (job, frame).
+/// The environments of a job's frames, prepared on demand. What is made for a frame is kept while
+/// memory allows, of as many frames as tasks in hand may ask for. Any number of threads may ask; a
+/// frame is prepared once while the others wait. A frame's light is a pure function of (job,
+/// frame).
 class LightSequence {
  public:
   /// job must outlive the object. maps: may be shared with other jobs.
@@ -60,7 +60,7 @@ class LightSequence {
   mutable std::mutex mutex_;
   /// By the first frame index that shows these texels.
   LruCache<std::int32_t, EnvironmentMap> mixed_maps_;
-  LruCache<std::int32_t, FrameLight> lights_;
+  LruCache<std::int32_t, PresampledLight> presampled_;
   std::vector<std::string> repair_notes_;
 };
 

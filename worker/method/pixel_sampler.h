@@ -44,14 +44,14 @@ inline kernels::CarriedLight carried_light(const PixelInput& input) {
   return {.before = input.before,
           .now = input.now,
           .still = input.light.still,
-          .presampled = input.light.presampled,
+          .presampled = *input.light.presampled,
           .turn = input.light.turn ? &*input.light.turn : nullptr};
 }
 
 /// What its fresh candidates are drawn from.
 inline kernels::CandidateSource candidate_source(const PixelInput& input,
                                                  const kernels::CandidateCounts& counts) {
-  return {input.sites, input.now, input.light.presampled, counts,
+  return {input.sites, input.now, *input.light.presampled, counts,
           Rng(input.key, PassId::candidates).bits(0, 0)};
 }
 

@@ -143,7 +143,7 @@ void TileFrameRenderer::sample(Batch& batch, const FrameLight& light, SampleStat
   batch.rays.clear();
   poison(batch.end_ray);
   batch.known.fill({});
-  const kernels::CarriedLight carried{before, now, light.still, light.presampled};
+  const kernels::CarriedLight carried{before, now, light.still, *light.presampled};
   look_ahead(0, batch.first, carried, state);
   for (std::size_t i = 0; i < batch.count; ++i) {
     const std::size_t index = batch.first + i;

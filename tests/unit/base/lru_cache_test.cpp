@@ -32,6 +32,14 @@ TEST(LruCache, KeepsTheNewestHoweverLargeItIs) {
   EXPECT_EQ(cache.size(), 2u);
 }
 
+TEST(LruCache, KeepsNoMoreEntriesThanAsked) {
+  Cache cache(100, length, 2);
+  for (const int key : {1, 2, 3}) cache.insert(key, text("ab"));
+  EXPECT_EQ(cache.find(1), nullptr);
+  EXPECT_NE(cache.find(2), nullptr);
+  EXPECT_EQ(cache.size(), 4u);
+}
+
 TEST(LruCache, KeepsTheFirstOfAKey) {
   Cache cache(6, length);
   cache.insert(1, text("ab"));

@@ -29,7 +29,8 @@ FrameLight light_of(const Radiance& radiance) {
           .before = map,
           .still = true,
           .turn = {},
-          .presampled = presample_light(map, map, 3, 1, {.one_run = true})};
+          .presampled = std::make_shared<const PresampledLight>(
+              presample_light(map, map, 3, 1, {.one_run = true}))};
 }
 FrameLight sky() {
   return light_of([](int i) { return static_cast<float>(1 + (i * 37) % 23); });
