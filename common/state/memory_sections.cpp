@@ -21,7 +21,7 @@ void put_bins(const VisibilityBins& bins, ByteWriter& masks, ByteWriter& cells) 
   std::size_t count = 0;
   constexpr std::size_t kAtOnce = sizeof(std::uint64_t) / sizeof(VisibilityCell);
   for (std::size_t first = 0; first < VisibilityBins::kCount; first += kAtOnce) {
-    std::uint64_t some;  // most are 0
+    std::uint64_t some = 0;  // most are
     std::memcpy(&some, bins.data() + first, sizeof(some));
     if (some == 0) continue;
     for (std::size_t bin = first; bin < first + kAtOnce; ++bin) {

@@ -8,6 +8,9 @@
 namespace baton {
 namespace {
 
+/// A coordinator that was killed keeps its lock until the system has put it away.
+constexpr int kLockPatienceMs = 3000;
+
 Error database_error(int code, const std::string& name, const char* detail) {
   switch (code & 0xff) {
     case SQLITE_BUSY:
@@ -83,6 +86,8 @@ Result<SqlDatabase> SqlDatabase::open(const std::filesystem::path& path) {
       sqlite3_open_v2(path.c_str(), &handle, SQLITE_OPEN_READWRITE | SQLITE_OPEN_CREATE, nullptr);
   SqlDatabase database(handle, path.string());
   if (code != SQLITE_OK) return database_error(code, database.name_, sqlite3_errstr(code));
+
+  sqlite3_busy_timeout(handle, kLockPatienceMs);
 
   // Exclusive from the first access on: no shared memory file, and a second coordinator finds the
   // door closed.

@@ -12,6 +12,7 @@
 
 #include "common/job/job_json.h"
 #include "common/job/motion.h"
+#include "tests/bench/orbit.h"
 #include "worker/pass/cpu_clock.h"
 #include "worker/pass/render_context.h"
 #include "worker/scene/settle_motion.h"
@@ -109,19 +110,6 @@ void print_row(int sites, const Cost& cost, double ns_of_one_site) {
       static_cast<double>(s.sampling.pixels_fresh) / surface,
       static_cast<double>(cost.state_bytes) / static_cast<double>(cost.state_pixels),
       cost.seconds_encode / total, cost.seconds_decode / total, cost.seconds_decode_inputs / total);
-}
-
-/// The camera of a still job goes round what it looks at by 2 degrees a frame.
-void set_in_orbit(JobSpec& job) {
-  const Vec3 arm = job.camera.position - job.camera.look_at;
-  for (std::size_t i = 0; i < job.frames.size(); ++i) {
-    job.camera.keys.push_back(
-        {.frame = static_cast<double>(job.frames[i]),
-         .position =
-             job.camera.look_at + rotation_about(job.camera.up, 2.0 * static_cast<double>(i)) * arm,
-         .look_at = job.camera.look_at,
-         .up = job.camera.up});
-  }
 }
 
 Status run(const std::string& path, int frames) {

@@ -1,8 +1,11 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <chrono>
 #include <filesystem>
 #include <fstream>
+#include <memory>
+#include <thread>
 
 #include "common/base/files.h"
 #include "coordinator/journal/database.h"
@@ -160,6 +163,16 @@ TEST_F(JournalTest, ASecondCoordinatorIsTurnedAway) {
   ASSERT_FALSE(second.ok());
   EXPECT_THAT(second.error().message,
               HasSubstr("journal.sqlite: already in use by another coordinator"));
+}
+
+// One that was killed a moment ago still has the lock.
+TEST_F(JournalTest, ACoordinatorOnItsWayOutIsWaitedFor) {
+  auto first = std::make_unique<Journal>(open());
+  std::jthread end([&] {
+    std::this_thread::sleep_for(std::chrono::milliseconds(100));
+    first.reset();
+  });
+  EXPECT_TRUE(Journal::open(path).ok());
 }
 
 TEST_F(JournalTest, ANewerJournalIsRefused) {

@@ -214,5 +214,30 @@ TEST_P(BaselineKernels, FreeRaysOfTheRatioBringAllCandidates) {
   EXPECT_EQ(rays->constant.visibility, 0);
 }
 
+// Light so dim that a candidate's colour is no normal number: each counts by its share of all.
+TEST_P(BaselineKernels, RaysOfTheRatioAreNumbersInTheDark) {
+  RgbImage image{32, 16, std::vector<float>(32 * 16 * 3, 1.0f)};
+  const Environment night{
+      std::make_shared<EnvironmentMap>(image, MapFilter::bilinear, 1e-9f, false), Mat3()};
+  const PresampledLight light = presample_light(night, night, 3, 2);
+  SiteBlock sites;
+  sites.clear(1);
+  const MaterialSpec gloss{.kind = MaterialKind::phong, .kd = 0};
+  sites.add(0, {.position = {}, .ng = {0, 1, 0}, .ns = {0, 1, 0}, .wo = normalize({1, 0.3f, 0})},
+            make_material(gloss));
+  const auto scratch = std::make_unique<kernels::ChoiceScratch>();
+  const auto rays = std::make_unique<PixelRays>();
+  std::size_t num_rays = 0;
+  for (std::uint32_t seed = 0; seed < 500; ++seed) {
+    const Rng rng({.job_seed = seed}, PassId::candidates);
+    kernels::choose_ratio_rays({sites, view_of(night), light, {.from_light = 1}, rng.bits(0, 0)},
+                               0.3f, 1, *scratch, *rays);
+    num_rays += rays->count;
+    for (std::size_t j = 0; j < rays->count; ++j)
+      ASSERT_TRUE(std::isfinite(rays->r[j] + rays->g[j] + rays->b[j])) << seed;
+  }
+  EXPECT_GT(num_rays, 100u);
+}
+
 }  // namespace
 }  // namespace baton

@@ -29,16 +29,20 @@ struct ColorLine {
   void BeginBsdf() {}
 };
 
-/// Looks up the rays and what each brings. reflected: of all candidates.
+/// Looks up the rays and what each brings. reflected: of all candidates. total: of the line, in
+/// units of which colours are added: they may be as dim as numbers get.
 HWY_INLINE void LookUpShares(const ChosenCandidates& chosen, const DistinctPicks& picks,
-                             const Vec3Lanes& reflected, float num_rays, PixelRays& out) {
+                             const Vec3Lanes& reflected, float total, float num_rays,
+                             PixelRays& out) {
   const DF d;
+  const VF per_pick = hn::Set(d, total / num_rays);
   Vec3Lanes sum{hn::Zero(d), hn::Zero(d), hn::Zero(d)};
   for (std::size_t j = 0; j < picks.count; j += hn::Lanes(d)) {
     const CandidateLanes c = chosen.Evaluate(hn::Load(DI(), picks.pick.from(j)));
     const Vec3Lanes w = DecodeOctahedral(c.code);
     const VF times = hn::Load(d, picks.times.from(j));
-    const Vec3Lanes color = Scale(c.reflected, hn::Div(times, MeanLanes(c.reflected)));
+    const VF light = hn::Mul(per_pick, times);
+    const Vec3Lanes color = Scale(c.reflected, hn::Div(light, MeanLanes(c.reflected)));
     sum = HWY_NAMESPACE::Add(sum, color);
     StoreRays(w, color, hn::Div(times, hn::Set(d, num_rays)), c.site, j, out);
   }
@@ -70,7 +74,7 @@ inline float ChooseRatioRays(const kernels::CandidateSource& from, float u, std:
   // Choose the rays.
   const auto count = static_cast<std::size_t>(num_rays);
   LookUpShares(ChosenCandidates(from, scratch.from_bsdf), DistinctPicks(sums, total, u, count),
-               line.colors, static_cast<float>(num_rays), out);
+               line.colors, total, static_cast<float>(num_rays), out);
   return total;
 }
 
