@@ -158,6 +158,8 @@ Status Service::receive(const PeerId& peer, const WorkerHello& hello) {
                  hello.host);
   reply(peer, WorkerWelcome{journal_.epoch(), static_cast<std::int32_t>(options_.heartbeat.count()),
                             store_directory_.string()});
+  // A process that has only become impatient may not have received yet what it was granted.
+  if (!is_new) return step(WorkerAlive{hello.worker_id, hello.running});
   return step(WorkerJoined{hello.worker_id, hello.running});
 }
 

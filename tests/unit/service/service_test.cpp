@@ -112,6 +112,25 @@ TEST_F(ServiceTest, ASilentWorkerIsForgottenAndItsTaskGoesOn) {
   silent.expect<HelloAgain>();
 }
 
+// A worker that has waited too long for an answer says hello while its lease is on the way.
+TEST_F(ServiceTest, ASecondHelloOfAProcessLosesNoLease) {
+  options.heartbeat = std::chrono::minutes(1);
+  const RunningService service(options);
+  const Digest id = ask<JobAccepted>(service.endpoint(), SubmitJob{document}).job;
+  FakeWorker worker(service.endpoint(), store(), job);
+  worker.hello();
+  worker.say(LeaseRequest{1});
+  const LeaseId lease = worker.expect<LeaseGrant>().lease;
+  worker.hello();
+  worker.say(worker.work(lease));
+  worker.expect<WorkerWelcome>();
+  worker.say(Heartbeat{});
+  worker.expect<Heartbeat>();
+  const JobSummary summary = show(service.endpoint(), id).summary;
+  EXPECT_EQ(summary.attempts_lost, 0u);
+  EXPECT_EQ(summary.tasks_done, 1u);
+}
+
 TEST_F(ServiceTest, HeartbeatsAreAnswered) {
   const RunningService service(options);
   FakeWorker worker(service.endpoint(), store(), job);
