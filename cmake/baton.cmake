@@ -39,7 +39,7 @@ endif()
 # Sanitizer builds: every finding ends the program. GCC warns of uninitialized values in sanitized code that are not.
 if(BATON_SANITIZE)
   target_compile_options(baton_options INTERFACE -fsanitize=${BATON_SANITIZE} -fno-sanitize-recover=all
-    -fno-omit-frame-pointer -Wno-maybe-uninitialized)
+    -fno-omit-frame-pointer $<$<CXX_COMPILER_ID:GNU>:-Wno-maybe-uninitialized>)
   target_compile_definitions(baton_options INTERFACE HWY_COMPILE_ONLY_STATIC)
   target_link_options(baton_options INTERFACE -fsanitize=${BATON_SANITIZE})
 endif()
@@ -48,7 +48,7 @@ target_link_libraries(baton_options INTERFACE Threads::Threads)
 # baton_decides_only(TARGET): it moves no pixels. Sanitizer builds compile it without optimisation, which takes less time.
 function(baton_decides_only target)
   get_target_property(type ${target} TYPE)
-  if(BATON_SANITIZE AND NOT type STREQUAL "INTERFACE_LIBRARY")
+  if(BATON_SANITIZE AND NOT BATON_FUZZ AND NOT type STREQUAL "INTERFACE_LIBRARY")
     target_compile_options(${target} PRIVATE -O0)
   endif()
 endfunction()

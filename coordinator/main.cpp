@@ -6,10 +6,10 @@
 #include <atomic>
 #include <filesystem>
 
+#include "common/base/build.h"
 #include "common/base/exit_codes.h"
 #include "common/base/files.h"
 #include "common/base/log.h"
-#include "common/base/version.h"
 #include "coordinator/service/service.h"
 
 namespace {
@@ -43,7 +43,7 @@ int main(int argc, char** argv) {
   CLI::App app(
       "Splits jobs into tasks and leases them to workers. Killed at any time, it goes on where it "
       "was.");
-  app.set_version_flag("--version", baton::kVersion);
+  app.set_version_flag("--version", baton::build_identity());
   app.footer(
       "Examples:\n"
       "  baton-coordinator --work-dir /srv/baton --listen 'tcp://*:5570'\n"
@@ -66,6 +66,8 @@ int main(int argc, char** argv) {
                  "between signs of life of a worker; four missing ones lose it its leases")
       ->check(CLI::Range(10, 60000))
       ->capture_default_str();
+  app.add_flag("--mixed-builds", options.mixed_builds,
+               "take workers of other builds and instruction sets: pixels may differ");
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

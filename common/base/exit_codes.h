@@ -26,6 +26,7 @@ constexpr ExitCode exit_code_of(ErrorKind kind) {
     case ErrorKind::version:
       return ExitCode::bad_input;
     case ErrorKind::io:
+    case ErrorKind::no_space:
       return ExitCode::io;
     case ErrorKind::timeout:
       return ExitCode::timeout;

@@ -8,6 +8,7 @@
 #include <atomic>
 #include <cerrno>
 #include <cstring>
+#include <utility>
 
 #include "common/base/limits.h"
 
@@ -17,7 +18,9 @@ namespace {
 namespace fs = std::filesystem;
 
 Error io_error(std::string_view what, const fs::path& path) {
-  return {ErrorKind::io, fmt::format("{}: {}: {}", path.string(), what, std::strerror(errno))};
+  const bool is_full = errno == ENOSPC || errno == EDQUOT;
+  return {is_full ? ErrorKind::no_space : ErrorKind::io,
+          fmt::format("{}: {}: {}", path.string(), what, std::strerror(errno))};
 }
 
 /// Closes on scope exit.
@@ -29,6 +32,8 @@ struct FileDescriptor {
   ~FileDescriptor() {
     if (fd >= 0) ::close(fd);
   }
+  /// Closes now: some file systems tell only then that they could not write.
+  bool close() { return ::close(std::exchange(fd, -1)) == 0; }
 };
 
 Status sync_path(const fs::path& path, int flags) {
@@ -118,10 +123,11 @@ Status write_then(const fs::path& path, ByteView bytes, Publish publish) {
   if (path.has_parent_path()) fs::create_directories(path.parent_path(), error);
   const fs::path temporary = temporary_sibling(path);
   {
-    const FileDescriptor file(
-        ::open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644));
+    FileDescriptor file(::open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644));
     if (file.fd < 0) return io_error("cannot create", temporary);
-    if (Status written = write_all(file.fd, bytes, temporary); !written) {
+    Status written = write_all(file.fd, bytes, temporary);
+    if (!file.close() && written) written = io_error("cannot write", temporary);
+    if (!written) {
       ::unlink(temporary.c_str());
       return written;
     }
@@ -167,6 +173,21 @@ Status write_file_unsynced(const fs::path& path, ByteView bytes) {
     if (::rename(temporary.c_str(), path.c_str()) != 0) return io_error("cannot rename to", path);
     return {};
   });
+}
+
+Status expect_space(const fs::path& folder, std::uint64_t size_bytes, std::uint64_t reserve_bytes) {
+  std::error_code error;
+  const fs::space_info space = fs::space(folder, error);
+  if (error) return {};  // whoever writes will be told
+  const std::uint64_t reserve = std::min<std::uint64_t>(reserve_bytes, space.capacity / 20);
+  if (space.available >= size_bytes + reserve) return {};
+  constexpr double kMiB = 1 << 20;
+  return Error{
+      ErrorKind::no_space,
+      fmt::format("{}: {:.1f} MiB are free, {:.1f} MiB are left to frames and the journal, "
+                  "and {:.1f} MiB are to be written",
+                  folder.string(), static_cast<double>(space.available) / kMiB,
+                  static_cast<double>(reserve) / kMiB, static_cast<double>(size_bytes) / kMiB)};
 }
 
 Status sync_file_system(const fs::path& path) {

@@ -38,6 +38,11 @@ Status expect_content(const std::filesystem::path& path, ByteView bytes);
 /// or not at all, but only sync_file_system() makes it survive a power cut.
 Status write_file_unsynced(const std::filesystem::path& path, ByteView bytes);
 
+/// Error no_space: writing so much to the file system of `folder` would leave less than a reserve,
+/// at most a twentieth of it.
+Status expect_space(const std::filesystem::path& folder, std::uint64_t size_bytes,
+                    std::uint64_t reserve_bytes);
+
 /// Waits until everything written so far to the file system of `path` is on disk (Linux syncfs).
 Status sync_file_system(const std::filesystem::path& path);
 

@@ -49,12 +49,17 @@ inline constexpr std::uint64_t kMaxEnvironmentCacheBytes =
     4ull << 30;  ///< per process and kind of entry
 inline constexpr std::uint64_t kMaxStateCacheBytes =
     1ull << 30;  ///< decoded states that a worker keeps, per job
+inline constexpr std::uint64_t kStoreReserveBytes =
+    64ull << 20;  ///< of a disk that blobs leave to frames and the journal
+inline constexpr std::uint64_t kMaxFilmBytesAhead =
+    2ull << 30;  ///< films, before compression, of frames that are rendered ahead of an open one
 inline constexpr std::uint64_t kMaxSurfaceCacheBytes =
     1ull << 29;  ///< surfaces that a worker keeps where things move, per job
 inline constexpr std::size_t kMaxCachedPoses =
     16;  ///< frames whose moved geometry a worker keeps, per job
 inline constexpr int kMaxTasksPerJob = 4000000;
 inline constexpr int kMaxTaskAttempts = 16;
+inline constexpr int kMaxTaskLosses = 16;  ///< lost leases of a task that pause its job
 inline constexpr int kMaxSecondsPerTask = 30 * 24 * 3600;
 inline constexpr int kMaxLeasesPerWorker = 1024;
 inline constexpr int kMaxJobs = 10000;

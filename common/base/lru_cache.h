@@ -30,6 +30,12 @@ class LruCache {
     const std::lock_guard lock(mutex_);
     return use(key);
   }
+  /// The same, but does not count as use.
+  ValuePtr peek(const Key& key) const {
+    const std::lock_guard lock(mutex_);
+    const auto found = index_.find(key);
+    return found == index_.end() ? nullptr : found->second->second;
+  }
   /// Keeps a value, unless there is one, and returns what is there.
   ValuePtr insert(const Key& key, ValuePtr value) {
     const std::lock_guard lock(mutex_);

@@ -20,6 +20,7 @@ enum class ErrorKind {
   timeout,
   cancelled,
   internal,  ///< a bug in this program
+  no_space,  ///< a disk is full: waiting can help
 };
 
 /// An error of operation: the message names the file, the place and what was expected.

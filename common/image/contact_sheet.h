@@ -24,7 +24,9 @@ RgbImage resize(const RgbImage& image, int width);
 /// All frames in reading order on one sheet of `columns` columns, `thumb_width` pixels wide each
 /// (height by the aspect of the first frame), 2 pixel gaps between and around them in dark grey.
 /// Frames are resized as by resize(). All frames
-/// must have one size; `frames` must not be empty.
-RgbImage contact_sheet(std::span<const RgbImage> frames, int columns, int thumb_width);
+/// must have one size; `frames` must not be empty. numbers: of the frames, drawn white on black
+/// into their lower left corners; none: empty.
+RgbImage contact_sheet(std::span<const RgbImage> frames, int columns, int thumb_width,
+                       std::span<const int> numbers = {});
 
 }  // namespace baton

@@ -15,6 +15,7 @@
 #include "common/base/files.h"
 #include "common/base/limits.h"
 #include "common/image/exr_channels.h"
+#include "common/image/exr_header.h"
 #include "common/image/image_io.h"
 
 namespace baton {
@@ -183,6 +184,7 @@ auto with_exr_file(const std::filesystem::path& path, Use use)
   if (!std::filesystem::is_regular_file(path, error)) {
     return Error{ErrorKind::io, fmt::format("{}: no such file", path.string())};
   }
+  if (const Status sound = check_exr_attributes(path); !sound) return sound.error();
   try {
     Imf::InputFile file(path.c_str(), kOpenExrThreads);
     return use(file);

@@ -34,12 +34,12 @@ std::int64_t state_bytes_per_pixel(const JobSpec& job) {
 
 JobEstimate estimate_job(const JobSpec& job) {
   JobEstimate e;
-  const std::int64_t pixels = std::int64_t{job.image.width} * job.image.height;
+  const PixelRect image = job.image.rendered();
+  const std::int64_t pixels = image.area();
 
   // Count tasks and what each waits for: a run for those before it, a frame for its tiles.
   e.frames = static_cast<std::int64_t>(job.frames.size());
-  const std::int64_t side = job.image.tile_size;
-  e.tiles = (job.image.width + side - 1) / side * ((job.image.height + side - 1) / side);
+  e.tiles = TileGrid(job.image).count();
   e.runs = num_runs(job);
   e.render_tasks = e.tiles * e.runs;
   e.assemble_tasks = e.frames;
@@ -68,8 +68,9 @@ JobEstimate estimate_job(const JobSpec& job) {
   e.frame_bytes = pixels * ((e.film_channels - wide_channels) * sample_bytes + wide_channels * 4);
 
   // Size the state and the largest blob.
-  const std::int64_t tile_pixels = std::min<std::int64_t>(side, job.image.width) *
-                                   std::min<std::int64_t>(side, job.image.height);
+  const std::int64_t side = job.image.tile_size;
+  const std::int64_t tile_pixels =
+      std::min<std::int64_t>(side, image.width()) * std::min<std::int64_t>(side, image.height());
   e.largest_blob_bytes = tile_pixels * e.film_channels * 4;
   if (carries_state(job)) {
     // What is stored of a pixel's particles is hardly smaller; its memory is, by half and more.

@@ -73,7 +73,8 @@ class JobArchive {
   virtual bool integer(Key key, std::uint64_t& value) = 0;
   /// Finite numbers only. NaN is not written: a value that need not be there.
   virtual bool number(Key key, double& value, NumberRange range) = 0;
-  /// `count` numbers in brackets; with `lone` also one number that stands for all.
+  /// `count` numbers in brackets; with `lone` also one number that stands for all. NaN is not
+  /// written.
   virtual bool numbers(Key key, std::span<double> values, NumberRange range, bool lone) = 0;
   /// 1 to limits::kMaxTextLength bytes, no control characters. An empty text is not written.
   virtual bool text(Key key, std::string& value) = 0;

@@ -1,6 +1,7 @@
 #include "common/job/job_fields.h"
 
 #include <fmt/format.h>
+#include <fmt/ranges.h>
 
 #include <algorithm>
 #include <cmath>
@@ -38,6 +39,29 @@ void frame_fields(JobArchive& a, JobSpec& job) {
   }
 }
 
+/// A region as x, y, width, height; four NaN: none.
+std::array<double, 4> to_numbers(const std::optional<PixelRect>& region) {
+  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
+  if (!region) return {kNone, kNone, kNone, kNone};
+  return {double(region->x0), double(region->y0), double(region->width()),
+          double(region->height())};
+}
+
+void region_fields(JobArchive& a, ImageSpec& image) {
+  std::array<double, 4> r = to_numbers(image.region);
+  if (!a.numbers("region", r, {.min = 0, .max = limits::kMaxImageSide}, false)) return;
+  const bool whole = std::all_of(r.begin(), r.end(), [](double n) { return n == std::floor(n); });
+  if (!whole || r[2] < 1 || r[3] < 1 || r[0] + r[2] > image.width || r[1] + r[3] > image.height) {
+    a.fault("region",
+            fmt::format("x, y, width and height in whole pixels, inside of {} x {}", image.width,
+                        image.height),
+            fmt::format("[{}]", fmt::join(r, ", ")));
+    return;
+  }
+  const auto x = static_cast<int>(r[0]), y = static_cast<int>(r[1]);
+  image.region = PixelRect{x, y, x + static_cast<int>(r[2]), y + static_cast<int>(r[3])};
+}
+
 void fields(JobArchive& a, ImageSpec& image) {
   a.integer("width", image.width, 1, limits::kMaxImageSide);
   a.integer("height", image.height, 1, limits::kMaxImageSide);
@@ -47,6 +71,11 @@ void fields(JobArchive& a, ImageSpec& image) {
       a.fault("sites", "one of 1, 4, 9, 16", std::to_string(image.sites));
   }
   a.integer("tileSize", image.tile_size, limits::kMinTileSize, limits::kMaxTileSize);
+  region_fields(a, image);
+  // Applied where it is read: what is written is the smaller image.
+  double scale = std::numeric_limits<double>::quiet_NaN();
+  if (a.number("scale", scale, {.min = 0, .max = 1, .min_open = true}) && scale > 0)
+    image = scaled(image, scale);
 }
 
 void method_that_draws_anew(JobArchive& a, Key key, Method& method) {
@@ -227,6 +256,9 @@ void fields(JobArchive& a, JobSpec& job) {
   a.integer("maxSecondsPerTask", job.max_seconds_per_task, 1, limits::kMaxSecondsPerTask);
   a.integer("maxFailedTasks", job.max_failed_tasks, 1, limits::kMaxTasksPerJob);
   a.integer("maxFailuresPerWorker", job.max_failures_per_worker, 1, limits::kMaxTasksPerJob);
+  // Editors read it; it says nothing of the job.
+  std::string schema;
+  a.text("$schema", schema);
   check_size(a, job);
 }
 

@@ -55,11 +55,12 @@ std::string write(T value, int indent) {
 template <class T>
 Result<T> read(std::string_view text, const std::string& name,
                const std::filesystem::path& base_directory,
+               const std::vector<JobOverride>& overrides = {},
                std::set<std::string>* defaulted = nullptr) {
-  BATON_ASSIGN(const json root, parse_json_text(text, name));
+  BATON_ASSIGN(json root, parse_json_text(text, name));
   T value;
-  JobJsonReader reader(name, base_directory);
-  BATON_TRY(reader.read(root, [&] { fields(reader, value); }));
+  JobJsonReader reader(name, base_directory, overrides);
+  BATON_TRY(reader.read(std::move(root), [&] { fields(reader, value); }));
   if (defaulted != nullptr) *defaulted = reader.defaulted();
   return value;
 }
@@ -108,18 +109,20 @@ Result<JobSpec> parse_job(std::string_view text, const std::string& name,
   return read<JobSpec>(text, name, base_directory);
 }
 
-Result<JobSpec> load_job(const std::filesystem::path& path) {
+Result<JobSpec> load_job(const std::filesystem::path& path,
+                         const std::vector<JobOverride>& overrides) {
   BATON_ASSIGN(const std::string text, read_job_text(path));
-  return parse_job(text, path.string(), path.parent_path());
+  return read<JobSpec>(text, path.string(), path.parent_path(), overrides);
 }
 
 std::string to_json(const JobSpec& job) { return write(job, 2); }
 
-Result<std::vector<JobSetting>> explain_job(const std::filesystem::path& path) {
+Result<std::vector<JobSetting>> explain_job(const std::filesystem::path& path,
+                                            const std::vector<JobOverride>& overrides) {
   BATON_ASSIGN(const std::string text, read_job_text(path));
   std::set<std::string> defaulted;
   BATON_ASSIGN(const JobSpec job,
-               read<JobSpec>(text, path.string(), path.parent_path(), &defaulted));
+               read<JobSpec>(text, path.string(), path.parent_path(), overrides, &defaulted));
   std::vector<JobSetting> settings;
   collect_settings(ordered_json::parse(to_json(job)), "$", defaulted, true, settings);
   return settings;

@@ -18,8 +18,17 @@ namespace baton {
 Result<JobSpec> parse_job(std::string_view json, const std::string& name,
                           const std::filesystem::path& base_directory);
 
-/// Reads and parses a job file.
-Result<JobSpec> load_job(const std::filesystem::path& path);
+/// A value that is said in place of the job file's.
+struct JobOverride {
+  std::string path;   ///< in the JSON of the job: `image.sites`, `$.scene.objects[0].fitHeight`
+  std::string value;  ///< JSON; what is none counts as a text
+  std::string option = "--set";  ///< named in faults
+};
+
+/// Reads and parses a job file, with `overrides` put into its JSON, the last one last. Faults of
+/// what was put in name the option instead of the file.
+Result<JobSpec> load_job(const std::filesystem::path& path,
+                         const std::vector<JobOverride>& overrides = {});
 
 /// Canonical JSON of a job: every default written out, absolute paths, keys in a fixed order.
 /// parse_job(to_json(j)) == j.
@@ -33,7 +42,8 @@ struct JobSetting {
 };
 
 /// Every value of a job file in force, in the order of to_json. Errors: those of load_job.
-Result<std::vector<JobSetting>> explain_job(const std::filesystem::path& path);
+Result<std::vector<JobSetting>> explain_job(const std::filesystem::path& path,
+                                            const std::vector<JobOverride>& overrides = {});
 
 /// A file that the job reads, with the digest of its contents when the job was submitted.
 struct AssetDigest {

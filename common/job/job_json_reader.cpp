@@ -47,17 +47,21 @@ bool has_control_character(const std::string& text) {
 
 }  // namespace
 
-JobJsonReader::JobJsonReader(std::string name, const fs::path& base_directory) {
+JobJsonReader::JobJsonReader(std::string name, const fs::path& base_directory,
+                             const std::vector<JobOverride>& overrides)
+    : overrides_(overrides) {
   place_.file = std::move(name);
   std::error_code error;  // without a current folder, relative paths stay so and are not found
   place_.base_directory = fs::current_path(error) / base_directory;
 }
 
-Status JobJsonReader::read(const json& root, const Body& body) {
+Status JobJsonReader::read(json root, const Body& body) {
   Place place = place_;
   place.path = "$";
   place.file_root = place.path.size();
+  overrides_.apply(place.path, root);
   visit(root, std::move(place), body, {});
+  for (std::string& fault : overrides_.faults()) faults_.push_back(std::move(fault));
   if (faults_.empty()) return {};
 
   const std::size_t listed = std::min<std::size_t>(faults_.size(), limits::kMaxFaultsReported);
@@ -267,8 +271,10 @@ std::string JobJsonReader::path_of(std::string_view key) const {
 }
 
 void JobJsonReader::fault_at(const std::string& path, const std::string& message) {
-  faults_.push_back(
-      fmt::format("{}: ${}: {}", place_.file, path.substr(place_.file_root), message));
+  const std::string option = overrides_.source_of(path);
+  faults_.push_back(option.empty() ? fmt::format("{}: ${}: {}", place_.file,
+                                                 path.substr(place_.file_root), message)
+                                   : fmt::format("{}: {}: {}", option, path, message));
 }
 
 bool JobJsonReader::read_number(const std::string& path, const json& value, double& number,
@@ -345,6 +351,7 @@ void JobJsonReader::visit_file(const json& value, const std::string& path, const
   Result<json> document = parse_json_text(*text, place.file);
   if (!document) return faults_.push_back(document.error().message);
   documents_.push_back(std::move(document).value());
+  overrides_.apply(path, documents_.back());
   visit(documents_.back(), std::move(place), body, {});
 }
 

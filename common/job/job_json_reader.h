@@ -9,6 +9,7 @@
 
 #include "common/base/result.h"
 #include "common/job/job_archive.h"
+#include "common/job/job_json_overrides.h"
 
 namespace baton {
 
@@ -16,10 +17,12 @@ namespace baton {
 class JobJsonReader final : public JobArchive {
  public:
   /// name: goes first in faults. base_directory: what relative paths are relative to.
-  JobJsonReader(std::string name, const std::filesystem::path& base_directory);
+  /// overrides: what is said in place of the text's values.
+  JobJsonReader(std::string name, const std::filesystem::path& base_directory,
+                const std::vector<JobOverride>& overrides = {});
 
   /// Visits the root object. One error lists every fault, one per line.
-  Status read(const nlohmann::json& root, const Body& body);
+  Status read(nlohmann::json root, const Body& body);
   /// Paths of the optional values that the text does not give.
   const std::set<std::string>& defaulted() const { return defaulted_; }
 
@@ -71,6 +74,7 @@ class JobJsonReader final : public JobArchive {
 
   Place place_;
   std::list<nlohmann::json> documents_;  ///< of other files; places point into them
+  JobOverrides overrides_;
   std::set<std::string> defaulted_;
   std::vector<std::string> faults_;
 };

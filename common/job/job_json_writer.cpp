@@ -28,6 +28,7 @@ bool JobJsonWriter::number(Key key, double& value, NumberRange) {
 }
 
 bool JobJsonWriter::numbers(Key key, std::span<double> values, NumberRange, bool) {
+  if (std::isnan(values.front())) return false;
   root_[key.name] = std::vector<double>(values.begin(), values.end());
   return true;
 }

@@ -10,6 +10,7 @@
 
 #include "common/base/digest.h"
 #include "common/job/method.h"
+#include "common/math/pixel_rect.h"
 #include "common/math/vec3.h"
 
 namespace baton {
@@ -21,13 +22,19 @@ namespace baton {
 // ---- image
 // -------------------------------------------------------------------------------------------------
 struct ImageSpec {
-  int width = 640;     ///< pixels, [1, limits::kMaxImageSide]
+  int width = 640;     ///< pixels of the whole picture, [1, limits::kMaxImageSide]
   int height = 360;    ///< pixels
   int sites = 1;       ///< primary rays per pixel: 1, 4, 9 or 16 (stratified; box filter)
   int tile_size = 64;  ///< side of a farm tile in pixels; never changes the picture
+  std::optional<PixelRect> region{};  ///< the part that is rendered, inside the whole; none: all
 
   bool operator==(const ImageSpec&) const = default;
+  /// The pixels that are rendered. Pixels are always addressed by their place in the whole picture.
+  PixelRect rendered() const { return region.value_or(PixelRect{0, 0, width, height}); }
 };
+
+/// The image with its sides times `scale`, (0, 1]; a region grows to whole pixels.
+ImageSpec scaled(const ImageSpec& image, double scale);
 
 // ---- motion
 // ------------------------------------------------------------------------------------------------

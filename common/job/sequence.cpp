@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 
 #include "common/base/check.h"
 #include "common/job/motion.h"
@@ -47,34 +48,50 @@ std::vector<FrameSpec> expand_sequence(const JobSpec& job) {
   return frames;
 }
 
-TileGrid::TileGrid(int width, int height, int tile_size)
-    : width_(width),
-      height_(height),
+ImageSpec scaled(const ImageSpec& image, double scale) {
+  const auto side = [&](int pixels) {
+    return std::max(1, static_cast<int>(std::lround(pixels * scale)));
+  };
+  const auto low = [&](int edge, int limit) {
+    return std::min(static_cast<int>(std::floor(edge * scale)), limit - 1);
+  };
+  const auto high = [&](int edge, int limit) {
+    return std::min(static_cast<int>(std::ceil(edge * scale)), limit);
+  };
+  ImageSpec small = image;
+  small.width = side(image.width);
+  small.height = side(image.height);
+  if (const auto& r = image.region)
+    small.region = PixelRect{low(r->x0, small.width), low(r->y0, small.height),
+                             high(r->x1, small.width), high(r->y1, small.height)};
+  return small;
+}
+
+TileGrid::TileGrid(const PixelRect& image, int tile_size)
+    : image_(image),
       tile_size_(tile_size),
-      columns_((width + tile_size - 1) / tile_size),
-      rows_((height + tile_size - 1) / tile_size) {
-  BATON_CHECK(width > 0 && height > 0 && tile_size > 0);
+      columns_((image.width() + tile_size - 1) / tile_size),
+      rows_((image.height() + tile_size - 1) / tile_size) {
+  BATON_CHECK(image.width() > 0 && image.height() > 0 && tile_size > 0);
 }
 
 PixelRect TileGrid::rect(std::int32_t tile) const {
   BATON_CHECK(tile >= 0 && tile < count());
-  const std::int32_t x0 = tile % columns_ * tile_size_;
-  const std::int32_t y0 = tile / columns_ * tile_size_;
-  return {x0, y0, std::min(x0 + tile_size_, width_), std::min(y0 + tile_size_, height_)};
+  const std::int32_t x0 = image_.x0 + tile % columns_ * tile_size_;
+  const std::int32_t y0 = image_.y0 + tile / columns_ * tile_size_;
+  return {x0, y0, std::min(x0 + tile_size_, image_.x1), std::min(y0 + tile_size_, image_.y1)};
 }
 
 std::vector<std::int32_t> TileGrid::tiles_near(std::int32_t tile, std::int32_t reach_px) const {
-  const PixelRect r = rect(tile);
-  std::vector<std::int32_t> near;
-  const std::int32_t first_row = std::max(r.y0 - reach_px, 0) / tile_size_;
-  const std::int32_t last_row = std::min(r.y1 - 1 + reach_px, height_ - 1) / tile_size_;
-  const std::int32_t first_column = std::max(r.x0 - reach_px, 0) / tile_size_;
-  const std::int32_t last_column = std::min(r.x1 - 1 + reach_px, width_ - 1) / tile_size_;
-  for (std::int32_t row = first_row; row <= last_row; ++row) {
-    for (std::int32_t column = first_column; column <= last_column; ++column)
-      near.push_back(row * columns_ + column);
+  const PixelRect near = grown(rect(tile), reach_px, image_);
+  std::vector<std::int32_t> tiles;
+  for (std::int32_t row = (near.y0 - image_.y0) / tile_size_;
+       row <= (near.y1 - 1 - image_.y0) / tile_size_; ++row) {
+    for (std::int32_t column = (near.x0 - image_.x0) / tile_size_;
+         column <= (near.x1 - 1 - image_.x0) / tile_size_; ++column)
+      tiles.push_back(row * columns_ + column);
   }
-  return near;
+  return tiles;
 }
 
 std::int32_t frames_per_run(const JobSpec& job) {
@@ -84,6 +101,15 @@ std::int32_t frames_per_run(const JobSpec& job) {
 std::int32_t num_runs(const JobSpec& job) {
   const auto frames = static_cast<std::int32_t>(job.frames.size());
   return (frames + frames_per_run(job) - 1) / frames_per_run(job);
+}
+
+std::int32_t runs_per_checkpoint(const JobSpec& job) {
+  return (job.state.checkpoint_every + frames_per_run(job) - 1) / frames_per_run(job);
+}
+
+bool ends_in_checkpoint(const JobSpec& job, std::int32_t run) {
+  return carries_state(job) &&
+         ((run + 1) % runs_per_checkpoint(job) == 0 || run + 1 == num_runs(job));
 }
 
 TileRun tile_run(const JobSpec& job, std::int32_t tile, std::int32_t run) {

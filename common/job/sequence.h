@@ -37,12 +37,11 @@ struct FrameSpec {
 /// One FrameSpec per frame of the job, in order.
 std::vector<FrameSpec> expand_sequence(const JobSpec& job);
 
-/// The image cut into square tiles, row by row; border tiles are clipped.
+/// The rendered pixels cut into square tiles, row by row; border tiles are clipped.
 class TileGrid {
  public:
-  TileGrid(int width, int height, int tile_size);
-  explicit TileGrid(const ImageSpec& image)
-      : TileGrid(image.width, image.height, image.tile_size) {}
+  TileGrid(const PixelRect& image, int tile_size);
+  explicit TileGrid(const ImageSpec& image) : TileGrid(image.rendered(), image.tile_size) {}
 
   std::int32_t count() const { return columns_ * rows_; }
   std::int32_t columns() const { return columns_; }
@@ -54,7 +53,8 @@ class TileGrid {
   std::vector<std::int32_t> tiles_near(std::int32_t tile, std::int32_t reach_px) const;
 
  private:
-  std::int32_t width_, height_, tile_size_, columns_, rows_;
+  PixelRect image_;
+  std::int32_t tile_size_, columns_, rows_;
 };
 
 /// The unit that a lease hands out: one tile for frames [first_frame, last_frame] (0-based indices,
@@ -73,6 +73,11 @@ struct TileRun {
 std::int32_t frames_per_run(const JobSpec& job);
 /// Number of runs that cover the sequence: ceil(frames / frames_per_run).
 std::int32_t num_runs(const JobSpec& job);
+/// Runs from one checkpoint to the next: those in state.checkpoint_every frames.
+std::int32_t runs_per_checkpoint(const JobSpec& job);
+/// Whether what is lost later is made again from the states of this run, or they are the job's
+/// last: those must be durable, all else that tasks hand to each other can be made again.
+bool ends_in_checkpoint(const JobSpec& job, std::int32_t run);
 /// The run's frames; run in [0, num_runs(job)), tile in [0, TileGrid(job.image).count()).
 TileRun tile_run(const JobSpec& job, std::int32_t tile, std::int32_t run);
 /// True when the method hands something from frame to frame and state.carry lets it.

@@ -1,5 +1,7 @@
 #include "common/job/task.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 
 namespace baton {
@@ -14,6 +16,18 @@ std::string_view task_name(TaskKind kind) {
       return "second pass";
   }
   return "unknown";
+}
+
+std::string describe_task(const TaskKey& task) {
+  switch (task.kind) {
+    case TaskKind::render:
+      return fmt::format("run {} of tile {}", task.step, task.tile);
+    case TaskKind::assemble:
+      return fmt::format("assembly of frame index {}", task.step);
+    case TaskKind::second_pass:
+      return fmt::format("second pass of tile {} frame index {}", task.tile, task.step);
+  }
+  return "unknown task";
 }
 
 std::string_view job_status_name(JobStatus status) {

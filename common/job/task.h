@@ -36,6 +36,8 @@ struct TaskKey {
     a(kind, step, tile);
   }
 };
+/// "run 3 of tile 7", "assembly of frame index 5": the task in words, steps and tiles 0-based.
+std::string describe_task(const TaskKey& task);
 
 /// A blob that a task needs or made. `frame` is a 0-based index. Stored and sent; values are for
 /// ever.

@@ -16,10 +16,18 @@ struct PixelRect {
   constexpr bool contains(std::int32_t x, std::int32_t y) const {
     return x >= x0 && x < x1 && y >= y0 && y < y1;
   }
+  /// The rectangle of this size at (0, 0).
+  constexpr PixelRect at_origin() const { return {0, 0, width(), height()}; }
   /// Not empty, and inside [0, max_side) both ways.
   constexpr bool fits_within(std::int32_t max_side) const {
     return x0 >= 0 && y0 >= 0 && x0 < x1 && y0 < y1 && x1 <= max_side && y1 <= max_side;
   }
 };
+
+/// `rect` and what lies within `margin` of it, inside of `image`.
+constexpr PixelRect grown(const PixelRect& rect, std::int32_t margin, const PixelRect& image) {
+  return {std::max(rect.x0 - margin, image.x0), std::max(rect.y0 - margin, image.y0),
+          std::min(rect.x1 + margin, image.x1), std::min(rect.y1 + margin, image.y1)};
+}
 
 }  // namespace baton

@@ -20,7 +20,7 @@ Result<Socket> connect_to(const std::string& endpoint) {
 }
 
 ErrorKind error_kind_of(std::uint8_t kind) {
-  return kind <= static_cast<std::uint8_t>(ErrorKind::internal) ? static_cast<ErrorKind>(kind)
+  return kind <= static_cast<std::uint8_t>(ErrorKind::no_space) ? static_cast<ErrorKind>(kind)
                                                                 : ErrorKind::internal;
 }
 

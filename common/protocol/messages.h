@@ -17,7 +17,7 @@ namespace baton {
 /// travels here: blobs go through the store, messages carry their digests.
 
 inline constexpr const char* kProtocolName = "BATON";
-inline constexpr std::uint16_t kProtocolVersion = 3;
+inline constexpr std::uint16_t kProtocolVersion = 5;
 
 // ---- worker to coordinator ----------------------------------------------------------------------
 struct WorkerHello {  ///< first, and again after a reconnect or a new epoch
@@ -25,11 +25,12 @@ struct WorkerHello {  ///< first, and again after a reconnect or a new epoch
   std::uint64_t instance =
       0;  ///< drawn when the process starts: who the worker is, whatever its name
   std::int32_t pid = 0, num_threads = 0;
-  std::string instruction_set;   ///< e.g. "AVX2": results are the same bytes only on one of them
+  std::string build;             ///< build_identity()
+  std::string renderer;          ///< e.g. "AVX2, Embree 3.13.5": equal ones make equal bytes
   std::vector<LeaseId> running;  ///< leases in hand: a restarted coordinator may adopt them
   template <class A>
   void fields(A& a) {
-    a(worker_id, host, instance, pid, num_threads, instruction_set, running);
+    a(worker_id, host, instance, pid, num_threads, build, renderer, running);
   }
 };
 /// `count` more leases are wanted; replaces what was asked before.
@@ -61,9 +62,10 @@ struct TaskFailed {
   LeaseId lease;
   std::string message;
   bool permanent = false;  ///< bad input: no retry can help
+  bool no_space = false;   ///< a disk is full: nobody's failure, waiting can help
   template <class A>
   void fields(A& a) {
-    a(lease, message, permanent);
+    a(lease, message, permanent, no_space);
   }
 };
 struct JobDocumentRequest {
@@ -110,6 +112,14 @@ struct NoWork {
   template <class A>
   void fields(A& a) {
     a(retry_ms);
+  }
+};
+/// A TaskDone or TaskFailed of this lease has come, and what follows from it is durable.
+struct ReportReceived {
+  LeaseId lease;
+  template <class A>
+  void fields(A& a) {
+    a(lease);
   }
 };
 struct HelloAgain {
@@ -162,7 +172,7 @@ struct ShowJob {
   void fields(A& a) {
     a(job);
   }
-};  ///< digest or unique prefix
+};  ///< name, digest, or the unique beginning of one
 struct PauseJob {
   std::string job;
   template <class A>
@@ -244,10 +254,11 @@ struct JobDetail {
   std::vector<std::int32_t> frames_done;  ///< user's frame numbers
   std::vector<std::string> failures;      ///< newest last, at most 100
   std::vector<FrameStats> frames =
-      {};  ///< the tiles so far of each frame: frame is the user's number, tile -1
+      {};                  ///< the tiles so far of each frame: frame is the user's number, tile -1
+  std::string waits = {};  ///< for what, where it does
   template <class A>
   void fields(A& a) {
-    a(summary, frames_done, failures, frames);
+    a(summary, frames_done, failures, frames, waits);
   }
 };
 struct Refused {
@@ -264,7 +275,8 @@ using Message =
     std::variant<WorkerHello, LeaseRequest, Heartbeat, TaskDone, TaskFailed, JobDocumentRequest,
                  WorkerGoodbye, WorkerWelcome, LeaseGrant, LeaseRevoke, NoWork, HelloAgain,
                  JobDocument, Shutdown, SubmitJob, ListJobs, ShowJob, CancelJob, StopCoordinator,
-                 JobAccepted, JobList, JobDetail, Refused, PauseJob, ResumeJob, DrainWorker, Drain>;
+                 JobAccepted, JobList, JobDetail, Refused, PauseJob, ResumeJob, DrainWorker, Drain,
+                 ReportReceived>;
 
 /// The frames of one message: [protocol name and version][type][body].
 std::vector<Bytes> encode_message(const Message& message);

@@ -67,11 +67,10 @@ Status decode_bins(const SectionFile& file, const std::vector<std::size_t>& pixe
   return {};
 }
 
-/// A noise of all memories; a file from before it was kept leaves it unknown.
+/// A noise of all memories.
 Status decode_noise(const SectionFile& file, const SectionTag& tag,
                     std::uint16_t PixelMemory::*noise, const std::vector<std::size_t>& pixels,
                     const std::string& name, SampleState& state) {
-  if (file.find(tag) == nullptr) return {};
   constexpr std::uint16_t kLargest = 0x7F7F;  // upper half of the largest float
   BATON_ASSIGN(const ByteView payload,
                section_payload(file, tag, pixels.size() * kMemoryCellStride, name));

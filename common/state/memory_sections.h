@@ -26,8 +26,8 @@ struct MemoryPayloads {
 /// have disagreed. The state must have memories.
 MemoryPayloads encode_memory(const SampleState& state, const std::vector<std::size_t>& pixels);
 
-/// Inverse of encode_memory; a file without memories leaves the state without them, one without
-/// noise leaves that unknown. Errors name file, section and pixel.
+/// Inverse of encode_memory; a file without memories leaves the state without them. Errors name
+/// file, section and pixel.
 Status decode_memory(const SectionFile& file, const std::vector<std::size_t>& pixels,
                      const std::string& name, SampleState& state);
 

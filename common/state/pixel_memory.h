@@ -52,9 +52,9 @@ class VisibilityBins {
 /// the frames before left. All 0: nothing is known.
 struct PixelMemory {
   static constexpr std::uint16_t kSawFree = 1, kSawBlocked = 2, kSawBoth = 3;
-  /// In a file, at most.
+  /// In a file before packing, at most: a bit for each bin, all of them, and what is below.
   static constexpr std::size_t kMaxStoredBytes =
-      (VisibilityBins::kCount + 4) * sizeof(VisibilityCell);
+      VisibilityBins::kCount / 8 + (VisibilityBins::kCount + 4) * sizeof(VisibilityCell);
 
   VisibilityBins bins;  ///< not empty exactly where both outcomes were seen: most pixels need none
   VisibilityCell all_rays = 0;

@@ -30,6 +30,7 @@ Result<Digest> BlobStore::put(ByteView bytes) {
                  fmt::format("{}: {} bytes, at most {} are stored", path(digest).string(),
                              bytes.size(), limits::kMaxBlobBytes)};
   }
+  BATON_TRY(expect_space(directory_, bytes.size(), limits::kStoreReserveBytes));
   BATON_TRY(write_file_unsynced(path(digest), bytes));
   return digest;
 }

@@ -20,11 +20,11 @@ class BlobStore {
 
   /// Publishes the bytes: from now on every process sees the blob, but it survives a power cut only
   /// after sync(). A blob that is there already is written again, which is harmless and mends a
-  /// damaged one. Errors: past limits::kMaxBlobBytes, the disk.
+  /// damaged one. Errors: past limits::kMaxBlobBytes, the disk;
+  /// no_space where it is so full that frames and the journal may soon have none.
   Result<Digest> put(ByteView bytes);
 
-  /// Makes all blobs put so far durable, with one wait for the disk. Whoever reports a blob to
-  /// others calls this first.
+  /// Makes all blobs put so far durable, with one wait for the disk.
   Status sync() const;
 
   /// The bytes with this digest. ErrorKind::corrupt names the file, the digest found and the one

@@ -59,6 +59,8 @@ Result<bool> SqlStatement::step() {
 Status SqlStatement::run() {
   BATON_ASSIGN(const bool row, step());
   BATON_CHECK(!row);
+  sqlite3_reset(statement_.get());
+  num_bound_ = 0;
   return {};
 }
 

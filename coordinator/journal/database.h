@@ -14,7 +14,8 @@ struct sqlite3_stmt;
 
 namespace baton {
 
-/// One prepared statement. Used as: bind all, step until false.
+/// One prepared statement. Used as: bind all, step until false. One that ran may be bound and run
+/// again.
 class SqlStatement {
  public:
   /// Parameters are numbered from 1 in the order of the calls.

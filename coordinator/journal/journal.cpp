@@ -15,7 +15,8 @@ constexpr std::int64_t kApplicationId = 0x4241544e;  // "BATN"
 
 // Digests, keys and statuses are written as numbers and hexadecimal text, so that the sqlite3 shell
 // shows them; outputs, statistics and leases in the form of common/base/archive.h: a change of
-// BlobRef, RenderStats, FrameStats or LeaseId is a new schema version.
+// BlobRef, RenderStats, FrameStats or LeaseId is a new schema version. Of `permanent` bit 0 says
+// that no retry by this worker can help, bit 1 that the task has failed for good with it.
 constexpr const char* kSchema = R"sql(
   CREATE TABLE starts (epoch INTEGER NOT NULL);
   INSERT INTO starts VALUES (0);
@@ -139,13 +140,14 @@ Result<JournalledJob> Journal::load(const Digest& digest) {
   while (true) {
     BATON_ASSIGN(const bool row, done.step());
     if (!row) break;
-    Completion& completion = result.completions.emplace_back();
+    Completion completion;
     BATON_TRY(read_enum(database_, done.integer(0), "completions.kind", completion.task.kind));
     completion.task.step = static_cast<std::int32_t>(done.integer(1));
     completion.task.tile = static_cast<std::int32_t>(done.integer(2));
     BATON_TRY(read_blob(database_, done.blob(3), "completions.outputs", completion.outputs));
     BATON_TRY(read_blob(database_, done.blob(4), "completions.stats", completion.stats));
     BATON_TRY(read_blob(database_, done.blob(5), "completions.frames", completion.frames));
+    result.completions.add(std::move(completion));
   }
 
   BATON_ASSIGN(SqlStatement failed,
@@ -202,43 +204,48 @@ Result<Failure> Journal::read_failure(const SqlStatement& row) const {
   BATON_TRY(read_blob(database_, row.blob(0), "failures.lease", failure.lease));
   failure.worker = row.text(1);
   failure.message = row.text(2);
-  failure.permanent = row.integer(3) != 0;
+  failure.permanent = (row.integer(3) & 1) != 0;
+  failure.last = (row.integer(3) & 2) != 0;
   return failure;
 }
 
 // ---- writing ------------------------------------------------------------------------------------
 
-Result<SqlStatement> Journal::write(std::string_view sql) {
+/// sql: a literal.
+Result<SqlStatement*> Journal::write(std::string_view sql) {
   if (!in_transaction_) BATON_TRY(database_.execute("BEGIN IMMEDIATE"));
   in_transaction_ = true;
-  return database_.prepare(sql);
+  const auto known = writers_.find(sql);
+  if (known != writers_.end()) return &known->second;
+  BATON_ASSIGN(SqlStatement statement, database_.prepare(sql));
+  return &writers_.emplace(sql, std::move(statement)).first->second;
 }
 
 Status Journal::add_job(const Digest& job, const std::string& document) {
-  BATON_ASSIGN(SqlStatement insert,
+  BATON_ASSIGN(SqlStatement * insert,
                write("INSERT INTO jobs (digest, status, document) VALUES (?, ?, ?)"));
-  return insert.bind(job.hex())
+  return insert->bind(job.hex())
       .bind(static_cast<std::int64_t>(JobStatus::running))
       .bind(document)
       .run();
 }
 
 Status Journal::restart_job(const Digest& job) {
-  BATON_ASSIGN(SqlStatement failures, write("DELETE FROM failures WHERE job = ?"));
-  BATON_TRY(failures.bind(job.hex()).run());
+  BATON_ASSIGN(SqlStatement * failures, write("DELETE FROM failures WHERE job = ?"));
+  BATON_TRY(failures->bind(job.hex()).run());
   return record_status(job, JobStatus::running);
 }
 
 Status Journal::record_status(const Digest& job, JobStatus status) {
-  BATON_ASSIGN(SqlStatement update, write("UPDATE jobs SET status = ? WHERE digest = ?"));
-  return update.bind(static_cast<std::int64_t>(status)).bind(job.hex()).run();
+  BATON_ASSIGN(SqlStatement * update, write("UPDATE jobs SET status = ? WHERE digest = ?"));
+  return update->bind(static_cast<std::int64_t>(status)).bind(job.hex()).run();
 }
 
 Status Journal::record_completion(const Digest& job, const Completion& completion) {
-  BATON_ASSIGN(SqlStatement insert,
+  BATON_ASSIGN(SqlStatement * insert,
                write("INSERT OR REPLACE INTO completions (job, kind, step, tile, outputs, stats, "
                      "frames) VALUES (?, ?, ?, ?, ?, ?, ?)"));
-  return insert.bind(job.hex())
+  return insert->bind(job.hex())
       .bind(static_cast<std::int64_t>(completion.task.kind))
       .bind(completion.task.step)
       .bind(completion.task.tile)
@@ -250,23 +257,23 @@ Status Journal::record_completion(const Digest& job, const Completion& completio
 
 Status Journal::record_failure(const Failure& failure) {
   BATON_ASSIGN(
-      SqlStatement insert,
+      SqlStatement * insert,
       write(
           "INSERT INTO failures (job, lease, worker, message, permanent) VALUES (?, ?, ?, ?, ?)"));
-  return insert.bind(failure.lease.job.hex())
+  return insert->bind(failure.lease.job.hex())
       .bind(to_bytes(failure.lease))
       .bind(failure.worker)
       .bind(failure.message)
-      .bind(std::int64_t{failure.permanent})
+      .bind(std::int64_t{failure.permanent} | std::int64_t{failure.last} << 1)
       .run();
 }
 
 Status Journal::record_reopened(const Digest& job, const std::vector<TaskKey>& tasks) {
   for (const TaskKey& task : tasks) {
-    BATON_ASSIGN(SqlStatement remove,
+    BATON_ASSIGN(SqlStatement * remove,
                  write("DELETE FROM completions WHERE job = ? AND kind = ? AND "
                        "step = ? AND tile = ?"));
-    BATON_TRY(remove.bind(job.hex())
+    BATON_TRY(remove->bind(job.hex())
                   .bind(static_cast<std::int64_t>(task.kind))
                   .bind(task.step)
                   .bind(task.tile)

@@ -2,8 +2,10 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <map>
 #include <optional>
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "coordinator/journal/database.h"
@@ -16,7 +18,7 @@ struct JournalledJob {
   Digest job;
   std::string document;
   JobStatus status = JobStatus::running;
-  std::vector<Completion> completions;  ///< in the order in which they were recorded
+  Completions completions;  ///< in the order in which they were recorded
   std::vector<Failure> failures;
 };
 
@@ -61,9 +63,10 @@ class Journal {
   Status prepare_schema();
   Status count_start();
   Result<Failure> read_failure(const SqlStatement& row) const;
-  Result<SqlStatement> write(std::string_view sql);
+  Result<SqlStatement*> write(std::string_view sql);
 
   SqlDatabase database_;
+  std::map<std::string_view, SqlStatement> writers_;  ///< prepared once, by their text
   std::uint32_t epoch_ = 0;
   bool in_transaction_ = false;
 };

@@ -6,11 +6,21 @@
 
 namespace baton {
 
+void BlobReferences::add(const Digest& blob) {
+  ++counts_[blob];
+  expected_.erase(blob);
+}
+
+void BlobReferences::expect(const Digest& blob) {
+  if (++counts_[blob] == 1) expected_.insert(blob);
+}
+
 void BlobReferences::release(const Digest& blob) {
   const auto found = counts_.find(blob);
   BATON_CHECK(found != counts_.end());
   if (--found->second > 0) return;
   counts_.erase(found);
+  expected_.erase(blob);
   garbage_.push_back(blob);
 }
 

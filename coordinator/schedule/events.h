@@ -2,7 +2,9 @@
 
 #include <chrono>
 #include <cstdint>
+#include <map>
 #include <string>
+#include <utility>
 #include <variant>
 #include <vector>
 
@@ -24,12 +26,31 @@ struct Completion {
   std::vector<FrameStats> frames = {};  ///< of a render task, at most one for each frame of its run
 };
 
+/// All that is recorded as done of a job. What the tasks counted stands as sums: a job may have
+/// millions of them.
+struct Completions {
+  struct Task {
+    TaskKey task;
+    std::vector<BlobRef> outputs;
+  };
+  std::vector<Task> tasks;
+  RenderStats stats;
+  std::map<std::int32_t, SamplingStats> frames;  ///< by 0-based index
+
+  void add(Completion completion) {
+    tasks.push_back({completion.task, std::move(completion.outputs)});
+    stats.merge(completion.stats);
+    for (const FrameStats& frame : completion.frames) frames[frame.frame].merge(frame.sampling);
+  }
+};
+
 /// An attempt that failed.
 struct Failure {
   LeaseId lease;
   std::string worker;
   std::string message;
-  bool permanent = false;  ///< no retry can help
+  bool permanent = false;  ///< no retry by this worker can help
+  bool last = false;       ///< the task has failed for good with it
 };
 
 // ---- events -------------------------------------------------------------------------------------
@@ -39,7 +60,7 @@ struct JobAdded {
   Digest job;
   JobSpec spec;
   JobStatus status = JobStatus::running;
-  std::vector<Completion> completions;
+  Completions completions;
   std::vector<Failure> failures;
   std::vector<TaskKey> lost = {};         ///< of the completed tasks, those whose outputs are gone
   std::vector<TaskKey> lost_spares = {};  ///< those whose states nobody needs now (Checkpoints)
@@ -96,6 +117,13 @@ struct ResultMissing {
   std::string worker;
   LeaseId lease;
 };
+/// An attempt failed because a disk is full. Nobody is to blame: the task is given back, and tasks
+/// of its kind and job rest for a while.
+struct SpaceLacking {
+  std::string worker;
+  LeaseId lease;
+  std::string message;
+};
 /// An attempt failed because inputs of its task are gone or damaged: what made them is done again.
 struct InputsLost {
   std::string worker;
@@ -107,7 +135,7 @@ struct ClockTicked {};
 
 using Event = std::variant<JobAdded, JobCancelled, JobSuperseded, JobPaused, JobResumed,
                            WorkerJoined, WorkerAlive, WorkerLeft, WorkRequested, TaskCompleted,
-                           AttemptFailed, ResultMissing, InputsLost, ClockTicked>;
+                           AttemptFailed, ResultMissing, SpaceLacking, InputsLost, ClockTicked>;
 
 // ---- actions ------------------------------------------------------------------------------------
 /// Make it durable; nothing that comes after in the same or a later step may be sent or removed
@@ -150,7 +178,7 @@ struct ForgetWorker {
 /// Two different results for one task: a bug in the renderer or a broken machine.
 struct ReportConflict {
   LeaseId lease;
-  std::string worker;
+  std::string worker, maker;  ///< who reports, and who did first
   BlobRef expected, reported;
 };
 /// Nobody needs these blobs now; a later step may need one again, so ask is_referenced() before

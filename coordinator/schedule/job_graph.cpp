@@ -40,7 +40,7 @@ JobGraph::JobGraph(const JobSpec& job)
       num_runs_(baton::num_runs(job)),
       num_tiles_(grid_.count()),
       frames_per_run_(baton::frames_per_run(job)),
-      runs_per_checkpoint_((job.state.checkpoint_every + frames_per_run_ - 1) / frames_per_run_),
+      runs_per_checkpoint_(baton::runs_per_checkpoint(job)),
       reach_px_(history_reach_px(job)),
       carries_state_(baton::carries_state(job)),
       shares_history_(baton::shares_history(job)),
@@ -103,13 +103,13 @@ std::vector<TaskIndex> JobGraph::dependents(const TaskKey& key) const {
 std::vector<TaskIndex> JobGraph::inputs(const TaskKey& key) const {
   std::vector<TaskIndex> result;
   if (key.kind == TaskKind::assemble) {
-    const std::int32_t run = key.step / frames_per_run_;
+    const std::int32_t run = run_of(key.step);
     for (std::int32_t tile = 0; tile < num_tiles_; ++tile)
       result.push_back(has_second_pass_ ? second_pass_index(key.step, tile)
                                         : render_index(run, tile));
   } else if (key.kind == TaskKind::second_pass) {
     for (const std::int32_t near : grid_.tiles_near(key.tile, exchange_reach_px_))
-      result.push_back(render_index(key.step / frames_per_run_, near));
+      result.push_back(render_index(run_of(key.step), near));
   } else if (carries_state_ && key.step > 0) {
     add_neighbours(key.step - 1, key.tile, result);
   }

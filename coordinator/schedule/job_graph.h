@@ -50,6 +50,8 @@ class JobGraph {
   /// First and last frame (0-based, inclusive) of a run.
   std::int32_t first_frame(std::int32_t run) const { return run * frames_per_run_; }
   std::int32_t last_frame(std::int32_t run) const;
+  /// The run that renders a frame.
+  std::int32_t run_of(std::int32_t frame) const { return frame / frames_per_run_; }
 
   /// Whether a render task hands its samples to the next run.
   bool carries_state() const { return carries_state_; }

@@ -4,6 +4,7 @@
 #include <utility>
 
 #include "common/base/check.h"
+#include "common/base/limits.h"
 
 namespace baton {
 
@@ -54,6 +55,11 @@ bool JobTasks::apply(TaskIndex task, TaskEvent event) {
       --progress_.tasks_open;
       break;
   }
+  if (task < graph_.num_frames()) {  // its assembly
+    first_open_frame_ = std::min(first_open_frame_, task);
+    while (first_open_frame_ < graph_.num_frames() && !is_open(status(first_open_frame_)))
+      ++first_open_frame_;
+  }
   return true;
 }
 
@@ -74,8 +80,20 @@ std::uint32_t JobTasks::grant(TaskIndex task) {
   return ++record(task).attempts;
 }
 
-void JobTasks::complete(TaskIndex task, const Completion& completion, BlobReferences& blobs) {
-  force_done(task, completion);
+void JobTasks::complete(TaskIndex task, const Completion& completion, const std::string& worker,
+                        BlobReferences& blobs) {
+  const auto next = static_cast<std::uint16_t>(makers_.size());
+  const bool full = makers_.size() > limits::kMaxWorkers;
+  const auto [maker, is_new] = full ? std::pair{maker_numbers_.find(worker), false}
+                                    : maker_numbers_.try_emplace(worker, next);
+  if (is_new) makers_.push_back(worker);
+  record(task).maker = maker != maker_numbers_.end() ? maker->second : std::uint16_t{0};
+  if (!former_outputs_.contains(task)) {
+    progress_.stats.merge(completion.stats);
+    for (const FrameStats& frame : completion.frames)
+      progress_.frames[frame.frame].merge(frame.sampling);
+  }
+  force_done(task, completion.outputs);
   add_outputs(task, blobs);
 
   // What this task needed may go; what needed this task comes closer.
@@ -87,30 +105,29 @@ void JobTasks::complete(TaskIndex task, const Completion& completion, BlobRefere
 }
 
 /// Brings a task to done, along the legal way, and keeps what it made.
-void JobTasks::force_done(TaskIndex task, const Completion& completion) {
+void JobTasks::force_done(TaskIndex task, const std::vector<BlobRef>& outputs) {
   apply(task, TaskEvent::inputs_done);
   apply(task, TaskEvent::granted);
   BATON_CHECK(apply(task, TaskEvent::completed));
-  record(task).outputs = completion.outputs;
-  const bool again = former_outputs_.contains(task);
-  if (!again) progress_.stats.merge(completion.stats);
-  for (const FrameStats& frame : completion.frames) {
-    if (!again) progress_.frames[frame.frame].merge(frame.sampling);
-  }
-  for (const BlobRef& output : completion.outputs) count_output(output, true);
+  record(task).outputs = outputs;
+  for (const BlobRef& output : outputs) count_output(output, true);
 }
 
-void JobTasks::restore(const std::vector<Completion>& completions, const std::vector<TaskKey>& gone,
+void JobTasks::restore(const Completions& completions, const std::vector<TaskKey>& gone,
                        BlobReferences& blobs) {
   // First all statuses: who needs what follows from them.
   std::vector<TaskIndex> done;
-  for (Completion completion : completions) {
-    const std::optional<TaskIndex> task = graph_.find(completion.task);
+  std::vector<BlobRef> outputs;
+  for (const Completions::Task& recorded : completions.tasks) {
+    const std::optional<TaskIndex> task = graph_.find(recorded.task);
     if (!task || status(*task) == TaskStatus::done) continue;
-    if (graph_.check_outputs(completion.task, completion.outputs)) continue;
-    force_done(*task, completion);
+    outputs = recorded.outputs;
+    if (graph_.check_outputs(recorded.task, outputs)) continue;
+    force_done(*task, outputs);
     done.push_back(*task);
   }
+  progress_.stats = completions.stats;
+  progress_.frames = completions.frames;
   for (const TaskIndex task : done) {
     for (const TaskIndex dependent : graph_.dependents(graph_.key(task)))
       --record(dependent).missing_inputs;
@@ -174,8 +191,8 @@ std::vector<TaskIndex> JobTasks::ask_inputs_again(TaskIndex task, BlobReferences
     bool is_there = true;
     for (const std::size_t position : graph_.taken_outputs(key, graph_.key(input))) {
       const Digest& blob = outputs(input).at(position).digest;
-      is_there = is_there && blobs.contains(blob);
-      blobs.add(blob);
+      is_there = is_there && blobs.is_there(blob);
+      blobs.expect(blob);
     }
     if (!is_there) gone.push_back(input);
   }
@@ -207,9 +224,43 @@ void JobTasks::cancel_open() {
 }
 
 void JobTasks::add_failure(TaskIndex task, const Failure& failure) {
-  failures_[task].push_back({failure.lease, failure.worker});
-  ++failures_of_worker_[failure.worker];
+  ended_[task].push_back({failure.lease, failure.worker, true, failure.permanent});
   ++progress_.attempts_lost;
+}
+
+void JobTasks::add_returned(TaskIndex task, const LeaseId& lease, const std::string& worker) {
+  // One for each worker will do: one that comes again after that is reported again, too.
+  std::vector<EndedAttempt>& ended = ended_[task];
+  std::erase_if(ended, [&](const EndedAttempt& attempt) {
+    return !attempt.failed && attempt.worker == worker;
+  });
+  ended.push_back({lease, worker});
+}
+
+bool JobTasks::has_ended(TaskIndex task, const LeaseId& lease) const {
+  const auto found = ended_.find(task);
+  if (found == ended_.end()) return false;
+  return std::any_of(found->second.begin(), found->second.end(),
+                     [&](const EndedAttempt& attempt) { return attempt.lease == lease; });
+}
+
+std::vector<TaskIndex> JobTasks::tried() const {
+  std::vector<TaskIndex> tasks;
+  for (const auto& [task, ended] : ended_) tasks.push_back(task);
+  return tasks;
+}
+
+std::map<std::string, Blame> JobTasks::blame(TaskIndex task) const {
+  std::map<std::string, Blame> blame;
+  const auto found = ended_.find(task);
+  if (found == ended_.end()) return blame;
+  for (const EndedAttempt& attempt : found->second) {
+    if (!attempt.failed) continue;
+    Blame& of_worker = blame[attempt.worker];
+    ++of_worker.failures;
+    of_worker.for_good |= attempt.for_good;
+  }
+  return blame;
 }
 
 std::int32_t JobTasks::add_loss(TaskIndex task) {
@@ -217,29 +268,16 @@ std::int32_t JobTasks::add_loss(TaskIndex task) {
   return ++record(task).losses;
 }
 
-std::int32_t JobTasks::num_failures(TaskIndex task) const {
-  const auto found = failures_.find(task);
-  return found == failures_.end() ? 0 : static_cast<std::int32_t>(found->second.size());
+void JobTasks::forgive(const std::string& worker) {
+  for (auto& [task, ended] : ended_) {
+    for (EndedAttempt& attempt : ended) {
+      if (attempt.worker == worker) attempt.for_good = false;
+    }
+  }
 }
 
-std::int32_t JobTasks::num_failures(TaskIndex task, const std::string& worker) const {
-  const auto found = failures_.find(task);
-  if (found == failures_.end()) return 0;
-  return static_cast<std::int32_t>(
-      std::count_if(found->second.begin(), found->second.end(),
-                    [&](const FailedAttempt& attempt) { return attempt.worker == worker; }));
-}
-
-std::int32_t JobTasks::num_failures(const std::string& worker) const {
-  const auto found = failures_of_worker_.find(worker);
-  return found == failures_of_worker_.end() ? 0 : found->second;
-}
-
-bool JobTasks::has_failed(TaskIndex task, const LeaseId& lease) const {
-  const auto found = failures_.find(task);
-  if (found == failures_.end()) return false;
-  return std::any_of(found->second.begin(), found->second.end(),
-                     [&](const FailedAttempt& attempt) { return attempt.lease == lease; });
+void JobTasks::forget_losses() {
+  for (Record& record : records_) record.losses = 0;
 }
 
 void JobTasks::release_all(BlobReferences& blobs) {

@@ -26,6 +26,12 @@ struct JobProgress {
   std::map<std::int32_t, SamplingStats> frames;  ///< by 0-based index, over the tiles so far
 };
 
+/// How a worker failed a task.
+struct Blame {
+  std::int32_t failures = 0;
+  bool for_good = false;  ///< it said that no retry of its own can help
+};
+
 /// All tasks of one job: their status, outputs and failures. Knows nothing of workers but their
 /// names.
 class JobTasks {
@@ -39,22 +45,27 @@ class JobTasks {
   const std::vector<BlobRef>& outputs(TaskIndex task) const { return record(task).outputs; }
   /// Tasks that a worker may have, in the order in which they should be granted.
   const std::set<TaskIndex>& ready() const { return ready_; }
+  /// The first frame that is not written and may still be; num_frames: there is none.
+  std::int32_t first_open_frame() const { return first_open_frame_; }
   /// Whether all tasks that it needs are done. A leased task may lose one of them.
   bool has_inputs(TaskIndex task) const { return record(task).missing_inputs == 0; }
   /// The blobs that the task needs: see LeaseGrant in PROTOCOL.md. It must have its inputs.
   std::vector<BlobRef> inputs(TaskIndex task) const;
 
   /// Takes up what an earlier coordinator recorded as done, in any order; of a fresh job only.
-  /// Completions that are none of the job's are left out. gone: render tasks whose spare_blobs()
-  /// are not there.
-  void restore(const std::vector<Completion>& completions, const std::vector<TaskKey>& gone,
+  /// Tasks that are none of the job's are left out. gone: render tasks whose spare_blobs() are not
+  /// there.
+  void restore(const Completions& completions, const std::vector<TaskKey>& gone,
                BlobReferences& blobs);
 
   /// Leases a ready task. Returns the number of the attempt, from 1.
   std::uint32_t grant(TaskIndex task);
   /// Ends a leased task: its outputs must be complete and sorted (JobGraph::check_outputs).
   /// Releases its dependents, and the blobs that nobody needs any more.
-  void complete(TaskIndex task, const Completion& completion, BlobReferences& blobs);
+  void complete(TaskIndex task, const Completion& completion, const std::string& worker,
+                BlobReferences& blobs);
+  /// The worker that completed the task last.
+  const std::string& maker(TaskIndex task) const { return makers_[record(task).maker]; }
   /// Opens a leased task again: ready, or blocked when an input was lost meanwhile.
   void give_back(TaskIndex task);
   /// What a done task made is gone: it is done again, and so is whatever it needs and nobody kept,
@@ -69,13 +80,19 @@ class JobTasks {
 
   /// Remembers a failed attempt.
   void add_failure(TaskIndex task, const Failure& failure);
+  /// Remembers an attempt that was reported as not done and is nobody's failure.
+  void add_returned(TaskIndex task, const LeaseId& lease, const std::string& worker);
+  /// Whether this very attempt was reported as not done: it cannot be taken up again.
+  bool has_ended(TaskIndex task, const LeaseId& lease) const;
+  /// The tasks of which an attempt was reported as not done.
+  std::vector<TaskIndex> tried() const;
+  /// How often each worker failed the task.
+  std::map<std::string, Blame> blame(TaskIndex task) const;
   /// Remembers a lost lease. Returns how many the task has lost.
   std::int32_t add_loss(TaskIndex task);
-  std::int32_t num_failures(TaskIndex task) const;
-  std::int32_t num_failures(TaskIndex task, const std::string& worker) const;
-  std::int32_t num_failures(const std::string& worker) const;
-  /// Whether this very attempt is known to have failed.
-  bool has_failed(TaskIndex task, const LeaseId& lease) const;
+  /// The worker was started anew: what it could not do for good, it may try once more.
+  void forgive(const std::string& worker);
+  void forget_losses();
 
   /// Forgets every blob, of a job that is to be replaced.
   void release_all(BlobReferences& blobs);
@@ -89,12 +106,14 @@ class JobTasks {
     TaskStatus status = TaskStatus::blocked;
     std::int32_t missing_inputs = 0;  ///< input tasks that are not done, whatever its own status
     std::uint32_t attempts = 0;
-    std::int32_t losses = 0;
+    std::uint16_t losses = 0;
+    std::uint16_t maker = 0;  ///< of makers_
     std::vector<BlobRef> outputs;
   };
-  struct FailedAttempt {
+  struct EndedAttempt {
     LeaseId lease;
     std::string worker;
+    bool failed = false, for_good = false;
   };
 
   Record& record(TaskIndex task) { return records_[static_cast<std::size_t>(task)]; }
@@ -103,7 +122,7 @@ class JobTasks {
   std::int32_t num_needs(TaskIndex task, const BlobRef& output) const;
   std::int32_t num_uses(TaskIndex task, const BlobRef& output) const;
   void count_output(const BlobRef& output, bool made);
-  void force_done(TaskIndex task, const Completion& completion);
+  void force_done(TaskIndex task, const std::vector<BlobRef>& outputs);
   void add_outputs(TaskIndex task, BlobReferences& blobs) const;
   void release_outputs(TaskIndex task, BlobReferences& blobs) const;
   void release_inputs(TaskIndex task, BlobReferences& blobs) const;
@@ -114,10 +133,12 @@ class JobTasks {
   Checkpoints checkpoints_;
   bool keep_all_states_;
   std::vector<Record> records_;
+  std::vector<std::string> makers_{"(not known)"};  ///< names, of at most kMaxWorkers
+  std::map<std::string, std::uint16_t> maker_numbers_;
   std::set<TaskIndex> ready_;
-  std::map<TaskIndex, std::vector<FailedAttempt>> failures_;
+  std::int32_t first_open_frame_ = 0;
+  std::map<TaskIndex, std::vector<EndedAttempt>> ended_;  ///< and not done
   std::map<TaskIndex, std::vector<BlobRef>> former_outputs_;
-  std::map<std::string, std::int32_t> failures_of_worker_;
   JobProgress progress_;
 };
 

@@ -6,19 +6,19 @@
 #include <utility>
 
 #include "common/base/limits.h"
+#include "common/job/estimate.h"
 
 namespace baton {
 namespace {
 
-std::string describe(const TaskKey& task) {
-  if (task.kind == TaskKind::assemble) return fmt::format("assembly of frame index {}", task.step);
-  if (task.kind == TaskKind::second_pass)
-    return fmt::format("second pass of tile {} frame index {}", task.tile, task.step);
-  return fmt::format("run {} of tile {}", task.step, task.tile);
+/// How many frames may be rendered ahead of the first that is not written: as their films have
+/// room, and at least two runs, so that a tile that takes long stops nobody at once.
+std::int32_t max_frames_ahead(const JobSpec& spec) {
+  const auto film_bytes = static_cast<std::uint64_t>(std::max(estimate_job(spec).film_bytes, 1L));
+  const std::uint64_t frames = limits::kMaxFilmBytesAhead / film_bytes;
+  const auto all = static_cast<std::uint64_t>(spec.frames.size());
+  return std::max(2 * frames_per_run(spec), static_cast<std::int32_t>(std::min(frames, all)));
 }
-
-/// The attempts that a task may fail in all.
-std::int32_t attempts_allowed(const JobSpec& spec) { return spec.max_retries_per_task + 1; }
 
 }  // namespace
 
@@ -70,7 +70,9 @@ void Scheduler::on(const JobAdded& event, TimePoint, Actions& actions) {
   }
 
   // Take up what the journal knows; all else is fresh.
-  Job& job = jobs_.emplace(event.job, Job{event.spec, event.status, sequence, JobTasks(event.spec)})
+  Job& job = jobs_
+                 .emplace(event.job, Job{event.spec, event.status, sequence, JobTasks(event.spec),
+                                         TileHomes(event.spec), max_frames_ahead(event.spec)})
                  .first->second;
   replay(job, event, actions);
   if (!is_open(event.status)) {
@@ -103,10 +105,7 @@ void Scheduler::on(const JobSuperseded& event, TimePoint, Actions& actions) {
 
 void Scheduler::on(const JobPaused& event, TimePoint, Actions& actions) {
   Job* job = find(event.job);
-  if (!job || job->status != JobStatus::running) return;
-  job->status = JobStatus::paused;
-  running_.erase(rank(*job));
-  actions.push_back(RecordJobStatus{event.job, job->status, "paused"});
+  if (job && job->status == JobStatus::running) pause_job(event.job, *job, "paused", actions);
 }
 
 void Scheduler::on(const JobResumed& event, TimePoint, Actions& actions) {
@@ -114,8 +113,11 @@ void Scheduler::on(const JobResumed& event, TimePoint, Actions& actions) {
   if (!job || job->status != JobStatus::paused) return;
   job->status = JobStatus::running;
   running_.emplace(rank(*job), event.job);
+  job->tasks.forget_losses();
+  job->waits.clear();
   reopen(event.job, *job, event.lost, actions);
   actions.push_back(RecordJobStatus{event.job, job->status, "resumed"});
+  end_if_finished(event.job, *job, actions);
 }
 
 // ---- events: reports ----------------------------------------------------------------------------
@@ -130,9 +132,7 @@ void Scheduler::on(const TaskCompleted& event, TimePoint now, Actions& actions) 
     const Job* job = find_job(event.lease.job);
     const auto task = job ? job->tasks.graph().find(event.lease.task) : std::nullopt;
     if (!task || job->tasks.graph().check_outputs(event.lease.task, outputs)) return;
-    const std::vector<BlobRef>& expected = job->tasks.outputs(*task);
-    const auto [e, o] = std::mismatch(expected.begin(), expected.end(), outputs.begin());
-    if (e != expected.end()) actions.push_back(ReportConflict{event.lease, event.worker, *e, *o});
+    compare_results(event, job->tasks.outputs(*task), outputs, actions);
     return;
   }
 
@@ -141,38 +141,69 @@ void Scheduler::on(const TaskCompleted& event, TimePoint now, Actions& actions) 
   std::optional<std::string> fault = graph.check_outputs(event.lease.task, outputs);
   if (!fault) fault = graph.check_frames(event.lease.task, event.frames);
   if (fault) {
-    fail_attempt(held, {event.lease, event.worker, *fault, false}, actions);
+    fail_attempt(held, {event.lease, event.worker, *fault}, now, actions);
     return;
   }
   // What was done before must come out alike.
-  const std::vector<BlobRef>& former = held.job->tasks.former_outputs(held.task);
-  const auto [f, o] = std::mismatch(former.begin(), former.end(), outputs.begin());
-  if (f != former.end()) actions.push_back(ReportConflict{event.lease, event.worker, *f, *o});
+  const bool is_equal =
+      compare_results(event, held.job->tasks.former_outputs(held.task), outputs, actions);
   Completion completion{event.lease.task, std::move(outputs), event.stats, event.frames};
-  held.job->tasks.complete(held.task, completion, blobs_);
+  held.job->tasks.complete(held.task, completion, event.worker, blobs_);
+  if (held.job->status == JobStatus::running) held.job->waits.clear();
   drop_lease(event.lease.job, held.task);
   actions.push_back(RecordCompletion{event.lease.job, std::move(completion)});
-  end_if_finished(event.lease.job, *held.job, actions);
+  if (is_equal) end_if_finished(event.lease.job, *held.job, actions);
+}
+
+/// Two different results for one task are a bug or a broken machine: the job pauses, so that
+/// somebody looks before more is made of them. Returns whether they are equal.
+bool Scheduler::compare_results(const TaskCompleted& event, const std::vector<BlobRef>& expected,
+                                const std::vector<BlobRef>& reported, Actions& actions) {
+  const auto [e, r] =
+      std::mismatch(expected.begin(), expected.end(), reported.begin(), reported.end());
+  if (e == expected.end() || r == reported.end()) return true;
+  const Digest digest = event.lease.job;
+  Job& job = jobs_.at(digest);
+  const std::string& maker = job.tasks.maker(*job.tasks.graph().find(event.lease.task));
+  actions.push_back(ReportConflict{event.lease, event.worker, maker, *e, *r});
+  if (job.status != JobStatus::running) return false;
+  job.waits = fmt::format("somebody to look: workers {} and {} have made different bytes of {}",
+                          maker, event.worker, describe_task(event.lease.task));
+  pause_job(digest, job, job.waits, actions);
+  return false;
 }
 
 void Scheduler::on(const AttemptFailed& event, TimePoint now, Actions& actions) {
   if (!touch(event.worker, now)) return;
   const Held held = hold(event.worker, event.lease, now);
   if (held.job)
-    fail_attempt(held, {event.lease, event.worker, event.message, event.permanent}, actions);
+    fail_attempt(held, {event.lease, event.worker, event.message, event.permanent}, now, actions);
 }
 
 void Scheduler::on(const ResultMissing& event, TimePoint now, Actions& actions) {
   if (!touch(event.worker, now)) return;
   const Held held = hold(event.worker, event.lease, now);
-  if (held.job) lose_lease(event.lease.job, held.task, actions);
+  if (!held.job) return;
+  held.job->tasks.add_returned(held.task, event.lease, event.worker);
+  lose_lease(event.lease.job, held.task, actions);
+}
+
+void Scheduler::on(const SpaceLacking& event, TimePoint now, Actions&) {
+  if (!touch(event.worker, now)) return;
+  const Held held = hold(event.worker, event.lease, now);
+  if (!held.job) return;
+  drop_lease(event.lease.job, held.task);
+  held.job->tasks.add_returned(held.task, event.lease, event.worker);
+  held.job->tasks.give_back(held.task);
+  held.job->rests_until.at(static_cast<std::size_t>(event.lease.task.kind)) = now + kRest;
+  held.job->waits = "space: " + event.message;
 }
 
 void Scheduler::on(const InputsLost& event, TimePoint now, Actions& actions) {
   if (!touch(event.worker, now)) return;
   const Held held = hold(event.worker, event.lease, now);
   if (!held.job) return;
-  const JobTasks& tasks = held.job->tasks;
+  JobTasks& tasks = held.job->tasks;
   std::vector<TaskKey> makers;
   for (const TaskIndex input : tasks.graph().inputs(event.lease.task)) {
     const std::vector<BlobRef>& made = tasks.outputs(input);
@@ -181,6 +212,7 @@ void Scheduler::on(const InputsLost& event, TimePoint now, Actions& actions) {
     });
     if (lost) makers.push_back(tasks.graph().key(input));
   }
+  tasks.add_returned(held.task, event.lease, event.worker);
   lose_lease(event.lease.job, held.task, actions);
   if (is_open(held.job->status)) reopen(event.lease.job, *held.job, makers, actions);
 }
@@ -202,11 +234,9 @@ void Scheduler::replay(Job& job, const JobAdded& event, Actions& actions) {
     const auto task = job.tasks.graph().find(failure.lease.task);
     if (!task) continue;
     job.tasks.add_failure(*task, failure);
-    if (!job.tasks.ready().contains(*task)) continue;
-    if (failure.permanent || job.tasks.num_failures(*task) >= attempts_allowed(job.spec)) {
-      job.tasks.grant(*task);
-      job.tasks.give_up(*task);
-    }
+    if (!failure.last || !job.tasks.ready().contains(*task)) continue;
+    job.tasks.grant(*task);
+    job.tasks.give_up(*task);
   }
 }
 
@@ -223,24 +253,20 @@ void Scheduler::reopen(const Digest& digest, Job& job, const std::vector<TaskKey
   if (!record.tasks.empty()) actions.push_back(std::move(record));
 }
 
-void Scheduler::fail_attempt(const Held& held, const Failure& failure, Actions& actions) {
+void Scheduler::fail_attempt(const Held& held, Failure failure, TimePoint now, Actions& actions) {
   const Digest digest = failure.lease.job;
   Job& job = *held.job;
   drop_lease(digest, held.task);
   job.tasks.add_failure(held.task, failure);
+  failure.last = is_exhausted(job, held.task);
   actions.push_back(RecordFailure{failure});
 
-  // Try again, unless that cannot help or was tried often enough.
-  if (failure.permanent || job.tasks.num_failures(held.task) >= attempts_allowed(job.spec)) {
+  Job::Standing& standing = job.workers[failure.worker];
+  if (++standing.failures >= job.spec.max_failures_per_worker) standing = {0, now + kWorkerRest};
+  if (failure.last) {
     give_up(digest, job, held.task, failure.message, actions);
   } else {
     job.tasks.give_back(held.task);
-    if (everyone_is_banned(job)) {
-      end_job(digest, job, JobStatus::failed,
-              fmt::format("every connected worker has failed {} times; the last one: {}",
-                          job.spec.max_failures_per_worker, failure.message),
-              actions);
-    }
   }
 }
 
@@ -251,10 +277,18 @@ void Scheduler::give_up(const Digest& digest, Job& job, TaskIndex task, const st
   job.tasks.give_up(task);
   if (job.tasks.progress().tasks_failed >= static_cast<std::uint64_t>(job.spec.max_failed_tasks)) {
     end_job(digest, job, JobStatus::failed,
-            fmt::format("{} failed: {}", describe(job.tasks.graph().key(task)), reason), actions);
+            fmt::format("{} failed: {}", describe_task(job.tasks.graph().key(task)), reason),
+            actions);
   } else {
     end_if_finished(digest, job, actions);
   }
+}
+
+void Scheduler::pause_job(const Digest& digest, Job& job, const std::string& reason,
+                          Actions& actions) {
+  job.status = JobStatus::paused;
+  running_.erase(rank(job));
+  actions.push_back(RecordJobStatus{digest, job.status, reason});
 }
 
 void Scheduler::end_if_finished(const Digest& digest, Job& job, Actions& actions) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <chrono>
 #include <compare>
 #include <cstdint>
@@ -11,6 +12,7 @@
 
 #include "coordinator/schedule/events.h"
 #include "coordinator/schedule/job_tasks.h"
+#include "coordinator/schedule/tile_homes.h"
 
 namespace baton {
 
@@ -18,8 +20,13 @@ namespace baton {
 /// an argument and never decides what a task makes, only who makes it.
 ///
 /// A task goes to the worker that asked first; of the tasks, the job of highest priority comes
-/// first, then the job that was submitted first, then the order of TaskIndex. A retry goes to a
-/// worker that has failed the task least.
+/// first, then the job that was submitted first, then what TileHomes prefers, then the order of
+/// TaskIndex. Nothing is rendered so far ahead of the first open frame that films pile up.
+///
+/// A task fails for good when as many workers have failed it as the job allows attempts, or, where
+/// fewer are connected, when those have had all attempts or can do no more. A retry goes to a
+/// worker that has failed the task least. A worker that fails much rests from the job for a while.
+/// Lost leases are no failures; a task that loses too many pauses its job.
 class Scheduler {
  public:
   struct Job {
@@ -27,11 +34,25 @@ class Scheduler {
     JobStatus status = JobStatus::running;
     std::uint64_t sequence = 0;  ///< position in the order of submission
     JobTasks tasks;
+    TileHomes homes;
+    std::int32_t max_frames_ahead = 0;          ///< of the first frame that is not written
+    std::array<TimePoint, 3> rests_until = {};  ///< tasks of each kind
+    std::string waits = {};                     ///< for what, as far as an event said so
+    struct Standing {
+      std::int32_t failures = 0;  ///< since its last rest
+      TimePoint rests_until = {};
+    };
+    std::map<std::string, Standing> workers = {};  ///< those that have failed
   };
 
   /// epoch: how often the coordinator has started; part of each lease. silence_limit: a worker that
   /// says nothing for longer loses its leases.
   Scheduler(std::uint32_t epoch, std::chrono::milliseconds silence_limit);
+
+  /// How long tasks of a kind rest after one of them found no space.
+  static constexpr std::chrono::seconds kRest{5};
+  /// How long a worker rests from a job of whose tasks it has failed max_failures_per_worker.
+  static constexpr std::chrono::minutes kWorkerRest{10};
 
   /// What follows from the event. Unknown jobs, workers and leases are normal: they are late, and
   /// nothing follows.
@@ -41,6 +62,8 @@ class Scheduler {
   const Job* find_job(const Digest& job) const;
   /// All jobs, in the order of submission.
   std::vector<Digest> jobs() const;
+  /// What the job, which must be known, cannot go on without; empty: it goes on, or has ended.
+  std::string waits_for(const Digest& job, TimePoint now) const;
   /// Leases that the worker holds.
   std::size_t num_leases(const std::string& worker) const;
   bool is_referenced(const Digest& blob) const { return blobs_.contains(blob); }
@@ -81,6 +104,7 @@ class Scheduler {
   void on(const TaskCompleted& event, TimePoint now, Actions& actions);
   void on(const AttemptFailed& event, TimePoint now, Actions& actions);
   void on(const ResultMissing& event, TimePoint now, Actions& actions);
+  void on(const SpaceLacking& event, TimePoint now, Actions& actions);
   void on(const InputsLost& event, TimePoint now, Actions& actions);
   void on(const ClockTicked& event, TimePoint now, Actions& actions);
 
@@ -95,18 +119,23 @@ class Scheduler {
   void remove_worker(const std::string& worker, bool lost, Actions& actions);
   void serve(TimePoint now, Actions& actions);
   bool grant_one(const std::string& worker, TimePoint now, Actions& actions);
-  bool may_try(const Job& job, TaskIndex task, const std::string& worker) const;
-  bool is_banned(const Job& job, const std::string& worker) const;
-  bool everyone_is_banned(const Job& job) const;
+  std::optional<TaskIndex> choose_task(const Job& job, const std::string& worker,
+                                       TimePoint now) const;
+  bool may_try(const Job& job, TaskIndex task, const std::string& worker, TimePoint now) const;
+  bool is_exhausted(const Job& job, TaskIndex task) const;
+  static bool rests(const Job& job, const std::string& worker, TimePoint now);
 
   // Jobs (scheduler.cpp).
   Job* find(const Digest& job);
   Rank rank(const Job& job) const;
   void replay(Job& job, const JobAdded& event, Actions& actions);
   void reopen(const Digest& digest, Job& job, const std::vector<TaskKey>& tasks, Actions& actions);
-  void fail_attempt(const Held& held, const Failure& failure, Actions& actions);
+  bool compare_results(const TaskCompleted& event, const std::vector<BlobRef>& expected,
+                       const std::vector<BlobRef>& reported, Actions& actions);
+  void fail_attempt(const Held& held, Failure failure, TimePoint now, Actions& actions);
   void give_up(const Digest& digest, Job& job, TaskIndex task, const std::string& reason,
                Actions& actions);
+  void pause_job(const Digest& digest, Job& job, const std::string& reason, Actions& actions);
   void end_if_finished(const Digest& digest, Job& job, Actions& actions);
   void end_job(const Digest& digest, Job& job, JobStatus status, const std::string& reason,
                Actions& actions);

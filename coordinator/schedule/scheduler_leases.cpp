@@ -16,6 +16,10 @@ void Scheduler::on(const WorkerJoined& event, TimePoint now, Actions& actions) {
   worker.last_sign = now;
   worker.wanted = 0;
   std::erase(hungry_, event.worker);
+  for (auto& [digest, job] : jobs_) {
+    job.workers.erase(event.worker);
+    job.tasks.forgive(event.worker);
+  }
   reconcile(event.worker, event.running, now, now, actions);
 }
 
@@ -77,7 +81,7 @@ Scheduler::Held Scheduler::hold(const std::string& worker, const LeaseId& lease,
     const Lease& current = leases_.at({lease.job, *task});
     return current.id == lease && current.worker == worker ? Held{job, *task} : Held{};
   }
-  if (job->tasks.status(*task) != TaskStatus::ready || job->tasks.has_failed(*task, lease))
+  if (job->tasks.status(*task) != TaskStatus::ready || job->tasks.has_ended(*task, lease))
     return {};
   job->tasks.grant(*task);
   add_lease(worker, lease, *task, now);
@@ -106,6 +110,8 @@ void Scheduler::add_lease(const std::string& worker, const LeaseId& lease, TaskI
                           TimePoint now) {
   leases_.insert_or_assign({lease.job, task}, Lease{lease, worker, now});
   workers_.at(worker).leases.emplace(lease.job, task);
+  if (lease.task.kind == TaskKind::render)
+    jobs_.at(lease.job).homes.settle(lease.task.tile, worker);
 }
 
 void Scheduler::drop_lease(const Digest& job, TaskIndex task) {
@@ -115,21 +121,17 @@ void Scheduler::drop_lease(const Digest& job, TaskIndex task) {
   leases_.erase(found);
 }
 
-/// The worker no longer has it, or nobody has what it made. A task that was lost too often probably
-/// kills its workers.
+/// The worker no longer has it, or nobody has what it made: no failure. But a task that was lost
+/// too often probably kills its workers, and people should look at it.
 void Scheduler::lose_lease(const Digest& digest, TaskIndex task, Actions& actions) {
   Job& job = jobs_.at(digest);
   const std::int32_t losses = job.tasks.add_loss(task);
-  if (losses < limits::kMaxTaskAttempts) {
-    drop_lease(digest, task);
-    job.tasks.give_back(task);
-  } else {
-    const Lease lease = leases_.at({digest, task});
-    fail_attempt({&job, task},
-                 {lease.id, lease.worker,
-                  fmt::format("its workers or results were lost {} times", losses), true},
-                 actions);
-  }
+  drop_lease(digest, task);
+  job.tasks.give_back(task);
+  if (losses < limits::kMaxTaskLosses || job.status != JobStatus::running) return;
+  job.waits = fmt::format("somebody to look at {}: its workers or results were lost {} times",
+                          describe_task(job.tasks.graph().key(task)), losses);
+  pause_job(digest, job, job.waits, actions);
 }
 
 /// lost: the worker vanished, which counts against its tasks; else it said goodbye.
@@ -149,6 +151,7 @@ void Scheduler::remove_worker(const std::string& worker, bool lost, Actions& act
   }
   std::erase(hungry_, worker);
   workers_.erase(found);
+  for (auto& [digest, job] : jobs_) job.homes.leave(worker);
 }
 
 // ---- granting -----------------------------------------------------------------------------------
@@ -176,33 +179,86 @@ void Scheduler::serve(TimePoint now, Actions& actions) {
 bool Scheduler::grant_one(const std::string& worker, TimePoint now, Actions& actions) {
   for (const auto& [rank, digest] : running_) {
     Job& job = jobs_.at(digest);
-    if (job.tasks.ready().empty() || is_banned(job, worker)) continue;
-    for (const TaskIndex task : job.tasks.ready()) {
-      if (!may_try(job, task, worker)) continue;
-      const LeaseId lease{digest, job.tasks.graph().key(task), job.tasks.grant(task), epoch_};
-      add_lease(worker, lease, task, now);
-      actions.push_back(GrantLease{worker, lease, job.tasks.inputs(task)});
-      return true;
-    }
+    if (job.tasks.ready().empty() || rests(job, worker, now)) continue;
+    const std::optional<TaskIndex> task = choose_task(job, worker, now);
+    if (!task) continue;
+    const LeaseId lease{digest, job.tasks.graph().key(*task), job.tasks.grant(*task), epoch_};
+    add_lease(worker, lease, *task, now);
+    actions.push_back(GrantLease{worker, lease, job.tasks.inputs(*task)});
+    return true;
   }
   return false;
 }
 
-/// Whether no other connected worker has failed the task less often.
-bool Scheduler::may_try(const Job& job, TaskIndex task, const std::string& worker) const {
-  const std::int32_t own = job.tasks.num_failures(task, worker);
-  return own == 0 || std::all_of(workers_.begin(), workers_.end(), [&](const auto& other) {
-           return is_banned(job, other.first) || job.tasks.num_failures(task, other.first) >= own;
-         });
+/// What the worker, which does not rest from it, should do next of the job.
+std::optional<TaskIndex> Scheduler::choose_task(const Job& job, const std::string& worker,
+                                                TimePoint now) const {
+  TileHomes::Asker asker{worker, 0, 0, [&](TaskIndex task) {
+                           const TaskKind kind = job.tasks.graph().key(task).kind;
+                           return job.rests_until.at(static_cast<std::size_t>(kind)) <= now &&
+                                  may_try(job, task, worker, now);
+                         }};
+  if (job.homes.matter()) {
+    for (const auto& [other, unused] : workers_) {
+      if (rests(job, other, now)) continue;
+      if (other < worker) ++asker.position;
+      ++asker.num_workers;
+    }
+  }
+  const JobGraph& graph = job.tasks.graph();
+  const std::int32_t last_frame =
+      std::min(job.tasks.first_open_frame() + job.max_frames_ahead, graph.num_frames()) - 1;
+  return job.homes.choose(graph, job.tasks.ready(), graph.run_of(last_frame), asker);
 }
 
-bool Scheduler::is_banned(const Job& job, const std::string& worker) const {
-  return job.tasks.num_failures(worker) >= job.spec.max_failures_per_worker;
+/// Whether the worker could succeed, and no other connected one has failed the task less often.
+bool Scheduler::may_try(const Job& job, TaskIndex task, const std::string& worker,
+                        TimePoint now) const {
+  const std::map<std::string, Blame> blame = job.tasks.blame(task);
+  const auto own = blame.find(worker);
+  if (own == blame.end()) return true;
+  if (own->second.for_good) return false;
+  return std::all_of(workers_.begin(), workers_.end(), [&](const auto& other) {
+    if (rests(job, other.first, now)) return true;
+    const auto found = blame.find(other.first);
+    return found != blame.end() &&
+           (found->second.for_good || found->second.failures >= own->second.failures);
+  });
 }
 
-bool Scheduler::everyone_is_banned(const Job& job) const {
-  return std::all_of(workers_.begin(), workers_.end(),
-                     [&](const auto& worker) { return is_banned(job, worker.first); });
+/// Whether the task has failed for good: with as many workers as it may have attempts, or with all
+/// that are connected, where each can do no more or all attempts are used up.
+bool Scheduler::is_exhausted(const Job& job, TaskIndex task) const {
+  const std::map<std::string, Blame> blame = job.tasks.blame(task);
+  const auto allowed = static_cast<std::size_t>(job.spec.max_retries_per_task) + 1;
+  if (blame.size() >= allowed) return true;
+  std::size_t failures = 0;
+  for (const auto& [worker, of_worker] : blame)
+    failures += static_cast<std::size_t>(of_worker.failures);
+  return std::all_of(workers_.begin(), workers_.end(), [&](const auto& worker) {
+    const auto found = blame.find(worker.first);
+    return found != blame.end() && (found->second.for_good || failures >= allowed);
+  });
+}
+
+std::string Scheduler::waits_for(const Digest& digest, TimePoint now) const {
+  const Job& job = jobs_.at(digest);
+  if (!is_open(job.status) || !job.waits.empty()) return is_open(job.status) ? job.waits : "";
+  for (const TaskIndex task : job.tasks.tried()) {
+    if (job.tasks.status(task) != TaskStatus::ready) continue;
+    const bool somebody_may = std::any_of(workers_.begin(), workers_.end(), [&](const auto& other) {
+      return !rests(job, other.first, now) && may_try(job, task, other.first, now);
+    });
+    if (!somebody_may)
+      return fmt::format("a worker that can do {}: those that are connected have failed it or rest",
+                         describe_task(job.tasks.graph().key(task)));
+  }
+  return {};
+}
+
+bool Scheduler::rests(const Job& job, const std::string& worker, TimePoint now) {
+  const auto found = job.workers.find(worker);
+  return found != job.workers.end() && now < found->second.rests_until;
 }
 
 }  // namespace baton

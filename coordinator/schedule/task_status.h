@@ -15,6 +15,9 @@ enum class TaskStatus : std::uint8_t {
   cancelled,  ///< no longer wanted, or in need of a task that failed
 };
 
+/// Whether the task may still be done.
+constexpr bool is_open(TaskStatus status) { return status <= TaskStatus::leased; }
+
 /// What can happen to a task.
 enum class TaskEvent : std::uint8_t {
   inputs_done,  ///< the last of its inputs is there

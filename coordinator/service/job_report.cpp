@@ -60,26 +60,37 @@ JobSummary summarize(const Digest& digest, const Scheduler::Job& job) {
   return summary;
 }
 
-JobDetail describe_job(const Digest& digest, const Scheduler::Job& job,
+JobDetail describe_job(const Scheduler& scheduler, const Digest& digest,
                        const std::vector<Failure>& failures) {
+  const Scheduler::Job& job = *scheduler.find_job(digest);
   JobDetail detail{summarize(digest, job), finished_frames(job), {}};
   for (const Failure& failure : failures) detail.failures.push_back(describe(job, failure));
   for (const auto& [frame, sampling] : job.tasks.progress().frames) {
     detail.frames.push_back({job.spec.frames[static_cast<std::size_t>(frame)], -1, sampling});
   }
+  detail.waits = scheduler.waits_for(digest, std::chrono::steady_clock::now());
   return detail;
 }
 
-Result<Digest> resolve_job(const Scheduler& scheduler, const std::string& prefix) {
-  std::vector<Digest> matches;
+Result<Digest> resolve_job(const Scheduler& scheduler, const std::string& text) {
+  std::vector<Digest> named, begin_so;
   for (const Digest& job : scheduler.jobs()) {
-    if (!prefix.empty() && job.hex().starts_with(prefix)) matches.push_back(job);
+    if (job.hex() == text) return job;
+    if (scheduler.find_job(job)->spec.name == text) named.push_back(job);
+    if (!text.empty() && job.hex().starts_with(text)) begin_so.push_back(job);
   }
+  const std::vector<Digest>& matches = named.empty() ? begin_so : named;
   if (matches.size() == 1) return matches.front();
-  return Error{ErrorKind::bad_input, matches.empty()
-                                         ? fmt::format("job '{}': no job has this ID", prefix)
-                                         : fmt::format("job '{}': {} jobs have IDs that begin so",
-                                                       prefix, matches.size())};
+  if (matches.empty())
+    return Error{ErrorKind::bad_input, fmt::format("job '{}': no job has this name or ID", text)};
+
+  std::string list;
+  for (const Digest& job : matches) {
+    list += fmt::format("\n  {}  {}", job.hex(), job_status_name(scheduler.find_job(job)->status));
+  }
+  return Error{ErrorKind::bad_input,
+               fmt::format("job '{}': {} jobs {}:{}", text, matches.size(),
+                           named.empty() ? "have IDs that begin so" : "have this name", list)};
 }
 
 std::vector<TaskKey> replaced_frames(const Scheduler::Job& rival, const JobSpec& job) {
@@ -100,11 +111,10 @@ std::vector<TaskKey> replaced_frames(const Scheduler::Job& rival, const JobSpec&
 }
 
 LostFiles find_lost_files(const JobAdded& job, const BlobStore& store) {
-  // A scheduler that knows only this job tells what is recorded as done, and which blobs that
-  // leaves.
-  Scheduler trial(0, std::chrono::milliseconds(0));
-  trial.step(job, {});
-  const JobTasks& recorded = trial.find_job(job.job)->tasks;
+  // What is recorded as done, and which blobs that leaves.
+  JobTasks recorded(job.spec);
+  BlobReferences references;
+  recorded.restore(job.completions, {}, references);
   const JobGraph& graph = recorded.graph();
   LostFiles lost;
   const auto look = [&](TaskIndex task, const fs::path& path, std::uint64_t size_bytes) {
@@ -136,7 +146,7 @@ LostFiles find_lost_files(const JobAdded& job, const BlobStore& store) {
   // A folder that is not there is not mounted rather than empty.
   std::error_code error;
   const fs::path& folder = job.spec.output.directory;
-  const bool any_frame = trial.find_job(job.job)->tasks.progress().frames_done > 0;
+  const bool any_frame = recorded.progress().frames_done > 0;
   if (any_frame && !fs::is_directory(folder, error) && !lost.unreadable)
     lost.unreadable = fmt::format("{}: the output folder is not there", folder.string());
   return lost;

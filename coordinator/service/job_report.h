@@ -12,12 +12,13 @@ namespace baton {
 
 /// What people are told of a job.
 JobSummary summarize(const Digest& digest, const Scheduler::Job& job);
-/// `failures`: the newest last.
-JobDetail describe_job(const Digest& digest, const Scheduler::Job& job,
+/// Of a job that the scheduler knows. `failures`: the newest last.
+JobDetail describe_job(const Scheduler& scheduler, const Digest& digest,
                        const std::vector<Failure>& failures);
 
-/// The one job whose digest starts with the hexadecimal `prefix`. Errors: none, or more than one.
-Result<Digest> resolve_job(const Scheduler& scheduler, const std::string& prefix);
+/// The job of this digest, or the one of this name, or else the one whose digest starts so. Errors:
+/// none, or several, whose digests it lists.
+Result<Digest> resolve_job(const Scheduler& scheduler, const std::string& text);
 
 /// The assemble tasks of `rival` whose frames a job would write over: those that are done, or of an
 /// open job all.

@@ -50,10 +50,11 @@ std::vector<PeerId> Peers::connections() const {
   return result;
 }
 
-bool Peers::is_mixed(const std::string& instruction_set) const {
-  return std::any_of(workers_.begin(), workers_.end(), [&](const auto& worker) {
-    return worker.second.hello.instruction_set != instruction_set;
+const WorkerHello* Peers::find_other_renderer(const WorkerHello& hello) const {
+  const auto other = std::find_if(workers_.begin(), workers_.end(), [&](const auto& worker) {
+    return worker.second.hello.renderer != hello.renderer;
   });
+  return other == workers_.end() ? nullptr : &other->second.hello;
 }
 
 bool OncePerPeer::first(const PeerId& peer) {

@@ -27,8 +27,8 @@ class Peers {
   /// By name, without their leases.
   std::vector<WorkerSummary> summaries() const;
   std::vector<PeerId> connections() const;
-  /// True when a connected worker has another instruction set.
-  bool is_mixed(const std::string& instruction_set) const;
+  /// A connected worker that renders with something else; null: there is none.
+  const WorkerHello* find_other_renderer(const WorkerHello& hello) const;
 
  private:
   struct Entry {

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <utility>
 
+#include "common/base/build.h"
 #include "common/base/limits.h"
 #include "coordinator/service/diagnostics_file.h"
 
@@ -146,9 +147,15 @@ Status Service::receive(const PeerId& peer, const WorkerHello& hello) {
            {ErrorKind::io, fmt::format("the farm is full: {} workers", peers_.num_workers())});
     return {};
   }
-  if (peers_.is_mixed(hello.instruction_set)) {
-    spdlog::warn("worker {} computes with {}, others do not: results may differ in the last bits",
-                 hello.worker_id, hello.instruction_set);
+  if (const std::optional<std::string> difference = other_build(hello)) {
+    if (!options_.mixed_builds) {
+      refuse(peer, {ErrorKind::version,
+                    fmt::format("{}; pixels may differ: use one build on all machines, or start "
+                                "the coordinator with --mixed-builds",
+                                *difference)});
+      return {};
+    }
+    if (is_new) spdlog::warn("{}: results may differ", *difference);
   }
 
   // Answer before the leases that follow from it.
@@ -163,6 +170,17 @@ Status Service::receive(const PeerId& peer, const WorkerHello& hello) {
   return step(WorkerJoined{hello.worker_id, hello.running});
 }
 
+/// Says where pixels of the worker may differ from those of the others; nullopt: nowhere.
+std::optional<std::string> Service::other_build(const WorkerHello& hello) const {
+  if (hello.build != build_identity())
+    return fmt::format("worker {} is {}, the coordinator {}", hello.worker_id, hello.build,
+                       build_identity());
+  if (const WorkerHello* const other = peers_.find_other_renderer(hello))
+    return fmt::format("worker {} renders with {}, worker {} with {}", hello.worker_id,
+                       hello.renderer, other->worker_id, other->renderer);
+  return std::nullopt;
+}
+
 Status Service::receive_from(const std::string& worker, const LeaseRequest& message) {
   return step(WorkRequested{worker, message.count});
 }
@@ -173,6 +191,7 @@ Status Service::receive_from(const std::string& worker, const Heartbeat& message
 }
 
 Status Service::receive_from(const std::string& worker, const TaskDone& message) {
+  reply_to(worker, ReportReceived{message.lease});  // leaves after what follows is durable
   // Accepted results must be there: a blob may have gone between publishing and reporting. A frame
   // that is not where it belongs is on a disk that only the worker sees.
   if (const auto missing = find_missing_frame(message)) {
@@ -192,6 +211,12 @@ Status Service::receive_from(const std::string& worker, const TaskDone& message)
 }
 
 Status Service::receive_from(const std::string& worker, const TaskFailed& message) {
+  reply_to(worker, ReportReceived{message.lease});
+  if (message.no_space) {
+    spdlog::warn("job {} waits for space: {}", message.lease.job.short_hex(), message.message);
+    return step(
+        SpaceLacking{worker, message.lease, message.message.substr(0, limits::kMaxTextLength)});
+  }
   // Inputs that are gone or damaged are nobody's fault: what made them is done again.
   const std::optional<std::vector<BlobRef>> bad = find_bad_inputs(message.lease);
   for (const BlobRef& input : bad.value_or(std::vector<BlobRef>())) {
@@ -309,12 +334,11 @@ Status Service::perform(const ForgetWorker& action) {
 }
 
 Status Service::perform(const ReportConflict& action) {
-  const TaskKey& task = action.lease.task;
   spdlog::error(
-      "BUG: job {}: task {}/{}/{}: worker {} reports {} for frame index {}, tile {}, but {} was "
-      "reported before",
-      action.lease.job.short_hex(), static_cast<int>(task.kind), task.step, task.tile,
-      action.worker, action.reported.digest.hex(), action.reported.frame, action.reported.tile,
+      "BUG: job {}: {}: worker {} reports {} for frame index {}, tile {}, but worker {} has "
+      "reported {}",
+      action.lease.job.short_hex(), describe_task(action.lease.task), action.worker,
+      action.reported.digest.hex(), action.reported.frame, action.reported.tile, action.maker,
       action.expected.digest.hex());
   return {};
 }

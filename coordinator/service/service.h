@@ -20,7 +20,8 @@ struct ServiceOptions {
   std::string listen = "tcp://127.0.0.1:5570";
   std::filesystem::path work_dir;  ///< holds journal.sqlite and store/
   std::chrono::milliseconds heartbeat{
-      1000};  ///< of workers; four silent ones lose a worker its leases
+      1000};                  ///< of workers; four silent ones lose a worker its leases
+  bool mixed_builds = false;  ///< workers may be of other builds and instruction sets
 };
 
 /// The coordinator: one thread that turns messages into events, actions into messages. A turn of
@@ -54,6 +55,7 @@ class Service {
 
   // Messages of workers.
   Status receive(const PeerId& peer, const WorkerHello& message);
+  std::optional<std::string> other_build(const WorkerHello& hello) const;
   Status receive_from(const std::string& worker, const LeaseRequest& message);
   Status receive_from(const std::string& worker, const Heartbeat& message);
   Status receive_from(const std::string& worker, const TaskDone& message);

@@ -53,8 +53,9 @@ Status Service::restore_job(const Digest& digest) {
       event.lost_spares = std::move(lost.spares);
     }
   }
-  BATON_TRY(step(event));
-  remove_job_file(digest, event.status);
+  const JobStatus status = event.status;
+  BATON_TRY(step(std::move(event)));
+  remove_job_file(digest, status);
   const JobProgress& progress = scheduler_.find_job(digest)->tasks.progress();
   spdlog::info("job {} of the journal: {} of {} tasks are done", digest.short_hex(),
                progress.tasks_done, progress.tasks_total);
@@ -178,7 +179,7 @@ Status Service::start_again(JobAdded event, JobStatus status, bool& already_ther
   event.lost = std::move(lost.tasks);
   event.lost_spares = std::move(lost.spares);
   BATON_TRY(journal_.restart_job(event.job));
-  return step(event);
+  return step(std::move(event));
 }
 
 Status Service::receive(const PeerId& peer, const ListJobs&) {
@@ -268,7 +269,7 @@ Status Service::change_job(const PeerId& peer, const std::string& prefix) {
 Status Service::answer_detail(const PeerId& peer, const Digest& job) {
   BATON_ASSIGN(const std::vector<Failure> failures,
                journal_.recent_failures(job, kMaxFailuresShown));
-  reply(peer, describe_job(job, *scheduler_.find_job(job), failures));
+  reply(peer, describe_job(scheduler_, job, failures));
   return {};
 }
 

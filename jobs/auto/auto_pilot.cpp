@@ -117,7 +117,7 @@ Result<std::vector<PilotNumbers>> settle_auto(JobSpec& job, const StudyFolder& f
       }) = seen;
     }
   }
-  const double lit_pixels = 1.0 * job.image.width * job.image.height *
+  const double lit_pixels = static_cast<double>(job.image.rendered().area()) *
                             static_cast<double>(job.frames.size()) * pilot.lit_share;
   apply_choice(choose_sampling(job, pilot.numbers, lit_pixels), pilot.numbers, job);
   return std::move(pilot.numbers);

@@ -19,10 +19,8 @@ constexpr std::uint64_t kReferenceSeed = 2'000'000'000;
 JobSpec small_job(const JobSpec& job, std::vector<int> frames) {
   JobSpec small = job;
   small.frames = std::move(frames);
-  const double scale =
-      std::min(1.0, std::sqrt(kPilotPixels / (1.0 * job.image.width * job.image.height)));
-  small.image.width = std::max(1, static_cast<int>(std::lround(job.image.width * scale)));
-  small.image.height = std::max(1, static_cast<int>(std::lround(job.image.height * scale)));
+  const auto pixels = static_cast<double>(job.image.rendered().area());
+  small.image = scaled(job.image, std::min(1.0, std::sqrt(kPilotPixels / pixels)));
   small.metadata.clear();
   small.output.background = Background::transparent;
   small.output.pixel_type = PixelType::full_float;
@@ -47,7 +45,8 @@ StudyScene pilot_scene(const JobSpec& window) {
   scene.name = fmt::format("frames from {}", window.frames.front());
   const auto num_measured = static_cast<std::ptrdiff_t>(std::min(window.frames.size(), kMeasured));
   scene.frames = {window.frames.end() - num_measured, window.frames.end()};
-  scene.crop = {0, 0, window.image.width, window.image.height};
+  const PixelRect image = window.image.rendered();
+  scene.crop = {0, 0, image.width(), image.height()};
   for (std::size_t half = 0; half < 2; ++half) {
     JobSpec& reference = scene.reference[half];
     reference = window;

@@ -3,9 +3,12 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 
+#include <algorithm>
+#include <cmath>
 #include <set>
 
 #include "common/image/image_io.h"
+#include "jobs/cli/object_view.h"
 #include "worker/scene/map_reduction.h"
 #include "worker/scene/scene.h"
 
@@ -15,8 +18,10 @@ namespace {
 Result<MapReport> load_map(const std::string& path, const EnvironmentSpec& environment) {
   BATON_ASSIGN(const RgbImage image, read_rgb_image(path));
   const EnvironmentMap map = make_map(image, environment, false);
+  float brightest = 0;
+  for (const float v : image.rgb) brightest = std::isfinite(v) ? std::max(brightest, v) : brightest;
   return MapReport{path,         map.width(),           map.height(), image.width,
-                   image.height, map.repairs().total(), map.black()};
+                   image.height, map.repairs().total(), map.black(),  brightest};
 }
 
 void load_maps(const EnvironmentSpec& environment, AssetReport& report,
@@ -50,6 +55,7 @@ void load_geometry(const JobSpec& job, AssetReport& report, std::vector<std::str
   for (const Instance& instance : scene->instances) {
     report.triangles += scene->meshes[instance.mesh].triangles.size();
   }
+  report.odd_objects = object_warnings(job, *scene);
 }
 
 }  // namespace

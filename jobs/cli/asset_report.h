@@ -16,14 +16,16 @@ struct MapReport {
   int file_width = 0, file_height = 0;  ///< what the file holds
   std::uint64_t repaired_texels = 0;    ///< negative, NaN or infinite ones, taken as 0
   bool black = false;
+  float brightest = 0;  ///< the largest finite channel of the file
 };
 
 /// The geometry of the job, as loaded.
 struct AssetReport {
   std::vector<MapReport> maps;  ///< in the order of their first key
   std::uint64_t meshes = 0, instances = 0;
-  std::uint64_t triangles = 0;          ///< of all instances
-  std::uint64_t dropped_triangles = 0;  ///< of all meshes: without area
+  std::uint64_t triangles = 0;           ///< of all instances
+  std::uint64_t dropped_triangles = 0;   ///< of all meshes: without area
+  std::vector<std::string> odd_objects;  ///< object_warnings
 };
 
 /// Loads everything that the job names. One error lists every fault: files that cannot be loaded,

@@ -8,8 +8,9 @@
 #include "common/job/motion.h"
 #include "jobs/cli/asset_report.h"
 #include "jobs/cli/commands.h"
+#include "jobs/cli/job_argument.h"
+#include "jobs/cli/job_warnings.h"
 #include "jobs/cli/text.h"
-#include "worker/scene/settle_motion.h"
 
 namespace baton {
 namespace {
@@ -17,7 +18,7 @@ namespace {
 using nlohmann::ordered_json;
 
 struct CheckOptions {
-  std::string job;
+  JobArgument job;
   bool explain = false;
   bool json = false;
 };
@@ -31,7 +32,7 @@ ordered_json settings_json(const std::vector<JobSetting>& settings) {
 }
 
 void print_json(const JobSpec& job, const JobEstimate& e, const AssetReport& assets,
-                const std::vector<JobSetting>& settings) {
+                const std::vector<std::string>& warnings, const std::vector<JobSetting>& settings) {
   ordered_json maps = ordered_json::array();
   for (const MapReport& map : assets.maps) {
     maps.push_back({{"path", map.path},
@@ -62,7 +63,8 @@ void print_json(const JobSpec& job, const JobEstimate& e, const AssetReport& ass
                          {"instances", assets.instances},
                          {"triangles", assets.triangles},
                          {"droppedTriangles", assets.dropped_triangles},
-                         {"maps", std::move(maps)}};
+                         {"maps", std::move(maps)},
+                         {"warnings", warnings}};
   if (!settings.empty()) result["settings"] = settings_json(settings);
   fmt::print("{}\n", result.dump(2));
 }
@@ -70,18 +72,10 @@ void print_json(const JobSpec& job, const JobEstimate& e, const AssetReport& ass
 void print_assets(const AssetReport& assets) {
   fmt::print("geometry   {} triangles in {} instances of {} meshes\n", assets.triangles,
              assets.instances, assets.meshes);
-  if (assets.dropped_triangles > 0) {
-    fmt::print("           {} triangles without area are left out\n", assets.dropped_triangles);
-  }
   for (const MapReport& map : assets.maps) {
     fmt::print("map        {} ({}x{})\n", map.path, map.file_width, map.file_height);
     if (map.width < map.file_width)
       fmt::print("           reduced to {}x{}\n", map.width, map.height);
-    if (map.repaired_texels > 0) {
-      fmt::print("           {} texels are negative, NaN or infinite and count as 0\n",
-                 map.repaired_texels);
-    }
-    if (map.black) fmt::print("           the map is black: nothing will be lit\n");
   }
 }
 
@@ -91,7 +85,11 @@ void print_text(const JobSpec& job, const JobEstimate& e, const AssetReport& ass
   };
   fmt::print("job        {}\n", job.name);
   fmt::print("frames     {} ({})\n", e.frames, format_frames(job.frames));
-  fmt::print("image      {}x{}, {} tiles\n", job.image.width, job.image.height, e.tiles);
+  const PixelRect image = job.image.rendered();
+  fmt::print("image      {}x{}, {} tiles\n", image.width(), image.height(), e.tiles);
+  if (job.image.region)
+    fmt::print("           from ({}, {}) of {}x{}\n", image.x0, image.y0, job.image.width,
+               job.image.height);
   print_assets(assets);
   fmt::print("tasks      {}: {} to render ({} a tile), {} to assemble; {} dependencies\n",
              e.tasks(), e.render_tasks, e.runs, e.assemble_tasks, e.dependencies);
@@ -101,7 +99,7 @@ void print_text(const JobSpec& job, const JobEstimate& e, const AssetReport& ass
     fmt::print("motion     history is followed up to {} pixels a frame\n", job.motion.max_px);
   }
   if (e.state_bytes > 0) {
-    fmt::print("state      about {} bytes a pixel, {} at each checkpoint\n",
+    fmt::print("state      at most {} bytes a pixel, {} at each checkpoint\n",
                e.state_bytes_per_pixel, total(e.state_bytes));
   }
   fmt::print("film       {} channels, {} a frame in tiles\n", e.film_channels, total(e.film_bytes));
@@ -118,19 +116,21 @@ void print_settings(const std::vector<JobSetting>& settings) {
 }
 
 Result<ExitCode> run_check(const CheckOptions& options) {
-  BATON_ASSIGN(JobSpec written, load_job(options.job));
-  BATON_ASSIGN(const JobSpec job, settle_motion(std::move(written)));
+  BATON_ASSIGN(const WantedJob wanted, load_settled(options.job));
+  const JobSpec& job = wanted.job;
   BATON_ASSIGN(const AssetReport assets, load_assets(job));
   std::vector<JobSetting> settings;
   if (options.explain) {
-    BATON_ASSIGN(settings, explain_job(options.job));
+    BATON_ASSIGN(settings, explain_job(options.job.file, overrides_of(options.job)));
   }
 
   const JobEstimate estimate = estimate_job(job);
+  const std::vector<std::string> warnings = job_warnings(job, assets);
   if (options.json) {
-    print_json(job, estimate, assets, settings);
+    print_json(job, estimate, assets, warnings, settings);
   } else {
     print_text(job, estimate, assets);
+    for (const std::string& warning : warnings) fmt::print("warning    {}\n", warning);
     if (options.explain) print_settings(settings);
   }
   return ExitCode::ok;
@@ -142,7 +142,7 @@ void add_check_command(CLI::App& app, ExitCode& code) {
   auto options = std::make_shared<CheckOptions>();
   CLI::App* command =
       app.add_subcommand("check", "Checks a job with all its files; shows what it will take");
-  command->add_option("JOB", options->job, "job file")->required();
+  add_job_argument(*command, options->job);
   command->add_flag("--explain", options->explain, "also every value in force, given or default");
   command->add_flag("--json", options->json, "for machines");
   command->footer(

@@ -25,6 +25,7 @@ class ChildProcess {
   ChildProcess& operator=(ChildProcess&& other) noexcept;
   ~ChildProcess();
 
+  pid_t pid() const { return pid_; }
   /// How it ended: "exit code 2" or "signal 9 (Killed)"; nullopt while it runs.
   std::optional<std::string> ended();
   /// Waits at most `patience` for the end; false when it still runs.

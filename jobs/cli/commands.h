@@ -14,6 +14,7 @@ void add_compare_command(CLI::App& app, ExitCode& code);
 void add_job_command(CLI::App& app, ExitCode& code);
 void add_render_command(CLI::App& app, ExitCode& code);
 void add_state_command(CLI::App& app, ExitCode& code);
+void add_view_command(CLI::App& app, ExitCode& code);
 void add_worker_command(CLI::App& app, ExitCode& code);
 
 /// Prints the error of a command, if it has one, and gives its exit code.

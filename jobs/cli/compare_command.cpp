@@ -75,7 +75,8 @@ Status check_alike(const std::vector<Compared>& jobs, const CompareOptions& opti
                                                      key, what, options.jobs.front())};
     };
     if (job.frames != first.frames) return differ("frames", "those of");
-    if (job.image.width != first.image.width || job.image.height != first.image.height)
+    const PixelRect image = job.image.rendered(), first_image = first.image.rendered();
+    if (image.width() != first_image.width() || image.height() != first_image.height())
       return differ("image", "the size of that of");
     for (std::size_t j = 0; j < i; ++j) {
       if (jobs[j].job.name == job.name) return differ("name", "another than that of");
@@ -97,21 +98,24 @@ Result<double> noise_of(const Compared& compared) {
 }
 
 /// A row of frames for each job.
-Status write_rows(const std::vector<Compared>& jobs, const fs::path& path) {
+Result<float> write_rows(const std::vector<Compared>& jobs, const fs::path& path) {
   const std::vector<int> frames = pick_frames(jobs.front().job.frames, kSheetColumns);
   std::vector<RgbImage> thumbnails;
+  std::vector<int> numbers;
   for (const Compared& compared : jobs) {
     const OutputSpec& out = compared.job.output;
     for (const int frame : frames) {
       BATON_ASSIGN(RgbImage thumbnail,
                    read_thumbnail(fs::path(out.directory) / frame_file_name(out.pattern, frame)));
       thumbnails.push_back(std::move(thumbnail));
+      numbers.push_back(frame);
     }
   }
-  return write_sheet(path, std::move(thumbnails), frames.size(), static_cast<int>(frames.size()));
+  return write_sheet(path, std::move(thumbnails), numbers, frames.size(),
+                     static_cast<int>(frames.size()));
 }
 
-void print_table(const std::vector<Compared>& jobs, const fs::path& sheet) {
+void print_table(const std::vector<Compared>& jobs, const fs::path& sheet, float stops) {
   std::size_t width = 4;
   for (const Compared& compared : jobs) width = std::max(width, compared.job.name.size());
   fmt::print("{:<{}}  {:>9}  {:>7}  {:>11}  {}\n", "job", width, "CPU", "noise", "handed on",
@@ -124,7 +128,7 @@ void print_table(const std::vector<Compared>& jobs, const fs::path& sheet) {
   }
   fmt::print("noise: relative standard deviation of a pixel, by two more seeds\n");
   fmt::print("handed on: sample state, packed, from frame to frame\n");
-  fmt::print("sheet, a row for each job: {}\n", sheet.string());
+  fmt::print("sheet, a row for each job, {}: {}\n", exposure_text(stops), sheet.string());
 }
 
 Result<ExitCode> run_compare(const CompareOptions& options) {
@@ -160,8 +164,8 @@ Result<ExitCode> run_compare(const CompareOptions& options) {
     BATON_ASSIGN(compared.noise, noise_of(compared));
   }
   const fs::path sheet = output / "comparison.png";
-  BATON_TRY(write_rows(jobs, sheet));
-  print_table(jobs, sheet);
+  BATON_ASSIGN(const float stops, write_rows(jobs, sheet));
+  print_table(jobs, sheet, stops);
   return ExitCode::ok;
 }
 

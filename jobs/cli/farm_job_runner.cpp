@@ -2,6 +2,7 @@
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
+#include <spdlog/spdlog.h>
 #include <unistd.h>
 
 #include <numeric>
@@ -76,12 +77,18 @@ Status FarmJobRunner::submit(const JobSpec& job, std::size_t index, std::vector<
   return {};
 }
 
-Result<JobSummary> FarmJobRunner::ask(const Open& job, const JobSpec& spec) {
+Result<JobSummary> FarmJobRunner::ask(Open& job, const JobSpec& spec) {
   BATON_ASSIGN(const std::optional<JobDetail> detail,
                ask_farm<JobDetail>(*farm_, *client_, signals_, ShowJob{job.job.hex()}));
   if (!detail) return stopped();
   const JobSummary& summary = detail->summary;
-  if (is_open(summary.status) || summary.status == JobStatus::done) return summary;
+  if (!detail->waits.empty() && job.waits.empty())
+    spdlog::warn("run '{}' seed {} waits for {}", spec.name, spec.seed, detail->waits);
+  job.waits = detail->waits;
+  if (summary.status == JobStatus::running || summary.status == JobStatus::done) return summary;
+  if (summary.status == JobStatus::paused)
+    return Error{ErrorKind::io, fmt::format("run '{}' seed {} is paused: it waits for {}",
+                                            spec.name, spec.seed, detail->waits)};
   return Error{ErrorKind::bad_input, fmt::format("run '{}' seed {} {}: {}", spec.name, spec.seed,
                                                  job_status_name(detail->summary.status),
                                                  fmt::join(detail->failures, "\n"))};

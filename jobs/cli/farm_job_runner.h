@@ -24,12 +24,13 @@ class FarmJobRunner final : public JobRunner {
   struct Open {
     std::size_t index = 0;
     Digest job;
+    std::string waits = {};  ///< for what, when it was asked last
   };
 
   Status start();
   Status submit(const JobSpec& job, std::size_t index, std::vector<Open>& open);
-  /// How far the job is. Error: it has failed.
-  Result<JobSummary> ask(const Open& job, const JobSpec& spec);
+  /// How far the job is; says once what it waits for. Error: it has failed.
+  Result<JobSummary> ask(Open& job, const JobSpec& spec);
 
   FarmOptions options_;
   SignalWait signals_;

@@ -31,11 +31,12 @@ Result<RgbImage> read_thumbnail(const fs::path& path) {
   return resize(image, std::min(image.width, kMaxThumbWidth));
 }
 
-Status write_sheet(const fs::path& path, std::vector<RgbImage> thumbnails, std::size_t row,
-                   int columns) {
+Result<float> write_sheet(const fs::path& path, std::vector<RgbImage> thumbnails,
+                          const std::vector<int>& numbers, std::size_t row, int columns) {
   const float exposure = auto_exposure(thumbnails[row / 2]);
   for (RgbImage& thumbnail : thumbnails) thumbnail = tone_map(thumbnail, exposure);
-  return write_png(path, contact_sheet(thumbnails, columns, thumbnails.front().width));
+  BATON_TRY(write_png(path, contact_sheet(thumbnails, columns, thumbnails.front().width, numbers)));
+  return std::log2(exposure);
 }
 
 FrameSheet::FrameSheet(const JobSpec& job)
@@ -56,17 +57,22 @@ void FrameSheet::add(const std::vector<int>& finished) {
   }
 }
 
-Result<std::optional<fs::path>> FrameSheet::write() const {
+Result<std::optional<FrameSheet::Written>> FrameSheet::write() const {
   BATON_TRY(read_);
-  if (thumbnails_.empty()) return std::optional<fs::path>();
+  if (thumbnails_.empty()) return std::optional<Written>();
 
   std::vector<RgbImage> frames;
-  for (const auto& [frame, thumbnail] : thumbnails_) frames.push_back(thumbnail);
+  std::vector<int> numbers;
+  for (const auto& [frame, thumbnail] : thumbnails_) {
+    frames.push_back(thumbnail);
+    numbers.push_back(frame);
+  }
   const auto square = static_cast<int>(std::ceil(std::sqrt(static_cast<double>(frames.size()))));
   const fs::path path = fs::path(output_.directory) / "contact-sheet.png";
   const std::size_t count = frames.size();
-  BATON_TRY(write_sheet(path, std::move(frames), count, std::min(square, kMaxColumns)));
-  return std::optional(path);
+  BATON_ASSIGN(const float stops,
+               write_sheet(path, std::move(frames), numbers, count, std::min(square, kMaxColumns)));
+  return std::optional(Written{path, stops});
 }
 
 }  // namespace baton

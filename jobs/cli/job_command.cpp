@@ -10,9 +10,9 @@
 #include "common/job/job_json.h"
 #include "jobs/cli/commands.h"
 #include "jobs/cli/coordinator_link.h"
+#include "jobs/cli/job_argument.h"
 #include "jobs/cli/job_summary.h"
 #include "jobs/cli/settle_method.h"
-#include "worker/scene/settle_motion.h"
 
 namespace baton {
 namespace {
@@ -25,7 +25,8 @@ constexpr std::chrono::minutes kAwayPatience{5};
 
 struct JobOptions {
   std::string endpoint;
-  std::string job;       ///< file to submit, or digest or unique prefix
+  std::string job;       ///< name, digest or its beginning
+  JobArgument wanted;    ///< of submit
   double timeout_s = 0;  ///< of wait; 0: none
   bool restart = false;  ///< of submit
   bool json = false;
@@ -40,20 +41,22 @@ FarmOptions pilot_farm(const JobSpec& job) {
 }
 
 Result<ExitCode> submit(const JobOptions& options, RequestClient& client) {
-  BATON_ASSIGN(JobSpec written, load_job(options.job));
-  BATON_ASSIGN(JobSpec job, settle_motion(std::move(written)));
+  BATON_ASSIGN(WantedJob wanted, load_settled(options.wanted));
+  JobSpec& job = wanted.job;
   // A pilot takes its time: first see that there is somebody to submit to.
   if (job.sampling.method == Method::automatic) BATON_TRY(ask<JobList>(client, ListJobs{}));
   BATON_TRY(settle_method(job, pilot_farm(job)));
   BATON_ASSIGN(std::string document, make_job_document(job));
-  BATON_ASSIGN(const JobAccepted accepted,
-               ask<JobAccepted>(client, SubmitJob{std::move(document), options.restart}));
+  BATON_ASSIGN(
+      const JobAccepted accepted,
+      ask<JobAccepted>(client, SubmitJob{std::move(document), options.restart || wanted.is_look}));
   if (options.json) {
     fmt::print(
         "{}\n",
         ordered_json{{"id", accepted.job.hex()}, {"alreadyThere", accepted.already_there}}.dump(2));
   } else {
     fmt::print("{}\n", accepted.job.hex());
+    if (wanted.is_look) fmt::print(stderr, "a look: frames go to {}\n", job.output.directory);
     if (accepted.already_there) fmt::print(stderr, "an equal job is there already: it goes on\n");
   }
   return ExitCode::ok;
@@ -81,6 +84,7 @@ void print_detail(const JobDetail& detail, bool json) {
   fmt::print("output     {}\n", detail.summary.output_directory);
   if (!detail.frames_done.empty()) fmt::print("frames     {}\n", format_frames(detail.frames_done));
   fmt::print("{}", job_statistics(detail.summary));
+  if (!detail.waits.empty()) fmt::print("waits      {}\n", detail.waits);
   for (const std::string& failure : detail.failures) fmt::print("failure    {}\n", failure);
 }
 
@@ -94,8 +98,9 @@ Result<ExitCode> show(const JobOptions& options, RequestClient& client) {
 Result<ExitCode> wait(const JobOptions& options, RequestClient& client) {
   const Clock::time_point start = Clock::now();
   std::optional<Clock::time_point> last_answer;
+  std::string job = options.job;  // once it is found, its ID: others may take its name
   for (;;) {
-    const Result<JobDetail> answer = ask<JobDetail>(client, ShowJob{options.job});
+    const Result<JobDetail> answer = ask<JobDetail>(client, ShowJob{job});
     const std::chrono::duration<double> waited = Clock::now() - start;
     if (!answer) {
       const bool away = answer.error().kind == ErrorKind::timeout && last_answer &&
@@ -107,6 +112,7 @@ Result<ExitCode> wait(const JobOptions& options, RequestClient& client) {
     }
 
     last_answer = Clock::now();
+    job = answer->summary.job.hex();
     const JobDetail& detail = *answer;
     const bool expired = options.timeout_s > 0 && waited.count() >= options.timeout_s;
     if (!is_open(detail.summary.status) || expired) {
@@ -130,7 +136,7 @@ void print_change(const JobDetail& before, const JobDetail& after, bool json) {
 template <class M>
 Result<ExitCode> change(const JobOptions& options, RequestClient& client) {
   BATON_ASSIGN(const JobDetail before, ask<JobDetail>(client, ShowJob{options.job}));
-  BATON_ASSIGN(const JobDetail after, ask<JobDetail>(client, M{options.job}));
+  BATON_ASSIGN(const JobDetail after, ask<JobDetail>(client, M{before.summary.job.hex()}));
   print_change(before, after, options.json);
   return ExitCode::ok;
 }
@@ -163,13 +169,14 @@ void add_job_command(CLI::App& app, ExitCode& code) {
       "Examples:\n"
       "  baton job submit job.json --coordinator tcp://farm:5570\n"
       "  baton job wait 3f2a --timeout 600 && echo done\n"
-      "An ID is the digest that submit prints, or its beginning.");
+      "An ID is the digest that submit prints, its beginning, or the name of a job.");
 
   const auto add = [&](const char* name, const char* what, const char* argument, Action action) {
     CLI::App* command = job->add_subcommand(name, what);
-    if (argument != nullptr) {
-      command
-          ->add_option(argument, options->job, argument == std::string("JOB") ? "job file" : "job")
+    if (argument == std::string("JOB")) {
+      add_job_argument(*command, options->wanted);
+    } else if (!std::string(argument).empty()) {
+      command->add_option(argument, options->job, "job: its name, its ID, or the beginning of that")
           ->required();
     }
     add_coordinator_option(*command, options->endpoint);
@@ -181,7 +188,7 @@ void add_job_command(CLI::App& app, ExitCode& code) {
   add("submit", "Hands a job over; prints its ID", "JOB", submit)
       ->add_flag("--restart", options->restart,
                  "replace the frames of another picture in the output folder");
-  add("list", "All jobs of the coordinator", nullptr, list);
+  add("list", "All jobs of the coordinator", "", list);
   add("show", "One job: progress, statistics, failures", "ID", show);
   add("pause", "Hands out no more of a job's tasks; those that run are finished", "ID",
       change<PauseJob>);

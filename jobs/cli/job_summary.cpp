@@ -125,6 +125,7 @@ ordered_json summary_json(const JobSummary& job) {
 ordered_json detail_json(const JobDetail& detail) {
   ordered_json result = summary_json(detail.summary);
   result["framesDoneNumbers"] = detail.frames_done;
+  if (!detail.waits.empty()) result["waits"] = detail.waits;
   result["frames"] = ordered_json::array();
   for (const FrameStats& frame : detail.frames) {
     ordered_json row = {{"frame", frame.frame}};

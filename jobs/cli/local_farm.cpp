@@ -9,9 +9,9 @@
 
 #include <cerrno>
 #include <cstring>
+#include <random>
 #include <thread>
 
-#include "common/base/files.h"
 #include "common/base/patience.h"
 
 namespace baton {
@@ -23,19 +23,16 @@ using std::chrono::milliseconds;
 constexpr milliseconds kStartPatience{20000 * kPatienceFactor};
 constexpr milliseconds kWorkerPatience{10000 * kPatienceFactor};
 constexpr milliseconds kCoordinatorPatience{5000 * kPatienceFactor};
+/// In a row, of a program that each time lived for less than kShortLife.
 constexpr int kMaxRestarts = 5;
-constexpr std::uint64_t kMaxEndpointBytes = 4096;
+constexpr std::chrono::seconds kShortLife{60};
 
-std::vector<std::string> coordinator_command(const std::string& program,
-                                             const std::string& endpoint, const fs::path& directory,
-                                             const fs::path& endpoint_file) {
-  return {program,
-          "--listen",
-          endpoint,
-          "--work-dir",
-          directory.string(),
-          "--endpoint-file",
-          endpoint_file.string()};
+/// An address on this machine that no other farm will have: Linux's abstract sockets have names,
+/// not numbers. A port goes to somebody else while a coordinator that died is started again, and
+/// then two farms are one.
+std::string draw_endpoint() {
+  std::random_device random;
+  return fmt::format("ipc://@baton-{:08x}{:08x}", random(), random());
 }
 
 }  // namespace
@@ -67,7 +64,7 @@ Result<LocalFarm> LocalFarm::start(const FarmOptions& options) {
   BATON_ASSIGN(const std::string coordinator, sibling_program("baton-coordinator"));
   BATON_ASSIGN(const std::string worker, sibling_program("baton-worker"));
   BATON_ASSIGN(Lock lock, lock_directory(options.work_directory));
-  LocalFarm farm(options, std::move(lock));
+  LocalFarm farm(options, draw_endpoint(), std::move(lock));
   BATON_TRY(farm.start_coordinator(coordinator));
   for (int i = 1; i <= options.workers; ++i) {
     BATON_TRY(farm.add_member(fmt::format("worker-{}", i),
@@ -81,10 +78,11 @@ Status LocalFarm::start_coordinator(const std::string& program) {
   const fs::path endpoint_file = options_.work_directory / "endpoint";
   std::error_code error;
   fs::remove(endpoint_file, error);
-  BATON_TRY(add_member("coordinator", coordinator_command(program, "tcp://127.0.0.1:*",
-                                                          options_.work_directory, endpoint_file)));
+  BATON_TRY(add_member("coordinator", {program, "--listen", endpoint_, "--work-dir",
+                                       options_.work_directory.string(), "--endpoint-file",
+                                       endpoint_file.string()}));
 
-  // The file appears, whole, when the coordinator listens.
+  // The file appears when the coordinator listens.
   const auto deadline = std::chrono::steady_clock::now() + kStartPatience;
   while (!fs::exists(endpoint_file, error)) {
     const std::optional<std::string> end = members_.front().process.ended();
@@ -95,12 +93,6 @@ Status LocalFarm::start_coordinator(const std::string& program) {
     }
     std::this_thread::sleep_for(milliseconds(10));
   }
-  BATON_ASSIGN(endpoint_, read_text_file(endpoint_file, kMaxEndpointBytes));
-  endpoint_.erase(endpoint_.find_last_not_of(" \n") + 1);
-
-  // When it must start again, then on the endpoint that the workers know.
-  members_.front().command =
-      coordinator_command(program, endpoint_, options_.work_directory, endpoint_file);
   return {};
 }
 
@@ -115,9 +107,12 @@ Status LocalFarm::tend() {
     const std::optional<std::string> end = member.process.ended();
     if (!end) continue;
     const std::string log = log_of(member.name).string();
+    const auto now = std::chrono::steady_clock::now();
+    if (now - std::exchange(member.started, now) > kShortLife) member.restarts = 0;
     if (member.restarts == kMaxRestarts) {
-      return Error{ErrorKind::io, fmt::format("{} ended again after {} restarts ({}); its log: {}",
-                                              member.name, kMaxRestarts, *end, log)};
+      return Error{ErrorKind::io,
+                   fmt::format("{} ended again, soon after {} restarts ({}); its log: {}",
+                               member.name, kMaxRestarts, *end, log)};
     }
     ++member.restarts;
     spdlog::warn("{} ended ({}): started again, {} of {} times; its log: {}", member.name, *end,

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <filesystem>
 #include <string>
 #include <utility>
@@ -16,9 +17,9 @@ struct FarmOptions {
   std::filesystem::path work_directory;  ///< journal, blobs, logs; what a resume needs
 };
 
-/// A coordinator and workers on this machine, as child processes. A program that dies is started
-/// again: the coordinator goes on from its journal on the same endpoint, a worker's lost work is
-/// done again.
+/// A coordinator and workers on this machine, as child processes, at an address of their own. A
+/// program that dies is started again: the coordinator goes on from its journal on the same
+/// endpoint, a worker's lost work is done again.
 class LocalFarm {
  public:
   /// Starts everything and waits until the coordinator listens. Errors: the work directory cannot
@@ -26,7 +27,8 @@ class LocalFarm {
   /// (its log is named).
   static Result<LocalFarm> start(const FarmOptions& options);
 
-  /// Replaces programs that have ended, with a warning. Error: one has ended too often.
+  /// Replaces programs that have ended, with a warning. Error: one has ended too often, each time
+  /// soon after its start.
   Status tend();
   /// Ends the workers, which finish what they hold, then the coordinator; kills what takes too
   /// long.
@@ -40,6 +42,7 @@ class LocalFarm {
     std::vector<std::string> command;
     ChildProcess process;
     int restarts = 0;
+    std::chrono::steady_clock::time_point started = std::chrono::steady_clock::now();
   };
 
   /// Holds the work directory as long as it lives.
@@ -55,16 +58,16 @@ class LocalFarm {
     int file_;
   };
 
-  LocalFarm(FarmOptions options, Lock lock)
-      : options_(std::move(options)), lock_(std::move(lock)) {}
+  LocalFarm(FarmOptions options, std::string endpoint, Lock lock)
+      : options_(std::move(options)), endpoint_(std::move(endpoint)), lock_(std::move(lock)) {}
   static Result<Lock> lock_directory(const std::filesystem::path& directory);
   Status start_coordinator(const std::string& program);
   Status add_member(const std::string& name, std::vector<std::string> command);
   std::filesystem::path log_of(const std::string& name) const;
 
   FarmOptions options_;
-  Lock lock_;
   std::string endpoint_;
+  Lock lock_;
   std::vector<Member> members_;  ///< the coordinator first
 };
 

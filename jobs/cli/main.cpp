@@ -5,8 +5,8 @@
 #include <string>
 #include <vector>
 
+#include "common/base/build.h"
 #include "common/base/log.h"
-#include "common/base/version.h"
 #include "common/job/suggest.h"
 #include "jobs/cli/commands.h"
 
@@ -25,6 +25,8 @@ namespace {
 constexpr const char* kFooter = R"(Examples:
   baton check job.json --explain     what the job says, and what it will take
   baton render job.json              renders on this machine; again: goes on where it stopped
+  baton render job.json --frames 12 --scale .25 --out look.png
+  baton view frame.0012.exr --aov depth
   baton job submit job.json          hands the job to a coordinator (see --coordinator)
   baton job list
   baton worker list
@@ -57,7 +59,7 @@ std::string unknown_command(const CLI::App& app, int argc, char** argv) {
 int main(int argc, char** argv) {
   baton::init_logging("baton");
   CLI::App app("Renders animations lit by changing HDR environments.", "baton");
-  app.set_version_flag("--version", std::string("baton ") + baton::kVersion);
+  app.set_version_flag("--version", baton::build_identity());
   app.require_subcommand(1);
   app.footer(kFooter);
 
@@ -69,6 +71,7 @@ int main(int argc, char** argv) {
   baton::add_state_command(app, code);
   baton::add_chart_command(app, code);
   baton::add_compare_command(app, code);
+  baton::add_view_command(app, code);
   if (const std::string fault = unknown_command(app, argc, argv); !fault.empty()) {
     fmt::print(stderr, "{}\n", fault);
     return static_cast<int>(baton::ExitCode::usage);

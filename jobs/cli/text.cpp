@@ -2,6 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <cmath>
+
 #include <array>
 
 namespace baton {
@@ -35,6 +37,11 @@ std::string duration_text(double seconds) {
   if (whole < 60) return fmt::format("{}s", whole);
   if (whole < 3600) return fmt::format("{}m{:02}s", whole / 60, whole % 60);
   return fmt::format("{}h{:02}m", whole / 3600, whole % 3600 / 60);
+}
+
+std::string exposure_text(float stops) {
+  const float rounded = std::round(10 * stops) / 10;
+  return fmt::format("exposure {:+.3g} stops", rounded + 0.0f);  // no -0
 }
 
 std::string percent_text(std::uint64_t part, std::uint64_t whole) {

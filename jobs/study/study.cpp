@@ -122,8 +122,8 @@ std::vector<int> measured_frames(const std::string& text, const JobSpec& job,
   return std::move(frames).value();
 }
 
-std::array<int, 4> read_crop(StudyObject& object, const ImageSpec& image, StudyFaults& faults) {
-  const std::array<int, 4> whole{0, 0, image.width, image.height};
+std::array<int, 4> read_crop(StudyObject& object, const PixelRect& image, StudyFaults& faults) {
+  const std::array<int, 4> whole{0, 0, image.width(), image.height()};
   if (!object.has("crop")) return whole;
   const json& list = object.list("crop", true);
   const bool numbers = list.size() == 4 && std::all_of(list.begin(), list.end(), [](const json& n) {
@@ -131,11 +131,11 @@ std::array<int, 4> read_crop(StudyObject& object, const ImageSpec& image, StudyF
                        });
   std::array<int, 4> crop = whole;
   if (numbers) crop = list.get<std::array<int, 4>>();
-  if (!numbers || crop[2] < 1 || crop[3] < 1 || crop[0] + crop[2] > image.width ||
-      crop[1] + crop[3] > image.height) {
+  if (!numbers || crop[2] < 1 || crop[3] < 1 || crop[0] + crop[2] > image.width() ||
+      crop[1] + crop[3] > image.height()) {
     faults.add(object.path_of("crop"),
                fmt::format("expected [x, y, width, height] inside of {} x {} pixels, got {}",
-                           image.width, image.height, list.dump()));
+                           image.width(), image.height(), list.dump()));
     return whole;
   }
   return crop;
@@ -171,7 +171,7 @@ void read_scene(StudyObject& object, const Shared& shared, Study& study, StudyFa
 
   // The reference.
   prepare_output(*plain);
-  scene.crop = read_crop(object, plain->image, faults);
+  scene.crop = read_crop(object, plain->image.rendered(), faults);
   scene.frames = measured_frames(shared.measured, *plain, shared.measured_path, faults);
   if (scene.cut_frame > 0 &&
       !std::binary_search(scene.frames.begin() + 1, scene.frames.end(), scene.cut_frame)) {

@@ -19,6 +19,7 @@
 
 #include "common/base/files.h"
 #include "common/job/job_json.h"
+#include "tests/bench/bench_program.h"
 #include "worker/run/frame_output.h"
 #include "worker/run/local_render.h"
 
@@ -134,11 +135,4 @@ Status run(const fs::path& bin, const std::string& job_path, int rounds) {
 }  // namespace
 }  // namespace baton
 
-int main(int argc, char** argv) {
-  const auto bin = std::filesystem::canonical("/proc/self/exe").parent_path();
-  const baton::Status status = baton::run(bin, argc > 1 ? argv[1] : "jobs/examples/demo.json",
-                                          argc > 2 ? std::max(1, std::atoi(argv[2])) : 5);
-  if (status) return 0;
-  fmt::print(stderr, "{}\n", status.error().message);
-  return 70;
-}
+int main(int argc, char** argv) { return baton::bench_program(argc, argv, 5, baton::run); }

@@ -18,6 +18,7 @@
 #include "common/base/limits.h"
 #include "common/job/job_json.h"
 #include "common/job/motion.h"
+#include "tests/bench/bench_program.h"
 #include "tests/bench/orbit.h"
 
 namespace baton {
@@ -81,8 +82,8 @@ Status run(const fs::path& bin, const std::string& path, int frames) {
   written.frames.resize(std::min(written.frames.size(), static_cast<std::size_t>(frames)));
   const fs::path folder = fs::temp_directory_path() / fmt::format("baton-sizes-{}", ::getpid());
   written.output.directory = (folder / "frames").string();
-  fmt::print("{} frames, {} sites, one worker of two threads; a frame starts afresh\n", frames,
-             written.image.sites);
+  fmt::print("{} frames, {} sites, one worker of two threads; the first frame starts afresh\n",
+             frames, written.image.sites);
   fmt::print(
       "size        method        camera  CPU s/f  Mrays/s  state%  system%  peak MiB  MiB/f "
       "written  B/pixel\n");
@@ -105,11 +106,4 @@ Status run(const fs::path& bin, const std::string& path, int frames) {
 }  // namespace
 }  // namespace baton
 
-int main(int argc, char** argv) {
-  const auto bin = std::filesystem::canonical("/proc/self/exe").parent_path();
-  const baton::Status status = baton::run(bin, argc > 1 ? argv[1] : "jobs/examples/demo.json",
-                                          argc > 2 ? std::max(1, std::atoi(argv[2])) : 3);
-  if (status) return 0;
-  fmt::print(stderr, "{}\n", status.error().message);
-  return 70;
-}
+int main(int argc, char** argv) { return baton::bench_program(argc, argv, 3, baton::run); }

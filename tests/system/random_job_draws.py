@@ -59,6 +59,7 @@ class Draw:
         self.by_material(job)
         mend(job, self.rng)
         self.cheapen(job)
+        self.part_of_image(job["image"])
         if '"table.binary"' not in json.dumps(job["scene"]):
             self.files.pop("table.binary", None)
         if self.chance(0.04):
@@ -76,14 +77,14 @@ class Draw:
             return None
         return {
             # Given elsewhere.
-            "name": self.name, "frames": self.frames, "scene": nothing, "camera": nothing,
+            "$schema": lambda: self.pick(None, None, "job.schema.json"), "name": self.name, "frames": self.frames, "scene": nothing, "camera": nothing,
             "environment.map": nothing, "environment.frames": nothing, "environment.keys": nothing,
             "sampling.byMaterial": nothing, "scene.meshes": nothing, "scene.materials": nothing,
             "scene.objects": nothing, "scene.ground": nothing,
             # Texts and sizes.
             "metadata.*": lambda: self.pick("x", "two words", "a \u00e4 \u4e2d \" \\ text", "long " * 200),
             "image.width": lambda: self.side(), "image.height": lambda: self.side(),
-            "image.tileSize": lambda: self.tile_size(),
+            "image.tileSize": lambda: self.tile_size(), "image.region": nothing, "image.scale": nothing,
             "output.directory": nothing,
             "output.pattern": lambda: self.pick(None, "f.#.exr", "a b ######.exr", "\u00e4####x.exr"),
             # 16 bits hide what differs in the last ones.
@@ -313,6 +314,14 @@ class Draw:
             if job["image"][side] == 1:
                 return
             job["image"][side] = (job["image"][side] + 1) // 2
+
+    def part_of_image(self, image):
+        """Sometimes a region and a smaller scale."""
+        if self.chance(0.15):
+            x, y = (self.rng.randrange(image[side]) for side in ("width", "height"))
+            image["region"] = [x, y, self.rng.randint(1, image["width"] - x), self.rng.randint(1, image["height"] - y)]
+        if self.chance(0.1):
+            image["scale"] = self.pick(1.0, 0.5, 0.37, 0.01)
 
     def split(self, job):
         """What never changes the picture."""

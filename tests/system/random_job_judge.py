@@ -142,8 +142,8 @@ class Judge:
         judge_frames(frames, case["job"], predicted)
         if name == "first" and not is_auto(case["job"]):
             side = int(json.loads(command[2].read_text(encoding="utf-8"))["image"]["tileSize"])
-            judge_states(work, min(side, case["job"]["image"]["width"]) * min(side, case["job"]["image"]["height"]),
-                         predicted)
+            width, height = rendered_size(case["job"]["image"])
+            judge_states(work, min(side, width) * min(side, height), predicted)
         return frames
 
 
@@ -222,9 +222,20 @@ def judge_frames(frames, job, predicted):
                             f"({places[0] % frame.width}, {places[0] // frame.width}): {values[places[0]]}")
         require(frame.sample_bytes == predicted["frameBytes"], "frame bytes",
                 f"{name}: {frame.sample_bytes} bytes of samples, predicted {predicted['frameBytes']}")
-        image = job.get("image", {})
-        require((frame.width, frame.height) == (image.get("width", 640), image.get("height", 360)), "size",
+        require((frame.width, frame.height) == rendered_size(job.get("image", {})), "size",
                 f"{name}: {frame.width}x{frame.height}")
+
+
+def rendered_size(image):
+    """Width and height of the frames: those of the region, each edge scaled and moved out to a whole pixel."""
+    scale = image.get("scale", 1)
+    # Halves are rounded up, as in C.
+    whole = [max(1, math.floor(image.get(key, side) * scale + 0.5)) for key, side in (("width", 640), ("height", 360))]
+    if "region" not in image:
+        return tuple(whole)
+    x, y, width, height = image["region"]
+    return tuple(min(math.ceil((low + size) * scale), limit) - min(math.floor(low * scale), limit - 1)
+                 for low, size, limit in ((x, width, whole[0]), (y, height, whole[1])))
 
 
 def compare(first, second):
@@ -248,7 +259,7 @@ def compare_prediction(predicted, summary, job):
     stats = summary["stats"]
     tasks = predicted["renderTasks"] + predicted["secondPassTasks"] + predicted["assembleTasks"]
     require(summary["tasksTotal"] == tasks, "predicted tasks", f"{summary['tasksTotal']}, predicted {tasks}")
-    pixels = job.get("image", {}).get("width", 640) * job.get("image", {}).get("height", 360)
+    pixels = math.prod(rendered_size(job.get("image", {})))
     second_pass = predicted["secondPassTasks"] > 0
     require(stats["pixels"] == pixels * predicted["frames"], "predicted pixels",
             f"{stats['pixels']}, predicted {pixels * predicted['frames']}")

@@ -110,7 +110,8 @@ def judge_means(case, render):
     def means(of, first_seed, count):
         found = []
         for seed in range(first_seed, first_seed + count):
-            frames = sorted(render(of, seed).glob("*.exr"))
+            # Frame 10 comes after frame 9, whether or not the pattern has room for two digits.
+            frames = sorted(render(of, seed).glob("*.exr"), key=lambda path: (len(path.name), path.name))
             found.append(brightness(read_frame(frames[which], None)))
         return found
 

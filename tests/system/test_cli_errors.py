@@ -97,6 +97,34 @@ class CliErrors(unittest.TestCase):
         self.expect(self.baton("check", self.job()), BAD_INPUT, "cube.obj", "sky.hdr")
         self.expect(self.baton("check", "missing.json"), BAD_INPUT, "missing.json: no such file")
 
+    def test_check_and_render_warn_alike(self):
+        (self.folder / "sky.hdr").write_bytes(radiance_hdr(6, 2))
+        objects = [{"mesh": "cube", "material": "clay", "translate": [0, 0, z]} for z in (0, 50)]
+        objects += [{"mesh": "cube", "material": "clay", "translate": [99, 0, 0]},
+                    {"mesh": "cube", "material": "clay", "scale": 1e-4}]
+        job = self.job(scene={**CUBE_JOB["scene"], "objects": objects})
+        warnings = ["sky.hdr: no texel is brighter than 1 (1)",
+                    "sky.hdr: 6x2 texels, a lat-long map is twice as wide as high",
+                    "object 1 (cube) is behind the camera in every frame",
+                    "object 2 (cube) is outside of the picture in every frame",
+                    "object 3 (cube) is smaller than a pixel in every frame"]
+        check, render = self.baton("check", job), self.baton("render", job)
+        self.expect(check, OK)
+        self.expect(render, OK)
+        for warning in warnings:
+            self.assertEqual(check.stdout.count(warning), 1, check.stdout)
+            self.assertEqual(render.stderr.count(warning), 1, render.stderr)
+        self.assertEqual(check.stdout.count("warning "), len(warnings), check.stdout)
+        told = json.loads(self.baton("check", job, "--json").stdout)["warnings"]
+        self.assertEqual(len(told), len(warnings), told)
+
+        # Where frames cannot go.
+        result = self.baton("check", self.job(output={"directory": "sky.hdr/frames"}))
+        self.assertIn("sky.hdr cannot be written", result.stdout)
+        result = self.baton("check", self.job(
+            image={"width": 8192, "height": 8192, "tileSize": 512}, frames="1-3000", output={"pixelType": "float"}))
+        self.assertIn(" are free, and frames and state may take ", result.stdout)
+
     def test_rendering_a_file_that_is_no_picture(self):
         (self.folder / "sky.hdr").write_bytes(b"no picture")
         result = self.baton("render", self.job())

@@ -65,10 +65,26 @@ def unknown_and_ambiguous_ids(programs, folder):
 
         # Seventeen IDs begin with sixteen digits.
         digit = next(d for d in "0123456789abcdef" if sum(job.startswith(d) for job in jobs) > 1)
-        for name, words in {digit: "jobs have IDs that begin so", "xyz": "no job has this ID"}.items():
+        for name, words in {digit: "jobs have IDs that begin so", "xyz": "no job has this name or ID"}.items():
             for command in ["show", "wait", "cancel"]:
                 done = farm.baton("job", command, name, expect=BAD_INPUT)
                 check(f"job '{name}'" in done.stderr and words in done.stderr, done.stderr)
+
+
+def names_of_jobs(programs, folder):
+    """A name is as good as an ID; where two jobs have it, both are listed."""
+    with Farm(programs, folder / "farm") as farm:
+        farm.start_coordinator()
+        first = farm.submit(small_job(folder / "a", name="old oak"))
+        second = farm.submit(small_job(folder / "b", name="new oak", seed=2))
+        check_equal(farm.show("old oak")["id"], first, "job of this name")
+        farm.baton("job", "pause", "new oak")
+        check_equal(farm.show(second)["status"], "paused", "status")
+        third = farm.submit(small_job(folder / "c", name="new oak", seed=3))
+        for command in ["show", "wait", "resume"]:
+            done = farm.baton("job", command, "new oak", expect=BAD_INPUT)
+            check("job 'new oak': 2 jobs have this name:" in done.stderr, done.stderr)
+            check(f"{second}  paused" in done.stderr and f"{third}  running" in done.stderr, done.stderr)
 
 
 def a_cancelled_job_goes_on_when_submitted_again(programs, folder):
@@ -165,6 +181,7 @@ if __name__ == "__main__":
         nobody_listens,
         a_job_from_submission_to_its_end,
         unknown_and_ambiguous_ids,
+        names_of_jobs,
         a_cancelled_job_goes_on_when_submitted_again,
         waiting_outlasts_a_restart_of_the_coordinator,
         a_paused_job_waits_until_it_is_resumed,

@@ -57,6 +57,17 @@ def a_finished_render_has_nothing_to_do(programs, folder):
     check_equal(programs.pixels(folder / "frames"), before, "pixels after the second run")
 
 
+def two_farms_of_one_machine_never_meet(programs, folder):
+    """A port of the system's choice goes to another farm while a coordinator that died is started again."""
+    path = make(folder)
+    addresses = []
+    for _ in range(2):
+        programs.render(path, folder / "work")
+        addresses.append((folder / "work/endpoint").read_text(encoding="utf-8"))
+    check(all(address.startswith("ipc://@") for address in addresses), f"listens at {addresses}")
+    check(addresses[0] != addresses[1], f"both listen at {addresses[0]}")
+
+
 def an_edited_job_does_not_mix_with_the_one_before(programs, folder):
     """Rendered, edited and rendered, edited back and rendered: each time the frames are the job's own, or it is refused."""
     first = write_job(folder / "job.json", make_job(folder, frames="1-4"))
@@ -158,6 +169,7 @@ if __name__ == "__main__":
     run_tests([
         a_killed_render_goes_on,
         a_finished_render_has_nothing_to_do,
+        two_farms_of_one_machine_never_meet,
         an_edited_job_does_not_mix_with_the_one_before,
         what_is_gone_is_made_again_and_only_that,
         damaged_blobs_are_made_again,

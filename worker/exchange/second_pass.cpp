@@ -39,11 +39,6 @@ Status check_inputs(const RenderContext& context, std::int32_t frame_index, std:
   return Error{ErrorKind::bad_input, fmt::format("film: of another tile than {}", tile)};
 }
 
-PixelRect grown(const PixelRect& rect, std::int32_t margin, const ImageSpec& image) {
-  return {std::max(rect.x0 - margin, 0), std::max(rect.y0 - margin, 0),
-          std::min(rect.x1 + margin, image.width), std::min(rect.y1 + margin, image.height)};
-}
-
 ExchangeMasks make_masks(const VisibilitySpec& visibility, const SampleRegion& samples,
                          const PixelRect& rect, const PixelRect& rect_before_dilation) {
   ExchangeMasks masks{{}, PixelMask(rect)};
@@ -140,9 +135,10 @@ Result<SecondPassOutput> run_second_pass(const RenderContext& context, std::int3
   const VisibilitySpec& visibility = context.job.visibility;
   const SampleRegion samples(near);
   const PixelRect rect = context.grid.rect(tile);
-  const PixelRect reach = grown(rect, visibility.tile_size - 1, context.job.image);
+  const PixelRect image = context.job.image.rendered();
+  const PixelRect reach = grown(rect, visibility.tile_size - 1, image);
   const ExchangeMasks masks =
-      make_masks(visibility, samples, reach, grown(reach, visibility.dilate, context.job.image));
+      make_masks(visibility, samples, reach, grown(reach, visibility.dilate, image));
 
   // Do their pixels again.
   BATON_ASSIGN(const auto geometry, context.geometry->at(frame_index));

@@ -19,7 +19,7 @@ class RenderContext {
  public:
   JobSpec job;
   Digest digest;
-  TileGrid grid{1, 1, 1};
+  TileGrid grid{{0, 0, 1, 1}, 1};
   std::vector<FrameSpec> frames;
   std::shared_ptr<const Scene> scene;
   std::unique_ptr<GeometrySequence> geometry;

@@ -77,8 +77,7 @@ std::optional<Reprojection::Position> Reprojection::find_source(std::span<const 
                         static_cast<std::int32_t>(std::floor((*projected)[1]))};
   const bool in_reach =
       std::abs(source.x - pixel.x) <= max_px && std::abs(source.y - pixel.y) <= max_px;
-  const bool inside = source.x >= 0 && source.y >= 0 && source.x < context_.job.image.width &&
-                      source.y < context_.job.image.height;
+  const bool inside = context_.job.image.rendered().contains(source.x, source.y);
   if (!in_reach || !inside) return std::nullopt;
   return source;
 }

@@ -43,7 +43,7 @@ Result<std::vector<StatePtr>> read_states(const LoadedJob& loaded, const BlobSto
       return Error{ErrorKind::bad_input,
                    fmt::format("{}: a render task takes states", blob_name(input))};
     }
-    StatePtr state = loaded.states->find(input.digest);
+    StatePtr state = loaded.states->peek(input.digest);
     if (state == nullptr) {
       BATON_ASSIGN(const Bytes bytes, store.get(input.digest));
       BATON_ASSIGN(SampleState decoded, decode_state(bytes, blob_name(input)));
@@ -167,6 +167,7 @@ Result<TaskOutput> execute_assemble(const LoadedJob& loaded, const BlobStore& st
     pasted[static_cast<std::size_t>(input.tile)] = true;
   }
 
+  image.rect = image.rect.at_origin();
   BATON_ASSIGN(const BlobRef written, write_frame(loaded.job, loaded.digest, task.step, image));
   return TaskOutput{{written}, {}};
 }

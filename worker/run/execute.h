@@ -19,10 +19,9 @@ struct TaskOutput {
 };
 
 /// Runs one task: reads its inputs from `store`, writes its outputs there (an assembled frame goes
-/// to the job's output folder and is durable on return; blobs are after store.sync(), which comes
-/// before anybody hears of them). Deterministic. Errors: a missing or
-/// damaged input, the disk, bad input of the renderer; ErrorKind::cancelled when `stop` is
-/// requested.
+/// to the job's output folder and is durable on return; blobs are after store.sync()).
+/// Deterministic. Errors: a missing or damaged input, the disk, bad input of the renderer;
+/// ErrorKind::cancelled when `stop` is requested.
 Result<TaskOutput> execute_task(const LoadedJob& loaded, BlobStore& store, const TaskKey& task,
                                 const std::vector<BlobRef>& inputs, std::stop_token stop);
 

@@ -62,8 +62,7 @@ Status verify_frame(const std::filesystem::path& path, const FilmTile& image, st
 }
 
 FilmTile blank_image(const ImageSpec& spec, std::vector<std::string> channels) {
-  FilmTile image{
-      .rect = {0, 0, spec.width, spec.height}, .channels = std::move(channels), .values = {}};
+  FilmTile image{.rect = spec.rendered(), .channels = std::move(channels), .values = {}};
   image.values.resize(image.channels.size() * image.num_pixels());
   return image;
 }

@@ -65,6 +65,7 @@ class FrameCollector {
       stats.merge(second.stats);
       BATON_TRY(paste_tile(second.film, image));
     }
+    image.rect = image.rect.at_origin();
     BATON_TRY(sink_(frame_index, image));
     return stats;
   }

@@ -14,6 +14,8 @@ using namespace std::chrono_literals;
 /// Silence of so many heartbeats means "introduce yourself again".
 constexpr int kSilentHeartbeats = 3;
 constexpr auto kHelloInterval = 1000ms;
+/// A report that is not confirmed after so many heartbeats is sent again.
+constexpr int kUnconfirmedHeartbeats = 2;
 
 /// True for errors that every attempt on every worker would repeat.
 bool is_permanent(ErrorKind kind) {
@@ -33,7 +35,7 @@ Session::Session(SessionOptions options, TimePoint now)
 std::vector<SessionAction> Session::step(const SessionEvent& event, TimePoint now) {
   Actions actions;
   std::visit([&](const auto& e) { on(e, now, actions); }, event);
-  if (draining_ && in_hand_.empty()) {
+  if (draining_ && in_hand_.empty() && reports_.empty()) {
     actions.push_back(SendMessage{WorkerGoodbye{}});
     actions.push_back(Leave{ExitCode::ok, "all running tasks are finished"});
   }
@@ -69,15 +71,18 @@ void Session::on(const TaskEnded& event, TimePoint now, Actions& actions) {
   // Report, unless the task was given up.
   if (event.result) {
     reports_.push_back(
-        TaskDone{event.lease, event.result->outputs, event.result->stats, event.result->frames});
+        {event.lease,
+         TaskDone{event.lease, event.result->outputs, event.result->stats, event.result->frames},
+         now});
+    send_report(reports_.back(), now, actions);
   } else if (event.result.error().kind != ErrorKind::cancelled) {
     const Error& error = event.result.error();
-    reports_.push_back(TaskFailed{event.lease, error.message, is_permanent(error.kind)});
-  } else {
-    return request_leases(now, actions);
+    reports_.push_back({event.lease,
+                        TaskFailed{event.lease, error.message, is_permanent(error.kind),
+                                   error.kind == ErrorKind::no_space},
+                        now});
+    send_report(reports_.back(), now, actions);
   }
-  if (reports_.size() > limits::kMaxUnconfirmedReports) reports_.pop_front();
-  if (welcomed_) actions.push_back(SendMessage{reports_.back()});
   request_leases(now, actions);
 }
 
@@ -108,7 +113,11 @@ void Session::on(const Tick&, TimePoint now, Actions& actions) {
   // A heartbeat names the leases in hand and repeats the questions that were not answered.
   if (now >= next_heartbeat_) {
     next_heartbeat_ = now + heartbeat_;
-    actions.push_back(SendMessage{Heartbeat{{in_hand_.begin(), in_hand_.end()}}});
+    for (Report& report : reports_) {
+      if (now - report.sent >= kUnconfirmedHeartbeats * heartbeat_)
+        send_report(report, now, actions);
+    }
+    actions.push_back(SendMessage{Heartbeat{leases_in_hand()}});
     for (const Digest& job : documents_missing_) {
       actions.push_back(SendMessage{JobDocumentRequest{job}});
     }
@@ -128,7 +137,7 @@ void Session::receive(const WorkerWelcome& welcome, TimePoint now, Actions& acti
 
   // What was reported to a coordinator that died may be lost: tell it again, in order, before
   // asking for more.
-  for (const Message& report : reports_) actions.push_back(SendMessage{report});
+  for (Report& report : reports_) send_report(report, now, actions);
   requested_ = 0;
   next_request_ = now;
   request_leases(now, actions);
@@ -143,6 +152,12 @@ void Session::receive(const LeaseGrant& grant, TimePoint now, Actions& actions) 
 
 void Session::receive(const LeaseRevoke& revoke, TimePoint, Actions& actions) {
   if (in_hand_.contains(revoke.lease)) actions.push_back(StopTask{revoke.lease});
+  forget_report(revoke.lease);
+}
+
+void Session::receive(const ReportReceived& received, TimePoint now, Actions& actions) {
+  forget_report(received.lease);
+  request_leases(now, actions);
 }
 
 void Session::receive(const NoWork& no_work, TimePoint now, Actions&) {
@@ -190,6 +205,7 @@ void Session::introduce(TimePoint now, Actions& actions) {
 
 void Session::request_leases(TimePoint now, Actions& actions) {
   if (!welcomed_ || draining_ || now < next_request_) return;
+  if (reports_.size() >= limits::kMaxUnconfirmedReports) return;  // first somebody must listen
 
   // One task more than threads, so that the next one is here when one ends. What waits for the disk
   // needs no thread; when it is one for each thread, the disk is what is short. A request replaces
@@ -204,14 +220,20 @@ void Session::request_leases(TimePoint now, Actions& actions) {
   actions.push_back(SendMessage{LeaseRequest{wanted}});
 }
 
+void Session::send_report(Report& report, TimePoint now, Actions& actions) const {
+  report.sent = now;
+  if (welcomed_) actions.push_back(SendMessage{report.message});
+}
+
+void Session::forget_report(const LeaseId& lease) {
+  std::erase_if(reports_, [&](const Report& report) { return report.lease == lease; });
+}
+
+/// A report that is not confirmed counts: a coordinator that lost it must keep or adopt the lease
+/// until the report comes again.
 std::vector<LeaseId> Session::leases_in_hand() const {
-  // A report counts as in hand: a coordinator that lost it must adopt the lease before the report
-  // comes again.
   std::set<LeaseId> leases = in_hand_;
-  for (const Message& report : reports_) {
-    if (const auto* done = std::get_if<TaskDone>(&report)) leases.insert(done->lease);
-    if (const auto* failed = std::get_if<TaskFailed>(&report)) leases.insert(failed->lease);
-  }
+  for (const Report& report : reports_) leases.insert(report.lease);
   return {leases.begin(), leases.end()};
 }
 

@@ -75,10 +75,11 @@ using SessionAction = std::variant<SendMessage, UseStore, StartTask, StopTask, D
 /// The worker's side of the conversation with the coordinator: events in, actions out. Knows no
 /// socket, thread or file; time comes as an argument.
 ///
-/// introducing --WorkerWelcome--> working --DrainRequested--> draining --last task ended--> (Leave)
-/// A HelloAgain, or silence of kSilentHeartbeats, leads back to introducing: the hello names the
-/// leases in hand, and the reports that a dead coordinator may have lost follow the welcome in
-/// their order. The coordinator fences what it has seen before, so sending twice is safe.
+/// introducing --WorkerWelcome--> working --DrainRequested--> draining --last report confirmed-->
+/// (Leave)
+/// A HelloAgain, or silence of kSilentHeartbeats, leads back to introducing. A report is said
+/// again, after each welcome and when it is not answered, until the coordinator has confirmed it or
+/// has revoked its lease. The coordinator fences what it has seen before, so sending twice is safe.
 class Session {
  public:
   explicit Session(SessionOptions options, TimePoint now);
@@ -87,6 +88,11 @@ class Session {
 
  private:
   using Actions = std::vector<SessionAction>;
+  struct Report {
+    LeaseId lease;
+    Message message;
+    TimePoint sent;
+  };
 
   void on(const MessageArrived& event, TimePoint now, Actions& actions);
   void on(const TaskExecuted& event, TimePoint now, Actions& actions);
@@ -99,6 +105,7 @@ class Session {
   void receive(const LeaseGrant& grant, TimePoint now, Actions& actions);
   void receive(const LeaseRevoke& revoke, TimePoint now, Actions& actions);
   void receive(const NoWork& no_work, TimePoint now, Actions& actions);
+  void receive(const ReportReceived& received, TimePoint now, Actions& actions);
   void receive(const HelloAgain& again, TimePoint now, Actions& actions);
   void receive(const JobDocument& document, TimePoint now, Actions& actions);
   void receive(const Drain& drain, TimePoint now, Actions& actions);
@@ -106,6 +113,8 @@ class Session {
   void receive(const Refused& refused, TimePoint now, Actions& actions);
 
   void introduce(TimePoint now, Actions& actions);
+  void send_report(Report& report, TimePoint now, Actions& actions) const;
+  void forget_report(const LeaseId& lease);
   void request_leases(TimePoint now, Actions& actions);
   std::vector<LeaseId> leases_in_hand() const;
 
@@ -116,7 +125,7 @@ class Session {
   std::set<LeaseId> in_hand_;           ///< granted and not ended
   std::set<LeaseId> executed_;          ///< those of them that have left their thread
   std::set<Digest> documents_missing_;  ///< asked for, not yet here
-  std::deque<Message> reports_;         ///< the newest kMaxUnconfirmedReports, oldest first
+  std::deque<Report> reports_;          ///< not confirmed, oldest first
   std::int32_t requested_ = 0;          ///< leases that the coordinator knows are wanted
   TimePoint last_heard_, next_hello_, next_heartbeat_, next_request_, request_expires_;
 };

@@ -12,8 +12,8 @@
 #include <set>
 #include <span>
 
+#include "common/base/build.h"
 #include "common/base/files.h"
-#include "common/base/version.h"
 #include "common/job/job_json.h"
 #include "common/job/sequence.h"
 #include "common/protocol/worker_channel.h"
@@ -31,6 +31,14 @@ namespace {
 /// due heartbeat.
 constexpr std::chrono::milliseconds kTickInterval{50};
 
+/// Instruction set and ray tracer.
+std::string describe_renderer() {
+  const Scene empty;
+  const auto accel = Accel::build(empty);
+  return fmt::format("{}, {}", instruction_set(),
+                     accel ? (*accel)->description() : accel.error().message);
+}
+
 std::string host_name() {
   std::array<char, 256> name{};
   return ::gethostname(name.data(), name.size() - 1) == 0 ? name.data() : "unknown-host";
@@ -46,7 +54,8 @@ SessionOptions session_options(const WorkerOptions& options) {
   identity.worker_id = options.worker_id.empty() ? fmt::format("{}-{}", identity.host, identity.pid)
                                                  : options.worker_id;
   identity.num_threads = options.num_threads;
-  identity.instruction_set = instruction_set();
+  identity.build = build_identity();
+  identity.renderer = describe_renderer();
   return {std::move(identity), options.give_up};
 }
 
@@ -114,7 +123,9 @@ Result<TaskOutput> execute_pooled(const PooledTask& task, std::stop_token stop, 
   Result<TaskOutput> output =
       execute_task(*loaded, *task.store, task.lease.task, task.inputs, stop);
   notes.report(repair_notes(*loaded->context));
-  if (output || output.error().kind == ErrorKind::cancelled) return output;
+  if (output || output.error().kind == ErrorKind::cancelled ||
+      output.error().kind == ErrorKind::no_space)
+    return output;
   return Error{output.error().kind,
                fmt::format("{}\nto replay it alone: {}", output.error().message, command)};
 }
@@ -122,13 +133,16 @@ Result<TaskOutput> execute_pooled(const PooledTask& task, std::stop_token stop, 
 /// What waiting for the disk may take; after it the tasks count as failed.
 constexpr std::chrono::seconds kDiskPatience{300};
 
-/// Makes the blobs of executed tasks durable. An assembled frame is already.
+/// Makes the checkpoints among what the tasks made durable. What lies between is made again from
+/// them, should the machine lose it; an assembled frame is durable already.
 Status publish_pooled(std::span<const PooledTask> tasks, TaskWatch& watch) {
   const auto deadline = std::chrono::steady_clock::now() + kDiskPatience;
   std::list<TaskWatch::Mark> marks;
   std::set<std::shared_ptr<BlobStore>> stores;
   for (const PooledTask& task : tasks) {
-    if (task.lease.task.kind == TaskKind::assemble) continue;
+    const TaskKey& key = task.lease.task;
+    BATON_ASSIGN(const LoadedJobPtr loaded, task.job->load({}));
+    if (key.kind != TaskKind::render || !ends_in_checkpoint(loaded->job, key.step)) continue;
     marks.emplace_back(watch, task.lease, deadline);
     stores.insert(task.store);
   }
@@ -263,10 +277,7 @@ class Worker {
 }  // namespace
 
 std::string describe_worker() {
-  const Scene empty;
-  const auto accel = Accel::build(empty);
-  return fmt::format("baton-worker {}\nray tracer: {}\nsampling: {}", kVersion,
-                     accel ? (*accel)->description() : accel.error().message, instruction_set());
+  return fmt::format("{}\nrenders with {}", build_identity(), describe_renderer());
 }
 
 ExitCode run_worker(const WorkerOptions& options, const std::atomic<bool>& drain) {

@@ -18,7 +18,7 @@ constexpr int kGroundRays = 24;
 /// The largest step of any visible point between two frames, in pixels along either axis.
 class StepMeter {
  public:
-  StepMeter(const Camera& now, const Camera& before, const ImageSpec& image)
+  StepMeter(const Camera& now, const Camera& before, const PixelRect& image)
       : now_(now), before_(before), image_(image) {}
 
   /// A point that is at `now` in this frame and was at `before`. What leaves the image has no
@@ -34,13 +34,13 @@ class StepMeter {
 
  private:
   bool inside(const std::array<float, 2>& p) const {
-    return p[0] >= 0 && p[1] >= 0 && p[0] < static_cast<float>(image_.width) &&
-           p[1] < static_cast<float>(image_.height);
+    return p[0] >= static_cast<float>(image_.x0) && p[1] >= static_cast<float>(image_.y0) &&
+           p[0] < static_cast<float>(image_.x1) && p[1] < static_cast<float>(image_.y1);
   }
 
   const Camera& now_;
   const Camera& before_;
-  const ImageSpec& image_;
+  PixelRect image_;
   float largest_ = 0;
 };
 
@@ -56,11 +56,13 @@ void add_meshes(const Scene& scene, const Pose& now, const Pose& before, StepMet
 
 /// The ground has corners only: look where a grid of rays hits it.
 void add_ground(const JobSpec& job, const Camera& camera, StepMeter& meter) {
+  const PixelRect image = job.image.rendered();
   for (int i = 0; i < kGroundRays * kGroundRays; ++i) {
     const float x = (static_cast<float>(i % kGroundRays) + 0.5f) / kGroundRays;
     const float y = (static_cast<float>(i / kGroundRays) + 0.5f) / kGroundRays;
-    const Ray ray = camera.ray(x * static_cast<float>(job.image.width),
-                               y * static_cast<float>(job.image.height));
+    const Ray ray =
+        camera.ray(static_cast<float>(image.x0) + x * static_cast<float>(image.width()),
+                   static_cast<float>(image.y0) + y * static_cast<float>(image.height()));
     const float t = (job.scene.ground->height - ray.origin.y) / ray.direction.y;
     const Vec3 point = ray.origin + ray.direction * t;
     const float half = 0.5f * job.scene.ground->size;
@@ -74,7 +76,7 @@ int measure_max_px(const JobSpec& job, const Scene& scene) {
   Pose before = pose_at(scene, job, job.frames.front());
   for (const int frame : job.frames) {
     Pose now = pose_at(scene, job, frame);
-    StepMeter meter(now.camera, before.camera, job.image);
+    StepMeter meter(now.camera, before.camera, job.image.rendered());
     add_meshes(scene, now, before, meter);
     if (job.scene.ground) add_ground(job, now.camera, meter);
     largest = std::max(largest, meter.largest());

@@ -57,14 +57,14 @@ class Poison : public testing::Test {
     test::TileResult first_pass;
     FilmTile second_pass;
   };
-  int num_jobs_ = 0;
-
   static Outcome render(const JobSpec& job, std::uint32_t pattern) {
     set_poison(pattern);
     Outcome outcome{test::render_tile(job), {}};
     if (job.visibility.correlated) outcome.second_pass = test::render_correlated(job).film;
     return outcome;
   }
+
+  int num_jobs_ = 0;
 };
 
 TEST_F(Poison, FreshSamplesOfAnyNumber) {

@@ -106,5 +106,41 @@ TEST(ContactSheet, EnlargedPixelsBecomeRectangles) {
   EXPECT_EQ(pixel(sheet, 4, 3)[0], 0);
 }
 
+TEST(ContactSheet, WritesFrameNumbersIntoTheLowerLeftCorners) {
+  RgbImage grey{40, 30, std::vector<float>(40 * 30 * 3, 0.5f)};
+  const std::vector<RgbImage> frames{grey, grey};
+  const std::vector<int> numbers{7, 41};
+  const RgbImage sheet = contact_sheet(frames, 2, 40, numbers);
+  // As text, one character a dot: of 2 x 2 pixels, from the upper left corner of a number's box.
+  const auto dots = [&](int left, int columns) {
+    std::string text;
+    for (int row = 0; row < 7; ++row) {
+      for (int column = 0; column < columns; ++column) {
+        const int x = left + 2 * column, y = 2 + 30 - 14 + 2 * row;
+        const float value = sheet.rgb[static_cast<std::size_t>((y * sheet.width + x) * 3)];
+        text += value == 1 ? '#' : value == 0 ? '.' : '?';
+      }
+      text += '\n';
+    }
+    return text;
+  };
+  EXPECT_EQ(dots(2, 6),
+            ".....?\n"
+            ".###.?\n"
+            "...#.?\n"
+            "..#..?\n"
+            "..#..?\n"
+            "..#..?\n"
+            ".....?\n");
+  EXPECT_EQ(dots(44, 9),
+            ".........\n"
+            ".#.#..#..\n"
+            ".#.#.##..\n"
+            ".###..#..\n"
+            "...#..#..\n"
+            "...#.###.\n"
+            ".........\n");
+}
+
 }  // namespace
 }  // namespace baton

@@ -5,6 +5,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <cstring>
 #include <fstream>
 #include <iterator>
 #include <limits>
@@ -245,6 +246,37 @@ TEST_F(ImageIoTest, PngIsWrittenWholeAndDeterministic) {
   ASSERT_GT(bytes.size(), sizeof(expected));
   EXPECT_TRUE(std::ranges::equal(ByteView(bytes).first(sizeof(expected)),
                                  std::as_bytes(std::span(expected))));
+}
+
+/// A picture whose header says something else behind `key`.
+Bytes with_claim(Bytes bytes, std::string_view key, std::uint32_t claim) {
+  const auto found = std::ranges::search(bytes, as_bytes_view(key));
+  EXPECT_FALSE(found.empty());
+  if (!found.empty()) std::memcpy(&*found.end(), &claim, sizeof(claim));
+  return bytes;
+}
+
+// OpenEXR would reserve gigabytes for a row.
+TEST_F(ImageIoTest, AnImageThatIsTooLargeIsAnErrorBeforeItsMemoryIsReserved) {
+  using namespace std::string_view_literals;
+  const Bytes bytes = *encode_exr("a.exr", picture({"R", "G", "B"}), {});
+  const auto key = "dataWindow\0box2i\0\x10\0\0\0"sv;
+  for (const std::uint32_t corner : {0xff000000u, 0x7fffffffu}) {
+    const Result<FilmTile> read = read_exr(write("a.exr", with_claim(bytes, key, corner)));
+    ASSERT_FALSE(read.ok());
+    EXPECT_THAT(read.error().message, HasSubstr("a.exr: dataWindow: expected sides of 1 to 32768"));
+  }
+}
+
+// OpenEXR would first reserve what it says.
+TEST_F(ImageIoTest, AnAttributeThatSaysItIsLargerThanTheFileIsAnError) {
+  const Bytes bytes =
+      *encode_exr("a.exr", picture({"R", "G", "B"}), {.metadata = {{"note", "abc"}}});
+  const std::string_view key("note\0string\0", 12);
+  const Result<FilmTile> read = read_exr(write("a.exr", with_claim(bytes, key, 0x7ffffff0)));
+  ASSERT_FALSE(read.ok());
+  EXPECT_THAT(read.error().message,
+              HasSubstr("a.exr: not a readable EXR file: attribute note is not as long"));
 }
 
 }  // namespace

@@ -77,6 +77,14 @@ TEST(JobJson, WritesFloatsAsShortDecimals) {
               HasSubstr("\"essRatioMin\": 0.1,"));
 }
 
+TEST(JobJson, IgnoresTheNameOfASchema) {
+  EXPECT_EQ(parsed(job_text(R"("$schema": "job.schema.json")")), parsed(job_text("")));
+  EXPECT_EQ(to_json(parsed(job_text(""))).find("$schema"), std::string::npos);
+  EXPECT_EQ(faults(R"("$schema": 3)"),
+            "job.json: $[\"$schema\"]: expected a text of 1 to 4096 bytes without control "
+            "characters, got 3");
+}
+
 TEST(JobJson, MaterialsTakeWhatTheyLeaveOutFromTheRest) {
   const JobSpec job = parsed(R"({"name": "test", "environment": {"map": "sky.exr"},
       "scene": {"materials": {"wall": {"type": "diffuse"}, "lamp": {"type": "diffuse"}}},

@@ -109,12 +109,31 @@ TEST(Motion, SaysWhatMovesAndWhetherThatIsSettled) {
 }
 
 TEST(TileGrid, TilesNearATileAreThoseWithAPixelInReach) {
-  const TileGrid grid(100, 60, 32);  // 4 x 2 tiles
+  const TileGrid grid({0, 0, 100, 60}, 32);  // 4 x 2 tiles
   EXPECT_THAT(grid.tiles_near(5, 0), ElementsAre(5));
   EXPECT_THAT(grid.tiles_near(5, 1), ElementsAre(0, 1, 2, 4, 5, 6));
   EXPECT_THAT(grid.tiles_near(3, 4), ElementsAre(2, 3, 6, 7));
   EXPECT_THAT(grid.tiles_near(3, 33), ElementsAre(1, 2, 3, 5, 6, 7));
   EXPECT_EQ(grid.tiles_near(0, 1 << 20).size(), 8u);
+}
+
+TEST(TileGrid, CutsARegionFromItsCorner) {
+  const TileGrid grid({10, 20, 50, 41}, 32);  // 2 x 1 tiles
+  EXPECT_EQ(grid.count(), 2);
+  EXPECT_EQ(grid.rect(0), (PixelRect{10, 20, 42, 41}));
+  EXPECT_EQ(grid.rect(1), (PixelRect{42, 20, 50, 41}));
+  EXPECT_THAT(grid.tiles_near(1, 0), ElementsAre(1));
+  EXPECT_THAT(grid.tiles_near(1, 1), ElementsAre(0, 1));
+}
+
+TEST(ImageSpec, ScalesARegionToWholePixels) {
+  const ImageSpec image{.width = 641, .height = 360, .region = PixelRect{101, 50, 400, 249}};
+  const ImageSpec quarter = scaled(image, 0.25);
+  EXPECT_EQ(quarter.width, 160);
+  EXPECT_EQ(quarter.height, 90);
+  EXPECT_EQ(quarter.rendered(), (PixelRect{25, 12, 100, 63}));
+  const ImageSpec dot = scaled(image, 0.0001);
+  EXPECT_EQ(dot.rendered(), (PixelRect{0, 0, 1, 1}));
 }
 
 Result<JobSpec> parse(const std::string& motion, const std::string& object = "") {

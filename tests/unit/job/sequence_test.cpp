@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include "common/job/job_json.h"
+
 namespace baton {
 namespace {
 
@@ -30,6 +32,21 @@ TEST(Sequence, TurnsFromTheFrameThatIsSaid) {
   const std::vector<FrameSpec> frames = expand_sequence(job);
   EXPECT_EQ(frames[0].environment.rotation, rotation_about({0, 1, 0}, 10));
   EXPECT_EQ(frames[1].environment.rotation, rotation_about({0, 1, 0}, 40));
+}
+
+TEST(ImageSpec, IsReadWithARegionAndScaled) {
+  const auto image_of = [](const std::string& image) {
+    return parse_job(
+        R"({"name": "t", "scene": {}, "environment": {"map": "a.exr"}, "image": )" + image + "}",
+        "job", "/");
+  };
+  const Result<JobSpec> job =
+      image_of(R"({"width": 200, "height": 100, "region": [20, 40, 100, 60], "scale": 0.5})");
+  ASSERT_TRUE(job) << job.error().message;
+  const ImageSpec expected{.width = 100, .height = 50, .region = PixelRect{10, 20, 60, 50}};
+  EXPECT_EQ(job->image, expected);
+  EXPECT_EQ(parse_job(to_json(*job), "again", "/").value(), *job);
+  EXPECT_EQ(to_json(image_of("{}").value()).find("region"), std::string::npos);
 }
 
 }  // namespace

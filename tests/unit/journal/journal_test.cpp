@@ -80,11 +80,13 @@ TEST_F(JournalTest, WhatWasCommittedIsThereAgain) {
   const JournalledJob job = journal.load(kJob).value();
   EXPECT_EQ(job.document, "{}");
   EXPECT_EQ(job.status, JobStatus::failed);
-  ASSERT_EQ(job.completions.size(), 2u);
-  EXPECT_EQ(job.completions[0].task, completion(1).task);
-  EXPECT_EQ(job.completions[0].outputs, completion(1).outputs);
-  EXPECT_EQ(job.completions[1].stats, completion(0).stats);
-  EXPECT_EQ(job.completions[1].frames, completion(0).frames);
+  Completions expected;
+  for (const int i : {1, 0}) expected.add(completion(i));
+  ASSERT_EQ(job.completions.tasks.size(), 2u);
+  EXPECT_EQ(job.completions.tasks[0].task, completion(1).task);
+  EXPECT_EQ(job.completions.tasks[0].outputs, completion(1).outputs);
+  EXPECT_EQ(job.completions.stats, expected.stats);
+  EXPECT_EQ(job.completions.frames, expected.frames);
   EXPECT_EQ(journal.frame_stats(kJob, 3).value().size(), 2u);
   EXPECT_TRUE(journal.frame_stats(kJob, 2).value().empty());
   ASSERT_EQ(job.failures.size(), 1u);
@@ -100,7 +102,7 @@ TEST_F(JournalTest, AKilledProcessLosesExactlyWhatItDidNotCommit) {
   ASSERT_TRUE(journal.commit().ok());
   ASSERT_TRUE(journal.record_completion(kJob, completion(1)).ok());
   kill_and_copy();
-  EXPECT_EQ(open().load(kJob).value().completions.size(), 1u);
+  EXPECT_EQ(open().load(kJob).value().completions.tasks.size(), 1u);
 }
 
 TEST_F(JournalTest, ARestartedJobForgetsItsFailuresAndKeepsItsWork) {
@@ -113,7 +115,7 @@ TEST_F(JournalTest, ARestartedJobForgetsItsFailuresAndKeepsItsWork) {
   ASSERT_TRUE(journal.restart_job(kJob).ok());
   JournalledJob job = journal.load(kJob).value();
   EXPECT_EQ(job.status, JobStatus::running);
-  EXPECT_EQ(job.completions.size(), 1u);
+  EXPECT_EQ(job.completions.tasks.size(), 1u);
   EXPECT_TRUE(job.failures.empty());
 }
 
@@ -126,7 +128,7 @@ TEST_F(JournalTest, EveryKindOfTaskComesBackAsItWas) {
     one.task.kind = static_cast<TaskKind>(kind);
     ASSERT_TRUE(journal.record_completion(kJob, one).ok());
   }
-  const std::vector<Completion> read = journal.load(kJob).value().completions;
+  const auto read = journal.load(kJob).value().completions.tasks;
   ASSERT_EQ(read.size(), static_cast<std::size_t>(last_of(TaskKind{})) + 1);
   for (std::size_t kind = 0; kind < read.size(); ++kind)
     EXPECT_EQ(read[kind].task.kind, static_cast<TaskKind>(kind));
@@ -138,7 +140,7 @@ TEST_F(JournalTest, TasksThatAreOpenAgainAreNotDone) {
   for (const std::int32_t tile : {0, 1, 2})
     ASSERT_TRUE(journal.record_completion(kJob, completion(tile)).ok());
   ASSERT_TRUE(journal.record_reopened(kJob, {completion(0).task, completion(2).task}).ok());
-  const std::vector<Completion> left = journal.load(kJob).value().completions;
+  const auto left = journal.load(kJob).value().completions.tasks;
   ASSERT_EQ(left.size(), 1u);
   EXPECT_EQ(left[0].task, completion(1).task);
 }

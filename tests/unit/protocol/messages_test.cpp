@@ -51,11 +51,11 @@ const JobSummary kSummary{{1, 2}, "name", "/out", JobStatus::failed, -3, 1, 2, 3
 /// One of each, in the order of the type codes, no member left at its default.
 const std::vector<Message>& examples() {
   static const std::vector<Message> messages{
-      WorkerHello{"w", "h\xc3\xb6st", 77, 1, 2, "AVX2", {kLease, kLease}},
+      WorkerHello{"w", "h\xc3\xb6st", 77, 1, 2, "baton 1", "AVX2", {kLease, kLease}},
       LeaseRequest{7},
       Heartbeat{{kLease}},
       TaskDone{kLease, {kBlob, kBlob}, kStats, {{3, 4, kStats.sampling}}},
-      TaskFailed{kLease, "no", true},
+      TaskFailed{kLease, "no", true, true},
       JobDocumentRequest{{1, 2}},
       WorkerGoodbye{},
       WorkerWelcome{3, 500, "/store"},
@@ -72,12 +72,13 @@ const std::vector<Message>& examples() {
       StopCoordinator{},
       JobAccepted{{5, 6}, true},
       JobList{{kSummary}, {{"w", "h", 1, 2, 3}}},
-      JobDetail{kSummary, {1, 2, 3}, {"one", ""}, {{3, -1, kStats.sampling}}},
+      JobDetail{kSummary, {1, 2, 3}, {"one", ""}, {{3, -1, kStats.sampling}}, "space"},
       Refused{4, "because"},
       PauseJob{"abc"},
       ResumeJob{"def"},
       DrainWorker{"w"},
       Drain{},
+      ReportReceived{kLease},
   };
   return messages;
 }
@@ -109,7 +110,7 @@ TEST(Messages, MembersArriveWhereTheyWereSent) {
 
 TEST(Messages, BytesAreThoseOfTheGrammar) {
   const std::vector<Bytes> frames = encode_message(NoWork{0x01020304});
-  EXPECT_EQ(frames[0], text(std::string_view("BATON\x03\x00", 7)));
+  EXPECT_EQ(frames[0], text(std::string_view("BATON\x05\x00", 7)));
   EXPECT_EQ(frames[1], text(std::string_view("\x0a\x00", 2)));
   EXPECT_EQ(frames[2], text("\x04\x03\x02\x01"));
 }
@@ -154,7 +155,7 @@ TEST(Messages, AnotherVersionIsAVersionError) {
   const Result<Message> decoded = decode_message(frames);
   ASSERT_FALSE(decoded.ok());
   EXPECT_EQ(decoded.error().kind, ErrorKind::version);
-  EXPECT_THAT(decoded.error().message, HasSubstr("version 9, this program speaks 3"));
+  EXPECT_THAT(decoded.error().message, HasSubstr("version 9, this program speaks 5"));
 }
 
 TEST(Messages, OtherProtocolsAreRefused) {

@@ -20,10 +20,11 @@ std::vector<FilmTile> images(const JobSpec& job, int threads) {
   return films;
 }
 
-// Samples follow moving surfaces, then pixels exchange them: two reaches into other tiles.
-TEST(LocalRender, TilingsDoNotShowInTheSecondPassOfWhatMoves) {
+/// Samples follow moving surfaces, then pixels exchange them: two reaches into other tiles.
+void expect_no_tiling_in_the_second_pass_of_what_moves(const ImageSpec& image) {
   JobSpec job = test::box_job();
-  job.image = {.width = 21, .height = 17, .sites = 4, .tile_size = 4096};
+  job.image = image;
+  job.image.tile_size = 4096;
   job.sampling.method = Method::sequential;
   job.frames = test::frame_numbers(3);
   job.visibility = {.correlated = true, .dilate = 1};
@@ -32,6 +33,46 @@ TEST(LocalRender, TilingsDoNotShowInTheSecondPassOfWhatMoves) {
   const std::vector<FilmTile> whole = images(job, 1);
   job.image.tile_size = 8;
   EXPECT_EQ(images(job, 2), whole);
+}
+
+TEST(LocalRender, TilingsDoNotShowInTheSecondPassOfWhatMoves) {
+  expect_no_tiling_in_the_second_pass_of_what_moves({.width = 21, .height = 17, .sites = 4});
+}
+
+/// The pixels of `rect` of an image that begins at (0, 0).
+FilmTile cut(const FilmTile& image, const PixelRect& rect) {
+  FilmTile part{.rect = rect.at_origin(), .channels = image.channels, .values = {}};
+  for (std::size_t c = 0; c < image.channels.size(); ++c) {
+    for (std::int32_t y = rect.y0; y < rect.y1; ++y) {
+      const float* const row = image.plane(c) + std::ptrdiff_t{y} * image.rect.width();
+      part.values.insert(part.values.end(), row + rect.x0, row + rect.x1);
+    }
+  }
+  return part;
+}
+
+// While pixels take nothing from others, a part has the bytes that it has in the whole.
+TEST(LocalRender, ARegionIsThatPartOfTheWholePicture) {
+  JobSpec job = test::box_job();
+  job.image = {.width = 21, .height = 17, .sites = 4, .tile_size = 8};
+  job.frames = test::frame_numbers(3);
+  job.output.aovs = {Aov::source, Aov::normal, Aov::depth};
+  const PixelRect region{3, 5, 14, 17};
+  for (const Method method : {Method::pool, Method::sequential, Method::bidirectional}) {
+    job.sampling.method = method;
+    job.image.region.reset();
+    const std::vector<FilmTile> whole = images(job, 1);
+    job.image.region = region;
+    const std::vector<FilmTile> part = images(job, 1);
+    for (std::size_t frame = 0; frame < whole.size(); ++frame)
+      EXPECT_EQ(part[frame], cut(whole[frame], region)) << traits(method).name << " " << frame;
+  }
+}
+
+// At the border of the region what moves in starts afresh; nothing else may go wrong.
+TEST(LocalRender, TilingsDoNotShowInARegionOfWhatMoves) {
+  expect_no_tiling_in_the_second_pass_of_what_moves(
+      {.width = 31, .height = 27, .sites = 4, .region = PixelRect{3, 5, 24, 22}});
 }
 
 }  // namespace

@@ -1,4 +1,5 @@
 #include "worker/run/session.h"
+#include "common/base/limits.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -37,11 +38,14 @@ class SessionTest : public testing::Test {
   }
 
   TimePoint now_{};
-  Session session_{
-      {.identity =
-           {.worker_id = "w", .host = {}, .num_threads = 2, .instruction_set = {}, .running = {}},
-       .give_up = 60s},
-      now_};
+  Session session_{{.identity = {.worker_id = "w",
+                                 .host = {},
+                                 .num_threads = 2,
+                                 .build = {},
+                                 .renderer = {},
+                                 .running = {}},
+                    .give_up = 60s},
+                   now_};
 };
 
 /// The sent messages of one type, in order.
@@ -141,8 +145,11 @@ TEST_F(SessionTest, BadInputIsPermanentAndALostDiskIsNot) {
   welcome();
   grant(lease(0));
   grant(lease(1));
+  grant(lease(2));
   EXPECT_TRUE(sent<TaskFailed>(fail(lease(0), ErrorKind::bad_input)).at(0).permanent);
   EXPECT_FALSE(sent<TaskFailed>(fail(lease(1), ErrorKind::io)).at(0).permanent);
+  const TaskFailed full = sent<TaskFailed>(fail(lease(2), ErrorKind::no_space)).at(0);
+  EXPECT_TRUE(full.no_space && !full.permanent);
 }
 
 TEST_F(SessionTest, ARevokedTaskIsStoppedAndNotReported) {
@@ -200,6 +207,40 @@ TEST_F(SessionTest, AReportMadeInSilenceWaitsForTheWelcome) {
   EXPECT_EQ(sent<TaskDone>(welcome()).size(), 1u);
 }
 
+TEST_F(SessionTest, AReportIsRepeatedUntilItIsConfirmed) {
+  welcome();
+  grant(lease(0));
+  grant(lease(1));
+  finish(lease(0));
+  fail(lease(1), ErrorKind::io);
+  EXPECT_THAT(sent<Heartbeat>(tick_after(1000ms)).at(0).running,
+              testing::UnorderedElementsAre(lease(0), lease(1)))
+      << "the coordinator must not give them to others before the reports come";
+  for (int i = 0; i < 3; ++i) {
+    const auto again = tick_after(2000ms);
+    EXPECT_EQ(sent<TaskDone>(again).size(), 1u);
+    EXPECT_EQ(sent<TaskFailed>(again).size(), 1u);
+    receive(Heartbeat{});
+  }
+  receive(ReportReceived{lease(0)});
+  receive(LeaseRevoke{lease(1)});
+  const auto after = tick_after(2000ms);
+  EXPECT_TRUE(sent<TaskDone>(after).empty());
+  EXPECT_TRUE(sent<TaskFailed>(after).empty());
+  EXPECT_THAT(sent<Heartbeat>(after).at(0).running, testing::IsEmpty());
+}
+
+TEST_F(SessionTest, NothingMoreIsTakenWhileNobodyConfirms) {
+  welcome();
+  int tile = 0;
+  for (; tile < 1000; ++tile) {
+    grant(lease(tile));
+    if (sent<LeaseRequest>(finish(lease(tile))).empty()) break;
+  }
+  EXPECT_EQ(tile + 1, static_cast<int>(limits::kMaxUnconfirmedReports));
+  EXPECT_EQ(sent<LeaseRequest>(receive(ReportReceived{lease(0)})).size(), 1u);
+}
+
 TEST_F(SessionTest, AMissingDocumentIsAskedForUntilItIsHere) {
   welcome();
   EXPECT_EQ(sent<JobDocumentRequest>(step(DocumentMissing{{1, 2}})).size(), 1u);
@@ -213,7 +254,8 @@ TEST_F(SessionTest, TheCoordinatorMayAskForTheEndToo) {
   welcome();
   grant(lease(0));
   EXPECT_NE(find<DropQueuedTasks>(step(MessageArrived{Drain{}})), nullptr);
-  const auto last = finish(lease(0));
+  finish(lease(0));
+  const auto last = receive(ReportReceived{lease(0)});
   EXPECT_EQ(sent<WorkerGoodbye>(last).size(), 1u);
   ASSERT_NE(find<Leave>(last), nullptr);
   EXPECT_EQ(find<Leave>(last)->code, ExitCode::ok);
@@ -227,9 +269,11 @@ TEST_F(SessionTest, DrainsWhatRunsThenSaysGoodbye) {
   EXPECT_EQ(find<Leave>(draining), nullptr);
   EXPECT_EQ(find<StartTask>(grant(lease(1))), nullptr);
 
-  const auto last = finish(lease(0));
-  EXPECT_EQ(sent<TaskDone>(last).size(), 1u);
-  EXPECT_TRUE(sent<LeaseRequest>(last).empty());
+  const auto ended = finish(lease(0));
+  EXPECT_EQ(sent<TaskDone>(ended).size(), 1u);
+  EXPECT_TRUE(sent<LeaseRequest>(ended).empty());
+  EXPECT_EQ(find<Leave>(ended), nullptr) << "the report may be lost";
+  const auto last = receive(ReportReceived{lease(0)});
   EXPECT_EQ(sent<WorkerGoodbye>(last).size(), 1u);
   ASSERT_NE(find<Leave>(last), nullptr);
   EXPECT_EQ(find<Leave>(last)->code, ExitCode::ok);

@@ -2,6 +2,8 @@
 
 #include <gtest/gtest.h>
 
+#include <string>
+
 #include "worker/pass/tile_renderer.h"
 
 namespace baton {
@@ -22,6 +24,23 @@ TEST(StateCache, CountsWhatStatesTake) {
   EXPECT_EQ(cache.size(), 100u * 25 + 514);
   cache.insert(digest_of("sequential"), state_of(10, false));
   EXPECT_EQ(cache.size(), 100u * (25 + 9 + 16 * 9) + 514);
+}
+
+// Four tiles a frame and room for five states: each tile of a frame finds its own of the frame
+// before, although that is the one that was used least recently.
+TEST(StateCache, ATileFindsItsStateOfTheFrameBefore) {
+  const StatePtr state = state_of(10, false);
+  StateCache cache(5 * state->size_bytes());
+  const auto key = [](int frame, int tile) {
+    return digest_of(std::to_string(frame) + "/" + std::to_string(tile));
+  };
+  for (int frame = 0; frame < 3; ++frame) {
+    for (int tile = 0; tile < 4; ++tile) {
+      const bool is_there = frame == 0 || cache.peek(key(frame - 1, tile)) != nullptr;
+      EXPECT_TRUE(is_there) << frame << " " << tile;
+      cache.insert(key(frame, tile), state);
+    }
+  }
 }
 
 }  // namespace

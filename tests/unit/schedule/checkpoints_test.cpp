@@ -125,7 +125,7 @@ TEST(Checkpoints, AnOlderOneThatIsGoneIsLetGo) {
   const TaskKey gone = render(14, 0);
   const auto actions = again.step(JobAdded{.job = again.job,
                                            .spec = again.spec(),
-                                           .completions = farm.completions(),
+                                           .completions = completions_of(farm.completions()),
                                            .failures = {},
                                            .lost_spares = {gone}});
   EXPECT_TRUE(all_of<RecordReopened>(actions).empty());

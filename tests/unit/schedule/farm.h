@@ -66,6 +66,13 @@ inline std::vector<BlobRef> outputs_of(const JobSpec& spec, const Digest& job, c
   return outputs;
 }
 
+/// What a journal holds of these.
+inline Completions completions_of(const std::vector<Completion>& all) {
+  Completions completions;
+  for (const Completion& completion : all) completions.add(completion);
+  return completions;
+}
+
 template <class T>
 std::vector<T> all_of(const std::vector<Action>& actions) {
   std::vector<T> result;

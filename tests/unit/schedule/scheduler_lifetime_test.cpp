@@ -131,7 +131,8 @@ TEST_F(SchedulerTest, ARestartedCoordinatorTakesUpWhereTheJournalEnds) {
   const auto recorded = all_of<RecordCompletion>(farm.finish(held[0]));
 
   Farm again(farm.spec(), /*epoch=*/2);
-  again.step(JobAdded{farm.job, farm.spec(), JobStatus::running, {recorded[0].completion}, {}});
+  again.step(JobAdded{
+      farm.job, farm.spec(), JobStatus::running, completions_of({recorded[0].completion}), {}});
   EXPECT_EQ(again.progress().tasks_done, 1u);
 
   // The lease of the first life is adopted, its report counts, and others get the rest.
@@ -158,7 +159,9 @@ TEST_F(SchedulerTest, AFailureThatWasRecordedIsNotCountedAgainAfterARestart) {
   const GrantLease grant = farm.ask_one("a");
   const auto recorded = all_of<RecordFailure>(farm.fail(grant));
   Farm again(farm.spec(), /*epoch=*/2);
-  again.step(JobAdded{farm.job, farm.spec(), JobStatus::running, {}, {recorded[0].failure}});
+  JobAdded added{.job = farm.job, .spec = farm.spec(), .completions = {}, .failures = {}};
+  added.failures.push_back(recorded[0].failure);
+  again.step(added);
   again.step(WorkerJoined{"a", {grant.lease}});
   EXPECT_THAT(again.fail(grant), IsEmpty());
   EXPECT_EQ(again.progress().attempts_lost, 1u);
@@ -167,8 +170,8 @@ TEST_F(SchedulerTest, AFailureThatWasRecordedIsNotCountedAgainAfterARestart) {
 TEST_F(SchedulerTest, ACancelledJobThatIsSubmittedAgainKeepsWhatIsDone) {
   const auto recorded = all_of<RecordCompletion>(farm.finish(farm.ask_one("a")));
   farm.step(JobCancelled{farm.job});
-  const auto actions =
-      farm.step(JobAdded{farm.job, farm.spec(), JobStatus::running, {recorded[0].completion}, {}});
+  const auto actions = farm.step(JobAdded{
+      farm.job, farm.spec(), JobStatus::running, completions_of({recorded[0].completion}), {}});
   EXPECT_THAT(all_of<RemoveBlobs>(actions), IsEmpty());
   EXPECT_EQ(farm.progress().tasks_done, 1u);
   EXPECT_THAT(tasks_of(farm.ask("a", 10)), ElementsAre(render(0, 1), render(1, 0)));

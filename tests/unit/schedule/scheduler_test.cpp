@@ -128,7 +128,34 @@ TEST_F(SchedulerTest, TwoResultsForOneTaskAreABug) {
   farm.finish(grant);
   const auto conflicts = all_of<ReportConflict>(farm.finish(grant, /*variant=*/1));
   ASSERT_THAT(conflicts, SizeIs(1));
+  EXPECT_EQ(conflicts[0].maker, "a");
+  EXPECT_EQ(farm.status(), JobStatus::paused) << "somebody should look before more is made of it";
   EXPECT_NE(conflicts[0].expected.digest, conflicts[0].reported.digest);
+}
+
+// Also the last task's: the job is not done before somebody has looked.
+TEST_F(SchedulerTest, AnotherResultThanBeforeKeepsAJobFromItsEnd) {
+  std::vector<Completion> all;
+  for (TaskIndex task = 0; task < JobGraph(farm.spec()).num_tasks(); ++task) {
+    const TaskKey key = JobGraph(farm.spec()).key(task);
+    all.push_back({key, outputs_of(farm.spec(), farm.job, key), {}});
+  }
+  Farm again(farm.spec(), 2);
+  again.step(JobAdded{
+      again.job, again.spec(), JobStatus::running, completions_of(all), {}, {assemble(3)}});
+  again.step(WorkerJoined{"b", {}});
+  std::size_t num_conflicts = 0;
+  for (int i = 0; i < 100 && again.status() == JobStatus::running; ++i) {
+    const GrantLease grant = again.ask_one("b");
+    const bool last = grant.lease.task == assemble(3);
+    num_conflicts += all_of<ReportConflict>(again.finish(grant, last ? 1 : 0)).size();
+  }
+  EXPECT_EQ(num_conflicts, 1u);
+  EXPECT_EQ(again.progress().tasks_open, 0u);
+  EXPECT_EQ(again.status(), JobStatus::paused);
+  EXPECT_THAT(again.scheduler.waits_for(again.job, again.now), testing::HasSubstr("different"));
+  again.step(JobResumed{again.job, {}});
+  EXPECT_EQ(again.status(), JobStatus::done);
 }
 
 TEST_F(SchedulerTest, AReportThatLacksAnOutputIsAFailedAttempt) {
@@ -151,130 +178,6 @@ TEST_F(SchedulerTest, NonsenseIsIgnored) {
   EXPECT_THAT(farm.step(WorkRequested{"stranger", 1}), IsEmpty());
   EXPECT_THAT(farm.step(WorkRequested{"a", -5}), IsEmpty());
   EXPECT_THAT(farm.step(JobCancelled{digest_of("other")}), IsEmpty());
-}
-
-// ---- lost workers -------------------------------------------------------------------------------
-
-TEST_F(SchedulerTest, ASilentWorkerLosesItsLeases) {
-  const auto held = farm.ask("a", 2);
-  farm.now += kSilence;
-  farm.step(WorkerAlive{"b", {}});
-  EXPECT_THAT(farm.step(ClockTicked{}), IsEmpty());
-  farm.now += 1ms;
-  EXPECT_THAT(all_of<ForgetWorker>(farm.step(ClockTicked{})), SizeIs(1));
-  EXPECT_EQ(farm.progress().attempts_lost, 2u);
-  EXPECT_THAT(tasks_of(farm.ask("b", 2)), ElementsAre(render(0, 0), render(0, 1)));
-}
-
-TEST_F(SchedulerTest, AnyMessageIsASignOfLife) {
-  farm.ask("a", 1);
-  for (int i = 0; i < 5; ++i) {
-    farm.now += kSilence;
-    farm.ask("a", 1);
-  }
-  EXPECT_EQ(all_of<ForgetWorker>(farm.step(ClockTicked{}))[0].worker, "b");
-  EXPECT_EQ(farm.progress().tasks_leased, 2u);
-}
-
-TEST_F(SchedulerTest, AGrantThatNeverArrivedIsFoundByTheHeartbeat) {
-  const GrantLease lost = farm.ask_one("a");
-  farm.step(WorkerAlive{"a", {}});
-  EXPECT_EQ(farm.progress().tasks_leased, 1u) << "it may still be on its way";
-  farm.now += kSilence;
-  farm.step(WorkerAlive{"a", {}});
-  EXPECT_EQ(farm.progress().tasks_leased, 0u);
-  EXPECT_EQ(farm.ask_one("b").lease.task, lost.lease.task);
-}
-
-TEST_F(SchedulerTest, AWorkerThatIntroducesItselfAgainKeepsWhatItNames) {
-  const auto held = farm.ask("a", 2);
-  EXPECT_THAT(farm.step(WorkerJoined{"a", {held[0].lease}}), IsEmpty());
-  EXPECT_EQ(farm.progress().tasks_leased, 1u);
-  EXPECT_THAT(all_of<RecordCompletion>(farm.finish(held[0])), SizeIs(1));
-}
-
-TEST_F(SchedulerTest, ATaskThatKeepsLosingItsWorkersFails) {
-  for (int i = 0; farm.status() == JobStatus::running && i < 100; ++i) {
-    farm.step(WorkerJoined{"a", {}});
-    farm.ask("a", 1);
-  }
-  EXPECT_EQ(farm.status(), JobStatus::failed);
-}
-
-// ---- failures -----------------------------------------------------------------------------------
-
-TEST_F(SchedulerTest, ARetryGoesToAnotherWorker) {
-  const GrantLease grant = farm.ask_one("a");
-  farm.fail(grant);
-  EXPECT_NE(farm.ask_one("a").lease.task, grant.lease.task);
-  EXPECT_EQ(farm.ask_one("b").lease.task, grant.lease.task);
-}
-
-TEST_F(SchedulerTest, TheSameWorkerMayRetryWhenItIsAlone) {
-  farm.step(WorkerLeft{"b"});
-  const GrantLease grant = farm.ask_one("a");
-  farm.fail(grant);
-  EXPECT_EQ(farm.ask_one("a").lease.task, grant.lease.task);
-}
-
-TEST_F(SchedulerTest, ATaskFailsAfterAllItsAttempts) {
-  farm.step(WorkerLeft{"b"});
-  for (int attempt = 0; attempt <= farm.spec().max_retries_per_task; ++attempt) {
-    ASSERT_EQ(farm.status(), JobStatus::running);
-    const GrantLease grant = farm.ask_one("a");
-    ASSERT_EQ(grant.lease.task, render(0, 0));
-    farm.fail(grant);
-  }
-  EXPECT_EQ(farm.status(), JobStatus::failed);
-  EXPECT_EQ(farm.progress().tasks_open, 0u);
-}
-
-TEST_F(SchedulerTest, APermanentFailureEndsTheJobAtOnce) {
-  const auto grants = farm.ask("a", 2);
-  const auto actions = farm.fail(grants[0], /*permanent=*/true);
-  EXPECT_EQ(all_of<RecordJobStatus>(actions)[0].status, JobStatus::failed);
-  EXPECT_EQ(all_of<RevokeLease>(actions)[0].lease, grants[1].lease);
-  EXPECT_THAT(farm.ask("b", 1), IsEmpty());
-}
-
-TEST(SchedulerFailures, AJobGoesOnBelowItsLimitOfFailedTasks) {
-  JobSpec spec = small_job(2, 4, 2);
-  spec.max_failed_tasks = 2;
-  Farm farm(spec);
-  farm.submit();
-  farm.step(WorkerJoined{"a", {}});
-  farm.fail(farm.ask_one("a"), /*permanent=*/true);
-  EXPECT_EQ(farm.status(), JobStatus::running);
-
-  // Tile 1 is still rendered to the end; no frame can be written.
-  for (const GrantLease& grant : all_of<GrantLease>(farm.work_off("a"))) {
-    EXPECT_EQ(grant.lease.task.kind, TaskKind::render);
-    EXPECT_EQ(grant.lease.task.tile, 1);
-  }
-  EXPECT_EQ(farm.status(), JobStatus::failed);
-  EXPECT_EQ(farm.progress().tasks_done, 2u);
-}
-
-TEST(SchedulerFailures, AWorkerThatFailsTooOftenGetsNoMoreOfTheJob) {
-  JobSpec spec = small_job(4, 1, 1);
-  spec.max_failures_per_worker = 2;
-  Farm farm(spec);
-  farm.submit();
-  farm.step(WorkerJoined{"bad", {}});
-  farm.step(WorkerJoined{"good", {}});
-  for (const GrantLease& grant : farm.ask("bad", 2)) farm.fail(grant);
-  EXPECT_THAT(farm.ask("bad", 1), IsEmpty());
-  EXPECT_THAT(farm.ask("good", 4), SizeIs(4));
-}
-
-TEST(SchedulerFailures, AJobThatNobodyMayWorkOnFails) {
-  JobSpec spec = small_job(4, 1, 1);
-  spec.max_failures_per_worker = 2;
-  Farm farm(spec);
-  farm.submit();
-  farm.step(WorkerJoined{"bad", {}});
-  for (const GrantLease& grant : farm.ask("bad", 2)) farm.fail(grant);
-  EXPECT_EQ(farm.status(), JobStatus::failed);
 }
 
 }  // namespace

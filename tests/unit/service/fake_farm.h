@@ -10,6 +10,7 @@
 #include <string>
 #include <thread>
 
+#include "common/base/build.h"
 #include "common/base/files.h"
 #include "common/job/job_json.h"
 #include "common/protocol/client.h"
@@ -65,9 +66,10 @@ class FakeWorker {
         id_(std::move(id)) {}
 
   void say(const Message& message) { ASSERT_TRUE(channel_.send(message)); }
-  void hello(std::vector<LeaseId> running = {}, std::int32_t pid = 1) {
-    say(WorkerHello{id_, "host", static_cast<std::uint64_t>(pid), pid, 2, "TEST",
-                    std::move(running)});
+  void hello(std::vector<LeaseId> running = {}, std::int32_t pid = 1,
+             const std::string& renderer = "TEST") {
+    say(WorkerHello{id_, "host", static_cast<std::uint64_t>(pid), pid, 2, build_identity(),
+                    renderer, std::move(running)});
   }
 
   /// The next message of type T; others are passed over.

@@ -244,10 +244,54 @@ TEST_F(ServiceTest, ANameIsRefusedToASecondProcessWhileTheFirstLives) {
   EXPECT_TRUE(welcome);
 }
 
+TEST_F(ServiceTest, AWorkerOfAnotherBuildIsRefusedUnlessBuildsMayMix) {
+  for (const bool mixed : {false, true}) {
+    options.mixed_builds = mixed;
+    options.work_dir = folder / (mixed ? "mixed" : "one");
+    const RunningService service(options);
+    const fs::path blobs = options.work_dir / "store";
+    FakeWorker first(service.endpoint(), blobs, job), second(service.endpoint(), blobs, job, "v"),
+        third(service.endpoint(), blobs, job, "u");
+    first.hello();
+    first.expect<WorkerWelcome>();
+    second.hello({}, 2, "OTHER");
+    third.say(WorkerHello{"u", "host", 3, 3, 2, "baton 0", "TEST", {}});
+    if (mixed) {
+      second.expect<WorkerWelcome>();
+      third.expect<WorkerWelcome>();
+      continue;
+    }
+    const Refused renderer = second.expect<Refused>(), build = third.expect<Refused>();
+    EXPECT_EQ(renderer.kind, static_cast<std::uint8_t>(ErrorKind::version));
+    EXPECT_THAT(renderer.message, HasSubstr("worker v renders with OTHER, worker w with TEST"));
+    EXPECT_THAT(build.message, HasSubstr("worker u is baton 0, the coordinator baton "));
+  }
+}
+
+// Also one that comes twice, or of a lease that is over.
+TEST_F(ServiceTest, EveryReportIsConfirmed) {
+  const RunningService service(options);
+  ask<JobAccepted>(service.endpoint(), SubmitJob{document});
+  FakeWorker worker(service.endpoint(), store(), job);
+  worker.hello();
+  worker.say(LeaseRequest{2});
+  const LeaseId first = worker.expect<LeaseGrant>().lease,
+                second = worker.expect<LeaseGrant>().lease;
+  const TaskDone done = worker.work(first);
+  for (int time = 0; time < 2; ++time) {
+    worker.say(done);
+    EXPECT_EQ(worker.expect<ReportReceived>().lease, first);
+  }
+  for (int time = 0; time < 2; ++time) {
+    worker.say(TaskFailed{second, "boom"});
+    EXPECT_EQ(worker.expect<ReportReceived>().lease, second);
+  }
+}
+
 TEST_F(ServiceTest, QuestionsThatCannotBeAnsweredAreRefused) {
   const RunningService service(options);
   EXPECT_THAT(refused(service.endpoint(), ShowJob{"abc"}).message,
-              HasSubstr("job 'abc': no job has this ID"));
+              HasSubstr("job 'abc': no job has this name or ID"));
   EXPECT_EQ(refused(service.endpoint(), SubmitJob{"{"}).kind, ErrorKind::bad_input);
   EXPECT_THAT(refused(service.endpoint(), JobDocumentRequest{}).message,
               HasSubstr("not known here"));

@@ -5,41 +5,22 @@
 
 #include <numeric>
 
+#include "tests/support/first_pass.h"
+
 namespace baton {
 namespace {
 
 using testing::HasSubstr;
 
-/// 5 x 4 pixels of 8 samples in two populations; pixel (1, 1) has a failed ray.
-FirstPassSamples small_samples() {
-  FirstPassSamples s;
-  s.job_digest = {3, 4};
-  s.frame_index = 2;
-  s.tile = 1;
-  s.rect = {10, 20, 15, 24};
-  s.num_slots = 8;
-  s.num_populations = 2;
-  s.flags.assign(20, FirstPassSamples::kSurface);
-  s.flags[6] |= FirstPassSamples::kFailed[1];
-  s.count.assign(20, 2);
-  for (std::uint32_t i = 0; i < 40; ++i) {
-    s.slot.push_back(static_cast<std::uint8_t>(i % 2 == 0 ? 1 : 6));
-    s.site.push_back(static_cast<std::uint8_t>(i % 4));
-    s.direction.push_back(i * 2654435761u);
-    s.energy.push_back(0.5f + static_cast<float>(i));
-  }
-  return s;
-}
-
 TEST(FirstPassSamples, ComeBackAsTheyWere) {
-  FirstPassSamples s = small_samples();
+  FirstPassSamples s = test::small_first_pass();
   EXPECT_EQ(*decode_first_pass_samples(encode_first_pass_samples(s), "test"), s);
   s.lns.assign(40, 1.5f);
   EXPECT_EQ(*decode_first_pass_samples(encode_first_pass_samples(s), "test"), s);
 }
 
 TEST(FirstPassSamples, AnyChangedByteIsAnError) {
-  const Bytes bytes = encode_first_pass_samples(small_samples());
+  const Bytes bytes = encode_first_pass_samples(test::small_first_pass());
   for (std::size_t i = 0; i < bytes.size(); ++i) {
     Bytes broken = bytes;
     broken[i] ^= std::byte{0x10};
@@ -52,29 +33,29 @@ TEST(FirstPassSamples, ValuesOutOfRangeAreNamed) {
     const auto decoded = decode_first_pass_samples(encode_first_pass_samples(s), "tile 7");
     return decoded.ok() ? std::string("no error") : decoded.error().message;
   };
-  FirstPassSamples s = small_samples();
+  FirstPassSamples s = test::small_first_pass();
   s.slot[1] = s.slot[0];
   EXPECT_THAT(message(s), HasSubstr("tile 7: section SLOT: expected ascending slots below 8"));
-  s = small_samples();
+  s = test::small_first_pass();
   s.energy[3] = -1;
   EXPECT_THAT(message(s), HasSubstr("section ENRG"));
-  s = small_samples();
+  s = test::small_first_pass();
   s.site[0] = 16;
   EXPECT_THAT(message(s), HasSubstr("section SITE"));
-  s = small_samples();
+  s = test::small_first_pass();
   s.num_populations = 3;
   EXPECT_THAT(message(s), HasSubstr("section META"));
 }
 
 TEST(FirstPassSamples, KeepsWhatAMaskMayHold) {
-  FirstPassSamples s = small_samples();
+  FirstPassSamples s = test::small_first_pass();
   s.keep_possible(0);
   EXPECT_EQ(std::accumulate(s.count.begin(), s.count.end(), 0), 2);
   EXPECT_EQ(s.count[6], 2);
   EXPECT_EQ(s.energy, (std::vector<float>{12.5f, 13.5f}));
 
   // Radius 1: the 3 x 3 around (1, 1), and the border.
-  s = small_samples();
+  s = test::small_first_pass();
   s.keep_possible(1);
   for (std::size_t pixel = 0; pixel < 20; ++pixel) {
     const std::size_t x = pixel % 5;

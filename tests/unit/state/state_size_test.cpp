@@ -26,8 +26,8 @@ TEST(SampleState, SizeOfAPixelIsThatOfItsArrays) {
                               bytes_of(state.weight) + bytes_of(state.site) +
                               bytes_of(state.memory) + bytes_of(state.confidence);
     EXPECT_EQ(state.size_bytes(), bytes);
-    // In a file a memory may take more: it has all bins.
-    const std::size_t in_a_file = memory ? 520 - sizeof(PixelMemory) : 0;
+    // In a file a memory may take more: all bins, and which they are.
+    const std::size_t in_a_file = memory ? 552 - sizeof(PixelMemory) : 0;
     EXPECT_EQ(10 * SampleState::bytes_per_pixel(6, 2, memory, !memory), bytes + 10 * in_a_file);
     if (!memory) continue;
     state.memory[3].bins.make();

@@ -1,0 +1,116 @@
+#include "common/image/exr_header.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <cstdint>
+#include <fstream>
+#include <string_view>
+#include <utility>
+
+#include "common/base/limits.h"
+
+namespace baton {
+namespace {
+
+constexpr std::uint32_t kMultiPart = 0x1000;
+
+/// Little-endian.
+std::uint32_t read_u32(std::istream& file) {
+  std::uint32_t value = 0;
+  file.read(reinterpret_cast<char*>(&value), sizeof(value));
+  return file ? value : 0;
+}
+
+/// Bytes of a value of each type that has always so many; OpenEXR reads those, whatever the file
+/// says.
+constexpr std::pair<std::string_view, std::uint64_t> kSizes[] = {{"box2f", 16},
+                                                                 {"box2i", 16},
+                                                                 {"chromaticities", 32},
+                                                                 {"compression", 1},
+                                                                 {"deepImageState", 1},
+                                                                 {"double", 8},
+                                                                 {"envmap", 1},
+                                                                 {"float", 4},
+                                                                 {"int", 4},
+                                                                 {"keycode", 28},
+                                                                 {"lineOrder", 1},
+                                                                 {"m33d", 72},
+                                                                 {"m33f", 36},
+                                                                 {"m44d", 128},
+                                                                 {"m44f", 64},
+                                                                 {"rational", 8},
+                                                                 {"tiledesc", 9},
+                                                                 {"timecode", 8},
+                                                                 {"v2d", 16},
+                                                                 {"v2f", 8},
+                                                                 {"v2i", 8},
+                                                                 {"v3d", 24},
+                                                                 {"v3f", 12},
+                                                                 {"v3i", 12}};
+
+/// Goes to the end of a value as OpenEXR finds it. False: that is not where `size` puts it, or past
+/// the end of the file.
+bool skip_value(std::istream& file, std::string_view type, std::uint64_t size,
+                std::uint64_t file_bytes) {
+  const auto start = static_cast<std::uint64_t>(file.tellg());
+  if (!file || size > file_bytes - start) return false;
+  if (type == "chlist") {
+    // Channels up to an empty name, each with 16 bytes.
+    std::string name;
+    while (std::getline(file, name, '\0') && !name.empty()) file.seekg(16, std::ios::cur);
+    return file && static_cast<std::uint64_t>(file.tellg()) == start + size;
+  }
+  const auto known =
+      std::ranges::find(kSizes, type, &std::pair<std::string_view, std::uint64_t>::first);
+  file.seekg(static_cast<std::streamoff>(size), std::ios::cur);
+  return known == std::end(kSizes) || known->second == size;
+}
+
+/// Whether a box at this place has sides that an image may have. The place stays.
+bool is_fair_box(std::istream& file) {
+  const auto start = file.tellg();
+  std::array<std::int64_t, 4> edges{};  // x and y of one corner, then of the other
+  for (std::int64_t& edge : edges) edge = static_cast<std::int32_t>(read_u32(file));
+  file.seekg(start);
+  const auto fits = [](std::int64_t low, std::int64_t high) {
+    return high >= low && high - low < limits::kMaxImageSide;
+  };
+  return file && fits(edges[0], edges[2]) && fits(edges[1], edges[3]);
+}
+
+}  // namespace
+
+/// A header is attributes up to an empty name: name, type, both ended by a zero, a size and so many
+/// bytes. A file of several parts has several headers, and an empty one behind them.
+Status check_exr_attributes(const std::filesystem::path& path) {
+  std::error_code error;
+  const std::uint64_t file_bytes = std::filesystem::file_size(path, error);
+  std::ifstream file(path, std::ios::binary);
+  read_u32(file);  // the magic number is for OpenEXR to check
+  const bool multi_part = (read_u32(file) & kMultiPart) != 0;
+  std::string name, type;
+  while (true) {
+    bool is_empty = true;
+    while (std::getline(file, name, '\0') && !name.empty()) {
+      is_empty = false;
+      std::getline(file, type, '\0');
+      const std::uint32_t size = read_u32(file);
+      if (name == "dataWindow" && !is_fair_box(file)) {
+        return Error{ErrorKind::bad_input,
+                     fmt::format("{}: dataWindow: expected sides of 1 to {} pixels", path.string(),
+                                 limits::kMaxImageSide)};
+      }
+      if (!file || !skip_value(file, type, size, file_bytes)) {
+        return Error{
+            ErrorKind::bad_input,
+            fmt::format("{}: not a readable EXR file: attribute {} is not as long as it says",
+                        path.string(), name)};
+      }
+    }
+    if (is_empty || !multi_part || !file) return {};
+  }
+}
+
+}  // namespace baton

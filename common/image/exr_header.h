@@ -1,0 +1,15 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "common/base/result.h"
+
+namespace baton {
+
+/// Whether every attribute of an EXR file's headers is as long as it says, and its image no larger
+/// than an image may be. OpenEXR believes them: a text of a few bytes that claims gigabytes, or a
+/// row of 16 million pixels, costs gigabytes.
+Status check_exr_attributes(const std::filesystem::path& path);
+
+}  // namespace baton

@@ -1,0 +1,124 @@
+#include "jobs/cli/display.h"
+
+#include <fmt/format.h>
+#include <fmt/ranges.h>
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+#include "jobs/cli/text.h"
+
+namespace baton {
+namespace {
+
+constexpr float kFarGrey = 0.1f;
+
+/// The light of a pixel value in [0, 1], the inverse of what write_png does [IEC 61966-2-1].
+float light_of(float value) {
+  const float v = std::clamp(value, 0.0f, 1.0f);
+  return v <= 0.04045f ? v / 12.92f : std::pow((v + 0.055f) / 1.055f, 2.4f);
+}
+
+/// The AOVs of a frame: `normal` of normal.X, normal.Y, normal.Z.
+std::vector<std::string> aovs_of(const FilmTile& frame) {
+  std::vector<std::string> names;
+  for (const std::string& channel : frame.channels) {
+    const std::string name = channel.substr(0, channel.rfind('.'));
+    const bool is_color = channel == "R" || channel == "G" || channel == "B";
+    if (!is_color && std::ranges::find(names, name) == names.end()) names.push_back(name);
+  }
+  return names;
+}
+
+/// The planes of an AOV: three or one; empty: it has no such channels.
+std::vector<const float*> planes_of(const FilmTile& frame, const std::string& aov) {
+  const std::string stem = aov.empty() ? "" : aov + ".";
+  for (const char* const letters : {"RGB", "XYZ"}) {
+    std::vector<const float*> planes;
+    for (int c = 0; c < 3; ++c) planes.push_back(frame.find(stem + letters[c]));
+    if (std::ranges::find(planes, nullptr) == planes.end()) return planes;
+  }
+  const float* const single = frame.find(aov);
+  return single == nullptr ? std::vector<const float*>{} : std::vector{single};
+}
+
+RgbImage interleaved(const FilmTile& frame, const std::vector<const float*>& planes) {
+  RgbImage image{frame.rect.width(), frame.rect.height(), {}};
+  image.rgb.reserve(3 * frame.num_pixels());
+  for (std::size_t i = 0; i < frame.num_pixels(); ++i) {
+    for (std::size_t c = 0; c < 3; ++c) image.rgb.push_back(planes[planes.size() == 3 ? c : 0][i]);
+  }
+  return image;
+}
+
+Display display_vectors(RgbImage image) {
+  for (float& v : image.rgb) v = light_of((v + 1) / 2);
+  return {std::move(image), "vectors as (v + 1) / 2"};
+}
+
+/// The smallest and largest of the finite values that are not 0; 0, 0 when there are none.
+std::pair<float, float> range_of(const std::vector<float>& values) {
+  std::optional<std::pair<float, float>> range;
+  for (const float v : values) {
+    if (!std::isfinite(v) || v == 0) continue;
+    if (!range) range = {v, v};
+    range = {std::min(range->first, v), std::max(range->second, v)};
+  }
+  return range.value_or(std::pair{0.0f, 0.0f});
+}
+
+Display display_depth(RgbImage image, const DisplayOptions& options) {
+  const auto [near, far] = options.range.value_or(range_of(image.rgb));
+  for (float& v : image.rgb) {
+    const float share = far > near ? std::clamp((v - near) / (far - near), 0.0f, 1.0f) : 0;
+    v = v > 0 && std::isfinite(v) ? light_of(1 - (1 - kFarGrey) * share) : 0;
+  }
+  return {std::move(image), fmt::format("depth {:.4g} (white) to {:.4g} (dark grey)", near, far)};
+}
+
+Display display_numbers(RgbImage image, const DisplayOptions& options) {
+  const auto [smallest, largest] = range_of(image.rgb);
+  const auto [black, white] =
+      options.range.value_or(std::pair{std::min(smallest, 0.0f), std::max(largest, 1.0f)});
+  for (float& v : image.rgb) v = std::isfinite(v) ? light_of((v - black) / (white - black)) : 0;
+  return {std::move(image), fmt::format("{:.4g} (black) to {:.4g} (white)", black, white)};
+}
+
+}  // namespace
+
+void add_exposure_option(CLI::App& command, std::optional<float>& stops) {
+  command
+      .add_option("--exposure", stops,
+                  "stops by which a PNG is brighter, as in a viewer; default: 0")
+      ->check(CLI::Range(-100.0, 100.0));
+}
+
+Display display_radiance(RgbImage image, const DisplayOptions& options) {
+  const float stops = options.stops.value_or(0);
+  const float factor = std::exp2(stops);
+  for (float& v : image.rgb) v *= factor;
+  const std::string factor_text = stops == 0 ? "" : fmt::format(" (x{:.4g})", factor);
+  return {std::move(image), exposure_text(stops) + factor_text};
+}
+
+Result<Display> display_aov(const FilmTile& frame, const std::string& aov,
+                            const DisplayOptions& options) {
+  const std::vector<const float*> planes = planes_of(frame, aov);
+  if (planes.empty()) {
+    return Error{ErrorKind::bad_input,
+                 fmt::format("{}; there is {}",
+                             aov.empty() ? "no channels R, G and B; see --aov"
+                                         : "--aov " + aov + ": no such AOV in the file",
+                             fmt::join(aovs_of(frame), ", "))};
+  }
+  RgbImage image = interleaved(frame, planes);
+  const bool is_vector = planes.size() == 3 && frame.find(aov + ".X") == planes[0];
+  const bool is_radiance = planes.size() == 3 || aov == "lns" || options.stops;
+  if (is_vector) return display_vectors(std::move(image));
+  if (is_radiance && !options.range) return display_radiance(std::move(image), options);
+  if (aov == "depth" || aov == "Z") return display_depth(std::move(image), options);
+  return display_numbers(std::move(image), options);
+}
+
+}  // namespace baton

@@ -1,0 +1,39 @@
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <utility>
+
+#include "common/image/image_io.h"
+
+namespace baton {
+
+/// How a picture becomes one of 8 bits a channel.
+struct DisplayOptions {
+  std::optional<float> stops;                    ///< radiance times 2^stops; none: 0
+  std::optional<std::pair<float, float>> range;  ///< of data: black, white; none: by its values
+};
+
+/// A picture for write_png, and what was done to it, for people.
+struct Display {
+  RgbImage image;
+  std::string how;  ///< "exposure +2 stops (x4)", "depth 1.2 (white) to 7.5 (dark grey)"
+};
+
+/// Adds --exposure.
+void add_exposure_option(CLI::App& command, std::optional<float>& stops);
+
+/// Radiance as a viewer shows it at this exposure: no tone curve, what is brighter than 1 is white.
+Display display_radiance(RgbImage image, const DisplayOptions& options);
+
+/// A frame's colours ("") or the named AOV. Colours and `lns` are shown as radiance. Vectors are
+/// shown as (v + 1) / 2. Single numbers go from 0, black, to 1, white, or to the largest where that
+/// is larger; `depth` from the nearest, white, to the farthest, dark grey, with black where nothing
+/// is. Data has no display curve: pixel value 128 is the middle. Errors: no such AOV, with those
+/// that there are.
+Result<Display> display_aov(const FilmTile& frame, const std::string& aov,
+                            const DisplayOptions& options);
+
+}  // namespace baton

@@ -1,0 +1,91 @@
+#include "jobs/cli/job_argument.h"
+
+#include <fmt/format.h>
+
+#include "worker/scene/settle_motion.h"
+
+namespace baton {
+namespace {
+
+std::string check_setting(const std::string& text) {
+  const std::size_t equals = text.find('=');
+  if (equals != text.npos && equals > 0) return {};
+  return fmt::format("expected KEY=VALUE, such as image.sites=1, got \"{}\"", text);
+}
+
+/// As a shell reads it: in single quotes where need be.
+std::string quoted(const std::string& word) {
+  const bool plain = !word.empty() && word.find_first_not_of(
+                                          "abcdefghijklmnopqrstuvwxyzABCDEFGHIJKLMNOPQRSTUVWXYZ"
+                                          "0123456789_-+=./,:@%") == word.npos;
+  if (plain) return word;
+  std::string text = "'";
+  for (const char c : word) text += c == '\'' ? std::string("'\\''") : std::string(1, c);
+  return text + "'";
+}
+
+}  // namespace
+
+void add_job_argument(CLI::App& command, JobArgument& argument) {
+  command.add_option("JOB", argument.file, "job file")->required();
+  command.add_option("--frames", argument.frames, "only these frames: 12, 1-48x4, 1,5,9-12");
+  command.add_option("--scale", argument.scale, "a smaller picture: its sides times this, (0, 1]");
+  command.add_option("--region", argument.region,
+                     "X,Y,WIDTH,HEIGHT: only this part, in pixels of the picture before --scale");
+  command
+      .add_option("--set", argument.set,
+                  "KEY=VALUE in place of what the job says, such as sampling.numParticles=8; keys "
+                  "as `baton check --explain` prints them")
+      ->check(CLI::Validator(check_setting, "KEY=VALUE"))
+      ->expected(1)
+      ->take_all()
+      ->allow_extra_args(false);
+}
+
+std::vector<JobOverride> overrides_of(const JobArgument& argument) {
+  std::vector<JobOverride> overrides;
+  if (!argument.frames.empty())
+    overrides.push_back({"frames", fmt::format("\"{}\"", argument.frames), "--frames"});
+  if (!argument.scale.empty()) overrides.push_back({"image.scale", argument.scale, "--scale"});
+  if (!argument.region.empty())
+    overrides.push_back({"image.region", fmt::format("[{}]", argument.region), "--region"});
+  for (const std::string& setting : argument.set) {
+    const std::size_t equals = setting.find('=');
+    overrides.push_back({setting.substr(0, equals), setting.substr(equals + 1), "--set"});
+  }
+  return overrides;
+}
+
+std::string command_text(const JobArgument& argument) {
+  std::string text = quoted(argument.file);
+  const auto add = [&](const char* option, const std::string& value) {
+    if (!value.empty()) text += fmt::format(" {} {}", option, quoted(value));
+  };
+  add("--frames", argument.frames);
+  add("--scale", argument.scale);
+  add("--region", argument.region);
+  for (const std::string& setting : argument.set) add("--set", setting);
+  return text;
+}
+
+Result<WantedJob> load_wanted(const JobArgument& argument, bool look) {
+  const std::vector<JobOverride> overrides = overrides_of(argument);
+  BATON_ASSIGN(JobSpec job, load_job(argument.file, overrides));
+  if (overrides.empty() && !look) return WantedJob{std::move(job)};
+
+  // A folder that the options name is left to them.
+  const Result<JobSpec> plain = load_job(argument.file);
+  const bool changed = !plain || *plain != job;
+  const bool own_folder = plain && plain->output.directory != job.output.directory;
+  WantedJob wanted{std::move(job), (look || changed) && !own_folder};
+  if (wanted.is_look) wanted.job.output.directory += "-look";
+  return wanted;
+}
+
+Result<WantedJob> load_settled(const JobArgument& argument, bool look) {
+  BATON_ASSIGN(WantedJob wanted, load_wanted(argument, look));
+  BATON_ASSIGN(wanted.job, settle_motion(std::move(wanted.job)));
+  return wanted;
+}
+
+}  // namespace baton

@@ -1,0 +1,42 @@
+#pragma once
+
+#include <CLI/CLI.hpp>
+#include <string>
+#include <vector>
+
+#include "common/base/result.h"
+#include "common/job/job_json.h"
+
+namespace baton {
+
+/// A job on a command line: its file, and what is said in place of the file's values.
+struct JobArgument {
+  std::string file;
+  std::vector<std::string> set;  ///< KEY=VALUE
+  std::string frames;            ///< empty: those of the job
+  std::string scale;
+  std::string region;
+};
+
+/// Adds JOB, --frames, --scale, --region and --set.
+void add_job_argument(CLI::App& command, JobArgument& argument);
+
+/// What the options put into the JSON of the job, --set last.
+std::vector<JobOverride> overrides_of(const JobArgument& argument);
+/// The argument as it is typed, for a shell.
+std::string command_text(const JobArgument& argument);
+
+/// A job as a command line wants it; motion is not settled.
+struct WantedJob {
+  JobSpec job;
+  /// It is not what its file says: its frames go to a folder of their own (`-look` behind its
+  /// name), in which a later look of a frame replaces it.
+  bool is_look = false;
+};
+/// Reads the file. `look`: a look even if the options change nothing. Errors: load_job's.
+Result<WantedJob> load_wanted(const JobArgument& argument, bool look = false);
+
+/// The same with settled motion, for what is rendered or estimated.
+Result<WantedJob> load_settled(const JobArgument& argument, bool look = false);
+
+}  // namespace baton

@@ -1,0 +1,121 @@
+#include "jobs/cli/object_view.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <limits>
+
+#include "jobs/cli/frame_sheet.h"
+#include "worker/scene/pose.h"
+
+namespace baton {
+namespace {
+
+constexpr std::size_t kMostFrames = 100;
+
+using Corners = std::array<Vec3, 8>;
+
+/// The corners of a mesh's bounding box.
+Corners corners_of(const TriangleMesh& mesh) {
+  constexpr float kFar = std::numeric_limits<float>::max();
+  Vec3 low{kFar, kFar, kFar}, high{-kFar, -kFar, -kFar};
+  for (const Vec3& p : mesh.positions) {
+    low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
+    high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
+  }
+  Corners corners;
+  for (std::size_t i = 0; i < corners.size(); ++i)
+    corners[i] = {i & 1 ? high.x : low.x, i & 2 ? high.y : low.y, i & 4 ? high.z : low.z};
+  return corners;
+}
+
+/// What a camera's picture has of a box.
+enum class Sight { behind, outside, tiny, seen };
+
+/// The planes through the eye and the borders of a picture, and the one across it.
+class View {
+ public:
+  View(const Camera& camera, const ImageSpec& image) : camera_(camera) {
+    const auto w = static_cast<float>(image.width), h = static_cast<float>(image.height);
+    const Ray ahead = camera.ray(w / 2, h / 2);
+    eye_ = ahead.origin;
+    inward_[0] = ahead.direction;
+    const std::array<Vec3, 4> corners{camera.ray(0, 0).direction, camera.ray(w, 0).direction,
+                                      camera.ray(w, h).direction, camera.ray(0, h).direction};
+    for (std::size_t i = 0; i < 4; ++i) {
+      const Vec3 normal = cross(corners[i], corners[(i + 1) % 4]);
+      inward_[i + 1] = dot(normal, ahead.direction) < 0 ? normal * -1.0f : normal;
+    }
+  }
+
+  Sight sight(const Corners& box) const {
+    for (std::size_t i = 0; i < inward_.size(); ++i) {
+      const bool none_inside = std::ranges::all_of(
+          box, [&](const Vec3& corner) { return dot(inward_[i], corner - eye_) <= 0; });
+      if (none_inside) return i == 0 ? Sight::behind : Sight::outside;
+    }
+    return is_tiny(box) ? Sight::tiny : Sight::seen;
+  }
+
+ private:
+  bool is_tiny(const Corners& box) const {
+    std::array<float, 2> low{1e30f, 1e30f}, high{-1e30f, -1e30f};
+    for (const Vec3& corner : box) {
+      const auto place = camera_.project(corner);
+      if (!place) return false;
+      for (std::size_t axis = 0; axis < 2; ++axis) {
+        low[axis] = std::min(low[axis], (*place)[axis]);
+        high[axis] = std::max(high[axis], (*place)[axis]);
+      }
+    }
+    return high[0] - low[0] < 1 && high[1] - low[1] < 1;
+  }
+
+  const Camera& camera_;
+  Vec3 eye_;
+  std::array<Vec3, 5> inward_;
+};
+
+std::string words(Sight best) {
+  switch (best) {
+    case Sight::behind:
+      return "is behind the camera in every frame";
+    case Sight::outside:
+      return "is outside of the picture in every frame";
+    case Sight::tiny:
+      return "is smaller than a pixel in every frame";
+    case Sight::seen:
+      break;
+  }
+  return {};
+}
+
+}  // namespace
+
+std::vector<std::string> object_warnings(const JobSpec& job, const Scene& scene) {
+  std::vector<Corners> boxes;
+  for (const TriangleMesh& mesh : scene.meshes) boxes.push_back(corners_of(mesh));
+  std::vector<Sight> best(scene.instances.size(), Sight::behind);
+  for (const int frame : pick_frames(job.frames, kMostFrames)) {
+    const Pose pose = pose_at(scene, job, frame);
+    const View view(pose.camera, job.image);
+    for (std::size_t i = 0; i < best.size(); ++i) {
+      Corners box = boxes[pose.instances[i].mesh];
+      for (Vec3& corner : box) corner = pose.instances[i].to_world.point(corner);
+      best[i] = std::max(best[i], view.sight(box));
+    }
+  }
+
+  std::vector<std::string> warnings;
+  for (std::size_t i = 0; i < std::min(best.size(), job.scene.objects.size()); ++i) {
+    if (best[i] != Sight::seen)
+      warnings.push_back(
+          fmt::format("object {} ({}) {}", i, job.scene.objects[i].mesh, words(best[i])));
+  }
+  const bool nothing = std::ranges::none_of(best, [](Sight s) { return s >= Sight::tiny; });
+  if (nothing) warnings.push_back("the camera sees no object and no ground in any frame");
+  return warnings;
+}
+
+}  // namespace baton

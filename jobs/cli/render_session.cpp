@@ -1,0 +1,141 @@
+#include "jobs/cli/render_session.h"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <thread>
+
+#include "common/job/sequence.h"
+#include "jobs/cli/display.h"
+#include "jobs/cli/frame_sheet.h"
+#include "jobs/cli/job_summary.h"
+#include "jobs/cli/progress.h"
+#include "jobs/cli/text.h"
+
+namespace baton {
+namespace {
+
+namespace fs = std::filesystem;
+using Clock = std::chrono::steady_clock;
+
+/// Each failure ends with the command that replays its tile alone.
+void print_failures(const JobDetail& detail) {
+  for (const std::string& failure : detail.failures) fmt::print(stderr, "failure: {}\n", failure);
+}
+
+void print_result(const JobSpec& job, const JobDetail& detail, double seconds) {
+  fmt::print("job        {} in {:.1f} s\n", job_status_name(detail.summary.status), seconds);
+  fmt::print("frames     {} of {} in {}/{}\n", detail.summary.frames_done,
+             detail.summary.frames_total, job.output.directory, job.output.pattern);
+  fmt::print("{}", job_statistics(detail.summary));
+}
+
+/// A sheet that cannot be made is no failure of the job.
+void write_sheet(const FrameSheet& sheet, bool json) {
+  const Result<std::optional<FrameSheet::Written>> written = sheet.write();
+  if (!written) return spdlog::warn("no contact sheet: {}", written.error().message);
+  if (*written && !json)
+    fmt::print("sheet      {}, {}\n", (*written)->path.string(), exposure_text((*written)->stops));
+}
+
+}  // namespace
+
+Status check_out(const RenderOptions& options, const JobSpec& job) {
+  if (options.out.empty() || job.frames.size() == 1) return {};
+  return Error{ErrorKind::usage,
+               fmt::format("--out {}: expected a job of one frame, as with --frames {}, got {}",
+                           options.out, job.frames.front(), job.frames.size())};
+}
+
+FarmOptions farm_options(const RenderOptions& options, const JobSpec& job) {
+  const int processors = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
+  FarmOptions farm;
+  farm.workers = std::max(1, options.workers);
+  farm.threads_per_worker = options.threads_per_worker > 0 ? options.threads_per_worker
+                                                           : std::max(1, processors / farm.workers);
+  farm.work_directory =
+      fs::absolute(options.work_directory.empty() ? fs::path(job.output.directory) / ".baton"
+                                                  : fs::path(options.work_directory));
+  return farm;
+}
+
+Result<RenderSession> RenderSession::start(const RenderOptions& options, const FarmOptions& farm,
+                                           const SignalWait& signals) {
+  BATON_ASSIGN(LocalFarm started, LocalFarm::start(farm));
+  BATON_ASSIGN(RequestClient client, RequestClient::connect(started.endpoint()));
+  return RenderSession(options, signals, std::move(started), std::move(client));
+}
+
+/// Follows the job to its end, reading finished frames for the sheet.
+Result<std::optional<JobDetail>> RenderSession::follow(const Digest& job, FrameSheet& sheet,
+                                                       const std::function<bool()>& interrupted) {
+  Progress progress(::isatty(STDERR_FILENO) == 1);
+  std::string waits;
+  for (;;) {
+    BATON_ASSIGN(std::optional<JobDetail> detail,
+                 ask_farm<JobDetail>(farm_, client_, signals_, ShowJob{job.hex()}));
+    if (detail) {
+      progress.update(detail->summary, Clock::now());
+      if (!detail->waits.empty() && waits.empty()) {
+        progress.finish();
+        spdlog::warn("waits for {}", detail->waits);
+      }
+      waits = detail->waits;
+      sheet.add(detail->frames_done);
+    }
+    // Who paused it, if not the person before this terminal, will not resume it.
+    const bool over = !detail || detail->summary.status != JobStatus::running;
+    if (over || interrupted() || signals_.stop_requested_within(kFarmPollInterval)) {
+      progress.finish();
+      return over ? detail : std::nullopt;
+    }
+    BATON_TRY(farm_.tend());
+  }
+}
+
+Result<std::optional<JobStatus>> RenderSession::render(const JobSpec& job, bool restart,
+                                                       const std::function<bool()>& interrupted) {
+  const Clock::time_point start = Clock::now();
+  BATON_ASSIGN(std::string document, make_job_document(job));
+  BATON_ASSIGN(
+      const std::optional<JobAccepted> accepted,
+      ask_farm<JobAccepted>(farm_, client_, signals_, SubmitJob{std::move(document), restart}));
+  if (!accepted) return std::optional<JobStatus>();
+  if (accepted->already_there) spdlog::info("going on with what is done already");
+
+  FrameSheet sheet(job);
+  BATON_ASSIGN(const std::optional<JobDetail> detail, follow(accepted->job, sheet, interrupted));
+  if (!detail) return std::optional<JobStatus>();
+  const JobStatus status = detail->summary.status;
+  if (options_.json) {
+    fmt::print("{}\n", detail_json(*detail).dump(2));
+  } else {
+    print_result(job, *detail, std::chrono::duration<double>(Clock::now() - start).count());
+  }
+  write_sheet(sheet, options_.json);
+  if (status == JobStatus::done) BATON_TRY(write_png_of(job));
+  if (status == JobStatus::failed) print_failures(*detail);
+  if (status == JobStatus::paused)
+    fmt::print(stderr, "paused: the job waits for {}\nto go on: the same command\n", detail->waits);
+  std::fflush(stdout);
+  return std::optional(status);
+}
+
+Status RenderSession::write_png_of(const JobSpec& job) const {
+  if (options_.out.empty()) return {};
+  BATON_ASSIGN(RgbImage image, read_rgb_image(frame_path(job, 0)));
+  const Display shown = display_radiance(std::move(image), {options_.exposure, {}});
+  BATON_TRY(write_png(options_.out, shown.image));
+  if (!options_.json) fmt::print("picture    {}, {}\n", options_.out, shown.how);
+  return {};
+}
+
+Status RenderSession::keep_running() {
+  fmt::print(stderr, "the coordinator still answers at {}; Ctrl-C ends it\n", farm_.endpoint());
+  while (!signals_.stop_requested_within(kFarmPollInterval)) BATON_TRY(farm_.tend());
+  return {};
+}
+
+}  // namespace baton

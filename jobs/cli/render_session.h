@@ -1,0 +1,65 @@
+#pragma once
+
+#include <functional>
+#include <optional>
+#include <string>
+
+#include "common/protocol/messages.h"
+#include "jobs/cli/ask_farm.h"
+#include "jobs/cli/job_argument.h"
+
+namespace baton {
+
+struct RenderOptions {
+  JobArgument job;
+  int workers = 0;             ///< 0: one, whose threads share scene and light
+  int threads_per_worker = 0;  ///< 0: the processors shared out
+  std::string work_directory;  ///< empty: .baton in the output folder
+  std::string out;             ///< the only frame as PNG; empty: none
+  std::optional<float> exposure;
+  bool watch = false;
+  bool restart = false;
+  bool keep_running = false;
+  bool json = false;
+};
+
+/// The farm that `options` ask for, with its folder in that of the job.
+FarmOptions farm_options(const RenderOptions& options, const JobSpec& job);
+
+/// --out shows one frame. Error: the job has more.
+Status check_out(const RenderOptions& options, const JobSpec& job);
+
+/// A farm of this machine that renders one job after another for `baton render`.
+class RenderSession {
+ public:
+  /// options and signals must outlive the session.
+  static Result<RenderSession> start(const RenderOptions& options, const FarmOptions& farm,
+                                     const SignalWait& signals);
+
+  /// Renders a job whose motion and method are settled, shows how it gets on, and prints what came
+  /// of it. A job that the farm has goes on where it stopped. `interrupted` is asked now and then;
+  /// nullopt when it says so, or when the user asked to stop.
+  Result<std::optional<JobStatus>> render(
+      const JobSpec& job, bool restart,
+      const std::function<bool()>& interrupted = [] { return false; });
+  /// Keeps the farm up until the user asks to stop.
+  Status keep_running();
+  /// As LocalFarm's.
+  Status tend() { return farm_.tend(); }
+  void stop() { farm_.stop(); }
+
+ private:
+  RenderSession(const RenderOptions& options, const SignalWait& signals, LocalFarm farm,
+                RequestClient client)
+      : options_(options), signals_(signals), farm_(std::move(farm)), client_(std::move(client)) {}
+  Result<std::optional<JobDetail>> follow(const Digest& job, class FrameSheet& sheet,
+                                          const std::function<bool()>& interrupted);
+  Status write_png_of(const JobSpec& job) const;
+
+  const RenderOptions& options_;
+  const SignalWait& signals_;
+  LocalFarm farm_;
+  RequestClient client_;
+};
+
+}  // namespace baton

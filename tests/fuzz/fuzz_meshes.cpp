@@ -1,0 +1,40 @@
+#include <algorithm>
+#include <cmath>
+
+#include "tests/fuzz/fuzz_target.h"
+#include "worker/scene/mesh_builder.h"
+#include "worker/scene/mesh_readers.h"
+
+namespace baton {
+namespace {
+
+/// What everything after the reader relies on.
+void look_at(const Result<TriangleMesh>& mesh) {
+  if (!mesh) return;
+  const auto finite = [](const Vec3& v) {
+    return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
+  };
+  BATON_CHECK(std::ranges::all_of(mesh->positions, finite));
+  BATON_CHECK(mesh->normals.empty() || mesh->normals.size() == mesh->positions.size());
+  BATON_CHECK(std::ranges::all_of(mesh->normals, finite));
+  for (const auto& triangle : mesh->triangles) {
+    for (const std::uint32_t index : triangle) BATON_CHECK(index < mesh->positions.size());
+  }
+  BATON_CHECK(std::ranges::all_of(smooth_vertex_normals(*mesh), finite));
+}
+
+}  // namespace
+}  // namespace baton
+
+/// The formats that we read ourselves; assimp reads the others.
+extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
+  using namespace baton;
+  const std::string_view text(reinterpret_cast<const char*>(data), size);
+  if (text.starts_with("ply")) {
+    look_at(parse_ply(text, "fuzz.ply", false));
+    look_at(parse_ply(text, "fuzz.ply", true));
+  } else {
+    look_at(parse_off(text, "fuzz.off"));
+  }
+  return 0;
+}

@@ -1,0 +1,207 @@
+"""Quick looks: a part of a job in a folder of its own, frames as PNG, and looks that follow the job file."""
+
+import json
+import re
+import struct
+import subprocess
+import zlib
+
+from farm import (BAD_INPUT, OK, USAGE, Process, check, check_equal, make_job, run_tests, wait_until, write_job,
+                  write_map)
+
+
+def read_png(path):
+    """Width, height and the rows of RGB bytes of an 8-bit PNG."""
+    data = path.read_bytes()
+    check_equal(data[:8], b"\x89PNG\r\n\x1a\n", f"start of {path}")
+    at, packed, size = 8, b"", None
+    while at < len(data):
+        length, kind = struct.unpack(">I4s", data[at:at + 8])
+        body = data[at + 8:at + 8 + length]
+        if kind == b"IHDR":
+            size = struct.unpack(">II", body[:8])
+        if kind == b"IDAT":
+            packed += body
+        at += 12 + length
+    width, height = size
+    raw, rows, before = zlib.decompress(packed), [], bytes(3 * width)
+    for y in range(height):
+        start = y * (3 * width + 1)
+        row = bytearray(raw[start + 1:start + 1 + 3 * width])
+        for i, up in enumerate(before):
+            left = row[i - 3] if i >= 3 else 0
+            left_up = before[i - 3] if i >= 3 else 0
+            guess = {0: 0, 1: left, 2: up, 3: (left + up) // 2, 4: paeth(left, up, left_up)}[raw[start]]
+            row[i] = (row[i] + guess) & 255
+        rows.append(bytes(row))
+        before = row
+    return width, height, rows
+
+
+def paeth(left, up, left_up):
+    """The predictor of PNG."""
+    guess = left + up - left_up
+    return min((left, up, left_up), key=lambda value: abs(guess - value))
+
+
+def job_at(folder, **changes):
+    """A job file of four frames by `bidirectional`."""
+    changes = {"frames": "1-4", "sampling": {"method": "bidirectional"}, **changes}
+    return write_job(folder / "job.json", make_job(folder, **changes))
+
+
+def render(programs, job, *extra, **options):
+    return programs.run("baton", "render", job, "--threads-per-worker", 2, *extra, **options)
+
+
+def test_a_look_leaves_finished_frames_alone(programs, folder):
+    job = job_at(folder)
+    render(programs, job)
+    before = {path: path.stat().st_mtime_ns for path in (folder / "frames").iterdir()}
+    done = render(programs, job, "--frames", "3", "--region", "40,16,80,48", "--scale", ".5", "--set",
+                  "sampling.numParticles=4", "--out", folder / "look.png")
+    after = {path: path.stat().st_mtime_ns for path in (folder / "frames").iterdir()}
+    check_equal(after, before, "the job's own folder")
+    look = folder / "frames-look"
+    check_equal(sorted(path.name for path in look.glob("*.exr")), ["frame.0003.exr"], "frames of the look")
+    check(f"frames go to {look}" in done.stderr, done.stderr)
+    check("look.png, exposure +0 stops" in done.stdout, done.stdout)
+    check(re.search(r"contact-sheet\.png, exposure [+-][0-9.]+ stops", done.stdout), done.stdout)
+    check_equal(read_png(folder / "look.png")[:2], (40, 24), "size of the look")
+
+    # Another look takes its place without further words; what changes nothing is the job itself.
+    render(programs, job, "--frames", "3", "--set", "image.sites=4")
+    same = render(programs, job, "--set", "sampling.numParticles=16", "--frames", "1-4")
+    check(str(look) not in same.stdout + same.stderr, same.stdout + same.stderr)
+
+
+def test_a_region_has_the_pixels_of_the_whole(programs, folder):
+    job = job_at(folder, image={"sites": 4})
+    render(programs, job, "--frames", "2-3")
+    look = folder / "frames-look/frame.0003.exr"
+    whole = programs.values(look, "G")
+    render(programs, job, "--frames", "2-3", "--region", "35,20,90,50")
+    part = programs.values(look, "G")
+    expected = [whole[y * 160 + x] for y in range(20, 70) for x in range(35, 125)]
+    check_equal(part, expected, "pixels of the region")
+
+
+def test_check_and_explain_take_the_same_options(programs, folder):
+    job = job_at(folder)
+    options = ["--frames", "2", "--region", "40,16,80,48", "--set", "image.sites=4"]
+    report = json.loads(programs.run("baton", "check", job, *options, "--json", "--explain").stdout)
+    check_equal(report["frames"], 1, "frames")
+    check_equal(report["primaryRaysPerPixel"], 4, "sites")
+    check_equal(report["outputDirectory"], str(folder / "frames-look"), "folder")
+    settings = {s["path"]: s["value"] for s in report["settings"]}
+    check_equal(settings["$.image.region"], [40, 16, 80, 48], "region")
+    # What is explained can be set.
+    check_equal(programs.run("baton", "check", job, "--set", "$.scene.objects[0].fitHeight=2").returncode, OK, "path")
+
+
+def test_faults_name_the_option(programs, folder):
+    job = job_at(folder)
+    for options, code, text in [
+            (["--set", "sampling.numParticels=8"], BAD_INPUT,
+             '--set: $.sampling.numParticels: unknown key; did you mean "numParticles"?'),
+            (["--scale", "3"], BAD_INPUT, "--scale: $.image.scale: expected a number in (0, 1], got 3"),
+            (["--region", "0,0,500,20"], BAD_INPUT, "--region: $.image.region: expected x, y, width and height"),
+            (["--frames", "4-2"], BAD_INPUT, "--frames: $.frames: expected a last frame not before the first"),
+            (["--set", "image.sites"], USAGE, "expected KEY=VALUE"),
+            (["--out", "x.png"], USAGE, "--out x.png: expected a job of one frame, as with --frames 1, got 4")]:
+        done = render(programs, job, *options, expect=code)
+        check(text in done.stderr, f"{options}: {done.stderr}")
+        check_equal(done.stdout, "", "stdout")
+    check(not (folder / "frames").exists() and not (folder / "frames-look").exists(), "nothing was begun")
+
+
+def test_view(programs, folder):
+    job = job_at(folder, frames="1", output={"aovs": ["normal", "depth", "visibility"], "background": "transparent"})
+    render(programs, job)
+    frame = folder / "frames/frame.0001.exr"
+
+    # The colours as a viewer shows them: two stops more is four times the light.
+    done = programs.run("baton", "view", frame)
+    check("exposure +0 stops" in done.stdout and "frame.0001.png" in done.stdout, done.stdout)
+    green = programs.values(frame, "G")
+    for stops, out in [(0, folder / "frames/frame.0001.png"), (2, folder / "bright.png")]:
+        programs.run("baton", "view", frame, "--exposure", stops, "--out", out)
+        rows = read_png(out)[2]
+        for i in range(0, len(green), 97):
+            shown = rows[i // 160][3 * (i % 160) + 1]
+            check(abs(shown - srgb(green[i] * 2**stops)) <= 1, f"{stops} stops: pixel {i}: {shown} for {green[i]}")
+
+    # Depth: the nearest is white, the farthest dark, nothing black.
+    done = programs.run("baton", "view", frame, "--aov", "depth", "--out", folder / "depth.png")
+    depth = programs.values(frame, "depth")
+    rows = read_png(folder / "depth.png")[2]
+    shown = [rows[i // 160][3 * (i % 160)] for i in range(len(depth))]
+    nearest = min(d for d in depth if d > 0)
+    check_equal(shown[depth.index(nearest)], 255, "nearest")
+    check_equal({s for s, d in zip(shown, depth) if d == 0}, {0}, "pixels without surface")
+    check(min(s for s, d in zip(shown, depth) if d > 0) >= 25, "the farthest differs from nothing")
+    check(f"depth {nearest:.4g} (white)" in done.stdout, done.stdout)
+
+    # A normal of 0 is the middle.
+    programs.run("baton", "view", frame, "--aov", "normal", "--out", folder / "normal.png")
+    check_equal(read_png(folder / "normal.png")[2][0][:3], b"\x80\x80\x80", "normal of the background")
+
+    done = programs.run("baton", "view", frame, "--aov", "dept", expect=BAD_INPUT)
+    check("--aov dept: no such AOV in the file; there is A, depth, normal, visibility" in done.stderr, done.stderr)
+    done = programs.run("baton", "view", folder / "job.json", expect=BAD_INPUT)
+    check("job.json" in done.stderr, done.stderr)
+
+
+def srgb(linear):
+    """The 8-bit value of linear light."""
+    v = min(max(linear, 0), 1)
+    return 255 * (12.92 * v if v <= 0.0031308 else 1.055 * v**(1 / 2.4) - 0.055)
+
+
+def test_watch_follows_job_and_files(programs, folder):
+    job = make_job(folder, frames="2", sampling={"method": "bidirectional"})
+    path = write_job(folder / "job.json", job)
+    out = folder / "look.png"
+    watch = Process([programs.path("baton"), "render", str(path), "--watch", "--threads-per-worker", "2", "--out",
+                     str(out)], folder / "watch.log")
+    try:
+        def rounds():
+            return watch.log().count("waiting for changes")
+
+        wait_until(lambda: rounds() == 1, "the first look")
+        sizes = [line.split()[1] for line in watch.log().splitlines() if line.startswith("picture")]
+        check_equal(len(sizes), 2, "pictures, coarse first")
+        check_equal(read_png(out)[:2], (160, 96), "size of the look")
+        check(not (folder / "frames").exists(), "only looks are rendered")
+        first = out.read_bytes()
+
+        # An asset changes, then the job, then it is broken and mended.
+        write_map(folder / "lamp.hdr", colour=lambda *_: (1.0, 0.5, 0.25))
+        wait_until(lambda: rounds() == 2, "the look under another map")
+        check(out.read_bytes() != first, "another map, the same picture")
+        job["image"]["width"] = 100
+        write_job(path, job)
+        wait_until(lambda: rounds() == 3, "the look of another size")
+        check_equal(read_png(out)[:2], (100, 96), "size of the look")
+        path.write_text("{")
+        wait_until(lambda: rounds() == 4, "the message about a broken job")
+        check("syntax error" in watch.log(), watch.log())
+        job["image"]["width"] = 50
+        write_job(path, job)
+        wait_until(lambda: rounds() == 5, "the look of the mended job")
+        check_equal(read_png(out)[:2], (50, 96), "size of the look")
+        watch.terminate()
+        check_equal(watch.wait(), OK, "exit code of a watch that is stopped")
+    except subprocess.TimeoutExpired:
+        print(watch.log())
+        raise
+    finally:
+        watch.kill()
+
+
+if __name__ == "__main__":
+    run_tests([
+        test_a_look_leaves_finished_frames_alone, test_a_region_has_the_pixels_of_the_whole,
+        test_check_and_explain_take_the_same_options, test_faults_name_the_option, test_view,
+        test_watch_follows_job_and_files
+    ])

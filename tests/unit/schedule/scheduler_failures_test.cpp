@@ -1,0 +1,270 @@
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "common/base/limits.h"
+#include "tests/unit/schedule/farm.h"
+
+namespace baton {
+namespace {
+
+using namespace testing_farm;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+using testing::SizeIs;
+
+// ---- lost workers -------------------------------------------------------------------------------
+
+TEST_F(SchedulerTest, ASilentWorkerLosesItsLeases) {
+  const auto held = farm.ask("a", 2);
+  farm.now += kSilence;
+  farm.step(WorkerAlive{"b", {}});
+  EXPECT_THAT(farm.step(ClockTicked{}), IsEmpty());
+  farm.now += 1ms;
+  EXPECT_THAT(all_of<ForgetWorker>(farm.step(ClockTicked{})), SizeIs(1));
+  EXPECT_EQ(farm.progress().attempts_lost, 2u);
+  EXPECT_THAT(tasks_of(farm.ask("b", 2)), ElementsAre(render(0, 0), render(0, 1)));
+}
+
+TEST_F(SchedulerTest, AnyMessageIsASignOfLife) {
+  farm.ask("a", 1);
+  for (int i = 0; i < 5; ++i) {
+    farm.now += kSilence;
+    farm.ask("a", 1);
+  }
+  EXPECT_EQ(all_of<ForgetWorker>(farm.step(ClockTicked{}))[0].worker, "b");
+  EXPECT_EQ(farm.progress().tasks_leased, 2u);
+}
+
+TEST_F(SchedulerTest, AGrantThatNeverArrivedIsFoundByTheHeartbeat) {
+  const GrantLease lost = farm.ask_one("a");
+  farm.step(WorkerAlive{"a", {}});
+  EXPECT_EQ(farm.progress().tasks_leased, 1u) << "it may still be on its way";
+  farm.now += kSilence;
+  farm.step(WorkerAlive{"a", {}});
+  EXPECT_EQ(farm.progress().tasks_leased, 0u);
+  EXPECT_EQ(farm.ask_one("b").lease.task, lost.lease.task);
+}
+
+TEST_F(SchedulerTest, AWorkerThatIntroducesItselfAgainKeepsWhatItNames) {
+  const auto held = farm.ask("a", 2);
+  EXPECT_THAT(farm.step(WorkerJoined{"a", {held[0].lease}}), IsEmpty());
+  EXPECT_EQ(farm.progress().tasks_leased, 1u);
+  EXPECT_THAT(all_of<RecordCompletion>(farm.finish(held[0])), SizeIs(1));
+}
+
+// Sixteen preemptions are no failure of the task, but may be its doing: somebody should look.
+TEST_F(SchedulerTest, AJobWhoseTaskKeepsLosingItsWorkersIsPaused) {
+  for (int round = 0; round < 2; ++round) {
+    int losses = 0;
+    for (farm.ask("a", 1); farm.status() == JobStatus::running && losses < 100; ++losses) {
+      farm.step(WorkerJoined{"a", {}});
+      farm.ask("a", 1);
+    }
+    EXPECT_EQ(losses, limits::kMaxTaskLosses);
+    EXPECT_EQ(farm.status(), JobStatus::paused);
+    EXPECT_THAT(farm.scheduler.find_job(farm.job)->waits, HasSubstr("run 0 of tile 0"));
+    farm.step(JobResumed{farm.job, {}});
+  }
+  EXPECT_EQ(farm.progress().tasks_failed, 0u);
+  farm.step(WorkerJoined{"a", {}});
+  farm.work_off("a");
+  EXPECT_EQ(farm.status(), JobStatus::done);
+}
+
+TEST_F(SchedulerTest, AReportedLeaseIsNotTakenUpAgain) {
+  const GrantLease grant = farm.ask_one("a");
+  farm.step(SpaceLacking{"a", grant.lease, "full"});
+  // The worker names the lease until its report is confirmed.
+  EXPECT_THAT(all_of<RevokeLease>(farm.step(WorkerAlive{"a", {grant.lease}})), SizeIs(1));
+  EXPECT_EQ(farm.progress().tasks_leased, 0u);
+}
+
+TEST_F(SchedulerTest, AFullDiskIsNobodysFailureHoweverOften) {
+  for (int i = 0; i < 100; ++i) {
+    const GrantLease grant = farm.ask_one("a");
+    ASSERT_EQ(grant.lease.task, render(0, 0));
+    farm.step(SpaceLacking{"a", grant.lease, "full"});
+    EXPECT_EQ(farm.scheduler.find_job(farm.job)->waits, "space: full");
+    EXPECT_THAT(farm.ask("a", 1), IsEmpty()) << "tries again at once";
+    farm.step(WorkRequested{"a", 0});
+    farm.now += Scheduler::kRest;
+  }
+  EXPECT_EQ(farm.progress().attempts_lost, 0u);
+  farm.finish(farm.ask_one("a"));
+  EXPECT_EQ(farm.scheduler.find_job(farm.job)->waits, "");
+  farm.work_off("a");
+  EXPECT_EQ(farm.status(), JobStatus::done);
+}
+
+TEST_F(SchedulerTest, FramesAreWrittenWhileRenderingFindsNoSpace) {
+  for (const GrantLease& grant : farm.ask("a", 2)) farm.finish(grant);
+  const auto grants = farm.ask("a", 4);
+  ASSERT_THAT(tasks_of(grants), ElementsAre(assemble(0), assemble(1), render(1, 0), render(1, 1)));
+  farm.step(SpaceLacking{"a", grants[2].lease, "full"});
+  farm.step(AttemptFailed{"a", grants[0].lease, "boom", false});
+  farm.step(WorkRequested{"b", 2});
+  EXPECT_EQ(farm.scheduler.num_leases("b"), 1u) << "the assembly, not the tile";
+}
+
+// ---- failures -----------------------------------------------------------------------------------
+
+TEST_F(SchedulerTest, ARetryGoesToAnotherWorker) {
+  const GrantLease grant = farm.ask_one("a");
+  farm.fail(grant);
+  EXPECT_NE(farm.ask_one("a").lease.task, grant.lease.task);
+  EXPECT_EQ(farm.ask_one("b").lease.task, grant.lease.task);
+}
+
+TEST_F(SchedulerTest, TheSameWorkerMayRetryWhenItIsAlone) {
+  farm.step(WorkerLeft{"b"});
+  const GrantLease grant = farm.ask_one("a");
+  farm.fail(grant);
+  EXPECT_EQ(farm.ask_one("a").lease.task, grant.lease.task);
+}
+
+TEST_F(SchedulerTest, ATaskFailsAfterAllItsAttempts) {
+  farm.step(WorkerLeft{"b"});
+  for (int attempt = 0; attempt <= farm.spec().max_retries_per_task; ++attempt) {
+    ASSERT_EQ(farm.status(), JobStatus::running);
+    const GrantLease grant = farm.ask_one("a");
+    ASSERT_EQ(grant.lease.task, render(0, 0));
+    farm.fail(grant);
+  }
+  EXPECT_EQ(farm.status(), JobStatus::failed);
+  EXPECT_EQ(farm.progress().tasks_open, 0u);
+}
+
+// What a worker lacks is its own trouble as long as another has it.
+TEST_F(SchedulerTest, APermanentFailureIsOneWorkersTrouble) {
+  const GrantLease grant = farm.ask_one("a");
+  farm.fail(grant, /*permanent=*/true);
+  EXPECT_EQ(farm.status(), JobStatus::running);
+  EXPECT_NE(farm.ask_one("a").lease.task, grant.lease.task);
+  const GrantLease again = farm.ask_one("b");
+  EXPECT_EQ(again.lease.task, grant.lease.task);
+  farm.finish(again);
+  EXPECT_EQ(farm.progress().tasks_done, 1u);
+}
+
+TEST_F(SchedulerTest, APermanentFailureOfAllWorkersEndsTheJob) {
+  farm.fail(farm.ask_one("a"), /*permanent=*/true);
+  const auto grants = farm.ask("b", 2);
+  const auto actions = farm.fail(grants[0], /*permanent=*/true);
+  EXPECT_EQ(all_of<RecordJobStatus>(actions)[0].status, JobStatus::failed);
+  EXPECT_TRUE(all_of<RecordFailure>(actions)[0].failure.last);
+  EXPECT_EQ(all_of<RevokeLease>(actions)[0].lease, grants[1].lease);
+  EXPECT_THAT(farm.ask("b", 1), IsEmpty());
+}
+
+TEST_F(SchedulerTest, AnAttemptIsLeftForEachWorkerThatHasNotTried) {
+  farm.step(WorkerLeft{"b"});
+  for (int i = 0; i < farm.spec().max_retries_per_task; ++i) farm.fail(farm.ask_one("a"));
+  farm.step(WorkerJoined{"b", {}});
+  const GrantLease last = farm.ask_one("a");  // tile 0 is b's now
+  EXPECT_EQ(last.lease.task, render(0, 1));
+  farm.finish(last);
+  farm.finish(farm.ask_one("b"));
+  EXPECT_EQ(farm.status(), JobStatus::running);
+  EXPECT_EQ(farm.progress().tasks_done, 2u);
+}
+
+TEST(SchedulerFailures, ATaskFailsWithAsManyWorkersAsItMayHaveAttempts) {
+  Farm farm(small_job(1, 1, 1));
+  farm.submit();
+  for (const char* name : {"a", "b", "c", "d", "e", "f"}) farm.step(WorkerJoined{name, {}});
+  for (const char* name : {"a", "b", "c"}) {
+    farm.fail(farm.ask_one(name), /*permanent=*/true);
+    ASSERT_EQ(farm.status(), JobStatus::running);
+  }
+  farm.fail(farm.ask_one("d"));
+  EXPECT_EQ(farm.status(), JobStatus::failed);
+}
+
+/// A job of one tile, which "a" cannot do and "b" has left.
+struct DeadEnd : Farm {
+  DeadEnd() : Farm(small_job(1, 1, 1)) {
+    submit();
+    step(WorkerJoined{"a", {}});
+    step(WorkerJoined{"b", {}});
+    fail(ask_one("a"), /*permanent=*/true);
+    EXPECT_EQ(scheduler.waits_for(job, now), "") << "b may do it";
+    step(WorkerLeft{"b"});
+    EXPECT_THAT(ask("a", 1), IsEmpty());
+    EXPECT_THAT(scheduler.waits_for(job, now), HasSubstr("a worker that can do run 0 of tile 0"));
+  }
+  void expect_that_it_is_done_by(const std::string& worker) {
+    step(WorkerJoined{worker, {}});
+    EXPECT_EQ(scheduler.waits_for(job, now), "");
+    finish(ask_one(worker));
+    EXPECT_EQ(progress().tasks_done, 1u);
+  }
+};
+
+TEST(SchedulerFailures, ATaskThatNobodyThereCanDoWaitsForAnotherWorker) {
+  DeadEnd().expect_that_it_is_done_by("c");
+}
+
+TEST(SchedulerFailures, AWorkerThatStartsAnewMayTryOnceMore) {
+  DeadEnd().expect_that_it_is_done_by("a");
+}
+
+TEST(SchedulerFailures, AJobGoesOnBelowItsLimitOfFailedTasks) {
+  JobSpec spec = small_job(2, 4, 2);
+  spec.max_failed_tasks = 2;
+  Farm farm(spec);
+  farm.submit();
+  farm.step(WorkerJoined{"a", {}});
+  farm.fail(farm.ask_one("a"), /*permanent=*/true);
+  EXPECT_EQ(farm.status(), JobStatus::running);
+
+  // Tile 1 is still rendered to the end; no frame can be written.
+  for (const GrantLease& grant : all_of<GrantLease>(farm.work_off("a"))) {
+    EXPECT_EQ(grant.lease.task.kind, TaskKind::render);
+    EXPECT_EQ(grant.lease.task.tile, 1);
+  }
+  EXPECT_EQ(farm.status(), JobStatus::failed);
+  EXPECT_EQ(farm.progress().tasks_done, 2u);
+}
+
+/// A job of four tiles, from which "bad" rests after two failures.
+struct TwoFailures : Farm {
+  static JobSpec spec_of_two() {
+    JobSpec spec = small_job(4, 1, 1);
+    spec.max_failures_per_worker = 2;
+    return spec;
+  }
+  TwoFailures() : Farm(spec_of_two()) {
+    submit();
+    step(WorkerJoined{"bad", {}});
+  }
+  void fail_twice() {
+    for (const GrantLease& grant : ask("bad", 2)) fail(grant);
+    EXPECT_THAT(ask("bad", 1), IsEmpty());
+  }
+};
+
+TEST(SchedulerFailures, AWorkerThatFailsMuchRestsAndIsForgiven) {
+  TwoFailures farm;
+  farm.step(WorkerJoined{"good", {}});
+  farm.fail_twice();
+  EXPECT_THAT(farm.ask("good", 3), SizeIs(3));
+  farm.now += Scheduler::kWorkerRest - 1s;
+  EXPECT_THAT(farm.ask("bad", 1), IsEmpty());
+  farm.now += 1s;
+  farm.step(WorkerAlive{"good", {}});
+  EXPECT_THAT(farm.ask("bad", 1), SizeIs(1));
+}
+
+TEST(SchedulerFailures, AJobFromWhichAllRestWaits) {
+  TwoFailures farm;
+  farm.fail_twice();
+  EXPECT_EQ(farm.status(), JobStatus::running);
+  EXPECT_THAT(farm.scheduler.waits_for(farm.job, farm.now), HasSubstr("a worker that can do"));
+  farm.now += Scheduler::kWorkerRest;
+  farm.work_off("bad");
+  EXPECT_EQ(farm.status(), JobStatus::done);
+}
+
+}  // namespace
+}  // namespace baton
