@@ -338,8 +338,7 @@ struct JobSpec {
   int max_retries_per_task = 3;
   int max_seconds_per_task = 3600;  ///< a task that takes longer has failed
   int max_failed_tasks = 1;         ///< the job fails when so many tasks have failed for good
-  int max_failures_per_worker =
-      8;  ///< a worker gets no more tasks of the job after so many failures
+  int max_failures_per_worker = 8;  ///< after so many failures a worker rests from the job
   std::uint64_t seed = 1;
 
   bool operator==(const JobSpec&) const = default;

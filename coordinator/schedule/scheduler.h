@@ -25,7 +25,8 @@ namespace baton {
 ///
 /// A task fails for good when as many workers have failed it as the job allows attempts, or, where
 /// fewer are connected, when those have had all attempts or can do no more. A retry goes to a
-/// worker that has failed the task least. A worker that fails much rests from the job for a while.
+/// worker that has failed the task least. A worker that fails much rests from the job for a
+/// while, unless all would.
 /// Lost leases are no failures; a task that loses too many pauses its job.
 class Scheduler {
  public:
@@ -51,7 +52,8 @@ class Scheduler {
 
   /// How long tasks of a kind rest after one of them found no space.
   static constexpr std::chrono::seconds kRest{5};
-  /// How long a worker rests from a job of whose tasks it has failed max_failures_per_worker.
+  /// How long a worker rests from a job of whose tasks it has failed max_failures_per_worker, while
+  /// another is there that does not.
   static constexpr std::chrono::minutes kWorkerRest{10};
 
   /// What follows from the event. Unknown jobs, workers and leases are normal: they are late, and
@@ -123,7 +125,7 @@ class Scheduler {
                                        TimePoint now) const;
   bool may_try(const Job& job, TaskIndex task, const std::string& worker, TimePoint now) const;
   bool is_exhausted(const Job& job, TaskIndex task) const;
-  static bool rests(const Job& job, const std::string& worker, TimePoint now);
+  bool rests(const Job& job, const std::string& worker, TimePoint now) const;
 
   // Jobs (scheduler.cpp).
   Job* find(const Digest& job);

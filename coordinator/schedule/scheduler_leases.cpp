@@ -256,9 +256,14 @@ std::string Scheduler::waits_for(const Digest& digest, TimePoint now) const {
   return {};
 }
 
-bool Scheduler::rests(const Job& job, const std::string& worker, TimePoint now) {
-  const auto found = job.workers.find(worker);
-  return found != job.workers.end() && now < found->second.rests_until;
+/// Whether the worker gets nothing of the job because it has failed much, while others have not.
+bool Scheduler::rests(const Job& job, const std::string& worker, TimePoint now) const {
+  const auto failed_much = [&](const std::string& name) {
+    const auto found = job.workers.find(name);
+    return found != job.workers.end() && now < found->second.rests_until;
+  };
+  return failed_much(worker) && !std::all_of(workers_.begin(), workers_.end(),
+                                             [&](const auto& w) { return failed_much(w.first); });
 }
 
 }  // namespace baton

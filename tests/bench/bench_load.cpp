@@ -11,6 +11,7 @@
 #include <filesystem>
 #include <fstream>
 #include <future>
+#include <limits>
 #include <numeric>
 #include <thread>
 
@@ -35,6 +36,7 @@ struct LoadOptions {
 constexpr int kTileSide = 8;
 constexpr int kMostTilesOfAFrame = 1024;  // an image of 256 x 256 pixels
 constexpr auto kPatience = 30min;
+constexpr double kNever = std::numeric_limits<double>::quiet_NaN();
 
 double seconds_since(LoadClock::time_point start) {
   return std::chrono::duration<double>(LoadClock::now() - start).count();
@@ -136,17 +138,11 @@ Result<JobSummary> wait_for(RequestClient& client, const Wanted& wanted) {
 struct Figures {
   std::uint64_t tasks = 0, measured_tasks = 0, again = 0;
   std::uint64_t memory_bytes = 0, restarted_bytes = 0;  ///< the most, in either life
-  double measured_s = 0, cpu_s = 0, submit_s = 0, restart_s = 0, granted_s = 0;
+  double measured_s = 0, cpu_s = 0, submit_s = 0;
+  double restart_s = kNever, granted_s = kNever;  ///< never: all was done before
   std::size_t expired = 0;
   std::vector<float> waits;
 };
-
-/// The time when `done` became true, seconds since `start`.
-template <class Done>
-double time_until(LoadClock::time_point start, const Done& done) {
-  while (!done() && seconds_since(start) < 600) std::this_thread::sleep_for(1ms);
-  return seconds_since(start);
-}
 
 Result<Figures> measure(const LoadOptions& options) {
   for (const fs::path& folder : {options.work_dir / "frames", options.work_dir / "farm"})
@@ -200,15 +196,19 @@ Result<Figures> measure(const LoadOptions& options) {
     // A new life.
     figures.memory_bytes = memory_of(coordinator, "VmHWM") - memory_before;
     const std::uint32_t epoch = run.newest_epoch;
-    const std::uint64_t welcomes = run.welcomes;
+    run.first_welcome = LoadClock::time_point{};
     coordinator.send_signal(SIGKILL);
     if (!coordinator.wait_for_end(10s)) return Error{ErrorKind::internal, "it cannot be killed"};
     start = LoadClock::now();
     BATON_ASSIGN(coordinator, start_coordinator(options, endpoint, endpoint));
-    figures.restart_s = time_until(start, [&] { return run.welcomes > welcomes; });
-    figures.granted_s = time_until(start, [&] { return run.newest_epoch > epoch; });
     BATON_ASSIGN(const JobSummary end,
                  wait_for(client, [](const JobSummary& j) { return j.status == JobStatus::done; }));
+    const auto since_start = [&](LoadClock::time_point moment) {
+      const bool is_set = moment != LoadClock::time_point{};
+      return is_set ? std::chrono::duration<double>(moment - start).count() : kNever;
+    };
+    figures.restart_s = since_start(run.first_welcome);
+    figures.granted_s = run.newest_epoch > epoch ? since_start(run.first_grant) : kNever;
     figures.tasks = end.tasks_total;
     figures.restarted_bytes = memory_of(coordinator, "VmHWM") - memory_before;
     return {};

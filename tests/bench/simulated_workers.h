@@ -34,8 +34,10 @@ struct LoadRun {
   std::chrono::milliseconds heartbeat{1000}, tile_time{0};
   BlobStore store;
   std::atomic<bool> stop{false};
-  std::atomic<std::uint64_t> reports{0}, welcomes{0};
-  std::atomic<std::uint32_t> newest_epoch{0};  ///< of a lease that a worker was granted
+  std::atomic<std::uint64_t> reports{0};
+  std::atomic<std::uint32_t> newest_epoch{0};          ///< of a lease that a worker was granted
+  std::atomic<LoadClock::time_point> first_grant{};    ///< of that epoch
+  std::atomic<LoadClock::time_point> first_welcome{};  ///< since this was last set to {}
 };
 
 class SimulatedWorker {
@@ -134,7 +136,8 @@ class SimulatedWorker {
 
   Status on(const WorkerWelcome&) {
     heard();
-    ++run_.welcomes;
+    LoadClock::time_point none{};
+    run_.first_welcome.compare_exchange_strong(none, last_heard_);
     retry_.reset();
     if (held_.empty()) ask();
     return {};
@@ -143,7 +146,10 @@ class SimulatedWorker {
     heard();
     retry_.reset();
     waits_.push_back(std::chrono::duration<float>(last_heard_ - asked_).count());
-    run_.newest_epoch = std::max(run_.newest_epoch.load(), grant.lease.epoch);
+    std::uint32_t newest = run_.newest_epoch;
+    if (grant.lease.epoch > newest &&
+        run_.newest_epoch.compare_exchange_strong(newest, grant.lease.epoch))
+      run_.first_grant = last_heard_;
     held_.push_back({grant.lease, last_heard_ + run_.tile_time});
     return {};
   }

@@ -240,7 +240,6 @@ struct TwoFailures : Farm {
   }
   void fail_twice() {
     for (const GrantLease& grant : ask("bad", 2)) fail(grant);
-    EXPECT_THAT(ask("bad", 1), IsEmpty());
   }
 };
 
@@ -248,6 +247,7 @@ TEST(SchedulerFailures, AWorkerThatFailsMuchRestsAndIsForgiven) {
   TwoFailures farm;
   farm.step(WorkerJoined{"good", {}});
   farm.fail_twice();
+  EXPECT_THAT(farm.ask("bad", 1), IsEmpty());
   EXPECT_THAT(farm.ask("good", 3), SizeIs(3));
   farm.now += Scheduler::kWorkerRest - 1s;
   EXPECT_THAT(farm.ask("bad", 1), IsEmpty());
@@ -256,14 +256,26 @@ TEST(SchedulerFailures, AWorkerThatFailsMuchRestsAndIsForgiven) {
   EXPECT_THAT(farm.ask("bad", 1), SizeIs(1));
 }
 
-TEST(SchedulerFailures, AJobFromWhichAllRestWaits) {
+// Whose failures they are cannot be told where everybody fails: no job waits for the end of a rest.
+TEST(SchedulerFailures, NobodyRestsWhereAllWould) {
   TwoFailures farm;
+  farm.step(WorkerJoined{"good", {}});
   farm.fail_twice();
-  EXPECT_EQ(farm.status(), JobStatus::running);
-  EXPECT_THAT(farm.scheduler.waits_for(farm.job, farm.now), HasSubstr("a worker that can do"));
-  farm.now += Scheduler::kWorkerRest;
-  farm.work_off("bad");
-  EXPECT_EQ(farm.status(), JobStatus::done);
+  farm.step(WorkerLeft{"good"});
+  EXPECT_THAT(farm.scheduler.waits_for(farm.job, farm.now), IsEmpty());
+  EXPECT_THAT(farm.ask("bad", 1), SizeIs(1));
+}
+
+// With several leases at a time the worker has failed too much before it has used up any task.
+TEST(SchedulerFailures, ALoneWorkerThatFailsEverythingEndsTheJobAtOnce) {
+  TwoFailures farm;
+  for (int round = 0; farm.status() == JobStatus::running; ++round) {
+    ASSERT_LT(round, farm.spec().max_retries_per_task + 1);
+    const auto grants = farm.ask("bad", 4);
+    ASSERT_THAT(grants, SizeIs(4));
+    for (const GrantLease& grant : grants) farm.fail(grant);
+  }
+  EXPECT_EQ(farm.status(), JobStatus::failed);
 }
 
 }  // namespace
