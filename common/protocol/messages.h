@@ -201,6 +201,13 @@ struct CancelJob {
     a(job);
   }
 };
+struct DeleteJob {
+  std::string job;
+  template <class A>
+  void fields(A& a) {
+    a(job);
+  }
+};
 struct StopCoordinator {
   template <class A>
   void fields(A& a) {
@@ -276,7 +283,7 @@ using Message =
                  WorkerGoodbye, WorkerWelcome, LeaseGrant, LeaseRevoke, NoWork, HelloAgain,
                  JobDocument, Shutdown, SubmitJob, ListJobs, ShowJob, CancelJob, StopCoordinator,
                  JobAccepted, JobList, JobDetail, Refused, PauseJob, ResumeJob, DrainWorker, Drain,
-                 ReportReceived>;
+                 ReportReceived, DeleteJob>;
 
 /// The frames of one message: [protocol name and version][type][body].
 std::vector<Bytes> encode_message(const Message& message);

@@ -236,6 +236,16 @@ Status Journal::restart_job(const Digest& job) {
   return record_status(job, JobStatus::running);
 }
 
+Status Journal::delete_job(const Digest& job) {
+  for (const char* const sql :
+       {"DELETE FROM completions WHERE job = ?", "DELETE FROM failures WHERE job = ?",
+        "DELETE FROM jobs WHERE digest = ?"}) {
+    BATON_ASSIGN(SqlStatement * remove, write(sql));
+    BATON_TRY(remove->bind(job.hex()).run());
+  }
+  return {};
+}
+
 Status Journal::record_status(const Digest& job, JobStatus status) {
   BATON_ASSIGN(SqlStatement * update, write("UPDATE jobs SET status = ? WHERE digest = ?"));
   return update->bind(static_cast<std::int64_t>(status)).bind(job.hex()).run();

@@ -49,6 +49,8 @@ class Journal {
   Status add_job(const Digest& job, const std::string& document);
   /// Forgets the failures of a job and lets it run again.
   Status restart_job(const Digest& job);
+  /// Forgets all of a job.
+  Status delete_job(const Digest& job);
   Status record_status(const Digest& job, JobStatus status);
   Status record_completion(const Digest& job, const Completion& completion);
   Status record_failure(const Failure& failure);

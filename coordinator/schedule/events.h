@@ -82,6 +82,10 @@ struct JobResumed {
   Digest job;
   std::vector<TaskKey> lost = {};
 };
+/// A job that has ended is forgotten, with the states that it left.
+struct JobDeleted {
+  Digest job;
+};
 /// `running`: the leases that the worker has in hand, of this coordinator or an earlier one.
 struct WorkerJoined {
   std::string worker;
@@ -133,7 +137,7 @@ struct InputsLost {
 /// Time has passed: who was silent for too long?
 struct ClockTicked {};
 
-using Event = std::variant<JobAdded, JobCancelled, JobSuperseded, JobPaused, JobResumed,
+using Event = std::variant<JobAdded, JobCancelled, JobSuperseded, JobPaused, JobResumed, JobDeleted,
                            WorkerJoined, WorkerAlive, WorkerLeft, WorkRequested, TaskCompleted,
                            AttemptFailed, ResultMissing, SpaceLacking, InputsLost, ClockTicked>;
 
@@ -156,6 +160,10 @@ struct RecordJobStatus {
   Digest job;
   JobStatus status = JobStatus::running;
   std::string reason;
+};
+/// Nothing of the job is to be known any more.
+struct RecordJobDeleted {
+  Digest job;
 };
 
 struct GrantLease {
@@ -188,7 +196,7 @@ struct RemoveBlobs {
 };
 
 using Action =
-    std::variant<RecordCompletion, RecordFailure, RecordReopened, RecordJobStatus, GrantLease,
-                 RevokeLease, ReportNoWork, ForgetWorker, ReportConflict, RemoveBlobs>;
+    std::variant<RecordCompletion, RecordFailure, RecordReopened, RecordJobStatus, RecordJobDeleted,
+                 GrantLease, RevokeLease, ReportNoWork, ForgetWorker, ReportConflict, RemoveBlobs>;
 
 }  // namespace baton

@@ -120,6 +120,14 @@ void Scheduler::on(const JobResumed& event, TimePoint, Actions& actions) {
   end_if_finished(event.job, *job, actions);
 }
 
+void Scheduler::on(const JobDeleted& event, TimePoint, Actions& actions) {
+  Job* job = find(event.job);
+  if (!job || is_open(job->status)) return;
+  job->tasks.release_all(blobs_);
+  jobs_.erase(event.job);
+  actions.push_back(RecordJobDeleted{event.job});
+}
+
 // ---- events: reports ----------------------------------------------------------------------------
 
 void Scheduler::on(const TaskCompleted& event, TimePoint now, Actions& actions) {

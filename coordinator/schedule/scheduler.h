@@ -60,7 +60,7 @@ class Scheduler {
   /// nothing follows.
   std::vector<Action> step(const Event& event, TimePoint now);
 
-  /// nullptr: no such job. Valid until the next JobAdded.
+  /// nullptr: no such job. Valid until the next JobAdded or JobDeleted.
   const Job* find_job(const Digest& job) const;
   /// All jobs, in the order of submission.
   std::vector<Digest> jobs() const;
@@ -99,6 +99,7 @@ class Scheduler {
   void on(const JobSuperseded& event, TimePoint now, Actions& actions);
   void on(const JobPaused& event, TimePoint now, Actions& actions);
   void on(const JobResumed& event, TimePoint now, Actions& actions);
+  void on(const JobDeleted& event, TimePoint now, Actions& actions);
   void on(const WorkerJoined& event, TimePoint now, Actions& actions);
   void on(const WorkerAlive& event, TimePoint now, Actions& actions);
   void on(const WorkerLeft& event, TimePoint now, Actions& actions);

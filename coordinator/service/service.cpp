@@ -312,6 +312,12 @@ Status Service::perform(const RecordJobStatus& action) {
   return journal_.record_status(action.job, action.status);
 }
 
+Status Service::perform(const RecordJobDeleted& action) {
+  spdlog::info("job {} is deleted", action.job.short_hex());
+  remove_job_file(action.job, JobStatus::cancelled);
+  return journal_.delete_job(action.job);
+}
+
 Status Service::perform(const GrantLease& action) {
   reply_to(action.worker, LeaseGrant{action.lease, action.inputs});
   return {};

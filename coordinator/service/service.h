@@ -70,6 +70,7 @@ class Service {
   Status receive(const PeerId& peer, const CancelJob& message);
   Status receive(const PeerId& peer, const PauseJob& message);
   Status receive(const PeerId& peer, const ResumeJob& message);
+  Status receive(const PeerId& peer, const DeleteJob& message);
   Status receive(const PeerId& peer, const DrainWorker& message);
   Status receive(const PeerId& peer, const StopCoordinator& message);
   Status make_way(const ParsedJobDocument& document, bool restart);
@@ -85,6 +86,7 @@ class Service {
   Status perform(const RecordFailure& action);
   Status perform(const RecordReopened& action);
   Status perform(const RecordJobStatus& action);
+  Status perform(const RecordJobDeleted& action);
   Status perform(const GrantLease& action);
   Status perform(const RevokeLease& action);
   Status perform(const ReportNoWork& action);

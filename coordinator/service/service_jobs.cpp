@@ -103,7 +103,9 @@ Status Service::receive(const PeerId& peer, const SubmitJob& message) {
     BATON_TRY(start_again(std::move(event), known->status, already_there));
   } else {
     if (scheduler_.jobs().size() >= limits::kMaxJobs) {
-      refuse(peer, {ErrorKind::io, fmt::format("the journal is full: {} jobs", limits::kMaxJobs)});
+      refuse(peer, {ErrorKind::io,
+                    fmt::format("the journal is full: {} jobs; `baton job delete` removes some",
+                                limits::kMaxJobs)});
       return {};
     }
     spdlog::info("job {} submitted: '{}', {} tasks", digest.short_hex(), event.spec.name,
@@ -226,6 +228,22 @@ Status Service::receive(const PeerId& peer, const ResumeJob& message) {
     BATON_TRY(step(JobResumed{*job, std::move(lost.tasks)}));
   }
   return answer_detail(peer, *job);
+}
+
+Status Service::receive(const PeerId& peer, const DeleteJob& message) {
+  const Result<Digest> job = resolve_job(scheduler_, message.job);
+  if (!job) {
+    refuse(peer, job.error());
+    return {};
+  }
+  const JobStatus status = scheduler_.find_job(*job)->status;
+  if (is_open(status)) {
+    refuse(peer, {ErrorKind::usage, fmt::format("job {} is {}: cancel it first", job->short_hex(),
+                                                job_status_name(status))});
+    return {};
+  }
+  BATON_TRY(step(JobDeleted{*job}));
+  return receive(peer, ListJobs{});
 }
 
 /// Of a job that the scheduler knows.

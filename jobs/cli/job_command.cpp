@@ -25,10 +25,11 @@ constexpr std::chrono::minutes kAwayPatience{5};
 
 struct JobOptions {
   std::string endpoint;
-  std::string job;       ///< name, digest or its beginning
-  JobArgument wanted;    ///< of submit
-  double timeout_s = 0;  ///< of wait; 0: none
-  bool restart = false;  ///< of submit
+  std::string job;         ///< name, digest or its beginning
+  JobArgument wanted;      ///< of submit
+  double timeout_s = 0;    ///< of wait; 0: none
+  bool restart = false;    ///< of submit
+  bool all_ended = false;  ///< of delete
   bool json = false;
 };
 
@@ -152,6 +153,26 @@ Result<ExitCode> retry(const JobOptions& options, RequestClient& client) {
   return ExitCode::ok;
 }
 
+Result<ExitCode> delete_jobs(const JobOptions& options, RequestClient& client) {
+  if (options.job.empty() != options.all_ended)
+    return Error{ErrorKind::usage, "name one job, or say --ended"};
+  std::vector<std::string> jobs{options.job};
+  if (options.all_ended) {
+    jobs.clear();
+    BATON_ASSIGN(const JobList found, ask<JobList>(client, ListJobs{}));
+    for (const JobSummary& job : found.jobs) {
+      if (!is_open(job.status)) jobs.push_back(job.job.hex());
+    }
+  }
+  for (const std::string& job : jobs) BATON_TRY(ask<JobList>(client, DeleteJob{job}));
+  if (options.json) {
+    fmt::print("{}\n", ordered_json{{"deleted", jobs.size()}}.dump(2));
+  } else {
+    fmt::print("{} jobs are deleted; their frames stay\n", jobs.size());
+  }
+  return ExitCode::ok;
+}
+
 using Action = Result<ExitCode> (*)(const JobOptions&, RequestClient&);
 
 Result<ExitCode> run_job(const JobOptions& options, Action action) {
@@ -195,6 +216,11 @@ void add_job_command(CLI::App& app, ExitCode& code) {
   add("resume", "Goes on with a paused job", "ID", change<ResumeJob>);
   add("cancel", "Ends a job; finished frames stay", "ID", change<CancelJob>);
   add("retry", "Goes on with a failed or cancelled job where it stopped", "ID", retry);
+  CLI::App* remove =
+      add("delete", "Forgets a job that has ended, and removes the states that it left", "",
+          delete_jobs);
+  remove->add_option("ID", options->job, "job: its name, its ID, or the beginning of that");
+  remove->add_flag("--ended", options->all_ended, "every job that has ended");
   add("wait",
       "Returns when the job has ended, with its exit code; outlasts a restart of the coordinator",
       "ID", wait)

@@ -79,6 +79,7 @@ const std::vector<Message>& examples() {
       DrainWorker{"w"},
       Drain{},
       ReportReceived{kLease},
+      DeleteJob{"def"},
   };
   return messages;
 }

@@ -57,6 +57,26 @@ class ChaosFarm {
     }
   }
 
+  /// Nothing that it made is left then.
+  void delete_job() {
+    step(JobDeleted{job_});
+    EXPECT_EQ(scheduler_->find_job(job_), nullptr);
+    for (const TaskCompleted& late : old_reports_) step(late);
+    EXPECT_FALSE(std::any_of(store_.begin(), store_.end(), [this](const Digest& blob) {
+      return scheduler_->is_referenced(blob);
+    }));
+  }
+  /// Of tasks that are done, blobs that are still in the store.
+  std::size_t num_left() const {
+    std::set<Digest> left;
+    for (const Completion& done : completions_) {
+      for (const BlobRef& blob : done.outputs) {
+        if (blob.kind == BlobKind::state && store_.contains(blob.digest)) left.insert(blob.digest);
+      }
+    }
+    return left.size();
+  }
+
   JobStatus status() const { return scheduler_->find_job(job_)->status; }
   const JobProgress& progress() const { return scheduler_->find_job(job_)->tasks.progress(); }
   std::size_t num_recorded() const { return completions_.size(); }
@@ -240,6 +260,7 @@ class ChaosFarm {
   }
   void on(const RecordFailure& a) { failures_.push_back(a.failure); }
   void on(const RecordJobStatus&) {}
+  void on(const RecordJobDeleted& a) { EXPECT_EQ(a.job, job_); }
   void on(const GrantLease& a) {
     EXPECT_FALSE(recorded_.contains(a.lease.task)) << "granted after it was done";
     EXPECT_TRUE(issued_.insert(a.lease).second) << "a lease id is used once";
@@ -297,7 +318,7 @@ std::uint32_t num_seeds() {
 }
 
 TEST(SchedulerModel, EveryTaskIsDoneOnceWhateverHappens) {
-  std::size_t num_missing = 0, num_lost = 0, num_reopened = 0, num_events = 0;
+  std::size_t num_missing = 0, num_lost = 0, num_reopened = 0, num_events = 0, num_left = 0;
   for (std::uint32_t seed = 1; seed <= num_seeds(); ++seed) {
     SCOPED_TRACE(testing::Message() << "seed " << seed);
     JobSpec spec = small_job(1 + static_cast<int>(seed % 5), 10, 1 + static_cast<int>(seed % 4),
@@ -315,6 +336,9 @@ TEST(SchedulerModel, EveryTaskIsDoneOnceWhateverHappens) {
     EXPECT_EQ(farm.progress().tasks_open, 0u);
     EXPECT_EQ(farm.progress().tasks_leased, 0u);
     EXPECT_GE(farm.num_removed(), 4u) << "the films are gone";
+    num_left += farm.num_left();
+    farm.delete_job();
+    EXPECT_EQ(farm.num_left(), 0u);
     num_missing += farm.num_missing();
     num_lost += farm.num_lost();
     num_reopened += farm.num_reopened();
@@ -322,6 +346,7 @@ TEST(SchedulerModel, EveryTaskIsDoneOnceWhateverHappens) {
     if (testing::Test::HasFailure()) return;
   }
   RecordProperty("events", std::to_string(num_events));
+  EXPECT_GT(num_left, 500u) << "the last states, until their jobs are deleted";
   EXPECT_GT(num_lost, 1000u);
   EXPECT_GT(num_reopened, 1000u) << "something was done again";
   EXPECT_GT(num_missing, 20u) << "alike blobs went between publishing and reporting";

@@ -190,6 +190,28 @@ TEST_F(ServiceTest, ACancelledJobGoesOnWhenItIsSubmittedAgain) {
   EXPECT_EQ(show(service.endpoint(), id).summary.status, JobStatus::done);
 }
 
+TEST_F(ServiceTest, ADeletedJobLeavesNeitherStatesNorALineOfTheJournal) {
+  Digest id;
+  {
+    const RunningService service(options);
+    id = ask<JobAccepted>(service.endpoint(), SubmitJob{document}).job;
+    FakeWorker worker(service.endpoint(), store(), job);
+    worker.hello();
+    EXPECT_THAT(refused(service.endpoint(), DeleteJob{id.hex()}).message,
+                HasSubstr("is running: cancel it first"));
+    for (int i = 0; i < kNumTasks; ++i) worker.do_one_task();
+    worker.say(LeaseRequest{1});
+    worker.expect<NoWork>();
+    EXPECT_THAT(ask<JobList>(service.endpoint(), DeleteJob{id.hex()}).jobs, SizeIs(0));
+    EXPECT_EQ(refused(service.endpoint(), ShowJob{id.hex()}).kind, ErrorKind::bad_input);
+    EXPECT_EQ(count_blobs(store()), 0u);
+  }
+  const RunningService service(options);
+  EXPECT_THAT(ask<JobList>(service.endpoint(), ListJobs{}).jobs, SizeIs(0));
+  EXPECT_FALSE(ask<JobAccepted>(service.endpoint(), SubmitJob{document}).already_there);
+  EXPECT_EQ(show(service.endpoint(), id).summary.tasks_done, 0u);
+}
+
 TEST_F(ServiceTest, APausedJobIsPausedAfterARestartAndResumedBySubmission) {
   Digest id;
   {
