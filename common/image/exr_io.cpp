@@ -1,9 +1,14 @@
 #include <ImfChannelList.h>
 #include <ImfFrameBuffer.h>
+#include <ImfFramesPerSecond.h>
 #include <ImfHeader.h>
 #include <ImfIO.h>
 #include <ImfInputFile.h>
+#include <ImfMatrixAttribute.h>
 #include <ImfOutputFile.h>
+#include <ImfRational.h>
+#include <ImfRationalAttribute.h>
+#include <ImfStandardAttributes.h>
 #include <ImfStringAttribute.h>
 #include <fmt/format.h>
 #include <half.h>
@@ -71,6 +76,25 @@ std::vector<half> to_half(std::span<const float> values) {
   return halves;
 }
 
+Imath::M44f matrix(const std::array<float, 16>& rows) {
+  Imath::M44f m;
+  std::copy(rows.begin(), rows.end(), m.getValue());
+  return m;
+}
+
+/// nullopt: an attribute of another kind.
+std::optional<std::string> attribute_text(const Imf::Attribute& attribute) {
+  if (const auto* text = dynamic_cast<const Imf::StringAttribute*>(&attribute))
+    return text->value();
+  if (const auto* rows = dynamic_cast<const Imf::M44fAttribute*>(&attribute)) {
+    const float* const values = rows->value().getValue();
+    return fmt::format("{}", fmt::join(values, values + 16, " "));
+  }
+  if (const auto* ratio = dynamic_cast<const Imf::RationalAttribute*>(&attribute))
+    return fmt::format("{}/{}", ratio->value().n, ratio->value().d);
+  return std::nullopt;
+}
+
 /// Header with channels and metadata.
 Result<Imf::Header> make_header(const std::string& name, const FilmTile& image,
                                 const ExrOptions& options) {
@@ -94,6 +118,10 @@ Result<Imf::Header> make_header(const std::string& name, const FilmTile& image,
     }
     header.insert(key, Imf::StringAttribute(value));
   }
+  if (options.world_to_camera) Imf::addWorldToCamera(header, matrix(*options.world_to_camera));
+  if (options.world_to_ndc) Imf::addWorldToNDC(header, matrix(*options.world_to_ndc));
+  if (options.frames_per_second)
+    Imf::addFramesPerSecond(header, Imf::guessExactFps(*options.frames_per_second));
   return header;
 }
 
@@ -250,8 +278,7 @@ Result<ImageMetadata> read_exr_metadata(const std::filesystem::path& path) {
     ImageMetadata metadata;
     const Imf::Header& header = file.header();
     for (auto it = header.begin(); it != header.end(); ++it) {
-      const auto* text = dynamic_cast<const Imf::StringAttribute*>(&it.attribute());
-      if (text != nullptr) metadata.emplace_back(it.name(), text->value());
+      if (auto text = attribute_text(it.attribute())) metadata.emplace_back(it.name(), *text);
     }
     return metadata;
   });

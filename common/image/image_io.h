@@ -1,6 +1,8 @@
 #pragma once
 
+#include <array>
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <utility>
 #include <vector>
@@ -31,6 +33,10 @@ struct ExrOptions {
   bool half_float = true;
   std::string compression = "zip";  ///< none, rle, zips, zip, piz
   ImageMetadata metadata;
+  /// Attributes of their own, which compositors read: worldToCamera, worldToNDC (row by row; points
+  /// are row vectors), framesPerSecond.
+  std::optional<std::array<float, 16>> world_to_camera{}, world_to_ndc{};
+  std::optional<double> frames_per_second{};
 };
 
 /// All channels of `image` (rect must start at 0, 0) as one scan-line EXR file in memory; `name`
@@ -47,7 +53,8 @@ Result<FilmTile> read_exr(const std::filesystem::path& path);
 /// Rows y0 to y1 - 1 of every channel, clipped to the data window. Errors: read_exr's, a file whose
 /// table of blocks has gaps.
 Result<FilmTile> read_exr_rows(const std::filesystem::path& path, int y0, int y1);
-/// Metadata of an EXR file that `write_exr` made (string attributes only).
+/// Metadata of an EXR file that `write_exr` made: attributes that are texts, 4x4 matrices (16
+/// numbers row by row) or rational numbers (n/d).
 Result<ImageMetadata> read_exr_metadata(const std::filesystem::path& path);
 
 /// 8-bit sRGB PNG from linear RGB, published atomically; values outside [0, 1] are clamped, NaN is

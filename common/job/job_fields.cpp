@@ -208,6 +208,7 @@ void fields(JobArchive& a, OutputSpec& output, const JobSpec& job) {
   a.choices("aovs", output.aovs, kAovs);
   a.choice("pixelType", output.pixel_type, kPixelTypes);
   a.word("compression", output.compression, kCompressions);
+  a.number("framesPerSecond", output.frames_per_second, {1, 1000});
 }
 
 void fields(JobArchive& a, StateSpec& state) {

@@ -306,6 +306,7 @@ struct OutputSpec {
   std::vector<Aov> aovs;  ///< in the order of the enum, no duplicates
   PixelType pixel_type = PixelType::half_float;
   std::string compression = "zip";  ///< none, rle, zips, zip, piz
+  double frames_per_second = 24;    ///< said in the header of frames, no more; (0, 1000]
 
   bool operator==(const OutputSpec&) const = default;
 };

@@ -9,7 +9,11 @@
 #include "common/job/motion.h"
 
 namespace baton {
-namespace {
+
+double rotation_deg_at(const EnvironmentSpec& environment, int frame_number) {
+  return environment.rotation_start_deg +
+         environment.rotation_deg_per_frame * (frame_number - environment.rotation_start_frame);
+}
 
 EnvironmentFrame environment_at(const EnvironmentSpec& environment, int frame_number) {
   const std::vector<EnvironmentKey>& keys = environment.keys;
@@ -28,14 +32,10 @@ EnvironmentFrame environment_at(const EnvironmentSpec& environment, int frame_nu
     if (result.mix > 0) result.map_b = static_cast<std::int32_t>(next - keys.begin());
   }
 
-  const double degrees =
-      environment.rotation_start_deg +
-      environment.rotation_deg_per_frame * (frame_number - environment.rotation_start_frame);
+  const double degrees = rotation_deg_at(environment, frame_number);
   if (degrees != 0) result.rotation = rotation_about(environment.rotation_axis, degrees);
   return result;
 }
-
-}  // namespace
 
 std::vector<FrameSpec> expand_sequence(const JobSpec& job) {
   std::vector<FrameSpec> frames;

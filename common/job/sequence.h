@@ -27,6 +27,11 @@ struct EnvironmentFrame {
   }
 };
 
+/// What the environment is at a frame, by the user's number; at least one key.
+EnvironmentFrame environment_at(const EnvironmentSpec& environment, int frame_number);
+/// By how much it is turned about its axis, degrees.
+double rotation_deg_at(const EnvironmentSpec& environment, int frame_number);
+
 /// What is particular to one frame of the sequence.
 struct FrameSpec {
   std::int32_t index = 0;   ///< 0-based position in the sequence

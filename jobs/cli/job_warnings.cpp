@@ -7,6 +7,7 @@
 #include <filesystem>
 
 #include "common/job/estimate.h"
+#include "common/job/job_fields.h"
 #include "common/job/sequence.h"
 #include "jobs/cli/text.h"
 
@@ -67,6 +68,32 @@ void output_warnings(const JobSpec& job, std::vector<std::string>& warnings) {
   }
 }
 
+/// Why an AOV shows nothing of this job; empty: it does.
+std::string_view why_empty(Aov aov, const JobSpec& job) {
+  const Method method = job.sampling.method;
+  switch (aov) {
+    case Aov::acceptance:
+    case Aov::acceptance_local:
+    case Aov::acceptance_independent:
+    case Aov::resampled:
+      return method == Method::sequential ? "" : "only `sequential` fills it";
+    case Aov::variance:
+      return traits(method).keeps_samples ? "only `reference`, `pool` and `ratio` fill it" : "";
+    case Aov::ess:
+      return traits(method).keeps_samples ? "" : "the method's rays have no weights";
+    default:
+      return "";
+  }
+}
+
+void aov_warnings(const JobSpec& job, std::vector<std::string>& warnings) {
+  for (const Aov aov : job.output.aovs) {
+    if (const std::string_view why = why_empty(aov, job); !why.empty())
+      warnings.push_back(fmt::format("output.aovs: {} says nothing here: {}",
+                                     kAovs.at(static_cast<std::size_t>(aov)), why));
+  }
+}
+
 }  // namespace
 
 std::vector<std::string> job_warnings(const JobSpec& job, const AssetReport& assets) {
@@ -77,6 +104,7 @@ std::vector<std::string> job_warnings(const JobSpec& job, const AssetReport& ass
         fmt::format("{} triangles without area are left out", assets.dropped_triangles));
   }
   warnings.insert(warnings.end(), assets.odd_objects.begin(), assets.odd_objects.end());
+  aov_warnings(job, warnings);
   output_warnings(job, warnings);
   return warnings;
 }

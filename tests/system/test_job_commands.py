@@ -7,7 +7,7 @@ import time
 from farm import BAD_INPUT, FAILED, OK, PATIENCE, UNAVAILABLE, Farm, Process, check, check_equal, free_port, make_job
 from farm import run_tests, wait_until, write_job
 
-TIMEOUT, CANCELLED = 1, 3
+TIMEOUT, CANCELLED, USAGE = 1, 3, 64
 
 
 def small_job(folder, **changes):
@@ -53,6 +53,13 @@ def a_job_from_submission_to_its_end(programs, folder):
         # The same job again is no new job.
         again = json.loads(farm.baton("job", "submit", path, "--json").stdout)
         check_equal(again, {"id": job, "alreadyThere": True}, "second submission")
+
+        # Deleted, it is known no longer; its frames stay.
+        farm.baton("job", "delete", expect=USAGE)
+        check("1 jobs are deleted" in farm.baton("job", "delete", "--ended").stdout, "no word of what was deleted")
+        check("0 jobs" in farm.baton("job", "list").stdout, "the job is still there")
+        farm.baton("job", "show", job, expect=BAD_INPUT)
+        check(list(folder.glob("**/frame.0001.exr")), "the frames are gone")
 
 
 def unknown_and_ambiguous_ids(programs, folder):

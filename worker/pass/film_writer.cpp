@@ -24,9 +24,9 @@ std::vector<std::string> channel_names(Aov aov) {
     case Aov::mask:
       return {"mask"};
     case Aov::acceptance_local:
-      return {"acceptance.local"};
+      return {"acceptanceLocal"};
     case Aov::acceptance_independent:
-      return {"acceptance.independent"};
+      return {"acceptanceIndependent"};
     case Aov::resampled:
       return {"resampled"};
     case Aov::material:

@@ -21,7 +21,7 @@ struct PixelResult {
         acceptance_independent = 0;  ///< the same by kind of move, 0 without any
   bool resampled = false;
   PixelSource source = PixelSource::background;
-  Vec3 normal;        ///< mean shading normal of the sites that see a surface
+  Vec3 normal;        ///< unit: mean shading normal of the sites that see a surface; else 0
   float depth = 0;    ///< mean distance of the sites that see a surface
   float mask = 0.5f;  ///< 1 all rays free, 0 some failed, 0.5 background [CV Fig. 2]
   std::uint32_t material =

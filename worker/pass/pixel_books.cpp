@@ -22,7 +22,7 @@ void record_geometry(std::span<const SurfaceHit> hits, PixelResult& pixel) {
   }
   if (num_hits == 0) return;
   pixel.alpha = num_hits / static_cast<float>(hits.size());
-  pixel.normal = pixel.normal / num_hits;
+  if (num_hits > 1) pixel.normal = normalize(pixel.normal);
   pixel.depth /= num_hits;
 }
 

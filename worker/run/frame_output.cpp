@@ -8,7 +8,9 @@
 #include "common/base/files.h"
 #include "common/base/version.h"
 #include "common/job/job_fields.h"
+#include "common/job/motion.h"
 #include "common/job/sequence.h"
+#include "worker/scene/camera.h"
 
 namespace baton {
 namespace {
@@ -97,6 +99,22 @@ ImageMetadata frame_metadata(const JobSpec& job, const Digest& job_digest, int f
                          {"baton:jobDigest", job_digest.hex()},
                          {"baton:frame", std::to_string(frame_number)},
                          {"baton:method", std::string(traits(job.sampling.method).name)}};
+  const SamplingSpec& sampling = job.sampling;
+  const auto add = [&](const char* key, const auto& value) {
+    metadata.emplace_back(key, fmt::format("{}", value));
+  };
+  add("baton:numParticles", sampling.num_particles);
+  add("baton:numCandidates", sampling.num_candidates);
+  add("baton:seed", job.seed);
+  add("baton:sites", job.image.sites);
+  const EnvironmentSpec& environment = job.environment;
+  const EnvironmentFrame light = environment_at(environment, frame_number);
+  add("baton:map", environment.keys.at(static_cast<std::size_t>(light.map_a)).map);
+  if (light.mix > 0) {
+    add("baton:mapMixedIn", environment.keys.at(static_cast<std::size_t>(light.map_b)).map);
+    add("baton:mapMix", light.mix);
+  }
+  add("baton:rotationDeg", rotation_deg_at(environment, frame_number));
   for (const auto& [name, text] : job.metadata)
     metadata.emplace_back("baton:metadata:" + name, text);
   return metadata;
@@ -106,11 +124,15 @@ Result<BlobRef> write_frame(const JobSpec& job, const Digest& job_digest, std::i
                             const FilmTile& image) {
   const std::filesystem::path path = frame_path(job, frame_index);
   const int number = job.frames.at(static_cast<std::size_t>(frame_index));
+  const Camera camera(camera_at(job, number), job.image.width, job.image.height);
   BATON_ASSIGN(const Bytes bytes,
                encode_exr(path.string(), image,
                           {.half_float = job.output.pixel_type == PixelType::half_float,
                            .compression = job.output.compression,
-                           .metadata = frame_metadata(job, job_digest, number)}));
+                           .metadata = frame_metadata(job, job_digest, number),
+                           .world_to_camera = camera.world_to_camera(),
+                           .world_to_ndc = camera.world_to_ndc(job.image.rendered()),
+                           .frames_per_second = job.output.frames_per_second}));
   BATON_TRY(write_file_verified(path, bytes, [&](const std::filesystem::path& temporary) {
     return verify_frame(temporary, image, frame_index);
   }));

@@ -12,6 +12,20 @@ Vec3 least_aligned_axis(const Vec3& v) {
   return y <= z ? Vec3{0, 1, 0} : Vec3{0, 0, 1};
 }
 
+/// The columns give dot products with points seen from `origin`; `last` is added.
+Matrix4 from_columns(const Vec3& origin, const std::array<Vec3, 4>& column,
+                     const std::array<float, 4>& last) {
+  Matrix4 m{};
+  for (std::size_t c = 0; c < 4; ++c) {
+    m[c] = column[c].x;
+    m[4 + c] = column[c].y;
+    m[8 + c] = column[c].z;
+    m[12 + c] = last[c] - dot(origin, column[c]);
+  }
+  for (float& value : m) value += 0.0f;  // no -0, which people would wonder about
+  return m;
+}
+
 }  // namespace
 
 Camera::Camera(const CameraSpec& spec, int width, int height) : origin_(spec.position) {
@@ -45,6 +59,24 @@ std::optional<std::array<float, 2>> Camera::project(const Vec3& point) const {
   if (!(ahead > 0)) return std::nullopt;
   return std::array<float, 2>{center_x_ + dot(view, right_) / (dot(right_, right_) * ahead),
                               center_y_ + dot(view, down_) / (dot(down_, down_) * ahead)};
+}
+
+Matrix4 Camera::world_to_camera() const {
+  return from_columns(origin_, {normalize(right_), normalize(down_) * -1, forward_ * -1, Vec3{}},
+                      {0, 0, 0, 1});
+}
+
+Matrix4 Camera::world_to_ndc(const PixelRect& shown) const {
+  // project(), times the distance, from pixels of `shown` to [-1, 1].
+  const float x_scale = 2 / static_cast<float>(shown.width());
+  const float y_scale = -2 / static_cast<float>(shown.height());
+  const float x_center = x_scale * (center_x_ - static_cast<float>(shown.x0)) - 1;
+  const float y_center = y_scale * (center_y_ - static_cast<float>(shown.y0)) + 1;
+  return from_columns(
+      origin_,
+      {right_ * (x_scale / dot(right_, right_)) + forward_ * x_center,
+       down_ * (y_scale / dot(down_, down_)) + forward_ * y_center, Vec3{}, forward_},
+      {0, 0, 1, 0});
 }
 
 }  // namespace baton

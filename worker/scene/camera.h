@@ -4,9 +4,13 @@
 #include <optional>
 
 #include "common/job/job_spec.h"
+#include "common/math/pixel_rect.h"
 #include "common/math/vec3.h"
 
 namespace baton {
+
+/// Row by row; points are row vectors, as in OpenEXR.
+using Matrix4 = std::array<float, 16>;
 
 struct Ray {
   Vec3 origin;
@@ -24,6 +28,13 @@ class Camera {
   Ray ray(float x, float y) const;
   /// Image position in pixels of a point; the inverse of ray(). nullopt behind the camera.
   std::optional<std::array<float, 2>> project(const Vec3& point) const;
+
+  /// Points of the world, as row vectors (x, y, z, 1), to the camera's own frame: x to the right, y
+  /// up, looking along -z.
+  Matrix4 world_to_camera() const;
+  /// To what `shown`, pixels of the whole picture, displays: after division by w, which is the
+  /// distance along the view, x and y are in [-1, 1], y up, and z is 1 / w.
+  Matrix4 world_to_ndc(const PixelRect& shown) const;
 
   bool operator==(const Camera&) const = default;
 

@@ -17,6 +17,7 @@ JobSpec small_job(const std::string& name) {
   job.sampling.method = Method::sequential;
   job.name = "small";
   job.frames = {7, 9};
+  job.environment.keys = {{.frame = 1, .map = "sky.exr"}};
   job.image = {.width = 20, .height = 10, .sites = 1, .tile_size = 8};
   job.output.directory = testing::TempDir() + "frame_output_" + name;
   return job;
@@ -66,6 +67,11 @@ TEST(FrameOutput, ATileThatDoesNotBelongIsAnError) {
 TEST(FrameOutput, AFrameIsWrittenVerifiedAndNamedByItsDigest) {
   JobSpec job = small_job("written");
   job.metadata["owner"] = "lighting";
+  job.environment = {.keys = {{.frame = 1, .map = "dawn.exr"}, {.frame = 11, .map = "noon.exr"}},
+                     .rotation_start_deg = 5,
+                     .rotation_deg_per_frame = 1.5};
+  job.seed = 77;
+  job.output.frames_per_second = 23.976;
   const Digest digest{3, 4};
   const Result<BlobRef> ref = write_frame(job, digest, 1, assembled(job));
   ASSERT_TRUE(ref) << ref.error().message;
@@ -84,7 +90,18 @@ TEST(FrameOutput, AFrameIsWrittenVerifiedAndNamedByItsDigest) {
                                                             {"baton:jobDigest", digest.hex()},
                                                             {"baton:frame", "9"},
                                                             {"baton:method", "sequential"},
+                                                            {"baton:seed", "77"},
+                                                            {"baton:sites", "1"},
+                                                            {"baton:numParticles", "16"},
+                                                            {"baton:map", "dawn.exr"},
+                                                            {"baton:mapMixedIn", "noon.exr"},
+                                                            {"baton:mapMix", "0.8"},
+                                                            {"baton:rotationDeg", "17"},
+                                                            {"framesPerSecond", "24000/1001"},
                                                             {"baton:metadata:owner", "lighting"}}));
+  EXPECT_TRUE(std::any_of(metadata.begin(), metadata.end(), [](const auto& entry) {
+    return entry.first == "worldToCamera" && entry.second == "1 0 0 0 0 1 0 0 0 0 1 0 0 0 -5 1";
+  })) << "the camera stands at (0, 0, 5)";
 }
 
 TEST(FrameOutput, AWrongValueIsFoundInTheFrameThatLooksAtItsBlock) {

@@ -34,6 +34,33 @@ TEST(Camera, FieldOfViewSpansTheHeight) {
   expect_direction(camera.ray(200, 50).direction, normalize({2, 0, -1}));
 }
 
+TEST(Camera, MatricesSayWhatRaysSay) {
+  const CameraSpec spec{
+      .position = {1, 2, 3}, .look_at = {-4, 0, 7}, .up = {0.2f, 1, 0}, .vertical_fov_deg = 50};
+  const Camera camera(spec, 64, 48);
+  const PixelRect shown{8, 12, 40, 48};
+  const Matrix4 to_camera = camera.world_to_camera(), to_ndc = camera.world_to_ndc(shown);
+  const auto times = [](const Vec3& p, const Matrix4& m, std::size_t c) {
+    return p.x * m[c] + p.y * m[4 + c] + p.z * m[8 + c] + m[12 + c];
+  };
+  for (const float x : {0.0f, 17.0f, 64.0f}) {
+    for (const float y : {0.0f, 30.5f, 48.0f}) {
+      const Ray ray = camera.ray(x, y);
+      const Vec3 point = ray.origin + ray.direction * 3;
+      const Vec3 seen{times(point, to_camera, 0), times(point, to_camera, 1),
+                      times(point, to_camera, 2)};
+      EXPECT_NEAR(length(seen), 3, 1e-5f);
+      EXPECT_LT(seen.z, 0);
+      EXPECT_NEAR(times(point, to_camera, 3), 1, 1e-6f);
+      const float w = times(point, to_ndc, 3);
+      EXPECT_NEAR(w, -seen.z, 1e-5f);
+      EXPECT_NEAR(times(point, to_ndc, 0) / w, (x - 8) / 16 - 1, 1e-5f);
+      EXPECT_NEAR(times(point, to_ndc, 1) / w, 1 - (y - 12) / 18, 1e-5f);
+      EXPECT_NEAR(times(point, to_ndc, 2), 1, 1e-5f);
+    }
+  }
+}
+
 TEST(Camera, DegenerateUpStillGivesAFrame) {
   for (const Vec3& up : {Vec3{0, 1, 0}, Vec3{0, -2, 0}, Vec3{0, 0, 0}, Vec3{1e-9f, 1, 0}}) {
     const Camera camera({.position = {0, 5, 0}, .look_at = {0, 0, 0}, .up = up}, 64, 64);

@@ -184,5 +184,14 @@ TEST_F(SchedulerTest, AJobThatStartsAfreshLetsGoOfItsBlobs) {
   EXPECT_EQ(farm.progress().tasks_done, 0u);
 }
 
+TEST(SchedulerLifetime, AHundredThousandTasksAreNoTrouble) {
+  Farm farm(small_job(1000, 300, 3));
+  ASSERT_GT(JobGraph(farm.spec()).num_tasks(), 100000);
+  farm.submit();
+  farm.step(WorkerJoined{"a", {}});
+  farm.work_off("a");
+  EXPECT_EQ(farm.status(), JobStatus::done);
+}
+
 }  // namespace
 }  // namespace baton

@@ -391,14 +391,5 @@ TEST(SchedulerModel, AJobAlwaysEndsWhenAttemptsAreLimited) {
   }
 }
 
-TEST(SchedulerModel, AHundredThousandTasksAreNoTrouble) {
-  Farm farm(small_job(1000, 300, 3));
-  ASSERT_GT(JobGraph(farm.spec()).num_tasks(), 100000);
-  farm.submit();
-  farm.step(WorkerJoined{"a", {}});
-  farm.work_off("a");
-  EXPECT_EQ(farm.status(), JobStatus::done);
-}
-
 }  // namespace
 }  // namespace baton
