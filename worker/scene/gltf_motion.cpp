@@ -1,11 +1,10 @@
 #include "worker/scene/gltf_motion.h"
 
-#include <assimp/scene.h>
-
 #include <algorithm>
-#include <assimp/Importer.hpp>
 #include <cmath>
 #include <filesystem>
+
+#include "worker/scene/assimp_file.h"
 
 namespace baton {
 namespace {
@@ -42,15 +41,9 @@ class AnimatedFile {
     std::error_code error;
     if (!std::filesystem::is_regular_file(gltf.file, error))
       return bad_file(gltf, "missing: expected a glTF file");
-    AnimatedFile file;
-    file.importer_ = std::make_unique<Assimp::Importer>();
-    try {
-      file.scene_ = file.importer_->ReadFile(gltf.file, 0);
-    } catch (const std::exception& e) {
-      return bad_file(gltf, std::string("not a glTF file: ") + e.what());
-    }
-    if (file.scene_ == nullptr || file.scene_->mRootNode == nullptr)
-      return bad_file(gltf, std::string("not a glTF file: ") + file.importer_->GetErrorString());
+    BATON_ASSIGN(AssimpFile read, AssimpFile::read(gltf.file, "a glTF file"));
+    AnimatedFile file(std::move(read));
+    file.scene_ = &file.file_.scene();
     file.node_ = file.scene_->mRootNode->FindNode(aiString(gltf.node));
     if (file.node_ == nullptr) return bad_file(gltf, "no node \"" + gltf.node + "\"");
     return file;
@@ -73,6 +66,8 @@ class AnimatedFile {
   }
 
  private:
+  explicit AnimatedFile(AssimpFile file) : file_(std::move(file)) {}
+
   aiMatrix4x4 local(const aiNode& node, double seconds) const {
     if (scene_->mNumAnimations == 0) return node.mTransformation;
     const aiAnimation& animation = *scene_->mAnimations[0];
@@ -92,7 +87,7 @@ class AnimatedFile {
             channel_value(c.mPositionKeys, c.mNumPositionKeys, ticks, place)};
   }
 
-  std::unique_ptr<Assimp::Importer> importer_;
+  AssimpFile file_;
   const aiScene* scene_ = nullptr;
   const aiNode* node_ = nullptr;
 };

@@ -1,14 +1,11 @@
-#include <assimp/postprocess.h>
-#include <assimp/scene.h>
-
 #include <algorithm>
-#include <assimp/Importer.hpp>
 #include <cmath>
 #include <filesystem>
 #include <optional>
 
 #include "common/base/files.h"
 #include "common/base/limits.h"
+#include "worker/scene/assimp_file.h"
 #include "worker/scene/mesh_builder.h"
 #include "worker/scene/mesh_readers.h"
 
@@ -85,21 +82,17 @@ void add_node(const aiScene& file, const aiNode& node, const aiMatrix4x4& parent
 }
 
 Result<TriangleMesh> load_with_assimp(const std::string& path, bool smooth_normals) {
-  Assimp::Importer importer;
-  const aiScene* file = importer.ReadFile(path, 0);
-  if (file == nullptr)
-    return bad_mesh(path, std::string("not a mesh: ") + importer.GetErrorString());
-  if (file->mNumMeshes == 0) return bad_mesh(path, "not a mesh: nothing found in it");
-  for (unsigned m = 0; m < file->mNumMeshes; ++m) {
-    if (const auto fault = find_fault(*file->mMeshes[m])) return bad_mesh(path, *fault);
+  BATON_ASSIGN(AssimpFile file, AssimpFile::read(path, "a mesh"));
+  const aiScene& read = file.scene();
+  if (read.mNumMeshes == 0) return bad_mesh(path, "not a mesh: nothing found in it");
+  for (unsigned m = 0; m < read.mNumMeshes; ++m) {
+    if (const auto fault = find_fault(*read.mMeshes[m])) return bad_mesh(path, *fault);
   }
-  file = importer.ApplyPostProcessing(aiProcess_Triangulate);
-  if (file == nullptr || file->mRootNode == nullptr) {
-    return bad_mesh(path, std::string("not a mesh: ") + importer.GetErrorString());
-  }
-  const bool with_normals = smooth_normals && has_normals(*file);
+  BATON_TRY(file.triangulate());
+  const aiScene& scene = file.scene();
+  const bool with_normals = smooth_normals && has_normals(scene);
   MeshBuilder builder(with_normals);
-  add_node(*file, *file->mRootNode, aiMatrix4x4(), with_normals, builder);
+  add_node(scene, *scene.mRootNode, aiMatrix4x4(), with_normals, builder);
   return builder.take();
 }
 
@@ -135,7 +128,7 @@ Result<TriangleMesh> load_mesh(const std::string& path, bool smooth_normals) {
     return bad_mesh(path, "larger than " + std::to_string(limits::kMaxAssetFileBytes) + " bytes");
   }
 
-  // assimp throws on some odd files instead of saying so.
+  // Postprocessing and odd files may throw.
   try {
     BATON_ASSIGN(TriangleMesh mesh, read_triangles(path, smooth_normals));
     if (mesh.triangles.empty()) {
