@@ -54,7 +54,7 @@ MAY_INCLUDE = {
 # Library, by how its headers are spelled -> files that may include them (prefix of the path).
 THIRD_PARTY = {
     r"embree3/": ["worker/accel/"],
-    r"assimp/": ["worker/scene/mesh_loader.cpp", "worker/scene/gltf_motion.cpp"],
+    r"assimp/": ["worker/scene/assimp_file.h", "worker/scene/assimp_file.cpp"],
     r"OpenEXR/|Imath/|png\.h": ["common/image/"],
     r"zmq": ["common/protocol/"],
     r"sqlite3": ["coordinator/journal/"],
