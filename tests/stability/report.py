@@ -1,17 +1,18 @@
 #!/usr/bin/env python3
 """Turns the tables of the stability suite into a report.
 
-usage: report.py FOLDER CASES [--markdown FILE]
+usage: report.py FOLDER CASES [--docs DOCS]
 
 FOLDER holds grid.csv and series.csv; CASES is the output of `stability --list`. Writes FOLDER/report.html (self-contained:
-the grid, and for each case its sentence, its plots and its numbers) and FOLDER/plots/CASE.svg. --markdown replaces what is
-between the lines "<!-- grid -->" and "<!-- /grid -->" of FILE with the grid as a table.
+the grid, and for each case its sentence, its plots and its numbers) and FOLDER/plots/CASE.svg. --docs writes the grid for
+the pages: DOCS/grid.svg, and DOCS/grid.csv with the same numbers unabridged.
 """
 
 import argparse
 import csv
 import html
 import math
+import re
 from collections import defaultdict
 from pathlib import Path
 
@@ -102,29 +103,58 @@ def grid_table(cells, texts, subjects):
     return f"<table><tr><th>case</th>{head}</tr>{''.join(lines)}</table>"
 
 
-def markdown_grid(cells, texts, subjects):
-    marks = {"holds": "holds", "degrades": "*degrades*", "fails": "**fails**"}
-    lines = ["| case | " + " | ".join(subjects) + " |", "|---" * (len(subjects) + 1) + "|"]
-    for name, row in cells.items():
-        entries = [f'{marks[row[s]["verdict"]]}: {row[s]["number"]}' if s in row else "" for s in subjects]
-        lines.append(f"| `{name}` | " + " | ".join(entries) + " |")
-    return "\n".join(lines)
+def short_number(text):
+    """The number that decided a verdict in the width of a cell; what it is of is left out where it is the noise."""
+    shapes = ((r"noise x([\d.]+)( after the jump)?", lambda m: m[1] + ("\N{DAGGER}" if m[2] else "")),
+              (r"growth of Lns error x([\d.]+)", lambda m: f"growth {m[1]}"),
+              (r"(median|mean) Lns\^/Lns ([\d.]+).*", lambda m: f"{m[1]} {m[2]}"),
+              (r"bias -?([\d.]+) .*", lambda m: f"bias {'-' if '-' in text else ''}{float(m[1]):.0f} %"),
+              (r"([\d.]+) % of pixels dark", lambda m: f"dark {m[1]} %"))
+    for pattern, shorten in shapes:
+        match = re.fullmatch(pattern, text)
+        if match:
+            return shorten(match)
+    return text
 
 
-def replace_grid(path, grid):
-    start, end = "<!-- grid -->", "<!-- /grid -->"
-    text = path.read_text(encoding="utf-8")
-    if text.count(start) != 1 or text.count(end) != 1:
-        raise SystemExit(f"report.py: {path}: expected one line {start} and one line {end}")
-    before, rest = text.split(start)
-    path.write_text(before + start + "\n" + grid + "\n" + end + rest.split(end)[1], encoding="utf-8")
+def grid_picture(cells, subjects):
+    """The grid as SVG: a row a case, a column a method, colour and type face by verdict."""
+    left, top, width, height = 150, 118, 74, 17
+    faces = {"holds": "", "degrades": ' font-style="italic"', "fails": ' font-weight="bold"'}
+    size = (left + width * len(subjects) + 70, top + height * len(cells) + 4)
+    out = [f'<svg xmlns="http://www.w3.org/2000/svg" viewBox="0 0 {size[0]} {size[1]}" font-family="sans-serif" '
+           f'font-size="11"><rect width="100%" height="100%" fill="#fff"/>']
+    for column, subject in enumerate(subjects):
+        x = left + width * (column + 0.4)
+        out.append(f'<text transform="translate({x:.0f} {top - 6}) rotate(-40)">{html.escape(subject)}</text>')
+    for line, (name, row) in enumerate(cells.items()):
+        y = top + height * line
+        out.append(f'<text x="{left - 6}" y="{y + 12}" text-anchor="end">{html.escape(name)}</text>')
+        for column, subject in enumerate(subjects):
+            if subject not in row:
+                continue
+            verdict, x = row[subject]["verdict"], left + width * column
+            out.append(f'<rect x="{x}" y="{y}" width="{width - 1}" height="{height - 1}" fill="{FILLS[verdict]}"/>'
+                       f'<text x="{x + width / 2:.0f}" y="{y + 12}" text-anchor="middle" '
+                       f'font-size="10"{faces[verdict]}>'
+                       f'{html.escape(short_number(row[subject]["number"]))}</text>')
+    return "".join(out) + "</svg>\n"
+
+
+def write_docs(folder, cells, subjects):
+    (folder / "grid.svg").write_text(grid_picture(cells, subjects), encoding="utf-8")
+    with (folder / "grid.csv").open("w", encoding="utf-8", newline="") as file:
+        lines = csv.writer(file, lineterminator="\n")
+        lines.writerow(["case", "method", "verdict", "number"])
+        lines.writerows([name, subject, row[subject]["verdict"], row[subject]["number"]]
+                        for name, row in cells.items() for subject in subjects if subject in row)
 
 
 def main():
     parser = argparse.ArgumentParser(description=__doc__.splitlines()[0])
     parser.add_argument("folder", type=Path)
     parser.add_argument("cases", type=Path)
-    parser.add_argument("--markdown", type=Path)
+    parser.add_argument("--docs", type=Path)
     options = parser.parse_args()
 
     # Sort the tables by case and subject, in the order of the files.
@@ -150,8 +180,8 @@ def main():
             ".n{font-size:11px}svg{max-width:1100px;display:block}</style><h1 id=top>Stability</h1>"
             + grid_table(cells, texts, subjects) + "".join(sections))
     (options.folder / "report.html").write_text(page, encoding="utf-8")
-    if options.markdown:
-        replace_grid(options.markdown, markdown_grid(cells, texts, subjects))
+    if options.docs:
+        write_docs(options.docs, cells, subjects)
     print(f"{options.folder / 'report.html'}: {len(cells)} cases, {len(subjects)} methods")
 
 
