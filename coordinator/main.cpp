@@ -42,7 +42,8 @@ baton::Status coordinate(const baton::ServiceOptions& options,
 int main(int argc, char** argv) {
   CLI::App app(
       "Splits jobs into tasks and leases them to workers. Killed at any time, it goes on where it "
-      "was.");
+      "was.",
+      "baton-coordinator");
   app.set_version_flag("--version", baton::build_identity());
   app.footer(
       "Examples:\n"
@@ -63,7 +64,7 @@ int main(int argc, char** argv) {
   app.add_option("--endpoint-file", endpoint_file,
                  "file that gets the concrete endpoint once it listens");
   app.add_option("--heartbeat-ms", heartbeat_ms,
-                 "between signs of life of a worker; four missing ones lose it its leases")
+                 "between signs of life of a worker; it loses its leases when four are missing")
       ->check(CLI::Range(10, 60000))
       ->capture_default_str();
   app.add_flag("--mixed-builds", options.mixed_builds,

@@ -40,7 +40,7 @@ int replay(const baton::ReplayOptions& options) {
 }  // namespace
 
 int main(int argc, char** argv) {
-  CLI::App app("Renders tiles for a baton-coordinator.");
+  CLI::App app("Renders tiles for a baton-coordinator.", "baton-worker");
   app.set_version_flag("--version", baton::describe_worker);
   app.require_subcommand(0, 1);
 
@@ -64,7 +64,7 @@ int main(int argc, char** argv) {
   baton::ReplayOptions replay_options;
   std::vector<int> pixel;
   CLI::App* const replay_command =
-      app.add_subcommand("replay", "renders one tile in this process, without a farm");
+      app.add_subcommand("replay", "Renders one tile in this process, without a farm");
   replay_command->add_option("JOB", replay_options.job, "job file")->required();
   replay_command->add_option("--frame", replay_options.frame_number, "frame number")->required();
   replay_command->add_option("--tile", replay_options.tile, "tile, 0-based, row by row")

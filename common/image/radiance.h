@@ -17,7 +17,7 @@ struct RadianceHeader {
 };
 
 /// `name` goes first in every error. Errors: no Radiance header, another pixel format than RGBE,
-/// rows that do not go from the top down and from left to right. The sides are not judged.
+/// rows that do not go from the top down and from left to right. The sides are not checked.
 Result<RadianceHeader> read_radiance_header(ByteView file, const std::string& name);
 
 /// The pixels, a mantissa m with exponent e as m * 2^(e - 136). The header's EXPOSURE is not undone

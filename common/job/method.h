@@ -35,11 +35,11 @@ enum class Carried : std::uint8_t {
 struct LightUse {
   std::int32_t num_taken = 1;  ///< by most pixels
   bool one_run = false;        ///< pixels differ in how many they take
-  bool with_before = false;    ///< their light in the frame before is asked for as well
+  bool with_before = false;    ///< their light in the frame before is needed as well
 };
 
 /// All that sets a method apart outside the code that samples, which make_pixel_method() finds, and
-/// the prices that `auto` counts with: who else switches on Method is mistaken.
+/// the unit costs of `auto`. No other code switches on Method.
 struct MethodTraits {
   std::string_view name;  ///< in a job
   Carried carried = Carried::nothing;

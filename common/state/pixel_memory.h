@@ -11,8 +11,8 @@ namespace baton {
 using VisibilityCell = std::uint16_t;
 
 /// How visible the light was in each bin of the octahedral lattice of directions
-/// (common/math/octahedral.h), row by row: the upper four bits of each half of a code. Takes memory
-/// of its own once somebody asks for the cells.
+/// (common/math/octahedral.h), row by row: the upper four bits of each half of a code. The cells
+/// are allocated by the first make().
 class VisibilityBins {
  public:
   static constexpr std::size_t kSide = 16, kCount = kSide * kSide;
@@ -34,7 +34,7 @@ class VisibilityBins {
   bool empty() const { return cells_ == nullptr; }
   /// kCount cells and one of padding: kernels load two at once. Null: empty.
   const VisibilityCell* data() const { return cells_ ? cells_->data() : nullptr; }
-  /// The cells, all 0 where nobody has asked before.
+  /// The cells, allocated with 0 by the first call.
   VisibilityCell* make() {
     if (!cells_) cells_ = std::make_unique<Cells>();
     return cells_->data();
@@ -48,7 +48,7 @@ class VisibilityBins {
 };
 
 /// What a pixel of `pool` remembers of the frames before: how visible the light was, and how noisy.
-/// A guess, never a fact: whoever uses it must stay right whatever it says, and may only use what
+/// An estimate: who uses it must be unbiased whatever its contents are, and may only use what
 /// the frames before left. All 0: nothing is known.
 struct PixelMemory {
   static constexpr std::uint16_t kSawFree = 1, kSawBlocked = 2, kSawBoth = 3;

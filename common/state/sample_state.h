@@ -46,7 +46,7 @@ struct SampleState {
 
   std::vector<PixelMemory> memory;  ///< (pixels), or empty: nothing is remembered
   /// (pixels) how many fresh sets a pixel's samples count as when they are weighed against fresh
-  /// ones, 0: they are no history; or empty: nobody asks.
+  /// ones, 0: they are no history; or empty: the method has no confidence.
   std::vector<std::uint16_t> confidence;
 
   bool operator==(const SampleState&) const = default;

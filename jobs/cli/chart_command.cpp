@@ -44,7 +44,7 @@ std::string machine_name() {
   return fmt::format("{} ({} logical processors)", model, std::thread::hardware_concurrency());
 }
 
-/// Whether the motion of two jobs is settled alike: it knows nothing else of them.
+/// Whether the motion of two jobs is settled alike: it depends on nothing else.
 bool move_alike(const JobSpec& a, const JobSpec& b) {
   return a.frames == b.frames && a.image == b.image && a.camera == b.camera && a.scene == b.scene &&
          a.motion == b.motion;

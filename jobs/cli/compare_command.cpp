@@ -40,7 +40,7 @@ struct Compared {
   double noise = 0;  ///< SeedNoise::deviation()
 };
 
-/// The first frames of job `number` with another seed, and with all that SeedNoise asks for.
+/// The first frames of job `number` with another seed, and with all that SeedNoise needs.
 JobSpec with_seed(JobSpec job, std::size_t number, std::uint64_t more, const fs::path& folder) {
   job.seed += more;
   job.frames.resize(std::min(job.frames.size(), kSeedFrames));
@@ -175,7 +175,7 @@ void add_compare_command(CLI::App& app, ExitCode& code) {
   auto options = std::make_shared<CompareOptions>();
   CLI::App* command = app.add_subcommand(
       "compare", "Renders jobs of the same frames into one folder and sets them side by side");
-  command->add_option("JOBS", options->jobs, "job files with alike frames")
+  command->add_option("JOBS", options->jobs, "two to eight job files, of the same frames and size")
       ->required()
       ->expected(2, 8);
   command->add_option("--output", options->output,

@@ -26,7 +26,7 @@ std::vector<JobOverride> overrides_of(const JobArgument& argument);
 /// The argument as it is typed, for a shell.
 std::string command_text(const JobArgument& argument);
 
-/// A job as a command line wants it; motion is not settled.
+/// A job with the changes of a command line; motion is not settled.
 struct WantedJob {
   JobSpec job;
   /// It is not what its file says: its frames go to a folder of their own (`-look` behind its

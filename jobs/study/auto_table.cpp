@@ -141,7 +141,7 @@ double block_headroom(const Study& study, const StudyResults& results, std::size
   blocks.pixels.resize(reference.num_blocks);
   for (const std::size_t block : reference.block) blocks.pixels[block] += 1;
 
-  // Choose on one half of the seeds, judge on the other.
+  // Choose on one half of the seeds, measure on the other.
   double log_gain = 0;
   for (const std::size_t parity : {std::size_t{0}, std::size_t{1}}) {
     blocks.train.clear();

@@ -86,8 +86,8 @@ void add_jumping_cases(std::vector<Case>& cases) {
         return switching(stage.boxes(dusk_map(false)), stage, {{time.event, dusk_map(true)}});
       });
   add("lamp-where-black",
-      "One lit texel on black; another place is lit besides: no carried sample can know of it.",
-      true, [](const Stage& stage, const Timeline& time) {
+      "One lit texel on black; another place is lit besides, where no carried sample is.", true,
+      [](const Stage& stage, const Timeline& time) {
         RgbImage both = lit_texel_map();
         std::copy_n(std::begin({60.0f, 60.0f, 60.0f}), 3, &both.rgb[3 * (8 * 64 + 40)]);
         return switching(stage.boxes(lit_texel_map()), stage, {{time.event, both}});

@@ -92,8 +92,8 @@ inline Verdict compare(const Estimate& a, const Estimate& b) {
 }
 
 // Level 1e-3 per comparison. 108 pixels with Sidak: 9.3e-6 two-sided per pixel, which for the t
-// distribution of 47 degrees of freedom is |t| = 5.0; the judge's share of the error only lightens
-// the tail. Image mean: |z| = 3.5.
+// distribution of 47 degrees of freedom is |t| = 5.0; the reference's share of the error only
+// lightens the tail. Image mean: |z| = 3.5.
 inline constexpr double kPixelLimit = 5.0;
 inline constexpr double kImageLimit = 3.5;
 

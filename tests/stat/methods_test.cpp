@@ -276,8 +276,8 @@ TEST(Methods, PoolAgreesUnderALoneLamp) {
   job.environment.filter = MapFilter::nearest;
   expect_agreement(job, 200, kFine);
 }
-// The map lights up from the top, row by row: there are always directions that no carried
-// sample can know.
+// The map lights up from the top, row by row: there are always lit directions that no carried
+// sample has.
 TEST(Methods, PoolAgreesWhileTheSupportGrows) {
   std::vector<std::pair<int, std::string>> maps;
   for (int frame = 1; frame <= 5; ++frame) {

@@ -116,7 +116,7 @@ struct Verdict {
   double worst = 0, resolution = 0;
 };
 /// 1e-3 for six comparisons together (Sidak): 1.67e-4 each, |t| of 239 degrees of freedom. The
-/// judge's errors are far smaller.
+/// reference's errors are far smaller.
 constexpr double kLimit = 3.82;
 
 Verdict compare(const Estimates& a, const Estimates& b) {

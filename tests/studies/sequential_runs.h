@@ -1,5 +1,5 @@
 // What the programs study_* share: runs of a job in one tile and thread,
-// variants of its sampling, and the judge.
+// variants of its sampling, and the reference.
 #pragma once
 
 #include <fmt/format.h>

@@ -112,8 +112,8 @@ Result<Picture> render(const RenderContext& context, std::int32_t frame) {
   return picture;
 }
 
-/// The judge: per pixel the radiance, its squared standard error, and whether the pixel lies in the
-/// penumbra.
+/// The reference: per pixel the radiance, its squared standard error, and whether the pixel lies in
+/// the penumbra.
 struct Truth {
   FilmTile film;
   std::vector<double> variance;
@@ -137,7 +137,7 @@ Result<Truth> judge(JobSpec job, int samples) {
   return truth;
 }
 
-/// Mean squared error of the mean over RGB, with what the judge itself misses taken off.
+/// Mean squared error of the mean over RGB, less the variance of the reference.
 struct Errors {
   double image = 0, mask = 0, bias_mask = 0;  ///< bias: relative to the light in the mask
 };

@@ -56,7 +56,7 @@ std::map<std::size_t, Score> score(const JobSpec& job,
     JobSpec run = job;
     run.seed = static_cast<std::uint64_t>(seed);
     if (run.sampling.method != Method::sequential) {
-      // Frames know nothing of each other: only the judged ones.
+      // Frames are independent of each other: only the measured ones are rendered.
       for (const auto& item : judged) add(item.first, render(frame_of(run, item.first)).front());
       continue;
     }

@@ -74,7 +74,7 @@ struct ShadowRays {
 /// error cannot make the surface shadow itself [Waechter & Binder 2019].
 Vec3 lift_off(const Vec3& position, const Vec3& ng);
 
-/// The ray tracer: the only place that knows Embree. Immutable after construction; any number of
+/// The ray tracer: the only user of Embree. Immutable after construction; any number of
 /// threads may trace.
 class Accel {
  public:

@@ -45,7 +45,7 @@ class Exchange {
     if (givers_.size() == kBatchGivers) flush();
   }
 
-  /// Offers, answers and books the samples of the batch.
+  /// Offers the samples of the batch and records what is received.
   void flush() {
     // Offer.
     scene_.load_samples(givers_, batch_);

@@ -33,7 +33,7 @@ struct GiverSample {
   Reflected reflected;     ///< at its own site; target above kSmallestTarget
 };
 
-/// A pixel whose samples are asked for.
+/// A pixel whose samples are offered.
 struct Giver {
   std::int32_t x = 0, y = 0;
   std::uint32_t rank = 0;      ///< as in Offer
@@ -60,7 +60,7 @@ class ExchangeScene {
   virtual void load_samples(std::span<Giver> givers, std::vector<GiverSample>& batch) = 0;
   /// Answers offers of samples of the batch. receptions: kReceptionPadding longer than the offers.
   virtual void receive(std::span<const Offer> offers, std::span<Reflected> receptions) = 0;
-  /// (ranks) Lns of the pixels as their samples have it; asked for by the published forms only.
+  /// (ranks) Lns of the pixels as their samples have it; for the published forms only.
   virtual std::span<const float> lns() const = 0;
 };
 

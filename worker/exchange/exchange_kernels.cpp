@@ -83,7 +83,7 @@ HWY_INLINE Records FindLights(std::span<const LightRecord> lights, std::span<con
   return records;
 }
 
-/// Looks up some vectors of directions: asks for all texels, then reads them.
+/// Looks up some vectors of directions: prefetches all texels, then reads them.
 void LookUpLights(const EnvironmentView& environment, std::span<const OctDirection> code,
                   std::span<LightRecord> lights) {
   const DF d;

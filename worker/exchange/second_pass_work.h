@@ -15,7 +15,7 @@ struct ExchangeMasks {
   PixelMask any;
 };
 
-/// What the second pass knows of its tile and frame.
+/// What the second pass of a tile and frame works on.
 struct SecondPassWork {
   const RenderContext& context;
   const FrameGeometry& geometry;

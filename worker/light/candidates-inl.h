@@ -290,7 +290,7 @@ struct BsdfRun {
 };
 
 /// use(candidates, i) for the candidates i, i + 1, ... from the BRDF, snapped to the lattice. Their
-/// texels are asked for some vectors ahead.
+/// texels are prefetched some vectors ahead.
 template <class Use>
 HWY_INLINE void BsdfCandidates(const kernels::CandidateSource& from, const Use& use) {
   const auto& [sites, environment, presampled, counts, random] = from;

@@ -37,8 +37,8 @@ struct CandidateSource {
   Philox4x32::Counter random;  ///< Rng::bits(0, 0) of the pixel
 };
 
-/// Checks what every caller owes: counts.total() in [1, kMaxCandidates], sites that the candidates
-/// can go to.
+/// Checks preconditions: counts.total() in [1, kMaxCandidates], and sites that the candidates can
+/// go to.
 void check_source(const CandidateSource& from);
 
 /// Candidates of one pixel: a properly weighted set for p~(site, w) = p~_site(w) / S. E[sum weight]

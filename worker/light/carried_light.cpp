@@ -15,7 +15,7 @@ HWY_BEFORE_NAMESPACE();
 namespace baton::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-/// Notes where directions lie in a map from place i on, and asks for the texels.
+/// Notes where directions lie in a map from place i on, and prefetches the texels.
 HWY_INLINE void Locate(const EnvironmentView& view, const Vec3Lanes& w, std::size_t i,
                        kernels::LocatedDirections::Place& out) {
   const DF d;

@@ -25,11 +25,11 @@ struct LocatedDirections {
   };
   Column<float> x, y, z;  ///< unit world vectors
   Place now;
-  Place before;  ///< where it was asked for
+  Place before;  ///< set where has_before
   bool has_before = false;
 };
 /// Finds lattice directions (at most kMaxParticles) in the map of now, and where it is not null in
-/// that of the frame before, and asks the memory for the texels there: maps are larger than the
+/// that of the frame before, and prefetches the texels there: maps are larger than the
 /// caches.
 void locate_directions(const EnvironmentView& now, const EnvironmentView* before,
                        std::span<const OctDirection> code, LocatedDirections& out);

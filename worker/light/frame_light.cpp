@@ -22,7 +22,7 @@ PresampledLightLayout presampled_layout(const JobSpec& job) {
       .with_before = use.with_before};
 }
 
-/// Frames that tasks in hand may ask for: those of a run and of the one before it that somebody has
+/// Frames that tasks in hand may need: those of a run and of the one before it that somebody has
 /// not ended yet, and some more in motion, where runs are short.
 std::size_t frames_in_hand(const JobSpec& job) {
   return 2 * static_cast<std::size_t>(frames_per_run(job)) + 6;

@@ -21,9 +21,9 @@ struct PixelState {
 /// Where carried directions lie in the maps, by population, looked up one pixel ahead.
 using LocatedPopulations = std::array<kernels::LocatedDirections, limits::kMaxPopulations>;
 
-/// A sampling method as the renderer sees it: sample, then trace, then learn. Every method tells a
-/// pixel as what it knows plus what its free rays bring. Stateless; any number of threads may use
-/// one.
+/// A sampling method as the renderer sees it: sample, then trace, then learn. Every pixel is a
+/// constant plus the values of its free rays, and a method gives both. Stateless; any number of
+/// threads may use one.
 class PixelMethod {
  public:
   virtual ~PixelMethod() = default;

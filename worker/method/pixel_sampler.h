@@ -66,7 +66,7 @@ struct PixelSamples {
   float& lns;
   float& lns_fresh;
   PixelSource& source;
-  std::uint16_t* confidence = nullptr;  ///< SampleState::confidence; null where nobody asks
+  std::uint16_t* confidence = nullptr;  ///< SampleState::confidence; null: none is kept
 };
 
 /// What a method says about its work on a pixel.

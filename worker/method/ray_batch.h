@@ -20,7 +20,7 @@ struct RayBatch {
   std::vector<std::uint32_t> sample;  ///< number of the sample in its pixel
   std::vector<float> r, g, b;         ///< u_j (f cos L)_rgb / p~
   std::vector<float> visibility;      ///< share of the pixel's Lns
-  std::vector<std::uint8_t> tag;      ///< what the method wants to hear again: PixelRays::bin
+  std::vector<std::uint8_t> tag;      ///< handed back to the method: PixelRays::bin
 
   void clear() {
     rays.clear();
@@ -83,11 +83,11 @@ struct KnownLight {
   /// Rays and `color` alternate between two estimates of the pixel that agree in the mean:
   bool has_halves = false;
   float difference = 0;  ///< what the even one has more than the odd one in `color`, grey
-  float variance = 0;    ///< of the grey mean, where the method tells it itself
+  float variance = 0;    ///< of the grey mean, where the method estimates it
   bool blocked = false;  ///< some of the light is known not to arrive
 };
 
-/// Where a method writes a pixel: what it knows, and the rays that tell the rest.
+/// Where a method writes a pixel: its constant, and the rays whose values are added.
 class RayWriter {
  public:
   RayWriter(const SiteOrigins& origins, RayBatch& batch) : origins_(origins), batch_(batch) {}

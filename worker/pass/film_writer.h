@@ -30,7 +30,7 @@ struct PixelResult {
       0;  ///< estimated squared error of the mean over RGB; 0 where the method has no estimate
 };
 
-/// Pass: writes pixels into the channels that the job asked for: R, G, B, A, then the AOVs in their
+/// Pass: writes pixels into the channels of the job: R, G, B, A, then the AOVs in their
 /// order.
 class FilmWriter {
  public:

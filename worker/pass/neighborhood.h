@@ -21,7 +21,7 @@ class Neighborhood {
   /// Forgets all pixels, and makes room for `count`.
   void clear(std::size_t count);
   /// Draws the neighbours of pixel i, which sees `hits` and was at (x, y) in the frame before, and
-  /// asks for what they saw.
+  /// requests what they saw.
   void look_up(std::size_t i, std::span<const SurfaceHit> hits, const RngKey& key, std::int32_t x,
                std::int32_t y);
   /// The sets of those neighbours that agree, until the next call; after OldPixels::trace().

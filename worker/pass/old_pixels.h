@@ -30,9 +30,9 @@ class OldPixels {
 
   /// Forgets all pixels.
   void clear() { rays_.clear(); }
-  /// Asks for a pixel; nullopt where it lies in no state or saw no surface.
+  /// Requests a pixel; nullopt where it lies in no state or saw no surface.
   std::optional<Place> ask(std::int32_t x, std::int32_t y);
-  /// Traces what was asked for since clear() and is not kept.
+  /// Traces what was requested since clear() and is not kept.
   void trace();
   /// What the sites of a pixel saw; after trace().
   std::span<const SurfaceHit> hits(const Place& place) const {
@@ -41,7 +41,7 @@ class OldPixels {
     return std::span(hits_).subspan(place.first_hit, num_sites);
   }
 
-  /// Rays of all pixels asked for so far; those of kept tiles count, too, so that the number does
+  /// Rays of all pixels requested so far; those of kept tiles count, too, so that the number does
   /// not depend on who rendered what.
   std::uint64_t num_rays() const { return num_rays_; }
 

@@ -31,7 +31,7 @@ struct EndedTask {
 /// collects; it never renders. Each render thread takes the oldest queued task, runs it with a stop
 /// token of its own and goes on with the next; the publisher makes durable what has been executed,
 /// all that came up during one wait by the next, and leaves the results for `collect`. The queue is
-/// bounded by the session, which asks for few more leases than there are threads.
+/// bounded by the session, which requests few more leases than there are threads.
 class RenderThreads {
  public:
   using Execute = std::function<Result<TaskOutput>(const PooledTask& task, std::stop_token stop)>;

@@ -124,9 +124,9 @@ class Session {
   std::chrono::milliseconds heartbeat_{1000};
   std::set<LeaseId> in_hand_;           ///< granted and not ended
   std::set<LeaseId> executed_;          ///< those of them that have left their thread
-  std::set<Digest> documents_missing_;  ///< asked for, not yet here
+  std::set<Digest> documents_missing_;  ///< requested, not yet here
   std::deque<Report> reports_;          ///< not confirmed, oldest first
-  std::int32_t requested_ = 0;          ///< leases that the coordinator knows are wanted
+  std::int32_t requested_ = 0;          ///< leases in the last request
   TimePoint last_heard_, next_hello_, next_heartbeat_, next_request_, request_expires_;
 };
 

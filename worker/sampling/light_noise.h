@@ -12,8 +12,8 @@ namespace baton {
 
 /// How many candidates a pixel gets, by what it remembers of the noise of its light. On glossy
 /// surfaces a few pixels have most of the error of a picture: those that see a lamp at the rim of
-/// their lobe. The candidates of one frame do not tell soon enough, and a number that depends on
-/// their own values would be bias; what earlier frames saw of the pixel is free of it.
+/// their lobe. A number of candidates that depends on their own values would be a bias; one that
+/// depends on what earlier frames saw of the pixel is not.
 
 /// What noise is compared with: a pixel's light and that of its surroundings.
 inline float noise_scale(const PoolTuning& tuning, float light, float mean_radiance) {

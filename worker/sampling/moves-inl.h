@@ -143,7 +143,7 @@ class MoveRandom {
   HWY_INLINE PhiloxLanes<VU> Proposal(std::uint32_t move, std::size_t i) const {
     return PhiloxBlock(DU(), rng_, move + 1, CountFrom(DU(), static_cast<std::uint32_t>(i)));
   }
-  /// How many moves Begin knows ahead.
+  /// How many moves Begin draws ahead.
   static constexpr std::uint32_t kWindow = 8;
 
  private:
@@ -161,7 +161,7 @@ class MoveRandom {
   ParticleArrays::Column<std::uint32_t> accept_[kShare];
 };
 
-/// Fetches the proposals of the moves that `random` knows ahead into the cache.
+/// Fetches the proposals of the moves that `random` has drawn ahead into the cache.
 template <class Target>
 HWY_INLINE void PrefetchProposals(const Target& target, const SequentialSettings& settings,
                                   const MoveRandom& random, std::uint32_t first,

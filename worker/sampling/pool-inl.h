@@ -39,7 +39,7 @@ HWY_INLINE VF DeviationFactor(const PoolTuning& tuning, VF expected) {
   return hn::Max(hn::Sqrt(variance), hn::Set(d, tuning.least_deviation));
 }
 
-/// What is remembered of a vector of directions: V^, in (0, 1), and what it makes of a candidate's
+/// What is remembered of a vector of directions: V^, in (0, 1), and the factors on a candidate's
 /// weight on the two lines.
 struct ProspectLanes {
   VF expected, contribution, deviation;
@@ -221,7 +221,7 @@ HWY_INLINE float PoolStep(const PoolTuning& tuning, const Candidates& candidates
   const float lns = sum(lines.light);
   if (!(lns > 0 && std::isfinite(lns))) return lns;
 
-  // Decide what rays are worth.
+  // Decide how rays count, and how many there are.
   const float total_deviation = deviation.Finish();
   const Rgb visible = SumOfLanes(lines.colors);
   const float expected = mean(visible);

@@ -14,12 +14,12 @@ namespace baton {
 /// weights w_i, which sum to Lns; its memory of earlier rays expects the visibility V^ of each, the
 /// share of free rays around it. V^ steers which candidates get a ray and how many, and it cannot
 /// bias: candidates and memory decide before any ray is chosen, and each ray is divided by the
-/// factor that chose it. The factor is the standard deviation of what is left to find out, so that
-/// the choice is the one of least variance:
+/// factor that chose it. The factor is the standard deviation of what a ray adds, which is the
+/// choice of least variance:
 /// - where rays count what they bring, the *contribution* sqrt(E[V^2]) = sqrt(V^);
-/// - where V^ is a control variate, its *deviation* sqrt(E[(V - V^)^2]) = sqrt(V^ (1 - V^)): what
-/// is
-///   known needs few rays.
+/// - where V^ is a control variate, its *deviation* sqrt(E[(V - V^)^2]) = sqrt(V^ (1 - V^)).
+///   Candidates whose visibility is nearly certain need few rays.
+/// Which of the two it is, use_control() decides.
 
 /// Something of every candidate of a pixel: those of the light to the end of their last vector,
 /// then those of the BRDF.

@@ -12,34 +12,34 @@ struct PoolTuning {
   /// environment, as nobody sees the noise of dark pixels among bright ones.
   float surroundings = 3;
 
-  /// Least factor on a candidate's weight where V^ is the control variate: what memory is sure of
-  /// still gets some rays.
+  /// Least factor on a candidate's weight where V^ is the control variate: candidates whose
+  /// visibility has no variance still get some rays.
   float least_deviation = 0.05f;
-  /// The same where rays count what they bring.
+  /// The same where V^ is no control variate.
   float least_contribution = 0.2f;
   /// V^ is the control variate where the expected light is so many times its deviation. Later
   /// loses; earlier, a blocked ray may leave a value below zero more often.
   float control_from = 2;
-  /// Deviation beside noise_scale() of the light that N rays are for.
+  /// Standard deviation of visibility over noise_scale() that gives N rays.
   float usual_deviation = 0.025f;
   /// Least share of N rays.
   float least_rays = 0.5f;
 
   /// Candidates of a kind.
   struct Candidates {
-    float usual_noise;  ///< beside noise_scale() that as many as usual may leave
+    float usual_noise;  ///< over noise_scale(), that gives the usual number
     float least;        ///< share of the usual number that every pixel gets
   };
   Candidates light{0.0015f, 0.25f};
-  /// Those from lobes take more time, and few of them do not see what they miss.
+  /// Those from lobes take more time, and too few of them miss lamps without showing any noise.
   Candidates lobes{0.008f, 1};
   /// Most candidates of a kind, times the usual number.
   float most_candidates = 64;
-  /// Fewest candidates of the light: noise is told by second differences, which take three vectors
-  /// of eight, and who cannot tell would keep too few for good.
+  /// Fewest candidates of the light: the noise estimate needs second differences, so three vectors
+  /// of eight. With fewer a pixel would measure no noise and keep too few for good.
   std::int32_t fewest_judged = 24;
-  /// Glossy pixels that usually have so many may go below: where they once had little noise, it is
-  /// candidates from lobes that they live on.
+  /// Glossy pixels that usually have so many may go below: if their noise from the light is small,
+  /// candidates from lobes bring most of their light.
   std::int32_t enough_beside_lobes = 64;
   /// Weight of a new frame in the noise that is remembered.
   float new_frame = 0.25f;

@@ -18,7 +18,7 @@ struct ReducedMap {
 /// every box, is kept for any sizes (texels taken as constant). width: [1, the map's).
 ReducedMap reduce_map(const RgbImage& map, int width, float scale);
 
-/// The map of a file's picture as the environment asks for it: scaled, repaired, and reduced to
+/// The map of a file's picture as the environment says: scaled, repaired, and reduced to
 /// max_width columns where it has more.
 EnvironmentMap make_map(const RgbImage& picture, const EnvironmentSpec& environment,
                         bool compensate);

@@ -2,7 +2,7 @@
 
 #include "tests/unit/exchange/exact_exchange.h"
 
-/// The scenes on which the second pass is judged: a few pixels and ten directions each.
+/// The scenes on which the second pass is tested: a few pixels and ten directions each.
 namespace baton::exact {
 
 /// Two-sided limit of |z| at level 1e-3 over at most 60 values: 1.7e-5 each [Sidak].

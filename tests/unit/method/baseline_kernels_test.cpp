@@ -108,7 +108,7 @@ TEST_P(BaselineKernels, PointsAreEvaluatedInTheirRangeAlone) {
   }
 }
 
-// What was drawn before a map turned is judged where it lay then: by light and surfaces of then.
+// The density of what was drawn before a map turned is that of then: of its light and surfaces.
 TEST_P(BaselineKernels, PointsThatTurnedAreSeenFromWhereTheyCame) {
   const SiteBlock sites = pixel(0.1f);
   OldSurfaces other{.sites = pixel(0.5f)};

@@ -9,9 +9,9 @@
 namespace baton {
 namespace {
 
-/// As many candidates of each kind as their noise in earlier frames asks for. Where sites see
-/// nothing but gloss, twice as many as usual come from the lobes: narrow ones see little of the
-/// light's.
+/// The number of candidates of each kind, by their noise in earlier frames. Where the sites are
+/// glossy only, twice as many as usual come from the lobes: those of the light rarely fall into a
+/// narrow one.
 kernels::CandidateCounts counts_for_noise(const PoolTuning& tuning, const SiteBlock& sites,
                                           std::int32_t num_candidates, float lobe_fraction,
                                           const LightVariance& known) {

@@ -36,7 +36,7 @@ class ReferenceRenderer {
   std::span<const Material> materials_;
 };
 
-/// ReferenceRenderer as a method: it traces its rays itself and knows the whole pixel.
+/// ReferenceRenderer as a method: it traces its rays itself, so its constant is the whole pixel.
 class ReferenceMethod final : public PixelMethod {
  public:
   ReferenceMethod(std::int32_t num_samples, std::span<const Material> materials)

@@ -77,7 +77,7 @@ void EvaluatePoints(const SiteBlock& sites, std::span<const OldSurfaces* const> 
   const auto put = [&](VF value, kernels::RestirPoints::Column<float>& column, std::size_t i)
                        HWY_ATTR { StoreSome(value, column.first(range.last), i); };
 
-  // A few vectors at a time, so that one's texels come while another's are asked for.
+  // A few vectors at a time: the texels of all are prefetched before the first is evaluated.
   constexpr std::size_t kAhead = 8;
   PlacedPoints placed[kAhead];
   for (std::size_t first = range.first; first < range.last; first += kAhead * hn::Lanes(d)) {
