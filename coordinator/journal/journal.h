@@ -13,7 +13,7 @@
 
 namespace baton {
 
-/// What the journal knows of a job.
+/// What the journal holds of a job.
 struct JournalledJob {
   Digest job;
   std::string document;

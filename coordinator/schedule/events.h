@@ -13,7 +13,7 @@
 
 namespace baton {
 
-/// What the scheduler is told and what it asks for: two closed sets of plain data. Workers are
+/// The scheduler's input and output: two closed sets of plain data. Workers are
 /// named by the id that they chose; any event of a worker is a sign of life.
 
 using TimePoint = std::chrono::steady_clock::time_point;
@@ -175,7 +175,7 @@ struct RevokeLease {
   std::string worker;
   LeaseId lease;
 };
-/// There is less work than the worker asked for; it is remembered.
+/// There is less work than the worker requested; the request is kept.
 struct ReportNoWork {
   std::string worker;
 };

@@ -16,10 +16,10 @@
 
 namespace baton {
 
-/// Who gets which task when: a pure state machine. It knows no clock, socket or file; time comes as
-/// an argument and never decides what a task makes, only who makes it.
+/// Who gets which task when: a pure state machine, without clock, socket or file. Time comes as an
+/// argument and never decides what a task makes, only who makes it.
 ///
-/// A task goes to the worker that asked first; of the tasks, the job of highest priority comes
+/// A task goes to the first worker in line; of the tasks, the job of highest priority comes
 /// first, then the job that was submitted first, then what TileHomes prefers, then the order of
 /// TaskIndex. Nothing is rendered so far ahead of the first open frame that films pile up.
 ///

@@ -27,7 +27,7 @@ class TileHomes {
   /// The worker is gone.
   void leave(const std::string& worker);
 
-  /// Who asks for a task.
+  /// The worker that requests a task.
   struct Asker {
     std::string worker;
     std::size_t position = 0, num_workers = 1;  ///< among the workers that may have tasks

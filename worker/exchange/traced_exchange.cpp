@@ -73,8 +73,8 @@ void TracedExchange::receive(std::span<const Offer> offers, std::span<Reflected>
   }
   rays_traced_ += rays_.rays.size();
 
-  // Of the blocked ones nothing is seen; what is free writes into the padding instead: a guess of
-  // the processor would fail too often.
+  // Blocked ones become 0; free ones write into the padding instead, without a branch, which would
+  // be mispredicted too often.
   for (std::size_t r = 0; r < rays_.rays.size(); ++r)
     receptions[rays_.rays.t_far[r] < 0 ? rays_.offer[r] : offers.size()] = {};
 }

@@ -24,8 +24,8 @@ enum class PixelHistory {
 /// motion by fractions of a pixel is followed on average, goes back with its object and is
 /// projected by the camera of then. The samples of that pixel are taken when each site of now finds
 /// a site of then that saw the same object at about the same place and turned about the same way,
-/// and each of then is found; else there is no history. Neighbours, where they are asked, are found
-/// around the same place.
+/// and each of then is found; else there is no history. Neighbours, where the method uses them, are
+/// found around the same place.
 class Reprojection {
  public:
   /// states: of the frame before, of every tile within reach. All must outlive the object.

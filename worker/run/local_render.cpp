@@ -106,8 +106,8 @@ class LocalRender {
   }
 
  private:
-  /// One tile through time. A state lives until every tile that needs it has gone on: nobody can be
-  /// two runs ahead.
+  /// One tile through time. A state is kept until every tile that needs it has read it: no tile can
+  /// be two runs ahead.
   struct Chain {
     std::int32_t runs_done = 0;
     std::array<StatePtr, 2> states;  ///< by run % 2
@@ -118,8 +118,8 @@ class LocalRender {
     return grid_.tiles_near(tile, reach_px_);
   }
 
-  /// The next run in order, once all that it needs is done. Whoever has that is at work, so nobody
-  /// waits for ever.
+  /// The next run in order, once all that it needs is done. That is in work on other threads, so no
+  /// thread waits for ever.
   std::optional<TileRun> next() {
     std::unique_lock lock(mutex_);
     if (error_ || next_ >= std::int64_t{num_runs_} * num_tiles_) return std::nullopt;

@@ -135,8 +135,8 @@ void Session::receive(const WorkerWelcome& welcome, TimePoint now, Actions& acti
   next_heartbeat_ = now + heartbeat_;
   actions.push_back(UseStore{welcome.store_directory});
 
-  // What was reported to a coordinator that died may be lost: tell it again, in order, before
-  // asking for more.
+  // What was reported to a coordinator that died may be lost: report it again, in order, before
+  // requesting more.
   for (Report& report : reports_) send_report(report, now, actions);
   requested_ = 0;
   next_request_ = now;
@@ -205,7 +205,7 @@ void Session::introduce(TimePoint now, Actions& actions) {
 
 void Session::request_leases(TimePoint now, Actions& actions) {
   if (!welcomed_ || draining_ || now < next_request_) return;
-  if (reports_.size() >= limits::kMaxUnconfirmedReports) return;  // first somebody must listen
+  if (reports_.size() >= limits::kMaxUnconfirmedReports) return;  // first some must be confirmed
 
   // One task more than threads, so that the next one is here when one ends. What waits for the disk
   // needs no thread; when it is one for each thread, the disk is what is short. A request replaces

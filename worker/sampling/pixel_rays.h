@@ -28,8 +28,8 @@ struct PixelRays {
   Column<std::uint8_t> site;
   Column<std::uint8_t> bin;  ///< of VisibilityBins
   Value constant;
-  /// What the even ones of all samples brought to `constant` more than the odd ones. With the
-  /// values of the rays, of alternating sign, it tells two interleaved halves of the pixel apart.
+  /// What the even samples brought to `constant`, less what the odd ones did. Plus the values of
+  /// the rays with alternating sign it is the difference of two interleaved halves of the pixel.
   float difference = 0;
   LightVariance light_variance;  ///< of this frame's candidates
 

@@ -1,5 +1,5 @@
 // One frame of the pool sampler (pool.h) for one pixel, in SIMD: candidates are weighed, what the
-// pixel remembers of their directions decides which of them get a ray. Knows no scene: everything
+// pixel remembers of their directions decides which of them get a ray. Free of any scene: all
 // about candidates comes from the Candidates. Included once per Highway target.
 #if defined(BATON_WORKER_SAMPLING_POOL_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef BATON_WORKER_SAMPLING_POOL_INL_H_

@@ -1,5 +1,5 @@
 // One frame of the sequential Monte Carlo sampler [Ghosh, Doucet & Heidrich 2006, algorithms 1 and
-// 2] for one pixel. Knows no scene: everything about targets and proposals comes from the Target.
+// 2] for one pixel. Free of any scene: all about targets and proposals comes from the Target.
 // Included once per Highway target.
 #if defined(BATON_WORKER_SAMPLING_SEQUENTIAL_INL_H_) == defined(HWY_TARGET_TOGGLE)
 #ifdef BATON_WORKER_SAMPLING_SEQUENTIAL_INL_H_
