@@ -121,8 +121,8 @@ struct ResultMissing {
   std::string worker;
   LeaseId lease;
 };
-/// An attempt failed because a disk is full. Nobody is to blame: the task is given back, and tasks
-/// of its kind and job rest for a while.
+/// An attempt failed because a disk is full, or takes nothing from anybody. Nobody is to blame: the
+/// task is given back, and tasks of its kind and job rest for a while. message: what is waited for.
 struct SpaceLacking {
   std::string worker;
   LeaseId lease;

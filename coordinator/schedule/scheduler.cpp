@@ -204,7 +204,7 @@ void Scheduler::on(const SpaceLacking& event, TimePoint now, Actions&) {
   held.job->tasks.add_returned(held.task, event.lease, event.worker);
   held.job->tasks.give_back(held.task);
   held.job->rests_until.at(static_cast<std::size_t>(event.lease.task.kind)) = now + kRest;
-  held.job->waits = "space: " + event.message;
+  held.job->waits = event.message;
 }
 
 void Scheduler::on(const InputsLost& event, TimePoint now, Actions& actions) {

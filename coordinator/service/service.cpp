@@ -2,8 +2,10 @@
 
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
+#include <unistd.h>
 
 #include <algorithm>
+#include <cerrno>
 #include <utility>
 
 #include "common/base/build.h"
@@ -74,6 +76,7 @@ Status Service::turn() {
     next_tick_ = Clock::now() + kTick;
     asked_for_hello_.clear();
     BATON_TRY(step(ClockTicked{}));
+    garbage_.insert(garbage_.end(), unremoved_.begin(), unremoved_.end());
   }
 
   // First durable, then known to others.
@@ -88,9 +91,13 @@ void Service::let_out() {
       spdlog::debug("a peer is gone or does not read; message dropped");
   }
   for (const Digest& blob : std::exchange(garbage_, {})) {
-    if (scheduler_.is_referenced(blob)) continue;
-    if (const Status removed = store_.remove(blob); !removed)
-      spdlog::warn("{}", removed.error().message);
+    const Status removed = scheduler_.is_referenced(blob) ? Status() : store_.remove(blob);
+    if (!removed && unremoved_.empty()) spdlog::warn("{}; tried again", removed.error().message);
+    if (removed) {
+      unremoved_.erase(blob);
+    } else {
+      unremoved_.insert(blob);
+    }
   }
 }
 
@@ -212,10 +219,14 @@ Status Service::receive_from(const std::string& worker, const TaskDone& message)
 
 Status Service::receive_from(const std::string& worker, const TaskFailed& message) {
   reply_to(worker, ReportReceived{message.lease});
-  if (message.no_space) {
-    spdlog::warn("job {} waits for space: {}", message.lease.job.short_hex(), message.message);
-    return step(
-        SpaceLacking{worker, message.lease, message.message.substr(0, limits::kMaxTextLength)});
+  // A disk that takes nothing, as far as the coordinator sees, takes nothing from other workers.
+  const bool read_only = !message.no_space && writes_nowhere(message.lease);
+  if (message.no_space || read_only) {
+    const std::string waits =
+        fmt::format("{}: {}", read_only ? "a folder that can be written" : "space",
+                    message.message.substr(0, limits::kMaxTextLength));
+    spdlog::warn("job {} waits for {}", message.lease.job.short_hex(), waits);
+    return step(SpaceLacking{worker, message.lease, waits});
   }
   // Inputs that are gone or damaged are nobody's fault: what made them is done again.
   const std::optional<std::vector<BlobRef>> bad = find_bad_inputs(message.lease);
@@ -262,6 +273,15 @@ std::optional<std::string> Service::find_missing_frame(const TaskDone& report) c
     if (fs::file_size(path, error) != output.size_bytes || error) return path.string();
   }
   return std::nullopt;
+}
+
+/// Whether the file system that a task of an open job writes to is mounted read-only.
+bool Service::writes_nowhere(const LeaseId& lease) const {
+  const Scheduler::Job* job = job_of_open_task(lease);
+  if (job == nullptr) return false;
+  const bool is_frame = lease.task.kind == TaskKind::assemble;
+  const fs::path folder = is_frame ? fs::path(job->spec.output.directory) : store_directory_;
+  return ::access(folder.c_str(), W_OK) != 0 && errno == EROFS;
 }
 
 /// The inputs of a leased task that are gone or damaged; none of them where a task that makes them

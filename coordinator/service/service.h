@@ -3,6 +3,7 @@
 #include <atomic>
 #include <chrono>
 #include <filesystem>
+#include <set>
 #include <string>
 #include <vector>
 
@@ -99,6 +100,7 @@ class Service {
   void reply_to(const std::string& worker, Message message);
   void refuse(const PeerId& peer, const Error& error);
   const Scheduler::Job* job_of_open_task(const LeaseId& lease) const;
+  bool writes_nowhere(const LeaseId& lease) const;
   std::optional<std::string> find_missing_blob(const TaskDone& report) const;
   std::optional<std::string> find_missing_frame(const TaskDone& report) const;
   std::optional<std::vector<BlobRef>> find_bad_inputs(const LeaseId& lease) const;
@@ -120,6 +122,7 @@ class Service {
   };
   std::vector<Outgoing> outbox_;  ///< waits for the commit
   std::vector<Digest> garbage_;   ///< likewise
+  std::set<Digest> unremoved_;    ///< that the disk would not let go: tried again with each tick
 };
 
 }  // namespace baton

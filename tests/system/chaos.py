@@ -1,191 +1,34 @@
 #!/usr/bin/env python3
-"""Jobs of every kind on a farm whose programs and files are struck at random; every frame must come out right.
+"""Jobs of every kind on a farm whose programs, messages and files are struck at random; every frame must come out right.
 
-usage: chaos.py --bin FOLDER [--faults N] [--seed S] [--keep]
+usage: chaos.py --bin FOLDER [--faults N] [--seed S] [--freeze SECONDS] [--keep]
 
-Real processes: one coordinator, three workers, three jobs at once (at rest, in motion, with a second pass), again and
-again until N faults have struck. Then the farm is left alone, each job is submitted once more (frames may have been
-removed) and must end as done, with the pixels of an undisturbed run, no job failed and no temporary file left.
+Real processes: one coordinator, three workers behind a proxy, three jobs at once (at rest, in motion, with a second pass),
+again and again until N faults have struck. Kinds of faults are dealt like cards, so that each comes once before any comes
+again. Then the farm is left alone, each job is submitted once more (frames may have been removed) and must end as done.
+
+Checked at the end: the pixels are those of an undisturbed run; no task was done under two digests; nothing was done again
+that no fault explains; no lease was taken from a worker for the sake of an older one; when all is done nobody reports any
+more; no temporary file is left. Where the machine lets it mount, the store lies on a small disk that is filled, folders
+become read-only, and power cuts take every file that no program had waited for the disk with.
 """
 
 import argparse
 import contextlib
-import json
 import os
 import random
 import shutil
-import signal
 import sys
 import tempfile
 import time
-from collections import Counter
 from pathlib import Path
 
-from farm import PATIENCE, Farm, Fault, Programs, check, make_job, wait_until, write_job
+import chaos_witness as witness
+from chaos_disk import Disk, PowerCut, enter_namespace, may_mount
+from chaos_faults import KINDS, NUM_WORKERS, Chaos, Job, open_jobs
+from farm import OK, PATIENCE, Farm, Fault, Programs, check, wait_until
 
-NUM_WORKERS = 3
-LONGEST_FREEZE_S = 5
 END_S = 300 * PATIENCE
-
-MOVING_CAMERA = [{"frame": 1, "position": [0, 1.2, 5], "lookAt": [0, 0.6, 0]},
-                 {"frame": 6, "position": [0.5, 1.3, 4.6], "lookAt": [0, 0.6, 0]}]
-KINDS = {
-    "rest": {"frames": "1-8", "sampling": {"method": "sequential", "numCandidates": 256, "numDistributions": 12}},
-    "motion": {"frames": "1-6", "sampling": {"method": "pool", "numParticles": 32, "numCandidates": 512},
-               "camera": {"keys": MOVING_CAMERA}},
-    "second-pass": {"frames": "1-5", "sampling": {"method": "bidirectional", "numCandidates": 512},
-                    "visibility": {"correlated": True}},
-}
-
-
-class Job:
-    """One submission of a kind of job."""
-
-    def __init__(self, kind, number, folder):
-        self.kind, self.frames = kind, folder / f"{kind}{number}"
-        changes = {**KINDS[kind], "name": f"{kind} {number}", "output": {"directory": str(self.frames)},
-                   "image": {"tileSize": 16}, "state": {"keep": "last"}}
-        self.path = write_job(folder / f"{kind}{number}.json", make_job(folder / "assets", **changes))
-        self.id = None
-
-
-class Chaos:
-    """Strikes a farm at random."""
-
-    def __init__(self, farm, rng):
-        self.farm, self.rng = farm, rng
-        self.jobs, self.struck, self.frozen = [], Counter(), []
-        self.faults = [self.kill_worker, self.kill_coordinator, self.freeze, self.end_worker, self.end_coordinator,
-                       self.flip_byte, self.cut_blob, self.remove_blob, self.remove_frame, self.submit_again]
-
-    def strike(self):
-        """One fault that really struck."""
-        while not self.rng.choice(self.faults)():
-            time.sleep(0.02)
-
-    def tend(self):
-        """Starts again what is gone, and thaws what has been frozen long enough."""
-        for until, pid in list(self.frozen):
-            if time.monotonic() >= until:
-                self.frozen.remove((until, pid))
-                self.signal(pid, signal.SIGCONT)
-        if not self.farm.coordinator.alive():
-            self.farm.start_coordinator()
-        self.farm.workers = [worker for worker in self.farm.workers if worker.alive()]
-        while len(self.farm.workers) < NUM_WORKERS:
-            self.start_worker()
-
-    def start_worker(self):
-        """With a name that no other worker has had."""
-        name = f"worker-{self.struck.total()}-{self.rng.randrange(1 << 30)}"
-        self.farm.start_worker(name=name)
-
-    # ---- faults: each returns whether it struck ------------------------------------------------------------
-
-    def kill_worker(self):
-        return self.end(self.some_worker(), signal.SIGKILL, "worker killed")
-
-    def kill_coordinator(self):
-        return self.end(self.farm.coordinator, signal.SIGKILL, "coordinator killed")
-
-    def end_worker(self):
-        return self.end(self.some_worker(), signal.SIGTERM, "worker terminated")
-
-    def end_coordinator(self):
-        return self.end(self.farm.coordinator, signal.SIGTERM, "coordinator terminated")
-
-    def freeze(self):
-        worker = self.some_worker()
-        if worker is None or any(pid == worker.pid for _, pid in self.frozen):
-            return False
-        self.signal(worker.pid, signal.SIGSTOP)
-        wait_until(lambda: state_of(worker.pid) in ("T", "Z", None), "a worker is frozen")
-        self.frozen.append((time.monotonic() + self.rng.uniform(0.2, LONGEST_FREEZE_S), worker.pid))
-        return self.count("worker frozen")
-
-    def flip_byte(self):
-        def damage(path, content):
-            at = self.rng.randrange(len(content))
-            path.write_bytes(content[:at] + bytes([content[at] ^ 0x10]) + content[at + 1:])
-        return self.harm_blob(damage, "byte of a blob changed")
-
-    def cut_blob(self):
-        return self.harm_blob(lambda path, content: path.write_bytes(content[:len(content) // 2]), "blob cut")
-
-    def remove_blob(self):
-        return self.harm_blob(lambda path, _: path.unlink(), "blob removed")
-
-    def remove_frame(self):
-        frames = [frame for job in self.jobs for frame in job.frames.glob("*.exr")]
-        if not frames:
-            return False
-        self.rng.choice(frames).unlink()
-        return self.count("frame removed")
-
-    def submit_again(self):
-        if not self.jobs or not self.farm.coordinator.alive():
-            return False
-        job = self.rng.choice(self.jobs)
-        return self.farm.baton("job", "submit", job.path, expect=None).returncode == 0 and self.count("submitted again")
-
-    # ---- helpers -------------------------------------------------------------------------------------------
-
-    def some_worker(self):
-        alive = [worker for worker in self.farm.workers if worker.alive()]
-        return self.rng.choice(alive) if alive else None
-
-    def end(self, process, number, what):
-        if process is None or not process.alive() or any(pid == process.pid for _, pid in self.frozen):
-            return False
-        self.signal(process.pid, number)
-        wait_until(lambda: not process.alive(), f"{what}: it has ended")
-        return self.count(what)
-
-    def harm_blob(self, harm, what):
-        blobs = list(self.farm.work_folder.rglob("*.blob"))
-        if not blobs:
-            return False
-        path = self.rng.choice(blobs)
-        try:
-            content = path.read_bytes()
-            if not content:
-                return False
-            harm(path, content)
-        except FileNotFoundError:  # removed by the farm meanwhile
-            return False
-        return self.count(what)
-
-    def count(self, what):
-        self.struck[what] += 1
-        return True
-
-    @staticmethod
-    def signal(pid, number):
-        with contextlib.suppress(ProcessLookupError):
-            os.kill(pid, number)
-
-
-def state_of(pid):
-    """The letter of a process's state, None when it is gone."""
-    try:
-        return Path(f"/proc/{pid}/stat").read_text(encoding="ascii").rsplit(")", 1)[1].split()[0]
-    except FileNotFoundError:
-        return None
-
-
-def open_jobs(farm, jobs):
-    """Those of the jobs that are not done. A failed one ends the test."""
-    left = []
-    for job in jobs:
-        shown = farm.baton("job", "show", job.id, "--json", expect=None)
-        if shown.returncode != 0:
-            left.append(job)
-            continue
-        status = json.loads(shown.stdout)["status"]
-        check(status not in ("failed", "cancelled"), f"job {job.path.stem} is {status}:\n{shown.stdout[-1500:]}")
-        if status != "done":
-            left.append(job)
-    return left
 
 
 def undisturbed(programs, folder):
@@ -209,54 +52,83 @@ def check_leftovers(farm):
     check(not left, f"temporary files are left: {left[:3]}")
 
 
-def run(programs, folder, num_faults, seed):
+def finish(chaos, farm):
+    """Leaves the farm alone until all is done; frames that were removed are asked for once more."""
+    def all_done():
+        chaos.tend()
+        return not open_jobs(farm, chaos.jobs)
+    for thaw in chaos.thaws.values():
+        thaw.join()
+    wait_until(all_done, "all jobs are done", END_S)
+    for job in chaos.jobs:
+        check(chaos.submit(job) == OK, f"{job.path.stem} is submitted once more")
+    wait_until(all_done, "all jobs are done once more", END_S)
+
+
+def judge(programs, chaos, farm, expected):
+    """Everything that must hold at the end. Returns (tasks, how many were done again, how many of those are explained)."""
+    for job in chaos.jobs:
+        got = programs.pixels(job.frames)
+        for frame, pixels in expected[job.kind].items():
+            check(got.get(frame) == pixels, f"{job.frames / frame}: {'other pixels' if frame in got else 'missing'}")
+    check(chaos.proxy.is_quiet(4 * PATIENCE), "all is done, and somebody still reports")
+    log, seen = farm.coordinator.log(), chaos.proxy.seen()
+    check("BUG" not in log, "the coordinator has found a bug")
+    num_tasks = witness.check_one_result_a_task(seen)
+    witness.check_nothing_revoked(seen, chaos.proxy.returns(), chaos.proxy.struck_ms(), chaos.ended_jobs)
+    again = witness.check_repeated(seen, log, chaos.struck, NUM_WORKERS, chaos.num_harmed)
+    check_leftovers(farm)
+    return (num_tasks, *again)
+
+
+def run(programs, folder, num_faults, seed, longest_freeze_s=5):
     """Everything. Raises Fault."""
     rng = random.Random(seed)
+    folder.mkdir(parents=True, exist_ok=True)
     expected = undisturbed(programs, folder)
-    with Farm(programs, folder / "farm") as farm:
+    with contextlib.ExitStack() as stack:
+        disk = Disk(folder / "farm/work", folder / "farm/frames") if may_mount() else None
+        if disk:
+            stack.callback(disk.close)
+        farm = stack.enter_context(Farm(programs, folder / "farm"))
+        power = PowerCut(programs, farm.folder) if Path(programs.path("libsync_witness.so")).exists() else None
+        farm.environment = power.environment if power else {}
         farm.start_coordinator()
-        chaos = Chaos(farm, rng)
-        rounds = 0
+        proxy = witness.Proxy(programs, farm.endpoint, farm.folder)
+        stack.callback(proxy.close)
+        farm.worker_endpoint = proxy.endpoint
+
+        chaos = Chaos(farm, proxy, disk, power, rng, longest_freeze_s)
         while chaos.struck.total() < num_faults:
             chaos.tend()
-            if not open_jobs(farm, chaos.jobs):
-                rounds += 1
-                fresh = [Job(kind, rounds, folder) for kind in KINDS]
-                for job in fresh:
-                    job.id = farm.submit(job.path)
-                chaos.jobs += fresh
+            chaos.renew()
             time.sleep(rng.uniform(0, 0.5))
             chaos.strike()
-
-        # Leave it alone; what was removed is asked for once more.
-        def all_done():
-            chaos.tend()
-            return not open_jobs(farm, chaos.jobs)
-        wait_until(all_done, "all jobs are done", END_S)
-        for job in chaos.jobs:
-            job.id = farm.submit(job.path)
-        wait_until(all_done, "all jobs are done once more", END_S)
-        for job in chaos.jobs:
-            got = programs.pixels(job.frames)
-            for frame, pixels in expected[job.kind].items():
-                check(got.get(frame) == pixels, f"{job.frames / frame}: {'other pixels' if frame in got else 'missing'}")
-        check_leftovers(farm)
+        finish(chaos, farm)
+        num_tasks, again, explained = judge(programs, chaos, farm, expected)
     faults = ", ".join(f"{count} {what}" for what, count in sorted(chaos.struck.items()))
-    print(f"seed {seed}: {chaos.struck.total()} faults in {rounds} rounds ({faults}), all frames right")
+    print(f"seed {seed}: {chaos.struck.total()} faults on {len(chaos.jobs)} jobs ({faults}); {chaos.num_lost_in_cuts} files "
+          f"lost in power cuts; {num_tasks} tasks, {again} done again, {explained} explained; all frames right")
+    for missing, what in ((disk, "full disks and read-only folders: it may not mount"),
+                          (power, "power cuts: programs with sanitizers load no library before theirs")):
+        if not missing:
+            print(f"not tried: {what}")
 
 
 def main():
+    enter_namespace()
     parser = argparse.ArgumentParser()
     parser.add_argument("--bin", required=True, help="folder of the programs")
     parser.add_argument("--faults", type=int, default=300)
     parser.add_argument("--seed", type=int, default=random.SystemRandom().randrange(1 << 30))
+    parser.add_argument("--freeze", type=float, default=30, help="seconds that a program is stopped for at most")
     parser.add_argument("--keep", action="store_true", help="leave the files")
     options = parser.parse_args()
     folder = Path(tempfile.mkdtemp(prefix="baton-chaos-"))
     try:
-        run(Programs(options.bin), folder, options.faults, options.seed)
+        run(Programs(options.bin), folder, options.faults, options.seed, options.freeze)
     except Fault as fault:
-        print(f"seed {options.seed}: {fault}\nfiles are in {folder}")
+        print(f"seed {options.seed}: {fault}\nfiles are in {folder}; farm/faults lists what struck, farm/record what was said")
         return 1
     if not options.keep:
         shutil.rmtree(folder, ignore_errors=True)

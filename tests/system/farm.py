@@ -195,10 +195,12 @@ class Programs:
 class Process:
     """A program in the background, with its log in a file."""
 
-    def __init__(self, command, log_path):
+    def __init__(self, command, log_path, environment=None):
+        """environment: variables beside those of this process."""
         self.log_path = Path(log_path)
         self._log = open(self.log_path, "ab")
-        self._process = subprocess.Popen(command, stdout=self._log, stderr=self._log, start_new_session=True)
+        self._process = subprocess.Popen(command, stdout=self._log, stderr=self._log, start_new_session=True,
+                                         env={**os.environ, **(environment or {})})
 
     @property
     def pid(self):
@@ -238,6 +240,8 @@ class Farm:
         self.folder.mkdir(parents=True, exist_ok=True)
         self.work_folder = self.folder / "work"
         self.endpoint = None
+        self.worker_endpoint = None  # where workers connect to, if not there
+        self.environment = {}        # of coordinator and workers
         self.coordinator = None
         self.workers = []
         self._port = free_port()
@@ -258,16 +262,16 @@ class Farm:
         self.endpoint = f"tcp://127.0.0.1:{self._port}"
         command = [self.programs.path("baton-coordinator"), "--listen", self.endpoint,
                    "--work-dir", str(self.work_folder)]
-        self.coordinator = Process(command, self.folder / "coordinator.log")
+        self.coordinator = Process(command, self.folder / "coordinator.log", self.environment)
         wait_until(lambda: self.baton("job", "list", expect=None, deadline_s=20).returncode == OK,
                    "the coordinator answers")
 
     def start_worker(self, threads=1, name=None):
         """Starts one more worker; returns it."""
         name = name or f"worker{len(self.workers)}"
-        command = [self.programs.path("baton-worker"), "--coordinator", self.endpoint, "--threads", str(threads),
-                   "--name", name]
-        self.workers.append(Process(command, self.folder / f"{name}.log"))
+        command = [self.programs.path("baton-worker"), "--coordinator", self.worker_endpoint or self.endpoint,
+                   "--threads", str(threads), "--name", name]
+        self.workers.append(Process(command, self.folder / f"{name}.log", self.environment))
         return self.workers[-1]
 
     def baton(self, *args, **options):

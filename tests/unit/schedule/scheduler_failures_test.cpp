@@ -85,7 +85,7 @@ TEST_F(SchedulerTest, AFullDiskIsNobodysFailureHoweverOften) {
     const GrantLease grant = farm.ask_one("a");
     ASSERT_EQ(grant.lease.task, render(0, 0));
     farm.step(SpaceLacking{"a", grant.lease, "full"});
-    EXPECT_EQ(farm.scheduler.find_job(farm.job)->waits, "space: full");
+    EXPECT_EQ(farm.scheduler.find_job(farm.job)->waits, "full");
     EXPECT_THAT(farm.ask("a", 1), IsEmpty()) << "tries again at once";
     farm.step(WorkRequested{"a", 0});
     farm.now += Scheduler::kRest;

@@ -1,0 +1,62 @@
+// A library to be loaded before all others (LD_PRELOAD) that writes down, in the file
+// $BATON_SYNC_RECORD and in the order in which they returned, what a program asks of the disk:
+//   rename FROM TO      sync FILE      syncfs DEVICE
+// From this a test tells what a power cut would have left (chaos.py).
+#include <dlfcn.h>
+#include <fcntl.h>
+#include <stdio.h>
+#include <sys/stat.h>
+#include <unistd.h>
+
+#include <array>
+#include <cstdio>
+#include <cstdlib>
+
+namespace {
+
+/// A line at once, so that those of several processes keep their order.
+template <class... Args>
+void note(const char* format, Args... args) {
+  static const char* const path = std::getenv("BATON_SYNC_RECORD");
+  if (path == nullptr) return;
+  std::array<char, 8300> line;
+  const int length = std::snprintf(line.data(), line.size(), format, args...);
+  const int file = ::open(path, O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0644);
+  if (file < 0) return;
+  if (::write(file, line.data(), static_cast<std::size_t>(length)) != length) std::abort();
+  ::close(file);
+}
+
+template <class F>
+F original(const char* name) {
+  return reinterpret_cast<F>(::dlsym(RTLD_NEXT, name));
+}
+
+}  // namespace
+
+extern "C" int rename(const char* from, const char* to) noexcept {
+  static const auto call = original<int (*)(const char*, const char*)>("rename");
+  const int result = call(from, to);
+  if (result == 0) note("rename %s %s\n", from, to);
+  return result;
+}
+
+extern "C" int fsync(int file) {
+  static const auto call = original<int (*)(int)>("fsync");
+  const int result = call(file);
+  std::array<char, 64> link;
+  std::array<char, 4096> path{};
+  std::snprintf(link.data(), link.size(), "/proc/self/fd/%d", file);
+  if (result == 0 && ::readlink(link.data(), path.data(), path.size() - 1) > 0)
+    note("sync %s\n", path.data());
+  return result;
+}
+
+extern "C" int syncfs(int file) noexcept {
+  static const auto call = original<int (*)(int)>("syncfs");
+  const int result = call(file);
+  struct stat status {};
+  if (result == 0 && ::fstat(file, &status) == 0)
+    note("syncfs %llu\n", static_cast<unsigned long long>(status.st_dev));
+  return result;
+}

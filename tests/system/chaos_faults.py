@@ -1,0 +1,336 @@
+"""What chaos.py strikes a farm with: programs, messages, files, disks and jobs."""
+
+import contextlib
+import functools
+import json
+import os
+import signal
+import threading
+import time
+from collections import Counter
+from pathlib import Path
+
+from chaos_witness import STATE
+from farm import BAD_INPUT, OK, PATIENCE, check, make_job, wait_until, write_job
+
+NUM_WORKERS = 3
+NOTICED_S = 6 * PATIENCE  # a fault of a disk that nobody notices in this time has not struck
+
+MOVING_CAMERA = [{"frame": 1, "position": [0, 1.2, 5], "lookAt": [0, 0.6, 0]},
+                 {"frame": 6, "position": [0.5, 1.3, 4.6], "lookAt": [0, 0.6, 0]}]
+KINDS = {
+    "rest": {"frames": "1-8", "sampling": {"method": "sequential", "numCandidates": 256, "numDistributions": 12}},
+    "motion": {"frames": "1-6", "sampling": {"method": "pool", "numParticles": 32, "numCandidates": 512},
+               "camera": {"keys": MOVING_CAMERA}},
+    "second-pass": {"frames": "1-5", "sampling": {"method": "bidirectional", "numCandidates": 512},
+                    "visibility": {"correlated": True}},
+}
+# That may be lost, come twice or late.
+MESSAGES = ["WorkerHello", "WorkerWelcome", "LeaseRequest", "LeaseGrant", "LeaseRevoke", "Heartbeat", "TaskDone",
+            "ReportReceived", "NoWork", "JobDocument"]
+FREQUENT = ["TaskDone", "LeaseGrant", "ReportReceived", "LeaseRequest"]
+
+
+@functools.cache
+def plain_job(folder):
+    """What the kinds of jobs have in common. Its assets are written once: a worker might be reading them."""
+    return make_job(folder)
+
+
+class Job:
+    """One submission of a kind of job."""
+
+    def __init__(self, kind, number, folder):
+        self.kind, self.frames, self.number = kind, folder / "frames" / f"{kind}{number}", number
+        self.path, self._edits = folder / f"{kind}{number}.json", {}
+        self.id, self.is_done = None, False
+        self._plain = plain_job(folder / "assets")
+        self.write()
+
+    def write(self, **changes):
+        """Writes the job file. changes: of settings, which stay, or of the picture."""
+        changes = {**KINDS[self.kind], "name": f"{self.kind} {self.number}", "output": {"directory": str(self.frames)},
+                   "image": {"tileSize": 16}, "state": {"keep": "last"}, **self._edits, **changes}
+        merged = {key: {**self._plain.get(key, {}), **value} if isinstance(value, dict) else value
+                  for key, value in changes.items()}
+        return write_job(self.path, {**self._plain, **merged})
+
+    def edit(self, **settings):
+        self._edits.update(settings)
+        return self.write()
+
+
+class Chaos:
+    """Strikes a farm at random."""
+
+    def __init__(self, farm, proxy, disk, power, rng, longest_freeze_s):
+        self.farm, self.proxy, self.disk, self.power, self.rng = farm, proxy, disk, power, rng
+        self.longest_freeze_s = longest_freeze_s
+        self.jobs, self.ended_jobs, self.struck, self.thaws = [], set(), Counter(), {}
+        self.num_harmed, self.num_lost_in_cuts, self.healed_at, self.num_started = 0, 0, None, 0
+        self.faults = [self.kill_worker, self.kill_coordinator, self.freeze_worker, self.freeze_coordinator,
+                       self.end_worker, self.end_coordinator, self.flip_byte, self.cut_blob, self.remove_blob,
+                       self.remove_frame, self.submit_again, self.edit_settings, self.edit_picture,
+                       self.drop_message, self.double_message, self.delay_message]
+        if disk:
+            self.faults += [self.fill_disk, self.make_read_only]
+        if power:
+            self.faults.append(self.cut_power)
+        self.deck = []
+
+    def strike(self):
+        """One fault that really struck."""
+        while True:
+            if not self.deck:
+                self.deck = self.rng.sample(self.faults, len(self.faults))
+            fault = self.deck.pop()
+            if fault():
+                return
+            self.deck.insert(self.rng.randrange(len(self.deck) + 1), fault)
+            time.sleep(0.02)
+            self.tend()
+            self.renew()
+
+    def tend(self):
+        """Starts again what is gone, and heals a disk that has been harmed long enough."""
+        if self.healed_at and time.monotonic() >= self.healed_at:
+            self.disk.heal()
+            self.healed_at = None
+        if not self.farm.coordinator.alive():
+            if self.healed_at:
+                self.disk.heal()
+            self.farm.start_coordinator()
+        self.farm.workers = [worker for worker in self.farm.workers if worker.alive()]
+        while len(self.farm.workers) < NUM_WORKERS:
+            self.num_started += 1
+            self.farm.start_worker(name=f"worker-{self.num_started}")
+
+    def renew(self):
+        """New jobs when all have ended."""
+        if open_jobs(self.farm, self.jobs):
+            return
+        number = len(self.jobs) // len(KINDS) + 1
+        for kind in KINDS:
+            job = Job(kind, number, self.farm.folder)
+            job.id = self.farm.submit(job.path)
+            self.jobs.append(job)
+
+    # ---- faults: each returns whether it struck ------------------------------------------------------------
+
+    def kill_worker(self):
+        return self.end(self.some_worker(), signal.SIGKILL, "worker killed")
+
+    def kill_coordinator(self):
+        return self.end(self.farm.coordinator, signal.SIGKILL, "coordinator killed")
+
+    def end_worker(self):
+        return self.end(self.some_worker(), signal.SIGTERM, "worker terminated")
+
+    def end_coordinator(self):
+        return self.end(self.farm.coordinator, signal.SIGTERM, "coordinator terminated")
+
+    def freeze_worker(self):
+        return self.freeze(self.some_worker(), "worker frozen")
+
+    def freeze_coordinator(self):
+        return self.freeze(self.farm.coordinator, "coordinator frozen")
+
+    def flip_byte(self):
+        def damage(path, content):
+            at = self.rng.randrange(len(content))
+            path.write_bytes(content[:at] + bytes([content[at] ^ 0x10]) + content[at + 1:])
+        return self.harm_blob(damage, "byte of a blob changed")
+
+    def cut_blob(self):
+        return self.harm_blob(lambda path, content: path.write_bytes(content[:len(content) // 2]), "blob cut")
+
+    def remove_blob(self):
+        return self.harm_blob(lambda path, _: path.unlink(), "blob removed")
+
+    def remove_frame(self):
+        frames = [frame for job in self.jobs for frame in job.frames.glob("*.exr")]
+        if not frames:
+            return False
+        with contextlib.suppress(OSError):  # it may be read-only now
+            self.rng.choice(frames).unlink()
+            self.num_harmed += 1
+            return self.count("frame removed")
+        return False
+
+    def submit_again(self):
+        job = self.some_job()
+        return job is not None and self.submit(job) == OK and self.count("submitted again")
+
+    def edit_settings(self):
+        """Another size of tiles and another priority make no other picture."""
+        job = self.some_job()
+        if job is None:
+            return False
+        before = job.id
+        job.edit(image={"tileSize": self.rng.choice([16, 32, 48])}, priority=self.rng.randrange(100))
+        if self.submit(job) != OK:
+            return False
+        if job.id != before:
+            self.ended_jobs.add(before)
+        return self.count("settings edited")
+
+    def edit_picture(self):
+        """Another picture is refused, and changes nothing."""
+        job = self.some_job()
+        if job is None or not list(job.frames.glob("*.exr")):
+            return False
+        job.write(seed=self.rng.randrange(100, 1000))
+        answer = self.farm.baton("job", "submit", job.path, expect=None)
+        job.write()
+        if answer.returncode not in (OK, BAD_INPUT):
+            return False  # nobody has answered
+        check(answer.returncode == BAD_INPUT and "$.seed" in answer.stderr,
+              f"another picture in the folder of {job.path.stem}: {answer.stdout}{answer.stderr}")
+        return self.count("picture edited")
+
+    def drop_message(self):
+        return self.harm_message("drop", "message dropped")
+
+    def double_message(self):
+        return self.harm_message("double", "message doubled")
+
+    def delay_message(self):
+        return self.harm_message("delay", "message delayed")
+
+    def fill_disk(self):
+        def fill():
+            self.disk.fill()
+            return True
+        return self.harm_disk(fill, "waits for space", "disk filled")
+
+    def make_read_only(self):
+        folder = self.rng.choice(self.disk.folders)
+        return self.harm_disk(lambda: self.disk.make_read_only(folder), "a folder that can be written",
+                              f"{folder.name} read-only")
+
+    def cut_power(self):
+        """All processes end, and the disk has what was waited for."""
+        processes = [self.farm.coordinator, *self.farm.workers]
+        if self.healed_at or not all(process.alive() for process in processes) or not self.power.at_risk():
+            return False
+        for process in processes:
+            self.signal(process.pid, signal.SIGKILL)
+        wait_until(lambda: not any(process.alive() for process in processes), "all processes have ended")
+        at_rest = {job.id for job in self.jobs if job.kind == "rest"}  # whose states are all checkpoints
+        promised = [output for seen in self.proxy.seen() if seen.type == "TaskDone" and seen.task[0] in at_rest
+                    for output in seen.outputs if output.startswith(f"{STATE}:")]
+        num_lost = self.power.strike(self.rng, promised)
+        self.num_harmed += num_lost
+        self.num_lost_in_cuts += num_lost
+        return self.count("power cut")
+
+    # ---- helpers -------------------------------------------------------------------------------------------
+
+    def some_worker(self):
+        alive = [worker for worker in self.farm.workers if worker.alive()]
+        return self.rng.choice(alive) if alive else None
+
+    def some_job(self):
+        return self.rng.choice(self.jobs) if self.jobs and self.farm.coordinator.alive() else None
+
+    def submit(self, job):
+        """Exit code; the job has its new ID."""
+        answer = self.farm.baton("job", "submit", job.path, "--json", expect=None)
+        job.is_done = False
+        if answer.returncode == OK:
+            job.id = json.loads(answer.stdout)["id"]
+        return answer.returncode
+
+    def is_frozen(self, process):
+        return process.pid in self.thaws and self.thaws[process.pid].is_alive()
+
+    def end(self, process, number, what):
+        if process is None or not process.alive() or self.is_frozen(process):
+            return False
+        self.signal(process.pid, number)
+        wait_until(lambda: not process.alive(), f"{what}: it has ended")
+        return self.count(what)
+
+    def freeze(self, process, what):
+        if process is None or not process.alive() or self.is_frozen(process):
+            return False
+        self.signal(process.pid, signal.SIGSTOP)
+        wait_until(lambda: state_of(process.pid) in ("T", "Z", None), what)
+        seconds = self.rng.uniform(0.2, self.longest_freeze_s)
+        self.thaws[process.pid] = threading.Timer(seconds, self.signal, [process.pid, signal.SIGCONT])
+        self.thaws[process.pid].start()
+        return self.count(what)
+
+    def harm_message(self, harm, what):
+        kinds = [self.rng.choice(MESSAGES), self.rng.choice(FREQUENT)]
+        delay_s = self.rng.uniform(0.1, 5)
+        return any(self.proxy.strike(harm, kind, delay_s) for kind in kinds) and self.count(what)
+
+    def harm_blob(self, harm, what):
+        blobs = list(self.farm.work_folder.rglob("*.blob"))
+        if not blobs:
+            return False
+        path = self.rng.choice(blobs)
+        with contextlib.suppress(OSError):  # removed by the farm meanwhile, or read-only now
+            content = path.read_bytes()
+            if not content:
+                return False
+            harm(path, content)
+            self.num_harmed += 1
+            return self.count(what)
+        return False
+
+    def harm_disk(self, harm, noticed, what):
+        """Strikes when the coordinator has logged `noticed`; healed some time after."""
+        if self.healed_at or not self.farm.coordinator.alive() or self.is_frozen(self.farm.coordinator):
+            return False
+        before = self.farm.coordinator.log().count(noticed)
+        if not harm():
+            return False
+        deadline = time.monotonic() + NOTICED_S
+        while time.monotonic() < deadline:
+            if self.farm.coordinator.log().count(noticed) > before:
+                self.healed_at = time.monotonic() + self.rng.uniform(0, 2)
+                return self.count(what)
+            if not self.farm.coordinator.alive():
+                break
+            time.sleep(0.02)
+        self.disk.heal()
+        return False
+
+    def count(self, what):
+        self.struck[what] += 1
+        with open(self.farm.folder / "faults", "a", encoding="ascii") as diary:
+            diary.write(f"{time.monotonic():.3f} {what}\n")
+        return True
+
+    @staticmethod
+    def signal(pid, number):
+        with contextlib.suppress(ProcessLookupError):
+            os.kill(pid, number)
+
+
+def state_of(pid):
+    """The letter of a process's state, None when it is gone."""
+    try:
+        return Path(f"/proc/{pid}/stat").read_text(encoding="ascii").rsplit(")", 1)[1].split()[0]
+    except FileNotFoundError:
+        return None
+
+
+def open_jobs(farm, jobs):
+    """Those of the jobs that are not known to be done. A failed one ends the test."""
+    left = []
+    for job in jobs:
+        if job.is_done:
+            continue
+        shown = farm.baton("job", "show", job.id, "--json", expect=None)
+        if shown.returncode != OK:
+            left.append(job)
+            continue
+        status = json.loads(shown.stdout)["status"]
+        check(status not in ("failed", "cancelled"), f"job {job.path.stem} is {status}:\n{shown.stdout[-1500:]}")
+        job.is_done = status == "done"
+        if not job.is_done:
+            left.append(job)
+    return left

@@ -1,0 +1,175 @@
+"""What a proxy between workers and coordinator saw, what the coordinator logged, and whether that may be.
+
+The proxy (tests/support/faulty_proxy.cpp) records every message about a lease before anything happens to it, so that what
+is judged here does not depend on the programs that are tried.
+"""
+
+import re
+import subprocess
+import time
+from collections import Counter, namedtuple
+
+from farm import PATIENCE, Fault, check, free_port, wait_until
+
+RENDER, ASSEMBLE, SECOND_PASS = range(3)  # kinds of tasks on the wire
+STATE, FILM, IMAGE, FIRST_PASS = range(4)  # kinds of blobs
+
+# What one fault may cost: a worker of one thread has up to three leases in hand.
+LEASES_OF_WORKER = 3
+SILENCE_MS = 3900  # about when a coordinator gives a worker up
+
+Seen = namedtuple("Seen", "ms worker type task attempt outputs")  # task: job, kind, step, tile; attempt: number, epoch
+
+
+class Proxy:
+    """A faulty proxy and its record."""
+
+    def __init__(self, programs, coordinator, folder):
+        self.endpoint = f"tcp://127.0.0.1:{free_port()}"
+        self._path = folder / "record"
+        self._log = open(folder / "proxy.log", "ab")
+        self._process = subprocess.Popen([programs.path("faulty_proxy"), self.endpoint, coordinator, str(self._path)],
+                                         stdin=subprocess.PIPE, stderr=self._log, start_new_session=True)
+        self._number = 0
+        self._lines, self._offset = [], 0
+        wait_until(lambda: self._path.exists() and self.lines(), "the proxy listens")
+
+    def close(self):
+        self._process.kill()
+        self._process.wait()
+        self._log.close()
+
+    def strike(self, harm, kind, delay_s):
+        """Harms the next message of a type; False when none comes soon."""
+        self._number += 1
+        self._say(f"{self._number} {harm} {kind} {int(1000 * delay_s)}")
+        try:
+            wait_until(self._has_struck, f"a {kind} to {harm}", 1 * PATIENCE)
+        except Fault:
+            self._say(f"{self._number} none")
+            time.sleep(0.05)
+        return self._has_struck()
+
+    def _say(self, line):
+        self._process.stdin.write((line + "\n").encode("ascii"))
+        self._process.stdin.flush()
+
+    def _has_struck(self):
+        return any(words[1:] == ["struck", str(self._number)] for words in self.lines()[-2000:])
+
+    def lines(self):
+        """The words of every line so far."""
+        with open(self._path, "rb") as record:
+            record.seek(self._offset)
+            content = record.read()
+        whole = content[:content.rfind(b"\n") + 1]
+        self._offset += len(whole)
+        self._lines += [line.split() for line in whole.decode("ascii").splitlines()]
+        return self._lines
+
+    def seen(self):
+        """Every message about a lease, in order."""
+        result = []
+        for words in self.lines():
+            if len(words) < 9:
+                continue
+            ms, worker, kind, job, *numbers = words[:9]
+            task = (job, *map(int, numbers[:3]))
+            outputs = tuple(words[9:])
+            result.append(Seen(int(ms), int(worker), kind, task, (int(numbers[3]), int(numbers[4])), outputs))
+        return result
+
+    def returns(self):
+        """(time, worker) of each word that came after a long silence."""
+        return [(int(words[0]), int(words[1])) for words in self.lines()
+                if len(words) == 4 and words[2] == "back" and int(words[3]) >= SILENCE_MS]
+
+    def struck_ms(self):
+        """When messages were struck."""
+        return [int(words[0]) for words in self.lines() if len(words) == 3 and words[1] == "struck"]
+
+    def is_quiet(self, seconds):
+        """Whether nobody reports anything for so long."""
+        before = sum(1 for seen in self.seen() if seen.type in ("TaskDone", "TaskFailed"))
+        time.sleep(seconds)
+        return sum(1 for seen in self.seen() if seen.type in ("TaskDone", "TaskFailed")) == before
+
+
+def check_one_result_a_task(seen):
+    """No task was done under two digests, whoever did it and when."""
+    results = {}
+    for report in seen:
+        if report.type == "TaskDone":
+            known = results.setdefault(report.task, report)
+            check(known.outputs == report.outputs, f"two results of one task: {known} and {report}")
+    return len(results)
+
+
+def check_nothing_revoked(seen, returns, struck_ms, ended_jobs):
+    """The newest attempt of a task stays with its worker, unless that was silent, the coordinator has started anew, a
+    message was struck, or the job has ended: a report of an older attempt must not be taken for it."""
+    newest, reported, epoch = {}, set(), 0
+    for message in seen:
+        lease = (message.task, message.attempt)
+        epoch = max(epoch, message.attempt[1])
+        if message.type == "LeaseGrant":
+            newest[message.task] = message
+        elif message.type in ("TaskDone", "TaskFailed"):
+            reported.add(lease)
+        elif message.type == "LeaseRevoke":
+            grant = newest.get(message.task)
+            if grant is None or grant.attempt != message.attempt or lease in reported:
+                continue
+            if message.task[0] in ended_jobs or message.attempt[1] < epoch:
+                continue
+            if any(grant.ms <= ms <= message.ms for ms in struck_ms):
+                continue
+            if any(worker == grant.worker and grant.ms <= ms <= message.ms for ms, worker in returns):
+                continue
+            raise Fault(f"taken from the worker that has it: {message}, granted {message.ms - grant.ms} ms before")
+
+
+def count_repeated(seen):
+    """Task -> how many attempts beyond the first reported it as done."""
+    attempts = {}
+    for report in seen:
+        if report.type == "TaskDone":
+            attempts.setdefault(report.task, set()).add(report.attempt)
+    return {task: len(made) - 1 for task, made in attempts.items() if len(made) > 1}
+
+
+def check_repeated(seen, log, struck, num_workers, num_harmed):
+    """Nothing is done again that no fault explains. struck: how often each kind of fault struck; num_harmed: files that
+    were harmed. Returns (how many tasks were done again, how many the faults explain)."""
+    reopenings = [int(n) for n in re.findall(r"(\d+) finished tasks are done again", log)]
+    check(len(reopenings) <= num_harmed,
+          f"finished tasks were opened again {len(reopenings)} times, but only {num_harmed} files were harmed")
+    leases = LEASES_OF_WORKER * sum(count for what, count in struck.items() if "worker" in what or "message" in what)
+    leases += num_workers * LEASES_OF_WORKER * sum(count for what, count in struck.items()
+                                                   if "coordinator" in what or "power" in what)
+    explained = (sum(reopenings) + log.count("the task is done again") + len(re.findall(r"attempt \d+ on \S+ failed", log))
+                 + leases)
+    repeated = count_repeated(seen)
+    total = sum(repeated.values())
+    worst = Counter(repeated).most_common(3)
+    check(total <= explained, f"{total} tasks were done again, the faults explain {explained}; most often {worst}")
+    return total, explained
+
+
+def unsynced(record):
+    """Files that a power cut would take: published, but neither they nor their file system were waited for since.
+
+    record: what sync_witness.cpp wrote. Returns path -> True."""
+    lost, synced = {}, set()
+    for line in record.splitlines():
+        what, *paths = line.split()
+        if what == "sync":
+            synced.add(paths[0])
+            lost.pop(paths[0], None)
+        elif what == "syncfs":
+            lost.clear()
+        elif paths[0] in synced:
+            lost.pop(paths[1], None)  # replaces one that may not have been
+        else:
+            lost[paths[1]] = True
+    return lost
