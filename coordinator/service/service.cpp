@@ -280,7 +280,9 @@ bool Service::writes_nowhere(const LeaseId& lease) const {
   const Scheduler::Job* job = job_of_open_task(lease);
   if (job == nullptr) return false;
   const bool is_frame = lease.task.kind == TaskKind::assemble;
-  const fs::path folder = is_frame ? fs::path(job->spec.output.directory) : store_directory_;
+  fs::path folder = is_frame ? fs::path(job->spec.output.directory) : store_directory_;
+  std::error_code error;
+  while (!fs::exists(folder, error) && folder.has_relative_path()) folder = folder.parent_path();
   return ::access(folder.c_str(), W_OK) != 0 && errno == EROFS;
 }
 
