@@ -1,10 +1,10 @@
 #include "common/image/contact_sheet.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <string>
 
+#include "common/image/pixel_text.h"
 #include "common/math/vec3.h"
 
 namespace baton {
@@ -64,36 +64,6 @@ void draw_thumb(const RgbImage& frame, int thumb_width, int thumb_height, int le
       out[0] = colour.x;
       out[1] = colour.y;
       out[2] = colour.z;
-    }
-  }
-}
-
-/// Digits of 3 x 5 dots, row by row from the top, the highest bit left.
-constexpr std::array<std::uint16_t, 10> kDigits{
-    0b111'101'101'101'111, 0b010'110'010'010'111, 0b111'001'111'100'111, 0b111'001'111'001'111,
-    0b101'101'111'001'001, 0b111'100'111'001'111, 0b111'100'111'101'111, 0b111'001'010'010'010,
-    0b111'101'111'101'111, 0b111'101'111'001'111};
-constexpr int kDotPixels = 2;
-
-/// Writes a number into a black box whose lower left corner is (left, bottom); what does not fit
-/// into the sheet is cut off.
-void draw_number(int number, int left, int bottom, RgbImage& sheet) {
-  const std::string digits = std::to_string(number);
-  const int columns = 1 + 4 * static_cast<int>(digits.size());
-  constexpr int kRows = 7;
-  for (int y = 0; y < kRows * kDotPixels; ++y) {
-    for (int x = 0; x < columns * kDotPixels; ++x) {
-      const int column = x / kDotPixels - 1, row = y / kDotPixels - 1;
-      const bool in_digit = column >= 0 && column % 4 < 3 && row >= 0 && row < 5;
-      const bool dot =
-          in_digit &&
-          (kDigits[static_cast<std::size_t>(digits[static_cast<std::size_t>(column / 4)] - '0')] >>
-               (14 - 3 * row - column % 4) &
-           1) != 0;
-      const int at_x = left + x, at_y = bottom - kRows * kDotPixels + y;
-      if (at_x >= sheet.width || at_y < 0) continue;
-      std::fill_n(sheet.rgb.begin() + (std::ptrdiff_t{at_y} * sheet.width + at_x) * 3, 3,
-                  dot ? 1.0f : 0.0f);
     }
   }
 }
@@ -165,7 +135,7 @@ RgbImage contact_sheet(std::span<const RgbImage> frames, int columns, int thumb_
     const int left = kGapPixels + (i % num_columns) * (thumb_width + kGapPixels);
     const int top = kGapPixels + (i / num_columns) * (thumb_height + kGapPixels);
     draw_thumb(frames[i], thumb_width, thumb_height, left, top, sheet);
-    if (!numbers.empty()) draw_number(numbers[i], left, top + thumb_height, sheet);
+    if (!numbers.empty()) draw_text(std::to_string(numbers[i]), left, top + thumb_height, sheet);
   }
   return sheet;
 }

@@ -69,6 +69,10 @@ bool always_float(const std::string& channel) {
          channel.starts_with("normal.");
 }
 
+bool is_color(const std::string& channel) {
+  return channel == "R" || channel == "G" || channel == "B";
+}
+
 std::vector<half> to_half(std::span<const float> values) {
   std::vector<half> halves(values.size());
   for (std::size_t i = 0; i < values.size(); ++i)
@@ -108,7 +112,8 @@ Result<Imf::Header> make_header(const std::string& name, const FilmTile& image,
   header.compression() = *compression;
   header.zipCompressionLevel() = kZipLevel;
   for (const std::string& channel : image.channels) {
-    const bool is_half = options.half_float && !always_float(channel);
+    const bool is_half = options.half_float && !always_float(channel) &&
+                         !(options.float_colors && is_color(channel));
     header.channels().insert(channel, Imf::Channel(is_half ? Imf::HALF : Imf::FLOAT));
   }
   for (const auto& [key, value] : options.metadata) {

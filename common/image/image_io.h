@@ -31,6 +31,7 @@ using ImageMetadata = std::vector<std::pair<std::string, std::string>>;
 struct ExrOptions {
   /// `depth`, `lns`, `variance` and `normal.*` stay float32 always.
   bool half_float = true;
+  bool float_colors = false;        ///< R, G and B are float32 whatever half_float says
   std::string compression = "zip";  ///< none, rle, zips, zip, piz
   ImageMetadata metadata;
   /// Attributes of their own, which compositors read: worldToCamera, worldToNDC (row by row; points

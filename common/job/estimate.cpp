@@ -32,6 +32,25 @@ std::int64_t state_bytes_per_pixel(const JobSpec& job) {
 
 }  // namespace
 
+std::int32_t max_frames_ahead(const JobSpec& job) {
+  const std::int64_t film_bytes = std::max<std::int64_t>(estimate_job(job).film_bytes, 1);
+  const std::uint64_t frames = limits::kMaxFilmBytesAhead / static_cast<std::uint64_t>(film_bytes);
+  const auto all = static_cast<std::uint64_t>(job.frames.size());
+  return std::max(2 * frames_per_run(job), static_cast<std::int32_t>(std::min(frames, all)));
+}
+
+DiskEstimate estimate_disk(const JobSpec& job) {
+  // Two checkpoints stay while the job runs, and those of the runs in work, of which there are at
+  // most two frames' or runs' worth, are beside them.
+  constexpr std::int64_t kStatesAtOnce = 4;
+  const JobEstimate e = estimate_job(job);
+  const std::int64_t kept =
+      job.state.keep == StateKeep::all ? e.frames / job.state.checkpoint_every + 1 : 0;
+  const std::int64_t states = std::min(kStatesAtOnce + kept, std::max(e.runs, kept));
+  const std::int64_t ahead = std::min<std::int64_t>(max_frames_ahead(job) + 1, e.frames);
+  return {e.frame_bytes * e.frames, e.state_bytes * states, e.film_bytes * ahead};
+}
+
 JobEstimate estimate_job(const JobSpec& job) {
   JobEstimate e;
   const PixelRect image = job.image.rendered();
@@ -55,17 +74,18 @@ JobEstimate estimate_job(const JobSpec& job) {
   e.shadow_rays_per_pixel = traits(job.sampling.method).most_rays(job.sampling);
 
   // Add up the planes: R, G, B, A and the AOVs.
-  std::int64_t wide_channels = 0;
-  e.film_channels = 4;
+  std::int64_t wide_channels = 0, frame_channels = 4;
   for (const Aov aov : job.output.aovs) {
-    e.film_channels += num_channels(aov);
+    frame_channels += num_channels(aov);
     const bool wide = aov == Aov::depth || aov == Aov::lns || aov == Aov::variance ||
                       aov == Aov::material || aov == Aov::normal;
     wide_channels += wide ? num_channels(aov) : 0;
   }
+  e.film_channels = 4;
+  for (const Aov aov : film_aovs(job)) e.film_channels += num_channels(aov);
   e.film_bytes = pixels * e.film_channels * 4;
   const std::int64_t sample_bytes = job.output.pixel_type == PixelType::half_float ? 2 : 4;
-  e.frame_bytes = pixels * ((e.film_channels - wide_channels) * sample_bytes + wide_channels * 4);
+  e.frame_bytes = pixels * ((frame_channels - wide_channels) * sample_bytes + wide_channels * 4);
 
   // Size the state and the largest blob.
   const std::int64_t side = job.image.tile_size;

@@ -31,4 +31,19 @@ struct JobEstimate {
 /// job: each value in its own range; needs no assets.
 JobEstimate estimate_job(const JobSpec& job);
 
+/// How many frames may be rendered ahead of the first that is not written: as their films have
+/// room, and at least two runs, so that a tile that takes long stops nobody at once.
+std::int32_t max_frames_ahead(const JobSpec& job);
+
+/// What a job has on disk at most, before compression.
+struct DiskEstimate {
+  std::int64_t frames = 0;  ///< all EXR files
+  std::int64_t states =
+      0;                   ///< checkpoints that stay, and the states on their way to the next frame
+  std::int64_t films = 0;  ///< of the frames that are not written yet
+
+  std::int64_t total() const { return frames + states + films; }
+};
+DiskEstimate estimate_disk(const JobSpec& job);
+
 }  // namespace baton

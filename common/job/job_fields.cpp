@@ -72,6 +72,7 @@ void fields(JobArchive& a, ImageSpec& image) {
   }
   a.integer("tileSize", image.tile_size, limits::kMinTileSize, limits::kMaxTileSize);
   region_fields(a, image);
+  a.integer("siteSeed", image.site_seed);
   // Applied where it is read: what is written is the smaller image.
   double scale = std::numeric_limits<double>::quiet_NaN();
   if (a.number("scale", scale, {.min = 0, .max = 1, .min_open = true}) && scale > 0)
@@ -209,6 +210,7 @@ void fields(JobArchive& a, OutputSpec& output, const JobSpec& job) {
   a.choice("pixelType", output.pixel_type, kPixelTypes);
   a.word("compression", output.compression, kCompressions);
   a.number("framesPerSecond", output.frames_per_second, {1, 1000});
+  a.boolean("clampNegative", output.clamp_negative);
 }
 
 void fields(JobArchive& a, StateSpec& state) {

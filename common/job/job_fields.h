@@ -43,6 +43,7 @@ inline constexpr std::array<std::string_view, 13> kAovs{"lns",
                                                         "acceptanceIndependent",
                                                         "resampled",
                                                         "material"};
+inline constexpr std::array<std::string_view, 3> kUpAxes{"x", "y", "z"};
 inline constexpr std::array<std::string_view, 2> kPixelTypes{"half", "float"};
 inline constexpr std::array<std::string_view, 5> kCompressions{"none", "rle", "zips", "zip", "piz"};
 inline constexpr std::array<std::string_view, 2> kKeyCurves{"linear", "smooth"};

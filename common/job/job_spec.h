@@ -27,6 +27,7 @@ struct ImageSpec {
   int sites = 1;       ///< primary rays per pixel: 1, 4, 9 or 16 (stratified; box filter)
   int tile_size = 64;  ///< side of a farm tile in pixels; never changes the picture
   std::optional<PixelRect> region{};  ///< the part that is rendered, inside the whole; none: all
+  std::uint64_t site_seed = 0;        ///< of the sites' places in their pixels; 0: the job's seed
 
   bool operator==(const ImageSpec&) const = default;
   /// The pixels that are rendered. Pixels are always addressed by their place in the whole picture.
@@ -132,16 +133,22 @@ struct ObjectKey {
   bool operator==(const ObjectKey&) const = default;
 };
 
-/// A mesh placed in the world: first scaled, then rotated (x, then y, then z), then translated.
-/// `place_on_ground` moves it so that its lowest point has y = 0 (before `translate`); `fit_height`
-/// scales it to that height first.
+/// Which axis of a mesh's file points up.
+enum class UpAxis : std::uint8_t { x, y, z };
+
+/// A mesh placed in the world: first turned so that its `up_axis` is y, then scaled, then rotated
+/// (x, then y, then z), then translated. `fit_height` scales it to that height before it is moved.
+/// Before `translate`, `center` moves the middle of its bounds to x = z = 0 and `place_on_ground`
+/// its lowest point to y = 0.
 struct ObjectSpec {
   std::string mesh;
   std::string material;
   Vec3 translate{0, 0, 0};
   Vec3 rotate_deg{0, 0, 0};
   Vec3 scale{1, 1, 1};
+  UpAxis up_axis = UpAxis::y;
   std::optional<float> fit_height{};
+  bool center = false;
   bool place_on_ground = false;
   std::vector<ObjectKey> keys{};  ///< ascending frames; none: stands still
   std::optional<GltfMotion> gltf{};
@@ -307,6 +314,7 @@ struct OutputSpec {
   PixelType pixel_type = PixelType::half_float;
   std::string compression = "zip";  ///< none, rle, zips, zip, piz
   double frames_per_second = 24;    ///< said in the header of frames, no more; (0, 1000]
+  bool clamp_negative = true;       ///< colours below zero become 0 in frames
 
   bool operator==(const OutputSpec&) const = default;
 };

@@ -57,6 +57,8 @@ struct MethodTraits {
   std::int64_t (*most_rays)(const SamplingSpec&) = nullptr;
 
   bool carries() const { return carried != Carried::nothing; }
+  /// Whether it tells the error of each pixel.
+  bool tells_variance() const { return !keeps_samples; }
 };
 
 /// The row of a method.

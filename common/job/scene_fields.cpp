@@ -65,7 +65,9 @@ void fields(JobArchive& a, ObjectSpec& object, const SceneSpec& scene) {
   a.vector("translate", object.translate, kCoordinateRange);
   a.vector("rotateDeg", object.rotate_deg, kAngleRange);
   a.vector("scale", object.scale, kPositiveRange, true);
+  a.choice("upAxis", object.up_axis, kUpAxes);
   a.number("fitHeight", object.fit_height, kPositiveRange);
+  a.boolean("center", object.center);
   a.boolean("placeOnGround", object.place_on_ground);
   motion_fields(a, object);
 }

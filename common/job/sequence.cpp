@@ -127,6 +127,14 @@ bool asks_neighbors(const SamplingSpec& sampling) {
   return traits(sampling.method).asks_neighbors && sampling.num_neighbors > 0;
 }
 
+std::vector<Aov> film_aovs(const JobSpec& job) {
+  std::vector<Aov> aovs = job.output.aovs;
+  const auto place = std::lower_bound(aovs.begin(), aovs.end(), Aov::variance);
+  const bool is_there = place != aovs.end() && *place == Aov::variance;
+  if (traits(job.sampling.method).tells_variance() && !is_there) aovs.insert(place, Aov::variance);
+  return aovs;
+}
+
 SamplingSpec as_sampling(const MaterialSampling& material) {
   SamplingSpec spec;
   spec.method = material.method;

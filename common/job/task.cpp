@@ -65,6 +65,23 @@ void SamplingStats::merge(const SamplingStats& b) {
   for (std::size_t i = 0; i < kEssBins; ++i) ess_histogram[i] += b.ess_histogram[i];
 }
 
+std::string_view noise_source_name(NoiseSource source) {
+  switch (source) {
+    case NoiseSource::none:
+      return "none";
+    case NoiseSource::halves:
+      return "halves";
+    case NoiseSource::neighbors:
+      return "neighbors";
+  }
+  return "unknown";
+}
+
+void FrameStats::merge(const FrameStats& b) {
+  sampling.merge(b.sampling);
+  if (b.quality.pixels > 0) quality = b.quality;
+}
+
 void RenderStats::merge(const RenderStats& b) {
   pixels += b.pixels;
   rays_primary += b.rays_primary;

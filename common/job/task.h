@@ -118,16 +118,48 @@ struct SamplingStats {
   }
 };
 
-/// The sampling of one tile in one frame.
+/// What the noise of a frame was told from. Stored and sent; values are for ever. halves: two
+/// estimates of each pixel, or the method's own error; neighbors: how pixels differ from those
+/// around them, in which edges and texture count as noise.
+enum class NoiseSource : std::uint8_t { none = 0, halves = 1, neighbors = 2 };
+constexpr NoiseSource last_of(NoiseSource) { return NoiseSource::neighbors; }
+/// "none", "halves", "neighbors".
+std::string_view noise_source_name(NoiseSource source);
+
+/// What was seen of a whole frame when it was written, of R, G and B, before anything was set to 0.
+struct FrameQuality {
+  std::uint64_t pixels = 0;              ///< 0: the frame is not written
+  std::uint64_t pixels_below_zero = 0;   ///< in one of the three at least
+  std::uint64_t pixels_beyond_half = 0;  ///< past what a half float can say
+  std::uint64_t pixels_not_finite = 0;   ///< NaN or infinite; in none of the other numbers
+  NoiseSource noise_source = NoiseSource::none;
+  float noise = 0;  ///< relative standard deviation of a pixel: rms of its error over mean radiance
+  float mean = 0;   ///< radiance, over pixels and the three
+  float lowest = 0;            ///< the least value, at most 0
+  float light_below_zero = 0;  ///< what lies below zero over all light, [0, ...)
+  bool clamped = false;        ///< what lay below zero was set to 0
+
+  bool operator==(const FrameQuality&) const = default;
+  template <class A>
+  void fields(A& a) {
+    a(pixels, pixels_below_zero, pixels_beyond_half, pixels_not_finite, noise_source, noise, mean,
+      lowest, light_below_zero, clamped);
+  }
+};
+
+/// The sampling of one tile in one frame, or what was seen of the whole frame.
 struct FrameStats {
   std::int32_t frame = 0;  ///< 0-based index
   std::int32_t tile = 0;
   SamplingStats sampling;
+  FrameQuality quality = {};
 
   bool operator==(const FrameStats&) const = default;
+  /// Adds another tile's sampling, or takes the frame's quality. Place and number stay.
+  void merge(const FrameStats& b);
   template <class A>
   void fields(A& a) {
-    a(frame, tile, sampling);
+    a(frame, tile, sampling, quality);
   }
 };
 

@@ -17,7 +17,7 @@ namespace baton {
 /// travels here: blobs go through the store, messages carry their digests.
 
 inline constexpr const char* kProtocolName = "BATON";
-inline constexpr std::uint16_t kProtocolVersion = 5;
+inline constexpr std::uint16_t kProtocolVersion = 6;
 
 // ---- worker to coordinator ----------------------------------------------------------------------
 struct WorkerHello {  ///< first, and again after a reconnect or a new epoch
@@ -52,7 +52,7 @@ struct TaskDone {
   LeaseId lease;
   std::vector<BlobRef> outputs;
   RenderStats stats;
-  std::vector<FrameStats> frames = {};  ///< of a render task: one for each frame of the run
+  std::vector<FrameStats> frames = {};  ///< of a render task one for each frame, of an assembly one
   template <class A>
   void fields(A& a) {
     a(lease, outputs, stats, frames);
@@ -261,7 +261,7 @@ struct JobDetail {
   std::vector<std::int32_t> frames_done;  ///< user's frame numbers
   std::vector<std::string> failures;      ///< newest last, at most 100
   std::vector<FrameStats> frames =
-      {};                  ///< the tiles so far of each frame: frame is the user's number, tile -1
+      {};                  ///< of each frame so far: frame is the user's number, tile -1
   std::string waits = {};  ///< for what, where it does
   template <class A>
   void fields(A& a) {

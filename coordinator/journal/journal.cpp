@@ -10,7 +10,7 @@
 namespace baton {
 namespace {
 
-constexpr std::int64_t kSchemaVersion = 2;
+constexpr std::int64_t kSchemaVersion = 3;
 constexpr std::int64_t kApplicationId = 0x4241544e;  // "BATN"
 
 // Digests, keys and statuses are written as numbers and hexadecimal text, so that the sqlite3 shell
@@ -162,10 +162,11 @@ Result<JournalledJob> Journal::load(const Digest& digest) {
   }
 }
 
-Result<std::vector<FrameStats>> Journal::frame_stats(const Digest& job, std::int32_t run) {
+Result<std::vector<FrameStats>> Journal::frame_stats(const Digest& job, TaskKind kind,
+                                                     std::int32_t step) {
   BATON_ASSIGN(SqlStatement query, database_.prepare("SELECT frames FROM completions "
                                                      "WHERE job = ? AND kind = ? AND step = ?"));
-  query.bind(job.hex()).bind(static_cast<std::int64_t>(TaskKind::render)).bind(run);
+  query.bind(job.hex()).bind(static_cast<std::int64_t>(kind)).bind(step);
   std::vector<FrameStats> all;
   while (true) {
     BATON_ASSIGN(const bool row, query.step());

@@ -40,9 +40,9 @@ class Journal {
   Result<JournalledJob> load(const Digest& job);
   /// nullopt: no such job.
   Result<std::optional<std::string>> document(const Digest& job);
-  /// What the sampler did in the frames of a run, recorded so far: one for each frame and tile, in
-  /// no order.
-  Result<std::vector<FrameStats>> frame_stats(const Digest& job, std::int32_t run);
+  /// What the tasks of one kind and step recorded of frames so far, in no order: those of a run for
+  /// each frame and tile what the sampler did, an assembly what was seen of its frame.
+  Result<std::vector<FrameStats>> frame_stats(const Digest& job, TaskKind kind, std::int32_t step);
   /// At most `count` failed attempts, the newest last.
   Result<std::vector<Failure>> recent_failures(const Digest& job, int count);
 

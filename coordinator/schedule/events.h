@@ -23,7 +23,7 @@ struct Completion {
   TaskKey task;
   std::vector<BlobRef> outputs;
   RenderStats stats;
-  std::vector<FrameStats> frames = {};  ///< of a render task, at most one for each frame of its run
+  std::vector<FrameStats> frames = {};  ///< at most one for each frame of a render task or assembly
 };
 
 /// All that is recorded as done of a job. What the tasks counted stands as sums: a job may have
@@ -35,12 +35,12 @@ struct Completions {
   };
   std::vector<Task> tasks;
   RenderStats stats;
-  std::map<std::int32_t, SamplingStats> frames;  ///< by 0-based index
+  std::map<std::int32_t, FrameStats> frames;  ///< by 0-based index
 
   void add(Completion completion) {
     tasks.push_back({completion.task, std::move(completion.outputs)});
     stats.merge(completion.stats);
-    for (const FrameStats& frame : completion.frames) frames[frame.frame].merge(frame.sampling);
+    for (const FrameStats& frame : completion.frames) frames[frame.frame].merge(frame);
   }
 };
 

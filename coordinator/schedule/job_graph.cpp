@@ -162,9 +162,15 @@ std::optional<std::string> JobGraph::check_outputs(const TaskKey& key,
 
 std::optional<std::string> JobGraph::check_frames(const TaskKey& key,
                                                   const std::vector<FrameStats>& frames) const {
-  std::int32_t next = key.kind == TaskKind::render ? first_frame(key.step) : num_frames_;
+  std::int32_t next = num_frames_, last = num_frames_ - 1;  // none
+  if (key.kind == TaskKind::render) {
+    next = first_frame(key.step);
+    last = last_frame(key.step);
+  } else if (key.kind == TaskKind::assemble) {
+    next = last = key.step;
+  }
   for (const FrameStats& stats : frames) {
-    if (stats.tile != key.tile || stats.frame < next || stats.frame > last_frame(key.step)) {
+    if (stats.tile != key.tile || stats.frame < next || stats.frame > last) {
       return fmt::format("the report has statistics of frame index {}, tile {}, out of place",
                          stats.frame, stats.tile);
     }

@@ -90,8 +90,7 @@ void JobTasks::complete(TaskIndex task, const Completion& completion, const std:
   record(task).maker = maker != maker_numbers_.end() ? maker->second : std::uint16_t{0};
   if (!former_outputs_.contains(task)) {
     progress_.stats.merge(completion.stats);
-    for (const FrameStats& frame : completion.frames)
-      progress_.frames[frame.frame].merge(frame.sampling);
+    for (const FrameStats& frame : completion.frames) progress_.frames[frame.frame].merge(frame);
   }
   force_done(task, completion.outputs);
   add_outputs(task, blobs);

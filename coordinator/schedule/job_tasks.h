@@ -23,7 +23,7 @@ struct JobProgress {
   std::uint32_t frames_done = 0;
   std::uint64_t state_bytes = 0, state_pixels = 0;
   RenderStats stats;
-  std::map<std::int32_t, SamplingStats> frames;  ///< by 0-based index, over the tiles so far
+  std::map<std::int32_t, FrameStats> frames;  ///< by 0-based index, over the tiles so far
 };
 
 /// How a worker failed a task.

@@ -5,23 +5,9 @@
 #include <algorithm>
 #include <utility>
 
-#include "common/base/limits.h"
 #include "common/job/estimate.h"
 
 namespace baton {
-namespace {
-
-/// How many frames may be rendered ahead of the first that is not written: as their films have
-/// room, and at least two runs, so that a tile that takes long stops nobody at once.
-std::int32_t max_frames_ahead(const JobSpec& spec) {
-  const auto film_bytes = static_cast<std::uint64_t>(std::max(estimate_job(spec).film_bytes, 1L));
-  const std::uint64_t frames = limits::kMaxFilmBytesAhead / film_bytes;
-  const auto all = static_cast<std::uint64_t>(spec.frames.size());
-  return std::max(2 * frames_per_run(spec), static_cast<std::int32_t>(std::min(frames, all)));
-}
-
-}  // namespace
-
 Scheduler::Scheduler(std::uint32_t epoch, std::chrono::milliseconds silence_limit)
     : epoch_(epoch), silence_limit_(silence_limit) {}
 

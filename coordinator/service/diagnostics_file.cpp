@@ -12,14 +12,20 @@
 namespace baton {
 namespace {
 
-std::string line(int frame_number, const std::string& tile, const SamplingStats& s) {
+/// quality: of a frame that is written; else its columns stay empty.
+std::string line(int frame_number, const std::string& tile, const SamplingStats& s,
+                 const FrameQuality& quality = {}) {
   std::string text =
       fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{}", frame_number, tile, s.pixels(),
                   s.pixels_carried, s.pixels_fresh, s.pixels_refreshed, s.pixels_refreshed_by_ratio,
                   s.pixels_restarted, s.pixels_resampled, s.local_proposed, s.local_accepted,
                   s.independent_proposed, s.independent_accepted);
   for (const std::uint64_t count : s.ess_histogram) text += fmt::format(",{}", count);
-  return text + "\n";
+  if (quality.pixels == 0) return text + ",,,,,,,,\n";
+  return text + fmt::format(",{:.6g},{},{:.6g},{},{:.6g},{:.3g},{},{}\n", quality.noise,
+                            noise_source_name(quality.noise_source), quality.mean,
+                            quality.pixels_below_zero, quality.lowest, quality.light_below_zero,
+                            quality.pixels_beyond_half, quality.pixels_not_finite);
 }
 
 }  // namespace
@@ -32,10 +38,13 @@ std::string diagnostics_header() {
     text += fmt::format(",essRatioFrom{:.3f}",
                         static_cast<double>(bin) / static_cast<double>(SamplingStats::kEssBins));
   }
-  return text + "\n";
+  return text +
+         ",noise,noiseFrom,mean,pixelsBelowZero,lowest,lightBelowZero,pixelsBeyondHalf,"
+         "pixelsNotFinite\n";
 }
 
 std::string diagnostics_lines(std::vector<FrameStats> stats,
+                              const std::map<std::int32_t, FrameQuality>& qualities,
                               const std::vector<int>& frame_numbers) {
   std::sort(stats.begin(), stats.end(), [](const FrameStats& a, const FrameStats& b) {
     return std::tie(a.frame, a.tile) < std::tie(b.frame, b.tile);
@@ -48,7 +57,8 @@ std::string diagnostics_lines(std::vector<FrameStats> stats,
 
     SamplingStats sum;
     std::for_each(first, last, [&](const FrameStats& s) { sum.merge(s.sampling); });
-    text += line(number, "all", sum);
+    const auto quality = qualities.find(first->frame);
+    text += line(number, "all", sum, quality != qualities.end() ? quality->second : FrameQuality{});
     for (; first != last; ++first)
       text += line(number, std::to_string(first->tile), first->sampling);
   }
@@ -59,8 +69,15 @@ Status write_diagnostics(Journal& journal, const Digest& digest, const JobSpec& 
   // Run by run: the rows of all tiles of a long job need not be in memory at once, their text may.
   std::string text;
   for (std::int32_t run = 0; run < num_runs(job); ++run) {
-    BATON_ASSIGN(std::vector<FrameStats> stats, journal.frame_stats(digest, run));
-    text += diagnostics_lines(std::move(stats), job.frames);
+    BATON_ASSIGN(std::vector<FrameStats> stats, journal.frame_stats(digest, TaskKind::render, run));
+    const TileRun frames = tile_run(job, 0, run);
+    std::map<std::int32_t, FrameQuality> qualities;
+    for (std::int32_t frame = frames.first_frame; frame <= frames.last_frame; ++frame) {
+      BATON_ASSIGN(const std::vector<FrameStats> whole,
+                   journal.frame_stats(digest, TaskKind::assemble, frame));
+      if (!whole.empty()) qualities[frame] = whole.front().quality;
+    }
+    text += diagnostics_lines(std::move(stats), qualities, job.frames);
   }
   if (text.empty()) return {};
   text.insert(0, diagnostics_header());

@@ -65,8 +65,10 @@ JobDetail describe_job(const Scheduler& scheduler, const Digest& digest,
   const Scheduler::Job& job = *scheduler.find_job(digest);
   JobDetail detail{summarize(digest, job), finished_frames(job), {}};
   for (const Failure& failure : failures) detail.failures.push_back(describe(job, failure));
-  for (const auto& [frame, sampling] : job.tasks.progress().frames) {
-    detail.frames.push_back({job.spec.frames[static_cast<std::size_t>(frame)], -1, sampling});
+  for (const auto& [frame, stats] : job.tasks.progress().frames) {
+    detail.frames.push_back(stats);
+    detail.frames.back().frame = job.spec.frames[static_cast<std::size_t>(frame)];
+    detail.frames.back().tile = -1;
   }
   detail.waits = scheduler.waits_for(digest, std::chrono::steady_clock::now());
   return detail;

@@ -99,6 +99,35 @@ Study pilot_study(const JobSpec& job, const std::vector<AutoCandidate>& candidat
   return study;
 }
 
+PilotPlan plan_pilot(const JobSpec& job, double ray_factor) {
+  const std::vector<AutoCandidate> candidates = auto_candidates(job);
+  const Study study = pilot_study(job, candidates);
+  PilotPlan plan{.candidates = candidates.size(), .windows = study.scenes.size()};
+  const auto add = [&](const JobSpec& spec, double runs, std::int64_t rays,
+                       std::int64_t evaluations) {
+    const auto pixels =
+        static_cast<std::uint64_t>(spec.image.rendered().area()) * spec.frames.size();
+    const RunCounts counts{.pixels = pixels,
+                           .rays_shadow = pixels * static_cast<std::uint64_t>(rays),
+                           .target_evaluations = pixels * static_cast<std::uint64_t>(evaluations)};
+    plan.frames += static_cast<std::size_t>(runs * static_cast<double>(spec.frames.size()));
+    plan.cpu_seconds += 1e-6 * runs * counted_cost_us(spec, ray_factor, counts);
+  };
+  constexpr double kLookedAtAgain = 0.5;
+  constexpr double kRuns = kFirstSeeds + kLookedAtAgain * (kSecondSeeds - kFirstSeeds);
+  for (const StudyCell& cell : study.cells) {
+    const SamplingSpec& s = cell.job.sampling;
+    add(cell.job, kRuns, traits(s.method).most_rays(s), s.num_candidates);
+    plan.pixels = cell.job.image.rendered().area();
+  }
+  for (const StudyScene& scene : study.scenes) {
+    // A pair is a sample of the light and one of the material.
+    for (const JobSpec& reference : scene.reference)
+      add(reference, 1, 2 * reference.sampling.reference_samples, 0);
+  }
+  return plan;
+}
+
 Result<std::vector<PilotNumbers>> settle_auto(JobSpec& job, const StudyFolder& folder,
                                               JobRunner& runner) {
   if (job.sampling.method != Method::automatic) return std::vector<PilotNumbers>();

@@ -7,6 +7,16 @@
 
 namespace baton {
 
+/// What settle_auto is going to do.
+struct PilotPlan {
+  std::size_t candidates = 0, windows = 0;
+  std::int64_t pixels = 0;  ///< of a picture
+  std::size_t frames = 0;   ///< in all, if half of the candidates are looked at again
+  double cpu_seconds = 0;   ///< as much, of counted work
+};
+/// job: with `auto`. ray_factor: ray_cost_factor of the job.
+PilotPlan plan_pilot(const JobSpec& job, double ray_factor);
+
 /// Settles `"method": "auto"`: renders the job small (about 2300 pixels, at most twelve frames at
 /// its start and at its end) with every candidate and a few seeds, those near the best with more,
 /// judges them by error and counted work, and writes the choice with its reasons into the job. A

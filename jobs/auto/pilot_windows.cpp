@@ -15,6 +15,9 @@ constexpr int kReferenceSamples = 512;
 /// Far from the seeds that people give.
 constexpr std::uint64_t kReferenceSeed = 2'000'000'000;
 
+/// Candidates, seeds and reference see the same points of the scene.
+constexpr std::uint64_t kSiteSeed = 1;
+
 /// The job with at most kPilotPixels a picture, for some of its frames.
 JobSpec small_job(const JobSpec& job, std::vector<int> frames) {
   JobSpec small = job;
@@ -24,9 +27,11 @@ JobSpec small_job(const JobSpec& job, std::vector<int> frames) {
   small.metadata.clear();
   small.output.background = Background::transparent;
   small.output.pixel_type = PixelType::full_float;
+  small.output.clamp_negative = false;
   small.output.pattern = kFramePattern;
   small.output.aovs = {Aov::lns};
   small.state.keep = StateKeep::last;
+  if (small.image.site_seed == 0) small.image.site_seed = kSiteSeed;
   return small;
 }
 

@@ -6,8 +6,10 @@
 #include <algorithm>
 #include <cmath>
 #include <set>
+#include <span>
 
 #include "common/image/image_io.h"
+#include "common/math/vec3.h"
 #include "jobs/cli/object_view.h"
 #include "worker/scene/map_reduction.h"
 #include "worker/scene/scene.h"
@@ -15,13 +17,27 @@
 namespace baton {
 namespace {
 
+float mean_over_sphere(const RgbImage& image) {
+  const auto row_values = static_cast<std::size_t>(3 * image.width);
+  double sum = 0, weights = 0;
+  for (int y = 0; y < image.height; ++y) {
+    const double weight = std::sin((y + 0.5) * double{kPi} / image.height);
+    const auto row =
+        std::span(image.rgb).subspan(static_cast<std::size_t>(y) * row_values, row_values);
+    for (const float v : row) sum += std::isfinite(v) && v > 0 ? weight * v : 0.0;
+    weights += weight * static_cast<double>(row_values);
+  }
+  return weights > 0 ? static_cast<float>(sum / weights) : 0.0f;
+}
+
 Result<MapReport> load_map(const std::string& path, const EnvironmentSpec& environment) {
   BATON_ASSIGN(const RgbImage image, read_rgb_image(path));
   const EnvironmentMap map = make_map(image, environment, false);
   float brightest = 0;
   for (const float v : image.rgb) brightest = std::isfinite(v) ? std::max(brightest, v) : brightest;
-  return MapReport{path,         map.width(),           map.height(), image.width,
-                   image.height, map.repairs().total(), map.black(),  brightest};
+  return MapReport{path,        map.width(),  map.height(),
+                   image.width, image.height, map.repairs().total(),
+                   map.black(), brightest,    mean_over_sphere(image)};
 }
 
 void load_maps(const EnvironmentSpec& environment, AssetReport& report,
@@ -54,6 +70,7 @@ void load_geometry(const JobSpec& job, AssetReport& report, std::vector<std::str
   for (const TriangleMesh& mesh : scene->meshes) report.dropped_triangles += mesh.dropped_triangles;
   for (const Instance& instance : scene->instances) {
     report.triangles += scene->meshes[instance.mesh].triangles.size();
+    report.objects_move = report.objects_move || instance.moves();
   }
   report.odd_objects = object_warnings(job, *scene);
 }

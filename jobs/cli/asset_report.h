@@ -17,13 +17,16 @@ struct MapReport {
   std::uint64_t repaired_texels = 0;    ///< negative, NaN or infinite ones, taken as 0
   bool black = false;
   float brightest = 0;  ///< the largest finite channel of the file
+  float mean = 0;       ///< radiance over the sphere and the three channels, of finite ones
 };
 
 /// The geometry of the job, as loaded.
 struct AssetReport {
   std::vector<MapReport> maps;  ///< in the order of their first key
+  bool every_map = true;        ///< else some were left out
   std::uint64_t meshes = 0, instances = 0;
-  std::uint64_t triangles = 0;           ///< of all instances
+  std::uint64_t triangles = 0;  ///< of all instances
+  bool objects_move = false;
   std::uint64_t dropped_triangles = 0;   ///< of all meshes: without area
   std::vector<std::string> odd_objects;  ///< object_warnings
 };

@@ -9,6 +9,7 @@
 #include "jobs/cli/commands.h"
 #include "jobs/cli/farm_job_runner.h"
 #include "jobs/study/study_report.h"
+#include "jobs/study/verdict.h"
 #include "worker/scene/settle_motion.h"
 
 namespace baton {
@@ -87,6 +88,10 @@ Result<ExitCode> run_chart(const ChartOptions& options) {
   BATON_TRY(settle_study(study, folder, runner));
   BATON_ASSIGN(const StudyResults results, run_study(study, folder, runner));
   BATON_ASSIGN(const fs::path report, write_report(study, results, folder, output, machine_name()));
+  const std::vector<CellSummary> rows = summarize_study(study, results);
+  for (const Verdict& verdict : verdicts(study, results, rows)) {
+    fmt::print("{:<24} {}\n", study.scenes[verdict.scene].name + ":", verdict_text(study, verdict));
+  }
   fmt::print("{}\n", report.string());
   return ExitCode::ok;
 }

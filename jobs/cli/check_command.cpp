@@ -6,10 +6,13 @@
 #include "common/job/frame_range.h"
 #include "common/job/job_json.h"
 #include "common/job/motion.h"
+#include "jobs/auto/unit_costs.h"
 #include "jobs/cli/asset_report.h"
 #include "jobs/cli/commands.h"
 #include "jobs/cli/job_argument.h"
 #include "jobs/cli/job_warnings.h"
+#include "jobs/cli/scene_picture.h"
+#include "jobs/cli/settle_method.h"
 #include "jobs/cli/text.h"
 
 namespace baton {
@@ -19,6 +22,7 @@ using nlohmann::ordered_json;
 
 struct CheckOptions {
   JobArgument job;
+  std::string picture;  ///< a look at the scene as PNG; empty: none
   bool explain = false;
   bool json = false;
 };
@@ -32,7 +36,8 @@ ordered_json settings_json(const std::vector<JobSetting>& settings) {
 }
 
 void print_json(const JobSpec& job, const JobEstimate& e, const AssetReport& assets,
-                const std::vector<std::string>& warnings, const std::vector<JobSetting>& settings) {
+                const std::vector<std::string>& warnings, const std::vector<JobSetting>& settings,
+                const PilotPlan& plan) {
   ordered_json maps = ordered_json::array();
   for (const MapReport& map : assets.maps) {
     maps.push_back({{"path", map.path},
@@ -57,6 +62,7 @@ void print_json(const JobSpec& job, const JobEstimate& e, const AssetReport& ass
                          {"frameBytes", e.frame_bytes},
                          {"stateBytesPerPixel", e.state_bytes_per_pixel},
                          {"stateBytes", e.state_bytes},
+                         {"diskBytes", estimate_disk(job).total()},
                          {"motionMaxPx", moves(job) ? job.motion.max_px : 0},
                          {"outputDirectory", job.output.directory},
                          {"meshes", assets.meshes},
@@ -65,6 +71,12 @@ void print_json(const JobSpec& job, const JobEstimate& e, const AssetReport& ass
                          {"droppedTriangles", assets.dropped_triangles},
                          {"maps", std::move(maps)},
                          {"warnings", warnings}};
+  if (plan.candidates > 0) {
+    result["pilot"] = {{"candidates", plan.candidates},
+                       {"frames", plan.frames},
+                       {"pixels", plan.pixels},
+                       {"cpuSeconds", plan.cpu_seconds}};
+  }
   if (!settings.empty()) result["settings"] = settings_json(settings);
   fmt::print("{}\n", result.dump(2));
 }
@@ -103,8 +115,10 @@ void print_text(const JobSpec& job, const JobEstimate& e, const AssetReport& ass
                e.state_bytes_per_pixel, total(e.state_bytes));
   }
   fmt::print("film       {} channels, {} a frame in tiles\n", e.film_channels, total(e.film_bytes));
-  fmt::print("disk       at most {} a frame, {} for all\n", total(e.frame_bytes),
-             total(e.frame_bytes * e.frames));
+  const DiskEstimate disk = estimate_disk(job);
+  fmt::print("disk       at most {}: frames {} ({} each), states {}, tiles on their way {}\n",
+             total(disk.total()), total(disk.frames), total(e.frame_bytes), total(disk.states),
+             total(disk.films));
   fmt::print("output     {}/{}\n", job.output.directory, job.output.pattern);
 }
 
@@ -113,6 +127,17 @@ void print_settings(const std::vector<JobSetting>& settings) {
   for (const JobSetting& s : settings) {
     fmt::print("{} {} = {}\n", s.given ? "given  " : "default", s.path, s.value);
   }
+}
+
+Status write_picture(const CheckOptions& options, const JobSpec& job) {
+  if (options.picture.empty()) return {};
+  BATON_ASSIGN(const Scene scene, load_scene(job));
+  BATON_TRY(write_png(options.picture, scene_picture(job, scene)));
+  if (options.json) return {};
+  for (const std::string& line : object_lines(job, scene)) fmt::print("object     {}\n", line);
+  fmt::print("picture    {}: frame {} as the camera sees it, and from outside\n", options.picture,
+             job.frames.front());
+  return {};
 }
 
 Result<ExitCode> run_check(const CheckOptions& options) {
@@ -126,10 +151,18 @@ Result<ExitCode> run_check(const CheckOptions& options) {
 
   const JobEstimate estimate = estimate_job(job);
   const std::vector<std::string> warnings = job_warnings(job, assets);
+  const PilotPlan plan =
+      job.sampling.method == Method::automatic
+          ? plan_pilot(job, ray_cost_factor(assets.triangles, assets.objects_move))
+          : PilotPlan{};
   if (options.json) {
-    print_json(job, estimate, assets, warnings, settings);
+    BATON_TRY(write_picture(options, job));
+    print_json(job, estimate, assets, warnings, settings, plan);
   } else {
     print_text(job, estimate, assets);
+    if (job.sampling.method == Method::automatic)
+      fmt::print("pilot      before the first frame: {}\n", pilot_text(plan));
+    BATON_TRY(write_picture(options, job));
     for (const std::string& warning : warnings) fmt::print("warning    {}\n", warning);
     if (options.explain) print_settings(settings);
   }
@@ -143,10 +176,15 @@ void add_check_command(CLI::App& app, ExitCode& code) {
   CLI::App* command =
       app.add_subcommand("check", "Checks a job with all its files; shows what it will take");
   add_job_argument(*command, options->job);
+  command->add_option(
+      "--picture", options->picture,
+      "writes a cheap look at the scene as PNG: objects with names and bounds, axes, "
+      "the camera's view");
   command->add_flag("--explain", options->explain, "also every value in force, given or default");
   command->add_flag("--json", options->json, "for machines");
   command->footer(
-      "Examples:\n  baton check job.json\n  baton check job.json --explain | grep sampling");
+      "Examples:\n  baton check job.json\n  baton check job.json --explain | grep sampling\n"
+      "  baton check job.json --picture scene.png");
   command->callback([options, &code] { code = finish(run_check(*options)); });
 }
 

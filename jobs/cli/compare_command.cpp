@@ -49,6 +49,7 @@ JobSpec with_seed(JobSpec job, std::size_t number, std::uint64_t more, const fs:
   job.output.background = Background::transparent;
   job.output.aovs = {Aov::normal, Aov::depth};
   job.output.pixel_type = PixelType::full_float;
+  job.output.clamp_negative = false;
   return job;
 }
 

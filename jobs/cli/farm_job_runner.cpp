@@ -3,9 +3,8 @@
 #include <fmt/format.h>
 #include <fmt/ranges.h>
 #include <spdlog/spdlog.h>
-#include <unistd.h>
 
-#include <numeric>
+#include <chrono>
 
 #include "common/job/job_json.h"
 #include "jobs/cli/job_summary.h"
@@ -14,52 +13,40 @@
 namespace baton {
 namespace {
 
-using Clock = std::chrono::steady_clock;
-
 constexpr std::size_t kMaxOpenJobs = 8;
 constexpr std::chrono::milliseconds kPause{20};
-constexpr std::chrono::seconds kLineInterval{5};
+/// How long a coordinator that has answered may be away, and one question may take.
+constexpr std::chrono::minutes kAwayPatience{5};
+constexpr std::chrono::seconds kAnswerPatience{2};
 
 Error stopped() { return {ErrorKind::cancelled, "stopped; finished runs are kept"}; }
-
-/// Says now and then how far it is.
-class Count {
- public:
-  explicit Count(const std::vector<JobSpec>& jobs)
-      : num_jobs_(jobs.size()), frames_done_(num_jobs_) {
-    for (const JobSpec& job : jobs) num_frames_ += job.frames.size();
-  }
-
-  void has_frames(std::size_t job, std::size_t done) { frames_done_[job] = done; }
-  void update(std::size_t jobs_done) {
-    const Clock::time_point now = Clock::now();
-    const bool terminal = ::isatty(STDERR_FILENO) == 1;
-    if (jobs_done < num_jobs_ && now < next_) return;
-    next_ = now + (terminal ? kPause : kLineInterval);
-    const double seconds = std::chrono::duration<double>(now - start_).count();
-    const auto done = std::accumulate(frames_done_.begin(), frames_done_.end(), std::size_t{0});
-    const auto left = static_cast<double>(num_frames_ - done);
-    fmt::print(stderr, "{}runs {}/{}  frames {}/{}  ETA {}{}", terminal ? "\r" : "", jobs_done,
-               num_jobs_, done, num_frames_,
-               done > 0 ? duration_text(left * seconds / static_cast<double>(done)) : "?",
-               terminal && jobs_done < num_jobs_ ? "\x1b[K" : "\n");
-  }
-
- private:
-  std::size_t num_jobs_, num_frames_ = 0;
-  std::vector<std::size_t> frames_done_;  ///< by job
-  Clock::time_point start_ = Clock::now();
-  Clock::time_point next_ = start_;
-};
 
 }  // namespace
 
 FarmJobRunner::~FarmJobRunner() {
+  finish_count();
   if (farm_) farm_->stop();
 }
 
+void FarmJobRunner::count_as_one(std::string label, std::size_t expected_frames) {
+  whole_.emplace(std::move(label), expected_frames);
+}
+
+void FarmJobRunner::finish_count() {
+  if (whole_) whole_->finish();
+}
+
+void FarmJobRunner::say(const std::string& text) {
+  if (!whole_) JobRunner::say(text);
+}
+
 Status FarmJobRunner::start() {
-  if (farm_) return {};
+  if (client_) return {};
+  if (!coordinator_.empty()) {
+    BATON_ASSIGN(RequestClient client, RequestClient::connect(coordinator_));
+    client_.emplace(std::move(client));
+    return {};
+  }
   BATON_ASSIGN(LocalFarm farm, LocalFarm::start(options_));
   BATON_ASSIGN(RequestClient client, RequestClient::connect(farm.endpoint()));
   farm_.emplace(std::move(farm));
@@ -67,19 +54,30 @@ Status FarmJobRunner::start() {
   return {};
 }
 
+template <class A>
+Result<std::optional<A>> FarmJobRunner::ask_about(const Message& question) {
+  if (farm_) return ask_farm<A>(*farm_, *client_, signals_, question);
+  const auto end = std::chrono::steady_clock::now() + kAwayPatience;
+  for (;;) {
+    Result<A> answer = baton::ask<A>(*client_, question, kAnswerPatience);
+    if (answer) return std::optional<A>(std::move(answer).value());
+    const bool away = answer.error().kind == ErrorKind::timeout;
+    if (!away || std::chrono::steady_clock::now() > end) return answer.error();
+    if (signals_.stop_requested_within(kFarmPollInterval)) return std::optional<A>();
+  }
+}
+
 Status FarmJobRunner::submit(const JobSpec& job, std::size_t index, std::vector<Open>& open) {
   BATON_ASSIGN(std::string document, make_job_document(job));
   BATON_ASSIGN(const std::optional<JobAccepted> accepted,
-               ask_farm<JobAccepted>(*farm_, *client_, signals_,
-                                     SubmitJob{std::move(document), /*restart=*/true}));
+               ask_about<JobAccepted>(SubmitJob{std::move(document), /*restart=*/true}));
   if (!accepted) return stopped();
   open.push_back({index, accepted->job});
   return {};
 }
 
 Result<JobSummary> FarmJobRunner::ask(Open& job, const JobSpec& spec) {
-  BATON_ASSIGN(const std::optional<JobDetail> detail,
-               ask_farm<JobDetail>(*farm_, *client_, signals_, ShowJob{job.job.hex()}));
+  BATON_ASSIGN(const std::optional<JobDetail> detail, ask_about<JobDetail>(ShowJob{job.job.hex()}));
   if (!detail) return stopped();
   const JobSummary& summary = detail->summary;
   if (!detail->waits.empty() && job.waits.empty())
@@ -97,7 +95,9 @@ Result<JobSummary> FarmJobRunner::ask(Open& job, const JobSpec& spec) {
 Status FarmJobRunner::run(const std::vector<JobSpec>& jobs,
                           const std::function<Status(std::size_t, const JobSummary&)>& done) {
   BATON_TRY(start());
-  Count count(jobs);
+  RunCount own;
+  RunCount& count = whole_ ? *whole_ : own;
+  const std::size_t first = count.add(jobs);
   std::vector<Open> open;
   std::size_t next = 0, num_done = 0;
   while (num_done < jobs.size()) {
@@ -107,19 +107,22 @@ Status FarmJobRunner::run(const std::vector<JobSpec>& jobs,
     }
     for (std::size_t i = 0; i < open.size();) {
       BATON_ASSIGN(const JobSummary summary, ask(open[i], jobs[open[i].index]));
-      count.has_frames(open[i].index, summary.frames_done);
+      count.has_frames(first + open[i].index, summary.frames_done);
       if (is_open(summary.status)) {
         ++i;
         continue;
       }
       BATON_TRY(done(open[i].index, summary));
+      if (!farm_) BATON_TRY(ask_about<JobList>(DeleteJob{open[i].job.hex()}));
+      count.job_done();
       open.erase(open.begin() + static_cast<std::ptrdiff_t>(i));
       ++num_done;
     }
-    count.update(num_done);
+    count.update();
     if (signals_.stop_requested_within(kPause)) return stopped();
-    BATON_TRY(farm_->tend());
+    if (farm_) BATON_TRY(farm_->tend());
   }
+  own.finish();
   return {};
 }
 

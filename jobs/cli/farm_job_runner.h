@@ -3,18 +3,25 @@
 #include <string>
 
 #include "jobs/cli/ask_farm.h"
-#include "jobs/cli/progress.h"
+#include "jobs/cli/run_count.h"
 #include "jobs/study/study_runner.h"
 
 namespace baton {
 
-/// Renders jobs with a local farm that lives as long as the runner. The farm starts with the first
-/// job. A few jobs are submitted at a time, so that workers never wait for the next; they keep
-/// their place in the farm's journal, and go on where they stopped.
+/// Renders jobs with a local farm that lives as long as the runner and starts with the first job,
+/// or with the farm of a coordinator that runs already, which forgets them when they are done. A
+/// few jobs are submitted at a time, so that workers never wait for the next; they keep their place
+/// in the farm's journal, and go on where they stopped.
 class FarmJobRunner final : public JobRunner {
  public:
   explicit FarmJobRunner(FarmOptions options) : options_(std::move(options)) {}
+  explicit FarmJobRunner(std::string coordinator) : coordinator_(std::move(coordinator)) {}
   ~FarmJobRunner() override;
+
+  /// Counts all that is run from now on in one line, instead of a line for each call of run().
+  void count_as_one(std::string label, std::size_t expected_frames);
+  void finish_count();
+  void say(const std::string& text) override;
 
   /// Error: cancelled when the user asked to stop.
   Status run(const std::vector<JobSpec>& jobs,
@@ -28,11 +35,16 @@ class FarmJobRunner final : public JobRunner {
   };
 
   Status start();
+  /// nullopt when the user asked to stop.
+  template <class A>
+  Result<std::optional<A>> ask_about(const Message& question);
   Status submit(const JobSpec& job, std::size_t index, std::vector<Open>& open);
   /// How far the job is; says once what it waits for. Error: it has failed.
   Result<JobSummary> ask(Open& job, const JobSpec& spec);
 
   FarmOptions options_;
+  std::string coordinator_;  ///< empty: a local farm
+  std::optional<RunCount> whole_;
   SignalWait signals_;
   std::optional<LocalFarm> farm_;
   std::optional<RequestClient> client_;

@@ -33,20 +33,12 @@ struct JobOptions {
   bool json = false;
 };
 
-/// A pilot runs here, whatever machines the farm has.
-FarmOptions pilot_farm(const JobSpec& job) {
-  const int processors = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
-  return {.workers = 1,
-          .threads_per_worker = processors,
-          .work_directory = std::filesystem::path(job.output.directory) / ".baton"};
-}
-
 Result<ExitCode> submit(const JobOptions& options, RequestClient& client) {
   BATON_ASSIGN(WantedJob wanted, load_settled(options.wanted));
   JobSpec& job = wanted.job;
   // A pilot takes its time: first see that there is somebody to submit to.
   if (job.sampling.method == Method::automatic) BATON_TRY(ask<JobList>(client, ListJobs{}));
-  BATON_TRY(settle_method(job, pilot_farm(job)));
+  BATON_TRY(settle_method_at(job, options.endpoint));
   BATON_ASSIGN(std::string document, make_job_document(job));
   BATON_ASSIGN(
       const JobAccepted accepted,
@@ -84,7 +76,7 @@ void print_detail(const JobDetail& detail, bool json) {
   fmt::print("{}\n", job_line(detail.summary));
   fmt::print("output     {}\n", detail.summary.output_directory);
   if (!detail.frames_done.empty()) fmt::print("frames     {}\n", format_frames(detail.frames_done));
-  fmt::print("{}", job_statistics(detail.summary));
+  fmt::print("{}{}", job_statistics(detail.summary), judgement_text(detail));
   if (!detail.waits.empty()) fmt::print("waits      {}\n", detail.waits);
   for (const std::string& failure : detail.failures) fmt::print("failure    {}\n", failure);
 }

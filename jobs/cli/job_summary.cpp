@@ -2,6 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <span>
+
+#include "common/job/frame_judgement.h"
 #include "jobs/cli/text.h"
 
 namespace baton {
@@ -9,6 +12,8 @@ namespace baton {
 using nlohmann::ordered_json;
 
 namespace {
+
+constexpr std::size_t kMostOdd = 5;
 
 /// Appends the counters to an object.
 void add_sampling(const SamplingStats& s, ordered_json& object) {
@@ -23,6 +28,47 @@ void add_sampling(const SamplingStats& s, ordered_json& object) {
   object["independentMovesProposed"] = s.independent_proposed;
   object["independentMovesAccepted"] = s.independent_accepted;
   object["essHistogram"] = s.ess_histogram;
+}
+
+std::string percent(float share) { return fmt::format("{:.2g} %", 100 * share); }
+
+/// As numbers a reader of JSON may compare with: null where nothing tells the noise.
+void add_quality(const FrameQuality& q, ordered_json& row) {
+  if (q.pixels == 0) return;
+  if (q.noise_source != NoiseSource::none) {
+    row["noise"] = q.noise;
+    row["noiseFrom"] = noise_source_name(q.noise_source);
+  }
+  row["mean"] = q.mean;
+  row["pixelsBelowZero"] = q.pixels_below_zero;
+  row["lowest"] = q.lowest;
+  row["lightBelowZero"] = q.light_below_zero;
+  row["clamped"] = q.clamped;
+  row["pixelsBeyondHalf"] = q.pixels_beyond_half;
+  row["pixelsNotFinite"] = q.pixels_not_finite;
+}
+
+ordered_json judgement_json(std::span<const FrameStats> frames) {
+  const Judgement j = judge_frames(frames);
+  ordered_json odd = ordered_json::array();
+  for (const OddFrame& frame : j.odd) {
+    odd.push_back({{"frame", frame.frame},
+                   {"by", frame.by_noise ? "noise" : "mean"},
+                   {"ratio", frame.ratio}});
+  }
+  ordered_json result = {{"frames", j.frames},
+                         {"noise", nullptr},
+                         {"noiseFrom", noise_source_name(j.noise_source)},
+                         {"framesThatStandOut", odd},
+                         {"pixelsBelowZero", j.pixels_below_zero},
+                         {"lowest", j.lowest},
+                         {"lightBelowZero", j.light_below_zero},
+                         {"clamped", j.clamped},
+                         {"pixelsBeyondHalf", j.pixels_beyond_half},
+                         {"pixelsNotFinite", j.pixels_not_finite},
+                         {"pixelsAfresh", j.carries ? j.pixels_afresh : 0}};
+  if (j.noise_source != NoiseSource::none) result["noise"] = j.noise;
+  return result;
 }
 
 }  // namespace
@@ -81,6 +127,51 @@ std::string job_statistics(const JobSummary& job) {
   return text;
 }
 
+std::string judgement_text(const JobDetail& detail) {
+  const Judgement j = judge_frames(detail.frames);
+  if (j.frames == 0) return "";
+  std::string text;
+  if (j.noise_source != NoiseSource::none) {
+    text += fmt::format("noise      {} of the radiance", percent(j.noise));
+    if (j.frames > 1) {
+      text += fmt::format(", by frame {} to {} (frame {})", percent(j.noise_least),
+                          percent(j.noise_most), j.noisiest);
+    }
+    text += j.noise_source == NoiseSource::halves
+                ? "; told from two halves of each pixel\n"
+                : "; told from neighbouring pixels, so edges and texture count, too\n";
+  }
+  for (std::size_t i = 0; i < j.odd.size() && i < kMostOdd; ++i) {
+    text +=
+        fmt::format("stands out frame {}: {} {:.3g} times that of the frames around it\n",
+                    j.odd[i].frame, j.odd[i].by_noise ? "noise" : "mean radiance", j.odd[i].ratio);
+  }
+  if (j.odd.size() > kMostOdd)
+    text += fmt::format("           and {} more, in --json\n", j.odd.size() - kMostOdd);
+  if (j.carries && j.pixels_afresh > 0) {
+    text +=
+        fmt::format("afresh     {} of the pixels after the first frame had nothing to go on from\n",
+                    percent_text(j.pixels_afresh, j.pixels_after_first));
+  }
+  if (j.pixels_below_zero > 0) {
+    text += fmt::format(
+        "below zero {} pixels in {} frames, the lowest {:.3g}; {} {:.2g} % of the light\n",
+        j.pixels_below_zero, j.frames_below_zero, j.lowest,
+        j.clamped ? "set to 0, which adds" : "kept; to set them to 0 would add",
+        100 * j.light_below_zero);
+  }
+  if (j.pixels_beyond_half > 0) {
+    text += fmt::format(
+        "very bright {} pixels in {} frames are above 65504: R, G and B of these frames have 32 "
+        "bits\n",
+        j.pixels_beyond_half, j.frames_beyond_half);
+  }
+  if (j.pixels_not_finite > 0)
+    text += fmt::format("WRONG      {} pixels are NaN or infinite: please report this\n",
+                        j.pixels_not_finite);
+  return text;
+}
+
 std::string worker_line(const WorkerSummary& worker) {
   return fmt::format("{:<24}  {:>3} threads  {:>3} leases  process {} on {}", worker.worker_id,
                      worker.num_threads, worker.leases, worker.pid, worker.host);
@@ -126,10 +217,12 @@ ordered_json detail_json(const JobDetail& detail) {
   ordered_json result = summary_json(detail.summary);
   result["framesDoneNumbers"] = detail.frames_done;
   if (!detail.waits.empty()) result["waits"] = detail.waits;
+  result["judgement"] = judgement_json(detail.frames);
   result["frames"] = ordered_json::array();
   for (const FrameStats& frame : detail.frames) {
     ordered_json row = {{"frame", frame.frame}};
     add_sampling(frame.sampling, row);
+    add_quality(frame.quality, row);
     result["frames"].push_back(std::move(row));
   }
   result["failures"] = detail.failures;

@@ -17,6 +17,9 @@ std::string job_line(const JobSummary& job);
 /// What the job has done so far, several lines.
 std::string job_statistics(const JobSummary& job);
 
+/// What is to be known of the frames that are written, several lines; empty: none is.
+std::string judgement_text(const JobDetail& detail);
+
 /// The worker's line in a list.
 std::string worker_line(const WorkerSummary& worker);
 nlohmann::ordered_json worker_json(const WorkerSummary& worker);

@@ -4,10 +4,13 @@
 #include <spdlog/spdlog.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <filesystem>
+#include <map>
 
 #include "common/job/estimate.h"
 #include "common/job/job_fields.h"
+#include "common/job/known_limits.h"
 #include "common/job/sequence.h"
 #include "jobs/cli/text.h"
 
@@ -16,10 +19,11 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Checkpoints that stay in the work folder beside what is being written.
-constexpr std::int64_t kCheckpointsKept = 3;
 /// Maps that are looked at while a job is rendered.
 constexpr std::size_t kMostMaps = 16;
+/// Factor by which the light's mean changes in a jump, and how many jumps are told one by one.
+constexpr float kJump = 2;
+constexpr std::size_t kMostJumps = 3;
 
 void map_warnings(const MapReport& map, std::vector<std::string>& warnings) {
   const auto add = [&](const std::string& text) { warnings.push_back(map.path + ": " + text); };
@@ -42,13 +46,48 @@ void map_warnings(const MapReport& map, std::vector<std::string>& warnings) {
   }
 }
 
-/// What all frames, and the checkpoints that are kept, take before compression.
-std::int64_t bytes_of(const JobSpec& job) {
-  const JobEstimate e = estimate_job(job);
-  const std::int64_t checkpoints = job.state.keep == StateKeep::all
-                                       ? e.frames / job.state.checkpoint_every + 1
-                                       : kCheckpointsKept;
-  return e.frame_bytes * e.frames + e.state_bytes * checkpoints;
+/// Between two of the job's frames.
+struct LightJump {
+  int from = 0, to = 0;
+  float ratio = 1;  ///< of the mean radiance; 1: only the map is another one
+};
+
+/// Where the light changes at once: its mean by a factor of two, or from one key's map to another's
+/// within a frame. Numbered maps are a film, so that there only the mean tells.
+std::vector<LightJump> light_jumps(const JobSpec& job, const AssetReport& assets) {
+  std::vector<LightJump> jumps;
+  if (!assets.every_map) return jumps;
+  std::map<std::string, float> means;
+  for (const MapReport& map : assets.maps) means[map.path] = map.mean;
+  const std::vector<EnvironmentKey>& keys = job.environment.keys;
+  const auto key = [&](std::int32_t i) -> const EnvironmentKey& {
+    return keys[static_cast<std::size_t>(i)];
+  };
+  const auto level = [&](const EnvironmentFrame& at) {
+    return (1 - at.mix) * means[key(at.map_a).map] + at.mix * means[key(at.map_b).map];
+  };
+  for (std::size_t i = 1; i < job.frames.size(); ++i) {
+    const int from = job.frames[i - 1], to = job.frames[i];
+    if (to != from + 1) continue;  // frames between them were left out on purpose
+    const EnvironmentFrame a = environment_at(job.environment, from);
+    const EnvironmentFrame b = environment_at(job.environment, to);
+    const float before = level(a), after = level(b);
+    const float ratio = before > 0 ? after / before : 1.0f;
+    const bool cut = job.environment.interpolate && a.mix == 0 && b.mix == 0 &&
+                     key(a.map_a).map != key(b.map_a).map;
+    if (ratio > kJump || ratio * kJump < 1)
+      jumps.push_back({from, to, ratio});
+    else if (cut)
+      jumps.push_back({from, to});
+  }
+  return jumps;
+}
+
+std::string jump_text(const LightJump& jump) {
+  if (jump.ratio == 1)
+    return fmt::format("the light jumps from frame {} to {}: another map", jump.from, jump.to);
+  return fmt::format("the light jumps from frame {} to {}: {:.3g} times as bright", jump.from,
+                     jump.to, jump.ratio);
 }
 
 void output_warnings(const JobSpec& job, std::vector<std::string>& warnings) {
@@ -60,9 +99,9 @@ void output_warnings(const JobSpec& job, std::vector<std::string>& warnings) {
     warnings.push_back(
         fmt::format("{}: {} cannot be written", job.output.directory, folder.string()));
   const fs::space_info space = fs::space(folder, error);
-  const auto needed = static_cast<std::uint64_t>(bytes_of(job));
+  const auto needed = static_cast<std::uint64_t>(estimate_disk(job).total());
   if (!error && space.available < needed) {
-    warnings.push_back(fmt::format("{}: {} are free, and frames and state may take {}",
+    warnings.push_back(fmt::format("{}: {} are free, and frames, states and tiles may take {}",
                                    job.output.directory, bytes_text(space.available),
                                    bytes_text(needed)));
   }
@@ -78,7 +117,7 @@ std::string_view why_empty(Aov aov, const JobSpec& job) {
     case Aov::resampled:
       return method == Method::sequential ? "" : "only `sequential` fills it";
     case Aov::variance:
-      return traits(method).keeps_samples ? "only `reference`, `pool` and `ratio` fill it" : "";
+      return traits(method).tells_variance() ? "" : "only `reference`, `pool` and `ratio` fill it";
     case Aov::ess:
       return traits(method).keeps_samples ? "" : "the method's rays have no weights";
     default:
@@ -104,6 +143,13 @@ std::vector<std::string> job_warnings(const JobSpec& job, const AssetReport& ass
         fmt::format("{} triangles without area are left out", assets.dropped_triangles));
   }
   warnings.insert(warnings.end(), assets.odd_objects.begin(), assets.odd_objects.end());
+  const std::vector<LightJump> jumps = light_jumps(job, assets);
+  for (std::size_t i = 0; i < std::min(jumps.size(), kMostJumps); ++i)
+    warnings.push_back(jump_text(jumps[i]));
+  if (jumps.size() > kMostJumps)
+    warnings.push_back(fmt::format("the light jumps {} more times", jumps.size() - kMostJumps));
+  for (std::string& warning : limit_warnings(job, !jumps.empty()))
+    warnings.push_back(std::move(warning));
   aov_warnings(job, warnings);
   output_warnings(job, warnings);
   return warnings;
@@ -112,13 +158,15 @@ std::vector<std::string> job_warnings(const JobSpec& job, const AssetReport& ass
 WarningsAside::WarningsAside(JobSpec job)
     : thread_([job = std::move(job)]() mutable {
         std::vector<EnvironmentKey>& keys = job.environment.keys;
+        const std::size_t num_keys = keys.size();
         if (keys.size() > kMostMaps) {
           const std::size_t stride = (keys.size() + kMostMaps - 1) / kMostMaps;
           for (std::size_t i = 0; i * stride < keys.size(); ++i) keys[i] = keys[i * stride];
           keys.resize((keys.size() + stride - 1) / stride);
         }
-        const Result<AssetReport> assets = load_assets(job);
+        Result<AssetReport> assets = load_assets(job);
         if (!assets) return;
+        assets->every_map = num_keys == keys.size();
         for (const std::string& warning : job_warnings(job, *assets)) spdlog::warn("{}", warning);
       }) {}
 

@@ -10,8 +10,9 @@ namespace baton {
 
 /// What a person should know before the job is rendered, one line each, in the order of the files:
 /// maps that are black, of low dynamic range, not twice as wide as high, or with texels that count
-/// as 0; dropped triangles; objects that no frame shows; an output folder that cannot be written or
-/// has too little room. assets: of this job, with settled motion.
+/// as 0; dropped triangles; objects that no frame shows; light that jumps; a method that is known
+/// to fail under it; AOVs that say nothing; an output folder that cannot be written or has too
+/// little room. assets: of this job, with settled motion.
 std::vector<std::string> job_warnings(const JobSpec& job, const AssetReport& assets);
 
 /// Says on stderr what job_warnings says, while the job is rendered already: files are read by a

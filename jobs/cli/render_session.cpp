@@ -29,7 +29,7 @@ void print_result(const JobSpec& job, const JobDetail& detail, double seconds) {
   fmt::print("job        {} in {:.1f} s\n", job_status_name(detail.summary.status), seconds);
   fmt::print("frames     {} of {} in {}/{}\n", detail.summary.frames_done,
              detail.summary.frames_total, job.output.directory, job.output.pattern);
-  fmt::print("{}", job_statistics(detail.summary));
+  fmt::print("{}{}", job_statistics(detail.summary), judgement_text(detail));
 }
 
 /// A sheet that cannot be made is no failure of the job.

@@ -2,6 +2,8 @@
 
 #include <array>
 #include <filesystem>
+#include <optional>
+#include <string>
 #include <vector>
 
 #include "common/image/image_io.h"
@@ -45,6 +47,7 @@ struct Reference {
   double flip = 0;     ///< mean FLIP between R and A, which is as far from R as R from the truth
   /// The same for the mean of R, G, B, by the variance that brute force reports of itself.
   double reported_mse = 0;
+  double grey_mse = 0;  ///< by the halves, to compare it with
   double lns_mean = 0;  ///< over lit pixels
 };
 
@@ -52,5 +55,9 @@ struct Reference {
 inline constexpr double kRelativeFloor = 0.01;
 
 Reference make_reference(Picture a, Picture b);
+
+/// Why a reference is not what it says: its halves differ by more than twice the error that it
+/// reports. nullopt: it may be trusted. Some 60 pixels are needed to say so.
+std::optional<std::string> reference_fault(const Reference& reference);
 
 }  // namespace baton

@@ -2,17 +2,22 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
 #include <iterator>
+#include <span>
 
 #include "common/base/version.h"
 #include "jobs/study/auto_table.h"
 #include "jobs/study/svg_text.h"
+#include "jobs/study/verdict.h"
 
 namespace baton {
 namespace {
 
 constexpr int kFewSeeds = 20;
+/// Charts of a scene that are shown, over all frames and frame by frame; the others are folded.
+constexpr std::size_t kShownOverview = 3, kShownCourses = 2;
 
 constexpr const char* kStyle = R"(
 body{font:14px/1.45 Helvetica,Arial,sans-serif;margin:2em auto;max-width:1320px;color:#222}
@@ -91,10 +96,26 @@ std::string reference_note(const Study& study, const StudyResults& results, std:
       study.scenes[scene].frames.size());
 }
 
-std::string charts_block(const std::vector<std::string>& svgs) {
+std::string charts_block(std::span<const std::string> svgs) {
   std::string html = "<div class=\"charts\">\n";
   for (const std::string& svg : svgs) html += svg;
   return html + "</div>\n";
+}
+
+std::string folded(const char* title, std::span<const std::string> svgs) {
+  if (svgs.empty()) return "";
+  return fmt::format("<details><summary>{}: {} charts</summary>{}</details>\n", title, svgs.size(),
+                     charts_block(svgs));
+}
+
+std::string verdict_list(const Study& study, const StudyResults& results,
+                         const std::vector<CellSummary>& rows) {
+  std::string html = "<ul class=\"verdicts\">\n";
+  for (const Verdict& verdict : verdicts(study, results, rows)) {
+    html += fmt::format("<li><b>{}</b>: {}</li>\n", escaped(study.scenes[verdict.scene].name),
+                        escaped(verdict_text(study, verdict)));
+  }
+  return html + "</ul>\n";
 }
 
 std::string crops_block(const Study& study, const StudyResults& results, std::size_t scene,
@@ -134,17 +155,21 @@ std::string report_html(const Study& study, const StudyResults& results,
       "best; above 1 is better. {5}</p>\n",
       escaped(study.name), kStyle, kVersion, escaped(machine), study.num_seeds,
       study.num_seeds < kFewSeeds ? "<b>Fewer than 20 seeds: the bands are rough.</b>" : "");
+  html += verdict_list(study, results, rows);
   html += auto_html(study, results);
   for (std::size_t i = 0; i < scenes.size(); ++i) {
     html += fmt::format("<h2>{}</h2>\n", escaped(study.scenes[i].name));
     html += reference_note(study, results, i);
-    html += charts_block(scenes[i].overview);
+    const std::span<const std::string> overview(scenes[i].overview), courses(scenes[i].courses);
+    const std::size_t overviews = std::min(overview.size(), kShownOverview);
+    const std::size_t shown = std::min(courses.size(), kShownCourses);
+    html += charts_block(overview.first(overviews));
     html += summary_table(study, i, rows);
     html += crops_block(study, results, i, scenes[i].crops);
-    if (!scenes[i].courses.empty())
-      html += "<h3>Over the frames</h3>" + charts_block(scenes[i].courses);
-    html += "<details><summary>Each frame by itself</summary>" + charts_block(scenes[i].frames) +
-            "</details>\n";
+    if (shown > 0) html += "<h3>Over the frames</h3>" + charts_block(courses.first(shown));
+    html += folded("Against rays instead of time", overview.subspan(overviews));
+    html += folded("More over the frames", courses.subspan(shown));
+    html += folded("Each frame by itself", scenes[i].frames);
   }
   return html + "</body></html>\n";
 }

@@ -23,6 +23,10 @@ constexpr int kMaxSeeds = 10000;
 /// Far from the seeds of runs, which count from 1.
 constexpr std::uint64_t kReferenceSeed = 1'000'000'000;
 
+/// All runs and the reference see the same points of the scene, or the noise of edges would count
+/// as that of the light.
+constexpr std::uint64_t kSiteSeed = 1;
+
 struct Budget {
   std::string name;
   StudyPatch patch;
@@ -84,8 +88,10 @@ std::vector<MethodEntry> read_methods(StudyObject& study, StudyFaults& faults) {
 void prepare_output(JobSpec& job) {
   job.output.background = Background::transparent;
   job.output.pixel_type = PixelType::full_float;
+  job.output.clamp_negative = false;
   job.output.pattern = kFramePattern;
   job.state.keep = StateKeep::last;
+  if (job.image.site_seed == 0) job.image.site_seed = kSiteSeed;
   std::vector<Aov>& aovs = job.output.aovs;
   aovs.insert(aovs.end(), {Aov::lns, Aov::ess, Aov::acceptance});
   std::sort(aovs.begin(), aovs.end());

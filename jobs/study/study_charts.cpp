@@ -91,8 +91,8 @@ ChartPoint course_point(const Course& course, const StudyResults& results, std::
 std::vector<NamedChart> error_charts(const Study& study, const StudyResults& results,
                                      std::size_t scene, FrameChoice frame) {
   std::vector<NamedChart> charts;
-  for (const ErrorKindOfImage kind : kImageErrors) {
-    for (const bool against_rays : {false, true}) {
+  for (const bool against_rays : {false, true}) {
+    for (const ErrorKindOfImage kind : kImageErrors) {
       const std::string suffix =
           frame ? fmt::format("-frame{}", study.scenes[scene].frames[*frame]) : "";
       charts.push_back(

@@ -49,6 +49,11 @@ Result<std::vector<Reference>> load_references(const StudyScene& scene, const St
     BATON_ASSIGN(Picture a, read_picture(frame_file(frames[0], frame)));
     BATON_ASSIGN(Picture b, read_picture(frame_file(frames[1], frame)));
     references.push_back(make_reference(std::move(a), std::move(b)));
+    if (const auto fault = reference_fault(references.back())) {
+      return Error{ErrorKind::corrupt,
+                   fmt::format("scene '{}', frame {}: {} ({} and {})", scene.name, frame, *fault,
+                               frames[0].string(), frames[1].string())};
+    }
   }
   return references;
 }
@@ -66,7 +71,7 @@ Status render_kept(const std::vector<JobSpec>& jobs, const StudyFolder& folder, 
     if (!known && !is_there(finished_mark(job.output.directory))) missing.push_back(std::move(job));
   }
   if (missing.empty()) return {};
-  spdlog::info("{} pictures to render", missing.size());
+  runner.say(fmt::format("{} pictures to render", missing.size()));
   return runner.run(missing, [&](std::size_t index, const JobSummary&) {
     return write_record(finished_mark(missing[index].output.directory), {});
   });
@@ -110,6 +115,8 @@ std::optional<RunRecord> kept_record(const StudyFolder& folder, const StudyScene
 }
 
 }  // namespace
+
+void JobRunner::say(const std::string& text) { spdlog::info("{}", text); }
 
 fs::path frame_file(const fs::path& folder, int frame) {
   return folder / frame_file_name(kFramePattern, frame);
@@ -167,9 +174,8 @@ Result<StudyResults> run_study(const Study& study, const StudyFolder& folder, Jo
       jobs.push_back(std::move(job));
     }
   }
-  spdlog::info("{} of {} runs are done already",
-               study.cells.size() * static_cast<std::size_t>(study.num_seeds) - runs.size(),
-               study.cells.size() * static_cast<std::size_t>(study.num_seeds));
+  const std::size_t all = study.cells.size() * static_cast<std::size_t>(study.num_seeds);
+  runner.say(fmt::format("{} of {} runs are done already", all - runs.size(), all));
   if (runs.empty()) return results;
 
   const auto keep = [&](std::size_t index, const JobSummary& summary) -> Status {

@@ -20,6 +20,8 @@ class JobRunner {
   /// error of a job or of `done` ends everything.
   virtual Status run(const std::vector<JobSpec>& jobs,
                      const std::function<Status(std::size_t index, const JobSummary&)>& done) = 0;
+  /// Tells a person how the study goes on.
+  virtual void say(const std::string& text);
 };
 
 /// Everything that a study measured.

@@ -64,8 +64,8 @@ Status render_in_process(const JobSpec& job, bool write) {
   BATON_ASSIGN(const auto context, load_render_context(job, Digest{1, 1}));
   const FrameSink sink = [&](std::int32_t frame, const FilmTile& image) -> Status {
     if (!write) return {};
-    BATON_ASSIGN(const BlobRef written, write_frame(job, Digest{1, 1}, frame, image));
-    return written.size_bytes > 0 ? Status() : Error{ErrorKind::internal, "empty frame"};
+    BATON_ASSIGN(const WrittenFrame written, write_frame(job, Digest{1, 1}, frame, image));
+    return written.file.size_bytes > 0 ? Status() : Error{ErrorKind::internal, "empty frame"};
   };
   BATON_ASSIGN(const RenderStats stats, render_locally(*context, job, 2, sink));
   return stats.pixels > 0 ? Status() : Error{ErrorKind::internal, "nothing was rendered"};

@@ -134,7 +134,7 @@ def a_failing_job_leaves_the_farm_alone(programs, folder):
     """A mesh that disappears after submission fails its job with its name; the next job is rendered."""
     with Farm(programs, folder / "farm") as farm:
         farm.start_coordinator()
-        bad_path = write_job(folder / "bad/job.json", make_job(folder / "bad"))
+        bad_path = write_job(folder / "bad/job.json", make_job(folder / "bad", maxRetriesPerTask=0))
         bad = farm.submit(bad_path)
         (folder / "bad/sphere.off").unlink()
         worker = farm.start_worker()

@@ -4,6 +4,8 @@ named. `"method": "auto"` is settled by a small study."""
 
 import csv
 import json
+import re
+import shutil
 
 from farm import (BAD_INPUT, Process, check, check_equal, make_job, run_tests, wait_until, write_job)
 
@@ -69,10 +71,17 @@ def a_killed_study_goes_on(programs, folder):
 
 def the_report_needs_no_other_file(programs, folder):
     study = make_study(folder, seeds=1)
-    chart(programs, study, folder / "out")
+    done = chart(programs, study, folder / "out")
+    check(re.search(r"^lamp: +`\w+`.*, [\d.]+ \[.*times the next \(`\w+`.*\), one seed: no interval", done.stdout),
+          f"no verdict:\n{done.stdout}")
     report = (folder / "out/report.html").read_text(encoding="utf-8")
-    for expected in ["<svg", "data:image/png;base64,", "Fewer than 20 seeds", "sequential"]:
+    processor = next(line for line in open("/proc/cpuinfo", encoding="utf-8") if line.startswith("model name"))
+    for expected in ["<svg", "data:image/png;base64,", "Fewer than 20 seeds", "sequential", "times the next",
+                     processor.split(": ", 1)[1].strip()]:
         check(expected in report, f"report.html: expected {expected}")
+    shown = re.sub("<details>.*?</details>", "", report, flags=re.DOTALL)
+    check_equal(shown.count("<svg"), 5, "charts that are not folded")
+    check(report.count("<svg") > 15, "the others are gone")
     for forbidden in ["src=\"http", "href=", "<script"]:
         check(forbidden not in report, f"report.html holds {forbidden}")
     names = {path.name for path in (folder / "out").iterdir()}
@@ -95,6 +104,29 @@ def the_second_pass_is_paid_for(programs, folder):
     check(0 < float(both["secondsSecondPass"]) < float(both["cpuSeconds"]), f"seconds of the second pass in {both}")
     check(float(first["raysPerPixel"]) <= 16, f"rays in {first}")
     check(float(both["raysPerPixel"]) > 18, f"rays of both passes in {both}")
+
+
+def a_reference_that_is_not_what_it_says_stops_a_study(programs, folder):
+    """Frames of one half of the reference are exchanged for others: nothing is judged by it."""
+    study = make_study(folder, seeds=1)
+    chart(programs, study, folder / "out")
+    frames = folder / "out/.work/frames"
+    halves = [place for place in frames.iterdir() if programs.values(place / "frame.0002.exr", "lns")
+              and b"\x09\0\0\0reference" in (place / "frame.0002.exr").read_bytes()[:4000]]
+    check_equal(len(halves), 2, "halves of the reference")
+    other = next(place for place in frames.iterdir() if place not in halves)
+    job = json.loads((folder / "job.json").read_text(encoding="utf-8"))
+    job.update(frames="2-3", output={"directory": str(folder / "dark"), "aovs": ["lns", "variance"],
+                                     "background": "transparent", "pixelType": "float"},
+               environment={**job["environment"], "scale": 0.5}, sampling={"method": "reference", "referenceSamples": 64})
+    programs.run("baton", "render", write_job(folder / "dark.json", job))
+    shutil.copy(folder / "dark/frame.0002.exr", halves[0] / "frame.0002.exr")
+    (folder / "study.json").write_text((folder / "study.json").read_text().replace('"seeds": 1', '"seeds": 2'))
+    done = chart(programs, study, folder / "out", expect=None)
+    check(done.returncode != 0, "the study went on")
+    for expected in ["scene 'lamp', frame 2", "halves of the reference differ", str(halves[0])]:
+        check(expected in done.stderr, f"expected {expected!r} in {done.stderr!r}")
+    check(other.exists(), "frames of a run are gone")
 
 
 def a_bad_entry_is_named(programs, folder):
@@ -141,4 +173,4 @@ def auto_is_settled_once_and_repeatably(programs, folder):
 
 if __name__ == "__main__":
     run_tests([a_killed_study_goes_on, the_report_needs_no_other_file, the_second_pass_is_paid_for,
-               auto_is_settled_once_and_repeatably, a_bad_entry_is_named])
+               auto_is_settled_once_and_repeatably, a_reference_that_is_not_what_it_says_stops_a_study, a_bad_entry_is_named])

@@ -125,7 +125,17 @@ class CliErrors(unittest.TestCase):
         self.assertIn("sky.hdr cannot be written", result.stdout)
         result = self.baton("check", self.job(
             image={"width": 8192, "height": 8192, "tileSize": 512}, frames="1-3000", output={"pixelType": "float"}))
-        self.assertIn(" are free, and frames and state may take ", result.stdout)
+        self.assertIn(" are free, and frames, states and tiles may take ", result.stdout)
+
+    def test_check_tells_of_the_pilot(self):
+        job = self.job(sampling={"method": "auto"}, frames="1-48")
+        told = self.baton("check", job)
+        self.expect(told, OK)
+        self.assertRegex(told.stdout, r"pilot +before the first frame: \d+ candidates at both ends of the job, "
+                                      r"some \d+ frames of \d+ pixels, about [\dms]+ of CPU time")
+        pilot = json.loads(self.baton("check", job, "--json").stdout)["pilot"]
+        self.assertGreater(pilot["cpuSeconds"], 0)
+        self.assertNotIn("pilot", self.baton("check", self.job(sampling={"method": "pool"})).stdout)
 
     def test_rendering_a_file_that_is_no_picture(self):
         (self.folder / "sky.hdr").write_bytes(b"no picture")

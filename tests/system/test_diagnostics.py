@@ -7,6 +7,7 @@ import json
 from farm import check, check_equal, make_job, run_tests, write_job
 
 COUNTS = ["carried", "fresh", "refreshed", "restarted"]
+OF_FRAMES = ["noise", "noiseFrom", "mean", "pixelsBelowZero", "lowest", "lightBelowZero", "pixelsBeyondHalf", "pixelsNotFinite"]
 
 
 def render(programs, folder, workers):
@@ -28,8 +29,10 @@ def rows_add_up(programs, folder):
         total, tiles = of_frame[0], of_frame[1:]
         check_equal(total["tile"], "all", "first row of a frame")
         check_equal([int(row["tile"]) for row in tiles], list(range(len(tiles))), "tiles")
+        check(all(total[column] for column in OF_FRAMES), f"nothing was seen of frame {frame}")
+        check_equal([row[column] for row in tiles for column in OF_FRAMES if row[column]], [], "of a tile")
         for column in total:
-            if column not in ("frame", "tile"):
+            if column not in ("frame", "tile", *OF_FRAMES):
                 check_equal(int(total[column]), sum(int(row[column]) for row in tiles), f"frame {frame}: {column}")
         check_equal(sum(int(total[c]) for c in COUNTS), int(total["pixels"]), "classes")
         check_equal(sum(int(total[c]) for c in total if c.startswith("essRatio")), int(total["pixels"]), "bins")

@@ -88,10 +88,19 @@ def names_of_jobs(programs, folder):
         farm.baton("job", "pause", "new oak")
         check_equal(farm.show(second)["status"], "paused", "status")
         third = farm.submit(small_job(folder / "c", name="new oak", seed=3))
-        for command in ["show", "wait", "resume"]:
+        for command in ["show", "wait", "pause", "resume", "cancel", "retry", "delete"]:
             done = farm.baton("job", command, "new oak", expect=BAD_INPUT)
             check("job 'new oak': 2 jobs have this name:" in done.stderr, done.stderr)
             check(f"{second}  paused" in done.stderr and f"{third}  running" in done.stderr, done.stderr)
+
+        # Every command takes the name where it is one job's.
+        for command, status in [("resume", "running"), ("pause", "paused"), ("cancel", "cancelled"), ("retry", "running"),
+                                ("cancel", "cancelled")]:
+            farm.baton("job", command, "old oak")
+            check_equal(farm.show(first)["status"], status, f"status after {command}")
+        farm.baton("job", "wait", "old oak", expect=CANCELLED)
+        farm.baton("job", "delete", "old oak")
+        check("no job has this name" in farm.baton("job", "show", "old oak", expect=BAD_INPUT).stderr, "still there")
 
 
 def a_cancelled_job_goes_on_when_submitted_again(programs, folder):
@@ -157,7 +166,7 @@ def a_failed_job_is_retried(programs, folder):
     """What was wrong is mended meanwhile: a mesh that was gone is back."""
     with Farm(programs, folder / "farm") as farm:
         farm.start_coordinator()
-        job = farm.submit(small_job(folder))
+        job = farm.submit(small_job(folder, maxRetriesPerTask=0))
         mesh = folder / "sphere.off"
         mesh.rename(folder / "elsewhere.off")
         farm.start_worker()
@@ -165,6 +174,20 @@ def a_failed_job_is_retried(programs, folder):
         (folder / "elsewhere.off").rename(mesh)
         check("running" in farm.baton("job", "retry", job).stdout, "retry does not say so")
         farm.baton("job", "wait", job)
+
+
+def a_map_that_is_away_is_waited_for(programs, folder):
+    """Gone after the submission and back some seconds later: the job goes on by itself."""
+    with Farm(programs, folder / "farm") as farm:
+        farm.start_coordinator()
+        job = farm.submit(small_job(folder))
+        away = folder / "away.hdr"
+        (folder / "lamp.hdr").rename(away)
+        worker = farm.start_worker()
+        wait_until(lambda: "lamp.hdr" in worker.log() and "waits 5 s" in worker.log(), "the worker misses the map")
+        away.rename(folder / "lamp.hdr")
+        farm.baton("job", "wait", job)
+        check_equal(farm.show(job)["status"], "done", "status")
 
 
 def a_task_that_takes_too_long_fails(programs, folder):
@@ -194,5 +217,6 @@ if __name__ == "__main__":
         a_paused_job_waits_until_it_is_resumed,
         a_drained_worker_ends_and_its_work_goes_on,
         a_failed_job_is_retried,
+        a_map_that_is_away_is_waited_for,
         a_task_that_takes_too_long_fails,
     ])

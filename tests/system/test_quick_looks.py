@@ -99,6 +99,29 @@ def test_check_and_explain_take_the_same_options(programs, folder):
     check_equal(programs.run("baton", "check", job, "--set", "$.scene.objects[0].fitHeight=2").returncode, OK, "path")
 
 
+def test_check_draws_the_scene(programs, folder):
+    """What the camera sees and what it does not: an object that floats off the picture is seen from outside."""
+    job = make_job(folder, frames="1-4")
+    job["scene"]["objects"].append({"mesh": "sphere", "material": "chalk", "translate": [30, 12, 0]})
+    path = write_job(folder / "job.json", job)
+    done = programs.run("baton", "check", path, "--picture", folder / "scene.png")
+    check("object     2 sphere (chalk): 2 x 2 x 2, x 29 to 31, y 11 to 13, z -1 to 1" in done.stdout, done.stdout)
+    check("scene.png: frame 1 as the camera sees it" in done.stdout, done.stdout)
+    width, height, rows = read_png(folder / "scene.png")
+    check_equal((width, height), (640 + 4 + 640, 384), "size of the picture")
+
+    def has(columns, hue):
+        """Whether some pixels of these columns are of the hue: r > g > b and so on, plainly."""
+        pixels = [row[3 * x:3 * x + 3] for row in rows for x in columns]
+        return sum(1 for rgb in pixels if hue(*rgb)) > 20
+
+    orange = lambda r, g, b: r > g + 20 > b + 60
+    green = lambda r, g, b: g > b + 20 > r + 40
+    check(has(range(640), orange), "the camera sees no object 0")
+    check(not has(range(640), green), "the camera sees object 2")
+    check(has(range(644, 1284), green), "object 2 is not to be seen from outside")
+
+
 def test_faults_name_the_option(programs, folder):
     job = job_at(folder)
     for options, code, text in [
@@ -202,6 +225,6 @@ def test_watch_follows_job_and_files(programs, folder):
 if __name__ == "__main__":
     run_tests([
         test_a_look_leaves_finished_frames_alone, test_a_region_has_the_pixels_of_the_whole,
-        test_check_and_explain_take_the_same_options, test_faults_name_the_option, test_view,
+        test_check_and_explain_take_the_same_options, test_faults_name_the_option, test_check_draws_the_scene, test_view,
         test_watch_follows_job_and_files
     ])

@@ -48,7 +48,8 @@ void append_primary_rays(const JobSpec& job, const FrameGeometry& geometry, std:
   };
   if (job.image.sites == 1) return add({0.5f, 0.5f});
   const auto side = static_cast<std::int32_t>(std::sqrt(static_cast<float>(job.image.sites)));
-  const Rng rng(pixel_key(job.seed, 0, job.image.width, x, y), PassId::site_position);
+  const std::uint64_t seed = job.image.site_seed > 0 ? job.image.site_seed : job.seed;
+  const Rng rng(pixel_key(seed, 0, job.image.width, x, y), PassId::site_position);
   std::array<float, 4> u{};  // of two sites
   for (std::int32_t site = 0; site < job.image.sites; ++site) {
     if (site % 2 == 0) u = rng.uniforms(0, static_cast<std::uint32_t>(site / 2));

@@ -4,6 +4,7 @@
 #include <bit>
 
 #include "common/base/poison.h"
+#include "common/job/sequence.h"
 #include "worker/light/carried_light.h"
 #include "worker/method/populations.h"
 #include "worker/pass/cpu_clock.h"
@@ -68,7 +69,7 @@ FilmTile TileFrameRenderer::render_batches(const FrameSpec& frame, const FrameLi
                                            SampleState& state) {
   const WorkClock clock;
   stages_ = {};
-  FilmWriter film(surfaces_.rect, context_.job.output.aovs);
+  FilmWriter film(surfaces_.rect, film_aovs(context_.job));
   Batch batch;
   batch.frame_number = frame.number;
   batch.frame_index = frame.index;

@@ -168,8 +168,9 @@ Result<TaskOutput> execute_assemble(const LoadedJob& loaded, const BlobStore& st
   }
 
   image.rect = image.rect.at_origin();
-  BATON_ASSIGN(const BlobRef written, write_frame(loaded.job, loaded.digest, task.step, image));
-  return TaskOutput{{written}, {}};
+  BATON_ASSIGN(const WrittenFrame written,
+               write_frame(loaded.job, loaded.digest, task.step, std::move(image)));
+  return TaskOutput{{written.file}, {}, {{task.step, task.tile, {}, written.quality}}};
 }
 
 }  // namespace

@@ -15,7 +15,7 @@ namespace baton {
 struct TaskOutput {
   std::vector<BlobRef> outputs;
   RenderStats stats;
-  std::vector<FrameStats> frames = {};  ///< of a render task, in frame order
+  std::vector<FrameStats> frames = {};  ///< of a render task in frame order, of an assembly one
 };
 
 /// Runs one task: reads its inputs from `store`, writes its outputs there (an assembled frame goes

@@ -10,6 +10,7 @@
 #include "common/job/job_fields.h"
 #include "common/job/motion.h"
 #include "common/job/sequence.h"
+#include "worker/run/frame_quality.h"
 #include "worker/scene/camera.h"
 
 namespace baton {
@@ -23,6 +24,19 @@ bool same_after_rounding(float value, float stored) {
   if (std::fabs(value) >= kHalfMax)
     return std::fabs(stored) >= kHalfMax && (value > 0) == (stored > 0);
   return std::fabs(value - stored) <= std::fabs(value) * kHalfStep + kHalfSmallest;
+}
+
+bool shows(const OutputSpec& output, Aov aov) {
+  return std::find(output.aovs.begin(), output.aovs.end(), aov) != output.aovs.end();
+}
+
+void drop_channel(FilmTile& image, std::string_view name) {
+  const auto found = std::find(image.channels.begin(), image.channels.end(), name);
+  if (found == image.channels.end()) return;
+  const float* const plane = image.plane(static_cast<std::size_t>(found - image.channels.begin()));
+  const auto first = image.values.begin() + (plane - image.values.data());
+  image.values.erase(first, first + static_cast<std::ptrdiff_t>(image.num_pixels()));
+  image.channels.erase(found);
 }
 
 }  // namespace
@@ -93,7 +107,8 @@ Status paste_tile(const FilmTile& tile, FilmTile& image) {
   return {};
 }
 
-ImageMetadata frame_metadata(const JobSpec& job, const Digest& job_digest, int frame_number) {
+ImageMetadata frame_metadata(const JobSpec& job, const Digest& job_digest, int frame_number,
+                             const FrameQuality& quality) {
   ImageMetadata metadata{{"baton:version", kVersion},
                          {"baton:jobName", job.name},
                          {"baton:jobDigest", job_digest.hex()},
@@ -115,28 +130,41 @@ ImageMetadata frame_metadata(const JobSpec& job, const Digest& job_digest, int f
     add("baton:mapMix", light.mix);
   }
   add("baton:rotationDeg", rotation_deg_at(environment, frame_number));
+  if (quality.noise_source != NoiseSource::none) {
+    metadata.emplace_back("baton:noise", fmt::format("{:.4g}", quality.noise));
+    add("baton:noiseFrom", noise_source_name(quality.noise_source));
+  }
+  add("baton:pixelsBelowZero", quality.pixels_below_zero);
+  add("baton:clampNegative", quality.clamped);
+  if (quality.pixels_not_finite > 0) add("baton:pixelsNotFinite", quality.pixels_not_finite);
   for (const auto& [name, text] : job.metadata)
     metadata.emplace_back("baton:metadata:" + name, text);
   return metadata;
 }
 
-Result<BlobRef> write_frame(const JobSpec& job, const Digest& job_digest, std::int32_t frame_index,
-                            const FilmTile& image) {
+Result<WrittenFrame> write_frame(const JobSpec& job, const Digest& job_digest,
+                                 std::int32_t frame_index, FilmTile image) {
+  FrameQuality quality = judge_frame(image);
+  quality.clamped = job.output.clamp_negative;
+  if (job.output.clamp_negative) clamp_negative(image);
+  if (!shows(job.output, Aov::variance)) drop_channel(image, "variance");
+
   const std::filesystem::path path = frame_path(job, frame_index);
   const int number = job.frames.at(static_cast<std::size_t>(frame_index));
   const Camera camera(camera_at(job, number), job.image.width, job.image.height);
   BATON_ASSIGN(const Bytes bytes,
                encode_exr(path.string(), image,
                           {.half_float = job.output.pixel_type == PixelType::half_float,
+                           .float_colors = quality.pixels_beyond_half > 0,
                            .compression = job.output.compression,
-                           .metadata = frame_metadata(job, job_digest, number),
+                           .metadata = frame_metadata(job, job_digest, number, quality),
                            .world_to_camera = camera.world_to_camera(),
                            .world_to_ndc = camera.world_to_ndc(job.image.rendered()),
                            .frames_per_second = job.output.frames_per_second}));
   BATON_TRY(write_file_verified(path, bytes, [&](const std::filesystem::path& temporary) {
     return verify_frame(temporary, image, frame_index);
   }));
-  return BlobRef{BlobKind::image, frame_index, 0, digest_of(bytes), bytes.size()};
+  return WrittenFrame{{BlobKind::image, frame_index, 0, digest_of(bytes), bytes.size()}, quality};
 }
 
 }  // namespace baton

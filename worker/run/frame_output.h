@@ -23,20 +23,30 @@ Status paste_tile(const FilmTile& tile, FilmTile& image);
 /// Rows of a frame that are compared with its film after it was written: one block of compression.
 inline constexpr int kRowsVerified = 16;
 
+/// A frame in the output folder, and what was seen of its film.
+struct WrittenFrame {
+  BlobRef file;
+  FrameQuality quality;
+};
+
 /// Writes one finished frame as EXR with the job's name, digest and program version in its header.
-/// Before it gets its name it is read back from disk: every byte must be the encoder's, the header
-/// and the table of blocks must be whole, and one block of rows, another one in each frame, must
-/// unpack to the film. Errors: the disk, or a file that does not hold what was written.
-Result<BlobRef> write_frame(const JobSpec& job, const Digest& job_digest, std::int32_t frame_index,
-                            const FilmTile& image);
+/// What is below zero is set to 0 where the job wants that; colours past a half float make those of
+/// the frame float32; planes that no AOV of the job has are left out.
+///
+/// Before the file gets its name it is read back from disk: every byte must be the encoder's, the
+/// header and the table of blocks must be whole, and one block of rows, another one in each frame,
+/// must unpack to the film. Errors: the disk, or a file that does not hold what was written.
+Result<WrittenFrame> write_frame(const JobSpec& job, const Digest& job_digest,
+                                 std::int32_t frame_index, FilmTile image);
 
 /// Checks that the EXR file at `path` has the size and the channels of `image`, and in block
 /// `block` (0-based, modulo the number of blocks) its values. ErrorKind::corrupt names channel and
 /// pixel.
 Status verify_frame(const std::filesystem::path& path, const FilmTile& image, std::int32_t block);
 
-/// The header attributes that Baton adds to its pictures: what they are made from, and the job's
-/// own metadata as baton:metadata:NAME.
-ImageMetadata frame_metadata(const JobSpec& job, const Digest& job_digest, int frame_number);
+/// The header attributes that Baton adds to its pictures: what they are made from, what was seen of
+/// them, and the job's own metadata as baton:metadata:NAME.
+ImageMetadata frame_metadata(const JobSpec& job, const Digest& job_digest, int frame_number,
+                             const FrameQuality& quality);
 
 }  // namespace baton

@@ -1,6 +1,7 @@
 #include "worker/run/job_cache.h"
 
 #include <fmt/format.h>
+#include <spdlog/spdlog.h>
 
 #include <algorithm>
 
@@ -54,6 +55,13 @@ Result<LoadedJobPtr> JobEntry::load(std::stop_token stop) {
   Result<LoadedJobPtr> result = loader_(digest_, *document_);
 
   lock.lock();
+  if (!result && result.error().kind == ErrorKind::io) {
+    spdlog::warn("waits {} s: {}", file_patience_.count() / 1000, result.error().message);
+    changed_.wait_for(lock, stop, file_patience_, [] { return false; });
+    lock.unlock();
+    if (!stop.stop_requested()) result = loader_(digest_, *document_);
+    lock.lock();
+  }
   result_ = result;
   changed_.notify_all();
   return result;
@@ -77,7 +85,7 @@ std::shared_ptr<JobEntry> JobCache::entry(const Digest& digest) {
     --oldest;
     if (oldest->use_count() == 1) oldest = entries_.erase(oldest);
   }
-  entries_.push_front(std::make_shared<JobEntry>(digest, loader_));
+  entries_.push_front(std::make_shared<JobEntry>(digest, loader_, file_patience_));
   return entries_.front();
 }
 

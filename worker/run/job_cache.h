@@ -1,5 +1,6 @@
 #pragma once
 
+#include <chrono>
 #include <condition_variable>
 #include <functional>
 #include <list>
@@ -35,11 +36,17 @@ using JobLoader =
 Result<LoadedJobPtr> load_job_document(const Digest& digest, const std::string& document,
                                        AssetShelf& shelf);
 
+/// How long a file that cannot be read is waited for before the attempt counts as failed: a disk of
+/// another machine may be away for a moment.
+inline constexpr std::chrono::milliseconds kFilePatience{5000};
+
 /// One job on its way from document to loaded scene. The first task that needs it loads it, the
 /// others wait.
 class JobEntry {
  public:
-  JobEntry(const Digest& digest, JobLoader loader) : digest_(digest), loader_(std::move(loader)) {}
+  JobEntry(const Digest& digest, JobLoader loader,
+           std::chrono::milliseconds file_patience = kFilePatience)
+      : digest_(digest), loader_(std::move(loader)), file_patience_(file_patience) {}
 
   const Digest& digest() const { return digest_; }
   /// Hands over the document; a second one is ignored.
@@ -47,13 +54,14 @@ class JobEntry {
   bool has_document() const;
   /// True once loading has failed.
   bool failed() const;
-  /// Waits for the document, then loads once for all callers. Cancelled when `stop` is requested
-  /// while waiting.
+  /// Waits for the document, then loads once for all callers; once more after a while if a file
+  /// could not be read. Cancelled when `stop` is requested while waiting.
   Result<LoadedJobPtr> load(std::stop_token stop);
 
  private:
   const Digest digest_;
   const JobLoader loader_;
+  const std::chrono::milliseconds file_patience_;
   mutable std::mutex mutex_;
   std::condition_variable_any changed_;
   std::optional<std::string> document_;
@@ -65,7 +73,8 @@ class JobEntry {
 /// by the control thread alone; the entries it hands out are safe to share.
 class JobCache {
  public:
-  explicit JobCache(JobLoader loader) : loader_(std::move(loader)) {}
+  explicit JobCache(JobLoader loader, std::chrono::milliseconds file_patience = kFilePatience)
+      : loader_(std::move(loader)), file_patience_(file_patience) {}
 
   /// The entry of a job, made when there is none. A failed entry is replaced, so that the next
   /// attempt loads anew.
@@ -73,6 +82,7 @@ class JobCache {
 
  private:
   JobLoader loader_;
+  std::chrono::milliseconds file_patience_;
   /// At most limits::kMaxCachedJobs, and beyond that those in use.
   std::list<std::shared_ptr<JobEntry>> entries_;
 };

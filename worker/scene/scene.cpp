@@ -25,38 +25,56 @@ class Faults {
   std::string text_;
 };
 
-/// Lowest and highest y of the mesh after `linear`.
-std::pair<float, float> vertical_bounds(const TriangleMesh& mesh, const Mat3& linear) {
-  float low = std::numeric_limits<float>::infinity();
-  float high = -low;
+/// Corners of the box around the mesh after `linear`.
+std::pair<Vec3, Vec3> bounds_of(const TriangleMesh& mesh, const Mat3& linear) {
+  constexpr float kFar = std::numeric_limits<float>::infinity();
+  Vec3 low{kFar, kFar, kFar}, high = low * -1.0f;
   for (const Vec3& position : mesh.positions) {
-    const float y = (linear * position).y;
-    low = std::min(low, y);
-    high = std::max(high, y);
+    const Vec3 p = linear * position;
+    low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
+    high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
   }
   return {low, high};
 }
 
+/// Turns this axis of a mesh to y.
+Mat3 upright(UpAxis up) {
+  switch (up) {
+    case UpAxis::x:
+      return {{0, -1, 0, 1, 0, 0, 0, 0, 1}};
+    case UpAxis::y:
+      break;
+    case UpAxis::z:
+      return {{1, 0, 0, 0, 0, 1, 0, -1, 0}};
+  }
+  return {{1, 0, 0, 0, 1, 0, 0, 0, 1}};
+}
+
 Mat3 scaling(const Vec3& s) { return {{s.x, 0, 0, 0, s.y, 0, 0, 0, s.z}}; }
 
-/// The object's transform: scale, rotate about x, y, z, fit to a height, place on the ground,
-/// translate.
+/// The object's transform: stand up, scale, rotate about x, y, z, fit to a height, centre, place on
+/// the ground, translate.
 Result<Transform> object_transform(const ObjectSpec& object, const TriangleMesh& mesh,
                                    const std::string& name) {
   Mat3 linear = rotation_about({0, 0, 1}, object.rotate_deg.z) *
                 rotation_about({0, 1, 0}, object.rotate_deg.y) *
-                rotation_about({1, 0, 0}, object.rotate_deg.x) * scaling(object.scale);
+                rotation_about({1, 0, 0}, object.rotate_deg.x) * scaling(object.scale) *
+                upright(object.up_axis);
   if (object.fit_height) {
-    const auto [low, high] = vertical_bounds(mesh, linear);
-    if (!(high > low)) {
+    const auto [low, high] = bounds_of(mesh, linear);
+    if (!(high.y > low.y)) {
       return Error{ErrorKind::bad_input, name + ": mesh \"" + object.mesh +
                                              "\" is flat, expected a height to fit to fitHeight"};
     }
-    const float factor = *object.fit_height / (high - low);
+    const float factor = *object.fit_height / (high.y - low.y);
     linear = scaling({factor, factor, factor}) * linear;
   }
   Vec3 offset = object.translate;
-  if (object.place_on_ground) offset.y -= vertical_bounds(mesh, linear).first;
+  if (object.place_on_ground || object.center) {
+    const auto [low, high] = bounds_of(mesh, linear);
+    if (object.place_on_ground) offset.y -= low.y;
+    if (object.center) offset = offset - Vec3{low.x + high.x, 0, low.z + high.z} * 0.5f;
+  }
   return Transform{linear, offset};
 }
 

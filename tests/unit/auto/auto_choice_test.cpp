@@ -136,6 +136,23 @@ TEST(AutoChoice, IsWrittenIntoTheJob) {
   EXPECT_EQ(job.metadata["auto.pilot"], "a N=16: error 0.2000, 2.00 us");
 }
 
+TEST(PilotPlan, GrowsWithTheCandidatesAndTheirSamples) {
+  JobSpec job = automatic_job();
+  job.image = {.width = 640, .height = 360};
+  job.frames = {1, 2, 3};
+  const PilotPlan one = plan_pilot(job, 1);
+  EXPECT_EQ(one.windows, 1u);
+  EXPECT_EQ(one.candidates, auto_candidates(job).size());
+  EXPECT_EQ(one.pixels, 64 * 36);
+  EXPECT_GT(one.frames, one.candidates * 3 * 3);
+  EXPECT_GT(one.cpu_seconds, 0.5);
+  EXPECT_LT(one.cpu_seconds, 60);
+  EXPECT_GT(plan_pilot(job, 3).cpu_seconds, 1.2 * one.cpu_seconds) << "dearer rays";
+  job.frames.clear();
+  for (int frame = 1; frame <= 48; ++frame) job.frames.push_back(frame);
+  EXPECT_GT(plan_pilot(job, 1).cpu_seconds, 2 * one.cpu_seconds);
+}
+
 TEST(PilotStudy, LooksAtTheStartAndTheEndOfALongJob) {
   JobSpec job = automatic_job();
   job.image = {.width = 640, .height = 360};
@@ -149,6 +166,11 @@ TEST(PilotStudy, LooksAtTheStartAndTheEndOfALongJob) {
   EXPECT_THAT(end.frames, ElementsAre(47, 48));
   EXPECT_EQ(end.image.width, 64);
   EXPECT_EQ(end.image.height, 36);
+
+  // Candidates and reference see the same points, whatever their seeds.
+  EXPECT_GT(end.image.site_seed, 0u);
+  for (const StudyCell& cell : study.cells)
+    EXPECT_EQ(cell.job.image.site_seed, end.image.site_seed);
 
   // A short one is looked at once.
   job.frames = {1, 2, 3};

@@ -87,8 +87,8 @@ TEST_F(JournalTest, WhatWasCommittedIsThereAgain) {
   EXPECT_EQ(job.completions.tasks[0].outputs, completion(1).outputs);
   EXPECT_EQ(job.completions.stats, expected.stats);
   EXPECT_EQ(job.completions.frames, expected.frames);
-  EXPECT_EQ(journal.frame_stats(kJob, 3).value().size(), 2u);
-  EXPECT_TRUE(journal.frame_stats(kJob, 2).value().empty());
+  EXPECT_EQ(journal.frame_stats(kJob, TaskKind::render, 3).value().size(), 2u);
+  EXPECT_TRUE(journal.frame_stats(kJob, TaskKind::render, 2).value().empty());
   ASSERT_EQ(job.failures.size(), 1u);
   EXPECT_EQ(job.failures[0].lease, failure.lease);
   EXPECT_EQ(job.failures[0].worker, failure.worker);
@@ -183,7 +183,7 @@ TEST_F(JournalTest, ANewerJournalIsRefused) {
   const Result<Journal> journal = Journal::open(path);
   ASSERT_FALSE(journal.ok());
   EXPECT_EQ(journal.error().kind, ErrorKind::version);
-  EXPECT_THAT(journal.error().message, HasSubstr("journal version 9, this program reads 2"));
+  EXPECT_THAT(journal.error().message, HasSubstr("journal version 9, this program reads 3"));
 }
 
 TEST_F(JournalTest, AnotherProgramsDatabaseIsRefused) {

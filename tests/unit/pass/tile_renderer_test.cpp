@@ -149,6 +149,36 @@ TEST(RunTile, ThePoolTakesMoreCandidatesWhereItWasNoisy) {
   EXPECT_EQ(per_pixel(), 64) << "noise of this frame must not count";
 }
 
+TEST(RunTile, JobsThatShareASiteSeedSeeTheSamePoints) {
+  JobSpec job = sequence_job(1);
+  job.image.sites = 4;
+  job.output.aovs = {Aov::depth};
+  const auto depths = [&](std::uint64_t seed, std::uint64_t site_seed) {
+    job.seed = seed;
+    job.image.site_seed = site_seed;
+    const FilmTile film = render_tile(job).films.back();
+    const auto values = channel(film, "depth");
+    return std::vector<float>(values.begin(), values.end());
+  };
+  EXPECT_EQ(depths(1, 9), depths(2, 9));
+  EXPECT_NE(depths(1, 0), depths(2, 0));
+  EXPECT_EQ(depths(9, 0), depths(2, 9)) << "else it is the job's seed";
+}
+
+TEST(RunTile, FilmsHoldTheErrorThatTheMethodTells) {
+  JobSpec job = sequence_job(1);
+  job.output.aovs = {Aov::depth};
+  for (const Method method : {Method::pool, Method::ratio, Method::reference}) {
+    job.sampling.method = method;
+    const FilmTile film = render_tile(job).films.back();
+    ASSERT_NE(film.find("variance"), nullptr) << static_cast<int>(method);
+    const auto variance = channel(film, "variance");
+    EXPECT_GT(*std::max_element(variance.begin(), variance.end()), 0) << static_cast<int>(method);
+  }
+  job.sampling.method = Method::bidirectional;
+  EXPECT_EQ(render_tile(job).films.back().find("variance"), nullptr);
+}
+
 // The variance that the presampled light states from its even and odd samples is, on average, at
 // least what is seen over 64 seeds (whose own error is 5 % of it), and not many times more.
 TEST(RunTile, PoolStatesItsVariance) {

@@ -73,10 +73,13 @@ TEST(FrameOutput, AFrameIsWrittenVerifiedAndNamedByItsDigest) {
   job.seed = 77;
   job.output.frames_per_second = 23.976;
   const Digest digest{3, 4};
-  const Result<BlobRef> ref = write_frame(job, digest, 1, assembled(job));
-  ASSERT_TRUE(ref) << ref.error().message;
+  const Result<WrittenFrame> written = write_frame(job, digest, 1, assembled(job));
+  ASSERT_TRUE(written) << written.error().message;
+  const BlobRef* const ref = &written->file;
   EXPECT_EQ(ref->kind, BlobKind::image);
   EXPECT_EQ(ref->frame, 1);
+  EXPECT_EQ(written->quality.pixels, 200u);
+  EXPECT_EQ(written->quality.noise_source, NoiseSource::neighbors);
 
   const std::filesystem::path path = frame_path(job, 1);
   EXPECT_EQ(path.filename(), "frame.0009.exr");
@@ -97,6 +100,8 @@ TEST(FrameOutput, AFrameIsWrittenVerifiedAndNamedByItsDigest) {
                                                             {"baton:mapMixedIn", "noon.exr"},
                                                             {"baton:mapMix", "0.8"},
                                                             {"baton:rotationDeg", "17"},
+                                                            {"baton:noiseFrom", "neighbors"},
+                                                            {"baton:pixelsBelowZero", "0"},
                                                             {"framesPerSecond", "24000/1001"},
                                                             {"baton:metadata:owner", "lighting"}}));
   EXPECT_TRUE(std::any_of(metadata.begin(), metadata.end(), [](const auto& entry) {
@@ -138,14 +143,64 @@ TEST(FrameOutput, AFrameOfOtherSizeOrChannelsIsNotTheFrame) {
 
 TEST(FrameOutput, EqualFramesAreEqualFiles) {
   const JobSpec job = small_job("equal");
-  const BlobRef first = write_frame(job, {3, 4}, 0, assembled(job)).value();
-  EXPECT_EQ(write_frame(job, {3, 4}, 0, assembled(job)).value(), first);
+  const WrittenFrame first = write_frame(job, {3, 4}, 0, assembled(job)).value();
+  const WrittenFrame again = write_frame(job, {3, 4}, 0, assembled(job)).value();
+  EXPECT_EQ(again.file, first.file);
+  EXPECT_EQ(again.quality, first.quality);
+}
+
+TEST(FrameOutput, ValuesBelowZeroAreSetToZeroAndCounted) {
+  JobSpec job = small_job("negative");
+  FilmTile image = assembled(job);
+  image.plane(0)[5] = -4.5f;
+  image.plane(2)[5] = -1;
+  image.plane(1)[77] = -0.25f;
+  for (const bool clamp : {true, false}) {
+    job.output.clamp_negative = clamp;
+    const FrameQuality seen = write_frame(job, {3, 4}, 0, image).value().quality;
+    EXPECT_EQ(seen.pixels_below_zero, 2u);
+    EXPECT_EQ(seen.lowest, -4.5f);
+    EXPECT_EQ(seen.clamped, clamp);
+    const FilmTile stored = read_exr(frame_path(job, 0)).value();
+    EXPECT_EQ(stored.find("R")[5], clamp ? 0.0f : -4.5f);
+    EXPECT_EQ(stored.find("G")[77], clamp ? 0.0f : -0.25f);
+    EXPECT_NEAR(stored.find("G")[5], image.plane(1)[5], 0.01f) << "what is not below zero stays";
+  }
+}
+
+TEST(FrameOutput, ColoursPastAHalfFloatAreWrittenAsFloat) {
+  const JobSpec job = small_job("bright");
+  FilmTile image = assembled(job);
+  ASSERT_EQ(write_frame(job, {3, 4}, 0, image).value().quality.pixels_beyond_half, 0u);
+  EXPECT_NE(read_exr(frame_path(job, 0)).value().find("G")[9], image.plane(1)[9]) << "half";
+  image.plane(0)[5] = 1e6f;
+  ASSERT_EQ(write_frame(job, {3, 4}, 0, image).value().quality.pixels_beyond_half, 1u);
+  const FilmTile stored = read_exr(frame_path(job, 0)).value();
+  EXPECT_EQ(stored.find("R")[5], 1e6f);
+  EXPECT_EQ(stored.find("G")[9], image.plane(1)[9]) << "the other colours, too";
+}
+
+TEST(FrameOutput, AnErrorThatNoAovAsksForStaysOutOfTheFrame) {
+  JobSpec job = small_job("error");
+  FilmTile image = assembled(job);
+  image.channels.insert(image.channels.begin() + 1, "variance");
+  image.values.insert(image.values.begin() + 200, 200, 0.04f);
+  const FrameQuality seen = write_frame(job, {3, 4}, 0, image).value().quality;
+  EXPECT_EQ(seen.noise_source, NoiseSource::halves);
+  EXPECT_NEAR(seen.noise, 0.2f / seen.mean, 1e-4f);
+  EXPECT_EQ(read_exr(frame_path(job, 0)).value().find("variance"), nullptr);
+  job.output.aovs = {Aov::variance};
+  ASSERT_TRUE(write_frame(job, {3, 4}, 0, image));
+  const FilmTile stored = read_exr(frame_path(job, 0)).value();
+  ASSERT_NE(stored.find("variance"), nullptr);
+  EXPECT_EQ(stored.find("variance")[7], 0.04f);
+  EXPECT_NEAR(stored.find("G")[9], image.find("G")[9], 0.01f);
 }
 
 TEST(FrameOutput, AFolderThatCannotBeMadeIsAnErrorWithItsName) {
   JobSpec job = small_job("blocked");
   job.output.directory = "/dev/null/frames";
-  const Result<BlobRef> ref = write_frame(job, {3, 4}, 0, assembled(job));
+  const Result<WrittenFrame> ref = write_frame(job, {3, 4}, 0, assembled(job));
   ASSERT_FALSE(ref);
   EXPECT_THAT(ref.error().message, testing::HasSubstr("/dev/null/frames"));
 }

@@ -50,7 +50,7 @@ TEST(JobCache, AWaiterCanBeStopped) {
 TEST(JobCache, AFailureIsForThatEntryAlone) {
   int loads = 0;
   JobCache cache([&](const Digest& digest, const std::string& document) -> Result<LoadedJobPtr> {
-    if (++loads == 1) return Error{ErrorKind::io, "mesh.ply: cannot open"};
+    if (++loads == 1) return Error{ErrorKind::bad_input, "mesh.ply: no triangles"};
     return empty_job(digest, document);
   });
   const auto first = cache.entry({1, 1});
@@ -63,6 +63,31 @@ TEST(JobCache, AFailureIsForThatEntryAlone) {
   EXPECT_FALSE(second->has_document());
   second->provide("text");
   EXPECT_TRUE(second->load({}));
+}
+
+TEST(JobCache, AFileThatIsAwayIsLookedForAgain) {
+  using namespace std::chrono_literals;
+  int loads = 0;
+  ErrorKind kind = ErrorKind::io;
+  int failures = 1;
+  const auto loader = [&](const Digest& digest, const std::string& text) -> Result<LoadedJobPtr> {
+    if (++loads <= failures) return Error{kind, "sky.exr: no such file"};
+    return empty_job(digest, text);
+  };
+  const auto load = [&] {
+    JobEntry entry({1, 1}, loader, 5ms);
+    entry.provide("text");
+    loads = 0;
+    return entry.load({}).ok();
+  };
+  EXPECT_TRUE(load()) << "it is back";
+  EXPECT_EQ(loads, 2);
+  failures = 2;
+  EXPECT_FALSE(load()) << "once is enough for one attempt";
+  EXPECT_EQ(loads, 2);
+  kind = ErrorKind::bad_input;
+  EXPECT_FALSE(load());
+  EXPECT_EQ(loads, 1) << "what is wrong stays wrong";
 }
 
 TEST(JobCache, TheOldestJobGoesFirst) {

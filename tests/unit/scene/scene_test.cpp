@@ -74,6 +74,40 @@ TEST(Scene, FitsHeightAndStandsOnTheGround) {
   EXPECT_NEAR(high, 3.5f, 1e-5f);
 }
 
+TEST(Scene, StandsUpAndIsCentred) {
+  // A card of 2 x 0.5 x 4 whose file has another axis up, far off its origin.
+  const std::string card =
+      "OFF\n4 2 0\n10 20 30\n12 20 30\n10 20.5 30\n10 20 34\n3 0 1 2\n3 0 2 3\n";
+  JobSpec job = cube_job();
+  job.scene.meshes["cube"] = {test::write_test_file("scene_card.off", card), true};
+  ObjectSpec& object = job.scene.objects[0];
+  object.center = object.place_on_ground = true;
+  object.translate = {1, 0, 7};
+  for (const auto& [up, size] : {std::pair{UpAxis::y, Vec3{2, 0.5f, 4}},
+                                 {UpAxis::z, Vec3{2, 4, 0.5f}},
+                                 {UpAxis::x, Vec3{0.5f, 2, 4}}}) {
+    object.up_axis = up;
+    const auto scene = load_scene(job);
+    ASSERT_TRUE(scene.ok());
+    Vec3 low{1e9f, 1e9f, 1e9f}, high = low * -1.0f;
+    for (const Vec3& position : scene->meshes[0].positions) {
+      const Vec3 p = scene->instances[0].to_world.point(position);
+      low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
+      high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
+    }
+    const Vec3 extent = high - low, middle = (low + high) * 0.5f;
+    EXPECT_NEAR(length(extent - size), 0, 1e-4f) << static_cast<int>(up);
+    EXPECT_NEAR(middle.x, 1, 1e-4f);
+    EXPECT_NEAR(middle.z, 7, 1e-4f);
+    EXPECT_NEAR(low.y, 0, 1e-4f);
+  }
+  // What points up in the file points up in the world, and nothing is mirrored.
+  object.up_axis = UpAxis::z;
+  const Mat3 turned = only_instance(job).to_world.linear;
+  EXPECT_GT((turned * Vec3{0, 0, 1}).y, 0.9f);
+  EXPECT_GT(dot(cross(turned * Vec3{1, 0, 0}, turned * Vec3{0, 1, 0}), turned * Vec3{0, 0, 1}), 0);
+}
+
 TEST(Scene, NormalMatrixKeepsNormalsPerpendicular) {
   JobSpec job = cube_job();
   job.scene.objects[0].scale = {1, 5, -0.2f};

@@ -134,7 +134,10 @@ TEST(JobGraph, StatisticsMustBeOfTheTasksOwnFramesAndTile) {
   EXPECT_TRUE(graph.check_frames(task, {{1, 2, {}}})) << "before the run";
   EXPECT_TRUE(graph.check_frames(task, {{4, 2, {}}})) << "after the run";
   EXPECT_TRUE(graph.check_frames(task, {{3, 2, {}}, {3, 2, {}}})) << "twice";
-  EXPECT_TRUE(graph.check_frames(assemble(2), {{2, 0, {}}})) << "an assembly samples nothing";
+  EXPECT_FALSE(graph.check_frames(assemble(2), {{2, 0, {}}})) << "what was seen of the frame";
+  EXPECT_TRUE(graph.check_frames(assemble(2), {{3, 0, {}}})) << "another frame";
+  EXPECT_TRUE(graph.check_frames(assemble(2), {{2, 0, {}}, {2, 0, {}}})) << "twice";
+  EXPECT_TRUE(graph.check_frames({TaskKind::second_pass, 2, 1}, {{2, 1, {}}}));
 }
 
 TEST(BlobReferences, ASharedBlobIsGarbageWhenItsLastUserLetsGo) {

@@ -8,6 +8,7 @@
 #include "jobs/study/auto_table.h"
 #include "jobs/study/chart_axis.h"
 #include "jobs/study/svg_chart.h"
+#include "jobs/study/verdict.h"
 
 namespace baton {
 namespace {
@@ -131,6 +132,36 @@ TEST(Summary, NothingIsJudgedBelowTheErrorOfItsReference) {
   const auto rows = summarize_study(two_methods(), two_results(4.0));
   EXPECT_TRUE(rows[0].resolved);
   EXPECT_FALSE(rows[1].resolved);
+}
+
+TEST(Verdict, SaysWhoWinsAndWhetherItIsDecided) {
+  const Study study = two_methods();
+  StudyResults results = two_results(0.1);
+  // Squared errors 2.5 in 3 us against 5 in 2 us: 1.33, and both vary by 20 %.
+  auto all = verdicts(study, results, summarize_study(study, results));
+  ASSERT_EQ(all.size(), 1u);
+  EXPECT_EQ(all[0].winner, 1u);
+  EXPECT_EQ(all[0].next, 0u);
+  EXPECT_NEAR(all[0].ratio.value, 5.0 * 2 / (2.5 * 3), 1e-12);
+  std::string text = verdict_text(study, all[0]);
+  EXPECT_TRUE(text.starts_with("`other`, 1.3 [")) << text;
+  EXPECT_NE(text.find("times the next (`mis`), intervals touch"), std::string::npos) << text;
+
+  results.runs[1] = runs({0.5, 0.6}, 3);
+  all = verdicts(study, results, summarize_study(study, results));
+  text = verdict_text(study, all[0]);
+  EXPECT_NE(text.find("intervals apart"), std::string::npos) << text;
+}
+
+TEST(Verdict, NamesWhatItsReferenceCannotJudge) {
+  const Study study = two_methods();
+  const StudyResults results = two_results(4.0);
+  const auto all = verdicts(study, results, summarize_study(study, results));
+  ASSERT_EQ(all.size(), 1u);
+  EXPECT_EQ(all[0].winner, 0u);
+  EXPECT_FALSE(all[0].next);
+  const std::string text = verdict_text(study, all[0]);
+  EXPECT_NE(text.find("of `other` some lies below the reference's own error"), std::string::npos);
 }
 
 TEST(Summary, LagCountsFramesFromTheCut) {

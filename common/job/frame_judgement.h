@@ -1,0 +1,45 @@
+#pragma once
+
+#include <cstdint>
+#include <span>
+#include <vector>
+
+#include "common/job/task.h"
+
+namespace baton {
+
+/// A frame that differs from those around it.
+struct OddFrame {
+  std::int32_t frame = 0;
+  bool by_noise = false;  ///< else by its mean radiance
+  float ratio = 1;        ///< to the median of those around it
+};
+
+/// What a person should know of the frames of a job that are written.
+struct Judgement {
+  std::uint64_t frames = 0;
+  NoiseSource noise_source = NoiseSource::none;
+  float noise = 0;  ///< rms over the frames
+  float noise_least = 0, noise_most = 0;
+  std::int32_t noisiest = 0;  ///< the frame of noise_most
+  std::vector<OddFrame> odd;
+  std::uint64_t frames_below_zero = 0, pixels_below_zero = 0;
+  float lowest = 0;
+  float light_below_zero = 0;  ///< over the light of all frames
+  bool clamped = false;        ///< it was set to 0
+  std::uint64_t frames_beyond_half = 0, pixels_beyond_half = 0;
+  std::uint64_t pixels_not_finite = 0;
+  /// Of pixels after the first frame that could have carried something, those that had to start
+  /// afresh; refreshes on schedule are not counted. carries: some pixels carried.
+  bool carries = false;
+  std::uint64_t pixels_afresh = 0, pixels_after_first = 0;
+};
+
+/// frames: in the order of their numbers, with those that are not written.
+///
+/// A frame is odd when its noise is above the median of the three frames on each side by more than
+/// half of that and five times their median absolute deviation, or its mean radiance as far outside
+/// of the medians of either side. Cuts and steady changes thus are not; a flash of one frame is.
+Judgement judge_frames(std::span<const FrameStats> frames);
+
+}  // namespace baton

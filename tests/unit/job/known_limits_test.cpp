@@ -1,0 +1,94 @@
+#include "common/job/known_limits.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <fstream>
+#include <map>
+
+namespace baton {
+namespace {
+
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::IsEmpty;
+
+/// A turning light on one material.
+JobSpec turning(Method method, double deg, MaterialSpec material) {
+  JobSpec job;
+  job.frames = {1, 2, 3};
+  job.sampling.method = method;
+  job.environment.rotation_deg_per_frame = deg;
+  job.scene.materials["only"] = material;
+  return job;
+}
+
+const MaterialSpec kChalk{};
+const MaterialSpec kLacquer{.kind = MaterialKind::phong, .exponent = 50};
+const MaterialSpec kChrome{
+    .kind = MaterialKind::metallic_roughness, .metallic = 1, .roughness = 0.1f};
+
+TEST(KnownLimits, AreTheVerdictsOfTheStabilitySuite) {
+  std::ifstream file(std::string(BATON_SOURCE_DIR) + "/tests/stability/expected.csv");
+  std::map<std::string, std::string> verdicts;
+  std::string test_case, subject, full, rest;
+  while (std::getline(file, test_case, ',') && std::getline(file, subject, ',') &&
+         std::getline(file, full, ',') && std::getline(file, rest))
+    verdicts[test_case + "," + subject] = full;
+  ASSERT_GT(verdicts.size(), 600u);
+  for (const KnownLimit& limit : known_limits()) {
+    const std::string key = std::string(limit.test_case) + "," + std::string(limit.subject);
+    EXPECT_EQ(verdicts[key], limit.verdict) << key;
+    EXPECT_EQ(verdicts[std::string(limit.test_case) + ",pool"], "holds")
+        << "what is offered instead";
+    if (limit.light == KnownLimit::Light::turns) {
+      EXPECT_NE(std::string(limit.test_case).find("turn-"), std::string::npos);
+      EXPECT_EQ(std::stod(std::string(limit.test_case).substr(5)), limit.from_deg) << key;
+    }
+  }
+}
+
+TEST(KnownLimits, SequentialIsWarnedOfFromTheTurnsThatItFailsAt) {
+  EXPECT_THAT(limit_warnings(turning(Method::sequential, 15, kLacquer), false),
+              ElementsAre(testing::AllOf(HasSubstr("turns 15 degrees a frame"),
+                                         HasSubstr("`sequential` fails from 1.5"))));
+  EXPECT_THAT(limit_warnings(turning(Method::sequential, 1.4, kLacquer), false), IsEmpty());
+  EXPECT_THAT(limit_warnings(turning(Method::sequential, -1.5, kLacquer), false),
+              ElementsAre(HasSubstr("fails from 1.5")));
+  EXPECT_THAT(limit_warnings(turning(Method::sequential, 1.5, kChalk), false),
+              ElementsAre(HasSubstr("degrades from 0.7 on diffuse")));
+  EXPECT_THAT(limit_warnings(turning(Method::sequential, 359.9, kLacquer), false), IsEmpty())
+      << "a tenth of a degree the other way";
+}
+
+TEST(KnownLimits, PublishedFormsFailEarlier) {
+  JobSpec job = turning(Method::sequential, 0.7, kLacquer);
+  job.sampling.refresh_every = 0;
+  EXPECT_THAT(limit_warnings(job, false), ElementsAre(HasSubstr("refreshEvery 0 fails from 0.7")));
+}
+
+TEST(KnownLimits, FramesThatAreLeftOutCount) {
+  JobSpec job = turning(Method::sequential, 1, kLacquer);
+  job.frames = {1, 3, 5};
+  EXPECT_EQ(turn_deg_per_frame(job), 2);
+  EXPECT_THAT(limit_warnings(job, false), ElementsAre(HasSubstr("turns 2 degrees")));
+}
+
+TEST(KnownLimits, JumpsAndMirrors) {
+  EXPECT_THAT(limit_warnings(turning(Method::sequential, 0, kChalk), true),
+              ElementsAre(HasSubstr("the light jumps: `sequential` fails")));
+  EXPECT_THAT(limit_warnings(turning(Method::restir, 0.1, kChrome), false),
+              ElementsAre(HasSubstr("`restir` fails from 0.1 on near mirrors")));
+  EXPECT_THAT(limit_warnings(turning(Method::environment, 0, kChrome), false),
+              ElementsAre(HasSubstr("fails by its noise on near mirrors")));
+}
+
+TEST(KnownLimits, WhatHoldsIsNotWarnedOf) {
+  for (const Method method : {Method::pool, Method::bidirectional, Method::ratio}) {
+    for (const MaterialSpec& material : {kChalk, kLacquer, kChrome})
+      EXPECT_THAT(limit_warnings(turning(method, 45, material), true), IsEmpty());
+  }
+}
+
+}  // namespace
+}  // namespace baton
