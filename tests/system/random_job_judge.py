@@ -220,8 +220,12 @@ def judge_frames(frames, job, predicted):
                 places = [i for i, value in enumerate(values) if not math.isfinite(value)]
                 raise Wrong("not finite", f"{name}: {channel}: {len(places)} of {len(values)}, first at "
                             f"({places[0] % frame.width}, {places[0] // frame.width}): {values[places[0]]}")
-        require(frame.sample_bytes == predicted["frameBytes"], "frame bytes",
-                f"{name}: {frame.sample_bytes} bytes of samples, predicted {predicted['frameBytes']}")
+        # Colours past a half float make R, G and B of a frame float32.
+        is_bright = any(abs(value) > 65504 for c in "RGB" for value in frame.channels[c])
+        is_half = job.get("output", {}).get("pixelType", "half") == "half"
+        wider = 6 * frame.width * frame.height if is_bright and is_half else 0
+        require(frame.sample_bytes == predicted["frameBytes"] + wider, "frame bytes",
+                f"{name}: {frame.sample_bytes} bytes of samples, predicted {predicted['frameBytes']} + {wider}")
         require((frame.width, frame.height) == rendered_size(job.get("image", {})), "size",
                 f"{name}: {frame.width}x{frame.height}")
 
