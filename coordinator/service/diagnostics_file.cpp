@@ -58,7 +58,8 @@ std::string diagnostics_lines(std::vector<FrameStats> stats,
 Status write_diagnostics(Journal& journal, const Digest& digest, const JobSpec& job) {
   // Run by run: the rows of all tiles of a long job need not be in memory at once, their text may.
   std::string text;
-  for (std::int32_t run = 0; run < num_runs(job); ++run) {
+  const std::int32_t count = num_runs(job);
+  for (std::int32_t run = 0; run < count; ++run) {
     BATON_ASSIGN(std::vector<FrameStats> stats, journal.frame_stats(digest, run));
     text += diagnostics_lines(std::move(stats), job.frames);
   }
