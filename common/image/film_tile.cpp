@@ -44,8 +44,8 @@ Status decode_meta(const SectionFile& file, const std::string& name, StoredFilm&
     }
     tile.channels.push_back(std::move(channel));
   }
-  stored.origin.job.high = reader.get<std::uint64_t>();
-  stored.origin.job.low = reader.get<std::uint64_t>();
+  stored.origin.picture.high = reader.get<std::uint64_t>();
+  stored.origin.picture.low = reader.get<std::uint64_t>();
   stored.origin.frame_index = reader.get<std::int32_t>();
   const auto pass = reader.get<std::uint8_t>();
   if (!reader.ok() || !reader.at_end())
@@ -88,8 +88,8 @@ Bytes encode_film_tile(const FilmTile& tile, const FilmOrigin& origin) {
     meta.put(side);
   meta.put(static_cast<std::uint32_t>(tile.channels.size()));
   for (const std::string& channel : tile.channels) meta.put_string(channel);
-  meta.put(origin.job.high);
-  meta.put(origin.job.low);
+  meta.put(origin.picture.high);
+  meta.put(origin.picture.low);
   meta.put(origin.frame_index);
   meta.put(static_cast<std::uint8_t>(origin.pass));
   const std::array sections{SectionView{.tag = kMeta, .payload = meta.bytes()},

@@ -35,7 +35,7 @@ enum class FilmPass : std::uint8_t { first = 0, second = 1 };
 /// tiles of two frames, are different blobs: what one task no longer needs is never what another
 /// made.
 struct FilmOrigin {
-  Digest job;
+  Digest picture;
   std::int32_t frame_index = 0;  ///< 0-based
   FilmPass pass = FilmPass::first;
 

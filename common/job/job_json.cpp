@@ -12,6 +12,7 @@
 #include "common/job/job_json_text.h"
 #include "common/job/job_json_writer.h"
 #include "common/job/motion.h"
+#include "common/job/picture.h"
 
 namespace baton {
 namespace {
@@ -147,7 +148,7 @@ Result<std::string> make_job_document(const JobSpec& job) {
                     job.name)};
   }
   BATON_TRY(check_settled(job));
-  ParsedJobDocument document{.job = job, .assets = {}, .digest = {}};
+  ParsedJobDocument document{.job = job, .assets = {}, .digest = {}, .picture = {}};
   BATON_ASSIGN(document.assets, digest_files(asset_paths(job)));
   return write(std::move(document), -1);
 }
@@ -160,6 +161,7 @@ Result<ParsedJobDocument> parse_job_document(std::string_view text) {
         "job document: $.job.sampling.method: expected a method that is settled, got \"auto\""};
   }
   document.digest = digest_of(text);
+  document.picture = picture_digest(document.job, document.assets);
   return document;
 }
 

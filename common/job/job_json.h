@@ -63,15 +63,10 @@ Result<std::string> make_job_document(const JobSpec& job);
 struct ParsedJobDocument {
   JobSpec job;
   std::vector<AssetDigest> assets;
-  Digest digest;  ///< digest_of(text): the identity of the job
+  Digest digest;   ///< digest_of(text): the identity of the job
+  Digest picture;  ///< picture_digest of it (picture.h)
 };
 Result<ParsedJobDocument> parse_job_document(std::string_view text);
-
-/// What decides the pixels of two jobs and differs: the JSON paths, and the files whose content
-/// changed; sorted. Left out are settings: which frames, in which tiles, when and by whom, and how
-/// they are stored.
-std::vector<std::string> picture_differences(const ParsedJobDocument& a,
-                                             const ParsedJobDocument& b);
 
 /// Checks that every asset still has the digest it had at submission. The error names each file
 /// that changed (bad_input) or cannot be read here (io, if that is all: another machine may).

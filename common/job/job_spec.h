@@ -350,6 +350,12 @@ struct JobSpec {
   int max_failures_per_worker = 8;  ///< after so many failures a worker rests from the job
   std::uint64_t seed = 1;
 
+  /// Not said by the user, nor part of the JSON: where runs begin that a former job of the same
+  /// picture made otherwise than every checkpoint_every frames (0-based, ascending, from 0). After
+  /// the last of them they begin at multiples again. Said by the coordinator; only who makes what
+  /// depends on it.
+  std::vector<std::int32_t> leading_runs{};
+
   bool operator==(const JobSpec&) const = default;
 };
 

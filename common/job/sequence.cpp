@@ -98,7 +98,19 @@ std::int32_t frames_per_run(const JobSpec& job) {
   return shares_history(job) && carries_state(job) ? 1 : job.state.checkpoint_every;
 }
 
+std::vector<std::int32_t> run_starts(const JobSpec& job) {
+  const auto frames = static_cast<std::int32_t>(job.frames.size());
+  std::vector<std::int32_t> starts = job.leading_runs;
+  std::erase_if(starts, [&](std::int32_t start) { return start >= frames; });
+  if (starts.empty()) starts.push_back(0);
+  const std::int32_t step = frames_per_run(job);
+  for (std::int32_t next = (starts.back() / step + 1) * step; next < frames; next += step)
+    starts.push_back(next);
+  return starts;
+}
+
 std::int32_t num_runs(const JobSpec& job) {
+  if (!job.leading_runs.empty()) return static_cast<std::int32_t>(run_starts(job).size());
   const auto frames = static_cast<std::int32_t>(job.frames.size());
   return (frames + frames_per_run(job) - 1) / frames_per_run(job);
 }
@@ -113,10 +125,17 @@ bool ends_in_checkpoint(const JobSpec& job, std::int32_t run) {
 }
 
 TileRun tile_run(const JobSpec& job, std::int32_t tile, std::int32_t run) {
-  const std::int32_t first = run * frames_per_run(job);
+  const std::vector<std::int32_t> starts = run_starts(job);
+  const auto r = static_cast<std::size_t>(run);
+  BATON_CHECK(run >= 0 && r < starts.size());
   const auto frames = static_cast<std::int32_t>(job.frames.size());
-  BATON_CHECK(run >= 0 && first < frames);
-  return {tile, run, first, std::min(first + frames_per_run(job), frames) - 1};
+  return {tile, run, starts[r], (r + 1 < starts.size() ? starts[r + 1] : frames) - 1};
+}
+
+std::size_t num_common_frames(const JobSpec& a, const JobSpec& b) {
+  const auto end =
+      std::mismatch(a.frames.begin(), a.frames.end(), b.frames.begin(), b.frames.end());
+  return static_cast<std::size_t>(end.first - a.frames.begin());
 }
 
 bool carries_state(const JobSpec& job) {

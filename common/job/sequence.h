@@ -66,17 +66,26 @@ class TileGrid {
 /// inclusive). Consecutive runs of a tile are chained by the sample state when the job carries it.
 struct TileRun {
   std::int32_t tile = 0;
-  std::int32_t run = 0;  ///< 0-based; run r covers frames r * frames_per_run ...
+  std::int32_t run = 0;  ///< 0-based; run r covers the frames from run_starts(job)[r]
   std::int32_t first_frame = 0;
   std::int32_t last_frame = 0;
 
   auto operator<=>(const TileRun&) const = default;
 };
 
+/// Frames of a sequence: 0-based indices, inclusive.
+struct FrameSpan {
+  std::int32_t first = 0;
+  std::int32_t last = 0;
+};
+
 /// Frames of a run: state.checkpoint_every, or 1 where pixels take samples from others, since a
 /// tile then needs its neighbours.
 std::int32_t frames_per_run(const JobSpec& job);
-/// Number of runs that cover the sequence: ceil(frames / frames_per_run).
+/// First frames of the runs that cover the sequence (0-based, ascending, from 0): those of
+/// job.leading_runs, and after the last of them every multiple of frames_per_run.
+std::vector<std::int32_t> run_starts(const JobSpec& job);
+/// Their number.
 std::int32_t num_runs(const JobSpec& job);
 /// Runs from one checkpoint to the next: those in state.checkpoint_every frames.
 std::int32_t runs_per_checkpoint(const JobSpec& job);
@@ -85,6 +94,9 @@ std::int32_t runs_per_checkpoint(const JobSpec& job);
 bool ends_in_checkpoint(const JobSpec& job, std::int32_t run);
 /// The run's frames; run in [0, num_runs(job)), tile in [0, TileGrid(job.image).count()).
 TileRun tile_run(const JobSpec& job, std::int32_t tile, std::int32_t run);
+/// How many frames from the first on two jobs have in common. Where samples are carried, only these
+/// have the same history.
+std::size_t num_common_frames(const JobSpec& a, const JobSpec& b);
 /// True when the method hands something from frame to frame and state.carry lets it.
 bool carries_state(const JobSpec& job);
 /// Whether pixels weigh the samples of their neighbours: `restir` with neighbours.

@@ -17,7 +17,7 @@ namespace baton {
 /// travels here: blobs go through the store, messages carry their digests.
 
 inline constexpr const char* kProtocolName = "BATON";
-inline constexpr std::uint16_t kProtocolVersion = 6;
+inline constexpr std::uint16_t kProtocolVersion = 7;
 
 // ---- worker to coordinator ----------------------------------------------------------------------
 struct WorkerHello {  ///< first, and again after a reconnect or a new epoch
@@ -95,9 +95,10 @@ struct WorkerWelcome {
 struct LeaseGrant {
   LeaseId lease;
   std::vector<BlobRef> inputs;
+  std::int32_t first_frame = 0, last_frame = 0;  ///< of the task, 0-based, inclusive
   template <class A>
   void fields(A& a) {
-    a(lease, inputs);
+    a(lease, inputs, first_frame, last_frame);
   }
 };
 struct LeaseRevoke {
@@ -161,9 +162,10 @@ struct SubmitJob {
   }
 };
 struct ListJobs {
+  bool all = false;  ///< also those that have ended, the newest of them
   template <class A>
   void fields(A& a) {
-    a();
+    a(all);
   }
 };
 struct ShowJob {
@@ -243,17 +245,19 @@ struct WorkerSummary {
 struct JobAccepted {
   Digest job;
   bool already_there = false;  ///< equal digest: the same job goes on (a success)
+  std::string plan = {};       ///< what is kept and what is done again, lines; empty: all is new
   template <class A>
   void fields(A& a) {
-    a(job, already_there);
+    a(job, already_there, plan);
   }
 };
 struct JobList {
   std::vector<JobSummary> jobs;
   std::vector<WorkerSummary> workers;
+  std::uint64_t num_ended = 0;  ///< jobs that have ended, listed or not
   template <class A>
   void fields(A& a) {
-    a(jobs, workers);
+    a(jobs, workers, num_ended);
   }
 };
 struct JobDetail {
@@ -263,9 +267,10 @@ struct JobDetail {
   std::vector<FrameStats> frames =
       {};                  ///< of each frame so far: frame is the user's number, tile -1
   std::string waits = {};  ///< for what, where it does
+  std::string plan = {};   ///< of the answer to ResumeJob: as JobAccepted's
   template <class A>
   void fields(A& a) {
-    a(summary, frames_done, failures, frames, waits);
+    a(summary, frames_done, failures, frames, waits, plan);
   }
 };
 struct Refused {

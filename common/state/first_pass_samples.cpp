@@ -45,8 +45,8 @@ Status read(const SectionFile& file, const SectionTag& tag, std::size_t count,
 Status decode_meta(const SectionFile& file, const std::string& name, FirstPassSamples& s) {
   BATON_ASSIGN(const ByteView payload, section_payload(file, kMeta, kMetaBytes, name));
   ByteReader reader(payload);
-  s.job_digest.high = reader.get<std::uint64_t>();
-  s.job_digest.low = reader.get<std::uint64_t>();
+  s.picture.high = reader.get<std::uint64_t>();
+  s.picture.low = reader.get<std::uint64_t>();
   for (std::int32_t* value : {&s.frame_index, &s.tile, &s.rect.x0, &s.rect.y0, &s.rect.x1,
                               &s.rect.y1, &s.num_slots, &s.num_populations}) {
     *value = reader.get<std::int32_t>();
@@ -140,8 +140,8 @@ void FirstPassSamples::keep_possible(std::int32_t radius) {
 
 Bytes encode_first_pass_samples(const FirstPassSamples& s) {
   ByteWriter meta;
-  meta.put(s.job_digest.high);
-  meta.put(s.job_digest.low);
+  meta.put(s.picture.high);
+  meta.put(s.picture.low);
   for (const std::int32_t value : {s.frame_index, s.tile, s.rect.x0, s.rect.y0, s.rect.x1,
                                    s.rect.y1, s.num_slots, s.num_populations}) {
     meta.put(value);

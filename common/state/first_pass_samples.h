@@ -20,7 +20,7 @@ struct FirstPassSamples {
   static constexpr std::uint8_t kSurface = 1;
   static constexpr std::uint8_t kFailed[2] = {2, 4};
 
-  Digest job_digest;
+  Digest picture;                ///< of the job (picture_digest)
   std::int32_t frame_index = 0;  ///< 0-based
   std::int32_t tile = 0;
   PixelRect rect;

@@ -125,8 +125,8 @@ Status scatter(const SectionFile& file, const SectionTag& tag,
 
 Bytes encode_meta(const SampleState& state) {
   ByteWriter writer;
-  writer.put(state.job_digest.high);
-  writer.put(state.job_digest.low);
+  writer.put(state.picture.high);
+  writer.put(state.picture.low);
   for (const std::int32_t value : {state.frame_index, state.tile, state.rect.x0, state.rect.y0,
                                    state.rect.x1, state.rect.y1, state.num_particles}) {
     writer.put(value);
@@ -138,8 +138,8 @@ Bytes encode_meta(const SampleState& state) {
 Status decode_meta(const SectionFile& file, const std::string& name, SampleState& state) {
   BATON_ASSIGN(const ByteView payload, section_payload(file, kMeta, kMetaBytes, name));
   ByteReader reader(payload);
-  state.job_digest.high = reader.get<std::uint64_t>();
-  state.job_digest.low = reader.get<std::uint64_t>();
+  state.picture.high = reader.get<std::uint64_t>();
+  state.picture.low = reader.get<std::uint64_t>();
   for (std::int32_t* value : {&state.frame_index, &state.tile, &state.rect.x0, &state.rect.y0,
                               &state.rect.x1, &state.rect.y1, &state.num_particles}) {
     *value = reader.get<std::int32_t>();

@@ -28,7 +28,7 @@ enum class PixelSource : std::uint8_t {
 /// site) and are traced again. A background pixel carries nothing: every array is 0 there, and the
 /// file leaves it out.
 struct SampleState {
-  Digest job_digest;
+  Digest picture;                ///< of the job (picture_digest)
   std::int32_t frame_index = 0;  ///< 0-based; the frame that these samples belong to
   std::int32_t tile = 0;
   PixelRect rect;

@@ -59,9 +59,13 @@ Result<bool> SqlStatement::step() {
 Status SqlStatement::run() {
   BATON_ASSIGN(const bool row, step());
   BATON_CHECK(!row);
+  reset();
+  return {};
+}
+
+void SqlStatement::reset() {
   sqlite3_reset(statement_.get());
   num_bound_ = 0;
-  return {};
 }
 
 std::int64_t SqlStatement::integer(int column) const {
@@ -97,13 +101,14 @@ Result<SqlDatabase> SqlDatabase::open(const std::filesystem::path& path) {
   BATON_TRY(database.execute("PRAGMA journal_mode = WAL"));
   BATON_TRY(database.execute("PRAGMA synchronous = FULL"));
 
-  BATON_ASSIGN(SqlStatement check, database.prepare("PRAGMA quick_check(1)"));
-  BATON_ASSIGN(const bool row, check.step());
-  if (!row || check.text(0) != "ok") {
-    return database_error(SQLITE_CORRUPT, database.name_,
-                          row ? check.text(0).c_str() : "no answer");
-  }
   return database;
+}
+
+Status SqlDatabase::check(std::string_view table) {
+  BATON_ASSIGN(SqlStatement check, prepare(fmt::format("PRAGMA quick_check({})", table)));
+  BATON_ASSIGN(const bool row, check.step());
+  if (row && check.text(0) == "ok") return {};
+  return database_error(SQLITE_CORRUPT, name_, row ? check.text(0).c_str() : "no answer");
 }
 
 Status SqlDatabase::execute(const std::string& sql) {

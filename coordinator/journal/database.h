@@ -27,6 +27,8 @@ class SqlStatement {
   Result<bool> step();
   /// For statements without rows.
   Status run();
+  /// Makes it ready to be bound again.
+  void reset();
 
   /// Columns are numbered from 0. Views are valid until the next step.
   std::int64_t integer(int column) const;
@@ -50,9 +52,11 @@ class SqlStatement {
 /// SQLite file is ErrorKind::corrupt, one in use ErrorKind::io.
 class SqlDatabase {
  public:
-  /// Opens or creates the file, write-ahead logged; a commit survives a power cut. Reads the whole
-  /// file once to check it.
+  /// Opens or creates the file, write-ahead logged; a commit survives a power cut.
   static Result<SqlDatabase> open(const std::filesystem::path& path);
+
+  /// Reads a table whole to see that its pages are sound.
+  Status check(std::string_view table);
 
   Status execute(const std::string& sql);
   Result<SqlStatement> prepare(std::string_view sql);

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <utility>
 
 #include "common/base/archive.h"
@@ -10,13 +11,14 @@
 namespace baton {
 namespace {
 
-constexpr std::int64_t kSchemaVersion = 3;
+constexpr std::int64_t kSchemaVersion = 4;
 constexpr std::int64_t kApplicationId = 0x4241544e;  // "BATN"
 
 // Digests, keys and statuses are written as numbers and hexadecimal text, so that the sqlite3 shell
 // shows them; outputs, statistics and leases in the form of common/base/archive.h: a change of
 // BlobRef, RenderStats, FrameStats or LeaseId is a new schema version. Of `permanent` bit 0 says
-// that no retry by this worker can help, bit 1 that the task has failed for good with it.
+// that no retry by this worker can help, bit 1 that the task has failed for good with it. The
+// completions of a job in the archive are pieces, packed by zstd (journal_archive.cpp).
 constexpr const char* kSchema = R"sql(
   CREATE TABLE starts (epoch INTEGER NOT NULL);
   INSERT INTO starts VALUES (0);
@@ -24,7 +26,14 @@ constexpr const char* kSchema = R"sql(
     position INTEGER PRIMARY KEY AUTOINCREMENT,
     digest TEXT NOT NULL UNIQUE,
     status INTEGER NOT NULL,
-    document TEXT NOT NULL);
+    document TEXT NOT NULL,
+    name TEXT NOT NULL,
+    folder TEXT NOT NULL,
+    plan BLOB NOT NULL,
+    archived INTEGER NOT NULL DEFAULT 0);
+  CREATE INDEX jobs_by_name ON jobs (name);
+  CREATE INDEX jobs_by_folder ON jobs (folder);
+  CREATE INDEX open_jobs ON jobs (position) WHERE archived = 0;
   CREATE TABLE completions (
     position INTEGER PRIMARY KEY AUTOINCREMENT,
     job TEXT NOT NULL,
@@ -41,7 +50,23 @@ constexpr const char* kSchema = R"sql(
     message TEXT NOT NULL,
     permanent INTEGER NOT NULL);
   CREATE INDEX failures_by_job ON failures (job);
+  CREATE TABLE archive (
+    position INTEGER PRIMARY KEY,
+    job TEXT NOT NULL UNIQUE,
+    summary BLOB NOT NULL, detail BLOB NOT NULL);
+  CREATE TABLE archived_completions (
+    position INTEGER PRIMARY KEY,
+    job TEXT NOT NULL,
+    raw_bytes INTEGER NOT NULL, stored_raw INTEGER NOT NULL, packed BLOB NOT NULL);
+  CREATE INDEX archived_completions_by_job ON archived_completions (job);
+  CREATE TABLE kept_blobs (
+    blob TEXT NOT NULL, job TEXT NOT NULL,
+    PRIMARY KEY (blob, job)) WITHOUT ROWID;
+  CREATE INDEX kept_blobs_by_job ON kept_blobs (job);
 )sql";
+
+/// What is read at the start, and so is checked then.
+constexpr std::array kCheckedTables{"starts", "jobs", "completions", "failures"};
 
 template <class T>
 Status read_blob(const SqlDatabase& database, ByteView bytes, const char* column, T& value) {
@@ -95,6 +120,7 @@ Status Journal::prepare_schema() {
     return Error{ErrorKind::version, fmt::format("{}: journal version {}, this program reads {}",
                                                  database_.name(), version, kSchemaVersion)};
   }
+  for (const char* const table : kCheckedTables) BATON_TRY(database_.check(table));
   return {};
 }
 
@@ -108,17 +134,37 @@ Status Journal::count_start() {
 
 // ---- reading ------------------------------------------------------------------------------------
 
-Result<std::vector<Digest>> Journal::jobs() {
-  BATON_ASSIGN(SqlStatement query, database_.prepare("SELECT digest FROM jobs ORDER BY position"));
-  std::vector<Digest> jobs;
+/// Column 0 of every row.
+Result<std::vector<Digest>> Journal::read_digests(SqlStatement& query) const {
+  std::vector<Digest> digests;
   while (true) {
     BATON_ASSIGN(const bool row, query.step());
-    if (!row) return jobs;
+    if (!row) return digests;
     const std::optional<Digest> digest = Digest::from_hex(query.text(0));
     if (!digest)
       return Error{ErrorKind::corrupt,
-                   fmt::format("{}: jobs: no digest: '{}'", database_.name(), query.text(0))};
-    jobs.push_back(*digest);
+                   fmt::format("{}: no digest: '{}'", database_.name(), query.text(0))};
+    digests.push_back(*digest);
+  }
+}
+
+Result<std::vector<Digest>> Journal::jobs() {
+  BATON_ASSIGN(SqlStatement query,
+               database_.prepare("SELECT digest FROM jobs WHERE archived = 0 ORDER BY position"));
+  return read_digests(query);
+}
+
+Status Journal::for_each_completion(const Digest& job,
+                                    const std::function<Status(const Completion&)>& visit) {
+  BATON_ASSIGN(SqlStatement query,
+               database_.prepare("SELECT kind, step, tile, outputs, stats, frames FROM completions "
+                                 "WHERE job = ? ORDER BY position"));
+  query.bind(job.hex());
+  while (true) {
+    BATON_ASSIGN(const bool row, query.step());
+    if (!row) return visit_archived(job, visit);
+    BATON_ASSIGN(const Completion completion, read_completion(query));
+    BATON_TRY(visit(completion));
   }
 }
 
@@ -126,29 +172,18 @@ Result<JournalledJob> Journal::load(const Digest& digest) {
   JournalledJob result;
   result.job = digest;
   BATON_ASSIGN(SqlStatement job,
-               database_.prepare("SELECT status, document FROM jobs WHERE digest = ?"));
+               database_.prepare("SELECT status, document, plan FROM jobs WHERE digest = ?"));
   BATON_ASSIGN(const bool found, job.bind(digest.hex()).step());
   if (!found)
     return Error{ErrorKind::internal, fmt::format("{}: no job {}", database_.name(), digest.hex())};
   BATON_TRY(read_enum(database_, job.integer(0), "jobs.status", result.status));
   result.document = job.text(1);
+  BATON_TRY(read_blob(database_, job.blob(2), "jobs.plan", result.plan));
 
-  BATON_ASSIGN(SqlStatement done,
-               database_.prepare("SELECT kind, step, tile, outputs, stats, frames FROM completions "
-                                 "WHERE job = ? ORDER BY position"));
-  done.bind(digest.hex());
-  while (true) {
-    BATON_ASSIGN(const bool row, done.step());
-    if (!row) break;
-    Completion completion;
-    BATON_TRY(read_enum(database_, done.integer(0), "completions.kind", completion.task.kind));
-    completion.task.step = static_cast<std::int32_t>(done.integer(1));
-    completion.task.tile = static_cast<std::int32_t>(done.integer(2));
-    BATON_TRY(read_blob(database_, done.blob(3), "completions.outputs", completion.outputs));
-    BATON_TRY(read_blob(database_, done.blob(4), "completions.stats", completion.stats));
-    BATON_TRY(read_blob(database_, done.blob(5), "completions.frames", completion.frames));
-    result.completions.add(std::move(completion));
-  }
+  BATON_TRY(for_each_completion(digest, [&](const Completion& completion) -> Status {
+    result.completions.add(completion);
+    return {};
+  }));
 
   BATON_ASSIGN(SqlStatement failed,
                database_.prepare("SELECT lease, worker, message, permanent FROM failures "
@@ -199,6 +234,18 @@ Result<std::vector<Failure>> Journal::recent_failures(const Digest& job, int cou
   return failures;
 }
 
+/// Columns: kind, step, tile, outputs, stats, frames.
+Result<Completion> Journal::read_completion(const SqlStatement& row) const {
+  Completion completion;
+  BATON_TRY(read_enum(database_, row.integer(0), "completions.kind", completion.task.kind));
+  completion.task.step = static_cast<std::int32_t>(row.integer(1));
+  completion.task.tile = static_cast<std::int32_t>(row.integer(2));
+  BATON_TRY(read_blob(database_, row.blob(3), "completions.outputs", completion.outputs));
+  BATON_TRY(read_blob(database_, row.blob(4), "completions.stats", completion.stats));
+  BATON_TRY(read_blob(database_, row.blob(5), "completions.frames", completion.frames));
+  return completion;
+}
+
 /// Columns: lease, worker, message, permanent.
 Result<Failure> Journal::read_failure(const SqlStatement& row) const {
   Failure failure;
@@ -212,35 +259,44 @@ Result<Failure> Journal::read_failure(const SqlStatement& row) const {
 
 // ---- writing ------------------------------------------------------------------------------------
 
-/// sql: a literal.
+/// A statement for reading, to be bound; sql: a literal.
+Result<SqlStatement*> Journal::read(std::string_view sql) {
+  const auto known = statements_.find(sql);
+  if (known != statements_.end()) return &known->second;
+  BATON_ASSIGN(SqlStatement statement, database_.prepare(sql));
+  return &statements_.emplace(sql, std::move(statement)).first->second;
+}
+
+/// The same within a transaction.
 Result<SqlStatement*> Journal::write(std::string_view sql) {
   if (!in_transaction_) BATON_TRY(database_.execute("BEGIN IMMEDIATE"));
   in_transaction_ = true;
-  const auto known = writers_.find(sql);
-  if (known != writers_.end()) return &known->second;
-  BATON_ASSIGN(SqlStatement statement, database_.prepare(sql));
-  return &writers_.emplace(sql, std::move(statement)).first->second;
+  return read(sql);
 }
 
-Status Journal::add_job(const Digest& job, const std::string& document) {
+Status Journal::add_job(const Digest& job, const std::string& document, const JobIndex& index) {
   BATON_ASSIGN(SqlStatement * insert,
-               write("INSERT INTO jobs (digest, status, document) VALUES (?, ?, ?)"));
+               write("INSERT INTO jobs (digest, status, document, name, folder, plan) "
+                     "VALUES (?, ?, ?, ?, ?, ?)"));
   return insert->bind(job.hex())
       .bind(static_cast<std::int64_t>(JobStatus::running))
       .bind(document)
+      .bind(index.name)
+      .bind(index.folder)
+      .bind(to_bytes(JobPlan{}))
       .run();
 }
 
-Status Journal::restart_job(const Digest& job) {
-  BATON_ASSIGN(SqlStatement * failures, write("DELETE FROM failures WHERE job = ?"));
-  BATON_TRY(failures->bind(job.hex()).run());
-  return record_status(job, JobStatus::running);
+Status Journal::record_plan(const Digest& job, const JobPlan& plan) {
+  BATON_ASSIGN(SqlStatement * update, write("UPDATE jobs SET plan = ? WHERE digest = ?"));
+  return update->bind(to_bytes(plan)).bind(job.hex()).run();
 }
 
 Status Journal::delete_job(const Digest& job) {
   for (const char* const sql :
        {"DELETE FROM completions WHERE job = ?", "DELETE FROM failures WHERE job = ?",
-        "DELETE FROM jobs WHERE digest = ?"}) {
+        "DELETE FROM archive WHERE job = ?", "DELETE FROM archived_completions WHERE job = ?",
+        "DELETE FROM kept_blobs WHERE job = ?", "DELETE FROM jobs WHERE digest = ?"}) {
     BATON_ASSIGN(SqlStatement * remove, write(sql));
     BATON_TRY(remove->bind(job.hex()).run());
   }

@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <filesystem>
+#include <functional>
 #include <map>
 #include <optional>
 #include <string>
@@ -18,11 +19,27 @@ struct JournalledJob {
   Digest job;
   std::string document;
   JobStatus status = JobStatus::running;
+  JobPlan plan;
   Completions completions;  ///< in the order in which they were recorded
   std::vector<Failure> failures;
 };
 
-/// What a coordinator must not forget: jobs, completions, failures. Records are collected until
+/// By what a job is found.
+struct JobIndex {
+  std::string name;
+  std::string folder;  ///< that it writes to
+};
+
+/// One of the jobs that a text may mean.
+struct FoundJob {
+  Digest job;
+  JobStatus status = JobStatus::running;
+  bool is_named = false;  ///< by the text; else its digest begins so
+};
+
+/// What a coordinator must not forget: jobs, completions, failures. A job that has ended is put
+/// into the *archive*: its completions become one compressed record, and it is read again only when
+/// somebody asks. Records are collected until
 /// commit() makes all of them durable at once; a process that is killed before leaves none of them.
 /// An error of any call leaves the journal unusable: stop, and start again from what was committed.
 class Journal {
@@ -34,7 +51,7 @@ class Journal {
   /// How often the journal was opened, from 1.
   std::uint32_t epoch() const { return epoch_; }
 
-  /// All jobs, in the order of submission.
+  /// The jobs that are not in the archive, in the order of submission.
   Result<std::vector<Digest>> jobs();
   /// The job must be there.
   Result<JournalledJob> load(const Digest& job);
@@ -43,12 +60,17 @@ class Journal {
   /// What the tasks of one kind and step recorded of frames so far, in no order: those of a run for
   /// each frame and tile what the sampler did, an assembly what was seen of its frame.
   Result<std::vector<FrameStats>> frame_stats(const Digest& job, TaskKind kind, std::int32_t step);
+  /// Every completion of a job, in the archive or not, in the order in which they were recorded.
+  Status for_each_completion(const Digest& job,
+                             const std::function<Status(const Completion&)>& visit);
   /// At most `count` failed attempts, the newest last.
   Result<std::vector<Failure>> recent_failures(const Digest& job, int count);
 
-  Status add_job(const Digest& job, const std::string& document);
-  /// Forgets the failures of a job and lets it run again.
+  Status add_job(const Digest& job, const std::string& document, const JobIndex& index = {});
+  /// Lets a job run again, in the archive or not, and forgets its failures and completions: those
+  /// that still hold are to be recorded anew.
   Status restart_job(const Digest& job);
+  Status record_plan(const Digest& job, const JobPlan& plan);
   /// Forgets all of a job.
   Status delete_job(const Digest& job);
   Status record_status(const Digest& job, JobStatus status);
@@ -56,6 +78,29 @@ class Journal {
   Status record_failure(const Failure& failure);
   /// Forgets that these tasks were done.
   Status record_reopened(const Digest& job, const std::vector<TaskKey>& tasks);
+
+  // ---- the archive (journal_archive.cpp)
+  /// Puts a job that has ended into the archive. summary, detail: for people, as the caller likes.
+  /// kept: the blobs that it leaves in the store.
+  Status archive_job(const Digest& job, const Bytes& summary, const Bytes& detail,
+                     const std::vector<Digest>& kept);
+  /// Replaces what people are told of a job of the archive.
+  Status describe_archived(const Digest& job, JobStatus status, const Bytes& summary,
+                           const Bytes& detail);
+  /// nullopt: the job is not in the archive.
+  Result<std::optional<Bytes>> archived_detail(const Digest& job);
+  /// Of the newest `count` jobs in the archive, the oldest first.
+  Result<std::vector<Bytes>> archived_summaries(int count);
+  Result<std::uint64_t> num_archived();
+  /// The jobs, in the archive or not, that write to a folder, in the order of submission.
+  Result<std::vector<Digest>> jobs_in(const std::string& folder);
+  /// The jobs of this digest or name, or whose digest begins so; a few of them.
+  Result<std::vector<FoundJob>> find_jobs(const std::string& text);
+  /// Whether a job of the archive keeps the blob.
+  Result<bool> is_kept(const Digest& blob);
+  Result<std::vector<Digest>> kept_blobs(const Digest& job);
+  /// The job keeps the blob no more.
+  Status let_go(const Digest& job, const Digest& blob);
 
   /// Makes durable what was recorded since the last commit; nothing to do is a success.
   Status commit();
@@ -65,10 +110,14 @@ class Journal {
   Status prepare_schema();
   Status count_start();
   Result<Failure> read_failure(const SqlStatement& row) const;
+  Result<Completion> read_completion(const SqlStatement& row) const;
+  Status visit_archived(const Digest& job, const std::function<Status(const Completion&)>& visit);
+  Result<std::vector<Digest>> read_digests(SqlStatement& query) const;
+  Result<SqlStatement*> read(std::string_view sql);
   Result<SqlStatement*> write(std::string_view sql);
 
   SqlDatabase database_;
-  std::map<std::string_view, SqlStatement> writers_;  ///< prepared once, by their text
+  std::map<std::string_view, SqlStatement> statements_;  ///< prepared once, by their text
   std::uint32_t epoch_ = 0;
   bool in_transaction_ = false;
 };

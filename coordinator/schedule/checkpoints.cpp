@@ -28,8 +28,10 @@ bool Checkpoints::is_over(std::size_t stage) const {
 }
 
 bool Checkpoints::keeps(const TaskKey& render) const {
-  if (stages_.empty() || (render.step + 1) % runs_per_stage_ != 0) return false;
+  if (stages_.empty()) return false;
   const std::size_t stage = stage_of(render);
+  if (render.step + 1 == num_runs_) return !stages_[stage].let_go;
+  if ((render.step + 1) % runs_per_stage_ != 0) return false;
   return stage + stages_per_step_ < stages_.size() && !stages_[stage].let_go;
 }
 

@@ -11,8 +11,8 @@ namespace baton {
 /// Which states stay although all who need them have read them, so that what is lost later is made
 /// again from there and not from the first frame. A *checkpoint* is the state of every
 /// state.checkpointEvery-th frame; it stays until the two after it, or those that there are, are
-/// complete: of the tile itself where pixels keep to themselves, else of all tiles. Once let go it
-/// is never asked for again.
+/// complete: of the tile itself where pixels keep to themselves, else of all tiles. The states of
+/// the last run stay for a job of more frames. Once let go it is never asked for again.
 class Checkpoints {
  public:
   explicit Checkpoints(const JobGraph& graph);

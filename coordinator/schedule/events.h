@@ -9,6 +9,7 @@
 #include <vector>
 
 #include "common/job/job_spec.h"
+#include "common/job/sequence.h"
 #include "common/job/task.h"
 
 namespace baton {
@@ -26,7 +27,35 @@ struct Completion {
   std::vector<FrameStats> frames = {};  ///< at most one for each frame of a render task or assembly
 };
 
-/// All that is recorded as done of a job. What the tasks counted stands as sums: a job may have
+/// A render task that is not rendered: its states are cut and joined from those of another tiling,
+/// which are of the last frame of its run.
+struct Cut {
+  TaskKey task;
+  std::vector<BlobRef> states;
+
+  bool operator==(const Cut&) const = default;
+  template <class A>
+  void fields(A& a) {
+    a(task, states);
+  }
+};
+
+/// Where a job goes on from former jobs of its picture.
+struct JobPlan {
+  std::vector<std::int32_t> leading_runs;  ///< JobSpec::leading_runs
+  std::vector<Cut> cuts;
+  /// Frames (0-based) whose files another job has written: once made again, their headers differ.
+  std::vector<std::int32_t> others_frames;
+
+  bool operator==(const JobPlan&) const = default;
+  template <class A>
+  void fields(A& a) {
+    a(leading_runs, cuts, others_frames);
+  }
+};
+
+/// All that is recorded as done of a job. A task without outputs is one of which nothing is needed
+/// now (JobTasks::restore). What the tasks counted stands as sums: a job may have
 /// millions of them.
 struct Completions {
   struct Task {
@@ -62,13 +91,16 @@ struct JobAdded {
   JobStatus status = JobStatus::running;
   Completions completions;
   std::vector<Failure> failures;
-  std::vector<TaskKey> lost = {};         ///< of the completed tasks, those whose outputs are gone
+  /// Of the completed tasks, those whose outputs are gone; of the cuts, those whose states are.
+  std::vector<TaskKey> lost = {};
   std::vector<TaskKey> lost_spares = {};  ///< those whose states nobody needs now (Checkpoints)
+  JobPlan plan = {};                      ///< its leading runs stand in `spec`, too
 };
 struct JobCancelled {
   Digest job;
 };
-/// Another job's frames take the place of some of this one's: it ends, and those are gone.
+/// Another job's frames take the place of some of this one's: it ends, and those are gone; none
+/// where they are of the same picture.
 struct JobSuperseded {
   Digest job;
   std::vector<TaskKey> replaced;
@@ -82,8 +114,8 @@ struct JobResumed {
   Digest job;
   std::vector<TaskKey> lost = {};
 };
-/// A job that has ended is forgotten, with the states that it left.
-struct JobDeleted {
+/// A job that has ended is forgotten; nobody here needs its blobs any more.
+struct JobForgotten {
   Digest job;
 };
 /// `running`: the leases that the worker has in hand, of this coordinator or an earlier one.
@@ -137,9 +169,10 @@ struct InputsLost {
 /// Time has passed: who was silent for too long?
 struct ClockTicked {};
 
-using Event = std::variant<JobAdded, JobCancelled, JobSuperseded, JobPaused, JobResumed, JobDeleted,
-                           WorkerJoined, WorkerAlive, WorkerLeft, WorkRequested, TaskCompleted,
-                           AttemptFailed, ResultMissing, SpaceLacking, InputsLost, ClockTicked>;
+using Event =
+    std::variant<JobAdded, JobCancelled, JobSuperseded, JobPaused, JobResumed, JobForgotten,
+                 WorkerJoined, WorkerAlive, WorkerLeft, WorkRequested, TaskCompleted, AttemptFailed,
+                 ResultMissing, SpaceLacking, InputsLost, ClockTicked>;
 
 // ---- actions ------------------------------------------------------------------------------------
 /// Make it durable; nothing that comes after in the same or a later step may be sent or removed
@@ -161,15 +194,12 @@ struct RecordJobStatus {
   JobStatus status = JobStatus::running;
   std::string reason;
 };
-/// Nothing of the job is to be known any more.
-struct RecordJobDeleted {
-  Digest job;
-};
 
 struct GrantLease {
   std::string worker;
   LeaseId lease;
   std::vector<BlobRef> inputs;
+  FrameSpan frames = {};
 };
 struct RevokeLease {
   std::string worker;
@@ -196,7 +226,7 @@ struct RemoveBlobs {
 };
 
 using Action =
-    std::variant<RecordCompletion, RecordFailure, RecordReopened, RecordJobStatus, RecordJobDeleted,
-                 GrantLease, RevokeLease, ReportNoWork, ForgetWorker, ReportConflict, RemoveBlobs>;
+    std::variant<RecordCompletion, RecordFailure, RecordReopened, RecordJobStatus, GrantLease,
+                 RevokeLease, ReportNoWork, ForgetWorker, ReportConflict, RemoveBlobs>;
 
 }  // namespace baton

@@ -36,10 +36,10 @@ std::int64_t count_tasks(const JobSpec& job) {
 
 JobGraph::JobGraph(const JobSpec& job)
     : grid_(job.image),
+      starts_(run_starts(job)),
       num_frames_(static_cast<std::int32_t>(job.frames.size())),
-      num_runs_(baton::num_runs(job)),
+      num_runs_(static_cast<std::int32_t>(starts_.size())),
       num_tiles_(grid_.count()),
-      frames_per_run_(baton::frames_per_run(job)),
       runs_per_checkpoint_(baton::runs_per_checkpoint(job)),
       reach_px_(history_reach_px(job)),
       carries_state_(baton::carries_state(job)),
@@ -117,7 +117,18 @@ std::vector<TaskIndex> JobGraph::inputs(const TaskKey& key) const {
 }
 
 std::int32_t JobGraph::last_frame(std::int32_t run) const {
-  return std::min(first_frame(run) + frames_per_run_, num_frames_) - 1;
+  return (run + 1 < num_runs_ ? first_frame(run + 1) : num_frames_) - 1;
+}
+
+std::int32_t JobGraph::run_of(std::int32_t frame) const {
+  return static_cast<std::int32_t>(std::upper_bound(starts_.begin(), starts_.end(), frame) -
+                                   starts_.begin()) -
+         1;
+}
+
+FrameSpan JobGraph::frames(const TaskKey& key) const {
+  if (key.kind != TaskKind::render) return {key.step, key.step};
+  return {first_frame(key.step), last_frame(key.step)};
 }
 
 std::uint64_t JobGraph::num_pixels(std::int32_t tile) const {
@@ -141,8 +152,10 @@ std::vector<BlobRef> JobGraph::expected_outputs(const TaskKey& key) const {
 }
 
 std::optional<std::string> JobGraph::check_outputs(const TaskKey& key,
-                                                   std::vector<BlobRef>& outputs) const {
-  const std::vector<BlobRef> expected = expected_outputs(key);
+                                                   std::vector<BlobRef>& outputs,
+                                                   Extent extent) const {
+  std::vector<BlobRef> expected = expected_outputs(key);
+  if (extent == Extent::state && key.kind == TaskKind::render && carries_state_) expected.resize(1);
 
   // Compare kind, frame and tile one by one.
   std::sort(outputs.begin(), outputs.end());

@@ -19,7 +19,8 @@ using TaskIndex = std::int32_t;
 /// Number of tasks of a job, before anything is allocated for it.
 std::int64_t count_tasks(const JobSpec& job);
 
-/// The task graph of a job, by arithmetic: nothing is stored per task.
+/// The task graph of a job, by arithmetic: nothing is stored per task, and of a run its first
+/// frame.
 ///
 /// If the job carries state, render(run, tile) needs render(run - 1, t) of every tile t that
 /// history may come from: itself, and its neighbours within history_reach_px.
@@ -48,10 +49,15 @@ class JobGraph {
   std::vector<TaskIndex> inputs(const TaskKey& key) const;
 
   /// First and last frame (0-based, inclusive) of a run.
-  std::int32_t first_frame(std::int32_t run) const { return run * frames_per_run_; }
+  std::int32_t first_frame(std::int32_t run) const {
+    return starts_[static_cast<std::size_t>(run)];
+  }
   std::int32_t last_frame(std::int32_t run) const;
   /// The run that renders a frame.
-  std::int32_t run_of(std::int32_t frame) const { return frame / frames_per_run_; }
+  std::int32_t run_of(std::int32_t frame) const;
+
+  /// The frames that a task works on.
+  FrameSpan frames(const TaskKey& key) const;
 
   /// Whether a render task hands its samples to the next run.
   bool carries_state() const { return carries_state_; }
@@ -62,9 +68,15 @@ class JobGraph {
   /// Pixels of a tile.
   std::uint64_t num_pixels(std::int32_t tile) const;
 
+  /// What of a render task must be there.
+  enum class Extent {
+    all,
+    state,  ///< its films are not needed: its state is a Cut
+  };
   /// Sorts the outputs that a task reported: state first, then films by frame. nullopt when they
   /// are exactly what the task must make; else what is wrong with them.
-  std::optional<std::string> check_outputs(const TaskKey& key, std::vector<BlobRef>& outputs) const;
+  std::optional<std::string> check_outputs(const TaskKey& key, std::vector<BlobRef>& outputs,
+                                           Extent extent = Extent::all) const;
   /// nullopt when the statistics are of the task's own tile and frames, each frame once at most;
   /// else what is wrong.
   std::optional<std::string> check_frames(const TaskKey& key,
@@ -81,7 +93,8 @@ class JobGraph {
   void add_neighbours(std::int32_t run, std::int32_t tile, std::vector<TaskIndex>& tasks) const;
 
   TileGrid grid_;
-  std::int32_t num_frames_, num_runs_, num_tiles_, frames_per_run_, runs_per_checkpoint_, reach_px_;
+  std::vector<std::int32_t> starts_;  ///< of the runs
+  std::int32_t num_frames_, num_runs_, num_tiles_, runs_per_checkpoint_, reach_px_;
   bool carries_state_, shares_history_, has_second_pass_;
   std::int32_t exchange_reach_px_;
   TaskIndex first_render_;

@@ -65,6 +65,7 @@ bool JobTasks::apply(TaskIndex task, TaskEvent event) {
 
 std::vector<BlobRef> JobTasks::inputs(TaskIndex task) const {
   BATON_CHECK(has_inputs(task));
+  if (const auto cut = cuts_.find(task); cut != cuts_.end()) return cut->second;
   const TaskKey key = graph_.key(task);
   std::vector<BlobRef> result;
   for (const TaskIndex input : graph_.inputs(key)) {
@@ -96,7 +97,7 @@ void JobTasks::complete(TaskIndex task, const Completion& completion, const std:
   add_outputs(task, blobs);
 
   // What this task needed may go; what needed this task comes closer.
-  release_inputs(task, blobs);
+  if (!drop_cut(task, blobs)) release_inputs(task, blobs);
   let_checkpoints_go(completion.task, blobs);
   for (const TaskIndex dependent : graph_.dependents(completion.task)) {
     if (--record(dependent).missing_inputs == 0) apply(dependent, TaskEvent::inputs_done);
@@ -112,16 +113,21 @@ void JobTasks::force_done(TaskIndex task, const std::vector<BlobRef>& outputs) {
   for (const BlobRef& output : outputs) count_output(output, true);
 }
 
-void JobTasks::restore(const Completions& completions, const std::vector<TaskKey>& gone,
-                       BlobReferences& blobs) {
+std::vector<TaskIndex> JobTasks::restore(const Completions& completions,
+                                         const std::vector<TaskKey>& gone, BlobReferences& blobs,
+                                         const JobPlan& plan) {
   // First all statuses: who needs what follows from them.
-  std::vector<TaskIndex> done;
+  std::vector<TaskIndex> done, hollow;
   std::vector<BlobRef> outputs;
   for (const Completions::Task& recorded : completions.tasks) {
     const std::optional<TaskIndex> task = graph_.find(recorded.task);
     if (!task || status(*task) == TaskStatus::done) continue;
     outputs = recorded.outputs;
-    if (graph_.check_outputs(recorded.task, outputs)) continue;
+    const bool is_hollow =
+        recorded.task.kind != TaskKind::assemble &&
+        (outputs.empty() || !graph_.check_outputs(recorded.task, outputs, JobGraph::Extent::state));
+    if (!is_hollow && graph_.check_outputs(recorded.task, outputs)) continue;
+    if (is_hollow) hollow.push_back(*task);
     force_done(*task, outputs);
     done.push_back(*task);
   }
@@ -141,7 +147,36 @@ void JobTasks::restore(const Completions& completions, const std::vector<TaskKey
   for (const TaskKey& key : gone) {
     if (graph_.find(key) && key.kind == TaskKind::render) checkpoints_.let_go(key);
   }
+  others_frames_.insert(plan.others_frames.begin(), plan.others_frames.end());
+  for (const Cut& cut : plan.cuts) {
+    const auto task = graph_.find(cut.task);
+    if (!task || (!is_open(status(*task)) && !record(*task).outputs.empty())) continue;
+    cuts_[*task] = cut.states;
+    if (is_open(status(*task))) use_cut(*task, blobs);
+  }
   for (const TaskIndex task : done) add_outputs(task, blobs);
+
+  // Then back from what is needed and not there.
+  std::vector<TaskIndex> reopened;
+  for (const TaskIndex task : hollow) {
+    if (status(task) != TaskStatus::done || !lacks_needed_output(task)) continue;
+    const std::vector<TaskIndex> more = reopen(task, blobs);
+    reopened.insert(reopened.end(), more.begin(), more.end());
+  }
+  std::erase_if(cuts_, [&](const auto& cut) { return !is_open(status(cut.first)); });
+  return reopened;
+}
+
+/// Whether an open task takes what a done one does not have.
+bool JobTasks::lacks_needed_output(TaskIndex task) const {
+  const TaskKey maker = graph_.key(task);
+  const std::vector<TaskIndex> dependents = graph_.dependents(maker);
+  return std::any_of(dependents.begin(), dependents.end(), [&](TaskIndex dependent) {
+    if (!is_open(status(dependent)) || cuts_.contains(dependent)) return false;
+    const std::vector<std::size_t> taken = graph_.taken_outputs(graph_.key(dependent), maker);
+    return std::any_of(taken.begin(), taken.end(),
+                       [&](std::size_t position) { return position >= outputs(task).size(); });
+  });
 }
 
 void JobTasks::give_back(TaskIndex task) {
@@ -155,14 +190,21 @@ std::vector<TaskIndex> JobTasks::reopen(TaskIndex task, BlobReferences& blobs) {
   while (!lost.empty()) {
     const TaskIndex next = lost.back();
     lost.pop_back();
-    if (status(next) != TaskStatus::done) continue;  // reached before, on another way
+    if (status(next) != TaskStatus::done) {  // reached before, on another way
+      if (!drop_cut(next, blobs)) continue;
+      const std::vector<TaskIndex> gone = ask_inputs_again(next, blobs);
+      lost.insert(lost.end(), gone.begin(), gone.end());
+      continue;
+    }
 
     // Forget what it made; who waits for that waits longer.
     release_outputs(next, blobs);
     for (const BlobRef& output : outputs(next)) count_output(output, false);
     if (const TaskKey key = graph_.key(next); key.kind == TaskKind::render)
       checkpoints_.reopen(key);
-    former_outputs_[next] = std::exchange(record(next).outputs, {});
+    std::vector<BlobRef> before = std::exchange(record(next).outputs, {});
+    if (!before.empty() && !others_frames_.contains(next))
+      former_outputs_[next] = std::move(before);
     BATON_CHECK(apply(next, TaskEvent::output_lost));
     reopened.push_back(next);
     for (const TaskIndex dependent : graph_.dependents(graph_.key(next))) {
@@ -171,6 +213,11 @@ std::vector<TaskIndex> JobTasks::reopen(TaskIndex task, BlobReferences& blobs) {
     }
 
     // It needs its inputs again: what nobody kept must be made again, too.
+    if (cuts_.contains(next) && !needs_films(next)) {
+      use_cut(next, blobs);
+      continue;
+    }
+    cuts_.erase(next);
     const std::vector<TaskIndex> gone = ask_inputs_again(next, blobs);
     lost.insert(lost.end(), gone.begin(), gone.end());
   }
@@ -186,10 +233,17 @@ std::vector<TaskIndex> JobTasks::ask_inputs_again(TaskIndex task, BlobReferences
   std::vector<TaskIndex> gone;
   const TaskKey key = graph_.key(task);
   for (const TaskIndex input : graph_.inputs(key)) {
-    if (status(input) != TaskStatus::done) continue;
+    if (status(input) != TaskStatus::done) {
+      if (cuts_.contains(input) && key.kind != TaskKind::render) gone.push_back(input);
+      continue;
+    }
     bool is_there = true;
     for (const std::size_t position : graph_.taken_outputs(key, graph_.key(input))) {
-      const Digest& blob = outputs(input).at(position).digest;
+      if (position >= outputs(input).size()) {
+        is_there = false;
+        continue;
+      }
+      const Digest& blob = outputs(input)[position].digest;
       is_there = is_there && blobs.is_there(blob);
       blobs.expect(blob);
     }
@@ -277,94 +331,6 @@ void JobTasks::forgive(const std::string& worker) {
 
 void JobTasks::forget_losses() {
   for (Record& record : records_) record.losses = 0;
-}
-
-void JobTasks::release_all(BlobReferences& blobs) {
-  for (TaskIndex task = 0; task < graph_.num_tasks(); ++task) release_outputs(task, blobs);
-}
-
-std::vector<BlobRef> JobTasks::live_blobs(TaskIndex task) const {
-  std::vector<BlobRef> live;
-  for (const BlobRef& output : outputs(task)) {
-    if (num_needs(task, output) > 0) live.push_back(output);
-  }
-  return live;
-}
-
-std::vector<BlobRef> JobTasks::spare_blobs(TaskIndex task) const {
-  std::vector<BlobRef> spare;
-  for (const BlobRef& output : outputs(task)) {
-    if (num_needs(task, output) == 0 && num_uses(task, output) > 0) spare.push_back(output);
-  }
-  return spare;
-}
-
-/// How many still need an output of a task that is done: the tasks that take it as input, and
-/// whoever keeps it after the job. Completing a dependent makes it one less (release_inputs).
-std::int32_t JobTasks::num_needs(TaskIndex task, const BlobRef& output) const {
-  if (output.kind == BlobKind::image) return 0;
-  std::int32_t uses = 0;
-  bool last_state = output.kind == BlobKind::state;
-  const TaskKey maker = graph_.key(task);
-  for (const TaskIndex dependent : graph_.dependents(maker)) {
-    if (!graph_.takes(graph_.key(dependent), maker, output)) continue;
-    last_state = false;
-    uses += status(dependent) != TaskStatus::done ? 1 : 0;
-  }
-  const bool kept = last_state || (keep_all_states_ && output.kind == BlobKind::state);
-  return uses + (kept ? 1 : 0);
-}
-
-/// The same, and whether it stays for what may be lost.
-std::int32_t JobTasks::num_uses(TaskIndex task, const BlobRef& output) const {
-  const bool stays = output.kind == BlobKind::state && checkpoints_.keeps(graph_.key(task));
-  return num_needs(task, output) + (stays ? 1 : 0);
-}
-
-/// made: whether it is there now, or there no longer. (Unsigned sums wrap to what they were.)
-void JobTasks::count_output(const BlobRef& output, bool made) {
-  const std::uint64_t sign = made ? 1 : ~std::uint64_t{0};
-  if (output.kind == BlobKind::image) progress_.frames_done += made ? 1u : ~0u;
-  if (output.kind == BlobKind::state) {
-    progress_.state_bytes += sign * output.size_bytes;
-    progress_.state_pixels += sign * graph_.num_pixels(output.tile);
-  }
-}
-
-/// Counts everybody's need of what a done task made. Images are files of the output folder, not
-/// blobs of the store.
-void JobTasks::add_outputs(TaskIndex task, BlobReferences& blobs) const {
-  for (const BlobRef& output : outputs(task)) {
-    const std::int32_t uses = num_uses(task, output);
-    for (std::int32_t use = 0; use < uses; ++use) blobs.add(output.digest);
-    if (uses == 0 && output.kind != BlobKind::image) blobs.discard(output.digest);
-  }
-}
-
-void JobTasks::release_outputs(TaskIndex task, BlobReferences& blobs) const {
-  for (const BlobRef& output : outputs(task)) {
-    for (std::int32_t use = num_uses(task, output); use > 0; --use) blobs.release(output.digest);
-  }
-}
-
-/// A render task that is done may be the last that older checkpoints stayed for.
-void JobTasks::let_checkpoints_go(const TaskKey& done, BlobReferences& blobs) {
-  if (done.kind != TaskKind::render) return;
-  for (const TaskKey& key : checkpoints_.complete(done)) {
-    for (const BlobRef& output : outputs(*graph_.find(key))) {
-      if (output.kind == BlobKind::state) blobs.release(output.digest);
-    }
-  }
-}
-
-/// Of inputs that were opened again meanwhile nothing is left to release.
-void JobTasks::release_inputs(TaskIndex task, BlobReferences& blobs) const {
-  const TaskKey key = graph_.key(task);
-  for (const TaskIndex input : graph_.inputs(key)) {
-    if (status(input) != TaskStatus::done) continue;
-    for (const std::size_t position : graph_.taken_outputs(key, graph_.key(input)))
-      blobs.release(outputs(input).at(position).digest);
-  }
 }
 
 }  // namespace baton

@@ -54,9 +54,13 @@ class JobTasks {
 
   /// Takes up what an earlier coordinator recorded as done, in any order; of a fresh job only.
   /// Tasks that are none of the job's are left out. gone: render tasks whose spare_blobs() are not
-  /// there.
-  void restore(const Completions& completions, const std::vector<TaskKey>& gone,
-               BlobReferences& blobs);
+  /// there. A task that is recorded without outputs, or without the films of a cut, is opened again
+  /// if an open task takes what it lacks, and so on back to what is there or can be cut. Returns
+  /// those that were.
+  std::vector<TaskIndex> restore(const Completions& completions, const std::vector<TaskKey>& gone,
+                                 BlobReferences& blobs, const JobPlan& plan = {});
+  /// Whether the task, which is not done, is a cut.
+  bool is_cut(TaskIndex task) const { return cuts_.contains(task); }
 
   /// Leases a ready task. Returns the number of the attempt, from 1.
   std::uint32_t grant(TaskIndex task);
@@ -69,7 +73,8 @@ class JobTasks {
   /// Opens a leased task again: ready, or blocked when an input was lost meanwhile.
   void give_back(TaskIndex task);
   /// What a done task made is gone: it is done again, and so is whatever it needs and nobody kept,
-  /// as far back as that goes. Returns those tasks; none where the task is not done.
+  /// as far back as that goes. A task that is not done, but is a cut, is rendered instead. Returns
+  /// those that were done.
   std::vector<TaskIndex> reopen(TaskIndex task, BlobReferences& blobs);
   /// What the task made when it was done before it was opened again; sorted, or empty.
   const std::vector<BlobRef>& former_outputs(TaskIndex task) const;
@@ -98,7 +103,7 @@ class JobTasks {
   void release_all(BlobReferences& blobs);
   /// The blobs of the store that open tasks and the job's result need of what the task made.
   std::vector<BlobRef> live_blobs(TaskIndex task) const;
-  /// Those that stay only for what may be lost (Checkpoints).
+  /// Those that stay only for what may be lost, or come after the job (Checkpoints).
   std::vector<BlobRef> spare_blobs(TaskIndex task) const;
 
  private:
@@ -127,7 +132,11 @@ class JobTasks {
   void release_outputs(TaskIndex task, BlobReferences& blobs) const;
   void release_inputs(TaskIndex task, BlobReferences& blobs) const;
   void let_checkpoints_go(const TaskKey& done, BlobReferences& blobs);
+  bool lacks_needed_output(TaskIndex task) const;
   std::vector<TaskIndex> ask_inputs_again(TaskIndex task, BlobReferences& blobs) const;
+  bool needs_films(TaskIndex task) const;
+  void use_cut(TaskIndex task, BlobReferences& blobs) const;
+  bool drop_cut(TaskIndex task, BlobReferences& blobs);
 
   JobGraph graph_;
   Checkpoints checkpoints_;
@@ -139,6 +148,8 @@ class JobTasks {
   std::int32_t first_open_frame_ = 0;
   std::map<TaskIndex, std::vector<EndedAttempt>> ended_;  ///< and not done
   std::map<TaskIndex, std::vector<BlobRef>> former_outputs_;
+  std::set<TaskIndex> others_frames_;               ///< JobPlan::others_frames
+  std::map<TaskIndex, std::vector<BlobRef>> cuts_;  ///< of open tasks: the states they are cut from
   JobProgress progress_;
 };
 

@@ -106,12 +106,11 @@ void Scheduler::on(const JobResumed& event, TimePoint, Actions& actions) {
   end_if_finished(event.job, *job, actions);
 }
 
-void Scheduler::on(const JobDeleted& event, TimePoint, Actions& actions) {
+void Scheduler::on(const JobForgotten& event, TimePoint, Actions&) {
   Job* job = find(event.job);
   if (!job || is_open(job->status)) return;
   job->tasks.release_all(blobs_);
   jobs_.erase(event.job);
-  actions.push_back(RecordJobDeleted{event.job});
 }
 
 // ---- events: reports ----------------------------------------------------------------------------
@@ -132,7 +131,9 @@ void Scheduler::on(const TaskCompleted& event, TimePoint now, Actions& actions) 
 
   // An incomplete report is a failed attempt.
   const JobGraph& graph = held.job->tasks.graph();
-  std::optional<std::string> fault = graph.check_outputs(event.lease.task, outputs);
+  const auto extent =
+      held.job->tasks.is_cut(held.task) ? JobGraph::Extent::state : JobGraph::Extent::all;
+  std::optional<std::string> fault = graph.check_outputs(event.lease.task, outputs, extent);
   if (!fault) fault = graph.check_frames(event.lease.task, event.frames);
   if (fault) {
     fail_attempt(held, {event.lease, event.worker, *fault}, now, actions);
@@ -199,6 +200,7 @@ void Scheduler::on(const InputsLost& event, TimePoint now, Actions& actions) {
   if (!held.job) return;
   JobTasks& tasks = held.job->tasks;
   std::vector<TaskKey> makers;
+  if (tasks.is_cut(held.task)) makers.push_back(event.lease.task);  // it will be rendered
   for (const TaskIndex input : tasks.graph().inputs(event.lease.task)) {
     const std::vector<BlobRef>& made = tasks.outputs(input);
     const bool lost = std::any_of(made.begin(), made.end(), [&](const BlobRef& output) {
@@ -222,7 +224,11 @@ Scheduler::Rank Scheduler::rank(const Job& job) const { return {-job.spec.priori
 
 /// Brings a fresh job to where the journal left it, less what is gone.
 void Scheduler::replay(Job& job, const JobAdded& event, Actions& actions) {
-  job.tasks.restore(event.completions, event.lost_spares, blobs_);
+  RecordReopened needed{event.job, {}};
+  for (const TaskIndex task :
+       job.tasks.restore(event.completions, event.lost_spares, blobs_, event.plan))
+    needed.tasks.push_back(job.tasks.graph().key(task));
+  if (!needed.tasks.empty()) actions.push_back(std::move(needed));
   reopen(event.job, job, event.lost, actions);
   for (const Failure& failure : event.failures) {
     const auto task = job.tasks.graph().find(failure.lease.task);

@@ -60,8 +60,9 @@ class Scheduler {
   /// nothing follows.
   std::vector<Action> step(const Event& event, TimePoint now);
 
-  /// nullptr: no such job. Valid until the next JobAdded or JobDeleted.
+  /// nullptr: no such job. Valid until the next JobAdded or JobForgotten.
   const Job* find_job(const Digest& job) const;
+  std::size_t num_jobs() const { return jobs_.size(); }
   /// All jobs, in the order of submission.
   std::vector<Digest> jobs() const;
   /// What the job, which must be known, cannot go on without; empty: it goes on, or has ended.
@@ -99,7 +100,7 @@ class Scheduler {
   void on(const JobSuperseded& event, TimePoint now, Actions& actions);
   void on(const JobPaused& event, TimePoint now, Actions& actions);
   void on(const JobResumed& event, TimePoint now, Actions& actions);
-  void on(const JobDeleted& event, TimePoint now, Actions& actions);
+  void on(const JobForgotten& event, TimePoint now, Actions& actions);
   void on(const WorkerJoined& event, TimePoint now, Actions& actions);
   void on(const WorkerAlive& event, TimePoint now, Actions& actions);
   void on(const WorkerLeft& event, TimePoint now, Actions& actions);

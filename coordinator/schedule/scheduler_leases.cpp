@@ -184,7 +184,8 @@ bool Scheduler::grant_one(const std::string& worker, TimePoint now, Actions& act
     if (!task) continue;
     const LeaseId lease{digest, job.tasks.graph().key(*task), job.tasks.grant(*task), epoch_};
     add_lease(worker, lease, *task, now);
-    actions.push_back(GrantLease{worker, lease, job.tasks.inputs(*task)});
+    actions.push_back(
+        GrantLease{worker, lease, job.tasks.inputs(*task), job.tasks.graph().frames(lease.task)});
     return true;
   }
   return false;

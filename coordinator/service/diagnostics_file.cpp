@@ -68,14 +68,15 @@ std::string diagnostics_lines(std::vector<FrameStats> stats,
 Status write_diagnostics(Journal& journal, const Digest& digest, const JobSpec& job) {
   // Run by run: the rows of all tiles of a long job need not be in memory at once, their text may.
   std::string text;
-  for (std::int32_t run = 0; run < num_runs(job); ++run) {
+  const std::int32_t count = num_runs(job);
+  for (std::int32_t run = 0; run < count; ++run) {
     BATON_ASSIGN(std::vector<FrameStats> stats, journal.frame_stats(digest, TaskKind::render, run));
-    const TileRun frames = tile_run(job, 0, run);
     std::map<std::int32_t, FrameQuality> qualities;
-    for (std::int32_t frame = frames.first_frame; frame <= frames.last_frame; ++frame) {
+    for (const FrameStats& of_tile : stats) {
+      if (qualities.contains(of_tile.frame)) continue;
       BATON_ASSIGN(const std::vector<FrameStats> whole,
-                   journal.frame_stats(digest, TaskKind::assemble, frame));
-      if (!whole.empty()) qualities[frame] = whole.front().quality;
+                   journal.frame_stats(digest, TaskKind::assemble, of_tile.frame));
+      qualities[of_tile.frame] = whole.empty() ? FrameQuality{} : whole.front().quality;
     }
     text += diagnostics_lines(std::move(stats), qualities, job.frames);
   }

@@ -2,8 +2,8 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <filesystem>
-#include <set>
 
 namespace baton {
 namespace {
@@ -74,49 +74,48 @@ JobDetail describe_job(const Scheduler& scheduler, const Digest& digest,
   return detail;
 }
 
-Result<Digest> resolve_job(const Scheduler& scheduler, const std::string& text) {
-  std::vector<Digest> named, begin_so;
-  for (const Digest& job : scheduler.jobs()) {
-    if (job.hex() == text) return job;
-    if (scheduler.find_job(job)->spec.name == text) named.push_back(job);
-    if (!text.empty() && job.hex().starts_with(text)) begin_so.push_back(job);
+Result<Digest> choose_job(const std::vector<FoundJob>& found, const std::string& text) {
+  std::vector<FoundJob> matches;
+  const bool any_named =
+      std::any_of(found.begin(), found.end(), [](const FoundJob& job) { return job.is_named; });
+  for (const FoundJob& job : found) {
+    if (job.job.hex() == text) return job.job;
+    if (job.is_named == any_named) matches.push_back(job);
   }
-  const std::vector<Digest>& matches = named.empty() ? begin_so : named;
-  if (matches.size() == 1) return matches.front();
+  std::vector<FoundJob> open = matches;
+  std::erase_if(open, [](const FoundJob& job) { return !is_open(job.status); });
+  if (open.size() == 1) matches = open;
+  if (matches.size() == 1) return matches.front().job;
   if (matches.empty())
     return Error{ErrorKind::bad_input, fmt::format("job '{}': no job has this name or ID", text)};
 
   std::string list;
-  for (const Digest& job : matches) {
-    list += fmt::format("\n  {}  {}", job.hex(), job_status_name(scheduler.find_job(job)->status));
-  }
+  for (const FoundJob& job : matches)
+    list += fmt::format("\n  {}  {}", job.job.hex(), job_status_name(job.status));
   return Error{ErrorKind::bad_input,
                fmt::format("job '{}': {} jobs {}:{}", text, matches.size(),
-                           named.empty() ? "have IDs that begin so" : "have this name", list)};
+                           any_named ? "have this name" : "have IDs that begin so", list)};
 }
 
-std::vector<TaskKey> replaced_frames(const Scheduler::Job& rival, const JobSpec& job) {
-  std::vector<TaskKey> replaced;
-  if (fs::path(rival.spec.output.directory).lexically_normal() !=
-      fs::path(job.output.directory).lexically_normal())
-    return replaced;
-  std::set<std::string> names;
-  for (const int frame : job.frames) names.insert(frame_file_name(job.output.pattern, frame));
-  for (TaskIndex frame = 0; frame < rival.tasks.graph().num_frames(); ++frame) {
-    const bool is_there = rival.tasks.status(frame) == TaskStatus::done;
-    const int number = rival.spec.frames[static_cast<std::size_t>(frame)];
-    if ((is_there || is_open(rival.status)) &&
-        names.contains(frame_file_name(rival.spec.output.pattern, number)))
-      replaced.push_back(rival.tasks.graph().key(frame));
-  }
-  return replaced;
+std::vector<std::string> lost_reasons(const LostFiles& lost) {
+  std::vector<std::string> reasons;
+  constexpr std::size_t kMost = 8;
+  for (std::size_t i = 0; i < lost.frames.size() && i < kMost; ++i)
+    reasons.push_back(fmt::format("{} is gone, or not as it was written", lost.frames[i]));
+  if (lost.frames.size() > kMost)
+    reasons.push_back(fmt::format("and {} frames more", lost.frames.size() - kMost));
+  const std::size_t blobs = lost.tasks.size() - std::min(lost.tasks.size(), lost.frames.size());
+  if (blobs > 0 && lost.frames.empty())
+    reasons.push_back(fmt::format("{} is gone or has another size{}", lost.first,
+                                  blobs > 1 ? fmt::format(", and {} blobs more", blobs - 1) : ""));
+  return reasons;
 }
 
-LostFiles find_lost_files(const JobAdded& job, const BlobStore& store) {
+LostFiles find_lost_files(const JobAdded& job, const BlobStore& store, FrameFiles* frames) {
   // What is recorded as done, and which blobs that leaves.
   JobTasks recorded(job.spec);
   BlobReferences references;
-  recorded.restore(job.completions, {}, references);
+  recorded.restore(job.completions, {}, references, job.plan);
   const JobGraph& graph = recorded.graph();
   LostFiles lost;
   const auto look = [&](TaskIndex task, const fs::path& path, std::uint64_t size_bytes) {
@@ -136,13 +135,24 @@ LostFiles find_lost_files(const JobAdded& job, const BlobStore& store) {
     for (const BlobRef& blob : recorded.live_blobs(task)) {
       if (!look(task, store.path(blob.digest), blob.size_bytes)) break;
     }
+    if (recorded.is_cut(task)) {
+      for (const BlobRef& blob : recorded.inputs(task)) {
+        if (!look(task, store.path(blob.digest), blob.size_bytes)) break;
+      }
+    }
     for (const BlobRef& blob : recorded.spare_blobs(task)) {
       if (!store.contains(blob.digest)) lost.spares.push_back(graph.key(task));
     }
   }
   for (TaskIndex frame = 0; frame < graph.num_frames(); ++frame) {
     if (recorded.status(frame) != TaskStatus::done) continue;
-    look(frame, frame_path(job.spec, frame), recorded.outputs(frame).front().size_bytes);
+    const fs::path path = frame_path(job.spec, frame);
+    const BlobRef& image = recorded.outputs(frame).front();
+    const bool is_there = look(frame, path, image.size_bytes);
+    if (is_there && (frames == nullptr || lost.unreadable || frames->holds(path, image))) continue;
+    if (is_there) lost.tasks.push_back(graph.key(frame));
+    lost.frames.push_back(path.string());
+    if (lost.first.empty()) lost.first = path.string();
   }
 
   // A folder that is not there is not mounted rather than empty.

@@ -6,7 +6,9 @@
 
 #include "common/protocol/messages.h"
 #include "common/store/blob_store.h"
+#include "coordinator/journal/journal.h"
 #include "coordinator/schedule/scheduler.h"
+#include "coordinator/service/frame_files.h"
 
 namespace baton {
 
@@ -16,22 +18,23 @@ JobSummary summarize(const Digest& digest, const Scheduler::Job& job);
 JobDetail describe_job(const Scheduler& scheduler, const Digest& digest,
                        const std::vector<Failure>& failures);
 
-/// The job of this digest, or the one of this name, or else the one whose digest starts so. Errors:
-/// none, or several, whose digests it lists.
-Result<Digest> resolve_job(const Scheduler& scheduler, const std::string& text);
-
-/// The assemble tasks of `rival` whose frames a job would write over: those that are done, or of an
-/// open job all.
-std::vector<TaskKey> replaced_frames(const Scheduler::Job& rival, const JobSpec& job);
+/// Which of the jobs that were found for a text is meant: the one of this digest, or of this name,
+/// or whose digest begins so; where several are, the only one that has not ended. Errors: none, or
+/// several, whose digests it lists.
+Result<Digest> choose_job(const std::vector<FoundJob>& found, const std::string& text);
 
 /// What is not there of the files that a job's recorded completions promise: blobs that are still
-/// needed, and finished frames. Sizes are compared, contents are not read.
+/// needed, and finished frames. Sizes are compared; the contents of frames only with `frames`.
 struct LostFiles {
   std::vector<TaskKey> tasks;             ///< that made them
   std::vector<TaskKey> spares;            ///< that made older checkpoints, which nobody needs now
+  std::vector<std::string> frames;        ///< the files of finished frames among them
   std::string first;                      ///< one of the files
   std::optional<std::string> unreadable;  ///< why it cannot be told now, of a file or folder
 };
-LostFiles find_lost_files(const JobAdded& job, const BlobStore& store);
+LostFiles find_lost_files(const JobAdded& job, const BlobStore& store,
+                          FrameFiles* frames = nullptr);
+/// For people, of what is lost: empty, or lines.
+std::vector<std::string> lost_reasons(const LostFiles& lost);
 
 }  // namespace baton

@@ -80,18 +80,20 @@ Status Service::turn() {
   }
 
   // First durable, then known to others.
+  BATON_TRY(archive_ended());
   BATON_TRY(journal_.commit());
-  let_out();
-  return {};
+  return let_out();
 }
 
-void Service::let_out() {
+Status Service::let_out() {
   for (const Outgoing& outgoing : std::exchange(outbox_, {})) {
     if (!router_.send(outgoing.peer, outgoing.message))
       spdlog::debug("a peer is gone or does not read; message dropped");
   }
   for (const Digest& blob : std::exchange(garbage_, {})) {
-    const Status removed = scheduler_.is_referenced(blob) ? Status() : store_.remove(blob);
+    BATON_ASSIGN(const bool is_kept, journal_.is_kept(blob));
+    const bool stays = is_kept || scheduler_.is_referenced(blob);
+    const Status removed = stays ? Status() : store_.remove(blob);
     if (!removed && unremoved_.empty()) spdlog::warn("{}; tried again", removed.error().message);
     if (removed) {
       unremoved_.erase(blob);
@@ -99,6 +101,7 @@ void Service::let_out() {
       unremoved_.insert(blob);
     }
   }
+  return {};
 }
 
 Status Service::step(const Event& event) {
@@ -331,17 +334,13 @@ Status Service::perform(const RecordJobStatus& action) {
     if (!written) spdlog::warn("no diagnostics: {}", written.error().message);
   }
   remove_job_file(action.job, action.status);
+  if (!is_open(action.status)) ended_.push_back(action.job);
   return journal_.record_status(action.job, action.status);
 }
 
-Status Service::perform(const RecordJobDeleted& action) {
-  spdlog::info("job {} is deleted", action.job.short_hex());
-  remove_job_file(action.job, JobStatus::cancelled);
-  return journal_.delete_job(action.job);
-}
-
 Status Service::perform(const GrantLease& action) {
-  reply_to(action.worker, LeaseGrant{action.lease, action.inputs});
+  reply_to(action.worker,
+           LeaseGrant{action.lease, action.inputs, action.frames.first, action.frames.last});
   return {};
 }
 

@@ -3,6 +3,8 @@
 #include <atomic>
 #include <chrono>
 #include <filesystem>
+#include <map>
+#include <optional>
 #include <set>
 #include <string>
 #include <vector>
@@ -11,6 +13,7 @@
 #include "common/protocol/router.h"
 #include "common/store/blob_store.h"
 #include "coordinator/journal/journal.h"
+#include "coordinator/schedule/adoption.h"
 #include "coordinator/schedule/scheduler.h"
 #include "coordinator/service/job_report.h"
 #include "coordinator/service/peers.h"
@@ -50,9 +53,10 @@ class Service {
   Status restore_jobs();
   Status restore_job(const Digest& job);
   Status turn();
+  Status archive_ended();
   Status handle(const Incoming& incoming);
   Status step(const Event& event);
-  void let_out();
+  Status let_out();
 
   // Messages of workers.
   Status receive(const PeerId& peer, const WorkerHello& message);
@@ -74,20 +78,32 @@ class Service {
   Status receive(const PeerId& peer, const DeleteJob& message);
   Status receive(const PeerId& peer, const DrainWorker& message);
   Status receive(const PeerId& peer, const StopCoordinator& message);
-  Status make_way(const ParsedJobDocument& document, bool restart);
-  Status start_again(JobAdded event, JobStatus status, bool& already_there);
   Result<LostFiles> lost_files_of(const Digest& job);
   static void tell_lost(const Digest& job, const LostFiles& lost);
   template <class E>
   Status change_job(const PeerId& peer, const std::string& prefix);
-  Status answer_detail(const PeerId& peer, const Digest& job);
+  Status answer_detail(const PeerId& peer, const Digest& job, std::string plan = {});
+  Result<std::optional<JobDetail>> archived_detail(const Digest& job);
+  Result<Digest> resolve(const std::string& text);
+  Status archive_job(const Digest& job);
+
+  // Submission (service_submit.cpp).
+  Result<std::optional<FormerJob>> former_job(const Digest& digest);
+  Result<std::vector<std::string>> make_way(const ParsedJobDocument& document, bool restart);
+  Status disown(const Digest& job, const std::vector<int>& frames);
+  Status go_on(const PeerId& peer, const Digest& digest);
+  Status begin(const PeerId& peer, const ParsedJobDocument& document, const std::string& text,
+               std::vector<std::string> reasons);
+  Result<Adoption> find_heritage(const ParsedJobDocument& document, std::vector<Digest>& digests,
+                                 std::vector<std::string>& reasons);
+  Status take_over(const Adoption& adoption, const std::vector<Digest>& formers,
+                   const std::string& text, JobAdded& event);
 
   // Actions of the scheduler.
   Status perform(const RecordCompletion& action);
   Status perform(const RecordFailure& action);
   Status perform(const RecordReopened& action);
   Status perform(const RecordJobStatus& action);
-  Status perform(const RecordJobDeleted& action);
   Status perform(const GrantLease& action);
   Status perform(const RevokeLease& action);
   Status perform(const ReportNoWork& action);
@@ -123,6 +139,9 @@ class Service {
   std::vector<Outgoing> outbox_;  ///< waits for the commit
   std::vector<Digest> garbage_;   ///< likewise
   std::set<Digest> unremoved_;    ///< that the disk would not let go: tried again with each tick
+  std::vector<Digest> ended_;     ///< jobs, to be archived at the end of the turn
+  FrameFiles frame_files_;
+  std::map<Digest, std::vector<std::string>> lost_before_;  ///< what open jobs lacked at the start
 };
 
 }  // namespace baton

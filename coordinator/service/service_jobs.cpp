@@ -5,9 +5,11 @@
 #include <span>
 #include <utility>
 
+#include "common/base/archive.h"
 #include "common/base/limits.h"
 #include "common/job/job_json.h"
 #include "coordinator/service/job_report.h"
+#include "coordinator/service/plan_text.h"
 #include "coordinator/service/service.h"
 
 namespace baton {
@@ -22,9 +24,9 @@ constexpr int kMaxFailuresShown = 100;
 Status Service::restore_jobs() {
   BATON_ASSIGN(const std::vector<Digest> jobs, journal_.jobs());
   for (const Digest& job : jobs) BATON_TRY(restore_job(job));
+  BATON_TRY(archive_ended());
   BATON_TRY(journal_.commit());
-  let_out();
-  return {};
+  return let_out();
 }
 
 Status Service::restore_job(const Digest& digest) {
@@ -37,9 +39,11 @@ Status Service::restore_job(const Digest& digest) {
   }
   JobAdded event{digest, std::move(document->job), known.status, std::move(known.completions),
                  std::move(known.failures)};
+  event.spec.leading_runs = known.plan.leading_runs;
+  event.plan = std::move(known.plan);
 
-  // A running job needs every file that it counts on; a job that has ended needs none until it is
-  // submitted again. What cannot be looked at now is not gone: the job waits to be resumed.
+  // An open job needs every file that it counts on. What cannot be looked at now is not gone: the
+  // job waits to be resumed.
   if (is_open(event.status)) {
     LostFiles lost = find_lost_files(event, store_);
     if (lost.unreadable) {
@@ -49,12 +53,14 @@ Status Service::restore_job(const Digest& digest) {
       BATON_TRY(journal_.record_status(digest, event.status));
     } else {
       tell_lost(digest, lost);
+      if (!lost.tasks.empty()) lost_before_[digest] = lost_reasons(lost);
       event.lost = std::move(lost.tasks);
       event.lost_spares = std::move(lost.spares);
     }
   }
   const JobStatus status = event.status;
   BATON_TRY(step(std::move(event)));
+  if (!is_open(status)) ended_.push_back(digest);
   remove_job_file(digest, status);
   const JobProgress& progress = scheduler_.find_job(digest)->tasks.progress();
   spdlog::info("job {} of the journal: {} of {} tasks are done", digest.short_hex(),
@@ -74,85 +80,6 @@ Status Service::receive(const PeerId& peer, const JobDocumentRequest& message) {
   return {};
 }
 
-Status Service::receive(const PeerId& peer, const SubmitJob& message) {
-  // A job that cannot be run is refused before it leaves a trace.
-  Result<ParsedJobDocument> document = parse_job_document(message.json);
-  if (!document) {
-    refuse(peer, document.error());
-    return {};
-  }
-  if (const std::int64_t count = count_tasks(document->job); count > limits::kMaxTasksPerJob) {
-    refuse(
-        peer,
-        {ErrorKind::bad_input,
-         fmt::format("job {}: {} tasks, at most {}: use larger tiles or more frames per checkpoint",
-                     document->digest.short_hex(), count, limits::kMaxTasksPerJob)});
-    return {};
-  }
-
-  if (const Status way = make_way(*document, message.restart); !way) {
-    if (way.error().kind != ErrorKind::bad_input) return way;
-    refuse(peer, way.error());
-    return {};
-  }
-
-  const Digest digest = document->digest;
-  JobAdded event{digest, std::move(document->job), JobStatus::running, {}, {}};
-  bool already_there = false;
-  if (const Scheduler::Job* known = scheduler_.find_job(digest)) {
-    BATON_TRY(start_again(std::move(event), known->status, already_there));
-  } else {
-    if (scheduler_.jobs().size() >= limits::kMaxJobs) {
-      refuse(peer, {ErrorKind::io,
-                    fmt::format("the journal is full: {} jobs; `baton job delete` removes some",
-                                limits::kMaxJobs)});
-      return {};
-    }
-    spdlog::info("job {} submitted: '{}', {} tasks", digest.short_hex(), event.spec.name,
-                 count_tasks(event.spec));
-    BATON_TRY(journal_.add_job(digest, message.json));
-    BATON_TRY(step(event));
-  }
-  reply(peer, JobAccepted{digest, already_there});
-  return {};
-}
-
-/// A frame belongs to one job. Those whose frames the new one would replace end, if that is wanted
-/// or their pictures are the same; bad_input: it is not.
-Status Service::make_way(const ParsedJobDocument& document, bool restart) {
-  std::vector<JobSuperseded> superseded;
-  for (const Digest& digest : scheduler_.jobs()) {
-    if (digest == document.digest) continue;
-    const Scheduler::Job& rival = *scheduler_.find_job(digest);
-    std::vector<TaskKey> replaced = replaced_frames(rival, document.job);
-    if (replaced.empty()) continue;
-    BATON_ASSIGN(const std::optional<std::string> text, journal_.document(digest));
-    const Result<ParsedJobDocument> other = parse_job_document(text.value_or(""));
-    const std::vector<std::string> differing =
-        other ? picture_differences(*other, document) : std::vector<std::string>{"the whole job"};
-    if (!differing.empty() && !restart) {
-      constexpr std::size_t kMost = 8;
-      const auto shown = std::span(differing).first(std::min(kMost, differing.size()));
-      return Error{
-          ErrorKind::bad_input,
-          fmt::format("job '{}': its frames would replace those of job {} ('{}', {}, {} of {} "
-                      "frames) in {}, which is another picture; what differs: {}{}\n"
-                      "--restart replaces them, another output.directory keeps them",
-                      document.job.name, digest.short_hex(), rival.spec.name,
-                      job_status_name(rival.status), rival.tasks.progress().frames_done,
-                      rival.spec.frames.size(), document.job.output.directory,
-                      fmt::join(shown, ", "), differing.size() > kMost ? ", ..." : "")};
-    }
-    superseded.push_back({digest, std::move(replaced)});
-  }
-  for (JobSuperseded& event : superseded) {
-    spdlog::info("job {} makes way for job {}: {} frames", event.job.short_hex(),
-                 document.digest.short_hex(), event.replaced.size());
-    BATON_TRY(step(std::move(event)));
-  }
-  return {};
-}
-
 void Service::tell_lost(const Digest& job, const LostFiles& lost) {
   if (lost.tasks.empty()) return;
   spdlog::warn("job {}: {} is gone or has another size{}", job.short_hex(), lost.first,
@@ -161,31 +88,17 @@ void Service::tell_lost(const Digest& job, const LostFiles& lost) {
                    : "");
 }
 
-/// A job that is known already: goes on where it stopped, and makes again what is gone. Who submits
-/// it wants it as it now is: a folder that is not there is empty.
-Status Service::start_again(JobAdded event, JobStatus status, bool& already_there) {
-  already_there = true;
-  if (status == JobStatus::running) return {};
-  BATON_ASSIGN(LostFiles lost, lost_files_of(event.job));
-  if (status == JobStatus::paused) {
-    tell_lost(event.job, lost);
-    return step(JobResumed{event.job, std::move(lost.tasks)});
-  }
-  BATON_ASSIGN(JournalledJob known, journal_.load(event.job));
-  event.completions = std::move(known.completions);
-  if (lost.tasks.empty() && status == JobStatus::done) return {};
-
-  already_there = false;
-  spdlog::info("job {} goes on", event.job.short_hex());
-  tell_lost(event.job, lost);
-  event.lost = std::move(lost.tasks);
-  event.lost_spares = std::move(lost.spares);
-  BATON_TRY(journal_.restart_job(event.job));
-  return step(std::move(event));
-}
-
-Status Service::receive(const PeerId& peer, const ListJobs&) {
+Status Service::receive(const PeerId& peer, const ListJobs& message) {
   JobList list;
+  if (message.all) {
+    BATON_ASSIGN(const std::vector<Bytes> ended, journal_.archived_summaries(limits::kMaxJobs));
+    for (const Bytes& bytes : ended) {
+      ArchiveReader reader(bytes);
+      reader(list.jobs.emplace_back());
+      if (!reader.complete()) list.jobs.pop_back();
+    }
+  }
+  BATON_ASSIGN(list.num_ended, journal_.num_archived());
   for (const Digest& job : scheduler_.jobs())
     list.jobs.push_back(summarize(job, *scheduler_.find_job(job)));
   list.workers = peers_.summaries();
@@ -196,8 +109,14 @@ Status Service::receive(const PeerId& peer, const ListJobs&) {
   return {};
 }
 
+Result<Digest> Service::resolve(const std::string& text) {
+  BATON_ASSIGN(const std::vector<FoundJob> found,
+               text.empty() ? std::vector<FoundJob>() : journal_.find_jobs(text));
+  return choose_job(found, text);
+}
+
 Status Service::receive(const PeerId& peer, const ShowJob& message) {
-  const Result<Digest> job = resolve_job(scheduler_, message.job);
+  const Result<Digest> job = resolve(message.job);
   if (job) return answer_detail(peer, *job);
   refuse(peer, job.error());
   return {};
@@ -212,12 +131,14 @@ Status Service::receive(const PeerId& peer, const PauseJob& message) {
 }
 
 Status Service::receive(const PeerId& peer, const ResumeJob& message) {
-  const Result<Digest> job = resolve_job(scheduler_, message.job);
+  const Result<Digest> job = resolve(message.job);
   if (!job) {
     refuse(peer, job.error());
     return {};
   }
-  if (scheduler_.find_job(*job)->status == JobStatus::paused) {
+  std::string plan;
+  const Scheduler::Job* const known = scheduler_.find_job(*job);
+  if (known != nullptr && known->status == JobStatus::paused) {
     BATON_ASSIGN(LostFiles lost, lost_files_of(*job));
     if (lost.unreadable) {
       refuse(peer, {ErrorKind::io,
@@ -225,33 +146,43 @@ Status Service::receive(const PeerId& peer, const ResumeJob& message) {
       return {};
     }
     tell_lost(*job, lost);
+    const std::vector<std::string> reasons = lost_reasons(lost);
     BATON_TRY(step(JobResumed{*job, std::move(lost.tasks)}));
+    plan = plan_text(*scheduler_.find_job(*job), reasons);
   }
-  return answer_detail(peer, *job);
+  return answer_detail(peer, *job, std::move(plan));
 }
 
 Status Service::receive(const PeerId& peer, const DeleteJob& message) {
-  const Result<Digest> job = resolve_job(scheduler_, message.job);
+  const Result<Digest> job = resolve(message.job);
   if (!job) {
     refuse(peer, job.error());
     return {};
   }
-  const JobStatus status = scheduler_.find_job(*job)->status;
-  if (is_open(status)) {
+  const Scheduler::Job* const known = scheduler_.find_job(*job);
+  if (known != nullptr && is_open(known->status)) {
     refuse(peer, {ErrorKind::usage, fmt::format("job {} is {}: cancel it first", job->short_hex(),
-                                                job_status_name(status))});
+                                                job_status_name(known->status))});
     return {};
   }
-  BATON_TRY(step(JobDeleted{*job}));
+  BATON_TRY(archive_job(*job));
+  BATON_ASSIGN(std::vector<Digest> kept, journal_.kept_blobs(*job));
+  garbage_.insert(garbage_.end(), kept.begin(), kept.end());
+  BATON_TRY(journal_.delete_job(*job));
+  remove_job_file(*job, JobStatus::cancelled);
+  spdlog::info("job {} is deleted", job->short_hex());
   return receive(peer, ListJobs{});
 }
 
 /// Of a job that the scheduler knows.
 Result<LostFiles> Service::lost_files_of(const Digest& job) {
   BATON_ASSIGN(JournalledJob known, journal_.load(job));
-  return find_lost_files(
-      {job, scheduler_.find_job(job)->spec, JobStatus::running, std::move(known.completions), {}},
-      store_);
+  return find_lost_files({.job = job,
+                          .spec = scheduler_.find_job(job)->spec,
+                          .completions = std::move(known.completions),
+                          .failures = {},
+                          .plan = std::move(known.plan)},
+                         store_, &frame_files_);
 }
 
 Status Service::receive(const PeerId& peer, const DrainWorker& message) {
@@ -275,7 +206,7 @@ Status Service::receive(const PeerId& peer, const StopCoordinator&) {
 /// Event E happens to the job whose ID begins with `prefix`; the answer shows what came of it.
 template <class E>
 Status Service::change_job(const PeerId& peer, const std::string& prefix) {
-  const Result<Digest> job = resolve_job(scheduler_, prefix);
+  const Result<Digest> job = resolve(prefix);
   if (!job) {
     refuse(peer, job.error());
     return {};
@@ -284,11 +215,67 @@ Status Service::change_job(const PeerId& peer, const std::string& prefix) {
   return answer_detail(peer, *job);
 }
 
-Status Service::answer_detail(const PeerId& peer, const Digest& job) {
-  BATON_ASSIGN(const std::vector<Failure> failures,
-               journal_.recent_failures(job, kMaxFailuresShown));
-  reply(peer, describe_job(scheduler_, job, failures));
+/// Of a job that is known here or in the archive.
+Status Service::answer_detail(const PeerId& peer, const Digest& job, std::string plan) {
+  if (scheduler_.find_job(job) != nullptr) {
+    BATON_ASSIGN(const std::vector<Failure> failures,
+                 journal_.recent_failures(job, kMaxFailuresShown));
+    JobDetail detail = describe_job(scheduler_, job, failures);
+    detail.plan = std::move(plan);
+    reply(peer, std::move(detail));
+    return {};
+  }
+  BATON_ASSIGN(std::optional<JobDetail> detail, archived_detail(job));
+  if (detail) {
+    reply(peer, std::move(*detail));
+  } else {
+    refuse(peer, {ErrorKind::bad_input,
+                  fmt::format("job {}: its document cannot be read", job.short_hex())});
+  }
   return {};
+}
+
+// ---- the archive
+// ----------------------------------------------------------------------------------
+
+Result<std::optional<JobDetail>> Service::archived_detail(const Digest& job) {
+  BATON_ASSIGN(const std::optional<Bytes> bytes, journal_.archived_detail(job));
+  if (!bytes) return std::optional<JobDetail>();
+  JobDetail detail;
+  ArchiveReader reader(*bytes);
+  reader(detail);
+  if (!reader.complete())
+    return Error{ErrorKind::corrupt,
+                 fmt::format("the archived job {} cannot be read", job.short_hex())};
+  return std::optional(std::move(detail));
+}
+
+/// Jobs that have ended leave the memory.
+Status Service::archive_ended() {
+  for (const Digest& job : std::exchange(ended_, {})) BATON_TRY(archive_job(job));
+  return {};
+}
+
+/// A job that has ended leaves the memory; what people may ask of it, and its blobs that a later
+/// job may go on from, stand in the archive. One that is there, or runs again, stays as it is.
+Status Service::archive_job(const Digest& digest) {
+  const Scheduler::Job* const job = scheduler_.find_job(digest);
+  if (job == nullptr || is_open(job->status)) return {};
+  std::vector<Digest> kept;
+  for (TaskIndex task = job->tasks.graph().num_frames(); task < job->tasks.graph().num_tasks();
+       ++task) {
+    for (const BlobRef& blob : job->tasks.live_blobs(task)) kept.push_back(blob.digest);
+    for (const BlobRef& blob : job->tasks.spare_blobs(task)) kept.push_back(blob.digest);
+    if (job->tasks.is_cut(task)) {
+      for (const BlobRef& blob : job->tasks.inputs(task)) kept.push_back(blob.digest);
+    }
+  }
+  BATON_ASSIGN(const std::vector<Failure> failures,
+               journal_.recent_failures(digest, kMaxFailuresShown));
+  const JobDetail detail = describe_job(scheduler_, digest, failures);
+  BATON_TRY(journal_.archive_job(digest, to_bytes(detail.summary), to_bytes(detail), kept));
+  lost_before_.erase(digest);
+  return step(JobForgotten{digest});
 }
 
 }  // namespace baton

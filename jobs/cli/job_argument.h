@@ -1,6 +1,7 @@
 #pragma once
 
 #include <CLI/CLI.hpp>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -35,6 +36,12 @@ struct WantedJob {
 };
 /// Reads the file. `look`: a look even if the options change nothing. Errors: load_job's.
 Result<WantedJob> load_wanted(const JobArgument& argument, bool look = false);
+
+/// Adds --from-frame; frame: none, where it is not given.
+void add_from_frame_option(CLI::App& command, std::optional<int>& frame);
+/// Leaves the frames from `frame` on, so that a job begins there afresh and those before stay with
+/// whichever job wrote them. Error: none is left.
+Status begin_at(JobSpec& job, std::optional<int> frame);
 
 /// The same with settled motion, for what is rendered or estimated.
 Result<WantedJob> load_settled(const JobArgument& argument, bool look = false);

@@ -25,41 +25,49 @@ constexpr std::chrono::minutes kAwayPatience{5};
 
 struct JobOptions {
   std::string endpoint;
-  std::string job;         ///< name, digest or its beginning
-  JobArgument wanted;      ///< of submit
-  double timeout_s = 0;    ///< of wait; 0: none
-  bool restart = false;    ///< of submit
-  bool all_ended = false;  ///< of delete
+  std::string job;                ///< name, digest or its beginning
+  JobArgument wanted;             ///< of submit
+  double timeout_s = 0;           ///< of wait; 0: none
+  bool restart = false;           ///< of submit
+  std::optional<int> from_frame;  ///< of submit
+  bool all = false;               ///< of list
+  bool all_ended = false;         ///< of delete
   bool json = false;
 };
 
 Result<ExitCode> submit(const JobOptions& options, RequestClient& client) {
   BATON_ASSIGN(WantedJob wanted, load_settled(options.wanted));
   JobSpec& job = wanted.job;
+  BATON_TRY(begin_at(job, options.from_frame));
   // A pilot takes its time: first see that there is somebody to submit to.
   if (job.sampling.method == Method::automatic) BATON_TRY(ask<JobList>(client, ListJobs{}));
   BATON_TRY(settle_method_at(job, options.endpoint));
   BATON_ASSIGN(std::string document, make_job_document(job));
-  BATON_ASSIGN(
-      const JobAccepted accepted,
-      ask<JobAccepted>(client, SubmitJob{std::move(document), options.restart || wanted.is_look}));
+  const bool restart = options.restart || options.from_frame || wanted.is_look;
+  BATON_ASSIGN(const JobAccepted accepted,
+               ask<JobAccepted>(client, SubmitJob{std::move(document), restart}));
   if (options.json) {
-    fmt::print(
-        "{}\n",
-        ordered_json{{"id", accepted.job.hex()}, {"alreadyThere", accepted.already_there}}.dump(2));
+    fmt::print("{}\n", ordered_json{{"id", accepted.job.hex()},
+                                    {"alreadyThere", accepted.already_there},
+                                    {"plan", accepted.plan}}
+                           .dump(2));
   } else {
     fmt::print("{}\n", accepted.job.hex());
     if (wanted.is_look) fmt::print(stderr, "a look: frames go to {}\n", job.output.directory);
     if (accepted.already_there) fmt::print(stderr, "an equal job is there already: it goes on\n");
+    fmt::print(stderr, "{}", accepted.plan);
   }
   return ExitCode::ok;
 }
 
 Result<ExitCode> list(const JobOptions& options, RequestClient& client) {
-  BATON_ASSIGN(const JobList found, ask<JobList>(client, ListJobs{}));
+  BATON_ASSIGN(const JobList found, ask<JobList>(client, ListJobs{options.all}));
   if (!options.json) {
     for (const JobSummary& job : found.jobs) fmt::print("{}\n", job_line(job));
-    fmt::print("{} jobs, {} workers\n", found.jobs.size(), found.workers.size());
+    fmt::print("{} jobs, {} workers", found.jobs.size(), found.workers.size());
+    if (!options.all && found.num_ended > 0)
+      fmt::print("; --all shows {} that have ended", found.num_ended);
+    fmt::print("\n");
     return ExitCode::ok;
   }
   ordered_json result = {{"jobs", ordered_json::array()}, {"workers", ordered_json::array()}};
@@ -130,6 +138,7 @@ template <class M>
 Result<ExitCode> change(const JobOptions& options, RequestClient& client) {
   BATON_ASSIGN(const JobDetail before, ask<JobDetail>(client, ShowJob{options.job}));
   BATON_ASSIGN(const JobDetail after, ask<JobDetail>(client, M{before.summary.job.hex()}));
+  fmt::print(stderr, "{}", after.plan);
   print_change(before, after, options.json);
   return ExitCode::ok;
 }
@@ -139,7 +148,9 @@ Result<ExitCode> retry(const JobOptions& options, RequestClient& client) {
   BATON_ASSIGN(const JobDetail before, ask<JobDetail>(client, ShowJob{options.job}));
   const Digest& id = before.summary.job;
   BATON_ASSIGN(JobDocument document, ask<JobDocument>(client, JobDocumentRequest{id}));
-  BATON_TRY(ask<JobAccepted>(client, SubmitJob{std::move(document.json)}));
+  BATON_ASSIGN(const JobAccepted accepted,
+               ask<JobAccepted>(client, SubmitJob{std::move(document.json)}));
+  fmt::print(stderr, "{}", accepted.plan);
   BATON_ASSIGN(const JobDetail after, ask<JobDetail>(client, ShowJob{id.hex()}));
   print_change(before, after, options.json);
   return ExitCode::ok;
@@ -151,7 +162,7 @@ Result<ExitCode> delete_jobs(const JobOptions& options, RequestClient& client) {
   std::vector<std::string> jobs{options.job};
   if (options.all_ended) {
     jobs.clear();
-    BATON_ASSIGN(const JobList found, ask<JobList>(client, ListJobs{}));
+    BATON_ASSIGN(const JobList found, ask<JobList>(client, ListJobs{true}));
     for (const JobSummary& job : found.jobs) {
       if (!is_open(job.status)) jobs.push_back(job.job.hex());
     }
@@ -198,10 +209,12 @@ void add_job_command(CLI::App& app, ExitCode& code) {
         [options, action, &code] { code = finish_with_coordinator(run_job(*options, action)); });
     return command;
   };
-  add("submit", "Hands a job over; prints its ID", "JOB", submit)
-      ->add_flag("--restart", options->restart,
-                 "replace the frames of another picture in the output folder");
-  add("list", "All jobs of the coordinator", "", list);
+  CLI::App* hand_in = add("submit", "Hands a job over; prints its ID", "JOB", submit);
+  hand_in->add_flag("--restart", options->restart,
+                    "replace the frames of another picture in the output folder");
+  add_from_frame_option(*hand_in, options->from_frame);
+  add("list", "The jobs of the coordinator that have not ended", "", list)
+      ->add_flag("--all", options->all, "also those that have ended");
   add("show", "One job: progress, statistics, failures", "ID", show);
   add("pause", "Hands out no more of a job's tasks; those that run are finished", "ID",
       change<PauseJob>);

@@ -24,6 +24,7 @@ ExitCode exit_code_of(const JobSpec& job, JobStatus status) {
 Result<ExitCode> run_render(const RenderOptions& options) {
   BATON_ASSIGN(WantedJob wanted, load_settled(options.job));
   JobSpec& job = wanted.job;
+  BATON_TRY(begin_at(job, options.from_frame));
   BATON_TRY(check_out(options, job));
   if (wanted.is_look) spdlog::info("a look: frames go to {}", job.output.directory);
   const FarmOptions farm = farm_options(options, job);
@@ -33,14 +34,14 @@ Result<ExitCode> run_render(const RenderOptions& options) {
   BATON_ASSIGN(RenderSession session, RenderSession::start(options, farm, signals));
   const WarningsAside warnings(job);
   BATON_ASSIGN(const std::optional<JobStatus> status,
-               session.render(job, options.restart || wanted.is_look));
+               session.render(job, options.restart || options.from_frame || wanted.is_look));
   if (status && options.keep_running) BATON_TRY(session.keep_running());
   if (!status) spdlog::info("stopping; finished work is kept");
   session.stop();
   if (status) return exit_code_of(job, *status);
 
-  const std::string place =
-      options.work_directory.empty() ? "" : " --work-dir " + options.work_directory;
+  std::string place = options.work_directory.empty() ? "" : " --work-dir " + options.work_directory;
+  if (options.from_frame) place += fmt::format(" --from-frame {}", *options.from_frame);
   fmt::print(stderr, "to go on: baton render {}{}\n", command_text(options.job), place);
   return ExitCode::cancelled;
 }
@@ -68,6 +69,7 @@ void add_render_command(CLI::App& app, ExitCode& code) {
                     "until Ctrl-C");
   command->add_flag("--restart", options->restart,
                     "replace the frames of another picture in the output folder");
+  add_from_frame_option(*command, options->from_frame);
   command->add_flag("--keep-running", options->keep_running,
                     "keep coordinator and workers until Ctrl-C");
   command->add_flag("--json", options->json, "the result for machines");

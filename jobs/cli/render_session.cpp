@@ -103,7 +103,7 @@ Result<std::optional<JobStatus>> RenderSession::render(const JobSpec& job, bool 
       const std::optional<JobAccepted> accepted,
       ask_farm<JobAccepted>(farm_, client_, signals_, SubmitJob{std::move(document), restart}));
   if (!accepted) return std::optional<JobStatus>();
-  if (accepted->already_there) spdlog::info("going on with what is done already");
+  fmt::print(stderr, "{}", accepted->plan);
 
   FrameSheet sheet(job);
   BATON_ASSIGN(const std::optional<JobDetail> detail, follow(accepted->job, sheet, interrupted));

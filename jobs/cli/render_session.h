@@ -19,6 +19,7 @@ struct RenderOptions {
   std::optional<float> exposure;
   bool watch = false;
   bool restart = false;
+  std::optional<int> from_frame;
   bool keep_running = false;
   bool json = false;
 };

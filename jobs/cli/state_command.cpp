@@ -79,7 +79,7 @@ ordered_json report_json(const StateReport& report) {
   ordered_json sources = ordered_json::object();
   for (std::size_t i = 0; i < kSourceNames.size(); ++i)
     sources[kSourceNames[i]] = report.sources[i];
-  return {{"job", state.job_digest.hex()},
+  return {{"picture", state.picture.hex()},
           {"frameIndex", state.frame_index},
           {"tile", state.tile},
           {"rect", {state.rect.x0, state.rect.y0, state.rect.x1, state.rect.y1}},
@@ -94,7 +94,7 @@ ordered_json report_json(const StateReport& report) {
 void print_report(const StateReport& report) {
   const SampleState& state = report.state;
   const PixelRect& rect = state.rect;
-  fmt::print("job        {}\n", state.job_digest.hex());
+  fmt::print("picture    {}\n", state.picture.hex());
   fmt::print("tile       {}, pixels [{}, {}) x [{}, {})\n", state.tile, rect.x0, rect.x1, rect.y0,
              rect.y1);
   fmt::print("frame      index {}\n", state.frame_index);

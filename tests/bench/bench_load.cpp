@@ -112,7 +112,7 @@ std::size_t count_lines(const fs::path& log, const std::string& part) {
 
 /// The job as the coordinator tells it; what it tells is durable.
 Result<JobSummary> ask_job(RequestClient& client) {
-  BATON_ASSIGN(const Message answer, client.request(ListJobs{}, 60s));
+  BATON_ASSIGN(const Message answer, client.request(ListJobs{.all = true}, 60s));
   const auto* list = std::get_if<JobList>(&answer);
   if (list == nullptr || list->jobs.size() != 1)
     return Error{ErrorKind::internal, "no list of one job"};

@@ -38,7 +38,7 @@ Status write_both(const fs::path& folder, const std::string& name, const Bytes& 
 /// A state of 4 x 3 pixels, the first of them background.
 SampleState small_state(std::int32_t particles, std::int32_t populations) {
   SampleState state;
-  state.job_digest = {1, 2};
+  state.picture = {1, 2};
   state.frame_index = 5;
   state.tile = 7;
   state.resize({8, 16, 12, 19}, particles, populations);

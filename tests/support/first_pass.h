@@ -7,7 +7,7 @@ namespace baton::test {
 /// 5 x 4 pixels of 8 samples in two populations; pixel (1, 1) has a failed ray.
 inline FirstPassSamples small_first_pass() {
   FirstPassSamples s;
-  s.job_digest = {3, 4};
+  s.picture = {3, 4};
   s.frame_index = 2;
   s.tile = 1;
   s.rect = {10, 20, 15, 24};

@@ -47,17 +47,18 @@ def a_job_from_submission_to_its_end(programs, folder):
         shown = farm.show(job[:6])
         check_equal((shown["id"], shown["status"], shown["framesDoneNumbers"]), (job, "done", [1, 2]), "show")
         text = farm.baton("job", "list").stdout
-        check("1 jobs, 1 workers" in text and job[:6] in text, text)
+        check("0 jobs, 1 workers; --all shows 1 that have ended" in text and job[:6] not in text, text)
+        check(job[:6] in farm.baton("job", "list", "--all").stdout, "the job is not listed with --all")
         check_equal(saved_jobs(farm), [], "documents of a job that is done")
 
         # The same job again is no new job.
         again = json.loads(farm.baton("job", "submit", path, "--json").stdout)
-        check_equal(again, {"id": job, "alreadyThere": True}, "second submission")
+        check_equal(again, {"id": job, "alreadyThere": True, "plan": "frames 1-2 are kept\n"}, "second submission")
 
         # Deleted, it is known no longer; its frames stay.
         farm.baton("job", "delete", expect=USAGE)
         check("1 jobs are deleted" in farm.baton("job", "delete", "--ended").stdout, "no word of what was deleted")
-        check("0 jobs" in farm.baton("job", "list").stdout, "the job is still there")
+        check("0 jobs" in farm.baton("job", "list", "--all").stdout, "the job is still there")
         farm.baton("job", "show", job, expect=BAD_INPUT)
         check(list(folder.glob("**/frame.0001.exr")), "the frames are gone")
 

@@ -23,7 +23,7 @@ Status check_inputs(const RenderContext& context, std::int32_t frame_index, std:
   }
   for (std::size_t i = 0; i < near.size(); ++i) {
     const FirstPassSamples& s = *near[i];
-    if (s.job_digest == context.digest && s.frame_index == frame_index && s.tile == tiles[i] &&
+    if (s.picture == context.picture && s.frame_index == frame_index && s.tile == tiles[i] &&
         s.rect == context.grid.rect(tiles[i]) &&
         s.num_slots == context.job.sampling.num_particles &&
         s.num_populations == num_populations(context.job)) {
@@ -31,8 +31,8 @@ Status check_inputs(const RenderContext& context, std::int32_t frame_index, std:
     }
     return Error{
         ErrorKind::bad_input,
-        fmt::format("first-pass samples: of job {} tile {} frame index {}, expected {}, {}, {}",
-                    s.job_digest.hex(), s.tile, s.frame_index, context.digest.hex(), tiles[i],
+        fmt::format("first-pass samples: of picture {} tile {} frame index {}, expected {}, {}, {}",
+                    s.picture.hex(), s.tile, s.frame_index, context.picture.hex(), tiles[i],
                     frame_index)};
   }
   if (film.rect == context.grid.rect(tile)) return {};

@@ -9,7 +9,7 @@ namespace baton {
 
 void FirstPassCollector::begin(const SampleState& state) {
   samples_ = {};
-  samples_.job_digest = state.job_digest;
+  samples_.picture = state.picture;
   samples_.tile = state.tile;
   samples_.rect = state.rect;
   samples_.num_slots = state.num_particles;

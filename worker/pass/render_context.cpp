@@ -23,18 +23,17 @@ std::vector<std::unique_ptr<const PixelMethod>> make_own_methods(const JobSpec& 
 }  // namespace
 
 Result<std::shared_ptr<const RenderContext>> load_render_context(const JobSpec& job,
-                                                                 const Digest& job_digest) {
+                                                                 const Digest& picture) {
   BATON_ASSIGN(const auto assets, load_shared_assets(job));
-  return make_render_context(job, job_digest, assets);
+  return make_render_context(job, picture, assets);
 }
 
 Result<std::shared_ptr<const RenderContext>> make_render_context(
-    const JobSpec& job, const Digest& job_digest,
-    const std::shared_ptr<const SharedAssets>& assets) {
+    const JobSpec& job, const Digest& picture, const std::shared_ptr<const SharedAssets>& assets) {
   BATON_TRY(check_settled(job));
   auto context = std::make_shared<RenderContext>();
   context->job = job;
-  context->digest = job_digest;
+  context->picture = picture;
   context->grid = TileGrid(job.image);
   context->frames = expand_sequence(job);
   context->lights = std::make_unique<LightSequence>(context->job, assets->maps);

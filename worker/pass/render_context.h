@@ -18,7 +18,7 @@ class SurfaceCache;
 class RenderContext {
  public:
   JobSpec job;
-  Digest digest;
+  Digest picture;  ///< of the job (picture_digest)
   TileGrid grid{{0, 0, 1, 1}, 1};
   std::vector<FrameSpec> frames;
   std::shared_ptr<const Scene> scene;

@@ -15,9 +15,9 @@ namespace {
 /// A state must be that of the job, a tile and a frame.
 Status check_state(const RenderContext& context, const SampleState& state, std::int32_t tile,
                    std::int32_t frame_index) {
-  if (state.job_digest != context.digest) {
-    return Error{ErrorKind::bad_input, fmt::format("sample state: of job {}, expected {}",
-                                                   state.job_digest.hex(), context.digest.hex())};
+  if (state.picture != context.picture) {
+    return Error{ErrorKind::bad_input, fmt::format("sample state: of picture {}, expected {}",
+                                                   state.picture.hex(), context.picture.hex())};
   }
   const std::int32_t num_particles = num_carried_particles(context.job.sampling);
   if (state.tile != tile || state.frame_index != frame_index ||
@@ -55,7 +55,7 @@ class TileWalk {
   TileWalk(const RenderContext& context, const TileRun& run)
       : context_(context), rect_(context.grid.rect(run.tile)) {
     start_state();
-    state_.job_digest = context.digest;
+    state_.picture = context.picture;
     state_.tile = run.tile;
   }
 

@@ -22,16 +22,15 @@ namespace baton {
 class RenderContext;
 struct SharedAssets;
 
-/// Loads every asset of the job. Errors name the file and what was expected; several faults are
-/// joined by newlines.
+/// Loads every asset of the job; `picture` names its states. Errors name the file and what was
+/// expected; several faults are joined by newlines.
 Result<std::shared_ptr<const RenderContext>> load_render_context(const JobSpec& job,
-                                                                 const Digest& job_digest);
+                                                                 const Digest& picture);
 
 /// The same with assets that are loaded already (worker/pass/shared_assets.h): those of the job's
 /// scene. Error: motion that is not settled.
 Result<std::shared_ptr<const RenderContext>> make_render_context(
-    const JobSpec& job, const Digest& job_digest,
-    const std::shared_ptr<const SharedAssets>& assets);
+    const JobSpec& job, const Digest& picture, const std::shared_ptr<const SharedAssets>& assets);
 
 /// Where the finished frames of a tile run go, in frame order. Called on the rendering thread.
 struct TileRunSink {
@@ -50,7 +49,7 @@ using StatePtr = std::shared_ptr<const SampleState>;
 /// all tiles within history_reach_px (TileGrid::tiles_near, in that order; the tile's own where
 /// pixels keep to themselves), required exactly when the job carries state and the run is not the
 /// first. The bytes that reach the sink are a function of (job, run, previous) alone. Errors: a
-/// state of another job, tile or frame; cancelled when `stop` is requested; the sink's own.
+/// state of another picture, tile or frame; cancelled when `stop` is requested; the sink's own.
 Result<RenderStats> run_tile(const RenderContext& context, const TileRun& run,
                              std::span<const StatePtr> previous, const TileRunSink& sink,
                              std::stop_token stop);

@@ -5,6 +5,7 @@
 #include "common/image/film_tile.h"
 #include "common/job/motion.h"
 #include "common/job/sequence.h"
+#include "common/state/join_states.h"
 #include "common/state/sample_state.h"
 #include "worker/exchange/second_pass.h"
 #include "worker/pass/cpu_clock.h"
@@ -26,11 +27,11 @@ Result<FilmTile> read_film(const LoadedJob& loaded, const BlobStore& store, cons
                            FilmPass pass) {
   BATON_ASSIGN(const Bytes bytes, store.get(ref.digest));
   BATON_ASSIGN(StoredFilm stored, decode_film_tile(bytes, blob_name(ref)));
-  if (stored.origin == FilmOrigin{loaded.digest, ref.frame, pass}) return std::move(stored.film);
+  if (stored.origin == FilmOrigin{loaded.picture, ref.frame, pass}) return std::move(stored.film);
   return Error{ErrorKind::bad_input,
-               fmt::format("{}: of job {} frame index {} pass {}, expected {}, {}, {}",
-                           blob_name(ref), stored.origin.job.hex(), stored.origin.frame_index,
-                           static_cast<int>(stored.origin.pass), loaded.digest.hex(), ref.frame,
+               fmt::format("{}: of picture {} frame index {} pass {}, expected {}, {}, {}",
+                           blob_name(ref), stored.origin.picture.hex(), stored.origin.frame_index,
+                           static_cast<int>(stored.origin.pass), loaded.picture.hex(), ref.frame,
                            static_cast<int>(pass))};
 }
 
@@ -55,13 +56,31 @@ Result<std::vector<StatePtr>> read_states(const LoadedJob& loaded, const BlobSto
   return states;
 }
 
+/// The task's state from those of another tiling, of the same frame.
+Result<TaskOutput> cut_state(const LoadedJob& loaded, BlobStore& store, const TaskKey& task,
+                             const std::vector<StatePtr>& others) {
+  TaskOutput output;
+  const CpuTimer timer(output.stats.seconds_state);
+  const PixelRect rect = TileGrid(loaded.job.image).rect(task.tile);
+  std::vector<const SampleState*> parts;
+  for (const StatePtr& other : others) parts.push_back(other.get());
+  BATON_ASSIGN(const SampleState state, join_states(parts, rect, task.tile));
+  const Bytes bytes = encode_state(state);
+  BATON_ASSIGN(const Digest digest, store.put(bytes));
+  output.outputs.push_back({BlobKind::state, state.frame_index, task.tile, digest, bytes.size()});
+  return output;
+}
+
 Result<TaskOutput> execute_render(const LoadedJob& loaded, BlobStore& store, const TaskKey& task,
-                                  const std::vector<BlobRef>& inputs, std::stop_token stop) {
-  // Check the key against the job: it came over the wire.
-  if (task.step < 0 || task.step >= num_runs(loaded.job) || task.tile < 0 ||
-      task.tile >= TileGrid(loaded.job.image).count()) {
+                                  const std::vector<BlobRef>& inputs, const FrameSpan& frames,
+                                  std::stop_token stop) {
+  // Check what came over the wire against the job.
+  const auto num_frames = static_cast<std::int32_t>(loaded.job.frames.size());
+  if (frames.first < 0 || frames.last < frames.first || frames.last >= num_frames ||
+      task.tile < 0 || task.tile >= TileGrid(loaded.job.image).count()) {
     return Error{ErrorKind::bad_input,
-                 fmt::format("the job has no tile {} in run {}", task.tile, task.step)};
+                 fmt::format("the job has no tile {} in frame indices {} to {}", task.tile,
+                             frames.first, frames.last)};
   }
   double seconds_read = 0;
   std::vector<StatePtr> previous;
@@ -69,6 +88,9 @@ Result<TaskOutput> execute_render(const LoadedJob& loaded, BlobStore& store, con
     const CpuTimer timer(seconds_read);
     BATON_ASSIGN(previous, read_states(loaded, store, inputs));
   }
+  const bool is_cut = !previous.empty() && previous.front()->frame_index == frames.last &&
+                      previous.front()->picture == loaded.picture;
+  if (is_cut) return cut_state(loaded, store, task, previous);
   double seconds_state = seconds_read;
 
   // Render.
@@ -81,7 +103,7 @@ Result<TaskOutput> execute_render(const LoadedJob& loaded, BlobStore& store, con
   const TileRunSink sink{
       .film =
           [&](int frame, const FilmTile& film) {
-            return keep(BlobKind::film, frame, encode_film_tile(film, {loaded.digest, frame}));
+            return keep(BlobKind::film, frame, encode_film_tile(film, {loaded.picture, frame}));
           },
       .state = [&](SampleState state) -> Status {
         const CpuTimer timer(seconds_state);
@@ -96,7 +118,7 @@ Result<TaskOutput> execute_render(const LoadedJob& loaded, BlobStore& store, con
       .samples = [&](const FirstPassSamples& samples) -> Status {
         return keep(BlobKind::first_pass, samples.frame_index, encode_first_pass_samples(samples));
       }};
-  const TileRun run = tile_run(loaded.job, task.tile, task.step);
+  const TileRun run{task.tile, task.step, frames.first, frames.last};
   BATON_ASSIGN(output.stats, run_tile(*loaded.context, run, previous, sink, stop));
   // run_tile counts what its sink does, not what was read before.
   output.stats.seconds_state = seconds_state;
@@ -131,7 +153,7 @@ Result<TaskOutput> execute_second_pass(const LoadedJob& loaded, BlobStore& store
 
   BATON_ASSIGN(const SecondPassOutput second,
                run_second_pass(*loaded.context, task.step, task.tile, film, near));
-  const Bytes bytes = encode_film_tile(second.film, {loaded.digest, task.step, FilmPass::second});
+  const Bytes bytes = encode_film_tile(second.film, {loaded.picture, task.step, FilmPass::second});
   BATON_ASSIGN(const Digest digest, store.put(bytes));
   return TaskOutput{{{BlobKind::film, task.step, task.tile, digest, bytes.size()}}, second.stats};
 }
@@ -176,10 +198,11 @@ Result<TaskOutput> execute_assemble(const LoadedJob& loaded, const BlobStore& st
 }  // namespace
 
 Result<TaskOutput> execute_task(const LoadedJob& loaded, BlobStore& store, const TaskKey& task,
-                                const std::vector<BlobRef>& inputs, std::stop_token stop) {
+                                const std::vector<BlobRef>& inputs, const FrameSpan& frames,
+                                std::stop_token stop) {
   switch (task.kind) {
     case TaskKind::render:
-      return execute_render(loaded, store, task, inputs, stop);
+      return execute_render(loaded, store, task, inputs, frames, stop);
     case TaskKind::second_pass:
       return execute_second_pass(loaded, store, task, inputs);
     case TaskKind::assemble:

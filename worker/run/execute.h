@@ -5,6 +5,7 @@
 #include <vector>
 
 #include "common/base/result.h"
+#include "common/job/sequence.h"
 #include "common/job/task.h"
 #include "common/store/blob_store.h"
 #include "worker/run/job_cache.h"
@@ -18,11 +19,13 @@ struct TaskOutput {
   std::vector<FrameStats> frames = {};  ///< of a render task in frame order, of an assembly one
 };
 
-/// Runs one task: reads its inputs from `store`, writes its outputs there (an assembled frame goes
-/// to the job's output folder and is durable on return; blobs are after store.sync()).
-/// Deterministic. Errors: a missing or damaged input, the disk, bad input of the renderer;
-/// ErrorKind::cancelled when `stop` is requested.
+/// Runs one task, of these frames: reads its inputs from `store`, writes its outputs there (an
+/// assembled frame goes to the job's output folder and is durable on return; blobs are after
+/// store.sync()). Deterministic. A render task whose inputs are states of its own last frame
+/// renders nothing: its state is cut and joined from them. Errors: a missing or damaged input, the
+/// disk, bad input of the renderer; ErrorKind::cancelled when `stop` is requested.
 Result<TaskOutput> execute_task(const LoadedJob& loaded, BlobStore& store, const TaskKey& task,
-                                const std::vector<BlobRef>& inputs, std::stop_token stop);
+                                const std::vector<BlobRef>& inputs, const FrameSpan& frames,
+                                std::stop_token stop);
 
 }  // namespace baton

@@ -19,9 +19,10 @@ Result<LoadedJobPtr> load_job_document(const Digest& digest, const std::string& 
   }
   BATON_TRY(verify_assets(parsed.assets));
   BATON_ASSIGN(const auto assets, shelf.get(parsed.job, parsed.assets));
-  BATON_ASSIGN(auto context, make_render_context(parsed.job, digest, assets));
-  return LoadedJobPtr(std::make_shared<LoadedJob>(LoadedJob{
-      std::move(parsed.job), digest, std::move(context), std::make_shared<StateCache>()}));
+  BATON_ASSIGN(auto context, make_render_context(parsed.job, parsed.picture, assets));
+  return LoadedJobPtr(
+      std::make_shared<LoadedJob>(LoadedJob{std::move(parsed.job), digest, parsed.picture,
+                                            std::move(context), std::make_shared<StateCache>()}));
 }
 
 void JobEntry::provide(const std::string& document) {

@@ -21,7 +21,7 @@ namespace baton {
 /// A job with all its assets in memory; shared by every task of it.
 struct LoadedJob {
   JobSpec job;
-  Digest digest;
+  Digest digest, picture;
   std::shared_ptr<const RenderContext> context;
   std::shared_ptr<StateCache> states = std::make_shared<StateCache>();
 };

@@ -20,6 +20,7 @@ struct PooledTask {
   std::vector<BlobRef> inputs;
   std::shared_ptr<JobEntry> job;
   std::shared_ptr<BlobStore> store;
+  FrameSpan frames = {};
 };
 
 struct EndedTask {

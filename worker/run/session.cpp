@@ -146,7 +146,7 @@ void Session::receive(const WorkerWelcome& welcome, TimePoint now, Actions& acti
 void Session::receive(const LeaseGrant& grant, TimePoint now, Actions& actions) {
   requested_ = std::max(0, requested_ - 1);
   if (draining_ || !in_hand_.insert(grant.lease).second) return;
-  actions.push_back(StartTask{grant.lease, grant.inputs});
+  actions.push_back(StartTask{grant.lease, grant.inputs, {grant.first_frame, grant.last_frame}});
   request_leases(now, actions);
 }
 

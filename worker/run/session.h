@@ -54,6 +54,7 @@ struct UseStore {
 struct StartTask {
   LeaseId lease;
   std::vector<BlobRef> inputs;
+  FrameSpan frames;
 };
 struct StopTask {
   LeaseId lease;

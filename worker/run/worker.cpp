@@ -104,24 +104,19 @@ Result<TaskOutput> execute_pooled(const PooledTask& task, std::stop_token stop, 
       std::chrono::steady_clock::now() + std::chrono::seconds(loaded->job.max_seconds_per_task));
   const TaskKey& key = task.lease.task;
   if (key.kind == TaskKind::assemble) {
-    return execute_task(*loaded, *task.store, task.lease.task, task.inputs, stop);
+    return execute_task(*loaded, *task.store, key, task.inputs, task.frames, stop);
   }
 
   // A replay renders up to the last frame of the run, or the frame of the second pass.
   std::string command;
-  const std::int32_t num_steps = key.kind == TaskKind::render
-                                     ? num_runs(loaded->job)
-                                     : static_cast<std::int32_t>(loaded->job.frames.size());
-  if (key.step >= 0 && key.step < num_steps) {
+  const std::vector<int>& numbers = loaded->job.frames;
+  if (task.frames.last >= 0 && static_cast<std::size_t>(task.frames.last) < numbers.size()) {
     BATON_ASSIGN(const std::filesystem::path path, save_job(*loaded, *task.store));
-    const std::int32_t frame = key.kind == TaskKind::render
-                                   ? tile_run(loaded->job, key.tile, key.step).last_frame
-                                   : key.step;
-    command = replay_command(path, loaded->job.frames[static_cast<std::size_t>(frame)], key.tile);
+    command = replay_command(path, numbers[static_cast<std::size_t>(task.frames.last)], key.tile);
   }
   const CrashNote note(command);
   Result<TaskOutput> output =
-      execute_task(*loaded, *task.store, task.lease.task, task.inputs, stop);
+      execute_task(*loaded, *task.store, key, task.inputs, task.frames, stop);
   notes.report(repair_notes(*loaded->context));
   if (output || output.error().kind == ErrorKind::cancelled ||
       output.error().kind == ErrorKind::no_space)
@@ -244,7 +239,7 @@ class Worker {
   void perform(StartTask& action) {
     std::shared_ptr<JobEntry> job = jobs_.entry(action.lease.job);
     const bool missing = !job->has_document();
-    pool_.submit({action.lease, std::move(action.inputs), std::move(job), store_});
+    pool_.submit({action.lease, std::move(action.inputs), std::move(job), store_, action.frames});
     if (missing) step(DocumentMissing{action.lease.job});
   }
   void perform(StopTask& action) { pool_.stop(action.lease); }

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/base/limits.h"
 #include "common/job/motion.h"
 #include "worker/scene/gltf_motion.h"
 #include "worker/scene/pose.h"
@@ -70,11 +71,36 @@ void add_ground(const JobSpec& job, const Camera& camera, StepMeter& meter) {
   }
 }
 
+/// The frames between which motion is measured: from the first key to the last, in the job's step,
+/// so that all jobs of a shot measure the same.
+std::vector<int> measured_frames(const JobSpec& job) {
+  std::vector<double> keys;
+  const auto add = [&](const auto& list) {
+    for (const auto& key : list) keys.push_back(key.frame);
+  };
+  add(job.camera.keys);
+  for (const ObjectSpec& object : job.scene.objects) add(object.keys);
+  const auto [first, last] = std::minmax_element(keys.begin(), keys.end());
+  if (first == keys.end()) return job.frames;
+  int step = 1;
+  if (job.frames.size() > 1) {
+    step = job.frames[1] - job.frames[0];
+    for (std::size_t i = 2; i < job.frames.size(); ++i)
+      step = std::min(step, job.frames[i] - job.frames[i - 1]);
+  }
+  if ((*last - *first) / step > limits::kMaxFrames) return job.frames;
+  std::vector<int> frames;
+  for (int frame = static_cast<int>(std::floor(*first)); frame < *last + step; frame += step)
+    frames.push_back(frame);
+  return frames;
+}
+
 /// An estimate is enough: a pixel that moved farther starts afresh.
 int measure_max_px(const JobSpec& job, const Scene& scene) {
   float largest = 0;
-  Pose before = pose_at(scene, job, job.frames.front());
-  for (const int frame : job.frames) {
+  const std::vector<int> frames = measured_frames(job);
+  Pose before = pose_at(scene, job, frames.front());
+  for (const int frame : frames) {
     Pose now = pose_at(scene, job, frame);
     StepMeter meter(now.camera, before.camera, job.image.rendered());
     add_meshes(scene, now, before, meter);

@@ -168,11 +168,11 @@ TEST(SecondPass, RefusesSamplesOfAnotherTileOrJob) {
   FilmTile film;
   film.rect = {0, 0, 12, 9};
   auto samples = std::make_shared<FirstPassSamples>();
-  samples->job_digest = {9, 9};
+  samples->picture = {9, 9};
   samples->rect = film.rect;
   std::vector<FirstPassPtr> near{samples};
   EXPECT_THAT(run_second_pass(**context, 0, 0, film, near).error().message,
-              HasSubstr("first-pass samples: of job"));
+              HasSubstr("first-pass samples: of picture"));
   EXPECT_THAT(run_second_pass(**context, 0, 0, film, {}).error().message,
               HasSubstr("samples of 0 tiles, expected 1"));
 }

@@ -374,25 +374,5 @@ TEST(JobDocument, RefusesADocumentThatIsDamaged) {
       HasSubstr("job document: $.assets[0].digest: expected 32 hexadecimal digits, got \"1\""));
 }
 
-// Settings may change without another picture; everything else is named.
-TEST(JobDifference, NamesWhatDecidesPixelsAlone) {
-  const auto document = [](const std::string& keys) {
-    return ParsedJobDocument{.job = parsed(job_text(keys)), .assets = {}, .digest = {}};
-  };
-  const ParsedJobDocument plain = document("");
-  for (const char* setting :
-       {R"("priority": 7)", R"("metadata": {"a": "b"})", R"("frames": "1-8")",
-        R"("image": {"tileSize": 32})", R"("output": {"compression": "rle"})",
-        R"("state": {"checkpointEvery": 3})", R"("maxRetriesPerTask": 1)", R"("maxFailedTasks": 3)",
-        R"("maxFailuresPerWorker": 2)", R"("maxSecondsPerTask": 77)"}) {
-    const auto differences = picture_differences(plain, document(setting));
-    EXPECT_TRUE(differences.empty()) << setting << " " << differences.front();
-  }
-  EXPECT_EQ(picture_differences(plain, document(R"("seed": 3)")),
-            std::vector{std::string("$.seed")});
-  EXPECT_EQ(picture_differences(plain, document(R"("state": {"carry": false})")),
-            std::vector{std::string("$.state.carry")});
-}
-
 }  // namespace
 }  // namespace baton

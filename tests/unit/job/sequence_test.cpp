@@ -49,5 +49,21 @@ TEST(ImageSpec, IsReadWithARegionAndScaled) {
   EXPECT_EQ(to_json(image_of("{}").value()).find("region"), std::string::npos);
 }
 
+// Runs of a job that was shorter stay as they were.
+TEST(Runs, LeadingOnesComeBeforeTheRegularOnes) {
+  JobSpec job;
+  job.frames.clear();
+  for (int frame = 1; frame <= 30; ++frame) job.frames.push_back(frame);
+  job.state.checkpoint_every = 12;
+  EXPECT_EQ(run_starts(job), (std::vector<std::int32_t>{0, 12, 24}));
+  job.leading_runs = {0, 5, 8};
+  EXPECT_EQ(run_starts(job), (std::vector<std::int32_t>{0, 5, 8, 12, 24}));
+  EXPECT_EQ(num_runs(job), 5);
+  EXPECT_EQ(tile_run(job, 0, 2).last_frame, 11);
+  job.frames.resize(7);
+  EXPECT_EQ(run_starts(job), (std::vector<std::int32_t>{0, 5}));
+  EXPECT_EQ(tile_run(job, 0, 1).last_frame, 6);
+}
+
 }  // namespace
 }  // namespace baton

@@ -326,7 +326,7 @@ TEST(RunTile, RefusesTheStateOfAnotherJobTileOrFrame) {
   ASSERT_TRUE(context.ok());
   SampleState state;
   state.resize({0, 0, 12, 9}, 16);
-  state.job_digest = {1, 2};
+  state.picture = {1, 2};
   const auto given = [](const SampleState& s) {
     return std::vector{std::make_shared<const SampleState>(s)};
   };
@@ -334,8 +334,8 @@ TEST(RunTile, RefusesTheStateOfAnotherJobTileOrFrame) {
                          [](const SampleState&) { return Status(); }};
   const TileRun run{.tile = 0, .run = 1, .first_frame = 2, .last_frame = 3};
   EXPECT_THAT(run_tile(**context, run, given(state), sink, {}).error().message,
-              HasSubstr("of job"));
-  state.job_digest = {7, 7};
+              HasSubstr("of picture"));
+  state.picture = {7, 7};
   state.frame_index = 0;
   EXPECT_THAT(run_tile(**context, run, given(state), sink, {}).error().message,
               HasSubstr("frame index 0"));

@@ -68,9 +68,14 @@ class ExecuteTest : public testing::Test {
     return load_job_document(digest_of(document), document, shelf);
   }
 
+  FrameSpan frames_of(std::int32_t step) const {
+    const TileRun run = tile_run(job_, 0, step);
+    return {run.first_frame, run.last_frame};
+  }
   Result<TaskOutput> render(std::int32_t step, std::int32_t tile,
                             const std::vector<BlobRef>& inputs) {
-    return execute_task(*loaded_, store_.value(), {TaskKind::render, step, tile}, inputs, {});
+    return execute_task(*loaded_, store_.value(), {TaskKind::render, step, tile}, inputs,
+                        frames_of(step), {});
   }
 
   /// Every render task in the order of a farm; returns the films by frame, the states in `states_`.
@@ -118,7 +123,7 @@ TEST_F(ExecuteTest, TasksThroughTheStoreMakeTheImagesOfOneProcess) {
 
   for (const auto& [frame, films] : render_all()) {
     const Result<TaskOutput> output =
-        execute_task(*loaded_, *store_, {TaskKind::assemble, frame, 0}, films, {});
+        execute_task(*loaded_, *store_, {TaskKind::assemble, frame, 0}, films, {frame, frame}, {});
     ASSERT_TRUE(output) << output.error().message;
     ASSERT_EQ(output->outputs.size(), 1u);
     EXPECT_EQ(output->outputs[0].kind, BlobKind::image);
@@ -175,7 +180,8 @@ TEST_F(ExecuteTest, TasksThatTheJobDoesNotHaveAreBadInput) {
   for (const TaskKey& task : {TaskKey{TaskKind::render, 3, 0}, TaskKey{TaskKind::render, 0, 6},
                               TaskKey{TaskKind::render, -1, 0}, TaskKey{TaskKind::assemble, 5, 0},
                               TaskKey{TaskKind::assemble, 0, 0}}) {
-    const Result<TaskOutput> output = execute_task(*loaded_, *store_, task, {}, {});
+    const Result<TaskOutput> output =
+        execute_task(*loaded_, *store_, task, {}, {2 * task.step, 2 * task.step}, {});
     ASSERT_FALSE(output);
     EXPECT_EQ(output.error().kind, ErrorKind::bad_input);
   }
@@ -184,14 +190,14 @@ TEST_F(ExecuteTest, TasksThatTheJobDoesNotHaveAreBadInput) {
 TEST_F(ExecuteTest, AFrameNeedsEveryTileOnce) {
   auto films = render_all()[0];
   films[1] = films[0];
-  EXPECT_FALSE(execute_task(*loaded_, *store_, {TaskKind::assemble, 0, 0}, films, {}));
+  EXPECT_FALSE(execute_task(*loaded_, *store_, {TaskKind::assemble, 0, 0}, films, {}, {}));
 }
 
 TEST_F(ExecuteTest, AStoppedTaskIsCancelled) {
   std::stop_source stop;
   stop.request_stop();
   const Result<TaskOutput> output =
-      execute_task(*loaded_, *store_, {TaskKind::render, 0, 0}, {}, stop.get_token());
+      execute_task(*loaded_, *store_, {TaskKind::render, 0, 0}, {}, frames_of(0), stop.get_token());
   ASSERT_FALSE(output);
   EXPECT_EQ(output.error().kind, ErrorKind::cancelled);
 }

@@ -13,7 +13,7 @@ namespace baton {
 namespace {
 
 Result<LoadedJobPtr> empty_job(const Digest& digest, const std::string&) {
-  return LoadedJobPtr(std::make_shared<LoadedJob>(LoadedJob{{}, digest, nullptr}));
+  return LoadedJobPtr(std::make_shared<LoadedJob>(LoadedJob{{}, digest, {}, nullptr}));
 }
 
 TEST(JobCache, ManyWaitersLoadOnce) {

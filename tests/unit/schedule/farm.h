@@ -10,6 +10,7 @@
 #include <utility>
 #include <vector>
 
+#include "coordinator/schedule/adoption.h"
 #include "coordinator/schedule/scheduler.h"
 
 namespace baton::testing_farm {
@@ -64,6 +65,27 @@ inline std::vector<BlobRef> outputs_of(const JobSpec& spec, const Digest& job, c
   const bool second = task.kind == TaskKind::second_pass;  // its film is another
   for (BlobRef& blob : outputs) blob.digest = blob_digest(job, blob, variant + (second ? 100 : 0));
   return outputs;
+}
+
+/// What of these a task makes that was granted these inputs: a cut renders no film.
+inline std::vector<BlobRef> outputs_of_grant(const JobSpec& spec, const Digest& job,
+                                             const TaskKey& task,
+                                             const std::vector<BlobRef>& inputs,
+                                             const FrameSpan& frames) {
+  std::vector<BlobRef> outputs = outputs_of(spec, job, task);
+  const bool is_cut =
+      task.kind == TaskKind::render && !inputs.empty() && inputs.front().frame == frames.last;
+  if (is_cut)
+    std::erase_if(outputs, [](const BlobRef& blob) { return blob.kind != BlobKind::state; });
+  return outputs;
+}
+
+/// As the journal has it, with a sky.
+inline ParsedJobDocument document_of(JobSpec job) {
+  job.environment.keys = {{.frame = 1, .map = "/sky.exr"}};
+  const Digest picture = picture_digest(job, {});
+  const Digest digest = digest_of(to_json(job));
+  return {std::move(job), {}, digest, picture};
 }
 
 /// What a journal holds of these.

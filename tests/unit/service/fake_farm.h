@@ -99,8 +99,9 @@ class FakeWorker {
       const int number = job_.frames[static_cast<std::size_t>(lease.task.step)];
       const fs::path path =
           fs::path(job_.output.directory) / frame_file_name(job_.output.pattern, number);
-      EXPECT_TRUE(write_file_atomic(path, as_bytes_view("image")).ok());
-      done.outputs.push_back({BlobKind::image, lease.task.step, 0, digest_of("image"), 5});
+      const std::string image = "image of seed " + std::to_string(job_.seed);
+      EXPECT_TRUE(write_file_atomic(path, as_bytes_view(image)).ok());
+      done.outputs.push_back({BlobKind::image, lease.task.step, 0, digest_of(image), image.size()});
       return done;
     }
     const TileRun run = tile_run(job_, lease.task.tile, lease.task.step);

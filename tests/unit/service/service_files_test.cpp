@@ -43,7 +43,7 @@ TEST_F(ServiceTest, ADoneJobOfWhichAFrameIsGoneOrCutMakesThatFrameAgain) {
   }
 }
 
-// A frame belongs to one job: another picture is refused, another setting takes its place.
+// A frame belongs to one job: another picture is refused, other settings take its place.
 TEST_F(ServiceTest, AnOutputFolderBelongsToOneJob) {
   const RunningService service(options);
   const Digest id = ask<JobAccepted>(service.endpoint(), SubmitJob{document}).job;
@@ -71,15 +71,22 @@ TEST_F(ServiceTest, AnOutputFolderBelongsToOneJob) {
   EXPECT_EQ(show(service.endpoint(), second).summary.status, JobStatus::cancelled);
   EXPECT_THAT(show(service.endpoint(), second).frames_done, SizeIs(0));
 
-  // The same picture with another priority, and other frames, are no rivals.
+  // The same picture with another priority takes its place.
   JobSpec urgent = job;
   urgent.priority = 7;
   EXPECT_FALSE(ask<JobAccepted>(service.endpoint(), SubmitJob{make_job_document(urgent).value()})
                    .already_there);
   EXPECT_EQ(show(service.endpoint(), id).summary.status, JobStatus::cancelled);
+
+  // Nobody else writes into the folder meanwhile, not even other frames.
   JobSpec later = other;
   later.frames = {5, 6};
-  ask<JobAccepted>(service.endpoint(), SubmitJob{make_job_document(later).value()});
+  const std::string others = make_job_document(later).value();
+  EXPECT_THAT(refused(service.endpoint(), SubmitJob{others}).message, HasSubstr("writes into"));
+  const auto open = ask<JobList>(service.endpoint(), ListJobs{}).jobs;
+  ASSERT_THAT(open, SizeIs(1));
+  ask<JobDetail>(service.endpoint(), CancelJob{open.front().job.hex()});
+  ask<JobAccepted>(service.endpoint(), SubmitJob{others});
 }
 
 // What is read of a folder that is not mounted is not the truth.

@@ -58,7 +58,7 @@ TEST_F(ServiceTest, AJobGoesFromSubmissionToItsLastFrame) {
   EXPECT_THAT(*csv, HasSubstr("\n4,all,21,21,0"));
   EXPECT_THAT(*csv, HasSubstr("\n4,1,11,11,0"));
 
-  const auto list = ask<JobList>(service.endpoint(), ListJobs{});
+  const auto list = ask<JobList>(service.endpoint(), ListJobs{.all = true});
   ASSERT_THAT(list.jobs, SizeIs(1));
   EXPECT_EQ(list.jobs[0].name, "test");
   ASSERT_THAT(list.workers, SizeIs(1));

@@ -15,7 +15,7 @@ inline constexpr SectionTag kMagic{'B', 'S', 'T', '1'};
 /// A background pixel and a surface pixel of two particles.
 inline SampleState tiny_state() {
   SampleState state;
-  state.job_digest = {0x0011223344556677ull, 0x8899aabbccddeeffull};
+  state.picture = {0x0011223344556677ull, 0x8899aabbccddeeffull};
   state.frame_index = 5;
   state.tile = 7;
   state.resize({10, 20, 12, 21}, 2);

@@ -1,0 +1,187 @@
+#include "common/job/picture.h"
+
+#include <algorithm>
+#include <array>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <string_view>
+
+#include "common/job/motion.h"
+#include "common/job/sequence.h"
+
+namespace baton {
+namespace {
+
+/// Beginnings of the paths that do not decide pixels.
+constexpr std::array<std::string_view, 12> kSettings{"/name",
+                                                     "/priority",
+                                                     "/metadata",
+                                                     "/frames",
+                                                     "/image/tileSize",
+                                                     "/output",
+                                                     "/state/",
+                                                     "/maxRetriesPerTask",
+                                                     "/maxFailedTasks",
+                                                     "/maxFailuresPerWorker",
+                                                     "/maxSecondsPerTask",
+                                                     "/specificationVersion"};
+/// Of these, those that do: a job that carries no samples renders other pixels.
+constexpr std::string_view kCarry = "/state/carry";
+/// The name of what carried samples begin with.
+constexpr const char* kFirstFrame = "$.frames (samples are carried from the first one on)";
+
+bool is_setting(std::string_view path) {
+  if (path == kCarry) return false;
+  return std::any_of(kSettings.begin(), kSettings.end(),
+                     [&](std::string_view start) { return path.starts_with(start); });
+}
+
+/// Keys decide single frames (FrameComparison).
+bool is_key(std::string_view path) {
+  return path.starts_with("/environment/keys/") || path.starts_with("/camera/keys/") ||
+         (path.starts_with("/scene/objects/") && path.find("/keys/") != path.npos);
+}
+
+/// "/image/sites" as "$.image.sites", "/objects/3/mesh" as "$.objects[3].mesh".
+std::string json_path(std::string_view pointer) {
+  std::string path = "$";
+  while (!pointer.empty()) {
+    const std::size_t end = std::min(pointer.find('/', 1), pointer.size());
+    const std::string_view key = pointer.substr(1, end - 1);
+    const bool is_index = !key.empty() && key.find_first_not_of("0123456789") == key.npos;
+    path += is_index ? "[" + std::string(key) + "]" : "." + std::string(key);
+    pointer.remove_prefix(end);
+  }
+  return path;
+}
+
+using Facts = std::map<std::string, std::string>;
+
+/// The values that decide all frames, and the contents of the files but the maps, by name.
+Facts picture_facts(const JobSpec& job, const std::vector<AssetDigest>& assets) {
+  Facts facts;
+  const nlohmann::json all = nlohmann::json::parse(to_json(job)).flatten();
+  for (const auto& [path, value] : all.items()) {
+    if (!is_setting(path) && !is_key(path)) facts.emplace(json_path(path), value.dump());
+  }
+  // What has keys at all follows its history another way.
+  if (!job.camera.keys.empty()) facts.emplace("$.camera.keys", "given");
+  for (std::size_t i = 0; i < job.scene.objects.size(); ++i) {
+    if (moves(job.scene.objects[i]))
+      facts.emplace("$.scene.objects[" + std::to_string(i) + "].keys", "given");
+  }
+  if (carries_state(job)) facts.emplace(kFirstFrame, std::to_string(job.frames.front()));
+  std::set<std::string> maps;
+  for (const EnvironmentKey& key : job.environment.keys) maps.insert(key.map);
+  for (const AssetDigest& asset : assets) {
+    if (!maps.contains(asset.path)) facts.emplace(asset.path, asset.digest.hex());
+  }
+  return facts;
+}
+
+void put(ByteWriter& writer, const Vec3& v) {
+  for (const float x : {v.x, v.y, v.z}) writer.put(x);
+}
+
+Digest light_facts(const EnvironmentSpec& environment, int frame,
+                   const std::map<std::string, Digest>& contents) {
+  const EnvironmentFrame light = environment_at(environment, frame);
+  ByteWriter writer;
+  for (const std::int32_t map : {light.map_a, light.map_b}) {
+    const std::string& path = environment.keys.at(static_cast<std::size_t>(map)).map;
+    const auto found = contents.find(path);
+    writer.put_string(found == contents.end() ? path : found->second.hex());
+  }
+  writer.put(light.mix);
+  writer.put(rotation_deg_at(environment, frame));
+  return digest_of(writer.bytes());
+}
+
+Digest camera_facts(const JobSpec& job, int frame) {
+  const CameraSpec camera = camera_at(job, frame);
+  ByteWriter writer;
+  for (const Vec3& v : {camera.position, camera.look_at, camera.up}) put(writer, v);
+  writer.put(camera.vertical_fov_deg);
+  return digest_of(writer.bytes());
+}
+
+Digest object_facts(const JobSpec& job, int frame) {
+  ByteWriter writer;
+  for (const ObjectSpec& object : job.scene.objects) {
+    if (!moves(object)) continue;
+    const Transform pose = object_motion_at(object, job.motion.curve, frame);
+    for (const float x : pose.linear.m) writer.put(x);
+    put(writer, pose.offset);
+  }
+  return digest_of(writer.bytes());
+}
+
+}  // namespace
+
+Digest picture_digest(const JobSpec& job, const std::vector<AssetDigest>& assets) {
+  ByteWriter writer;
+  for (const auto& [name, value] : picture_facts(job, assets)) {
+    writer.put_string(name);
+    writer.put_string(value);
+  }
+  return digest_of(writer.bytes());
+}
+
+std::vector<std::string> picture_differences(const ParsedJobDocument& a,
+                                             const ParsedJobDocument& b) {
+  const Facts left = picture_facts(a.job, a.assets), right = picture_facts(b.job, b.assets);
+  std::set<std::string> differences;
+  const auto compare = [&](const Facts& one, const Facts& other) {
+    for (const auto& [name, value] : one) {
+      const auto found = other.find(name);
+      // A file that only one job reads, and whether samples are carried, have keys of their own.
+      const bool has_key = name.front() == '/' || name == kFirstFrame;
+      if (found == other.end() ? !has_key : found->second != value) differences.insert(name);
+    }
+  };
+  compare(left, right);
+  compare(right, left);
+  return {differences.begin(), differences.end()};
+}
+
+std::vector<FrameComparison::Facts> FrameComparison::facts_of(const ParsedJobDocument& document) {
+  std::map<std::string, Digest> contents;
+  for (const AssetDigest& asset : document.assets) contents.emplace(asset.path, asset.digest);
+  std::vector<Facts> facts;
+  for (const int frame : document.job.frames) {
+    facts.push_back({light_facts(document.job.environment, frame, contents),
+                     camera_facts(document.job, frame), object_facts(document.job, frame)});
+  }
+  return facts;
+}
+
+FrameComparison::FrameComparison(const ParsedJobDocument& a, const ParsedJobDocument& b)
+    : frames_a_(a.job.frames),
+      frames_b_(b.job.frames),
+      a_(facts_of(a)),
+      b_(facts_of(b)),
+      carried_(carries_state(a.job) || carries_state(b.job)) {
+  while (num_common_ < std::min(a_.size(), b_.size()) &&
+         frames_a_[num_common_] == frames_b_[num_common_] && a_[num_common_] == b_[num_common_])
+    ++num_common_;
+}
+
+bool FrameComparison::are_equal(std::size_t index_a, std::size_t index_b) const {
+  if (carried_) return index_a == index_b && index_a < num_common_;
+  return frames_a_[index_a] == frames_b_[index_b] && a_[index_a] == b_[index_b];
+}
+
+std::string FrameComparison::difference(std::size_t index_a, std::size_t index_b) const {
+  const Facts &a = a_[index_a], &b = b_[index_b];
+  const int frame = frames_b_[index_b];
+  if (frames_a_[index_a] == frame && !(a == b)) {
+    const char* const what = !(a.light == b.light)     ? "$.environment"
+                             : !(a.camera == b.camera) ? "$.camera.keys"
+                                                       : "$.scene.objects: keys";
+    return std::string(what) + " at frame " + std::to_string(frame);
+  }
+  return "$.frames before frame " + std::to_string(frame) + " (samples are carried)";
+}
+
+}  // namespace baton

@@ -1,0 +1,53 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "common/job/job_json.h"
+
+namespace baton {
+
+/// What decides the pixels of a job, apart from its settings: those say which frames are made, in
+/// which tiles, when, by whom, and how they are stored. Two jobs of one picture make the same bytes
+/// of a frame that both have the same way up to there, and go on with each other's work.
+
+/// Names what holds for all frames: every value of the job that is no setting and no key, the
+/// contents of the meshes and, where samples are carried, the first frame, since the history begins
+/// there. States and films say it.
+Digest picture_digest(const JobSpec& job, const std::vector<AssetDigest>& assets);
+
+/// What holds for all frames and differs: the JSON paths, and the files whose content changed;
+/// sorted. Empty exactly when the picture digests are equal.
+std::vector<std::string> picture_differences(const ParsedJobDocument& a,
+                                             const ParsedJobDocument& b);
+
+/// What two jobs show in their frames, for jobs of one picture digest: the number of a frame, its
+/// light with the contents of its maps, the camera and the poses of all that moves.
+class FrameComparison {
+ public:
+  FrameComparison(const ParsedJobDocument& a, const ParsedJobDocument& b);
+
+  /// Whether frame `index_a` of one and `index_b` of the other have the same pixels: they show the
+  /// same and, where samples are carried, so do all frames before. Indices are 0-based.
+  bool are_equal(std::size_t index_a, std::size_t index_b) const;
+  /// How many frames from the first on are the same in both.
+  std::size_t num_common() const { return num_common_; }
+  /// What differs in two frames that are not equal: "$.camera.keys", ...; "$.frames" where it is
+  /// the frames before.
+  std::string difference(std::size_t index_a, std::size_t index_b) const;
+
+ private:
+  struct Facts {
+    Digest light, camera, objects;
+    bool operator==(const Facts&) const = default;
+  };
+  static std::vector<Facts> facts_of(const ParsedJobDocument& document);
+
+  std::vector<int> frames_a_, frames_b_;
+  std::vector<Facts> a_, b_;
+  bool carried_;
+  std::size_t num_common_ = 0;
+};
+
+}  // namespace baton

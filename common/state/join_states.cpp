@@ -1,0 +1,86 @@
+#include "common/state/join_states.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+
+namespace baton {
+namespace {
+
+/// Whether two states are of one frame and hold the same things.
+bool are_alike(const SampleState& a, const SampleState& b) {
+  return a.picture == b.picture && a.frame_index == b.frame_index &&
+         a.num_particles == b.num_particles && a.num_populations == b.num_populations &&
+         a.memory.empty() == b.memory.empty() && a.confidence.empty() == b.confidence.empty();
+}
+
+/// Copies `count` pixels of `width` values each.
+template <class T>
+void copy_pixels(const std::vector<T>& from, std::size_t first_from, std::vector<T>& to,
+                 std::size_t first_to, std::size_t count, std::size_t width) {
+  if (from.empty()) return;
+  std::copy_n(from.begin() + static_cast<std::ptrdiff_t>(first_from * width), count * width,
+              to.begin() + static_cast<std::ptrdiff_t>(first_to * width));
+}
+
+void copy_row(const SampleState& from, std::size_t first_from, SampleState& to,
+              std::size_t first_to, std::size_t count) {
+  const auto populations = static_cast<std::size_t>(to.num_populations);
+  const auto particles = static_cast<std::size_t>(to.num_particles);
+  const auto copy = [&](const auto& a, auto& b, std::size_t width) {
+    copy_pixels(a, first_from, b, first_to, count, width);
+  };
+  copy(from.lns, to.lns, populations);
+  copy(from.lns_fresh, to.lns_fresh, populations);
+  copy(from.source, to.source, populations);
+  copy(from.direction, to.direction, particles);
+  copy(from.weight, to.weight, particles);
+  copy(from.site, to.site, particles);
+  copy(from.memory, to.memory, 1);
+  copy(from.confidence, to.confidence, 1);
+}
+
+std::size_t pixel_at(const PixelRect& rect, std::int32_t x, std::int32_t y) {
+  return static_cast<std::size_t>(y - rect.y0) * static_cast<std::size_t>(rect.width()) +
+         static_cast<std::size_t>(x - rect.x0);
+}
+
+}  // namespace
+
+Result<SampleState> join_states(std::span<const SampleState* const> parts, const PixelRect& rect,
+                                std::int32_t tile) {
+  const auto fail = [&](const std::string& what) {
+    return Error{ErrorKind::bad_input, fmt::format("joining states for tile {}: {}", tile, what)};
+  };
+  if (parts.empty()) return fail("there are none");
+  const SampleState& model = *parts.front();
+  SampleState joined;
+  joined.picture = model.picture;
+  joined.frame_index = model.frame_index;
+  joined.tile = tile;
+  joined.resize(rect, model.num_particles, model.num_populations);
+  if (!model.memory.empty()) joined.add_memory();
+  if (!model.confidence.empty()) joined.add_confidence();
+
+  std::int64_t num_covered = 0;
+  for (const SampleState* const part : parts) {
+    if (!are_alike(model, *part)) {
+      return fail(fmt::format("tile {} is of another picture, frame or layout than tile {}",
+                              part->tile, model.tile));
+    }
+    const PixelRect& from = part->rect;
+    const PixelRect shared{std::max(rect.x0, from.x0), std::max(rect.y0, from.y0),
+                           std::min(rect.x1, from.x1), std::min(rect.y1, from.y1)};
+    if (shared.x0 >= shared.x1) continue;
+    for (std::int32_t y = shared.y0; y < shared.y1; ++y) {
+      const auto width = static_cast<std::size_t>(shared.x1 - shared.x0);
+      copy_row(*part, pixel_at(from, shared.x0, y), joined, pixel_at(rect, shared.x0, y), width);
+      num_covered += shared.x1 - shared.x0;
+    }
+  }
+  if (num_covered != rect.area())
+    return fail(fmt::format("they cover {} of {} pixels", num_covered, rect.area()));
+  return joined;
+}
+
+}  // namespace baton

@@ -1,0 +1,200 @@
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <utility>
+
+#include "common/base/archive.h"
+#include "common/base/section_packing.h"
+#include "coordinator/journal/journal.h"
+
+namespace baton {
+namespace {
+
+/// A row of `completions` as it stands in the archive.
+struct ArchivedCompletion {
+  TaskKey task;
+  std::vector<BlobRef> outputs;
+  RenderStats stats;
+  std::vector<FrameStats> frames;
+  template <class A>
+  void fields(A& a) {
+    a(task, outputs, stats, frames);
+  }
+};
+
+/// How many of a job stand in one piece, so that no piece is large once unpacked.
+constexpr std::size_t kCompletionsPerPiece = 4096;
+
+struct ArchivedPiece {
+  std::vector<ArchivedCompletion> completions;
+  template <class A>
+  void fields(A& a) {
+    a(completions);
+  }
+};
+
+constexpr int kMaxFound = 20;
+
+}  // namespace
+
+Status Journal::archive_job(const Digest& job, const Bytes& summary, const Bytes& detail,
+                            const std::vector<Digest>& kept) {
+  // The completions, piece by piece.
+  BATON_ASSIGN(SqlStatement * insert_piece,
+               write("INSERT INTO archived_completions (job, raw_bytes, stored_raw, packed) "
+                     "VALUES (?, ?, ?, ?)"));
+  SectionPacker packer;
+  ArchivedPiece piece;
+  const auto store = [&]() -> Status {
+    if (piece.completions.empty()) return {};
+    const Bytes raw = to_bytes(std::exchange(piece, {}));
+    Bytes packed;
+    const bool stored_raw = packer.append(raw, 1, Packing::zstd, packed);
+    return insert_piece->bind(job.hex())
+        .bind(static_cast<std::int64_t>(raw.size()))
+        .bind(std::int64_t{stored_raw})
+        .bind(ByteView(packed))
+        .run();
+  };
+  BATON_TRY(for_each_completion(job, [&](const Completion& c) -> Status {
+    piece.completions.push_back({c.task, c.outputs, c.stats, c.frames});
+    return piece.completions.size() < kCompletionsPerPiece ? Status() : store();
+  }));
+  BATON_TRY(store());
+
+  BATON_ASSIGN(SqlStatement * insert,
+               write("INSERT INTO archive (job, summary, detail) VALUES (?, ?, ?)"));
+  BATON_TRY(insert->bind(job.hex()).bind(ByteView(summary)).bind(ByteView(detail)).run());
+  BATON_ASSIGN(SqlStatement * keep, write("INSERT OR IGNORE INTO kept_blobs VALUES (?, ?)"));
+  for (const Digest& blob : kept) BATON_TRY(keep->bind(blob.hex()).bind(job.hex()).run());
+  for (const char* const sql :
+       {"DELETE FROM completions WHERE job = ?", "DELETE FROM failures WHERE job = ?",
+        "UPDATE jobs SET archived = 1 WHERE digest = ?"}) {
+    BATON_ASSIGN(SqlStatement * remove, write(sql));
+    BATON_TRY(remove->bind(job.hex()).run());
+  }
+  return {};
+}
+
+Status Journal::restart_job(const Digest& job) {
+  for (const char* const sql :
+       {"DELETE FROM archive WHERE job = ?", "DELETE FROM archived_completions WHERE job = ?",
+        "DELETE FROM kept_blobs WHERE job = ?", "DELETE FROM failures WHERE job = ?",
+        "DELETE FROM completions WHERE job = ?", "UPDATE jobs SET archived = 0 WHERE digest = ?"}) {
+    BATON_ASSIGN(SqlStatement * change, write(sql));
+    BATON_TRY(change->bind(job.hex()).run());
+  }
+  return record_status(job, JobStatus::running);
+}
+
+Status Journal::visit_archived(const Digest& job,
+                               const std::function<Status(const Completion&)>& visit) {
+  BATON_ASSIGN(SqlStatement query,
+               database_.prepare("SELECT raw_bytes, stored_raw, packed FROM archived_completions "
+                                 "WHERE job = ? ORDER BY position"));
+  query.bind(job.hex());
+  SectionUnpacker unpacker;
+  while (true) {
+    BATON_ASSIGN(const bool row, query.step());
+    if (!row) return {};
+    const auto raw_bytes = static_cast<std::size_t>(query.integer(0));
+    Result<Bytes> raw = unpacker.unpack(query.blob(2), query.integer(1) != 0, 1, raw_bytes);
+    ArchivedPiece piece;
+    bool complete = raw.ok();
+    if (complete) {
+      ArchiveReader reader(*raw);
+      reader(piece);
+      complete = reader.complete();
+    }
+    if (!complete) {
+      return Error{ErrorKind::corrupt,
+                   fmt::format("{}: the archived completions of job {} cannot be read",
+                               database_.name(), job.hex())};
+    }
+    for (const ArchivedCompletion& c : piece.completions)
+      BATON_TRY(visit({c.task, c.outputs, c.stats, c.frames}));
+  }
+}
+
+Status Journal::describe_archived(const Digest& job, JobStatus status, const Bytes& summary,
+                                  const Bytes& detail) {
+  BATON_ASSIGN(SqlStatement * update,
+               write("UPDATE archive SET summary = ?, detail = ? WHERE job = ?"));
+  BATON_TRY(update->bind(ByteView(summary)).bind(ByteView(detail)).bind(job.hex()).run());
+  return record_status(job, status);
+}
+
+Result<std::optional<Bytes>> Journal::archived_detail(const Digest& job) {
+  BATON_ASSIGN(SqlStatement query, database_.prepare("SELECT detail FROM archive WHERE job = ?"));
+  BATON_ASSIGN(const bool row, query.bind(job.hex()).step());
+  if (!row) return std::optional<Bytes>();
+  const ByteView bytes = query.blob(0);
+  return std::optional(Bytes(bytes.begin(), bytes.end()));
+}
+
+Result<std::vector<Bytes>> Journal::archived_summaries(int count) {
+  BATON_ASSIGN(SqlStatement query,
+               database_.prepare("SELECT summary FROM archive ORDER BY position DESC LIMIT ?"));
+  query.bind(count);
+  std::vector<Bytes> summaries;
+  while (true) {
+    BATON_ASSIGN(const bool row, query.step());
+    if (!row) break;
+    const ByteView bytes = query.blob(0);
+    summaries.emplace_back(bytes.begin(), bytes.end());
+  }
+  std::reverse(summaries.begin(), summaries.end());
+  return summaries;
+}
+
+Result<std::uint64_t> Journal::num_archived() {
+  BATON_ASSIGN(SqlStatement query, database_.prepare("SELECT count(*) FROM archive"));
+  BATON_ASSIGN(const bool row, query.step());
+  return row ? static_cast<std::uint64_t>(query.integer(0)) : 0;
+}
+
+Result<std::vector<Digest>> Journal::jobs_in(const std::string& folder) {
+  BATON_ASSIGN(SqlStatement query,
+               database_.prepare("SELECT digest FROM jobs WHERE folder = ? ORDER BY position"));
+  query.bind(folder);
+  return read_digests(query);
+}
+
+Result<std::vector<FoundJob>> Journal::find_jobs(const std::string& text) {
+  // A digest is its own beginning; of hexadecimal digits 'g' is past the last.
+  BATON_ASSIGN(
+      SqlStatement query,
+      database_.prepare("SELECT digest, status, name = ?1 FROM jobs WHERE name = ?1 OR "
+                        "(digest >= ?1 AND digest < ?1 || 'g') ORDER BY position LIMIT ?"));
+  query.bind(text).bind(kMaxFound);
+  std::vector<FoundJob> found;
+  while (true) {
+    BATON_ASSIGN(const bool row, query.step());
+    if (!row) return found;
+    const std::optional<Digest> digest = Digest::from_hex(query.text(0));
+    if (!digest) continue;
+    FoundJob job{*digest, JobStatus::running, query.integer(2) != 0};
+    job.status = static_cast<JobStatus>(query.integer(1));
+    found.push_back(job);
+  }
+}
+
+Result<bool> Journal::is_kept(const Digest& blob) {
+  BATON_ASSIGN(SqlStatement * query, read("SELECT 1 FROM kept_blobs WHERE blob = ? LIMIT 1"));
+  BATON_ASSIGN(const bool row, query->bind(blob.hex()).step());
+  query->reset();
+  return row;
+}
+
+Result<std::vector<Digest>> Journal::kept_blobs(const Digest& job) {
+  BATON_ASSIGN(SqlStatement query, database_.prepare("SELECT blob FROM kept_blobs WHERE job = ?"));
+  query.bind(job.hex());
+  return read_digests(query);
+}
+
+Status Journal::let_go(const Digest& job, const Digest& blob) {
+  BATON_ASSIGN(SqlStatement * remove, write("DELETE FROM kept_blobs WHERE blob = ? AND job = ?"));
+  return remove->bind(blob.hex()).bind(job.hex()).run();
+}
+
+}  // namespace baton

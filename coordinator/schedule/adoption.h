@@ -1,0 +1,54 @@
+#pragma once
+
+#include <cstdint>
+#include <functional>
+#include <optional>
+#include <vector>
+
+#include "common/job/picture.h"
+#include "coordinator/schedule/events.h"
+
+namespace baton {
+
+/// A job that writes, or has written, the picture of a new one into the same folder.
+struct FormerJob {
+  ParsedJobDocument document;  ///< with job.leading_runs
+  std::vector<Completions::Task> tasks;
+  JobPlan plan;
+  JobStatus status = JobStatus::running;
+};
+
+/// What is there of what former jobs have made.
+struct KeptFiles {
+  /// Whether the file of the new job's frame `frame_index` has this size and digest.
+  std::function<bool(std::int32_t frame_index, const BlobRef& image)> has_frame;
+  std::function<bool(const BlobRef& blob)> has_blob;
+};
+
+/// What a new job need not do.
+struct Adoption {
+  std::vector<BlobRef> images;        ///< frames that are written, by the new job's index
+  std::optional<std::size_t> former;  ///< whose work goes on
+  std::vector<TaskKey> tasks;    ///< of that one, which count as the new job's under their keys
+  std::vector<TaskKey> settled;  ///< done without outputs until something of them is needed
+  JobPlan plan;
+  std::vector<std::int32_t> lost;  ///< frames that were written and are not there, by index
+
+  bool empty() const { return images.empty() && tasks.empty() && plan.cuts.empty(); }
+};
+
+/// Whether frames are written alike: in the same channels, format and names. What stands in headers
+/// alone may differ.
+bool writes_alike(const OutputSpec& a, const OutputSpec& b);
+
+/// What jobs of one picture leave to a new one.
+///
+/// A frame is kept if its pixels are the same (FrameComparison), it is written alike and its file
+/// is as it was written. Of the former job that has come farthest, all tasks of the frames in
+/// common count where tiles and films are the same. With other tiles its states are cut and joined:
+/// those of the newest frame of which all are there, before the first frame that is to be written.
+/// Tasks of runs whose frames are all kept are settled.
+Adoption adopt(const ParsedJobDocument& wanted, const std::vector<FormerJob>& formers,
+               const KeptFiles& files);
+
+}  // namespace baton

@@ -1,0 +1,20 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "coordinator/schedule/adoption.h"
+#include "coordinator/schedule/scheduler.h"
+
+namespace baton {
+
+/// What is kept of a job and what is rendered, for people, a line each: "frames 1-8 are kept",
+/// "frames 9-12 are rendered, going on from the states of frame 8". Then `reasons`, why something
+/// is done again. Empty where nothing is kept and there is no reason.
+std::string plan_text(const Scheduler::Job& job, const std::vector<std::string>& reasons);
+
+/// Why a new job does not keep what a former one of its picture has done, and what it keeps as it
+/// is: settings of the output that differ, headers.
+std::vector<std::string> output_reasons(const JobSpec& former, const JobSpec& wanted);
+
+}  // namespace baton

@@ -1,0 +1,230 @@
+#!/usr/bin/env python3
+"""A job whose settings change keeps what is right; one whose picture changes is refused.
+
+Bytes are those of the whole job rendered at once, in a folder of its own.
+"""
+
+import json
+import os
+
+from farm import BAD_INPUT, OK, USAGE, Farm, check, check_equal, make_job, run_tests, wait_until, write_job
+
+CAMERA_KEYS = [{"frame": 1, "position": [0, 1.2, 5], "lookAt": [0, 0.6, 0]},
+               {"frame": 6, "position": [0.5, 1.3, 4.8], "lookAt": [0, 0.6, 0]}]
+KINDS = {
+    "rest": {},
+    "motion": {"camera": {"keys": CAMERA_KEYS}},
+    "second-pass": {"visibility": {"correlated": True, "dilate": 1}},
+}
+METHODS = {"pool": {"method": "pool", "numParticles": 8},
+           "sequential": {"method": "sequential", "numParticles": 8, "numCandidates": 32, "numDistributions": 3}}
+FOLDER = "frames"
+
+
+def small_job(folder, frames, **changes):
+    """A job of 96 x 64 pixels in two tiles. changes: as make_job's, `sampling` in place of its own."""
+    sampling = changes.pop("sampling", METHODS["pool"])
+    job = make_job(folder, frames=frames, **changes)
+    job["image"] = {"width": 96, "height": 64, "tileSize": 64, **changes.get("image", {})}
+    job["sampling"] = sampling
+    job["state"] = {"checkpointEvery": 12, **changes.get("state", {})}
+    job["output"] = {"directory": str(folder / FOLDER), **changes.get("output", {})}
+    return job
+
+
+def render(programs, folder, job, *extra, expect=OK):
+    """Renders in the folder's own farm; returns what was said on stderr."""
+    path = write_job(folder / "job.json", job)
+    return programs.render(path, folder / "work", extra=extra, expect=expect).stderr
+
+
+def files(folder):
+    """Bytes of each frame, by number."""
+    return {int(file.name[6:10]): file.read_bytes() for file in sorted((folder / FOLDER).glob("*.exr"))}
+
+
+def stamps(folder):
+    """When each frame was written."""
+    return {file.name: os.stat(file).st_mtime_ns for file in (folder / FOLDER).glob("*.exr")}
+
+
+def rewritten(before, folder):
+    """Names of frames that are not the file that they were."""
+    after = stamps(folder)
+    return sorted(name for name, time in before.items() if after.get(name) != time)
+
+
+def witness(programs, folder, frames, **changes):
+    """The pixels of the whole job."""
+    job = small_job(folder, frames, **changes)
+    render(programs, folder, job)
+    return programs.pixels(folder / FOLDER)
+
+
+def say(text, *words):
+    for word in words:
+        check(word in text, f"expected {word!r} in:\n{text}")
+
+
+def each_kind():
+    for kind, changes in KINDS.items():
+        for method, sampling in METHODS.items():
+            if kind == "second-pass" and method == "pool":
+                continue  # its rays are not its samples
+            yield f"{kind}-{method}", {**changes, "sampling": sampling}
+
+
+def more_frames(programs, folder):
+    """Frames 1-4, then 1-6: the first four are left alone, the rest goes on from their last states."""
+    for name, changes in each_kind():
+        expected = witness(programs, folder / f"whole-{name}", "1-6", **changes)
+        place = folder / name
+        render(programs, place, small_job(place, "1-4", **changes))
+        before = stamps(place)
+        text = render(programs, place, small_job(place, "1-6", **changes))
+        say(text, "frames 1-4 are kept", "frames 5-6 are rendered, going on from the states of frame 4")
+        check_equal(rewritten(before, place), [], f"frames of {name} written again")
+        check_equal(programs.pixels(place / FOLDER), expected, f"pixels of {name}")
+
+
+def other_tiles(programs, folder):
+    """The same with other tiles: states are cut and joined."""
+    for name, changes in each_kind():
+        expected = witness(programs, folder / f"whole-{name}", "1-6", **changes)
+        place = folder / name
+        render(programs, place, small_job(place, "1-4", **changes))
+        before = stamps(place)
+        text = render(programs, place, small_job(place, "1-6", image={"tileSize": 32}, **changes))
+        say(text, "frames 1-4 are kept", "going on from the states of frame 4, cut into tiles of 32 pixels")
+        check_equal(rewritten(before, place), [], f"frames of {name} written again")
+        check_equal(programs.pixels(place / FOLDER), expected, f"pixels of {name}")
+
+
+def settings_alone(programs, folder):
+    """Fewer frames, priority, names, metadata, retries, checkpoints, what is kept: nothing is made again."""
+    job = small_job(folder, "1-6")
+    render(programs, folder, job)
+    before = stamps(folder)
+    for changes in [{"frames": "1-3"}, {"priority": 80}, {"maxRetriesPerTask": 1}, {"name": "other"},
+                    {"metadata": {"shot": "7"}}, {"state": {"checkpointEvery": 2, "keep": "all"}},
+                    {"image": {**job["image"], "tileSize": 32}}, {}]:
+        text = render(programs, folder, {**job, **changes})
+        say(text, "are kept")
+        check("rendered" not in text, f"{changes}: {text}")
+        check_equal(rewritten(before, folder), [], f"frames written again for {changes}")
+    say(render(programs, folder, {**job, "metadata": {"shot": "8"}}), "keep their headers")
+
+
+def what_is_written_otherwise(programs, folder):
+    """Other channels and formats are written anew, and the program says why."""
+    job = small_job(folder, "1-3")
+    render(programs, folder, job)
+    before = stamps(folder)
+    changed = {**job, "output": {**job["output"], "aovs": ["depth"], "compression": "piz"}}
+    say(render(programs, folder, changed), "written anew: output.aovs, output.compression have changed")
+    check_equal(len(rewritten(before, folder)), 3, "frames written again")
+
+
+def one_frame_is_gone_or_damaged(programs, folder):
+    """Only that one is written; damage that keeps the size is noticed."""
+    job = small_job(folder, "1-4")
+    render(programs, folder, job)
+    expected = files(folder)
+    for number, damage in [(2, False), (3, True)]:
+        frame = folder / FOLDER / f"frame.{number:04}.exr"
+        before = stamps(folder)
+        if damage:
+            content = bytearray(frame.read_bytes())
+            content[len(content) // 2] ^= 1
+            frame.write_bytes(content)
+        else:
+            frame.unlink()
+        text = render(programs, folder, job)
+        say(text, f"frame {number} is rendered", f"{frame} is gone, or not as it was written")
+        check_equal(rewritten(before, folder), [frame.name], "frames written again")
+        check(files(folder) == expected, f"frame {number} is not what it was")
+
+
+def another_picture(programs, folder):
+    """Refused with what differs; --from-frame keeps the frames before, --restart replaces all."""
+    job = small_job(folder, "1-6")
+    render(programs, folder, job)
+    before, first = stamps(folder), programs.pixels(folder / FOLDER)
+    other = {**job, "seed": 8}
+    text = render(programs, folder, other, expect=BAD_INPUT)
+    say(text, "what differs: $.seed", "--restart", "--from-frame")
+    check_equal(rewritten(before, folder), [], "frames that a refused job has touched")
+
+    # As a job that begins there.
+    later = witness(programs, folder / "later", "4-6", seed=8)
+    render(programs, folder, other, "--from-frame", "4")
+    now = programs.pixels(folder / FOLDER)
+    for number in range(1, 7):
+        name = f"frame.{number:04}.exr"
+        check_equal(now[name], first[name] if number < 4 else later[name], name)
+    check_equal(len(rewritten(before, folder)), 3, "frames replaced from frame 4 on")
+    say(render(programs, folder, other, "--from-frame", "4"), "frames 4-6 are kept")
+    render(programs, folder, other, "--from-frame", "9", expect=USAGE)
+
+    say(render(programs, folder, other, "--restart"), "are replaced: $.seed differs")
+    check_equal(programs.pixels(folder / FOLDER), witness(programs, folder / "all", "1-6", seed=8), "pixels")
+
+
+def a_key_of_later_frames(programs, folder):
+    """A changed key leaves the frames before it as they are."""
+    keys = [{"frame": frame, "position": [0.1 * frame, 1.2, 5], "lookAt": [0, 0.6, 0]} for frame in (1, 3, 6)]
+    moving = {"motion": {"curve": "linear", "maxPx": 8}}
+    render(programs, folder, small_job(folder, "1-6", camera={"keys": keys}, **moving))
+    before = stamps(folder)
+    keys[2]["position"][1] = 1.4
+    job = small_job(folder, "1-6", camera={"keys": keys}, **moving)
+    text = render(programs, folder, job, expect=BAD_INPUT)
+    say(text, "$.camera.keys at frame 4", "frames before 4 are the same and stay")
+    render(programs, folder, job, "--restart")
+    check_equal(rewritten(before, folder), [f"frame.{n:04}.exr" for n in (4, 5, 6)], "frames written again")
+    expected = witness(programs, folder / "whole", "1-6", camera={"keys": keys}, **moving)
+    check_equal(programs.pixels(folder / FOLDER), expected, "pixels")
+
+
+def an_open_job_is_extended(programs, folder):
+    """On a farm: a job that runs makes way for a longer one of its picture, and its work is kept."""
+    slow = {"method": "sequential", "numParticles": 16, "numCandidates": 512, "numDistributions": 48}
+    changes = {**KINDS["motion"], "sampling": slow, "image": {"tileSize": 32}}
+    expected = witness(programs, folder / "whole", "1-6", **changes)
+    place = folder / "changed"
+    with Farm(programs, folder / "farm") as farm:
+        farm.start_coordinator()
+        farm.start_worker(threads=2)
+        first = farm.submit(write_job(place / "job.json", small_job(place, "1-4", **changes)))
+        wait_until(lambda: farm.show(first)["framesDone"] >= 1, "the first frame is written")
+        longer = write_job(place / "longer.json", small_job(place, "1-6", **changes))
+        answer = json.loads(farm.baton("job", "submit", longer, "--json").stdout)
+        say(answer["plan"], "kept")
+        farm.wait_for(answer["id"])
+        check_equal(farm.show(first)["status"] in ("cancelled", "done"), True, "the first job has ended")
+        check("0 jobs" in farm.baton("job", "list").stdout, "jobs that have ended are listed")
+        listed = json.loads(farm.baton("job", "list", "--all", "--json").stdout)["jobs"]
+        check_equal([job["id"] for job in listed], [first, answer["id"]], "jobs with --all")
+
+        # Another picture, of other frames: not while this one is written.
+        farm.baton("job", "pause", farm.submit(write_job(place / "longest.json", small_job(
+            place, "1-8", **changes))))
+        other = write_job(place / "other.json", small_job(place, "20-21", seed=9, **changes))
+        say(farm.baton("job", "submit", other, expect=BAD_INPUT).stderr, "writes into", "wait for its end")
+        say(farm.baton("job", "resume", "system test").stderr, " are kept",
+            "going on from the states of frame ")
+    check_equal({name: line for name, line in programs.pixels(place / FOLDER).items() if name < "frame.0007"},
+                expected, "pixels")
+
+
+if __name__ == "__main__":
+    run_tests([
+        more_frames,
+        other_tiles,
+        settings_alone,
+        what_is_written_otherwise,
+        one_frame_is_gone_or_damaged,
+        another_picture,
+        a_key_of_later_frames,
+        an_open_job_is_extended,
+    ])

@@ -1,0 +1,249 @@
+#include "coordinator/schedule/adoption.h"
+
+#include <gmock/gmock.h>
+
+#include "common/job/motion.h"
+#include "tests/unit/schedule/farm.h"
+
+namespace baton {
+namespace {
+
+using namespace testing_farm;
+using testing::ElementsAre;
+using testing::IsEmpty;
+
+/// One output folder and one store: a job works, then another of the same picture.
+class Shop {
+ public:
+  /// Does at most `count` tasks of the job with what there is. Returns those that were done.
+  std::vector<TaskKey> work(JobSpec wanted, int count = 1000000) {
+    const KeptFiles files{
+        .has_frame =
+            [&](std::int32_t frame, const BlobRef& image) {
+              const auto found = frames_.find(wanted.frames[static_cast<std::size_t>(frame)]);
+              return found != frames_.end() && found->second == image.digest;
+            },
+        .has_blob = [&](const BlobRef& blob) { return store_.contains(blob.digest); }};
+    adoption_ = adopt(document_of(wanted), formers_, files);
+    wanted.leading_runs = adoption_.plan.leading_runs;
+    Farm farm(wanted);
+    farm.job = digest_of("tiles of " + std::to_string(wanted.image.tile_size));
+    std::vector<Completion> done = inherited();
+    JobAdded added{farm.job, wanted, JobStatus::running, completions_of(done), {}};
+    added.plan = adoption_.plan;
+    note(farm.step(added), done);
+    note(farm.step(WorkerJoined{"a", {}}), done);
+    std::vector<TaskKey> tasks;
+    while (static_cast<int>(tasks.size()) < count && farm.status() == JobStatus::running) {
+      const GrantLease grant = farm.ask_one("a");
+      for (const BlobRef& input : grant.inputs)
+        EXPECT_TRUE(store_.contains(input.digest)) << "an input that is not there";
+      const auto outputs =
+          outputs_of_grant(wanted, farm.job, grant.lease.task, grant.inputs, grant.frames);
+      for (const BlobRef& blob : outputs) {
+        store_.insert(blob.digest);
+        if (blob.kind == BlobKind::image)
+          frames_[wanted.frames[static_cast<std::size_t>(blob.frame)]] = blob.digest;
+      }
+      inputs_of_last_ = grant.inputs;
+      if (tasks.empty()) first_inputs_ = grant.inputs;
+      tasks.push_back(grant.lease.task);
+      note(farm.step(TaskCompleted{"a", grant.lease, outputs, {}}), done);
+    }
+    formers_.push_back(
+        {document_of(wanted), completions_of(done).tasks, adoption_.plan, farm.status()});
+    return tasks;
+  }
+  void lose_states() { store_.clear(); }
+  void lose_frame(int number) { frames_.erase(number); }
+  const Adoption& adoption() const { return adoption_; }
+  /// Of the first task of the last job.
+  const std::vector<BlobRef>& first_inputs() const { return first_inputs_; }
+
+ private:
+  std::vector<Completion> inherited() const {
+    std::vector<Completion> done;
+    if (adoption_.former) {
+      for (const Completions::Task& task : formers_[*adoption_.former].tasks) {
+        if (std::count(adoption_.tasks.begin(), adoption_.tasks.end(), task.task) > 0)
+          done.push_back({task.task, task.outputs, {}, {}});
+      }
+    }
+    for (const BlobRef& image : adoption_.images)
+      done.push_back({{TaskKind::assemble, image.frame, 0}, {image}, {}, {}});
+    for (const TaskKey& task : adoption_.settled) done.push_back({task, {}, {}, {}});
+    return done;
+  }
+  /// The archive keeps all states, so removals are left out.
+  void note(const std::vector<Action>& actions, std::vector<Completion>& done) {
+    for (const auto& record : all_of<RecordReopened>(actions)) {
+      for (const TaskKey& task : record.tasks)
+        std::erase_if(done, [&](const Completion& c) { return c.task == task; });
+    }
+    for (const auto& record : all_of<RecordCompletion>(actions)) done.push_back(record.completion);
+  }
+
+  std::vector<FormerJob> formers_;
+  std::set<Digest> store_;
+  std::map<int, Digest> frames_;
+  Adoption adoption_;
+  std::vector<BlobRef> first_inputs_, inputs_of_last_;
+};
+
+std::set<int> rendered_runs(const std::vector<TaskKey>& tasks) {
+  std::set<int> runs;
+  for (const TaskKey& task : tasks) {
+    if (task.kind == TaskKind::render) runs.insert(task.step);
+  }
+  return runs;
+}
+std::set<int> written_frames(const std::vector<TaskKey>& tasks) {
+  std::set<int> frames;
+  for (const TaskKey& task : tasks) {
+    if (task.kind == TaskKind::assemble) frames.insert(task.step);
+  }
+  return frames;
+}
+
+JobSpec with_frames(JobSpec job, int first, int last) {
+  job.frames.clear();
+  for (int frame = first; frame <= last; ++frame) job.frames.push_back(frame);
+  return job;
+}
+
+TEST(Adoption, MoreFramesGoOnFromTheLastStatesInMotion) {
+  Shop shop;
+  shop.work(moving_job(3, 8, 3));
+  const auto tasks = shop.work(moving_job(3, 12, 3));
+  EXPECT_EQ(rendered_runs(tasks), (std::set<int>{8, 9, 10, 11}));
+  EXPECT_EQ(written_frames(tasks), (std::set<int>{8, 9, 10, 11}));
+  ASSERT_FALSE(shop.first_inputs().empty());
+  EXPECT_EQ(shop.first_inputs().front().frame, 7);
+}
+
+// The last run of the shorter job was cut short: it stays as it is.
+TEST(Adoption, MoreFramesGoOnFromTheLastStatesAtRest) {
+  Shop shop;
+  shop.work(small_job(2, 8, 12));
+  const auto tasks = shop.work(small_job(2, 30, 12));
+  EXPECT_THAT(shop.adoption().plan.leading_runs, ElementsAre(0, 8));
+  EXPECT_EQ(tasks.size(), 2u * 3 + 22) << "frames 9-12, 13-24 and 25-30 of two tiles";
+  EXPECT_EQ(*written_frames(tasks).begin(), 8);
+  EXPECT_EQ(shop.first_inputs().front().frame, 7);
+}
+
+TEST(Adoption, ASecondPassGoesOnToo) {
+  JobSpec job = moving_job(3, 4, 3);
+  job.visibility.correlated = true;
+  Shop shop;
+  shop.work(job);
+  const auto tasks = shop.work(with_frames(job, 1, 6));
+  EXPECT_EQ(tasks.size(), 2u * (3 + 3 + 1));
+}
+
+TEST(Adoption, FewerFramesAndOtherSettingsNeedNothing) {
+  Shop shop;
+  shop.work(small_job(2, 12, 12));
+  JobSpec fewer = small_job(2, 5, 7);
+  fewer.priority = 90;
+  fewer.max_retries_per_task = 9;
+  fewer.name = "another name";
+  fewer.metadata["shot"] = "12";
+  EXPECT_THAT(shop.work(fewer), IsEmpty());
+  EXPECT_EQ(shop.adoption().images.size(), 5u);
+  // And what the first job has written is still there for a third.
+  EXPECT_THAT(shop.work(small_job(2, 12, 12)), IsEmpty());
+}
+
+TEST(Adoption, AnInterruptedJobLeavesItsSingleTasks) {
+  Shop shop;
+  const auto before = shop.work(small_job(3, 8, 2), 5);
+  JobSpec longer = small_job(3, 10, 2);
+  const auto after = shop.work(longer);
+  EXPECT_EQ(before.size() + after.size(), static_cast<std::size_t>(count_tasks(longer)));
+}
+
+TEST(Adoption, StatesAreCutIntoOtherTiles) {
+  for (const JobSpec& job : {small_job(4, 6, 3), moving_job(4, 6, 3)}) {
+    Shop shop;
+    shop.work(job);
+    JobSpec larger = with_frames(job, 1, 8);
+    larger.image.tile_size = 16;
+    const auto tasks = shop.work(larger);
+    EXPECT_EQ(written_frames(tasks), (std::set<int>{6, 7}));
+    const std::int32_t runs = moves(job) ? 2 : 1;  // after the frame that is cut
+    EXPECT_EQ(tasks.size(), static_cast<std::size_t>(2 + 2 * runs + 2));
+    ASSERT_EQ(shop.first_inputs().size(), 2u) << "two tiles make one";
+    EXPECT_EQ(shop.first_inputs().front().frame, 5);
+  }
+}
+
+// In the middle of the shorter job only checkpoints and the last frame have all states.
+TEST(Adoption, WithoutStatesTheChainIsRenderedAndOnlyWhatIsMissingWritten) {
+  Shop shop;
+  shop.work(moving_job(2, 6, 3));
+  shop.lose_states();
+  JobSpec larger = moving_job(2, 8, 3);
+  larger.image.tile_size = 16;
+  const auto tasks = shop.work(larger);
+  EXPECT_EQ(rendered_runs(tasks).size(), 8u);
+  EXPECT_EQ(written_frames(tasks), (std::set<int>{6, 7}));
+}
+
+TEST(Adoption, AFrameThatIsGoneIsMadeAgain) {
+  Shop shop;
+  shop.work(small_job(2, 6, 2));
+  shop.lose_frame(3);
+  shop.lose_states();
+  JobSpec smaller_tiles = small_job(2, 6, 2);
+  smaller_tiles.image.tile_size = 16;
+  const auto tasks = shop.work(smaller_tiles);
+  EXPECT_EQ(written_frames(tasks), std::set<int>{2});
+  EXPECT_EQ(rendered_runs(tasks), (std::set<int>{0, 1}));
+  EXPECT_THAT(shop.adoption().lost, ElementsAre(2));
+}
+
+TEST(Adoption, WithoutHistoryFramesAreKeptByNumber) {
+  Shop shop;
+  shop.work(with_frames(small_job(2, 4, 3, /*carry=*/false), 5, 8));
+  const auto tasks = shop.work(small_job(2, 12, 3, /*carry=*/false));
+  EXPECT_EQ(written_frames(tasks), (std::set<int>{0, 1, 2, 3, 8, 9, 10, 11}));
+  EXPECT_EQ(tasks.size(), 8u + 2 * 4) << "runs 1-3, 4, 9, 10-12";
+}
+
+TEST(Adoption, OtherChannelsAreWrittenAnew) {
+  Shop shop;
+  shop.work(small_job(2, 4, 2));
+  JobSpec more = small_job(2, 4, 2);
+  more.output.aovs = {Aov::depth};
+  EXPECT_EQ(shop.work(more).size(), static_cast<std::size_t>(count_tasks(more)));
+  // Of another format only the assembly, while the films are there.
+  more.output.compression = "piz";
+  EXPECT_EQ(shop.work(more).size(), 4u);
+}
+
+// A key that only later frames see leaves those before as they are.
+TEST(Adoption, AKeyChangesTheFramesThatItMoves) {
+  JobSpec job = moving_job(2, 8, 3);
+  job.motion.curve = KeyCurve::linear;
+  job.camera.keys = {{.frame = 1, .position = {0, 0, 5}, .look_at = {}, .up = {0, 1, 0}},
+                     {.frame = 5, .position = {0, 1, 5}, .look_at = {}, .up = {0, 1, 0}},
+                     {.frame = 8, .position = {0, 2, 5}, .look_at = {}, .up = {0, 1, 0}}};
+  JobSpec other = job;
+  other.camera.keys[2].position.x = 1;
+  EXPECT_EQ(document_of(job).picture, document_of(other).picture);
+  const FrameComparison comparison(document_of(job), document_of(other));
+  EXPECT_EQ(comparison.num_common(), 5u);
+  EXPECT_FALSE(comparison.are_equal(5, 5));
+  EXPECT_EQ(comparison.difference(5, 5), "$.camera.keys at frame 6");
+}
+
+TEST(Adoption, ACarriedHistoryBeginsWithTheFirstFrame) {
+  const JobSpec job = small_job(1, 8, 2);
+  EXPECT_NE(document_of(job).picture, document_of(with_frames(job, 2, 8)).picture);
+  JobSpec fresh = small_job(1, 8, 2, /*carry=*/false);
+  EXPECT_EQ(document_of(fresh).picture, document_of(with_frames(fresh, 2, 8)).picture);
+}
+
+}  // namespace
+}  // namespace baton
