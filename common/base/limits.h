@@ -30,6 +30,8 @@ inline constexpr int kMaxFaultsReported = 100;
 inline constexpr int kMinTileSize = 8;
 inline constexpr int kMaxTileSize = 32768;
 inline constexpr int kMaxSites = 16;
+inline constexpr int kMaxRounds = 65536;
+inline constexpr int kMaxPreroll = 64;  ///< rounds
 inline constexpr int kMaxParticles = 64;
 inline constexpr int kMaxPopulations = 2;  // of a pixel's particles
 inline constexpr int kMaxCandidates = 8192;
@@ -55,6 +57,10 @@ inline constexpr std::uint64_t kMaxFilmBytesAhead =
     2ull << 30;  ///< films, before compression, of frames that are rendered ahead of an open one
 inline constexpr std::uint64_t kMaxSurfaceCacheBytes =
     1ull << 29;  ///< surfaces that a worker keeps where things move, per job
+inline constexpr std::uint64_t kMaxRoundSurfaceBytes =
+    1ull << 27;  ///< what a tile keeps of its rounds' surfaces from frame to frame
+inline constexpr std::uint64_t kMaxPresampledCacheBytes =
+    1ull << 30;  ///< presampled light that a worker keeps, per job
 inline constexpr std::size_t kMaxCachedPoses =
     16;  ///< frames whose moved geometry a worker keeps, per job
 inline constexpr int kMaxTasksPerJob = 4000000;

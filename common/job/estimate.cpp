@@ -69,9 +69,12 @@ JobEstimate estimate_job(const JobSpec& job) {
   if (job.visibility.correlated)
     e.dependencies += count_neighbours(job, exchange_reach_px(job.visibility)) * e.frames;
 
-  // Count rays.
+  // Count rays, of all rounds. Those that are not seen have the sites of the first.
+  e.rounds = job.quality.rounds;
+  e.preroll_rounds = num_preroll_rounds(job);
   e.primary_rays_per_pixel = job.image.sites;
-  e.shadow_rays_per_pixel = traits(job.sampling.method).most_rays(job.sampling);
+  if (rounds_have_own_sites(job)) e.primary_rays_per_pixel *= e.rounds;
+  e.shadow_rays_per_pixel = traits(job.sampling.method).most_rays(job.sampling) * e.rounds;
 
   // Add up the planes: R, G, B, A and the AOVs.
   std::int64_t wide_channels = 0, frame_channels = 4;

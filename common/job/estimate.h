@@ -11,13 +11,15 @@ namespace baton {
 struct JobEstimate {
   std::int64_t frames = 0;
   std::int64_t tiles = 0;
-  std::int64_t runs = 0;               ///< per tile
-  std::int64_t render_tasks = 0;       ///< tiles * runs
-  std::int64_t second_pass_tasks = 0;  ///< tiles * frames, with correlated visibility
-  std::int64_t assemble_tasks = 0;     ///< one a frame
-  std::int64_t dependencies = 0;       ///< of a task on another
-  std::int64_t primary_rays_per_pixel = 0;
-  std::int64_t shadow_rays_per_pixel = 0;  ///< at most, in the first pass
+  std::int64_t runs = 0;                    ///< per tile
+  std::int64_t render_tasks = 0;            ///< tiles * runs
+  std::int64_t second_pass_tasks = 0;       ///< tiles * frames, with correlated visibility
+  std::int64_t assemble_tasks = 0;          ///< one a frame
+  std::int64_t dependencies = 0;            ///< of a task on another
+  std::int64_t rounds = 1;                  ///< of a frame
+  std::int64_t preroll_rounds = 0;          ///< before the first frame
+  std::int64_t primary_rays_per_pixel = 0;  ///< in a frame
+  std::int64_t shadow_rays_per_pixel = 0;   ///< at most, in a frame, in the first pass
   std::int64_t film_channels = 0;
   std::int64_t film_bytes = 0;             ///< of one frame as float32 tiles, before compression
   std::int64_t frame_bytes = 0;            ///< of one EXR, before compression

@@ -70,6 +70,7 @@ void fields(JobArchive& a, ImageSpec& image) {
     if (root * root != image.sites)
       a.fault("sites", "one of 1, 4, 9, 16", std::to_string(image.sites));
   }
+  a.choice("filter", image.filter, kPixelFilters);
   a.integer("tileSize", image.tile_size, limits::kMinTileSize, limits::kMaxTileSize);
   region_fields(a, image);
   a.integer("siteSeed", image.site_seed);
@@ -167,7 +168,16 @@ void fields(JobArchive& a, SamplingSpec& sampling, const SceneSpec& scene) {
   material_fields(a, sampling, scene);
 }
 
-void fields(JobArchive& a, VisibilitySpec& visibility, const SamplingSpec& sampling) {
+void fields(JobArchive& a, QualitySpec& quality, const SamplingSpec& sampling) {
+  a.integer("rounds", quality.rounds, 1, limits::kMaxRounds);
+  if (quality.rounds > 1 && sampling.method == Method::automatic) {
+    a.fault("rounds", "1, as sampling.method is auto, which chooses for one",
+            std::to_string(quality.rounds));
+  }
+}
+
+void fields(JobArchive& a, VisibilitySpec& visibility, const SamplingSpec& sampling,
+            const QualitySpec& quality) {
   a.boolean("correlated", visibility.correlated);
   a.choice("form", visibility.form, kSecondPassForms);
   a.choice("mask", visibility.mask, kMaskPolicies);
@@ -184,6 +194,12 @@ void fields(JobArchive& a, VisibilitySpec& visibility, const SamplingSpec& sampl
   }
   if (!sampling.by_material.empty()) {
     a.fault("correlated", "false, as sampling.byMaterial is given", "true");
+  }
+  if (quality.rounds > 1) {
+    a.fault("correlated",
+            fmt::format("false, as quality.rounds is {}, and the second pass takes one round",
+                        quality.rounds),
+            "true");
   }
   if (visibility.mask != MaskPolicy::same_samples && sampling.num_particles % 2 != 0) {
     a.fault("mask", "same-samples, or an even sampling.numParticles to be halved",
@@ -216,6 +232,7 @@ void fields(JobArchive& a, OutputSpec& output, const JobSpec& job) {
 void fields(JobArchive& a, StateSpec& state) {
   a.boolean("carry", state.carry);
   a.integer("checkpointEvery", state.checkpoint_every, 1, limits::kMaxCheckpointEvery);
+  a.integer("preroll", state.preroll, 0, limits::kMaxPreroll);
   a.choice("keep", state.keep, kStateKeeps);
 }
 
@@ -252,7 +269,8 @@ void fields(JobArchive& a, JobSpec& job) {
   a.object(required("environment"), [&] { fields(a, job.environment, job.frames); });
   a.object("motion", [&] { fields(a, job.motion); });
   a.object("sampling", [&] { fields(a, job.sampling, job.scene); });
-  a.object("visibility", [&] { fields(a, job.visibility, job.sampling); });
+  a.object("quality", [&] { fields(a, job.quality, job.sampling); });
+  a.object("visibility", [&] { fields(a, job.visibility, job.sampling, job.quality); });
   a.object("output", [&] { fields(a, job.output, job); });
   a.object("state", [&] { fields(a, job.state); });
   a.integer("maxRetriesPerTask", job.max_retries_per_task, 0, limits::kMaxTaskAttempts - 1);

@@ -21,6 +21,8 @@ inline constexpr NumberRange kAngleRange{-1e6, 1e6};
 inline constexpr std::array<std::string_view, 4> kMaterialKinds{"diffuse", "phong",
                                                                 "metallicRoughness", "measured"};
 inline constexpr std::array<std::string_view, 2> kMapFilters{"nearest", "bilinear"};
+inline constexpr std::array<std::string_view, 3> kPixelFilters{"box", "gaussian",
+                                                               "blackman-harris"};
 inline constexpr std::array<std::string_view, 4> kResamplingSchemes{"systematic", "stratified",
                                                                     "multinomial", "residual"};
 inline constexpr std::array<std::string_view, 4> kSecondPassForms{

@@ -26,13 +26,13 @@ constexpr std::array<std::string_view, 12> kSettings{"/name",
                                                      "/maxFailuresPerWorker",
                                                      "/maxSecondsPerTask",
                                                      "/specificationVersion"};
-/// Of these, those that do: a job that carries no samples renders other pixels.
-constexpr std::string_view kCarry = "/state/carry";
+/// Of these, those that do: what a pixel knows of earlier frames decides where its rays go.
+constexpr std::array<std::string_view, 2> kOfThePicture{"/state/carry", "/state/preroll"};
 /// The name of what carried samples begin with.
 constexpr const char* kFirstFrame = "$.frames (samples are carried from the first one on)";
 
 bool is_setting(std::string_view path) {
-  if (path == kCarry) return false;
+  if (std::ranges::find(kOfThePicture, path) != kOfThePicture.end()) return false;
   return std::any_of(kSettings.begin(), kSettings.end(),
                      [&](std::string_view start) { return path.starts_with(start); });
 }

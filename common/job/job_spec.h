@@ -21,11 +21,19 @@ namespace baton {
 
 // ---- image
 // -------------------------------------------------------------------------------------------------
+/// From where in a pixel, and around it, its light comes. Widths are those of Cycles at 1.5.
+enum class PixelFilter : std::uint8_t {
+  box,              ///< the pixel
+  gaussian,         ///< standard deviation .375 pixels, to 2.25 pixels from the centre
+  blackman_harris,  ///< to 1.5 pixels from the centre
+};
+
 struct ImageSpec {
-  int width = 640;     ///< pixels of the whole picture, [1, limits::kMaxImageSide]
-  int height = 360;    ///< pixels
-  int sites = 1;       ///< primary rays per pixel: 1, 4, 9 or 16 (stratified; box filter)
-  int tile_size = 64;  ///< side of a farm tile in pixels; never changes the picture
+  int width = 640;   ///< pixels of the whole picture, [1, limits::kMaxImageSide]
+  int height = 360;  ///< pixels
+  int sites = 1;     ///< primary rays per pixel: 1, 4, 9 or 16 (stratified)
+  PixelFilter filter = PixelFilter::box;
+  int tile_size = 64;                 ///< side of a farm tile in pixels; never changes the picture
   std::optional<PixelRect> region{};  ///< the part that is rendered, inside the whole; none: all
   std::uint64_t site_seed = 0;        ///< of the sites' places in their pixels; 0: the job's seed
 
@@ -266,6 +274,16 @@ struct SamplingSpec {
   bool operator==(const SamplingSpec&) const = default;
 };
 
+// ---- quality
+// ------------------------------------------------------------------------------------------------
+/// How much of the job's sampling a frame is the mean of.
+struct QualitySpec {
+  int rounds = 1;  ///< K: passes over a frame, each with other random numbers and sites,
+                   ///< [1, limits::kMaxRounds]
+
+  bool operator==(const QualitySpec&) const = default;
+};
+
 // ---- visibility
 // --------------------------------------------------------------------------------------------
 /// What a second pass does with the pixels whose shadow rays did not all agree.
@@ -324,6 +342,8 @@ enum class StateKeep : std::uint8_t { last, all };
 struct StateSpec {
   bool carry = true;                 ///< pass samples from frame to frame
   int checkpoint_every = 12;         ///< frames between checkpoints; at rest, of a lease, [1, 1000]
+  int preroll = 2;                   ///< pool: rounds before the first frame that are not seen, [0,
+                                     ///< limits::kMaxPreroll]
   StateKeep keep = StateKeep::last;  ///< `all` keeps every checkpoint after the job
 
   bool operator==(const StateSpec&) const = default;
@@ -341,6 +361,7 @@ struct JobSpec {
   EnvironmentSpec environment;
   MotionSpec motion;
   SamplingSpec sampling;
+  QualitySpec quality;
   VisibilitySpec visibility;
   OutputSpec output;
   StateSpec state;

@@ -174,6 +174,15 @@ std::int32_t most_particles(const SamplingSpec& sampling) {
   return most;
 }
 
+bool rounds_have_own_sites(const JobSpec& job) {
+  return !(carries_state(job) && traits(job.sampling.method).keeps_samples);
+}
+
+std::int32_t num_preroll_rounds(const JobSpec& job) {
+  const bool learns = carries_state(job) && traits(job.sampling.method).carried == Carried::memory;
+  return learns ? job.state.preroll : 0;
+}
+
 std::int32_t num_populations(const JobSpec& job) {
   return job.visibility.correlated && job.visibility.mask != MaskPolicy::same_samples ? 2 : 1;
 }

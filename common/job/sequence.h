@@ -111,6 +111,12 @@ std::int32_t most_particles(const SamplingSpec& sampling);
 /// Particles per pixel in the job's states; 0 where rays are chosen apart from samples.
 std::int32_t num_carried_particles(const SamplingSpec& sampling);
 
+/// Whether each round of a frame has sites of its own. Samples that are carried belong to a
+/// surface: where pixels carry them, all rounds have the same sites.
+bool rounds_have_own_sites(const JobSpec& job);
+/// Rounds before the first frame that are not seen: state.preroll, where pixels carry a memory.
+std::int32_t num_preroll_rounds(const JobSpec& job);
+
 /// Sets of samples of a pixel that never exchange anything: 2 when one decides what is done with
 /// the other, else 1.
 std::int32_t num_populations(const JobSpec& job);

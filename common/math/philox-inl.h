@@ -35,8 +35,8 @@ HWY_INLINE void MulWide(DU du, VU a, VU b, VU& low, VU& high) {
 /// The block of Rng::bits(step, index) for a vector of indices.
 template <class DU, class VU>
 HWY_INLINE PhiloxLanes<VU> PhiloxBlock(DU du, const Rng& rng, std::uint32_t step, VU index) {
-  auto k0 = static_cast<std::uint32_t>(rng.key().job_seed);
-  auto k1 = static_cast<std::uint32_t>(rng.key().job_seed >> 32);
+  auto k0 = static_cast<std::uint32_t>(rng.key().philox_key());
+  auto k1 = static_cast<std::uint32_t>(rng.key().philox_key() >> 32);
   PhiloxLanes<VU> c{hn::Set(du, rng.key().pixel), hn::Set(du, rng.key().frame),
                     hn::Set(du, rng.pass_word(step)), index};
   const VU m0 = hn::Set(du, Philox4x32::kMultiplier0);

@@ -53,19 +53,24 @@ constexpr float uniform_float(std::uint32_t bits) {
   return static_cast<float>(bits >> 8) * 0x1p-24f;
 }
 
-/// The address of a pixel's randomness: (job seed, frame, pixel, pass, step, index).
+/// The address of a pixel's randomness: (job seed, frame, round, pixel, pass, step, index).
 /// pixel: y * image_width + x, so no tiling enters. Equal addresses give equal numbers, on any
 /// thread or host.
 struct RngKey {
   std::uint64_t job_seed = 0;
   std::uint32_t frame = 0;
   std::uint32_t pixel = 0;
+  std::uint32_t round = 0;
+
+  /// Key of Philox: another one for each round.
+  constexpr std::uint64_t philox_key() const { return job_seed + 0x9E3779B97F4A7C15ull * round; }
 };
-/// The address of pixel (x, y) of frame number `frame` in images of `image_width` pixels.
+/// The address of pixel (x, y) of frame number `frame` in images of `image_width` pixels. round: of
+/// the frame; negative: one that is not seen.
 constexpr RngKey pixel_key(std::uint64_t job_seed, std::int32_t frame, std::int32_t image_width,
-                           std::int32_t x, std::int32_t y) {
+                           std::int32_t x, std::int32_t y, std::int32_t round = 0) {
   return {job_seed, static_cast<std::uint32_t>(frame),
-          static_cast<std::uint32_t>(y * image_width + x)};
+          static_cast<std::uint32_t>(y * image_width + x), static_cast<std::uint32_t>(round)};
 }
 
 class Rng {
@@ -74,7 +79,7 @@ class Rng {
 
   /// 128 bits at (step, index); step < 2^24.
   constexpr Philox4x32::Counter bits(std::uint32_t step, std::uint32_t index) const {
-    return Philox4x32::block({key_.pixel, key_.frame, pass_word(step), index}, key_.job_seed);
+    return Philox4x32::block({key_.pixel, key_.frame, pass_word(step), index}, key_.philox_key());
   }
   /// Four uniforms in [0, 1).
   constexpr std::array<float, 4> uniforms(std::uint32_t step, std::uint32_t index) const {

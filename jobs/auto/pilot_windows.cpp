@@ -32,6 +32,7 @@ JobSpec small_job(const JobSpec& job, std::vector<int> frames) {
   small.output.aovs = {Aov::lns};
   small.state.keep = StateKeep::last;
   if (small.image.site_seed == 0) small.image.site_seed = kSiteSeed;
+  small.state.preroll = 0;  // by the frames that are measured pixels know enough
   return small;
 }
 

@@ -56,6 +56,8 @@ void print_json(const JobSpec& job, const JobEstimate& e, const AssetReport& ass
                          {"secondPassTasks", e.second_pass_tasks},
                          {"assembleTasks", e.assemble_tasks},
                          {"dependencies", e.dependencies},
+                         {"rounds", e.rounds},
+                         {"prerollRounds", e.preroll_rounds},
                          {"primaryRaysPerPixel", e.primary_rays_per_pixel},
                          {"shadowRaysPerPixel", e.shadow_rays_per_pixel},
                          {"filmBytesPerFrame", e.film_bytes},
@@ -107,6 +109,14 @@ void print_text(const JobSpec& job, const JobEstimate& e, const AssetReport& ass
              e.tasks(), e.render_tasks, e.runs, e.assemble_tasks, e.dependencies);
   fmt::print("rays       {} primary and at most {} shadow rays a pixel and frame\n",
              e.primary_rays_per_pixel, e.shadow_rays_per_pixel);
+  if (e.rounds > 1) fmt::print("           in {} rounds\n", e.rounds);
+  if (e.preroll_rounds > 0) {
+    fmt::print(
+        "preroll    {} rounds before frame {} that are not seen: it takes {:.3g} times as "
+        "long\n",
+        e.preroll_rounds, job.frames.front(),
+        1 + static_cast<double>(e.preroll_rounds) / static_cast<double>(e.rounds));
+  }
   if (moves(job)) {
     fmt::print("motion     history is followed up to {} pixels a frame\n", job.motion.max_px);
   }

@@ -117,7 +117,11 @@ std::string_view why_empty(Aov aov, const JobSpec& job) {
     case Aov::resampled:
       return method == Method::sequential ? "" : "only `sequential` fills it";
     case Aov::variance:
-      return traits(method).tells_variance() ? "" : "only `reference`, `pool` and `ratio` fill it";
+      if (traits(method).tells_variance()) return "";
+      if (carries_state(job)) return "samples that are carried tell nothing of their error";
+      return job.quality.rounds < 4 ? "only `reference`, `pool` and `ratio` fill it, and four "
+                                      "rounds or more of the others"
+                                    : "";
     case Aov::ess:
       return traits(method).keeps_samples ? "" : "the method's rays have no weights";
     default:

@@ -98,6 +98,7 @@ class Draw:
             "sampling.byMaterial.*.numParticles": lambda: self.rng.choice([None, *NUM_PARTICLES]),
             "sampling.byMaterial.*.numCandidates": lambda: self.rng.choice([None, *NUM_CANDIDATES]),
             "sampling.targetError": lambda: self.pick(None, 0.3), "sampling.timeBudget": lambda: 1.0,
+            "quality.rounds": lambda: self.pick(1, 2, 3, 4, 5, 9), "state.preroll": lambda: self.pick(None, 0, 1, 2, 5),
             "visibility.correlated": lambda: self.chance(0.9),
             "visibility.mask": lambda: self.rng.choice(self.enum("visibility", "mask") + ["same-samples"]),
             "image.sites": lambda: self.rng.choice(self.enum("image", "sites") + [4]),

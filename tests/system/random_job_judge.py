@@ -278,7 +278,8 @@ def compare_prediction(predicted, summary, job):
     most = least * (2 + asks if shares else 1) + (9 * of_frame * predicted["frames"] if second_pass else 0)
     require(least <= stats["raysPrimary"] <= most, "predicted primary rays",
             f"{stats['raysPrimary']}, predicted {least} to {most}")
-    shadow = pixels * predicted["frames"] * predicted["shadowRaysPerPixel"]
+    unseen = predicted.get("prerollRounds", 0) / predicted.get("rounds", 1)
+    shadow = pixels * (predicted["frames"] + unseen) * predicted["shadowRaysPerPixel"]
     require(stats["raysShadow"] <= shadow, "predicted shadow rays",
             f"{stats['raysShadow']}, predicted at most {shadow}")
 

@@ -69,6 +69,9 @@ def settle_claims(job):
         visibility["correlated"] = False
     if sampling["method"] not in ("environment", "brdf", "mis", "bidirectional"):
         sampling.pop("byMaterial", None)
+    # Where rounds share their sites a lone one is the pixel's centre, which `reference` does not keep to.
+    if sampling["method"] in ("sequential", "restir") and job.get("quality", {}).get("rounds", 1) > 1:
+        job["image"]["sites"] = max(job["image"].get("sites", 1), 4)
     if sampling["method"] != "mis":
         sampling.pop("misCompensation", None)
     sampling.pop("targetError", None)

@@ -17,7 +17,14 @@ def work_of(job, num_frames):
     if job.get("visibility", {}).get("correlated"):
         visibility = job["visibility"]
         of_pixel += n * visibility.get("partitions", 16)
-    return image["width"] * image["height"] * num_frames * of_pixel
+    rounds = job.get("quality", {}).get("rounds", 1)
+    if method_carries_memory(sampling["method"]):
+        rounds += job.get("state", {}).get("preroll", 2) / num_frames
+    return image["width"] * image["height"] * num_frames * of_pixel * rounds
+
+
+def method_carries_memory(method):
+    return method == "pool"
 
 
 def mend_view(view, rng):
@@ -47,6 +54,8 @@ def mend(job, rng):
             sampling.pop(key, None)
     if method in ("reference", "pool", "ratio", "restir", "auto") or sampling.get("byMaterial"):
         visibility["correlated"] = False
+    if (visibility.get("correlated") or method == "auto") and "quality" in job:
+        job["quality"]["rounds"] = 1
     if visibility.get("correlated") and visibility.get("mask") != "same-samples" and sampling["numParticles"] % 2:
         if rng.random() < 0.5:
             visibility["mask"] = "same-samples"

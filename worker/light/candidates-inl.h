@@ -21,61 +21,78 @@ HWY_BEFORE_NAMESPACE();
 namespace baton::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-/// How candidates 0, 1, ... of one kind are dealt to the sites: even shares from a random start.
-/// Many candidates: all lanes of a vector share a site, and a site's vectors are neighbours, which
-/// needs no table look-ups; few: each lane has its own.
+/// How candidates 0, 1, ... of one kind are dealt to the sites: even shares, and which site has
+/// which is random. Many candidates: all lanes of a vector share a site, which needs no table
+/// look-ups; few: each lane has its own.
 struct SiteDeal {
   const std::int32_t* sites;
   std::int32_t num_sites;
   std::int32_t count;  ///< candidates of this kind
   float start;         ///< uniform in [0, 1)
+  /// Candidates lie along a curve of directions: its blocks of eight go to the sites in turn. If a
+  /// site had a stretch of the curve for itself, the light there would be seen through it alone,
+  /// and the noise of pixels with several normals would not fall with the number of candidates.
+  /// Else a site has neighbours: points of a sequence of which no single one matters.
+  bool in_turn;
+
+  static constexpr std::size_t kBlock = PresampledLight::kBlock;
+  static constexpr std::size_t kVectorsOfBlock = kBlock / hn::MaxLanes(DF());
 
   std::size_t Vectors() const {
     return (static_cast<std::size_t>(count) + hn::Lanes(DF()) - 1) / hn::Lanes(DF());
   }
-  bool ByVector() const { return count >= num_sites * static_cast<std::int32_t>(hn::Lanes(DF())); }
-  /// Site of the k-th share of the vectors.
+  bool ByVector() const {
+    const std::size_t least = in_turn ? kBlock : hn::Lanes(DF());
+    return static_cast<std::size_t>(count) >= static_cast<std::size_t>(num_sites) * least;
+  }
+  /// Site of the k-th share, where the vectors are shared out, or of the k-th block.
   std::int32_t SiteOfShare(std::size_t k) const {
     const auto n = static_cast<std::size_t>(num_sites);
     if (n == 1) return sites[0];
-    return sites[(k + static_cast<std::size_t>(start * static_cast<float>(num_sites))) % n];
-  }
-  /// First vector of the k-th share.
-  std::size_t FirstOfShare(std::size_t k) const {
-    const auto n = static_cast<std::size_t>(num_sites);
-    return (k * Vectors() + n - 1) / n;
-  }
-  HWY_INLINE VI SitesOfLanes(std::size_t i) const {
-    const DF d;
-    const DI di;
-    const VF position = hn::Add(CountFrom(d, static_cast<float>(i)), hn::Set(d, start));
-    const VF turn =
-        hn::Mul(position, hn::Set(d, static_cast<float>(num_sites) / static_cast<float>(count)));
-    return hn::GatherIndex(di, sites, hn::Min(hn::ConvertTo(di, turn), hn::Set(di, num_sites - 1)));
+    return sites[(k + FirstSite()) % n];
   }
   /// Site of candidate i, as ForEach deals it.
   std::int32_t SiteOf(std::size_t i) const {
-    if (ByVector()) {
-      return SiteOfShare(i / hn::Lanes(DF()) * static_cast<std::size_t>(num_sites) / Vectors());
-    }
-    const float turn = (static_cast<float>(i) + start) *
+    if (num_sites == 1) return sites[0];
+    if (ByVector()) return SiteOfShare(in_turn ? i / kBlock : ShareOf(i / hn::Lanes(DF())));
+    const float turn = (static_cast<float>(i) + Rest()) *
                        (static_cast<float>(num_sites) / static_cast<float>(count));
-    return sites[std::min(static_cast<std::int32_t>(turn), num_sites - 1)];
+    return SiteOfShare(
+        static_cast<std::size_t>(std::min(static_cast<std::int32_t>(turn), num_sites - 1)));
   }
 
-  /// use(surface, first, last) for vectors [first, last) that share their surface, in turn.
-  template <class Use>
-  HWY_INLINE void ForEachRun(const SiteBlock& block, const Use& use) const {
+  /// use(read(reader), first, last) for vectors [first, last) that share their surface, in turn;
+  /// the reader looks fields of the sites up.
+  template <class Read, class Use>
+  HWY_INLINE void ForEachRunOf(const SiteBlock& block, const Read& read, const Use& use) const {
+    const std::size_t vectors = Vectors();
+    const DI di;
     if (!ByVector()) {
-      for (std::size_t v = 0; v < Vectors(); ++v) {
-        use(LoadSurfaces(block, SitesOfLanes(v * hn::Lanes(DF()))), v, v + 1);
+      for (std::size_t v = 0; v < vectors; ++v) {
+        const VI site = SitesOfLanes(v * hn::Lanes(DF()));
+        use(read(site, [&](const SiteBlock::Array& field)
+                           HWY_ATTR { return LookUp(field, site, block.num_sites); }),
+            v, v + 1);
       }
       return;
     }
-    for (std::size_t k = 0; k < static_cast<std::size_t>(num_sites); ++k) {
-      use(LoadSurface(block, static_cast<std::size_t>(SiteOfShare(k))), FirstOfShare(k),
-          FirstOfShare(k + 1));
+    std::size_t next = FirstSite();
+    for (std::size_t k = 0, first = 0; first < vectors; ++k) {
+      const std::size_t last = std::min(EndOfShare(k), vectors);
+      const auto site = static_cast<std::size_t>(sites[next]);
+      use(read(hn::Set(di, sites[next]),
+               [&](const SiteBlock::Array& field) HWY_ATTR { return hn::Set(DF(), field[site]); }),
+          first, last);
+      first = last;
+      if (++next == static_cast<std::size_t>(num_sites)) next = 0;
     }
+  }
+  /// The same with all of a surface.
+  template <class Use>
+  HWY_INLINE void ForEachRun(const SiteBlock& block, const Use& use) const {
+    ForEachRunOf(
+        block, [&](VI site, const auto& read) HWY_ATTR { return ReadSurfaces(block, site, read); },
+        use);
   }
   /// use(surface, i) for each vector of candidates i, i + 1, ... in turn.
   template <class Use>
@@ -84,6 +101,36 @@ struct SiteDeal {
                [&](const SurfaceLanes& surface, std::size_t first, std::size_t last) HWY_ATTR {
                  for (std::size_t v = first; v < last; ++v) use(surface, v * hn::Lanes(DF()));
                });
+  }
+
+ private:
+  /// Who is dealt the first share, each site as likely as any other, and what `start` has left.
+  std::size_t FirstSite() const {
+    return static_cast<std::size_t>(start * static_cast<float>(num_sites));
+  }
+  float Rest() const {
+    return start * static_cast<float>(num_sites) - static_cast<float>(FirstSite());
+  }
+  std::size_t ShareOf(std::size_t vector) const {
+    return vector * static_cast<std::size_t>(num_sites) / Vectors();
+  }
+  /// Vector after the k-th share.
+  std::size_t EndOfShare(std::size_t k) const {
+    const auto n = static_cast<std::size_t>(num_sites);
+    if (n == 1) return Vectors();
+    return in_turn ? (k + 1) * kVectorsOfBlock : ((k + 1) * Vectors() + n - 1) / n;
+  }
+  HWY_INLINE VI SitesOfLanes(std::size_t i) const {
+    const DF d;
+    const DI di;
+    const VF position = hn::Add(CountFrom(d, static_cast<float>(i)), hn::Set(d, Rest()));
+    const VF turn =
+        hn::Mul(position, hn::Set(d, static_cast<float>(num_sites) / static_cast<float>(count)));
+    const VI share = hn::Min(hn::ConvertTo(di, turn), hn::Set(di, num_sites - 1));
+    const VI site = hn::Add(share, hn::Set(di, static_cast<std::int32_t>(FirstSite())));
+    const VI n = hn::Set(di, num_sites);
+    const auto is_past = hn::Gt(site, hn::Set(di, num_sites - 1));
+    return hn::GatherIndex(di, sites, hn::Sub(site, hn::IfThenElseZero(is_past, n)));
   }
 };
 
@@ -216,7 +263,7 @@ HWY_INLINE void StoreCandidates(const CandidateLanes& c, std::size_t at,
 
 HWY_INLINE SiteDeal LightSites(const kernels::CandidateSource& from) {
   return {from.sites.hit_sites.data(), from.sites.num_hits, from.counts.from_light,
-          uniform_float(from.random[3])};
+          uniform_float(from.random[3]), true};
 }
 
 /// use(candidates, i) for the candidates i, i + 1, ... from the presampled light.
@@ -251,7 +298,7 @@ struct BsdfRun {
     const bool lobes = counts.lobe_only;
     return {lobes ? sites.lobe_sites.data() : sites.hit_sites.data(),
             lobes ? sites.num_lobes : sites.num_hits, counts.from_bsdf,
-            uniform_float(random[3] * 0x9E3779B9u)};
+            uniform_float(random[3] * 0x9E3779B9u), false};
   }
   /// texels = locate(surface, i, code) for the directions i, i + 1, ..., some vectors ahead of
   /// use(surface, i, code, texels).

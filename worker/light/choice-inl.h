@@ -10,6 +10,7 @@
 #include <hwy/highway.h>
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 
 #include "common/base/poison.h"
@@ -34,29 +35,40 @@ HWY_INLINE void WeighDiffuse(const kernels::CandidateSource& from, Line& line) {
   const VF scale = hn::Set(d, kInvPi / 3.0f * static_cast<float>(sites.num_hits) /
                                   static_cast<float>(sites.num_sites * counts.from_light));
   const auto count = static_cast<std::size_t>(counts.from_light);
-  deal.ForEachRun(sites, [&](const SurfaceLanes& s, std::size_t first, std::size_t last) HWY_ATTR {
-    const Vec3Lanes ns = s.ns, ng = s.ng, kd = Scale(s.kd, scale);
-    Line adding = line;
-    if constexpr (Line::kHasColors) SetZero(adding.colors);
-    for (std::size_t v = first; v < last; ++v) {
-      const std::size_t i = v * hn::Lanes(d);
-      const LightLanes light = run.Load(i);
-      const VF cosine = Dot(ns, light.direction);
-      const VF above = hn::Min(cosine, Dot(ng, light.direction));  // its sign alone counts
-      MF live = hn::Gt(above, hn::Zero(d));
-      if (i + hn::Lanes(d) > count) live = hn::And(live, hn::FirstN(d, count - i));
-      const VF each = hn::IfThenElseZero(live, hn::Mul(cosine, run.LoadInverse(i)));
-      const auto add_color = [&](VF share, Vec3Lanes& sum) HWY_ATTR {
-        sum = AddScaled({light.now.r, light.now.g, light.now.b}, hn::Mul(each, share), sum);
-      };
-      const VF reflected = Dot(kd, {light.now.r, light.now.g, light.now.b});
-      adding.Add(light.code, hn::Mul(each, reflected), add_color);
-    }
-    if constexpr (Line::kHasColors) {
-      adding.colors = AddProduct(Scale(kd, hn::Set(d, 3.0f)), adding.colors, line.colors);
-    }
-    line = adding;
-  });
+  Line adding = line;
+  Vec3Lanes colors;
+  SetZero(colors);
+  // What diffuse surfaces need; a site has a block of eight at a time.
+  const auto read = [&](VI /*site*/, const auto& field) HWY_ATTR {
+    return std::array<Vec3Lanes, 3>{{{field(sites.ns_x), field(sites.ns_y), field(sites.ns_z)},
+                                     {field(sites.ng_x), field(sites.ng_y), field(sites.ng_z)},
+                                     {field(sites.kd_r), field(sites.kd_g), field(sites.kd_b)}}};
+  };
+  deal.ForEachRunOf(
+      sites, read,
+      [&](const std::array<Vec3Lanes, 3>& surface, std::size_t first, std::size_t last) HWY_ATTR {
+        const Vec3Lanes ns = surface[0], ng = surface[1], kd = Scale(surface[2], scale);
+        if constexpr (Line::kHasColors) SetZero(adding.colors);
+        for (std::size_t v = first; v < last; ++v) {
+          const std::size_t i = v * hn::Lanes(d);
+          const LightLanes light = run.Load(i);
+          const VF cosine = Dot(ns, light.direction);
+          const VF above = hn::Min(cosine, Dot(ng, light.direction));  // its sign alone counts
+          MF live = hn::Gt(above, hn::Zero(d));
+          if (i + hn::Lanes(d) > count) live = hn::And(live, hn::FirstN(d, count - i));
+          const VF each = hn::IfThenElseZero(live, hn::Mul(cosine, run.LoadInverse(i)));
+          const auto add_color = [&](VF share, Vec3Lanes& sum) HWY_ATTR {
+            sum = AddScaled({light.now.r, light.now.g, light.now.b}, hn::Mul(each, share), sum);
+          };
+          const VF reflected = Dot(kd, {light.now.r, light.now.g, light.now.b});
+          adding.Add(light.code, hn::Mul(each, reflected), add_color);
+        }
+        if constexpr (Line::kHasColors) {
+          colors = AddProduct(Scale(kd, hn::Set(d, 3.0f)), adding.colors, colors);
+        }
+      });
+  if constexpr (Line::kHasColors) adding.colors = Add(line.colors, colors);
+  line = adding;
 }
 
 /// Weighs all candidates of a pixel; those from the BRDF are kept. line: as for WeighDiffuse, and

@@ -53,8 +53,9 @@ LightSequence::LightSequence(const JobSpec& job, std::shared_ptr<MapCache> maps)
           limits::kMaxEnvironmentCacheBytes,
           [](const EnvironmentMap& map) { return map.size_bytes(); }, frames_in_hand(job)),
       presampled_(
-          limits::kMaxEnvironmentCacheBytes,
-          [](const PresampledLight& light) { return light.size_bytes(); }, frames_in_hand(job)) {}
+          limits::kMaxPresampledCacheBytes,
+          [](const PresampledLight& light) { return light.size_bytes(); },
+          frames_in_hand(job) * static_cast<std::size_t>(job.quality.rounds)) {}
 
 Result<std::shared_ptr<const EnvironmentMap>> LightSequence::key_map(std::int32_t key) {
   const std::string& path = job_.environment.keys[static_cast<std::size_t>(key)].map;
@@ -96,22 +97,25 @@ Result<Environment> LightSequence::environment(const EnvironmentFrame& frame) {
   return Environment{std::move(map), frame.rotation};
 }
 
-Result<std::shared_ptr<const FrameLight>> LightSequence::at(std::int32_t index) {
+Result<std::shared_ptr<const FrameLight>> LightSequence::at(std::int32_t index,
+                                                            std::int32_t round) {
   const std::lock_guard lock(mutex_);
   const FrameSpec& frame = frames_[static_cast<std::size_t>(index)];
-  const FrameSpec& frame_before = frames_[static_cast<std::size_t>(std::max(index - 1, 0))];
+  const FrameSpec& frame_before =
+      frames_[static_cast<std::size_t>(round == 0 ? std::max(index - 1, 0) : index)];
   auto light = std::make_shared<FrameLight>();
   BATON_ASSIGN(light->now, environment(frame.environment));
   BATON_ASSIGN(light->before, environment(frame_before.environment));
-  light->still = frame.environment == frame_before.environment;
+  light->still = round == 0 && frame.environment == frame_before.environment;
   if (frame.environment.same_texels(frame_before.environment))
     light->turn = turn_between(light->before, light->now);
-  light->presampled = presampled_.find(index);
+  light->presampled = presampled_.find({index, round});
   if (light->presampled == nullptr) {
     light->presampled = presampled_.insert(
-        index, std::make_shared<const PresampledLight>(presample_light(
-                   light->now, light->before, job_.seed, static_cast<std::uint32_t>(frame.number),
-                   presampled_layout(job_))));
+        {index, round},
+        std::make_shared<const PresampledLight>(presample_light(
+            light->now, light->before, job_.seed, static_cast<std::uint32_t>(frame.number),
+            presampled_layout(job_), round)));
   }
   return std::shared_ptr<const FrameLight>(std::move(light));
 }

@@ -15,11 +15,14 @@
 
 namespace baton {
 
-/// The light of one frame, ready for its pixels.
+/// The light of one round of a frame, ready for its pixels.
 struct FrameLight {
   Environment now;
-  Environment before;  ///< the frame before; for the first frame the same as now
-  bool still = false;  ///< now shows what before showed: the same texels, turned alike
+  /// The frame before; for the first frame, and for its later rounds, the same as now.
+  Environment before;
+  /// now shows what before showed: the same texels, turned alike. Not in later rounds: they must
+  /// not repeat the first one.
+  bool still = false;
   /// How directions turn with the light from the frame before to now, if that is all that it does;
   /// see turn_between()
   std::optional<Mat3> turn;
@@ -34,16 +37,16 @@ std::optional<Mat3> turn_between(const Environment& before, const Environment& n
 
 /// The environments of a job's frames, prepared on demand. What is made for a frame is kept while
 /// memory allows, of as many frames as tasks in hand may ask for. Any number of threads may ask; a
-/// frame is prepared once while the others wait. A frame's light is a pure function of (job,
-/// frame).
+/// frame is prepared once while the others wait. A frame's light is a pure function of (job, frame,
+/// round).
 class LightSequence {
  public:
   /// job must outlive the object. maps: may be shared with other jobs.
   LightSequence(const JobSpec& job, std::shared_ptr<MapCache> maps);
 
-  /// The light of frame `index` (0-based). Errors: a map that cannot be read, or two key frames of
-  /// different size.
-  Result<std::shared_ptr<const FrameLight>> at(std::int32_t index);
+  /// The light of frame `index` (0-based) in a round; negative: before those that are seen. Errors:
+  /// a map that cannot be read, or two key frames of different size.
+  Result<std::shared_ptr<const FrameLight>> at(std::int32_t index, std::int32_t round = 0);
 
   /// Texels set to 0 because they were negative, NaN or infinite, per map read so far: "path: 12
   /// negative ...".
@@ -60,7 +63,7 @@ class LightSequence {
   mutable std::mutex mutex_;
   /// By the first frame index that shows these texels.
   LruCache<std::int32_t, EnvironmentMap> mixed_maps_;
-  LruCache<std::int32_t, PresampledLight> presampled_;
+  LruCache<std::pair<std::int32_t, std::int32_t>, PresampledLight> presampled_;  ///< frame, round
   std::vector<std::string> repair_notes_;
 };
 

@@ -65,10 +65,14 @@ float mean_radiance(std::span<const PresampledLight::Block> blocks) {
 
 PresampledLight presample_light(const Environment& now, const Environment& before,
                                 std::uint64_t job_seed, std::uint32_t frame,
-                                const PresampledLightLayout& layout) {
+                                const PresampledLightLayout& layout, std::int32_t round) {
   PresampledLight presampled;
   if (now.map->black()) return presampled;
-  const Rng rng({.job_seed = job_seed, .frame = frame, .pixel = 0}, PassId::presampled_light);
+  const Rng rng({.job_seed = job_seed,
+                 .frame = frame,
+                 .pixel = 0,
+                 .round = static_cast<std::uint32_t>(round)},
+                PassId::presampled_light);
 
   // Draw the directions, run by run.
   const EnvironmentView now_view = view_of(now);

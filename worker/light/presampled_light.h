@@ -63,9 +63,9 @@ struct PresampledLightLayout {
 };
 
 /// The presampled light of one frame. before: the environment of the frame before (the same as
-/// `now` for the first frame).
+/// `now` for the first frame). round: each has other directions.
 PresampledLight presample_light(const Environment& now, const Environment& before,
                                 std::uint64_t job_seed, std::uint32_t frame,
-                                const PresampledLightLayout& layout = {});
+                                const PresampledLightLayout& layout = {}, std::int32_t round = 0);
 
 }  // namespace baton

@@ -87,7 +87,7 @@ void FilmWriter::write(std::size_t index, const PixelResult& pixel) {
         put(pixel.acceptance);
         break;
       case Aov::source:
-        put_vec(source_color(pixel.source));
+        put_vec(pixel.source_color);
         break;
       case Aov::normal:
         put_vec(pixel.normal);
@@ -108,7 +108,7 @@ void FilmWriter::write(std::size_t index, const PixelResult& pixel) {
         put(pixel.acceptance_independent);
         break;
       case Aov::resampled:
-        put(pixel.resampled ? 1.0f : 0.0f);
+        put(pixel.resampled);
         break;
       case Aov::material:
         put(static_cast<float>(pixel.material));

@@ -11,19 +11,21 @@ namespace baton {
 
 /// All that is known of a finished pixel.
 struct PixelResult {
-  Rgb radiance;     ///< reflected and background light, mean over the sites
-  float alpha = 0;  ///< share of the sites that see a surface
+  Rgb radiance;        ///< reflected and background light, mean over the sites
+  float coverage = 0;  ///< share of the sites that see a surface
+  float alpha = 0;     ///< the same, or 1 where the background is shown
   float lns = 0;
   float visibility = 0;  ///< share of the weight whose rays are free
   float ess_ratio = 0;   ///< ESS / N
   float acceptance = 0;  ///< accepted moves / proposed moves
   float acceptance_local = 0,
         acceptance_independent = 0;  ///< the same by kind of move, 0 without any
-  bool resampled = false;
+  float resampled = 0;               ///< 1 where it was
   PixelSource source = PixelSource::background;
-  Vec3 normal;        ///< unit: mean shading normal of the sites that see a surface; else 0
-  float depth = 0;    ///< mean distance of the sites that see a surface
-  float mask = 0.5f;  ///< 1 all rays free, 0 some failed, 0.5 background [CV Fig. 2]
+  Rgb source_color{};  ///< of `source`
+  Vec3 normal{};       ///< unit: mean shading normal of the sites that see a surface; else 0
+  float depth = 0;     ///< mean distance of the sites that see a surface
+  float mask = 0.5f;   ///< 1 all rays free, 0 some failed, 0.5 background [CV Fig. 2]
   std::uint32_t material =
       0;  ///< of the first site that sees a surface: index in the scene + 1; 0: none
   float variance =

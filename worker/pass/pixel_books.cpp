@@ -21,7 +21,7 @@ void record_geometry(std::span<const SurfaceHit> hits, PixelResult& pixel) {
     pixel.depth += hit.depth;
   }
   if (num_hits == 0) return;
-  pixel.alpha = num_hits / static_cast<float>(hits.size());
+  pixel.coverage = num_hits / static_cast<float>(hits.size());
   if (num_hits > 1) pixel.normal = normalize(pixel.normal);
   pixel.depth /= num_hits;
 }
@@ -32,7 +32,7 @@ void record_sampling(const PixelDiagnostics& did, PixelResult& pixel, SamplingSt
                                       did.local.accepted + did.independent.accepted});
   pixel.acceptance_local = acceptance_rate(did.local);
   pixel.acceptance_independent = acceptance_rate(did.independent);
-  pixel.resampled = did.resampled;
+  pixel.resampled = did.resampled ? 1.0f : 0.0f;
 
   stats.pixels_fresh += pixel.source == PixelSource::fresh ? 1 : 0;
   stats.pixels_carried += pixel.source == PixelSource::carried ? 1 : 0;

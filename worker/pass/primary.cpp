@@ -4,7 +4,10 @@
 #include <array>
 #include <cmath>
 
+#include "common/job/sequence.h"
+#include "common/math/low_discrepancy.h"
 #include "worker/light/candidates.h"
+#include "worker/scene/pixel_filter.h"
 #include "worker/scene/scene_kernels.h"
 
 namespace baton {
@@ -19,14 +22,14 @@ std::array<float, 2> site_position(std::int32_t site, std::int32_t side, float u
 
 }  // namespace
 
-TileSurfaces trace_primary(const JobSpec& job, const FrameGeometry& geometry,
-                           const PixelRect& rect) {
+TileSurfaces trace_primary(const JobSpec& job, const FrameGeometry& geometry, const PixelRect& rect,
+                           std::int32_t round) {
   TileSurfaces surfaces{
       .rect = rect, .num_sites = job.image.sites, .hits = {}, .rays = {}, .first_site = {}};
   surfaces.rays.reserve(static_cast<std::size_t>(rect.area() * job.image.sites));
   for (std::int32_t y = rect.y0; y < rect.y1; ++y) {
     for (std::int32_t x = rect.x0; x < rect.x1; ++x) {
-      append_primary_rays(job, geometry, x, y, surfaces.rays);
+      append_primary_rays(job, geometry, x, y, surfaces.rays, round);
     }
   }
   surfaces.hits.resize(surfaces.rays.size());
@@ -41,20 +44,25 @@ TileSurfaces trace_primary(const JobSpec& job, const FrameGeometry& geometry,
 }
 
 void append_primary_rays(const JobSpec& job, const FrameGeometry& geometry, std::int32_t x,
-                         std::int32_t y, std::vector<Ray>& rays) {
+                         std::int32_t y, std::vector<Ray>& rays, std::int32_t round) {
   const auto add = [&](const std::array<float, 2>& position) {
     rays.push_back(geometry.pose.camera.ray(static_cast<float>(x) + position[0],
                                             static_cast<float>(y) + position[1]));
   };
-  if (job.image.sites == 1) return add({0.5f, 0.5f});
+  const bool own_sites = rounds_have_own_sites(job);
+  const bool lone = job.image.sites == 1 && (job.quality.rounds == 1 || !own_sites);
+  if (lone && job.image.filter == PixelFilter::box) return add({0.5f, 0.5f});
   const auto side = static_cast<std::int32_t>(std::sqrt(static_cast<float>(job.image.sites)));
   const std::uint64_t seed = job.image.site_seed > 0 ? job.image.site_seed : job.seed;
   const Rng rng(pixel_key(seed, 0, job.image.width, x, y), PassId::site_position);
-  std::array<float, 4> u{};  // of two sites
+  const auto shift = sobol_2d(own_sites && round > 0 ? static_cast<std::uint32_t>(round) : 0);
+  Philox4x32::Counter bits{};  // of two sites
   for (std::int32_t site = 0; site < job.image.sites; ++site) {
-    if (site % 2 == 0) u = rng.uniforms(0, static_cast<std::uint32_t>(site / 2));
+    if (site % 2 == 0) bits = rng.bits(0, static_cast<std::uint32_t>(site / 2));
     const auto k = static_cast<std::size_t>(site % 2 * 2);
-    add(site_position(site, side, u[k], u[k + 1]));
+    add(filter_position(job.image.filter,
+                        site_position(site, side, uniform_float(bits[k] ^ shift[0]),
+                                      uniform_float(bits[k + 1] ^ shift[1]))));
   }
 }
 

@@ -43,15 +43,17 @@ class SurfaceCache : public LruCache<std::pair<std::int32_t, std::int32_t>, Tile
       : LruCache(max_bytes, [](const TileSurfaces& surfaces) { return surfaces.size_bytes(); }) {}
 };
 
-/// Pass 1: one primary ray for each site of each pixel. S = 1 shoots through the pixel's centre,
-/// else the sites are jittered on a sqrt(S) x sqrt(S) grid; the same for all frames.
-TileSurfaces trace_primary(const JobSpec& job, const FrameGeometry& geometry,
-                           const PixelRect& rect);
+/// Pass 1: one primary ray for each site of each pixel. A single site of a single round shoots
+/// through the pixel's centre, if the filter is the box; else sites are jittered on a sqrt(S) x
+/// sqrt(S) grid over image.filter, in each round anew (rounds_have_own_sites): those of a cell are
+/// points of a low-discrepancy sequence. The same for all frames.
+TileSurfaces trace_primary(const JobSpec& job, const FrameGeometry& geometry, const PixelRect& rect,
+                           std::int32_t round = 0);
 
 /// The same for pixels one by one: appends the rays of the sites of pixel (x, y). Hits are the same
 /// as of a whole tile.
 void append_primary_rays(const JobSpec& job, const FrameGeometry& geometry, std::int32_t x,
-                         std::int32_t y, std::vector<Ray>& rays);
+                         std::int32_t y, std::vector<Ray>& rays, std::int32_t round = 0);
 void trace_primary_rays(const JobSpec& job, const FrameGeometry& geometry,
                         std::span<const Ray> rays, std::span<SurfaceHit> hits);
 

@@ -66,8 +66,16 @@ std::optional<Reprojection::Position> Reprojection::find_source(std::span<const 
 
   const Vec3 point =
       carry_point(instance, before_.pose.instances[hit->instance], hit->point.position);
-  const auto projected = before_.pose.camera.project(point);
+  auto projected = before_.pose.camera.project(point);
   if (!projected) return std::nullopt;
+  // Sites of wide filters lie around the pixel: it moves as its hit does.
+  if (context_.job.image.filter != PixelFilter::box) {
+    const auto now = now_.pose.camera.project(hit->point.position);
+    if (!now) return std::nullopt;
+    const std::array<float, 4> u = rng.uniforms(0, 1);
+    (*projected)[0] += static_cast<float>(pixel.x) + u[0] - (*now)[0];
+    (*projected)[1] += static_cast<float>(pixel.y) + u[1] - (*now)[1];
+  }
   const std::int32_t max_px = context_.job.motion.max_px;
   const auto reach = static_cast<float>(max_px) + 1;
   const float dx = (*projected)[0] - static_cast<float>(pixel.x);

@@ -27,7 +27,8 @@ struct TileFrameRenderer::Batch {
   std::size_t first = 0;
   std::size_t count = 0;
   std::int32_t frame_number = 0;
-  std::int32_t frame_index = 0;
+  std::int32_t round = 0;
+  std::int32_t step = 0;
   RayBatch rays;
   std::array<std::size_t, kBatchPixels> end_ray;  ///< where each pixel's rays end
   std::array<KnownLight, kBatchPixels> known;
@@ -37,45 +38,43 @@ struct TileFrameRenderer::Batch {
     const auto width = static_cast<std::size_t>(rect.width());
     const auto x = rect.x0 + static_cast<std::int32_t>(index % width);
     const auto y = rect.y0 + static_cast<std::int32_t>(index / width);
-    return pixel_key(context.job.seed, frame_number, context.job.image.width, x, y);
+    return pixel_key(context.job.seed, frame_number, context.job.image.width, x, y, round);
   }
 };
 
-TileFrameRenderer::TileFrameRenderer(const RenderContext& context, const FrameGeometry& geometry,
-                                     const TileSurfaces& surfaces)
+TileFrameRenderer::TileFrameRenderer(const RenderContext& context, const FrameGeometry& geometry)
     : context_(context),
       geometry_(geometry),
-      surfaces_(surfaces),
       scratch_(std::make_unique<SamplerScratch>()),
       collector_(context.job) {}
 
-FilmTile TileFrameRenderer::render(const FrameSpec& frame, const FrameLight& light,
-                                   bool has_history, SampleState& state) {
+void TileFrameRenderer::render(const TileRound& at, bool has_history, SampleState& state,
+                               RoundMean& film) {
   reprojection_ = nullptr;
   has_history_ = has_history;
-  return render_batches(frame, light, state);
+  render_batches(at, state, film);
 }
 
-FilmTile TileFrameRenderer::render(const FrameSpec& frame, const FrameLight& light,
-                                   Reprojection& history, SampleState& state) {
+void TileFrameRenderer::render(const TileRound& at, Reprojection& history, SampleState& state,
+                               RoundMean& film) {
   reprojection_ = &history;
+  has_history_ = false;
   const std::uint64_t rays_before = history.num_rays();
-  const FilmTile film = render_batches(frame, light, state);
+  render_batches(at, state, film);
   stats_.rays_primary += history.num_rays() - rays_before;
-  return film;
 }
 
-FilmTile TileFrameRenderer::render_batches(const FrameSpec& frame, const FrameLight& light,
-                                           SampleState& state) {
+void TileFrameRenderer::render_batches(const TileRound& at, SampleState& state, RoundMean& film) {
   const WorkClock clock;
   stages_ = {};
-  FilmWriter film(surfaces_.rect, film_aovs(context_.job));
+  surfaces_ = &at.surfaces;
   Batch batch;
-  batch.frame_number = frame.number;
-  batch.frame_index = frame.index;
-  frame_sampling_ = {};
+  batch.frame_number = at.frame.number;
+  batch.round = at.round;
+  batch.step = at.step(context_.job.quality.rounds);
+  round_sampling_ = {};
   const std::size_t num_pixels = state.num_pixels();
-  keep_targets(frame.index, num_pixels * static_cast<std::size_t>(state.num_particles));
+  keep_targets(num_pixels * static_cast<std::size_t>(state.num_particles));
   if (context_.job.visibility.correlated) collector_.begin(state);
   for (std::size_t first = 0; first < num_pixels; first += kBatchPixels) {
     batch.first = first;
@@ -83,36 +82,39 @@ FilmTile TileFrameRenderer::render_batches(const FrameSpec& frame, const FrameLi
     batch.pixels.fill({});
     if (reprojection_ != nullptr) {
       const StageTimer timer(stages_.reproject);
-      reprojection_->look_up(surfaces_, batch.first, batch.count, frame.number);
+      reprojection_->look_up(at.surfaces, batch.first, batch.count, at.frame.number);
     }
-    sample(batch, light, state);
+    sample(batch, at.light, state);
     trace(batch);
     learn(batch, state);
-    finish(batch, light, film);
+    finish(batch, at.light, film);
   }
-  state.frame_index = frame.index;
-  stats_.pixels += num_pixels;
-  stats_.sampling.merge(frame_sampling_);
+  state.frame_index = at.frame.index;
+  if (at.round == 0) {
+    stats_.pixels += num_pixels;
+    frame_sampling_ = {};
+  }
+  if (at.round >= 0) {
+    frame_sampling_.merge(round_sampling_);
+    stats_.sampling.merge(round_sampling_);
+  }
   const double share = clock.running_share();
   stats_.seconds_primary += share * stages_.reproject;
   stats_.seconds_sample += share * stages_.sample;
   stats_.seconds_visibility += share * stages_.visibility;
   stats_.seconds_shade += share * stages_.shade;
-  return film.film();
 }
 
-/// Makes room for the targets of the frame's samples, and says whether those of the frame before
-/// are there.
-void TileFrameRenderer::keep_targets(std::int32_t frame_index, std::size_t num_samples) {
-  knows_targets_ = has_history_ && reprojection_ == nullptr && targets_.size() == num_samples &&
-                   targets_frame_ + 1 == frame_index;
+/// Makes room for the targets of the round's samples, and says whether those of the one before are
+/// there.
+void TileFrameRenderer::keep_targets(std::size_t num_samples) {
+  knows_targets_ = has_history_ && reprojection_ == nullptr && targets_.size() == num_samples;
   targets_.resize(num_samples);
-  targets_frame_ = frame_index;
 }
 
 /// The setting of the material of the first surface, or the job's.
 const PixelMethod& TileFrameRenderer::method_of(std::size_t index) const {
-  const auto& own = context_.own_methods[surfaces_.first_surface(index).material];
+  const auto& own = context_.own_methods[surfaces_->first_surface(index).material];
   return own != nullptr ? *own : *context_.method;
 }
 
@@ -120,12 +122,13 @@ const PixelMethod& TileFrameRenderer::method_of(std::size_t index) const {
 /// they are not already, and the memory is asked for what evaluating them will read.
 void TileFrameRenderer::look_ahead(std::size_t pixel_of_batch, std::size_t index,
                                    const kernels::CarriedLight& light, SampleState& state) {
-  if (!surfaces_.sees_surface(index)) return;
+  if (!surfaces_->sees_surface(index)) return;
   Ahead& ahead = ahead_[index % 2];
   poison(ahead.located);
   poison(ahead.old);
   fetch_ahead(state.memory_of(index));
-  ahead.history = has_history_ ? PixelHistory::same : PixelHistory::none;
+  const bool was_seen = has_history_ && latest_source(state, index) != PixelSource::background;
+  ahead.history = was_seen ? PixelHistory::same : PixelHistory::none;
   if (reprojection_ != nullptr) {
     ahead.history = reprojection_->take(pixel_of_batch, index, state, ahead.old);
   }
@@ -151,14 +154,15 @@ void TileFrameRenderer::sample(Batch& batch, const FrameLight& light, SampleStat
     if (i + 1 < batch.count) look_ahead(i + 1, index + 1, carried, state);
 
     // Gather the pixel's surfaces.
-    if (!surfaces_.sees_surface(index)) {
-      set_background(state, index);
-      ++stats_.pixels_background;
+    if (!surfaces_->sees_surface(index)) {
+      // Other rounds, whose sites are elsewhere, may have seen something.
+      if (batch.round <= 0 && !has_history_) set_background(state, index);
+      if (batch.round == 0) ++stats_.pixels_background;
       batch.end_ray[i] = batch.rays.size();
       continue;
     }
     poison(sites);
-    context_.gather_sites(surfaces_.pixel(index), sites);
+    context_.gather_sites(surfaces_->pixel(index), sites);
 
     // Sample it.
     const Ahead& ahead = ahead_[index % 2];
@@ -167,8 +171,8 @@ void TileFrameRenderer::sample(Batch& batch, const FrameLight& light, SampleStat
         .light = light,
         .now = now,
         .before = before,
-        .key = batch.key(context_, surfaces_.rect, index),
-        .frame_index = batch.frame_index,
+        .key = batch.key(context_, surfaces_->rect, index),
+        .frame_index = batch.step,
         .has_history = ahead.history != PixelHistory::none,
         .target_before = knows_targets_ ? targets_of(index, state) : std::span<float>(),
         .old = ahead.history == PixelHistory::moved ? &ahead.old : nullptr,
@@ -177,7 +181,7 @@ void TileFrameRenderer::sample(Batch& batch, const FrameLight& light, SampleStat
         .target = targets_of(index, state),
         .neighbors =
             reprojection_ != nullptr ? reprojection_->neighbors(i) : std::span<const CarriedSet>(),
-        .hits = surfaces_.pixel(index),
+        .hits = surfaces_->pixel(index),
         .accel = geometry_.accel.get()};
     const SiteOrigins from = origins(index);
     RayWriter rays(from, batch.rays);
@@ -190,7 +194,8 @@ void TileFrameRenderer::sample(Batch& batch, const FrameLight& light, SampleStat
     PixelResult& pixel = batch.pixels[i];
     pixel.lns = mean_lns(state, index);
     pixel.source = latest_source(state, index);
-    record_sampling(did, pixel, frame_sampling_);
+    pixel.source_color = source_color(pixel.source);
+    record_sampling(did, pixel, round_sampling_);
     stats_.target_evaluations += static_cast<std::uint64_t>(did.target_evaluations);
     stats_.rays_shadow += did.rays_traced;
   }
@@ -198,8 +203,8 @@ void TileFrameRenderer::sample(Batch& batch, const FrameLight& light, SampleStat
 
 /// Where the shadow rays of a pixel's sites start.
 SiteOrigins TileFrameRenderer::origins(std::size_t index) const {
-  const std::span<const SurfaceHit> hits = surfaces_.pixel(index);
-  SiteOrigins origins{.num_sites = surfaces_.num_sites};
+  const std::span<const SurfaceHit> hits = surfaces_->pixel(index);
+  SiteOrigins origins{.num_sites = surfaces_->num_sites};
   for (std::size_t s = 0; s < hits.size(); ++s) {
     if (hits[s].hit) origins.set(s, hits[s].ray_origin);
   }
@@ -220,7 +225,7 @@ void TileFrameRenderer::learn(Batch& batch, SampleState& state) {
   std::size_t first = 0;
   for (std::size_t i = 0; i < batch.count; ++i) {
     const std::size_t index = batch.first + i, end = batch.end_ray[i], count = end - first;
-    if (!surfaces_.sees_surface(index)) continue;
+    if (!surfaces_->sees_surface(index)) continue;
     const KnownLight& known = batch.known[i];
     const FreeLight found = sum_free(batch.rays, first, end);
     PixelResult& pixel = batch.pixels[i];
@@ -251,24 +256,24 @@ void TileFrameRenderer::collect(const FoundRays& found, std::size_t index,
     collector_.add_ray(state, first + found.sample[i], !found.free(i));
 }
 
-/// Pass: adds what is not sampled and writes the film.
-void TileFrameRenderer::finish(Batch& batch, const FrameLight& light, FilmWriter& film) {
+/// Pass: adds what is not sampled and hands the pixels on.
+void TileFrameRenderer::finish(Batch& batch, const FrameLight& light, RoundMean& film) {
   const StageTimer timer(stages_.shade);
   const bool show_environment = context_.job.output.background == Background::environment;
   std::array<Rgb, kBatchPixels> background{};
   if (show_environment) {
-    const auto num_sites = static_cast<std::size_t>(surfaces_.num_sites);
+    const auto num_sites = static_cast<std::size_t>(surfaces_->num_sites);
     add_environment_behind(
-        std::span(surfaces_.hits).subspan(batch.first * num_sites, batch.count * num_sites),
-        std::span(surfaces_.rays).subspan(batch.first * num_sites, batch.count * num_sites),
-        surfaces_.num_sites, view_of(light.now), background);
+        std::span(surfaces_->hits).subspan(batch.first * num_sites, batch.count * num_sites),
+        std::span(surfaces_->rays).subspan(batch.first * num_sites, batch.count * num_sites),
+        surfaces_->num_sites, view_of(light.now), background);
   }
   for (std::size_t i = 0; i < batch.count; ++i) {
     PixelResult& pixel = batch.pixels[i];
-    record_geometry(surfaces_.pixel(batch.first + i), pixel);
+    record_geometry(surfaces_->pixel(batch.first + i), pixel);
     pixel.radiance += background[i];
-    if (show_environment) pixel.alpha = 1;
-    film.write(batch.first + i, pixel);
+    pixel.alpha = show_environment ? 1 : pixel.coverage;
+    film.add(batch.first + i, pixel);
   }
 }
 

@@ -7,29 +7,37 @@
 #include "common/job/task.h"
 #include "worker/light/carried_light.h"
 #include "worker/method/pixel_method.h"
-#include "worker/pass/film_writer.h"
 #include "worker/pass/first_pass_collector.h"
 #include "worker/pass/primary.h"
 #include "worker/pass/reproject.h"
+#include "worker/pass/round_mean.h"
 
 namespace baton {
 
-/// Renders one frame of one tile: look ahead, sample, trace, learn, film, a batch of pixels at a
-/// time so that a batch stays in the cache. What the method does is its own affair (PixelMethod).
+/// One pass over a tile.
+struct TileRound {
+  const FrameSpec& frame;
+  std::int32_t round = 0;  ///< of the frame; negative: before those that are seen
+  const FrameLight& light;
+  const TileSurfaces& surfaces;  ///< what its sites see
+
+  /// Number of the pass in the sequence: to a method a round is a frame of standing light.
+  std::int32_t step(std::int32_t num_rounds) const { return frame.index * num_rounds + round; }
+};
+
+/// Renders a round of one tile: look ahead, sample, trace, learn, film, a batch of pixels at a time
+/// so that a batch stays in the cache. What the method does is its own affair (PixelMethod).
 class TileFrameRenderer {
  public:
-  /// geometry and surfaces: of the frames that are rendered; must outlive the object.
-  TileFrameRenderer(const RenderContext& context, const FrameGeometry& geometry,
-                    const TileSurfaces& surfaces);
+  /// geometry: of the frames that are rendered; must outlive the object.
+  TileFrameRenderer(const RenderContext& context, const FrameGeometry& geometry);
 
-  /// Where surfaces stay. state: the samples of the previous frame when has_history, else only its
-  /// sizes matter; becomes this frame's.
-  FilmTile render(const FrameSpec& frame, const FrameLight& light, bool has_history,
-                  SampleState& state);
-  /// Where they move: the samples of the previous frame come from `history`. state: sized, all
-  /// zero.
-  FilmTile render(const FrameSpec& frame, const FrameLight& light, Reprojection& history,
-                  SampleState& state);
+  /// Where a pixel stays where it was. state: what the previous round or frame left when
+  /// has_history, else only its sizes matter; becomes this round's. film: takes the pixels.
+  void render(const TileRound& at, bool has_history, SampleState& state, RoundMean& film);
+  /// The first round where surfaces move: what the previous frame left comes from `history`. state:
+  /// sized, all zero.
+  void render(const TileRound& at, Reprojection& history, SampleState& state, RoundMean& film);
 
   /// What the second pass needs of the frame that was rendered last; once, and only if the job has
   /// a second pass.
@@ -38,7 +46,7 @@ class TileFrameRenderer {
   }
 
   const RenderStats& stats() const { return stats_; }
-  /// Of the frame that was rendered last.
+  /// Of the frame that was rendered last, over its rounds.
   const SamplingStats& frame_sampling() const { return frame_sampling_; }
 
  private:
@@ -51,13 +59,13 @@ class TileFrameRenderer {
     LocatedPopulations located;
     bool is_located = false;
   };
-  /// Wall seconds of the frame in work.
+  /// Wall seconds of the round in work.
   struct Stages {
     double reproject = 0, sample = 0, visibility = 0, shade = 0;
   };
 
-  FilmTile render_batches(const FrameSpec& frame, const FrameLight& light, SampleState& state);
-  void keep_targets(std::int32_t frame_index, std::size_t num_samples);
+  void render_batches(const TileRound& at, SampleState& state, RoundMean& film);
+  void keep_targets(std::size_t num_samples);
   std::span<float> targets_of(std::size_t index, const SampleState& state) {
     const auto n = static_cast<std::size_t>(state.num_particles);
     return std::span(targets_).subspan(index * n, n);
@@ -70,24 +78,23 @@ class TileFrameRenderer {
   void trace(Batch& batch);
   void learn(Batch& batch, SampleState& state);
   void collect(const FoundRays& found, std::size_t index, const SampleState& state);
-  void finish(Batch& batch, const FrameLight& light, FilmWriter& film);
+  void finish(Batch& batch, const FrameLight& light, RoundMean& film);
 
   const RenderContext& context_;
   const FrameGeometry& geometry_;
-  const TileSurfaces& surfaces_;
-  Reprojection* reprojection_ = nullptr;  ///< of the frame in work; null where surfaces stay
-  bool has_history_ = false;              ///< of the frame in work, where surfaces stay
-  std::array<Ahead, 2> ahead_;            ///< of odd and even pixels
-  /// (pixels, N) p~ at the samples of frame targets_frame_: where surfaces stay, the next frame
-  /// need not evaluate it again.
+  const TileSurfaces* surfaces_ = nullptr;  ///< of the round in work
+  Reprojection* reprojection_ = nullptr;    ///< of the round in work; null where pixels stay
+  bool has_history_ = false;                ///< of the round in work, where pixels stay
+  std::array<Ahead, 2> ahead_;              ///< of odd and even pixels
+  /// (pixels, N) p~ at the samples of the round before: where samples and surfaces stay, it need
+  /// not be evaluated again.
   std::vector<float> targets_;
-  std::int32_t targets_frame_ = 0;
-  bool knows_targets_ = false;  ///< targets_ are those of the frame before the one in work
+  bool knows_targets_ = false;  ///< for the round in work
   std::unique_ptr<SamplerScratch> scratch_;
   FirstPassCollector collector_;
   RenderStats stats_;
   Stages stages_;
-  SamplingStats frame_sampling_;
+  SamplingStats round_sampling_, frame_sampling_;
 };
 
 }  // namespace baton

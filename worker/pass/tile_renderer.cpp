@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <map>
+#include <optional>
 #include <utility>
 
 #include "common/job/motion.h"
@@ -49,47 +51,50 @@ Status check_previous(const RenderContext& context, const TileRun& run,
   return {};
 }
 
-/// A tile on its way through its frames.
+/// A tile on its way through its frames, round by round.
 class TileWalk {
  public:
-  TileWalk(const RenderContext& context, const TileRun& run)
-      : context_(context), rect_(context.grid.rect(run.tile)) {
+  TileWalk(const RenderContext& context, const TileRun& run, std::stop_token stop)
+      : context_(context),
+        rect_(context.grid.rect(run.tile)),
+        shares_(shares_history(context.job)),
+        keeps_surfaces_(!shares_ && run.first_frame < run.last_frame),
+        stop_(std::move(stop)) {
     start_state();
     state_.picture = context.picture;
     state_.tile = run.tile;
   }
 
-  /// Where surfaces stay: the tile's own samples go on.
+  /// Where surfaces stay: what the tile itself left goes on.
   void go_on_from(const SampleState& previous) {
     state_ = previous;
     has_history_ = true;
   }
 
-  /// Renders the next frame with the surfaces of all frames.
-  Result<FilmTile> render_still(const FrameSpec& frame) {
-    BATON_ASSIGN(const std::shared_ptr<const FrameLight> light, light_of(frame));
-    if (renderer_ == nullptr) {
-      BATON_ASSIGN(geometry_, context_.geometry->at(frame.index));
-      renderer_ = std::make_unique<TileFrameRenderer>(context_, *geometry_, trace(*geometry_));
+  /// Renders the next frame. previous: where surfaces move, the states of all tiles that its
+  /// history may come from, or none.
+  Result<FilmTile> render(const FrameSpec& frame, std::span<const StatePtr> previous) {
+    BATON_TRY(prepare(frame));
+    RoundMean film(context_.job, rect_);
+    const std::int32_t first = frame.index == 0 ? -num_preroll_rounds(context_.job) : 0;
+    std::optional<RoundMean> unseen;
+    if (first < 0) unseen.emplace(context_.job, rect_);
+    for (std::int32_t round = first; round < context_.job.quality.rounds; ++round) {
+      if (stop_.stop_requested()) return Error{ErrorKind::cancelled, "stopped"};
+      BATON_ASSIGN(const std::shared_ptr<const FrameLight> light, light_of(frame, round));
+      const std::shared_ptr<const TileSurfaces> surfaces = surfaces_of(round);
+      const TileRound at{frame, round, *light, *surfaces};
+      RoundMean& mean = round < 0 ? *unseen : film;
+      if (shares_ && round == first) {
+        context_.surfaces->insert({frame.index, state_.tile}, surfaces);
+        Reprojection history(context_, *geometry_, *before_, previous);
+        renderer_->render(at, history, state_, mean);
+      } else {
+        renderer_->render(at, has_history_, state_, mean);
+      }
+      has_history_ = carries_state(context_.job);
     }
-    FilmTile film = renderer_->render(frame, *light, has_history_, state_);
-    has_history_ = carries_state(context_.job);
-    return film;
-  }
-
-  /// Renders one frame with surfaces of its own, its history taken from `previous`: the states of
-  /// all tiles that it may come from, or none.
-  Result<FilmTile> render_sharing(const FrameSpec& frame, std::span<const StatePtr> previous) {
-    BATON_ASSIGN(const std::shared_ptr<const FrameLight> light, light_of(frame));
-    BATON_ASSIGN(geometry_, context_.geometry->at(frame.index));
-    BATON_ASSIGN(const std::shared_ptr<const FrameGeometry> before,
-                 context_.geometry->at(std::max(frame.index - 1, 0)));
-    start_state();
-    if (renderer_ != nullptr) stats_.merge(renderer_->stats());
-    renderer_ = std::make_unique<TileFrameRenderer>(context_, *geometry_, trace(*geometry_));
-    context_.surfaces->insert({frame.index, state_.tile}, surfaces_);
-    Reprojection history(context_, *geometry_, *before, previous);
-    return renderer_->render(frame, *light, history, state_);
+    return film.finish();
   }
 
   /// At the end of the walk.
@@ -114,24 +119,47 @@ class TileWalk {
     if (carried == Carried::memory) state_.add_memory();
     if (carried == Carried::weighed_samples) state_.add_confidence();
   }
-  Result<std::shared_ptr<const FrameLight>> light_of(const FrameSpec& frame) {
-    const CpuTimer timer(stats_.seconds_light);
-    return context_.lights->at(frame.index);
+  /// Where surfaces move, a frame has a geometry, surfaces and a state of its own.
+  Status prepare(const FrameSpec& frame) {
+    if (renderer_ != nullptr && !shares_) return {};
+    BATON_ASSIGN(geometry_, context_.geometry->at(frame.index));
+    if (shares_) {
+      BATON_ASSIGN(before_, context_.geometry->at(std::max(frame.index - 1, 0)));
+      start_state();
+      if (renderer_ != nullptr) stats_.merge(renderer_->stats());
+    }
+    kept_.clear();
+    renderer_ = std::make_unique<TileFrameRenderer>(context_, *geometry_);
+    return {};
   }
-  const TileSurfaces& trace(const FrameGeometry& geometry) {
+  Result<std::shared_ptr<const FrameLight>> light_of(const FrameSpec& frame, std::int32_t round) {
+    const CpuTimer timer(stats_.seconds_light);
+    return context_.lights->at(frame.index, round);
+  }
+  /// What the sites of a round see: traced, or kept from a frame before.
+  std::shared_ptr<const TileSurfaces> surfaces_of(std::int32_t round) {
+    const std::int32_t of = rounds_have_own_sites(context_.job) ? std::max(round, 0) : 0;
+    if (const auto found = kept_.find(of); found != kept_.end()) return found->second;
     const CpuTimer timer(stats_.seconds_primary);
-    surfaces_ = std::make_shared<const TileSurfaces>(trace_primary(context_.job, geometry, rect_));
-    stats_.rays_primary += surfaces_->rays.size();
-    return *surfaces_;
+    auto surfaces =
+        std::make_shared<const TileSurfaces>(trace_primary(context_.job, *geometry_, rect_, of));
+    stats_.rays_primary += surfaces->rays.size();
+    const bool has_room =
+        (kept_.size() + 1) * surfaces->size_bytes() <= limits::kMaxRoundSurfaceBytes;
+    if (of == 0 || (keeps_surfaces_ && has_room)) kept_.emplace(of, surfaces);
+    return surfaces;
   }
 
   const RenderContext& context_;
   const PixelRect rect_;
+  const bool shares_;  ///< pixels take history from others
+  const bool keeps_surfaces_;
+  const std::stop_token stop_;
   SampleState state_;
   bool has_history_ = false;
-  std::shared_ptr<const FrameGeometry> geometry_;
-  std::shared_ptr<const TileSurfaces> surfaces_;
-  std::unique_ptr<TileFrameRenderer> renderer_;  ///< of the frame that was rendered last
+  std::shared_ptr<const FrameGeometry> geometry_, before_;
+  std::map<std::int32_t, std::shared_ptr<const TileSurfaces>> kept_;  ///< by round
+  std::unique_ptr<TileFrameRenderer> renderer_;
   RenderStats stats_;
 };
 
@@ -143,15 +171,14 @@ Result<RenderStats> run_tile(const RenderContext& context, const TileRun& run,
   const double start = thread_cpu_seconds();
   BATON_TRY(check_previous(context, run, previous));
   const bool shares = shares_history(context.job);
-  TileWalk walk(context, run);
+  TileWalk walk(context, run, stop);
   if (!shares && !previous.empty()) walk.go_on_from(*previous.front());
 
   // Frame by frame.
   for (std::int32_t f = run.first_frame; f <= run.last_frame; ++f) {
     if (stop.stop_requested()) return Error{ErrorKind::cancelled, "stopped"};
     const FrameSpec& frame = context.frames[static_cast<std::size_t>(f)];
-    BATON_ASSIGN(const FilmTile film,
-                 shares ? walk.render_sharing(frame, previous) : walk.render_still(frame));
+    BATON_ASSIGN(const FilmTile film, walk.render(frame, previous));
     BATON_TRY(sink.film(f, film));
     if (sink.diagnostics) sink.diagnostics({f, run.tile, walk.frame_sampling()});
     if (context.job.visibility.correlated) BATON_TRY(sink.samples(walk.take_first_pass()));

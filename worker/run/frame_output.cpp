@@ -122,6 +122,7 @@ ImageMetadata frame_metadata(const JobSpec& job, const Digest& job_digest, int f
   add("baton:numCandidates", sampling.num_candidates);
   add("baton:seed", job.seed);
   add("baton:sites", job.image.sites);
+  add("baton:rounds", job.quality.rounds);
   const EnvironmentSpec& environment = job.environment;
   const EnvironmentFrame light = environment_at(environment, frame_number);
   add("baton:map", environment.keys.at(static_cast<std::size_t>(light.map_a)).map);

@@ -65,6 +65,20 @@ TEST(Estimate, CountsTheMostRaysThatAPixelMayHave) {
   EXPECT_EQ(estimate_job(job).shadow_rays_per_pixel, 2 * job.sampling.reference_samples);
 }
 
+// Rounds have rays of their own; their sites, too, unless samples belong to them.
+TEST(Estimate, CountsTheRaysOfAllRounds) {
+  JobSpec job = small_job();
+  job.quality.rounds = 3;
+  EXPECT_EQ(estimate_job(job).primary_rays_per_pixel, 4);
+  EXPECT_EQ(estimate_job(job).shadow_rays_per_pixel, 48);
+  EXPECT_EQ(estimate_job(job).preroll_rounds, 0);
+  job.sampling.method = Method::pool;
+  EXPECT_EQ(estimate_job(job).primary_rays_per_pixel, 12);
+  EXPECT_EQ(estimate_job(job).preroll_rounds, 2);
+  job.state.carry = false;
+  EXPECT_EQ(estimate_job(job).preroll_rounds, 0);
+}
+
 // A pixel that asks its neighbours needs the tiles around it, frame by frame.
 TEST(Estimate, CountsTheTilesThatNeighborsLieIn) {
   JobSpec job = small_job();

@@ -109,8 +109,9 @@ TEST(JobJson, ReportsAllFaultsAtOnce) {
 }
 
 TEST(JobJson, ListsTheKnownKeysWhenNoneIsNear) {
-  EXPECT_EQ(faults(R"("state": {"zzzzzzzz": 1})"),
-            "job.json: $.state.zzzzzzzz: unknown key; there is carry, checkpointEvery, keep");
+  EXPECT_EQ(
+      faults(R"("state": {"zzzzzzzz": 1})"),
+      "job.json: $.state.zzzzzzzz: unknown key; there is carry, checkpointEvery, preroll, keep");
 }
 
 TEST(JobJson, NamesPlaceAndExpectationOfEachKindOfFault) {

@@ -95,6 +95,7 @@ TEST(FrameOutput, AFrameIsWrittenVerifiedAndNamedByItsDigest) {
                                                             {"baton:method", "sequential"},
                                                             {"baton:seed", "77"},
                                                             {"baton:sites", "1"},
+                                                            {"baton:rounds", "1"},
                                                             {"baton:numParticles", "16"},
                                                             {"baton:map", "dawn.exr"},
                                                             {"baton:mapMixedIn", "noon.exr"},

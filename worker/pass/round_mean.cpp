@@ -1,0 +1,88 @@
+#include "worker/pass/round_mean.h"
+
+#include <algorithm>
+
+#include "common/job/sequence.h"
+
+namespace baton {
+namespace {
+
+void add_to(std::array<double, 3>& sum, const Vec3& v, double weight = 1) {
+  sum[0] += weight * double{v.x};
+  sum[1] += weight * double{v.y};
+  sum[2] += weight * double{v.z};
+}
+Vec3 scaled(const std::array<double, 3>& sum, double factor) {
+  return {static_cast<float>(sum[0] * factor), static_cast<float>(sum[1] * factor),
+          static_cast<float>(sum[2] * factor)};
+}
+
+}  // namespace
+
+RoundMean::RoundMean(const JobSpec& job, const PixelRect& rect)
+    : num_rounds_(job.quality.rounds),
+      rounds_are_uncorrelated_(rounds_have_own_sites(job)),
+      film_(rect, film_aovs(job)) {
+  if (num_rounds_ > 1) sums_.resize(static_cast<std::size_t>(rect.area()));
+}
+
+void RoundMean::add(std::size_t index, const PixelResult& pixel) {
+  if (sums_.empty()) return film_.write(index, pixel);
+  PixelSum& sum = sums_[index];
+  const double grey = double{baton::mean(pixel.radiance)};
+  add_to(sum.radiance, pixel.radiance);
+  sum.squares += grey * grey;
+  sum.variance += double{pixel.variance};
+  sum.alpha += double{pixel.alpha};
+  if (!(pixel.coverage > 0)) return;
+  if (sum.num_seen == 0) sum.material = pixel.material;
+  ++sum.num_seen;
+  sum.coverage += double{pixel.coverage};
+  sum.depth += double{pixel.coverage} * double{pixel.depth};
+  add_to(sum.normal, pixel.normal, double{pixel.coverage});
+  add_to(sum.source, pixel.source_color);
+  sum.lns += double{pixel.lns};
+  sum.arrived += double{pixel.lns} * double{pixel.visibility};
+  sum.ess_ratio += double{pixel.ess_ratio};
+  sum.acceptance += double{pixel.acceptance};
+  sum.acceptance_local += double{pixel.acceptance_local};
+  sum.acceptance_independent += double{pixel.acceptance_independent};
+  sum.resampled += double{pixel.resampled};
+  sum.mask += double{pixel.mask};
+}
+
+PixelResult RoundMean::mean(const PixelSum& sum) const {
+  const double k = num_rounds_;
+  PixelResult pixel;
+  pixel.radiance = scaled(sum.radiance, 1 / k);
+  pixel.alpha = static_cast<float>(sum.alpha / k);
+  const double grey = (sum.radiance[0] + sum.radiance[1] + sum.radiance[2]) / 3 / k;
+  if (rounds_are_uncorrelated_) {
+    pixel.variance = static_cast<float>(num_rounds_ >= kLeastForScatter
+                                            ? std::max(sum.squares / k - grey * grey, 0.0) / (k - 1)
+                                            : sum.variance / (k * k));
+  }
+  if (sum.num_seen == 0) return pixel;
+  const double seen = 1.0 / sum.num_seen;
+  pixel.coverage = static_cast<float>(sum.coverage / k);
+  pixel.depth = static_cast<float>(sum.depth / sum.coverage);
+  pixel.normal = normalize(scaled(sum.normal, 1 / sum.coverage));
+  pixel.material = sum.material;
+  pixel.source_color = scaled(sum.source, seen);
+  pixel.lns = static_cast<float>(sum.lns / k);
+  pixel.visibility = sum.lns > 0 ? static_cast<float>(sum.arrived / sum.lns) : 0.0f;
+  pixel.ess_ratio = static_cast<float>(sum.ess_ratio * seen);
+  pixel.acceptance = static_cast<float>(sum.acceptance * seen);
+  pixel.acceptance_local = static_cast<float>(sum.acceptance_local * seen);
+  pixel.acceptance_independent = static_cast<float>(sum.acceptance_independent * seen);
+  pixel.resampled = static_cast<float>(sum.resampled * seen);
+  pixel.mask = static_cast<float>(sum.mask * seen);
+  return pixel;
+}
+
+const FilmTile& RoundMean::finish() {
+  for (std::size_t i = 0; i < sums_.size(); ++i) film_.write(i, mean(sums_[i]));
+  return film_.film();
+}
+
+}  // namespace baton

@@ -1,0 +1,49 @@
+#pragma once
+
+#include <array>
+#include <vector>
+
+#include "common/image/film_tile.h"
+#include "common/job/job_spec.h"
+#include "worker/pass/film_writer.h"
+
+namespace baton {
+
+/// The sums of one pixel over the rounds of its frame.
+struct PixelSum {
+  std::array<double, 3> radiance{}, normal{}, source{};
+  double alpha = 0, coverage = 0, depth = 0;
+  double lns = 0, arrived = 0;  ///< arrived: Lns x visibility
+  double ess_ratio = 0, acceptance = 0, acceptance_local = 0, acceptance_independent = 0;
+  double resampled = 0, mask = 0;
+  double variance = 0, squares = 0;  ///< squares: of the grey radiance
+  std::uint32_t material = 0;        ///< of the first round that sees one
+  std::int32_t num_seen = 0;         ///< rounds that see a surface
+};
+
+/// A frame of a tile as the mean of its rounds. Colours, alpha, Lns: over all rounds. Depth and
+/// normal: over the sites that see a surface; visibility: share of all rounds' light; what a method
+/// did: over the rounds that see a surface. variance: from the scatter of kLeastForScatter rounds
+/// or more, which is unbiased where rounds are uncorrelated, as they are for all methods that carry
+/// no samples; of fewer, from what the method says of each; with carried samples 0.
+class RoundMean {
+ public:
+  static constexpr int kLeastForScatter = 4;
+
+  RoundMean(const JobSpec& job, const PixelRect& rect);
+
+  /// Adds pixel `index` of a round; rounds must come in turn.
+  void add(std::size_t index, const PixelResult& pixel);
+  /// The mean; after the last round, once.
+  const FilmTile& finish();
+
+ private:
+  PixelResult mean(const PixelSum& sum) const;
+
+  const std::int32_t num_rounds_;
+  const bool rounds_are_uncorrelated_;
+  FilmWriter film_;
+  std::vector<PixelSum> sums_;  ///< empty for a single round
+};
+
+}  // namespace baton
