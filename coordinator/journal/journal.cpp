@@ -43,6 +43,10 @@ constexpr const char* kSchema = R"sql(
   CREATE INDEX failures_by_job ON failures (job);
 )sql";
 
+/// Added to journals of any version: a job without an owner is nobody's.
+constexpr const char* kOwners =
+    "CREATE TABLE IF NOT EXISTS owners (job TEXT PRIMARY KEY, name TEXT NOT NULL)";
+
 template <class T>
 Status read_blob(const SqlDatabase& database, ByteView bytes, const char* column, T& value) {
   ArchiveReader reader(bytes);
@@ -71,6 +75,7 @@ Result<Journal> Journal::open(const std::filesystem::path& path) {
   BATON_ASSIGN(SqlDatabase database, SqlDatabase::open(path));
   Journal journal(std::move(database));
   BATON_TRY(journal.prepare_schema());
+  BATON_TRY(journal.database_.execute(kOwners));
   BATON_TRY(journal.count_start());
   return journal;
 }
@@ -119,6 +124,17 @@ Result<std::vector<Digest>> Journal::jobs() {
       return Error{ErrorKind::corrupt,
                    fmt::format("{}: jobs: no digest: '{}'", database_.name(), query.text(0))};
     jobs.push_back(*digest);
+  }
+}
+
+Result<std::map<Digest, std::string>> Journal::owners() {
+  BATON_ASSIGN(SqlStatement query, database_.prepare("SELECT job, name FROM owners"));
+  std::map<Digest, std::string> owners;
+  while (true) {
+    BATON_ASSIGN(const bool row, query.step());
+    if (!row) return owners;
+    if (const std::optional<Digest> job = Digest::from_hex(query.text(0)))
+      owners[*job] = query.text(1);
   }
 }
 
@@ -231,6 +247,12 @@ Status Journal::add_job(const Digest& job, const std::string& document) {
       .run();
 }
 
+Status Journal::record_owner(const Digest& job, const std::string& owner) {
+  BATON_ASSIGN(SqlStatement * insert,
+               write("INSERT OR REPLACE INTO owners (job, name) VALUES (?, ?)"));
+  return insert->bind(job.hex()).bind(owner).run();
+}
+
 Status Journal::restart_job(const Digest& job) {
   BATON_ASSIGN(SqlStatement * failures, write("DELETE FROM failures WHERE job = ?"));
   BATON_TRY(failures->bind(job.hex()).run());
@@ -240,7 +262,7 @@ Status Journal::restart_job(const Digest& job) {
 Status Journal::delete_job(const Digest& job) {
   for (const char* const sql :
        {"DELETE FROM completions WHERE job = ?", "DELETE FROM failures WHERE job = ?",
-        "DELETE FROM jobs WHERE digest = ?"}) {
+        "DELETE FROM owners WHERE job = ?", "DELETE FROM jobs WHERE digest = ?"}) {
     BATON_ASSIGN(SqlStatement * remove, write(sql));
     BATON_TRY(remove->bind(job.hex()).run());
   }

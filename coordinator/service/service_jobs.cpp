@@ -20,6 +20,7 @@ constexpr int kMaxFailuresShown = 100;
 // ---- taking up the journal ----------------------------------------------------------------------
 
 Status Service::restore_jobs() {
+  BATON_ASSIGN(owners_, journal_.owners());
   BATON_ASSIGN(const std::vector<Digest> jobs, journal_.jobs());
   for (const Digest& job : jobs) BATON_TRY(restore_job(job));
   BATON_TRY(journal_.commit());
@@ -65,6 +66,10 @@ Status Service::restore_job(const Digest& digest) {
 // ---- questions ----------------------------------------------------------------------------------
 
 Status Service::receive(const PeerId& peer, const JobDocumentRequest& message) {
+  if (const Status own = check_own(message.job); !own) {
+    refuse(peer, own.error());
+    return {};
+  }
   BATON_ASSIGN(std::optional<std::string> document, journal_.document(message.job));
   if (document) {
     reply(peer, JobDocument{message.job, std::move(*document)});
@@ -81,6 +86,11 @@ Status Service::receive(const PeerId& peer, const SubmitJob& message) {
     refuse(peer, document.error());
     return {};
   }
+  if (const Status within = check_roots(*document, options_.roots); !within) {
+    spdlog::warn("refused: job '{}': {}", document->job.name, within.error().message);
+    refuse(peer, within.error());
+    return {};
+  }
   if (const std::int64_t count = count_tasks(document->job); count > limits::kMaxTasksPerJob) {
     refuse(
         peer,
@@ -91,7 +101,8 @@ Status Service::receive(const PeerId& peer, const SubmitJob& message) {
   }
 
   if (const Status way = make_way(*document, message.restart); !way) {
-    if (way.error().kind != ErrorKind::bad_input) return way;
+    const ErrorKind kind = way.error().kind;
+    if (kind != ErrorKind::bad_input && kind != ErrorKind::usage) return way;
     refuse(peer, way.error());
     return {};
   }
@@ -100,6 +111,11 @@ Status Service::receive(const PeerId& peer, const SubmitJob& message) {
   JobAdded event{digest, std::move(document->job), JobStatus::running, {}, {}};
   bool already_there = false;
   if (const Scheduler::Job* known = scheduler_.find_job(digest)) {
+    const bool changes = known->status != JobStatus::running;
+    if (const Status own = check_own(digest); changes && !own) {
+      refuse(peer, own.error());
+      return {};
+    }
     BATON_TRY(start_again(std::move(event), known->status, already_there));
   } else {
     if (scheduler_.jobs().size() >= limits::kMaxJobs) {
@@ -111,6 +127,10 @@ Status Service::receive(const PeerId& peer, const SubmitJob& message) {
     spdlog::info("job {} submitted: '{}', {} tasks", digest.short_hex(), event.spec.name,
                  count_tasks(event.spec));
     BATON_TRY(journal_.add_job(digest, message.json));
+    if (!speaker_.name.empty()) {
+      owners_[digest] = speaker_.name;
+      BATON_TRY(journal_.record_owner(digest, speaker_.name));
+    }
     BATON_TRY(step(event));
   }
   reply(peer, JobAccepted{digest, already_there});
@@ -126,6 +146,7 @@ Status Service::make_way(const ParsedJobDocument& document, bool restart) {
     const Scheduler::Job& rival = *scheduler_.find_job(digest);
     std::vector<TaskKey> replaced = replaced_frames(rival, document.job);
     if (replaced.empty()) continue;
+    BATON_TRY(check_own(digest));
     BATON_ASSIGN(const std::optional<std::string> text, journal_.document(digest));
     const Result<ParsedJobDocument> other = parse_job_document(text.value_or(""));
     const std::vector<std::string> differing =
@@ -186,8 +207,10 @@ Status Service::start_again(JobAdded event, JobStatus status, bool& already_ther
 
 Status Service::receive(const PeerId& peer, const ListJobs&) {
   JobList list;
-  for (const Digest& job : scheduler_.jobs())
+  for (const Digest& job : scheduler_.jobs()) {
     list.jobs.push_back(summarize(job, *scheduler_.find_job(job)));
+    list.jobs.back().owner = owner_of(job);
+  }
   list.workers = peers_.summaries();
   for (WorkerSummary& worker : list.workers) {
     worker.leases = static_cast<std::int32_t>(scheduler_.num_leases(worker.worker_id));
@@ -212,7 +235,7 @@ Status Service::receive(const PeerId& peer, const PauseJob& message) {
 }
 
 Status Service::receive(const PeerId& peer, const ResumeJob& message) {
-  const Result<Digest> job = resolve_job(scheduler_, message.job);
+  const Result<Digest> job = resolve_own(message.job);
   if (!job) {
     refuse(peer, job.error());
     return {};
@@ -231,7 +254,7 @@ Status Service::receive(const PeerId& peer, const ResumeJob& message) {
 }
 
 Status Service::receive(const PeerId& peer, const DeleteJob& message) {
-  const Result<Digest> job = resolve_job(scheduler_, message.job);
+  const Result<Digest> job = resolve_own(message.job);
   if (!job) {
     refuse(peer, job.error());
     return {};
@@ -275,7 +298,7 @@ Status Service::receive(const PeerId& peer, const StopCoordinator&) {
 /// Event E happens to the job whose ID begins with `prefix`; the answer shows what came of it.
 template <class E>
 Status Service::change_job(const PeerId& peer, const std::string& prefix) {
-  const Result<Digest> job = resolve_job(scheduler_, prefix);
+  const Result<Digest> job = resolve_own(prefix);
   if (!job) {
     refuse(peer, job.error());
     return {};
@@ -287,7 +310,9 @@ Status Service::change_job(const PeerId& peer, const std::string& prefix) {
 Status Service::answer_detail(const PeerId& peer, const Digest& job) {
   BATON_ASSIGN(const std::vector<Failure> failures,
                journal_.recent_failures(job, kMaxFailuresShown));
-  reply(peer, describe_job(scheduler_, job, failures));
+  JobDetail detail = describe_job(scheduler_, job, failures);
+  detail.summary.owner = owner_of(job);
+  reply(peer, std::move(detail));
   return {};
 }
 
