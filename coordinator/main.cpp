@@ -26,8 +26,9 @@ void install_stop_handler() {
   ::sigaction(SIGINT, &action, nullptr);
 }
 
-baton::Status coordinate(const baton::ServiceOptions& options,
+baton::Status coordinate(baton::ServiceOptions options, const std::string& key_file, bool insecure,
                          const std::filesystem::path& endpoint_file) {
+  BATON_ASSIGN(options.access, baton::server_access(key_file, insecure));
   BATON_ASSIGN(baton::Service service, baton::Service::open(options));
   if (!endpoint_file.empty()) {
     BATON_TRY(
@@ -47,7 +48,7 @@ int main(int argc, char** argv) {
   app.set_version_flag("--version", baton::build_identity());
   app.footer(
       "Examples:\n"
-      "  baton-coordinator --work-dir /srv/baton --listen 'tcp://*:5570'\n"
+      "  baton-coordinator --work-dir /srv/baton --listen 'tcp://*:5570' --key keys/server.key\n"
       "  baton-coordinator --work-dir farm --listen 'tcp://127.0.0.1:*' --endpoint-file "
       "farm/endpoint\n"
       "The work folder must be on a file system that all workers share.");
@@ -69,6 +70,13 @@ int main(int argc, char** argv) {
       ->capture_default_str();
   app.add_flag("--mixed-builds", options.mixed_builds,
                "take workers of other builds and instruction sets: pixels may differ");
+  std::string key_file;
+  bool insecure = false;
+  app.add_option("--key", key_file, "server.key of `baton key create`; whoever it knows is let in")
+      ->envname("BATON_KEY");
+  app.add_flag("--insecure", insecure, "listen to other machines without a key");
+  app.add_option("--root", options.roots,
+                 "folder that jobs may read from and write to, may be repeated; default: all");
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
@@ -78,7 +86,7 @@ int main(int argc, char** argv) {
   baton::init_logging("baton-coordinator");
   install_stop_handler();
   options.heartbeat = std::chrono::milliseconds(heartbeat_ms);
-  const baton::Status status = coordinate(options, endpoint_file);
+  const baton::Status status = coordinate(options, key_file, insecure, endpoint_file);
   if (status) return static_cast<int>(baton::ExitCode::ok);
   spdlog::error("{}", status.error().message);
   return static_cast<int>(baton::exit_code_of(status.error().kind));

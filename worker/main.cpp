@@ -54,12 +54,19 @@ int main(int argc, char** argv) {
       ->envname("BATON_THREADS")
       ->check(CLI::Range(1, 1024));
   app.add_option("--name", worker.worker_id,
-                 "unique name in the farm; default: host and process id")
+                 "for people; several workers may have one; default: host and process id")
       ->envname("BATON_WORKER_NAME");
   app.add_option("--give-up-s", give_up_s,
                  "ends when no coordinator has answered for so long; 0: never")
       ->capture_default_str()
       ->check(CLI::Range(0, 1000000));
+
+  std::string key_file;
+  bool insecure = false;
+  app.add_option("--key", key_file, "worker.key of `baton key create`")->envname("BATON_KEY");
+  app.add_flag("--insecure", insecure, "connect to another machine without a key");
+  app.add_option("--root", worker.roots,
+                 "folder that jobs may read from and write to, may be repeated; default: all");
 
   baton::ReplayOptions replay_options;
   std::vector<int> pixel;
@@ -92,5 +99,11 @@ int main(int argc, char** argv) {
   }
   install_drain_handler();
   worker.give_up = std::chrono::seconds(give_up_s);
+  baton::Result<baton::ClientAccess> access = baton::client_access(key_file, insecure);
+  if (!access) {
+    spdlog::error("{}", access.error().message);
+    return static_cast<int>(baton::exit_code_of(access.error().kind));
+  }
+  worker.access = std::move(access).value();
   return static_cast<int>(baton::run_worker(worker, g_drain));
 }

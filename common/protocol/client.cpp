@@ -15,8 +15,8 @@ constexpr std::chrono::milliseconds kClientLinger{0};
 /// A coordinator accepts connections at once, however busy it is.
 constexpr std::chrono::milliseconds kConnectPatience{2000 * kPatienceFactor};
 
-Result<Socket> connect_to(const std::string& endpoint) {
-  return Socket::connect(endpoint, kClientLinger, Socket::Unconnected::refuse);
+Result<Socket> connect_to(const std::string& endpoint, const ClientAccess& access) {
+  return Socket::connect(endpoint, kClientLinger, Socket::Unconnected::refuse, access);
 }
 
 ErrorKind error_kind_of(std::uint8_t kind) {
@@ -26,12 +26,22 @@ ErrorKind error_kind_of(std::uint8_t kind) {
 
 }  // namespace
 
-RequestClient::RequestClient(std::string endpoint, Socket socket)
-    : endpoint_(std::move(endpoint)), socket_(std::move(socket)) {}
+RequestClient::RequestClient(std::string endpoint, ClientAccess access, Socket socket)
+    : endpoint_(std::move(endpoint)), access_(std::move(access)), socket_(std::move(socket)) {}
 
-Result<RequestClient> RequestClient::connect(const std::string& endpoint) {
-  BATON_ASSIGN(Socket socket, connect_to(endpoint));
-  return RequestClient(endpoint, std::move(socket));
+Result<RequestClient> RequestClient::connect(const std::string& endpoint,
+                                             const ClientAccess& access) {
+  BATON_ASSIGN(Socket socket, connect_to(endpoint, access));
+  return RequestClient(endpoint, access, std::move(socket));
+}
+
+/// Drops the connection. Why there is no answer: a refusal says more than silence.
+Error RequestClient::give_up(const std::string& otherwise) {
+  const std::optional<Error> refusal = socket_.take_refusal();
+  Result<Socket> fresh = connect_to(endpoint_, access_);
+  if (!fresh) return fresh.error();
+  socket_ = std::move(fresh).value();
+  return refusal.value_or(Error{ErrorKind::timeout, endpoint_ + ": " + otherwise});
 }
 
 Result<Message> RequestClient::request(const Message& message, std::chrono::milliseconds timeout) {
@@ -40,21 +50,15 @@ Result<Message> RequestClient::request(const Message& message, std::chrono::mill
 
   // Nobody there is found out soon.
   const bool connected = socket_.wait_to_send(std::min(timeout, kConnectPatience));
-  if (!connected || !socket_.send(encode_message(message))) {
-    BATON_ASSIGN(socket_, connect_to(endpoint_));
-    return Error{ErrorKind::timeout, fmt::format("{}: no coordinator listens there", endpoint_)};
-  }
+  if (!connected || !socket_.send(encode_message(message)))
+    return give_up("no coordinator listens there");
 
   // Wait for the one answer; a signal may end a wait early.
   std::optional<std::vector<Bytes>> frames;
   while (!frames && Clock::now() < deadline) {
     frames = socket_.receive(std::chrono::ceil<std::chrono::milliseconds>(deadline - Clock::now()));
   }
-  if (!frames) {
-    BATON_ASSIGN(socket_, connect_to(endpoint_));
-    return Error{ErrorKind::timeout, fmt::format("{}: no coordinator answered within {} ms",
-                                                 endpoint_, timeout.count())};
-  }
+  if (!frames) return give_up(fmt::format("no coordinator answered within {} ms", timeout.count()));
 
   BATON_ASSIGN(Message answer, decode_message(*frames));
   if (const auto* refused = std::get_if<Refused>(&answer)) {

@@ -12,18 +12,21 @@ namespace baton {
 class RequestClient {
  public:
   /// Succeeds for every well-formed endpoint, whether a coordinator listens there or not.
-  static Result<RequestClient> connect(const std::string& endpoint);
+  static Result<RequestClient> connect(const std::string& endpoint,
+                                       const ClientAccess& access = {});
 
   /// Sends and waits for the answer; a Refused becomes the Error that it carries.
-  /// ErrorKind::timeout when nobody listens (known after 2 s times kPatienceFactor) or no answer
-  /// came in time. The connection is then dropped, so that a late answer is never taken for that of
-  /// the next request.
+  /// ErrorKind::usage when the coordinator does not know the key, timeout when nobody listens
+  /// (known after 2 s times kPatienceFactor) or no answer came in time. The connection is then
+  /// dropped, so that a late answer is never taken for that of the next request.
   Result<Message> request(const Message& message, std::chrono::milliseconds timeout);
 
  private:
-  RequestClient(std::string endpoint, Socket socket);
+  RequestClient(std::string endpoint, ClientAccess access, Socket socket);
+  Error give_up(const std::string& otherwise);
 
   std::string endpoint_;
+  ClientAccess access_;
   Socket socket_;
 };
 

@@ -220,7 +220,7 @@ struct StopCoordinator {
 // ---- coordinator to client ----------------------------------------------------------------------
 struct JobSummary {
   Digest job;
-  std::string name, output_directory;
+  std::string name, owner, output_directory;  ///< owner: who submitted it; empty: without a key
   JobStatus status = JobStatus::running;
   std::int32_t priority = 0;
   std::uint64_t tasks_total = 0, tasks_done = 0, tasks_leased = 0, tasks_failed = 0,
@@ -230,7 +230,7 @@ struct JobSummary {
   RenderStats stats;
   template <class A>
   void fields(A& a) {
-    a(job, name, output_directory, status, priority, tasks_total, tasks_done, tasks_leased,
+    a(job, name, owner, output_directory, status, priority, tasks_total, tasks_done, tasks_leased,
       tasks_failed, attempts_lost, frames_total, frames_done, state_bytes, state_pixels, stats);
   }
 };

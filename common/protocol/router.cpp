@@ -9,9 +9,9 @@ constexpr std::chrono::milliseconds kRouterLinger{1000};  // so that a Shutdown 
 
 }  // namespace
 
-Result<Router> Router::bind(const std::string& endpoint) {
-  BATON_ASSIGN(Socket socket, Socket::bind(endpoint, kRouterLinger));
-  return Router(std::move(socket));
+Result<Router> Router::bind(const std::string& endpoint, const ServerAccess& access) {
+  BATON_ASSIGN(Socket socket, Socket::bind(endpoint, kRouterLinger, access));
+  return Router(std::move(socket), access.key);
 }
 
 bool Router::send(const PeerId& peer, const Message& message) {
@@ -25,7 +25,11 @@ std::optional<Incoming> Router::receive(std::chrono::milliseconds timeout) {
   if (!frames) return std::nullopt;
   PeerId peer = std::move(frames->front());
   frames->erase(frames->begin());
-  return Incoming{std::move(peer), decode_message(*frames)};
+  if (!key_) return Incoming{std::move(peer), decode_message(*frames)};
+  const auto speaker = key_->known.find(socket_.sender_key());
+  if (speaker == key_->known.end())
+    return Incoming{std::move(peer), Error{ErrorKind::usage, "message: from nobody known"}};
+  return Incoming{std::move(peer), decode_message(*frames), speaker->second};
 }
 
 }  // namespace baton

@@ -12,32 +12,37 @@ namespace baton {
 /// Names a connection, chosen by the library; a peer that connects again has another one.
 using PeerId = Bytes;
 
-/// What a peer sent, or why it cannot be read.
+/// What a peer sent, or why it cannot be read, and who the peer is.
 struct Incoming {
   PeerId peer;
   Result<Message> message;
+  Speaker speaker = {};
 };
 
 /// The coordinator's side of every connection. Used by one thread, except wake().
 class Router {
  public:
   /// "tcp://host:*" picks a port. Errors: malformed endpoint, address in use or not of this
-  /// machine.
-  static Result<Router> bind(const std::string& endpoint);
+  /// machine, or open to other machines without a key.
+  static Result<Router> bind(const std::string& endpoint, const ServerAccess& access = {});
 
   /// Queues without waiting; false when the peer is gone or its queue is full.
   bool send(const PeerId& peer, const Message& message);
   /// The next message of any peer, or nullopt after `timeout`, a signal or wake().
   std::optional<Incoming> receive(std::chrono::milliseconds timeout);
+  /// What became of a connection that was refused, since the last call.
+  std::optional<Error> take_refusal() { return socket_.take_refusal(); }
   /// Ends a receive() early, from any thread.
   void wake() { socket_.wake(); }
   /// The concrete endpoint: with the port that was picked.
   const std::string& endpoint() const { return socket_.endpoint(); }
 
  private:
-  explicit Router(Socket socket) : socket_(std::move(socket)) {}
+  Router(Socket socket, std::optional<ServerKey> key)
+      : socket_(std::move(socket)), key_(std::move(key)) {}
 
   Socket socket_;
+  std::optional<ServerKey> key_;
 };
 
 }  // namespace baton

@@ -11,6 +11,7 @@
 
 #include "common/base/check.h"
 #include "common/base/limits.h"
+#include "common/protocol/doorkeeper.h"
 
 namespace baton {
 namespace {
@@ -54,10 +55,37 @@ struct Socket::Impl {
   Impl& operator=(const Impl&) = delete;
   ~Impl() { ::close(wake_fd); }
 
+  /// The keys come before bind and connect.
+  void use(const ClientKey& key) {
+    socket.set(zmq::sockopt::curve_publickey, key.own.public_key);
+    socket.set(zmq::sockopt::curve_secretkey, key.own.secret_key);
+    socket.set(zmq::sockopt::curve_serverkey, key.server_public_key);
+  }
+  void use(const ServerKey& key) {
+    doorkeeper.emplace(context, key.known);
+    socket.set(zmq::sockopt::curve_server, 1);
+    socket.set(zmq::sockopt::curve_secretkey, key.own.secret_key);
+  }
+  /// Polled beside the socket itself, which is the first.
+  std::vector<zmq::pollitem_t> poll_items(short events) {
+    std::vector<zmq::pollitem_t> items{{socket.handle(), 0, events, 0}};
+    if (watch) items.push_back({watch->events().handle(), 0, ZMQ_POLLIN, 0});
+    if (doorkeeper) items.push_back({doorkeeper->questions().handle(), 0, ZMQ_POLLIN, 0});
+    return items;
+  }
+  bool is_denied() const { return watch && watch->failure() == HandshakeWatch::Failure::denied; }
+  void look_at_handshakes() {
+    if (doorkeeper) doorkeeper->answer();
+    if (watch) watch->look();
+  }
+
   zmq::context_t context;
   zmq::socket_t socket;
+  std::optional<HandshakeWatch> watch;
+  std::optional<Doorkeeper> doorkeeper;
   int wake_fd;
-  std::string endpoint;
+  std::string endpoint, sender_key;
+  bool is_server = false;
 };
 
 Socket::Socket(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -65,18 +93,26 @@ Socket::Socket(Socket&&) noexcept = default;
 Socket& Socket::operator=(Socket&&) noexcept = default;
 Socket::~Socket() = default;
 
-Result<Socket> Socket::open(const std::string& endpoint, bool listen,
-                            std::chrono::milliseconds linger, Unconnected unconnected) {
+Result<Socket> Socket::open(const std::string& endpoint, std::chrono::milliseconds linger,
+                            Unconnected unconnected, const ClientAccess* client,
+                            const ServerAccess* server) {
   // ZeroMQ takes a port modulo 65536.
   const std::string port = endpoint.substr(endpoint.rfind(':') + 1);
   const bool is_number = !port.empty() && port.find_first_not_of("0123456789") == std::string::npos;
   if (is_number && (port.size() > 5 || std::stoi(port) > 65535)) {
     return Error{ErrorKind::usage, fmt::format("{}: expected a port up to 65535", endpoint)};
   }
+  const bool listen = server != nullptr;
+  const bool has_key = listen ? server->key.has_value() : client->key.has_value();
+  BATON_TRY(check_exposure(endpoint, has_key, listen ? server->insecure : client->insecure));
   try {
     auto impl =
         std::make_unique<Impl>(listen ? zmq::socket_type::router : zmq::socket_type::dealer);
+    impl->is_server = listen;
     set_options(impl->socket, linger);
+    if (listen && server->key) impl->use(*server->key);
+    if (!listen && client->key) impl->use(*client->key);
+    if (has_key || !listen) impl->watch.emplace(impl->context, impl->socket);
     impl->socket.set(zmq::sockopt::immediate, unconnected == Unconnected::refuse);
     if (listen) {
       impl->socket.set(zmq::sockopt::router_mandatory, true);
@@ -95,27 +131,29 @@ Result<Socket> Socket::open(const std::string& endpoint, bool listen,
 }
 
 Result<Socket> Socket::connect(const std::string& endpoint, std::chrono::milliseconds linger,
-                               Unconnected unconnected) {
-  return open(endpoint, false, linger, unconnected);
+                               Unconnected unconnected, const ClientAccess& access) {
+  return open(endpoint, linger, unconnected, &access, nullptr);
 }
 
-Result<Socket> Socket::bind(const std::string& endpoint, std::chrono::milliseconds linger) {
-  return open(endpoint, true, linger, Unconnected::queue);
+Result<Socket> Socket::bind(const std::string& endpoint, std::chrono::milliseconds linger,
+                            const ServerAccess& access) {
+  return open(endpoint, linger, Unconnected::queue, nullptr, &access);
 }
 
 bool Socket::wait_to_send(std::chrono::milliseconds timeout) {
   const auto deadline = std::chrono::steady_clock::now() + timeout;
-  zmq::pollitem_t item{impl_->socket.handle(), 0, ZMQ_POLLOUT, 0};
+  std::vector<zmq::pollitem_t> items = impl_->poll_items(ZMQ_POLLOUT);
   while (true) {
     const auto left =
         std::chrono::ceil<std::chrono::milliseconds>(deadline - std::chrono::steady_clock::now());
     try {
-      zmq::poll(&item, 1, std::max(left, std::chrono::milliseconds(0)));
+      zmq::poll(items, std::max(left, std::chrono::milliseconds(0)));
     } catch (const zmq::error_t& error) {
       BATON_CHECK(error.num() == EINTR);
     }
-    if (item.revents & ZMQ_POLLOUT) return true;
-    if (left.count() <= 0) return false;
+    if (items[0].revents & ZMQ_POLLOUT) return true;
+    impl_->look_at_handshakes();
+    if (left.count() <= 0 || impl_->is_denied()) return false;
   }
 }
 
@@ -140,19 +178,20 @@ bool Socket::send(const std::vector<Bytes>& frames) {
 }
 
 std::optional<std::vector<Bytes>> Socket::receive(std::chrono::milliseconds timeout) {
-  // Wait for the first of message, wake-up, signal, timeout.
-  std::array<zmq::pollitem_t, 2> items{zmq::pollitem_t{impl_->socket.handle(), 0, ZMQ_POLLIN, 0},
-                                       zmq::pollitem_t{nullptr, impl_->wake_fd, ZMQ_POLLIN, 0}};
+  // Wait for the first of message, wake-up, handshake, signal, timeout.
+  std::vector<zmq::pollitem_t> items = impl_->poll_items(ZMQ_POLLIN);
+  items.push_back({nullptr, impl_->wake_fd, ZMQ_POLLIN, 0});
   try {
-    zmq::poll(items.data(), items.size(), timeout);
+    zmq::poll(items, timeout);
   } catch (const zmq::error_t& error) {
     BATON_CHECK(error.num() == EINTR);
     return std::nullopt;
   }
-  if (items[1].revents & ZMQ_POLLIN) {
+  if (items.back().revents & ZMQ_POLLIN) {
     eventfd_t count = 0;
     ::eventfd_read(impl_->wake_fd, &count);
   }
+  impl_->look_at_handshakes();
   if (!(items[0].revents & ZMQ_POLLIN)) return std::nullopt;
 
   // The frames of one message arrive together.
@@ -162,12 +201,40 @@ std::optional<std::vector<Bytes>> Socket::receive(std::chrono::milliseconds time
     const bool received = despite_signals(
         [&] { return impl_->socket.recv(frame, zmq::recv_flags::dontwait).has_value(); });
     if (!received) return std::nullopt;
+    // Who sent it stands with each frame but the first, which the library adds.
+    if (frames.size() <= 1 && impl_->doorkeeper) {
+      const char* const key = ::zmq_msg_gets(frame.handle(), "User-Id");
+      impl_->sender_key = key != nullptr ? key : "";
+    }
     if (frames.size() < limits::kMaxMessageFrames) {
       const auto* data = frame.data<std::byte>();
       frames.emplace_back(data, data + frame.size());
     }
   } while (frame.more());
   return frames;
+}
+
+const std::string& Socket::sender_key() const { return impl_->sender_key; }
+
+std::optional<Error> Socket::take_refusal() {
+  if (impl_->doorkeeper) {
+    if (std::optional<std::string> refusal = impl_->doorkeeper->take_refusal())
+      return Error{ErrorKind::usage, *refusal};
+  }
+  const auto failure = impl_->watch ? impl_->watch->take() : std::nullopt;
+  if (!failure) return std::nullopt;
+  const bool denied = *failure == HandshakeWatch::Failure::denied;
+  if (impl_->is_server) {
+    if (denied) return std::nullopt;  // the doorkeeper has told
+    return Error{ErrorKind::usage, "a connection: it has no key, or not one for this coordinator"};
+  }
+  if (denied)
+    return Error{ErrorKind::usage,
+                 fmt::format("{}: the coordinator does not know this key", impl_->endpoint)};
+  return Error{ErrorKind::timeout,
+               fmt::format("{}: the connection was broken off: either side may lack a key, or this "
+                           "one is of another coordinator",
+                           impl_->endpoint)};
 }
 
 void Socket::wake() { ::eventfd_write(impl_->wake_fd, 1); }

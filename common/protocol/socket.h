@@ -8,10 +8,11 @@
 
 #include "common/base/bytes.h"
 #include "common/base/result.h"
+#include "common/protocol/keys.h"
 
 namespace baton {
 
-/// One ZeroMQ socket that carries multi-frame messages; socket.cpp is the only file that knows the
+/// One ZeroMQ socket that carries multi-frame messages; only socket, doorkeeper and keys know the
 /// library. Not thread-safe, except wake(). Nothing here blocks but receive(), and that no longer
 /// than its timeout. Queues are bounded by limits::kMaxQueuedMessages, frames by
 /// limits::kMaxMessageBytes. Broken connections are made again in the background; what was queued
@@ -25,16 +26,19 @@ class Socket {
   /// endpoint that nobody listens on is not an error: messages wait in the queue, or send() refuses
   /// them until there is a connection.
   static Result<Socket> connect(const std::string& endpoint, std::chrono::milliseconds linger,
-                                Unconnected unconnected = Unconnected::queue);
+                                Unconnected unconnected = Unconnected::queue,
+                                const ClientAccess& access = {});
   /// Listens for many (ROUTER): the first frame of each message is the peer's identity.
-  /// "tcp://host:*" picks a port.
-  static Result<Socket> bind(const std::string& endpoint, std::chrono::milliseconds linger);
+  /// "tcp://host:*" picks a port. With a key, only those that it knows are let in.
+  static Result<Socket> bind(const std::string& endpoint, std::chrono::milliseconds linger,
+                             const ServerAccess& access = {});
 
   Socket(Socket&&) noexcept;
   Socket& operator=(Socket&&) noexcept;
   ~Socket();
 
-  /// Waits until send() takes a message; false when it still does not after `timeout`.
+  /// Waits until send() takes a message; false when it still does not after `timeout`, or when the
+  /// key was refused.
   bool wait_to_send(std::chrono::milliseconds timeout);
   /// Queues the frames; false when the queue is full or the peer is gone, and then nothing was
   /// queued.
@@ -42,6 +46,11 @@ class Socket {
   /// The next message, or nullopt after `timeout`, a signal or wake(). Of a message with more than
   /// limits::kMaxMessageFrames frames only so many are returned.
   std::optional<std::vector<Bytes>> receive(std::chrono::milliseconds timeout);
+  /// The public key of who sent the last message; empty: without keys.
+  const std::string& sender_key() const;
+  /// Why a connection was refused, by either side, once. usage: the key is not known; timeout: it
+  /// was broken off, which may have other reasons.
+  std::optional<Error> take_refusal();
   /// Ends a receive() that is under way, or the next one, early. From any thread.
   void wake();
   /// The concrete endpoint: with the port that was picked.
@@ -50,8 +59,9 @@ class Socket {
  private:
   struct Impl;
   explicit Socket(std::unique_ptr<Impl> impl);
-  static Result<Socket> open(const std::string& endpoint, bool listen,
-                             std::chrono::milliseconds linger, Unconnected unconnected);
+  static Result<Socket> open(const std::string& endpoint, std::chrono::milliseconds linger,
+                             Unconnected unconnected, const ClientAccess* client,
+                             const ServerAccess* server);
 
   std::unique_ptr<Impl> impl_;
 };

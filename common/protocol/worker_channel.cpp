@@ -9,8 +9,10 @@ constexpr std::chrono::milliseconds kWorkerLinger{500};
 
 }  // namespace
 
-Result<WorkerChannel> WorkerChannel::connect(const std::string& endpoint) {
-  BATON_ASSIGN(Socket socket, Socket::connect(endpoint, kWorkerLinger));
+Result<WorkerChannel> WorkerChannel::connect(const std::string& endpoint,
+                                             const ClientAccess& access) {
+  BATON_ASSIGN(Socket socket,
+               Socket::connect(endpoint, kWorkerLinger, Socket::Unconnected::queue, access));
   return WorkerChannel(std::move(socket));
 }
 

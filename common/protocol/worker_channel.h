@@ -13,7 +13,8 @@ namespace baton {
 /// the coordinator is away. Used by one thread, except wake().
 class WorkerChannel {
  public:
-  static Result<WorkerChannel> connect(const std::string& endpoint);
+  static Result<WorkerChannel> connect(const std::string& endpoint,
+                                       const ClientAccess& access = {});
 
   /// Queues the message without waiting; false when the queue is full: the coordinator has been
   /// away for long.
@@ -21,6 +22,8 @@ class WorkerChannel {
   /// The next message, or nullopt after `timeout`, a signal or wake(). A message that cannot be
   /// read is returned as a Refused that says why.
   std::optional<Message> receive(std::chrono::milliseconds timeout);
+  /// Why the connection was refused, since the last call (Socket).
+  std::optional<Error> take_refusal() { return socket_.take_refusal(); }
   /// Ends a receive() early, from any thread: "there is something to send".
   void wake() { socket_.wake(); }
 

@@ -63,10 +63,12 @@ constexpr const char* kSchema = R"sql(
     blob TEXT NOT NULL, job TEXT NOT NULL,
     PRIMARY KEY (blob, job)) WITHOUT ROWID;
   CREATE INDEX kept_blobs_by_job ON kept_blobs (job);
+  CREATE TABLE owners (job TEXT PRIMARY KEY, name TEXT NOT NULL);
 )sql";
 
 /// What is read at the start, and so is checked then.
 constexpr std::array kCheckedTables{"starts", "jobs", "completions", "failures"};
+
 
 template <class T>
 Status read_blob(const SqlDatabase& database, ByteView bytes, const char* column, T& value) {
@@ -165,6 +167,17 @@ Status Journal::for_each_completion(const Digest& job,
     if (!row) return visit_archived(job, visit);
     BATON_ASSIGN(const Completion completion, read_completion(query));
     BATON_TRY(visit(completion));
+  }
+}
+
+Result<std::map<Digest, std::string>> Journal::owners() {
+  BATON_ASSIGN(SqlStatement query, database_.prepare("SELECT job, name FROM owners"));
+  std::map<Digest, std::string> owners;
+  while (true) {
+    BATON_ASSIGN(const bool row, query.step());
+    if (!row) return owners;
+    if (const std::optional<Digest> job = Digest::from_hex(query.text(0)))
+      owners[*job] = query.text(1);
   }
 }
 
@@ -292,11 +305,18 @@ Status Journal::record_plan(const Digest& job, const JobPlan& plan) {
   return update->bind(to_bytes(plan)).bind(job.hex()).run();
 }
 
+Status Journal::record_owner(const Digest& job, const std::string& owner) {
+  BATON_ASSIGN(SqlStatement * insert,
+               write("INSERT OR REPLACE INTO owners (job, name) VALUES (?, ?)"));
+  return insert->bind(job.hex()).bind(owner).run();
+}
+
 Status Journal::delete_job(const Digest& job) {
   for (const char* const sql :
        {"DELETE FROM completions WHERE job = ?", "DELETE FROM failures WHERE job = ?",
         "DELETE FROM archive WHERE job = ?", "DELETE FROM archived_completions WHERE job = ?",
-        "DELETE FROM kept_blobs WHERE job = ?", "DELETE FROM jobs WHERE digest = ?"}) {
+        "DELETE FROM kept_blobs WHERE job = ?", "DELETE FROM owners WHERE job = ?",
+        "DELETE FROM jobs WHERE digest = ?"}) {
     BATON_ASSIGN(SqlStatement * remove, write(sql));
     BATON_TRY(remove->bind(job.hex()).run());
   }

@@ -55,6 +55,9 @@ class Journal {
   Result<std::vector<Digest>> jobs();
   /// The job must be there.
   Result<JournalledJob> load(const Digest& job);
+  /// Who submitted which job, where that is known.
+  Result<std::map<Digest, std::string>> owners();
+  Status record_owner(const Digest& job, const std::string& owner);
   /// nullopt: no such job.
   Result<std::optional<std::string>> document(const Digest& job);
   /// What the tasks of one kind and step recorded of frames so far, in no order: those of a run for

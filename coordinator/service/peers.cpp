@@ -1,5 +1,7 @@
 #include "coordinator/service/peers.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 
 #include "common/base/limits.h"
@@ -18,6 +20,13 @@ void Peers::remove(const std::string& worker) {
   if (found == workers_.end()) return;
   names_.erase(found->second.peer);
   workers_.erase(found);
+}
+
+std::string Peers::id_for(const WorkerHello& hello) const {
+  const auto other = workers_.find(hello.worker_id);
+  if (other == workers_.end() || other->second.hello.instance == hello.instance)
+    return hello.worker_id;
+  return fmt::format("{}#{:08x}", hello.worker_id, static_cast<std::uint32_t>(hello.instance));
 }
 
 std::string Peers::worker_of(const PeerId& peer) const {

@@ -16,6 +16,9 @@ class Peers {
   /// Introduces or replaces a worker.
   void add(const PeerId& peer, const WorkerHello& hello);
   void remove(const std::string& worker);
+  /// The ID by which a worker goes here: its name, or where another process has that, the name and
+  /// some digits of its instance.
+  std::string id_for(const WorkerHello& hello) const;
 
   /// Empty: the connection belongs to no worker.
   std::string worker_of(const PeerId& peer) const;

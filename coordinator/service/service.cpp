@@ -38,7 +38,7 @@ Result<Service> Service::open(const ServiceOptions& options) {
   BATON_ASSIGN(BlobStore store, BlobStore::open(options.work_dir / "store"));
   if (const std::size_t swept = store.sweep(); swept > 0)
     spdlog::info("{} files that were never finished are removed from the store", swept);
-  BATON_ASSIGN(Router router, Router::bind(options.listen));
+  BATON_ASSIGN(Router router, Router::bind(options.listen, options.access));
   Service service(options, std::move(router), std::move(journal), std::move(store));
   BATON_TRY(service.restore_jobs());
   return service;
@@ -75,6 +75,7 @@ Status Service::turn() {
   if (Clock::now() >= next_tick_) {
     next_tick_ = Clock::now() + kTick;
     asked_for_hello_.clear();
+    tell_refusals();
     BATON_TRY(step(ClockTicked{}));
     garbage_.insert(garbage_.end(), unremoved_.begin(), unremoved_.end());
   }
@@ -111,47 +112,17 @@ Status Service::step(const Event& event) {
   return {};
 }
 
-Status Service::handle(const Incoming& incoming) {
-  const PeerId& peer = incoming.peer;
-  if (!incoming.message) {
-    if (complained_.first(peer)) spdlog::warn("bad message: {}", incoming.message.error().message);
-    refuse(peer, incoming.message.error());
-    return {};
-  }
-  const std::string worker = peers_.worker_of(peer);
-  return std::visit(
-      [&](const auto& message) -> Status {
-        if constexpr (requires { this->receive(peer, message); }) {
-          return receive(peer, message);
-        } else if constexpr (requires { this->receive_from(worker, message); }) {
-          if (!worker.empty()) return receive_from(worker, message);
-          if (asked_for_hello_.first(peer)) reply(peer, HelloAgain{});
-        } else {
-          refuse(peer, {ErrorKind::bad_input, "this message is not for a coordinator"});
-        }
-        return {};
-      },
-      *incoming.message);
-}
-
 // ---- messages of workers ------------------------------------------------------------------------
 
-Status Service::receive(const PeerId& peer, const WorkerHello& hello) {
-  if (hello.worker_id.empty() || hello.worker_id.size() > limits::kMaxTextLength) {
+Status Service::receive(const PeerId& peer, const WorkerHello& message) {
+  if (message.worker_id.empty() || message.worker_id.size() > limits::kMaxTextLength) {
     refuse(peer, {ErrorKind::bad_input, "a worker needs a name of at most 4096 bytes"});
     return {};
   }
-  // A name belongs to one process until that falls silent; a new connection of it keeps the name.
-  const WorkerHello* const known = peers_.hello_of(hello.worker_id);
-  if (known != nullptr && known->instance != hello.instance) {
-    refuse(peer,
-           {ErrorKind::usage,
-            fmt::format("worker {}: process {} on {} has this name; a worker needs one of its "
-                        "own, or waits until the other is silent",
-                        hello.worker_id, known->pid, known->host)});
-    return {};
-  }
-  const bool is_new = known == nullptr;
+  // A worker is the instance that it drew; its name is for people, and others may have it, too.
+  WorkerHello hello = message;
+  hello.worker_id = peers_.id_for(message);
+  const bool is_new = peers_.hello_of(hello.worker_id) == nullptr;
   if (is_new && peers_.num_workers() >= limits::kMaxWorkers) {
     refuse(peer,
            {ErrorKind::io, fmt::format("the farm is full: {} workers", peers_.num_workers())});
@@ -329,7 +300,7 @@ Status Service::perform(const RecordJobStatus& action) {
   spdlog::log(level, "job {}: {}", action.job.short_hex(), action.reason);
   // Before the status is durable: whoever is killed in between ends the job, and writes, again.
   const Scheduler::Job* job = scheduler_.find_job(action.job);
-  if (job != nullptr && !is_open(action.status)) {
+  if (job != nullptr && !is_open(action.status) && check_output_root(job->spec, options_.roots)) {
     const Status written = write_diagnostics(journal_, action.job, job->spec);
     if (!written) spdlog::warn("no diagnostics: {}", written.error().message);
   }

@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "common/job/job_json.h"
+#include "common/job/roots.h"
 #include "common/protocol/router.h"
 #include "common/store/blob_store.h"
 #include "coordinator/journal/journal.h"
@@ -26,6 +27,8 @@ struct ServiceOptions {
   std::chrono::milliseconds heartbeat{
       1000};                  ///< of workers; four silent ones lose a worker its leases
   bool mixed_builds = false;  ///< workers may be of other builds and instruction sets
+  ServerAccess access = {};   ///< who is let in
+  Roots roots = {};           ///< folders that jobs may read from and write to
 };
 
 /// The coordinator: one thread that turns messages into events, actions into messages. A turn of
@@ -66,6 +69,14 @@ class Service {
   Status receive_from(const std::string& worker, const TaskDone& message);
   Status receive_from(const std::string& worker, const TaskFailed& message);
   Status receive_from(const std::string& worker, const WorkerGoodbye& message);
+
+  // Who may do what (service_access.cpp).
+  template <class M>
+  bool is_allowed(const PeerId& peer);
+  Status check_own(const Digest& job) const;
+  Result<Digest> resolve_own(const std::string& text);
+  std::string owner_of(const Digest& job) const;
+  void tell_refusals();
 
   // Questions of anybody (service_jobs.cpp).
   Status receive(const PeerId& peer, const JobDocumentRequest& message);
@@ -129,6 +140,9 @@ class Service {
   Scheduler scheduler_;
   Peers peers_;
   OncePerPeer complained_, asked_for_hello_;
+  std::map<Digest, std::string> owners_;
+  Speaker speaker_;  ///< of the message that is being handled
+  std::map<std::string, TimePoint> told_refusals_;
   TimePoint next_tick_{};
   bool stop_requested_ = false;
 

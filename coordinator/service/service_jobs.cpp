@@ -22,6 +22,7 @@ constexpr int kMaxFailuresShown = 100;
 // ---- taking up the journal ----------------------------------------------------------------------
 
 Status Service::restore_jobs() {
+  BATON_ASSIGN(owners_, journal_.owners());
   BATON_ASSIGN(const std::vector<Digest> jobs, journal_.jobs());
   for (const Digest& job : jobs) BATON_TRY(restore_job(job));
   BATON_TRY(archive_ended());
@@ -71,6 +72,10 @@ Status Service::restore_job(const Digest& digest) {
 // ---- questions ----------------------------------------------------------------------------------
 
 Status Service::receive(const PeerId& peer, const JobDocumentRequest& message) {
+  if (const Status own = check_own(message.job); !own) {
+    refuse(peer, own.error());
+    return {};
+  }
   BATON_ASSIGN(std::optional<std::string> document, journal_.document(message.job));
   if (document) {
     reply(peer, JobDocument{message.job, std::move(*document)});
@@ -95,12 +100,18 @@ Status Service::receive(const PeerId& peer, const ListJobs& message) {
     for (const Bytes& bytes : ended) {
       ArchiveReader reader(bytes);
       reader(list.jobs.emplace_back());
-      if (!reader.complete()) list.jobs.pop_back();
+      if (!reader.complete()) {
+        list.jobs.pop_back();
+        continue;
+      }
+      list.jobs.back().owner = owner_of(list.jobs.back().job);
     }
   }
   BATON_ASSIGN(list.num_ended, journal_.num_archived());
-  for (const Digest& job : scheduler_.jobs())
+  for (const Digest& job : scheduler_.jobs()) {
     list.jobs.push_back(summarize(job, *scheduler_.find_job(job)));
+    list.jobs.back().owner = owner_of(job);
+  }
   list.workers = peers_.summaries();
   for (WorkerSummary& worker : list.workers) {
     worker.leases = static_cast<std::int32_t>(scheduler_.num_leases(worker.worker_id));
@@ -131,7 +142,7 @@ Status Service::receive(const PeerId& peer, const PauseJob& message) {
 }
 
 Status Service::receive(const PeerId& peer, const ResumeJob& message) {
-  const Result<Digest> job = resolve(message.job);
+  const Result<Digest> job = resolve_own(message.job);
   if (!job) {
     refuse(peer, job.error());
     return {};
@@ -154,7 +165,7 @@ Status Service::receive(const PeerId& peer, const ResumeJob& message) {
 }
 
 Status Service::receive(const PeerId& peer, const DeleteJob& message) {
-  const Result<Digest> job = resolve(message.job);
+  const Result<Digest> job = resolve_own(message.job);
   if (!job) {
     refuse(peer, job.error());
     return {};
@@ -169,6 +180,7 @@ Status Service::receive(const PeerId& peer, const DeleteJob& message) {
   BATON_ASSIGN(std::vector<Digest> kept, journal_.kept_blobs(*job));
   garbage_.insert(garbage_.end(), kept.begin(), kept.end());
   BATON_TRY(journal_.delete_job(*job));
+  owners_.erase(*job);
   remove_job_file(*job, JobStatus::cancelled);
   spdlog::info("job {} is deleted", job->short_hex());
   return receive(peer, ListJobs{});
@@ -206,7 +218,7 @@ Status Service::receive(const PeerId& peer, const StopCoordinator&) {
 /// Event E happens to the job whose ID begins with `prefix`; the answer shows what came of it.
 template <class E>
 Status Service::change_job(const PeerId& peer, const std::string& prefix) {
-  const Result<Digest> job = resolve(prefix);
+  const Result<Digest> job = resolve_own(prefix);
   if (!job) {
     refuse(peer, job.error());
     return {};
@@ -222,11 +234,13 @@ Status Service::answer_detail(const PeerId& peer, const Digest& job, std::string
                  journal_.recent_failures(job, kMaxFailuresShown));
     JobDetail detail = describe_job(scheduler_, job, failures);
     detail.plan = std::move(plan);
+    detail.summary.owner = owner_of(job);
     reply(peer, std::move(detail));
     return {};
   }
   BATON_ASSIGN(std::optional<JobDetail> detail, archived_detail(job));
   if (detail) {
+    detail->summary.owner = owner_of(job);
     reply(peer, std::move(*detail));
   } else {
     refuse(peer, {ErrorKind::bad_input,

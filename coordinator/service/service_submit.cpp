@@ -149,7 +149,9 @@ Result<std::vector<std::string>> Service::make_way(const ParsedJobDocument& docu
     }
     if (!other.differing.empty() && !restart)
       return another_picture(document.job, other, former->document.job);
-    if (!other.written.empty() || other.busy) others.push_back(std::move(other));
+    if (other.written.empty() && !other.busy) continue;
+    if (is_open(other.status) || !other.differing.empty()) BATON_TRY(check_own(digest));
+    others.push_back(std::move(other));
   }
 
   for (const Neighbour& other : others) {
@@ -194,6 +196,11 @@ Status Service::receive(const PeerId& peer, const SubmitJob& message) {
     refuse(peer, document.error());
     return {};
   }
+  if (const Status within = check_roots(*document, options_.roots); !within) {
+    spdlog::warn("refused: job '{}': {}", document->job.name, within.error().message);
+    refuse(peer, within.error());
+    return {};
+  }
   if (const std::int64_t count = count_tasks(document->job); count > limits::kMaxTasksPerJob) {
     refuse(
         peer,
@@ -202,7 +209,14 @@ Status Service::receive(const PeerId& peer, const SubmitJob& message) {
                      document->digest.short_hex(), count, limits::kMaxTasksPerJob)});
     return {};
   }
-  if (scheduler_.find_job(document->digest) != nullptr) return go_on(peer, document->digest);
+  const Scheduler::Job* const known = scheduler_.find_job(document->digest);
+  if (known != nullptr) {
+    if (const Status own = check_own(document->digest); known->status != JobStatus::running && !own) {
+      refuse(peer, own.error());
+      return {};
+    }
+    return go_on(peer, document->digest);
+  }
 
   if (scheduler_.num_jobs() >= limits::kMaxJobs) {
     refuse(peer, {ErrorKind::io,
@@ -211,7 +225,8 @@ Status Service::receive(const PeerId& peer, const SubmitJob& message) {
   }
   Result<std::vector<std::string>> reasons = make_way(*document, message.restart);
   if (!reasons) {
-    if (reasons.error().kind != ErrorKind::bad_input) return reasons.error();
+    const ErrorKind kind = reasons.error().kind;
+    if (kind != ErrorKind::bad_input && kind != ErrorKind::usage) return reasons.error();
     refuse(peer, reasons.error());
     return {};
   }
@@ -328,6 +343,10 @@ Status Service::take_over(const Adoption& adoption, const std::vector<Digest>& f
     BATON_TRY(journal_.add_job(event.job, text, {event.spec.name, folder_of(event.spec)}));
   }
   BATON_TRY(journal_.record_plan(event.job, adoption.plan));
+  if (!speaker_.name.empty() && !owners_.contains(event.job)) {
+    owners_[event.job] = speaker_.name;
+    BATON_TRY(journal_.record_owner(event.job, speaker_.name));
+  }
   event.spec.leading_runs = adoption.plan.leading_runs;
   event.plan = adoption.plan;
   for (const Completion& completion : taken) {

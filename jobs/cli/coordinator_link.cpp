@@ -4,11 +4,18 @@
 
 namespace baton {
 
-void add_coordinator_option(CLI::App& command, std::string& endpoint) {
-  endpoint = "tcp://127.0.0.1:5570";
-  command.add_option("--coordinator", endpoint, "endpoint of the coordinator")
+Result<RequestClient> CoordinatorLink::connect() const {
+  BATON_ASSIGN(const ClientAccess access, client_access(key_file, insecure));
+  return RequestClient::connect(endpoint, access);
+}
+
+void add_coordinator_options(CLI::App& command, CoordinatorLink& link) {
+  command.add_option("--coordinator", link.endpoint, "endpoint of the coordinator")
       ->envname("BATON_COORDINATOR")
       ->capture_default_str();
+  command.add_option("--key", link.key_file, "user.key or admin.key of `baton key create`")
+      ->envname("BATON_KEY");
+  command.add_flag("--insecure", link.insecure, "connect to another machine without a key");
 }
 
 ExitCode finish_with_coordinator(const Result<ExitCode>& outcome) {

@@ -10,9 +10,18 @@
 
 namespace baton {
 
-/// Adds --coordinator; the environment's BATON_COORDINATOR and then tcp://127.0.0.1:5570 stand in
-/// for it.
-void add_coordinator_option(CLI::App& command, std::string& endpoint);
+/// Which coordinator, and how to be let in.
+struct CoordinatorLink {
+  std::string endpoint = "tcp://127.0.0.1:5570";
+  std::string key_file;
+  bool insecure = false;
+
+  Result<RequestClient> connect() const;
+};
+
+/// Adds --coordinator, --key and --insecure; the environment's BATON_COORDINATOR and BATON_KEY
+/// stand in for the first two.
+void add_coordinator_options(CLI::App& command, CoordinatorLink& link);
 
 /// Asks for an answer of type A. Errors: those of RequestClient::request; internal when another
 /// type came.

@@ -24,7 +24,7 @@ constexpr std::chrono::milliseconds kPollInterval{500};
 constexpr std::chrono::minutes kAwayPatience{5};
 
 struct JobOptions {
-  std::string endpoint;
+  CoordinatorLink link;
   std::string job;                ///< name, digest or its beginning
   JobArgument wanted;             ///< of submit
   double timeout_s = 0;           ///< of wait; 0: none
@@ -83,6 +83,7 @@ void print_detail(const JobDetail& detail, bool json) {
   if (json) return fmt::print("{}\n", detail_json(detail).dump(2));
   fmt::print("{}\n", job_line(detail.summary));
   fmt::print("output     {}\n", detail.summary.output_directory);
+  if (!detail.summary.owner.empty()) fmt::print("owner      {}\n", detail.summary.owner);
   if (!detail.frames_done.empty()) fmt::print("frames     {}\n", format_frames(detail.frames_done));
   fmt::print("{}{}", job_statistics(detail.summary), judgement_text(detail));
   if (!detail.waits.empty()) fmt::print("waits      {}\n", detail.waits);
@@ -179,7 +180,7 @@ Result<ExitCode> delete_jobs(const JobOptions& options, RequestClient& client) {
 using Action = Result<ExitCode> (*)(const JobOptions&, RequestClient&);
 
 Result<ExitCode> run_job(const JobOptions& options, Action action) {
-  BATON_ASSIGN(RequestClient client, RequestClient::connect(options.endpoint));
+  BATON_ASSIGN(RequestClient client, options.link.connect());
   return action(options, client);
 }
 
@@ -203,7 +204,7 @@ void add_job_command(CLI::App& app, ExitCode& code) {
       command->add_option(argument, options->job, "job: its name, its ID, or the beginning of that")
           ->required();
     }
-    add_coordinator_option(*command, options->endpoint);
+    add_coordinator_options(*command, options->link);
     command->add_flag("--json", options->json, "for machines");
     command->callback(
         [options, action, &code] { code = finish_with_coordinator(run_job(*options, action)); });

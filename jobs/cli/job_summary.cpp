@@ -189,6 +189,7 @@ ordered_json summary_json(const JobSummary& job) {
   const RenderStats& s = job.stats;
   ordered_json result = {{"id", job.job.hex()},
                          {"name", job.name},
+                         {"owner", job.owner},
                          {"status", job_status_name(job.status)},
                          {"priority", job.priority},
                          {"outputDirectory", job.output_directory},

@@ -61,6 +61,7 @@ Result<LocalFarm::Lock> LocalFarm::lock_directory(const fs::path& directory) {
 }
 
 Result<LocalFarm> LocalFarm::start(const FarmOptions& options) {
+  ::unsetenv("BATON_KEY");  // nobody else reaches this farm, and one key does not fit all
   BATON_ASSIGN(const std::string coordinator, sibling_program("baton-coordinator"));
   BATON_ASSIGN(const std::string worker, sibling_program("baton-worker"));
   BATON_ASSIGN(Lock lock, lock_directory(options.work_directory));

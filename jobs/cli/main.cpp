@@ -30,6 +30,7 @@ constexpr const char* kFooter = R"(Examples:
   baton job submit job.json          hands the job to a coordinator (see --coordinator)
   baton job list
   baton worker list
+  baton key create keys              keys for a farm of several machines
   baton chart study.json             error against time of several methods, as charts
   baton compare a.json b.json        two ways to render the same frames, side by side
   baton state show STATE.blob        what samples a tile hands to its next frame
@@ -68,6 +69,7 @@ int main(int argc, char** argv) {
   baton::add_render_command(app, code);
   baton::add_job_command(app, code);
   baton::add_worker_command(app, code);
+  baton::add_key_command(app, code);
   baton::add_state_command(app, code);
   baton::add_chart_command(app, code);
   baton::add_compare_command(app, code);

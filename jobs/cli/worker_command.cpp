@@ -10,7 +10,7 @@ namespace {
 using nlohmann::ordered_json;
 
 struct WorkerCommandOptions {
-  std::string endpoint;
+  CoordinatorLink link;
   std::string worker_id;
   bool json = false;
 };
@@ -27,7 +27,7 @@ void print_workers(const std::vector<WorkerSummary>& workers, bool json) {
 
 /// question: ListJobs or DrainWorker.
 Result<ExitCode> ask_for_workers(const WorkerCommandOptions& options, const Message& question) {
-  BATON_ASSIGN(RequestClient client, RequestClient::connect(options.endpoint));
+  BATON_ASSIGN(RequestClient client, options.link.connect());
   BATON_ASSIGN(const JobList found, ask<JobList>(client, question));
   print_workers(found.workers, options.json);
   return ExitCode::ok;
@@ -49,7 +49,7 @@ void add_worker_command(CLI::App& app, ExitCode& code) {
       "drain", "Lets a worker finish what it renders, then end; its other tasks go to others");
   drain->add_option("NAME", options->worker_id, "as listed")->required();
   for (CLI::App* command : {list, drain}) {
-    add_coordinator_option(*command, options->endpoint);
+    add_coordinator_options(*command, options->link);
     command->add_flag("--json", options->json, "for machines");
   }
   list->callback(

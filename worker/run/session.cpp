@@ -184,9 +184,11 @@ void Session::receive(const Shutdown&, TimePoint, Actions& actions) {
 }
 
 void Session::receive(const Refused& refused, TimePoint, Actions& actions) {
-  // Another version will not change its mind; anything else is worth a line in the log.
-  if (refused.kind == static_cast<std::uint8_t>(ErrorKind::version)) {
-    actions.push_back(Leave{exit_code_of(ErrorKind::version), refused.message});
+  // Another version, or a key that is not that of a worker, will not change its mind; anything else
+  // is worth a line in the log.
+  const auto kind = static_cast<ErrorKind>(refused.kind);
+  if (kind == ErrorKind::version || kind == ErrorKind::usage) {
+    actions.push_back(Leave{exit_code_of(kind), refused.message});
   } else {
     actions.push_back(Warn{refused.message});
   }

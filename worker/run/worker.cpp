@@ -91,7 +91,7 @@ constexpr std::chrono::minutes kLoadPatience{15};
 /// Runs a task on a render thread. The command that repeats it stands in its error message and,
 /// should the process die, in the crash report.
 Result<TaskOutput> execute_pooled(const PooledTask& task, std::stop_token stop, NoteLog& notes,
-                                  TaskWatch& watch) {
+                                  TaskWatch& watch, const Roots& roots) {
   // The time that a task may take does not include the loading of its job, which has its own.
   LoadedJobPtr loaded;
   {
@@ -103,6 +103,8 @@ Result<TaskOutput> execute_pooled(const PooledTask& task, std::stop_token stop, 
       watch, task.lease,
       std::chrono::steady_clock::now() + std::chrono::seconds(loaded->job.max_seconds_per_task));
   const TaskKey& key = task.lease.task;
+  // Again for each frame: links may have changed.
+  BATON_TRY(check_output_root(loaded->job, roots));
   if (key.kind == TaskKind::assemble) {
     return execute_task(*loaded, *task.store, key, task.inputs, task.frames, stop);
   }
@@ -151,13 +153,16 @@ class Worker {
   Worker(WorkerChannel channel, const WorkerOptions& options)
       : channel_(std::move(channel)),
         session_(session_options(options), now()),
-        jobs_([this](const Digest& digest, const std::string& document) {
+        roots_(options.roots),
+        jobs_([this](const Digest& digest, const std::string& document) -> Result<LoadedJobPtr> {
+          BATON_ASSIGN(const ParsedJobDocument parsed, parse_job_document(document));
+          BATON_TRY(check_roots(parsed, roots_));
           return load_job_document(digest, document, shelf_);
         }),
         pool_(
             options.num_threads,
             [this](const PooledTask& task, std::stop_token stop) {
-              return execute_pooled(task, std::move(stop), notes_, watch_);
+              return execute_pooled(task, std::move(stop), notes_, watch_, roots_);
             },
             [this](std::span<const PooledTask> tasks) { return publish_pooled(tasks, watch_); },
             [this] { channel_.wake(); }) {}
@@ -172,6 +177,7 @@ class Worker {
         step(TaskEnded{ended.lease, std::move(ended.result)});
       }
       end_overdue_tasks();
+      heed_refusals();
       if (drain && !std::exchange(draining, true)) step(DrainRequested{});
       step(Tick{});
       if (leave_) break;
@@ -213,6 +219,18 @@ class Worker {
     spdlog::critical("ends: a task has not stopped {} s after its time was up",
                      TaskWatch::kStopPatience.count());
     std::_Exit(static_cast<int>(ExitCode::failed));
+  }
+
+  /// A key that the coordinator does not know will not be known soon; what else broke a connection
+  /// off may pass.
+  void heed_refusals() {
+    const std::optional<Error> refusal = channel_.take_refusal();
+    if (!refusal) return;
+    if (refusal->kind == ErrorKind::usage) {
+      leave_ = Leave{exit_code_of(refusal->kind), refusal->message};
+    } else {
+      notes_.report({refusal->message});
+    }
   }
 
   void step(const SessionEvent& event) {
@@ -259,6 +277,7 @@ class Worker {
 
   WorkerChannel channel_;
   Session session_;
+  const Roots roots_;
   AssetShelf shelf_;  ///< what jobs_ loads from
   JobCache jobs_;
   std::shared_ptr<BlobStore> store_;
@@ -276,7 +295,7 @@ std::string describe_worker() {
 }
 
 ExitCode run_worker(const WorkerOptions& options, const std::atomic<bool>& drain) {
-  Result<WorkerChannel> channel = WorkerChannel::connect(options.endpoint);
+  Result<WorkerChannel> channel = WorkerChannel::connect(options.endpoint, options.access);
   if (!channel) {
     spdlog::error("{}", channel.error().message);
     return exit_code_of(channel.error().kind);

@@ -5,13 +5,17 @@
 #include <string>
 
 #include "common/base/exit_codes.h"
+#include "common/job/roots.h"
+#include "common/protocol/keys.h"
 
 namespace baton {
 
 struct WorkerOptions {
   std::string endpoint;   ///< of the coordinator, e.g. "tcp://127.0.0.1:5570"
   int num_threads = 1;    ///< render threads, at least 1
-  std::string worker_id;  ///< unique in the farm; empty: host and process id
+  std::string worker_id;  ///< for people; empty: host and process id
+  ClientAccess access = {};
+  Roots roots = {};  ///< folders that jobs may read from and write to; empty: all
   std::chrono::seconds give_up{
       60};  ///< silence of the coordinator after which the worker ends; 0: never
 };

@@ -246,24 +246,29 @@ TEST_F(ServiceTest, AWorkerIsDrainedByItsName) {
   EXPECT_EQ(unknown.message, "worker 'mil': no worker has this name");
 }
 
-// A name belongs to one process; another one gets it when the first has fallen silent.
-TEST_F(ServiceTest, ANameIsRefusedToASecondProcessWhileTheFirstLives) {
+// A name is for people: two processes of one name on one host work side by side.
+TEST_F(ServiceTest, TwoWorkersOfOneNameWorkSideBySide) {
   const RunningService service(options);
   FakeWorker first(service.endpoint(), store(), job), second(service.endpoint(), store(), job);
-  first.hello();
+  first.hello({}, 1);
   first.expect<WorkerWelcome>();
   second.hello({}, 2);
-  EXPECT_THAT(second.expect<Refused>().message, HasSubstr("process 1 on host has this name"));
-  first.hello();
-  first.expect<WorkerWelcome>();
+  second.expect<WorkerWelcome>();
+  const JobAccepted accepted = ask<JobAccepted>(service.endpoint(), SubmitJob{document});
+  first.say(LeaseRequest{1});
+  second.say(LeaseRequest{1});
+  const LeaseId one = first.expect<LeaseGrant>().lease, other = second.expect<LeaseGrant>().lease;
+  EXPECT_NE(one, other);
 
-  const auto deadline = std::chrono::steady_clock::now() + kPatience;
-  bool welcome = false;
-  while (!welcome && std::chrono::steady_clock::now() < deadline) {
-    second.hello({}, 2);
-    welcome = second.answers<WorkerWelcome>(kHeartbeat);
-  }
-  EXPECT_TRUE(welcome);
+  // A hello of either takes nothing from the other.
+  first.hello({one}, 1);
+  first.expect<WorkerWelcome>();
+  const JobList list = ask<JobList>(service.endpoint(), ListJobs{});
+  ASSERT_THAT(list.workers, SizeIs(2));
+  EXPECT_EQ(list.workers[0].worker_id, "w");
+  EXPECT_EQ(list.workers[1].worker_id, "w#00000002");
+  for (const WorkerSummary& worker : list.workers) EXPECT_EQ(worker.leases, 1);
+  EXPECT_EQ(show(service.endpoint(), accepted.job).summary.attempts_lost, 0u);
 }
 
 TEST_F(ServiceTest, AWorkerOfAnotherBuildIsRefusedUnlessBuildsMayMix) {

@@ -1,0 +1,59 @@
+#pragma once
+
+#include <type_traits>
+
+#include "common/protocol/keys.h"
+#include "common/protocol/messages.h"
+
+namespace baton {
+
+/// own: of jobs that the same name submitted.
+enum class May : std::uint8_t { no, own, yes };
+
+/// What each role may say to a coordinator: the table.
+struct Rights {
+  const char* what;
+  May worker, user, admin;
+};
+template <class M>
+inline constexpr Rights kRights{"say this", May::yes, May::yes,
+                                May::yes};  // refused as not for a coordinator
+
+// clang-format off
+//                                                                              worker    user      admin
+template <> inline constexpr Rights kRights<WorkerHello>        {"work",          May::yes, May::no,  May::no};
+template <> inline constexpr Rights kRights<LeaseRequest>       {"work",          May::yes, May::no,  May::no};
+template <> inline constexpr Rights kRights<Heartbeat>          {"work",          May::yes, May::no,  May::no};
+template <> inline constexpr Rights kRights<TaskDone>           {"work",          May::yes, May::no,  May::no};
+template <> inline constexpr Rights kRights<TaskFailed>         {"work",          May::yes, May::no,  May::no};
+template <> inline constexpr Rights kRights<WorkerGoodbye>      {"work",          May::yes, May::no,  May::no};
+template <> inline constexpr Rights kRights<JobDocumentRequest> {"read jobs",     May::yes, May::own, May::yes};
+template <> inline constexpr Rights kRights<SubmitJob>          {"submit jobs",   May::no,  May::own, May::yes};
+template <> inline constexpr Rights kRights<ListJobs>           {"list jobs",     May::no,  May::yes, May::yes};
+template <> inline constexpr Rights kRights<ShowJob>            {"look at jobs",  May::no,  May::yes, May::yes};
+template <> inline constexpr Rights kRights<PauseJob>           {"pause jobs",    May::no,  May::own, May::yes};
+template <> inline constexpr Rights kRights<ResumeJob>          {"resume jobs",   May::no,  May::own, May::yes};
+template <> inline constexpr Rights kRights<CancelJob>          {"cancel jobs",   May::no,  May::own, May::yes};
+template <> inline constexpr Rights kRights<DeleteJob>          {"delete jobs",   May::no,  May::own, May::yes};
+template <> inline constexpr Rights kRights<DrainWorker>        {"drain workers", May::no,  May::no,  May::yes};
+template <> inline constexpr Rights kRights<StopCoordinator>    {"stop the farm", May::no,  May::no,  May::yes};
+// clang-format on
+
+/// What the speaker may do with a message of type M. Who has no name has no key: where there are no
+/// keys, everybody is everything.
+template <class M>
+May may_say(const Speaker& speaker) {
+  if (speaker.name.empty()) return May::yes;
+  constexpr Rights rights = kRights<M>;
+  switch (speaker.role) {
+    case Role::worker:
+      return rights.worker;
+    case Role::user:
+      return rights.user;
+    case Role::admin:
+      return rights.admin;
+  }
+  return May::no;
+}
+
+}  // namespace baton

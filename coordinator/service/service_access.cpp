@@ -1,0 +1,90 @@
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include "coordinator/service/job_report.h"
+#include "coordinator/service/permissions.h"
+#include "coordinator/service/service.h"
+
+namespace baton {
+namespace {
+
+/// A refusal that comes again, as one does each time that a stranger tries, is told so often.
+constexpr std::chrono::minutes kRefusalInterval{1};
+constexpr std::size_t kMaxToldRefusals = 100;
+
+}  // namespace
+
+/// Refuses, and logs, what the speaker may not say.
+template <class M>
+bool Service::is_allowed(const PeerId& peer) {
+  if (may_say<M>(speaker_) != May::no) return true;
+  const std::string text =
+      fmt::format("{} '{}' may not {}", role_name(speaker_.role), speaker_.name, kRights<M>.what);
+  if (complained_.first(peer)) spdlog::warn("refused: {}", text);
+  refuse(peer, {ErrorKind::usage, text});
+  return false;
+}
+
+Status Service::handle(const Incoming& incoming) {
+  const PeerId& peer = incoming.peer;
+  if (!incoming.message) {
+    if (complained_.first(peer)) spdlog::warn("bad message: {}", incoming.message.error().message);
+    refuse(peer, incoming.message.error());
+    return {};
+  }
+  const std::string worker = peers_.worker_of(peer);
+  speaker_ = incoming.speaker;
+  return std::visit(
+      [&](const auto& message) -> Status {
+        if (!is_allowed<std::decay_t<decltype(message)>>(peer)) return {};
+        if constexpr (requires { this->receive(peer, message); }) {
+          return receive(peer, message);
+        } else if constexpr (requires { this->receive_from(worker, message); }) {
+          if (!worker.empty()) return receive_from(worker, message);
+          if (asked_for_hello_.first(peer)) reply(peer, HelloAgain{});
+        } else {
+          refuse(peer, {ErrorKind::bad_input, "this message is not for a coordinator"});
+        }
+        return {};
+      },
+      *incoming.message);
+}
+
+std::string Service::owner_of(const Digest& job) const {
+  const auto found = owners_.find(job);
+  return found == owners_.end() ? std::string() : found->second;
+}
+
+/// usage: the speaker is a user, and the job somebody else's.
+Status Service::check_own(const Digest& job) const {
+  if (speaker_.name.empty() || speaker_.role != Role::user) return {};
+  const std::string owner = owner_of(job);
+  if (owner == speaker_.name) return {};
+  return Error{ErrorKind::usage,
+               fmt::format("job {} belongs to {}: user '{}' may not change it", job.short_hex(),
+                           owner.empty() ? "nobody" : fmt::format("'{}'", owner), speaker_.name)};
+}
+
+/// The job that is meant, if the speaker may change it.
+Result<Digest> Service::resolve_own(const std::string& text) {
+  BATON_ASSIGN(const Digest job, resolve(text));
+  if (const Status own = check_own(job); !own) {
+    spdlog::warn("refused: {}", own.error().message);
+    return own.error();
+  }
+  return job;
+}
+
+/// Logs which connections were refused.
+void Service::tell_refusals() {
+  const std::optional<Error> refusal = router_.take_refusal();
+  if (!refusal) return;
+  const TimePoint now = std::chrono::steady_clock::now();
+  if (told_refusals_.size() >= kMaxToldRefusals) told_refusals_.clear();
+  const auto [told, is_new] = told_refusals_.try_emplace(refusal->message, now);
+  if (!is_new && now - told->second < kRefusalInterval) return;
+  told->second = now;
+  spdlog::warn("refused: {}", refusal->message);
+}
+
+}  // namespace baton

@@ -1,0 +1,54 @@
+#include <fmt/format.h>
+
+#include <map>
+#include <memory>
+
+#include "common/protocol/keys.h"
+#include "jobs/cli/commands.h"
+
+namespace baton {
+namespace {
+
+struct KeyOptions {
+  std::string folder;
+  Speaker speaker{Role::user, ""};
+};
+
+Result<ExitCode> create(const KeyOptions& options) {
+  BATON_TRY(create_keys(options.folder));
+  fmt::print(
+      "{0}/server.key   for baton-coordinator\n{0}/worker.key   for every baton-worker\n"
+      "{0}/user.key     for `baton`: submits jobs and looks after its own\n"
+      "{0}/admin.key    for `baton`: everything\n",
+      options.folder);
+  return ExitCode::ok;
+}
+
+Result<ExitCode> add(const KeyOptions& options) {
+  BATON_TRY(add_key(options.folder, options.speaker));
+  fmt::print("{}/{}.key   {}; the coordinator lets it in when it is started again\n",
+             options.folder, options.speaker.name, role_name(options.speaker.role));
+  return ExitCode::ok;
+}
+
+}  // namespace
+
+void add_key_command(CLI::App& app, ExitCode& code) {
+  auto options = std::make_shared<KeyOptions>();
+  CLI::App* key = app.add_subcommand("key", "Makes keys for a farm of several machines");
+  key->require_subcommand(1);
+  CLI::App* made =
+      key->add_subcommand("create", "Keys of a coordinator, its workers and its users");
+  CLI::App* added = key->add_subcommand("add", "One more key, with a name of its own");
+  for (CLI::App* command : {made, added})
+    command->add_option("FOLDER", options->folder, "where the keys are kept")->required();
+  added->add_option("NAME", options->speaker.name, "whose key it is")->required();
+  added->add_option("--role", options->speaker.role, "worker, user or admin")
+      ->transform(CLI::CheckedTransformer(std::map<std::string, Role>{
+          {"worker", Role::worker}, {"user", Role::user}, {"admin", Role::admin}}))
+      ->default_str("user");
+  made->callback([options, &code] { code = finish(create(*options)); });
+  added->callback([options, &code] { code = finish(add(*options)); });
+}
+
+}  // namespace baton

@@ -1,0 +1,208 @@
+#!/usr/bin/env python3
+"""Who may do what: keys, roles, owners and roots, as people and logs see them."""
+
+import json
+import os
+import time
+
+from farm import (BAD_INPUT, DEADLINE_S, OK, UNAVAILABLE, USAGE, Farm, Process, check, check_equal, make_job, run_tests,
+                  wait_until, write_job)
+
+
+class KeyedFarm(Farm):
+    """A farm on loopback whose coordinator and workers have keys."""
+
+    def __init__(self, programs, folder, coordinator_options=(), worker_options=()):
+        super().__init__(programs, folder)
+        self.keys = self.folder / "keys"
+        self.coordinator_options, self.worker_options = coordinator_options, worker_options
+        programs.run("baton", "key", "create", self.keys)
+
+    def key(self, name):
+        return str(self.keys / f"{name}.key")
+
+    def start_coordinator(self):
+        self.endpoint = f"tcp://127.0.0.1:{self._port}"
+        self.coordinator = Process([self.programs.path("baton-coordinator"), "--listen", self.endpoint, "--work-dir",
+                                    str(self.work_folder), "--key", self.key("server"), *self.coordinator_options],
+                                   self.folder / "coordinator.log")
+        wait_until(lambda: self.speak("admin", "job", "list", expect=None).returncode == OK, "the coordinator answers")
+
+    def start_worker(self, name="worker0", key="worker"):
+        self.workers.append(Process([self.programs.path("baton-worker"), "--coordinator", self.endpoint, "--threads", "1",
+                                     "--name", name, "--key", self.key(key), *self.worker_options],
+                                    self.folder / f"{name}-{len(self.workers)}.log"))
+        return self.workers[-1]
+
+    def speak(self, key, *words, **options):
+        """The command line with one of the keys."""
+        return self.baton(*words, "--key", self.key(key), **options)
+
+    def refused(self, key, *words, says, expect=USAGE):
+        """The command line gets one line, which says so."""
+        answer = self.speak(key, *words, expect=expect)
+        check(says in answer.stderr and len(answer.stderr.strip().splitlines()) == 1, f"{words}: {answer.stderr}")
+
+
+def small(folder, **changes):
+    return write_job(folder / "job.json", make_job(folder, frames="1-2", image={"tileSize": 80}, **changes))
+
+
+def roles_decide_who_may_do_what(programs, folder):
+    path = small(folder / "job")
+    with KeyedFarm(programs, folder) as farm:
+        programs.run("baton", "key", "add", farm.keys, "anna")
+        farm.start_coordinator()
+        farm.start_worker()
+        job = json.loads(farm.speak("user", "job", "submit", path, "--json").stdout)["id"]
+        farm.speak("user", "job", "wait", job)
+        check_equal(json.loads(farm.speak("anna", "job", "show", job, "--json").stdout)["owner"], "user", "the owner")
+
+        # A user's key stops nothing that is not its own; a worker's key asks for nothing.
+        farm.refused("user", "worker", "drain", "worker0", says="user 'user' may not drain workers")
+        farm.refused("anna", "job", "cancel", job, says="belongs to 'user': user 'anna' may not change it")
+        farm.refused("anna", "job", "delete", job, says="user 'anna' may not change it")
+        farm.refused("anna", "job", "submit", small(folder / "job", seed=8), "--restart",
+                     says="user 'anna' may not change it")
+        farm.refused("worker", "job", "list", says="worker 'worker' may not list jobs")
+        stranger = farm.start_worker("stranger", key="user")
+        check_equal(stranger.wait(), USAGE, "exit code of a worker with a user's key")
+        check("user 'user' may not work" in stranger.log(), stranger.log())
+        for line in ("refused: user 'user' may not drain workers", "user 'anna' may not change it",
+                     "refused: worker 'worker' may not list jobs", "refused: user 'user' may not work"):
+            check(line in farm.coordinator.log(), f"not logged: {line}\n{farm.coordinator.log()}")
+
+        # The owner outlasts the coordinator; an admin may do everything.
+        farm.coordinator.kill()
+        farm.start_coordinator()
+        farm.refused("anna", "job", "delete", job, says="belongs to 'user'")
+        farm.speak("admin", "job", "delete", job)
+        wait_until(lambda: "worker0" in farm.speak("admin", "worker", "list").stdout, "the worker is back")
+        farm.speak("admin", "worker", "drain", "worker0")
+        check_equal(farm.workers[0].wait(), OK, "exit code of the drained worker")
+
+
+def without_the_right_key_nobody_comes_in(programs, folder):
+    with KeyedFarm(programs, folder) as farm:
+        farm.start_coordinator()
+        programs.run("baton", "key", "create", folder / "other")
+        for options in (["--key", folder / "other/admin.key"], []):
+            answer = farm.baton("job", "list", *options, expect=UNAVAILABLE)
+            check("either side may lack a key" in answer.stderr, answer.stderr)
+        programs.run("baton", "key", "add", farm.keys, "late", "--role", "admin")
+        farm.refused("late", "job", "list", says="the coordinator does not know this key")
+        late = farm.start_worker("late", key="late")
+        check_equal(late.wait(), USAGE, "exit code of a worker whose key is not known")
+        check("does not know this key" in late.log(), late.log())
+        for line in ("refused: a connection from 127.0.0.1: its key is not known here",
+                     "refused: a connection: it has no key, or not one for this coordinator"):
+            wait_until(lambda line=line: line in farm.coordinator.log(), f"the log has: {line}")
+        # Who reads the file of keys anew knows the new one.
+        farm.coordinator.kill()
+        farm.start_coordinator()
+        farm.speak("late", "job", "list")
+
+
+def other_machines_need_keys(programs, folder):
+    folder.mkdir(parents=True)
+    for program, *words in (("baton-coordinator", "--listen", "tcp://*:*", "--work-dir", folder / "work"),
+                            ("baton-worker", "--coordinator", "tcp://192.0.2.1:5570"),
+                            ("baton", "job", "list", "--coordinator", "tcp://192.0.2.1:5570")):
+        refused = programs.run(program, *words, expect=USAGE)
+        check("other machines reach it, so it needs a key" in refused.stderr + refused.stdout, refused.stderr)
+    coordinator = Process([programs.path("baton-coordinator"), "--listen", "tcp://*:*", "--work-dir", str(folder / "work"),
+                           "--insecure"], folder / "insecure.log")
+    wait_until(lambda: "listening on" in coordinator.log(), "it listens all the same")
+    coordinator.kill()
+    check("INSECURE" in coordinator.log(), coordinator.log())
+
+    # A key that others may read, and one of another kind.
+    programs.run("baton", "key", "create", folder / "keys")
+    again = programs.run("baton", "key", "create", folder / "keys", expect=USAGE)
+    check("a key is not replaced" in again.stderr, again.stderr)
+    wrong = programs.run("baton", "job", "list", "--key", folder / "keys/server.key", expect=USAGE)
+    check("is the key of a coordinator" in wrong.stderr, wrong.stderr)
+    os.chmod(folder / "keys/user.key", 0o644)
+    open_key = programs.run("baton", "job", "list", "--key", folder / "keys/user.key", expect=USAGE)
+    check("chmod 600" in open_key.stderr, open_key.stderr)
+
+    # A key of the environment is not that of a farm of this machine alone.
+    os.environ["BATON_KEY"] = str(folder / "keys/admin.key")
+    try:
+        programs.render(small(folder / "job"), folder / "render")
+    finally:
+        del os.environ["BATON_KEY"]
+
+
+def jobs_stay_within_the_roots(programs, folder):
+    shows, elsewhere = folder / "shows", folder / "elsewhere"
+    elsewhere.mkdir(parents=True)
+    inside = small(shows / "job")
+    (shows / "way out").symlink_to(elsewhere)
+    outside = elsewhere / "frames"
+    with KeyedFarm(programs, folder / "farm", ["--root", str(shows)], ["--root", str(shows)]) as farm:
+        farm.start_coordinator()
+        worker = farm.start_worker()
+
+        def refused(says, **changes):
+            path = write_job(shows / "bad.json", make_job(shows / "job", frames="1-2", **changes))
+            farm.refused("user", "job", "submit", path, says=says, expect=BAD_INPUT)
+            check("refused: job 'system test'" in farm.coordinator.log(), "not logged")
+
+        refused(f"output.directory {outside} lies outside what this farm allows", output={"directory": str(outside)})
+        refused(f"(which is {elsewhere})", output={"directory": str(shows / "way out")})
+        make_job(elsewhere)
+        refused(f"file {elsewhere / 'lamp.hdr'} lies outside",
+                environment={"keys": [{"frame": 1, "map": str(elsewhere / "lamp.hdr")}]})
+        check(not outside.exists(), "a frame was written outside")
+
+        # A link that is made after the job was accepted: the worker does not follow it.
+        job = json.loads(farm.speak("user", "job", "submit", inside, "--json").stdout)["id"]
+        farm.speak("user", "job", "wait", job)
+        frames = shows / "job/frames"
+        check_equal(len(list(frames.glob("*.exr"))), 2, "frames within the roots")
+        farm.coordinator.kill()
+        worker.kill()
+        for frame in frames.iterdir():
+            frame.unlink()
+        frames.rmdir()
+        farm.start_coordinator()
+        farm.speak("user", "job", "submit", inside)
+        frames.symlink_to(elsewhere)
+        worker = farm.start_worker("second")
+        wait_until(lambda: "lies outside" in worker.log(), "the worker refuses")
+        check(not list(elsewhere.glob("*.exr")), "a frame was written through a link")
+
+
+def two_workers_of_one_name_work_side_by_side(programs, folder):
+    path = write_job(folder / "job.json", make_job(folder, image={"tileSize": 16}))
+    with Farm(programs, folder / "farm") as farm:
+        farm.start_coordinator()
+        for number in range(2):
+            command = [programs.path("baton-worker"), "--coordinator", farm.endpoint, "--threads", "1", "--name", "twin"]
+            farm.workers.append(Process(command, farm.folder / f"twin{number}.log"))
+
+        def names():
+            return [worker["id"] for worker in json.loads(farm.baton("worker", "list", "--json").stdout)]
+        wait_until(lambda: len(names()) == 2, "both are there")
+        first, second = sorted(names())
+        check(first == "twin" and second.startswith("twin#"), f"names: {first}, {second}")
+        job = farm.submit(path)
+        seen = set()
+        end = time.monotonic() + DEADLINE_S
+        while farm.show(job)["status"] == "running" and time.monotonic() < end:
+            listed = json.loads(farm.baton("worker", "list", "--json").stdout)
+            seen |= {worker["id"] for worker in listed if worker["leases"] > 0}
+        shown = farm.show(job)
+        check_equal((shown["status"], shown["attemptsLost"]), ("done", 0), "the job")
+        check_equal(len(seen), 2, f"workers that had leases: {seen}")
+
+
+if __name__ == "__main__":
+    run_tests([
+        roles_decide_who_may_do_what,
+        without_the_right_key_nobody_comes_in,
+        other_machines_need_keys,
+        jobs_stay_within_the_roots,
+        two_workers_of_one_name_work_side_by_side,
+    ])
