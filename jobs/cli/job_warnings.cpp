@@ -10,6 +10,7 @@
 #include "common/job/job_fields.h"
 #include "common/job/sequence.h"
 #include "jobs/cli/text.h"
+#include "worker/scene/settle_scene.h"
 
 namespace baton {
 namespace {
@@ -104,6 +105,7 @@ std::vector<std::string> job_warnings(const JobSpec& job, const AssetReport& ass
         fmt::format("{} triangles without area are left out", assets.dropped_triangles));
   }
   warnings.insert(warnings.end(), assets.odd_objects.begin(), assets.odd_objects.end());
+  for (std::string& warning : gltf_warnings(job.scene)) warnings.push_back(std::move(warning));
   aov_warnings(job, warnings);
   output_warnings(job, warnings);
   return warnings;
