@@ -20,6 +20,10 @@ inline constexpr int kMaxFrameNumber = 9999999;
 inline constexpr int kMaxMaterials = 4096;
 inline constexpr int kMaxMeshes = 4096;
 inline constexpr int kMaxObjects = 100000;
+inline constexpr int kMaxGltfIndex = 1 << 24;  ///< of a mesh or a primitive of a file
+inline constexpr std::uint64_t kMaxGltfElements = 1ull << 28;  ///< of an accessor without a view
+inline constexpr std::size_t kMaxGltfKeys = 300000;  ///< of all objects: 40 MB of a job's document
+inline constexpr std::uint64_t kMaxGltfStride = 4096;  ///< bytes; the format allows 252
 inline constexpr int kMaxMetadata = 256;
 inline constexpr int kMaxNameLength = 100;
 inline constexpr int kMaxTextLength = 4096;
@@ -61,6 +65,9 @@ inline constexpr std::uint64_t kMaxRoundSurfaceBytes =
     1ull << 27;  ///< what a tile keeps of its rounds' surfaces from frame to frame
 inline constexpr std::uint64_t kMaxPresampledCacheBytes =
     1ull << 30;  ///< presampled light that a worker keeps, per job
+/// Of meshes in several places, in one flat hierarchy: some 600 MB. A second level costs a third of
+/// the shadow rays' speed.
+inline constexpr std::uint64_t kMaxCopiedTriangles = 4000000;
 inline constexpr std::size_t kMaxCachedPoses =
     16;  ///< frames whose moved geometry a worker keeps, per job
 inline constexpr int kMaxTasksPerJob = 4000000;

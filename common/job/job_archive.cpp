@@ -5,10 +5,6 @@
 #include <charconv>
 
 namespace baton {
-namespace {
-
-/// The double with the shortest decimal text that reads back as `value`: 0.8f becomes 0.8, not
-/// 0.800000011920929.
 double decimal(float value) {
   std::array<char, 32> text{};
   const auto written = std::to_chars(text.data(), text.data() + text.size(), value);
@@ -16,8 +12,6 @@ double decimal(float value) {
   std::from_chars(text.data(), written.ptr, result);
   return result;
 }
-
-}  // namespace
 
 void JobArchive::fault(std::string_view key, const std::string& expected, const std::string& got) {
   fault(key, fmt::format("expected {}, got {}", expected, got));

@@ -45,6 +45,10 @@ struct NumberRange {
   }
 };
 
+/// The double with the shortest decimal text that reads back as `value`: 0.8f becomes 0.8, not
+/// 0.800000011920929.
+double decimal(float value);
+
 /// How an object may be written besides `{...}`.
 struct ObjectForm {
   const char* shorthand = nullptr;  ///< a lone text means {shorthand: text}

@@ -106,7 +106,7 @@ void material_fields(JobArchive& a, SamplingSpec& sampling, const SceneSpec& sce
   const auto visit = [&](const std::string& name, MaterialSampling& material) {
     method_that_draws_anew(a, "method", material.method);
     count_fields(a, material);
-    if (scene.materials.contains(name)) return;
+    if (scene.materials.contains(name) || scene.gltf) return;
     std::vector<std::string> names;
     for (const auto& entry : scene.materials) names.push_back(entry.first);
     a.fault("", fmt::format("no such material in scene.materials{}", suggestion(name, names)));
@@ -264,8 +264,12 @@ void fields(JobArchive& a, JobSpec& job) {
   frame_fields(a, job);
   a.integer("seed", job.seed);
   a.object("image", [&] { fields(a, job.image); });
-  a.object("camera", [&] { fields(a, job.camera); });
+  const bool says_camera = a.object("camera", [&] { fields(a, job.camera); });
   a.object(required("scene"), [&] { fields(a, job.scene); }, {.file = true});
+  if (job.scene.gltf && !says_camera) job.camera.node = kFirstCamera;
+  if (!job.camera.node.empty() && !job.scene.gltf)
+    a.fault("camera", "no node, as there is no scene.gltf that has it",
+            fmt::format("\"{}\"", job.camera.node));
   a.object(required("environment"), [&] { fields(a, job.environment, job.frames); });
   a.object("motion", [&] { fields(a, job.motion); });
   a.object("sampling", [&] { fields(a, job.sampling, job.scene); });

@@ -62,6 +62,8 @@ void fields(JobArchive& a, CameraSpec& camera);
 void fields(JobArchive& a, MotionSpec& motion);
 /// Keys of an object, or where they come from.
 void motion_fields(JobArchive& a, ObjectSpec& object);
+/// Twelve numbers that need not be there.
+void matrix_field(JobArchive& a, Key key, std::optional<Matrix34>& matrix);
 /// A path whose name ends in one of `extensions`.
 void asset_path(JobArchive& a, Key key, std::string& path,
                 std::initializer_list<std::string_view> extensions);

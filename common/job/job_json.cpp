@@ -42,7 +42,8 @@ void fields(JobArchive& a, ParsedJobDocument& document) {
   a.list(required("assets"), document.assets, kMaxAssets,
          [&](AssetDigest& asset) { fields(a, asset); });
   if (!is_settled(document.job))
-    a.fault("job", "motion as keys, and motion.maxPx >= 1", "motion that is not settled");
+    a.fault("job", "meshes in place of scene.gltf, motion as keys, and motion.maxPx >= 1",
+            "a job that is not settled");
 }
 
 template <class T>
@@ -135,6 +136,7 @@ std::vector<std::string> asset_paths(const JobSpec& job) {
   for (const auto& item : job.scene.materials) {
     if (item.second.kind == MaterialKind::measured) paths.insert(item.second.file);
   }
+  for (const FileSpec& file : job.scene.files) paths.insert(file.path);
   for (const EnvironmentKey& key : job.environment.keys) paths.insert(key.map);
   return {paths.begin(), paths.end()};
 }

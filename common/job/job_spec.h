@@ -10,6 +10,7 @@
 
 #include "common/base/digest.h"
 #include "common/job/method.h"
+#include "common/job/scene_spec.h"
 #include "common/math/pixel_rect.h"
 #include "common/math/vec3.h"
 
@@ -64,17 +65,6 @@ struct MotionSpec {
   bool operator==(const MotionSpec&) const = default;
 };
 
-/// A node or camera of a glTF file whose animation gives the keys: one a frame, at (frame -
-/// start_frame) / fps seconds.
-struct GltfMotion {
-  std::string file;  ///< .gltf .glb
-  std::string node;  ///< its name in the file
-  float fps = 24;
-  int start_frame = 1;
-
-  bool operator==(const GltfMotion&) const = default;
-};
-
 // ---- camera
 // ------------------------------------------------------------------------------------------------
 struct CameraKey {
@@ -87,6 +77,9 @@ struct CameraKey {
   bool operator==(const CameraKey&) const = default;
 };
 
+/// See CameraSpec::node.
+inline constexpr const char* kFirstCamera = "*";
+
 /// With keys, these say where the camera is and what it looks at.
 struct CameraSpec {
   Vec3 position{0, 0, 5};
@@ -95,91 +88,10 @@ struct CameraSpec {
   float vertical_fov_deg = 40;    ///< (0, 180)
   std::vector<CameraKey> keys{};  ///< ascending frames
   std::optional<GltfMotion> gltf{};
+  /// The camera of scene.gltf that is taken, by the name of its node; kFirstCamera: the first one.
+  std::string node{};
 
   bool operator==(const CameraSpec&) const = default;
-};
-
-// ---- scene
-// -------------------------------------------------------------------------------------------------
-enum class MaterialKind : std::uint8_t { diffuse, phong, metallic_roughness, measured };
-
-/// diffuse: base_color is the albedo. phong: kd * base_color diffuse + ks * specular_color
-/// normalised lobe of `exponent`. metallic_roughness: GGX with base_color, metallic, roughness
-/// (glTF 2.0). measured: a table in the MERL binary format.
-struct MaterialSpec {
-  MaterialKind kind = MaterialKind::diffuse;
-  Rgb base_color{0.8f, 0.8f, 0.8f};
-  Rgb specular_color{1, 1, 1};  ///< phong
-  float kd = 0.5f;              ///< phong, [0, 1]
-  float ks = 0.5f;              ///< phong, [0, 1]; kd + ks <= 1
-  float exponent = 50;          ///< phong, [1, 100000]
-  float metallic = 0;           ///< [0, 1]
-  float roughness = 0.5f;       ///< [0.02, 1]; alpha = roughness^2
-  std::string file{};           ///< measured: .binary
-
-  bool operator==(const MaterialSpec&) const = default;
-};
-
-struct MeshSpec {
-  std::string path;            ///< .ply .obj .off .gltf .glb
-  bool smooth_normals = true;  ///< interpolate vertex normals (computed when the file has none)
-
-  bool operator==(const MeshSpec&) const = default;
-};
-
-/// A rigid motion, with scale, of an object that is already placed: scaled, turned by `rotate_deg`
-/// (x, then y, then z; angles are joined as numbers, so 0 to 360 is a full turn), turned by
-/// `quaternion`, each about the place that the object's `translate` names, then moved by
-/// `translate`.
-struct ObjectKey {
-  double frame = 1;
-  Vec3 translate{};
-  Vec3 rotate_deg{};
-  std::array<float, 4> quaternion{0, 0, 0, 1};  ///< x, y, z, w; need not be unit
-  Vec3 scale{1, 1, 1};
-
-  bool operator==(const ObjectKey&) const = default;
-};
-
-/// Which axis of a mesh's file points up.
-enum class UpAxis : std::uint8_t { x, y, z };
-
-/// A mesh placed in the world: first turned so that its `up_axis` is y, then scaled, then rotated
-/// (x, then y, then z), then translated. `fit_height` scales it to that height before it is moved.
-/// Before `translate`, `center` moves the middle of its bounds to x = z = 0 and `place_on_ground`
-/// its lowest point to y = 0.
-struct ObjectSpec {
-  std::string mesh;
-  std::string material;
-  Vec3 translate{0, 0, 0};
-  Vec3 rotate_deg{0, 0, 0};
-  Vec3 scale{1, 1, 1};
-  UpAxis up_axis = UpAxis::y;
-  std::optional<float> fit_height{};
-  bool center = false;
-  bool place_on_ground = false;
-  std::vector<ObjectKey> keys{};  ///< ascending frames; none: stands still
-  std::optional<GltfMotion> gltf{};
-
-  bool operator==(const ObjectSpec&) const = default;
-};
-
-/// A horizontal square centred on the origin.
-struct GroundSpec {
-  std::string material;
-  float height = 0;
-  float size = 100;  ///< side length
-
-  bool operator==(const GroundSpec&) const = default;
-};
-
-struct SceneSpec {
-  std::map<std::string, MaterialSpec> materials;
-  std::map<std::string, MeshSpec> meshes;
-  std::vector<ObjectSpec> objects;
-  std::optional<GroundSpec> ground;
-
-  bool operator==(const SceneSpec&) const = default;
 };
 
 // ---- environment

@@ -60,9 +60,21 @@ Vec3 join(const std::vector<K>& keys, const KeySpan& span, KeyCurve curve, const
          in * (t3 - t2);
 }
 
+/// Element by element: keys with matrices are dense.
+Transform matrix_at(const ObjectKey& from, const ObjectKey& to, double share) {
+  const auto t = static_cast<float>(share);
+  Matrix34 m = *from.matrix;
+  for (std::size_t i = 0; t > 0 && i < m.size(); ++i) m[i] += ((*to.matrix)[i] - m[i]) * t;
+  return to_transform(m);
+}
+
 Mat3 scaling(const Vec3& s) { return {{s.x, 0, 0, 0, s.y, 0, 0, 0, s.z}}; }
 
 }  // namespace
+
+Transform to_transform(const Matrix34& m) {
+  return {{{m[0], m[1], m[2], m[4], m[5], m[6], m[8], m[9], m[10]}}, {m[3], m[7], m[11]}};
+}
 
 bool moves(const ObjectSpec& object) { return !object.keys.empty() || object.gltf.has_value(); }
 
@@ -77,14 +89,15 @@ bool is_settled(const JobSpec& job) {
       job.camera.gltf ||
       std::any_of(job.scene.objects.begin(), job.scene.objects.end(),
                   [](const ObjectSpec& object) { return object.gltf.has_value(); });
-  return !from_file && (!moves(job) || job.motion.max_px > 0);
+  const bool in_scene = job.scene.gltf || !job.camera.node.empty();
+  return !from_file && !in_scene && (!moves(job) || job.motion.max_px > 0);
 }
 
 Status check_settled(const JobSpec& job) {
   if (is_settled(job)) return {};
   return Error{ErrorKind::bad_input,
                "job \"" + job.name +
-                   "\": the motion is not settled: expected keys, none in a glTF file, and "
+                   "\": not settled: expected no scene or motion in a glTF file, and "
                    "motion.maxPx above 0"};
 }
 
@@ -115,6 +128,8 @@ Transform object_motion_at(const ObjectSpec& object, KeyCurve curve, double fram
   if (object.keys.empty()) return {};
   const KeySpan span = find_span(object.keys, frame);
   const auto at = [&](auto value) { return join(object.keys, span, curve, value); };
+  if (object.keys[span.from].matrix)
+    return matrix_at(object.keys[span.from], object.keys[span.to], span.share);
   const Vec3 degrees = at([](const ObjectKey& key) { return key.rotate_deg; });
   const Mat3 turned = rotation_about({0, 0, 1}, degrees.z) * rotation_about({0, 1, 0}, degrees.y) *
                       rotation_about({1, 0, 0}, degrees.x);

@@ -29,6 +29,8 @@ bool shares_history(const JobSpec& job);
 /// 0 when each pixel keeps to itself.
 std::int32_t history_reach_px(const JobSpec& job);
 
+Transform to_transform(const Matrix34& matrix);
+
 /// The camera at a frame number, without keys. Position, point looked at, up and angle of view
 /// follow motion.curve.
 CameraSpec camera_at(const JobSpec& job, double frame);

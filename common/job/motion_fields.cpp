@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <optional>
 
 #include "common/base/limits.h"
@@ -44,6 +45,7 @@ void fields(JobArchive& a, ObjectKey& key) {
       a.fault("quaternion", "a rotation", "[0, 0, 0, 0]");
   }
   a.vector("scale", key.scale, kPositiveRange, true);
+  matrix_field(a, "matrix", key.matrix);
 }
 
 void fields(JobArchive& a, GltfMotion& gltf) {
@@ -77,10 +79,17 @@ void fields(JobArchive& a, CameraSpec& camera) {
   a.number("verticalFovDeg", camera.vertical_fov_deg, kFovRange);
   check_view(a, camera.position, camera.look_at, camera.up);
   source_fields(a, camera.keys, camera.gltf);
+  a.text(alternative("node"), camera.node);
+  if (!camera.node.empty() && (camera.gltf || !camera.keys.empty()))
+    a.fault("node", "either node, keys or gltf", "several");
 }
 
 void motion_fields(JobArchive& a, ObjectSpec& object) {
   source_fields(a, object.keys, object.gltf);
+  const auto has_matrix = [](const ObjectKey& key) { return key.matrix.has_value(); };
+  const auto count = std::count_if(object.keys.begin(), object.keys.end(), has_matrix);
+  if (count != 0 && count != std::ssize(object.keys))
+    a.fault("keys", "a matrix in all keys or in none", fmt::format("one in {}", count));
 }
 
 void fields(JobArchive& a, MotionSpec& motion) {

@@ -14,17 +14,33 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A name that must be a key of `named`.
+std::string lower_extension(const std::string& path) {
+  std::string extension = fs::path(path).extension().string();
+  for (char& c : extension) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  return extension;
+}
+
+/// A name that must be a key of `named`; a required one unless `key` says otherwise.
 template <class T>
-void reference(JobArchive& a, const char* key, std::string& name,
-               const std::map<std::string, T>& named, const char* what) {
-  if (!a.text(required(key), name) || named.contains(name)) return;
+void reference(JobArchive& a, Key key, std::string& name, const std::map<std::string, T>& named,
+               const char* what) {
+  if (!a.text(key, name) || named.contains(name)) return;
   std::vector<std::string> known;
   if (a.explains_faults()) {
     for (const auto& item : named) known.push_back(item.first);
   }
-  a.fault(key, fmt::format("the name of a {}", what),
+  a.fault(key.name, fmt::format("the name of a {}", what),
           fmt::format("\"{}\"{}", name, suggestion(name, known)));
+}
+
+/// The name of a material. Those of a glTF file are not known yet: they are looked for when the
+/// scene is loaded.
+void material_reference(JobArchive& a, Key key, std::string& name, const SceneSpec& scene) {
+  if (scene.gltf) {
+    a.text(key, name);
+  } else {
+    reference(a, key, name, scene.materials, "material");
+  }
 }
 
 void fields(JobArchive& a, MaterialSpec& material) {
@@ -57,11 +73,15 @@ void fields(JobArchive& a, MaterialSpec& material) {
 void fields(JobArchive& a, MeshSpec& mesh) {
   asset_path(a, required("path"), mesh.path, {".ply", ".obj", ".off", ".gltf", ".glb"});
   a.boolean("smoothNormals", mesh.smooth_normals);
+  a.integer("mesh", mesh.mesh, -1, limits::kMaxGltfIndex);
+  a.integer("primitive", mesh.primitive, 0, limits::kMaxGltfIndex);
+  if (mesh.mesh >= 0 && !is_gltf(mesh.path))
+    a.fault("mesh", "-1 unless path is a .gltf or .glb file", std::to_string(mesh.mesh));
 }
 
 void fields(JobArchive& a, ObjectSpec& object, const SceneSpec& scene) {
-  reference(a, "mesh", object.mesh, scene.meshes, "mesh");
-  reference(a, "material", object.material, scene.materials, "material");
+  reference(a, required("mesh"), object.mesh, scene.meshes, "mesh");
+  material_reference(a, required("material"), object.material, scene);
   a.vector("translate", object.translate, kCoordinateRange);
   a.vector("rotateDeg", object.rotate_deg, kAngleRange);
   a.vector("scale", object.scale, kPositiveRange, true);
@@ -69,13 +89,33 @@ void fields(JobArchive& a, ObjectSpec& object, const SceneSpec& scene) {
   a.number("fitHeight", object.fit_height, kPositiveRange);
   a.boolean("center", object.center);
   a.boolean("placeOnGround", object.place_on_ground);
+  matrix_field(a, "matrix", object.matrix);
   motion_fields(a, object);
 }
 
 void fields(JobArchive& a, GroundSpec& ground, const SceneSpec& scene) {
-  reference(a, "material", ground.material, scene.materials, "material");
+  material_reference(a, required("material"), ground.material, scene);
   a.number("height", ground.height, kCoordinateRange);
   a.number("size", ground.size, kPositiveRange);
+}
+
+void fields(JobArchive& a, GltfNodeSpec& node) {
+  a.boolean("visible", node.visible);
+  a.text(alternative("material"), node.material);
+  PlaceSpec place = node.place.value_or(PlaceSpec{});
+  const auto visit = [&] {
+    a.vector("translate", place.translate, kCoordinateRange);
+    a.vector("rotateDeg", place.rotate_deg, kAngleRange);
+    a.vector("scale", place.scale, kPositiveRange, true);
+  };
+  if (a.object("place", visit, {.present = node.place.has_value()})) node.place = place;
+}
+
+void fields(JobArchive& a, GltfSceneSpec& gltf) {
+  asset_path(a, required("file"), gltf.file, {".gltf", ".glb"});
+  a.number("fps", gltf.fps, kPositiveRange);
+  a.integer("startFrame", gltf.start_frame, 0, limits::kMaxFrameNumber);
+  a.named("nodes", gltf.nodes, limits::kMaxObjects, [&](GltfNodeSpec& node) { fields(a, node); });
 }
 
 void fields(JobArchive& a, EnvironmentKey& key) {
@@ -99,11 +139,24 @@ void expand_numbered(JobArchive& a, const fs::path& numbered, const std::vector<
 
 }  // namespace
 
+void matrix_field(JobArchive& a, Key key, std::optional<Matrix34>& matrix) {
+  std::array<double, 12> rows;
+  rows.fill(std::numeric_limits<double>::quiet_NaN());
+  for (std::size_t i = 0; matrix && i < rows.size(); ++i) rows[i] = decimal((*matrix)[i]);
+  if (!a.numbers(key, rows, kCoordinateRange, false)) return;
+  matrix.emplace();
+  for (std::size_t i = 0; i < rows.size(); ++i) (*matrix)[i] = static_cast<float>(rows[i]);
+}
+
+bool is_gltf(const std::string& path) {
+  const std::string extension = lower_extension(path);
+  return extension == ".gltf" || extension == ".glb";
+}
+
 void asset_path(JobArchive& a, Key key, std::string& path,
                 std::initializer_list<std::string_view> extensions) {
   if (!a.path(key, path)) return;
-  std::string extension = fs::path(path).extension().string();
-  for (char& c : extension) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
+  const std::string extension = lower_extension(path);
   if (std::find(extensions.begin(), extensions.end(), extension) != extensions.end()) return;
 
   std::string expected = "a file name that ends in";
@@ -112,6 +165,11 @@ void asset_path(JobArchive& a, Key key, std::string& path,
 }
 
 void fields(JobArchive& a, SceneSpec& scene) {
+  GltfSceneSpec gltf = scene.gltf.value_or(GltfSceneSpec{});
+  if (a.object("gltf", [&] { fields(a, gltf); },
+               {.shorthand = "file", .present = scene.gltf.has_value()})) {
+    scene.gltf = gltf;
+  }
   a.named("materials", scene.materials, limits::kMaxMaterials,
           [&](MaterialSpec& item) { fields(a, item); });
   a.named("meshes", scene.meshes, limits::kMaxMeshes, [&](MeshSpec& item) { fields(a, item); },
@@ -123,6 +181,8 @@ void fields(JobArchive& a, SceneSpec& scene) {
                {.present = scene.ground.has_value()})) {
     scene.ground = ground;
   }
+  a.list("files", scene.files, limits::kMaxMeshes,
+         [&](FileSpec& file) { a.path(required("path"), file.path); });
 }
 
 void fields(JobArchive& a, EnvironmentSpec& environment, const std::vector<int>& frames) {

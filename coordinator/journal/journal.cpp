@@ -69,7 +69,6 @@ constexpr const char* kSchema = R"sql(
 /// What is read at the start, and so is checked then.
 constexpr std::array kCheckedTables{"starts", "jobs", "completions", "failures"};
 
-
 template <class T>
 Status read_blob(const SqlDatabase& database, ByteView bytes, const char* column, T& value) {
   ArchiveReader reader(bytes);

@@ -211,7 +211,8 @@ Status Service::receive(const PeerId& peer, const SubmitJob& message) {
   }
   const Scheduler::Job* const known = scheduler_.find_job(document->digest);
   if (known != nullptr) {
-    if (const Status own = check_own(document->digest); known->status != JobStatus::running && !own) {
+    if (const Status own = check_own(document->digest);
+        known->status != JobStatus::running && !own) {
       refuse(peer, own.error());
       return {};
     }

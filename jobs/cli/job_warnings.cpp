@@ -13,6 +13,7 @@
 #include "common/job/known_limits.h"
 #include "common/job/sequence.h"
 #include "jobs/cli/text.h"
+#include "worker/scene/settle_scene.h"
 
 namespace baton {
 namespace {
@@ -154,6 +155,7 @@ std::vector<std::string> job_warnings(const JobSpec& job, const AssetReport& ass
     warnings.push_back(fmt::format("the light jumps {} more times", jumps.size() - kMostJumps));
   for (std::string& warning : limit_warnings(job, !jumps.empty()))
     warnings.push_back(std::move(warning));
+  for (std::string& warning : gltf_warnings(job.scene)) warnings.push_back(std::move(warning));
   aov_warnings(job, warnings);
   output_warnings(job, warnings);
   return warnings;

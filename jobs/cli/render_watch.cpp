@@ -19,6 +19,7 @@ constexpr double kCoarseScale = 0.25;
 /// Every file that the job names.
 std::vector<std::string> watched_files(const JobSpec& job) {
   std::vector<std::string> files = asset_paths(job);
+  if (job.scene.gltf) files.push_back(job.scene.gltf->file);
   if (job.camera.gltf) files.push_back(job.camera.gltf->file);
   for (const ObjectSpec& object : job.scene.objects) {
     if (object.gltf) files.push_back(object.gltf->file);

@@ -2,6 +2,8 @@
 #include <cmath>
 
 #include "tests/fuzz/fuzz_target.h"
+#include "worker/scene/gltf/meshes.h"
+#include "worker/scene/gltf/node_motion.h"
 #include "worker/scene/mesh_builder.h"
 #include "worker/scene/mesh_readers.h"
 
@@ -26,13 +28,19 @@ void look_at(const Result<TriangleMesh>& mesh) {
 }  // namespace
 }  // namespace baton
 
-/// The formats that we read ourselves; assimp reads the others.
+/// The formats that we read ourselves; assimp reads OBJ.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace baton;
   const std::string_view text(reinterpret_cast<const char*>(data), size);
   if (text.starts_with("ply")) {
     look_at(parse_ply(text, "fuzz.ply", false));
     look_at(parse_ply(text, "fuzz.ply", true));
+  } else if (text.starts_with("glTF") || text.starts_with("{")) {
+    const auto document = gltf::parse_document(as_bytes_view(text), "/nowhere/fuzz.gltf");
+    if (!document) return 0;
+    look_at(gltf::whole_mesh(**document, true));
+    const auto motion = gltf::NodeMotion::read(*document);
+    if (motion) motion->to_world(0.5);
   } else {
     look_at(parse_off(text, "fuzz.off"));
   }

@@ -32,7 +32,8 @@ MAY_INCLUDE = {
     "common/store": COMMON_BASE,
     "common/protocol": COMMON_DATA | {"common/job"},
     "worker/sampling": COMMON_DATA | {"common/job", "common/state"},
-    "worker/scene": SCENE,
+    "worker/scene": SCENE | {"worker/scene/gltf"},
+    "worker/scene/gltf": SCENE | {"worker/scene"},
     "worker/accel": SCENE | {"worker/scene"},
     "worker/light": LIGHT,
     "worker/method": METHOD | METHODS,
@@ -59,7 +60,7 @@ THIRD_PARTY = {
     r"zmq": ["common/protocol/"],
     r"sqlite3": ["coordinator/journal/"],
     r"zstd|xxhash": ["common/base/"],
-    r"nlohmann/": ["common/job/job_json", "jobs/cli/", "jobs/study/"],
+    r"nlohmann/": ["common/job/job_json", "jobs/cli/", "jobs/study/", "worker/scene/gltf/json_view"],
     r"httplib": ["coordinator/service/"],
     r"CLI/": ["worker/main.cpp", "coordinator/main.cpp", "jobs/cli/"],
 }

@@ -47,6 +47,8 @@ class Draw:
         job["image"] = self.schema.value(keys["image"], "image")
         job["scene"] = self.scene()
         job["camera"] = self.camera()
+        if "gltf" in job["scene"] and self.chance(0.4):
+            job["camera"] = {"node": self.pick("eye", "*")}
         for key, inner in keys.items():
             if key in job:
                 continue
@@ -80,7 +82,8 @@ class Draw:
             "$schema": lambda: self.pick(None, None, "job.schema.json"), "name": self.name, "frames": self.frames, "scene": nothing, "camera": nothing,
             "environment.map": nothing, "environment.frames": nothing, "environment.keys": nothing,
             "sampling.byMaterial": nothing, "scene.meshes": nothing, "scene.materials": nothing,
-            "scene.objects": nothing, "scene.ground": nothing,
+            "scene.objects": nothing, "scene.ground": nothing, "scene.gltf": nothing, "scene.files": nothing,
+            "camera.node": nothing, "scene.gltf.file": lambda: "set.glb",
             # Texts and sizes.
             "metadata.*": lambda: self.pick("x", "two words", "a \u00e4 \u4e2d \" \\ text", "long " * 200),
             "image.width": lambda: self.side(), "image.height": lambda: self.side(),
@@ -108,6 +111,8 @@ class Draw:
             "scene.objects[].translate": lambda: self.vector(1.3),
             "scene.objects[].rotateDeg": lambda: self.pick(None, self.vector(180)),
             "scene.objects[].scale": lambda: self.pick(None, 0.3, 1.7, [0.2, 1, 1.5], 1e-3, 30),
+            "scene.objects[].matrix": lambda: self.matrix() if self.chance(0.1) else None, "objectKey.matrix": nothing,
+            "scene.meshes.*.mesh": nothing, "scene.meshes.*.primitive": nothing,
             "scene.objects[].fitHeight": lambda: self.pick(None, None, None, 1.2),
             "scene.objects[].keys": lambda: self.object_keys() if self.chance(0.2) else None,
             "scene.objects[].gltf": lambda: self.gltf("hip") if self.chance(0.03) else None,
@@ -167,10 +172,30 @@ class Draw:
             ground = self.schema.resolve(keys["ground"])
             self.schema.hand["scene.ground.material"] = lambda: self.rng.choice(names)
             scene["ground"] = self.schema.object(ground, "scene.ground")
+        if self.chance(0.06):
+            scene["gltf"] = self.gltf_set(node, names)
         scene["meshes"] = {}
         count = 2 if self.plain else self.pick(0, 1, 1, 2, 2, 3)
         scene["objects"] = [self.object(scene, keys, names, i) for i in range(count)]
         return scene
+
+    def gltf_set(self, node, names):
+        """The set of the examples: instances, some of them mirrored, three kinds of curves."""
+        self.files["set.glb"] = {"kind": "set", "pillars": self.pick(1, 4)}
+        form = self.schema.resolve(node["properties"]["gltf"])["oneOf"][1]
+        self.schema.hand["scene.gltf.nodes"] = lambda: None
+        gltf = self.schema.object(form, "scene.gltf")
+        gltf.update(file="set.glb", fps=self.pick(4, 24), startFrame=max(self.first_frame - 1, 0))
+        override = self.schema.schema["definitions"]["gltfNode"]
+        at = "scene.gltf.nodes.*"
+        self.schema.hand.update({
+            f"{at}.material": lambda: self.rng.choice([None, *names]),
+            f"{at}.place.translate": lambda: self.vector(1.3),
+            f"{at}.place.rotateDeg": lambda: self.pick(None, self.vector(180)),
+            f"{at}.place.scale": lambda: self.pick(None, 0.3, [0.2, 1, 1.5])})
+        nodes = [name for name in ("ring", "lift", "ball", "pillar.000") if self.chance(0.4)]
+        gltf["nodes"] = {name: self.schema.object(override, at) for name in nodes}
+        return self.pick("set.glb", gltf, gltf)
 
     def material(self, node):
         """Seldom a measured one: each process reads its 35 MB."""
@@ -217,7 +242,14 @@ class Draw:
             if self.chance(0.2):
                 key["scale"] = self.pick(1.1, [0.9, 1.0, 1.2])
             keys.append(key)
+        if self.chance(0.15):
+            keys = [{"frame": key["frame"], "matrix": self.matrix()} for key in keys]
         return keys
+
+    def matrix(self):
+        """Sheared, sometimes mirrored, far from singular."""
+        rows = [[1.1, 0.2, 0.0], [0.0, 0.9, -0.3], [0.1, 0.0, self.pick(1.0, -1.2)]]
+        return [n for row in rows for n in [*row, round(self.rng.uniform(-0.5, 0.5), 3)]]
 
     def camera(self):
         """Mostly outside; inside a mesh, below the ground, far away, with the sky alone in view; still or moving."""

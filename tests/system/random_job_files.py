@@ -8,11 +8,15 @@ import os
 import random
 import struct
 import subprocess
+import sys
 import zlib
 from array import array
 from pathlib import Path
 
 from farm import Fault, write_sphere
+
+sys.path.append(str(Path(__file__).parents[2] / "jobs/examples"))
+from make_gltf_set import make_set  # noqa: E402
 
 # ---- recipes ------------------------------------------------------------------------------------------------
 # A recipe is {"kind": ..., its numbers}; the file's ending says the format.
@@ -30,6 +34,8 @@ def write_file(path, recipe, shared):
         write_map(path, recipe)
     elif kind == "merl":
         link_table(path, recipe, shared)
+    elif kind == "set":
+        path.write_bytes(make_set(recipe["pillars"]))
     elif kind == "walk":
         path.write_text(json.dumps(walk_gltf(recipe)), encoding="ascii")
     else:

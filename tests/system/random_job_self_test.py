@@ -19,8 +19,9 @@ from random_job_schema import key_paths
 from random_job_shrink import shrink
 
 # Keys that are meant to stay away: what makes a job fail by itself, what is set when it is rendered, and those of
-# `auto`, which is rare.
-NEVER_DRAWN = {"maxRetriesPerTask", "maxSecondsPerTask", "maxFailuresPerWorker", "output.directory",
+# `auto`, which is rare; what Baton writes itself when it takes a glTF file apart.
+NEVER_DRAWN = {"scene.files", "scene.files[].path", "scene.meshes.*.mesh", "scene.meshes.*.primitive",
+               "maxRetriesPerTask", "maxSecondsPerTask", "maxFailuresPerWorker", "output.directory",
                "sampling.targetError", "sampling.timeBudget"}
 CASES = 1500
 
@@ -59,7 +60,7 @@ def paths_of(value, path=""):
             yield from paths_of(item, f"{path}[]")
     elif isinstance(value, dict):
         for key, inner in value.items():
-            named = path in ("metadata", "scene.materials", "scene.meshes", "sampling.byMaterial")
+            named = path in ("metadata", "scene.materials", "scene.meshes", "scene.gltf.nodes", "sampling.byMaterial")
             at = f"{path}.*" if named else f"{path}.{key}" if path else key
             yield at
             yield from paths_of(inner, at)

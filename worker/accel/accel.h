@@ -7,6 +7,7 @@
 #include <span>
 #include <string>
 
+#include "common/base/limits.h"
 #include "common/base/poison.h"
 #include "worker/scene/camera.h"
 #include "worker/scene/scene.h"
@@ -79,8 +80,11 @@ Vec3 lift_off(const Vec3& position, const Vec3& ng);
 class Accel {
  public:
   /// Keeps a reference to `scene`, which must outlive it. What stands still is one flat hierarchy;
-  /// each mesh that moves has its own, placed where the scene says. Error: Embree's own message.
-  static Result<std::unique_ptr<Accel>> build(const Scene& scene);
+  /// each mesh that moves has its own, placed where the scene says. Where copies of meshes that
+  /// stand still would have more than `max_copied_triangles`, these have their own, too. Error:
+  /// Embree's own message.
+  static Result<std::unique_ptr<Accel>> build(
+      const Scene& scene, std::uint64_t max_copied_triangles = limits::kMaxCopiedTriangles);
   virtual ~Accel() = default;
 
   /// The same geometry with its moving instances elsewhere; shares all but their placement.

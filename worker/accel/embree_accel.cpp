@@ -4,6 +4,7 @@
 #include <cstring>
 #include <limits>
 #include <map>
+#include <set>
 #include <vector>
 
 #include "common/base/check.h"
@@ -49,8 +50,8 @@ void attach_instance(RTCDevice device, RTCScene target, const TriangleMesh& mesh
   rtcAttachGeometryByID(target, geometry.get(), index);
 }
 
-/// Attaches an instance that moves; geometry id = index of the instance.
-void attach_moving(RTCDevice device, RTCScene target, RTCScene mesh, const Transform& to_world,
+/// Attaches a mesh that has a hierarchy of its own; geometry id = index of the instance.
+void attach_placed(RTCDevice device, RTCScene target, RTCScene mesh, const Transform& to_world,
                    unsigned index) {
   const auto& m = to_world.linear.m;
   const Vec3& o = to_world.offset;
@@ -67,8 +68,9 @@ void attach_moving(RTCDevice device, RTCScene target, RTCScene mesh, const Trans
 struct SharedGeometry {
   Owned<RTCDevice> device;
   Owned<RTCScene> still;  ///< all that does not move, in world space
-  std::map<std::uint32_t, Owned<RTCScene>>
-      moving_meshes;  ///< by index of the mesh, in its own space
+  /// By index of the mesh, in its own space: those that move, or that are in too many places.
+  std::map<std::uint32_t, Owned<RTCScene>> own_meshes;
+  bool any_moves = false;
 
   Owned<RTCScene> new_scene() const {
     Owned<RTCScene> scene(rtcNewScene(device.get()));
@@ -96,13 +98,13 @@ class EmbreeAccel final : public Accel {
                                                    std::span<const Instance> instances) {
     Owned<RTCScene> moving;
     std::string message;
-    if (!geometry->moving_meshes.empty()) {
+    if (geometry->any_moves) {
       RTCDevice device = geometry->device.get();
       rtcSetDeviceErrorFunction(device, remember_error, &message);
       moving = geometry->new_scene();
       for (unsigned i = 0; i < instances.size(); ++i) {
         if (!instances[i].moves()) continue;
-        attach_moving(device, moving.get(), geometry->moving_meshes.at(instances[i].mesh).get(),
+        attach_placed(device, moving.get(), geometry->own_meshes.at(instances[i].mesh).get(),
                       instances[i].to_world, i);
       }
       rtcCommitScene(moving.get());
@@ -274,9 +276,22 @@ class EmbreeAccel final : public Accel {
   const Owned<RTCScene> moving_;
 };
 
+/// Meshes that stand still in several places, where their copies would be too many.
+std::set<std::uint32_t> shared_meshes(const Scene& scene, std::uint64_t max_copied_triangles) {
+  std::set<std::uint32_t> seen, repeated;
+  std::uint64_t copied = 0;
+  for (const Instance& instance : scene.instances) {
+    if (instance.moves() || seen.insert(instance.mesh).second) continue;
+    repeated.insert(instance.mesh);
+    copied += scene.meshes[instance.mesh].triangles.size();
+  }
+  return copied > max_copied_triangles ? repeated : std::set<std::uint32_t>{};
+}
+
 }  // namespace
 
-Result<std::unique_ptr<Accel>> Accel::build(const Scene& scene) {
+Result<std::unique_ptr<Accel>> Accel::build(const Scene& scene,
+                                            std::uint64_t max_copied_triangles) {
   // One build thread: answers at edges depend on the shape of the tree, which must not depend on
   // the host.
   auto geometry = std::make_shared<SharedGeometry>();
@@ -291,17 +306,23 @@ Result<std::unique_ptr<Accel>> Accel::build(const Scene& scene) {
 
   // What stands still, in world space; each mesh that moves, in its own.
   geometry->still = geometry->new_scene();
+  const std::set<std::uint32_t> shared = shared_meshes(scene, max_copied_triangles);
   for (unsigned i = 0; i < scene.instances.size(); ++i) {
     const Instance& instance = scene.instances[i];
-    if (!instance.moves()) {
+    if (!instance.moves() && !shared.contains(instance.mesh)) {
       attach_instance(device, geometry->still.get(), scene.meshes[instance.mesh], instance.to_world,
                       i);
-    } else if (!geometry->moving_meshes.contains(instance.mesh)) {
-      Owned<RTCScene>& own = geometry->moving_meshes[instance.mesh];
+      continue;
+    }
+    Owned<RTCScene>& own = geometry->own_meshes[instance.mesh];
+    if (own == nullptr) {
       own = geometry->new_scene();
       attach_instance(device, own.get(), scene.meshes[instance.mesh], {}, 0);
       rtcCommitScene(own.get());
     }
+    geometry->any_moves = geometry->any_moves || instance.moves();
+    if (!instance.moves())
+      attach_placed(device, geometry->still.get(), own.get(), instance.to_world, i);
   }
   rtcCommitScene(geometry->still.get());
   rtcSetDeviceErrorFunction(device, nullptr, nullptr);

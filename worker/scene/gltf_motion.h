@@ -4,16 +4,36 @@
 
 #include "common/base/result.h"
 #include "common/job/job_spec.h"
+#include "worker/scene/gltf/node_motion.h"
 
 namespace baton {
 
-/// Replace `gltf` by keys, one for each frame number: where the file's first animation has the node
-/// then, in the world of the file. Nodes that it does not move stay where the file puts them.
-/// Errors name the file: missing, not a glTF file, no such node.
+/// Replace `gltf` by keys, one for each frame number: where the file's animations have the node
+/// then, in the world of the file. Errors name the file: missing, not a glTF file, no such node, a
+/// node that no animation moves.
 
 /// The node must hold a camera, which also gives the angle of view.
 Status take_camera_keys(const std::vector<int>& frames, CameraSpec& camera);
-/// The node's place, rotation and scale become the motion of the object.
+/// What the node does is done to the object.
 Status take_object_keys(const std::vector<int>& frames, ObjectSpec& object);
+
+/// Which time of a file a frame shows.
+struct FileClock {
+  float fps = 24;
+  int start_frame = 0;
+
+  double seconds_at(int frame) const {
+    return static_cast<double>(frame - start_frame) / static_cast<double>(fps);
+  }
+};
+
+/// Makes `camera` that of a node: with keys where it moves, at one place where it does not. Error:
+/// the node holds no perspective camera.
+Status put_camera(const gltf::NodeMotion& motion, int node, const FileClock& clock,
+                  const std::vector<int>& frames, CameraSpec& camera);
+
+/// Keys of matrices, one a frame, but for those between equal ones. matrices: of `frames`.
+std::vector<ObjectKey> matrix_keys(const std::vector<int>& frames,
+                                   const std::vector<Matrix34>& matrices);
 
 }  // namespace baton

@@ -30,7 +30,8 @@ std::uint32_t bits(float f) { return std::bit_cast<std::uint32_t>(f + 0.0f); }
 
 }  // namespace
 
-void MeshBuilder::add(const std::array<Vec3, 3>& corners, const std::array<Vec3, 3>& normals) {
+void MeshBuilder::add(const std::array<Vec3, 3>& corners, const std::array<Vec3, 3>& normals,
+                      const std::array<UvSets, 3>& uvs) {
   const Vec3 a = corners[1] - corners[0];
   const Vec3 b = corners[2] - corners[0];
   const double longest =
@@ -41,7 +42,7 @@ void MeshBuilder::add(const std::array<Vec3, 3>& corners, const std::array<Vec3,
   }
   std::array<std::uint32_t, 3> triangle{};
   for (std::size_t k = 0; k < 3; ++k) {
-    triangle[k] = vertex(corners[k], with_normals_ ? normals[k] : Vec3{});
+    triangle[k] = vertex(corners[k], parts_.normals ? normals[k] : Vec3{}, uvs[k]);
   }
   mesh_.triangles.push_back(triangle);
 }
@@ -55,14 +56,17 @@ std::size_t MeshBuilder::VertexHash::operator()(const VertexKey& key) const {
   return hash;
 }
 
-std::uint32_t MeshBuilder::vertex(const Vec3& position, const Vec3& normal) {
-  const VertexKey key{bits(position.x), bits(position.y), bits(position.z),
-                      bits(normal.x),   bits(normal.y),   bits(normal.z)};
+std::uint32_t MeshBuilder::vertex(const Vec3& position, const Vec3& normal, const UvSets& uvs) {
+  const auto sets = static_cast<std::size_t>(parts_.uv_sets);
+  VertexKey key{bits(position.x), bits(position.y), bits(position.z),
+                bits(normal.x),   bits(normal.y),   bits(normal.z)};
+  for (std::size_t i = 0; i < 2 * sets; ++i) key[6 + i] = bits(uvs[i / 2][i % 2]);
   const auto next = static_cast<std::uint32_t>(mesh_.positions.size());
   const auto [found, inserted] = index_.try_emplace(key, next);
   if (inserted) {
     mesh_.positions.push_back(position);
-    if (with_normals_) mesh_.normals.push_back(normal);
+    if (parts_.normals) mesh_.normals.push_back(normal);
+    for (std::size_t set = 0; set < sets; ++set) mesh_.uvs[set].push_back(uvs[set]);
   }
   return found->second;
 }

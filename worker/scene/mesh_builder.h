@@ -8,25 +8,32 @@
 
 namespace baton {
 
+/// What vertices have beside their position.
+struct MeshParts {
+  bool normals = false;
+  int uv_sets = 0;  ///< [0, 2]
+};
+
 /// Collects the triangles of all parts of a file into one mesh: equal vertices become one,
 /// triangles without area are dropped and counted.
 class MeshBuilder {
  public:
-  /// with_normals: corners with different normals stay different vertices.
-  explicit MeshBuilder(bool with_normals) : with_normals_(with_normals) {}
+  /// Corners that differ in one of `parts` stay different vertices.
+  explicit MeshBuilder(MeshParts parts) : parts_(parts) {}
 
-  /// Adds a triangle of finite corners. normals: unit; not looked at without `with_normals`.
-  void add(const std::array<Vec3, 3>& corners, const std::array<Vec3, 3>& normals = {});
+  /// Adds a triangle of finite corners. normals: unit. What `parts` does not name is not looked at.
+  void add(const std::array<Vec3, 3>& corners, const std::array<Vec3, 3>& normals = {},
+           const std::array<UvSets, 3>& uvs = {});
   TriangleMesh take() { return std::move(mesh_); }
 
  private:
-  using VertexKey = std::array<std::uint32_t, 6>;  ///< bits of position and normal
+  using VertexKey = std::array<std::uint32_t, 10>;  ///< bits of position, normal and UVs
   struct VertexHash {
     std::size_t operator()(const VertexKey& key) const;
   };
-  std::uint32_t vertex(const Vec3& position, const Vec3& normal);
+  std::uint32_t vertex(const Vec3& position, const Vec3& normal, const UvSets& uvs);
 
-  bool with_normals_;
+  MeshParts parts_;
   TriangleMesh mesh_;
   std::unordered_map<VertexKey, std::uint32_t, VertexHash> index_;
 };

@@ -6,6 +6,7 @@
 #include "common/base/files.h"
 #include "common/base/limits.h"
 #include "worker/scene/assimp_file.h"
+#include "worker/scene/gltf/meshes.h"
 #include "worker/scene/mesh_builder.h"
 #include "worker/scene/mesh_readers.h"
 
@@ -91,7 +92,7 @@ Result<TriangleMesh> load_with_assimp(const std::string& path, bool smooth_norma
   BATON_TRY(file.triangulate());
   const aiScene& scene = file.scene();
   const bool with_normals = smooth_normals && has_normals(scene);
-  MeshBuilder builder(with_normals);
+  MeshBuilder builder({.normals = with_normals});
   add_node(scene, *scene.mRootNode, aiMatrix4x4(), with_normals, builder);
   return builder.take();
 }
@@ -111,6 +112,10 @@ Result<TriangleMesh> read_triangles(const std::string& path, bool smooth_normals
   if (is(".ply")) {
     BATON_ASSIGN(const std::string bytes, read_text_file(path, limits::kMaxAssetFileBytes));
     return parse_ply(bytes, path, smooth_normals);
+  }
+  if (is(".gltf") || is(".glb")) {
+    BATON_ASSIGN(const auto document, gltf::read_document(path));
+    return gltf::whole_mesh(*document, smooth_normals);
   }
   return load_with_assimp(path, smooth_normals);
 }

@@ -129,7 +129,7 @@ Result<TriangleMesh> parse_off(std::string_view text, const std::string& name) {
   reader.skip_line();
 
   BATON_ASSIGN(const std::vector<Vec3> vertices, read_vertices(reader, *num_vertices, name));
-  MeshBuilder builder(false);
+  MeshBuilder builder(MeshParts{});
   for (std::uint32_t face = 0; face < *num_faces; ++face) {
     BATON_TRY(read_face(reader, face, vertices, builder, name));
   }

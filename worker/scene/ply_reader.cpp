@@ -180,7 +180,7 @@ class PlyReader {
     for (const Element& element : header_.elements) {
       for (std::uint64_t i = 0; i < element.count; ++i) BATON_TRY(read_record(element, i));
     }
-    MeshBuilder builder(with_normals_);
+    MeshBuilder builder({.normals = with_normals_});
     for (const auto& t : triangles_) {
       builder.add({positions_[t[0]], positions_[t[1]], positions_[t[2]]},
                   {normals_[t[0]], normals_[t[1]], normals_[t[2]]});

@@ -8,6 +8,8 @@
 
 #include "common/job/motion.h"
 #include "common/math/inverse.h"
+#include "worker/scene/gltf/file_cache.h"
+#include "worker/scene/gltf/meshes.h"
 
 namespace baton {
 namespace {
@@ -25,12 +27,12 @@ class Faults {
   std::string text_;
 };
 
-/// Corners of the box around the mesh after `linear`.
-std::pair<Vec3, Vec3> bounds_of(const TriangleMesh& mesh, const Mat3& linear) {
+/// Corners of the box around the mesh after `map`.
+std::pair<Vec3, Vec3> bounds_of(const TriangleMesh& mesh, const Transform& map) {
   constexpr float kFar = std::numeric_limits<float>::infinity();
   Vec3 low{kFar, kFar, kFar}, high = low * -1.0f;
   for (const Vec3& position : mesh.positions) {
-    const Vec3 p = linear * position;
+    const Vec3 p = map.point(position);
     low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
     high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
   }
@@ -52,30 +54,38 @@ Mat3 upright(UpAxis up) {
 
 Mat3 scaling(const Vec3& s) { return {{s.x, 0, 0, 0, s.y, 0, 0, 0, s.z}}; }
 
-/// The object's transform: stand up, scale, rotate about x, y, z, fit to a height, centre, place on
-/// the ground, translate.
+Transform scaled(const Transform& map, float factor) {
+  return {scaling({factor, factor, factor}) * map.linear, map.offset * factor};
+}
+
+/// The object's transform: its matrix, stand up, scale, rotate about x, y, z, fit to a height,
+/// centre, place on the ground, translate.
 Result<Transform> object_transform(const ObjectSpec& object, const TriangleMesh& mesh,
                                    const std::string& name) {
-  Mat3 linear = rotation_about({0, 0, 1}, object.rotate_deg.z) *
-                rotation_about({0, 1, 0}, object.rotate_deg.y) *
-                rotation_about({1, 0, 0}, object.rotate_deg.x) * scaling(object.scale) *
-                upright(object.up_axis);
+  const Mat3 turned = rotation_about({0, 0, 1}, object.rotate_deg.z) *
+                      rotation_about({0, 1, 0}, object.rotate_deg.y) *
+                      rotation_about({1, 0, 0}, object.rotate_deg.x) * scaling(object.scale) *
+                      upright(object.up_axis);
+  Transform map{turned, {}};
+  if (object.matrix) {
+    const Transform given = to_transform(*object.matrix);
+    map = {turned * given.linear, turned * given.offset};
+  }
   if (object.fit_height) {
-    const auto [low, high] = bounds_of(mesh, linear);
+    const auto [low, high] = bounds_of(mesh, map);
     if (!(high.y > low.y)) {
       return Error{ErrorKind::bad_input, name + ": mesh \"" + object.mesh +
                                              "\" is flat, expected a height to fit to fitHeight"};
     }
-    const float factor = *object.fit_height / (high.y - low.y);
-    linear = scaling({factor, factor, factor}) * linear;
+    map = scaled(map, *object.fit_height / (high.y - low.y));
   }
-  Vec3 offset = object.translate;
   if (object.place_on_ground || object.center) {
-    const auto [low, high] = bounds_of(mesh, linear);
-    if (object.place_on_ground) offset.y -= low.y;
-    if (object.center) offset = offset - Vec3{low.x + high.x, 0, low.z + high.z} * 0.5f;
+    const auto [low, high] = bounds_of(mesh, map);
+    if (object.place_on_ground) map.offset.y -= low.y;
+    if (object.center) map.offset = map.offset - Vec3{low.x + high.x, 0, low.z + high.z} * 0.5f;
   }
-  return Transform{linear, offset};
+  map.offset += object.translate;
+  return map;
 }
 
 /// Two triangles, facing up.
@@ -104,13 +114,19 @@ Material load_material(const MaterialSpec& spec, const std::string& name, Faults
   return {};
 }
 
+Result<TriangleMesh> load_part(const MeshSpec& spec, gltf::FileCache& files) {
+  if (spec.mesh < 0) return load_mesh(spec.path, spec.smooth_normals);
+  BATON_ASSIGN(const auto document, files.get(spec.path));
+  return gltf::primitive_mesh(*document, spec.mesh, spec.primitive, spec.smooth_normals);
+}
+
 /// Loads every mesh; a mesh that fails keeps an empty place, so that its users are not reported as
 /// well.
-NameIndex load_meshes(const SceneSpec& spec, Scene& scene, Faults& faults) {
+NameIndex load_meshes(const SceneSpec& spec, gltf::FileCache& files, Scene& scene, Faults& faults) {
   NameIndex names;
   for (const auto& [name, mesh_spec] : spec.meshes) {
     names[name] = static_cast<std::uint32_t>(scene.meshes.size());
-    Result<TriangleMesh> mesh = load_mesh(mesh_spec.path, mesh_spec.smooth_normals);
+    Result<TriangleMesh> mesh = load_part(mesh_spec, files);
     if (!mesh) faults.add("scene.meshes." + name + ": " + mesh.error().message);
     scene.meshes.push_back(mesh ? std::move(*mesh) : TriangleMesh{});
   }
@@ -146,7 +162,8 @@ Result<Scene> load_scene(const JobSpec& job) {
     materials[name] = static_cast<std::uint32_t>(scene.materials.size());
     scene.materials.push_back(load_material(material, "scene.materials." + name, faults));
   }
-  const NameIndex meshes = load_meshes(job.scene, scene, faults);
+  gltf::FileCache files;
+  const NameIndex meshes = load_meshes(job.scene, files, scene, faults);
 
   // Objects, in the order of the job.
   for (std::size_t i = 0; i < job.scene.objects.size(); ++i) {

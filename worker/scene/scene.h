@@ -10,10 +10,15 @@
 
 namespace baton {
 
+/// Texture coordinates, (0, 0) at the upper left of the image; sets 0 and 1.
+using Uv = std::array<float, 2>;
+using UvSets = std::array<Uv, 2>;
+
 /// Triangles of one file. Degenerate triangles (zero area, equal corners) are dropped and counted.
 struct TriangleMesh {
   std::vector<Vec3> positions;
-  std::vector<Vec3> normals;  ///< per vertex, unit; empty: flat shading
+  std::vector<Vec3> normals;             ///< per vertex, unit; empty: flat shading
+  std::array<std::vector<Uv>, 2> uvs{};  ///< by set, per vertex, or empty
   std::vector<std::array<std::uint32_t, 3>> triangles;
   std::uint64_t dropped_triangles = 0;
 };

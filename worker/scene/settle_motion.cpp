@@ -7,12 +7,14 @@
 #include "common/job/motion.h"
 #include "worker/scene/gltf_motion.h"
 #include "worker/scene/pose.h"
+#include "worker/scene/settle_scene.h"
 
 namespace baton {
 namespace {
 
-/// Vertices that are looked at of each mesh, spread evenly over its list.
-constexpr std::size_t kMeshPoints = 2000;
+/// Vertices that are looked at of each instance, spread evenly over the list of its mesh; fewer
+/// where there are many instances.
+constexpr std::size_t kMeshPoints = 2000, kLeastMeshPoints = 50, kScenePoints = 200000;
 /// Rays to the ground along each side of the image.
 constexpr int kGroundRays = 24;
 
@@ -46,9 +48,11 @@ class StepMeter {
 };
 
 void add_meshes(const Scene& scene, const Pose& now, const Pose& before, StepMeter& meter) {
+  const std::size_t share = kScenePoints / std::max<std::size_t>(now.instances.size(), 1);
+  const std::size_t most = std::clamp(share, kLeastMeshPoints, kMeshPoints);
   for (std::size_t i = 0; i < now.instances.size(); ++i) {
     const std::vector<Vec3>& points = scene.meshes[now.instances[i].mesh].positions;
-    const std::size_t stride = std::max<std::size_t>(points.size() / kMeshPoints, 1);
+    const std::size_t stride = std::max<std::size_t>(points.size() / most, 1);
     for (std::size_t k = 0; k < points.size(); k += stride)
       meter.add(now.instances[i].to_world.point(points[k]),
                 before.instances[i].to_world.point(points[k]));
@@ -117,6 +121,7 @@ int measure_max_px(const JobSpec& job, const Scene& scene) {
 }  // namespace
 
 Result<JobSpec> settle_motion(JobSpec job) {
+  BATON_TRY(settle_scene(job));
   if (job.camera.gltf) BATON_TRY(take_camera_keys(job.frames, job.camera));
   for (ObjectSpec& object : job.scene.objects) {
     if (object.gltf) BATON_TRY(take_object_keys(job.frames, object));

@@ -66,7 +66,7 @@ class ShapeArchive final : public JobArchive {
     return add(key, fmt::format("texts, at most {}", max_count));
   }
   bool object(Key key, const Body& body, ObjectForm form) override {
-    if (form.file) add(key, "text");
+    if (form.file || form.shorthand != nullptr) add(key, "text");
     add(key, "object");
     nest(std::string(".") + key.name, body);
     return true;

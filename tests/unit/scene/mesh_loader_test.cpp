@@ -198,9 +198,9 @@ TEST(MeshLoader, ErrorsNameFileAndFault) {
   expect_error(testing::TempDir() + "nowhere.ply", "missing");
   expect_error(testing::TempDir(), "no regular file");
   for (const std::string extension : {"off", "ply", "obj", "gltf", "glb"}) {
-    expect_error(write_test_file("garbage." + extension, "hello, this is no mesh\n"),
-                 "not a mesh: ");
-    expect_error(write_test_file("empty." + extension, ""), "not a mesh: ");
+    const std::string expected = extension.starts_with("gl") ? "not a glTF file: " : "not a mesh: ";
+    expect_error(write_test_file("garbage." + extension, "hello, this is no mesh\n"), expected);
+    expect_error(write_test_file("empty." + extension, ""), expected);
   }
   expect_error(write_test_file(
                    "cloud.ply",

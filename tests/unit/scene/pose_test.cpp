@@ -105,15 +105,18 @@ TEST(SettleMotion, MeasuresTheLargestStepInTheImage) {
 }
 
 /// A node "arm" below a turned parent "base", moved from (0, 0, 0) to (4, 0, 0) in one second, and
-/// a camera "eye".
+/// a camera "eye" that moves alike; "rest" does not.
 std::string animated_gltf() {
   // Times 0, 1 and places (0,0,0), (4,0,0) as little-endian floats in base 64.
   return test::write_test_file(
-      "animated.gltf", R"({"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0, 2]}],
+      "animated.gltf",
+      R"({"asset": {"version": "2.0"}, "scene": 0, "scenes": [{"nodes": [0, 2, 3]}],
     "nodes": [{"name": "base", "children": [1], "rotation": [0, 0, 0.70710678, 0.70710678]}, {"name": "arm"},
-              {"name": "eye", "camera": 0, "translation": [0, 1, 5]}],
+              {"name": "eye", "camera": 0, "translation": [0, 1, 5]}, {"name": "rest"}],
     "cameras": [{"type": "perspective", "perspective": {"yfov": 0.8, "znear": 0.1, "aspectRatio": 1.5}}],
     "animations": [{"channels": [{"sampler": 0, "target": {"node": 1, "path": "translation"}}],
+                    "samplers": [{"input": 0, "output": 1}]},
+                   {"channels": [{"sampler": 0, "target": {"node": 2, "path": "translation"}}],
                     "samplers": [{"input": 0, "output": 1}]}],
     "buffers": [{"byteLength": 32, "uri": "data:application/octet-stream;base64,AAAAAAAAgD8AAAAAAAAAAAAAAAAAAIBAAAAAAAAAAAA="}],
     "bufferViews": [{"buffer": 0, "byteLength": 8}, {"buffer": 0, "byteOffset": 8, "byteLength": 24}],
@@ -132,10 +135,13 @@ TEST(SettleMotion, TakesNodesAndCamerasOutOfGltf) {
   const std::vector<ObjectKey>& keys = settled->scene.objects[0].keys;
   ASSERT_EQ(keys.size(), 3u);
   // Half a second at frame 2; the parent turns x into y.
-  expect_near(keys[1].translate, {0, 2, 0});
-  expect_near(keys[2].translate, {0, 4, 0});
-  EXPECT_NEAR(std::fabs(keys[1].quaternion[2]), 0.70710678f, 1e-5f);
-  expect_near(settled->camera.keys.at(2).position, {0, 1, 5});
+  const auto motion = [&](double frame) {
+    return object_motion_at(settled->scene.objects[0], settled->motion.curve, frame);
+  };
+  expect_near(motion(2).offset, {0, 2, 0});
+  expect_near(motion(3).offset, {0, 4, 0});
+  expect_near(motion(2).linear * Vec3{1, 0, 0}, {0, 1, 0});
+  expect_near(settled->camera.keys.at(2).position, {4, 0, 0});
   expect_near(normalize(settled->camera.keys[2].look_at - settled->camera.keys[2].position),
               {0, 0, -1});
   EXPECT_NEAR(settled->camera.vertical_fov_deg, 0.8f * 180 / kPi, 1e-3f);
@@ -146,6 +152,8 @@ TEST(SettleMotion, NamesTheFileThatIsWrong) {
   job.scene.objects[0].keys.clear();
   job.scene.objects[0].gltf = GltfMotion{.file = animated_gltf(), .node = "leg"};
   EXPECT_THAT(settle_motion(job).error().message, HasSubstr("animated.gltf: no node \"leg\""));
+  job.scene.objects[0].gltf->node = "rest";
+  EXPECT_THAT(settle_motion(job).error().message, HasSubstr("node \"rest\": no animation moves"));
   job.camera.gltf = GltfMotion{.file = animated_gltf(), .node = "arm"};
   EXPECT_THAT(settle_motion(job).error().message, HasSubstr("node \"arm\" holds no camera"));
   job.camera.gltf->file = "/nowhere.gltf";

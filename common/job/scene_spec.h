@@ -1,0 +1,159 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <map>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/math/vec3.h"
+
+namespace baton {
+
+/// The scene of a job (job_spec.h).
+
+/// Row-major 3 x 4: an affine map of points.
+using Matrix34 = std::array<float, 12>;
+
+/// A node or camera of a glTF file whose animations give the keys: one a frame, at (frame -
+/// start_frame) / fps seconds.
+struct GltfMotion {
+  std::string file;  ///< .gltf .glb
+  std::string node;  ///< its name in the file
+  float fps = 24;
+  int start_frame = 0;  ///< the frame at time 0; Blender writes frame f at f / fps seconds
+
+  bool operator==(const GltfMotion&) const = default;
+};
+
+enum class MaterialKind : std::uint8_t { diffuse, phong, metallic_roughness, measured };
+
+/// diffuse: base_color is the albedo. phong: kd * base_color diffuse + ks * specular_color
+/// normalised lobe of `exponent`. metallic_roughness: GGX with base_color, metallic, roughness
+/// (glTF 2.0). measured: a table in the MERL binary format.
+struct MaterialSpec {
+  MaterialKind kind = MaterialKind::diffuse;
+  Rgb base_color{0.8f, 0.8f, 0.8f};
+  Rgb specular_color{1, 1, 1};  ///< phong
+  float kd = 0.5f;              ///< phong, [0, 1]
+  float ks = 0.5f;              ///< phong, [0, 1]; kd + ks <= 1
+  float exponent = 50;          ///< phong, [1, 100000]
+  float metallic = 0;           ///< [0, 1]
+  float roughness = 0.5f;       ///< [0.02, 1]; alpha = roughness^2
+  std::string file{};           ///< measured: .binary
+
+  bool operator==(const MaterialSpec&) const = default;
+};
+
+/// Whether a file name ends in .gltf or .glb.
+bool is_gltf(const std::string& path);
+
+struct MeshSpec {
+  std::string path;            ///< .ply .obj .off .gltf .glb
+  bool smooth_normals = true;  ///< interpolate vertex normals (computed when the file has none)
+  /// One primitive of one mesh of a glTF file, by their places in its lists, flat where it has no
+  /// normals; -1: all that the file shows.
+  int mesh = -1;
+  int primitive = 0;
+
+  bool operator==(const MeshSpec&) const = default;
+};
+
+/// A rigid motion, with scale, of an object that is already placed: scaled, turned by `rotate_deg`
+/// (x, then y, then z; angles are joined as numbers, so 0 to 360 is a full turn), turned by
+/// `quaternion`, each about the place that the object's `translate` names, then moved by
+/// `translate`.
+struct ObjectKey {
+  double frame = 1;
+  Vec3 translate{};
+  Vec3 rotate_deg{};
+  std::array<float, 4> quaternion{0, 0, 0, 1};  ///< x, y, z, w; need not be unit
+  Vec3 scale{1, 1, 1};
+  std::optional<Matrix34> matrix{};  ///< in place of all the others; joined linearly
+
+  bool operator==(const ObjectKey&) const = default;
+};
+
+/// Which axis of a mesh's file points up.
+enum class UpAxis : std::uint8_t { x, y, z };
+
+/// A mesh placed in the world: first mapped by `matrix`, then turned so that its `up_axis` is y,
+/// then scaled, then rotated (x, then y, then z), then translated. `fit_height` scales it to that
+/// height before it is moved. Before `translate`, `center` moves the middle of its bounds to
+/// x = z = 0 and `place_on_ground` its lowest point to y = 0.
+struct ObjectSpec {
+  std::string mesh;
+  std::string material;
+  Vec3 translate{0, 0, 0};
+  Vec3 rotate_deg{0, 0, 0};
+  Vec3 scale{1, 1, 1};
+  UpAxis up_axis = UpAxis::y;
+  std::optional<float> fit_height{};
+  bool center = false;
+  bool place_on_ground = false;
+  std::optional<Matrix34> matrix{};
+  std::vector<ObjectKey> keys{};  ///< ascending frames; none: stands still
+  std::optional<GltfMotion> gltf{};
+
+  bool operator==(const ObjectSpec&) const = default;
+};
+
+/// A horizontal square centred on the origin.
+struct GroundSpec {
+  std::string material;
+  float height = 0;
+  float size = 100;  ///< side length
+
+  bool operator==(const GroundSpec&) const = default;
+};
+
+/// Where a node is below its parent: scaled, rotated (x, then y, then z), moved.
+struct PlaceSpec {
+  Vec3 translate{0, 0, 0};
+  Vec3 rotate_deg{0, 0, 0};
+  Vec3 scale{1, 1, 1};
+
+  bool operator==(const PlaceSpec&) const = default;
+};
+
+/// What a job says of a node of its glTF file, and of all nodes below it.
+struct GltfNodeSpec {
+  bool visible = true;
+  std::string material{};  ///< in place of those of the file; empty: those of the file
+  std::optional<PlaceSpec>
+      place{};  ///< of the node alone, in place of the file's and its animation
+
+  bool operator==(const GltfNodeSpec&) const = default;
+};
+
+/// A glTF file whose scene is shown: its meshes, materials, and the animations of its nodes.
+struct GltfSceneSpec {
+  std::string file;  ///< .gltf .glb
+  float fps = 24;
+  int start_frame = 0;                          ///< the frame at time 0
+  std::map<std::string, GltfNodeSpec> nodes{};  ///< by name
+
+  bool operator==(const GltfSceneSpec&) const = default;
+};
+
+/// A file that others refer to.
+struct FileSpec {
+  std::string path;
+  bool operator==(const FileSpec&) const = default;
+};
+
+/// gltf becomes materials, meshes and objects before a job is submitted
+/// (worker/scene/settle_scene.h).
+struct SceneSpec {
+  std::optional<GltfSceneSpec> gltf;
+  std::map<std::string, MaterialSpec> materials;
+  std::map<std::string, MeshSpec> meshes;
+  std::vector<ObjectSpec> objects;
+  std::optional<GroundSpec> ground;
+  std::vector<FileSpec> files;  ///< beside those that meshes and materials name
+
+  bool operator==(const SceneSpec&) const = default;
+};
+
+}  // namespace baton

@@ -1,0 +1,171 @@
+#!/usr/bin/env python3
+"""Writes a small scene as Blender would: a floor, a ring of pillars that share one mesh, a turning vane, a lift, a ball
+that bounces, and a camera on a dolly, each with an animation of its own. Standard library only.
+
+usage: make_gltf_set.py FILE.glb     frames 1 to 24 at 24 frames per second, frame n at n / 24 seconds
+"""
+
+import json
+import math
+import struct
+import sys
+from pathlib import Path
+
+FLOAT, UINT16, INT16 = 5126, 5123, 5122
+LAST_FRAME, FPS = 24, 24
+
+
+class Builder:
+    """A glTF file in the making: buffer, views, accessors."""
+
+    def __init__(self):
+        self.data = bytearray()
+        self.views, self.accessors, self.meshes, self.nodes, self.animations = [], [], [], [], []
+
+    def accessor(self, rows, kind, component=FLOAT, **more):
+        """Appends rows of numbers; the index of their accessor."""
+        width = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}[kind]
+        letter, size = {FLOAT: ("f", 4), UINT16: ("H", 2), INT16: ("h", 2)}[component]
+        self.data += bytes(-len(self.data) % 4)
+        stride = (width * size + 3) // 4 * 4 if kind != "SCALAR" else size
+        view = {"buffer": 0, "byteOffset": len(self.data), "byteLength": stride * len(rows)}
+        if kind != "SCALAR" and stride != width * size:
+            view["byteStride"] = stride
+        for row in rows:
+            packed = struct.pack(f"<{width}{letter}", *(row if kind != "SCALAR" else (row,)))
+            self.data += packed + bytes(stride - len(packed))
+        self.views.append(view)
+        accessor = {"bufferView": len(self.views) - 1, "componentType": component, "count": len(rows), "type": kind, **more}
+        if component == FLOAT and rows and "normalized" not in more:
+            columns = [[row] for row in rows] if kind == "SCALAR" else rows
+            accessor["min"] = [min(float(struct.unpack("<f", struct.pack("<f", c[i]))[0]) for c in columns) for i in range(width)]
+            accessor["max"] = [max(float(struct.unpack("<f", struct.pack("<f", c[i]))[0]) for c in columns) for i in range(width)]
+        self.accessors.append(accessor)
+        return len(self.accessors) - 1
+
+    def mesh(self, name, material, positions, normals, uvs, triangles, quantised=False):
+        """A mesh of one primitive; quantised: positions as 16-bit integers of the cube [-1, 1]."""
+        if quantised:
+            places = self.accessor([[round(c * 32767) for c in p] for p in positions], "VEC3", INT16, normalized=True)
+        else:
+            places = self.accessor(positions, "VEC3")
+        attributes = {"POSITION": places, "NORMAL": self.accessor(normals, "VEC3"), "TEXCOORD_0": self.accessor(uvs, "VEC2")}
+        indices = self.accessor([i for triangle in triangles for i in triangle], "SCALAR", UINT16)
+        self.meshes.append({"name": name, "primitives": [{"attributes": attributes, "indices": indices, "material": material}]})
+        return len(self.meshes) - 1
+
+    def node(self, name, parent=None, **what):
+        self.nodes.append({"name": name, **what})
+        if parent is not None:
+            self.nodes[parent].setdefault("children", []).append(len(self.nodes) - 1)
+        return len(self.nodes) - 1
+
+    def animate(self, node, path, times, rows, curve="LINEAR"):
+        """An animation of its own, as Blender writes one for each object."""
+        sampler = {"input": self.accessor(times, "SCALAR"), "output": self.accessor(rows, "VEC4" if path == "rotation" else "VEC3"),
+                   "interpolation": curve}
+        self.animations.append({"name": f"{self.nodes[node]['name']}.{path}", "samplers": [sampler],
+                                "channels": [{"sampler": 0, "target": {"node": node, "path": path}}]})
+
+    def glb(self, roots, materials, cameras, **more):
+        children = {child for node in self.nodes for child in node.get("children", [])}
+        document = {"asset": {"version": "2.0", "generator": "make_gltf_set"}, "scene": 0,
+                    "scenes": [{"nodes": [n for n in roots if n not in children]}], "nodes": self.nodes, "meshes": self.meshes,
+                    "materials": materials, "cameras": cameras, "animations": self.animations, "accessors": self.accessors,
+                    "bufferViews": self.views, "buffers": [{"byteLength": len(self.data)}], **more}
+        text = json.dumps(document, separators=(",", ":")).encode()
+        text += b" " * (-len(text) % 4)
+        binary = bytes(self.data) + bytes(-len(self.data) % 4)
+        size = 12 + 8 + len(text) + 8 + len(binary)
+        return (struct.pack("<4sII", b"glTF", 2, size) + struct.pack("<I4s", len(text), b"JSON") + text
+                + struct.pack("<I4s", len(binary), b"BIN\0") + binary)
+
+
+def box():
+    """A cube of edge 2: four vertices a side."""
+    positions, normals, uvs, triangles = [], [], [], []
+    for axis in range(3):
+        for sign in (-1, 1):
+            u, v = (axis + 1) % 3, (axis + 2) % 3
+            first = len(positions)
+            for a, b in ((-1, -1), (1, -1), (1, 1), (-1, 1)):
+                p = [0, 0, 0]
+                p[axis], p[u], p[v] = sign, a, b
+                n = [0, 0, 0]
+                n[axis] = sign
+                positions.append(p)
+                normals.append(n)
+                uvs.append([(a + 1) / 2, (b + 1) / 2])
+            corners = [(0, 1, 2), (0, 2, 3)] if sign > 0 else [(0, 2, 1), (0, 3, 2)]
+            triangles += [[first + i for i in corner] for corner in corners]
+    return positions, normals, uvs, triangles
+
+
+def ball(rings=16, segments=24):
+    """A unit sphere."""
+    positions, uvs, triangles = [], [], []
+    for i in range(rings + 1):
+        for j in range(segments + 1):
+            theta, phi = math.pi * i / rings, 2 * math.pi * j / segments
+            positions.append([math.sin(theta) * math.cos(phi), math.cos(theta), -math.sin(theta) * math.sin(phi)])
+            uvs.append([j / segments, i / rings])
+    for i in range(rings):
+        for j in range(segments):
+            a, b = i * (segments + 1) + j, (i + 1) * (segments + 1) + j
+            triangles += [[a, b, b + 1]] * (i < rings - 1) + [[a, b + 1, a + 1]] * (i > 0)
+    return positions, positions, uvs, triangles
+
+
+def about_y(degrees):
+    return [0, math.sin(math.radians(degrees) / 2), 0, math.cos(math.radians(degrees) / 2)]
+
+
+def pbr(name, color, metallic, roughness):
+    return {"name": name, "pbrMetallicRoughness": {"baseColorFactor": [*color, 1], "metallicFactor": metallic,
+                                                   "roughnessFactor": roughness}}
+
+
+def make_set(pillars=7):
+    """The bytes of the .glb."""
+    b = Builder()
+    materials = [pbr("floor", (0.5, 0.45, 0.4), 0, 0.7), pbr("clay", (0.6, 0.25, 0.15), 0, 0.6),
+                 pbr("steel", (0.75, 0.77, 0.8), 1, 0.3), pbr("rubber", (0.1, 0.3, 0.6), 0, 0.4)]
+    side = [[-4, 0, -4], [-4, 0, 4], [4, 0, 4], [4, 0, -4]]
+    floor = b.mesh("floor", 0, side, [[0, 1, 0]] * 4, [[0, 0], [0, 4], [4, 4], [4, 0]], [(0, 1, 2), (0, 2, 3)])
+    pillar = b.mesh("pillar", 1, *box(), quantised=True)
+    vane_mesh = b.mesh("vane", 2, *box())
+    ball_mesh = b.mesh("ball", 3, *ball())
+
+    roots = [b.node("floor", mesh=floor)]
+    ring = b.node("ring")
+    roots.append(ring)
+    for i in range(pillars):
+        angle = 2 * math.pi * i / pillars
+        scale = [0.15, 0.5 + 0.05 * i, -0.15 if i % 2 else 0.15]  # every other one is mirrored
+        b.node(f"pillar.{i:03}", ring, mesh=pillar, scale=scale, rotation=about_y(20 * i),
+               translation=[2 * math.sin(angle), scale[1], 2 * math.cos(angle) - 0.5])
+
+    seconds = [frame / FPS for frame in range(1, LAST_FRAME + 1)]
+    lift = b.node("lift", translation=[-0.7, 0.4, 0])
+    vane = b.node("vane", lift, mesh=vane_mesh, scale=[0.5, 0.06, 0.12])
+    bounce = b.node("ball", mesh=ball_mesh, scale=[0.3, 0.3, 0.3], translation=[0.7, 0.3, 0.2])
+    dolly = b.node("dolly")
+    eye = b.node("eye", dolly, camera=0, translation=[0, 1.6, 5], rotation=[-math.sin(0.12), 0, 0, math.cos(0.12)])
+    roots += [lift, bounce, dolly]
+    b.animate(vane, "rotation", [seconds[0], seconds[11], seconds[-1]], [about_y(0), about_y(120), about_y(240)])
+    b.animate(lift, "translation", seconds[::8], [[-0.7, y, 0] for y in (0.3, 0.6, 0.9)], "STEP")
+    # In-tangent, value, out-tangent of each key, per second.
+    keys = [([0.7, 0.3, 0.2], 0, 3), ([0.7, 0.9, 0.2], 0, 0), ([0.7, 0.3, 0.2], -3, 0)]
+    b.animate(bounce, "translation", [seconds[0], seconds[12], seconds[-1]],
+              [row for place, before, behind in keys for row in ([0, before, 0], place, [0, behind, 0])], "CUBICSPLINE")
+    b.animate(dolly, "rotation", [seconds[0], seconds[-1]], [about_y(-10), about_y(10)])
+    assert eye < len(b.nodes)
+    camera = {"type": "perspective", "name": "eye", "perspective": {"yfov": 0.55, "znear": 0.1, "aspectRatio": 16 / 9}}
+    return b.glb(roots, materials, [camera], extensionsUsed=["KHR_mesh_quantization"],
+                 extensionsRequired=["KHR_mesh_quantization"])
+
+
+if __name__ == "__main__":
+    if len(sys.argv) != 2:
+        sys.exit(__doc__)
+    Path(sys.argv[1]).write_bytes(make_set())

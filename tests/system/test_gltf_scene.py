@@ -1,0 +1,71 @@
+#!/usr/bin/env python3
+"""A glTF scene as a job: nodes, materials and animations are shown, the same for any tiling; what is wrong with the file
+is said once; the file is part of the job."""
+
+import json
+import sys
+from pathlib import Path
+
+from farm import BAD_INPUT, check, check_equal, make_job, run_tests, write_job
+
+sys.path.append(str(Path(__file__).parents[2] / "jobs/examples"))
+from make_gltf_set import make_set  # noqa: E402
+
+NUM_FRAMES = 3
+
+
+def set_job(folder, tile_size=64, method="pool", **scene):
+    """The camera of the set from behind its dolly; frames with motion of all kinds."""
+    folder.mkdir(parents=True, exist_ok=True)
+    (folder / "set.glb").write_bytes(make_set(3))
+    job = make_job(folder, frames="12-14", image={"width": 96, "height": 54, "sites": 4, "tileSize": tile_size},
+                   sampling={"method": method, "numParticles": 4, "numCandidates": 32})
+    del job["camera"]
+    job["scene"] = {"gltf": {"file": "set.glb", **scene.pop("gltf", {})}, **scene}
+    return job
+
+
+def rendered(programs, folder, job, **how):
+    path = write_job(folder / "job.json", job)
+    programs.render(path, folder / "work", **how)
+    pixels = programs.pixels(folder / "frames")
+    check_equal(len(pixels), NUM_FRAMES, f"frames in {folder}")
+    return pixels
+
+
+def any_tiling(programs, folder):
+    """Small tiles on two workers and the whole image on one give the same pixels, while everything moves."""
+    for method in ("pool", "sequential"):
+        whole, small = folder / method / "whole", folder / method / "small"
+        expected = rendered(programs, whole, set_job(whole, 128, method), workers=1, threads=1)
+        got = rendered(programs, small, set_job(small, 16, method), workers=2, threads=1)
+        check_equal(got, expected, f"pixels of {method} in small tiles")
+        depths = [programs.values(whole / f"frames/frame.{frame:04}.exr", "depth") for frame in (12, 14)]
+        check(depths[0] != depths[1], "nothing moves")
+
+
+def the_job_says_otherwise(programs, folder):
+    """`check` counts what is shown; hidden nodes are not, and names that are not there are suggested."""
+    checked = json.loads(programs.run("baton", "check", write_job(folder / "job.json", set_job(folder)), "--json").stdout)
+    check_equal((checked["meshes"], checked["instances"]), (4, 6), "meshes and instances")
+    check(checked["motionMaxPx"] > 1, f"motion of {checked['motionMaxPx']} pixels")
+    hidden = set_job(folder, gltf={"nodes": {"ring": {"visible": False}}})
+    checked = json.loads(programs.run("baton", "check", write_job(folder / "hidden.json", hidden), "--json").stdout)
+    check_equal(checked["instances"], 3, "instances without the ring")
+    wrong = set_job(folder, gltf={"nodes": {"rings": {"visible": False}}})
+    failed = programs.run("baton", "check", write_job(folder / "wrong.json", wrong), expect=BAD_INPUT)
+    check('set.glb: no node "rings"; did you mean "ring"?' in failed.stderr, failed.stderr)
+
+
+def a_cut_file_is_one_error(programs, folder):
+    path = write_job(folder / "job.json", set_job(folder))
+    whole = (folder / "set.glb").read_bytes()
+    for size in (0, 1024, len(whole) // 2, len(whole) - 1):
+        (folder / "set.glb").write_bytes(whole[:size])
+        failed = programs.run("baton", "check", path, expect=BAD_INPUT)
+        check_equal(len(failed.stderr.strip().splitlines()), 1, f"lines on stderr for {size} bytes: {failed.stderr}")
+        check("set.glb: not a glTF file" in failed.stderr, failed.stderr)
+
+
+if __name__ == "__main__":
+    run_tests([any_tiling, the_job_says_otherwise, a_cut_file_is_one_error])

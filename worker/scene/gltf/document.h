@@ -1,0 +1,160 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <limits>
+#include <memory>
+#include <string>
+#include <string_view>
+#include <vector>
+
+#include "common/base/bytes.h"
+#include "common/base/result.h"
+
+/// A glTF 2.0 file as plain data, as far as Baton renders it. Indices refer to the lists of
+/// Document; -1: none. Every index is checked when the file is read, so that what follows one
+/// needs no check; what lies in buffers is checked by accessor.h.
+namespace baton::gltf {
+
+struct View {
+  int buffer = -1;
+  std::uint64_t offset = 0, size = 0;  ///< bytes, within the buffer
+  std::uint64_t stride = 0;            ///< bytes from element to element; 0: packed
+};
+
+enum class Component : std::uint8_t { i8, u8, i16, u16, u32, f32 };
+/// Bytes of a component.
+int size_of(Component component);
+
+/// Elements that stand in place of others.
+struct Sparse {
+  std::uint64_t count = 0;  ///< 0: none
+  int indices = -1;         ///< view
+  std::uint64_t indices_offset = 0;
+  Component indices_component = Component::u32;
+  int values = -1;  ///< view
+  std::uint64_t values_offset = 0;
+};
+
+struct Accessor {
+  int view = -1;  ///< -1: zeros, but for what is sparse
+  std::uint64_t offset = 0;
+  std::uint64_t count = 0;
+  Component component = Component::f32;
+  int width = 1;  ///< components of an element: 1 to 4, 9 or 16
+  bool normalized = false;
+  Sparse sparse;
+};
+
+struct Primitive {
+  int mode = 4;  ///< as OpenGL counts: 4 triangles, 5 strip, 6 fan; others have no surface
+  int material = -1;
+  int indices = -1, positions = -1, normals = -1;  ///< accessors
+  std::array<int, 2> uvs{-1, -1};                  ///< accessors of sets 0 and 1
+  bool colored = false, morphed = false;           ///< has vertex colours, morph targets
+};
+
+struct Mesh {
+  std::string name;
+  std::vector<Primitive> primitives;
+};
+
+/// Row-major 3 x 4.
+using Matrix = std::array<double, 12>;
+
+struct Node {
+  std::string name;
+  int parent = -1;
+  std::vector<int> children;
+  int mesh = -1, camera = -1, skin = -1;
+  bool has_matrix = false;  ///< else the three below
+  Matrix matrix{};
+  std::array<double, 3> translation{0, 0, 0};
+  std::array<double, 4> rotation{0, 0, 0, 1};  ///< x, y, z, w
+  std::array<double, 3> scale{1, 1, 1};
+};
+
+struct Camera {
+  bool perspective = true;
+  double yfov = 0;  ///< radians, (0, pi)
+};
+
+enum class Path : std::uint8_t { translation, rotation, scale, weights };
+enum class Interpolation : std::uint8_t { linear, step, cubic_spline };
+
+/// A curve that moves a node.
+struct Channel {
+  int node = -1;
+  Path path = Path::translation;
+  Interpolation interpolation = Interpolation::linear;
+  int input = -1, output = -1;  ///< accessors: seconds; values
+};
+
+/// Where a texture lies on a surface (textureInfo and KHR_texture_transform).
+struct TextureInfo {
+  int texture = -1;
+  int uv = 0;  ///< set
+  std::array<double, 2> offset{0, 0}, scale{1, 1};
+  double rotation = 0;  ///< radians
+  double strength = 1;  ///< of a normal texture
+};
+
+enum class Wrap : std::uint8_t { repeat, clamp, mirror };
+
+struct Texture {
+  int image = -1;
+  Wrap wrap_s = Wrap::repeat, wrap_t = Wrap::repeat;
+};
+
+/// An image is a file beside this one, a view or bytes of its own.
+struct Image {
+  std::string file;  ///< absolute, or empty
+  int view = -1;
+  Bytes bytes;
+};
+
+enum class AlphaMode : std::uint8_t { opaque, mask, blend };
+
+struct Material {
+  std::string name;
+  std::array<double, 4> base_color{1, 1, 1, 1};
+  double metallic = 1, roughness = 1;
+  TextureInfo base_color_texture, metallic_roughness_texture, normal_texture;
+  AlphaMode alpha_mode = AlphaMode::opaque;
+  double alpha_cutoff = 0.5;
+  bool emissive = false;
+};
+
+struct Document {
+  std::string path;  ///< goes first in every error
+  std::vector<Bytes> buffers;
+  std::vector<std::string> buffer_files;  ///< those that are files of their own; absolute
+  std::vector<View> views;
+  std::vector<Accessor> accessors;
+  std::vector<Mesh> meshes;
+  std::vector<Node> nodes;
+  std::vector<int> roots;  ///< nodes of the scene that is shown
+  std::vector<Camera> cameras;
+  std::vector<Channel> channels;  ///< of all animations, in the order of the file
+  std::vector<Material> materials;
+  std::vector<Texture> textures;
+  std::vector<Image> images;
+  std::vector<std::string> extensions_used;
+
+  Error error(const std::string& what) const { return {ErrorKind::bad_input, path + ": " + what}; }
+};
+
+/// Reads a .gltf or .glb file and the buffers beside it. Errors name file and place in its JSON:
+/// what is missing or cut, indices past their list, views past their buffer, nodes that are their
+/// own ancestors, extensions that are required and not read.
+Result<std::shared_ptr<const Document>> read_document(const std::string& path);
+/// The same of bytes in memory; buffers that are files lie beside `path`.
+Result<std::shared_ptr<const Document>> parse_document(ByteView bytes, const std::string& path);
+
+/// The nodes of the scene that is shown, parents first.
+std::vector<int> shown_nodes(const Document& document);
+
+/// Extensions that are read; all others are reported where they are used.
+bool is_read(std::string_view extension);
+
+}  // namespace baton::gltf

@@ -1,0 +1,57 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "worker/scene/gltf/matrix.h"
+
+namespace baton::gltf {
+
+/// Values over time, (times, width); cubic: (times, 3, width) with the tangents before and behind.
+struct Curve {
+  Interpolation interpolation = Interpolation::linear;
+  std::vector<float> times;  ///< seconds, ascending, at least one
+  std::vector<float> values;
+
+  /// Rotations are unit quaternions. Held before the first time and after the last one.
+  std::array<double, 3> vector_at(double seconds) const;
+  Quaternion rotation_at(double seconds) const;
+};
+
+/// Where the nodes of a file are at any time: all its animations together. Where several move one
+/// property of a node, the first in the file counts.
+class NodeMotion {
+ public:
+  /// Errors name the file and the accessor.
+  static Result<NodeMotion> read(std::shared_ptr<const Document> document);
+
+  const Document& document() const { return *document_; }
+  /// The only node of a name. Error: none, or several.
+  Result<int> find(const std::string& name) const;
+  /// Whether a node, or one above it, is moved by an animation.
+  bool moves(int node) const { return moves_[static_cast<std::size_t>(node)]; }
+  /// Puts a node elsewhere below its parent, and at rest there.
+  void place(int node, const Matrix& local);
+  /// From each node to the world of the file.
+  std::vector<Matrix> to_world(double seconds) const;
+  /// The same as the file places them, without its animations.
+  static std::vector<Matrix> at_rest(const Document& document);
+
+ private:
+  struct Moved {
+    std::optional<Curve> translation, rotation, scale;
+    std::optional<Matrix> placed;
+    bool any() const { return !placed && (translation || rotation || scale); }
+  };
+  Matrix local(std::size_t node, double seconds) const;
+  void find_what_moves();
+
+  std::shared_ptr<const Document> document_;
+  std::vector<int> order_;     ///< all nodes, parents first
+  std::vector<Moved> curves_;  ///< by node
+  std::vector<bool> moves_;    ///< by node
+};
+
+}  // namespace baton::gltf

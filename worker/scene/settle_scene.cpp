@@ -1,0 +1,280 @@
+#include "worker/scene/settle_scene.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <map>
+#include <set>
+
+#include "common/base/limits.h"
+#include "common/job/motion.h"
+#include "common/job/suggest.h"
+#include "common/math/inverse.h"
+#include "worker/scene/gltf/file_cache.h"
+#include "worker/scene/gltf/materials.h"
+#include "worker/scene/gltf_motion.h"
+
+namespace baton {
+namespace {
+
+/// Names longer than this are left out of those of meshes.
+constexpr std::size_t kLongestShown = 60;
+
+/// No job has such a name by accident; people see it in warnings.
+std::string mesh_name(const gltf::Document& file, int mesh, std::size_t primitive) {
+  const std::string& name = file.meshes[static_cast<std::size_t>(mesh)].name;
+  return fmt::format("gltf/{}/{}{}{}", mesh, primitive, name.empty() ? "" : " ",
+                     name.size() <= kLongestShown ? name : "");
+}
+
+bool has_surface(const gltf::Primitive& primitive) {
+  return primitive.mode >= 4 && primitive.mode <= 6;
+}
+
+bool is_flat(const Matrix34& matrix) { return !inverse_transposed(to_transform(matrix).linear); }
+
+/// Puts the scene of one file into a job.
+class SceneTaker {
+ public:
+  SceneTaker(JobSpec& job, gltf::NodeMotion motion)
+      : job_(job),
+        gltf_(*job.scene.gltf),
+        motion_(std::move(motion)),
+        file_(motion_.document()),
+        material_names_(gltf::material_names(file_)) {}
+
+  Status take() {
+    BATON_TRY(place_nodes());
+    BATON_TRY(take_camera());
+    BATON_TRY(take_objects());
+    take_materials();
+    if (job_.scene.materials.size() > limits::kMaxMaterials ||
+        job_.scene.meshes.size() > limits::kMaxMeshes ||
+        job_.scene.objects.size() > limits::kMaxObjects)
+      return file_.error(fmt::format("expected at most {} materials, {} meshes and {} objects",
+                                     limits::kMaxMaterials, limits::kMaxMeshes,
+                                     limits::kMaxObjects));
+    job_.scene.gltf.reset();
+    return {};
+  }
+
+ private:
+  FileClock clock() const { return {gltf_.fps, gltf_.start_frame}; }
+
+  /// What the job says of nodes; then where all of them are in each frame.
+  Status place_nodes() {
+    said_.assign(file_.nodes.size(), nullptr);
+    for (const auto& [name, said] : gltf_.nodes) {
+      BATON_ASSIGN(const int node, motion_.find(name));
+      said_[static_cast<std::size_t>(node)] = &said;
+      if (!said.place) continue;
+      const Vec3& t = said.place->translate;
+      const Vec3& s = said.place->scale;
+      const Mat3 r = rotation_about({0, 0, 1}, said.place->rotate_deg.z) *
+                     rotation_about({0, 1, 0}, said.place->rotate_deg.y) *
+                     rotation_about({1, 0, 0}, said.place->rotate_deg.x);
+      motion_.place(node, {r.m[0] * s.x, r.m[1] * s.y, r.m[2] * s.z, t.x,  //
+                           r.m[3] * s.x, r.m[4] * s.y, r.m[5] * s.z, t.y,  //
+                           r.m[6] * s.x, r.m[7] * s.y, r.m[8] * s.z, t.z});
+    }
+    return follow_nodes();
+  }
+
+  /// Where all nodes are in the first frame, and those with meshes that move in all frames.
+  Status follow_nodes() {
+    for (const int node : gltf::shown_nodes(file_)) {
+      if (motion_.moves(node) && file_.nodes[static_cast<std::size_t>(node)].mesh >= 0)
+        moved_[static_cast<std::size_t>(node)];
+    }
+    if (moved_.size() * job_.frames.size() > limits::kMaxGltfKeys) return too_many_keys();
+    for (const int frame : job_.frames) {
+      if (!rest_.empty() && moved_.empty()) break;
+      const std::vector<gltf::Matrix> world = motion_.to_world(clock().seconds_at(frame));
+      for (auto& [node, matrices] : moved_) matrices.push_back(gltf::to_floats(world[node]));
+      if (rest_.empty()) rest_ = world;
+    }
+    return {};
+  }
+
+  Error too_many_keys() const {
+    return file_.error(fmt::format("its animations give more than {} keys in the job's frames",
+                                   limits::kMaxGltfKeys));
+  }
+
+  Status take_camera() {
+    if (job_.camera.node.empty()) return {};
+    if (job_.camera.node != kFirstCamera) {
+      BATON_ASSIGN(const int node, motion_.find(job_.camera.node));
+      return put_camera(motion_, node, clock(), job_.frames, job_.camera);
+    }
+    for (const int node : gltf::shown_nodes(file_)) {
+      if (file_.nodes[static_cast<std::size_t>(node)].camera >= 0)
+        return put_camera(motion_, node, clock(), job_.frames, job_.camera);
+    }
+    return file_.error("no camera: expected one there, or `camera` in the job");
+  }
+
+  /// Walks the scene, parents first: what is said of a node holds for those below it.
+  Status take_objects() {
+    struct Passed {
+      bool visible = true;
+      std::string material;
+    };
+    std::vector<Passed> passed(file_.nodes.size());
+    for (const int n : gltf::shown_nodes(file_)) {
+      const auto node = static_cast<std::size_t>(n);
+      if (const int parent = file_.nodes[node].parent; parent >= 0)
+        passed[node] = passed[static_cast<std::size_t>(parent)];
+      if (const GltfNodeSpec* said = said_[node]) {
+        passed[node].visible = passed[node].visible && said->visible;
+        if (!said->material.empty()) passed[node].material = said->material;
+      }
+      if (passed[node].visible && file_.nodes[node].mesh >= 0)
+        BATON_TRY(take_node(node, passed[node].material));
+    }
+    return {};
+  }
+
+  Status take_node(std::size_t node, const std::string& material) {
+    ObjectSpec object;
+    if (const auto moved = moved_.find(node); moved != moved_.end()) {
+      const auto flat = std::ranges::find_if(moved->second, is_flat);
+      if (flat != moved->second.end())
+        return file_.error(
+            fmt::format("node \"{}\": no extent in frame {}, expected a scale without zeros",
+                        file_.nodes[node].name,
+                        job_.frames[static_cast<std::size_t>(flat - moved->second.begin())]));
+      object.keys = matrix_keys(job_.frames, moved->second);
+    } else {
+      object.matrix = gltf::to_floats(rest_[node]);
+      if (is_flat(*object.matrix)) return {};  // nothing is seen of it
+    }
+
+    const int mesh = file_.nodes[node].mesh;
+    const std::vector<gltf::Primitive>& primitives =
+        file_.meshes[static_cast<std::size_t>(mesh)].primitives;
+    for (std::size_t p = 0; p < primitives.size(); ++p) {
+      if (!has_surface(primitives[p])) continue;
+      object.mesh = mesh_name(file_, mesh, p);
+      object.material = material;
+      if (material.empty()) {
+        object.material = material_names_[static_cast<std::size_t>(primitives[p].material + 1)];
+        used_materials_.insert(primitives[p].material);
+      }
+      MeshSpec& spec = job_.scene.meshes[object.mesh];
+      spec = {.path = gltf_.file,
+              .smooth_normals = true,
+              .mesh = mesh,
+              .primitive = static_cast<int>(p)};
+      job_.scene.objects.push_back(object);
+      num_keys_ += object.keys.size();
+    }
+    if (num_keys_ > limits::kMaxGltfKeys) return too_many_keys();
+    return {};
+  }
+
+  /// Those that are in use, or that the job's own objects name.
+  void take_materials() {
+    for (std::size_t m = 0; m < material_names_.size(); ++m) {
+      const int index = static_cast<int>(m) - 1;
+      if (index < 0 && !used_materials_.contains(index)) continue;
+      job_.scene.materials.try_emplace(material_names_[m], gltf::material_spec(file_, index));
+    }
+  }
+
+  JobSpec& job_;
+  const GltfSceneSpec gltf_;
+  gltf::NodeMotion motion_;
+  const gltf::Document& file_;
+  const std::vector<std::string> material_names_;  ///< of material i - 1; first the default one
+  std::vector<const GltfNodeSpec*> said_;          ///< by node; null: nothing
+  std::vector<gltf::Matrix> rest_;                 ///< by node, in the first frame
+  std::map<std::size_t, std::vector<Matrix34>> moved_;  ///< by node that moves, (frames)
+  std::set<int> used_materials_;
+  std::size_t num_keys_ = 0;
+};
+
+/// Names of materials that could not be looked for before the file was read.
+Status check_names(const JobSpec& job) {
+  std::vector<std::string> known;
+  for (const auto& item : job.scene.materials) known.push_back(item.first);
+  const auto check = [&](const std::string& user, const std::string& name) -> Status {
+    if (job.scene.materials.contains(name)) return {};
+    return Error{ErrorKind::bad_input,
+                 fmt::format("{}: no material \"{}\"{}", user, name, suggestion(name, known))};
+  };
+  for (const auto& item : job.sampling.by_material)
+    BATON_TRY(check("sampling.byMaterial", item.first));
+  for (const ObjectSpec& object : job.scene.objects)
+    BATON_TRY(check("scene, mesh \"" + object.mesh + "\"", object.material));
+  if (job.scene.ground) BATON_TRY(check("scene.ground", job.scene.ground->material));
+  return {};
+}
+
+/// What glTF files refer to is part of the job.
+Status list_files(SceneSpec& scene, gltf::FileCache& cache) {
+  std::set<std::string> files;
+  for (const FileSpec& file : scene.files) files.insert(file.path);
+  for (const auto& [name, mesh] : scene.meshes) {
+    if (!is_gltf(mesh.path)) continue;
+    const auto document = cache.get(mesh.path);
+    // What is wrong with a file is said where all meshes are loaded.
+    if (document) files.insert((*document)->buffer_files.begin(), (*document)->buffer_files.end());
+  }
+  scene.files.clear();
+  for (const std::string& file : files) scene.files.push_back({file});
+  return {};
+}
+
+void warn_of_materials(const gltf::Document& file, std::vector<std::string>& warnings) {
+  const std::vector<std::string> names = gltf::material_names(file);
+  for (std::size_t m = 0; m < file.materials.size(); ++m) {
+    for (const std::string& what : gltf::unsupported_parts(file.materials[m]))
+      warnings.push_back(fmt::format("{}: material \"{}\": {}", file.path, names[m + 1], what));
+  }
+}
+
+}  // namespace
+
+Status settle_scene(JobSpec& job) {
+  gltf::FileCache cache;
+  if (job.scene.gltf) {
+    BATON_ASSIGN(auto document, cache.get(job.scene.gltf->file));
+    BATON_ASSIGN(gltf::NodeMotion motion, gltf::NodeMotion::read(std::move(document)));
+    BATON_TRY(SceneTaker(job, std::move(motion)).take());
+    BATON_TRY(check_names(job));
+  }
+  return list_files(job.scene, cache);
+}
+
+std::vector<std::string> gltf_warnings(const SceneSpec& scene) {
+  std::set<std::string> paths;
+  for (const auto& [name, mesh] : scene.meshes) {
+    if (mesh.mesh >= 0) paths.insert(mesh.path);
+  }
+  std::vector<std::string> warnings;
+  for (const std::string& path : paths) {
+    const auto document = gltf::read_document(path);
+    if (!document) continue;
+    const gltf::Document& file = **document;
+    const auto add = [&](const std::string& what) { warnings.push_back(path + ": " + what); };
+    for (const std::string& extension : file.extensions_used) {
+      if (!gltf::is_read(extension)) add("extension " + extension + " is not read");
+    }
+    warn_of_materials(file, warnings);
+    std::size_t skinned = 0, morphed = 0, colored = 0;
+    for (const gltf::Node& node : file.nodes) skinned += node.skin >= 0 && node.mesh >= 0 ? 1 : 0;
+    for (const gltf::Mesh& mesh : file.meshes) {
+      for (const gltf::Primitive& primitive : mesh.primitives) {
+        morphed += primitive.morphed ? 1 : 0;
+        colored += primitive.colored ? 1 : 0;
+      }
+    }
+    if (skinned > 0) add(fmt::format("{} meshes follow bones: they are shown at rest", skinned));
+    if (morphed > 0) add(fmt::format("{} parts have morph targets, which are not read", morphed));
+    if (colored > 0) add(fmt::format("{} parts have vertex colours, which are not read", colored));
+  }
+  return warnings;
+}
+
+}  // namespace baton
