@@ -1,10 +1,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <fstream>
+#include <iterator>
 #include <memory>
 #include <thread>
 
-#include "common/base/files.h"
 #include "jobs/auto/auto_pilot.h"
 #include "jobs/cli/commands.h"
 #include "jobs/cli/farm_job_runner.h"
@@ -36,8 +37,9 @@ FarmOptions farm_options(const ChartOptions& options, const StudyFolder& folder)
 
 /// The processor as Linux names it.
 std::string machine_name() {
-  const Result<std::string> info = read_text_file("/proc/cpuinfo", 1 << 24);
-  const std::string text = info ? *info : "";
+  // A file of /proc says that it has no bytes, so it is read as a stream.
+  std::ifstream info("/proc/cpuinfo");
+  const std::string text{std::istreambuf_iterator<char>(info), std::istreambuf_iterator<char>()};
   const std::size_t key = text.find("model name");
   const std::size_t colon = text.find(": ", key);
   if (key == std::string::npos || colon == std::string::npos) return "an unknown machine";

@@ -221,7 +221,7 @@ def judge_frames(frames, job, predicted):
                 raise Wrong("not finite", f"{name}: {channel}: {len(places)} of {len(values)}, first at "
                             f"({places[0] % frame.width}, {places[0] // frame.width}): {values[places[0]]}")
         # Colours past a half float make R, G and B of a frame float32.
-        is_bright = any(abs(value) > 65504 for c in "RGB" for value in frame.channels[c])
+        is_bright = any(abs(value) > 65504 for c in "RGB" for value in frame.channels.get(c, ()))
         is_half = job.get("output", {}).get("pixelType", "half") == "half"
         wider = 6 * frame.width * frame.height if is_bright and is_half else 0
         require(frame.sample_bytes == predicted["frameBytes"] + wider, "frame bytes",

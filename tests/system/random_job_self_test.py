@@ -165,7 +165,12 @@ def wrong_pixels_are_found(_):
 def wrong_numbers_are_found(_):
     """NaN, infinity, a frame of another size than was predicted."""
     job, predicted = {"image": {"width": 2, "height": 2}}, {"frameBytes": 32}
-    judge_frames(frames_of(0, 1, 2, 3e38), job, predicted)
+    judge_frames(frames_of(0, 1, 2, 3), job, predicted)
+    # Colours past a half float take two bytes more each.
+    bright, narrow = frames_of(0, 1, 2, 3e38), {"frameBytes": 32 - 3 * 2 * 4}
+    judge_frames(bright, job, narrow)
+    raises("frame bytes", judge_frames, bright, job, predicted)
+    judge_frames(bright, {**job, "output": {"pixelType": "float"}}, predicted)
     for bad in (math.nan, math.inf, -math.inf):
         raises("not finite", judge_frames, frames_of(0, 1, bad, 2), job, predicted)
     raises("frame bytes", judge_frames, frames_of(0, 1, 2, 3), job, {"frameBytes": 28})
