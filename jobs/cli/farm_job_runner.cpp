@@ -42,8 +42,8 @@ void FarmJobRunner::say(const std::string& text) {
 
 Status FarmJobRunner::start() {
   if (client_) return {};
-  if (!coordinator_.empty()) {
-    BATON_ASSIGN(RequestClient client, RequestClient::connect(coordinator_));
+  if (coordinator_) {
+    BATON_ASSIGN(RequestClient client, coordinator_->connect());
     client_.emplace(std::move(client));
     return {};
   }

@@ -1,8 +1,10 @@
 #pragma once
 
+#include <optional>
 #include <string>
 
 #include "jobs/cli/ask_farm.h"
+#include "jobs/cli/coordinator_link.h"
 #include "jobs/cli/run_count.h"
 #include "jobs/study/study_runner.h"
 
@@ -15,7 +17,7 @@ namespace baton {
 class FarmJobRunner final : public JobRunner {
  public:
   explicit FarmJobRunner(FarmOptions options) : options_(std::move(options)) {}
-  explicit FarmJobRunner(std::string coordinator) : coordinator_(std::move(coordinator)) {}
+  explicit FarmJobRunner(CoordinatorLink coordinator) : coordinator_(std::move(coordinator)) {}
   ~FarmJobRunner() override;
 
   /// Counts all that is run from now on in one line, instead of a line for each call of run().
@@ -43,7 +45,7 @@ class FarmJobRunner final : public JobRunner {
   Result<JobSummary> ask(Open& job, const JobSpec& spec);
 
   FarmOptions options_;
-  std::string coordinator_;  ///< empty: a local farm
+  std::optional<CoordinatorLink> coordinator_;  ///< none: a local farm
   std::optional<RunCount> whole_;
   SignalWait signals_;
   std::optional<LocalFarm> farm_;

@@ -41,7 +41,7 @@ Result<ExitCode> submit(const JobOptions& options, RequestClient& client) {
   BATON_TRY(begin_at(job, options.from_frame));
   // A pilot takes its time: first see that there is somebody to submit to.
   if (job.sampling.method == Method::automatic) BATON_TRY(ask<JobList>(client, ListJobs{}));
-  BATON_TRY(settle_method_at(job, options.endpoint));
+  BATON_TRY(settle_method_at(job, options.link));
   BATON_ASSIGN(std::string document, make_job_document(job));
   const bool restart = options.restart || options.from_frame || wanted.is_look;
   BATON_ASSIGN(const JobAccepted accepted,

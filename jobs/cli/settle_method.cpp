@@ -45,7 +45,7 @@ Status settle_method(JobSpec& job, const FarmOptions& farm) {
   return settle(job, folder, runner);
 }
 
-Status settle_method_at(JobSpec& job, const std::string& coordinator) {
+Status settle_method_at(JobSpec& job, const CoordinatorLink& coordinator) {
   if (job.sampling.method != Method::automatic) return {};
   FarmJobRunner runner(coordinator);
   return settle(job, StudyFolder(std::filesystem::path(job.output.directory) / ".baton/pilot"),

@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include "common/job/job_json.h"
+#include "common/job/picture.h"
 
 namespace baton {
 namespace {
@@ -28,7 +29,7 @@ TEST(Quality, RoundsGoWithNeitherASecondPassNorAuto) {
 
 TEST(Quality, RoundsAndPrerollChangeThePicture) {
   const auto differences = [](const auto& change) {
-    ParsedJobDocument a{.job = {}, .assets = {}, .digest = {}};
+    ParsedJobDocument a{.job = {}, .assets = {}, .digest = {}, .picture = {}};
     a.job.name = "a";
     ParsedJobDocument b = a;
     change(b.job);

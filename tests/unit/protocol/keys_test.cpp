@@ -22,7 +22,7 @@ using namespace std::chrono_literals;
 namespace fs = std::filesystem;
 using testing::HasSubstr;
 
-constexpr auto kPatience = with_patience(10s);
+constexpr auto kKeyPatience = with_patience(10s);
 
 struct KeysTest : testing::Test {
   const fs::path folder =
@@ -106,14 +106,14 @@ TEST_F(KeysTest, WhoSpeaksIsProvenByTheKey) {
     WorkerChannel channel = WorkerChannel::connect(router.endpoint(), client(name)).value();
     ASSERT_TRUE(channel.send(LeaseRequest{3}));
     std::optional<Incoming> incoming;
-    const auto deadline = std::chrono::steady_clock::now() + kPatience;
+    const auto deadline = std::chrono::steady_clock::now() + kKeyPatience;
     while (!incoming && std::chrono::steady_clock::now() < deadline)
       incoming = router.receive(50ms);
     ASSERT_TRUE(incoming.has_value()) << name;
     EXPECT_EQ(incoming->speaker.name, name);
     EXPECT_EQ(role_name(incoming->speaker.role), name);
     ASSERT_TRUE(router.send(incoming->peer, NoWork{7}));
-    const std::optional<Message> answer = channel.receive(kPatience);
+    const std::optional<Message> answer = channel.receive(kKeyPatience);
     ASSERT_TRUE(answer.has_value());
     EXPECT_EQ(std::get<NoWork>(*answer).retry_ms, 7);
   }
@@ -125,7 +125,7 @@ std::pair<std::optional<Error>, std::optional<Error>> try_to_speak(Router& route
   WorkerChannel channel = WorkerChannel::connect(router.endpoint(), access).value();
   EXPECT_TRUE(channel.send(StopCoordinator{}));
   std::optional<Error> ours, theirs;
-  const auto deadline = std::chrono::steady_clock::now() + kPatience;
+  const auto deadline = std::chrono::steady_clock::now() + kKeyPatience;
   while ((!ours || !theirs) && std::chrono::steady_clock::now() < deadline) {
     EXPECT_FALSE(router.receive(20ms).has_value()) << "it was let in";
     EXPECT_FALSE(channel.receive(20ms).has_value());
@@ -165,7 +165,7 @@ TEST_F(KeysTest, ARequestSaysWhyItWasRefused) {
     while (!stop) router.receive(20ms);
   });
   RequestClient client = RequestClient::connect(router.endpoint(), this->client("late")).value();
-  const Result<Message> answer = client.request(ListJobs{}, kPatience);
+  const Result<Message> answer = client.request(ListJobs{}, kKeyPatience);
   stop = true;
   loop.join();
   ASSERT_FALSE(answer.ok());

@@ -45,8 +45,8 @@ RenderStats numbered_stats(int factor) {
 }
 
 const RenderStats kStats = numbered_stats(1);
-const JobSummary kSummary{{1, 2}, "name", "/out", JobStatus::failed, -3, 1, 2, 3, 4, 5, 6, 7,
-                          8,      9,      kStats};
+const JobSummary kSummary{{1, 2}, "name", "owner", "/out", JobStatus::failed, -3, 1, 2, 3, 4, 5, 6,
+                          7,      8,      9,       kStats};
 
 /// One of each, in the order of the type codes, no member left at its default.
 const std::vector<Message>& examples() {
@@ -59,20 +59,20 @@ const std::vector<Message>& examples() {
       JobDocumentRequest{{1, 2}},
       WorkerGoodbye{},
       WorkerWelcome{3, 500, "/store"},
-      LeaseGrant{kLease, {kBlob}},
+      LeaseGrant{kLease, {kBlob}, 4, 5},
       LeaseRevoke{kLease},
       NoWork{250},
       HelloAgain{},
       JobDocument{{3, 4}, "{}"},
       Shutdown{},
       SubmitJob{std::string("a\0b", 3)},
-      ListJobs{},
+      ListJobs{true},
       ShowJob{"abc"},
       CancelJob{"def"},
       StopCoordinator{},
-      JobAccepted{{5, 6}, true},
-      JobList{{kSummary}, {{"w", "h", 1, 2, 3}}},
-      JobDetail{kSummary, {1, 2, 3}, {"one", ""}, {{3, -1, kStats.sampling}}, "space"},
+      JobAccepted{{5, 6}, true, "all is kept"},
+      JobList{{kSummary}, {{"w", "h", 1, 2, 3}}, 4},
+      JobDetail{kSummary, {1, 2, 3}, {"one", ""}, {{3, -1, kStats.sampling}}, "space", "on"},
       Refused{4, "because"},
       PauseJob{"abc"},
       ResumeJob{"def"},
@@ -111,7 +111,7 @@ TEST(Messages, MembersArriveWhereTheyWereSent) {
 
 TEST(Messages, BytesAreThoseOfTheGrammar) {
   const std::vector<Bytes> frames = encode_message(NoWork{0x01020304});
-  EXPECT_EQ(frames[0], text(std::string_view("BATON\x05\x00", 7)));
+  EXPECT_EQ(frames[0], text(std::string_view("BATON\x07\x00", 7)));
   EXPECT_EQ(frames[1], text(std::string_view("\x0a\x00", 2)));
   EXPECT_EQ(frames[2], text("\x04\x03\x02\x01"));
 }
