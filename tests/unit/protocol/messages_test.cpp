@@ -156,7 +156,7 @@ TEST(Messages, AnotherVersionIsAVersionError) {
   const Result<Message> decoded = decode_message(frames);
   ASSERT_FALSE(decoded.ok());
   EXPECT_EQ(decoded.error().kind, ErrorKind::version);
-  EXPECT_THAT(decoded.error().message, HasSubstr("version 9, this program speaks 5"));
+  EXPECT_THAT(decoded.error().message, HasSubstr("version 9, this program speaks 7"));
 }
 
 TEST(Messages, OtherProtocolsAreRefused) {
