@@ -206,7 +206,9 @@ def an_open_job_is_extended(programs, folder):
         listed = json.loads(farm.baton("job", "list", "--all", "--json").stdout)["jobs"]
         check_equal([job["id"] for job in listed], [first, answer["id"]], "jobs with --all")
 
-        # Another picture, of other frames: not while this one is written.
+        # Another picture, of other frames: not while this one is written, which nobody does now.
+        farm.workers[0].terminate()
+        farm.workers[0].wait()
         farm.baton("job", "pause", farm.submit(write_job(place / "longest.json", small_job(
             place, "1-8", **changes))))
         other = write_job(place / "other.json", small_job(place, "20-21", seed=9, **changes))
