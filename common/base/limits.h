@@ -54,7 +54,9 @@ inline constexpr int kMaxEnvironmentSide = 32768;
 inline constexpr std::uint64_t kMaxEnvironmentCacheBytes =
     4ull << 30;  ///< per process and kind of entry
 inline constexpr std::uint64_t kMaxStateCacheBytes =
-    1ull << 30;  ///< decoded states that a worker keeps, per job
+    1ull << 29;  ///< decoded states that a worker keeps beside those it holds, per job
+inline constexpr std::uint64_t kMaxHeldStateBytes =
+    1ull << 30;  ///< states that a worker holds; what is more goes into the store
 inline constexpr std::uint64_t kStoreReserveBytes =
     64ull << 20;  ///< of a disk that blobs leave to frames and the journal
 inline constexpr std::uint64_t kMaxFilmBytesAhead =

@@ -30,6 +30,10 @@ std::string describe_task(const TaskKey& task) {
   return "unknown task";
 }
 
+Digest held_state_name(const Digest& job, std::int32_t frame, std::int32_t tile) {
+  return digest_of(fmt::format("{} holds frame {} tile {}", job.hex(), frame, tile));
+}
+
 std::string_view job_status_name(JobStatus status) {
   switch (status) {
     case JobStatus::running:

@@ -51,12 +51,31 @@ struct BlobRef {
   Digest digest;  ///< for `image`: digest of the EXR file in the output folder
   std::uint64_t size_bytes = 0;
 
+  /// A state without bytes in the store: it is in the memory of the worker that made it, where
+  /// `digest` names it (held_state_name).
+  bool is_held() const { return kind == BlobKind::state && size_bytes == 0; }
+
   auto operator<=>(const BlobRef&) const = default;
   template <class A>
   void fields(A& a) {
     a(kind, frame, tile, digest, size_bytes);
   }
 };
+
+/// A held state that its worker has packed and put into the store.
+struct PublishedState {
+  BlobRef held, published;
+
+  bool operator==(const PublishedState&) const = default;
+  template <class A>
+  void fields(A& a) {
+    a(held, published);
+  }
+};
+
+/// Names the state of a tile and frame (0-based) of a job that is held: nothing of it is packed, so
+/// it has no digest of bytes.
+Digest held_state_name(const Digest& job, std::int32_t frame, std::int32_t tile);
 
 /// Where a job stands. Stored and sent; values are for ever. Of a paused job no task is handed out.
 enum class JobStatus : std::uint8_t {

@@ -17,7 +17,7 @@ namespace baton {
 /// travels here: blobs go through the store, messages carry their digests.
 
 inline constexpr const char* kProtocolName = "BATON";
-inline constexpr std::uint16_t kProtocolVersion = 7;
+inline constexpr std::uint16_t kProtocolVersion = 8;
 
 // ---- worker to coordinator ----------------------------------------------------------------------
 struct WorkerHello {  ///< first, and again after a reconnect or a new epoch
@@ -75,6 +75,15 @@ struct JobDocumentRequest {
     a(job);
   }
 };
+/// States that the worker held are in the store.
+struct StatesPublished {
+  Digest job;
+  std::vector<PublishedState> states;
+  template <class A>
+  void fields(A& a) {
+    a(job, states);
+  }
+};
 struct WorkerGoodbye {
   template <class A>
   void fields(A& a) {
@@ -96,9 +105,20 @@ struct LeaseGrant {
   LeaseId lease;
   std::vector<BlobRef> inputs;
   std::int32_t first_frame = 0, last_frame = 0;  ///< of the task, 0-based, inclusive
+  bool may_hold = false;         ///< the task's state may stay in the worker's memory
+  std::int32_t states_from = 0;  ///< states of earlier frames (0-based) are needed by no task
   template <class A>
   void fields(A& a) {
-    a(lease, inputs, first_frame, last_frame);
+    a(lease, inputs, first_frame, last_frame, may_hold, states_from);
+  }
+};
+/// Others wait for these states, which the worker holds: they should go into the store.
+struct RequestStates {
+  Digest job;
+  std::vector<Digest> states;
+  template <class A>
+  void fields(A& a) {
+    a(job, states);
   }
 };
 struct LeaseRevoke {
@@ -288,7 +308,7 @@ using Message =
                  WorkerGoodbye, WorkerWelcome, LeaseGrant, LeaseRevoke, NoWork, HelloAgain,
                  JobDocument, Shutdown, SubmitJob, ListJobs, ShowJob, CancelJob, StopCoordinator,
                  JobAccepted, JobList, JobDetail, Refused, PauseJob, ResumeJob, DrainWorker, Drain,
-                 ReportReceived, DeleteJob>;
+                 ReportReceived, DeleteJob, StatesPublished, RequestStates>;
 
 /// The frames of one message: [protocol name and version][type][body].
 std::vector<Bytes> encode_message(const Message& message);

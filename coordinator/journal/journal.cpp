@@ -341,6 +341,18 @@ Status Journal::record_completion(const Digest& job, const Completion& completio
       .run();
 }
 
+Status Journal::record_outputs(const Digest& job, const TaskKey& task,
+                               const std::vector<BlobRef>& outputs) {
+  BATON_ASSIGN(SqlStatement * update, write("UPDATE completions SET outputs = ? WHERE job = ? AND "
+                                            "kind = ? AND step = ? AND tile = ?"));
+  return update->bind(to_bytes(outputs))
+      .bind(job.hex())
+      .bind(static_cast<std::int64_t>(task.kind))
+      .bind(task.step)
+      .bind(task.tile)
+      .run();
+}
+
 Status Journal::record_failure(const Failure& failure) {
   BATON_ASSIGN(
       SqlStatement * insert,

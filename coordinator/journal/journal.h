@@ -78,6 +78,9 @@ class Journal {
   Status delete_job(const Digest& job);
   Status record_status(const Digest& job, JobStatus status);
   Status record_completion(const Digest& job, const Completion& completion);
+  /// Of a task that is recorded as done; else nothing happens.
+  Status record_outputs(const Digest& job, const TaskKey& task,
+                        const std::vector<BlobRef>& outputs);
   Status record_failure(const Failure& failure);
   /// Forgets that these tasks were done.
   Status record_reopened(const Digest& job, const std::vector<TaskKey>& tasks);

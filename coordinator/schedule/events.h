@@ -166,13 +166,20 @@ struct InputsLost {
   LeaseId lease;
   std::vector<BlobRef> inputs;
 };
+/// States that the worker holds are in the store now; what is not held by it, or not there, is left
+/// out.
+struct HeldPublished {
+  std::string worker;
+  Digest job;
+  std::vector<PublishedState> states;
+};
 /// Time has passed: who was silent for too long?
 struct ClockTicked {};
 
 using Event =
     std::variant<JobAdded, JobCancelled, JobSuperseded, JobPaused, JobResumed, JobForgotten,
                  WorkerJoined, WorkerAlive, WorkerLeft, WorkRequested, TaskCompleted, AttemptFailed,
-                 ResultMissing, SpaceLacking, InputsLost, ClockTicked>;
+                 ResultMissing, SpaceLacking, InputsLost, HeldPublished, ClockTicked>;
 
 // ---- actions ------------------------------------------------------------------------------------
 /// Make it durable; nothing that comes after in the same or a later step may be sent or removed
@@ -183,6 +190,12 @@ struct RecordCompletion {
 };
 struct RecordFailure {
   Failure failure;
+};
+/// What a task that is recorded as done has made lies elsewhere now.
+struct RecordOutputs {
+  Digest job;
+  TaskKey task;
+  std::vector<BlobRef> outputs;
 };
 /// These tasks were done and are open again; their completions are void.
 struct RecordReopened {
@@ -200,6 +213,15 @@ struct GrantLease {
   LeaseId lease;
   std::vector<BlobRef> inputs;
   FrameSpan frames = {};
+  bool may_hold = false;  ///< the state that it makes may stay in the worker's memory
+  /// States of earlier frames (0-based) are needed by no task.
+  std::int32_t states_from = 0;
+};
+/// Somebody waits for states that the worker holds: it should put them into the store.
+struct AskForStates {
+  std::string worker;
+  Digest job;
+  std::vector<Digest> states;
 };
 struct RevokeLease {
   std::string worker;
@@ -225,8 +247,8 @@ struct RemoveBlobs {
   std::vector<Digest> blobs;
 };
 
-using Action =
-    std::variant<RecordCompletion, RecordFailure, RecordReopened, RecordJobStatus, GrantLease,
-                 RevokeLease, ReportNoWork, ForgetWorker, ReportConflict, RemoveBlobs>;
+using Action = std::variant<RecordCompletion, RecordOutputs, RecordFailure, RecordReopened,
+                            RecordJobStatus, GrantLease, AskForStates, RevokeLease, ReportNoWork,
+                            ForgetWorker, ReportConflict, RemoveBlobs>;
 
 }  // namespace baton

@@ -12,7 +12,8 @@ JobTasks::JobTasks(const JobSpec& spec)
     : graph_(spec),
       checkpoints_(graph_),
       keep_all_states_(spec.state.keep == StateKeep::all),
-      records_(static_cast<std::size_t>(graph_.num_tasks())) {
+      records_(static_cast<std::size_t>(graph_.num_tasks())),
+      open_renders_(static_cast<std::size_t>(graph_.num_runs()), graph_.num_tiles()) {
   progress_.tasks_total = progress_.tasks_open = records_.size();
   for (TaskIndex task = 0; task < graph_.num_tasks(); ++task) {
     record(task).missing_inputs = graph_.num_inputs(graph_.key(task));
@@ -27,6 +28,7 @@ bool JobTasks::apply(TaskIndex task, TaskEvent event) {
   if (!next) return false;
 
   // Leave the old status, enter the new one.
+  const bool was_open = is_open(r.status);
   if (r.status == TaskStatus::ready) ready_.erase(task);
   if (r.status == TaskStatus::leased) --progress_.tasks_leased;
   if (r.status == TaskStatus::done) {
@@ -60,7 +62,19 @@ bool JobTasks::apply(TaskIndex task, TaskEvent event) {
     while (first_open_frame_ < graph_.num_frames() && !is_open(status(first_open_frame_)))
       ++first_open_frame_;
   }
+  if (was_open != is_open(r.status)) count_run(task, is_open(r.status));
   return true;
+}
+
+/// A task was opened or closed.
+void JobTasks::count_run(TaskIndex task, bool opened) {
+  const TaskKey key = graph_.key(task);
+  if (key.kind != TaskKind::render) return;
+  open_renders_[static_cast<std::size_t>(key.step)] += opened ? 1 : -1;
+  first_open_run_ = std::min(first_open_run_, key.step);
+  while (first_open_run_ < graph_.num_runs() &&
+         open_renders_[static_cast<std::size_t>(first_open_run_)] == 0)
+    ++first_open_run_;
 }
 
 std::vector<BlobRef> JobTasks::inputs(TaskIndex task) const {

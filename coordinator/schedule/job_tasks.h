@@ -5,6 +5,7 @@
 #include <optional>
 #include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "coordinator/schedule/blob_references.h"
@@ -47,6 +48,8 @@ class JobTasks {
   const std::set<TaskIndex>& ready() const { return ready_; }
   /// The first frame that is not written and may still be; num_frames: there is none.
   std::int32_t first_open_frame() const { return first_open_frame_; }
+  /// States of earlier frames (0-based) than this are inputs of no open task.
+  std::int32_t states_from() const;
   /// Whether all tasks that it needs are done. A leased task may lose one of them.
   bool has_inputs(TaskIndex task) const { return record(task).missing_inputs == 0; }
   /// The blobs that the task needs: see LeaseGrant in PROTOCOL.md. It must have its inputs.
@@ -68,6 +71,30 @@ class JobTasks {
   /// Releases its dependents, and the blobs that nobody needs any more.
   void complete(TaskIndex task, const Completion& completion, const std::string& worker,
                 BlobReferences& blobs);
+
+  // Held states (job_tasks_held.cpp): a worker may keep what it made between checkpoints in memory
+  // and out of the store. Then it alone can read it, until it publishes it.
+
+  /// Whether the state of a render task may be held: it is neither a checkpoint nor a result, and
+  /// nothing of the job has failed yet, so no task must change its worker.
+  bool may_hold(TaskIndex task) const;
+  /// Whether the worker holds whichever of the task's inputs is held at all.
+  bool can_read(TaskIndex task, const std::string& worker) const;
+  /// The held inputs of a task that has its inputs, with the workers that hold them.
+  std::vector<std::pair<std::string, Digest>> held_inputs(TaskIndex task) const;
+  /// The tasks whose states, held by the worker, somebody still needs; with the worker they are
+  /// gone.
+  std::vector<TaskKey> held_by(const std::string& worker) const;
+  /// The same of workers of an earlier coordinator, from which nothing can be had.
+  std::vector<TaskKey> held_by_strangers() const { return held_by(makers_.front()); }
+  /// A state that the worker holds is in the store now. nullopt: it does not hold it; else the task
+  /// that made it.
+  std::optional<TaskIndex> publish(const PublishedState& state, const std::string& worker,
+                                   BlobReferences& blobs);
+  /// Whether the task is done and its state is held.
+  bool is_held(TaskIndex task) const { return held_state(task) != nullptr; }
+  std::size_t num_held() const { return num_held_; }
+
   /// The worker that completed the task last.
   const std::string& maker(TaskIndex task) const { return makers_[record(task).maker]; }
   /// Opens a leased task again: ready, or blocked when an input was lost meanwhile.
@@ -124,9 +151,11 @@ class JobTasks {
   Record& record(TaskIndex task) { return records_[static_cast<std::size_t>(task)]; }
   const Record& record(TaskIndex task) const { return records_[static_cast<std::size_t>(task)]; }
   bool apply(TaskIndex task, TaskEvent event);
+  void count_run(TaskIndex task, bool opened);
   std::int32_t num_needs(TaskIndex task, const BlobRef& output) const;
   std::int32_t num_uses(TaskIndex task, const BlobRef& output) const;
   void count_output(const BlobRef& output, bool made);
+  const BlobRef* held_state(TaskIndex task) const;
   void force_done(TaskIndex task, const std::vector<BlobRef>& outputs);
   void add_outputs(TaskIndex task, BlobReferences& blobs) const;
   void release_outputs(TaskIndex task, BlobReferences& blobs) const;
@@ -142,10 +171,14 @@ class JobTasks {
   Checkpoints checkpoints_;
   bool keep_all_states_;
   std::vector<Record> records_;
-  std::vector<std::string> makers_{"(not known)"};  ///< names, of at most kMaxWorkers
+  std::vector<std::string> makers_{
+      "(not known)"};  ///< names, of at most kMaxWorkers; the first: all others
   std::map<std::string, std::uint16_t> maker_numbers_;
   std::set<TaskIndex> ready_;
   std::int32_t first_open_frame_ = 0;
+  std::vector<std::int32_t> open_renders_;  ///< of each run
+  std::int32_t first_open_run_ = 0;
+  std::size_t num_held_ = 0;
   std::map<TaskIndex, std::vector<EndedAttempt>> ended_;  ///< and not done
   std::map<TaskIndex, std::vector<BlobRef>> former_outputs_;
   std::set<TaskIndex> others_frames_;               ///< JobPlan::others_frames

@@ -55,8 +55,9 @@ void JobTasks::count_output(const BlobRef& output, bool made) {
   if (output.kind == BlobKind::image) progress_.frames_done += made ? 1u : ~0u;
   if (output.kind == BlobKind::state) {
     progress_.state_bytes += sign * output.size_bytes;
-    progress_.state_pixels += sign * graph_.num_pixels(output.tile);
+    if (!output.is_held()) progress_.state_pixels += sign * graph_.num_pixels(output.tile);
   }
+  if (output.is_held()) num_held_ += made ? 1u : ~std::size_t{0};
 }
 
 /// Counts everybody's need of what a done task made. Images are files of the output folder, not

@@ -151,11 +151,13 @@ void Scheduler::on(const TaskCompleted& event, TimePoint now, Actions& actions) 
 }
 
 /// Two different results for one task are a bug or a broken machine: the job pauses, so that
-/// somebody looks before more is made of them. Returns whether they are equal.
+/// somebody looks before more is made of them. Of a held state only its task is known. Returns
+/// whether they are equal.
 bool Scheduler::compare_results(const TaskCompleted& event, const std::vector<BlobRef>& expected,
                                 const std::vector<BlobRef>& reported, Actions& actions) {
-  const auto [e, r] =
-      std::mismatch(expected.begin(), expected.end(), reported.begin(), reported.end());
+  const auto [e, r] = std::mismatch(
+      expected.begin(), expected.end(), reported.begin(), reported.end(),
+      [](const BlobRef& a, const BlobRef& b) { return a.is_held() || b.is_held() || a == b; });
   if (e == expected.end() || r == reported.end()) return true;
   const Digest digest = event.lease.job;
   Job& job = jobs_.at(digest);
@@ -213,6 +215,19 @@ void Scheduler::on(const InputsLost& event, TimePoint now, Actions& actions) {
   if (is_open(held.job->status)) reopen(event.lease.job, *held.job, makers, actions);
 }
 
+void Scheduler::on(const HeldPublished& event, TimePoint now, Actions& actions) {
+  if (!touch(event.worker, now)) return;
+  Job* job = find(event.job);
+  if (!job) return;
+  for (const PublishedState& state : event.states) {
+    const std::optional<TaskIndex> task = job->tasks.publish(state, event.worker, blobs_);
+    if (task)
+      actions.push_back(
+          RecordOutputs{event.job, job->tasks.graph().key(*task), job->tasks.outputs(*task)});
+  }
+  asked_.erase({event.worker, event.job});
+}
+
 // ---- jobs ---------------------------------------------------------------------------------------
 
 Scheduler::Job* Scheduler::find(const Digest& job) {
@@ -230,6 +245,7 @@ void Scheduler::replay(Job& job, const JobAdded& event, Actions& actions) {
     needed.tasks.push_back(job.tasks.graph().key(task));
   if (!needed.tasks.empty()) actions.push_back(std::move(needed));
   reopen(event.job, job, event.lost, actions);
+  reopen(event.job, job, job.tasks.held_by_strangers(), actions);
   for (const Failure& failure : event.failures) {
     const auto task = job.tasks.graph().find(failure.lease.task);
     if (!task) continue;
@@ -265,9 +281,16 @@ void Scheduler::fail_attempt(const Held& held, Failure failure, TimePoint now, A
   if (++standing.failures >= job.spec.max_failures_per_worker) standing = {0, now + kWorkerRest};
   if (failure.last) {
     give_up(digest, job, held.task, failure.message, actions);
-  } else {
-    job.tasks.give_back(held.task);
+    return;
   }
+  job.tasks.give_back(held.task);
+
+  // Another worker should try, so nothing that it needs may be bound to this one.
+  std::vector<TaskKey> bound;
+  for (const TaskIndex input : job.tasks.graph().inputs(failure.lease.task)) {
+    if (job.tasks.is_held(input)) bound.push_back(job.tasks.graph().key(input));
+  }
+  reopen(digest, job, bound, actions);
 }
 
 /// Ends a leased task, whose lease is already dropped, as failed; and the job when that is one

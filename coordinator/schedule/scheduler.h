@@ -55,6 +55,8 @@ class Scheduler {
   /// How long a worker rests from a job of whose tasks it has failed max_failures_per_worker, while
   /// another is there that does not.
   static constexpr std::chrono::minutes kWorkerRest{10};
+  /// For so many tasks held states are asked for at once where a worker has nothing to do.
+  static constexpr int kMaxTasksFreed = 8;
 
   /// What follows from the event. Unknown jobs, workers and leases are normal: they are late, and
   /// nothing follows.
@@ -110,6 +112,7 @@ class Scheduler {
   void on(const ResultMissing& event, TimePoint now, Actions& actions);
   void on(const SpaceLacking& event, TimePoint now, Actions& actions);
   void on(const InputsLost& event, TimePoint now, Actions& actions);
+  void on(const HeldPublished& event, TimePoint now, Actions& actions);
   void on(const ClockTicked& event, TimePoint now, Actions& actions);
 
   // Leases (scheduler_leases.cpp).
@@ -121,10 +124,13 @@ class Scheduler {
   void drop_lease(const Digest& job, TaskIndex task);
   void lose_lease(const Digest& job, TaskIndex task, Actions& actions);
   void remove_worker(const std::string& worker, bool lost, Actions& actions);
+  void lose_held(const std::string& worker, Actions& actions);
   void serve(TimePoint now, Actions& actions);
+  void ask_for_states(const std::string& worker, TimePoint now, Actions& actions);
   bool grant_one(const std::string& worker, TimePoint now, Actions& actions);
-  std::optional<TaskIndex> choose_task(const Job& job, const std::string& worker,
-                                       TimePoint now) const;
+  TileHomes::Asker asker(const Job& job, const std::string& worker, TimePoint now) const;
+  std::int32_t last_run(const Job& job) const;
+  bool is_due(const Job& job, TaskIndex task, const std::string& worker, TimePoint now) const;
   bool may_try(const Job& job, TaskIndex task, const std::string& worker, TimePoint now) const;
   bool is_exhausted(const Job& job, TaskIndex task) const;
   bool rests(const Job& job, const std::string& worker, TimePoint now) const;
@@ -152,6 +158,7 @@ class Scheduler {
   std::map<std::pair<Digest, TaskIndex>, Lease> leases_;
   std::map<std::string, Worker> workers_;
   std::deque<std::string> hungry_;  ///< workers with wanted > 0, who asked first comes first
+  std::set<std::pair<std::string, Digest>> asked_;  ///< of whom states of a job were asked
   BlobReferences blobs_;
 };
 

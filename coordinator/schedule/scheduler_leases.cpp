@@ -20,6 +20,7 @@ void Scheduler::on(const WorkerJoined& event, TimePoint now, Actions& actions) {
     job.workers.erase(event.worker);
     job.tasks.forgive(event.worker);
   }
+  lose_held(event.worker, actions);
   reconcile(event.worker, event.running, now, now, actions);
 }
 
@@ -43,6 +44,7 @@ void Scheduler::on(const WorkRequested& event, TimePoint now, Actions&) {
 }
 
 void Scheduler::on(const ClockTicked&, TimePoint now, Actions& actions) {
+  asked_.clear();  // an answer may be lost
   std::vector<std::string> silent;
   for (const auto& [id, worker] : workers_) {
     if (worker.last_sign + silence_limit_ < now) silent.push_back(id);
@@ -152,6 +154,14 @@ void Scheduler::remove_worker(const std::string& worker, bool lost, Actions& act
   std::erase(hungry_, worker);
   workers_.erase(found);
   for (auto& [digest, job] : jobs_) job.homes.leave(worker);
+  lose_held(worker, actions);
+}
+
+/// What the worker held in memory is gone: it is made again from the newest checkpoint.
+void Scheduler::lose_held(const std::string& worker, Actions& actions) {
+  for (auto& [digest, job] : jobs_) {
+    if (is_open(job.status)) reopen(digest, job, job.tasks.held_by(worker), actions);
+  }
 }
 
 // ---- granting -----------------------------------------------------------------------------------
@@ -174,30 +184,75 @@ void Scheduler::serve(TimePoint now, Actions& actions) {
     }
   }
   hungry_ = std::move(unserved);
+  for (const std::string& worker : hungry_) {
+    if (workers_.at(worker).leases.empty()) ask_for_states(worker, now, actions);
+  }
+}
+
+/// The worker has nothing to do: if tasks that it might have are bound to workers that hold their
+/// inputs, those should publish them.
+void Scheduler::ask_for_states(const std::string& worker, TimePoint now, Actions& actions) {
+  for (const auto& [rank, digest] : running_) {
+    const Job& job = jobs_.at(digest);
+    if (job.tasks.num_held() == 0 || rests(job, worker, now)) continue;
+    std::map<std::string, std::set<Digest>> wanted;  // by holder
+    int num_tasks = 0;
+    for (const TaskIndex task : job.tasks.ready()) {
+      const TaskKey key = job.tasks.graph().key(task);
+      if (key.kind != TaskKind::render || !is_due(job, task, worker, now)) continue;
+      if (key.step > last_run(job) || num_tasks == kMaxTasksFreed) break;
+      ++num_tasks;
+      for (const auto& [holder, state] : job.tasks.held_inputs(task)) {
+        if (holder != worker) wanted[holder].insert(state);
+      }
+    }
+    for (const auto& [holder, states] : wanted) {
+      if (asked_.emplace(holder, digest).second)
+        actions.push_back(AskForStates{holder, digest, {states.begin(), states.end()}});
+    }
+    if (!wanted.empty()) return;
+  }
 }
 
 bool Scheduler::grant_one(const std::string& worker, TimePoint now, Actions& actions) {
   for (const auto& [rank, digest] : running_) {
     Job& job = jobs_.at(digest);
     if (job.tasks.ready().empty() || rests(job, worker, now)) continue;
-    const std::optional<TaskIndex> task = choose_task(job, worker, now);
+    const JobGraph& graph = job.tasks.graph();
+    const TileHomes::Asker asking = asker(job, worker, now);
+    const auto task = job.homes.choose(graph, job.tasks.ready(), last_run(job), asking);
     if (!task) continue;
-    const LeaseId lease{digest, job.tasks.graph().key(*task), job.tasks.grant(*task), epoch_};
+    const LeaseId lease{digest, graph.key(*task), job.tasks.grant(*task), epoch_};
     add_lease(worker, lease, *task, now);
-    actions.push_back(
-        GrantLease{worker, lease, job.tasks.inputs(*task), job.tasks.graph().frames(lease.task)});
+    const bool may_hold = job.tasks.may_hold(*task) && job.homes.surround(lease.task.tile, asking);
+    actions.push_back(GrantLease{worker, lease, job.tasks.inputs(*task), graph.frames(lease.task),
+                                 may_hold, job.tasks.states_from()});
     return true;
   }
   return false;
 }
 
-/// What the worker, which does not rest from it, should do next of the job.
-std::optional<TaskIndex> Scheduler::choose_task(const Job& job, const std::string& worker,
-                                                TimePoint now) const {
-  TileHomes::Asker asker{worker, 0, 0, [&](TaskIndex task) {
-                           const TaskKind kind = job.tasks.graph().key(task).kind;
-                           return job.rests_until.at(static_cast<std::size_t>(kind)) <= now &&
-                                  may_try(job, task, worker, now);
+/// The last run of which a task may be granted: no frame is rendered far ahead of the first open
+/// one.
+std::int32_t Scheduler::last_run(const Job& job) const {
+  const JobGraph& graph = job.tasks.graph();
+  return graph.run_of(
+      std::min(job.tasks.first_open_frame() + job.max_frames_ahead, graph.num_frames()) - 1);
+}
+
+/// Whether the worker may try the task now, could it read its inputs.
+bool Scheduler::is_due(const Job& job, TaskIndex task, const std::string& worker,
+                       TimePoint now) const {
+  const TaskKind kind = job.tasks.graph().key(task).kind;
+  return job.rests_until.at(static_cast<std::size_t>(kind)) <= now &&
+         may_try(job, task, worker, now);
+}
+
+/// The worker, which does not rest from the job, as one that asks for a task of it.
+TileHomes::Asker Scheduler::asker(const Job& job, const std::string& worker, TimePoint now) const {
+  TileHomes::Asker asker{worker, 0, 0, [this, &job, worker, now](TaskIndex task) {
+                           return is_due(job, task, worker, now) &&
+                                  job.tasks.can_read(task, worker);
                          }};
   if (job.homes.matter()) {
     for (const auto& [other, unused] : workers_) {
@@ -206,10 +261,7 @@ std::optional<TaskIndex> Scheduler::choose_task(const Job& job, const std::strin
       ++asker.num_workers;
     }
   }
-  const JobGraph& graph = job.tasks.graph();
-  const std::int32_t last_frame =
-      std::min(job.tasks.first_open_frame() + job.max_frames_ahead, graph.num_frames()) - 1;
-  return job.homes.choose(graph, job.tasks.ready(), graph.run_of(last_frame), asker);
+  return asker;
 }
 
 /// Whether the worker could succeed, and no other connected one has failed the task less often.

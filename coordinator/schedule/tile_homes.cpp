@@ -39,6 +39,13 @@ std::optional<TaskIndex> TileHomes::choose(const JobGraph& graph, const std::set
   return nearest == others.end() ? std::nullopt : std::optional(*nearest);
 }
 
+bool TileHomes::surround(std::int32_t tile, const Asker& asker) const {
+  if (!matter()) return false;
+  const std::vector<std::int32_t> near = grid_.tiles_near(tile, 2 * reach_px_);
+  return std::all_of(near.begin(), near.end(),
+                     [&](std::int32_t other) { return is_home(other, asker); });
+}
+
 bool TileHomes::is_home(std::int32_t tile, const Asker& asker) const {
   const std::string& home = homes_[static_cast<std::size_t>(tile)];
   if (!home.empty()) return home == asker.worker;

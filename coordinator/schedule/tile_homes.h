@@ -27,6 +27,11 @@ class TileHomes {
   /// The worker is gone.
   void leave(const std::string& worker);
 
+  struct Asker;
+  /// Whether all tiles within twice the reach of history are at home with the asker: then whoever
+  /// needs the tile's state, or has a neighbour that does, is the asker itself.
+  bool surround(std::int32_t tile, const Asker& asker) const;
+
   /// The worker that requests a task.
   struct Asker {
     std::string worker;

@@ -119,6 +119,7 @@ LostFiles find_lost_files(const JobAdded& job, const BlobStore& store, FrameFile
   const JobGraph& graph = recorded.graph();
   LostFiles lost;
   const auto look = [&](TaskIndex task, const fs::path& path, std::uint64_t size_bytes) {
+    if (size_bytes == 0) return true;  // a held state: the scheduler knows its holder
     std::error_code error;
     const std::uintmax_t size = fs::file_size(path, error);
     if (!error && size == size_bytes) return true;
@@ -141,7 +142,7 @@ LostFiles find_lost_files(const JobAdded& job, const BlobStore& store, FrameFile
       }
     }
     for (const BlobRef& blob : recorded.spare_blobs(task)) {
-      if (!store.contains(blob.digest)) lost.spares.push_back(graph.key(task));
+      if (!blob.is_held() && !store.contains(blob.digest)) lost.spares.push_back(graph.key(task));
     }
   }
   for (TaskIndex frame = 0; frame < graph.num_frames(); ++frame) {

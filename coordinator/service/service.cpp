@@ -215,6 +215,14 @@ Status Service::receive_from(const std::string& worker, const TaskFailed& messag
                             message.message.substr(0, limits::kMaxTextLength), message.permanent});
 }
 
+Status Service::receive_from(const std::string& worker, const StatesPublished& message) {
+  std::vector<PublishedState> states = message.states;
+  std::erase_if(states, [this](const PublishedState& state) {
+    return !store_.contains(state.published.digest);
+  });
+  return step(HeldPublished{worker, message.job, std::move(states)});
+}
+
 Status Service::receive_from(const std::string& worker, const WorkerGoodbye&) {
   spdlog::info("worker {} left", worker);
   peers_.remove(worker);
@@ -232,7 +240,7 @@ std::optional<std::string> Service::find_missing_blob(const TaskDone& report) co
   // Of a task that was done before the blobs may have served their purpose.
   if (job_of_open_task(report.lease) == nullptr) return std::nullopt;
   for (const BlobRef& output : report.outputs) {
-    if (output.kind != BlobKind::image && !store_.contains(output.digest))
+    if (output.kind != BlobKind::image && !output.is_held() && !store_.contains(output.digest))
       return store_.path(output.digest).string();
   }
   return std::nullopt;
@@ -270,7 +278,7 @@ std::optional<std::vector<BlobRef>> Service::find_bad_inputs(const LeaseId& leas
   if (job->tasks.status(*task) != TaskStatus::leased) return std::nullopt;
   if (!job->tasks.has_inputs(*task)) return bad;
   for (const BlobRef& input : job->tasks.inputs(*task)) {
-    if (store_.is_bad(input.digest)) bad.push_back(input);
+    if (!input.is_held() && store_.is_bad(input.digest)) bad.push_back(input);
   }
   if (bad.empty()) return std::nullopt;
   return bad;
@@ -280,6 +288,10 @@ std::optional<std::vector<BlobRef>> Service::find_bad_inputs(const LeaseId& leas
 
 Status Service::perform(const RecordCompletion& action) {
   return journal_.record_completion(action.job, action.completion);
+}
+
+Status Service::perform(const RecordOutputs& action) {
+  return journal_.record_outputs(action.job, action.task, action.outputs);
 }
 
 Status Service::perform(const RecordFailure& action) {
@@ -310,8 +322,13 @@ Status Service::perform(const RecordJobStatus& action) {
 }
 
 Status Service::perform(const GrantLease& action) {
-  reply_to(action.worker,
-           LeaseGrant{action.lease, action.inputs, action.frames.first, action.frames.last});
+  reply_to(action.worker, LeaseGrant{action.lease, action.inputs, action.frames.first,
+                                     action.frames.last, action.may_hold, action.states_from});
+  return {};
+}
+
+Status Service::perform(const AskForStates& action) {
+  reply_to(action.worker, RequestStates{action.job, action.states});
   return {};
 }
 

@@ -68,6 +68,7 @@ class Service {
   Status receive_from(const std::string& worker, const Heartbeat& message);
   Status receive_from(const std::string& worker, const TaskDone& message);
   Status receive_from(const std::string& worker, const TaskFailed& message);
+  Status receive_from(const std::string& worker, const StatesPublished& message);
   Status receive_from(const std::string& worker, const WorkerGoodbye& message);
 
   // Who may do what (service_access.cpp).
@@ -112,10 +113,12 @@ class Service {
 
   // Actions of the scheduler.
   Status perform(const RecordCompletion& action);
+  Status perform(const RecordOutputs& action);
   Status perform(const RecordFailure& action);
   Status perform(const RecordReopened& action);
   Status perform(const RecordJobStatus& action);
   Status perform(const GrantLease& action);
+  Status perform(const AskForStates& action);
   Status perform(const RevokeLease& action);
   Status perform(const ReportNoWork& action);
   Status perform(const ForgetWorker& action);

@@ -278,8 +278,11 @@ Status Service::archive_job(const Digest& digest) {
   std::vector<Digest> kept;
   for (TaskIndex task = job->tasks.graph().num_frames(); task < job->tasks.graph().num_tasks();
        ++task) {
-    for (const BlobRef& blob : job->tasks.live_blobs(task)) kept.push_back(blob.digest);
-    for (const BlobRef& blob : job->tasks.spare_blobs(task)) kept.push_back(blob.digest);
+    for (const auto& blobs : {job->tasks.live_blobs(task), job->tasks.spare_blobs(task)}) {
+      for (const BlobRef& blob : blobs) {
+        if (!blob.is_held()) kept.push_back(blob.digest);
+      }
+    }
     if (job->tasks.is_cut(task)) {
       for (const BlobRef& blob : job->tasks.inputs(task)) kept.push_back(blob.digest);
     }

@@ -44,7 +44,10 @@ Result<std::vector<StatePtr>> read_states(const LoadedJob& loaded, const BlobSto
       return Error{ErrorKind::bad_input,
                    fmt::format("{}: a render task takes states", blob_name(input))};
     }
-    StatePtr state = loaded.states->peek(input.digest);
+    StatePtr state =
+        input.is_held() ? loaded.held->find(input.digest) : loaded.states->peek(input.digest);
+    if (state == nullptr && input.is_held())
+      return Error{ErrorKind::io, fmt::format("{}: is not held here", blob_name(input))};
     if (state == nullptr) {
       BATON_ASSIGN(const Bytes bytes, store.get(input.digest));
       BATON_ASSIGN(SampleState decoded, decode_state(bytes, blob_name(input)));
@@ -71,9 +74,27 @@ Result<TaskOutput> cut_state(const LoadedJob& loaded, BlobStore& store, const Ta
   return output;
 }
 
+/// Keeps what a render task hands on: in this process if it may stay here, else in the store.
+Status keep_state(const LoadedJob& loaded, BlobStore& store, bool may_hold, SampleState&& state,
+                  std::vector<BlobRef>& outputs) {
+  BlobRef ref{BlobKind::state, state.frame_index, state.tile,
+              held_state_name(loaded.digest, state.frame_index, state.tile)};
+  const auto shared = std::make_shared<const SampleState>(std::move(state));
+  if (may_hold && loaded.held->hold(ref, shared)) {
+    outputs.push_back(ref);
+    return {};
+  }
+  const Bytes bytes = encode_state(*shared);
+  BATON_ASSIGN(ref.digest, store.put(bytes));
+  ref.size_bytes = bytes.size();
+  outputs.push_back(ref);
+  if (moves(loaded.job)) loaded.states->insert(ref.digest, shared);
+  return {};
+}
+
 Result<TaskOutput> execute_render(const LoadedJob& loaded, BlobStore& store, const TaskKey& task,
-                                  const std::vector<BlobRef>& inputs, const FrameSpan& frames,
-                                  std::stop_token stop) {
+                                  const TaskGrant& grant, std::stop_token stop) {
+  const FrameSpan& frames = grant.frames;
   // Check what came over the wire against the job.
   const auto num_frames = static_cast<std::int32_t>(loaded.job.frames.size());
   if (frames.first < 0 || frames.last < frames.first || frames.last >= num_frames ||
@@ -86,7 +107,7 @@ Result<TaskOutput> execute_render(const LoadedJob& loaded, BlobStore& store, con
   std::vector<StatePtr> previous;
   {
     const CpuTimer timer(seconds_read);
-    BATON_ASSIGN(previous, read_states(loaded, store, inputs));
+    BATON_ASSIGN(previous, read_states(loaded, store, grant.inputs));
   }
   const bool is_cut = !previous.empty() && previous.front()->frame_index == frames.last &&
                       previous.front()->picture == loaded.picture;
@@ -107,12 +128,7 @@ Result<TaskOutput> execute_render(const LoadedJob& loaded, BlobStore& store, con
           },
       .state = [&](SampleState state) -> Status {
         const CpuTimer timer(seconds_state);
-        BATON_TRY(keep(BlobKind::state, state.frame_index, encode_state(state)));
-        if (moves(loaded.job)) {
-          loaded.states->insert(output.outputs.back().digest,
-                                std::make_shared<const SampleState>(std::move(state)));
-        }
-        return {};
+        return keep_state(loaded, store, grant.may_hold, std::move(state), output.outputs);
       },
       .diagnostics = [&](const FrameStats& stats) { output.frames.push_back(stats); },
       .samples = [&](const FirstPassSamples& samples) -> Status {
@@ -198,17 +214,27 @@ Result<TaskOutput> execute_assemble(const LoadedJob& loaded, const BlobStore& st
 }  // namespace
 
 Result<TaskOutput> execute_task(const LoadedJob& loaded, BlobStore& store, const TaskKey& task,
-                                const std::vector<BlobRef>& inputs, const FrameSpan& frames,
-                                std::stop_token stop) {
+                                const TaskGrant& grant, std::stop_token stop) {
+  loaded.held->release_before(grant.states_from);
   switch (task.kind) {
     case TaskKind::render:
-      return execute_render(loaded, store, task, inputs, frames, stop);
+      return execute_render(loaded, store, task, grant, stop);
     case TaskKind::second_pass:
-      return execute_second_pass(loaded, store, task, inputs);
+      return execute_second_pass(loaded, store, task, grant.inputs);
     case TaskKind::assemble:
-      return execute_assemble(loaded, store, task, inputs, stop);
+      return execute_assemble(loaded, store, task, grant.inputs, stop);
   }
   return Error{ErrorKind::bad_input, "unknown kind of task"};
+}
+
+Result<std::vector<PublishedState>> publish_held(const HeldStates::List& states, BlobStore& store) {
+  std::vector<PublishedState> published;
+  for (const auto& [ref, state] : states) {
+    const Bytes bytes = encode_state(*state);
+    BATON_ASSIGN(const Digest digest, store.put(bytes));
+    published.push_back({ref, {ref.kind, ref.frame, ref.tile, digest, bytes.size()}});
+  }
+  return published;
 }
 
 }  // namespace baton

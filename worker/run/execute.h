@@ -19,13 +19,24 @@ struct TaskOutput {
   std::vector<FrameStats> frames = {};  ///< of a render task in frame order, of an assembly one
 };
 
-/// Runs one task, of these frames: reads its inputs from `store`, writes its outputs there (an
-/// assembled frame goes to the job's output folder and is durable on return; blobs are after
-/// store.sync()). Deterministic. A render task whose inputs are states of its own last frame
-/// renders nothing: its state is cut and joined from them. Errors: a missing or damaged input, the
-/// disk, bad input of the renderer; ErrorKind::cancelled when `stop` is requested.
+/// What a lease says beside the task: LeaseGrant in PROTOCOL.md.
+struct TaskGrant {
+  std::vector<BlobRef> inputs;
+  FrameSpan frames = {};
+  bool may_hold = false;
+  std::int32_t states_from = 0;
+};
+
+/// Runs one task, of the grant's frames: reads its inputs from `store`, writes its outputs there
+/// (an assembled frame goes to the job's output folder and is durable on return; blobs are after
+/// store.sync()). A state that may be held stays in loaded.held if there is room. Deterministic. A
+/// render task whose inputs are states of its own last frame renders nothing: its state is cut and
+/// joined from them. Errors: a missing or damaged input, the disk, bad input of the renderer;
+/// ErrorKind::cancelled when `stop` is requested.
 Result<TaskOutput> execute_task(const LoadedJob& loaded, BlobStore& store, const TaskKey& task,
-                                const std::vector<BlobRef>& inputs, const FrameSpan& frames,
-                                std::stop_token stop);
+                                const TaskGrant& grant, std::stop_token stop);
+
+/// Packs states that a job holds into the store. Errors: the disk.
+Result<std::vector<PublishedState>> publish_held(const HeldStates::List& states, BlobStore& store);
 
 }  // namespace baton

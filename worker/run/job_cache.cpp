@@ -20,9 +20,10 @@ Result<LoadedJobPtr> load_job_document(const Digest& digest, const std::string& 
   BATON_TRY(verify_assets(parsed.assets));
   BATON_ASSIGN(const auto assets, shelf.get(parsed.job, parsed.assets));
   BATON_ASSIGN(auto context, make_render_context(parsed.job, parsed.picture, assets));
-  return LoadedJobPtr(
-      std::make_shared<LoadedJob>(LoadedJob{std::move(parsed.job), digest, parsed.picture,
-                                            std::move(context), std::make_shared<StateCache>()}));
+  return LoadedJobPtr(std::make_shared<LoadedJob>(LoadedJob{.job = std::move(parsed.job),
+                                                            .digest = digest,
+                                                            .picture = parsed.picture,
+                                                            .context = std::move(context)}));
 }
 
 void JobEntry::provide(const std::string& document) {
@@ -40,6 +41,11 @@ bool JobEntry::has_document() const {
 bool JobEntry::failed() const {
   const std::lock_guard lock(mutex_);
   return result_ && !result_->ok();
+}
+
+LoadedJobPtr JobEntry::loaded() const {
+  const std::lock_guard lock(mutex_);
+  return result_ && result_->ok() ? result_->value() : nullptr;
 }
 
 Result<LoadedJobPtr> JobEntry::load(std::stop_token stop) {
@@ -66,6 +72,14 @@ Result<LoadedJobPtr> JobEntry::load(std::stop_token stop) {
   result_ = result;
   changed_.notify_all();
   return result;
+}
+
+std::vector<LoadedJobPtr> JobCache::loaded() const {
+  std::vector<LoadedJobPtr> jobs;
+  for (const std::shared_ptr<JobEntry>& entry : entries_) {
+    if (LoadedJobPtr job = entry->loaded()) jobs.push_back(std::move(job));
+  }
+  return jobs;
 }
 
 std::shared_ptr<JobEntry> JobCache::entry(const Digest& digest) {

@@ -9,6 +9,7 @@
 #include <optional>
 #include <stop_token>
 #include <string>
+#include <vector>
 
 #include "common/base/digest.h"
 #include "common/job/job_spec.h"
@@ -24,6 +25,7 @@ struct LoadedJob {
   Digest digest, picture;
   std::shared_ptr<const RenderContext> context;
   std::shared_ptr<StateCache> states = std::make_shared<StateCache>();
+  std::shared_ptr<HeldStates> held = std::make_shared<HeldStates>();
 };
 
 using LoadedJobPtr = std::shared_ptr<const LoadedJob>;
@@ -54,6 +56,8 @@ class JobEntry {
   bool has_document() const;
   /// True once loading has failed.
   bool failed() const;
+  /// Null unless it is loaded.
+  LoadedJobPtr loaded() const;
   /// Waits for the document, then loads once for all callers; once more after a while if a file
   /// could not be read. Cancelled when `stop` is requested while waiting.
   Result<LoadedJobPtr> load(std::stop_token stop);
@@ -79,6 +83,8 @@ class JobCache {
   /// The entry of a job, made when there is none. A failed entry is replaced, so that the next
   /// attempt loads anew.
   std::shared_ptr<JobEntry> entry(const Digest& digest);
+  /// Those that are loaded, most recent first.
+  std::vector<LoadedJobPtr> loaded() const;
 
  private:
   JobLoader loader_;

@@ -17,10 +17,9 @@ namespace baton {
 /// What a render thread needs to run one task without asking anybody.
 struct PooledTask {
   LeaseId lease;
-  std::vector<BlobRef> inputs;
+  TaskGrant grant;
   std::shared_ptr<JobEntry> job;
   std::shared_ptr<BlobStore> store;
-  FrameSpan frames = {};
 };
 
 struct EndedTask {

@@ -35,9 +35,9 @@ Session::Session(SessionOptions options, TimePoint now)
 std::vector<SessionAction> Session::step(const SessionEvent& event, TimePoint now) {
   Actions actions;
   std::visit([&](const auto& e) { on(e, now, actions); }, event);
-  if (draining_ && in_hand_.empty() && reports_.empty()) {
-    actions.push_back(SendMessage{WorkerGoodbye{}});
-    actions.push_back(Leave{ExitCode::ok, "all running tasks are finished"});
+  if (draining_ && !packing_ && in_hand_.empty() && reports_.empty()) {
+    packing_ = true;
+    actions.push_back(PackHeld{});
   }
   return actions;
 }
@@ -89,6 +89,13 @@ void Session::on(const TaskEnded& event, TimePoint now, Actions& actions) {
 void Session::on(const DocumentMissing& event, TimePoint, Actions& actions) {
   if (!documents_missing_.insert(event.job).second) return;
   actions.push_back(SendMessage{JobDocumentRequest{event.job}});
+}
+
+void Session::on(const HeldPacked& event, TimePoint, Actions& actions) {
+  for (const StatesPublished& message : event.messages) actions.push_back(SendMessage{message});
+  if (!packing_) return;
+  actions.push_back(SendMessage{WorkerGoodbye{}});
+  actions.push_back(Leave{ExitCode::ok, "all running tasks are finished"});
 }
 
 void Session::on(const DrainRequested&, TimePoint, Actions& actions) {
@@ -146,7 +153,9 @@ void Session::receive(const WorkerWelcome& welcome, TimePoint now, Actions& acti
 void Session::receive(const LeaseGrant& grant, TimePoint now, Actions& actions) {
   requested_ = std::max(0, requested_ - 1);
   if (draining_ || !in_hand_.insert(grant.lease).second) return;
-  actions.push_back(StartTask{grant.lease, grant.inputs, {grant.first_frame, grant.last_frame}});
+  actions.push_back(StartTask{
+      grant.lease,
+      {grant.inputs, {grant.first_frame, grant.last_frame}, grant.may_hold, grant.states_from}});
   request_leases(now, actions);
 }
 
@@ -158,6 +167,10 @@ void Session::receive(const LeaseRevoke& revoke, TimePoint, Actions& actions) {
 void Session::receive(const ReportReceived& received, TimePoint now, Actions& actions) {
   forget_report(received.lease);
   request_leases(now, actions);
+}
+
+void Session::receive(const RequestStates& request, TimePoint, Actions& actions) {
+  actions.push_back(PackHeld{request});
 }
 
 void Session::receive(const NoWork& no_work, TimePoint now, Actions&) {

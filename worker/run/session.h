@@ -3,6 +3,7 @@
 #include <chrono>
 #include <cstdint>
 #include <deque>
+#include <optional>
 #include <set>
 #include <string>
 #include <variant>
@@ -37,11 +38,14 @@ struct TaskEnded {
 };
 struct DocumentMissing {
   Digest job;
-};                         ///< a started task belongs to a job that this process has not seen
+};  ///< a started task belongs to a job that this process has not seen
+struct HeldPacked {
+  std::vector<StatesPublished> messages;
+};                         ///< PackHeld is done; what could not be put into the store is left out
 struct DrainRequested {};  ///< SIGTERM or the coordinator: finish what runs, take nothing new
 struct Tick {};            ///< time has passed
-using SessionEvent =
-    std::variant<MessageArrived, TaskExecuted, TaskEnded, DocumentMissing, DrainRequested, Tick>;
+using SessionEvent = std::variant<MessageArrived, TaskExecuted, TaskEnded, DocumentMissing,
+                                  HeldPacked, DrainRequested, Tick>;
 
 // ---- actions: what the program around the session must do
 // -------------------------------------------------
@@ -53,8 +57,12 @@ struct UseStore {
 };
 struct StartTask {
   LeaseId lease;
-  std::vector<BlobRef> inputs;
-  FrameSpan frames;
+  TaskGrant grant;
+};
+/// Put states that are held into the store: of one job those that are named, or all of all jobs.
+/// HeldPacked is the answer.
+struct PackHeld {
+  std::optional<RequestStates> request;
 };
 struct StopTask {
   LeaseId lease;
@@ -70,14 +78,14 @@ struct Leave {
   ExitCode code = ExitCode::ok;
   std::string reason;
 };  ///< abandon everything and end
-using SessionAction = std::variant<SendMessage, UseStore, StartTask, StopTask, DropQueuedTasks,
-                                   TakeDocument, Warn, Leave>;
+using SessionAction = std::variant<SendMessage, UseStore, StartTask, PackHeld, StopTask,
+                                   DropQueuedTasks, TakeDocument, Warn, Leave>;
 
 /// The worker's side of the conversation with the coordinator: events in, actions out. Knows no
 /// socket, thread or file; time comes as an argument.
 ///
 /// introducing --WorkerWelcome--> working --DrainRequested--> draining --last report confirmed-->
-/// (Leave)
+/// packing --HeldPacked--> (Leave)
 /// A HelloAgain, or silence of kSilentHeartbeats, leads back to introducing. A report is said
 /// again, after each welcome and when it is not answered, until the coordinator has confirmed it or
 /// has revoked its lease. The coordinator fences what it has seen before, so sending twice is safe.
@@ -99,12 +107,14 @@ class Session {
   void on(const TaskExecuted& event, TimePoint now, Actions& actions);
   void on(const TaskEnded& event, TimePoint now, Actions& actions);
   void on(const DocumentMissing& event, TimePoint now, Actions& actions);
+  void on(const HeldPacked& event, TimePoint now, Actions& actions);
   void on(const DrainRequested& event, TimePoint now, Actions& actions);
   void on(const Tick& event, TimePoint now, Actions& actions);
 
   void receive(const WorkerWelcome& welcome, TimePoint now, Actions& actions);
   void receive(const LeaseGrant& grant, TimePoint now, Actions& actions);
   void receive(const LeaseRevoke& revoke, TimePoint now, Actions& actions);
+  void receive(const RequestStates& request, TimePoint now, Actions& actions);
   void receive(const NoWork& no_work, TimePoint now, Actions& actions);
   void receive(const ReportReceived& received, TimePoint now, Actions& actions);
   void receive(const HelloAgain& again, TimePoint now, Actions& actions);
@@ -122,6 +132,7 @@ class Session {
   SessionOptions options_;
   bool welcomed_ = false;
   bool draining_ = false;
+  bool packing_ = false;  ///< all that is held, before it leaves
   std::chrono::milliseconds heartbeat_{1000};
   std::set<LeaseId> in_hand_;           ///< granted and not ended
   std::set<LeaseId> executed_;          ///< those of them that have left their thread

@@ -5,6 +5,7 @@
 #include <unistd.h>
 
 #include <array>
+#include <future>
 #include <list>
 #include <mutex>
 #include <optional>
@@ -106,19 +107,20 @@ Result<TaskOutput> execute_pooled(const PooledTask& task, std::stop_token stop, 
   // Again for each frame: links may have changed.
   BATON_TRY(check_output_root(loaded->job, roots));
   if (key.kind == TaskKind::assemble) {
-    return execute_task(*loaded, *task.store, key, task.inputs, task.frames, stop);
+    return execute_task(*loaded, *task.store, key, task.grant, stop);
   }
 
   // A replay renders up to the last frame of the run, or the frame of the second pass.
   std::string command;
   const std::vector<int>& numbers = loaded->job.frames;
-  if (task.frames.last >= 0 && static_cast<std::size_t>(task.frames.last) < numbers.size()) {
+  if (task.grant.frames.last >= 0 &&
+      static_cast<std::size_t>(task.grant.frames.last) < numbers.size()) {
     BATON_ASSIGN(const std::filesystem::path path, save_job(*loaded, *task.store));
-    command = replay_command(path, numbers[static_cast<std::size_t>(task.frames.last)], key.tile);
+    command =
+        replay_command(path, numbers[static_cast<std::size_t>(task.grant.frames.last)], key.tile);
   }
   const CrashNote note(command);
-  Result<TaskOutput> output =
-      execute_task(*loaded, *task.store, key, task.inputs, task.frames, stop);
+  Result<TaskOutput> output = execute_task(*loaded, *task.store, key, task.grant, stop);
   notes.report(repair_notes(*loaded->context));
   if (output || output.error().kind == ErrorKind::cancelled ||
       output.error().kind == ErrorKind::no_space)
@@ -145,6 +147,22 @@ Status publish_pooled(std::span<const PooledTask> tasks, TaskWatch& watch) {
   }
   for (const auto& store : stores) BATON_TRY(store->sync());
   return {};
+}
+
+/// Packs held states of jobs into the store, beside the render threads.
+std::vector<StatesPublished> pack_held(const std::vector<std::pair<Digest, HeldStates::List>>& jobs,
+                                       BlobStore& store) {
+  std::vector<StatesPublished> messages;
+  for (const auto& [job, states] : jobs) {
+    Result<std::vector<PublishedState>> published = publish_held(states, store);
+    if (published) {
+      messages.push_back({job, std::move(published).value()});
+    } else {
+      spdlog::warn("job {}: states stay unpublished: {}", job.short_hex(),
+                   published.error().message);
+    }
+  }
+  return messages;
 }
 
 /// Carries the session's actions out and feeds it with events.
@@ -176,6 +194,7 @@ class Worker {
         log_failure(ended);
         step(TaskEnded{ended.lease, std::move(ended.result)});
       }
+      take_packed();
       end_overdue_tasks();
       heed_refusals();
       if (drain && !std::exchange(draining, true)) step(DrainRequested{});
@@ -221,6 +240,19 @@ class Worker {
     std::_Exit(static_cast<int>(ExitCode::failed));
   }
 
+  /// Hands over what has been packed since the last turn.
+  void take_packed() {
+    for (auto packing = packing_.begin(); packing != packing_.end();) {
+      if (packing->wait_for(std::chrono::seconds(0)) != std::future_status::ready) {
+        ++packing;
+        continue;
+      }
+      HeldPacked packed{packing->get()};
+      packing = packing_.erase(packing);
+      step(packed);
+    }
+  }
+
   /// A key that the coordinator does not know will not be known soon; what else broke a connection
   /// off may pass.
   void heed_refusals() {
@@ -257,8 +289,24 @@ class Worker {
   void perform(StartTask& action) {
     std::shared_ptr<JobEntry> job = jobs_.entry(action.lease.job);
     const bool missing = !job->has_document();
-    pool_.submit({action.lease, std::move(action.inputs), std::move(job), store_, action.frames});
+    pool_.submit({action.lease, std::move(action.grant), std::move(job), store_});
     if (missing) step(DocumentMissing{action.lease.job});
+  }
+  void perform(PackHeld& action) {
+    std::vector<std::pair<Digest, HeldStates::List>> jobs;
+    for (const LoadedJobPtr& job : jobs_.loaded()) {
+      if (action.request && action.request->job != job->digest) continue;
+      HeldStates::List states =
+          action.request ? job->held->states(action.request->states) : job->held->all();
+      if (!states.empty()) jobs.emplace_back(job->digest, std::move(states));
+    }
+    packing_.push_back(
+        std::async(std::launch::async, [this, jobs = std::move(jobs), store = store_] {
+          std::vector<StatesPublished> messages;
+          if (!jobs.empty()) messages = pack_held(jobs, *store);
+          channel_.wake();
+          return messages;
+        }));
   }
   void perform(StopTask& action) { pool_.stop(action.lease); }
   void perform(DropQueuedTasks&) { pool_.drop_queued(); }
@@ -285,6 +333,7 @@ class Worker {
   std::optional<Leave> leave_;
   NoteLog notes_;
   TaskWatch watch_;
+  std::list<std::future<std::vector<StatesPublished>>> packing_;
   RenderThreads pool_;  ///< last: its threads use the rest and are joined first
 };
 

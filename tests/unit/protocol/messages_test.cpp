@@ -59,7 +59,7 @@ const std::vector<Message>& examples() {
       JobDocumentRequest{{1, 2}},
       WorkerGoodbye{},
       WorkerWelcome{3, 500, "/store"},
-      LeaseGrant{kLease, {kBlob}, 4, 5},
+      LeaseGrant{kLease, {kBlob}, 4, 5, true, 6},
       LeaseRevoke{kLease},
       NoWork{250},
       HelloAgain{},
@@ -80,6 +80,8 @@ const std::vector<Message>& examples() {
       Drain{},
       ReportReceived{kLease},
       DeleteJob{"def"},
+      StatesPublished{{1, 2}, {{kBlob, kBlob}}},
+      RequestStates{{3, 4}, {{5, 6}}},
   };
   return messages;
 }
@@ -111,7 +113,7 @@ TEST(Messages, MembersArriveWhereTheyWereSent) {
 
 TEST(Messages, BytesAreThoseOfTheGrammar) {
   const std::vector<Bytes> frames = encode_message(NoWork{0x01020304});
-  EXPECT_EQ(frames[0], text(std::string_view("BATON\x07\x00", 7)));
+  EXPECT_EQ(frames[0], text(std::string_view("BATON\x08\x00", 7)));
   EXPECT_EQ(frames[1], text(std::string_view("\x0a\x00", 2)));
   EXPECT_EQ(frames[2], text("\x04\x03\x02\x01"));
 }
@@ -156,7 +158,7 @@ TEST(Messages, AnotherVersionIsAVersionError) {
   const Result<Message> decoded = decode_message(frames);
   ASSERT_FALSE(decoded.ok());
   EXPECT_EQ(decoded.error().kind, ErrorKind::version);
-  EXPECT_THAT(decoded.error().message, HasSubstr("version 9, this program speaks 7"));
+  EXPECT_THAT(decoded.error().message, HasSubstr("version 9, this program speaks 8"));
 }
 
 TEST(Messages, OtherProtocolsAreRefused) {

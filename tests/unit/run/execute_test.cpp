@@ -74,8 +74,8 @@ class ExecuteTest : public testing::Test {
   }
   Result<TaskOutput> render(std::int32_t step, std::int32_t tile,
                             const std::vector<BlobRef>& inputs) {
-    return execute_task(*loaded_, store_.value(), {TaskKind::render, step, tile}, inputs,
-                        frames_of(step), {});
+    return execute_task(*loaded_, store_.value(), {TaskKind::render, step, tile},
+                        {inputs, frames_of(step)}, {});
   }
 
   /// Every render task in the order of a farm; returns the films by frame, the states in `states_`.
@@ -122,8 +122,8 @@ TEST_F(ExecuteTest, TasksThroughTheStoreMakeTheImagesOfOneProcess) {
   loaded_ = load().value();
 
   for (const auto& [frame, films] : render_all()) {
-    const Result<TaskOutput> output =
-        execute_task(*loaded_, *store_, {TaskKind::assemble, frame, 0}, films, {frame, frame}, {});
+    const Result<TaskOutput> output = execute_task(
+        *loaded_, *store_, {TaskKind::assemble, frame, 0}, {films, {frame, frame}}, {});
     ASSERT_TRUE(output) << output.error().message;
     ASSERT_EQ(output->outputs.size(), 1u);
     EXPECT_EQ(output->outputs[0].kind, BlobKind::image);
@@ -162,6 +162,33 @@ TEST_F(ExecuteTest, ARunHandsOnItsStateAndCountsItsWork) {
   EXPECT_FALSE(render(1, 1, {first->outputs[0]}));
 }
 
+// What is held is what a file would have said: the next run makes the same films of either, and
+// packing it later gives the file that packing at once does.
+TEST_F(ExecuteTest, AHeldStateIsTheStateOfItsFile) {
+  const TaskKey first{TaskKind::render, 0, 1}, next{TaskKind::render, 1, 1};
+  const BlobRef packed = render(0, 1, {}).value().outputs.back();
+  const Result<TaskOutput> made =
+      execute_task(*loaded_, *store_, first, {{}, frames_of(0), /*may_hold=*/true}, {});
+  ASSERT_TRUE(made) << made.error().message;
+  const BlobRef held = made->outputs.back();
+  EXPECT_TRUE(held.is_held());
+  EXPECT_EQ(held.digest, held_state_name(loaded_->digest, 1, 1));
+  EXPECT_EQ(loaded_->held->size_bytes(), loaded_->held->find(held.digest)->size_bytes());
+  EXPECT_EQ(render(1, 1, {held}).value().outputs, render(1, 1, {packed}).value().outputs);
+
+  const auto published = publish_held(loaded_->held->all(), *store_);
+  ASSERT_TRUE(published) << published.error().message;
+  EXPECT_EQ(*published, (std::vector<PublishedState>{{held, packed}}));
+
+  // A grant says which states nobody needs any more; one that is not here is an error.
+  EXPECT_TRUE(execute_task(*loaded_, *store_, next, {{held}, frames_of(1), false, 1}, {}));
+  const Result<TaskOutput> late =
+      execute_task(*loaded_, *store_, next, {{held}, frames_of(1), false, 2}, {});
+  ASSERT_FALSE(late);
+  EXPECT_THAT(late.error().message, testing::HasSubstr("is not held here"));
+  EXPECT_EQ(loaded_->held->size_bytes(), 0u);
+}
+
 TEST_F(ExecuteTest, ADamagedOrMissingStateIsAnErrorThatNamesIt) {
   const BlobRef state = render(0, 0, {}).value().outputs.back();
   Bytes bytes = read_file(store_->path(state.digest), limits::kMaxBlobBytes).value();
@@ -181,7 +208,7 @@ TEST_F(ExecuteTest, TasksThatTheJobDoesNotHaveAreBadInput) {
                               TaskKey{TaskKind::render, -1, 0}, TaskKey{TaskKind::assemble, 5, 0},
                               TaskKey{TaskKind::assemble, 0, 0}}) {
     const Result<TaskOutput> output =
-        execute_task(*loaded_, *store_, task, {}, {2 * task.step, 2 * task.step}, {});
+        execute_task(*loaded_, *store_, task, {{}, {2 * task.step, 2 * task.step}}, {});
     ASSERT_FALSE(output);
     EXPECT_EQ(output.error().kind, ErrorKind::bad_input);
   }
@@ -190,14 +217,14 @@ TEST_F(ExecuteTest, TasksThatTheJobDoesNotHaveAreBadInput) {
 TEST_F(ExecuteTest, AFrameNeedsEveryTileOnce) {
   auto films = render_all()[0];
   films[1] = films[0];
-  EXPECT_FALSE(execute_task(*loaded_, *store_, {TaskKind::assemble, 0, 0}, films, {}, {}));
+  EXPECT_FALSE(execute_task(*loaded_, *store_, {TaskKind::assemble, 0, 0}, {films}, {}));
 }
 
 TEST_F(ExecuteTest, AStoppedTaskIsCancelled) {
   std::stop_source stop;
   stop.request_stop();
-  const Result<TaskOutput> output =
-      execute_task(*loaded_, *store_, {TaskKind::render, 0, 0}, {}, frames_of(0), stop.get_token());
+  const Result<TaskOutput> output = execute_task(*loaded_, *store_, {TaskKind::render, 0, 0},
+                                                 {{}, frames_of(0)}, stop.get_token());
   ASSERT_FALSE(output);
   EXPECT_EQ(output.error().kind, ErrorKind::cancelled);
 }

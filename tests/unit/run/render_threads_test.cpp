@@ -17,7 +17,7 @@ LeaseId lease(std::int32_t tile) {
 }
 
 PooledTask task(std::int32_t tile) {
-  return {.lease = lease(tile), .inputs = {}, .job = nullptr, .store = nullptr};
+  return {.lease = lease(tile), .grant = {}, .job = nullptr, .store = nullptr};
 }
 
 Status at_once(std::span<const PooledTask> /*tasks*/) { return {}; }

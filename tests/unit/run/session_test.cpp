@@ -255,7 +255,8 @@ TEST_F(SessionTest, TheCoordinatorMayAskForTheEndToo) {
   grant(lease(0));
   EXPECT_NE(find<DropQueuedTasks>(step(MessageArrived{Drain{}})), nullptr);
   finish(lease(0));
-  const auto last = receive(ReportReceived{lease(0)});
+  EXPECT_NE(find<PackHeld>(receive(ReportReceived{lease(0)})), nullptr);
+  const auto last = step(HeldPacked{});
   EXPECT_EQ(sent<WorkerGoodbye>(last).size(), 1u);
   ASSERT_NE(find<Leave>(last), nullptr);
   EXPECT_EQ(find<Leave>(last)->code, ExitCode::ok);
@@ -273,10 +274,31 @@ TEST_F(SessionTest, DrainsWhatRunsThenSaysGoodbye) {
   EXPECT_EQ(sent<TaskDone>(ended).size(), 1u);
   EXPECT_TRUE(sent<LeaseRequest>(ended).empty());
   EXPECT_EQ(find<Leave>(ended), nullptr) << "the report may be lost";
-  const auto last = receive(ReportReceived{lease(0)});
+  EXPECT_NE(find<PackHeld>(receive(ReportReceived{lease(0)})), nullptr);
+  const auto last = step(HeldPacked{});
   EXPECT_EQ(sent<WorkerGoodbye>(last).size(), 1u);
   ASSERT_NE(find<Leave>(last), nullptr);
   EXPECT_EQ(find<Leave>(last)->code, ExitCode::ok);
+}
+
+TEST_F(SessionTest, WhatItHoldsIsPublishedWhenAskedForAndBeforeItLeaves) {
+  const StatesPublished states{{1, 2}, {{{BlobKind::state, 3, 4, {5, 6}}, {}}}};
+  welcome();
+  const auto asked = receive(RequestStates{{1, 2}, {{5, 6}}});
+  ASSERT_NE(find<PackHeld>(asked), nullptr);
+  EXPECT_EQ(find<PackHeld>(asked)->request->states, (std::vector<Digest>{{5, 6}}));
+  const auto packed = step(HeldPacked{{states}});
+  EXPECT_EQ(sent<StatesPublished>(packed).size(), 1u);
+  EXPECT_EQ(find<Leave>(packed), nullptr);
+
+  const auto draining = step(DrainRequested{});
+  ASSERT_NE(find<PackHeld>(draining), nullptr);
+  EXPECT_FALSE(find<PackHeld>(draining)->request) << "all";
+  EXPECT_EQ(find<Leave>(draining), nullptr);
+  EXPECT_EQ(find<PackHeld>(tick_after(10ms)), nullptr) << "once";
+  const auto last = step(HeldPacked{{states}});
+  EXPECT_EQ(sent<StatesPublished>(last).size(), 1u);
+  EXPECT_NE(find<Leave>(last), nullptr);
 }
 
 TEST_F(SessionTest, GivesUpOnASilentCoordinator) {

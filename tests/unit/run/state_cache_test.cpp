@@ -43,5 +43,25 @@ TEST(StateCache, ATileFindsItsStateOfTheFrameBefore) {
   }
 }
 
+// What does not fit is not held: it goes into the store instead.
+TEST(HeldStates, HoldsWhatFitsUntilNobodyNeedsIt) {
+  const StatePtr state = state_of(10, false);
+  HeldStates held(2 * state->size_bytes());
+  const auto ref = [](std::int32_t frame) {
+    return BlobRef{BlobKind::state, frame, 0, held_state_name({1, 2}, frame, 0)};
+  };
+  EXPECT_TRUE(held.hold(ref(0), state));
+  EXPECT_TRUE(held.hold(ref(1), state));
+  EXPECT_TRUE(held.hold(ref(1), state)) << "again";
+  EXPECT_FALSE(held.hold(ref(2), state));
+  EXPECT_EQ(held.size_bytes(), 2 * state->size_bytes());
+  EXPECT_EQ(held.states({ref(1).digest, ref(2).digest}).size(), 1u);
+
+  held.release_before(1);
+  EXPECT_EQ(held.find(ref(0).digest), nullptr);
+  EXPECT_EQ(held.find(ref(1).digest), state);
+  EXPECT_TRUE(held.hold(ref(2), state));
+}
+
 }  // namespace
 }  // namespace baton

@@ -11,13 +11,18 @@ namespace baton::testing_farm {
 
 /// A farm where everything goes wrong at random: workers vanish, fail, report late or twice,
 /// messages are lost, blobs and frames vanish, the coordinator restarts from what it recorded.
-/// Workers publish their outputs some time before they report them. Checks after every step what
+/// Workers publish their outputs some time before they report them; states that they may hold they
+/// mostly do, until they are asked for them, leave or die. Checks after every step what
 /// must hold whatever happens.
 class ChaosFarm {
  public:
-  /// alike: films of many tasks have the same bytes, and so are one blob.
-  ChaosFarm(std::uint32_t seed, JobSpec spec, bool alike)
-      : random_(seed), spec_(std::move(spec)), graph_(spec_), alike_(alike) {
+  struct Options {
+    bool alike = false;  ///< films of many tasks have the same bytes, and so are one blob
+    int num_workers = 5;
+    bool failures = true;  ///< attempts fail, files vanish; else only workers and messages do
+  };
+  ChaosFarm(std::uint32_t seed, JobSpec spec, Options options)
+      : random_(seed), spec_(std::move(spec)), graph_(spec_), options_(options) {
     job_ = digest_of("job");
     start_coordinator();
   }
@@ -25,7 +30,7 @@ class ChaosFarm {
   /// One random thing happens. `trouble`: whether bad things may happen.
   void advance(bool trouble) {
     now_ += std::chrono::milliseconds(roll(300));
-    const std::string worker = "w" + std::to_string(roll(5));
+    const std::string worker = "w" + std::to_string(roll(options_.num_workers));
     const int what = roll(100);
     if (what < 30) {
       ask(worker);
@@ -36,21 +41,22 @@ class ChaosFarm {
     } else if (what < 80) {
       step(ClockTicked{});
     } else if (what < 88) {
-      for (int i = 0; i < 5; ++i) heartbeat("w" + std::to_string(i));
+      for (int i = 0; i < options_.num_workers; ++i) heartbeat("w" + std::to_string(i));
     } else if (!trouble) {
       return;
     } else if (what < 91) {
-      held_[worker].clear();
-      unconfirmed_[worker].clear();
+      end_process(worker);
       if (roll(2)) join(worker);
+    } else if (what < 92) {
+      leave(worker);
     } else if (what < 93) {
       now_ += kSilence;
     } else if (what < 96) {
-      fail(worker);
+      if (options_.failures) fail(worker);
     } else if (what < 97) {
       start_coordinator();
     } else if (what < 98) {
-      lose_a_file();
+      if (options_.failures) lose_a_file();
     } else if (!old_reports_.empty()) {
       receive(old_reports_[static_cast<std::size_t>(roll(static_cast<int>(old_reports_.size())))]);
     }
@@ -65,6 +71,8 @@ class ChaosFarm {
     keep_blobs();
     step(JobForgotten{job_});
     held_.clear();
+    memory_.clear();
+    wanted_.clear();
     unconfirmed_.clear();
     old_reports_.clear();
 
@@ -139,6 +147,10 @@ class ChaosFarm {
   std::size_t num_lost() const { return num_lost_; }
   std::size_t num_reopened() const { return num_reopened_; }
   std::size_t num_events() const { return num_events_; }
+  /// States that were held, that a worker published, and that went with it.
+  std::size_t num_held() const { return num_held_; }
+  std::size_t num_published() const { return num_published_; }
+  std::size_t num_held_lost() const { return num_held_lost_; }
   std::size_t num_kept_frames() const { return num_kept_frames_; }
   std::size_t num_cuts() const { return num_cuts_; }
   const JobSpec& spec() const { return spec_; }
@@ -147,8 +159,11 @@ class ChaosFarm {
   struct Held {
     std::vector<BlobRef> inputs;
     FrameSpan frames;
+    bool holds = false;  ///< the state that it makes
     bool published = false;
   };
+  /// A held state, and the blob that it becomes.
+  using Memory = std::map<Digest, PublishedState>;
 
   int roll(int sides) { return static_cast<int>(random_() % static_cast<std::uint32_t>(sides)); }
 
@@ -168,7 +183,7 @@ class ChaosFarm {
     for (const Completion& done : completions_) {
       const auto live = tasks.live_blobs(*graph_.find(done.task));
       const bool lost = std::any_of(live.begin(), live.end(), [this](const BlobRef& blob) {
-        return !store_.contains(blob.digest);
+        return !blob.is_held() && !store_.contains(blob.digest);
       });
       if (lost || lost_frames_.erase(done.task) > 0) added.lost.push_back(done.task);
       for (const BlobRef& spare : tasks.spare_blobs(*graph_.find(done.task))) {
@@ -214,6 +229,32 @@ class ChaosFarm {
     step(WorkerJoined{worker, leases(worker)});
   }
 
+  /// The process dies, with all that it holds.
+  void end_process(const std::string& worker) {
+    num_held_lost_ += memory_[worker].size();
+    memory_[worker].clear();
+    wanted_.erase(worker);
+    held_[worker].clear();
+    unconfirmed_[worker].clear();
+    known_.erase(worker);
+    // What comes next under this name is another process; nobody listens to the old one's socket.
+    std::erase_if(old_reports_, [&](const TaskCompleted& done) { return done.worker == worker; });
+  }
+  /// It is drained: what it has not begun goes back, what it holds into the store.
+  void leave(const std::string& worker) {
+    if (!known_.contains(worker)) return;
+    HeldPublished all{worker, job_, {}};
+    for (const auto& [name, state] : memory_[worker]) all.states.push_back(state);
+    publish(all);
+    end_process(worker);
+    step(WorkerLeft{worker});
+  }
+  void publish(const HeldPublished& event) {
+    for (const PublishedState& state : event.states) store_.insert(state.published.digest);
+    num_published_ += event.states.size();
+    step(event);
+  }
+
   void ask(const std::string& worker) {
     if (!known_.contains(worker)) join(worker);
     step(WorkRequested{worker, 1 + roll(3)});
@@ -221,7 +262,17 @@ class ChaosFarm {
 
   void heartbeat(const std::string& worker) {
     repeat(worker);
-    if (known_.contains(worker)) step(WorkerAlive{worker, leases(worker)});
+    if (!known_.contains(worker)) return;
+    step(WorkerAlive{worker, leases(worker)});
+    if (const auto asked = wanted_.find(worker); asked != wanted_.end() && roll(4) > 0) {
+      HeldPublished some{worker, job_, {}};
+      for (const Digest& name : asked->second) {
+        if (const auto state = memory_[worker].find(name); state != memory_[worker].end())
+          some.states.push_back(state->second);
+      }
+      wanted_.erase(asked);
+      publish(some);
+    }
   }
 
   void report(const std::string& worker) {
@@ -229,13 +280,19 @@ class ChaosFarm {
     if (!known_.contains(worker)) join(worker);
     if (held_[worker].empty()) return;
     const auto [lease, held] = *held_[worker].begin();
-    const std::vector<BlobRef> unread = missing_inputs(held);
+    const std::vector<BlobRef> unread = missing_inputs(worker, held);
     held_[worker].erase(lease);
+    const bool unheld = std::any_of(unread.begin(), unread.end(),
+                                    [](const BlobRef& blob) { return blob.is_held(); });
+    if (!held.published && unheld) {
+      say(worker, lease, AttemptFailed{worker, lease, "is not held here", false});
+      return;
+    }
     if (!held.published && !unread.empty()) {
       say(worker, lease, InputsLost{worker, lease, unread});
       return;
     }
-    if (!held.published) publish(lease, held);
+    if (!held.published) publish(worker, lease, held);
     const TaskCompleted done{worker, lease, outputs(lease.task, held), {}};
     old_reports_.push_back(done);
     say(worker, lease, done);
@@ -263,7 +320,7 @@ class ChaosFarm {
     const bool is_missing =
         !recorded_.contains(done.lease.task) &&
         std::any_of(done.outputs.begin(), done.outputs.end(), [this](const BlobRef& blob) {
-          return blob.kind != BlobKind::image && !store_.contains(blob.digest);
+          return blob.kind != BlobKind::image && !blob.is_held() && !store_.contains(blob.digest);
         });
     num_missing_ += is_missing ? 1 : 0;
     if (is_missing) {
@@ -276,29 +333,45 @@ class ChaosFarm {
   /// The worker's next task is rendered; its report is still to come.
   void publish(const std::string& worker) {
     for (auto& [lease, held] : held_[worker]) {
-      if (held.published || !missing_inputs(held).empty()) continue;
+      if (held.published || !missing_inputs(worker, held).empty()) continue;
       held.published = true;
-      publish(lease, held);
+      publish(worker, lease, held);
       return;
     }
   }
-  std::vector<BlobRef> missing_inputs(const Held& held) const {
+  std::vector<BlobRef> missing_inputs(const std::string& worker, const Held& held) {
     std::vector<BlobRef> missing;
     for (const BlobRef& input : held.inputs) {
-      if (!store_.contains(input.digest)) missing.push_back(input);
+      const bool is_there =
+          input.is_held() ? memory_[worker].contains(input.digest) : store_.contains(input.digest);
+      if (!is_there) missing.push_back(input);
     }
     return missing;
   }
-  void publish(const LeaseId& lease, const Held& held) {
-    for (const BlobRef& blob : outputs(lease.task, held)) store_.insert(blob.digest);
+  void publish(const std::string& worker, const LeaseId& lease, Held held) {
+    const std::vector<BlobRef> made = outputs(lease.task, held);
+    held.holds = false;
+    const std::vector<BlobRef> packed = outputs(lease.task, held);
+    for (std::size_t i = 0; i < made.size(); ++i) {
+      if (made[i].is_held()) {
+        memory_[worker].insert_or_assign(made[i].digest, PublishedState{made[i], packed[i]});
+        ++num_held_;
+      } else {
+        store_.insert(made[i].digest);
+      }
+    }
   }
 
   std::vector<BlobRef> outputs(const TaskKey& task, const Held& held) const {
     const Digest tiling = digest_of("tiles of " + std::to_string(spec_.image.tile_size));
     std::vector<BlobRef> outputs = outputs_of_grant(spec_, tiling, task, held.inputs, held.frames);
     for (BlobRef& blob : outputs) {
-      if (alike_ && blob.kind == BlobKind::film)
+      if (options_.alike && blob.kind == BlobKind::film)
         blob.digest = digest_of("empty tile " + std::to_string((blob.frame + blob.tile) / 2));
+      if (held.holds && blob.kind == BlobKind::state) {
+        blob.digest = held_state_name(job_, blob.frame, blob.tile);
+        blob.size_bytes = 0;
+      }
     }
     return outputs;
   }
@@ -329,6 +402,17 @@ class ChaosFarm {
     completions_.push_back(a.completion);
     lost_frames_.erase(a.completion.task);
   }
+  void on(const RecordOutputs& a) {
+    EXPECT_TRUE(recorded_.contains(a.task)) << "only what is done lies anywhere";
+    for (Completion& done : completions_) {
+      if (done.task == a.task) done.outputs = a.outputs;
+    }
+  }
+  void on(const AskForStates& a) {
+    for (const Digest& state : a.states)
+      EXPECT_TRUE(scheduler_->is_referenced(state)) << "asked for a state that nobody needs";
+    if (roll(20) > 0) wanted_[a.worker].insert(a.states.begin(), a.states.end());
+  }
   void on(const RecordReopened& a) {
     for (const TaskKey& task : a.tasks) {
       EXPECT_EQ(recorded_.erase(task), 1u) << "only what was done is done again";
@@ -344,13 +428,23 @@ class ChaosFarm {
     for (const TaskIndex input : graph_.inputs(a.lease.task)) {
       EXPECT_TRUE(recorded_.contains(graph_.key(input))) << "granted before its input was recorded";
     }
+    // Who is not known any more gets no message.
+    const bool arrives = roll(20) > 0 && known_.contains(a.worker);
+    Memory& memory = memory_[a.worker];
+    if (arrives)
+      std::erase_if(memory, [&](const auto& s) { return s.second.held.frame < a.states_from; });
     for (const BlobRef& input : a.inputs) {
       EXPECT_TRUE(scheduler_->is_referenced(input.digest));
-      EXPECT_TRUE(store_.contains(input.digest) || lost_.contains(input.digest))
-          << "granted with an input that was removed";
+      if (input.is_held()) {
+        EXPECT_TRUE(memory.contains(input.digest) || !known_.contains(a.worker))
+            << "granted to a worker that does not hold an input";
+      } else {
+        EXPECT_TRUE(store_.contains(input.digest) || lost_.contains(input.digest))
+            << "granted with an input that was removed";
+      }
     }
-    // Now and then the message is lost.
-    if (roll(20) > 0) held_[a.worker].emplace(a.lease, Held{a.inputs, a.frames});
+    if (arrives)
+      held_[a.worker].emplace(a.lease, Held{a.inputs, a.frames, a.may_hold && roll(5) > 0});
   }
   void on(const RevokeLease& a) {
     held_[a.worker].erase(a.lease);
@@ -370,13 +464,15 @@ class ChaosFarm {
   std::mt19937 random_;
   JobSpec spec_;
   JobGraph graph_;
-  bool alike_;
+  Options options_;
   Digest job_;
   TimePoint now_{};
   std::uint32_t epoch_ = 0;
   std::unique_ptr<Scheduler> scheduler_;
   std::set<std::string> known_;  ///< to the coordinator, as the workers believe
   std::map<std::string, std::map<LeaseId, Held>> held_;  ///< what each worker has in hand
+  std::map<std::string, Memory> memory_;                 ///< what each worker holds
+  std::map<std::string, std::set<Digest>> wanted_;       ///< of it, what it was asked for
   std::map<std::string, std::map<LeaseId, Event>> unconfirmed_;
   std::vector<TaskCompleted> old_reports_;
   std::vector<Completion> completions_;  ///< the journal
@@ -390,6 +486,7 @@ class ChaosFarm {
   std::set<Digest> kept_;  ///< blobs of jobs before this one
   std::size_t num_changes_ = 0, num_kept_frames_ = 0, num_cuts_ = 0;
   std::size_t num_removed_ = 0, num_missing_ = 0, num_lost_ = 0, num_reopened_ = 0, num_events_ = 0;
+  std::size_t num_held_ = 0, num_published_ = 0, num_held_lost_ = 0;
 };
 
 }  // namespace baton::testing_farm

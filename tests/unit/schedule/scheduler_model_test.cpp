@@ -38,7 +38,7 @@ TEST(SchedulerModel, EveryTaskIsDoneOnceWhateverHappens) {
     spec.visibility.correlated = seed % 3 == 1;
     spec.max_retries_per_task = 1000000;
     spec.max_failures_per_worker = 1000000;
-    ChaosFarm farm(seed, spec, /*alike=*/seed % 2 == 0);
+    ChaosFarm farm(seed, spec, {.alike = seed % 2 == 0});
     // Some jobs are changed on the way, or after their end.
     int steps = 0;
     for (std::uint32_t change = 0; change < seed % 3; ++change) {
@@ -82,7 +82,7 @@ TEST(SchedulerModel, NobodyIsBlamedForBlobsThatAreAlike) {
     JobSpec spec = small_job(4, 12, 3);
     spec.max_retries_per_task = 0;
     spec.max_failures_per_worker = 1;
-    ChaosFarm farm(seed, spec, /*alike=*/true);
+    ChaosFarm farm(seed, spec, {.alike = true});
     int steps = 0;
     for (; farm.status() == JobStatus::running && steps < 20000; ++steps)
       farm.advance(/*trouble=*/false);
@@ -94,6 +94,33 @@ TEST(SchedulerModel, NobodyIsBlamedForBlobsThatAreAlike) {
   EXPECT_GT(num_missing, 20u);
 }
 
+// One or two workers die, fall silent and leave, and messages are lost; what they held is made
+// again from a checkpoint, or was published before. Between checkpoints most states are held.
+TEST(SchedulerModel, HeldStatesAreReadByTheirHolderAlone) {
+  std::size_t num_tasks = 0, num_held = 0, num_published = 0, num_held_lost = 0;
+  for (std::uint32_t seed = 1; seed <= num_seeds(); ++seed) {
+    SCOPED_TRACE(testing::Message() << "seed " << seed);
+    JobSpec spec = moving_job(8, 24, 1);
+    spec.state.checkpoint_every = 6;
+    const int num_workers = 1 + static_cast<int>(seed % 2);
+    ChaosFarm farm(seed, spec, {.num_workers = num_workers, .failures = false});
+    int steps = 0;
+    for (; farm.status() == JobStatus::running && steps < 20000; ++steps)
+      farm.advance(/*trouble=*/steps % 500 < 250);
+    EXPECT_EQ(farm.status(), JobStatus::done) << "after " << steps << " steps";
+    EXPECT_EQ(farm.progress().tasks_open, 0u);
+    num_tasks += farm.num_tasks();
+    num_held += farm.num_held();
+    num_published += farm.num_published();
+    num_held_lost += farm.num_held_lost();
+    farm.delete_job();
+    if (testing::Test::HasFailure()) return;
+  }
+  EXPECT_GT(num_held, num_tasks / 4);
+  EXPECT_GT(num_published, num_tasks / 100) << "others waited for them, or their worker left";
+  EXPECT_GT(num_held_lost, num_tasks / 100) << "with their workers";
+}
+
 TEST(SchedulerModel, AJobAlwaysEndsWhenAttemptsAreLimited) {
   for (std::uint32_t seed = 1; seed <= 60; ++seed) {
     SCOPED_TRACE(testing::Message() << "seed " << seed);
@@ -101,7 +128,7 @@ TEST(SchedulerModel, AJobAlwaysEndsWhenAttemptsAreLimited) {
     spec.max_retries_per_task = 1;
     spec.max_failed_tasks = 2;
     spec.max_failures_per_worker = 3;
-    ChaosFarm farm(seed, spec, /*alike=*/seed % 2 == 0);
+    ChaosFarm farm(seed, spec, {.alike = seed % 2 == 0});
     int steps = 0;
     for (; farm.status() == JobStatus::running && steps < 20000; ++steps)
       farm.advance(/*trouble=*/true);

@@ -1,0 +1,73 @@
+#include <algorithm>
+
+#include "common/base/limits.h"
+#include "coordinator/schedule/job_tasks.h"
+
+namespace baton {
+
+std::int32_t JobTasks::states_from() const {
+  if (first_open_run_ >= graph_.num_runs()) return graph_.num_frames();
+  return graph_.first_frame(first_open_run_) - 1;
+}
+
+bool JobTasks::may_hold(TaskIndex task) const {
+  const TaskKey key = graph_.key(task);
+  return key.kind == TaskKind::render && graph_.carries_state() && graph_.shares_history() &&
+         key.step + 1 < graph_.num_runs() && !keep_all_states_ && !checkpoints_.keeps(key) &&
+         !cuts_.contains(task) && ended_.empty() && makers_.size() <= limits::kMaxWorkers;
+}
+
+/// The state of a done task if it is held; else null.
+const BlobRef* JobTasks::held_state(TaskIndex task) const {
+  const std::vector<BlobRef>& made = outputs(task);
+  return !made.empty() && made.front().is_held() ? &made.front() : nullptr;
+}
+
+std::vector<std::pair<std::string, Digest>> JobTasks::held_inputs(TaskIndex task) const {
+  std::vector<std::pair<std::string, Digest>> held;
+  const TaskKey key = graph_.key(task);
+  if (num_held_ == 0 || key.kind != TaskKind::render || cuts_.contains(task)) return held;
+  for (const TaskIndex input : graph_.inputs(key)) {
+    if (const BlobRef* state = held_state(input)) held.emplace_back(maker(input), state->digest);
+  }
+  return held;
+}
+
+bool JobTasks::can_read(TaskIndex task, const std::string& worker) const {
+  const auto held = held_inputs(task);
+  return std::all_of(held.begin(), held.end(),
+                     [&](const auto& input) { return input.first == worker; });
+}
+
+std::vector<TaskKey> JobTasks::held_by(const std::string& worker) const {
+  std::vector<TaskKey> tasks;
+  if (num_held_ == 0) return tasks;
+  for (TaskIndex task = graph_.num_frames(); task < graph_.num_tasks(); ++task) {
+    const BlobRef* state = held_state(task);
+    if (state != nullptr && maker(task) == worker && num_needs(task, *state) > 0)
+      tasks.push_back(graph_.key(task));
+  }
+  return tasks;
+}
+
+std::optional<TaskIndex> JobTasks::publish(const PublishedState& state, const std::string& worker,
+                                           BlobReferences& blobs) {
+  if (state.held.frame < 0 || state.held.frame >= graph_.num_frames()) return std::nullopt;
+  const auto task =
+      graph_.find({TaskKind::render, graph_.run_of(state.held.frame), state.held.tile});
+  const BlobRef* held = task ? held_state(*task) : nullptr;
+  const bool fits = held != nullptr && *held == state.held && maker(*task) == worker &&
+                    !state.published.is_held() && state.published.kind == held->kind &&
+                    state.published.frame == held->frame && state.published.tile == held->tile;
+  if (!fits) return std::nullopt;
+
+  // Whoever needs it needs the blob from now on.
+  release_outputs(*task, blobs);
+  count_output(*held, false);
+  record(*task).outputs.front() = state.published;
+  count_output(state.published, true);
+  add_outputs(*task, blobs);
+  return task;
+}
+
+}  // namespace baton
