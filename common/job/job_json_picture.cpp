@@ -26,9 +26,9 @@ constexpr std::array<std::string_view, 12> kSettings{"/name",
                                                      "/maxFailuresPerWorker",
                                                      "/maxSecondsPerTask",
                                                      "/specificationVersion"};
-/// Of these, those that do: what a pixel knows of earlier frames decides where its rays go.
+/// Exceptions, which decide pixels: what is remembered of earlier frames says where rays go.
 constexpr std::array<std::string_view, 2> kOfThePicture{"/state/carry", "/state/preroll"};
-/// The name of what carried samples begin with.
+/// How the first frame is named among the differences.
 constexpr const char* kFirstFrame = "$.frames (samples are carried from the first one on)";
 
 bool is_setting(std::string_view path) {
@@ -65,7 +65,7 @@ Facts picture_facts(const JobSpec& job, const std::vector<AssetDigest>& assets) 
   for (const auto& [path, value] : all.items()) {
     if (!is_setting(path) && !is_key(path)) facts.emplace(json_path(path), value.dump());
   }
-  // What has keys at all follows its history another way.
+  // Whether anything moves decides how all frames follow their history.
   if (!job.camera.keys.empty()) facts.emplace("$.camera.keys", "given");
   for (std::size_t i = 0; i < job.scene.objects.size(); ++i) {
     if (moves(job.scene.objects[i]))

@@ -255,8 +255,7 @@ void JobJsonReader::fault(std::string_view key, const std::string& message) {
 
 bool JobJsonReader::explains_faults() const { return faults_.size() < limits::kMaxFaultsReported; }
 
-// ---- the object being visited
-// --------------------------------------------------------------------------------
+// ---- the object being visited -------------------------------------------------------------------
 const json* JobJsonReader::find(Key key) {
   place_.keys.emplace_back(key.name);
   const auto found = place_.object->find(key.name);

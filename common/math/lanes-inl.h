@@ -157,30 +157,29 @@ HWY_INLINE Vec3Lanes Transform(const float* m, const Vec3Lanes& v) {
 /// 1 / sqrt(x) to float accuracy.
 HWY_INLINE VF InverseSqrt(VF x) { return hn::Div(hn::Set(DF(), 1.0f), hn::Sqrt(x)); }
 
-/// v.x * frame x + v.y * frame y + v.z * n, the frame around unit n as in common/math/vec3.h [Duff
-/// et al. 2017].
-HWY_INLINE Vec3Lanes FrameToWorld(const Vec3Lanes& n, const Vec3Lanes& v) {
+/// The two axes beside unit n of a frame around it, as in common/math/vec3.h [Duff et al. 2017].
+struct FrameAxes {
+  Vec3Lanes x, y;
+};
+HWY_INLINE FrameAxes AxesAround(const Vec3Lanes& n) {
   const DF d;
   const VF one = hn::Set(d, 1.0f);
   const VF sign = hn::CopySign(one, n.z);
   const VF a = hn::Div(hn::Set(d, -1.0f), hn::Add(sign, n.z));
   const VF b = hn::Mul(hn::Mul(n.x, n.y), a);
-  const Vec3Lanes fx{hn::MulAdd(hn::Mul(sign, n.x), hn::Mul(n.x, a), one), hn::Mul(sign, b),
-                     hn::Neg(hn::Mul(sign, n.x))};
-  const Vec3Lanes fy{b, hn::MulAdd(hn::Mul(n.y, n.y), a, sign), hn::Neg(n.y)};
-  return Add(Add(Scale(fx, v.x), Scale(fy, v.y)), Scale(n, v.z));
+  return {{hn::MulAdd(hn::Mul(sign, n.x), hn::Mul(n.x, a), one), hn::Mul(sign, b),
+           hn::Neg(hn::Mul(sign, n.x))},
+          {b, hn::MulAdd(hn::Mul(n.y, n.y), a, sign), hn::Neg(n.y)}};
+}
+/// v.x * frame x + v.y * frame y + v.z * n.
+HWY_INLINE Vec3Lanes FrameToWorld(const Vec3Lanes& n, const Vec3Lanes& v) {
+  const FrameAxes frame = AxesAround(n);
+  return Add(Add(Scale(frame.x, v.x), Scale(frame.y, v.y)), Scale(n, v.z));
 }
 /// Components of world vector v in the same frame.
 HWY_INLINE Vec3Lanes FrameToLocal(const Vec3Lanes& n, const Vec3Lanes& v) {
-  const DF d;
-  const VF one = hn::Set(d, 1.0f);
-  const VF sign = hn::CopySign(one, n.z);
-  const VF a = hn::Div(hn::Set(d, -1.0f), hn::Add(sign, n.z));
-  const VF b = hn::Mul(hn::Mul(n.x, n.y), a);
-  const Vec3Lanes fx{hn::MulAdd(hn::Mul(sign, n.x), hn::Mul(n.x, a), one), hn::Mul(sign, b),
-                     hn::Neg(hn::Mul(sign, n.x))};
-  const Vec3Lanes fy{b, hn::MulAdd(hn::Mul(n.y, n.y), a, sign), hn::Neg(n.y)};
-  return {Dot(fx, v), Dot(fy, v), Dot(n, v)};
+  const FrameAxes frame = AxesAround(n);
+  return {Dot(frame.x, v), Dot(frame.y, v), Dot(n, v)};
 }
 
 /// sin and cos of 2 pi u for u in [0, 1): odd and even minimax polynomials on a quarter turn, error

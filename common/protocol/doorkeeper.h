@@ -3,6 +3,7 @@
 #include <map>
 #include <optional>
 #include <string>
+#include <utility>
 #include <zmq.hpp>
 
 #include "common/protocol/keys.h"
@@ -11,7 +12,7 @@ namespace baton {
 
 /// Answers ZeroMQ's question whether a key may connect (ZAP, RFC 27), for all listening sockets of
 /// a context. A message then carries the public key of its sender as "User-Id". Used by the thread
-/// of the socket: a handshake waits until that looks.
+/// of the socket: a handshake waits for its next answer().
 class Doorkeeper {
  public:
   Doorkeeper(zmq::context_t& context, std::map<std::string, Speaker> known);

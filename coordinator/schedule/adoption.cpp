@@ -33,12 +33,16 @@ class KeptFrames {
       const auto found = index_.find(former.document.job.frames.at(old));
       if (found == index_.end() || images_[found->second]) continue;
       if (!comparison.are_equal(old, found->second)) continue;
+
+      // The same pixels: is the file as it was written?
       const auto frame = static_cast<std::int32_t>(found->second);
       BlobRef image = task.outputs.front();
       const bool is_there = files_.has_frame(frame, image);
       image.frame = frame;
       if (is_there) images_[found->second] = image;
       if (!is_there) lost_.insert(frame);
+
+      // Which job wrote it? The headers of another job's frame differ from this one's.
       const std::vector<std::int32_t>& others = former.plan.others_frames;
       const bool is_own = former.document.digest == wanted_.digest &&
                           std::find(others.begin(), others.end(), frame) == others.end();

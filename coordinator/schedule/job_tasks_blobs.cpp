@@ -97,8 +97,7 @@ void JobTasks::release_inputs(TaskIndex task, BlobReferences& blobs) const {
   }
 }
 
-// ---- cuts
-// ----------------------------------------------------------------------------------------
+// ---- cuts ---------------------------------------------------------------------------------------
 
 /// Whether an open task takes films of it.
 bool JobTasks::needs_films(TaskIndex task) const {

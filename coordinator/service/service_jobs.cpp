@@ -249,8 +249,7 @@ Status Service::answer_detail(const PeerId& peer, const Digest& job, std::string
   return {};
 }
 
-// ---- the archive
-// ----------------------------------------------------------------------------------
+// ---- the archive --------------------------------------------------------------------------------
 
 Result<std::optional<JobDetail>> Service::archived_detail(const Digest& job) {
   BATON_ASSIGN(const std::optional<Bytes> bytes, journal_.archived_detail(job));

@@ -40,7 +40,7 @@ std::vector<std::pair<std::size_t, std::size_t>> shared_frames(const JobSpec& a,
 struct Neighbour {
   Digest job;
   JobStatus status = JobStatus::running;
-  std::vector<int> written;  ///< of the frames in common those that it has written, and all if open
+  std::vector<int> written;  ///< frames in common that it has written; all of them if it is open
   std::vector<std::string> differing;  ///< what makes their pixels others; empty: they are the same
   std::optional<int> first_differing;  ///< frame
   bool busy = false;                   ///< it is open and shares no frame
@@ -82,7 +82,7 @@ Neighbour look_at(const FormerJob& former, const Digest& job, const ParsedJobDoc
       images[static_cast<std::size_t>(task.task.step)] = task.outputs.front();
   }
 
-  // A frame is its job's as long as the file is as that has written it.
+  // A frame belongs to the job that wrote it as long as its file is unchanged.
   const std::vector<std::string> picture = picture_differences(former.document, wanted);
   const FrameComparison comparison(former.document, wanted);
   std::set<std::string> differing;
@@ -108,8 +108,7 @@ Neighbour look_at(const FormerJob& former, const Digest& job, const ParsedJobDoc
 
 }  // namespace
 
-// ---- another job of the folder
-// --------------------------------------------------------------------
+// ---- another job of the folder ------------------------------------------------------------------
 
 /// What the journal knows of a job, as far as a later one can use it. nullopt: it cannot be read.
 Result<std::optional<FormerJob>> Service::former_job(const Digest& digest) {
@@ -123,10 +122,10 @@ Result<std::optional<FormerJob>> Service::former_job(const Digest& digest) {
   return std::optional(std::move(former));
 }
 
-/// A folder belongs to one job at a time, a frame in it to the job that wrote it. Those of another
-/// picture stand in the way, unless `restart`; then they end. Those of the same one end in any
-/// case, and leave their work. Returns what is to be said; bad_input or usage: the new job is
-/// refused.
+/// Makes room for a new job: a folder has one open job, and a frame in it belongs to the job that
+/// wrote it. Jobs of the same picture end and leave their work. Jobs of another picture whose
+/// frames would be replaced refuse the new one (bad_input, usage); with `restart` they end. Returns
+/// lines that say what is replaced, and why.
 Result<std::vector<std::string>> Service::make_way(const ParsedJobDocument& document,
                                                    bool restart) {
   std::vector<std::string> reasons;
@@ -171,7 +170,7 @@ Result<std::vector<std::string>> Service::make_way(const ParsedJobDocument& docu
   return reasons;
 }
 
-/// Frames of a job of the archive are replaced by another picture: they are its frames no more.
+/// Takes frames that another picture replaces off the record of a job in the archive.
 Status Service::disown(const Digest& job, const std::vector<int>& frames) {
   BATON_ASSIGN(std::optional<JobDetail> detail, archived_detail(job));
   if (!detail) return {};
@@ -184,11 +183,10 @@ Status Service::disown(const Digest& job, const std::vector<int>& frames) {
   return journal_.describe_archived(job, summary.status, to_bytes(summary), to_bytes(*detail));
 }
 
-// ---- submission
-// -----------------------------------------------------------------------------------
+// ---- submission ---------------------------------------------------------------------------------
 
 Status Service::receive(const PeerId& peer, const SubmitJob& message) {
-  // What has ended in this very turn is read from the archive, too.
+  // Jobs that ended in this turn of the loop are read from the archive, too.
   BATON_TRY(archive_ended());
   // A job that cannot be run is refused before it leaves a trace.
   Result<ParsedJobDocument> document = parse_job_document(message.json);
@@ -252,7 +250,7 @@ Status Service::begin(const PeerId& peer, const ParsedJobDocument& document,
   event.lost.insert(event.lost.end(), lost.tasks.begin(), lost.tasks.end());
   event.lost_spares = std::move(lost.spares);
 
-  // Say what will happen before anybody is given anything to do.
+  // The answer goes out before any lease of the job.
   const auto place = static_cast<std::ptrdiff_t>(outbox_.size());
   BATON_TRY(step(event));
   const Scheduler::Job& job = *scheduler_.find_job(digest);
@@ -264,7 +262,7 @@ Status Service::begin(const PeerId& peer, const ParsedJobDocument& document,
                job.tasks.progress().tasks_total);
   if (!plan.empty()) spdlog::info("job {}: {}", digest.short_hex(), plan);
 
-  // What it needs is its own now.
+  // Blobs that the new job needs are not kept for the former ones any more.
   for (const Digest& former : formers) {
     BATON_ASSIGN(const std::vector<Digest> kept, journal_.kept_blobs(former));
     for (const Digest& blob : kept) {
@@ -307,12 +305,12 @@ Result<Adoption> Service::find_heritage(const ParsedJobDocument& document,
   return adoption;
 }
 
-/// Journals a job as if it had done itself what it adopts, and puts that into the event. text: the
+/// Journals a job as if it had itself done what it adopts, and adds that to the event. text: the
 /// document; empty: the journal has it.
 Status Service::take_over(const Adoption& adoption, const std::vector<Digest>& formers,
                           const std::string& text, JobAdded& event) {
-  // Read first: the job may go on from itself. A frame has what its assembly counted where that is
-  // of the same job.
+  // Read before the journal changes, since the job may go on from itself. A kept frame has the
+  // statistics of its assembly if that is the former job's.
   std::map<std::int32_t, BlobRef> images;
   for (const BlobRef& image : adoption.images) images[image.frame] = image;
   const std::set<TaskKey> tasks(adoption.tasks.begin(), adoption.tasks.end());
@@ -326,7 +324,7 @@ Status Service::take_over(const Adoption& adoption, const std::vector<Digest>& f
                             completion.outputs.size() == 1 &&
                             completion.outputs.front() == image->second;
       if (is_frame) images.erase(image);
-      // A frame of its own that is gone must come out as it was.
+      // A frame that the job itself wrote and that is gone must come out as it was.
       const bool is_lost = former == event.job && completion.task.kind == TaskKind::assemble &&
                            lost.contains(completion.task.step);
       if (is_lost) event.lost.push_back(completion.task);
@@ -357,9 +355,8 @@ Status Service::take_over(const Adoption& adoption, const std::vector<Digest>& f
   return {};
 }
 
-/// A job that has not ended is submitted again: one that is paused goes on, and what is gone of it,
-/// or damaged, is made again. Who submits it wants it as it now is: a folder that is not there is
-/// empty.
+/// A job that has not ended is submitted again. A paused one goes on, and what is gone or damaged
+/// is made again; a folder that is not there counts as empty.
 Status Service::go_on(const PeerId& peer, const Digest& digest) {
   BATON_ASSIGN(LostFiles lost, lost_files_of(digest));
   const bool runs = scheduler_.find_job(digest)->status == JobStatus::running;

@@ -114,7 +114,7 @@ void add_chart_command(CLI::App& app, ExitCode& code) {
   command->add_flag("--check", options->check_only, "check every combination, render nothing");
   command->footer(
       "Examples:\n"
-      "  baton chart jobs/studies/relighting.json --output charts\n"
+      "  baton chart jobs/studies/first-look.json --output charts\n"
       "Ctrl-C stops; the same command goes on where it stopped.");
   command->callback([options, &code] { code = finish_with_coordinator(run_chart(*options)); });
 }

@@ -121,7 +121,8 @@ std::string job_statistics(const JobSummary& job) {
                     static_cast<double>(job.state_bytes) / static_cast<double>(job.state_pixels),
                     bytes_text(job.state_bytes), 100 * s.seconds_state / s.cpu_seconds);
   }
-  text += fmt::format("cpu        {}\n", duration_text(s.cpu_seconds));
+  text += s.cpu_seconds < 10 ? fmt::format("cpu        {:.1f} s\n", s.cpu_seconds)
+                             : fmt::format("cpu        {}\n", duration_text(s.cpu_seconds));
   if (job.attempts_lost > 0)
     text += fmt::format("attempts   {} lost or failed\n", job.attempts_lost);
   return text;

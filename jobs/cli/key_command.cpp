@@ -37,6 +37,11 @@ void add_key_command(CLI::App& app, ExitCode& code) {
   auto options = std::make_shared<KeyOptions>();
   CLI::App* key = app.add_subcommand("key", "Makes keys for a farm of several machines");
   key->require_subcommand(1);
+  key->footer(
+      "Examples:\n"
+      "  baton key create keys                  server.key, worker.key, user.key, admin.key\n"
+      "  baton key add keys anna --role user    anna.key\n"
+      "A coordinator lets in the keys that its server.key lists when it starts.");
   CLI::App* made =
       key->add_subcommand("create", "Keys of a coordinator, its workers and its users");
   CLI::App* added = key->add_subcommand("add", "One more key, with a name of its own");
@@ -46,7 +51,7 @@ void add_key_command(CLI::App& app, ExitCode& code) {
   added->add_option("--role", options->speaker.role, "worker, user or admin")
       ->transform(CLI::CheckedTransformer(std::map<std::string, Role>{
           {"worker", Role::worker}, {"user", Role::user}, {"admin", Role::admin}}))
-      ->default_str("user");
+      ->option_text("ROLE=user");
   made->callback([options, &code] { code = finish(create(*options)); });
   added->callback([options, &code] { code = finish(add(*options)); });
 }

@@ -6,7 +6,7 @@
 
 #include "common/base/files.h"
 #include "common/base/limits.h"
-#include "common/state/sample_state.h"
+#include "common/state/source_names.h"
 #include "jobs/cli/commands.h"
 #include "jobs/cli/text.h"
 
@@ -16,8 +16,6 @@ namespace {
 using nlohmann::ordered_json;
 
 constexpr std::size_t kEssBins = 8;
-constexpr std::array<const char*, 5> kSourceNames{"background", "fresh", "carried", "restarted",
-                                                  "refreshed"};
 
 struct StateOptions {
   std::vector<std::string> files;
@@ -78,7 +76,7 @@ ordered_json report_json(const StateReport& report) {
   }
   ordered_json sources = ordered_json::object();
   for (std::size_t i = 0; i < kSourceNames.size(); ++i)
-    sources[kSourceNames[i]] = report.sources[i];
+    sources[std::string(kSourceNames[i])] = report.sources[i];
   return {{"picture", state.picture.hex()},
           {"frameIndex", state.frame_index},
           {"tile", state.tile},
@@ -134,7 +132,7 @@ ordered_json pixel_json(const SampleState& state, std::int32_t x, std::int32_t y
   }
   return {{"x", x},
           {"y", y},
-          {"source", kSourceNames[static_cast<std::size_t>(state.source[row])]},
+          {"source", source_name(state.source[row])},
           {"lns", state.lns[row]},
           {"lnsFresh", state.lns_fresh[row]},
           {"ess", pixel_ess(state, pixel)},

@@ -40,10 +40,10 @@ bool is_resolved(const Study& study, const StudyResults& results, std::size_t ce
 
 /// What is known of a choice for every block: squared error and time, both to be multiplied.
 struct Blocks {
-  std::vector<double> pixels;              ///< with a surface
-  std::vector<std::vector<double>> train;  ///< (cells, blocks) squared error
-  std::vector<std::vector<double>> judge;  ///< the same of other seeds
-  std::vector<double> cost;                ///< (cells) of a pixel
+  std::vector<double> pixels;                 ///< with a surface
+  std::vector<std::vector<double>> train;     ///< (cells, blocks) squared error
+  std::vector<std::vector<double>> held_out;  ///< the same of other seeds
+  std::vector<double> cost;                   ///< (cells) of a pixel
 };
 
 /// The mean over runs of one parity, and frames, of a cell's errors by block.
@@ -145,15 +145,15 @@ double block_headroom(const Study& study, const StudyResults& results, std::size
   double log_gain = 0;
   for (const std::size_t parity : {std::size_t{0}, std::size_t{1}}) {
     blocks.train.clear();
-    blocks.judge.clear();
+    blocks.held_out.clear();
     blocks.cost.clear();
     for (const std::size_t c : cells) {
       blocks.train.push_back(mean_blocks(results.runs[c], parity, blocks.pixels.size()));
-      blocks.judge.push_back(mean_blocks(results.runs[c], 1 - parity, blocks.pixels.size()));
+      blocks.held_out.push_back(mean_blocks(results.runs[c], 1 - parity, blocks.pixels.size()));
       blocks.cost.push_back(cell_cost(results.runs[c]).cpu_us);
     }
-    log_gain += std::log(product(blocks, blocks.judge, best_uniform(blocks)) /
-                         product(blocks, blocks.judge, best_by_block(blocks)));
+    log_gain += std::log(product(blocks, blocks.held_out, best_uniform(blocks)) /
+                         product(blocks, blocks.held_out, best_by_block(blocks)));
   }
   return std::exp(0.5 * log_gain);
 }

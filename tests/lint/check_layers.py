@@ -61,7 +61,6 @@ THIRD_PARTY = {
     r"sqlite3": ["coordinator/journal/"],
     r"zstd|xxhash": ["common/base/"],
     r"nlohmann/": ["common/job/job_json", "jobs/cli/", "jobs/study/", "worker/scene/gltf/json_view"],
-    r"httplib": ["coordinator/service/"],
     r"CLI/": ["worker/main.cpp", "coordinator/main.cpp", "jobs/cli/"],
 }
 

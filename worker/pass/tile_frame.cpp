@@ -13,7 +13,7 @@
 namespace baton {
 namespace {
 
-/// Asks for a pixel's bins early: those of a tile are larger than the caches.
+/// Prefetches a pixel's bins: those of a tile are larger than the caches.
 void fetch_ahead(const PixelMemory* memory) {
   if (memory == nullptr) return;
   const auto* bytes = reinterpret_cast<const std::byte*>(memory->bins.data());
@@ -190,7 +190,7 @@ void TileFrameRenderer::sample(Batch& batch, const FrameLight& light, SampleStat
     batch.known[i] = rays.known;
     batch.end_ray[i] = batch.rays.size();
 
-    // Keep the books.
+    // Count what the method did.
     PixelResult& pixel = batch.pixels[i];
     pixel.lns = mean_lns(state, index);
     pixel.source = latest_source(state, index);

@@ -12,6 +12,7 @@
 #include "common/job/job_json.h"
 #include "common/job/motion.h"
 #include "common/job/sequence.h"
+#include "common/state/source_names.h"
 #include "worker/exchange/second_pass.h"
 #include "worker/pass/tile_renderer.h"
 #include "worker/run/frame_output.h"
@@ -174,22 +175,6 @@ std::string describe_stats(const RenderStats& s) {
       s.target_evaluations, did.local_accepted, did.local_proposed, did.independent_accepted,
       did.independent_proposed, s.cpu_seconds, s.seconds_light, s.seconds_primary, s.seconds_sample,
       s.seconds_visibility, s.seconds_shade);
-}
-
-const char* source_name(PixelSource source) {
-  switch (source) {
-    case PixelSource::background:
-      return "background";
-    case PixelSource::fresh:
-      return "fresh";
-    case PixelSource::carried:
-      return "carried";
-    case PixelSource::restarted:
-      return "restarted";
-    case PixelSource::refreshed:
-      return "refreshed";
-  }
-  return "unknown";
 }
 
 std::string describe_pixel(const LastFrame& last, const PixelPosition& position) {

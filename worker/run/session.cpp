@@ -42,8 +42,7 @@ std::vector<SessionAction> Session::step(const SessionEvent& event, TimePoint no
   return actions;
 }
 
-// ---- events
-// ------------------------------------------------------------------------------------------------
+// ---- events -------------------------------------------------------------------------------------
 
 void Session::on(const MessageArrived& event, TimePoint now, Actions& actions) {
   last_heard_ = now;
@@ -133,8 +132,7 @@ void Session::on(const Tick&, TimePoint now, Actions& actions) {
   request_leases(now, actions);
 }
 
-// ---- messages
-// ----------------------------------------------------------------------------------------------
+// ---- messages -----------------------------------------------------------------------------------
 
 void Session::receive(const WorkerWelcome& welcome, TimePoint now, Actions& actions) {
   welcomed_ = true;
@@ -207,8 +205,7 @@ void Session::receive(const Refused& refused, TimePoint, Actions& actions) {
   }
 }
 
-// ---- helpers
-// -----------------------------------------------------------------------------------------------
+// ---- helpers ------------------------------------------------------------------------------------
 
 void Session::introduce(TimePoint now, Actions& actions) {
   welcomed_ = false;

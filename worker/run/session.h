@@ -24,8 +24,7 @@ struct SessionOptions {
       60};  ///< silence of the coordinator after which the worker ends; 0: never
 };
 
-// ---- events: what happened to the worker
-// -------------------------------------------------------------------
+// ---- events: what happened to the worker --------------------------------------------------------
 struct MessageArrived {
   Message message;
 };
@@ -47,8 +46,7 @@ struct Tick {};            ///< time has passed
 using SessionEvent = std::variant<MessageArrived, TaskExecuted, TaskEnded, DocumentMissing,
                                   HeldPacked, DrainRequested, Tick>;
 
-// ---- actions: what the program around the session must do
-// -------------------------------------------------
+// ---- actions: what the program around the session must do ---------------------------------------
 struct SendMessage {
   Message message;
 };

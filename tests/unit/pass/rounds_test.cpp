@@ -70,12 +70,12 @@ TEST(Rounds, ErrorFallsWithTheirNumber) {
   for (const Method method : {Method::bidirectional, Method::pool, Method::mis, Method::ratio}) {
     JobSpec job = rounds_job(method, 1);
     job.frames = {1};
-    JobSpec judge = job;
-    judge.sampling.method = Method::reference;
-    judge.sampling.reference_samples = 64;
-    judge.quality.rounds = 600;
-    judge.seed = 77;
-    const std::vector<double> truth = mean_rgb(render_tile(judge).films.back());
+    JobSpec reference = job;
+    reference.sampling.method = Method::reference;
+    reference.sampling.reference_samples = 64;
+    reference.quality.rounds = 600;
+    reference.seed = 77;
+    const std::vector<double> truth = mean_rgb(render_tile(reference).films.back());
     std::array<double, 3> error{};
     for (const int rounds : {1, 4, 16}) {
       job.quality.rounds = rounds;

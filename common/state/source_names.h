@@ -1,0 +1,17 @@
+#pragma once
+
+#include <array>
+#include <string_view>
+
+#include "common/state/sample_state.h"
+
+namespace baton {
+
+/// By PixelSource, for people and JSON.
+inline constexpr std::array<std::string_view, 5> kSourceNames{"background", "fresh", "carried",
+                                                              "restarted", "refreshed"};
+constexpr std::string_view source_name(PixelSource source) {
+  return kSourceNames.at(static_cast<std::size_t>(source));
+}
+
+}  // namespace baton
