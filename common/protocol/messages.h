@@ -247,11 +247,14 @@ struct JobSummary {
                 attempts_lost = 0;
   std::uint32_t frames_total = 0, frames_done = 0;
   std::uint64_t state_bytes = 0, state_pixels = 0;  ///< of all states published so far
+  std::uint64_t states_held = 0;      ///< states that are in the memory of workers alone
+  std::int32_t checkpoint_every = 0;  ///< frames
   RenderStats stats;
   template <class A>
   void fields(A& a) {
     a(job, name, owner, output_directory, status, priority, tasks_total, tasks_done, tasks_leased,
-      tasks_failed, attempts_lost, frames_total, frames_done, state_bytes, state_pixels, stats);
+      tasks_failed, attempts_lost, frames_total, frames_done, state_bytes, state_pixels,
+      states_held, checkpoint_every, stats);
   }
 };
 struct WorkerSummary {

@@ -201,6 +201,7 @@ struct RecordOutputs {
 struct RecordReopened {
   Digest job;
   std::vector<TaskKey> tasks;
+  std::string gone = "something of them";  ///< what is gone, for people
 };
 struct RecordJobStatus {
   Digest job;

@@ -93,7 +93,10 @@ class JobTasks {
                                    BlobReferences& blobs);
   /// Whether the task is done and its state is held.
   bool is_held(TaskIndex task) const { return held_state(task) != nullptr; }
-  std::size_t num_held() const { return num_held_; }
+  /// Held states that somebody needs now.
+  std::size_t num_held() const { return held_now().size(); }
+  /// Whether any state has been held and is not published.
+  bool has_held() const { return num_held_ > 0; }
 
   /// The worker that completed the task last.
   const std::string& maker(TaskIndex task) const { return makers_[record(task).maker]; }
@@ -156,6 +159,7 @@ class JobTasks {
   std::int32_t num_uses(TaskIndex task, const BlobRef& output) const;
   void count_output(const BlobRef& output, bool made);
   const BlobRef* held_state(TaskIndex task) const;
+  std::vector<TaskIndex> held_now() const;
   void force_done(TaskIndex task, const std::vector<BlobRef>& outputs);
   void add_outputs(TaskIndex task, BlobReferences& blobs) const;
   void release_outputs(TaskIndex task, BlobReferences& blobs) const;
@@ -178,7 +182,7 @@ class JobTasks {
   std::int32_t first_open_frame_ = 0;
   std::vector<std::int32_t> open_renders_;  ///< of each run
   std::int32_t first_open_run_ = 0;
-  std::size_t num_held_ = 0;
+  std::size_t num_held_ = 0;                              ///< of done tasks, needed or not
   std::map<TaskIndex, std::vector<EndedAttempt>> ended_;  ///< and not done
   std::map<TaskIndex, std::vector<BlobRef>> former_outputs_;
   std::set<TaskIndex> others_frames_;               ///< JobPlan::others_frames

@@ -39,13 +39,26 @@ bool JobTasks::can_read(TaskIndex task, const std::string& worker) const {
                      [&](const auto& input) { return input.first == worker; });
 }
 
+/// The tasks whose states are held and needed. They are of the runs from the one before the first
+/// open one on.
+std::vector<TaskIndex> JobTasks::held_now() const {
+  std::vector<TaskIndex> tasks;
+  if (num_held_ == 0) return tasks;
+  for (std::int32_t run = std::max(0, first_open_run_ - 1); run < graph_.num_runs(); ++run) {
+    if (open_renders_[static_cast<std::size_t>(run)] == graph_.num_tiles()) continue;
+    for (std::int32_t tile = 0; tile < graph_.num_tiles(); ++tile) {
+      const TaskIndex task = *graph_.find({TaskKind::render, run, tile});
+      const BlobRef* state = held_state(task);
+      if (state != nullptr && num_needs(task, *state) > 0) tasks.push_back(task);
+    }
+  }
+  return tasks;
+}
+
 std::vector<TaskKey> JobTasks::held_by(const std::string& worker) const {
   std::vector<TaskKey> tasks;
-  if (num_held_ == 0) return tasks;
-  for (TaskIndex task = graph_.num_frames(); task < graph_.num_tasks(); ++task) {
-    const BlobRef* state = held_state(task);
-    if (state != nullptr && maker(task) == worker && num_needs(task, *state) > 0)
-      tasks.push_back(graph_.key(task));
+  for (const TaskIndex task : held_now()) {
+    if (maker(task) == worker) tasks.push_back(graph_.key(task));
   }
   return tasks;
 }

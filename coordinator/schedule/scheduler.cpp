@@ -85,7 +85,7 @@ void Scheduler::on(const JobSuperseded& event, TimePoint, Actions& actions) {
     job->status = JobStatus::cancelled;
     actions.push_back(RecordJobStatus{event.job, job->status, reason});
   }
-  reopen(event.job, *job, event.replaced, actions);
+  reopen({event.job, event.replaced}, *job, actions);
   job->tasks.cancel_open();
 }
 
@@ -101,7 +101,7 @@ void Scheduler::on(const JobResumed& event, TimePoint, Actions& actions) {
   running_.emplace(rank(*job), event.job);
   job->tasks.forget_losses();
   job->waits.clear();
-  reopen(event.job, *job, event.lost, actions);
+  reopen({event.job, event.lost}, *job, actions);
   actions.push_back(RecordJobStatus{event.job, job->status, "resumed"});
   end_if_finished(event.job, *job, actions);
 }
@@ -212,7 +212,7 @@ void Scheduler::on(const InputsLost& event, TimePoint now, Actions& actions) {
   }
   tasks.add_returned(held.task, event.lease, event.worker);
   lose_lease(event.lease.job, held.task, actions);
-  if (is_open(held.job->status)) reopen(event.lease.job, *held.job, makers, actions);
+  if (is_open(held.job->status)) reopen({event.lease.job, makers}, *held.job, actions);
 }
 
 void Scheduler::on(const HeldPublished& event, TimePoint now, Actions& actions) {
@@ -244,8 +244,8 @@ void Scheduler::replay(Job& job, const JobAdded& event, Actions& actions) {
        job.tasks.restore(event.completions, event.lost_spares, blobs_, event.plan))
     needed.tasks.push_back(job.tasks.graph().key(task));
   if (!needed.tasks.empty()) actions.push_back(std::move(needed));
-  reopen(event.job, job, event.lost, actions);
-  reopen(event.job, job, job.tasks.held_by_strangers(), actions);
+  reopen({event.job, event.lost}, job, actions);
+  reopen({event.job, job.tasks.held_by_strangers(), "what workers held"}, job, actions);
   for (const Failure& failure : event.failures) {
     const auto task = job.tasks.graph().find(failure.lease.task);
     if (!task) continue;
@@ -257,10 +257,8 @@ void Scheduler::replay(Job& job, const JobAdded& event, Actions& actions) {
 }
 
 /// Opens done tasks again whose outputs are gone, and what they need.
-void Scheduler::reopen(const Digest& digest, Job& job, const std::vector<TaskKey>& tasks,
-                       Actions& actions) {
-  RecordReopened record{digest, {}};
-  for (const TaskKey& key : tasks) {
+void Scheduler::reopen(RecordReopened record, Job& job, Actions& actions) {
+  for (const TaskKey& key : std::exchange(record.tasks, {})) {
     const std::optional<TaskIndex> task = job.tasks.graph().find(key);
     if (!task) continue;
     for (const TaskIndex again : job.tasks.reopen(*task, blobs_))
@@ -290,7 +288,7 @@ void Scheduler::fail_attempt(const Held& held, Failure failure, TimePoint now, A
   for (const TaskIndex input : job.tasks.graph().inputs(failure.lease.task)) {
     if (job.tasks.is_held(input)) bound.push_back(job.tasks.graph().key(input));
   }
-  reopen(digest, job, bound, actions);
+  reopen({digest, bound, "what a worker held that failed"}, job, actions);
 }
 
 /// Ends a leased task, whose lease is already dropped, as failed; and the job when that is one

@@ -139,7 +139,7 @@ class Scheduler {
   Job* find(const Digest& job);
   Rank rank(const Job& job) const;
   void replay(Job& job, const JobAdded& event, Actions& actions);
-  void reopen(const Digest& digest, Job& job, const std::vector<TaskKey>& tasks, Actions& actions);
+  void reopen(RecordReopened record, Job& job, Actions& actions);
   bool compare_results(const TaskCompleted& event, const std::vector<BlobRef>& expected,
                        const std::vector<BlobRef>& reported, Actions& actions);
   void fail_attempt(const Held& held, Failure failure, TimePoint now, Actions& actions);

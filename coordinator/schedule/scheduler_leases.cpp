@@ -160,7 +160,8 @@ void Scheduler::remove_worker(const std::string& worker, bool lost, Actions& act
 /// What the worker held in memory is gone: it is made again from the newest checkpoint.
 void Scheduler::lose_held(const std::string& worker, Actions& actions) {
   for (auto& [digest, job] : jobs_) {
-    if (is_open(job.status)) reopen(digest, job, job.tasks.held_by(worker), actions);
+    if (is_open(job.status))
+      reopen({digest, job.tasks.held_by(worker), "what worker " + worker + " held"}, job, actions);
   }
 }
 
@@ -194,7 +195,7 @@ void Scheduler::serve(TimePoint now, Actions& actions) {
 void Scheduler::ask_for_states(const std::string& worker, TimePoint now, Actions& actions) {
   for (const auto& [rank, digest] : running_) {
     const Job& job = jobs_.at(digest);
-    if (job.tasks.num_held() == 0 || rests(job, worker, now)) continue;
+    if (!job.tasks.has_held() || rests(job, worker, now)) continue;
     std::map<std::string, std::set<Digest>> wanted;  // by holder
     int num_tasks = 0;
     for (const TaskIndex task : job.tasks.ready()) {

@@ -56,6 +56,8 @@ JobSummary summarize(const Digest& digest, const Scheduler::Job& job) {
   summary.frames_done = progress.frames_done;
   summary.state_bytes = progress.state_bytes;
   summary.state_pixels = progress.state_pixels;
+  summary.states_held = is_open(job.status) ? job.tasks.num_held() : 0;
+  summary.checkpoint_every = job.spec.state.checkpoint_every;
   summary.stats = progress.stats;
   return summary;
 }

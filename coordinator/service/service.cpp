@@ -302,8 +302,8 @@ Status Service::perform(const RecordFailure& action) {
 }
 
 Status Service::perform(const RecordReopened& action) {
-  spdlog::warn("job {}: {} finished tasks are done again, since something of them is gone",
-               action.job.short_hex(), action.tasks.size());
+  spdlog::warn("job {}: {} finished tasks are done again, since {} is gone", action.job.short_hex(),
+               action.tasks.size(), action.gone);
   return journal_.record_reopened(action.job, action.tasks);
 }
 

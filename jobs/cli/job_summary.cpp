@@ -121,6 +121,12 @@ std::string job_statistics(const JobSummary& job) {
                     static_cast<double>(job.state_bytes) / static_cast<double>(job.state_pixels),
                     bytes_text(job.state_bytes), 100 * s.seconds_state / s.cpu_seconds);
   }
+  if (job.states_held > 0)
+    text += fmt::format(
+        "held       {} states in the memory of workers; one that dies costs at most {} frames of "
+        "its "
+        "tiles\n",
+        job.states_held, 2 * job.checkpoint_every);
   text += s.cpu_seconds < 10 ? fmt::format("cpu        {:.1f} s\n", s.cpu_seconds)
                              : fmt::format("cpu        {}\n", duration_text(s.cpu_seconds));
   if (job.attempts_lost > 0)
@@ -203,6 +209,7 @@ ordered_json summary_json(const JobSummary& job) {
                          {"attemptsLost", job.attempts_lost},
                          {"stateBytes", job.state_bytes},
                          {"statePixels", job.state_pixels},
+                         {"statesHeld", job.states_held},
                          {"stats",
                           {{"pixels", s.pixels},
                            {"raysPrimary", s.rays_primary},

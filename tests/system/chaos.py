@@ -76,7 +76,7 @@ def judge(programs, chaos, farm, expected):
     check("BUG" not in log, "the coordinator has found a bug")
     num_tasks = witness.check_one_result_a_task(seen)
     witness.check_nothing_revoked(seen, chaos.proxy.returns(), chaos.proxy.struck_ms(), chaos.ended_jobs)
-    again = witness.check_repeated(seen, log, chaos.struck, NUM_WORKERS, chaos.num_harmed)
+    again = witness.check_repeated(seen, log, chaos.struck, NUM_WORKERS, len(chaos.jobs), chaos.num_harmed)
     check_leftovers(farm)
     return (num_tasks, *again)
 

@@ -138,15 +138,20 @@ def count_repeated(seen):
     return {task: len(made) - 1 for task, made in attempts.items() if len(made) > 1}
 
 
-def check_repeated(seen, log, struck, num_workers, num_harmed):
+def check_repeated(seen, log, struck, num_workers, num_jobs, num_harmed):
     """Nothing is done again that no fault explains. struck: how often each kind of fault struck; num_harmed: files that
     were harmed. Returns (how many tasks were done again, how many the faults explain)."""
-    reopenings = [int(n) for n in re.findall(r"(\d+) finished tasks are done again", log)]
-    check(len(reopenings) <= num_harmed,
-          f"finished tasks were opened again {len(reopenings)} times, but only {num_harmed} files were harmed")
-    leases = LEASES_OF_WORKER * sum(count for what, count in struck.items() if "worker" in what or "message" in what)
-    leases += num_workers * LEASES_OF_WORKER * sum(count for what, count in struck.items()
-                                                   if "coordinator" in what or "power" in what)
+    opened = re.findall(r"(\d+) finished tasks are done again, since (what|something)", log)
+    reopenings = [int(count) for count, _ in opened]
+    files = sum(what == "something" for _, what in opened)
+    check(files <= num_harmed,
+          f"finished tasks were opened again {files} times, but only {num_harmed} files were harmed")
+    of_workers = sum(count for what, count in struck.items() if "worker" in what or "message" in what)
+    of_all = sum(count for what, count in struck.items() if "coordinator" in what or "power" in what)
+    lost = of_workers + num_workers * of_all
+    check(len(opened) - files <= num_jobs * lost,
+          f"held states were lost {len(opened) - files} times, but only {lost} workers were")
+    leases = LEASES_OF_WORKER * lost
     explained = (sum(reopenings) + log.count("the task is done again") + len(re.findall(r"attempt \d+ on \S+ failed", log))
                  + leases)
     repeated = count_repeated(seen)

@@ -45,8 +45,9 @@ RenderStats numbered_stats(int factor) {
 }
 
 const RenderStats kStats = numbered_stats(1);
-const JobSummary kSummary{{1, 2}, "name", "owner", "/out", JobStatus::failed, -3, 1, 2, 3, 4, 5, 6,
-                          7,      8,      9,       kStats};
+const JobSummary kSummary{
+    {1, 2}, "name", "owner", "/out", JobStatus::failed, -3, 1, 2, 3, 4, 5, 6, 7, 8,
+    9,      10,     11,      kStats};
 
 /// One of each, in the order of the type codes, no member left at its default.
 const std::vector<Message>& examples() {
