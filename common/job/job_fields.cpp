@@ -129,8 +129,7 @@ void fields(JobArchive& a, SamplingSpec& sampling, const SceneSpec& scene) {
   a.choice("method", sampling.method, method_names());
   count_fields(a, sampling);
   a.boolean("misCompensation", sampling.mis_compensation);
-  if (sampling.mis_compensation && sampling.method != Method::mis &&
-      sampling.method != Method::automatic) {
+  if (sampling.mis_compensation && !traits(sampling.method).compensates) {
     a.fault("misCompensation",
             "false unless sampling.method is mis or auto, as what is dim is then left to the "
             "BRDF's samples",

@@ -47,6 +47,7 @@ constexpr MethodTraits kTraits[] = {
     {.name = "mis",
      .keeps_samples = true,
      .draws_anew = true,
+     .compensates = true,
      .light =
          [](const SamplingSpec& s) {
            return LightUse{.num_taken =
@@ -61,6 +62,7 @@ constexpr MethodTraits kTraits[] = {
     {.name = "sequential",
      .carried = Carried::samples,
      .keeps_samples = true,
+     .moves_samples = true,
      .light = of_sequential,
      .most_rays = as_many_as_samples},
     {.name = "pool",
@@ -80,7 +82,11 @@ constexpr MethodTraits kTraits[] = {
      .light = by_candidates,
      .most_rays = as_many_as_samples},
     // Settled before anything is rendered; until then its numbers are those of the usual methods.
-    {.name = "auto", .keeps_samples = true, .light = no_light, .most_rays = as_many_as_samples},
+    {.name = "auto",
+     .keeps_samples = true,
+     .compensates = true,
+     .light = no_light,
+     .most_rays = as_many_as_samples},
 };
 static_assert(std::size(kTraits) == static_cast<std::size_t>(Method::automatic) + 1);
 

@@ -50,6 +50,10 @@ struct MethodTraits {
   bool draws_anew = false;
   /// Pixels may weigh the samples of SamplingSpec::num_neighbors others.
   bool asks_neighbors = false;
+  /// Markov chains move and resample its samples.
+  bool moves_samples = false;
+  /// SamplingSpec::mis_compensation may leave dim light to the BRDF's samples.
+  bool compensates = false;
   /// Why the second pass can't follow; empty: it can.
   std::string_view no_second_pass = {};
   LightUse (*light)(const SamplingSpec&) = nullptr;

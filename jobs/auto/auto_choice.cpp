@@ -106,7 +106,8 @@ std::vector<AutoCandidate> auto_candidates(const JobSpec& job) {
       candidate.sampling.num_particles = n;
       candidate.sampling.num_candidates = std::max(num_candidates, n);
       candidate.sampling.num_distributions = num_distributions;
-      candidate.sampling.mis_compensation = job.sampling.mis_compensation && method == Method::mis;
+      candidate.sampling.mis_compensation =
+          job.sampling.mis_compensation && traits(method).compensates;
       candidate.sampling.target_error.reset();
       candidate.sampling.time_budget.reset();
       if (can_take(candidate, n)) candidates.push_back(std::move(candidate));

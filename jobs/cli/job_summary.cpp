@@ -123,9 +123,8 @@ std::string job_statistics(const JobSummary& job) {
   }
   if (job.states_held > 0)
     text += fmt::format(
-        "held       {} states in the memory of workers; one that dies costs at most {} frames of "
-        "its "
-        "tiles\n",
+        "held       {} states in the memory of workers; each costs at most {} frames, should one "
+        "die\n",
         job.states_held, 2 * job.checkpoint_every);
   text += s.cpu_seconds < 10 ? fmt::format("cpu        {:.1f} s\n", s.cpu_seconds)
                              : fmt::format("cpu        {}\n", duration_text(s.cpu_seconds));

@@ -116,7 +116,7 @@ std::string_view why_empty(Aov aov, const JobSpec& job) {
     case Aov::acceptance_local:
     case Aov::acceptance_independent:
     case Aov::resampled:
-      return method == Method::sequential ? "" : "only `sequential` fills it";
+      return traits(method).moves_samples ? "" : "only `sequential` fills it";
     case Aov::variance:
       if (traits(method).tells_variance()) return "";
       if (carries_state(job)) return "samples that are carried tell nothing of their error";

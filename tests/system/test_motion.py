@@ -72,6 +72,36 @@ def a_killed_worker(programs, folder):
     check_equal(got, expected, "result after the death of a worker")
 
 
+def held_states(programs, folder):
+    """Between checkpoints states stay in the worker that made them. One that is drained publishes them, and nothing is
+    done again; of one that dies they are made again; one that comes later is given what it needs. The frames are the same."""
+    changes = {"image": {"tileSize": 32, "sites": 4}, "state": {"carry": True, "checkpointEvery": 12, "keep": "last"},
+               "sampling": {"numParticles": 16, "numCandidates": 512, "numDistributions": 24}}
+
+    def make(name):
+        return write_job(folder / name / "job.json", {**moving_job(folder / name, **changes), "frames": "1-10"})
+
+    programs.render(make("quiet"), folder / "quiet" / "work")
+    expected = programs.pixels(folder / "quiet" / "frames")
+    for name, end in [("drained", "terminate"), ("killed", "kill"), ("joined", None)]:
+        with Farm(programs, folder / name / "farm") as farm:
+            farm.start_coordinator()
+            first = farm.start_worker()
+            job = farm.submit(make(name))
+            wait_until(lambda: farm.show(job)["framesDone"] >= 2 and farm.show(job)["statesHeld"] > 0, "states are held")
+            check(farm.show(job)["status"] == "running", "the job ended before anything could happen")
+            if end:
+                getattr(first, end)()
+            if end == "terminate":
+                first.wait()
+                check_equal(farm.show(job)["statesHeld"], 0, "states that a drained worker holds")
+            farm.start_worker()
+            farm.wait_for(job)
+            opened = "finished tasks are done again, since what worker" in farm.coordinator.log()
+        check_equal(programs.pixels(folder / name / "frames"), expected, f"pixels where the first worker was {name}")
+        check_equal(opened, end == "kill", f"tasks were opened again where the first worker was {name}")
+
+
 def a_replay_makes_the_same_tile(programs, folder):
     """The command that replays a tile renders all of the past that the tile depends on."""
     path = write_job(folder / "job.json", moving_job(folder, image={"tileSize": 32}, output={"pixelType": "float"}))
@@ -97,4 +127,4 @@ def the_range_of_motion_is_measured(programs, folder):
 
 
 if __name__ == "__main__":
-    run_tests([any_tiling_and_workers, a_killed_worker, a_replay_makes_the_same_tile, the_range_of_motion_is_measured])
+    run_tests([any_tiling_and_workers, a_killed_worker, held_states, a_replay_makes_the_same_tile, the_range_of_motion_is_measured])
