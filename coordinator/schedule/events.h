@@ -166,13 +166,20 @@ struct InputsLost {
   LeaseId lease;
   std::vector<BlobRef> inputs;
 };
+/// The worker will not do the task: nobody's failure. unseen: what it cannot see of the job; none
+/// of its tasks are granted to it for a while. Empty: it has no time left.
+struct LeaseReturned {
+  std::string worker;
+  LeaseId lease;
+  std::string unseen = {};
+};
 /// Time has passed: who was silent for too long?
 struct ClockTicked {};
 
 using Event =
     std::variant<JobAdded, JobCancelled, JobSuperseded, JobPaused, JobResumed, JobForgotten,
                  WorkerJoined, WorkerAlive, WorkerLeft, WorkRequested, TaskCompleted, AttemptFailed,
-                 ResultMissing, SpaceLacking, InputsLost, ClockTicked>;
+                 ResultMissing, SpaceLacking, InputsLost, LeaseReturned, ClockTicked>;
 
 // ---- actions ------------------------------------------------------------------------------------
 /// Make it durable; nothing that comes after in the same or a later step may be sent or removed
@@ -200,6 +207,7 @@ struct GrantLease {
   LeaseId lease;
   std::vector<BlobRef> inputs;
   FrameSpan frames = {};
+  double expected_seconds = 0;  ///< CPU time, as the longest of late; 0: not known
 };
 struct RevokeLease {
   std::string worker;

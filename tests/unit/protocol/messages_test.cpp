@@ -58,12 +58,12 @@ const std::vector<Message>& examples() {
       TaskFailed{kLease, "no", true, true},
       JobDocumentRequest{{1, 2}},
       WorkerGoodbye{},
-      WorkerWelcome{3, 500, "/store"},
-      LeaseGrant{kLease, {kBlob}, 4, 5},
+      WorkerWelcome{3, 500, "/store", "mark"},
+      LeaseGrant{kLease, {kBlob}, 4, 5, 1.5},
       LeaseRevoke{kLease},
       NoWork{250},
       HelloAgain{},
-      JobDocument{{3, 4}, "{}"},
+      JobDocument{{3, 4}, "{}", "mark"},
       Shutdown{},
       SubmitJob{std::string("a\0b", 3)},
       ListJobs{true},
@@ -71,7 +71,7 @@ const std::vector<Message>& examples() {
       CancelJob{"def"},
       StopCoordinator{},
       JobAccepted{{5, 6}, true, "all is kept"},
-      JobList{{kSummary}, {{"w", "h", 1, 2, 3}}, 4},
+      JobList{{kSummary}, {{"w", "h", 1, 2, 3}}, 4, 5, 6.5},
       JobDetail{kSummary, {1, 2, 3}, {"one", ""}, {{3, -1, kStats.sampling}}, "space", "on"},
       Refused{4, "because"},
       PauseJob{"abc"},
@@ -80,6 +80,7 @@ const std::vector<Message>& examples() {
       Drain{},
       ReportReceived{kLease},
       DeleteJob{"def"},
+      LeaseReturn{kLease, "/shows"},
   };
   return messages;
 }
@@ -111,7 +112,7 @@ TEST(Messages, MembersArriveWhereTheyWereSent) {
 
 TEST(Messages, BytesAreThoseOfTheGrammar) {
   const std::vector<Bytes> frames = encode_message(NoWork{0x01020304});
-  EXPECT_EQ(frames[0], text(std::string_view("BATON\x07\x00", 7)));
+  EXPECT_EQ(frames[0], text(std::string_view("BATON\x08\x00", 7)));
   EXPECT_EQ(frames[1], text(std::string_view("\x0a\x00", 2)));
   EXPECT_EQ(frames[2], text("\x04\x03\x02\x01"));
 }
@@ -156,7 +157,7 @@ TEST(Messages, AnotherVersionIsAVersionError) {
   const Result<Message> decoded = decode_message(frames);
   ASSERT_FALSE(decoded.ok());
   EXPECT_EQ(decoded.error().kind, ErrorKind::version);
-  EXPECT_THAT(decoded.error().message, HasSubstr("version 9, this program speaks 7"));
+  EXPECT_THAT(decoded.error().message, HasSubstr("version 9, this program speaks 8"));
 }
 
 TEST(Messages, OtherProtocolsAreRefused) {
