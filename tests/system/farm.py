@@ -266,11 +266,11 @@ class Farm:
         wait_until(lambda: self.baton("job", "list", expect=None, deadline_s=20).returncode == OK,
                    "the coordinator answers")
 
-    def start_worker(self, threads=1, name=None):
-        """Starts one more worker; returns it."""
+    def start_worker(self, threads=1, name=None, extra=()):
+        """Starts one more worker; returns it. extra: more arguments."""
         name = name or f"worker{len(self.workers)}"
         command = [self.programs.path("baton-worker"), "--coordinator", self.worker_endpoint or self.endpoint,
-                   "--threads", str(threads), "--name", name]
+                   "--threads", str(threads), "--name", name, *map(str, extra)]
         self.workers.append(Process(command, self.folder / f"{name}.log", self.environment))
         return self.workers[-1]
 
