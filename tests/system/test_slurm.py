@@ -2,10 +2,12 @@
 """Pilots in a real Slurm: as many as there is work, replaced when they are lost, and the same bytes as without all that."""
 
 import json
+import os
 import shutil
 import time
+from pathlib import Path
 
-from farm import OK, Process, check, check_equal, make_job, run_tests, wait_until, write_job
+from farm import OK, Farm, Process, check, check_equal, make_job, run_tests, wait_until, write_job
 from slurm_cluster import Cluster
 
 NUM_FRAMES = 12
@@ -155,6 +157,28 @@ def a_job_of_its_own_is_rendered_and_resumed(programs, folder):
         check("keys/admin.key" in again.log(), "the command says how to look at the farm")
 
 
+def the_recipes_do_without_the_command(programs, folder):
+    """docker/slurm: a farm inside one allocation, and workers for a coordinator outside."""
+    recipes = Path(__file__).resolve().parents[2] / "docker" / "slurm"
+    with Cluster(folder / "slurm", nodes=2) as cluster:
+        farm = SlurmFarm(programs, cluster, folder, "1", "10")
+        cluster.environment["PATH"] = f"{programs.bin.resolve()}:{os.environ['PATH']}"
+        cluster.run("sbatch", "--nodes=2", "--time=10", f"--output={folder}/inside.log", recipes / "farm.sbatch",
+                    farm.job_path, folder / "inside")
+        wait_until(lambda: not cluster.pilots(), "the allocation has ended")
+        log = (folder / "inside.log").read_text(encoding="utf-8")
+        check_equal(programs.pixels(farm.frames), farm.expected, f"frames of a farm in one allocation\n{log}")
+        check("done" in log and log.count("joined") == 2, log)
+
+        shutil.rmtree(farm.frames)
+        with Farm(programs, folder / "outside") as outside:
+            outside.start_coordinator()
+            cluster.environment["BATON_COORDINATOR"] = outside.endpoint
+            cluster.run("sbatch", "--array=1-2", "--time=10", f"--output={folder}/worker-%a.log", recipes / "workers.sbatch")
+            outside.wait_for(outside.submit(farm.job_path))
+            check_equal(programs.pixels(farm.frames), farm.expected, "frames by workers of the recipe")
+
+
 # ---- long ---------------------------------------------------------------------------------------------------
 
 
@@ -194,4 +218,4 @@ def what_slurm_finds_out_late(programs, folder):
 
 if __name__ == "__main__":
     run_tests([pilots_follow_the_work_and_are_replaced, a_pilot_ends_with_its_time,
-               a_job_of_its_own_is_rendered_and_resumed], long_tests=[what_slurm_finds_out_late])
+               a_job_of_its_own_is_rendered_and_resumed, the_recipes_do_without_the_command], long_tests=[what_slurm_finds_out_late])
