@@ -4,7 +4,9 @@
 
 #include <signal.h>
 
+#include <algorithm>
 #include <atomic>
+#include <chrono>
 #include <cstdio>
 #include <thread>
 
@@ -15,16 +17,60 @@
 
 namespace {
 
-/// Set by SIGTERM and SIGINT, read by the control thread.
-std::atomic<bool> g_drain{false};
+/// SIGTERMs and SIGINTs so far, read by the control thread.
+std::atomic<int> g_signals{0};
 
-/// The first signal drains, a second one of the same kind ends the process at once.
+/// The first signal drains, the second gives back what is not finished, the third ends the process
+/// at once.
 void install_drain_handler() {
   struct sigaction action {};
-  action.sa_handler = [](int) { g_drain = true; };
-  action.sa_flags = static_cast<int>(SA_RESETHAND);
+  action.sa_handler = [](int number) {
+    if (++g_signals == 2) ::signal(number, SIG_DFL);
+  };
   ::sigaction(SIGTERM, &action, nullptr);
   ::sigaction(SIGINT, &action, nullptr);
+}
+
+/// What a worker must be told on a machine that is lent to it.
+struct PilotOptions {
+  std::int64_t end_at = 0, idle_exit_s = 0, drain_s = 0, memory_mib = 0;
+  std::vector<std::string> maps;
+};
+
+void add_pilot_options(CLI::App& app, PilotOptions& pilot) {
+  app.add_option("--end-at", pilot.end_at,
+                 "when it must be gone, in seconds since 1970: takes nothing that it cannot finish "
+                 "before, gives back what it has not finished");
+  app.add_option("--idle-exit", pilot.idle_exit_s, "ends after so many seconds without a task")
+      ->check(CLI::Range(0, 1000000));
+  app.add_option(
+         "--drain", pilot.drain_s,
+         "seconds that it goes on with its tasks when it is told to end, by SIGTERM or `baton "
+         "worker drain`; default: to their end")
+      ->check(CLI::Range(0, 1000000));
+  app.add_option(
+         "--memory", pilot.memory_mib,
+         "MiB of this machine that it may use; a quarter of them, at most 1024, keep decoded "
+         "states")
+      ->check(CLI::Range(0, 1 << 30));
+  app.add_option("--map", pilot.maps,
+                 "FROM=TO: the folder FROM of the others is TO here; may be repeated");
+}
+
+baton::Status take_pilot_options(const PilotOptions& pilot, baton::WorkerOptions& worker) {
+  if (pilot.end_at > 0)
+    worker.end_at = std::chrono::system_clock::time_point(std::chrono::seconds(pilot.end_at));
+  worker.idle_exit = std::chrono::seconds(pilot.idle_exit_s);
+  worker.drain = std::chrono::seconds(pilot.drain_s);
+  std::uint64_t& state_bytes = worker.machine.max_state_bytes;
+  if (pilot.memory_mib > 0) {
+    state_bytes = std::min(state_bytes, static_cast<std::uint64_t>(pilot.memory_mib) << 18);
+  }
+  for (const std::string& text : pilot.maps) {
+    BATON_ASSIGN(baton::PathMap map, baton::parse_path_map(text));
+    worker.machine.maps.push_back(std::move(map));
+  }
+  return {};
 }
 
 int replay(const baton::ReplayOptions& options) {
@@ -65,8 +111,11 @@ int main(int argc, char** argv) {
   bool insecure = false;
   app.add_option("--key", key_file, "worker.key of `baton key create`")->envname("BATON_KEY");
   app.add_flag("--insecure", insecure, "connect to another machine without a key");
-  app.add_option("--root", worker.roots,
+  app.add_option("--root", worker.machine.roots,
                  "folder that jobs may read from and write to, may be repeated; default: all");
+
+  PilotOptions pilot;
+  add_pilot_options(app, pilot);
 
   baton::ReplayOptions replay_options;
   std::vector<int> pixel;
@@ -99,11 +148,15 @@ int main(int argc, char** argv) {
   }
   install_drain_handler();
   worker.give_up = std::chrono::seconds(give_up_s);
+  if (const baton::Status taken = take_pilot_options(pilot, worker); !taken) {
+    spdlog::error("{}", taken.error().message);
+    return static_cast<int>(baton::exit_code_of(taken.error().kind));
+  }
   baton::Result<baton::ClientAccess> access = baton::client_access(key_file, insecure);
   if (!access) {
     spdlog::error("{}", access.error().message);
     return static_cast<int>(baton::exit_code_of(access.error().kind));
   }
   worker.access = std::move(access).value();
-  return static_cast<int>(baton::run_worker(worker, g_drain));
+  return static_cast<int>(baton::run_worker(worker, g_signals));
 }

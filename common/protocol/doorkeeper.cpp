@@ -82,11 +82,16 @@ HandshakeWatch::~HandshakeWatch() { ::zmq_socket_monitor(watched_.handle(), null
 void HandshakeWatch::look() {
   while (true) {
     const std::vector<std::string> event = receive_all(events_);
-    if (event.empty() || event[0].size() < sizeof(std::uint16_t)) return;
     std::uint16_t number = 0;
+    std::uint32_t reason = 0;
+    if (event.empty() || event[0].size() < sizeof(number) + sizeof(reason)) return;
     std::memcpy(&number, event[0].data(), sizeof(number));
-    const Failure failure =
-        number == ZMQ_EVENT_HANDSHAKE_FAILED_AUTH ? Failure::denied : Failure::broken_off;
+    std::memcpy(&reason, event[0].data() + sizeof(number), sizeof(reason));
+    const bool is_replayed = number == ZMQ_EVENT_HANDSHAKE_FAILED_PROTOCOL &&
+                             reason == ZMQ_PROTOCOL_ERROR_ZMTP_INVALID_SEQUENCE;
+    const Failure failure = number == ZMQ_EVENT_HANDSHAKE_FAILED_AUTH ? Failure::denied
+                            : is_replayed                             ? Failure::replayed
+                                                                      : Failure::broken_off;
     failure_ = std::max(failure_.value_or(failure), failure);
   }
 }

@@ -33,8 +33,9 @@ class Doorkeeper {
 class HandshakeWatch {
  public:
   /// broken_off: by the other side, without a word: one has a key that the other cannot read, or
-  /// only one has any. denied: the key is not known.
-  enum class Failure { broken_off, denied };
+  /// only one has any. replayed: a message came again, or out of turn. denied: the key is not
+  /// known.
+  enum class Failure { broken_off, replayed, denied };
 
   HandshakeWatch(zmq::context_t& context, zmq::socket_t& watched);
   HandshakeWatch(const HandshakeWatch&) = delete;

@@ -68,6 +68,16 @@ struct TaskFailed {
     a(lease, message, permanent, no_space);
   }
 };
+/// The worker will not do it: nobody's failure, and no loss.
+struct LeaseReturn {
+  LeaseId lease;
+  std::string unseen =
+      {};  ///< the folder of the job that it cannot see; empty: it has no time left
+  template <class A>
+  void fields(A& a) {
+    a(lease, unseen);
+  }
+};
 struct JobDocumentRequest {
   Digest job;
   template <class A>
@@ -96,9 +106,10 @@ struct WorkerWelcome {
   std::uint32_t epoch = 0;
   std::int32_t heartbeat_ms = 1000;
   std::string store_directory;  ///< shared by coordinator and workers
+  std::string token = {};       ///< stands in its file `token`: whoever reads it sees the folder
   template <class A>
   void fields(A& a) {
-    a(epoch, heartbeat_ms, store_directory);
+    a(epoch, heartbeat_ms, store_directory, token);
   }
 };
 struct LeaseGrant {
@@ -107,9 +118,10 @@ struct LeaseGrant {
   std::int32_t first_frame = 0, last_frame = 0;  ///< of the task, 0-based, inclusive
   bool may_hold = false;         ///< the task's state may stay in the worker's memory
   std::int32_t states_from = 0;  ///< states of earlier frames (0-based) are needed by no task
+  double expected_seconds = 0;   ///< of CPU time, as the longest of late; 0: not known
   template <class A>
   void fields(A& a) {
-    a(lease, inputs, first_frame, last_frame, may_hold, states_from);
+    a(lease, inputs, first_frame, last_frame, may_hold, states_from, expected_seconds);
   }
 };
 /// Others wait for these states, which the worker holds: they should go into the store.
@@ -152,9 +164,11 @@ struct HelloAgain {
 struct JobDocument {
   Digest job;
   std::string json;  ///< resolved: absolute paths, asset digests
+  /// Stands in its output folder (output_token_file); empty: that could not be marked.
+  std::string token = {};
   template <class A>
   void fields(A& a) {
-    a(job, json);
+    a(job, json, token);
   }
 };
 /// Finish what runs, take nothing new, end.
@@ -277,10 +291,12 @@ struct JobAccepted {
 struct JobList {
   std::vector<JobSummary> jobs;
   std::vector<WorkerSummary> workers;
-  std::uint64_t num_ended = 0;  ///< jobs that have ended, listed or not
+  std::uint64_t num_ended = 0;    ///< jobs that have ended, listed or not
+  std::uint64_t tasks_ready = 0;  ///< of running jobs, that a worker may have at once
+  double task_seconds = 0;        ///< CPU time of their longest tasks of late; 0: not known
   template <class A>
   void fields(A& a) {
-    a(jobs, workers, num_ended);
+    a(jobs, workers, num_ended, tasks_ready, task_seconds);
   }
 };
 struct JobDetail {
@@ -311,7 +327,7 @@ using Message =
                  WorkerGoodbye, WorkerWelcome, LeaseGrant, LeaseRevoke, NoWork, HelloAgain,
                  JobDocument, Shutdown, SubmitJob, ListJobs, ShowJob, CancelJob, StopCoordinator,
                  JobAccepted, JobList, JobDetail, Refused, PauseJob, ResumeJob, DrainWorker, Drain,
-                 ReportReceived, DeleteJob, StatesPublished, RequestStates>;
+                 ReportReceived, DeleteJob, LeaseReturn, StatesPublished, RequestStates>;
 
 /// The frames of one message: [protocol name and version][type][body].
 std::vector<Bytes> encode_message(const Message& message);

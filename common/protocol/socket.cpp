@@ -226,6 +226,8 @@ std::optional<Error> Socket::take_refusal() {
   const bool denied = *failure == HandshakeWatch::Failure::denied;
   if (impl_->is_server) {
     if (denied) return std::nullopt;  // the doorkeeper has told
+    if (*failure == HandshakeWatch::Failure::replayed)
+      return Error{ErrorKind::usage, "a connection: a message came a second time, or out of turn"};
     return Error{ErrorKind::usage, "a connection: it has no key, or not one for this coordinator"};
   }
   if (denied)

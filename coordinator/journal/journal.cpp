@@ -157,13 +157,19 @@ Result<std::vector<Digest>> Journal::jobs() {
 
 Status Journal::for_each_completion(const Digest& job,
                                     const std::function<Status(const Completion&)>& visit) {
+  BATON_TRY(visit_recorded(job, visit));
+  return visit_archived(job, visit);
+}
+
+Status Journal::visit_recorded(const Digest& job,
+                               const std::function<Status(const Completion&)>& visit) {
   BATON_ASSIGN(SqlStatement query,
                database_.prepare("SELECT kind, step, tile, outputs, stats, frames FROM completions "
                                  "WHERE job = ? ORDER BY position"));
   query.bind(job.hex());
   while (true) {
     BATON_ASSIGN(const bool row, query.step());
-    if (!row) return visit_archived(job, visit);
+    if (!row) return {};
     BATON_ASSIGN(const Completion completion, read_completion(query));
     BATON_TRY(visit(completion));
   }

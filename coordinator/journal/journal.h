@@ -117,6 +117,7 @@ class Journal {
   Status count_start();
   Result<Failure> read_failure(const SqlStatement& row) const;
   Result<Completion> read_completion(const SqlStatement& row) const;
+  Status visit_recorded(const Digest& job, const std::function<Status(const Completion&)>& visit);
   Status visit_archived(const Digest& job, const std::function<Status(const Completion&)>& visit);
   Result<std::vector<Digest>> read_digests(SqlStatement& query) const;
   Result<SqlStatement*> read(std::string_view sql);

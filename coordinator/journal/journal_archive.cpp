@@ -56,7 +56,8 @@ Status Journal::archive_job(const Digest& job, const Bytes& summary, const Bytes
         .bind(ByteView(packed))
         .run();
   };
-  BATON_TRY(for_each_completion(job, [&](const Completion& c) -> Status {
+  // Not those that the archive has: they are the ones that are written here.
+  BATON_TRY(visit_recorded(job, [&](const Completion& c) -> Status {
     piece.completions.push_back({c.task, c.outputs, c.stats, c.frames});
     return piece.completions.size() < kCompletionsPerPiece ? Status() : store();
   }));

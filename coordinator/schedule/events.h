@@ -173,13 +173,20 @@ struct HeldPublished {
   Digest job;
   std::vector<PublishedState> states;
 };
+/// The worker will not do the task: nobody's failure. unseen: what it cannot see of the job; none
+/// of its tasks are granted to it for a while. Empty: it has no time left.
+struct LeaseReturned {
+  std::string worker;
+  LeaseId lease;
+  std::string unseen = {};
+};
 /// Time has passed: who was silent for too long?
 struct ClockTicked {};
 
-using Event =
-    std::variant<JobAdded, JobCancelled, JobSuperseded, JobPaused, JobResumed, JobForgotten,
-                 WorkerJoined, WorkerAlive, WorkerLeft, WorkRequested, TaskCompleted, AttemptFailed,
-                 ResultMissing, SpaceLacking, InputsLost, HeldPublished, ClockTicked>;
+using Event = std::variant<JobAdded, JobCancelled, JobSuperseded, JobPaused, JobResumed,
+                           JobForgotten, WorkerJoined, WorkerAlive, WorkerLeft, WorkRequested,
+                           TaskCompleted, AttemptFailed, ResultMissing, SpaceLacking, InputsLost,
+                           LeaseReturned, HeldPublished, ClockTicked>;
 
 // ---- actions ------------------------------------------------------------------------------------
 /// Make it durable; nothing that comes after in the same or a later step may be sent or removed
@@ -217,6 +224,7 @@ struct GrantLease {
   bool may_hold = false;  ///< the state that it makes may stay in the worker's memory
   /// States of earlier frames (0-based) are needed by no task.
   std::int32_t states_from = 0;
+  double expected_seconds = 0;  ///< CPU time, as the longest of late; 0: not known
 };
 /// Somebody waits for states that the worker holds: it should put them into the store.
 struct AskForStates {

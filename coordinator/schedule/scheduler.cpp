@@ -8,6 +8,15 @@
 #include "common/job/estimate.h"
 
 namespace baton {
+namespace {
+
+/// Follows the longest of the last values: up at once, down by a tenth each time.
+void follow_longest(double& longest, double value) {
+  longest = std::max(value, longest + (value - longest) / 10);
+}
+
+}  // namespace
+
 Scheduler::Scheduler(std::uint32_t epoch, std::chrono::milliseconds silence_limit)
     : epoch_(epoch), silence_limit_(silence_limit) {}
 
@@ -144,6 +153,8 @@ void Scheduler::on(const TaskCompleted& event, TimePoint now, Actions& actions) 
       compare_results(event, held.job->tasks.former_outputs(held.task), outputs, actions);
   Completion completion{event.lease.task, std::move(outputs), event.stats, event.frames};
   held.job->tasks.complete(held.task, completion, event.worker, blobs_);
+  follow_longest(held.job->longest_seconds.at(static_cast<std::size_t>(event.lease.task.kind)),
+                 event.stats.cpu_seconds);
   if (held.job->status == JobStatus::running) held.job->waits.clear();
   drop_lease(event.lease.job, held.task);
   actions.push_back(RecordCompletion{event.lease.job, std::move(completion)});
@@ -189,11 +200,17 @@ void Scheduler::on(const SpaceLacking& event, TimePoint now, Actions&) {
   if (!touch(event.worker, now)) return;
   const Held held = hold(event.worker, event.lease, now);
   if (!held.job) return;
-  drop_lease(event.lease.job, held.task);
-  held.job->tasks.add_returned(held.task, event.lease, event.worker);
-  held.job->tasks.give_back(held.task);
+  return_lease(held, event.lease, event.worker);
   held.job->rests_until.at(static_cast<std::size_t>(event.lease.task.kind)) = now + kRest;
   held.job->waits = event.message;
+}
+
+void Scheduler::on(const LeaseReturned& event, TimePoint now, Actions&) {
+  if (!touch(event.worker, now)) return;
+  if (Job* job = find(event.lease.job); job != nullptr && !event.unseen.empty())
+    job->blind[event.worker] = {event.unseen, now + kBlindRest};
+  const Held held = hold(event.worker, event.lease, now);
+  if (held.job) return_lease(held, event.lease, event.worker);
 }
 
 void Scheduler::on(const InputsLost& event, TimePoint now, Actions& actions) {

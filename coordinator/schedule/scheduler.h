@@ -44,6 +44,12 @@ class Scheduler {
       TimePoint rests_until = {};
     };
     std::map<std::string, Standing> workers = {};  ///< those that have failed
+    struct Blind {
+      std::string unseen;
+      TimePoint until;
+    };
+    std::map<std::string, Blind> blind = {};     ///< workers that do not see its folders
+    std::array<double, 3> longest_seconds = {};  ///< CPU time of tasks of each kind, of late
   };
 
   /// epoch: how often the coordinator has started; part of each lease. silence_limit: a worker that
@@ -58,6 +64,9 @@ class Scheduler {
   /// For so many tasks held states are asked for at once where a worker has nothing to do.
   static constexpr int kMaxTasksFreed = 8;
 
+  /// How long a worker gets nothing of a job whose folders it cannot see; then it looks again.
+  static constexpr std::chrono::minutes kBlindRest{1};
+
   /// What follows from the event. Unknown jobs, workers and leases are normal: they are late, and
   /// nothing follows.
   std::vector<Action> step(const Event& event, TimePoint now);
@@ -71,6 +80,10 @@ class Scheduler {
   std::string waits_for(const Digest& job, TimePoint now) const;
   /// Leases that the worker holds.
   std::size_t num_leases(const std::string& worker) const;
+  /// Tasks of running jobs that are ready.
+  std::size_t num_ready() const;
+  /// CPU time of the longest render tasks of running jobs, of late; 0: not known.
+  double longest_task_seconds() const;
   bool is_referenced(const Digest& blob) const { return blobs_.contains(blob); }
 
  private:
@@ -113,6 +126,7 @@ class Scheduler {
   void on(const SpaceLacking& event, TimePoint now, Actions& actions);
   void on(const InputsLost& event, TimePoint now, Actions& actions);
   void on(const HeldPublished& event, TimePoint now, Actions& actions);
+  void on(const LeaseReturned& event, TimePoint now, Actions& actions);
   void on(const ClockTicked& event, TimePoint now, Actions& actions);
 
   // Leases (scheduler_leases.cpp).
@@ -122,6 +136,7 @@ class Scheduler {
                  TimePoint granted_until, TimePoint now, Actions& actions);
   void add_lease(const std::string& worker, const LeaseId& lease, TaskIndex task, TimePoint now);
   void drop_lease(const Digest& job, TaskIndex task);
+  void return_lease(const Held& held, const LeaseId& lease, const std::string& worker);
   void lose_lease(const Digest& job, TaskIndex task, Actions& actions);
   void remove_worker(const std::string& worker, bool lost, Actions& actions);
   void lose_held(const std::string& worker, Actions& actions);
@@ -134,6 +149,7 @@ class Scheduler {
   bool may_try(const Job& job, TaskIndex task, const std::string& worker, TimePoint now) const;
   bool is_exhausted(const Job& job, TaskIndex task) const;
   bool rests(const Job& job, const std::string& worker, TimePoint now) const;
+  static bool is_blind(const Job& job, const std::string& worker, TimePoint now);
 
   // Jobs (scheduler.cpp).
   Job* find(const Digest& job);

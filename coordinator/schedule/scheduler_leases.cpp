@@ -18,6 +18,7 @@ void Scheduler::on(const WorkerJoined& event, TimePoint now, Actions& actions) {
   std::erase(hungry_, event.worker);
   for (auto& [digest, job] : jobs_) {
     job.workers.erase(event.worker);
+    job.blind.erase(event.worker);
     job.tasks.forgive(event.worker);
   }
   lose_held(event.worker, actions);
@@ -58,6 +59,21 @@ void Scheduler::on(const ClockTicked&, TimePoint now, Actions& actions) {
 std::size_t Scheduler::num_leases(const std::string& worker) const {
   const auto found = workers_.find(worker);
   return found == workers_.end() ? 0 : found->second.leases.size();
+}
+
+std::size_t Scheduler::num_ready() const {
+  std::size_t count = 0;
+  for (const auto& [rank, job] : running_) count += jobs_.at(job).tasks.ready().size();
+  return count;
+}
+
+double Scheduler::longest_task_seconds() const {
+  double longest = 0;
+  for (const auto& [rank, job] : running_) {
+    const auto render = static_cast<std::size_t>(TaskKind::render);
+    longest = std::max(longest, jobs_.at(job).longest_seconds.at(render));
+  }
+  return longest;
 }
 
 // ---- leases -------------------------------------------------------------------------------------
@@ -121,6 +137,13 @@ void Scheduler::drop_lease(const Digest& job, TaskIndex task) {
   BATON_CHECK(found != leases_.end());
   workers_.at(found->second.worker).leases.erase({job, task});
   leases_.erase(found);
+}
+
+/// A lease that ends without a result, and without anybody's failure.
+void Scheduler::return_lease(const Held& held, const LeaseId& lease, const std::string& worker) {
+  drop_lease(lease.job, held.task);
+  held.job->tasks.add_returned(held.task, lease, worker);
+  held.job->tasks.give_back(held.task);
 }
 
 /// The worker no longer has it, or nobody has what it made: no failure. But a task that was lost
@@ -226,8 +249,10 @@ bool Scheduler::grant_one(const std::string& worker, TimePoint now, Actions& act
     const LeaseId lease{digest, graph.key(*task), job.tasks.grant(*task), epoch_};
     add_lease(worker, lease, *task, now);
     const bool may_hold = job.tasks.may_hold(*task) && job.homes.surround(lease.task.tile, asking);
-    actions.push_back(GrantLease{worker, lease, job.tasks.inputs(*task), graph.frames(lease.task),
-                                 may_hold, job.tasks.states_from()});
+    actions.push_back(
+        GrantLease{worker, lease, job.tasks.inputs(*task), graph.frames(lease.task), may_hold,
+                   job.tasks.states_from(),
+                   job.longest_seconds.at(static_cast<std::size_t>(lease.task.kind))});
     return true;
   }
   return false;
@@ -298,6 +323,10 @@ bool Scheduler::is_exhausted(const Job& job, TaskIndex task) const {
 std::string Scheduler::waits_for(const Digest& digest, TimePoint now) const {
   const Job& job = jobs_.at(digest);
   if (!is_open(job.status) || !job.waits.empty()) return is_open(job.status) ? job.waits : "";
+  if (!job.blind.empty() && std::all_of(workers_.begin(), workers_.end(), [&](const auto& other) {
+        return is_blind(job, other.first, now);
+      }))
+    return fmt::format("a worker that sees {}", job.blind.begin()->second.unseen);
   for (const TaskIndex task : job.tasks.tried()) {
     if (job.tasks.status(task) != TaskStatus::ready) continue;
     const bool somebody_may = std::any_of(workers_.begin(), workers_.end(), [&](const auto& other) {
@@ -310,14 +339,22 @@ std::string Scheduler::waits_for(const Digest& digest, TimePoint now) const {
   return {};
 }
 
-/// Whether the worker gets nothing of the job because it has failed much, while others have not.
+/// Whether the worker gets nothing of the job: it does not see its folders, or it has failed much,
+/// while others have not.
 bool Scheduler::rests(const Job& job, const std::string& worker, TimePoint now) const {
   const auto failed_much = [&](const std::string& name) {
     const auto found = job.workers.find(name);
     return found != job.workers.end() && now < found->second.rests_until;
   };
-  return failed_much(worker) && !std::all_of(workers_.begin(), workers_.end(),
-                                             [&](const auto& w) { return failed_much(w.first); });
+  if (is_blind(job, worker, now)) return true;
+  return failed_much(worker) && !std::all_of(workers_.begin(), workers_.end(), [&](const auto& w) {
+           return failed_much(w.first) || is_blind(job, w.first, now);
+         });
+}
+
+bool Scheduler::is_blind(const Job& job, const std::string& worker, TimePoint now) {
+  const auto found = job.blind.find(worker);
+  return found != job.blind.end() && now < found->second.until;
 }
 
 }  // namespace baton

@@ -10,6 +10,7 @@
 
 #include "common/base/build.h"
 #include "common/base/limits.h"
+#include "common/store/folder_token.h"
 #include "coordinator/service/diagnostics_file.h"
 
 namespace baton {
@@ -38,15 +39,19 @@ Result<Service> Service::open(const ServiceOptions& options) {
   BATON_ASSIGN(BlobStore store, BlobStore::open(options.work_dir / "store"));
   if (const std::size_t swept = store.sweep(); swept > 0)
     spdlog::info("{} files that were never finished are removed from the store", swept);
+  BATON_ASSIGN(std::string token, make_token(options.work_dir / "store" / "token"));
   BATON_ASSIGN(Router router, Router::bind(options.listen, options.access));
-  Service service(options, std::move(router), std::move(journal), std::move(store));
+  Service service(options, std::move(router), std::move(journal), std::move(store),
+                  std::move(token));
   BATON_TRY(service.restore_jobs());
   return service;
 }
 
-Service::Service(const ServiceOptions& options, Router router, Journal journal, BlobStore store)
+Service::Service(const ServiceOptions& options, Router router, Journal journal, BlobStore store,
+                 std::string token)
     : options_(options),
       store_directory_(fs::absolute(options.work_dir / "store").lexically_normal()),
+      token_(std::move(token)),
       router_(std::move(router)),
       journal_(std::move(journal)),
       store_(std::move(store)),
@@ -145,7 +150,7 @@ Status Service::receive(const PeerId& peer, const WorkerHello& message) {
     spdlog::info("worker {} joined: {} threads on {}", hello.worker_id, hello.num_threads,
                  hello.host);
   reply(peer, WorkerWelcome{journal_.epoch(), static_cast<std::int32_t>(options_.heartbeat.count()),
-                            store_directory_.string()});
+                            store_directory_.string(), token_});
   // A process that has only become impatient may not have received yet what it was granted.
   if (!is_new) return step(WorkerAlive{hello.worker_id, hello.running});
   return step(WorkerJoined{hello.worker_id, hello.running});
@@ -221,6 +226,14 @@ Status Service::receive_from(const std::string& worker, const StatesPublished& m
     return !store_.contains(state.published.digest);
   });
   return step(HeldPublished{worker, message.job, std::move(states)});
+}
+
+Status Service::receive_from(const std::string& worker, const LeaseReturn& message) {
+  const std::string unseen = message.unseen.substr(0, limits::kMaxTextLength);
+  if (!unseen.empty())
+    spdlog::warn("worker {} takes no tasks of job {}: {}", worker, message.lease.job.short_hex(),
+                 unseen);
+  return step(LeaseReturned{worker, message.lease, unseen});
 }
 
 Status Service::receive_from(const std::string& worker, const WorkerGoodbye&) {
@@ -317,13 +330,18 @@ Status Service::perform(const RecordJobStatus& action) {
     if (!written) spdlog::warn("no diagnostics: {}", written.error().message);
   }
   remove_job_file(action.job, action.status);
+  if (job != nullptr && !is_open(action.status)) {
+    std::error_code error;  // where it cannot be removed, it could not be written
+    fs::remove(output_token_file(job->spec.output.directory, action.job), error);
+  }
   if (!is_open(action.status)) ended_.push_back(action.job);
   return journal_.record_status(action.job, action.status);
 }
 
 Status Service::perform(const GrantLease& action) {
-  reply_to(action.worker, LeaseGrant{action.lease, action.inputs, action.frames.first,
-                                     action.frames.last, action.may_hold, action.states_from});
+  reply_to(action.worker,
+           LeaseGrant{action.lease, action.inputs, action.frames.first, action.frames.last,
+                      action.may_hold, action.states_from, action.expected_seconds});
   return {};
 }
 
@@ -361,6 +379,16 @@ Status Service::perform(const ReportConflict& action) {
 Status Service::perform(const RemoveBlobs& action) {
   garbage_.insert(garbage_.end(), action.blobs.begin(), action.blobs.end());
   return {};
+}
+
+/// Marks the output folder of an open job, for workers. Returns the token; empty: it cannot be
+/// marked, or the job has ended.
+std::string Service::mark_output(const Digest& job) const {
+  const Scheduler::Job* const open = scheduler_.find_job(job);
+  if (open == nullptr || !is_open(open->status)) return {};
+  if (!check_output_root(open->spec, options_.roots)) return {};
+  const fs::path file = output_token_file(open->spec.output.directory, job);
+  return write_token(file, token_) ? token_ : std::string();
 }
 
 /// The document for replays outlives its job only if that has failed.

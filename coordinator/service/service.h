@@ -51,7 +51,8 @@ class Service {
   Status run(const std::atomic<bool>& stop);
 
  private:
-  Service(const ServiceOptions& options, Router router, Journal journal, BlobStore store);
+  Service(const ServiceOptions& options, Router router, Journal journal, BlobStore store,
+          std::string token);
 
   Status restore_jobs();
   Status restore_job(const Digest& job);
@@ -69,6 +70,7 @@ class Service {
   Status receive_from(const std::string& worker, const TaskDone& message);
   Status receive_from(const std::string& worker, const TaskFailed& message);
   Status receive_from(const std::string& worker, const StatesPublished& message);
+  Status receive_from(const std::string& worker, const LeaseReturn& message);
   Status receive_from(const std::string& worker, const WorkerGoodbye& message);
 
   // Who may do what (service_access.cpp).
@@ -125,6 +127,7 @@ class Service {
   Status perform(const ReportConflict& action);
   Status perform(const RemoveBlobs& action);
 
+  std::string mark_output(const Digest& job) const;
   void remove_job_file(const Digest& job, JobStatus status);
   void reply(const PeerId& peer, Message message);
   void reply_to(const std::string& worker, Message message);
@@ -137,6 +140,7 @@ class Service {
 
   ServiceOptions options_;
   std::filesystem::path store_directory_;
+  std::string token_;  ///< by which workers tell the folders that this coordinator sees
   Router router_;
   Journal journal_;
   BlobStore store_;

@@ -78,7 +78,9 @@ Status Service::receive(const PeerId& peer, const JobDocumentRequest& message) {
   }
   BATON_ASSIGN(std::optional<std::string> document, journal_.document(message.job));
   if (document) {
-    reply(peer, JobDocument{message.job, std::move(*document)});
+    const bool for_worker = !peers_.worker_of(peer).empty();
+    reply(peer, JobDocument{message.job, std::move(*document),
+                            for_worker ? mark_output(message.job) : std::string()});
   } else {
     refuse(peer, {ErrorKind::bad_input, fmt::format("job {}: not known here", message.job.hex())});
   }
@@ -112,6 +114,8 @@ Status Service::receive(const PeerId& peer, const ListJobs& message) {
     list.jobs.push_back(summarize(job, *scheduler_.find_job(job)));
     list.jobs.back().owner = owner_of(job);
   }
+  list.tasks_ready = scheduler_.num_ready();
+  list.task_seconds = scheduler_.longest_task_seconds();
   list.workers = peers_.summaries();
   for (WorkerSummary& worker : list.workers) {
     worker.leases = static_cast<std::int32_t>(scheduler_.num_leases(worker.worker_id));

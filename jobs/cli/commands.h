@@ -11,6 +11,7 @@ namespace baton {
 void add_chart_command(CLI::App& app, ExitCode& code);
 void add_check_command(CLI::App& app, ExitCode& code);
 void add_compare_command(CLI::App& app, ExitCode& code);
+void add_farm_command(CLI::App& app, ExitCode& code);
 void add_job_command(CLI::App& app, ExitCode& code);
 void add_key_command(CLI::App& app, ExitCode& code);
 void add_render_command(CLI::App& app, ExitCode& code);

@@ -21,7 +21,7 @@ using Clock = std::chrono::steady_clock;
 using nlohmann::ordered_json;
 
 constexpr std::chrono::milliseconds kPollInterval{500};
-constexpr std::chrono::minutes kAwayPatience{5};
+constexpr std::chrono::minutes kWaitPatience{5};
 
 struct JobOptions {
   CoordinatorLink link;
@@ -106,7 +106,7 @@ Result<ExitCode> wait(const JobOptions& options, RequestClient& client) {
     const std::chrono::duration<double> waited = Clock::now() - start;
     if (!answer) {
       const bool away = answer.error().kind == ErrorKind::timeout && last_answer &&
-                        Clock::now() - *last_answer < kAwayPatience;
+                        Clock::now() - *last_answer < kWaitPatience;
       if (!away) return answer.error();
       if (options.timeout_s > 0 && waited.count() >= options.timeout_s) return ExitCode::timeout;
       std::this_thread::sleep_for(kPollInterval);

@@ -7,11 +7,14 @@
 #include <sys/file.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <random>
 #include <thread>
 
+#include "common/base/files.h"
+#include "common/base/limits.h"
 #include "common/base/patience.h"
 
 namespace baton {
@@ -65,7 +68,8 @@ Result<LocalFarm> LocalFarm::start(const FarmOptions& options) {
   BATON_ASSIGN(const std::string coordinator, sibling_program("baton-coordinator"));
   BATON_ASSIGN(const std::string worker, sibling_program("baton-worker"));
   BATON_ASSIGN(Lock lock, lock_directory(options.work_directory));
-  LocalFarm farm(options, draw_endpoint(), std::move(lock));
+  LocalFarm farm(options, options.listen.empty() ? draw_endpoint() : options.listen,
+                 std::move(lock));
   BATON_TRY(farm.start_coordinator(coordinator));
   for (int i = 1; i <= options.workers; ++i) {
     BATON_TRY(farm.add_member(fmt::format("worker-{}", i),
@@ -79,9 +83,15 @@ Status LocalFarm::start_coordinator(const std::string& program) {
   const fs::path endpoint_file = options_.work_directory / "endpoint";
   std::error_code error;
   fs::remove(endpoint_file, error);
-  BATON_TRY(add_member("coordinator", {program, "--listen", endpoint_, "--work-dir",
-                                       options_.work_directory.string(), "--endpoint-file",
-                                       endpoint_file.string()}));
+  std::vector<std::string> command{program,
+                                   "--listen",
+                                   endpoint_,
+                                   "--work-dir",
+                                   options_.work_directory.string(),
+                                   "--endpoint-file",
+                                   endpoint_file.string()};
+  if (!options_.server_key.empty()) command.insert(command.end(), {"--key", options_.server_key});
+  BATON_TRY(add_member("coordinator", std::move(command)));
 
   // The file appears when the coordinator listens.
   const auto deadline = std::chrono::steady_clock::now() + kStartPatience;
@@ -94,6 +104,11 @@ Status LocalFarm::start_coordinator(const std::string& program) {
     }
     std::this_thread::sleep_for(milliseconds(10));
   }
+  // Where a port was picked, a coordinator that is started again must have the same.
+  if (options_.listen.empty()) return {};
+  BATON_ASSIGN(endpoint_, read_text_file(endpoint_file, limits::kMaxTextLength));
+  while (!endpoint_.empty() && endpoint_.back() == '\n') endpoint_.pop_back();
+  members_.front().command.at(2) = endpoint_;
   return {};
 }
 
@@ -134,7 +149,7 @@ void LocalFarm::stop() {
     }
   };
   end_members(1, members_.size(), kWorkerPatience);
-  end_members(0, 1, kCoordinatorPatience);
+  end_members(0, std::min<std::size_t>(1, members_.size()), kCoordinatorPatience);
 }
 
 fs::path LocalFarm::log_of(const std::string& name) const {

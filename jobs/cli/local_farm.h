@@ -15,6 +15,8 @@ struct FarmOptions {
   int workers = 1;
   int threads_per_worker = 1;
   std::filesystem::path work_directory;  ///< journal, blobs, logs; what a resume needs
+  std::string listen = {};      ///< of the coordinator; empty: where only this machine reaches it
+  std::string server_key = {};  ///< file of the coordinator's key; empty: none
 };
 
 /// A coordinator and workers on this machine, as child processes, at an address of their own. A
@@ -26,6 +28,9 @@ class LocalFarm {
   /// be made or belongs to a farm that runs; a program is missing; the coordinator does not come up
   /// (its log is named).
   static Result<LocalFarm> start(const FarmOptions& options);
+
+  /// The farm of a coordinator that somebody else looks after: it has no programs to tend.
+  static LocalFarm attach(const std::string& endpoint) { return {{}, endpoint, Lock(-1)}; }
 
   /// Replaces programs that have ended, with a warning. Error: one has ended too often, each time
   /// soon after its start.

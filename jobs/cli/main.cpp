@@ -30,6 +30,7 @@ constexpr const char* kFooter = R"(Examples:
   baton job submit job.json          hands the job to a coordinator (see --coordinator)
   baton job list
   baton worker list
+  baton farm slurm job.json --nodes 1-8 --time 2:00:00
   baton key create keys              keys for a farm of several machines
   baton chart study.json             error against time of several methods, as charts
   baton compare a.json b.json        two ways to render the same frames, side by side
@@ -69,6 +70,7 @@ int main(int argc, char** argv) {
   baton::add_render_command(app, code);
   baton::add_job_command(app, code);
   baton::add_worker_command(app, code);
+  baton::add_farm_command(app, code);
   baton::add_key_command(app, code);
   baton::add_state_command(app, code);
   baton::add_chart_command(app, code);

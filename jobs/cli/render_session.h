@@ -36,6 +36,10 @@ class RenderSession {
   /// options and signals must outlive the session.
   static Result<RenderSession> start(const RenderOptions& options, const FarmOptions& farm,
                                      const SignalWait& signals);
+  /// The same with a farm that is there.
+  RenderSession(const RenderOptions& options, const SignalWait& signals, LocalFarm farm,
+                RequestClient client)
+      : options_(options), signals_(signals), farm_(std::move(farm)), client_(std::move(client)) {}
 
   /// Renders a job whose motion and method are settled, shows how it gets on, and prints what came
   /// of it. A job that the farm has goes on where it stopped. `interrupted` is asked now and then;
@@ -43,16 +47,13 @@ class RenderSession {
   Result<std::optional<JobStatus>> render(
       const JobSpec& job, bool restart,
       const std::function<bool()>& interrupted = [] { return false; });
-  /// Keeps the farm up until the user asks to stop.
-  Status keep_running();
+  /// Keeps the farm up until the user asks to stop. `meanwhile` is called now and then.
+  Status keep_running(const std::function<void()>& meanwhile = [] {});
   /// As LocalFarm's.
   Status tend() { return farm_.tend(); }
   void stop() { farm_.stop(); }
 
  private:
-  RenderSession(const RenderOptions& options, const SignalWait& signals, LocalFarm farm,
-                RequestClient client)
-      : options_(options), signals_(signals), farm_(std::move(farm)), client_(std::move(client)) {}
   Result<std::optional<JobDetail>> follow(const Digest& job, class FrameSheet& sheet,
                                           const std::function<bool()>& interrupted);
   Status write_png_of(const JobSpec& job) const;

@@ -29,6 +29,7 @@ using namespace std::chrono_literals;
 struct LoadOptions {
   int workers = 1000, tiles = 1000000, threads = 2, tile_ms = 0;
   std::string method = "bidirectional";
+  bool keys = false;  ///< every connection is encrypted
   fs::path work_dir = fs::temp_directory_path() / fmt::format("baton-load-{}", ::getpid());
   fs::path store = fs::path("/dev/shm") / fmt::format("baton-load-{}", ::getpid());
 };
@@ -64,15 +65,20 @@ Result<JobSpec> make_job(const LoadOptions& options) {
 
 // ---- the coordinator ----------------------------------------------------------------------------
 
+/// The keys of an encrypted run.
+fs::path keys_of(const LoadOptions& options) { return options.work_dir / "keys"; }
+
 Result<ChildProcess> start_coordinator(const LoadOptions& options, const std::string& endpoint,
                                        std::string& concrete) {
   const fs::path file = options.work_dir / "endpoint";
   fs::remove(file);
   BATON_ASSIGN(const std::string program, sibling_program("baton-coordinator"));
+  std::vector<std::string> command{program,      "--work-dir", (options.work_dir / "farm").string(),
+                                   "--listen",   endpoint,     "--endpoint-file",
+                                   file.string()};
+  if (options.keys) command.insert(command.end(), {"--key", keys_of(options) / "server.key"});
   BATON_ASSIGN(ChildProcess process,
-               ChildProcess::start({program, "--work-dir", (options.work_dir / "farm").string(),
-                                    "--listen", endpoint, "--endpoint-file", file.string()},
-                                   options.work_dir / "coordinator.log"));
+               ChildProcess::start(command, options.work_dir / "coordinator.log"));
   while (!fs::exists(file)) {
     if (const auto end = process.ended()) return Error{ErrorKind::internal, "coordinator: " + *end};
     std::this_thread::sleep_for(1ms);
@@ -112,7 +118,7 @@ std::size_t count_lines(const fs::path& log, const std::string& part) {
 
 /// The job as the coordinator tells it; what it tells is durable.
 Result<JobSummary> ask_job(RequestClient& client) {
-  BATON_ASSIGN(const Message answer, client.request(ListJobs{.all = true}, 60s));
+  BATON_ASSIGN(const Message answer, client.request(ListJobs{.all = true}, 10s));
   const auto* list = std::get_if<JobList>(&answer);
   if (list == nullptr || list->jobs.size() != 1)
     return Error{ErrorKind::internal, "no list of one job"};
@@ -124,10 +130,12 @@ template <class Wanted>
 Result<JobSummary> wait_for(RequestClient& client, const Wanted& wanted) {
   const auto deadline = LoadClock::now() + kPatience;
   while (LoadClock::now() < deadline) {
-    BATON_ASSIGN(JobSummary job, ask_job(client));
-    if (wanted(job)) return job;
-    if (!is_open(job.status))
-      return Error{ErrorKind::internal, fmt::format("the job is {}", job_status_name(job.status))};
+    // A question to a coordinator that was killed a moment ago has no answer.
+    Result<JobSummary> job = ask_job(client);
+    if (!job && job.error().kind == ErrorKind::timeout) continue;
+    if (!job || wanted(*job)) return job;
+    if (!is_open(job->status))
+      return Error{ErrorKind::internal, fmt::format("the job is {}", job_status_name(job->status))};
     std::this_thread::sleep_for(50ms);
   }
   return Error{ErrorKind::timeout, "the job takes too long"};
@@ -138,6 +146,7 @@ Result<JobSummary> wait_for(RequestClient& client, const Wanted& wanted) {
 struct Figures {
   std::uint64_t tasks = 0, measured_tasks = 0, again = 0;
   std::uint64_t memory_bytes = 0, restarted_bytes = 0;  ///< the most, in either life
+  std::uint64_t measured_bytes = 0;
   double measured_s = 0, cpu_s = 0, submit_s = 0;
   double restart_s = kNever, granted_s = kNever;  ///< never: all was done before
   std::size_t expired = 0;
@@ -153,11 +162,19 @@ Result<Figures> measure(const LoadOptions& options) {
   BATON_ASSIGN(const std::string document, make_job_document(job));
   Figures figures;
 
+  ClientAccess access;
+  std::optional<ClientKey> worker_key;
+  if (options.keys) {
+    BATON_TRY(create_keys(keys_of(options)));
+    BATON_ASSIGN(access, client_access((keys_of(options) / "admin.key").string(), false));
+    BATON_ASSIGN(worker_key, read_client_key(keys_of(options) / "worker.key"));
+  }
+
   // A coordinator and its job.
   std::string endpoint;
   BATON_ASSIGN(ChildProcess coordinator, start_coordinator(options, "tcp://127.0.0.1:*", endpoint));
   const std::uint64_t memory_before = memory_of(coordinator, "VmRSS");
-  BATON_ASSIGN(RequestClient client, RequestClient::connect(endpoint));
+  BATON_ASSIGN(RequestClient client, RequestClient::connect(endpoint, access));
   auto start = LoadClock::now();
   BATON_ASSIGN(const Message accepted, client.request(SubmitJob{document}, 60s));
   figures.submit_s = seconds_since(start);
@@ -167,6 +184,7 @@ Result<Figures> measure(const LoadOptions& options) {
   LoadRun run{.job = job,
               .digest = std::get<JobAccepted>(accepted).job,
               .endpoint = endpoint,
+              .key = worker_key,
               .tile_time = std::chrono::milliseconds(options.tile_ms),
               .store = std::move(store)};
   zmq::context_t context(1);
@@ -188,9 +206,11 @@ Result<Figures> measure(const LoadOptions& options) {
     BATON_ASSIGN(const JobSummary first, wait_for(client, part_done(0.1)));
     start = LoadClock::now();
     const double cpu_start = cpu_of(coordinator);
+    const std::uint64_t bytes_start = run.bytes;
     BATON_ASSIGN(const JobSummary last, wait_for(client, part_done(0.9)));
     figures.measured_s = seconds_since(start);
     figures.cpu_s = cpu_of(coordinator) - cpu_start;
+    figures.measured_bytes = run.bytes - bytes_start;
     figures.measured_tasks = last.tasks_done - first.tasks_done;
 
     // A new life.
@@ -236,8 +256,8 @@ void print(const LoadOptions& options, Figures& f) {
     return static_cast<double>(bytes) / static_cast<double>(f.tasks);
   };
   fmt::print(
-      "{} workers, {} tasks ({}, {} ms a tile)\n"
-      "durable completions     {:.0f} a second (goal 5000)\n"
+      "{} workers, {} tasks ({}, {} ms a tile), {}\n"
+      "durable completions     {:.0f} a second (goal 5000), messages of {:.2f} MB/s\n"
       "coordinator             {:.0f} us of CPU a completion, {:.0f} % of one core\n"
       "wait for a grant        median {:.1f} ms, 99th percentile {:.1f} ms\n"
       "coordinator's memory    {:.0f} bytes a task at the most (goal 300), {:.0f} after a restart\n"
@@ -246,10 +266,35 @@ void print(const LoadOptions& options, Figures& f) {
       "10)\n"
       "workers expired         {} (goal 0)\n"
       "reported more than once {} tasks\n",
-      options.workers, f.tasks, options.method, options.tile_ms, tasks / f.measured_s,
-      1e6 * f.cpu_s / tasks, 100 * f.cpu_s / f.measured_s, wait_ms(0.5), wait_ms(0.99),
-      a_task(f.memory_bytes), a_task(f.restarted_bytes), f.submit_s, f.restart_s, f.granted_s,
-      f.expired, f.again);
+      options.workers, f.tasks, options.method, options.tile_ms,
+      options.keys ? "encrypted (CURVE)" : "in the clear", tasks / f.measured_s,
+      1e-6 * static_cast<double>(f.measured_bytes) / f.measured_s, 1e6 * f.cpu_s / tasks,
+      100 * f.cpu_s / f.measured_s, wait_ms(0.5), wait_ms(0.99), a_task(f.memory_bytes),
+      a_task(f.restarted_bytes), f.submit_s, f.restart_s, f.granted_s, f.expired, f.again);
+}
+
+/// keys: "without", "with" or "both". Returns the exit code.
+int run_both(const LoadOptions& options, const std::string& keys) {
+  std::vector<double> rates;
+  for (const bool encrypted : {false, true}) {
+    if (keys == (encrypted ? "without" : "with")) continue;
+    LoadOptions run = options;
+    run.keys = encrypted;
+    run.work_dir /= encrypted ? "encrypted" : "clear";
+    run.store /= encrypted ? "encrypted" : "clear";
+    Result<Figures> figures = measure(run);
+    if (!figures) {
+      fmt::print(stderr, "{}\n", figures.error().message);
+      return 70;
+    }
+    print(run, *figures);
+    rates.push_back(static_cast<double>(figures->measured_tasks) / figures->measured_s);
+  }
+  if (rates.size() == 2)
+    fmt::print(
+        "completions a second: {:.0f} in the clear, {:.0f} encrypted, {:.2f} times as many\n",
+        rates[0], rates[1], rates[1] / rates[0]);
+  return 0;
 }
 
 }  // namespace
@@ -258,6 +303,7 @@ void print(const LoadOptions& options, Figures& f) {
 int main(int argc, char** argv) {
   baton::LoadOptions options;
   bool keep = false;
+  std::string keys = "both";
   CLI::App app(
       "Loads one coordinator with simulated workers and tiny tiles, and prints what it bears.");
   app.add_option("--workers", options.workers)->check(CLI::Range(1, 4096))->capture_default_str();
@@ -268,14 +314,15 @@ int main(int argc, char** argv) {
   app.add_option("--method", options.method)->capture_default_str();
   app.add_option("--work-dir", options.work_dir, "a folder that is not there; removed at the end");
   app.add_option("--store", options.store, "likewise, for the blobs")->capture_default_str();
+  app.add_option("--keys", keys, "of the farm")
+      ->check(CLI::IsMember({"without", "with", "both"}))
+      ->capture_default_str();
   app.add_flag("--keep", keep, "leave the folders");
   CLI11_PARSE(app, argc, argv);
-  baton::Result<baton::Figures> figures = baton::measure(options);
-  if (figures) baton::print(options, *figures);
-  if (!figures) fmt::print(stderr, "{}\n", figures.error().message);
+  const int code = baton::run_both(options, keys);
   if (!keep) {
     std::filesystem::remove_all(options.store);
     std::filesystem::remove_all(options.work_dir);
   }
-  return figures ? 0 : 70;
+  return code;
 }

@@ -16,6 +16,7 @@
 #include "common/base/files.h"
 #include "common/base/limits.h"
 #include "common/job/sequence.h"
+#include "common/protocol/keys.h"
 #include "common/protocol/messages.h"
 #include "common/store/blob_store.h"
 
@@ -31,10 +32,13 @@ struct LoadRun {
   JobSpec job;
   Digest digest;  ///< of the job
   std::string endpoint;
+  std::optional<ClientKey> key;  ///< of workers; none: they speak in the clear
   std::chrono::milliseconds heartbeat{1000}, tile_time{0};
   BlobStore store;
   std::atomic<bool> stop{false};
   std::atomic<std::uint64_t> reports{0};
+  std::atomic<std::uint64_t> bytes{
+      0};  ///< of messages, both ways, as they are before they are encrypted
   std::atomic<std::uint32_t> newest_epoch{0};          ///< of a lease that a worker was granted
   std::atomic<LoadClock::time_point> first_grant{};    ///< of that epoch
   std::atomic<LoadClock::time_point> first_welcome{};  ///< since this was last set to {}
@@ -49,6 +53,11 @@ class SimulatedWorker {
     socket_.set(zmq::sockopt::rcvhwm, limits::kMaxQueuedMessages);
     socket_.set(zmq::sockopt::reconnect_ivl, 50);
     socket_.set(zmq::sockopt::reconnect_ivl_max, 2000);
+    if (run.key) {
+      socket_.set(zmq::sockopt::curve_publickey, run.key->own.public_key);
+      socket_.set(zmq::sockopt::curve_secretkey, run.key->own.secret_key);
+      socket_.set(zmq::sockopt::curve_serverkey, run.key->server_public_key);
+    }
     socket_.connect(run.endpoint);
     hello_ = {.worker_id = fmt::format("simulated-{}", number),
               .host = "bench",
@@ -70,6 +79,7 @@ class SimulatedWorker {
     while (socket_.recv(frame, zmq::recv_flags::dontwait)) {
       const auto* data = frame.data<std::byte>();
       frames.emplace_back(data, data + frame.size());
+      run_.bytes += frame.size();
       if (frame.more()) continue;
       BATON_ASSIGN(const Message message, decode_message(frames));
       BATON_TRY(std::visit([this](const auto& m) { return on(m); }, message));
@@ -131,6 +141,7 @@ class SimulatedWorker {
                                   more | zmq::send_flags::dontwait)
                             .has_value();
       BATON_CHECK(sent);
+      run_.bytes += frames[i].size();
     }
   }
 

@@ -49,7 +49,8 @@ MAY_INCLUDE = {
     "coordinator": COMMON_ALL | {"coordinator/schedule", "coordinator/journal", "coordinator/service"},
     "jobs/study": COMMON_DATA | {"common/job", "common/image", "common/protocol"},
     "jobs/auto": COMMON_DATA | {"common/job", "jobs/study", "worker/scene"},  # how large a scene is
-    "jobs/cli": COMMON_ALL | {"jobs/study", "jobs/auto", "worker/scene"},  # `baton check` loads the scene
+    "jobs/slurm": COMMON_BASE,
+    "jobs/cli": COMMON_ALL | {"jobs/study", "jobs/auto", "jobs/slurm", "worker/scene"},  # `baton check` loads the scene
 }
 
 # Library, by how its headers are spelled -> files that may include them (prefix of the path).

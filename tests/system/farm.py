@@ -266,11 +266,11 @@ class Farm:
         wait_until(lambda: self.baton("job", "list", expect=None, deadline_s=20).returncode == OK,
                    "the coordinator answers")
 
-    def start_worker(self, threads=1, name=None):
-        """Starts one more worker; returns it."""
+    def start_worker(self, threads=1, name=None, extra=()):
+        """Starts one more worker; returns it. extra: more arguments."""
         name = name or f"worker{len(self.workers)}"
         command = [self.programs.path("baton-worker"), "--coordinator", self.worker_endpoint or self.endpoint,
-                   "--threads", str(threads), "--name", name]
+                   "--threads", str(threads), "--name", name, *map(str, extra)]
         self.workers.append(Process(command, self.folder / f"{name}.log", self.environment))
         return self.workers[-1]
 
@@ -307,19 +307,21 @@ def free_port():
 # ---- a test script ------------------------------------------------------------------------------------------
 
 
-def run_tests(tests):
-    """Main of a test script: --bin and --source, then each test with its own folder. Exits 1 when one fails."""
+def run_tests(tests, long_tests=()):
+    """Main of a test script: --bin and --source, then each test with its own folder. Exits 1 when one fails.
+    long_tests: run with --long, too."""
     parser = argparse.ArgumentParser()
     parser.add_argument("--bin", required=True, help="folder of the programs")
     parser.add_argument("--source", required=True, help="root of the project")
     parser.add_argument("--only", default="", help="regular expression: run only the tests whose name matches")
+    parser.add_argument("--long", action="store_true", help="also the tests that take minutes")
     parser.add_argument("--keep", action="store_true", help="leave the files of the tests")
     options = parser.parse_args()
 
     programs = Programs(options.bin)
     root = Path(tempfile.mkdtemp(prefix="baton-system-"))
     failures = 0
-    for test in tests:
+    for test in [*tests, *(long_tests if options.long else [])]:
         if not re.search(options.only, test.__name__):
             continue
         start = time.monotonic()

@@ -2,6 +2,7 @@
 
 #include <memory>
 #include <stop_token>
+#include <string>
 #include <vector>
 
 #include "common/base/result.h"
@@ -17,6 +18,8 @@ struct TaskOutput {
   std::vector<BlobRef> outputs;
   RenderStats stats;
   std::vector<FrameStats> frames = {};  ///< of a render task in frame order, of an assembly one
+  /// What this machine does not see of the job, a line; then nothing was done.
+  std::string unseen = {};
 };
 
 /// What a lease says beside the task: LeaseGrant in PROTOCOL.md.

@@ -7,26 +7,46 @@
 
 #include "common/base/limits.h"
 #include "common/job/job_json.h"
+#include "common/store/folder_token.h"
 
 namespace baton {
 
-Result<LoadedJobPtr> load_job_document(const Digest& digest, const std::string& document,
+Result<LoadedJobPtr> load_job_document(const JobDocument& document, const Machine& machine,
                                        AssetShelf& shelf) {
-  BATON_ASSIGN(ParsedJobDocument parsed, parse_job_document(document));
-  if (parsed.digest != digest) {
-    return Error{ErrorKind::corrupt,
-                 fmt::format("job document {}: digest is {}", digest.hex(), parsed.digest.hex())};
+  BATON_ASSIGN(const ParsedJobDocument parsed, parse_job_document(document.json));
+  if (parsed.digest != document.job) {
+    return Error{ErrorKind::corrupt, fmt::format("job document {}: digest is {}",
+                                                 document.job.hex(), parsed.digest.hex())};
   }
-  BATON_TRY(verify_assets(parsed.assets));
-  BATON_ASSIGN(const auto assets, shelf.get(parsed.job, parsed.assets));
-  BATON_ASSIGN(auto context, make_render_context(parsed.job, parsed.picture, assets));
-  return LoadedJobPtr(std::make_shared<LoadedJob>(LoadedJob{.job = std::move(parsed.job),
-                                                            .digest = digest,
-                                                            .picture = parsed.picture,
-                                                            .context = std::move(context)}));
+  // As this machine sees it. Frames name their maps as the job does.
+  const ParsedJobDocument here{map_paths(parsed.job, machine.maps),
+                               map_paths(parsed.assets, machine.maps), parsed.digest,
+                               parsed.picture};
+  auto loaded = std::make_shared<LoadedJob>(
+      LoadedJob{.job = parsed.job,
+                .digest = document.job,
+                .picture = parsed.picture,
+                .context = nullptr,
+                .states = std::make_shared<StateCache>(machine.max_state_bytes),
+                .held = std::make_shared<HeldStates>(2 * machine.max_state_bytes)});
+  loaded->job.output.directory = here.job.output.directory;
+  BATON_TRY(check_roots(here, machine.roots));
+  const Status seen = document.token.empty()
+                          ? Status()
+                          : expect_token(output_token_file(here.job.output.directory, document.job),
+                                         document.token);
+  if (!seen) {
+    loaded->unseen = seen.error().message;
+    return LoadedJobPtr(std::move(loaded));
+  }
+
+  BATON_TRY(verify_assets(here.assets));
+  BATON_ASSIGN(const auto assets, shelf.get(here.job, here.assets));
+  BATON_ASSIGN(loaded->context, make_render_context(here.job, parsed.picture, assets));
+  return LoadedJobPtr(std::move(loaded));
 }
 
-void JobEntry::provide(const std::string& document) {
+void JobEntry::provide(const JobDocument& document) {
   const std::lock_guard lock(mutex_);
   if (document_) return;
   document_ = document;
@@ -40,7 +60,7 @@ bool JobEntry::has_document() const {
 
 bool JobEntry::failed() const {
   const std::lock_guard lock(mutex_);
-  return result_ && !result_->ok();
+  return result_ && (!result_->ok() || !result_->value()->unseen.empty());
 }
 
 LoadedJobPtr JobEntry::loaded() const {
@@ -59,14 +79,14 @@ Result<LoadedJobPtr> JobEntry::load(std::stop_token stop) {
   // Load without the lock: it may take long, and others only wait.
   loading_ = true;
   lock.unlock();
-  Result<LoadedJobPtr> result = loader_(digest_, *document_);
+  Result<LoadedJobPtr> result = loader_(*document_);
 
   lock.lock();
   if (!result && result.error().kind == ErrorKind::io) {
     spdlog::warn("waits {} s: {}", file_patience_.count() / 1000, result.error().message);
     changed_.wait_for(lock, stop, file_patience_, [] { return false; });
     lock.unlock();
-    if (!stop.stop_requested()) result = loader_(digest_, *document_);
+    if (!stop.stop_requested()) result = loader_(*document_);
     lock.lock();
   }
   result_ = result;

@@ -12,7 +12,11 @@
 #include <vector>
 
 #include "common/base/digest.h"
+#include "common/base/limits.h"
 #include "common/job/job_spec.h"
+#include "common/job/path_maps.h"
+#include "common/job/roots.h"
+#include "common/protocol/messages.h"
 #include "worker/pass/shared_assets.h"
 #include "worker/pass/tile_renderer.h"
 #include "worker/run/state_cache.h"
@@ -21,21 +25,29 @@ namespace baton {
 
 /// A job with all its assets in memory; shared by every task of it.
 struct LoadedJob {
-  JobSpec job;
+  JobSpec job;  ///< as submitted, but for its output folder, which is where this machine has it
   Digest digest, picture;
   std::shared_ptr<const RenderContext> context;
   std::shared_ptr<StateCache> states = std::make_shared<StateCache>();
   std::shared_ptr<HeldStates> held = std::make_shared<HeldStates>();
+  /// What this machine does not see of the job, a line; then nothing of it is loaded.
+  std::string unseen = {};
 };
 
 using LoadedJobPtr = std::shared_ptr<const LoadedJob>;
-/// Turns the text of a job document into a loaded job.
-using JobLoader =
-    std::function<Result<LoadedJobPtr>(const Digest& digest, const std::string& document)>;
+/// Turns a job document into a loaded job.
+using JobLoader = std::function<Result<LoadedJobPtr>(const JobDocument& document)>;
 
-/// The loader of the worker: parses the document, checks its digest and those of the assets, and
-/// loads the scene, or shares it with a job on the shelf.
-Result<LoadedJobPtr> load_job_document(const Digest& digest, const std::string& document,
+/// What is particular to a worker's machine.
+struct Machine {
+  PathMaps maps = {};  ///< folders that lie elsewhere here
+  Roots roots = {};    ///< folders that jobs may read from and write to; empty: all
+  std::uint64_t max_state_bytes = limits::kMaxStateCacheBytes;  ///< of decoded states of a job
+};
+
+/// The loader of the worker: parses the document, checks its digest, the folders and the digests of
+/// the assets, and loads the scene, or shares it with a job on the shelf.
+Result<LoadedJobPtr> load_job_document(const JobDocument& document, const Machine& machine,
                                        AssetShelf& shelf);
 
 /// How long a file that cannot be read is waited for before the attempt counts as failed: a disk of
@@ -52,9 +64,9 @@ class JobEntry {
 
   const Digest& digest() const { return digest_; }
   /// Hands over the document; a second one is ignored.
-  void provide(const std::string& document);
+  void provide(const JobDocument& document);
   bool has_document() const;
-  /// True once loading has failed.
+  /// True once loading has failed, or the machine has not seen the job's folders.
   bool failed() const;
   /// Null unless it is loaded.
   LoadedJobPtr loaded() const;
@@ -68,7 +80,7 @@ class JobEntry {
   const std::chrono::milliseconds file_patience_;
   mutable std::mutex mutex_;
   std::condition_variable_any changed_;
-  std::optional<std::string> document_;
+  std::optional<JobDocument> document_;
   bool loading_ = false;
   std::optional<Result<LoadedJobPtr>> result_;
 };

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <utility>
 
 #include "common/base/limits.h"
 
@@ -16,6 +17,10 @@ constexpr int kSilentHeartbeats = 3;
 constexpr auto kHelloInterval = 1000ms;
 /// A report that is not confirmed after so many heartbeats is sent again.
 constexpr int kUnconfirmedHeartbeats = 2;
+/// So long before it must be gone the worker gives back what it has not finished.
+constexpr auto kFarewell = 2000ms;
+/// Tasks take longer than the longest of late, and on other processors.
+constexpr double kCaution = 1.5;
 
 /// True for errors that every attempt on every worker would repeat.
 bool is_permanent(ErrorKind kind) {
@@ -26,19 +31,20 @@ bool is_permanent(ErrorKind kind) {
 
 Session::Session(SessionOptions options, TimePoint now)
     : options_(std::move(options)),
+      last_busy_(now),
       last_heard_(now),
       next_hello_(now),
       next_heartbeat_(now),
       next_request_(now),
-      request_expires_(now) {}
+      request_expires_(now) {
+  if (options_.end_at) give_back_at_ = *options_.end_at - kFarewell;
+}
 
 std::vector<SessionAction> Session::step(const SessionEvent& event, TimePoint now) {
   Actions actions;
   std::visit([&](const auto& e) { on(e, now, actions); }, event);
-  if (draining_ && !packing_ && in_hand_.empty() && reports_.empty()) {
-    packing_ = true;
-    actions.push_back(PackHeld{});
-  }
+  if (draining_ && in_hand_.empty() && reports_.empty())
+    leave("all running tasks are finished", actions);
   return actions;
 }
 
@@ -68,7 +74,9 @@ void Session::on(const TaskEnded& event, TimePoint now, Actions& actions) {
   next_request_ = now;  // what ended may have made work
 
   // Report, unless the task was given up.
-  if (event.result) {
+  if (event.result && !event.result->unseen.empty()) {
+    actions.push_back(SendMessage{LeaseReturn{event.lease, event.result->unseen}});
+  } else if (event.result) {
     reports_.push_back(
         {event.lease,
          TaskDone{event.lease, event.result->outputs, event.result->stats, event.result->frames},
@@ -81,6 +89,8 @@ void Session::on(const TaskEnded& event, TimePoint now, Actions& actions) {
                                    error.kind == ErrorKind::no_space},
                         now});
     send_report(reports_.back(), now, actions);
+  } else if (draining_) {
+    actions.push_back(SendMessage{LeaseReturn{event.lease}});  // nobody had begun it
   }
   request_leases(now, actions);
 }
@@ -92,17 +102,37 @@ void Session::on(const DocumentMissing& event, TimePoint, Actions& actions) {
 
 void Session::on(const HeldPacked& event, TimePoint, Actions& actions) {
   for (const StatesPublished& message : event.messages) actions.push_back(SendMessage{message});
-  if (!packing_) return;
+  if (!leaving_) return;
   actions.push_back(SendMessage{WorkerGoodbye{}});
-  actions.push_back(Leave{ExitCode::ok, "all running tasks are finished"});
+  actions.push_back(Leave{ExitCode::ok, *leaving_});
 }
 
-void Session::on(const DrainRequested&, TimePoint, Actions& actions) {
+void Session::on(const DrainRequested&, TimePoint now, Actions& actions) {
   draining_ = true;
+  if (options_.drain > 0s) {
+    const TimePoint end = now + options_.drain;
+    give_back_at_ = std::min(give_back_at_.value_or(end), end);
+  }
   actions.push_back(DropQueuedTasks{});
 }
 
+void Session::on(const GiveBackRequested&, TimePoint, Actions& actions) {
+  leave("what is not finished goes to others", actions);
+}
+
 void Session::on(const Tick&, TimePoint now, Actions& actions) {
+  if (give_back_at_ && now >= *give_back_at_) {
+    leave(in_hand_.empty() ? "its time is up"
+                           : fmt::format("its time is up: {} tasks go to others", in_hand_.size()),
+          actions);
+    return;
+  }
+  const bool idle = welcomed_ && in_hand_.empty() && reports_.empty();
+  if (!idle) last_busy_ = now;
+  if (options_.idle_exit > 0s && now - last_busy_ >= options_.idle_exit) {
+    leave(fmt::format("there was nothing to do for {} s", options_.idle_exit.count()), actions);
+    return;
+  }
   const auto silence = now - last_heard_;
   if (options_.give_up > 0s && silence > options_.give_up) {
     actions.push_back(
@@ -138,7 +168,7 @@ void Session::receive(const WorkerWelcome& welcome, TimePoint now, Actions& acti
   welcomed_ = true;
   heartbeat_ = std::chrono::milliseconds(std::max(1, welcome.heartbeat_ms));
   next_heartbeat_ = now + heartbeat_;
-  actions.push_back(UseStore{welcome.store_directory});
+  actions.push_back(UseStore{welcome.store_directory, welcome.token});
 
   // What was reported to a coordinator that died may be lost: report it again, in order, before
   // requesting more.
@@ -150,7 +180,16 @@ void Session::receive(const WorkerWelcome& welcome, TimePoint now, Actions& acti
 
 void Session::receive(const LeaseGrant& grant, TimePoint now, Actions& actions) {
   requested_ = std::max(0, requested_ - 1);
-  if (draining_ || !in_hand_.insert(grant.lease).second) return;
+  if (in_hand_.contains(grant.lease)) return;
+  const bool late = !fits(grant, now);
+  if (draining_ || late) actions.push_back(SendMessage{LeaseReturn{grant.lease}});
+  if (late && !draining_) {
+    actions.push_back(Warn{fmt::format("it has no time for a task of about {:.0f} s: takes no more",
+                                       grant.expected_seconds)});
+    draining_ = true;  // what it has begun it can finish
+  }
+  if (draining_) return;
+  in_hand_.insert(grant.lease);
   actions.push_back(StartTask{
       grant.lease,
       {grant.inputs, {grant.first_frame, grant.last_frame}, grant.may_hold, grant.states_from}});
@@ -201,11 +240,27 @@ void Session::receive(const Refused& refused, TimePoint, Actions& actions) {
   if (kind == ErrorKind::version || kind == ErrorKind::usage) {
     actions.push_back(Leave{exit_code_of(kind), refused.message});
   } else {
-    actions.push_back(Warn{refused.message});
+    actions.push_back(Warn{"the coordinator says: " + refused.message});
   }
 }
 
 // ---- helpers ------------------------------------------------------------------------------------
+
+/// Whether a task is finished before the worker must be gone, as far as anybody can say. Where all
+/// threads are busy it begins when one of them ends.
+bool Session::fits(const LeaseGrant& grant, TimePoint now) const {
+  if (!give_back_at_) return true;
+  const bool waits = std::ssize(in_hand_) >= options_.identity.num_threads;
+  const std::chrono::duration<double> expected(kCaution * grant.expected_seconds * (waits ? 2 : 1));
+  return now + expected <= *give_back_at_;
+}
+
+/// The goodbye gives back whatever is in hand.
+void Session::leave(std::string reason, Actions& actions) {
+  if (leaving_) return;
+  leaving_ = std::move(reason);
+  actions.push_back(PackHeld{});
+}
 
 void Session::introduce(TimePoint now, Actions& actions) {
   welcomed_ = false;

@@ -22,6 +22,10 @@ struct SessionOptions {
   WorkerHello identity;  ///< `running` is filled in by the session
   std::chrono::seconds give_up{
       60};  ///< silence of the coordinator after which the worker ends; 0: never
+  std::optional<TimePoint> end_at = {};  ///< when it must be gone
+  std::chrono::seconds idle_exit{0};     ///< without a task, after which it ends; 0: never
+  std::chrono::seconds drain{
+      0};  ///< that it goes on with its tasks when told to end; 0: to their end
 };
 
 // ---- events: what happened to the worker --------------------------------------------------------
@@ -42,16 +46,17 @@ struct HeldPacked {
   std::vector<StatesPublished> messages;
 };                         ///< PackHeld is done; what could not be put into the store is left out
 struct DrainRequested {};  ///< SIGTERM or the coordinator: finish what runs, take nothing new
-struct Tick {};            ///< time has passed
+struct GiveBackRequested {};  ///< a second SIGTERM: finish nothing, others will
+struct Tick {};               ///< time has passed
 using SessionEvent = std::variant<MessageArrived, TaskExecuted, TaskEnded, DocumentMissing,
-                                  HeldPacked, DrainRequested, Tick>;
+                                  HeldPacked, DrainRequested, GiveBackRequested, Tick>;
 
 // ---- actions: what the program around the session must do ---------------------------------------
 struct SendMessage {
   Message message;
 };
 struct UseStore {
-  std::string directory;
+  std::string directory, token;
 };
 struct StartTask {
   LeaseId lease;
@@ -84,6 +89,8 @@ using SessionAction = std::variant<SendMessage, UseStore, StartTask, PackHeld, S
 ///
 /// introducing --WorkerWelcome--> working --DrainRequested--> draining --last report confirmed-->
 /// packing --HeldPacked--> (Leave)
+/// What it has not finished when its time is up goes back to the coordinator with its goodbye; so
+/// does at once what is granted too late to be finished, after which it drains.
 /// A HelloAgain, or silence of kSilentHeartbeats, leads back to introducing. A report is said
 /// again, after each welcome and when it is not answered, until the coordinator has confirmed it or
 /// has revoked its lease. The coordinator fences what it has seen before, so sending twice is safe.
@@ -107,6 +114,7 @@ class Session {
   void on(const DocumentMissing& event, TimePoint now, Actions& actions);
   void on(const HeldPacked& event, TimePoint now, Actions& actions);
   void on(const DrainRequested& event, TimePoint now, Actions& actions);
+  void on(const GiveBackRequested& event, TimePoint now, Actions& actions);
   void on(const Tick& event, TimePoint now, Actions& actions);
 
   void receive(const WorkerWelcome& welcome, TimePoint now, Actions& actions);
@@ -121,6 +129,8 @@ class Session {
   void receive(const Shutdown& shutdown, TimePoint now, Actions& actions);
   void receive(const Refused& refused, TimePoint now, Actions& actions);
 
+  bool fits(const LeaseGrant& grant, TimePoint now) const;
+  void leave(std::string reason, Actions& actions);
   void introduce(TimePoint now, Actions& actions);
   void send_report(Report& report, TimePoint now, Actions& actions) const;
   void forget_report(const LeaseId& lease);
@@ -130,14 +140,15 @@ class Session {
   SessionOptions options_;
   bool welcomed_ = false;
   bool draining_ = false;
-  bool packing_ = false;  ///< all that is held, before it leaves
+  std::optional<std::string> leaving_;     ///< why; all that is held is being packed
+  std::optional<TimePoint> give_back_at_;  ///< what is not finished then goes back
   std::chrono::milliseconds heartbeat_{1000};
   std::set<LeaseId> in_hand_;           ///< granted and not ended
   std::set<LeaseId> executed_;          ///< those of them that have left their thread
   std::set<Digest> documents_missing_;  ///< requested, not yet here
   std::deque<Report> reports_;          ///< not confirmed, oldest first
   std::int32_t requested_ = 0;          ///< leases in the last request
-  TimePoint last_heard_, next_hello_, next_heartbeat_, next_request_, request_expires_;
+  TimePoint last_busy_, last_heard_, next_hello_, next_heartbeat_, next_request_, request_expires_;
 };
 
 }  // namespace baton

@@ -18,7 +18,9 @@
 #include "common/job/job_json.h"
 #include "common/job/sequence.h"
 #include "common/protocol/worker_channel.h"
+#include "common/store/folder_token.h"
 #include "worker/accel/accel.h"
+#include "worker/pass/render_context.h"
 #include "worker/run/crash_handler.h"
 #include "worker/run/render_threads.h"
 #include "worker/run/replay.h"
@@ -57,7 +59,13 @@ SessionOptions session_options(const WorkerOptions& options) {
   identity.num_threads = options.num_threads;
   identity.build = build_identity();
   identity.renderer = describe_renderer();
-  return {std::move(identity), options.give_up};
+  std::optional<TimePoint> end_at;
+  if (options.end_at) {
+    end_at =
+        std::chrono::steady_clock::now() + std::chrono::duration_cast<std::chrono::milliseconds>(
+                                               *options.end_at - std::chrono::system_clock::now());
+  }
+  return {std::move(identity), options.give_up, end_at, options.idle_exit, options.drain};
 }
 
 /// Saves the job where a replay can read it. Returns its path.
@@ -65,7 +73,7 @@ Result<std::filesystem::path> save_job(const LoadedJob& loaded, const BlobStore&
   const std::filesystem::path path = store.job_file(loaded.digest);
   std::error_code error;
   if (!std::filesystem::exists(path, error)) {
-    BATON_TRY(write_file_atomic(path, as_bytes_view(to_json(loaded.job))));
+    BATON_TRY(write_file_atomic(path, as_bytes_view(to_json(loaded.context->job))));
   }
   return path;
 }
@@ -99,6 +107,10 @@ Result<TaskOutput> execute_pooled(const PooledTask& task, std::stop_token stop, 
     const TaskWatch::Mark loading(watch, task.lease,
                                   std::chrono::steady_clock::now() + kLoadPatience);
     BATON_ASSIGN(loaded, task.job->load(stop));
+  }
+  if (!loaded->unseen.empty()) {
+    notes.report({loaded->unseen});
+    return TaskOutput{.outputs = {}, .stats = {}, .unseen = loaded->unseen};
   }
   const TaskWatch::Mark mark(
       watch, task.lease,
@@ -171,22 +183,20 @@ class Worker {
   Worker(WorkerChannel channel, const WorkerOptions& options)
       : channel_(std::move(channel)),
         session_(session_options(options), now()),
-        roots_(options.roots),
-        jobs_([this](const Digest& digest, const std::string& document) -> Result<LoadedJobPtr> {
-          BATON_ASSIGN(const ParsedJobDocument parsed, parse_job_document(document));
-          BATON_TRY(check_roots(parsed, roots_));
-          return load_job_document(digest, document, shelf_);
+        machine_(options.machine),
+        jobs_([this](const JobDocument& document) {
+          return load_job_document(document, machine_, shelf_);
         }),
         pool_(
             options.num_threads,
             [this](const PooledTask& task, std::stop_token stop) {
-              return execute_pooled(task, std::move(stop), notes_, watch_, roots_);
+              return execute_pooled(task, std::move(stop), notes_, watch_, machine_.roots);
             },
             [this](std::span<const PooledTask> tasks) { return publish_pooled(tasks, watch_); },
             [this] { channel_.wake(); }) {}
 
-  ExitCode run(const std::atomic<bool>& drain) {
-    bool draining = false;
+  ExitCode run(const std::atomic<int>& signals) {
+    int heeded = 0;
     while (!leave_) {
       // Results first: they free slots that the tick then asks leases for.
       for (const LeaseId& lease : pool_.take_executed()) step(TaskExecuted{lease});
@@ -197,7 +207,13 @@ class Worker {
       take_packed();
       end_overdue_tasks();
       heed_refusals();
-      if (drain && !std::exchange(draining, true)) step(DrainRequested{});
+      if (signals > heeded) {
+        if (heeded++ == 0) {
+          step(DrainRequested{});
+        } else {
+          step(GiveBackRequested{});
+        }
+      }
       step(Tick{});
       if (leave_) break;
 
@@ -277,14 +293,16 @@ class Worker {
   }
   void perform(UseStore& action) {
     if (store_ && store_directory_ == action.directory) return;
-    Result<BlobStore> store = BlobStore::open(action.directory);
+    const std::filesystem::path folder = map_path(action.directory, machine_.maps);
+    const Status seen = expect_token(folder / "token", action.token);
+    Result<BlobStore> store = seen ? BlobStore::open(folder) : seen.error();
     if (!store) {
       leave_ = Leave{exit_code_of(store.error().kind), store.error().message};
       return;
     }
     store_directory_ = action.directory;
     store_ = std::make_shared<BlobStore>(std::move(store).value());
-    spdlog::info("the coordinator has answered, blobs are in {}", action.directory);
+    spdlog::info("the coordinator has answered, blobs are in {}", folder.string());
   }
   void perform(StartTask& action) {
     std::shared_ptr<JobEntry> job = jobs_.entry(action.lease.job);
@@ -310,10 +328,8 @@ class Worker {
   }
   void perform(StopTask& action) { pool_.stop(action.lease); }
   void perform(DropQueuedTasks&) { pool_.drop_queued(); }
-  void perform(TakeDocument& action) {
-    jobs_.entry(action.document.job)->provide(action.document.json);
-  }
-  void perform(Warn& action) { spdlog::warn("the coordinator says: {}", action.message); }
+  void perform(TakeDocument& action) { jobs_.entry(action.document.job)->provide(action.document); }
+  void perform(Warn& action) { spdlog::warn("{}", action.message); }
   void perform(Leave& action) { leave_ = std::move(action); }
 
   static void log_failure(const EndedTask& ended) {
@@ -325,7 +341,7 @@ class Worker {
 
   WorkerChannel channel_;
   Session session_;
-  const Roots roots_;
+  const Machine machine_;
   AssetShelf shelf_;  ///< what jobs_ loads from
   JobCache jobs_;
   std::shared_ptr<BlobStore> store_;
@@ -343,14 +359,14 @@ std::string describe_worker() {
   return fmt::format("{}\nrenders with {}", build_identity(), describe_renderer());
 }
 
-ExitCode run_worker(const WorkerOptions& options, const std::atomic<bool>& drain) {
+ExitCode run_worker(const WorkerOptions& options, const std::atomic<int>& signals) {
   Result<WorkerChannel> channel = WorkerChannel::connect(options.endpoint, options.access);
   if (!channel) {
     spdlog::error("{}", channel.error().message);
     return exit_code_of(channel.error().kind);
   }
   Worker worker(std::move(channel).value(), options);
-  return worker.run(drain);
+  return worker.run(signals);
 }
 
 }  // namespace baton

@@ -61,6 +61,23 @@ TEST_F(JournalTest, EveryStartIsCounted) {
   EXPECT_EQ(open().epoch(), 2u);
 }
 
+// More than go into one piece of the archive.
+TEST_F(JournalTest, AJobOfManyTasksIsArchivedOnce) {
+  constexpr std::int32_t kTiles = 9000;
+  Journal journal = open();
+  ASSERT_TRUE(journal.add_job(kJob, "{}").ok());
+  for (std::int32_t tile = 0; tile < kTiles; ++tile)
+    ASSERT_TRUE(journal.record_completion(kJob, completion(tile)).ok());
+  ASSERT_TRUE(journal.archive_job(kJob, {std::byte{1}}, {std::byte{2}}, {}).ok());
+  std::int32_t next = 0;
+  const Status visited = journal.for_each_completion(kJob, [&](const Completion& c) -> Status {
+    EXPECT_EQ(c.task.tile, next++);
+    return next <= kTiles ? Status() : Error{ErrorKind::internal, "more than there were"};
+  });
+  EXPECT_TRUE(visited.ok());
+  EXPECT_EQ(next, kTiles);
+}
+
 TEST_F(JournalTest, WhatWasCommittedIsThereAgain) {
   const Failure failure{
       {kJob, {TaskKind::assemble, 2, 0}, 4, 1}, "worker \xc3\xa4", "disk full", true};

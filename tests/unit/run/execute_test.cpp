@@ -65,7 +65,7 @@ class ExecuteTest : public testing::Test {
   Result<LoadedJobPtr> load() const {
     BATON_ASSIGN(const std::string document, make_job_document(job_));
     AssetShelf shelf;
-    return load_job_document(digest_of(document), document, shelf);
+    return load_job_document({digest_of(document), document}, {}, shelf);
   }
 
   FrameSpan frames_of(std::int32_t step) const {
@@ -233,7 +233,7 @@ TEST_F(ExecuteTest, AnAssetThatChangedSinceSubmissionIsNamed) {
   const std::string document = make_job_document(job_).value();
   ASSERT_TRUE(write_file_atomic(folder_ + "tetrahedron.off", as_bytes_view("OFF\n")));
   AssetShelf shelf;
-  const Result<LoadedJobPtr> loaded = load_job_document(digest_of(document), document, shelf);
+  const Result<LoadedJobPtr> loaded = load_job_document({digest_of(document), document}, {}, shelf);
   ASSERT_FALSE(loaded);
   EXPECT_THAT(loaded.error().message, testing::HasSubstr("tetrahedron.off"));
 }

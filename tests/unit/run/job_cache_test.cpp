@@ -12,16 +12,16 @@
 namespace baton {
 namespace {
 
-Result<LoadedJobPtr> empty_job(const Digest& digest, const std::string&) {
-  return LoadedJobPtr(std::make_shared<LoadedJob>(LoadedJob{{}, digest, {}, nullptr}));
+Result<LoadedJobPtr> empty_job(const JobDocument& document) {
+  return LoadedJobPtr(std::make_shared<LoadedJob>(LoadedJob{{}, document.job, {}, nullptr}));
 }
 
 TEST(JobCache, ManyWaitersLoadOnce) {
   std::atomic<int> loads{0};
-  JobEntry entry({1, 1}, [&](const Digest& digest, const std::string& document) {
-    EXPECT_EQ(document, "text");
+  JobEntry entry({1, 1}, [&](const JobDocument& document) {
+    EXPECT_EQ(document.json, "text");
     ++loads;
-    return empty_job(digest, document);
+    return empty_job(document);
   });
 
   // All threads wait for the document; then all get the same job.
@@ -30,8 +30,8 @@ TEST(JobCache, ManyWaitersLoadOnce) {
   for (LoadedJobPtr& job : jobs) {
     threads.emplace_back([&] { job = entry.load({}).value(); });
   }
-  entry.provide("text");
-  entry.provide("another text");
+  entry.provide({{}, "text"});
+  entry.provide({{}, "another text"});
   for (std::thread& thread : threads) thread.join();
   EXPECT_EQ(loads, 1);
   for (const LoadedJobPtr& job : jobs) EXPECT_EQ(job, jobs.front());
@@ -49,19 +49,19 @@ TEST(JobCache, AWaiterCanBeStopped) {
 
 TEST(JobCache, AFailureIsForThatEntryAlone) {
   int loads = 0;
-  JobCache cache([&](const Digest& digest, const std::string& document) -> Result<LoadedJobPtr> {
+  JobCache cache([&](const JobDocument& document) -> Result<LoadedJobPtr> {
     if (++loads == 1) return Error{ErrorKind::bad_input, "mesh.ply: no triangles"};
-    return empty_job(digest, document);
+    return empty_job(document);
   });
   const auto first = cache.entry({1, 1});
-  first->provide("text");
+  first->provide({{}, "text"});
   EXPECT_FALSE(first->load({}));
   EXPECT_TRUE(first->failed());
 
   const auto second = cache.entry({1, 1});
   EXPECT_NE(first, second);
   EXPECT_FALSE(second->has_document());
-  second->provide("text");
+  second->provide({{}, "text"});
   EXPECT_TRUE(second->load({}));
 }
 
@@ -70,13 +70,13 @@ TEST(JobCache, AFileThatIsAwayIsLookedForAgain) {
   int loads = 0;
   ErrorKind kind = ErrorKind::io;
   int failures = 1;
-  const auto loader = [&](const Digest& digest, const std::string& text) -> Result<LoadedJobPtr> {
+  const auto loader = [&](const JobDocument& document) -> Result<LoadedJobPtr> {
     if (++loads <= failures) return Error{kind, "sky.exr: no such file"};
-    return empty_job(digest, text);
+    return empty_job(document);
   };
   const auto load = [&] {
     JobEntry entry({1, 1}, loader, 5ms);
-    entry.provide("text");
+    entry.provide({{}, "text"});
     loads = 0;
     return entry.load({}).ok();
   };
@@ -92,8 +92,8 @@ TEST(JobCache, AFileThatIsAwayIsLookedForAgain) {
 
 TEST(JobCache, TheOldestJobGoesFirst) {
   JobCache cache(empty_job);
-  cache.entry({0, 1})->provide("text");
-  cache.entry({0, 2})->provide("text");
+  cache.entry({0, 1})->provide({{}, "text"});
+  cache.entry({0, 2})->provide({{}, "text"});
   for (std::uint64_t i = 3; i <= limits::kMaxCachedJobs; ++i) (void)cache.entry({0, i});
   EXPECT_TRUE(cache.entry({0, 1})->has_document());
   (void)cache.entry({9, 9});
@@ -109,7 +109,7 @@ TEST(JobCache, AJobInUseIsNotForgotten) {
   for (std::uint64_t i = 0; i < 3 * limits::kMaxCachedJobs; ++i)
     held.push_back(cache.entry({0, i}));
   for (std::uint64_t i = 0; i < held.size(); ++i) {
-    cache.entry({0, i})->provide("text");
+    cache.entry({0, i})->provide({{}, "text"});
     EXPECT_TRUE(held[i]->has_document()) << i;
   }
 
@@ -120,9 +120,26 @@ TEST(JobCache, AJobInUseIsNotForgotten) {
     EXPECT_FALSE(cache.entry({0, i})->has_document()) << i;
 }
 
+// Its folders may be mounted by the time that a task of it comes again.
+TEST(JobCache, AJobThatWasNotSeenIsLookedForAgain) {
+  int loads = 0;
+  JobCache cache([&](const JobDocument& document) -> Result<LoadedJobPtr> {
+    auto job = std::make_shared<LoadedJob>(LoadedJob{{}, document.job, {}, nullptr});
+    if (++loads == 1) job->unseen = "/shows: not there";
+    return LoadedJobPtr(std::move(job));
+  });
+  const auto first = cache.entry({1, 1});
+  first->provide({{1, 1}, "text"});
+  EXPECT_EQ(first->load({}).value()->unseen, "/shows: not there");
+  const auto second = cache.entry({1, 1});
+  EXPECT_NE(second, first);
+  second->provide({{1, 1}, "text"});
+  EXPECT_EQ(second->load({}).value()->unseen, "");
+}
+
 TEST(JobCache, ADocumentOfAnotherJobIsRefused) {
   AssetShelf shelf;
-  const Result<LoadedJobPtr> job = load_job_document({1, 1}, "not a document", shelf);
+  const Result<LoadedJobPtr> job = load_job_document({{1, 1}, "not a document"}, {}, shelf);
   EXPECT_FALSE(job);
 }
 

@@ -1,72 +1,17 @@
 #include "worker/run/session.h"
-#include "common/base/limits.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <algorithm>
 
+#include "common/base/limits.h"
+#include "tests/unit/run/session_fixture.h"
+
 namespace baton {
 namespace {
 
-using namespace std::chrono_literals;
-
-/// A session at a clock that the test turns.
-class SessionTest : public testing::Test {
- protected:
-  std::vector<SessionAction> step(const SessionEvent& event) { return session_.step(event, now_); }
-  std::vector<SessionAction> receive(Message message) {
-    return step(MessageArrived{std::move(message)});
-  }
-  std::vector<SessionAction> welcome() {
-    return receive(WorkerWelcome{.epoch = 1, .heartbeat_ms = 1000, .store_directory = "/store"});
-  }
-  std::vector<SessionAction> grant(const LeaseId& lease) { return receive(LeaseGrant{lease, {}}); }
-  std::vector<SessionAction> finish(const LeaseId& lease) {
-    return step(TaskEnded{lease, TaskOutput{}});
-  }
-  std::vector<SessionAction> fail(const LeaseId& lease, ErrorKind kind) {
-    return step(TaskEnded{lease, Error{kind, "broken"}});
-  }
-  std::vector<SessionAction> tick_after(std::chrono::milliseconds time) {
-    now_ += time;
-    return step(Tick{});
-  }
-
-  static LeaseId lease(std::int32_t tile) {
-    return {.job = {1, 2}, .task = {TaskKind::render, 0, tile}, .attempt = 1, .epoch = 1};
-  }
-
-  TimePoint now_{};
-  Session session_{{.identity = {.worker_id = "w",
-                                 .host = {},
-                                 .num_threads = 2,
-                                 .build = {},
-                                 .renderer = {},
-                                 .running = {}},
-                    .give_up = 60s},
-                   now_};
-};
-
-/// The sent messages of one type, in order.
-template <class M>
-std::vector<M> sent(const std::vector<SessionAction>& actions) {
-  std::vector<M> messages;
-  for (const SessionAction& action : actions) {
-    const auto* send = std::get_if<SendMessage>(&action);
-    if (send == nullptr) continue;
-    if (const auto* message = std::get_if<M>(&send->message)) messages.push_back(*message);
-  }
-  return messages;
-}
-
-template <class A>
-const A* find(const std::vector<SessionAction>& actions) {
-  for (const SessionAction& action : actions) {
-    if (const auto* found = std::get_if<A>(&action)) return found;
-  }
-  return nullptr;
-}
+using namespace test;
 
 TEST_F(SessionTest, SaysHelloUntilItIsWelcome) {
   EXPECT_EQ(sent<WorkerHello>(tick_after(0ms)).size(), 1u);

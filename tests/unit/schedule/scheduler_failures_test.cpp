@@ -278,5 +278,60 @@ TEST(SchedulerFailures, ALoneWorkerThatFailsEverythingEndsTheJobAtOnce) {
   EXPECT_EQ(farm.status(), JobStatus::failed);
 }
 
+// A pilot whose time is up: the task is ready at once, and nobody is to blame.
+TEST(SchedulerFailures, AReturnedLeaseIsNeitherFailureNorLoss) {
+  Farm farm(small_job(1, 2, 2));
+  farm.submit();
+  farm.step(WorkerJoined{"short", {}});
+  farm.step(WorkerJoined{"long", {}});
+  for (int i = 0; i < 3 * limits::kMaxTaskLosses; ++i) {
+    const GrantLease grant = farm.ask_one("short");
+    ASSERT_EQ(grant.lease.task, render(0, 0)) << i;
+    farm.step(LeaseReturned{"short", grant.lease});
+    EXPECT_EQ(farm.progress().attempts_lost, 0u);
+    // Said twice, and a heartbeat that still names it.
+    farm.step(LeaseReturned{"short", grant.lease});
+    EXPECT_THAT(all_of<RevokeLease>(farm.step(WorkerAlive{"short", {grant.lease}})), SizeIs(1));
+  }
+  EXPECT_EQ(farm.ask_one("long").lease.task, render(0, 0));
+  EXPECT_EQ(farm.status(), JobStatus::running);
+}
+
+TEST(SchedulerFailures, WhoDoesNotSeeAJobGetsNothingOfItForAWhile) {
+  Farm farm(small_job(4, 2, 2));
+  farm.submit();
+  farm.step(WorkerJoined{"blind", {}});
+  const GrantLease grant = farm.ask_one("blind");
+  farm.step(LeaseReturned{"blind", grant.lease, "/shows"});
+  EXPECT_THAT(farm.ask("blind", 1), IsEmpty());
+  EXPECT_EQ(farm.scheduler.waits_for(farm.job, farm.now), "a worker that sees /shows");
+
+  farm.step(WorkerJoined{"sees", {}});
+  EXPECT_THAT(farm.scheduler.waits_for(farm.job, farm.now), IsEmpty());
+  EXPECT_THAT(farm.ask("sees", 1), SizeIs(1));
+  EXPECT_EQ(farm.progress().attempts_lost, 0u);
+  farm.now += Scheduler::kBlindRest;
+  farm.step(WorkerJoined{"sees", {}});
+  EXPECT_THAT(farm.ask("blind", 1), SizeIs(1));
+}
+
+TEST(SchedulerFailures, AGrantSaysHowLongTasksTake) {
+  Farm farm(small_job(4, 2, 2));
+  farm.submit();
+  farm.step(WorkerJoined{"a", {}});
+  const auto finish_in = [&](double seconds) {
+    const GrantLease grant = farm.ask_one("a");
+    TaskCompleted done{"a", grant.lease, outputs_of(farm.spec(), farm.job, grant.lease.task), {}};
+    done.stats.cpu_seconds = seconds;
+    farm.step(done);
+    return grant.expected_seconds;
+  };
+  EXPECT_EQ(finish_in(10), 0);
+  EXPECT_EQ(finish_in(5), 10);
+  EXPECT_EQ(finish_in(20), 9.5);
+  EXPECT_EQ(farm.ask_one("a").expected_seconds, 20);
+  EXPECT_EQ(farm.scheduler.longest_task_seconds(), 20);
+}
+
 }  // namespace
 }  // namespace baton

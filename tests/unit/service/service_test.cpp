@@ -18,7 +18,7 @@ using testing::SizeIs;
 std::size_t count_blobs(const fs::path& store) {
   std::size_t count = 0;
   for (const auto& entry : fs::recursive_directory_iterator(store))
-    count += entry.is_regular_file() ? 1 : 0;
+    count += entry.path().extension() == ".blob" ? 1 : 0;
   return count;
 }
 

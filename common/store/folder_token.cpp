@@ -1,0 +1,44 @@
+#include "common/store/folder_token.h"
+
+#include <fmt/format.h>
+
+#include <random>
+
+#include "common/base/files.h"
+
+namespace baton {
+namespace {
+
+constexpr std::uint64_t kMaxTokenBytes = 64;
+
+}  // namespace
+
+std::filesystem::path output_token_file(const std::filesystem::path& folder, const Digest& job) {
+  return folder / (".baton-" + job.short_hex());
+}
+
+Result<std::string> make_token(const std::filesystem::path& file) {
+  Result<std::string> there = read_text_file(file, kMaxTokenBytes);
+  if (there) return there;
+  std::random_device random;
+  std::string token = fmt::format("{:08x}{:08x}", random(), random());
+  BATON_TRY(write_token(file, token));
+  return token;
+}
+
+Status write_token(const std::filesystem::path& file, const std::string& token) {
+  return write_file_atomic(file, as_bytes_view(token));
+}
+
+Status expect_token(const std::filesystem::path& file, const std::string& token) {
+  const Result<std::string> found = read_text_file(file, kMaxTokenBytes);
+  if (found && *found == token) return {};
+  return Error{
+      ErrorKind::io,
+      fmt::format("{}: not the folder that the coordinator sees ({}: {}); mount it here, or "
+                  "say where it is with --map",
+                  file.parent_path().string(), file.filename().string(),
+                  found ? "has another token" : "not there")};
+}
+
+}  // namespace baton

@@ -1,0 +1,24 @@
+#pragma once
+
+#include <filesystem>
+#include <string>
+
+#include "common/base/digest.h"
+#include "common/base/result.h"
+
+namespace baton {
+
+/// The token of a folder is a text in a small file of it. Who reads it there sees the folder that
+/// somebody else marked, and not an empty one that only has its name.
+
+/// Where the coordinator marks the output folder of an open job.
+std::filesystem::path output_token_file(const std::filesystem::path& folder, const Digest& job);
+
+/// The token in `file`, a new random one (16 hex digits) where there is none yet.
+Result<std::string> make_token(const std::filesystem::path& file);
+/// Writes a token that is known.
+Status write_token(const std::filesystem::path& file, const std::string& token);
+/// The error, io, names the folder of `file`, unless the token stands there.
+Status expect_token(const std::filesystem::path& file, const std::string& token);
+
+}  // namespace baton

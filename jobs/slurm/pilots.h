@@ -1,0 +1,68 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+namespace baton {
+
+/// How many pilots a farm should have, and what is to be done about it. A pilot is a baton-worker
+/// in an allocation of Slurm. All here is pure: snapshots in, orders out.
+
+enum class SlurmState {
+  waiting,    ///< will begin
+  resting,    ///< was put back into the queue, which lets it wait for minutes
+  running,    ///< its program runs, or is believed to
+  suspended,  ///< stands still until somebody lets it go on
+  ending,
+};
+
+/// A pilot that Slurm has.
+struct SlurmPilot {
+  std::string id;  ///< "17_3": array and task, as scancel takes it
+  SlurmState state = SlurmState::waiting;
+  double alone_s = 0;  ///< how long it has been running without a worker of its name
+  /// For people: Slurm's own word and its reason, the name of the job, the node, what is left of
+  /// the time.
+  std::string state_text = {}, reason = {}, job_name = {}, node = {}, time_left = {};
+
+  bool operator==(const SlurmPilot&) const = default;
+};
+
+/// A pilot that the coordinator has: a connected worker.
+struct SlurmWorker {
+  std::string id;    ///< of its pilot
+  std::string name;  ///< by which it goes at the coordinator
+  int leases = 0;
+  bool told_to_end = false;
+};
+
+struct SlurmSnapshot {
+  std::vector<SlurmPilot> pilots;
+  std::vector<SlurmWorker> workers;
+  std::uint64_t tasks = 0;    ///< that could be in work at the same time
+  int threads_per_pilot = 1;  ///< at least 1
+  int least = 1, most = 1;
+};
+
+struct SlurmOrders {
+  int submit = 0;
+  std::vector<std::string> cancel;  ///< pilots
+  std::vector<std::string> drain;   ///< workers
+
+  bool operator==(const SlurmOrders&) const = default;
+};
+
+/// A pilot whose worker the coordinator has not seen for longer is counted out.
+inline constexpr double kMostAlone_s = 45;
+
+/// How many pilots the work is enough for, within the limits.
+int wanted_pilots(const SlurmSnapshot& now);
+
+/// Whom the coordinator sees is there, whatever Slurm says: a controller that was killed may have
+/// forgotten it. Of the others counts who waits or has just begun. A pilot that rests or is alone
+/// for long is given up; a suspended one is replaced and left to whoever suspended it. When there
+/// are too many, those that wait go first, then the workers with the fewest leases are drained.
+SlurmOrders give_orders(const SlurmSnapshot& now);
+
+}  // namespace baton

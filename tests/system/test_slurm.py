@@ -1,0 +1,221 @@
+#!/usr/bin/env python3
+"""Pilots in a real Slurm: as many as there is work, replaced when they are lost, and the same bytes as without all that."""
+
+import json
+import os
+import shutil
+import time
+from pathlib import Path
+
+from farm import OK, Farm, Process, check, check_equal, make_job, run_tests, wait_until, write_job
+from slurm_cluster import Cluster
+
+NUM_FRAMES = 12
+
+
+class SlurmFarm:
+    """`baton farm slurm` without a job of its own, and a job that is submitted to it again and again."""
+
+    def __init__(self, programs, cluster, folder, nodes, time_limit):
+        self.programs, self.cluster, self.folder = programs, cluster, folder
+        self.job_path = write_job(folder / "job" / "job.json", make_job(
+            folder / "job", frames=f"1-{NUM_FRAMES}", image={"tileSize": 32},
+            sampling={"numParticles": 16, "numCandidates": 64}))
+        programs.render(self.job_path, folder / "alone", 1, 2)
+        self.expected = programs.pixels(self.frames)
+        check_equal(len(self.expected), NUM_FRAMES, "frames of one machine")
+        shutil.rmtree(self.frames)
+        self.job, self.num_done, self.attempts_lost = None, 0, 0
+        self.command = [programs.path("baton"), "farm", "slurm", "--work-dir", str(folder / "farm"), "--nodes", nodes,
+                        "--time", time_limit, "--poll", "0.5", "--host", "127.0.0.1"]
+        self.process = None
+
+    @property
+    def frames(self):
+        return self.folder / "job" / "frames"
+
+    def start(self):
+        """Starts the command, or starts it again; waits until it has a pilot."""
+        self.process = Process(self.command, self.folder / "farm.log", self.cluster.environment)
+        wait_until(lambda: (self.folder / "farm" / "endpoint").exists(), "the coordinator listens")
+        wait_until(self.workers, "the first pilot works")
+
+    def log(self):
+        return self.process.log()
+
+    def baton(self, *words, **options):
+        endpoint = (self.folder / "farm" / "endpoint").read_text(encoding="ascii").strip()
+        return self.programs.run("baton", *words, "--coordinator", endpoint.replace("0.0.0.0", "127.0.0.1"),
+                                 "--key", self.folder / "farm" / "keys" / "admin.key", **options)
+
+    def workers(self):
+        """The pilots that are connected, by their ids in Slurm."""
+        answer = self.baton("worker", "list", "--json", expect=None)
+        if answer.returncode != OK:
+            return set()
+        return {worker["id"].removeprefix("slurm-").partition("#")[0] for worker in json.loads(answer.stdout)}
+
+    def keep_busy(self):
+        """Submits the job when it is not there, and again when it is done, after a look at what came of it."""
+        if self.job is None:
+            self.job = json.loads(self.baton("job", "submit", self.job_path, "--json").stdout)["id"]
+        shown = json.loads(self.baton("job", "show", self.job, "--json").stdout)
+        check(shown["status"] in ("running", "done"), f"the job is {shown['status']}\n{shown['failures']}\n{self.log()}")
+        if shown["status"] == "done":
+            check_equal(self.programs.pixels(self.frames), self.expected, "frames by pilots and alone")
+            self.attempts_lost += shown["attemptsLost"]
+            self.baton("job", "delete", self.job)
+            shutil.rmtree(self.frames)
+            self.job, self.num_done = None, self.num_done + 1
+
+    def wait_while_busy(self, condition, what):
+        """Polls like wait_until, with work all the time."""
+        def turn():
+            self.keep_busy()
+            return condition()
+        return wait_until(turn, f"{what}\n{self.log()}")
+
+    def finish_job(self):
+        done = self.num_done
+        self.wait_while_busy(lambda: self.num_done > done, "the job is done")
+
+    def wait_for_new(self, count, gone, what):
+        """Until so many pilots work and those of `gone` do not."""
+        return self.wait_while_busy(lambda: (w := self.workers()) and len(w - gone) >= count and w, what)
+
+    def stop(self):
+        """Ctrl-C: nothing is left of it in the queue, but what a dead node has not reported."""
+        self.process.terminate()
+        check_equal(self.process.wait(), OK, "exit code of the command")
+        wait_until(lambda: all(state == "COMPLETING" for state, _ in self.cluster.pilots().values()), "the queue is empty")
+
+
+def pilots_follow_the_work_and_are_replaced(programs, folder):
+    with Cluster(folder / "slurm") as cluster:
+        farm = SlurmFarm(programs, cluster, folder, "1-3", "10")
+        farm.start()
+        check_equal(len(farm.workers()), 1, "pilots without work")
+        first = farm.wait_for_new(3, set(), "three pilots work")
+
+        status = farm.baton("farm", "status").stdout
+        for pilot in first:
+            check(f"slurm-{pilot} " in status, f"pilot {pilot} is not shown beside its worker:\n{status}")
+
+        # Cancelled, or back in the queue: others come, and nothing that they held counts as lost or failed.
+        cancelled, requeued = sorted(first)[:2]
+        cluster.run("scancel", cancelled)
+        cluster.run("scontrol", "requeue", requeued)
+        second = farm.wait_for_new(3, {cancelled, requeued}, "two pilots are replaced")
+        farm.finish_job()
+        check_equal(farm.attempts_lost, 0, "attempts lost or failed by a drain")
+
+        # The controller forgets what it took a moment ago, which may be running.
+        gone = min(second)
+        cluster.run("scancel", gone)
+        num_arrays = farm.log().count("pilots are submitted")
+        farm.wait_while_busy(lambda: farm.log().count("pilots are submitted") > num_arrays, "one is submitted")
+        cluster.kill_controller()
+        farm.keep_busy()
+        cluster.start_controller()
+        third = farm.wait_for_new(3, {gone}, "pilots that nobody knows are replaced")
+
+        # A node dies: its tasks go to the others, long before Slurm hears of it.
+        rows = wait_until(lambda: {p: n for p, n in cluster.running().items() if p in third}, "the queue is known again")
+        pilot, node = sorted(rows.items())[0]
+        cluster.kill_node(node)
+        farm.wait_while_busy(lambda: pilot not in farm.workers(), "the pilot of the dead node is missed")
+        farm.finish_job()
+
+        # Without work the least stay.
+        wait_until(lambda: len(farm.workers()) == 1, f"one pilot is left\n{farm.log()}")
+        farm.stop()
+
+
+def a_pilot_ends_with_its_time(programs, folder):
+    with Cluster(folder / "slurm", nodes=1) as cluster:
+        farm = SlurmFarm(programs, cluster, folder, "1", "0:06")
+        farm.start()
+        seen = farm.workers()
+        while len(seen) < 2:
+            seen |= farm.wait_while_busy(lambda: farm.workers() - seen, "the next pilot")
+        farm.finish_job()
+        check_equal(farm.attempts_lost, 0, "attempts lost or failed when a pilot's time was up")
+        farm.stop()
+
+
+def a_job_of_its_own_is_rendered_and_resumed(programs, folder):
+    """As people use it: one command for one job, killed on the way."""
+    with Cluster(folder / "slurm", nodes=2) as cluster:
+        farm = SlurmFarm(programs, cluster, folder, "2", "10")
+        farm.command.insert(3, str(farm.job_path))
+        farm.process = Process(farm.command, folder / "farm.log", cluster.environment)
+        wait_until(lambda: list(farm.frames.glob("*.exr")), "the first frame")
+        farm.process.kill()
+        again = Process(farm.command, folder / "again.log", cluster.environment)
+        check_equal(again.wait(), OK, "exit code")
+        check_equal(programs.pixels(farm.frames), farm.expected, "frames by pilots and alone")
+        check("keys/admin.key" in again.log(), "the command says how to look at the farm")
+
+
+def the_recipes_do_without_the_command(programs, folder):
+    """docker/slurm: a farm inside one allocation, and workers for a coordinator outside."""
+    recipes = Path(__file__).resolve().parents[2] / "docker" / "slurm"
+    with Cluster(folder / "slurm", nodes=2) as cluster:
+        farm = SlurmFarm(programs, cluster, folder, "1", "10")
+        cluster.environment["PATH"] = f"{programs.bin.resolve()}:{os.environ['PATH']}"
+        cluster.run("sbatch", "--nodes=2", "--time=10", f"--output={folder}/inside.log", recipes / "farm.sbatch",
+                    farm.job_path, folder / "inside")
+        wait_until(lambda: not cluster.pilots(), "the allocation has ended")
+        log = (folder / "inside.log").read_text(encoding="utf-8")
+        check_equal(programs.pixels(farm.frames), farm.expected, f"frames of a farm in one allocation\n{log}")
+        check("done" in log and log.count("joined") == 2, log)
+
+        shutil.rmtree(farm.frames)
+        with Farm(programs, folder / "outside") as outside:
+            outside.start_coordinator()
+            cluster.environment["BATON_COORDINATOR"] = outside.endpoint
+            cluster.run("sbatch", "--array=1-2", "--time=10", f"--output={folder}/worker-%a.log", recipes / "workers.sbatch")
+            outside.wait_for(outside.submit(farm.job_path))
+            check_equal(programs.pixels(farm.frames), farm.expected, "frames by workers of the recipe")
+
+
+# ---- long ---------------------------------------------------------------------------------------------------
+
+
+def what_slurm_finds_out_late(programs, folder):
+    """Suspended pilots, and a dead node that Slurm believes in for a while."""
+    with Cluster(folder / "slurm") as cluster:
+        farm = SlurmFarm(programs, cluster, folder, "1-2", "10")
+        farm.start()
+        first = farm.wait_for_new(2, set(), "two pilots work")
+        suspended = min(first)
+        cluster.run("scontrol", "suspend", suspended)
+        second = farm.wait_for_new(2, {suspended}, "a suspended pilot is replaced")
+        cluster.run("scontrol", "resume", suspended)
+        farm.wait_while_busy(lambda: len(farm.workers()) == 2, "one of three goes home")
+
+        victim, node = sorted((p, n) for p, n in cluster.running().items() if p in second)[0]
+        cluster.kill_node(node)
+        farm.wait_for_new(2, {victim}, "the pilot of a dead node is replaced")
+        cluster.start_node(node)
+        for _ in range(5):
+            farm.finish_job()
+
+        # Two seconds after a submission.
+        gone = min(farm.workers())
+        cluster.run("scancel", gone)
+        num_arrays = farm.log().count("pilots are submitted")
+        farm.wait_while_busy(lambda: farm.log().count("pilots are submitted") > num_arrays, "one is submitted")
+        time.sleep(2)
+        cluster.kill_controller()
+        time.sleep(5)
+        cluster.start_controller()
+        farm.wait_for_new(2, {gone}, "pilots that nobody knows are replaced")
+        for _ in range(5):
+            farm.finish_job()
+        farm.stop()
+
+
+if __name__ == "__main__":
+    run_tests([pilots_follow_the_work_and_are_replaced, a_pilot_ends_with_its_time,
+               a_job_of_its_own_is_rendered_and_resumed, the_recipes_do_without_the_command], long_tests=[what_slurm_finds_out_late])

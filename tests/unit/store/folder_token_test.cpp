@@ -1,0 +1,31 @@
+#include "common/store/folder_token.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include "common/base/files.h"
+
+namespace baton {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::HasSubstr;
+
+TEST(FolderToken, ATokenStaysAndTellsItsFolder) {
+  const fs::path folder = fs::path(testing::TempDir()) / "folder_token";
+  fs::remove_all(folder);
+  const std::string token = make_token(folder / "shared" / "token").value();
+  EXPECT_EQ(token.size(), 16u);
+  EXPECT_EQ(make_token(folder / "shared" / "token").value(), token);
+  EXPECT_NE(make_token(folder / "other" / "token").value(), token);
+  EXPECT_TRUE(expect_token(folder / "shared" / "token", token));
+
+  for (const char* where : {"other", "nowhere"}) {
+    const Status seen = expect_token(folder / where / "token", token);
+    ASSERT_FALSE(seen);
+    EXPECT_THAT(seen.error().message, HasSubstr((folder / where).string() + ": not the folder"));
+  }
+}
+
+}  // namespace
+}  // namespace baton
