@@ -53,10 +53,12 @@ function(baton_decides_only target)
   endif()
 endfunction()
 
-# baton_library(NAME DIR folder DEPS public... PRIVATE private...): all .cpp files of one folder and those below.
+# baton_library(NAME DIR folder DEPS public... PRIVATE private...): all .cpp files of one folder and those below; but for
+# folders named `reader`, which are loaded (baton_image_reader).
 function(baton_library name)
   cmake_parse_arguments(A "" "DIR" "DEPS;PRIVATE" ${ARGN})
   file(GLOB_RECURSE sources CONFIGURE_DEPENDS ${CMAKE_SOURCE_DIR}/${A_DIR}/*.cpp)
+  list(FILTER sources EXCLUDE REGEX "/reader/[^/]*$")
   if(sources)
     add_library(${name} STATIC ${sources})
     target_link_libraries(${name} PUBLIC baton_options ${A_DEPS} PRIVATE ${A_PRIVATE})
@@ -84,4 +86,15 @@ function(baton_program name)
     add_executable(${name} ${sources})
     target_link_libraries(${name} PRIVATE baton_options ${A_DEPS})
   endif()
+endfunction()
+
+# baton_image_reader(DIR folder PRIVATE libraries...): libbaton-images.so beside the programs, which load it when they read
+# their first image: what it is linked with takes longer to load than most programs run.
+function(baton_image_reader)
+  cmake_parse_arguments(A "" "DIR" "PRIVATE" ${ARGN})
+  file(GLOB sources CONFIGURE_DEPENDS ${CMAKE_SOURCE_DIR}/${A_DIR}/*.cpp)
+  add_library(baton-images MODULE ${sources})
+  target_link_libraries(baton-images PRIVATE baton_options ${A_PRIVATE})
+  set_target_properties(baton-images PROPERTIES LIBRARY_OUTPUT_DIRECTORY ${CMAKE_RUNTIME_OUTPUT_DIRECTORY})
+  add_dependencies(texture baton-images)
 endfunction()

@@ -12,6 +12,8 @@ namespace baton {
 inline constexpr NumberRange kUnitRange{0, 1};
 /// Positions: far beyond it float32 has no digits left for the picture.
 inline constexpr NumberRange kCoordinateRange{-1e9, 1e9};
+/// Radiance.
+inline constexpr NumberRange kLightRange{0, 1e9};
 /// Lengths and factors above zero.
 inline constexpr NumberRange kPositiveRange{.min = 0, .max = 1e9, .min_open = true};
 /// Angles in degrees.
@@ -20,6 +22,8 @@ inline constexpr NumberRange kAngleRange{-1e6, 1e6};
 /// Names of the enumerations in JSON, by value.
 inline constexpr std::array<std::string_view, 4> kMaterialKinds{"diffuse", "phong",
                                                                 "metallicRoughness", "measured"};
+inline constexpr std::array<std::string_view, 3> kTextureWraps{"repeat", "clamp", "mirror"};
+inline constexpr std::array<std::string_view, 2> kTextureFilters{"linear", "nearest"};
 inline constexpr std::array<std::string_view, 2> kMapFilters{"nearest", "bilinear"};
 inline constexpr std::array<std::string_view, 3> kPixelFilters{"box", "gaussian",
                                                                "blackman-harris"};
@@ -57,6 +61,8 @@ void fields(JobArchive& a, JobSpec& job);
 
 /// scene_fields.cpp
 void fields(JobArchive& a, SceneSpec& scene);
+/// material_fields.cpp
+void fields(JobArchive& a, MaterialSpec& material);
 /// motion_fields.cpp
 void fields(JobArchive& a, CameraSpec& camera);
 void fields(JobArchive& a, MotionSpec& motion);

@@ -135,6 +135,7 @@ std::vector<std::string> asset_paths(const JobSpec& job) {
   for (const auto& item : job.scene.meshes) paths.insert(item.second.path);
   for (const auto& item : job.scene.materials) {
     if (item.second.kind == MaterialKind::measured) paths.insert(item.second.file);
+    for (const TextureSpec* texture : textures_of(item.second)) paths.insert(texture->file);
   }
   for (const FileSpec& file : job.scene.files) paths.insert(file.path);
   for (const EnvironmentKey& key : job.environment.keys) paths.insert(key.map);

@@ -43,33 +43,6 @@ void material_reference(JobArchive& a, Key key, std::string& name, const SceneSp
   }
 }
 
-void fields(JobArchive& a, MaterialSpec& material) {
-  a.choice(required("type"), material.kind, kMaterialKinds);
-  if (material.kind != MaterialKind::measured) a.vector("color", material.base_color, kUnitRange);
-  switch (material.kind) {
-    case MaterialKind::diffuse:
-      break;
-    case MaterialKind::phong:
-      a.vector("specularColor", material.specular_color, kUnitRange);
-      a.number("kd", material.kd, kUnitRange);
-      a.number("ks", material.ks, kUnitRange);
-      a.number("exponent", material.exponent, {1, 100000});
-      // Float sums such as 0.7 + 0.3 may be an ulp above 1.
-      if (material.kd + material.ks > 1.000001f) {
-        a.fault("ks", "kd + ks <= 1, or the material makes light",
-                fmt::format("{}", material.kd + material.ks));
-      }
-      break;
-    case MaterialKind::metallic_roughness:
-      a.number("metallic", material.metallic, kUnitRange);
-      a.number("roughness", material.roughness, {0.02, 1});
-      break;
-    case MaterialKind::measured:
-      asset_path(a, required("file"), material.file, {".binary"});
-      break;
-  }
-}
-
 void fields(JobArchive& a, MeshSpec& mesh) {
   asset_path(a, required("path"), mesh.path, {".ply", ".obj", ".off", ".gltf", ".glb"});
   a.boolean("smoothNormals", mesh.smooth_normals);

@@ -27,24 +27,59 @@ struct GltfMotion {
   bool operator==(const GltfMotion&) const = default;
 };
 
+/// How an image goes on past its edges.
+enum class TextureWrap : std::uint8_t { repeat, clamp, mirror };
+/// How texels are blended that are larger than what a site sees.
+enum class TextureFilter : std::uint8_t { linear, nearest };
+
+/// An image on a surface: at texture coordinates (u, v) lies the image's place
+/// offset + R(rotate_deg) (scale * (u, v)), with (0, 0) its upper left corner, (1, 1) its lower
+/// right [KHR_texture_transform].
+struct TextureSpec {
+  std::string file;  ///< an image, or a .gltf or .glb file that holds one
+  int image = -1;    ///< of a .gltf or .glb file: place in its list of images; else -1
+  int uv = 0;        ///< set of texture coordinates, 0 or 1
+  std::array<float, 2> offset{0, 0};
+  std::array<float, 2> scale{1, 1};
+  float rotate_deg = 0;  ///< counter-clockwise, of the coordinates
+  TextureWrap wrap_u = TextureWrap::repeat, wrap_v = TextureWrap::repeat;
+  TextureFilter filter = TextureFilter::linear;
+  float strength = 1;  ///< normal maps: factor on x and y
+
+  bool operator==(const TextureSpec&) const = default;
+};
+
 enum class MaterialKind : std::uint8_t { diffuse, phong, metallic_roughness, measured };
 
 /// diffuse: base_color is the albedo. phong: kd * base_color diffuse + ks * specular_color
 /// normalised lobe of `exponent`. metallic_roughness: GGX with base_color, metallic, roughness
-/// (glTF 2.0). measured: a table in the MERL binary format.
+/// (glTF 2.0). measured: a table in the MERL binary format. Textures are factors; not of measured.
 struct MaterialSpec {
   MaterialKind kind = MaterialKind::diffuse;
   Rgb base_color{0.8f, 0.8f, 0.8f};
-  Rgb specular_color{1, 1, 1};  ///< phong
+  Rgb specular_color{1, 1, 1};  ///< phong; metallic_roughness: on F0 of what is no metal
   float kd = 0.5f;              ///< phong, [0, 1]
   float ks = 0.5f;              ///< phong, [0, 1]; kd + ks <= 1
   float exponent = 50;          ///< phong, [1, 100000]
   float metallic = 0;           ///< [0, 1]
   float roughness = 0.5f;       ///< [0.02, 1]; alpha = roughness^2
+  float ior = 1.5f;             ///< metallic_roughness, of what is no metal, [1, 100]
+  float specular = 1;           ///< the same: strength of its reflection, [0, 1]
   std::string file{};           ///< measured: .binary
+
+  std::optional<TextureSpec> color_texture{};               ///< on base_color; its alpha on `alpha`
+  std::optional<TextureSpec> metallic_roughness_texture{};  ///< B on metallic, G on roughness
+  std::optional<TextureSpec> normal_texture{};
+  Rgb emission{0, 0, 0};  ///< radiance that the camera sees; it lights nothing
+  std::optional<TextureSpec> emission_texture{};  ///< on emission
+  float alpha = 1;                                ///< [0, 1]
+  float alpha_cutoff = 0;  ///< where alpha is below, there is no surface; [0, 1]
 
   bool operator==(const MaterialSpec&) const = default;
 };
+
+/// Those that a material has.
+std::vector<const TextureSpec*> textures_of(const MaterialSpec& material);
 
 /// Whether a file name ends in .gltf or .glb.
 bool is_gltf(const std::string& path);

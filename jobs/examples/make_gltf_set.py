@@ -2,13 +2,17 @@
 """Writes a small scene as Blender would: a floor, a ring of pillars that share one mesh, a turning vane, a lift, a ball
 that bounces, and a camera on a dolly, each with an animation of its own. Standard library only.
 
-usage: make_gltf_set.py FILE.glb     frames 1 to 24 at 24 frames per second, frame n at n / 24 seconds
+usage: make_gltf_set.py FILE.glb [--textured]
+
+Frames 1 to 24 at 24 frames per second, frame n at n / 24 seconds. --textured: tiles with joints on the floor, scratches on
+the vane, holes in the ball, pillars that glow in stripes.
 """
 
 import json
 import math
 import struct
 import sys
+import zlib
 from pathlib import Path
 
 FLOAT, UINT16, INT16 = 5126, 5123, 5122
@@ -21,6 +25,7 @@ class Builder:
     def __init__(self):
         self.data = bytearray()
         self.views, self.accessors, self.meshes, self.nodes, self.animations = [], [], [], [], []
+        self.images, self.textures = [], []
 
     def accessor(self, rows, kind, component=FLOAT, **more):
         """Appends rows of numbers; the index of their accessor."""
@@ -42,6 +47,16 @@ class Builder:
             accessor["max"] = [max(float(struct.unpack("<f", struct.pack("<f", c[i]))[0]) for c in columns) for i in range(width)]
         self.accessors.append(accessor)
         return len(self.accessors) - 1
+
+    def texture(self, width, height, texel):
+        """An image in the file, by texel(x, y) -> 3 or 4 bytes; the index of its texture."""
+        self.data += bytes(-len(self.data) % 4)
+        image = png(width, height, texel)
+        self.views.append({"buffer": 0, "byteOffset": len(self.data), "byteLength": len(image)})
+        self.data += image
+        self.images.append({"bufferView": len(self.views) - 1, "mimeType": "image/png"})
+        self.textures.append({"source": len(self.images) - 1, "sampler": len(self.images) - 1})
+        return len(self.textures) - 1
 
     def mesh(self, name, material, positions, normals, uvs, triangles, quantised=False):
         """A mesh of one primitive; quantised: positions as 16-bit integers of the cube [-1, 1]."""
@@ -79,6 +94,16 @@ class Builder:
         size = 12 + 8 + len(text) + 8 + len(binary)
         return (struct.pack("<4sII", b"glTF", 2, size) + struct.pack("<I4s", len(text), b"JSON") + text
                 + struct.pack("<I4s", len(binary), b"BIN\0") + binary)
+
+
+def png(width, height, texel):
+    """The bytes of a PNG of texel(x, y) -> 3 or 4 bytes."""
+    def chunk(kind, data):
+        return struct.pack(">I", len(data)) + kind + data + struct.pack(">I", zlib.crc32(kind + data))
+    rows = b"".join(b"\0" + b"".join(bytes(texel(x, y)) for x in range(width)) for y in range(height))
+    color = {3: 2, 4: 6}[len(texel(0, 0))]
+    return (b"\x89PNG\r\n\x1a\n" + chunk(b"IHDR", struct.pack(">IIBBBBB", width, height, 8, color, 0, 0, 0))
+            + chunk(b"IDAT", zlib.compress(rows)) + chunk(b"IEND", b""))
 
 
 def box():
@@ -125,7 +150,44 @@ def pbr(name, color, metallic, roughness):
                                                    "roughnessFactor": roughness}}
 
 
-def make_set(pillars=7):
+def add_textures(b, materials):
+    """Every kind of texture that is read, on the materials of the set."""
+    def joint(x):  # how far into a joint between tiles of 32 texels
+        return max(0, 2 - min(x % 32, 31 - x % 32))
+
+    def tile(x, y):
+        shade = 255 - 40 * ((x // 32 + y // 32) % 2) - 70 * max(joint(x), joint(y)) - (x * 7 + y * 13) % 16
+        return shade, shade - 5, shade - 15
+
+    def slope(x, y):
+        across = 60 * joint(x) * (1 if x % 32 > 16 else -1)
+        up = 60 * joint(y) * (1 if y % 32 < 16 else -1)
+        length = math.sqrt(across ** 2 + up ** 2 + 127 ** 2)
+        return tuple(round(127.5 + 127 * c / length) for c in (across, up, 127))
+
+    def scratch(x, y):
+        return 0, 60 + (x * 37 + y // 8 * 11) % 128, 255 if y % 16 < 12 else 0
+
+    def lace(x, y):
+        return 255, 255 - 2 * y, 200, 0 if (x - 16) ** 2 + (y - 16) ** 2 < 90 else 255
+
+    def stripe(_x, y):
+        return (255, 160, 40) if y % 16 < 4 else (0, 0, 0)
+
+    floor, clay, steel, rubber = materials
+    floor["pbrMetallicRoughness"]["baseColorTexture"] = {"index": b.texture(64, 64, tile)}
+    floor["normalTexture"] = {"index": b.texture(64, 64, slope), "scale": 0.8}
+    steel["pbrMetallicRoughness"]["metallicRoughnessTexture"] = {"index": b.texture(64, 32, scratch)}
+    turned = {"KHR_texture_transform": {"scale": [8, 4], "rotation": 0.1, "offset": [0.2, 0]}}
+    rubber["pbrMetallicRoughness"]["baseColorTexture"] = {"index": b.texture(32, 32, lace), "extensions": turned}
+    rubber.update(alphaMode="MASK", alphaCutoff=0.4, doubleSided=True)
+    clay["emissiveTexture"] = {"index": b.texture(32, 32, stripe)}
+    clay.update(emissiveFactor=[1, 1, 1], extensions={"KHR_materials_emissive_strength": {"emissiveStrength": 1.5}})
+    samplers = [{"wrapS": 10497, "wrapT": 10497}] * 5
+    return {"images": b.images, "textures": b.textures, "samplers": samplers}
+
+
+def make_set(pillars=7, textured=False):
     """The bytes of the .glb."""
     b = Builder()
     materials = [pbr("floor", (0.5, 0.45, 0.4), 0, 0.7), pbr("clay", (0.6, 0.25, 0.15), 0, 0.6),
@@ -161,11 +223,12 @@ def make_set(pillars=7):
     b.animate(dolly, "rotation", [seconds[0], seconds[-1]], [about_y(-10), about_y(10)])
     assert eye < len(b.nodes)
     camera = {"type": "perspective", "name": "eye", "perspective": {"yfov": 0.55, "znear": 0.1, "aspectRatio": 16 / 9}}
-    return b.glb(roots, materials, [camera], extensionsUsed=["KHR_mesh_quantization"],
-                 extensionsRequired=["KHR_mesh_quantization"])
+    used = ["KHR_mesh_quantization"] + ["KHR_texture_transform", "KHR_materials_emissive_strength"] * textured
+    more = add_textures(b, materials) if textured else {}
+    return b.glb(roots, materials, [camera], extensionsUsed=used, extensionsRequired=["KHR_mesh_quantization"], **more)
 
 
 if __name__ == "__main__":
-    if len(sys.argv) != 2:
+    if len(sys.argv) not in (2, 3) or sys.argv[2:] not in ([], ["--textured"]):
         sys.exit(__doc__)
-    Path(sys.argv[1]).write_bytes(make_set())
+    Path(sys.argv[1]).write_bytes(make_set(textured="--textured" in sys.argv))

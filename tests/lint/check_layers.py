@@ -32,7 +32,9 @@ MAY_INCLUDE = {
     "common/store": COMMON_BASE,
     "common/protocol": COMMON_DATA | {"common/job"},
     "worker/sampling": COMMON_DATA | {"common/job", "common/state"},
-    "worker/scene": SCENE | {"worker/scene/gltf"},
+    "worker/texture": COMMON_BASE | {"worker/texture/reader"},
+    "worker/texture/reader": set(),
+    "worker/scene": SCENE | {"worker/scene/gltf", "worker/texture"},
     "worker/scene/gltf": SCENE | {"worker/scene"},
     "worker/accel": SCENE | {"worker/scene"},
     "worker/light": LIGHT,
@@ -56,6 +58,7 @@ MAY_INCLUDE = {
 # Library, by how its headers are spelled -> files that may include them (prefix of the path).
 THIRD_PARTY = {
     r"embree3/": ["worker/accel/"],
+    r"OpenImageIO/": ["worker/texture/reader/"],
     r"assimp/": ["worker/scene/assimp_file.h", "worker/scene/assimp_file.cpp"],
     r"OpenEXR/|Imath/|png\.h": ["common/image/"],
     r"zmq": ["common/protocol/"],

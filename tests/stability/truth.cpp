@@ -40,18 +40,17 @@ std::vector<Node> light_nodes(const Environment& environment, int nodes) {
 }
 
 /// Adds up one pixel. rays and weights: scratch.
-void sum_pixel(const RenderContext& context, const FrameGeometry& geometry, const SurfaceHit& hit,
-               const std::vector<Node>& nodes, ShadowRays& rays, std::vector<double>& weights,
-               double& lns, double& radiance) {
+void sum_pixel(const FrameGeometry& geometry, const SurfaceHit& hit, const std::vector<Node>& nodes,
+               ShadowRays& rays, std::vector<double>& weights, double& lns, double& radiance) {
   if (!hit.hit) return;
   rays.clear();
   weights.clear();
-  const Material& material = context.scene->materials[hit.material];
+  const SeenSurface seen = geometry.see(hit);
   const Vec3 origin = hit.ray_origin;
   for (const Node& node : nodes) {
-    if (!above_horizon(hit.point, node.wi)) continue;
-    const double value =
-        mean(evaluate_bsdf(material, hit.point, node.wi) * node.power) * dot(hit.point.ns, node.wi);
+    if (!above_horizon(seen.point, node.wi)) continue;
+    const double value = mean(evaluate_bsdf(seen.material, seen.point, node.wi) * node.power) *
+                         dot(seen.point.ns, node.wi);
     if (!(value > 0)) continue;
     lns += value;
     rays.push(origin, node.wi);
@@ -73,8 +72,7 @@ FrameTruth sum_frame(const RenderContext& context, const FrameGeometry& geometry
   ShadowRays rays;
   std::vector<double> weights;
   for (std::size_t p = 0; p < surfaces.hits.size(); ++p) {
-    sum_pixel(context, geometry, surfaces.hits[p], light, rays, weights, truth.lns[p],
-              truth.radiance[p]);
+    sum_pixel(geometry, surfaces.hits[p], light, rays, weights, truth.lns[p], truth.radiance[p]);
   }
   return truth;
 }

@@ -108,6 +108,10 @@ class Draw:
             "maxRetriesPerTask": nothing, "maxSecondsPerTask": nothing, "maxFailuresPerWorker": nothing,
             # Geometry.
             "scene.materials.*.file": self.table,
+            "scene.materials.*.emission": lambda: self.pick(None, None, [0.2, 0.5, 3.0]),
+            # Meshes without texture coordinates take none; the glTF set has textures of its own.
+            **{f"scene.materials.*.{key}": nothing
+               for key in ("colorTexture", "normalTexture", "emissionTexture", "metallicRoughnessTexture")},
             "scene.objects[].translate": lambda: self.vector(1.3),
             "scene.objects[].rotateDeg": lambda: self.pick(None, self.vector(180)),
             "scene.objects[].scale": lambda: self.pick(None, 0.3, 1.7, [0.2, 1, 1.5], 1e-3, 30),
@@ -181,7 +185,7 @@ class Draw:
 
     def gltf_set(self, node, names):
         """The set of the examples: instances, some of them mirrored, three kinds of curves."""
-        self.files["set.glb"] = {"kind": "set", "pillars": self.pick(1, 4)}
+        self.files["set.glb"] = {"kind": "set", "pillars": self.pick(1, 4), "textured": self.chance(0.5)}
         form = self.schema.resolve(node["properties"]["gltf"])["oneOf"][1]
         self.schema.hand["scene.gltf.nodes"] = lambda: None
         gltf = self.schema.object(form, "scene.gltf")

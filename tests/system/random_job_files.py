@@ -35,7 +35,7 @@ def write_file(path, recipe, shared):
     elif kind == "merl":
         link_table(path, recipe, shared)
     elif kind == "set":
-        path.write_bytes(make_set(recipe["pillars"]))
+        path.write_bytes(make_set(recipe["pillars"], recipe.get("textured", False)))
     elif kind == "walk":
         path.write_text(json.dumps(walk_gltf(recipe)), encoding="ascii")
     else:

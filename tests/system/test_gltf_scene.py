@@ -9,15 +9,15 @@ from pathlib import Path
 from farm import BAD_INPUT, check, check_equal, make_job, run_tests, write_job
 
 sys.path.append(str(Path(__file__).parents[2] / "jobs/examples"))
-from make_gltf_set import make_set  # noqa: E402
+from make_gltf_set import make_set, png  # noqa: E402
 
 NUM_FRAMES = 3
 
 
-def set_job(folder, tile_size=64, method="pool", **scene):
+def set_job(folder, tile_size=64, method="pool", textured=False, **scene):
     """The camera of the set from behind its dolly; frames with motion of all kinds."""
     folder.mkdir(parents=True, exist_ok=True)
-    (folder / "set.glb").write_bytes(make_set(3))
+    (folder / "set.glb").write_bytes(make_set(3, textured))
     job = make_job(folder, frames="12-14", image={"width": 96, "height": 54, "sites": 4, "tileSize": tile_size},
                    sampling={"method": method, "numParticles": 4, "numCandidates": 32})
     del job["camera"]
@@ -67,5 +67,43 @@ def a_cut_file_is_one_error(programs, folder):
         check("set.glb: not a glTF file" in failed.stderr, failed.stderr)
 
 
+def textures_for_any_tiling(programs, folder):
+    """Holes, bumps, glow and images are the same in small tiles, and are seen."""
+    for method in ("pool", "bidirectional"):
+        whole, small, plain = (folder / method / name for name in ("whole", "small", "plain"))
+        expected = rendered(programs, whole, set_job(whole, 128, method, textured=True), workers=1, threads=1)
+        got = rendered(programs, small, set_job(small, 16, method, textured=True), workers=2, threads=1)
+        check_equal(got, expected, f"pixels of {method} in small tiles")
+        check(rendered(programs, plain, set_job(plain, 128, method), workers=1, threads=1) != expected, "no texture is seen")
+
+
+def textures_are_said_and_part_of_the_job(programs, folder):
+    """`check` says what is not as in the file; another image is another picture; a damaged one is one error."""
+    path = write_job(folder / "job.json", set_job(folder, textured=True))
+    said = programs.run("baton", "check", path).stdout
+    check('material "clay": it glows, but lights nothing' in said, said)
+    check("textures are not read" not in said, said)
+    (folder / "wood.png").write_bytes(png(2, 2, lambda x, y: (100 * x, 50 * y, 9)))
+    job = make_job(folder)
+    job["scene"]["materials"] = {name: {"type": "diffuse", "colorTexture": "wood.png"} for name in job["scene"]["materials"]}
+    job["scene"]["objects"], job["scene"]["ground"] = [], {"material": next(iter(job["scene"]["materials"]))}
+    path = write_job(folder / "wood.json", job)
+    programs.render(path, folder / "work")
+    before = programs.pixels(folder / "frames")
+    (folder / "wood.png").write_bytes(png(2, 2, lambda x, y: (100 * x, 50 * y, 99)))
+    refused = programs.render(path, folder / "work", expect=None)
+    check(refused.returncode != 0 and "wood.png" in refused.stderr, refused.stderr)
+    programs.render(path, folder / "work", extra=["--restart"])
+    check(programs.pixels(folder / "frames") != before, "another image shows the same")
+    for content, said in ((b"no image\n" * 9, "not an image"), (None, "missing")):
+        (folder / "wood.png").unlink()
+        if content is not None:
+            (folder / "wood.png").write_bytes(content)
+        failed = programs.run("baton", "check", path, expect=BAD_INPUT)
+        check("wood.png: " + said in failed.stderr, failed.stderr)
+        (folder / "wood.png").write_bytes(b"")
+
+
 if __name__ == "__main__":
-    run_tests([any_tiling, the_job_says_otherwise, a_cut_file_is_one_error])
+    run_tests([any_tiling, the_job_says_otherwise, a_cut_file_is_one_error, textures_for_any_tiling,
+               textures_are_said_and_part_of_the_job])

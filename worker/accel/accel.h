@@ -11,6 +11,7 @@
 #include "common/base/poison.h"
 #include "worker/scene/camera.h"
 #include "worker/scene/scene.h"
+#include "worker/scene/surface_detail.h"
 
 namespace baton {
 
@@ -22,6 +23,7 @@ struct SurfaceHit {
   std::uint32_t instance = 0;
   std::uint32_t material = 0;
   bool hit = false;
+  SurfacePlace place{};  ///< where the material has detail (surface_detail.h), else all 0
 
   bool operator==(const SurfaceHit&) const = default;
 };

@@ -36,9 +36,29 @@ void fill_buffer(RTCGeometry geometry, RTCBufferType type, RTCFormat format,
   if (buffer != nullptr) std::memcpy(buffer, elements.data(), elements.size() * sizeof(T));
 }
 
-/// Attaches the triangles of a mesh, moved by `to_target`, as geometry `index`.
+/// Lets rays pass where a cut-out surface is not there; for hits to count and for shadows alike.
+/// geometryUserPtr: the Scene.
+void pass_through_holes(const RTCFilterFunctionNArguments* args) {
+  const auto& scene = *static_cast<const Scene*>(args->geometryUserPtr);
+  for (unsigned i = 0; i < args->N; ++i) {
+    if (args->valid[i] == 0) continue;
+    // Meshes with a hierarchy of their own are placed as the instance of that number.
+    const unsigned placed = RTCHitN_instID(args->hit, args->N, i, 0);
+    const Instance& instance =
+        scene.instances[placed != RTC_INVALID_GEOMETRY_ID ? placed
+                                                          : RTCHitN_geomID(args->hit, args->N, i)];
+    const auto& detail = scene.material_of(instance).detail;
+    if (detail == nullptr || !detail->is_cut_out()) continue;
+    if (is_cut_away(scene, instance, RTCHitN_primID(args->hit, args->N, i),
+                    RTCHitN_u(args->hit, args->N, i), RTCHitN_v(args->hit, args->N, i)))
+      args->valid[i] = 0;
+  }
+}
+
+/// Attaches the triangles of a mesh, moved by `to_target`, as geometry `index`. holes: the scene if
+/// the mesh is cut out somewhere, else null.
 void attach_instance(RTCDevice device, RTCScene target, const TriangleMesh& mesh,
-                     const Transform& to_target, unsigned index) {
+                     const Transform& to_target, const Scene* holes, unsigned index) {
   std::vector<Vec3> positions;
   positions.reserve(mesh.positions.size());
   for (const Vec3& p : mesh.positions) positions.push_back(to_target.point(p));
@@ -46,6 +66,11 @@ void attach_instance(RTCDevice device, RTCScene target, const TriangleMesh& mesh
   const Owned<RTCGeometry> geometry(rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE));
   fill_buffer(geometry.get(), RTC_BUFFER_TYPE_VERTEX, RTC_FORMAT_FLOAT3, positions);
   fill_buffer(geometry.get(), RTC_BUFFER_TYPE_INDEX, RTC_FORMAT_UINT3, mesh.triangles);
+  if (holes != nullptr) {
+    rtcSetGeometryUserData(geometry.get(), const_cast<Scene*>(holes));
+    rtcSetGeometryIntersectFilterFunction(geometry.get(), pass_through_holes);
+    rtcSetGeometryOccludedFilterFunction(geometry.get(), pass_through_holes);
+  }
   rtcCommitGeometry(geometry.get());
   rtcAttachGeometryByID(target, geometry.get(), index);
 }
@@ -262,12 +287,14 @@ class EmbreeAccel final : public Accel {
       if (!(dot(ns, ng) > 0)) ns = ng;
     }
     const Vec3 position = interpolate(a, b, c);
+    const bool has_detail = scene_.material_of(instance).detail != nullptr;
     return {.point = {.position = position, .ng = ng, .ns = ns, .wo = wo},
             .ray_origin = lift_off(position, ng),
             .depth = hit.depth,
             .instance = index,
             .material = instance.material,
-            .hit = true};
+            .hit = true,
+            .place = has_detail ? SurfacePlace{hit.triangle, u, v} : SurfacePlace{}};
   }
 
   const Scene& scene_;
@@ -286,6 +313,16 @@ std::set<std::uint32_t> shared_meshes(const Scene& scene, std::uint64_t max_copi
     copied += scene.meshes[instance.mesh].triangles.size();
   }
   return copied > max_copied_triangles ? repeated : std::set<std::uint32_t>{};
+}
+
+/// Meshes that are cut out, somewhere at least.
+std::set<std::uint32_t> meshes_with_holes(const Scene& scene) {
+  std::set<std::uint32_t> meshes;
+  for (const Instance& instance : scene.instances) {
+    const auto& detail = scene.material_of(instance).detail;
+    if (detail != nullptr && detail->is_cut_out()) meshes.insert(instance.mesh);
+  }
+  return meshes;
 }
 
 }  // namespace
@@ -307,17 +344,19 @@ Result<std::unique_ptr<Accel>> Accel::build(const Scene& scene,
   // What stands still, in world space; each mesh that moves, in its own.
   geometry->still = geometry->new_scene();
   const std::set<std::uint32_t> shared = shared_meshes(scene, max_copied_triangles);
+  const std::set<std::uint32_t> with_holes = meshes_with_holes(scene);
   for (unsigned i = 0; i < scene.instances.size(); ++i) {
     const Instance& instance = scene.instances[i];
+    const Scene* const holes = with_holes.contains(instance.mesh) ? &scene : nullptr;
     if (!instance.moves() && !shared.contains(instance.mesh)) {
       attach_instance(device, geometry->still.get(), scene.meshes[instance.mesh], instance.to_world,
-                      i);
+                      holes, i);
       continue;
     }
     Owned<RTCScene>& own = geometry->own_meshes[instance.mesh];
     if (own == nullptr) {
       own = geometry->new_scene();
-      attach_instance(device, own.get(), scene.meshes[instance.mesh], {}, 0);
+      attach_instance(device, own.get(), scene.meshes[instance.mesh], {}, holes, 0);
       rtcCommitScene(own.get());
     }
     geometry->any_moves = geometry->any_moves || instance.moves();

@@ -18,6 +18,7 @@ Result<std::shared_ptr<const FrameGeometry>> GeometrySequence::at(std::int32_t i
   const bool placed = std::any_of(scene_.instances.begin(), scene_.instances.end(),
                                   [](const Instance& instance) { return instance.moves(); });
   frame->accel = rest_;
+  frame->scene = &scene_;
   if (placed) {
     BATON_ASSIGN(frame->accel, rest_->place(frame->pose.instances));
   }

@@ -8,6 +8,7 @@
 #include "common/base/lru_cache.h"
 #include "worker/accel/accel.h"
 #include "worker/scene/pose.h"
+#include "worker/scene/site_block.h"
 
 namespace baton {
 
@@ -15,6 +16,29 @@ namespace baton {
 struct FrameGeometry {
   Pose pose;
   std::shared_ptr<const Accel> accel;
+  const Scene* scene = nullptr;
+
+  const Material& material_of(const SurfaceHit& hit) const {
+    return scene->materials[hit.material];
+  }
+  /// Sets a site to what it hit. Returns the radiance that the surface emits.
+  Rgb add_to(SiteBlock& sites, int site, const SurfaceHit& hit) const {
+    const Material& material = material_of(hit);
+    if (material.detail == nullptr) {
+      sites.add(site, hit.point, material);
+      return {};
+    }
+    const SeenSurface seen = see(hit);
+    sites.add(site, seen.point, seen.material);
+    return seen.emission;
+  }
+  /// A hit, with what textures say of it. Normals of hits are those of the mesh: history compares
+  /// them.
+  SeenSurface see(const SurfaceHit& hit) const {
+    const Material& material = material_of(hit);
+    if (material.detail == nullptr) return {hit.point, material, {}};
+    return see_detail(*scene, pose.instances[hit.instance], hit.place, hit.point);
+  }
 };
 
 /// The geometry of a job's frames, placed on demand and kept for the frames used last. What stands

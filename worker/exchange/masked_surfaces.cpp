@@ -20,12 +20,15 @@ MaskedSurfaces::MaskedSurfaces(const RenderContext& context, const FrameGeometry
 
   // Tabulate.
   table_.reserve(hits_.size());
-  for (const SurfaceHit& hit : hits_) {
-    if (hit.hit) {
-      table_.add(hit.point, context.scene->materials[hit.material], hit.ray_origin);
-    } else {
+  emission_.resize(hits_.size() / num_sites_);
+  for (std::size_t i = 0; i < hits_.size(); ++i) {
+    if (!hits_[i].hit) {
       table_.add_nothing();
+      continue;
     }
+    const SeenSurface seen = geometry.see(hits_[i]);
+    table_.add(seen.point, seen.material, hits_[i].ray_origin);
+    emission_[i / num_sites_] += seen.emission / static_cast<float>(num_sites_);
   }
 }
 

@@ -24,12 +24,17 @@ class MaskedSurfaces {
   double seconds_rays() const { return seconds_rays_; }
   /// Radiance of the environment that the pixel shows past its surfaces, mean over the sites.
   Rgb background(std::int32_t position, const Environment& environment) const;
+  /// Radiance that the surfaces of a pixel emit, mean over the sites.
+  Rgb emission(std::int32_t position) const {
+    return emission_[static_cast<std::size_t>(position)];
+  }
 
  private:
   std::size_t num_sites_;
   std::vector<std::int32_t> position_;  ///< PixelMask::ranks
   std::vector<Ray> rays_;               ///< (masked pixels, S)
   std::vector<SurfaceHit> hits_;        ///< (masked pixels, S)
+  std::vector<Rgb> emission_;           ///< (masked pixels)
   SurfaceTable table_;                  ///< (masked pixels, S)
   double seconds_rays_ = 0;
 };

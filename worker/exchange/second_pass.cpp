@@ -102,10 +102,9 @@ void write_pixels(const SecondPassWork& work, std::span<const Rgb> radiance, Fil
     for (std::int32_t x = work.rect.x0; x < work.rect.x1; ++x) {
       if (!work.masks.any.at(x, y)) continue;
       const std::size_t pixel = PixelMask::index(work.rect, x, y);
-      Rgb value = radiance[pixel];
-      if (show_environment)
-        value += work.surfaces.background(work.surfaces.find(work.masks.any.index(x, y)),
-                                          work.light.now);
+      const std::int32_t position = work.surfaces.find(work.masks.any.index(x, y));
+      Rgb value = radiance[pixel] + work.surfaces.emission(position);
+      if (show_environment) value += work.surfaces.background(position, work.light.now);
       film.plane(0)[pixel] = value.x;
       film.plane(1)[pixel] = value.y;
       film.plane(2)[pixel] = value.z;

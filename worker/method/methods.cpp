@@ -18,18 +18,17 @@ namespace {
 
 using SamplerPtr = std::unique_ptr<const PixelSampler>;
 using MethodPtr = std::unique_ptr<const PixelMethod>;
-using Materials = std::span<const Material>;
 
 template <class Of>
-MethodPtr of_job(const JobSpec& job, Materials /*materials*/) {
+MethodPtr of_job(const JobSpec& job) {
   return std::make_unique<Of>(job);
 }
 template <class Of>
-MethodPtr of_sampling(const JobSpec& job, Materials /*materials*/) {
+MethodPtr of_sampling(const JobSpec& job) {
   return std::make_unique<Of>(job.sampling);
 }
-MethodPtr make_reference(const JobSpec& job, Materials materials) {
-  return std::make_unique<ReferenceMethod>(job.sampling.reference_samples, materials);
+MethodPtr make_reference(const JobSpec& job) {
+  return std::make_unique<ReferenceMethod>(job.sampling.reference_samples);
 }
 
 SamplerPtr make_environment(const SamplingSpec& s) {
@@ -63,7 +62,7 @@ SamplerPtr make_sequential(const SamplingSpec& s) {
 
 struct Maker {
   Method name;
-  MethodPtr (*method)(const JobSpec&, Materials);
+  MethodPtr (*method)(const JobSpec&);
   SamplerPtr (*sampler)(const SamplingSpec&);  ///< of methods that keep samples
 };
 /// In the order of the enumeration.
@@ -85,9 +84,9 @@ const Maker& maker(Method method) { return kMakers[static_cast<std::size_t>(meth
 
 }  // namespace
 
-MethodPtr make_pixel_method(const JobSpec& job, Materials materials) {
+MethodPtr make_pixel_method(const JobSpec& job) {
   BATON_CHECK(job.sampling.method != Method::automatic);
-  return maker(job.sampling.method).method(job, materials);
+  return maker(job.sampling.method).method(job);
 }
 
 MethodPtr make_material_method(const MaterialSampling& material) {

@@ -43,9 +43,8 @@ class PixelMethod {
   virtual void learn(const FoundRays& /*found*/, const PixelState& /*pixel*/) const {}
 };
 
-/// The method of a job. materials: of its scene; must outlive it.
-std::unique_ptr<const PixelMethod> make_pixel_method(const JobSpec& job,
-                                                     std::span<const Material> materials);
+/// The method of a job.
+std::unique_ptr<const PixelMethod> make_pixel_method(const JobSpec& job);
 /// The method of one material that has a setting of its own.
 std::unique_ptr<const PixelMethod> make_material_method(const MaterialSampling& material);
 

@@ -6,7 +6,7 @@
 
 #include "common/job/job_spec.h"
 #include "common/state/sample_state.h"
-#include "worker/accel/accel.h"
+#include "worker/accel/geometry_sequence.h"
 #include "worker/light/candidates.h"
 #include "worker/light/carried_light.h"
 #include "worker/light/frame_light.h"
@@ -36,7 +36,7 @@ struct PixelInput {
   /// What the neighbours that the pixel asks held in the frame before; at most kMaxNeighbors.
   std::span<const CarriedSet> neighbors{};
   std::span<const SurfaceHit> hits{};  ///< (S) what the sites were made of, for who traces itself
-  const Accel* accel = nullptr;        ///< of the frame
+  const FrameGeometry* geometry = nullptr;  ///< of the frame
 };
 
 /// The light of the pixel's two frames.

@@ -69,6 +69,13 @@ void append_primary_rays(const JobSpec& job, const FrameGeometry& geometry, std:
 void trace_primary_rays(const JobSpec& job, const FrameGeometry& geometry,
                         std::span<const Ray> rays, std::span<SurfaceHit> hits) {
   geometry.accel->intersect(rays, hits, static_cast<std::size_t>(job.image.sites));
+  if (!geometry.scene->has_detail) return;
+  const float share = 1 / std::sqrt(static_cast<float>(job.image.sites));
+  for (std::size_t i = 0; i < hits.size(); ++i) {
+    if (!hits[i].hit || geometry.material_of(hits[i]).detail == nullptr) continue;
+    const float pixel = geometry.pose.camera.pixel_width(rays[i].direction) * hits[i].depth;
+    hits[i].place.width = share * pixel;
+  }
 }
 
 void add_environment_behind(std::span<const SurfaceHit> hits, std::span<const Ray> rays,

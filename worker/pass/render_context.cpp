@@ -39,22 +39,25 @@ Result<std::shared_ptr<const RenderContext>> make_render_context(
   context->lights = std::make_unique<LightSequence>(context->job, assets->maps);
   context->surfaces = std::make_shared<SurfaceCache>();
   context->scene = std::shared_ptr<const Scene>(assets, &assets->scene);
-  context->method = make_pixel_method(context->job, context->scene->materials);
+  context->method = make_pixel_method(context->job);
   context->own_methods = make_own_methods(job);
   context->geometry =
       std::make_unique<GeometrySequence>(context->job, *context->scene, assets->accel);
   return std::shared_ptr<const RenderContext>(std::move(context));
 }
 
-void RenderContext::gather_sites(std::span<const SurfaceHit> hits, SiteBlock& sites) const {
+Rgb gather_sites(const FrameGeometry& geometry, std::span<const SurfaceHit> hits,
+                 SiteBlock& sites) {
+  Rgb emission;
   sites.clear(static_cast<int>(hits.size()));
   for (std::size_t s = 0; s < hits.size(); ++s) {
     if (hits[s].hit) {
-      sites.add(static_cast<int>(s), hits[s].point, scene->materials[hits[s].material]);
+      emission += geometry.add_to(sites, static_cast<int>(s), hits[s]);
     } else {
       sites.add_miss(static_cast<int>(s));
     }
   }
+  return emission / static_cast<float>(hits.size());
 }
 
 std::vector<std::string> repair_notes(const RenderContext& context) {

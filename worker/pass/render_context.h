@@ -27,9 +27,10 @@ class RenderContext {
   std::vector<std::unique_ptr<const PixelMethod>> own_methods;  ///< (materials); null: `method`
   std::unique_ptr<LightSequence> lights;
   std::shared_ptr<SurfaceCache> surfaces;  ///< of the last frames, where things move
-
-  /// The surfaces of one pixel, which its sites hit, with their materials.
-  void gather_sites(std::span<const SurfaceHit> hits, SiteBlock& sites) const;
 };
+
+/// The surfaces of one pixel, which its sites hit in that frame, with their materials. Returns the
+/// radiance that they emit, the mean over the sites.
+Rgb gather_sites(const FrameGeometry& geometry, std::span<const SurfaceHit> hits, SiteBlock& sites);
 
 }  // namespace baton

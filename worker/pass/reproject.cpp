@@ -209,8 +209,7 @@ PixelHistory Reprojection::take(std::size_t i, std::size_t pixel, SampleState& s
       continue;
     }
     const std::size_t from = inheritance->from[t];
-    old.sites.add(static_cast<int>(t), old_hits[from].point,
-                  context_.scene->materials[old_hits[from].material]);
+    before_.add_to(old.sites, static_cast<int>(t), old_hits[from]);
     old.log_share[t] = -std::log(static_cast<float>(inheritance->count[from]));
   }
   return PixelHistory::moved;

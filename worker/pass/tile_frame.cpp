@@ -33,6 +33,7 @@ struct TileFrameRenderer::Batch {
   std::array<std::size_t, kBatchPixels> end_ray;  ///< where each pixel's rays end
   std::array<KnownLight, kBatchPixels> known;
   std::array<PixelResult, kBatchPixels> pixels;
+  std::array<Rgb, kBatchPixels> emission;  ///< of the surfaces that are seen
 
   RngKey key(const RenderContext& context, const PixelRect& rect, std::size_t index) const {
     const auto width = static_cast<std::size_t>(rect.width());
@@ -147,6 +148,7 @@ void TileFrameRenderer::sample(Batch& batch, const FrameLight& light, SampleStat
   batch.rays.clear();
   poison(batch.end_ray);
   batch.known.fill({});
+  batch.emission.fill({});
   const kernels::CarriedLight carried{before, now, light.still, *light.presampled};
   look_ahead(0, batch.first, carried, state);
   for (std::size_t i = 0; i < batch.count; ++i) {
@@ -162,7 +164,7 @@ void TileFrameRenderer::sample(Batch& batch, const FrameLight& light, SampleStat
       continue;
     }
     poison(sites);
-    context_.gather_sites(surfaces_->pixel(index), sites);
+    batch.emission[i] = gather_sites(geometry_, surfaces_->pixel(index), sites);
 
     // Sample it.
     const Ahead& ahead = ahead_[index % 2];
@@ -182,7 +184,7 @@ void TileFrameRenderer::sample(Batch& batch, const FrameLight& light, SampleStat
         .neighbors =
             reprojection_ != nullptr ? reprojection_->neighbors(i) : std::span<const CarriedSet>(),
         .hits = surfaces_->pixel(index),
-        .accel = geometry_.accel.get()};
+        .geometry = &geometry_};
     const SiteOrigins from = origins(index);
     RayWriter rays(from, batch.rays);
     poison(*scratch_);
@@ -271,7 +273,7 @@ void TileFrameRenderer::finish(Batch& batch, const FrameLight& light, RoundMean&
   for (std::size_t i = 0; i < batch.count; ++i) {
     PixelResult& pixel = batch.pixels[i];
     record_geometry(surfaces_->pixel(batch.first + i), pixel);
-    pixel.radiance += background[i];
+    pixel.radiance += background[i] + batch.emission[i];
     pixel.alpha = show_environment ? 1 : pixel.coverage;
     film.add(batch.first + i, pixel);
   }

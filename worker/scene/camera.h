@@ -26,6 +26,10 @@ class Camera {
 
   /// Ray through image position (x, y) in pixels.
   Ray ray(float x, float y) const;
+  /// Width of a pixel at unit distance along a unit direction, across the view.
+  float pixel_width(const Vec3& direction) const {
+    return length(right_) * dot(direction, forward_);
+  }
   /// Image position in pixels of a point; the inverse of ray(). nullopt behind the camera.
   std::optional<std::array<float, 2>> project(const Vec3& point) const;
 

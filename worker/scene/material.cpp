@@ -47,8 +47,10 @@ Rgb evaluate_ggx(const Material& m, const ShadingPoint& p, const Vec3& wi) {
   const float specular = ggx_distribution(p.ns, h, m.shape) * masking_over_4;
   const float t = 1 - std::clamp(dot(wo, h), 0.0f, 1.0f);
   const float t2 = t * t;
-  const Rgb fresnel = m.ks + (Rgb{1, 1, 1} - m.ks) * (t2 * t2 * t);
-  return (Rgb{1, 1, 1} - fresnel) * m.kd * kInvPi + fresnel * specular;
+  const float grazing = t2 * t2 * t;
+  const Rgb fresnel = m.ks + (Rgb{m.f90, m.f90, m.f90} - m.ks) * grazing;
+  const Rgb kept_out = m.ks + (Rgb{1, 1, 1} - m.ks) * grazing;
+  return (Rgb{1, 1, 1} - kept_out) * m.kd * kInvPi + fresnel * specular;
 }
 
 /// Density of the reflected visible normal, D G1(wo) / (4 n.wo), with G1 / n.wo = 2 / (n.wo +
@@ -119,14 +121,28 @@ float specular_share(float specular, float diffuse) {
   return sum > 0 ? specular / sum : 0.0f;
 }
 
+/// Reflection of what is no metal, seen head-on [KHR_materials_ior, KHR_materials_specular].
+Rgb dielectric_f0(const MaterialSpec& spec) {
+  const float ratio = (spec.ior - 1) / (spec.ior + 1);
+  const float f0 = spec.ior == 1.5f ? 0.04f : ratio * ratio;  // 0.04 to the bit
+  const Rgb tinted = spec.specular_color * f0;
+  return Rgb{std::min(tinted.x, 1.0f), std::min(tinted.y, 1.0f), std::min(tinted.z, 1.0f)} *
+         spec.specular;
+}
+
 }  // namespace
 
 Material make_material(const MaterialSpec& spec) {
+  return make_material(spec, spec.base_color, spec.metallic, spec.roughness);
+}
+
+Material make_material(const MaterialSpec& spec, const Rgb& base_color, float metallic,
+                       float roughness) {
   switch (spec.kind) {
     case MaterialKind::diffuse:
-      return {.kd = spec.base_color, .ks = {}};
+      return {.kd = base_color, .ks = {}};
     case MaterialKind::phong: {
-      const Rgb kd = spec.base_color * spec.kd;
+      const Rgb kd = base_color * spec.kd;
       const Rgb ks = spec.specular_color * spec.ks;
       return {.lobe = mean(ks) > 0 ? Material::Lobe::phong : Material::Lobe::none,
               .kd = kd,
@@ -135,16 +151,17 @@ Material make_material(const MaterialSpec& spec) {
               .specular_probability = specular_share(mean(ks), mean(kd))};
     }
     case MaterialKind::metallic_roughness: {
-      const Rgb kd = spec.base_color * (1 - spec.metallic);
-      const Rgb f0 =
-          Rgb{0.04f, 0.04f, 0.04f} * (1 - spec.metallic) + spec.base_color * spec.metallic;
+      const Rgb kd = base_color * (1 - metallic);
+      const Rgb f0 = dielectric_f0(spec) * (1 - metallic) + base_color * metallic;
+      const float f90 = 1 - (1 - spec.specular) * (1 - metallic);
       // Schlick's term averages to 1/21 over the cosine-weighted hemisphere.
-      const float fresnel = mean(f0) + (1 - mean(f0)) / 21;
+      const float fresnel = mean(f0) + (f90 - mean(f0)) / 21;
       return {.lobe = Material::Lobe::ggx,
               .kd = kd,
               .ks = f0,
-              .shape = spec.roughness * spec.roughness,
-              .specular_probability = specular_share(fresnel, mean(kd) * (1 - fresnel))};
+              .shape = roughness * roughness,
+              .specular_probability = specular_share(fresnel, mean(kd) * (1 - fresnel)),
+              .f90 = f90};
     }
     case MaterialKind::measured:
       break;

@@ -9,13 +9,15 @@
 
 namespace baton {
 
+struct SurfaceDetail;
+
 /// A material in the one form that all code evaluates. lobe measured: f is the table. Else:
 ///   f = kd/pi [* (1 - F) for ggx] + specular lobe,
 /// lobe phong: ks (s+2)/(2 pi) max(0, r.wi)^s, r the mirror direction of wo about the shading
 /// normal
 ///   [Lafortune & Willems 1994; the papers' model];
-/// lobe ggx: D G2 F / (4 |n.wi| |n.wo|), F Schlick with F0 = ks [glTF 2.0, appendix B]. As
-/// published, a white and smooth
+/// lobe ggx: D G2 F / (4 |n.wi| |n.wo|), F Schlick from F0 = ks to f90 [glTF 2.0, appendix B;
+/// KHR_materials_specular]; the diffuse part takes f90 as 1. As published, a white and smooth
 ///   dielectric gains energy at grazing view (albedo 1.03 at 60, 1.6 at 85 degrees); a metal never
 ///   does.
 struct Material {
@@ -27,12 +29,19 @@ struct Material {
   float shape = 1;                 ///< phong: exponent s; ggx: alpha = roughness^2
   float specular_probability = 0;  ///< chance that sample_bsdf draws from the lobe, [0, 1]
   std::shared_ptr<const MeasuredBrdf>
-      table{};  ///< measured: the whole BRDF; kd and ks are 0, shape is the sampled lobe's alpha
+      table{};    ///< measured: the whole BRDF; kd and ks are 0, shape is the sampled lobe's alpha
+  float f90 = 1;  ///< ggx
+  /// What differs from place to place, glows or is not there (surface_detail.h); null: nothing. The
+  /// rest is then only what methods look at ahead.
+  std::shared_ptr<const SurfaceDetail> detail{};
 };
 
 /// Material of a specification of any kind but `measured`. specular_probability follows from the
 /// mean albedos.
 Material make_material(const MaterialSpec& spec);
+/// The same with other numbers than the specification's.
+Material make_material(const MaterialSpec& spec, const Rgb& base_color, float metallic,
+                       float roughness);
 /// Evaluates the table; samples and densities are those of the GGX lobe that resembles its peak,
 /// and of the cosine lobe.
 Material make_measured_material(std::shared_ptr<const MeasuredBrdf> table);

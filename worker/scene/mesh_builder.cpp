@@ -31,7 +31,7 @@ std::uint32_t bits(float f) { return std::bit_cast<std::uint32_t>(f + 0.0f); }
 }  // namespace
 
 void MeshBuilder::add(const std::array<Vec3, 3>& corners, const std::array<Vec3, 3>& normals,
-                      const std::array<UvSets, 3>& uvs) {
+                      const std::array<UvSets, 3>& uvs, const std::array<Tangent, 3>& tangents) {
   const Vec3 a = corners[1] - corners[0];
   const Vec3 b = corners[2] - corners[0];
   const double longest =
@@ -42,7 +42,7 @@ void MeshBuilder::add(const std::array<Vec3, 3>& corners, const std::array<Vec3,
   }
   std::array<std::uint32_t, 3> triangle{};
   for (std::size_t k = 0; k < 3; ++k) {
-    triangle[k] = vertex(corners[k], parts_.normals ? normals[k] : Vec3{}, uvs[k]);
+    triangle[k] = vertex(corners[k], parts_.normals ? normals[k] : Vec3{}, uvs[k], tangents[k]);
   }
   mesh_.triangles.push_back(triangle);
 }
@@ -56,17 +56,26 @@ std::size_t MeshBuilder::VertexHash::operator()(const VertexKey& key) const {
   return hash;
 }
 
-std::uint32_t MeshBuilder::vertex(const Vec3& position, const Vec3& normal, const UvSets& uvs) {
+std::uint32_t MeshBuilder::vertex(const Vec3& position, const Vec3& normal, const UvSets& uvs,
+                                  const Tangent& tangent) {
   const auto sets = static_cast<std::size_t>(parts_.uv_sets);
   VertexKey key{bits(position.x), bits(position.y), bits(position.z),
                 bits(normal.x),   bits(normal.y),   bits(normal.z)};
   for (std::size_t i = 0; i < 2 * sets; ++i) key[6 + i] = bits(uvs[i / 2][i % 2]);
+  if (parts_.tangents) {
+    const Vec3& t = tangent.direction;
+    key[10] = bits(t.x);
+    key[11] = bits(t.y);
+    key[12] = bits(t.z);
+    key[13] = bits(tangent.side);
+  }
   const auto next = static_cast<std::uint32_t>(mesh_.positions.size());
   const auto [found, inserted] = index_.try_emplace(key, next);
   if (inserted) {
     mesh_.positions.push_back(position);
     if (parts_.normals) mesh_.normals.push_back(normal);
     for (std::size_t set = 0; set < sets; ++set) mesh_.uvs[set].push_back(uvs[set]);
+    if (parts_.tangents) mesh_.tangents.push_back(tangent);
   }
   return found->second;
 }

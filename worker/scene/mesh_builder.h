@@ -12,6 +12,7 @@ namespace baton {
 struct MeshParts {
   bool normals = false;
   int uv_sets = 0;  ///< [0, 2]
+  bool tangents = false;
 };
 
 /// Collects the triangles of all parts of a file into one mesh: equal vertices become one,
@@ -23,15 +24,17 @@ class MeshBuilder {
 
   /// Adds a triangle of finite corners. normals: unit. What `parts` does not name is not looked at.
   void add(const std::array<Vec3, 3>& corners, const std::array<Vec3, 3>& normals = {},
-           const std::array<UvSets, 3>& uvs = {});
+           const std::array<UvSets, 3>& uvs = {}, const std::array<Tangent, 3>& tangents = {});
   TriangleMesh take() { return std::move(mesh_); }
 
  private:
-  using VertexKey = std::array<std::uint32_t, 10>;  ///< bits of position, normal and UVs
+  /// Bits of position, normal, UVs and tangent.
+  using VertexKey = std::array<std::uint32_t, 14>;
   struct VertexHash {
     std::size_t operator()(const VertexKey& key) const;
   };
-  std::uint32_t vertex(const Vec3& position, const Vec3& normal, const UvSets& uvs);
+  std::uint32_t vertex(const Vec3& position, const Vec3& normal, const UvSets& uvs,
+                       const Tangent& tangent);
 
   MeshParts parts_;
   TriangleMesh mesh_;

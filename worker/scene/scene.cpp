@@ -1,15 +1,19 @@
 #include "worker/scene/scene.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <limits>
 #include <optional>
+#include <set>
 #include <unordered_map>
 
 #include "common/job/motion.h"
 #include "common/math/inverse.h"
-#include "worker/scene/gltf/file_cache.h"
+#include "worker/scene/detail_loader.h"
 #include "worker/scene/gltf/meshes.h"
+#include "worker/scene/tangents.h"
 
 namespace baton {
 namespace {
@@ -88,12 +92,13 @@ Result<Transform> object_transform(const ObjectSpec& object, const TriangleMesh&
   return map;
 }
 
-/// Two triangles, facing up.
+/// Two triangles, facing up. Texture coordinates are x and z: an image is one unit wide.
 TriangleMesh ground_mesh(const GroundSpec& ground) {
   const float h = 0.5f * ground.size;
   const float y = ground.height;
   return {.positions = {{-h, y, -h}, {-h, y, h}, {h, y, h}, {h, y, -h}},
           .normals = {},
+          .uvs = {{{{-h, -h}, {-h, h}, {h, h}, {h, -h}}, {}}},
           .triangles = {{0, 1, 2}, {0, 2, 3}}};
 }
 
@@ -106,27 +111,66 @@ std::optional<std::uint32_t> find_name(const NameIndex& names, const std::string
 }
 
 /// A material that fails keeps its place.
-Material load_material(const MaterialSpec& spec, const std::string& name, Faults& faults) {
-  if (spec.kind != MaterialKind::measured) return make_material(spec);
+Material load_material(const MaterialSpec& spec, const std::string& name, DetailLoader& details,
+                       Faults& faults) {
+  if (spec.kind != MaterialKind::measured) {
+    Material material = make_material(spec);
+    auto detail = details.load(spec);
+    if (detail) {
+      material.detail = std::move(*detail);
+    } else {
+      faults.add(name + ": " + detail.error().message);
+    }
+    return material;
+  }
   Result<std::shared_ptr<const MeasuredBrdf>> table = MeasuredBrdf::load(spec.file);
   if (table) return make_measured_material(std::move(*table));
   faults.add(name + ": " + table.error().message);
   return {};
 }
 
-Result<TriangleMesh> load_part(const MeshSpec& spec, gltf::FileCache& files) {
-  if (spec.mesh < 0) return load_mesh(spec.path, spec.smooth_normals);
+/// Names of meshes that a texture lies on.
+std::set<std::string> textured_meshes(const SceneSpec& spec) {
+  std::set<std::string> names;
+  for (const ObjectSpec& object : spec.objects) {
+    const auto material = spec.materials.find(object.material);
+    if (material != spec.materials.end() && !textures_of(material->second).empty())
+      names.insert(object.mesh);
+  }
+  return names;
+}
+
+Result<TriangleMesh> load_part(const MeshSpec& spec, bool with_uvs, gltf::FileCache& files) {
+  if (spec.mesh < 0) return load_mesh(spec.path, spec.smooth_normals, with_uvs);
   BATON_ASSIGN(const auto document, files.get(spec.path));
   return gltf::primitive_mesh(*document, spec.mesh, spec.primitive, spec.smooth_normals);
+}
+
+/// Whether the mesh has the texture coordinates that the material's textures need; makes tangents
+/// where it has a normal map.
+void fit_mesh(const Material& material, const std::string& material_name,
+              const std::string& mesh_name, const std::string& user, TriangleMesh& mesh,
+              Faults& faults) {
+  if (material.detail == nullptr || mesh.positions.empty()) return;
+  if (const auto missing = missing_uvs(*material.detail, mesh)) {
+    faults.add(
+        fmt::format("{}: {} has no texture coordinates of set {}, which {} of material "
+                    "\"{}\" needs",
+                    user, mesh_name, missing->set, missing->texture, material_name));
+    return;
+  }
+  if (material.detail->normal.texture != nullptr)
+    derive_tangents(mesh, material.detail->normal.uv_set);
 }
 
 /// Loads every mesh; a mesh that fails keeps an empty place, so that its users are not reported as
 /// well.
 NameIndex load_meshes(const SceneSpec& spec, gltf::FileCache& files, Scene& scene, Faults& faults) {
   NameIndex names;
+  const std::set<std::string> textured = textured_meshes(spec);
   for (const auto& [name, mesh_spec] : spec.meshes) {
     names[name] = static_cast<std::uint32_t>(scene.meshes.size());
-    Result<TriangleMesh> mesh = load_part(mesh_spec, files);
+    Result<TriangleMesh> mesh = load_part(mesh_spec, textured.contains(name), files);
     if (!mesh) faults.add("scene.meshes." + name + ": " + mesh.error().message);
     scene.meshes.push_back(mesh ? std::move(*mesh) : TriangleMesh{});
   }
@@ -157,12 +201,14 @@ Result<Scene> load_scene(const JobSpec& job) {
   Faults faults;
 
   // Materials and meshes, in the order of their names.
+  gltf::FileCache files;
+  DetailLoader details(files);
   NameIndex materials;
   for (const auto& [name, material] : job.scene.materials) {
     materials[name] = static_cast<std::uint32_t>(scene.materials.size());
-    scene.materials.push_back(load_material(material, "scene.materials." + name, faults));
+    scene.materials.push_back(load_material(material, "scene.materials." + name, details, faults));
+    scene.has_detail = scene.has_detail || scene.materials.back().detail != nullptr;
   }
-  gltf::FileCache files;
   const NameIndex meshes = load_meshes(job.scene, files, scene, faults);
 
   // Objects, in the order of the job.
@@ -171,7 +217,11 @@ Result<Scene> load_scene(const JobSpec& job) {
     const std::string name = "scene.objects[" + std::to_string(i) + "]";
     const auto mesh = find_name(meshes, object.mesh, "mesh", name, faults);
     const auto material = find_name(materials, object.material, "material", name, faults);
-    if (mesh && material) place_object(object, i, name, *mesh, *material, scene, faults);
+    if (!mesh || !material) continue;
+    place_object(object, i, name, *mesh, *material, scene, faults);
+    fit_mesh(scene.materials[*material], object.material,
+             job.scene.meshes.at(object.mesh).path + ", mesh \"" + object.mesh + "\"", name,
+             scene.meshes[*mesh], faults);
   }
 
   // The ground comes last.
@@ -182,6 +232,8 @@ Result<Scene> load_scene(const JobSpec& job) {
       const auto mesh = static_cast<std::uint32_t>(scene.meshes.size());
       scene.meshes.push_back(ground_mesh(*job.scene.ground));
       scene.instances.push_back({mesh, *material, {}, {}, -1});
+      fit_mesh(scene.materials[*material], job.scene.ground->material, "the ground", "scene.ground",
+               scene.meshes[mesh], faults);
     }
   }
   if (faults.any()) return faults.error();

@@ -14,18 +14,28 @@ namespace baton {
 using Uv = std::array<float, 2>;
 using UvSets = std::array<Uv, 2>;
 
+/// Which way the first texture coordinate grows.
+struct Tangent {
+  Vec3 direction;  ///< unit, at a right angle to the normal
+  float side = 1;  ///< side * cross(normal, direction) points up in the image: 1 or -1
+
+  bool operator==(const Tangent&) const = default;
+};
+
 /// Triangles of one file. Degenerate triangles (zero area, equal corners) are dropped and counted.
 struct TriangleMesh {
   std::vector<Vec3> positions;
   std::vector<Vec3> normals;             ///< per vertex, unit; empty: flat shading
   std::array<std::vector<Uv>, 2> uvs{};  ///< by set, per vertex, or empty
+  std::vector<Tangent> tangents{};       ///< per vertex, where a normal map needs them, or empty
   std::vector<std::array<std::uint32_t, 3>> triangles;
   std::uint64_t dropped_triangles = 0;
 };
 
-/// Reads .ply .obj .off .gltf .glb. Errors name the file: missing, not a mesh, no triangles,
+/// Reads .ply .obj .off .gltf .glb. with_uvs: of .obj files, too, whose vertices then part where
+/// their texture coordinates do. Errors name the file: missing, not a mesh, no triangles,
 /// indices out of range, coordinates that are not finite.
-Result<TriangleMesh> load_mesh(const std::string& path, bool smooth_normals);
+Result<TriangleMesh> load_mesh(const std::string& path, bool smooth_normals, bool with_uvs = false);
 
 /// A mesh placed in the world.
 struct Instance {
@@ -43,6 +53,11 @@ struct Scene {
   std::vector<TriangleMesh> meshes;
   std::vector<Material> materials;
   std::vector<Instance> instances;  ///< placed as without keys; pose.h moves them
+  bool has_detail = false;          ///< some material has
+
+  const Material& material_of(const Instance& instance) const {
+    return materials[instance.material];
+  }
 };
 
 /// Loads every mesh and resolves every name. The ground is a two-triangle mesh of its own.

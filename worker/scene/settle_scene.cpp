@@ -221,6 +221,17 @@ Status list_files(SceneSpec& scene, gltf::FileCache& cache) {
     // What is wrong with a file is said where all meshes are loaded.
     if (document) files.insert((*document)->buffer_files.begin(), (*document)->buffer_files.end());
   }
+  for (const auto& [name, material] : scene.materials) {
+    for (const TextureSpec* texture : textures_of(material)) {
+      if (texture->image < 0) continue;
+      const auto document = cache.get(texture->file);
+      if (!document) continue;
+      files.insert((*document)->buffer_files.begin(), (*document)->buffer_files.end());
+      const auto image = static_cast<std::size_t>(texture->image);
+      if (image < (*document)->images.size() && !(*document)->images[image].file.empty())
+        files.insert((*document)->images[image].file);
+    }
+  }
   scene.files.clear();
   for (const std::string& file : files) scene.files.push_back({file});
   return {};
@@ -229,7 +240,7 @@ Status list_files(SceneSpec& scene, gltf::FileCache& cache) {
 void warn_of_materials(const gltf::Document& file, std::vector<std::string>& warnings) {
   const std::vector<std::string> names = gltf::material_names(file);
   for (std::size_t m = 0; m < file.materials.size(); ++m) {
-    for (const std::string& what : gltf::unsupported_parts(file.materials[m]))
+    for (const std::string& what : gltf::unsupported_parts(file, file.materials[m]))
       warnings.push_back(fmt::format("{}: material \"{}\": {}", file.path, names[m + 1], what));
   }
 }

@@ -54,7 +54,7 @@ void SiteBlock::add(int site, const ShadingPoint& point, const Material& materia
   set(ks_r, ks_g, ks_b, ggx || phong ? material.ks : Rgb{});
   shape[s] = material.shape;
   lobe_scale[s] =
-      phong ? (material.shape + 2) * (0.5f * kInvPi) : (ggx && !tabulated ? 1.0f : 0.0f);
+      phong ? (material.shape + 2) * (0.5f * kInvPi) : (ggx && !tabulated ? material.f90 : 0.0f);
   specular_probability[s] = ggx || phong ? material.specular_probability : 0.0f;
   is_ggx[s] = ggx ? 1.0f : 0.0f;
   alpha2[s] = ggx ? material.shape * material.shape : 0.0f;

@@ -21,7 +21,7 @@ struct alignas(64) SiteBlock {
   Array kd_r{}, kd_g{}, kd_b{};              ///< diffuse albedo; ggx: kd (1 - F0)
   Array ks_r{}, ks_g{}, ks_b{};              ///< phong: specular albedo; ggx: F0
   Array shape{};                             ///< phong: exponent; ggx: alpha
-  Array lobe_scale{};                        ///< phong: (s + 2) / (2 pi); ggx: 1; measured: 0
+  Array lobe_scale{};                        ///< phong: (s + 2) / (2 pi); ggx: F90; measured: 0
   Array specular_probability{};
   Array alpha2{};        ///< ggx: alpha^2
   Array view_cosine{};   ///< ggx: n.wo, at least 1e-4

@@ -15,13 +15,8 @@ struct Contribution {
   std::int32_t pair = 0;
 };
 
-struct Site {
-  const ShadingPoint& point;
-  const Material& material;
-};
-
 /// f cos L / (q_environment + q_bsdf): the balance heuristic with one sample of each kind.
-Rgb weighted_radiance(const Site& site, const Environment& environment, const Vec3& wi) {
+Rgb weighted_radiance(const SeenSurface& site, const Environment& environment, const Vec3& wi) {
   if (!above_horizon(site.point, wi)) return {};
   const EnvironmentMap::Texel light = environment.evaluate(wi);
   const float density = light.density + bsdf_pdf_solid_angle(site.material, site.point, wi);
@@ -32,7 +27,7 @@ Rgb weighted_radiance(const Site& site, const Environment& environment, const Ve
 
 }  // namespace
 
-ReferenceEstimate ReferenceRenderer::render(std::span<const SurfaceHit> surfaces,
+ReferenceEstimate ReferenceRenderer::render(std::span<const SurfaceHit> hits,
                                             const Environment& environment,
                                             std::int32_t num_samples, const RngKey& key,
                                             ShadowRays& rays, std::uint64_t& rays_traced) const {
@@ -42,6 +37,8 @@ ReferenceEstimate ReferenceRenderer::render(std::span<const SurfaceHit> surfaces
   double sum_mean = 0;
   double sum_mean_squared = 0;
   if (environment.map->black()) return {};
+  std::vector<SeenSurface> seen;
+  for (const SurfaceHit& hit : hits) seen.push_back(hit.hit ? geometry_.see(hit) : SeenSurface{});
   std::vector<Contribution> contributions;
   for (std::int32_t first = 0; first < num_samples; first += kBatch) {
     const std::int32_t count = std::min(kBatch, num_samples - first);
@@ -53,11 +50,10 @@ ReferenceEstimate ReferenceRenderer::render(std::span<const SurfaceHit> surfaces
       const auto step = static_cast<std::uint32_t>(first + pair);
       const auto u = rng.uniforms(step, 0);
       const auto v = rng.uniforms(step, 1);
-      const SurfaceHit& hit =
-          surfaces[static_cast<std::size_t>(u[0] * static_cast<float>(surfaces.size()))];
-      if (!hit.hit) continue;
-      const Site site{hit.point, materials_[hit.material]};
-      const Vec3 origin = hit.ray_origin;
+      const auto s = static_cast<std::size_t>(u[0] * static_cast<float>(hits.size()));
+      if (!hits[s].hit) continue;
+      const SeenSurface& site = seen[s];
+      const Vec3 origin = hits[s].ray_origin;
       for (const Vec3& wi : {environment.sample({u[1], u[2]}),
                              sample_bsdf(site.material, site.point, {v[0], v[1], v[2]})}) {
         const Rgb value = weighted_radiance(site, environment, wi);
@@ -66,7 +62,7 @@ ReferenceEstimate ReferenceRenderer::render(std::span<const SurfaceHit> surfaces
         contributions.push_back({value, pair});
       }
     }
-    accel_.occluded(rays);
+    geometry_.accel->occluded(rays);
     rays_traced += rays.size();
 
     // Add them up, pair by pair.
@@ -102,7 +98,7 @@ PixelDiagnostics ReferenceMethod::sample(const PixelInput& input, const PixelSta
   PixelDiagnostics did{.target_evaluations = 2 * num_samples_};
   ShadowRays own;
   const ReferenceEstimate estimate =
-      ReferenceRenderer(*input.accel, materials_)
+      ReferenceRenderer(*input.geometry)
           .render(input.hits, input.light.now, num_samples_, input.key, own, did.rays_traced);
   rays.known = {.color = estimate.radiance,
                 .visibility = estimate.visibility,

@@ -15,7 +15,9 @@
 namespace baton::gltf {
 namespace {
 
-constexpr std::array<std::string_view, 2> kRead{"KHR_texture_transform", "KHR_mesh_quantization"};
+constexpr std::array<std::string_view, 6> kRead{
+    "KHR_texture_transform", "KHR_mesh_quantization",  "KHR_materials_emissive_strength",
+    "KHR_materials_ior",     "KHR_materials_specular", "EXT_texture_webp"};
 
 /// Files that need an extension that is not read cannot be shown right.
 void check_extensions(const JsonView& root) {
@@ -98,6 +100,13 @@ int size_of(Component component) {
       break;
   }
   return 4;
+}
+
+ByteView Document::bytes_of_image(std::size_t image) const {
+  const Image& given = images[image];
+  if (given.view < 0) return given.bytes;
+  const View& view = views[static_cast<std::size_t>(given.view)];
+  return ByteView(buffers[static_cast<std::size_t>(view.buffer)]).subspan(view.offset, view.size);
 }
 
 std::vector<int> shown_nodes(const Document& document) {

@@ -49,9 +49,9 @@ struct Accessor {
 struct Primitive {
   int mode = 4;  ///< as OpenGL counts: 4 triangles, 5 strip, 6 fan; others have no surface
   int material = -1;
-  int indices = -1, positions = -1, normals = -1;  ///< accessors
-  std::array<int, 2> uvs{-1, -1};                  ///< accessors of sets 0 and 1
-  bool colored = false, morphed = false;           ///< has vertex colours, morph targets
+  int indices = -1, positions = -1, normals = -1, tangents = -1;  ///< accessors
+  std::array<int, 2> uvs{-1, -1};                                 ///< accessors of sets 0 and 1
+  bool colored = false, morphed = false;  ///< has vertex colours, morph targets
 };
 
 struct Mesh {
@@ -102,8 +102,9 @@ struct TextureInfo {
 enum class Wrap : std::uint8_t { repeat, clamp, mirror };
 
 struct Texture {
-  int image = -1;
+  int image = -1;  ///< -1: none that is read
   Wrap wrap_s = Wrap::repeat, wrap_t = Wrap::repeat;
+  bool nearest = false;  ///< where it is seen larger than it is
 };
 
 /// An image is a file beside this one, a view or bytes of its own.
@@ -119,10 +120,13 @@ struct Material {
   std::string name;
   std::array<double, 4> base_color{1, 1, 1, 1};
   double metallic = 1, roughness = 1;
-  TextureInfo base_color_texture, metallic_roughness_texture, normal_texture;
+  TextureInfo base_color_texture, metallic_roughness_texture, normal_texture, emissive_texture;
+  std::array<double, 3> emission{0, 0, 0};  ///< factor times strength
+  double ior = 1.5, specular = 1;
+  std::array<double, 3> specular_color{1, 1, 1};
+  bool specular_textured = false;  ///< by textures, which are not read
   AlphaMode alpha_mode = AlphaMode::opaque;
   double alpha_cutoff = 0.5;
-  bool emissive = false;
 };
 
 struct Document {
@@ -140,6 +144,9 @@ struct Document {
   std::vector<Texture> textures;
   std::vector<Image> images;
   std::vector<std::string> extensions_used;
+
+  /// What image `image` is: bytes of this file, else nothing and Image::file.
+  ByteView bytes_of_image(std::size_t image) const;
 
   Error error(const std::string& what) const { return {ErrorKind::bad_input, path + ": " + what}; }
 };

@@ -1,6 +1,6 @@
 #include <algorithm>
-#include <tuple>
 #include <utility>
+#include <vector>
 
 #include "worker/scene/gltf/document_parser.h"
 
@@ -22,6 +22,19 @@ TextureInfo parse_texture_info(const JsonView& info, const Document& document) {
   return read;
 }
 
+void parse_extensions(const JsonView& extensions, Material& material) {
+  const double strength =
+      extensions.at("KHR_materials_emissive_strength").number("emissiveStrength", 1, 0, 1e6);
+  for (double& c : material.emission) c = std::clamp(c, 0.0, 1.0) * strength;
+  material.ior = extensions.at("KHR_materials_ior").number("ior", 1.5, 0, 100);
+  const JsonView specular = extensions.at("KHR_materials_specular");
+  material.specular = specular.number("specularFactor", 1, 0, 1);
+  specular.numbers("specularColorFactor", material.specular_color);
+  for (double& c : material.specular_color) c = std::clamp(c, 0.0, 1e6);
+  material.specular_textured =
+      specular.has("specularTexture") || specular.has("specularColorTexture");
+}
+
 Material parse_material(const JsonView& material, const Document& document) {
   Material read;
   read.name = material.text("name");
@@ -39,9 +52,9 @@ Material parse_material(const JsonView& material, const Document& document) {
   if (mode == "MASK") read.alpha_mode = AlphaMode::mask;
   if (mode == "BLEND") read.alpha_mode = AlphaMode::blend;
   read.alpha_cutoff = material.number("alphaCutoff", 0.5, 0, 1e6);
-  std::array<double, 3> light{};
-  material.numbers("emissiveFactor", light);
-  read.emissive = light != std::array<double, 3>{};
+  material.numbers("emissiveFactor", read.emission);
+  read.emissive_texture = parse_texture_info(material.at("emissiveTexture"), document);
+  parse_extensions(material.at("extensions"), read);
   return read;
 }
 
@@ -53,15 +66,18 @@ Wrap wrap_of(std::uint64_t value) {
 }  // namespace
 
 void parse_materials(const JsonView& root, Document& document) {
-  std::vector<std::pair<Wrap, Wrap>> samplers;
+  constexpr std::uint64_t kNearest = 9728;  // as OpenGL counts
+  std::vector<Texture> samplers;
   root.each("samplers", [&](const JsonView& sampler) {
-    samplers.emplace_back(wrap_of(sampler.size("wrapS")), wrap_of(sampler.size("wrapT")));
+    samplers.push_back({.wrap_s = wrap_of(sampler.size("wrapS")),
+                        .wrap_t = wrap_of(sampler.size("wrapT")),
+                        .nearest = sampler.size("magFilter") == kNearest});
   });
   root.each("textures", [&](const JsonView& texture) {
-    Texture read;
-    read.image = texture.index("source", document.images.size());
-    if (const int s = texture.index("sampler", samplers.size()); s >= 0)
-      std::tie(read.wrap_s, read.wrap_t) = samplers[static_cast<std::size_t>(s)];
+    const int sampler = texture.index("sampler", samplers.size());
+    Texture read = sampler < 0 ? Texture{} : samplers[static_cast<std::size_t>(sampler)];
+    const JsonView webp = texture.at("extensions").at("EXT_texture_webp");
+    read.image = (webp ? webp : texture).index("source", document.images.size());
     document.textures.push_back(read);
   });
   root.each("materials", [&](const JsonView& material) {

@@ -90,6 +90,7 @@ Primitive parse_primitive(const JsonView& primitive, std::size_t num_accessors,
   const JsonView attributes = primitive.at("attributes");
   read.positions = attributes.index("POSITION", num_accessors);
   read.normals = attributes.index("NORMAL", num_accessors);
+  read.tangents = attributes.index("TANGENT", num_accessors);
   read.uvs = {attributes.index("TEXCOORD_0", num_accessors),
               attributes.index("TEXCOORD_1", num_accessors)};
   read.colored = attributes.has("COLOR_0");

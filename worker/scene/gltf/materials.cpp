@@ -3,6 +3,8 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <numbers>
+#include <optional>
 #include <set>
 
 namespace baton::gltf {
@@ -10,6 +12,9 @@ namespace {
 
 /// What the schema of jobs takes.
 constexpr double kLeastRoughness = 0.02;
+constexpr float kMirrorIor = 100;
+/// What is seen through is not shown; such as leaves are cut out.
+constexpr double kBlendCutoff = 0.5;
 
 }  // namespace
 
@@ -25,28 +30,77 @@ std::vector<std::string> material_names(const Document& document) {
   return names;
 }
 
+namespace {
+
+/// As a job says it; nothing where there is no image.
+std::optional<TextureSpec> texture_spec(const Document& document, const TextureInfo& info) {
+  if (info.texture < 0) return std::nullopt;
+  const Texture& texture = document.textures[static_cast<std::size_t>(info.texture)];
+  if (texture.image < 0) return std::nullopt;
+  const Image& image = document.images[static_cast<std::size_t>(texture.image)];
+  const auto wrap = [](Wrap given) { return static_cast<TextureWrap>(given); };
+  const auto pair = [](const std::array<double, 2>& given) {
+    return std::array<float, 2>{static_cast<float>(given[0]), static_cast<float>(given[1])};
+  };
+  return TextureSpec{.file = image.file.empty() ? document.path : image.file,
+                     .image = image.file.empty() ? texture.image : -1,
+                     .uv = info.uv,
+                     .offset = pair(info.offset),
+                     .scale = pair(info.scale),
+                     .rotate_deg = static_cast<float>(info.rotation * 180 / std::numbers::pi),
+                     .wrap_u = wrap(texture.wrap_s),
+                     .wrap_v = wrap(texture.wrap_t),
+                     .filter = texture.nearest ? TextureFilter::nearest : TextureFilter::linear,
+                     .strength = static_cast<float>(info.strength)};
+}
+
+}  // namespace
+
 MaterialSpec material_spec(const Document& document, int material) {
   const Material given =
       material < 0 ? Material{} : document.materials[static_cast<std::size_t>(material)];
-  const auto color = [&](std::size_t c) { return static_cast<float>(given.base_color[c]); };
+  const auto rgb = [](const auto& c) {
+    return Rgb{static_cast<float>(c[0]), static_cast<float>(c[1]), static_cast<float>(c[2])};
+  };
   MaterialSpec spec;
   spec.kind = MaterialKind::metallic_roughness;
-  spec.base_color = {color(0), color(1), color(2)};
+  spec.base_color = rgb(given.base_color);
   spec.metallic = static_cast<float>(given.metallic);
   spec.roughness = static_cast<float>(std::max(given.roughness, kLeastRoughness));
+  // 0 stands for a mirror [KHR_materials_ior].
+  spec.ior = given.ior == 0 ? kMirrorIor : static_cast<float>(std::max(given.ior, 1.0));
+  spec.specular = static_cast<float>(given.specular);
+  spec.specular_color = rgb(given.specular_color);
+  spec.color_texture = texture_spec(document, given.base_color_texture);
+  spec.metallic_roughness_texture = texture_spec(document, given.metallic_roughness_texture);
+  spec.normal_texture = texture_spec(document, given.normal_texture);
+  spec.emission = rgb(given.emission);
+  if (!(spec.emission == Rgb{}))
+    spec.emission_texture = texture_spec(document, given.emissive_texture);
+  if (given.alpha_mode != AlphaMode::opaque) {
+    const bool is_blend = given.alpha_mode == AlphaMode::blend;
+    const double cutoff = is_blend ? kBlendCutoff : given.alpha_cutoff;
+    // No alpha is above 1.
+    spec.alpha = cutoff > 1 ? 0.0f : static_cast<float>(given.base_color[3]);
+    spec.alpha_cutoff = static_cast<float>(std::min(cutoff, 1.0));
+  }
   return spec;
 }
 
-std::vector<std::string> unsupported_parts(const Material& material) {
+std::vector<std::string> unsupported_parts(const Document& document, const Material& material) {
   std::vector<std::string> parts;
-  if (material.emissive) parts.push_back("it does not glow: emission is not read");
-  if (material.alpha_mode != AlphaMode::opaque)
-    parts.push_back("it is opaque: its alpha is not read");
-  for (const TextureInfo* texture :
+  if (material.emission != std::array<double, 3>{}) parts.push_back("it glows, but lights nothing");
+  if (material.alpha_mode == AlphaMode::blend)
+    parts.push_back(
+        "it is not seen through: where its alpha is below 0.5 there is nothing, "
+        "elsewhere it is opaque");
+  if (material.specular_textured) parts.push_back("its textures of `specular` are not read");
+  for (const TextureInfo* info :
        {&material.base_color_texture, &material.metallic_roughness_texture,
-        &material.normal_texture}) {
-    if (texture->texture < 0) continue;
-    parts.push_back("its textures are not read");
+        &material.normal_texture, &material.emissive_texture}) {
+    if (info->texture < 0 || document.textures[static_cast<std::size_t>(info->texture)].image >= 0)
+      continue;
+    parts.push_back("one of its textures has no image of a kind that is read");
     break;
   }
   return parts;

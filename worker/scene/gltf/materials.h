@@ -16,6 +16,6 @@ std::vector<std::string> material_names(const Document& document);
 MaterialSpec material_spec(const Document& document, int material);
 
 /// What a material has and Baton does not show, one text each.
-std::vector<std::string> unsupported_parts(const Material& material);
+std::vector<std::string> unsupported_parts(const Document& document, const Material& material);
 
 }  // namespace baton::gltf

@@ -19,6 +19,7 @@ constexpr int kTriangles = 4, kStrip = 5, kFan = 6;
 /// What lies in the accessors of a primitive.
 struct Vertices {
   std::vector<float> positions, normals;  ///< (vertices, 3); normals may be empty
+  std::vector<float> tangents;            ///< (vertices, 4), or empty
   std::array<std::vector<float>, 2> uvs;  ///< (vertices, 2), or empty
   std::vector<std::uint32_t> corners;     ///< (triangles, 3)
 };
@@ -63,6 +64,7 @@ Result<Vertices> read_vertices(const Document& document, const Primitive& primit
                                       values.size() / static_cast<std::size_t>(width)));
   };
   BATON_TRY(attribute(primitive.normals, 3, "NORMAL", v.normals));
+  BATON_TRY(attribute(primitive.tangents, 4, "TANGENT", v.tangents));
   BATON_TRY(attribute(primitive.uvs[0], 2, "TEXCOORD_0", v.uvs[0]));
   BATON_TRY(attribute(primitive.uvs[1], 2, "TEXCOORD_1", v.uvs[1]));
   if (!all_finite(v.positions))
@@ -93,6 +95,20 @@ bool has_usable_normals(const Vertices& v) {
   return true;
 }
 
+Tangent tangent_at(const Vertices& v, std::size_t vertex) {
+  const float* const t = v.tangents.data() + 4 * vertex;
+  return {normalize({t[0], t[1], t[2]}), t[3] < 0 ? -1.0f : 1.0f};
+}
+
+/// Tangents count where normals do, as they lie at a right angle to them.
+bool has_usable_tangents(const Vertices& v) {
+  if (v.tangents.empty() || !has_usable_normals(v) || !all_finite(v.tangents)) return false;
+  for (std::size_t i = 0; i < v.tangents.size(); i += 4) {
+    if (!(length({v.tangents[i], v.tangents[i + 1], v.tangents[i + 2]}) > 0)) return false;
+  }
+  return true;
+}
+
 void add_triangles(const Vertices& v, const Matrix& to_file, const MeshParts& parts,
                    MeshBuilder& builder) {
   const Transform transform = to_transform(to_file);
@@ -101,15 +117,24 @@ void add_triangles(const Vertices& v, const Matrix& to_file, const MeshParts& pa
   for (std::size_t i = 0; i < v.corners.size(); i += 3) {
     std::array<Vec3, 3> corners, normals;
     std::array<UvSets, 3> uvs{};
+    std::array<Tangent, 3> tangents{};
     for (std::size_t k = 0; k < 3; ++k) {
       const std::size_t vertex = v.corners[i + (mirrored ? 2 - k : k)];
       corners[k] = transform.point(vec3_at(v.positions, vertex));
       if (parts.normals) normals[k] = normalize(normal_to_file * vec3_at(v.normals, vertex));
       for (std::size_t set = 0; set < static_cast<std::size_t>(parts.uv_sets); ++set)
         uvs[k][set] = {v.uvs[set][2 * vertex], v.uvs[set][2 * vertex + 1]};
+      if (parts.tangents) tangents[k] = tangent_at(v, vertex);
     }
-    builder.add(corners, normals, uvs);
+    builder.add(corners, normals, uvs, tangents);
   }
+}
+
+/// Whether the file gives the primitive a normal map: other tangents would only part its vertices.
+bool is_bumpy(const Document& document, const Primitive& primitive) {
+  return primitive.material >= 0 &&
+         document.materials[static_cast<std::size_t>(primitive.material)].normal_texture.texture >=
+             0;
 }
 
 int uv_sets_of(const Vertices& v) {
@@ -135,7 +160,10 @@ Result<TriangleMesh> primitive_mesh(const Document& document, int mesh, int prim
       p >= document.meshes[m].primitives.size())
     return document.error(place + ": not there");
   BATON_ASSIGN(const Vertices v, read_vertices(document, document.meshes[m].primitives[p], place));
-  const MeshParts parts{smooth_normals && has_usable_normals(v), uv_sets_of(v)};
+  const bool with_normals = smooth_normals && has_usable_normals(v);
+  const bool with_tangents = with_normals && is_bumpy(document, document.meshes[m].primitives[p]) &&
+                             has_usable_tangents(v);
+  const MeshParts parts{with_normals, uv_sets_of(v), with_tangents};
   MeshBuilder builder(parts);
   add_triangles(v, kIdentity, parts, builder);
   TriangleMesh result = builder.take();
@@ -152,7 +180,7 @@ Result<TriangleMesh> whole_mesh(const Document& document, bool smooth_normals) {
   };
   const std::vector<Matrix> to_world = NodeMotion::at_rest(document);
   std::vector<Part> parts;
-  MeshParts common{smooth_normals, 2};
+  MeshParts common{.normals = smooth_normals, .uv_sets = 2};
   for (const int node : shown_nodes(document)) {
     const int mesh = document.nodes[static_cast<std::size_t>(node)].mesh;
     if (mesh < 0) continue;

@@ -1,0 +1,165 @@
+#include "worker/texture/texture.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <cmath>
+#include <random>
+
+#include "tests/support/image_files.h"
+
+namespace baton {
+namespace {
+
+using test::write_targa;
+using test::write_test_file;
+using testing::HasSubstr;
+
+/// An image of integers.
+Image image_of(int width, int height, int channels, std::vector<float> samples) {
+  return {width, height, channels, std::move(samples), true};
+}
+
+std::shared_ptr<const Texture> texture_of(const Image& image, TextureUse use) {
+  auto texture = Texture::build(image, use, "test");
+  EXPECT_TRUE(texture.ok()) << (texture.ok() ? "" : texture.error().message);
+  return *texture;
+}
+
+/// Four grey steps side by side: 0, 1/3, 2/3, 1.
+std::shared_ptr<const Texture> ramp() {
+  return texture_of(image_of(4, 1, 1, {0, 1 / 3.0f, 2 / 3.0f, 1}), TextureUse::metallic_roughness);
+}
+
+std::string error_of(const Result<Image>& image) {
+  return image.ok() ? "none" : image.error().message;
+}
+
+TEST(Texture, EverySmallerImageHasTheSameMean) {
+  std::mt19937 random(1);
+  std::uniform_real_distribution<float> uniform(0, 1);
+  for (const auto& [width, height] : {std::pair{64, 32}, {13, 7}, {1, 9}, {17, 1}, {1, 1}}) {
+    std::vector<float> samples;
+    double mean = 0;
+    for (int i = 0; i < width * height * 3; ++i) {
+      samples.push_back(uniform(random));
+      mean += i % 3 == 1 ? samples.back() : 0;
+    }
+    mean /= width * height;
+    const auto texture = texture_of(image_of(width, height, 3, samples), TextureUse::normal);
+    int w = width, h = height;
+    for (std::int32_t level = 0; level < texture->num_levels(); ++level) {
+      double sum = 0;
+      for (int y = 0; y < h; ++y) {
+        for (int x = 0; x < w; ++x) sum += texture->texel(level, x, y)[1];
+      }
+      EXPECT_NEAR(sum / (w * h), mean, 1e-5) << width << " x " << height << ", level " << level;
+      w = std::max(w / 2, 1);
+      h = std::max(h / 2, 1);
+    }
+  }
+}
+
+TEST(Texture, ColoursBecomeLinearBeforeTheyAreAveraged) {
+  const Image image = image_of(2, 1, 3, {0, 0.5f, 1, 1, 0.5f, 1});
+  const auto color = texture_of(image, TextureUse::color);
+  EXPECT_NEAR(color->texel(0, 0, 0)[1], 0.21404f, 1e-4f);
+  EXPECT_NEAR(color->texel(1, 0, 0)[0], 0.5f, 1e-4f);
+  EXPECT_NEAR(color->texel(1, 0, 0)[2], 1.0f, 1e-6f);
+  EXPECT_NEAR(texture_of(image, TextureUse::normal)->texel(0, 0, 0)[1], 0.5f, 1e-4f);
+  Image floats = image;
+  floats.is_integer = false;
+  floats.samples[0] = 8;
+  floats.samples[1] = NAN;
+  const auto linear = texture_of(floats, TextureUse::color);
+  EXPECT_NEAR(linear->texel(0, 0, 0)[0], 8, 1e-3f);
+  EXPECT_EQ(linear->texel(0, 0, 0)[1], 0);
+  EXPECT_NEAR(linear->texel(0, 1, 0)[1], 0.5f, 1e-3f);
+}
+
+TEST(Texture, ChannelsGoWhereTheirUseSays) {
+  const Image rgba = image_of(1, 1, 4, {0.1f, 0.2f, 0.3f, 0.4f});
+  const auto pair = texture_of(rgba, TextureUse::metallic_roughness)->texel(0, 0, 0);
+  EXPECT_NEAR(pair[0], 0.2f, 1e-5f);
+  EXPECT_NEAR(pair[1], 0.3f, 1e-5f);
+  EXPECT_TRUE(texture_of(rgba, TextureUse::color_and_alpha)->has_alpha());
+  EXPECT_NEAR(texture_of(rgba, TextureUse::color_and_alpha)->texel(0, 0, 0)[3], 0.4f, 1e-5f);
+  EXPECT_FALSE(texture_of(rgba, TextureUse::color)->has_alpha());
+  const Image grey = image_of(1, 1, 2, {1, 0.25f});
+  EXPECT_NEAR(texture_of(grey, TextureUse::color_and_alpha)->texel(0, 0, 0)[2], 1, 1e-5f);
+  EXPECT_NEAR(texture_of(grey, TextureUse::color_and_alpha)->texel(0, 0, 0)[3], 0.25f, 1e-5f);
+  const auto flat = Texture::build(grey, TextureUse::normal, "grey.png");
+  ASSERT_FALSE(flat.ok());
+  EXPECT_EQ(flat.error().message, "grey.png: expected 3 or 4 channels of a normal map, got 2");
+}
+
+TEST(Texture, GoesOnPastItsEdges) {
+  const auto texture = ramp();
+  const auto at = [&](float u, Wrap wrap, bool nearest) {
+    return texture->look_up({u, 0.5f}, {}, {wrap, Wrap::repeat, nearest})[0];
+  };
+  EXPECT_NEAR(at(1.125f, Wrap::repeat, true), 0, 1e-5f);
+  EXPECT_NEAR(at(1.125f, Wrap::clamp, true), 1, 1e-5f);
+  EXPECT_NEAR(at(1.125f, Wrap::mirror, true), 1, 1e-5f);
+  EXPECT_NEAR(at(-0.375f, Wrap::repeat, true), 2 / 3.0f, 1e-5f);
+  EXPECT_NEAR(at(-0.375f, Wrap::clamp, true), 0, 1e-5f);
+  EXPECT_NEAR(at(-0.375f, Wrap::mirror, true), 1 / 3.0f, 1e-5f);
+  EXPECT_NEAR(at(1, Wrap::repeat, false), 0.5f, 1e-5f);  // between the last and the first
+  EXPECT_NEAR(at(1, Wrap::clamp, false), 1, 1e-5f);
+  EXPECT_NEAR(at(0.375f, Wrap::repeat, false), 1 / 3.0f, 1e-5f);
+  for (const float far : {1e30f, -1e30f, INFINITY, NAN}) {
+    for (const Wrap wrap : {Wrap::repeat, Wrap::clamp, Wrap::mirror})
+      EXPECT_GE(at(far, wrap, false), 0) << far;
+  }
+}
+
+TEST(Texture, AFootprintIsAveragedAlongBothSides) {
+  // Bright and dark rows.
+  std::vector<float> rows;
+  for (int i = 0; i < 64 * 64; ++i) rows.push_back(i / 64 % 2 == 0 ? 1.0f : 0.0f);
+  const auto texture = texture_of(image_of(64, 64, 1, rows), TextureUse::metallic_roughness);
+  const auto at = [&](const Footprint& footprint) {
+    return texture->look_up({0.5f, 10.5f / 64}, footprint, {})[0];
+  };
+  EXPECT_NEAR(at({}), 1, 1e-5f);
+  EXPECT_NEAR(at({{1, 0}, {0, 1}}), 0.5f, 1e-4f);
+  EXPECT_NEAR(at({{0, 0.25f}, {0.25f, 0}}), 0.5f, 1e-4f);
+  // Long along the rows and thin across them: it stays within one.
+  EXPECT_NEAR(at({{0.2f, 0}, {0, 1 / 64.0f}}), 1, 1e-5f);
+  EXPECT_NEAR(at({{0, 1 / 64.0f}, {0.2f, 0}}), 1, 1e-5f);
+  EXPECT_NEAR(at({{INFINITY, 0}, {0, 1}}), 0.5f, 1e-4f);
+}
+
+TEST(ImageReader, ReadsFilesAndBytes) {
+  const std::vector<std::uint8_t> values{255, 0, 51, 255, 0, 102, 0, 0};
+  const auto image = read_image(write_targa("two.tga", 2, 1, 4, values));
+  ASSERT_TRUE(image.ok()) << image.error().message;
+  EXPECT_EQ(image->width, 2);
+  EXPECT_EQ(image->channels, 4);
+  EXPECT_TRUE(image->is_integer);
+  // Colours are not multiplied by alpha.
+  for (std::size_t i = 0; i < values.size(); ++i)
+    EXPECT_NEAR(image->samples[i], values[i] / 255.0f, 1e-6f) << i;
+}
+
+TEST(ImageReader, SaysWhatIsWrong) {
+  EXPECT_THAT(error_of(read_image("/no/such.png")),
+              HasSubstr("/no/such.png: missing: expected an image file"));
+  EXPECT_THAT(error_of(read_image(testing::TempDir())), HasSubstr("missing"));
+  const std::string text = write_test_file("text.png", "this is no image\n");
+  EXPECT_THAT(error_of(read_image(text)), HasSubstr("text.png: not an image: "));
+  const std::string cut =
+      write_test_file("cut.tga", test::targa(64, 64, 3, std::vector<std::uint8_t>(300)));
+  EXPECT_THAT(error_of(read_image(cut)), HasSubstr("cut.tga: not an image: "));
+  EXPECT_THAT(error_of(read_image(write_test_file("wide.tga", test::targa(9000, 1, 3, {})))),
+              HasSubstr("wide.tga: expected an image of 1 to 8192 pixels a side, got 9000 x 1"));
+  const Bytes bytes(100, std::byte{1});
+  EXPECT_EQ(error_of(read_image(bytes, "set.glb, image 2")),
+            "set.glb, image 2: not an image: expected PNG, JPEG or WebP");
+  const Bytes png{std::byte{0x89}, std::byte{'P'}, std::byte{'N'}, std::byte{'G'}, std::byte{13}};
+  EXPECT_THAT(error_of(read_image(png, "set.glb, image 3")),
+              HasSubstr("set.glb, image 3: not an image: "));
+}
+
+}  // namespace
+}  // namespace baton

@@ -1,0 +1,40 @@
+#pragma once
+
+#include <map>
+#include <tuple>
+
+#include "worker/scene/gltf/file_cache.h"
+#include "worker/scene/surface_detail.h"
+
+namespace baton {
+
+/// Loads the textures of materials, each image once for each use.
+class DetailLoader {
+ public:
+  /// files: must outlive the object.
+  explicit DetailLoader(gltf::FileCache& files) : files_(files) {}
+
+  /// What a material of numbers has beside them; null: nothing. Errors name the file: no image,
+  /// not there, together larger than kMaxTextureBytes.
+  Result<std::shared_ptr<const SurfaceDetail>> load(const MaterialSpec& spec);
+
+ private:
+  using TexturePtr = std::shared_ptr<const Texture>;
+  Status place(const std::optional<TextureSpec>& spec, TextureUse use, PlacedTexture& placed);
+  Result<TexturePtr> load_texture(const TextureSpec& spec, TextureUse use);
+  Result<Image> read(const TextureSpec& spec);
+
+  gltf::FileCache& files_;
+  std::map<std::tuple<std::string, int, TextureUse>, Result<TexturePtr>> textures_;
+  std::uint64_t size_bytes_ = 0;
+};
+
+/// A set of texture coordinates that a texture of the material needs and the mesh does not have;
+/// nullopt: none. name: of the texture, as in a job.
+struct MissingUvs {
+  std::size_t set;
+  const char* texture;
+};
+std::optional<MissingUvs> missing_uvs(const SurfaceDetail& detail, const TriangleMesh& mesh);
+
+}  // namespace baton

@@ -1,0 +1,180 @@
+#include "worker/scene/surface_detail.h"
+
+#include <algorithm>
+#include <cmath>
+
+namespace baton {
+namespace {
+
+/// What the schema of jobs takes.
+constexpr float kLeastRoughness = 0.02f;
+/// Cosines of slopes below this count as this: footprints end.
+constexpr float kLeastSlope = 0.01f;
+/// Least cosine between a mapped and the geometric normal.
+constexpr float kLeastUpright = 0.02f;
+
+template <class T>
+T mix(const T& a, const T& b, const T& c, float u, float v) {
+  return a * (1 - u - v) + b * u + c * v;
+}
+
+Uv mix_uv(const Uv& a, const Uv& b, const Uv& c, float u, float v) {
+  return {mix(a[0], b[0], c[0], u, v), mix(a[1], b[1], c[1], u, v)};
+}
+
+Uv mapped(const std::array<float, 4>& m, const Uv& uv) {
+  return {m[0] * uv[0] + m[1] * uv[1], m[2] * uv[0] + m[3] * uv[1]};
+}
+
+/// The triangle at a place, in the world.
+class Patch {
+ public:
+  Patch(const Scene& scene, const Instance& instance, const SurfacePlace& place)
+      : mesh_(scene.meshes[instance.mesh]),
+        instance_(instance),
+        place_(place),
+        corner_(mesh_.triangles[place.triangle]) {}
+
+  /// Sets what the site sees: a rectangle, longer along the view by its slope. Without, look-ups
+  /// are those of a point.
+  void set_footprint(const ShadingPoint& point) {
+    const Vec3 a = world(0);
+    edge_b_ = world(1) - a;
+    edge_c_ = world(2) - a;
+    const float slope = std::max(dot(point.ng, point.wo), kLeastSlope);
+    const Vec3 down = point.wo - point.ng * dot(point.ng, point.wo);
+    const Vec3 along = length(down) > 1e-6f ? normalize(down) : Frame(point.ng).x;
+    along_ = along * (place_.width / slope);
+    across_ = cross(point.ng, along) * place_.width;
+  }
+
+  std::array<float, 4> look_up(const PlacedTexture& t) const {
+    const std::vector<Uv>& uvs = mesh_.uvs[t.uv_set];
+    const Uv &a = uvs[corner_[0]], &b = uvs[corner_[1]], &c = uvs[corner_[2]];
+    const Uv at = mapped(t.linear, mix_uv(a, b, c, place_.u, place_.v));
+    const Uv to_b = mapped(t.linear, {b[0] - a[0], b[1] - a[1]});
+    const Uv to_c = mapped(t.linear, {c[0] - a[0], c[1] - a[1]});
+    const Footprint seen{edge(along_, to_b, to_c), edge(across_, to_b, to_c)};
+    return t.texture->look_up({at[0] + t.offset[0], at[1] + t.offset[1]}, seen, t.sampling);
+  }
+
+  /// The normal that (x, y, z) of tangent space is, z along that of the mesh; unit, on the side of
+  /// ns.
+  Vec3 from_tangent_space(const Vec3& local, const Vec3& ns) const {
+    const auto& t = mesh_.tangents;
+    const float u = place_.u, v = place_.v;
+    const Vec3 normal = own_normal();
+    Vec3 tangent =
+        mix(t[corner_[0]].direction, t[corner_[1]].direction, t[corner_[2]].direction, u, v);
+    tangent = normalize(tangent - normal * dot(normal, tangent));
+    const Vec3 up = cross(normal, tangent) * t[corner_[0]].side;
+    const Vec3 n = normalize(instance_.normal_to_world * normal);
+    const Vec3 world = normalize(instance_.to_world.linear * tangent) * local.x +
+                       normalize(instance_.to_world.linear * up) * local.y + n * local.z;
+    return normalize(dot(n, ns) < 0 ? -world : world);
+  }
+
+ private:
+  Vec3 world(std::size_t k) const { return instance_.to_world.point(mesh_.positions[corner_[k]]); }
+
+  /// The interpolated normal in the space of the mesh.
+  Vec3 own_normal() const {
+    const auto corner = [&](const std::vector<Vec3>& values, std::size_t k) {
+      return values[corner_[k]];
+    };
+    if (mesh_.normals.empty()) {
+      const Vec3 a = corner(mesh_.positions, 0);
+      return normalize(cross(corner(mesh_.positions, 1) - a, corner(mesh_.positions, 2) - a));
+    }
+    return normalize(mix(corner(mesh_.normals, 0), corner(mesh_.normals, 1),
+                         corner(mesh_.normals, 2), place_.u, place_.v));
+  }
+
+  /// What a step in the world is in the image.
+  Uv edge(const Vec3& step, const Uv& to_b, const Uv& to_c) const {
+    const float bb = dot(edge_b_, edge_b_), bc = dot(edge_b_, edge_c_), cc = dot(edge_c_, edge_c_);
+    const float sb = dot(step, edge_b_), sc = dot(step, edge_c_);
+    const float determinant = bb * cc - bc * bc;
+    if (!(determinant > 0)) return {0, 0};
+    const float b = (cc * sb - bc * sc) / determinant, c = (bb * sc - bc * sb) / determinant;
+    return {b * to_b[0] + c * to_c[0], b * to_b[1] + c * to_c[1]};
+  }
+
+  const TriangleMesh& mesh_;
+  const Instance& instance_;
+  const SurfacePlace& place_;
+  const std::array<std::uint32_t, 3>& corner_;
+  Vec3 edge_b_{}, edge_c_{};
+  Vec3 along_{}, across_{};
+};
+
+/// The shading normal that a normal map gives.
+Vec3 mapped_normal(const Patch& patch, const SurfaceDetail& detail, const ShadingPoint& point,
+                   bool has_lobe) {
+  const std::array<float, 4> texel = patch.look_up(detail.normal);
+  const float strength = detail.spec.normal_texture->strength;
+  const Vec3 local{(2 * texel[0] - 1) * strength, (2 * texel[1] - 1) * strength, 2 * texel[2] - 1};
+  if (!(length(local) > 0)) return point.ns;
+  Vec3 normal = patch.from_tangent_space(local, point.ns);
+  if (const float upright = dot(normal, point.ng); upright < kLeastUpright)
+    normal = normalize(normal + point.ng * (kLeastUpright - upright));
+  return has_lobe ? bent_normal(normal, point.ng, point.wo) : normal;
+}
+
+}  // namespace
+
+SeenSurface see_detail(const Scene& scene, const Instance& instance, const SurfacePlace& place,
+                       const ShadingPoint& point) {
+  const SurfaceDetail& detail = *scene.material_of(instance).detail;
+  Patch patch(scene, instance, place);
+  patch.set_footprint(point);
+  const MaterialSpec& spec = detail.spec;
+  Rgb color = spec.base_color, emission = spec.emission;
+  float metallic = spec.metallic, roughness = spec.roughness;
+  const auto rgb = [](const std::array<float, 4>& t) { return Rgb{t[0], t[1], t[2]}; };
+  if (detail.color.texture != nullptr) {
+    color = color * rgb(patch.look_up(detail.color));
+    color = {std::min(color.x, 1.0f), std::min(color.y, 1.0f), std::min(color.z, 1.0f)};
+  }
+  if (detail.metallic_roughness.texture != nullptr) {
+    const std::array<float, 4> t = patch.look_up(detail.metallic_roughness);
+    roughness = std::clamp(roughness * t[0], kLeastRoughness, 1.0f);
+    metallic = std::min(metallic * t[1], 1.0f);
+  }
+  if (detail.emission.texture != nullptr) emission = emission * rgb(patch.look_up(detail.emission));
+  SeenSurface seen{point, make_material(spec, color, metallic, roughness), emission};
+  if (detail.normal.texture != nullptr)
+    seen.point.ns = mapped_normal(patch, detail, point, seen.material.lobe != Material::Lobe::none);
+  return seen;
+}
+
+bool is_cut_away(const Scene& scene, const Instance& instance, std::uint32_t triangle, float u,
+                 float v) {
+  const SurfaceDetail& detail = *scene.material_of(instance).detail;
+  float alpha = detail.spec.alpha;
+  if (detail.color.texture != nullptr && detail.color.texture->has_alpha())
+    alpha *= Patch(scene, instance, {triangle, u, v}).look_up(detail.color)[3];
+  return alpha < detail.spec.alpha_cutoff;
+}
+
+// With N' = x X + z ng in the plane of both normals, the mirror image's height
+// 2 (x I.X + z I.ng) z - I.ng shall be t. Squared, that is quadratic in z^2.
+Vec3 bent_normal(const Vec3& normal, const Vec3& ng, const Vec3& wo) {
+  const float height = dot(wo, ng);
+  const float threshold = std::min(0.9f * height, 0.01f);
+  if (dot(ng, reflect(wo, normal)) >= threshold) return normal;
+  const Vec3 aside = normal - ng * dot(normal, ng);
+  if (!(length(aside) > 0)) return ng;
+  const Vec3 x = normalize(aside);
+  // In doubles: at grazing view the root is of a small difference.
+  const double sideways = dot(wo, x), up = height, t = threshold;
+  const double a = sideways * sideways + up * up;
+  if (!(a > 0)) return ng;
+  const double b = a + up * t, c = (t + up) * (t + up);
+  const double root = std::sqrt(std::max(b * b - a * c, 0.0));
+  const double z2 = std::clamp(0.5 * (sideways < 0 ? b + root : b - root) / a, 0.0, 1.0);
+  return normalize(x * static_cast<float>(std::sqrt(1 - z2)) +
+                   ng * static_cast<float>(std::sqrt(z2)));
+}
+
+}  // namespace baton

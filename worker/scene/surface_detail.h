@@ -1,0 +1,62 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+
+#include "worker/scene/scene.h"
+#include "worker/texture/texture.h"
+
+namespace baton {
+
+/// A texture and where it lies on a surface.
+struct PlacedTexture {
+  std::shared_ptr<const Texture> texture;  ///< null: none
+  std::size_t uv_set = 0;
+  /// Image place of texture coordinates c: offset + linear c.
+  std::array<float, 4> linear{1, 0, 0, 1};  ///< row by row
+  std::array<float, 2> offset{0, 0};
+  TextureSampling sampling{};
+};
+
+/// What a material of numbers has beside them.
+struct SurfaceDetail {
+  MaterialSpec spec;  ///< the numbers: factors of the textures
+  PlacedTexture color{}, metallic_roughness{}, normal{}, emission{};
+
+  bool is_cut_out() const { return spec.alpha_cutoff > 0; }
+};
+
+/// Where on a mesh a surface was hit.
+struct SurfacePlace {
+  std::uint32_t triangle = 0;
+  float u = 0, v = 0;  ///< barycentric coordinates of its second and third corner
+  float width = 0;     ///< of what the site sees, across the ray, in the world
+
+  bool operator==(const SurfacePlace&) const = default;
+};
+
+/// A surface as it is lit: with its normal and its material as its textures say.
+struct SeenSurface {
+  ShadingPoint point;
+  Material material;
+  Rgb emission{};  ///< radiance to the viewer
+};
+
+/// The surface at a hit of `instance`, whose material has detail. point: with the normals of the
+/// mesh. A mapped normal is bent just so far towards the geometric one that the viewer's mirror
+/// image lies above the surface. Textures are averaged over the width of the place, which the
+/// surface's slope stretches.
+SeenSurface see_detail(const Scene& scene, const Instance& instance, const SurfacePlace& place,
+                       const ShadingPoint& point);
+
+/// Whether the instance, whose material has detail, has no surface there: its alpha, blended in the
+/// image of full size, is below the cut-off.
+bool is_cut_away(const Scene& scene, const Instance& instance, std::uint32_t triangle, float u,
+                 float v);
+
+/// `normal`, turned towards ng until wo's mirror image about it is above the surface: as shallow as
+/// 0.01, or as nine tenths of wo. All unit; dot(ng, wo) >= 0.
+Vec3 bent_normal(const Vec3& normal, const Vec3& ng, const Vec3& wo);
+
+}  // namespace baton

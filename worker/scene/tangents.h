@@ -1,0 +1,12 @@
+#pragma once
+
+#include "worker/scene/scene.h"
+
+namespace baton {
+
+/// Gives the mesh tangents from its texture coordinates of set `uv_set`, which it has, where it has
+/// none: at each vertex the mean over the triangles around it, weighted by their corners' angles,
+/// as MikkTSpace does. Where images that are mirrored to each other meet, vertices become two.
+void derive_tangents(TriangleMesh& mesh, std::size_t uv_set);
+
+}  // namespace baton

@@ -1,0 +1,234 @@
+#include "worker/texture/texture.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+namespace baton {
+namespace {
+
+constexpr float kFullScale = 65535;
+/// Blends along the longer side of a footprint.
+constexpr float kMostProbes = 16;
+/// Brighter values of images of floats are cut.
+constexpr float kBrightest = 65504;
+
+/// Of what integers of 8 or 16 bits say.
+constexpr std::size_t kTableSize = 65536;
+
+/// IEC 61966-2-1.
+float decode_srgb(float v) {
+  return v <= 0.04045f ? v / 12.92f : std::pow((v + 0.055f) / 1.055f, 2.4f);
+}
+
+/// The channels of an image that a use keeps.
+std::vector<std::int32_t> kept_channels(TextureUse use, std::int32_t channels) {
+  const bool is_grey = channels < 3;
+  switch (use) {
+    case TextureUse::color:
+    case TextureUse::normal:
+      return is_grey ? std::vector<std::int32_t>{0, 0, 0} : std::vector<std::int32_t>{0, 1, 2};
+    case TextureUse::color_and_alpha:
+      if (channels == 2) return {0, 0, 0, 1};
+      if (channels == 4) return {0, 1, 2, 3};
+      return kept_channels(TextureUse::color, channels);
+    case TextureUse::metallic_roughness:
+      return is_grey ? std::vector<std::int32_t>{0, 0} : std::vector<std::int32_t>{1, 2};
+  }
+  return {};
+}
+
+/// Values of the kept channels, colours as linear light, none below 0.
+std::vector<float> linear_values(const Image& image, TextureUse use,
+                                 const std::vector<std::int32_t>& kept) {
+  const bool is_srgb =
+      image.is_integer && (use == TextureUse::color || use == TextureUse::color_and_alpha);
+  const auto channels = static_cast<std::size_t>(image.channels);
+  std::vector<float> light(is_srgb ? kTableSize : 0);
+  for (std::size_t i = 0; i < light.size(); ++i)
+    light[i] = decode_srgb(static_cast<float>(i) / static_cast<float>(kTableSize - 1));
+  std::vector<float> values;
+  values.reserve(image.samples.size() / channels * kept.size());
+  for (std::size_t pixel = 0; pixel < image.samples.size(); pixel += channels) {
+    for (std::size_t k = 0; k < kept.size(); ++k) {
+      const float v = image.samples[pixel + static_cast<std::size_t>(kept[k])];
+      const float positive = v > 0 ? std::min(v, kBrightest) : 0;  // NaN is 0
+      const auto step =
+          static_cast<std::size_t>(positive * static_cast<float>(kTableSize - 1) + 0.5f);
+      values.push_back(is_srgb && k < 3 ? light[std::min(step, kTableSize - 1)] : positive);
+    }
+  }
+  return values;
+}
+
+/// Half as many samples along one axis, each the mean of the stretch that it covers. values:
+/// (outer, count, inner).
+std::vector<float> halve(const std::vector<float>& values, std::size_t count, std::size_t inner) {
+  const std::size_t half = std::max<std::size_t>(count / 2, 1);
+  if (half == count) return values;
+  const std::size_t outer = values.size() / (count * inner);
+  std::vector<float> result(outer * half * inner);
+  // An odd number of texels splits the last ones between two: the shares of 2n + 1 texels are in
+  // units of 1 / n.
+  const std::size_t unit = count % 2 == 0 ? 1 : half, width = count % 2 == 0 ? 2 : count;
+  for (std::size_t o = 0; o < outer; ++o) {
+    for (std::size_t i = 0; i < half; ++i) {
+      const std::size_t begin = i * width, end = begin + width;
+      for (std::size_t t = begin / unit; t * unit < end; ++t) {
+        const std::size_t covered = std::min(end, (t + 1) * unit) - std::max(begin, t * unit);
+        const float share = static_cast<float>(covered) / static_cast<float>(width);
+        const float* const from = values.data() + (o * count + t) * inner;
+        float* const to = result.data() + (o * half + i) * inner;
+        for (std::size_t k = 0; k < inner; ++k) to[k] += share * from[k];
+      }
+    }
+  }
+  return result;
+}
+
+/// A coordinate within one period of the image, in units of it; what is not finite is 0.
+float within_period(float u, Wrap wrap) {
+  if (!std::isfinite(u)) return 0;
+  switch (wrap) {
+    case Wrap::repeat:
+      return u - std::floor(u);
+    case Wrap::clamp:
+      return std::clamp(u, -1.0f, 2.0f);
+    case Wrap::mirror:
+      return u - 2 * std::floor(0.5f * u);
+  }
+  return 0;
+}
+
+/// The texel at a place at most one image away from it.
+std::int32_t wrap_texel(std::int32_t i, std::int32_t size, Wrap wrap) {
+  switch (wrap) {
+    case Wrap::repeat:
+      return i < 0 ? i + size : (i >= size ? i - size : i);
+    case Wrap::clamp:
+      return std::clamp(i, 0, size - 1);
+    case Wrap::mirror:
+      if (i < 0) i = -1 - i;
+      if (i >= 2 * size) i -= 2 * size;
+      return i < size ? i : 2 * size - 1 - i;
+  }
+  return 0;
+}
+
+float length2(const std::array<float, 2>& v) { return std::sqrt(v[0] * v[0] + v[1] * v[1]); }
+
+}  // namespace
+
+Result<std::shared_ptr<const Texture>> Texture::build(const Image& image, TextureUse use,
+                                                      const std::string& name) {
+  if (use == TextureUse::normal && image.channels < 3)
+    return Error{
+        ErrorKind::bad_input,
+        fmt::format("{}: expected 3 or 4 channels of a normal map, got {}", name, image.channels)};
+  const std::vector<std::int32_t> kept = kept_channels(use, image.channels);
+  auto texture = std::make_shared<Texture>();
+  texture->channels_ = static_cast<std::int32_t>(kept.size());
+  std::vector<float> values = linear_values(image, use, kept);
+  const float brightest = *std::max_element(values.begin(), values.end());
+  texture->scale_ = std::max(brightest, 1.0f) / kFullScale;
+
+  std::int32_t width = image.width, height = image.height;
+  texture->append_level(values, width, height);
+  while (width > 1 || height > 1) {
+    values = halve(values, static_cast<std::size_t>(width), kept.size());
+    width = std::max(width / 2, 1);
+    values = halve(values, static_cast<std::size_t>(height),
+                   static_cast<std::size_t>(width) * kept.size());
+    height = std::max(height / 2, 1);
+    texture->append_level(values, width, height);
+  }
+  return std::shared_ptr<const Texture>(std::move(texture));
+}
+
+void Texture::append_level(const std::vector<float>& values, std::int32_t width,
+                           std::int32_t height) {
+  levels_.push_back({width, height, texels_.size()});
+  texels_.reserve(texels_.size() + values.size());
+  for (const float v : values)
+    texels_.push_back(static_cast<std::uint16_t>(std::lround(std::min(v / scale_, kFullScale))));
+}
+
+std::array<float, 4> Texture::texel(std::int32_t level, std::int32_t x, std::int32_t y) const {
+  const Level& l = levels_[static_cast<std::size_t>(level)];
+  const std::size_t at =
+      l.first + static_cast<std::size_t>(y * l.width + x) * static_cast<std::size_t>(channels_);
+  std::array<float, 4> value{};
+  for (std::size_t c = 0; c < static_cast<std::size_t>(channels_); ++c)
+    value[c] = static_cast<float>(texels_[at + c]) * scale_;
+  return value;
+}
+
+/// Adds weight times the blend of the four texels around (u, v), or the nearest one.
+void Texture::add(const Level& level, std::array<float, 2> uv, const TextureSampling& sampling,
+                  float weight, std::array<float, 4>& sum) const {
+  const float half = sampling.nearest ? 0.0f : 0.5f;
+  const float x = within_period(uv[0], sampling.wrap_u) * static_cast<float>(level.width) - half;
+  const float y = within_period(uv[1], sampling.wrap_v) * static_cast<float>(level.height) - half;
+  const float x0 = std::floor(x), y0 = std::floor(y);
+  const float fx = sampling.nearest ? 0 : x - x0, fy = sampling.nearest ? 0 : y - y0;
+  const auto channels = static_cast<std::size_t>(channels_);
+  for (std::int32_t j = 0; j < 2; ++j) {
+    const float wy = weight * (j == 0 ? 1 - fy : fy);
+    if (wy == 0) continue;
+    const std::int32_t row =
+        wrap_texel(static_cast<std::int32_t>(y0) + j, level.height, sampling.wrap_v);
+    for (std::int32_t i = 0; i < 2; ++i) {
+      const float w = wy * (i == 0 ? 1 - fx : fx);
+      if (w == 0) continue;
+      const std::int32_t column =
+          wrap_texel(static_cast<std::int32_t>(x0) + i, level.width, sampling.wrap_u);
+      const std::size_t at =
+          level.first + (static_cast<std::size_t>(row) * static_cast<std::size_t>(level.width) +
+                         static_cast<std::size_t>(column)) *
+                            channels;
+      for (std::size_t c = 0; c < channels; ++c)
+        sum[c] += w * (static_cast<float>(texels_[at + c]) * scale_);
+    }
+  }
+}
+
+std::array<float, 4> Texture::look_up(std::array<float, 2> uv, const Footprint& footprint,
+                                      const TextureSampling& sampling) const {
+  // The footprint in texels.
+  const auto w = static_cast<float>(width()), h = static_cast<float>(height());
+  const float size_a = length2({footprint.a[0] * w, footprint.a[1] * h});
+  const float size_b = length2({footprint.b[0] * w, footprint.b[1] * h});
+  const bool along_a = !(size_b > size_a);
+  const std::array<float, 2>& along = along_a ? footprint.a : footprint.b;
+  const float longer = along_a ? size_a : size_b, shorter = along_a ? size_b : size_a;
+
+  // As many probes along the longer side as are as wide as the shorter one.
+  std::array<float, 4> sum{};
+  if (!(longer > 1)) {
+    add(levels_.front(), uv, sampling, 1, sum);
+    return sum;
+  }
+  if (!std::isfinite(longer)) {
+    add(levels_.back(), uv, sampling, 1, sum);
+    return sum;
+  }
+  const float probes = std::ceil(std::min(longer / std::max(shorter, 1.0f), kMostProbes));
+  const float last = static_cast<float>(num_levels() - 1);
+  const float level = std::min(std::log2(std::max(longer / probes, std::max(shorter, 1.0f))), last);
+  const float below = std::floor(level);
+  const float blend = level - below;
+  const auto fine = static_cast<std::size_t>(below);
+  const std::size_t coarse = std::min(fine + 1, levels_.size() - 1);
+  const TextureSampling smooth{sampling.wrap_u, sampling.wrap_v, false};
+  const float share = 1 / probes;
+  for (float p = 0.5f; p < probes; ++p) {
+    const float t = p * share - 0.5f;
+    const std::array<float, 2> at{uv[0] + t * along[0], uv[1] + t * along[1]};
+    add(levels_[fine], at, smooth, share * (1 - blend), sum);
+    if (blend > 0) add(levels_[coarse], at, smooth, share * blend, sum);
+  }
+  return sum;
+}
+
+}  // namespace baton
