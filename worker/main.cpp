@@ -64,7 +64,7 @@ baton::Status take_pilot_options(const PilotOptions& pilot, baton::WorkerOptions
   worker.drain = std::chrono::seconds(pilot.drain_s);
   std::uint64_t& state_bytes = worker.machine.max_state_bytes;
   if (pilot.memory_mib > 0) {
-    state_bytes = std::min(state_bytes, static_cast<std::uint64_t>(pilot.memory_mib) << 18);
+    state_bytes = std::min(state_bytes, static_cast<std::uint64_t>(pilot.memory_mib) << 17);
   }
   for (const std::string& text : pilot.maps) {
     BATON_ASSIGN(baton::PathMap map, baton::parse_path_map(text));

@@ -42,7 +42,8 @@ using JobLoader = std::function<Result<LoadedJobPtr>(const JobDocument& document
 struct Machine {
   PathMaps maps = {};  ///< folders that lie elsewhere here
   Roots roots = {};    ///< folders that jobs may read from and write to; empty: all
-  std::uint64_t max_state_bytes = limits::kMaxStateCacheBytes;  ///< of decoded states of a job
+  std::uint64_t max_state_bytes =
+      limits::kMaxStateCacheBytes;  ///< decoded states of a job; held ones may take twice as much
 };
 
 /// The loader of the worker: parses the document, checks its digest, the folders and the digests of

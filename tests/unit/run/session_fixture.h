@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <vector>
 
 #include "worker/run/session.h"
@@ -13,7 +14,19 @@ using namespace std::chrono_literals;
 /// A session at a clock that the test turns.
 class SessionTest : public testing::Test {
  protected:
-  std::vector<SessionAction> step(const SessionEvent& event) { return session_.step(event, now_); }
+  /// Nothing is held: who leaves has packed it at once, unless the test does that itself.
+  std::vector<SessionAction> step(const SessionEvent& event) {
+    std::vector<SessionAction> actions = session_.step(event, now_);
+    const bool leaves =
+        std::any_of(actions.begin(), actions.end(), [](const SessionAction& action) {
+          const auto* const pack = std::get_if<PackHeld>(&action);
+          return pack != nullptr && !pack->request;
+        });
+    if (!leaves || holds_) return actions;
+    const std::vector<SessionAction> more = session_.step(HeldPacked{}, now_);
+    actions.insert(actions.end(), more.begin(), more.end());
+    return actions;
+  }
   std::vector<SessionAction> receive(Message message) {
     return step(MessageArrived{std::move(message)});
   }
@@ -37,6 +50,7 @@ class SessionTest : public testing::Test {
   }
 
   TimePoint now_{};
+  bool holds_ = false;
   Session session_{{.identity = {.worker_id = "w",
                                  .host = {},
                                  .num_threads = 2,

@@ -1,0 +1,188 @@
+#include "tests/unit/schedule/chaos_farm.h"
+
+namespace baton::testing_farm {
+
+void ChaosFarm::advance(bool trouble) {
+  now_ += std::chrono::milliseconds(roll(300));
+  const std::string worker = "w" + std::to_string(roll(options_.num_workers));
+  const int what = roll(100);
+  if (what < 30) {
+    ask(worker);
+  } else if (what < 50) {
+    publish(worker);
+  } else if (what < 70) {
+    report(worker);
+  } else if (what < 80) {
+    step(ClockTicked{});
+  } else if (what < 88) {
+    for (int i = 0; i < options_.num_workers; ++i) heartbeat("w" + std::to_string(i));
+  } else if (!trouble) {
+    return;
+  } else if (what < 91) {
+    end_process(worker);
+    if (roll(2)) join(worker);
+  } else if (what < 92) {
+    leave(worker);
+  } else if (what < 93) {
+    now_ += kSilence;
+  } else if (what < 96) {
+    if (options_.failures) fail(worker);
+  } else if (what < 97) {
+    start_coordinator();
+  } else if (what < 98) {
+    if (options_.failures) lose_a_file();
+  } else if (!old_reports_.empty()) {
+    receive(old_reports_[static_cast<std::size_t>(roll(static_cast<int>(old_reports_.size())))]);
+  }
+}
+
+void ChaosFarm::change_job(JobSpec next) {
+  FormerJob former{document_of(spec_), completions_of(completions_).tasks, plan_,
+                   JobStatus::cancelled};
+  if (is_open(status())) step(JobSuperseded{job_, {}});
+  keep_blobs();
+  step(JobForgotten{job_});
+  held_.clear();
+  memory_.clear();
+  wanted_.clear();
+  unconfirmed_.clear();
+  old_reports_.clear();
+
+  // Frames are files with numbers.
+  std::set<int> written;
+  for (const Completion& done : completions_) {
+    if (done.task.kind == TaskKind::assemble && !lost_frames_.contains(done.task))
+      written.insert(spec_.frames[static_cast<std::size_t>(done.task.step)]);
+  }
+  const KeptFiles files{
+      .has_frame =
+          [&](std::int32_t frame, const BlobRef&) {
+            return written.contains(next.frames[static_cast<std::size_t>(frame)]);
+          },
+      .has_blob = [&](const BlobRef& blob) { return store_.contains(blob.digest); }};
+  const Adoption adoption = adopt(document_of(next), {former}, files);
+  num_kept_frames_ += adoption.images.size();
+  num_cuts_ += adoption.plan.cuts.size();
+
+  std::vector<Completion> taken;
+  const std::set<TaskKey> tasks(adoption.tasks.begin(), adoption.tasks.end());
+  for (const Completion& done : completions_) {
+    if (tasks.contains(done.task)) taken.push_back(done);
+  }
+  for (const BlobRef& image : adoption.images)
+    taken.push_back({{TaskKind::assemble, image.frame, 0}, {image}, {}, {}});
+  for (const TaskKey& task : adoption.settled) taken.push_back({task, {}, {}, {}});
+  spec_ = std::move(next);
+  spec_.leading_runs = adoption.plan.leading_runs;
+  graph_ = JobGraph(spec_);
+  plan_ = adoption.plan;
+  completions_ = std::move(taken);
+  recorded_.clear();
+  for (const Completion& done : completions_)
+    EXPECT_TRUE(recorded_.insert(done.task).second) << "adopted twice";
+  failures_.clear();
+  lost_frames_.clear();
+  job_ = digest_of("job " + std::to_string(++num_changes_));
+  add_job();
+  std::erase_if(kept_, [this](const Digest& blob) { return scheduler_->is_referenced(blob); });
+}
+
+void ChaosFarm::delete_job() {
+  step(JobForgotten{job_});
+  for (const Digest& blob : kept_) store_.erase(blob);
+  EXPECT_EQ(scheduler_->find_job(job_), nullptr);
+  for (const TaskCompleted& late : old_reports_) step(late);
+  EXPECT_FALSE(std::any_of(store_.begin(), store_.end(),
+                           [this](const Digest& blob) { return scheduler_->is_referenced(blob); }));
+}
+
+void ChaosFarm::add_job() {
+  JobAdded added{job_, spec_, JobStatus::running, completions_of(completions_), failures_};
+  added.plan = plan_;
+  // It looks for every file that it counts on.
+  Scheduler trial(0, kSilence);
+  trial.step(added, now_);
+  const JobTasks& tasks = trial.find_job(job_)->tasks;
+  for (const Completion& done : completions_) {
+    const auto live = tasks.live_blobs(*graph_.find(done.task));
+    const bool lost = std::any_of(live.begin(), live.end(), [this](const BlobRef& blob) {
+      return !blob.is_held() && !store_.contains(blob.digest);
+    });
+    if (lost || lost_frames_.erase(done.task) > 0) added.lost.push_back(done.task);
+    for (const BlobRef& spare : tasks.spare_blobs(*graph_.find(done.task))) {
+      if (!store_.contains(spare.digest)) added.lost_spares.push_back(done.task);
+    }
+  }
+  for (const Cut& cut : plan_.cuts) {
+    const bool lost =
+        std::any_of(cut.states.begin(), cut.states.end(),
+                    [this](const BlobRef& blob) { return !store_.contains(blob.digest); });
+    if (lost && tasks.is_cut(*graph_.find(cut.task))) added.lost.push_back(cut.task);
+  }
+  step(added);
+}
+
+void ChaosFarm::heartbeat(const std::string& worker) {
+  repeat(worker);
+  if (!known_.contains(worker)) return;
+  step(WorkerAlive{worker, leases(worker)});
+  if (const auto asked = wanted_.find(worker); asked != wanted_.end() && roll(4) > 0) {
+    HeldPublished some{worker, job_, {}};
+    for (const Digest& name : asked->second) {
+      if (const auto state = memory_[worker].find(name); state != memory_[worker].end())
+        some.states.push_back(state->second);
+    }
+    wanted_.erase(asked);
+    publish(some);
+  }
+}
+
+void ChaosFarm::report(const std::string& worker) {
+  if (held_[worker].empty()) return;
+  if (!known_.contains(worker)) join(worker);
+  if (held_[worker].empty()) return;
+  const auto [lease, held] = *held_[worker].begin();
+  const std::vector<BlobRef> unread = missing_inputs(worker, held);
+  held_[worker].erase(lease);
+  const bool unheld =
+      std::any_of(unread.begin(), unread.end(), [](const BlobRef& blob) { return blob.is_held(); });
+  if (!held.published && unheld) {
+    say(worker, lease, AttemptFailed{worker, lease, "is not held here", false});
+    return;
+  }
+  if (!held.published && !unread.empty()) {
+    say(worker, lease, InputsLost{worker, lease, unread});
+    return;
+  }
+  if (!held.published) publish(worker, lease, held);
+  const TaskCompleted done{worker, lease, outputs(lease.task, held), {}};
+  old_reports_.push_back(done);
+  say(worker, lease, done);
+}
+
+void ChaosFarm::on(const GrantLease& a) {
+  EXPECT_FALSE(recorded_.contains(a.lease.task)) << "granted after it was done";
+  EXPECT_TRUE(issued_.insert(a.lease).second) << "a lease id is used once";
+  for (const TaskIndex input : graph_.inputs(a.lease.task)) {
+    EXPECT_TRUE(recorded_.contains(graph_.key(input))) << "granted before its input was recorded";
+  }
+  // Who is not known any more gets no message.
+  const bool arrives = roll(20) > 0 && known_.contains(a.worker);
+  Memory& memory = memory_[a.worker];
+  if (arrives)
+    std::erase_if(memory, [&](const auto& s) { return s.second.held.frame < a.states_from; });
+  for (const BlobRef& input : a.inputs) {
+    EXPECT_TRUE(scheduler_->is_referenced(input.digest));
+    if (input.is_held()) {
+      EXPECT_TRUE(memory.contains(input.digest) || !known_.contains(a.worker))
+          << "granted to a worker that does not hold an input";
+    } else {
+      EXPECT_TRUE(store_.contains(input.digest) || lost_.contains(input.digest))
+          << "granted with an input that was removed";
+    }
+  }
+  if (arrives)
+    held_[a.worker].emplace(a.lease, Held{a.inputs, a.frames, a.may_hold && roll(5) > 0});
+}
+
+}  // namespace baton::testing_farm

@@ -1,0 +1,114 @@
+#include <gtest/gtest.h>
+
+#include "tests/unit/schedule/farm.h"
+
+namespace baton {
+namespace {
+
+using namespace testing_farm;
+
+/// Four tiles in a row that need their neighbours, 12 frames, checkpoints every 6. Worker "a" is
+/// there and holds what it may.
+class HeldStatesTest : public testing::Test {
+ protected:
+  static JobSpec spec() {
+    JobSpec job = moving_job(4, 12, 1);
+    job.state.checkpoint_every = 6;
+    return job;
+  }
+  void SetUp() override {
+    farm.submit();
+    farm.step(WorkerJoined{"a", {}});
+  }
+  /// The worker does a task, and holds its state if it may.
+  std::vector<Action> finish(const GrantLease& grant) {
+    std::vector<BlobRef> outputs = outputs_of(farm.spec(), farm.job, grant.lease.task);
+    for (BlobRef& blob : outputs) {
+      if (grant.may_hold && blob.kind == BlobKind::state)
+        blob = {blob.kind, blob.frame, blob.tile, held_state_name(farm.job, blob.frame, blob.tile)};
+    }
+    return farm.step(TaskCompleted{grant.worker, grant.lease, outputs, {}});
+  }
+  /// "a" renders the first frame of all tiles.
+  void render_first_frame() {
+    for (int tile = 0; tile < 4; ++tile) finish(farm.ask_one("a"));
+    while (farm.progress().frames_done == 0) finish(farm.ask_one("a"));
+    ASSERT_EQ(farm.scheduler.find_job(farm.job)->tasks.num_held(), 4u);
+  }
+  Farm farm{spec()};
+};
+
+TEST_F(HeldStatesTest, OneWorkerHoldsAllButCheckpointsAndResults) {
+  std::map<std::int32_t, int> held;
+  for (GrantLease grant = farm.ask_one("a"); grant.lease.attempt > 0; grant = farm.ask_one("a")) {
+    if (grant.lease.task.kind == TaskKind::render) held[grant.lease.task.step] += grant.may_hold;
+    finish(grant);
+  }
+  EXPECT_EQ(farm.status(), JobStatus::done);
+  for (const auto& [run, tiles] : held) EXPECT_EQ(tiles, run == 5 || run == 11 ? 0 : 4) << run;
+}
+
+TEST_F(HeldStatesTest, WhoHasNothingToDoMakesTheHolderPublish) {
+  render_first_frame();
+  farm.step(WorkerJoined{"b", {}});
+  const std::vector<Action> actions = farm.step(WorkRequested{"b", 1});
+  EXPECT_TRUE(all_of<GrantLease>(actions).empty()) << "it can read nothing";
+  const auto asked = all_of<AskForStates>(actions);
+  ASSERT_EQ(asked.size(), 1u);
+  EXPECT_EQ(asked[0].worker, "a");
+  EXPECT_EQ(asked[0].states.size(), 4u);
+  EXPECT_TRUE(all_of<AskForStates>(farm.step(WorkRequested{"b", 1})).empty()) << "once";
+  EXPECT_EQ(all_of<AskForStates>(farm.step(ClockTicked{})).size(), 1u) << "or the answer was lost";
+
+  HeldPublished published{"a", farm.job, {}};
+  for (const BlobRef& state : outputs_of(farm.spec(), farm.job, render(0, 0))) {
+    if (state.kind != BlobKind::state) continue;
+    for (std::int32_t tile = 0; tile < 4; ++tile) {
+      const BlobRef packed{state.kind, 0, tile, digest_of(std::to_string(tile)), 20};
+      published.states.push_back(
+          {{state.kind, 0, tile, held_state_name(farm.job, 0, tile)}, packed});
+    }
+  }
+  const auto after = farm.step(published);
+  EXPECT_EQ(all_of<RecordOutputs>(after).size(), 4u);
+  const auto granted = all_of<GrantLease>(after);
+  ASSERT_EQ(granted.size(), 1u);
+  EXPECT_EQ(granted[0].worker, "b");
+  for (const BlobRef& input : granted[0].inputs) EXPECT_FALSE(input.is_held());
+}
+
+TEST_F(HeldStatesTest, NobodyElsePublishesThem) {
+  render_first_frame();
+  farm.step(WorkerJoined{"b", {}});
+  const BlobRef held{BlobKind::state, 0, 1, held_state_name(farm.job, 0, 1)};
+  const BlobRef packed{BlobKind::state, 0, 1, digest_of("1"), 20};
+  for (const HeldPublished& event :
+       {HeldPublished{"b", farm.job, {{held, packed}}},
+        HeldPublished{"a", farm.job, {{held, held}}},
+        HeldPublished{"a", farm.job, {{{held.kind, -1, 1, held.digest}, packed}}}}) {
+    EXPECT_TRUE(all_of<RecordOutputs>(farm.step(event)).empty());
+  }
+}
+
+TEST_F(HeldStatesTest, WithTheHolderTheyAreGone) {
+  render_first_frame();
+  const auto reopened = all_of<RecordReopened>(farm.step(WorkerLeft{"a"}));
+  ASSERT_EQ(reopened.size(), 1u);
+  EXPECT_EQ(reopened[0].tasks.size(), 4u);
+  EXPECT_EQ(reopened[0].gone, "what worker a held");
+  EXPECT_EQ(farm.progress().frames_done, 1u) << "the frame stays";
+}
+
+TEST_F(HeldStatesTest, AfterAFailureNothingIsBoundToAWorker) {
+  render_first_frame();
+  farm.step(WorkerJoined{"b", {}});
+  const GrantLease grant = farm.ask_one("a");
+  ASSERT_EQ(grant.lease.task.kind, TaskKind::render);
+  EXPECT_FALSE(all_of<RecordReopened>(farm.fail(grant)).empty()) << "its inputs are made again";
+  const GrantLease next = farm.ask_one("b");
+  ASSERT_EQ(next.lease.task.kind, TaskKind::render);
+  EXPECT_FALSE(next.may_hold);
+}
+
+}  // namespace
+}  // namespace baton
