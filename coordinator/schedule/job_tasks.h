@@ -52,7 +52,8 @@ class JobTasks {
   std::int32_t states_from() const;
   /// Whether all tasks that it needs are done. A leased task may lose one of them.
   bool has_inputs(TaskIndex task) const { return record(task).missing_inputs == 0; }
-  /// The blobs that the task needs: see LeaseGrant in PROTOCOL.md. It must have its inputs.
+  /// The blobs that the task needs: see LeaseGrant in PROTOCOL.md. It must have its inputs, or be
+  /// a cut.
   std::vector<BlobRef> inputs(TaskIndex task) const;
 
   /// Takes up what an earlier coordinator recorded as done, in any order; of a fresh job only.
