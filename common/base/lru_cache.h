@@ -50,6 +50,20 @@ class LruCache {
     }
     return value;
   }
+  /// Forgets the values for which predicate(value) holds.
+  template <class Predicate>
+  void erase_if(Predicate predicate) {
+    const std::lock_guard lock(mutex_);
+    for (auto entry = entries_.begin(); entry != entries_.end();) {
+      if (!predicate(*entry->second)) {
+        ++entry;
+        continue;
+      }
+      size_ -= size_of_(*entry->second);
+      index_.erase(entry->first);
+      entry = entries_.erase(entry);
+    }
+  }
   /// What all values take now.
   std::size_t size() const {
     const std::lock_guard lock(mutex_);

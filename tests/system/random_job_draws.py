@@ -7,6 +7,7 @@ import random
 from random_job_means import tame
 from random_job_rules import mend, mend_view, spoil, work_of
 from random_job_schema import SchemaDraw
+from random_job_textures import Textures
 
 # Particles and candidates: every remainder modulo 8, one, powers of two and the most.
 NUM_PARTICLES = [1, 2, 3, 4, 5, 6, 7, 8, 9, 10, 12, 13, 14, 16, 16, 18, 20, 23, 24, 31, 32, 34, 40, 57, 63, 64]
@@ -16,13 +17,14 @@ FRESH_METHODS = {"environment", "brdf", "mis", "bidirectional"}
 MOST_WORK = 5e6
 
 
-class Draw:
+class Draw(Textures):
     """One random case: {"job", "files", "first", "second"}, as random_job_judge.py takes it."""
 
     def __init__(self, schema, rng):
         self.rng = rng
         self.files = {}
         self.first_frame, self.step, self.count = 1, 1, 1
+        self.on_ground, self.image = False, None
         # Every other job shows spheres on the ground under a lamp, as users' jobs do: penumbras are where much happens.
         self.plain = rng.random() < 0.5
         self.schema = SchemaDraw(schema, rng, self.hand())
@@ -109,9 +111,7 @@ class Draw:
             # Geometry.
             "scene.materials.*.file": self.table,
             "scene.materials.*.emission": lambda: self.pick(None, None, [0.2, 0.5, 3.0]),
-            # Meshes without texture coordinates take none; the glTF set has textures of its own.
-            **{f"scene.materials.*.{key}": nothing
-               for key in ("colorTexture", "normalTexture", "emissionTexture", "metallicRoughnessTexture")},
+            **self.texture_hands(),
             "scene.objects[].translate": lambda: self.vector(1.3),
             "scene.objects[].rotateDeg": lambda: self.pick(None, self.vector(180)),
             "scene.objects[].scale": lambda: self.pick(None, 0.3, 1.7, [0.2, 1, 1.5], 1e-3, 30),
@@ -169,13 +169,16 @@ class Draw:
         scene = self.schema.object(node, "scene")
         names = [f"m{i}" for i in range(self.pick(1, 2, 3))]
         scene["materials"] = {name: self.material(keys["materials"]["additionalProperties"]) for name in names}
-        for material in scene["materials"].values():
-            if material.get("kd", 0.5) + material.get("ks", 0.5) > 1:
-                material["kd"], material["ks"] = 0.5, 0.4
         if self.plain or self.chance(0.75):
             ground = self.schema.resolve(keys["ground"])
             self.schema.hand["scene.ground.material"] = lambda: self.rng.choice(names)
             scene["ground"] = self.schema.object(ground, "scene.ground")
+            if self.chance(0.3):
+                scene["materials"]["tiles"] = self.textured(keys["materials"]["additionalProperties"])
+                scene["ground"]["material"] = "tiles"
+        for material in scene["materials"].values():
+            if material.get("kd", 0.5) + material.get("ks", 0.5) > 1:
+                material["kd"], material["ks"] = 0.5, 0.4
         if self.chance(0.06):
             scene["gltf"] = self.gltf_set(node, names)
         scene["meshes"] = {}

@@ -32,6 +32,8 @@ def write_file(path, recipe, shared):
         MESHES[kind](path, recipe)
     elif kind in SKIES:
         write_map(path, recipe)
+    elif kind == "image":
+        write_image(path, recipe["width"], recipe["height"])
     elif kind == "merl":
         link_table(path, recipe, shared)
     elif kind == "set":
@@ -40,6 +42,20 @@ def write_file(path, recipe, shared):
         path.write_text(json.dumps(walk_gltf(recipe)), encoding="ascii")
     else:
         raise ValueError(f"{path}: no recipe of kind {kind!r}")
+
+
+def write_image(path, width, height):
+    """Colours with holes, as PNG or TGA."""
+    texels = [[(37 * x + 90 * y) % 256, (11 * x + 5 * y + 120) % 256, 200 - (x * y) % 90, 255 if (x + y) % 3 else 60]
+              for y in range(height) for x in range(width)]
+    if path.suffix == ".tga":
+        head = struct.pack("<BBBHHBHHHHBB", 0, 0, 2, 0, 0, 0, 0, 0, width, height, 32, 0x28)
+        path.write_bytes(head + b"".join(bytes([b, g, r, a]) for r, g, b, a in texels))
+        return
+    rows = b"".join(b"\0" + bytes(sum(texels[y * width:(y + 1) * width], [])) for y in range(height))
+    chunks = [(b"IHDR", struct.pack(">IIBBBBB", width, height, 8, 6, 0, 0, 0)), (b"IDAT", zlib.compress(rows)), (b"IEND", b"")]
+    path.write_bytes(b"\x89PNG\r\n\x1a\n" + b"".join(
+        struct.pack(">I", len(body)) + tag + body + struct.pack(">I", zlib.crc32(tag + body)) for tag, body in chunks))
 
 
 def write_triangles(path, vertices, triangles):

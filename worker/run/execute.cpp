@@ -216,6 +216,7 @@ Result<TaskOutput> execute_assemble(const LoadedJob& loaded, const BlobStore& st
 Result<TaskOutput> execute_task(const LoadedJob& loaded, BlobStore& store, const TaskKey& task,
                                 const TaskGrant& grant, std::stop_token stop) {
   loaded.held->release_before(grant.states_from);
+  loaded.states->release_before(grant.states_from);
   switch (task.kind) {
     case TaskKind::render:
       return execute_render(loaded, store, task, grant, stop);

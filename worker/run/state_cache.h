@@ -20,6 +20,11 @@ class StateCache : public LruCache<Digest, SampleState> {
  public:
   explicit StateCache(std::size_t max_bytes = limits::kMaxStateCacheBytes)
       : LruCache(max_bytes, [](const SampleState& state) { return state.size_bytes(); }) {}
+
+  /// Forgets the states of frames (0-based) before this one: no task needs them.
+  void release_before(std::int32_t frame) {
+    erase_if([frame](const SampleState& state) { return state.frame_index < frame; });
+  }
 };
 
 /// The states of one job that are in this process alone, by the name of BlobRef::is_held(): they

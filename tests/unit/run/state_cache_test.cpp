@@ -43,6 +43,22 @@ TEST(StateCache, ATileFindsItsStateOfTheFrameBefore) {
   }
 }
 
+// What no task needs any more leaves room at once.
+TEST(StateCache, StatesOfEarlierFramesAreForgotten) {
+  const auto state_of_frame = [](std::int32_t frame) {
+    SampleState state = *state_of(10, false);
+    state.frame_index = frame;
+    return std::make_shared<const SampleState>(std::move(state));
+  };
+  StateCache cache(1 << 20);
+  for (const std::int32_t frame : {3, 4, 5})
+    cache.insert(digest_of(std::to_string(frame)), state_of_frame(frame));
+  cache.release_before(5);
+  EXPECT_EQ(cache.peek(digest_of("4")), nullptr);
+  ASSERT_NE(cache.peek(digest_of("5")), nullptr);
+  EXPECT_EQ(cache.size(), cache.peek(digest_of("5"))->size_bytes());
+}
+
 // What does not fit is not held: it goes into the store instead.
 TEST(HeldStates, HoldsWhatFitsUntilNobodyNeedsIt) {
   const StatePtr state = state_of(10, false);
