@@ -219,7 +219,7 @@ def failures_become_small(schema):
                 and job.get("state", {}).get("carry") is False)
 
     found = 0
-    for number in range(60):
+    for number in range(400):
         case = draw_case(schema, 3, number)
         try:
             if not fails(case):
@@ -233,7 +233,9 @@ def failures_become_small(schema):
         assert set(job) <= {"name", "image", "scene", "state", "sampling"}, job
         assert job.get("sampling", {}).get("numParticles", 3) == 3, job
         assert "interruption" not in small["second"]
-    assert found >= 2, found
+        if found == 3:
+            return
+    raise AssertionError(f"only {found} of 400 cases have such a failure")
 
 
 def ignoring_nonsense(fails, case):
