@@ -36,7 +36,7 @@ PilotJob pilot_job() {
   job.worker = "/opt/it's/baton-worker";
   job.endpoint = "tcp://login:5570";
   job.key = "/keys/worker.key";
-  job.script_log = "/work/%A_%a.log";
+  job.script_log = "/farm/%A_%a.log";
   job.job_name = "baton-1f00";
   job.partition = "cpu";
   job.time = "2:00:00";
@@ -58,12 +58,12 @@ TEST(SlurmText, AScriptQuotesItsWords) {
 
 TEST(SlurmText, SbatchGetsOneNodeForEachPilot) {
   PilotJob job = pilot_job();
-  const std::vector<std::string> command = sbatch_command(job, 3, "/work/pilot.sh");
+  const std::vector<std::string> command = sbatch_command(job, 3, "/farm/pilot.sh");
   for (const char* word : {"--array=1-3", "--requeue", "--nodes=1", "--ntasks=1", "--exclusive",
                            "--partition=cpu", "--time=2:00:00", "--signal=B:TERM@60"})
     EXPECT_THAT(command, Contains(word));
   EXPECT_EQ(command[command.size() - 2], "--account=film");
-  EXPECT_EQ(command.back(), "/work/pilot.sh");
+  EXPECT_EQ(command.back(), "/farm/pilot.sh");
   job.time_s = 60;
   EXPECT_THAT(sbatch_command(job, 1, "x"), Not(Contains("--signal=B:TERM@60")));
 }
