@@ -50,8 +50,7 @@ void add_pilot_options(CLI::App& app, PilotOptions& pilot) {
       ->check(CLI::Range(0, 1000000));
   app.add_option(
          "--memory", pilot.memory_mib,
-         "MiB of this machine that it may use; a quarter of them, at most 1024, keep decoded "
-         "states")
+         "MiB of this machine that it may use; three eighths, at most 1536, keep states of a job")
       ->check(CLI::Range(0, 1 << 30));
   app.add_option("--map", pilot.maps,
                  "FROM=TO: the folder FROM of the others is TO here; may be repeated");
