@@ -69,9 +69,6 @@ def settle_claims(job):
         visibility["correlated"] = False
     if sampling["method"] not in ("environment", "brdf", "mis", "bidirectional"):
         sampling.pop("byMaterial", None)
-    # Where rounds share their sites a lone one is the pixel's centre, which `reference` does not keep to.
-    if sampling["method"] in ("sequential", "restir") and job.get("quality", {}).get("rounds", 1) > 1:
-        job["image"]["sites"] = max(job["image"].get("sites", 1), 4)
     if sampling["method"] != "mis":
         sampling.pop("misCompensation", None)
     sampling.pop("targetError", None)
@@ -109,6 +106,9 @@ def judge_means(case, render):
     judge = copy.deepcopy(case)
     judge["job"]["sampling"] = {"method": "reference", "referenceSamples": REFERENCE_SAMPLES}
     judge["job"].pop("visibility", None)
+    # Rounds of these see the sites of the first round, those of `reference` have sites of their own.
+    if sampling["method"] in ("sequential", "restir"):
+        judge["job"].pop("quality", None)
 
     def means(of, first_seed, count):
         found = []
