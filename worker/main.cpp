@@ -2,6 +2,7 @@
 #include <spdlog/spdlog.h>
 #include <CLI/CLI.hpp>
 
+#include <malloc.h>
 #include <signal.h>
 
 #include <algorithm>
@@ -16,6 +17,14 @@
 #include "worker/run/worker.h"
 
 namespace {
+
+/// Work space of tiles is freed and taken again all the time. What is freed stays with the process,
+/// as giving it back costs the system as much as all of its other work for a worker. Larger blocks
+/// than malloc keeps (32 MiB) go back.
+void keep_freed_memory() {
+  ::mallopt(M_MMAP_THRESHOLD, 32 << 20);
+  ::mallopt(M_TRIM_THRESHOLD, 1 << 30);
+}
 
 /// SIGTERMs and SIGINTs so far, read by the control thread.
 std::atomic<int> g_signals{0};
@@ -48,9 +57,8 @@ void add_pilot_options(CLI::App& app, PilotOptions& pilot) {
          "seconds that it goes on with its tasks when it is told to end, by SIGTERM or `baton "
          "worker drain`; default: to their end")
       ->check(CLI::Range(0, 1000000));
-  app.add_option(
-         "--memory", pilot.memory_mib,
-         "MiB of this machine that it may use; three eighths, at most 1536, keep states of a job")
+  app.add_option("--memory", pilot.memory_mib,
+                 "MiB of this machine that it may use, about; default: half")
       ->check(CLI::Range(0, 1 << 30));
   app.add_option("--map", pilot.maps,
                  "FROM=TO: the folder FROM of the others is TO here; may be repeated");
@@ -61,9 +69,9 @@ baton::Status take_pilot_options(const PilotOptions& pilot, baton::WorkerOptions
     worker.end_at = std::chrono::system_clock::time_point(std::chrono::seconds(pilot.end_at));
   worker.idle_exit = std::chrono::seconds(pilot.idle_exit_s);
   worker.drain = std::chrono::seconds(pilot.drain_s);
-  std::uint64_t& state_bytes = worker.machine.max_state_bytes;
   if (pilot.memory_mib > 0) {
-    state_bytes = std::min(state_bytes, static_cast<std::uint64_t>(pilot.memory_mib) << 17);
+    worker.machine.memory =
+        baton::MemoryBudget::of(static_cast<std::uint64_t>(pilot.memory_mib) << 20);
   }
   for (const std::string& text : pilot.maps) {
     BATON_ASSIGN(baton::PathMap map, baton::parse_path_map(text));
@@ -139,6 +147,7 @@ int main(int argc, char** argv) {
     return app.exit(error) == 0 ? 0 : static_cast<int>(baton::ExitCode::usage);
   }
 
+  keep_freed_memory();
   baton::init_logging("baton-worker");
   baton::install_crash_handler();
   if (replay_command->parsed()) {
@@ -147,6 +156,7 @@ int main(int argc, char** argv) {
   }
   install_drain_handler();
   worker.give_up = std::chrono::seconds(give_up_s);
+  worker.machine.num_threads = worker.num_threads;
   if (const baton::Status taken = take_pilot_options(pilot, worker); !taken) {
     spdlog::error("{}", taken.error().message);
     return static_cast<int>(baton::exit_code_of(taken.error().kind));

@@ -53,22 +53,12 @@ inline constexpr int kMostPoolRays = 4;  ///< of a pixel of method pool, in numP
 inline constexpr int kMaxReferenceSamples = 1 << 24;
 inline constexpr int kMaxCheckpointEvery = 1000;
 inline constexpr int kMaxEnvironmentSide = 32768;
-inline constexpr std::uint64_t kMaxEnvironmentCacheBytes =
-    4ull << 30;  ///< per process and kind of entry
-inline constexpr std::uint64_t kMaxStateCacheBytes =
-    1ull << 29;  ///< decoded states that a worker keeps beside those it holds, per job
-inline constexpr std::uint64_t kMaxHeldStateBytes =
-    1ull << 30;  ///< states that a worker holds; what is more goes into the store
 inline constexpr std::uint64_t kStoreReserveBytes =
     64ull << 20;  ///< of a disk that blobs leave to frames and the journal
 inline constexpr std::uint64_t kMaxFilmBytesAhead =
     2ull << 30;  ///< films, before compression, of frames that are rendered ahead of an open one
-inline constexpr std::uint64_t kMaxSurfaceCacheBytes =
-    1ull << 29;  ///< surfaces that a worker keeps where things move, per job
 inline constexpr std::uint64_t kMaxRoundSurfaceBytes =
     1ull << 27;  ///< what a tile keeps of its rounds' surfaces from frame to frame
-inline constexpr std::uint64_t kMaxPresampledCacheBytes =
-    1ull << 30;  ///< presampled light that a worker keeps, per job
 /// Of meshes in several places, in one flat hierarchy: some 600 MB. A second level costs a third of
 /// the shadow rays' speed.
 inline constexpr std::uint64_t kMaxCopiedTriangles = 4000000;

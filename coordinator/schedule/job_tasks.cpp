@@ -291,6 +291,7 @@ void JobTasks::cancel_open() {
 }
 
 void JobTasks::add_failure(TaskIndex task, const Failure& failure) {
+  has_failed_ = true;
   ended_[task].push_back({failure.lease, failure.worker, true, failure.permanent});
   ++progress_.attempts_lost;
 }

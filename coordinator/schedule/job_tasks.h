@@ -185,6 +185,7 @@ class JobTasks {
   std::int32_t first_open_run_ = 0;
   std::size_t num_held_ = 0;                              ///< of done tasks, needed or not
   std::map<TaskIndex, std::vector<EndedAttempt>> ended_;  ///< and not done
+  bool has_failed_ = false;                               ///< some attempt
   std::map<TaskIndex, std::vector<BlobRef>> former_outputs_;
   std::set<TaskIndex> others_frames_;               ///< JobPlan::others_frames
   std::map<TaskIndex, std::vector<BlobRef>> cuts_;  ///< of open tasks: the states they are cut from

@@ -14,7 +14,7 @@ bool JobTasks::may_hold(TaskIndex task) const {
   const TaskKey key = graph_.key(task);
   return key.kind == TaskKind::render && graph_.carries_state() && graph_.shares_history() &&
          key.step + 1 < graph_.num_runs() && !keep_all_states_ && !checkpoints_.keeps(key) &&
-         !cuts_.contains(task) && ended_.empty() && makers_.size() <= limits::kMaxWorkers;
+         !cuts_.contains(task) && !has_failed_ && makers_.size() <= limits::kMaxWorkers;
 }
 
 /// The state of a done task if it is held; else null.

@@ -15,6 +15,7 @@
 
 #include "common/base/files.h"
 #include "common/base/limits.h"
+#include "common/base/machine_memory.h"
 #include "common/base/patience.h"
 
 namespace baton {
@@ -71,10 +72,14 @@ Result<LocalFarm> LocalFarm::start(const FarmOptions& options) {
   LocalFarm farm(options, options.listen.empty() ? draw_endpoint() : options.listen,
                  std::move(lock));
   BATON_TRY(farm.start_coordinator(coordinator));
+  const std::uint64_t memory =
+      options.memory_bytes > 0 ? options.memory_bytes : default_memory_bytes();
+  const std::uint64_t memory_mib = (memory >> 20) / static_cast<std::uint64_t>(options.workers);
   for (int i = 1; i <= options.workers; ++i) {
     BATON_TRY(farm.add_member(fmt::format("worker-{}", i),
                               {worker, "--coordinator", farm.endpoint_, "--threads",
-                               std::to_string(options.threads_per_worker)}));
+                               std::to_string(options.threads_per_worker), "--memory",
+                               std::to_string(std::max<std::uint64_t>(1, memory_mib))}));
   }
   return farm;
 }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <chrono>
+#include <cstdint>
 #include <filesystem>
 #include <string>
 #include <utility>
@@ -14,6 +15,7 @@ namespace baton {
 struct FarmOptions {
   int workers = 1;
   int threads_per_worker = 1;
+  std::uint64_t memory_bytes = 0;        ///< of all workers together; 0: default_memory_bytes()
   std::filesystem::path work_directory;  ///< journal, blobs, logs; what a resume needs
   std::string listen = {};      ///< of the coordinator; empty: where only this machine reaches it
   std::string server_key = {};  ///< file of the coordinator's key; empty: none

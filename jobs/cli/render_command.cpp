@@ -62,6 +62,10 @@ void add_render_command(CLI::App& app, ExitCode& code) {
       ->add_option("--threads-per-worker", options->threads_per_worker,
                    "default: the processors shared out")
       ->check(CLI::Range(1, 1024));
+  command
+      ->add_option("--memory", options->memory_mib,
+                   "MiB that all workers together may use, about; default: half of the machine's")
+      ->check(CLI::Range(1, 1 << 30));
   command->add_option("--work-dir", options->work_directory,
                       "journal, blobs and logs; default: .baton in the output folder");
   command->add_flag("--watch", options->watch,

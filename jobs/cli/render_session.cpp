@@ -55,6 +55,7 @@ FarmOptions farm_options(const RenderOptions& options, const JobSpec& job) {
   farm.workers = std::max(1, options.workers);
   farm.threads_per_worker = options.threads_per_worker > 0 ? options.threads_per_worker
                                                            : std::max(1, processors / farm.workers);
+  farm.memory_bytes = options.memory_mib << 20;
   farm.work_directory =
       fs::absolute(options.work_directory.empty() ? fs::path(job.output.directory) / ".baton"
                                                   : fs::path(options.work_directory));

@@ -12,10 +12,11 @@ namespace baton {
 
 struct RenderOptions {
   JobArgument job;
-  int workers = 0;             ///< 0: one, whose threads share scene and light
-  int threads_per_worker = 0;  ///< 0: the processors shared out
-  std::string work_directory;  ///< empty: .baton in the output folder
-  std::string out;             ///< the only frame as PNG; empty: none
+  int workers = 0;               ///< 0: one, whose threads share scene and light
+  int threads_per_worker = 0;    ///< 0: the processors shared out
+  std::uint64_t memory_mib = 0;  ///< of all workers; 0: half of the machine's
+  std::string work_directory;    ///< empty: .baton in the output folder
+  std::string out;               ///< the only frame as PNG; empty: none
   std::optional<float> exposure;
   bool watch = false;
   bool restart = false;

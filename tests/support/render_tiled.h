@@ -1,10 +1,12 @@
 #pragma once
 
+#include <limits>
 #include <memory>
 #include <vector>
 
 #include "common/job/motion.h"
 #include "tests/support/small_scene.h"
+#include "worker/pass/shared_assets.h"
 
 namespace baton::test {
 
@@ -18,20 +20,21 @@ inline JobSpec sequence_job(int frames) {
 }
 
 /// All films of a job cut into tiles of `tile_size` and runs of `run_length`, pasted together;
-/// states go through their file form between runs. each_run_alone: as in a process of its own,
-/// which keeps nothing from the runs before.
+/// states go through their file form between runs. memory: with MemoryBudget::of(0) nothing is kept
+/// from one tile to the next.
 inline std::vector<FilmTile> render_tiled(JobSpec job, int tile_size, int run_length,
-                                          bool each_run_alone = false) {
+                                          const MemoryBudget& memory = MemoryBudget::of_machine()) {
   job.image.tile_size = tile_size;
   job.state.checkpoint_every = run_length;
-  auto context = load_render_context(job, Digest{1, 2});
+  const auto assets =
+      load_shared_assets(job, memory, std::numeric_limits<std::uint64_t>::max()).value();
+  const auto context = make_render_context(job, Digest{1, 2}, assets, memory);
   EXPECT_TRUE(context.ok());
   std::vector<FilmTile> images(job.frames.size());
   const TileGrid grid(job.image);
   std::vector<StatePtr> states(static_cast<std::size_t>(grid.count()));
   for (std::int32_t run = 0; run < num_runs(job); ++run) {
     std::vector<StatePtr> next(states.size());
-    if (each_run_alone) context = load_render_context(job, Digest{1, 2});
     for (std::int32_t tile = 0; tile < grid.count(); ++tile) {
       std::vector<StatePtr> previous;
       for (const std::int32_t near : grid.tiles_near(tile, history_reach_px(job))) {

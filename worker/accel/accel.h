@@ -77,16 +77,22 @@ struct ShadowRays {
 /// error cannot make the surface shadow itself [Waechter & Binder 2019].
 Vec3 lift_off(const Vec3& position, const Vec3& ng);
 
+/// How a ray tracer is built.
+struct AccelLimits {
+  /// Of meshes that stand still in several places, in one flat hierarchy; where their copies would
+  /// have more, they have hierarchies of their own.
+  std::uint64_t max_copied_triangles = limits::kMaxCopiedTriangles;
+  std::uint64_t max_bytes = std::numeric_limits<std::uint64_t>::max();
+};
+
 /// The ray tracer: the only user of Embree. Immutable after construction; any number of
 /// threads may trace.
 class Accel {
  public:
   /// Keeps a reference to `scene`, which must outlive it. What stands still is one flat hierarchy;
-  /// each mesh that moves has its own, placed where the scene says. Where copies of meshes that
-  /// stand still would have more than `max_copied_triangles`, these have their own, too. Error:
-  /// Embree's own message.
-  static Result<std::unique_ptr<Accel>> build(
-      const Scene& scene, std::uint64_t max_copied_triangles = limits::kMaxCopiedTriangles);
+  /// each mesh that moves has its own, placed where the scene says. Errors: bad_input where it
+  /// would take more than limits.max_bytes; Embree's own message.
+  static Result<std::unique_ptr<Accel>> build(const Scene& scene, const AccelLimits& limits = {});
   virtual ~Accel() = default;
 
   /// The same geometry with its moving instances elsewhere; shares all but their placement.
@@ -101,6 +107,8 @@ class Accel {
                          std::size_t group = 1) const = 0;
   /// Traces all rays; t_far of the occluded ones becomes -inf.
   virtual void occluded(ShadowRays& rays) const = 0;
+  /// What Embree has allocated for this geometry in all its placements.
+  virtual std::uint64_t size_bytes() const = 0;
   /// "Embree 3.13.5, AVX2" for the benchmark and --version.
   virtual std::string description() const = 0;
 };

@@ -1,6 +1,10 @@
 #include <embree3/rtcore.h>
 
+#include <sys/types.h>
+
+#include <algorithm>
 #include <array>
+#include <atomic>
 #include <cstring>
 #include <limits>
 #include <map>
@@ -89,8 +93,25 @@ void attach_placed(RTCDevice device, RTCScene target, RTCScene mesh, const Trans
   rtcAttachGeometryByID(target, geometry.get(), index);
 }
 
+/// Counts what Embree allocates, and stops it from taking more than is allowed.
+struct AllocationCount {
+  std::atomic<std::int64_t> bytes{0};
+  std::int64_t allowed = std::numeric_limits<std::int64_t>::max();
+  std::atomic<bool> was_exceeded{false};
+
+  /// change: negative where memory is given back. The answer counts for allocations alone.
+  static bool note(void* count, ssize_t change, bool /*done*/) {
+    auto& self = *static_cast<AllocationCount*>(count);
+    const std::int64_t now = self.bytes += change;
+    if (change <= 0 || now <= self.allowed) return true;
+    self.was_exceeded = true;
+    return false;
+  }
+};
+
 /// What all poses of a scene share.
 struct SharedGeometry {
+  AllocationCount allocated;  ///< outlives what it counts
   Owned<RTCDevice> device;
   Owned<RTCScene> still;  ///< all that does not move, in world space
   /// By index of the mesh, in its own space: those that move, or that are in too many places.
@@ -187,6 +208,10 @@ class EmbreeAccel final : public Accel {
     rtcOccludedNp(geometry_->still.get(), &context, &stream, count);
     // Rays that are blocked already have t_far = -inf, which Embree leaves alone.
     if (moving_ != nullptr) rtcOccludedNp(moving_.get(), &context, &stream, count);
+  }
+
+  std::uint64_t size_bytes() const override {
+    return static_cast<std::uint64_t>(std::max<std::int64_t>(0, geometry_->allocated.bytes));
   }
 
   std::string description() const override {
@@ -327,8 +352,7 @@ std::set<std::uint32_t> meshes_with_holes(const Scene& scene) {
 
 }  // namespace
 
-Result<std::unique_ptr<Accel>> Accel::build(const Scene& scene,
-                                            std::uint64_t max_copied_triangles) {
+Result<std::unique_ptr<Accel>> Accel::build(const Scene& scene, const AccelLimits& limits) {
   // One build thread: answers at edges depend on the shape of the tree, which must not depend on
   // the host.
   auto geometry = std::make_shared<SharedGeometry>();
@@ -340,10 +364,14 @@ Result<std::unique_ptr<Accel>> Accel::build(const Scene& scene,
   }
   std::string message;
   rtcSetDeviceErrorFunction(device, remember_error, &message);
+  AllocationCount& allocated = geometry->allocated;
+  allocated.allowed = static_cast<std::int64_t>(
+      std::min<std::uint64_t>(limits.max_bytes, std::numeric_limits<std::int64_t>::max()));
+  rtcSetDeviceMemoryMonitorFunction(device, AllocationCount::note, &allocated);
 
   // What stands still, in world space; each mesh that moves, in its own.
   geometry->still = geometry->new_scene();
-  const std::set<std::uint32_t> shared = shared_meshes(scene, max_copied_triangles);
+  const std::set<std::uint32_t> shared = shared_meshes(scene, limits.max_copied_triangles);
   const std::set<std::uint32_t> with_holes = meshes_with_holes(scene);
   for (unsigned i = 0; i < scene.instances.size(); ++i) {
     const Instance& instance = scene.instances[i];
@@ -365,7 +393,12 @@ Result<std::unique_ptr<Accel>> Accel::build(const Scene& scene,
   }
   rtcCommitScene(geometry->still.get());
   rtcSetDeviceErrorFunction(device, nullptr, nullptr);
+  if (allocated.was_exceeded) {
+    return Error{ErrorKind::bad_input, "the ray tracer would take more than " +
+                                           std::to_string(limits.max_bytes) + " bytes"};
+  }
   if (!message.empty()) return Error{ErrorKind::internal, "Embree: " + message};
+  allocated.allowed = std::numeric_limits<std::int64_t>::max();  // placements are small
   BATON_ASSIGN(std::unique_ptr<Accel> accel,
                EmbreeAccel::make(scene, std::move(geometry), scene.instances));
   return Result<std::unique_ptr<Accel>>(std::move(accel));

@@ -5,7 +5,6 @@
 #include <algorithm>
 #include <cmath>
 
-#include "common/base/limits.h"
 #include "common/math/octahedral.h"
 
 namespace baton {
@@ -45,16 +44,15 @@ std::optional<Mat3> turn_between(const Environment& before, const Environment& n
   return turn;
 }
 
-LightSequence::LightSequence(const JobSpec& job, std::shared_ptr<MapCache> maps)
+LightSequence::LightSequence(const JobSpec& job, std::shared_ptr<MapCache> maps,
+                             const MemorySharePtr& share)
     : job_(job),
       maps_(std::move(maps)),
       frames_(expand_sequence(job)),
       mixed_maps_(
-          limits::kMaxEnvironmentCacheBytes,
-          [](const EnvironmentMap& map) { return map.size_bytes(); }, frames_in_hand(job)),
+          share, [](const EnvironmentMap& map) { return map.size_bytes(); }, frames_in_hand(job)),
       presampled_(
-          limits::kMaxPresampledCacheBytes,
-          [](const PresampledLight& light) { return light.size_bytes(); },
+          share, [](const PresampledLight& light) { return light.size_bytes(); },
           frames_in_hand(job) * static_cast<std::size_t>(job.quality.rounds)) {}
 
 Result<std::shared_ptr<const EnvironmentMap>> LightSequence::key_map(std::int32_t key) {

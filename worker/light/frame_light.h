@@ -41,8 +41,8 @@ std::optional<Mat3> turn_between(const Environment& before, const Environment& n
 /// round).
 class LightSequence {
  public:
-  /// job must outlive the object. maps: may be shared with other jobs.
-  LightSequence(const JobSpec& job, std::shared_ptr<MapCache> maps);
+  /// job must outlive the object. maps: may be shared with other jobs. share: of what it makes.
+  LightSequence(const JobSpec& job, std::shared_ptr<MapCache> maps, const MemorySharePtr& share);
 
   /// The light of frame `index` (0-based) in a round; negative: before those that are seen. Errors:
   /// a map that cannot be read, or two key frames of different size.

@@ -4,7 +4,6 @@
 #include <mutex>
 #include <string>
 
-#include "common/base/limits.h"
 #include "common/base/lru_cache.h"
 #include "common/base/result.h"
 #include "common/job/job_spec.h"
@@ -12,12 +11,15 @@
 
 namespace baton {
 
-/// Maps of files, as large as jobs want them, with sampling tables, kept while memory allows
-/// (limits::kMaxEnvironmentCacheBytes). Any number of threads and jobs may ask; a map is read once
-/// while the others wait. Files are taken to keep their contents as long as the cache lives.
+/// Maps of files, as large as jobs want them, with sampling tables, kept while memory allows. Any
+/// number of threads and jobs may ask; a map is read once while the others wait. Files are taken to
+/// keep their contents as long as the cache lives.
 class MapCache {
  public:
   using MapPtr = std::shared_ptr<const EnvironmentMap>;
+
+  explicit MapCache(const MemorySharePtr& share)
+      : maps_(share, [](const EnvironmentMap& map) { return map.size_bytes(); }) {}
 
   /// The map of a file with the size and table that `environment` and `compensate` ask for. Error:
   /// a map that cannot be read.
@@ -35,8 +37,7 @@ class MapCache {
   };
 
   std::mutex reading_;
-  LruCache<Key, EnvironmentMap> maps_{limits::kMaxEnvironmentCacheBytes,
-                                      [](const EnvironmentMap& map) { return map.size_bytes(); }};
+  LruCache<Key, EnvironmentMap> maps_;
 };
 
 }  // namespace baton

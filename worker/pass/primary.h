@@ -3,8 +3,7 @@
 #include <utility>
 #include <vector>
 
-#include "common/base/limits.h"
-#include "common/base/lru_cache.h"
+#include "common/base/frame_keep.h"
 #include "worker/pass/render_context.h"
 
 namespace baton {
@@ -36,11 +35,9 @@ struct TileSurfaces {
 
 /// What the tiles of this process saw last, by frame index and tile, where things move: the next
 /// frame asks for it again, and tracing it a second time is the same work with the same result.
-/// Counted in bytes.
-class SurfaceCache : public LruCache<std::pair<std::int32_t, std::int32_t>, TileSurfaces> {
+class SurfaceCache : public FrameKeep<std::pair<std::int32_t, std::int32_t>, TileSurfaces> {
  public:
-  explicit SurfaceCache(std::size_t max_bytes = limits::kMaxSurfaceCacheBytes)
-      : LruCache(max_bytes, [](const TileSurfaces& surfaces) { return surfaces.size_bytes(); }) {}
+  using FrameKeep::FrameKeep;
 };
 
 /// Pass 1: one primary ray for each site of each pixel. A single site of a single round shoots

@@ -29,15 +29,16 @@ Result<std::shared_ptr<const RenderContext>> load_render_context(const JobSpec& 
 }
 
 Result<std::shared_ptr<const RenderContext>> make_render_context(
-    const JobSpec& job, const Digest& picture, const std::shared_ptr<const SharedAssets>& assets) {
+    const JobSpec& job, const Digest& picture, const std::shared_ptr<const SharedAssets>& assets,
+    const MemoryBudget& memory) {
   BATON_TRY(check_settled(job));
   auto context = std::make_shared<RenderContext>();
   context->job = job;
   context->picture = picture;
   context->grid = TileGrid(job.image);
   context->frames = expand_sequence(job);
-  context->lights = std::make_unique<LightSequence>(context->job, assets->maps);
-  context->surfaces = std::make_shared<SurfaceCache>();
+  context->lights = std::make_unique<LightSequence>(context->job, assets->maps, memory.light);
+  context->surfaces = std::make_shared<SurfaceCache>(memory.surfaces);
   context->scene = std::shared_ptr<const Scene>(assets, &assets->scene);
   context->method = make_pixel_method(context->job);
   context->own_methods = make_own_methods(job);

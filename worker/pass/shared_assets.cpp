@@ -1,17 +1,42 @@
 #include "worker/pass/shared_assets.h"
 
+#include <fmt/format.h>
+
+#include <algorithm>
+
 namespace baton {
 
-Result<std::shared_ptr<const SharedAssets>> load_shared_assets(const JobSpec& job) {
+Result<std::shared_ptr<const SharedAssets>> load_shared_assets(const JobSpec& job,
+                                                               const MemoryBudget& memory,
+                                                               std::uint64_t max_scene_bytes) {
   auto assets = std::make_shared<SharedAssets>();
   BATON_ASSIGN(assets->scene, load_scene(job));
-  BATON_ASSIGN(assets->accel, Accel::build(assets->scene));
-  assets->maps = std::make_shared<MapCache>();
+  const std::uint64_t scene_bytes = assets->scene.size_bytes();
+  const std::uint64_t room = max_scene_bytes - std::min(max_scene_bytes, scene_bytes);
+  Result<std::unique_ptr<Accel>> accel = Accel::build(assets->scene, {.max_bytes = room});
+  if (!accel && accel.error().kind == ErrorKind::bad_input) {
+    return Error{ErrorKind::bad_input,
+                 fmt::format("the scene does not fit into memory: meshes and textures take {} MiB, "
+                             "the ray tracer's hierarchies more than {} MiB; {} MiB are left for "
+                             "them of {} MiB (--memory)",
+                             scene_bytes >> 20, room >> 20, max_scene_bytes >> 20,
+                             memory.total_bytes >> 20)};
+  }
+  if (!accel) return accel.error();
+  assets->accel = std::move(accel).value();
+  assets->maps = std::make_shared<MapCache>(memory.maps);
   return std::shared_ptr<const SharedAssets>(std::move(assets));
 }
 
+Result<std::shared_ptr<const SharedAssets>> load_shared_assets(const JobSpec& job) {
+  const MemoryBudget memory = MemoryBudget::of_machine();
+  return load_shared_assets(job, memory, memory.scene_bytes);
+}
+
 Result<std::shared_ptr<const SharedAssets>> AssetShelf::get(const JobSpec& job,
-                                                            const std::vector<AssetDigest>& files) {
+                                                            const std::vector<AssetDigest>& files,
+                                                            const MemoryBudget& memory,
+                                                            std::uint64_t max_scene_bytes) {
   const std::lock_guard lock(mutex_);
   entries_.remove_if([](const Entry& entry) { return entry.assets.expired(); });
   for (const Entry& entry : entries_) {
@@ -19,7 +44,7 @@ Result<std::shared_ptr<const SharedAssets>> AssetShelf::get(const JobSpec& job,
     auto assets = entry.assets.lock();
     if (assets != nullptr && entry.scene == job.scene && entry.files == files) return assets;
   }
-  BATON_ASSIGN(auto assets, load_shared_assets(job));
+  BATON_ASSIGN(auto assets, load_shared_assets(job, memory, max_scene_bytes));
   entries_.push_front({job.scene, files, assets});
   return assets;
 }

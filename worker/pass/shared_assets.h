@@ -10,6 +10,7 @@
 #include "common/job/job_spec.h"
 #include "worker/accel/accel.h"
 #include "worker/light/map_cache.h"
+#include "worker/pass/memory_budget.h"
 
 namespace baton {
 
@@ -20,10 +21,18 @@ struct SharedAssets {
   Scene scene;
   std::shared_ptr<const Accel> accel;  ///< of `scene`
   std::shared_ptr<MapCache> maps;
+
+  /// What scene and ray tracer take.
+  std::uint64_t size_bytes() const { return scene.size_bytes() + accel->size_bytes(); }
 };
 
 /// Loads meshes and materials and builds the ray tracer; maps are read when they are asked for.
-/// Errors name the file and what was expected; several faults are joined by newlines.
+/// memory: whose share the maps use. Errors name the file and what was expected; several faults are
+/// joined by newlines; a scene that takes more than max_scene_bytes is refused with the numbers.
+Result<std::shared_ptr<const SharedAssets>> load_shared_assets(const JobSpec& job,
+                                                               const MemoryBudget& memory,
+                                                               std::uint64_t max_scene_bytes);
+/// The same with what is usual on this machine.
 Result<std::shared_ptr<const SharedAssets>> load_shared_assets(const JobSpec& job);
 
 /// The assets of those jobs that are still in use. Any number of threads may ask; one loads at a
@@ -33,7 +42,9 @@ class AssetShelf {
   /// The assets of a living job of equal scene and files, or newly loaded ones. files: every asset
   /// of the job with its digest, already verified.
   Result<std::shared_ptr<const SharedAssets>> get(const JobSpec& job,
-                                                  const std::vector<AssetDigest>& files);
+                                                  const std::vector<AssetDigest>& files,
+                                                  const MemoryBudget& memory,
+                                                  std::uint64_t max_scene_bytes);
 
  private:
   struct Entry {

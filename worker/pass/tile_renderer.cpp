@@ -86,7 +86,9 @@ class TileWalk {
       const TileRound at{frame, round, *light, *surfaces};
       RoundMean& mean = round < 0 ? *unseen : film;
       if (shares_ && round == first) {
-        context_.surfaces->insert({frame.index, state_.tile}, surfaces);
+        // Tiles ask for those of the frame before; one that is behind them traces them again.
+        context_.surfaces->release_before(frame.index - 1);
+        context_.surfaces->keep({frame.index, state_.tile}, frame.index, surfaces);
         Reprojection history(context_, *geometry_, *before_, previous);
         renderer_->render(at, history, state_, mean);
       } else {

@@ -14,6 +14,7 @@
 #include "common/job/task.h"
 #include "common/state/first_pass_samples.h"
 #include "common/state/sample_state.h"
+#include "worker/pass/memory_budget.h"
 
 namespace baton {
 
@@ -28,9 +29,10 @@ Result<std::shared_ptr<const RenderContext>> load_render_context(const JobSpec& 
                                                                  const Digest& picture);
 
 /// The same with assets that are loaded already (worker/pass/shared_assets.h): those of the job's
-/// scene. Error: motion that is not settled.
+/// scene. memory: whose shares it uses. Error: motion that is not settled.
 Result<std::shared_ptr<const RenderContext>> make_render_context(
-    const JobSpec& job, const Digest& picture, const std::shared_ptr<const SharedAssets>& assets);
+    const JobSpec& job, const Digest& picture, const std::shared_ptr<const SharedAssets>& assets,
+    const MemoryBudget& memory = MemoryBudget::of_machine());
 
 /// Where the finished frames of a tile run go, in frame order. Called on the rendering thread.
 struct TileRunSink {

@@ -44,15 +44,14 @@ Result<std::vector<StatePtr>> read_states(const LoadedJob& loaded, const BlobSto
       return Error{ErrorKind::bad_input,
                    fmt::format("{}: a render task takes states", blob_name(input))};
     }
-    StatePtr state =
-        input.is_held() ? loaded.held->find(input.digest) : loaded.states->peek(input.digest);
+    StatePtr state = loaded.states->find(input);
     if (state == nullptr && input.is_held())
       return Error{ErrorKind::io, fmt::format("{}: is not held here", blob_name(input))};
     if (state == nullptr) {
       BATON_ASSIGN(const Bytes bytes, store.get(input.digest));
       BATON_ASSIGN(SampleState decoded, decode_state(bytes, blob_name(input)));
       state = std::make_shared<const SampleState>(std::move(decoded));
-      if (moves(loaded.job)) loaded.states->insert(input.digest, state);
+      if (moves(loaded.job)) loaded.states->keep(input.digest, state);
     }
     states.push_back(std::move(state));
   }
@@ -80,7 +79,7 @@ Status keep_state(const LoadedJob& loaded, BlobStore& store, bool may_hold, Samp
   BlobRef ref{BlobKind::state, state.frame_index, state.tile,
               held_state_name(loaded.digest, state.frame_index, state.tile)};
   const auto shared = std::make_shared<const SampleState>(std::move(state));
-  if (may_hold && loaded.held->hold(ref, shared)) {
+  if (may_hold && loaded.states->hold(ref, shared)) {
     outputs.push_back(ref);
     return {};
   }
@@ -88,7 +87,7 @@ Status keep_state(const LoadedJob& loaded, BlobStore& store, bool may_hold, Samp
   BATON_ASSIGN(ref.digest, store.put(bytes));
   ref.size_bytes = bytes.size();
   outputs.push_back(ref);
-  if (moves(loaded.job)) loaded.states->insert(ref.digest, shared);
+  if (moves(loaded.job)) loaded.states->keep(ref.digest, shared);
   return {};
 }
 
@@ -215,7 +214,6 @@ Result<TaskOutput> execute_assemble(const LoadedJob& loaded, const BlobStore& st
 
 Result<TaskOutput> execute_task(const LoadedJob& loaded, BlobStore& store, const TaskKey& task,
                                 const TaskGrant& grant, std::stop_token stop) {
-  loaded.held->release_before(grant.states_from);
   loaded.states->release_before(grant.states_from);
   switch (task.kind) {
     case TaskKind::render:
@@ -228,7 +226,7 @@ Result<TaskOutput> execute_task(const LoadedJob& loaded, BlobStore& store, const
   return Error{ErrorKind::bad_input, "unknown kind of task"};
 }
 
-Result<std::vector<PublishedState>> publish_held(const HeldStates::List& states, BlobStore& store) {
+Result<std::vector<PublishedState>> publish_held(const JobStates::List& states, BlobStore& store) {
   std::vector<PublishedState> published;
   for (const auto& [ref, state] : states) {
     const Bytes bytes = encode_state(*state);

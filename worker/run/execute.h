@@ -40,6 +40,6 @@ Result<TaskOutput> execute_task(const LoadedJob& loaded, BlobStore& store, const
                                 const TaskGrant& grant, std::stop_token stop);
 
 /// Packs states that a job holds into the store. Errors: the disk.
-Result<std::vector<PublishedState>> publish_held(const HeldStates::List& states, BlobStore& store);
+Result<std::vector<PublishedState>> publish_held(const JobStates::List& states, BlobStore& store);
 
 }  // namespace baton

@@ -6,10 +6,39 @@
 #include <algorithm>
 
 #include "common/base/limits.h"
+#include "common/job/estimate.h"
 #include "common/job/job_json.h"
 #include "common/store/folder_token.h"
+#include "worker/accel/accel.h"
 
 namespace baton {
+namespace {
+
+/// What the tiles in work and a frame that is assembled take, about.
+std::uint64_t work_bytes(const JobSpec& job, int num_threads) {
+  const JobEstimate e = estimate_job(job);
+  const std::int64_t side = job.image.tile_size;
+  const std::int64_t pixels = std::min(job.image.rendered().area(), side * side);
+  const auto site_bytes = static_cast<std::int64_t>(sizeof(SurfaceHit) + sizeof(Ray));
+  const std::int64_t pixel_bytes =
+      job.image.sites * site_bytes + 4 * e.film_channels + e.state_bytes_per_pixel;
+  return static_cast<std::uint64_t>(num_threads * pixels * pixel_bytes + e.film_bytes +
+                                    e.frame_bytes);
+}
+
+/// What the worker's memory leaves to the job's scene. Error: nothing.
+Result<std::uint64_t> room_for_scene(const JobSpec& job, const Machine& machine) {
+  const std::uint64_t work = work_bytes(job, machine.num_threads);
+  const MemoryBudget& memory = machine.memory;
+  if (work < memory.scene_bytes) return memory.scene_bytes - work;
+  return Error{ErrorKind::bad_input,
+               fmt::format("the job does not fit into memory: {} tiles in work and a frame take {} "
+                           "MiB; {} MiB are for them and the scene of {} MiB (--memory)",
+                           machine.num_threads, work >> 20, memory.scene_bytes >> 20,
+                           memory.total_bytes >> 20)};
+}
+
+}  // namespace
 
 Result<LoadedJobPtr> load_job_document(const JobDocument& document, const Machine& machine,
                                        AssetShelf& shelf) {
@@ -27,8 +56,7 @@ Result<LoadedJobPtr> load_job_document(const JobDocument& document, const Machin
                 .digest = document.job,
                 .picture = parsed.picture,
                 .context = nullptr,
-                .states = std::make_shared<StateCache>(machine.max_state_bytes),
-                .held = std::make_shared<HeldStates>(2 * machine.max_state_bytes)});
+                .states = std::make_shared<JobStates>(machine.memory.states)});
   loaded->job.output.directory = here.job.output.directory;
   BATON_TRY(check_roots(here, machine.roots));
   const Status seen = document.token.empty()
@@ -41,8 +69,11 @@ Result<LoadedJobPtr> load_job_document(const JobDocument& document, const Machin
   }
 
   BATON_TRY(verify_assets(here.assets));
-  BATON_ASSIGN(const auto assets, shelf.get(here.job, here.assets));
-  BATON_ASSIGN(loaded->context, make_render_context(here.job, parsed.picture, assets));
+  BATON_ASSIGN(const std::uint64_t room, room_for_scene(here.job, machine));
+  BATON_ASSIGN(const auto assets, shelf.get(here.job, here.assets, machine.memory, room));
+  BATON_ASSIGN(loaded->context,
+               make_render_context(here.job, parsed.picture, assets, machine.memory));
+  loaded->scene_bytes = assets->size_bytes();
   return LoadedJobPtr(std::move(loaded));
 }
 
@@ -94,6 +125,12 @@ Result<LoadedJobPtr> JobEntry::load(std::stop_token stop) {
   return result;
 }
 
+bool JobCache::has_room_for_another() const {
+  std::uint64_t scene_bytes = 0;
+  for (const LoadedJobPtr& job : loaded()) scene_bytes += job->scene_bytes;
+  return entries_.size() < limits::kMaxCachedJobs && scene_bytes <= max_idle_scene_bytes_;
+}
+
 std::vector<LoadedJobPtr> JobCache::loaded() const {
   std::vector<LoadedJobPtr> jobs;
   for (const std::shared_ptr<JobEntry>& entry : entries_) {
@@ -115,11 +152,11 @@ std::shared_ptr<JobEntry> JobCache::entry(const Digest& digest) {
   }
 
   // Make room. A job that tasks still hold stays: a document that arrives for it must find it.
-  for (auto oldest = entries_.end();
-       entries_.size() >= limits::kMaxCachedJobs && oldest != entries_.begin();) {
+  for (auto oldest = entries_.end(); oldest != entries_.begin() && !has_room_for_another();) {
     --oldest;
     if (oldest->use_count() == 1) oldest = entries_.erase(oldest);
   }
+  for (const LoadedJobPtr& job : loaded()) job->states->drop_kept();
   entries_.push_front(std::make_shared<JobEntry>(digest, loader_, file_patience_));
   return entries_.front();
 }

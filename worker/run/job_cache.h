@@ -3,6 +3,7 @@
 #include <chrono>
 #include <condition_variable>
 #include <functional>
+#include <limits>
 #include <list>
 #include <memory>
 #include <mutex>
@@ -12,14 +13,14 @@
 #include <vector>
 
 #include "common/base/digest.h"
-#include "common/base/limits.h"
 #include "common/job/job_spec.h"
 #include "common/job/path_maps.h"
 #include "common/job/roots.h"
 #include "common/protocol/messages.h"
+#include "worker/pass/memory_budget.h"
 #include "worker/pass/shared_assets.h"
 #include "worker/pass/tile_renderer.h"
-#include "worker/run/state_cache.h"
+#include "worker/run/job_states.h"
 
 namespace baton {
 
@@ -28,8 +29,9 @@ struct LoadedJob {
   JobSpec job;  ///< as submitted, but for its output folder, which is where this machine has it
   Digest digest, picture;
   std::shared_ptr<const RenderContext> context;
-  std::shared_ptr<StateCache> states = std::make_shared<StateCache>();
-  std::shared_ptr<HeldStates> held = std::make_shared<HeldStates>();
+  /// In a share of the process's memory; with none nothing is kept.
+  std::shared_ptr<JobStates> states = std::make_shared<JobStates>(std::make_shared<MemoryShare>(0));
+  std::uint64_t scene_bytes = 0;
   /// What this machine does not see of the job, a line; then nothing of it is loaded.
   std::string unseen = {};
 };
@@ -42,8 +44,8 @@ using JobLoader = std::function<Result<LoadedJobPtr>(const JobDocument& document
 struct Machine {
   PathMaps maps = {};  ///< folders that lie elsewhere here
   Roots roots = {};    ///< folders that jobs may read from and write to; empty: all
-  std::uint64_t max_state_bytes =
-      limits::kMaxStateCacheBytes;  ///< decoded states of a job; held ones may take twice as much
+  MemoryBudget memory = MemoryBudget::of_machine();
+  int num_threads = 1;  ///< tiles that are in work at once
 };
 
 /// The loader of the worker: parses the document, checks its digest, the folders and the digests of
@@ -90,8 +92,12 @@ class JobEntry {
 /// by the control thread alone; the entries it hands out are safe to share.
 class JobCache {
  public:
-  explicit JobCache(JobLoader loader, std::chrono::milliseconds file_patience = kFilePatience)
-      : loader_(std::move(loader)), file_patience_(file_patience) {}
+  /// max_idle_scene_bytes: scenes of jobs that nobody holds go when they take more.
+  explicit JobCache(JobLoader loader, std::chrono::milliseconds file_patience = kFilePatience,
+                    std::uint64_t max_idle_scene_bytes = std::numeric_limits<std::uint64_t>::max())
+      : loader_(std::move(loader)),
+        file_patience_(file_patience),
+        max_idle_scene_bytes_(max_idle_scene_bytes) {}
 
   /// The entry of a job, made when there is none. A failed entry is replaced, so that the next
   /// attempt loads anew.
@@ -100,8 +106,11 @@ class JobCache {
   std::vector<LoadedJobPtr> loaded() const;
 
  private:
+  bool has_room_for_another() const;
+
   JobLoader loader_;
   std::chrono::milliseconds file_patience_;
+  std::uint64_t max_idle_scene_bytes_;
   /// At most limits::kMaxCachedJobs, and beyond that those in use.
   std::list<std::shared_ptr<JobEntry>> entries_;
 };

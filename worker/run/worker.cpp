@@ -162,7 +162,7 @@ Status publish_pooled(std::span<const PooledTask> tasks, TaskWatch& watch) {
 }
 
 /// Packs held states of jobs into the store, beside the render threads.
-std::vector<StatesPublished> pack_held(const std::vector<std::pair<Digest, HeldStates::List>>& jobs,
+std::vector<StatesPublished> pack_held(const std::vector<std::pair<Digest, JobStates::List>>& jobs,
                                        BlobStore& store) {
   std::vector<StatesPublished> messages;
   for (const auto& [job, states] : jobs) {
@@ -184,9 +184,11 @@ class Worker {
       : channel_(std::move(channel)),
         session_(session_options(options), now()),
         machine_(options.machine),
-        jobs_([this](const JobDocument& document) {
-          return load_job_document(document, machine_, shelf_);
-        }),
+        jobs_(
+            [this](const JobDocument& document) {
+              return load_job_document(document, machine_, shelf_);
+            },
+            kFilePatience, machine_.memory.scene_bytes / 2),
         pool_(
             options.num_threads,
             [this](const PooledTask& task, std::stop_token stop) {
@@ -311,11 +313,11 @@ class Worker {
     if (missing) step(DocumentMissing{action.lease.job});
   }
   void perform(PackHeld& action) {
-    std::vector<std::pair<Digest, HeldStates::List>> jobs;
+    std::vector<std::pair<Digest, JobStates::List>> jobs;
     for (const LoadedJobPtr& job : jobs_.loaded()) {
       if (action.request && action.request->job != job->digest) continue;
-      HeldStates::List states =
-          action.request ? job->held->states(action.request->states) : job->held->all();
+      JobStates::List states =
+          action.request ? job->states->held(action.request->states) : job->states->held();
       if (!states.empty()) jobs.emplace_back(job->digest, std::move(states));
     }
     packing_.push_back(

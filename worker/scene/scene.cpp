@@ -7,12 +7,14 @@
 #include <limits>
 #include <optional>
 #include <set>
+#include <type_traits>
 #include <unordered_map>
 
 #include "common/job/motion.h"
 #include "common/math/inverse.h"
 #include "worker/scene/detail_loader.h"
 #include "worker/scene/gltf/meshes.h"
+#include "worker/scene/surface_detail.h"
 #include "worker/scene/tangents.h"
 
 namespace baton {
@@ -195,6 +197,31 @@ void place_object(const ObjectSpec& object, std::size_t index, const std::string
 }
 
 }  // namespace
+
+std::uint64_t Scene::size_bytes() const {
+  std::uint64_t size = 0;
+  const auto add = [&size](const auto& array) {
+    size += array.capacity() * sizeof(typename std::decay_t<decltype(array)>::value_type);
+  };
+  for (const TriangleMesh& mesh : meshes) {
+    add(mesh.positions);
+    add(mesh.normals);
+    for (const auto& uvs : mesh.uvs) add(uvs);
+    add(mesh.tangents);
+    add(mesh.triangles);
+  }
+  std::set<const Texture*> textures;  // materials share them
+  for (const Material& material : materials) {
+    if (material.detail == nullptr) continue;
+    const SurfaceDetail& detail = *material.detail;
+    for (const PlacedTexture* placed :
+         {&detail.color, &detail.metallic_roughness, &detail.normal, &detail.emission}) {
+      const Texture* const texture = placed->texture.get();
+      if (texture != nullptr && textures.insert(texture).second) size += texture->size_bytes();
+    }
+  }
+  return size;
+}
 
 Result<Scene> load_scene(const JobSpec& job) {
   Scene scene;

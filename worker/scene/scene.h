@@ -58,6 +58,8 @@ struct Scene {
   const Material& material_of(const Instance& instance) const {
     return materials[instance.material];
   }
+  /// What meshes and textures take.
+  std::uint64_t size_bytes() const;
 };
 
 /// Loads every mesh and resolves every name. The ground is a two-triangle mesh of its own.

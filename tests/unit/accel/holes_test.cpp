@@ -56,7 +56,7 @@ TEST(Holes, SightAndLightPass) {
     ASSERT_TRUE(copied.ok());
     expect_holes(**copied, opaque_front);
     // Both from one mesh that is not copied.
-    const auto placed = Accel::build(scene, 0);
+    const auto placed = Accel::build(scene, {.max_copied_triangles = 0});
     ASSERT_TRUE(placed.ok());
     expect_holes(**placed, opaque_front);
   }

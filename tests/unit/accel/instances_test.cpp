@@ -23,7 +23,8 @@ Scene nine_cubes() {
 
 TEST(Instances, SharedMeshesAreHitAsTheirCopiesAre) {
   const Scene scene = nine_cubes();
-  const auto copied = Accel::build(scene), shared = Accel::build(scene, 95);
+  const auto copied = Accel::build(scene),
+             shared = Accel::build(scene, {.max_copied_triangles = 95});
   ASSERT_TRUE(copied && shared);
   int num_hits = 0;
   ShadowRays rays, same;

@@ -22,7 +22,8 @@ JobSpec dissolve(int frames) {
 // A cache whose values hold those of another keeps more than either may: one map of each frame.
 TEST(LightSequence, KeepsTheLightOfTheLastFramesAlone) {
   const JobSpec job = dissolve(60);
-  LightSequence lights(job, std::make_shared<MapCache>());
+  const auto share = std::make_shared<MemoryShare>(std::uint64_t{1} << 30);
+  LightSequence lights(job, std::make_shared<MapCache>(share), share);
   std::vector<std::weak_ptr<const EnvironmentMap>> maps;
   std::vector<std::weak_ptr<const PresampledLight>> presampled;
   for (std::int32_t f = 0; f < 60; ++f) {
@@ -40,7 +41,8 @@ TEST(LightSequence, KeepsTheLightOfTheLastFramesAlone) {
 
 TEST(LightSequence, MakesAFrameAgainAlike) {
   const JobSpec job = dissolve(60);
-  LightSequence lights(job, std::make_shared<MapCache>());
+  const auto share = std::make_shared<MemoryShare>(std::uint64_t{1} << 30);
+  LightSequence lights(job, std::make_shared<MapCache>(share), share);
   const auto first = *lights.at(3);
   for (std::int32_t f = 4; f < 40; ++f) ASSERT_TRUE(lights.at(f).ok());
   const auto again = *lights.at(3);

@@ -173,10 +173,10 @@ TEST_F(ExecuteTest, AHeldStateIsTheStateOfItsFile) {
   const BlobRef held = made->outputs.back();
   EXPECT_TRUE(held.is_held());
   EXPECT_EQ(held.digest, held_state_name(loaded_->digest, 1, 1));
-  EXPECT_EQ(loaded_->held->size_bytes(), loaded_->held->find(held.digest)->size_bytes());
+  EXPECT_EQ(loaded_->states->size_bytes(), loaded_->states->find(held)->size_bytes());
   EXPECT_EQ(render(1, 1, {held}).value().outputs, render(1, 1, {packed}).value().outputs);
 
-  const auto published = publish_held(loaded_->held->all(), *store_);
+  const auto published = publish_held(loaded_->states->held(), *store_);
   ASSERT_TRUE(published) << published.error().message;
   EXPECT_EQ(*published, (std::vector<PublishedState>{{held, packed}}));
 
@@ -186,7 +186,7 @@ TEST_F(ExecuteTest, AHeldStateIsTheStateOfItsFile) {
       execute_task(*loaded_, *store_, next, {{held}, frames_of(1), false, 2}, {});
   ASSERT_FALSE(late);
   EXPECT_THAT(late.error().message, testing::HasSubstr("is not held here"));
-  EXPECT_EQ(loaded_->held->size_bytes(), 0u);
+  EXPECT_EQ(loaded_->states->size_bytes(), 0u);
 }
 
 TEST_F(ExecuteTest, ADamagedOrMissingStateIsAnErrorThatNamesIt) {
@@ -227,6 +227,30 @@ TEST_F(ExecuteTest, AStoppedTaskIsCancelled) {
                                                  {{}, frames_of(0)}, stop.get_token());
   ASSERT_FALSE(output);
   EXPECT_EQ(output.error().kind, ErrorKind::cancelled);
+}
+
+// A worker with too little memory says how much there is; another one may have more.
+TEST_F(ExecuteTest, AJobThatDoesNotFitIntoMemoryIsRefusedWithTheNumbers) {
+  const std::string document = make_job_document(job_).value();
+  const auto load_with = [&](std::uint64_t bytes) {
+    AssetShelf shelf;
+    Machine machine;
+    machine.memory = MemoryBudget::of(bytes);
+    return load_job_document({digest_of(document), document}, machine, shelf);
+  };
+  EXPECT_TRUE(load_with(std::uint64_t{64} << 20));
+  const Result<LoadedJobPtr> no_frame = load_with(1 << 10);
+  ASSERT_FALSE(no_frame);
+  EXPECT_EQ(no_frame.error().kind, ErrorKind::bad_input);
+  EXPECT_THAT(no_frame.error().message, testing::HasSubstr("tiles in work and a frame take"));
+
+  // Room for the frame is found at some size; for the ray tracer it is not yet.
+  std::uint64_t bytes = 1 << 10;
+  Result<LoadedJobPtr> no_scene = load_with(bytes);
+  while (!no_scene && no_scene.error().message == no_frame.error().message)
+    no_scene = load_with(bytes += bytes / 8);
+  ASSERT_FALSE(no_scene);
+  EXPECT_THAT(no_scene.error().message, testing::HasSubstr("the scene does not fit into memory"));
 }
 
 TEST_F(ExecuteTest, AnAssetThatChangedSinceSubmissionIsNamed) {

@@ -147,15 +147,19 @@ TEST(AssetShelf, JobsOfOneSceneShareItWhileOneOfThemLives) {
   JobSpec job = test::box_job();
   const std::vector<AssetDigest> files{{"map.exr", {1, 2}}};
   AssetShelf shelf;
-  auto first = shelf.get(job, files).value();
+  const MemoryBudget memory = MemoryBudget::of_machine();
+  const auto get = [&](const JobSpec& of, const std::vector<AssetDigest>& with) {
+    return shelf.get(of, with, memory, memory.scene_bytes);
+  };
+  auto first = get(job, files).value();
   job.seed = 7;
   job.sampling.num_particles = 3;
-  EXPECT_EQ(shelf.get(job, files).value(), first);
+  EXPECT_EQ(get(job, files).value(), first);
 
   // Another file content or another scene is loaded anew.
-  EXPECT_NE(shelf.get(job, {{"map.exr", {1, 3}}}).value(), first);
+  EXPECT_NE(get(job, {{"map.exr", {1, 3}}}).value(), first);
   job.scene.ground->size += 1;
-  EXPECT_NE(shelf.get(job, files).value(), first);
+  EXPECT_NE(get(job, files).value(), first);
   job.scene.ground->size -= 1;
 
   // Nothing is kept for its own sake.
@@ -167,7 +171,7 @@ TEST(AssetShelf, JobsOfOneSceneShareItWhileOneOfThemLives) {
 TEST(MapCache, AMapIsReadOncePerTable) {
   const JobSpec job = test::box_job();
   const std::string& path = job.environment.keys.front().map;
-  MapCache maps;
+  MapCache maps(std::make_shared<MemoryShare>(std::uint64_t{1} << 30));
   const auto first = maps.get(path, job.environment, false).value();
   EXPECT_EQ(maps.get(path, job.environment, false).value(), first);
   EXPECT_NE(maps.get(path, job.environment, true).value(), first);

@@ -1,8 +1,6 @@
-#include "worker/run/state_cache.h"
+#include "worker/run/job_states.h"
 
 #include <gtest/gtest.h>
-
-#include <string>
 
 #include "worker/pass/tile_renderer.h"
 
@@ -17,66 +15,76 @@ StatePtr state_of(std::int32_t side, bool with_memory) {
   return std::make_shared<const SampleState>(std::move(state));
 }
 
+StatePtr state_of_frame(std::int32_t frame) {
+  SampleState state = *state_of(10, false);
+  state.frame_index = frame;
+  return std::make_shared<const SampleState>(std::move(state));
+}
+
+BlobRef held_ref(std::int32_t frame) {
+  return {BlobKind::state, frame, 0, held_state_name({1, 2}, frame, 0)};
+}
+BlobRef stored_ref(std::int32_t frame) {
+  return {BlobKind::state, frame, 0, digest_of(std::to_string(frame)), 100};
+}
+
+MemorySharePtr room_for(std::size_t num_states) {
+  return std::make_shared<MemoryShare>(num_states * state_of(10, false)->size_bytes());
+}
+
 // A pixel of `pool` takes 25 bytes, and 514 more where it needs bins.
-TEST(StateCache, CountsWhatStatesTake) {
-  StateCache cache(1 << 20);
-  cache.insert(digest_of("pool"), state_of(10, true));
-  EXPECT_EQ(cache.size(), 100u * 25 + 514);
-  cache.insert(digest_of("sequential"), state_of(10, false));
-  EXPECT_EQ(cache.size(), 100u * (25 + 9 + 16 * 9) + 514);
-}
-
-// Four tiles a frame and room for five states: each tile of a frame finds its own of the frame
-// before, although that is the one that was used least recently.
-TEST(StateCache, ATileFindsItsStateOfTheFrameBefore) {
-  const StatePtr state = state_of(10, false);
-  StateCache cache(5 * state->size_bytes());
-  const auto key = [](int frame, int tile) {
-    return digest_of(std::to_string(frame) + "/" + std::to_string(tile));
-  };
-  for (int frame = 0; frame < 3; ++frame) {
-    for (int tile = 0; tile < 4; ++tile) {
-      const bool is_there = frame == 0 || cache.peek(key(frame - 1, tile)) != nullptr;
-      EXPECT_TRUE(is_there) << frame << " " << tile;
-      cache.insert(key(frame, tile), state);
-    }
-  }
-}
-
-// What no task needs any more leaves room at once.
-TEST(StateCache, StatesOfEarlierFramesAreForgotten) {
-  const auto state_of_frame = [](std::int32_t frame) {
-    SampleState state = *state_of(10, false);
-    state.frame_index = frame;
-    return std::make_shared<const SampleState>(std::move(state));
-  };
-  StateCache cache(1 << 20);
-  for (const std::int32_t frame : {3, 4, 5})
-    cache.insert(digest_of(std::to_string(frame)), state_of_frame(frame));
-  cache.release_before(5);
-  EXPECT_EQ(cache.peek(digest_of("4")), nullptr);
-  ASSERT_NE(cache.peek(digest_of("5")), nullptr);
-  EXPECT_EQ(cache.size(), cache.peek(digest_of("5"))->size_bytes());
+TEST(JobStates, CountsWhatStatesTake) {
+  JobStates states(std::make_shared<MemoryShare>(1 << 20));
+  states.keep(digest_of("pool"), state_of(10, true));
+  EXPECT_EQ(states.size_bytes(), 100u * 25 + 514);
+  states.keep(digest_of("sequential"), state_of(10, false));
+  EXPECT_EQ(states.size_bytes(), 100u * (25 + 9 + 16 * 9) + 514);
 }
 
 // What does not fit is not held: it goes into the store instead.
-TEST(HeldStates, HoldsWhatFitsUntilNobodyNeedsIt) {
-  const StatePtr state = state_of(10, false);
-  HeldStates held(2 * state->size_bytes());
-  const auto ref = [](std::int32_t frame) {
-    return BlobRef{BlobKind::state, frame, 0, held_state_name({1, 2}, frame, 0)};
-  };
-  EXPECT_TRUE(held.hold(ref(0), state));
-  EXPECT_TRUE(held.hold(ref(1), state));
-  EXPECT_TRUE(held.hold(ref(1), state)) << "again";
-  EXPECT_FALSE(held.hold(ref(2), state));
-  EXPECT_EQ(held.size_bytes(), 2 * state->size_bytes());
-  EXPECT_EQ(held.states({ref(1).digest, ref(2).digest}).size(), 1u);
+TEST(JobStates, HoldsWhatFitsUntilNobodyNeedsIt) {
+  const auto share = room_for(2);
+  JobStates states(share);
+  EXPECT_TRUE(states.hold(held_ref(0), state_of_frame(0)));
+  EXPECT_TRUE(states.hold(held_ref(1), state_of_frame(1)));
+  EXPECT_TRUE(states.hold(held_ref(1), state_of_frame(1))) << "again";
+  EXPECT_FALSE(states.hold(held_ref(2), state_of_frame(2)));
+  EXPECT_EQ(share->used(), share->bytes());
+  const JobStates::List held = states.held({held_ref(1).digest, held_ref(2).digest});
+  ASSERT_EQ(held.size(), 1u);
+  EXPECT_EQ(held.front().first, held_ref(1));
 
-  held.release_before(1);
-  EXPECT_EQ(held.find(ref(0).digest), nullptr);
-  EXPECT_EQ(held.find(ref(1).digest), state);
-  EXPECT_TRUE(held.hold(ref(2), state));
+  states.release_before(1);
+  EXPECT_EQ(states.find(held_ref(0)), nullptr);
+  EXPECT_NE(states.find(held_ref(1)), nullptr);
+  EXPECT_TRUE(states.hold(held_ref(2), state_of_frame(2)));
+  EXPECT_EQ(states.held().size(), 2u);
+}
+
+// What can be read again makes room for what cannot.
+TEST(JobStates, HeldStatesComeFirst) {
+  JobStates states(room_for(2));
+  states.keep(stored_ref(0).digest, state_of_frame(0));
+  EXPECT_TRUE(states.hold(held_ref(1), state_of_frame(1)));
+  EXPECT_NE(states.find(stored_ref(0)), nullptr);
+  EXPECT_TRUE(states.hold(held_ref(2), state_of_frame(2)));
+  EXPECT_EQ(states.find(stored_ref(0)), nullptr);
+  states.keep(stored_ref(0).digest, state_of_frame(0));
+  EXPECT_EQ(states.find(stored_ref(0)), nullptr) << "no room";
+  EXPECT_EQ(states.held().size(), 2u);
+}
+
+// Jobs share the memory of a worker; one that is not at work leaves what it keeps, not what it
+// holds.
+TEST(JobStates, WhatIsKeptMakesRoomForAnotherJob) {
+  const auto share = room_for(2);
+  JobStates first(share), second(share);
+  first.keep(stored_ref(0).digest, state_of_frame(0));
+  EXPECT_TRUE(first.hold(held_ref(1), state_of_frame(1)));
+  EXPECT_FALSE(second.hold(held_ref(3), state_of_frame(3)));
+  first.drop_kept();
+  EXPECT_TRUE(second.hold(held_ref(3), state_of_frame(3)));
+  EXPECT_NE(first.find(held_ref(1)), nullptr);
 }
 
 }  // namespace

@@ -99,6 +99,15 @@ TEST_F(HeldStatesTest, WithTheHolderTheyAreGone) {
   EXPECT_EQ(farm.progress().frames_done, 1u) << "the frame stays";
 }
 
+// A worker that has no time for a task has not failed it: holding goes on.
+TEST_F(HeldStatesTest, AfterAReturnedLeaseStatesAreHeldAsBefore) {
+  render_first_frame();
+  farm.step(LeaseReturned{"a", farm.ask_one("a").lease});
+  const GrantLease again = farm.ask_one("a");
+  ASSERT_EQ(again.lease.task.kind, TaskKind::render);
+  EXPECT_TRUE(again.may_hold);
+}
+
 TEST_F(HeldStatesTest, AfterAFailureNothingIsBoundToAWorker) {
   render_first_frame();
   farm.step(WorkerJoined{"b", {}});

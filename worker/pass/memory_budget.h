@@ -1,0 +1,35 @@
+#pragma once
+
+#include <cstdint>
+#include <memory>
+
+#include "common/base/machine_memory.h"
+#include "common/base/memory_share.h"
+
+namespace baton {
+
+/// What a process may use of its machine's memory, shared out in sixteenths. What does not fit into
+/// a share is read or made again; a scene that does not fit is refused.
+struct MemoryBudget {
+  std::uint64_t total_bytes = 0;
+  std::uint64_t scene_bytes = 0;  ///< a job's scene, with the tiles and frames in work
+  MemorySharePtr maps;            ///< environment maps as they were read, of all jobs
+  MemorySharePtr light;           ///< mixed maps and presampled light
+  MemorySharePtr surfaces;        ///< what primary rays have seen, where things move
+  MemorySharePtr states;          ///< decoded sample states
+
+  static MemoryBudget of(std::uint64_t total_bytes) {
+    const auto share = [total_bytes](std::uint64_t sixteenths) {
+      return std::make_shared<MemoryShare>(total_bytes / 16 * sixteenths);
+    };
+    return {.total_bytes = total_bytes,
+            .scene_bytes = total_bytes / 16 * 7,
+            .maps = share(2),
+            .light = share(1),
+            .surfaces = share(2),
+            .states = share(4)};
+  }
+  static MemoryBudget of_machine() { return of(default_memory_bytes()); }
+};
+
+}  // namespace baton
