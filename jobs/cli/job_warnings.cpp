@@ -12,6 +12,7 @@
 #include "common/job/job_fields.h"
 #include "common/job/known_limits.h"
 #include "common/job/sequence.h"
+#include "common/job/store_estimate.h"
 #include "jobs/cli/text.h"
 #include "worker/scene/settle_scene.h"
 
@@ -91,7 +92,7 @@ std::string jump_text(const LightJump& jump) {
                      jump.to, jump.ratio);
 }
 
-void output_warnings(const JobSpec& job, std::vector<std::string>& warnings) {
+void output_warnings(const JobSpec& job, double surface_share, std::vector<std::string>& warnings) {
   // The part of the path that is there already.
   fs::path folder = job.output.directory;
   std::error_code error;
@@ -100,11 +101,13 @@ void output_warnings(const JobSpec& job, std::vector<std::string>& warnings) {
     warnings.push_back(
         fmt::format("{}: {} cannot be written", job.output.directory, folder.string()));
   const fs::space_info space = fs::space(folder, error);
-  const auto needed = static_cast<std::uint64_t>(estimate_disk(job).total());
-  if (!error && space.available < needed) {
-    warnings.push_back(fmt::format("{}: {} are free, and frames, states and tiles may take {}",
+  const JobEstimate e = estimate_job(job);
+  const auto frames = static_cast<std::uint64_t>(e.frames * e.frame_bytes);
+  const auto store = static_cast<std::uint64_t>(estimate_store(job, surface_share).total());
+  if (!error && space.available < frames + store) {
+    warnings.push_back(fmt::format("{}: {} are free, and frames may take {}, states and tiles {}",
                                    job.output.directory, bytes_text(space.available),
-                                   bytes_text(needed)));
+                                   bytes_text(frames), bytes_text(store)));
   }
 }
 
@@ -157,7 +160,7 @@ std::vector<std::string> job_warnings(const JobSpec& job, const AssetReport& ass
     warnings.push_back(std::move(warning));
   for (std::string& warning : gltf_warnings(job.scene)) warnings.push_back(std::move(warning));
   aov_warnings(job, warnings);
-  output_warnings(job, warnings);
+  output_warnings(job, assets.surface_share, warnings);
   return warnings;
 }
 
