@@ -9,7 +9,6 @@
 #include "common/base/build.h"
 #include "common/base/exit_codes.h"
 #include "common/base/files.h"
-#include "common/base/limits.h"
 #include "common/base/log.h"
 #include "coordinator/service/service.h"
 
@@ -83,7 +82,7 @@ int main(int argc, char** argv) {
                  "MiB that states and films may take in the work folder: jobs that would need more "
                  "wait; default: as the disk has room")
       ->envname("BATON_STORE_LIMIT")
-      ->check(CLI::Range(std::uint64_t{1}, baton::limits::kMaxStoreLimitMib));
+      ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{1} << 40));
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {

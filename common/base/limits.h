@@ -61,7 +61,6 @@ inline constexpr std::uint64_t kMaxHeldStateBytes =
     1ull << 30;  ///< states that a worker holds; what is more goes into the store
 inline constexpr std::uint64_t kStoreReserveBytes =
     64ull << 20;  ///< of a disk that blobs leave to frames and the journal
-inline constexpr std::uint64_t kMaxStoreLimitMib = 1ull << 40;  ///< of --store-limit
 inline constexpr std::uint64_t kMaxFilmBytesAhead =
     2ull << 30;  ///< films, before compression, of frames that are rendered ahead of an open one
 inline constexpr std::uint64_t kMaxSurfaceCacheBytes =

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <vector>
 
+#include "common/job/empty_aovs.h"
 #include "common/job/estimate.h"
 #include "common/job/motion.h"
 #include "common/job/sequence.h"
@@ -15,11 +16,12 @@ namespace {
 /// One of R, G, B; also in a sky.
 constexpr double kColorBytes = 3.2;
 /// What a memory takes after kMemoryRays shadow rays; it grows with their square root, until all
-/// bins above the horizon are known.
+/// bins above the horizon are known. Where things move, some pixels start afresh in each frame.
 constexpr double kMemoryBytes = 200, kMemoryRays = 800, kMostMemoryBytes = 310;
+constexpr double kMovingMemory = 0.85;
 /// A sample of the first pass, and how many of a pixel's are stored: those of pixels near a
 /// shadow's border.
-constexpr double kSampleBytes = 10, kSampleShare = 0.5;
+constexpr double kSampleBytes = 10, kSampleShare = 0.27;
 /// Tasks in a worker's hands beside those of the run that everybody waits for.
 constexpr double kTasksAhead = 3;
 
@@ -51,7 +53,9 @@ double film_bytes(Aov aov) {
 double film_bytes_per_pixel(const JobSpec& job, double surface_share) {
   const bool has_sky = job.output.background == Background::environment;
   double bytes = 3 * kColorBytes * (has_sky ? 1 : surface_share);
-  for (const Aov aov : film_aovs(job)) bytes += surface_share * film_bytes(aov);
+  for (const Aov aov : film_aovs(job)) {
+    if (why_empty(aov, job).empty()) bytes += surface_share * film_bytes(aov);
+  }
   return bytes;
 }
 
@@ -62,8 +66,8 @@ double state_bytes_per_pixel(const JobSpec& job, std::int64_t end, double surfac
   if (traits(job.sampling.method).carried != Carried::memory) return surface_share * whole;
   const auto rounds = static_cast<double>(e.preroll_rounds + end * e.rounds);
   const double rays = rounds * job.sampling.num_particles;
-  return surface_share *
-         std::min({whole, kMostMemoryBytes, kMemoryBytes * std::sqrt(rays / kMemoryRays)});
+  const double memory = std::min(kMostMemoryBytes, kMemoryBytes * std::sqrt(rays / kMemoryRays));
+  return surface_share * std::min(whole, memory * (moves(job) ? kMovingMemory : 1));
 }
 
 /// The ends of the frames whose states are in the store together when it is fullest.
@@ -103,14 +107,16 @@ StoreEstimate estimate_store(const JobSpec& job, double surface_share) {
 
   // All tiles of a run are rendered before its first frame is written, and some of the next one.
   const double tiles_ahead = std::min(1.0, kTasksAhead / static_cast<double>(e.tiles));
-  const double ahead = std::min(frames, frames_per_run(job) * (1 + tiles_ahead));
+  // A second pass takes samples away while the run is still rendered.
+  const bool second = job.visibility.correlated;
+  const double run = frames_per_run(job);
+  const double ahead = std::min(frames, run * (1 + tiles_ahead / (second ? 2 : 1)));
   store.films =
       static_cast<std::int64_t>(pixels * ahead * film_bytes_per_pixel(job, surface_share));
-  if (job.visibility.correlated) {
+  if (second) {
+    const double samples = surface_share * kSampleShare * job.sampling.num_particles;
     store.samples =
-        static_cast<std::int64_t>(pixels * ahead *
-                                  (2 + surface_share * kSampleShare * kSampleBytes *
-                                           static_cast<double>(job.sampling.num_particles)));
+        static_cast<std::int64_t>(pixels * std::min(frames, run) * (2 + samples * kSampleBytes));
   }
   return store;
 }

@@ -32,8 +32,10 @@ bool Scheduler::has_room(const Job& job, TaskIndex task, bool others_wait) const
   }
   // What an idle farm does not begin nobody begins.
   const std::int32_t run = key.kind == TaskKind::render ? key.step : graph.run_of(key.step);
-  if (run < job.begun_runs || is_idle) return true;
-  return !others_wait && may_begin(job, run);
+  if (is_idle) return true;
+  if (run >= job.begun_runs) return !others_wait && may_begin(job, run);
+  // What is lost of earlier runs, and made again, comes first.
+  return store_bytes() + unmade_bytes(job, run) <= store_limit_;
 }
 
 /// Whether there is room for all that the run makes, beside what runs in work still make.

@@ -8,6 +8,7 @@
 #include <filesystem>
 #include <map>
 
+#include "common/job/empty_aovs.h"
 #include "common/job/estimate.h"
 #include "common/job/job_fields.h"
 #include "common/job/known_limits.h"
@@ -108,28 +109,6 @@ void output_warnings(const JobSpec& job, double surface_share, std::vector<std::
     warnings.push_back(fmt::format("{}: {} are free, and frames may take {}, states and tiles {}",
                                    job.output.directory, bytes_text(space.available),
                                    bytes_text(frames), bytes_text(store)));
-  }
-}
-
-/// Why an AOV shows nothing of this job; empty: it does.
-std::string_view why_empty(Aov aov, const JobSpec& job) {
-  const Method method = job.sampling.method;
-  switch (aov) {
-    case Aov::acceptance:
-    case Aov::acceptance_local:
-    case Aov::acceptance_independent:
-    case Aov::resampled:
-      return traits(method).moves_samples ? "" : "only `sequential` fills it";
-    case Aov::variance:
-      if (traits(method).tells_variance()) return "";
-      if (carries_state(job)) return "samples that are carried tell nothing of their error";
-      return job.quality.rounds < 4 ? "only `reference`, `pool` and `ratio` fill it, and four "
-                                      "rounds or more of the others"
-                                    : "";
-    case Aov::ess:
-      return traits(method).keeps_samples ? "" : "the method's rays have no weights";
-    default:
-      return "";
   }
 }
 

@@ -69,7 +69,7 @@ void add_store_limit_option(CLI::App& command, std::uint64_t& store_limit_mib) {
                   "MiB that states and films may take in the work folder; a job that needs more "
                   "ends with an error and can go on; default: as the disk has room")
       ->envname("BATON_STORE_LIMIT")
-      ->check(CLI::Range(std::uint64_t{1}, limits::kMaxStoreLimitMib));
+      ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{1} << 40));
 }
 
 Result<RenderSession> RenderSession::start(const RenderOptions& options, const FarmOptions& farm,
