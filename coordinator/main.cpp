@@ -77,6 +77,12 @@ int main(int argc, char** argv) {
   app.add_flag("--insecure", insecure, "listen to other machines without a key");
   app.add_option("--root", options.roots,
                  "folder that jobs may read from and write to, may be repeated; default: all");
+  std::uint64_t store_limit_mib = 0;
+  app.add_option("--store-limit", store_limit_mib,
+                 "MiB that states and films may take in the work folder: jobs that would need more "
+                 "wait; default: as the disk has room")
+      ->envname("BATON_STORE_LIMIT")
+      ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{1} << 40));
   try {
     app.parse(argc, argv);
   } catch (const CLI::ParseError& error) {
@@ -86,6 +92,7 @@ int main(int argc, char** argv) {
   baton::init_logging("baton-coordinator");
   install_stop_handler();
   options.heartbeat = std::chrono::milliseconds(heartbeat_ms);
+  options.store_limit = store_limit_mib << 20;
   const baton::Status status = coordinate(options, key_file, insecure, endpoint_file);
   if (status) return static_cast<int>(baton::ExitCode::ok);
   spdlog::error("{}", status.error().message);

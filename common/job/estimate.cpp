@@ -39,18 +39,6 @@ std::int32_t max_frames_ahead(const JobSpec& job) {
   return std::max(2 * frames_per_run(job), static_cast<std::int32_t>(std::min(frames, all)));
 }
 
-DiskEstimate estimate_disk(const JobSpec& job) {
-  // Two checkpoints stay while the job runs, and those of the runs in work, of which there are at
-  // most two frames' or runs' worth, are beside them.
-  constexpr std::int64_t kStatesAtOnce = 4;
-  const JobEstimate e = estimate_job(job);
-  const std::int64_t kept =
-      job.state.keep == StateKeep::all ? e.frames / job.state.checkpoint_every + 1 : 0;
-  const std::int64_t states = std::min(kStatesAtOnce + kept, std::max(e.runs, kept));
-  const std::int64_t ahead = std::min<std::int64_t>(max_frames_ahead(job) + 1, e.frames);
-  return {e.frame_bytes * e.frames, e.state_bytes * states, e.film_bytes * ahead};
-}
-
 JobEstimate estimate_job(const JobSpec& job) {
   JobEstimate e;
   const PixelRect image = job.image.rendered();

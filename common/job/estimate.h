@@ -24,7 +24,7 @@ struct JobEstimate {
   std::int64_t film_bytes = 0;             ///< of one frame as float32 tiles, before compression
   std::int64_t frame_bytes = 0;            ///< of one EXR, before compression
   std::int64_t state_bytes_per_pixel = 0;  ///< in memory; 0 when no state is carried
-  std::int64_t state_bytes = 0;            ///< of all tiles at one checkpoint
+  std::int64_t state_bytes = 0;            ///< of all tiles at one checkpoint, in memory
   std::int64_t largest_blob_bytes = 0;     ///< one tile's film or state in memory
 
   std::int64_t tasks() const { return render_tasks + second_pass_tasks + assemble_tasks; }
@@ -36,16 +36,5 @@ JobEstimate estimate_job(const JobSpec& job);
 /// How many frames may be rendered ahead of the first that is not written: as their films have
 /// room, and at least two runs, so that a tile that takes long stops nobody at once.
 std::int32_t max_frames_ahead(const JobSpec& job);
-
-/// What a job has on disk at most, before compression.
-struct DiskEstimate {
-  std::int64_t frames = 0;  ///< all EXR files
-  std::int64_t states =
-      0;                   ///< checkpoints that stay, and the states on their way to the next frame
-  std::int64_t films = 0;  ///< of the frames that are not written yet
-
-  std::int64_t total() const { return frames + states + films; }
-};
-DiskEstimate estimate_disk(const JobSpec& job);
 
 }  // namespace baton

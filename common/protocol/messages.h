@@ -17,7 +17,7 @@ namespace baton {
 /// travels here: blobs go through the store, messages carry their digests.
 
 inline constexpr const char* kProtocolName = "BATON";
-inline constexpr std::uint16_t kProtocolVersion = 8;
+inline constexpr std::uint16_t kProtocolVersion = 9;
 
 // ---- worker to coordinator ----------------------------------------------------------------------
 struct WorkerHello {  ///< first, and again after a reconnect or a new epoch
@@ -307,9 +307,11 @@ struct JobDetail {
       {};                  ///< of each frame so far: frame is the user's number, tile -1
   std::string waits = {};  ///< for what, where it does
   std::string plan = {};   ///< of the answer to ResumeJob: as JobAccepted's
+  /// It waits for room in the store, and nothing that is in work will make some.
+  bool lacks_room = false;
   template <class A>
   void fields(A& a) {
-    a(summary, frames_done, failures, frames, waits, plan);
+    a(summary, frames_done, failures, frames, waits, plan, lacks_room);
   }
 };
 struct Refused {

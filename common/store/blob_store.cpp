@@ -9,6 +9,26 @@ namespace baton {
 
 namespace fs = std::filesystem;
 
+namespace {
+
+/// The files below a folder, of this extension, that nobody has written to for kLeftoverAge. What
+/// cannot be looked at is left out.
+std::vector<fs::path> old_files(const fs::path& folder, const char* extension) {
+  std::vector<fs::path> files;
+  const auto oldest = fs::file_time_type::clock::now() - BlobStore::kLeftoverAge;
+  std::error_code error;
+  for (fs::recursive_directory_iterator entry(folder, error), end; !error && entry != end;
+       entry.increment(error)) {
+    if (entry->path().extension() != extension) continue;
+    std::error_code gone;
+    const auto written = entry->last_write_time(gone);
+    if (!gone && written < oldest) files.push_back(entry->path());
+  }
+  return files;
+}
+
+}  // namespace
+
 Result<BlobStore> BlobStore::open(const fs::path& directory) {
   // Make every subfolder now, so that put() need not.
   for (int i = 0; i < 256; ++i) {
@@ -71,16 +91,29 @@ Status BlobStore::remove(const Digest& digest) {
 
 std::size_t BlobStore::sweep() const {
   std::size_t count = 0;
-  const auto oldest = fs::file_time_type::clock::now() - kLeftoverAge;
-  std::error_code error;
-  for (fs::recursive_directory_iterator entry(directory_, error), end; !error && entry != end;
-       entry.increment(error)) {
-    if (entry->path().extension() != ".tmp") continue;
-    std::error_code gone;
-    const auto written = entry->last_write_time(gone);
-    if (!gone && written < oldest && fs::remove(entry->path(), gone)) ++count;
-  }
+  std::error_code gone;
+  for (const fs::path& file : old_files(directory_, ".tmp")) count += fs::remove(file, gone);
   return count;
+}
+
+std::vector<BlobStore::Leftover> BlobStore::old_blobs() const {
+  std::vector<Leftover> blobs;
+  for (const fs::path& file : old_files(directory_, ".blob")) {
+    const auto digest =
+        Digest::from_hex(file.parent_path().filename().string() + file.stem().string());
+    std::error_code gone;
+    const std::uintmax_t size = fs::file_size(file, gone);
+    if (digest && !gone && file == path(*digest)) blobs.push_back({*digest, size});
+  }
+  return blobs;
+}
+
+std::vector<Digest> BlobStore::old_job_files() const {
+  std::vector<Digest> jobs;
+  for (const fs::path& file : old_files(directory_ / "jobs", ".json")) {
+    if (const auto job = Digest::from_hex(file.stem().string())) jobs.push_back(*job);
+  }
+  return jobs;
 }
 
 fs::path BlobStore::job_file(const Digest& job) const {

@@ -1,7 +1,9 @@
 #pragma once
 
 #include <chrono>
+#include <cstdint>
 #include <filesystem>
+#include <vector>
 
 #include "common/base/bytes.h"
 #include "common/base/digest.h"
@@ -45,6 +47,15 @@ class BlobStore {
   /// touched for kLeftoverAge, longer than any write takes. Returns how many.
   std::size_t sweep() const;
   static constexpr std::chrono::hours kLeftoverAge{1};
+
+  /// The blobs that nobody has put for kLeftoverAge: whoever needs none of them made them earlier.
+  struct Leftover {
+    Digest digest;
+    std::uint64_t size_bytes = 0;
+  };
+  std::vector<Leftover> old_blobs() const;
+  /// The jobs whose job_file() is as old.
+  std::vector<Digest> old_job_files() const;
 
   /// Where workers save a job's document while it runs, so that a failed tile can be replayed
   /// alone.

@@ -11,14 +11,15 @@
 namespace baton {
 namespace {
 
-constexpr std::int64_t kSchemaVersion = 4;
+constexpr std::int64_t kSchemaVersion = 5;
 constexpr std::int64_t kApplicationId = 0x4241544e;  // "BATN"
 
 // Digests, keys and statuses are written as numbers and hexadecimal text, so that the sqlite3 shell
 // shows them; outputs, statistics and leases in the form of common/base/archive.h: a change of
 // BlobRef, RenderStats, FrameStats or LeaseId is a new schema version. Of `permanent` bit 0 says
 // that no retry by this worker can help, bit 1 that the task has failed for good with it. The
-// completions of a job in the archive are pieces, packed by zstd (journal_archive.cpp).
+// completions of a job in the archive are pieces, packed by zstd (journal_archive.cpp). `kept` is
+// what the blobs of kept_blobs take, each counted once.
 constexpr const char* kSchema = R"sql(
   CREATE TABLE starts (epoch INTEGER NOT NULL);
   INSERT INTO starts VALUES (0);
@@ -60,9 +61,17 @@ constexpr const char* kSchema = R"sql(
     raw_bytes INTEGER NOT NULL, stored_raw INTEGER NOT NULL, packed BLOB NOT NULL);
   CREATE INDEX archived_completions_by_job ON archived_completions (job);
   CREATE TABLE kept_blobs (
-    blob TEXT NOT NULL, job TEXT NOT NULL,
+    blob TEXT NOT NULL, job TEXT NOT NULL, size_bytes INTEGER NOT NULL,
     PRIMARY KEY (blob, job)) WITHOUT ROWID;
   CREATE INDEX kept_blobs_by_job ON kept_blobs (job);
+  CREATE TABLE kept (size_bytes INTEGER NOT NULL);
+  INSERT INTO kept VALUES (0);
+  CREATE TRIGGER keep_blob BEFORE INSERT ON kept_blobs
+    WHEN NOT EXISTS (SELECT 1 FROM kept_blobs WHERE blob = new.blob)
+    BEGIN UPDATE kept SET size_bytes = size_bytes + new.size_bytes; END;
+  CREATE TRIGGER let_blob_go AFTER DELETE ON kept_blobs
+    WHEN NOT EXISTS (SELECT 1 FROM kept_blobs WHERE blob = old.blob)
+    BEGIN UPDATE kept SET size_bytes = size_bytes - old.size_bytes; END;
   CREATE TABLE owners (job TEXT PRIMARY KEY, name TEXT NOT NULL);
 )sql";
 

@@ -87,9 +87,9 @@ class Journal {
 
   // ---- the archive (journal_archive.cpp)
   /// Puts a job that has ended into the archive. summary, detail: for people, as the caller likes.
-  /// kept: the blobs that it leaves in the store.
+  /// kept: the blobs that it leaves in the store, none of them held.
   Status archive_job(const Digest& job, const Bytes& summary, const Bytes& detail,
-                     const std::vector<Digest>& kept);
+                     const std::vector<BlobRef>& kept);
   /// Replaces what people are told of a job of the archive.
   Status describe_archived(const Digest& job, JobStatus status, const Bytes& summary,
                            const Bytes& detail);
@@ -105,6 +105,8 @@ class Journal {
   /// Whether a job of the archive keeps the blob.
   Result<bool> is_kept(const Digest& blob);
   Result<std::vector<Digest>> kept_blobs(const Digest& job);
+  /// What the blobs take that jobs of the archive keep, each counted once.
+  Result<std::uint64_t> kept_bytes();
   /// The job keeps the blob no more.
   Status let_go(const Digest& job, const Digest& blob);
 

@@ -38,7 +38,7 @@ constexpr int kMaxFound = 20;
 }  // namespace
 
 Status Journal::archive_job(const Digest& job, const Bytes& summary, const Bytes& detail,
-                            const std::vector<Digest>& kept) {
+                            const std::vector<BlobRef>& kept) {
   // The completions, piece by piece.
   BATON_ASSIGN(SqlStatement * insert_piece,
                write("INSERT INTO archived_completions (job, raw_bytes, stored_raw, packed) "
@@ -66,8 +66,11 @@ Status Journal::archive_job(const Digest& job, const Bytes& summary, const Bytes
   BATON_ASSIGN(SqlStatement * insert,
                write("INSERT INTO archive (job, summary, detail) VALUES (?, ?, ?)"));
   BATON_TRY(insert->bind(job.hex()).bind(ByteView(summary)).bind(ByteView(detail)).run());
-  BATON_ASSIGN(SqlStatement * keep, write("INSERT OR IGNORE INTO kept_blobs VALUES (?, ?)"));
-  for (const Digest& blob : kept) BATON_TRY(keep->bind(blob.hex()).bind(job.hex()).run());
+  BATON_ASSIGN(SqlStatement * keep, write("INSERT OR IGNORE INTO kept_blobs VALUES (?, ?, ?)"));
+  for (const BlobRef& blob : kept) {
+    const auto bytes = static_cast<std::int64_t>(blob.size_bytes);
+    BATON_TRY(keep->bind(blob.digest.hex()).bind(job.hex()).bind(bytes).run());
+  }
   for (const char* const sql :
        {"DELETE FROM completions WHERE job = ?", "DELETE FROM failures WHERE job = ?",
         "UPDATE jobs SET archived = 1 WHERE digest = ?"}) {
@@ -191,6 +194,14 @@ Result<std::vector<Digest>> Journal::kept_blobs(const Digest& job) {
   BATON_ASSIGN(SqlStatement query, database_.prepare("SELECT blob FROM kept_blobs WHERE job = ?"));
   query.bind(job.hex());
   return read_digests(query);
+}
+
+Result<std::uint64_t> Journal::kept_bytes() {
+  BATON_ASSIGN(SqlStatement * query, read("SELECT size_bytes FROM kept"));
+  BATON_ASSIGN(const bool row, query->step());
+  const std::uint64_t bytes = row ? static_cast<std::uint64_t>(query->integer(0)) : 0;
+  query->reset();
+  return bytes;
 }
 
 Status Journal::let_go(const Digest& job, const Digest& blob) {

@@ -180,13 +180,17 @@ struct LeaseReturned {
   LeaseId lease;
   std::string unseen = {};
 };
+/// Jobs that have ended left so much in the store.
+struct StoreKeeps {
+  std::uint64_t size_bytes = 0;
+};
 /// Time has passed: who was silent for too long?
 struct ClockTicked {};
 
 using Event = std::variant<JobAdded, JobCancelled, JobSuperseded, JobPaused, JobResumed,
                            JobForgotten, WorkerJoined, WorkerAlive, WorkerLeft, WorkRequested,
                            TaskCompleted, AttemptFailed, ResultMissing, SpaceLacking, InputsLost,
-                           LeaseReturned, HeldPublished, ClockTicked>;
+                           LeaseReturned, HeldPublished, StoreKeeps, ClockTicked>;
 
 // ---- actions ------------------------------------------------------------------------------------
 /// Make it durable; nothing that comes after in the same or a later step may be sent or removed

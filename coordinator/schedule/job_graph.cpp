@@ -192,6 +192,23 @@ std::optional<std::string> JobGraph::check_frames(const TaskKey& key,
   return std::nullopt;
 }
 
+std::int32_t JobGraph::num_outputs(const TaskKey& key, BlobKind kind) const {
+  if (key.kind == TaskKind::assemble) return 0;
+  if (key.kind == TaskKind::second_pass) return kind == BlobKind::film ? 1 : 0;
+  const std::int32_t frames = last_frame(key.step) - first_frame(key.step) + 1;
+  switch (kind) {
+    case BlobKind::state:
+      return carries_state_ ? 1 : 0;
+    case BlobKind::film:
+      return frames;
+    case BlobKind::first_pass:
+      return has_second_pass_ ? frames : 0;
+    case BlobKind::image:
+      return 0;
+  }
+  return 0;
+}
+
 bool JobGraph::takes(const TaskKey& reader, const TaskKey& maker, const BlobRef& output) const {
   switch (reader.kind) {
     case TaskKind::render:

@@ -81,6 +81,8 @@ class JobGraph {
   /// else what is wrong.
   std::optional<std::string> check_frames(const TaskKey& key,
                                           const std::vector<FrameStats>& frames) const;
+  /// How many blobs of a kind the task makes.
+  std::int32_t num_outputs(const TaskKey& key, BlobKind kind) const;
   /// What `reader` takes of `maker`, one of its inputs: positions in the sorted outputs of `maker`.
   std::vector<std::size_t> taken_outputs(const TaskKey& reader, const TaskKey& maker) const;
   /// Whether `reader`, one of its dependents, takes an output of `maker`.

@@ -48,6 +48,12 @@ class JobTasks {
   const std::set<TaskIndex>& ready() const { return ready_; }
   /// The first frame that is not written and may still be; num_frames: there is none.
   std::int32_t first_open_frame() const { return first_open_frame_; }
+  /// The first run with an open render task; num_runs: there is none.
+  std::int32_t first_open_run() const { return first_open_run_; }
+  /// Render tasks of the run that are open.
+  std::int32_t num_open_renders(std::int32_t run) const {
+    return open_renders_[static_cast<std::size_t>(run)];
+  }
   /// States of earlier frames (0-based) than this are inputs of no open task.
   std::int32_t states_from() const;
   /// Whether all tasks that it needs are done. A leased task may lose one of them.

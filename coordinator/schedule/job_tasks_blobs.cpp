@@ -65,7 +65,7 @@ void JobTasks::count_output(const BlobRef& output, bool made) {
 void JobTasks::add_outputs(TaskIndex task, BlobReferences& blobs) const {
   for (const BlobRef& output : outputs(task)) {
     const std::int32_t uses = num_uses(task, output);
-    for (std::int32_t use = 0; use < uses; ++use) blobs.add(output.digest);
+    for (std::int32_t use = 0; use < uses; ++use) blobs.add(output);
     if (uses == 0 && output.kind != BlobKind::image) blobs.discard(output.digest);
   }
 }
@@ -109,7 +109,7 @@ bool JobTasks::needs_films(TaskIndex task) const {
 
 /// An open task needs what it is cut from.
 void JobTasks::use_cut(TaskIndex task, BlobReferences& blobs) const {
-  for (const BlobRef& state : cuts_.at(task)) blobs.add(state.digest);
+  for (const BlobRef& state : cuts_.at(task)) blobs.add(state);
 }
 
 /// Of an open task; false: it is no cut.

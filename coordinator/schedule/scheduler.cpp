@@ -17,8 +17,9 @@ void follow_longest(double& longest, double value) {
 
 }  // namespace
 
-Scheduler::Scheduler(std::uint32_t epoch, std::chrono::milliseconds silence_limit)
-    : epoch_(epoch), silence_limit_(silence_limit) {}
+Scheduler::Scheduler(std::uint32_t epoch, std::chrono::milliseconds silence_limit,
+                     std::uint64_t store_limit)
+    : epoch_(epoch), silence_limit_(silence_limit), store_limit_(store_limit) {}
 
 std::vector<Action> Scheduler::step(const Event& event, TimePoint now) {
   Actions actions;
@@ -67,7 +68,8 @@ void Scheduler::on(const JobAdded& event, TimePoint, Actions& actions) {
   // Take up what the journal knows; all else is fresh.
   Job& job = jobs_
                  .emplace(event.job, Job{event.spec, event.status, sequence, JobTasks(event.spec),
-                                         TileHomes(event.spec), max_frames_ahead(event.spec)})
+                                         TileHomes(event.spec), max_frames_ahead(event.spec),
+                                         BlobSizes(event.spec)})
                  .first->second;
   replay(job, event, actions);
   if (!is_open(event.status)) {
@@ -153,6 +155,7 @@ void Scheduler::on(const TaskCompleted& event, TimePoint now, Actions& actions) 
       compare_results(event, held.job->tasks.former_outputs(held.task), outputs, actions);
   Completion completion{event.lease.task, std::move(outputs), event.stats, event.frames};
   held.job->tasks.complete(held.task, completion, event.worker, blobs_);
+  held.job->sizes.learn(completion.outputs);
   follow_longest(held.job->longest_seconds.at(static_cast<std::size_t>(event.lease.task.kind)),
                  event.stats.cpu_seconds);
   if (held.job->status == JobStatus::running) held.job->waits.clear();
@@ -235,12 +238,16 @@ void Scheduler::on(const InputsLost& event, TimePoint now, Actions& actions) {
 void Scheduler::on(const HeldPublished& event, TimePoint now, Actions& actions) {
   if (!touch(event.worker, now)) return;
   Job* job = find(event.job);
-  if (!job) return;
   for (const PublishedState& state : event.states) {
-    const std::optional<TaskIndex> task = job->tasks.publish(state, event.worker, blobs_);
-    if (task)
-      actions.push_back(
-          RecordOutputs{event.job, job->tasks.graph().key(*task), job->tasks.outputs(*task)});
+    const std::optional<TaskIndex> task =
+        job ? job->tasks.publish(state, event.worker, blobs_) : std::nullopt;
+    if (!task) {
+      blobs_.discard(state.published.digest);
+      continue;
+    }
+    job->sizes.learn({state.published});
+    actions.push_back(
+        RecordOutputs{event.job, job->tasks.graph().key(*task), job->tasks.outputs(*task)});
   }
   asked_.erase({event.worker, event.job});
 }
@@ -256,6 +263,11 @@ Scheduler::Rank Scheduler::rank(const Job& job) const { return {-job.spec.priori
 
 /// Brings a fresh job to where the journal left it, less what is gone.
 void Scheduler::replay(Job& job, const JobAdded& event, Actions& actions) {
+  for (const Completions::Task& done : event.completions.tasks) {
+    job.sizes.learn(done.outputs);
+    if (done.task.kind == TaskKind::render && !done.outputs.empty())
+      job.begun_runs = std::clamp(done.task.step + 1, job.begun_runs, job.tasks.graph().num_runs());
+  }
   RecordReopened needed{event.job, {}};
   for (const TaskIndex task :
        job.tasks.restore(event.completions, event.lost_spares, blobs_, event.plan))

@@ -10,6 +10,7 @@
 #include <string>
 #include <vector>
 
+#include "coordinator/schedule/blob_sizes.h"
 #include "coordinator/schedule/events.h"
 #include "coordinator/schedule/job_tasks.h"
 #include "coordinator/schedule/tile_homes.h"
@@ -21,7 +22,8 @@ namespace baton {
 ///
 /// A task goes to the first worker in line; of the tasks, the job of highest priority comes
 /// first, then the job that was submitted first, then what TileHomes prefers, then the order of
-/// TaskIndex. Nothing is rendered so far ahead of the first open frame that films pile up.
+/// TaskIndex. Nothing is rendered so far ahead of the first open frame that films pile up, and
+/// nothing for which the store has no room (scheduler_room.cpp).
 ///
 /// A task fails for good when as many workers have failed it as the job allows attempts, or, where
 /// fewer are connected, when those have had all attempts or can do no more. A retry goes to a
@@ -36,7 +38,9 @@ class Scheduler {
     std::uint64_t sequence = 0;  ///< position in the order of submission
     JobTasks tasks;
     TileHomes homes;
-    std::int32_t max_frames_ahead = 0;          ///< of the first frame that is not written
+    std::int32_t max_frames_ahead = 0;  ///< of the first frame that is not written
+    BlobSizes sizes;
+    std::int32_t begun_runs = 0;  ///< in order, up to the last of which a task was granted
     std::array<TimePoint, 3> rests_until = {};  ///< tasks of each kind
     std::string waits = {};                     ///< for what, as far as an event said so
     struct Standing {
@@ -53,8 +57,9 @@ class Scheduler {
   };
 
   /// epoch: how often the coordinator has started; part of each lease. silence_limit: a worker that
-  /// says nothing for longer loses its leases.
-  Scheduler(std::uint32_t epoch, std::chrono::milliseconds silence_limit);
+  /// says nothing for longer loses its leases. store_limit: bytes of the store; 0: no limit.
+  Scheduler(std::uint32_t epoch, std::chrono::milliseconds silence_limit,
+            std::uint64_t store_limit = 0);
 
   /// How long tasks of a kind rest after one of them found no space.
   static constexpr std::chrono::seconds kRest{5};
@@ -78,6 +83,11 @@ class Scheduler {
   std::vector<Digest> jobs() const;
   /// What the job, which must be known, cannot go on without; empty: it goes on, or has ended.
   std::string waits_for(const Digest& job, TimePoint now) const;
+  /// Whether the store has no room for the job's next task, and nothing in work will make some. The
+  /// job must be known.
+  bool lacks_room(const Digest& job) const;
+  /// What blobs take that somebody needs: jobs, and those that have ended (StoreKeeps).
+  std::uint64_t store_bytes() const { return blobs_.size_bytes() + kept_bytes_; }
   /// Leases that the worker holds.
   std::size_t num_leases(const std::string& worker) const;
   /// Tasks of running jobs that are ready.
@@ -91,6 +101,7 @@ class Scheduler {
     LeaseId id;
     std::string worker;
     TimePoint granted_at;
+    std::uint64_t expected_bytes = 0;  ///< that its outputs will take in the store
   };
   struct Worker {
     TimePoint last_sign;
@@ -127,6 +138,7 @@ class Scheduler {
   void on(const InputsLost& event, TimePoint now, Actions& actions);
   void on(const HeldPublished& event, TimePoint now, Actions& actions);
   void on(const LeaseReturned& event, TimePoint now, Actions& actions);
+  void on(const StoreKeeps& event, TimePoint now, Actions& actions);
   void on(const ClockTicked& event, TimePoint now, Actions& actions);
 
   // Leases (scheduler_leases.cpp).
@@ -151,6 +163,13 @@ class Scheduler {
   bool rests(const Job& job, const std::string& worker, TimePoint now) const;
   static bool is_blind(const Job& job, const std::string& worker, TimePoint now);
 
+  // Room in the store (scheduler_room.cpp).
+  bool fits(std::uint64_t more_bytes) const;
+  bool has_room(const Job& job, TaskIndex task, bool others_wait) const;
+  bool may_begin(const Job& job, std::int32_t run) const;
+  std::uint64_t unmade_bytes(const Job& job, std::int32_t end) const;
+  std::string lacking_room(const Job& job) const;
+
   // Jobs (scheduler.cpp).
   Job* find(const Digest& job);
   Rank rank(const Job& job) const;
@@ -168,6 +187,7 @@ class Scheduler {
 
   std::uint32_t epoch_;
   std::chrono::milliseconds silence_limit_;
+  std::uint64_t store_limit_;
   std::uint64_t next_sequence_ = 0;
   std::map<Digest, Job> jobs_;
   std::map<Rank, Digest> running_;
@@ -176,6 +196,8 @@ class Scheduler {
   std::deque<std::string> hungry_;  ///< workers with wanted > 0, who asked first comes first
   std::set<std::pair<std::string, Digest>> asked_;  ///< of whom states of a job were asked
   BlobReferences blobs_;
+  std::uint64_t kept_bytes_ = 0;      ///< of jobs that have ended
+  std::uint64_t expected_bytes_ = 0;  ///< of all leases
 };
 
 }  // namespace baton

@@ -126,15 +126,20 @@ void Scheduler::reconcile(const std::string& worker, const std::vector<LeaseId>&
 
 void Scheduler::add_lease(const std::string& worker, const LeaseId& lease, TaskIndex task,
                           TimePoint now) {
-  leases_.insert_or_assign({lease.job, task}, Lease{lease, worker, now});
+  Job& job = jobs_.at(lease.job);
+  const std::uint64_t bytes = job.sizes.largest(job.tasks.graph(), lease.task);
+  leases_.insert_or_assign({lease.job, task}, Lease{lease, worker, now, bytes});
+  expected_bytes_ += bytes;
   workers_.at(worker).leases.emplace(lease.job, task);
-  if (lease.task.kind == TaskKind::render)
-    jobs_.at(lease.job).homes.settle(lease.task.tile, worker);
+  if (lease.task.kind != TaskKind::render) return;
+  job.homes.settle(lease.task.tile, worker);
+  job.begun_runs = std::max(job.begun_runs, lease.task.step + 1);
 }
 
 void Scheduler::drop_lease(const Digest& job, TaskIndex task) {
   const auto found = leases_.find({job, task});
   BATON_CHECK(found != leases_.end());
+  expected_bytes_ -= found->second.expected_bytes;
   workers_.at(found->second.worker).leases.erase({job, task});
   leases_.erase(found);
 }
@@ -230,6 +235,9 @@ void Scheduler::ask_for_states(const std::string& worker, TimePoint now, Actions
         if (holder != worker) wanted[holder].insert(state);
       }
     }
+    std::uint64_t num_states = 0;
+    for (const auto& [holder, states] : wanted) num_states += states.size();
+    if (!fits(num_states * job.sizes.largest_state())) return;
     for (const auto& [holder, states] : wanted) {
       if (asked_.emplace(holder, digest).second)
         actions.push_back(AskForStates{holder, digest, {states.begin(), states.end()}});
@@ -239,6 +247,7 @@ void Scheduler::ask_for_states(const std::string& worker, TimePoint now, Actions
 }
 
 bool Scheduler::grant_one(const std::string& worker, TimePoint now, Actions& actions) {
+  bool others_wait = false;
   for (const auto& [rank, digest] : running_) {
     Job& job = jobs_.at(digest);
     if (job.tasks.ready().empty() || rests(job, worker, now)) continue;
@@ -246,6 +255,10 @@ bool Scheduler::grant_one(const std::string& worker, TimePoint now, Actions& act
     const TileHomes::Asker asking = asker(job, worker, now);
     const auto task = job.homes.choose(graph, job.tasks.ready(), last_run(job), asking);
     if (!task) continue;
+    if (!has_room(job, *task, others_wait)) {
+      others_wait = true;
+      continue;
+    }
     const LeaseId lease{digest, graph.key(*task), job.tasks.grant(*task), epoch_};
     add_lease(worker, lease, *task, now);
     const bool may_hold = job.tasks.may_hold(*task) && job.homes.surround(lease.task.tile, asking);
@@ -323,6 +336,7 @@ bool Scheduler::is_exhausted(const Job& job, TaskIndex task) const {
 std::string Scheduler::waits_for(const Digest& digest, TimePoint now) const {
   const Job& job = jobs_.at(digest);
   if (!is_open(job.status) || !job.waits.empty()) return is_open(job.status) ? job.waits : "";
+  if (lacks_room(digest)) return lacking_room(job);
   if (!job.blind.empty() && std::all_of(workers_.begin(), workers_.end(), [&](const auto& other) {
         return is_blind(job, other.first, now);
       }))

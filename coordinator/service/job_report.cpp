@@ -73,6 +73,7 @@ JobDetail describe_job(const Scheduler& scheduler, const Digest& digest,
     detail.frames.back().tile = -1;
   }
   detail.waits = scheduler.waits_for(digest, std::chrono::steady_clock::now());
+  detail.lacks_room = scheduler.lacks_room(digest);
   return detail;
 }
 

@@ -35,8 +35,6 @@ Result<Service> Service::open(const ServiceOptions& options) {
   }
   BATON_ASSIGN(Journal journal, Journal::open(options.work_dir / "journal.sqlite"));
   BATON_ASSIGN(BlobStore store, BlobStore::open(options.work_dir / "store"));
-  if (const std::size_t swept = store.sweep(); swept > 0)
-    spdlog::info("{} files that were never finished are removed from the store", swept);
   BATON_ASSIGN(std::string token, make_token(options.work_dir / "store" / "token"));
   BATON_ASSIGN(Router router, Router::bind(options.listen, options.access));
   Service service(options, std::move(router), std::move(journal), std::move(store),
@@ -53,7 +51,7 @@ Service::Service(const ServiceOptions& options, Router router, Journal journal, 
       router_(std::move(router)),
       journal_(std::move(journal)),
       store_(std::move(store)),
-      scheduler_(journal_.epoch(), kSilentHeartbeats * options.heartbeat) {}
+      scheduler_(journal_.epoch(), kSilentHeartbeats * options.heartbeat, options.store_limit) {}
 
 Status Service::run(const std::atomic<bool>& stop) {
   while (!stop && !stop_requested_) BATON_TRY(turn());
@@ -85,6 +83,7 @@ Status Service::turn() {
 
   // First durable, then known to others.
   BATON_TRY(archive_ended());
+  BATON_TRY(count_kept());
   BATON_TRY(journal_.commit());
   return let_out();
 }

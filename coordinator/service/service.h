@@ -25,10 +25,11 @@ struct ServiceOptions {
   std::string listen = "tcp://127.0.0.1:5570";
   std::filesystem::path work_dir;  ///< holds journal.sqlite and store/
   std::chrono::milliseconds heartbeat{
-      1000};                  ///< of workers; four silent ones lose a worker its leases
-  bool mixed_builds = false;  ///< workers may be of other builds and instruction sets
-  ServerAccess access = {};   ///< who is let in
-  Roots roots = {};           ///< folders that jobs may read from and write to
+      1000};                      ///< of workers; four silent ones lose a worker its leases
+  bool mixed_builds = false;      ///< workers may be of other builds and instruction sets
+  ServerAccess access = {};       ///< who is let in
+  Roots roots = {};               ///< folders that jobs may read from and write to
+  std::uint64_t store_limit = 0;  ///< bytes that blobs may take; 0: as the disk has room
 };
 
 /// The coordinator: one thread that turns messages into events, actions into messages. A turn of
@@ -56,6 +57,8 @@ class Service {
 
   Status restore_jobs();
   Status restore_job(const Digest& job);
+  Status sweep();
+  Status count_kept();
   Status turn();
   Status archive_ended();
   Status handle(const Incoming& incoming);
@@ -152,6 +155,8 @@ class Service {
   std::map<std::string, TimePoint> told_refusals_;
   TimePoint next_tick_{};
   bool stop_requested_ = false;
+  bool has_unread_jobs_ = false;  ///< in the journal
+  std::uint64_t kept_bytes_ = 0;  ///< that the archive keeps, as the scheduler was told
 
   struct Outgoing {
     PeerId peer;

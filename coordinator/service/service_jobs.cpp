@@ -7,6 +7,7 @@
 
 #include "common/base/archive.h"
 #include "common/base/limits.h"
+#include "common/base/size_text.h"
 #include "common/job/job_json.h"
 #include "coordinator/service/job_report.h"
 #include "coordinator/service/plan_text.h"
@@ -26,8 +27,43 @@ Status Service::restore_jobs() {
   BATON_ASSIGN(const std::vector<Digest> jobs, journal_.jobs());
   for (const Digest& job : jobs) BATON_TRY(restore_job(job));
   BATON_TRY(archive_ended());
+  BATON_TRY(count_kept());
   BATON_TRY(journal_.commit());
-  return let_out();
+  BATON_TRY(let_out());
+  return sweep();
+}
+
+/// Removes what earlier runs left in the store and neither an open job nor the archive needs. A job
+/// that cannot be read may need anything.
+Status Service::sweep() {
+  const std::size_t unfinished = store_.sweep();
+  if (unfinished > 0)
+    spdlog::info("{} files that were never finished are removed from the store", unfinished);
+  if (has_unread_jobs_) return {};
+  std::size_t count = 0;
+  std::uint64_t bytes = 0;
+  for (const BlobStore::Leftover& blob : store_.old_blobs()) {
+    if (scheduler_.is_referenced(blob.digest)) continue;
+    BATON_ASSIGN(const bool is_kept, journal_.is_kept(blob.digest));
+    if (is_kept || !store_.remove(blob.digest)) continue;
+    ++count;
+    bytes += blob.size_bytes;
+  }
+  if (count > 0)
+    spdlog::info("{} blobs that no job needs, {}, are removed from the store", count,
+                 bytes_text(bytes));
+  for (const Digest& job : store_.old_job_files()) {
+    BATON_ASSIGN(const std::optional<std::string> document, journal_.document(job));
+    if (!document) remove_job_file(job, JobStatus::cancelled);
+  }
+  return {};
+}
+
+/// Tells the scheduler what ended jobs leave in the store.
+Status Service::count_kept() {
+  BATON_ASSIGN(const std::uint64_t bytes, journal_.kept_bytes());
+  if (std::exchange(kept_bytes_, bytes) == bytes) return {};
+  return step(StoreKeeps{bytes});
 }
 
 Status Service::restore_job(const Digest& digest) {
@@ -36,6 +72,7 @@ Status Service::restore_job(const Digest& digest) {
   if (!document) {
     spdlog::error("job {} of the journal cannot be read and is left out: {}", digest.short_hex(),
                   document.error().message);
+    has_unread_jobs_ = true;
     return {};
   }
   JobAdded event{digest, std::move(document->job), known.status, std::move(known.completions),
@@ -278,16 +315,16 @@ Status Service::archive_ended() {
 Status Service::archive_job(const Digest& digest) {
   const Scheduler::Job* const job = scheduler_.find_job(digest);
   if (job == nullptr || is_open(job->status)) return {};
-  std::vector<Digest> kept;
+  std::vector<BlobRef> kept;
   for (TaskIndex task = job->tasks.graph().num_frames(); task < job->tasks.graph().num_tasks();
        ++task) {
     for (const auto& blobs : {job->tasks.live_blobs(task), job->tasks.spare_blobs(task)}) {
       for (const BlobRef& blob : blobs) {
-        if (!blob.is_held()) kept.push_back(blob.digest);
+        if (!blob.is_held()) kept.push_back(blob);
       }
     }
     if (job->tasks.is_cut(task)) {
-      for (const BlobRef& blob : job->tasks.inputs(task)) kept.push_back(blob.digest);
+      for (const BlobRef& blob : job->tasks.inputs(task)) kept.push_back(blob);
     }
   }
   BATON_ASSIGN(const std::vector<Failure> failures,

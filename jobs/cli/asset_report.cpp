@@ -11,6 +11,7 @@
 #include "common/image/image_io.h"
 #include "common/math/vec3.h"
 #include "jobs/cli/object_view.h"
+#include "jobs/cli/surface_share.h"
 #include "worker/scene/map_reduction.h"
 #include "worker/scene/scene.h"
 
@@ -72,6 +73,7 @@ void load_geometry(const JobSpec& job, AssetReport& report, std::vector<std::str
     report.triangles += scene->meshes[instance.mesh].triangles.size();
     report.objects_move = report.objects_move || instance.moves();
   }
+  report.surface_share = surface_share(job, *scene);
   report.odd_objects = object_warnings(job, *scene);
 }
 

@@ -27,6 +27,7 @@ struct AssetReport {
   std::uint64_t meshes = 0, instances = 0;
   std::uint64_t triangles = 0;  ///< of all instances
   bool objects_move = false;
+  double surface_share = 1;              ///< of the pixels (surface_share)
   std::uint64_t dropped_triangles = 0;   ///< of all meshes: without area
   std::vector<std::string> odd_objects;  ///< object_warnings
 };

@@ -6,6 +6,7 @@
 #include "common/job/frame_range.h"
 #include "common/job/job_json.h"
 #include "common/job/motion.h"
+#include "common/job/store_estimate.h"
 #include "jobs/auto/unit_costs.h"
 #include "jobs/cli/asset_report.h"
 #include "jobs/cli/commands.h"
@@ -64,7 +65,9 @@ void print_json(const JobSpec& job, const JobEstimate& e, const AssetReport& ass
                          {"frameBytes", e.frame_bytes},
                          {"stateBytesPerPixel", e.state_bytes_per_pixel},
                          {"stateBytes", e.state_bytes},
-                         {"diskBytes", estimate_disk(job).total()},
+                         {"storeBytes", estimate_store(job, assets.surface_share).total()},
+                         {"storeBytesMost", bound_store(job).total()},
+                         {"diskBytes", e.frames * e.frame_bytes + bound_store(job).total()},
                          {"motionMaxPx", moves(job) ? job.motion.max_px : 0},
                          {"outputDirectory", job.output.directory},
                          {"meshes", assets.meshes},
@@ -121,14 +124,15 @@ void print_text(const JobSpec& job, const JobEstimate& e, const AssetReport& ass
     fmt::print("motion     history is followed up to {} pixels a frame\n", job.motion.max_px);
   }
   if (e.state_bytes > 0) {
-    fmt::print("state      at most {} bytes a pixel, {} at each checkpoint\n",
-               e.state_bytes_per_pixel, total(e.state_bytes));
+    fmt::print("state      at most {} bytes a pixel\n", e.state_bytes_per_pixel);
   }
   fmt::print("film       {} channels, {} a frame in tiles\n", e.film_channels, total(e.film_bytes));
-  const DiskEstimate disk = estimate_disk(job);
-  fmt::print("disk       at most {}: frames {} ({} each), states {}, tiles on their way {}\n",
-             total(disk.total()), total(disk.frames), total(e.frame_bytes), total(disk.states),
-             total(disk.films));
+  const StoreEstimate store = estimate_store(job, assets.surface_share);
+  fmt::print("store      {} at its fullest with one worker: states {}, tiles on their way {}\n",
+             total(store.total()), total(store.states), total(store.films + store.samples));
+  fmt::print("           at most {}, however many workers\n", total(bound_store(job).total()));
+  fmt::print("disk       frames take at most {}, {} each\n", total(e.frames * e.frame_bytes),
+             total(e.frame_bytes));
   fmt::print("output     {}/{}\n", job.output.directory, job.output.pattern);
 }
 

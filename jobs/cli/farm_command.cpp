@@ -110,7 +110,7 @@ Result<ExitCode> work(RenderSession& session, const RenderOptions& options,
     tend_pilots();
     return false;
   }));
-  if (status) return *status == JobStatus::paused ? ExitCode::failed : exit_code_of(*status);
+  if (status) return is_open(*status) ? ExitCode::failed : exit_code_of(*status);
   fmt::print(stderr, "stopped; the same command goes on\n");
   return ExitCode::cancelled;
 }
@@ -206,6 +206,7 @@ void add_slurm_command(CLI::App& farm, ExitCode& code) {
       "--work-dir", options->render.work_directory,
       "journal, blobs, keys and logs, on a disk that the nodes share; default: .baton "
       "in the output folder");
+  add_store_limit_option(*slurm, options->render.store_limit_mib);
   slurm->add_option("--host", options->host,
                     "name or address by which the nodes reach this machine; default: its name");
   slurm->add_option("--listen", options->listen, "of the coordinator; port * picks a free one")

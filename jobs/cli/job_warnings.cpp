@@ -8,10 +8,12 @@
 #include <filesystem>
 #include <map>
 
+#include "common/job/empty_aovs.h"
 #include "common/job/estimate.h"
 #include "common/job/job_fields.h"
 #include "common/job/known_limits.h"
 #include "common/job/sequence.h"
+#include "common/job/store_estimate.h"
 #include "jobs/cli/text.h"
 #include "worker/scene/settle_scene.h"
 
@@ -91,7 +93,7 @@ std::string jump_text(const LightJump& jump) {
                      jump.to, jump.ratio);
 }
 
-void output_warnings(const JobSpec& job, std::vector<std::string>& warnings) {
+void output_warnings(const JobSpec& job, double surface_share, std::vector<std::string>& warnings) {
   // The part of the path that is there already.
   fs::path folder = job.output.directory;
   std::error_code error;
@@ -100,33 +102,13 @@ void output_warnings(const JobSpec& job, std::vector<std::string>& warnings) {
     warnings.push_back(
         fmt::format("{}: {} cannot be written", job.output.directory, folder.string()));
   const fs::space_info space = fs::space(folder, error);
-  const auto needed = static_cast<std::uint64_t>(estimate_disk(job).total());
-  if (!error && space.available < needed) {
-    warnings.push_back(fmt::format("{}: {} are free, and frames, states and tiles may take {}",
+  const JobEstimate e = estimate_job(job);
+  const auto frames = static_cast<std::uint64_t>(e.frames * e.frame_bytes);
+  const auto store = static_cast<std::uint64_t>(estimate_store(job, surface_share).total());
+  if (!error && space.available < frames + store) {
+    warnings.push_back(fmt::format("{}: {} are free, and frames may take {}, states and tiles {}",
                                    job.output.directory, bytes_text(space.available),
-                                   bytes_text(needed)));
-  }
-}
-
-/// Why an AOV shows nothing of this job; empty: it does.
-std::string_view why_empty(Aov aov, const JobSpec& job) {
-  const Method method = job.sampling.method;
-  switch (aov) {
-    case Aov::acceptance:
-    case Aov::acceptance_local:
-    case Aov::acceptance_independent:
-    case Aov::resampled:
-      return traits(method).moves_samples ? "" : "only `sequential` fills it";
-    case Aov::variance:
-      if (traits(method).tells_variance()) return "";
-      if (carries_state(job)) return "samples that are carried tell nothing of their error";
-      return job.quality.rounds < 4 ? "only `reference`, `pool` and `ratio` fill it, and four "
-                                      "rounds or more of the others"
-                                    : "";
-    case Aov::ess:
-      return traits(method).keeps_samples ? "" : "the method's rays have no weights";
-    default:
-      return "";
+                                   bytes_text(frames), bytes_text(store)));
   }
 }
 
@@ -157,7 +139,7 @@ std::vector<std::string> job_warnings(const JobSpec& job, const AssetReport& ass
     warnings.push_back(std::move(warning));
   for (std::string& warning : gltf_warnings(job.scene)) warnings.push_back(std::move(warning));
   aov_warnings(job, warnings);
-  output_warnings(job, warnings);
+  output_warnings(job, assets.surface_share, warnings);
   return warnings;
 }
 

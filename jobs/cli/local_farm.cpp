@@ -96,6 +96,8 @@ Status LocalFarm::start_coordinator(const std::string& program) {
                                    "--endpoint-file",
                                    endpoint_file.string()};
   if (!options_.server_key.empty()) command.insert(command.end(), {"--key", options_.server_key});
+  if (options_.store_limit_mib > 0)
+    command.insert(command.end(), {"--store-limit", std::to_string(options_.store_limit_mib)});
   BATON_TRY(add_member("coordinator", std::move(command)));
 
   // The file appears when the coordinator listens.

@@ -19,6 +19,7 @@ struct FarmOptions {
   std::filesystem::path work_directory;  ///< journal, blobs, logs; what a resume needs
   std::string listen = {};      ///< of the coordinator; empty: where only this machine reaches it
   std::string server_key = {};  ///< file of the coordinator's key; empty: none
+  std::uint64_t store_limit_mib = 0;  ///< of the coordinator; 0: none
 };
 
 /// A coordinator and workers on this machine, as child processes, at an address of their own. A
@@ -41,6 +42,8 @@ class LocalFarm {
   /// long.
   void stop();
 
+  /// Whether it is this process's, and nobody else looks after it.
+  bool is_own() const { return !members_.empty(); }
   const std::string& endpoint() const { return endpoint_; }
 
  private:

@@ -23,6 +23,11 @@ class PreviewCanvas {
   /// A small black box with letters, centred above a point; nothing behind the eye.
   void label(const Vec3& at, std::string_view text);
 
+  /// Whether a triangle covers the middle of a pixel.
+  bool covers(int x, int y) const {
+    return nearness_[static_cast<std::size_t>(y) * static_cast<std::size_t>(image_.width) +
+                     static_cast<std::size_t>(x)] > 0;
+  }
   const RgbImage& image() const { return image_; }
   RgbImage& image() { return image_; }
 

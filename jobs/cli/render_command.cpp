@@ -15,7 +15,7 @@ namespace {
 
 /// Says how the job ended; one that failed because its files cannot be loaded is bad input.
 ExitCode exit_code_of(const JobSpec& job, JobStatus status) {
-  if (status == JobStatus::paused) return ExitCode::failed;
+  if (is_open(status)) return ExitCode::failed;  // it waits for somebody
   if (status != JobStatus::failed) return exit_code_of(status);
   const Result<AssetReport> assets = load_assets(job);
   return assets ? ExitCode::failed : exit_code_of(assets.error().kind);
@@ -68,6 +68,7 @@ void add_render_command(CLI::App& app, ExitCode& code) {
       ->check(CLI::Range(1, 1 << 30));
   command->add_option("--work-dir", options->work_directory,
                       "journal, blobs and logs; default: .baton in the output folder");
+  add_store_limit_option(*command, options->store_limit_mib);
   command->add_flag("--watch", options->watch,
                     "renders a look, coarse first, and again when the job or its files change, "
                     "until Ctrl-C");

@@ -7,6 +7,7 @@
 #include <algorithm>
 #include <thread>
 
+#include "common/base/limits.h"
 #include "common/job/sequence.h"
 #include "jobs/cli/display.h"
 #include "jobs/cli/frame_sheet.h"
@@ -59,7 +60,17 @@ FarmOptions farm_options(const RenderOptions& options, const JobSpec& job) {
   farm.work_directory =
       fs::absolute(options.work_directory.empty() ? fs::path(job.output.directory) / ".baton"
                                                   : fs::path(options.work_directory));
+  farm.store_limit_mib = options.store_limit_mib;
   return farm;
+}
+
+void add_store_limit_option(CLI::App& command, std::uint64_t& store_limit_mib) {
+  command
+      .add_option("--store-limit", store_limit_mib,
+                  "MiB that states and films may take in the work folder; a job that needs more "
+                  "ends with an error and can go on; default: as the disk has room")
+      ->envname("BATON_STORE_LIMIT")
+      ->check(CLI::Range(std::uint64_t{1}, std::uint64_t{1} << 40));
 }
 
 Result<RenderSession> RenderSession::start(const RenderOptions& options, const FarmOptions& farm,
@@ -79,15 +90,17 @@ Result<std::optional<JobDetail>> RenderSession::follow(const Digest& job, FrameS
                  ask_farm<JobDetail>(farm_, client_, signals_, ShowJob{job.hex()}));
     if (detail) {
       progress.update(detail->summary, Clock::now());
-      if (!detail->waits.empty() && waits.empty()) {
+      if (!detail->waits.empty() && waits.empty() && !(detail->lacks_room && farm_.is_own())) {
         progress.finish();
         spdlog::warn("waits for {}", detail->waits);
       }
       waits = detail->waits;
       sheet.add(detail->frames_done);
     }
-    // Who paused it, if not the person before this terminal, will not resume it.
-    const bool over = !detail || detail->summary.status != JobStatus::running;
+    // Who paused it, if not the person before this terminal, will not resume it. In a farm of its
+    // own nobody makes room either.
+    const bool over = !detail || detail->summary.status != JobStatus::running ||
+                      (detail->lacks_room && farm_.is_own());
     if (over || interrupted() || signals_.stop_requested_within(kFarmPollInterval)) {
       progress.finish();
       return over ? detail : std::nullopt;
@@ -118,8 +131,9 @@ Result<std::optional<JobStatus>> RenderSession::render(const JobSpec& job, bool 
   write_sheet(sheet, options_.json);
   if (status == JobStatus::done) BATON_TRY(write_png_of(job));
   if (status == JobStatus::failed) print_failures(*detail);
-  if (status == JobStatus::paused)
-    fmt::print(stderr, "paused: the job waits for {}\nto go on: the same command\n", detail->waits);
+  if (status == JobStatus::paused || detail->lacks_room)
+    fmt::print(stderr, "{}: the job waits for {}\nto go on: the same command\n",
+               status == JobStatus::paused ? "paused" : "stopped", detail->waits);
   std::fflush(stdout);
   return std::optional(status);
 }

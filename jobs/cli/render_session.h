@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstdint>
 #include <functional>
 #include <optional>
 #include <string>
@@ -12,11 +13,12 @@ namespace baton {
 
 struct RenderOptions {
   JobArgument job;
-  int workers = 0;               ///< 0: one, whose threads share scene and light
-  int threads_per_worker = 0;    ///< 0: the processors shared out
-  std::uint64_t memory_mib = 0;  ///< of all workers; 0: half of the machine's
-  std::string work_directory;    ///< empty: .baton in the output folder
-  std::string out;               ///< the only frame as PNG; empty: none
+  int workers = 0;                    ///< 0: one, whose threads share scene and light
+  int threads_per_worker = 0;         ///< 0: the processors shared out
+  std::uint64_t memory_mib = 0;       ///< of all workers; 0: half of the machine's
+  std::string work_directory;         ///< empty: .baton in the output folder
+  std::uint64_t store_limit_mib = 0;  ///< 0: as the disk has room
+  std::string out;                    ///< the only frame as PNG; empty: none
   std::optional<float> exposure;
   bool watch = false;
   bool restart = false;
@@ -27,6 +29,9 @@ struct RenderOptions {
 
 /// The farm that `options` ask for, with its folder in that of the job.
 FarmOptions farm_options(const RenderOptions& options, const JobSpec& job);
+
+/// --store-limit, of the coordinator that the command starts.
+void add_store_limit_option(CLI::App& command, std::uint64_t& store_limit_mib);
 
 /// --out shows one frame. Error: the job has more.
 Status check_out(const RenderOptions& options, const JobSpec& job);

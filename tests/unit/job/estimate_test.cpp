@@ -2,7 +2,6 @@
 
 #include <gtest/gtest.h>
 
-#include <algorithm>
 #include <utility>
 
 #include "common/job/sequence.h"
@@ -105,22 +104,6 @@ TEST(Estimate, AddsUpTheChannelsOfAFrame) {
   EXPECT_EQ(estimate_job(job).frame_bytes, e.frame_bytes);
   job.output.aovs.push_back(Aov::variance);
   EXPECT_EQ(film_aovs(job), job.output.aovs);
-}
-
-TEST(Estimate, CountsAllThatIsOnTheDisk) {
-  JobSpec job = small_job();
-  job.sampling.method = Method::pool;
-  const JobEstimate e = estimate_job(job);
-  const DiskEstimate disk = estimate_disk(job);
-  EXPECT_EQ(disk.frames, e.frames * e.frame_bytes);
-  EXPECT_EQ(disk.states, std::min<std::int64_t>(4, e.runs) * e.state_bytes);
-  EXPECT_EQ(disk.films, e.frames * e.film_bytes) << "all of so few frames may be in work";
-  EXPECT_EQ(disk.total(), disk.frames + disk.states + disk.films);
-  job.frames.clear();
-  for (int frame = 1; frame <= 100; ++frame) job.frames.push_back(frame);
-  const std::int64_t last = estimate_disk(job).states;
-  job.state.keep = StateKeep::all;
-  EXPECT_GT(estimate_disk(job).states, last);
 }
 
 }  // namespace

@@ -200,7 +200,7 @@ TEST_F(JournalTest, ANewerJournalIsRefused) {
   const Result<Journal> journal = Journal::open(path);
   ASSERT_FALSE(journal.ok());
   EXPECT_EQ(journal.error().kind, ErrorKind::version);
-  EXPECT_THAT(journal.error().message, HasSubstr("journal version 9, this program reads 4"));
+  EXPECT_THAT(journal.error().message, HasSubstr("journal version 9, this program reads 5"));
 }
 
 TEST_F(JournalTest, AnotherProgramsDatabaseIsRefused) {
@@ -236,6 +236,25 @@ TEST_F(JournalTest, AMissingFolderIsAnErrorThatNamesTheFile) {
   const Result<Journal> journal = Journal::open(folder / "nowhere" / "journal.sqlite");
   ASSERT_FALSE(journal.ok());
   EXPECT_THAT(journal.error().message, HasSubstr("nowhere/journal.sqlite"));
+}
+
+// What several jobs keep is counted once.
+TEST_F(JournalTest, CountsTheBytesThatTheArchiveKeeps) {
+  Journal journal = open();
+  const BlobRef shared{BlobKind::state, 3, 0, {1, 2}, 100}, own{BlobKind::state, 3, 1, {3, 4}, 7};
+  const Digest a = digest_of("a"), b = digest_of("b");
+  const Bytes text{std::byte{1}};
+  for (const Digest& job : {a, b}) ASSERT_TRUE(journal.add_job(job, "{}").ok());
+  EXPECT_EQ(*journal.kept_bytes(), 0u);
+  ASSERT_TRUE(journal.archive_job(a, text, text, {shared, shared, own}).ok());
+  ASSERT_TRUE(journal.archive_job(b, text, text, {shared}).ok());
+  EXPECT_EQ(*journal.kept_bytes(), 107u);
+  ASSERT_TRUE(journal.let_go(a, shared.digest).ok());
+  EXPECT_EQ(*journal.kept_bytes(), 107u);
+  ASSERT_TRUE(journal.delete_job(b).ok());
+  EXPECT_EQ(*journal.kept_bytes(), 7u);
+  ASSERT_TRUE(journal.restart_job(a).ok());
+  EXPECT_EQ(*journal.kept_bytes(), 0u);
 }
 
 }  // namespace

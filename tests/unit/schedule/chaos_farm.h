@@ -20,6 +20,7 @@ class ChaosFarm {
     bool alike = false;  ///< films of many tasks have the same bytes, and so are one blob
     int num_workers = 5;
     bool failures = true;  ///< attempts fail, files vanish; else only workers and messages do
+    std::uint64_t store_limit = 0;
   };
   ChaosFarm(std::uint32_t seed, JobSpec spec, Options options)
       : random_(seed), spec_(std::move(spec)), graph_(spec_), options_(options) {
@@ -65,6 +66,8 @@ class ChaosFarm {
   std::size_t num_kept_frames() const { return num_kept_frames_; }
   std::size_t num_cuts() const { return num_cuts_; }
   const JobSpec& spec() const { return spec_; }
+  /// Bytes of blobs that somebody needs, at most so far.
+  std::uint64_t most_bytes() const { return most_bytes_; }
 
  private:
   struct Held {
@@ -79,7 +82,7 @@ class ChaosFarm {
   int roll(int sides) { return static_cast<int>(random_() % static_cast<std::uint32_t>(sides)); }
 
   void start_coordinator() {
-    scheduler_ = std::make_unique<Scheduler>(++epoch_, kSilence);
+    scheduler_ = std::make_unique<Scheduler>(++epoch_, kSilence, options_.store_limit);
     known_.clear();
     add_job();
   }
@@ -248,6 +251,7 @@ class ChaosFarm {
     for (const Action& action : scheduler_->step(event, now_)) {
       std::visit([this](const auto& a) { on(a); }, action);
     }
+    most_bytes_ = std::max(most_bytes_, scheduler_->store_bytes());
   }
 
   void on(const RecordCompletion& a) {
@@ -317,6 +321,7 @@ class ChaosFarm {
   std::size_t num_changes_ = 0, num_kept_frames_ = 0, num_cuts_ = 0;
   std::size_t num_removed_ = 0, num_missing_ = 0, num_lost_ = 0, num_reopened_ = 0, num_events_ = 0;
   std::size_t num_held_ = 0, num_published_ = 0, num_held_lost_ = 0;
+  std::uint64_t most_bytes_ = 0;
 };
 
 }  // namespace baton::testing_farm

@@ -116,8 +116,8 @@ inline std::vector<TaskKey> tasks_of(const std::vector<GrantLease>& grants) {
 /// A scheduler with a clock and one job, driven by the words of a test.
 class Farm {
  public:
-  explicit Farm(JobSpec spec, std::uint32_t epoch = 1)
-      : spec_(std::move(spec)), scheduler(epoch, kSilence), job(digest_of("job")) {}
+  explicit Farm(JobSpec spec, std::uint32_t epoch = 1, std::uint64_t store_limit = 0)
+      : spec_(std::move(spec)), scheduler(epoch, kSilence, store_limit), job(digest_of("job")) {}
 
   std::vector<Action> submit() { return step(JobAdded{job, spec_, JobStatus::running, {}, {}}); }
   std::vector<Action> step(const Event& event) { return scheduler.step(event, now); }

@@ -143,8 +143,8 @@ TEST(JobGraph, StatisticsMustBeOfTheTasksOwnFramesAndTile) {
 TEST(BlobReferences, ASharedBlobIsGarbageWhenItsLastUserLetsGo) {
   BlobReferences blobs;
   const Digest shared{1, 2};
-  blobs.add(shared);
-  blobs.add(shared);
+  blobs.add({BlobKind::film, 0, 0, shared, 100});
+  blobs.add({BlobKind::film, 0, 1, shared, 100});
   blobs.release(shared);
   EXPECT_TRUE(blobs.take_garbage().empty());
   blobs.release(shared);
@@ -154,10 +154,30 @@ TEST(BlobReferences, ASharedBlobIsGarbageWhenItsLastUserLetsGo) {
 
 TEST(BlobReferences, ABlobThatIsNeededAgainIsNoGarbage) {
   BlobReferences blobs;
-  blobs.add({1, 2});
-  blobs.release({1, 2});
-  blobs.add({1, 2});
+  const BlobRef blob{BlobKind::film, 0, 0, {1, 2}, 100};
+  blobs.add(blob);
+  blobs.release(blob.digest);
+  blobs.add(blob);
   EXPECT_TRUE(blobs.take_garbage().empty());
+}
+
+TEST(BlobReferences, CountsTheBytesOfEachBlobOnceWhileItIsThere) {
+  BlobReferences blobs;
+  const BlobRef shared{BlobKind::film, 0, 0, {1, 2}, 100}, other{BlobKind::state, 0, 0, {3, 4}, 7};
+  blobs.expect(other.digest);
+  blobs.add({BlobKind::state, 0, 1, {5, 6}, 0});
+  EXPECT_EQ(blobs.size_bytes(), 0u) << "one is expected, one is held";
+  blobs.add(shared);
+  blobs.add(shared);
+  blobs.add(other);
+  EXPECT_EQ(blobs.size_bytes(), 107u);
+  blobs.release(shared.digest);
+  blobs.release(other.digest);
+  EXPECT_EQ(blobs.size_bytes(), 107u);
+  blobs.release(shared.digest);
+  EXPECT_EQ(blobs.size_bytes(), 7u);
+  blobs.release(other.digest);
+  EXPECT_EQ(blobs.size_bytes(), 0u);
 }
 
 }  // namespace

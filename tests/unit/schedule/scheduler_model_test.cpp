@@ -121,6 +121,41 @@ TEST(SchedulerModel, HeldStatesAreReadByTheirHolderAlone) {
   EXPECT_GT(num_held_lost, num_tasks / 100) << "with their workers";
 }
 
+// A limit at which a job can go on is never passed, and the job ends, whatever happens to workers,
+// messages and the coordinator. (Where files are lost, what is made again may need more room.)
+// Where leases are lost, or a coordinator starts again, workers may report one task each that it no
+// longer counted on; and states that a leaving worker hands over are in no account.
+TEST(SchedulerModel, AStoreWithALimitIsNeverFullAndNeverStuck) {
+  std::size_t num_felt = 0;
+  for (std::uint32_t seed = 1; seed <= num_seeds(); ++seed) {
+    SCOPED_TRACE(testing::Message() << "seed " << seed);
+    const int tiles = 2 + static_cast<int>(seed % 4);
+    JobSpec spec = small_job(tiles, 24, 1 + static_cast<int>(seed % 3), seed % 5 != 0);
+    if (seed % 4 == 0) spec = moving_job(tiles, 24, 1);
+    spec.visibility.correlated = seed % 3 == 1;
+    spec.max_retries_per_task = 1000000;
+    spec.max_failures_per_worker = 1000000;
+    // States of all tiles: two checkpoints, what tasks read and make, in motion a third checkpoint;
+    // and the films of two runs.
+    const int num_states = !carries_state(spec) ? 0 : shares_history(spec) ? 6 : 4;
+    const int run = frames_per_run(spec) * (spec.visibility.correlated ? 50 : 10);
+    const auto limit = static_cast<std::uint64_t>(tiles * (20 * num_states + 2 * run));
+    const bool trouble = seed % 2 == 0;
+    ChaosFarm farm(seed, spec, {.alike = seed % 8 < 4, .failures = false, .store_limit = limit});
+    int steps = 0;
+    for (; farm.status() == JobStatus::running && steps < 40000; ++steps)
+      farm.advance(trouble && steps < 3000);
+    EXPECT_EQ(farm.status(), JobStatus::done) << "after " << steps << " steps";
+    const auto late = static_cast<std::uint64_t>(trouble ? 5 * (20 + run) : 0);
+    if (farm.num_published() == 0) {
+      EXPECT_LE(farm.most_bytes(), limit + late);
+    }
+    num_felt += farm.most_bytes() * 4 > limit * 3 ? 1 : 0;
+    if (testing::Test::HasFailure()) return;
+  }
+  EXPECT_GT(num_felt, num_seeds() / 4);
+}
+
 TEST(SchedulerModel, AJobAlwaysEndsWhenAttemptsAreLimited) {
   for (std::uint32_t seed = 1; seed <= 60; ++seed) {
     SCOPED_TRACE(testing::Message() << "seed " << seed);

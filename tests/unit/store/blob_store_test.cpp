@@ -143,5 +143,26 @@ TEST_F(BlobStoreTest, SweepsWhatTheDeadLeftAndNothingElse) {
   EXPECT_TRUE(store.contains(digest));
 }
 
+TEST_F(BlobStoreTest, NamesBlobsAndJobFilesThatNobodyHasTouchedForLong) {
+  BlobStore store = open();
+  const Digest old = *store.put(as_bytes_view("old blob")), young = *store.put(as_bytes_view("x"));
+  const Digest job = digest_of("job"), other = digest_of("another");
+  fs::create_directories(folder_ / "jobs");
+  for (const fs::path& path : {store.job_file(job), store.job_file(other), folder_ / "00/ab.blob"})
+    ASSERT_TRUE(write_file_atomic(path, as_bytes_view("x")).ok());
+  const auto long_ago = fs::file_time_type::clock::now() - 2 * BlobStore::kLeftoverAge;
+  for (const fs::path& path : {store.path(old), store.job_file(job), folder_ / "00/ab.blob"})
+    fs::last_write_time(path, long_ago);
+  const auto blobs = store.old_blobs();
+  ASSERT_EQ(blobs.size(), 1u) << "a file that no digest names is none";
+  EXPECT_EQ(blobs[0].digest, old);
+  EXPECT_EQ(blobs[0].size_bytes, 8u);
+  EXPECT_EQ(store.old_job_files(), std::vector<Digest>{job});
+  // Whoever puts it once more needs it.
+  ASSERT_TRUE(store.put(as_bytes_view("old blob")).ok());
+  EXPECT_TRUE(store.old_blobs().empty());
+  EXPECT_TRUE(store.contains(young));
+}
+
 }  // namespace
 }  // namespace baton

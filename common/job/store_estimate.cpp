@@ -1,0 +1,165 @@
+#include "common/job/store_estimate.h"
+
+#include <algorithm>
+#include <cmath>
+#include <vector>
+
+#include "common/job/empty_aovs.h"
+#include "common/job/estimate.h"
+#include "common/job/motion.h"
+#include "common/job/sequence.h"
+
+namespace baton {
+namespace {
+
+// Measured sizes, in bytes a pixel that sees a surface: docs/scheduling.md has the table.
+/// One of R, G, B; also in a sky.
+constexpr double kColorBytes = 3.2;
+/// What a memory takes after kMemoryRays shadow rays; it grows with their square root, until all
+/// bins above the horizon are known. Where things move, some pixels start afresh in each frame.
+constexpr double kMemoryBytes = 200, kMemoryRays = 800, kMostMemoryBytes = 310;
+constexpr double kMovingMemory = 0.85;
+/// A sample of the first pass, and how many of a pixel's are stored: those of pixels near a
+/// shadow's border.
+constexpr double kSampleBytes = 10, kSampleShare = 0.27;
+/// Tasks in a worker's hands beside those of the run that everybody waits for.
+constexpr double kTasksAhead = 3;
+
+double film_bytes(Aov aov) {
+  switch (aov) {
+    case Aov::lns:
+      return 3.2;
+    case Aov::visibility:
+    case Aov::depth:
+      return 2.9;
+    case Aov::variance:
+    case Aov::normal:
+      return 4;
+    case Aov::ess:
+    case Aov::acceptance:
+    case Aov::acceptance_local:
+    case Aov::acceptance_independent:
+      return 1.6;
+    case Aov::source:
+    case Aov::mask:
+    case Aov::resampled:
+    case Aov::material:
+      return 0.1;
+  }
+  return 4;
+}
+
+/// Of a pixel of a frame, on average.
+double film_bytes_per_pixel(const JobSpec& job, double surface_share) {
+  const bool has_sky = job.output.background == Background::environment;
+  double bytes = 3 * kColorBytes * (has_sky ? 1 : surface_share);
+  for (const Aov aov : film_aovs(job)) {
+    if (why_empty(aov, job).empty()) bytes += surface_share * film_bytes(aov);
+  }
+  return bytes;
+}
+
+/// Of a pixel's state after frames [0, end), on average.
+double state_bytes_per_pixel(const JobSpec& job, std::int64_t end, double surface_share) {
+  const JobEstimate e = estimate_job(job);
+  const auto whole = static_cast<double>(e.state_bytes_per_pixel);
+  if (traits(job.sampling.method).carried != Carried::memory) return surface_share * whole;
+  const auto rounds = static_cast<double>(e.preroll_rounds + end * e.rounds);
+  const double rays = rounds * job.sampling.num_particles;
+  const double memory = std::min(kMostMemoryBytes, kMemoryBytes * std::sqrt(rays / kMemoryRays));
+  return surface_share * std::min(whole, memory * (moves(job) ? kMovingMemory : 1));
+}
+
+/// The ends of the frames whose states are in the store together when it is fullest.
+std::vector<std::int64_t> states_at_once(const JobSpec& job) {
+  const auto frames = static_cast<std::int64_t>(job.frames.size());
+  const std::int64_t every = job.state.checkpoint_every;
+  std::vector<std::int64_t> ends;
+  if (job.state.keep == StateKeep::all) {
+    const std::int64_t step = frames_per_run(job);
+    for (std::int64_t end = step; end < frames; end += step) ends.push_back(end);
+    ends.push_back(frames);
+    return ends;
+  }
+  // Two checkpoints stay. In motion the third is there before one may go, since all tiles share
+  // them; at rest each tile lets its own go, and at its last both.
+  const bool shares = shares_history(job);
+  const std::int64_t last = (frames - 1) / every * every;
+  if (shares || last == 0) ends.push_back(frames);
+  for (std::int64_t end = last; end > 0 && ends.size() < (shares ? 3 : 2); end -= every)
+    ends.push_back(end);
+  return ends;
+}
+
+}  // namespace
+
+StoreEstimate estimate_store(const JobSpec& job, double surface_share) {
+  StoreEstimate store;
+  const JobEstimate e = estimate_job(job);
+  const auto pixels = static_cast<double>(job.image.rendered().area());
+  const auto frames = static_cast<double>(e.frames);
+  if (carries_state(job)) {
+    double bytes = 0;
+    for (const std::int64_t end : states_at_once(job))
+      bytes += state_bytes_per_pixel(job, end, surface_share);
+    store.states = static_cast<std::int64_t>(pixels * bytes);
+  }
+
+  // All tiles of a run are rendered before its first frame is written, and some of the next one.
+  const double tiles_ahead = std::min(1.0, kTasksAhead / static_cast<double>(e.tiles));
+  // A second pass takes samples away while the run is still rendered.
+  const bool second = job.visibility.correlated;
+  const double run = frames_per_run(job);
+  const double ahead = std::min(frames, run * (1 + tiles_ahead / (second ? 2 : 1)));
+  store.films =
+      static_cast<std::int64_t>(pixels * ahead * film_bytes_per_pixel(job, surface_share));
+  if (second) {
+    const double samples = surface_share * kSampleShare * job.sampling.num_particles;
+    store.samples =
+        static_cast<std::int64_t>(pixels * std::min(frames, run) * (2 + samples * kSampleBytes));
+  }
+  return store;
+}
+
+StoreEstimate bound_store(const JobSpec& job) {
+  const JobEstimate e = estimate_job(job);
+  // Frames that are rendered ahead, with two runs in work at most: their films, and the states that
+  // their tasks have read and made.
+  constexpr std::int64_t kStatesInWork = 2;
+  const std::int64_t ahead = std::min<std::int64_t>(max_frames_ahead(job) + 1, e.frames);
+  const auto kept = carries_state(job) ? static_cast<std::int64_t>(states_at_once(job).size()) : 0;
+  StoreEstimate store;
+  store.states = e.state_bytes * std::min(kept + kStatesInWork, e.runs);
+  store.films = e.film_bytes * ahead;
+  if (job.visibility.correlated) {
+    store.films *= 2;  // of both passes
+    const std::int64_t per_pixel = 2 + 8 + 10 * std::int64_t{job.sampling.num_particles};
+    store.samples = job.image.rendered().area() * per_pixel * ahead;
+  }
+  return store;
+}
+
+std::int64_t estimate_blob_bytes(const JobSpec& job, BlobKind kind) {
+  const std::int64_t side = job.image.tile_size;
+  const PixelRect image = job.image.rendered();
+  const auto pixels = static_cast<double>(std::min<std::int64_t>(side, image.width()) *
+                                          std::min<std::int64_t>(side, image.height()));
+  switch (kind) {
+    case BlobKind::state:
+      return !carries_state(job)
+                 ? 0
+                 : static_cast<std::int64_t>(
+                       pixels *
+                       state_bytes_per_pixel(job, static_cast<std::int64_t>(job.frames.size()), 1));
+    case BlobKind::film:
+      return static_cast<std::int64_t>(pixels * film_bytes_per_pixel(job, 1));
+    case BlobKind::first_pass:
+      return static_cast<std::int64_t>(
+          pixels * (2 + kSampleShare * kSampleBytes * job.sampling.num_particles));
+    case BlobKind::image:
+      break;
+  }
+  return 0;
+}
+
+}  // namespace baton

@@ -1,0 +1,29 @@
+#pragma once
+
+#include <cstdint>
+
+#include "common/job/job_spec.h"
+#include "common/job/task.h"
+
+namespace baton {
+
+/// Bytes of blobs in the store.
+struct StoreEstimate {
+  std::int64_t states = 0;   ///< checkpoints that stay, and states on their way to the next frame
+  std::int64_t films = 0;    ///< of the frames that are not written yet
+  std::int64_t samples = 0;  ///< of the first pass, for the second
+
+  std::int64_t total() const { return states + films + samples; }
+};
+
+/// What the store of a job holds at its fullest with one worker, as it is likely: sizes are those
+/// that docs/scheduling.md measures. surface_share: of the pixels that see a surface, [0, 1].
+StoreEstimate estimate_store(const JobSpec& job, double surface_share);
+
+/// What it holds at most, however many workers there are and however badly blobs pack.
+StoreEstimate bound_store(const JobSpec& job);
+
+/// What a blob of a whole tile takes, as it is likely; all pixels see a surface.
+std::int64_t estimate_blob_bytes(const JobSpec& job, BlobKind kind);
+
+}  // namespace baton

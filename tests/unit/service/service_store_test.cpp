@@ -1,0 +1,120 @@
+#include <gmock/gmock.h>
+
+#include "coordinator/service/service.h"
+#include "tests/unit/service/fake_farm.h"
+
+/// What is in the store: leftovers of earlier runs, and a limit.
+namespace baton {
+namespace {
+
+using namespace testing_service;
+using testing::HasSubstr;
+using testing::SizeIs;
+
+struct ServiceStoreTest : ServiceTest {
+  /// Nobody has touched what is in the store for long.
+  void age_all() const {
+    const auto long_ago = fs::file_time_type::clock::now() - 2 * BlobStore::kLeftoverAge;
+    for (const auto& entry : fs::recursive_directory_iterator(store())) {
+      if (entry.is_regular_file()) fs::last_write_time(entry, long_ago);
+    }
+  }
+  fs::path put_leftover(const std::string& text) const {
+    BlobStore blobs = BlobStore::open(store()).value();
+    return blobs.path(blobs.put(as_bytes_view(text)).value());
+  }
+  void do_tasks(const std::string& endpoint, int count) {
+    FakeWorker worker(endpoint, store(), job);
+    worker.hello();
+    for (int i = 0; i < count; ++i) worker.do_one_task();
+    worker.say(Heartbeat{});
+    worker.expect<Heartbeat>();
+  }
+  std::size_t num_blobs() const { return BlobStore::open(store()).value().old_blobs().size(); }
+};
+
+TEST_F(ServiceStoreTest, AStartRemovesWhatNoJobNeedsAndNothingElse) {
+  Digest id;
+  {
+    const RunningService service(options);
+    id = ask<JobAccepted>(service.endpoint(), SubmitJob{document}).job;
+    do_tasks(service.endpoint(), 2);
+  }
+  const fs::path orphan = put_leftover("of a worker that was killed");
+  const BlobStore blobs = BlobStore::open(store()).value();
+  const fs::path job_file = blobs.job_file(id), gone = blobs.job_file(digest_of("gone"));
+  for (const fs::path& path : {job_file, gone})
+    ASSERT_TRUE(write_file_atomic(path, as_bytes_view("{}")).ok());
+  age_all();
+  const fs::path young = put_leftover("of a worker that will report it");
+  ASSERT_EQ(num_blobs(), 7u) << "two states, four films, the orphan";
+
+  // Of the open job everything stays, however old.
+  {
+    const RunningService service(options);
+    EXPECT_EQ(num_blobs(), 6u);
+    EXPECT_FALSE(fs::exists(orphan));
+    EXPECT_TRUE(fs::exists(young));
+    EXPECT_TRUE(fs::exists(job_file));
+    EXPECT_FALSE(fs::exists(gone));
+    EXPECT_EQ(show(service.endpoint(), id).summary.tasks_done, 2u);
+    do_tasks(service.endpoint(), kNumTasks - 2);
+    EXPECT_EQ(show(service.endpoint(), id).summary.status, JobStatus::done);
+  }
+
+  // Of one that has ended its last states, which a longer job goes on from.
+  age_all();
+  {
+    const RunningService service(options);
+    EXPECT_EQ(num_blobs(), 2u);
+    EXPECT_FALSE(fs::exists(young)) << "it has grown old";
+    JobSpec longer = job;
+    longer.frames.push_back(5);
+    const auto accepted =
+        ask<JobAccepted>(service.endpoint(), SubmitJob{make_job_document(longer).value()});
+    EXPECT_THAT(accepted.plan, HasSubstr("going on from the states of frame 4"));
+  }
+}
+
+// A job that cannot be read may need any blob.
+TEST_F(ServiceStoreTest, NothingIsSweptBesideAJobThatCannotBeRead) {
+  const fs::path orphan = put_leftover("of a worker that was killed");
+  age_all();
+  {
+    Journal journal = Journal::open(options.work_dir / "journal.sqlite").value();
+    ASSERT_TRUE(journal.add_job(digest_of("other"), "of a later version").ok());
+    ASSERT_TRUE(journal.commit().ok());
+  }
+  const RunningService service(options);
+  EXPECT_TRUE(fs::exists(orphan));
+}
+
+// A blob of the fake worker has 5 bytes: a task makes 15.
+TEST_F(ServiceStoreTest, AJobWaitsForRoomAndGoesOnWhenAnotherIsDeleted) {
+  JobSpec other = job;
+  other.name = "other";
+  other.output.directory = (folder / "other").string();
+  options.store_limit = 45;
+  const RunningService service(options);
+  const Digest first = ask<JobAccepted>(service.endpoint(), SubmitJob{document}).job;
+  FakeWorker worker(service.endpoint(), store(), job);
+  worker.hello();
+  for (int i = 0; i < 2; ++i) worker.do_one_task();
+  ask<JobDetail>(service.endpoint(), CancelJob{first.hex()});
+  const Digest second =
+      ask<JobAccepted>(service.endpoint(), SubmitJob{make_job_document(other).value()}).job;
+  worker.do_one_task();
+  const JobDetail waiting = show(service.endpoint(), second);
+  EXPECT_EQ(waiting.summary.status, JobStatus::running);
+  EXPECT_TRUE(waiting.lacks_room);
+  EXPECT_THAT(waiting.waits,
+              HasSubstr("of the 45 B that --store-limit allows, 30 B of them of jobs"));
+  worker.say(LeaseRequest{1});
+  worker.expect<NoWork>();
+  ask<JobList>(service.endpoint(), DeleteJob{first.hex()});
+  EXPECT_EQ(worker.expect<LeaseGrant>().lease.job, second);
+  EXPECT_FALSE(show(service.endpoint(), second).lacks_room);
+}
+
+}  // namespace
+}  // namespace baton
