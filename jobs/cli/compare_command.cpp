@@ -130,7 +130,8 @@ void print_table(const std::vector<Compared>& jobs, const fs::path& sheet, float
                bytes_text(compared.summary.state_bytes), compared.job.output.directory,
                compared.job.output.pattern);
   }
-  fmt::print("noise: a pixel's standard deviation, rms, over the mean radiance, by two more seeds\n");
+  fmt::print(
+      "noise: a pixel's standard deviation, rms, over the mean radiance, by two more seeds\n");
   fmt::print("handed on: sample state, packed, from frame to frame\n");
   fmt::print("sheet, a row for each job, {}: {}\n", exposure_text(stops), sheet.string());
 }

@@ -34,7 +34,7 @@ struct TileFrameRenderer::Batch {
   std::array<std::size_t, kBatchPixels> end_ray;  ///< where each pixel's rays end
   std::array<KnownLight, kBatchPixels> known;
   std::array<PixelResult, kBatchPixels> pixels;
-  std::array<Rgb, kBatchPixels> emission;  ///< of the surfaces that are seen
+  std::array<Rgb, kBatchPixels> emission;                ///< of the surfaces that are seen
   std::array<std::optional<float>, kBatchPixels> again;  ///< grey radiance, of probes
 
   /// x and y in the image.
@@ -47,9 +47,9 @@ struct TileFrameRenderer::Batch {
     const auto [x, y] = place(rect, index);
     return pixel_key(context.job.seed, frame_number, context.job.image.width, x, y, round);
   }
-  bool is_probe(const PixelRect& rect, std::size_t index) const {
+  bool is_probe(const RenderContext& context, const PixelRect& rect, std::size_t index) const {
     const auto [x, y] = place(rect, index);
-    return baton::is_probe(x, y, frame_number);
+    return baton::is_probe(x, y, frame_number, context.job.seed);
   }
 };
 
@@ -198,7 +198,7 @@ void TileFrameRenderer::sample(Batch& batch, const TileRound& at, SampleState& s
         .hits = surfaces_->pixel(index),
         .geometry = &geometry_};
     const SiteOrigins from = origins(index);
-    if (at.probe_light != nullptr && batch.is_probe(surfaces_->rect, index)) {
+    if (at.probe_light != nullptr && batch.is_probe(context_, surfaces_->rect, index)) {
       batch.again[i] = probe_.sample_again(method_of(index), input, *at.probe_light, state, index,
                                            from, *scratch_);
     }
@@ -257,8 +257,8 @@ void TileFrameRenderer::learn(Batch& batch, SampleState& state) {
     const float d = known.difference + found.difference;
     pixel.variance = known.has_halves ? d * d : known.variance;
     const std::optional<float>& again = batch.again[i];
-    pixel.error = again ? static_cast<float>(squared_error(mean(pixel.radiance), *again))
-                        : kErrorUnknown;
+    pixel.error =
+        again ? static_cast<float>(squared_error(mean(pixel.radiance), *again)) : kErrorUnknown;
 
     const FoundRays rays{.sample = std::span(batch.rays.sample).subspan(first, count),
                          .tag = std::span(batch.rays.tag).subspan(first, count),

@@ -96,7 +96,7 @@ TEST(Estimate, AddsUpTheChannelsOfAFrame) {
   job.output.aovs = {Aov::lns, Aov::source, Aov::normal};
   job.sampling.method = Method::bidirectional;
   const JobEstimate e = estimate_job(job);
-  EXPECT_EQ(e.film_channels, 4 + 1 + 3 + 3 + 1);  // films also hold the error of probes
+  EXPECT_EQ(e.film_channels, 4 + 1 + 3 + 3 + 1);     // films also hold the error of probes
   EXPECT_EQ(e.frame_bytes, 5000 * (7 * 2 + 4 * 4));  // lns and normal stay float32
 
   // Samples that are carried tell nothing of their error.
