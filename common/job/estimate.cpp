@@ -72,8 +72,7 @@ JobEstimate estimate_job(const JobSpec& job) {
                       aov == Aov::material || aov == Aov::normal;
     wide_channels += wide ? num_channels(aov) : 0;
   }
-  e.film_channels = 4;
-  for (const Aov aov : film_aovs(job)) e.film_channels += num_channels(aov);
+  e.film_channels = frame_channels + (tells_noise(job) ? 1 : 0);
   e.film_bytes = pixels * e.film_channels * 4;
   const std::int64_t sample_bytes = job.output.pixel_type == PixelType::half_float ? 2 : 4;
   e.frame_bytes = pixels * ((frame_channels - wide_channels) * sample_bytes + wide_channels * 4);

@@ -73,6 +73,20 @@ void find_odd_frames(std::span<const FrameStats* const> written, Judgement& judg
   }
 }
 
+/// Enters the noise of a frame that tells it. squares: the sum over these frames.
+void add_noise(const FrameStats& frame, double& squares, Judgement& judgement) {
+  const float noise = frame.quality.noise;
+  const bool is_first = judgement.frames_told == 0;
+  squares += double{noise} * noise;
+  judgement.noise_least = is_first ? noise : std::min(judgement.noise_least, noise);
+  if (is_first || noise > judgement.noise_most) {
+    judgement.noise_most = noise;
+    judgement.noisiest = frame.frame;
+  }
+  judgement.noise_source = frame.quality.noise_source;
+  ++judgement.frames_told;
+}
+
 }  // namespace
 
 Judgement judge_frames(std::span<const FrameStats> frames) {
@@ -89,18 +103,10 @@ Judgement judge_frames(std::span<const FrameStats> frames) {
     const FrameQuality& quality = frames[i].quality;
     if (quality.pixels == 0) continue;
     written.push_back(&frames[i]);
-    squares += double{quality.noise} * quality.noise;
+    if (quality.noise_source == NoiseSource::probes) add_noise(frames[i], squares, judgement);
     const double frame_light = double{quality.mean} * static_cast<double>(quality.pixels);
     light += frame_light;
     below += quality.light_below_zero * frame_light;
-    const bool noisier = written.size() == 1 || quality.noise > judgement.noise_most;
-    judgement.noise_least =
-        written.size() == 1 ? quality.noise : std::min(judgement.noise_least, quality.noise);
-    if (noisier) {
-      judgement.noise_most = quality.noise;
-      judgement.noisiest = frames[i].frame;
-    }
-    judgement.noise_source = std::max(judgement.noise_source, quality.noise_source);
     judgement.clamped |= quality.clamped;
     judgement.frames_below_zero += quality.pixels_below_zero > 0 ? 1 : 0;
     judgement.pixels_below_zero += quality.pixels_below_zero;
@@ -111,7 +117,10 @@ Judgement judge_frames(std::span<const FrameStats> frames) {
   }
   judgement.frames = written.size();
   if (written.empty()) return judgement;
-  judgement.noise = static_cast<float>(std::sqrt(squares / static_cast<double>(written.size())));
+  if (judgement.frames_told > 0) {
+    judgement.noise =
+        static_cast<float>(std::sqrt(squares / static_cast<double>(judgement.frames_told)));
+  }
   judgement.light_below_zero = light > 0 ? static_cast<float>(below / light) : 0.0f;
   find_odd_frames(written, judgement);
   return judgement;

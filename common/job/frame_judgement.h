@@ -18,8 +18,9 @@ struct OddFrame {
 /// What a person should know of the frames of a job that are written.
 struct Judgement {
   std::uint64_t frames = 0;
+  std::uint64_t frames_told = 0;  ///< whose noise is told
   NoiseSource noise_source = NoiseSource::none;
-  float noise = 0;  ///< rms over the frames
+  float noise = 0;  ///< rms over these frames
   float noise_least = 0, noise_most = 0;
   std::int32_t noisiest = 0;  ///< the frame of noise_most
   std::vector<OddFrame> odd;

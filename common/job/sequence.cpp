@@ -146,12 +146,9 @@ bool asks_neighbors(const SamplingSpec& sampling) {
   return traits(sampling.method).asks_neighbors && sampling.num_neighbors > 0;
 }
 
-std::vector<Aov> film_aovs(const JobSpec& job) {
-  std::vector<Aov> aovs = job.output.aovs;
-  const auto place = std::lower_bound(aovs.begin(), aovs.end(), Aov::variance);
-  const bool is_there = place != aovs.end() && *place == Aov::variance;
-  if (traits(job.sampling.method).tells_variance() && !is_there) aovs.insert(place, Aov::variance);
-  return aovs;
+bool tells_noise(const JobSpec& job) {
+  const bool carries_samples = carries_state(job) && traits(job.sampling.method).keeps_samples;
+  return !carries_samples && !job.visibility.correlated;
 }
 
 SamplingSpec as_sampling(const MaterialSampling& material) {

@@ -103,9 +103,9 @@ bool carries_state(const JobSpec& job);
 bool asks_neighbors(const SamplingSpec& sampling);
 /// A material's setting as one of the whole picture.
 SamplingSpec as_sampling(const MaterialSampling& material);
-/// What the films of a job hold: the AOVs of its frames, and the error of each pixel where the
-/// method tells it, for what is said of the frames.
-std::vector<Aov> film_aovs(const JobSpec& job);
+/// Whether the noise of a job's frames is told: of pixels that draw all samples anew, and whose
+/// light no second pass shares out. Films then have a plane of errors (common/image/noise.h).
+bool tells_noise(const JobSpec& job);
 /// Samples of a pixel: the most of any material.
 std::int32_t most_particles(const SamplingSpec& sampling);
 /// Particles per pixel in the job's states; 0 where rays are chosen apart from samples.

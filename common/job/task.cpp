@@ -77,6 +77,8 @@ std::string_view noise_source_name(NoiseSource source) {
       return "halves";
     case NoiseSource::neighbors:
       return "neighbors";
+    case NoiseSource::probes:
+      return "probes";
   }
   return "unknown";
 }

@@ -137,12 +137,11 @@ struct SamplingStats {
   }
 };
 
-/// What the noise of a frame was told from. Stored and sent; values are for ever. halves: two
-/// estimates of each pixel, or the method's own error; neighbors: how pixels differ from those
-/// around them, in which edges and texture count as noise.
-enum class NoiseSource : std::uint8_t { none = 0, halves = 1, neighbors = 2 };
-constexpr NoiseSource last_of(NoiseSource) { return NoiseSource::neighbors; }
-/// "none", "halves", "neighbors".
+/// What the noise of a frame was told from. Stored and sent; values are for ever. probes: pixels
+/// that were sampled twice. halves, neighbors: other measures, of frames of earlier programs.
+enum class NoiseSource : std::uint8_t { none = 0, halves = 1, neighbors = 2, probes = 3 };
+constexpr NoiseSource last_of(NoiseSource) { return NoiseSource::probes; }
+/// "none", "halves", "neighbors", "probes".
 std::string_view noise_source_name(NoiseSource source);
 
 /// What was seen of a whole frame when it was written, of R, G and B, before anything was set to 0.
@@ -152,8 +151,8 @@ struct FrameQuality {
   std::uint64_t pixels_beyond_half = 0;  ///< past what a half float can say
   std::uint64_t pixels_not_finite = 0;   ///< NaN or infinite; in none of the other numbers
   NoiseSource noise_source = NoiseSource::none;
-  float noise = 0;  ///< relative standard deviation of a pixel: rms of its error over mean radiance
-  float mean = 0;   ///< radiance, over pixels and the three
+  float noise = 0;             ///< FrameNoise::relative() (common/image/noise.h)
+  float mean = 0;              ///< radiance, over pixels and the three
   float lowest = 0;            ///< the least value, at most 0
   float light_below_zero = 0;  ///< what lies below zero over all light, [0, ...)
   bool clamped = false;        ///< what lay below zero was set to 0

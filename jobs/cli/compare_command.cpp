@@ -2,10 +2,12 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <memory>
 #include <thread>
 
 #include "common/image/image_io.h"
+#include "common/image/noise.h"
 #include "common/job/job_json.h"
 #include "common/job/sequence.h"
 #include "jobs/cli/commands.h"
@@ -13,7 +15,6 @@
 #include "jobs/cli/frame_sheet.h"
 #include "jobs/cli/settle_method.h"
 #include "jobs/cli/text.h"
-#include "jobs/study/seed_noise.h"
 #include "worker/scene/settle_motion.h"
 
 namespace baton {
@@ -37,17 +38,18 @@ struct Compared {
   JobSpec job;
   std::array<JobSpec, 2> seeds;  ///< for its noise
   JobSummary summary;
-  double noise = 0;  ///< SeedNoise::deviation()
+  double noise = 0;  ///< FrameNoise::relative(), rms over frames
 };
 
-/// The first frames of job `number` with another seed, and with all that SeedNoise needs.
+/// The first frames of job `number` with another seed, which sees the same points of the scene.
 JobSpec with_seed(JobSpec job, std::size_t number, std::uint64_t more, const fs::path& folder) {
+  if (job.image.site_seed == 0) job.image.site_seed = std::max<std::uint64_t>(job.seed, 1);
   job.seed += more;
   job.frames.resize(std::min(job.frames.size(), kSeedFrames));
   job.name = fmt::format("job {} seed {}", number + 1, job.seed);
   job.output.directory = folder / job.name;
   job.output.background = Background::transparent;
-  job.output.aovs = {Aov::normal, Aov::depth};
+  job.output.aovs.clear();
   job.output.pixel_type = PixelType::full_float;
   job.output.clamp_negative = false;
   return job;
@@ -88,14 +90,15 @@ Status check_alike(const std::vector<Compared>& jobs, const CompareOptions& opti
 
 Result<double> noise_of(const Compared& compared) {
   const auto count = static_cast<std::int32_t>(compared.seeds[0].frames.size());
-  SeedNoise noise;
-  for (std::int32_t f = std::max(count - static_cast<std::int32_t>(kNoiseFrames), 0); f < count;
-       ++f) {
+  const std::int32_t begin = std::max(count - static_cast<std::int32_t>(kNoiseFrames), 0);
+  double squares = 0;
+  for (std::int32_t f = begin; f < count; ++f) {
     BATON_ASSIGN(const FilmTile first, read_exr(frame_path(compared.seeds[0], f)));
     BATON_ASSIGN(const FilmTile second, read_exr(frame_path(compared.seeds[1], f)));
-    BATON_TRY(noise.add(first, second));
+    const double noise = noise_of_seeds(first, second).relative();
+    squares += noise * noise;
   }
-  return noise.deviation();
+  return std::sqrt(squares / (count - begin));
 }
 
 /// A row of frames for each job.
@@ -122,12 +125,13 @@ void print_table(const std::vector<Compared>& jobs, const fs::path& sheet, float
   fmt::print("{:<{}}  {:>9}  {:>7}  {:>11}  {}\n", "job", width, "CPU", "noise", "handed on",
              "frames");
   for (const Compared& compared : jobs) {
-    fmt::print("{:<{}}  {:>7.1f} s  {:>7.4f}  {:>11}  {}/{}\n", compared.job.name, width,
-               compared.summary.stats.cpu_seconds, compared.noise,
+    fmt::print("{:<{}}  {:>7.1f} s  {:>5.3g} %  {:>11}  {}/{}\n", compared.job.name, width,
+               compared.summary.stats.cpu_seconds, 100 * compared.noise,
                bytes_text(compared.summary.state_bytes), compared.job.output.directory,
                compared.job.output.pattern);
   }
-  fmt::print("noise: a pixel's standard deviation over its brightness, rms, by two more seeds\n");
+  fmt::print(
+      "noise: a pixel's standard deviation, rms, over the mean radiance, by two more seeds\n");
   fmt::print("handed on: sample state, packed, from frame to frame\n");
   fmt::print("sheet, a row for each job, {}: {}\n", exposure_text(stops), sheet.string());
 }

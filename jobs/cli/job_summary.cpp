@@ -138,13 +138,11 @@ std::string judgement_text(const JobDetail& detail) {
   std::string text;
   if (j.noise_source != NoiseSource::none) {
     text += fmt::format("noise      {} of the radiance", percent(j.noise));
-    if (j.frames > 1) {
+    if (j.frames_told > 1) {
       text += fmt::format(", by frame {} to {} (frame {})", percent(j.noise_least),
                           percent(j.noise_most), j.noisiest);
     }
-    text += j.noise_source == NoiseSource::halves
-                ? "; told from two halves of each pixel\n"
-                : "; told from neighbouring pixels, so edges and texture count, too\n";
+    text += "; told from pixels that were sampled twice\n";
   }
   for (std::size_t i = 0; i < j.odd.size() && i < kMostOdd; ++i) {
     text +=

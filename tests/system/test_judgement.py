@@ -21,52 +21,67 @@ def grey(programs, file):
 
 
 def deviation(programs, a, b):
-    """Relative noise of two frames of two seeds: rms of their difference over sqrt(2) and mean radiance, where both see
-    the same surface."""
-    depths = zip(programs.values(a, "depth"), programs.values(b, "depth"))
-    same = [i for i, (x, y) in enumerate(depths) if x > 0 and abs(x - y) < 0.01 * x]
+    """Noise of two frames of two seeds at the same sites: rms of their difference over sqrt(2) and mean radiance, of the
+    pixels with a surface."""
+    lit = [i for i, depth in enumerate(programs.values(a, "depth")) if depth > 0]
     first, second = grey(programs, a), grey(programs, b)
-    square = sum((first[i] - second[i]) ** 2 for i in same) / 2 / len(same)
-    return math.sqrt(square) / (sum(first[i] for i in same) / len(same))
+    square = sum((first[i] - second[i]) ** 2 for i in lit) / 2 / len(lit)
+    return math.sqrt(square) / (sum(first[i] + second[i] for i in lit) / 2 / len(lit))
+
+
+def rms(values):
+    return math.sqrt(sum(value * value for value in values) / len(values))
+
+
+def told_and_true(programs, folder, method):
+    """The summaries of seeds 1 and 2, and the noise of their six frames as told of both and as they differ."""
+    summaries = []
+    for seed in (1, 2):
+        path = job_at(folder / str(seed), seed=seed, sampling={"method": method},
+                      image={"sites": 1, "width": 240, "height": 140, "siteSeed": 3})
+        done = programs.render(path, folder / f"work{seed}", extra=["--json"])
+        summaries.append(json.loads(done.stdout))
+    true = [deviation(programs, *(folder / f"{seed}/frames/frame.000{number}.exr" for seed in (1, 2)))
+            for number in range(1, 7)]
+    told = [row["noise"] for summary in summaries for row in summary["frames"]]
+    return summaries, rms(told), rms(true)
 
 
 def noise_told_is_noise(programs, folder):
-    """The noise of `pool` from the halves of its pixels is that of two seeds; in frame, JSON and CSV alike."""
-    summaries = []
-    for seed in (1, 2):
-        path = job_at(folder / str(seed), seed=seed, image={"sites": 1, "width": 240, "height": 140})
-        done = programs.render(path, folder / f"work{seed}", extra=["--json"])
-        summaries.append(json.loads(done.stdout))
-    for number, row in enumerate(summaries[0]["frames"], 1):
-        check_equal(row["noiseFrom"], "halves", "source")
-        frames = [folder / f"{seed}/frames/frame.000{number}.exr" for seed in (1, 2)]
-        true = deviation(programs, *frames)
-        check(true / 1.6 < row["noise"] < 1.6 * true, f"frame {number}: told {row['noise']}, seeds differ by {true}")
-        header = frames[0].read_bytes()[:4000]
-        check(b"baton:noise\0" in header and f"{row['noise']:.4g}".encode() in header, "the header does not tell it")
+    """What is told is what two seeds show, within 20 %, and it ranks methods as they do. Level: 12 frames of 240 probes are
+    3000, which resolve 6 %. Frame, JSON and CSV say the same."""
+    told, true = {}, {}
+    for method in ("pool", "bidirectional", "mis", "environment"):
+        summaries, told[method], true[method] = told_and_true(programs, folder / method, method)
+        print(f"  {method}: told {told[method]:.4f}, is {true[method]:.4f}")
+        check(abs(told[method] / true[method] - 1) < 0.2, f"{method}: told {told[method]}, seeds differ by {true[method]}")
+        check_equal({row["noiseFrom"] for row in summaries[0]["frames"]}, {"probes"}, "source")
+    check_equal(sorted(told, key=told.get), sorted(true, key=true.get), "methods from clean to noisy")
+
+    frames = summaries[0]["frames"]
+    header = (folder / "environment/1/frames/frame.0003.exr").read_bytes()[:4000]
+    check(b"baton:noise\0" in header and f"{frames[2]['noise']:.4g}".encode() in header, "the header does not tell it")
     check_equal(summaries[0]["judgement"]["frames"], 6, "judged frames")
-    with (folder / "1/frames/diagnostics.csv").open(encoding="ascii") as file:
+    check(abs(summaries[0]["judgement"]["noise"] - rms([row["noise"] for row in frames])) < 1e-5, "the job's noise")
+    with (folder / "environment/1/frames/diagnostics.csv").open(encoding="ascii") as file:
         rows = [row for row in csv.DictReader(file) if row["tile"] == "all"]
-    check_equal([row["noiseFrom"] for row in rows], ["halves"] * 6, "diagnostics.csv")
-    check(abs(float(rows[2]["noise"]) - summaries[0]["frames"][2]["noise"]) < 1e-5, "diagnostics.csv")
+    check_equal([row["noiseFrom"] for row in rows], ["probes"] * 6, "diagnostics.csv")
+    check(abs(float(rows[2]["noise"]) - frames[2]["noise"]) < 1e-5, "diagnostics.csv")
 
 
 def a_method_that_fails_is_named(programs, folder):
-    """15 degrees a frame by `sequential`: warned of by check and render, and the noise is told."""
+    """15 degrees a frame by `sequential`: warned of by check and render."""
     path = job_at(folder, sampling={"method": "sequential"}, environment={"rotation": {"degPerFrame": 15}})
     word = "turns 15 degrees a frame: `sequential` fails from 1.5 on glossy surfaces"
     check(word in programs.run("baton", "check", path).stdout, "check does not warn")
     done = programs.render(path, folder / "work")
     check(word in done.stderr, f"render does not warn:\n{done.stderr}")
-    told = re.search(r"noise +([\d.]+) % of the radiance.*neighbouring pixels", done.stdout)
-    check(told is not None, f"no noise:\n{done.stdout}")
+    check("\nnoise" not in done.stdout, f"carried samples tell nothing of their error:\n{done.stdout}")
 
     path = job_at(folder / "pool", environment={"rotation": {"degPerFrame": 15}})
     done = programs.render(path, folder / "work2")
     check("fails from" not in done.stderr, "`pool` holds")
-    quiet = re.search(r"noise +([\d.]+) % of the radiance.*two halves", done.stdout)
-    check(quiet is not None, f"no noise:\n{done.stdout}")
-    check(float(told[1]) > 2 * float(quiet[1]), f"`sequential` {told[1]} %, `pool` {quiet[1]} %")
+    check(re.search(r"noise +([\d.]+) % of the radiance.*sampled twice", done.stdout), f"no noise:\n{done.stdout}")
 
 
 def what_half_floats_cannot_hold_is_written_as_float(programs, folder):

@@ -53,7 +53,7 @@ LightSequence::LightSequence(const JobSpec& job, std::shared_ptr<MapCache> maps,
           share, [](const EnvironmentMap& map) { return map.size_bytes(); }, frames_in_hand(job)),
       presampled_(
           share, [](const PresampledLight& light) { return light.size_bytes(); },
-          frames_in_hand(job) * static_cast<std::size_t>(job.quality.rounds)) {}
+          frames_in_hand(job) * (static_cast<std::size_t>(job.quality.rounds) + 1)) {}
 
 Result<std::shared_ptr<const EnvironmentMap>> LightSequence::key_map(std::int32_t key) {
   const std::string& path = job_.environment.keys[static_cast<std::size_t>(key)].map;

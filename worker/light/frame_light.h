@@ -35,6 +35,9 @@ struct FrameLight {
 /// another light at once.
 std::optional<Mat3> turn_between(const Environment& before, const Environment& now);
 
+/// The round whose presampled light and random numbers no picture has (noise_probe.h).
+inline constexpr std::int32_t kProbeRound = 1 << 30;
+
 /// The environments of a job's frames, prepared on demand. What is made for a frame is kept while
 /// memory allows, of as many frames as tasks in hand may ask for. Any number of threads may ask; a
 /// frame is prepared once while the others wait. A frame's light is a pure function of (job, frame,
@@ -44,8 +47,8 @@ class LightSequence {
   /// job must outlive the object. maps: may be shared with other jobs. share: of what it makes.
   LightSequence(const JobSpec& job, std::shared_ptr<MapCache> maps, const MemorySharePtr& share);
 
-  /// The light of frame `index` (0-based) in a round; negative: before those that are seen. Errors:
-  /// a map that cannot be read, or two key frames of different size.
+  /// The light of frame `index` (0-based) in a round; negative: before those that are seen; or of
+  /// kProbeRound. Errors: a map that cannot be read, or two key frames of different size.
   Result<std::shared_ptr<const FrameLight>> at(std::int32_t index, std::int32_t round = 0);
 
   /// Texels set to 0 because they were negative, NaN or infinite, per map read so far: "path: 12

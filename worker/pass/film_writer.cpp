@@ -1,5 +1,7 @@
 #include "worker/pass/film_writer.h"
 
+#include "common/job/sequence.h"
+
 namespace baton {
 namespace {
 
@@ -53,12 +55,14 @@ Rgb source_color(PixelSource source) {
   return {};
 }
 
-FilmWriter::FilmWriter(const PixelRect& rect, const std::vector<Aov>& aovs) : aovs_(aovs) {
+FilmWriter::FilmWriter(const PixelRect& rect, const JobSpec& job)
+    : aovs_(job.output.aovs), with_error_(tells_noise(job)) {
   film_.rect = rect;
   film_.channels = {"R", "G", "B", "A"};
-  for (const Aov aov : aovs) {
+  for (const Aov aov : aovs_) {
     for (std::string& name : channel_names(aov)) film_.channels.push_back(std::move(name));
   }
+  if (with_error_) film_.channels.emplace_back(kErrorChannel);
   film_.values.resize(film_.channels.size() * film_.num_pixels());
 }
 
@@ -115,6 +119,7 @@ void FilmWriter::write(std::size_t index, const PixelResult& pixel) {
         break;
     }
   }
+  if (with_error_) put(pixel.error);
 }
 
 }  // namespace baton

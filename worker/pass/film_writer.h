@@ -3,6 +3,7 @@
 #include <array>
 
 #include "common/image/film_tile.h"
+#include "common/image/noise.h"
 #include "common/job/job_spec.h"
 #include "common/state/sample_state.h"
 #include "worker/method/pixel_sampler.h"
@@ -30,13 +31,14 @@ struct PixelResult {
       0;  ///< of the first site that sees a surface: index in the scene + 1; 0: none
   float variance =
       0;  ///< estimated squared error of the mean over RGB; 0 where the method has no estimate
+  float error = kNoSurface;  ///< as in the plane kErrorChannel
 };
 
-/// Pass: writes pixels into the channels of the job: R, G, B, A, then the AOVs in their
-/// order.
+/// Pass: writes pixels into the channels of the job: R, G, B, A, the AOVs in their order, and where
+/// the noise is told kErrorChannel.
 class FilmWriter {
  public:
-  FilmWriter(const PixelRect& rect, const std::vector<Aov>& aovs);
+  FilmWriter(const PixelRect& rect, const JobSpec& job);
   /// index: row by row inside the rectangle.
   void write(std::size_t index, const PixelResult& pixel);
   const FilmTile& film() const { return film_; }
@@ -44,6 +46,7 @@ class FilmWriter {
  private:
   FilmTile film_;
   std::vector<Aov> aovs_;
+  bool with_error_;
 };
 
 /// False colour of a pixel's source: green carried, red fresh, yellow restarted, blue refreshed,

@@ -22,7 +22,7 @@ Vec3 scaled(const std::array<double, 3>& sum, double factor) {
 RoundMean::RoundMean(const JobSpec& job, const PixelRect& rect)
     : num_rounds_(job.quality.rounds),
       rounds_are_uncorrelated_(rounds_have_own_sites(job)),
-      film_(rect, film_aovs(job)) {
+      film_(rect, job) {
   if (num_rounds_ > 1) sums_.resize(static_cast<std::size_t>(rect.area()));
 }
 
@@ -35,6 +35,7 @@ void RoundMean::add(std::size_t index, const PixelResult& pixel) {
   sum.variance += double{pixel.variance};
   sum.alpha += double{pixel.alpha};
   if (!(pixel.coverage > 0)) return;
+  if (pixel.error >= 0) sum.error = std::max(sum.error, 0.0) + double{pixel.error};
   if (sum.num_seen == 0) sum.material = pixel.material;
   ++sum.num_seen;
   sum.coverage += double{pixel.coverage};
@@ -63,6 +64,7 @@ PixelResult RoundMean::mean(const PixelSum& sum) const {
                                             : sum.variance / (k * k));
   }
   if (sum.num_seen == 0) return pixel;
+  pixel.error = sum.error >= 0 ? static_cast<float>(sum.error / (k * k)) : kErrorUnknown;
   const double seen = 1.0 / sum.num_seen;
   pixel.coverage = static_cast<float>(sum.coverage / k);
   pixel.depth = static_cast<float>(sum.depth / sum.coverage);

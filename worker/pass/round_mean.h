@@ -17,6 +17,7 @@ struct PixelSum {
   double ess_ratio = 0, acceptance = 0, acceptance_local = 0, acceptance_independent = 0;
   double resampled = 0, mask = 0;
   double variance = 0, squares = 0;  ///< squares: of the grey radiance
+  double error = kErrorUnknown;      ///< of the rounds whose error is known
   std::uint32_t material = 0;        ///< of the first round that sees one
   std::int32_t num_seen = 0;         ///< rounds that see a surface
 };
@@ -25,7 +26,8 @@ struct PixelSum {
 /// normal: over the sites that see a surface; visibility: share of all rounds' light; what a method
 /// did: over the rounds that see a surface. variance: from the scatter of kLeastForScatter rounds
 /// or more, which is unbiased where rounds are uncorrelated, as they are for all methods that carry
-/// no samples; of fewer, from what the method says of each; with carried samples 0.
+/// no samples; of fewer, from what the method says of each; with carried samples 0. error: the
+/// probes of all rounds are the same pixels; without bias, as each round is, given those before.
 class RoundMean {
  public:
   static constexpr int kLeastForScatter = 4;

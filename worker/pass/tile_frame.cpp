@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <bit>
+#include <optional>
 
 #include "common/base/poison.h"
 #include "common/job/sequence.h"
@@ -33,13 +34,22 @@ struct TileFrameRenderer::Batch {
   std::array<std::size_t, kBatchPixels> end_ray;  ///< where each pixel's rays end
   std::array<KnownLight, kBatchPixels> known;
   std::array<PixelResult, kBatchPixels> pixels;
-  std::array<Rgb, kBatchPixels> emission;  ///< of the surfaces that are seen
+  std::array<Rgb, kBatchPixels> emission;                ///< of the surfaces that are seen
+  std::array<std::optional<float>, kBatchPixels> again;  ///< grey radiance, of probes
 
-  RngKey key(const RenderContext& context, const PixelRect& rect, std::size_t index) const {
+  /// x and y in the image.
+  static std::array<std::int32_t, 2> place(const PixelRect& rect, std::size_t index) {
     const auto width = static_cast<std::size_t>(rect.width());
-    const auto x = rect.x0 + static_cast<std::int32_t>(index % width);
-    const auto y = rect.y0 + static_cast<std::int32_t>(index / width);
+    return {rect.x0 + static_cast<std::int32_t>(index % width),
+            rect.y0 + static_cast<std::int32_t>(index / width)};
+  }
+  RngKey key(const RenderContext& context, const PixelRect& rect, std::size_t index) const {
+    const auto [x, y] = place(rect, index);
     return pixel_key(context.job.seed, frame_number, context.job.image.width, x, y, round);
+  }
+  bool is_probe(const RenderContext& context, const PixelRect& rect, std::size_t index) const {
+    const auto [x, y] = place(rect, index);
+    return baton::is_probe(x, y, frame_number, context.job.seed);
   }
 };
 
@@ -85,7 +95,7 @@ void TileFrameRenderer::render_batches(const TileRound& at, SampleState& state, 
       const StageTimer timer(stages_.reproject);
       reprojection_->look_up(at.surfaces, batch.first, batch.count, at.frame.number);
     }
-    sample(batch, at.light, state);
+    sample(batch, at, state);
     trace(batch);
     learn(batch, state);
     finish(batch, at.light, film);
@@ -139,8 +149,9 @@ void TileFrameRenderer::look_ahead(std::size_t pixel_of_batch, std::size_t index
 }
 
 /// Pass: what every pixel's method knows of it, and the rays that tell the rest.
-void TileFrameRenderer::sample(Batch& batch, const FrameLight& light, SampleState& state) {
+void TileFrameRenderer::sample(Batch& batch, const TileRound& at, SampleState& state) {
   const StageTimer timer(stages_.sample);
+  const FrameLight& light = at.light;
   const EnvironmentView now = view_of(light.now);
   const EnvironmentView before = view_of(light.before);
   const auto populations = static_cast<std::size_t>(state.num_populations);
@@ -149,6 +160,7 @@ void TileFrameRenderer::sample(Batch& batch, const FrameLight& light, SampleStat
   poison(batch.end_ray);
   batch.known.fill({});
   batch.emission.fill({});
+  batch.again.fill({});
   const kernels::CarriedLight carried{before, now, light.still, *light.presampled};
   look_ahead(0, batch.first, carried, state);
   for (std::size_t i = 0; i < batch.count; ++i) {
@@ -186,6 +198,10 @@ void TileFrameRenderer::sample(Batch& batch, const FrameLight& light, SampleStat
         .hits = surfaces_->pixel(index),
         .geometry = &geometry_};
     const SiteOrigins from = origins(index);
+    if (at.probe_light != nullptr && batch.is_probe(context_, surfaces_->rect, index)) {
+      batch.again[i] = probe_.sample_again(method_of(index), input, *at.probe_light, state, index,
+                                           from, *scratch_);
+    }
     RayWriter rays(from, batch.rays);
     poison(*scratch_);
     const PixelDiagnostics did = method_of(index).sample(input, {state, index}, *scratch_, rays);
@@ -240,6 +256,9 @@ void TileFrameRenderer::learn(Batch& batch, SampleState& state) {
     // variance of the whole, as neighbours differ least.
     const float d = known.difference + found.difference;
     pixel.variance = known.has_halves ? d * d : known.variance;
+    const std::optional<float>& again = batch.again[i];
+    pixel.error =
+        again ? static_cast<float>(squared_error(mean(pixel.radiance), *again)) : kErrorUnknown;
 
     const FoundRays rays{.sample = std::span(batch.rays.sample).subspan(first, count),
                          .tag = std::span(batch.rays.tag).subspan(first, count),

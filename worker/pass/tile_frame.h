@@ -8,6 +8,7 @@
 #include "worker/light/carried_light.h"
 #include "worker/method/pixel_method.h"
 #include "worker/pass/first_pass_collector.h"
+#include "worker/pass/noise_probe.h"
 #include "worker/pass/primary.h"
 #include "worker/pass/reproject.h"
 #include "worker/pass/round_mean.h"
@@ -20,6 +21,8 @@ struct TileRound {
   std::int32_t round = 0;  ///< of the frame; negative: before those that are seen
   const FrameLight& light;
   const TileSurfaces& surfaces;  ///< what its sites see
+  /// The light that probes are sampled again with; null: there are none.
+  const FrameLight* probe_light = nullptr;
 
   /// Number of the pass in the sequence: to a method a round is a frame of standing light.
   std::int32_t step(std::int32_t num_rounds) const { return frame.index * num_rounds + round; }
@@ -70,7 +73,7 @@ class TileFrameRenderer {
     const auto n = static_cast<std::size_t>(state.num_particles);
     return std::span(targets_).subspan(index * n, n);
   }
-  void sample(Batch& batch, const FrameLight& light, SampleState& state);
+  void sample(Batch& batch, const TileRound& at, SampleState& state);
   const PixelMethod& method_of(std::size_t index) const;
   void look_ahead(std::size_t pixel_of_batch, std::size_t index, const kernels::CarriedLight& light,
                   SampleState& state);
@@ -91,6 +94,7 @@ class TileFrameRenderer {
   std::vector<float> targets_;
   bool knows_targets_ = false;  ///< for the round in work
   std::unique_ptr<SamplerScratch> scratch_;
+  NoiseProbe probe_;
   FirstPassCollector collector_;
   RenderStats stats_;
   Stages stages_;

@@ -79,11 +79,15 @@ class TileWalk {
     const std::int32_t first = frame.index == 0 ? -num_preroll_rounds(context_.job) : 0;
     std::optional<RoundMean> unseen;
     if (first < 0) unseen.emplace(context_.job, rect_);
+    std::shared_ptr<const FrameLight> probe_light;
+    if (tells_noise(context_.job)) {
+      BATON_ASSIGN(probe_light, light_of(frame, kProbeRound));
+    }
     for (std::int32_t round = first; round < context_.job.quality.rounds; ++round) {
       if (stop_.stop_requested()) return Error{ErrorKind::cancelled, "stopped"};
       BATON_ASSIGN(const std::shared_ptr<const FrameLight> light, light_of(frame, round));
       const std::shared_ptr<const TileSurfaces> surfaces = surfaces_of(round);
-      const TileRound at{frame, round, *light, *surfaces};
+      const TileRound at{frame, round, *light, *surfaces, round < 0 ? nullptr : probe_light.get()};
       RoundMean& mean = round < 0 ? *unseen : film;
       if (shares_ && round == first) {
         // Tiles ask for those of the frame before; one that is behind them traces them again.

@@ -7,6 +7,7 @@
 
 #include "common/base/files.h"
 #include "common/base/version.h"
+#include "common/image/noise.h"
 #include "common/job/job_fields.h"
 #include "common/job/motion.h"
 #include "common/job/sequence.h"
@@ -24,10 +25,6 @@ bool same_after_rounding(float value, float stored) {
   if (std::fabs(value) >= kHalfMax)
     return std::fabs(stored) >= kHalfMax && (value > 0) == (stored > 0);
   return std::fabs(value - stored) <= std::fabs(value) * kHalfStep + kHalfSmallest;
-}
-
-bool shows(const OutputSpec& output, Aov aov) {
-  return std::find(output.aovs.begin(), output.aovs.end(), aov) != output.aovs.end();
 }
 
 void drop_channel(FilmTile& image, std::string_view name) {
@@ -148,7 +145,7 @@ Result<WrittenFrame> write_frame(const JobSpec& job, const Digest& job_digest,
   FrameQuality quality = judge_frame(image);
   quality.clamped = job.output.clamp_negative;
   if (job.output.clamp_negative) clamp_negative(image);
-  if (!shows(job.output, Aov::variance)) drop_channel(image, "variance");
+  drop_channel(image, kErrorChannel);
 
   const std::filesystem::path path = frame_path(job, frame_index);
   const int number = job.frames.at(static_cast<std::size_t>(frame_index));

@@ -15,7 +15,7 @@ std::vector<FrameStats> sequence(std::size_t count, float noise = 0.04f, float m
     frames[i].sampling.pixels_carried = 90;
     const float wobble = i % 2 == 0 ? 1.02f : 0.98f;
     frames[i].quality = {.pixels = 100,
-                         .noise_source = NoiseSource::halves,
+                         .noise_source = NoiseSource::probes,
                          .noise = noise * wobble,
                          .mean = mean * wobble};
   }

@@ -180,7 +180,8 @@ TEST(RoundMean, EveryAovHasItsMeaning) {
                      .depth = 2,
                      .mask = 1,
                      .material = 3,
-                     .variance = 0.4f};
+                     .variance = 0.4f,
+                     .error = 0.2f};
   PixelResult half = bright;
   half.radiance = {1, 1, 1};
   half.coverage = half.alpha = 0.5f;
@@ -190,6 +191,7 @@ TEST(RoundMean, EveryAovHasItsMeaning) {
   half.depth = 5;
   half.mask = 0;
   half.material = 4;
+  half.error = 0.7f;
   const PixelResult nothing{.radiance = {1, 1, 1}};
   const FilmTile film = mean_of(Method::pool, {nothing, bright, half});
   const auto value = [&](const char* name) { return channel(film, name)[0]; };
@@ -204,6 +206,10 @@ TEST(RoundMean, EveryAovHasItsMeaning) {
   EXPECT_FLOAT_EQ(value("source.G"), 1);
   EXPECT_EQ(value("material"), 3) << "of the first that sees one";
   EXPECT_FLOAT_EQ(value("variance"), 0.8f / 9);
+  EXPECT_FLOAT_EQ(value(kErrorChannel), 0.9f / 9);
+  EXPECT_EQ(channel(mean_of(Method::pool, {nothing, nothing}), kErrorChannel)[0], kNoSurface);
+  bright.error = half.error = kErrorUnknown;
+  EXPECT_EQ(channel(mean_of(Method::pool, {bright, half}), kErrorChannel)[0], kErrorUnknown);
   EXPECT_FLOAT_EQ(channel(mean_of(Method::pool, {nothing, nothing}), "mask")[0], 0.5f);
 }
 

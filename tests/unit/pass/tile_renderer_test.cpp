@@ -165,20 +165,6 @@ TEST(RunTile, JobsThatShareASiteSeedSeeTheSamePoints) {
   EXPECT_EQ(depths(9, 0), depths(2, 9)) << "else it is the job's seed";
 }
 
-TEST(RunTile, FilmsHoldTheErrorThatTheMethodTells) {
-  JobSpec job = sequence_job(1);
-  job.output.aovs = {Aov::depth};
-  for (const Method method : {Method::pool, Method::ratio, Method::reference}) {
-    job.sampling.method = method;
-    const FilmTile film = render_tile(job).films.back();
-    ASSERT_NE(film.find("variance"), nullptr) << static_cast<int>(method);
-    const auto variance = channel(film, "variance");
-    EXPECT_GT(*std::max_element(variance.begin(), variance.end()), 0) << static_cast<int>(method);
-  }
-  job.sampling.method = Method::bidirectional;
-  EXPECT_EQ(render_tile(job).films.back().find("variance"), nullptr);
-}
-
 // The variance that the presampled light states from its even and odd samples is, on average, at
 // least what is seen over 64 seeds (whose own error is 5 % of it), and not many times more.
 TEST(RunTile, PoolStatesItsVariance) {

@@ -7,6 +7,7 @@
 #include "common/base/files.h"
 #include "common/base/limits.h"
 #include "common/base/version.h"
+#include "common/image/noise.h"
 #include "common/job/sequence.h"
 
 namespace baton {
@@ -79,7 +80,7 @@ TEST(FrameOutput, AFrameIsWrittenVerifiedAndNamedByItsDigest) {
   EXPECT_EQ(ref->kind, BlobKind::image);
   EXPECT_EQ(ref->frame, 1);
   EXPECT_EQ(written->quality.pixels, 200u);
-  EXPECT_EQ(written->quality.noise_source, NoiseSource::neighbors);
+  EXPECT_EQ(written->quality.noise_source, NoiseSource::none);
 
   const std::filesystem::path path = frame_path(job, 1);
   EXPECT_EQ(path.filename(), "frame.0009.exr");
@@ -101,7 +102,6 @@ TEST(FrameOutput, AFrameIsWrittenVerifiedAndNamedByItsDigest) {
                                                             {"baton:mapMixedIn", "noon.exr"},
                                                             {"baton:mapMix", "0.8"},
                                                             {"baton:rotationDeg", "17"},
-                                                            {"baton:noiseFrom", "neighbors"},
                                                             {"baton:pixelsBelowZero", "0"},
                                                             {"framesPerSecond", "24000/1001"},
                                                             {"baton:metadata:owner", "lighting"}}));
@@ -181,20 +181,16 @@ TEST(FrameOutput, ColoursPastAHalfFloatAreWrittenAsFloat) {
   EXPECT_EQ(stored.find("G")[9], image.plane(1)[9]) << "the other colours, too";
 }
 
-TEST(FrameOutput, AnErrorThatNoAovAsksForStaysOutOfTheFrame) {
-  JobSpec job = small_job("error");
+TEST(FrameOutput, ErrorsTellTheNoiseAndStayOutOfTheFrame) {
+  const JobSpec job = small_job("error");
   FilmTile image = assembled(job);
-  image.channels.insert(image.channels.begin() + 1, "variance");
+  image.channels.insert(image.channels.begin() + 1, kErrorChannel);
   image.values.insert(image.values.begin() + 200, 200, 0.04f);
   const FrameQuality seen = write_frame(job, {3, 4}, 0, image).value().quality;
-  EXPECT_EQ(seen.noise_source, NoiseSource::halves);
+  EXPECT_EQ(seen.noise_source, NoiseSource::probes);
   EXPECT_NEAR(seen.noise, 0.2f / seen.mean, 1e-4f);
-  EXPECT_EQ(read_exr(frame_path(job, 0)).value().find("variance"), nullptr);
-  job.output.aovs = {Aov::variance};
-  ASSERT_TRUE(write_frame(job, {3, 4}, 0, image));
   const FilmTile stored = read_exr(frame_path(job, 0)).value();
-  ASSERT_NE(stored.find("variance"), nullptr);
-  EXPECT_EQ(stored.find("variance")[7], 0.04f);
+  EXPECT_EQ(stored.find(kErrorChannel), nullptr);
   EXPECT_NEAR(stored.find("G")[9], image.find("G")[9], 0.01f);
 }
 

@@ -4,7 +4,8 @@
 
 #include <cmath>
 #include <limits>
-#include <random>
+
+#include "common/image/noise.h"
 
 namespace baton {
 namespace {
@@ -15,65 +16,18 @@ FilmTile film(int width, int height, const std::vector<std::string>& channels, f
   return film;
 }
 
-/// Grey noise of this relative deviation on a radiance of 2.
-FilmTile noisy(float relative, unsigned seed) {
-  FilmTile image = film(120, 90, {"R", "G", "B", "A"}, 1);
-  std::mt19937 random(seed);
-  std::normal_distribution<float> normal(0, relative);
-  for (std::size_t i = 0; i < image.num_pixels(); ++i) {
-    const float grey = 2 * (1 + normal(random));
-    for (std::size_t c = 0; c < 3; ++c) image.plane(c)[i] = grey;
-  }
-  return image;
-}
-
-TEST(FrameQuality, NoiseIsToldFromNeighboursWhereNoErrorIsKnown) {
-  for (const float relative : {0.02f, 0.2f}) {
-    const FrameQuality seen = judge_frame(noisy(relative, 3));
-    EXPECT_EQ(seen.noise_source, NoiseSource::neighbors);
-    EXPECT_NEAR(seen.noise / relative, 1, 0.04) << relative;
-    EXPECT_NEAR(seen.mean, 2, 0.03);
-  }
-}
-
-TEST(FrameQuality, SaltAndPepperIsNoise) {
-  FilmTile image = film(100, 100, {"R", "G", "B", "A"}, 1);
-  for (std::size_t i = 7; i < image.num_pixels(); i += 100) image.plane(0)[i] = 301;
-  // One pixel of 100 is 100 brighter in grey: rms 10 over a mean of 2.
-  EXPECT_NEAR(judge_frame(image).noise, 5 / std::sqrt(1.18), 0.1);
-}
-
-TEST(FrameQuality, EdgesCountLittle) {
-  const auto edge = [](std::size_t rows_a_step) {
-    FilmTile image = film(100, 100, {"R", "G", "B", "A"}, 1);
-    for (std::size_t i = 0; i < image.num_pixels(); ++i) {
-      const bool bright = i % 100 > 40 + (i / 100) / rows_a_step;
-      for (std::size_t c = 0; c < 3 && bright; ++c) image.plane(c)[i] = 10;
-    }
-    return judge_frame(image).noise;
-  };
-  EXPECT_LT(edge(1000), 1e-6f) << "a straight one of 1 : 10";
-  EXPECT_LT(edge(3), 0.1f) << "its steps count; their rms to the mean of their neighbours is 0.3";
-}
-
-TEST(FrameQuality, WhatIsTransparentIsLeftOut) {
-  FilmTile image = noisy(0.1f, 4);
-  for (std::size_t i = 0; i < image.num_pixels(); ++i) {
-    if (i % 120 < 60) continue;
-    for (std::size_t c = 0; c < 4; ++c) image.plane(c)[i] = 0;
-  }
-  EXPECT_NEAR(judge_frame(image).noise, 0.1, 0.01);
-}
-
-TEST(FrameQuality, AKnownErrorIsTaken) {
-  FilmTile image = film(10, 10, {"R", "G", "B", "A", "variance"}, 0);
-  for (std::size_t i = 0; i < 50; ++i) {  // half of the pixels see a surface
-    for (std::size_t c = 0; c < 3; ++c) image.plane(c)[i] = 4;
-    image.plane(4)[i] = i % 2 == 0 ? 0.16f : 0.64f;
-  }
+TEST(FrameQuality, NoiseIsToldByTheErrorsOfAFilm) {
+  FilmTile image = film(10, 10, {"R", "G", "B", "A", kErrorChannel}, 4);
+  for (std::size_t i = 0; i < 100; ++i)
+    image.plane(4)[i] = i < 50 ? kNoSurface : i % 25 == 0 ? 0.16f : i % 25 == 1 ? 0.64f : -1;
   const FrameQuality seen = judge_frame(image);
-  EXPECT_EQ(seen.noise_source, NoiseSource::halves);
-  EXPECT_NEAR(seen.noise, std::sqrt(0.4f) / 4, 1e-5f) << "over the pixels that have an error";
+  EXPECT_EQ(seen.noise_source, NoiseSource::probes);
+  EXPECT_NEAR(seen.noise, std::sqrt(0.4f) / 4, 1e-5f);
+}
+
+TEST(FrameQuality, NoiseIsNotToldWithoutErrors) {
+  EXPECT_EQ(judge_frame(film(10, 10, {"R", "G", "B", "A"}, 4)).noise_source, NoiseSource::none);
+  EXPECT_EQ(judge_frame(film(10, 10, {"R", "G", "B", "A", kErrorChannel}, kErrorUnknown)).noise, 0);
 }
 
 TEST(FrameQuality, OddValuesAreCountedOnceAPixel) {

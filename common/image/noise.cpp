@@ -1,0 +1,68 @@
+#include "common/image/noise.h"
+
+#include <algorithm>
+#include <array>
+#include <cmath>
+
+namespace baton {
+namespace {
+
+/// The colours of a film; false: it has not all of them.
+struct Colors {
+  std::array<const float*, 3> plane;
+
+  explicit Colors(const FilmTile& film) : plane{film.find("R"), film.find("G"), film.find("B")} {}
+  explicit operator bool() const { return plane[0] && plane[1] && plane[2]; }
+  double grey(std::size_t i) const {
+    return (double{plane[0][i]} + double{plane[1][i]} + double{plane[2][i]}) / 3;
+  }
+};
+
+}  // namespace
+
+void FrameNoise::add_pixel(double grey) {
+  if (!std::isfinite(grey)) return;
+  light_ += grey;
+  ++num_pixels_;
+}
+
+void FrameNoise::add_error(double square) {
+  if (!std::isfinite(square)) return;
+  squares_ += square;
+  ++num_errors_;
+}
+
+float FrameNoise::relative() const {
+  if (!is_told()) return 0;
+  const double error = std::sqrt(squares_ / static_cast<double>(num_errors_));
+  return static_cast<float>(error * static_cast<double>(num_pixels_) / light_);
+}
+
+FrameNoise noise_of_film(const FilmTile& film) {
+  FrameNoise noise;
+  const Colors colors(film);
+  const float* const error = film.find(kErrorChannel);
+  if (!colors || error == nullptr) return noise;
+  for (std::size_t i = 0; i < film.num_pixels(); ++i) {
+    if (error[i] == kNoSurface) continue;
+    noise.add_pixel(colors.grey(i));
+    if (error[i] != kErrorUnknown) noise.add_error(double{error[i]});
+  }
+  return noise;
+}
+
+FrameNoise noise_of_seeds(const FilmTile& a, const FilmTile& b) {
+  FrameNoise noise;
+  const Colors first(a), second(b);
+  const float* const alpha = a.find("A");
+  if (!first || !second || alpha == nullptr || a.rect != b.rect) return noise;
+  for (std::size_t i = 0; i < a.num_pixels(); ++i) {
+    if (!(alpha[i] > 0)) continue;
+    const double x = first.grey(i), y = second.grey(i);
+    noise.add_pixel((x + y) / 2);
+    noise.add_error(squared_error(x, y));
+  }
+  return noise;
+}
+
+}  // namespace baton

@@ -1,0 +1,50 @@
+#pragma once
+
+#include <cstddef>
+
+#include "common/image/film_tile.h"
+
+namespace baton {
+
+/// The noise of a frame, the one measure of it in the program:
+///
+///   sqrt(mean over probes of sigma^2) / (mean over surfaces of grey)
+///
+/// grey: mean of R, G and B of a pixel; sigma^2: an estimate without bias of its squared error at
+/// fixed sites; surfaces: all pixels that see one; probes: those of them whose error is known.
+/// Methods rank by it as by their RMSE, as all of them have the same mean.
+class FrameNoise {
+ public:
+  /// A pixel that sees a surface. Values that are not finite are left out.
+  void add_pixel(double grey);
+  /// An estimate of the squared error of such a pixel.
+  void add_error(double square);
+
+  /// Whether there are errors and light to tell it from.
+  bool is_told() const { return num_errors_ > 0 && light_ > 0; }
+  /// 0 where it is not told.
+  float relative() const;
+
+ private:
+  double squares_ = 0, light_ = 0;
+  std::size_t num_errors_ = 0, num_pixels_ = 0;
+};
+
+/// Half the squared difference of two independent estimates of one value: without bias, the squared
+/// error of each.
+inline double squared_error(double a, double b) { return (a - b) * (a - b) / 2; }
+
+/// The plane of films that tells the squared error of pixels; frames do not have it.
+inline constexpr char kErrorChannel[] = "error";
+/// In that plane: a pixel that sees no surface, and one whose error is not known.
+inline constexpr float kNoSurface = -2, kErrorUnknown = -1;
+
+/// Of a film with an error plane and R, G, B; not told without them. Sums are taken in the order of
+/// the pixels.
+FrameNoise noise_of_film(const FilmTile& film);
+
+/// Of two frames with the channels R, G, B, A of one size, by two seeds that see the same sites;
+/// pixels that see a surface are those with alpha. Not told without the channels.
+FrameNoise noise_of_seeds(const FilmTile& a, const FilmTile& b);
+
+}  // namespace baton
