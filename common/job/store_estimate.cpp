@@ -15,6 +15,8 @@ namespace {
 // Measured sizes, in bytes a pixel that sees a surface: docs/scheduling.md has the table.
 /// One of R, G, B; also in a sky.
 constexpr double kColorBytes = 3.2;
+/// The errors of a few pixels.
+constexpr double kErrorBytes = 0.1;
 /// What a memory takes after kMemoryRays shadow rays; it grows with their square root, until all
 /// bins above the horizon are known. Where things move, some pixels start afresh in each frame.
 constexpr double kMemoryBytes = 200, kMemoryRays = 800, kMostMemoryBytes = 310;
@@ -53,10 +55,10 @@ double film_bytes(Aov aov) {
 double film_bytes_per_pixel(const JobSpec& job, double surface_share) {
   const bool has_sky = job.output.background == Background::environment;
   double bytes = 3 * kColorBytes * (has_sky ? 1 : surface_share);
-  for (const Aov aov : film_aovs(job)) {
+  for (const Aov aov : job.output.aovs) {
     if (why_empty(aov, job).empty()) bytes += surface_share * film_bytes(aov);
   }
-  return bytes;
+  return bytes + (tells_noise(job) ? kErrorBytes : 0);
 }
 
 /// Of a pixel's state after frames [0, end), on average.
