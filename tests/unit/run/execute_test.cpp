@@ -248,7 +248,7 @@ TEST_F(ExecuteTest, AJobThatDoesNotFitIntoMemoryIsRefusedWithTheNumbers) {
   std::uint64_t bytes = 1 << 10;
   Result<LoadedJobPtr> no_scene = load_with(bytes);
   while (!no_scene && no_scene.error().message == no_frame.error().message)
-    no_scene = load_with(bytes += bytes / 8);
+    no_scene = load_with(bytes += 1 << 11);
   ASSERT_FALSE(no_scene);
   EXPECT_THAT(no_scene.error().message, testing::HasSubstr("the scene does not fit into memory"));
 }
