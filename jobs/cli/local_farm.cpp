@@ -39,6 +39,13 @@ std::string draw_endpoint() {
   return fmt::format("ipc://@baton-{:08x}{:08x}", random(), random());
 }
 
+/// The share of one worker; there is one.
+std::uint64_t memory_mib_of_each(const FarmOptions& options) {
+  const std::uint64_t all =
+      options.memory_bytes > 0 ? options.memory_bytes : default_memory_bytes();
+  return std::max<std::uint64_t>(1, (all >> 20) / static_cast<std::uint64_t>(options.workers));
+}
+
 }  // namespace
 
 LocalFarm::Lock::~Lock() {
@@ -72,14 +79,11 @@ Result<LocalFarm> LocalFarm::start(const FarmOptions& options) {
   LocalFarm farm(options, options.listen.empty() ? draw_endpoint() : options.listen,
                  std::move(lock));
   BATON_TRY(farm.start_coordinator(coordinator));
-  const std::uint64_t memory =
-      options.memory_bytes > 0 ? options.memory_bytes : default_memory_bytes();
-  const std::uint64_t memory_mib = (memory >> 20) / static_cast<std::uint64_t>(options.workers);
   for (int i = 1; i <= options.workers; ++i) {
     BATON_TRY(farm.add_member(fmt::format("worker-{}", i),
                               {worker, "--coordinator", farm.endpoint_, "--threads",
                                std::to_string(options.threads_per_worker), "--memory",
-                               std::to_string(std::max<std::uint64_t>(1, memory_mib))}));
+                               std::to_string(memory_mib_of_each(options))}));
   }
   return farm;
 }

@@ -1,10 +1,7 @@
 #include <embree3/rtcore.h>
 
-#include <sys/types.h>
-
 #include <algorithm>
 #include <array>
-#include <atomic>
 #include <cstring>
 #include <limits>
 #include <map>
@@ -13,6 +10,7 @@
 
 #include "common/base/check.h"
 #include "worker/accel/accel.h"
+#include "worker/accel/allocation_count.h"
 
 namespace baton {
 namespace {
@@ -92,22 +90,6 @@ void attach_placed(RTCDevice device, RTCScene target, RTCScene mesh, const Trans
   rtcCommitGeometry(geometry.get());
   rtcAttachGeometryByID(target, geometry.get(), index);
 }
-
-/// Counts what Embree allocates, and stops it from taking more than is allowed.
-struct AllocationCount {
-  std::atomic<std::int64_t> bytes{0};
-  std::int64_t allowed = std::numeric_limits<std::int64_t>::max();
-  std::atomic<bool> was_exceeded{false};
-
-  /// change: negative where memory is given back. The answer counts for allocations alone.
-  static bool note(void* count, ssize_t change, bool /*done*/) {
-    auto& self = *static_cast<AllocationCount*>(count);
-    const std::int64_t now = self.bytes += change;
-    if (change <= 0 || now <= self.allowed) return true;
-    self.was_exceeded = true;
-    return false;
-  }
-};
 
 /// What all poses of a scene share.
 struct SharedGeometry {
