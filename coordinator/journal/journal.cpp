@@ -7,73 +7,10 @@
 #include <utility>
 
 #include "common/base/archive.h"
+#include "coordinator/journal/schema.h"
 
 namespace baton {
 namespace {
-
-constexpr std::int64_t kSchemaVersion = 5;
-constexpr std::int64_t kApplicationId = 0x4241544e;  // "BATN"
-
-// Digests, keys and statuses are written as numbers and hexadecimal text, so that the sqlite3 shell
-// shows them; outputs, statistics and leases in the form of common/base/archive.h: a change of
-// BlobRef, RenderStats, FrameStats or LeaseId is a new schema version. Of `permanent` bit 0 says
-// that no retry by this worker can help, bit 1 that the task has failed for good with it. The
-// completions of a job in the archive are pieces, packed by zstd (journal_archive.cpp). `kept` is
-// what the blobs of kept_blobs take, each counted once.
-constexpr const char* kSchema = R"sql(
-  CREATE TABLE starts (epoch INTEGER NOT NULL);
-  INSERT INTO starts VALUES (0);
-  CREATE TABLE jobs (
-    position INTEGER PRIMARY KEY AUTOINCREMENT,
-    digest TEXT NOT NULL UNIQUE,
-    status INTEGER NOT NULL,
-    document TEXT NOT NULL,
-    name TEXT NOT NULL,
-    folder TEXT NOT NULL,
-    plan BLOB NOT NULL,
-    archived INTEGER NOT NULL DEFAULT 0);
-  CREATE INDEX jobs_by_name ON jobs (name);
-  CREATE INDEX jobs_by_folder ON jobs (folder);
-  CREATE INDEX open_jobs ON jobs (position) WHERE archived = 0;
-  CREATE TABLE completions (
-    position INTEGER PRIMARY KEY AUTOINCREMENT,
-    job TEXT NOT NULL,
-    kind INTEGER NOT NULL, step INTEGER NOT NULL, tile INTEGER NOT NULL,
-    outputs BLOB NOT NULL,
-    stats BLOB NOT NULL,
-    frames BLOB NOT NULL,
-    UNIQUE (job, kind, step, tile));
-  CREATE TABLE failures (
-    position INTEGER PRIMARY KEY AUTOINCREMENT,
-    job TEXT NOT NULL,
-    lease BLOB NOT NULL,
-    worker TEXT NOT NULL,
-    message TEXT NOT NULL,
-    permanent INTEGER NOT NULL);
-  CREATE INDEX failures_by_job ON failures (job);
-  CREATE TABLE archive (
-    position INTEGER PRIMARY KEY,
-    job TEXT NOT NULL UNIQUE,
-    summary BLOB NOT NULL, detail BLOB NOT NULL);
-  CREATE TABLE archived_completions (
-    position INTEGER PRIMARY KEY,
-    job TEXT NOT NULL,
-    raw_bytes INTEGER NOT NULL, stored_raw INTEGER NOT NULL, packed BLOB NOT NULL);
-  CREATE INDEX archived_completions_by_job ON archived_completions (job);
-  CREATE TABLE kept_blobs (
-    blob TEXT NOT NULL, job TEXT NOT NULL, size_bytes INTEGER NOT NULL,
-    PRIMARY KEY (blob, job)) WITHOUT ROWID;
-  CREATE INDEX kept_blobs_by_job ON kept_blobs (job);
-  CREATE TABLE kept (size_bytes INTEGER NOT NULL);
-  INSERT INTO kept VALUES (0);
-  CREATE TRIGGER keep_blob BEFORE INSERT ON kept_blobs
-    WHEN NOT EXISTS (SELECT 1 FROM kept_blobs WHERE blob = new.blob)
-    BEGIN UPDATE kept SET size_bytes = size_bytes + new.size_bytes; END;
-  CREATE TRIGGER let_blob_go AFTER DELETE ON kept_blobs
-    WHEN NOT EXISTS (SELECT 1 FROM kept_blobs WHERE blob = old.blob)
-    BEGIN UPDATE kept SET size_bytes = size_bytes - old.size_bytes; END;
-  CREATE TABLE owners (job TEXT PRIMARY KEY, name TEXT NOT NULL);
-)sql";
 
 /// What is read at the start, and so is checked then.
 constexpr std::array kCheckedTables{"starts", "jobs", "completions", "failures"};

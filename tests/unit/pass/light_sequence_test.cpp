@@ -29,6 +29,7 @@ TEST(LightSequence, KeepsTheLightOfTheLastFramesAlone) {
   for (std::int32_t f = 0; f < 60; ++f) {
     const auto light = lights.at(f);
     ASSERT_TRUE(light.ok());
+    ASSERT_TRUE(lights.at(f, kProbeRound).ok());
     maps.push_back((*light)->now.map);
     presampled.push_back((*light)->presampled);
   }

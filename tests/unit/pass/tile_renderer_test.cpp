@@ -69,11 +69,11 @@ TEST(RunTile, EachMaterialIsSampledByItsOwnSetting) {
     }
     alike[number] = render_tiled(whole, 4096, 5).back();
   }
-  const std::size_t plane = mixed.channels.size() - 1;
-  ASSERT_EQ(mixed.channels[plane], "material");
+  const float* const materials = mixed.find("material");
+  ASSERT_NE(materials, nullptr);
   std::map<float, int> pixels;
   for (std::size_t i = 0; i < mixed.num_pixels(); ++i) {
-    const float material = mixed.plane(plane)[i];
+    const float material = materials[i];
     pixels[material] += 1;
     if (material == 0) continue;
     for (std::size_t c = 0; c < mixed.channels.size(); ++c)
