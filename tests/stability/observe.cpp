@@ -6,6 +6,7 @@
 #include <numeric>
 #include <utility>
 
+#include "common/image/noise.h"
 #include "tests/stability/parallel.h"
 #include "worker/method/weighted_method.h"
 #include "worker/pass/render_context.h"
@@ -49,7 +50,8 @@ struct Run {
         std::count_if(film.values.begin(), film.values.end(), std::not_fn(finite)));
     for (std::size_t p = 0; p < film.num_pixels(); ++p) {
       bool below = false;
-      for (std::size_t c = 0; c < film.channels.size(); ++c) below |= film.plane(c)[p] < 0;
+      for (std::size_t c = 0; c < film.channels.size(); ++c)
+        below |= film.channels[c] != kErrorChannel && film.plane(c)[p] < 0;
       negative += below ? 1 : 0;
     }
     pixels += film.num_pixels();

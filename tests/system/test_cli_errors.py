@@ -125,7 +125,7 @@ class CliErrors(unittest.TestCase):
         self.assertIn("sky.hdr cannot be written", result.stdout)
         result = self.baton("check", self.job(
             image={"width": 8192, "height": 8192, "tileSize": 512}, frames="1-3000", output={"pixelType": "float"}))
-        self.assertIn(" are free, and frames, states and tiles may take ", result.stdout)
+        self.assertIn(" are free, and frames may take ", result.stdout)
 
     def test_check_tells_of_the_pilot(self):
         job = self.job(sampling={"method": "auto"}, frames="1-48")
