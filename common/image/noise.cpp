@@ -29,6 +29,7 @@ void FrameNoise::add_pixel(double grey) {
 void FrameNoise::add_error(double square) {
   if (!std::isfinite(square)) return;
   squares_ += square;
+  squares_of_squares_ += square * square;
   ++num_errors_;
 }
 
@@ -36,6 +37,15 @@ float FrameNoise::relative() const {
   if (!is_told()) return 0;
   const double error = std::sqrt(squares_ / static_cast<double>(num_errors_));
   return static_cast<float>(error * static_cast<double>(num_pixels_) / light_);
+}
+
+float FrameNoise::error_share() const {
+  if (!is_told() || !(squares_ > 0)) return 0;
+  // Of a mean, by the scatter of its values; a root has half of it.
+  const double n = static_cast<double>(num_errors_);
+  if (n < 2) return 1;
+  const double scatter = std::max(0.0, n * squares_of_squares_ / (squares_ * squares_) - 1);
+  return static_cast<float>(std::sqrt(scatter / (n - 1)) / 2);
 }
 
 FrameNoise noise_of_film(const FilmTile& film) {

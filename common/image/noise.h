@@ -24,9 +24,11 @@ class FrameNoise {
   bool is_told() const { return num_errors_ > 0 && light_ > 0; }
   /// 0 where it is not told.
   float relative() const;
+  /// Its own standard error, as a share of it; large where a few pixels make most of the noise.
+  float error_share() const;
 
  private:
-  double squares_ = 0, light_ = 0;
+  double squares_ = 0, squares_of_squares_ = 0, light_ = 0;
   std::size_t num_errors_ = 0, num_pixels_ = 0;
 };
 

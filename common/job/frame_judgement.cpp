@@ -11,6 +11,8 @@ constexpr std::size_t kAround = 3;   ///< frames on each side
 constexpr std::size_t kFewest = 3;   ///< frames to compare with
 constexpr float kLeastShare = 0.5f;  ///< of the median
 constexpr float kDeviations = 5;     ///< median absolute ones
+/// Of the noise's own standard errors: it is told by few pixels.
+constexpr float kErrors = 4;
 /// Less noise than this is never worth a word.
 constexpr float kNoNoise = 0.002f;
 
@@ -67,8 +69,10 @@ void find_odd_frames(std::span<const FrameStats* const> written, Judgement& judg
     const FrameQuality& quality = written[i]->quality;
     if (const auto ratio = odd_mean(quality.mean, mean))
       judgement.odd.push_back({written[i]->frame, false, *ratio});
-    const auto ratio = odd_ratio(quality.noise, median(noise.both), noise.both);
-    if (ratio && *ratio > 1 && quality.noise > kNoNoise)
+    const float usual = median(noise.both);
+    const auto ratio = odd_ratio(quality.noise, usual, noise.both);
+    const bool is_sure = quality.noise - usual > kErrors * quality.noise_error * quality.noise;
+    if (ratio && *ratio > 1 && is_sure && quality.noise > kNoNoise)
       judgement.odd.push_back({written[i]->frame, true, *ratio});
   }
 }

@@ -57,6 +57,7 @@ constexpr MethodTraits kTraits[] = {
     {.name = "bidirectional",
      .keeps_samples = true,
      .draws_anew = true,
+     .equal_weights = true,
      .light = by_candidates,
      .most_rays = as_many_as_samples},
     {.name = "sequential",

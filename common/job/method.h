@@ -48,6 +48,8 @@ struct MethodTraits {
   /// All samples are drawn anew in each frame, so that it may start `sequential` and serve a single
   /// material.
   bool draws_anew = false;
+  /// Its samples weigh the same when they are drawn: they are resampled from candidates.
+  bool equal_weights = false;
   /// Pixels may weigh the samples of SamplingSpec::num_neighbors others.
   bool asks_neighbors = false;
   /// Markov chains move and resample its samples.

@@ -27,17 +27,31 @@ constexpr double kSampleBytes = 10, kSampleShare = 0.27;
 /// Tasks in a worker's hands beside those of the run that everybody waits for.
 constexpr double kTasksAhead = 3;
 
-double film_bytes(Aov aov) {
+/// Whether a pixel's samples weigh the same: those that are carried do while the light stands
+/// still.
+bool weigh_alike(const JobSpec& job) {
+  if (traits(job.sampling.method).carried != Carried::samples)
+    return traits(job.sampling.method).equal_weights;
+  const std::vector<FrameSpec> frames = expand_sequence(job);
+  return traits(job.sampling.start_method).equal_weights &&
+         std::all_of(frames.begin(), frames.end(), [&](const FrameSpec& frame) {
+           return frame.environment == frames.front().environment;
+         });
+}
+
+double film_bytes(Aov aov, bool equal_weights) {
   switch (aov) {
     case Aov::lns:
       return 3.2;
-    case Aov::visibility:
     case Aov::depth:
       return 2.9;
+    case Aov::visibility:
+      return equal_weights ? 0.75 : 2.9;
     case Aov::variance:
     case Aov::normal:
       return 4;
     case Aov::ess:
+      return equal_weights ? 0.1 : 1.6;
     case Aov::acceptance:
     case Aov::acceptance_local:
     case Aov::acceptance_independent:
@@ -55,8 +69,9 @@ double film_bytes(Aov aov) {
 double film_bytes_per_pixel(const JobSpec& job, double surface_share) {
   const bool has_sky = job.output.background == Background::environment;
   double bytes = 3 * kColorBytes * (has_sky ? 1 : surface_share);
+  const bool equal_weights = weigh_alike(job);
   for (const Aov aov : job.output.aovs) {
-    if (why_empty(aov, job).empty()) bytes += surface_share * film_bytes(aov);
+    if (why_empty(aov, job).empty()) bytes += surface_share * film_bytes(aov, equal_weights);
   }
   return bytes + (tells_noise(job) ? kErrorBytes : 0);
 }
@@ -65,7 +80,11 @@ double film_bytes_per_pixel(const JobSpec& job, double surface_share) {
 double state_bytes_per_pixel(const JobSpec& job, std::int64_t end, double surface_share) {
   const JobEstimate e = estimate_job(job);
   const auto whole = static_cast<double>(e.state_bytes_per_pixel);
-  if (traits(job.sampling.method).carried != Carried::memory) return surface_share * whole;
+  if (traits(job.sampling.method).carried != Carried::memory) {
+    // Weights that are all alike pack to nothing.
+    const double weights = weigh_alike(job) ? 4.0 * job.sampling.num_particles : 0;
+    return surface_share * (whole - weights);
+  }
   const auto rounds = static_cast<double>(e.preroll_rounds + end * e.rounds);
   const double rays = rounds * job.sampling.num_particles;
   const double memory = std::min(kMostMemoryBytes, kMemoryBytes * std::sqrt(rays / kMemoryRays));

@@ -152,6 +152,7 @@ struct FrameQuality {
   std::uint64_t pixels_not_finite = 0;   ///< NaN or infinite; in none of the other numbers
   NoiseSource noise_source = NoiseSource::none;
   float noise = 0;             ///< FrameNoise::relative() (common/image/noise.h)
+  float noise_error = 0;       ///< its standard error, as a share of it
   float mean = 0;              ///< radiance, over pixels and the three
   float lowest = 0;            ///< the least value, at most 0
   float light_below_zero = 0;  ///< what lies below zero over all light, [0, ...)
@@ -160,8 +161,8 @@ struct FrameQuality {
   bool operator==(const FrameQuality&) const = default;
   template <class A>
   void fields(A& a) {
-    a(pixels, pixels_below_zero, pixels_beyond_half, pixels_not_finite, noise_source, noise, mean,
-      lowest, light_below_zero, clamped);
+    a(pixels, pixels_below_zero, pixels_beyond_half, pixels_not_finite, noise_source, noise,
+      noise_error, mean, lowest, light_below_zero, clamped);
   }
 };
 

@@ -37,6 +37,7 @@ void add_quality(const FrameQuality& q, ordered_json& row) {
   if (q.pixels == 0) return;
   if (q.noise_source != NoiseSource::none) {
     row["noise"] = q.noise;
+    row["noiseError"] = q.noise_error;
     row["noiseFrom"] = noise_source_name(q.noise_source);
   }
   row["mean"] = q.mean;

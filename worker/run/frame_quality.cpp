@@ -59,6 +59,7 @@ FrameQuality judge_frame(const FilmTile& image) {
   judge_values(colors, quality);
   if (const FrameNoise noise = noise_of_film(image); noise.is_told()) {
     quality.noise = noise.relative();
+    quality.noise_error = noise.error_share();
     quality.noise_source = NoiseSource::probes;
   }
   return quality;

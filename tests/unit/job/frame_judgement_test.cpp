@@ -51,6 +51,16 @@ TEST(Judgement, FramesThatStandOutAreNamed) {
   EXPECT_NEAR(judge_frames(frames).odd[0].ratio, 0.095 / 0.04, 0.1);
 }
 
+// A few bright pixels that happen to be looked at are no noisy frame.
+TEST(Judgement, NoiseThatIsToldBadlyDoesNotStandOut) {
+  std::vector<FrameStats> frames = sequence(20);
+  frames[9].quality.noise = 0.08f;
+  for (FrameStats& frame : frames) frame.quality.noise_error = 0.1f;
+  EXPECT_THAT(odd_numbers(frames), testing::ElementsAre(10));
+  frames[9].quality.noise_error = 0.2f;
+  EXPECT_THAT(odd_numbers(frames), testing::IsEmpty());
+}
+
 TEST(Judgement, CutsAndSteadyChangesDoNotStandOut) {
   std::vector<FrameStats> frames = sequence(20);
   for (std::size_t i = 10; i < 20; ++i) frames[i].quality.mean *= 7;

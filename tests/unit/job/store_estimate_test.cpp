@@ -15,6 +15,8 @@ JobSpec job_of(Method method, int frames) {
   for (int frame = 1; frame <= frames; ++frame) job.frames.push_back(frame);
   job.image = {.width = 640, .height = 360, .sites = 4, .tile_size = 64};
   job.state.checkpoint_every = 12;
+  job.environment.keys = {{.frame = 1, .map = "sky.exr"}};
+  job.environment.rotation_deg_per_frame = 1;
   return job;
 }
 
@@ -40,6 +42,16 @@ TEST(StoreEstimate, CountsTheCheckpointsThatAreThereTogether) {
   EXPECT_EQ(estimate_store(all, 1).states, 3 * one);
   EXPECT_EQ(estimate_store(moving(all), 1).states, 30 * one) << "each frame's";
   EXPECT_EQ(estimate_store(job_of(Method::bidirectional, 30), 1).states, 0);
+}
+
+// While the light stands still, weights are alike and pack to nothing.
+TEST(StoreEstimate, SaysWhatWeightsTake) {
+  JobSpec job = job_of(Method::sequential, 12);
+  const std::int64_t turning = estimate_store(job, 1).states;
+  job.environment.rotation_deg_per_frame = 0;
+  EXPECT_EQ(turning - estimate_store(job, 1).states, 640 * 360 * 4 * 16);
+  job.sampling.start_method = Method::mis;
+  EXPECT_EQ(estimate_store(job, 1).states, turning);
 }
 
 // Skies have no states, but colours.

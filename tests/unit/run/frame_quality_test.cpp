@@ -23,6 +23,7 @@ TEST(FrameQuality, NoiseIsToldByTheErrorsOfAFilm) {
   const FrameQuality seen = judge_frame(image);
   EXPECT_EQ(seen.noise_source, NoiseSource::probes);
   EXPECT_NEAR(seen.noise, std::sqrt(0.4f) / 4, 1e-5f);
+  EXPECT_NEAR(seen.noise_error, std::sqrt(0.36f / 3) / 2, 1e-5f);
 }
 
 TEST(FrameQuality, NoiseIsNotToldWithoutErrors) {
