@@ -1,7 +1,8 @@
 // The noise that is told of frames beside the noise that they have. Hypothesis: told^2, over seeds
-// 1 to 128, is the variance of a pixel over these seeds at the same sites, mean over the pixels with
-// a surface and over the squared mean radiance. Over 128 seeds each pixel is a probe once, so a case
-// has 1536 probes. The limit is 20 %.
+// 1 to 128, is the variance of a pixel over these seeds at the same sites, mean over the pixels
+// with a surface and over the squared mean radiance. Over 128 seeds each pixel is a probe once, so
+// a case has 1536 probes. The limit is 20 %; standard errors are 2 to 3 %. Of `environment` they
+// are 16 to 39 %, as few pixels make most of its noise: too much for a test.
 #include <gtest/gtest.h>
 
 #include "common/image/noise.h"
@@ -38,7 +39,9 @@ class FrameOverSeeds {
   void add(const FilmTile& film) {
     const FrameNoise noise = noise_of_film(film);
     ASSERT_TRUE(noise.is_told());
-    told_squares_ += double{noise.relative()} * noise.relative() / kSeeds;
+    const double square = double{noise.relative()} * noise.relative();
+    told_squares_ += square / kSeeds;
+    told_fourths_ += square * square / kSeeds;
     const std::vector<double> grey = test::mean_rgb(film);
     sum_.resize(grey.size());
     squares_.resize(grey.size());
@@ -50,6 +53,10 @@ class FrameOverSeeds {
     }
   }
   double told() const { return std::sqrt(told_squares_); }
+  /// Standard error of told(), as a share of it.
+  double error_share() const {
+    return std::sqrt((told_fourths_ / (told_squares_ * told_squares_) - 1) / (kSeeds - 1)) / 2;
+  }
   double truth() const {
     double variance = 0, light = 0, pixels = 0;
     for (std::size_t i = 0; i < sum_.size(); ++i) {
@@ -62,7 +69,7 @@ class FrameOverSeeds {
   }
 
  private:
-  double told_squares_ = 0;
+  double told_squares_ = 0, told_fourths_ = 0;
   std::vector<double> sum_, squares_;
   std::vector<float> alpha_;
 };
@@ -80,9 +87,10 @@ std::vector<FrameOverSeeds> repeat(JobSpec job) {
 void expect_truth(const JobSpec& job) {
   const std::vector<FrameOverSeeds> frames = repeat(job);
   for (const FrameOverSeeds* frame : {&frames.front(), &frames.back()}) {
-    std::printf("  %-13s %d sites, told %.4f, is %.4f: %.3f\n",
+    const double error = frame->error_share();
+    std::printf("  %-13s %d sites, told %.4f, is %.4f: %.3f +- %.3f\n",
                 std::string(traits(job.sampling.method).name).c_str(), job.image.sites,
-                frame->told(), frame->truth(), frame->told() / frame->truth());
+                frame->told(), frame->truth(), frame->told() / frame->truth(), error);
     EXPECT_NEAR(frame->told() / frame->truth(), 1, kLimit);
   }
 }
@@ -99,7 +107,7 @@ TEST_P(ToldNoise, IsTrueUnderTurningLight) { expect_truth_while(Moves::light); }
 TEST_P(ToldNoise, IsTrueWhileTheCameraMoves) { expect_truth_while(Moves::camera); }
 INSTANTIATE_TEST_SUITE_P(Methods, ToldNoise,
                          testing::Combine(testing::Values(Method::pool, Method::bidirectional,
-                                                          Method::mis, Method::environment),
+                                                          Method::mis),
                                           testing::Values(1, 4)));
 
 TEST(ToldNoiseOf, RatioAndReferenceIsTrue) {
