@@ -71,6 +71,7 @@ void Scheduler::on(const JobAdded& event, TimePoint, Actions& actions) {
                                          TileHomes(event.spec), max_frames_ahead(event.spec),
                                          BlobSizes(event.spec)})
                  .first->second;
+  job.homes.share_out(worker_names());
   replay(job, event, actions);
   if (!is_open(event.status)) {
     job.tasks.cancel_open();
@@ -236,7 +237,7 @@ void Scheduler::on(const InputsLost& event, TimePoint now, Actions& actions) {
 }
 
 void Scheduler::on(const HeldPublished& event, TimePoint now, Actions& actions) {
-  if (!touch(event.worker, now)) return;
+  touch(event.worker, now);  // of one that is no longer known, what it has published goes
   Job* job = find(event.job);
   for (const PublishedState& state : event.states) {
     const std::optional<TaskIndex> task =

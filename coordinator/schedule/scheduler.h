@@ -67,7 +67,7 @@ class Scheduler {
   /// another is there that does not.
   static constexpr std::chrono::minutes kWorkerRest{10};
   /// For so many tasks held states are asked for at once where a worker has nothing to do.
-  static constexpr int kMaxTasksFreed = 8;
+  static constexpr std::size_t kMaxTasksFreed = 8;
 
   /// How long a worker gets nothing of a job whose folders it cannot see; then it looks again.
   static constexpr std::chrono::minutes kBlindRest{1};
@@ -155,7 +155,7 @@ class Scheduler {
   void serve(TimePoint now, Actions& actions);
   void ask_for_states(const std::string& worker, TimePoint now, Actions& actions);
   bool grant_one(const std::string& worker, TimePoint now, Actions& actions);
-  TileHomes::Asker asker(const Job& job, const std::string& worker, TimePoint now) const;
+  std::vector<std::string> worker_names() const;
   std::int32_t last_run(const Job& job) const;
   bool is_due(const Job& job, TaskIndex task, const std::string& worker, TimePoint now) const;
   bool may_try(const Job& job, TaskIndex task, const std::string& worker, TimePoint now) const;

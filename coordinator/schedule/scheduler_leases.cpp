@@ -12,7 +12,8 @@ namespace baton {
 // ---- events: workers ----------------------------------------------------------------------------
 
 void Scheduler::on(const WorkerJoined& event, TimePoint now, Actions& actions) {
-  Worker& worker = workers_[event.worker];
+  const auto [place, is_new] = workers_.try_emplace(event.worker);
+  Worker& worker = place->second;
   worker.last_sign = now;
   worker.wanted = 0;
   std::erase(hungry_, event.worker);
@@ -20,6 +21,7 @@ void Scheduler::on(const WorkerJoined& event, TimePoint now, Actions& actions) {
     job.workers.erase(event.worker);
     job.blind.erase(event.worker);
     job.tasks.forgive(event.worker);
+    if (is_new) job.homes.share_out(worker_names());
   }
   lose_held(event.worker, actions);
   reconcile(event.worker, event.running, now, now, actions);
@@ -224,13 +226,20 @@ void Scheduler::ask_for_states(const std::string& worker, TimePoint now, Actions
   for (const auto& [rank, digest] : running_) {
     const Job& job = jobs_.at(digest);
     if (!job.tasks.has_held() || rests(job, worker, now)) continue;
-    std::map<std::string, std::set<Digest>> wanted;  // by holder
-    int num_tasks = 0;
+    std::vector<TaskIndex> tasks;
     for (const TaskIndex task : job.tasks.ready()) {
       const TaskKey key = job.tasks.graph().key(task);
       if (key.kind != TaskKind::render || !is_due(job, task, worker, now)) continue;
-      if (key.step > last_run(job) || num_tasks == kMaxTasksFreed) break;
-      ++num_tasks;
+      if (key.step > last_run(job)) break;
+      tasks.push_back(task);
+    }
+    // Its own tiles first, so that it need not settle among those of others.
+    std::stable_partition(tasks.begin(), tasks.end(), [&](TaskIndex task) {
+      return job.homes.is_home(job.tasks.graph().key(task).tile, worker);
+    });
+    if (tasks.size() > kMaxTasksFreed) tasks.resize(kMaxTasksFreed);
+    std::map<std::string, std::set<Digest>> wanted;  // by holder
+    for (const TaskIndex task : tasks) {
       for (const auto& [holder, state] : job.tasks.held_inputs(task)) {
         if (holder != worker) wanted[holder].insert(state);
       }
@@ -252,8 +261,10 @@ bool Scheduler::grant_one(const std::string& worker, TimePoint now, Actions& act
     Job& job = jobs_.at(digest);
     if (job.tasks.ready().empty() || rests(job, worker, now)) continue;
     const JobGraph& graph = job.tasks.graph();
-    const TileHomes::Asker asking = asker(job, worker, now);
-    const auto task = job.homes.choose(graph, job.tasks.ready(), last_run(job), asking);
+    const auto task = job.homes.choose(
+        graph, job.tasks.ready(), last_run(job), worker, [&](TaskIndex ready) {
+          return is_due(job, ready, worker, now) && job.tasks.can_read(ready, worker);
+        });
     if (!task) continue;
     if (!has_room(job, *task, others_wait)) {
       others_wait = true;
@@ -261,7 +272,7 @@ bool Scheduler::grant_one(const std::string& worker, TimePoint now, Actions& act
     }
     const LeaseId lease{digest, graph.key(*task), job.tasks.grant(*task), epoch_};
     add_lease(worker, lease, *task, now);
-    const bool may_hold = job.tasks.may_hold(*task) && job.homes.surround(lease.task.tile, asking);
+    const bool may_hold = job.tasks.may_hold(*task) && job.homes.surround(lease.task.tile, worker);
     actions.push_back(
         GrantLease{worker, lease, job.tasks.inputs(*task), graph.frames(lease.task), may_hold,
                    job.tasks.states_from(),
@@ -287,20 +298,11 @@ bool Scheduler::is_due(const Job& job, TaskIndex task, const std::string& worker
          may_try(job, task, worker, now);
 }
 
-/// The worker, which does not rest from the job, as one that asks for a task of it.
-TileHomes::Asker Scheduler::asker(const Job& job, const std::string& worker, TimePoint now) const {
-  TileHomes::Asker asker{worker, 0, 0, [this, &job, worker, now](TaskIndex task) {
-                           return is_due(job, task, worker, now) &&
-                                  job.tasks.can_read(task, worker);
-                         }};
-  if (job.homes.matter()) {
-    for (const auto& [other, unused] : workers_) {
-      if (rests(job, other, now)) continue;
-      if (other < worker) ++asker.position;
-      ++asker.num_workers;
-    }
-  }
-  return asker;
+std::vector<std::string> Scheduler::worker_names() const {
+  std::vector<std::string> names;
+  names.reserve(workers_.size());
+  for (const auto& [name, worker] : workers_) names.push_back(name);
+  return names;
 }
 
 /// Whether the worker could succeed, and no other connected one has failed the task less often.

@@ -5,6 +5,7 @@
 #include <optional>
 #include <set>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "common/job/sequence.h"
@@ -12,47 +13,46 @@
 
 namespace baton {
 
-/// Which worker a tile is at home with: the one that rendered it last still has its state decoded,
-/// and those of its neighbours if they are at home there, too. A preference, never a bond: a worker
-/// that has no tile of its own to render takes somebody else's, and that tile has a new home. Where
-/// no tile needs another's state nobody has a home.
+/// Which worker a tile is at home with: the one that renders it still has its state decoded, and
+/// those of its neighbours if they are at home there, too. The homes of a worker are a strip across
+/// the longer side of the image, the shape with the shortest border. A preference, never a bond: a
+/// worker that has no tile of its own to render takes somebody else's, and its strip grows by a
+/// tile at the cost of that one's. Where no tile needs another's state nobody has a home.
 class TileHomes {
  public:
   explicit TileHomes(const JobSpec& job);
 
   /// Whether any tile needs another's state.
   bool matter() const { return !homes_.empty(); }
+  /// All tiles in strips of equal size, in the order of the workers.
+  void share_out(const std::vector<std::string>& workers);
+  /// The worker is gone; who is beside it has its strip.
+  void leave(const std::string& worker);
   /// The worker begins to render the tile.
   void settle(std::int32_t tile, const std::string& worker);
-  /// The worker is gone.
-  void leave(const std::string& worker);
 
-  struct Asker;
-  /// Whether all tiles within twice the reach of history are at home with the asker: then whoever
-  /// needs the tile's state, or has a neighbour that does, is the asker itself.
-  bool surround(std::int32_t tile, const Asker& asker) const;
+  bool is_home(std::int32_t tile, const std::string& worker) const;
+  /// Whether all tiles within the reach of history are at home with the worker: then whoever needs
+  /// the tile's state is this worker.
+  bool surround(std::int32_t tile, const std::string& worker) const;
 
-  /// The worker that requests a task.
-  struct Asker {
-    std::string worker;
-    std::size_t position = 0, num_workers = 1;  ///< among the workers that may have tasks
-    std::function<bool(TaskIndex)> may_try;
-  };
-  /// The one of the ready tasks that the asker should have, render tasks up to `last_run`: assembly
-  /// and second passes first; then a tile of its own, in the earliest run of all or the one after;
-  /// then of that earliest run the tile with most of its own tiles around it. Tiles without a home
-  /// are shared out in strips across the longer side of the image, which have the shortest borders.
-  /// nullopt: there is none.
+  /// The one of the ready tasks that a worker should have which may try some of them, render tasks
+  /// up to `last_run`: assembly and second passes first; then a tile of its own, in the earliest
+  /// run of all or the one after; then of that earliest run the tile with most of its own tiles
+  /// around it. nullopt: there is none.
   std::optional<TaskIndex> choose(const JobGraph& graph, const std::set<TaskIndex>& ready,
-                                  std::int32_t last_run, const Asker& asker) const;
+                                  std::int32_t last_run, const std::string& worker,
+                                  const std::function<bool(TaskIndex)>& may_try) const;
 
  private:
-  bool is_home(std::int32_t tile, const Asker& asker) const;
-  std::int64_t num_own_near(std::int32_t tile, const Asker& asker) const;
+  std::size_t place(std::int32_t tile) const;
+  /// The worker's places, [first, end).
+  std::pair<std::size_t, std::size_t> strip(const std::string& worker) const;
+  std::int64_t num_own_near(std::int32_t tile, const std::string& worker) const;
 
   TileGrid grid_;
   std::int32_t reach_px_;
-  std::vector<std::string> homes_;  ///< of each tile, "" at first; empty: nobody has one
+  std::vector<std::string> homes_;  ///< by place along the longer side; empty: nobody has one
 };
 
 }  // namespace baton

@@ -73,6 +73,8 @@ class Draw(Textures):
         second = {**self.split(job), "compression": self.pick("none", "none", "zip", "rle")}
         if self.chance(0.35):
             second["interruption"] = self.interruption()
+        if self.chance(0.3):
+            second["memory"] = self.pick(1, 2, 4, 16)  # MiB: little or nothing is kept
         return {"job": job, "files": self.files, "first": first, "second": second}
 
     def hand(self):

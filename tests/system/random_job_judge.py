@@ -22,6 +22,8 @@ AUTO_DEADLINE_S = 10 * JOB_DEADLINE_S
 # Exit code of a `baton render` that was asked to stop.
 CANCELLED = 3
 # How each fault of a job or of its files begins.
+# What a worker says that has too little memory for a job, rather than for what it would keep.
+NO_ROOM = "does not fit into memory"
 FAULT_LINE = re.compile(r"\S.*: .")
 
 
@@ -50,6 +52,7 @@ class Judge:
         self.programs = programs
         self.shared = Path(shared)
         self.values = values_by(programs.path("exr_values"))
+        self.num_scarce = 0  # renderings that got by with little memory, about
 
     def judge(self, case, folder):
         """Renders and compares; the folder must not exist. Raises Wrong or Refused."""
@@ -114,7 +117,14 @@ class Judge:
         command = ["baton", "render", write_job(case, split, folder, name), "--workers", split["workers"],
                    "--threads-per-worker", split["threads"], "--work-dir", work, "--json"]
         deadline_s = AUTO_DEADLINE_S if is_auto(case["job"]) else JOB_DEADLINE_S
-        code, output, errors = self.run(command, interruption, deadline_s)
+        scarce = ["--memory", split["memory"]] if "memory" in split else []
+        code, output, errors = self.run(command + scarce, interruption, deadline_s)
+        if scarce and NO_ROOM in errors:
+            remove(work)
+            code, output, errors = self.run(command, interruption, deadline_s)
+        elif scarce:
+            self.num_scarce += 1
+            command += scarce
         if interruption:
             # A coordinator that dies before it listens has not started.
             none = "did not start" in errors

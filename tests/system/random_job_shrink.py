@@ -38,6 +38,7 @@ def shrink(case, fails, seconds, clock=time.monotonic):
 def smaller_forms(case):
     """(what, change) of every smaller form of the case as it is now, the largest steps first."""
     forms = [("interruption", lambda c: drop(c, ("second", "interruption"))),
+             ("memory", lambda c: drop(c, ("second", "memory"))),
              ("one split", lambda c: {**c, "second": {**c["first"], **interruption_of(c)}}),
              ("inline scene", inline_scene)]
     paths = sorted(places(case), key=len)
@@ -67,7 +68,7 @@ def smaller_forms(case):
 
 
 def interruption_of(case):
-    return {key: case["second"][key] for key in ("interruption", "compression") if key in case["second"]}
+    return {key: case["second"][key] for key in ("interruption", "compression", "memory") if key in case["second"]}
 
 
 def places(value, path=()):
@@ -91,7 +92,7 @@ def drop(case, path):
         look_up(case, path)
     except (KeyError, IndexError, TypeError):
         return None
-    of_split = path[0] in ("first", "second", "means") and path[-1] not in ("interruption", "compression")
+    of_split = path[0] in ("first", "second", "means") and path[-1] not in ("interruption", "compression", "memory")
     if path in NEVER_DROPPED or len(path) == 1 or of_split or (isinstance(container, list) and is_vector(container)):
         return None
     del container[path[-1]]

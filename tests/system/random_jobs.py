@@ -138,7 +138,8 @@ def run_jobs(options):
     """Judges the jobs that the options ask for; returns the number of failures."""
     schema = json.loads((Path(options.source) / "jobs/schema/job.schema.json").read_text(encoding="utf-8"))
     folder = Path(tempfile.mkdtemp(prefix="baton-random-"))
-    run = Run(Judge(Programs(options.bin), folder), schema, options, folder)
+    judge = Judge(Programs(options.bin), folder)
+    run = Run(judge, schema, options, folder)
     start = time.monotonic()
     run.all()
     seconds = time.monotonic() - start
@@ -147,6 +148,7 @@ def run_jobs(options):
     by_method = ", ".join(f"{count} {what}" for what, count in sorted(counts.items()) if what != "jobs")
     print(f"seed {options.seed}: {counts['jobs']} jobs in {seconds:.0f} s, {counts['jobs'] / max(seconds, 1e-9):.1f} a "
           f"second; {len(run.failures)} failed {dict(Counter(run.failures))}; {by_method}", flush=True)
+    print(f"{judge.num_scarce} of the second renderings had little memory", flush=True)
     if counts["refused"] > MOST_REFUSED * max(counts["jobs"], 10):
         run.failures.append("refusals")
         print("`baton check` refuses too many: the generator draws what is not legal", flush=True)

@@ -90,6 +90,9 @@ void ChaosFarm::change_job(JobSpec next) {
 void ChaosFarm::delete_job() {
   step(JobForgotten{job_});
   for (const Digest& blob : kept_) store_.erase(blob);
+  for (const Digest& blob : unreported_) {
+    if (!scheduler_->is_referenced(blob)) store_.erase(blob);
+  }
   EXPECT_EQ(scheduler_->find_job(job_), nullptr);
   for (const TaskCompleted& late : old_reports_) step(late);
   EXPECT_FALSE(std::any_of(store_.begin(), store_.end(),

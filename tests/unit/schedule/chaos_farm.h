@@ -122,6 +122,7 @@ class ChaosFarm {
   /// The process dies, with all that it holds.
   void end_process(const std::string& worker) {
     num_held_lost_ += memory_[worker].size();
+    for (const auto& [lease, held] : held_[worker]) leave_unreported(lease, held);
     memory_[worker].clear();
     wanted_.erase(worker);
     held_[worker].clear();
@@ -129,6 +130,11 @@ class ChaosFarm {
     known_.erase(worker);
     // What comes next under this name is another process; nobody listens to the old one's socket.
     std::erase_if(old_reports_, [&](const TaskCompleted& done) { return done.worker == worker; });
+  }
+  /// Nobody hears of what was published for the lease: the sweep of leftovers removes it.
+  void leave_unreported(const LeaseId& lease, const Held& held) {
+    if (!held.published) return;
+    for (const BlobRef& blob : outputs(lease.task, held)) unreported_.insert(blob.digest);
   }
   /// It is drained: what it has not begun goes back, what it holds into the store.
   void leave(const std::string& worker) {
@@ -281,7 +287,10 @@ class ChaosFarm {
   void on(const RecordJobStatus&) {}
   void on(const GrantLease& a);
   void on(const RevokeLease& a) {
-    held_[a.worker].erase(a.lease);
+    if (const auto held = held_[a.worker].find(a.lease); held != held_[a.worker].end()) {
+      leave_unreported(a.lease, held->second);
+      held_[a.worker].erase(held);
+    }
     unconfirmed_[a.worker].erase(a.lease);
   }
   void on(const ReportNoWork&) {}
@@ -314,6 +323,7 @@ class ChaosFarm {
   std::set<TaskKey> recorded_;
   std::set<LeaseId> issued_;
   std::set<Digest> store_;  ///< the blobs that are there
+  std::set<Digest> unreported_;
   std::set<Digest> lost_;   ///< that somebody took
   std::set<TaskKey> lost_frames_;
   JobPlan plan_;

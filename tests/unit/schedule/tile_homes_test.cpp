@@ -27,10 +27,10 @@ constexpr auto kAny = [](TaskIndex) { return true; };
 
 class TileHomesTest : public testing::Test {
  protected:
-  /// The tile that one of "a" and "b" gets of run 0, or of run 1 if `late`.
+  TileHomesTest() { homes.share_out({"a", "b"}); }
+  /// The tile that one of "a" and "b" gets.
   std::int32_t choice(const std::string& worker, std::set<TaskIndex> ready) const {
-    const std::optional<TaskIndex> task =
-        homes.choose(graph, ready, 9, {worker, worker == "a" ? 0u : 1u, 2, kAny});
+    const std::optional<TaskIndex> task = homes.choose(graph, ready, 9, worker, kAny);
     return task ? graph.key(*task).tile : -1;
   }
   std::set<TaskIndex> tiles(std::int32_t run, std::initializer_list<std::int32_t> which) const {
@@ -44,15 +44,30 @@ class TileHomesTest : public testing::Test {
   TileHomes homes{job};
 };
 
-TEST_F(TileHomesTest, TilesWithoutAHomeAreSharedOutInStrips) {
+TEST_F(TileHomesTest, TilesAreSharedOutInStrips) {
   EXPECT_EQ(choice("a", tiles(0, {3, 5, 32, 33, 35})), 32) << "columns 0 to 2 are a's";
   EXPECT_EQ(choice("b", tiles(0, {0, 2, 32, 33, 35})), 33);
 }
 
-TEST_F(TileHomesTest, ATileStaysWhereItWasRenderedLast) {
-  homes.settle(1, "b");
-  EXPECT_EQ(choice("a", tiles(1, {1, 2})), 2);
-  EXPECT_EQ(choice("b", tiles(1, {1, 2})), 1);
+// Whichever tile "b" takes from "a", it is at home in one more from then on, beside its strip.
+TEST_F(TileHomesTest, WhoTakesATileHasALargerStrip) {
+  homes.settle(0, "b");
+  EXPECT_TRUE(homes.is_home(0, "a"));
+  EXPECT_TRUE(homes.is_home(32, "b")) << "the last of column 2";
+  EXPECT_TRUE(homes.is_home(26, "a"));
+  homes.settle(35, "a");
+  EXPECT_TRUE(homes.is_home(32, "a"));
+  EXPECT_TRUE(homes.is_home(3, "b"));
+}
+
+TEST_F(TileHomesTest, StripsBetweenTheTwoMove) {
+  homes.share_out({"a", "b", "c"});
+  homes.settle(0, "c");
+  EXPECT_TRUE(homes.is_home(31, "b")) << "a gave the last of column 1 to b";
+  EXPECT_TRUE(homes.is_home(33, "c")) << "which gave the last of column 3 to c";
+  homes.settle(35, "a");
+  for (const auto& [tile, worker] : {std::pair{31, "a"}, {33, "b"}, {34, "c"}})
+    EXPECT_TRUE(homes.is_home(tile, worker)) << tile;
 }
 
 TEST_F(TileHomesTest, WhoHasNothingToDoTakesTheTileNextToItsOwn) {
@@ -69,17 +84,29 @@ TEST_F(TileHomesTest, ItsOwnTileOneRunLaterComesFirst) {
   EXPECT_EQ(choice("a", much_later), 9);
 }
 
-TEST_F(TileHomesTest, WhatAWorkerLeavesIsSharedOutAgain) {
-  homes.settle(0, "gone");
-  EXPECT_EQ(choice("a", tiles(1, {0, 1})), 1);
+TEST_F(TileHomesTest, WhatAWorkerLeavesIsOfThoseBesideIt) {
+  homes.share_out({"a", "gone", "b"});
   homes.leave("gone");
-  EXPECT_EQ(choice("a", tiles(1, {0, 1})), 0);
+  EXPECT_TRUE(homes.is_home(2, "a"));
+  EXPECT_TRUE(homes.is_home(3, "b"));
+  homes.leave("a");
+  EXPECT_TRUE(homes.is_home(0, "b"));
+}
+
+TEST_F(TileHomesTest, ATileIsSurroundedWhereAllThatReadItsStateAreAtHomeWithTheSameWorker) {
+  EXPECT_TRUE(homes.surround(31, "a"));
+  EXPECT_FALSE(homes.surround(32, "a")) << "column 3 is b's";
+  EXPECT_FALSE(homes.surround(4, "a"));
+  homes.settle(0, "b");
+  EXPECT_FALSE(homes.surround(31, "a")) << "tile 32 is b's";
+  EXPECT_FALSE(homes.surround(25, "a")) << "corner to corner";
+  EXPECT_TRUE(homes.surround(19, "a"));
 }
 
 TEST_F(TileHomesTest, AssemblyComesBeforeAllTiles) {
   std::set<TaskIndex> ready = tiles(0, {0});
   ready.insert(*graph.find(assemble(0)));
-  const auto task = homes.choose(graph, ready, 9, {"a", 0, 2, kAny});
+  const auto task = homes.choose(graph, ready, 9, "a", kAny);
   EXPECT_EQ(graph.key(*task), assemble(0));
 }
 
