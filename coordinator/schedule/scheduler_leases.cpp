@@ -261,8 +261,8 @@ bool Scheduler::grant_one(const std::string& worker, TimePoint now, Actions& act
     Job& job = jobs_.at(digest);
     if (job.tasks.ready().empty() || rests(job, worker, now)) continue;
     const JobGraph& graph = job.tasks.graph();
-    const auto task = job.homes.choose(
-        graph, job.tasks.ready(), last_run(job), worker, [&](TaskIndex ready) {
+    const auto task =
+        job.homes.choose(graph, job.tasks.ready(), last_run(job), worker, [&](TaskIndex ready) {
           return is_due(job, ready, worker, now) && job.tasks.can_read(ready, worker);
         });
     if (!task) continue;

@@ -43,7 +43,8 @@ void TileHomes::settle(std::int32_t tile, const std::string& worker) {
 
 std::pair<std::size_t, std::size_t> TileHomes::strip(const std::string& worker) const {
   const auto first = std::find(homes_.begin(), homes_.end(), worker);
-  const auto end = std::find_if(first, homes_.end(), [&](const auto& home) { return home != worker; });
+  const auto end =
+      std::find_if(first, homes_.end(), [&](const auto& home) { return home != worker; });
   return {static_cast<std::size_t>(first - homes_.begin()),
           static_cast<std::size_t>(end - homes_.begin())};
 }

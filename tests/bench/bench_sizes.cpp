@@ -11,7 +11,11 @@
 #include <array>
 #include <cstdlib>
 #include <filesystem>
+#include <fstream>
+#include <map>
 #include <nlohmann/json.hpp>
+#include <set>
+#include <sstream>
 #include <string>
 
 #include "common/base/files.h"
@@ -33,11 +37,39 @@ double seconds(const timeval& t) {
   return static_cast<double>(t.tv_sec) + 1e-6 * static_cast<double>(t.tv_usec);
 }
 
+/// Bytes of the files that were waited for, by themselves or with their file system. `record` is
+/// that of sync_witness.cpp.
+Result<double> bytes_synced(const fs::path& record) {
+  std::ifstream lines(record);
+  if (!lines) return Error{ErrorKind::io, record.string() + ": nothing was waited for"};
+  double synced = 0;
+  std::map<std::string, double> waiting;  // published, by name
+  std::set<std::string> alone;            // files that were waited for by themselves
+  for (std::string line, what, file, name; std::getline(lines, line);) {
+    std::istringstream words(line);
+    double bytes = 0;
+    words >> what >> file;
+    if (what == "sync" && words >> bytes) {
+      if (alone.insert(file).second) synced += bytes;
+    } else if (what == "rename" && words >> name >> bytes) {
+      if (!alone.contains(file)) waiting[name] = bytes;
+    } else if (what == "remove") {
+      waiting.erase(file);
+    } else if (what == "syncfs") {
+      for (const auto& [unused, size] : waiting) synced += size;
+      waiting.clear();
+    }
+  }
+  return synced;
+}
+
 /// Runs `baton render` with its report in `report`; returns what it and all that it started took.
 Result<rusage> render(const fs::path& bin, const fs::path& job_file, const fs::path& report) {
   const std::string command = fmt::format(
-      "exec '{}' render '{}' --workers 1 --threads-per-worker 2 --json > '{}' 2> '{}'",
-      (bin / "baton").string(), job_file.string(), report.string(), report.string() + ".log");
+      "LD_PRELOAD='{}' BATON_SYNC_RECORD='{}' exec '{}' render '{}' --workers 1 "
+      "--threads-per-worker 2 --json > '{}' 2> '{}'",
+      (bin / "libsync_witness.so").string(), report.string() + ".syncs", (bin / "baton").string(),
+      job_file.string(), report.string(), report.string() + ".log");
   const pid_t child = ::fork();
   if (child == 0) {
     ::execl("/bin/sh", "sh", "-c", command.c_str(), nullptr);
@@ -56,6 +88,7 @@ Status measure(const fs::path& bin, const fs::path& folder, const JobSpec& job) 
   const std::string text = to_json(job);
   BATON_TRY(write_file_atomic(folder / "job.json", as_bytes_view(text)));
   BATON_ASSIGN(const rusage used, render(bin, folder / "job.json", folder / "report.json"));
+  BATON_ASSIGN(const double synced, bytes_synced(folder / "report.json.syncs"));
   BATON_ASSIGN(const Bytes report, read_file(folder / "report.json", limits::kMaxJobFileBytes));
   const auto* const begin = reinterpret_cast<const char*>(report.data());
   const auto told = nlohmann::json::parse(begin, begin + report.size());
@@ -66,13 +99,14 @@ Status measure(const fs::path& bin, const fs::path& folder, const JobSpec& job) 
   const double rays = stats.at("raysPrimary").get<double>() + stats.at("raysShadow").get<double>();
   const double state_bytes = told.at("stateBytes").get<double>();
   constexpr double kBlock = 512, kMiB = 1 << 20;
-  fmt::print("{:4} x {:<4} {:<13} {:<6} {:7.2f} {:8.2f} {:7.1f} {:7.1f} {:9.0f} {:9.0f} {:8.1f}\n",
-             job.image.width, job.image.height, traits(job.sampling.method).name,
-             moves(job) ? "motion" : "rest", cpu / frames, rays / cpu / 1e6,
-             100 * stats.at("stateSeconds").get<double>() / cpu, 100 * system / cpu,
-             static_cast<double>(used.ru_maxrss) / 1024,
-             static_cast<double>(used.ru_oublock) * kBlock / kMiB / frames,
-             state_bytes / std::max(told.at("statePixels").get<double>(), 1.0));
+  fmt::print(
+      "{:4} x {:<4} {:<13} {:<6} {:7.2f} {:8.2f} {:7.1f} {:7.1f} {:9.0f} {:9.0f} {:8.0f} {:8.1f}\n",
+      job.image.width, job.image.height, traits(job.sampling.method).name,
+      moves(job) ? "motion" : "rest", cpu / frames, rays / cpu / 1e6,
+      100 * stats.at("stateSeconds").get<double>() / cpu, 100 * system / cpu,
+      static_cast<double>(used.ru_maxrss) / 1024,
+      static_cast<double>(used.ru_oublock) * kBlock / kMiB / frames, synced / kMiB / frames,
+      state_bytes / std::max(told.at("statePixels").get<double>(), 1.0));
   std::fflush(stdout);
   return {};
 }
@@ -85,8 +119,8 @@ Status run(const fs::path& bin, const std::string& path, int frames) {
   fmt::print("{} frames, {} sites, one worker of two threads; the first frame starts afresh\n",
              frames, written.image.sites);
   fmt::print(
-      "size        method        camera  CPU s/f  Mrays/s  state%  system%  peak MiB  MiB/f "
-      "written  B/pixel\n");
+      "size        method        camera  CPU s/f  Mrays/s  state%  system%  peak MiB  MiB/f: "
+      "written  synced  B/pixel\n");
   for (const auto& [width, height] : kSizes) {
     for (const Method method : kMethods) {
       for (const bool in_motion : {false, true}) {

@@ -1,7 +1,8 @@
 // A library to be loaded before all others (LD_PRELOAD) that writes down, in the file
 // $BATON_SYNC_RECORD and in the order in which they returned, what a program asks of the disk:
-//   rename FROM TO      sync FILE      syncfs DEVICE
-// From this a test tells what a power cut would have left (chaos.py).
+//   rename FROM TO BYTES      sync FILE BYTES      syncfs DEVICE      remove FILE
+// From this a test tells what a power cut would have left (chaos.py), a benchmark what it waited
+// for (bench_sizes.cpp). A folder has no bytes.
 #include <dlfcn.h>
 #include <fcntl.h>
 #include <stdio.h>
@@ -32,12 +33,25 @@ F original(const char* name) {
   return reinterpret_cast<F>(::dlsym(RTLD_NEXT, name));
 }
 
+long long num_bytes(const struct stat& status) {
+  return S_ISREG(status.st_mode) ? static_cast<long long>(status.st_size) : 0;
+}
+
 }  // namespace
 
 extern "C" int rename(const char* from, const char* to) noexcept {
   static const auto call = original<int (*)(const char*, const char*)>("rename");
   const int result = call(from, to);
-  if (result == 0) note("rename %s %s\n", from, to);
+  struct stat status {};
+  if (result == 0 && ::stat(to, &status) == 0)
+    note("rename %s %s %lld\n", from, to, num_bytes(status));
+  return result;
+}
+
+extern "C" int remove(const char* file) noexcept {
+  static const auto call = original<int (*)(const char*)>("remove");
+  const int result = call(file);
+  if (result == 0) note("remove %s\n", file);
   return result;
 }
 
@@ -47,8 +61,10 @@ extern "C" int fsync(int file) {
   std::array<char, 64> link;
   std::array<char, 4096> path{};
   std::snprintf(link.data(), link.size(), "/proc/self/fd/%d", file);
-  if (result == 0 && ::readlink(link.data(), path.data(), path.size() - 1) > 0)
-    note("sync %s\n", path.data());
+  struct stat status {};
+  if (result == 0 && ::fstat(file, &status) == 0 &&
+      ::readlink(link.data(), path.data(), path.size() - 1) > 0)
+    note("sync %s %lld\n", path.data(), num_bytes(status));
   return result;
 }
 

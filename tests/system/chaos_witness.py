@@ -177,6 +177,8 @@ def unsynced(record):
             lost.pop(paths[0], None)
         elif what == "syncfs":
             lost.clear()
+        elif what == "remove":
+            lost.pop(paths[0], None)
         elif paths[0] in synced:
             lost.pop(paths[1], None)  # replaces one that may not have been
         else:

@@ -324,7 +324,7 @@ class ChaosFarm {
   std::set<LeaseId> issued_;
   std::set<Digest> store_;  ///< the blobs that are there
   std::set<Digest> unreported_;
-  std::set<Digest> lost_;   ///< that somebody took
+  std::set<Digest> lost_;  ///< that somebody took
   std::set<TaskKey> lost_frames_;
   JobPlan plan_;
   std::set<Digest> kept_;  ///< blobs of jobs before this one
