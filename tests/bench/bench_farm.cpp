@@ -22,6 +22,7 @@
 #include "tests/bench/bench_program.h"
 #include "worker/run/frame_output.h"
 #include "worker/run/local_render.h"
+#include "worker/scene/settle_motion.h"
 
 namespace baton {
 namespace {
@@ -60,7 +61,8 @@ Result<Cost> measure(const std::function<Status()>& work) {
 }
 
 /// write: frames become files; otherwise they are only rendered.
-Status render_in_process(const JobSpec& job, bool write) {
+Status render_in_process(const JobSpec& given, bool write) {
+  BATON_ASSIGN(const JobSpec job, settle_motion(given));
   BATON_ASSIGN(const auto context, load_render_context(job, Digest{1, 1}));
   const FrameSink sink = [&](std::int32_t frame, const FilmTile& image) -> Status {
     if (!write) return {};
