@@ -98,6 +98,7 @@ TEST(SchedulerModel, NobodyIsBlamedForBlobsThatAreAlike) {
 // again from a checkpoint, or was published before. Between checkpoints most states are held.
 TEST(SchedulerModel, HeldStatesAreReadByTheirHolderAlone) {
   std::size_t num_tasks = 0, num_held = 0, num_published = 0, num_held_lost = 0;
+  std::uint32_t num_paused = 0;
   for (std::uint32_t seed = 1; seed <= num_seeds(); ++seed) {
     SCOPED_TRACE(testing::Message() << "seed " << seed);
     JobSpec spec = moving_job(8, 24, 1);
@@ -107,6 +108,12 @@ TEST(SchedulerModel, HeldStatesAreReadByTheirHolderAlone) {
     int steps = 0;
     for (; farm.status() == JobStatus::running && steps < 20000; ++steps)
       farm.advance(/*trouble=*/steps % 500 < 250);
+    // By rare bad luck one task is lost sixteen times, and waits for a person.
+    if (farm.status() == JobStatus::paused) {
+      ++num_paused;
+      farm.delete_job();
+      continue;
+    }
     EXPECT_EQ(farm.status(), JobStatus::done) << "after " << steps << " steps";
     EXPECT_EQ(farm.progress().tasks_open, 0u);
     num_tasks += farm.num_tasks();
@@ -116,6 +123,7 @@ TEST(SchedulerModel, HeldStatesAreReadByTheirHolderAlone) {
     farm.delete_job();
     if (testing::Test::HasFailure()) return;
   }
+  EXPECT_LE(num_paused, num_seeds() / 2000);
   EXPECT_GT(num_held, num_tasks / 4);
   EXPECT_GT(num_published, num_tasks / 100) << "others waited for them, or their worker left";
   EXPECT_GT(num_held_lost, num_tasks / 100) << "with their workers";
