@@ -237,7 +237,7 @@ void Scheduler::on(const InputsLost& event, TimePoint now, Actions& actions) {
 }
 
 void Scheduler::on(const HeldPublished& event, TimePoint now, Actions& actions) {
-  touch(event.worker, now);  // of one that is no longer known, what it has published goes
+  if (!touch(event.worker, now)) return;
   Job* job = find(event.job);
   for (const PublishedState& state : event.states) {
     const std::optional<TaskIndex> task =

@@ -156,6 +156,7 @@ class Scheduler {
   void ask_for_states(const std::string& worker, TimePoint now, Actions& actions);
   bool grant_one(const std::string& worker, TimePoint now, Actions& actions);
   std::vector<std::string> worker_names() const;
+  void share_out_tiles();
   std::int32_t last_run(const Job& job) const;
   bool is_due(const Job& job, TaskIndex task, const std::string& worker, TimePoint now) const;
   bool may_try(const Job& job, TaskIndex task, const std::string& worker, TimePoint now) const;

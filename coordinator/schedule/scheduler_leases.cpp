@@ -21,8 +21,8 @@ void Scheduler::on(const WorkerJoined& event, TimePoint now, Actions& actions) {
     job.workers.erase(event.worker);
     job.blind.erase(event.worker);
     job.tasks.forgive(event.worker);
-    if (is_new) job.homes.share_out(worker_names());
   }
+  if (is_new) share_out_tiles();
   lose_held(event.worker, actions);
   reconcile(event.worker, event.running, now, now, actions);
 }
@@ -303,6 +303,11 @@ std::vector<std::string> Scheduler::worker_names() const {
   names.reserve(workers_.size());
   for (const auto& [name, worker] : workers_) names.push_back(name);
   return names;
+}
+
+void Scheduler::share_out_tiles() {
+  const std::vector<std::string> names = worker_names();
+  for (auto& [digest, job] : jobs_) job.homes.share_out(names);
 }
 
 /// Whether the worker could succeed, and no other connected one has failed the task less often.

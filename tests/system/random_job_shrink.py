@@ -17,6 +17,8 @@ PLAIN_MESH = {"kind": "card"}
 PLAIN_MAP = {"kind": "flat", "width": 1, "height": 1}
 # What a job costs much more without: defaults are large pictures.
 NEVER_DROPPED = {("job", "image"), ("job", "image", "width"), ("job", "image", "height"), ("job", "name")}
+# What the second rendering need not have.
+OPTIONAL = ("interruption", "compression", "memory")
 
 
 def shrink(case, fails, seconds, clock=time.monotonic):
@@ -39,7 +41,7 @@ def smaller_forms(case):
     """(what, change) of every smaller form of the case as it is now, the largest steps first."""
     forms = [("interruption", lambda c: drop(c, ("second", "interruption"))),
              ("memory", lambda c: drop(c, ("second", "memory"))),
-             ("one split", lambda c: {**c, "second": {**c["first"], **interruption_of(c)}}),
+             ("one split", lambda c: {**c, "second": {**c["first"], **manner_of_second(c)}}),
              ("inline scene", inline_scene)]
     paths = sorted(places(case), key=len)
     quick = [(path, lambda c, p=path, v=value: replace(c, p, v))
@@ -67,8 +69,8 @@ def smaller_forms(case):
     return forms
 
 
-def interruption_of(case):
-    return {key: case["second"][key] for key in ("interruption", "compression", "memory") if key in case["second"]}
+def manner_of_second(case):
+    return {key: case["second"][key] for key in OPTIONAL if key in case["second"]}
 
 
 def places(value, path=()):
@@ -92,7 +94,7 @@ def drop(case, path):
         look_up(case, path)
     except (KeyError, IndexError, TypeError):
         return None
-    of_split = path[0] in ("first", "second", "means") and path[-1] not in ("interruption", "compression", "memory")
+    of_split = path[0] in ("first", "second", "means") and path[-1] not in OPTIONAL
     if path in NEVER_DROPPED or len(path) == 1 or of_split or (isinstance(container, list) and is_vector(container)):
         return None
     del container[path[-1]]

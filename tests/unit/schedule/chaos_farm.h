@@ -322,9 +322,9 @@ class ChaosFarm {
   std::vector<Failure> failures_;
   std::set<TaskKey> recorded_;
   std::set<LeaseId> issued_;
-  std::set<Digest> store_;  ///< the blobs that are there
-  std::set<Digest> unreported_;
-  std::set<Digest> lost_;  ///< that somebody took
+  std::set<Digest> store_;       ///< the blobs that are there
+  std::set<Digest> unreported_;  ///< published for leases of which nobody will report
+  std::set<Digest> lost_;        ///< that somebody took
   std::set<TaskKey> lost_frames_;
   JobPlan plan_;
   std::set<Digest> kept_;  ///< blobs of jobs before this one

@@ -1,11 +1,23 @@
 #include <gtest/gtest.h>
 
+#include <set>
+
 #include "tests/unit/schedule/farm.h"
 
 namespace baton {
 namespace {
 
 using namespace testing_farm;
+
+/// The worker does a task, and holds its state if it may.
+std::vector<Action> finish_holding(Farm& farm, const GrantLease& grant) {
+  std::vector<BlobRef> outputs = outputs_of(farm.spec(), farm.job, grant.lease.task);
+  for (BlobRef& blob : outputs) {
+    if (grant.may_hold && blob.kind == BlobKind::state)
+      blob = {blob.kind, blob.frame, blob.tile, held_state_name(farm.job, blob.frame, blob.tile)};
+  }
+  return farm.step(TaskCompleted{grant.worker, grant.lease, outputs, {}});
+}
 
 /// Four tiles in a row that need their neighbours, 12 frames, checkpoints every 6. Worker "a" is
 /// there and holds what it may.
@@ -20,15 +32,7 @@ class HeldStatesTest : public testing::Test {
     farm.submit();
     farm.step(WorkerJoined{"a", {}});
   }
-  /// The worker does a task, and holds its state if it may.
-  std::vector<Action> finish(const GrantLease& grant) {
-    std::vector<BlobRef> outputs = outputs_of(farm.spec(), farm.job, grant.lease.task);
-    for (BlobRef& blob : outputs) {
-      if (grant.may_hold && blob.kind == BlobKind::state)
-        blob = {blob.kind, blob.frame, blob.tile, held_state_name(farm.job, blob.frame, blob.tile)};
-    }
-    return farm.step(TaskCompleted{grant.worker, grant.lease, outputs, {}});
-  }
+  std::vector<Action> finish(const GrantLease& grant) { return finish_holding(farm, grant); }
   /// "a" renders the first frame of all tiles.
   void render_first_frame() {
     for (int tile = 0; tile < 4; ++tile) finish(farm.ask_one("a"));
@@ -117,6 +121,24 @@ TEST_F(HeldStatesTest, AfterAFailureNothingIsBoundToAWorker) {
   const GrantLease next = farm.ask_one("b");
   ASSERT_EQ(next.lease.task.kind, TaskKind::render);
   EXPECT_FALSE(next.may_hold);
+}
+
+// "a" had all 20 tiles. When "b" comes, 10 to 19 are b's, and of so many states it wants those
+// first.
+TEST(HeldStates, WhoComesGetsAStripAndAsksForItsStatesFirst) {
+  JobSpec job = moving_job(20, 12, 1);
+  job.state.checkpoint_every = 6;
+  Farm farm(job);
+  farm.submit();
+  farm.step(WorkerJoined{"a", {}});
+  while (farm.progress().frames_done == 0) finish_holding(farm, farm.ask_one("a"));
+  farm.step(WorkerJoined{"b", {}});
+  const auto asked = all_of<AskForStates>(farm.step(WorkRequested{"b", 1}));
+  ASSERT_EQ(asked.size(), 1u);
+  std::set<Digest> expected;  // eight tiles, and their neighbours
+  for (std::int32_t tile = 9; tile <= 18; ++tile)
+    expected.insert(held_state_name(farm.job, 0, tile));
+  EXPECT_EQ(std::set<Digest>(asked[0].states.begin(), asked[0].states.end()), expected);
 }
 
 }  // namespace
