@@ -141,6 +141,13 @@ void Scheduler::on(const TaskCompleted& event, TimePoint now, Actions& actions) 
     return;
   }
 
+  // A report from before a restart may be an old one: what it held may have been dropped since.
+  if (event.lease.epoch != epoch_ &&
+      std::any_of(outputs.begin(), outputs.end(), [](const BlobRef& b) { return b.is_held(); })) {
+    on(ResultMissing{event.worker, event.lease}, now, actions);
+    return;
+  }
+
   // An incomplete report is a failed attempt.
   const JobGraph& graph = held.job->tasks.graph();
   const auto extent =

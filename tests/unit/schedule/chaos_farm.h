@@ -35,6 +35,8 @@ class ChaosFarm {
   /// or runs. It begins with all that the service would leave to it.
   void change_job(JobSpec next);
 
+  void resume() { step(JobResumed{job_}); }
+
   /// Nothing that it made is left then.
   void delete_job();
   /// Of tasks that are done, blobs that are still in the store.

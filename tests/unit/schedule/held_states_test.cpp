@@ -103,6 +103,14 @@ TEST_F(HeldStatesTest, WithTheHolderTheyAreGone) {
   EXPECT_EQ(farm.progress().frames_done, 1u) << "the frame stays";
 }
 
+// The worker may have reported it once already, and dropped it since.
+TEST_F(HeldStatesTest, WhatWasGrantedBeforeARestartIsMadeAgain) {
+  const GrantLease before{"b", {farm.job, render(0, 0), 1, /*epoch=*/0}, {}, {}, true, 0, 0};
+  farm.step(WorkerJoined{"b", {before.lease}});
+  EXPECT_TRUE(all_of<RecordCompletion>(finish(before)).empty());
+  EXPECT_EQ(farm.ask_one("a").lease.task, render(0, 0));
+}
+
 // A worker that has no time for a task has not failed it: holding goes on.
 TEST_F(HeldStatesTest, AfterAReturnedLeaseStatesAreHeldAsBefore) {
   render_first_frame();
