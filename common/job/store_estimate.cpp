@@ -148,7 +148,11 @@ StoreEstimate bound_store(const JobSpec& job) {
   // their tasks have read and made.
   constexpr std::int64_t kStatesInWork = 2;
   const std::int64_t ahead = std::min<std::int64_t>(max_frames_ahead(job) + 1, e.frames);
-  const auto kept = carries_state(job) ? static_cast<std::int64_t>(states_at_once(job).size()) : 0;
+  // In motion, what workers read of each other stays until the next checkpoint.
+  const std::int64_t between =
+      shares_history(job) && job.state.keep == StateKeep::last ? job.state.checkpoint_every - 1 : 0;
+  const std::int64_t kept =
+      carries_state(job) ? static_cast<std::int64_t>(states_at_once(job).size()) + between : 0;
   StoreEstimate store;
   store.states = e.state_bytes * std::min(kept + kStatesInWork, e.runs);
   store.films = e.film_bytes * ahead;

@@ -11,123 +11,114 @@
 namespace baton {
 namespace {
 
-/// Which bins are not 0, bit i of word j being bin 64 j + i, and those that are not.
-using BinMask = std::array<std::uint64_t, VisibilityBins::kCount / 64>;
-
-void put_bins(const VisibilityBins& bins, ByteWriter& masks, ByteWriter& cells) {
-  BATON_CHECK(!bins.empty());
-  BinMask mask{};
-  std::array<VisibilityCell, VisibilityBins::kCount> set;
-  std::size_t count = 0;
-  constexpr std::size_t kAtOnce = sizeof(std::uint64_t) / sizeof(VisibilityCell);
-  for (std::size_t first = 0; first < VisibilityBins::kCount; first += kAtOnce) {
-    std::uint64_t some = 0;  // most are
-    std::memcpy(&some, bins.data() + first, sizeof(some));
-    if (some == 0) continue;
-    for (std::size_t bin = first; bin < first + kAtOnce; ++bin) {
-      const bool is_set = bins.data()[bin] != 0;
-      set[count] = bins.data()[bin];
-      count += is_set ? 1 : 0;
-      mask[bin / 64] |= std::uint64_t{is_set} << bin % 64;
-    }
+/// The cells of a value for each pixel.
+struct Column {
+  const std::byte* data = nullptr;
+  template <class T>
+  T at(std::size_t i) const {
+    T value;
+    std::memcpy(&value, data + i * sizeof(T), sizeof(T));
+    return value;
   }
-  masks.put_raw(std::as_bytes(std::span(mask)));
-  cells.put_raw(std::as_bytes(std::span(set).first(count)));
+};
+
+Result<Column> column(const SectionFile& file, const SectionTag& tag, std::size_t size_bytes,
+                      const std::string& name) {
+  BATON_ASSIGN(const ByteView payload, section_payload(file, tag, size_bytes, name));
+  return Column{payload.data()};
 }
 
-/// The bins of `pixels`.
-Status decode_bins(const SectionFile& file, const std::vector<std::size_t>& pixels,
-                   const std::string& name, SampleState& state) {
-  BATON_ASSIGN(const ByteView masks,
-               section_payload(file, kMemoryMasks, pixels.size() * sizeof(BinMask), name));
-  std::size_t num_cells = 0;
-  const auto mask_of = [&](std::size_t i) {
-    BinMask mask;
-    std::memcpy(&mask, masks.data() + i * sizeof(mask), sizeof(mask));
-    return mask;
-  };
-  for (std::size_t i = 0; i < pixels.size(); ++i) {
-    for (const std::uint64_t word : mask_of(i))
-      num_cells += static_cast<std::size_t>(std::popcount(word));
-  }
-  BATON_ASSIGN(const ByteView cells,
-               section_payload(file, kMemoryCells, num_cells * kMemoryCellStride, name));
-  const std::byte* next = cells.data();
-  for (std::size_t i = 0; i < pixels.size(); ++i) {
-    VisibilityCell* const bins = state.memory[pixels[i]].bins.make();
-    const BinMask mask = mask_of(i);
-    for (std::size_t j = 0; j < mask.size(); ++j) {
-      for (std::uint64_t left = mask[j]; left != 0; left &= left - 1) {
-        const auto bin = 64 * j + static_cast<std::size_t>(std::countr_zero(left));
-        std::memcpy(bins + bin, next, kMemoryCellStride);
-        next += kMemoryCellStride;
-      }
-    }
-  }
-  return {};
+Error wrong_value(const SampleState& state, const SectionTag& tag, std::size_t pixel,
+                  const std::string& what, const std::string& name) {
+  const Error error = value_error(state, tag, pixel, what);
+  return Error{error.kind, fmt::format("{}: section {}", name, error.message)};
 }
 
-/// A noise of all memories.
-Status decode_noise(const SectionFile& file, const SectionTag& tag,
-                    std::uint16_t PixelMemory::*noise, const std::vector<std::size_t>& pixels,
-                    const std::string& name, SampleState& state) {
+/// The noises of one kind are upper halves of floats that are finite and not negative.
+Status check_noises(const Column& noises, const SectionTag& tag,
+                    const std::vector<std::size_t>& pixels, const std::string& name,
+                    const SampleState& state) {
   constexpr std::uint16_t kLargest = 0x7F7F;  // upper half of the largest float
-  BATON_ASSIGN(const ByteView payload,
-               section_payload(file, tag, pixels.size() * kMemoryCellStride, name));
   for (std::size_t i = 0; i < pixels.size(); ++i) {
-    std::uint16_t& value = state.memory[pixels[i]].*noise;
-    std::memcpy(&value, payload.data() + i * kMemoryCellStride, kMemoryCellStride);
+    const auto value = noises.at<std::uint16_t>(i);
     if (value <= kLargest) continue;
-    const Error error =
-        value_error(state, tag, pixels[i],
-                    fmt::format("noise {:#06x}, expected 0 to {:#06x}", value, kLargest));
-    return Error{error.kind, fmt::format("{}: section {}", name, error.message)};
+    return wrong_value(state, tag, pixels[i],
+                       fmt::format("noise {:#06x}, expected 0 to {:#06x}", value, kLargest), name);
   }
   return {};
 }
 
 }  // namespace
 
-MemoryPayloads encode_memory(const SampleState& state, const std::vector<std::size_t>& pixels) {
-  BATON_CHECK(!state.memory.empty());
+MemoryPayloads encode_memory(const PixelMemories& packed, const std::vector<std::size_t>& pixels) {
   ByteWriter summaries, masks, cells, light_noise, lobe_noise;
   for (const std::size_t pixel : pixels) {
-    const PixelMemory& memory = state.memory[pixel];
+    const PixelMemories::Packed memory = packed.packed(pixel);
     summaries.put(memory.all_rays);
     summaries.put(memory.outcomes);
     light_noise.put(memory.light_noise);
     lobe_noise.put(memory.lobe_noise);
-    if (memory.outcomes == PixelMemory::kSawBoth) {
-      put_bins(memory.bins, masks, cells);
-    }
+    if (memory.outcomes != PixelMemory::kSawBoth) continue;
+    BATON_CHECK(memory.mask != nullptr);
+    masks.put_raw(std::as_bytes(std::span(*memory.mask)));
+    cells.put_raw(std::as_bytes(memory.cells));
   }
   return {summaries.take(), masks.take(), cells.take(), light_noise.take(), lobe_noise.take()};
 }
 
 Status decode_memory(const SectionFile& file, const std::vector<std::size_t>& pixels,
                      const std::string& name, SampleState& state) {
+  using BinMask = PixelMemories::BinMask;
   if (file.find(kMemorySummary) == nullptr && file.find(kMemoryMasks) == nullptr) return {};
-  BATON_ASSIGN(const ByteView summaries,
-               section_payload(file, kMemorySummary, pixels.size() * kMemorySummaryStride, name));
-  state.add_memory();
 
-  // Summaries first: they say who has bins.
-  std::vector<std::size_t> with_bins;
+  // Summaries first: they say who has bins, and the masks how many.
+  BATON_ASSIGN(const Column summaries,
+               column(file, kMemorySummary, pixels.size() * kMemorySummaryStride, name));
+  std::size_t num_sets = 0;
   for (std::size_t i = 0; i < pixels.size(); ++i) {
-    PixelMemory& memory = state.memory[pixels[i]];
-    const std::byte* summary = summaries.data() + i * kMemorySummaryStride;
-    std::memcpy(&memory.all_rays, summary, kMemoryCellStride);
-    std::memcpy(&memory.outcomes, summary + kMemoryCellStride, kMemoryCellStride);
-    if (memory.outcomes > PixelMemory::kSawBoth) {
-      const Error error = value_error(state, kMemorySummary, pixels[i],
-                                      fmt::format("outcomes {}, expected 0 to 3", memory.outcomes));
-      return Error{error.kind, fmt::format("{}: section {}", name, error.message)};
+    const auto outcomes = summaries.at<std::uint16_t>(2 * i + 1);
+    if (outcomes > PixelMemory::kSawBoth) {
+      return wrong_value(state, kMemorySummary, pixels[i],
+                         fmt::format("outcomes {}, expected 0 to 3", outcomes), name);
     }
-    if (memory.outcomes == PixelMemory::kSawBoth) with_bins.push_back(pixels[i]);
+    num_sets += outcomes == PixelMemory::kSawBoth ? 1 : 0;
   }
-  BATON_TRY(decode_bins(file, with_bins, name, state));
-  BATON_TRY(decode_noise(file, kMemoryLightNoise, &PixelMemory::light_noise, pixels, name, state));
-  return decode_noise(file, kMemoryLobeNoise, &PixelMemory::lobe_noise, pixels, name, state);
+  BATON_ASSIGN(const Column masks, column(file, kMemoryMasks, num_sets * sizeof(BinMask), name));
+  std::size_t num_cells = 0;
+  for (std::size_t i = 0; i < num_sets * BinMask{}.size(); ++i)
+    num_cells += static_cast<std::size_t>(std::popcount(masks.at<std::uint64_t>(i)));
+  BATON_ASSIGN(const Column cells, column(file, kMemoryCells, num_cells * kMemoryCellStride, name));
+  const std::size_t noise_bytes = pixels.size() * kMemoryCellStride;
+  BATON_ASSIGN(const Column light, column(file, kMemoryLightNoise, noise_bytes, name));
+  BATON_TRY(check_noises(light, kMemoryLightNoise, pixels, name, state));
+  BATON_ASSIGN(const Column lobes, column(file, kMemoryLobeNoise, noise_bytes, name));
+  BATON_TRY(check_noises(lobes, kMemoryLobeNoise, pixels, name, state));
+
+  // All pixels, those without a surface included.
+  std::size_t next_set = 0, next_cell = 0, next_pixel = 0;
+  BinMask mask{};
+  std::array<VisibilityCell, VisibilityBins::kCount> set{};
+  state.memory.reserve(state.num_pixels(), num_sets, num_cells);
+  for (std::size_t i = 0; i < pixels.size(); ++i) {
+    for (; next_pixel < pixels[i]; ++next_pixel) state.memory.add({});
+    PixelMemories::Packed memory{summaries.at<VisibilityCell>(2 * i),
+                                 summaries.at<std::uint16_t>(2 * i + 1),
+                                 light.at<std::uint16_t>(i),
+                                 lobes.at<std::uint16_t>(i),
+                                 nullptr,
+                                 {}};
+    if (memory.outcomes == PixelMemory::kSawBoth) {
+      mask = masks.at<BinMask>(next_set++);
+      const std::size_t count = PixelMemories::num_bins(mask);
+      for (std::size_t j = 0; j < count; ++j) set[j] = cells.at<VisibilityCell>(next_cell++);
+      memory.mask = &mask;
+      memory.cells = std::span(set).first(count);
+    }
+    state.memory.add(memory);
+    ++next_pixel;
+  }
+  for (; next_pixel < state.num_pixels(); ++next_pixel) state.memory.add({});
+  return {};
 }
 
 Error value_error(const SampleState& state, const SectionTag& tag, std::size_t pixel,

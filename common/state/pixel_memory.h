@@ -39,6 +39,10 @@ class VisibilityBins {
     if (!cells_) cells_ = std::make_unique<Cells>();
     return cells_->data();
   }
+  /// All 0, if there are any.
+  void clear() {
+    if (cells_) cells_->fill(0);
+  }
   /// What the cells take.
   std::size_t size_bytes() const { return cells_ ? sizeof(Cells) : 0; }
 

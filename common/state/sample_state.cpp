@@ -250,11 +250,10 @@ Status decode_sources(const SectionFile& file, const std::string& name, SampleSt
 }  // namespace
 
 std::size_t SampleState::size_bytes() const {
-  std::size_t bytes = num_pixels() * bytes_per_pixel(static_cast<std::size_t>(num_particles),
-                                                     static_cast<std::size_t>(num_populations),
-                                                     false, !confidence.empty());
-  for (const PixelMemory& m : memory) bytes += sizeof(m) + m.bins.size_bytes();
-  return bytes;
+  return num_pixels() * bytes_per_pixel(static_cast<std::size_t>(num_particles),
+                                        static_cast<std::size_t>(num_populations), false,
+                                        !confidence.empty()) +
+         memory.size_bytes();
 }
 
 void SampleState::resize(const PixelRect& new_rect, std::int32_t new_num_particles,
@@ -313,7 +312,10 @@ Bytes encode_state(const SampleState& state) {
     sections.add(kPopulations, 1, writer.take());
   }
   if (!state.memory.empty()) {
-    MemoryPayloads memory = encode_memory(state, sections.pixels());
+    PixelMemories packed;
+    if (!state.memory.is_packed()) packed = state.memory.to_packed();
+    MemoryPayloads memory =
+        encode_memory(state.memory.is_packed() ? state.memory : packed, sections.pixels());
     sections.add(kMemorySummary, kMemorySummaryStride, std::move(memory.summaries));
     sections.add(kMemoryMasks, 1, std::move(memory.masks));
     sections.add(kMemoryCells, kMemoryCellStride, std::move(memory.cells));

@@ -1,5 +1,8 @@
 #include "coordinator/schedule/checkpoints.h"
 
+#include <algorithm>
+#include <utility>
+
 namespace baton {
 
 Checkpoints::Checkpoints(const JobGraph& graph)
@@ -35,9 +38,34 @@ bool Checkpoints::keeps(const TaskKey& render) const {
   return stage + stages_per_step_ < stages_.size() && !stages_[stage].let_go;
 }
 
+bool Checkpoints::keeps_between(const TaskKey& render) const {
+  return !stages_.empty() && !is_checkpoint(render) && !stages_[stage_of(render)].between_let_go;
+}
+
+void Checkpoints::let_between_go(std::size_t stage, std::vector<TaskKey>& gone) {
+  if (std::exchange(stages_[stage].between_let_go, true)) return;
+  const auto step = static_cast<std::int32_t>(stage / stages_per_step_);
+  const auto count = static_cast<std::int32_t>(tiles_per_stage_);
+  const std::int32_t first = static_cast<std::int32_t>(stage % stages_per_step_) * count;
+  const std::int32_t end = std::min((step + 1) * runs_per_stage_, num_runs_);
+  for (std::int32_t run = step * runs_per_stage_; run < end; ++run) {
+    for (std::int32_t tile = first; tile < first + count; ++tile) {
+      const TaskKey render{TaskKind::render, run, tile};
+      if (!is_checkpoint(render)) gone.push_back(render);
+    }
+  }
+}
+
+std::vector<TaskKey> Checkpoints::let_between_go() {
+  std::vector<TaskKey> gone;
+  for (std::size_t stage = 0; stage < stages_.size(); ++stage) let_between_go(stage, gone);
+  return gone;
+}
+
 std::vector<TaskKey> Checkpoints::complete(const TaskKey& render) {
   std::vector<TaskKey> gone;
   if (stages_.empty() || --stages_[stage_of(render)].open > 0) return gone;
+  let_between_go(stage_of(render), gone);
 
   // Of the two checkpoints before.
   for (std::int32_t back = 1; back <= 2; ++back) {
@@ -62,7 +90,9 @@ void Checkpoints::reopen(const TaskKey& render) {
 }
 
 void Checkpoints::let_go(const TaskKey& render) {
-  if (!stages_.empty()) stages_[stage_of(render)].let_go = true;
+  if (stages_.empty()) return;
+  Stage& stage = stages_[stage_of(render)];
+  (is_checkpoint(render) ? stage.let_go : stage.between_let_go) = true;
 }
 
 }  // namespace baton

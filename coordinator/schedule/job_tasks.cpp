@@ -96,7 +96,7 @@ std::uint32_t JobTasks::grant(TaskIndex task) {
 }
 
 void JobTasks::complete(TaskIndex task, const Completion& completion, const std::string& worker,
-                        BlobReferences& blobs) {
+                        bool is_shared, BlobReferences& blobs) {
   const auto next = static_cast<std::uint16_t>(makers_.size());
   const bool full = makers_.size() > limits::kMaxWorkers;
   const auto [maker, is_new] = full ? std::pair{maker_numbers_.find(worker), false}
@@ -108,11 +108,13 @@ void JobTasks::complete(TaskIndex task, const Completion& completion, const std:
     for (const FrameStats& frame : completion.frames) progress_.frames[frame.frame].merge(frame);
   }
   force_done(task, completion.outputs);
+  record(task).is_shared = is_shared;
   add_outputs(task, blobs);
 
   // What this task needed may go; what needed this task comes closer.
   if (!drop_cut(task, blobs)) release_inputs(task, blobs);
-  let_checkpoints_go(completion.task, blobs);
+  if (completion.task.kind == TaskKind::render)
+    let_go(checkpoints_.complete(completion.task), blobs);
   for (const TaskIndex dependent : graph_.dependents(completion.task)) {
     if (--record(dependent).missing_inputs == 0) apply(dependent, TaskEvent::inputs_done);
   }
@@ -290,8 +292,9 @@ void JobTasks::cancel_open() {
   for (TaskIndex task = 0; task < graph_.num_tasks(); ++task) apply(task, TaskEvent::cancelled);
 }
 
-void JobTasks::add_failure(TaskIndex task, const Failure& failure) {
+void JobTasks::add_failure(TaskIndex task, const Failure& failure, BlobReferences& blobs) {
   has_failed_ = true;
+  let_between_go(blobs);
   ended_[task].push_back({failure.lease, failure.worker, true, failure.permanent});
   ++progress_.attempts_lost;
 }

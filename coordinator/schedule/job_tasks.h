@@ -75,9 +75,10 @@ class JobTasks {
   /// Leases a ready task. Returns the number of the attempt, from 1.
   std::uint32_t grant(TaskIndex task);
   /// Ends a leased task: its outputs must be complete and sorted (JobGraph::check_outputs).
-  /// Releases its dependents, and the blobs that nobody needs any more.
+  /// Releases its dependents, and the blobs that nobody needs any more. is_shared: other workers
+  /// may read its state.
   void complete(TaskIndex task, const Completion& completion, const std::string& worker,
-                BlobReferences& blobs);
+                bool is_shared, BlobReferences& blobs);
 
   // Held states (job_tasks_held.cpp): a worker may keep what it made between checkpoints in memory
   // and out of the store. Then it alone can read it, until it publishes it.
@@ -94,6 +95,8 @@ class JobTasks {
   std::vector<TaskKey> held_by(const std::string& worker) const;
   /// The same of workers of an earlier coordinator, from which nothing can be had.
   std::vector<TaskKey> held_by_strangers() const { return held_by(makers_.front()); }
+  /// The worker reads the task's inputs: those of others stay until the next checkpoint.
+  void share_inputs(TaskIndex task, const std::string& worker, BlobReferences& blobs);
   /// A state that the worker holds is in the store now. nullopt: it does not hold it; else the task
   /// that made it.
   std::optional<TaskIndex> publish(const PublishedState& state, const std::string& worker,
@@ -120,8 +123,8 @@ class JobTasks {
   /// Cancels whatever is open.
   void cancel_open();
 
-  /// Remembers a failed attempt.
-  void add_failure(TaskIndex task, const Failure& failure);
+  /// Remembers a failed attempt. From now on nothing is held, so nothing stays between checkpoints.
+  void add_failure(TaskIndex task, const Failure& failure, BlobReferences& blobs);
   /// Remembers an attempt that was reported as not done and is nobody's failure.
   void add_returned(TaskIndex task, const LeaseId& lease, const std::string& worker);
   /// Whether this very attempt was reported as not done: it cannot be taken up again.
@@ -136,6 +139,8 @@ class JobTasks {
   void forgive(const std::string& worker);
   void forget_losses();
 
+  /// Nothing between checkpoints stays for a worker that may be lost, now or later.
+  void let_between_go(BlobReferences& blobs);
   /// Forgets every blob, of a job that is to be replaced.
   void release_all(BlobReferences& blobs);
   /// The blobs of the store that open tasks and the job's result need of what the task made.
@@ -150,6 +155,7 @@ class JobTasks {
     std::uint32_t attempts = 0;
     std::uint16_t losses = 0;
     std::uint16_t maker = 0;  ///< of makers_
+    bool is_shared = true;    ///< other workers may read its state
     std::vector<BlobRef> outputs;
   };
   struct EndedAttempt {
@@ -171,7 +177,8 @@ class JobTasks {
   void add_outputs(TaskIndex task, BlobReferences& blobs) const;
   void release_outputs(TaskIndex task, BlobReferences& blobs) const;
   void release_inputs(TaskIndex task, BlobReferences& blobs) const;
-  void let_checkpoints_go(const TaskKey& done, BlobReferences& blobs);
+  bool stays(TaskIndex task, const BlobRef& output) const;
+  void let_go(const std::vector<TaskKey>& renders, BlobReferences& blobs);
   bool lacks_needed_output(TaskIndex task) const;
   std::vector<TaskIndex> ask_inputs_again(TaskIndex task, BlobReferences& blobs) const;
   bool needs_films(TaskIndex task) const;

@@ -43,10 +43,18 @@ std::int32_t JobTasks::num_needs(TaskIndex task, const BlobRef& output) const {
   return uses + (kept ? 1 : 0);
 }
 
-/// The same, and whether it stays for what may be lost or come after the job.
+/// Whether it stays for what may be lost or come after the job. Between checkpoints only what
+/// workers have read of others stays: the rest of what a lost worker has made is lost with it.
+bool JobTasks::stays(TaskIndex task, const BlobRef& output) const {
+  if (output.kind != BlobKind::state) return false;
+  const TaskKey key = graph_.key(task);
+  return checkpoints_.keeps(key) ||
+         (!output.is_held() && record(task).is_shared && checkpoints_.keeps_between(key));
+}
+
+/// The number of needs, and one more for what stays.
 std::int32_t JobTasks::num_uses(TaskIndex task, const BlobRef& output) const {
-  const bool stays = output.kind == BlobKind::state && checkpoints_.keeps(graph_.key(task));
-  return num_needs(task, output) + (stays ? 1 : 0);
+  return num_needs(task, output) + (stays(task, output) ? 1 : 0);
 }
 
 /// made: whether it is there now, or there no longer. (Unsigned sums wrap to what they were.)
@@ -76,14 +84,20 @@ void JobTasks::release_outputs(TaskIndex task, BlobReferences& blobs) const {
   }
 }
 
-/// A render task that is done may be the last that older checkpoints stayed for.
-void JobTasks::let_checkpoints_go(const TaskKey& done, BlobReferences& blobs) {
-  if (done.kind != TaskKind::render) return;
-  for (const TaskKey& key : checkpoints_.complete(done)) {
-    for (const BlobRef& output : outputs(*graph_.find(key))) {
-      if (output.kind == BlobKind::state) blobs.release(output.digest);
+/// States that have stayed need not stay any more.
+void JobTasks::let_go(const std::vector<TaskKey>& renders, BlobReferences& blobs) {
+  for (const TaskKey& key : renders) {
+    const TaskIndex task = *graph_.find(key);
+    for (const BlobRef& output : outputs(task)) {
+      const bool stayed = output.kind == BlobKind::state && !output.is_held() &&
+                          (checkpoints_.is_checkpoint(key) || record(task).is_shared);
+      if (stayed) blobs.release(output.digest);
     }
   }
+}
+
+void JobTasks::let_between_go(BlobReferences& blobs) {
+  let_go(checkpoints_.let_between_go(), blobs);
 }
 
 /// Of inputs that were opened again meanwhile nothing is left to release.

@@ -63,6 +63,18 @@ std::vector<TaskKey> JobTasks::held_by(const std::string& worker) const {
   return tasks;
 }
 
+void JobTasks::share_inputs(TaskIndex task, const std::string& worker, BlobReferences& blobs) {
+  const TaskKey key = graph_.key(task);
+  if (key.kind != TaskKind::render || !graph_.shares_history() || cuts_.contains(task)) return;
+  for (const TaskIndex input : graph_.inputs(key)) {
+    if (record(input).is_shared || maker(input) == worker) continue;
+    record(input).is_shared = true;
+    for (const BlobRef& output : outputs(input)) {
+      if (!checkpoints_.keeps(graph_.key(input)) && stays(input, output)) blobs.add(output);
+    }
+  }
+}
+
 std::optional<TaskIndex> JobTasks::publish(const PublishedState& state, const std::string& worker,
                                            BlobReferences& blobs) {
   if (state.held.frame < 0 || state.held.frame >= graph_.num_frames()) return std::nullopt;
@@ -78,6 +90,7 @@ std::optional<TaskIndex> JobTasks::publish(const PublishedState& state, const st
   release_outputs(*task, blobs);
   count_output(*held, false);
   record(*task).outputs.front() = state.published;
+  record(*task).is_shared = true;
   count_output(state.published, true);
   add_outputs(*task, blobs);
   return task;

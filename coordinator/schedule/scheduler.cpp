@@ -162,7 +162,8 @@ void Scheduler::on(const TaskCompleted& event, TimePoint now, Actions& actions) 
   const bool is_equal =
       compare_results(event, held.job->tasks.former_outputs(held.task), outputs, actions);
   Completion completion{event.lease.task, std::move(outputs), event.stats, event.frames};
-  held.job->tasks.complete(held.task, completion, event.worker, blobs_);
+  const bool is_shared = !leases_.at({event.lease.job, held.task}).may_hold;
+  held.job->tasks.complete(held.task, completion, event.worker, is_shared, blobs_);
   held.job->sizes.learn(completion.outputs);
   follow_longest(held.job->longest_seconds.at(static_cast<std::size_t>(event.lease.task.kind)),
                  event.stats.cpu_seconds);
@@ -213,6 +214,9 @@ void Scheduler::on(const SpaceLacking& event, TimePoint now, Actions&) {
   if (!held.job) return;
   return_lease(held, event.lease, event.worker);
   held.job->rests_until.at(static_cast<std::size_t>(event.lease.task.kind)) = now + kRest;
+  for (auto& [digest, job] : jobs_) {
+    if (is_open(job.status)) job.tasks.let_between_go(blobs_);
+  }
   held.job->waits = event.message;
 }
 
@@ -276,6 +280,7 @@ void Scheduler::replay(Job& job, const JobAdded& event, Actions& actions) {
     if (done.task.kind == TaskKind::render && !done.outputs.empty())
       job.begun_runs = std::clamp(done.task.step + 1, job.begun_runs, job.tasks.graph().num_runs());
   }
+  if (store_limit_ > 0 || !event.failures.empty()) job.tasks.let_between_go(blobs_);
   RecordReopened needed{event.job, {}};
   for (const TaskIndex task :
        job.tasks.restore(event.completions, event.lost_spares, blobs_, event.plan))
@@ -286,7 +291,7 @@ void Scheduler::replay(Job& job, const JobAdded& event, Actions& actions) {
   for (const Failure& failure : event.failures) {
     const auto task = job.tasks.graph().find(failure.lease.task);
     if (!task) continue;
-    job.tasks.add_failure(*task, failure);
+    job.tasks.add_failure(*task, failure, blobs_);
     if (!failure.last || !job.tasks.ready().contains(*task)) continue;
     job.tasks.grant(*task);
     job.tasks.give_up(*task);
@@ -308,7 +313,7 @@ void Scheduler::fail_attempt(const Held& held, Failure failure, TimePoint now, A
   const Digest digest = failure.lease.job;
   Job& job = *held.job;
   drop_lease(digest, held.task);
-  job.tasks.add_failure(held.task, failure);
+  job.tasks.add_failure(held.task, failure, blobs_);
   failure.last = is_exhausted(job, held.task);
   actions.push_back(RecordFailure{failure});
 
@@ -372,6 +377,7 @@ void Scheduler::end_job(const Digest& digest, Job& job, JobStatus status, const 
   }
   for (const TaskIndex task : leased) drop_lease(digest, task);
   job.tasks.cancel_open();
+  job.tasks.let_between_go(blobs_);
 
   job.status = status;
   running_.erase(rank(job));

@@ -102,6 +102,7 @@ class Scheduler {
     std::string worker;
     TimePoint granted_at;
     std::uint64_t expected_bytes = 0;  ///< that its outputs will take in the store
+    bool may_hold = false;
   };
   struct Worker {
     TimePoint last_sign;

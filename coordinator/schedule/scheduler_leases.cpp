@@ -89,8 +89,8 @@ Scheduler::Worker* Scheduler::touch(const std::string& worker, TimePoint now) {
 }
 
 /// The task of a lease that the worker says it has. A lease that was lost, or granted by an earlier
-/// coordinator, is taken up again while nobody else has the task. No job in the answer: the lease
-/// is over.
+/// coordinator, is taken up again while nobody else has the task or holds what it was made of. No
+/// job in the answer: the lease is over.
 Scheduler::Held Scheduler::hold(const std::string& worker, const LeaseId& lease, TimePoint now) {
   Job* job = find(lease.job);
   if (!job || !is_open(job->status)) return {};
@@ -101,7 +101,8 @@ Scheduler::Held Scheduler::hold(const std::string& worker, const LeaseId& lease,
     const Lease& current = leases_.at({lease.job, *task});
     return current.id == lease && current.worker == worker ? Held{job, *task} : Held{};
   }
-  if (job->tasks.status(*task) != TaskStatus::ready || job->tasks.has_ended(*task, lease))
+  if (job->tasks.status(*task) != TaskStatus::ready || job->tasks.has_ended(*task, lease) ||
+      !job->tasks.can_read(*task, worker))
     return {};
   job->tasks.grant(*task);
   add_lease(worker, lease, *task, now);
@@ -273,6 +274,8 @@ bool Scheduler::grant_one(const std::string& worker, TimePoint now, Actions& act
     const LeaseId lease{digest, graph.key(*task), job.tasks.grant(*task), epoch_};
     add_lease(worker, lease, *task, now);
     const bool may_hold = job.tasks.may_hold(*task) && job.homes.surround(lease.task.tile, worker);
+    leases_.at({digest, *task}).may_hold = may_hold;
+    job.tasks.share_inputs(*task, worker, blobs_);
     actions.push_back(
         GrantLease{worker, lease, job.tasks.inputs(*task), graph.frames(lease.task), may_hold,
                    job.tasks.states_from(),

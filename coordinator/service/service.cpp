@@ -78,6 +78,7 @@ Status Service::turn() {
     asked_for_hello_.clear();
     tell_refusals();
     BATON_TRY(step(ClockTicked{}));
+    if (Clock::now() >= next_sweep_) BATON_TRY(sweep());
     garbage_.insert(garbage_.end(), unremoved_.begin(), unremoved_.end());
   }
 

@@ -30,6 +30,7 @@ struct ServiceOptions {
   ServerAccess access = {};       ///< who is let in
   Roots roots = {};               ///< folders that jobs may read from and write to
   std::uint64_t store_limit = 0;  ///< bytes that blobs may take; 0: as the disk has room
+  std::chrono::milliseconds sweep_every = BlobStore::kLeftoverAge;  ///< of leftovers in the store
 };
 
 /// The coordinator: one thread that turns messages into events, actions into messages. A turn of
@@ -154,6 +155,7 @@ class Service {
   Speaker speaker_;  ///< of the message that is being handled
   std::map<std::string, TimePoint> told_refusals_;
   TimePoint next_tick_{};
+  TimePoint next_sweep_;
   bool stop_requested_ = false;
   bool has_unread_jobs_ = false;  ///< in the journal
   std::uint64_t kept_bytes_ = 0;  ///< that the archive keeps, as the scheduler was told

@@ -33,9 +33,10 @@ Status Service::restore_jobs() {
   return sweep();
 }
 
-/// Removes what earlier runs left in the store and neither an open job nor the archive needs. A job
-/// that cannot be read may need anything.
+/// Removes what processes that died left in the store and neither an open job nor the archive
+/// needs. A job that cannot be read may need anything.
 Status Service::sweep() {
+  next_sweep_ = std::chrono::steady_clock::now() + options_.sweep_every;
   const std::size_t unfinished = store_.sweep();
   if (unfinished > 0)
     spdlog::info("{} files that were never finished are removed from the store", unfinished);

@@ -9,7 +9,10 @@ float NoiseProbe::sample_again(const PixelMethod& method, const PixelInput& inpu
                                const SiteOrigins& origins, SamplerScratch& scratch) {
   // Start from what the pixel remembers, in a state of its own.
   state_.resize({0, 0, 1, 1}, state.num_particles, state.num_populations);
-  if (const PixelMemory* memory = state.memory_of(index)) state_.memory.assign(1, *memory);
+  if (const PixelMemory* memory = state.memory_of(index)) {
+    state_.add_memory();
+    state_.memory[0] = *memory;
+  }
   target_.resize(static_cast<std::size_t>(state.num_particles));
 
   // Sample with other random numbers.

@@ -28,7 +28,7 @@ void ChaosFarm::advance(bool trouble) {
   } else if (what < 96) {
     if (options_.failures) fail(worker);
   } else if (what < 97) {
-    start_coordinator();
+    if (options_.restarts) start_coordinator();
   } else if (what < 98) {
     if (options_.failures) lose_a_file();
   } else if (!old_reports_.empty()) {
@@ -186,6 +186,18 @@ void ChaosFarm::on(const GrantLease& a) {
   }
   if (arrives)
     held_[a.worker].emplace(a.lease, Held{a.inputs, a.frames, a.may_hold && roll(5) > 0});
+}
+
+/// Where no file and no coordinator is lost, a lost worker costs what it has made itself, and of
+/// each tile at most the frames between two checkpoints.
+void ChaosFarm::check_own_loss(const RecordReopened& a) const {
+  if (options_.failures || options_.restarts || options_.store_limit > 0) return;
+  std::map<std::int32_t, std::int32_t> frames;
+  for (const TaskKey& task : a.tasks) {
+    EXPECT_EQ(a.gone, "what worker " + makers_.at(task) + " held")
+        << "tile " << task.tile << " of run " << task.step << " is lost with another worker";
+    EXPECT_LE(++frames[task.tile], spec_.state.checkpoint_every);
+  }
 }
 
 }  // namespace baton::testing_farm

@@ -21,6 +21,7 @@ class ChaosFarm {
     int num_workers = 5;
     bool failures = true;  ///< attempts fail, files vanish; else only workers and messages do
     std::uint64_t store_limit = 0;
+    bool restarts = true;  ///< of the coordinator
   };
   ChaosFarm(std::uint32_t seed, JobSpec spec, Options options)
       : random_(seed), spec_(std::move(spec)), graph_(spec_), options_(options) {
@@ -187,6 +188,7 @@ class ChaosFarm {
           return blob.kind != BlobKind::image && !blob.is_held() && !store_.contains(blob.digest);
         });
     num_missing_ += is_missing ? 1 : 0;
+    reporter_ = done.worker;
     if (is_missing) {
       step(ResultMissing{done.worker, done.lease});
     } else {
@@ -265,6 +267,7 @@ class ChaosFarm {
   void on(const RecordCompletion& a) {
     EXPECT_TRUE(recorded_.insert(a.completion.task).second) << "a task counts once";
     completions_.push_back(a.completion);
+    makers_[a.completion.task] = reporter_;
     lost_frames_.erase(a.completion.task);
   }
   void on(const RecordOutputs& a) {
@@ -284,7 +287,9 @@ class ChaosFarm {
       std::erase_if(completions_, [&](const Completion& c) { return c.task == task; });
     }
     num_reopened_ += a.tasks.size();
+    check_own_loss(a);
   }
+  void check_own_loss(const RecordReopened& a) const;
   void on(const RecordFailure& a) { failures_.push_back(a.failure); }
   void on(const RecordJobStatus&) {}
   void on(const GrantLease& a);
@@ -323,6 +328,8 @@ class ChaosFarm {
   std::vector<Completion> completions_;  ///< the journal
   std::vector<Failure> failures_;
   std::set<TaskKey> recorded_;
+  std::string reporter_;                   ///< of the last report
+  std::map<TaskKey, std::string> makers_;  ///< whose report was recorded
   std::set<LeaseId> issued_;
   std::set<Digest> store_;       ///< the blobs that are there
   std::set<Digest> unreported_;  ///< published for leases of which nobody will report

@@ -149,5 +149,65 @@ TEST(HeldStates, WhoComesGetsAStripAndAsksForItsStatesFirst) {
   EXPECT_EQ(std::set<Digest>(asked[0].states.begin(), asked[0].states.end()), expected);
 }
 
+/// Two workers with four tiles each, and the states that are in the store.
+class BorderTest : public testing::Test {
+ protected:
+  static JobSpec spec() {
+    JobSpec job = moving_job(8, 12, 1);
+    job.state.checkpoint_every = 6;
+    return job;
+  }
+  void SetUp() override {
+    farm.submit();
+    farm.step(WorkerJoined{"a", {}});
+    farm.step(WorkerJoined{"b", {}});
+  }
+  /// The workers take turns until all renders of the run are done.
+  void finish_run(int run) {
+    while (farm.scheduler.find_job(farm.job)->tasks.first_open_run() <= run) {
+      for (const char* const worker : {"a", "b"}) {
+        const GrantLease grant = farm.ask_one(worker);
+        if (grant.lease.attempt > 0) note(finish_holding(farm, grant));
+      }
+    }
+  }
+  void note(const std::vector<Action>& actions) {
+    for (const RecordCompletion& done : all_of<RecordCompletion>(actions)) {
+      for (const BlobRef& blob : done.completion.outputs) {
+        if (blob.kind == BlobKind::state && !blob.is_held()) states.insert(blob.digest);
+      }
+    }
+    for (const RemoveBlobs& removed : all_of<RemoveBlobs>(actions)) {
+      for (const Digest& blob : removed.blobs) states.erase(blob);
+    }
+  }
+  Farm farm{spec()};
+  std::set<Digest> states;
+};
+
+// Tiles 3 and 4 are at the border.
+TEST_F(BorderTest, WhatWorkersReadOfEachOtherStaysUntilTheNextCheckpoint) {
+  finish_run(3);
+  EXPECT_EQ(states.size(), 2u * 4);
+  finish_run(4);
+  EXPECT_EQ(states.size(), 2u * 5);
+  finish_run(5);
+  EXPECT_EQ(states.size(), 8u) << "the checkpoint";
+}
+
+TEST_F(BorderTest, ALostWorkerTakesItsOwnTilesAlone) {
+  finish_run(4);
+  const auto reopened = all_of<RecordReopened>(farm.step(WorkerLeft{"b"}));
+  ASSERT_EQ(reopened.size(), 1u);
+  EXPECT_EQ(reopened[0].tasks.size(), 3u * 5) << "what it held of five frames";
+}
+
+TEST_F(BorderTest, OnAFullDiskNothingStaysForALostWorker) {
+  finish_run(3);
+  const GrantLease grant = farm.ask_one("a");
+  note(farm.step(SpaceLacking{"a", grant.lease, "the disk is full"}));
+  EXPECT_EQ(states.size(), 2u) << "what the next frame needs";
+}
+
 }  // namespace
 }  // namespace baton

@@ -76,6 +76,20 @@ TEST_F(ServiceStoreTest, AStartRemovesWhatNoJobNeedsAndNothingElse) {
   }
 }
 
+TEST_F(ServiceStoreTest, ARunningCoordinatorSweepsFromTimeToTime) {
+  options.sweep_every = std::chrono::milliseconds(1);
+  const RunningService service(options);
+  ask<JobAccepted>(service.endpoint(), SubmitJob{document});
+  do_tasks(service.endpoint(), 2);
+  const fs::path orphan = put_leftover("of a worker that was killed");
+  age_all();
+  const auto end = std::chrono::steady_clock::now() + kPatience;
+  while (fs::exists(orphan) && std::chrono::steady_clock::now() < end)
+    std::this_thread::sleep_for(std::chrono::milliseconds(10));
+  EXPECT_FALSE(fs::exists(orphan));
+  EXPECT_EQ(num_blobs(), 6u) << "of the open job";
+}
+
 // A job that cannot be read may need any blob.
 TEST_F(ServiceStoreTest, NothingIsSweptBesideAJobThatCannotBeRead) {
   const fs::path orphan = put_leftover("of a worker that was killed");

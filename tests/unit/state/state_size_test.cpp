@@ -21,10 +21,10 @@ TEST(SampleState, SizeOfAPixelIsThatOfItsArrays) {
     state.resize({0, 0, 5, 2}, 6, 2);
     if (memory) state.add_memory();
     if (!memory) state.add_confidence();
-    const std::size_t bytes = bytes_of(state.lns) + bytes_of(state.lns_fresh) +
-                              bytes_of(state.source) + bytes_of(state.direction) +
-                              bytes_of(state.weight) + bytes_of(state.site) +
-                              bytes_of(state.memory) + bytes_of(state.confidence);
+    const std::size_t bytes =
+        bytes_of(state.lns) + bytes_of(state.lns_fresh) + bytes_of(state.source) +
+        bytes_of(state.direction) + bytes_of(state.weight) + bytes_of(state.site) +
+        state.memory.size() * sizeof(PixelMemory) + bytes_of(state.confidence);
     EXPECT_EQ(state.size_bytes(), bytes);
     // In a file a memory may take more: all bins, and which they are.
     const std::size_t in_a_file = memory ? 552 - sizeof(PixelMemory) : 0;
