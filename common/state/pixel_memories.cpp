@@ -10,25 +10,38 @@
 namespace baton {
 namespace {
 
+/// The bins that are not 0, four at a time.
+PixelMemories::BinMask mask_of(const VisibilityBins& bins) {
+  static_assert(sizeof(VisibilityCell) == 2 && std::endian::native == std::endian::little);
+  constexpr std::uint64_t kTops = 0x8000800080008000, kRest = ~kTops;
+  constexpr std::uint64_t kTogether = 1ull << 48 | 1ull << 33 | 1ull << 18 | 1ull << 3;
+  PixelMemories::BinMask mask{};
+  for (std::size_t first = 0; first < VisibilityBins::kCount; first += 4) {
+    std::uint64_t four = 0;
+    std::memcpy(&four, bins.data() + first, sizeof(four));
+    const std::uint64_t tops =
+        (((four & kRest) + kRest) | four) & kTops;  // of those that are not 0
+    mask[first / 64] |= ((tops >> 15) * kTogether >> 48 & 0xF) << first % 64;
+  }
+  return mask;
+}
+
+/// Calls take(bin) for each of the mask.
+template <class Take>
+void for_each_bin(const PixelMemories::BinMask& mask, Take take) {
+  for (std::size_t word = 0; word < mask.size(); ++word) {
+    for (std::uint64_t left = mask[word]; left != 0; left &= left - 1)
+      take(64 * word + static_cast<std::size_t>(std::countr_zero(left)));
+  }
+}
+
 /// Appends the bins that are not 0. Returns which they are.
 PixelMemories::BinMask append_cells(const VisibilityBins& bins,
                                     std::vector<VisibilityCell>& cells) {
-  PixelMemories::BinMask mask{};
-  std::array<VisibilityCell, VisibilityBins::kCount> set;
-  std::size_t count = 0;
-  constexpr std::size_t kAtOnce = sizeof(std::uint64_t) / sizeof(VisibilityCell);
-  for (std::size_t first = 0; first < VisibilityBins::kCount; first += kAtOnce) {
-    std::uint64_t some = 0;  // most are
-    std::memcpy(&some, bins.data() + first, sizeof(some));
-    if (some == 0) continue;
-    for (std::size_t bin = first; bin < first + kAtOnce; ++bin) {
-      const bool is_set = bins.data()[bin] != 0;
-      set[count] = bins.data()[bin];
-      count += is_set ? 1 : 0;
-      mask[bin / 64] |= std::uint64_t{is_set} << bin % 64;
-    }
-  }
-  cells.insert(cells.end(), set.begin(), set.begin() + static_cast<std::ptrdiff_t>(count));
+  const PixelMemories::BinMask mask = mask_of(bins);
+  std::size_t count = cells.size();
+  cells.resize(count + PixelMemories::num_bins(mask));
+  for_each_bin(mask, [&](std::size_t bin) { cells[count++] = bins.data()[bin]; });
   return mask;
 }
 
@@ -36,10 +49,7 @@ void fill_bins(const PixelMemories::Packed& from, VisibilityBins& bins) {
   bins.clear();
   VisibilityCell* const all = bins.make();
   const VisibilityCell* next = from.cells.data();
-  for (std::size_t word = 0; word < from.mask->size(); ++word) {
-    for (std::uint64_t left = (*from.mask)[word]; left != 0; left &= left - 1)
-      all[64 * word + static_cast<std::size_t>(std::countr_zero(left))] = *next++;
-  }
+  for_each_bin(*from.mask, [&](std::size_t bin) { all[bin] = *next++; });
 }
 
 }  // namespace
@@ -57,6 +67,9 @@ void PixelMemories::assign(std::size_t num_pixels) {
 
 PixelMemories PixelMemories::to_packed() const {
   if (is_packed_) return *this;
+  // The array of cells is made in one piece, as large as it must be.
+  thread_local std::vector<VisibilityCell> cells;
+  cells.clear();
   PixelMemories packed;
   packed.is_packed_ = true;
   const auto with_bins = [](const PixelMemory& memory) { return !memory.bins.empty(); };
@@ -65,13 +78,13 @@ PixelMemories PixelMemories::to_packed() const {
   for (const PixelMemory& memory : open_) {
     Entry entry{memory.all_rays, memory.outcomes, memory.light_noise, memory.lobe_noise, 0};
     if (with_bins(memory)) {
-      const std::size_t first = packed.cells_.size();
-      packed.sets_.push_back({append_cells(memory.bins, packed.cells_), first});
+      const std::size_t first = cells.size();
+      packed.sets_.push_back({append_cells(memory.bins, cells), first});
       entry.set = static_cast<std::uint32_t>(packed.sets_.size());
     }
     packed.entries_.push_back(entry);
   }
-  packed.cells_.shrink_to_fit();
+  packed.cells_ = cells;
   return packed;
 }
 
