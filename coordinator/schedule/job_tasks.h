@@ -151,11 +151,11 @@ class JobTasks {
  private:
   struct Record {
     TaskStatus status = TaskStatus::blocked;
+    bool is_shared = true;            ///< other workers may read its state
     std::int32_t missing_inputs = 0;  ///< input tasks that are not done, whatever its own status
     std::uint32_t attempts = 0;
     std::uint16_t losses = 0;
     std::uint16_t maker = 0;  ///< of makers_
-    bool is_shared = true;    ///< other workers may read its state
     std::vector<BlobRef> outputs;
   };
   struct EndedAttempt {

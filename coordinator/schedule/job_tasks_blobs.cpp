@@ -46,10 +46,9 @@ std::int32_t JobTasks::num_needs(TaskIndex task, const BlobRef& output) const {
 /// Whether it stays for what may be lost or come after the job. Between checkpoints only what
 /// workers have read of others stays: the rest of what a lost worker has made is lost with it.
 bool JobTasks::stays(TaskIndex task, const BlobRef& output) const {
-  if (output.kind != BlobKind::state) return false;
+  if (output.kind != BlobKind::state || output.is_held()) return false;
   const TaskKey key = graph_.key(task);
-  return checkpoints_.keeps(key) ||
-         (!output.is_held() && record(task).is_shared && checkpoints_.keeps_between(key));
+  return checkpoints_.keeps(key) || (record(task).is_shared && checkpoints_.keeps_between(key));
 }
 
 /// The number of needs, and one more for what stays.

@@ -114,17 +114,17 @@ class Judge:
         """Renders the job to its end, through the interruption if there is one; returns the decoded frames."""
         work = folder / f"{name}-work"
         interruption = split.get("interruption")
-        command = ["baton", "render", write_job(case, split, folder, name), "--workers", split["workers"],
-                   "--threads-per-worker", split["threads"], "--work-dir", work, "--json"]
+        enough = ["baton", "render", write_job(case, split, folder, name), "--workers", split["workers"],
+                  "--threads-per-worker", split["threads"], "--work-dir", work, "--json"]
         deadline_s = AUTO_DEADLINE_S if is_auto(case["job"]) else JOB_DEADLINE_S
         scarce = ["--memory", split["memory"]] if "memory" in split else []
-        code, output, errors = self.run(command + scarce, interruption, deadline_s)
+        command = enough + scarce
+        code, output, errors = self.run(command, interruption, deadline_s)
         if scarce and NO_ROOM in errors:
             remove(work)
+            command, scarce = enough, []
             code, output, errors = self.run(command, interruption, deadline_s)
-        elif scarce:
-            self.num_scarce += 1
-            command += scarce
+        self.num_scarce += 1 if scarce else 0
         if interruption:
             # A coordinator that dies before it listens has not started.
             none = "did not start" in errors
@@ -137,6 +137,10 @@ class Judge:
                 split = {**split, "tileSize": tile_size}
                 write_job(case, split, folder, name)
                 code, output, errors = self.run(command, None, deadline_s)
+                if scarce and NO_ROOM in errors:  # the interruption came before it was said
+                    remove(work)
+                    command = [*enough, "--restart"]
+                    code, output, errors = self.run(command, None, deadline_s)
         log = text_of(self.logs(command))
         require(code == OK, "render failed", f"exit code {code}\n{errors[-2000:]}\n{log}")
         summary = json.loads(output)
