@@ -102,7 +102,7 @@ class Scheduler {
     std::string worker;
     TimePoint granted_at;
     std::uint64_t expected_bytes = 0;  ///< that its outputs will take in the store
-    bool may_hold = false;
+    bool may_hold = false;  ///< its state; false where this coordinator has not granted it
   };
   struct Worker {
     TimePoint last_sign;
@@ -147,7 +147,7 @@ class Scheduler {
   Held hold(const std::string& worker, const LeaseId& lease, TimePoint now);
   void reconcile(const std::string& worker, const std::vector<LeaseId>& named,
                  TimePoint granted_until, TimePoint now, Actions& actions);
-  void add_lease(const std::string& worker, const LeaseId& lease, TaskIndex task, TimePoint now);
+  Lease& add_lease(const std::string& worker, const LeaseId& lease, TaskIndex task, TimePoint now);
   void drop_lease(const Digest& job, TaskIndex task);
   void return_lease(const Held& held, const LeaseId& lease, const std::string& worker);
   void lose_lease(const Digest& job, TaskIndex task, Actions& actions);

@@ -127,16 +127,18 @@ void Scheduler::reconcile(const std::string& worker, const std::vector<LeaseId>&
   }
 }
 
-void Scheduler::add_lease(const std::string& worker, const LeaseId& lease, TaskIndex task,
-                          TimePoint now) {
+Scheduler::Lease& Scheduler::add_lease(const std::string& worker, const LeaseId& lease,
+                                       TaskIndex task, TimePoint now) {
   Job& job = jobs_.at(lease.job);
   const std::uint64_t bytes = job.sizes.largest(job.tasks.graph(), lease.task);
-  leases_.insert_or_assign({lease.job, task}, Lease{lease, worker, now, bytes});
   expected_bytes_ += bytes;
   workers_.at(worker).leases.emplace(lease.job, task);
-  if (lease.task.kind != TaskKind::render) return;
-  job.homes.settle(lease.task.tile, worker);
-  job.begun_runs = std::max(job.begun_runs, lease.task.step + 1);
+  if (lease.task.kind == TaskKind::render) {
+    job.homes.settle(lease.task.tile, worker);
+    job.begun_runs = std::max(job.begun_runs, lease.task.step + 1);
+  }
+  return leases_.insert_or_assign({lease.job, task}, Lease{lease, worker, now, bytes})
+      .first->second;
 }
 
 void Scheduler::drop_lease(const Digest& job, TaskIndex task) {
@@ -272,13 +274,12 @@ bool Scheduler::grant_one(const std::string& worker, TimePoint now, Actions& act
       continue;
     }
     const LeaseId lease{digest, graph.key(*task), job.tasks.grant(*task), epoch_};
-    add_lease(worker, lease, *task, now);
-    const bool may_hold = job.tasks.may_hold(*task) && job.homes.surround(lease.task.tile, worker);
-    leases_.at({digest, *task}).may_hold = may_hold;
+    Lease& granted = add_lease(worker, lease, *task, now);
+    granted.may_hold = job.tasks.may_hold(*task) && job.homes.surround(lease.task.tile, worker);
     job.tasks.share_inputs(*task, worker, blobs_);
     actions.push_back(
-        GrantLease{worker, lease, job.tasks.inputs(*task), graph.frames(lease.task), may_hold,
-                   job.tasks.states_from(),
+        GrantLease{worker, lease, job.tasks.inputs(*task), graph.frames(lease.task),
+                   granted.may_hold, job.tasks.states_from(),
                    job.longest_seconds.at(static_cast<std::size_t>(lease.task.kind))});
     return true;
   }

@@ -124,9 +124,7 @@ std::string job_statistics(const JobSummary& job) {
   }
   if (job.states_held > 0)
     text += fmt::format(
-        "held       {} states in the memory of workers; one that is lost costs at most {} frames "
-        "of "
-        "its own tiles\n",
+        "held       {} states in the memory of workers; a lost worker costs at most {} frames\n",
         job.states_held, job.checkpoint_every);
   text += s.cpu_seconds < 10 ? fmt::format("cpu        {:.1f} s\n", s.cpu_seconds)
                              : fmt::format("cpu        {}\n", duration_text(s.cpu_seconds));

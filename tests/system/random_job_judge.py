@@ -114,17 +114,21 @@ class Judge:
         """Renders the job to its end, through the interruption if there is one; returns the decoded frames."""
         work = folder / f"{name}-work"
         interruption = split.get("interruption")
-        enough = ["baton", "render", write_job(case, split, folder, name), "--workers", split["workers"],
-                  "--threads-per-worker", split["threads"], "--work-dir", work, "--json"]
+        command = ["baton", "render", write_job(case, split, folder, name), "--workers", split["workers"],
+                   "--threads-per-worker", split["threads"], "--work-dir", work, "--json"]
         deadline_s = AUTO_DEADLINE_S if is_auto(case["job"]) else JOB_DEADLINE_S
         scarce = ["--memory", split["memory"]] if "memory" in split else []
-        command = enough + scarce
-        code, output, errors = self.run(command, interruption, deadline_s)
-        if scarce and NO_ROOM in errors:
+
+        def render(interruption=None):
+            """With little memory, unless it is refused as too little."""
+            result = self.run(command + scarce, interruption, deadline_s)
+            if not scarce or NO_ROOM not in result[2]:
+                return result
+            scarce.clear()
             remove(work)
-            command, scarce = enough, []
-            code, output, errors = self.run(command, interruption, deadline_s)
-        self.num_scarce += 1 if scarce else 0
+            return self.run([*command, "--restart"], interruption, deadline_s)
+
+        code, output, errors = render(interruption)
         if interruption:
             # A coordinator that dies before it listens has not started.
             none = "did not start" in errors
@@ -136,11 +140,8 @@ class Judge:
                 tile_size = interruption.get("tileSize") or split["tileSize"]
                 split = {**split, "tileSize": tile_size}
                 write_job(case, split, folder, name)
-                code, output, errors = self.run(command, None, deadline_s)
-                if scarce and NO_ROOM in errors:  # the interruption came before it was said
-                    remove(work)
-                    command = [*enough, "--restart"]
-                    code, output, errors = self.run(command, None, deadline_s)
+                code, output, errors = render()  # it may be refused now only, the interruption having come before
+        self.num_scarce += 1 if scarce else 0
         log = text_of(self.logs(command))
         require(code == OK, "render failed", f"exit code {code}\n{errors[-2000:]}\n{log}")
         summary = json.loads(output)

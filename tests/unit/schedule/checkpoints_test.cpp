@@ -51,27 +51,17 @@ class CheckpointFarm : public Farm {
     for (const auto& record : all_of<RecordReopened>(actions)) again = record.tasks;
     return again;
   }
-  std::set<int> frames_of_states() const {
-    std::set<int> frames;
-    for (const auto& [digest, frame] : states_) frames.insert(frame);
-    return frames;
-  }
+  std::set<int> frames_of_states() const { return states_.frames(); }
   const std::vector<Completion>& completions() const { return completions_; }
 
  private:
   void note(const std::vector<Action>& actions) {
-    for (const RecordCompletion& done : all_of<RecordCompletion>(actions)) {
+    for (const RecordCompletion& done : all_of<RecordCompletion>(actions))
       completions_.push_back(done.completion);
-      for (const BlobRef& blob : done.completion.outputs) {
-        if (blob.kind == BlobKind::state) states_[blob.digest] = blob.frame;
-      }
-    }
-    for (const RemoveBlobs& removed : all_of<RemoveBlobs>(actions)) {
-      for (const Digest& blob : removed.blobs) states_.erase(blob);
-    }
+    states_.note(actions);
   }
 
-  std::map<Digest, int> states_;
+  StoredStates states_;
   std::vector<Completion> completions_;
 };
 

@@ -104,6 +104,30 @@ std::vector<T> all_of(const std::vector<Action>& actions) {
   return result;
 }
 
+/// The states that are in the store, with their frames, as far as the actions tell.
+class StoredStates {
+ public:
+  void note(const std::vector<Action>& actions) {
+    for (const RecordCompletion& done : all_of<RecordCompletion>(actions)) {
+      for (const BlobRef& blob : done.completion.outputs) {
+        if (blob.kind == BlobKind::state && !blob.is_held()) frames_[blob.digest] = blob.frame;
+      }
+    }
+    for (const RemoveBlobs& removed : all_of<RemoveBlobs>(actions)) {
+      for (const Digest& blob : removed.blobs) frames_.erase(blob);
+    }
+  }
+  std::size_t size() const { return frames_.size(); }
+  std::set<int> frames() const {
+    std::set<int> frames;
+    for (const auto& [digest, frame] : frames_) frames.insert(frame);
+    return frames;
+  }
+
+ private:
+  std::map<Digest, int> frames_;
+};
+
 inline TaskKey render(int run, int tile) { return {TaskKind::render, run, tile}; }
 inline TaskKey assemble(int frame) { return {TaskKind::assemble, frame, 0}; }
 

@@ -19,15 +19,16 @@ std::vector<Action> finish_holding(Farm& farm, const GrantLease& grant) {
   return farm.step(TaskCompleted{grant.worker, grant.lease, outputs, {}});
 }
 
-/// Four tiles in a row that need their neighbours, 12 frames, checkpoints every 6. Worker "a" is
-/// there and holds what it may.
+/// Tiles in a row that need their neighbours, 12 frames, checkpoints every 6.
+JobSpec row_of(int tiles) {
+  JobSpec job = moving_job(tiles, 12, 1);
+  job.state.checkpoint_every = 6;
+  return job;
+}
+
+/// Four tiles. Worker "a" is there and holds what it may.
 class HeldStatesTest : public testing::Test {
  protected:
-  static JobSpec spec() {
-    JobSpec job = moving_job(4, 12, 1);
-    job.state.checkpoint_every = 6;
-    return job;
-  }
   void SetUp() override {
     farm.submit();
     farm.step(WorkerJoined{"a", {}});
@@ -39,7 +40,7 @@ class HeldStatesTest : public testing::Test {
     while (farm.progress().frames_done == 0) finish(farm.ask_one("a"));
     ASSERT_EQ(farm.scheduler.find_job(farm.job)->tasks.num_held(), 4u);
   }
-  Farm farm{spec()};
+  Farm farm{row_of(4)};
 };
 
 TEST_F(HeldStatesTest, OneWorkerHoldsAllButCheckpointsAndResults) {
@@ -134,9 +135,7 @@ TEST_F(HeldStatesTest, AfterAFailureNothingIsBoundToAWorker) {
 // "a" had all 20 tiles. When "b" comes, 10 to 19 are b's, and of so many states it wants those
 // first.
 TEST(HeldStates, WhoComesGetsAStripAndAsksForItsStatesFirst) {
-  JobSpec job = moving_job(20, 12, 1);
-  job.state.checkpoint_every = 6;
-  Farm farm(job);
+  Farm farm(row_of(20));
   farm.submit();
   farm.step(WorkerJoined{"a", {}});
   while (farm.progress().frames_done == 0) finish_holding(farm, farm.ask_one("a"));
@@ -152,37 +151,21 @@ TEST(HeldStates, WhoComesGetsAStripAndAsksForItsStatesFirst) {
 /// Two workers with four tiles each, and the states that are in the store.
 class BorderTest : public testing::Test {
  protected:
-  static JobSpec spec() {
-    JobSpec job = moving_job(8, 12, 1);
-    job.state.checkpoint_every = 6;
-    return job;
-  }
   void SetUp() override {
     farm.submit();
-    farm.step(WorkerJoined{"a", {}});
-    farm.step(WorkerJoined{"b", {}});
+    for (const char* const worker : {"a", "b"}) farm.step(WorkerJoined{worker, {}});
   }
   /// The workers take turns until all renders of the run are done.
   void finish_run(int run) {
     while (farm.scheduler.find_job(farm.job)->tasks.first_open_run() <= run) {
       for (const char* const worker : {"a", "b"}) {
         const GrantLease grant = farm.ask_one(worker);
-        if (grant.lease.attempt > 0) note(finish_holding(farm, grant));
+        if (grant.lease.attempt > 0) states.note(finish_holding(farm, grant));
       }
     }
   }
-  void note(const std::vector<Action>& actions) {
-    for (const RecordCompletion& done : all_of<RecordCompletion>(actions)) {
-      for (const BlobRef& blob : done.completion.outputs) {
-        if (blob.kind == BlobKind::state && !blob.is_held()) states.insert(blob.digest);
-      }
-    }
-    for (const RemoveBlobs& removed : all_of<RemoveBlobs>(actions)) {
-      for (const Digest& blob : removed.blobs) states.erase(blob);
-    }
-  }
-  Farm farm{spec()};
-  std::set<Digest> states;
+  Farm farm{row_of(8)};
+  StoredStates states;
 };
 
 // Tiles 3 and 4 are at the border.
@@ -205,7 +188,7 @@ TEST_F(BorderTest, ALostWorkerTakesItsOwnTilesAlone) {
 TEST_F(BorderTest, OnAFullDiskNothingStaysForALostWorker) {
   finish_run(3);
   const GrantLease grant = farm.ask_one("a");
-  note(farm.step(SpaceLacking{"a", grant.lease, "the disk is full"}));
+  states.note(farm.step(SpaceLacking{"a", grant.lease, "the disk is full"}));
   EXPECT_EQ(states.size(), 2u) << "what the next frame needs";
 }
 
