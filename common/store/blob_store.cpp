@@ -27,6 +27,14 @@ std::vector<fs::path> old_files(const fs::path& folder, const char* extension) {
   return files;
 }
 
+/// Whether the file is there with this content; then it is as young as one written now.
+bool is_put_again(const fs::path& file, ByteView bytes) {
+  std::error_code error;
+  if (!fs::exists(file, error) || !expect_content(file, bytes)) return false;
+  fs::last_write_time(file, fs::file_time_type::clock::now(), error);
+  return !error;
+}
+
 }  // namespace
 
 Result<BlobStore> BlobStore::open(const fs::path& directory) {
@@ -50,6 +58,7 @@ Result<Digest> BlobStore::put(ByteView bytes) {
                  fmt::format("{}: {} bytes, at most {} are stored", path(digest).string(),
                              bytes.size(), limits::kMaxBlobBytes)};
   }
+  if (is_put_again(path(digest), bytes)) return digest;
   BATON_TRY(expect_space(directory_, bytes.size(), limits::kStoreReserveBytes));
   BATON_TRY(write_file_unsynced(path(digest), bytes));
   return digest;

@@ -21,9 +21,10 @@ class BlobStore {
   static Result<BlobStore> open(const std::filesystem::path& directory);
 
   /// Publishes the bytes: from now on every process sees the blob, but it survives a power cut only
-  /// after sync(). A blob that is there already is written again, which is harmless and mends a
-  /// damaged one. Errors: past limits::kMaxBlobBytes, the disk;
-  /// no_space where it is so full that frames and the journal may soon have none.
+  /// after sync(). A blob that is there already, whole, is not written again but counts as put now:
+  /// one that survives a power cut is never replaced by one that does not. A damaged one is mended.
+  /// Errors: past limits::kMaxBlobBytes, the disk; no_space where it is so full that frames and the
+  /// journal may soon have none.
   Result<Digest> put(ByteView bytes);
 
   /// Makes all blobs put so far durable, with one wait for the disk.

@@ -1,6 +1,7 @@
 // A library to be loaded before all others (LD_PRELOAD) that writes down, in the file
 // $BATON_SYNC_RECORD and in the order in which they returned, what a program asks of the disk:
-//   rename FROM TO BYTES      sync FILE BYTES      syncfs DEVICE      remove FILE
+//   rename FROM TO BYTES MS      sync FILE BYTES      syncfs DEVICE      remove FILE
+// MS: of the machine's monotonic clock, before the call.
 // From this a test tells what a power cut would have left (chaos.py), a benchmark what it waited
 // for (bench_sizes.cpp). A folder has no bytes.
 #include <dlfcn.h>
@@ -10,6 +11,7 @@
 #include <unistd.h>
 
 #include <array>
+#include <chrono>
 #include <cstdio>
 #include <cstdlib>
 
@@ -41,10 +43,12 @@ long long num_bytes(const struct stat& status) {
 
 extern "C" int rename(const char* from, const char* to) noexcept {
   static const auto call = original<int (*)(const char*, const char*)>("rename");
+  const auto since_start = std::chrono::steady_clock::now().time_since_epoch();
+  const long long ms = std::chrono::duration_cast<std::chrono::milliseconds>(since_start).count();
   const int result = call(from, to);
   struct stat status {};
   if (result == 0 && ::stat(to, &status) == 0)
-    note("rename %s %s %lld\n", from, to, num_bytes(status));
+    note("rename %s %s %lld %lld\n", from, to, num_bytes(status), ms);
   return result;
 }
 

@@ -82,17 +82,17 @@ class PowerCut:
         self.environment = {"LD_PRELOAD": programs.path("libsync_witness.so"), "BATON_SYNC_RECORD": str(self._record)}
 
     def at_risk(self):
-        """The files that a power cut might take now."""
-        return [path for path in unsynced(self._record.read_text(encoding="ascii"))
-                if path.endswith((".blob", ".exr")) and os.path.exists(path)]
+        """The files that a power cut might take now, and when they were published."""
+        return {path: ms for path, ms in unsynced(self._record.read_text(encoding="ascii")).items()
+                if path.endswith((".blob", ".exr")) and os.path.exists(path)}
 
-    def strike(self, rng, reports):
-        """After the end of all processes. reports: of the proxy. Returns how many files it took."""
+    def strike(self, rng, promised):
+        """After the end of all processes. promised: digest -> when it was last reported, if its blob had to be durable
+        then. Returns how many files it took."""
         lost = self.at_risk()
-        promised = {output.split(":")[2] for output in reports}
-        for path in lost:
+        for path, published_ms in lost.items():
             digest = "".join(path.rsplit("/", 2)[-2:]).removesuffix(".blob")
-            check(digest not in promised, f"reported as durable, and taken by a power cut: {path}")
+            check(promised.get(digest, -1) < published_ms, f"reported as durable, and taken by a power cut: {path}")
             check(not path.endswith(".exr"), f"a frame was published before it was on the disk: {path}")
         struck = 0
         for path in lost:

@@ -217,8 +217,9 @@ class Chaos:
             self.signal(process.pid, signal.SIGKILL)
         wait_until(lambda: not any(process.alive() for process in processes), "all processes have ended")
         at_rest = {job.id for job in self.jobs if job.kind == "rest"}  # whose states are all checkpoints
-        promised = [output for seen in self.proxy.seen() if seen.type == "TaskDone" and seen.task[0] in at_rest
-                    for output in seen.outputs if output.startswith(f"{STATE}:")]
+        promised = {output.split(":")[2]: seen.ms
+                    for seen in self.proxy.seen() if seen.type == "TaskDone" and seen.task[0] in at_rest
+                    for output in seen.outputs if output.startswith(f"{STATE}:")}
         num_lost = self.power.strike(self.rng, promised)
         self.num_harmed += num_lost
         self.num_lost_in_cuts += num_lost

@@ -168,7 +168,7 @@ def check_repeated(seen, log, struck, num_workers, num_jobs, num_harmed):
 def unsynced(record):
     """Files that a power cut would take: published, but neither they nor their file system were waited for since.
 
-    record: what sync_witness.cpp wrote. Returns path -> True."""
+    record: what sync_witness.cpp wrote. Returns path -> when it was published, in the record's milliseconds."""
     lost, synced = {}, set()
     for line in record.splitlines():
         what, *paths = line.split()
@@ -182,5 +182,5 @@ def unsynced(record):
         elif paths[0] in synced:
             lost.pop(paths[1], None)  # replaces one that may not have been
         else:
-            lost[paths[1]] = True
+            lost[paths[1]] = int(paths[3])
     return lost

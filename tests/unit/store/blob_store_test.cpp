@@ -67,6 +67,20 @@ TEST_F(BlobStoreTest, PuttingAgainIsASuccessAndLeavesOneFile) {
   EXPECT_EQ(num_files(), 1);
 }
 
+// What was waited for must not be replaced by what a power cut takes.
+TEST_F(BlobStoreTest, PuttingAgainLeavesTheFileThatIsThereAndMakesItYoung) {
+  BlobStore store = open();
+  const fs::path file = store.path(*store.put(as_bytes_view("state")));
+  const fs::path same_file = folder_ / "same_file";
+  fs::create_hard_link(file, same_file);
+  const auto long_ago = fs::file_time_type::clock::now() - 2 * BlobStore::kLeftoverAge;
+  fs::last_write_time(file, long_ago);
+  ASSERT_EQ(store.old_blobs().size(), 1u);
+  ASSERT_TRUE(store.put(as_bytes_view("state")).ok());
+  EXPECT_TRUE(fs::equivalent(file, same_file));
+  EXPECT_TRUE(store.old_blobs().empty());
+}
+
 TEST_F(BlobStoreTest, ADamagedBlobIsFoundAndMended) {
   BlobStore store = open();
   const Digest digest = *store.put(as_bytes_view("film"));
