@@ -29,31 +29,4 @@ class Doorkeeper {
   std::optional<std::string> refusal_;
 };
 
-/// Hears which handshakes of a socket fail. Must be gone before the socket.
-class HandshakeWatch {
- public:
-  /// broken_off: by the other side, without a word: one has a key that the other cannot read, or
-  /// only one has any. replayed: a message came again, or out of turn. denied: the key is not
-  /// known.
-  enum class Failure { broken_off, replayed, denied };
-
-  HandshakeWatch(zmq::context_t& context, zmq::socket_t& watched);
-  HandshakeWatch(const HandshakeWatch&) = delete;
-  HandshakeWatch& operator=(const HandshakeWatch&) = delete;
-  ~HandshakeWatch();
-
-  /// To be polled: something has failed.
-  zmq::socket_t& events() { return events_; }
-  /// Takes what has come.
-  void look();
-  /// What failed, the worst of it, since the last take().
-  std::optional<Failure> failure() const { return failure_; }
-  std::optional<Failure> take() { return std::exchange(failure_, std::nullopt); }
-
- private:
-  zmq::socket_t& watched_;
-  zmq::socket_t events_;
-  std::optional<Failure> failure_;
-};
-
 }  // namespace baton

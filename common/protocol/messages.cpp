@@ -14,9 +14,27 @@ namespace {
 constexpr std::size_t kNumFrames = 3;
 constexpr std::size_t kNumTypes = std::variant_size_v<Message>;
 
+/// The most that a body of type T may have. What a worker says is short, and the coordinator, which
+/// hears a thousand of them, must never be long about one.
+template <class T>
+constexpr std::uint64_t max_body_bytes() {
+  constexpr bool kIsOfWorkers =
+      []<class... Said>(std::variant<Said...>*) {
+        return (std::is_same_v<T, Said> || ...);
+      }(static_cast<std::variant<WorkerHello, LeaseRequest, Heartbeat, TaskDone, TaskFailed,
+                                 LeaseReturn, JobDocumentRequest, StatesPublished, WorkerGoodbye>*>(
+          nullptr));
+  return kIsOfWorkers ? limits::kMaxWorkerMessageBytes : limits::kMaxMessageBytes;
+}
+
 template <std::size_t Type>
 Result<Message> decode_body(ByteView body) {
   std::variant_alternative_t<Type, Message> message;
+  if (constexpr std::uint64_t most = max_body_bytes<decltype(message)>(); body.size() > most) {
+    return Error{ErrorKind::bad_input,
+                 fmt::format("message: type {}: a body of {} bytes, at most {} are read", Type,
+                             body.size(), most)};
+  }
   ArchiveReader reader(body);
   reader(message);
   if (!reader.complete()) {
@@ -81,11 +99,6 @@ Result<Message> decode_message(const std::vector<Bytes>& frames) {
   if (type >= kNumTypes) {
     return Error{ErrorKind::bad_input,
                  fmt::format("message: unknown type {}, expected less than {}", type, kNumTypes)};
-  }
-  if (frames[2].size() > limits::kMaxMessageBytes) {
-    return Error{ErrorKind::bad_input,
-                 fmt::format("message: type {}: a body of {} bytes, at most {} are read", type,
-                             frames[2].size(), limits::kMaxMessageBytes)};
   }
   return kDecoders[type](frames[2]);
 }

@@ -334,7 +334,7 @@ using Message =
 /// The frames of one message: [protocol name and version][type][body].
 std::vector<Bytes> encode_message(const Message& message);
 /// Errors: wrong protocol name, another version (ErrorKind::version, names both), unknown type,
-/// short or long body, past limits::kMaxMessageBytes.
+/// short or long body, past limits::kMaxMessageBytes or, of a worker, kMaxWorkerMessageBytes.
 Result<Message> decode_message(const std::vector<Bytes>& frames);
 
 }  // namespace baton

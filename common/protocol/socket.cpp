@@ -11,6 +11,7 @@
 
 #include "common/base/check.h"
 #include "common/base/limits.h"
+#include "common/protocol/connection_watch.h"
 #include "common/protocol/doorkeeper.h"
 
 namespace baton {
@@ -20,6 +21,7 @@ constexpr int kReconnectFirstMs = 50;
 constexpr int kReconnectMaxMs = 2000;
 constexpr int kTransportHeartbeatMs = 2000;  // notices a peer whose machine vanished
 constexpr int kTransportTimeoutMs = 6000;
+constexpr std::chrono::milliseconds kClosingInterval{100};
 
 void set_options(zmq::socket_t& socket, std::chrono::milliseconds linger) {
   socket.set(zmq::sockopt::linger, static_cast<int>(linger.count()));
@@ -47,8 +49,11 @@ auto despite_signals(F call) {
 }  // namespace
 
 struct Socket::Impl {
-  explicit Impl(zmq::socket_type type)
-      : socket(context, type), wake_fd(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)) {
+  Impl(bool listens, bool has_key)
+      : socket(context, listens ? zmq::socket_type::router : zmq::socket_type::dealer),
+        watch(context, socket, {.handshakes = has_key || !listens, .connections = listens}),
+        wake_fd(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)),
+        is_server(listens) {
     BATON_CHECK(wake_fd >= 0);
   }
   Impl(const Impl&) = delete;
@@ -69,23 +74,53 @@ struct Socket::Impl {
   /// Polled beside the socket itself, which is the first.
   std::vector<zmq::pollitem_t> poll_items(short events) {
     std::vector<zmq::pollitem_t> items{{socket.handle(), 0, events, 0}};
-    if (watch) items.push_back({watch->events().handle(), 0, ZMQ_POLLIN, 0});
+    items.push_back({watch.events().handle(), 0, ZMQ_POLLIN, 0});
     if (doorkeeper) items.push_back({doorkeeper->questions().handle(), 0, ZMQ_POLLIN, 0});
     return items;
   }
-  bool is_denied() const { return watch && watch->failure() == HandshakeWatch::Failure::denied; }
-  void look_at_handshakes() {
+  bool is_denied() const { return watch.failure() == ConnectionWatch::Failure::denied; }
+  /// True: a handshake has failed.
+  bool look_at_connections() {
     if (doorkeeper) doorkeeper->answer();
-    if (watch) watch->look();
+    const bool has_failed = watch.look();
+    const auto now = std::chrono::steady_clock::now();
+    if (is_server && now >= next_closing) {
+      watch.close_endless();
+      next_closing = now + kClosingInterval;
+    }
+    return has_failed;
+  }
+  /// False after the timeout, a wake-up, a signal or a failed handshake.
+  bool wait_for_message(std::chrono::milliseconds timeout) {
+    const auto deadline = std::chrono::steady_clock::now() + timeout;
+    std::vector<zmq::pollitem_t> items = poll_items(ZMQ_POLLIN);
+    items.push_back({nullptr, wake_fd, ZMQ_POLLIN, 0});
+    while (true) {
+      const auto left =
+          std::chrono::ceil<std::chrono::milliseconds>(deadline - std::chrono::steady_clock::now());
+      try {
+        zmq::poll(items, std::max(left, std::chrono::milliseconds(0)));
+      } catch (const zmq::error_t& error) {
+        BATON_CHECK(error.num() == EINTR);
+        return false;
+      }
+      const bool is_woken = (items.back().revents & ZMQ_POLLIN) != 0;
+      eventfd_t count = 0;
+      if (is_woken) ::eventfd_read(wake_fd, &count);
+      const bool has_failed = look_at_connections();
+      if (items[0].revents & ZMQ_POLLIN) return true;
+      if (is_woken || has_failed || left.count() <= 0) return false;
+    }
   }
 
   zmq::context_t context;
   zmq::socket_t socket;
-  std::optional<HandshakeWatch> watch;
+  ConnectionWatch watch;
   std::optional<Doorkeeper> doorkeeper;
   int wake_fd;
   std::string endpoint, sender_key;
-  bool is_server = false;
+  bool is_server;
+  std::chrono::steady_clock::time_point next_closing;
 };
 
 Socket::Socket(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -106,13 +141,10 @@ Result<Socket> Socket::open(const std::string& endpoint, std::chrono::millisecon
   const bool has_key = listen ? server->key.has_value() : client->key.has_value();
   BATON_TRY(check_exposure(endpoint, has_key, listen ? server->insecure : client->insecure));
   try {
-    auto impl =
-        std::make_unique<Impl>(listen ? zmq::socket_type::router : zmq::socket_type::dealer);
-    impl->is_server = listen;
+    auto impl = std::make_unique<Impl>(listen, has_key);
     set_options(impl->socket, linger);
     if (listen && server->key) impl->use(*server->key);
     if (!listen && client->key) impl->use(*client->key);
-    if (has_key || !listen) impl->watch.emplace(impl->context, impl->socket);
     impl->socket.set(zmq::sockopt::immediate, unconnected == Unconnected::refuse);
     if (listen) {
       impl->socket.set(zmq::sockopt::router_mandatory, true);
@@ -152,7 +184,7 @@ bool Socket::wait_to_send(std::chrono::milliseconds timeout) {
       BATON_CHECK(error.num() == EINTR);
     }
     if (items[0].revents & ZMQ_POLLOUT) return true;
-    impl_->look_at_handshakes();
+    impl_->look_at_connections();
     if (left.count() <= 0 || impl_->is_denied()) return false;
   }
 }
@@ -178,21 +210,7 @@ bool Socket::send(const std::vector<Bytes>& frames) {
 }
 
 std::optional<std::vector<Bytes>> Socket::receive(std::chrono::milliseconds timeout) {
-  // Wait for the first of message, wake-up, handshake, signal, timeout.
-  std::vector<zmq::pollitem_t> items = impl_->poll_items(ZMQ_POLLIN);
-  items.push_back({nullptr, impl_->wake_fd, ZMQ_POLLIN, 0});
-  try {
-    zmq::poll(items, timeout);
-  } catch (const zmq::error_t& error) {
-    BATON_CHECK(error.num() == EINTR);
-    return std::nullopt;
-  }
-  if (items.back().revents & ZMQ_POLLIN) {
-    eventfd_t count = 0;
-    ::eventfd_read(impl_->wake_fd, &count);
-  }
-  impl_->look_at_handshakes();
-  if (!(items[0].revents & ZMQ_POLLIN)) return std::nullopt;
+  if (!impl_->wait_for_message(timeout)) return std::nullopt;
 
   // The frames of one message arrive together.
   std::vector<Bytes> frames;
@@ -202,6 +220,7 @@ std::optional<std::vector<Bytes>> Socket::receive(std::chrono::milliseconds time
         [&] { return impl_->socket.recv(frame, zmq::recv_flags::dontwait).has_value(); });
     if (!received) return std::nullopt;
     // Who sent it stands with each frame but the first, which the library adds.
+    if (frames.size() == 1 && impl_->is_server) impl_->watch.note_message(frame);
     if (frames.size() <= 1 && impl_->doorkeeper) {
       const char* const key = ::zmq_msg_gets(frame.handle(), "User-Id");
       impl_->sender_key = key != nullptr ? key : "";
@@ -221,12 +240,16 @@ std::optional<Error> Socket::take_refusal() {
     if (std::optional<std::string> refusal = impl_->doorkeeper->take_refusal())
       return Error{ErrorKind::usage, *refusal};
   }
-  const auto failure = impl_->watch ? impl_->watch->take() : std::nullopt;
+  const auto failure = impl_->watch.take();
   if (!failure) return std::nullopt;
-  const bool denied = *failure == HandshakeWatch::Failure::denied;
+  const bool denied = *failure == ConnectionWatch::Failure::denied;
   if (impl_->is_server) {
     if (denied) return std::nullopt;  // the doorkeeper has told
-    if (*failure == HandshakeWatch::Failure::replayed)
+    if (*failure == ConnectionWatch::Failure::endless)
+      return Error{ErrorKind::usage,
+                   fmt::format("a connection: {} bytes without the end of a message",
+                               limits::kMaxUnendedBytes)};
+    if (*failure == ConnectionWatch::Failure::replayed)
       return Error{ErrorKind::usage, "a connection: a message came a second time, or out of turn"};
     return Error{ErrorKind::usage, "a connection: it has no key, or not one for this coordinator"};
   }

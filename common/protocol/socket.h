@@ -12,11 +12,12 @@
 
 namespace baton {
 
-/// One ZeroMQ socket that carries multi-frame messages; only socket, doorkeeper and keys know the
-/// library. Not thread-safe, except wake(). Nothing here blocks but receive(), and that no longer
-/// than its timeout. Queues are bounded by limits::kMaxQueuedMessages, frames by
-/// limits::kMaxMessageBytes. Broken connections are made again in the background; what was queued
-/// is kept, what was on its way is lost.
+/// One ZeroMQ socket that carries multi-frame messages; only socket, connection_watch, doorkeeper
+/// and keys know the library. Not thread-safe, except wake(). Nothing here blocks but receive(),
+/// and that no longer than its timeout. Queues are bounded by limits::kMaxQueuedMessages, frames by
+/// limits::kMaxMessageBytes, what comes without the end of a message by limits::kMaxUnendedBytes.
+/// Broken connections are made again in the background; what was queued is kept, what was on its
+/// way is lost.
 class Socket {
  public:
   /// What happens to messages while nobody listens.
@@ -43,13 +44,13 @@ class Socket {
   /// Queues the frames; false when the queue is full or the peer is gone, and then nothing was
   /// queued.
   bool send(const std::vector<Bytes>& frames);
-  /// The next message, or nullopt after `timeout`, a signal or wake(). Of a message with more than
-  /// limits::kMaxMessageFrames frames only so many are returned.
+  /// The next message, or nullopt after `timeout`, a signal, wake() or a refusal. Of a message with
+  /// more than limits::kMaxMessageFrames frames only so many are returned.
   std::optional<std::vector<Bytes>> receive(std::chrono::milliseconds timeout);
   /// The public key of who sent the last message; empty: without keys.
   const std::string& sender_key() const;
-  /// Why a connection was refused, by either side, once. usage: the key is not known; timeout: it
-  /// was broken off, which may have other reasons.
+  /// Why a connection was refused, by either side, once. usage: the key is not known, or the
+  /// other side spoke against the rules; timeout: it was broken off, which may have other reasons.
   std::optional<Error> take_refusal();
   /// Ends a receive() that is under way, or the next one, early. From any thread.
   void wake();

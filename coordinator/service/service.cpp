@@ -22,6 +22,14 @@ constexpr int kSilentHeartbeats = 4;
 constexpr int kMaxMessagesPerTurn = 1000;
 constexpr std::chrono::milliseconds kTick{250};
 
+/// bad_input: no worker can have so many in hand.
+Status check_leases(const std::vector<LeaseId>& running) {
+  constexpr std::size_t kMost = limits::kMaxLeasesPerWorker + limits::kMaxUnconfirmedReports;
+  if (running.size() <= kMost) return {};
+  return Error{ErrorKind::bad_input,
+               fmt::format("{} leases in hand, a worker has at most {}", running.size(), kMost)};
+}
+
 }  // namespace
 
 // ---- the loop -----------------------------------------------------------------------------------
@@ -122,6 +130,10 @@ Status Service::receive(const PeerId& peer, const WorkerHello& message) {
     refuse(peer, {ErrorKind::bad_input, "a worker needs a name of at most 4096 bytes"});
     return {};
   }
+  if (const Status few = check_leases(message.running); !few) {
+    refuse(peer, few.error());
+    return {};
+  }
   // A worker is the instance that it drew; its name is for people, and others may have it, too.
   WorkerHello hello = message;
   hello.worker_id = peers_.id_for(message);
@@ -170,6 +182,10 @@ Status Service::receive_from(const std::string& worker, const LeaseRequest& mess
 }
 
 Status Service::receive_from(const std::string& worker, const Heartbeat& message) {
+  if (const Status few = check_leases(message.running); !few) {
+    if (const auto peer = peers_.peer_of(worker)) refuse(*peer, few.error());
+    return {};
+  }
   reply_to(worker, Heartbeat{});
   return step(WorkerAlive{worker, message.running});
 }

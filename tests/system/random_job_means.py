@@ -106,8 +106,8 @@ def judge_means(case, render):
     judge = copy.deepcopy(case)
     judge["job"]["sampling"] = {"method": "reference", "referenceSamples": REFERENCE_SAMPLES}
     judge["job"].pop("visibility", None)
-    # Rounds of these see the sites of the first round, those of `reference` have sites of their own.
-    if sampling["method"] in ("sequential", "restir"):
+    # Rounds that carry samples see the sites of the first round, those of `reference` have sites of their own.
+    if sampling["method"] in ("sequential", "restir") and case["job"].get("state", {}).get("carry", True):
         judge["job"].pop("quality", None)
 
     def means(of, first_seed, count):

@@ -201,6 +201,13 @@ TEST(Messages, OversizedBodyIsRefused) {
   EXPECT_THAT(decode_message(frames).error().message, HasSubstr("at most"));
 }
 
+TEST(Messages, WhatAWorkerSaysIsShort) {
+  const SubmitJob document{std::string(limits::kMaxWorkerMessageBytes + 1, ' ')};
+  EXPECT_TRUE(decode_message(encode_message(document)).ok());
+  const TaskFailed report{{}, document.json};
+  EXPECT_THAT(decode_message(encode_message(report)).error().message, HasSubstr("at most 8388608"));
+}
+
 TEST(Messages, AHugeCountReservesNothing) {
   std::vector<Bytes> frames = encode_message(Heartbeat{});
   frames[2] = text("\xff\xff\xff\xff");

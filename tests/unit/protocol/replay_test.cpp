@@ -1,4 +1,3 @@
-#include <arpa/inet.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <poll.h>
@@ -12,6 +11,7 @@
 
 #include "common/protocol/router.h"
 #include "common/protocol/worker_channel.h"
+#include "tests/support/loopback.h"
 #include "tests/support/patience.h"
 
 namespace baton {
@@ -22,14 +22,6 @@ namespace fs = std::filesystem;
 using testing::HasSubstr;
 
 constexpr auto kReplayPatience = with_patience(10s);
-
-sockaddr_in loopback(int port) {
-  sockaddr_in address{};
-  address.sin_family = AF_INET;
-  address.sin_port = htons(static_cast<std::uint16_t>(port));
-  address.sin_addr.s_addr = htonl(INADDR_LOOPBACK);
-  return address;
-}
 
 /// Somebody on the wire: passes the bytes of one connection on, and on request those that come next
 /// from the client a second time.
@@ -63,9 +55,8 @@ class Eavesdropper {
     while (!stop_ && !wait_for(listener_)) continue;
     if (stop_) return;
     const int client = ::accept(listener_, nullptr, nullptr);
-    const int server = ::socket(AF_INET, SOCK_STREAM, 0);
-    sockaddr_in address = loopback(server_port);
-    bool open = ::connect(server, reinterpret_cast<sockaddr*>(&address), sizeof(address)) == 0;
+    const int server = connect_to_loopback(server_port);
+    bool open = server >= 0;
     std::array<char, 65536> bytes{};
     const auto pass = [&](int from, int to, bool twice) {
       const ssize_t count = ::recv(from, bytes.data(), bytes.size(), 0);

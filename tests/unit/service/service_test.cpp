@@ -5,6 +5,7 @@
 #include <algorithm>
 
 #include "common/base/files.h"
+#include "common/base/limits.h"
 #include "tests/unit/service/fake_farm.h"
 
 namespace baton {
@@ -341,6 +342,21 @@ TEST_F(ServiceTest, BadMessagesAreRefusedAndHarmNobody) {
   ASSERT_TRUE(stranger.send({{}, {}}));
   EXPECT_TRUE(stranger.receive(kPatience).has_value());
   EXPECT_THAT(ask<JobList>(service.endpoint(), ListJobs{}).jobs, SizeIs(0));
+}
+
+// Each lease that a worker names is looked up and answered: millions would stop the farm for
+// seconds.
+TEST_F(ServiceTest, AWorkerCannotHaveMoreLeasesInHandThanItMay) {
+  const RunningService service(options);
+  const std::vector<LeaseId> leases(
+      limits::kMaxLeasesPerWorker + limits::kMaxUnconfirmedReports + 1, LeaseId{});
+  FakeWorker worker(service.endpoint(), store(), job);
+  worker.hello(leases);
+  EXPECT_THAT(worker.expect<Refused>().message, HasSubstr("1281 leases in hand"));
+  worker.hello();
+  worker.expect<WorkerWelcome>();
+  worker.say(Heartbeat{leases});
+  EXPECT_THAT(worker.expect<Refused>().message, HasSubstr("1281 leases in hand"));
 }
 
 TEST_F(ServiceTest, StoppingTellsTheWorkers) {

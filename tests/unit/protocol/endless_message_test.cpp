@@ -1,0 +1,103 @@
+#include <arpa/inet.h>
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+#include <sys/socket.h>
+#include <unistd.h>
+
+#include <algorithm>
+#include <array>
+#include <cstring>
+#include <string>
+
+#include "common/base/limits.h"
+#include "common/protocol/router.h"
+#include "common/protocol/worker_channel.h"
+#include "tests/support/loopback.h"
+#include "tests/support/patience.h"
+
+namespace baton {
+namespace {
+
+using namespace std::chrono_literals;
+using testing::HasSubstr;
+
+/// The beginning of a connection that speaks ZMTP 3.0 without keys (RFC 23).
+std::string greeting() {
+  std::string bytes(64, '\0');
+  bytes[0] = '\xff';
+  bytes[9] = '\x7f';
+  bytes[10] = 3;
+  bytes.replace(12, 4, "NULL");
+  return bytes;
+}
+
+/// "I am a DEALER".
+std::string ready() {
+  using namespace std::string_literals;
+  const std::string body = "\x05READY\x0bSocket-Type\0\0\0\x06"s + "DEALER";
+  return "\x04"s + static_cast<char>(body.size()) + body;
+}
+
+/// A frame that is not the last of its message.
+std::string frame_with_more(std::size_t num_bytes) {
+  std::string bytes = "\x03";
+  for (int shift = 56; shift >= 0; shift -= 8) bytes += static_cast<char>(num_bytes >> shift);
+  return bytes + std::string(num_bytes, 'x');
+}
+
+// Without an end of the message everything stays in the library, and nothing of it is received.
+TEST(EndlessMessage, ItsConnectionIsClosedAndOthersGoOn) {
+  Router router = Router::bind("tcp://127.0.0.1:*").value();
+  const std::string& endpoint = router.endpoint();
+  WorkerChannel channel = WorkerChannel::connect(endpoint).value();
+  ASSERT_TRUE(channel.send(LeaseRequest{1}));
+
+  const int talker = connect_to_loopback(std::stoi(endpoint.substr(endpoint.rfind(':') + 1)));
+  ASSERT_GE(talker, 0);
+  const std::string start = greeting() + ready(), frame = frame_with_more(1 << 20);
+  ASSERT_EQ(::send(talker, start.data(), start.size(), MSG_NOSIGNAL),
+            static_cast<ssize_t>(start.size()));
+
+  constexpr std::size_t kTooMuch = 8 * limits::kMaxUnendedBytes;
+  const auto deadline = std::chrono::steady_clock::now() + with_patience(60s);
+  std::size_t num_sent = 0, num_heard = 0;
+  std::optional<Error> refusal;
+  while (!refusal && num_sent < kTooMuch && std::chrono::steady_clock::now() < deadline) {
+    const std::size_t at = num_sent % frame.size();
+    const ssize_t sent =
+        ::send(talker, frame.data() + at, frame.size() - at, MSG_NOSIGNAL | MSG_DONTWAIT);
+    if (sent > 0) num_sent += static_cast<std::size_t>(sent);
+    num_heard += router.receive(1ms).has_value();
+    refusal = router.take_refusal();
+  }
+  ::close(talker);
+  ASSERT_TRUE(refusal.has_value()) << num_sent << " bytes were taken";
+  EXPECT_THAT(refusal->message, HasSubstr("without the end of a message"));
+  EXPECT_GT(num_sent, limits::kMaxUnendedBytes);
+
+  // The worker, whose messages end, has its connection still.
+  ASSERT_TRUE(channel.send(LeaseRequest{2}));
+  while (num_heard < 2 && std::chrono::steady_clock::now() < deadline)
+    num_heard += router.receive(20ms).has_value();
+  EXPECT_EQ(num_heard, 2u);
+  EXPECT_FALSE(router.take_refusal().has_value());
+}
+
+// What counts is what came since the last end of a message, however much came before.
+TEST(EndlessMessage, MessagesThatEndMayBeAsManyAsTheyLike) {
+  Router router = Router::bind("tcp://127.0.0.1:*").value();
+  WorkerChannel channel = WorkerChannel::connect(router.endpoint()).value();
+  const JobDocument document{{}, std::string(limits::kMaxMessageBytes / 2, ' ')};
+  for (int i = 0; i < 6; ++i) {
+    ASSERT_TRUE(channel.send(document));
+    const auto deadline = std::chrono::steady_clock::now() + with_patience(20s);
+    bool heard = false;
+    while (!heard && std::chrono::steady_clock::now() < deadline)
+      heard = router.receive(20ms).has_value();
+    ASSERT_TRUE(heard) << i;
+  }
+  EXPECT_FALSE(router.take_refusal().has_value());
+}
+
+}  // namespace
+}  // namespace baton
