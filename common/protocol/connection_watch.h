@@ -17,7 +17,7 @@ std::vector<std::string> receive_frames(zmq::socket_t& socket);
 ///
 /// The library hands a message over when its last frame has come. Until then it keeps the frames,
 /// of which it limits the size but not the number, so a connection that never ends a message would
-/// grow the process without bound; a listening socket closes it.
+/// grow the process without bound; a listening socket closes it, where it came over TCP.
 class ConnectionWatch {
  public:
   /// broken_off: by the other side, without a word, during the handshake: one has a key that the

@@ -1,12 +1,9 @@
-#include <arpa/inet.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/socket.h>
 #include <unistd.h>
 
-#include <algorithm>
-#include <array>
-#include <cstring>
+#include <filesystem>
 #include <string>
 
 #include "common/base/limits.h"
@@ -18,6 +15,7 @@
 namespace baton {
 namespace {
 
+namespace fs = std::filesystem;
 using namespace std::chrono_literals;
 using testing::HasSubstr;
 
@@ -83,10 +81,22 @@ TEST(EndlessMessage, ItsConnectionIsClosedAndOthersGoOn) {
   EXPECT_FALSE(router.take_refusal().has_value());
 }
 
+/// With a key, as farms have it, or without.
+class ManyMessages : public testing::TestWithParam<bool> {};
+
 // What counts is what came since the last end of a message, however much came before.
-TEST(EndlessMessage, MessagesThatEndMayBeAsManyAsTheyLike) {
-  Router router = Router::bind("tcp://127.0.0.1:*").value();
-  WorkerChannel channel = WorkerChannel::connect(router.endpoint()).value();
+TEST_P(ManyMessages, MayComeOverOneConnection) {
+  ServerAccess server;
+  ClientAccess client;
+  if (GetParam()) {
+    const fs::path folder = fs::path(testing::TempDir()) / ("many-" + std::to_string(::getpid()));
+    ASSERT_TRUE(create_keys(folder));
+    server = server_access((folder / "server.key").string(), false).value();
+    client = client_access((folder / "worker.key").string(), false).value();
+    fs::remove_all(folder);
+  }
+  Router router = Router::bind("tcp://127.0.0.1:*", server).value();
+  WorkerChannel channel = WorkerChannel::connect(router.endpoint(), client).value();
   const JobDocument document{{}, std::string(limits::kMaxMessageBytes / 2, ' ')};
   for (int i = 0; i < 6; ++i) {
     ASSERT_TRUE(channel.send(document));
@@ -98,6 +108,10 @@ TEST(EndlessMessage, MessagesThatEndMayBeAsManyAsTheyLike) {
   }
   EXPECT_FALSE(router.take_refusal().has_value());
 }
+
+INSTANTIATE_TEST_SUITE_P(Keys, ManyMessages, testing::Bool(), [](const auto& with_key) {
+  return with_key.param ? "WithKey" : "WithoutKey";
+});
 
 }  // namespace
 }  // namespace baton
