@@ -1,5 +1,6 @@
 #include "worker/scene/pixel_filter.h"
 
+#include <algorithm>
 #include <cmath>
 #include <cstdint>
 #include <numbers>
@@ -27,8 +28,10 @@ class FilterTable {
       guide_[k] = static_cast<std::uint16_t>(cell);
     }
   }
-  /// Distance from the centre. u: [0, 1).
+  /// Distance from the centre. u: [0, 1]; 1, to which the sum of a site's cell and its place in it
+  /// may round, is the number before it.
   float operator()(float u) const {
+    u = std::min(u, 0x1.fffffep-1f);
     std::size_t cell = guide_[static_cast<std::size_t>(u * kCells)];
     while (cumulative_[cell + 1] <= u) ++cell;
     const float along = (u - cumulative_[cell]) / (cumulative_[cell + 1] - cumulative_[cell]);

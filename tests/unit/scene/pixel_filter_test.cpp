@@ -70,5 +70,16 @@ TEST(PixelFilter, IsMonotonousAndSymmetric) {
   }
 }
 
+// (3 + u) / 4, the place of a site in the last of four rows, rounds to 1 for the largest u.
+TEST(PixelFilterEdge, OneIsWithinTheFilter) {
+  for (const PixelFilter filter : {PixelFilter::gaussian, PixelFilter::blackman_harris}) {
+    const auto [x, y] = filter_position(filter, {1.0f, 1.0f});
+    const auto edge = static_cast<float>(0.5 + filter_radius(filter));
+    EXPECT_GT(x, 0.5 + 0.8 * filter_radius(filter));  // float sums end before the last cells
+    EXPECT_LE(x, edge);
+    EXPECT_EQ(x, y);
+  }
+}
+
 }  // namespace
 }  // namespace baton
