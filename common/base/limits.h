@@ -10,10 +10,10 @@ inline constexpr std::uint64_t kMaxJobFileBytes = 16ull << 20;
 inline constexpr std::uint64_t kMaxAssetFileBytes = 8ull << 30;
 inline constexpr std::uint64_t kMaxBlobBytes = 4ull << 30;
 inline constexpr std::uint64_t kMaxMessageBytes = 64ull << 20;
-inline constexpr std::uint64_t kMaxWorkerMessageBytes = 8ull << 20;  // to the coordinator
-/// From one connection, without the end of a message: more is no message of ours.
-inline constexpr std::uint64_t kMaxUnendedBytes = 2 * kMaxMessageBytes;
-inline constexpr int kMaxMessageFrames = 4;      // with the peer's identity
+inline constexpr std::uint64_t kMaxWorkerMessageBytes = 8ull << 20;  // what a worker says
+inline constexpr std::uint64_t kMaxUnendedBytes =
+    2 * kMaxMessageBytes;                    ///< from one connection without the end of a message
+inline constexpr int kMaxMessageFrames = 4;  // with the peer's identity
 inline constexpr int kMaxQueuedMessages = 4096;  // per connection, either way
 inline constexpr int kMaxSections = 64;          // of one state or film file
 inline constexpr int kMaxChannels = 256;         // of one picture

@@ -79,7 +79,6 @@ void ConnectionWatch::close_endless() {
   for (auto next = connections_.begin(); next != connections_.end();) {
     const auto [descriptor, connection] = *next;
     const std::optional<std::uint64_t> bytes = bytes_received(descriptor);
-    // A number of bytes that has fallen is that of another connection.
     const bool is_endless =
         bytes && !connection.has_spoken && *bytes > connection.bytes + limits::kMaxUnendedBytes;
     if (is_endless) {
@@ -90,7 +89,7 @@ void ConnectionWatch::close_endless() {
       next = connections_.erase(next);
       continue;
     }
-    if (connection.has_spoken || *bytes < connection.bytes) next->second = {*bytes, false};
+    if (connection.has_spoken) next->second = {*bytes, false};
     ++next;
   }
 }

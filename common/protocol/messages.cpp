@@ -14,23 +14,22 @@ namespace {
 constexpr std::size_t kNumFrames = 3;
 constexpr std::size_t kNumTypes = std::variant_size_v<Message>;
 
-/// The most that a body of type T may have. What a worker says is short, and the coordinator, which
+template <class T, class... Types>
+constexpr bool kIsOneOf = (std::is_same_v<T, Types> || ...);
+
+/// The most that a body of type T may have. What a worker says is short: the coordinator, which
 /// hears a thousand of them, must never be long about one.
 template <class T>
-constexpr std::uint64_t max_body_bytes() {
-  constexpr bool kIsOfWorkers =
-      []<class... Said>(std::variant<Said...>*) {
-        return (std::is_same_v<T, Said> || ...);
-      }(static_cast<std::variant<WorkerHello, LeaseRequest, Heartbeat, TaskDone, TaskFailed,
-                                 LeaseReturn, JobDocumentRequest, StatesPublished, WorkerGoodbye>*>(
-          nullptr));
-  return kIsOfWorkers ? limits::kMaxWorkerMessageBytes : limits::kMaxMessageBytes;
-}
+constexpr std::uint64_t kMaxBodyBytes =
+    kIsOneOf<T, WorkerHello, LeaseRequest, Heartbeat, TaskDone, TaskFailed, LeaseReturn,
+             JobDocumentRequest, StatesPublished, WorkerGoodbye>
+        ? limits::kMaxWorkerMessageBytes
+        : limits::kMaxMessageBytes;
 
 template <std::size_t Type>
 Result<Message> decode_body(ByteView body) {
   std::variant_alternative_t<Type, Message> message;
-  if (constexpr std::uint64_t most = max_body_bytes<decltype(message)>(); body.size() > most) {
+  if (constexpr std::uint64_t most = kMaxBodyBytes<decltype(message)>; body.size() > most) {
     return Error{ErrorKind::bad_input,
                  fmt::format("message: type {}: a body of {} bytes, at most {} are read", Type,
                              body.size(), most)};

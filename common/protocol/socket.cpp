@@ -17,6 +17,8 @@
 namespace baton {
 namespace {
 
+using Clock = std::chrono::steady_clock;
+
 constexpr int kReconnectFirstMs = 50;
 constexpr int kReconnectMaxMs = 2000;
 constexpr int kTransportHeartbeatMs = 2000;  // notices a peer whose machine vanished
@@ -43,6 +45,18 @@ auto despite_signals(F call) {
     } catch (const zmq::error_t& error) {
       if (error.num() != EINTR) throw;
     }
+  }
+}
+
+/// Waits for one of the events, no longer than until the deadline; false: a signal came.
+bool poll_until(Clock::time_point deadline, std::vector<zmq::pollitem_t>& items) {
+  const auto left = std::chrono::ceil<std::chrono::milliseconds>(deadline - Clock::now());
+  try {
+    zmq::poll(items, std::max(left, std::chrono::milliseconds(0)));
+    return true;
+  } catch (const zmq::error_t& error) {
+    BATON_CHECK(error.num() == EINTR);
+    return false;
   }
 }
 
@@ -83,7 +97,7 @@ struct Socket::Impl {
   bool look_at_connections() {
     if (doorkeeper) doorkeeper->answer();
     const bool has_failed = watch.look();
-    const auto now = std::chrono::steady_clock::now();
+    const auto now = Clock::now();
     if (is_server && now >= next_closing) {
       watch.close_endless();
       next_closing = now + kClosingInterval;
@@ -92,24 +106,17 @@ struct Socket::Impl {
   }
   /// False after the timeout, a wake-up, a signal or a failed handshake.
   bool wait_for_message(std::chrono::milliseconds timeout) {
-    const auto deadline = std::chrono::steady_clock::now() + timeout;
+    const auto deadline = Clock::now() + timeout;
     std::vector<zmq::pollitem_t> items = poll_items(ZMQ_POLLIN);
     items.push_back({nullptr, wake_fd, ZMQ_POLLIN, 0});
     while (true) {
-      const auto left =
-          std::chrono::ceil<std::chrono::milliseconds>(deadline - std::chrono::steady_clock::now());
-      try {
-        zmq::poll(items, std::max(left, std::chrono::milliseconds(0)));
-      } catch (const zmq::error_t& error) {
-        BATON_CHECK(error.num() == EINTR);
-        return false;
-      }
+      if (!poll_until(deadline, items)) return false;
       const bool is_woken = (items.back().revents & ZMQ_POLLIN) != 0;
       eventfd_t count = 0;
       if (is_woken) ::eventfd_read(wake_fd, &count);
       const bool has_failed = look_at_connections();
       if (items[0].revents & ZMQ_POLLIN) return true;
-      if (is_woken || has_failed || left.count() <= 0) return false;
+      if (is_woken || has_failed || Clock::now() >= deadline) return false;
     }
   }
 
@@ -120,7 +127,7 @@ struct Socket::Impl {
   int wake_fd;
   std::string endpoint, sender_key;
   bool is_server;
-  std::chrono::steady_clock::time_point next_closing;
+  Clock::time_point next_closing;
 };
 
 Socket::Socket(std::unique_ptr<Impl> impl) : impl_(std::move(impl)) {}
@@ -173,19 +180,13 @@ Result<Socket> Socket::bind(const std::string& endpoint, std::chrono::millisecon
 }
 
 bool Socket::wait_to_send(std::chrono::milliseconds timeout) {
-  const auto deadline = std::chrono::steady_clock::now() + timeout;
+  const auto deadline = Clock::now() + timeout;
   std::vector<zmq::pollitem_t> items = impl_->poll_items(ZMQ_POLLOUT);
   while (true) {
-    const auto left =
-        std::chrono::ceil<std::chrono::milliseconds>(deadline - std::chrono::steady_clock::now());
-    try {
-      zmq::poll(items, std::max(left, std::chrono::milliseconds(0)));
-    } catch (const zmq::error_t& error) {
-      BATON_CHECK(error.num() == EINTR);
-    }
-    if (items[0].revents & ZMQ_POLLOUT) return true;
+    const bool is_signal = !poll_until(deadline, items);
+    if (!is_signal && (items[0].revents & ZMQ_POLLOUT)) return true;
     impl_->look_at_connections();
-    if (left.count() <= 0 || impl_->is_denied()) return false;
+    if (Clock::now() >= deadline || impl_->is_denied()) return false;
   }
 }
 

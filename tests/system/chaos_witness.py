@@ -110,27 +110,31 @@ def check_one_result_a_task(seen):
 
 
 def check_nothing_revoked(seen, returns, struck_ms, ended_jobs):
-    """The newest attempt of a task stays with its worker, unless that was silent, the coordinator has started anew, a
-    message was struck, or the job has ended: a report of an older attempt must not be taken for it."""
-    newest, reported, epoch = {}, set(), 0
+    """The newest attempt of a task stays with its worker until it reports, and each report is confirmed, unless the worker
+    was silent, the coordinator has started anew, a message was struck, or the job has ended. A report of an older attempt
+    must not be taken for the newest; a report that is not confirmed shows as its lease being revoked."""
+    newest, reported, confirmed, epoch = {}, {}, set(), 0
     for message in seen:
         lease = (message.task, message.attempt)
         epoch = max(epoch, message.attempt[1])
         if message.type == "LeaseGrant":
             newest[message.task] = message
         elif message.type in ("TaskDone", "TaskFailed"):
-            reported.add(lease)
+            reported.setdefault(lease, message)
+        elif message.type == "ReportReceived":
+            confirmed.add(lease)
         elif message.type == "LeaseRevoke":
-            grant = newest.get(message.task)
-            if grant is None or grant.attempt != message.attempt or lease in reported:
+            since = reported.get(lease) or newest.get(message.task)
+            if since is None or since.attempt != message.attempt or lease in confirmed:
                 continue
             if message.task[0] in ended_jobs or message.attempt[1] < epoch:
                 continue
-            if any(grant.ms <= ms <= message.ms for ms in struck_ms):
+            if any(since.ms <= ms <= message.ms for ms in struck_ms):
                 continue
-            if any(worker == grant.worker and grant.ms <= ms <= message.ms for ms, worker in returns):
+            if any(worker == since.worker and since.ms <= ms <= message.ms for ms, worker in returns):
                 continue
-            raise Fault(f"taken from the worker that has it: {message}, granted {message.ms - grant.ms} ms before")
+            what = "its report was not confirmed" if lease in reported else "taken from the worker that has it"
+            raise Fault(f"{what}: {message}, {since.type} {message.ms - since.ms} ms before")
 
 
 def count_repeated(seen):
