@@ -110,10 +110,10 @@ def check_one_result_a_task(seen):
 
 
 def check_nothing_revoked(seen, returns, struck_ms, ended_jobs):
-    """The newest attempt of a task stays with its worker until it reports, and each report is confirmed, unless the worker
-    was silent, the coordinator has started anew, a message was struck, or the job has ended. A report of an older attempt
-    must not be taken for the newest; a report that is not confirmed shows as its lease being revoked."""
-    newest, reported, confirmed, epoch = {}, {}, set(), 0
+    """The newest attempt of a task stays with its worker until it reports, and a report whose lease is revoked is confirmed
+    in the end, unless the worker was silent, the coordinator has started anew, a message was struck, or the job has ended. A
+    report of an older attempt must not be taken for the newest."""
+    newest, reported, unconfirmed, epoch = {}, {}, {}, 0
     for message in seen:
         lease = (message.task, message.attempt)
         epoch = max(epoch, message.attempt[1])
@@ -122,10 +122,10 @@ def check_nothing_revoked(seen, returns, struck_ms, ended_jobs):
         elif message.type in ("TaskDone", "TaskFailed"):
             reported.setdefault(lease, message)
         elif message.type == "ReportReceived":
-            confirmed.add(lease)
+            unconfirmed[lease] = None
         elif message.type == "LeaseRevoke":
             since = reported.get(lease) or newest.get(message.task)
-            if since is None or since.attempt != message.attempt or lease in confirmed:
+            if since is None or since.attempt != message.attempt:
                 continue
             if message.task[0] in ended_jobs or message.attempt[1] < epoch:
                 continue
@@ -133,8 +133,11 @@ def check_nothing_revoked(seen, returns, struck_ms, ended_jobs):
                 continue
             if any(worker == since.worker and since.ms <= ms <= message.ms for ms, worker in returns):
                 continue
-            what = "its report was not confirmed" if lease in reported else "taken from the worker that has it"
-            raise Fault(f"{what}: {message}, {since.type} {message.ms - since.ms} ms before")
+            if lease not in reported:
+                raise Fault(f"taken from the worker that has it: {message}, granted {message.ms - since.ms} ms before")
+            unconfirmed.setdefault(lease, message)
+    for message in filter(None, unconfirmed.values()):
+        raise Fault(f"its report was never confirmed: {message}")
 
 
 def count_repeated(seen):
