@@ -6,8 +6,8 @@
 // forgets a command that has not struck. It ends when the input does.
 //
 // RECORD is what a witness saw, one line each: "MS struck NUMBER"; "MS WORKER back SILENCE_MS" when
-// a worker speaks after seconds of silence; and for each message about a lease, before it is
-// struck, "MS WORKER TYPE JOB KIND STEP TILE ATTEMPT EPOCH [OUTPUT...]", where OUTPUT is
+// a worker speaks after seconds of silence; and for each lease that a message is about, before it
+// is struck, "MS WORKER TYPE JOB KIND STEP TILE ATTEMPT EPOCH [OUTPUT...]", where OUTPUT is
 // KIND:FRAME:DIGEST; kinds are numbers. MS: of a clock that only goes forward.
 #include <fcntl.h>
 #include <fmt/format.h>
@@ -84,16 +84,20 @@ std::string describe(const LeaseId& lease) {
                      lease.task.step, lease.task.tile, lease.attempt, lease.epoch);
 }
 
-/// The part of a line of the record that follows the worker; empty: not about a lease.
-std::string describe(const Message& message) {
+/// What the record says of a message after the worker: a text for each lease that it is about.
+std::vector<std::string> describe(const Message& message) {
+  std::vector<std::string> texts;
+  if (const auto* hello = std::get_if<WorkerHello>(&message)) {
+    for (const LeaseId& lease : hello->running) texts.push_back("WorkerHello " + describe(lease));
+  }
   if (const auto* grant = std::get_if<LeaseGrant>(&message))
-    return "LeaseGrant " + describe(grant->lease);
+    texts.push_back("LeaseGrant " + describe(grant->lease));
   if (const auto* revoke = std::get_if<LeaseRevoke>(&message))
-    return "LeaseRevoke " + describe(revoke->lease);
+    texts.push_back("LeaseRevoke " + describe(revoke->lease));
   if (const auto* failed = std::get_if<TaskFailed>(&message))
-    return "TaskFailed " + describe(failed->lease);
+    texts.push_back("TaskFailed " + describe(failed->lease));
   if (const auto* received = std::get_if<ReportReceived>(&message))
-    return "ReportReceived " + describe(received->lease);
+    texts.push_back("ReportReceived " + describe(received->lease));
   if (const auto* done = std::get_if<TaskDone>(&message)) {
     std::string text = "TaskDone " + describe(done->lease);
     for (const BlobRef& output : done->outputs) {
@@ -101,9 +105,9 @@ std::string describe(const Message& message) {
       text += fmt::format(" {}:{}:{}", static_cast<int>(output.kind), output.frame,
                           output.digest.hex());
     }
-    return text;
+    texts.push_back(text);
   }
-  return {};
+  return texts;
 }
 
 class Proxy {
@@ -177,7 +181,7 @@ class Proxy {
   void pass(Passing message, int worker) {
     const Result<Message> decoded = decode_message(message.frames);
     if (!decoded) return send(message);
-    if (const std::string text = describe(*decoded); !text.empty())
+    for (const std::string& text : describe(*decoded))
       fmt::print(record_, "{} {} {}\n", now_ms(), worker, text);
 
     if (!command_ || command_->type != decoded->index()) return send(message);

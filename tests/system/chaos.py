@@ -8,9 +8,9 @@ again and again until N faults have struck. Kinds of faults are dealt like cards
 again. Then the farm is left alone, each job is submitted once more (frames may have been removed) and must end as done.
 
 Checked at the end: the pixels are those of an undisturbed run; no task was done under two digests; nothing was done again
-that no fault explains; no lease was taken from a worker for the sake of an older one; when all is done nobody reports any
-more; no temporary file is left. Where the machine lets it mount, the store lies on a small disk that is filled, folders
-become read-only, and power cuts take every file that no program had waited for the disk with.
+that no fault explains; no lease was taken from a worker for the sake of an older one, and no older one was kept; when all is
+done nobody reports any more; no temporary file is left. Where the machine lets it mount, the store lies on a small disk that
+is filled, folders become read-only, and power cuts take every file that no program had waited for the disk with.
 """
 
 import argparse
@@ -66,7 +66,8 @@ def finish(chaos, farm):
 
 
 def judge(programs, chaos, farm, expected):
-    """Everything that must hold at the end. Returns (tasks, how many were done again, how many of those are explained)."""
+    """Everything that must hold at the end. Returns (tasks, superseded leases that workers named, tasks done again, how many
+    of those are explained)."""
     for job in chaos.jobs:
         got = programs.pixels(job.frames)
         for frame, pixels in expected[job.kind].items():
@@ -76,9 +77,10 @@ def judge(programs, chaos, farm, expected):
     check("BUG" not in log, "the coordinator has found a bug")
     num_tasks = witness.check_one_result_a_task(seen)
     witness.check_nothing_revoked(seen, chaos.proxy.returns(), chaos.proxy.struck_ms(), chaos.ended_jobs)
+    num_superseded = witness.check_superseded_revoked(seen, chaos.proxy.struck_ms())
     again = witness.check_repeated(seen, log, chaos.struck, NUM_WORKERS, len(chaos.jobs), chaos.num_harmed)
     check_leftovers(farm)
-    return (num_tasks, *again)
+    return (num_tasks, num_superseded, *again)
 
 
 def run(programs, folder, num_faults, seed, longest_freeze_s=5):
@@ -105,10 +107,11 @@ def run(programs, folder, num_faults, seed, longest_freeze_s=5):
             time.sleep(rng.uniform(0, 0.5))
             chaos.strike()
         finish(chaos, farm)
-        num_tasks, again, explained = judge(programs, chaos, farm, expected)
+        num_tasks, num_superseded, again, explained = judge(programs, chaos, farm, expected)
     faults = ", ".join(f"{count} {what}" for what, count in sorted(chaos.struck.items()))
     print(f"seed {seed}: {chaos.struck.total()} faults on {len(chaos.jobs)} jobs ({faults}); {chaos.num_lost_in_cuts} files "
-          f"lost in power cuts; {num_tasks} tasks, {again} done again, {explained} explained; all frames right")
+          f"lost in power cuts; {num_superseded} leases superseded; {num_tasks} tasks, {again} done again, {explained} "
+          "explained; all frames right")
     for missing, what in ((disk, "full disks and read-only folders: it may not mount"),
                           (power, "power cuts: programs with sanitizers load no library before theirs")):
         if not missing:

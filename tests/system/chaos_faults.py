@@ -10,11 +10,13 @@ import time
 from collections import Counter
 from pathlib import Path
 
-from chaos_witness import STATE
+from chaos_witness import STATE, in_hand
 from farm import BAD_INPUT, OK, PATIENCE, check, make_job, wait_until, write_job
 
 NUM_WORKERS = 3
 NOTICED_S = 6 * PATIENCE  # a fault of a disk that nobody notices in this time has not struck
+SUPERSEDED_S = 8 * PATIENCE  # so long after a worker fell silent its leases are another's, if there are any
+SUPERSEDER_STOPS_S = 0.5
 
 MOVING_CAMERA = [{"frame": 1, "position": [0, 1.2, 5], "lookAt": [0, 0.6, 0]},
                  {"frame": 6, "position": [0.5, 1.3, 4.6], "lookAt": [0, 0.6, 0]}]
@@ -69,7 +71,7 @@ class Chaos:
         self.jobs, self.ended_jobs, self.struck, self.thaws = [], set(), Counter(), {}
         self.num_harmed, self.num_lost_in_cuts, self.healed_at, self.num_started = 0, 0, None, 0
         self.faults = [self.kill_worker, self.kill_coordinator, self.freeze_worker, self.freeze_coordinator,
-                       self.end_worker, self.end_coordinator, self.flip_byte, self.cut_blob, self.remove_blob,
+                       self.supersede_worker, self.end_worker, self.end_coordinator, self.flip_byte, self.cut_blob, self.remove_blob,
                        self.remove_frame, self.submit_again, self.edit_settings, self.edit_picture,
                        self.drop_message, self.double_message, self.delay_message]
         if disk:
@@ -122,6 +124,28 @@ class Chaos:
 
     def kill_coordinator(self):
         return self.end(self.farm.coordinator, signal.SIGKILL, "coordinator killed")
+
+    def supersede_worker(self):
+        """Frozen until one of its leases has gone to another worker, which is given no time to do it: what the frozen one says
+        of that lease is late."""
+        worker = self.some_worker()
+        if not self.farm.coordinator.alive() or self.is_frozen(self.farm.coordinator) or not self.stop(worker):
+            return False
+        others = [other for other in self.farm.workers
+                  if other is not worker and other.alive() and not self.is_frozen(other)]
+        since, tasks = len(self.proxy.lines()), in_hand(self.proxy.seen())
+        deadline = time.monotonic() + SUPERSEDED_S
+        is_superseded = False
+        while tasks and not is_superseded and time.monotonic() < deadline:
+            time.sleep(0.001)
+            is_superseded = any(seen.type == "LeaseGrant" and seen.task in tasks for seen in self.proxy.seen(since))
+        for other in others:
+            self.signal(other.pid, signal.SIGSTOP)
+        self.signal(worker.pid, signal.SIGCONT)
+        time.sleep(SUPERSEDER_STOPS_S)
+        for other in others:
+            self.signal(other.pid, signal.SIGCONT)
+        return is_superseded and self.count("worker superseded")
 
     def end_worker(self):
         return self.end(self.some_worker(), signal.SIGTERM, "worker terminated")
@@ -252,11 +276,16 @@ class Chaos:
         wait_until(lambda: not process.alive(), f"{what}: it has ended")
         return self.count(what)
 
-    def freeze(self, process, what):
+    def stop(self, process):
         if process is None or not process.alive() or self.is_frozen(process):
             return False
         self.signal(process.pid, signal.SIGSTOP)
-        wait_until(lambda: state_of(process.pid) in ("T", "Z", None), what)
+        wait_until(lambda: state_of(process.pid) in ("T", "Z", None), f"{process.pid} is stopped")
+        return True
+
+    def freeze(self, process, what):
+        if not self.stop(process):
+            return False
         seconds = self.rng.uniform(0.2, self.longest_freeze_s)
         self.thaws[process.pid] = threading.Timer(seconds, self.signal, [process.pid, signal.SIGCONT])
         self.thaws[process.pid].start()

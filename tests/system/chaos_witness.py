@@ -67,10 +67,10 @@ class Proxy:
         self._lines += [line.split() for line in whole.decode("ascii").splitlines()]
         return self._lines
 
-    def seen(self):
-        """Every message about a lease, in order."""
+    def seen(self, since=0):
+        """Every message about a lease, in order, from a line on."""
         result = []
-        for words in self.lines():
+        for words in self.lines()[since:]:
             if len(words) < 9:
                 continue
             ms, worker, kind, job, *numbers = words[:9]
@@ -93,6 +93,17 @@ class Proxy:
         before = sum(1 for seen in self.seen() if seen.type in ("TaskDone", "TaskFailed"))
         time.sleep(seconds)
         return sum(1 for seen in self.seen() if seen.type in ("TaskDone", "TaskFailed")) == before
+
+
+def in_hand(seen):
+    """Task -> attempt, of those that workers have."""
+    attempts = {}
+    for message in seen:
+        if message.type == "LeaseGrant":
+            attempts[message.task] = message.attempt
+        elif message.type in ("TaskDone", "TaskFailed", "LeaseRevoke") and attempts.get(message.task) == message.attempt:
+            del attempts[message.task]
+    return attempts
 
 
 def check_one_result_a_task(seen):
@@ -138,6 +149,33 @@ def check_nothing_revoked(seen, returns, struck_ms, ended_jobs):
             unconfirmed.setdefault(lease, message)
     for message in filter(None, unconfirmed.values()):
         raise Fault(f"its report was never confirmed: {message}")
+
+
+def check_superseded_revoked(seen, struck_ms):
+    """A worker that says hello with a lease that has gone to another one loses it: a stale attempt is not accepted.
+
+    Its report is confirmed all the same, so the lease must be revoked before. That the other worker kept its newer attempt
+    is known where it reported it and never lost it. Returns how many such leases there were."""
+    done = {(message.task, message.attempt) for message in seen if message.type == "TaskDone"}
+    revoked = {(message.task, message.attempt) for message in seen if message.type == "LeaseRevoke"}
+    newest, stale, num_stale = {}, {}, 0
+    for message in seen:
+        lease = (message.task, message.attempt)
+        if message.type == "LeaseGrant":
+            newest[message.task] = message
+        elif message.type == "WorkerHello":
+            other = newest.get(message.task)
+            newer = other and (other.task, other.attempt)
+            if other and newer != lease and other.worker != message.worker and newer in done and newer not in revoked:
+                stale[(message.worker, lease)] = message
+                num_stale += 1
+        elif message.type == "LeaseRevoke":
+            stale.pop((message.worker, lease), None)
+        elif message.type == "ReportReceived":
+            hello = stale.pop((message.worker, lease), None)
+            if hello and not any(hello.ms <= ms <= message.ms for ms in struck_ms):
+                raise Fault(f"a stale attempt was accepted: {message}, after {hello}")
+    return num_stale
 
 
 def count_repeated(seen):
