@@ -2,29 +2,13 @@
 
 #include <algorithm>
 #include <bit>
-#include <cstring>
 #include <utility>
 
 #include "common/base/check.h"
+#include "common/state/bin_kernels.h"
 
 namespace baton {
 namespace {
-
-/// The bins that are not 0, four at a time.
-PixelMemories::BinMask mask_of(const VisibilityBins& bins) {
-  static_assert(sizeof(VisibilityCell) == 2 && std::endian::native == std::endian::little);
-  constexpr std::uint64_t kTops = 0x8000800080008000, kRest = ~kTops;
-  constexpr std::uint64_t kTogether = 1ull << 48 | 1ull << 33 | 1ull << 18 | 1ull << 3;
-  PixelMemories::BinMask mask{};
-  for (std::size_t first = 0; first < VisibilityBins::kCount; first += 4) {
-    std::uint64_t four = 0;
-    std::memcpy(&four, bins.data() + first, sizeof(four));
-    const std::uint64_t tops =
-        (((four & kRest) + kRest) | four) & kTops;  // of those that are not 0
-    mask[first / 64] |= ((tops >> 15) * kTogether >> 48 & 0xF) << first % 64;
-  }
-  return mask;
-}
 
 /// Calls take(bin) for each of the mask.
 template <class Take>
@@ -33,16 +17,6 @@ void for_each_bin(const PixelMemories::BinMask& mask, Take take) {
     for (std::uint64_t left = mask[word]; left != 0; left &= left - 1)
       take(64 * word + static_cast<std::size_t>(std::countr_zero(left)));
   }
-}
-
-/// Appends the bins that are not 0. Returns which they are.
-PixelMemories::BinMask append_cells(const VisibilityBins& bins,
-                                    std::vector<VisibilityCell>& cells) {
-  const PixelMemories::BinMask mask = mask_of(bins);
-  std::size_t count = cells.size();
-  cells.resize(count + PixelMemories::num_bins(mask));
-  for_each_bin(mask, [&](std::size_t bin) { cells[count++] = bins.data()[bin]; });
-  return mask;
 }
 
 void fill_bins(const PixelMemories::Packed& from, VisibilityBins& bins) {
@@ -69,7 +43,7 @@ PixelMemories PixelMemories::to_packed() const {
   if (is_packed_) return *this;
   // The array of cells is made in one piece, as large as it must be.
   thread_local std::vector<VisibilityCell> cells;
-  cells.clear();
+  std::size_t num_cells = 0;
   PixelMemories packed;
   packed.is_packed_ = true;
   const auto with_bins = [](const PixelMemory& memory) { return !memory.bins.empty(); };
@@ -78,13 +52,15 @@ PixelMemories PixelMemories::to_packed() const {
   for (const PixelMemory& memory : open_) {
     Entry entry{memory.all_rays, memory.outcomes, memory.light_noise, memory.lobe_noise, 0};
     if (with_bins(memory)) {
-      const std::size_t first = cells.size();
-      packed.sets_.push_back({append_cells(memory.bins, cells), first});
+      if (cells.size() < num_cells + VisibilityBins::kCount)
+        cells.resize(2 * num_cells + VisibilityBins::kCount);
+      BinSet& set = packed.sets_.emplace_back(BinMask{}, num_cells);
+      num_cells += compress_bins(memory.bins.data(), set.mask, cells.data() + num_cells);
       entry.set = static_cast<std::uint32_t>(packed.sets_.size());
     }
     packed.entries_.push_back(entry);
   }
-  packed.cells_ = cells;
+  packed.cells_.assign(cells.begin(), cells.begin() + static_cast<std::ptrdiff_t>(num_cells));
   return packed;
 }
 

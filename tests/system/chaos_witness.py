@@ -123,8 +123,9 @@ def check_one_result_a_task(seen):
 def check_nothing_revoked(seen, returns, struck_ms, ended_jobs):
     """The newest attempt of a task stays with its worker until it reports, and a report whose lease is revoked is confirmed
     in the end, unless the worker was silent, the coordinator has started anew, a message was struck, or the job has ended. A
-    report of an older attempt must not be taken for the newest."""
-    newest, reported, unconfirmed, epoch = {}, {}, {}, 0
+    report of an older attempt must not be taken for the newest. The confirmation may be lost with a connection: then the
+    worker says hello and names the lease."""
+    newest, reported, named_again, unconfirmed, epoch = {}, {}, set(), {}, 0
     for message in seen:
         lease = (message.task, message.attempt)
         epoch = max(epoch, message.attempt[1])
@@ -132,6 +133,8 @@ def check_nothing_revoked(seen, returns, struck_ms, ended_jobs):
             newest[message.task] = message
         elif message.type in ("TaskDone", "TaskFailed"):
             reported.setdefault(lease, message)
+        elif message.type == "WorkerHello" and lease in reported:
+            named_again.add(lease)
         elif message.type == "ReportReceived":
             unconfirmed[lease] = None
         elif message.type == "LeaseRevoke":
@@ -146,7 +149,8 @@ def check_nothing_revoked(seen, returns, struck_ms, ended_jobs):
                 continue
             if lease not in reported:
                 raise Fault(f"taken from the worker that has it: {message}, granted {message.ms - since.ms} ms before")
-            unconfirmed.setdefault(lease, message)
+            if lease not in named_again:
+                unconfirmed.setdefault(lease, message)
     for message in filter(None, unconfirmed.values()):
         raise Fault(f"its report was never confirmed: {message}")
 

@@ -3,6 +3,9 @@
 #include <gtest/gtest.h>
 
 #include <random>
+#include <vector>
+
+#include "common/state/bin_kernels.h"
 
 namespace baton {
 namespace {
@@ -38,6 +41,31 @@ TEST(PixelMemories, RememberTheSamePackedAndOpen) {
     after.open();
     EXPECT_FALSE(after.is_packed());
     for (std::size_t i = 0; i < before.size(); ++i) EXPECT_EQ(after[i], before[i]) << i;
+  }
+}
+
+// None, one, all, and what lies between.
+TEST(PixelMemories, BinsAreCompressedInOrder) {
+  std::mt19937 random(7);
+  for (std::uint32_t most = 0; most <= 256; most += most < 4 || most > 252 ? 1 : 9) {
+    VisibilityBins bins;
+    bins.make();
+    for (std::size_t bin = 0; bin < VisibilityBins::kCount; ++bin) {
+      if (random() % VisibilityBins::kCount < most)
+        bins.make()[bin] = static_cast<VisibilityCell>(bin % 2 == 0 ? 1u << random() % 16 : 65535);
+    }
+    std::vector<VisibilityCell> expected;
+    PixelMemories::BinMask expected_mask{};
+    for (std::size_t bin = 0; bin < VisibilityBins::kCount; ++bin) {
+      if (bins.data()[bin] == 0) continue;
+      expected.push_back(bins.data()[bin]);
+      expected_mask[bin / 64] |= std::uint64_t{1} << bin % 64;
+    }
+    PixelMemories::BinMask mask{};
+    std::vector<VisibilityCell> cells(VisibilityBins::kCount);
+    cells.resize(compress_bins(bins.data(), mask, cells.data()));
+    EXPECT_EQ(cells, expected) << most;
+    EXPECT_EQ(mask, expected_mask) << most;
   }
 }
 
