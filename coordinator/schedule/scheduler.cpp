@@ -141,8 +141,8 @@ void Scheduler::on(const TaskCompleted& event, TimePoint now, Actions& actions) 
     return;
   }
 
-  // A report from before a restart may be an old one: what it held may have been dropped since.
-  if (event.lease.epoch != epoch_ &&
+  // A lease that was taken up again may be an old one: what it held may have been dropped since.
+  if (!leases_.at({event.lease.job, held.task}).may_hold &&
       std::any_of(outputs.begin(), outputs.end(), [](const BlobRef& b) { return b.is_held(); })) {
     on(ResultMissing{event.worker, event.lease}, now, actions);
     return;

@@ -102,7 +102,7 @@ class Scheduler {
     std::string worker;
     TimePoint granted_at;
     std::uint64_t expected_bytes = 0;  ///< that its outputs will take in the store
-    bool may_hold = false;  ///< its state; false where this coordinator has not granted it
+    bool may_hold = false;             ///< its state; false where the lease was taken up again
   };
   struct Worker {
     TimePoint last_sign;

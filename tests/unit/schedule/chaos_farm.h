@@ -170,6 +170,8 @@ class ChaosFarm {
     if (roll(10) == 0) return;
     if (const auto* done = std::get_if<TaskCompleted>(&report)) {
       receive(*done);
+    } else if (const auto* lost = std::get_if<InputsLost>(&report)) {
+      receive(*lost);
     } else {
       step(report);
     }
@@ -193,6 +195,17 @@ class ChaosFarm {
       step(ResultMissing{done.worker, done.lease});
     } else {
       step(done);
+    }
+  }
+
+  /// The service looks itself: what was gone may have been made again since.
+  void receive(InputsLost lost) {
+    std::erase_if(lost.inputs,
+                  [this](const BlobRef& blob) { return store_.contains(blob.digest); });
+    if (lost.inputs.empty()) {
+      step(LeaseReturned{lost.worker, lost.lease, {}});
+    } else {
+      step(lost);
     }
   }
 

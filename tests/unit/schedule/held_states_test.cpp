@@ -112,6 +112,17 @@ TEST_F(HeldStatesTest, WhatWasGrantedBeforeARestartIsMadeAgain) {
   EXPECT_EQ(farm.ask_one("a").lease.task, render(0, 0));
 }
 
+// It was silent, and what it held was lost; what it repeats then is of no use.
+TEST_F(HeldStatesTest, WhatIsReportedForALeaseTakenUpAgainIsMadeAgain) {
+  const GrantLease before = farm.ask_one("a");
+  ASSERT_TRUE(before.may_hold);
+  ASSERT_FALSE(all_of<RecordCompletion>(finish(before)).empty());
+  farm.now += 2 * kSilence;
+  farm.step(ClockTicked{});
+  farm.step(WorkerJoined{"a", {}});
+  EXPECT_TRUE(all_of<RecordCompletion>(finish(before)).empty());
+}
+
 // A worker that has no time for a task has not failed it: holding goes on.
 TEST_F(HeldStatesTest, AfterAReturnedLeaseStatesAreHeldAsBefore) {
   render_first_frame();
