@@ -17,6 +17,7 @@ NUM_WORKERS = 3
 NOTICED_S = 6 * PATIENCE  # a fault of a disk that nobody notices in this time has not struck
 SUPERSEDED_S = 8 * PATIENCE  # so long after a worker fell silent its leases are another's, if there are any
 SUPERSEDER_STOPS_S = 0.5
+RECENT_LINES = 3000  # of the record: who has which lease
 
 MOVING_CAMERA = [{"frame": 1, "position": [0, 1.2, 5], "lookAt": [0, 0.6, 0]},
                  {"frame": 6, "position": [0.5, 1.3, 4.6], "lookAt": [0, 0.6, 0]}]
@@ -133,7 +134,8 @@ class Chaos:
             return False
         others = [other for other in self.farm.workers
                   if other is not worker and other.alive() and not self.is_frozen(other)]
-        since, tasks = len(self.proxy.lines()), in_hand(self.proxy.seen())
+        since = len(self.proxy.lines())
+        tasks = in_hand(self.proxy.seen(max(0, since - RECENT_LINES)))
         deadline = time.monotonic() + SUPERSEDED_S
         is_superseded = False
         while tasks and not is_superseded and time.monotonic() < deadline:

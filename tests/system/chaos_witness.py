@@ -159,9 +159,11 @@ def check_superseded_revoked(seen, struck_ms):
     """A worker that says hello with a lease that has gone to another one loses it: a stale attempt is not accepted.
 
     Its report is confirmed all the same, so the lease must be revoked before. That the other worker kept its newer attempt
-    is known where it reported it and never lost it. Returns how many such leases there were."""
+    is known where it reported it and never lost it, and the task was not opened again: its attempt is the last. Returns how
+    many such leases there were."""
     done = {(message.task, message.attempt) for message in seen if message.type == "TaskDone"}
     revoked = {(message.task, message.attempt) for message in seen if message.type == "LeaseRevoke"}
+    last = {message.task: message.attempt for message in seen if message.type == "LeaseGrant"}
     newest, stale, num_stale = {}, {}, 0
     for message in seen:
         lease = (message.task, message.attempt)
@@ -170,7 +172,8 @@ def check_superseded_revoked(seen, struck_ms):
         elif message.type == "WorkerHello":
             other = newest.get(message.task)
             newer = other and (other.task, other.attempt)
-            if other and newer != lease and other.worker != message.worker and newer in done and newer not in revoked:
+            is_kept = newer in done and newer not in revoked and last[message.task] == other.attempt
+            if is_kept and newer != lease and other.worker != message.worker:
                 stale[(message.worker, lease)] = message
                 num_stale += 1
         elif message.type == "LeaseRevoke":
