@@ -10,20 +10,14 @@
 namespace baton {
 namespace {
 
-/// Calls take(bin) for each of the mask.
-template <class Take>
-void for_each_bin(const PixelMemories::BinMask& mask, Take take) {
-  for (std::size_t word = 0; word < mask.size(); ++word) {
-    for (std::uint64_t left = mask[word]; left != 0; left &= left - 1)
-      take(64 * word + static_cast<std::size_t>(std::countr_zero(left)));
-  }
-}
-
 void fill_bins(const PixelMemories::Packed& from, VisibilityBins& bins) {
   bins.clear();
   VisibilityCell* const all = bins.make();
   const VisibilityCell* next = from.cells.data();
-  for_each_bin(*from.mask, [&](std::size_t bin) { all[bin] = *next++; });
+  for (std::size_t word = 0; word < from.mask->size(); ++word) {
+    for (std::uint64_t left = (*from.mask)[word]; left != 0; left &= left - 1)
+      all[64 * word + static_cast<std::size_t>(std::countr_zero(left))] = *next++;
+  }
 }
 
 }  // namespace

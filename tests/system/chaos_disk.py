@@ -6,7 +6,7 @@ import subprocess
 import sys
 import time
 
-from chaos_witness import unsynced
+from chaos_witness import Unsynced
 from farm import check
 
 SIZE_MIB = 512  # three jobs at once need some tens
@@ -78,12 +78,14 @@ class PowerCut:
     """Takes away what no program has waited for the disk with."""
 
     def __init__(self, programs, folder):
-        self._record = folder / "syncs"
-        self.environment = {"LD_PRELOAD": programs.path("libsync_witness.so"), "BATON_SYNC_RECORD": str(self._record)}
+        record = folder / "syncs"
+        record.touch()
+        self._unsynced = Unsynced(record)
+        self.environment = {"LD_PRELOAD": programs.path("libsync_witness.so"), "BATON_SYNC_RECORD": str(record)}
 
     def at_risk(self):
         """The files that a power cut might take now, and when they were published."""
-        return {path: ms for path, ms in unsynced(self._record.read_text(encoding="ascii")).items()
+        return {path: ms for path, ms in self._unsynced.files().items()
                 if path.endswith((".blob", ".exr")) and os.path.exists(path)}
 
     def strike(self, rng, promised):

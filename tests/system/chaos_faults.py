@@ -72,8 +72,8 @@ class Chaos:
         self.jobs, self.ended_jobs, self.struck, self.thaws = [], set(), Counter(), {}
         self.num_harmed, self.num_lost_in_cuts, self.healed_at, self.num_started = 0, 0, None, 0
         self.faults = [self.kill_worker, self.kill_coordinator, self.freeze_worker, self.freeze_coordinator,
-                       self.supersede_worker, self.end_worker, self.end_coordinator, self.flip_byte, self.cut_blob, self.remove_blob,
-                       self.remove_frame, self.submit_again, self.edit_settings, self.edit_picture,
+                       self.supersede_worker, self.end_worker, self.end_coordinator, self.flip_byte, self.cut_blob,
+                       self.remove_blob, self.remove_frame, self.submit_again, self.edit_settings, self.edit_picture,
                        self.drop_message, self.double_message, self.delay_message]
         if disk:
             self.faults += [self.fill_disk, self.make_read_only]

@@ -21,6 +21,22 @@ SILENCE_MS = 3900  # about when a coordinator gives a worker up
 Seen = namedtuple("Seen", "ms worker type task attempt outputs")  # task: job, kind, step, tile; attempt: number, epoch
 
 
+class Tail:
+    """A file of lines that somebody else appends to."""
+
+    def __init__(self, path):
+        self._path, self._offset = path, 0
+
+    def read(self):
+        """The whole lines that have come since the last time."""
+        with open(self._path, "rb") as file:
+            file.seek(self._offset)
+            content = file.read()
+        whole = content[:content.rfind(b"\n") + 1]
+        self._offset += len(whole)
+        return whole.decode("ascii").splitlines()
+
+
 class Proxy:
     """A faulty proxy and its record."""
 
@@ -31,7 +47,7 @@ class Proxy:
         self._process = subprocess.Popen([programs.path("faulty_proxy"), self.endpoint, coordinator, str(self._path)],
                                          stdin=subprocess.PIPE, stderr=self._log, start_new_session=True)
         self._number = 0
-        self._lines, self._offset = [], 0
+        self._lines, self._tail = [], Tail(self._path)
         wait_until(lambda: self._path.exists() and self.lines(), "the proxy listens")
 
     def close(self):
@@ -59,12 +75,7 @@ class Proxy:
 
     def lines(self):
         """The words of every line so far."""
-        with open(self._path, "rb") as record:
-            record.seek(self._offset)
-            content = record.read()
-        whole = content[:content.rfind(b"\n") + 1]
-        self._offset += len(whole)
-        self._lines += [line.split() for line in whole.decode("ascii").splitlines()]
+        self._lines += [line.split() for line in self._tail.read()]
         return self._lines
 
     def seen(self, since=0):
@@ -217,22 +228,26 @@ def check_repeated(seen, log, struck, num_workers, num_jobs, num_harmed):
     return total, explained
 
 
-def unsynced(record):
-    """Files that a power cut would take: published, but neither they nor their file system were waited for since.
+class Unsynced:
+    """Files that a power cut would take: published, but neither they nor their file system were waited for since."""
 
-    record: what sync_witness.cpp wrote. Returns path -> when it was published, in the record's milliseconds."""
-    lost, synced = {}, set()
-    for line in record.splitlines():
-        what, *paths = line.split()
-        if what == "sync":
-            synced.add(paths[0])
-            lost.pop(paths[0], None)
-        elif what == "syncfs":
-            lost.clear()
-        elif what == "remove":
-            lost.pop(paths[0], None)
-        elif paths[0] in synced:
-            lost.pop(paths[1], None)  # replaces one that may not have been
-        else:
-            lost[paths[1]] = int(paths[3])
-    return lost
+    def __init__(self, record):
+        """record: what sync_witness.cpp writes."""
+        self._tail, self._lost, self._synced = Tail(record), {}, set()
+
+    def files(self):
+        """Path -> when it was published, in the record's milliseconds."""
+        for line in self._tail.read():
+            what, *paths = line.split()
+            if what == "sync":
+                self._synced.add(paths[0])
+                self._lost.pop(paths[0], None)
+            elif what == "syncfs":
+                self._lost.clear()
+            elif what == "remove":
+                self._lost.pop(paths[0], None)
+            elif paths[0] in self._synced:
+                self._lost.pop(paths[1], None)  # replaces one that may not have been
+            else:
+                self._lost[paths[1]] = int(paths[3])
+        return self._lost

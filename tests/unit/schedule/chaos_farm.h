@@ -198,7 +198,8 @@ class ChaosFarm {
     }
   }
 
-  /// The service looks itself: what was gone may have been made again since.
+  /// The service looks itself: what was gone may have been made again since. (It calls that a
+  /// failed attempt. Here the worker looks again.)
   void receive(InputsLost lost) {
     std::erase_if(lost.inputs,
                   [this](const BlobRef& blob) { return store_.contains(blob.digest); });
