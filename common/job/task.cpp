@@ -34,6 +34,14 @@ Digest held_state_name(const Digest& job, std::int32_t frame, std::int32_t tile)
   return digest_of(fmt::format("{} holds frame {} tile {}", job.hex(), frame, tile));
 }
 
+std::vector<Digest> stored_blobs(const std::vector<BlobRef>& blobs) {
+  std::vector<Digest> stored;
+  for (const BlobRef& blob : blobs) {
+    if (blob.kind != BlobKind::image && !blob.is_held()) stored.push_back(blob.digest);
+  }
+  return stored;
+}
+
 std::string_view job_status_name(JobStatus status) {
   switch (status) {
     case JobStatus::running:

@@ -77,6 +77,9 @@ struct PublishedState {
 /// it has no digest of bytes.
 Digest held_state_name(const Digest& job, std::int32_t frame, std::int32_t tile);
 
+/// Those of the blobs that lie in the store: neither frames nor held states.
+std::vector<Digest> stored_blobs(const std::vector<BlobRef>& blobs);
+
 /// Where a job stands. Stored and sent; values are for ever. Of a paused job no task is handed out.
 enum class JobStatus : std::uint8_t {
   running = 0,

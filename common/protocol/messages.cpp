@@ -22,7 +22,7 @@ constexpr bool kIsOneOf = (std::is_same_v<T, Types> || ...);
 template <class T>
 constexpr std::uint64_t kMaxBodyBytes =
     kIsOneOf<T, WorkerHello, LeaseRequest, Heartbeat, TaskDone, TaskFailed, LeaseReturn,
-             JobDocumentRequest, StatesPublished, WorkerGoodbye>
+             JobDocumentRequest, StatesPublished, BlobsLeft, WorkerGoodbye>
         ? limits::kMaxWorkerMessageBytes
         : limits::kMaxMessageBytes;
 

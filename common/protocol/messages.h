@@ -17,7 +17,7 @@ namespace baton {
 /// travels here: blobs go through the store, messages carry their digests.
 
 inline constexpr const char* kProtocolName = "BATON";
-inline constexpr std::uint16_t kProtocolVersion = 9;
+inline constexpr std::uint16_t kProtocolVersion = 10;
 
 // ---- worker to coordinator ----------------------------------------------------------------------
 struct WorkerHello {  ///< first, and again after a reconnect or a new epoch
@@ -92,6 +92,16 @@ struct StatesPublished {
   template <class A>
   void fields(A& a) {
     a(job, states);
+  }
+};
+/// What an attempt put into the store that ended without a result, or too late: nobody else knows
+/// of it.
+struct BlobsLeft {
+  LeaseId lease;
+  std::vector<Digest> blobs;
+  template <class A>
+  void fields(A& a) {
+    a(lease, blobs);
   }
 };
 struct WorkerGoodbye {
@@ -329,7 +339,7 @@ using Message =
                  WorkerGoodbye, WorkerWelcome, LeaseGrant, LeaseRevoke, NoWork, HelloAgain,
                  JobDocument, Shutdown, SubmitJob, ListJobs, ShowJob, CancelJob, StopCoordinator,
                  JobAccepted, JobList, JobDetail, Refused, PauseJob, ResumeJob, DrainWorker, Drain,
-                 ReportReceived, DeleteJob, LeaseReturn, StatesPublished, RequestStates>;
+                 ReportReceived, DeleteJob, LeaseReturn, StatesPublished, RequestStates, BlobsLeft>;
 
 /// The frames of one message: [protocol name and version][type][body].
 std::vector<Bytes> encode_message(const Message& message);

@@ -152,6 +152,7 @@ struct AttemptFailed {
 struct ResultMissing {
   std::string worker;
   LeaseId lease;
+  std::vector<BlobRef> outputs;  ///< as it says; the others are there
 };
 /// An attempt failed because a disk is full, or takes nothing from anybody. Nobody is to blame: the
 /// task is given back, and tasks of its kind and job rest for a while. message: what is waited for.
@@ -180,6 +181,11 @@ struct LeaseReturned {
   LeaseId lease;
   std::string unseen = {};
 };
+/// What an attempt put into the store that has no result, or whose lease is over.
+struct AttemptLeft {
+  LeaseId lease;
+  std::vector<Digest> blobs;
+};
 /// Jobs that have ended left so much in the store.
 struct StoreKeeps {
   std::uint64_t size_bytes = 0;
@@ -190,7 +196,7 @@ struct ClockTicked {};
 using Event = std::variant<JobAdded, JobCancelled, JobSuperseded, JobPaused, JobResumed,
                            JobForgotten, WorkerJoined, WorkerAlive, WorkerLeft, WorkRequested,
                            TaskCompleted, AttemptFailed, ResultMissing, SpaceLacking, InputsLost,
-                           LeaseReturned, HeldPublished, StoreKeeps, ClockTicked>;
+                           LeaseReturned, HeldPublished, AttemptLeft, StoreKeeps, ClockTicked>;
 
 // ---- actions ------------------------------------------------------------------------------------
 /// Make it durable; nothing that comes after in the same or a later step may be sent or removed

@@ -274,18 +274,22 @@ const std::vector<BlobRef>& JobTasks::former_outputs(TaskIndex task) const {
   return found == former_outputs_.end() ? kNone : found->second;
 }
 
-void JobTasks::give_up(TaskIndex task) {
+std::vector<TaskIndex> JobTasks::give_up(TaskIndex task) {
   BATON_CHECK(apply(task, TaskEvent::exhausted));
 
   // What needs this task, directly or not, will never be done.
+  std::vector<TaskIndex> leased;
   std::vector<TaskIndex> unreachable = graph_.dependents(graph_.key(task));
   while (!unreachable.empty()) {
     const TaskIndex dependent = unreachable.back();
     unreachable.pop_back();
+    const bool is_leased = status(dependent) == TaskStatus::leased;
     if (!apply(dependent, TaskEvent::cancelled)) continue;  // reached before, on another way
+    if (is_leased) leased.push_back(dependent);
     const std::vector<TaskIndex> more = graph_.dependents(graph_.key(dependent));
     unreachable.insert(unreachable.end(), more.begin(), more.end());
   }
+  return leased;
 }
 
 void JobTasks::cancel_open() {

@@ -118,8 +118,9 @@ class JobTasks {
   std::vector<TaskIndex> reopen(TaskIndex task, BlobReferences& blobs);
   /// What the task made when it was done before it was opened again; sorted, or empty.
   const std::vector<BlobRef>& former_outputs(TaskIndex task) const;
-  /// Ends a leased task for good, and cancels what cannot be done without it.
-  void give_up(TaskIndex task);
+  /// Ends a leased task for good, and cancels what cannot be done without it. Returns what was
+  /// leased of that: an input of it was lost meanwhile.
+  std::vector<TaskIndex> give_up(TaskIndex task);
   /// Cancels whatever is open.
   void cancel_open();
 

@@ -136,6 +136,7 @@ void Scheduler::on(const TaskCompleted& event, TimePoint now, Actions& actions) 
   if (!held.job) {
     const Job* job = find_job(event.lease.job);
     const auto task = job ? job->tasks.graph().find(event.lease.task) : std::nullopt;
+    on(AttemptLeft{event.lease, stored_blobs(outputs)}, now, actions);
     if (!task || job->tasks.graph().check_outputs(event.lease.task, outputs)) return;
     compare_results(event, job->tasks.outputs(*task), outputs, actions);
     return;
@@ -144,7 +145,7 @@ void Scheduler::on(const TaskCompleted& event, TimePoint now, Actions& actions) 
   // A lease that was taken up again may be an old one: what it held may have been dropped since.
   if (!leases_.at({event.lease.job, held.task}).may_hold &&
       std::any_of(outputs.begin(), outputs.end(), [](const BlobRef& b) { return b.is_held(); })) {
-    on(ResultMissing{event.worker, event.lease}, now, actions);
+    on(ResultMissing{event.worker, event.lease, outputs}, now, actions);
     return;
   }
 
@@ -156,6 +157,7 @@ void Scheduler::on(const TaskCompleted& event, TimePoint now, Actions& actions) 
   if (!fault) fault = graph.check_frames(event.lease.task, event.frames);
   if (fault) {
     fail_attempt(held, {event.lease, event.worker, *fault}, now, actions);
+    on(AttemptLeft{event.lease, stored_blobs(outputs)}, now, actions);
     return;
   }
   // What was done before must come out alike.
@@ -202,10 +204,11 @@ void Scheduler::on(const AttemptFailed& event, TimePoint now, Actions& actions) 
 
 void Scheduler::on(const ResultMissing& event, TimePoint now, Actions& actions) {
   if (!touch(event.worker, now)) return;
-  const Held held = hold(event.worker, event.lease, now);
-  if (!held.job) return;
-  held.job->tasks.add_returned(held.task, event.lease, event.worker);
-  lose_lease(event.lease.job, held.task, actions);
+  if (const Held held = hold(event.worker, event.lease, now); held.job) {
+    held.job->tasks.add_returned(held.task, event.lease, event.worker);
+    lose_lease(event.lease.job, held.task, actions);
+  }
+  on(AttemptLeft{event.lease, stored_blobs(event.outputs)}, now, actions);
 }
 
 void Scheduler::on(const SpaceLacking& event, TimePoint now, Actions&) {
@@ -338,7 +341,7 @@ void Scheduler::fail_attempt(const Held& held, Failure failure, TimePoint now, A
 /// failure too many.
 void Scheduler::give_up(const Digest& digest, Job& job, TaskIndex task, const std::string& reason,
                         Actions& actions) {
-  job.tasks.give_up(task);
+  for (const TaskIndex hopeless : job.tasks.give_up(task)) revoke_lease(digest, hopeless, actions);
   if (job.tasks.progress().tasks_failed >= static_cast<std::uint64_t>(job.spec.max_failed_tasks)) {
     end_job(digest, job, JobStatus::failed,
             fmt::format("{} failed: {}", describe_task(job.tasks.graph().key(task)), reason),
@@ -372,11 +375,9 @@ void Scheduler::end_job(const Digest& digest, Job& job, JobStatus status, const 
   // Take back what is leased, then close whatever is open.
   const auto first = leases_.lower_bound({digest, 0});
   std::vector<TaskIndex> leased;
-  for (auto lease = first; lease != leases_.end() && lease->first.first == digest; ++lease) {
-    actions.push_back(RevokeLease{lease->second.worker, lease->second.id});
+  for (auto lease = first; lease != leases_.end() && lease->first.first == digest; ++lease)
     leased.push_back(lease->first.second);
-  }
-  for (const TaskIndex task : leased) drop_lease(digest, task);
+  for (const TaskIndex task : leased) revoke_lease(digest, task, actions);
   job.tasks.cancel_open();
   job.tasks.let_between_go(blobs_);
 

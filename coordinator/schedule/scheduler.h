@@ -139,6 +139,7 @@ class Scheduler {
   void on(const InputsLost& event, TimePoint now, Actions& actions);
   void on(const HeldPublished& event, TimePoint now, Actions& actions);
   void on(const LeaseReturned& event, TimePoint now, Actions& actions);
+  void on(const AttemptLeft& event, TimePoint now, Actions& actions);
   void on(const StoreKeeps& event, TimePoint now, Actions& actions);
   void on(const ClockTicked& event, TimePoint now, Actions& actions);
 
@@ -148,6 +149,7 @@ class Scheduler {
   void reconcile(const std::string& worker, const std::vector<LeaseId>& named,
                  TimePoint granted_until, TimePoint now, Actions& actions);
   Lease& add_lease(const std::string& worker, const LeaseId& lease, TaskIndex task, TimePoint now);
+  void revoke_lease(const Digest& job, TaskIndex task, Actions& actions);
   void drop_lease(const Digest& job, TaskIndex task);
   void return_lease(const Held& held, const LeaseId& lease, const std::string& worker);
   void lose_lease(const Digest& job, TaskIndex task, Actions& actions);
@@ -195,6 +197,8 @@ class Scheduler {
   std::map<Rank, Digest> running_;
   std::map<std::pair<Digest, TaskIndex>, Lease> leases_;
   std::map<std::string, Worker> workers_;
+  /// Blobs of attempts without a result, of tasks that somebody works on: he may count on them.
+  std::map<std::pair<Digest, TaskIndex>, std::vector<Digest>> left_;
   std::deque<std::string> hungry_;  ///< workers with wanted > 0, who asked first comes first
   std::set<std::pair<std::string, Digest>> asked_;  ///< of whom states of a job were asked
   BlobReferences blobs_;

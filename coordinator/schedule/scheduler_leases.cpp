@@ -147,6 +147,15 @@ void Scheduler::drop_lease(const Digest& job, TaskIndex task) {
   expected_bytes_ -= found->second.expected_bytes;
   workers_.at(found->second.worker).leases.erase({job, task});
   leases_.erase(found);
+  if (const auto left = left_.extract({job, task})) {
+    for (const Digest& blob : left.mapped()) blobs_.discard(blob);
+  }
+}
+
+void Scheduler::revoke_lease(const Digest& job, TaskIndex task, Actions& actions) {
+  const Lease& lease = leases_.at({job, task});
+  actions.push_back(RevokeLease{lease.worker, lease.id});
+  drop_lease(job, task);
 }
 
 /// A lease that ends without a result, and without anybody's failure.

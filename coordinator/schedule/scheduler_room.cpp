@@ -14,6 +14,18 @@ namespace baton {
 
 void Scheduler::on(const StoreKeeps& event, TimePoint, Actions&) { kept_bytes_ = event.size_bytes; }
 
+/// It goes at once, or when nobody works on the task any more: whoever does may count on it.
+void Scheduler::on(const AttemptLeft& attempt, TimePoint, Actions&) {
+  const Job* const job = find_job(attempt.lease.job);
+  const auto task = job ? job->tasks.graph().find(attempt.lease.task) : std::nullopt;
+  if (task && leases_.contains({attempt.lease.job, *task})) {
+    std::vector<Digest>& left = left_[{attempt.lease.job, *task}];
+    left.insert(left.end(), attempt.blobs.begin(), attempt.blobs.end());
+  } else {
+    for (const Digest& blob : attempt.blobs) blobs_.discard(blob);
+  }
+}
+
 /// Whether the store takes so much more, beside what tasks in work will add.
 bool Scheduler::fits(std::uint64_t more_bytes) const {
   return store_limit_ == 0 || store_bytes() + expected_bytes_ + more_bytes <= store_limit_;

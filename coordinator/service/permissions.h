@@ -27,6 +27,7 @@ template <> inline constexpr Rights kRights<Heartbeat>          {"work",        
 template <> inline constexpr Rights kRights<TaskDone>           {"work",          May::yes, May::no,  May::no};
 template <> inline constexpr Rights kRights<TaskFailed>         {"work",          May::yes, May::no,  May::no};
 template <> inline constexpr Rights kRights<StatesPublished>    {"work",          May::yes, May::no,  May::no};
+template <> inline constexpr Rights kRights<BlobsLeft>          {"work",          May::yes, May::no,  May::no};
 template <> inline constexpr Rights kRights<LeaseReturn>        {"work",          May::yes, May::no,  May::no};
 template <> inline constexpr Rights kRights<WorkerGoodbye>      {"work",          May::yes, May::no,  May::no};
 template <> inline constexpr Rights kRights<JobDocumentRequest> {"read jobs",     May::yes, May::own, May::yes};

@@ -205,7 +205,7 @@ Status Service::receive_from(const std::string& worker, const TaskDone& message)
   if (const auto missing = find_missing_blob(message)) {
     spdlog::warn("worker {}: {}: reported, but not there; the task is done again", worker,
                  *missing);
-    return step(ResultMissing{worker, message.lease});
+    return step(ResultMissing{worker, message.lease, message.outputs});
   }
   return step(TaskCompleted{worker, message.lease, message.outputs, message.stats, message.frames});
 }
@@ -248,6 +248,10 @@ Status Service::receive_from(const std::string& worker, const LeaseReturn& messa
     spdlog::warn("worker {} takes no tasks of job {}: {}", worker, message.lease.job.short_hex(),
                  unseen);
   return step(LeaseReturned{worker, message.lease, unseen});
+}
+
+Status Service::receive_from(const std::string&, const BlobsLeft& message) {
+  return step(AttemptLeft{message.lease, message.blobs});
 }
 
 Status Service::receive_from(const std::string& worker, const WorkerGoodbye&) {

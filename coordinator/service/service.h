@@ -75,6 +75,7 @@ class Service {
   Status receive_from(const std::string& worker, const TaskFailed& message);
   Status receive_from(const std::string& worker, const StatesPublished& message);
   Status receive_from(const std::string& worker, const LeaseReturn& message);
+  Status receive_from(const std::string& worker, const BlobsLeft& message);
   Status receive_from(const std::string& worker, const WorkerGoodbye& message);
 
   // Who may do what (service_access.cpp).

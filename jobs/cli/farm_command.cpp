@@ -143,7 +143,7 @@ Result<ExitCode> run_slurm(const FarmCommandOptions& options) {
              open.link.endpoint, open.link.key_file);
 
   RenderSession session(render, signals, std::move(open.farm), std::move(client));
-  const auto outcome = work(session, render, wanted, [&] { pilots.tend(watcher); });
+  auto outcome = work(session, render, wanted, [&] { pilots.tend(watcher); });
   pilots.cancel_all();
   session.stop();
   return outcome;

@@ -10,7 +10,7 @@ namespace baton::test {
 
 /// Writes a file of the test's own and returns its path.
 inline std::string write_test_file(const std::string& name, std::string_view bytes) {
-  const std::string path = testing::TempDir() + name;
+  std::string path = testing::TempDir() + name;
   std::ofstream(path, std::ios::binary) << bytes;
   return path;
 }

@@ -54,7 +54,7 @@ Status check_previous(const RenderContext& context, const TileRun& run,
 /// A tile on its way through its frames, round by round.
 class TileWalk {
  public:
-  TileWalk(const RenderContext& context, const TileRun& run, std::stop_token stop)
+  TileWalk(const RenderContext& context, const TileRun& run, const std::stop_token& stop)
       : context_(context),
         rect_(context.grid.rect(run.tile)),
         shares_(shares_history(context.job)),
@@ -174,7 +174,7 @@ class TileWalk {
 
 Result<RenderStats> run_tile(const RenderContext& context, const TileRun& run,
                              std::span<const StatePtr> previous, const TileRunSink& sink,
-                             std::stop_token stop) {
+                             const std::stop_token& stop) {
   const double start = thread_cpu_seconds();
   BATON_TRY(check_previous(context, run, previous));
   const bool shares = shares_history(context.job);

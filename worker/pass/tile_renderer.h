@@ -54,7 +54,7 @@ using StatePtr = std::shared_ptr<const SampleState>;
 /// state of another picture, tile or frame; cancelled when `stop` is requested; the sink's own.
 Result<RenderStats> run_tile(const RenderContext& context, const TileRun& run,
                              std::span<const StatePtr> previous, const TileRunSink& sink,
-                             std::stop_token stop);
+                             const std::stop_token& stop);
 
 /// Texels of the job's maps that were set to 0 because they were negative, NaN or infinite; one
 /// line per map read so far.

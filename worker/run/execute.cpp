@@ -93,7 +93,8 @@ Status keep_state(const LoadedJob& loaded, BlobStore& store, bool may_hold, Samp
 }
 
 Result<TaskOutput> execute_render(const LoadedJob& loaded, BlobStore& store, const TaskKey& task,
-                                  const TaskGrant& grant, std::stop_token stop) {
+                                  const TaskGrant& grant, const std::stop_token& stop,
+                                  std::vector<BlobRef>* left) {
   const FrameSpan& frames = grant.frames;
   // Check what came over the wire against the job.
   const auto num_frames = static_cast<std::int32_t>(loaded.job.frames.size());
@@ -135,7 +136,12 @@ Result<TaskOutput> execute_render(const LoadedJob& loaded, BlobStore& store, con
         return keep(BlobKind::first_pass, samples.frame_index, encode_first_pass_samples(samples));
       }};
   const TileRun run{task.tile, task.step, frames.first, frames.last};
-  BATON_ASSIGN(output.stats, run_tile(*loaded.context, run, previous, sink, stop));
+  Result<RenderStats> stats = run_tile(*loaded.context, run, previous, sink, stop);
+  if (!stats) {
+    if (left != nullptr) *left = std::move(output.outputs);
+    return stats.error();
+  }
+  output.stats = *stats;
   // run_tile counts what its sink does, not what was read before.
   output.stats.seconds_state = seconds_state;
   output.stats.cpu_seconds += seconds_read;
@@ -176,7 +182,7 @@ Result<TaskOutput> execute_second_pass(const LoadedJob& loaded, BlobStore& store
 
 Result<TaskOutput> execute_assemble(const LoadedJob& loaded, const BlobStore& store,
                                     const TaskKey& task, const std::vector<BlobRef>& inputs,
-                                    std::stop_token stop) {
+                                    const std::stop_token& stop) {
   const TileGrid grid(loaded.job.image);
   const auto num_frames = static_cast<std::int32_t>(loaded.job.frames.size());
   if (task.step < 0 || task.step >= num_frames ||
@@ -214,11 +220,12 @@ Result<TaskOutput> execute_assemble(const LoadedJob& loaded, const BlobStore& st
 }  // namespace
 
 Result<TaskOutput> execute_task(const LoadedJob& loaded, BlobStore& store, const TaskKey& task,
-                                const TaskGrant& grant, std::stop_token stop) {
+                                const TaskGrant& grant, const std::stop_token& stop,
+                                std::vector<BlobRef>* left) {
   loaded.states->release_before(grant.states_from);
   switch (task.kind) {
     case TaskKind::render:
-      return execute_render(loaded, store, task, grant, stop);
+      return execute_render(loaded, store, task, grant, stop, left);
     case TaskKind::second_pass:
       return execute_second_pass(loaded, store, task, grant.inputs);
     case TaskKind::assemble:

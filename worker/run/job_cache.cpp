@@ -99,7 +99,7 @@ LoadedJobPtr JobEntry::loaded() const {
   return result_ && result_->ok() ? result_->value() : nullptr;
 }
 
-Result<LoadedJobPtr> JobEntry::load(std::stop_token stop) {
+Result<LoadedJobPtr> JobEntry::load(const std::stop_token& stop) {
   // Wait until there is something to do or to return.
   std::unique_lock lock(mutex_);
   const bool ready =

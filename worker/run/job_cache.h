@@ -75,7 +75,7 @@ class JobEntry {
   LoadedJobPtr loaded() const;
   /// Waits for the document, then loads once for all callers; once more after a while if a file
   /// could not be read. Cancelled when `stop` is requested while waiting.
-  Result<LoadedJobPtr> load(std::stop_token stop);
+  Result<LoadedJobPtr> load(const std::stop_token& stop);
 
  private:
   const Digest digest_;

@@ -92,7 +92,7 @@ class LocalRender {
         chains_(static_cast<std::size_t>(num_tiles_)),
         frames_(context, job, sink) {}
 
-  void work(std::stop_token stop) {
+  void work(const std::stop_token& stop) {
     while (const std::optional<TileRun> run = next()) {
       StatePtr state;
       const Result<RenderStats> stats = render(*run, state, stop);
@@ -136,7 +136,7 @@ class LocalRender {
   }
 
   /// Renders a run from the states before it; `state` becomes its own.
-  Result<RenderStats> render(const TileRun& run, StatePtr& state, std::stop_token stop) {
+  Result<RenderStats> render(const TileRun& run, StatePtr& state, const std::stop_token& stop) {
     std::vector<StatePtr> previous;
     if (run.run > 0 && carries_state(job_)) {
       const std::lock_guard lock(mutex_);
@@ -206,7 +206,8 @@ class LocalRender {
 }  // namespace
 
 Result<RenderStats> render_locally(const RenderContext& context, const JobSpec& job,
-                                   int num_threads, const FrameSink& sink, std::stop_token stop) {
+                                   int num_threads, const FrameSink& sink,
+                                   const std::stop_token& stop) {
   LocalRender render(context, job, sink);
   std::vector<std::thread> threads;
   for (int i = 0; i < num_threads; ++i) threads.emplace_back([&] { render.work(stop); });

@@ -21,6 +21,6 @@ using FrameSink = std::function<Status(std::int32_t frame_index, const FilmTile&
 /// cancelled when `stop` is requested.
 Result<RenderStats> render_locally(const RenderContext& context, const JobSpec& job,
                                    int num_threads, const FrameSink& sink,
-                                   std::stop_token stop = {});
+                                   const std::stop_token& stop = {});
 
 }  // namespace baton

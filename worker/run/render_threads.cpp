@@ -77,13 +77,12 @@ void RenderThreads::work() {
     // Run it without the lock; list nodes do not move.
     lock.unlock();
     const std::stop_token stop = slot->stop.get_token();
-    Result<TaskOutput> result = stop.stop_requested()
-                                    ? Error{ErrorKind::cancelled, "stopped before it began"}
-                                    : execute_(slot->task, stop);
+    EndedTask end{slot->task.lease, Error{ErrorKind::cancelled, "stopped before it began"}};
+    if (!stop.stop_requested()) end.result = execute_(slot->task, stop, end.left);
     lock.lock();
     left_thread_.push_back(slot->task.lease);
     executed_.tasks.push_back(std::move(slot->task));
-    executed_.results.push_back(std::move(result));
+    executed_.ends.push_back(std::move(end));
     slots_.erase(slot);
     executed_any_.notify_one();
     wake_();
@@ -101,14 +100,16 @@ void RenderThreads::publish_executed() {
     lock.unlock();
     std::vector<PooledTask> good;
     for (std::size_t i = 0; i < batch.tasks.size(); ++i) {
-      if (batch.results[i]) good.push_back(batch.tasks[i]);
+      if (batch.ends[i].result) good.push_back(batch.tasks[i]);
     }
     const Status published = good.empty() ? Status() : publish_(good);
     lock.lock();
-    for (std::size_t i = 0; i < batch.tasks.size(); ++i) {
-      Result<TaskOutput>& result = batch.results[i];
-      if (result && !published) result = published.error();
-      ended_.push_back({batch.tasks[i].lease, std::move(result)});
+    for (EndedTask& end : batch.ends) {
+      if (end.result && !published) {
+        end.left = std::move(end.result->outputs);
+        end.result = published.error();
+      }
+      ended_.push_back(std::move(end));
     }
     wake_();
   }

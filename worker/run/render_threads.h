@@ -25,6 +25,7 @@ struct PooledTask {
 struct EndedTask {
   LeaseId lease;
   Result<TaskOutput> result;
+  std::vector<BlobRef> left = {};  ///< in the store, by one that has no result
 };
 
 /// The render threads, and one more that waits for the disk. The control thread submits, stops and
@@ -34,7 +35,9 @@ struct EndedTask {
 /// bounded by the session, which requests few more leases than there are threads.
 class RenderThreads {
  public:
-  using Execute = std::function<Result<TaskOutput>(const PooledTask& task, std::stop_token stop)>;
+  /// `left`: see execute_task().
+  using Execute = std::function<Result<TaskOutput>(
+      const PooledTask& task, const std::stop_token& stop, std::vector<BlobRef>& left)>;
   /// Makes the outputs of tasks that went well durable; an error becomes that of each of them.
   using Publish = std::function<Status(std::span<const PooledTask> tasks)>;
 
@@ -65,7 +68,7 @@ class RenderThreads {
 
   struct Executed {
     std::vector<PooledTask> tasks;
-    std::vector<Result<TaskOutput>> results;  ///< of each
+    std::vector<EndedTask> ends;  ///< of each
   };
 
   void work();

@@ -70,7 +70,10 @@ void Session::on(const TaskExecuted& event, TimePoint now, Actions& actions) {
 
 void Session::on(const TaskEnded& event, TimePoint now, Actions& actions) {
   executed_.erase(event.lease);
-  if (in_hand_.erase(event.lease) == 0) return;
+  if (in_hand_.erase(event.lease) == 0) {  // its end was told before
+    tell_left(event.lease, event.result ? event.result->outputs : event.left, actions);
+    return;
+  }
   next_request_ = now;  // what ended may have made work
 
   // Report, unless the task was given up.
@@ -92,6 +95,7 @@ void Session::on(const TaskEnded& event, TimePoint now, Actions& actions) {
   } else if (draining_) {
     actions.push_back(SendMessage{LeaseReturn{event.lease}});  // nobody had begun it
   }
+  tell_left(event.lease, event.left, actions);
   request_leases(now, actions);
 }
 
@@ -198,6 +202,10 @@ void Session::receive(const LeaseGrant& grant, TimePoint now, Actions& actions) 
 
 void Session::receive(const LeaseRevoke& revoke, TimePoint, Actions& actions) {
   if (in_hand_.contains(revoke.lease)) actions.push_back(StopTask{revoke.lease});
+  for (const Report& report : reports_) {
+    const auto* const done = std::get_if<TaskDone>(&report.message);
+    if (done && report.lease == revoke.lease) tell_left(report.lease, done->outputs, actions);
+  }
   forget_report(revoke.lease);
 }
 
@@ -294,6 +302,13 @@ void Session::send_report(Report& report, TimePoint now, Actions& actions) const
 
 void Session::forget_report(const LeaseId& lease) {
   std::erase_if(reports_, [&](const Report& report) { return report.lease == lease; });
+}
+
+/// Names what an attempt without a result has put into the store, so that it need not wait there
+/// for the sweep of leftovers.
+void Session::tell_left(const LeaseId& lease, const std::vector<BlobRef>& left, Actions& actions) {
+  BlobsLeft message{lease, stored_blobs(left)};
+  if (!message.blobs.empty()) actions.push_back(SendMessage{std::move(message)});
 }
 
 /// A report that is not confirmed counts: a coordinator that lost it must keep or adopt the lease

@@ -38,6 +38,7 @@ struct TaskExecuted {
 struct TaskEnded {
   LeaseId lease;
   Result<TaskOutput> result;
+  std::vector<BlobRef> left = {};  ///< in the store, by one that has no result
 };
 struct DocumentMissing {
   Digest job;
@@ -134,6 +135,7 @@ class Session {
   void introduce(TimePoint now, Actions& actions);
   void send_report(Report& report, TimePoint now, Actions& actions) const;
   void forget_report(const LeaseId& lease);
+  static void tell_left(const LeaseId& lease, const std::vector<BlobRef>& left, Actions& actions);
   void request_leases(TimePoint now, Actions& actions);
   std::vector<LeaseId> leases_in_hand() const;
 

@@ -99,8 +99,9 @@ constexpr std::chrono::minutes kLoadPatience{15};
 
 /// Runs a task on a render thread. The command that repeats it stands in its error message and,
 /// should the process die, in the crash report.
-Result<TaskOutput> execute_pooled(const PooledTask& task, std::stop_token stop, NoteLog& notes,
-                                  TaskWatch& watch, const Roots& roots) {
+Result<TaskOutput> execute_pooled(const PooledTask& task, const std::stop_token& stop,
+                                  std::vector<BlobRef>& left, NoteLog& notes, TaskWatch& watch,
+                                  const Roots& roots) {
   // The time that a task may take does not include the loading of its job, which has its own.
   LoadedJobPtr loaded;
   {
@@ -132,7 +133,7 @@ Result<TaskOutput> execute_pooled(const PooledTask& task, std::stop_token stop, 
         replay_command(path, numbers[static_cast<std::size_t>(task.grant.frames.last)], key.tile);
   }
   const CrashNote note(command);
-  Result<TaskOutput> output = execute_task(*loaded, *task.store, key, task.grant, stop);
+  Result<TaskOutput> output = execute_task(*loaded, *task.store, key, task.grant, stop, &left);
   notes.report(repair_notes(*loaded->context));
   if (output || output.error().kind == ErrorKind::cancelled ||
       output.error().kind == ErrorKind::no_space)
@@ -191,8 +192,9 @@ class Worker {
             kFilePatience, machine_.memory.scene_bytes / 2),
         pool_(
             options.num_threads,
-            [this](const PooledTask& task, std::stop_token stop) {
-              return execute_pooled(task, std::move(stop), notes_, watch_, machine_.roots);
+            [this](const PooledTask& task, const std::stop_token& stop,
+                   std::vector<BlobRef>& left) {
+              return execute_pooled(task, stop, left, notes_, watch_, machine_.roots);
             },
             [this](std::span<const PooledTask> tasks) { return publish_pooled(tasks, watch_); },
             [this] { channel_.wake(); }) {}
@@ -204,7 +206,7 @@ class Worker {
       for (const LeaseId& lease : pool_.take_executed()) step(TaskExecuted{lease});
       for (EndedTask& ended : pool_.collect()) {
         log_failure(ended);
-        step(TaskEnded{ended.lease, std::move(ended.result)});
+        step(TaskEnded{ended.lease, std::move(ended.result), std::move(ended.left)});
       }
       take_packed();
       end_overdue_tasks();

@@ -29,7 +29,7 @@ class ImageIoTest : public testing::Test {
     fs::create_directories(folder_);
   }
   fs::path write(const std::string& name, ByteView bytes) const {
-    const fs::path path = folder_ / name;
+    fs::path path = folder_ / name;
     std::ofstream(path, std::ios::binary)
         .write(reinterpret_cast<const char*>(bytes.data()),
                static_cast<std::streamsize>(bytes.size()));

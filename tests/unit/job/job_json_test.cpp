@@ -37,7 +37,7 @@ JobSpec parsed(const std::string& text) {
 
 /// A new folder for the test.
 fs::path test_folder() {
-  const fs::path folder =
+  fs::path folder =
       fs::path(testing::TempDir()) / testing::UnitTest::GetInstance()->current_test_info()->name();
   fs::remove_all(folder);
   return folder;

@@ -14,7 +14,7 @@ using testing::HasSubstr;
 using testing::IsEmpty;
 
 /// A turning light on one material.
-JobSpec turning(Method method, double deg, MaterialSpec material) {
+JobSpec turning(Method method, double deg, const MaterialSpec& material) {
   JobSpec job;
   job.frames = {1, 2, 3};
   job.sampling.method = method;

@@ -84,6 +84,7 @@ const std::vector<Message>& examples() {
       LeaseReturn{kLease, "/shows"},
       StatesPublished{{1, 2}, {{kBlob, kBlob}}},
       RequestStates{{3, 4}, {{5, 6}}},
+      BlobsLeft{kLease, {{5, 6}}},
   };
   return messages;
 }
@@ -115,7 +116,7 @@ TEST(Messages, MembersArriveWhereTheyWereSent) {
 
 TEST(Messages, BytesAreThoseOfTheGrammar) {
   const std::vector<Bytes> frames = encode_message(NoWork{0x01020304});
-  EXPECT_EQ(frames[0], text(std::string_view("BATON\x09\x00", 7)));
+  EXPECT_EQ(frames[0], text(std::string_view("BATON\x0A\x00", 7)));
   EXPECT_EQ(frames[1], text(std::string_view("\x0a\x00", 2)));
   EXPECT_EQ(frames[2], text("\x04\x03\x02\x01"));
 }
@@ -155,12 +156,12 @@ TEST(Messages, AnyChangedByteIsReadOrRefusedButNeverCrashes) {
 
 TEST(Messages, AnotherVersionIsAVersionError) {
   std::vector<Bytes> frames = encode_message(ListJobs{});
-  frames[0][5] = std::byte{10};
+  frames[0][5] = std::byte{11};
   frames.resize(1);  // nothing after the header may matter
   const Result<Message> decoded = decode_message(frames);
   ASSERT_FALSE(decoded.ok());
   EXPECT_EQ(decoded.error().kind, ErrorKind::version);
-  EXPECT_THAT(decoded.error().message, HasSubstr("version 10, this program speaks 9"));
+  EXPECT_THAT(decoded.error().message, HasSubstr("version 11, this program speaks 10"));
 }
 
 TEST(Messages, OtherProtocolsAreRefused) {

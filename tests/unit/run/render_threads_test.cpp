@@ -37,7 +37,7 @@ TEST(RenderThreads, RunsEverythingOnceAndWakesForEachResult) {
   std::counting_semaphore<> woken(0);
   RenderThreads pool(
       3,
-      [](const PooledTask& t, std::stop_token) {
+      [](const PooledTask& t, const std::stop_token&, std::vector<BlobRef>&) {
         TaskOutput output;
         output.stats.pixels = static_cast<std::uint64_t>(t.lease.task.tile);
         return output;
@@ -58,7 +58,8 @@ TEST(RenderThreads, StopReachesTheRunningTaskAlone) {
   std::counting_semaphore<> woken(0), started(0), let_go(0);
   RenderThreads pool(
       2,
-      [&](const PooledTask&, std::stop_token stop) -> Result<TaskOutput> {
+      [&](const PooledTask&, const std::stop_token& stop,
+          std::vector<BlobRef>&) -> Result<TaskOutput> {
         started.release();
         let_go.acquire();
         if (stop.stop_requested()) return Error{ErrorKind::cancelled, "stopped"};
@@ -80,7 +81,7 @@ TEST(RenderThreads, DroppedTasksEndAsCancelledAndNeverRun) {
   std::counting_semaphore<> woken(0), started(0), let_go(0);
   RenderThreads pool(
       1,
-      [&](const PooledTask& t, std::stop_token) {
+      [&](const PooledTask& t, const std::stop_token&, std::vector<BlobRef>&) {
         EXPECT_EQ(t.lease, lease(0));
         started.release();
         let_go.acquire();
@@ -102,7 +103,8 @@ TEST(RenderThreads, NoThreadWaitsForTheDisk) {
   std::counting_semaphore<> woken(0), waiting(0), let_go(0);
   std::vector<std::size_t> waits;
   RenderThreads pool(
-      1, [](const PooledTask&, std::stop_token) { return TaskOutput{}; },
+      1,
+      [](const PooledTask&, const std::stop_token&, std::vector<BlobRef>&) { return TaskOutput{}; },
       [&](std::span<const PooledTask> tasks) {
         waits.push_back(tasks.size());
         waiting.release();
@@ -127,7 +129,10 @@ TEST(RenderThreads, NoThreadWaitsForTheDisk) {
 TEST(RenderThreads, WhatTheDiskRefusesHasFailed) {
   std::counting_semaphore<> woken(0);
   RenderThreads pool(
-      1, [](const PooledTask&, std::stop_token) { return TaskOutput{}; },
+      1,
+      [](const PooledTask&, const std::stop_token&, std::vector<BlobRef>&) {
+        return TaskOutput{{{BlobKind::film, 0, 0, digest_of("film"), 10}}, {}};
+      },
       [](std::span<const PooledTask>) {
         return Status(Error{ErrorKind::io, "disk full"});
       },
@@ -136,13 +141,15 @@ TEST(RenderThreads, WhatTheDiskRefusesHasFailed) {
   const std::vector<EndedTask> ended = collect(pool, woken, 1);
   ASSERT_FALSE(ended[0].result);
   EXPECT_EQ(ended[0].result.error().message, "disk full");
+  EXPECT_EQ(ended[0].left.size(), 1u);
 }
 
 TEST(RenderThreads, ClosingStopsWhatRuns) {
   std::counting_semaphore<> started(0);
   RenderThreads pool(
       1,
-      [&](const PooledTask&, std::stop_token stop) -> Result<TaskOutput> {
+      [&](const PooledTask&, const std::stop_token& stop,
+          std::vector<BlobRef>&) -> Result<TaskOutput> {
         started.release();
         while (!stop.stop_requested()) std::this_thread::yield();
         return Error{ErrorKind::cancelled, "stopped"};

@@ -107,6 +107,32 @@ TEST_F(SessionTest, ARevokedTaskIsStoppedAndNotReported) {
   EXPECT_EQ(find<StopTask>(receive(LeaseRevoke{lease(0)})), nullptr);
 }
 
+TEST_F(SessionTest, WhatItLeavesInTheStoreIsNamed) {
+  const BlobRef film{BlobKind::film, 3, 0, digest_of("film"), 10};
+  const BlobRef held{BlobKind::state, 3, 0, digest_of("held"), 0};
+  const BlobRef frame{BlobKind::image, 3, 0, digest_of("frame"), 10};
+  const auto left = [](const std::vector<SessionAction>& actions) {
+    const auto said = sent<BlobsLeft>(actions);
+    return said.size() == 1 ? said[0].blobs : std::vector<Digest>();
+  };
+  const Error stopped{ErrorKind::cancelled, "stopped"};
+  welcome();
+  for (int tile = 0; tile < 3; ++tile) grant(lease(tile));
+
+  // By a task that was stopped, or failed.
+  receive(LeaseRevoke{lease(0)});
+  EXPECT_THAT(left(step(TaskEnded{lease(0), stopped, {film}})), testing::ElementsAre(film.digest));
+  EXPECT_THAT(left(step(TaskEnded{lease(0), stopped, {film}})), testing::ElementsAre(film.digest))
+      << "its end was told before";
+
+  // By one whose report came too late.
+  const TaskOutput output{{film, held, frame}, {}};
+  EXPECT_THAT(left(step(TaskEnded{lease(1), output})), testing::IsEmpty());
+  EXPECT_THAT(left(receive(LeaseRevoke{lease(1)})), testing::ElementsAre(film.digest));
+  step(TaskEnded{lease(2), output});
+  EXPECT_THAT(left(receive(ReportReceived{lease(2)})), testing::IsEmpty());
+}
+
 TEST_F(SessionTest, AGrantThatComesTwiceStartsOneTask) {
   welcome();
   EXPECT_NE(find<StartTask>(grant(lease(0))), nullptr);

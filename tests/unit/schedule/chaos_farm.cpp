@@ -1,9 +1,12 @@
 #include "tests/unit/schedule/chaos_farm.h"
 
+#include <gmock/gmock.h>
+
 namespace baton::testing_farm {
 
 void ChaosFarm::advance(bool trouble) {
   now_ += std::chrono::milliseconds(roll(300));
+  if (roll(3) == 0) deliver_left();
   const std::string worker = "w" + std::to_string(roll(options_.num_workers));
   const int what = roll(100);
   if (what < 30) {
@@ -42,10 +45,9 @@ void ChaosFarm::change_job(JobSpec next) {
   if (is_open(status())) step(JobSuperseded{job_, {}});
   keep_blobs();
   step(JobForgotten{job_});
-  held_.clear();
   memory_.clear();
   wanted_.clear();
-  unconfirmed_.clear();
+  for (int i = 0; i < options_.num_workers; ++i) drop_leases("w" + std::to_string(i));
   old_reports_.clear();
 
   // Frames are files with numbers.
@@ -88,12 +90,15 @@ void ChaosFarm::change_job(JobSpec next) {
 }
 
 void ChaosFarm::delete_job() {
+  for (int i = 0; i < options_.num_workers; ++i) drop_leases("w" + std::to_string(i));
+  deliver_left();
   step(JobForgotten{job_});
   for (const Digest& blob : kept_) store_.erase(blob);
   for (const Digest& blob : unreported_) {
     if (!scheduler_->is_referenced(blob)) store_.erase(blob);
   }
   EXPECT_EQ(scheduler_->find_job(job_), nullptr);
+  EXPECT_THAT(store_, testing::IsEmpty()) << "all that was published was reported, or told of";
   for (const TaskCompleted& late : old_reports_) step(late);
   EXPECT_FALSE(std::any_of(store_.begin(), store_.end(),
                            [this](const Digest& blob) { return scheduler_->is_referenced(blob); }));

@@ -87,6 +87,8 @@ class ChaosFarm {
   void start_coordinator() {
     scheduler_ = std::make_unique<Scheduler>(++epoch_, kSilence, options_.store_limit);
     known_.clear();
+    unreported_.merge(told_);
+    told_.clear();
     add_job();
   }
 
@@ -125,19 +127,39 @@ class ChaosFarm {
   /// The process dies, with all that it holds.
   void end_process(const std::string& worker) {
     num_held_lost_ += memory_[worker].size();
-    for (const auto& [lease, held] : held_[worker]) leave_unreported(lease, held);
+    drop_leases(worker);
+    for (const auto& [unused, left] : std::exchange(left_, {}))
+      unreported_.insert(left.blobs.begin(), left.blobs.end());
     memory_[worker].clear();
     wanted_.erase(worker);
-    held_[worker].clear();
-    unconfirmed_[worker].clear();
     known_.erase(worker);
     // What comes next under this name is another process; nobody listens to the old one's socket.
     std::erase_if(old_reports_, [&](const TaskCompleted& done) { return done.worker == worker; });
   }
-  /// Nobody hears of what was published for the lease: the sweep of leftovers removes it.
-  void leave_unreported(const LeaseId& lease, const Held& held) {
-    if (!held.published) return;
-    for (const BlobRef& blob : outputs(lease.task, held)) unreported_.insert(blob.digest);
+  /// It has no result of the lease, and will say what it published for it.
+  void tell_left(const std::string& worker, const LeaseId& lease, const Held& held) {
+    if (held.published) left_.push_back({worker, {lease, stored_blobs(outputs(lease.task, held))}});
+  }
+  void tell_left(const std::string& worker, const LeaseId& lease, const Event& report) {
+    if (const auto* done = std::get_if<TaskCompleted>(&report))
+      left_.push_back({worker, {lease, stored_blobs(done->outputs)}});
+  }
+  void drop_leases(const std::string& worker) {
+    for (const auto& [lease, held] : held_[worker]) tell_left(worker, lease, held);
+    for (const auto& [lease, report] : unconfirmed_[worker]) tell_left(worker, lease, report);
+    held_[worker].clear();
+    unconfirmed_[worker].clear();
+  }
+  /// Now and then it is lost, or nobody knows the worker: then only the sweep will find them.
+  void deliver_left() {
+    for (const auto& [worker, left] : std::exchange(left_, {})) {
+      if (roll(10) == 0 || !known_.contains(worker)) {
+        unreported_.insert(left.blobs.begin(), left.blobs.end());
+      } else {
+        told_.insert(left.blobs.begin(), left.blobs.end());
+        step(left);
+      }
+    }
   }
   /// It is drained: what it has not begun goes back, what it holds into the store.
   void leave(const std::string& worker) {
@@ -192,7 +214,7 @@ class ChaosFarm {
     num_missing_ += is_missing ? 1 : 0;
     reporter_ = done.worker;
     if (is_missing) {
-      step(ResultMissing{done.worker, done.lease});
+      step(ResultMissing{done.worker, done.lease, done.outputs});
     } else {
       step(done);
     }
@@ -236,7 +258,7 @@ class ChaosFarm {
       if (made[i].is_held()) {
         memory_[worker].insert_or_assign(made[i].digest, PublishedState{made[i], packed[i]});
         ++num_held_;
-      } else {
+      } else if (made[i].kind != BlobKind::image) {
         store_.insert(made[i].digest);
       }
     }
@@ -259,6 +281,7 @@ class ChaosFarm {
   void fail(const std::string& worker) {
     if (held_[worker].empty() || !known_.contains(worker)) return;
     const LeaseId lease = held_[worker].begin()->first;
+    tell_left(worker, lease, held_[worker].begin()->second);
     held_[worker].erase(lease);
     say(worker, lease, AttemptFailed{worker, lease, "boom", false});
   }
@@ -309,10 +332,11 @@ class ChaosFarm {
   void on(const GrantLease& a);
   void on(const RevokeLease& a) {
     if (const auto held = held_[a.worker].find(a.lease); held != held_[a.worker].end()) {
-      leave_unreported(a.lease, held->second);
+      tell_left(a.worker, a.lease, held->second);
       held_[a.worker].erase(held);
     }
-    unconfirmed_[a.worker].erase(a.lease);
+    if (const auto report = unconfirmed_[a.worker].extract(a.lease))
+      tell_left(a.worker, a.lease, report.mapped());
   }
   void on(const ReportNoWork&) {}
   void on(const ForgetWorker& a) { known_.erase(a.worker); }
@@ -345,7 +369,9 @@ class ChaosFarm {
   std::string reporter_;                   ///< of the last report
   std::map<TaskKey, std::string> makers_;  ///< whose report was recorded
   std::set<LeaseId> issued_;
-  std::set<Digest> store_;       ///< the blobs that are there
+  std::set<Digest> store_;                                 ///< the blobs that are there
+  std::vector<std::pair<std::string, AttemptLeft>> left_;  ///< still to be said
+  std::set<Digest> told_;                                  ///< of, to this coordinator
   std::set<Digest> unreported_;  ///< published for leases of which nobody will report
   std::set<Digest> lost_;        ///< that somebody took
   std::set<TaskKey> lost_frames_;

@@ -227,6 +227,35 @@ TEST(SchedulerFailures, AJobGoesOnBelowItsLimitOfFailedTasks) {
   EXPECT_EQ(farm.progress().tasks_done, 2u);
 }
 
+TEST(SchedulerFailures, WhatNeedsAFailedTaskIsTakenBackFromItsWorker) {
+  JobSpec spec = moving_job(4, 4, 8);
+  spec.max_failed_tasks = 10;
+  Farm farm(spec);
+  farm.submit();
+  farm.step(WorkerJoined{"a", {}});
+  farm.step(WorkerJoined{"b", {}});
+  for (const char* name : {"a", "a", "b", "b"}) farm.finish(farm.ask_one(name));
+  farm.finish(farm.ask_one("a"));
+  std::map<TaskKey, GrantLease> grants;
+  for (const char* name : {"a", "a", "b", "b"}) {
+    const GrantLease grant = farm.ask_one(name);
+    grants.emplace(grant.lease.task, grant);
+  }
+
+  // A state that tiles 0 and 1 read is lost, and cannot be made again.
+  const GrantLease& kept = grants.at(render(1, 0));
+  const GrantLease& blocked = grants.at(render(1, 1));
+  farm.step(InputsLost{blocked.worker, blocked.lease, {blocked.inputs.at(0)}});
+  farm.fail(farm.ask_one("b"), /*permanent=*/true);
+  const auto actions = farm.fail(farm.ask_one("a"), /*permanent=*/true);
+  const auto revoked = all_of<RevokeLease>(actions);
+  ASSERT_EQ(revoked.size(), 1u);
+  EXPECT_EQ(revoked[0].lease, kept.lease);
+  EXPECT_EQ(farm.status(), JobStatus::running) << "the other tiles go on";
+  EXPECT_EQ(farm.progress().tasks_leased, 2u);
+  farm.step(WorkerLeft{kept.worker});
+}
+
 /// A job of four tiles, from which "bad" rests after two failures.
 struct TwoFailures : Farm {
   static JobSpec spec_of_two() {

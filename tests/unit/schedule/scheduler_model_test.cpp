@@ -188,11 +188,13 @@ TEST(SchedulerModel, AStoreWithALimitIsNeverFullAndNeverStuck) {
 }
 
 TEST(SchedulerModel, AJobAlwaysEndsWhenAttemptsAreLimited) {
-  for (std::uint32_t seed = 1; seed <= 60; ++seed) {
+  for (std::uint32_t seed = 1; seed <= num_seeds(); ++seed) {
     SCOPED_TRACE(testing::Message() << "seed " << seed);
     JobSpec spec = small_job(4, 12, 3);
+    if (seed % 2 == 0) spec = moving_job(4, 8, 1 + static_cast<int>(seed % 9));
+    spec.visibility.correlated = seed % 3 == 1;
     spec.max_retries_per_task = 1;
-    spec.max_failed_tasks = 2;
+    spec.max_failed_tasks = 2 + static_cast<int>(seed % 4);
     spec.max_failures_per_worker = 3;
     ChaosFarm farm(seed, spec, {.alike = seed % 2 == 0});
     int steps = 0;

@@ -29,7 +29,7 @@ class TileHomesTest : public testing::Test {
  protected:
   TileHomesTest() { homes.share_out({"a", "b"}); }
   /// The tile that one of "a" and "b" gets.
-  std::int32_t choice(const std::string& worker, std::set<TaskIndex> ready) const {
+  std::int32_t choice(const std::string& worker, const std::set<TaskIndex>& ready) const {
     const std::optional<TaskIndex> task = homes.choose(graph, ready, 9, worker, kAny);
     return task ? graph.key(*task).tile : -1;
   }

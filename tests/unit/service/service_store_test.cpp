@@ -9,7 +9,6 @@ namespace {
 
 using namespace testing_service;
 using testing::HasSubstr;
-using testing::SizeIs;
 
 struct ServiceStoreTest : ServiceTest {
   /// Nobody has touched what is in the store for long.

@@ -12,7 +12,6 @@
 
 HWY_BEFORE_NAMESPACE();
 namespace baton::HWY_NAMESPACE {
-namespace hn = hwy::HWY_NAMESPACE;
 
 SequentialOutcome SequentialPixel(const SiteBlock& sites, const kernels::CarriedLight& light,
                                   const kernels::LocatedDirections* located,
