@@ -77,10 +77,20 @@ Display display_depth(RgbImage image, const DisplayOptions& options) {
   return {std::move(image), fmt::format("depth {:.4g} (white) to {:.4g} (dark grey)", near, far)};
 }
 
-Display display_numbers(RgbImage image, const DisplayOptions& options) {
+/// What a hundredth of the values exceed, of those that are above 0; 1: none is.
+float nearly_largest(std::vector<float> values) {
+  std::erase_if(values, [](float v) { return !std::isfinite(v) || v <= 0; });
+  if (values.empty()) return 1;
+  const auto at = values.begin() + static_cast<std::ptrdiff_t>(values.size() * 99 / 100);
+  std::ranges::nth_element(values, at);
+  return *at;
+}
+
+/// Shares from 0 to 1. A variance has no such bound, and a few pixels far above the others.
+Display display_numbers(RgbImage image, bool is_share, const DisplayOptions& options) {
   const auto [smallest, largest] = range_of(image.rgb);
-  const auto [black, white] =
-      options.range.value_or(std::pair{std::min(smallest, 0.0f), std::max(largest, 1.0f)});
+  const float most = is_share ? std::max(largest, 1.0f) : nearly_largest(image.rgb);
+  const auto [black, white] = options.range.value_or(std::pair{std::min(smallest, 0.0f), most});
   for (float& v : image.rgb) v = std::isfinite(v) ? light_of((v - black) / (white - black)) : 0;
   return {std::move(image), fmt::format("{:.4g} (black) to {:.4g} (white)", black, white)};
 }
@@ -118,7 +128,7 @@ Result<Display> display_aov(const FilmTile& frame, const std::string& aov,
   if (is_vector) return display_vectors(std::move(image));
   if (is_radiance && !options.range) return display_radiance(std::move(image), options);
   if (aov == "depth" || aov == "Z") return display_depth(std::move(image), options);
-  return display_numbers(std::move(image), options);
+  return display_numbers(std::move(image), aov != "variance", options);
 }
 
 }  // namespace baton

@@ -24,8 +24,15 @@ SMALL = {"width": 120, "height": 68, "tileSize": 32, "sites": 1}
 
 
 def steps_of(text):
-    """(kind, body, start, end) of each block of the page: "json" is the job, "console" commands and what they say."""
-    return [(match[1], match[2], match.start(2), match.end(2)) for match in BLOCK.finditer(text)]
+    """(kind, body, start, end) of each block of the page: "console" is commands and what they say, "NAME.json" a job, whose
+    name stands before it."""
+    steps = []
+    for match in BLOCK.finditer(text):
+        kind = match[1]
+        if kind == "json":
+            kind = re.findall(r"`(\w+\.json)`:", text[:match.start()])[-1]
+        steps.append((kind, match[2], match.start(2), match.end(2)))
+    return steps
 
 
 def commands_of(body):
@@ -80,7 +87,8 @@ def stand_ins(folder):
     lamp, sky = (40.0, 36.0, 30.0), (0.3, 0.4, 0.6)
     rows = [array("f", [c for x in range(width) for c in (lamp if (x, y) in ((8, 4), (9, 4)) else sky)])
             for y in range(width // 2)]
-    write_exr(folder / "courtyard.exr", width, rows)
+    for name in re.findall(r'"map": "(\w+)\.exr"', PAGE.read_text(encoding="utf-8")):
+        write_exr(folder / f"{name}.exr", width, rows)
 
 
 def every_command_says_what_the_page_says(programs, folder):
@@ -88,10 +96,10 @@ def every_command_says_what_the_page_says(programs, folder):
     stand_ins(folder)
     num_commands = 0
     for kind, body, _, _ in steps_of(PAGE.read_text(encoding="utf-8")):
-        if kind == "json":
+        if kind.endswith(".json"):
             job = json.loads(body)
             job["image"] = {**job["image"], **SMALL}
-            (folder / "bust.json").write_text(json.dumps(job, separators=(", ", ": ")), encoding="utf-8")
+            (folder / kind).write_text(json.dumps(job, separators=(", ", ": ")), encoding="utf-8")
         if kind != "console":
             continue
         for command, said in commands_of(body):
@@ -137,8 +145,8 @@ def record(programs, folder):
     text = PAGE.read_text(encoding="utf-8")
     parts, at = [], 0
     for kind, body, start, end in steps_of(text):
-        if kind == "json":
-            (folder / "bust.json").write_text(body, encoding="utf-8")
+        if kind.endswith(".json"):
+            (folder / kind).write_text(body, encoding="utf-8")
         if kind != "console":
             continue
         said = ""

@@ -139,7 +139,8 @@ def test_faults_name_the_option(programs, folder):
 
 
 def test_view(programs, folder):
-    job = job_at(folder, frames="1", output={"aovs": ["normal", "depth", "visibility"], "background": "transparent"})
+    job = job_at(folder, frames="1", sampling={"method": "pool"},
+                 output={"aovs": ["normal", "depth", "variance", "visibility"], "background": "transparent"})
     render(programs, job)
     frame = folder / "frames/frame.0001.exr"
 
@@ -169,8 +170,18 @@ def test_view(programs, folder):
     programs.run("baton", "view", frame, "--aov", "normal", "--out", folder / "normal.png")
     check_equal(read_png(folder / "normal.png")[2][0][:3], b"\x80\x80\x80", "normal of the background")
 
+    # Shares are shown from 0 to 1, a variance up to what a hundredth of the pixels exceed.
+    done = programs.run("baton", "view", frame, "--aov", "visibility", "--out", folder / "visibility.png")
+    white = float(re.search(r"0 \(black\) to (\S+) \(white\)", done.stdout)[1])
+    check(white >= 1, done.stdout)
+    done = programs.run("baton", "view", frame, "--aov", "variance", "--out", folder / "variance.png")
+    white = float(re.search(r"0 \(black\) to (\S+) \(white\)", done.stdout)[1])
+    variance = [v for v in programs.values(frame, "variance") if v > 0]
+    above = sum(v > 1.001 * white for v in variance)
+    check(len(variance) > 100 and 0.005 < above / len(variance) <= 0.01, f"{done.stdout}: {above} of {len(variance)}")
+
     done = programs.run("baton", "view", frame, "--aov", "dept", expect=BAD_INPUT)
-    check("--aov dept: no such AOV in the file; there is A, depth, normal, visibility" in done.stderr, done.stderr)
+    check("--aov dept: no such AOV in the file; there is A, depth, normal, variance, visibility" in done.stderr, done.stderr)
     done = programs.run("baton", "view", folder / "job.json", expect=BAD_INPUT)
     check("job.json" in done.stderr, done.stderr)
 

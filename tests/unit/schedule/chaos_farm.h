@@ -304,7 +304,7 @@ class ChaosFarm {
   void on(const RecordCompletion& a) {
     EXPECT_TRUE(recorded_.insert(a.completion.task).second) << "a task counts once";
     completions_.push_back(a.completion);
-    makers_[a.completion.task] = reporter_;
+    makers_[a.completion.task].insert(reporter_);
     lost_frames_.erase(a.completion.task);
   }
   void on(const RecordOutputs& a) {
@@ -366,8 +366,8 @@ class ChaosFarm {
   std::vector<Completion> completions_;  ///< the journal
   std::vector<Failure> failures_;
   std::set<TaskKey> recorded_;
-  std::string reporter_;                   ///< of the last report
-  std::map<TaskKey, std::string> makers_;  ///< whose report was recorded
+  std::string reporter_;                             ///< of the last report
+  std::map<TaskKey, std::set<std::string>> makers_;  ///< whose reports were recorded
   std::set<LeaseId> issued_;
   std::set<Digest> store_;                                 ///< the blobs that are there
   std::vector<std::pair<std::string, AttemptLeft>> left_;  ///< still to be said
