@@ -96,8 +96,9 @@ using Status = Result<void>;
 /// Declares `decl` with the value of `expr`, or leaves the enclosing function with its error.
 #define BATON_ASSIGN(decl, expr) BATON_ASSIGN_IMPL_(decl, expr, __LINE__)
 #define BATON_ASSIGN_IMPL_(decl, expr, line) BATON_ASSIGN_IMPL2_(decl, expr, line)
-// NOLINTNEXTLINE(bugprone-macro-parentheses): a declaration stands in none
+// NOLINTBEGIN(bugprone-macro-parentheses): a declaration stands in none
 #define BATON_ASSIGN_IMPL2_(decl, expr, line)                   \
   auto baton_result_##line = (expr);                            \
   if (!baton_result_##line) return baton_result_##line.error(); \
   decl = std::move(baton_result_##line).value()
+// NOLINTEND(bugprone-macro-parentheses)
