@@ -290,9 +290,11 @@ bool JobJsonReader::read_text(const std::string& path, const json& value, std::s
   const std::string* found = value.get_ptr<const std::string*>();
   if (found == nullptr || found->empty() || found->size() > limits::kMaxTextLength ||
       has_control_character(*found)) {
-    fault_at(path,
-             fmt::format("expected a text of 1 to {} bytes without control characters, got {}",
-                         limits::kMaxTextLength, shown(value)));
+    fault_at(path, value.is_number()
+                       ? fmt::format("expected a text, such as \"{0}\", got {0}", shown(value))
+                       : fmt::format(
+                             "expected a text of 1 to {} bytes without control characters, got {}",
+                             limits::kMaxTextLength, shown(value)));
     return false;
   }
   text = *found;

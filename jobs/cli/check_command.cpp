@@ -15,6 +15,7 @@
 #include "jobs/cli/scene_picture.h"
 #include "jobs/cli/settle_method.h"
 #include "jobs/cli/text.h"
+#include "worker/scene/settle_motion.h"
 
 namespace baton {
 namespace {
@@ -155,9 +156,11 @@ Status write_picture(const CheckOptions& options, const JobSpec& job) {
 }
 
 Result<ExitCode> run_check(const CheckOptions& options) {
-  BATON_ASSIGN(const WantedJob wanted, load_settled(options.job));
-  const JobSpec& job = wanted.job;
-  BATON_ASSIGN(const AssetReport assets, load_assets(job));
+  BATON_ASSIGN(const WantedJob wanted, load_wanted(options.job));
+  const Result<JobSpec> settled = settle_motion(wanted.job);
+  const JobSpec& job = settled ? *settled : wanted.job;
+  BATON_ASSIGN(const AssetReport assets, load_assets(job));  // lists the faults of all files
+  if (!settled) return settled.error();
   std::vector<JobSetting> settings;
   if (options.explain) {
     BATON_ASSIGN(settings, explain_job(options.job.file, overrides_of(options.job)));

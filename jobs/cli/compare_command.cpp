@@ -1,4 +1,5 @@
 #include <fmt/format.h>
+#include <spdlog/spdlog.h>
 
 #include <algorithm>
 #include <array>
@@ -159,10 +160,13 @@ Result<ExitCode> run_compare(const CompareOptions& options) {
     all.insert(all.end(), compared.seeds.begin(), compared.seeds.end());
   {
     FarmJobRunner runner(farm);
-    BATON_TRY(runner.run(all, [&](std::size_t index, const JobSummary& summary) {
+    const Status rendered = runner.run(all, [&](std::size_t index, const JobSummary& summary) {
       if (index < jobs.size()) jobs[index].summary = summary;
       return Status();
-    }));
+    });
+    if (!rendered && rendered.error().kind == ErrorKind::cancelled)
+      spdlog::info("stopped; finished work is kept, the same command goes on");
+    BATON_TRY(rendered);
   }
 
   for (Compared& compared : jobs) {

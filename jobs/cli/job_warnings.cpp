@@ -98,9 +98,11 @@ void output_warnings(const JobSpec& job, double surface_share, std::vector<std::
   fs::path folder = job.output.directory;
   std::error_code error;
   while (!fs::exists(folder, error) && folder.has_relative_path()) folder = folder.parent_path();
-  if (!fs::is_directory(folder, error) || ::access(folder.c_str(), W_OK | X_OK) != 0)
-    warnings.push_back(
-        fmt::format("{}: {} cannot be written", job.output.directory, folder.string()));
+  const bool is_folder = fs::is_directory(folder, error);
+  if (!is_folder || ::access(folder.c_str(), W_OK | X_OK) != 0)
+    warnings.push_back(fmt::format(
+        "output.directory: {}: {} cannot be written: {}", job.output.directory, folder.string(),
+        is_folder ? "no permission, or a read-only disk" : "it is not a folder"));
   const fs::space_info space = fs::space(folder, error);
   const JobEstimate e = estimate_job(job);
   const auto frames = static_cast<std::uint64_t>(e.frames * e.frame_bytes);

@@ -81,8 +81,7 @@ TEST(JobJson, IgnoresTheNameOfASchema) {
   EXPECT_EQ(parsed(job_text(R"("$schema": "job.schema.json")")), parsed(job_text("")));
   EXPECT_EQ(to_json(parsed(job_text(""))).find("$schema"), std::string::npos);
   EXPECT_EQ(faults(R"("$schema": 3)"),
-            "job.json: $[\"$schema\"]: expected a text of 1 to 4096 bytes without control "
-            "characters, got 3");
+            "job.json: $[\"$schema\"]: expected a text, such as \"3\", got 3");
 }
 
 TEST(JobJson, MaterialsTakeWhatTheyLeaveOutFromTheRest) {
@@ -138,7 +137,7 @@ TEST(JobJson, NamesPlaceAndExpectationOfEachKindOfFault) {
       {R"("camera": {"up": [0, 0, 2]})", "$.camera.up: expected a direction across the view"},
       {R"("camera": {"up": [0, 0, 0]})", "$.camera.up: expected a direction, got [0, 0, 0]"},
       {R"("metadata": {"odd key": 1})",
-       "$.metadata[\"odd key\"]: expected a text of 1 to 4096 bytes"},
+       "$.metadata[\"odd key\"]: expected a text, such as \"1\", got 1"},
       {R"("frames": "4-1")", "$.frames: expected a last frame not before the first, got \"4-1\""},
       {R"("frames": 3)", "$.frames: expected a text"},
       {R"("sampling": {"method": "sequentail"})",
