@@ -96,6 +96,11 @@ class CliErrors(unittest.TestCase):
         (self.folder / "sky.hdr").write_bytes(b"no picture")
         self.expect(self.baton("check", self.job()), BAD_INPUT, "cube.obj", "sky.hdr")
         self.expect(self.baton("check", "missing.json"), BAD_INPUT, "missing.json: no such file")
+        # Motion is settled from the meshes; that they are missing hides nothing.
+        keys = [{"frame": f, "position": [f, 1, 4], "lookAt": [0, 0, 0]} for f in (1, 2)]
+        self.job(camera={"keys": keys}, environment={"map": "gone.exr"})
+        (self.folder / "cube.obj").unlink()
+        self.expect(self.baton("check", "job.json"), BAD_INPUT, "cube.obj", "gone.exr: no such file")
 
     def test_check_and_render_warn_alike(self):
         (self.folder / "sky.hdr").write_bytes(radiance_hdr(6, 2))
