@@ -2,6 +2,7 @@
 
 import argparse
 import json
+import math
 import os
 import pathlib
 import shutil
@@ -10,6 +11,9 @@ import subprocess
 import tempfile
 import time
 import unittest
+from array import array
+
+from random_job_files import write_exr
 
 PATIENCE = int(os.environ.get("BATON_PATIENCE", "1"))
 OK, USAGE, BAD_INPUT, UNAVAILABLE, IO = 0, 64, 65, 69, 74
@@ -131,6 +135,14 @@ class CliErrors(unittest.TestCase):
         result = self.baton("check", self.job(
             image={"width": 8192, "height": 8192, "tileSize": 512}, frames="1-3000", output={"pixelType": "float"}))
         self.assertIn(" are free, and frames may take ", result.stdout)
+
+    def test_texels_that_are_no_light_are_counted(self):
+        rows = [array("f", [2.0] * 9 + [math.nan, -1.0, math.inf]), array("f", [2.0] * 12)]
+        write_exr(self.folder / "sky.exr", 4, rows)
+        job = self.job(environment={"map": "sky.exr"}, sampling={"method": "pool"})
+        warning = "sky.exr: 1 texels are negative, NaN or infinite and count as 0"
+        self.assertIn(warning, self.baton("check", job).stdout)
+        self.assertIn(warning, self.baton("render", job).stderr)
 
     def test_check_tells_of_the_pilot(self):
         job = self.job(sampling={"method": "auto"}, frames="1-48")
