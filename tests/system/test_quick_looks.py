@@ -1,6 +1,7 @@
 """Quick looks: a part of a job in a folder of its own, frames as PNG, and looks that follow the job file."""
 
 import json
+import math
 import re
 import struct
 import subprocess
@@ -73,6 +74,26 @@ def test_a_look_leaves_finished_frames_alone(programs, folder):
     render(programs, job, "--frames", "3", "--set", "image.sites=4")
     same = render(programs, job, "--set", "sampling.numParticles=16", "--frames", "1-4")
     check(str(look) not in same.stdout + same.stderr, same.stdout + same.stderr)
+
+
+def test_the_sheet_has_numbers_and_one_exposure(programs, folder):
+    """A dark frame beside a bright one stays dark; the exposure that is told makes the second one middle grey."""
+    job = job_at(folder, frames="1-2")
+    write_map(folder / "dim.hdr", colour=lambda *_: (0.02, 0.02, 0.02))
+    spec = json.loads(job.read_text())
+    spec["environment"]["keys"] = [{"frame": 1, "map": "dim.hdr"}, {"frame": 2, "map": "lamp.hdr"}]
+    spec["environment"]["interpolate"] = False
+    told = render(programs, write_job(job, spec)).stdout
+    rows = read_png(folder / "frames/contact-sheet.png")[2]
+    dark, bright = (sum(sum(row[3 * x:3 * x + 480]) for row in rows[2:80]) for x in (2, 164))
+    check(dark < 0.5 * bright, f"sums of {dark} and {bright}")
+    for x in (2, 164):
+        corner = {tuple(row[3 * i:3 * i + 3]) for row in rows[84:98] for i in range(x, x + 10)}
+        check({(0, 0, 0), (255, 255, 255)} <= corner, f"no number at {x}")
+    rgb = zip(*(programs.values(folder / "frames/frame.0002.exr", c) for c in "RGB"))
+    logs = [math.log2(luma) for luma in (0.2126 * r + 0.7152 * g + 0.0722 * b for r, g, b in rgb) if luma > 0]
+    stops = float(re.search(r"contact-sheet\.png, exposure (\S+) stops", told)[1])
+    check(abs(stops - (math.log2(0.18) - sum(logs) / len(logs))) < 0.06, told)
 
 
 def test_a_region_has_the_pixels_of_the_whole(programs, folder):
@@ -235,7 +256,8 @@ def test_watch_follows_job_and_files(programs, folder):
 
 if __name__ == "__main__":
     run_tests([
-        test_a_look_leaves_finished_frames_alone, test_a_region_has_the_pixels_of_the_whole,
+        test_a_look_leaves_finished_frames_alone, test_the_sheet_has_numbers_and_one_exposure,
+        test_a_region_has_the_pixels_of_the_whole,
         test_check_and_explain_take_the_same_options, test_faults_name_the_option, test_check_draws_the_scene, test_view,
         test_watch_follows_job_and_files
     ])
