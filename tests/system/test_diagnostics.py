@@ -55,5 +55,19 @@ def workers_do_not_matter(programs, folder):
     check_equal(one, three, "diagnostics")
 
 
+def frames_say_what_they_are(programs, folder):
+    """M, the matrices, an AOV under its name, and normals of length 1 where sites of two surfaces meet."""
+    job = make_job(folder, frames="1-2", image={"sites": 4}, output={"aovs": ["acceptanceLocal", "normal", "depth"]})
+    programs.render(write_job(folder / "job.json", job), folder / "work")
+    frame = folder / "frames/frame.0002.exr"
+    header = frame.read_bytes()[:4000]
+    for attribute in [b"baton:numCandidates\0string\0\x02\0\0\x0064", b"worldToCamera\0m44f\0", b"worldToNDC\0m44f\0"]:
+        check(attribute in header, f"the header has no {attribute}")
+    check(0 < max(programs.values(frame, "acceptanceLocal")) <= 1, "no local move was accepted")
+    vectors = zip(*(programs.values(frame, f"normal.{axis}") for axis in "XYZ"), programs.values(frame, "depth"))
+    lengths = [sum(v * v for v in normal)**0.5 for *normal, depth in vectors if depth > 0]
+    check(all(abs(length - 1) < 1e-3 for length in lengths), f"normals of length {min(lengths)} to {max(lengths)}")
+
+
 if __name__ == "__main__":
-    run_tests([rows_add_up, workers_do_not_matter])
+    run_tests([rows_add_up, workers_do_not_matter, frames_say_what_they_are])
