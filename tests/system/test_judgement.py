@@ -103,6 +103,10 @@ def values_below_zero_are_counted_and_set_to_zero(programs, folder):
         place = folder / str(clamp)
         path = job_at(place, output={"pixelType": "float", "aovs": [], "clampNegative": clamp}, **changes)
         summary = json.loads(programs.render(path, folder / f"work{clamp}", extra=["--json"]).stdout)
+        told = programs.render(path, folder / f"work{clamp}").stdout
+        words = "set to 0, which adds" if clamp else "kept; to set them to 0 would add"
+        check(re.search(rf"^below zero \d+ pixels in \d+ frames, .*; {words} [\d.e-]+ % of the light$", told, re.MULTILINE),
+              f"the light that is added is not told:\n{told}")
         below = 0
         for frame in sorted((place / "frames").glob("*.exr")):
             below += sum(1 for rgb in zip(*(programs.values(frame, c) for c in "RGB")) if min(rgb) < 0)
