@@ -103,7 +103,7 @@ Result<double> noise_of(const Compared& compared) {
 }
 
 /// A row of frames for each job.
-Result<float> write_rows(const std::vector<Compared>& jobs, const fs::path& path) {
+Status write_rows(const std::vector<Compared>& jobs, const fs::path& path) {
   const std::vector<int> frames = pick_frames(jobs.front().job.frames, kSheetColumns);
   std::vector<RgbImage> thumbnails;
   std::vector<int> numbers;
@@ -116,11 +116,10 @@ Result<float> write_rows(const std::vector<Compared>& jobs, const fs::path& path
       numbers.push_back(frame);
     }
   }
-  return write_sheet(path, std::move(thumbnails), numbers, frames.size(),
-                     static_cast<int>(frames.size()));
+  return write_sheet(path, std::move(thumbnails), numbers, static_cast<int>(frames.size()), 0);
 }
 
-void print_table(const std::vector<Compared>& jobs, const fs::path& sheet, float stops) {
+void print_table(const std::vector<Compared>& jobs, const fs::path& sheet) {
   std::size_t width = 4;
   for (const Compared& compared : jobs) width = std::max(width, compared.job.name.size());
   fmt::print("{:<{}}  {:>9}  {:>7}  {:>11}  {}\n", "job", width, "CPU", "noise", "handed on",
@@ -134,7 +133,7 @@ void print_table(const std::vector<Compared>& jobs, const fs::path& sheet, float
   fmt::print(
       "noise: a pixel's standard deviation, rms, over the mean radiance, by two more seeds\n");
   fmt::print("handed on: sample state, packed, from frame to frame\n");
-  fmt::print("sheet, a row for each job, {}: {}\n", exposure_text(stops), sheet.string());
+  fmt::print("sheet, a row for each job: {}\n", sheet.string());
 }
 
 Result<ExitCode> run_compare(const CompareOptions& options) {
@@ -173,8 +172,8 @@ Result<ExitCode> run_compare(const CompareOptions& options) {
     BATON_ASSIGN(compared.noise, noise_of(compared));
   }
   const fs::path sheet = output / "comparison.png";
-  BATON_ASSIGN(const float stops, write_rows(jobs, sheet));
-  print_table(jobs, sheet, stops);
+  BATON_TRY(write_rows(jobs, sheet));
+  print_table(jobs, sheet);
   return ExitCode::ok;
 }
 

@@ -6,6 +6,7 @@
 
 #include "common/image/contact_sheet.h"
 #include "common/job/sequence.h"
+#include "jobs/cli/display.h"
 
 namespace baton {
 namespace {
@@ -31,12 +32,11 @@ Result<RgbImage> read_thumbnail(const fs::path& path) {
   return resize(image, std::min(image.width, kMaxThumbWidth));
 }
 
-Result<float> write_sheet(const fs::path& path, std::vector<RgbImage> thumbnails,
-                          const std::vector<int>& numbers, std::size_t row, int columns) {
-  const float exposure = auto_exposure(thumbnails[row / 2]);
-  for (RgbImage& thumbnail : thumbnails) thumbnail = tone_map(thumbnail, exposure);
-  BATON_TRY(write_png(path, contact_sheet(thumbnails, columns, thumbnails.front().width, numbers)));
-  return std::log2(exposure);
+Status write_sheet(const fs::path& path, std::vector<RgbImage> thumbnails,
+                   const std::vector<int>& numbers, int columns, float stops) {
+  for (RgbImage& thumbnail : thumbnails)
+    thumbnail = display_radiance(std::move(thumbnail), {stops, {}}).image;
+  return write_png(path, contact_sheet(thumbnails, columns, thumbnails.front().width, numbers));
 }
 
 FrameSheet::FrameSheet(const JobSpec& job)
@@ -57,9 +57,9 @@ void FrameSheet::add(const std::vector<int>& finished) {
   }
 }
 
-Result<std::optional<FrameSheet::Written>> FrameSheet::write() const {
+Result<std::optional<fs::path>> FrameSheet::write(float stops) const {
   BATON_TRY(read_);
-  if (thumbnails_.empty()) return std::optional<Written>();
+  if (thumbnails_.empty()) return std::optional<fs::path>();
 
   std::vector<RgbImage> frames;
   std::vector<int> numbers;
@@ -69,10 +69,8 @@ Result<std::optional<FrameSheet::Written>> FrameSheet::write() const {
   }
   const auto square = static_cast<int>(std::ceil(std::sqrt(static_cast<double>(frames.size()))));
   const fs::path path = fs::path(output_.directory) / "contact-sheet.png";
-  const std::size_t count = frames.size();
-  BATON_ASSIGN(const float stops,
-               write_sheet(path, std::move(frames), numbers, count, std::min(square, kMaxColumns)));
-  return std::optional(Written{path, stops});
+  BATON_TRY(write_sheet(path, std::move(frames), numbers, std::min(square, kMaxColumns), stops));
+  return std::optional(path);
 }
 
 }  // namespace baton

@@ -17,11 +17,10 @@ std::vector<int> pick_frames(const std::vector<int>& frames, std::size_t count);
 /// A frame small enough for a sheet. Errors: read_rgb_image's.
 Result<RgbImage> read_thumbnail(const std::filesystem::path& path);
 
-/// Writes linear thumbnails in reading order with their frame numbers, all at the exposure of the
-/// middle one of the first `row`, or changes of the light would not show. Returns the exposure:
-/// stops, of a curve that keeps bright colours apart.
-Result<float> write_sheet(const std::filesystem::path& path, std::vector<RgbImage> thumbnails,
-                          const std::vector<int>& numbers, std::size_t row, int columns);
+/// Writes linear thumbnails in reading order with their frame numbers, all as a viewer shows them
+/// at this exposure (display_radiance). Errors: the disk.
+Status write_sheet(const std::filesystem::path& path, std::vector<RgbImage> thumbnails,
+                   const std::vector<int>& numbers, int columns, float stops);
 
 /// contact-sheet.png of a job: at most 12 of its frames, evenly picked, all at one exposure. Frames
 /// are read as they are finished, so that little is left to do in the end.
@@ -33,12 +32,8 @@ class FrameSheet {
   /// be read is the error of write().
   void add(const std::vector<int>& finished);
 
-  struct Written {
-    std::filesystem::path path;
-    float stops = 0;  ///< of write_sheet
-  };
   /// Writes what there is into the output folder; no sheet without a frame.
-  Result<std::optional<Written>> write() const;
+  Result<std::optional<std::filesystem::path>> write(float stops) const;
 
  private:
   OutputSpec output_;

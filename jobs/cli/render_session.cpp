@@ -34,11 +34,10 @@ void print_result(const JobSpec& job, const JobDetail& detail, double seconds) {
 }
 
 /// A sheet that cannot be made is no failure of the job.
-void write_sheet(const FrameSheet& sheet, bool json) {
-  const Result<std::optional<FrameSheet::Written>> written = sheet.write();
-  if (!written) return spdlog::warn("no contact sheet: {}", written.error().message);
-  if (*written && !json)
-    fmt::print("sheet      {}, {}\n", (*written)->path.string(), exposure_text((*written)->stops));
+void write_sheet(const FrameSheet& sheet, float stops, bool json) {
+  const Result<std::optional<std::filesystem::path>> path = sheet.write(stops);
+  if (!path) return spdlog::warn("no contact sheet: {}", path.error().message);
+  if (*path && !json) fmt::print("sheet      {}, {}\n", (*path)->string(), exposure_text(stops));
 }
 
 }  // namespace
@@ -128,7 +127,7 @@ Result<std::optional<JobStatus>> RenderSession::render(const JobSpec& job, bool 
   } else {
     print_result(job, *detail, std::chrono::duration<double>(Clock::now() - start).count());
   }
-  write_sheet(sheet, options_.json);
+  write_sheet(sheet, options_.exposure.value_or(0), options_.json);
   if (status == JobStatus::done) BATON_TRY(write_png_of(job));
   if (status == JobStatus::failed) print_failures(*detail);
   if (status == JobStatus::paused || detail->lacks_room)
