@@ -68,6 +68,12 @@ class SlurmFarm:
             shutil.rmtree(self.frames)
             self.job, self.num_done = None, self.num_done + 1
 
+    def fill(self):
+        """Submits a job that is never done, so that there is work for every pilot however slowly this test looks."""
+        path = write_job(self.folder / "filler" / "job.json", make_job(
+            self.folder / "filler", name="filler", frames="1-5000", priority=0, image={"tileSize": 32}))
+        return json.loads(self.baton("job", "submit", path, "--json").stdout)["id"]
+
     def wait_while_busy(self, condition, what):
         """Polls like wait_until, with work all the time."""
         def turn():
@@ -95,6 +101,7 @@ def pilots_follow_the_work_and_are_replaced(programs, folder):
         farm = SlurmFarm(programs, cluster, folder, "1-3", "10")
         farm.start()
         check_equal(len(farm.workers()), 1, "pilots without work")
+        filler = farm.fill()
         first = farm.wait_for_new(3, set(), "three pilots work")
 
         status = farm.baton("farm", "status").stdout
@@ -127,6 +134,7 @@ def pilots_follow_the_work_and_are_replaced(programs, folder):
         farm.finish_job()
 
         # Without work the least stay.
+        farm.baton("job", "cancel", filler)
         wait_until(lambda: len(farm.workers()) == 1, f"one pilot is left\n{farm.log()}")
         farm.stop()
 
