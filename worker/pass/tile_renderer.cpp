@@ -59,7 +59,7 @@ class TileWalk {
         rect_(context.grid.rect(run.tile)),
         shares_(shares_history(context.job)),
         keeps_surfaces_(!shares_ && run.first_frame < run.last_frame),
-        stop_(std::move(stop)) {
+        stop_(stop) {
     start_state();
     state_.picture = context.picture;
     state_.tile = run.tile;
