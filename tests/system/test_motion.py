@@ -37,7 +37,8 @@ def rendered(programs, folder, name, workers, threads, tile_size, sites=4):
     """Renders the job with `baton render`; returns its result."""
     job = moving_job(folder / name, image={"tileSize": tile_size, "sites": sites})
     path = write_job(folder / name / "job.json", job)
-    programs.render(path, folder / name / "work", workers, threads)
+    told = programs.render(path, folder / name / "work", workers, threads).stdout
+    check("\nafresh " in told and "nothing to go on from" in told, f"what came into view is not told\n{told}")
     return result_of(programs, folder / name, folder / name / "work")
 
 
