@@ -88,9 +88,9 @@ using Status = Result<void>;
 }  // namespace baton
 
 /// Leaves the enclosing function with the error of `expr`, or goes on.
-#define BATON_TRY(expr)                                                            \
-  do {                                                                             \
-    if (auto baton_status_ = (expr); !baton_status_) return baton_status_.error(); \
+#define BATON_TRY(expr)                                                                   \
+  do {                                                                                    \
+    if (const auto& baton_status_ = (expr); !baton_status_) return baton_status_.error(); \
   } while (false)
 
 /// Declares `decl` with the value of `expr`, or leaves the enclosing function with its error.

@@ -1,5 +1,6 @@
 #include <spdlog/spdlog.h>
 
+#include "common/store/folder_token.h"
 #include "coordinator/service/diagnostics_file.h"
 #include "coordinator/service/service.h"
 

@@ -163,9 +163,11 @@ Result<ExitCode> run_compare(const CompareOptions& options) {
       if (index < jobs.size()) jobs[index].summary = summary;
       return Status();
     });
-    if (!rendered && rendered.error().kind == ErrorKind::cancelled)
-      spdlog::info("stopped; finished work is kept, the same command goes on");
-    BATON_TRY(rendered);
+    if (!rendered) {
+      if (rendered.error().kind == ErrorKind::cancelled)
+        spdlog::info("stopped; finished work is kept, the same command goes on");
+      return rendered.error();
+    }
   }
 
   for (Compared& compared : jobs) {

@@ -73,7 +73,7 @@ Result<Expectations> Expectations::read(const std::filesystem::path& path) {
     std::getline(fields, subject, ',');
     std::getline(fields, full, ',');
     std::getline(fields, quick, ',');
-    Verdict verdict;
+    Verdict verdict{};
     const bool good = !subject.empty() && (full.empty() || from_string(full, verdict)) &&
                       (quick.empty() || from_string(quick, verdict)) && !std::getline(fields, rest);
     if (number == 1 || !good) {
@@ -105,7 +105,7 @@ void Expectations::record(const Cell& cell, bool quick) {
 }
 
 std::string change(const Cell& cell, const std::string& recorded) {
-  Verdict expected;
+  Verdict expected{};
   if (recorded.empty() || !from_string(recorded, expected)) return "";
   if (expected >= cell.judgement.lowest && expected <= cell.judgement.highest) return "";
   return fmt::format("{} / {}: {} ({}), recorded is {}", cell.case_name, cell.subject,

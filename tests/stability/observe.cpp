@@ -85,7 +85,7 @@ class SharedLights {
     if (subject.sampler)
       context->method = std::make_unique<WeightedMethod>(job, subject.sampler(job.sampling));
     std::swap(context->lights, owner->lights);
-    const Status status = render_run(*context, judged, run);
+    Status status = render_run(*context, judged, run);
     std::swap(context->lights, owner->lights);
     return status;
   }

@@ -2,6 +2,7 @@
 
 #include <cstdlib>
 
+#include "common/job/motion.h"
 #include "tests/unit/schedule/chaos_farm.h"
 
 namespace baton {
