@@ -99,9 +99,8 @@ Display display_numbers(RgbImage image, bool is_share, const DisplayOptions& opt
 
 void add_exposure_option(CLI::App& command, std::optional<float>& stops) {
   command
-      .add_option(
-          "--exposure", stops,
-          "stops by which a PNG, and the contact sheet, is brighter, as in a viewer; default: 0")
+      .add_option("--exposure", stops,
+                  "stops by which a PNG is brighter, as in a viewer; default: 0")
       ->check(CLI::Range(-100.0, 100.0));
 }
 

@@ -22,6 +22,13 @@ struct TaskOutput {
   std::string unseen = {};
 };
 
+/// How a task that was leased has ended.
+struct TaskEnded {
+  LeaseId lease;
+  Result<TaskOutput> result;
+  std::vector<BlobRef> left = {};  ///< in the store, by one that has no result
+};
+
 /// What a lease says beside the task: LeaseGrant in PROTOCOL.md.
 struct TaskGrant {
   std::vector<BlobRef> inputs;

@@ -45,7 +45,7 @@ void RenderThreads::drop_queued() {
       continue;
     }
     // A copy: GCC 12 sees unset members in a moved temporary.
-    const EndedTask dropped{slot->task.lease,
+    const TaskEnded dropped{slot->task.lease,
                             Error{ErrorKind::cancelled, "dropped before it began"}};
     ended_.push_back(dropped);
     slot = slots_.erase(slot);
@@ -57,7 +57,7 @@ std::vector<LeaseId> RenderThreads::take_executed() {
   return std::exchange(left_thread_, {});
 }
 
-std::vector<EndedTask> RenderThreads::collect() {
+std::vector<TaskEnded> RenderThreads::collect() {
   const std::lock_guard lock(mutex_);
   return std::exchange(ended_, {});
 }
@@ -77,7 +77,7 @@ void RenderThreads::work() {
     // Run it without the lock; list nodes do not move.
     lock.unlock();
     const std::stop_token stop = slot->stop.get_token();
-    EndedTask end{slot->task.lease, Error{ErrorKind::cancelled, "stopped before it began"}};
+    TaskEnded end{slot->task.lease, Error{ErrorKind::cancelled, "stopped before it began"}};
     if (!stop.stop_requested()) end.result = execute_(slot->task, stop, end.left);
     lock.lock();
     left_thread_.push_back(slot->task.lease);
@@ -104,7 +104,7 @@ void RenderThreads::publish_executed() {
     }
     const Status published = good.empty() ? Status() : publish_(good);
     lock.lock();
-    for (EndedTask& end : batch.ends) {
+    for (TaskEnded& end : batch.ends) {
       if (end.result && !published) {
         end.left = std::move(end.result->outputs);
         end.result = published.error();

@@ -22,12 +22,6 @@ struct PooledTask {
   std::shared_ptr<BlobStore> store;
 };
 
-struct EndedTask {
-  LeaseId lease;
-  Result<TaskOutput> result;
-  std::vector<BlobRef> left = {};  ///< in the store, by one that has no result
-};
-
 /// The render threads, and one more that waits for the disk. The control thread submits, stops and
 /// collects; it never renders. Each render thread takes the oldest queued task, runs it with a stop
 /// token of its own and goes on with the next; the publisher makes durable what has been executed,
@@ -57,7 +51,7 @@ class RenderThreads {
   /// Tasks that have left their thread since the last call; each will end.
   std::vector<LeaseId> take_executed();
   /// Results since the last call, in the order in which they ended.
-  std::vector<EndedTask> collect();
+  std::vector<TaskEnded> collect();
 
  private:
   struct Slot {
@@ -68,7 +62,7 @@ class RenderThreads {
 
   struct Executed {
     std::vector<PooledTask> tasks;
-    std::vector<EndedTask> ends;  ///< of each
+    std::vector<TaskEnded> ends;  ///< of each
   };
 
   void work();
@@ -83,7 +77,7 @@ class RenderThreads {
   std::list<Slot> slots_;                 ///< oldest first; queued and running
   Executed executed_;                     ///< not yet durable
   std::vector<LeaseId> left_thread_;
-  std::vector<EndedTask> ended_;
+  std::vector<TaskEnded> ended_;
   bool closing_ = false;
   std::vector<std::thread> threads_;
 };

@@ -35,11 +35,6 @@ struct MessageArrived {
 struct TaskExecuted {
   LeaseId lease;
 };  ///< its thread is free, its outputs are on their way to the disk: it will end
-struct TaskEnded {
-  LeaseId lease;
-  Result<TaskOutput> result;
-  std::vector<BlobRef> left = {};  ///< in the store, by one that has no result
-};
 struct DocumentMissing {
   Digest job;
 };  ///< a started task belongs to a job that this process has not seen

@@ -204,9 +204,9 @@ class Worker {
     while (!leave_) {
       // Results first: they free slots that the tick then asks leases for.
       for (const LeaseId& lease : pool_.take_executed()) step(TaskExecuted{lease});
-      for (EndedTask& ended : pool_.collect()) {
+      for (TaskEnded& ended : pool_.collect()) {
         log_failure(ended);
-        step(TaskEnded{ended.lease, std::move(ended.result), std::move(ended.left)});
+        step(std::move(ended));
       }
       take_packed();
       end_overdue_tasks();
@@ -246,13 +246,13 @@ class Worker {
   void end_overdue_tasks() {
     for (const LeaseId& lease : watch_.take_overdue(now())) {
       pool_.stop(lease);
-      EndedTask ended{
+      TaskEnded ended{
           lease,
           Error{
               ErrorKind::timeout,
               "ran for longer than maxSecondsPerTask, or loaded its job for a quarter of an hour"}};
       log_failure(ended);
-      step(TaskEnded{ended.lease, std::move(ended.result)});
+      step(std::move(ended));
     }
     if (!watch_.is_stuck(now())) return;
     spdlog::critical("ends: a task has not stopped {} s after its time was up",
@@ -336,7 +336,7 @@ class Worker {
   void perform(Warn& action) { spdlog::warn("{}", action.message); }
   void perform(Leave& action) { leave_ = std::move(action); }
 
-  static void log_failure(const EndedTask& ended) {
+  static void log_failure(const TaskEnded& ended) {
     if (ended.result || ended.result.error().kind == ErrorKind::cancelled) return;
     spdlog::error("job {} {} step {} tile {} failed: {}", ended.lease.job.short_hex(),
                   task_name(ended.lease.task.kind), ended.lease.task.step, ended.lease.task.tile,

@@ -23,11 +23,11 @@ PooledTask task(std::int32_t tile) {
 Status at_once(std::span<const PooledTask> /*tasks*/) { return {}; }
 
 /// Collects until `count` tasks have ended; each end releases `woken`.
-std::vector<EndedTask> collect(RenderThreads& pool, std::counting_semaphore<>& woken,
+std::vector<TaskEnded> collect(RenderThreads& pool, std::counting_semaphore<>& woken,
                                std::size_t count) {
-  std::vector<EndedTask> all;
+  std::vector<TaskEnded> all;
   while (all.size() < count) {
-    for (EndedTask& ended : pool.collect()) all.push_back(std::move(ended));
+    for (TaskEnded& ended : pool.collect()) all.push_back(std::move(ended));
     if (all.size() < count) woken.acquire();
   }
   return all;
@@ -44,7 +44,7 @@ TEST(RenderThreads, RunsEverythingOnceAndWakesForEachResult) {
       },
       at_once, [&] { woken.release(); });
   for (int tile = 0; tile < 50; ++tile) pool.submit(task(tile));
-  std::vector<EndedTask> ended = collect(pool, woken, 50);
+  std::vector<TaskEnded> ended = collect(pool, woken, 50);
 
   std::sort(ended.begin(), ended.end(),
             [](const auto& a, const auto& b) { return a.lease < b.lease; });
@@ -72,7 +72,7 @@ TEST(RenderThreads, StopReachesTheRunningTaskAlone) {
   started.acquire();
   pool.stop(lease(1));
   let_go.release(2);
-  for (const EndedTask& ended : collect(pool, woken, 2)) {
+  for (const TaskEnded& ended : collect(pool, woken, 2)) {
     EXPECT_EQ(ended.result.ok(), ended.lease == lease(0));
   }
 }
@@ -92,7 +92,7 @@ TEST(RenderThreads, DroppedTasksEndAsCancelledAndNeverRun) {
   started.acquire();
   pool.drop_queued();
   let_go.release();
-  const std::vector<EndedTask> ended = collect(pool, woken, 3);
+  const std::vector<TaskEnded> ended = collect(pool, woken, 3);
   EXPECT_EQ(std::count_if(ended.begin(), ended.end(), [](const auto& e) { return e.result.ok(); }),
             1);
 }
@@ -138,7 +138,7 @@ TEST(RenderThreads, WhatTheDiskRefusesHasFailed) {
       },
       [&] { woken.release(); });
   pool.submit(task(0));
-  const std::vector<EndedTask> ended = collect(pool, woken, 1);
+  const std::vector<TaskEnded> ended = collect(pool, woken, 1);
   ASSERT_FALSE(ended[0].result);
   EXPECT_EQ(ended[0].result.error().message, "disk full");
   EXPECT_EQ(ended[0].left.size(), 1u);
