@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <numbers>
 
 namespace baton {
 namespace {
@@ -46,6 +47,23 @@ float FrameNoise::error_share() const {
   if (n < 2) return 1;
   const double scatter = std::max(0.0, n * squares_of_squares_ / (squares_ * squares_) - 1);
   return static_cast<float>(std::sqrt(scatter / (n - 1)) / 2);
+}
+
+float cycles_noise(const FilmTile& film) {
+  constexpr double kDark = 1e-4;
+  const Colors colors(film);
+  const float* const error = film.find(kErrorChannel);
+  if (!colors || error == nullptr) return 0;
+  double sum = 0;
+  std::size_t count = 0;
+  for (std::size_t i = 0; i < film.num_pixels(); ++i) {
+    const double grey = colors.grey(i);
+    if (!(error[i] >= 0) || !std::isfinite(error[i]) || !std::isfinite(grey)) continue;
+    sum += double{error[i]} / std::max(grey, kDark);
+    ++count;
+  }
+  if (count == 0) return 0;
+  return static_cast<float>(std::sqrt(6 / std::numbers::pi * sum / static_cast<double>(count)));
 }
 
 FrameNoise noise_of_film(const FilmTile& film) {

@@ -56,9 +56,10 @@ JobEstimate estimate_job(const JobSpec& job) {
     e.dependencies += count_neighbours(job, history_reach_px(job)) * (e.runs - 1);
   if (job.visibility.correlated)
     e.dependencies += count_neighbours(job, exchange_reach_px(job.visibility)) * e.frames;
+  e.dependencies += e.render_tasks / job.quality.sweeps * (job.quality.sweeps - 1);
 
   // Count rays, of all rounds. Those that are not seen have the sites of the first.
-  e.rounds = job.quality.rounds;
+  e.rounds = std::int64_t{job.quality.rounds} * job.quality.sweeps;
   e.preroll_rounds = num_preroll_rounds(job);
   e.primary_rays_per_pixel = job.image.sites;
   if (rounds_have_own_sites(job)) e.primary_rays_per_pixel *= e.rounds;

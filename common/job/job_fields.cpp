@@ -173,6 +173,24 @@ void fields(JobArchive& a, QualitySpec& quality, const SamplingSpec& sampling) {
     a.fault("rounds", "1, as sampling.method is auto, which chooses for one",
             std::to_string(quality.rounds));
   }
+  a.integer("sweeps", quality.sweeps, 1, limits::kMaxRounds);
+  if (const std::int64_t all = std::int64_t{quality.rounds} * quality.sweeps;
+      quality.sweeps > 1 && all > limits::kMaxRounds) {
+    a.fault("sweeps", fmt::format("at most {} rounds in all sweeps", limits::kMaxRounds),
+            std::to_string(all));
+  }
+  if (quality.sweeps > 1 && sampling.method == Method::automatic) {
+    a.fault("sweeps", "1, as sampling.method is auto, which chooses for one",
+            std::to_string(quality.sweeps));
+  }
+  a.boolean("refinable", quality.refinable);
+  a.number("noiseThreshold", quality.noise_threshold, {.min = 0, .max = 1e6, .min_open = true});
+  a.number("timeLimit", quality.time_limit, {.min = 0, .max = 1e9, .min_open = true});
+  a.integer("maxRounds", quality.max_rounds, 0, limits::kMaxRounds);
+  if (quality.max_rounds > 0 && quality.max_rounds < quality.rounds) {
+    a.fault("maxRounds", fmt::format("0, or at least quality.rounds, {}", quality.rounds),
+            std::to_string(quality.max_rounds));
+  }
 }
 
 void fields(JobArchive& a, VisibilitySpec& visibility, const SamplingSpec& sampling,
@@ -198,6 +216,11 @@ void fields(JobArchive& a, VisibilitySpec& visibility, const SamplingSpec& sampl
     a.fault("correlated",
             fmt::format("false, as quality.rounds is {}, and the second pass takes one round",
                         quality.rounds),
+            "true");
+  }
+  if (quality.sweeps > 1 || quality.refinable || quality.may_grow()) {
+    a.fault("correlated",
+            "false, as quality asks for sweeps, and the frames of a second pass have no mean",
             "true");
   }
   if (visibility.mask != MaskPolicy::same_samples && sampling.num_particles % 2 != 0) {
@@ -235,8 +258,21 @@ void fields(JobArchive& a, StateSpec& state) {
   a.choice("keep", state.keep, kStateKeeps);
 }
 
-/// What no single value shows: too many tasks, tiles that no blob holds.
-void check_size(JobArchive& a, const JobSpec& job) {
+/// What no single value shows: too many tasks, tiles that no blob holds, noise that nobody tells.
+void check_whole(JobArchive& a, const JobSpec& job) {
+  if (std::int64_t{job.quality.sweeps} * static_cast<std::int64_t>(job.frames.size()) >
+      limits::kMaxTasksPerJob) {
+    return a.fault("quality",
+                   fmt::format("at most {} frames in all sweeps", limits::kMaxTasksPerJob),
+                   fmt::format("{} sweeps of {}", job.quality.sweeps, job.frames.size()));
+  }
+  if (job.quality.noise_threshold && !tells_noise(job)) {
+    a.fault(
+        "quality",
+        fmt::format("no noiseThreshold, as the noise of {} is not known where it carries samples",
+                    traits(job.sampling.method).name),
+        fmt::format("{}", *job.quality.noise_threshold));
+  }
   const JobEstimate estimate = estimate_job(job);
   if (estimate.tasks() > limits::kMaxTasksPerJob) {
     a.fault(
@@ -283,7 +319,7 @@ void fields(JobArchive& a, JobSpec& job) {
   // Editors read it; it says nothing of the job.
   std::string schema;
   a.text("$schema", schema);
-  check_size(a, job);
+  check_whole(a, job);
 }
 
 }  // namespace baton

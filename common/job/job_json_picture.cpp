@@ -14,13 +14,18 @@ namespace baton {
 namespace {
 
 /// Beginnings of the paths that do not decide pixels.
-constexpr std::array<std::string_view, 12> kSettings{"/name",
+constexpr std::array<std::string_view, 17> kSettings{"/name",
                                                      "/priority",
                                                      "/metadata",
                                                      "/frames",
                                                      "/image/tileSize",
                                                      "/output",
                                                      "/state/",
+                                                     "/quality/sweeps",
+                                                     "/quality/refinable",
+                                                     "/quality/noiseThreshold",
+                                                     "/quality/maxRounds",
+                                                     "/quality/timeLimit",
                                                      "/maxRetriesPerTask",
                                                      "/maxFailedTasks",
                                                      "/maxFailuresPerWorker",
@@ -159,6 +164,8 @@ std::vector<FrameComparison::Facts> FrameComparison::facts_of(const ParsedJobDoc
 FrameComparison::FrameComparison(const ParsedJobDocument& a, const ParsedJobDocument& b)
     : frames_a_(a.job.frames),
       frames_b_(b.job.frames),
+      sweeps_a_(static_cast<std::size_t>(a.job.quality.sweeps)),
+      sweeps_b_(static_cast<std::size_t>(b.job.quality.sweeps)),
       a_(facts_of(a)),
       b_(facts_of(b)),
       carried_(carries_state(a.job) || carries_state(b.job)) {
@@ -168,8 +175,19 @@ FrameComparison::FrameComparison(const ParsedJobDocument& a, const ParsedJobDocu
 }
 
 bool FrameComparison::are_equal(std::size_t index_a, std::size_t index_b) const {
+  return sweeps_a_ == sweeps_b_ && are_alike(index_a, index_b);
+}
+
+bool FrameComparison::are_alike(std::size_t index_a, std::size_t index_b) const {
+  const bool all_common = num_common_ == a_.size() && num_common_ == b_.size();
+  if (carried_ && std::min(sweeps_a_, sweeps_b_) > 1 && !all_common) return false;
   if (carried_) return index_a == index_b && index_a < num_common_;
   return frames_a_[index_a] == frames_b_[index_b] && a_[index_a] == b_[index_b];
+}
+
+std::size_t FrameComparison::num_common_steps() const {
+  const bool all_common = num_common_ == a_.size() && num_common_ == b_.size();
+  return all_common ? num_common_ * std::min(sweeps_a_, sweeps_b_) : num_common_;
 }
 
 std::string FrameComparison::difference(std::size_t index_a, std::size_t index_b) const {
@@ -181,6 +199,7 @@ std::string FrameComparison::difference(std::size_t index_a, std::size_t index_b
                                                        : "$.scene.objects: keys";
     return std::string(what) + " at frame " + std::to_string(frame);
   }
+  if (sweeps_a_ != sweeps_b_) return "$.quality.sweeps";
   return "$.frames before frame " + std::to_string(frame) + " (samples are carried)";
 }
 

@@ -192,6 +192,16 @@ struct SamplingSpec {
 struct QualitySpec {
   int rounds = 1;  ///< K: passes over a frame, each with other random numbers and sites,
                    ///< [1, limits::kMaxRounds]
+  int sweeps = 1;  ///< how often the sequence is rendered, K rounds a frame each time; a frame is
+                   ///< the mean of its sweeps. rounds * sweeps <= limits::kMaxRounds
+  bool refinable = false;  ///< films stay after the job, for one of more sweeps
+  /// `baton render` adds sweeps until no frame is noisier, in Cycles' measure; > 0.
+  std::optional<float> noise_threshold{};
+  std::optional<float> time_limit{};  ///< it adds none that would end later, s; > 0
+  int max_rounds = 0;                 ///< it adds none past so many rounds; >= rounds, 0: no limit
+
+  /// Whether `baton render` may add sweeps.
+  bool may_grow() const { return noise_threshold || time_limit || max_rounds > 0; }
 
   bool operator==(const QualitySpec&) const = default;
 };

@@ -28,11 +28,16 @@ class FrameComparison {
  public:
   FrameComparison(const ParsedJobDocument& a, const ParsedJobDocument& b);
 
-  /// Whether frame `index_a` of one and `index_b` of the other have the same pixels: they show the
-  /// same and, where samples are carried, so do all frames before. Indices are 0-based.
+  /// Whether frame `index_a` of one and `index_b` of the other have the same pixels: they are
+  /// alike, and the means of as many sweeps. Indices are 0-based.
   bool are_equal(std::size_t index_a, std::size_t index_b) const;
+  /// Whether they show the same and, where samples are carried, so do all frames before; in later
+  /// sweeps these are all frames.
+  bool are_alike(std::size_t index_a, std::size_t index_b) const;
   /// How many frames from the first on are the same in both.
   std::size_t num_common() const { return num_common_; }
+  /// The same of steps (common/job/sequence.h).
+  std::size_t num_common_steps() const;
   /// What differs in two frames that are not equal: "$.camera.keys", ...; "$.frames" where it is
   /// the frames before.
   std::string difference(std::size_t index_a, std::size_t index_b) const;
@@ -45,6 +50,7 @@ class FrameComparison {
   static std::vector<Facts> facts_of(const ParsedJobDocument& document);
 
   std::vector<int> frames_a_, frames_b_;
+  std::size_t sweeps_a_, sweeps_b_;
   std::vector<Facts> a_, b_;
   bool carried_;
   std::size_t num_common_ = 0;

@@ -39,13 +39,25 @@ EnvironmentFrame environment_at(const EnvironmentSpec& environment, int frame_nu
 
 std::vector<FrameSpec> expand_sequence(const JobSpec& job) {
   std::vector<FrameSpec> frames;
-  frames.reserve(job.frames.size());
-  for (std::size_t i = 0; i < job.frames.size(); ++i) {
-    frames.push_back({.index = static_cast<std::int32_t>(i),
-                      .number = job.frames[i],
-                      .environment = environment_at(job.environment, job.frames[i])});
+  const std::int32_t end = num_steps(job);
+  frames.reserve(static_cast<std::size_t>(end));
+  for (std::int32_t step = 0; step < end; ++step) {
+    const int number = job.frames[static_cast<std::size_t>(frame_of_step(job, step))];
+    const auto sweep = step / static_cast<std::int32_t>(job.frames.size());
+    frames.push_back({.index = step,
+                      .number = number,
+                      .first_round = sweep * job.quality.rounds,
+                      .environment = environment_at(job.environment, number)});
   }
   return frames;
+}
+
+std::int32_t num_steps(const JobSpec& job) {
+  return static_cast<std::int32_t>(job.frames.size()) * job.quality.sweeps;
+}
+
+std::int32_t frame_of_step(const JobSpec& job, std::int32_t step) {
+  return step % static_cast<std::int32_t>(job.frames.size());
 }
 
 ImageSpec scaled(const ImageSpec& image, double scale) {
@@ -100,19 +112,23 @@ std::int32_t frames_per_run(const JobSpec& job) {
 
 std::vector<std::int32_t> run_starts(const JobSpec& job) {
   const auto frames = static_cast<std::int32_t>(job.frames.size());
+  const std::int32_t end = num_steps(job);
   std::vector<std::int32_t> starts = job.leading_runs;
-  std::erase_if(starts, [&](std::int32_t start) { return start >= frames; });
+  std::erase_if(starts, [&](std::int32_t start) { return start >= end; });
   if (starts.empty()) starts.push_back(0);
-  const std::int32_t step = frames_per_run(job);
-  for (std::int32_t next = (starts.back() / step + 1) * step; next < frames; next += step)
+  const std::int32_t length = frames_per_run(job);
+  while (true) {
+    const std::int32_t frame = starts.back() % frames, sweep = starts.back() - frame;
+    const std::int32_t next = sweep + std::min((frame / length + 1) * length, frames);
+    if (next >= end) return starts;
     starts.push_back(next);
-  return starts;
+  }
 }
 
 std::int32_t num_runs(const JobSpec& job) {
   if (!job.leading_runs.empty()) return static_cast<std::int32_t>(run_starts(job).size());
   const auto frames = static_cast<std::int32_t>(job.frames.size());
-  return (frames + frames_per_run(job) - 1) / frames_per_run(job);
+  return (frames + frames_per_run(job) - 1) / frames_per_run(job) * job.quality.sweeps;
 }
 
 std::int32_t runs_per_checkpoint(const JobSpec& job) {
@@ -128,8 +144,7 @@ TileRun tile_run(const JobSpec& job, std::int32_t tile, std::int32_t run) {
   const std::vector<std::int32_t> starts = run_starts(job);
   const auto r = static_cast<std::size_t>(run);
   BATON_CHECK(run >= 0 && r < starts.size());
-  const auto frames = static_cast<std::int32_t>(job.frames.size());
-  return {tile, run, starts[r], (r + 1 < starts.size() ? starts[r + 1] : frames) - 1};
+  return {tile, run, starts[r], (r + 1 < starts.size() ? starts[r + 1] : num_steps(job)) - 1};
 }
 
 std::size_t num_common_frames(const JobSpec& a, const JobSpec& b) {

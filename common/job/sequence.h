@@ -34,12 +34,18 @@ double rotation_deg_at(const EnvironmentSpec& environment, int frame_number);
 
 /// What is particular to one frame of the sequence.
 struct FrameSpec {
-  std::int32_t index = 0;   ///< 0-based position in the sequence
-  std::int32_t number = 1;  ///< the user's frame number
+  std::int32_t index = 0;        ///< 0-based position in the sequence: the step
+  std::int32_t number = 1;       ///< the user's frame number
+  std::int32_t first_round = 0;  ///< rounds of this frame that were rendered in earlier sweeps
   EnvironmentFrame environment;
 };
 
-/// One FrameSpec per frame of the job, in order.
+/// A job renders its frames quality.sweeps times over. A *step* is one of these renderings: step s
+/// is frame index s % frames of sweep s / frames. What is carried goes from step to step.
+std::int32_t num_steps(const JobSpec& job);
+/// The frame index of a step.
+std::int32_t frame_of_step(const JobSpec& job, std::int32_t step);
+/// One FrameSpec per step of the job, in order.
 std::vector<FrameSpec> expand_sequence(const JobSpec& job);
 
 /// The rendered pixels cut into square tiles, row by row; border tiles are clipped.
@@ -62,18 +68,18 @@ class TileGrid {
   std::int32_t tile_size_, columns_, rows_;
 };
 
-/// The unit that a lease hands out: one tile for frames [first_frame, last_frame] (0-based indices,
-/// inclusive). Consecutive runs of a tile are chained by the sample state when the job carries it.
+/// The unit that a lease hands out: one tile for steps [first_frame, last_frame] (inclusive) of one
+/// sweep. Consecutive runs of a tile are chained by the sample state when the job carries it.
 struct TileRun {
   std::int32_t tile = 0;
-  std::int32_t run = 0;  ///< 0-based; run r covers the frames from run_starts(job)[r]
+  std::int32_t run = 0;  ///< 0-based; run r covers the steps from run_starts(job)[r]
   std::int32_t first_frame = 0;
   std::int32_t last_frame = 0;
 
   auto operator<=>(const TileRun&) const = default;
 };
 
-/// Frames of a sequence: 0-based indices, inclusive.
+/// Frames or steps of a sequence: 0-based indices, inclusive.
 struct FrameSpan {
   std::int32_t first = 0;
   std::int32_t last = 0;
@@ -82,8 +88,8 @@ struct FrameSpan {
 /// Frames of a run: state.checkpoint_every, or 1 where pixels take samples from others, since a
 /// tile then needs its neighbours.
 std::int32_t frames_per_run(const JobSpec& job);
-/// First frames of the runs that cover the sequence (0-based, ascending, from 0): those of
-/// job.leading_runs, and after the last of them every multiple of frames_per_run.
+/// First steps of the runs that cover the sequence (0-based, ascending, from 0): those of
+/// job.leading_runs, and after the last of them every multiple of frames_per_run in a sweep.
 std::vector<std::int32_t> run_starts(const JobSpec& job);
 /// Their number.
 std::int32_t num_runs(const JobSpec& job);
@@ -92,7 +98,7 @@ std::int32_t runs_per_checkpoint(const JobSpec& job);
 /// Whether what is lost later is made again from the states of this run, or they are the job's
 /// last: those must be durable, all else that tasks hand to each other can be made again.
 bool ends_in_checkpoint(const JobSpec& job, std::int32_t run);
-/// The run's frames; run in [0, num_runs(job)), tile in [0, TileGrid(job.image).count()).
+/// The run's steps; run in [0, num_runs(job)), tile in [0, TileGrid(job.image).count()).
 TileRun tile_run(const JobSpec& job, std::int32_t tile, std::int32_t run);
 /// How many frames from the first on two jobs have in common. Where samples are carried, only these
 /// have the same history.
@@ -114,7 +120,7 @@ std::int32_t num_carried_particles(const SamplingSpec& sampling);
 /// Whether each round of a frame has sites of its own. Samples that are carried belong to a
 /// surface: where pixels carry them, all rounds have the same sites.
 bool rounds_have_own_sites(const JobSpec& job);
-/// Rounds before the first frame that are not seen: state.preroll, where pixels carry a memory.
+/// Rounds before the first step that are not seen: state.preroll, where pixels carry a memory.
 std::int32_t num_preroll_rounds(const JobSpec& job);
 
 /// Sets of samples of a pixel that never exchange anything: 2 when one decides what is done with

@@ -76,7 +76,7 @@ double film_bytes_per_pixel(const JobSpec& job, double surface_share) {
   return bytes + (tells_noise(job) ? kErrorBytes : 0);
 }
 
-/// Of a pixel's state after frames [0, end), on average.
+/// Of a pixel's state after steps [0, end), on average.
 double state_bytes_per_pixel(const JobSpec& job, std::int64_t end, double surface_share) {
   const JobEstimate e = estimate_job(job);
   const auto whole = static_cast<double>(e.state_bytes_per_pixel);
@@ -85,15 +85,15 @@ double state_bytes_per_pixel(const JobSpec& job, std::int64_t end, double surfac
     const double weights = weigh_alike(job) ? 4.0 * job.sampling.num_particles : 0;
     return surface_share * (whole - weights);
   }
-  const auto rounds = static_cast<double>(e.preroll_rounds + end * e.rounds);
+  const auto rounds = static_cast<double>(e.preroll_rounds + end * job.quality.rounds);
   const double rays = rounds * job.sampling.num_particles;
   const double memory = std::min(kMostMemoryBytes, kMemoryBytes * std::sqrt(rays / kMemoryRays));
   return surface_share * std::min(whole, memory * (moves(job) ? kMovingMemory : 1));
 }
 
-/// The ends of the frames whose states are in the store together when it is fullest.
+/// The ends of the steps whose states are in the store together when it is fullest.
 std::vector<std::int64_t> states_at_once(const JobSpec& job) {
-  const auto frames = static_cast<std::int64_t>(job.frames.size());
+  const std::int64_t frames = num_steps(job);
   const std::int64_t every = job.state.checkpoint_every;
   std::vector<std::int64_t> ends;
   if (job.state.keep == StateKeep::all) {
@@ -110,6 +110,12 @@ std::vector<std::int64_t> states_at_once(const JobSpec& job) {
   for (std::int64_t end = last; end > 0 && ends.size() < (shares ? 3 : 2); end -= every)
     ends.push_back(end);
   return ends;
+}
+
+/// Frames whose films stay for another sweep, of this job or a later one.
+std::int64_t frames_that_stay(const JobSpec& job) {
+  const bool stay = job.quality.sweeps > 1 || job.quality.refinable;
+  return stay ? static_cast<std::int64_t>(job.frames.size()) : 0;
 }
 
 }  // namespace
@@ -131,7 +137,8 @@ StoreEstimate estimate_store(const JobSpec& job, double surface_share) {
   // A second pass takes samples away while the run is still rendered.
   const bool second = job.visibility.correlated;
   const double run = frames_per_run(job);
-  const double ahead = std::min(frames, run * (1 + tiles_ahead / (second ? 2 : 1)));
+  const double ahead = std::max(std::min(frames, run * (1 + tiles_ahead / (second ? 2 : 1))),
+                                static_cast<double>(frames_that_stay(job)));
   store.films =
       static_cast<std::int64_t>(pixels * ahead * film_bytes_per_pixel(job, surface_share));
   if (second) {
@@ -155,7 +162,7 @@ StoreEstimate bound_store(const JobSpec& job) {
       carries_state(job) ? static_cast<std::int64_t>(states_at_once(job).size()) + between : 0;
   StoreEstimate store;
   store.states = e.state_bytes * std::min(kept + kStatesInWork, e.runs);
-  store.films = e.film_bytes * ahead;
+  store.films = e.film_bytes * (ahead + frames_that_stay(job));
   if (job.visibility.correlated) {
     store.films *= 2;  // of both passes
     const std::int64_t per_pixel = 2 + 8 + 10 * std::int64_t{job.sampling.num_particles};
@@ -171,11 +178,9 @@ std::int64_t estimate_blob_bytes(const JobSpec& job, BlobKind kind) {
                                           std::min<std::int64_t>(side, image.height()));
   switch (kind) {
     case BlobKind::state:
-      return !carries_state(job)
-                 ? 0
-                 : static_cast<std::int64_t>(
-                       pixels *
-                       state_bytes_per_pixel(job, static_cast<std::int64_t>(job.frames.size()), 1));
+      return !carries_state(job) ? 0
+                                 : static_cast<std::int64_t>(
+                                       pixels * state_bytes_per_pixel(job, num_steps(job), 1));
     case BlobKind::film:
       return static_cast<std::int64_t>(pixels * film_bytes_per_pixel(job, 1));
     case BlobKind::first_pass:

@@ -39,8 +39,8 @@ struct TaskKey {
 /// "run 3 of tile 7", "assembly of frame index 5": the task in words, steps and tiles 0-based.
 std::string describe_task(const TaskKey& task);
 
-/// A blob that a task needs or made. `frame` is a 0-based index. Stored and sent; values are for
-/// ever.
+/// A blob that a task needs or made. `frame` is a 0-based index; of states, films and first-pass
+/// samples that of a step (common/job/sequence.h). Stored and sent; values are for ever.
 enum class BlobKind : std::uint8_t { state = 0, film = 1, image = 2, first_pass = 3 };
 constexpr BlobKind last_of(BlobKind) { return BlobKind::first_pass; }
 

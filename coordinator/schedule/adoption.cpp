@@ -54,9 +54,10 @@ class KeptFrames {
   bool has(std::int32_t frame) const {
     return images_[static_cast<std::size_t>(frame)].has_value();
   }
-  bool has_all(const FrameSpan& frames) const {
-    for (std::int32_t frame = frames.first; frame <= frames.last; ++frame) {
-      if (!has(frame)) return false;
+  /// Of these steps.
+  bool has_all(const JobSpec& job, const FrameSpan& steps) const {
+    for (std::int32_t step = steps.first; step <= steps.last; ++step) {
+      if (!has(frame_of_step(job, step))) return false;
     }
     return true;
   }
@@ -85,9 +86,9 @@ class KeptFrames {
 
 /// How far the work of a former job reaches; the more, the better.
 struct Reach {
-  std::int32_t states = 0;  ///< end of the newest frame all of whose states are there
+  std::int32_t states = 0;  ///< end of the newest step all of whose states are there
   bool same_tasks = false;  ///< its tasks are those of the wanted job
-  std::int32_t tasks = 0;   ///< then the end of the newest frame that a task of it has rendered
+  std::int32_t tasks = 0;   ///< then the end of the newest step that a task of it has rendered
 
   auto operator<=>(const Reach&) const = default;
 };
@@ -101,19 +102,22 @@ class Predecessor {
         former_(former),
         old_(former.document.job),
         old_graph_(old_),
-        num_common_(static_cast<std::int32_t>(comparison.num_common())) {}
+        num_common_(static_cast<std::int32_t>(comparison.num_common_steps())) {}
 
   /// How far its work reaches that the wanted job can use.
   Reach reach(std::int32_t first_open, const KeptFiles& files) {
     const bool same = num_common_ > 0 && job_.image.tile_size == old_.image.tile_size &&
                       films_alike(job_.output, old_.output);
-    const std::int32_t states =
-        carries_state(job_) ? newest_states(same ? num_common_ : first_open, files) : 0;
+    // States of another tiling come without the films of their sweep.
+    const bool may_cut = job_.quality.sweeps == 1 && old_.quality.sweeps == 1;
+    const std::int32_t states = carries_state(job_) && (same || may_cut)
+                                    ? newest_states(same ? num_common_ : first_open, files)
+                                    : 0;
     if (!same && states == 0) return {};
     return {states, same, same ? progress() : 0};
   }
 
-  /// Its runs up to a frame, and one that begins there.
+  /// Its runs up to a step, and one that begins there.
   std::vector<std::int32_t> runs_up_to(std::int32_t end) const {
     std::vector<std::int32_t> starts;
     for (const std::int32_t start : run_starts(old_)) {
@@ -134,14 +138,15 @@ class Predecessor {
       const FrameSpan frames = graph.frames(key);
       if (frames.last >= num_common_) continue;
       // States that the former job did not keep, and the new one would, are not made again.
-      const bool all_kept = kept.has_all(frames);
+      const bool all_kept = kept.has_all(job, frames);
       const bool lacks_state = job_.state.keep == StateKeep::all && !task.outputs.empty() &&
                                task.outputs.front().kind == BlobKind::state &&
                                !files.has_blob(task.outputs.front());
       if (!(all_kept && lacks_state)) adoption.tasks.push_back(key);
     }
+    // A cut has no film for another sweep.
     for (const Cut& cut : former_.plan.cuts) {
-      if (graph.find(cut.task) && is_same_run(graph, cut.task.step))
+      if (job.quality.sweeps == 1 && graph.find(cut.task) && is_same_run(graph, cut.task.step))
         adoption.plan.cuts.push_back(cut);
     }
   }
@@ -166,7 +171,7 @@ class Predecessor {
   }
 
  private:
-  /// The end of the last frame in common that one of its tasks has rendered.
+  /// The end of the last step in common that one of its tasks has rendered.
   std::int32_t progress() const {
     std::int32_t end = 0;
     for (const Completions::Task& task : former_.tasks) {
@@ -176,8 +181,8 @@ class Predecessor {
     return std::min(end, num_common_);
   }
 
-  /// The states that are all there of the newest frame before `end`; 0: there are none. Else the
-  /// frame after it.
+  /// The states that are all there of the newest step before `end`; 0: there are none. Else the
+  /// step after it.
   std::int32_t newest_states(std::int32_t end, const KeptFiles& files) {
     std::map<std::int32_t, std::vector<BlobRef>> states;  // by run
     for (const Completions::Task& task : former_.tasks) {
@@ -235,12 +240,12 @@ std::vector<TaskKey> settled_tasks(const JobSpec& job, const KeptFrames& kept,
     }
   };
   for (std::int32_t run = 0; run < graph.num_runs(); ++run) {
-    bool all = true;
-    for (std::int32_t frame = graph.first_frame(run); frame <= graph.last_frame(run); ++frame) {
-      all = all && kept.has(frame);
-      if (kept.has(frame) && job.visibility.correlated) settle(TaskKind::second_pass, frame);
+    const FrameSpan steps{graph.first_frame(run), graph.last_frame(run)};
+    for (std::int32_t frame = steps.first; job.visibility.correlated && frame <= steps.last;
+         ++frame) {
+      if (kept.has(frame)) settle(TaskKind::second_pass, frame);
     }
-    if (all) settle(TaskKind::render, run);
+    if (kept.has_all(job, steps)) settle(TaskKind::render, run);
   }
   return settled;
 }

@@ -93,7 +93,7 @@ struct JobAdded {
   std::vector<Failure> failures;
   /// Of the completed tasks, those whose outputs are gone; of the cuts, those whose states are.
   std::vector<TaskKey> lost = {};
-  std::vector<TaskKey> lost_spares = {};  ///< those whose states nobody needs now (Checkpoints)
+  std::vector<BlobRef> lost_spares = {};  ///< blobs that nobody needs now (JobTasks::spare_blobs)
   JobPlan plan = {};                      ///< its leading runs stand in `spec`, too
 };
 struct JobCancelled {

@@ -38,6 +38,7 @@ JobGraph::JobGraph(const JobSpec& job)
     : grid_(job.image),
       starts_(run_starts(job)),
       num_frames_(static_cast<std::int32_t>(job.frames.size())),
+      num_steps_(baton::num_steps(job)),
       num_runs_(static_cast<std::int32_t>(starts_.size())),
       num_tiles_(grid_.count()),
       runs_per_checkpoint_(baton::runs_per_checkpoint(job)),
@@ -80,6 +81,7 @@ std::int32_t JobGraph::num_inputs(const TaskKey& key) const {
   if (key.kind == TaskKind::assemble) return num_tiles_;
   if (key.kind == TaskKind::second_pass)
     return static_cast<std::int32_t>(grid_.tiles_near(key.tile, exchange_reach_px_).size());
+  if (first_frame(key.step) >= num_frames_) return static_cast<std::int32_t>(inputs(key).size());
   if (!carries_state_ || key.step == 0) return 0;
   return static_cast<std::int32_t>(grid_.tiles_near(key.tile, reach_px_).size());
 }
@@ -88,7 +90,10 @@ std::vector<TaskIndex> JobGraph::dependents(const TaskKey& key) const {
   std::vector<TaskIndex> result;
   if (key.kind == TaskKind::assemble) return result;
   if (key.kind == TaskKind::second_pass) return {key.step};
-  for (std::int32_t frame = first_frame(key.step); frame <= last_frame(key.step); ++frame) {
+  const FrameSpan steps = frames(key);
+  const bool is_last_sweep = steps.first >= last_step_of(0);
+  for (std::int32_t step = steps.first; is_last_sweep && step <= steps.last; ++step) {
+    const std::int32_t frame = step - last_step_of(0);
     if (!has_second_pass_) {
       result.push_back(frame);
       continue;
@@ -97,31 +102,35 @@ std::vector<TaskIndex> JobGraph::dependents(const TaskKey& key) const {
       result.push_back(second_pass_index(frame, near));
   }
   if (carries_state_ && key.step + 1 < num_runs_) add_neighbours(key.step + 1, key.tile, result);
+  if (!is_last_sweep)
+    add_same_frames({steps.first + num_frames_, steps.last + num_frames_}, key.tile, result);
   return result;
 }
 
 std::vector<TaskIndex> JobGraph::inputs(const TaskKey& key) const {
   std::vector<TaskIndex> result;
   if (key.kind == TaskKind::assemble) {
-    const std::int32_t run = run_of(key.step);
+    const std::int32_t run = run_of(last_step_of(key.step));
     for (std::int32_t tile = 0; tile < num_tiles_; ++tile)
       result.push_back(has_second_pass_ ? second_pass_index(key.step, tile)
                                         : render_index(run, tile));
   } else if (key.kind == TaskKind::second_pass) {
     for (const std::int32_t near : grid_.tiles_near(key.tile, exchange_reach_px_))
       result.push_back(render_index(run_of(key.step), near));
-  } else if (carries_state_ && key.step > 0) {
-    add_neighbours(key.step - 1, key.tile, result);
+  } else {
+    if (carries_state_ && key.step > 0) add_neighbours(key.step - 1, key.tile, result);
+    if (const FrameSpan steps = frames(key); steps.first >= num_frames_)
+      add_same_frames({steps.first - num_frames_, steps.last - num_frames_}, key.tile, result);
   }
   return result;
 }
 
 std::int32_t JobGraph::last_frame(std::int32_t run) const {
-  return (run + 1 < num_runs_ ? first_frame(run + 1) : num_frames_) - 1;
+  return (run + 1 < num_runs_ ? first_frame(run + 1) : num_steps_) - 1;
 }
 
-std::int32_t JobGraph::run_of(std::int32_t frame) const {
-  return static_cast<std::int32_t>(std::upper_bound(starts_.begin(), starts_.end(), frame) -
+std::int32_t JobGraph::run_of(std::int32_t step) const {
+  return static_cast<std::int32_t>(std::upper_bound(starts_.begin(), starts_.end(), step) -
                                    starts_.begin()) -
          1;
 }
@@ -175,7 +184,7 @@ std::optional<std::string> JobGraph::check_outputs(const TaskKey& key,
 
 std::optional<std::string> JobGraph::check_frames(const TaskKey& key,
                                                   const std::vector<FrameStats>& frames) const {
-  std::int32_t next = num_frames_, last = num_frames_ - 1;  // none
+  std::int32_t next = num_steps_, last = num_steps_ - 1;  // none
   if (key.kind == TaskKind::render) {
     next = first_frame(key.step);
     last = last_frame(key.step);
@@ -211,10 +220,15 @@ std::int32_t JobGraph::num_outputs(const TaskKey& key, BlobKind kind) const {
 
 bool JobGraph::takes(const TaskKey& reader, const TaskKey& maker, const BlobRef& output) const {
   switch (reader.kind) {
-    case TaskKind::render:
-      return output.kind == BlobKind::state;
+    case TaskKind::render: {
+      if (output.kind == BlobKind::state) return maker.step + 1 == reader.step;
+      const std::int32_t step = output.frame + num_frames_;
+      const FrameSpan steps = frames(reader);
+      return output.kind == BlobKind::film && maker.tile == reader.tile && step >= steps.first &&
+             step <= steps.last;
+    }
     case TaskKind::assemble:
-      return output.kind == BlobKind::film && output.frame == reader.step;
+      return output.kind == BlobKind::film && output.frame == last_step_of(reader.step);
     case TaskKind::second_pass:
       if (output.frame != reader.step) return false;
       return output.kind == BlobKind::first_pass ||
@@ -237,6 +251,15 @@ void JobGraph::add_neighbours(std::int32_t run, std::int32_t tile,
                               std::vector<TaskIndex>& tasks) const {
   for (const std::int32_t near : grid_.tiles_near(tile, reach_px_))
     tasks.push_back(render_index(run, near));
+}
+
+/// The tasks that render these steps of a tile, but for those that are there.
+void JobGraph::add_same_frames(const FrameSpan& steps, std::int32_t tile,
+                               std::vector<TaskIndex>& tasks) const {
+  for (std::int32_t run = run_of(steps.first); run <= run_of(steps.last); ++run) {
+    const TaskIndex task = render_index(run, tile);
+    if (std::find(tasks.begin(), tasks.end(), task) == tasks.end()) tasks.push_back(task);
+  }
 }
 
 TaskIndex JobGraph::render_index(std::int32_t run, std::int32_t tile) const {

@@ -23,9 +23,12 @@ std::int64_t count_tasks(const JobSpec& job);
 /// frame.
 ///
 /// If the job carries state, render(run, tile) needs render(run - 1, t) of every tile t that
-/// history may come from: itself, and its neighbours within history_reach_px.
+/// history may come from: itself, and its neighbours within history_reach_px. In a later sweep it
+/// needs the films of its tile of the sweep before. Runs and the blobs that they make are numbered
+/// by steps (common/job/sequence.h), all else by frames; without sweeps these are the same.
 /// second_pass(frame, tile) needs the render tasks of that frame of all tiles within
-/// exchange_reach_px. assemble(frame) needs all tiles of its run, or all its second passes.
+/// exchange_reach_px. assemble(frame) needs all tiles of its run in the last sweep, or all its
+/// second passes.
 class JobGraph {
  public:
   /// count_tasks(job) must be at most limits::kMaxTasksPerJob.
@@ -35,6 +38,9 @@ class JobGraph {
   std::int32_t num_frames() const { return num_frames_; }
   std::int32_t num_tiles() const { return num_tiles_; }
   std::int32_t num_runs() const { return num_runs_; }
+  std::int32_t num_steps() const { return num_steps_; }
+  /// The step whose films make the frame.
+  std::int32_t last_step_of(std::int32_t frame) const { return num_steps_ - num_frames_ + frame; }
 
   /// nullopt: the job has no such task.
   std::optional<TaskIndex> find(const TaskKey& key) const;
@@ -48,15 +54,15 @@ class JobGraph {
   /// The tasks that this one needs, in tile order.
   std::vector<TaskIndex> inputs(const TaskKey& key) const;
 
-  /// First and last frame (0-based, inclusive) of a run.
+  /// First and last step (0-based, inclusive) of a run.
   std::int32_t first_frame(std::int32_t run) const {
     return starts_[static_cast<std::size_t>(run)];
   }
   std::int32_t last_frame(std::int32_t run) const;
-  /// The run that renders a frame.
-  std::int32_t run_of(std::int32_t frame) const;
+  /// The run that renders a step.
+  std::int32_t run_of(std::int32_t step) const;
 
-  /// The frames that a task works on.
+  /// The steps that a render task works on; the frame of the others.
   FrameSpan frames(const TaskKey& key) const;
 
   /// Whether a render task hands its samples to the next run.
@@ -93,10 +99,12 @@ class JobGraph {
   TaskIndex second_pass_index(std::int32_t frame, std::int32_t tile) const;
   std::vector<BlobRef> expected_outputs(const TaskKey& key) const;
   void add_neighbours(std::int32_t run, std::int32_t tile, std::vector<TaskIndex>& tasks) const;
+  void add_same_frames(const FrameSpan& steps, std::int32_t tile,
+                       std::vector<TaskIndex>& tasks) const;
 
   TileGrid grid_;
   std::vector<std::int32_t> starts_;  ///< of the runs
-  std::int32_t num_frames_, num_runs_, num_tiles_, runs_per_checkpoint_, reach_px_;
+  std::int32_t num_frames_, num_steps_, num_runs_, num_tiles_, runs_per_checkpoint_, reach_px_;
   bool carries_state_, shares_history_, has_second_pass_;
   std::int32_t exchange_reach_px_;
   TaskIndex first_render_;

@@ -12,6 +12,7 @@ JobTasks::JobTasks(const JobSpec& spec)
     : graph_(spec),
       checkpoints_(graph_),
       keep_all_states_(spec.state.keep == StateKeep::all),
+      keep_films_(spec.quality.refinable),
       records_(static_cast<std::size_t>(graph_.num_tasks())),
       open_renders_(static_cast<std::size_t>(graph_.num_runs()), graph_.num_tiles()) {
   progress_.tasks_total = progress_.tasks_open = records_.size();
@@ -105,7 +106,7 @@ void JobTasks::complete(TaskIndex task, const Completion& completion, const std:
   record(task).maker = maker != maker_numbers_.end() ? maker->second : std::uint16_t{0};
   if (!former_outputs_.contains(task)) {
     progress_.stats.merge(completion.stats);
-    for (const FrameStats& frame : completion.frames) progress_.frames[frame.frame].merge(frame);
+    for (const FrameStats& frame : completion.frames) add_stats(frame);
   }
   force_done(task, completion.outputs);
   record(task).is_shared = is_shared;
@@ -120,17 +121,29 @@ void JobTasks::complete(TaskIndex task, const Completion& completion, const std:
   }
 }
 
+/// Of a frame, over its sweeps.
+void JobTasks::add_stats(const FrameStats& of_step) {
+  progress_.frames[of_step.frame % graph_.num_frames()].merge(of_step);
+}
+
+std::int32_t JobTasks::first_open_step() const {
+  const std::int32_t step = graph_.last_step_of(first_open_frame_);
+  if (first_open_run_ >= graph_.num_runs()) return step;
+  return std::min(step, graph_.first_frame(first_open_run_));
+}
+
 /// Brings a task to done, along the legal way, and keeps what it made.
 void JobTasks::force_done(TaskIndex task, const std::vector<BlobRef>& outputs) {
   apply(task, TaskEvent::inputs_done);
   apply(task, TaskEvent::granted);
   BATON_CHECK(apply(task, TaskEvent::completed));
   record(task).outputs = outputs;
+  record(task).films_let_go = false;
   for (const BlobRef& output : outputs) count_output(output, true);
 }
 
 std::vector<TaskIndex> JobTasks::restore(const Completions& completions,
-                                         const std::vector<TaskKey>& gone, BlobReferences& blobs,
+                                         const std::vector<BlobRef>& gone, BlobReferences& blobs,
                                          const JobPlan& plan) {
   // First all statuses: who needs what follows from them.
   std::vector<TaskIndex> done, hollow;
@@ -148,7 +161,7 @@ std::vector<TaskIndex> JobTasks::restore(const Completions& completions,
     done.push_back(*task);
   }
   progress_.stats = completions.stats;
-  progress_.frames = completions.frames;
+  for (const auto& [step, frame] : completions.frames) add_stats(frame);
   for (const TaskIndex task : done) {
     for (const TaskIndex dependent : graph_.dependents(graph_.key(task)))
       --record(dependent).missing_inputs;
@@ -160,8 +173,12 @@ std::vector<TaskIndex> JobTasks::restore(const Completions& completions,
     if (const TaskKey key = graph_.key(task); key.kind == TaskKind::render)
       checkpoints_.complete(key);
   }
-  for (const TaskKey& key : gone) {
-    if (graph_.find(key) && key.kind == TaskKind::render) checkpoints_.let_go(key);
+  for (const BlobRef& blob : gone) {
+    const TaskKey key{TaskKind::render, graph_.run_of(blob.frame), blob.tile};
+    const std::optional<TaskIndex> task = graph_.find(key);
+    if (!task) continue;
+    if (blob.kind == BlobKind::state) checkpoints_.let_go(key);
+    if (blob.kind == BlobKind::film) record(*task).films_let_go = true;
   }
   others_frames_.insert(plan.others_frames.begin(), plan.others_frames.end());
   for (const Cut& cut : plan.cuts) {

@@ -48,6 +48,8 @@ class JobTasks {
   const std::set<TaskIndex>& ready() const { return ready_; }
   /// The first frame that is not written and may still be; num_frames: there is none.
   std::int32_t first_open_frame() const { return first_open_frame_; }
+  /// The first step that is not done: not rendered, or in the last sweep not written.
+  std::int32_t first_open_step() const;
   /// The first run with an open render task; num_runs: there is none.
   std::int32_t first_open_run() const { return first_open_run_; }
   /// Render tasks of the run that are open.
@@ -63,11 +65,11 @@ class JobTasks {
   std::vector<BlobRef> inputs(TaskIndex task) const;
 
   /// Takes up what an earlier coordinator recorded as done, in any order; of a fresh job only.
-  /// Tasks that are none of the job's are left out. gone: render tasks whose spare_blobs() are not
-  /// there. A task that is recorded without outputs, or without the films of a cut, is opened again
-  /// if an open task takes what it lacks, and so on back to what is there or can be cut. Returns
-  /// those that were.
-  std::vector<TaskIndex> restore(const Completions& completions, const std::vector<TaskKey>& gone,
+  /// Tasks that are none of the job's are left out. gone: spare_blobs() that are not there. A task
+  /// that is recorded without outputs, or without the films of a cut, is opened again if an open
+  /// task takes what it lacks, and so on back to what is there or can be cut. Returns those that
+  /// were.
+  std::vector<TaskIndex> restore(const Completions& completions, const std::vector<BlobRef>& gone,
                                  BlobReferences& blobs, const JobPlan& plan = {});
   /// Whether the task, which is not done, is a cut.
   bool is_cut(TaskIndex task) const { return cuts_.contains(task); }
@@ -153,6 +155,7 @@ class JobTasks {
   struct Record {
     TaskStatus status = TaskStatus::blocked;
     bool is_shared = true;            ///< other workers may read its state
+    bool films_let_go = false;        ///< they are not all there, and nobody counts on them
     std::int32_t missing_inputs = 0;  ///< input tasks that are not done, whatever its own status
     std::uint32_t attempts = 0;
     std::uint16_t losses = 0;
@@ -169,6 +172,7 @@ class JobTasks {
   const Record& record(TaskIndex task) const { return records_[static_cast<std::size_t>(task)]; }
   bool apply(TaskIndex task, TaskEvent event);
   void count_run(TaskIndex task, bool opened);
+  void add_stats(const FrameStats& of_step);
   std::int32_t num_needs(TaskIndex task, const BlobRef& output) const;
   std::int32_t num_uses(TaskIndex task, const BlobRef& output) const;
   void count_output(const BlobRef& output, bool made);
@@ -188,7 +192,7 @@ class JobTasks {
 
   JobGraph graph_;
   Checkpoints checkpoints_;
-  bool keep_all_states_;
+  bool keep_all_states_, keep_films_;
   std::vector<Record> records_;
   std::vector<std::string> makers_{
       "(not known)"};  ///< names, of at most kMaxWorkers; the first: all others

@@ -46,6 +46,9 @@ std::int32_t JobTasks::num_needs(TaskIndex task, const BlobRef& output) const {
 /// Whether it stays for what may be lost or come after the job. Between checkpoints only what
 /// workers have read of others stays: the rest of what a lost worker has made is lost with it.
 bool JobTasks::stays(TaskIndex task, const BlobRef& output) const {
+  if (output.kind == BlobKind::film) {
+    return keep_films_ && output.frame >= graph_.last_step_of(0) && !record(task).films_let_go;
+  }
   if (output.kind != BlobKind::state || output.is_held()) return false;
   const TaskKey key = graph_.key(task);
   return checkpoints_.keeps(key) || (record(task).is_shared && checkpoints_.keeps_between(key));

@@ -6,7 +6,7 @@
 namespace baton {
 
 std::int32_t JobTasks::states_from() const {
-  if (first_open_run_ >= graph_.num_runs()) return graph_.num_frames();
+  if (first_open_run_ >= graph_.num_runs()) return graph_.num_steps();
   return graph_.first_frame(first_open_run_) - 1;
 }
 
@@ -14,7 +14,8 @@ bool JobTasks::may_hold(TaskIndex task) const {
   const TaskKey key = graph_.key(task);
   return key.kind == TaskKind::render && graph_.carries_state() && graph_.shares_history() &&
          key.step + 1 < graph_.num_runs() && !keep_all_states_ && !checkpoints_.keeps(key) &&
-         !cuts_.contains(task) && !has_failed_ && makers_.size() <= limits::kMaxWorkers;
+         graph_.first_frame(key.step) < graph_.num_frames() && !cuts_.contains(task) &&
+         !has_failed_ && makers_.size() <= limits::kMaxWorkers;
 }
 
 /// The state of a done task if it is held; else null.
@@ -28,7 +29,9 @@ std::vector<std::pair<std::string, Digest>> JobTasks::held_inputs(TaskIndex task
   const TaskKey key = graph_.key(task);
   if (num_held_ == 0 || key.kind != TaskKind::render || cuts_.contains(task)) return held;
   for (const TaskIndex input : graph_.inputs(key)) {
-    if (const BlobRef* state = held_state(input)) held.emplace_back(maker(input), state->digest);
+    const BlobRef* const state = held_state(input);
+    if (state != nullptr && graph_.takes(key, graph_.key(input), *state))
+      held.emplace_back(maker(input), state->digest);
   }
   return held;
 }
@@ -77,7 +80,7 @@ void JobTasks::share_inputs(TaskIndex task, const std::string& worker, BlobRefer
 
 std::optional<TaskIndex> JobTasks::publish(const PublishedState& state, const std::string& worker,
                                            BlobReferences& blobs) {
-  if (state.held.frame < 0 || state.held.frame >= graph_.num_frames()) return std::nullopt;
+  if (state.held.frame < 0 || state.held.frame >= graph_.num_steps()) return std::nullopt;
   const auto task =
       graph_.find({TaskKind::render, graph_.run_of(state.held.frame), state.held.tile});
   const BlobRef* held = task ? held_state(*task) : nullptr;

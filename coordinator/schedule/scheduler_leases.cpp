@@ -295,12 +295,12 @@ bool Scheduler::grant_one(const std::string& worker, TimePoint now, Actions& act
   return false;
 }
 
-/// The last run of which a task may be granted: no frame is rendered far ahead of the first open
-/// one.
+/// The last run of which a task may be granted: nothing is rendered far ahead of the first open
+/// step.
 std::int32_t Scheduler::last_run(const Job& job) const {
   const JobGraph& graph = job.tasks.graph();
   return graph.run_of(
-      std::min(job.tasks.first_open_frame() + job.max_frames_ahead, graph.num_frames()) - 1);
+      std::min(job.tasks.first_open_step() + job.max_frames_ahead, graph.num_steps()) - 1);
 }
 
 /// Whether the worker may try the task now, could it read its inputs.

@@ -4,10 +4,12 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <map>
 #include <tuple>
 
 #include "common/base/files.h"
 #include "common/job/sequence.h"
+#include "coordinator/schedule/job_graph.h"
 
 namespace baton {
 namespace {
@@ -65,12 +67,41 @@ std::string diagnostics_lines(std::vector<FrameStats> stats,
   return text;
 }
 
+namespace {
+
+/// What the tiles did in these frames, over all sweeps.
+Result<std::vector<FrameStats>> stats_of(Journal& journal, const Digest& digest, const JobSpec& job,
+                                         const JobGraph& graph, const FrameSpan& frames) {
+  std::map<std::pair<std::int32_t, std::int32_t>, FrameStats> sums;  // by frame and tile
+  for (std::int32_t sweep = 0; sweep < job.quality.sweeps; ++sweep) {
+    const std::int32_t first = sweep * graph.num_frames() + frames.first;
+    const std::int32_t last = sweep * graph.num_frames() + frames.last;
+    for (std::int32_t run = graph.run_of(first); run <= graph.run_of(last); ++run) {
+      BATON_ASSIGN(const std::vector<FrameStats> all,
+                   journal.frame_stats(digest, TaskKind::render, run));
+      for (FrameStats stats : all) {
+        if (stats.frame < first || stats.frame > last) continue;
+        stats.frame = frame_of_step(job, stats.frame);
+        const auto [sum, is_new] = sums.try_emplace({stats.frame, stats.tile}, stats);
+        if (!is_new) sum->second.merge(stats);
+      }
+    }
+  }
+  std::vector<FrameStats> result;
+  for (const auto& [place, stats] : sums) result.push_back(stats);
+  return result;
+}
+
+}  // namespace
+
 Status write_diagnostics(Journal& journal, const Digest& digest, const JobSpec& job) {
   // Run by run: the rows of all tiles of a long job need not be in memory at once, their text may.
   std::string text;
-  const std::int32_t count = num_runs(job);
-  for (std::int32_t run = 0; run < count; ++run) {
-    BATON_ASSIGN(std::vector<FrameStats> stats, journal.frame_stats(digest, TaskKind::render, run));
+  const JobGraph graph(job);
+  for (std::int32_t run = 0; run < graph.num_runs(); ++run) {
+    const FrameSpan frames{graph.first_frame(run), graph.last_frame(run)};
+    if (frames.first >= graph.num_frames()) break;  // of a later sweep
+    BATON_ASSIGN(std::vector<FrameStats> stats, stats_of(journal, digest, job, graph, frames));
     std::map<std::int32_t, FrameQuality> qualities;
     for (const FrameStats& of_tile : stats) {
       if (qualities.contains(of_tile.frame)) continue;

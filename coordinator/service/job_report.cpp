@@ -145,7 +145,7 @@ LostFiles find_lost_files(const JobAdded& job, const BlobStore& store, FrameFile
       }
     }
     for (const BlobRef& blob : recorded.spare_blobs(task)) {
-      if (!blob.is_held() && !store.contains(blob.digest)) lost.spares.push_back(graph.key(task));
+      if (!blob.is_held() && !store.contains(blob.digest)) lost.spares.push_back(blob);
     }
   }
   for (TaskIndex frame = 0; frame < graph.num_frames(); ++frame) {

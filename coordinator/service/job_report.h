@@ -27,7 +27,7 @@ Result<Digest> choose_job(const std::vector<FoundJob>& found, const std::string&
 /// needed, and finished frames. Sizes are compared; the contents of frames only with `frames`.
 struct LostFiles {
   std::vector<TaskKey> tasks;             ///< that made them
-  std::vector<TaskKey> spares;            ///< that made older checkpoints, which nobody needs now
+  std::vector<BlobRef> spares;            ///< that nobody needs now (JobTasks::spare_blobs)
   std::vector<std::string> frames;        ///< the files of finished frames among them
   std::string first;                      ///< one of the files
   std::optional<std::string> unreadable;  ///< why it cannot be told now, of a file or folder

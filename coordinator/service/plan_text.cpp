@@ -55,8 +55,11 @@ std::string plan_text(const Scheduler::Job& job, const std::vector<std::string>&
   const bool some_work = kept.size() + left.size() > 0 && job.tasks.progress().tasks_done > 0;
   if (kept.empty() && reasons.empty() && !some_work) return {};
   for (const std::int32_t run : open.runs) {
-    for (std::int32_t frame = graph.first_frame(run); frame <= graph.last_frame(run); ++frame) {
-      if (job.tasks.status(frame) == TaskStatus::done) again.push_back(frame);
+    for (std::int32_t step = graph.first_frame(run); step <= graph.last_frame(run); ++step) {
+      const std::int32_t frame = frame_of_step(spec, step);
+      const bool is_written = job.tasks.status(frame) == TaskStatus::done;
+      if (is_written && std::find(again.begin(), again.end(), frame) == again.end())
+        again.push_back(frame);
     }
   }
 
@@ -66,8 +69,11 @@ std::string plan_text(const Scheduler::Job& job, const std::vector<std::string>&
     text += fmt::format("{} {} {}", frames_text(spec, left), are(left),
                         open.runs.empty() ? "put together from what is rendered" : "rendered");
     const std::int32_t first = open.runs.empty() ? 0 : graph.first_frame(*open.runs.begin());
+    if (const std::int32_t sweep = first / graph.num_frames(); sweep > 0)
+      text += fmt::format(" from sweep {} of {} on", sweep + 1, spec.quality.sweeps);
     if (graph.carries_state() && first > 0) {
-      text += fmt::format(", going on from the states of {}", frames_text(spec, {first - 1}));
+      text += fmt::format(", going on from the states of {}",
+                          frames_text(spec, {frame_of_step(spec, first - 1)}));
       if (open.cuts) text += fmt::format(", cut into tiles of {} pixels", spec.image.tile_size);
     } else if (graph.carries_state() && !open.runs.empty() && !kept.empty()) {
       text += ", from the first frame on";

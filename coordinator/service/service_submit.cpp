@@ -97,7 +97,11 @@ Neighbour look_at(const FormerJob& former, const Digest& job, const ParsedJobDoc
     if (!is_there && !is_open(status)) continue;
     other.written.push_back(wanted.job.frames[its]);
     differing.insert(picture.begin(), picture.end());
-    if (picture.empty() && comparison.are_equal(mine, its)) continue;
+    // More sweeps make a frame cleaner; what is not written may have had more.
+    const bool may_replace = !is_there || wanted.job.quality.sweeps > theirs.quality.sweeps;
+    const bool is_same =
+        may_replace ? comparison.are_alike(mine, its) : comparison.are_equal(mine, its);
+    if (picture.empty() && is_same) continue;
     if (picture.empty() && differing.size() < 3) differing.insert(comparison.difference(mine, its));
     if (!other.first_differing) other.first_differing = wanted.job.frames[its];
   }

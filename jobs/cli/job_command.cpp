@@ -6,6 +6,7 @@
 #include <optional>
 #include <thread>
 
+#include "common/base/limits.h"
 #include "common/job/frame_range.h"
 #include "common/job/job_json.h"
 #include "jobs/cli/commands.h"
@@ -30,6 +31,7 @@ struct JobOptions {
   double timeout_s = 0;           ///< of wait; 0: none
   bool restart = false;           ///< of submit
   std::optional<int> from_frame;  ///< of submit
+  int rounds = 0;                 ///< of refine; 0: as many as a sweep has
   bool all = false;               ///< of list
   bool all_ended = false;         ///< of delete
   bool json = false;
@@ -157,6 +159,38 @@ Result<ExitCode> retry(const JobOptions& options, RequestClient& client) {
   return ExitCode::ok;
 }
 
+/// Submits the job with more sweeps: those that it has stay, and frames become the mean of all.
+Result<ExitCode> refine(const JobOptions& options, RequestClient& client) {
+  BATON_ASSIGN(const JobDetail before, ask<JobDetail>(client, ShowJob{options.job}));
+  BATON_ASSIGN(const JobDocument document,
+               ask<JobDocument>(client, JobDocumentRequest{before.summary.job}));
+  BATON_ASSIGN(ParsedJobDocument parsed, parse_job_document(document.json));
+  QualitySpec& quality = parsed.job.quality;
+  const int rounds = options.rounds > 0 ? options.rounds : quality.rounds;
+  if (rounds % quality.rounds != 0) {
+    return Error{
+        ErrorKind::usage,
+        fmt::format("--rounds: expected a multiple of the job's quality.rounds, {}, got {}",
+                    quality.rounds, rounds)};
+  }
+  const std::int64_t sweeps = std::int64_t{quality.sweeps} + rounds / quality.rounds;
+  if (sweeps * quality.rounds > limits::kMaxRounds) {
+    return Error{ErrorKind::usage, fmt::format("--rounds: expected at most {} in all, got {}",
+                                               limits::kMaxRounds, sweeps * quality.rounds)};
+  }
+  quality.sweeps = static_cast<int>(sweeps);
+  quality.refinable = true;
+  BATON_ASSIGN(std::string wanted, make_job_document(parsed.job));
+  BATON_ASSIGN(const JobAccepted accepted, ask<JobAccepted>(client, SubmitJob{std::move(wanted)}));
+  if (options.json) {
+    fmt::print("{}\n", ordered_json{{"id", accepted.job.hex()}, {"plan", accepted.plan}}.dump(2));
+  } else {
+    fmt::print("{}\n", accepted.job.hex());
+    fmt::print(stderr, "{}", accepted.plan);
+  }
+  return ExitCode::ok;
+}
+
 Result<ExitCode> delete_jobs(const JobOptions& options, RequestClient& client) {
   if (options.job.empty() != options.all_ended)
     return Error{ErrorKind::usage, "name one job, or say --ended"};
@@ -222,6 +256,13 @@ void add_job_command(CLI::App& app, ExitCode& code) {
   add("resume", "Goes on with a paused job", "ID", change<ResumeJob>);
   add("cancel", "Ends a job; finished frames stay", "ID", change<CancelJob>);
   add("retry", "Goes on with a failed or cancelled job where it stopped", "ID", retry);
+  add("refine",
+      "Adds rounds to a job: its frames become the mean of those and of the new ones; prints the "
+      "new ID",
+      "ID", refine)
+      ->add_option("--rounds", options->rounds,
+                   "a multiple of the job's quality.rounds; default: as many")
+      ->check(CLI::Range(1, limits::kMaxRounds));
   CLI::App* remove =
       add("delete", "Forgets a job that has ended, and removes the states that it left", "",
           delete_jobs);

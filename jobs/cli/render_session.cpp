@@ -13,6 +13,7 @@
 #include "jobs/cli/frame_sheet.h"
 #include "jobs/cli/job_summary.h"
 #include "jobs/cli/progress.h"
+#include "jobs/cli/sweeps.h"
 #include "jobs/cli/text.h"
 
 namespace baton {
@@ -108,26 +109,37 @@ Result<std::optional<JobDetail>> RenderSession::follow(const Digest& job, FrameS
   }
 }
 
-Result<std::optional<JobStatus>> RenderSession::render(const JobSpec& job, bool restart,
-                                                       const std::function<bool()>& interrupted) {
-  const Clock::time_point start = Clock::now();
+/// Renders the job as it is.
+Result<std::optional<JobDetail>> RenderSession::render_sweeps(
+    const JobSpec& job, bool restart, FrameSheet& sheet, const std::function<bool()>& interrupted) {
   BATON_ASSIGN(std::string document, make_job_document(job));
   BATON_ASSIGN(
       const std::optional<JobAccepted> accepted,
       ask_farm<JobAccepted>(farm_, client_, signals_, SubmitJob{std::move(document), restart}));
-  if (!accepted) return std::optional<JobStatus>();
+  if (!accepted) return std::optional<JobDetail>();
   fmt::print(stderr, "{}", accepted->plan);
+  return follow(accepted->job, sheet, interrupted);
+}
 
-  FrameSheet sheet(job);
-  BATON_ASSIGN(const std::optional<JobDetail> detail, follow(accepted->job, sheet, interrupted));
-  if (!detail) return std::optional<JobStatus>();
+Result<std::optional<JobStatus>> RenderSession::render(JobSpec job, bool restart,
+                                                       const std::function<bool()>& interrupted) {
+  const Clock::time_point start = Clock::now();
+  MoreSweeps more(job, restart);
+  std::optional<FrameSheet> sheet;
+  std::optional<JobDetail> detail;
+  for (bool is_first = true;; is_first = false) {
+    sheet.emplace(job);
+    BATON_ASSIGN(detail, render_sweeps(job, restart && is_first, *sheet, interrupted));
+    if (!detail) return std::optional<JobStatus>();
+    if (detail->summary.status != JobStatus::done || !more.add_to(job)) break;
+  }
   const JobStatus status = detail->summary.status;
   if (options_.json) {
     fmt::print("{}\n", detail_json(*detail).dump(2));
   } else {
     print_result(job, *detail, std::chrono::duration<double>(Clock::now() - start).count());
   }
-  write_sheet(sheet, options_.exposure.value_or(0), options_.json);
+  write_sheet(*sheet, options_.exposure.value_or(0), options_.json);
   if (status == JobStatus::done) BATON_TRY(write_png_of(job));
   if (status == JobStatus::failed) print_failures(*detail);
   if (status == JobStatus::paused || detail->lacks_room)

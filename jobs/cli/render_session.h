@@ -47,12 +47,12 @@ class RenderSession {
                 RequestClient client)
       : options_(options), signals_(signals), farm_(std::move(farm)), client_(std::move(client)) {}
 
-  /// Renders a job whose motion and method are settled, shows how it gets on, and prints what came
-  /// of it. A job that the farm has goes on where it stopped. `interrupted` is asked now and then;
-  /// nullopt when it says so, or when the user asked to stop.
+  /// Renders a job whose motion and method are settled, with the sweeps that its quality asks for
+  /// (sweeps.h), shows how it gets on, and prints what came of it. A job that the farm has goes on
+  /// where it stopped. `interrupted` is asked now and then; nullopt when it says so, or when the
+  /// user asked to stop.
   Result<std::optional<JobStatus>> render(
-      const JobSpec& job, bool restart,
-      const std::function<bool()>& interrupted = [] { return false; });
+      JobSpec job, bool restart, const std::function<bool()>& interrupted = [] { return false; });
   /// Keeps the farm up until the user asks to stop. `meanwhile` is called now and then.
   Status keep_running(const std::function<void()>& meanwhile = [] {});
   /// As LocalFarm's.
@@ -60,6 +60,9 @@ class RenderSession {
   void stop() { farm_.stop(); }
 
  private:
+  Result<std::optional<JobDetail>> render_sweeps(const JobSpec& job, bool restart,
+                                                 class FrameSheet& sheet,
+                                                 const std::function<bool()>& interrupted);
   Result<std::optional<JobDetail>> follow(const Digest& job, class FrameSheet& sheet,
                                           const std::function<bool()>& interrupted);
   Status write_png_of(const JobSpec& job) const;

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <limits>
+#include <map>
 #include <memory>
 #include <vector>
 
@@ -33,6 +34,7 @@ inline std::vector<FilmTile> render_tiled(JobSpec job, int tile_size, int run_le
   std::vector<FilmTile> images(job.frames.size());
   const TileGrid grid(job.image);
   std::vector<StatePtr> states(static_cast<std::size_t>(grid.count()));
+  std::map<std::pair<std::int32_t, std::int32_t>, FilmTile> films;  // of all sweeps
   for (std::int32_t run = 0; run < num_runs(job); ++run) {
     std::vector<StatePtr> next(states.size());
     for (std::int32_t tile = 0; tile < grid.count(); ++tile) {
@@ -42,8 +44,9 @@ inline std::vector<FilmTile> render_tiled(JobSpec job, int tile_size, int run_le
           previous.push_back(states[static_cast<std::size_t>(near)]);
       }
       const TileRunSink sink{
-          [&](int frame, const FilmTile& film) {
-            FilmTile& image = images[static_cast<std::size_t>(frame)];
+          [&](std::int32_t step, const FilmTile& film) {
+            films[{step, tile}] = film;
+            FilmTile& image = images[static_cast<std::size_t>(frame_of_step(job, step))];
             image.rect = {0, 0, job.image.width, job.image.height};
             image.channels = film.channels;
             image.values.resize(image.channels.size() * image.num_pixels());
@@ -61,6 +64,11 @@ inline std::vector<FilmTile> render_tiled(JobSpec job, int tile_size, int run_le
             next[static_cast<std::size_t>(tile)] =
                 std::make_shared<const SampleState>(*decode_state(encode_state(s), "test"));
             return Status();
+          },
+          {},
+          {},
+          [&](std::int32_t step) -> Result<FilmTile> {
+            return films.at({step, tile});
           }};
       const auto done = run_tile(**context, tile_run(job, tile, run), previous, sink, {});
       EXPECT_TRUE(done.ok()) << (done.ok() ? "" : done.error().message);

@@ -3,12 +3,13 @@
 #include <algorithm>
 
 #include "common/job/motion.h"
+#include "common/job/sequence.h"
 
 namespace baton {
 
 Result<std::shared_ptr<const FrameGeometry>> GeometrySequence::at(std::int32_t index) {
   // A job in which nothing moves has one frame for all.
-  const std::int32_t name = moves(job_) ? index : 0;
+  const std::int32_t name = moves(job_) ? frame_of_step(job_, index) : 0;
   const std::lock_guard lock(placing_);
   if (auto found = frames_.find(name)) return found;
 

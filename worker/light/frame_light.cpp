@@ -113,7 +113,7 @@ Result<std::shared_ptr<const FrameLight>> LightSequence::at(std::int32_t index,
         {index, round},
         std::make_shared<const PresampledLight>(presample_light(
             light->now, light->before, job_.seed, static_cast<std::uint32_t>(frame.number),
-            presampled_layout(job_), round)));
+            presampled_layout(job_), frame.first_round + round)));
   }
   return std::shared_ptr<const FrameLight>(std::move(light));
 }

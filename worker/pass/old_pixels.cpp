@@ -3,12 +3,19 @@
 #include <algorithm>
 
 #include "worker/method/populations.h"
+#include "worker/pass/render_context.h"
 
 namespace baton {
 
 OldPixels::OldPixels(const RenderContext& context, const FrameGeometry& before,
                      std::span<const StatePtr> states)
-    : job_(context.job), before_(before), states_(states) {
+    : job_(context.job),
+      before_(before),
+      states_(states),
+      round_(
+          states.empty()
+              ? 0
+              : context.frames[static_cast<std::size_t>(states.front()->frame_index)].first_round) {
   for (const StatePtr& state : states)
     kept_.push_back(context.surfaces->find({state->frame_index, state->tile}));
 }
@@ -26,7 +33,7 @@ std::optional<OldPixels::Place> OldPixels::ask(std::int32_t x, std::int32_t y) {
   const TileSurfaces* const kept = kept_[static_cast<std::size_t>(found - states_.begin())].get();
   if (kept != nullptr) return Place{&state, index, kept};
   const Place place{&state, index, nullptr, rays_.size()};
-  append_primary_rays(job_, before_, x, y, rays_);
+  append_primary_rays(job_, before_, x, y, rays_, round_);
   return place;
 }
 

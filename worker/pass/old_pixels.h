@@ -49,6 +49,7 @@ class OldPixels {
   const JobSpec& job_;
   const FrameGeometry& before_;
   std::span<const StatePtr> states_;
+  const std::int32_t round_;                               ///< whose sites carry them
   std::vector<std::shared_ptr<const TileSurfaces>> kept_;  ///< (states)
   std::vector<Ray> rays_;
   std::vector<SurfaceHit> hits_;

@@ -91,7 +91,7 @@ std::optional<Reprojection::Position> Reprojection::find_source(std::span<const 
 }
 
 void Reprojection::look_up(const TileSurfaces& surfaces, std::size_t first, std::size_t count,
-                           std::int32_t frame) {
+                           const FrameSpec& frame) {
   const JobSpec& job = context_.job;
   slots_.assign(count, {});
   old_pixels_.clear();
@@ -102,7 +102,8 @@ void Reprojection::look_up(const TileSurfaces& surfaces, std::size_t first, std:
                          surfaces.rect.y0 + static_cast<std::int32_t>((first + i) / width)};
     Slot& slot = slots_[i];
     slot.hits = surfaces.pixel(first + i);
-    slot.key = pixel_key(job.seed, frame, job.image.width, pixel.x, pixel.y);
+    slot.key =
+        pixel_key(job.seed, frame.number, job.image.width, pixel.x, pixel.y, frame.first_round);
     const std::optional<Position> source =
         find_source(slot.hits, pixel, Rng(slot.key, PassId::reproject));
     if (!source) continue;

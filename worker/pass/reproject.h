@@ -35,7 +35,7 @@ class Reprojection {
   /// Looks for the history of `count` pixels of `surfaces` from `first` on. frame: the user's
   /// number.
   void look_up(const TileSurfaces& surfaces, std::size_t first, std::size_t count,
-               std::int32_t frame);
+               const FrameSpec& frame);
   /// Copies the samples that pixel first + i of the last look_up takes over to pixel `pixel` of
   /// `state`. `old` is filled for `moved`.
   PixelHistory take(std::size_t i, std::size_t pixel, SampleState& state, OldSurfaces& old) const;

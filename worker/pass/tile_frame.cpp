@@ -28,7 +28,7 @@ struct TileFrameRenderer::Batch {
   std::size_t first = 0;
   std::size_t count = 0;
   std::int32_t frame_number = 0;
-  std::int32_t round = 0;
+  std::int32_t round = 0, round_of_frame = 0;
   std::int32_t step = 0;
   RayBatch rays;
   std::array<std::size_t, kBatchPixels> end_ray;  ///< where each pixel's rays end
@@ -45,7 +45,7 @@ struct TileFrameRenderer::Batch {
   }
   RngKey key(const RenderContext& context, const PixelRect& rect, std::size_t index) const {
     const auto [x, y] = place(rect, index);
-    return pixel_key(context.job.seed, frame_number, context.job.image.width, x, y, round);
+    return pixel_key(context.job.seed, frame_number, context.job.image.width, x, y, round_of_frame);
   }
   bool is_probe(const RenderContext& context, const PixelRect& rect, std::size_t index) const {
     const auto [x, y] = place(rect, index);
@@ -82,6 +82,7 @@ void TileFrameRenderer::render_batches(const TileRound& at, SampleState& state, 
   Batch batch;
   batch.frame_number = at.frame.number;
   batch.round = at.round;
+  batch.round_of_frame = at.round_of_frame();
   batch.step = at.step(context_.job.quality.rounds);
   round_sampling_ = {};
   const std::size_t num_pixels = state.num_pixels();
@@ -93,7 +94,7 @@ void TileFrameRenderer::render_batches(const TileRound& at, SampleState& state, 
     batch.pixels.fill({});
     if (reprojection_ != nullptr) {
       const StageTimer timer(stages_.reproject);
-      reprojection_->look_up(at.surfaces, batch.first, batch.count, at.frame.number);
+      reprojection_->look_up(at.surfaces, batch.first, batch.count, at.frame);
     }
     sample(batch, at, state);
     trace(batch);

@@ -18,7 +18,7 @@ namespace baton {
 /// One pass over a tile.
 struct TileRound {
   const FrameSpec& frame;
-  std::int32_t round = 0;  ///< of the frame; negative: before those that are seen
+  std::int32_t round = 0;  ///< of the step; negative: before those that are seen
   const FrameLight& light;
   const TileSurfaces& surfaces;  ///< what its sites see
   /// The light that probes are sampled again with; null: there are none.
@@ -26,6 +26,8 @@ struct TileRound {
 
   /// Number of the pass in the sequence: to a method a round is a frame of standing light.
   std::int32_t step(std::int32_t num_rounds) const { return frame.index * num_rounds + round; }
+  /// Of the frame, over all sweeps: the address of its random numbers.
+  std::int32_t round_of_frame() const { return frame.first_round + round; }
 };
 
 /// Renders a round of one tile: look ahead, sample, trace, learn, film, a batch of pixels at a time

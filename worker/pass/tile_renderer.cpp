@@ -9,6 +9,7 @@
 
 #include "common/job/motion.h"
 #include "worker/pass/cpu_clock.h"
+#include "worker/pass/sweep_mean.h"
 #include "worker/pass/tile_frame.h"
 
 namespace baton {
@@ -87,7 +88,7 @@ class TileWalk {
     for (std::int32_t round = first; round < context_.job.quality.rounds; ++round) {
       if (stop_.stop_requested()) return Error{ErrorKind::cancelled, "stopped"};
       BATON_ASSIGN(const std::shared_ptr<const FrameLight> light, light_of(frame, round));
-      const std::shared_ptr<const TileSurfaces> surfaces = surfaces_of(round);
+      const std::shared_ptr<const TileSurfaces> surfaces = surfaces_of(frame.first_round + round);
       const TileRound at{frame, round, *light, *surfaces, round < 0 ? nullptr : probe_light.get()};
       RoundMean& mean = round < 0 ? *unseen : film;
       if (shares_ && round == first) {
@@ -143,7 +144,7 @@ class TileWalk {
     const CpuTimer timer(stats_.seconds_light);
     return context_.lights->at(frame.index, round);
   }
-  /// What the sites of a round see: traced, or kept from a frame before.
+  /// What the sites of a round of all sweeps see: traced, or kept from a frame before.
   std::shared_ptr<const TileSurfaces> surfaces_of(std::int32_t round) {
     const std::int32_t of = rounds_have_own_sites(context_.job) ? std::max(round, 0) : 0;
     if (const auto found = kept_.find(of); found != kept_.end()) return found->second;
@@ -185,7 +186,12 @@ Result<RenderStats> run_tile(const RenderContext& context, const TileRun& run,
   for (std::int32_t f = run.first_frame; f <= run.last_frame; ++f) {
     if (stop.stop_requested()) return Error{ErrorKind::cancelled, "stopped"};
     const FrameSpec& frame = context.frames[static_cast<std::size_t>(f)];
-    BATON_ASSIGN(const FilmTile film, walk.render(frame, previous));
+    BATON_ASSIGN(FilmTile film, walk.render(frame, previous));
+    if (const std::int32_t sweep = frame.first_round / context.job.quality.rounds; sweep > 0) {
+      const auto num_frames = static_cast<std::int32_t>(context.job.frames.size());
+      BATON_ASSIGN(const FilmTile earlier, sink.earlier_film(f - num_frames));
+      BATON_TRY(add_sweeps(earlier, sweep, film));
+    }
     BATON_TRY(sink.film(f, film));
     if (sink.diagnostics) sink.diagnostics({f, run.tile, walk.frame_sampling()});
     if (context.job.visibility.correlated) BATON_TRY(sink.samples(walk.take_first_pass()));

@@ -34,24 +34,28 @@ Result<std::shared_ptr<const RenderContext>> make_render_context(
     const JobSpec& job, const Digest& picture, const std::shared_ptr<const SharedAssets>& assets,
     const MemoryBudget& memory = MemoryBudget::of_machine());
 
-/// Where the finished frames of a tile run go, in frame order. Called on the rendering thread.
+/// Where the films of a tile run go, step by step. Called on the rendering thread.
 struct TileRunSink {
-  std::function<Status(int frame_index, const FilmTile& film)> film;
+  /// film: the mean of this sweep and all before it.
+  std::function<Status(std::int32_t step, const FilmTile& film)> film;
   /// Called for the last frame of the run when the job carries state.
   std::function<Status(SampleState state)> state = {};
   /// Called after each film with what the sampler did; may be empty.
   std::function<void(const FrameStats& stats)> diagnostics = {};
   /// Called after each film when the job has a second pass.
   std::function<Status(FirstPassSamples samples)> samples = {};
+  /// Where films of an earlier sweep come from; called for the steps of later ones.
+  std::function<Result<FilmTile>(std::int32_t step)> earlier_film = {};
 };
 
 using StatePtr = std::shared_ptr<const SampleState>;
 
-/// Renders one tile for the frames of `run`. previous: the states of frame run.first_frame - 1 of
+/// Renders one tile for the steps of `run`. previous: the states of step run.first_frame - 1 of
 /// all tiles within history_reach_px (TileGrid::tiles_near, in that order; the tile's own where
 /// pixels keep to themselves), required exactly when the job carries state and the run is not the
-/// first. The bytes that reach the sink are a function of (job, run, previous) alone. Errors: a
-/// state of another picture, tile or frame; cancelled when `stop` is requested; the sink's own.
+/// first. The bytes that reach the sink are a function of (job, run, previous, earlier films)
+/// alone. Errors: a state of another picture, tile or step; a film of another tile; cancelled when
+/// `stop` is requested; the sink's own.
 Result<RenderStats> run_tile(const RenderContext& context, const TileRun& run,
                              std::span<const StatePtr> previous, const TileRunSink& sink,
                              const std::stop_token& stop);

@@ -40,9 +40,10 @@ Result<std::vector<StatePtr>> read_states(const LoadedJob& loaded, const BlobSto
                                           const std::vector<BlobRef>& inputs) {
   std::vector<StatePtr> states;
   for (const BlobRef& input : inputs) {
+    if (input.kind == BlobKind::film) continue;  // of an earlier sweep: read when it is its turn
     if (input.kind != BlobKind::state) {
       return Error{ErrorKind::bad_input,
-                   fmt::format("{}: a render task takes states", blob_name(input))};
+                   fmt::format("{}: a render task takes states and films", blob_name(input))};
     }
     StatePtr state = loaded.states->find(input);
     if (state == nullptr && input.is_held())
@@ -97,12 +98,10 @@ Result<TaskOutput> execute_render(const LoadedJob& loaded, BlobStore& store, con
                                   std::vector<BlobRef>* left) {
   const FrameSpan& frames = grant.frames;
   // Check what came over the wire against the job.
-  const auto num_frames = static_cast<std::int32_t>(loaded.job.frames.size());
-  if (frames.first < 0 || frames.last < frames.first || frames.last >= num_frames ||
+  if (frames.first < 0 || frames.last < frames.first || frames.last >= num_steps(loaded.job) ||
       task.tile < 0 || task.tile >= TileGrid(loaded.job.image).count()) {
-    return Error{ErrorKind::bad_input,
-                 fmt::format("the job has no tile {} in frame indices {} to {}", task.tile,
-                             frames.first, frames.last)};
+    return Error{ErrorKind::bad_input, fmt::format("the job has no tile {} in steps {} to {}",
+                                                   task.tile, frames.first, frames.last)};
   }
   double seconds_read = 0;
   std::vector<StatePtr> previous;
@@ -124,8 +123,8 @@ Result<TaskOutput> execute_render(const LoadedJob& loaded, BlobStore& store, con
   };
   const TileRunSink sink{
       .film =
-          [&](int frame, const FilmTile& film) {
-            return keep(BlobKind::film, frame, encode_film_tile(film, {loaded.picture, frame}));
+          [&](std::int32_t step, const FilmTile& film) {
+            return keep(BlobKind::film, step, encode_film_tile(film, {loaded.picture, step}));
           },
       .state = [&](SampleState state) -> Status {
         const CpuTimer timer(seconds_state);
@@ -134,6 +133,14 @@ Result<TaskOutput> execute_render(const LoadedJob& loaded, BlobStore& store, con
       .diagnostics = [&](const FrameStats& stats) { output.frames.push_back(stats); },
       .samples = [&](const FirstPassSamples& samples) -> Status {
         return keep(BlobKind::first_pass, samples.frame_index, encode_first_pass_samples(samples));
+      },
+      .earlier_film = [&](std::int32_t step) -> Result<FilmTile> {
+        for (const BlobRef& input : grant.inputs) {
+          if (input.kind == BlobKind::film && input.frame == step && input.tile == task.tile)
+            return read_film(loaded, store, input, FilmPass::first);
+        }
+        return Error{ErrorKind::bad_input,
+                     fmt::format("the task lacks the film of step {} tile {}", step, task.tile)};
       }};
   const TileRun run{task.tile, task.step, frames.first, frames.last};
   Result<RenderStats> stats = run_tile(*loaded.context, run, previous, sink, stop);
@@ -192,14 +199,15 @@ Result<TaskOutput> execute_assemble(const LoadedJob& loaded, const BlobStore& st
                              num_frames, inputs.size(), grid.count())};
   }
 
-  // Paste every tile once.
+  // Paste every tile of the last sweep once.
+  const std::int32_t step = num_steps(loaded.job) - num_frames + task.step;
   FilmTile image;
   std::vector<bool> pasted(inputs.size(), false);
   for (const BlobRef& input : inputs) {
     if (stop.stop_requested()) return Error{ErrorKind::cancelled, "stopped while assembling"};
     const FilmPass pass = loaded.job.visibility.correlated ? FilmPass::second : FilmPass::first;
     BATON_ASSIGN(const FilmTile film, read_film(loaded, store, input, pass));
-    const bool fits = input.kind == BlobKind::film && input.frame == task.step && input.tile >= 0 &&
+    const bool fits = input.kind == BlobKind::film && input.frame == step && input.tile >= 0 &&
                       input.tile < grid.count() && film.rect == grid.rect(input.tile) &&
                       !pasted[static_cast<std::size_t>(input.tile)];
     if (!fits) {

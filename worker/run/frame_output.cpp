@@ -105,7 +105,7 @@ Status paste_tile(const FilmTile& tile, FilmTile& image) {
 }
 
 ImageMetadata frame_metadata(const JobSpec& job, const Digest& job_digest, int frame_number,
-                             const FrameQuality& quality) {
+                             const FrameQuality& quality, float cycles_noise) {
   ImageMetadata metadata{{"baton:version", kVersion},
                          {"baton:jobName", job.name},
                          {"baton:jobDigest", job_digest.hex()},
@@ -119,7 +119,7 @@ ImageMetadata frame_metadata(const JobSpec& job, const Digest& job_digest, int f
   add("baton:numCandidates", sampling.num_candidates);
   add("baton:seed", job.seed);
   add("baton:sites", job.image.sites);
-  add("baton:rounds", job.quality.rounds);
+  add("baton:rounds", std::int64_t{job.quality.rounds} * job.quality.sweeps);
   const EnvironmentSpec& environment = job.environment;
   const EnvironmentFrame light = environment_at(environment, frame_number);
   add("baton:map", environment.keys.at(static_cast<std::size_t>(light.map_a)).map);
@@ -132,6 +132,8 @@ ImageMetadata frame_metadata(const JobSpec& job, const Digest& job_digest, int f
     metadata.emplace_back("baton:noise", fmt::format("{:.4g}", quality.noise));
     add("baton:noiseFrom", noise_source_name(quality.noise_source));
   }
+  if (cycles_noise > 0)
+    metadata.emplace_back("baton:cyclesNoise", fmt::format("{:.4g}", cycles_noise));
   add("baton:pixelsBelowZero", quality.pixels_below_zero);
   add("baton:clampNegative", quality.clamped);
   if (quality.pixels_not_finite > 0) add("baton:pixelsNotFinite", quality.pixels_not_finite);
@@ -143,6 +145,7 @@ ImageMetadata frame_metadata(const JobSpec& job, const Digest& job_digest, int f
 Result<WrittenFrame> write_frame(const JobSpec& job, const Digest& job_digest,
                                  std::int32_t frame_index, FilmTile image) {
   FrameQuality quality = judge_frame(image);
+  const float noise = cycles_noise(image);
   quality.clamped = job.output.clamp_negative;
   if (job.output.clamp_negative) clamp_negative(image);
   drop_channel(image, kErrorChannel);
@@ -155,7 +158,7 @@ Result<WrittenFrame> write_frame(const JobSpec& job, const Digest& job_digest,
                           {.half_float = job.output.pixel_type == PixelType::half_float,
                            .float_colors = quality.pixels_beyond_half > 0,
                            .compression = job.output.compression,
-                           .metadata = frame_metadata(job, job_digest, number, quality),
+                           .metadata = frame_metadata(job, job_digest, number, quality, noise),
                            .world_to_camera = camera.world_to_camera(),
                            .world_to_ndc = camera.world_to_ndc(job.image.rendered()),
                            .frames_per_second = job.output.frames_per_second}));

@@ -45,8 +45,8 @@ Result<WrittenFrame> write_frame(const JobSpec& job, const Digest& job_digest,
 Status verify_frame(const std::filesystem::path& path, const FilmTile& image, std::int32_t block);
 
 /// The header attributes that Baton adds to its pictures: what they are made from, what was seen of
-/// them, and the job's own metadata as baton:metadata:NAME.
+/// them, and the job's own metadata as baton:metadata:NAME. cycles_noise: 0 where it is not told.
 ImageMetadata frame_metadata(const JobSpec& job, const Digest& job_digest, int frame_number,
-                             const FrameQuality& quality);
+                             const FrameQuality& quality, float cycles_noise = 0);
 
 }  // namespace baton

@@ -110,7 +110,8 @@ class LocalRender {
   /// be two runs ahead.
   struct Chain {
     std::int32_t runs_done = 0;
-    std::array<StatePtr, 2> states;  ///< by run % 2
+    std::array<StatePtr, 2> states;          ///< by run % 2
+    std::map<std::int32_t, FilmTile> films;  ///< of a sweep that is not the last, by step
   };
 
   Chain& chain(std::int32_t tile) { return chains_[static_cast<std::size_t>(tile)]; }
@@ -151,7 +152,15 @@ class LocalRender {
       second.merge(stats);
       return {};
     };
-    const TileRunSink sink{.film = [&](int frame, const FilmTile& film) -> Status {
+    // Only who renders the tile touches its films.
+    std::map<std::int32_t, FilmTile>& films = chain(run.tile).films;
+    const std::int32_t last_sweep = num_steps(job_) - static_cast<std::int32_t>(job_.frames.size());
+    const TileRunSink sink{.film = [&](std::int32_t step, const FilmTile& film) -> Status {
+                             if (step < last_sweep) {
+                               films.emplace(step, film);
+                               return {};
+                             }
+                             const std::int32_t frame = step - last_sweep;
                              if (!job_.visibility.correlated) return add(frame, film, nullptr);
                              first_film = film;
                              return {};
@@ -167,7 +176,10 @@ class LocalRender {
                                  return add(
                                      frame, std::move(first_film),
                                      std::make_shared<const FirstPassSamples>(std::move(samples)));
-                               }};
+                               },
+                           .earlier_film = [&](std::int32_t step) -> Result<FilmTile> {
+                             return std::move(films.extract(step).mapped());
+                           }};
     BATON_ASSIGN(RenderStats stats, run_tile(context_, run, previous, sink, stop));
     stats.merge(second);
     return stats;

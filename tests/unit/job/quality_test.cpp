@@ -1,6 +1,7 @@
 #include <gtest/gtest.h>
 
 #include "common/job/job_json.h"
+#include "common/job/next_sweeps.h"
 #include "common/job/picture.h"
 
 namespace baton {
@@ -27,6 +28,45 @@ TEST(Quality, RoundsGoWithNeitherASecondPassNorAuto) {
             "second pass takes one round, got true");
 }
 
+TEST(Quality, SweepsAreBoundedAndNoiseMustBeKnown) {
+  EXPECT_EQ(faults(R"("quality": {"sweeps": 3, "noiseThreshold": 0.01, "maxRounds": 64})"), "");
+  EXPECT_EQ(faults(R"("quality": {"rounds": 256, "sweeps": 257})"),
+            "job.json: $.quality.sweeps: expected at most 65536 rounds in all sweeps, got 65792");
+  EXPECT_EQ(faults(R"("quality": {"rounds": 16, "maxRounds": 8})"),
+            "job.json: $.quality.maxRounds: expected 0, or at least quality.rounds, 16, got 8");
+  EXPECT_EQ(faults(R"("quality": {"sweeps": 2}, "sampling": {"method": "auto"})"),
+            "job.json: $.quality.sweeps: expected 1, as sampling.method is auto, which chooses for "
+            "one, got 2");
+  EXPECT_EQ(faults(R"("quality": {"timeLimit": 9}, "sampling": {"method": "mis"},
+                      "visibility": {"correlated": true})"),
+            "job.json: $.visibility.correlated: expected false, as quality asks for sweeps, and "
+            "the frames of a second pass have no mean, got true");
+  EXPECT_EQ(faults(R"("quality": {"noiseThreshold": 0.5}, "sampling": {"method": "sequential"})"),
+            "job.json: $.quality: expected no noiseThreshold, as the noise of sequential is not "
+            "known where it carries samples, got 0.5");
+}
+
+TEST(Quality, SweepsAreDoubledUntilNoiseTimeOrRoundsEndThem) {
+  QualitySpec quality{.rounds = 4, .sweeps = 2, .max_rounds = 40};
+  EXPECT_EQ(next_sweeps(quality, 0.1f, 1, 2), 4);
+  quality.sweeps = 8;
+  EXPECT_EQ(next_sweeps(quality, 0.1f, 1, 2), 10) << "40 rounds";
+  quality.sweeps = 10;
+  EXPECT_EQ(next_sweeps(quality, 0.1f, 1, 2), 10);
+
+  quality = {.rounds = 4, .sweeps = 4, .noise_threshold = 0.05f};
+  EXPECT_EQ(next_sweeps(quality, 0.06f, 1, 4), 6) << "4 (6 / 5)^2 = 5.76";
+  EXPECT_EQ(next_sweeps(quality, 0.2f, 1, 4), 8);
+  EXPECT_EQ(next_sweeps(quality, 0.05f, 1, 4), 4);
+  EXPECT_EQ(next_sweeps(quality, 0, 1, 4), 8) << "not known";
+
+  quality = {.rounds = 1, .sweeps = 4, .time_limit = 10.0f};
+  EXPECT_EQ(next_sweeps(quality, 0, 4, 4), 8);
+  EXPECT_EQ(next_sweeps(quality, 0, 8, 4), 5) << "a sweep takes 2 s";
+  EXPECT_EQ(next_sweeps(quality, 0, 9, 4), 4);
+  EXPECT_EQ(next_sweeps(quality, 0, 30, 4), 4) << "never fewer";
+}
+
 TEST(Quality, RoundsAndPrerollChangeThePicture) {
   const auto differences = [](const auto& change) {
     ParsedJobDocument a{.job = {}, .assets = {}, .digest = {}, .picture = {}};
@@ -37,6 +77,8 @@ TEST(Quality, RoundsAndPrerollChangeThePicture) {
   };
   EXPECT_EQ(differences([](JobSpec& job) { job.state.preroll = 1; }),
             std::vector{std::string("$.state.preroll")});
+  EXPECT_TRUE(differences([](JobSpec& job) { job.quality.sweeps = 2; }).empty());
+  EXPECT_TRUE(differences([](JobSpec& job) { job.quality.noise_threshold = 2.0f; }).empty());
   EXPECT_EQ(differences([](JobSpec& job) { job.quality.rounds = 2; }),
             std::vector{std::string("$.quality.rounds")});
   EXPECT_TRUE(differences([](JobSpec& job) { job.state.checkpoint_every = 3; }).empty());

@@ -65,5 +65,25 @@ TEST(Runs, LeadingOnesComeBeforeTheRegularOnes) {
   EXPECT_EQ(tile_run(job, 0, 1).last_frame, 6);
 }
 
+// Runs end with their sweep; the frames before stay as they were when there are more sweeps.
+TEST(Runs, EachSweepHasTheSame) {
+  JobSpec job;
+  job.frames = {3, 4, 5, 6, 8};
+  job.state.checkpoint_every = 2;
+  job.quality = {.rounds = 4, .sweeps = 3};
+  EXPECT_EQ(num_steps(job), 15);
+  EXPECT_EQ(run_starts(job), (std::vector<std::int32_t>{0, 2, 4, 5, 7, 9, 10, 12, 14}));
+  EXPECT_EQ(num_runs(job), 9);
+  EXPECT_EQ(tile_run(job, 0, 2).last_frame, 4);
+  job.leading_runs = {0, 1};
+  EXPECT_EQ(run_starts(job), (std::vector<std::int32_t>{0, 1, 2, 4, 5, 7, 9, 10, 12, 14}));
+
+  const std::vector<FrameSpec> steps = expand_sequence(job);
+  EXPECT_EQ(steps[8].index, 8);
+  EXPECT_EQ(steps[8].number, 6);
+  EXPECT_EQ(steps[8].first_round, 4);
+  EXPECT_EQ(frame_of_step(job, 8), 3);
+}
+
 }  // namespace
 }  // namespace baton

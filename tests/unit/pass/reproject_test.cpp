@@ -71,7 +71,7 @@ class Follower {
   void follow() {
     Reprojection reprojection(*context_, *now_, *before_, states_);
     const std::size_t num_pixels = states_[0]->num_pixels();
-    reprojection.look_up(surfaces_, 0, num_pixels, 2);
+    reprojection.look_up(surfaces_, 0, num_pixels, context_->frames[1]);
     found_.resize(num_pixels);
     SampleState state;
     state.resize(states_[0]->rect, 16);

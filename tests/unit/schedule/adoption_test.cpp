@@ -111,6 +111,40 @@ JobSpec with_frames(JobSpec job, int first, int last) {
   return job;
 }
 
+// Frames of four in runs of two: the second sweep has runs 2 and 3.
+TEST(Adoption, MoreSweepsGoOnFromThoseThatAreDone) {
+  for (const JobSpec& job : {small_job(3, 4, 2), small_job(3, 4, 2, false), moving_job(3, 2, 3)}) {
+    Shop shop;
+    shop.work(with_sweeps(job, 1));
+    auto tasks = shop.work(with_sweeps(job, 2));
+    EXPECT_EQ(rendered_runs(tasks), (std::set<int>{2, 3}));
+    EXPECT_EQ(written_frames(tasks).size(), job.frames.size());
+    // The same job again has nothing to do; a third sweep goes on from the second.
+    EXPECT_THAT(shop.work(with_sweeps(job, 2)), IsEmpty());
+    tasks = shop.work(with_sweeps(job, 3));
+    EXPECT_EQ(rendered_runs(tasks), (std::set<int>{4, 5}));
+  }
+}
+
+TEST(Adoption, AJobThatIsChangedInItsSecondSweepKeepsTheFirst) {
+  Shop shop;
+  shop.work(with_sweeps(small_job(3, 4, 2), 2), 8);  // six tasks are the first sweep
+  const auto tasks = shop.work(with_sweeps(small_job(3, 4, 2), 4));
+  EXPECT_EQ(rendered_runs(tasks), (std::set<int>{2, 3, 4, 5, 6, 7}));
+  EXPECT_EQ(std::count_if(tasks.begin(), tasks.end(),
+                          [](const TaskKey& t) { return t.kind == TaskKind::render; }),
+            18 - 2);
+}
+
+// What another sweep of more frames starts from is the state of another frame.
+TEST(Adoption, OtherFramesKeepTheFirstSweepAlone) {
+  Shop shop;
+  shop.work(with_sweeps(small_job(3, 4, 2), 2));
+  const auto tasks = shop.work(with_sweeps(small_job(3, 6, 2), 2));
+  EXPECT_EQ(rendered_runs(tasks), (std::set<int>{2, 3, 4, 5}));
+  EXPECT_EQ(written_frames(tasks).size(), 6u);
+}
+
 TEST(Adoption, MoreFramesGoOnFromTheLastStatesInMotion) {
   Shop shop;
   shop.work(moving_job(3, 8, 3));

@@ -118,7 +118,7 @@ void ChaosFarm::add_job() {
     });
     if (lost || lost_frames_.erase(done.task) > 0) added.lost.push_back(done.task);
     for (const BlobRef& spare : tasks.spare_blobs(*graph_.find(done.task))) {
-      if (!store_.contains(spare.digest)) added.lost_spares.push_back(done.task);
+      if (!store_.contains(spare.digest)) added.lost_spares.push_back(spare);
     }
   }
   for (const Cut& cut : plan_.cuts) {

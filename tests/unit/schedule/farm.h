@@ -39,6 +39,13 @@ inline JobSpec moving_job(int tiles, int frames, int reach_px) {
   return job;
 }
 
+/// The same, so many times over.
+inline JobSpec with_sweeps(JobSpec job, int sweeps, bool refinable = true) {
+  job.quality.sweeps = sweeps;
+  job.quality.refinable = refinable;
+  return job;
+}
+
 /// The one right output of a task; `variant` makes another, wrong one.
 inline Digest blob_digest(const Digest& job, const BlobRef& blob, int variant = 0) {
   return digest_of(job.hex() + std::to_string(static_cast<int>(blob.kind)) + "/" +

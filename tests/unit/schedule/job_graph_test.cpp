@@ -30,7 +30,10 @@ TEST(JobGraph, UnknownKeysAreNotFound) {
 
 TEST(JobGraph, InputsAndDependentsMirrorEachOther) {
   for (const JobSpec& spec :
-       {small_job(3, 5, 2), small_job(3, 5, 2, false), moving_job(5, 5, 9), moving_job(5, 5, 1)}) {
+       {small_job(3, 5, 2), small_job(3, 5, 2, false), moving_job(5, 5, 9), moving_job(5, 5, 1),
+        with_sweeps(small_job(3, 5, 2), 3), with_sweeps(small_job(3, 5, 2, false), 2),
+        with_sweeps(small_job(3, 1, 2), 4), with_sweeps(moving_job(5, 4, 9), 3),
+        with_sweeps(moving_job(5, 1, 1), 3)}) {
     const JobGraph graph(spec);
     for (TaskIndex task = 0; task < graph.num_tasks(); ++task) {
       const std::vector<TaskIndex> inputs = graph.inputs(graph.key(task));
@@ -41,6 +44,35 @@ TEST(JobGraph, InputsAndDependentsMirrorEachOther) {
       }
     }
   }
+}
+
+// Five frames in runs of two: each sweep begins with a run of its own.
+TEST(JobGraph, ALaterSweepTakesTheFilmsOfTheOneBefore) {
+  const JobGraph graph(with_sweeps(small_job(3, 5, 2), 2));
+  EXPECT_EQ(graph.num_tasks(), 5 + 6 * 3);
+  EXPECT_EQ(graph.first_frame(3), 5);
+  EXPECT_EQ(graph.last_frame(4), 8);
+  const auto keys = [&](const std::vector<TaskIndex>& tasks) {
+    std::vector<TaskKey> result;
+    for (const TaskIndex task : tasks) result.push_back(graph.key(task));
+    return result;
+  };
+  EXPECT_EQ(keys(graph.inputs(render(3, 1))), (std::vector{render(2, 1), render(0, 1)}));
+  EXPECT_EQ(keys(graph.dependents(render(0, 1))), (std::vector{render(1, 1), render(3, 1)}));
+  EXPECT_EQ(keys(graph.inputs(assemble(4))),
+            (std::vector{render(5, 0), render(5, 1), render(5, 2)}));
+  EXPECT_EQ(keys(graph.dependents(render(3, 1))),
+            (std::vector{assemble(0), assemble(1), render(4, 1)}));
+
+  // Of a run's state and two films the next sweep takes the films, the next run the state.
+  EXPECT_EQ(graph.taken_outputs(render(3, 1), render(0, 1)), (std::vector<std::size_t>{1, 2}));
+  EXPECT_EQ(graph.taken_outputs(render(1, 1), render(0, 1)), (std::vector<std::size_t>{0}));
+  EXPECT_TRUE(graph.taken_outputs(render(3, 2), render(0, 1)).empty());
+
+  // Of a still, one task takes both.
+  const JobGraph still(with_sweeps(small_job(3, 1, 2), 3));
+  EXPECT_EQ(still.inputs(render(1, 2)).size(), 1u);
+  EXPECT_EQ(still.taken_outputs(render(1, 2), render(0, 2)), (std::vector<std::size_t>{0, 1}));
 }
 
 TEST(JobGraph, WhereThingsMoveATileNeedsItsNeighboursInReach) {

@@ -1,0 +1,134 @@
+#!/usr/bin/env python3
+"""A finished job is refined: more sweeps over its frames give the bytes of as many sweeps at once, however the work is
+split, whoever dies, and whatever was kept. `baton render` adds sweeps by itself until its frames are clean enough."""
+
+import json
+
+from farm import BAD_INPUT, USAGE, Farm, check, check_equal, make_job, run_tests, wait_until, write_job
+from test_motion import moving_job
+
+POOL = {"method": "pool", "numParticles": 8, "numCandidates": 32}
+
+
+def still(folder, **quality):
+    return make_job(folder, frames="3", image={"tileSize": 32, "sites": 4}, sampling=POOL, quality=quality,
+                    state={"keep": "last"}, output={"aovs": ["normal", "depth", "variance"]})
+
+
+def turning(folder, **quality):
+    return {**still(folder, **quality), "frames": "1-5"}
+
+
+def moving(folder, **quality):
+    job = moving_job(folder, image={"tileSize": 32, "sites": 4}, sampling=POOL, quality=quality, state={"keep": "last"})
+    job["output"]["aovs"] = ["normal", "depth", "variance"]
+    return job
+
+
+def at_once(programs, folder, job, **render):
+    """The pixels of a job as `baton render` makes them."""
+    path = write_job(folder / "job.json", job)
+    programs.render(path, folder / "work", **render)
+    return programs.pixels(folder / "frames")
+
+
+def refined(programs, folder, job, times, workers, kill_at=None):
+    """The pixels of a job that is refined so many times; a worker dies in the refinement number kill_at."""
+    with Farm(programs, folder / "farm") as farm:
+        farm.start_coordinator()
+        hands = [farm.start_worker() for _ in range(workers)]
+        done = farm.submit(write_job(folder / "job.json", job))
+        farm.wait_for(done)
+        for time in range(times):
+            before = farm.show(done)
+            done = farm.baton("job", "refine", done).stdout.strip()
+            if time == kill_at:
+                wait_until(lambda: farm.show(done)["tasksDone"] > before["tasksDone"], "a task of the new sweep is done")
+                hands.pop().kill()
+                farm.start_worker()
+            farm.wait_for(done)
+        return programs.pixels(folder / "frames")
+
+
+def a_still_in_four_steps(programs, folder):
+    """64 rounds at once, and 16 refined three times, on 1 to 3 workers with a kill."""
+    expected = at_once(programs, folder / "whole", still(folder / "whole", rounds=16, sweeps=4))
+    for workers in (1, 2, 3):
+        place = folder / f"refined-{workers}"
+        got = refined(programs, place, still(place, rounds=16, refinable=True), 3, workers,
+                      kill_at=1 if workers > 1 else None)
+        check_equal(got, expected, f"pixels with {workers} workers")
+
+
+def sequences_at_rest_and_in_motion(programs, folder):
+    for make in (turning, moving):
+        name = make.__name__
+        expected = at_once(programs, folder / f"{name}-whole", make(folder / f"{name}-whole", rounds=2, sweeps=3))
+        got = refined(programs, folder / name, make(folder / name, rounds=2, refinable=True), 2, 2, kill_at=0)
+        check_equal(got, expected, f"pixels of {name} refined")
+
+        # What was not kept is made again.
+        place = folder / f"{name}-afresh"
+        got = refined(programs, place, make(place, rounds=2), 2, 2)
+        check_equal(got, expected, f"pixels of {name} whose films were gone")
+
+
+def only_new_sweeps_are_rendered(programs, folder):
+    """One tile: its first sweep is done before anybody works at the others."""
+    job = still(folder, rounds=2, refinable=True)
+    job["image"]["tileSize"] = 160
+    with Farm(programs, folder / "farm") as farm:
+        farm.start_coordinator()
+        worker = farm.start_worker()
+        first = farm.submit(write_job(folder / "job.json", job))
+        farm.wait_for(first)
+        once = farm.show(first)["stats"]["pixels"]
+        worker.terminate()
+        second = farm.baton("job", "refine", first, "--rounds", "4").stdout.strip()
+        check_equal(farm.show(second)["tasksDone"], 1, "tasks that are done before anybody works")
+        farm.start_worker()
+        farm.wait_for(second)
+        check_equal(farm.show(second)["stats"]["pixels"], 3 * once, "pixels rendered, those of the first sweep included")
+        # Fewer sweeps would make the frame worse; a number of rounds that no sweep has is refused.
+        told = farm.baton("job", "submit", folder / "job.json", expect=BAD_INPUT).stderr
+        check("what differs: $.quality.sweeps" in told, told)
+        told = farm.baton("job", "refine", second, "--rounds", "3", expect=USAGE).stderr
+        check("--rounds: expected a multiple of the job's quality.rounds, 2, got 3" in told, told)
+
+
+def render_adds_sweeps(programs, folder):
+    """Until a noise is reached, or so many rounds are; a second call has nothing to do."""
+    job = turning(folder, rounds=4, noiseThreshold=0.02, maxRounds=64)
+    path = write_job(folder / "job.json", job)
+    told = programs.render(path, folder / "work").stderr
+    lines = [line for line in told.splitlines() if "as Cycles measures it" in line]
+    noises = [float(line.split("noise ")[1].split()[0]) for line in lines]
+    check(len(lines) > 1 and lines[0].startswith("4 rounds: "), told)
+    check(noises == sorted(noises, reverse=True), f"the noise does not fall: {noises}")
+    rounds = int(lines[-1].split()[0])
+    check(noises[-1] <= 0.02 or rounds == 64, f"ended at {lines[-1]}")
+    pixels = programs.pixels(folder / "frames")
+    again = programs.render(path, folder / "work").stderr
+    check(f"{rounds} rounds: noise" in again and "more" not in again, again)
+    check_equal(programs.pixels(folder / "frames"), pixels, "pixels after a second call")
+
+    # The same at once.
+    check(rounds % 4 == 0, lines[-1])
+    expected = at_once(programs, folder / "whole", turning(folder / "whole", rounds=4, sweeps=rounds // 4))
+    check_equal(pixels, expected, "pixels beside those at once")
+
+    # With a limit of rounds the last step is shorter.
+    job = still(folder / "most", rounds=2, maxRounds=10)
+    told = programs.render(write_job(folder / "most/job.json", job), folder / "most/work", extra=["--json"])
+    check_equal([line.split()[0] for line in told.stderr.splitlines() if "as Cycles" in line], ["2", "4", "8", "10"],
+                "rounds after each step")
+    check_equal(json.loads(told.stdout)["status"], "done", "the one result of --json")
+
+    # No time: one sweep.
+    job = still(folder / "hurry", rounds=2, timeLimit=0.001)
+    told = programs.render(write_job(folder / "hurry/job.json", job), folder / "hurry/work").stderr
+    check("2 rounds: noise" in told and "more" not in told, told)
+
+
+if __name__ == "__main__":
+    run_tests([a_still_in_four_steps, sequences_at_rest_and_in_motion, only_new_sweeps_are_rendered, render_adds_sweeps])

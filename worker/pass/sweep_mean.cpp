@@ -1,0 +1,81 @@
+#include "worker/pass/sweep_mean.h"
+
+#include <fmt/format.h>
+
+#include <cmath>
+#include <string>
+
+#include "common/image/noise.h"
+
+namespace baton {
+namespace {
+
+/// The mean of `count` values and of one more.
+float mean(float of_earlier, double count, float value) {
+  return static_cast<float>((count * double{of_earlier} + double{value}) / (count + 1));
+}
+/// The variance of such a mean, from those of its parts.
+float variance_of_mean(float of_earlier, double count, float value) {
+  return static_cast<float>((count * count * double{of_earlier} + double{value}) /
+                            ((count + 1) * (count + 1)));
+}
+/// Where it is not known of one, that of the other stands for both.
+float error_of_mean(float of_earlier, double count, float value) {
+  if (of_earlier < 0 && value < 0) return std::max(of_earlier, value);
+  if (of_earlier < 0) return value;
+  if (value < 0) return of_earlier;
+  return variance_of_mean(of_earlier, count, value);
+}
+
+using Rule = float (*)(float of_earlier, double count, float value);
+Rule rule_of(const std::string& channel) {
+  if (channel == kErrorChannel) return error_of_mean;
+  if (channel == "variance") return variance_of_mean;
+  if (channel == "material")
+    return
+        [](float of_earlier, double, float value) { return of_earlier > 0 ? of_earlier : value; };
+  if (channel == "depth") {
+    return [](float of_earlier, double count, float value) {
+      if (!(of_earlier > 0)) return value;
+      return value > 0 ? mean(of_earlier, count, value) : of_earlier;
+    };
+  }
+  return mean;
+}
+
+/// Mean normals have unit length, or are 0 where no sweep sees a surface.
+void normalize_normals(FilmTile& film) {
+  float *const x = film.find("normal.X"), *const y = film.find("normal.Y"),
+               *const z = film.find("normal.Z");
+  if (x == nullptr || y == nullptr || z == nullptr) return;
+  for (std::size_t i = 0; i < film.num_pixels(); ++i) {
+    const float length = std::sqrt(x[i] * x[i] + y[i] * y[i] + z[i] * z[i]);
+    if (!(length > 0)) continue;
+    x[i] /= length;
+    y[i] /= length;
+    z[i] /= length;
+  }
+}
+
+}  // namespace
+
+Status add_sweeps(const FilmTile& earlier, std::int32_t num_sweeps, FilmTile& film) {
+  if (earlier.rect != film.rect || earlier.channels != film.channels) {
+    return Error{ErrorKind::bad_input,
+                 fmt::format("film of an earlier sweep: at {},{} with channels {}, expected {},{}, "
+                             "{}",
+                             earlier.rect.x0, earlier.rect.y0, fmt::join(earlier.channels, " "),
+                             film.rect.x0, film.rect.y0, fmt::join(film.channels, " "))};
+  }
+  for (std::size_t channel = 0; channel < film.channels.size(); ++channel) {
+    const Rule rule = rule_of(film.channels[channel]);
+    const float* const before = earlier.plane(channel);
+    float* const now = film.plane(channel);
+    for (std::size_t i = 0; i < film.num_pixels(); ++i)
+      now[i] = rule(before[i], num_sweeps, now[i]);
+  }
+  normalize_normals(film);
+  return {};
+}
+
+}  // namespace baton

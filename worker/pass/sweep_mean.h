@@ -1,0 +1,16 @@
+#pragma once
+
+#include <cstdint>
+
+#include "common/base/result.h"
+#include "common/image/film_tile.h"
+
+namespace baton {
+
+/// Makes `film`, of one sweep, the mean of itself and of `earlier`, which is that of `num_sweeps`.
+/// All sweeps weigh the same, whatever they found, so the mean has no bias. Depth, normal and
+/// material are those of the sweeps that see a surface; variance and error are those of the mean of
+/// independent values. Error: films of different tiles or channels.
+Status add_sweeps(const FilmTile& earlier, std::int32_t num_sweeps, FilmTile& film);
+
+}  // namespace baton
