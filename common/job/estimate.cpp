@@ -61,8 +61,8 @@ JobEstimate estimate_job(const JobSpec& job) {
   // Count rays, of all rounds. Those that are not seen have the sites of the first.
   e.rounds = std::int64_t{job.quality.rounds} * job.quality.sweeps;
   e.preroll_rounds = num_preroll_rounds(job);
-  e.primary_rays_per_pixel = job.image.sites;
-  if (rounds_have_own_sites(job)) e.primary_rays_per_pixel *= e.rounds;
+  e.primary_rays_per_pixel =
+      job.image.sites * (rounds_have_own_sites(job) ? e.rounds : job.quality.sweeps);
   e.shadow_rays_per_pixel = traits(job.sampling.method).most_rays(job.sampling) * e.rounds;
 
   // Add up the planes: R, G, B, A and the AOVs.

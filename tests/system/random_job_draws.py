@@ -106,6 +106,9 @@ class Draw(Textures):
             "sampling.byMaterial.*.numCandidates": lambda: self.rng.choice([None, *NUM_CANDIDATES]),
             "sampling.targetError": lambda: self.pick(None, 0.3), "sampling.timeBudget": lambda: 1.0,
             "quality.rounds": lambda: self.pick(1, 2, 3, 4, 5, 9), "state.preroll": lambda: self.pick(None, 0, 1, 2, 5),
+            "quality.sweeps": lambda: self.pick(None, 1, 2, 3),
+            # These add sweeps by noise and time: tests/system/test_refine.py.
+            "quality.noiseThreshold": nothing, "quality.timeLimit": nothing, "quality.maxRounds": nothing,
             "visibility.correlated": lambda: self.chance(0.9),
             "visibility.mask": lambda: self.rng.choice(self.enum("visibility", "mask") + ["same-samples"]),
             "image.sites": lambda: self.rng.choice(self.enum("image", "sites") + [4]),

@@ -280,17 +280,18 @@ def compare_prediction(predicted, summary, job):
     require(summary["tasksTotal"] == tasks, "predicted tasks", f"{summary['tasksTotal']}, predicted {tasks}")
     pixels = math.prod(rendered_size(job.get("image", {})))
     second_pass = predicted["secondPassTasks"] > 0
-    require(stats["pixels"] == pixels * predicted["frames"], "predicted pixels",
-            f"{stats['pixels']}, predicted {pixels * predicted['frames']}")
+    sweeps = job.get("quality", {}).get("sweeps", 1)
+    steps = predicted["frames"] * sweeps
+    require(stats["pixels"] == pixels * steps, "predicted pixels", f"{stats['pixels']}, predicted {pixels * steps}")
 
     # A run traces its surfaces once where pixels take history from themselves alone, else in each frame; old surfaces
     # and those of the second pass, whose tiles overlap, are traced again.
     sampling = job.get("sampling", {})
     asks = sampling.get("numNeighbors", 0) if sampling.get("method") == "restir" else 0
     shares = asks > 0 or predicted["motionMaxPx"] > 0
-    of_frame = pixels * predicted["primaryRaysPerPixel"]
-    least = of_frame * (predicted["frames"] if shares else predicted["runs"])
-    most = least * (2 + asks if shares else 1) + (9 * of_frame * predicted["frames"] if second_pass else 0)
+    of_step = pixels * predicted["primaryRaysPerPixel"] // sweeps
+    least = of_step * (steps if shares else predicted["runs"])
+    most = least * (2 + asks if shares else 1) + (9 * of_step * steps if second_pass else 0)
     require(least <= stats["raysPrimary"] <= most, "predicted primary rays",
             f"{stats['raysPrimary']}, predicted {least} to {most}")
     unseen = predicted.get("prerollRounds", 0) / predicted.get("rounds", 1)

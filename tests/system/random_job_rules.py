@@ -20,6 +20,7 @@ def work_of(job, num_frames):
     rounds = job.get("quality", {}).get("rounds", 1)
     if method_carries_memory(sampling["method"]):
         rounds += job.get("state", {}).get("preroll", 2) / num_frames
+    rounds *= job.get("quality", {}).get("sweeps", 1)
     return image["width"] * image["height"] * num_frames * of_pixel * rounds
 
 
@@ -55,7 +56,7 @@ def mend(job, rng):
     if method in ("reference", "pool", "ratio", "restir", "auto") or sampling.get("byMaterial"):
         visibility["correlated"] = False
     if (visibility.get("correlated") or method == "auto") and "quality" in job:
-        job["quality"]["rounds"] = 1
+        job["quality"] = {}
     if visibility.get("correlated") and visibility.get("mask") != "same-samples" and sampling["numParticles"] % 2:
         if rng.random() < 0.5:
             visibility["mask"] = "same-samples"

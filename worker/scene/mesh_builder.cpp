@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
+#include <span>
 
 namespace baton {
 namespace {
@@ -47,21 +48,16 @@ void MeshBuilder::add(const std::array<Vec3, 3>& corners, const std::array<Vec3,
   mesh_.triangles.push_back(triangle);
 }
 
-std::size_t MeshBuilder::VertexHash::operator()(const VertexKey& key) const {
-  std::uint64_t hash = 0;
-  for (const std::uint32_t word : key) {
-    hash = (hash ^ word) * 0x9E3779B97F4A7C15u;
-    hash ^= hash >> 32;
+MeshBuilder::VertexKey MeshBuilder::key_of(const Vec3& position, const Vec3& normal,
+                                           const UvSets& uvs, const Tangent& tangent) const {
+  VertexKey key{bits(position.x), bits(position.y), bits(position.z)};
+  if (parts_.normals) {
+    key[3] = bits(normal.x);
+    key[4] = bits(normal.y);
+    key[5] = bits(normal.z);
   }
-  return hash;
-}
-
-std::uint32_t MeshBuilder::vertex(const Vec3& position, const Vec3& normal, const UvSets& uvs,
-                                  const Tangent& tangent) {
-  const auto sets = static_cast<std::size_t>(parts_.uv_sets);
-  VertexKey key{bits(position.x), bits(position.y), bits(position.z),
-                bits(normal.x),   bits(normal.y),   bits(normal.z)};
-  for (std::size_t i = 0; i < 2 * sets; ++i) key[6 + i] = bits(uvs[i / 2][i % 2]);
+  for (std::size_t i = 0; i < 2 * static_cast<std::size_t>(parts_.uv_sets); ++i)
+    key[6 + i] = bits(uvs[i / 2][i % 2]);
   if (parts_.tangents) {
     const Vec3& t = tangent.direction;
     key[10] = bits(t.x);
@@ -69,15 +65,51 @@ std::uint32_t MeshBuilder::vertex(const Vec3& position, const Vec3& normal, cons
     key[12] = bits(t.z);
     key[13] = bits(tangent.side);
   }
-  const auto next = static_cast<std::uint32_t>(mesh_.positions.size());
-  const auto [found, inserted] = index_.try_emplace(key, next);
-  if (inserted) {
+  return key;
+}
+
+MeshBuilder::VertexKey MeshBuilder::key_of(std::uint32_t vertex) const {
+  UvSets uvs{};
+  for (std::size_t set = 0; set < static_cast<std::size_t>(parts_.uv_sets); ++set)
+    uvs[set] = mesh_.uvs[set][vertex];
+  return key_of(mesh_.positions[vertex], parts_.normals ? mesh_.normals[vertex] : Vec3{}, uvs,
+                parts_.tangents ? mesh_.tangents[vertex] : Tangent{});
+}
+
+/// Where the vertex is, or would be put.
+std::size_t MeshBuilder::find_slot(const VertexKey& key) const {
+  const bool is_plain = parts_.uv_sets == 0 && !parts_.tangents;
+  const std::size_t count = !is_plain ? key.size() : parts_.normals ? 6 : 3;
+  std::uint64_t hash = 0;
+  for (const std::uint32_t word : std::span(key).first(count)) {
+    hash = (hash ^ word) * 0x9E3779B97F4A7C15u;
+    hash ^= hash >> 32;
+  }
+  const std::size_t mask = slots_.size() - 1;
+  std::size_t slot = hash & mask;
+  while (slots_[slot] != 0 && key_of(slots_[slot] - 1) != key) slot = (slot + 1) & mask;
+  return slot;
+}
+
+void MeshBuilder::grow() {
+  constexpr std::size_t kFirstSize = 1024;
+  slots_.assign(std::max(kFirstSize, 4 * slots_.size()), 0);
+  for (std::uint32_t v = 0; v < mesh_.positions.size(); ++v) slots_[find_slot(key_of(v))] = v + 1;
+}
+
+std::uint32_t MeshBuilder::vertex(const Vec3& position, const Vec3& normal, const UvSets& uvs,
+                                  const Tangent& tangent) {
+  const auto sets = static_cast<std::size_t>(parts_.uv_sets);
+  if (2 * (mesh_.positions.size() + 1) > slots_.size()) grow();
+  const std::size_t slot = find_slot(key_of(position, normal, uvs, tangent));
+  if (slots_[slot] == 0) {
     mesh_.positions.push_back(position);
     if (parts_.normals) mesh_.normals.push_back(normal);
     for (std::size_t set = 0; set < sets; ++set) mesh_.uvs[set].push_back(uvs[set]);
     if (parts_.tangents) mesh_.tangents.push_back(tangent);
+    slots_[slot] = static_cast<std::uint32_t>(mesh_.positions.size());
   }
-  return found->second;
+  return slots_[slot] - 1;
 }
 
 std::vector<Vec3> smooth_vertex_normals(const TriangleMesh& mesh) {

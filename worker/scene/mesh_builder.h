@@ -2,7 +2,7 @@
 
 #include <array>
 #include <cstdint>
-#include <unordered_map>
+#include <vector>
 
 #include "worker/scene/scene.h"
 
@@ -30,15 +30,19 @@ class MeshBuilder {
  private:
   /// Bits of position, normal, UVs and tangent.
   using VertexKey = std::array<std::uint32_t, 14>;
-  struct VertexHash {
-    std::size_t operator()(const VertexKey& key) const;
-  };
+  VertexKey key_of(const Vec3& position, const Vec3& normal, const UvSets& uvs,
+                   const Tangent& tangent) const;
+  VertexKey key_of(std::uint32_t vertex) const;
   std::uint32_t vertex(const Vec3& position, const Vec3& normal, const UvSets& uvs,
                        const Tangent& tangent);
+  std::size_t find_slot(const VertexKey& key) const;
+  void grow();
 
   MeshParts parts_;
   TriangleMesh mesh_;
-  std::unordered_map<VertexKey, std::uint32_t, VertexHash> index_;
+  /// Hash table of open addressing: numbers of vertices + 1, 0 where there is none. Its size is a
+  /// power of two, at least twice the vertices.
+  std::vector<std::uint32_t> slots_;
 };
 
 /// Angle-weighted unit vertex normals [Thuermer & Wuethrich 1998]. Where faces cancel each other (a

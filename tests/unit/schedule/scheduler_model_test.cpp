@@ -86,7 +86,7 @@ TEST(SchedulerModel, EveryTaskIsDoneOnceWhateverHappens) {
 // well.
 TEST(SchedulerModel, NobodyIsBlamedForBlobsThatAreAlike) {
   std::size_t num_missing = 0;
-  for (std::uint32_t seed = 1; seed <= 1000; ++seed) {
+  for (std::uint32_t seed = 1; seed <= num_seeds(); ++seed) {
     SCOPED_TRACE(testing::Message() << "seed " << seed);
     JobSpec spec = small_job(4, 12, 3);
     spec.max_retries_per_task = 0;
