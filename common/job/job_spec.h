@@ -80,12 +80,19 @@ struct CameraKey {
 /// See CameraSpec::node.
 inline constexpr const char* kFirstCamera = "*";
 
+enum class Projection : std::uint8_t { perspective, orthographic };
+
 /// With keys, these say where the camera is and what it looks at.
 struct CameraSpec {
   Vec3 position{0, 0, 5};
   Vec3 look_at{0, 0, 0};
   Vec3 up{0, 1, 0};
-  float vertical_fov_deg = 40;    ///< (0, 180)
+  float vertical_fov_deg = 40;  ///< perspective: (0, 180)
+  Projection projection = Projection::perspective;
+  float orthographic_height = 2;  ///< of the picture, scene units, > 0
+  std::array<float, 2> shift{};   ///< of the picture to the right and up, in its heights
+  float aperture = 0;             ///< diameter of the lens, scene units; 0: a pinhole
+  float focus_distance = 0;       ///< along the view, scene units; 0: as far as look_at
   std::vector<CameraKey> keys{};  ///< ascending frames
   std::optional<GltfMotion> gltf{};
   /// The camera of scene.gltf that is taken, by the name of its node; kFirstCamera: the first one.

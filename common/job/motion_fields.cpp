@@ -9,6 +9,9 @@
 namespace baton {
 namespace {
 
+constexpr std::array<std::string_view, 2> kProjections{"perspective", "orthographic"};
+constexpr double kMaxLength = 1e9, kMaxShift = 100;
+constexpr NumberRange kLengthRange{.min = 0, .max = kMaxLength, .min_open = true};
 constexpr NumberRange kFovRange{.min = 0, .max = 180, .min_open = true, .max_open = true};
 constexpr NumberRange kFrameRange{0, limits::kMaxFrameNumber};
 
@@ -78,6 +81,13 @@ void fields(JobArchive& a, CameraSpec& camera) {
   a.vector("up", camera.up, kCoordinateRange);
   a.number("verticalFovDeg", camera.vertical_fov_deg, kFovRange);
   check_view(a, camera.position, camera.look_at, camera.up);
+  a.choice("projection", camera.projection, kProjections);
+  a.number("orthographicHeight", camera.orthographic_height, kLengthRange);
+  std::array<double, 2> shift{camera.shift[0], camera.shift[1]};
+  if (a.numbers("shift", shift, {-kMaxShift, kMaxShift}, false))
+    camera.shift = {static_cast<float>(shift[0]), static_cast<float>(shift[1])};
+  a.number("aperture", camera.aperture, {0, kMaxLength});
+  a.number("focusDistance", camera.focus_distance, {0, kMaxLength});
   source_fields(a, camera.keys, camera.gltf);
   a.text(alternative("node"), camera.node);
   if (!camera.node.empty() && (camera.gltf || !camera.keys.empty()))

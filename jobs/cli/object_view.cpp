@@ -33,26 +33,28 @@ Corners corners_of(const TriangleMesh& mesh) {
 /// What a camera's picture has of a box.
 enum class Sight { behind, outside, tiny, seen };
 
-/// The planes through the eye and the borders of a picture, and the one across it.
+/// The planes through the borders of a picture, and the one across it through the eye.
 class View {
  public:
   View(const Camera& camera, const ImageSpec& image) : camera_(camera) {
     const auto w = static_cast<float>(image.width), h = static_cast<float>(image.height);
     const Ray ahead = camera.ray(w / 2, h / 2);
-    eye_ = ahead.origin;
-    inward_[0] = ahead.direction;
-    const std::array<Vec3, 4> corners{camera.ray(0, 0).direction, camera.ray(w, 0).direction,
-                                      camera.ray(w, h).direction, camera.ray(0, h).direction};
+    planes_[0] = {ahead.origin, ahead.direction};
+    const std::array<Ray, 4> corners{camera.ray(0, 0), camera.ray(w, 0), camera.ray(w, h),
+                                     camera.ray(0, h)};
     for (std::size_t i = 0; i < 4; ++i) {
-      const Vec3 normal = cross(corners[i], corners[(i + 1) % 4]);
-      inward_[i + 1] = dot(normal, ahead.direction) < 0 ? normal * -1.0f : normal;
+      const Ray &a = corners[i], &b = corners[(i + 1) % 4];
+      const Vec3 normal = cross(a.direction, b.origin + b.direction - (a.origin + a.direction));
+      const bool is_inward = dot(normal, ahead.origin + ahead.direction - a.origin) >= 0;
+      planes_[i + 1] = {a.origin, is_inward ? normal : normal * -1.0f};
     }
   }
 
   Sight sight(const Corners& box) const {
-    for (std::size_t i = 0; i < inward_.size(); ++i) {
-      const bool none_inside = std::ranges::all_of(
-          box, [&](const Vec3& corner) { return dot(inward_[i], corner - eye_) <= 0; });
+    for (std::size_t i = 0; i < planes_.size(); ++i) {
+      const bool none_inside = std::ranges::all_of(box, [&](const Vec3& corner) {
+        return dot(planes_[i].inward, corner - planes_[i].point) <= 0;
+      });
       if (none_inside) return i == 0 ? Sight::behind : Sight::outside;
     }
     return is_tiny(box) ? Sight::tiny : Sight::seen;
@@ -72,9 +74,11 @@ class View {
     return high[0] - low[0] < 1 && high[1] - low[1] < 1;
   }
 
+  struct Plane {
+    Vec3 point, inward;
+  };
   const Camera& camera_;
-  Vec3 eye_;
-  std::array<Vec3, 5> inward_;
+  std::array<Plane, 5> planes_;
 };
 
 std::string words(Sight best) {

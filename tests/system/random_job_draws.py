@@ -273,6 +273,11 @@ class Draw(Textures):
         position, look_at = camera["position"], camera["lookAt"]
         if self.chance(0.2):
             camera["up"] = self.pick([0, 0, 1], [0.3, 1, 0.1], [0, -1, 0])
+        if self.chance(0.15):
+            camera |= {"projection": "orthographic", "orthographicHeight": self.pick(0.3, 2, 5)}
+        if self.chance(0.15):
+            camera |= {"shift": self.pick([0.2, 0], [-0.5, 0.3]), "aperture": self.pick(0, 0.05, 1)}
+            camera["focusDistance"] = self.pick(0, 0.5, 4)
         if self.chance(0.3):
             size = self.pick(0.05, 0.05, 0.5, 3)
             camera["keys"] = []

@@ -45,16 +45,23 @@ TileSurfaces trace_primary(const JobSpec& job, const FrameGeometry& geometry, co
 
 void append_primary_rays(const JobSpec& job, const FrameGeometry& geometry, std::int32_t x,
                          std::int32_t y, std::vector<Ray>& rays, std::int32_t round) {
-  const auto add = [&](const std::array<float, 2>& position) {
-    rays.push_back(geometry.pose.camera.ray(static_cast<float>(x) + position[0],
-                                            static_cast<float>(y) + position[1]));
-  };
+  const Camera& camera = geometry.pose.camera;
+  const std::uint64_t seed = job.image.site_seed > 0 ? job.image.site_seed : job.seed;
+  const Rng rng(pixel_key(seed, 0, job.image.width, x, y), PassId::site_position);
   const bool own_sites = rounds_have_own_sites(job);
+  const Philox4x32::Counter lens_shift = camera.has_lens() ? rng.bits(1, 0) : Philox4x32::Counter{};
+  std::uint32_t lens_point =
+      own_sites ? static_cast<std::uint32_t>(std::max(round, 0) * job.image.sites) : 0;
+  const auto add = [&](const std::array<float, 2>& position) {
+    const float px = static_cast<float>(x) + position[0], py = static_cast<float>(y) + position[1];
+    if (!camera.has_lens()) return rays.push_back(camera.ray(px, py));
+    const auto u = sobol_2d(lens_point++);
+    rays.push_back(camera.ray(
+        px, py, {uniform_float(u[0] ^ lens_shift[0]), uniform_float(u[1] ^ lens_shift[1])}));
+  };
   const bool lone = job.image.sites == 1 && (job.quality.rounds == 1 || !own_sites);
   if (lone && job.image.filter == PixelFilter::box) return add({0.5f, 0.5f});
   const auto side = static_cast<std::int32_t>(std::sqrt(static_cast<float>(job.image.sites)));
-  const std::uint64_t seed = job.image.site_seed > 0 ? job.image.site_seed : job.seed;
-  const Rng rng(pixel_key(seed, 0, job.image.width, x, y), PassId::site_position);
   const auto shift = sobol_2d(own_sites && round > 0 ? static_cast<std::uint32_t>(round) : 0);
   Philox4x32::Counter bits{};  // of two sites
   for (std::int32_t site = 0; site < job.image.sites; ++site) {
@@ -73,7 +80,7 @@ void trace_primary_rays(const JobSpec& job, const FrameGeometry& geometry,
   const float share = 1 / std::sqrt(static_cast<float>(job.image.sites));
   for (std::size_t i = 0; i < hits.size(); ++i) {
     if (!hits[i].hit || geometry.material_of(hits[i]).detail == nullptr) continue;
-    const float pixel = geometry.pose.camera.pixel_width(rays[i].direction) * hits[i].depth;
+    const float pixel = geometry.pose.camera.pixel_width(rays[i].direction, hits[i].depth);
     hits[i].place.width = share * pixel;
   }
 }

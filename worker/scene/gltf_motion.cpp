@@ -34,11 +34,19 @@ Status put_camera(const gltf::NodeMotion& motion, int node, const FileClock& clo
   const gltf::Node& given = file.nodes[static_cast<std::size_t>(node)];
   if (given.camera < 0) return file.error(fmt::format("node \"{}\" holds no camera", given.name));
   const gltf::Camera& lens = file.cameras[static_cast<std::size_t>(given.camera)];
-  if (!lens.perspective)
-    return file.error(fmt::format("node \"{}\": expected a perspective camera", given.name));
 
+  // The file says nothing of shift and lens: the job does.
+  const CameraSpec wanted = camera;
   camera = {};
-  camera.vertical_fov_deg = static_cast<float>(lens.yfov * 180 / 3.14159265358979323846);
+  camera.shift = wanted.shift;
+  camera.aperture = wanted.aperture;
+  camera.focus_distance = wanted.focus_distance;
+  if (lens.perspective) {
+    camera.vertical_fov_deg = static_cast<float>(lens.yfov * 180 / 3.14159265358979323846);
+  } else {
+    camera.projection = Projection::orthographic;
+    camera.orthographic_height = static_cast<float>(2 * lens.ymag);
+  }
   const auto at = [&](int frame) {
     const std::vector<gltf::Matrix> world = motion.to_world(clock.seconds_at(frame));
     return camera_key(static_cast<double>(frame), world[static_cast<std::size_t>(node)]);

@@ -28,7 +28,7 @@ struct FileClock {
 };
 
 /// Makes `camera` that of a node: with keys where it moves, at one place where it does not. Error:
-/// the node holds no perspective camera.
+/// the node holds no camera.
 Status put_camera(const gltf::NodeMotion& motion, int node, const FileClock& clock,
                   const std::vector<int>& frames, CameraSpec& camera);
 

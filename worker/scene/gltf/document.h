@@ -77,6 +77,7 @@ struct Node {
 struct Camera {
   bool perspective = true;
   double yfov = 0;  ///< radians, (0, pi)
+  double ymag = 1;  ///< orthographic: half the height of the picture
 };
 
 enum class Path : std::uint8_t { translation, rotation, scale, weights };

@@ -167,7 +167,13 @@ void parse_scene(const JsonView& root, Document& document) {
 }
 
 Camera parse_camera(const JsonView& camera) {
-  if (camera.text("type") != "perspective") return {.perspective = false};
+  if (camera.text("type") == "orthographic") {
+    const JsonView lens = camera.at("orthographic");
+    if (!lens.has("ymag")) lens.fail("expected ymag");
+    return {.perspective = false, .ymag = lens.number("ymag", 1, 1e-9, 1e9)};
+  }
+  if (camera.text("type") != "perspective")
+    camera.fail("expected a perspective or orthographic camera");
   const JsonView lens = camera.at("perspective");
   if (!lens.has("yfov")) lens.fail("expected yfov");
   return {.perspective = true, .yfov = lens.number("yfov", 1, 1e-4, 3.14159)};
