@@ -14,6 +14,7 @@
 #include <half.h>
 
 #include <algorithm>
+#include <array>
 #include <exception>
 #include <optional>
 
@@ -65,8 +66,12 @@ std::optional<Imf::Compression> compression_of(const std::string& name) {
 
 /// Channels whose use needs all 32 bits.
 bool always_float(const std::string& channel) {
-  return channel == "depth" || channel == "lns" || channel == "variance" || channel == "material" ||
-         channel.starts_with("normal.");
+  static constexpr std::array<std::string_view, 6> kWhole{"depth",    "lns",    "variance",
+                                                          "material", "object", "Z"};
+  static constexpr std::array<std::string_view, 5> kBeginnings{"normal.", "P.", "forward.",
+                                                               "backward.", "Crypto"};
+  return std::ranges::find(kWhole, channel) != kWhole.end() ||
+         std::ranges::any_of(kBeginnings, [&](auto start) { return channel.starts_with(start); });
 }
 
 bool is_color(const std::string& channel) {

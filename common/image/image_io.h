@@ -29,7 +29,7 @@ Result<RgbImage> read_rgb_image(const std::filesystem::path& path);
 using ImageMetadata = std::vector<std::pair<std::string, std::string>>;
 
 struct ExrOptions {
-  /// `depth`, `lns`, `variance` and `normal.*` stay float32 always.
+  /// Distances, positions, normals, motion, IDs, `lns` and `variance` stay float32 always.
   bool half_float = true;
   bool float_colors = false;        ///< R, G and B are float32 whatever half_float says
   std::string compression = "zip";  ///< none, rle, zips, zip, piz

@@ -3,15 +3,13 @@
 #include <algorithm>
 
 #include "common/base/limits.h"
+#include "common/job/aov.h"
 #include "common/job/motion.h"
 #include "common/job/sequence.h"
 #include "common/state/sample_state.h"
 
 namespace baton {
 namespace {
-
-/// Planes of an EXR that an AOV adds.
-std::int64_t num_channels(Aov aov) { return aov == Aov::source || aov == Aov::normal ? 3 : 1; }
 
 /// Tiles within reach of each tile, all tiles together.
 std::int64_t count_neighbours(const JobSpec& job, std::int32_t reach_px) {
@@ -68,10 +66,9 @@ JobEstimate estimate_job(const JobSpec& job) {
   // Add up the planes: R, G, B, A and the AOVs.
   std::int64_t wide_channels = 0, frame_channels = 4;
   for (const Aov aov : job.output.aovs) {
-    frame_channels += num_channels(aov);
-    const bool wide = aov == Aov::depth || aov == Aov::lns || aov == Aov::variance ||
-                      aov == Aov::material || aov == Aov::normal;
-    wide_channels += wide ? num_channels(aov) : 0;
+    const auto count = static_cast<std::int64_t>(traits(aov).channels.size());
+    frame_channels += count;
+    wide_channels += traits(aov).is_float ? count : 0;
   }
   e.film_channels = frame_channels + (tells_noise(job) ? 1 : 0);
   e.film_bytes = pixels * e.film_channels * 4;

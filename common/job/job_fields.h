@@ -36,7 +36,7 @@ inline constexpr std::array<std::string_view, 3> kMaskPolicies{"same-samples", "
 inline constexpr std::array<std::string_view, 4> kLnsUpdates{"ratio", "pathLeft", "pathRight",
                                                              "pathTrapezoid"};
 inline constexpr std::array<std::string_view, 2> kBackgrounds{"environment", "transparent"};
-inline constexpr std::array<std::string_view, 13> kAovs{"lns",
+inline constexpr std::array<std::string_view, 20> kAovs{"lns",
                                                         "visibility",
                                                         "ess",
                                                         "acceptance",
@@ -48,7 +48,14 @@ inline constexpr std::array<std::string_view, 13> kAovs{"lns",
                                                         "acceptanceLocal",
                                                         "acceptanceIndependent",
                                                         "resampled",
-                                                        "material"};
+                                                        "material",
+                                                        "albedo",
+                                                        "position",
+                                                        "z",
+                                                        "motion",
+                                                        "object",
+                                                        "cryptoObject",
+                                                        "cryptoMaterial"};
 inline constexpr std::array<std::string_view, 3> kUpAxes{"x", "y", "z"};
 inline constexpr std::array<std::string_view, 2> kPixelTypes{"half", "float"};
 inline constexpr std::array<std::string_view, 5> kCompressions{"none", "rle", "zips", "zip", "piz"};

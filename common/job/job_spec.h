@@ -249,7 +249,14 @@ enum class Aov : std::uint8_t {
   acceptance_local,
   acceptance_independent,
   resampled,
-  material
+  material,
+  albedo,
+  position,
+  z,
+  motion,
+  object,
+  crypto_object,
+  crypto_material
 };
 enum class PixelType : std::uint8_t { half_float, full_float };
 

@@ -4,6 +4,7 @@
 #include <cmath>
 #include <vector>
 
+#include "common/job/aov.h"
 #include "common/job/empty_aovs.h"
 #include "common/job/estimate.h"
 #include "common/job/motion.h"
@@ -40,29 +41,9 @@ bool weigh_alike(const JobSpec& job) {
 }
 
 double film_bytes(Aov aov, bool equal_weights) {
-  switch (aov) {
-    case Aov::lns:
-      return 3.2;
-    case Aov::depth:
-      return 2.9;
-    case Aov::visibility:
-      return equal_weights ? 0.75 : 2.9;
-    case Aov::variance:
-    case Aov::normal:
-      return 4;
-    case Aov::ess:
-      return equal_weights ? 0.1 : 1.6;
-    case Aov::acceptance:
-    case Aov::acceptance_local:
-    case Aov::acceptance_independent:
-      return 1.6;
-    case Aov::source:
-    case Aov::mask:
-    case Aov::resampled:
-    case Aov::material:
-      return 0.1;
-  }
-  return 4;
+  if (equal_weights && aov == Aov::visibility) return 0.75;
+  if (equal_weights && aov == Aov::ess) return 0.1;
+  return traits(aov).film_bytes;
 }
 
 /// Of a pixel of a frame, on average.

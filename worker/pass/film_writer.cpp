@@ -1,44 +1,9 @@
 #include "worker/pass/film_writer.h"
 
+#include "common/job/aov.h"
 #include "common/job/sequence.h"
 
 namespace baton {
-namespace {
-
-std::vector<std::string> channel_names(Aov aov) {
-  switch (aov) {
-    case Aov::lns:
-      return {"lns"};
-    case Aov::visibility:
-      return {"visibility"};
-    case Aov::ess:
-      return {"ess"};
-    case Aov::acceptance:
-      return {"acceptance"};
-    case Aov::source:
-      return {"source.R", "source.G", "source.B"};
-    case Aov::normal:
-      return {"normal.X", "normal.Y", "normal.Z"};
-    case Aov::depth:
-      return {"depth"};
-    case Aov::variance:
-      return {"variance"};
-    case Aov::mask:
-      return {"mask"};
-    case Aov::acceptance_local:
-      return {"acceptanceLocal"};
-    case Aov::acceptance_independent:
-      return {"acceptanceIndependent"};
-    case Aov::resampled:
-      return {"resampled"};
-    case Aov::material:
-      return {"material"};
-  }
-  return {};
-}
-
-}  // namespace
-
 Rgb source_color(PixelSource source) {
   switch (source) {
     case PixelSource::background:
@@ -60,7 +25,7 @@ FilmWriter::FilmWriter(const PixelRect& rect, const JobSpec& job)
   film_.rect = rect;
   film_.channels = {"R", "G", "B", "A"};
   for (const Aov aov : aovs_) {
-    for (std::string& name : channel_names(aov)) film_.channels.push_back(std::move(name));
+    for (const std::string& name : traits(aov).channels) film_.channels.push_back(name);
   }
   if (with_error_) film_.channels.emplace_back(kErrorChannel);
   film_.values.resize(film_.channels.size() * film_.num_pixels());
@@ -116,6 +81,15 @@ void FilmWriter::write(std::size_t index, const PixelResult& pixel) {
         break;
       case Aov::material:
         put(static_cast<float>(pixel.material));
+        break;
+      case Aov::albedo:
+      case Aov::position:
+      case Aov::z:
+      case Aov::motion:
+      case Aov::object:
+      case Aov::crypto_object:
+      case Aov::crypto_material:
+        channel += traits(aov).channels.size();  // GeometryPlanes fills them
         break;
     }
   }

@@ -5,7 +5,9 @@
 #include <cmath>
 #include <string>
 
+#include "common/image/cryptomatte.h"
 #include "common/image/noise.h"
+#include "common/job/aov.h"
 
 namespace baton {
 namespace {
@@ -31,13 +33,15 @@ using Rule = float (*)(float of_earlier, double count, float value);
 Rule rule_of(const std::string& channel) {
   if (channel == kErrorChannel) return error_of_mean;
   if (channel == "variance") return variance_of_mean;
-  if (channel == "material")
+  if (channel == "material" || channel == "object")
     return
         [](float of_earlier, double, float value) { return of_earlier > 0 ? of_earlier : value; };
-  if (channel == "depth") {
+  const bool of_surfaces = channel == "depth" || channel == "Z" || channel.starts_with("P.") ||
+                           channel.starts_with("albedo.");
+  if (of_surfaces) {
     return [](float of_earlier, double count, float value) {
-      if (!(of_earlier > 0)) return value;
-      return value > 0 ? mean(of_earlier, count, value) : of_earlier;
+      if (of_earlier == 0) return value;  // no surface, or black in both
+      return value == 0 ? of_earlier : mean(of_earlier, count, value);
     };
   }
   return mean;
@@ -68,12 +72,15 @@ Status add_sweeps(const FilmTile& earlier, std::int32_t num_sweeps, FilmTile& fi
                              film.rect.x0, film.rect.y0, fmt::join(film.channels, " "))};
   }
   for (std::size_t channel = 0; channel < film.channels.size(); ++channel) {
+    if (film.channels[channel].starts_with("Crypto")) continue;  // below, a layer at a time
     const Rule rule = rule_of(film.channels[channel]);
     const float* const before = earlier.plane(channel);
     float* const now = film.plane(channel);
     for (std::size_t i = 0; i < film.num_pixels(); ++i)
       now[i] = rule(before[i], num_sweeps, now[i]);
   }
+  for (const Aov aov : {Aov::crypto_object, Aov::crypto_material})
+    merge_cryptomatte(earlier, num_sweeps, traits(aov).channels, film);
   normalize_normals(film);
   return {};
 }

@@ -9,6 +9,7 @@
 
 #include "common/job/motion.h"
 #include "worker/pass/cpu_clock.h"
+#include "worker/pass/geometry_planes.h"
 #include "worker/pass/sweep_mean.h"
 #include "worker/pass/tile_frame.h"
 
@@ -78,6 +79,7 @@ class TileWalk {
   Result<FilmTile> render(const FrameSpec& frame, std::span<const StatePtr> previous) {
     BATON_TRY(prepare(frame));
     RoundMean film(context_.job, rect_);
+    GeometryPlanes planes(context_, frame, *geometry_, rect_);
     const std::int32_t first = frame.index == 0 ? -num_preroll_rounds(context_.job) : 0;
     std::optional<RoundMean> unseen;
     if (first < 0) unseen.emplace(context_.job, rect_);
@@ -91,6 +93,7 @@ class TileWalk {
       const std::shared_ptr<const TileSurfaces> surfaces = surfaces_of(frame.first_round + round);
       const TileRound at{frame, round, *light, *surfaces, round < 0 ? nullptr : probe_light.get()};
       RoundMean& mean = round < 0 ? *unseen : film;
+      if (round >= 0) planes.add(*surfaces);
       if (shares_ && round == first) {
         // Tiles ask for those of the frame before; one that is behind them traces them again.
         context_.surfaces->release_before(frame.index - 1);
@@ -102,7 +105,9 @@ class TileWalk {
       }
       has_history_ = carries_state(context_.job);
     }
-    return film.finish();
+    FilmTile result = film.finish();
+    planes.write(result);
+    return result;
   }
 
   /// At the end of the walk.

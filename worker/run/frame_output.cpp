@@ -7,7 +7,9 @@
 
 #include "common/base/files.h"
 #include "common/base/version.h"
+#include "common/image/cryptomatte.h"
 #include "common/image/noise.h"
+#include "common/job/aov.h"
 #include "common/job/job_fields.h"
 #include "common/job/motion.h"
 #include "common/job/sequence.h"
@@ -137,6 +139,13 @@ ImageMetadata frame_metadata(const JobSpec& job, const Digest& job_digest, int f
   add("baton:pixelsBelowZero", quality.pixels_below_zero);
   add("baton:clampNegative", quality.clamped);
   if (quality.pixels_not_finite > 0) add("baton:pixelsNotFinite", quality.pixels_not_finite);
+  for (const Aov aov : job.output.aovs) {
+    ImageMetadata ids;
+    if (aov == Aov::crypto_object) ids = cryptomatte_metadata(kCryptoObject, object_names(job));
+    if (aov == Aov::crypto_material)
+      ids = cryptomatte_metadata(kCryptoMaterial, material_names(job));
+    metadata.insert(metadata.end(), ids.begin(), ids.end());
+  }
   for (const auto& [name, text] : job.metadata)
     metadata.emplace_back("baton:metadata:" + name, text);
   return metadata;

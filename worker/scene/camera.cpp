@@ -92,6 +92,12 @@ std::optional<std::array<float, 2>> Camera::project(const Vec3& point) const {
                               center_y_ + dot(view, down_) / (dot(down_, down_) * depth)};
 }
 
+std::optional<std::array<float, 2>> Camera::project_direction(const Vec3& direction) const {
+  // Parallel rays see one direction everywhere: it has no place.
+  if (is_orthographic_) return std::nullopt;
+  return project(origin_ + direction);
+}
+
 Matrix4 Camera::world_to_camera() const {
   return from_columns(origin_, {normalize(right_), normalize(down_) * -1, forward_ * -1, Vec3{}},
                       {0, 0, 0, 1});

@@ -38,6 +38,11 @@ class Camera {
   /// camera.
   std::optional<std::array<float, 2>> project(const Vec3& point) const;
 
+  /// The same of a point infinitely far away.
+  std::optional<std::array<float, 2>> project_direction(const Vec3& direction) const;
+  /// Of a point from the eye, along the view.
+  float distance_ahead(const Vec3& point) const { return dot(point - origin_, forward_); }
+
   /// Points of the world, as row vectors (x, y, z, 1), to the camera's own frame: x to the right, y
   /// up, looking along -z.
   Matrix4 world_to_camera() const;

@@ -1,0 +1,29 @@
+#pragma once
+
+#include <string>
+#include <vector>
+
+#include "common/job/job_spec.h"
+
+namespace baton {
+
+/// Layers of ID mattes (common/image/cryptomatte.h), and how many things of a pixel they keep.
+inline constexpr const char* kCryptoObject = "CryptoObject";
+inline constexpr const char* kCryptoMaterial = "CryptoMaterial";
+inline constexpr std::size_t kCryptoRanks = 6;
+
+/// What is known of an AOV without a frame.
+struct AovTraits {
+  std::vector<std::string> channels;  ///< of the EXR file, as compositors expect them
+  bool is_float = false;              ///< 32 bits whatever output.pixelType says
+  bool of_geometry = false;           ///< follows from what the sites see, not from samples
+  double film_bytes = 4;              ///< of a pixel with a surface in a packed film, measured
+};
+const AovTraits& traits(Aov aov);
+
+/// The job's objects for people: by their meshes, "bunny", "bunny.2" ...; the ground last.
+std::vector<std::string> object_names(const JobSpec& job);
+/// Its materials in the order of their numbers.
+std::vector<std::string> material_names(const JobSpec& job);
+
+}  // namespace baton

@@ -1,0 +1,59 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "common/image/film_tile.h"
+#include "worker/pass/primary.h"
+#include "worker/pass/render_context.h"
+
+namespace baton {
+
+/// The AOVs of a film that follow from what sites see, summed over the rounds of a frame: albedo,
+/// position, z, motion, object and the ID mattes. Nothing where the job has none of them.
+class GeometryPlanes {
+ public:
+  /// Of a tile in a frame.
+  GeometryPlanes(const RenderContext& context, const FrameSpec& frame,
+                 const FrameGeometry& geometry, const PixelRect& rect);
+
+  /// Whether the job has such AOVs.
+  bool is_empty() const { return sums_.empty(); }
+
+  /// Adds the sites of a round.
+  void add(const TileSurfaces& surfaces);
+  /// Writes the means into the planes of the film.
+  void write(FilmTile& film) const;
+
+ private:
+  /// Of one pixel. Sums over sites that see a surface; of motion over all sites.
+  struct Sum {
+    std::array<double, 3> albedo{}, position{};
+    double z = 0;
+    std::array<double, 4> motion{};
+    std::uint32_t object = 0;  ///< of the first site that sees one: number from 1; 0: none
+    std::uint32_t num_seen = 0;
+  };
+  /// The things that one pixel sees, and with how many sites. The first kMostThings are kept.
+  static constexpr std::size_t kMostThings = 8;
+  struct Things {
+    std::array<std::uint32_t, kMostThings> thing{}, sites{};  ///< thing: number from 1; 0: none
+
+    void add(std::uint32_t number);
+  };
+
+  void add_motion(const Camera& camera, const Ray& ray, const SurfaceHit& hit, Sum& sum) const;
+  void write_ids(const std::vector<Things>& things, const std::vector<std::string>& names,
+                 Aov layer, FilmTile& film) const;
+  bool has(Aov aov) const;
+
+  const RenderContext& context_;
+  const FrameGeometry& geometry_;
+  Pose before_, after_;  ///< of the frame numbers one less and one more; only for motion
+  std::vector<Sum> sums_;
+  std::vector<Things> objects_, materials_;  ///< (pixels), or empty
+  std::uint32_t num_sites_ = 0;              ///< of a pixel, over the rounds so far
+};
+
+}  // namespace baton
