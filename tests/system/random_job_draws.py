@@ -128,6 +128,8 @@ class Draw(Textures):
             "scene.ground.height": lambda: self.pick(None, -1.0, 0.3),
             "scene.ground.size": lambda: self.pick(None, 2.0, 50.0),
             "environment.scale": lambda: self.pick(None, None, 0.1, 7.0, 1e-9, 1e9),
+            "environment.scaleKeys": lambda: self.number_keys("scale", 0.1, 4) if self.chance(0.2) else None,
+            "environment.rotation.keys": lambda: self.number_keys("deg", -90, 90) if self.chance(0.2) else None,
             "environment.maxWidth": lambda: self.pick(None, None, 0, 1, 3, 8, 16),
             "environment.rotation.axis": lambda: self.pick(None, [1, 2, 3], [0, 0, -1], [1e-9, 0, 0]),
             "environment.rotation.degPerFrame": lambda: self.pick(0.0, 0.1, 1.5, 20.0, -90.0, 1e6),
@@ -234,6 +236,9 @@ class Draw(Textures):
             item.pop("placeOnGround", None)
             item.update(translate=[0.9 - 1.8 * number, 0.7, 0.3 * number], scale=0.7)
         return item
+
+    def number_keys(self, name, low, high):
+        return [{"frame": frame, name: round(self.rng.uniform(low, high), 3)} for frame in self.key_frames()]
 
     def key_frames(self):
         """Ascending frames, at times between those of the job or beyond them."""
