@@ -43,6 +43,10 @@ class SlurmFarm:
     def log(self):
         return self.process.log()
 
+    def num_arrays(self):
+        """How often pilots were submitted."""
+        return self.log().count("pilots are submitted")
+
     def baton(self, *words, **options):
         endpoint = (self.folder / "farm" / "endpoint").read_text(encoding="ascii").strip()
         return self.programs.run("baton", *words, "--coordinator", endpoint.replace("0.0.0.0", "127.0.0.1"),
@@ -101,34 +105,33 @@ def pilots_follow_the_work_and_are_replaced(programs, folder):
         farm = SlurmFarm(programs, cluster, folder, "1-3", "10")
         farm.start()
         check_equal(len(farm.workers()), 1, "pilots without work")
+
+        # The controller forgets what it took a moment ago, which may be running; the pilot of before goes on.
+        num_arrays = farm.num_arrays()
         filler = farm.fill()
-        first = farm.wait_for_new(3, set(), "three pilots work")
+        farm.wait_while_busy(lambda: farm.num_arrays() > num_arrays, "two more are submitted")
+        cluster.kill_controller()
+        farm.keep_busy()
+        cluster.start_controller()
+        first = farm.wait_while_busy(lambda: len(known := farm.workers() & set(cluster.running())) >= 3 and known,
+                                     "three pilots work, and the queue knows them")
 
         status = farm.baton("farm", "status").stdout
         for pilot in first:
             check(f"slurm-{pilot} " in status, f"pilot {pilot} is not shown beside its worker:\n{status}")
 
         # Cancelled, or back in the queue: others come, and nothing that they held counts as lost or failed.
+        farm.finish_job()
+        lost = farm.attempts_lost
         cancelled, requeued = sorted(first)[:2]
         cluster.run("scancel", cancelled)
         cluster.run("scontrol", "requeue", requeued)
         second = farm.wait_for_new(3, {cancelled, requeued}, "two pilots are replaced")
         farm.finish_job()
-        check_equal(farm.attempts_lost, 0, "attempts lost or failed by a drain")
-
-        # The controller forgets what it took a moment ago, which may be running.
-        gone = min(second)
-        cluster.run("scancel", gone)
-        num_arrays = farm.log().count("pilots are submitted")
-        farm.wait_while_busy(lambda: farm.log().count("pilots are submitted") > num_arrays, "one is submitted")
-        cluster.kill_controller()
-        farm.keep_busy()
-        cluster.start_controller()
-        third = farm.wait_for_new(3, {gone}, "pilots that nobody knows are replaced")
+        check_equal(farm.attempts_lost, lost, "attempts lost or failed by a drain")
 
         # A node dies: its tasks go to the others, long before Slurm hears of it.
-        rows = wait_until(lambda: {p: n for p, n in cluster.running().items() if p in third}, "the queue is known again")
-        pilot, node = sorted(rows.items())[0]
+        pilot, node = sorted((p, n) for p, n in cluster.running().items() if p in second)[0]
         cluster.kill_node(node)
         farm.wait_while_busy(lambda: pilot not in farm.workers(), "the pilot of the dead node is missed")
         farm.finish_job()
@@ -139,16 +142,24 @@ def pilots_follow_the_work_and_are_replaced(programs, folder):
         farm.stop()
 
 
-def a_pilot_ends_with_its_time(programs, folder):
-    with Cluster(folder / "slurm", nodes=1) as cluster:
-        farm = SlurmFarm(programs, cluster, folder, "1", "0:06")
+def pilots_end_with_their_time(programs, folder, nodes, time_limit, generations):
+    """So many pilots, one after the other on each node; Slurm, which counts whole minutes, has to end none of them."""
+    with Cluster(folder / "slurm", nodes=nodes) as cluster:
+        farm = SlurmFarm(programs, cluster, folder, str(nodes), time_limit)
         farm.start()
         seen = farm.workers()
-        while len(seen) < 2:
+        while len(seen) < nodes * generations:
             seen |= farm.wait_while_busy(lambda: farm.workers() - seen, "the next pilot")
         farm.finish_job()
         check_equal(farm.attempts_lost, 0, "attempts lost or failed when a pilot's time was up")
+        logs = {log.stem: log.read_text(encoding="utf-8") for log in (folder / "farm" / "slurm").glob("*.log")}
+        ended = [name for name, log in logs.items() if "ends: its time is up" in log]
+        check(len(ended) >= nodes * (generations - 1), f"pilots that ended with their time: {ended}\n{logs}")
         farm.stop()
+
+
+def a_pilot_ends_with_its_time(programs, folder):
+    pilots_end_with_their_time(programs, folder, 1, "0:06", 2)
 
 
 def a_job_of_its_own_is_rendered_and_resumed(programs, folder):
@@ -191,7 +202,7 @@ def the_recipes_do_without_the_command(programs, folder):
 
 
 def what_slurm_finds_out_late(programs, folder):
-    """Suspended pilots, and a dead node that Slurm believes in for a while."""
+    """Suspended pilots, a dead node that Slurm believes in for a while, a controller that dies after a submission."""
     with Cluster(folder / "slurm") as cluster:
         farm = SlurmFarm(programs, cluster, folder, "1-2", "10")
         farm.start()
@@ -212,8 +223,8 @@ def what_slurm_finds_out_late(programs, folder):
         # Two seconds after a submission.
         gone = min(farm.workers())
         cluster.run("scancel", gone)
-        num_arrays = farm.log().count("pilots are submitted")
-        farm.wait_while_busy(lambda: farm.log().count("pilots are submitted") > num_arrays, "one is submitted")
+        num_arrays = farm.num_arrays()
+        farm.wait_while_busy(lambda: farm.num_arrays() > num_arrays, "one is submitted")
         time.sleep(2)
         cluster.kill_controller()
         time.sleep(5)
@@ -224,6 +235,11 @@ def what_slurm_finds_out_late(programs, folder):
         farm.stop()
 
 
+def pilots_of_half_a_minute(programs, folder):
+    pilots_end_with_their_time(programs, folder, 3, "0:30", 3)
+
+
 if __name__ == "__main__":
     run_tests([pilots_follow_the_work_and_are_replaced, a_pilot_ends_with_its_time,
-               a_job_of_its_own_is_rendered_and_resumed, the_recipes_do_without_the_command], long_tests=[what_slurm_finds_out_late])
+               a_job_of_its_own_is_rendered_and_resumed, the_recipes_do_without_the_command],
+              long_tests=[what_slurm_finds_out_late, pilots_of_half_a_minute])
