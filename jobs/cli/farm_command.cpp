@@ -56,6 +56,12 @@ OpenFarm attach(const FarmCommandOptions& options) {
           options.coordinator};
 }
 
+/// How `baton` speaks to a coordinator, as arguments.
+std::string link_arguments(const CoordinatorLink& link) {
+  return fmt::format("--coordinator {}{}", link.endpoint,
+                     link.key_file.empty() ? std::string() : " --key " + link.key_file);
+}
+
 /// Starts a coordinator where the nodes reach it, with keys of its own. It has the port of the last
 /// time, which pilots may still be trying.
 Result<OpenFarm> start(const FarmCommandOptions& options, FarmOptions farm) {
@@ -139,8 +145,11 @@ Result<ExitCode> run_slurm(const FarmCommandOptions& options) {
   BATON_TRY(pilots.prepare());
   BATON_ASSIGN(RequestClient client, open.link.connect());
   BATON_ASSIGN(RequestClient watcher, open.link.connect());
-  fmt::print(stderr, "to look at the farm: baton farm status --coordinator {} --key {}\n",
-             open.link.endpoint, open.link.key_file);
+  fmt::print(stderr, "to look at the farm: baton farm status {}\n", link_arguments(open.link));
+  if (!wanted) {
+    fmt::print(stderr, "to hand in a job: baton job submit JOB {}\nCtrl-C ends the farm\n",
+               link_arguments({open.pilot_endpoint, open.link.key_file}));
+  }
 
   RenderSession session(render, signals, std::move(open.farm), std::move(client));
   auto outcome = work(session, render, wanted, [&] { pilots.tend(watcher); });

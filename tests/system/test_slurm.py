@@ -16,7 +16,7 @@ NUM_FRAMES = 12
 class SlurmFarm:
     """`baton farm slurm` without a job of its own, and a job that is submitted to it again and again."""
 
-    def __init__(self, programs, cluster, folder, nodes, time_limit):
+    def __init__(self, programs, cluster, folder, nodes, time_limit="--time=10"):
         self.programs, self.cluster, self.folder = programs, cluster, folder
         self.job_path = write_job(folder / "job" / "job.json", make_job(
             folder / "job", frames=f"1-{NUM_FRAMES}", image={"tileSize": 32},
@@ -27,7 +27,7 @@ class SlurmFarm:
         shutil.rmtree(self.frames)
         self.job, self.num_done, self.attempts_lost = None, 0, 0
         self.command = [programs.path("baton"), "farm", "slurm", "--work-dir", str(folder / "farm"), "--nodes", nodes,
-                        "--time", time_limit, "--poll", "0.5", "--host", "127.0.0.1"]
+                        time_limit, "--poll", "0.5", "--host", "127.0.0.1"]
         self.process = None
 
     @property
@@ -100,11 +100,19 @@ class SlurmFarm:
         wait_until(lambda: all(state == "COMPLETING" for state, _ in self.cluster.pilots().values()), "the queue is empty")
 
 
+def check_that_all_have_an_end(cluster, least):
+    """So many workers or more, each of which was told when its ten minutes are over."""
+    now = time.time()
+    ends = [int(words[words.index("--end-at") + 1]) for words in cluster.command_lines("baton-worker")]
+    check(len(ends) >= least and all(now < end <= now + 600 for end in ends), f"ends of pilots, at {now}: {ends}")
+
+
 def pilots_follow_the_work_and_are_replaced(programs, folder):
     with Cluster(folder / "slurm") as cluster:
-        farm = SlurmFarm(programs, cluster, folder, "1-3", "10")
+        farm = SlurmFarm(programs, cluster, folder, "1-3", "--sbatch-arg=--time=10")
         farm.start()
         check_equal(len(farm.workers()), 1, "pilots without work")
+        check("to hand in a job: baton job submit JOB --coordinator tcp://127.0.0.1:" in farm.log(), farm.log())
 
         # The controller forgets what it took a moment ago, which may be running; the pilot of before goes on.
         num_arrays = farm.num_arrays()
@@ -119,6 +127,7 @@ def pilots_follow_the_work_and_are_replaced(programs, folder):
         status = farm.baton("farm", "status").stdout
         for pilot in first:
             check(f"slurm-{pilot} " in status, f"pilot {pilot} is not shown beside its worker:\n{status}")
+        check_that_all_have_an_end(cluster, 3)
 
         # Cancelled, or back in the queue: others come, and nothing that they held counts as lost or failed.
         farm.finish_job()
@@ -145,7 +154,7 @@ def pilots_follow_the_work_and_are_replaced(programs, folder):
 def pilots_end_with_their_time(programs, folder, nodes, time_limit, generations):
     """So many pilots, one after the other on each node; Slurm, which counts whole minutes, has to end none of them."""
     with Cluster(folder / "slurm", nodes=nodes) as cluster:
-        farm = SlurmFarm(programs, cluster, folder, str(nodes), time_limit)
+        farm = SlurmFarm(programs, cluster, folder, str(nodes), f"--time={time_limit}")
         farm.start()
         seen = farm.workers()
         while len(seen) < nodes * generations:
@@ -165,7 +174,7 @@ def a_pilot_ends_with_its_time(programs, folder):
 def a_job_of_its_own_is_rendered_and_resumed(programs, folder):
     """As people use it: one command for one job, killed on the way."""
     with Cluster(folder / "slurm", nodes=2) as cluster:
-        farm = SlurmFarm(programs, cluster, folder, "2", "10")
+        farm = SlurmFarm(programs, cluster, folder, "2")
         farm.command.insert(3, str(farm.job_path))
         farm.process = Process(farm.command, folder / "farm.log", cluster.environment)
         wait_until(lambda: list(farm.frames.glob("*.exr")), "the first frame")
@@ -180,7 +189,7 @@ def the_recipes_do_without_the_command(programs, folder):
     """docker/slurm: a farm inside one allocation, and workers for a coordinator outside."""
     recipes = Path(__file__).resolve().parents[2] / "docker" / "slurm"
     with Cluster(folder / "slurm", nodes=2) as cluster:
-        farm = SlurmFarm(programs, cluster, folder, "1", "10")
+        farm = SlurmFarm(programs, cluster, folder, "1")
         cluster.environment["PATH"] = f"{programs.bin.resolve()}:{os.environ['PATH']}"
         cluster.run("sbatch", "--nodes=2", "--time=10", f"--output={folder}/inside.log", recipes / "farm.sbatch",
                     farm.job_path, folder / "inside")
@@ -194,6 +203,8 @@ def the_recipes_do_without_the_command(programs, folder):
             outside.start_coordinator()
             cluster.environment["BATON_COORDINATOR"] = outside.endpoint
             cluster.run("sbatch", "--array=1-2", "--time=10", f"--output={folder}/worker-%a.log", recipes / "workers.sbatch")
+            wait_until(lambda: len(cluster.command_lines("baton-worker")) == 2, "both workers run")
+            check_that_all_have_an_end(cluster, 2)
             outside.wait_for(outside.submit(farm.job_path))
             check_equal(programs.pixels(farm.frames), farm.expected, "frames by workers of the recipe")
 
@@ -204,7 +215,7 @@ def the_recipes_do_without_the_command(programs, folder):
 def what_slurm_finds_out_late(programs, folder):
     """Suspended pilots, a dead node that Slurm believes in for a while, a controller that dies after a submission."""
     with Cluster(folder / "slurm") as cluster:
-        farm = SlurmFarm(programs, cluster, folder, "1-2", "10")
+        farm = SlurmFarm(programs, cluster, folder, "1-2")
         farm.start()
         first = farm.wait_for_new(2, set(), "two pilots work")
         suspended = min(first)
