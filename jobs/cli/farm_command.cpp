@@ -49,11 +49,17 @@ struct OpenFarm {
   std::string worker_key, pilot_endpoint;
 };
 
-OpenFarm attach(const FarmCommandOptions& options) {
-  return {LocalFarm::attach(options.coordinator),
-          {options.coordinator, options.key},
-          options.worker_key,
-          options.coordinator};
+Result<OpenFarm> attach(const FarmCommandOptions& options) {
+  if (options.key.empty() != options.worker_key.empty()) {
+    return Error{ErrorKind::usage,
+                 "--key is for this command and --worker-key for the pilots: a coordinator with "
+                 "keys needs both"};
+  }
+  BATON_TRY(client_access(options.worker_key, true));  // before the pilots find out
+  return OpenFarm{LocalFarm::attach(options.coordinator),
+                  {options.coordinator, options.key},
+                  options.worker_key,
+                  options.coordinator};
 }
 
 /// How `baton` speaks to a coordinator, as arguments.
@@ -137,7 +143,7 @@ Result<ExitCode> run_slurm(const FarmCommandOptions& options) {
 
   const SignalWait signals;
   BATON_ASSIGN(OpenFarm open,
-               options.coordinator.empty() ? start(options, local) : Result(attach(options)));
+               options.coordinator.empty() ? start(options, local) : attach(options));
   const fs::path folder = local.work_directory / "slurm";
   BATON_ASSIGN(PilotJob pilot, pilot_job(options, open, folder));
   SlurmFarm pilots({std::move(pilot), nodes, folder / "pilot.sh",

@@ -185,6 +185,18 @@ def a_job_of_its_own_is_rendered_and_resumed(programs, folder):
         check("keys/admin.key" in again.log(), "the command says how to look at the farm")
 
 
+def pilots_that_cannot_work_are_told_of(programs, folder):
+    """They end as soon as they begin. The command says why, and does not fill the queue with others."""
+    with Cluster(folder / "slurm", nodes=1) as cluster:
+        farm = SlurmFarm(programs, cluster, folder, "1")
+        farm.process = Process([*farm.command, "--worker-arg=--map=nonsense"], folder / "farm.log", cluster.environment)
+        wait_until(lambda: "no pilot of the last 2 arrays has reached the coordinator" in farm.log(), "the command tells")
+        check("--map nonsense" in farm.log(), f"not told why\n{farm.log()}")
+        time.sleep(3)  # some looks, and far from a minute
+        check_equal(farm.num_arrays(), 2, f"arrays\n{farm.log()}")
+        farm.stop()
+
+
 def the_recipes_do_without_the_command(programs, folder):
     """docker/slurm: a farm inside one allocation, and workers for a coordinator outside."""
     recipes = Path(__file__).resolve().parents[2] / "docker" / "slurm"
@@ -252,5 +264,5 @@ def pilots_of_half_a_minute(programs, folder):
 
 if __name__ == "__main__":
     run_tests([pilots_follow_the_work_and_are_replaced, a_pilot_ends_with_its_time,
-               a_job_of_its_own_is_rendered_and_resumed, the_recipes_do_without_the_command],
+               a_job_of_its_own_is_rendered_and_resumed, pilots_that_cannot_work_are_told_of, the_recipes_do_without_the_command],
               long_tests=[what_slurm_finds_out_late, pilots_of_half_a_minute])
