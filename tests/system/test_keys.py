@@ -122,6 +122,9 @@ def other_machines_need_keys(programs, folder):
     check("a key is not replaced" in again.stderr, again.stderr)
     wrong = programs.run("baton", "job", "list", "--key", folder / "keys/server.key", expect=USAGE)
     check("is the key of a coordinator" in wrong.stderr, wrong.stderr)
+    no_worker_key = programs.run("baton", "farm", "slurm", "--work-dir", folder / "slurm", "--coordinator",
+                                 "tcp://192.0.2.1:5570", "--key", folder / "keys/admin.key", expect=USAGE)
+    check("a coordinator with keys needs both" in no_worker_key.stderr, no_worker_key.stderr)
     os.chmod(folder / "keys/user.key", 0o644)
     open_key = programs.run("baton", "job", "list", "--key", folder / "keys/user.key", expect=USAGE)
     check("chmod 600" in open_key.stderr, open_key.stderr)
