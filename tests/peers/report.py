@@ -1,0 +1,137 @@
+"""What a comparison says: tables for the screen and the page, numbers as JSON, a sheet of pictures."""
+
+import json
+
+import numpy as np
+
+import errors
+import pictures
+
+GOALS = {"still": 10, "at rest": 25, "in motion": 12}
+CROP = 176
+
+
+def kind_of(placed):
+    if len(placed["frames"]) == 1:
+        return "still"
+    return "in motion" if placed["moves"] else "at rest"
+
+
+def digits(value, count=2):
+    """A number with so many digits that count, without exponents."""
+    if value <= 0 or value >= 10**count:
+        return f"{value:.0f}"
+    return f"{value:.{max(0, count - 1 - int(np.floor(np.log10(value))))}f}"
+
+
+def start_of(settings):
+    """CPU seconds without a sample: the line through the two cheapest settings."""
+    a, b = settings[0], settings[1]
+    return a.cpu() - (b.cpu() - a.cpu()) / (b.level - a.level) * a.level
+
+
+class Scene:
+    """The settings of one job, measured."""
+
+    def __init__(self, placed, cycles, variants):
+        """cycles: settings from cheap to dear; variants: lists of such by name."""
+        self.placed, self.kind, self.cycles, self.variants = placed, kind_of(placed), cycles, variants
+        errors.draw([*cycles, *(s for curve in variants.values() for s in curve)])
+        self.ratios = [self.best_ratio(other) for other in cycles]
+        self.difference = errors.difference(max(cycles, key=errors.Setting.work),
+                                            max(self.baton(), key=errors.Setting.work))
+
+    def baton(self):
+        return [setting for curve in self.variants.values() for setting in curve]
+
+    def best_ratio(self, other):
+        """The variant that is cheapest at the error of `other`, and its ratio."""
+        ratios = {name: errors.ratio_at_error(curve, other) for name, curve in self.variants.items()}
+        name = max(ratios, key=lambda variant: ratios[variant].value)
+        return name, ratios[name]
+
+    def triangles(self):
+        return max(mesh["triangles"] for mesh in self.placed["meshes"])
+
+
+def ratio_text(ratio, goal):
+    text = f"{'at least ' if ratio.bound else ''}{digits(ratio.value)} [{digits(ratio.low)}, {digits(ratio.high)}]"
+    text += " *" if ratio.extrapolated else ""
+    return f"**{text}**" if ratio.value < goal else text
+
+
+def rmse_text(setting):
+    low, high = errors.interval(np.sqrt(setting.draws["mse"]))
+    return f"{digits(np.sqrt(setting.mse()))} [{digits(low)}, {digits(high)}]"
+
+
+def main_table(scenes):
+    lines = ["| scene | Cycles: spp | RMSE | CPU s | Baton at this error | CPU s | times cheaper | goal |",
+             "|---|---|---|---|---|---|---|---|"]
+    for scene in scenes:
+        goal = GOALS[scene.kind]
+        for other, (name, ratio) in zip(scene.cycles, scene.ratios):
+            lines.append(f"| {scene.placed['name']} | {other.level} | {rmse_text(other)} | {digits(other.cpu())} | "
+                         f"{name} | {digits(ratio.cpu)} | {ratio_text(ratio, goal)} | {goal} |")
+    return lines
+
+
+def settings_table(scene):
+    lines = [f"{scene.placed['name']}: {scene.triangles()} triangles, {scene.placed['width']} x "
+             f"{scene.placed['height']} pixels, {len(scene.placed['frames'])} frames, {scene.kind}", "",
+             "| | spp or rounds | pairs | CPU s | RMSE | efficiency |", "|---|---|---|---|---|---|"]
+    for name, curve in {"Cycles": scene.cycles, **scene.variants}.items():
+        for s in curve:
+            low, high = errors.interval(1 / (s.draws["mse"] * s.draws["cpu"]))
+            lines.append(f"| {name} | {s.level} | {len(s.pairs)} | {digits(s.cpu(), 3)} | {rmse_text(s)} | "
+                         f"{digits(s.efficiency(), 3)} [{digits(low, 3)}, {digits(high, 3)}] |")
+    return [*lines, ""]
+
+
+def difference_table(scenes):
+    lines = ["| scene | image mean | Cycles over it | rms over blocks | z^2 of blocks | of Cycles' MSE at most |",
+             "|---|---|---|---|---|---|"]
+    for scene in scenes:
+        d = scene.difference
+        share = np.square(d.systematic * d.mean) / min(s.mse() for s in scene.cycles)
+        lines.append(f"| {scene.placed['name']} | {digits(d.mean, 3)} | {100 * d.relative:+.3f} % +- "
+                     f"{196 * d.error:.3f} % | {100 * d.systematic:.2f} % | {digits(d.z_squared)} | {100 * share:.1f} % |")
+    return lines
+
+
+def text(scenes, said):
+    """The whole comparison as Markdown; said: lines about machine and programs."""
+    starts = [f"- {scene.placed['name']}: start-up (CPU s without a sample) of Cycles {digits(start_of(scene.cycles))}, of Baton "
+              f"{digits(start_of(next(iter(scene.variants.values()))))}" for scene in scenes
+              if min(len(scene.cycles), len(next(iter(scene.variants.values())))) > 1]
+    parts = [[*said, ""], main_table(scenes), ["", *starts, ""], difference_table(scenes), [""],
+             *(settings_table(scene) for scene in scenes)]
+    return "\n".join(line for part in parts for line in part)
+
+
+def numbers(scenes):
+    """The same for programs."""
+    def of_setting(name, s):
+        return {"renderer": name, "level": s.level, "pairs": len(s.pairs), "cpuSeconds": s.cpu(), "mse": s.mse(),
+                "mseInterval": errors.interval(s.draws["mse"]), "efficiency": s.efficiency()}
+
+    return json.dumps([{
+        "scene": scene.placed["name"], "kind": scene.kind, "goal": GOALS[scene.kind], "triangles": scene.triangles(),
+        "settings": [of_setting(name, s) for name, curve in {"Cycles": scene.cycles, **scene.variants}.items()
+                     for s in curve],
+        "ratios": [{"spp": other.level, "baton": name, **vars(ratio)}
+                   for other, (name, ratio) in zip(scene.cycles, scene.ratios)],
+        "difference": vars(scene.difference)} for scene in scenes], indent=1)
+
+
+def cropped(picture):
+    """The middle of a picture, for the eye."""
+    top, left = (max(0, (size - CROP) // 2) for size in picture.shape[:2])
+    return pictures.to_srgb(picture[top:top + CROP, left:left + CROP])
+
+
+def equal_time(scene, level):
+    """The Cycles setting of that level, and the dearest of Baton's that takes no longer (or else its cheapest)."""
+    other = next((s for s in scene.cycles if s.level == level), scene.cycles[0])
+    affordable = [s for s in scene.baton() if s.cpu() <= other.cpu()] or [min(scene.baton(), key=errors.Setting.cpu)]
+    return other, min(affordable, key=errors.Setting.mse)
