@@ -31,7 +31,7 @@ VARIANTS = {"the job": {},
 # Means of the test picture: how far they may be apart, and where a planted fault must show.
 CHECK_SPP, CHECK_ROUNDS = 256, 16
 MOST_APART = 0.001
-MOST_SYSTEMATIC = 0.004
+MOST_Z_SQUARED = 2
 
 
 def say(text):
@@ -66,7 +66,7 @@ def agreement(work, fault):
                           ("the job", CHECK_ROUNDS): renderers.Baton(CHECK_ROUNDS, "the job", {})}.items():
         pairs[key] = errors.Setting(*key, [renderers.pair_of_runs(renderer, work, 0)[0]], work.block_pixels())
     d = errors.difference(*pairs.values())
-    return abs(d.relative) < MOST_APART and d.systematic < MOST_SYSTEMATIC, d
+    return abs(d.relative) < MOST_APART and d.z_squared < MOST_Z_SQUARED, d
 
 
 def check_conventions(options):

@@ -129,7 +129,8 @@ class MapWriter {
       }
     }
     files_.push_back(fmt::format("map-{}.exr", files_.size()));
-    return write_exr(folder_ / files_.back(), image, {.half_float = false, .compression = "none"});
+    return write_exr(folder_ / files_.back(), image,
+                     {.half_float = false, .compression = "none", .metadata = {}});
   }
 
   const EnvironmentSpec& environment_;
