@@ -12,6 +12,7 @@ import platform
 import shutil
 import subprocess
 import sys
+from dataclasses import dataclass
 from pathlib import Path
 
 import errors
@@ -20,13 +21,27 @@ import renderers
 import report
 
 HERE = Path(__file__).parent
-STILL_SPP, SEQUENCE_SPP = (16, 64, 256, 1024), (64,)
-STILL_ROUNDS, SEQUENCE_ROUNDS = (1, 4, 16, 64), (1, 4, 16)
-MOST_PAIRS = 4
-# In place of what a job says; the first is the job as it is.
-VARIANTS = {"the job": {},
-            "bidirectional": {"sampling.method": "bidirectional"},
-            "M = 128": {"sampling.numCandidates": 128}}
+SPP = {True: (16, 64, 256, 1024), False: (64,)}  # of stills, of sequences
+MOST_PAIRS = 2
+
+
+@dataclass(frozen=True)
+class Variant:
+    """Settings of Baton in place of a job's, and the rounds that they are measured with."""
+    changes: dict
+    still_rounds: tuple
+    sequence_rounds: tuple
+
+
+THE_JOB = "the job"
+VARIANTS = {
+    THE_JOB: Variant({}, (1, 4, 16, 64), (1, 4)),
+    "M = 128": Variant({"sampling.numCandidates": 128}, (1, 4, 16), (1, 4)),
+    "4 sites": Variant({"image.sites": 4, "sampling.numCandidates": 128}, (1, 4), (1,)),
+    "bidirectional": Variant({"sampling.method": "bidirectional"}, (1, 4, 16, 64), (1, 4)),
+    "bidirectional, 4 sites": Variant({"sampling.method": "bidirectional", "sampling.numCandidates": 128,
+                                       "image.sites": 4}, (1, 4), (1,)),
+}
 
 # Means of the test picture: how far they may be apart, and where a planted fault must show.
 CHECK_SPP, CHECK_ROUNDS = 256, 16
@@ -56,14 +71,14 @@ def measure(make, work, pairs, names):
 
 def renderer_of(key):
     name, level = key
-    return renderers.Cycles(level) if name == "Cycles" else renderers.Baton(level, name, VARIANTS[name])
+    return renderers.Cycles(level) if name == "Cycles" else renderers.Baton(level, name, VARIANTS[name].changes)
 
 
 def agreement(work, fault):
     """Whether both renderers show the test picture alike, and the difference."""
     pairs = {}
     for key, renderer in {("Cycles", CHECK_SPP): renderers.Cycles(CHECK_SPP, fault=fault),
-                          ("the job", CHECK_ROUNDS): renderers.Baton(CHECK_ROUNDS, "the job", {})}.items():
+                          (THE_JOB, CHECK_ROUNDS): renderers.Baton(CHECK_ROUNDS, THE_JOB, {})}.items():
         pairs[key] = errors.Setting(*key, [renderers.pair_of_runs(renderer, work, 0)[0]], work.block_pixels())
     d = errors.difference(*pairs.values())
     return abs(d.relative) < MOST_APART and d.z_squared < MOST_Z_SQUARED, d
@@ -87,19 +102,21 @@ def compare(job, options):
     work = renderers.Work(job, options.output / job.stem, options.bin)
     work.place()
     still = report.kind_of(work.placed) == "still"
-    spp = options.spp or (STILL_SPP if still else SEQUENCE_SPP)
-    rounds = options.rounds or (STILL_ROUNDS if still else SEQUENCE_ROUNDS)
-    names = [("Cycles", level) for level in spp] + [(name, level) for name in VARIANTS for level in rounds]
-    finest = {"Cycles": max(spp)}
+    work.every = 1 if still else options.every
+    levels = {"Cycles": options.spp or SPP[still]}
+    for name, variant in VARIANTS.items():
+        levels[name] = options.rounds or (variant.still_rounds if still else variant.sequence_rounds)
+    dearest = {"Cycles": max(levels["Cycles"]), **{name: max(levels[THE_JOB]) for name in VARIANTS}}
 
     def pairs(key):
-        return max(1, min(options.pairs, finest.get(key[0], max(rounds)) // key[1]))
+        return max(1, min(options.pairs, dearest[key[0]] // (16 * key[1])))
 
+    names = [(name, level) for name, some in levels.items() for level in some]
     settings, files = measure(renderer_of, work, pairs, names)
-    scene = report.Scene(work.placed, [settings["Cycles", level] for level in spp],
-                         {name: [settings[name, level] for level in rounds] for name in VARIANTS})
+    curves = {name: [settings[name, level] for level in some] for name, some in levels.items()}
+    scene = report.Scene(work.placed, curves.pop("Cycles"), curves)
     other, own = report.equal_time(scene, 64)
-    finest_key = ("Cycles", max(spp))
+    finest_key = ("Cycles", dearest["Cycles"])
     row = [report.cropped(renderers.last_frames(files[s.name, s.level])[0]) for s in (other, own)]
     row.append(report.cropped(renderers.last_frames(files[finest_key]).mean(0)))
     said = (f"{work.name}: Cycles {other.level} spp ({other.cpu():.1f} CPU s), Baton, {own.name}, {own.level} rounds "
@@ -124,6 +141,7 @@ def parse_arguments():
     parser.add_argument("--output", type=Path, required=True)
     parser.add_argument("--spp", type=levels, help="of Cycles: 16,64,256")
     parser.add_argument("--rounds", type=levels, help="of Baton: 1,4,16")
+    parser.add_argument("--every", type=int, default=4, help="of a sequence, Cycles renders every so-manyth frame (4)")
     parser.add_argument("--pairs", type=int, default=MOST_PAIRS, help="of the cheaper settings")
     return parser.parse_args()
 

@@ -3,6 +3,7 @@
 import hashlib
 import json
 import os
+import re
 import shutil
 import subprocess
 from dataclasses import dataclass, field
@@ -47,6 +48,7 @@ class Work:
     job: Path
     folder: Path
     bin: Path
+    every: int = 1  # frames that errors are measured in, and that Cycles renders: the first, and every so-manyth
     placed: dict = field(default_factory=dict)
     digest: str = ""
 
@@ -65,7 +67,10 @@ class Work:
 
     @property
     def files(self):
-        return [frame["file"] for frame in self.placed["frames"]]
+        return [frame["file"] for frame in self.placed["frames"][::self.every]]
+
+    def log(self):
+        return (self.folder / "last.log").read_text(encoding="utf-8", errors="replace")
 
     def block_pixels(self):
         return errors.block_sizes(self.placed["height"], self.placed["width"])
@@ -93,7 +98,13 @@ class Cycles:
         fault = ["--fault", self.fault] if self.fault else []
         return ["blender", "-b", "--factory-startup", "-noaudio", "--python-exit-code", "1",
                 "-P", HERE / "cycles_scene.py", "--", work.folder / "placed", out, "--spp", self.level,
-                "--seed", seed, "--threads", os.cpu_count(), *fault]
+                "--seed", seed, "--threads", os.cpu_count(), "--every", work.every, *fault]
+
+    def cpu_of_all(self, work, cpu):
+        """CPU seconds if it had rendered all frames: each starts from nothing and takes as long as the others."""
+        marks = [float(text) for text in re.findall(r"^CPU seconds: (.*)$", work.log(), re.MULTILINE)]
+        left = len(work.placed["frames"]) - len(marks)
+        return cpu + (left * (marks[-1] - marks[0]) / (len(marks) - 1) if left > 0 else 0)
 
 
 @dataclass
@@ -112,20 +123,23 @@ class Baton:
                    "output.directory": out}
         return [work.bin / "baton", "render", work.job, *settings_of(changes)]
 
+    def cpu_of_all(self, _, cpu):
+        return cpu
+
 
 def render(renderer, work, seed):
-    """Frames of one run, (frames, height, width, 3), and its CPU seconds."""
+    """The frames of one run that errors are measured in, (frames, height, width, 3), and the CPU seconds of all."""
     out = work.folder / "frames"
     shutil.rmtree(out, ignore_errors=True)
     cpu = run(renderer.command(work, seed, out), work.folder / "last.log")
     frames = np.stack([pictures.read_exr(out / file) for file in work.files])
     shutil.rmtree(out)
-    return frames, cpu
+    return frames, renderer.cpu_of_all(work, cpu)
 
 
 def pair_of_runs(renderer, work, number):
     """Pair `number` (from 0) of a setting, from disk where it was made before, and the path of its last frames."""
-    key = f"{work.digest} {renderer.identity(work)} {renderer.level} {number}"
+    key = f"{work.digest} {renderer.identity(work)} {renderer.level} {work.every} {number}"
     path = work.folder / "pairs" / (hashlib.sha256(key.encode()).hexdigest()[:24] + ".npz")
     if not path.exists():
         (a, cpu_a), (b, cpu_b) = (render(renderer, work, 2 * number + half + 1) for half in (0, 1))
