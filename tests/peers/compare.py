@@ -114,13 +114,13 @@ def compare(job, options):
     names = [(name, level) for name, some in levels.items() for level in some]
     settings, files = measure(renderer_of, work, pairs, names)
     curves = {name: [settings[name, level] for level in some] for name, some in levels.items()}
-    scene = report.Scene(work.placed, curves.pop("Cycles"), curves)
+    finest = [renderers.last_frames(files[name, dearest[name]]) for name in ("Cycles", THE_JOB)]
+    scene = report.Scene(work.placed, curves.pop("Cycles"), curves, errors.beyond_noise(*finest))
     other, own = report.equal_time(scene, 64)
-    finest_key = ("Cycles", dearest["Cycles"])
     row = [report.cropped(renderers.last_frames(files[s.name, s.level])[0]) for s in (other, own)]
-    row.append(report.cropped(renderers.last_frames(files[finest_key]).mean(0)))
+    row.append(report.cropped(finest[0].mean(0)))
     said = (f"{work.name}: Cycles {other.level} spp ({other.cpu():.1f} CPU s), Baton, {own.name}, {own.level} rounds "
-            f"({own.cpu():.1f} CPU s), Cycles {finest_key[1]} spp twice")
+            f"({own.cpu():.1f} CPU s), Cycles {dearest['Cycles']} spp twice")
     return scene, row, said
 
 

@@ -168,3 +168,15 @@ def difference(first, second):
                       float(np.mean(np.square(apart[known]) / variance[known])),
                       float(np.sqrt(max(0.0, (np.square(apart) - variance) @ first.shares))) / mean)
 
+
+def beyond_noise(first, second):
+    """Mean square over pixels and channels of the difference of two renderers' expectations, without their noise, and its
+    standard error. What differs from pixel to pixel and not on the mean of a block is in it. first, second: runs, (2 or
+    more, height, width, 3)."""
+    apart = first.mean(0, dtype=np.float64) - second.mean(0, dtype=np.float64)
+    noise = sum(runs.var(0, ddof=1, dtype=np.float64) / len(runs) for runs in (first, second))
+    blocks = block_means((np.square(apart) - noise).mean(-1)[None])[0]
+    shares = block_sizes(*apart.shape[:2])
+    shares = shares / shares.sum()
+    mean = blocks @ shares
+    return float(mean), float(np.sqrt(np.square(shares) @ np.square(blocks - mean)))

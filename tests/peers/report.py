@@ -33,13 +33,13 @@ def start_of(settings):
 class Scene:
     """The settings of one job, measured."""
 
-    def __init__(self, placed, cycles, variants):
-        """cycles: settings from cheap to dear; variants: lists of such by name."""
+    def __init__(self, placed, cycles, variants, beyond_noise):
+        """cycles: settings from cheap to dear; variants: lists of such by name; beyond_noise: of their finest pictures."""
+        self.beyond_noise = beyond_noise
         self.placed, self.kind, self.cycles, self.variants = placed, kind_of(placed), cycles, variants
         errors.draw([*cycles, *(s for curve in variants.values() for s in curve)])
         self.ratios = [self.best_ratio(other) for other in cycles]
-        self.difference = errors.difference(max(cycles, key=errors.Setting.work),
-                                            max(self.baton(), key=errors.Setting.work))
+        self.difference = errors.difference(cycles[-1], finest(variants))
 
     def baton(self):
         return [setting for curve in self.variants.values() for setting in curve]
@@ -52,6 +52,11 @@ class Scene:
 
     def triangles(self):
         return max(mesh["triangles"] for mesh in self.placed["meshes"])
+
+
+def finest(variants):
+    """The last setting of the first variant, which is the job as it is."""
+    return next(iter(variants.values()))[-1]
 
 
 def ratio_text(ratio, goal):
@@ -89,21 +94,25 @@ def settings_table(scene):
 
 
 def difference_table(scenes):
-    lines = ["| scene | image mean | Cycles over it | rms over blocks | z^2 of blocks | of Cycles' MSE at most |",
-             "|---|---|---|---|---|---|"]
+    lines = ["| scene | image mean | Cycles over it | z^2 of blocks | rms over blocks | mean square over pixels, of Cycles' "
+             "least MSE |", "|---|---|---|---|---|---|"]
     for scene in scenes:
-        d = scene.difference
-        share = np.square(d.systematic * d.mean) / min(s.mse() for s in scene.cycles)
+        d, least = scene.difference, scene.cycles[-1].mse()
+        square, error = (100 * value / least for value in scene.beyond_noise)
         lines.append(f"| {scene.placed['name']} | {digits(d.mean, 3)} | {100 * d.relative:+.3f} % +- "
-                     f"{196 * d.error:.3f} % | {100 * d.systematic:.2f} % | {digits(d.z_squared)} | {100 * share:.1f} % |")
+                     f"{196 * d.error:.3f} % | {digits(d.z_squared)} | {100 * d.systematic:.2f} % | "
+                     f"{square:.1f} % +- {1.96 * error:.1f} % |")
     return lines
 
 
 def text(scenes, said):
     """The whole comparison as Markdown; said: lines about machine and programs."""
-    starts = [f"- {scene.placed['name']}: start-up (CPU s without a sample) of Cycles {digits(start_of(scene.cycles))}, of Baton "
-              f"{digits(start_of(next(iter(scene.variants.values()))))}" for scene in scenes
-              if min(len(scene.cycles), len(next(iter(scene.variants.values())))) > 1]
+    starts = []
+    for scene in scenes:
+        job = next(iter(scene.variants.values()))
+        if len(scene.cycles) > 1 and len(job) > 1:
+            starts.append(f"- {scene.placed['name']}, CPU s without samples: Cycles {digits(start_of(scene.cycles))}, Baton "
+                          f"{digits(start_of(job))}")
     parts = [[*said, ""], main_table(scenes), ["", *starts, ""], difference_table(scenes), [""],
              *(settings_table(scene) for scene in scenes)]
     return "\n".join(line for part in parts for line in part)
@@ -121,7 +130,7 @@ def numbers(scenes):
                      for s in curve],
         "ratios": [{"spp": other.level, "baton": name, **vars(ratio)}
                    for other, (name, ratio) in zip(scene.cycles, scene.ratios)],
-        "difference": vars(scene.difference)} for scene in scenes], indent=1)
+        "difference": {**vars(scene.difference), "beyondNoise": scene.beyond_noise}} for scene in scenes], indent=1)
 
 
 def cropped(picture):
