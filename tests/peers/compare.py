@@ -37,8 +37,8 @@ THE_JOB = "the job"
 VARIANTS = {
     THE_JOB: Variant({}, (1, 4, 16, 64), (1, 4)),
     "M = 128": Variant({"sampling.numCandidates": 128}, (1, 4, 16), (1,)),
-    "4 sites": Variant({"image.sites": 4, "sampling.numCandidates": 128}, (1, 4), (1,)),
-    "bidirectional": Variant({"sampling.method": "bidirectional"}, (1, 4, 16, 64), (1,)),
+    "4 sites": Variant({"image.sites": 4, "sampling.numCandidates": 128}, (1, 4, 16, 64), (1, 4)),
+    "bidirectional": Variant({"sampling.method": "bidirectional"}, (1, 4, 16), (1,)),
     "bidirectional, 4 sites": Variant({"sampling.method": "bidirectional", "sampling.numCandidates": 128,
                                        "image.sites": 4}, (1, 4), (1,)),
 }
