@@ -10,8 +10,11 @@ from dataclasses import dataclass, field
 
 import numpy as np
 
+import pictures
+
 BLOCK = 16
 DRAWS = 2000
+MEASURES = ("mse", "shown")
 QUANTILES = (2.5, 97.5)
 
 
@@ -36,6 +39,14 @@ class Pair:
     grey_variance: np.ndarray  # (frames, blocks): variance of a pixel's mean over channels
     grey: np.ndarray  # (2, frames, blocks): mean over channels and pixels of each run
     cpu: np.ndarray  # (2): CPU seconds of each run
+    shown: np.ndarray  # (1, blocks): squared error of the last frame as a screen shows it, 0 to 1
+
+
+def shown_error(a, b):
+    """Squared error of one of two pictures, (height, width, 3), as sRGB clamped to [0, 1]: dark parts count as the eye
+    sees them, highlights no more than white. Returns (1, blocks)."""
+    apart = pictures.to_display(a) - pictures.to_display(b)
+    return block_means(0.5 * np.square(apart).mean(-1)[None])
 
 
 def measure_pair(a, b, cpu):
@@ -43,7 +54,7 @@ def measure_pair(a, b, cpu):
     grey_a, grey_b = a.mean(-1, dtype=np.float64), b.mean(-1, dtype=np.float64)
     half_squares = 0.5 * np.square(a.astype(np.float64) - b).mean(-1)
     return Pair(block_means(half_squares), block_means(0.5 * np.square(grey_a - grey_b)),
-                np.stack([block_means(grey_a), block_means(grey_b)]), np.asarray(cpu, float))
+                np.stack([block_means(grey_a), block_means(grey_b)]), np.asarray(cpu, float), shown_error(a[-1], b[-1]))
 
 
 @dataclass
@@ -59,12 +70,12 @@ class Setting:
     def shares(self):
         return self.pixels / self.pixels.sum()
 
-    def blocks(self):
+    def blocks(self, measure):
         """Squared error, (pairs, blocks)."""
-        return np.array([pair.mse.mean(0) for pair in self.pairs])
+        return np.array([getattr(pair, measure).mean(0) for pair in self.pairs])
 
-    def mse(self):
-        return float((self.blocks() @ self.shares).mean())
+    def mse(self, measure="mse"):
+        return float((self.blocks(measure) @ self.shares).mean())
 
     def cpu(self):
         return float(np.mean([pair.cpu for pair in self.pairs]))
@@ -83,7 +94,7 @@ def interval(values):
 
 
 def draw(settings, seed=1):
-    """Fills in DRAWS bootstrap values of MSE and CPU seconds of each setting of a scene."""
+    """Fills in DRAWS bootstrap values of errors and CPU seconds of each setting of a scene."""
     random = np.random.default_rng(seed)
     shares = settings[0].shares
     picked = random.multinomial(len(shares), np.full(len(shares), 1 / len(shares)), DRAWS) * shares
@@ -92,8 +103,8 @@ def draw(settings, seed=1):
         count = len(setting.pairs)
         weights = random.multinomial(count, np.full(count, 1 / count), DRAWS) / count
         cpu = np.concatenate([pair.cpu for pair in setting.pairs])
-        setting.draws = {"mse": np.einsum("dp,pd->d", weights, setting.blocks() @ picked.T),
-                         "cpu": random.choice(cpu, (DRAWS, len(cpu))).mean(1)}
+        setting.draws = {name: np.einsum("dp,pd->d", weights, setting.blocks(name) @ picked.T) for name in MEASURES}
+        setting.draws["cpu"] = random.choice(cpu, (DRAWS, len(cpu))).mean(1)
 
 
 def cpu_at(cpus, errors, target):
@@ -122,16 +133,16 @@ class Ratio:
     extrapolated: bool  # beyond the dearest
 
 
-def ratio_at_error(curve, other):
+def ratio_at_error(curve, other, measure="mse"):
     """curve: settings of one renderer from cheap to dear, other: one of the other; all drawn."""
-    target = other.mse()
-    cpus, errors = [s.cpu() for s in curve], [s.mse() for s in curve]
+    target = other.mse(measure)
+    cpus, errors = [s.cpu() for s in curve], [s.mse(measure) for s in curve]
     cpu = cpu_at(cpus, errors, target)
     bound = cpu is None
     cpu = cpus[0] if bound else cpu
     drawn = []
     for i in range(DRAWS):
-        own = cpu_at([s.draws["cpu"][i] for s in curve], [s.draws["mse"][i] for s in curve], other.draws["mse"][i])
+        own = cpu_at(*([s.draws[name][i] for s in curve] for name in ("cpu", measure)), other.draws[measure][i])
         drawn.append(other.draws["cpu"][i] / (curve[0].draws["cpu"][i] if own is None else own))
     return Ratio(other.cpu() / cpu, *interval(drawn), cpu, bound, not bound and target < errors[-1])
 

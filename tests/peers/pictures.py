@@ -64,10 +64,15 @@ def read_exr(path):
     return np.stack([lines[name] for name in "RGB"], axis=-1).astype(np.float32)
 
 
-def to_srgb(picture):
-    """Linear radiance to 0 to 255, clamped."""
+def to_display(picture):
+    """Linear radiance as sRGB, clamped to [0, 1]."""
     x = np.clip(picture, 0, 1)
-    return np.round(255 * np.where(x <= 0.0031308, 12.92 * x, 1.055 * np.power(x, 1 / 2.4) - 0.055)).astype(np.uint8)
+    return np.where(x <= 0.0031308, 12.92 * x, 1.055 * np.power(x, 1 / 2.4) - 0.055)
+
+
+def to_srgb(picture):
+    """The same as 0 to 255."""
+    return np.round(255 * to_display(picture)).astype(np.uint8)
 
 
 def write_png(path, picture):

@@ -150,7 +150,8 @@ def pair_of_runs(renderer, work, number):
                  last=np.stack([a[-1], b[-1]]))
         unfinished.rename(path)
     with np.load(path) as kept:
-        return errors.Pair(kept["mse"], kept["grey_variance"], kept["grey"], kept["cpu"]), path
+        shown = errors.shown_error(*kept["last"])
+        return errors.Pair(kept["mse"], kept["grey_variance"], kept["grey"], kept["cpu"], shown), path
 
 
 def last_frames(path):

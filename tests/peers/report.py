@@ -38,16 +38,16 @@ class Scene:
         self.beyond_noise = beyond_noise
         self.placed, self.kind, self.cycles, self.variants = placed, kind_of(placed), cycles, variants
         errors.draw([*cycles, *(s for curve in variants.values() for s in curve)])
-        self.ratios = [self.best_ratio(other) for other in cycles]
+        self.ratios = {measure: [self.best_ratio(other, measure) for other in cycles] for measure in errors.MEASURES}
         self.difference = errors.difference(cycles[-1], finest(variants))
 
     def baton(self):
         return [setting for curve in self.variants.values() for setting in curve]
 
-    def best_ratio(self, other):
-        """The variant that is cheapest at the error of `other`, and its ratio."""
-        ratios = {name: errors.ratio_at_error(curve, other) for name, curve in self.variants.items()}
-        name = max(ratios, key=lambda variant: ratios[variant].value)
+    def best_ratio(self, other, measure):
+        """The variant that is cheapest at the error of `other`, and its ratio; one that was measured down to it, if any."""
+        ratios = {name: errors.ratio_at_error(curve, other, measure) for name, curve in self.variants.items()}
+        name = max(ratios, key=lambda variant: (not ratios[variant].extrapolated, ratios[variant].value))
         return name, ratios[name]
 
     def triangles(self):
@@ -60,36 +60,38 @@ def finest(variants):
 
 
 def ratio_text(ratio, goal):
-    text = f"{'at least ' if ratio.bound else ''}{digits(ratio.value)} [{digits(ratio.low)}, {digits(ratio.high)}]"
-    text += " *" if ratio.extrapolated else ""
+    text = f"{'at least ' if ratio.bound else 'about ' if ratio.extrapolated else ''}{digits(ratio.value)} [{digits(ratio.low)}, {digits(ratio.high)}]"
     return f"**{text}**" if ratio.value < goal else text
 
 
-def rmse_text(setting):
-    low, high = errors.interval(np.sqrt(setting.draws["mse"]))
-    return f"{digits(np.sqrt(setting.mse()))} [{digits(low)}, {digits(high)}]"
+def rmse_text(setting, measure="mse"):
+    low, high = errors.interval(np.sqrt(setting.draws[measure]))
+    return f"{digits(np.sqrt(setting.mse(measure)))} [{digits(low)}, {digits(high)}]"
 
 
 def main_table(scenes):
-    lines = ["| scene | Cycles: spp | RMSE | CPU s | Baton at this error | CPU s | times cheaper | goal |",
-             "|---|---|---|---|---|---|---|---|"]
+    lines = ["| scene | goal | Cycles: spp | CPU s | RMSE | Baton at this error | CPU s | times cheaper | as shown: RMSE | "
+             "Baton at this error | times cheaper |", "|---|---|---|---|---|---|---|---|---|---|---|"]
     for scene in scenes:
         goal = GOALS[scene.kind]
-        for other, (name, ratio) in zip(scene.cycles, scene.ratios):
-            lines.append(f"| {scene.placed['name']} | {other.level} | {rmse_text(other)} | {digits(other.cpu())} | "
-                         f"{name} | {digits(ratio.cpu)} | {ratio_text(ratio, goal)} | {goal} |")
+        for k, other in enumerate(scene.cycles):
+            name, ratio = scene.ratios["mse"][k]
+            shown_name, shown_ratio = scene.ratios["shown"][k]
+            lines.append(f"| {scene.placed['name']} | {goal} | {other.level} | {digits(other.cpu())} | {rmse_text(other)} | "
+                         f"{name} | {digits(ratio.cpu)} | {ratio_text(ratio, goal)} | {rmse_text(other, 'shown')} | "
+                         f"{shown_name} | {ratio_text(shown_ratio, goal)} |")
     return lines
 
 
 def settings_table(scene):
     lines = [f"{scene.placed['name']}: {scene.triangles()} triangles, {scene.placed['width']} x "
              f"{scene.placed['height']} pixels, {len(scene.placed['frames'])} frames, {scene.kind}", "",
-             "| | spp or rounds | pairs | CPU s | RMSE | efficiency |", "|---|---|---|---|---|---|"]
+             "| | spp or rounds | pairs | CPU s | RMSE | efficiency | as shown: RMSE |", "|---|---|---|---|---|---|---|"]
     for name, curve in {"Cycles": scene.cycles, **scene.variants}.items():
         for s in curve:
             low, high = errors.interval(1 / (s.draws["mse"] * s.draws["cpu"]))
             lines.append(f"| {name} | {s.level} | {len(s.pairs)} | {digits(s.cpu(), 3)} | {rmse_text(s)} | "
-                         f"{digits(s.efficiency(), 3)} [{digits(low, 3)}, {digits(high, 3)}] |")
+                         f"{digits(s.efficiency(), 3)} [{digits(low, 3)}, {digits(high, 3)}] | {rmse_text(s, 'shown')} |")
     return [*lines, ""]
 
 
@@ -122,14 +124,14 @@ def numbers(scenes):
     """The same for programs."""
     def of_setting(name, s):
         return {"renderer": name, "level": s.level, "pairs": len(s.pairs), "cpuSeconds": s.cpu(), "mse": s.mse(),
-                "mseInterval": errors.interval(s.draws["mse"]), "efficiency": s.efficiency()}
+                "mseInterval": errors.interval(s.draws["mse"]), "efficiency": s.efficiency(), "shownMse": s.mse("shown")}
 
     return json.dumps([{
         "scene": scene.placed["name"], "kind": scene.kind, "goal": GOALS[scene.kind], "triangles": scene.triangles(),
         "settings": [of_setting(name, s) for name, curve in {"Cycles": scene.cycles, **scene.variants}.items()
                      for s in curve],
-        "ratios": [{"spp": other.level, "baton": name, **vars(ratio)}
-                   for other, (name, ratio) in zip(scene.cycles, scene.ratios)],
+        "ratios": [{"of": measure, "spp": other.level, "baton": name, **vars(ratio)}
+                   for measure, ratios in scene.ratios.items() for other, (name, ratio) in zip(scene.cycles, ratios)],
         "difference": {**vars(scene.difference), "beyondNoise": scene.beyond_noise}} for scene in scenes], indent=1)
 
 

@@ -130,6 +130,13 @@ def the_error_is_that_planted(_, __):
     check(inside >= 36, f"of 40 intervals {inside} hold the truth")
 
 
+def an_error_as_shown_counts_what_a_screen_shows(_, __):
+    """Above white nothing is seen; at linear .001 the slope of sRGB is 12.92."""
+    grey = np.full((32, 32, 3), 0.001)
+    check_close(errors.shown_error(grey, grey + 0.0002), 0.5 * (12.92 * 0.0002) ** 2, "in the dark", 1e-9)
+    check_close(errors.shown_error(grey + 1, grey + 7), 0, "above white", 1e-9)
+
+
 def a_ratio_is_that_planted(_, __):
     """One renderer has the variance .08 / CPU s; the other takes 12 s for what it has after 2.5 s."""
     curve = [planted(level, 2, 0.08 / level, float(level)) for level in (1, 4, 16)]
@@ -221,5 +228,6 @@ def what_is_not_modelled_alike_is_refused(programs, folder):
 if __name__ == "__main__":
     run_tests([a_map_lies_alike, a_turned_map_lies_alike, objects_stand_alike, the_camera_sees_alike,
                arrays_are_turned_like_points, the_error_is_that_planted, a_ratio_is_that_planted, a_curve_ends_honestly,
+               an_error_as_shown_counts_what_a_screen_shows,
                a_difference_is_seen_and_noise_is_not, a_difference_of_single_pixels_is_seen,
                blocks_at_the_edge_count_by_their_pixels, frames_are_read_as_written, a_picture_is_written_as_it_is, what_is_not_modelled_alike_is_refused])
