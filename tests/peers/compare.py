@@ -1,7 +1,7 @@
 #!/usr/bin/env python3
 """Baton beside Cycles on the same jobs: CPU seconds, errors from pairs of seeds, and whether both show the same.
 
-usage: compare.py --bin build/release/bin --output FOLDER JOB...
+usage: compare.py --bin build/release/bin --output FOLDER [JOB...]      without jobs: those of scenes/ with a number
 
 FOLDER gets compare.md, compare.json and compare.png; runs are kept there, and the same command goes on with what is
 missing. First a test picture must agree in both renderers, and disagree where a convention is broken on purpose.
