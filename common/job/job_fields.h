@@ -3,6 +3,7 @@
 #include <array>
 #include <string_view>
 
+#include "common/base/limits.h"
 #include "common/job/job_archive.h"
 #include "common/job/job_spec.h"
 
@@ -15,6 +16,7 @@ inline constexpr NumberRange kCoordinateRange{-1e9, 1e9};
 /// Radiance.
 inline constexpr NumberRange kLightRange{0, 1e9};
 /// Lengths and factors above zero.
+inline constexpr NumberRange kFrameRange{0, limits::kMaxFrameNumber};
 inline constexpr NumberRange kPositiveRange{.min = 0, .max = 1e9, .min_open = true};
 /// Angles in degrees.
 inline constexpr NumberRange kAngleRange{-1e6, 1e6};

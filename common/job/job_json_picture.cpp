@@ -44,7 +44,8 @@ bool is_setting(std::string_view path) {
 
 /// Keys decide single frames (FrameComparison).
 bool is_key(std::string_view path) {
-  return path.starts_with("/environment/keys/") || path.starts_with("/camera/keys/") ||
+  return path.starts_with("/environment/keys/") || path.starts_with("/environment/scaleKeys/") ||
+         path.starts_with("/environment/rotation/keys/") || path.starts_with("/camera/keys/") ||
          (path.starts_with("/scene/objects/") && path.find("/keys/") != path.npos);
 }
 
@@ -99,6 +100,7 @@ Digest light_facts(const EnvironmentSpec& environment, int frame,
     writer.put_string(found == contents.end() ? path : found->second.hex());
   }
   writer.put(light.mix);
+  writer.put(light.scale);
   writer.put(rotation_deg_at(environment, frame));
   return digest_of(writer.bytes());
 }

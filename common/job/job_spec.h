@@ -114,19 +114,29 @@ struct EnvironmentKey {
   bool operator==(const EnvironmentKey&) const = default;
 };
 
+/// A number at a frame number; linear between keys, held outside.
+struct NumberKey {
+  double frame = 1;
+  double value = 0;
+
+  bool operator==(const NumberKey&) const = default;
+};
+
 /// Numbered frames are keys at every frame with `interpolate` false: the last key at or before the
 /// frame holds.
 struct EnvironmentSpec {
   std::vector<EnvironmentKey> keys;  ///< sorted by frame, at least one
   bool interpolate = true;
   MapFilter filter = MapFilter::bilinear;
-  float scale = 1;  ///< radiance factor, (0, inf)
+  float scale = 1;                      ///< radiance factor, (0, inf)
+  std::vector<NumberKey> scale_keys{};  ///< further factors, > 0; ascending frames
   int max_width =
       0;  ///< wider maps are reduced to so many columns, [0, limits::kMaxEnvironmentSide]; 0: none
   Vec3 rotation_axis{0, 1, 0};
   std::int32_t rotation_start_frame = 1;
   double rotation_start_deg = 0;  ///< at that frame, whichever frames the job has
   double rotation_deg_per_frame = 0;
+  std::vector<NumberKey> rotation_keys{};  ///< degrees, instead of the two; ascending frames
 
   bool operator==(const EnvironmentSpec&) const = default;
 };

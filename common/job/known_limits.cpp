@@ -108,9 +108,9 @@ std::span<const KnownLimit> known_limits() { return kLimits; }
 double turn_deg_per_frame(const JobSpec& job) {
   double most = 0;
   for (std::size_t i = 1; i < job.frames.size(); ++i) {
-    const double turn = std::fmod(
-        std::abs(job.environment.rotation_deg_per_frame * (job.frames[i] - job.frames[i - 1])),
-        360.0);
+    const double turn = std::fmod(std::abs(rotation_deg_at(job.environment, job.frames[i]) -
+                                           rotation_deg_at(job.environment, job.frames[i - 1])),
+                                  360.0);
     most = std::max(most, std::min(turn, 360 - turn));
   }
   return most;

@@ -13,7 +13,6 @@ constexpr std::array<std::string_view, 2> kProjections{"perspective", "orthograp
 constexpr double kMaxLength = 1e9, kMaxShift = 100;
 constexpr NumberRange kLengthRange{.min = 0, .max = kMaxLength, .min_open = true};
 constexpr NumberRange kFovRange{.min = 0, .max = 180, .min_open = true, .max_open = true};
-constexpr NumberRange kFrameRange{0, limits::kMaxFrameNumber};
 
 /// The three vectors must span a view.
 void check_view(JobArchive& a, const Vec3& position, const Vec3& look_at, const Vec3& up) {

@@ -110,6 +110,21 @@ void expand_numbered(JobArchive& a, const fs::path& numbered, const std::vector<
   }
 }
 
+/// Numbers at ascending frames; `name`: the key of the number.
+void number_keys(JobArchive& a, const char* list, std::vector<NumberKey>& keys, const char* name,
+                 NumberRange range) {
+  a.list(list, keys, limits::kMaxFrames, [&](NumberKey& key) {
+    a.number(required("frame"), key.frame, kFrameRange);
+    a.number(required(name), key.value, range);
+  });
+  for (std::size_t i = 1; i < keys.size(); ++i) {
+    if (keys[i].frame > keys[i - 1].frame) continue;
+    a.fault(list, "ascending frames without duplicates",
+            fmt::format("{} after {}", keys[i].frame, keys[i - 1].frame));
+    break;
+  }
+}
+
 }  // namespace
 
 void matrix_field(JobArchive& a, Key key, std::optional<Matrix34>& matrix) {
@@ -198,6 +213,7 @@ void fields(JobArchive& a, EnvironmentSpec& environment, const std::vector<int>&
   a.boolean("interpolate", environment.interpolate);
   a.choice("filter", environment.filter, kMapFilters);
   a.number("scale", environment.scale, kPositiveRange);
+  number_keys(a, "scaleKeys", environment.scale_keys, "scale", kPositiveRange);
   a.integer("maxWidth", environment.max_width, 0, limits::kMaxEnvironmentSide);
   a.object("rotation", [&] {
     a.vector("axis", environment.rotation_axis, kCoordinateRange);
@@ -205,6 +221,11 @@ void fields(JobArchive& a, EnvironmentSpec& environment, const std::vector<int>&
     a.integer("startFrame", environment.rotation_start_frame, 0, limits::kMaxFrameNumber);
     a.number("startDeg", environment.rotation_start_deg, kAngleRange);
     a.number("degPerFrame", environment.rotation_deg_per_frame, kAngleRange);
+    number_keys(a, "keys", environment.rotation_keys, "deg", kAngleRange);
+    const bool turns =
+        environment.rotation_start_deg != 0 || environment.rotation_deg_per_frame != 0;
+    if (!environment.rotation_keys.empty() && turns)
+      a.fault("keys", "either keys or startDeg and degPerFrame", "both");
   });
 }
 

@@ -10,7 +10,23 @@
 
 namespace baton {
 
+namespace {
+
+/// At least one key.
+double value_at(const std::vector<NumberKey>& keys, double frame) {
+  const auto next = std::upper_bound(keys.begin(), keys.end(), frame,
+                                     [](double f, const NumberKey& key) { return f < key.frame; });
+  if (next == keys.begin()) return next->value;
+  const NumberKey& before = *(next - 1);
+  if (next == keys.end()) return before.value;
+  const double share = (frame - before.frame) / (next->frame - before.frame);
+  return before.value + share * (next->value - before.value);
+}
+
+}  // namespace
+
 double rotation_deg_at(const EnvironmentSpec& environment, int frame_number) {
+  if (!environment.rotation_keys.empty()) return value_at(environment.rotation_keys, frame_number);
   return environment.rotation_start_deg +
          environment.rotation_deg_per_frame * (frame_number - environment.rotation_start_frame);
 }
@@ -32,6 +48,8 @@ EnvironmentFrame environment_at(const EnvironmentSpec& environment, int frame_nu
     if (result.mix > 0) result.map_b = static_cast<std::int32_t>(next - keys.begin());
   }
 
+  if (!environment.scale_keys.empty())
+    result.scale = static_cast<float>(value_at(environment.scale_keys, frame_number));
   const double degrees = rotation_deg_at(environment, frame_number);
   if (degrees != 0) result.rotation = rotation_about(environment.rotation_axis, degrees);
   return result;

@@ -11,19 +11,20 @@
 
 namespace baton {
 
-/// The environment at one frame: texels are lerp(map[map_a], map[map_b], mix), directions are
-/// turned by `rotation` (world = rotation * map direction). Maps are indices into
+/// The environment at one frame: texels are scale lerp(map[map_a], map[map_b], mix), directions
+/// are turned by `rotation` (world = rotation * map direction). Maps are indices into
 /// JobSpec::environment.keys.
 struct EnvironmentFrame {
   std::int32_t map_a = 0;
   std::int32_t map_b = 0;  ///< equal to map_a when mix is 0
   float mix = 0;           ///< [0, 1)
+  float scale = 1;         ///< radiance factor beside EnvironmentSpec::scale, > 0
   Mat3 rotation;
 
   bool operator==(const EnvironmentFrame&) const = default;
   /// True when both frames show the same texels, whatever the rotation.
   bool same_texels(const EnvironmentFrame& b) const {
-    return map_a == b.map_a && map_b == b.map_b && mix == b.mix;
+    return map_a == b.map_a && map_b == b.map_b && mix == b.mix && scale == b.scale;
   }
 };
 

@@ -5,7 +5,8 @@ import json
 import random
 
 from random_job_means import tame
-from random_job_rules import mend, mend_view, spoil, work_of
+from random_job_motion import Motion
+from random_job_rules import mend, spoil, work_of
 from random_job_schema import SchemaDraw
 from random_job_textures import Textures
 
@@ -17,7 +18,7 @@ FRESH_METHODS = {"environment", "brdf", "mis", "bidirectional"}
 MOST_WORK = 5e6
 
 
-class Draw(Textures):
+class Draw(Motion, Textures):
     """One random case: {"job", "files", "first", "second"}, as random_job_judge.py takes it."""
 
     def __init__(self, schema, rng):
@@ -128,6 +129,8 @@ class Draw(Textures):
             "scene.ground.height": lambda: self.pick(None, -1.0, 0.3),
             "scene.ground.size": lambda: self.pick(None, 2.0, 50.0),
             "environment.scale": lambda: self.pick(None, None, 0.1, 7.0, 1e-9, 1e9),
+            "environment.scaleKeys": lambda: self.number_keys("scale", 0.1, 4) if self.chance(0.2) else None,
+            "environment.rotation.keys": lambda: self.number_keys("deg", -90, 90) if self.chance(0.2) else None,
             "environment.maxWidth": lambda: self.pick(None, None, 0, 1, 3, 8, 16),
             "environment.rotation.axis": lambda: self.pick(None, [1, 2, 3], [0, 0, -1], [1e-9, 0, 0]),
             "environment.rotation.degPerFrame": lambda: self.pick(0.0, 0.1, 1.5, 20.0, -90.0, 1e6),
@@ -234,65 +237,6 @@ class Draw(Textures):
             item.pop("placeOnGround", None)
             item.update(translate=[0.9 - 1.8 * number, 0.7, 0.3 * number], scale=0.7)
         return item
-
-    def key_frames(self):
-        """Ascending frames, at times between those of the job or beyond them."""
-        last = self.first_frame + self.step * self.count
-        frames = {float(self.first_frame), round(self.rng.uniform(self.first_frame, last), 2), float(last)}
-        return sorted(frames)[: self.pick(1, 2, 2, 3)]
-
-    def object_keys(self):
-        size = self.pick(0.05, 0.05, 1.0)
-        node = self.schema.schema["definitions"]["objectKey"]
-        keys = []
-        for frame in self.key_frames():
-            key = self.schema.object(node, "objectKey", share=0.1)
-            key.update(frame=frame, translate=self.vector(size), rotateDeg=self.vector(200 * size))
-            if key.get("quaternion") == [0, 0, 0, 0]:
-                del key["quaternion"]
-            key.pop("scale", None)
-            if self.chance(0.2):
-                key["scale"] = self.pick(1.1, [0.9, 1.0, 1.2])
-            keys.append(key)
-        if self.chance(0.15):
-            keys = [{"frame": key["frame"], "matrix": self.matrix()} for key in keys]
-        return keys
-
-    def matrix(self):
-        """Sheared, sometimes mirrored, far from singular."""
-        rows = [[1.1, 0.2, 0.0], [0.0, 0.9, -0.3], [0.1, 0.0, self.pick(1.0, -1.2)]]
-        return [n for row in rows for n in [*row, round(self.rng.uniform(-0.5, 0.5), 3)]]
-
-    def camera(self):
-        """Mostly outside; inside a mesh, below the ground, far away, with the sky alone in view; still or moving."""
-        camera = {"position": [0, 1.2, 4.5], "lookAt": [0, 0.3, 0], "verticalFovDeg": self.pick(30, 40, 60)}
-        if not self.plain and self.chance(0.6):
-            camera = {"position": self.pick(self.vector(3), self.vector(0.2), [0.5, -2, 3], [0, 2, 400], [0, 1, 4.5]),
-                      "lookAt": self.pick([0, 0.3, 0], self.vector(0.5), [0, 0.3, 0], [0.1, 90, 2]),
-                      "verticalFovDeg": self.pick(5, 30, 40, 90, 170, 0.01)}
-        position, look_at = camera["position"], camera["lookAt"]
-        if self.chance(0.2):
-            camera["up"] = self.pick([0, 0, 1], [0.3, 1, 0.1], [0, -1, 0])
-        if self.chance(0.15):
-            camera |= {"projection": "orthographic", "orthographicHeight": self.pick(0.3, 2, 5)}
-        if self.chance(0.15):
-            camera |= {"shift": self.pick([0.2, 0], [-0.5, 0.3]), "aperture": self.pick(0, 0.05, 1)}
-            camera["focusDistance"] = self.pick(0, 0.5, 4)
-        if self.chance(0.3):
-            size = self.pick(0.05, 0.05, 0.5, 3)
-            camera["keys"] = []
-            for frame in self.key_frames():
-                moved = [round(p + self.rng.uniform(-size, size), 3) for p in position]
-                camera["keys"].append({"frame": frame, "position": moved, "lookAt": look_at})
-                if "up" in camera:
-                    camera["keys"][-1]["up"] = camera["up"]
-                if self.chance(0.2):
-                    camera["keys"][-1]["verticalFovDeg"] = self.pick(20, 60)
-        elif self.chance(0.02):
-            camera["gltf"] = self.gltf("eye")
-        for view in [camera, *camera.get("keys", [])]:
-            mend_view(view, self.rng)
-        return camera
 
     def gltf(self, node):
         self.files["walk.gltf"] = {"kind": "walk", "distance": self.pick(3.0, 5.0)}

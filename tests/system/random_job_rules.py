@@ -63,6 +63,10 @@ def mend(job, rng):
         else:
             sampling["numParticles"] += 1 if sampling["numParticles"] < 64 else -1
             sampling["numCandidates"] = max(sampling["numCandidates"], sampling["numParticles"])
+    rotation = job["environment"].get("rotation", {})
+    if rotation.get("keys"):
+        rotation.pop("startDeg", None)
+        rotation.pop("degPerFrame", None)
     for movable in [job["camera"], *job["scene"]["objects"]]:
         if movable.get("keys"):
             movable.pop("gltf", None)

@@ -70,7 +70,7 @@ Result<std::shared_ptr<const EnvironmentMap>> LightSequence::key_map(std::int32_
 
 Result<std::shared_ptr<const EnvironmentMap>> LightSequence::mixed_map(
     const EnvironmentFrame& frame) {
-  if (frame.mix <= 0) return key_map(frame.map_a);
+  if (frame.mix <= 0 && frame.scale == 1) return key_map(frame.map_a);
   const auto first = std::find_if(frames_.begin(), frames_.end(), [&](const FrameSpec& f) {
     return f.environment.same_texels(frame);
   });
@@ -86,8 +86,9 @@ Result<std::shared_ptr<const EnvironmentMap>> LightSequence::mixed_map(
                     b->height(), a->width(), a->height(),
                     job_.environment.keys[static_cast<std::size_t>(frame.map_a)].map)};
   }
-  return mixed_maps_.insert(name, std::make_shared<const EnvironmentMap>(
-                                      *a, *b, frame.mix, job_.sampling.mis_compensation));
+  return mixed_maps_.insert(name,
+                            std::make_shared<const EnvironmentMap>(*a, *b, frame.mix, frame.scale,
+                                                                   job_.sampling.mis_compensation));
 }
 
 Result<Environment> LightSequence::environment(const EnvironmentFrame& frame) {

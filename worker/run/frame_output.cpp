@@ -129,6 +129,7 @@ ImageMetadata frame_metadata(const JobSpec& job, const Digest& job_digest, int f
     add("baton:mapMixedIn", environment.keys.at(static_cast<std::size_t>(light.map_b)).map);
     add("baton:mapMix", light.mix);
   }
+  add("baton:mapScale", environment.scale * light.scale);
   add("baton:rotationDeg", rotation_deg_at(environment, frame_number));
   if (quality.noise_source != NoiseSource::none) {
     metadata.emplace_back("baton:noise", fmt::format("{:.4g}", quality.noise));

@@ -61,14 +61,15 @@ EnvironmentMap::EnvironmentMap(const RgbImage& image, MapFilter filter, float sc
 }
 
 EnvironmentMap::EnvironmentMap(const EnvironmentMap& a, const EnvironmentMap& b, float t,
-                               bool compensate)
+                               float scale, bool compensate)
     : width_(a.width_), height_(a.height_), filter_(a.filter_) {
   BATON_CHECK(a.width_ == b.width_ && a.height_ == b.height_ && a.filter_ == b.filter_);
   texels_.resize(a.texels_.size());
   for (std::size_t i = 0; i < texels_.size(); ++i) {
     const Texel& p = a.texels_[i];
     const Texel& q = b.texels_[i];
-    texels_[i] = {(1 - t) * p.r + t * q.r, (1 - t) * p.g + t * q.g, (1 - t) * p.b + t * q.b, 0};
+    texels_[i] = {scale * ((1 - t) * p.r + t * q.r), scale * ((1 - t) * p.g + t * q.g),
+                  scale * ((1 - t) * p.b + t * q.b), 0};
   }
   build_table(compensate);
 }

@@ -39,8 +39,9 @@ class EnvironmentMap {
   /// image was made from.
   EnvironmentMap(const RgbImage& image, MapFilter filter, float scale, bool compensate,
                  const TexelRepairs& repairs = {});
-  /// Texels (1 - t) a + t b; a and b of one size and filter. t in [0, 1].
-  EnvironmentMap(const EnvironmentMap& a, const EnvironmentMap& b, float t, bool compensate);
+  /// Texels scale ((1 - t) a + t b); a and b of one size and filter. t in [0, 1].
+  EnvironmentMap(const EnvironmentMap& a, const EnvironmentMap& b, float t, float scale,
+                 bool compensate);
 
   int width() const { return width_; }
   int height() const { return height_; }

@@ -5,6 +5,7 @@
 #include <utility>
 
 #include "common/base/check.h"
+#include "worker/scene/ggx_energy.h"
 
 namespace baton {
 namespace {
@@ -50,7 +51,8 @@ Rgb evaluate_ggx(const Material& m, const ShadingPoint& p, const Vec3& wi) {
   const float grazing = t2 * t2 * t;
   const Rgb fresnel = m.ks + (Rgb{m.f90, m.f90, m.f90} - m.ks) * grazing;
   const Rgb kept_out = m.ks + (Rgb{1, 1, 1} - m.ks) * grazing;
-  return (Rgb{1, 1, 1} - kept_out) * m.kd * kInvPi + fresnel * specular;
+  const Rgb diffuse = (Rgb{1, 1, 1} - kept_out) * m.kd * diffuse_left(m, cos_o);
+  return diffuse * kInvPi + fresnel * specular;
 }
 
 /// Density of the reflected visible normal, D G1(wo) / (4 n.wo), with G1 / n.wo = 2 / (n.wo +

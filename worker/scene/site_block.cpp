@@ -3,6 +3,7 @@
 #include <algorithm>
 
 #include "common/base/check.h"
+#include "worker/scene/ggx_energy.h"
 
 namespace baton {
 
@@ -50,7 +51,10 @@ void SiteBlock::add(int site, const ShadingPoint& point, const Material& materia
   const Vec3 wo = ggx ? clamped_view(point) : point.wo;
   set(wo_x, wo_y, wo_z, wo);
   set(mirror_x, mirror_y, mirror_z, reflect(wo, point.ns));
-  set(kd_r, kd_g, kd_b, ggx ? material.kd * (Rgb{1, 1, 1} - material.ks) : material.kd);
+  const float cos_view = ggx ? std::max(dot(point.ns, wo), kMinCosView) : 1.0f;
+  set(kd_r, kd_g, kd_b,
+      ggx ? material.kd * (Rgb{1, 1, 1} - material.ks) * diffuse_left(material, cos_view)
+          : material.kd);
   set(ks_r, ks_g, ks_b, ggx || phong ? material.ks : Rgb{});
   shape[s] = material.shape;
   lobe_scale[s] =
@@ -58,7 +62,7 @@ void SiteBlock::add(int site, const ShadingPoint& point, const Material& materia
   specular_probability[s] = ggx || phong ? material.specular_probability : 0.0f;
   is_ggx[s] = ggx ? 1.0f : 0.0f;
   alpha2[s] = ggx ? material.shape * material.shape : 0.0f;
-  view_cosine[s] = ggx ? std::max(dot(point.ns, wo), kMinCosView) : 1.0f;
+  view_cosine[s] = cos_view;
   view_masking[s] = ggx ? ggx_view_masking(view_cosine[s], material.shape) : 1.0f;
   measured[s] = tabulated ? material.table->texels() : nullptr;
 

@@ -18,7 +18,7 @@ struct alignas(64) SiteBlock {
   Array ng_x{}, ng_y{}, ng_z{};              ///< geometric normal
   Array wo_x{}, wo_y{}, wo_z{};              ///< to the viewer
   Array mirror_x{}, mirror_y{}, mirror_z{};  ///< wo mirrored about ns
-  Array kd_r{}, kd_g{}, kd_b{};              ///< diffuse albedo; ggx: kd (1 - F0)
+  Array kd_r{}, kd_g{}, kd_b{};              ///< diffuse albedo; ggx: kd (1 - F0) diffuse_left()
   Array ks_r{}, ks_g{}, ks_b{};              ///< phong: specular albedo; ggx: F0
   Array shape{};                             ///< phong: exponent; ggx: alpha
   Array lobe_scale{};                        ///< phong: (s + 2) / (2 pi); ggx: F90; measured: 0

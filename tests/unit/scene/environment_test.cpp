@@ -299,9 +299,10 @@ TEST(Environment, BlendInterpolatesTexels) {
   const EnvironmentMap a(random_image(32, 16, 1), MapFilter::bilinear, 1, false);
   const EnvironmentMap b(random_image(32, 16, 2), MapFilter::bilinear, 1, false);
   const Vec3 w = normalize({0.3f, -0.4f, 0.8f});
-  EXPECT_EQ(EnvironmentMap(a, b, 0, false).evaluate(w).g, a.evaluate(w).g);
-  EXPECT_EQ(EnvironmentMap(a, b, 1, false).evaluate(w).g, b.evaluate(w).g);
-  const EnvironmentMap middle(a, b, 0.25f, false);
+  EXPECT_EQ(EnvironmentMap(a, b, 0, 1, false).evaluate(w).g, a.evaluate(w).g);
+  EXPECT_EQ(EnvironmentMap(a, b, 1, 1, false).evaluate(w).g, b.evaluate(w).g);
+  const EnvironmentMap middle(a, b, 0.25f, 1, false);
+  EXPECT_NEAR(EnvironmentMap(a, a, 0, 3, false).evaluate(w).g, 3 * a.evaluate(w).g, 1e-5f);
   EXPECT_NEAR(middle.evaluate(w).g, 0.75f * a.evaluate(w).g + 0.25f * b.evaluate(w).g, 1e-5f);
   EXPECT_GT(run_chi_square(middle, middle).p_value, 0.001);
 }
