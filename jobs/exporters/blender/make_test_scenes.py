@@ -67,7 +67,8 @@ def diffuse(name, color, image=None):
     surface.inputs["Color"].default_value = (*color, 1)
     if image:
         texture = tree.nodes.new("ShaderNodeTexImage")
-        texture.image = image
+        # Between texels Cycles mixes sRGB values, Baton light.
+        texture.image, texture.interpolation = image, "Closest"
         tree.links.new(texture.outputs["Color"], surface.inputs["Color"])
     tree.links.new(surface.outputs[0], tree.nodes.new("ShaderNodeOutputMaterial").inputs["Surface"])
     return material
@@ -248,7 +249,7 @@ def make_hdr_sequence(folder):
     image.colorspace_settings.name = "Linear"
     texture, mapping, background = world(image)
     user = texture.image_user
-    user.frame_start, user.frame_duration, user.frame_offset = 3, 8, 100
+    user.frame_start, user.frame_duration, user.frame_offset = 1, 7, 101
     user.use_auto_refresh = True
     turned, strength = mapping.inputs["Rotation"], background.inputs["Strength"]
     for frame, degrees, factor in ((1, 0, 1.0), (6, 30, 1.6), (12, 140, 0.7)):

@@ -3,6 +3,8 @@
 import bpy
 import numpy
 
+from .flat_faces import cut_bent
+
 SHAPES = {"MESH", "CURVE", "SURFACE", "FONT", "META"}
 DEFORMATION = 1e-5  # of the size of a mesh
 
@@ -104,6 +106,7 @@ class Geometry:
                 mesh = None
             if mesh is not None:
                 set_materials(mesh, shown)
+                cut_bent(mesh)
                 if may_deform(shown):
                     self.witnesses[key] = vertices_of(shown)
             self.meshes[made_of] = mesh

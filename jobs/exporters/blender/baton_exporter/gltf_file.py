@@ -3,13 +3,16 @@
 import bpy
 from mathutils import Matrix
 
+from . import gltf_materials
 from .glb import Glb, tracks_of
 
 SHEAR = 1e-4
 
 
-def write(path, geometry, frames, fps, report):
-    """geometry: shapes with a matrix for each frame. Frame n is at n / fps seconds, as Blender has it."""
+def write(path, geometry, frames, fps, diffuse, report):
+    """geometry: shapes with a matrix for each frame. Frame n is at n / fps seconds, as Blender has it.
+
+    The job's materials for those named in `diffuse`, which glTF says less exactly."""
     shapes = list(geometry.shapes.values())
     names = put_in_scene(shapes, report)
     bpy.ops.export_scene.gltf(filepath=str(path), export_format="GLB", use_active_scene=True, export_yup=True,
@@ -25,8 +28,10 @@ def write(path, geometry, frames, fps, report):
         if is_moving(shape):
             tracks += tracks_of(nodes[name], [gltf_place(matrix) for matrix in shape.matrices])
     file.animate("shot", tracks, [frame / fps for frame in frames])
-    mend_materials(file.document)
+    gltf_materials.mend(file.document)
     file.write(path)
+    return {material["name"]: gltf_materials.diffuse(file.document, material, path.name)
+            for material in file.document.get("materials", []) if material["name"] in diffuse}
 
 
 def is_moving(shape):
@@ -79,12 +84,3 @@ def put_in_scene(shapes, report):
     bpy.context.view_layer.update()
     return names
 
-
-def mend_materials(document):
-    """Blender's exporter writes a reflection of 0 as a colour alone, which leaves that at grazing angles."""
-    for material in document.get("materials", []):
-        specular = material.get("extensions", {}).get("KHR_materials_specular")
-        if specular and max(specular.get("specularColorFactor", [1])) == 0:
-            specular.pop("specularColorFactor")
-            specular["specularFactor"] = 0
-            material["extensions"].pop("KHR_materials_ior", None)

@@ -46,8 +46,8 @@ def export(folder, strict=False, frames=None):
             part.take(depsgraph)
     if not shapes.shapes:
         raise CannotExport("the scene shows no surface: expected a mesh that is rendered")
-    materials = used_materials(shapes)
-    Materials(report).check(materials)
+    materials = Materials(report)
+    materials.check(used_materials(shapes))
 
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
@@ -62,7 +62,9 @@ def export(folder, strict=False, frames=None):
         job["motion"] = {"curve": "linear"}
     job["output"] = output_of(scene, fps)
     if not (strict and report.entries):
-        gltf_file.write(folder / "scene.glb", shapes, numbers, fps, report)
+        own = gltf_file.write(folder / "scene.glb", shapes, numbers, fps, materials.diffuse, report)
+        if own:
+            job["scene"]["materials"] = own
     if not (strict and report.entries):
         (folder / "job.json").write_text(json.dumps(job, indent=2) + "\n", encoding="utf-8")
     (folder / "report.txt").write_text(report.text(), encoding="utf-8")

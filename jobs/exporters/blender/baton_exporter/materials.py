@@ -1,7 +1,7 @@
 """Materials: what Blender's glTF exporter or Baton would drop is reported; runs inside Blender.
 
-Carried over: a Principled BSDF with constants, images, normal maps and cut-outs, and a Diffuse BSDF, which becomes a
-Principled one without reflection."""
+Carried over: a Principled BSDF with constants, images, normal maps and cut-outs, and a Diffuse BSDF. The glTF exporter
+reads Principled ones alone, so a Diffuse one becomes one of these."""
 
 import bpy
 
@@ -20,6 +20,7 @@ CUT = 0.5
 class Materials:
     def __init__(self, report):
         self.report = report
+        self.diffuse = set()  # names of those that are diffuse alone
 
     def check(self, materials):
         for material in materials:
@@ -51,6 +52,7 @@ class Materials:
         elif surface.node.type == "BSDF_DIFFUSE" and not surface.node.mute:
             Surface(material, surface.node, add).check_diffuse()
             replace_diffuse(material, surface.node)
+            self.diffuse.add(material.name)
         else:
             for node in [n for n in nodes.feeding(output.inputs["Surface"]) if n.outputs and n.outputs[0].type == "SHADER"]:
                 if node.type != "BSDF_PRINCIPLED":
