@@ -5,6 +5,7 @@ animations that Baton reads."""
 import itertools
 import json
 import math
+import struct
 import sys
 from pathlib import Path
 
@@ -13,6 +14,7 @@ from farm import check, check_equal, make_job, run_tests, write_job
 ROOT = Path(__file__).parents[2]
 sys.path += [str(ROOT / "jobs/exporters/blender/baton_exporter"), str(ROOT / "jobs/examples")]
 import conventions  # noqa: E402
+import exr  # noqa: E402
 import gltf_materials  # noqa: E402
 import keys  # noqa: E402
 from glb import Glb, tracks_of  # noqa: E402
@@ -103,6 +105,7 @@ def cameras(_programs, _folder):
     close(conventions.aperture(False, 50, 2.8), 0.05 / 2.8, "aperture")
     close(conventions.aperture(True, 50, 4), 0.25, "orthographic aperture")
     check_equal(conventions.region(100, 50, 0.1, 0.6, 0.2, 0.5), [10, 25, 50, 15], "region from the upper left corner")
+    check_equal(conventions.region(300, 360, 0.1, 0.95, 0.2, 0.9), [30, 36, 255, 252], "region in 32-bit numbers")
 
 
 def keys_are_reduced(_programs, _folder):
@@ -169,6 +172,15 @@ def animations_that_baton_reads(programs, folder):
     check(moved["moved"] > 1 and moved["still"] <= 1, f"motion in pixels: {moved}")
 
 
+def images_that_baton_reads(programs, folder):
+    folder.mkdir()
+    lines = [struct.pack("<6f", *(10 * y + i for i in range(6))) for y in range(3)]  # B B G G R R
+    exr.write(folder / "sky.exr", 2, 3, lines)
+    for channel, first in (("B", 0), ("G", 2), ("R", 4)):
+        wanted = [10.0 * y + first + x for y in range(3) for x in range(2)]
+        check_equal(programs.values(folder / "sky.exr", channel), wanted, f"channel {channel}")
+
+
 def diffuse_materials(_programs, _folder):
     """An image with its place on the surface, as the job's own textures have it."""
     turned = {"KHR_texture_transform": {"offset": [0.1, 0.2], "rotation": math.pi / 2, "scale": [2, 3]}}
@@ -193,4 +205,4 @@ def reports(_programs, _folder):
 if __name__ == "__main__":
     sys.dont_write_bytecode = True
     run_tests([map_of_every_mapping, mappings_that_are_no_rotation, angles_of_rotations, cameras, keys_are_reduced,
-               frame_numbers, animations_that_baton_reads, diffuse_materials, reports])
+               frame_numbers, animations_that_baton_reads, images_that_baton_reads, diffuse_materials, reports])

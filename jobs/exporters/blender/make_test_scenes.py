@@ -156,7 +156,9 @@ def make_turntable(folder):
     figure.modifiers.new("smooth", "SUBSURF").render_levels = 2
     bpy.ops.object.shade_smooth()
     bpy.ops.mesh.primitive_cube_add(size=0.8)
-    shape("box", diffuse("chart", (1, 1, 1), chart()), (1.2, -0.3, 0.4), table)
+    box = shape("box", diffuse("chart", (1, 1, 1), chart()), (1.2, -0.3, 0.4), table)
+    box.data.materials.append(diffuse("lid", (0.1, 0.2, 0.6)))
+    max(box.data.polygons, key=lambda face: face.center.z).material_index = 1
 
     # A collection that is shown by instances alone.
     cones = bpy.data.collections.new("cones")

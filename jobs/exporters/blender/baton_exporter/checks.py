@@ -2,7 +2,8 @@
 
 from . import nodes
 
-UNSEEN = {"EMPTY", "CAMERA", "ARMATURE", "LATTICE", "SPEAKER", "LIGHT_PROBE", "MESH", "CURVE", "SURFACE", "FONT", "META"}
+SHAPES = {"MESH", "CURVE", "SURFACE", "FONT", "META"}
+UNSEEN = {"EMPTY", "CAMERA", "ARMATURE", "LATTICE", "SPEAKER", "LIGHT_PROBE"}
 RAYS = {"camera": "the camera", "diffuse": "diffuse rays", "glossy": "glossy rays", "shadow": "shadow rays"}
 LINEAR_VIEWS = {"Standard", "Raw"}
 
@@ -97,23 +98,28 @@ def check_object(item, report):
                    "put it into the world's image")
     elif item.type == "VOLUME":
         report.add(where, "a volume", "hide it from the render")
-    elif item.type not in UNSEEN:
+    elif item.type not in SHAPES | UNSEEN:
         report.add(where, f"an object of type {item.type.lower()}", "convert it to a mesh")
     for system in item.particle_systems:
         if system.settings.type == "HAIR" and system.settings.render_type == "PATH":
             report.add(where, f'hair "{system.name}"', "convert it to a mesh with a thickness")
         elif system.settings.type == "EMITTER" and system.settings.render_type not in ("OBJECT", "COLLECTION", "NONE"):
             report.add(where, f'particles "{system.name}" without a shape', "render them as objects")
+    if item.type in SHAPES:
+        check_rays(item, where, report)
+    if nodes.is_animated(item) and changes_visibility(item):
+        report.add(where, "its visibility changes, but stays as in the first frame",
+                   "export frames before and after as two jobs")
+
+
+def check_rays(item, where, report):
     if item.is_holdout:
         report.add(where, "a holdout", "hide it from the render")
     if item.is_shadow_catcher:
         report.add(where, "a shadow catcher: it is shown as a surface", "hide it, or give it a material")
     for name, rays in RAYS.items():
-        if not getattr(item, f"visible_{name}") and item.type in UNSEEN - {"EMPTY", "CAMERA", "ARMATURE"}:
+        if not getattr(item, f"visible_{name}"):
             report.add(where, f"it is hidden from {rays}", "let all rays see it, or hide it from the render")
-    if nodes.is_animated(item) and changes_visibility(item):
-        report.add(where, "its visibility changes, but stays as in the first frame",
-                   "export frames before and after as two jobs")
 
 
 def changes_visibility(item):

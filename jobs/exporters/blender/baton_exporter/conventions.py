@@ -7,6 +7,7 @@ Matrices are lists of three rows.
 """
 
 import math
+import struct
 
 TO_BATON = [[1, 0, 0], [0, 0, 1], [0, -1, 0]]
 ROUNDING = 1e-5
@@ -128,6 +129,15 @@ def aperture(is_orthographic, lens_mm, fstop):
 
 
 def region(width, height, left, right, bottom, top):
-    """x, y, width, height from the upper left corner of a border in shares of the picture from the lower left one."""
-    x0, x1, y0, y1 = int(left * width), int(right * width), int(bottom * height), int(top * height)
+    """x, y, width, height from the upper left corner of a border in shares of the picture from the lower left one.
+
+    Blender multiplies as 32-bit numbers, then cuts: 0.95 of 300 pixels are 285."""
+    def pixels(share, size):
+        return int(as_float(as_float(share) * size))
+
+    x0, x1, y0, y1 = pixels(left, width), pixels(right, width), pixels(bottom, height), pixels(top, height)
     return [x0, height - y1, x1 - x0, y1 - y0]
+
+
+def as_float(value):
+    return struct.unpack("f", struct.pack("f", value))[0]

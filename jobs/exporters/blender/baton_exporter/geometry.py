@@ -1,11 +1,11 @@
 """The shapes of a scene as they are rendered, and where each is in every frame; runs inside Blender."""
 
+import bmesh
 import bpy
 import numpy
 
 from .flat_faces import cut_bent
 
-SHAPES = {"MESH", "CURVE", "SURFACE", "FONT", "META"}
 DEFORMATION = 1e-5  # of the size of a mesh
 
 
@@ -62,73 +62,109 @@ class Geometry:
         self.shapes = {}
         self.meshes = {}     # by what they were made of, in the first frame
         self.witnesses = {}  # vertices in the first frame of what may deform
+        self.first = set()   # keys of the first frame
         self.frames = 0
-        self.owners = set()
 
     def take(self, depsgraph):
         """The evaluated scene in the next frame."""
         seen = set()
         for instance in depsgraph.object_instances:
             shown = instance.object
-            if not instance.show_self or shown.type not in SHAPES:
+            # Curves, texts and metaballs are listed twice: as they are, and as the mesh they have become.
+            if not instance.show_self or shown.type != "MESH":
                 continue
             parent = instance.parent.name if instance.parent else ""
             key = (shown.name, parent, tuple(instance.persistent_id) if instance.is_instance else ())
             seen.add(key)
             if self.frames == 0:
+                self.first.add(key)
                 mesh = self.mesh_of(key, shown, depsgraph)
                 if mesh is not None:
                     self.shapes[key] = Shape(shown.name, mesh)
             elif key in self.witnesses:
-                self.compare(key, shown)
+                self.compare(key, shown, depsgraph)
             if key in self.shapes:
                 self.shapes[key].matrices.append(instance.matrix_world.copy())
-            elif self.frames > 0:
-                self.report.add(shown.name, "it is not there in the first frame, and never shown",
+            elif key not in self.first:
+                self.report.add(where(key), "it is not there in the first frame, and never shown",
                                 "hide nothing within a shot: export frames before and after as two jobs")
         for key, shape in self.shapes.items():
             if key not in seen:
                 shape.matrices.append(shape.matrices[-1])
-                self.report.add(shape.name, "it is not there in some frames, but always shown",
+                self.report.add(where(key), "it is not there in some frames, but always shown",
                                 "hide nothing within a shot: export frames before and after as two jobs")
         self.frames += 1
 
     def mesh_of(self, key, shown, depsgraph):
         """The evaluated mesh, one for all that share it; None where there is no surface."""
-        slots = tuple(slot.material.name if slot.material else "" for slot in shown.material_slots)
-        made_of = (shown.data.as_pointer(), slots, "" if shown.type == "MESH" else shown.name)
+        slots = tuple(material.name if material else "" for material in materials_of(shown))
+        made_of = (shown.data.as_pointer(), slots)
         if made_of not in self.meshes:
-            mesh = bpy.data.meshes.new_from_object(shown, preserve_all_data_layers=True, depsgraph=depsgraph)
+            mesh = new_mesh(shown, depsgraph, is_made_by_nodes(key))
             if mesh is not None and len(mesh.polygons) == 0:
                 if mesh.vertices:
-                    self.report.add(shown.name, "it has no faces, so nothing of it is seen",
+                    self.report.add(where(key), "it has no faces, so nothing of it is seen",
                                     "give edges and points a surface, such as a curve's bevel")
                 mesh = None
             if mesh is not None:
                 set_materials(mesh, shown)
                 cut_bent(mesh)
                 if may_deform(shown):
-                    self.witnesses[key] = vertices_of(shown)
+                    self.witnesses[key] = vertices_of(shown, depsgraph, is_made_by_nodes(key))
             self.meshes[made_of] = mesh
-            self.owners.add(shown.name)
         return self.meshes[made_of]
 
-    def compare(self, key, shown):
-        before, now = self.witnesses[key], vertices_of(shown)
+    def compare(self, key, shown, depsgraph):
+        before, now = self.witnesses[key], vertices_of(shown, depsgraph, is_made_by_nodes(key))
         largest = float(numpy.abs(before).max(initial=1e-9))
-        if before.shape != now.shape or float(numpy.abs(now - before).max()) > DEFORMATION * largest:
-            self.report.add(shown.name, "it deforms, but is shown as in the first frame",
+        if before.shape != now.shape or float(numpy.abs(now - before).max(initial=0)) > DEFORMATION * largest:
+            self.report.add(where(key), "it deforms, but is shown as in the first frame",
                             "move it as a whole, or render each shape as a job of its own")
             del self.witnesses[key]
 
 
+def where(key):
+    return f'object "{key[0]}"'
+
+
+def is_made_by_nodes(key):
+    """What is no object of the file: a curve's mesh, or instances that geometry nodes have made."""
+    name, parent, path = key
+    return bool(path) and name == parent
+
+
+def evaluated(shown, depsgraph):
+    """The object of the file, which lives longer than what Blender lists."""
+    return bpy.data.objects[shown.name].evaluated_get(depsgraph)
+
+
+def new_mesh(shown, depsgraph, made_by_nodes):
+    if not made_by_nodes:
+        return bpy.data.meshes.new_from_object(evaluated(shown, depsgraph), preserve_all_data_layers=True,
+                                               depsgraph=depsgraph)
+    mesh, copied = bpy.data.meshes.new(shown.name), bmesh.new()
+    copied.from_mesh(shown.data)
+    copied.to_mesh(mesh)
+    copied.free()
+    return mesh
+
+
 def set_materials(mesh, shown):
     """Those of the object's slots, which may differ from the mesh's; empty ones get what Cycles shows there."""
-    materials = [slot.material for slot in shown.material_slots] or [None]
-    mesh.materials.clear()
-    for material in materials:
+    # Clearing the list would give all faces the first one.
+    for slot, material in enumerate(materials_of(shown)):
         given = bpy.data.materials.get(material.name) if material else None
-        mesh.materials.append(given or no_material())
+        if slot == len(mesh.materials):
+            mesh.materials.append(None)
+        mesh.materials[slot] = given or no_material()
+
+
+def materials_of(shown):
+    """By slot; what geometry nodes have made has its own."""
+    own = list(shown.data.materials)
+    source = bpy.data.objects.get(shown.name)
+    slots = [slot.material for slot in shown.material_slots]
+    return (own if source and source.data and source.data.name != shown.data.name else slots) or own or [None]
 
 
 def no_material():
@@ -146,15 +182,17 @@ def no_material():
 
 def may_deform(shown):
     data = shown.data
-    plain = shown.type == "MESH" and not shown.modifiers and not data.shape_keys and not data.animation_data
-    original = shown.original
-    return not plain or original is None or original.type != shown.type
+    source = bpy.data.objects.get(shown.name)
+    return (bool(shown.modifiers or data.shape_keys or data.animation_data) or source is None or source.type != "MESH"
+            or source.data.name != data.name)
 
 
-def vertices_of(shown):
+def vertices_of(shown, depsgraph, made_by_nodes):
     """Places of the evaluated mesh's vertices: (vertices, 3)."""
-    mesh = shown.to_mesh()
+    source = None if made_by_nodes else evaluated(shown, depsgraph)
+    mesh = source.to_mesh() if source else shown.data
     places = numpy.empty(3 * len(mesh.vertices), numpy.float32)
     mesh.vertices.foreach_get("co", places)
-    shown.to_mesh_clear()
+    if source:
+        source.to_mesh_clear()
     return places.reshape(-1, 3)

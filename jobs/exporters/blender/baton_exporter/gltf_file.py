@@ -66,7 +66,7 @@ def put_in_scene(shapes, report):
         if any(map(is_sheared, shape.matrices)):
             # Nodes of glTF turn and scale only: what stands still is sheared in its mesh.
             if is_moving(shape):
-                report.add(shape.name, "it is sheared while it moves, which is not exact",
+                report.add(f'object "{shape.name}"', "it is sheared while it moves, which is not exact",
                            "apply the scale of its parents (Object > Apply > Scale)")
             else:
                 mesh = mesh.copy()

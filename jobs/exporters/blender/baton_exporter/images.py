@@ -6,7 +6,7 @@ from pathlib import Path
 import bpy
 import numpy
 
-from . import keys
+from . import exr, keys
 
 LINEAR = {"Linear", "Raw", "Non-Color", "Linear ACEScg", "scene_linear"}
 READ = {".exr", ".hdr"}
@@ -59,15 +59,9 @@ def linear_pixels(image):
 
 
 def write(path, color, width, height):
-    """An EXR of 32-bit numbers; its file name."""
-    image = bpy.data.images.new("baton", width, height, float_buffer=True, alpha=False)
-    image.colorspace_settings.name = "Linear"
-    pixels = numpy.ones((height, width, 4), numpy.float32)
-    pixels[..., :3] = color
-    image.pixels.foreach_set(pixels.ravel())
-    image.filepath_raw, image.file_format = str(path), "OPEN_EXR"
-    image.save()
-    bpy.data.images.remove(image)
+    """An EXR of 32-bit numbers; its file name. color: (height, width, 3) from the lowest row up."""
+    rows = numpy.asarray(color, "<f4")[::-1, :, ::-1]
+    exr.write(path, width, height, (row.T.tobytes() for row in rows))
     return Path(path).name
 
 

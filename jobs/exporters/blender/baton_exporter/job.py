@@ -77,7 +77,7 @@ def frames_of(scene, wanted):
     try:
         return text, keys.parse_frames(text)
     except ValueError as fault:
-        raise CannotExport(f"{fault}, not below 0") from None
+        raise CannotExport(str(fault)) from None
 
 
 def job_name():

@@ -57,7 +57,7 @@ def parse_frames(text):
     for part in text.split(","):
         match = re.fullmatch(r"(\d+)(?:-(\d+)(?:x(\d+))?)?", part)
         if not match:
-            raise ValueError(f'frames "{text}": expected such as 12, 1-48, 1-100x2, 1,5,9-12')
+            raise ValueError(f'frames "{text}": expected such as 12, 1-48, 1-100x2, 1,5,9-12, none below 0')
         first, last, step = (int(group) if group else None for group in match.groups())
         numbers += range(first, (first if last is None else last) + 1, step or 1)
     if numbers != sorted(set(numbers)) or not numbers:
