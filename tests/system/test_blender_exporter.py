@@ -56,7 +56,8 @@ def map_of_every_mapping(_programs, _folder):
 
 
 def mappings_that_are_no_rotation(_programs, _folder):
-    for location, scale in (((1, 0, 0), (1, 1, 1)), ((0, 0, 0), (1, -1, 1)), ((0, 0, 0), (1, 2, 1)), ((0, 0, 0), (0, 0, 0))):
+    for location, scale in (((1, 0, 0), (1, 1, 1)), ((0, 0, 0), (1, -1, 1)), ((0, 0, 0), (1, 2, 1)), ((0, 0, 0), (0, 0, 0)),
+                            ((0, 0, 0), (-1, -1, -1))):
         try:
             conventions.mapping_lookup("POINT", location, (0, 0, 0), scale)
         except conventions.NotARotation:
@@ -158,6 +159,7 @@ def animations_that_baton_reads(programs, folder):
     file.document.pop("animations")
     ball = next(i for i, node in enumerate(file.document["nodes"]) if node["name"] == "ball")
     file.animate("shot", [(ball, "translation", [[0, 0.3, 0], [1, 0.3, 0]])], [1 / 24, 3 / 24])
+    check_equal(file.document["animations"][0]["channels"][0]["target"]["node"], ball, "node that moves")
     file.write(folder / "moved.glb")
     job = make_job(folder, frames="1-3")
     del job["camera"]

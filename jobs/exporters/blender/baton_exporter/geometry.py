@@ -14,7 +14,8 @@ def as_rendered(scene, view_layer):
     scene.render.use_simplify, simplify = False, scene.render.use_simplify
     for item in scene.objects:
         item.hide_viewport = item.hide_render
-        item.hide_set(False, view_layer=view_layer)
+        if item.name in view_layer.objects:
+            item.hide_set(False, view_layer=view_layer)
         item.show_instancer_for_viewport = item.show_instancer_for_render
         for modifier in item.modifiers:
             modifier.show_viewport = modifier.show_render
@@ -135,7 +136,7 @@ def is_made_by_nodes(key):
 
 def evaluated(shown, depsgraph):
     """The object of the file, which lives longer than what Blender lists."""
-    return bpy.data.objects[shown.name].evaluated_get(depsgraph)
+    return shown.original.evaluated_get(depsgraph)
 
 
 def new_mesh(shown, depsgraph, made_by_nodes):
@@ -153,18 +154,17 @@ def set_materials(mesh, shown):
     """Those of the object's slots, which may differ from the mesh's; empty ones get what Cycles shows there."""
     # Clearing the list would give all faces the first one.
     for slot, material in enumerate(materials_of(shown)):
-        given = bpy.data.materials.get(material.name) if material else None
         if slot == len(mesh.materials):
             mesh.materials.append(None)
-        mesh.materials[slot] = given or no_material()
+        mesh.materials[slot] = material.original if material else no_material()
 
 
 def materials_of(shown):
     """By slot; what geometry nodes have made has its own."""
     own = list(shown.data.materials)
-    source = bpy.data.objects.get(shown.name)
+    source = shown.original
     slots = [slot.material for slot in shown.material_slots]
-    return (own if source and source.data and source.data.name != shown.data.name else slots) or own or [None]
+    return (own if source.data and source.data.name != shown.data.name else slots) or own or [None]
 
 
 def no_material():
@@ -182,8 +182,8 @@ def no_material():
 
 def may_deform(shown):
     data = shown.data
-    source = bpy.data.objects.get(shown.name)
-    return (bool(shown.modifiers or data.shape_keys or data.animation_data) or source is None or source.type != "MESH"
+    source = shown.original
+    return (bool(shown.modifiers or data.shape_keys or data.animation_data) or source.type != "MESH"
             or source.data.name != data.name)
 
 

@@ -58,6 +58,8 @@ def is_sheared(matrix):
 def put_in_scene(shapes, report):
     """A scene of its own, without parents; the names of the objects."""
     for item in bpy.data.objects:
+        if item.library:
+            continue
         item.name = "source of " + item.name[:50]
     scene = bpy.data.scenes.new("baton")
     names = []

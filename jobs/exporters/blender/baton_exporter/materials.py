@@ -3,8 +3,6 @@
 Carried over: a Principled BSDF with constants, images, normal maps and cut-outs, and a Diffuse BSDF. The glTF exporter
 reads Principled ones alone, so a Diffuse one becomes one of these."""
 
-import bpy
-
 from . import nodes
 
 # Inputs of the Principled BSDF that change nothing at these values.
@@ -215,6 +213,6 @@ def replace_diffuse(material, diffuse):
 
 
 def used_materials(geometry):
-    """Those of all shapes, by name."""
-    found = {m.name: m for mesh in geometry.meshes.values() if mesh for m in mesh.materials if m}
-    return [bpy.data.materials[name] for name in sorted(found)]
+    """Those of all shapes, by name; linked ones become local, so that they can be changed."""
+    found = {m for mesh in geometry.meshes.values() if mesh for m in mesh.materials if m}
+    return sorted((m.make_local() if m.library else m for m in found), key=lambda m: m.name)
