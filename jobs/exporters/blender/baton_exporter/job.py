@@ -51,9 +51,7 @@ def export(folder, strict=False, frames=None):
 
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
-    for old in [folder / "job.json", *folder.glob("sky.*")]:
-        old.unlink(missing_ok=True)
-    shutil.rmtree(folder / "sky", ignore_errors=True)
+    clear(folder)
     job = {"specificationVersion": 1, "name": job_name(), "frames": text, "image": image_of(scene)}
     job["camera"] = camera.job(numbers)
     job["scene"] = {"gltf": {"file": "scene.glb", "fps": number(fps)}}
@@ -67,8 +65,17 @@ def export(folder, strict=False, frames=None):
             job["scene"]["materials"] = own
     if not (strict and report.entries):
         (folder / "job.json").write_text(json.dumps(job, indent=2) + "\n", encoding="utf-8")
+    else:
+        clear(folder)
     (folder / "report.txt").write_text(report.text(), encoding="utf-8")
     return report
+
+
+def clear(folder):
+    """Removes what an export has written."""
+    for old in [folder / "job.json", folder / "scene.glb", folder / "report.txt", *folder.glob("sky.*")]:
+        old.unlink(missing_ok=True)
+    shutil.rmtree(folder / "sky", ignore_errors=True)
 
 
 def frames_of(scene, wanted):
