@@ -70,6 +70,7 @@ JobEstimate estimate_job(const JobSpec& job) {
     frame_channels += count;
     wide_channels += traits(aov).is_float ? count : 0;
   }
+  if (has_catcher(job)) frame_channels += 3;
   e.film_channels = frame_channels + (tells_noise(job) ? 1 : 0);
   e.film_bytes = pixels * e.film_channels * 4;
   const std::int64_t sample_bytes = job.output.pixel_type == PixelType::half_float ? 2 : 4;

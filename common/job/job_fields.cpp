@@ -266,6 +266,17 @@ void check_whole(JobArchive& a, const JobSpec& job) {
                    fmt::format("at most {} frames in all sweeps", limits::kMaxTasksPerJob),
                    fmt::format("{} sweeps of {}", job.quality.sweeps, job.frames.size()));
   }
+  if (has_catcher(job)) {
+    const bool carries_samples =
+        traits(job.sampling.method).keeps_samples && traits(job.sampling.method).carries();
+    if (carries_samples || job.visibility.correlated) {
+      a.fault(
+          "scene.ground.catcher",
+          "false, as samples that are carried, and the second pass, know no albedo that changes "
+          "with the light",
+          "true");
+    }
+  }
   if (job.quality.noise_threshold && !tells_noise(job)) {
     a.fault(
         "quality",

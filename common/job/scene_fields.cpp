@@ -70,6 +70,7 @@ void fields(JobArchive& a, GroundSpec& ground, const SceneSpec& scene) {
   material_reference(a, required("material"), ground.material, scene);
   a.number("height", ground.height, kCoordinateRange);
   a.number("size", ground.size, kPositiveRange);
+  a.boolean("catcher", ground.catcher);
 }
 
 void fields(JobArchive& a, GltfNodeSpec& node) {

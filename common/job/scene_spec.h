@@ -139,6 +139,8 @@ struct GroundSpec {
   std::string material;
   float height = 0;
   float size = 100;  ///< side length
+  /// It is not in the picture: what shadows take from it is in the channels `shadow`.
+  bool catcher = false;
 
   bool operator==(const GroundSpec&) const = default;
 };

@@ -184,6 +184,8 @@ bool tells_noise(const JobSpec& job) {
   return !carries_samples && !job.visibility.correlated;
 }
 
+bool has_catcher(const JobSpec& job) { return job.scene.ground && job.scene.ground->catcher; }
+
 SamplingSpec as_sampling(const MaterialSampling& material) {
   SamplingSpec spec;
   spec.method = material.method;

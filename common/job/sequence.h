@@ -113,6 +113,8 @@ SamplingSpec as_sampling(const MaterialSampling& material);
 /// Whether the noise of a job's frames is told: of pixels that draw all samples anew, and whose
 /// light no second pass shares out. Films then have a plane of errors (common/image/noise.h).
 bool tells_noise(const JobSpec& job);
+/// Whether the ground catches shadows; films then have channels shadow.*.
+bool has_catcher(const JobSpec& job);
 /// Samples of a pixel: the most of any material.
 std::int32_t most_particles(const SamplingSpec& sampling);
 /// Particles per pixel in the job's states; 0 where rays are chosen apart from samples.

@@ -54,6 +54,7 @@ double film_bytes_per_pixel(const JobSpec& job, double surface_share) {
   for (const Aov aov : job.output.aovs) {
     if (why_empty(aov, job).empty()) bytes += surface_share * film_bytes(aov, equal_weights);
   }
+  if (has_catcher(job)) bytes += 3 * kColorBytes * surface_share;
   return bytes + (tells_noise(job) ? kErrorBytes : 0);
 }
 

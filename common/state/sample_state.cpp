@@ -237,9 +237,9 @@ Status decode_sources(const SectionFile& file, const std::string& name, SampleSt
   for (std::size_t row = 0; row < payload.size(); ++row) {
     const std::size_t pixel = row / populations;
     const auto value = std::to_integer<std::uint8_t>(payload[row]);
-    if (value > static_cast<std::uint8_t>(PixelSource::refreshed)) {
+    if (value > static_cast<std::uint8_t>(PixelSource::catcher)) {
       const Error error =
-          value_error(state, kSource, pixel, fmt::format("source {}, expected 0 to 4", value));
+          value_error(state, kSource, pixel, fmt::format("source {}, expected 0 to 5", value));
       return Error{error.kind, fmt::format("{}: section {}", name, error.message)};
     }
     state.source[row] = static_cast<PixelSource>(value);

@@ -106,7 +106,7 @@ void JobTasks::complete(TaskIndex task, const Completion& completion, const std:
   record(task).maker = maker != maker_numbers_.end() ? maker->second : std::uint16_t{0};
   if (!former_outputs_.contains(task)) {
     progress_.stats.merge(completion.stats);
-    for (const FrameStats& frame : completion.frames) add_stats(frame);
+    for (const FrameStats& frame : completion.frames) add_stats(frame.frame, frame);
   }
   force_done(task, completion.outputs);
   record(task).is_shared = is_shared;
@@ -122,8 +122,8 @@ void JobTasks::complete(TaskIndex task, const Completion& completion, const std:
 }
 
 /// Of a frame, over its sweeps.
-void JobTasks::add_stats(const FrameStats& of_step) {
-  progress_.frames[of_step.frame % graph_.num_frames()].merge(of_step);
+void JobTasks::add_stats(std::int32_t step, const FrameStats& stats) {
+  progress_.frames[step % graph_.num_frames()].merge(stats);
 }
 
 std::int32_t JobTasks::first_open_step() const {
@@ -161,7 +161,7 @@ std::vector<TaskIndex> JobTasks::restore(const Completions& completions,
     done.push_back(*task);
   }
   progress_.stats = completions.stats;
-  for (const auto& [step, frame] : completions.frames) add_stats(frame);
+  for (const auto& [step, frame] : completions.frames) add_stats(step, frame);
   for (const TaskIndex task : done) {
     for (const TaskIndex dependent : graph_.dependents(graph_.key(task)))
       --record(dependent).missing_inputs;

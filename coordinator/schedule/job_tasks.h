@@ -172,7 +172,7 @@ class JobTasks {
   const Record& record(TaskIndex task) const { return records_[static_cast<std::size_t>(task)]; }
   bool apply(TaskIndex task, TaskEvent event);
   void count_run(TaskIndex task, bool opened);
-  void add_stats(const FrameStats& of_step);
+  void add_stats(std::int32_t step, const FrameStats& stats);
   std::int32_t num_needs(TaskIndex task, const BlobRef& output) const;
   std::int32_t num_uses(TaskIndex task, const BlobRef& output) const;
   void count_output(const BlobRef& output, bool made);

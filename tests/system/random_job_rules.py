@@ -63,6 +63,9 @@ def mend(job, rng):
         else:
             sampling["numParticles"] += 1 if sampling["numParticles"] < 64 else -1
             sampling["numCandidates"] = max(sampling["numCandidates"], sampling["numParticles"])
+    ground = job["scene"].get("ground", {})
+    if method in ("sequential", "restir") or visibility.get("correlated"):
+        ground.pop("catcher", None)
     rotation = job["environment"].get("rotation", {})
     if rotation.get("keys"):
         rotation.pop("startDeg", None)

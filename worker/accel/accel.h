@@ -23,6 +23,9 @@ struct SurfaceHit {
   std::uint32_t instance = 0;
   std::uint32_t material = 0;
   bool hit = false;
+  /// Of the ground that catches shadows (worker/pass/catcher.h). `hit` is false where the pixel
+  /// sees an object, too.
+  bool is_catcher = false;
   SurfacePlace place{};  ///< where the material has detail (surface_detail.h), else all 0
 
   bool operator==(const SurfaceHit&) const = default;

@@ -357,6 +357,7 @@ Result<std::unique_ptr<Accel>> Accel::build(const Scene& scene, const AccelLimit
   const std::set<std::uint32_t> with_holes = meshes_with_holes(scene);
   for (unsigned i = 0; i < scene.instances.size(); ++i) {
     const Instance& instance = scene.instances[i];
+    if (instance.is_catcher) continue;
     const Scene* const holes = with_holes.contains(instance.mesh) ? &scene : nullptr;
     if (!instance.moves() && !shared.contains(instance.mesh)) {
       attach_instance(device, geometry->still.get(), scene.meshes[instance.mesh], instance.to_world,

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -27,6 +28,9 @@ struct FrameLight {
   /// see turn_between()
   std::optional<Mat3> turn;
   std::shared_ptr<const PresampledLight> presampled;
+  /// Albedo with which an unshadowed ground reflects 1 in each channel: pi / E; 0: no light
+  /// of that colour arrives. Of jobs whose ground catches shadows.
+  Rgb catcher{1, 1, 1};
 };
 
 /// R_now R_before^-1 of a map whose texels stay: along it, directions on the lattice are carried
@@ -56,6 +60,7 @@ class LightSequence {
   std::vector<std::string> repair_notes() const;
 
  private:
+  Rgb catcher_albedo(std::int32_t index, const Environment& now);
   Result<std::shared_ptr<const EnvironmentMap>> key_map(std::int32_t key);
   Result<std::shared_ptr<const EnvironmentMap>> mixed_map(const EnvironmentFrame& frame);
   Result<Environment> environment(const EnvironmentFrame& frame);
@@ -67,6 +72,7 @@ class LightSequence {
   /// By the first frame index that shows these texels.
   LruCache<std::int32_t, EnvironmentMap> mixed_maps_;
   LruCache<std::pair<std::int32_t, std::int32_t>, PresampledLight> presampled_;  ///< frame, round
+  std::map<std::int32_t, Rgb> catchers_;                                         ///< by frame index
   std::vector<std::string> repair_notes_;
 };
 

@@ -64,10 +64,21 @@ PixelDiagnostics sample_populations(const PixelSampler& sampler, std::size_t num
   return sum;
 }
 
-void set_background(SampleState& state, std::size_t index) {
+namespace {
+
+void set_source(SampleState& state, std::size_t index, PixelSource source) {
   const auto k = static_cast<std::ptrdiff_t>(state.num_populations);
-  std::fill_n(state.source.begin() + static_cast<std::ptrdiff_t>(index) * k, k,
-              PixelSource::background);
+  std::fill_n(state.source.begin() + static_cast<std::ptrdiff_t>(index) * k, k, source);
+}
+
+}  // namespace
+
+void set_background(SampleState& state, std::size_t index) {
+  set_source(state, index, PixelSource::background);
+}
+
+void set_catcher(SampleState& state, std::size_t index) {
+  set_source(state, index, PixelSource::catcher);
 }
 
 float mean_lns(const SampleState& state, std::size_t index) {

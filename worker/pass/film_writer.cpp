@@ -7,6 +7,7 @@ namespace baton {
 Rgb source_color(PixelSource source) {
   switch (source) {
     case PixelSource::background:
+    case PixelSource::catcher:
       return {0, 0, 0};
     case PixelSource::fresh:
       return {1, 0, 0};
@@ -21,11 +22,15 @@ Rgb source_color(PixelSource source) {
 }
 
 FilmWriter::FilmWriter(const PixelRect& rect, const JobSpec& job)
-    : aovs_(job.output.aovs), with_error_(tells_noise(job)) {
+    : aovs_(job.output.aovs), with_shadow_(has_catcher(job)), with_error_(tells_noise(job)) {
   film_.rect = rect;
   film_.channels = {"R", "G", "B", "A"};
   for (const Aov aov : aovs_) {
     for (const std::string& name : traits(aov).channels) film_.channels.push_back(name);
+  }
+  if (with_shadow_) {
+    for (const char* const name : {"shadow.R", "shadow.G", "shadow.B"})
+      film_.channels.emplace_back(name);
   }
   if (with_error_) film_.channels.emplace_back(kErrorChannel);
   film_.values.resize(film_.channels.size() * film_.num_pixels());
@@ -93,6 +98,7 @@ void FilmWriter::write(std::size_t index, const PixelResult& pixel) {
         break;
     }
   }
+  if (with_shadow_) put_vec(pixel.catcher > 0 ? pixel.shadow / pixel.catcher : Rgb{1, 1, 1});
   if (with_error_) put(pixel.error);
 }
 

@@ -32,10 +32,12 @@ struct PixelResult {
   float variance =
       0;  ///< estimated squared error of the mean over RGB; 0 where the method has no estimate
   float error = kNoSurface;  ///< as in the plane kErrorChannel
+  Rgb shadow{};              ///< share of the light that arrives on the catcher, times `catcher`
+  float catcher = 0;         ///< share of the sites that see it
 };
 
-/// Pass: writes pixels into the channels of the job: R, G, B, A, the AOVs in their order, and where
-/// the noise is told kErrorChannel.
+/// Pass: writes pixels into the channels of the job: R, G, B, A, the AOVs in their order, shadow.*
+/// where the ground catches shadows, and where the noise is told kErrorChannel.
 class FilmWriter {
  public:
   FilmWriter(const PixelRect& rect, const JobSpec& job);
@@ -46,7 +48,7 @@ class FilmWriter {
  private:
   FilmTile film_;
   std::vector<Aov> aovs_;
-  bool with_error_;
+  bool with_shadow_, with_error_;
 };
 
 /// False colour of a pixel's source: green carried, red fresh, yellow restarted, blue refreshed,

@@ -72,7 +72,7 @@ void GeometryPlanes::add(const TileSurfaces& surfaces) {
     for (std::size_t s = 0; s < num_sites; ++s) {
       const SurfaceHit& hit = surfaces.hits[pixel * num_sites + s];
       if (with_motion) add_motion(camera, surfaces.rays[pixel * num_sites + s], hit, sum);
-      if (!hit.hit) continue;
+      if (!hit.hit || hit.is_catcher) continue;
       ++sum.num_seen;
       if (sum.object == 0) sum.object = hit.instance + 1;
       const Vec3& p = hit.point.position;

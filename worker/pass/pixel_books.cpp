@@ -14,7 +14,7 @@ float acceptance_rate(const MoveCounts& moves) {
 void record_geometry(std::span<const SurfaceHit> hits, PixelResult& pixel) {
   float num_hits = 0;
   for (const SurfaceHit& hit : hits) {
-    if (!hit.hit) continue;
+    if (!hit.hit || hit.is_catcher) continue;
     if (num_hits == 0) pixel.material = hit.material + 1;
     num_hits += 1;
     pixel.normal += hit.point.ns;

@@ -7,6 +7,7 @@
 #include "common/job/sequence.h"
 #include "common/math/low_discrepancy.h"
 #include "worker/light/candidates.h"
+#include "worker/pass/catcher.h"
 #include "worker/scene/pixel_filter.h"
 #include "worker/scene/scene_kernels.h"
 
@@ -76,6 +77,7 @@ void append_primary_rays(const JobSpec& job, const FrameGeometry& geometry, std:
 void trace_primary_rays(const JobSpec& job, const FrameGeometry& geometry,
                         std::span<const Ray> rays, std::span<SurfaceHit> hits) {
   geometry.accel->intersect(rays, hits, static_cast<std::size_t>(job.image.sites));
+  see_catcher(job, geometry, rays, hits);
   if (!geometry.scene->has_detail) return;
   const float share = 1 / std::sqrt(static_cast<float>(job.image.sites));
   for (std::size_t i = 0; i < hits.size(); ++i) {
@@ -103,7 +105,7 @@ void add_environment_behind(std::span<const SurfaceHit> hits, std::span<const Ra
     count = 0;
   };
   for (std::size_t s = 0; s < hits.size(); ++s) {
-    if (hits[s].hit) continue;
+    if (hits[s].hit && !hits[s].is_catcher) continue;
     pixel[count] = s / static_cast<std::size_t>(num_sites);
     x[count] = rays[s].direction.x;
     y[count] = rays[s].direction.y;

@@ -34,6 +34,8 @@ void RoundMean::add(std::size_t index, const PixelResult& pixel) {
   sum.squares += grey * grey;
   sum.variance += double{pixel.variance};
   sum.alpha += double{pixel.alpha};
+  add_to(sum.shadow, pixel.shadow);
+  sum.catcher += double{pixel.catcher};
   if (!(pixel.coverage > 0)) return;
   if (pixel.error >= 0) sum.error = std::max(sum.error, 0.0) + double{pixel.error};
   if (sum.num_seen == 0) sum.material = pixel.material;
@@ -57,6 +59,8 @@ PixelResult RoundMean::mean(const PixelSum& sum) const {
   PixelResult pixel;
   pixel.radiance = scaled(sum.radiance, 1 / k);
   pixel.alpha = static_cast<float>(sum.alpha / k);
+  pixel.shadow = scaled(sum.shadow, 1 / k);
+  pixel.catcher = static_cast<float>(sum.catcher / k);
   const double grey = (sum.radiance[0] + sum.radiance[1] + sum.radiance[2]) / 3 / k;
   if (rounds_are_uncorrelated_) {
     pixel.variance = static_cast<float>(num_rounds_ >= kLeastForScatter

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <bit>
 #include <optional>
+#include <utility>
 
 #include "common/base/poison.h"
 #include "common/job/sequence.h"
@@ -13,6 +14,19 @@
 
 namespace baton {
 namespace {
+
+/// Of the sites.
+float catcher_share(std::span<const SurfaceHit> hits) {
+  const auto count = std::ranges::count_if(hits, &SurfaceHit::is_catcher);
+  return static_cast<float>(count) / static_cast<float>(hits.size());
+}
+
+/// Where no light of a colour arrives, none is taken away.
+void lighten_black(const Rgb& albedo, PixelResult& pixel) {
+  if (albedo.x == 0) pixel.shadow.x = pixel.catcher;
+  if (albedo.y == 0) pixel.shadow.y = pixel.catcher;
+  if (albedo.z == 0) pixel.shadow.z = pixel.catcher;
+}
 
 /// Prefetches a pixel's bins: those of a tile are larger than the caches.
 void fetch_ahead(const PixelMemory* memory) {
@@ -139,7 +153,8 @@ void TileFrameRenderer::look_ahead(std::size_t pixel_of_batch, std::size_t index
   poison(ahead.located);
   poison(ahead.old);
   fetch_ahead(state.memory_of(index));
-  const bool was_seen = has_history_ && latest_source(state, index) != PixelSource::background;
+  const bool sees_catcher = surfaces_->first_surface(index).is_catcher;
+  const bool was_seen = has_history_ && takes_up(sees_catcher, state, index);
   ahead.history = was_seen ? PixelHistory::same : PixelHistory::none;
   if (reprojection_ != nullptr) {
     ahead.history = reprojection_->take(pixel_of_batch, index, state, ahead.old);
@@ -177,7 +192,7 @@ void TileFrameRenderer::sample(Batch& batch, const TileRound& at, SampleState& s
       continue;
     }
     poison(sites);
-    batch.emission[i] = gather_sites(geometry_, surfaces_->pixel(index), sites);
+    batch.emission[i] = gather_sites(geometry_, surfaces_->pixel(index), sites, light.catcher);
 
     // Sample it.
     const Ahead& ahead = ahead_[index % 2];
@@ -199,7 +214,15 @@ void TileFrameRenderer::sample(Batch& batch, const TileRound& at, SampleState& s
         .hits = surfaces_->pixel(index),
         .geometry = &geometry_};
     const SiteOrigins from = origins(index);
-    if (at.probe_light != nullptr && batch.is_probe(context_, surfaces_->rect, index)) {
+    const bool is_catcher = surfaces_->first_surface(index).is_catcher;
+    if (is_catcher && has_history_ && belongs_to_object(state, index)) {
+      batch.pixels[i].shadow = edge_.sample(*context_.method, input, light, state, *scratch_);
+      batch.pixels[i].catcher = 1;
+      batch.end_ray[i] = batch.rays.size();
+      continue;
+    }
+    if (at.probe_light != nullptr && !is_catcher &&
+        batch.is_probe(context_, surfaces_->rect, index)) {
       batch.again[i] = probe_.sample_again(method_of(index), input, *at.probe_light, state, index,
                                            from, *scratch_);
     }
@@ -208,6 +231,12 @@ void TileFrameRenderer::sample(Batch& batch, const TileRound& at, SampleState& s
     const PixelDiagnostics did = method_of(index).sample(input, {state, index}, *scratch_, rays);
     batch.known[i] = rays.known;
     batch.end_ray[i] = batch.rays.size();
+
+    if (is_catcher) set_catcher(state, index);
+    if (const float share = catcher_share(input.hits); share > 0 && !is_catcher) {
+      batch.pixels[i].shadow = edge_.sample(*context_.method, input, light, state, *scratch_);
+      batch.pixels[i].catcher = share;
+    }
 
     // Count what the method did.
     PixelResult& pixel = batch.pixels[i];
@@ -292,7 +321,15 @@ void TileFrameRenderer::finish(Batch& batch, const FrameLight& light, RoundMean&
   }
   for (std::size_t i = 0; i < batch.count; ++i) {
     PixelResult& pixel = batch.pixels[i];
-    record_geometry(surfaces_->pixel(batch.first + i), pixel);
+    const std::span<const SurfaceHit> hits = surfaces_->pixel(batch.first + i);
+    if (surfaces_->sees_surface(batch.first + i) &&
+        surfaces_->first_surface(batch.first + i).is_catcher) {
+      const PixelResult ground = std::exchange(pixel, {});  // which is not in the picture
+      pixel.shadow = ground.catcher > 0 ? ground.shadow : ground.radiance;
+      pixel.catcher = catcher_share(hits);
+    }
+    if (pixel.catcher > 0) lighten_black(light.catcher, pixel);
+    record_geometry(hits, pixel);
     pixel.radiance += background[i] + batch.emission[i];
     pixel.alpha = show_environment ? 1 : pixel.coverage;
     film.add(batch.first + i, pixel);

@@ -7,6 +7,7 @@
 #include "common/job/task.h"
 #include "worker/light/carried_light.h"
 #include "worker/method/pixel_method.h"
+#include "worker/pass/catcher.h"
 #include "worker/pass/first_pass_collector.h"
 #include "worker/pass/noise_probe.h"
 #include "worker/pass/primary.h"
@@ -97,6 +98,7 @@ class TileFrameRenderer {
   bool knows_targets_ = false;  ///< for the round in work
   std::unique_ptr<SamplerScratch> scratch_;
   NoiseProbe probe_;
+  CatcherEdge edge_;
   FirstPassCollector collector_;
   RenderStats stats_;
   Stages stages_;

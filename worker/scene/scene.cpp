@@ -258,7 +258,7 @@ Result<Scene> load_scene(const JobSpec& job) {
     if (material) {
       const auto mesh = static_cast<std::uint32_t>(scene.meshes.size());
       scene.meshes.push_back(ground_mesh(*job.scene.ground));
-      scene.instances.push_back({mesh, *material, {}, {}, -1});
+      scene.instances.push_back({mesh, *material, {}, {}, -1, job.scene.ground->catcher});
       fit_mesh(scene.materials[*material], job.scene.ground->material, "the ground", "scene.ground",
                scene.meshes[mesh], faults);
     }

@@ -45,6 +45,8 @@ struct Instance {
   Mat3 normal_to_world;             ///< inverse transpose of to_world.linear
   std::int32_t moving_object = -1;  ///< index of the job's object, where that has keys; else -1
 
+  bool is_catcher = false;  ///< seen by catcher.h alone, not by the ray tracer
+
   bool moves() const { return moving_object >= 0; }
 };
 

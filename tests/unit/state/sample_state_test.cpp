@@ -198,8 +198,8 @@ TEST(SampleState, BadValuesNameSectionAndPixel) {
       {with_value("LNS_", 0, -1.0f), "section LNS_: pixel (11, 20): -1"},
       {with_value("LNSF", 0, kInfinity), "section LNSF: pixel (11, 20): inf"},
       {with_value("SITE", 0, std::uint8_t{16}), "particle 0 has site 16, expected 0 to 15"},
-      {with_value("SRC_", 1, std::uint8_t{5}),
-       "section SRC_: pixel (11, 20): source 5, expected 0 to 4"},
+      {with_value("SRC_", 1, std::uint8_t{6}),
+       "section SRC_: pixel (11, 20): source 6, expected 0 to 5"},
   };
   for (const Case& c : cases) {
     EXPECT_EQ(error_of(c.file).kind, ErrorKind::bad_input) << c.message;

@@ -1,0 +1,163 @@
+// A ground that catches shadows and is in no picture.
+#include <gtest/gtest.h>
+
+#include <cmath>
+
+#include "tests/support/render_tiled.h"
+
+namespace baton {
+namespace {
+
+using test::channel;
+using test::render_tile;
+using test::render_tiled;
+using test::sequence_job;
+
+JobSpec catcher_job(Method method, int frames) {
+  JobSpec job = sequence_job(frames);
+  job.sampling.method = method;
+  job.sampling.num_candidates = 32;
+  job.quality.rounds = 2;
+  job.scene.ground->catcher = true;
+  job.image.site_seed = 99;  // jobs of other seeds see the same points
+  job.output.background = Background::transparent;
+  job.output.aovs = {Aov::normal, Aov::depth, Aov::object, Aov::variance};
+  return job;
+}
+
+TEST(Catcher, SameBytesForAnyTiling) {
+  for (const bool moves : {false, true}) {
+    JobSpec job = catcher_job(Method::pool, 3);
+    if (moves) test::set_in_motion(job, true, true);
+    const std::vector<FilmTile> whole = render_tiled(job, 4096, 3);
+    EXPECT_EQ(render_tiled(job, 5, 1), whole);
+    EXPECT_EQ(render_tiled(job, 8, 2, MemoryBudget::of(0)), whole);
+  }
+}
+
+// It hides nothing, casts nothing and lights nothing: all else is as if it were not there.
+TEST(Catcher, ObjectsHaveTheSameBytesWithoutIt) {
+  for (const Background background : {Background::transparent, Background::environment}) {
+    JobSpec job = catcher_job(Method::pool, 2);
+    job.output.background = background;
+    const std::vector<FilmTile> with = render_tile(job).films;
+    job.scene.ground.reset();
+    const std::vector<FilmTile> without = render_tile(job).films;
+    for (std::size_t f = 0; f < with.size(); ++f) {
+      for (const std::string& name : without[f].channels) {
+        if (name == "error") continue;  // of the pixels of the ground there is one less
+        const auto a = channel(with[f], name), b = channel(without[f], name);
+        EXPECT_TRUE(std::equal(a.begin(), a.end(), b.begin())) << name;
+      }
+    }
+  }
+}
+
+/// Means over seeds of shadow.G in every pixel, and their standard errors.
+struct Means {
+  std::vector<double> mean, error;
+};
+Means means_of(JobSpec job, const std::string& name) {
+  constexpr int kSeeds = 24;
+  Means means;
+  for (int seed = 1; seed <= kSeeds; ++seed) {
+    job.seed = static_cast<std::uint64_t>(seed);
+    const FilmTile film = render_tile(job).films.back();
+    const auto values = channel(film, name);
+    means.mean.resize(values.size());
+    means.error.resize(values.size());
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      means.mean[i] += double{values[i]} / kSeeds;
+      means.error[i] += double{values[i]} * double{values[i]} / kSeeds;
+    }
+  }
+  for (std::size_t i = 0; i < means.mean.size(); ++i) {
+    const double variance = means.error[i] - means.mean[i] * means.mean[i];
+    means.error[i] = std::sqrt(std::max(variance, 0.0) / (kSeeds - 1));
+  }
+  return means;
+}
+
+// S / U beside brute force: a white ground with black objects over the same without. Hypothesis:
+// equal means in every pixel that sees the ground alone; |z| < 5 in some 60 pixels, 24 seeds.
+TEST(Catcher, ShadowsAreTheShareOfTheLightThatArrives) {
+  for (const Method method : {Method::pool, Method::bidirectional, Method::mis}) {
+    JobSpec job = catcher_job(method, 1);
+    job.quality.rounds = 8;
+    const Means shadow = means_of(job, "shadow.G");
+    JobSpec white = job;
+    white.scene.ground->catcher = false;
+    white.scene.materials["ground"].base_color = {1, 1, 1};
+    const Means arrives = means_of(white, "G");
+    const FilmTile ground = render_tile(white).films.back(), film = render_tile(job).films.back();
+    white.scene.objects.clear();
+    const Means whole = means_of(white, "G");
+    int num_compared = 0, num_shaded = 0;
+    for (std::size_t i = 0; i < shadow.mean.size(); ++i) {
+      // The third object is the ground; a pixel with alpha sees a box, too.
+      if (channel(ground, "object")[i] != 3 || channel(film, "A")[i] > 0) continue;
+      ++num_compared;
+      const double expected = arrives.mean[i] / whole.mean[i];
+      const double relative =
+          std::hypot(arrives.error[i] / arrives.mean[i], whole.error[i] / whole.mean[i]) * expected;
+      EXPECT_NEAR(shadow.mean[i], expected, 5 * std::hypot(shadow.error[i], relative) + 2e-3)
+          << static_cast<int>(method) << " pixel " << i;
+      num_shaded += expected < 0.9 ? 1 : 0;
+    }
+    EXPECT_GT(num_compared, 25);
+    EXPECT_GT(num_shaded, 5);
+  }
+}
+
+// Pixels that see both: each site on the ground counts alike, whatever the objects are made of. A
+// black sky takes nothing away.
+TEST(Catcher, EdgesAreSharesOfTheSitesOnTheGround) {
+  JobSpec job = catcher_job(Method::bidirectional, 1);
+  job.quality.rounds = 64;
+  const FilmTile many = render_tile(job).films.back();
+  int num_edges = 0;
+  for (std::size_t i = 0; i < many.num_pixels(); ++i) {
+    const float alpha = channel(many, "A")[i];
+    const float s = channel(many, "shadow.G")[i];
+    if (alpha >= 1) {
+      EXPECT_EQ(s, 1) << "no ground";
+    }
+    if (alpha > 0 && alpha < 1) ++num_edges;
+    EXPECT_GT(s, 0);
+    EXPECT_LT(s, 1.3f);
+  }
+  EXPECT_GT(num_edges, 5);
+}
+
+// RGB + (1 - A) plate shadow, with a plate that is the empty ground, is the picture with the ground
+// in it, at edges, too. Hypothesis: equal means; |z| < 5 in every pixel without sky, 24 seeds.
+TEST(Catcher, AboveItsPlateItIsThePicture) {
+  JobSpec job = catcher_job(Method::pool, 1);
+  // Black: a real ground keeps light from below from them.
+  for (const char* const name : {"glossy", "metal"})
+    job.scene.materials[name] = {.kind = MaterialKind::diffuse, .base_color = {0, 0, 0}};
+  job.quality.rounds = 8;
+  const Means objects = means_of(job, "G"), shadow = means_of(job, "shadow.G");
+  const FilmTile film = render_tile(job).films.back();
+  JobSpec direct = job;
+  direct.scene.ground->catcher = false;
+  const Means expected = means_of(direct, "G");
+  direct.scene.objects.clear();
+  const FilmTile whole = render_tile(direct).films.back();
+  const Means plate = means_of(direct, "G");
+  int num_edges = 0;
+  for (std::size_t i = 0; i < film.num_pixels(); ++i) {
+    if (channel(whole, "A")[i] < 1) continue;  // sees the sky, which the plate lacks
+    const double a = double{channel(film, "A")[i]};
+    num_edges += a > 0 && a < 1 ? 1 : 0;
+    const double ground = (1 - a) * plate.mean[i];
+    const double over = objects.mean[i] + ground * shadow.mean[i];
+    const double error = std::hypot(objects.error[i], expected.error[i], ground * shadow.error[i]) +
+                         (1 - a) * plate.error[i];
+    EXPECT_NEAR(over, expected.mean[i], 5 * error + 2e-3 * expected.mean[i]) << "pixel " << i;
+  }
+  EXPECT_GT(num_edges, 5);
+}
+
+}  // namespace
+}  // namespace baton
