@@ -1,0 +1,218 @@
+"""Materials: what Blender's glTF exporter or Baton would drop is reported; runs inside Blender.
+
+Carried over: a Principled BSDF with constants, images, normal maps and cut-outs, and a Diffuse BSDF. The glTF exporter
+reads Principled ones alone, so a Diffuse one becomes one of these."""
+
+from . import nodes
+
+# Inputs of the Principled BSDF that change nothing at these values.
+NEUTRAL = {"Subsurface": 0, "Specular Tint": 0, "Anisotropic": 0, "Sheen": 0, "Clearcoat": 0, "Transmission": 0}
+WITH_NEUTRAL = {"Subsurface Radius", "Subsurface Color", "Subsurface IOR", "Subsurface Anisotropy", "Anisotropic Rotation",
+                "Sheen Tint", "Clearcoat Roughness", "Clearcoat Normal", "Transmission Roughness", "IOR", "Tangent",
+                "Emission Strength", "Weight"}
+BAKE = "bake it into an image (Render Properties > Bake)"
+FILES = {"PNG", "JPEG"}  # other images become PNG
+CUT = 0.5
+
+
+class Materials:
+    def __init__(self, report):
+        self.report = report
+        self.diffuse = set()  # names of those that are diffuse alone
+
+    def check(self, materials):
+        for material in materials:
+            self.check_one(material)
+
+    def check_one(self, material):
+        where = f'material "{material.name}"'
+
+        def add(what, remedy=BAKE):
+            self.report.add(where, what, remedy)
+
+        if not material.use_nodes:
+            add("it has no nodes", "switch Use Nodes on")
+            return
+        if nodes.is_animated(material):
+            add("its values change, but stay as in the first frame", "keep them constant")
+        output = nodes.active_output(material.node_tree, "OUTPUT_MATERIAL")
+        if output is None:
+            add("it has no output", "add a Material Output")
+            return
+        for name in ("Volume", "Displacement"):
+            if nodes.source(output.inputs[name]):
+                add(f"its {name.lower()}", "model it, or bake a normal map" if name == "Displacement" else "remove it")
+        surface = nodes.source(output.inputs["Surface"])
+        if surface is None:
+            add("it has no surface, so Cycles shows it black", "connect a Principled BSDF")
+        elif surface.node.type == "BSDF_PRINCIPLED" and not surface.node.mute:
+            Surface(material, surface.node, add).check_principled()
+        elif surface.node.type == "BSDF_DIFFUSE" and not surface.node.mute:
+            Surface(material, surface.node, add).check_diffuse()
+            replace_diffuse(material, surface.node)
+            self.diffuse.add(material.name)
+        else:
+            for node in [n for n in nodes.feeding(output.inputs["Surface"]) if n.outputs and n.outputs[0].type == "SHADER"]:
+                if node.type != "BSDF_PRINCIPLED":
+                    add(f'node "{node.name}"', "use one Principled BSDF")
+
+
+class Surface:
+    """The inputs of a BSDF."""
+
+    def __init__(self, material, bsdf, add):
+        self.material, self.bsdf, self.add = material, bsdf, add
+
+    def check_principled(self):
+        inputs = self.bsdf.inputs
+        for name, neutral in NEUTRAL.items():
+            if nodes.source(inputs[name]) or inputs[name].default_value != neutral:
+                if name == "Specular Tint" and not nodes.source(inputs[name]):
+                    continue  # the glTF exporter makes it a colour of the reflection
+                self.add(f"{name} of the Principled BSDF", "set it to 0")
+        for name in sorted(WITH_NEUTRAL & set(inputs.keys())):
+            if nodes.source(inputs[name]) and name != "Emission Strength":
+                self.add(f"{name} of the Principled BSDF is connected", "disconnect it")
+        if nodes.source(inputs["Specular"]):
+            self.add("Specular of the Principled BSDF is connected", "set it to one value")
+        self.check_emission(inputs["Emission"], inputs["Emission Strength"])
+        self.check_input(inputs["Base Color"], {"MIX"})
+        for name in ("Metallic", "Roughness"):
+            self.check_input(inputs[name], {"SEPARATE_COLOR", "SEPRGB", "MATH"})
+        self.check_normal(inputs["Normal"])
+        self.check_alpha(inputs["Alpha"])
+
+    def check_diffuse(self):
+        inputs = self.bsdf.inputs
+        if nodes.source(inputs["Roughness"]) or inputs["Roughness"].default_value != 0:
+            self.add("Roughness of the Diffuse BSDF", "set it to 0")
+        self.check_input(inputs["Color"], {"MIX"})
+        self.check_normal(inputs["Normal"])
+
+    def check_emission(self, color, strength):
+        if nodes.source(strength):
+            self.add("Emission Strength of the Principled BSDF is connected", "set it to one value")
+        if nodes.source(color) or (strength.default_value != 0 and max(color.default_value[:3]) > 0):
+            self.add("it glows, which the camera sees, but lights nothing", "put lights into the world's image")
+            self.check_input(color, {"MIX"})
+
+    def check_input(self, socket, helpers):
+        """A constant, an image, or an image times a constant."""
+        given = nodes.source(socket)
+        if given is None or given.node.type in ("RGB", "VALUE"):
+            return
+        what = f"{socket.name} of {self.bsdf.name}"
+        if given.node.type in helpers and not given.node.mute:
+            if given.node.type == "MIX" and not is_product(given.node):
+                self.add(f'node "{given.node.name}"')
+                return
+            if given.node.type == "MATH" and given.node.operation != "MULTIPLY":
+                self.add(f'node "{given.node.name}"')
+                return
+            behind = [nodes.source(s) for s in given.node.inputs if s.enabled]
+            images = [s for s in behind if s is not None and s.node.type not in ("RGB", "VALUE")]
+            if given.node.type in ("SEPARATE_COLOR", "SEPRGB"):
+                wanted = {"Metallic": "Blue", "Roughness": "Green"}[socket.name]
+                if given.name[0] != wanted[0]:
+                    self.add(f"{what} takes {given.name} of an image", f"put it into the image's {wanted.lower()}")
+            for behind_socket in images:
+                self.check_image(behind_socket, what, 1)
+            if len(images) > 1:
+                self.add(f'node "{given.node.name}" of two images')
+            return
+        self.check_image(given, what)
+
+    def check_image(self, given, what, depth=0):
+        """The output of an Image Texture with coordinates of UVs."""
+        node = given.node
+        if depth == 1 and node.type in ("SEPARATE_COLOR", "SEPRGB"):
+            behind = nodes.source(node.inputs[0])
+            if behind is not None:
+                self.check_image(behind, what, 2)
+            return
+        if node.type != "TEX_IMAGE" or node.mute:
+            self.add(f'node "{node.name}" ({what})')
+            return
+        if node.image is None:
+            self.add(f'node "{node.name}" has no image', "choose one")
+            return
+        if node.image.source in ("SEQUENCE", "MOVIE"):
+            self.add(f'image "{node.image.name}" changes, but stays as it is first', "use one image")
+        if node.image.is_float or node.image.file_format not in FILES and node.image.depth > 32:
+            self.add(f'image "{node.image.name}" becomes a PNG of 8 bits', "use an image of 8 bits")
+        if node.projection != "FLAT":
+            self.add(f'node "{node.name}": projection {node.projection.lower()}', "unwrap the mesh, use UVs")
+        if node.extension == "CLIP":
+            self.add(f'node "{node.name}": extension Clip', "use Repeat or Extend")
+        if not nodes.is_identity(node.texture_mapping):
+            self.add(f'node "{node.name}": its own mapping', "use a Mapping node")
+        self.check_coordinates(node)
+
+    def check_coordinates(self, node):
+        vector = nodes.source(node.inputs["Vector"])
+        if vector is not None and vector.node.type == "MAPPING" and not vector.node.mute:
+            mapping = vector.node
+            connected = [s.name for s in mapping.inputs if s.name != "Vector" and nodes.source(s)]
+            turned = mapping.inputs["Rotation"].default_value
+            if connected or turned[0] or turned[1] or mapping.vector_type == "NORMAL":
+                self.add(f'node "{mapping.name}"', "let it move, scale, and turn about z only, by constants")
+            vector = nodes.source(mapping.inputs["Vector"])
+        if vector is None or vector.node.type == "UVMAP" or (vector.node.type, vector.name) == ("TEX_COORD", "UV"):
+            return
+        self.add(f'node "{vector.node.name}" ({vector.name}) as coordinates', "unwrap the mesh, use UVs")
+
+    def check_normal(self, socket):
+        given = nodes.source(socket)
+        if given is None:
+            return
+        node = given.node
+        if node.type != "NORMAL_MAP" or node.mute:
+            self.add(f'node "{node.name}" on the normal', "bake a normal map")
+            return
+        if node.space != "TANGENT" or nodes.source(node.inputs["Strength"]):
+            self.add(f'node "{node.name}"', "use a normal map in tangent space with a constant strength")
+        color = nodes.source(node.inputs["Color"])
+        if color is not None:
+            self.check_image(color, "normal map")
+            if color.node.type == "TEX_IMAGE" and color.node.image and \
+                    color.node.image.colorspace_settings.name not in ("Non-Color", "Raw", "Linear"):
+                self.add(f'normal map "{color.node.image.name}" is not of colour space Non-Color', "set Non-Color")
+
+    def check_alpha(self, socket):
+        given, method = nodes.source(socket), self.material.blend_method
+        if given is None and socket.default_value == 1:
+            return
+        if given is not None:
+            self.check_input(socket, {"MATH"})
+        if method == "OPAQUE":
+            self.add("its alpha is not read, as its blend mode is Opaque", "set Blend Mode to Alpha Clip")
+        elif method != "CLIP":
+            self.add(f"nothing is seen through: holes where alpha is below {CUT}", "set Blend Mode to Alpha Clip")
+
+
+def is_product(mix):
+    """Whether a Mix node multiplies, wholly."""
+    factor = mix.inputs[0]
+    return (mix.data_type == "RGBA" and mix.blend_type == "MULTIPLY" and not nodes.source(factor)
+            and factor.default_value == 1)
+
+
+def replace_diffuse(material, diffuse):
+    """A Principled BSDF without reflection in place of a Diffuse BSDF."""
+    tree = material.node_tree
+    principled = tree.nodes.new("ShaderNodeBsdfPrincipled")
+    for name, value in (("Metallic", 0), ("Specular", 0), ("Roughness", 1)):
+        principled.inputs[name].default_value = value
+    principled.inputs["Base Color"].default_value = diffuse.inputs["Color"].default_value
+    for name, wanted in (("Color", "Base Color"), ("Normal", "Normal")):
+        given = nodes.source(diffuse.inputs[name])
+        if given is not None:
+            tree.links.new(given, principled.inputs[wanted])
+    for link in list(diffuse.outputs["BSDF"].links):
+        tree.links.new(principled.outputs["BSDF"], link.to_socket)
+
+
+def used_materials(geometry):
+    """Those of all shapes, by name; linked ones become local, so that they can be changed."""
+    found = {m for mesh in geometry.meshes.values() if mesh for m in mesh.materials if m}
+    return sorted((m.make_local() if m.library else m for m in found), key=lambda m: m.name)

@@ -1,0 +1,114 @@
+#!/usr/bin/env python3
+"""Exports a Blender file, renders it with Baton and with Cycles, and compares the pictures.
+
+compare_with_cycles.py --bin build/release/bin --out FOLDER --frames 1,12,24 [--rounds 16] [--spp 64]
+                       [--fault turn|frame] shot.blend
+
+Both render twice, with other seeds, which tells how noisy each 16 x 16 block of pixels is. For each frame stand there:
+the ratio of the means, Baton's over Cycles'; the rms difference of blocks over the picture's mean, and over what noise
+explains (about 1 where both render the same); the largest difference of a block over the mean. Exit code 1 where noise
+does not explain the difference. --fault plants one, which must be seen: the map turned by half a degree, or objects one
+frame late.
+"""
+
+import argparse
+import json
+import math
+import subprocess
+import sys
+from pathlib import Path
+
+HERE = Path(__file__).resolve().parent
+BLOCK = 16
+SEEDS = (1, 2)
+MOST_OVER_NOISE = 1.5
+MOST_RMS = 0.002  # of the mean: below it, filters of the two differ more than a viewer sees
+
+
+def run(*command):
+    done = subprocess.run([str(part) for part in command], capture_output=True, text=True, check=False)
+    if done.returncode:
+        sys.exit(f"{' '.join(map(str, command))}: exit code {done.returncode}\n{done.stdout[-3000:]}{done.stderr[-3000:]}")
+    return done.stdout
+
+
+def plant(job, fault):
+    """A fault of the exporter, put into the job."""
+    if fault == "frame":
+        job["scene"]["gltf"]["startFrame"] = 1
+    elif fault == "turn":
+        rotation = job["environment"].setdefault("rotation", {})
+        rotation["startDeg"] = rotation.get("startDeg", 0) + 0.5
+        for key in rotation.get("keys", []):
+            key["deg"] += 0.5
+
+
+def picture(programs, file):
+    """Rows of (r, g, b)."""
+    channels = [[list(map(float, row.split())) for row in run(programs / "exr_values", file, name).splitlines()]
+                for name in "RGB"]
+    return [list(zip(*rows)) for rows in zip(*channels)]
+
+
+def blocks(rows):
+    """Mean of R, G and B of each whole or cut block of BLOCK x BLOCK pixels."""
+    out = []
+    for y in range(0, len(rows), BLOCK):
+        for x in range(0, len(rows[0]), BLOCK):
+            pixels = [sum(pixel) / 3 for row in rows[y:y + BLOCK] for pixel in row[x:x + BLOCK]]
+            out.append(sum(pixels) / len(pixels))
+    return out
+
+
+def judge(baton, cycles):
+    """baton, cycles: the blocks for both seeds."""
+    count = len(baton[0])
+    ours, theirs = ([(a + b) / 2 for a, b in zip(*pair)] for pair in (baton, cycles))
+    mean = sum(theirs) / count
+    noise = sum(((a - b) ** 2) / 4 for pair in (baton, cycles) for a, b in zip(*pair)) / count
+    square = sum((a - b) ** 2 for a, b in zip(ours, theirs)) / count
+    largest = max(abs(a - b) for a, b in zip(ours, theirs))
+    return {"ratio": sum(ours) / count / mean, "rms": math.sqrt(square) / mean, "overNoise": math.sqrt(square / noise),
+            "largest": largest / mean}
+
+
+def main():
+    parser = argparse.ArgumentParser(description=__doc__, formatter_class=argparse.RawDescriptionHelpFormatter)
+    parser.add_argument("--bin", type=Path, required=True)
+    parser.add_argument("--out", type=Path, required=True)
+    parser.add_argument("--frames", required=True)
+    parser.add_argument("--rounds", type=int, default=16)
+    parser.add_argument("--spp", type=int, default=64)
+    parser.add_argument("--fault", choices=("turn", "frame"))
+    parser.add_argument("blend", type=Path)
+    options = parser.parse_args()
+    out = options.out.resolve()
+    run("blender", "-b", options.blend, "-P", HERE / "export_baton.py", "--", out / "job", "--frames", options.frames)
+    print((out / "job/report.txt").read_text(encoding="utf-8"), end="")
+    job = json.loads((out / "job/job.json").read_text(encoding="utf-8"))
+    plant(job, options.fault)
+    (out / "job/compared.json").write_text(json.dumps(job, indent=1), encoding="utf-8")
+
+    for seed in SEEDS:
+        run(options.bin / "baton", "render", out / "job/compared.json", "--restart", "--set", f"seed={seed}",
+            "--set", f"quality.rounds={options.rounds}", "--set", "output.pixelType=float",
+            "--set", "output.clampNegative=false", "--set", f"output.directory={out}/baton.{seed}")
+        if not options.fault or not (out / f"cycles.{seed}").exists():
+            run("blender", "-b", options.blend, "-P", HERE / "render_direct.py", "--", out / f"cycles.{seed}",
+                "--frames", options.frames, "--spp", options.spp, "--seed", seed)
+
+    failed = False
+    print("frame  ratio     rms  over noise  largest")
+    for file in sorted((out / "baton.1").glob("frame.*.exr")):
+        number = file.name.split(".")[1]
+        result = judge(*([blocks(picture(options.bin, out / f"{name}.{seed}" / f"{stem}.{number}.exr")) for seed in SEEDS]
+                         for name, stem in (("baton", "frame"), ("cycles", "cycles"))))
+        wrong = result["overNoise"] > MOST_OVER_NOISE and result["rms"] > MOST_RMS
+        failed = failed or wrong
+        print(f"{number}  {result['ratio']:.4f}  {100 * result['rms']:.2f} %  {result['overNoise']:8.2f}"
+              f"  {100 * result['largest']:6.2f} %{'  DIFFERS' if wrong else ''}")
+    return int(failed)
+
+
+if __name__ == "__main__":
+    sys.exit(main())

@@ -1,0 +1,210 @@
+#!/usr/bin/env python3
+"""The arithmetic of the Blender exporter, without Blender: axes of the map, angles of view, keys, frame numbers, and
+animations that Baton reads."""
+
+import itertools
+import json
+import math
+import struct
+import sys
+from pathlib import Path
+
+from farm import check, check_equal, make_job, run_tests, write_job
+
+ROOT = Path(__file__).parents[2]
+sys.path += [str(ROOT / "jobs/exporters/blender/baton_exporter"), str(ROOT / "jobs/examples")]
+import conventions  # noqa: E402
+import exr  # noqa: E402
+import gltf_materials  # noqa: E402
+import keys  # noqa: E402
+from glb import Glb, tracks_of  # noqa: E402
+from make_gltf_set import make_set  # noqa: E402
+from report import Report  # noqa: E402
+
+DIRECTIONS = [v for v in itertools.product((-0.8, 0.1, 0.7), repeat=3)]
+
+
+def close(got, wanted, what, within=1e-6):
+    pairs = list(zip(got, wanted)) if isinstance(got, (list, tuple)) else [(got, wanted)]
+    check(all(abs(a - b) <= within for a, b in pairs), f"{what}: got {got}, expected {wanted}")
+
+
+def applied(matrix, v):
+    return [sum(a * b for a, b in zip(row, v)) for row in matrix]
+
+
+def texel(side, ahead, up):
+    """Column and row in a lat-long map that has `ahead` in its centre and `side` a quarter to the left."""
+    return 0.5 - math.atan2(side, ahead) / (2 * math.pi), math.acos(up / math.hypot(side, ahead, up)) / math.pi
+
+
+def map_of_every_mapping(_programs, _folder):
+    """Both renderers read the same texel in every direction, however the Mapping node turns the map."""
+    for kind, angles in itertools.product(("POINT", "TEXTURE", "VECTOR"), ((0, 0, 0), (0, 0, 0.7), (0.3, -1.1, 2.5))):
+        lookup = conventions.mapping_lookup(kind, (0, 0, 0), angles, (2, 2, 2))
+        to_map = conventions.transposed(conventions.map_rotation(lookup))
+        for v in DIRECTIONS:
+            x, y, z = applied(lookup, v)
+            a, b, c = applied(to_map, conventions.to_baton(v))
+            close(texel(a, c, b), texel(y, x, z), f"{kind} {angles}, texel along {v}")
+    # What the nodes do, written out: POINT turns by Rz Ry Rx, TEXTURE undoes it.
+    close(applied(conventions.mapping_lookup("POINT", (0, 0, 0), (0, 0, math.pi / 2), (1, 1, 1)), (1, 0, 0)), (0, 1, 0), "POINT")
+    close(applied(conventions.mapping_lookup("TEXTURE", (0, 0, 0), (0, 0, math.pi / 2), (1, 1, 1)), (1, 0, 0)), (0, -1, 0),
+          "TEXTURE")
+    x_then_z = conventions.mapping_lookup("VECTOR", (9, 0, 0), (math.pi / 2, 0, math.pi / 2), (1, 1, 1))
+    close(applied(x_then_z, (0, 1, 0)), (0, 0, 1), "first about x, then about z")
+
+
+def mappings_that_are_no_rotation(_programs, _folder):
+    for location, scale in (((1, 0, 0), (1, 1, 1)), ((0, 0, 0), (1, -1, 1)), ((0, 0, 0), (1, 2, 1)), ((0, 0, 0), (0, 0, 0)),
+                            ((0, 0, 0), (-1, -1, -1))):
+        try:
+            conventions.mapping_lookup("POINT", location, (0, 0, 0), scale)
+        except conventions.NotARotation:
+            continue
+        check(False, f"location {location}, scale {scale} is taken for a rotation")
+
+
+def angles_of_rotations(_programs, _folder):
+    for degrees in (-170, -40, 0, 50, 179):
+        turned = conventions.turn(1, math.radians(degrees))
+        close(conventions.up_angle(turned), degrees, "angle about up")
+        lookup = conventions.mapping_lookup("POINT", (0, 0, 0), (0, 0, math.radians(degrees)), (1, 1, 1))
+        expected = (90 - degrees + 180) % 360 - 180
+        close(conventions.up_angle(conventions.map_rotation(lookup)), expected, "angle of a Mapping node")
+    check_equal(conventions.up_angle(conventions.turn(0, 0.1)), None, "angle about up of a tilt")
+    for axis, degrees in (([0, 0.6, 0.8], 120), ([1, 0, 0], 180), ([-0.6, 0, 0.8], 1)):
+        rotation = about(axis, math.radians(degrees))
+        got_axis, got_degrees = conventions.axis_angle(rotation)
+        close(got_degrees, degrees, f"angle about {axis}", 1e-5)
+        close(got_axis, axis, "axis", 1e-5)
+    check_equal(conventions.axis_angle(about([1, 0, 0], 0)), ([0.0, 1.0, 0.0], 0.0), "no rotation")
+
+
+def about(axis, angle):
+    """Rodrigues' formula."""
+    x, y, z = axis
+    cross = [[0, -z, y], [z, 0, -x], [-y, x, 0]]
+    square = conventions.product(cross, cross)
+    return [[float(i == j) + math.sin(angle) * cross[i][j] + (1 - math.cos(angle)) * square[i][j] for j in range(3)]
+            for i in range(3)]
+
+
+def cameras(_programs, _folder):
+    """Numbers of Blender's interface: a sensor of 36 x 24 mm and 50 mm give 39.5978 degrees across."""
+    across = 39.597752
+    for width, height, fit, horizontal in ((1920, 1080, "AUTO", across), (1080, 1920, "HORIZONTAL", across)):
+        fov = conventions.vertical_fov_deg(width, height, fit, 36, 24, 50)
+        again = 2 * math.degrees(math.atan(math.tan(math.radians(fov / 2)) * width / height))
+        close(again, horizontal, f"horizontal angle of {fit}", 1e-4)
+    close(conventions.vertical_fov_deg(1080, 1920, "AUTO", 36, 24, 50), across, "AUTO, upright", 1e-4)
+    close(conventions.vertical_fov_deg(1920, 1080, "VERTICAL", 36, 24, 50), 2 * math.degrees(math.atan(12 / 50)), "VERTICAL")
+    close(conventions.orthographic_height(320, 180, "AUTO", 6), 3.375, "orthographic height")
+    close(conventions.orthographic_height(320, 180, "VERTICAL", 6), 6, "orthographic height, VERTICAL")
+    close(conventions.shift_in_heights(320, 160, "AUTO", 0.1, -0.2), (0.2, -0.4), "shift by the longer side")
+    close(conventions.shift_in_heights(320, 160, "VERTICAL", 0.1, -0.2), (0.1, -0.2), "shift by the height")
+    close(conventions.aperture(False, 50, 2.8), 0.05 / 2.8, "aperture")
+    close(conventions.aperture(True, 50, 4), 0.25, "orthographic aperture")
+    check_equal(conventions.region(100, 50, 0.1, 0.6, 0.2, 0.5), [10, 25, 50, 15], "region from the upper left corner")
+    check_equal(conventions.region(300, 360, 0.1, 0.95, 0.2, 0.9), [30, 36, 255, 252], "region in 32-bit numbers")
+
+
+def keys_are_reduced(_programs, _folder):
+    frames = [1, 2, 3, 5, 6]
+    rows = [[2 * f, 7] for f in frames]
+    check_equal(keys.reduce_linear(frames, rows, 1e-9), [0, 4], "keys of a line")
+    check_equal(keys.reduce_linear(frames, [[3]] * 5, 1e-9), [0], "keys of a constant")
+    bent = [[0], [1], [2], [2], [2]]
+    check_equal(keys.reduce_linear(frames, bent, 1e-9), [0, 2, 4], "keys of a bend")
+    curve = [[f * f] for f in range(40)]
+    kept = keys.reduce_linear(list(range(40)), curve, 3)
+    check(len(kept) < 20, f"{len(kept)} keys of a parabola")
+    for first, last in zip(kept, kept[1:]):
+        for f in range(first, last):
+            line = first ** 2 + (last ** 2 - first ** 2) * (f - first) / (last - first)
+            check(abs(line - f * f) <= 3, f"frame {f} is off by {line - f * f}")
+    check_equal(keys.unwrapped([170, -170, -150, 160]), [170, 190, 210, 160], "angles across half a turn")
+    close(keys.constant_speed(frames, [4 * f for f in frames], 1e-9), 4, "speed per frame number")
+    check_equal(keys.constant_speed(frames, [0, 1, 2, 3, 4], 1e-9), None, "speed where a frame is left out")
+
+
+def frame_numbers(_programs, _folder):
+    check_equal([keys.frame_text(*f) for f in ((1, 24), (1, 24, 2), (7, 7), (5, 6, 4))], ["1-24", "1-24x2", "7", "5"], "texts")
+    check_equal(keys.parse_frames("1,5,9-12"), [1, 5, 9, 10, 11, 12], "frames")
+    check_equal(keys.parse_frames("1-10x4"), [1, 5, 9], "frames with a step")
+    for text in ("", "a", "3,2", "1-", "-4"):
+        try:
+            keys.parse_frames(text)
+        except ValueError:
+            continue
+        check(False, f'"{text}" is taken for frames')
+    held = [keys.sequence_number(f, 3, 4, 100, False) for f in (3, 4, 6, 9)]
+    check_equal(held, [101, 102, 104, 104], "a sequence that starts at frame 3 and holds")
+    cyclic = [keys.sequence_number(f, 1, 4, 0, True) for f in (0, 1, 4, 5, 9)]
+    check_equal(cyclic, [4, 1, 4, 1, 1], "a cyclic sequence")
+    check_equal(keys.numbered_file("v2_sun_0099.exr", 100), "v2_sun_0100.exr", "name of a file")
+    check_equal(keys.numbered_file("sun.exr", 1), None, "name without a number")
+
+
+def animations_that_baton_reads(programs, folder):
+    """Tracks keep the sign of quaternions, leave out what is constant, and move the nodes of the file."""
+    half = math.sqrt(0.5)
+    places = [((i, 0, 0), q, (1, 1, 1)) for i, q in enumerate([(0, 0, 0, 1), (0, half, 0, half), (0, 0, 0, -1)])]
+    tracks = tracks_of(0, places)
+    check_equal([path for _, path, _ in tracks], ["translation", "rotation"], "tracks")
+    check(all(sum(a * b for a, b in zip(*pair)) >= 0 for pair in itertools.pairwise(tracks[1][2])), "a quaternion changes its sign")
+    folder.mkdir()
+    (folder / "set.glb").write_bytes(make_set(3))
+    file = Glb.read(folder / "set.glb")
+    file.document.pop("animations")
+    ball = next(i for i, node in enumerate(file.document["nodes"]) if node["name"] == "ball")
+    file.animate("shot", [(ball, "translation", [[0, 0.3, 0], [1, 0.3, 0]])], [1 / 24, 3 / 24])
+    check_equal(file.document["animations"][0]["channels"][0]["target"]["node"], ball, "node that moves")
+    file.write(folder / "moved.glb")
+    job = make_job(folder, frames="1-3")
+    del job["camera"]
+    moved = {}
+    for name in ("moved", "still"):
+        if name == "still":
+            file.document.pop("animations")
+            file.write(folder / "still.glb")
+        job["scene"] = {"gltf": {"file": f"{name}.glb"}}
+        checked = json.loads(programs.run("baton", "check", write_job(folder / f"{name}.json", job), "--json").stdout)
+        moved[name] = checked.get("motionMaxPx", 0)
+    check(moved["moved"] > 1 and moved["still"] <= 1, f"motion in pixels: {moved}")
+
+
+def images_that_baton_reads(programs, folder):
+    folder.mkdir()
+    lines = [struct.pack("<6f", *(10 * y + i for i in range(6))) for y in range(3)]  # B B G G R R
+    exr.write(folder / "sky.exr", 2, 3, lines)
+    for channel, first in (("B", 0), ("G", 2), ("R", 4)):
+        wanted = [10.0 * y + first + x for y in range(3) for x in range(2)]
+        check_equal(programs.values(folder / "sky.exr", channel), wanted, f"channel {channel}")
+
+
+def diffuse_materials(_programs, _folder):
+    """An image with its place on the surface, as the job's own textures have it."""
+    turned = {"KHR_texture_transform": {"offset": [0.1, 0.2], "rotation": math.pi / 2, "scale": [2, 3]}}
+    document = {"textures": [{"source": 4, "sampler": 0}], "samplers": [{"wrapS": 33071, "magFilter": 9728}]}
+    material = {"pbrMetallicRoughness": {"baseColorTexture": {"index": 0, "texCoord": 1, "extensions": turned}}}
+    got = gltf_materials.diffuse(document, material, "scene.glb")
+    check_equal(got["colorTexture"], {"file": "scene.glb", "image": 4, "wrapU": "clamp", "filter": "nearest", "uv": 1,
+                                      "offset": [0.1, 0.2], "scale": [2, 3], "rotateDeg": 90.0}, "texture")
+    document = {"materials": [{"extensions": {"KHR_materials_specular": {"specularColorFactor": [0, 0, 0]}}}]}
+    gltf_materials.mend(document)
+    check_equal(document["materials"][0]["extensions"]["KHR_materials_specular"], {"specularFactor": 0}, "no reflection")
+
+
+def reports(_programs, _folder):
+    report = Report()
+    check_equal(report.text(), "Everything is carried over.\n", "empty report")
+    for _ in range(2):
+        report.add('light "Sun"', "a sun lamp", "put it into the map")
+    check_equal(report.text(), '1 thing is not carried over:\n- light "Sun": a sun lamp. Remedy: put it into the map.\n', "report")
+
+
+if __name__ == "__main__":
+    sys.dont_write_bytecode = True
+    run_tests([map_of_every_mapping, mappings_that_are_no_rotation, angles_of_rotations, cameras, keys_are_reduced,
+               frame_numbers, animations_that_baton_reads, images_that_baton_reads, diffuse_materials, reports])
