@@ -60,7 +60,8 @@ def finest(variants):
 
 
 def ratio_text(ratio, goal):
-    text = f"{'at least ' if ratio.bound else 'about ' if ratio.extrapolated else ''}{digits(ratio.value)} [{digits(ratio.low)}, {digits(ratio.high)}]"
+    word = "at least " if ratio.bound else "about " if ratio.extrapolated else ""
+    text = f"{word}{digits(ratio.value)} [{digits(ratio.low)}, {digits(ratio.high)}]"
     return f"**{text}**" if ratio.value < goal else text
 
 

@@ -230,4 +230,5 @@ if __name__ == "__main__":
                arrays_are_turned_like_points, the_error_is_that_planted, a_ratio_is_that_planted, a_curve_ends_honestly,
                an_error_as_shown_counts_what_a_screen_shows,
                a_difference_is_seen_and_noise_is_not, a_difference_of_single_pixels_is_seen,
-               blocks_at_the_edge_count_by_their_pixels, frames_are_read_as_written, a_picture_is_written_as_it_is, what_is_not_modelled_alike_is_refused])
+               blocks_at_the_edge_count_by_their_pixels, frames_are_read_as_written,
+               a_picture_is_written_as_it_is, what_is_not_modelled_alike_is_refused])
