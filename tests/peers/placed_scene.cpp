@@ -95,16 +95,16 @@ class MapWriter {
 
   /// Index of the map that a frame shows.
   Result<std::size_t> index_of(const EnvironmentFrame& frame) {
-    const std::tuple key(frame.map_a, frame.map_b, frame.mix);
+    const std::tuple key(frame.map_a, frame.map_b, frame.mix, frame.scale);
     if (const auto found = written_.find(key); found != written_.end()) return found->second;
     BATON_ASSIGN(const EnvironmentMap a, key_map(frame.map_a));
     if (frame.mix > 0) {
       BATON_ASSIGN(const EnvironmentMap b, key_map(frame.map_b));
       if (a.width() != b.width() || a.height() != b.height())
         return refusal("environment: maps of different sizes");
-      BATON_TRY(write(EnvironmentMap(a, b, frame.mix, false)));
+      BATON_TRY(write(EnvironmentMap(a, b, frame.mix, frame.scale, false)));
     } else {
-      BATON_TRY(write(a));
+      BATON_TRY(write(EnvironmentMap(a, a, 0, frame.scale, false)));
     }
     return written_[key] = files_.size() - 1;
   }
@@ -135,7 +135,7 @@ class MapWriter {
 
   const EnvironmentSpec& environment_;
   fs::path folder_;
-  std::map<std::tuple<std::int32_t, std::int32_t, float>, std::size_t> written_;
+  std::map<std::tuple<std::int32_t, std::int32_t, float, float>, std::size_t> written_;
   std::vector<std::string> files_;
 };
 
@@ -175,6 +175,11 @@ Status place(const std::string& job_file, const fs::path& folder,
   BATON_ASSIGN(const JobSpec job, settle_motion(std::move(written)));
   if (job.image.region || job.image.filter != PixelFilter::box)
     return refusal("image: only whole pictures with the box filter are compared");
+  const CameraSpec& camera = job.camera;
+  if (camera.projection != Projection::perspective || camera.shift != std::array<float, 2>{} ||
+      camera.aperture > 0)
+    return refusal("camera: only pinholes without shift are compared");
+  if (has_catcher(job)) return refusal("scene.ground: catchers are not compared");
   BATON_ASSIGN(json shown_materials, materials(job.scene));
   BATON_ASSIGN(const Scene scene, load_scene(job));
   std::error_code error;
