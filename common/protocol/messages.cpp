@@ -61,9 +61,9 @@ Status check_header(ByteView header) {
         fmt::format("message: the first frame does not name the protocol {}", kProtocolName)};
   }
   if (version != kProtocolVersion) {
-    return Error{ErrorKind::version,
-                 fmt::format("message: protocol version {}, this program speaks {}", version,
-                             kProtocolVersion)};
+    return Error{ErrorKind::version, fmt::format("message: protocol version {}, this program "
+                                                 "speaks {}: a farm takes programs of one version",
+                                                 version, kProtocolVersion)};
   }
   return {};
 }

@@ -145,6 +145,7 @@ Status Service::receive(const PeerId& peer, const WorkerHello& message) {
   }
   if (const std::optional<std::string> difference = other_build(hello)) {
     if (!options_.mixed_builds) {
+      tell("refused: " + *difference);
       refuse(peer, {ErrorKind::version,
                     fmt::format("{}; pixels may differ: use one build on all machines, or start "
                                 "the coordinator with --mixed-builds",
@@ -245,8 +246,8 @@ Status Service::receive_from(const std::string& worker, const StatesPublished& m
 Status Service::receive_from(const std::string& worker, const LeaseReturn& message) {
   const std::string unseen = message.unseen.substr(0, limits::kMaxTextLength);
   if (!unseen.empty())
-    spdlog::warn("worker {} takes no tasks of job {}: {}", worker, message.lease.job.short_hex(),
-                 unseen);
+    tell(fmt::format("worker {} takes no tasks of job {}: {}", worker,
+                     message.lease.job.short_hex(), unseen));
   return step(LeaseReturned{worker, message.lease, unseen});
 }
 

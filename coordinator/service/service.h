@@ -85,6 +85,7 @@ class Service {
   Result<Digest> resolve_own(const std::string& text);
   std::string owner_of(const Digest& job) const;
   void tell_refusals();
+  void tell(const std::string& warning);
 
   // Questions of anybody (service_jobs.cpp).
   Status receive(const PeerId& peer, const JobDocumentRequest& message);
@@ -153,8 +154,8 @@ class Service {
   Peers peers_;
   OncePerPeer complained_, asked_for_hello_;
   std::map<Digest, std::string> owners_;
-  Speaker speaker_;  ///< of the message that is being handled
-  std::map<std::string, TimePoint> told_refusals_;
+  Speaker speaker_;                        ///< of the message that is being handled
+  std::map<std::string, TimePoint> told_;  ///< warnings, and when
   TimePoint next_tick_{};
   TimePoint next_sweep_;
   bool stop_requested_ = false;

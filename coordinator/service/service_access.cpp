@@ -8,9 +8,9 @@
 namespace baton {
 namespace {
 
-/// A refusal that comes again, as one does each time that a stranger tries, is told so often.
-constexpr std::chrono::minutes kRefusalInterval{1};
-constexpr std::size_t kMaxToldRefusals = 100;
+/// What comes again is told so often.
+constexpr std::chrono::minutes kTellInterval{1};
+constexpr std::size_t kMaxTold = 100;
 
 }  // namespace
 
@@ -78,13 +78,17 @@ Result<Digest> Service::resolve_own(const std::string& text) {
 /// Logs which connections were refused.
 void Service::tell_refusals() {
   const std::optional<Error> refusal = router_.take_refusal();
-  if (!refusal) return;
+  if (refusal) tell("refused: " + refusal->message);
+}
+
+/// Logs what may come again and again, as when a stranger tries.
+void Service::tell(const std::string& warning) {
   const TimePoint now = std::chrono::steady_clock::now();
-  if (told_refusals_.size() >= kMaxToldRefusals) told_refusals_.clear();
-  const auto [told, is_new] = told_refusals_.try_emplace(refusal->message, now);
-  if (!is_new && now - told->second < kRefusalInterval) return;
+  if (told_.size() >= kMaxTold) told_.clear();
+  const auto [told, is_new] = told_.try_emplace(warning, now);
+  if (!is_new && now - told->second < kTellInterval) return;
   told->second = now;
-  spdlog::warn("refused: {}", refusal->message);
+  spdlog::warn("{}", warning);
 }
 
 }  // namespace baton

@@ -49,11 +49,23 @@ struct OpenFarm {
   std::string worker_key, pilot_endpoint;
 };
 
-OpenFarm attach(const FarmCommandOptions& options) {
-  return {LocalFarm::attach(options.coordinator),
-          {options.coordinator, options.key},
-          options.worker_key,
-          options.coordinator};
+Result<OpenFarm> attach(const FarmCommandOptions& options) {
+  if (options.key.empty() != options.worker_key.empty()) {
+    return Error{ErrorKind::usage,
+                 "--key is for this command and --worker-key for the pilots: a coordinator with "
+                 "keys needs both"};
+  }
+  BATON_TRY(client_access(options.worker_key, true));  // before the pilots find out
+  return OpenFarm{LocalFarm::attach(options.coordinator),
+                  {options.coordinator, options.key},
+                  options.worker_key,
+                  options.coordinator};
+}
+
+/// How `baton` speaks to a coordinator, as arguments.
+std::string link_arguments(const CoordinatorLink& link) {
+  return fmt::format("--coordinator {}{}", link.endpoint,
+                     link.key_file.empty() ? std::string() : " --key " + link.key_file);
 }
 
 /// Starts a coordinator where the nodes reach it, with keys of its own. It has the port of the last
@@ -131,7 +143,7 @@ Result<ExitCode> run_slurm(const FarmCommandOptions& options) {
 
   const SignalWait signals;
   BATON_ASSIGN(OpenFarm open,
-               options.coordinator.empty() ? start(options, local) : Result(attach(options)));
+               options.coordinator.empty() ? start(options, local) : attach(options));
   const fs::path folder = local.work_directory / "slurm";
   BATON_ASSIGN(PilotJob pilot, pilot_job(options, open, folder));
   SlurmFarm pilots({std::move(pilot), nodes, folder / "pilot.sh",
@@ -139,8 +151,11 @@ Result<ExitCode> run_slurm(const FarmCommandOptions& options) {
   BATON_TRY(pilots.prepare());
   BATON_ASSIGN(RequestClient client, open.link.connect());
   BATON_ASSIGN(RequestClient watcher, open.link.connect());
-  fmt::print(stderr, "to look at the farm: baton farm status --coordinator {} --key {}\n",
-             open.link.endpoint, open.link.key_file);
+  fmt::print(stderr, "to look at the farm: baton farm status {}\n", link_arguments(open.link));
+  if (!wanted) {
+    fmt::print(stderr, "to hand in a job: baton job submit JOB {}\nCtrl-C ends the farm\n",
+               link_arguments({open.pilot_endpoint, open.link.key_file}));
+  }
 
   RenderSession session(render, signals, std::move(open.farm), std::move(client));
   auto outcome = work(session, render, wanted, [&] { pilots.tend(watcher); });

@@ -35,7 +35,10 @@ Result<ExitCode> run_render(const RenderOptions& options) {
   const WarningsAside warnings(job);
   BATON_ASSIGN(const std::optional<JobStatus> status,
                session.render(job, options.restart || options.from_frame || wanted.is_look));
-  if (status && options.keep_running) BATON_TRY(session.keep_running());
+  if (status && options.keep_running) {
+    fmt::print(stderr, "the coordinator still answers at {}; Ctrl-C ends it\n", session.endpoint());
+    BATON_TRY(session.keep_running());
+  }
   if (!status) spdlog::info("stopping; finished work is kept");
   session.stop();
   if (status) return exit_code_of(job, *status);

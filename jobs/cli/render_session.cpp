@@ -159,7 +159,6 @@ Status RenderSession::write_png_of(const JobSpec& job) const {
 }
 
 Status RenderSession::keep_running(const std::function<void()>& meanwhile) {
-  fmt::print(stderr, "the coordinator still answers at {}; Ctrl-C ends it\n", farm_.endpoint());
   while (!signals_.stop_requested_within(kFarmPollInterval)) {
     BATON_TRY(farm_.tend());
     meanwhile();

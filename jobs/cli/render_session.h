@@ -56,6 +56,7 @@ class RenderSession {
   /// Keeps the farm up until the user asks to stop. `meanwhile` is called now and then.
   Status keep_running(const std::function<void()>& meanwhile = [] {});
   /// As LocalFarm's.
+  const std::string& endpoint() const { return farm_.endpoint(); }
   Status tend() { return farm_.tend(); }
   void stop() { farm_.stop(); }
 

@@ -17,6 +17,20 @@ constexpr std::chrono::seconds kSlurmPatience{30};
 constexpr std::chrono::seconds kAnswerPatience{2};
 /// Pilots are sent home when at so many looks in a row the work was enough for fewer.
 constexpr std::size_t kLooksBeforeShrinking = 3;
+/// After so many arrays in vain others are submitted seldom.
+constexpr int kMostVainArrays = 2;
+constexpr std::chrono::seconds kVainPause{60};
+constexpr std::uint64_t kMostPilotLog = 1 << 20;
+
+/// The last line of a pilot's log, or why there is none.
+std::string last_words(const std::string& log) {
+  const Result<std::string> text = read_text_file(log, kMostPilotLog);
+  if (!text) return text.error().message + ": do the nodes have this folder?";
+  const std::size_t end = text->find_last_not_of('\n');
+  if (end == text->npos) return log + ": empty";
+  const std::size_t begin = text->find_last_of('\n', end) + 1;
+  return fmt::format("{}: {}", log, text->substr(begin, end + 1 - begin));
+}
 
 }  // namespace
 
@@ -39,7 +53,9 @@ void SlurmFarm::tend(RequestClient& client) {
   if (!pilots) return warn(pilots.error().message);
   last_warning_.clear();
   warn_of_short_time(*list);
-  carry_out(give_orders(look(*list, std::move(pilots).value(), now)), client);
+  const SlurmSnapshot seen = look(*list, std::move(pilots).value(), now);
+  warn_of_vain_arrays(seen);
+  carry_out(give_orders(seen), client);
 }
 
 SlurmSnapshot SlurmFarm::look(const JobList& list, std::vector<SlurmPilot> pilots,
@@ -86,20 +102,41 @@ void SlurmFarm::carry_out(const SlurmOrders& orders, RequestClient& client) {
     std::vector<std::string> command{"scancel"};
     command.insert(command.end(), orders.cancel.begin(), orders.cancel.end());
     spdlog::info("pilots are cancelled: {}", fmt::join(orders.cancel, " "));
+    vain_.cancelled(orders.cancel);
     if (const auto done = run_captured(command, kSlurmPatience); !done) warn(done.error().message);
   }
   for (const std::string& worker : orders.drain) {
     spdlog::info("worker {} is sent home", worker);
     const Result<JobList> told = ask<JobList>(client, DrainWorker{worker}, kAnswerPatience);
-    if (told) told_to_end_.insert(worker);
+    if (!told) {
+      warn(told.error().message);
+    } else {
+      told_to_end_.insert(worker);
+    }
   }
-  if (orders.submit > 0) {
-    const Result<std::string> job = run_captured(
-        sbatch_command(options_.pilot, orders.submit, options_.script.string()), kSlurmPatience);
-    if (!job) return warn(job.error().message);
-    spdlog::info("{} pilots are submitted, array {}", orders.submit,
-                 job->substr(0, job->find_first_of(";\n")));
-  }
+  const bool in_vain = vain_.count() >= kMostVainArrays;
+  if (orders.submit > 0 && (!in_vain || Clock::now() - submitted_ > kVainPause))
+    submit(orders.submit);
+}
+
+void SlurmFarm::submit(int count) {
+  const Result<std::string> answer =
+      run_captured(sbatch_command(options_.pilot, count, options_.script.string()), kSlurmPatience);
+  if (!answer) return warn(answer.error().message);
+  const std::string array = answer->substr(0, answer->find_first_of(";\n"));
+  spdlog::info("{} pilots are submitted, array {}", count, array);
+  vain_.submitted(array);
+  submitted_ = Clock::now();
+}
+
+void SlurmFarm::warn_of_vain_arrays(const SlurmSnapshot& now) {
+  if (!vain_.look(now) || vain_.count() < kMostVainArrays) return;
+  std::string log = options_.pilot.script_log;
+  log.replace(log.find("%A_%a"), 5, vain_.last() + "_1");
+  spdlog::warn(
+      "no pilot of the last {} arrays has reached the coordinator; others are submitted "
+      "every {} s; {}",
+      vain_.count(), kVainPause.count(), last_words(log));
 }
 
 void SlurmFarm::warn_of_short_time(const JobList& list) {

@@ -40,6 +40,8 @@ class SlurmFarm {
 
   SlurmSnapshot look(const JobList& list, std::vector<SlurmPilot> pilots, Clock::time_point now);
   void carry_out(const SlurmOrders& orders, RequestClient& client);
+  void submit(int count);
+  void warn_of_vain_arrays(const SlurmSnapshot& now);
   void warn_of_short_time(const JobList& list);
   void warn(const std::string& text);
 
@@ -49,6 +51,8 @@ class SlurmFarm {
   std::map<std::string, Clock::time_point> alone_since_;  ///< running pilots, no worker
   std::set<std::string> told_to_end_;                     ///< workers
   int threads_per_pilot_ = 1;                             ///< of the last that was seen
+  VainArrays vain_;
+  Clock::time_point submitted_{};  ///< last
   bool told_short_time_ = false;
   std::string last_warning_;
 };

@@ -2,8 +2,20 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <utility>
 
 namespace baton {
+namespace {
+
+bool is_of_array(const std::string& pilot, const std::string& array) {
+  return pilot.starts_with(array) && pilot.substr(array.size()).starts_with('_');
+}
+
+bool is_mute(const SlurmPilot& pilot) {
+  return pilot.state == SlurmState::running && pilot.alone_s > kMostAlone_s;
+}
+
+}  // namespace
 
 int wanted_pilots(const SlurmSnapshot& now) {
   const auto threads = static_cast<std::uint64_t>(std::max(1, now.threads_per_pilot));
@@ -22,10 +34,10 @@ SlurmOrders give_orders(const SlurmSnapshot& now) {
   for (const SlurmPilot& pilot : now.pilots) {
     const bool is_seen = std::any_of(now.workers.begin(), now.workers.end(),
                                      [&](const auto& worker) { return worker.id == pilot.id; });
-    const bool is_mute = pilot.state == SlurmState::running && pilot.alone_s > kMostAlone_s;
     if (is_seen || pilot.state == SlurmState::ending || pilot.state == SlurmState::suspended)
       continue;
-    (pilot.state == SlurmState::resting || is_mute ? orders.cancel : coming).push_back(pilot.id);
+    (pilot.state == SlurmState::resting || is_mute(pilot) ? orders.cancel : coming)
+        .push_back(pilot.id);
   }
 
   // Too few, or too many: those that came last go first.
@@ -42,6 +54,28 @@ SlurmOrders give_orders(const SlurmSnapshot& now) {
     orders.drain.push_back(working[static_cast<std::size_t>(i)].name);
   }
   return orders;
+}
+
+bool VainArrays::look(const SlurmSnapshot& now) {
+  if (open_.empty()) return false;
+  const auto has_come = [&](const SlurmWorker& worker) { return is_of_array(worker.id, open_); };
+  if (std::any_of(now.workers.begin(), now.workers.end(), has_come)) {
+    open_.clear();
+    count_ = 0;
+    return false;
+  }
+  const auto may_come = [&](const SlurmPilot& pilot) {
+    return is_of_array(pilot.id, open_) && pilot.state != SlurmState::ending && !is_mute(pilot);
+  };
+  if (std::any_of(now.pilots.begin(), now.pilots.end(), may_come)) return false;
+  last_ = std::exchange(open_, {});
+  ++count_;
+  return true;
+}
+
+void VainArrays::cancelled(const std::vector<std::string>& pilots) {
+  const auto is_open = [&](const std::string& pilot) { return is_of_array(pilot, open_); };
+  if (std::any_of(pilots.begin(), pilots.end(), is_open)) open_.clear();
 }
 
 }  // namespace baton

@@ -65,4 +65,22 @@ int wanted_pilots(const SlurmSnapshot& now);
 /// are too many, those that wait go first, then the workers with the fewest leases are drained.
 SlurmOrders give_orders(const SlurmSnapshot& now);
 
+/// Counts arrays in a row whose pilots have all gone without ever having worked: they cannot, and
+/// others would not either. One alone may be an array that a controller has forgotten.
+class VainArrays {
+ public:
+  void submitted(const std::string& array) { open_ = array; }
+  /// What a look has found. True: one more has been in vain.
+  bool look(const SlurmSnapshot& now);
+  /// Pilots of it that are cancelled as there are too many do not count.
+  void cancelled(const std::vector<std::string>& pilots);
+  int count() const { return count_; }
+  const std::string& last() const { return last_; }  ///< in vain
+
+ private:
+  std::string open_;  ///< of whose pilots nothing has been seen; empty: none
+  std::string last_;
+  int count_ = 0;
+};
+
 }  // namespace baton

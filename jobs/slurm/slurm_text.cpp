@@ -94,14 +94,16 @@ std::string pilot_script(const PilotJob& job) {
   std::string text =
       "#!/bin/sh\n"
       "# A pilot: works for a coordinator until its time ends or there is nothing to do.\n";
-  // Where nobody has said how long, Slurm knows it.
-  text += job.time_s > 0
-              ? fmt::format("end=$(($(date +%s) + {}))\n", job.time_s)
-              : std::string(
-                    "end=$(date -d \"$(squeue -h -j \"$SLURM_JOB_ID\" -o %e)\" +%s) || end=0\n");
+  // Where nobody has said how long, Slurm knows it. SLURM_JOB_ID of the array's last task means the
+  // whole array.
+  text += "pilot=${SLURM_ARRAY_JOB_ID}_$SLURM_ARRAY_TASK_ID\n";
+  text += job.time_s > 0 ? fmt::format("end=$(($(date +%s) + {}))\n", job.time_s)
+                         : std::string(
+                               "end=$(date -d \"$(squeue -h -j \"$pilot\" -o %e)\" +%s "
+                               "2>/dev/null) || end=0  # NONE: no limit\n");
   text += fmt::format(
       "exec {} --coordinator {}{} \\\n"
-      "  --name \"{}${{SLURM_ARRAY_JOB_ID}}_${{SLURM_ARRAY_TASK_ID}}\" \\\n"
+      "  --name \"{}$pilot\" \\\n"
       "  --threads \"${{SLURM_CPUS_ON_NODE:-1}}\" --memory \"${{SLURM_MEM_PER_NODE:-0}}\" --end-at "
       "\"$end\"",
       quoted(job.worker), quoted(job.endpoint),

@@ -128,6 +128,14 @@ class Cluster:
 
     # ---- processes ----
 
+    def command_lines(self, program):
+        """The words of each of its processes of this name."""
+        lines = []
+        for pid in self._processes():
+            with contextlib.suppress(OSError):  # it is gone
+                lines.append(Path(f"/proc/{pid}/cmdline").read_bytes().decode(errors="replace").split("\0"))
+        return [words for words in lines if Path(words[0]).name == program]
+
     def _pid_of(self, name):
         return int((self.folder / f"{name}.pid").read_text(encoding="ascii"))
 

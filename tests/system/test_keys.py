@@ -3,7 +3,9 @@
 
 import json
 import os
+import re
 import time
+from pathlib import Path
 
 from farm import (BAD_INPUT, DEADLINE_S, OK, UNAVAILABLE, USAGE, Farm, Process, check, check_equal, make_job, run_tests,
                   wait_until, write_job)
@@ -122,6 +124,9 @@ def other_machines_need_keys(programs, folder):
     check("a key is not replaced" in again.stderr, again.stderr)
     wrong = programs.run("baton", "job", "list", "--key", folder / "keys/server.key", expect=USAGE)
     check("is the key of a coordinator" in wrong.stderr, wrong.stderr)
+    no_worker_key = programs.run("baton", "farm", "slurm", "--work-dir", folder / "slurm", "--coordinator",
+                                 "tcp://192.0.2.1:5570", "--key", folder / "keys/admin.key", expect=USAGE)
+    check("a coordinator with keys needs both" in no_worker_key.stderr, no_worker_key.stderr)
     os.chmod(folder / "keys/user.key", 0o644)
     open_key = programs.run("baton", "job", "list", "--key", folder / "keys/user.key", expect=USAGE)
     check("chmod 600" in open_key.stderr, open_key.stderr)
@@ -198,6 +203,28 @@ def two_workers_of_one_name_work_side_by_side(programs, folder):
         check_equal(len(seen), 2, f"workers that had leases: {seen}")
 
 
+def a_worker_of_another_build_is_sent_away(programs, folder):
+    path = small(folder / "job")
+    build = re.search(rb"sources (\w+)", programs.run("baton-worker", "--version").stdout.encode())[1]
+    other = folder / "baton-worker"
+    program = Path(programs.path("baton-worker")).read_bytes()
+    check(build in program, f"{build} is not in the program")
+    other.write_bytes(program.replace(build, b"f" * len(build)))
+    other.chmod(0o755)
+    with Farm(programs, folder / "farm") as farm:
+        farm.start_coordinator()
+        farm.start_worker()
+        job = farm.submit(path)
+        stranger = Process([str(other), "--coordinator", farm.endpoint, "--name", "stranger"], folder / "stranger.log",
+                           {"LD_LIBRARY_PATH": str(programs.bin.resolve())})
+        check_equal(stranger.wait(), BAD_INPUT, "exit code of the other build")
+        line = f"worker stranger is baton 0.1.0 (sources {'f' * len(build)}"
+        check(line in stranger.log() and "use one build on all machines" in stranger.log(), stranger.log())
+        check_equal(farm.coordinator.log().count(f"refused: {line}"), 1, f"lines\n{farm.coordinator.log()}")
+        farm.wait_for(job)
+        check_equal(farm.show(job)["attemptsLost"], 0, "attempts lost or failed")
+
+
 if __name__ == "__main__":
     run_tests([
         roles_decide_who_may_do_what,
@@ -205,4 +232,5 @@ if __name__ == "__main__":
         other_machines_need_keys,
         jobs_stay_within_the_roots,
         two_workers_of_one_name_work_side_by_side,
+        a_worker_of_another_build_is_sent_away,
     ])

@@ -16,7 +16,7 @@ NUM_FRAMES = 12
 class SlurmFarm:
     """`baton farm slurm` without a job of its own, and a job that is submitted to it again and again."""
 
-    def __init__(self, programs, cluster, folder, nodes, time_limit):
+    def __init__(self, programs, cluster, folder, nodes, time_limit="--time=10"):
         self.programs, self.cluster, self.folder = programs, cluster, folder
         self.job_path = write_job(folder / "job" / "job.json", make_job(
             folder / "job", frames=f"1-{NUM_FRAMES}", image={"tileSize": 32},
@@ -27,7 +27,7 @@ class SlurmFarm:
         shutil.rmtree(self.frames)
         self.job, self.num_done, self.attempts_lost = None, 0, 0
         self.command = [programs.path("baton"), "farm", "slurm", "--work-dir", str(folder / "farm"), "--nodes", nodes,
-                        "--time", time_limit, "--poll", "0.5", "--host", "127.0.0.1"]
+                        time_limit, "--poll", "0.5", "--host", "127.0.0.1"]
         self.process = None
 
     @property
@@ -42,6 +42,10 @@ class SlurmFarm:
 
     def log(self):
         return self.process.log()
+
+    def num_arrays(self):
+        """How often pilots were submitted."""
+        return self.log().count("pilots are submitted")
 
     def baton(self, *words, **options):
         endpoint = (self.folder / "farm" / "endpoint").read_text(encoding="ascii").strip()
@@ -96,39 +100,47 @@ class SlurmFarm:
         wait_until(lambda: all(state == "COMPLETING" for state, _ in self.cluster.pilots().values()), "the queue is empty")
 
 
+def check_that_all_have_an_end(cluster, least):
+    """So many workers or more, each of which was told when its ten minutes are over."""
+    now = time.time()
+    ends = [int(words[words.index("--end-at") + 1]) for words in cluster.command_lines("baton-worker")]
+    check(len(ends) >= least and all(now < end <= now + 600 for end in ends), f"ends of pilots, at {now}: {ends}")
+
+
 def pilots_follow_the_work_and_are_replaced(programs, folder):
     with Cluster(folder / "slurm") as cluster:
-        farm = SlurmFarm(programs, cluster, folder, "1-3", "10")
+        farm = SlurmFarm(programs, cluster, folder, "1-3", "--sbatch-arg=--time=10")
         farm.start()
         check_equal(len(farm.workers()), 1, "pilots without work")
+        check("to hand in a job: baton job submit JOB --coordinator tcp://127.0.0.1:" in farm.log(), farm.log())
+
+        # The controller forgets what it took a moment ago, which may be running; the pilot of before goes on.
+        num_arrays = farm.num_arrays()
         filler = farm.fill()
-        first = farm.wait_for_new(3, set(), "three pilots work")
+        farm.wait_while_busy(lambda: farm.num_arrays() > num_arrays, "two more are submitted")
+        cluster.kill_controller()
+        farm.keep_busy()
+        cluster.start_controller()
+        first = farm.wait_while_busy(lambda: len(known := farm.workers() & set(cluster.running())) >= 3 and known,
+                                     "three pilots work, and the queue knows them")
 
         status = farm.baton("farm", "status").stdout
         for pilot in first:
             check(f"slurm-{pilot} " in status, f"pilot {pilot} is not shown beside its worker:\n{status}")
+        check_that_all_have_an_end(cluster, 3)
 
         # Cancelled, or back in the queue: others come, and nothing that they held counts as lost or failed.
+        farm.finish_job()
+        lost = farm.attempts_lost
         cancelled, requeued = sorted(first)[:2]
         cluster.run("scancel", cancelled)
         cluster.run("scontrol", "requeue", requeued)
         second = farm.wait_for_new(3, {cancelled, requeued}, "two pilots are replaced")
         farm.finish_job()
-        check_equal(farm.attempts_lost, 0, "attempts lost or failed by a drain")
-
-        # The controller forgets what it took a moment ago, which may be running.
-        gone = min(second)
-        cluster.run("scancel", gone)
-        num_arrays = farm.log().count("pilots are submitted")
-        farm.wait_while_busy(lambda: farm.log().count("pilots are submitted") > num_arrays, "one is submitted")
-        cluster.kill_controller()
-        farm.keep_busy()
-        cluster.start_controller()
-        third = farm.wait_for_new(3, {gone}, "pilots that nobody knows are replaced")
+        check_equal(farm.attempts_lost, lost, "attempts lost or failed by a drain")
 
         # A node dies: its tasks go to the others, long before Slurm hears of it.
-        rows = wait_until(lambda: {p: n for p, n in cluster.running().items() if p in third}, "the queue is known again")
-        pilot, node = sorted(rows.items())[0]
+        pilot, node = sorted((p, n) for p, n in cluster.running().items() if p in second)[0]
         cluster.kill_node(node)
         farm.wait_while_busy(lambda: pilot not in farm.workers(), "the pilot of the dead node is missed")
         farm.finish_job()
@@ -139,22 +151,30 @@ def pilots_follow_the_work_and_are_replaced(programs, folder):
         farm.stop()
 
 
-def a_pilot_ends_with_its_time(programs, folder):
-    with Cluster(folder / "slurm", nodes=1) as cluster:
-        farm = SlurmFarm(programs, cluster, folder, "1", "0:06")
+def pilots_end_with_their_time(programs, folder, nodes, time_limit, generations):
+    """So many pilots, one after the other on each node; Slurm, which counts whole minutes, has to end none of them."""
+    with Cluster(folder / "slurm", nodes=nodes) as cluster:
+        farm = SlurmFarm(programs, cluster, folder, str(nodes), f"--time={time_limit}")
         farm.start()
         seen = farm.workers()
-        while len(seen) < 2:
+        while len(seen) < nodes * generations:
             seen |= farm.wait_while_busy(lambda: farm.workers() - seen, "the next pilot")
         farm.finish_job()
         check_equal(farm.attempts_lost, 0, "attempts lost or failed when a pilot's time was up")
+        logs = {log.stem: log.read_text(encoding="utf-8") for log in (folder / "farm" / "slurm").glob("*.log")}
+        ended = [name for name, log in logs.items() if "ends: its time is up" in log]
+        check(len(ended) >= nodes * (generations - 1), f"pilots that ended with their time: {ended}\n{logs}")
         farm.stop()
+
+
+def a_pilot_ends_with_its_time(programs, folder):
+    pilots_end_with_their_time(programs, folder, 1, "0:06", 2)
 
 
 def a_job_of_its_own_is_rendered_and_resumed(programs, folder):
     """As people use it: one command for one job, killed on the way."""
     with Cluster(folder / "slurm", nodes=2) as cluster:
-        farm = SlurmFarm(programs, cluster, folder, "2", "10")
+        farm = SlurmFarm(programs, cluster, folder, "2")
         farm.command.insert(3, str(farm.job_path))
         farm.process = Process(farm.command, folder / "farm.log", cluster.environment)
         wait_until(lambda: list(farm.frames.glob("*.exr")), "the first frame")
@@ -165,11 +185,23 @@ def a_job_of_its_own_is_rendered_and_resumed(programs, folder):
         check("keys/admin.key" in again.log(), "the command says how to look at the farm")
 
 
+def pilots_that_cannot_work_are_told_of(programs, folder):
+    """They end as soon as they begin. The command says why, and does not fill the queue with others."""
+    with Cluster(folder / "slurm", nodes=1) as cluster:
+        farm = SlurmFarm(programs, cluster, folder, "1")
+        farm.process = Process([*farm.command, "--worker-arg=--map=nonsense"], folder / "farm.log", cluster.environment)
+        wait_until(lambda: "no pilot of the last 2 arrays has reached the coordinator" in farm.log(), "the command tells")
+        check("--map nonsense" in farm.log(), f"not told why\n{farm.log()}")
+        time.sleep(3)  # some looks, and far from a minute
+        check_equal(farm.num_arrays(), 2, f"arrays\n{farm.log()}")
+        farm.stop()
+
+
 def the_recipes_do_without_the_command(programs, folder):
     """docker/slurm: a farm inside one allocation, and workers for a coordinator outside."""
     recipes = Path(__file__).resolve().parents[2] / "docker" / "slurm"
     with Cluster(folder / "slurm", nodes=2) as cluster:
-        farm = SlurmFarm(programs, cluster, folder, "1", "10")
+        farm = SlurmFarm(programs, cluster, folder, "1")
         cluster.environment["PATH"] = f"{programs.bin.resolve()}:{os.environ['PATH']}"
         cluster.run("sbatch", "--nodes=2", "--time=10", f"--output={folder}/inside.log", recipes / "farm.sbatch",
                     farm.job_path, folder / "inside")
@@ -183,6 +215,8 @@ def the_recipes_do_without_the_command(programs, folder):
             outside.start_coordinator()
             cluster.environment["BATON_COORDINATOR"] = outside.endpoint
             cluster.run("sbatch", "--array=1-2", "--time=10", f"--output={folder}/worker-%a.log", recipes / "workers.sbatch")
+            wait_until(lambda: len(cluster.command_lines("baton-worker")) == 2, "both workers run")
+            check_that_all_have_an_end(cluster, 2)
             outside.wait_for(outside.submit(farm.job_path))
             check_equal(programs.pixels(farm.frames), farm.expected, "frames by workers of the recipe")
 
@@ -191,9 +225,9 @@ def the_recipes_do_without_the_command(programs, folder):
 
 
 def what_slurm_finds_out_late(programs, folder):
-    """Suspended pilots, and a dead node that Slurm believes in for a while."""
+    """Suspended pilots, a dead node that Slurm believes in for a while, a controller that dies after a submission."""
     with Cluster(folder / "slurm") as cluster:
-        farm = SlurmFarm(programs, cluster, folder, "1-2", "10")
+        farm = SlurmFarm(programs, cluster, folder, "1-2")
         farm.start()
         first = farm.wait_for_new(2, set(), "two pilots work")
         suspended = min(first)
@@ -212,8 +246,8 @@ def what_slurm_finds_out_late(programs, folder):
         # Two seconds after a submission.
         gone = min(farm.workers())
         cluster.run("scancel", gone)
-        num_arrays = farm.log().count("pilots are submitted")
-        farm.wait_while_busy(lambda: farm.log().count("pilots are submitted") > num_arrays, "one is submitted")
+        num_arrays = farm.num_arrays()
+        farm.wait_while_busy(lambda: farm.num_arrays() > num_arrays, "one is submitted")
         time.sleep(2)
         cluster.kill_controller()
         time.sleep(5)
@@ -224,6 +258,11 @@ def what_slurm_finds_out_late(programs, folder):
         farm.stop()
 
 
+def pilots_of_half_a_minute(programs, folder):
+    pilots_end_with_their_time(programs, folder, 3, "0:30", 3)
+
+
 if __name__ == "__main__":
     run_tests([pilots_follow_the_work_and_are_replaced, a_pilot_ends_with_its_time,
-               a_job_of_its_own_is_rendered_and_resumed, the_recipes_do_without_the_command], long_tests=[what_slurm_finds_out_late])
+               a_job_of_its_own_is_rendered_and_resumed, pilots_that_cannot_work_are_told_of, the_recipes_do_without_the_command],
+              long_tests=[what_slurm_finds_out_late, pilots_of_half_a_minute])
