@@ -7,19 +7,21 @@ compare_with_cycles.py --bin build/release/bin --out FOLDER --frames 1,12,24 [--
 Both render twice, with other seeds, which tells how noisy each 16 x 16 block of pixels is. For each frame stand there:
 the ratio of the means, Baton's over Cycles'; the rms difference of blocks over the picture's mean, and over what noise
 explains (about 1 where both render the same); the largest difference of a block over the mean. Exit code 1 where noise
-does not explain the difference. --fault plants one, which must be seen: the map turned by half a degree, or objects one
-frame late.
+does not explain the difference. --fault plants one, which must be seen: the map turned by two degrees, or objects one
+frame late (which needs two frames or more).
 """
 
 import argparse
 import json
 import math
+import shutil
 import subprocess
 import sys
 from pathlib import Path
 
 HERE = Path(__file__).resolve().parent
 BLOCK = 16
+FAULT_DEG = 2
 SEEDS = (1, 2)
 MOST_OVER_NOISE = 1.5
 MOST_RMS = 0.002  # of the mean: below it, filters of the two differ more than a viewer sees
@@ -38,9 +40,10 @@ def plant(job, fault):
         job["scene"]["gltf"]["startFrame"] = 1
     elif fault == "turn":
         rotation = job["environment"].setdefault("rotation", {})
-        rotation["startDeg"] = rotation.get("startDeg", 0) + 0.5
         for key in rotation.get("keys", []):
-            key["deg"] += 0.5
+            key["deg"] += FAULT_DEG
+        if "keys" not in rotation:
+            rotation["startDeg"] = rotation.get("startDeg", 0) + FAULT_DEG
 
 
 def picture(programs, file):
@@ -90,6 +93,7 @@ def main():
     (out / "job/compared.json").write_text(json.dumps(job, indent=1), encoding="utf-8")
 
     for seed in SEEDS:
+        shutil.rmtree(out / f"baton.{seed}", ignore_errors=True)
         run(options.bin / "baton", "render", out / "job/compared.json", "--restart", "--set", f"seed={seed}",
             "--set", f"quality.rounds={options.rounds}", "--set", "output.pixelType=float",
             "--set", "output.clampNegative=false", "--set", f"output.directory={out}/baton.{seed}")

@@ -15,6 +15,10 @@ from pathlib import Path
 import bpy
 import numpy
 
+sys.dont_write_bytecode = True
+sys.path.insert(0, str(Path(__file__).resolve().parent))
+from baton_exporter import exr  # noqa: E402
+
 MAPS = Path(bpy.utils.resource_path("SYSTEM")) / "datafiles/studiolights/world"
 
 
@@ -225,15 +229,11 @@ def write_sequence(folder):
     height, width = 64, 128
     v, u = numpy.mgrid[0:height, 0:width]
     for i in range(8):
-        pixels = numpy.ones((height, width, 4), numpy.float32)
-        pixels[..., :3] = numpy.where((v > height / 2)[..., None], (0.25, 0.35, 0.6), (0.1, 0.09, 0.08))
-        distance = numpy.hypot(u - (20 + 9 * i), v - (36 + 2.5 * i))
-        pixels[..., :3] += numpy.exp(-(distance / 2.5) ** 2)[..., None] * numpy.array((60, 50 - 4 * i, 30))
-        image = bpy.data.images.new("map", width, height, float_buffer=True)
-        image.pixels.foreach_set(pixels.ravel())
-        image.filepath_raw, image.file_format = str(folder / f"sun_{101 + i:04}.exr"), "OPEN_EXR"
-        image.save()
-        bpy.data.images.remove(image)
+        pixels = numpy.where((v > height / 2)[..., None], (0.1, 0.09, 0.08), (0.25, 0.35, 0.6))
+        distance = numpy.hypot(u - (20 + 9 * i), v - (28 - 2.5 * i))
+        pixels = pixels + numpy.exp(-(distance / 1.2) ** 2)[..., None] * numpy.array((200, 170 - 10 * i, 100))
+        lines = numpy.ascontiguousarray(pixels[..., ::-1].transpose(0, 2, 1), "<f4")
+        exr.write(folder / f"sun_{101 + i:04}.exr", width, height, (line.tobytes() for line in lines))
 
 
 def make_hdr_sequence(folder):
