@@ -4,7 +4,6 @@
 
 #include <algorithm>
 #include <bit>
-#include <map>
 
 #include "common/base/check.h"
 
@@ -43,31 +42,6 @@ std::string json_text(std::string_view name) {
   return text + '"';
 }
 
-std::vector<float*> planes_of(FilmTile& film, const std::vector<std::string>& channels) {
-  std::vector<float*> planes;
-  for (const std::string& channel : channels) {
-    planes.push_back(film.find(channel));
-    BATON_CHECK(planes.back() != nullptr);
-  }
-  return planes;
-}
-
-void sort_shares(std::vector<CryptoShare>& shares) {
-  std::sort(shares.begin(), shares.end(), [](const CryptoShare& a, const CryptoShare& b) {
-    if (a.share != b.share) return a.share > b.share;
-    return std::bit_cast<std::uint32_t>(a.id) < std::bit_cast<std::uint32_t>(b.id);
-  });
-}
-
-void write_shares(const std::vector<float*>& planes, std::size_t pixel,
-                  const std::vector<CryptoShare>& shares) {
-  for (std::size_t rank = 0; rank < planes.size() / 2; ++rank) {
-    const bool is_there = rank < shares.size();
-    planes[2 * rank][pixel] = is_there ? shares[rank].id : 0;
-    planes[2 * rank + 1][pixel] = is_there ? shares[rank].share : 0;
-  }
-}
-
 }  // namespace
 
 float cryptomatte_id(std::string_view name) {
@@ -77,33 +51,47 @@ float cryptomatte_id(std::string_view name) {
   return std::bit_cast<float>(hash);
 }
 
-void write_cryptomatte(FilmTile& film, const std::vector<std::string>& channels, std::size_t pixel,
-                       std::vector<CryptoShare>& shares) {
-  sort_shares(shares);
-  write_shares(planes_of(film, channels), pixel, shares);
+CryptoLayer::CryptoLayer(FilmTile& film, const std::vector<std::string>& channels) {
+  for (const std::string& channel : channels) {
+    planes_.push_back(film.find(channel));
+    BATON_CHECK(planes_.back() != nullptr);
+  }
 }
 
-void merge_cryptomatte(const FilmTile& earlier, double weight,
-                       const std::vector<std::string>& channels, FilmTile& film) {
+void CryptoLayer::write(std::size_t pixel, std::vector<CryptoShare>& shares) const {
+  std::sort(shares.begin(), shares.end(), [](const CryptoShare& a, const CryptoShare& b) {
+    if (a.share != b.share) return a.share > b.share;
+    return std::bit_cast<std::uint32_t>(a.id) < std::bit_cast<std::uint32_t>(b.id);
+  });
+  for (std::size_t rank = 0; rank < planes_.size() / 2; ++rank) {
+    const CryptoShare thing = rank < shares.size() ? shares[rank] : CryptoShare{};
+    planes_[2 * rank][pixel] = thing.id;
+    planes_[2 * rank + 1][pixel] = thing.share;
+  }
+}
+
+void CryptoLayer::add_to(std::size_t pixel, double factor,
+                         std::map<std::uint32_t, double>& sums) const {
+  for (std::size_t i = 0; i < planes_.size(); i += 2) {
+    const float share = planes_[i + 1][pixel];
+    if (share > 0) sums[std::bit_cast<std::uint32_t>(planes_[i][pixel])] += factor * double{share};
+  }
+}
+
+void merge_cryptomatte(FilmTile& earlier, double weight, const std::vector<std::string>& channels,
+                       FilmTile& film) {
   if (film.find(channels.front()) == nullptr) return;
-  const std::vector<float*> now = planes_of(film, channels);
-  std::vector<const float*> before;
-  for (const std::string& channel : channels) before.push_back(earlier.find(channel));
+  const CryptoLayer before(earlier, channels), now(film, channels);
+  std::map<std::uint32_t, double> sums;
   std::vector<CryptoShare> shares;
   for (std::size_t pixel = 0; pixel < film.num_pixels(); ++pixel) {
-    std::map<std::uint32_t, double> sums;  // by the ID's bits
-    const auto add = [&](float id, float share, double factor) {
-      if (share > 0) sums[std::bit_cast<std::uint32_t>(id)] += factor * double{share};
-    };
-    for (std::size_t i = 0; i < channels.size(); i += 2) {
-      add(before[i][pixel], before[i + 1][pixel], weight);
-      add(now[i][pixel], now[i + 1][pixel], 1);
-    }
+    sums.clear();
+    before.add_to(pixel, weight, sums);
+    now.add_to(pixel, 1, sums);
     shares.clear();
     for (const auto& [bits, sum] : sums)
       shares.push_back({std::bit_cast<float>(bits), static_cast<float>(sum / (weight + 1))});
-    sort_shares(shares);
-    write_shares(now, pixel, shares);
+    now.write(pixel, shares);
   }
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <map>
 #include <string>
 #include <string_view>
 #include <vector>
@@ -24,15 +25,23 @@ struct CryptoShare {
   float id = 0;
   float share = 0;
 };
-/// Puts the largest shares into the planes of a layer at a pixel; equal shares in the order of
-/// their IDs' bits. Sorts `shares`. film must have the channels.
-void write_cryptomatte(FilmTile& film, const std::vector<std::string>& channels, std::size_t pixel,
-                       std::vector<CryptoShare>& shares);
+/// The planes of a layer in a film, which must have the channels.
+class CryptoLayer {
+ public:
+  CryptoLayer(FilmTile& film, const std::vector<std::string>& channels);
+  /// Puts the largest shares into a pixel; equal ones in the order of their IDs' bits. Sorts them.
+  void write(std::size_t pixel, std::vector<CryptoShare>& shares) const;
+  /// Adds the shares of a pixel, times `factor`, to sums by the bits of their IDs.
+  void add_to(std::size_t pixel, double factor, std::map<std::uint32_t, double>& sums) const;
+
+ private:
+  std::vector<float*> planes_;  ///< ID, share, ID, share, ...
+};
 
 /// Makes a layer of `film`, if it has it, the mean of itself and of `earlier`, which counts
 /// `weight` times.
-void merge_cryptomatte(const FilmTile& earlier, double weight,
-                       const std::vector<std::string>& channels, FilmTile& film);
+void merge_cryptomatte(FilmTile& earlier, double weight, const std::vector<std::string>& channels,
+                       FilmTile& film);
 
 /// The header attributes of a layer: name, hash, conversion, and the manifest of these names.
 ImageMetadata cryptomatte_metadata(std::string_view layer, const std::vector<std::string>& names);

@@ -1,7 +1,11 @@
 #pragma once
 
+#include <fmt/format.h>
+
+#include <algorithm>
 #include <array>
 #include <string_view>
+#include <vector>
 
 #include "common/base/limits.h"
 #include "common/job/job_archive.h"
@@ -15,8 +19,8 @@ inline constexpr NumberRange kUnitRange{0, 1};
 inline constexpr NumberRange kCoordinateRange{-1e9, 1e9};
 /// Radiance.
 inline constexpr NumberRange kLightRange{0, 1e9};
-/// Lengths and factors above zero.
 inline constexpr NumberRange kFrameRange{0, limits::kMaxFrameNumber};
+/// Lengths and factors above zero.
 inline constexpr NumberRange kPositiveRange{.min = 0, .max = 1e9, .min_open = true};
 /// Angles in degrees.
 inline constexpr NumberRange kAngleRange{-1e6, 1e6};
@@ -63,6 +67,16 @@ inline constexpr std::array<std::string_view, 2> kPixelTypes{"half", "float"};
 inline constexpr std::array<std::string_view, 5> kCompressions{"none", "rle", "zips", "zip", "piz"};
 inline constexpr std::array<std::string_view, 2> kKeyCurves{"linear", "smooth"};
 inline constexpr std::array<std::string_view, 2> kStateKeeps{"last", "all"};
+
+/// A fault unless the frames of `keys` ascend; name: of the list.
+template <class K>
+void check_ascending(JobArchive& a, const char* name, const std::vector<K>& keys) {
+  const auto wrong = std::adjacent_find(
+      keys.begin(), keys.end(), [](const K& x, const K& y) { return !(x.frame < y.frame); });
+  if (wrong == keys.end()) return;
+  a.fault(name, "ascending frames without duplicates",
+          fmt::format("{} after {}", (wrong + 1)->frame, wrong->frame));
+}
 
 /// The JSON shape of a job and every check that needs nothing but the job. Documented, key by key,
 /// in jobs/schema/job.schema.json.

@@ -61,12 +61,7 @@ void fields(JobArchive& a, GltfMotion& gltf) {
 template <class K>
 void source_fields(JobArchive& a, std::vector<K>& keys, std::optional<GltfMotion>& gltf) {
   a.list("keys", keys, limits::kMaxFrames, [&](K& key) { fields(a, key); });
-  for (std::size_t i = 1; i < keys.size(); ++i) {
-    if (keys[i].frame > keys[i - 1].frame) continue;
-    a.fault("keys", "ascending frames without duplicates",
-            fmt::format("{} after {}", keys[i].frame, keys[i - 1].frame));
-    break;
-  }
+  check_ascending(a, "keys", keys);
   GltfMotion source = gltf.value_or(GltfMotion{});
   if (a.object("gltf", [&] { fields(a, source); }, {.present = gltf.has_value()})) gltf = source;
   if (gltf && !keys.empty()) a.fault("gltf", "either keys or gltf", "both");

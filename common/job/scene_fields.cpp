@@ -118,12 +118,7 @@ void number_keys(JobArchive& a, const char* list, std::vector<NumberKey>& keys, 
     a.number(required("frame"), key.frame, kFrameRange);
     a.number(required(name), key.value, range);
   });
-  for (std::size_t i = 1; i < keys.size(); ++i) {
-    if (keys[i].frame > keys[i - 1].frame) continue;
-    a.fault(list, "ascending frames without duplicates",
-            fmt::format("{} after {}", keys[i].frame, keys[i - 1].frame));
-    break;
-  }
+  check_ascending(a, list, keys);
 }
 
 }  // namespace
@@ -204,12 +199,7 @@ void fields(JobArchive& a, EnvironmentSpec& environment, const std::vector<int>&
     a.fault("", "exactly one of map, keys (at least one) and frames",
             forms > 1 ? "several" : "none");
   }
-  for (std::size_t i = 1; i < keys.size(); ++i) {
-    if (keys[i].frame > keys[i - 1].frame) continue;
-    a.fault("keys", "ascending frames without duplicates",
-            fmt::format("{} after {}", keys[i].frame, keys[i - 1].frame));
-    break;
-  }
+  check_ascending(a, "keys", keys);
 
   a.boolean("interpolate", environment.interpolate);
   a.choice("filter", environment.filter, kMapFilters);

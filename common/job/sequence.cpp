@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "common/base/check.h"
+#include "common/job/key_span.h"
 #include "common/job/motion.h"
 
 namespace baton {
@@ -14,13 +15,9 @@ namespace {
 
 /// At least one key.
 double value_at(const std::vector<NumberKey>& keys, double frame) {
-  const auto next = std::upper_bound(keys.begin(), keys.end(), frame,
-                                     [](double f, const NumberKey& key) { return f < key.frame; });
-  if (next == keys.begin()) return next->value;
-  const NumberKey& before = *(next - 1);
-  if (next == keys.end()) return before.value;
-  const double share = (frame - before.frame) / (next->frame - before.frame);
-  return before.value + share * (next->value - before.value);
+  const KeySpan span = find_span(keys, frame);
+  const double from = keys[span.from].value;
+  return from + span.share * (keys[span.to].value - from);
 }
 
 }  // namespace
@@ -35,19 +32,12 @@ EnvironmentFrame environment_at(const EnvironmentSpec& environment, int frame_nu
   const std::vector<EnvironmentKey>& keys = environment.keys;
   EnvironmentFrame result;
 
-  // The last key at or before the frame holds; before the first key the first one does.
-  const auto next =
-      std::upper_bound(keys.begin(), keys.end(), static_cast<double>(frame_number),
-                       [](double frame, const EnvironmentKey& key) { return frame < key.frame; });
-  const auto held = next == keys.begin() ? keys.begin() : next - 1;
-  result.map_a = result.map_b = static_cast<std::int32_t>(held - keys.begin());
-
-  // Between two keys the texels are mixed linearly.
-  if (environment.interpolate && next != keys.end() && next != keys.begin()) {
-    result.mix = static_cast<float>((frame_number - held->frame) / (next->frame - held->frame));
-    if (result.mix > 0) result.map_b = static_cast<std::int32_t>(next - keys.begin());
-  }
-
+  // The last key at or before the frame holds; before the first key the first one does. Between two
+  // keys the texels are mixed linearly.
+  const KeySpan span = find_span(keys, frame_number);
+  result.map_a = result.map_b = static_cast<std::int32_t>(span.from);
+  if (environment.interpolate) result.mix = static_cast<float>(span.share);
+  if (result.mix > 0) result.map_b = static_cast<std::int32_t>(span.to);
   if (!environment.scale_keys.empty())
     result.scale = static_cast<float>(value_at(environment.scale_keys, frame_number));
   const double degrees = rotation_deg_at(environment, frame_number);

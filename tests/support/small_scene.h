@@ -176,7 +176,10 @@ inline TileResult render_tile(const JobSpec& job, std::int32_t tile = 0) {
                              [&](FirstPassSamples samples) {
                                result.samples.push_back(std::move(samples));
                                return Status();
-                             }};
+                             },
+                         .earlier_film = [&](std::int32_t step) -> Result<FilmTile> {
+                           return result.films.at(static_cast<std::size_t>(step));
+                         }};
   for (std::int32_t run = 0; run < num_runs(job); ++run) {
     std::vector<StatePtr> previous;
     if (carries_state(job) && run > 0)

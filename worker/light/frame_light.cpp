@@ -107,7 +107,7 @@ Result<std::shared_ptr<const FrameLight>> LightSequence::at(std::int32_t index,
   BATON_ASSIGN(light->now, environment(frame.environment));
   BATON_ASSIGN(light->before, environment(frame_before.environment));
   light->still = round == 0 && frame.environment == frame_before.environment;
-  if (has_catcher(job_)) light->catcher = catcher_albedo(index, light->now);
+  if (has_catcher(job_)) light->catcher = catcher_albedo(frame.environment, light->now);
   if (frame.environment.same_texels(frame_before.environment))
     light->turn = turn_between(light->before, light->now);
   light->presampled = presampled_.find({index, round});
@@ -121,11 +121,13 @@ Result<std::shared_ptr<const FrameLight>> LightSequence::at(std::int32_t index,
   return std::shared_ptr<const FrameLight>(std::move(light));
 }
 
-Rgb LightSequence::catcher_albedo(std::int32_t index, const Environment& now) {
-  if (const auto found = catchers_.find(index); found != catchers_.end()) return found->second;
+Rgb LightSequence::catcher_albedo(const EnvironmentFrame& frame, const Environment& now) {
+  const auto same = std::ranges::find(catchers_, frame, &std::pair<EnvironmentFrame, Rgb>::first);
+  if (same != catchers_.end()) return same->second;
   const Rgb e = irradiance(now, {0, 1, 0});
   const auto albedo = [](float received) { return received > 0 ? kPi / received : 0.0f; };
-  return catchers_[index] = {albedo(e.x), albedo(e.y), albedo(e.z)};
+  if (catchers_.size() >= frames_in_hand(job_)) catchers_.erase(catchers_.begin());
+  return catchers_.emplace_back(frame, Rgb{albedo(e.x), albedo(e.y), albedo(e.z)}).second;
 }
 
 std::vector<std::string> LightSequence::repair_notes() const {

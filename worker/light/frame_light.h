@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstdint>
-#include <map>
 #include <memory>
 #include <mutex>
 #include <optional>
@@ -60,7 +59,7 @@ class LightSequence {
   std::vector<std::string> repair_notes() const;
 
  private:
-  Rgb catcher_albedo(std::int32_t index, const Environment& now);
+  Rgb catcher_albedo(const EnvironmentFrame& frame, const Environment& now);
   Result<std::shared_ptr<const EnvironmentMap>> key_map(std::int32_t key);
   Result<std::shared_ptr<const EnvironmentMap>> mixed_map(const EnvironmentFrame& frame);
   Result<Environment> environment(const EnvironmentFrame& frame);
@@ -72,7 +71,7 @@ class LightSequence {
   /// By the first frame index that shows these texels.
   LruCache<std::int32_t, EnvironmentMap> mixed_maps_;
   LruCache<std::pair<std::int32_t, std::int32_t>, PresampledLight> presampled_;  ///< frame, round
-  std::map<std::int32_t, Rgb> catchers_;                                         ///< by frame index
+  std::vector<std::pair<EnvironmentFrame, Rgb>> catchers_;  ///< of the last frames
   std::vector<std::string> repair_notes_;
 };
 

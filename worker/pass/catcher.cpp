@@ -3,11 +3,9 @@
 #include <algorithm>
 #include <cmath>
 
-#include "common/base/poison.h"
 #include "common/job/sequence.h"
 #include "worker/accel/accel.h"
 #include "worker/method/populations.h"
-#include "worker/method/ray_batch.h"
 
 namespace baton {
 
@@ -56,7 +54,7 @@ bool takes_up(bool sees_catcher, SampleState& state, std::size_t index) {
 
 Rgb CatcherEdge::sample(const PixelMethod& method, const PixelInput& input, const FrameLight& light,
                         const SampleState& like, SamplerScratch& scratch) {
-  // The sites on the ground alone, in a state of their own.
+  // The sites on the ground alone.
   hits_.assign(input.hits.begin(), input.hits.end());
   SiteOrigins origins{.num_sites = static_cast<std::int32_t>(hits_.size())};
   for (std::size_t s = 0; s < hits_.size(); ++s) {
@@ -64,29 +62,12 @@ Rgb CatcherEdge::sample(const PixelMethod& method, const PixelInput& input, cons
     if (hits_[s].hit) origins.set(s, hits_[s].ray_origin);
   }
   gather_sites(*input.geometry, hits_, sites_, light.catcher);
-  state_.resize({0, 0, 1, 1}, like.num_particles, like.num_populations);
-  if (!like.memory.empty()) state_.add_memory();
-  target_.resize(static_cast<std::size_t>(like.num_particles));
-
   // Random numbers of pixels that no picture has.
   RngKey key = input.key;
   key.pixel ^= 0x80000000u;
-  const PixelInput ground{.sites = sites_,
-                          .light = light,
-                          .now = input.now,
-                          .before = input.before,
-                          .key = key,
-                          .frame_index = input.frame_index,
-                          .has_history = false,
-                          .target = target_,
-                          .hits = hits_,
-                          .geometry = input.geometry};
-  rays_.clear();
-  RayWriter writer(origins, rays_);
-  poison(scratch);
-  method.sample(ground, {state_, 0}, scratch, writer);
-  input.geometry->accel->occluded(rays_.rays);
-  return writer.known.color + sum_free(rays_, 0, rays_.size()).color;
+  const AsideSampler::Aside ground{
+      .sites = sites_, .hits = hits_, .origins = origins, .light = light, .key = key};
+  return aside_.sample(method, input, ground, like, scratch);
 }
 
 }  // namespace baton

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "worker/light/frame_light.h"
-#include "worker/method/pixel_method.h"
+#include "worker/pass/aside.h"
 #include "worker/pass/render_context.h"
 
 namespace baton {
@@ -35,11 +35,9 @@ class CatcherEdge {
              const SampleState& like, SamplerScratch& scratch);
 
  private:
-  SampleState state_;  ///< of one pixel
   std::vector<SurfaceHit> hits_;
-  std::vector<float> target_;
   SiteBlock sites_;
-  RayBatch rays_;
+  AsideSampler aside_;
 };
 
 }  // namespace baton

@@ -1,5 +1,6 @@
 #include "worker/pass/film_writer.h"
 
+#include "common/image/shadow.h"
 #include "common/job/aov.h"
 #include "common/job/sequence.h"
 
@@ -29,7 +30,7 @@ FilmWriter::FilmWriter(const PixelRect& rect, const JobSpec& job)
     for (const std::string& name : traits(aov).channels) film_.channels.push_back(name);
   }
   if (with_shadow_) {
-    for (const char* const name : {"shadow.R", "shadow.G", "shadow.B"})
+    for (const char* const name : {"shadow.R", "shadow.G", "shadow.B", kCatcherChannel})
       film_.channels.emplace_back(name);
   }
   if (with_error_) film_.channels.emplace_back(kErrorChannel);
@@ -98,7 +99,10 @@ void FilmWriter::write(std::size_t index, const PixelResult& pixel) {
         break;
     }
   }
-  if (with_shadow_) put_vec(pixel.catcher > 0 ? pixel.shadow / pixel.catcher : Rgb{1, 1, 1});
+  if (with_shadow_) {
+    put_vec(pixel.shadow);
+    put(pixel.catcher);
+  }
   if (with_error_) put(pixel.error);
 }
 

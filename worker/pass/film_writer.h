@@ -37,7 +37,7 @@ struct PixelResult {
 };
 
 /// Pass: writes pixels into the channels of the job: R, G, B, A, the AOVs in their order, shadow.*
-/// where the ground catches shadows, and where the noise is told kErrorChannel.
+/// and kCatcherChannel where the ground catches shadows, and where the noise is told kErrorChannel.
 class FilmWriter {
  public:
   FilmWriter(const PixelRect& rect, const JobSpec& job);

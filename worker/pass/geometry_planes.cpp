@@ -66,7 +66,6 @@ void GeometryPlanes::add(const TileSurfaces& surfaces) {
   const auto num_sites = static_cast<std::size_t>(surfaces.num_sites);
   num_sites_ += static_cast<std::uint32_t>(surfaces.num_sites);
   const bool with_albedo = has(Aov::albedo), with_motion = has(Aov::motion);
-  SiteBlock block;
   for (std::size_t pixel = 0; pixel < sums_.size(); ++pixel) {
     Sum& sum = sums_[pixel];
     for (std::size_t s = 0; s < num_sites; ++s) {
@@ -96,6 +95,7 @@ void GeometryPlanes::write_ids(const std::vector<Things>& things,
                                FilmTile& film) const {
   std::vector<float> ids;
   for (const std::string& name : names) ids.push_back(cryptomatte_id(name));
+  const CryptoLayer planes(film, traits(layer).channels);
   std::vector<CryptoShare> shares;
   for (std::size_t pixel = 0; pixel < things.size(); ++pixel) {
     shares.clear();
@@ -104,7 +104,7 @@ void GeometryPlanes::write_ids(const std::vector<Things>& things,
           {ids.at(things[pixel].thing[i] - 1),
            static_cast<float>(things[pixel].sites[i]) / static_cast<float>(num_sites_)});
     }
-    write_cryptomatte(film, traits(layer).channels, pixel, shares);
+    planes.write(pixel, shares);
   }
 }
 

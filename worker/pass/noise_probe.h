@@ -1,9 +1,8 @@
 #pragma once
 
 #include <cstdint>
-#include <vector>
 
-#include "worker/method/pixel_method.h"
+#include "worker/pass/aside.h"
 
 namespace baton {
 
@@ -37,9 +36,7 @@ class NoiseProbe {
                      SamplerScratch& scratch);
 
  private:
-  SampleState state_;  ///< of one pixel
-  std::vector<float> target_;
-  RayBatch rays_;
+  AsideSampler aside_;
 };
 
 }  // namespace baton

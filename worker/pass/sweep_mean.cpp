@@ -2,12 +2,13 @@
 
 #include <fmt/format.h>
 
-#include <cmath>
+#include <algorithm>
 #include <string>
 
 #include "common/image/cryptomatte.h"
 #include "common/image/noise.h"
 #include "common/job/aov.h"
+#include "common/math/vec3.h"
 
 namespace baton {
 namespace {
@@ -53,17 +54,18 @@ void normalize_normals(FilmTile& film) {
                *const z = film.find("normal.Z");
   if (x == nullptr || y == nullptr || z == nullptr) return;
   for (std::size_t i = 0; i < film.num_pixels(); ++i) {
-    const float length = std::sqrt(x[i] * x[i] + y[i] * y[i] + z[i] * z[i]);
-    if (!(length > 0)) continue;
-    x[i] /= length;
-    y[i] /= length;
-    z[i] /= length;
+    const Vec3 sum{x[i], y[i], z[i]};
+    if (sum == Vec3{}) continue;
+    const Vec3 normal = normalize(sum);
+    x[i] = normal.x;
+    y[i] = normal.y;
+    z[i] = normal.z;
   }
 }
 
 }  // namespace
 
-Status add_sweeps(const FilmTile& earlier, std::int32_t num_sweeps, FilmTile& film) {
+Status add_sweeps(FilmTile earlier, std::int32_t num_sweeps, FilmTile& film) {
   if (earlier.rect != film.rect || earlier.channels != film.channels) {
     return Error{ErrorKind::bad_input,
                  fmt::format("film of an earlier sweep: at {},{} with channels {}, expected {},{}, "

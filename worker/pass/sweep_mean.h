@@ -11,6 +11,6 @@ namespace baton {
 /// All sweeps weigh the same, whatever they found, so the mean has no bias. Depth, normal and
 /// material are those of the sweeps that see a surface; variance and error are those of the mean of
 /// independent values. Error: films of different tiles or channels.
-Status add_sweeps(const FilmTile& earlier, std::int32_t num_sweeps, FilmTile& film);
+Status add_sweeps(FilmTile earlier, std::int32_t num_sweeps, FilmTile& film);
 
 }  // namespace baton

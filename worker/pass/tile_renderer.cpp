@@ -194,8 +194,8 @@ Result<RenderStats> run_tile(const RenderContext& context, const TileRun& run,
     BATON_ASSIGN(FilmTile film, walk.render(frame, previous));
     if (const std::int32_t sweep = frame.first_round / context.job.quality.rounds; sweep > 0) {
       const auto num_frames = static_cast<std::int32_t>(context.job.frames.size());
-      BATON_ASSIGN(const FilmTile earlier, sink.earlier_film(f - num_frames));
-      BATON_TRY(add_sweeps(earlier, sweep, film));
+      BATON_ASSIGN(FilmTile earlier, sink.earlier_film(f - num_frames));
+      BATON_TRY(add_sweeps(std::move(earlier), sweep, film));
     }
     BATON_TRY(sink.film(f, film));
     if (sink.diagnostics) sink.diagnostics({f, run.tile, walk.frame_sampling()});

@@ -9,6 +9,7 @@
 #include "common/base/version.h"
 #include "common/image/cryptomatte.h"
 #include "common/image/noise.h"
+#include "common/image/shadow.h"
 #include "common/job/aov.h"
 #include "common/job/job_fields.h"
 #include "common/job/motion.h"
@@ -159,6 +160,8 @@ Result<WrittenFrame> write_frame(const JobSpec& job, const Digest& job_digest,
   quality.clamped = job.output.clamp_negative;
   if (job.output.clamp_negative) clamp_negative(image);
   drop_channel(image, kErrorChannel);
+  finish_shadows(image);
+  drop_channel(image, kCatcherChannel);
 
   const std::filesystem::path path = frame_path(job, frame_index);
   const int number = job.frames.at(static_cast<std::size_t>(frame_index));

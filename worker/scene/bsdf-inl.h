@@ -185,7 +185,8 @@ HWY_INLINE BsdfLanes EvaluateBsdf(const SurfaceLanes& s, const Vec3Lanes& wi) {
     const VF m2 = hn::Mul(m, m);
     const VF schlick = hn::Mul(hn::Mul(m2, m2), m);
     const VF keep = hn::Sub(one, schlick);
-    out.diffuse = hn::IfThenElse(s.is_ggx, hn::Mul(out.diffuse, keep), out.diffuse);
+    const VF kept = hn::NegMulAdd(s.lobe_scale, schlick, one);  // F90 = 0: there is no lobe
+    out.diffuse = hn::IfThenElse(s.is_ggx, hn::Mul(out.diffuse, kept), out.diffuse);
     out.lobe = hn::IfThenElse(s.is_ggx, hn::Mul(dv, keep), out.lobe);
     out.white = hn::IfThenElseZero(s.is_ggx, hn::Mul(hn::Mul(dv, schlick), s.lobe_scale));
     out.lobe_pdf = hn::IfThenElse(s.is_ggx, hn::Div(quarter, s.view_masking), out.lobe_pdf);

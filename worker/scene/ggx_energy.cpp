@@ -100,7 +100,7 @@ Rgb diffuse_left(const Material& material, float cos_view) {
   const Albedo albedo = kTable.look_up(cos_view, material.shape);
   const auto left = [&](float kd, float f0) {
     const float lobe = f0 * albedo.head_on + material.f90 * albedo.grazing;
-    const float diffuse = kd * (1 - f0) * (1 - albedo.schlick);
+    const float diffuse = kd * (1 - f0) * (1 - material.f90 * albedo.schlick);
     return diffuse > 0 ? std::clamp((1 - lobe) / diffuse, 0.0f, 1.0f) : 1.0f;
   };
   return {left(material.kd.x, material.ks.x), left(material.kd.y, material.ks.y),

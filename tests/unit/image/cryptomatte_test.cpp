@@ -29,16 +29,16 @@ FilmTile film_of(std::size_t pixels) {
 TEST(Cryptomatte, KeepsTheLargestShares) {
   FilmTile film = film_of(1);
   std::vector<CryptoShare> shares{{3, 0.2f}, {1, 0.5f}, {2, 0.3f}};
-  write_cryptomatte(film, kChannels, 0, shares);
+  CryptoLayer(film, kChannels).write(0, shares);
   EXPECT_EQ(film.values, (std::vector<float>{1, 0.5f, 2, 0.3f}));
 }
 
 TEST(Cryptomatte, AMeanJoinsWhatIsTheSameThing) {
   FilmTile earlier = film_of(2), film = film_of(2);
   std::vector<CryptoShare> before{{7, 0.75f}, {8, 0.25f}}, now{{8, 1}}, none;
-  write_cryptomatte(earlier, kChannels, 0, before);
-  write_cryptomatte(film, kChannels, 0, now);
-  write_cryptomatte(film, kChannels, 1, now);
+  CryptoLayer(earlier, kChannels).write(0, before);
+  CryptoLayer(film, kChannels).write(0, now);
+  CryptoLayer(film, kChannels).write(1, now);
   merge_cryptomatte(earlier, 3, kChannels, film);
   // (3 * 0.75, 3 * 0.25 + 1) / 4; the other pixel had nothing before.
   EXPECT_FLOAT_EQ(film.find("Id00.R")[0], 7);

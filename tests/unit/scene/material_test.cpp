@@ -223,6 +223,18 @@ TEST(Material, GgxNeverReflectsMoreThanItReceives) {
   }
 }
 
+// KHR_materials_specular: without a lobe the diffuse part gives nothing away.
+TEST(Material, GgxWithoutSpecularIsLambertian) {
+  MaterialSpec spec;
+  spec.kind = MaterialKind::metallic_roughness;
+  spec.specular = 0;
+  const Material m = make_material(spec, {0.5f, 0.5f, 0.5f}, 0, 1);
+  for (const double view : {0.0, 60.0, 85.0}) {
+    for (const Vec3& wi : {normalize(Vec3{0.1f, 0, 1}), normalize(Vec3{-0.9f, 0.3f, 0.2f})})
+      EXPECT_FLOAT_EQ(evaluate_bsdf(m, flat_point(view), wi).x, 0.5f * kInvPi) << view;
+  }
+}
+
 TEST(Material, BrdfIsReciprocal) {
   const Vec3 a = from_polar(20, 10);
   const Vec3 b = from_polar(65, 200);
