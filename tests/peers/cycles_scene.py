@@ -22,6 +22,7 @@ from mathutils import Matrix
 
 sys.path.insert(0, str(Path(__file__).parent))
 import conventions  # noqa: E402
+import cycles_settings  # noqa: E402
 
 FAULTS = ("turn", "mirror", "shift")
 
@@ -38,38 +39,13 @@ def parse_arguments():
     return parser.parse_args(sys.argv[sys.argv.index("--") + 1:])
 
 
-def set_renderer(scene, placed, options):
-    """Cycles as its defaults are, but for what would not be the direct light of the job."""
-    scene.render.engine = "CYCLES"
-    cycles = scene.cycles
-    cycles.device = "CPU"
-    scene.render.threads_mode = "FIXED"
-    scene.render.threads = options.threads
-    cycles.samples = options.spp
-    cycles.seed = options.seed
-    cycles.use_adaptive_sampling = False
-    cycles.use_denoising = False
-    cycles.time_limit = 0
-
-    # No light between surfaces: rays that leave the first surface count where they reach the map.
-    for name in ("max", "diffuse", "glossy", "transmission", "volume", "transparent_max"):
-        setattr(cycles, f"{name}_bounces", 0)
-    # Nothing that trades energy for less noise.
-    cycles.sample_clamp_direct = cycles.sample_clamp_indirect = 0
-    cycles.blur_glossy = 0
-    cycles.light_sampling_threshold = 0
-    cycles.use_fast_gi = False
-
-    cycles.pixel_filter_type = "BOX"
-    cycles.filter_width = 1
+def set_picture(scene, placed):
+    scene.cycles.pixel_filter_type = "BOX"
+    scene.cycles.filter_width = 1
     render = scene.render
     render.resolution_x, render.resolution_y, render.resolution_percentage = placed["width"], placed["height"], 100
     render.film_transparent = False
     render.use_persistent_data = True  # of a sequence: meshes and their hierarchy are built once
-    render.use_compositing = render.use_sequencer = False
-    render.dither_intensity = 0
-    image = render.image_settings
-    image.file_format, image.color_mode, image.color_depth, image.exr_codec = "OPEN_EXR", "RGB", "32", "NONE"
 
 
 def make_material(entry, number):
@@ -207,7 +183,8 @@ def main():
         for item in list(collection):
             collection.remove(item)
     scene = bpy.context.scene
-    set_renderer(scene, placed, options)
+    set_picture(scene, placed)
+    cycles_settings.set_direct_light(scene, options)
     objects = make_objects(scene, options.placed, placed)
     sky, camera = Sky(scene, options.placed, placed, options.fault), make_camera(scene)
 

@@ -1,67 +1,21 @@
-"""Uncompressed EXR in, PNG out: what a comparison reads and shows. Pictures are float32 arrays (height, width, 3)."""
+"""EXR in, PNG out: what a comparison reads and shows. Pictures are float32 arrays (height, width, 3)."""
 
 import struct
+import sys
 import zlib
+from pathlib import Path
 
 import numpy as np
 
-MAGIC = b"\x76\x2f\x31\x01"
-SIZES = {1: 2, 2: 4}  # half, float
-
-
-class Unreadable(Exception):
-    """A file that is not what the comparison itself has written."""
-
-
-def read_text(data, at):
-    """A zero-terminated text; where it ends."""
-    end = data.index(b"\0", at)
-    return data[at:end].decode("ascii"), end + 1
-
-
-def read_header(data, name):
-    """Attributes of a scan-line file by name; where they end."""
-    if data[:4] != MAGIC or struct.unpack_from("<I", data, 4)[0] not in (2, 0x402):
-        raise Unreadable(f"{name}: expected an EXR file of scan lines")
-    attributes, at = {}, 8
-    while data[at] != 0:
-        key, at = read_text(data, at)
-        _, at = read_text(data, at)
-        size = struct.unpack_from("<I", data, at)[0]
-        attributes[key] = data[at + 4:at + 4 + size]
-        at += 4 + size
-    return attributes, at + 1
-
-
-def channels_of(value):
-    """Names and types (1: half, 2: float) in the order of the file."""
-    channels, at = [], 0
-    while value[at] != 0:
-        name, at = read_text(value, at)
-        channels.append((name, struct.unpack_from("<I", value, at)[0]))
-        at += 16
-    return channels
+sys.path.append(str(Path(__file__).parents[1] / "system"))
+from exr_frames import read_frame  # noqa: E402
 
 
 def read_exr(path):
     """R, G and B."""
-    data = path.read_bytes()
-    attributes, at = read_header(data, path)
-    if attributes["compression"] != b"\0":
-        raise Unreadable(f"{path}: expected no compression")
-    left, top, right, bottom = struct.unpack("<4i", attributes["dataWindow"])
-    width, height = right - left + 1, bottom - top + 1
-    channels = channels_of(attributes["channels"])
-    if any(kind not in SIZES for _, kind in channels) or not {"R", "G", "B"} <= {name for name, _ in channels}:
-        raise Unreadable(f"{path}: expected R, G and B as floats, got {channels}")
-
-    # Each line is its row, its size and one channel after the other; all are equally long.
-    line = np.dtype([("row", "<i4"), ("size", "<i4")] +
-                    [(name, "<f2" if kind == 1 else "<f4", (width,)) for name, kind in channels])
-    lines = np.frombuffer(data, line, height, at + 8 * height)
-    if np.any(lines["row"] != np.arange(top, bottom + 1)):
-        raise Unreadable(f"{path}: expected lines from top to bottom")
-    return np.stack([lines[name] for name in "RGB"], axis=-1).astype(np.float32)
+    frame = read_frame(path)
+    planes = [np.array(frame.channels[name], np.float32) for name in "RGB"]
+    return np.stack(planes, axis=-1).reshape(frame.height, frame.width, 3)
 
 
 def to_display(picture):

@@ -92,7 +92,8 @@ class Cycles:
 
     def identity(self, _):
         version = subprocess.run(["blender", "--version"], capture_output=True, text=True, check=True).stdout
-        return digest_of([HERE / "cycles_scene.py", HERE / "conventions.py"]) + version + self.fault
+        scripts = [HERE / f"{name}.py" for name in ("cycles_scene", "cycles_settings", "conventions")]
+        return digest_of(scripts) + version + self.fault
 
     def command(self, work, seed, out):
         fault = ["--fault", self.fault] if self.fault else []

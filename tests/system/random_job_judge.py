@@ -12,8 +12,9 @@ import subprocess
 import threading
 from pathlib import Path
 
+from exr_frames import read_frame, values_by
 from farm import BAD_INPUT, DEADLINE_S, IO, OK, PATIENCE
-from random_job_files import raw_state_bytes, read_frame, values_by, write_file
+from random_job_files import raw_state_bytes, write_file
 from random_job_means import judge_means
 
 # A job this small that takes longer hangs; one of `auto` renders pilots first.

@@ -12,7 +12,7 @@ import copy
 import math
 import statistics
 
-from random_job_files import read_frame
+from exr_frames import read_frame
 
 # Method -> which frame is unbiased: for those that carry samples the first, whose samples are fresh. `pool` is unbiased
 # in all; `ratio` is only consistent.
@@ -116,7 +116,7 @@ def judge_means(case, render):
         for seed in range(first_seed, first_seed + count):
             # Frame 10 comes after frame 9, whether or not the pattern has room for two digits.
             frames = sorted(render(of, seed).glob("*.exr"), key=lambda path: (len(path.name), path.name))
-            found.append(brightness(read_frame(frames[which], None)))
+            found.append(brightness(read_frame(frames[which])))
         return found
 
     seed = case["means"]["firstSeed"]

@@ -10,8 +10,9 @@ import zlib
 from array import array
 from pathlib import Path
 
+from exr_frames import Frame, read_frame, unpack_runs
 from random_job_draws import NUM_CANDIDATES, NUM_PARTICLES, Draw, draw_case
-from random_job_files import Frame, read_frame, rgbe, unpack_runs, write_file
+from random_job_files import rgbe, write_file
 from random_job_judge import FAULT_LINE, Wrong, compare, compare_prediction, judge_frames
 from random_job_means import FIRST_LOOK, SECOND_LOOK, significant
 from random_job_rules import spoil
@@ -100,7 +101,7 @@ def frames_are_read(_):
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "map.exr"
         write_file(path, {"kind": "sky", "width": 4, "height": 3}, folder)
-        frame = read_frame(path, None)
+        frame = read_frame(path)
         assert (frame.width, frame.height, frame.sample_bytes) == (4, 3, 4 * 3 * 12)
         assert all(g == 0.5 for g in frame.channels["G"]), frame.channels["G"]
         plain = path.read_bytes()
@@ -120,7 +121,7 @@ def frames_are_read(_):
             offsets += struct.pack("<Q", at + len(blocks))
             blocks += row[:4] + struct.pack("<i", len(data)) + data
         path.write_bytes(bytes(packed[:table]) + offsets + blocks)
-        assert read_frame(path, None).channels == frame.channels
+        assert read_frame(path).channels == frame.channels
     assert unpack_runs(bytes([2, 7, 254, 1, 2])) == bytes([7, 7, 7, 1, 2])
     assert rgbe((0, 0, 0)) == bytes(4) and rgbe((1.0, 0.5, 0.25)) == bytes([128, 64, 32, 129])
 
@@ -129,7 +130,7 @@ def wild_maps_hold_what_readers_mend(_):
     with tempfile.TemporaryDirectory() as folder:
         path = Path(folder) / "map.exr"
         write_file(path, {"kind": "wild", "width": 4, "height": 2, "count": 1, "seed": 1}, folder)
-        values = [v for plane in read_frame(path, None).channels.values() for v in plane]
+        values = [v for plane in read_frame(path).channels.values() for v in plane]
         assert any(map(math.isnan, values)) and any(map(math.isinf, values)) and min(v for v in values if v == v) < 0
 
 

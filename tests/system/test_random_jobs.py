@@ -6,7 +6,7 @@ import tempfile
 from pathlib import Path
 
 from farm import check, check_equal, make_job, run_tests
-from random_job_files import read_frame
+from exr_frames import read_frame
 from random_job_judge import Judge, Wrong
 from random_job_self_test import self_test
 from random_jobs import parse_options, run_jobs
@@ -31,7 +31,7 @@ class Saboteur(Judge):
             data = bytearray(path.read_bytes())
             data[-4] ^= 1
             path.write_bytes(data)
-            frames[path.name] = read_frame(path, None)
+            frames[path.name] = read_frame(path)
         return frames
 
 

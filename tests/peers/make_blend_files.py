@@ -1,6 +1,6 @@
 """Writes three Blender files that use what the exporter carries over:
 
-blender -b --factory-startup -P make_test_scenes.py -- FOLDER
+blender -b --factory-startup -P make_blend_files.py -- FOLDER
 
 turntable.blend: a turning parent with a figure, a textured box and instances; shift, depth of field, a packed map.
 keyed_camera.blend: a camera on a turning arm, with a Track To constraint, keyed focal length, a border; a tilted map.
@@ -16,7 +16,7 @@ import bpy
 import numpy
 
 sys.dont_write_bytecode = True
-sys.path.insert(0, str(Path(__file__).resolve().parent))
+sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "jobs/exporters/blender"))
 from baton_exporter import exr  # noqa: E402
 
 MAPS = Path(bpy.utils.resource_path("SYSTEM")) / "datafiles/studiolights/world"

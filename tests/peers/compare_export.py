@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
 """Exports a Blender file, renders it with Baton and with Cycles, and compares the pictures.
 
-compare_with_cycles.py --bin build/release/bin --out FOLDER --frames 1,12,24 [--rounds 16] [--spp 64]
-                       [--fault turn|frame] shot.blend
+/usr/bin/python3 compare_export.py --bin build/release/bin --out FOLDER --frames 1,12,24 [--rounds 16] [--spp 64]
+                                   [--fault turn|frame] shot.blend
 
-Both render twice, with other seeds, which tells how noisy each 16 x 16 block of pixels is. For each frame stand there:
-the ratio of the means, Baton's over Cycles'; the rms difference of blocks over the picture's mean, and over what noise
+Both render twice, with other seeds, which tells how noisy each block of pixels is. For each frame stand there: the
+ratio of the means, Baton's over Cycles'; the rms difference of blocks over the picture's mean, and over what noise
 explains (about 1 where both render the same); the largest difference of a block over the mean. Exit code 1 where noise
 does not explain the difference. --fault plants one, which must be seen: the map turned by two degrees, or objects one
 frame late (which needs two frames or more).
@@ -13,14 +13,18 @@ frame late (which needs two frames or more).
 
 import argparse
 import json
-import math
 import shutil
 import subprocess
 import sys
 from pathlib import Path
 
+import numpy as np
+
+import errors
+import pictures
+
 HERE = Path(__file__).resolve().parent
-BLOCK = 16
+EXPORTER = HERE.parents[1] / "jobs/exporters/blender/export_baton.py"
 FAULT_DEG = 2
 SEEDS = (1, 2)
 MOST_OVER_NOISE = 1.5
@@ -31,7 +35,6 @@ def run(*command):
     done = subprocess.run([str(part) for part in command], capture_output=True, text=True, check=False)
     if done.returncode:
         sys.exit(f"{' '.join(map(str, command))}: exit code {done.returncode}\n{done.stdout[-3000:]}{done.stderr[-3000:]}")
-    return done.stdout
 
 
 def plant(job, fault):
@@ -46,33 +49,14 @@ def plant(job, fault):
             rotation["startDeg"] = rotation.get("startDeg", 0) + FAULT_DEG
 
 
-def picture(programs, file):
-    """Rows of (r, g, b)."""
-    channels = [[list(map(float, row.split())) for row in run(programs / "exr_values", file, name).splitlines()]
-                for name in "RGB"]
-    return [list(zip(*rows)) for rows in zip(*channels)]
-
-
-def blocks(rows):
-    """Mean of R, G and B of each whole or cut block of BLOCK x BLOCK pixels."""
-    out = []
-    for y in range(0, len(rows), BLOCK):
-        for x in range(0, len(rows[0]), BLOCK):
-            pixels = [sum(pixel) / 3 for row in rows[y:y + BLOCK] for pixel in row[x:x + BLOCK]]
-            out.append(sum(pixels) / len(pixels))
-    return out
-
-
 def judge(baton, cycles):
-    """baton, cycles: the blocks for both seeds."""
-    count = len(baton[0])
-    ours, theirs = ([(a + b) / 2 for a, b in zip(*pair)] for pair in (baton, cycles))
-    mean = sum(theirs) / count
-    noise = sum(((a - b) ** 2) / 4 for pair in (baton, cycles) for a, b in zip(*pair)) / count
-    square = sum((a - b) ** 2 for a, b in zip(ours, theirs)) / count
-    largest = max(abs(a - b) for a, b in zip(ours, theirs))
-    return {"ratio": sum(ours) / count / mean, "rms": math.sqrt(square) / mean, "overNoise": math.sqrt(square / noise),
-            "largest": largest / mean}
+    """baton, cycles: pictures of both seeds."""
+    ours, theirs = (errors.block_means(np.stack(runs).mean(-1)) for runs in (baton, cycles))
+    noise = sum(np.square(runs[0] - runs[1]).mean() / 4 for runs in (ours, theirs))
+    apart = ours.mean(0) - theirs.mean(0)
+    mean, rms = theirs.mean(), np.sqrt(np.square(apart).mean())
+    return {"ratio": ours.mean() / mean, "rms": rms / mean, "over_noise": rms / np.sqrt(noise),
+            "largest": np.abs(apart).max() / mean}
 
 
 def main():
@@ -86,7 +70,7 @@ def main():
     parser.add_argument("blend", type=Path)
     options = parser.parse_args()
     out = options.out.resolve()
-    run("blender", "-b", options.blend, "-P", HERE / "export_baton.py", "--", out / "job", "--frames", options.frames)
+    run("blender", "-b", options.blend, "-P", EXPORTER, "--", out / "job", "--frames", options.frames)
     print((out / "job/report.txt").read_text(encoding="utf-8"), end="")
     job = json.loads((out / "job/job.json").read_text(encoding="utf-8"))
     plant(job, options.fault)
@@ -98,19 +82,19 @@ def main():
             "--set", f"quality.rounds={options.rounds}", "--set", "output.pixelType=float",
             "--set", "output.clampNegative=false", "--set", f"output.directory={out}/baton.{seed}")
         if not options.fault or not (out / f"cycles.{seed}").exists():
-            run("blender", "-b", options.blend, "-P", HERE / "render_direct.py", "--", out / f"cycles.{seed}",
+            run("blender", "-b", options.blend, "-P", HERE / "cycles_file.py", "--", out / f"cycles.{seed}",
                 "--frames", options.frames, "--spp", options.spp, "--seed", seed)
 
     failed = False
     print("frame  ratio     rms  over noise  largest")
     for file in sorted((out / "baton.1").glob("frame.*.exr")):
         number = file.name.split(".")[1]
-        result = judge(*([blocks(picture(options.bin, out / f"{name}.{seed}" / f"{stem}.{number}.exr")) for seed in SEEDS]
-                         for name, stem in (("baton", "frame"), ("cycles", "cycles"))))
-        wrong = result["overNoise"] > MOST_OVER_NOISE and result["rms"] > MOST_RMS
+        found = judge(*([pictures.read_exr(out / f"{name}.{seed}" / f"{stem}.{number}.exr") for seed in SEEDS]
+                        for name, stem in (("baton", "frame"), ("cycles", "cycles"))))
+        wrong = found["over_noise"] > MOST_OVER_NOISE and found["rms"] > MOST_RMS
         failed = failed or wrong
-        print(f"{number}  {result['ratio']:.4f}  {100 * result['rms']:.2f} %  {result['overNoise']:8.2f}"
-              f"  {100 * result['largest']:6.2f} %{'  DIFFERS' if wrong else ''}")
+        print(f"{number}  {found['ratio']:.4f}  {100 * found['rms']:.2f} %  {found['over_noise']:8.2f}"
+              f"  {100 * found['largest']:6.2f} %{'  DIFFERS' if wrong else ''}")
     return int(failed)
 
 
