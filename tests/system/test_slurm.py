@@ -3,6 +3,7 @@
 
 import json
 import os
+import re
 import shutil
 import time
 from pathlib import Path
@@ -47,10 +48,13 @@ class SlurmFarm:
         """How often pilots were submitted."""
         return self.log().count("pilots are submitted")
 
-    def baton(self, *words, **options):
+    def link(self):
+        """How `baton` reaches the coordinator."""
         endpoint = (self.folder / "farm" / "endpoint").read_text(encoding="ascii").strip()
-        return self.programs.run("baton", *words, "--coordinator", endpoint.replace("0.0.0.0", "127.0.0.1"),
-                                 "--key", self.folder / "farm" / "keys" / "admin.key", **options)
+        return ["--coordinator", endpoint.replace("0.0.0.0", "127.0.0.1"), "--key", self.folder / "farm" / "keys" / "admin.key"]
+
+    def baton(self, *words, **options):
+        return self.programs.run("baton", *words, *self.link(), **options)
 
     def workers(self):
         """The pilots that are connected, by their ids in Slurm."""
@@ -100,11 +104,16 @@ class SlurmFarm:
         wait_until(lambda: all(state == "COMPLETING" for state, _ in self.cluster.pilots().values()), "the queue is empty")
 
 
-def check_that_all_have_an_end(cluster, least):
-    """So many workers or more, each of which was told when its ten minutes are over."""
-    now = time.time()
-    ends = [int(words[words.index("--end-at") + 1]) for words in cluster.command_lines("baton-worker")]
-    check(len(ends) >= least and all(now < end <= now + 600 for end in ends), f"ends of pilots, at {now}: {ends}")
+def ends_of_pilots(cluster):
+    """{name: when it must have ended}, in seconds since 1970, of all workers that run."""
+    lines = cluster.command_lines("baton-worker")
+    return {words[words.index("--name") + 1]: int(words[words.index("--end-at") + 1]) for words in lines}
+
+
+def check_that_all_have_an_end(cluster):
+    """Each was told when its ten minutes are over."""
+    now, ends = time.time(), ends_of_pilots(cluster)
+    check(all(now < end <= now + 600 for end in ends.values()), f"ends of pilots, at {now}: {ends}")
 
 
 def pilots_follow_the_work_and_are_replaced(programs, folder):
@@ -121,13 +130,18 @@ def pilots_follow_the_work_and_are_replaced(programs, folder):
         cluster.kill_controller()
         farm.keep_busy()
         cluster.start_controller()
-        first = farm.wait_while_busy(lambda: len(known := farm.workers() & set(cluster.running())) >= 3 and known,
-                                     "three pilots work, and the queue knows them")
 
-        status = farm.baton("farm", "status").stdout
+        def agreed():
+            """The pilots, when processes, coordinator and queue agree on them."""
+            alive = {name.removeprefix("slurm-") for name in ends_of_pilots(cluster)}
+            return alive if alive == farm.workers() == set(cluster.running()) else set()
+        first = farm.wait_while_busy(lambda: len(pilots := agreed()) == 3 and pilots, "three pilots work and are known")
+
+        status = cluster.run(programs.path("baton"), "farm", "status", *farm.link())
         for pilot in first:
-            check(f"slurm-{pilot} " in status, f"pilot {pilot} is not shown beside its worker:\n{status}")
-        check_that_all_have_an_end(cluster, 3)
+            check(re.search(rf"^pilot {pilot} +RUNNING +n\d .* slurm-{pilot}\b", status, re.MULTILINE),
+                  f"pilot {pilot} is not shown beside its worker:\n{status}")
+        check_that_all_have_an_end(cluster)
 
         # Cancelled, or back in the queue: others come, and nothing that they held counts as lost or failed.
         farm.finish_job()
@@ -162,7 +176,7 @@ def pilots_end_with_their_time(programs, folder, nodes, time_limit, generations)
         farm.finish_job()
         check_equal(farm.attempts_lost, 0, "attempts lost or failed when a pilot's time was up")
         logs = {log.stem: log.read_text(encoding="utf-8") for log in (folder / "farm" / "slurm").glob("*.log")}
-        ended = [name for name, log in logs.items() if "ends: its time is up" in log]
+        ended = [name for name, log in logs.items() if "its time is up" in log or "it has no time for a task" in log]
         check(len(ended) >= nodes * (generations - 1), f"pilots that ended with their time: {ended}\n{logs}")
         farm.stop()
 
@@ -215,8 +229,8 @@ def the_recipes_do_without_the_command(programs, folder):
             outside.start_coordinator()
             cluster.environment["BATON_COORDINATOR"] = outside.endpoint
             cluster.run("sbatch", "--array=1-2", "--time=10", f"--output={folder}/worker-%a.log", recipes / "workers.sbatch")
-            wait_until(lambda: len(cluster.command_lines("baton-worker")) == 2, "both workers run")
-            check_that_all_have_an_end(cluster, 2)
+            wait_until(lambda: len(ends_of_pilots(cluster)) == 2, "both workers run")
+            check_that_all_have_an_end(cluster)
             outside.wait_for(outside.submit(farm.job_path))
             check_equal(programs.pixels(farm.frames), farm.expected, "frames by workers of the recipe")
 
