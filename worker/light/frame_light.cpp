@@ -46,9 +46,10 @@ std::optional<Mat3> turn_between(const Environment& before, const Environment& n
 }
 
 LightSequence::LightSequence(const JobSpec& job, std::shared_ptr<MapCache> maps,
-                             const MemorySharePtr& share)
+                             const MemorySharePtr& share, const HiddenCone& hidden)
     : job_(job),
       maps_(std::move(maps)),
+      hidden_(hidden),
       frames_(expand_sequence(job)),
       mixed_maps_(
           share, [](const EnvironmentMap& map) { return map.size_bytes(); }, frames_in_hand(job)),
@@ -58,7 +59,8 @@ LightSequence::LightSequence(const JobSpec& job, std::shared_ptr<MapCache> maps,
 
 Result<std::shared_ptr<const EnvironmentMap>> LightSequence::key_map(std::int32_t key) {
   const std::string& path = job_.environment.keys[static_cast<std::size_t>(key)].map;
-  BATON_ASSIGN(const auto map, maps_->get(path, job_.environment, job_.sampling.mis_compensation));
+  BATON_ASSIGN(const auto map,
+               maps_->get(path, job_.environment, job_.sampling.mis_compensation, hidden_));
   if (const auto& repairs = map->repairs(); repairs.total() > 0) {
     const std::string note = fmt::format("{}: {} negative, {} NaN, {} infinite texels set to 0",
                                          path, repairs.negative, repairs.nan, repairs.infinite);

@@ -48,7 +48,9 @@ inline constexpr std::int32_t kProbeRound = 1 << 30;
 class LightSequence {
  public:
   /// job must outlive the object. maps: may be shared with other jobs. share: of what it makes.
-  LightSequence(const JobSpec& job, std::shared_ptr<MapCache> maps, const MemorySharePtr& share);
+  /// hidden: see hidden_light.h.
+  LightSequence(const JobSpec& job, std::shared_ptr<MapCache> maps, const MemorySharePtr& share,
+                const HiddenCone& hidden = {});
 
   /// The light of frame `index` (0-based) in a round; negative: before those that are seen; or of
   /// kProbeRound. Errors: a map that cannot be read, or two key frames of different size.
@@ -66,6 +68,7 @@ class LightSequence {
 
   const JobSpec& job_;
   const std::shared_ptr<MapCache> maps_;
+  const HiddenCone hidden_;
   std::vector<FrameSpec> frames_;
   mutable std::mutex mutex_;
   /// By the first frame index that shows these texels.

@@ -5,13 +5,14 @@
 namespace baton {
 
 Result<MapCache::MapPtr> MapCache::get(const std::string& path, const EnvironmentSpec& environment,
-                                       bool compensate) {
-  const Key key{path, environment.filter, environment.scale, environment.max_width, compensate};
+                                       bool compensate, const HiddenCone& hidden) {
+  const Key key{path,  environment.filter, environment.scale, environment.max_width, compensate,
+                hidden};
   const std::lock_guard lock(reading_);
   if (MapPtr found = maps_.find(key)) return found;
   BATON_ASSIGN(const RgbImage image, read_rgb_image(path));
-  return maps_.insert(
-      key, std::make_shared<const EnvironmentMap>(make_map(image, environment, compensate)));
+  return maps_.insert(key, std::make_shared<const EnvironmentMap>(
+                               make_map(image, environment, compensate, hidden)));
 }
 
 }  // namespace baton

@@ -21,9 +21,10 @@ class MapCache {
   explicit MapCache(const MemorySharePtr& share)
       : maps_(share, [](const EnvironmentMap& map) { return map.size_bytes(); }) {}
 
-  /// The map of a file with the size and table that `environment` and `compensate` ask for. Error:
-  /// a map that cannot be read.
-  Result<MapPtr> get(const std::string& path, const EnvironmentSpec& environment, bool compensate);
+  /// The map of a file with the size and table that `environment`, `compensate` and `hidden` ask
+  /// for. Error: a map that cannot be read.
+  Result<MapPtr> get(const std::string& path, const EnvironmentSpec& environment, bool compensate,
+                     const HiddenCone& hidden = {});
 
  private:
   struct Key {
@@ -32,6 +33,7 @@ class MapCache {
     float scale;
     int max_width;
     bool compensate;
+    HiddenCone hidden;
 
     auto operator<=>(const Key&) const = default;
   };

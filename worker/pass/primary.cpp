@@ -91,7 +91,7 @@ void add_environment_behind(std::span<const SurfaceHit> hits, std::span<const Ra
                             std::int32_t num_sites, const EnvironmentView& environment,
                             std::span<Rgb> radiance) {
   constexpr std::size_t kBatch = 64;
-  std::array<float, kBatch> x, y, z, r, g, b, density;
+  std::array<float, kBatch> x, y, z, r, g, b;
   std::array<std::size_t, kBatch> pixel;
   const float share = 1.0f / static_cast<float>(num_sites);
   std::size_t count = 0;
@@ -99,8 +99,7 @@ void add_environment_behind(std::span<const SurfaceHit> hits, std::span<const Ra
     const auto used = [count](std::array<float, kBatch>& array) {
       return std::span(array).first(count);
     };
-    kernels::evaluate_environment(environment, used(x), used(y), used(z), used(r), used(g), used(b),
-                                  used(density));
+    kernels::see_environment(environment, used(x), used(y), used(z), used(r), used(g), used(b));
     for (std::size_t i = 0; i < count; ++i) radiance[pixel[i]] += Rgb{r[i], g[i], b[i]} * share;
     count = 0;
   };

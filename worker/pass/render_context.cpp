@@ -3,6 +3,7 @@
 #include "common/job/motion.h"
 #include "worker/pass/primary.h"
 #include "worker/pass/shared_assets.h"
+#include "worker/scene/hidden_light.h"
 #include "worker/scene/scene_kernels.h"
 
 namespace baton {
@@ -37,7 +38,8 @@ Result<std::shared_ptr<const RenderContext>> make_render_context(
   context->picture = picture;
   context->grid = TileGrid(job.image);
   context->frames = expand_sequence(job);
-  context->lights = std::make_unique<LightSequence>(context->job, assets->maps, memory.light);
+  context->lights = std::make_unique<LightSequence>(context->job, assets->maps, memory.light,
+                                                    hidden_light(job, assets->scene));
   context->surfaces = std::make_shared<SurfaceCache>(memory.surfaces);
   context->scene = std::shared_ptr<const Scene>(assets, &assets->scene);
   context->method = make_pixel_method(context->job);

@@ -127,12 +127,25 @@ HWY_INLINE void PrefetchTexels(const EnvironmentView& view, const TexelLanes& at
   }
 }
 
-HWY_INLINE RadianceLanes EvaluateTexels(const EnvironmentView& view, const TexelLanes& at) {
+/// As the camera sees them.
+HWY_INLINE RadianceLanes SeenTexels(const EnvironmentView& view, const TexelLanes& at) {
   if (!view.bilinear) return LoadTexels(view, at.index);
   return LoadTexelsBilinear(view, at.index, at.fx, at.fy);
 }
 
-/// Radiance and density along unit world directions.
+/// As they light surfaces: what is hidden does not.
+HWY_INLINE RadianceLanes EvaluateTexels(const EnvironmentView& view, const TexelLanes& at) {
+  const DF d;
+  const DI di;
+  RadianceLanes light = SeenTexels(view, at);
+  const VF hidden = hn::BitCast(d, hn::BroadcastSignBit(hn::BitCast(di, light.density)));
+  light.r = hn::AndNot(hidden, light.r);
+  light.g = hn::AndNot(hidden, light.g);
+  light.b = hn::AndNot(hidden, light.b);
+  return light;
+}
+
+/// Radiance that lights surfaces and density along unit world directions.
 HWY_INLINE RadianceLanes EvaluateEnvironment(const EnvironmentView& view, const Vec3Lanes& world) {
   return EvaluateTexels(view, LocateTexels(view, world));
 }

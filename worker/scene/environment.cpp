@@ -34,7 +34,8 @@ int num_blocks(int width) { return (width + kBlock - 1) / kBlock; }
 }  // namespace
 
 EnvironmentMap::EnvironmentMap(const RgbImage& image, MapFilter filter, float scale,
-                               bool compensate, const TexelRepairs& repairs)
+                               bool compensate, const TexelRepairs& repairs,
+                               const HiddenCone& hidden)
     : width_(image.width), height_(image.height), filter_(filter), repairs_(repairs) {
   BATON_CHECK(width_ > 0 && height_ > 0);
   BATON_CHECK(image.rgb.size() == std::size_t{3} * static_cast<std::size_t>(width_) * height_);
@@ -57,6 +58,7 @@ EnvironmentMap::EnvironmentMap(const RgbImage& image, MapFilter filter, float sc
   // Repeat the first and the last row.
   std::copy_n(texels_.begin() + stride(), stride(), texels_.begin());
   std::copy_n(texels_.end() - 2 * stride(), stride(), texels_.end() - stride());
+  if (hidden.angle > 0) hide(hidden);
   build_table(compensate);
 }
 
@@ -69,7 +71,7 @@ EnvironmentMap::EnvironmentMap(const EnvironmentMap& a, const EnvironmentMap& b,
     const Texel& p = a.texels_[i];
     const Texel& q = b.texels_[i];
     texels_[i] = {scale * ((1 - t) * p.r + t * q.r), scale * ((1 - t) * p.g + t * q.g),
-                  scale * ((1 - t) * p.b + t * q.b), 0};
+                  scale * ((1 - t) * p.b + t * q.b), std::copysign(0.0f, p.density)};
   }
   build_table(compensate);
 }
@@ -86,6 +88,31 @@ std::size_t EnvironmentMap::cell_row(int row) const {
   return static_cast<std::size_t>(padded_row) * stride() + 1;
 }
 
+void EnvironmentMap::hide(const HiddenCone& cone) {
+  // The middle of a cell, in texels: of a texel, or of the four corners of a dual cell.
+  const double shift_x = filter_ == MapFilter::bilinear ? 1.0 : 0.5;
+  const double shift_y = filter_ == MapFilter::bilinear ? 0.0 : 0.5;
+  const double row_step = std::numbers::pi / height_, column_step = 2 * std::numbers::pi / width_;
+  // No point of a cell is farther from its middle than half its height and half its width.
+  const double reach = cone.angle - 0.5 * (row_step + column_step);
+  if (reach <= 0) return;
+  const double least = std::cos(reach);
+
+  std::vector<double> around(static_cast<std::size_t>(width_));
+  for (std::size_t i = 0; i < around.size(); ++i) {
+    const double longitude = std::numbers::pi - (static_cast<double>(i) + shift_x) * column_step;
+    around[i] = std::sin(longitude) * cone.axis[0] + std::cos(longitude) * cone.axis[2];
+  }
+  for (int r = 0; r < cell_rows(); ++r) {
+    const double polar = (r + shift_y) * row_step;
+    Texel* texel = &texels_[cell_row(r)];
+    for (std::size_t i = 0; i < around.size(); ++i) {
+      if (std::sin(polar) * around[i] + std::cos(polar) * cone.axis[1] >= least)
+        texel[i].density = -0.0f;
+    }
+  }
+}
+
 std::vector<double> EnvironmentMap::row_means(int row) const {
   const Texel* texel = &texels_[cell_row(row)];
   std::vector<double> means(static_cast<std::size_t>(width_) + 1);
@@ -95,7 +122,8 @@ std::vector<double> EnvironmentMap::row_means(int row) const {
 
 double EnvironmentMap::measure_row(int row, const std::vector<double>& means,
                                    const std::vector<double>& means_below) {
-  // A nearest cell is one texel; a bilinear cell has corners in two columns of two rows.
+  // A nearest cell is one texel; a bilinear cell has corners in two columns of two rows. What is
+  // hidden counts as black.
   Texel* texel = &texels_[cell_row(row)];
   double sum = 0;
   const bool nearest = filter_ == MapFilter::nearest;
@@ -103,7 +131,7 @@ double EnvironmentMap::measure_row(int row, const std::vector<double>& means,
     const double mean =
         nearest ? means[i]
                 : 0.25 * ((means[i] + means_below[i]) + (means[i + 1] + means_below[i + 1]));
-    texel[i].density = static_cast<float>(mean);
+    if (!texel[i].is_hidden()) texel[i].density = static_cast<float>(mean);
     sum += texel[i].density;
   }
   return sum;
@@ -153,7 +181,8 @@ void EnvironmentMap::build_table(bool compensate) {
       for (int i = block * kBlock; i < end; ++i) {
         const double weight = texel[i].density - offset;
         const auto density = static_cast<float>(weight * inverse_power);
-        texel[i].density = weight > 0 ? std::max(density, kMinDensity) : 0.0f;
+        texel[i].density =
+            weight > 0 ? std::max(density, kMinDensity) : std::copysign(0.0f, texel[i].density);
         sum += texel[i].density;
       }
       block_cdf[block + 1] = sum;

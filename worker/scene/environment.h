@@ -1,6 +1,8 @@
 #pragma once
 
 #include <array>
+#include <cmath>
+#include <compare>
 #include <cstdint>
 #include <memory>
 #include <utility>
@@ -12,6 +14,14 @@
 
 namespace baton {
 
+/// Directions of a map whose light reaches no surface of a job: those within an angle of an axis.
+struct HiddenCone {
+  std::array<float, 3> axis{0, -1, 0};  ///< unit, in the map's own frame
+  float angle = 0;                      ///< radians, [0, pi / 2); 0: there are none
+
+  auto operator<=>(const HiddenCone&) const = default;
+};
+
 /// A lat-long radiance map with its sampling table, in the map's own frame (no rotation).
 ///
 /// Mapping (OpenEXR's LATLONG): +Y up, the centre of the picture looks along +Z, u = 1/2 - atan2(x,
@@ -22,6 +32,7 @@ namespace baton {
 /// four texel centres (W x (H+1), the first and last row half as high). A cell's probability is
 /// proportional to the mean over RGB and over its four corners of the radiance, times its solid
 /// angle, and the density is constant inside: it is positive wherever the reconstruction is.
+/// Cells that lie in a HiddenCone have density -0: they are seen, and light nothing.
 ///
 /// Texels are stored once, padded by one texel on every side, as {R, G, B, density}: texel (i, j)
 /// at
@@ -32,14 +43,17 @@ class EnvironmentMap {
  public:
   struct Texel {
     float r = 0, g = 0, b = 0, density = 0;
+
+    /// Reaches no surface.
+    bool is_hidden() const { return std::signbit(density); }
   };
 
   /// image: at least 1x1. scale: radiance factor. compensate: the table of MIS compensation, max(0,
   /// L - mean L) [Karlik et al. 2019] (a constant map keeps its plain table). repairs: of what the
   /// image was made from.
   EnvironmentMap(const RgbImage& image, MapFilter filter, float scale, bool compensate,
-                 const TexelRepairs& repairs = {});
-  /// Texels scale ((1 - t) a + t b); a and b of one size and filter. t in [0, 1].
+                 const TexelRepairs& repairs = {}, const HiddenCone& hidden = {});
+  /// Texels scale ((1 - t) a + t b); a and b of one size and filter, with one cone. t in [0, 1].
   EnvironmentMap(const EnvironmentMap& a, const EnvironmentMap& b, float t, float scale,
                  bool compensate);
 
@@ -51,8 +65,8 @@ class EnvironmentMap {
   /// Memory of the texels; the tables are small beside them.
   std::size_t size_bytes() const { return texels_.size() * sizeof(Texel); }
   const TexelRepairs& repairs() const { return repairs_; }
-  /// Integral of the reconstruction over the sphere as the table sees it, mean over RGB; 0 for a
-  /// black map.
+  /// Integral of the reconstruction over what is not hidden, as the table sees it, mean over RGB; 0
+  /// for a black map.
   double total_power() const { return total_power_; }
   bool black() const { return !(total_power_ > 0); }
   /// Radiance and density along unit `w` (map frame).
@@ -67,6 +81,8 @@ class EnvironmentMap {
   double row_angle(int row) const;
   /// Index in texels_ of the texel that owns the first cell of a row.
   std::size_t cell_row(int row) const;
+  /// Marks the cells that lie wholly in the cone.
+  void hide(const HiddenCone& cone);
   /// Mean over RGB of the texels of a row of cells, and of the first one again: (width + 1).
   std::vector<double> row_means(int row) const;
   /// Writes the mean radiance of a row's cells to their densities; returns the sum. means: of the

@@ -68,11 +68,11 @@ ReducedMap reduce_map(const RgbImage& map, int width, float scale) {
 }
 
 EnvironmentMap make_map(const RgbImage& picture, const EnvironmentSpec& environment,
-                        bool compensate) {
+                        bool compensate, const HiddenCone& hidden) {
   if (environment.max_width == 0 || picture.width <= environment.max_width)
-    return {picture, environment.filter, environment.scale, compensate};
+    return {picture, environment.filter, environment.scale, compensate, {}, hidden};
   const ReducedMap reduced = reduce_map(picture, environment.max_width, environment.scale);
-  return {reduced.image, environment.filter, 1, compensate, reduced.repairs};
+  return {reduced.image, environment.filter, 1, compensate, reduced.repairs, hidden};
 }
 
 }  // namespace baton

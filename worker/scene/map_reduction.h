@@ -21,6 +21,6 @@ ReducedMap reduce_map(const RgbImage& map, int width, float scale);
 /// The map of a file's picture as the environment says: scaled, repaired, and reduced to
 /// max_width columns where it has more.
 EnvironmentMap make_map(const RgbImage& picture, const EnvironmentSpec& environment,
-                        bool compensate);
+                        bool compensate, const HiddenCone& hidden = {});
 
 }  // namespace baton

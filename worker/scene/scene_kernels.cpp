@@ -38,6 +38,18 @@ void EvaluateEnvironmentSpans(const EnvironmentView& view, std::span<const float
   }
 }
 
+void SeeEnvironmentSpans(const EnvironmentView& view, std::span<const float> x,
+                         std::span<const float> y, std::span<const float> z, std::span<float> r,
+                         std::span<float> g, std::span<float> b) {
+  for (std::size_t i = 0; i < x.size(); i += hn::Lanes(DF())) {
+    const Vec3Lanes w{LoadSome(x, i), LoadSome(y, i), LoadSome(z, i)};
+    const RadianceLanes light = SeenTexels(view, LocateTexels(view, w));
+    StoreSome(light.r, r, i);
+    StoreSome(light.g, g, i);
+    StoreSome(light.b, b, i);
+  }
+}
+
 void EvaluateBsdfSpans(const SiteBlock& sites, std::span<const std::int32_t> site,
                        std::span<const float> x, std::span<const float> y, std::span<const float> z,
                        std::span<float> r, std::span<float> g, std::span<float> b,
@@ -76,6 +88,7 @@ HWY_AFTER_NAMESPACE();
 namespace baton {
 HWY_EXPORT(DecodeDirections);
 HWY_EXPORT(EvaluateEnvironmentSpans);
+HWY_EXPORT(SeeEnvironmentSpans);
 HWY_EXPORT(EvaluateBsdfSpans);
 HWY_EXPORT(SampleBsdfSpans);
 HWY_EXPORT(TargetName);
@@ -93,6 +106,12 @@ void evaluate_environment(const EnvironmentView& view, std::span<const float> x,
                           std::span<const float> y, std::span<const float> z, std::span<float> r,
                           std::span<float> g, std::span<float> b, std::span<float> density) {
   HWY_DYNAMIC_DISPATCH(EvaluateEnvironmentSpans)(view, x, y, z, r, g, b, density);
+}
+
+void see_environment(const EnvironmentView& view, std::span<const float> x,
+                     std::span<const float> y, std::span<const float> z, std::span<float> r,
+                     std::span<float> g, std::span<float> b) {
+  HWY_DYNAMIC_DISPATCH(SeeEnvironmentSpans)(view, x, y, z, r, g, b);
 }
 
 void evaluate_bsdf(const SiteBlock& sites, std::span<const std::int32_t> site,

@@ -18,10 +18,16 @@ std::string instruction_set();
 void decode_directions(std::span<const OctDirection> code, std::span<float> x, std::span<float> y,
                        std::span<float> z);
 
-/// Radiance and table density (1/sr) along unit world directions; all spans of one length.
+/// Radiance that lights surfaces and table density (1/sr) along unit world directions; all spans of
+/// one length.
 void evaluate_environment(const EnvironmentView& view, std::span<const float> x,
                           std::span<const float> y, std::span<const float> z, std::span<float> r,
                           std::span<float> g, std::span<float> b, std::span<float> density);
+
+/// Radiance that the camera sees, with what is hidden from surfaces.
+void see_environment(const EnvironmentView& view, std::span<const float> x,
+                     std::span<const float> y, std::span<const float> z, std::span<float> r,
+                     std::span<float> g, std::span<float> b);
 
 /// BRDF times cosine (RGB) and density of sample_bsdf for (site, direction) pairs; all spans of one
 /// length.

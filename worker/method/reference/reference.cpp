@@ -13,16 +13,20 @@ constexpr std::int32_t kBatch = 64;
 struct Contribution {
   Rgb value;
   std::int32_t pair = 0;
+  bool is_hidden = false;
 };
 
-/// f cos L / (q_environment + q_bsdf): the balance heuristic with one sample of each kind.
-Rgb weighted_radiance(const SeenSurface& site, const Environment& environment, const Vec3& wi) {
+/// f cos L / (q_environment + q_bsdf): the balance heuristic with one sample of each kind. What
+/// hidden_light.h leaves out is traced, too: a reference tells whether it was hidden.
+Contribution weighted_radiance(const SeenSurface& site, const Environment& environment,
+                               const Vec3& wi) {
   if (!above_horizon(site.point, wi)) return {};
   const EnvironmentMap::Texel light = environment.evaluate(wi);
   const float density = light.density + bsdf_pdf_solid_angle(site.material, site.point, wi);
   if (!(density > 0)) return {};
-  return evaluate_bsdf(site.material, site.point, wi) * Rgb{light.r, light.g, light.b} *
-         (dot(site.point.ns, wi) / density);
+  return {.value = evaluate_bsdf(site.material, site.point, wi) * Rgb{light.r, light.g, light.b} *
+                   (dot(site.point.ns, wi) / density),
+          .is_hidden = light.is_hidden()};
 }
 
 }  // namespace
@@ -56,10 +60,11 @@ ReferenceEstimate ReferenceRenderer::render(std::span<const SurfaceHit> hits,
       const Vec3 origin = hits[s].ray_origin;
       for (const Vec3& wi : {environment.sample({u[1], u[2]}),
                              sample_bsdf(site.material, site.point, {v[0], v[1], v[2]})}) {
-        const Rgb value = weighted_radiance(site, environment, wi);
-        if (!(mean(value) > 0)) continue;
+        Contribution found = weighted_radiance(site, environment, wi);
+        if (!(mean(found.value) > 0)) continue;
+        found.pair = pair;
         rays.push(origin, wi);
-        contributions.push_back({value, pair});
+        contributions.push_back(found);
       }
     }
     geometry_.accel->occluded(rays);
@@ -69,7 +74,7 @@ ReferenceEstimate ReferenceRenderer::render(std::span<const SurfaceHit> hits,
     std::array<double, kBatch> mean_of_pair{};
     for (std::size_t i = 0; i < contributions.size(); ++i) {
       const Contribution& c = contributions[i];
-      sum_lns += mean(c.value);
+      if (!c.is_hidden) sum_lns += mean(c.value);
       if (rays.t_far[i] < 0) continue;
       sum[0] += c.value.x;
       sum[1] += c.value.y;
