@@ -11,10 +11,11 @@
 namespace baton::stability {
 namespace {
 
-/// Light that arrives along one direction: radiance times solid angle.
+/// Light that arrives along one direction: radiance times solid angle; is_hidden: no part of Lns.
 struct Node {
   Vec3 wi;
   Rgb power;
+  bool is_hidden = false;
 };
 
 /// The midpoints of nodes x nodes cells in each texel that are not black, in world space.
@@ -33,7 +34,8 @@ std::vector<Node> light_nodes(const Environment& environment, int nodes) {
                            static_cast<float>(std::sin(polar) * std::cos(longitude))};
       const EnvironmentMap::Texel light = environment.map->evaluate(direction);
       const Rgb power = Rgb{light.r, light.g, light.b} * static_cast<float>(solid_angle);
-      if (mean(power) > 0) list.push_back({environment.rotation * direction, power});
+      if (mean(power) > 0)
+        list.push_back({environment.rotation * direction, power, light.is_hidden()});
     }
   }
   return list;
@@ -52,7 +54,7 @@ void sum_pixel(const FrameGeometry& geometry, const SurfaceHit& hit, const std::
     const double value = mean(evaluate_bsdf(seen.material, seen.point, node.wi) * node.power) *
                          dot(seen.point.ns, node.wi);
     if (!(value > 0)) continue;
-    lns += value;
+    if (!node.is_hidden) lns += value;
     rays.push(origin, node.wi);
     weights.push_back(value);
   }

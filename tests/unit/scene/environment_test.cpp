@@ -146,6 +146,54 @@ TEST(Environment, SamplesFollowTheDensityThatEvaluateReports) {
   }
 }
 
+/// Tilted, and not on a texel's edge.
+const HiddenCone kTiltedCone{.axis = {0.6f, -0.8f, 0}, .angle = 1.0f};
+
+bool is_inside(const HiddenCone& cone, const Vec3& w) {
+  return dot(w, {cone.axis[0], cone.axis[1], cone.axis[2]}) >= std::cos(cone.angle);
+}
+
+TEST(Environment, WhatIsHiddenIsSeenAndNotSampled) {
+  for (const MapFilter filter : kFilters) {
+    for (const bool compensate : {false, true}) {
+      const RgbImage image = random_image(64, 32, 5);
+      const EnvironmentMap plain(image, filter, 1, compensate);
+      const EnvironmentMap map(image, filter, 1, compensate, {}, kTiltedCone);
+      EXPECT_GT(run_chi_square(map, map).p_value, 0.001);
+      EXPECT_LT(run_chi_square(plain, map).p_value, 1e-6);
+      EXPECT_NEAR(sum_of(cell_probabilities(map)), 1, 1e-5);
+      EXPECT_LT(map.total_power(), 0.85 * plain.total_power());
+
+      int hidden = 0, inside = 0;
+      for (std::uint32_t i = 0; i < 20000; ++i) {
+        const auto u = test::test_uniforms(8, i);
+        EXPECT_FALSE(
+            is_inside({kTiltedCone.axis, kTiltedCone.angle - 0.3f}, map.sample({u[0], u[1]})));
+        const float y = 1 - 2 * u[0], r = std::sqrt(1 - y * y), phi = 2 * kPi * u[1];
+        const Vec3 w{r * std::sin(phi), y, r * std::cos(phi)};
+        const EnvironmentMap::Texel light = map.evaluate(w);
+        EXPECT_EQ(light.g, plain.evaluate(w).g);
+        if (light.is_hidden()) {
+          EXPECT_TRUE(is_inside(kTiltedCone, w));
+          EXPECT_EQ(light.density, 0);
+        }
+        hidden += light.is_hidden() ? 1 : 0;
+        inside += is_inside(kTiltedCone, w) ? 1 : 0;
+      }
+      EXPECT_GT(hidden, 0.7 * inside) << "cells at the edge apart, all";
+
+      // A mixture hides the same.
+      const EnvironmentMap other(random_image(64, 32, 6), filter, 1, compensate, {}, kTiltedCone);
+      const EnvironmentMap mixed(map, other, 0.3f, 2, compensate);
+      for (std::uint32_t i = 0; i < 2000; ++i) {
+        const auto u = test::test_uniforms(9, i);
+        const Vec3 w = normalize({u[0] - 0.5f, u[1] - 0.5f, 0.3f});
+        EXPECT_EQ(mixed.evaluate(w).is_hidden(), map.evaluate(w).is_hidden());
+      }
+    }
+  }
+}
+
 TEST(Environment, ChiSquareSeesAWrongTable) {
   RgbImage other = random_image(32, 16, 5);
   for (int i = 0; i < 32; ++i) set_texel(other, i, 8, {6, 6, 6});
