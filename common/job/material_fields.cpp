@@ -47,6 +47,7 @@ void surface_fields(JobArchive& a, MaterialSpec& material) {
   texture_field(a, "emissionTexture", material.emission_texture);
   a.number("alpha", material.alpha, kUnitRange);
   a.number("alphaCutoff", material.alpha_cutoff, kUnitRange);
+  a.boolean("alphaBlend", material.alpha_blend);
 }
 
 }  // namespace

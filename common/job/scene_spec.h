@@ -73,7 +73,8 @@ struct MaterialSpec {
   Rgb emission{0, 0, 0};  ///< radiance that the camera sees; it lights nothing
   std::optional<TextureSpec> emission_texture{};  ///< on emission
   float alpha = 1;                                ///< [0, 1]
-  float alpha_cutoff = 0;  ///< where alpha is below, there is no surface; [0, 1]
+  float alpha_cutoff = 0;    ///< where alpha is below, there is no surface; [0, 1]
+  bool alpha_blend = false;  ///< where there is, the share 1 - alpha of all rays passes
 
   bool operator==(const MaterialSpec&) const = default;
 };

@@ -90,7 +90,8 @@ float nearly_largest(std::vector<float> values) {
 Display display_numbers(RgbImage image, bool is_share, const DisplayOptions& options) {
   const auto [smallest, largest] = range_of(image.rgb);
   const float most = is_share ? std::max(largest, 1.0f) : nearly_largest(image.rgb);
-  const auto [black, white] = options.range.value_or(std::pair{std::min(smallest, 0.0f), most});
+  const float least = smallest < -1e-6f * most ? smallest : 0;  // but for what is rounded
+  const auto [black, white] = options.range.value_or(std::pair{least, most});
   for (float& v : image.rgb) v = std::isfinite(v) ? light_of((v - black) / (white - black)) : 0;
   return {std::move(image), fmt::format("{:.4g} (black) to {:.4g} (white)", black, white)};
 }

@@ -40,7 +40,8 @@ json numbers(const Vec3& v) { return {v.x, v.y, v.z}; }
 /// A material that both renderers have: Lambert's, or GGX without Fresnel's term.
 Result<json> material(const std::string& name, const MaterialSpec& spec) {
   const std::string place = "scene.materials." + name;
-  if (!textures_of(spec).empty() || spec.alpha_cutoff > 0 || spec.emission != Rgb{})
+  if (!textures_of(spec).empty() || spec.alpha_cutoff > 0 || spec.alpha_blend ||
+      spec.emission != Rgb{})
     return refusal(place + ": textures, holes and emission are not compared");
   if (spec.kind == MaterialKind::diffuse)
     return json{{"type", "diffuse"}, {"color", numbers(spec.base_color)}};

@@ -109,5 +109,21 @@ TEST(Textures, MovingSurfacesAgreeWithBruteForce) {
   }
 }
 
+// A pane through which some of the light and of the sight passes, in motion and at rest.
+TEST(Textures, BlendedSurfacesAgreeWithBruteForce) {
+  for (const Method method : {Method::mis, Method::pool, Method::sequential}) {
+    for (const bool moves : {false, true}) {
+      JobSpec job = textured_job(method);
+      job.scene.materials["glossy"].alpha_cutoff = 0;
+      job.scene.materials["glossy"].alpha_blend = true;
+      job.scene.materials["glossy"].alpha = 0.7f;
+      job.frames = frame_numbers(3);
+      job.sampling.num_candidates = 256;
+      if (moves) test::set_in_motion(job, true, true);
+      expect_agreement(job, 2 * kRuns, 0.03);
+    }
+  }
+}
+
 }  // namespace
 }  // namespace baton

@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""With state.carry off every pixel of every frame starts with SIR; with it on none does after the first frame."""
+"""With state.carry off every pixel of every frame starts with SIR; with it on none does after the first frame, but for the
+few pixels that look down and hardly see light: all of their samples may end without any."""
 
 import json
 
@@ -35,9 +36,11 @@ def carry_on_starts_none(programs, folder):
     summary, surfaces, red, green = render(programs, folder, carry=True)
     num_surfaces = sum(surfaces)
     check_equal(summary["stats"]["pixelsFresh"], num_surfaces, "fresh pixels: those of frame 1")
-    check_equal(summary["stats"]["pixelsCarried"], num_surfaces, "carried pixels: those of frame 2")
-    check_equal(summary["stats"]["pixelsRestarted"], 0, "restarted pixels")
-    check_equal(count(surfaces, red, green, (0, 1)), num_surfaces, "green pixels of frame 2")
+    restarted = summary["stats"]["pixelsRestarted"]
+    check(restarted <= 0.001 * num_surfaces, f"{restarted} restarted pixels")
+    check_equal(summary["stats"]["pixelsCarried"], num_surfaces - restarted, "carried pixels: those of frame 2")
+    check_equal(count(surfaces, red, green, (0, 1)), num_surfaces - restarted, "green pixels of frame 2")
+    check_equal(count(surfaces, red, green, (1, 1)), restarted, "yellow pixels of frame 2")
 
 
 if __name__ == "__main__":

@@ -39,6 +39,8 @@ struct ShadowRays {
   std::vector<float> t_near, t_far;  ///< t_far < 0 after tracing: occluded
 
   std::size_t size() const { return count_; }
+  Vec3 origin(std::size_t i) const { return {origin_x[i], origin_y[i], origin_z[i]}; }
+  Vec3 direction(std::size_t i) const { return {direction_x[i], direction_y[i], direction_z[i]}; }
   void clear() {
     count_ = 0;
     for (auto* column : {&origin_x, &origin_y, &origin_z, &direction_x, &direction_y, &direction_z})

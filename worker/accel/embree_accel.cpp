@@ -11,6 +11,7 @@
 #include "common/base/check.h"
 #include "worker/accel/accel.h"
 #include "worker/accel/allocation_count.h"
+#include "worker/accel/cut_outs.h"
 
 namespace baton {
 namespace {
@@ -36,25 +37,6 @@ void fill_buffer(RTCGeometry geometry, RTCBufferType type, RTCFormat format,
                  const std::vector<T>& elements) {
   void* buffer = rtcSetNewGeometryBuffer(geometry, type, 0, format, sizeof(T), elements.size());
   if (buffer != nullptr) std::memcpy(buffer, elements.data(), elements.size() * sizeof(T));
-}
-
-/// Lets rays pass where a cut-out surface is not there; for hits to count and for shadows alike.
-/// geometryUserPtr: the Scene.
-void pass_through_holes(const RTCFilterFunctionNArguments* args) {
-  const auto& scene = *static_cast<const Scene*>(args->geometryUserPtr);
-  for (unsigned i = 0; i < args->N; ++i) {
-    if (args->valid[i] == 0) continue;
-    // Meshes with a hierarchy of their own are placed as the instance of that number.
-    const unsigned placed = RTCHitN_instID(args->hit, args->N, i, 0);
-    const Instance& instance =
-        scene.instances[placed != RTC_INVALID_GEOMETRY_ID ? placed
-                                                          : RTCHitN_geomID(args->hit, args->N, i)];
-    const auto& detail = scene.material_of(instance).detail;
-    if (detail == nullptr || !detail->is_cut_out()) continue;
-    if (is_cut_away(scene, instance, RTCHitN_primID(args->hit, args->N, i),
-                    RTCHitN_u(args->hit, args->N, i), RTCHitN_v(args->hit, args->N, i)))
-      args->valid[i] = 0;
-  }
 }
 
 /// Attaches the triangles of a mesh, moved by `to_target`, as geometry `index`. holes: the scene if
@@ -99,6 +81,7 @@ struct SharedGeometry {
   /// By index of the mesh, in its own space: those that move, or that are in too many places.
   std::map<std::uint32_t, Owned<RTCScene>> own_meshes;
   bool any_moves = false;
+  bool any_blends = false;  ///< rays need their bits
 
   Owned<RTCScene> new_scene() const {
     Owned<RTCScene> scene(rtcNewScene(device.get()));
@@ -174,6 +157,9 @@ class EmbreeAccel final : public Accel {
     BATON_CHECK(rays.size() <= std::numeric_limits<unsigned>::max());
     RTCIntersectContext context;
     rtcInitIntersectContext(&context);
+    std::vector<unsigned> bits(geometry_->any_blends ? rays.size() : 0);
+    for (std::size_t i = 0; i < bits.size(); ++i)
+      bits[i] = ray_bits(rays.origin(i), rays.direction(i));
     const RTCRayNp stream{.org_x = rays.origin_x.data(),
                           .org_y = rays.origin_y.data(),
                           .org_z = rays.origin_z.data(),
@@ -184,7 +170,7 @@ class EmbreeAccel final : public Accel {
                           .time = nullptr,
                           .tfar = rays.t_far.data(),
                           .mask = nullptr,
-                          .id = nullptr,
+                          .id = bits.empty() ? nullptr : bits.data(),
                           .flags = nullptr};
     const auto count = static_cast<unsigned>(rays.size());
     rtcOccludedNp(geometry_->still.get(), &context, &stream, count);
@@ -208,6 +194,10 @@ class EmbreeAccel final : public Accel {
   }
 
  private:
+  std::uint32_t bits_of(const Ray& ray) const {
+    return geometry_->any_blends ? ray_bits(ray.origin, ray.direction) : 0;
+  }
+
   SurfaceHit intersect_one(const Ray& ray, RTCIntersectContext& context) const {
     RTCRayHit query{};
     query.ray = {.org_x = ray.origin.x,
@@ -220,7 +210,7 @@ class EmbreeAccel final : public Accel {
                  .time = 0,
                  .tfar = std::numeric_limits<float>::infinity(),
                  .mask = ~0u,
-                 .id = 0,
+                 .id = bits_of(ray),
                  .flags = 0};
     query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
     query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
@@ -246,6 +236,7 @@ class EmbreeAccel final : public Accel {
       query.ray.dir_z[k] = rays[k].direction.z;
       query.ray.tfar[k] = std::numeric_limits<float>::infinity();
       query.ray.mask[k] = ~0u;
+      query.ray.id[k] = bits_of(rays[k]);
       query.hit.geomID[k] = RTC_INVALID_GEOMETRY_ID;
       query.hit.instID[0][k] = RTC_INVALID_GEOMETRY_ID;
     }
@@ -322,16 +313,6 @@ std::set<std::uint32_t> shared_meshes(const Scene& scene, std::uint64_t max_copi
   return copied > max_copied_triangles ? repeated : std::set<std::uint32_t>{};
 }
 
-/// Meshes that are cut out, somewhere at least.
-std::set<std::uint32_t> meshes_with_holes(const Scene& scene) {
-  std::set<std::uint32_t> meshes;
-  for (const Instance& instance : scene.instances) {
-    const auto& detail = scene.material_of(instance).detail;
-    if (detail != nullptr && detail->is_cut_out()) meshes.insert(instance.mesh);
-  }
-  return meshes;
-}
-
 }  // namespace
 
 Result<std::unique_ptr<Accel>> Accel::build(const Scene& scene, const AccelLimits& limits) {
@@ -353,6 +334,7 @@ Result<std::unique_ptr<Accel>> Accel::build(const Scene& scene, const AccelLimit
 
   // What stands still, in world space; each mesh that moves, in its own.
   geometry->still = geometry->new_scene();
+  geometry->any_blends = any_blends(scene);
   const std::set<std::uint32_t> shared = shared_meshes(scene, limits.max_copied_triangles);
   const std::set<std::uint32_t> with_holes = meshes_with_holes(scene);
   for (unsigned i = 0; i < scene.instances.size(); ++i) {

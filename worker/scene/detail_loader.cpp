@@ -28,7 +28,8 @@ PlacedTexture placed_texture(const TextureSpec& spec, std::shared_ptr<const Text
 
 bool has_detail(const MaterialSpec& spec) {
   return spec.kind != MaterialKind::measured &&
-         (!textures_of(spec).empty() || !(spec.emission == Rgb{}) || spec.alpha_cutoff > 0);
+         (!textures_of(spec).empty() || !(spec.emission == Rgb{}) ||
+          SurfaceDetail{spec}.is_cut_out());
 }
 
 }  // namespace

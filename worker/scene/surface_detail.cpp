@@ -148,13 +148,13 @@ SeenSurface see_detail(const Scene& scene, const Instance& instance, const Surfa
   return seen;
 }
 
-bool is_cut_away(const Scene& scene, const Instance& instance, std::uint32_t triangle, float u,
-                 float v) {
+bool is_cut_away(const Scene& scene, const Instance& instance, const SurfacePlace& place,
+                 float draw) {
   const SurfaceDetail& detail = *scene.material_of(instance).detail;
   float alpha = detail.spec.alpha;
   if (detail.color.texture != nullptr && detail.color.texture->has_alpha())
-    alpha *= Patch(scene, instance, {triangle, u, v}).look_up(detail.color)[3];
-  return alpha < detail.spec.alpha_cutoff;
+    alpha *= Patch(scene, instance, place).look_up(detail.color)[3];
+  return alpha < std::max(detail.spec.alpha_cutoff, detail.spec.alpha_blend ? draw : 0.0f);
 }
 
 // With N' = x X + z ng in the plane of both normals, the mirror image's height

@@ -24,7 +24,8 @@ struct SurfaceDetail {
   MaterialSpec spec;  ///< the numbers: factors of the textures
   PlacedTexture color{}, metallic_roughness{}, normal{}, emission{};
 
-  bool is_cut_out() const { return spec.alpha_cutoff > 0; }
+  /// Not every ray that meets the surface stops there.
+  bool is_cut_out() const { return spec.alpha_cutoff > 0 || spec.alpha_blend; }
 };
 
 /// Where on a mesh a surface was hit.
@@ -50,10 +51,12 @@ struct SeenSurface {
 SeenSurface see_detail(const Scene& scene, const Instance& instance, const SurfacePlace& place,
                        const ShadingPoint& point);
 
-/// Whether the instance, whose material has detail, has no surface there: its alpha, blended in the
-/// image of full size, is below the cut-off.
-bool is_cut_away(const Scene& scene, const Instance& instance, std::uint32_t triangle, float u,
-                 float v);
+/// Whether a ray passes the instance, whose material is cut out, at that place: its alpha, blended
+/// in the image of full size, is below the cut-off, or where the surface blends below `draw`. A
+/// ray's draw, uniform in (0, 1], differs from surface to surface: the share 1 - alpha of all rays
+/// passes, and each wholly or not at all.
+bool is_cut_away(const Scene& scene, const Instance& instance, const SurfacePlace& place,
+                 float draw);
 
 /// `normal`, turned towards ng until wo's mirror image about it is above the surface: as shallow as
 /// 0.01, or as nine tenths of wo. All unit; dot(ng, wo) >= 0.

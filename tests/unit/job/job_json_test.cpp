@@ -231,7 +231,7 @@ TEST(JobJson, ChecksTheSceneByName) {
       "ground": {"size": 0}}})";
   EXPECT_EQ(faults_of(scene),
             "job.json: $.scene.materials.blue.kd: unknown key; there is type, color, colorTexture, "
-            "normalTexture, emission, emissionTexture, alpha, alphaCutoff\n"
+            "normalTexture, emission, emissionTexture, alpha, alphaCutoff, alphaBlend\n"
             "job.json: $.scene.materials.red.ks: expected kd + ks <= 1, or the material makes "
             "light, got 1.3\n"
             "job.json: $.scene.materials.x.type: expected a value, got none\n"

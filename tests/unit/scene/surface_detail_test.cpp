@@ -166,7 +166,8 @@ TEST(SurfaceDetail, NothingIsThereBelowTheCutOff) {
   spec.color_texture = TextureSpec{.file = file, .filter = TextureFilter::nearest};
   const Scene scene = scene_of(spec);
   const auto is_away = [](const Scene& s, float x, float y) {
-    return is_cut_away(s, s.instances[0], x > y ? 0 : 1, x > y ? x - y : x, x > y ? y : y - x);
+    const SurfacePlace place{x > y ? 0u : 1u, x > y ? x - y : x, x > y ? y : y - x};
+    return is_cut_away(s, s.instances[0], place, 0.9f);
   };
   EXPECT_FALSE(is_away(scene, 0.3f, 0.2f));
   EXPECT_TRUE(is_away(scene, 0.8f, 0.2f));

@@ -13,8 +13,6 @@ namespace {
 /// What the schema of jobs takes.
 constexpr double kLeastRoughness = 0.02;
 constexpr float kMirrorIor = 100;
-/// What is seen through is not shown; such as leaves are cut out.
-constexpr double kBlendCutoff = 0.5;
 
 }  // namespace
 
@@ -77,12 +75,12 @@ MaterialSpec material_spec(const Document& document, int material) {
   spec.emission = rgb(given.emission);
   if (!(spec.emission == Rgb{}))
     spec.emission_texture = texture_spec(document, given.emissive_texture);
-  if (given.alpha_mode != AlphaMode::opaque) {
-    const bool is_blend = given.alpha_mode == AlphaMode::blend;
-    const double cutoff = is_blend ? kBlendCutoff : given.alpha_cutoff;
+  if (given.alpha_mode != AlphaMode::opaque) spec.alpha = static_cast<float>(given.base_color[3]);
+  spec.alpha_blend = given.alpha_mode == AlphaMode::blend;
+  if (given.alpha_mode == AlphaMode::mask) {
     // No alpha is above 1.
-    spec.alpha = cutoff > 1 ? 0.0f : static_cast<float>(given.base_color[3]);
-    spec.alpha_cutoff = static_cast<float>(std::min(cutoff, 1.0));
+    if (given.alpha_cutoff > 1) spec.alpha = 0;
+    spec.alpha_cutoff = static_cast<float>(std::min(given.alpha_cutoff, 1.0));
   }
   return spec;
 }
@@ -90,10 +88,6 @@ MaterialSpec material_spec(const Document& document, int material) {
 std::vector<std::string> unsupported_parts(const Document& document, const Material& material) {
   std::vector<std::string> parts;
   if (material.emission != std::array<double, 3>{}) parts.push_back("it glows, but lights nothing");
-  if (material.alpha_mode == AlphaMode::blend)
-    parts.push_back(
-        "it is not seen through: where its alpha is below 0.5 there is nothing, "
-        "elsewhere it is opaque");
   if (material.specular_textured) parts.push_back("its textures of `specular` are not read");
   for (const TextureInfo* info :
        {&material.base_color_texture, &material.metallic_roughness_texture,

@@ -12,7 +12,6 @@ WITH_NEUTRAL = {"Subsurface Radius", "Subsurface Color", "Subsurface IOR", "Subs
                 "Emission Strength", "Weight"}
 BAKE = "bake it into an image (Render Properties > Bake)"
 FILES = {"PNG", "JPEG"}  # other images become PNG
-CUT = 0.5
 
 
 class Materials:
@@ -185,9 +184,7 @@ class Surface:
         if given is not None:
             self.check_input(socket, {"MATH"})
         if method == "OPAQUE":
-            self.add("its alpha is not read, as its blend mode is Opaque", "set Blend Mode to Alpha Clip")
-        elif method != "CLIP":
-            self.add(f"nothing is seen through: holes where alpha is below {CUT}", "set Blend Mode to Alpha Clip")
+            self.add("its alpha is not read, as its blend mode is Opaque", "set another Blend Mode")
 
 
 def is_product(mix):
