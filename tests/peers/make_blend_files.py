@@ -3,7 +3,8 @@
 blender -b --factory-startup -P make_blend_files.py -- FOLDER
 
 turntable.blend: a turning parent with a figure, a textured box and instances; shift, depth of field, a packed map.
-keyed_camera.blend: a camera on a turning arm, with a Track To constraint, keyed focal length, a border; a tilted map.
+keyed_camera.blend: a camera on a turning arm, with a Track To constraint, keyed focal length, a border; a tilted
+map, a pane that blends.
 hdr_sequence.blend: an image sequence with an offset, a turning and brightening world; an orthographic camera.
 The maps come with Blender. Surfaces are diffuse or metal, where Cycles and Baton model the same.
 """
@@ -199,6 +200,11 @@ def make_keyed_camera(folder):
     driver.expression = "frame * 0.05"
     bpy.ops.mesh.primitive_cube_add(size=0.9)
     shape("box", diffuse("chart", (1, 1, 1), chart()), (-1.3, 0.5, 0.45))
+    # A pane that lets more than half of the light pass.
+    bpy.ops.mesh.primitive_plane_add(size=1.2, rotation=(math.radians(80), 0, math.radians(30)))
+    pane = shape("pane", metal("gauze", (0.9, 0.8, 0.6), 0.5), (1.1, -0.4, 0.7))
+    pane.active_material.blend_method = "BLEND"
+    pane.active_material.node_tree.nodes["Principled BSDF"].inputs["Alpha"].default_value = 0.4
 
     arm = empty("arm")
     for frame, turned in ((11, -30), (34, 50)):
