@@ -139,6 +139,7 @@ std::vector<std::string> asset_paths(const JobSpec& job) {
   }
   for (const FileSpec& file : job.scene.files) paths.insert(file.path);
   for (const EnvironmentKey& key : job.environment.keys) paths.insert(key.map);
+  if (const std::string& map = job.environment.camera_map.file; !map.empty()) paths.insert(map);
   return {paths.begin(), paths.end()};
 }
 

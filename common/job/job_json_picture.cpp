@@ -80,6 +80,7 @@ Facts picture_facts(const JobSpec& job, const std::vector<AssetDigest>& assets) 
   if (carries_state(job)) facts.emplace(kFirstFrame, std::to_string(job.frames.front()));
   std::set<std::string> maps;
   for (const EnvironmentKey& key : job.environment.keys) maps.insert(key.map);
+  maps.erase(job.environment.camera_map.file);  // which all frames show
   for (const AssetDigest& asset : assets) {
     if (!maps.contains(asset.path)) facts.emplace(asset.path, asset.digest.hex());
   }

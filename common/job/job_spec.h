@@ -124,6 +124,14 @@ struct NumberKey {
 
 /// Numbered frames are keys at every frame with `interpolate` false: the last key at or before the
 /// frame holds.
+/// A map that the camera sees and that lights nothing.
+struct CameraMapSpec {
+  std::string file{};  ///< lat-long .exr or .hdr; empty: the camera sees the map that lights
+  float scale = 1;     ///< radiance factor, (0, inf)
+
+  bool operator==(const CameraMapSpec&) const = default;
+};
+
 struct EnvironmentSpec {
   std::vector<EnvironmentKey> keys;  ///< sorted by frame, at least one
   bool interpolate = true;
@@ -137,6 +145,7 @@ struct EnvironmentSpec {
   double rotation_start_deg = 0;  ///< at that frame, whichever frames the job has
   double rotation_deg_per_frame = 0;
   std::vector<NumberKey> rotation_keys{};  ///< degrees, instead of the two; ascending frames
+  CameraMapSpec camera_map{};              ///< turned like the others
 
   bool operator==(const EnvironmentSpec&) const = default;
 };

@@ -86,13 +86,18 @@ void fields(JobArchive& a, MaterialSpec& material) {
   }
 }
 
-std::vector<const TextureSpec*> textures_of(const MaterialSpec& material) {
-  std::vector<const TextureSpec*> textures;
-  for (const auto* texture : {&material.color_texture, &material.metallic_roughness_texture,
-                              &material.normal_texture, &material.emission_texture}) {
+std::vector<TextureSpec*> textures_of(MaterialSpec& material) {
+  std::vector<TextureSpec*> textures;
+  for (auto* texture : {&material.color_texture, &material.metallic_roughness_texture,
+                        &material.normal_texture, &material.emission_texture}) {
     if (texture->has_value()) textures.push_back(&**texture);
   }
   return textures;
+}
+
+std::vector<const TextureSpec*> textures_of(const MaterialSpec& material) {
+  const auto textures = textures_of(const_cast<MaterialSpec&>(material));
+  return {textures.begin(), textures.end()};
 }
 
 }  // namespace baton

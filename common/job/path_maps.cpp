@@ -54,13 +54,17 @@ JobSpec map_paths(JobSpec job, const PathMaps& maps) {
   map(job.output.directory);
   if (job.camera.gltf) map(job.camera.gltf->file);
   if (job.scene.gltf) map(job.scene.gltf->file);
-  for (auto& [name, material] : job.scene.materials) map(material.file);
+  for (auto& [name, material] : job.scene.materials) {
+    map(material.file);
+    for (TextureSpec* const texture : textures_of(material)) map(texture->file);
+  }
   for (auto& [name, mesh] : job.scene.meshes) map(mesh.path);
   for (FileSpec& file : job.scene.files) map(file.path);
   for (ObjectSpec& object : job.scene.objects) {
     if (object.gltf) map(object.gltf->file);
   }
   for (EnvironmentKey& key : job.environment.keys) map(key.map);
+  map(job.environment.camera_map.file);
   return job;
 }
 

@@ -218,6 +218,13 @@ void fields(JobArchive& a, EnvironmentSpec& environment, const std::vector<int>&
     if (!environment.rotation_keys.empty() && turns)
       a.fault("keys", "either keys or startDeg and degPerFrame", "both");
   });
+  CameraMapSpec& camera_map = environment.camera_map;
+  a.object("cameraMap",
+           [&] {
+             asset_path(a, required("file"), camera_map.file, {".exr", ".hdr"});
+             a.number("scale", camera_map.scale, kPositiveRange);
+           },
+           {.shorthand = "file", .present = !camera_map.file.empty()});
 }
 
 }  // namespace baton

@@ -81,6 +81,7 @@ struct MaterialSpec {
 
 /// Those that a material has.
 std::vector<const TextureSpec*> textures_of(const MaterialSpec& material);
+std::vector<TextureSpec*> textures_of(MaterialSpec& material);
 
 /// Whether a file name ends in .gltf or .glb.
 bool is_gltf(const std::string& path);

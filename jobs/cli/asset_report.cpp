@@ -63,6 +63,13 @@ void load_maps(const EnvironmentSpec& environment, AssetReport& report,
   }
 }
 
+/// A map that the camera sees can be read; nothing else is asked of it.
+void load_camera_map(const EnvironmentSpec& environment, std::vector<std::string>& faults) {
+  const std::string& file = environment.camera_map.file;
+  if (file.empty()) return;
+  if (const auto image = read_rgb_image(file); !image) faults.push_back(image.error().message);
+}
+
 void load_geometry(const JobSpec& job, AssetReport& report, std::vector<std::string>& faults) {
   const Result<Scene> scene = load_scene(job);
   if (!scene) return faults.push_back(scene.error().message);
@@ -84,6 +91,7 @@ Result<AssetReport> load_assets(const JobSpec& job) {
   std::vector<std::string> faults;
   load_geometry(job, report, faults);
   load_maps(job.environment, report, faults);
+  load_camera_map(job.environment, faults);
   if (!faults.empty())
     return Error{ErrorKind::bad_input, fmt::format("{}", fmt::join(faults, "\n"))};
   return report;

@@ -86,6 +86,7 @@ class Draw(Motion, Textures):
             # Given elsewhere.
             "$schema": lambda: self.pick(None, None, "job.schema.json"), "name": self.name, "frames": self.frames, "scene": nothing, "camera": nothing,
             "environment.map": nothing, "environment.frames": nothing, "environment.keys": nothing,
+            "environment.cameraMap.file": self.camera_map,
             "sampling.byMaterial": nothing, "scene.meshes": nothing, "scene.materials": nothing,
             "scene.objects": nothing, "scene.ground": nothing, "scene.gltf": nothing, "scene.files": nothing,
             "camera.node": nothing, "scene.gltf.file": lambda: "set.glb",
@@ -277,6 +278,10 @@ class Draw(Motion, Textures):
         else:
             frames = self.key_frames()
             environment["keys"] = [{"frame": f, "map": add(f"map{i}{ending}")} for i, f in enumerate(frames)]
+
+    def camera_map(self):
+        self.files["seen.exr"] = {"kind": "dots", "width": 8, "height": 4, "seed": 1, "count": 3, "level": 2.0}
+        return "seen.exr"
 
     def by_material(self, job):
         """Settings of single materials, where the method allows them; names are known only now."""

@@ -51,6 +51,7 @@ def a_worker_without_the_store_ends(programs, folder):
         check_equal(worker.wait(), IO, "exit code")
         check_equal(worker.log().count(UNSEEN), 1, worker.log())
         check(not list((folder / "empty").iterdir()), "no second store is made")
+        wait_until(lambda: farm.coordinator.log().count(" left") == 1, "it says goodbye")
 
 
 if __name__ == "__main__":

@@ -104,7 +104,7 @@ void write_pixels(const SecondPassWork& work, std::span<const Rgb> radiance, Fil
       const std::size_t pixel = PixelMask::index(work.rect, x, y);
       const std::int32_t position = work.surfaces.find(work.masks.any.index(x, y));
       Rgb value = radiance[pixel] + work.surfaces.emission(position);
-      if (show_environment) value += work.surfaces.background(position, work.light.now);
+      if (show_environment) value += work.surfaces.background(position, work.light.seen);
       film.plane(0)[pixel] = value.x;
       film.plane(1)[pixel] = value.y;
       film.plane(2)[pixel] = value.z;

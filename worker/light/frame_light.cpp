@@ -46,10 +46,11 @@ std::optional<Mat3> turn_between(const Environment& before, const Environment& n
 }
 
 LightSequence::LightSequence(const JobSpec& job, std::shared_ptr<MapCache> maps,
-                             const MemorySharePtr& share, const HiddenCone& hidden)
+                             const MemorySharePtr& share, std::shared_ptr<const HiddenLight> hidden)
     : job_(job),
       maps_(std::move(maps)),
-      hidden_(hidden),
+      hidden_(std::move(hidden)),
+      cones_(static_cast<std::size_t>(num_steps(job))),
       frames_(expand_sequence(job)),
       mixed_maps_(
           share, [](const EnvironmentMap& map) { return map.size_bytes(); }, frames_in_hand(job)),
@@ -57,10 +58,11 @@ LightSequence::LightSequence(const JobSpec& job, std::shared_ptr<MapCache> maps,
           share, [](const PresampledLight& light) { return light.size_bytes(); },
           frames_in_hand(job) * (static_cast<std::size_t>(job.quality.rounds) + 1)) {}
 
-Result<std::shared_ptr<const EnvironmentMap>> LightSequence::key_map(std::int32_t key) {
+Result<std::shared_ptr<const EnvironmentMap>> LightSequence::key_map(std::int32_t key,
+                                                                     const HiddenCone& hidden) {
   const std::string& path = job_.environment.keys[static_cast<std::size_t>(key)].map;
   BATON_ASSIGN(const auto map,
-               maps_->get(path, job_.environment, job_.sampling.mis_compensation, hidden_));
+               maps_->get(path, job_.environment, job_.sampling.mis_compensation, hidden));
   if (const auto& repairs = map->repairs(); repairs.total() > 0) {
     const std::string note = fmt::format("{}: {} negative, {} NaN, {} infinite texels set to 0",
                                          path, repairs.negative, repairs.nan, repairs.infinite);
@@ -72,15 +74,15 @@ Result<std::shared_ptr<const EnvironmentMap>> LightSequence::key_map(std::int32_
 }
 
 Result<std::shared_ptr<const EnvironmentMap>> LightSequence::mixed_map(
-    const EnvironmentFrame& frame) {
-  if (frame.mix <= 0 && frame.scale == 1) return key_map(frame.map_a);
+    const EnvironmentFrame& frame, const HiddenCone& hidden) {
+  if (frame.mix <= 0 && frame.scale == 1) return key_map(frame.map_a, hidden);
   const auto first = std::find_if(frames_.begin(), frames_.end(), [&](const FrameSpec& f) {
     return f.environment.same_texels(frame);
   });
-  const auto name = static_cast<std::int32_t>(first - frames_.begin());
+  const std::pair name(static_cast<std::int32_t>(first - frames_.begin()), hidden);
   if (auto found = mixed_maps_.find(name)) return found;
-  BATON_ASSIGN(const auto a, key_map(frame.map_a));
-  BATON_ASSIGN(const auto b, key_map(frame.map_b));
+  BATON_ASSIGN(const auto a, key_map(frame.map_a, hidden));
+  BATON_ASSIGN(const auto b, key_map(frame.map_b, hidden));
   if (a->width() != b->width() || a->height() != b->height()) {
     return Error{
         ErrorKind::bad_input,
@@ -94,9 +96,25 @@ Result<std::shared_ptr<const EnvironmentMap>> LightSequence::mixed_map(
                                                                    job_.sampling.mis_compensation));
 }
 
-Result<Environment> LightSequence::environment(const EnvironmentFrame& frame) {
-  BATON_ASSIGN(auto map, mixed_map(frame));
-  return Environment{std::move(map), frame.rotation};
+HiddenCone LightSequence::hidden_in(const FrameSpec& frame) {
+  if (hidden_ == nullptr) return {};
+  std::optional<HiddenCone>& cone = cones_[static_cast<std::size_t>(frame.index)];
+  if (!cone) cone = hidden_->at(frame.number);
+  return *cone;
+}
+
+Result<Environment> LightSequence::environment(const FrameSpec& frame) {
+  BATON_ASSIGN(auto map, mixed_map(frame.environment, hidden_in(frame)));
+  return Environment{std::move(map), frame.environment.rotation};
+}
+
+Result<Environment> LightSequence::seen_environment(const Environment& now) {
+  const CameraMapSpec& camera_map = job_.environment.camera_map;
+  if (camera_map.file.empty()) return now;
+  const EnvironmentSpec as_is{
+      .keys = {}, .filter = job_.environment.filter, .scale = camera_map.scale};
+  BATON_ASSIGN(auto map, maps_->get(camera_map.file, as_is, false));
+  return Environment{std::move(map), now.rotation};
 }
 
 Result<std::shared_ptr<const FrameLight>> LightSequence::at(std::int32_t index,
@@ -106,9 +124,11 @@ Result<std::shared_ptr<const FrameLight>> LightSequence::at(std::int32_t index,
   const FrameSpec& frame_before =
       frames_[static_cast<std::size_t>(round == 0 ? std::max(index - 1, 0) : index)];
   auto light = std::make_shared<FrameLight>();
-  BATON_ASSIGN(light->now, environment(frame.environment));
-  BATON_ASSIGN(light->before, environment(frame_before.environment));
-  light->still = round == 0 && frame.environment == frame_before.environment;
+  BATON_ASSIGN(light->now, environment(frame));
+  BATON_ASSIGN(light->before, environment(frame_before));
+  BATON_ASSIGN(light->seen, seen_environment(light->now));
+  light->still = round == 0 && frame.environment == frame_before.environment &&
+                 hidden_in(frame) == hidden_in(frame_before);
   if (has_catcher(job_)) light->catcher = catcher_albedo(frame.environment, light->now);
   if (frame.environment.same_texels(frame_before.environment))
     light->turn = turn_between(light->before, light->now);

@@ -12,12 +12,14 @@
 #include "worker/light/map_cache.h"
 #include "worker/light/presampled_light.h"
 #include "worker/scene/environment.h"
+#include "worker/scene/hidden_light.h"
 
 namespace baton {
 
 /// The light of one round of a frame, ready for its pixels.
 struct FrameLight {
   Environment now;
+  Environment seen{};  ///< by the camera, where it sees no surface
   /// The frame before; for the first frame, and for its later rounds, the same as now.
   Environment before;
   /// now shows what before showed: the same texels, turned alike. Not in later rounds: they must
@@ -48,9 +50,9 @@ inline constexpr std::int32_t kProbeRound = 1 << 30;
 class LightSequence {
  public:
   /// job must outlive the object. maps: may be shared with other jobs. share: of what it makes.
-  /// hidden: see hidden_light.h.
+  /// hidden: what lights no surface; null: nothing.
   LightSequence(const JobSpec& job, std::shared_ptr<MapCache> maps, const MemorySharePtr& share,
-                const HiddenCone& hidden = {});
+                std::shared_ptr<const HiddenLight> hidden = nullptr);
 
   /// The light of frame `index` (0-based) in a round; negative: before those that are seen; or of
   /// kProbeRound. Errors: a map that cannot be read, or two key frames of different size.
@@ -62,17 +64,21 @@ class LightSequence {
 
  private:
   Rgb catcher_albedo(const EnvironmentFrame& frame, const Environment& now);
-  Result<std::shared_ptr<const EnvironmentMap>> key_map(std::int32_t key);
-  Result<std::shared_ptr<const EnvironmentMap>> mixed_map(const EnvironmentFrame& frame);
-  Result<Environment> environment(const EnvironmentFrame& frame);
+  Result<std::shared_ptr<const EnvironmentMap>> key_map(std::int32_t key, const HiddenCone& hidden);
+  Result<std::shared_ptr<const EnvironmentMap>> mixed_map(const EnvironmentFrame& frame,
+                                                          const HiddenCone& hidden);
+  HiddenCone hidden_in(const FrameSpec& frame);
+  Result<Environment> environment(const FrameSpec& frame);
+  Result<Environment> seen_environment(const Environment& now);
 
   const JobSpec& job_;
   const std::shared_ptr<MapCache> maps_;
-  const HiddenCone hidden_;
+  const std::shared_ptr<const HiddenLight> hidden_;
+  std::vector<std::optional<HiddenCone>> cones_;  ///< (frames), of those that were asked for
   std::vector<FrameSpec> frames_;
   mutable std::mutex mutex_;
-  /// By the first frame index that shows these texels.
-  LruCache<std::int32_t, EnvironmentMap> mixed_maps_;
+  /// By the first frame index that shows these texels, and what is hidden of them.
+  LruCache<std::pair<std::int32_t, HiddenCone>, EnvironmentMap> mixed_maps_;
   LruCache<std::pair<std::int32_t, std::int32_t>, PresampledLight> presampled_;  ///< frame, round
   std::vector<std::pair<EnvironmentFrame, Rgb>> catchers_;  ///< of the last frames
   std::vector<std::string> repair_notes_;

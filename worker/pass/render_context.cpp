@@ -38,10 +38,11 @@ Result<std::shared_ptr<const RenderContext>> make_render_context(
   context->picture = picture;
   context->grid = TileGrid(job.image);
   context->frames = expand_sequence(job);
-  context->lights = std::make_unique<LightSequence>(context->job, assets->maps, memory.light,
-                                                    hidden_light(job, assets->scene));
-  context->surfaces = std::make_shared<SurfaceCache>(memory.surfaces);
   context->scene = std::shared_ptr<const Scene>(assets, &assets->scene);
+  context->lights = std::make_unique<LightSequence>(
+      context->job, assets->maps, memory.light,
+      std::make_shared<const HiddenLight>(context->job, *context->scene));
+  context->surfaces = std::make_shared<SurfaceCache>(memory.surfaces);
   context->method = make_pixel_method(context->job);
   context->own_methods = make_own_methods(job);
   context->geometry =

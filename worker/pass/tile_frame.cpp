@@ -317,7 +317,7 @@ void TileFrameRenderer::finish(Batch& batch, const FrameLight& light, RoundMean&
     add_environment_behind(
         std::span(surfaces_->hits).subspan(batch.first * num_sites, batch.count * num_sites),
         std::span(surfaces_->rays).subspan(batch.first * num_sites, batch.count * num_sites),
-        surfaces_->num_sites, view_of(light.now), background);
+        surfaces_->num_sites, view_of(light.seen), background);
   }
   for (std::size_t i = 0; i < batch.count; ++i) {
     PixelResult& pixel = batch.pixels[i];

@@ -131,6 +131,7 @@ ImageMetadata frame_metadata(const JobSpec& job, const Digest& job_digest, int f
     add("baton:mapMix", light.mix);
   }
   add("baton:mapScale", environment.scale * light.scale);
+  if (!environment.camera_map.file.empty()) add("baton:cameraMap", environment.camera_map.file);
   add("baton:rotationDeg", rotation_deg_at(environment, frame_number));
   if (quality.noise_source != NoiseSource::none) {
     metadata.emplace_back("baton:noise", fmt::format("{:.4g}", quality.noise));

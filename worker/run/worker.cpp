@@ -301,6 +301,7 @@ class Worker {
     const Status seen = expect_token(folder / "token", action.token);
     Result<BlobStore> store = seen ? BlobStore::open(folder) : seen.error();
     if (!store) {
+      channel_.send(WorkerGoodbye{});
       leave_ = Leave{exit_code_of(store.error().kind), store.error().message};
       return;
     }

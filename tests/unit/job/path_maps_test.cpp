@@ -29,14 +29,17 @@ TEST(PathMaps, AllFilesOfAJobAreMapped) {
   job.output.directory = "/from/out";
   job.scene.meshes["m"].path = "/from/m.ply";
   job.scene.materials["p"] = {.kind = MaterialKind::measured, .file = "/from/p.binary"};
+  job.scene.materials["t"] = {.color_texture = TextureSpec{.file = "/from/t.png"},
+                              .normal_texture = TextureSpec{.file = "/from/n.png"}};
   job.scene.files = {{"/from/extra.bin"}};
   job.environment.keys = {{1, "/from/sky.exr"}};
+  job.environment.camera_map.file = "/from/plate.exr";
   const PathMaps maps{{"/from", "/to"}};
   const JobSpec mapped = map_paths(job, maps);
   EXPECT_EQ(mapped.output.directory, "/to/out");
   const std::vector<std::string> before = asset_paths(job), after = asset_paths(mapped);
-  ASSERT_EQ(before.size(), 4u);
-  ASSERT_EQ(after.size(), 4u);
+  ASSERT_EQ(before.size(), 7u);
+  ASSERT_EQ(after.size(), 7u);
   for (std::size_t i = 0; i < before.size(); ++i) EXPECT_EQ(after[i], map_path(before[i], maps));
   EXPECT_EQ(map_paths(std::vector<AssetDigest>{{"/from/a", {1, 2}}}, maps).front().path, "/to/a");
 }

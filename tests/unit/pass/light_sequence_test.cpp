@@ -54,5 +54,43 @@ TEST(LightSequence, MakesAFrameAgainAlike) {
             0);
 }
 
+// A box rises, so that less and less lies behind the ground for all that is lit.
+TEST(LightSequence, HidesWhatEachFrameHides) {
+  JobSpec job = test::box_job();
+  job.frames = test::frame_numbers(3);
+  job.scene.objects[1].keys = {{.frame = 2}, {.frame = 3, .translate = {0, 20, 0}}};
+  job.motion.max_px = 4;
+  const auto scene = load_scene(job);
+  ASSERT_TRUE(scene.ok());
+  const auto share = std::make_shared<MemoryShare>(std::uint64_t{1} << 30);
+  LightSequence lights(job, std::make_shared<MapCache>(share), share,
+                       std::make_shared<const HiddenLight>(job, *scene));
+  const Vec3 aslant{0.77f, -0.64f, 0};  // by 50 degrees
+  const auto first = *lights.at(0), second = *lights.at(1), third = *lights.at(2);
+  EXPECT_EQ(first->now.map, second->now.map);
+  EXPECT_TRUE(second->still);
+  EXPECT_TRUE(second->now.evaluate(aslant).is_hidden());
+  EXPECT_FALSE(third->now.evaluate(aslant).is_hidden());
+  EXPECT_FALSE(third->still) << "what is sampled changes";
+  EXPECT_EQ(third->before.map, second->now.map);
+}
+
+TEST(LightSequence, TheCameraMaySeeAnotherMap) {
+  JobSpec job = test::box_job();
+  job.frames = {7};
+  job.environment.rotation_start_frame = 7;
+  job.environment.rotation_start_deg = 90;
+  const auto share = std::make_shared<MemoryShare>(std::uint64_t{1} << 30);
+  const auto maps = std::make_shared<MapCache>(share);
+  const auto plain = *LightSequence(job, maps, share).at(0);
+  EXPECT_EQ(plain->seen.map, plain->now.map);
+  job.environment.camera_map = {
+      .file = test::write_map("plate.exr", test::constant_map(8, 4, {1, 2, 3})), .scale = 3};
+  const auto other = *LightSequence(job, maps, share).at(0);
+  EXPECT_EQ(other->now.map, plain->now.map);
+  EXPECT_EQ(other->seen.rotation, plain->now.rotation);
+  EXPECT_EQ(other->seen.evaluate({0, 1, 0}).b, 9);
+}
+
 }  // namespace
 }  // namespace baton
