@@ -55,9 +55,9 @@ AovTraits make_traits(Aov aov) {
       return row;
     }
     case Aov::position:
-      return geometry({"P.X", "P.Y", "P.Z"}, 9);
+      return geometry({"P.X", "P.Y", "P.Z"}, 7);
     case Aov::z:
-      return geometry({"Z"}, 2.9);
+      return geometry({"Z"}, 2.5);
     case Aov::motion:
       return geometry({"forward.u", "forward.v", "backward.u", "backward.v"}, 12);
     case Aov::object:
