@@ -86,7 +86,8 @@ class Draw(Motion, Textures):
             # Given elsewhere.
             "$schema": lambda: self.pick(None, None, "job.schema.json"), "name": self.name, "frames": self.frames, "scene": nothing, "camera": nothing,
             "environment.map": nothing, "environment.frames": nothing, "environment.keys": nothing,
-            "environment.cameraMap.file": self.camera_map,
+            "environment.cameraMap": lambda: self.camera_map() if self.chance(0.2) else None,
+            "environment.cameraMap.file": lambda: "seen.exr",
             "sampling.byMaterial": nothing, "scene.meshes": nothing, "scene.materials": nothing,
             "scene.objects": nothing, "scene.ground": nothing, "scene.gltf": nothing, "scene.files": nothing,
             "camera.node": nothing, "scene.gltf.file": lambda: "set.glb",
@@ -281,7 +282,8 @@ class Draw(Motion, Textures):
 
     def camera_map(self):
         self.files["seen.exr"] = {"kind": "dots", "width": 8, "height": 4, "seed": 1, "count": 3, "level": 2.0}
-        return "seen.exr"
+        form = self.schema.schema["properties"]["environment"]["properties"]["cameraMap"]["oneOf"][1]
+        return self.pick("seen.exr", self.schema.object(form, "environment.cameraMap"))
 
     def by_material(self, job):
         """Settings of single materials, where the method allows them; names are known only now."""
