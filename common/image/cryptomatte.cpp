@@ -6,30 +6,24 @@
 #include <bit>
 
 #include "common/base/check.h"
+#include "common/math/murmur3.h"
 
 namespace baton {
 namespace {
 
-/// [Appleby 2011]
-std::uint32_t murmur3(std::string_view text) {
-  constexpr std::uint32_t kFirst = 0xcc9e2d51, kSecond = 0x1b873593;
-  std::uint32_t hash = 0;
+/// Of a text [Appleby 2011].
+std::uint32_t hash_of(std::string_view text) {
   const auto byte = [&](std::size_t i) {
     return std::uint32_t{static_cast<std::uint8_t>(text[i])};
   };
-  const auto mixed = [&](std::uint32_t k) { return std::rotl(k * kFirst, 15) * kSecond; };
+  std::uint32_t hash = 0;
   const std::size_t whole = text.size() / 4 * 4;
-  for (std::size_t i = 0; i < whole; i += 4) {
-    hash ^= mixed(byte(i) | byte(i + 1) << 8 | byte(i + 2) << 16 | byte(i + 3) << 24);
-    hash = std::rotl(hash, 13) * 5 + 0xe6546b64;
-  }
+  for (std::size_t i = 0; i < whole; i += 4)
+    hash = murmur3::added(hash, byte(i) | byte(i + 1) << 8 | byte(i + 2) << 16 | byte(i + 3) << 24);
   std::uint32_t rest = 0;
   for (std::size_t i = text.size(); i > whole; --i) rest = rest << 8 | byte(i - 1);
-  if (whole < text.size()) hash ^= mixed(rest);
-  hash ^= static_cast<std::uint32_t>(text.size());
-  hash = (hash ^ hash >> 16) * 0x85ebca6b;
-  hash = (hash ^ hash >> 13) * 0xc2b2ae35;
-  return hash ^ hash >> 16;
+  hash ^= murmur3::scrambled(rest);
+  return murmur3::finished(hash ^ static_cast<std::uint32_t>(text.size()));
 }
 
 /// A name in a JSON text.
@@ -45,7 +39,7 @@ std::string json_text(std::string_view name) {
 }  // namespace
 
 float cryptomatte_id(std::string_view name) {
-  std::uint32_t hash = murmur3(name);
+  std::uint32_t hash = hash_of(name);
   const std::uint32_t exponent = hash >> 23 & 255;
   if (exponent == 0 || exponent == 255) hash ^= 1u << 23;
   return std::bit_cast<float>(hash);
@@ -106,7 +100,7 @@ ImageMetadata cryptomatte_metadata(std::string_view layer, const std::vector<std
   }
   manifest += "}";
   const std::string key =
-      fmt::format("cryptomatte/{}/", fmt::format("{:08x}", murmur3(layer)).substr(0, 7));
+      fmt::format("cryptomatte/{}/", fmt::format("{:08x}", hash_of(layer)).substr(0, 7));
   return {{key + "name", std::string(layer)},
           {key + "hash", "MurmurHash3_32"},
           {key + "conversion", "uint32_to_float32"},

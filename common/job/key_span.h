@@ -6,8 +6,8 @@
 
 namespace baton {
 
-/// The keys around a frame: values[k] of keys first + k with `share` of the way from the second to
-/// the third. Beyond the ends the last key stands in, marked by equal indices.
+/// The keys around a frame, which is `share` of the way between `from` and `to`, with the one
+/// before and the one after. Where there is none, the last key stands in.
 struct KeySpan {
   std::size_t before = 0, from = 0, to = 0, after = 0;  ///< indices of keys
   double share = 0;                                     ///< [0, 1)

@@ -50,6 +50,17 @@ void surface_fields(JobArchive& a, MaterialSpec& material) {
   a.boolean("alphaBlend", material.alpha_blend);
 }
 
+/// Material: may be const.
+template <class Material>
+auto given_textures(Material& material) {
+  std::vector<decltype(&*material.color_texture)> textures;
+  for (auto* texture : {&material.color_texture, &material.metallic_roughness_texture,
+                        &material.normal_texture, &material.emission_texture}) {
+    if (texture->has_value()) textures.push_back(&**texture);
+  }
+  return textures;
+}
+
 }  // namespace
 
 void fields(JobArchive& a, MaterialSpec& material) {
@@ -86,18 +97,10 @@ void fields(JobArchive& a, MaterialSpec& material) {
   }
 }
 
-std::vector<TextureSpec*> textures_of(MaterialSpec& material) {
-  std::vector<TextureSpec*> textures;
-  for (auto* texture : {&material.color_texture, &material.metallic_roughness_texture,
-                        &material.normal_texture, &material.emission_texture}) {
-    if (texture->has_value()) textures.push_back(&**texture);
-  }
-  return textures;
-}
+std::vector<TextureSpec*> textures_of(MaterialSpec& material) { return given_textures(material); }
 
 std::vector<const TextureSpec*> textures_of(const MaterialSpec& material) {
-  const auto textures = textures_of(const_cast<MaterialSpec&>(material));
-  return {textures.begin(), textures.end()};
+  return given_textures(material);
 }
 
 }  // namespace baton

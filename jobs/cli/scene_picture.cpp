@@ -7,6 +7,7 @@
 #include <limits>
 
 #include "common/job/motion.h"
+#include "common/math/bounds.h"
 #include "jobs/cli/preview_canvas.h"
 #include "worker/scene/pose.h"
 
@@ -25,21 +26,6 @@ constexpr std::array<Rgb, 8> kPalette{Rgb{0.90f, 0.62f, 0.20f}, Rgb{0.35f, 0.70f
                                       Rgb{0.60f, 0.60f, 0.60f}, Rgb{0.45f, 0.55f, 0.95f}};
 constexpr Rgb kGround{0.36f, 0.36f, 0.36f}, kGroundDark{0.27f, 0.27f, 0.27f};
 constexpr Rgb kBounds{0.75f, 0.75f, 0.75f}, kView{1, 1, 0.6f};
-
-struct Bounds {
-  Vec3 low{1e30f, 1e30f, 1e30f}, high{-1e30f, -1e30f, -1e30f};
-
-  void add(const Vec3& p) {
-    low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
-    high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
-  }
-  bool empty() const { return low.x > high.x; }
-  Vec3 center() const { return (low + high) * 0.5f; }
-  Vec3 size() const { return high - low; }
-  Vec3 corner(std::size_t i) const {
-    return {i & 1 ? high.x : low.x, i & 2 ? high.y : low.y, i & 4 ? high.z : low.z};
-  }
-};
 
 /// The job's first frame.
 struct Shot {

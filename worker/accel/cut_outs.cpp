@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <bit>
 
-#include "common/math/mix_bits.h"
+#include "common/math/murmur3.h"
 #include "worker/scene/surface_detail.h"
 
 namespace baton {
@@ -26,7 +26,7 @@ bool any_blends(const Scene& scene) {
 std::uint32_t ray_bits(const Vec3& origin, const Vec3& direction) {
   std::uint32_t bits = 0;
   for (const float x : {origin.x, origin.y, origin.z, direction.x, direction.y, direction.z})
-    bits = mix_bits(bits, std::bit_cast<std::uint32_t>(x));
+    bits = murmur3::added(bits, std::bit_cast<std::uint32_t>(x));
   return bits;
 }
 
@@ -44,8 +44,8 @@ void pass_through_holes(const RTCFilterFunctionNArguments* args) {
     const SurfacePlace place{.triangle = RTCHitN_primID(args->hit, args->N, i),
                              .u = RTCHitN_u(args->hit, args->N, i),
                              .v = RTCHitN_v(args->hit, args->N, i)};
-    const std::uint32_t bits =
-        mix_bits(mix_bits(RTCRayN_id(args->ray, args->N, i), index), place.triangle);
+    const std::uint32_t bits = murmur3::finished(
+        murmur3::added(murmur3::added(RTCRayN_id(args->ray, args->N, i), index), place.triangle));
     const float draw = static_cast<float>((bits >> 8) + 1) * 0x1p-24f;
     if (is_cut_away(scene, instance, place, draw)) args->valid[i] = 0;
   }

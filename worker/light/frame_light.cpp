@@ -58,11 +58,10 @@ LightSequence::LightSequence(const JobSpec& job, std::shared_ptr<MapCache> maps,
           share, [](const PresampledLight& light) { return light.size_bytes(); },
           frames_in_hand(job) * (static_cast<std::size_t>(job.quality.rounds) + 1)) {}
 
-Result<std::shared_ptr<const EnvironmentMap>> LightSequence::key_map(std::int32_t key,
-                                                                     const HiddenCone& hidden) {
-  const std::string& path = job_.environment.keys[static_cast<std::size_t>(key)].map;
-  BATON_ASSIGN(const auto map,
-               maps_->get(path, job_.environment, job_.sampling.mis_compensation, hidden));
+Result<std::shared_ptr<const EnvironmentMap>> LightSequence::file_map(
+    const std::string& path, const EnvironmentSpec& environment, bool compensate,
+    const HiddenCone& hidden) {
+  BATON_ASSIGN(const auto map, maps_->get(path, environment, compensate, hidden));
   if (const auto& repairs = map->repairs(); repairs.total() > 0) {
     const std::string note = fmt::format("{}: {} negative, {} NaN, {} infinite texels set to 0",
                                          path, repairs.negative, repairs.nan, repairs.infinite);
@@ -71,6 +70,12 @@ Result<std::shared_ptr<const EnvironmentMap>> LightSequence::key_map(std::int32_
     }
   }
   return map;
+}
+
+Result<std::shared_ptr<const EnvironmentMap>> LightSequence::key_map(std::int32_t key,
+                                                                     const HiddenCone& hidden) {
+  return file_map(job_.environment.keys[static_cast<std::size_t>(key)].map, job_.environment,
+                  job_.sampling.mis_compensation, hidden);
 }
 
 Result<std::shared_ptr<const EnvironmentMap>> LightSequence::mixed_map(
@@ -113,7 +118,7 @@ Result<Environment> LightSequence::seen_environment(const Environment& now) {
   if (camera_map.file.empty()) return now;
   const EnvironmentSpec as_is{
       .keys = {}, .filter = job_.environment.filter, .scale = camera_map.scale};
-  BATON_ASSIGN(auto map, maps_->get(camera_map.file, as_is, false));
+  BATON_ASSIGN(auto map, file_map(camera_map.file, as_is, false, {}));
   return Environment{std::move(map), now.rotation};
 }
 

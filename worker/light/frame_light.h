@@ -64,6 +64,10 @@ class LightSequence {
 
  private:
   Rgb catcher_albedo(const EnvironmentFrame& frame, const Environment& now);
+  /// A map of a file; notes its repairs.
+  Result<std::shared_ptr<const EnvironmentMap>> file_map(const std::string& path,
+                                                         const EnvironmentSpec& environment,
+                                                         bool compensate, const HiddenCone& hidden);
   Result<std::shared_ptr<const EnvironmentMap>> key_map(std::int32_t key, const HiddenCone& hidden);
   Result<std::shared_ptr<const EnvironmentMap>> mixed_map(const EnvironmentFrame& frame,
                                                           const HiddenCone& hidden);

@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
-#include <limits>
 
 #include "common/job/motion.h"
 #include "common/job/sequence.h"
@@ -54,20 +53,13 @@ std::optional<Vec3> down_in_map(const EnvironmentSpec& environment) {
 
 }  // namespace
 
-HiddenLight::Box HiddenLight::box_of(const TriangleMesh& mesh) {
-  constexpr float kFar = std::numeric_limits<float>::max();
-  Box box{{kFar, kFar, kFar}, {-kFar, -kFar, -kFar}};
-  for (const Vec3& p : mesh.positions) {
-    box.low = {std::min(box.low.x, p.x), std::min(box.low.y, p.y), std::min(box.low.z, p.z)};
-    box.high = {std::max(box.high.x, p.x), std::max(box.high.y, p.y), std::max(box.high.z, p.z)};
-  }
-  return box;
-}
-
 HiddenLight::HiddenLight(const JobSpec& job, const Scene& scene) : job_(job), scene_(scene) {
   if (has_solid_ground(job, scene)) down_ = down_in_map(job.environment);
   if (!down_) return;
-  for (const TriangleMesh& mesh : scene.meshes) boxes_.push_back(box_of(mesh));
+  boxes_.resize(scene.meshes.size());
+  for (std::size_t i = 0; i < boxes_.size(); ++i) {
+    for (const Vec3& position : scene.meshes[i].positions) boxes_[i].add(position);
+  }
 }
 
 HiddenCone HiddenLight::at(int frame_number) const {
@@ -77,11 +69,9 @@ HiddenCone HiddenLight::at(int frame_number) const {
   float height = 0, aside = 0;
   const Pose pose = pose_at(scene_, job_, frame_number);
   for (std::size_t i = 0; i + 1 < pose.instances.size(); ++i) {
-    const Box& box = boxes_[pose.instances[i].mesh];
-    for (unsigned k = 0; k < 8; ++k) {
-      const Vec3 corner = pose.instances[i].to_world.point({(k & 1) ? box.high.x : box.low.x,
-                                                            (k & 2) ? box.high.y : box.low.y,
-                                                            (k & 4) ? box.high.z : box.low.z});
+    const Bounds& box = boxes_[pose.instances[i].mesh];
+    for (std::size_t k = 0; k < 8; ++k) {
+      const Vec3 corner = pose.instances[i].to_world.point(box.corner(k));
       height = std::max(height, corner.y - job_.scene.ground->height);
       aside = std::max({aside, std::fabs(corner.x), std::fabs(corner.z)});
     }

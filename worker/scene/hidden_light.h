@@ -4,6 +4,7 @@
 #include <vector>
 
 #include "common/job/job_spec.h"
+#include "common/math/bounds.h"
 #include "worker/scene/environment.h"
 #include "worker/scene/scene.h"
 
@@ -27,15 +28,10 @@ class HiddenLight {
   HiddenCone at(int frame_number) const;
 
  private:
-  struct Box {
-    Vec3 low, high;
-  };
-  static Box box_of(const TriangleMesh& mesh);
-
   const JobSpec& job_;
   const Scene& scene_;
-  std::optional<Vec3> down_;  ///< straight down in the map's own frame; none: nothing is hidden
-  std::vector<Box> boxes_;    ///< (meshes) around each, in its own space
+  std::optional<Vec3> down_;   ///< straight down in the map's own frame; none: nothing is hidden
+  std::vector<Bounds> boxes_;  ///< (meshes) around each, in its own space
 };
 
 }  // namespace baton

@@ -11,6 +11,7 @@
 #include <unordered_map>
 
 #include "common/job/motion.h"
+#include "common/math/bounds.h"
 #include "common/math/inverse.h"
 #include "worker/scene/detail_loader.h"
 #include "worker/scene/gltf/meshes.h"
@@ -33,16 +34,11 @@ class Faults {
   std::string text_;
 };
 
-/// Corners of the box around the mesh after `map`.
-std::pair<Vec3, Vec3> bounds_of(const TriangleMesh& mesh, const Transform& map) {
-  constexpr float kFar = std::numeric_limits<float>::infinity();
-  Vec3 low{kFar, kFar, kFar}, high = low * -1.0f;
-  for (const Vec3& position : mesh.positions) {
-    const Vec3 p = map.point(position);
-    low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
-    high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
-  }
-  return {low, high};
+/// The box around the mesh after `map`.
+Bounds bounds_of(const TriangleMesh& mesh, const Transform& map) {
+  Bounds bounds;
+  for (const Vec3& position : mesh.positions) bounds.add(map.point(position));
+  return bounds;
 }
 
 /// Turns this axis of a mesh to y.
