@@ -78,49 +78,59 @@ TEST_P(Kernels, EnvironmentAsTheScalarCode) {
   }
   const Lanes w(directions);
   for (const MapFilter filter : {MapFilter::nearest, MapFilter::bilinear}) {
-    const Environment environment{std::make_shared<EnvironmentMap>(image, filter, 1.0f, false),
-                                  rotation_about({0.2f, 1, 0.1f}, 33)};
+    const HiddenCone below{.axis = {0, -1, 0}, .angle = 1.2f};
+    const Environment environment{
+        std::make_shared<EnvironmentMap>(image, filter, 1.0f, false, TexelRepairs{}, below),
+        rotation_about({0.2f, 1, 0.1f}, 33)};
     std::vector<float> r(w.x.size()), g(r), b(r), density(r);
     kernels::evaluate_environment(view_of(environment), w.x, w.y, w.z, r, g, b, density);
-    int on_edge = 0;
+    std::vector<float> seen_r(r), seen_g(r), seen_b(r);
+    kernels::see_environment(view_of(environment), w.x, w.y, w.z, seen_r, seen_g, seen_b);
+    int on_edge = 0, hidden = 0;
     for (std::size_t i = 0; i < directions.size(); ++i) {
       const EnvironmentMap::Texel t = environment.evaluate(directions[i]);
+      const float lights = t.is_hidden() ? 0.0f : 1.0f;
+      hidden += t.is_hidden() ? 1 : 0;
       // A direction within float error of a cell's edge may fall on either side.
-      const bool equal = std::fabs(t.r - r[i]) < 1e-3f && std::fabs(t.b - b[i]) < 1e-3f &&
+      const bool equal = std::fabs(lights * t.r - r[i]) < 1e-3f &&
+                         std::fabs(lights * t.b - b[i]) < 1e-3f &&
+                         std::fabs(t.r - seen_r[i]) < 1e-3f && std::fabs(t.b - seen_b[i]) < 1e-3f &&
                          std::fabs(t.density - density[i]) < 1e-4f * (1 + t.density);
       on_edge += equal ? 0 : 1;
     }
     EXPECT_LE(on_edge, 7);  // the poles and the seam, exactly on edges after rotation
+    EXPECT_GT(hidden, 500);
   }
 }
 
 TEST_P(Kernels, BsdfAsTheScalarCode) {
   const std::vector<Vec3> directions = random_directions(4000, 5);
   const Lanes w(directions);
-  const std::vector<Material> materials{material_of(MaterialKind::diffuse),
-                                        material_of(MaterialKind::phong),
-                                        material_of(MaterialKind::metallic_roughness)};
+  const std::vector<Material> materials{
+      material_of(MaterialKind::diffuse), material_of(MaterialKind::phong),
+      material_of(MaterialKind::metallic_roughness),
+      make_material({.kind = MaterialKind::metallic_roughness, .roughness = 0.4f, .specular = 0})};
   for (const Vec3& wo : {normalize(Vec3{0.3f, 0.9f, 0.2f}), normalize(Vec3{1, 0.02f, 0})}) {
-    // All three materials in one pixel, and sites in mixed order within a vector.
+    // All materials in one pixel, and sites in mixed order within a vector.
     SiteBlock sites;
     sites.clear(4);
-    for (int s = 0; s < 3; ++s)
+    for (int s = 0; s < 4; ++s)
       sites.add(s, tilted_point({0, 1, 0}, wo), materials[static_cast<std::size_t>(s)]);
     std::vector<std::int32_t> site;
     for (std::size_t i = 0; i < directions.size(); ++i)
-      site.push_back(static_cast<std::int32_t>(i % 3));
+      site.push_back(static_cast<std::int32_t>(i % 4));
     std::vector<float> r(w.x.size()), g(r), b(r), pdf(r);
     kernels::evaluate_bsdf(sites, site, w.x, w.y, w.z, r, g, b, pdf);
     for (std::size_t i = 0; i < directions.size(); ++i) {
-      const Material& material = materials[i % 3];
+      const Material& material = materials[i % 4];
       const ShadingPoint point = tilted_point({0, 1, 0}, wo);
       const Rgb f = evaluate_bsdf(material, point, directions[i]) * std::max(0.0f, directions[i].y);
       const float tolerance = 1e-5f + 2e-3f * f.x;
-      ASSERT_NEAR(r[i], f.x, tolerance) << "material " << i % 3 << " direction " << i;
+      ASSERT_NEAR(r[i], f.x, tolerance) << "material " << i % 4 << " direction " << i;
       ASSERT_NEAR(b[i], f.z, tolerance);
       const float expected_pdf = bsdf_pdf_solid_angle(material, point, directions[i]);
       ASSERT_NEAR(pdf[i], expected_pdf, 1e-5f + 2e-3f * expected_pdf)
-          << "material " << i % 3 << " direction " << i;
+          << "material " << i % 4 << " direction " << i;
     }
   }
 }
