@@ -55,7 +55,8 @@ template <class Material>
 auto given_textures(Material& material) {
   std::vector<decltype(&*material.color_texture)> textures;
   for (auto* texture : {&material.color_texture, &material.metallic_roughness_texture,
-                        &material.normal_texture, &material.emission_texture}) {
+                        &material.normal_texture, &material.emission_texture,
+                        &material.clearcoat_texture, &material.clearcoat_roughness_texture}) {
     if (texture->has_value()) textures.push_back(&**texture);
   }
   return textures;
@@ -90,6 +91,12 @@ void fields(JobArchive& a, MaterialSpec& material) {
       a.number("ior", material.ior, {1, 100});
       a.number("specular", material.specular, kUnitRange);
       a.vector("specularColor", material.specular_color, kLightRange);
+      a.number("clearcoat", material.clearcoat, kUnitRange);
+      texture_field(a, "clearcoatTexture", material.clearcoat_texture);
+      if (material.clearcoat_texture && !material.clearcoat)
+        a.fault("clearcoatTexture", "clearcoat beside it, whose factor it is", "none");
+      a.number("clearcoatRoughness", material.clearcoat_roughness, {0.02, 1});
+      texture_field(a, "clearcoatRoughnessTexture", material.clearcoat_roughness_texture);
       break;
     case MaterialKind::measured:
       asset_path(a, required("file"), material.file, {".binary"});

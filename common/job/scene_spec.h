@@ -57,19 +57,23 @@ enum class MaterialKind : std::uint8_t { diffuse, phong, metallic_roughness, mea
 struct MaterialSpec {
   MaterialKind kind = MaterialKind::diffuse;
   Rgb base_color{0.8f, 0.8f, 0.8f};
-  Rgb specular_color{1, 1, 1};  ///< phong; metallic_roughness: on F0 of what is no metal
-  float kd = 0.5f;              ///< phong, [0, 1]
-  float ks = 0.5f;              ///< phong, [0, 1]; kd + ks <= 1
-  float exponent = 50;          ///< phong, [1, 100000]
-  float metallic = 0;           ///< [0, 1]
-  float roughness = 0.5f;       ///< [0.02, 1]; alpha = roughness^2
-  float ior = 1.5f;             ///< metallic_roughness, of what is no metal, [1, 100]
-  float specular = 1;           ///< the same: strength of its reflection, [0, 1]
-  std::string file{};           ///< measured: .binary
+  Rgb specular_color{1, 1, 1};       ///< phong; metallic_roughness: on F0 of what is no metal
+  float kd = 0.5f;                   ///< phong, [0, 1]
+  float ks = 0.5f;                   ///< phong, [0, 1]; kd + ks <= 1
+  float exponent = 50;               ///< phong, [1, 100000]
+  float metallic = 0;                ///< [0, 1]
+  float roughness = 0.5f;            ///< [0.02, 1]; alpha = roughness^2
+  float ior = 1.5f;                  ///< metallic_roughness, of what is no metal, [1, 100]
+  float specular = 1;                ///< the same: strength of its reflection, [0, 1]
+  std::optional<float> clearcoat{};  ///< metallic_roughness, [0, 1]; none: no coat
+  std::optional<float> clearcoat_roughness{};  ///< of the coat, [0.02, 1]; none: 0.02
+  std::string file{};                          ///< measured: .binary
 
   std::optional<TextureSpec> color_texture{};               ///< on base_color; its alpha on `alpha`
   std::optional<TextureSpec> metallic_roughness_texture{};  ///< B on metallic, G on roughness
-  std::optional<TextureSpec> normal_texture{};
+  std::optional<TextureSpec> clearcoat_texture{};           ///< R on clearcoat
+  std::optional<TextureSpec> clearcoat_roughness_texture{};  ///< G on clearcoat_roughness
+  std::optional<TextureSpec> normal_texture{};               ///< of what is below a coat
   Rgb emission{0, 0, 0};  ///< radiance that the camera sees; it lights nothing
   std::optional<TextureSpec> emission_texture{};  ///< on emission
   float alpha = 1;                                ///< [0, 1]

@@ -1,11 +1,11 @@
 #!/usr/bin/env python3
-"""Writes a small scene as Blender would: a floor, a ring of pillars that share one mesh, a turning vane, a lift, a ball
+"""Writes a small scene as Blender would: a floor, a ring of glazed pillars that share one mesh, a turning vane, a lift, a ball
 that bounces, and a camera on a dolly, each with an animation of its own. Standard library only.
 
 usage: make_gltf_set.py FILE.glb [--textured]
 
 Frames 1 to 24 at 24 frames per second, frame n at n / 24 seconds. --textured: tiles with joints on the floor, scratches on
-the vane, holes in the ball, pillars that glow in stripes.
+the vane, holes in the ball, pillars that glow in stripes and whose glaze has run.
 """
 
 import json
@@ -174,6 +174,9 @@ def add_textures(b, materials):
     def stripe(_x, y):
         return (255, 160, 40) if y % 16 < 4 else (0, 0, 0)
 
+    def glaze(x, y):  # red: how much of it; green: how rough it is
+        return 255 if y < 20 + (x * 5) % 11 else 40, 60 + 6 * y, 0
+
     floor, clay, steel, rubber = materials
     floor["pbrMetallicRoughness"]["baseColorTexture"] = {"index": b.texture(64, 64, tile)}
     floor["normalTexture"] = {"index": b.texture(64, 64, slope), "scale": 0.8}
@@ -182,8 +185,12 @@ def add_textures(b, materials):
     rubber["pbrMetallicRoughness"]["baseColorTexture"] = {"index": b.texture(32, 32, lace), "extensions": turned}
     rubber.update(alphaMode="MASK", alphaCutoff=0.4, doubleSided=True)
     clay["emissiveTexture"] = {"index": b.texture(32, 32, stripe)}
-    clay.update(emissiveFactor=[1, 1, 1], extensions={"KHR_materials_emissive_strength": {"emissiveStrength": 1.5}})
-    samplers = [{"wrapS": 10497, "wrapT": 10497}] * 5
+    clay["emissiveFactor"] = [1, 1, 1]
+    clay["extensions"]["KHR_materials_emissive_strength"] = {"emissiveStrength": 1.5}
+    run = {"index": b.texture(32, 32, glaze)}
+    clay["extensions"]["KHR_materials_clearcoat"] = {"clearcoatFactor": 1, "clearcoatTexture": run,
+                                                     "clearcoatRoughnessFactor": 1, "clearcoatRoughnessTexture": run}
+    samplers = [{"wrapS": 10497, "wrapT": 10497}] * len(b.images)
     return {"images": b.images, "textures": b.textures, "samplers": samplers}
 
 
@@ -192,6 +199,7 @@ def make_set(pillars=7, textured=False):
     b = Builder()
     materials = [pbr("floor", (0.5, 0.45, 0.4), 0, 0.7), pbr("clay", (0.6, 0.25, 0.15), 0, 0.6),
                  pbr("steel", (0.75, 0.77, 0.8), 1, 0.3), pbr("rubber", (0.1, 0.3, 0.6), 0, 0.4)]
+    materials[1]["extensions"] = {"KHR_materials_clearcoat": {"clearcoatFactor": 1, "clearcoatRoughnessFactor": 0.1}}
     side = [[-4, 0, -4], [-4, 0, 4], [4, 0, 4], [4, 0, -4]]
     floor = b.mesh("floor", 0, side, [[0, 1, 0]] * 4, [[0, 0], [0, 4], [4, 4], [4, 0]], [(0, 1, 2), (0, 2, 3)])
     pillar = b.mesh("pillar", 1, *box(), quantised=True)
@@ -223,7 +231,7 @@ def make_set(pillars=7, textured=False):
     b.animate(dolly, "rotation", [seconds[0], seconds[-1]], [about_y(-10), about_y(10)])
     assert eye < len(b.nodes)
     camera = {"type": "perspective", "name": "eye", "perspective": {"yfov": 0.55, "znear": 0.1, "aspectRatio": 16 / 9}}
-    used = ["KHR_mesh_quantization"] + ["KHR_texture_transform", "KHR_materials_emissive_strength"] * textured
+    used = ["KHR_mesh_quantization", "KHR_materials_clearcoat"] + ["KHR_texture_transform", "KHR_materials_emissive_strength"] * textured
     more = add_textures(b, materials) if textured else {}
     return b.glb(roots, materials, [camera], extensionsUsed=used, extensionsRequired=["KHR_mesh_quantization"], **more)
 

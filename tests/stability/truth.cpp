@@ -50,9 +50,9 @@ void sum_pixel(const FrameGeometry& geometry, const SurfaceHit& hit, const std::
   const SeenSurface seen = geometry.see(hit);
   const Vec3 origin = hit.ray_origin;
   for (const Node& node : nodes) {
-    if (!above_horizon(seen.point, node.wi)) continue;
     const double value = mean(evaluate_bsdf(seen.material, seen.point, node.wi) * node.power) *
-                         dot(seen.point.ns, node.wi);
+                             dot(seen.point.ns, node.wi) +
+                         mean(node.power) * evaluate_coat(seen.material, seen.point, node.wi);
     if (!(value > 0)) continue;
     if (!node.is_hidden) lns += value;
     rays.push(origin, node.wi);

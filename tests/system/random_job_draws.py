@@ -118,6 +118,8 @@ class Draw(Motion, Textures):
             "maxRetriesPerTask": nothing, "maxSecondsPerTask": nothing, "maxFailuresPerWorker": nothing,
             # Geometry.
             "scene.materials.*.file": self.table,
+            "scene.materials.*.clearcoat": lambda: self.pick(None, None, 0.0, 0.4, 1.0),
+            "scene.materials.*.clearcoatRoughness": lambda: self.pick(None, 0.02, 0.3, 1.0),
             "scene.materials.*.emission": lambda: self.pick(None, None, [0.2, 0.5, 3.0]),
             **self.texture_hands(),
             "scene.objects[].translate": lambda: self.vector(1.3),
@@ -219,6 +221,8 @@ class Draw(Motion, Textures):
         material = self.schema.value(node, "scene.materials.*")
         while "file" in material and self.chance(0.9):
             material = self.schema.value(node, "scene.materials.*")
+        if "clearcoat" not in material:
+            material.pop("clearcoatTexture", None)
         return material
 
     def object(self, scene, keys, names, number):

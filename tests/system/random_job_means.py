@@ -42,6 +42,7 @@ def tame(case, rng):
             material["exponent"] = min(material.get("exponent", 50), 30)
         if material["type"] == "metallicRoughness":
             material["roughness"] = max(material.get("roughness", 0.5), 0.3)
+            material["clearcoatRoughness"] = max(material.get("clearcoatRoughness", 0), 0.3)
     for item in job["scene"]["objects"]:
         item.pop("gltf", None)
     for recipe in case["files"].values():

@@ -7,7 +7,8 @@ class Textures:
     def texture_hands(self):
         """Textures of materials: only the ground's, since the meshes here have no texture coordinates."""
         hands = {}
-        for key in ("colorTexture", "normalTexture", "emissionTexture", "metallicRoughnessTexture"):
+        for key in ("colorTexture", "normalTexture", "emissionTexture", "metallicRoughnessTexture", "clearcoatTexture",
+                    "clearcoatRoughnessTexture"):
             at = f"scene.materials.*.{key}"
             hands.update({
                 at: lambda key=key: self.texture(key) if self.on_ground and self.chance(0.6) else None,

@@ -46,6 +46,7 @@ HWY_INLINE SurfaceLanes LoadTable(const SurfaceTable& table, const Records& comm
   s.table = s.site = hn::Zero(DI());
   s.alpha2 = s.view_cosine = s.view_masking = zero;
   s.any_lobe = s.any_phong || s.any_ggx;
+  s.any_coat = false;
   if (!s.any_lobe) return s;
   Records glossy;
   for (std::size_t lane = 0; lane < hn::Lanes(d); ++lane)
@@ -55,9 +56,28 @@ HWY_INLINE SurfaceLanes LoadTable(const SurfaceTable& table, const Records& comm
   s.wo = {f.row[0], f.row[1], f.row[2]};
   s.mirror = {g.row[0], g.row[1], g.row[2]};
   s.ks = {ks_r, f.row[3], g.row[3]};
-  if (s.any_ggx) SetViewTerms(s);
+  if (s.any_ggx) {
+    GgxLanes lobe{s.ns, s.wo, s.shape, zero, zero, zero};
+    SetViewTerms(lobe);
+    s.alpha2 = lobe.alpha2;
+    s.view_cosine = lobe.view_cosine;
+    s.view_masking = lobe.view_masking;
+  }
   s.any_measured = table.tables().size() > 1 && s.any_ggx;
   s.table = hn::ConvertTo(DI(), hn::Max(hn::Sub(b.row[3], hn::Set(d, 1.0f)), zero));
+  if (table.coats() == nullptr) return s;
+  Records coats;
+  for (std::size_t lane = 0; lane < hn::Lanes(d); ++lane)
+    coats[lane] = table.coats() + (common[lane] - table.common()) / 2;
+  const FourRows m = LoadFour(coats, 0);
+  const FourRows n = LoadFour(coats, 4);
+  s.coat.ns = {m.row[0], m.row[1], m.row[2]};
+  s.coat.alpha = m.row[3];
+  s.coat.wo = {n.row[0], n.row[1], n.row[2]};
+  s.coat_share = n.row[3];
+  s.coat_chance = zero;
+  SetViewTerms(s.coat);
+  s.any_coat = !hn::AllFalse(d, hn::Gt(s.coat_share, zero));
   return s;
 }
 static_assert(SurfaceTable::kGlossy * 2 == SurfaceTable::kCommon);

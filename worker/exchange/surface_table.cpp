@@ -21,11 +21,18 @@ void SurfaceTable::add(const ShadingPoint& point, const Material& material,
                       ray_origin.x, ray_origin.y, ray_origin.z, s.ks_r[0]}});
   glossy_.push_back({{s.wo_x[0], s.wo_y[0], s.wo_z[0], s.ks_g[0],  //
                       s.mirror_x[0], s.mirror_y[0], s.mirror_z[0], s.ks_b[0]}});
+  if (!s.any_coat && coats_.empty()) return;
+  coats_.resize(glossy_.size());  // also of those before the first coat
+  if (!s.any_coat) return;
+  const SiteBlock::Coats& c = s.coats;
+  coats_.back() = {{c.ns_x[0], c.ns_y[0], c.ns_z[0], c.alpha[0],  //
+                    c.wo_x[0], c.wo_y[0], c.wo_z[0], c.share[0]}};
 }
 
 void SurfaceTable::add_nothing() {
   common_.push_back({});
   glossy_.push_back({});
+  if (!coats_.empty()) coats_.push_back({});
 }
 
 void SurfaceTable::reserve(std::size_t count) {

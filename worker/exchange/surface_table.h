@@ -41,6 +41,9 @@ class SurfaceTable {
   const float* common() const { return common_.data()->value; }
   /// (surfaces, kGlossy)
   const float* glossy() const { return glossy_.data()->value; }
+  /// (surfaces, kGlossy): a coat's normal, alpha, view direction and share (SiteBlock::Coats);
+  /// null: no surface has one.
+  const float* coats() const { return coats_.empty() ? nullptr : coats_.data()->value; }
   /// Texels of measured BRDFs; the first is null.
   const std::vector<const float*>& tables() const { return tables_; }
 
@@ -53,6 +56,7 @@ class SurfaceTable {
   };
   std::vector<Common> common_;
   std::vector<Glossy> glossy_;
+  std::vector<Glossy> coats_;  ///< of all surfaces, or empty
   std::vector<const float*> tables_{nullptr};
   SiteBlock one_;  ///< the surface in work
 };

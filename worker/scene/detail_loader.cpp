@@ -44,6 +44,9 @@ Result<std::shared_ptr<const SurfaceDetail>> DetailLoader::load(const MaterialSp
                   detail->metallic_roughness));
   BATON_TRY(place(spec.normal_texture, TextureUse::normal, detail->normal));
   BATON_TRY(place(spec.emission_texture, TextureUse::color, detail->emission));
+  BATON_TRY(place(spec.clearcoat_texture, TextureUse::red, detail->clearcoat));
+  BATON_TRY(
+      place(spec.clearcoat_roughness_texture, TextureUse::green, detail->clearcoat_roughness));
   return std::shared_ptr<const SurfaceDetail>(std::move(detail));
 }
 
@@ -91,6 +94,9 @@ std::optional<MissingUvs> missing_uvs(const SurfaceDetail& detail, const Triangl
     return MissingUvs{detail.metallic_roughness.uv_set, "metallicRoughnessTexture"};
   if (missing(detail.normal)) return MissingUvs{detail.normal.uv_set, "normalTexture"};
   if (missing(detail.emission)) return MissingUvs{detail.emission.uv_set, "emissionTexture"};
+  if (missing(detail.clearcoat)) return MissingUvs{detail.clearcoat.uv_set, "clearcoatTexture"};
+  if (missing(detail.clearcoat_roughness))
+    return MissingUvs{detail.clearcoat_roughness.uv_set, "clearcoatRoughnessTexture"};
   return std::nullopt;
 }
 

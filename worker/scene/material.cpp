@@ -11,6 +11,8 @@ namespace baton {
 namespace {
 
 constexpr float kTwoPi = 2 * kPi;
+/// What a coat of index 1.5 reflects head-on.
+constexpr float kCoatF0 = 0.04f;
 
 /// cos^s of the angle between unit a and b, 0 past a right angle. 1 - cos = |a - b|^2 / 2 keeps its
 /// digits where the cosine has lost them, so s = 100000 is as exact as s = 1.
@@ -36,16 +38,22 @@ float smith_root(float cos_theta, float alpha) {
   return std::sqrt(alpha2 + (1 - alpha2) * cos_theta * cos_theta);
 }
 
-/// Specular and diffuse part of ggx. G2 / (4 n.wi n.wo) of the height-correlated Smith function
-/// [Heitz 2014, eq. 99] is 1 / (2 (n.wi root(n.wo) + n.wo root(n.wi))): nothing divides by n.wi.
+/// D G2 / (4 n.wi n.wo). G2 / (4 n.wi n.wo) of the height-correlated Smith function [Heitz 2014,
+/// eq. 99] is 1 / (2 (n.wi root(n.wo) + n.wo root(n.wi))): nothing divides by n.wi. h: unit,
+/// between wi and wo.
+float ggx_lobe(float alpha, const Vec3& n, const Vec3& h, float cos_i, float cos_o) {
+  const float masking_over_4 =
+      0.5f / (cos_i * smith_root(cos_o, alpha) + cos_o * smith_root(cos_i, alpha));
+  return ggx_distribution(n, h, alpha) * masking_over_4;
+}
+
+/// Specular and diffuse part of ggx.
 Rgb evaluate_ggx(const Material& m, const ShadingPoint& p, const Vec3& wi) {
   const Vec3 wo = clamped_view(p);
   const Vec3 h = normalize(wi + wo);
   const float cos_i = dot(p.ns, wi);
   const float cos_o = std::max(dot(p.ns, wo), kMinCosView);
-  const float masking_over_4 =
-      0.5f / (cos_i * smith_root(cos_o, m.shape) + cos_o * smith_root(cos_i, m.shape));
-  const float specular = ggx_distribution(p.ns, h, m.shape) * masking_over_4;
+  const float specular = ggx_lobe(m.shape, p.ns, h, cos_i, cos_o);
   const float t = 1 - std::clamp(dot(wo, h), 0.0f, 1.0f);
   const float t2 = t * t;
   const float grazing = t2 * t2 * t;
@@ -57,22 +65,21 @@ Rgb evaluate_ggx(const Material& m, const ShadingPoint& p, const Vec3& wi) {
 
 /// Density of the reflected visible normal, D G1(wo) / (4 n.wo), with G1 / n.wo = 2 / (n.wo +
 /// root(n.wo)).
-float ggx_pdf(const Material& m, const ShadingPoint& p, const Vec3& wi) {
+float ggx_pdf(float alpha, const ShadingPoint& p, const Vec3& wi) {
   const Vec3 wo = clamped_view(p);
   const Vec3 sum = wi + wo;
   if (!(dot(sum, p.ns) > 0)) return 0;
   const float cos_o = std::max(dot(p.ns, wo), kMinCosView);
-  return ggx_distribution(p.ns, normalize(sum), m.shape) * 0.5f /
-         (cos_o + smith_root(cos_o, m.shape));
+  return ggx_distribution(p.ns, normalize(sum), alpha) * 0.5f / (cos_o + smith_root(cos_o, alpha));
 }
 
 /// wo mirrored at a visible normal, drawn through a spherical cap [Dupuy & Benyoub 2023, listing
 /// 1].
-Vec3 sample_ggx(const Material& m, const ShadingPoint& p, float u0, float u1) {
+Vec3 sample_ggx(float alpha, const ShadingPoint& p, float u0, float u1) {
   const Frame frame(p.ns);
   const Vec3 wo = clamped_view(p);
   const Vec3 local = frame.to_local(wo);
-  const Vec3 stretched = normalize({local.x * m.shape, local.y * m.shape, std::max(local.z, 0.0f)});
+  const Vec3 stretched = normalize({local.x * alpha, local.y * alpha, std::max(local.z, 0.0f)});
 
   // Draw on the cap z > -stretched.z; the sum with the view direction is the hemisphere's visible
   // normal.
@@ -80,8 +87,8 @@ Vec3 sample_ggx(const Material& m, const ShadingPoint& p, float u0, float u1) {
   const float z_plus_view = (1 - u1) * (1 + stretched.z);
   const float z = std::clamp(z_plus_view - stretched.z, -1.0f, 1.0f);
   const float sin_theta = std::sqrt((1 - z) * (1 + z));
-  const Vec3 h{(sin_theta * std::cos(phi) + stretched.x) * m.shape,
-               (sin_theta * std::sin(phi) + stretched.y) * m.shape, z_plus_view};
+  const Vec3 h{(sin_theta * std::cos(phi) + stretched.x) * alpha,
+               (sin_theta * std::sin(phi) + stretched.y) * alpha, z_plus_view};
   return normalize(reflect(wo, frame.to_world(normalize(h))));
 }
 
@@ -112,7 +119,7 @@ float lobe_pdf(const Material& m, const ShadingPoint& p, const Vec3& wi) {
       return (m.shape + 1) / kTwoPi * cosine_power(normalize(reflect(p.wo, p.ns)), wi, m.shape);
     case Material::Lobe::ggx:
     case Material::Lobe::measured:
-      return ggx_pdf(m, p, wi);
+      return ggx_pdf(m.shape, p, wi);
   }
   return 0;
 }
@@ -121,6 +128,10 @@ float lobe_pdf(const Material& m, const ShadingPoint& p, const Vec3& wi) {
 float specular_share(float specular, float diffuse) {
   const float sum = specular + diffuse;
   return sum > 0 ? specular / sum : 0.0f;
+}
+
+float coat_roughness(const MaterialSpec& spec) {
+  return spec.clearcoat_roughness.value_or(kLeastRoughness);
 }
 
 /// Reflection of what is no metal, seen head-on [KHR_materials_ior, KHR_materials_specular].
@@ -163,7 +174,10 @@ Material make_material(const MaterialSpec& spec, const Rgb& base_color, float me
               .ks = f0,
               .shape = roughness * roughness,
               .specular_probability = specular_share(fresnel, mean(kd) * (1 - fresnel)),
-              .f90 = f90};
+              .f90 = f90,
+              .coat = {.weight = spec.clearcoat.value_or(0),
+                       .alpha = coat_roughness(spec) * coat_roughness(spec),
+                       .base_albedo = fresnel + mean(kd) * (1 - fresnel)}};
     }
     case MaterialKind::measured:
       break;
@@ -192,8 +206,10 @@ Vec3 clamped_view(const ShadingPoint& point) {
   return normalize(point.wo + point.ns * (kMinCosView - cos_view));
 }
 
-Rgb evaluate_bsdf(const Material& material, const ShadingPoint& point, const Vec3& wi) {
-  if (!above_horizon(point, wi)) return {};
+namespace {
+
+/// evaluate_bsdf without a coat, where it is not 0.
+Rgb evaluate_base(const Material& material, const ShadingPoint& point, const Vec3& wi) {
   switch (material.lobe) {
     case Material::Lobe::none:
       return material.kd * kInvPi;
@@ -210,17 +226,62 @@ Rgb evaluate_bsdf(const Material& material, const ShadingPoint& point, const Vec
   return {};
 }
 
+}  // namespace
+
+Rgb evaluate_bsdf(const Material& material, const ShadingPoint& point, const Vec3& wi) {
+  if (!above_horizon(point, wi)) return {};
+  const Rgb f = evaluate_base(material, point, wi);
+  return material.coat.weight > 0 ? f * (1 - see_coat(material, point).share) : f;
+}
+
+float evaluate_coat(const Material& material, const ShadingPoint& point, const Vec3& wi) {
+  if (!(material.coat.weight > 0)) return 0;
+  const SeenCoat coat = see_coat(material, point);
+  const ShadingPoint& p = coat.point;
+  if (!above_horizon(p, wi)) return 0;
+  const float cos_i = dot(p.ns, wi);
+  const float cos_o = std::max(dot(p.ns, p.wo), kMinCosView);
+  return coat.share * cos_i *
+         ggx_lobe(material.coat.alpha, p.ns, normalize(wi + p.wo), cos_i, cos_o);
+}
+
+SeenCoat see_coat(const Material& material, const ShadingPoint& point) {
+  SeenCoat coat{point};
+  if (!(material.coat.weight > 0)) return coat;
+  if (!(material.coat.normal == Vec3{})) coat.point.ns = material.coat.normal;
+  coat.point.wo = clamped_view(coat.point);
+  const float t = 1 - std::clamp(dot(coat.point.ns, coat.point.wo), 0.0f, 1.0f), t2 = t * t;
+  coat.share = material.coat.weight * (kCoatF0 + (1 - kCoatF0) * t2 * t2 * t);
+  return coat;
+}
+
+LobeChances lobe_chances(const Material& material, float coat_share) {
+  if (!(coat_share > 0)) return {material.specular_probability, 0};
+  const float below = (1 - coat_share) * material.coat.base_albedo;
+  const float lobes = coat_share + below * material.specular_probability;
+  return {lobes / (coat_share + below), coat_share / lobes};
+}
+
 Vec3 sample_bsdf(const Material& material, const ShadingPoint& point,
                  const std::array<float, 3>& u) {
-  if (u[2] >= material.specular_probability) return sample_cosine(point, u[0], u[1]);
+  const SeenCoat coat = see_coat(material, point);
+  const LobeChances chance = lobe_chances(material, coat.share);
+  if (u[2] >= chance.any) return sample_cosine(point, u[0], u[1]);
+  if (u[2] < chance.any * chance.coat)
+    return sample_ggx(material.coat.alpha, coat.point, u[0], u[1]);
   return material.lobe == Material::Lobe::phong ? sample_phong(material, point, u[0], u[1])
-                                                : sample_ggx(material, point, u[0], u[1]);
+                                                : sample_ggx(material.shape, point, u[0], u[1]);
 }
 
 float bsdf_pdf_solid_angle(const Material& material, const ShadingPoint& point, const Vec3& wi) {
   const float cosine = std::max(dot(point.ns, wi), 0.0f) * kInvPi;
-  const float p = material.specular_probability;
-  return (1 - p) * cosine + p * lobe_pdf(material, point, wi);
+  const SeenCoat coat = see_coat(material, point);
+  const LobeChances chance = lobe_chances(material, coat.share);
+  const float p = chance.any;
+  float lobes = lobe_pdf(material, point, wi);
+  if (chance.coat > 0)
+    lobes += chance.coat * (ggx_pdf(material.coat.alpha, coat.point, wi) - lobes);
+  return (1 - p) * cosine + p * lobes;
 }
 
 }  // namespace baton

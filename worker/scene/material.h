@@ -11,6 +11,16 @@ namespace baton {
 
 struct SurfaceDetail;
 
+/// A clear layer of index 1.5 over a material [KHR_materials_clearcoat]: f = (1 - s) f_below + s D
+/// G2 / (4 |n.wi| |n.wo|), with the share s of what it reflects = weight times Schlick's term of
+/// F0 = 0.04 and n.wo. It reflects no more than it receives if the material below does not.
+struct Coat {
+  float weight = 0;       ///< [0, 1]; 0: none
+  float alpha = 1;        ///< roughness^2
+  Vec3 normal{};          ///< unit; 0: the shading normal
+  float base_albedo = 0;  ///< about what the material below reflects, [0, 1]; for sampling alone
+};
+
 /// A material in the one form that all code evaluates. lobe measured: f is the table. Else:
 ///   f = kd/pi [* (1 - F) for ggx] + specular lobe,
 /// lobe phong: ks (s+2)/(2 pi) max(0, r.wi)^s, r the mirror direction of wo about the shading
@@ -27,13 +37,14 @@ struct Material {
   Rgb kd;                          ///< diffuse albedo
   Rgb ks;                          ///< phong: specular albedo; ggx: F0
   float shape = 1;                 ///< phong: exponent s; ggx: alpha = roughness^2
-  float specular_probability = 0;  ///< chance that sample_bsdf draws from the lobe, [0, 1]
+  float specular_probability = 0;  ///< chance of the lobe in sample_bsdf, without a coat, [0, 1]
   std::shared_ptr<const MeasuredBrdf>
       table{};    ///< measured: the whole BRDF; kd and ks are 0, shape is the sampled lobe's alpha
   float f90 = 1;  ///< ggx
   /// What differs from place to place, glows or is not there (surface_detail.h); null: nothing. The
   /// rest is then only what methods look at ahead.
   std::shared_ptr<const SurfaceDetail> detail{};
+  Coat coat{};  ///< ggx
 };
 
 /// Material of a specification of any kind but `measured`. specular_probability follows from the
@@ -62,6 +73,9 @@ inline bool above_horizon(const ShadingPoint& p, const Vec3& wi) {
   return dot(p.ns, wi) > 0 && dot(p.ng, wi) > 0;
 }
 
+/// Least roughness of a ggx lobe; what the schema of jobs takes.
+inline constexpr float kLeastRoughness = 0.02f;
+
 /// Least cosine between the shading normal and the view direction of a ggx lobe.
 inline constexpr float kMinCosView = 1e-4f;
 
@@ -72,11 +86,29 @@ float ggx_view_masking(float cos_view, float alpha);
 /// may face away from the viewer, where visible normals have no density.
 Vec3 clamped_view(const ShadingPoint& point);
 
-/// BRDF f(wi, wo) in 1/sr, without the cosine; 0 when not above_horizon. The scalar witness of the
-/// SIMD code.
+/// BRDF f(wi, wo) in 1/sr, without the cosine; 0 when not above_horizon. Of a coated material what
+/// lies below the coat, as it is seen through it. The scalar witness of the SIMD code, with
+/// evaluate_coat.
 Rgb evaluate_bsdf(const Material& material, const ShadingPoint& point, const Vec3& wi);
+/// BRDF of the coat times the cosine to its normal, in 1/sr, in all channels; 0 without a coat and
+/// below the horizon of its or of the geometric normal.
+float evaluate_coat(const Material& material, const ShadingPoint& point, const Vec3& wi);
 
-/// A direction from the mixture of the cosine lobe and the specular lobe. u: 3 uniforms in [0, 1).
+/// A coat as a viewer sees it.
+struct SeenCoat {
+  ShadingPoint point;  ///< with the coat's normal, and wo clamped to it
+  float share = 0;     ///< of light that it reflects, [0, 1]; the material below keeps the rest
+};
+SeenCoat see_coat(const Material& material, const ShadingPoint& point);
+
+/// Where sample_bsdf draws from: chance of a lobe, and of these that of the coat's, each in [0, 1].
+struct LobeChances {
+  float any = 0, coat = 0;
+};
+LobeChances lobe_chances(const Material& material, float coat_share);
+
+/// A direction from the mixture of the cosine lobe, the specular lobe and that of the coat. u: 3
+/// uniforms in [0, 1).
 /// May fall below the horizon (there the BRDF is 0).
 Vec3 sample_bsdf(const Material& material, const ShadingPoint& point,
                  const std::array<float, 3>& u);

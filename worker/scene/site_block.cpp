@@ -16,6 +16,7 @@ void SiteBlock::clear(int sites) {
   any_phong = false;
   any_ggx = false;
   any_measured = false;
+  any_coat = false;
 }
 
 void SiteBlock::add_miss(int site) {
@@ -69,9 +70,29 @@ void SiteBlock::add(int site, const ShadingPoint& point, const Material& materia
   any_phong = any_phong || phong;
   any_ggx = any_ggx || ggx;
   any_measured = any_measured || tabulated;
+  if (material.coat.weight > 0) add_coat(s, point, material);
   specular_sum += specular_probability[s];
   hit_sites[static_cast<std::size_t>(num_hits++)] = site;
   if (specular_probability[s] > 0) lobe_sites[static_cast<std::size_t>(num_lobes++)] = site;
+}
+
+void SiteBlock::add_coat(std::size_t site, const ShadingPoint& point, const Material& material) {
+  if (!any_coat) coats = {};
+  any_coat = true;
+  const SeenCoat seen = see_coat(material, point);
+  const LobeChances chance = lobe_chances(material, seen.share);
+  coats.ns_x[site] = seen.point.ns.x;
+  coats.ns_y[site] = seen.point.ns.y;
+  coats.ns_z[site] = seen.point.ns.z;
+  coats.wo_x[site] = seen.point.wo.x;
+  coats.wo_y[site] = seen.point.wo.y;
+  coats.wo_z[site] = seen.point.wo.z;
+  coats.alpha[site] = material.coat.alpha;
+  coats.share[site] = seen.share;
+  coats.chance[site] = chance.coat;
+  specular_probability[site] = chance.any;
+  for (Array* const below : {&kd_r, &kd_g, &kd_b, &ks_r, &ks_g, &ks_b})
+    (*below)[site] *= 1 - seen.share;
 }
 
 }  // namespace baton

@@ -22,12 +22,22 @@ struct alignas(64) SiteBlock {
   Array ks_r{}, ks_g{}, ks_b{};              ///< phong: specular albedo; ggx: F0
   Array shape{};                             ///< phong: exponent; ggx: alpha
   Array lobe_scale{};                        ///< phong: (s + 2) / (2 pi); ggx: F90; measured: 0
-  Array specular_probability{};
-  Array alpha2{};        ///< ggx: alpha^2
-  Array view_cosine{};   ///< ggx: n.wo, at least 1e-4
-  Array view_masking{};  ///< ggx: 1 + Lambda(wo) [Heitz 2014]
-  Array is_ggx{};        ///< 1 for ggx, and for measured, which is sampled by such a lobe; else 0
+  Array specular_probability{};              ///< LobeChances::any
+  Array alpha2{};                            ///< ggx: alpha^2
+  Array view_cosine{};                       ///< ggx: n.wo, at least 1e-4
+  Array view_masking{};                      ///< ggx: 1 + Lambda(wo) [Heitz 2014]
+  Array is_ggx{};  ///< 1 for ggx, and for measured, which is sampled by such a lobe; else 0
   std::array<const float*, kMaxSites> measured{};  ///< texels of a MeasuredBrdf, or null
+
+  /// Clear coats, all 0 where a site has none. Only what any_coat says is there is read.
+  struct Coats {
+    Array ns_x{}, ns_y{}, ns_z{};  ///< the coat's normal
+    Array wo_x{}, wo_y{}, wo_z{};  ///< to the viewer, as a ggx lobe about it has it
+    Array alpha{};
+    Array share{};   ///< SeenCoat::share; kd and ks hold what it leaves
+    Array chance{};  ///< LobeChances::coat
+  };
+  Coats coats;
 
   std::int32_t num_sites = 1;  ///< S
   std::int32_t num_hits = 0;   ///< sites that see a surface
@@ -38,6 +48,7 @@ struct alignas(64) SiteBlock {
   bool any_phong = false;
   bool any_ggx = false;
   bool any_measured = false;
+  bool any_coat = false;
 
   /// Starts anew with `sites` in [1, kMaxSites]; each must then be added, in ascending order, with
   /// add or add_miss.
@@ -46,6 +57,9 @@ struct alignas(64) SiteBlock {
   void add(int site, const ShadingPoint& point, const Material& material);
   /// Sets site `site` to nothing.
   void add_miss(int site);
+
+ private:
+  void add_coat(std::size_t site, const ShadingPoint& point, const Material& material);
 };
 
 }  // namespace baton

@@ -6,8 +6,6 @@
 namespace baton {
 namespace {
 
-/// What the schema of jobs takes.
-constexpr float kLeastRoughness = 0.02f;
 /// Cosines of slopes below this count as this: footprints end.
 constexpr float kLeastSlope = 0.01f;
 /// Least cosine between a mapped and the geometric normal.
@@ -121,6 +119,22 @@ Vec3 mapped_normal(const Patch& patch, const SurfaceDetail& detail, const Shadin
   return has_lobe ? bent_normal(normal, point.ng, point.wo) : normal;
 }
 
+/// What textures say of a coat, whose normal is that of the mesh; what is below glows through it.
+void see_coat_detail(const Patch& patch, const SurfaceDetail& detail, const ShadingPoint& point,
+                     SeenSurface& seen) {
+  Coat& coat = seen.material.coat;
+  coat.normal = point.ns;
+  if (detail.clearcoat.texture != nullptr)
+    coat.weight = std::min(coat.weight * patch.look_up(detail.clearcoat)[0], 1.0f);
+  if (detail.clearcoat_roughness.texture != nullptr) {
+    const float given = detail.spec.clearcoat_roughness.value_or(kLeastRoughness);
+    const float roughness =
+        std::clamp(given * patch.look_up(detail.clearcoat_roughness)[0], kLeastRoughness, 1.0f);
+    coat.alpha = roughness * roughness;
+  }
+  seen.emission = seen.emission * (1 - see_coat(seen.material, seen.point).share);
+}
+
 }  // namespace
 
 SeenSurface see_detail(const Scene& scene, const Instance& instance, const SurfacePlace& place,
@@ -145,6 +159,7 @@ SeenSurface see_detail(const Scene& scene, const Instance& instance, const Surfa
   SeenSurface seen{point, make_material(spec, color, metallic, roughness), emission};
   if (detail.normal.texture != nullptr)
     seen.point.ns = mapped_normal(patch, detail, point, seen.material.lobe != Material::Lobe::none);
+  if (seen.material.coat.weight > 0) see_coat_detail(patch, detail, point, seen);
   return seen;
 }
 

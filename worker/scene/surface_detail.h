@@ -23,6 +23,7 @@ struct PlacedTexture {
 struct SurfaceDetail {
   MaterialSpec spec;  ///< the numbers: factors of the textures
   PlacedTexture color{}, metallic_roughness{}, normal{}, emission{};
+  PlacedTexture clearcoat{}, clearcoat_roughness{};
 
   /// Not every ray that meets the surface stops there.
   bool is_cut_out() const { return spec.alpha_cutoff > 0 || spec.alpha_blend; }

@@ -35,6 +35,10 @@ std::vector<std::int32_t> kept_channels(TextureUse use, std::int32_t channels) {
       return kept_channels(TextureUse::color, channels);
     case TextureUse::metallic_roughness:
       return is_grey ? std::vector<std::int32_t>{0, 0} : std::vector<std::int32_t>{1, 2};
+    case TextureUse::red:
+      return {0};
+    case TextureUse::green:
+      return {is_grey ? 0 : 1};
   }
   return {};
 }

@@ -16,6 +16,8 @@ enum class TextureUse : std::uint8_t {
   color_and_alpha,     ///< the same with A
   metallic_roughness,  ///< G and B, numbers
   normal,              ///< RGB, numbers
+  red,                 ///< R, numbers
+  green,               ///< G, numbers
 };
 
 /// How an image goes on past its edges.

@@ -56,7 +56,12 @@ TEST(ExchangeKernels, ReflectionsAsTheScalarCode) {
                      .metallic = 0.3f,
                      .roughness = 0.4f}),
       make_measured_material(MeasuredBrdf::tabulate(
-          test::phong_by_angles({0.3f, 0.2f, 0.1f}, {0.5f, 0.4f, 0.3f}, 20)))};
+          test::phong_by_angles({0.3f, 0.2f, 0.1f}, {0.5f, 0.4f, 0.3f}, 20))),
+      make_material({.kind = MaterialKind::metallic_roughness,
+                     .base_color = {0.7f, 0.1f, 0.1f},
+                     .clearcoat = 1.0f,
+                     .clearcoat_roughness = 0.3f}),
+      make_material({.kind = MaterialKind::metallic_roughness, .base_color = {0.4f, 0.5f, 0.6f}})};
   const ShadingPoint point{.position = {},
                            .ng = {0, 1, 0},
                            .ns = normalize(Vec3{0.1f, 1, 0.2f}),
@@ -71,7 +76,7 @@ TEST(ExchangeKernels, ReflectionsAsTheScalarCode) {
   kernels::look_up_lights(view_of(checkered_environment()), codes, lights);
   std::vector<Offer> offers;
   for (std::size_t i = 0; i < codes.size(); ++i) {
-    const std::size_t surface = i < 1000 ? i / 200 : i % 5;
+    const std::size_t surface = i < 1400 ? i / 200 : i % 7;
     offers.push_back({.sample = static_cast<std::uint32_t>(i),
                       .receiver = 0,
                       .surface = static_cast<std::uint32_t>(surface)});
@@ -87,7 +92,8 @@ TEST(ExchangeKernels, ReflectionsAsTheScalarCode) {
     const Vec3& wi = lights[i].direction;
     Rgb expected;
     if (surface < materials.size() && dot(point.ng, wi) > 0)
-      expected = evaluate_bsdf(materials[surface], point, wi) * std::max(dot(point.ns, wi), 0.0f) *
+      expected = (evaluate_bsdf(materials[surface], point, wi) * std::max(dot(point.ns, wi), 0.0f) +
+                  Rgb{1, 1, 1} * evaluate_coat(materials[surface], point, wi)) *
                  lights[i].radiance;
     const Rgb got = reflected[i].radiance;
     ASSERT_NEAR(got.x, expected.x, 2e-3f * expected.x + 1e-3f) << surface << " direction " << i;

@@ -144,6 +144,46 @@ TEST(SettleScene, WarnsOfWhatIsNotShown) {
               testing::ElementsAre(HasSubstr("extension KHR_lights_punctual is not read")));
 }
 
+/// A file of one triangle whose material has this extension, and two images.
+std::string coated_file(const std::string& coat) {
+  GltfWriter w;
+  w.add(test::kTriangle, "VEC3", 3);
+  return write_test_file("coated.glb", w.glb(R"("scenes":[{"nodes":[0]}],"nodes":[{"mesh":0}],
+    "meshes":[{"primitives":[{"attributes":{"POSITION":0},"material":0}]}],
+    "images":[{"uri":"a.png"},{"uri":"b.png"}],"textures":[{"source":1},{"source":0}],
+    "extensionsUsed":["KHR_materials_clearcoat"],"extensionsRequired":["KHR_materials_clearcoat"],
+    "materials":[{"name":"paint","extensions":{"KHR_materials_clearcoat":)" +
+                                             coat + "}}]"));
+}
+
+TEST(SettleScene, ReadsCoats) {
+  const std::string camera =
+      R"(, "camera": {"position": [0, 0, 4], "lookAt": [0, 0, 0], "verticalFovDeg": 30})";
+  const auto coat_of = [&](const std::string& coat) {
+    return settled(job_of(coated_file(coat), "", camera)).scene.materials.at("paint");
+  };
+  const MaterialSpec plain = coat_of(R"({"clearcoatFactor":0.75,"clearcoatRoughnessFactor":0.25})");
+  EXPECT_EQ(plain.clearcoat, 0.75f);
+  EXPECT_EQ(plain.clearcoat_roughness, 0.25f);
+  EXPECT_FALSE(plain.clearcoat_texture || plain.clearcoat_roughness_texture);
+  EXPECT_EQ(coat_of(R"({"clearcoatFactor":1})").clearcoat_roughness, 0.02f);
+  // Without a factor there is no coat, whatever else is said of it.
+  const MaterialSpec none = coat_of(R"({"clearcoatTexture":{"index":0}})");
+  EXPECT_FALSE(none.clearcoat || none.clearcoat_roughness || none.clearcoat_texture);
+
+  const std::string textured = R"({"clearcoatFactor":1,"clearcoatTexture":{"index":0},
+      "clearcoatRoughnessFactor":0.5,"clearcoatRoughnessTexture":{"index":1,"texCoord":1},
+      "clearcoatNormalTexture":{"index":0}})";
+  const JobSpec job = settled(job_of(coated_file(textured), "", camera));
+  const MaterialSpec& paint = job.scene.materials.at("paint");
+  ASSERT_TRUE(paint.clearcoat_texture && paint.clearcoat_roughness_texture);
+  EXPECT_TRUE(paint.clearcoat_texture->file.ends_with("b.png"));
+  EXPECT_TRUE(paint.clearcoat_roughness_texture->file.ends_with("a.png"));
+  EXPECT_EQ(paint.clearcoat_roughness_texture->uv, 1);
+  EXPECT_THAT(gltf_warnings(job.scene),
+              testing::ElementsAre(HasSubstr("the normal map of its coat is not read")));
+}
+
 /// Node "spun" turns (animation 1), its parent "cart" goes along x (animation 2), "hop" jumps by
 /// steps, "glide" follows a spline, "eye" below "cart" is a camera. Times are 1/2, 1 and 2 seconds.
 std::string moving_set() {

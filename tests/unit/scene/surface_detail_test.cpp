@@ -103,6 +103,29 @@ TEST(SurfaceDetail, MetalAndRoughnessAreFactors) {
   EXPECT_NEAR(got.kd.y, expected.kd.y, 1e-5f);
 }
 
+// The coat keeps the normal of the mesh, where a map turns that of what is below.
+TEST(SurfaceDetail, ACoatHasImagesAndANormalOfItsOwn) {
+  MaterialSpec spec{
+      .kind = MaterialKind::metallic_roughness, .clearcoat = 0.8f, .clearcoat_roughness = 0.5f};
+  spec.emission = {2, 2, 2};
+  spec.clearcoat_texture = TextureSpec{.file = write_targa("c.tga", 1, 1, 3, {128, 9, 7})};
+  spec.clearcoat_roughness_texture =
+      TextureSpec{.file = write_targa("r.tga", 1, 1, 3, {9, 102, 7})};
+  spec.normal_texture = TextureSpec{.file = write_targa("n.tga", 1, 1, 3, {255, 128, 255})};
+  const SeenSurface seen = seen_at(scene_of(spec), 0.3f, 0.4f);
+  const float weight = 0.8f * 128 / 255, alpha = 0.2f * 0.2f;
+  EXPECT_NEAR(seen.material.coat.weight, weight, 1e-4f);
+  EXPECT_NEAR(seen.material.coat.alpha, alpha, 1e-4f);
+  EXPECT_EQ(seen.material.coat.normal, (Vec3{0, 0, 1}));
+  EXPECT_NEAR(seen.point.ns.x, std::sqrt(0.5f), 0.01f);
+  // What glows below shines through.
+  EXPECT_NEAR(seen.emission.x, 2 * (1 - 0.04f * weight), 1e-4f);
+
+  // Grey images stand for all channels; smoother than smooth is smooth.
+  spec.clearcoat_roughness_texture = TextureSpec{.file = write_targa("g.tga", 1, 1, 1, {1})};
+  EXPECT_FLOAT_EQ(seen_at(scene_of(spec), 0.3f, 0.4f).material.coat.alpha, 0.02f * 0.02f);
+}
+
 TEST(SurfaceDetail, ANormalMapTurnsTheNormalAsItsImageLies) {
   // 45 degrees to the right of the image; then upward.
   for (const bool mirrored : {false, true}) {

@@ -20,13 +20,16 @@ struct Contribution {
 /// hidden_light.h leaves out is traced, too: a reference tells whether it was hidden.
 Contribution weighted_radiance(const SeenSurface& site, const Environment& environment,
                                const Vec3& wi) {
-  if (!above_horizon(site.point, wi)) return {};
+  const float coat = evaluate_coat(site.material, site.point, wi);
+  if (!(coat > 0) && !above_horizon(site.point, wi)) return {};
   const EnvironmentMap::Texel light = environment.evaluate(wi);
   const float density = light.density + bsdf_pdf_solid_angle(site.material, site.point, wi);
   if (!(density > 0)) return {};
-  return {.value = evaluate_bsdf(site.material, site.point, wi) * Rgb{light.r, light.g, light.b} *
-                   (dot(site.point.ns, wi) / density),
-          .is_hidden = light.is_hidden()};
+  const Rgb radiance{light.r, light.g, light.b};
+  Rgb value =
+      evaluate_bsdf(site.material, site.point, wi) * radiance * (dot(site.point.ns, wi) / density);
+  if (coat > 0) value += radiance * (coat / density);
+  return {.value = value, .is_hidden = light.is_hidden()};
 }
 
 }  // namespace

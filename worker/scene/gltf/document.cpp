@@ -15,9 +15,10 @@
 namespace baton::gltf {
 namespace {
 
-constexpr std::array<std::string_view, 6> kRead{
-    "KHR_texture_transform", "KHR_mesh_quantization",  "KHR_materials_emissive_strength",
-    "KHR_materials_ior",     "KHR_materials_specular", "EXT_texture_webp"};
+constexpr std::array<std::string_view, 7> kRead{
+    "KHR_texture_transform",  "KHR_mesh_quantization",  "KHR_materials_emissive_strength",
+    "KHR_materials_ior",      "KHR_materials_specular", "EXT_texture_webp",
+    "KHR_materials_clearcoat"};
 
 /// Files that need an extension that is not read cannot be shown right.
 void check_extensions(const JsonView& root) {

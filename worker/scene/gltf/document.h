@@ -126,6 +126,9 @@ struct Material {
   double ior = 1.5, specular = 1;
   std::array<double, 3> specular_color{1, 1, 1};
   bool specular_textured = false;  ///< by textures, which are not read
+  double clearcoat = 0, clearcoat_roughness = 0;
+  TextureInfo clearcoat_texture, clearcoat_roughness_texture;
+  bool has_coat_normals = false;  ///< clearcoatNormalTexture, which is not read
   AlphaMode alpha_mode = AlphaMode::opaque;
   double alpha_cutoff = 0.5;
 };

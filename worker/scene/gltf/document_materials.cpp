@@ -22,7 +22,7 @@ TextureInfo parse_texture_info(const JsonView& info, const Document& document) {
   return read;
 }
 
-void parse_extensions(const JsonView& extensions, Material& material) {
+void parse_extensions(const JsonView& extensions, const Document& document, Material& material) {
   const double strength =
       extensions.at("KHR_materials_emissive_strength").number("emissiveStrength", 1, 0, 1e6);
   for (double& c : material.emission) c = std::clamp(c, 0.0, 1.0) * strength;
@@ -33,6 +33,13 @@ void parse_extensions(const JsonView& extensions, Material& material) {
   for (double& c : material.specular_color) c = std::clamp(c, 0.0, 1e6);
   material.specular_textured =
       specular.has("specularTexture") || specular.has("specularColorTexture");
+  const JsonView coat = extensions.at("KHR_materials_clearcoat");
+  material.clearcoat = coat.number("clearcoatFactor", 0, 0, 1);
+  material.clearcoat_roughness = coat.number("clearcoatRoughnessFactor", 0, 0, 1);
+  material.clearcoat_texture = parse_texture_info(coat.at("clearcoatTexture"), document);
+  material.clearcoat_roughness_texture =
+      parse_texture_info(coat.at("clearcoatRoughnessTexture"), document);
+  material.has_coat_normals = coat.has("clearcoatNormalTexture");
 }
 
 Material parse_material(const JsonView& material, const Document& document) {
@@ -54,7 +61,7 @@ Material parse_material(const JsonView& material, const Document& document) {
   read.alpha_cutoff = material.number("alphaCutoff", 0.5, 0, 1e6);
   material.numbers("emissiveFactor", read.emission);
   read.emissive_texture = parse_texture_info(material.at("emissiveTexture"), document);
-  parse_extensions(material.at("extensions"), read);
+  parse_extensions(material.at("extensions"), document, read);
   return read;
 }
 

@@ -1,0 +1,43 @@
+#include <gtest/gtest.h>
+
+#include "common/job/job_json.h"
+
+namespace baton {
+namespace {
+
+std::string faults_of(const std::string& text) {
+  const Result<JobSpec> job = parse_job(text, "job.json", "/");
+  return job.ok() ? "" : job.error().message;
+}
+
+TEST(MaterialFields, ACoatIsWrittenOnlyWhereThereIsOne) {
+  const auto job_of = [](const std::string& coat) {
+    return R"({"name": "test", "environment": {"map": "sky.exr"}, "scene": {"materials":
+        {"paint": {"type": "metallicRoughness")" +
+           coat + "}}}}";
+  };
+  const JobSpec bare = parse_job(job_of(""), "job.json", "/").value();
+  EXPECT_EQ(to_json(bare).find("clearcoat"), std::string::npos);
+  const JobSpec job =
+      parse_job(job_of(R"(, "clearcoat": 0.5, "clearcoatTexture": "a.png", "clearcoatRoughness":
+          0.25, "clearcoatRoughnessTexture": {"file": "b.png", "uv": 1})"),
+                "job.json", "/")
+          .value();
+  const MaterialSpec& paint = job.scene.materials.at("paint");
+  EXPECT_EQ(paint.clearcoat, 0.5f);
+  EXPECT_EQ(paint.clearcoat_roughness, 0.25f);
+  EXPECT_EQ(paint.clearcoat_texture->file, "/a.png");
+  EXPECT_EQ(paint.clearcoat_roughness_texture->uv, 1);
+  EXPECT_EQ(textures_of(paint).size(), 2u);
+  EXPECT_EQ(parse_job(to_json(job), "again", "/").value(), job);
+  EXPECT_EQ(faults_of(job_of(R"(, "clearcoat": 2, "clearcoatRoughness": 0)")),
+            "job.json: $.scene.materials.paint.clearcoat: expected a number in [0, 1], got 2\n"
+            "job.json: $.scene.materials.paint.clearcoatRoughness: expected a number in [0.02, 1], "
+            "got 0");
+  EXPECT_EQ(faults_of(job_of(R"(, "clearcoatTexture": "a.png")")),
+            "job.json: $.scene.materials.paint.clearcoatTexture: expected clearcoat beside it, "
+            "whose factor it is, got none");
+}
+
+}  // namespace
+}  // namespace baton
