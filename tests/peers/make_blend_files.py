@@ -1,12 +1,13 @@
-"""Writes three Blender files that use what the exporter carries over:
+"""Writes four Blender files that use what the exporter carries over:
 
 blender -b --factory-startup -P make_blend_files.py -- FOLDER
 
 turntable.blend: a turning parent with a figure, a textured box and instances; shift, depth of field, a packed map.
 keyed_camera.blend: a camera on a turning arm, with a Track To constraint, keyed focal length, a border; a tilted
 map, a pane that blends.
+lacquer.blend: coats over metal, smooth and rough, of constants and of images; the two model coats differently.
 hdr_sequence.blend: an image sequence with an offset, a turning and brightening world; an orthographic camera.
-The maps come with Blender. Surfaces are diffuse or metal, where Cycles and Baton model the same.
+The maps come with Blender. All other surfaces are diffuse or metal, where Cycles and Baton model the same.
 """
 
 import math
@@ -85,6 +86,21 @@ def metal(name, color, roughness):
     inputs = material.node_tree.nodes["Principled BSDF"].inputs
     inputs["Base Color"].default_value = (*color, 1)
     inputs["Metallic"].default_value, inputs["Roughness"].default_value = 1, roughness
+    return material
+
+
+def lacquered(name, color, clearcoat, roughness, image=None):
+    """A coat on metal; image: red is its strength, green its roughness."""
+    material = metal(name, color, 0.4)
+    tree = material.node_tree
+    inputs = tree.nodes["Principled BSDF"].inputs
+    inputs["Clearcoat"].default_value, inputs["Clearcoat Roughness"].default_value = clearcoat, roughness
+    if image:
+        texture, parts = tree.nodes.new("ShaderNodeTexImage"), tree.nodes.new("ShaderNodeSeparateColor")
+        texture.image, texture.interpolation = image, "Closest"
+        tree.links.new(texture.outputs["Color"], parts.inputs["Color"])
+        tree.links.new(parts.outputs["Red"], inputs["Clearcoat"])
+        tree.links.new(parts.outputs["Green"], inputs["Clearcoat Roughness"])
     return material
 
 
@@ -229,6 +245,22 @@ def make_keyed_camera(folder):
     save(folder, "keyed_camera.blend")
 
 
+def make_lacquer(folder):
+    new_file("lacquer", 360, 200, 1, 1, 24)
+    add_floor(diffuse("floor", (0.5, 0.48, 0.45)))
+    image = chart()
+    image.colorspace_settings.name = "Non-Color"
+    red = (0.5, 0.05, 0.04)
+    for i, material in enumerate((metal("bare", red, 0.4), lacquered("smooth", red, 1, 0.03), lacquered("rough", red, 1, 0.3),
+                                  lacquered("chart", red, 0, 0, image))):
+        bpy.ops.mesh.primitive_uv_sphere_add(radius=0.5, segments=64, ring_count=32)
+        shape(material.name, material, (1.15 * (i - 1.5), 0, 0.5))
+        bpy.ops.object.shade_smooth()
+    track(camera((0, -6.5, 2), lens=50), empty("aim", (0, 0, 0.4)))
+    world(load_map("sunset.exr"))
+    save(folder, "lacquer.blend")
+
+
 def write_sequence(folder):
     """Eight maps, numbered from 101, in which a sun climbs."""
     folder.mkdir(exist_ok=True)
@@ -273,4 +305,5 @@ if __name__ == "__main__":
     target.mkdir(parents=True, exist_ok=True)
     make_turntable(target)
     make_keyed_camera(target)
+    make_lacquer(target)
     make_hdr_sequence(target)

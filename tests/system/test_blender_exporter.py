@@ -194,6 +194,11 @@ def diffuse_materials(_programs, _folder):
     document = {"materials": [{"extensions": {"KHR_materials_specular": {"specularColorFactor": [0, 0, 0]}}}]}
     gltf_materials.mend(document)
     check_equal(document["materials"][0]["extensions"]["KHR_materials_specular"], {"specularFactor": 0}, "no reflection")
+    document = {"materials": [{}, {"extensions": {"KHR_materials_clearcoat": {"clearcoatFactor": 0.8,
+                                                                              "clearcoatRoughnessFactor": 0.1}}}]}
+    gltf_materials.mend(document)
+    check_equal(document["materials"][1]["extensions"]["KHR_materials_clearcoat"],
+                {"clearcoatFactor": 0.2, "clearcoatRoughnessFactor": 0.1}, "a quarter of the coat")
 
 
 def reports(_programs, _folder):

@@ -7,9 +7,17 @@ NEAREST = 9728
 REPEAT = 10497
 
 
+# Cycles shows a quarter of the Principled BSDF's Clearcoat, and Blender's exporter writes all of it.
+SHOWN_OF_COAT = 0.25
+
+
 def mend(document):
-    """Blender's exporter writes a reflection of 0 as a colour alone, which leaves that at grazing angles."""
+    """Blender's exporter writes a reflection of 0 as a colour alone, which leaves that at grazing angles, and coats four
+    times as strong as Cycles shows them."""
     for material in document.get("materials", []):
+        coat = material.get("extensions", {}).get("KHR_materials_clearcoat")
+        if coat:
+            coat["clearcoatFactor"] = SHOWN_OF_COAT * coat.get("clearcoatFactor", 0)
         specular = material.get("extensions", {}).get("KHR_materials_specular")
         if specular and max(specular.get("specularColorFactor", [1])) == 0:
             specular.pop("specularColorFactor")

@@ -1,17 +1,19 @@
 """Materials: what Blender's glTF exporter or Baton would drop is reported; runs inside Blender.
 
-Carried over: a Principled BSDF with constants, images, normal maps and cut-outs, and a Diffuse BSDF. The glTF exporter
+Carried over: a Principled BSDF with constants, images, normal maps, a coat and cut-outs, and a Diffuse BSDF. The glTF exporter
 reads Principled ones alone, so a Diffuse one becomes one of these."""
 
 from . import nodes
 
 # Inputs of the Principled BSDF that change nothing at these values.
-NEUTRAL = {"Subsurface": 0, "Specular Tint": 0, "Anisotropic": 0, "Sheen": 0, "Clearcoat": 0, "Transmission": 0}
+NEUTRAL = {"Subsurface": 0, "Specular Tint": 0, "Anisotropic": 0, "Sheen": 0, "Transmission": 0}
 WITH_NEUTRAL = {"Subsurface Radius", "Subsurface Color", "Subsurface IOR", "Subsurface Anisotropy", "Anisotropic Rotation",
-                "Sheen Tint", "Clearcoat Roughness", "Clearcoat Normal", "Transmission Roughness", "IOR", "Tangent",
+                "Sheen Tint", "Clearcoat Normal", "Transmission Roughness", "IOR", "Tangent",
                 "Emission Strength", "Weight"}
 BAKE = "bake it into an image (Render Properties > Bake)"
 FILES = {"PNG", "JPEG"}  # other images become PNG
+# Of an image: where glTF has what an input takes.
+CHANNELS = {"Metallic": "Blue", "Roughness": "Green", "Clearcoat": "Red", "Clearcoat Roughness": "Green"}
 
 
 class Materials:
@@ -76,7 +78,7 @@ class Surface:
             self.add("Specular of the Principled BSDF is connected", "set it to one value")
         self.check_emission(inputs["Emission"], inputs["Emission Strength"])
         self.check_input(inputs["Base Color"], {"MIX"})
-        for name in ("Metallic", "Roughness"):
+        for name in ("Metallic", "Roughness", "Clearcoat", "Clearcoat Roughness"):
             self.check_input(inputs[name], {"SEPARATE_COLOR", "SEPRGB", "MATH"})
         self.check_normal(inputs["Normal"])
         self.check_alpha(inputs["Alpha"])
@@ -111,7 +113,7 @@ class Surface:
             behind = [nodes.source(s) for s in given.node.inputs if s.enabled]
             images = [s for s in behind if s is not None and s.node.type not in ("RGB", "VALUE")]
             if given.node.type in ("SEPARATE_COLOR", "SEPRGB"):
-                wanted = {"Metallic": "Blue", "Roughness": "Green"}[socket.name]
+                wanted = CHANNELS[socket.name]
                 if given.name[0] != wanted[0]:
                     self.add(f"{what} takes {given.name} of an image", f"put it into the image's {wanted.lower()}")
             for behind_socket in images:
