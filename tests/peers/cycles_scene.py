@@ -62,8 +62,39 @@ def make_material(entry, number):
         surface.distribution = "GGX"
         surface.inputs["Color"].default_value = (1, 1, 1, 1)
         surface.inputs["Roughness"].default_value = entry["roughness"]
-    links.new(surface.outputs["BSDF"], nodes.new("ShaderNodeOutputMaterial").inputs["Surface"])
+    shown = surface.outputs["BSDF"]
+    if "coat" in entry:
+        shown = coat_over(shown, entry["coat"], nodes, links)
+    links.new(shown, nodes.new("ShaderNodeOutputMaterial").inputs["Surface"])
     return material
+
+
+def coat_over(below, coat, nodes, links):
+    """A white GGX lobe mixed over `below` by weight (0.04 + 0.96 (1 - n.v)^5), as KHR_materials_clearcoat has it."""
+    def math_node(operation, first, second):
+        node = nodes.new("ShaderNodeMath")
+        node.operation = operation
+        for socket, given in zip(node.inputs, (first, second)):
+            if isinstance(given, (int, float)):
+                socket.default_value = given
+            else:
+                links.new(given, socket)
+        return node.outputs[0]
+
+    seen, cosine, mix = nodes.new("ShaderNodeNewGeometry"), nodes.new("ShaderNodeVectorMath"), nodes.new("ShaderNodeMixShader")
+    cosine.operation = "DOT_PRODUCT"
+    links.new(seen.outputs["Normal"], cosine.inputs[0])
+    links.new(seen.outputs["Incoming"], cosine.inputs[1])
+    grazing = math_node("POWER", math_node("SUBTRACT", 1, cosine.outputs["Value"]), 5)
+    share = math_node("ADD", math_node("MULTIPLY", grazing, 0.96 * coat["weight"]), 0.04 * coat["weight"])
+    lobe = nodes.new("ShaderNodeBsdfGlossy")
+    lobe.distribution = "GGX"
+    lobe.inputs["Color"].default_value = (1, 1, 1, 1)
+    lobe.inputs["Roughness"].default_value = coat["roughness"]
+    links.new(share, mix.inputs["Fac"])
+    links.new(below, mix.inputs[1])
+    links.new(lobe.outputs["BSDF"], mix.inputs[2])
+    return mix.outputs[0]
 
 
 def read_mesh(folder, entry):

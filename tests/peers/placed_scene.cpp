@@ -37,13 +37,10 @@ Error refusal(const std::string& what) { return {ErrorKind::bad_input, what}; }
 
 json numbers(const Vec3& v) { return {v.x, v.y, v.z}; }
 
-/// A material that both renderers have: Lambert's, or GGX without Fresnel's term.
-Result<json> material(const std::string& name, const MaterialSpec& spec) {
-  const std::string place = "scene.materials." + name;
-  if (!textures_of(spec).empty() || spec.alpha_cutoff > 0 || spec.alpha_blend ||
-      spec.emission != Rgb{})
-    return refusal(place + ": textures, holes and emission are not compared");
-  if (spec.kind == MaterialKind::diffuse)
+/// A material that both renderers have, below its coat: Lambert's, or GGX without Fresnel's term.
+Result<json> material_below(const std::string& place, const MaterialSpec& spec) {
+  if (spec.kind == MaterialKind::diffuse ||
+      (spec.kind == MaterialKind::metallic_roughness && spec.metallic == 0 && spec.specular == 0))
     return json{{"type", "diffuse"}, {"color", numbers(spec.base_color)}};
   if (spec.kind != MaterialKind::metallic_roughness)
     return refusal(place + ": only diffuse and metallicRoughness are compared");
@@ -52,6 +49,22 @@ Result<json> material(const std::string& name, const MaterialSpec& spec) {
   if (spec.roughness > kMostRoughness)
     return refusal(fmt::format("{}: expected a roughness of at most {}", place, kMostRoughness));
   return json{{"type", "glossy"}, {"roughness", spec.roughness}};
+}
+
+/// The same with its coat.
+Result<json> material(const std::string& name, const MaterialSpec& spec) {
+  const std::string place = "scene.materials." + name;
+  if (!textures_of(spec).empty() || spec.alpha_cutoff > 0 || spec.alpha_blend ||
+      spec.emission != Rgb{})
+    return refusal(place + ": textures, holes and emission are not compared");
+  BATON_ASSIGN(json entry, material_below(place, spec));
+  if (spec.clearcoat.value_or(0) == 0) return entry;
+  const float roughness = spec.clearcoat_roughness.value_or(kLeastRoughness);
+  if (roughness > kMostRoughness)
+    return refusal(
+        fmt::format("{}: expected a clearcoatRoughness of at most {}", place, kMostRoughness));
+  entry["coat"] = {{"weight", *spec.clearcoat}, {"roughness", roughness}};
+  return entry;
 }
 
 Result<json> materials(const SceneSpec& scene) {

@@ -215,6 +215,9 @@ def what_is_not_modelled_alike_is_refused(programs, folder):
     white = {**gold, "color": [1, 1, 1]}
     for number, (material, expected) in enumerate([
             (white, None), (gold, "color [1, 1, 1]"), ({**white, "roughness": 0.8}, "a roughness of at most 0.3"),
+            ({**white, "clearcoat": 0.5, "clearcoatRoughness": 0.1}, None),
+            ({"type": "metallicRoughness", "specular": 0, "clearcoat": 1, "clearcoatRoughness": 0.8},
+             "a clearcoatRoughness of at most 0.3"),
             ({"type": "phong"}, "only diffuse and metallicRoughness"),
             ({"type": "diffuse", "emission": [1, 1, 1]}, "textures, holes and emission")]):
         done, placed = place(programs, folder / str(number), 0 if expected is None else BAD_INPUT, lacquer=material)
