@@ -57,6 +57,13 @@ struct ObjectForm {
       true;  ///< without the key: true means all defaults, false means there is no such object
 };
 
+/// A word for several values of an enumeration.
+template <class E>
+struct NamedSet {
+  std::string_view name;
+  std::vector<E> values;
+};
+
 /// Visits the values of a specification, one call a key. The reader fills them from JSON, the
 /// writer makes JSON of them, so that a key, its unit and its range are said once (job_fields.cpp,
 /// scene_fields.cpp).
@@ -114,16 +121,28 @@ class JobArchive {
     return true;
   }
 
-  /// A set of enumeration values, kept in the order of the enumeration.
+  /// A set of enumeration values, kept in the order of the enumeration. sets: words that stand for
+  /// several of them where the set is read.
   template <class E>
-  bool choices(Key key, std::vector<E>& values, std::span<const std::string_view> names) {
+  bool choices(Key key, std::vector<E>& values, std::span<const std::string_view> names,
+               std::span<const NamedSet<E>> sets = {}) {
     std::vector<std::string> chosen;
     for (const E value : values) chosen.emplace_back(names[static_cast<std::size_t>(value)]);
-    if (!words(key, chosen, names)) return false;
+    std::vector<std::string_view> known(names.begin(), names.end());
+    for (const NamedSet<E>& set : sets) known.push_back(set.name);
+    if (!words(key, chosen, known)) return false;
+
+    const auto is_chosen = [&](std::string_view name) {
+      return std::find(chosen.begin(), chosen.end(), name) != chosen.end();
+    };
     values.clear();
     for (std::size_t i = 0; i < names.size(); ++i) {
-      if (std::find(chosen.begin(), chosen.end(), names[i]) != chosen.end())
-        values.push_back(static_cast<E>(i));
+      const E value = static_cast<E>(i);
+      const bool of_a_set = std::any_of(sets.begin(), sets.end(), [&](const NamedSet<E>& set) {
+        return is_chosen(set.name) &&
+               std::find(set.values.begin(), set.values.end(), value) != set.values.end();
+      });
+      if (of_a_set || is_chosen(names[i])) values.push_back(value);
     }
     return true;
   }

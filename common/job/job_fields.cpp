@@ -244,7 +244,8 @@ void fields(JobArchive& a, OutputSpec& output, const JobSpec& job) {
             got());
   }
   a.choice("background", output.background, kBackgrounds);
-  a.choices("aovs", output.aovs, kAovs);
+  const NamedSet<Aov> denoise{"denoise", {Aov::normal, Aov::variance, Aov::albedo, Aov::motion}};
+  a.choices("aovs", output.aovs, kAovs, std::span(&denoise, 1));
   a.choice("pixelType", output.pixel_type, kPixelTypes);
   a.word("compression", output.compression, kCompressions);
   a.number("framesPerSecond", output.frames_per_second, {1, 1000});
