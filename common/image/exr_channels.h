@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "common/base/result.h"
+#include "common/image/color_space.h"
 #include "common/image/film_tile.h"
 
 namespace baton {
@@ -17,5 +18,9 @@ using ChannelChoice =
 /// Like read_exr (image_io.h), but only the chosen channels, in the order of the choice: the others
 /// cost neither memory nor conversion. Errors: those of read_exr and of the choice.
 Result<FilmTile> read_exr_channels(const std::filesystem::path& path, const ChannelChoice& choose);
+
+/// The chromaticities that the header of an EXR file says, and those of Rec. 709 where it says none
+/// or has no colours.
+Result<PictureColors> read_exr_colors(const std::filesystem::path& path);
 
 }  // namespace baton

@@ -10,6 +10,8 @@
 #include <ImfRationalAttribute.h>
 #include <ImfStandardAttributes.h>
 #include <ImfStringAttribute.h>
+#include <ImfTimeCode.h>
+#include <ImfTimeCodeAttribute.h>
 #include <fmt/format.h>
 #include <half.h>
 
@@ -23,6 +25,7 @@
 #include "common/image/exr_channels.h"
 #include "common/image/exr_header.h"
 #include "common/image/image_io.h"
+#include "common/image/openexr_colors.h"
 
 namespace baton {
 namespace {
@@ -32,6 +35,7 @@ constexpr int kOpenExrThreads = 0;
 /// Of zlib. OpenEXR's own choice is 4: a quarter slower for files that are two per cent smaller.
 constexpr int kZipLevel = 1;
 constexpr float kMaxHalf = 65504.0f;
+constexpr int kMostSmpteFrames = 30;  // a second
 /// Rows read at a time, so that memory grows only with data that is really there.
 constexpr int kRowsPerRead = 256;
 
@@ -101,7 +105,20 @@ std::optional<std::string> attribute_text(const Imf::Attribute& attribute) {
   }
   if (const auto* ratio = dynamic_cast<const Imf::RationalAttribute*>(&attribute))
     return fmt::format("{}/{}", ratio->value().n, ratio->value().d);
+  if (const auto* code = dynamic_cast<const Imf::TimeCodeAttribute*>(&attribute)) {
+    const Imf::TimeCode& t = code->value();
+    return fmt::format("{:02}:{:02}:{:02}:{:02}", t.hours(), t.minutes(), t.seconds(), t.frame());
+  }
   return std::nullopt;
+}
+
+/// The field of frames counts to 39, and no rate between that and the largest of SMPTE is in use.
+void add_time_code(Imf::Header& header, int frame, double frames_per_second) {
+  const int rate = static_cast<int>(frames_per_second);
+  if (rate != frames_per_second || rate > kMostSmpteFrames) return;
+  const int second = frame / rate;
+  Imf::addTimeCode(header,
+                   Imf::TimeCode(second / 3600 % 24, second / 60 % 60, second % 60, frame % rate));
 }
 
 /// Header with channels and metadata.
@@ -130,8 +147,12 @@ Result<Imf::Header> make_header(const std::string& name, const FilmTile& image,
   }
   if (options.world_to_camera) Imf::addWorldToCamera(header, matrix(*options.world_to_camera));
   if (options.world_to_ndc) Imf::addWorldToNDC(header, matrix(*options.world_to_ndc));
-  if (options.frames_per_second)
+  if (options.frames_per_second) {
     Imf::addFramesPerSecond(header, Imf::guessExactFps(*options.frames_per_second));
+    if (options.frame_number)
+      add_time_code(header, *options.frame_number, *options.frames_per_second);
+  }
+  Imf::addChromaticities(header, to_openexr(options.chromaticities));
   return header;
 }
 
@@ -280,6 +301,15 @@ Result<FilmTile> read_exr_rows(const std::filesystem::path& path, int y0, int y1
     image.rect.y1 = std::min(image.rect.y1, y1);
     if (image.rect.y0 < image.rect.y1) read_planes(file, image);
     return image;
+  });
+}
+
+Result<PictureColors> read_exr_colors(const std::filesystem::path& path) {
+  return with_exr_file(path, [](Imf::InputFile& file) -> Result<PictureColors> {
+    const Imf::Header& header = file.header();
+    const bool has_colors = header.channels().findChannel("R") != nullptr;
+    if (!has_colors || !Imf::hasChromaticities(header)) return PictureColors{};
+    return PictureColors{.chromaticities = from_openexr(Imf::chromaticities(header))};
   });
 }
 

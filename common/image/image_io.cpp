@@ -59,6 +59,23 @@ Result<std::vector<std::string>> choose_rgb(const std::filesystem::path& path,
   return rgb;
 }
 
+/// Pixels as they are stored, as linear Rec. 709.
+Result<RgbImage> converted(const std::filesystem::path& path, RgbImage image,
+                           const PictureColors& colors) {
+  const Result<std::optional<Mat3>> matrix = to_rec709(colors.chromaticities);
+  if (!matrix) return Error{ErrorKind::bad_input, path.string() + ": " + matrix.error().message};
+  const Rgb& f = colors.factor;
+  const bool scales = !(f == Rgb{1, 1, 1});
+  for (std::size_t i = 0; (*matrix || scales) && i < image.rgb.size(); i += 3) {
+    Rgb color{image.rgb[i] / f.x, image.rgb[i + 1] / f.y, image.rgb[i + 2] / f.z};
+    if (*matrix) color = **matrix * color;
+    image.rgb[i] = color.x;
+    image.rgb[i + 1] = color.y;
+    image.rgb[i + 2] = color.z;
+  }
+  return image;
+}
+
 Result<RgbImage> rgb_from_exr(const std::filesystem::path& path) {
   BATON_ASSIGN(const FilmTile film,
                read_exr_channels(path, [&](const auto& all) { return choose_rgb(path, all); }));
@@ -72,18 +89,20 @@ Result<RgbImage> rgb_from_exr(const std::filesystem::path& path) {
   for (std::size_t i = 0; i < film.num_pixels(); ++i) {
     for (std::size_t c = 0; c < 3; ++c) image.rgb[i * 3 + c] = planes[c][i];
   }
-  return image;
+  if (film.channels.size() == 1) return image;
+  BATON_ASSIGN(const PictureColors colors, read_exr_colors(path));
+  return converted(path, std::move(image), colors);
 }
 
 Result<RgbImage> rgb_from_radiance(const std::filesystem::path& path) {
   BATON_ASSIGN(const Bytes bytes, read_file(path, limits::kMaxAssetFileBytes));
   BATON_ASSIGN(const RadianceHeader header, read_radiance_header(bytes, path.string()));
   if (!sides_ok(header.width, header.height)) return side_error(path, header.width, header.height);
-  return read_radiance_pixels(bytes, header, path.string());
+  BATON_ASSIGN(RgbImage image, read_radiance_pixels(bytes, header, path.string()));
+  return converted(path, std::move(image), header.colors);
 }
 
-/// Linear [0, 1] to 8-bit sRGB [IEC 61966-2-1]; NaN gives 0.
-std::uint8_t to_srgb8(float linear) {
+std::uint8_t channel_to_srgb8(float linear) {
   if (!(linear > 0)) return 0;
   const float clamped = std::min(linear, 1.0f);
   const float encoded =
@@ -107,11 +126,24 @@ Result<RgbImage> read_rgb_image(const std::filesystem::path& path) {
                fmt::format("{}: neither an EXR nor a Radiance HDR picture", path.string())};
 }
 
-Status write_png(const std::filesystem::path& path, const RgbImage& image) {
+Result<PictureColors> read_picture_colors(const std::filesystem::path& path) {
+  BATON_ASSIGN(const PictureFormat format, picture_format(path));
+  if (format == PictureFormat::exr) return read_exr_colors(path);
+  BATON_ASSIGN(const Bytes bytes, read_file(path, limits::kMaxAssetFileBytes));
+  BATON_ASSIGN(const RadianceHeader header, read_radiance_header(bytes, path.string()));
+  return header.colors;
+}
+
+std::vector<std::uint8_t> to_srgb8(const RgbImage& image) {
   BATON_CHECK(image.width > 0 && image.height > 0);
   BATON_CHECK(image.rgb.size() == static_cast<std::size_t>(image.width) * image.height * 3);
   std::vector<std::uint8_t> pixels(image.rgb.size());
-  std::ranges::transform(image.rgb, pixels.begin(), to_srgb8);
+  std::ranges::transform(image.rgb, pixels.begin(), channel_to_srgb8);
+  return pixels;
+}
+
+Status write_png(const std::filesystem::path& path, const RgbImage& image) {
+  const std::vector<std::uint8_t> pixels = to_srgb8(image);
 
   // Encode in memory, then publish.
   png_image png{};

@@ -9,6 +9,7 @@
 
 #include "common/base/bytes.h"
 #include "common/base/result.h"
+#include "common/image/color_space.h"
 #include "common/image/film_tile.h"
 
 namespace baton {
@@ -21,9 +22,13 @@ struct RgbImage {
 };
 
 /// Reads an EXR or Radiance HDR picture as float32 RGB (grey is spread to three channels, alpha
-/// dropped). Errors name the file: missing, not an image, truncated, sides past
+/// dropped), in linear Rec. 709 as the header says what its numbers are
+/// (read_picture_colors). Errors name the file: missing, not an image, truncated, sides past
 /// limits::kMaxEnvironmentSide, neither R, G, B nor one channel to spread.
 Result<RgbImage> read_rgb_image(const std::filesystem::path& path);
+/// What read_rgb_image converts from: `chromaticities` of an EXR file; PRIMARIES, EXPOSURE and
+/// COLORCORR of a Radiance one. Of a picture of one channel, only factors.
+Result<PictureColors> read_picture_colors(const std::filesystem::path& path);
 
 /// Header attribute of an EXR file.
 using ImageMetadata = std::vector<std::pair<std::string, std::string>>;
@@ -33,11 +38,15 @@ struct ExrOptions {
   bool half_float = true;
   bool float_colors = false;        ///< R, G and B are float32 whatever half_float says
   std::string compression = "zip";  ///< none, rle, zips, zip, piz
-  ImageMetadata metadata;
+  ImageMetadata metadata{};
   /// Attributes of their own, which compositors read: worldToCamera, worldToNDC (row by row; points
   /// are row vectors), framesPerSecond.
   std::optional<std::array<float, 16>> world_to_camera{}, world_to_ndc{};
   std::optional<double> frames_per_second{};
+  /// With frames_per_second, if that is a whole number that SMPTE counts (up to 30): timeCode,
+  /// frame 0 at 00:00:00:00, modulo a day.
+  std::optional<int> frame_number{};
+  Chromaticities chromaticities{};  ///< of R, G and B; written always
 };
 
 /// All channels of `image` (rect must start at 0, 0) as one scan-line EXR file in memory; `name`
@@ -55,11 +64,13 @@ Result<FilmTile> read_exr(const std::filesystem::path& path);
 /// table of blocks has gaps.
 Result<FilmTile> read_exr_rows(const std::filesystem::path& path, int y0, int y1);
 /// Metadata of an EXR file that `write_exr` made: attributes that are texts, 4x4 matrices (16
-/// numbers row by row) or rational numbers (n/d).
+/// numbers row by row), rational numbers (n/d) or time codes (hours:minutes:seconds:frames).
 Result<ImageMetadata> read_exr_metadata(const std::filesystem::path& path);
 
-/// 8-bit sRGB PNG from linear RGB, published atomically; values outside [0, 1] are clamped, NaN is
-/// black.
+/// 8-bit sRGB from linear RGB [IEC 61966-2-1], (height, width, 3); values outside [0, 1] are
+/// clamped, NaN is 0.
+std::vector<std::uint8_t> to_srgb8(const RgbImage& image);
+/// PNG of to_srgb8, published atomically.
 Status write_png(const std::filesystem::path& path, const RgbImage& image);
 
 }  // namespace baton

@@ -6,6 +6,7 @@
 #include <array>
 #include <charconv>
 #include <cmath>
+#include <optional>
 #include <string_view>
 
 namespace baton {
@@ -41,6 +42,46 @@ bool parse_sides(std::string_view line, int& width, int& height) {
     return error == std::errc();
   };
   return take_number("-Y ", height) && take_number(" +X ", width) && line.empty();
+}
+
+/// N numbers, apart by blanks.
+template <std::size_t N>
+std::optional<std::array<float, N>> parse_numbers(std::string_view text) {
+  std::array<float, N> numbers{};
+  for (float& number : numbers) {
+    text.remove_prefix(std::min(text.find_first_not_of(" \t"), text.size()));
+    const auto [end, error] = std::from_chars(text.data(), text.data() + text.size(), number);
+    if (error != std::errc() || !std::isfinite(number)) return std::nullopt;
+    text.remove_prefix(static_cast<std::size_t>(end - text.data()));
+  }
+  return numbers;
+}
+
+/// EXPOSURE, COLORCORR and PRIMARIES; other lines are let pass. The first two may come several
+/// times: each program that changed the pixels adds its own. False: not the numbers that it needs.
+bool take_color_setting(std::string_view line, PictureColors& colors) {
+  const auto value_of = [&](std::string_view key) {
+    return line.starts_with(key) ? std::optional(line.substr(key.size())) : std::nullopt;
+  };
+  std::optional<std::array<float, 3>> factor;
+  if (const auto value = value_of("EXPOSURE=")) {
+    const auto exposure = parse_numbers<1>(*value);
+    if (!exposure) return false;
+    factor = {(*exposure)[0], (*exposure)[0], (*exposure)[0]};
+  } else if (const auto correction = value_of("COLORCORR=")) {
+    factor = parse_numbers<3>(*correction);
+    if (!factor) return false;
+  } else if (const auto primaries = value_of("PRIMARIES=")) {
+    const auto xy = parse_numbers<8>(*primaries);
+    if (!xy) return false;
+    const auto& p = *xy;
+    colors.chromaticities = {{p[0], p[1]}, {p[2], p[3]}, {p[4], p[5]}, {p[6], p[7]}};
+  }
+  if (!factor) return true;
+  const Rgb f = colors.factor * Rgb{(*factor)[0], (*factor)[1], (*factor)[2]};
+  colors.factor = f;
+  const auto is_good = [](float v) { return v > 0 && std::isfinite(v); };
+  return is_good(f.x) && is_good(f.y) && is_good(f.z);
 }
 
 std::uint8_t byte_at(ByteView bytes, std::size_t i) {
@@ -115,15 +156,17 @@ Result<RadianceHeader> read_radiance_header(ByteView file, const std::string& na
   std::string_view line;
   if (!text.starts_with("#?")) return unreadable(name, "it does not begin with #?");
 
-  // Settings up to an empty line; only the pixel format matters.
+  // Settings up to an empty line.
+  RadianceHeader header;
   bool is_rgbe = false;
   do {
     if (!take_line(text, line)) return unreadable(name, "its header does not end");
     is_rgbe = is_rgbe || line == "FORMAT=32-bit_rle_rgbe";
+    if (!take_color_setting(line, header.colors))
+      return unreadable(name, fmt::format("a line {}", line.substr(0, 60)));
   } while (!line.empty());
   if (!is_rgbe) return unreadable(name, "no line FORMAT=32-bit_rle_rgbe");
 
-  RadianceHeader header;
   if (!take_line(text, line) || !parse_sides(line, header.width, header.height)) {
     return unreadable(name, "expected -Y HEIGHT +X WIDTH after its header");
   }

@@ -36,9 +36,17 @@ Result<MapReport> load_map(const std::string& path, const EnvironmentSpec& envir
   const EnvironmentMap map = make_map(image, environment, false);
   float brightest = 0;
   for (const float v : image.rgb) brightest = std::isfinite(v) ? std::max(brightest, v) : brightest;
-  return MapReport{path,        map.width(),  map.height(),
-                   image.width, image.height, map.repairs().total(),
-                   map.black(), brightest,    mean_over_sphere(image)};
+  BATON_ASSIGN(const PictureColors colors, read_picture_colors(path));
+  return MapReport{.path = path,
+                   .width = map.width(),
+                   .height = map.height(),
+                   .file_width = image.width,
+                   .file_height = image.height,
+                   .repaired_texels = map.repairs().total(),
+                   .black = map.black(),
+                   .brightest = brightest,
+                   .colors = conversion_text(colors),
+                   .mean = mean_over_sphere(image)};
 }
 
 void load_maps(const EnvironmentSpec& environment, AssetReport& report,

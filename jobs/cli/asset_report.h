@@ -17,6 +17,7 @@ struct MapReport {
   std::uint64_t repaired_texels = 0;    ///< negative, NaN or infinite ones, taken as 0
   bool black = false;
   float brightest = 0;  ///< the largest finite channel of the file
+  std::string colors;   ///< what was converted (conversion_text); empty: nothing
   float mean = 0;       ///< radiance over the sphere and the three channels, of finite ones
 };
 

@@ -47,6 +47,7 @@ void print_json(const JobSpec& job, const JobEstimate& e, const AssetReport& ass
                     {"height", map.height},
                     {"fileWidth", map.file_width},
                     {"fileHeight", map.file_height},
+                    {"colors", map.colors},
                     {"repairedTexels", map.repaired_texels},
                     {"black", map.black}});
   }
@@ -94,6 +95,7 @@ void print_assets(const AssetReport& assets) {
     fmt::print("map        {} ({}x{})\n", map.path, map.file_width, map.file_height);
     if (map.width < map.file_width)
       fmt::print("           reduced to {}x{}\n", map.width, map.height);
+    if (!map.colors.empty()) fmt::print("           converted: {}\n", map.colors);
   }
 }
 

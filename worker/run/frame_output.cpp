@@ -175,7 +175,8 @@ Result<WrittenFrame> write_frame(const JobSpec& job, const Digest& job_digest,
                            .metadata = frame_metadata(job, job_digest, number, quality, noise),
                            .world_to_camera = camera.world_to_camera(),
                            .world_to_ndc = camera.world_to_ndc(job.image.rendered()),
-                           .frames_per_second = job.output.frames_per_second}));
+                           .frames_per_second = job.output.frames_per_second,
+                           .frame_number = number}));
   BATON_TRY(write_file_verified(path, bytes, [&](const std::filesystem::path& temporary) {
     return verify_frame(temporary, image, frame_index);
   }));

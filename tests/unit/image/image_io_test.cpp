@@ -136,6 +136,27 @@ TEST_F(ImageIoTest, WritingSaysWhatIsWrong) {
   EXPECT_EQ(status.error().kind, ErrorKind::io);
 }
 
+/// The time code of frame `number`; empty: the header has none.
+std::string time_code(const std::filesystem::path& path, int number, double rate) {
+  FilmTile pixel{{0, 0, 1, 1}, {"R"}, {1}};
+  EXPECT_TRUE(write_exr(path, pixel, {.frames_per_second = rate, .frame_number = number}).ok());
+  const ImageMetadata metadata = read_exr_metadata(path).value();
+  for (const auto& [name, value] : metadata) {
+    if (name == "timeCode") return value;
+  }
+  return "";
+}
+
+TEST_F(ImageIoTest, TimeCodesCountFramesOfWholeRates) {
+  const auto path = folder_ / "t.exr";
+  EXPECT_EQ(time_code(path, 0, 24), "00:00:00:00");
+  EXPECT_EQ(time_code(path, 47, 24), "00:00:01:23");
+  EXPECT_EQ(time_code(path, 29, 30), "00:00:00:29");
+  EXPECT_EQ(time_code(path, 25 * 3600 * 25 + 61 * 25 + 3, 25), "01:01:01:03") << "modulo a day";
+  EXPECT_EQ(time_code(path, 12, 24000.0 / 1001), "");
+  EXPECT_EQ(time_code(path, 12, 48), "") << "past what the field holds";
+}
+
 TEST_F(ImageIoTest, ReadsRgbFromExrWithoutAlpha) {
   const FilmTile image = picture({"A", "B", "G", "R"});
   ASSERT_TRUE(write_exr(folder_ / "a.exr", image,

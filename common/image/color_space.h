@@ -1,0 +1,37 @@
+#pragma once
+
+#include <array>
+#include <optional>
+#include <string>
+
+#include "common/base/result.h"
+#include "common/math/vec3.h"
+
+namespace baton {
+
+/// CIE xy of the primaries and the white of an RGB space. The default, Rec. 709 with the white of
+/// D65, is the space that Baton works in and writes.
+struct Chromaticities {
+  std::array<float, 2> red{0.64f, 0.33f}, green{0.3f, 0.6f}, blue{0.15f, 0.06f};
+  std::array<float, 2> white{0.3127f, 0.3290f};
+
+  bool operator==(const Chromaticities&) const = default;
+};
+
+/// From linear RGB of a space to that of Rec. 709, white to white [Bradford, as in ICC.1:2010,
+/// annex E]. nullopt: it is Rec. 709, but for the rounding of a header. Error: no such space.
+Result<std::optional<Mat3>> to_rec709(const Chromaticities& from);
+
+/// What the header of a picture says of its numbers.
+struct PictureColors {
+  Chromaticities chromaticities;
+  Rgb factor{1, 1, 1};  ///< by which radiance was multiplied before it was stored, > 0
+
+  bool operator==(const PictureColors&) const = default;
+};
+
+/// "primaries (0.713, 0.293) ... converted to Rec. 709; divided by 2"; empty: the numbers are taken
+/// as they are.
+std::string conversion_text(const PictureColors& colors);
+
+}  // namespace baton
