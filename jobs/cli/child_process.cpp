@@ -20,7 +20,7 @@ namespace fs = std::filesystem;
 constexpr int kCannotRun = 127;
 
 /// What the child does between fork and exec: only calls that are safe there.
-[[noreturn]] void become_program(char* const* arguments, int log, pid_t parent) {
+[[noreturn]] void become_program(char* const* arguments, int output, int input, pid_t parent) {
   // Die with the parent, also when it died before this line.
   ::prctl(PR_SET_PDEATHSIG, SIGKILL);
   if (::getppid() != parent) ::_exit(kCannotRun);
@@ -29,9 +29,10 @@ constexpr int kCannotRun = 127;
   sigset_t none;
   sigemptyset(&none);
   ::sigprocmask(SIG_SETMASK, &none, nullptr);
-  ::dup2(log, STDOUT_FILENO);
-  ::dup2(log, STDERR_FILENO);
-  ::execv(arguments[0], arguments);
+  ::dup2(input, STDIN_FILENO);
+  ::dup2(output, STDOUT_FILENO);
+  ::dup2(output, STDERR_FILENO);
+  ::execvp(arguments[0], arguments);
   ::_exit(kCannotRun);
 }
 
@@ -43,7 +44,13 @@ Result<ChildProcess> ChildProcess::start(const std::vector<std::string>& command
   if (log_file < 0)
     return Error{ErrorKind::io,
                  fmt::format("{}: cannot open: {}", log.string(), std::strerror(errno))};
+  Result<ChildProcess> started = start(command, log_file);
+  ::close(log_file);
+  return started;
+}
 
+Result<ChildProcess> ChildProcess::start(const std::vector<std::string>& command, int output,
+                                         std::optional<int> input) {
   // Everything that needs memory comes before fork.
   std::vector<std::string> words = command;
   std::vector<char*> arguments;
@@ -52,8 +59,7 @@ Result<ChildProcess> ChildProcess::start(const std::vector<std::string>& command
 
   const pid_t parent = ::getpid();
   const pid_t pid = ::fork();
-  if (pid == 0) become_program(arguments.data(), log_file, parent);
-  ::close(log_file);
+  if (pid == 0) become_program(arguments.data(), output, input.value_or(STDIN_FILENO), parent);
   if (pid < 0)
     return Error{ErrorKind::io,
                  fmt::format("{}: cannot start: {}", command[0], std::strerror(errno))};

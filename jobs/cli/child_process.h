@@ -17,13 +17,20 @@ namespace baton {
 /// happens. The destructor kills it.
 class ChildProcess {
  public:
-  /// command: the program's path, then its arguments. stdout and stderr are appended to `log`.
+  /// command: the program's path, or its name where it is on the PATH, then its arguments. stdout
+  /// and stderr are appended to `log`.
   static Result<ChildProcess> start(const std::vector<std::string>& command,
                                     const std::filesystem::path& log);
+  /// The same with open files, which stay the caller's. input: none is this process's.
+  static Result<ChildProcess> start(const std::vector<std::string>& command, int output,
+                                    std::optional<int> input = std::nullopt);
 
   ChildProcess(ChildProcess&& other) noexcept;
   ChildProcess& operator=(ChildProcess&& other) noexcept;
   ~ChildProcess();
+
+  /// What ended() says of a command that is no program.
+  static constexpr const char* kCannotBeRun = "exit code 127";
 
   pid_t pid() const { return pid_; }
   /// How it ended: "exit code 2" or "signal 9 (Killed)"; nullopt while it runs.

@@ -14,6 +14,7 @@ void add_compare_command(CLI::App& app, ExitCode& code);
 void add_farm_command(CLI::App& app, ExitCode& code);
 void add_job_command(CLI::App& app, ExitCode& code);
 void add_key_command(CLI::App& app, ExitCode& code);
+void add_movie_command(CLI::App& app, ExitCode& code);
 void add_render_command(CLI::App& app, ExitCode& code);
 void add_state_command(CLI::App& app, ExitCode& code);
 void add_view_command(CLI::App& app, ExitCode& code);

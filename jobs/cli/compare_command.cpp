@@ -116,7 +116,7 @@ Status write_rows(const std::vector<Compared>& jobs, const fs::path& path) {
       numbers.push_back(frame);
     }
   }
-  return write_sheet(path, std::move(thumbnails), numbers, static_cast<int>(frames.size()), 0);
+  return write_sheet(path, std::move(thumbnails), numbers, static_cast<int>(frames.size()), {});
 }
 
 void print_table(const std::vector<Compared>& jobs, const fs::path& sheet) {

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <map>
 
 #include "jobs/cli/text.h"
 
@@ -74,7 +75,8 @@ Display display_depth(RgbImage image, const DisplayOptions& options) {
     const float share = far > near ? std::clamp((v - near) / (far - near), 0.0f, 1.0f) : 0;
     v = v > 0 && std::isfinite(v) ? light_of(1 - (1 - kFarGrey) * share) : 0;
   }
-  return {std::move(image), fmt::format("depth {:.4g} (white) to {:.4g} (dark grey)", near, far)};
+  return {std::move(image), fmt::format("depth {:.4g} (white) to {:.4g} (dark grey)", near, far),
+          std::pair{near, far}};
 }
 
 /// What a hundredth of the values exceed, of those that are above 0; 1: none is.
@@ -93,24 +95,62 @@ Display display_numbers(RgbImage image, bool is_share, const DisplayOptions& opt
   const float least = smallest < -1e-6f * most ? smallest : 0;  // but for what is rounded
   const auto [black, white] = options.range.value_or(std::pair{least, most});
   for (float& v : image.rgb) v = std::isfinite(v) ? light_of((v - black) / (white - black)) : 0;
-  return {std::move(image), fmt::format("{:.4g} (black) to {:.4g} (white)", black, white)};
+  return {std::move(image), fmt::format("{:.4g} (black) to {:.4g} (white)", black, white),
+          std::pair{black, white}};
+}
+
+/// The fit to the film curve of ACES, with its exposure: 1 becomes .80, 8 is nearly white
+/// [Narkowicz 2015, "ACES Filmic Tone Mapping Curve"]. NaN gives 0.
+float filmic(float v) {
+  const float x = v > 0 ? std::min(v, 1e4f) : 0;
+  return std::min(x * (2.51f * x + 0.03f) / (x * (2.43f * x + 0.59f) + 0.14f), 1.0f);
 }
 
 }  // namespace
 
-void add_exposure_option(CLI::App& command, std::optional<float>& stops) {
+void add_radiance_options(CLI::App& command, DisplayOptions& options) {
   command
-      .add_option("--exposure", stops,
-                  "stops by which a PNG is brighter, as in a viewer; default: 0")
+      .add_option("--exposure", options.stops,
+                  "stops by which a picture is brighter, as in a viewer; default: 0")
       ->check(CLI::Range(-100.0, 100.0));
+  const std::map<std::string, DisplayCurve> curves{{"none", DisplayCurve::none},
+                                                   {"filmic", DisplayCurve::filmic}};
+  command
+      .add_option("--curve", options.curve,
+                  "none: what is brighter than 1 is white; filmic: bright light fades to white; "
+                  "default: none")
+      ->transform(CLI::Transformer(curves).description("none|filmic"))
+      ->default_str("");
+}
+
+void add_aov_options(CLI::App& command, std::string& aov, DisplayOptions& options) {
+  command.add_option("--aov", aov, "an AOV of the file, such as depth; default: the colours");
+  using Range = std::pair<float, float>;
+  const auto set_range = [&options](const Range& range) {
+    if (!(range.first < range.second))
+      throw CLI::ValidationError("--range", fmt::format("{} {}: expected a larger second number",
+                                                        range.first, range.second));
+    options.range = range;
+  };
+  command.add_option_function<Range>(
+      "--range", set_range,
+      "LOW HIGH: the numbers of an AOV that are black and white (depth: white and dark grey); "
+      "default: 0 to 1, or by its values");
+}
+
+std::string radiance_text(const DisplayOptions& options) {
+  const float stops = options.stops.value_or(0);
+  return exposure_text(stops) + (stops == 0 ? "" : fmt::format(" (x{:.4g})", std::exp2(stops))) +
+         (options.curve == DisplayCurve::filmic ? ", filmic curve" : "");
 }
 
 Display display_radiance(RgbImage image, const DisplayOptions& options) {
-  const float stops = options.stops.value_or(0);
-  const float factor = std::exp2(stops);
-  for (float& v : image.rgb) v *= factor;
-  const std::string factor_text = stops == 0 ? "" : fmt::format(" (x{:.4g})", factor);
-  return {std::move(image), exposure_text(stops) + factor_text};
+  const float factor = std::exp2(options.stops.value_or(0));
+  for (float& v : image.rgb) {
+    v *= factor;
+    if (options.curve == DisplayCurve::filmic) v = filmic(v);
+  }
+  return {std::move(image), radiance_text(options)};
 }
 
 Result<Display> display_aov(const FilmTile& frame, const std::string& aov,

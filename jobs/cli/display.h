@@ -10,23 +10,33 @@
 
 namespace baton {
 
+/// What happens to radiance before it is shown. none: what is brighter than 1 is white.
+enum class DisplayCurve : std::uint8_t { none, filmic };
+
 /// How a picture becomes one of 8 bits a channel.
 struct DisplayOptions {
-  std::optional<float> stops;                    ///< radiance times 2^stops; none: 0
-  std::optional<std::pair<float, float>> range;  ///< of data: black, white; none: by its values
+  std::optional<float> stops{};  ///< radiance times 2^stops; none: 0
+  DisplayCurve curve = DisplayCurve::none;
+  std::optional<std::pair<float, float>> range{};  ///< of data: black, white; none: by its values
 };
 
 /// A picture for write_png, and what was done to it, for people.
 struct Display {
   RgbImage image;
   std::string how;  ///< "exposure +2 stops (x4)", "depth 1.2 (white) to 7.5 (dark grey)"
+  std::optional<std::pair<float, float>> range{};  ///< of data, given or by its values
 };
 
-/// Adds --exposure.
-void add_exposure_option(CLI::App& command, std::optional<float>& stops);
+/// Adds --exposure and --curve.
+void add_radiance_options(CLI::App& command, DisplayOptions& options);
+/// Adds --aov, and --range.
+void add_aov_options(CLI::App& command, std::string& aov, DisplayOptions& options);
 
-/// Radiance as a viewer shows it at this exposure: no tone curve, what is brighter than 1 is white.
+/// Radiance as a viewer shows it at this exposure and through this curve, black behind what is
+/// transparent.
 Display display_radiance(RgbImage image, const DisplayOptions& options);
+/// "exposure +2 stops, filmic curve".
+std::string radiance_text(const DisplayOptions& options);
 
 /// A frame's colours ("") or the named AOV. Colours and `lns` are shown as radiance. Vectors are
 /// shown as (v + 1) / 2. Single numbers go from 0, black, to 1, white, or to the largest where that

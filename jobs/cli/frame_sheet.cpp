@@ -6,7 +6,6 @@
 
 #include "common/image/contact_sheet.h"
 #include "common/job/sequence.h"
-#include "jobs/cli/display.h"
 
 namespace baton {
 namespace {
@@ -33,9 +32,9 @@ Result<RgbImage> read_thumbnail(const fs::path& path) {
 }
 
 Status write_sheet(const fs::path& path, std::vector<RgbImage> thumbnails,
-                   const std::vector<int>& numbers, int columns, float stops) {
+                   const std::vector<int>& numbers, int columns, const DisplayOptions& display) {
   for (RgbImage& thumbnail : thumbnails)
-    thumbnail = display_radiance(std::move(thumbnail), {stops, {}}).image;
+    thumbnail = display_radiance(std::move(thumbnail), display).image;
   return write_png(path, contact_sheet(thumbnails, columns, thumbnails.front().width, numbers));
 }
 
@@ -57,7 +56,7 @@ void FrameSheet::add(const std::vector<int>& finished) {
   }
 }
 
-Result<std::optional<fs::path>> FrameSheet::write(float stops) const {
+Result<std::optional<fs::path>> FrameSheet::write(const DisplayOptions& display) const {
   BATON_TRY(read_);
   if (thumbnails_.empty()) return std::optional<fs::path>();
 
@@ -69,7 +68,7 @@ Result<std::optional<fs::path>> FrameSheet::write(float stops) const {
   }
   const auto square = static_cast<int>(std::ceil(std::sqrt(static_cast<double>(frames.size()))));
   const fs::path path = fs::path(output_.directory) / "contact-sheet.png";
-  BATON_TRY(write_sheet(path, std::move(frames), numbers, std::min(square, kMaxColumns), stops));
+  BATON_TRY(write_sheet(path, std::move(frames), numbers, std::min(square, kMaxColumns), display));
   return std::optional(path);
 }
 

@@ -8,6 +8,7 @@
 #include "common/base/result.h"
 #include "common/image/image_io.h"
 #include "common/job/job_spec.h"
+#include "jobs/cli/display.h"
 
 namespace baton {
 
@@ -18,9 +19,9 @@ std::vector<int> pick_frames(const std::vector<int>& frames, std::size_t count);
 Result<RgbImage> read_thumbnail(const std::filesystem::path& path);
 
 /// Writes linear thumbnails in reading order with their frame numbers, all as a viewer shows them
-/// at this exposure (display_radiance). Errors: the disk.
+/// (display_radiance). Errors: the disk.
 Status write_sheet(const std::filesystem::path& path, std::vector<RgbImage> thumbnails,
-                   const std::vector<int>& numbers, int columns, float stops);
+                   const std::vector<int>& numbers, int columns, const DisplayOptions& display);
 
 /// contact-sheet.png of a job: at most 12 of its frames, evenly picked, all at one exposure. Frames
 /// are read as they are finished, so that little is left to do in the end.
@@ -33,7 +34,7 @@ class FrameSheet {
   void add(const std::vector<int>& finished);
 
   /// Writes what there is into the output folder; no sheet without a frame.
-  Result<std::optional<std::filesystem::path>> write(float stops) const;
+  Result<std::optional<std::filesystem::path>> write(const DisplayOptions& display) const;
 
  private:
   OutputSpec output_;

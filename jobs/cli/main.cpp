@@ -27,6 +27,7 @@ constexpr const char* kFooter = R"(Examples:
   baton render job.json              renders on this machine; again: goes on where it stopped
   baton render job.json --frames 12 --scale .25 --out look.png
   baton view frame.0012.exr --aov depth
+  baton movie job.json               the sequence as it looks: preview.mp4, or PNGs
   baton job submit job.json          hands the job to a coordinator (see --coordinator)
   baton job list
   baton worker list
@@ -76,6 +77,7 @@ int main(int argc, char** argv) {
   baton::add_chart_command(app, code);
   baton::add_compare_command(app, code);
   baton::add_view_command(app, code);
+  baton::add_movie_command(app, code);
   if (const std::string fault = unknown_command(app, argc, argv); !fault.empty()) {
     fmt::print(stderr, "{}\n", fault);
     return static_cast<int>(baton::ExitCode::usage);

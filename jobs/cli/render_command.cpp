@@ -56,7 +56,7 @@ void add_render_command(CLI::App& app, ExitCode& code) {
   CLI::App* command = app.add_subcommand("render", "Renders a job on this machine");
   add_job_argument(*command, options->job);
   command->add_option("--out", options->out, "also writes the only frame as PNG");
-  add_exposure_option(*command, options->exposure);
+  add_radiance_options(*command, options->display);
   command
       ->add_option("--workers", options->workers,
                    "worker processes; default: 1, whose threads share scene and light")

@@ -9,7 +9,6 @@
 
 #include "common/base/limits.h"
 #include "common/job/sequence.h"
-#include "jobs/cli/display.h"
 #include "jobs/cli/frame_sheet.h"
 #include "jobs/cli/job_summary.h"
 #include "jobs/cli/progress.h"
@@ -35,10 +34,10 @@ void print_result(const JobSpec& job, const JobDetail& detail, double seconds) {
 }
 
 /// A sheet that cannot be made is no failure of the job.
-void write_sheet(const FrameSheet& sheet, float stops, bool json) {
-  const Result<std::optional<std::filesystem::path>> path = sheet.write(stops);
+void write_sheet(const FrameSheet& sheet, const DisplayOptions& display, bool json) {
+  const Result<std::optional<std::filesystem::path>> path = sheet.write(display);
   if (!path) return spdlog::warn("no contact sheet: {}", path.error().message);
-  if (*path && !json) fmt::print("sheet      {}, {}\n", (*path)->string(), exposure_text(stops));
+  if (*path && !json) fmt::print("sheet      {}, {}\n", (*path)->string(), radiance_text(display));
 }
 
 }  // namespace
@@ -139,7 +138,7 @@ Result<std::optional<JobStatus>> RenderSession::render(JobSpec job, bool restart
   } else {
     print_result(job, *detail, std::chrono::duration<double>(Clock::now() - start).count());
   }
-  write_sheet(*sheet, options_.exposure.value_or(0), options_.json);
+  write_sheet(*sheet, options_.display, options_.json);
   if (status == JobStatus::done) BATON_TRY(write_png_of(job));
   if (status == JobStatus::failed) print_failures(*detail);
   if (status == JobStatus::paused || detail->lacks_room)
@@ -152,7 +151,7 @@ Result<std::optional<JobStatus>> RenderSession::render(JobSpec job, bool restart
 Status RenderSession::write_png_of(const JobSpec& job) const {
   if (options_.out.empty()) return {};
   BATON_ASSIGN(RgbImage image, read_rgb_image(frame_path(job, 0)));
-  const Display shown = display_radiance(std::move(image), {options_.exposure, {}});
+  const Display shown = display_radiance(std::move(image), options_.display);
   BATON_TRY(write_png(options_.out, shown.image));
   if (!options_.json) fmt::print("picture    {}, {}\n", options_.out, shown.how);
   return {};

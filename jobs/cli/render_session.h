@@ -7,6 +7,7 @@
 
 #include "common/protocol/messages.h"
 #include "jobs/cli/ask_farm.h"
+#include "jobs/cli/display.h"
 #include "jobs/cli/job_argument.h"
 
 namespace baton {
@@ -19,7 +20,7 @@ struct RenderOptions {
   std::string work_directory;         ///< empty: .baton in the output folder
   std::uint64_t store_limit_mib = 0;  ///< 0: as the disk has room
   std::string out;                    ///< the only frame as PNG; empty: none
-  std::optional<float> exposure;
+  DisplayOptions display;             ///< of the sheet and of `out`
   bool watch = false;
   bool restart = false;
   std::optional<int> from_frame;

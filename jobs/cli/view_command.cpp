@@ -13,7 +13,6 @@ struct ViewOptions {
   std::string frame;
   std::string aov;  ///< empty: the colours
   std::string out;  ///< empty: beside the frame
-  std::vector<float> range;
   DisplayOptions display;
 };
 
@@ -22,13 +21,7 @@ fs::path default_output(const ViewOptions& options) {
   return fs::path(options.frame).replace_extension(end);
 }
 
-Result<ExitCode> run_view(ViewOptions options) {
-  if (!options.range.empty()) {
-    if (!(options.range[0] < options.range[1]))
-      return Error{ErrorKind::usage, fmt::format("--range {} {}: expected a larger second number",
-                                                 options.range[0], options.range[1])};
-    options.display.range = {options.range[0], options.range[1]};
-  }
+Result<ExitCode> run_view(const ViewOptions& options) {
   BATON_ASSIGN(const FilmTile frame, read_exr(options.frame));
   const Result<Display> shown = display_aov(frame, options.aov, options.display);
   if (!shown)
@@ -45,14 +38,8 @@ void add_view_command(CLI::App& app, ExitCode& code) {
   auto options = std::make_shared<ViewOptions>();
   CLI::App* command = app.add_subcommand("view", "Writes a frame, or one of its AOVs, as PNG");
   command->add_option("FRAME", options->frame, "EXR file")->required();
-  command->add_option("--aov", options->aov,
-                      "an AOV of the file, such as depth; default: the colours");
-  add_exposure_option(*command, options->display.stops);
-  command
-      ->add_option("--range", options->range,
-                   "LOW HIGH: the numbers of an AOV that are black and white (depth: white and "
-                   "dark grey); default: 0 to 1, or by its values")
-      ->expected(2);
+  add_radiance_options(*command, options->display);
+  add_aov_options(*command, options->aov, options->display);
   command->add_option("--out", options->out, "default: FRAME.png, FRAME.AOV.png beside it");
   command->footer(
       "Examples:\n"
