@@ -18,6 +18,7 @@ inline constexpr int kMaxQueuedMessages = 4096;  // per connection, either way
 inline constexpr int kMaxSections = 64;          // of one state or film file
 inline constexpr int kMaxChannels = 256;         // of one picture
 inline constexpr int kMaxImageSide = 32768;
+inline constexpr int kMaxOverscan = 4096;  // pixels on a side
 inline constexpr int kMaxFrames = 100000;
 inline constexpr int kMaxFrameNumber = 9999999;
 inline constexpr int kMaxMaterials = 4096;

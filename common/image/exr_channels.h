@@ -11,13 +11,17 @@
 
 namespace baton {
 
+/// What of an EXR file is read: all that it holds, or what it shows, without the pixels around it.
+/// Of a file whose data does not fill its display window, the data there is within.
+enum class ExrWindow : std::uint8_t { data, display };
 /// The channels wanted of those that a file has, by name.
 using ChannelChoice =
     std::function<Result<std::vector<std::string>>(const std::vector<std::string>& all)>;
 
 /// Like read_exr (image_io.h), but only the chosen channels, in the order of the choice: the others
 /// cost neither memory nor conversion. Errors: those of read_exr and of the choice.
-Result<FilmTile> read_exr_channels(const std::filesystem::path& path, const ChannelChoice& choose);
+Result<FilmTile> read_exr_channels(const std::filesystem::path& path, const ChannelChoice& choose,
+                                   ExrWindow window = ExrWindow::data);
 
 /// The chromaticities that the header of an EXR file says, and those of Rec. 709 where it says none
 /// or has no colours.

@@ -18,6 +18,7 @@
 #include <algorithm>
 #include <array>
 #include <exception>
+#include <limits>
 #include <optional>
 
 #include "common/base/files.h"
@@ -121,6 +122,11 @@ void add_time_code(Imf::Header& header, int frame, double frames_per_second) {
                    Imf::TimeCode(second / 3600 % 24, second / 60 % 60, second % 60, frame % rate));
 }
 
+/// Both corners belong to OpenEXR's boxes.
+Imath::Box2i box_of(const PixelRect& rect) {
+  return {Imath::V2i(rect.x0, rect.y0), Imath::V2i(rect.x1 - 1, rect.y1 - 1)};
+}
+
 /// Header with channels and metadata.
 Result<Imf::Header> make_header(const std::string& name, const FilmTile& image,
                                 const ExrOptions& options) {
@@ -130,7 +136,7 @@ Result<Imf::Header> make_header(const std::string& name, const FilmTile& image,
                  fmt::format("{}: compression {}, expected none, rle, zips, zip or piz", name,
                              options.compression)};
   }
-  Imf::Header header(image.rect.width(), image.rect.height());
+  Imf::Header header(box_of(options.display_window.value_or(image.rect)), box_of(image.rect));
   header.compression() = *compression;
   header.zipCompressionLevel() = kZipLevel;
   for (const std::string& channel : image.channels) {
@@ -156,6 +162,13 @@ Result<Imf::Header> make_header(const std::string& name, const FilmTile& image,
   return header;
 }
 
+/// The address that pixel (0, 0) would have, which OpenEXR wants, where `rect` is stored from
+/// `base`.
+char* at_corner(char* base, const PixelRect& rect, std::size_t pixel_bytes) {
+  const auto bytes = static_cast<std::ptrdiff_t>(pixel_bytes);
+  return base - bytes * (std::ptrdiff_t{rect.y0} * rect.width() + rect.x0);
+}
+
 /// The whole file in memory. Throws what OpenEXR throws.
 Bytes encode_planes(const std::string& name, const Imf::Header& header, const FilmTile& image) {
   const std::size_t width = static_cast<std::size_t>(image.rect.width());
@@ -172,8 +185,10 @@ Bytes encode_planes(const std::string& name, const Imf::Header& header, const Fi
     }
     const std::size_t pixel_bytes = type == Imf::HALF ? sizeof(half) : sizeof(float);
     // OpenEXR only reads through this pointer when it writes a file.
-    frame_buffer.insert(image.channels[c], Imf::Slice(type, const_cast<char*>(base), pixel_bytes,
-                                                      pixel_bytes * width));
+    frame_buffer.insert(
+        image.channels[c],
+        Imf::Slice(type, at_corner(const_cast<char*>(base), image.rect, pixel_bytes), pixel_bytes,
+                   pixel_bytes * width));
   }
   MemoryStream stream(name.c_str());
   {
@@ -182,6 +197,13 @@ Bytes encode_planes(const std::string& name, const Imf::Header& header, const Fi
     file.writePixels(image.rect.height());
   }
   return stream.take();
+}
+
+PixelRect rect_of(const Imath::Box2i& box) {
+  const auto past = [](int last) {
+    return last == std::numeric_limits<int>::max() ? last : last + 1;
+  };
+  return {box.min.x, box.min.y, past(box.max.x), past(box.max.y)};
 }
 
 /// Rectangle and channel names of an open file, checked against the limits.
@@ -220,10 +242,8 @@ void read_planes(Imf::InputFile& file, FilmTile& image) {
     Imf::FrameBuffer frame_buffer;
     for (std::size_t c = 0; c < planes.size(); ++c) {
       planes[c].resize(width * static_cast<std::size_t>(y1 - image.rect.y0));
-      // OpenEXR wants the address that pixel (0, 0) would have.
-      const auto origin = -static_cast<std::ptrdiff_t>(sizeof(float)) * image.rect.x0 -
-                          static_cast<std::ptrdiff_t>(row_bytes) * image.rect.y0;
-      char* base = reinterpret_cast<char*>(planes[c].data()) + origin;
+      char* const base =
+          at_corner(reinterpret_cast<char*>(planes[c].data()), image.rect, sizeof(float));
       frame_buffer.insert(image.channels[c],
                           Imf::Slice(Imf::FLOAT, base, sizeof(float), row_bytes));
     }
@@ -257,8 +277,7 @@ auto with_exr_file(const std::filesystem::path& path, Use use)
 
 Result<Bytes> encode_exr(const std::string& name, const FilmTile& image,
                          const ExrOptions& options) {
-  BATON_CHECK(image.rect.x0 == 0 && image.rect.y0 == 0 &&
-              image.rect.fits_within(limits::kMaxImageSide));
+  BATON_CHECK(image.rect.fits_within(limits::kMaxImageSide, limits::kMaxOverscan));
   BATON_CHECK(!image.channels.empty() &&
               image.values.size() == image.channels.size() * image.num_pixels());
   try {
@@ -276,18 +295,22 @@ Status write_exr(const std::filesystem::path& path, const FilmTile& image,
   return write_file_atomic(path, bytes);
 }
 
-Result<FilmTile> read_exr_channels(const std::filesystem::path& path, const ChannelChoice& choose) {
+Result<FilmTile> read_exr_channels(const std::filesystem::path& path, const ChannelChoice& choose,
+                                   ExrWindow window) {
   return with_exr_file(path, [&](Imf::InputFile& file) -> Result<FilmTile> {
     BATON_ASSIGN(FilmTile image, describe(file.header(), path.string()));
     BATON_ASSIGN(image.channels, choose(image.channels));
     read_planes(file, image);
-    return image;
+    if (window == ExrWindow::data) return image;
+    const PixelRect shown = common_part(rect_of(file.header().displayWindow()), image.rect);
+    const bool is_all = shown == image.rect || shown.width() < 1 || shown.height() < 1;
+    return is_all ? std::move(image) : part_of(image, shown);
   });
 }
 
-Result<FilmTile> read_exr(const std::filesystem::path& path) {
+Result<FilmTile> read_exr(const std::filesystem::path& path, ExrWindow window) {
   const auto every = [](const std::vector<std::string>& all) { return Result(all); };
-  return read_exr_channels(path, every);
+  return read_exr_channels(path, every, window);
 }
 
 Result<FilmTile> read_exr_rows(const std::filesystem::path& path, int y0, int y1) {

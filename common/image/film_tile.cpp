@@ -60,10 +60,11 @@ Status decode_meta(const SectionFile& file, const std::string& name, StoredFilm&
 
   // Check the rectangle.
   const PixelRect& rect = tile.rect;
-  if (!rect.fits_within(limits::kMaxImageSide)) {
+  if (!rect.fits_within(limits::kMaxImageSide, limits::kMaxOverscan)) {
     return fail(
-        fmt::format("has rectangle [{}, {}) x [{}, {}), expected a non-empty one within 0..{}",
-                    rect.x0, rect.x1, rect.y0, rect.y1, limits::kMaxImageSide));
+        fmt::format("has rectangle [{}, {}) x [{}, {}), expected a non-empty one within {}..{}",
+                    rect.x0, rect.x1, rect.y0, rect.y1, -limits::kMaxOverscan,
+                    limits::kMaxImageSide + limits::kMaxOverscan));
   }
   return {};
 }
@@ -78,6 +79,21 @@ const float* FilmTile::find(std::string_view channel) const {
 
 float* FilmTile::find(std::string_view channel) {
   return const_cast<float*>(std::as_const(*this).find(channel));
+}
+
+FilmTile part_of(const FilmTile& film, const PixelRect& rect) {
+  BATON_CHECK(film.rect.contains(rect) && rect.area() > 0);
+  FilmTile part{rect, film.channels, {}};
+  part.values.reserve(part.channels.size() * part.num_pixels());
+  for (std::size_t c = 0; c < film.channels.size(); ++c) {
+    for (std::int32_t y = rect.y0; y < rect.y1; ++y) {
+      const float* const row = film.plane(c) +
+                               std::ptrdiff_t{y - film.rect.y0} * film.rect.width() +
+                               (rect.x0 - film.rect.x0);
+      part.values.insert(part.values.end(), row, row + rect.width());
+    }
+  }
+  return part;
 }
 
 Bytes encode_film_tile(const FilmTile& tile, const FilmOrigin& origin) {

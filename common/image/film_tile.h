@@ -28,6 +28,9 @@ struct FilmTile {
   const float* find(std::string_view channel) const;
 };
 
+/// The pixels of a film that lie in `rect`, which it contains.
+FilmTile part_of(const FilmTile& film, const PixelRect& rect);
+
 /// Which pass made a film. Stored; values are for ever.
 enum class FilmPass : std::uint8_t { first = 0, second = 1 };
 

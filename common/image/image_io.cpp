@@ -77,8 +77,10 @@ Result<RgbImage> converted(const std::filesystem::path& path, RgbImage image,
 }
 
 Result<RgbImage> rgb_from_exr(const std::filesystem::path& path) {
-  BATON_ASSIGN(const FilmTile film,
-               read_exr_channels(path, [&](const auto& all) { return choose_rgb(path, all); }));
+  BATON_ASSIGN(
+      const FilmTile film,
+      read_exr_channels(
+          path, [&](const auto& all) { return choose_rgb(path, all); }, ExrWindow::display));
   RgbImage image{film.rect.width(), film.rect.height(), {}};
   if (!sides_ok(image.width, image.height)) return side_error(path, image.width, image.height);
 

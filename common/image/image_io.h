@@ -10,6 +10,7 @@
 #include "common/base/bytes.h"
 #include "common/base/result.h"
 #include "common/image/color_space.h"
+#include "common/image/exr_channels.h"
 #include "common/image/film_tile.h"
 
 namespace baton {
@@ -21,8 +22,8 @@ struct RgbImage {
   std::vector<float> rgb;  ///< (height, width, 3)
 };
 
-/// Reads an EXR or Radiance HDR picture as float32 RGB (grey is spread to three channels, alpha
-/// dropped), in linear Rec. 709 as the header says what its numbers are
+/// Reads an EXR (its display window) or Radiance HDR picture as float32 RGB (grey is spread to
+/// three channels, alpha dropped), in linear Rec. 709 as the header says what its numbers are
 /// (read_picture_colors). Errors name the file: missing, not an image, truncated, sides past
 /// limits::kMaxEnvironmentSide, neither R, G, B nor one channel to spread.
 Result<RgbImage> read_rgb_image(const std::filesystem::path& path);
@@ -46,20 +47,23 @@ struct ExrOptions {
   /// With frames_per_second, if that is a whole number that SMPTE counts (up to 30): timeCode,
   /// frame 0 at 00:00:00:00, modulo a day.
   std::optional<int> frame_number{};
+  /// What is shown, in pixels of the picture, with its corner at (0, 0); none: all.
+  std::optional<PixelRect> display_window{};
   Chromaticities chromaticities{};  ///< of R, G and B; written always
 };
 
-/// All channels of `image` (rect must start at 0, 0) as one scan-line EXR file in memory; `name`
-/// goes first in every error. Bytes are deterministic (no dates, no host names). Values past half's
-/// largest, 65504, stop there in half channels. Errors: unknown compression, a metadata key twice.
+/// All channels of `image`, whose rectangle is the data window, as one scan-line EXR file in
+/// memory; `name` goes first in every error. Bytes are deterministic (no dates, no host names).
+/// Values past half's largest, 65504, stop there in half channels. Errors: unknown compression, a
+/// metadata key twice.
 Result<Bytes> encode_exr(const std::string& name, const FilmTile& image, const ExrOptions& options);
 /// Publishes the encoded file atomically, with missing folders. Errors: encode_exr's, the disk.
 Status write_exr(const std::filesystem::path& path, const FilmTile& image,
                  const ExrOptions& options);
 /// Reads every channel of a flat EXR file as float32, in file order, which is alphabetical. The
-/// rectangle is the data window. Errors name the file: missing, not an EXR, truncated, subsampled
-/// channels, past the limits of picture sides.
-Result<FilmTile> read_exr(const std::filesystem::path& path);
+/// rectangle is that of the pixels in the file's coordinates. Errors name the file: missing, not an
+/// EXR, truncated, subsampled channels, past the limits of picture sides.
+Result<FilmTile> read_exr(const std::filesystem::path& path, ExrWindow window = ExrWindow::data);
 /// Rows y0 to y1 - 1 of every channel, clipped to the data window. Errors: read_exr's, a file whose
 /// table of blocks has gaps.
 Result<FilmTile> read_exr_rows(const std::filesystem::path& path, int y0, int y1);

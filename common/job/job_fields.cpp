@@ -62,6 +62,26 @@ void region_fields(JobArchive& a, ImageSpec& image) {
   image.region = PixelRect{x, y, x + static_cast<int>(r[2]), y + static_cast<int>(r[3])};
 }
 
+/// The pixels on the left, on top, on the right and below; four NaN: none.
+void overscan_fields(JobArchive& a, ImageSpec& image) {
+  const Overscan& old = image.overscan;
+  std::array<double, 4> sides{double(old.left), double(old.top), double(old.right),
+                              double(old.bottom)};
+  if (old == Overscan{}) sides.fill(std::numeric_limits<double>::quiet_NaN());
+  if (!a.numbers("overscan", sides, {.min = 0, .max = limits::kMaxOverscan}, true)) return;
+  const bool whole =
+      std::all_of(sides.begin(), sides.end(), [](double n) { return n == std::floor(n); });
+  const auto at = [&](std::size_t i) { return static_cast<int>(sides[i]); };
+  if (whole) image.overscan = {at(0), at(1), at(2), at(3)};
+  const PixelRect extent = image.extent();
+  if (!whole || std::max(extent.width(), extent.height()) > limits::kMaxImageSide) {
+    a.fault("overscan",
+            fmt::format("whole pixels, and with them at most {} a side", limits::kMaxImageSide),
+            fmt::format("[{}]", fmt::join(sides, ", ")));
+    image.overscan = {};
+  }
+}
+
 void fields(JobArchive& a, ImageSpec& image) {
   a.integer("width", image.width, 1, limits::kMaxImageSide);
   a.integer("height", image.height, 1, limits::kMaxImageSide);
@@ -73,6 +93,7 @@ void fields(JobArchive& a, ImageSpec& image) {
   a.choice("filter", image.filter, kPixelFilters);
   a.integer("tileSize", image.tile_size, limits::kMinTileSize, limits::kMaxTileSize);
   region_fields(a, image);
+  overscan_fields(a, image);
   a.integer("siteSeed", image.site_seed);
   // Applied where it is read: what is written is the smaller image.
   double scale = std::numeric_limits<double>::quiet_NaN();

@@ -29,21 +29,37 @@ enum class PixelFilter : std::uint8_t {
   blackman_harris,  ///< to 1.5 pixels from the centre
 };
 
+/// Pixels that are rendered around a picture, [0, limits::kMaxOverscan] each.
+struct Overscan {
+  int left = 0, top = 0, right = 0, bottom = 0;
+
+  bool operator==(const Overscan&) const = default;
+  PixelRect around(const PixelRect& rect) const {
+    return {rect.x0 - left, rect.y0 - top, rect.x1 + right, rect.y1 + bottom};
+  }
+};
+
 struct ImageSpec {
   int width = 640;   ///< pixels of the whole picture, [1, limits::kMaxImageSide]
   int height = 360;  ///< pixels
   int sites = 1;     ///< primary rays per pixel: 1, 4, 9 or 16 (stratified)
   PixelFilter filter = PixelFilter::box;
   int tile_size = 64;                 ///< side of a farm tile in pixels; never changes the picture
-  std::optional<PixelRect> region{};  ///< the part that is rendered, inside the whole; none: all
+  std::optional<PixelRect> region{};  ///< the part that is shown, inside the whole; none: all
+  Overscan overscan{};                ///< around what is shown
   std::uint64_t site_seed = 0;        ///< of the sites' places in their pixels; 0: the job's seed
 
   bool operator==(const ImageSpec&) const = default;
-  /// The pixels that are rendered. Pixels are always addressed by their place in the whole picture.
-  PixelRect rendered() const { return region.value_or(PixelRect{0, 0, width, height}); }
+  /// Pixels are always addressed by their place in the whole picture, whose corner is (0, 0). What
+  /// frames show: their display window.
+  PixelRect shown() const { return region.value_or(PixelRect{0, 0, width, height}); }
+  /// The pixels that are rendered: their data window.
+  PixelRect rendered() const { return overscan.around(shown()); }
+  /// The whole picture with its overscan; every region lies inside with its own.
+  PixelRect extent() const { return overscan.around({0, 0, width, height}); }
 };
 
-/// The image with its sides times `scale`, (0, 1]; a region grows to whole pixels.
+/// The image with its sides times `scale`, (0, 1]; region and overscan grow to whole pixels.
 ImageSpec scaled(const ImageSpec& image, double scale);
 
 // ---- motion

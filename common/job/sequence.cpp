@@ -84,6 +84,9 @@ ImageSpec scaled(const ImageSpec& image, double scale) {
   if (const auto& r = image.region)
     small.region = PixelRect{low(r->x0, small.width), low(r->y0, small.height),
                              high(r->x1, small.width), high(r->y1, small.height)};
+  for (int* const pixels :
+       {&small.overscan.left, &small.overscan.top, &small.overscan.right, &small.overscan.bottom})
+    *pixels = static_cast<int>(std::ceil(*pixels * scale));
   return small;
 }
 

@@ -3,6 +3,8 @@
 #include <array>
 #include <cstdint>
 
+#include "common/base/limits.h"
+
 namespace baton {
 
 /// Philox4x32-10 [Salmon et al. 2011, "Parallel random numbers: as easy as 1, 2, 3"]: 128 random
@@ -54,7 +56,7 @@ constexpr float uniform_float(std::uint32_t bits) {
 }
 
 /// The address of a pixel's randomness: (job seed, frame, round, pixel, pass, step, index).
-/// pixel: y * image_width + x, so no tiling enters. Equal addresses give equal numbers, on any
+/// pixel: that of pixel_key, so no tiling enters. Equal addresses give equal numbers, on any
 /// thread or host.
 struct RngKey {
   std::uint64_t job_seed = 0;
@@ -65,12 +67,21 @@ struct RngKey {
   /// Key of Philox: another one for each round.
   constexpr std::uint64_t philox_key() const { return job_seed + 0x9E3779B97F4A7C15ull * round; }
 };
+/// A number for each pixel: y * image_width + x from the first row on, from the left edge to the
+/// right one. Pixels outside of these, which overscan has, count in a larger picture, behind all
+/// others: width + 2 margins to a row. Limits of sides and overscan keep both parts below 2^31.
+constexpr std::uint32_t pixel_number(std::int32_t image_width, std::int32_t x, std::int32_t y) {
+  if (y >= 0 && x >= 0 && x < image_width) return static_cast<std::uint32_t>(y * image_width + x);
+  constexpr std::int32_t kMargin = limits::kMaxOverscan;
+  return 0x80000000u +
+         static_cast<std::uint32_t>((y + kMargin) * (image_width + 2 * kMargin) + x + kMargin);
+}
 /// The address of pixel (x, y) of frame number `frame` in images of `image_width` pixels. round: of
 /// the frame; negative: one that is not seen.
 constexpr RngKey pixel_key(std::uint64_t job_seed, std::int32_t frame, std::int32_t image_width,
                            std::int32_t x, std::int32_t y, std::int32_t round = 0) {
-  return {job_seed, static_cast<std::uint32_t>(frame),
-          static_cast<std::uint32_t>(y * image_width + x), static_cast<std::uint32_t>(round)};
+  return {job_seed, static_cast<std::uint32_t>(frame), pixel_number(image_width, x, y),
+          static_cast<std::uint32_t>(round)};
 }
 
 class Rng {

@@ -16,13 +16,27 @@ struct PixelRect {
   constexpr bool contains(std::int32_t x, std::int32_t y) const {
     return x >= x0 && x < x1 && y >= y0 && y < y1;
   }
+  /// The same rectangle in coordinates whose origin is the upper left corner of `rect`.
+  constexpr PixelRect relative_to(const PixelRect& rect) const {
+    return {x0 - rect.x0, y0 - rect.y0, x1 - rect.x0, y1 - rect.y0};
+  }
   /// The rectangle of this size at (0, 0).
-  constexpr PixelRect at_origin() const { return {0, 0, width(), height()}; }
-  /// Not empty, and inside [0, max_side) both ways.
-  constexpr bool fits_within(std::int32_t max_side) const {
-    return x0 >= 0 && y0 >= 0 && x0 < x1 && y0 < y1 && x1 <= max_side && y1 <= max_side;
+  constexpr PixelRect at_origin() const { return relative_to(*this); }
+  /// Whether `rect` lies inside.
+  constexpr bool contains(const PixelRect& rect) const {
+    return rect.x0 >= x0 && rect.y0 >= y0 && rect.x1 <= x1 && rect.y1 <= y1;
+  }
+  /// Not empty, and inside [-margin, max_side + margin) both ways.
+  constexpr bool fits_within(std::int32_t max_side, std::int32_t margin = 0) const {
+    return x0 >= -margin && y0 >= -margin && x0 < x1 && y0 < y1 && x1 <= max_side + margin &&
+           y1 <= max_side + margin;
   }
 };
+
+/// What two rectangles have in common; without area where that is nothing.
+constexpr PixelRect common_part(const PixelRect& a, const PixelRect& b) {
+  return {std::max(a.x0, b.x0), std::max(a.y0, b.y0), std::min(a.x1, b.x1), std::min(a.y1, b.y1)};
+}
 
 /// `rect` and what lies within `margin` of it, inside of `image`.
 constexpr PixelRect grown(const PixelRect& rect, std::int32_t margin, const PixelRect& image) {

@@ -52,8 +52,8 @@ Status decode_meta(const SectionFile& file, const std::string& name, FirstPassSa
     *value = reader.get<std::int32_t>();
   }
   const bool good = s.frame_index >= 0 && s.frame_index < limits::kMaxFrames && s.tile >= 0 &&
-                    s.rect.fits_within(limits::kMaxImageSide) && s.num_slots >= 1 &&
-                    s.num_slots <= limits::kMaxParticles &&
+                    s.rect.fits_within(limits::kMaxImageSide, limits::kMaxOverscan) &&
+                    s.num_slots >= 1 && s.num_slots <= limits::kMaxParticles &&
                     (s.num_populations == 1 || s.num_populations == 2) &&
                     s.num_slots % s.num_populations == 0;
   if (good) return {};

@@ -153,9 +153,10 @@ Status decode_meta(const SectionFile& file, const std::string& name, SampleState
   if (state.frame_index < 0 || state.frame_index >= limits::kMaxFrames || state.tile < 0) {
     return fail(fmt::format("frame index {}, tile {}", state.frame_index, state.tile));
   }
-  if (!rect.fits_within(limits::kMaxImageSide)) {
-    return fail(fmt::format("rectangle [{}, {}) x [{}, {}), expected a non-empty one within 0..{}",
-                            rect.x0, rect.x1, rect.y0, rect.y1, limits::kMaxImageSide));
+  if (!rect.fits_within(limits::kMaxImageSide, limits::kMaxOverscan)) {
+    return fail(fmt::format("rectangle [{}, {}) x [{}, {}), expected a non-empty one within {}..{}",
+                            rect.x0, rect.x1, rect.y0, rect.y1, -limits::kMaxOverscan,
+                            limits::kMaxImageSide + limits::kMaxOverscan));
   }
   const int fewest = file.find(kMemorySummary) != nullptr ? 0 : 1;
   if (state.num_particles < fewest || state.num_particles > limits::kMaxParticles) {

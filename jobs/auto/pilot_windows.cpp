@@ -51,7 +51,7 @@ StudyScene pilot_scene(const JobSpec& window) {
   scene.name = fmt::format("frames from {}", window.frames.front());
   const auto num_measured = static_cast<std::ptrdiff_t>(std::min(window.frames.size(), kMeasured));
   scene.frames = {window.frames.end() - num_measured, window.frames.end()};
-  const PixelRect image = window.image.rendered();
+  const PixelRect image = window.image.shown();
   scene.crop = {0, 0, image.width(), image.height()};
   for (std::size_t half = 0; half < 2; ++half) {
     JobSpec& reference = scene.reference[half];

@@ -105,11 +105,15 @@ void print_text(const JobSpec& job, const JobEstimate& e, const AssetReport& ass
   };
   fmt::print("job        {}\n", job.name);
   fmt::print("frames     {} ({})\n", e.frames, format_frames(job.frames));
-  const PixelRect image = job.image.rendered();
+  const PixelRect image = job.image.shown();
   fmt::print("image      {}x{}, {} tiles\n", image.width(), image.height(), e.tiles);
   if (job.image.region)
     fmt::print("           from ({}, {}) of {}x{}\n", image.x0, image.y0, job.image.width,
                job.image.height);
+  if (const Overscan& o = job.image.overscan; o != Overscan{})
+    fmt::print("           overscan {} left, {} on top, {} right, {} below: {}x{} are rendered\n",
+               o.left, o.top, o.right, o.bottom, job.image.rendered().width(),
+               job.image.rendered().height());
   print_assets(assets);
   fmt::print("tasks      {}: {} to render ({} a tile), {} to assemble; {} dependencies\n",
              e.tasks(), e.render_tasks, e.runs, e.assemble_tasks, e.dependencies);

@@ -79,7 +79,7 @@ Status check_alike(const std::vector<Compared>& jobs, const CompareOptions& opti
                                                      key, what, options.jobs.front())};
     };
     if (job.frames != first.frames) return differ("frames", "those of");
-    const PixelRect image = job.image.rendered(), first_image = first.image.rendered();
+    const PixelRect image = job.image.shown(), first_image = first.image.shown();
     if (image.width() != first_image.width() || image.height() != first_image.height())
       return differ("image", "the size of that of");
     for (std::size_t j = 0; j < i; ++j) {

@@ -11,8 +11,9 @@ namespace fs = std::filesystem;
 
 struct ViewOptions {
   std::string frame;
-  std::string aov;  ///< empty: the colours
-  std::string out;  ///< empty: beside the frame
+  std::string aov;        ///< empty: the colours
+  std::string out;        ///< empty: beside the frame
+  bool overscan = false;  ///< with the pixels around the picture
   DisplayOptions display;
 };
 
@@ -22,7 +23,8 @@ fs::path default_output(const ViewOptions& options) {
 }
 
 Result<ExitCode> run_view(const ViewOptions& options) {
-  BATON_ASSIGN(const FilmTile frame, read_exr(options.frame));
+  BATON_ASSIGN(const FilmTile frame,
+               read_exr(options.frame, options.overscan ? ExrWindow::data : ExrWindow::display));
   const Result<Display> shown = display_aov(frame, options.aov, options.display);
   if (!shown)
     return Error{shown.error().kind, fmt::format("{}: {}", options.frame, shown.error().message)};
@@ -40,6 +42,7 @@ void add_view_command(CLI::App& app, ExitCode& code) {
   command->add_option("FRAME", options->frame, "EXR file")->required();
   add_radiance_options(*command, options->display);
   add_aov_options(*command, options->aov, options->display);
+  command->add_flag("--overscan", options->overscan, "with the pixels around the picture, if any");
   command->add_option("--out", options->out, "default: FRAME.png, FRAME.AOV.png beside it");
   command->footer(
       "Examples:\n"

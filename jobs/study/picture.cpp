@@ -21,7 +21,7 @@ std::vector<float> plane(const FilmTile& film, const std::string& name) {
 }  // namespace
 
 Result<Picture> read_picture(const std::filesystem::path& path) {
-  BATON_ASSIGN(const FilmTile film, read_exr(path));
+  BATON_ASSIGN(const FilmTile film, read_exr(path, ExrWindow::display));
   Picture picture;
   picture.image = {film.rect.width(), film.rect.height(), {}};
   picture.image.rgb.resize(3 * film.num_pixels());

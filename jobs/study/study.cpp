@@ -177,7 +177,7 @@ void read_scene(StudyObject& object, const Shared& shared, Study& study, StudyFa
 
   // The reference.
   prepare_output(*plain);
-  scene.crop = read_crop(object, plain->image.rendered(), faults);
+  scene.crop = read_crop(object, plain->image.shown(), faults);
   scene.frames = measured_frames(shared.measured, *plain, shared.measured_path, faults);
   if (scene.cut_frame > 0 &&
       !std::binary_search(scene.frames.begin() + 1, scene.frames.end(), scene.cut_frame)) {

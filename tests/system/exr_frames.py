@@ -13,10 +13,18 @@ TYPES = {0: ("I", 4), 1: ("e", 2), 2: ("f", 4)}
 
 
 class Frame:
-    """A decoded EXR file: channels[name] is an array of floats, row by row; sample_bytes: of all samples, unpacked."""
+    """A decoded EXR file: channels[name] is an array of floats, row by row; sample_bytes: of all samples, unpacked.
+    Windows are (x0, y0, x1, y1), half-open; width and height are those of the data window."""
 
-    def __init__(self, width, height, channels, sample_bytes):
-        self.width, self.height, self.channels, self.sample_bytes = width, height, channels, sample_bytes
+    def __init__(self, window, display, channels, sample_bytes):
+        self.window, self.display, self.channels, self.sample_bytes = window, display, channels, sample_bytes
+        self.width, self.height = window[2] - window[0], window[3] - window[1]
+
+    def shown(self, name):
+        """The values of a channel in the display window, which the data must fill."""
+        (x0, y0, x1, y1), (left, top) = self.display, self.window[:2]
+        rows = ((y - top) * self.width - left for y in range(y0, y1))
+        return [value for row in rows for value in self.channels[name][row + x0:row + x1]]
 
 
 def read_frame(path, values=None):
@@ -24,7 +32,7 @@ def read_frame(path, values=None):
     data = Path(path).read_bytes()
     if data[:4] != MAGIC:
         raise ValueError(f"{path}: expected an EXR file of scan lines")
-    at, layout, window, compression = 8, [], None, None
+    at, layout, window, display, compression = 8, [], None, None, None
     while data[at]:
         name_end = data.index(0, at)
         kind_end = data.index(0, name_end + 1)
@@ -35,10 +43,12 @@ def read_frame(path, values=None):
         if name == "channels":
             layout = read_channel_list(value)
         elif name == "dataWindow":
-            window = struct.unpack("<4i", value)
+            window = read_box(value)
+        elif name == "displayWindow":
+            display = read_box(value)
         elif name == "compression":
             compression = COMPRESSIONS[value[0]]
-    width, height = window[2] - window[0] + 1, window[3] - window[1] + 1
+    width, height = window[2] - window[0], window[3] - window[1]
     sample_bytes = width * height * sum(TYPES[kind][1] for _, kind in layout)
     if compression == "piz":
         channels = {name: array("f", values(path, name)) for name, _ in layout}
@@ -47,7 +57,13 @@ def read_frame(path, values=None):
     for name, plane in channels.items():
         if len(plane) != width * height:
             raise ValueError(f"{path}: {name}: {len(plane)} pixels, expected {width * height}")
-    return Frame(width, height, channels, sample_bytes)
+    return Frame(window, display, channels, sample_bytes)
+
+
+def read_box(value):
+    """Half-open; in the file both corners belong to it."""
+    x0, y0, x1, y1 = struct.unpack("<4i", value)
+    return x0, y0, x1 + 1, y1 + 1
 
 
 def read_channel_list(value):

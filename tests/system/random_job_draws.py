@@ -95,6 +95,7 @@ class Draw(Motion, Textures):
             "metadata.*": lambda: self.pick("x", "two words", "a \u00e4 \u4e2d \" \\ text", "long " * 200),
             "image.width": lambda: self.side(), "image.height": lambda: self.side(),
             "image.tileSize": lambda: self.tile_size(), "image.region": nothing, "image.scale": nothing,
+            "image.overscan": lambda: self.overscan() if self.chance(0.2) else None,
             "output.directory": nothing,
             "output.pattern": lambda: self.pick(None, "f.#.exr", "a b ######.exr", "\u00e4####x.exr"),
             # 16 bits hide what differs in the last ones.
@@ -319,6 +320,10 @@ class Draw(Motion, Textures):
             if job["image"][side] == 1:
                 return
             job["image"][side] = (job["image"][side] + 1) // 2
+
+    def overscan(self):
+        """Now and then as much as the picture itself."""
+        return self.pick(0, 1, 9, [self.pick(0, 0, 2, 17) for _ in range(4)])
 
     def part_of_image(self, image):
         """Sometimes a region and a smaller scale."""

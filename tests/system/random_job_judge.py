@@ -242,11 +242,26 @@ def judge_frames(frames, job, predicted):
         wider = 6 * frame.width * frame.height if is_bright and is_half else 0
         require(frame.sample_bytes == predicted["frameBytes"] + wider, "frame bytes",
                 f"{name}: {frame.sample_bytes} bytes of samples, predicted {predicted['frameBytes']} + {wider}")
-        require((frame.width, frame.height) == rendered_size(job.get("image", {})), "size",
-                f"{name}: {frame.width}x{frame.height}")
+        windows = windows_of(job.get("image", {}))
+        require((frame.display, frame.window) == windows, "size",
+                f"{name}: shows {frame.display} of {frame.window}, expected {windows}")
+
+
+def windows_of(image):
+    """Display and data window of the frames, half-open: a region of that size, and its overscan around it."""
+    scale, around = image.get("scale", 1), image.get("overscan", 0)
+    left, top, right, bottom = (math.ceil(side * scale) for side in (around if isinstance(around, list) else 4 * [around]))
+    width, height = shown_size(image)
+    return (0, 0, width, height), (-left, -top, width + right, height + bottom)
 
 
 def rendered_size(image):
+    """Width and height of the data window."""
+    x0, y0, x1, y1 = windows_of(image)[1]
+    return x1 - x0, y1 - y0
+
+
+def shown_size(image):
     """Width and height of the frames: those of the region, each edge scaled and moved out to a whole pixel."""
     scale = image.get("scale", 1)
     # Halves are rounded up, as in C.

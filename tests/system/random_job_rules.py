@@ -21,7 +21,10 @@ def work_of(job, num_frames):
     if method_carries_memory(sampling["method"]):
         rounds += job.get("state", {}).get("preroll", 2) / num_frames
     rounds *= job.get("quality", {}).get("sweeps", 1)
-    return image["width"] * image["height"] * num_frames * of_pixel * rounds
+    around = image.get("overscan", 0)
+    left, top, right, bottom = around if isinstance(around, list) else 4 * [around]
+    pixels = (image["width"] + left + right) * (image["height"] + top + bottom)
+    return pixels * num_frames * of_pixel * rounds
 
 
 def method_carries_memory(method):

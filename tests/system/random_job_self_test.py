@@ -138,7 +138,7 @@ def wild_maps_hold_what_readers_mend(_):
 
 
 def frames_of(*pixels):
-    return {"frame.0001.exr": Frame(2, 2, {"R": array("f", pixels), "A": array("f", [1, 1, 1, 1])}, 32)}
+    return {"frame.0001.exr": Frame((0, 0, 2, 2), (0, 0, 2, 2), {"R": array("f", pixels), "A": array("f", [1, 1, 1, 1])}, 32)}
 
 
 def raises(kind, function, *arguments):
@@ -176,6 +176,12 @@ def wrong_numbers_are_found(_):
         raises("not finite", judge_frames, frames_of(0, 1, bad, 2), job, predicted)
     raises("frame bytes", judge_frames, frames_of(0, 1, 2, 3), job, {"frameBytes": 28})
     raises("size", judge_frames, frames_of(0, 1, 2, 3), {"image": {"width": 4, "height": 1}}, predicted)
+    # The same pixels, but one of them around the picture; and where they should be.
+    wide = {"image": {"width": 1, "height": 2, "overscan": [1, 0, 0, 0]}}
+    raises("size", judge_frames, frames_of(0, 1, 2, 3), wide, predicted)
+    frames = frames_of(0, 1, 2, 3)
+    frames["frame.0001.exr"].window, frames["frame.0001.exr"].display = (-1, 0, 1, 2), (0, 0, 1, 2)
+    judge_frames(frames, wide, predicted)
 
 
 def wrong_predictions_are_found(_):

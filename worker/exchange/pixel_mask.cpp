@@ -56,8 +56,11 @@ SquarePartitions::SquarePartitions(const PixelRect& image, std::int32_t side, st
 
 PixelRect SquarePartitions::square(std::int32_t partition, std::int32_t x, std::int32_t y) const {
   const Offset& offset = offsets_[static_cast<std::size_t>(partition)];
-  const std::int32_t x0 = (x - image_.x0 + offset.x) / side_ * side_ - offset.x + image_.x0;
-  const std::int32_t y0 = (y - image_.y0 + offset.y) / side_ * side_ - offset.y + image_.y0;
+  const auto corner = [&](std::int32_t at, std::int32_t shift) {
+    const std::int32_t rest = (at + shift) % side_;
+    return at - (rest < 0 ? rest + side_ : rest);
+  };
+  const std::int32_t x0 = corner(x, offset.x), y0 = corner(y, offset.y);
   return {std::max(x0, image_.x0), std::max(y0, image_.y0), std::min(x0 + side_, image_.x1),
           std::min(y0 + side_, image_.y1)};
 }

@@ -77,9 +77,9 @@ class PixelMask {
 PixelMask dilate(const PixelMask& mask, std::int32_t radius, const PixelMask& allowed,
                  const PixelRect& rect);
 
-/// The image cut into squares by several partitions of different offsets. Offsets are drawn without
-/// replacement among the side^2 possible ones, and again from the start when there are more
-/// partitions than that.
+/// The image cut into squares by several partitions of different offsets from pixel (0, 0). Offsets
+/// are drawn without replacement among the side^2 possible ones, and again from the start when
+/// there are more partitions than that.
 class SquarePartitions {
  public:
   /// side >= 1, count >= 1.

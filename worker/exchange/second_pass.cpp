@@ -54,8 +54,8 @@ ExchangeMasks make_masks(const VisibilitySpec& visibility, const SampleRegion& s
 /// The exchange, fold by fold.
 void exchange(const SecondPassWork& work, std::span<Rgb> radiance, RenderStats& stats) {
   const JobSpec& job = work.context.job;
-  const SquarePartitions partitions({0, 0, job.image.width, job.image.height},
-                                    job.visibility.tile_size, job.visibility.partitions,
+  const SquarePartitions partitions(job.image.extent(), job.visibility.tile_size,
+                                    job.visibility.partitions,
                                     Rng({.job_seed = job.seed,
                                          .frame = static_cast<std::uint32_t>(work.frame.number),
                                          .pixel = 0},

@@ -219,7 +219,7 @@ Result<TaskOutput> execute_assemble(const LoadedJob& loaded, const BlobStore& st
     pasted[static_cast<std::size_t>(input.tile)] = true;
   }
 
-  image.rect = image.rect.at_origin();
+  image.rect = image.rect.relative_to(loaded.job.image.shown());
   BATON_ASSIGN(const WrittenFrame written,
                write_frame(loaded.job, loaded.digest, task.step, std::move(image)));
   return TaskOutput{{written.file}, {}, {{task.step, task.tile, {}, written.quality}}};

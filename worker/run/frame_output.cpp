@@ -43,10 +43,10 @@ void drop_channel(FilmTile& image, std::string_view name) {
 
 Status verify_frame(const std::filesystem::path& path, const FilmTile& image, std::int32_t block) {
   const std::int32_t num_blocks = (image.rect.height() + kRowsVerified - 1) / kRowsVerified;
-  const std::int32_t y0 = block % num_blocks * kRowsVerified;
-  const std::int32_t y1 = std::min(y0 + kRowsVerified, image.rect.height());
+  const std::int32_t y0 = image.rect.y0 + block % num_blocks * kRowsVerified;
+  const std::int32_t y1 = std::min(y0 + kRowsVerified, image.rect.y1);
   BATON_ASSIGN(const FilmTile stored, read_exr_rows(path, y0, y1));
-  if (stored.rect != PixelRect{0, y0, image.rect.width(), y1} ||
+  if (stored.rect != PixelRect{image.rect.x0, y0, image.rect.x1, y1} ||
       stored.channels.size() != image.channels.size()) {
     return Error{
         ErrorKind::corrupt,
@@ -56,7 +56,7 @@ Status verify_frame(const std::filesystem::path& path, const FilmTile& image, st
   }
 
   // Channels may come in any order.
-  const std::size_t offset = static_cast<std::size_t>(y0) * image.rect.width();
+  const std::size_t offset = static_cast<std::size_t>(y0 - image.rect.y0) * image.rect.width();
   for (std::size_t channel = 0; channel < image.channels.size(); ++channel) {
     const std::string& name = image.channels[channel];
     const float* const read = stored.find(name);
@@ -67,11 +67,12 @@ Status verify_frame(const std::filesystem::path& path, const FilmTile& image, st
     const float* const wrote = image.plane(channel) + offset;
     for (std::size_t pixel = 0; pixel < stored.num_pixels(); ++pixel) {
       if (same_after_rounding(wrote[pixel], read[pixel])) continue;
-      const auto width = static_cast<std::size_t>(image.rect.width());
-      return Error{
-          ErrorKind::corrupt,
-          fmt::format("{}: channel {} pixel {},{}: read back {}, wrote {}", path.string(), name,
-                      pixel % width, (offset + pixel) / width, read[pixel], wrote[pixel])};
+      const auto width = static_cast<std::int64_t>(image.rect.width());
+      const auto place = static_cast<std::int64_t>(offset + pixel);
+      return Error{ErrorKind::corrupt,
+                   fmt::format("{}: channel {} pixel {},{}: read back {}, wrote {}", path.string(),
+                               name, image.rect.x0 + place % width, image.rect.y0 + place / width,
+                               read[pixel], wrote[pixel])};
     }
   }
   return {};
@@ -174,9 +175,10 @@ Result<WrittenFrame> write_frame(const JobSpec& job, const Digest& job_digest,
                            .compression = job.output.compression,
                            .metadata = frame_metadata(job, job_digest, number, quality, noise),
                            .world_to_camera = camera.world_to_camera(),
-                           .world_to_ndc = camera.world_to_ndc(job.image.rendered()),
+                           .world_to_ndc = camera.world_to_ndc(job.image.shown()),
                            .frames_per_second = job.output.frames_per_second,
-                           .frame_number = number}));
+                           .frame_number = number,
+                           .display_window = job.image.shown().at_origin()}));
   BATON_TRY(write_file_verified(path, bytes, [&](const std::filesystem::path& temporary) {
     return verify_frame(temporary, image, frame_index);
   }));

@@ -65,7 +65,7 @@ class FrameCollector {
       stats.merge(second.stats);
       BATON_TRY(paste_tile(second.film, image));
     }
-    image.rect = image.rect.at_origin();
+    image.rect = image.rect.relative_to(job_.image.shown());
     BATON_TRY(sink_(frame_index, image));
     return stats;
   }

@@ -19,9 +19,14 @@ constexpr std::array kAngles{89, 88, 87, 85, 83, 80, 75, 70, 60, 45, 30};
 float reach_of(const CameraSpec& camera, const ImageSpec& image) {
   float reach = 0.5f * camera.aperture;
   if (camera.projection == Projection::orthographic) {
-    const float aspect = static_cast<float>(image.width) / static_cast<float>(image.height);
+    const auto pictures = [&](int pixels) {
+      return static_cast<float>(pixels) / static_cast<float>(image.height);
+    };
+    const Overscan& around = image.overscan;
     reach += camera.orthographic_height *
-             (0.5f * (1 + aspect) + std::fabs(camera.shift[0]) + std::fabs(camera.shift[1]));
+             (0.5f * (1 + pictures(image.width)) + std::fabs(camera.shift[0]) +
+              std::fabs(camera.shift[1]) + pictures(std::max(around.left, around.right)) +
+              pictures(std::max(around.top, around.bottom)));
   }
   return reach;
 }

@@ -95,12 +95,11 @@ TEST(Dilate, GrowsASquareWithinWhatIsAllowed) {
   }
 }
 
-TEST(SquarePartitions, EachIsAPartitionOfTheImage) {
-  const PixelRect image{0, 0, 13, 8};
+void expect_partitions_of(const PixelRect& image) {
   const SquarePartitions partitions(image, 5, 30, Rng({.job_seed = 9}, PassId::partition));
   for (std::int32_t c = 0; c < partitions.count(); ++c) {
-    for (std::int32_t y = 0; y < 8; ++y) {
-      for (std::int32_t x = 0; x < 13; ++x) {
+    for (std::int32_t y = image.y0; y < image.y1; ++y) {
+      for (std::int32_t x = image.x0; x < image.x1; ++x) {
         const PixelRect square = partitions.square(c, x, y);
         ASSERT_TRUE(square.contains(x, y));
         EXPECT_LE(square.width(), 5);
@@ -111,6 +110,20 @@ TEST(SquarePartitions, EachIsAPartitionOfTheImage) {
         EXPECT_EQ(partitions.square(c, square.x1 - 1, square.y1 - 1), square);
       }
     }
+  }
+}
+
+TEST(SquarePartitions, EachIsAPartitionOfTheImage) {
+  expect_partitions_of({0, 0, 13, 8});
+  expect_partitions_of({-7, -11, 9, 3});
+}
+
+TEST(SquarePartitions, OverscanMovesNoSquare) {
+  const Rng rng({.job_seed = 9}, PassId::partition);
+  const SquarePartitions plain({0, 0, 13, 18}, 5, 25, rng), wide({-3, -9, 14, 30}, 5, 25, rng);
+  for (std::int32_t c = 0; c < plain.count(); ++c) {
+    EXPECT_EQ(wide.square(c, 6, 6), plain.square(c, 6, 6));
+    EXPECT_EQ(common_part(wide.square(c, 0, 0), {0, 0, 13, 18}), plain.square(c, 0, 0));
   }
 }
 

@@ -69,7 +69,7 @@ TEST(FilmTile, AnyChangedByteAndAnyTruncationIsAnError) {
 
 TEST(FilmTile, MetaMustDescribeThePixels) {
   EXPECT_THAT(meta_error(2, 4), HasSubstr("t.btf: section META has rectangle [4, 4) x [8, 9)"));
-  EXPECT_THAT(meta_error(0, -1), HasSubstr("rectangle [-1, 6)"));
+  EXPECT_THAT(meta_error(0, -4097), HasSubstr("rectangle [-4097, 6)"));
   EXPECT_THAT(meta_error(2, 7), HasSubstr("section PIXL has 16 bytes, expected 24"));
   EXPECT_THAT(meta_error(4, 0), HasSubstr("has 0 channels, expected 1 to 256"));
   EXPECT_THAT(meta_error(4, 1), HasSubstr("is not a rectangle, a list of names, a job"));

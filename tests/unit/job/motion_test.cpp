@@ -136,6 +136,12 @@ TEST(ImageSpec, ScalesARegionToWholePixels) {
   EXPECT_EQ(dot.rendered(), (PixelRect{0, 0, 1, 1}));
 }
 
+TEST(ImageSpec, ScalesOverscanToWholePixels) {
+  const ImageSpec image{.width = 640, .height = 360, .overscan = {10, 0, 1, 4096}};
+  EXPECT_EQ(scaled(image, 0.25).overscan, (Overscan{3, 0, 1, 1024}));
+  EXPECT_EQ(scaled(image, 0.25).rendered(), (PixelRect{-3, 0, 161, 1114}));
+}
+
 Result<JobSpec> parse(const std::string& motion, const std::string& object = "") {
   return parse_job(
       R"({"name": "m", "environment": {"map": "a.exr"}, "scene": {"materials": {"m": {"type": "diffuse"}},

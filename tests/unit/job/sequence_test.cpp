@@ -80,6 +80,36 @@ TEST(ImageSpec, IsReadWithARegionAndScaled) {
   EXPECT_EQ(to_json(image_of("{}").value()).find("region"), std::string::npos);
 }
 
+TEST(ImageSpec, IsReadWithOverscan) {
+  const auto image_of = [](const std::string& image) {
+    return parse_job(
+        R"({"name": "t", "scene": {}, "environment": {"map": "a.exr"}, "image": )" + image + "}",
+        "job", "/");
+  };
+  const Result<JobSpec> one = image_of(R"({"overscan": 8})");
+  ASSERT_TRUE(one) << one.error().message;
+  EXPECT_EQ(one->image.overscan, (Overscan{8, 8, 8, 8}));
+  EXPECT_EQ(one->image.shown(), (PixelRect{0, 0, 640, 360}));
+  EXPECT_EQ(one->image.rendered(), (PixelRect{-8, -8, 648, 368}));
+  const Result<JobSpec> job =
+      image_of(R"({"region": [20, 40, 100, 60], "overscan": [1, 2, 3, 4]})");
+  ASSERT_TRUE(job) << job.error().message;
+  EXPECT_EQ(job->image.rendered(), (PixelRect{19, 38, 123, 104}));
+  EXPECT_EQ(parse_job(to_json(*job), "again", "/").value(), *job);
+  EXPECT_EQ(to_json(image_of(R"({"overscan": 0})").value()).find("overscan"), std::string::npos)
+      << "as without the key: the digest of a picture stays";
+  EXPECT_EQ(image_of(R"({"overscan": [1, 2]})").error().message,
+            "job: $.image.overscan: expected a number or a list of 4 numbers, got a list of 2");
+  EXPECT_EQ(image_of(R"({"overscan": -1})").error().message,
+            "job: $.image.overscan: expected a number in [0, 4096], got -1");
+  EXPECT_EQ(image_of(R"({"overscan": [1, 2, 0.5, 4]})").error().message,
+            "job: $.image.overscan: expected whole pixels, and with them at most 32768 a side, got "
+            "[1, 2, 0.5, 4]");
+  EXPECT_EQ(image_of(R"({"width": 32768, "height": 1, "overscan": 1})").error().message,
+            "job: $.image.overscan: expected whole pixels, and with them at most 32768 a side, got "
+            "[1, 1, 1, 1]");
+}
+
 // Runs of a job that was shorter stay as they were.
 TEST(Runs, LeadingOnesComeBeforeTheRegularOnes) {
   JobSpec job;

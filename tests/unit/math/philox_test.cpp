@@ -32,6 +32,29 @@ TEST(Philox, RunsAtCompileTime) {
   static_assert(Philox4x32::block({0, 0, 0, 0}, 0)[0] == 0x6627e8d5u);
 }
 
+TEST(PixelNumber, CountsThePictureRowByRowWithoutItsOverscan) {
+  EXPECT_EQ(pixel_number(640, 0, 0), 0u);
+  EXPECT_EQ(pixel_number(640, 639, 1), 1279u);
+  EXPECT_EQ(pixel_number(640, 5, 400), 400u * 640 + 5) << "below, too";
+}
+
+TEST(PixelNumber, NoTwoPixelsShareOne) {
+  const std::int32_t width = 7, margin = 12;
+  std::set<std::uint32_t> numbers;
+  for (std::int32_t y = -margin; y < 5 + margin; ++y) {
+    for (std::int32_t x = -margin; x < width + margin; ++x)
+      numbers.insert(pixel_number(width, x, y));
+  }
+  EXPECT_EQ(numbers.size(), static_cast<std::size_t>((5 + 2 * margin) * (width + 2 * margin)));
+  // The largest picture, at its corners.
+  constexpr std::int32_t kSide = limits::kMaxImageSide, kMargin = limits::kMaxOverscan;
+  const std::uint32_t first = pixel_number(kSide, -kMargin, -kMargin);
+  const std::uint32_t last = pixel_number(kSide, kSide + kMargin - 1, kSide + kMargin - 1);
+  EXPECT_EQ(first, 0x80000000u);
+  EXPECT_EQ(last, 0x80000000u + 40960u * 40960u - 1);
+  EXPECT_LT(pixel_number(kSide, kSide - 1, kSide + kMargin - 1), first);
+}
+
 TEST(UniformFloat, StaysBelowOne) {
   EXPECT_EQ(uniform_float(0), 0.0f);
   EXPECT_LT(uniform_float(0xffffffffu), 1.0f);

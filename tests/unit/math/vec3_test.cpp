@@ -65,6 +65,9 @@ TEST(PixelRect, FitsWithinItsImageWhenNotEmpty) {
   EXPECT_FALSE((PixelRect{0, 0, 9, 8}.fits_within(8)));
   EXPECT_FALSE((PixelRect{-1, 0, 8, 8}.fits_within(8)));
   EXPECT_FALSE((PixelRect{3, 0, 3, 8}.fits_within(8)));
+  EXPECT_TRUE((PixelRect{-2, 0, 8, 10}.fits_within(8, 2)));
+  EXPECT_FALSE((PixelRect{-3, 0, 8, 8}.fits_within(8, 2)));
+  EXPECT_FALSE((PixelRect{0, 0, 8, 11}.fits_within(8, 2)));
 }
 
 }  // namespace

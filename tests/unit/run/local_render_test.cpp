@@ -69,6 +69,38 @@ TEST(LocalRender, ARegionIsThatPartOfTheWholePicture) {
   }
 }
 
+// Overscan changes nothing inside, whatever is cut off on the sides.
+TEST(LocalRender, APictureIsTheSameBytesWithOverscan) {
+  JobSpec job = test::box_job();
+  job.image = {.width = 21, .height = 17, .sites = 4, .tile_size = 8};
+  job.frames = test::frame_numbers(3);
+  job.output.aovs = {Aov::source, Aov::normal, Aov::depth, Aov::motion, Aov::crypto_object};
+  const PixelRect region{3, 5, 14, 17};
+  for (const Method method : {Method::pool, Method::sequential, Method::bidirectional}) {
+    job.sampling.method = method;
+    job.image.overscan = {};
+    const std::vector<FilmTile> plain = images(job, 1);
+    job.image.overscan = {5, 0, 2, 9};
+    const std::vector<FilmTile> wide = images(job, 1);
+    job.image.region = region;
+    const std::vector<FilmTile> part = images(job, 1);
+    job.image.region.reset();
+    for (std::size_t frame = 0; frame < plain.size(); ++frame) {
+      EXPECT_EQ(wide[frame].rect, (PixelRect{-5, 0, 23, 26}));
+      EXPECT_EQ(part_of(wide[frame], {0, 0, 21, 17}), plain[frame]) << traits(method).name;
+      EXPECT_EQ(part[frame].rect, (PixelRect{-5, 0, 13, 21}));
+      FilmTile same = part_of(wide[frame], {-2, 5, 16, 26});
+      same.rect = part[frame].rect;
+      EXPECT_EQ(part[frame], same) << traits(method).name << ": a region with overscan";
+    }
+  }
+}
+
+TEST(LocalRender, TilingsDoNotShowInTheOverscanOfWhatMoves) {
+  expect_no_tiling_in_the_second_pass_of_what_moves(
+      {.width = 21, .height = 17, .sites = 4, .overscan = {6, 3, 0, 5}});
+}
+
 // At the border of the region what moves in starts afresh; nothing else may go wrong.
 TEST(LocalRender, TilingsDoNotShowInARegionOfWhatMoves) {
   expect_no_tiling_in_the_second_pass_of_what_moves(

@@ -216,7 +216,7 @@ TEST(SampleState, BadMetaIsRefusedBeforeAnythingIsAllocated) {
   const Case cases[] = {
       {16, -1, "frame index -1"},
       {20, -1, "tile -1"},
-      {24, -1, "rectangle [-1"},
+      {24, -4097, "rectangle [-4097"},
       {32, 10, "rectangle [10, 10)"},
       {32, 40000, "[10, 40000)"},
       {40, 0, "0 particles"},
