@@ -142,7 +142,8 @@ Result<Imf::Header> make_header(const std::string& name, const FilmTile& image,
   for (const std::string& channel : image.channels) {
     const bool is_half = options.half_float && !always_float(channel) &&
                          !(options.float_colors && is_color(channel));
-    header.channels().insert(channel, Imf::Channel(is_half ? Imf::HALF : Imf::FLOAT));
+    header.channels().insert(stored_channel(channel, options.naming).name,
+                             Imf::Channel(is_half ? Imf::HALF : Imf::FLOAT));
   }
   for (const auto& [key, value] : options.metadata) {
     if (header.find(key) != header.end()) {
@@ -162,6 +163,10 @@ Result<Imf::Header> make_header(const std::string& name, const FilmTile& image,
   return header;
 }
 
+void negate(std::vector<float>& values) {
+  for (float& v : values) v = -v;
+}
+
 /// The address that pixel (0, 0) would have, which OpenEXR wants, where `rect` is stored from
 /// `base`.
 char* at_corner(char* base, const PixelRect& rect, std::size_t pixel_bytes) {
@@ -170,14 +175,23 @@ char* at_corner(char* base, const PixelRect& rect, std::size_t pixel_bytes) {
 }
 
 /// The whole file in memory. Throws what OpenEXR throws.
-Bytes encode_planes(const std::string& name, const Imf::Header& header, const FilmTile& image) {
+Bytes encode_planes(const std::string& name, const Imf::Header& header, const FilmTile& image,
+                    ChannelNaming naming) {
   const std::size_t width = static_cast<std::size_t>(image.rect.width());
   std::vector<std::vector<half>> halves;
   halves.reserve(image.channels.size());
+  std::vector<std::vector<float>> turned;
+  turned.reserve(image.channels.size());
   Imf::FrameBuffer frame_buffer;
   for (std::size_t c = 0; c < image.channels.size(); ++c) {
-    const Imf::PixelType type = header.channels()[image.channels[c]].type;
+    const StoredChannel stored = stored_channel(image.channels[c], naming);
+    const Imf::PixelType type = header.channels()[stored.name].type;
     const float* plane = image.plane(c);
+    if (stored.is_negated) {
+      turned.emplace_back(plane, plane + image.num_pixels());
+      negate(turned.back());
+      plane = turned.back().data();
+    }
     const char* base = reinterpret_cast<const char*>(plane);
     if (type == Imf::HALF) {
       halves.push_back(to_half({plane, image.num_pixels()}));
@@ -186,9 +200,8 @@ Bytes encode_planes(const std::string& name, const Imf::Header& header, const Fi
     const std::size_t pixel_bytes = type == Imf::HALF ? sizeof(half) : sizeof(float);
     // OpenEXR only reads through this pointer when it writes a file.
     frame_buffer.insert(
-        image.channels[c],
-        Imf::Slice(type, at_corner(const_cast<char*>(base), image.rect, pixel_bytes), pixel_bytes,
-                   pixel_bytes * width));
+        stored.name, Imf::Slice(type, at_corner(const_cast<char*>(base), image.rect, pixel_bytes),
+                                pixel_bytes, pixel_bytes * width));
   }
   MemoryStream stream(name.c_str());
   {
@@ -204,6 +217,13 @@ PixelRect rect_of(const Imath::Box2i& box) {
     return last == std::numeric_limits<int>::max() ? last : last + 1;
   };
   return {box.min.x, box.min.y, past(box.max.x), past(box.max.y)};
+}
+
+std::vector<PlainChannel> channels_in(const Imf::Header& header) {
+  std::vector<std::string> names;
+  for (auto it = header.channels().begin(); it != header.channels().end(); ++it)
+    names.emplace_back(it.name());
+  return plain_channels(names);
 }
 
 /// Rectangle and channel names of an open file, checked against the limits.
@@ -223,8 +243,9 @@ Result<FilmTile> describe(const Imf::Header& header, const std::string& name) {
           ErrorKind::bad_input,
           fmt::format("{}: channel {} is subsampled, expected one value a pixel", name, it.name())};
     }
-    image.channels.emplace_back(it.name());
   }
+  for (PlainChannel& channel : channels_in(header))
+    image.channels.push_back(std::move(channel.name));
   if (image.channels.empty() || image.channels.size() > limits::kMaxChannels) {
     return Error{ErrorKind::bad_input, fmt::format("{}: {} channels, expected 1 to {}", name,
                                                    image.channels.size(), limits::kMaxChannels)};
@@ -234,6 +255,10 @@ Result<FilmTile> describe(const Imf::Header& header, const std::string& name) {
 
 /// Reads `image.channels` into `image.values`. Throws what OpenEXR throws.
 void read_planes(Imf::InputFile& file, FilmTile& image) {
+  std::vector<StoredChannel> stored;
+  const std::vector<PlainChannel> all = channels_in(file.header());
+  for (const std::string& name : image.channels)
+    stored.push_back(std::ranges::find(all, name, &PlainChannel::name)->stored);
   const auto width = static_cast<std::size_t>(image.rect.width());
   const std::size_t row_bytes = width * sizeof(float);
   std::vector<std::vector<float>> planes(image.channels.size());
@@ -244,14 +269,15 @@ void read_planes(Imf::InputFile& file, FilmTile& image) {
       planes[c].resize(width * static_cast<std::size_t>(y1 - image.rect.y0));
       char* const base =
           at_corner(reinterpret_cast<char*>(planes[c].data()), image.rect, sizeof(float));
-      frame_buffer.insert(image.channels[c],
-                          Imf::Slice(Imf::FLOAT, base, sizeof(float), row_bytes));
+      frame_buffer.insert(stored[c].name, Imf::Slice(Imf::FLOAT, base, sizeof(float), row_bytes));
     }
     file.setFrameBuffer(frame_buffer);
     file.readPixels(y0, y1 - 1);
   }
-  for (const std::vector<float>& plane : planes)
-    image.values.insert(image.values.end(), plane.begin(), plane.end());
+  for (std::size_t c = 0; c < planes.size(); ++c) {
+    if (stored[c].is_negated) negate(planes[c]);
+    image.values.insert(image.values.end(), planes[c].begin(), planes[c].end());
+  }
 }
 
 /// Opens an EXR file and calls `use(file)`; turns exceptions of OpenEXR into errors that name the
@@ -282,7 +308,7 @@ Result<Bytes> encode_exr(const std::string& name, const FilmTile& image,
               image.values.size() == image.channels.size() * image.num_pixels());
   try {
     BATON_ASSIGN(const Imf::Header header, make_header(name, image, options));
-    return encode_planes(name, header, image);
+    return encode_planes(name, header, image, options.naming);
   } catch (const std::exception& fault) {
     return Error{ErrorKind::bad_input,
                  fmt::format("{}: cannot be written as EXR: {}", name, fault.what())};
@@ -330,8 +356,9 @@ Result<FilmTile> read_exr_rows(const std::filesystem::path& path, int y0, int y1
 Result<PictureColors> read_exr_colors(const std::filesystem::path& path) {
   return with_exr_file(path, [](Imf::InputFile& file) -> Result<PictureColors> {
     const Imf::Header& header = file.header();
-    const bool has_colors = header.channels().findChannel("R") != nullptr;
-    if (!has_colors || !Imf::hasChromaticities(header)) return PictureColors{};
+    const auto channels = channels_in(header);
+    const auto red = std::ranges::find(channels, "R", &PlainChannel::name);
+    if (red == channels.end() || !Imf::hasChromaticities(header)) return PictureColors{};
     return PictureColors{.chromaticities = from_openexr(Imf::chromaticities(header))};
   });
 }

@@ -9,6 +9,7 @@
 
 #include "common/base/bytes.h"
 #include "common/base/result.h"
+#include "common/image/channel_names.h"
 #include "common/image/color_space.h"
 #include "common/image/exr_channels.h"
 #include "common/image/film_tile.h"
@@ -47,6 +48,7 @@ struct ExrOptions {
   /// With frames_per_second, if that is a whole number that SMPTE counts (up to 30): timeCode,
   /// frame 0 at 00:00:00:00, modulo a day.
   std::optional<int> frame_number{};
+  ChannelNaming naming = ChannelNaming::plain;  ///< in the file
   /// What is shown, in pixels of the picture, with its corner at (0, 0); none: all.
   std::optional<PixelRect> display_window{};
   Chromaticities chromaticities{};  ///< of R, G and B; written always
@@ -60,7 +62,8 @@ Result<Bytes> encode_exr(const std::string& name, const FilmTile& image, const E
 /// Publishes the encoded file atomically, with missing folders. Errors: encode_exr's, the disk.
 Status write_exr(const std::filesystem::path& path, const FilmTile& image,
                  const ExrOptions& options);
-/// Reads every channel of a flat EXR file as float32, in file order, which is alphabetical. The
+/// Reads every channel of a flat EXR file as float32, in file order, which is alphabetical, by its
+/// plain name (channel_names.h). The
 /// rectangle is that of the pixels in the file's coordinates. Errors name the file: missing, not an
 /// EXR, truncated, subsampled channels, past the limits of picture sides.
 Result<FilmTile> read_exr(const std::filesystem::path& path, ExrWindow window = ExrWindow::data);

@@ -270,6 +270,7 @@ void fields(JobArchive& a, OutputSpec& output, const JobSpec& job) {
   a.choice("pixelType", output.pixel_type, kPixelTypes);
   a.word("compression", output.compression, kCompressions);
   a.number("framesPerSecond", output.frames_per_second, {1, 1000});
+  a.choice("naming", output.naming, kFrameNamings);
   a.boolean("clampNegative", output.clamp_negative);
 }
 

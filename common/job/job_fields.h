@@ -65,6 +65,7 @@ inline constexpr std::array<std::string_view, 20> kAovs{"lns",
 inline constexpr std::array<std::string_view, 3> kUpAxes{"x", "y", "z"};
 inline constexpr std::array<std::string_view, 2> kPixelTypes{"half", "float"};
 inline constexpr std::array<std::string_view, 5> kCompressions{"none", "rle", "zips", "zip", "piz"};
+inline constexpr std::array<std::string_view, 2> kFrameNamings{"plain", "blender"};
 inline constexpr std::array<std::string_view, 2> kKeyCurves{"linear", "smooth"};
 inline constexpr std::array<std::string_view, 2> kStateKeeps{"last", "all"};
 

@@ -294,6 +294,8 @@ enum class Aov : std::uint8_t {
   crypto_material
 };
 enum class PixelType : std::uint8_t { half_float, full_float };
+/// How channels are called in frames: as most compositors expect them, or as Blender's passes.
+enum class FrameNaming : std::uint8_t { plain, blender };
 
 struct OutputSpec {
   std::string directory;                   ///< absolute
@@ -303,7 +305,8 @@ struct OutputSpec {
   PixelType pixel_type = PixelType::half_float;
   std::string compression = "zip";  ///< none, rle, zips, zip, piz
   double frames_per_second = 24;    ///< said in the header of frames, no more; (0, 1000]
-  bool clamp_negative = true;       ///< colours below zero become 0 in frames
+  FrameNaming naming = FrameNaming::plain;
+  bool clamp_negative = true;  ///< colours below zero become 0 in frames
 
   bool operator==(const OutputSpec&) const = default;
 };

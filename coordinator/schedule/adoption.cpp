@@ -254,7 +254,8 @@ std::vector<TaskKey> settled_tasks(const JobSpec& job, const KeptFrames& kept,
 
 bool writes_alike(const OutputSpec& a, const OutputSpec& b) {
   return films_alike(a, b) && a.pattern == b.pattern && a.pixel_type == b.pixel_type &&
-         a.compression == b.compression && a.clamp_negative == b.clamp_negative;
+         a.compression == b.compression && a.naming == b.naming &&
+         a.clamp_negative == b.clamp_negative;
 }
 
 Adoption adopt(const ParsedJobDocument& wanted, const std::vector<FormerJob>& formers,

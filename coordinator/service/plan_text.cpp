@@ -99,6 +99,7 @@ std::vector<std::string> output_reasons(const JobSpec& former, const JobSpec& wa
   compare(a.pattern == b.pattern, "output.pattern");
   compare(a.pixel_type == b.pixel_type, "output.pixelType");
   compare(a.compression == b.compression, "output.compression");
+  compare(a.naming == b.naming, "output.naming");
   compare(a.clamp_negative == b.clamp_negative, "output.clampNegative");
   std::vector<std::string> reasons;
   if (!differing.empty()) {

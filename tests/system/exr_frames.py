@@ -6,6 +6,11 @@ import zlib
 from array import array
 from pathlib import Path
 
+# Blender's names of passes that have others here; and of Blender's vector to the next frame, the other sign.
+BLENDER_PASSES = {**{f"Combined.{c}": c for c in "RGBA"}, "Depth.Z": "Z", "Distance.X": "depth", "IndexOB.X": "object",
+                  "IndexMA.X": "material", **{f"Normal.{c}": f"normal.{c}" for c in "XYZ"},
+                  **{f"Position.{c}": f"P.{c}" for c in "XYZ"}, **{f"DiffCol.{c}": f"albedo.{c}" for c in "RGB"},
+                  "Vector.X": "backward.u", "Vector.Y": "backward.v", "Vector.Z": "-forward.u", "Vector.W": "-forward.v"}
 MAGIC = b"\x76\x2f\x31\x01"
 COMPRESSIONS = ["none", "rle", "zips", "zip", "piz"]
 ROWS_OF_A_BLOCK = {"none": 1, "rle": 1, "zips": 1, "zip": 16}
@@ -50,14 +55,32 @@ def read_frame(path, values=None):
             compression = COMPRESSIONS[value[0]]
     width, height = window[2] - window[0], window[3] - window[1]
     sample_bytes = width * height * sum(TYPES[kind][1] for _, kind in layout)
-    if compression == "piz":
-        channels = {name: array("f", values(path, name)) for name, _ in layout}
+    if compression == "piz":  # what is printed has plain names and signs
+        names = [plain_name(name)[0] for name, _ in layout]
+        channels = {name: array("f", values(path, name)) for name in names}
     else:
-        channels = read_blocks(data, at + 1, width, height, layout, compression)
+        channels = plain_channels(read_blocks(data, at + 1, width, height, layout, compression))
     for name, plane in channels.items():
         if len(plane) != width * height:
             raise ValueError(f"{path}: {name}: {len(plane)} pixels, expected {width * height}")
     return Frame(window, display, channels, sample_bytes)
+
+
+def plain_name(name):
+    """Of a channel that may have Blender's name; and whether its values have the other sign."""
+    layer = "ViewLayer."
+    if name.startswith(layer):
+        name = name[len(layer):]
+        name = BLENDER_PASSES.get(name, name.removesuffix(".X"))
+    return name.removeprefix("-"), name.startswith("-")
+
+
+def plain_channels(channels):
+    plain = {}
+    for stored, plane in channels.items():
+        name, is_negated = plain_name(stored)
+        plain[name] = array("f", [-value for value in plane]) if is_negated else plane
+    return plain
 
 
 def read_box(value):

@@ -30,6 +30,10 @@ bool same_after_rounding(float value, float stored) {
   return std::fabs(value - stored) <= std::fabs(value) * kHalfStep + kHalfSmallest;
 }
 
+ChannelNaming naming_of(const JobSpec& job) {
+  return job.output.naming == FrameNaming::blender ? ChannelNaming::blender : ChannelNaming::plain;
+}
+
 void drop_channel(FilmTile& image, std::string_view name) {
   const auto found = std::find(image.channels.begin(), image.channels.end(), name);
   if (found == image.channels.end()) return;
@@ -145,9 +149,11 @@ ImageMetadata frame_metadata(const JobSpec& job, const Digest& job_digest, int f
   if (quality.pixels_not_finite > 0) add("baton:pixelsNotFinite", quality.pixels_not_finite);
   for (const Aov aov : job.output.aovs) {
     ImageMetadata ids;
-    if (aov == Aov::crypto_object) ids = cryptomatte_metadata(kCryptoObject, object_names(job));
+    const std::string in(naming_of(job) == ChannelNaming::blender ? kBlenderLayer : "");
+    if (aov == Aov::crypto_object)
+      ids = cryptomatte_metadata(in + kCryptoObject, object_names(job));
     if (aov == Aov::crypto_material)
-      ids = cryptomatte_metadata(kCryptoMaterial, material_names(job));
+      ids = cryptomatte_metadata(in + kCryptoMaterial, material_names(job));
     metadata.insert(metadata.end(), ids.begin(), ids.end());
   }
   for (const auto& [name, text] : job.metadata)
@@ -178,6 +184,7 @@ Result<WrittenFrame> write_frame(const JobSpec& job, const Digest& job_digest,
                            .world_to_ndc = camera.world_to_ndc(job.image.shown()),
                            .frames_per_second = job.output.frames_per_second,
                            .frame_number = number,
+                           .naming = naming_of(job),
                            .display_window = job.image.shown().at_origin()}));
   BATON_TRY(write_file_verified(path, bytes, [&](const std::filesystem::path& temporary) {
     return verify_frame(temporary, image, frame_index);
