@@ -1,6 +1,7 @@
 """Movies and numbered PNGs of a sequence, as ffmpeg and its reader see them."""
 
 import os
+import re
 import subprocess
 
 from farm import BAD_INPUT, OK, check, check_equal, make_job, run_tests, write_job, write_map
@@ -92,10 +93,21 @@ def test_pngs_need_no_ffmpeg(programs, folder):
     check_equal(done.stderr.count("\n"), 1, "lines of the error")
     check(not list((folder / "frames").glob("preview*")), "nothing is begun")
 
-    # The values of an AOV mean the same in all frames.
+
+def test_an_aov_means_the_same_in_all_frames(programs, folder):
+    """As the first frame has it: depth under a camera that moves away."""
+    job = rendered(programs, folder, camera={"keys": [{"frame": 1, "position": [0, 1.2, 5], "lookAt": [0, 0.6, 0]},
+                                                      {"frame": 6, "position": [0, 1.2, 9], "lookAt": [0, 0.6, 0]}]})
     programs.run("baton", "movie", job, "--aov", "depth", "--out", folder / "depth")
-    programs.run("baton", "view", folder / "frames/frame.0001.exr", "--aov", "depth", "--out", folder / "d.png")
-    check_equal((folder / "depth/frame.0001.png").read_bytes(), (folder / "d.png").read_bytes(), "depth")
+    first, last = (folder / f"frames/frame.000{f}.exr" for f in (1, 6))
+    told = programs.run("baton", "view", first, "--aov", "depth", "--out", folder / "1.png").stdout
+    near, far = re.search(r"depth (\S+) \(white\) to (\S+) \(dark", told).groups()
+    check_equal(read_png(folder / "depth/frame.0001.png"), read_png(folder / "1.png"), "frame 1")
+    programs.run("baton", "view", last, "--aov", "depth", "--range", near, far, "--out", folder / "6.png")
+    shown, wanted = (read_png(path)[2] for path in (folder / "depth/frame.0006.png", folder / "6.png"))
+    check(all(abs(a - b) <= 1 for row, other in zip(shown, wanted) for a, b in zip(row, other)), "frame 6")
+    programs.run("baton", "view", last, "--aov", "depth", "--out", folder / "own.png")
+    check(read_png(folder / "own.png")[2] != shown, "frame 6 has other values")
 
 
 def test_faults(programs, folder):
@@ -140,5 +152,6 @@ def test_check_tells_of_exposures_of_maps(programs, folder):
 
 
 if __name__ == "__main__":
-    run_tests([test_a_movie_shows_what_view_shows, test_the_filmic_curve, test_pngs_need_no_ffmpeg, test_faults,
+    run_tests([test_a_movie_shows_what_view_shows, test_the_filmic_curve, test_pngs_need_no_ffmpeg,
+               test_an_aov_means_the_same_in_all_frames, test_faults,
                test_check_tells_of_exposures_of_maps])
