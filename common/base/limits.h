@@ -39,6 +39,9 @@ inline constexpr int kMaxJsonDepth = 32;
 inline constexpr int kMaxFaultsReported = 100;
 inline constexpr int kMinTileSize = 8;
 inline constexpr int kMaxTileSize = 32768;
+/// Side of the blocks of pixels that get the same number of rounds; tiles are whole numbers of
+/// them.
+inline constexpr int kAdaptiveBlock = 8;
 inline constexpr int kMaxSites = 16;
 inline constexpr int kMaxRounds = 65536;
 inline constexpr int kMaxPreroll = 64;  ///< rounds

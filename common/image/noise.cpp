@@ -49,8 +49,12 @@ float FrameNoise::error_share() const {
   return static_cast<float>(std::sqrt(scatter / (n - 1)) / 2);
 }
 
-float cycles_noise(const FilmTile& film) {
+double cycles_noise_squared(double variance, double grey) {
   constexpr double kDark = 1e-4;
+  return 6 / std::numbers::pi * variance / std::max(grey, kDark);
+}
+
+float cycles_noise(const FilmTile& film) {
   const Colors colors(film);
   const float* const error = film.find(kErrorChannel);
   if (!colors || error == nullptr) return 0;
@@ -59,11 +63,11 @@ float cycles_noise(const FilmTile& film) {
   for (std::size_t i = 0; i < film.num_pixels(); ++i) {
     const double grey = colors.grey(i);
     if (!(error[i] >= 0) || !std::isfinite(error[i]) || !std::isfinite(grey)) continue;
-    sum += double{error[i]} / std::max(grey, kDark);
+    sum += cycles_noise_squared(double{error[i]}, grey);
     ++count;
   }
   if (count == 0) return 0;
-  return static_cast<float>(std::sqrt(6 / std::numbers::pi * sum / static_cast<double>(count)));
+  return static_cast<float>(std::sqrt(sum / static_cast<double>(count)));
 }
 
 FrameNoise noise_of_film(const FilmTile& film) {

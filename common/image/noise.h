@@ -41,11 +41,13 @@ inline constexpr char kErrorChannel[] = "error";
 /// In that plane: a pixel that sees no surface, and one whose error is not known.
 inline constexpr float kNoSurface = -2, kErrorUnknown = -1;
 
-/// The same error as Cycles measures it for its noise threshold, so that its numbers carry over:
-/// sum over R, G, B of |a - b| / sqrt(R + G + B), where a is a pixel and b half of its samples. Of
-/// errors that are alike and normal in the three colours its square has the mean 6/pi sigma^2 /
-/// grey; the root of that is taken over the probes. Dark pixels count as much as a grey of 1e-4. 0:
-/// a film without errors.
+/// The error of a pixel as Cycles measures it for its noise threshold, so that its numbers carry
+/// over: sum over R, G, B of |a - b| / sqrt(R + G + B), where a is a pixel and b half of its
+/// samples. Of errors that are alike and normal in the three colours its square has this mean, 6/pi
+/// variance / grey. Dark pixels count as much as a grey of 1e-4.
+double cycles_noise_squared(double variance, double grey);
+
+/// Its rms over the probes. 0: a film without errors.
 float cycles_noise(const FilmTile& film);
 
 /// Of a film with an error plane and R, G, B; not told without them. Sums are taken in the order of

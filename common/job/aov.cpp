@@ -47,6 +47,8 @@ AovTraits make_traits(Aov aov) {
       return {.channels = {"acceptanceIndependent"}, .film_bytes = 1.6};
     case Aov::resampled:
       return {.channels = {"resampled"}, .film_bytes = 0.1};
+    case Aov::rounds:
+      return {.channels = {"rounds"}, .is_float = true, .film_bytes = 0.1};
     case Aov::material:
       return {.channels = {"material"}, .is_float = true, .film_bytes = 0.1};
     case Aov::albedo: {

@@ -204,6 +204,8 @@ void fields(JobArchive& a, QualitySpec& quality, const SamplingSpec& sampling) {
     a.fault("sweeps", "1, as sampling.method is auto, which chooses for one",
             std::to_string(quality.sweeps));
   }
+  a.number("adaptiveThreshold", quality.adaptive_threshold,
+           {.min = 0, .max = 1e6, .min_open = true});
   a.boolean("refinable", quality.refinable);
   a.number("noiseThreshold", quality.noise_threshold, {.min = 0, .max = 1e6, .min_open = true});
   a.number("timeLimit", quality.time_limit, {.min = 0, .max = 1e9, .min_open = true});
@@ -281,6 +283,25 @@ void fields(JobArchive& a, StateSpec& state) {
   a.choice("keep", state.keep, kStateKeeps);
 }
 
+/// Whether blocks of pixels can have numbers of rounds of their own.
+void check_adaptive(JobArchive& a, const JobSpec& job) {
+  if (!job.quality.adaptive_threshold) return;
+  const auto refuse = [&](const std::string& why) {
+    a.fault("quality", "no adaptiveThreshold, as " + why,
+            fmt::format("{}", *job.quality.adaptive_threshold));
+  };
+  if (job.quality.rounds < 3) {
+    refuse(
+        fmt::format("the first two of quality.rounds judge, and there are {}", job.quality.rounds));
+  } else if (!rounds_have_own_sites(job)) {
+    refuse(fmt::format("the rounds of {} go on from each other where it carries samples",
+                       traits(job.sampling.method).name));
+  } else if (job.image.tile_size % limits::kAdaptiveBlock != 0) {
+    refuse(fmt::format("image.tileSize, {}, is no multiple of {}", job.image.tile_size,
+                       limits::kAdaptiveBlock));
+  }
+}
+
 /// What no single value shows: too many tasks, tiles that no blob holds, noise that nobody tells.
 void check_whole(JobArchive& a, const JobSpec& job) {
   if (std::int64_t{job.quality.sweeps} * static_cast<std::int64_t>(job.frames.size()) >
@@ -307,6 +328,7 @@ void check_whole(JobArchive& a, const JobSpec& job) {
                     traits(job.sampling.method).name),
         fmt::format("{}", *job.quality.noise_threshold));
   }
+  check_adaptive(a, job);
   const JobEstimate estimate = estimate_job(job);
   if (estimate.tasks() > limits::kMaxTasksPerJob) {
     a.fault(

@@ -42,7 +42,7 @@ inline constexpr std::array<std::string_view, 3> kMaskPolicies{"same-samples", "
 inline constexpr std::array<std::string_view, 4> kLnsUpdates{"ratio", "pathLeft", "pathRight",
                                                              "pathTrapezoid"};
 inline constexpr std::array<std::string_view, 2> kBackgrounds{"environment", "transparent"};
-inline constexpr std::array<std::string_view, 20> kAovs{"lns",
+inline constexpr std::array<std::string_view, 21> kAovs{"lns",
                                                         "visibility",
                                                         "ess",
                                                         "acceptance",
@@ -54,6 +54,7 @@ inline constexpr std::array<std::string_view, 20> kAovs{"lns",
                                                         "acceptanceLocal",
                                                         "acceptanceIndependent",
                                                         "resampled",
+                                                        "rounds",
                                                         "material",
                                                         "albedo",
                                                         "position",

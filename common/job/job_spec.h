@@ -236,6 +236,8 @@ struct QualitySpec {
                    ///< [1, limits::kMaxRounds]
   int sweeps = 1;  ///< how often the sequence is rendered, K rounds a frame each time; a frame is
                    ///< the mean of its sweeps. rounds * sweeps <= limits::kMaxRounds
+  /// Pixels that are cleaner get fewer of the rounds (worker/pass/adaptive_rounds.h); > 0.
+  std::optional<float> adaptive_threshold{};
   bool refinable = false;  ///< films stay after the job, for one of more sweeps
   /// `baton render` adds sweeps until no frame is noisier, in Cycles' measure; > 0.
   std::optional<float> noise_threshold{};
@@ -284,6 +286,7 @@ enum class Aov : std::uint8_t {
   acceptance_local,
   acceptance_independent,
   resampled,
+  rounds,
   material,
   albedo,
   position,

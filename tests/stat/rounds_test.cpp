@@ -76,6 +76,25 @@ TEST(Rounds, OfSequentialAgreeInMotion) {
   expect_agreement(job, 0.03);
 }
 
+/// Six rounds or fewer after two that judge, with the noise of two rays a round.
+JobSpec adaptive_job(Method method, int frames, bool in_motion) {
+  JobSpec job = rounds_job(method, frames, in_motion);
+  job.sampling.num_particles = 2;
+  job.quality.rounds = 8;
+  job.quality.adaptive_threshold = 0.1f;
+  return job;
+}
+
+TEST(Rounds, AdaptiveOnesOfBidirectionalAgreeWithBruteForce) {
+  expect_agreement(adaptive_job(Method::bidirectional, 1, false), 0.02);
+}
+TEST(Rounds, AdaptiveOnesOfThePoolAgreeWithBruteForce) {
+  expect_agreement(adaptive_job(Method::pool, 3, false), 0.02);
+}
+TEST(Rounds, AdaptiveOnesAgreeInMotion) {
+  expect_agreement(adaptive_job(Method::pool, 3, true), 0.02);
+}
+
 /// A frame of 16 rounds of each pixel that stopped after four where their scatter is small: what
 /// adaptive renderers do, and a bias. The four are the first of the sixteen.
 Estimate repeat_with_stopping(JobSpec job) {

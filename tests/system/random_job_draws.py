@@ -6,7 +6,7 @@ import random
 
 from random_job_means import tame
 from random_job_motion import Motion
-from random_job_rules import mend, spoil, work_of
+from random_job_rules import mend, spoil, whole_blocks, work_of
 from random_job_schema import SchemaDraw
 from random_job_textures import Textures
 
@@ -73,7 +73,7 @@ class Draw(Motion, Textures):
         first = self.split(job)
         second = {**self.split(job), "compression": self.pick("none", "none", "zip", "rle")}
         if self.chance(0.35):
-            second["interruption"] = self.interruption()
+            second["interruption"] = self.interruption(job)
         if self.chance(0.3):
             second["memory"] = self.pick(1, 2, 4, 16)  # MiB: little or nothing is kept
         return {"job": job, "files": self.files, "first": first, "second": second}
@@ -110,6 +110,7 @@ class Draw(Motion, Textures):
             "sampling.byMaterial.*.numCandidates": lambda: self.rng.choice([None, *NUM_CANDIDATES]),
             "sampling.targetError": lambda: self.pick(None, 0.3), "sampling.timeBudget": lambda: 1.0,
             "quality.rounds": lambda: self.pick(1, 2, 3, 4, 5, 9), "state.preroll": lambda: self.pick(None, 0, 1, 2, 5),
+            "quality.adaptiveThreshold": lambda: self.pick(None, None, 1e-3, 0.03, 0.1, 0.5),
             "quality.sweeps": lambda: self.pick(None, 1, 2, 3),
             # These add sweeps by noise and time: tests/system/test_refine.py.
             "quality.noiseThreshold": nothing, "quality.timeLimit": nothing, "quality.maxRounds": nothing,
@@ -151,8 +152,9 @@ class Draw(Motion, Textures):
     def side(self):
         return self.pick(20, 24, 33, 40) if self.plain else self.pick(1, 1, 2, 5, 8, 9, 16, 17, 24, 33, 40)
 
-    def tile_size(self):
-        return self.pick(8, 8, 9, 13, 16, 19, 64, 32768)
+    def tile_size(self, job=None):
+        size = self.pick(8, 8, 9, 13, 16, 19, 64, 32768)
+        return whole_blocks(size) if job and "adaptiveThreshold" in job.get("quality", {}) else size
 
     def method(self):
         methods = self.enum("sampling", "method")
@@ -335,16 +337,16 @@ class Draw(Motion, Textures):
 
     def split(self, job):
         """What never changes the picture."""
-        split = {"tileSize": self.tile_size(), "workers": self.pick(1, 1, 2), "threads": self.pick(1, 2),
+        split = {"tileSize": self.tile_size(job), "workers": self.pick(1, 1, 2), "threads": self.pick(1, 2),
                  "checkpointEvery": self.pick(1, 2, 3, 12, 1000)}
         if job["image"]["width"] * job["image"]["height"] > 600 and split["tileSize"] < 13:
-            split["tileSize"] = 13
+            split["tileSize"] = 16
         return split
 
-    def interruption(self):
+    def interruption(self, job):
         """Somebody dies after some seconds; then all is started again, maybe with other tiles."""
         return {"who": self.pick("render", "render", "worker", "worker", "coordinator", "all"),
-                "after": round(self.rng.uniform(0.02, 0.4), 3), "tileSize": self.pick(None, None, self.tile_size())}
+                "after": round(self.rng.uniform(0.02, 0.4), 3), "tileSize": self.pick(None, None, self.tile_size(job))}
 
 
 def draw_case(schema, seed, number):

@@ -42,6 +42,11 @@ def mend_view(view, rng):
         view["position"] = [round(p + rng.uniform(-1, 1), 3) for p in view["position"]]
 
 
+def whole_blocks(tile_size):
+    """Tiles in which blocks of pixels can have numbers of rounds of their own."""
+    return (tile_size + 7) // 8 * 8
+
+
 def mend(job, rng):
     """What the keys of a legal job demand of each other."""
     sampling, visibility = job["sampling"], job.setdefault("visibility", {})
@@ -60,6 +65,10 @@ def mend(job, rng):
         visibility["correlated"] = False
     if (visibility.get("correlated") or method == "auto") and "quality" in job:
         job["quality"] = {}
+    if job.get("quality", {}).get("rounds", 1) < 3 or method in ("sequential", "restir"):
+        job.get("quality", {}).pop("adaptiveThreshold", None)
+    if "adaptiveThreshold" in job.get("quality", {}) and "tileSize" in job["image"]:
+        job["image"]["tileSize"] = whole_blocks(job["image"]["tileSize"])
     if visibility.get("correlated") and visibility.get("mask") != "same-samples" and sampling["numParticles"] % 2:
         if rng.random() < 0.5:
             visibility["mask"] = "same-samples"

@@ -88,6 +88,9 @@ void FilmWriter::write(std::size_t index, const PixelResult& pixel) {
       case Aov::material:
         put(static_cast<float>(pixel.material));
         break;
+      case Aov::rounds:
+        put(pixel.rounds);
+        break;
       case Aov::albedo:
       case Aov::position:
       case Aov::z:

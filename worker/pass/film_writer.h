@@ -32,6 +32,7 @@ struct PixelResult {
   float variance =
       0;  ///< estimated squared error of the mean over RGB; 0 where the method has no estimate
   float error = kNoSurface;  ///< as in the plane kErrorChannel
+  float rounds = 1;          ///< that it is the mean of
   Rgb shadow{};              ///< share of the light that arrives on the catcher, times `catcher`
   float catcher = 0;         ///< share of the sites that see it
 };

@@ -27,11 +27,11 @@ bool GeometryPlanes::has(Aov aov) const {
   return std::ranges::find(aovs, aov) != aovs.end();
 }
 
-void GeometryPlanes::Things::add(std::uint32_t number) {
+void GeometryPlanes::Things::add(std::uint32_t number, double weight) {
   for (std::size_t i = 0; i < kMostThings; ++i) {
     if (thing[i] != number && thing[i] != 0) continue;
     thing[i] = number;
-    ++sites[i];
+    sites[i] += weight;
     return;
   }
 }
@@ -39,7 +39,7 @@ void GeometryPlanes::Things::add(std::uint32_t number) {
 /// From where the point is in the picture to where it is one frame later, and before; what is
 /// behind the camera then is left out. The sky is infinitely far away.
 void GeometryPlanes::add_motion(const Camera& camera, const Ray& ray, const SurfaceHit& hit,
-                                Sum& sum) const {
+                                double weight, Sum& sum) const {
   const auto place_in = [&](const Pose& pose) {
     if (!hit.hit) return pose.camera.project_direction(ray.direction);
     const Instance& now = geometry_.pose.instances[hit.instance];
@@ -53,8 +53,8 @@ void GeometryPlanes::add_motion(const Camera& camera, const Ray& ray, const Surf
   for (const Pose* pose : {&after_, &before_}) {
     const auto there = place_in(*pose);
     if (here && there) {
-      sum.motion[at] += double{(*there)[0]} - double{(*here)[0]};
-      sum.motion[at + 1] -= double{(*there)[1]} - double{(*here)[1]};  // v goes up
+      sum.motion[at] += weight * (double{(*there)[0]} - double{(*here)[0]});
+      sum.motion[at + 1] -= weight * (double{(*there)[1]} - double{(*here)[1]});  // v goes up
     }
     at += 2;
   }
@@ -64,28 +64,30 @@ void GeometryPlanes::add(const TileSurfaces& surfaces) {
   if (is_empty()) return;
   const Camera& camera = geometry_.pose.camera;
   const auto num_sites = static_cast<std::size_t>(surfaces.num_sites);
-  num_sites_ += static_cast<std::uint32_t>(surfaces.num_sites);
   const bool with_albedo = has(Aov::albedo), with_motion = has(Aov::motion);
-  for (std::size_t pixel = 0; pixel < sums_.size(); ++pixel) {
+  for (std::size_t slot = 0; slot < surfaces.pixels.size(); ++slot) {
+    const std::size_t pixel = surfaces.pixels.index(slot);
+    const double weight = surfaces.pixels.weight(slot);
     Sum& sum = sums_[pixel];
+    sum.sites += weight * static_cast<double>(num_sites);
     for (std::size_t s = 0; s < num_sites; ++s) {
-      const SurfaceHit& hit = surfaces.hits[pixel * num_sites + s];
-      if (with_motion) add_motion(camera, surfaces.rays[pixel * num_sites + s], hit, sum);
+      const SurfaceHit& hit = surfaces.hits[slot * num_sites + s];
+      if (with_motion) add_motion(camera, surfaces.rays[slot * num_sites + s], hit, weight, sum);
       if (!hit.hit || hit.is_catcher) continue;
-      ++sum.num_seen;
+      sum.seen += weight;
       if (sum.object == 0) sum.object = hit.instance + 1;
       const Vec3& p = hit.point.position;
-      sum.position[0] += double{p.x};
-      sum.position[1] += double{p.y};
-      sum.position[2] += double{p.z};
-      sum.z += double{camera.distance_ahead(p)};
-      if (!objects_.empty()) objects_[pixel].add(hit.instance + 1);
-      if (!materials_.empty()) materials_[pixel].add(hit.material + 1);
+      sum.position[0] += weight * double{p.x};
+      sum.position[1] += weight * double{p.y};
+      sum.position[2] += weight * double{p.z};
+      sum.z += weight * double{camera.distance_ahead(p)};
+      if (!objects_.empty()) objects_[pixel].add(hit.instance + 1, weight);
+      if (!materials_.empty()) materials_[pixel].add(hit.material + 1, weight);
       if (!with_albedo) continue;
       const Material material = geometry_.see(hit).material;
-      sum.albedo[0] += double{material.kd.x} + double{material.ks.x};
-      sum.albedo[1] += double{material.kd.y} + double{material.ks.y};
-      sum.albedo[2] += double{material.kd.z} + double{material.ks.z};
+      sum.albedo[0] += weight * (double{material.kd.x} + double{material.ks.x});
+      sum.albedo[1] += weight * (double{material.kd.y} + double{material.ks.y});
+      sum.albedo[2] += weight * (double{material.kd.z} + double{material.ks.z});
     }
   }
 }
@@ -102,7 +104,7 @@ void GeometryPlanes::write_ids(const std::vector<Things>& things,
     for (std::size_t i = 0; i < kMostThings && things[pixel].thing[i] != 0; ++i) {
       shares.push_back(
           {ids.at(things[pixel].thing[i] - 1),
-           static_cast<float>(things[pixel].sites[i]) / static_cast<float>(num_sites_)});
+           static_cast<float>(things[pixel].sites[i]) / static_cast<float>(sums_[pixel].sites)});
     }
     planes.write(pixel, shares);
   }
@@ -117,7 +119,7 @@ void GeometryPlanes::write(FilmTile& film) const {
       plane[pixel] = static_cast<float>(value_of(sums_[pixel]));
   };
   const auto mean = [](double sum, const Sum& pixel) {
-    return pixel.num_seen > 0 ? sum / pixel.num_seen : 0;
+    return pixel.seen > 0 ? sum / pixel.seen : 0;
   };
   for (std::size_t c = 0; c < 3; ++c) {
     fill(Aov::albedo, c, [&](const Sum& sum) { return mean(sum.albedo[c], sum); });
@@ -125,7 +127,7 @@ void GeometryPlanes::write(FilmTile& film) const {
   }
   fill(Aov::z, 0, [&](const Sum& sum) { return mean(sum.z, sum); });
   for (std::size_t c = 0; c < 4; ++c)
-    fill(Aov::motion, c, [&](const Sum& sum) { return sum.motion[c] / num_sites_; });
+    fill(Aov::motion, c, [&](const Sum& sum) { return sum.motion[c] / sum.sites; });
   fill(Aov::object, 0, [](const Sum& sum) { return static_cast<double>(sum.object); });
   if (!objects_.empty()) write_ids(objects_, object_names(context_.job), Aov::crypto_object, film);
   if (!materials_.empty())

@@ -21,7 +21,7 @@ class GeometryPlanes {
   /// Whether the job has such AOVs.
   bool is_empty() const { return sums_.empty(); }
 
-  /// Adds the sites of a round.
+  /// Adds the sites of a round, each with the weight of its pixel.
   void add(const TileSurfaces& surfaces);
   /// Writes the means into the planes of the film.
   void write(FilmTile& film) const;
@@ -33,17 +33,20 @@ class GeometryPlanes {
     double z = 0;
     std::array<double, 4> motion{};
     std::uint32_t object = 0;  ///< of the first site that sees one: number from 1; 0: none
-    std::uint32_t num_seen = 0;
+    double seen = 0;           ///< weight of the sites that see a surface
+    double sites = 0;          ///< of all sites
   };
   /// The things that one pixel sees, and with how many sites. The first kMostThings are kept.
   static constexpr std::size_t kMostThings = 8;
   struct Things {
-    std::array<std::uint32_t, kMostThings> thing{}, sites{};  ///< thing: number from 1; 0: none
+    std::array<std::uint32_t, kMostThings> thing{};  ///< number from 1; 0: none
+    std::array<double, kMostThings> sites{};         ///< their weight
 
-    void add(std::uint32_t number);
+    void add(std::uint32_t number, double weight);
   };
 
-  void add_motion(const Camera& camera, const Ray& ray, const SurfaceHit& hit, Sum& sum) const;
+  void add_motion(const Camera& camera, const Ray& ray, const SurfaceHit& hit, double weight,
+                  Sum& sum) const;
   void write_ids(const std::vector<Things>& things, const std::vector<std::string>& names,
                  Aov layer, FilmTile& film) const;
   bool has(Aov aov) const;
@@ -53,7 +56,6 @@ class GeometryPlanes {
   Pose before_, after_;  ///< of the frame numbers one less and one more; only for motion
   std::vector<Sum> sums_;
   std::vector<Things> objects_, materials_;  ///< (pixels), or empty
-  std::uint32_t num_sites_ = 0;              ///< of a pixel, over the rounds so far
 };
 
 }  // namespace baton

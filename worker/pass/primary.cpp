@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <cmath>
+#include <utility>
 
 #include "common/job/sequence.h"
 #include "common/math/low_discrepancy.h"
@@ -25,18 +26,28 @@ std::array<float, 2> site_position(std::int32_t site, std::int32_t side, float u
 
 TileSurfaces trace_primary(const JobSpec& job, const FrameGeometry& geometry, const PixelRect& rect,
                            std::int32_t round) {
-  TileSurfaces surfaces{
-      .rect = rect, .num_sites = job.image.sites, .hits = {}, .rays = {}, .first_site = {}};
-  surfaces.rays.reserve(static_cast<std::size_t>(rect.area() * job.image.sites));
-  for (std::int32_t y = rect.y0; y < rect.y1; ++y) {
-    for (std::int32_t x = rect.x0; x < rect.x1; ++x) {
-      append_primary_rays(job, geometry, x, y, surfaces.rays, round);
-    }
+  return trace_primary(job, geometry, rect, RoundPixels::all(static_cast<std::size_t>(rect.area())),
+                       round);
+}
+
+TileSurfaces trace_primary(const JobSpec& job, const FrameGeometry& geometry, const PixelRect& rect,
+                           RoundPixels pixels, std::int32_t round) {
+  TileSurfaces surfaces{.rect = rect,
+                        .pixels = std::move(pixels),
+                        .num_sites = job.image.sites,
+                        .hits = {},
+                        .rays = {},
+                        .first_site = {}};
+  const std::size_t count = surfaces.pixels.size();
+  surfaces.rays.reserve(count * static_cast<std::size_t>(job.image.sites));
+  for (std::size_t slot = 0; slot < count; ++slot) {
+    const auto [x, y] = rect.place(surfaces.pixels.index(slot));
+    append_primary_rays(job, geometry, x, y, surfaces.rays, round);
   }
   surfaces.hits.resize(surfaces.rays.size());
   trace_primary_rays(job, geometry, surfaces.rays, surfaces.hits);
-  for (std::size_t i = 0; i < static_cast<std::size_t>(rect.area()); ++i) {
-    const std::span<const SurfaceHit> hits = surfaces.pixel(i);
+  for (std::size_t slot = 0; slot < count; ++slot) {
+    const std::span<const SurfaceHit> hits = surfaces.pixel(slot);
     const auto first =
         std::find_if(hits.begin(), hits.end(), [](const SurfaceHit& hit) { return hit.hit; });
     surfaces.first_site.push_back(static_cast<std::uint8_t>(first - hits.begin()));

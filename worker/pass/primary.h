@@ -5,27 +5,29 @@
 
 #include "common/base/frame_keep.h"
 #include "worker/pass/render_context.h"
+#include "worker/pass/round_pixels.h"
 
 namespace baton {
 
-/// What the sites of a tile see in one frame: a pure function of (job, pixel, site), and of the
-/// frame where camera or objects move.
+/// What the sites of pixels of a tile see in one frame: a pure function of (job, pixel, site), and
+/// of the frame where camera or objects move.
 struct TileSurfaces {
   PixelRect rect;
+  RoundPixels pixels;            ///< with a slot each
   std::int32_t num_sites = 1;    ///< S
-  std::vector<SurfaceHit> hits;  ///< (pixels, S)
-  std::vector<Ray> rays;         ///< (pixels, S) primary rays
-  /// (pixels) The first site that sees a surface, S where none does: hits are large, and whether
+  std::vector<SurfaceHit> hits;  ///< (slots, S)
+  std::vector<Ray> rays;         ///< (slots, S) primary rays
+  /// (slots) The first site that sees a surface, S where none does: hits are large, and whether
   /// there is one is asked several times a frame.
   std::vector<std::uint8_t> first_site;
 
-  bool sees_surface(std::size_t index) const { return first_site[index] < num_sites; }
+  bool sees_surface(std::size_t slot) const { return first_site[slot] < num_sites; }
   /// Of a pixel that sees one.
-  const SurfaceHit& first_surface(std::size_t index) const {
-    return hits[index * static_cast<std::size_t>(num_sites) + first_site[index]];
+  const SurfaceHit& first_surface(std::size_t slot) const {
+    return hits[slot * static_cast<std::size_t>(num_sites) + first_site[slot]];
   }
-  std::span<const SurfaceHit> pixel(std::size_t index) const {
-    return std::span(hits).subspan(index * static_cast<std::size_t>(num_sites),
+  std::span<const SurfaceHit> pixel(std::size_t slot) const {
+    return std::span(hits).subspan(slot * static_cast<std::size_t>(num_sites),
                                    static_cast<std::size_t>(num_sites));
   }
   std::size_t size_bytes() const {
@@ -46,6 +48,9 @@ class SurfaceCache : public FrameKeep<std::pair<std::int32_t, std::int32_t>, Til
 /// points of a low-discrepancy sequence. The same for all frames.
 TileSurfaces trace_primary(const JobSpec& job, const FrameGeometry& geometry, const PixelRect& rect,
                            std::int32_t round = 0);
+/// Of some pixels of a tile.
+TileSurfaces trace_primary(const JobSpec& job, const FrameGeometry& geometry, const PixelRect& rect,
+                           RoundPixels pixels, std::int32_t round);
 
 /// The same for pixels one by one: appends the rays of the sites of pixel (x, y). Hits are the same
 /// as of a whole tile.

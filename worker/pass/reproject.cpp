@@ -97,9 +97,8 @@ void Reprojection::look_up(const TileSurfaces& surfaces, std::size_t first, std:
   old_pixels_.clear();
   if (neighborhood_) neighborhood_->clear(count);
   for (std::size_t i = 0; i < count; ++i) {
-    const auto width = static_cast<std::size_t>(surfaces.rect.width());
-    const Position pixel{surfaces.rect.x0 + static_cast<std::int32_t>((first + i) % width),
-                         surfaces.rect.y0 + static_cast<std::int32_t>((first + i) / width)};
+    const auto [x, y] = surfaces.rect.place(first + i);
+    const Position pixel{x, y};
     Slot& slot = slots_[i];
     slot.hits = surfaces.pixel(first + i);
     slot.key =

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "common/image/noise.h"
 #include "common/job/sequence.h"
 
 namespace baton {
@@ -26,32 +27,45 @@ RoundMean::RoundMean(const JobSpec& job, const PixelRect& rect)
   if (num_rounds_ > 1) sums_.resize(static_cast<std::size_t>(rect.area()));
 }
 
-void RoundMean::add(std::size_t index, const PixelResult& pixel) {
+void RoundMean::add(std::size_t index, const PixelResult& pixel, double weight) {
   if (sums_.empty()) return film_.write(index, pixel);
   PixelSum& sum = sums_[index];
   const double grey = double{baton::mean(pixel.radiance)};
-  add_to(sum.radiance, pixel.radiance);
-  sum.squares += grey * grey;
-  sum.variance += double{pixel.variance};
-  sum.alpha += double{pixel.alpha};
-  add_to(sum.shadow, pixel.shadow);
-  sum.catcher += double{pixel.catcher};
+  const double seen = grey + double{baton::mean(pixel.shadow)};
+  ++sum.num_rounds;
+  sum.weights_squared += weight * weight;
+  sum.seen += seen;
+  sum.seen_squares += seen * seen;
+  add_to(sum.radiance, pixel.radiance, weight);
+  sum.squares += weight * grey * grey;
+  sum.variance += weight * weight * double{pixel.variance};
+  sum.alpha += weight * double{pixel.alpha};
+  add_to(sum.shadow, pixel.shadow, weight);
+  sum.catcher += weight * double{pixel.catcher};
   if (!(pixel.coverage > 0)) return;
-  if (pixel.error >= 0) sum.error = std::max(sum.error, 0.0) + double{pixel.error};
-  if (sum.num_seen == 0) sum.material = pixel.material;
-  ++sum.num_seen;
-  sum.coverage += double{pixel.coverage};
-  sum.depth += double{pixel.coverage} * double{pixel.depth};
-  add_to(sum.normal, pixel.normal, double{pixel.coverage});
-  add_to(sum.source, pixel.source_color);
-  sum.lns += double{pixel.lns};
-  sum.arrived += double{pixel.lns} * double{pixel.visibility};
-  sum.ess_ratio += double{pixel.ess_ratio};
-  sum.acceptance += double{pixel.acceptance};
-  sum.acceptance_local += double{pixel.acceptance_local};
-  sum.acceptance_independent += double{pixel.acceptance_independent};
-  sum.resampled += double{pixel.resampled};
-  sum.mask += double{pixel.mask};
+  if (pixel.error >= 0)
+    sum.error = std::max(sum.error, 0.0) + weight * weight * double{pixel.error};
+  if (sum.weight_seen == 0) sum.material = pixel.material;
+  sum.weight_seen += weight;
+  sum.coverage += weight * double{pixel.coverage};
+  sum.depth += weight * double{pixel.coverage} * double{pixel.depth};
+  add_to(sum.normal, pixel.normal, weight * double{pixel.coverage});
+  add_to(sum.source, pixel.source_color, weight);
+  sum.lns += weight * double{pixel.lns};
+  sum.arrived += weight * double{pixel.lns} * double{pixel.visibility};
+  sum.ess_ratio += weight * double{pixel.ess_ratio};
+  sum.acceptance += weight * double{pixel.acceptance};
+  sum.acceptance_local += weight * double{pixel.acceptance_local};
+  sum.acceptance_independent += weight * double{pixel.acceptance_independent};
+  sum.resampled += weight * double{pixel.resampled};
+  sum.mask += weight * double{pixel.mask};
+}
+
+double RoundMean::squared_noise(std::size_t index) const {
+  const PixelSum& sum = sums_[index];
+  const double n = sum.num_rounds, mean = sum.seen / n;
+  const double variance = std::max(sum.seen_squares / n - mean * mean, 0.0) * n / (n - 1);
+  return cycles_noise_squared(variance / num_rounds_, mean);
 }
 
 PixelResult RoundMean::mean(const PixelSum& sum) const {
@@ -61,15 +75,18 @@ PixelResult RoundMean::mean(const PixelSum& sum) const {
   pixel.alpha = static_cast<float>(sum.alpha / k);
   pixel.shadow = scaled(sum.shadow, 1 / k);
   pixel.catcher = static_cast<float>(sum.catcher / k);
+  pixel.rounds = static_cast<float>(sum.num_rounds);
   const double grey = (sum.radiance[0] + sum.radiance[1] + sum.radiance[2]) / 3 / k;
   if (rounds_are_uncorrelated_) {
+    // Of equal weights k^2 / weights_squared is k.
+    const double scatter = std::max(sum.squares / k - grey * grey, 0.0);
     pixel.variance = static_cast<float>(num_rounds_ >= kLeastForScatter
-                                            ? std::max(sum.squares / k - grey * grey, 0.0) / (k - 1)
+                                            ? scatter / (k * k / sum.weights_squared - 1)
                                             : sum.variance / (k * k));
   }
-  if (sum.num_seen == 0) return pixel;
+  if (sum.weight_seen == 0) return pixel;
   pixel.error = sum.error >= 0 ? static_cast<float>(sum.error / (k * k)) : kErrorUnknown;
-  const double seen = 1.0 / sum.num_seen;
+  const double seen = 1.0 / sum.weight_seen;
   pixel.coverage = static_cast<float>(sum.coverage / k);
   pixel.depth = static_cast<float>(sum.depth / sum.coverage);
   pixel.normal = normalize(scaled(sum.normal, 1 / sum.coverage));

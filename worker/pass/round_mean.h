@@ -16,13 +16,17 @@ struct PixelSum {
   double lns = 0, arrived = 0;  ///< arrived: Lns x visibility
   double ess_ratio = 0, acceptance = 0, acceptance_local = 0, acceptance_independent = 0;
   double resampled = 0, mask = 0;
-  double variance = 0, squares = 0;  ///< squares: of the grey radiance
-  double error = kErrorUnknown;      ///< of the rounds whose error is known
-  std::uint32_t material = 0;        ///< of the first round that sees one
-  std::int32_t num_seen = 0;         ///< rounds that see a surface
+  double variance = 0, squares = 0;   ///< squares: of the grey radiance
+  double seen = 0, seen_squares = 0;  ///< of what the picture shows: grey radiance and shadow
+  double weights_squared = 0;
+  std::int32_t num_rounds = 0;
+  double error = kErrorUnknown;  ///< of the rounds whose error is known
+  std::uint32_t material = 0;    ///< of the first round that sees one
+  double weight_seen = 0;        ///< of the rounds that see a surface
 };
 
-/// A frame of a tile as the mean of its rounds. Colours, alpha, Lns: over all rounds. Depth and
+/// A frame of a tile as the mean of its rounds, each with its weight; those of a pixel add up to
+/// quality.rounds. Colours, alpha, Lns: over all rounds. Depth and
 /// normal: over the sites that see a surface; visibility: share of all rounds' light; what a method
 /// did: over the rounds that see a surface. variance: from the scatter of kLeastForScatter rounds
 /// or more, which is unbiased where rounds are uncorrelated, as they are for all methods that carry
@@ -34,8 +38,12 @@ class RoundMean {
 
   RoundMean(const JobSpec& job, const PixelRect& rect);
 
-  /// Adds pixel `index` of a round; rounds must come in turn.
-  void add(std::size_t index, const PixelResult& pixel);
+  /// Adds pixel `index` of a round; rounds must come in turn. weight: rounds that it stands for.
+  void add(std::size_t index, const PixelResult& pixel, double weight = 1);
+  /// Of the mean of quality.rounds rounds of pixel `index`, as Cycles measures it
+  /// (common/image/noise.h), by the scatter of those so far, two or more of weight 1. A shadow on a
+  /// plate counts as light.
+  double squared_noise(std::size_t index) const;
   /// The mean; after the last round, once.
   const FilmTile& finish();
 

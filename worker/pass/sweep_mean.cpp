@@ -34,6 +34,8 @@ using Rule = float (*)(float of_earlier, double count, float value);
 Rule rule_of(const std::string& channel) {
   if (channel == kErrorChannel) return error_of_mean;
   if (channel == "variance") return variance_of_mean;
+  if (channel == "rounds")
+    return [](float of_earlier, double, float value) { return of_earlier + value; };
   if (channel == "material" || channel == "object")
     return
         [](float of_earlier, double, float value) { return of_earlier > 0 ? of_earlier : value; };

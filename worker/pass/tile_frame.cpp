@@ -37,7 +37,8 @@ void fetch_ahead(const PixelMemory* memory) {
 
 }  // namespace
 
-/// The pixels in work: [first, first + count) of the tile, with what one pass hands to the next.
+/// The pixels in work: slots [first, first + count) of the round, with what one pass hands to the
+/// next.
 struct TileFrameRenderer::Batch {
   std::size_t first = 0;
   std::size_t count = 0;
@@ -51,18 +52,12 @@ struct TileFrameRenderer::Batch {
   std::array<Rgb, kBatchPixels> emission;                ///< of the surfaces that are seen
   std::array<std::optional<float>, kBatchPixels> again;  ///< grey radiance, of probes
 
-  /// x and y in the image.
-  static std::array<std::int32_t, 2> place(const PixelRect& rect, std::size_t index) {
-    const auto width = static_cast<std::size_t>(rect.width());
-    return {rect.x0 + static_cast<std::int32_t>(index % width),
-            rect.y0 + static_cast<std::int32_t>(index / width)};
-  }
   RngKey key(const RenderContext& context, const PixelRect& rect, std::size_t index) const {
-    const auto [x, y] = place(rect, index);
+    const auto [x, y] = rect.place(index);
     return pixel_key(context.job.seed, frame_number, context.job.image.width, x, y, round_of_frame);
   }
   bool is_probe(const RenderContext& context, const PixelRect& rect, std::size_t index) const {
-    const auto [x, y] = place(rect, index);
+    const auto [x, y] = rect.place(index);
     return baton::is_probe(x, y, frame_number, context.job.seed);
   }
 };
@@ -99,8 +94,8 @@ void TileFrameRenderer::render_batches(const TileRound& at, SampleState& state, 
   batch.round_of_frame = at.round_of_frame();
   batch.step = at.step(context_.job.quality.rounds);
   round_sampling_ = {};
-  const std::size_t num_pixels = state.num_pixels();
-  keep_targets(num_pixels * static_cast<std::size_t>(state.num_particles));
+  const std::size_t num_pixels = at.surfaces.pixels.size();
+  keep_targets(state.num_pixels() * static_cast<std::size_t>(state.num_particles));
   if (context_.job.visibility.correlated) collector_.begin(state);
   for (std::size_t first = 0; first < num_pixels; first += kBatchPixels) {
     batch.first = first;
@@ -139,21 +134,22 @@ void TileFrameRenderer::keep_targets(std::size_t num_samples) {
 }
 
 /// The setting of the material of the first surface, or the job's.
-const PixelMethod& TileFrameRenderer::method_of(std::size_t index) const {
-  const auto& own = context_.own_methods[surfaces_->first_surface(index).material];
+const PixelMethod& TileFrameRenderer::method_of(std::size_t slot) const {
+  const auto& own = context_.own_methods[surfaces_->first_surface(slot).material];
   return own != nullptr ? *own : *context_.method;
 }
 
-/// What pixel `index` starts from: its samples in `state` become those of the frame before, where
-/// they are not already, and the memory is asked for what evaluating them will read.
-void TileFrameRenderer::look_ahead(std::size_t pixel_of_batch, std::size_t index,
+/// What the pixel in `slot` starts from: its samples in `state` become those of the frame before,
+/// where they are not already, and the memory is asked for what evaluating them will read.
+void TileFrameRenderer::look_ahead(std::size_t pixel_of_batch, std::size_t slot,
                                    const kernels::CarriedLight& light, SampleState& state) {
-  if (!surfaces_->sees_surface(index)) return;
-  Ahead& ahead = ahead_[index % 2];
+  if (!surfaces_->sees_surface(slot)) return;
+  const std::size_t index = surfaces_->pixels.index(slot);
+  Ahead& ahead = ahead_[slot % 2];
   poison(ahead.located);
   poison(ahead.old);
   fetch_ahead(state.memory_of(index));
-  const bool sees_catcher = surfaces_->first_surface(index).is_catcher;
+  const bool sees_catcher = surfaces_->first_surface(slot).is_catcher;
   const bool was_seen = has_history_ && takes_up(sees_catcher, state, index);
   ahead.history = was_seen ? PixelHistory::same : PixelHistory::none;
   if (reprojection_ != nullptr) {
@@ -161,7 +157,7 @@ void TileFrameRenderer::look_ahead(std::size_t pixel_of_batch, std::size_t index
   }
   ahead.is_located =
       ahead.history != PixelHistory::none &&
-      method_of(index).look_ahead(light, knows_targets_, {state, index}, ahead.located);
+      method_of(slot).look_ahead(light, knows_targets_, {state, index}, ahead.located);
 }
 
 /// Pass: what every pixel's method knows of it, and the rays that tell the rest.
@@ -180,11 +176,11 @@ void TileFrameRenderer::sample(Batch& batch, const TileRound& at, SampleState& s
   const kernels::CarriedLight carried{before, now, light.still, *light.presampled};
   look_ahead(0, batch.first, carried, state);
   for (std::size_t i = 0; i < batch.count; ++i) {
-    const std::size_t index = batch.first + i;
-    if (i + 1 < batch.count) look_ahead(i + 1, index + 1, carried, state);
+    const std::size_t slot = batch.first + i, index = surfaces_->pixels.index(slot);
+    if (i + 1 < batch.count) look_ahead(i + 1, slot + 1, carried, state);
 
     // Gather the pixel's surfaces.
-    if (!surfaces_->sees_surface(index)) {
+    if (!surfaces_->sees_surface(slot)) {
       // Other rounds, whose sites are elsewhere, may have seen something.
       if (batch.round <= 0 && !has_history_) set_background(state, index);
       if (batch.round == 0) ++stats_.pixels_background;
@@ -192,10 +188,10 @@ void TileFrameRenderer::sample(Batch& batch, const TileRound& at, SampleState& s
       continue;
     }
     poison(sites);
-    batch.emission[i] = gather_sites(geometry_, surfaces_->pixel(index), sites, light.catcher);
+    batch.emission[i] = gather_sites(geometry_, surfaces_->pixel(slot), sites, light.catcher);
 
     // Sample it.
-    const Ahead& ahead = ahead_[index % 2];
+    const Ahead& ahead = ahead_[slot % 2];
     const PixelInput input{
         .sites = sites,
         .light = light,
@@ -211,10 +207,10 @@ void TileFrameRenderer::sample(Batch& batch, const TileRound& at, SampleState& s
         .target = targets_of(index, state),
         .neighbors =
             reprojection_ != nullptr ? reprojection_->neighbors(i) : std::span<const CarriedSet>(),
-        .hits = surfaces_->pixel(index),
+        .hits = surfaces_->pixel(slot),
         .geometry = &geometry_};
-    const SiteOrigins from = origins(index);
-    const bool is_catcher = surfaces_->first_surface(index).is_catcher;
+    const SiteOrigins from = origins(slot);
+    const bool is_catcher = surfaces_->first_surface(slot).is_catcher;
     if (is_catcher && has_history_ && belongs_to_object(state, index)) {
       batch.pixels[i].shadow = edge_.sample(*context_.method, input, light, state, *scratch_);
       batch.pixels[i].catcher = 1;
@@ -223,12 +219,12 @@ void TileFrameRenderer::sample(Batch& batch, const TileRound& at, SampleState& s
     }
     if (at.probe_light != nullptr && !is_catcher &&
         batch.is_probe(context_, surfaces_->rect, index)) {
-      batch.again[i] = probe_.sample_again(method_of(index), input, *at.probe_light, state, index,
+      batch.again[i] = probe_.sample_again(method_of(slot), input, *at.probe_light, state, index,
                                            from, *scratch_);
     }
     RayWriter rays(from, batch.rays);
     poison(*scratch_);
-    const PixelDiagnostics did = method_of(index).sample(input, {state, index}, *scratch_, rays);
+    const PixelDiagnostics did = method_of(slot).sample(input, {state, index}, *scratch_, rays);
     batch.known[i] = rays.known;
     batch.end_ray[i] = batch.rays.size();
 
@@ -250,8 +246,8 @@ void TileFrameRenderer::sample(Batch& batch, const TileRound& at, SampleState& s
 }
 
 /// Where the shadow rays of a pixel's sites start.
-SiteOrigins TileFrameRenderer::origins(std::size_t index) const {
-  const std::span<const SurfaceHit> hits = surfaces_->pixel(index);
+SiteOrigins TileFrameRenderer::origins(std::size_t slot) const {
+  const std::span<const SurfaceHit> hits = surfaces_->pixel(slot);
   SiteOrigins origins{.num_sites = surfaces_->num_sites};
   for (std::size_t s = 0; s < hits.size(); ++s) {
     if (hits[s].hit) origins.set(s, hits[s].ray_origin);
@@ -272,8 +268,9 @@ void TileFrameRenderer::learn(Batch& batch, SampleState& state) {
   const StageTimer timer(stages_.shade);
   std::size_t first = 0;
   for (std::size_t i = 0; i < batch.count; ++i) {
-    const std::size_t index = batch.first + i, end = batch.end_ray[i], count = end - first;
-    if (!surfaces_->sees_surface(index)) continue;
+    const std::size_t slot = batch.first + i, index = surfaces_->pixels.index(slot);
+    const std::size_t end = batch.end_ray[i], count = end - first;
+    if (!surfaces_->sees_surface(slot)) continue;
     const KnownLight& known = batch.known[i];
     const FreeLight found = sum_free(batch.rays, first, end);
     PixelResult& pixel = batch.pixels[i];
@@ -293,7 +290,7 @@ void TileFrameRenderer::learn(Batch& batch, SampleState& state) {
     const FoundRays rays{.sample = std::span(batch.rays.sample).subspan(first, count),
                          .tag = std::span(batch.rays.tag).subspan(first, count),
                          .is_free = found.is_free};
-    if (count > 0) method_of(index).learn(rays, {state, index});
+    if (count > 0) method_of(slot).learn(rays, {state, index});
     if (context_.job.visibility.correlated) collect(rays, index, state);
     first = end;
   }
@@ -321,9 +318,9 @@ void TileFrameRenderer::finish(Batch& batch, const FrameLight& light, RoundMean&
   }
   for (std::size_t i = 0; i < batch.count; ++i) {
     PixelResult& pixel = batch.pixels[i];
-    const std::span<const SurfaceHit> hits = surfaces_->pixel(batch.first + i);
-    if (surfaces_->sees_surface(batch.first + i) &&
-        surfaces_->first_surface(batch.first + i).is_catcher) {
+    const std::size_t slot = batch.first + i;
+    const std::span<const SurfaceHit> hits = surfaces_->pixel(slot);
+    if (surfaces_->sees_surface(slot) && surfaces_->first_surface(slot).is_catcher) {
       const PixelResult ground = std::exchange(pixel, {});  // which is not in the picture
       pixel.shadow = ground.catcher > 0 ? ground.shadow : ground.radiance;
       pixel.catcher = catcher_share(hits);
@@ -332,7 +329,7 @@ void TileFrameRenderer::finish(Batch& batch, const FrameLight& light, RoundMean&
     record_geometry(hits, pixel);
     pixel.radiance += background[i] + batch.emission[i];
     pixel.alpha = show_environment ? 1 : pixel.coverage;
-    film.add(batch.first + i, pixel);
+    film.add(surfaces_->pixels.index(slot), pixel, surfaces_->pixels.weight(slot));
   }
 }
 

@@ -77,10 +77,10 @@ class TileFrameRenderer {
     return std::span(targets_).subspan(index * n, n);
   }
   void sample(Batch& batch, const TileRound& at, SampleState& state);
-  const PixelMethod& method_of(std::size_t index) const;
-  void look_ahead(std::size_t pixel_of_batch, std::size_t index, const kernels::CarriedLight& light,
+  const PixelMethod& method_of(std::size_t slot) const;
+  void look_ahead(std::size_t pixel_of_batch, std::size_t slot, const kernels::CarriedLight& light,
                   SampleState& state);
-  SiteOrigins origins(std::size_t index) const;
+  SiteOrigins origins(std::size_t slot) const;
   void trace(Batch& batch);
   void learn(Batch& batch, SampleState& state);
   void collect(const FoundRays& found, std::size_t index, const SampleState& state);
@@ -91,7 +91,7 @@ class TileFrameRenderer {
   const TileSurfaces* surfaces_ = nullptr;  ///< of the round in work
   Reprojection* reprojection_ = nullptr;    ///< of the round in work; null where pixels stay
   bool has_history_ = false;                ///< of the round in work, where pixels stay
-  std::array<Ahead, 2> ahead_;              ///< of odd and even pixels
+  std::array<Ahead, 2> ahead_;              ///< of odd and even slots
   /// (pixels, N) p~ at the samples of the round before: where samples and surfaces stay, it need
   /// not be evaluated again.
   std::vector<float> targets_;

@@ -8,6 +8,7 @@
 #include <utility>
 
 #include "common/job/motion.h"
+#include "worker/pass/adaptive_rounds.h"
 #include "worker/pass/cpu_clock.h"
 #include "worker/pass/geometry_planes.h"
 #include "worker/pass/sweep_mean.h"
@@ -79,6 +80,7 @@ class TileWalk {
   Result<FilmTile> render(const FrameSpec& frame, std::span<const StatePtr> previous) {
     BATON_TRY(prepare(frame));
     RoundMean film(context_.job, rect_);
+    AdaptiveRounds adaptive(context_.job, rect_);
     GeometryPlanes planes(context_, frame, *geometry_, rect_);
     const std::int32_t first = frame.index == 0 ? -num_preroll_rounds(context_.job) : 0;
     std::optional<RoundMean> unseen;
@@ -89,8 +91,12 @@ class TileWalk {
     }
     for (std::int32_t round = first; round < context_.job.quality.rounds; ++round) {
       if (stop_.stop_requested()) return Error{ErrorKind::cancelled, "stopped"};
+      if (round == AdaptiveRounds::kJudgingRounds) adaptive.judge(film);
+      RoundPixels pixels = adaptive.pixels(round);
+      if (pixels.size() == 0) break;
       BATON_ASSIGN(const std::shared_ptr<const FrameLight> light, light_of(frame, round));
-      const std::shared_ptr<const TileSurfaces> surfaces = surfaces_of(frame.first_round + round);
+      const std::shared_ptr<const TileSurfaces> surfaces =
+          surfaces_of(frame.first_round + round, std::move(pixels));
       const TileRound at{frame, round, *light, *surfaces, round < 0 ? nullptr : probe_light.get()};
       RoundMean& mean = round < 0 ? *unseen : film;
       if (round >= 0) planes.add(*surfaces);
@@ -150,16 +156,17 @@ class TileWalk {
     return context_.lights->at(frame.index, round);
   }
   /// What the sites of a round of all sweeps see: traced, or kept from a frame before.
-  std::shared_ptr<const TileSurfaces> surfaces_of(std::int32_t round) {
+  std::shared_ptr<const TileSurfaces> surfaces_of(std::int32_t round, RoundPixels pixels) {
     const std::int32_t of = rounds_have_own_sites(context_.job) ? std::max(round, 0) : 0;
-    if (const auto found = kept_.find(of); found != kept_.end()) return found->second;
+    const bool is_whole = pixels.are_all(state_.num_pixels());
+    if (const auto found = kept_.find(of); found != kept_.end() && is_whole) return found->second;
     const CpuTimer timer(stats_.seconds_primary);
-    auto surfaces =
-        std::make_shared<const TileSurfaces>(trace_primary(context_.job, *geometry_, rect_, of));
+    auto surfaces = std::make_shared<const TileSurfaces>(
+        trace_primary(context_.job, *geometry_, rect_, std::move(pixels), of));
     stats_.rays_primary += surfaces->rays.size();
     const bool has_room =
         (kept_.size() + 1) * surfaces->size_bytes() <= limits::kMaxRoundSurfaceBytes;
-    if (of == 0 || (keeps_surfaces_ && has_room)) kept_.emplace(of, surfaces);
+    if (is_whole && (of == 0 || (keeps_surfaces_ && has_room))) kept_.emplace(of, surfaces);
     return surfaces;
   }
 

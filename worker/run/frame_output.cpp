@@ -128,6 +128,8 @@ ImageMetadata frame_metadata(const JobSpec& job, const Digest& job_digest, int f
   add("baton:seed", job.seed);
   add("baton:sites", job.image.sites);
   add("baton:rounds", std::int64_t{job.quality.rounds} * job.quality.sweeps);
+  if (job.quality.adaptive_threshold)
+    add("baton:adaptiveThreshold", *job.quality.adaptive_threshold);
   const EnvironmentSpec& environment = job.environment;
   const EnvironmentFrame light = environment_at(environment, frame_number);
   add("baton:map", environment.keys.at(static_cast<std::size_t>(light.map_a)).map);

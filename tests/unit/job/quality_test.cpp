@@ -32,6 +32,18 @@ TEST(Quality, SweepsAreBoundedAndNoiseMustBeKnown) {
   EXPECT_EQ(faults(R"("quality": {"sweeps": 3, "noiseThreshold": 0.01, "maxRounds": 64})"), "");
   EXPECT_EQ(faults(R"("quality": {"rounds": 256, "sweeps": 257})"),
             "job.json: $.quality.sweeps: expected at most 65536 rounds in all sweeps, got 65792");
+  EXPECT_EQ(faults(R"("quality": {"rounds": 3, "adaptiveThreshold": 0.01})"), "");
+  EXPECT_EQ(faults(R"("quality": {"rounds": 2, "adaptiveThreshold": 0.01})"),
+            "job.json: $.quality: expected no adaptiveThreshold, as the first two of "
+            "quality.rounds judge, and there are 2, got 0.01");
+  EXPECT_EQ(faults(R"("quality": {"rounds": 8, "adaptiveThreshold": 0.01},
+                      "sampling": {"method": "sequential"})"),
+            "job.json: $.quality: expected no adaptiveThreshold, as the rounds of sequential go on "
+            "from each other where it carries samples, got 0.01");
+  EXPECT_EQ(faults(R"("quality": {"rounds": 8, "adaptiveThreshold": 0.01},
+                      "image": {"tileSize": 20})"),
+            "job.json: $.quality: expected no adaptiveThreshold, as image.tileSize, 20, is no "
+            "multiple of 8, got 0.01");
   EXPECT_EQ(faults(R"("quality": {"rounds": 16, "maxRounds": 8})"),
             "job.json: $.quality.maxRounds: expected 0, or at least quality.rounds, 16, got 8");
   EXPECT_EQ(faults(R"("quality": {"sweeps": 2}, "sampling": {"method": "auto"})"),

@@ -237,6 +237,37 @@ TEST(RoundMean, VarianceIsTheScatterOfFourRoundsOrMore) {
   EXPECT_EQ(channel(mean_of(Method::sequential, rounds), "variance")[0], 0) << "rounds correlate";
 }
 
+// 18 rounds: two that count once, then two that count eight times.
+TEST(RoundMean, RoundsHaveWeights) {
+  JobSpec job;
+  job.sampling.method = Method::bidirectional;
+  job.quality.rounds = 18;
+  job.output.aovs = {Aov::depth, Aov::variance, Aov::rounds};
+  RoundMean mean(job, {0, 0, 1, 1});
+  const std::array<float, 4> values{1, 3, 4, 6};
+  for (std::size_t i = 0; i < 4; ++i) {
+    PixelResult pixel{.radiance = {values[i], values[i], values[i]}, .error = 0.5f};
+    pixel.coverage = pixel.alpha = i == 3 ? 1.0f : 0.0f;
+    pixel.depth = 7;
+    mean.add(0, pixel, i < 2 ? 1 : 8);
+    // Of two: variance 2, mean 2.
+    if (i == 1) {
+      EXPECT_NEAR(mean.squared_noise(0), cycles_noise_squared(2.0 / 18, 2), 1e-12);
+    }
+  }
+  const FilmTile film = mean.finish();
+  const auto value = [&](const char* name) { return channel(film, name)[0]; };
+  EXPECT_FLOAT_EQ(value("R"), (1 + 3 + 8 * 4 + 8 * 6) / 18.0f);
+  EXPECT_FLOAT_EQ(value("A"), 8 / 18.0f);
+  EXPECT_FLOAT_EQ(value("depth"), 7);
+  EXPECT_EQ(value("rounds"), 4);
+  // Sums of squares of weights 130, scatter (1 + 9 + 128 + 288) / 18 - (84 / 18)^2.
+  const double share = 130.0 / 324;
+  EXPECT_FLOAT_EQ(value("variance"),
+                  static_cast<float>((426.0 / 18 - 84.0 * 84 / 324) * share / (1 - share)));
+  EXPECT_FLOAT_EQ(value(kErrorChannel), 64 * 0.5f / 324);
+}
+
 // The variance that four rounds state is what 300 seeds show, in pixels that see one plane alone
 // (so that sites, which are stratified from round to round, do not matter). The mean over pixels
 // and seeds of the stated one is within 10 % (its own error is 2 %).
