@@ -27,10 +27,11 @@ MOST_PAIRS = 2
 
 @dataclass(frozen=True)
 class Variant:
-    """Settings of Baton in place of a job's, and the rounds that they are measured with."""
+    """Settings of Baton in place of a job's, and the rounds that they are measured with, if with any."""
     changes: dict
     still_rounds: tuple
     sequence_rounds: tuple
+    least_rounds: int = 1
 
 
 THE_JOB = "the job"
@@ -40,7 +41,12 @@ VARIANTS = {
     "4 sites": Variant({"image.sites": 4, "sampling.numCandidates": 128}, (1, 4, 16, 64), (1, 4)),
     "bidirectional": Variant({"sampling.method": "bidirectional"}, (1, 4, 16), (1,)),
     "bidirectional, 4 sites": Variant({"sampling.method": "bidirectional", "sampling.numCandidates": 128,
-                                       "image.sites": 4}, (1, 4), (1,)),
+                                       "image.sites": 4}, (1, 4, 16), (1,)),
+    "adaptive, 4 sites": Variant({"quality.adaptiveThreshold": 0.024, "sampling.numCandidates": 128,
+                                  "image.sites": 4}, (16, 32), (), 3),
+    "adaptive, bidirectional, 4 sites": Variant({"quality.adaptiveThreshold": 0.024, "image.sites": 4,
+                                                 "sampling.method": "bidirectional", "sampling.numCandidates": 128},
+                                                (8, 16, 32), (), 3),
 }
 
 # Means of the test picture: how far they may be apart, and where a planted fault must show.
@@ -105,7 +111,10 @@ def compare(job, options):
     work.every = 1 if still else options.every
     levels = {"Cycles": options.spp or SPP[still]}
     for name, variant in VARIANTS.items():
-        levels[name] = options.rounds or (variant.still_rounds if still else variant.sequence_rounds)
+        usual = variant.still_rounds if still else variant.sequence_rounds
+        some = [rounds for rounds in options.rounds or usual if rounds >= variant.least_rounds]
+        if usual and some:
+            levels[name] = tuple(some)
     dearest = {"Cycles": max(levels["Cycles"]), **{name: max(levels[THE_JOB]) for name in VARIANTS}}
 
     def pairs(key):
