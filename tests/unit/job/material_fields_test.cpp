@@ -5,7 +5,7 @@
 namespace baton {
 namespace {
 
-std::string faults_of(const std::string& text) {
+std::string material_faults(const std::string& text) {
   const Result<JobSpec> job = parse_job(text, "job.json", "/");
   return job.ok() ? "" : job.error().message;
 }
@@ -30,11 +30,11 @@ TEST(MaterialFields, ACoatIsWrittenOnlyWhereThereIsOne) {
   EXPECT_EQ(paint.clearcoat_roughness_texture->uv, 1);
   EXPECT_EQ(textures_of(paint).size(), 2u);
   EXPECT_EQ(parse_job(to_json(job), "again", "/").value(), job);
-  EXPECT_EQ(faults_of(job_of(R"(, "clearcoat": 2, "clearcoatRoughness": 0)")),
+  EXPECT_EQ(material_faults(job_of(R"(, "clearcoat": 2, "clearcoatRoughness": 0)")),
             "job.json: $.scene.materials.paint.clearcoat: expected a number in [0, 1], got 2\n"
             "job.json: $.scene.materials.paint.clearcoatRoughness: expected a number in [0.02, 1], "
             "got 0");
-  EXPECT_EQ(faults_of(job_of(R"(, "clearcoatTexture": "a.png")")),
+  EXPECT_EQ(material_faults(job_of(R"(, "clearcoatTexture": "a.png")")),
             "job.json: $.scene.materials.paint.clearcoatTexture: expected clearcoat beside it, "
             "whose factor it is, got none");
 }

@@ -8,7 +8,7 @@ namespace baton {
 namespace {
 
 /// Faults of a small job with `more` keys; empty: none.
-std::string faults(const std::string& more) {
+std::string quality_faults(const std::string& more) {
   const std::string text =
       R"({"name": "a", "environment": {"map": "a.exr"}, "scene": {)"
       R"("materials": {"m": {"type": "diffuse"}}, "ground": {"material": "m"}}, )" +
@@ -18,44 +18,46 @@ std::string faults(const std::string& more) {
 }
 
 TEST(Quality, RoundsGoWithNeitherASecondPassNorAuto) {
-  EXPECT_EQ(faults(R"("quality": {"rounds": 2}, "sampling": {"method": "mis"})"), "");
-  EXPECT_EQ(faults(R"("quality": {"rounds": 2}, "sampling": {"method": "auto"})"),
+  EXPECT_EQ(quality_faults(R"("quality": {"rounds": 2}, "sampling": {"method": "mis"})"), "");
+  EXPECT_EQ(quality_faults(R"("quality": {"rounds": 2}, "sampling": {"method": "auto"})"),
             "job.json: $.quality.rounds: expected 1, as sampling.method is auto, which chooses for "
             "one, got 2");
-  EXPECT_EQ(faults(R"("quality": {"rounds": 2}, "sampling": {"method": "mis"},
+  EXPECT_EQ(quality_faults(R"("quality": {"rounds": 2}, "sampling": {"method": "mis"},
                       "visibility": {"correlated": true})"),
             "job.json: $.visibility.correlated: expected false, as quality.rounds is 2, and the "
             "second pass takes one round, got true");
 }
 
 TEST(Quality, SweepsAreBoundedAndNoiseMustBeKnown) {
-  EXPECT_EQ(faults(R"("quality": {"sweeps": 3, "noiseThreshold": 0.01, "maxRounds": 64})"), "");
-  EXPECT_EQ(faults(R"("quality": {"rounds": 256, "sweeps": 257})"),
+  EXPECT_EQ(quality_faults(R"("quality": {"sweeps": 3, "noiseThreshold": 0.01, "maxRounds": 64})"),
+            "");
+  EXPECT_EQ(quality_faults(R"("quality": {"rounds": 256, "sweeps": 257})"),
             "job.json: $.quality.sweeps: expected at most 65536 rounds in all sweeps, got 65792");
-  EXPECT_EQ(faults(R"("quality": {"rounds": 3, "adaptiveThreshold": 0.01})"), "");
-  EXPECT_EQ(faults(R"("quality": {"rounds": 2, "adaptiveThreshold": 0.01})"),
+  EXPECT_EQ(quality_faults(R"("quality": {"rounds": 3, "adaptiveThreshold": 0.01})"), "");
+  EXPECT_EQ(quality_faults(R"("quality": {"rounds": 2, "adaptiveThreshold": 0.01})"),
             "job.json: $.quality: expected no adaptiveThreshold, as the first two of "
             "quality.rounds judge, and there are 2, got 0.01");
-  EXPECT_EQ(faults(R"("quality": {"rounds": 8, "adaptiveThreshold": 0.01},
+  EXPECT_EQ(quality_faults(R"("quality": {"rounds": 8, "adaptiveThreshold": 0.01},
                       "sampling": {"method": "sequential"})"),
             "job.json: $.quality: expected no adaptiveThreshold, as the rounds of sequential go on "
             "from each other where it carries samples, got 0.01");
-  EXPECT_EQ(faults(R"("quality": {"rounds": 8, "adaptiveThreshold": 0.01},
+  EXPECT_EQ(quality_faults(R"("quality": {"rounds": 8, "adaptiveThreshold": 0.01},
                       "image": {"tileSize": 20})"),
             "job.json: $.quality: expected no adaptiveThreshold, as image.tileSize, 20, is no "
             "multiple of 8, got 0.01");
-  EXPECT_EQ(faults(R"("quality": {"rounds": 16, "maxRounds": 8})"),
+  EXPECT_EQ(quality_faults(R"("quality": {"rounds": 16, "maxRounds": 8})"),
             "job.json: $.quality.maxRounds: expected 0, or at least quality.rounds, 16, got 8");
-  EXPECT_EQ(faults(R"("quality": {"sweeps": 2}, "sampling": {"method": "auto"})"),
+  EXPECT_EQ(quality_faults(R"("quality": {"sweeps": 2}, "sampling": {"method": "auto"})"),
             "job.json: $.quality.sweeps: expected 1, as sampling.method is auto, which chooses for "
             "one, got 2");
-  EXPECT_EQ(faults(R"("quality": {"timeLimit": 9}, "sampling": {"method": "mis"},
+  EXPECT_EQ(quality_faults(R"("quality": {"timeLimit": 9}, "sampling": {"method": "mis"},
                       "visibility": {"correlated": true})"),
             "job.json: $.visibility.correlated: expected false, as quality asks for sweeps, and "
             "the frames of a second pass have no mean, got true");
-  EXPECT_EQ(faults(R"("quality": {"noiseThreshold": 0.5}, "sampling": {"method": "sequential"})"),
-            "job.json: $.quality: expected no noiseThreshold, as the noise of sequential is not "
-            "known where it carries samples, got 0.5");
+  EXPECT_EQ(
+      quality_faults(R"("quality": {"noiseThreshold": 0.5}, "sampling": {"method": "sequential"})"),
+      "job.json: $.quality: expected no noiseThreshold, as the noise of sequential is not "
+      "known where it carries samples, got 0.5");
 }
 
 TEST(Quality, SweepsAreDoubledUntilNoiseTimeOrRoundsEndThem) {
