@@ -39,11 +39,14 @@ class Patch {
     const Vec3 a = world(0);
     edge_b_ = world(1) - a;
     edge_c_ = world(2) - a;
+    bb_ = dot(edge_b_, edge_b_);
+    bc_ = dot(edge_b_, edge_c_);
+    cc_ = dot(edge_c_, edge_c_);
     const float slope = std::max(dot(point.ng, point.wo), kLeastSlope);
     const Vec3 down = point.wo - point.ng * dot(point.ng, point.wo);
     const Vec3 along = length(down) > 1e-6f ? normalize(down) : Frame(point.ng).x;
-    along_ = along * (place_.width / slope);
-    across_ = cross(point.ng, along) * place_.width;
+    along_ = on_triangle(along * (place_.width / slope));
+    across_ = on_triangle(cross(point.ng, along) * place_.width);
   }
 
   std::array<float, 4> look_up(const PlacedTexture& t) const {
@@ -52,7 +55,10 @@ class Patch {
     const Uv at = mapped(t.linear, mix_uv(a, b, c, place_.u, place_.v));
     const Uv to_b = mapped(t.linear, {b[0] - a[0], b[1] - a[1]});
     const Uv to_c = mapped(t.linear, {c[0] - a[0], c[1] - a[1]});
-    const Footprint seen{edge(along_, to_b, to_c), edge(across_, to_b, to_c)};
+    const auto edge = [&](const Uv& step) -> Uv {
+      return {step[0] * to_b[0] + step[1] * to_c[0], step[0] * to_b[1] + step[1] * to_c[1]};
+    };
+    const Footprint seen{edge(along_), edge(across_)};
     return t.texture->look_up({at[0] + t.offset[0], at[1] + t.offset[1]}, seen, t.sampling);
   }
 
@@ -88,14 +94,12 @@ class Patch {
                          corner(mesh_.normals, 2), place_.u, place_.v));
   }
 
-  /// What a step in the world is in the image.
-  Uv edge(const Vec3& step, const Uv& to_b, const Uv& to_c) const {
-    const float bb = dot(edge_b_, edge_b_), bc = dot(edge_b_, edge_c_), cc = dot(edge_c_, edge_c_);
+  /// A step in the world, in edges of the triangle.
+  Uv on_triangle(const Vec3& step) const {
     const float sb = dot(step, edge_b_), sc = dot(step, edge_c_);
-    const float determinant = bb * cc - bc * bc;
+    const float determinant = bb_ * cc_ - bc_ * bc_;
     if (!(determinant > 0)) return {0, 0};
-    const float b = (cc * sb - bc * sc) / determinant, c = (bb * sc - bc * sb) / determinant;
-    return {b * to_b[0] + c * to_c[0], b * to_b[1] + c * to_c[1]};
+    return {(cc_ * sb - bc_ * sc) / determinant, (bb_ * sc - bc_ * sb) / determinant};
   }
 
   const TriangleMesh& mesh_;
@@ -103,7 +107,8 @@ class Patch {
   const SurfacePlace& place_;
   const std::array<std::uint32_t, 3>& corner_;
   Vec3 edge_b_{}, edge_c_{};
-  Vec3 along_{}, across_{};
+  float bb_ = 0, bc_ = 0, cc_ = 0;  ///< of these edges
+  Uv along_{}, across_{};           ///< of the footprint, in edges of the triangle
 };
 
 /// The shading normal that a normal map gives.

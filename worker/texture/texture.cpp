@@ -168,32 +168,50 @@ std::array<float, 4> Texture::texel(std::int32_t level, std::int32_t x, std::int
   return value;
 }
 
-/// Adds weight times the blend of the four texels around (u, v), or the nearest one.
-void Texture::add(const Level& level, std::array<float, 2> uv, const TextureSampling& sampling,
-                  float weight, std::array<float, 4>& sum) const {
+/// Adds weight times the blend of the four texels around (u, v), or the nearest one. kChannels:
+/// those of the image.
+template <std::size_t kChannels>
+void Texture::add_channels(const Level& level, std::array<float, 2> uv,
+                           const TextureSampling& sampling, float weight,
+                           std::array<float, 4>& sum) const {
   const float half = sampling.nearest ? 0.0f : 0.5f;
   const float x = within_period(uv[0], sampling.wrap_u) * static_cast<float>(level.width) - half;
   const float y = within_period(uv[1], sampling.wrap_v) * static_cast<float>(level.height) - half;
   const float x0 = std::floor(x), y0 = std::floor(y);
   const float fx = sampling.nearest ? 0 : x - x0, fy = sampling.nearest ? 0 : y - y0;
-  const auto channels = static_cast<std::size_t>(channels_);
-  for (std::int32_t j = 0; j < 2; ++j) {
+  const auto column = static_cast<std::int32_t>(x0), row = static_cast<std::int32_t>(y0);
+  const std::array<std::int32_t, 2> columns{wrap_texel(column, level.width, sampling.wrap_u),
+                                            wrap_texel(column + 1, level.width, sampling.wrap_u)};
+  const std::array<std::int32_t, 2> rows{wrap_texel(row, level.height, sampling.wrap_v),
+                                         wrap_texel(row + 1, level.height, sampling.wrap_v)};
+  const std::uint16_t* const first = texels_.data() + level.first;
+  for (std::size_t j = 0; j < 2; ++j) {
     const float wy = weight * (j == 0 ? 1 - fy : fy);
     if (wy == 0) continue;
-    const std::int32_t row =
-        wrap_texel(static_cast<std::int32_t>(y0) + j, level.height, sampling.wrap_v);
-    for (std::int32_t i = 0; i < 2; ++i) {
+    const std::size_t line =
+        static_cast<std::size_t>(rows[j]) * static_cast<std::size_t>(level.width);
+    for (std::size_t i = 0; i < 2; ++i) {
       const float w = wy * (i == 0 ? 1 - fx : fx);
       if (w == 0) continue;
-      const std::int32_t column =
-          wrap_texel(static_cast<std::int32_t>(x0) + i, level.width, sampling.wrap_u);
-      const std::size_t at =
-          level.first + (static_cast<std::size_t>(row) * static_cast<std::size_t>(level.width) +
-                         static_cast<std::size_t>(column)) *
-                            channels;
-      for (std::size_t c = 0; c < channels; ++c)
-        sum[c] += w * (static_cast<float>(texels_[at + c]) * scale_);
+      const std::uint16_t* const texel =
+          first + (line + static_cast<std::size_t>(columns[i])) * kChannels;
+      for (std::size_t c = 0; c < kChannels; ++c)
+        sum[c] += w * (static_cast<float>(texel[c]) * scale_);
     }
+  }
+}
+
+void Texture::add(const Level& level, std::array<float, 2> uv, const TextureSampling& sampling,
+                  float weight, std::array<float, 4>& sum) const {
+  switch (channels_) {
+    case 1:
+      return add_channels<1>(level, uv, sampling, weight, sum);
+    case 2:
+      return add_channels<2>(level, uv, sampling, weight, sum);
+    case 3:
+      return add_channels<3>(level, uv, sampling, weight, sum);
+    default:
+      return add_channels<4>(level, uv, sampling, weight, sum);
   }
 }
 

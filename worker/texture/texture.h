@@ -64,6 +64,9 @@ class Texture {
     std::size_t first;  ///< of its values
   };
   void append_level(const std::vector<float>& values, std::int32_t width, std::int32_t height);
+  template <std::size_t kChannels>
+  void add_channels(const Level& level, std::array<float, 2> uv, const TextureSampling& sampling,
+                    float weight, std::array<float, 4>& sum) const;
   void add(const Level& level, std::array<float, 2> uv, const TextureSampling& sampling,
            float weight, std::array<float, 4>& sum) const;
 
