@@ -71,8 +71,8 @@ std::optional<Imf::Compression> compression_of(const std::string& name) {
 
 /// Channels whose use needs all 32 bits.
 bool always_float(const std::string& channel) {
-  static constexpr std::array<std::string_view, 6> kWhole{"depth",    "lns",    "variance",
-                                                          "material", "object", "Z"};
+  static constexpr std::array<std::string_view, 7> kWhole{"depth",  "lns", "variance", "material",
+                                                          "object", "Z",   "rounds"};
   static constexpr std::array<std::string_view, 5> kBeginnings{"normal.", "P.", "forward.",
                                                                "backward.", "Crypto"};
   return std::ranges::find(kWhole, channel) != kWhole.end() ||

@@ -119,7 +119,9 @@ void print_text(const JobSpec& job, const JobEstimate& e, const AssetReport& ass
              e.tasks(), e.render_tasks, e.runs, e.assemble_tasks, e.dependencies);
   fmt::print("rays       {} primary and at most {} shadow rays a pixel and frame\n",
              e.primary_rays_per_pixel, e.shadow_rays_per_pixel);
-  if (e.rounds > 1) fmt::print("           in {} rounds\n", e.rounds);
+  if (e.rounds > 1)
+    fmt::print("           in {}{} rounds\n", job.quality.adaptive_threshold ? "at most " : "",
+               e.rounds);
   if (e.preroll_rounds > 0) {
     fmt::print(
         "preroll    {} rounds before frame {} that are not seen: it takes {:.3g} times as "

@@ -308,6 +308,8 @@ def compare_prediction(predicted, summary, job):
     of_step = pixels * predicted["primaryRaysPerPixel"] // sweeps
     least = of_step * (steps if shares else predicted["runs"])
     most = least * (2 + asks if shares else 1) + (9 * of_step * steps if second_pass else 0)
+    if "adaptiveThreshold" in job.get("quality", {}):  # three rounds at least
+        least = least * 3 // job["quality"]["rounds"]
     require(least <= stats["raysPrimary"] <= most, "predicted primary rays",
             f"{stats['raysPrimary']}, predicted {least} to {most}")
     unseen = predicted.get("prerollRounds", 0) / predicted.get("rounds", 1)

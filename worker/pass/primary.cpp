@@ -55,6 +55,28 @@ TileSurfaces trace_primary(const JobSpec& job, const FrameGeometry& geometry, co
   return surfaces;
 }
 
+TileSurfaces part_of(const TileSurfaces& whole, RoundPixels pixels) {
+  TileSurfaces part{.rect = whole.rect,
+                    .pixels = std::move(pixels),
+                    .num_sites = whole.num_sites,
+                    .hits = {},
+                    .rays = {},
+                    .first_site = {}};
+  const auto num_sites = static_cast<std::ptrdiff_t>(whole.num_sites);
+  part.hits.reserve(part.pixels.size() * static_cast<std::size_t>(num_sites));
+  part.rays.reserve(part.hits.capacity());
+  for (std::size_t slot = 0; slot < part.pixels.size(); ++slot) {
+    const std::size_t index = part.pixels.index(slot);
+    const auto first = static_cast<std::ptrdiff_t>(index) * num_sites;
+    part.hits.insert(part.hits.end(), whole.hits.begin() + first,
+                     whole.hits.begin() + first + num_sites);
+    part.rays.insert(part.rays.end(), whole.rays.begin() + first,
+                     whole.rays.begin() + first + num_sites);
+    part.first_site.push_back(whole.first_site[index]);
+  }
+  return part;
+}
+
 void append_primary_rays(const JobSpec& job, const FrameGeometry& geometry, std::int32_t x,
                          std::int32_t y, std::vector<Ray>& rays, std::int32_t round) {
   const Camera& camera = geometry.pose.camera;

@@ -30,8 +30,11 @@ struct TileSurfaces {
     return std::span(hits).subspan(slot * static_cast<std::size_t>(num_sites),
                                    static_cast<std::size_t>(num_sites));
   }
-  std::size_t size_bytes() const {
-    return hits.size() * sizeof(hits[0]) + rays.size() * sizeof(rays[0]) + first_site.size();
+  std::size_t size_bytes() const { return size_bytes(pixels.size(), num_sites); }
+  /// Of so many pixels.
+  static std::size_t size_bytes(std::size_t num_pixels, std::int32_t num_sites) {
+    const auto rays = num_pixels * static_cast<std::size_t>(num_sites);
+    return rays * (sizeof(SurfaceHit) + sizeof(Ray)) + num_pixels;
   }
 };
 
@@ -51,6 +54,9 @@ TileSurfaces trace_primary(const JobSpec& job, const FrameGeometry& geometry, co
 /// Of some pixels of a tile.
 TileSurfaces trace_primary(const JobSpec& job, const FrameGeometry& geometry, const PixelRect& rect,
                            RoundPixels pixels, std::int32_t round);
+
+/// What some pixels of a tile see, of what all of them do.
+TileSurfaces part_of(const TileSurfaces& whole, RoundPixels pixels);
 
 /// The same for pixels one by one: appends the rays of the sites of pixel (x, y). Hits are the same
 /// as of a whole tile.

@@ -158,15 +158,28 @@ class TileWalk {
   /// What the sites of a round of all sweeps see: traced, or kept from a frame before.
   std::shared_ptr<const TileSurfaces> surfaces_of(std::int32_t round, RoundPixels pixels) {
     const std::int32_t of = rounds_have_own_sites(context_.job) ? std::max(round, 0) : 0;
-    const bool is_whole = pixels.are_all(state_.num_pixels());
-    if (const auto found = kept_.find(of); found != kept_.end() && is_whole) return found->second;
     const CpuTimer timer(stats_.seconds_primary);
+    const bool is_whole = pixels.are_all(state_.num_pixels());
+    auto found = kept_.find(of);
+    if (found == kept_.end() && (of == 0 || has_room())) {
+      // Of all pixels: the next frame may want others.
+      found = kept_.emplace(of, trace(of, RoundPixels::all(state_.num_pixels()))).first;
+    }
+    if (found == kept_.end()) return trace(of, std::move(pixels));
+    return is_whole
+               ? found->second
+               : std::make_shared<const TileSurfaces>(part_of(*found->second, std::move(pixels)));
+  }
+  /// For what another round sees, until the next frame.
+  bool has_room() const {
+    const std::size_t of_round =
+        TileSurfaces::size_bytes(state_.num_pixels(), context_.job.image.sites);
+    return keeps_surfaces_ && (kept_.size() + 1) * of_round <= limits::kMaxRoundSurfaceBytes;
+  }
+  std::shared_ptr<const TileSurfaces> trace(std::int32_t round, RoundPixels pixels) {
     auto surfaces = std::make_shared<const TileSurfaces>(
-        trace_primary(context_.job, *geometry_, rect_, std::move(pixels), of));
+        trace_primary(context_.job, *geometry_, rect_, std::move(pixels), round));
     stats_.rays_primary += surfaces->rays.size();
-    const bool has_room =
-        (kept_.size() + 1) * surfaces->size_bytes() <= limits::kMaxRoundSurfaceBytes;
-    if (is_whole && (of == 0 || (keeps_surfaces_ && has_room))) kept_.emplace(of, surfaces);
     return surfaces;
   }
 
