@@ -42,6 +42,7 @@ inline constexpr int kMaxTileSize = 32768;
 /// Side of the blocks of pixels that get the same number of rounds; tiles are whole numbers of
 /// them.
 inline constexpr int kAdaptiveBlock = 8;
+inline constexpr int kJudgingRounds = 2;  ///< of all pixels; they say how many more a block gets
 inline constexpr int kMaxSites = 16;
 inline constexpr int kMaxRounds = 65536;
 inline constexpr int kMaxPreroll = 64;  ///< rounds

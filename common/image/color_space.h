@@ -30,8 +30,8 @@ struct PictureColors {
   bool operator==(const PictureColors&) const = default;
 };
 
-/// "primaries (0.713, 0.293) ... converted to Rec. 709; divided by 2"; empty: the numbers are taken
-/// as they are.
+/// "to Rec. 709, from red (0.713, 0.293), ...; divided by its exposure, 2"; empty: the numbers are
+/// taken as they are.
 std::string conversion_text(const PictureColors& colors);
 
 }  // namespace baton

@@ -69,20 +69,6 @@ std::optional<Imf::Compression> compression_of(const std::string& name) {
   return std::nullopt;
 }
 
-/// Channels whose use needs all 32 bits.
-bool always_float(const std::string& channel) {
-  static constexpr std::array<std::string_view, 7> kWhole{"depth",  "lns", "variance", "material",
-                                                          "object", "Z",   "rounds"};
-  static constexpr std::array<std::string_view, 5> kBeginnings{"normal.", "P.", "forward.",
-                                                               "backward.", "Crypto"};
-  return std::ranges::find(kWhole, channel) != kWhole.end() ||
-         std::ranges::any_of(kBeginnings, [&](auto start) { return channel.starts_with(start); });
-}
-
-bool is_color(const std::string& channel) {
-  return channel == "R" || channel == "G" || channel == "B";
-}
-
 std::vector<half> to_half(std::span<const float> values) {
   std::vector<half> halves(values.size());
   for (std::size_t i = 0; i < values.size(); ++i)
@@ -140,8 +126,8 @@ Result<Imf::Header> make_header(const std::string& name, const FilmTile& image,
   header.compression() = *compression;
   header.zipCompressionLevel() = kZipLevel;
   for (const std::string& channel : image.channels) {
-    const bool is_half = options.half_float && !always_float(channel) &&
-                         !(options.float_colors && is_color(channel));
+    const bool is_half =
+        options.half_float && std::ranges::find(options.whole, channel) == options.whole.end();
     header.channels().insert(stored_channel(channel, options.naming).name,
                              Imf::Channel(is_half ? Imf::HALF : Imf::FLOAT));
   }

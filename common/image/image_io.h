@@ -38,8 +38,8 @@ using ImageMetadata = std::vector<std::pair<std::string, std::string>>;
 struct ExrOptions {
   /// Distances, positions, normals, motion, IDs, `lns` and `variance` stay float32 always.
   bool half_float = true;
-  bool float_colors = false;        ///< R, G and B are float32 whatever half_float says
-  std::string compression = "zip";  ///< none, rle, zips, zip, piz
+  std::vector<std::string> whole{};  ///< channels that are float32 whatever half_float says
+  std::string compression = "zip";   ///< none, rle, zips, zip, piz
   ImageMetadata metadata{};
   /// Attributes of their own, which compositors read: worldToCamera, worldToNDC (row by row; points
   /// are row vectors), framesPerSecond.
@@ -62,10 +62,9 @@ Result<Bytes> encode_exr(const std::string& name, const FilmTile& image, const E
 /// Publishes the encoded file atomically, with missing folders. Errors: encode_exr's, the disk.
 Status write_exr(const std::filesystem::path& path, const FilmTile& image,
                  const ExrOptions& options);
-/// Reads every channel of a flat EXR file as float32, in file order, which is alphabetical, by its
-/// plain name (channel_names.h). The
-/// rectangle is that of the pixels in the file's coordinates. Errors name the file: missing, not an
-/// EXR, truncated, subsampled channels, past the limits of picture sides.
+/// Reads every channel of a flat EXR file as float32, by its plain name (channel_names.h), in
+/// alphabetical order. The rectangle is that of the pixels in the file's coordinates. Errors name
+/// the file: missing, not an EXR, truncated, subsampled channels, past the limits of picture sides.
 Result<FilmTile> read_exr(const std::filesystem::path& path, ExrWindow window = ExrWindow::data);
 /// Rows y0 to y1 - 1 of every channel, clipped to the data window. Errors: read_exr's, a file whose
 /// table of blocks has gaps.

@@ -18,9 +18,8 @@ struct RadianceHeader {
 };
 
 /// `name` goes first in every error. Errors: no Radiance header, another pixel format than RGBE,
-/// rows that do not go from the top down and from left to right,
-/// settings of colours that are no numbers, an exposure that is not above zero. The sides are not
-/// checked.
+/// rows that do not go from the top down and from left to right, settings of colours that are no
+/// numbers, an exposure that is not above zero. The sides are not checked.
 Result<RadianceHeader> read_radiance_header(ByteView file, const std::string& name);
 
 /// The pixels, a mantissa m with exponent e as m * 2^(e - 136), as they are stored: header.colors

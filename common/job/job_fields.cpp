@@ -290,9 +290,9 @@ void check_adaptive(JobArchive& a, const JobSpec& job) {
     a.fault("quality", "no adaptiveThreshold, as " + why,
             fmt::format("{}", *job.quality.adaptive_threshold));
   };
-  if (job.quality.rounds < 3) {
-    refuse(
-        fmt::format("the first two of quality.rounds judge, and there are {}", job.quality.rounds));
+  if (job.quality.rounds <= limits::kJudgingRounds) {
+    refuse(fmt::format("the first {} of quality.rounds judge, and there are {}",
+                       limits::kJudgingRounds, job.quality.rounds));
   } else if (!rounds_have_own_sites(job)) {
     refuse(fmt::format("the rounds of {} go on from each other where it carries samples",
                        traits(job.sampling.method).name));

@@ -307,7 +307,7 @@ struct OutputSpec {
   std::vector<Aov> aovs;  ///< in the order of the enum, no duplicates
   PixelType pixel_type = PixelType::half_float;
   std::string compression = "zip";  ///< none, rle, zips, zip, piz
-  double frames_per_second = 24;    ///< said in the header of frames, no more; (0, 1000]
+  double frames_per_second = 24;    ///< of movies; said in the header of frames; [1, 1000]
   FrameNaming naming = FrameNaming::plain;
   bool clamp_negative = true;  ///< colours below zero become 0 in frames
 

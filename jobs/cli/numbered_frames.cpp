@@ -58,7 +58,9 @@ Result<std::string> rate_of(const fs::path& frame) {
   BATON_ASSIGN(const ImageMetadata metadata, read_exr_metadata(frame));
   const auto found =
       std::ranges::find(metadata, "framesPerSecond", [](const auto& entry) { return entry.first; });
-  return found == metadata.end() ? "24" : found->second;
+  if (found == metadata.end()) return std::string("24");
+  const std::string& rate = found->second;
+  return rate.ends_with("/1") ? rate.substr(0, rate.size() - 2) : rate;
 }
 
 Result<FrameFolder> in_folder(const fs::path& path, const std::string& range) {

@@ -87,8 +87,8 @@ TEST(Coats, MovingSurfacesAgreeWithBruteForce) {
     expect_agreement(job, 2 * kRuns, 0.03);
   }
 }
-// The reference itself, which the others are held to: with all light from one small sun, the
-// picture is that of the formula at that direction.
+// The reference itself, which the others are held to: under a white sky a coat of share s shows s
+// times a white metal of its roughness, and 1 - s times the bare material.
 TEST(Coats, TheReferenceIsTheFormula) {
   JobSpec job = coated_job(Method::reference);
   job.sampling.reference_samples = 20000;
@@ -100,7 +100,6 @@ TEST(Coats, TheReferenceIsTheFormula) {
   job.scene.materials["ground"].clearcoat_roughness = 0.6f;
   job.environment.keys[0].map = test::write_map("flat.exr", test::constant_map(64, 32, {1, 1, 1}));
   const FilmTile film = test::render_tile(job).films.back();
-  // The white sky: what a coat of share s reflects and what is left of the bare material.
   JobSpec bare = job, metal = job;
   bare.scene.materials["ground"].clearcoat.reset();
   metal.scene.materials["ground"] = {.kind = MaterialKind::metallic_roughness,

@@ -21,12 +21,13 @@ std::size_t AdaptiveRounds::block_of(std::size_t pixel) const {
 
 RoundPixels AdaptiveRounds::pixels(std::int32_t round) const {
   const auto num_pixels = static_cast<std::size_t>(rect_.area());
-  if (round < kJudgingRounds || rounds_of_block_.empty()) return RoundPixels::all(num_pixels);
+  if (round < limits::kJudgingRounds || rounds_of_block_.empty())
+    return RoundPixels::all(num_pixels);
   RoundPixels taken;
   for (std::size_t pixel = 0; pixel < num_pixels; ++pixel) {
     const std::int32_t count = rounds_of_block_[block_of(pixel)];
-    if (round - kJudgingRounds < count)
-      taken.add(pixel, static_cast<double>(rounds_ - kJudgingRounds) / count);
+    if (round - limits::kJudgingRounds < count)
+      taken.add(pixel, static_cast<double>(rounds_ - limits::kJudgingRounds) / count);
   }
   return taken;
 }
@@ -40,7 +41,7 @@ void AdaptiveRounds::judge(const RoundMean& film) {
     squares[block_of(pixel)] += film.squared_noise(pixel);
     ++counts[block_of(pixel)];
   }
-  const std::int32_t most = rounds_ - kJudgingRounds;
+  const std::int32_t most = rounds_ - limits::kJudgingRounds;
   rounds_of_block_.resize(num_blocks);
   for (std::size_t block = 0; block < num_blocks; ++block) {
     const double share = std::sqrt(squares[block] / counts[block]) / double{*threshold_};

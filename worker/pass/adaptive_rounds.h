@@ -25,13 +25,11 @@ namespace baton {
 /// are whole numbers of blocks, so that no tiling shows.
 class AdaptiveRounds {
  public:
-  static constexpr std::int32_t kJudgingRounds = 2;
-
   /// Of a tile.
   AdaptiveRounds(const JobSpec& job, const PixelRect& rect);
 
-  /// The pixels of round `round` of the frame, [0, K); later rounds have no others than earlier
-  /// ones. After the judging rounds only once judge() was called.
+  /// The pixels of round `round` of the frame, below K, or negative in preroll; later rounds have
+  /// no others than earlier ones. After the judging rounds only once judge() was called.
   RoundPixels pixels(std::int32_t round) const;
   /// film: the sums of the judging rounds. Does nothing where all pixels get all rounds.
   void judge(const RoundMean& film);

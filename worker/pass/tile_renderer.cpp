@@ -91,7 +91,7 @@ class TileWalk {
     }
     for (std::int32_t round = first; round < context_.job.quality.rounds; ++round) {
       if (stop_.stop_requested()) return Error{ErrorKind::cancelled, "stopped"};
-      if (round == AdaptiveRounds::kJudgingRounds) adaptive.judge(film);
+      if (round == limits::kJudgingRounds) adaptive.judge(film);
       RoundPixels pixels = adaptive.pixels(round);
       if (pixels.size() == 0) break;
       BATON_ASSIGN(const std::shared_ptr<const FrameLight> light, light_of(frame, round));

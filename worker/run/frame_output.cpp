@@ -34,6 +34,18 @@ ChannelNaming naming_of(const JobSpec& job) {
   return job.output.naming == FrameNaming::blender ? ChannelNaming::blender : ChannelNaming::plain;
 }
 
+/// Channels with 32 bits whatever output.pixelType says: colours that half floats cannot hold, and
+/// AOVs whose use needs them.
+std::vector<std::string> whole_channels(const JobSpec& job, const FrameQuality& quality) {
+  std::vector<std::string> whole;
+  if (quality.pixels_beyond_half > 0) whole = {"R", "G", "B"};
+  for (const Aov aov : job.output.aovs) {
+    const AovTraits& row = traits(aov);
+    if (row.is_float) whole.insert(whole.end(), row.channels.begin(), row.channels.end());
+  }
+  return whole;
+}
+
 void drop_channel(FilmTile& image, std::string_view name) {
   const auto found = std::find(image.channels.begin(), image.channels.end(), name);
   if (found == image.channels.end()) return;
@@ -179,7 +191,7 @@ Result<WrittenFrame> write_frame(const JobSpec& job, const Digest& job_digest,
   BATON_ASSIGN(const Bytes bytes,
                encode_exr(path.string(), image,
                           {.half_float = job.output.pixel_type == PixelType::half_float,
-                           .float_colors = quality.pixels_beyond_half > 0,
+                           .whole = whole_channels(job, quality),
                            .compression = job.output.compression,
                            .metadata = frame_metadata(job, job_digest, number, quality, noise),
                            .world_to_camera = camera.world_to_camera(),

@@ -108,8 +108,7 @@ struct LobeChances {
 LobeChances lobe_chances(const Material& material, float coat_share);
 
 /// A direction from the mixture of the cosine lobe, the specular lobe and that of the coat. u: 3
-/// uniforms in [0, 1).
-/// May fall below the horizon (there the BRDF is 0).
+/// uniforms in [0, 1). May fall below the horizon (there the BRDF is 0).
 Vec3 sample_bsdf(const Material& material, const ShadingPoint& point,
                  const std::array<float, 3>& u);
 /// Its density, 1/sr; integrates to 1 over the sphere.

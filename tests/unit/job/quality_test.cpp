@@ -35,7 +35,7 @@ TEST(Quality, SweepsAreBoundedAndNoiseMustBeKnown) {
             "job.json: $.quality.sweeps: expected at most 65536 rounds in all sweeps, got 65792");
   EXPECT_EQ(quality_faults(R"("quality": {"rounds": 3, "adaptiveThreshold": 0.01})"), "");
   EXPECT_EQ(quality_faults(R"("quality": {"rounds": 2, "adaptiveThreshold": 0.01})"),
-            "job.json: $.quality: expected no adaptiveThreshold, as the first two of "
+            "job.json: $.quality: expected no adaptiveThreshold, as the first 2 of "
             "quality.rounds judge, and there are 2, got 0.01");
   EXPECT_EQ(quality_faults(R"("quality": {"rounds": 8, "adaptiveThreshold": 0.01},
                       "sampling": {"method": "sequential"})"),

@@ -8,12 +8,15 @@
 #include <vector>
 
 #include "tests/support/chi_square.h"
+#include "tests/support/directions.h"
 #include "tests/support/instruction_sets.h"
 #include "worker/light/candidates.h"
 #include "worker/scene/scene_kernels.h"
 
 namespace baton {
 namespace {
+
+using test::Columns;
 
 Material coated(float metallic, float clearcoat, float coat_roughness) {
   return make_material({.kind = MaterialKind::metallic_roughness,
@@ -43,30 +46,11 @@ ShadingPoint tilted_point(const Vec3& wo) {
 }
 
 /// Directions over the upper half space and a little below.
-std::vector<Vec3> random_directions(std::size_t count) {
-  const Rng rng({.job_seed = 5}, PassId::reference);
-  std::vector<Vec3> out;
-  for (std::uint32_t i = 0; i < count; ++i) {
-    const auto u = rng.uniforms(0, i);
-    const float z = 2 * u[0] - 1;
-    const float r = std::sqrt(std::max(0.0f, 1 - z * z));
-    out.push_back(
-        {r * std::cos(2 * kPi * u[1]), std::fabs(z) - 0.1f, r * std::sin(2 * kPi * u[1])});
-    out.back() = normalize(out.back());
-  }
+std::vector<Vec3> upper_directions(std::size_t count) {
+  std::vector<Vec3> out = test::random_directions(count, 5);
+  for (Vec3& w : out) w = normalize({w.x, std::fabs(w.z) - 0.1f, w.y});
   return out;
 }
-
-struct Columns {
-  std::vector<float> x, y, z;
-  explicit Columns(const std::vector<Vec3>& v) {
-    for (const Vec3& w : v) {
-      x.push_back(w.x);
-      y.push_back(w.y);
-      z.push_back(w.z);
-    }
-  }
-};
 
 class CoatKernels : public OnInstructionSet {};
 INSTANTIATE_TEST_SUITE_P(Sets, CoatKernels, testing::ValuesIn(instruction_sets()),
@@ -74,7 +58,7 @@ INSTANTIATE_TEST_SUITE_P(Sets, CoatKernels, testing::ValuesIn(instruction_sets()
 
 TEST_P(CoatKernels, MixedSitesAsTheScalarCode) {
   const auto materials = materials_of_pixel();
-  const Columns w(random_directions(4003));
+  const Columns w(upper_directions(4003));
   for (const Vec3& wo : {normalize(Vec3{0.3f, 0.9f, 0.2f}), normalize(Vec3{1, 0.02f, 0}),
                          normalize(Vec3{1, -0.01f, 0})}) {
     const ShadingPoint point = tilted_point(wo);
@@ -105,7 +89,7 @@ TEST_P(CoatKernels, MixedSitesAsTheScalarCode) {
 // A lane's value does not depend on what the other lanes see.
 TEST_P(CoatKernels, OthersAreTheSameBitsBesideACoat) {
   const auto materials = materials_of_pixel();
-  const Columns w(random_directions(1000));
+  const Columns w(upper_directions(1000));
   const ShadingPoint point = tilted_point(normalize({0.3f, 0.9f, 0.2f}));
   std::array<std::array<std::vector<float>, 4>, 2> found;
   for (const bool beside : {false, true}) {

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <vector>
 
+#include "tests/support/directions.h"
 #include "tests/support/instruction_sets.h"
 #include "worker/scene/material.h"
 #include "worker/scene/scene_kernels.h"
@@ -13,28 +14,8 @@
 namespace baton {
 namespace {
 
-std::vector<Vec3> random_directions(std::size_t count, std::uint32_t seed) {
-  const Rng rng({.job_seed = seed}, PassId::reference);
-  std::vector<Vec3> out;
-  for (std::uint32_t i = 0; i < count; ++i) {
-    const auto u = rng.uniforms(0, i);
-    const float z = 2 * u[0] - 1;
-    const float r = std::sqrt(std::max(0.0f, 1 - z * z));
-    out.push_back({r * std::cos(2 * kPi * u[1]), r * std::sin(2 * kPi * u[1]), z});
-  }
-  return out;
-}
-
-struct Lanes {
-  std::vector<float> x, y, z;
-  explicit Lanes(const std::vector<Vec3>& v) {
-    for (const Vec3& w : v) {
-      x.push_back(w.x);
-      y.push_back(w.y);
-      z.push_back(w.z);
-    }
-  }
-};
+using test::Columns;
+using test::random_directions;
 
 Material material_of(MaterialKind kind) {
   MaterialSpec spec;
@@ -76,7 +57,7 @@ TEST_P(Kernels, EnvironmentAsTheScalarCode) {
        {Vec3{0, 1, 0}, Vec3{0, -1, 0}, Vec3{1, 0, 0}, Vec3{0, 0, 1}, Vec3{0, 0, -1}}) {
     directions.push_back(axis);
   }
-  const Lanes w(directions);
+  const Columns w(directions);
   for (const MapFilter filter : {MapFilter::nearest, MapFilter::bilinear}) {
     const HiddenCone below{.axis = {0, -1, 0}, .angle = 1.2f};
     const Environment environment{
@@ -105,7 +86,7 @@ TEST_P(Kernels, EnvironmentAsTheScalarCode) {
 
 TEST_P(Kernels, BsdfAsTheScalarCode) {
   const std::vector<Vec3> directions = random_directions(4000, 5);
-  const Lanes w(directions);
+  const Columns w(directions);
   const std::vector<Material> materials{
       material_of(MaterialKind::diffuse), material_of(MaterialKind::phong),
       material_of(MaterialKind::metallic_roughness),
