@@ -1,7 +1,6 @@
 #include "common/job/store_estimate.h"
 
 #include <algorithm>
-#include <cmath>
 #include <vector>
 
 #include "common/job/aov.h"
@@ -18,10 +17,9 @@ namespace {
 constexpr double kColorBytes = 3.2;
 /// The errors of a few pixels.
 constexpr double kErrorBytes = 0.1;
-/// What a memory takes after kMemoryRays shadow rays; it grows with their square root, until all
-/// bins above the horizon are known. Where things move, some pixels start afresh in each frame.
-constexpr double kMemoryBytes = 200, kMemoryRays = 800, kMostMemoryBytes = 310;
-constexpr double kMovingMemory = 0.85;
+/// What a memory takes in the end, when all bins that rays reach are known, and the number of
+/// shadow rays after which it takes half of that.
+constexpr double kMemoryBytes = 64, kHalfMemoryRays = 70;
 /// A sample of the first pass, and how many of a pixel's are stored: those of pixels near a
 /// shadow's border.
 constexpr double kSampleBytes = 10, kSampleShare = 0.27;
@@ -69,8 +67,7 @@ double state_bytes_per_pixel(const JobSpec& job, std::int64_t end, double surfac
   }
   const auto rounds = static_cast<double>(e.preroll_rounds + end * job.quality.rounds);
   const double rays = rounds * job.sampling.num_particles;
-  const double memory = std::min(kMostMemoryBytes, kMemoryBytes * std::sqrt(rays / kMemoryRays));
-  return surface_share * std::min(whole, memory * (moves(job) ? kMovingMemory : 1));
+  return surface_share * std::min(whole, kMemoryBytes * rays / (rays + kHalfMemoryRays));
 }
 
 /// The ends of the steps whose states are in the store together when it is fullest.

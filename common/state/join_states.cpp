@@ -37,8 +37,7 @@ void copy_row(const SampleState& from, std::size_t first_from, SampleState& to,
   copy(from.weight, to.weight, particles);
   copy(from.site, to.site, particles);
   copy(from.confidence, to.confidence, 1);
-  for (std::size_t i = 0; i < count && !to.memory.empty(); ++i)
-    from.memory.copy_to(first_from + i, to.memory[first_to + i]);
+  copy(from.memory, to.memory, 1);
 }
 
 std::size_t pixel_at(const PixelRect& rect, std::int32_t x, std::int32_t y) {

@@ -2,14 +2,18 @@
 
 #include <fmt/format.h>
 
-#include <array>
 #include <bit>
+#include <cstdint>
 #include <cstring>
 
 #include "common/base/check.h"
 
 namespace baton {
 namespace {
+
+/// Which bins are not 0: bit i is bin i.
+using BinMask = std::uint64_t;
+static_assert(8 * sizeof(BinMask) == VisibilityBins::kCount);
 
 /// The cells of a value for each pixel.
 struct Column {
@@ -50,43 +54,51 @@ Status check_noises(const Column& noises, const SectionTag& tag,
 
 }  // namespace
 
-MemoryPayloads encode_memory(const PixelMemories& packed, const std::vector<std::size_t>& pixels) {
+MemoryPayloads encode_memory(std::span<const PixelMemory> memories,
+                             const std::vector<std::size_t>& pixels) {
   ByteWriter summaries, masks, cells, light_noise, lobe_noise;
   for (const std::size_t pixel : pixels) {
-    const PixelMemories::Packed memory = packed.packed(pixel);
+    const PixelMemory& memory = memories[pixel];
     summaries.put(memory.all_rays);
     summaries.put(memory.outcomes);
     light_noise.put(memory.light_noise);
     lobe_noise.put(memory.lobe_noise);
-    if (memory.outcomes != PixelMemory::kSawBoth) continue;
-    BATON_CHECK(memory.mask != nullptr);
-    masks.put_raw(std::as_bytes(std::span(*memory.mask)));
-    cells.put_raw(std::as_bytes(memory.cells));
+    if (!memory.has_bins()) continue;
+    BinMask mask = 0;
+    VisibilityBins reached;
+    std::size_t count = 0;
+    for (std::size_t bin = 0; bin < VisibilityBins::kCount; ++bin) {  // no branch
+      const VisibilityCell cell = memory.bins.cells[bin];
+      reached.cells[count] = cell;
+      count += cell != 0 ? 1 : 0;
+      mask |= BinMask{cell != 0} << bin;
+    }
+    masks.put(mask);
+    cells.put_raw(std::as_bytes(std::span(reached.cells).first(count)));
   }
   return {summaries.take(), masks.take(), cells.take(), light_noise.take(), lobe_noise.take()};
 }
 
 Status decode_memory(const SectionFile& file, const std::vector<std::size_t>& pixels,
                      const std::string& name, SampleState& state) {
-  using BinMask = PixelMemories::BinMask;
   if (file.find(kMemorySummary) == nullptr && file.find(kMemoryMasks) == nullptr) return {};
 
   // Summaries first: they say who has bins, and the masks how many.
   BATON_ASSIGN(const Column summaries,
                column(file, kMemorySummary, pixels.size() * kMemorySummaryStride, name));
-  std::size_t num_sets = 0;
+  std::size_t num_masks = 0;
   for (std::size_t i = 0; i < pixels.size(); ++i) {
     const auto outcomes = summaries.at<std::uint16_t>(2 * i + 1);
     if (outcomes > PixelMemory::kSawBoth) {
       return wrong_value(state, kMemorySummary, pixels[i],
                          fmt::format("outcomes {}, expected 0 to 3", outcomes), name);
     }
-    num_sets += outcomes == PixelMemory::kSawBoth ? 1 : 0;
+    num_masks += outcomes == PixelMemory::kSawBoth ? 1 : 0;
   }
-  BATON_ASSIGN(const Column masks, column(file, kMemoryMasks, num_sets * sizeof(BinMask), name));
+  BATON_ASSIGN(const Column masks, column(file, kMemoryMasks, num_masks * sizeof(BinMask), name));
   std::size_t num_cells = 0;
-  for (std::size_t i = 0; i < num_sets * BinMask{}.size(); ++i)
-    num_cells += static_cast<std::size_t>(std::popcount(masks.at<std::uint64_t>(i)));
+  for (std::size_t i = 0; i < num_masks; ++i)
+    num_cells += static_cast<std::size_t>(std::popcount(masks.at<BinMask>(i)));
   BATON_ASSIGN(const Column cells, column(file, kMemoryCells, num_cells * kMemoryCellStride, name));
   const std::size_t noise_bytes = pixels.size() * kMemoryCellStride;
   BATON_ASSIGN(const Column light, column(file, kMemoryLightNoise, noise_bytes, name));
@@ -94,30 +106,20 @@ Status decode_memory(const SectionFile& file, const std::vector<std::size_t>& pi
   BATON_ASSIGN(const Column lobes, column(file, kMemoryLobeNoise, noise_bytes, name));
   BATON_TRY(check_noises(lobes, kMemoryLobeNoise, pixels, name, state));
 
-  // All pixels, those without a surface included.
-  std::size_t next_set = 0, next_cell = 0, next_pixel = 0;
-  BinMask mask{};
-  std::array<VisibilityCell, VisibilityBins::kCount> set{};
-  state.memory.reserve(state.num_pixels(), num_sets, num_cells);
+  std::size_t next_mask = 0, next_cell = 0;
+  state.add_memory();
   for (std::size_t i = 0; i < pixels.size(); ++i) {
-    for (; next_pixel < pixels[i]; ++next_pixel) state.memory.add({});
-    PixelMemories::Packed memory{summaries.at<VisibilityCell>(2 * i),
-                                 summaries.at<std::uint16_t>(2 * i + 1),
-                                 light.at<std::uint16_t>(i),
-                                 lobes.at<std::uint16_t>(i),
-                                 nullptr,
-                                 {}};
-    if (memory.outcomes == PixelMemory::kSawBoth) {
-      mask = masks.at<BinMask>(next_set++);
-      const std::size_t count = PixelMemories::num_bins(mask);
-      for (std::size_t j = 0; j < count; ++j) set[j] = cells.at<VisibilityCell>(next_cell++);
-      memory.mask = &mask;
-      memory.cells = std::span(set).first(count);
+    PixelMemory& memory = state.memory[pixels[i]];
+    memory.all_rays = summaries.at<VisibilityCell>(2 * i);
+    memory.outcomes = summaries.at<std::uint16_t>(2 * i + 1);
+    memory.light_noise = light.at<std::uint16_t>(i);
+    memory.lobe_noise = lobes.at<std::uint16_t>(i);
+    if (!memory.has_bins()) continue;
+    for (BinMask left = masks.at<BinMask>(next_mask++); left != 0; left &= left - 1) {
+      memory.bins.cells[static_cast<std::size_t>(std::countr_zero(left))] =
+          cells.at<VisibilityCell>(next_cell++);
     }
-    state.memory.add(memory);
-    ++next_pixel;
   }
-  for (; next_pixel < state.num_pixels(); ++next_pixel) state.memory.add({});
   return {};
 }
 

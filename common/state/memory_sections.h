@@ -1,5 +1,6 @@
 #pragma once
 
+#include <span>
 #include <string>
 #include <vector>
 
@@ -24,10 +25,11 @@ struct MemoryPayloads {
 
 /// Summary and noise of each of `pixels` (0-based, ascending), and the bins of those whose rays
 /// have disagreed.
-MemoryPayloads encode_memory(const PixelMemories& packed, const std::vector<std::size_t>& pixels);
+MemoryPayloads encode_memory(std::span<const PixelMemory> memories,
+                             const std::vector<std::size_t>& pixels);
 
-/// Inverse of encode_memory: the memories are packed. A file without memories leaves the state
-/// without them. Errors name file, section and pixel.
+/// Inverse of encode_memory. A file without memories leaves the state without them. Errors name
+/// file, section and pixel.
 Status decode_memory(const SectionFile& file, const std::vector<std::size_t>& pixels,
                      const std::string& name, SampleState& state);
 

@@ -254,7 +254,7 @@ std::size_t SampleState::size_bytes() const {
   return num_pixels() * bytes_per_pixel(static_cast<std::size_t>(num_particles),
                                         static_cast<std::size_t>(num_populations), false,
                                         !confidence.empty()) +
-         memory.size_bytes();
+         memory.size() * sizeof(PixelMemory);
 }
 
 void SampleState::resize(const PixelRect& new_rect, std::int32_t new_num_particles,
@@ -313,10 +313,7 @@ Bytes encode_state(const SampleState& state) {
     sections.add(kPopulations, 1, writer.take());
   }
   if (!state.memory.empty()) {
-    PixelMemories packed;
-    if (!state.memory.is_packed()) packed = state.memory.to_packed();
-    MemoryPayloads memory =
-        encode_memory(state.memory.is_packed() ? state.memory : packed, sections.pixels());
+    MemoryPayloads memory = encode_memory(state.memory, sections.pixels());
     sections.add(kMemorySummary, kMemorySummaryStride, std::move(memory.summaries));
     sections.add(kMemoryMasks, 1, std::move(memory.masks));
     sections.add(kMemoryCells, kMemoryCellStride, std::move(memory.cells));

@@ -10,7 +10,7 @@
 #include "common/base/result.h"
 #include "common/math/octahedral.h"
 #include "common/math/pixel_rect.h"
-#include "common/state/pixel_memories.h"
+#include "common/state/pixel_memory.h"
 
 namespace baton {
 
@@ -45,7 +45,7 @@ struct SampleState {
                               ///< no particle is lit
   std::vector<std::uint8_t> site;  ///< (pixels, N)
 
-  PixelMemories memory;  ///< (pixels), or empty: nothing is remembered
+  std::vector<PixelMemory> memory;  ///< (pixels), or empty: nothing is remembered
   /// (pixels) how many fresh sets a pixel's samples count as when they are weighed against fresh
   /// ones, 0: they are no history; or empty: the method has no confidence.
   std::vector<std::uint16_t> confidence;
@@ -69,8 +69,8 @@ struct SampleState {
   /// Lets each pixel's samples count for nothing yet.
   void add_confidence() { confidence.assign(num_pixels(), 0); }
   /// Gives each pixel an empty memory.
-  void add_memory() { memory.assign(num_pixels()); }
-  /// The memory of a pixel, which must be open, or null.
+  void add_memory() { memory.assign(num_pixels(), {}); }
+  /// The memory of a pixel, or null.
   PixelMemory* memory_of(std::size_t pixel) { return memory.empty() ? nullptr : &memory[pixel]; }
 };
 

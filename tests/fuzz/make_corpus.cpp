@@ -65,7 +65,7 @@ SampleState state_with_memory() {
     memory.all_rays = 0x8003;
     memory.outcomes = static_cast<std::uint16_t>(pixel % 4);
     memory.light_noise = 0x3f80;
-    if (memory.outcomes == PixelMemory::kSawBoth) memory.bins.make()[16 * pixel] = 0x8001;
+    if (memory.outcomes == PixelMemory::kSawBoth) memory.bins.cells[4 * pixel] = 0x8001;
   }
   return state;
 }

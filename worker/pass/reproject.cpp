@@ -37,7 +37,7 @@ void copy_pixel(const SampleState& from, std::size_t source, SampleState& to, st
   copy(from.weight, to.weight, to.num_particles);
   copy(from.lns, to.lns, to.num_populations);
   copy(from.lns_fresh, to.lns_fresh, to.num_populations);
-  if (!to.memory.empty()) from.memory.copy_to(source, to.memory[target]);
+  if (!to.memory.empty()) to.memory[target] = from.memory[source];
   if (!to.confidence.empty()) copy(from.confidence, to.confidence, 1);
 }
 

@@ -28,11 +28,11 @@ void lighten_black(const Rgb& albedo, PixelResult& pixel) {
   if (albedo.z == 0) pixel.shadow.z = pixel.catcher;
 }
 
-/// Prefetches a pixel's bins: those of a tile are larger than the caches.
+/// Prefetches what a pixel remembers: the memories of a tile are larger than the caches.
 void fetch_ahead(const PixelMemory* memory) {
   if (memory == nullptr) return;
-  const auto* bytes = reinterpret_cast<const std::byte*>(memory->bins.data());
-  for (std::size_t at = 0; at < memory->bins.size_bytes(); at += 64) __builtin_prefetch(bytes + at);
+  const auto* bytes = reinterpret_cast<const std::byte*>(memory);
+  for (std::size_t at = 0; at < sizeof(PixelMemory); at += 64) __builtin_prefetch(bytes + at);
 }
 
 }  // namespace

@@ -71,7 +71,6 @@ class TileWalk {
   /// Where surfaces stay: what the tile itself left goes on.
   void go_on_from(const SampleState& previous) {
     state_ = previous;
-    state_.memory.open();
     has_history_ = true;
   }
 

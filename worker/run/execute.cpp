@@ -79,7 +79,6 @@ Status keep_state(const LoadedJob& loaded, BlobStore& store, bool may_hold, Samp
                   std::vector<BlobRef>& outputs) {
   BlobRef ref{BlobKind::state, state.frame_index, state.tile,
               held_state_name(loaded.digest, state.frame_index, state.tile)};
-  state.memory.pack();
   const auto shared = std::make_shared<const SampleState>(std::move(state));
   if (may_hold && loaded.states->hold(ref, shared)) {
     outputs.push_back(ref);

@@ -23,10 +23,11 @@ namespace hn = hwy::HWY_NAMESPACE;
 
 /// A lane's bin of VisibilityBins.
 HWY_INLINE VI BinsOf(VU code) {
-  static_assert(VisibilityBins::kSide == 16);
+  constexpr int kBits = VisibilityBins::kBits;
+  constexpr std::uint32_t kMost = VisibilityBins::kSide - 1;
   const DU du;
-  const VU across = hn::And(hn::ShiftRight<12>(code), hn::Set(du, 0x0F));
-  const VU down = hn::And(hn::ShiftRight<24>(code), hn::Set(du, 0xF0));
+  const VU across = hn::And(hn::ShiftRight<16 - kBits>(code), hn::Set(du, kMost));
+  const VU down = hn::And(hn::ShiftRight<32 - 2 * kBits>(code), hn::Set(du, kMost << kBits));
   return hn::BitCast(DI(), hn::Or(across, down));
 }
 
@@ -51,26 +52,23 @@ class RememberedLanes {
  public:
   RememberedLanes(const PoolTuning& tuning, const PixelMemory& memory)
       : tuning_(tuning),
-        bins_(memory.bins.data()),
+        memory_(memory.has_bins() ? &memory : nullptr),
         all_((memory.all_rays & 15) != 0 ? memory.all_rays : 2048 << 4),
         everywhere_(Prospect(Share(hn::Set(DI(), all_)))) {}
 
   /// A pixel whose rays have always agreed expects the same everywhere.
   HWY_INLINE ProspectLanes Look(VU code) const {
-    if (bins_ != nullptr) return Prospect(ShareInBins(code));
+    if (memory_ != nullptr) return Prospect(ShareInBins(code));
     return {everywhere_.expected, everywhere_.contribution, everywhere_.deviation};
   }
 
  private:
   HWY_INLINE VF ShareInBins(VU code) const {
     const DI di;
-    const DU du;
-    // Two cells come with each load; ours is the lower one. The last bin's other is padding.
-    static_assert(sizeof(VisibilityCell) == 2 && VisibilityBins::kSide == 16);
-    const VU across = hn::And(hn::ShiftRight<11>(code), hn::Set(du, 2 * 0x0F));
-    const VU down = hn::And(hn::ShiftRight<23>(code), hn::Set(du, 2 * 0xF0));
-    const VI pair = hn::GatherOffset(di, reinterpret_cast<const std::int32_t*>(bins_),
-                                     hn::BitCast(di, hn::Or(across, down)));
+    // Two cells come with each load; ours is the lower one.
+    static_assert(sizeof(VisibilityCell) == 2 && offsetof(PixelMemory, bins) == 0);
+    const VI pair = hn::GatherOffset(di, reinterpret_cast<const std::int32_t*>(memory_),
+                                     hn::ShiftLeft<1>(BinsOf(code)));
     const auto unseen = hn::Eq(hn::And(pair, hn::Set(di, 15)), hn::Zero(di));
     return Share(hn::IfThenElse(unseen, hn::Set(di, all_), pair));
   }
@@ -84,7 +82,7 @@ class RememberedLanes {
     return hn::MulAdd(hn::ConvertTo(d, share), hn::Set(d, 1.0f / 65536), hn::Set(d, 0.5f / 4096));
   }
   const PoolTuning& tuning_;
-  const VisibilityCell* bins_;  ///< null: rays have always agreed
+  const PixelMemory* memory_;  ///< null: rays have always agreed
   std::int32_t all_;
   ProspectLanes everywhere_;
 };

@@ -53,7 +53,7 @@ void remember_rays(PixelMemory& memory, std::span<const std::uint8_t> bin, std::
     const bool is_free = (free >> j & 1) != 0;
     outcomes |= is_free ? PixelMemory::kSawFree : PixelMemory::kSawBlocked;
     if (outcomes == PixelMemory::kSawBoth) {
-      VisibilityCell& cell = memory.bins.make()[bin[j]];
+      VisibilityCell& cell = memory.bins.cells[bin[j]];
       Tally own(cell);
       if (own.seen == 0) own.share = all.share;
       own.add(is_free);

@@ -22,11 +22,11 @@ inline constexpr StateValues kVisible{1, 1, 1, 0.5f, 0, 0, 1, 0.2f, 0, 1, 1, 0.9
 
 /// Directions of different bins.
 inline OctDirection code_of(std::size_t state) {
-  const auto bin = static_cast<std::uint32_t>(20 * state + 7);
-  return (bin & 15) << 12 | 0x800 | (bin >> 4) << 28 | 0x8000000;
+  const auto bin = static_cast<std::uint32_t>(5 * state + 2);
+  return (bin & 7) << 13 | 0x1000 | (bin >> 3) << 29 | 0x10000000;
 }
 inline std::size_t state_of(OctDirection code) {
-  return ((code >> 12 & 0x0F) | (code >> 24 & 0xF0)) / 20u;
+  return ((code >> 13 & 0x07) | (code >> 26 & 0x38)) / 5u;
 }
 
 /// Candidates drawn alike from all states. Rays know nothing of them but their number on the line.
@@ -182,7 +182,7 @@ class PoolChain {
     std::uint64_t free = 0;
     for (std::size_t j = 0; j < rays.count; ++j) {
       const std::vector<bool>& found = space_.candidates.found;
-      const bool outcome = found.empty() ? is_free(rays.bin[j] / 20u) : found[j];
+      const bool outcome = found.empty() ? is_free(rays.bin[j] / 5u) : found[j];
       if (outcome) free |= std::uint64_t{1} << j;
       if (outcome) sum += rays.r[j];
     }

@@ -28,8 +28,8 @@ TEST(VisibilityMemory, KnowsNothingAtFirst) {
 TEST(VisibilityMemory, KeepsNoBinsWhileRaysAgree) {
   for (const bool free : {true, false}) {
     PixelMemory memory;
-    for (int i = 0; i < 50; ++i) remember_ray(memory, 77, free);
-    EXPECT_TRUE(memory.bins.empty());
+    for (int i = 0; i < 50; ++i) remember_ray(memory, 17, free);
+    EXPECT_EQ(memory.bins, VisibilityBins());
     EXPECT_EQ(memory.outcomes, free ? PixelMemory::kSawFree : PixelMemory::kSawBlocked);
     // Every direction gets the share of all rays, which comes close to certainty but never reaches
     // it.
@@ -59,17 +59,17 @@ TEST(VisibilityMemory, ForgetsWhatNoLongerHolds) {
   EXPECT_LT(expected_visibility(memory, kUp), 0.05f);
 }
 
-// All eight lanes, and the last bins, whose loads reach past the bins.
+// All eight lanes, and the last bin, whose load reaches past the bins.
 TEST(VisibilityMemory, IsReadBinByBin) {
   PixelMemory memory;
   memory.outcomes = PixelMemory::kSawBoth;
   memory.all_rays = 100 << 4 | 15;
   for (std::size_t bin = 0; bin < VisibilityBins::kCount; ++bin)
-    memory.bins.make()[bin] = static_cast<VisibilityCell>(bin << 8 | bin % 3);
+    memory.bins.cells[bin] = static_cast<VisibilityCell>(bin << 10 | bin % 3);
   for (std::uint32_t i = 0; i < 20000; ++i) {
     const OctDirection code = i * 2654435761u;
     const std::size_t bin = visibility_bin(code);
-    const float cell = bin % 3 == 0 ? 100.0f : static_cast<float>(bin << 4);
+    const float cell = bin % 3 == 0 ? 100.0f : static_cast<float>(bin << 6);
     ASSERT_NEAR(expected_visibility(memory, code), (cell + 0.5f) / 4096, 1e-6f) << bin;
   }
 }

@@ -23,7 +23,7 @@ SampleState remembering_state() {
   agreed.outcomes = PixelMemory::kSawFree;
   agreed.lobe_noise = 0x3C01;
   PixelMemory& disagreed = state.memory[2];
-  disagreed.bins.make()[5] = 0x1234;
+  disagreed.bins.cells[5] = 0x1234;
   disagreed.all_rays = 0x7771;
   disagreed.outcomes = PixelMemory::kSawBoth;
   disagreed.light_noise = 0x3B12;
@@ -37,17 +37,17 @@ TEST(SampleState, RemembersRays) {
 
 TEST(SampleState, RemembersEveryBin) {
   SampleState state = remembering_state();
-  for (const std::size_t step : {1, 2, 3, 63, 64, 255}) {
+  for (const std::size_t step : {1, 2, 3, 31, 63}) {
     state.memory[2].bins = {};
     for (std::size_t bin = 0; bin < VisibilityBins::kCount; bin += step)
-      state.memory[2].bins.make()[bin] = static_cast<VisibilityCell>(0x1001 + bin);
+      state.memory[2].bins.cells[bin] = static_cast<VisibilityCell>(0x1001 + bin);
     EXPECT_EQ(*decode_state(encode_state(state), "test"), state) << step;
   }
 }
 
 TEST(SampleState, RefusesMasksThatNameOtherCells) {
   SectionFile file = sections_of(remembering_state());
-  section(file, "VISM").payload[31] = std::byte{0x80};
+  section(file, "VISM").payload[7] = std::byte{0x80};
   EXPECT_THAT(error_of(file).message, HasSubstr("section VISC has 2 bytes, expected 4"));
 }
 
@@ -82,7 +82,7 @@ TEST(SampleState, StoresOnlyBinsThatRaysReached) {
     }
     return std::uint64_t{0};
   };
-  EXPECT_EQ(raw_bytes(state, "VISM"), 32u);
+  EXPECT_EQ(raw_bytes(state, "VISM"), 8u);
   EXPECT_EQ(raw_bytes(state, "VISC"), 2u);
   EXPECT_EQ(raw_bytes(state, "VISS"), 8u);
   EXPECT_EQ(raw_bytes(state, "NOIS"), 4u);
