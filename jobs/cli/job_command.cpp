@@ -14,6 +14,7 @@
 #include "jobs/cli/job_argument.h"
 #include "jobs/cli/job_summary.h"
 #include "jobs/cli/settle_method.h"
+#include "jobs/cli/sweeps.h"
 
 namespace baton {
 namespace {
@@ -44,8 +45,9 @@ Result<ExitCode> submit(const JobOptions& options, RequestClient& client) {
   // A pilot takes its time: first see that there is somebody to submit to.
   if (job.sampling.method == Method::automatic) BATON_TRY(ask<JobList>(client, ListJobs{}));
   BATON_TRY(settle_method_at(job, options.link));
-  BATON_ASSIGN(std::string document, make_job_document(job));
   const bool restart = options.restart || options.from_frame || wanted.is_look;
+  const MoreSweeps more(job, restart);
+  BATON_ASSIGN(std::string document, make_job_document(job));
   BATON_ASSIGN(const JobAccepted accepted,
                ask<JobAccepted>(client, SubmitJob{std::move(document), restart}));
   if (options.json) {
@@ -58,6 +60,11 @@ Result<ExitCode> submit(const JobOptions& options, RequestClient& client) {
     if (wanted.is_look) fmt::print(stderr, "a look: frames go to {}\n", job.output.directory);
     if (accepted.already_there) fmt::print(stderr, "an equal job is there already: it goes on\n");
     fmt::print(stderr, "{}", accepted.plan);
+    if (job.quality.may_grow())
+      fmt::print(stderr, "baton job wait adds rounds until quality.{} ends it\n",
+                 job.quality.noise_threshold ? "noiseThreshold"
+                 : job.quality.time_limit    ? "timeLimit"
+                                             : "maxRounds");
   }
   return ExitCode::ok;
 }
@@ -98,11 +105,36 @@ Result<ExitCode> show(const JobOptions& options, RequestClient& client) {
   return ExitCode::ok;
 }
 
+/// A job that is waited for, with the sweeps that it gets meanwhile.
+class GrowingJob {
+ public:
+  /// After the job is done: the ID of the job that has more sweeps, or nullopt: there are enough.
+  Result<std::optional<std::string>> grow(const Digest& job, RequestClient& client) {
+    if (!more_) {
+      BATON_ASSIGN(const JobDocument document, ask<JobDocument>(client, JobDocumentRequest{job}));
+      BATON_ASSIGN(ParsedJobDocument parsed, parse_job_document(document.json));
+      spec_ = std::move(parsed.job);
+      more_.emplace(spec_, false);
+    }
+    if (!more_->add_to(spec_)) return std::optional<std::string>();
+    BATON_ASSIGN(std::string document, make_job_document(spec_));
+    BATON_ASSIGN(const JobAccepted accepted,
+                 ask<JobAccepted>(client, SubmitJob{std::move(document)}));
+    fmt::print(stderr, "{}", accepted.plan);
+    return std::optional(accepted.job.hex());
+  }
+
+ private:
+  JobSpec spec_;
+  std::optional<MoreSweeps> more_;
+};
+
 /// A coordinator that has answered once may be away for a while: it is started again.
 Result<ExitCode> wait(const JobOptions& options, RequestClient& client) {
   const Clock::time_point start = Clock::now();
   std::optional<Clock::time_point> last_answer;
   std::string job = options.job;  // once it is found, its ID: others may take its name
+  GrowingJob growing;
   for (;;) {
     const Result<JobDetail> answer = ask<JobDetail>(client, ShowJob{job});
     const std::chrono::duration<double> waited = Clock::now() - start;
@@ -119,6 +151,13 @@ Result<ExitCode> wait(const JobOptions& options, RequestClient& client) {
     job = answer->summary.job.hex();
     const JobDetail& detail = *answer;
     const bool expired = options.timeout_s > 0 && waited.count() >= options.timeout_s;
+    if (detail.summary.status == JobStatus::done && !expired) {
+      BATON_ASSIGN(const std::optional<std::string> next, growing.grow(detail.summary.job, client));
+      if (next) {
+        job = *next;
+        continue;
+      }
+    }
     if (!is_open(detail.summary.status) || expired) {
       print_detail(detail, options.json);
       return is_open(detail.summary.status) ? ExitCode::timeout
@@ -269,7 +308,8 @@ void add_job_command(CLI::App& app, ExitCode& code) {
   remove->add_option("ID", options->job, "job: its name, its ID, or the beginning of that");
   remove->add_flag("--ended", options->all_ended, "every job that has ended");
   add("wait",
-      "Returns when the job has ended, with its exit code; outlasts a restart of the coordinator",
+      "Returns when the job has ended, with its exit code; adds the sweeps that the job's "
+      "quality.noiseThreshold asks for; outlasts a restart of the coordinator",
       "ID", wait)
       ->add_option("--timeout", options->timeout_s, "seconds; default: as long as it takes")
       ->check(CLI::Range(0.0, 1e9));

@@ -58,6 +58,10 @@ bool MoreSweeps::add_to(JobSpec& job) {
   QualitySpec& quality = job.quality;
   if (!quality.may_grow()) return false;
   const float noise = largest_noise(job);
+  if (quality.noise_threshold && noise == 0) {
+    fmt::print(stderr, "no frame tells its noise here: no more rounds\n");
+    return false;
+  }
   const std::chrono::duration<double> seconds = Clock::now() - start_;
   const int next = next_sweeps(quality, noise, seconds.count(), quality.sweeps - first_sweeps_);
   fmt::print(stderr, "{} rounds: noise {:.3g} as Cycles measures it{}\n",

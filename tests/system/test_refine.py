@@ -130,5 +130,28 @@ def render_adds_sweeps(programs, folder):
     check("2 rounds: noise" in told and "more" not in told, told)
 
 
+def waiting_adds_sweeps(programs, folder):
+    """A job that was submitted grows while somebody waits for it, as `baton render` would have it."""
+    quality = {"rounds": 4, "noiseThreshold": 0.02, "maxRounds": 64}
+    expected = at_once(programs, folder / "rendered", turning(folder / "rendered", **quality))
+    path = write_job(folder / "farm/job.json", turning(folder / "farm", **quality))
+    with Farm(programs, folder / "work") as farm:
+        farm.start_coordinator()
+        farm.start_worker()
+        said = farm.baton("job", "submit", path)
+        check("baton job wait adds rounds until quality.noiseThreshold ends it" in said.stderr, said.stderr)
+        farm.wait_for(said.stdout.strip())
+        check_equal(programs.pixels(folder / "farm/frames"), expected, "pixels beside those of render")
+        told = farm.baton("job", "wait", said.stdout.strip()).stderr
+        check("rounds: noise" in told and "more" not in told, told)
+
+        # Frames that cannot be read tell no noise.
+        for frame in (folder / "farm/frames").glob("*.exr"):
+            frame.unlink()
+        told = farm.baton("job", "wait", said.stdout.strip()).stderr
+        check("no frame tells its noise here: no more rounds" in told, told)
+
+
 if __name__ == "__main__":
-    run_tests([a_still_in_four_steps, sequences_at_rest_and_in_motion, only_new_sweeps_are_rendered, render_adds_sweeps])
+    run_tests([a_still_in_four_steps, sequences_at_rest_and_in_motion, only_new_sweeps_are_rendered, render_adds_sweeps,
+               waiting_adds_sweeps])
