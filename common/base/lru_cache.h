@@ -22,10 +22,10 @@ class LruCache {
   /// What a value takes of the share.
   using SizeOf = std::size_t (*)(const Value&);
 
-  /// most: entries.
+  /// most, least: entries; so many of those used last stay however large they are.
   LruCache(MemorySharePtr share, SizeOf size_of,
-           std::size_t most = std::numeric_limits<std::size_t>::max())
-      : share_(std::move(share)), most_(most), size_of_(size_of) {}
+           std::size_t most = std::numeric_limits<std::size_t>::max(), std::size_t least = 1)
+      : share_(std::move(share)), most_(most), least_(least), size_of_(size_of) {}
   /// With a share of its own.
   LruCache(std::size_t budget, SizeOf size_of,
            std::size_t most = std::numeric_limits<std::size_t>::max())
@@ -49,7 +49,7 @@ class LruCache {
     entries_.push_front({key, value, size});
     index_.emplace(key, entries_.begin());
     share_->overdraw(size);
-    while (entries_.size() > 1 && (share_->is_over() || entries_.size() > most_)) drop_last();
+    while (entries_.size() > least_ && (share_->is_over() || entries_.size() > most_)) drop_last();
     return value;
   }
 
@@ -73,7 +73,7 @@ class LruCache {
   }
 
   const MemorySharePtr share_;
-  const std::size_t most_;
+  const std::size_t most_, least_;
   const SizeOf size_of_;
   std::mutex mutex_;
   std::list<Entry> entries_;  ///< most recently used in front

@@ -61,9 +61,13 @@ Transform to_transform(const Matrix34& m) {
 bool moves(const ObjectSpec& object) { return !object.keys.empty() || object.gltf.has_value(); }
 
 bool moves(const JobSpec& job) {
+  const auto deforms = [&](const ObjectSpec& object) {
+    const auto mesh = job.scene.meshes.find(object.mesh);
+    return mesh != job.scene.meshes.end() && mesh->second.deforms();
+  };
   return !job.camera.keys.empty() || job.camera.gltf.has_value() ||
          std::any_of(job.scene.objects.begin(), job.scene.objects.end(),
-                     [](const ObjectSpec& object) { return moves(object); });
+                     [&](const ObjectSpec& object) { return moves(object) || deforms(object); });
 }
 
 bool is_settled(const JobSpec& job) {

@@ -10,7 +10,7 @@ namespace baton {
 
 /// Where camera and objects are at a frame: pure functions of the job.
 
-/// Whether camera or objects have keys.
+/// Whether camera or objects have keys, or meshes of objects deform.
 bool moves(const JobSpec& job);
 /// Whether the object has keys.
 bool moves(const ObjectSpec& object);

@@ -43,6 +43,23 @@ void material_reference(JobArchive& a, Key key, std::string& name, const SceneSp
   }
 }
 
+void fields(JobArchive& a, ShapeSpec& shape) {
+  a.integer(required("node"), shape.node, 0, limits::kMaxGltfIndex);
+  FileClock clock = shape.animation.value_or(FileClock{});
+  const auto visit = [&] {
+    a.number("fps", clock.fps, kPositiveRange);
+    a.integer("startFrame", clock.start_frame, 0, limits::kMaxFrameNumber);
+  };
+  if (a.object("animation", visit, {.present = shape.animation.has_value()}))
+    shape.animation = clock;
+  a.list("places", shape.places, limits::kMaxObjects, [&](PlacedNode& placed) {
+    a.integer(required("node"), placed.node, 0, limits::kMaxGltfIndex);
+    std::optional<Matrix34> matrix = placed.matrix;
+    matrix_field(a, required("matrix"), matrix);
+    placed.matrix = matrix.value_or(Matrix34{});
+  });
+}
+
 void fields(JobArchive& a, MeshSpec& mesh) {
   asset_path(a, required("path"), mesh.path, {".ply", ".obj", ".off", ".gltf", ".glb"});
   a.boolean("smoothNormals", mesh.smooth_normals);
@@ -50,6 +67,11 @@ void fields(JobArchive& a, MeshSpec& mesh) {
   a.integer("primitive", mesh.primitive, 0, limits::kMaxGltfIndex);
   if (mesh.mesh >= 0 && !is_gltf(mesh.path))
     a.fault("mesh", "-1 unless path is a .gltf or .glb file", std::to_string(mesh.mesh));
+  ShapeSpec shape = mesh.shaped_by.value_or(ShapeSpec{});
+  if (a.object("shapedBy", [&] { fields(a, shape); }, {.present = mesh.shaped_by.has_value()})) {
+    mesh.shaped_by = shape;
+    if (mesh.mesh < 0) a.fault("shapedBy", "a mesh of a glTF file", "mesh -1");
+  }
 }
 
 void fields(JobArchive& a, ObjectSpec& object, const SceneSpec& scene) {

@@ -90,6 +90,35 @@ std::vector<TextureSpec*> textures_of(MaterialSpec& material);
 /// Whether a file name ends in .gltf or .glb.
 bool is_gltf(const std::string& path);
 
+/// Which time of a file a frame shows.
+struct FileClock {
+  float fps = 24;
+  int start_frame = 0;  ///< the frame at time 0
+
+  double seconds_at(double frame) const {
+    return (frame - static_cast<double>(start_frame)) / static_cast<double>(fps);
+  }
+  bool operator==(const FileClock&) const = default;
+};
+
+/// Where a node of a glTF file is below its parent, in place of the file's and its animation.
+struct PlacedNode {
+  int node = 0;  ///< place in the file's list
+  Matrix34 matrix{};
+
+  bool operator==(const PlacedNode&) const = default;
+};
+
+/// What shapes a primitive of a glTF file: the morph weights and the skin of a node that shows it.
+/// With a skin its vertices are in the world of the file.
+struct ShapeSpec {
+  int node = 0;                          ///< place in the file's list
+  std::optional<FileClock> animation{};  ///< it deforms as the file's animations say; none: rests
+  std::vector<PlacedNode> places{};      ///< of nodes of the file, such as bones
+
+  bool operator==(const ShapeSpec&) const = default;
+};
+
 struct MeshSpec {
   std::string path;            ///< .ply .obj .off .gltf .glb
   bool smooth_normals = true;  ///< interpolate vertex normals (computed when the file has none)
@@ -97,7 +126,9 @@ struct MeshSpec {
   /// normals; -1: all that the file shows.
   int mesh = -1;
   int primitive = 0;
+  std::optional<ShapeSpec> shaped_by{};  ///< none: as the primitive is
 
+  bool deforms() const { return shaped_by && shaped_by->animation; }
   bool operator==(const MeshSpec&) const = default;
 };
 

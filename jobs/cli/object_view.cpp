@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <array>
 #include <limits>
+#include <span>
 
 #include "jobs/cli/frame_sheet.h"
 #include "worker/scene/pose.h"
@@ -16,11 +17,11 @@ constexpr std::size_t kMostFrames = 100;
 
 using Corners = std::array<Vec3, 8>;
 
-/// The corners of a mesh's bounding box.
-Corners corners_of(const TriangleMesh& mesh) {
+/// The corners of the box around the points of a mesh.
+Corners corners_of(std::span<const Vec3> points) {
   constexpr float kFar = std::numeric_limits<float>::max();
   Vec3 low{kFar, kFar, kFar}, high{-kFar, -kFar, -kFar};
-  for (const Vec3& p : mesh.positions) {
+  for (const Vec3& p : points) {
     low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
     high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
   }
@@ -99,13 +100,16 @@ std::string words(Sight best) {
 
 std::vector<std::string> object_warnings(const JobSpec& job, const Scene& scene) {
   std::vector<Corners> boxes;
-  for (const TriangleMesh& mesh : scene.meshes) boxes.push_back(corners_of(mesh));
+  for (const TriangleMesh& mesh : scene.meshes) boxes.push_back(corners_of(mesh.positions));
   std::vector<Sight> best(scene.instances.size(), Sight::behind);
   for (const int frame : pick_frames(job.frames, kMostFrames)) {
     const Pose pose = pose_at(scene, job, frame);
     const View view(pose.camera, job.image);
     for (std::size_t i = 0; i < best.size(); ++i) {
-      Corners box = boxes[pose.instances[i].mesh];
+      const std::uint32_t mesh = pose.instances[i].mesh;
+      Corners box = pose.instances[i].deforms
+                        ? corners_of(vertices_of(scene, pose.shapes, mesh).positions)
+                        : boxes[mesh];
       for (Vec3& corner : box) corner = pose.instances[i].to_world.point(corner);
       best[i] = std::max(best[i], view.sight(box));
     }

@@ -41,7 +41,7 @@ Shot first_shot(const JobSpec& job, const Scene& scene) {
   shot.objects.resize(std::min(job.scene.objects.size(), shot.pose.instances.size()));
   for (std::size_t i = 0; i < shot.objects.size(); ++i) {
     const Instance& instance = shot.pose.instances[i];
-    for (const Vec3& p : scene.meshes[instance.mesh].positions)
+    for (const Vec3& p : vertices_of(scene, shot.pose.shapes, instance.mesh).positions)
       shot.objects[i].add(instance.to_world.point(p));
     if (shot.objects[i].empty()) continue;
     shot.all.add(shot.objects[i].low);
@@ -95,11 +95,9 @@ void draw_scene(const JobSpec& job, const Scene& scene, const Shot& shot, Previe
   if (job.scene.ground) draw_ground(*job.scene.ground, shot, canvas);
   for (std::size_t i = 0; i < shot.objects.size(); ++i) {
     const Instance& instance = shot.pose.instances[i];
-    const TriangleMesh& mesh = scene.meshes[instance.mesh];
-    for (const auto& corners : mesh.triangles) {
-      const auto point = [&](std::size_t c) {
-        return instance.to_world.point(mesh.positions[corners[c]]);
-      };
+    const std::span<const Vec3> at = vertices_of(scene, shot.pose.shapes, instance.mesh).positions;
+    for (const auto& corners : scene.meshes[instance.mesh].triangles) {
+      const auto point = [&](std::size_t c) { return instance.to_world.point(at[corners[c]]); };
       canvas.triangle({point(0), point(1), point(2)}, kPalette[i % kPalette.size()]);
     }
   }

@@ -26,11 +26,9 @@ double share_in(const JobSpec& job, const Scene& scene, int frame) {
       static_cast<int>(std::int64_t{kWidth} * job.image.height / job.image.width), 1, 2 * kWidth);
   PreviewCanvas canvas(camera_at(job, frame), kWidth, height);
   for (const Instance& instance : pose.instances) {
-    const TriangleMesh& mesh = scene.meshes[instance.mesh];
-    for (const auto& corners : mesh.triangles) {
-      const auto point = [&](std::size_t c) {
-        return instance.to_world.point(mesh.positions[corners[c]]);
-      };
+    const std::span<const Vec3> at = vertices_of(scene, pose.shapes, instance.mesh).positions;
+    for (const auto& corners : scene.meshes[instance.mesh].triangles) {
+      const auto point = [&](std::size_t c) { return instance.to_world.point(at[corners[c]]); };
       canvas.triangle({point(0), point(1), point(2)}, {1, 1, 1});
     }
   }

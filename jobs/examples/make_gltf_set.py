@@ -2,10 +2,11 @@
 """Writes a small scene as Blender would: a floor, a ring of glazed pillars that share one mesh, a turning vane, a lift, a ball
 that bounces, and a camera on a dolly, each with an animation of its own. Standard library only.
 
-usage: make_gltf_set.py FILE.glb [--textured]
+usage: make_gltf_set.py FILE.glb [--textured] [--alive]
 
 Frames 1 to 24 at 24 frames per second, frame n at n / 24 seconds. --textured: tiles with joints on the floor, scratches on
-the vane, holes in the ball, pillars that glow in stripes and whose glaze has run.
+the vane, holes in the ball, pillars that glow in stripes and whose glaze has run. --alive: a reed that sways on three bones
+while it swells, and a drop that flattens.
 """
 
 import json
@@ -15,7 +16,7 @@ import sys
 import zlib
 from pathlib import Path
 
-FLOAT, UINT16, INT16 = 5126, 5123, 5122
+FLOAT, UINT8, UINT16, INT16 = 5126, 5121, 5123, 5122
 LAST_FRAME, FPS = 24, 24
 
 
@@ -24,13 +25,13 @@ class Builder:
 
     def __init__(self):
         self.data = bytearray()
-        self.views, self.accessors, self.meshes, self.nodes, self.animations = [], [], [], [], []
+        self.views, self.accessors, self.meshes, self.nodes, self.animations, self.skins = [], [], [], [], [], []
         self.images, self.textures = [], []
 
     def accessor(self, rows, kind, component=FLOAT, **more):
         """Appends rows of numbers; the index of their accessor."""
-        width = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4}[kind]
-        letter, size = {FLOAT: ("f", 4), UINT16: ("H", 2), INT16: ("h", 2)}[component]
+        width = {"SCALAR": 1, "VEC2": 2, "VEC3": 3, "VEC4": 4, "MAT4": 16}[kind]
+        letter, size = {FLOAT: ("f", 4), UINT8: ("B", 1), UINT16: ("H", 2), INT16: ("h", 2)}[component]
         self.data += bytes(-len(self.data) % 4)
         stride = (width * size + 3) // 4 * 4 if kind != "SCALAR" else size
         view = {"buffer": 0, "byteOffset": len(self.data), "byteLength": stride * len(rows)}
@@ -58,15 +59,23 @@ class Builder:
         self.textures.append({"source": len(self.images) - 1, "sampler": len(self.images) - 1})
         return len(self.textures) - 1
 
-    def mesh(self, name, material, positions, normals, uvs, triangles, quantised=False):
-        """A mesh of one primitive; quantised: positions as 16-bit integers of the cube [-1, 1]."""
+    def mesh(self, name, material, positions, normals, uvs, triangles, quantised=False, skin=None, target=None):
+        """A mesh of one primitive; quantised: positions as 16-bit integers of the cube [-1, 1]. skin: (joints, weights) of
+        each vertex; target: (steps of positions, of normals) of a morph target."""
         if quantised:
             places = self.accessor([[round(c * 32767) for c in p] for p in positions], "VEC3", INT16, normalized=True)
         else:
             places = self.accessor(positions, "VEC3")
         attributes = {"POSITION": places, "NORMAL": self.accessor(normals, "VEC3"), "TEXCOORD_0": self.accessor(uvs, "VEC2")}
+        if skin:
+            attributes["JOINTS_0"] = self.accessor(skin[0], "VEC4", UINT8)
+            attributes["WEIGHTS_0"] = self.accessor([[round(255 * w) for w in row] for row in skin[1]], "VEC4", UINT8,
+                                                    normalized=True)
         indices = self.accessor([i for triangle in triangles for i in triangle], "SCALAR", UINT16)
-        self.meshes.append({"name": name, "primitives": [{"attributes": attributes, "indices": indices, "material": material}]})
+        primitive = {"attributes": attributes, "indices": indices, "material": material}
+        if target:
+            primitive["targets"] = [{"POSITION": self.accessor(target[0], "VEC3"), "NORMAL": self.accessor(target[1], "VEC3")}]
+        self.meshes.append({"name": name, "primitives": [primitive]})
         return len(self.meshes) - 1
 
     def node(self, name, parent=None, **what):
@@ -77,12 +86,14 @@ class Builder:
 
     def animate(self, node, path, times, rows, curve="LINEAR"):
         """An animation of its own, as Blender writes one for each object."""
-        sampler = {"input": self.accessor(times, "SCALAR"), "output": self.accessor(rows, "VEC4" if path == "rotation" else "VEC3"),
-                   "interpolation": curve}
+        kind = {"rotation": "VEC4", "weights": "SCALAR"}.get(path, "VEC3")
+        sampler = {"input": self.accessor(times, "SCALAR"), "output": self.accessor(rows, kind), "interpolation": curve}
         self.animations.append({"name": f"{self.nodes[node]['name']}.{path}", "samplers": [sampler],
                                 "channels": [{"sampler": 0, "target": {"node": node, "path": path}}]})
 
     def glb(self, roots, materials, cameras, **more):
+        if self.skins:
+            more = {"skins": self.skins, **more}
         children = {child for node in self.nodes for child in node.get("children", [])}
         document = {"asset": {"version": "2.0", "generator": "make_gltf_set"}, "scene": 0,
                     "scenes": [{"nodes": [n for n in roots if n not in children]}], "nodes": self.nodes, "meshes": self.meshes,
@@ -141,6 +152,64 @@ def ball(rings=16, segments=24):
     return positions, positions, uvs, triangles
 
 
+def reed(rings=12, sides=8):
+    """A stalk of height 1.5 along y, rounded at the top; each vertex hangs on the two of three bones between which it is."""
+    positions, normals, uvs, triangles, joints, weights, steps = [], [], [], [], [], [], []
+    for i in range(rings + 1):
+        height = i / rings
+        radius = 0.09 * math.sqrt(max(0.0, 1 - height ** 8)) + 0.005
+        bone = min(int(2 * height), 1)
+        share = 2 * height - bone
+        share = share * share * (3 - 2 * share)
+        for j in range(sides + 1):
+            phi = 2 * math.pi * j / sides
+            out = [math.cos(phi), 0, -math.sin(phi)]
+            positions.append([radius * out[0], 1.5 * height, radius * out[2]])
+            normals.append(out)
+            uvs.append([j / sides, 4 * (1 - height)])
+            joints.append([bone, bone + 1, 0, 0])
+            weights.append([1 - round(255 * share) / 255, round(255 * share) / 255, 0, 0])
+            swell = 0.12 * math.exp(-((height - 0.35) / 0.12) ** 2)
+            steps.append([swell * out[0], 0, swell * out[2]])
+    for i in range(rings):
+        for j in range(sides):
+            a, b = i * (sides + 1) + j, (i + 1) * (sides + 1) + j
+            triangles += [[a, a + 1, b + 1], [a, b + 1, b]]
+    return (positions, normals, uvs, triangles), (joints, weights), (steps, [[0, 0, 0]] * len(steps))
+
+
+def add_creatures(b, reed_material, drop_material, seconds):
+    """The reed and the drop, animated; their nodes."""
+    shape, skin, swell = reed()
+    mesh = b.mesh("reed", reed_material, *shape, skin=skin, target=swell)
+    # The node of a mesh with a skin says nothing of where that is.
+    stalk = b.node("reed", mesh=mesh, skin=0, translation=[9, 9, 9])
+    bones = [b.node("reed.0", translation=[-1.3, 0, 1], scale=[1.2, 1, 1.2])]
+    bones += [b.node("reed.1", bones[0], translation=[0, 0.75, 0])]
+    bones += [b.node("reed.2", bones[1], translation=[0, 0.75, 0])]
+    binds = [[1, 0, 0, 0, 0, 1, 0, 0, 0, 0, 1, 0, 0, -0.75 * i, 0, 1] for i in range(3)]
+    b.skins.append({"joints": bones, "inverseBindMatrices": b.accessor(binds, "MAT4")})
+    times = [seconds[0], seconds[7], seconds[15], seconds[-1]]
+    for bone, size in zip(bones, (12, 40, 55)):
+        turns = [math.radians(size * sign) / 2 for sign in (-0.5, 1, -1, 0.5)]
+        b.animate(bone, "rotation", times, [[0.3 * math.sin(t), 0, math.sin(t), math.cos(t)] for t in turns])
+    b.animate(stalk, "weights", times, [0, 0.3, 1, 0])
+
+    positions, _, uvs, triangles = ball(10, 16)
+    flat = [[0.6 * x, -0.55 * y, 0.6 * z] for x, y, z in positions]
+
+    def bent(x, y, z):  # what the normal of the flattened ball is more than that of the ball
+        n = [x / 1.6, y / 0.45, z / 1.6]
+        length = math.sqrt(sum(c * c for c in n))
+        return [c / length - p for c, p in zip(n, (x, y, z))]
+    mesh = b.mesh("drop", drop_material, positions, positions, uvs, triangles, target=(flat, [bent(*p) for p in positions]))
+    b.meshes[mesh]["weights"] = [0.2]
+    drop = b.node("drop", mesh=mesh, scale=[0.25, 0.25, 0.25], translation=[0.2, 0.3, 1.3])
+    b.animate(drop, "weights", [seconds[0], seconds[9], seconds[-1]], [0, 0, 4, 0, 1, 0, 0, 0, 0], "CUBICSPLINE")
+    b.animate(drop, "translation", [seconds[0], seconds[-1]], [[0.2, 0.3, 1.3], [0.5, 0.25, 1.3]])
+    return [stalk, bones[0], drop]
+
+
 def about_y(degrees):
     return [0, math.sin(math.radians(degrees) / 2), 0, math.cos(math.radians(degrees) / 2)]
 
@@ -194,7 +263,7 @@ def add_textures(b, materials):
     return {"images": b.images, "textures": b.textures, "samplers": samplers}
 
 
-def make_set(pillars=7, textured=False):
+def make_set(pillars=7, textured=False, alive=False):
     """The bytes of the .glb."""
     b = Builder()
     materials = [pbr("floor", (0.5, 0.45, 0.4), 0, 0.7), pbr("clay", (0.6, 0.25, 0.15), 0, 0.6),
@@ -230,6 +299,8 @@ def make_set(pillars=7, textured=False):
               [row for place, before, behind in keys for row in ([0, before, 0], place, [0, behind, 0])], "CUBICSPLINE")
     b.animate(dolly, "rotation", [seconds[0], seconds[-1]], [about_y(-10), about_y(10)])
     assert eye < len(b.nodes)
+    if alive:
+        roots += add_creatures(b, 0, 3, seconds)
     camera = {"type": "perspective", "name": "eye", "perspective": {"yfov": 0.55, "znear": 0.1, "aspectRatio": 16 / 9}}
     used = ["KHR_mesh_quantization", "KHR_materials_clearcoat"] + ["KHR_texture_transform", "KHR_materials_emissive_strength"] * textured
     more = add_textures(b, materials) if textured else {}
@@ -237,6 +308,6 @@ def make_set(pillars=7, textured=False):
 
 
 if __name__ == "__main__":
-    if len(sys.argv) not in (2, 3) or sys.argv[2:] not in ([], ["--textured"]):
+    if len(sys.argv) < 2 or not set(sys.argv[2:]) <= {"--textured", "--alive"}:
         sys.exit(__doc__)
-    Path(sys.argv[1]).write_bytes(make_set(textured="--textured" in sys.argv))
+    Path(sys.argv[1]).write_bytes(make_set(textured="--textured" in sys.argv, alive="--alive" in sys.argv))

@@ -3,7 +3,6 @@
 
 #include "tests/fuzz/fuzz_target.h"
 #include "worker/scene/gltf/meshes.h"
-#include "worker/scene/gltf/node_motion.h"
 #include "worker/scene/mesh_builder.h"
 #include "worker/scene/mesh_readers.h"
 
@@ -25,6 +24,31 @@ void look_at(const Result<TriangleMesh>& mesh) {
   BATON_CHECK(std::ranges::all_of(smooth_vertex_normals(*mesh), finite));
 }
 
+/// What nodes shape, at rest and at times between the keys.
+void look_at_shapes(const std::shared_ptr<const gltf::Document>& document) {
+  const auto motion = gltf::MotionCache().get(document, {});
+  if (!motion) return;
+  (*motion)->to_world(0.5);
+  for (const int node : gltf::shown_nodes(*document)) {
+    const gltf::Shaping shaping = gltf::shaping_of(**motion, node);
+    if (shaping == gltf::Shaping::none) continue;
+    MeshSpec spec{.path = {},
+                  .mesh = document->nodes[static_cast<std::size_t>(node)].mesh,
+                  .shaped_by = ShapeSpec{.node = node}};
+    look_at(gltf::shaped_mesh(*document, *motion, spec));
+    spec.shaped_by->animation = FileClock{};
+    Result<TriangleMesh> mesh = gltf::shaped_mesh(*document, *motion, spec);
+    look_at(mesh);
+    for (const double frame : {0.0, 7.5}) {
+      if (!mesh) break;
+      MeshShape shape = mesh->shape_at(frame);
+      mesh->positions = std::move(shape.positions);
+      mesh->normals = std::move(shape.normals);
+      look_at(mesh);
+    }
+  }
+}
+
 }  // namespace
 }  // namespace baton
 
@@ -39,8 +63,7 @@ extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size
     const auto document = gltf::parse_document(as_bytes_view(text), "/nowhere/fuzz.gltf");
     if (!document) return 0;
     look_at(gltf::whole_mesh(**document, true));
-    const auto motion = gltf::NodeMotion::read(*document);
-    if (motion) motion->to_world(0.5);
+    look_at_shapes(*document);
   } else {
     look_at(parse_off(text, "fuzz.off"));
   }

@@ -1,4 +1,4 @@
-"""Writes four Blender files that use what the exporter carries over:
+"""Writes five Blender files that use what the exporter carries over:
 
 blender -b --factory-startup -P make_blend_files.py -- FOLDER
 
@@ -6,6 +6,7 @@ turntable.blend: a turning parent with a figure, a textured box and instances; s
 keyed_camera.blend: a camera on a turning arm, with a Track To constraint, keyed focal length, a border; a tilted
 map, a pane that blends.
 lacquer.blend: coats over metal, smooth and rough, of constants and of images; the two model coats differently.
+bending.blend: a stalk on the bones of an armature, a ball with a shape key, a sheet with waves, and a turning parent of all.
 hdr_sequence.blend: an image sequence with an offset, a turning and brightening world; an orthographic camera.
 The maps come with Blender. All other surfaces are diffuse or metal, where Cycles and Baton model the same.
 """
@@ -261,6 +262,67 @@ def make_lacquer(folder):
     save(folder, "lacquer.blend")
 
 
+def make_bending(folder):
+    scene = new_file("bending", 320, 180, 1, 24, 24)
+    add_floor(diffuse("floor", (0.5, 0.48, 0.45)))
+    table = empty("table")
+    for frame, turned in ((1, -20), (24, 20)):
+        table.rotation_euler.z = math.radians(turned)
+        table.keyframe_insert("rotation_euler", frame=frame)
+    linear_keys(table)
+
+    bpy.ops.object.armature_add()
+    rig = bpy.context.object
+    rig.name, rig.parent = "rig", table
+    bpy.ops.object.mode_set(mode="EDIT")
+    first = rig.data.edit_bones[0]
+    first.name, first.head, first.tail = "lower", (-1, 0, 0), (-1, 0, 0.9)
+    second = rig.data.edit_bones.new("upper")
+    second.head, second.tail, second.parent = first.tail, (-1, 0, 1.8), first
+    bpy.ops.object.mode_set(mode="POSE")
+    for frame, bent in ((1, -40), (12, 50), (24, -30)):
+        for bone, share in (("lower", 0.3), ("upper", 1)):
+            posed = rig.pose.bones[bone]
+            posed.rotation_mode = "XYZ"
+            posed.rotation_euler = (math.radians(20 * share), 0, math.radians(bent * share))
+            posed.keyframe_insert("rotation_euler", frame=frame)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    bpy.ops.mesh.primitive_cylinder_add(radius=0.2, depth=1.8, vertices=24)
+    stalk = shape("stalk", diffuse("leaf", (0.2, 0.5, 0.2)), (-1, 0, 0.9), rig)
+    bpy.ops.object.mode_set(mode="EDIT")
+    bpy.ops.mesh.select_all(action="SELECT")
+    bpy.ops.mesh.subdivide(number_cuts=7)
+    bpy.ops.object.mode_set(mode="OBJECT")
+    groups = [stalk.vertex_groups.new(name=name) for name in ("lower", "upper")]
+    for vertex in stalk.data.vertices:
+        share = min(max(vertex.co.z / 0.8 + 0.5, 0), 1)
+        groups[0].add([vertex.index], 1 - share, "REPLACE")
+        groups[1].add([vertex.index], share, "REPLACE")
+    stalk.modifiers.new("rig", "ARMATURE").object = rig
+    bpy.ops.object.shade_smooth()
+    stalk.data.use_auto_smooth, stalk.data.auto_smooth_angle = True, math.radians(60)
+
+    bpy.ops.mesh.primitive_uv_sphere_add(radius=0.5, segments=48, ring_count=24)
+    ball = shape("ball", metal("steel", (0.8, 0.8, 0.85), 0.4), (1.3, -0.4, 0.5), table)
+    bpy.ops.object.shade_smooth()
+    ball.shape_key_add(name="round")
+    flat = ball.shape_key_add(name="flat")
+    for point in flat.data:
+        point.co = (1.4 * point.co.x, 1.4 * point.co.y, 0.4 * point.co.z)
+    for frame, value in ((1, 0), (12, 1), (24, 0.3)):
+        flat.value = value
+        flat.keyframe_insert("value", frame=frame)
+
+    bpy.ops.mesh.primitive_grid_add(x_subdivisions=40, y_subdivisions=40, size=1.6)
+    sheet = shape("sheet", diffuse("clay", (0.6, 0.3, 0.2)), (0.2, 1.2, 0.6), table)
+    bpy.ops.object.shade_smooth()
+    wave = sheet.modifiers.new("wave", "WAVE")
+    wave.height, wave.width, wave.narrowness, wave.time_offset = 0.25, 0.6, 3, -40
+    track(camera((0, -6.5, 2.6), lens=50), empty("aim", (0, 0, 0.7)))
+    world(load_map("courtyard.exr"))
+    save(folder, "bending.blend")
+
+
 def write_sequence(folder):
     """Eight maps, numbered from 101, in which a sun climbs."""
     folder.mkdir(exist_ok=True)
@@ -306,4 +368,5 @@ if __name__ == "__main__":
     make_turntable(target)
     make_keyed_camera(target)
     make_lacquer(target)
+    make_bending(target)
     make_hdr_sequence(target)

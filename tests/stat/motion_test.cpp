@@ -9,6 +9,7 @@
 #include <functional>
 
 #include "tests/stat/against_brute_force.h"
+#include "tests/support/alive_box.h"
 #include "worker/method/populations.h"
 
 namespace baton {
@@ -34,6 +35,14 @@ TEST(Motion, AMovingCameraIsUnbiased) {
 TEST(Motion, AMovingObjectIsUnbiased) {
   test::expect_agreement(moving_job(false, true, 1), kMotionRuns, 0.02);
 }
+
+/// A box that grows: its faces stay flat and turned as they are, its points slide along.
+JobSpec growing_job() {
+  JobSpec job = moving_job(false, false, 1);
+  test::set_deforming(job, 0, 0.4f);
+  return job;
+}
+TEST(Motion, AGrowingBoxIsUnbiased) { test::expect_agreement(growing_job(), kMotionRuns, 0.02); }
 
 /// Both sides average over the sites, which are part of the seed.
 void expect_agreement_over_sites(const JobSpec& job) {
@@ -72,6 +81,17 @@ TEST(Motion, ThePoolIsUnbiasedUnderBothWithSeveralSites) {
   expect_agreement_over_sites(moving_pool_job(true, true, 4));
 }
 
+/// A box that bends by 8 degrees a frame while it grows, under a camera that moves.
+JobSpec bending_job(Method method, int sites) {
+  JobSpec job = moving_pool_job(true, false, sites);
+  test::set_deforming(job, 40 * kPi / 180, 0.3f);
+  job.sampling.method = method;
+  return job;
+}
+TEST(Motion, ThePoolIsUnbiasedOnABoxThatBends) {
+  test::expect_agreement(bending_job(Method::pool, 1), 200, 0.003);
+}
+
 /// ReSTIR, whose neighbours are asked around the place that the pixel comes from.
 JobSpec moving_restir_job(bool camera, bool object, int sites, int neighbors) {
   JobSpec job = moving_pool_job(camera, object, sites);
@@ -85,6 +105,12 @@ TEST(Motion, RestirIsUnbiasedUnderAMovingCamera) {
 }
 TEST(Motion, RestirIsUnbiasedUnderAMovingObjectWithNeighbors) {
   test::expect_agreement(moving_restir_job(false, true, 1, 2), kMotionRuns, 0.01);
+}
+TEST(Motion, RestirIsUnbiasedOnABoxThatBends) {
+  JobSpec job = bending_job(Method::restir, 4);
+  job.sampling.num_neighbors = 1;
+  job.sampling.neighbor_radius = 4;
+  expect_agreement_over_sites(job);
 }
 TEST(Motion, RestirIsUnbiasedUnderBothWithSeveralSites) {
   expect_agreement_over_sites(moving_restir_job(true, true, 4, 1));

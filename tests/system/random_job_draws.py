@@ -129,6 +129,9 @@ class Draw(Motion, Textures):
             "scene.objects[].scale": lambda: self.pick(None, 0.3, 1.7, [0.2, 1, 1.5], 1e-3, 30),
             "scene.objects[].matrix": lambda: self.matrix() if self.chance(0.1) else None, "objectKey.matrix": nothing,
             "scene.meshes.*.mesh": nothing, "scene.meshes.*.primitive": nothing,
+            "scene.meshes.*.shapedBy": nothing, "shapedBy.node": lambda: 8, "shapedBy.animation.startFrame": lambda: self.first_frame,
+            "shapedBy.animation.fps": lambda: self.pick(4, 24), "shapedBy.places[].node": lambda: self.pick(9, 10, 11, 0),
+            "shapedBy.places[].matrix": self.matrix,
             "scene.objects[].fitHeight": lambda: self.pick(None, None, None, 1.2),
             "scene.objects[].keys": lambda: self.object_keys() if self.chance(0.2) else None,
             "scene.objects[].gltf": lambda: self.gltf("hip") if self.chance(0.03) else None,
@@ -203,7 +206,8 @@ class Draw(Motion, Textures):
 
     def gltf_set(self, node, names):
         """The set of the examples: instances, some of them mirrored, three kinds of curves."""
-        self.files["set.glb"] = {"kind": "set", "pillars": self.pick(1, 4), "textured": self.chance(0.5)}
+        alive = self.chance(0.6)
+        self.files["set.glb"] = {"kind": "set", "pillars": self.pick(1, 4), "textured": self.chance(0.5), "alive": alive}
         form = self.schema.resolve(node["properties"]["gltf"])["oneOf"][1]
         self.schema.hand["scene.gltf.nodes"] = lambda: None
         gltf = self.schema.object(form, "scene.gltf")
@@ -215,7 +219,8 @@ class Draw(Motion, Textures):
             f"{at}.place.translate": lambda: self.vector(1.3),
             f"{at}.place.rotateDeg": lambda: self.pick(None, self.vector(180)),
             f"{at}.place.scale": lambda: self.pick(None, 0.3, [0.2, 1, 1.5])})
-        nodes = [name for name in ("ring", "lift", "ball", "pillar.000") if self.chance(0.4)]
+        there = ("ring", "lift", "ball", "pillar.000") + ("reed.0", "reed.1", "drop") * alive
+        nodes = [name for name in there if self.chance(0.4)]
         gltf["nodes"] = {name: self.schema.object(override, at) for name in nodes}
         return self.pick("set.glb", gltf, gltf)
 
@@ -239,6 +244,9 @@ class Draw(Motion, Textures):
             self.files[path] = {"kind": "sphere", "rings": 8, "segments": 12}
         smooth = self.pick(None, True, False)
         scene["meshes"][mesh] = path if smooth is None else {"path": path, "smoothNormals": smooth}
+        if self.chance(0.08):
+            del self.files[path]
+            scene["meshes"][mesh] = self.creature(keys["meshes"]["additionalProperties"])
         self.schema.hand["scene.objects[].mesh"] = lambda: mesh
         self.schema.hand["scene.objects[].material"] = lambda: self.rng.choice(names)
         item = self.schema.value(keys["objects"]["items"], "scene.objects[]")
@@ -246,6 +254,13 @@ class Draw(Motion, Textures):
             item.pop("placeOnGround", None)
             item.update(translate=[0.9 - 1.8 * number, 0.7, 0.3 * number], scale=0.7)
         return item
+
+    def creature(self, node):
+        """A reed on three bones, or a drop, of the set of the examples."""
+        self.files["alive.glb"] = {"kind": "set", "pillars": 1, "alive": True}
+        form = self.schema.resolve(self.schema.resolve(node)["oneOf"][1]["properties"]["shapedBy"])
+        mesh, shown_by = self.pick((4, 8), (4, 8), (5, 12))
+        return {"path": "alive.glb", "mesh": mesh, "shapedBy": self.schema.object(form, "shapedBy", share=0.7) | {"node": shown_by}}
 
     def gltf(self, node):
         self.files["walk.gltf"] = {"kind": "walk", "distance": self.pick(3.0, 5.0)}

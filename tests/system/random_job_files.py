@@ -36,7 +36,7 @@ def write_file(path, recipe, shared):
     elif kind == "merl":
         link_table(path, recipe, shared)
     elif kind == "set":
-        path.write_bytes(make_set(recipe["pillars"], recipe.get("textured", False)))
+        path.write_bytes(make_set(recipe["pillars"], recipe.get("textured", False), recipe.get("alive", False)))
     elif kind == "walk":
         path.write_text(json.dumps(walk_gltf(recipe)), encoding="ascii")
     else:

@@ -17,7 +17,7 @@ import conventions  # noqa: E402
 import exr  # noqa: E402
 import gltf_materials  # noqa: E402
 import keys  # noqa: E402
-from glb import Glb, tracks_of  # noqa: E402
+from glb import Glb, tracks_of, weights_of  # noqa: E402
 from make_gltf_set import make_set  # noqa: E402
 from report import Report  # noqa: E402
 
@@ -174,6 +174,24 @@ def animations_that_baton_reads(programs, folder):
     check(moved["moved"] > 1 and moved["still"] <= 1, f"motion in pixels: {moved}")
 
 
+def shapes_of_frames(programs, folder):
+    """What deforms has a target for each frame in which it is another than in the first one, and Baton follows it."""
+    rows = [row[0] for row in weights_of([None, "bent", None, "flat"])]
+    check_equal(rows, [0, 0, 1, 0, 0, 0, 0, 1], "weights of two targets in four frames")
+    folder.mkdir()
+    (folder / "set.glb").write_bytes(make_set(1, alive=True))
+    file = Glb.read(folder / "set.glb")
+    drop = next(i for i, node in enumerate(file.document["nodes"]) if node["name"] == "drop")
+    del file.document["nodes"][drop]["translation"]
+    file.document["animations"] = []
+    file.animate("shot", [(drop, "weights", weights_of([None, "flat", None]))], [1 / 24, 2 / 24, 3 / 24])
+    file.write(folder / "moved.glb")
+    job = make_job(folder, frames="1-3")
+    job["scene"] = {"gltf": {"file": "moved.glb"}}
+    checked = json.loads(programs.run("baton", "check", write_job(folder / "job.json", job), "--json").stdout)
+    check(checked["motionMaxPx"] > 1, f"motion of {checked['motionMaxPx']} pixels")
+
+
 def images_that_baton_reads(programs, folder):
     folder.mkdir()
     lines = [struct.pack("<6f", *(10 * y + i for i in range(6))) for y in range(3)]  # B B G G R R
@@ -212,4 +230,4 @@ def reports(_programs, _folder):
 if __name__ == "__main__":
     sys.dont_write_bytecode = True
     run_tests([map_of_every_mapping, mappings_that_are_no_rotation, angles_of_rotations, cameras, keys_are_reduced,
-               frame_numbers, animations_that_baton_reads, images_that_baton_reads, diffuse_materials, reports])
+               frame_numbers, animations_that_baton_reads, shapes_of_frames, images_that_baton_reads, diffuse_materials, reports])

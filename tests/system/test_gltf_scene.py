@@ -14,10 +14,10 @@ from make_gltf_set import make_set, png  # noqa: E402
 NUM_FRAMES = 3
 
 
-def set_job(folder, tile_size=64, method="pool", textured=False, **scene):
+def set_job(folder, tile_size=64, method="pool", textured=False, alive=False, **scene):
     """The camera of the set from behind its dolly; frames with motion of all kinds."""
     folder.mkdir(parents=True, exist_ok=True)
-    (folder / "set.glb").write_bytes(make_set(3, textured))
+    (folder / "set.glb").write_bytes(make_set(3, textured, alive))
     job = make_job(folder, frames="12-14", image={"width": 96, "height": 54, "sites": 4, "tileSize": tile_size},
                    sampling={"method": method, "numParticles": 4, "numCandidates": 32})
     del job["camera"]
@@ -104,6 +104,48 @@ def textures_are_said_and_part_of_the_job(programs, folder):
         (folder / "wood.png").write_bytes(b"")
 
 
+def deforming_for_any_tiling(programs, folder):
+    """A reed on bones and a drop that flattens: the same pixels in small tiles, by a run that is cut in two, and in a job of
+    the last frame alone, where nothing is carried; they are where the file's animation has them."""
+    for method in ("pool", "mis"):
+        whole, small, split = (folder / method / name for name in ("whole", "small", "split"))
+        expected = rendered(programs, whole, set_job(whole, 128, method, textured=True, alive=True), workers=1, threads=1)
+        got = rendered(programs, small, set_job(small, 16, method, textured=True, alive=True), workers=2, threads=2)
+        check_equal(got, expected, f"pixels of {method} in small tiles")
+        job = set_job(split, 32, method, textured=True, alive=True)
+        path = write_job(split / "first.json", {**job, "frames": "12-13", "motion": {"maxPx": 9}})
+        programs.render(path, split / "work")
+        job["motion"] = {"maxPx": 9}
+        again = rendered(programs, split, job)
+        job = set_job(folder / method / "once", 32, method, textured=True, alive=True)
+        job["motion"] = {"maxPx": 9}
+        check_equal(again, rendered(programs, folder / method / "once", job), f"pixels of {method} in two runs")
+    last = set_job(folder / "last", 64, "mis", textured=True, alive=True)
+    path = write_job(folder / "last/job.json", {**last, "frames": "14"})
+    programs.render(path, folder / "last/work")
+    alone = programs.values(folder / "last/frames/frame.0014.exr", "depth")
+    check(alone == programs.values(folder / "mis/whole/frames/frame.0014.exr", "depth"), "frame 14 alone is another one")
+    still = set_job(folder / "still", 64, "mis", textured=True, alive=True, gltf={"startFrame": 14})
+    rendered(programs, folder / "still", still)
+    check(programs.values(folder / "still/frames/frame.0014.exr", "depth") != alone, "startFrame moves nothing")
+
+
+def what_deforms_is_said(programs, folder):
+    """`check` counts what deforms as motion; bones can be placed, a mesh that follows them cannot."""
+    def checked(**how):
+        path = write_job(folder / "job.json", set_job(folder, alive=True, **how))
+        return json.loads(programs.run("baton", "check", path, "--json").stdout)
+    still = {name: {"place": {}} for name in ("lift", "vane", "ball", "dolly")}
+    hidden = checked(gltf={"nodes": {**still, "reed": {"visible": False}, "drop": {"visible": False}}})
+    check_equal(hidden["motionMaxPx"], 0, "motion without what deforms")
+    alive = checked(gltf={"nodes": {**still, "drop": {"visible": False}}})
+    check(alive["motionMaxPx"] > 1, f"motion of {alive['motionMaxPx']} pixels")
+    check(not [line for line in alive["warnings"] if "morph" in line or "bones" in line], alive["warnings"])
+    wrong = set_job(folder, alive=True, gltf={"nodes": {"reed": {"place": {"translate": [0, 1, 0]}}}})
+    failed = programs.run("baton", "check", write_job(folder / "wrong.json", wrong), expect=BAD_INPUT)
+    check('set.glb: node "reed": follows its bones, expected `place` of these' in failed.stderr, failed.stderr)
+
+
 if __name__ == "__main__":
     run_tests([any_tiling, the_job_says_otherwise, a_cut_file_is_one_error, textures_for_any_tiling,
-               textures_are_said_and_part_of_the_job])
+               textures_are_said_and_part_of_the_job, deforming_for_any_tiling, what_deforms_is_said])

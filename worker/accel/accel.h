@@ -26,7 +26,7 @@ struct SurfaceHit {
   /// Of the ground that catches shadows (worker/pass/catcher.h). `hit` is false where the pixel
   /// sees an object, too.
   bool is_catcher = false;
-  SurfacePlace place{};  ///< where the material has detail (surface_detail.h), else all 0
+  SurfacePlace place{};  ///< where the material has detail or the mesh deforms, else all 0
 
   bool operator==(const SurfaceHit&) const = default;
 };
@@ -95,15 +95,17 @@ struct AccelLimits {
 class Accel {
  public:
   /// Keeps a reference to `scene`, which must outlive it. What stands still is one flat hierarchy;
-  /// each mesh that moves has its own, placed where the scene says. Errors: bad_input where it
+  /// each mesh that moves has its own, placed where the scene says, unless it deforms: then it has
+  /// one in each frame. Errors: bad_input where it
   /// would take more than limits.max_bytes; Embree's own message.
   static Result<std::unique_ptr<Accel>> build(const Scene& scene, const AccelLimits& limits = {});
   virtual ~Accel() = default;
 
-  /// The same geometry with its moving instances elsewhere; shares all but their placement.
-  /// instances: those of the scene in its order, moved; must outlive the result. Error: Embree's
-  /// own message.
-  virtual Result<std::unique_ptr<const Accel>> place(std::span<const Instance> instances) const = 0;
+  /// The same geometry with its moving instances elsewhere and its deforming meshes in another
+  /// shape; shares all that does not deform. instances: those of the scene in its order, moved.
+  /// Both must outlive the result. Error: Embree's own message.
+  virtual Result<std::unique_ptr<const Accel>> place(std::span<const Instance> instances,
+                                                     const MeshShapes& shapes) const = 0;
 
   /// Closest hit of each ray; hits.size() == rays.size(). The rays come in groups of `group` (1 to
   /// 16) that start nearby and point alike, such as the sites of a pixel; a hit depends on no ray
@@ -114,6 +116,8 @@ class Accel {
   virtual void occluded(ShadowRays& rays) const = 0;
   /// What Embree has allocated for this geometry in all its placements.
   virtual std::uint64_t size_bytes() const = 0;
+  /// About what one placement takes of that for itself.
+  virtual std::uint64_t placement_bytes() const = 0;
   /// "Embree 3.13.5, AVX2" for the benchmark and --version.
   virtual std::string description() const = 0;
 };

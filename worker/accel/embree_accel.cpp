@@ -1,8 +1,5 @@
-#include <embree3/rtcore.h>
-
 #include <algorithm>
 #include <array>
-#include <cstring>
 #include <limits>
 #include <map>
 #include <set>
@@ -12,66 +9,10 @@
 #include "worker/accel/accel.h"
 #include "worker/accel/allocation_count.h"
 #include "worker/accel/cut_outs.h"
+#include "worker/accel/embree_geometry.h"
 
 namespace baton {
 namespace {
-
-/// Owns one reference to an Embree object.
-struct Release {
-  void operator()(RTCDevice device) const { rtcReleaseDevice(device); }
-  void operator()(RTCScene scene) const { rtcReleaseScene(scene); }
-  void operator()(RTCGeometry geometry) const { rtcReleaseGeometry(geometry); }
-};
-template <class Handle>
-using Owned = std::unique_ptr<std::remove_pointer_t<Handle>, Release>;
-
-/// Keeps Embree's first message in the std::string behind `text`.
-void remember_error(void* text, RTCError, const char* message) {
-  auto* first = static_cast<std::string*>(text);
-  if (first->empty()) *first = message != nullptr ? message : "unknown error";
-}
-
-/// Fills a new buffer of the geometry; it belongs to Embree, which pads it for its wide loads.
-template <class T>
-void fill_buffer(RTCGeometry geometry, RTCBufferType type, RTCFormat format,
-                 const std::vector<T>& elements) {
-  void* buffer = rtcSetNewGeometryBuffer(geometry, type, 0, format, sizeof(T), elements.size());
-  if (buffer != nullptr) std::memcpy(buffer, elements.data(), elements.size() * sizeof(T));
-}
-
-/// Attaches the triangles of a mesh, moved by `to_target`, as geometry `index`. holes: the scene if
-/// the mesh is cut out somewhere, else null.
-void attach_instance(RTCDevice device, RTCScene target, const TriangleMesh& mesh,
-                     const Transform& to_target, const Scene* holes, unsigned index) {
-  std::vector<Vec3> positions;
-  positions.reserve(mesh.positions.size());
-  for (const Vec3& p : mesh.positions) positions.push_back(to_target.point(p));
-
-  const Owned<RTCGeometry> geometry(rtcNewGeometry(device, RTC_GEOMETRY_TYPE_TRIANGLE));
-  fill_buffer(geometry.get(), RTC_BUFFER_TYPE_VERTEX, RTC_FORMAT_FLOAT3, positions);
-  fill_buffer(geometry.get(), RTC_BUFFER_TYPE_INDEX, RTC_FORMAT_UINT3, mesh.triangles);
-  if (holes != nullptr) {
-    rtcSetGeometryUserData(geometry.get(), const_cast<Scene*>(holes));
-    rtcSetGeometryIntersectFilterFunction(geometry.get(), pass_through_holes);
-    rtcSetGeometryOccludedFilterFunction(geometry.get(), pass_through_holes);
-  }
-  rtcCommitGeometry(geometry.get());
-  rtcAttachGeometryByID(target, geometry.get(), index);
-}
-
-/// Attaches a mesh that has a hierarchy of its own; geometry id = index of the instance.
-void attach_placed(RTCDevice device, RTCScene target, RTCScene mesh, const Transform& to_world,
-                   unsigned index) {
-  const auto& m = to_world.linear.m;
-  const Vec3& o = to_world.offset;
-  const std::array<float, 12> rows{m[0], m[1], m[2], o.x,  m[3], m[4],
-                                   m[5], o.y,  m[6], m[7], m[8], o.z};
-  const Owned<RTCGeometry> geometry(rtcNewGeometry(device, RTC_GEOMETRY_TYPE_INSTANCE));
-  rtcSetGeometryInstancedScene(geometry.get(), mesh);
-  rtcSetGeometryTransform(geometry.get(), 0, RTC_FORMAT_FLOAT3X4_ROW_MAJOR, rows.data());
-  rtcCommitGeometry(geometry.get());
-  rtcAttachGeometryByID(target, geometry.get(), index);
-}
 
 /// What all poses of a scene share.
 struct SharedGeometry {
@@ -80,9 +21,17 @@ struct SharedGeometry {
   Owned<RTCScene> still;  ///< all that does not move, in world space
   /// By index of the mesh, in its own space: those that move, or that are in too many places.
   std::map<std::uint32_t, Owned<RTCScene>> own_meshes;
+  std::set<std::uint32_t> with_holes;  ///< meshes that are cut out somewhere
   bool any_moves = false;
-  bool any_blends = false;  ///< rays need their bits
+  bool any_blends = false;            ///< rays need their bits
+  std::uint64_t placement_bytes = 0;  ///< of what is built for each placement
 
+  const Scene* holes_of(const Scene& scene, std::uint32_t mesh) const {
+    return with_holes.contains(mesh) ? &scene : nullptr;
+  }
+  std::uint64_t size_bytes() const {
+    return static_cast<std::uint64_t>(std::max<std::int64_t>(0, allocated.bytes));
+  }
   Owned<RTCScene> new_scene() const {
     Owned<RTCScene> scene(rtcNewScene(device.get()));
     rtcSetSceneBuildQuality(scene.get(), RTC_BUILD_QUALITY_HIGH);
@@ -92,21 +41,26 @@ struct SharedGeometry {
 
 /// Still instances are placed in one flat hierarchy: a second level costs a third of the shadow
 /// rays' speed. A ray asks it first, then the moving instances, which have a small hierarchy of
-/// their own. The floating-point environment stays as it is (Embree suggests flush-to-zero):
-/// results must not depend on the thread that traces.
+/// their own: for each frame one, in which meshes that deform lie flat. The floating-point
+/// environment stays as it is (Embree suggests flush-to-zero): results must not depend on the
+/// thread that traces.
 class EmbreeAccel final : public Accel {
  public:
   /// moving: null when nothing moves.
   EmbreeAccel(const Scene& scene, std::shared_ptr<const SharedGeometry> geometry,
-              std::span<const Instance> instances, Owned<RTCScene> moving)
+              std::span<const Instance> instances, const MeshShapes& shapes, Owned<RTCScene> moving)
       : scene_(scene),
         geometry_(std::move(geometry)),
         instances_(instances),
-        moving_(std::move(moving)) {}
+        moving_(std::move(moving)) {
+    for (std::uint32_t i = 0; i < scene.meshes.size(); ++i)
+      vertices_.push_back(vertices_of(scene, shapes, i));
+  }
 
   static Result<std::unique_ptr<EmbreeAccel>> make(const Scene& scene,
                                                    std::shared_ptr<const SharedGeometry> geometry,
-                                                   std::span<const Instance> instances) {
+                                                   std::span<const Instance> instances,
+                                                   const MeshShapes& shapes) {
     Owned<RTCScene> moving;
     std::string message;
     if (geometry->any_moves) {
@@ -114,20 +68,28 @@ class EmbreeAccel final : public Accel {
       rtcSetDeviceErrorFunction(device, remember_error, &message);
       moving = geometry->new_scene();
       for (unsigned i = 0; i < instances.size(); ++i) {
-        if (!instances[i].moves()) continue;
-        attach_placed(device, moving.get(), geometry->own_meshes.at(instances[i].mesh).get(),
-                      instances[i].to_world, i);
+        const Instance& instance = instances[i];
+        if (instance.deforms) {
+          attach_instance(device, moving.get(), scene.meshes[instance.mesh],
+                          vertices_of(scene, shapes, instance.mesh).positions, instance.to_world,
+                          geometry->holes_of(scene, instance.mesh), i);
+        } else if (instance.moves()) {
+          attach_placed(device, moving.get(), geometry->own_meshes.at(instance.mesh).get(),
+                        instance.to_world, i);
+        }
       }
       rtcCommitScene(moving.get());
       rtcSetDeviceErrorFunction(device, nullptr, nullptr);
     }
     if (!message.empty()) return Error{ErrorKind::internal, "Embree: " + message};
-    return std::make_unique<EmbreeAccel>(scene, std::move(geometry), instances, std::move(moving));
+    return std::make_unique<EmbreeAccel>(scene, std::move(geometry), instances, shapes,
+                                         std::move(moving));
   }
 
-  Result<std::unique_ptr<const Accel>> place(std::span<const Instance> instances) const override {
+  Result<std::unique_ptr<const Accel>> place(std::span<const Instance> instances,
+                                             const MeshShapes& shapes) const override {
     BATON_CHECK(instances.size() == instances_.size());
-    BATON_ASSIGN(std::unique_ptr<const Accel> placed, make(scene_, geometry_, instances));
+    BATON_ASSIGN(std::unique_ptr<const Accel> placed, make(scene_, geometry_, instances, shapes));
     return Result<std::unique_ptr<const Accel>>(std::move(placed));
   }
 
@@ -178,9 +140,9 @@ class EmbreeAccel final : public Accel {
     if (moving_ != nullptr) rtcOccludedNp(moving_.get(), &context, &stream, count);
   }
 
-  std::uint64_t size_bytes() const override {
-    return static_cast<std::uint64_t>(std::max<std::int64_t>(0, geometry_->allocated.bytes));
-  }
+  std::uint64_t size_bytes() const override { return geometry_->size_bytes(); }
+
+  std::uint64_t placement_bytes() const override { return geometry_->placement_bytes; }
 
   std::string description() const override {
     const auto native = [this](RTCDeviceProperty p) {
@@ -261,43 +223,43 @@ class EmbreeAccel final : public Accel {
     if (hit.geometry == RTC_INVALID_GEOMETRY_ID) return {};
     const unsigned index = hit.instance != RTC_INVALID_GEOMETRY_ID ? hit.instance : hit.geometry;
     const Instance& instance = instances_[index];
-    const TriangleMesh& mesh = scene_.meshes[instance.mesh];
-    const auto& corner = mesh.triangles[hit.triangle];
+    const auto [positions, normals, tangents] = vertices_[instance.mesh];
+    const auto& corner = scene_.meshes[instance.mesh].triangles[hit.triangle];
     const float u = hit.u;
     const float v = hit.v;
     const auto interpolate = [u, v](const Vec3& a, const Vec3& b, const Vec3& c) {
       return a * (1 - u - v) + b * u + c * v;
     };
-    const Vec3 a = instance.to_world.point(mesh.positions[corner[0]]);
-    const Vec3 b = instance.to_world.point(mesh.positions[corner[1]]);
-    const Vec3 c = instance.to_world.point(mesh.positions[corner[2]]);
+    const Vec3 a = instance.to_world.point(positions[corner[0]]);
+    const Vec3 b = instance.to_world.point(positions[corner[1]]);
+    const Vec3 c = instance.to_world.point(positions[corner[2]]);
 
     // Turn the geometric normal to the viewer, the shading normal to the geometric one.
     const Vec3 wo = -ray.direction;
     Vec3 ng = normalize(cross(b - a, c - a));
     if (dot(ng, wo) < 0) ng = -ng;
     Vec3 ns = ng;
-    if (!mesh.normals.empty()) {
-      ns = normalize(instance.normal_to_world * interpolate(mesh.normals[corner[0]],
-                                                            mesh.normals[corner[1]],
-                                                            mesh.normals[corner[2]]));
+    if (!normals.empty()) {
+      ns = normalize(instance.normal_to_world *
+                     interpolate(normals[corner[0]], normals[corner[1]], normals[corner[2]]));
       if (dot(ns, ng) < 0) ns = -ns;
       if (!(dot(ns, ng) > 0)) ns = ng;
     }
     const Vec3 position = interpolate(a, b, c);
-    const bool has_detail = scene_.material_of(instance).detail != nullptr;
+    const bool is_placed = scene_.material_of(instance).detail != nullptr || instance.deforms;
     return {.point = {.position = position, .ng = ng, .ns = ns, .wo = wo},
             .ray_origin = lift_off(position, ng),
             .depth = hit.depth,
             .instance = index,
             .material = instance.material,
             .hit = true,
-            .place = has_detail ? SurfacePlace{hit.triangle, u, v} : SurfacePlace{}};
+            .place = is_placed ? SurfacePlace{hit.triangle, u, v} : SurfacePlace{}};
   }
 
   const Scene& scene_;
   const std::shared_ptr<const SharedGeometry> geometry_;
   const std::span<const Instance> instances_;
+  std::vector<MeshVertices> vertices_;  ///< by mesh
   const Owned<RTCScene> moving_;
 };
 
@@ -336,37 +298,43 @@ Result<std::unique_ptr<Accel>> Accel::build(const Scene& scene, const AccelLimit
   geometry->still = geometry->new_scene();
   geometry->any_blends = any_blends(scene);
   const std::set<std::uint32_t> shared = shared_meshes(scene, limits.max_copied_triangles);
-  const std::set<std::uint32_t> with_holes = meshes_with_holes(scene);
+  geometry->with_holes = meshes_with_holes(scene);
   for (unsigned i = 0; i < scene.instances.size(); ++i) {
     const Instance& instance = scene.instances[i];
     if (instance.is_catcher) continue;
-    const Scene* const holes = with_holes.contains(instance.mesh) ? &scene : nullptr;
+    geometry->any_moves = geometry->any_moves || instance.moves();
+    if (instance.deforms) continue;
+    const std::vector<Vec3>& positions = scene.meshes[instance.mesh].positions;
+    const Scene* const holes = geometry->holes_of(scene, instance.mesh);
     if (!instance.moves() && !shared.contains(instance.mesh)) {
-      attach_instance(device, geometry->still.get(), scene.meshes[instance.mesh], instance.to_world,
-                      holes, i);
+      attach_instance(device, geometry->still.get(), scene.meshes[instance.mesh], positions,
+                      instance.to_world, holes, i);
       continue;
     }
     Owned<RTCScene>& own = geometry->own_meshes[instance.mesh];
     if (own == nullptr) {
       own = geometry->new_scene();
-      attach_instance(device, own.get(), scene.meshes[instance.mesh], {}, holes, 0);
+      attach_instance(device, own.get(), scene.meshes[instance.mesh], positions, {}, holes, 0);
       rtcCommitScene(own.get());
     }
-    geometry->any_moves = geometry->any_moves || instance.moves();
     if (!instance.moves())
       attach_placed(device, geometry->still.get(), own.get(), instance.to_world, i);
   }
   rtcCommitScene(geometry->still.get());
   rtcSetDeviceErrorFunction(device, nullptr, nullptr);
+  const std::uint64_t shared_bytes = geometry->size_bytes();
+  Result<std::unique_ptr<EmbreeAccel>> accel =
+      EmbreeAccel::make(scene, geometry, scene.instances, {});
+  geometry->placement_bytes =
+      geometry->size_bytes() - std::min(geometry->size_bytes(), shared_bytes);
   if (allocated.was_exceeded) {
     return Error{ErrorKind::bad_input, "the ray tracer would take more than " +
                                            std::to_string(limits.max_bytes) + " bytes"};
   }
   if (!message.empty()) return Error{ErrorKind::internal, "Embree: " + message};
-  allocated.allowed = std::numeric_limits<std::int64_t>::max();  // placements are small
-  BATON_ASSIGN(std::unique_ptr<Accel> accel,
-               EmbreeAccel::make(scene, std::move(geometry), scene.instances));
-  return Result<std::unique_ptr<Accel>>(std::move(accel));
+  if (!accel) return accel.error();
+  allocated.allowed = std::numeric_limits<std::int64_t>::max();  // caches count what frames take
+  return Result<std::unique_ptr<Accel>>(std::move(*accel));
 }
 
 }  // namespace baton

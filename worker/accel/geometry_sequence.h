@@ -37,19 +37,36 @@ struct FrameGeometry {
   SeenSurface see(const SurfaceHit& hit) const {
     const Material& material = material_of(hit);
     if (material.detail == nullptr) return {hit.point, material, {}};
-    return see_detail(*scene, pose.instances[hit.instance], hit.place, hit.point);
+    return see_detail(*scene, pose.instances[hit.instance], hit.place, hit.point, pose.shapes);
   }
+  /// Where the point of a hit of this frame is in another pose, and its shading normal.
+  Vec3 point_in(const Pose& other, const SurfaceHit& hit) const {
+    if (!pose.instances[hit.instance].moves()) return hit.point.position;
+    return carry_point(*scene, pose, other, {hit.instance, hit.place, hit.point.position});
+  }
+  Vec3 normal_in(const Pose& other, const SurfaceHit& hit) const {
+    if (!pose.instances[hit.instance].moves()) return hit.point.ns;
+    return carry_normal(*scene, pose, other, {hit.instance, hit.place, hit.point.ns});
+  }
+  /// Of what deforms.
+  std::size_t size_bytes() const;
 };
 
 /// The geometry of a job's frames, placed on demand and kept for the frames used last. What stands
-/// still is built once, moving objects once each; a frame only places them. Any number of threads
-/// may ask. A frame's geometry is a pure function of (job, frame).
+/// still is built once, moving objects once each; a frame only places them, and builds what
+/// deforms. Any number of threads may ask. A frame's geometry is a pure function of (job, frame).
 class GeometrySequence {
  public:
   /// job and scene must outlive the object. rest: the scene's ray tracer, may be shared with other
-  /// jobs.
-  GeometrySequence(const JobSpec& job, const Scene& scene, std::shared_ptr<const Accel> rest)
-      : job_(job), scene_(scene), rest_(std::move(rest)) {}
+  /// jobs. share: of memory, for what deforms; the two frames used last stay in any case.
+  GeometrySequence(const JobSpec& job, const Scene& scene, std::shared_ptr<const Accel> rest,
+                   MemorySharePtr share)
+      : job_(job),
+        scene_(scene),
+        rest_(std::move(rest)),
+        frames_(
+            std::move(share), [](const FrameGeometry& frame) { return frame.size_bytes(); },
+            limits::kMaxCachedPoses, 2) {}
 
   /// The geometry of frame `index` (0-based). Error: Embree's own message.
   Result<std::shared_ptr<const FrameGeometry>> at(std::int32_t index);
@@ -59,8 +76,7 @@ class GeometrySequence {
   const Scene& scene_;
   const std::shared_ptr<const Accel> rest_;  ///< every frame's, when no object moves
   std::mutex placing_;
-  LruCache<std::int32_t, FrameGeometry> frames_{
-      limits::kMaxCachedPoses, [](const FrameGeometry&) { return std::size_t{1}; }};
+  LruCache<std::int32_t, FrameGeometry> frames_;
 };
 
 }  // namespace baton

@@ -42,10 +42,7 @@ void GeometryPlanes::add_motion(const Camera& camera, const Ray& ray, const Surf
                                 double weight, Sum& sum) const {
   const auto place_in = [&](const Pose& pose) {
     if (!hit.hit) return pose.camera.project_direction(ray.direction);
-    const Instance& now = geometry_.pose.instances[hit.instance];
-    const Vec3& point = hit.point.position;
-    return pose.camera.project(now.moves() ? carry_point(now, pose.instances[hit.instance], point)
-                                           : point);
+    return pose.camera.project(geometry_.point_in(pose, hit));
   };
   const auto here =
       hit.hit ? camera.project(hit.point.position) : camera.project_direction(ray.direction);

@@ -15,7 +15,8 @@ struct MemoryBudget {
   std::uint64_t scene_bytes = 0;  ///< a job's scene, with the tiles and frames in work
   MemorySharePtr maps;            ///< environment maps as they were read, of all jobs
   MemorySharePtr light;           ///< mixed maps and presampled light
-  MemorySharePtr surfaces;        ///< what primary rays have seen, where things move
+  MemorySharePtr surfaces;        ///< where things move: what primary rays have seen, and
+                                  ///< the geometry of what deforms
   MemorySharePtr states;          ///< decoded sample states
 
   static MemoryBudget of(std::uint64_t total_bytes) {

@@ -50,9 +50,7 @@ bool Neighborhood::agrees(std::span<const SurfaceHit> now, std::span<const Surfa
   const SurfaceHit* const a = first_surface(now);
   const SurfaceHit* const b = first_surface(old);
   if (a == nullptr || b == nullptr || a->instance != b->instance) return false;
-  const Instance& from = now_.pose.instances[a->instance];
-  const Instance& to = old_pixels_.geometry().pose.instances[a->instance];
-  const Vec3 normal = from.moves() ? carry_normal(from, to, a->point.ns) : a->point.ns;
+  const Vec3 normal = now_.normal_in(old_pixels_.geometry().pose, *a);
   return dot(b->point.ns, normal) >= cos_normal_tolerance_ &&
          std::fabs(b->depth - a->depth) <= kDepthTolerance * a->depth;
 }

@@ -45,8 +45,8 @@ Result<std::shared_ptr<const RenderContext>> make_render_context(
   context->surfaces = std::make_shared<SurfaceCache>(memory.surfaces);
   context->method = make_pixel_method(context->job);
   context->own_methods = make_own_methods(job);
-  context->geometry =
-      std::make_unique<GeometrySequence>(context->job, *context->scene, assets->accel);
+  context->geometry = std::make_unique<GeometrySequence>(context->job, *context->scene,
+                                                         assets->accel, memory.surfaces);
   return std::shared_ptr<const RenderContext>(std::move(context));
 }
 

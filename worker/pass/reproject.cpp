@@ -61,11 +61,9 @@ std::optional<Reprojection::Position> Reprojection::find_source(std::span<const 
                                                                 const Rng& rng) const {
   const SurfaceHit* const hit = draw_hit(hits, rng);
   if (hit == nullptr) return std::nullopt;
-  const Instance& instance = now_.pose.instances[hit->instance];
-  if (still_camera_ && !instance.moves()) return pixel;
-
-  const Vec3 point =
-      carry_point(instance, before_.pose.instances[hit->instance], hit->point.position);
+  if (still_camera_ && !now_.pose.instances[hit->instance].moves()) return pixel;
+  const Vec3 point = carry_point(*now_.scene, now_.pose, before_.pose,
+                                 {hit->instance, hit->place, hit->point.position});
   auto projected = before_.pose.camera.project(point);
   if (!projected) return std::nullopt;
   // Sites of wide filters lie around the pixel: it moves as its hit does.
@@ -117,10 +115,8 @@ void Reprojection::look_up(const TileSurfaces& surfaces, std::size_t first, std:
 /// of then, and normals alike.
 bool Reprojection::agrees(const SurfaceHit& now, const SurfaceHit& old) const {
   if (!old.hit || old.instance != now.instance) return false;
-  const Instance& from = now_.pose.instances[now.instance];
-  const Instance& to = before_.pose.instances[now.instance];
-  const Vec3 point = from.moves() ? carry_point(from, to, now.point.position) : now.point.position;
-  const Vec3 normal = from.moves() ? carry_normal(from, to, now.point.ns) : now.point.ns;
+  const Vec3 point = now_.point_in(before_.pose, now);
+  const Vec3 normal = now_.normal_in(before_.pose, now);
   return std::fabs(dot(old.point.ng, point - old.point.position)) <=
              context_.job.motion.depth_tolerance * old.depth &&
          dot(old.point.ns, normal) >= cos_normal_tolerance_;

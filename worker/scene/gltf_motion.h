@@ -17,16 +17,6 @@ Status take_camera_keys(const std::vector<int>& frames, CameraSpec& camera);
 /// What the node does is done to the object.
 Status take_object_keys(const std::vector<int>& frames, ObjectSpec& object);
 
-/// Which time of a file a frame shows.
-struct FileClock {
-  float fps = 24;
-  int start_frame = 0;
-
-  double seconds_at(int frame) const {
-    return static_cast<double>(frame - start_frame) / static_cast<double>(fps);
-  }
-};
-
 /// Makes `camera` that of a node: with keys where it moves, at one place where it does not. Error:
 /// the node holds no camera.
 Status put_camera(const gltf::NodeMotion& motion, int node, const FileClock& clock,

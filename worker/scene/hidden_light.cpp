@@ -15,6 +15,12 @@ namespace {
 /// Degrees; each costs a sequence a map at most.
 constexpr std::array kAngles{89, 88, 87, 85, 83, 80, 75, 70, 60, 45, 30};
 
+Bounds bounds_of(std::span<const Vec3> points) {
+  Bounds bounds;
+  for (const Vec3& point : points) bounds.add(point);
+  return bounds;
+}
+
 /// How far from the camera's position its rays may start.
 float reach_of(const CameraSpec& camera, const ImageSpec& image) {
   float reach = 0.5f * camera.aperture;
@@ -61,10 +67,7 @@ std::optional<Vec3> down_in_map(const EnvironmentSpec& environment) {
 HiddenLight::HiddenLight(const JobSpec& job, const Scene& scene) : job_(job), scene_(scene) {
   if (has_solid_ground(job, scene)) down_ = down_in_map(job.environment);
   if (!down_) return;
-  boxes_.resize(scene.meshes.size());
-  for (std::size_t i = 0; i < boxes_.size(); ++i) {
-    for (const Vec3& position : scene.meshes[i].positions) boxes_[i].add(position);
-  }
+  for (const TriangleMesh& mesh : scene.meshes) boxes_.push_back(bounds_of(mesh.positions));
 }
 
 HiddenCone HiddenLight::at(int frame_number) const {
@@ -74,7 +77,10 @@ HiddenCone HiddenLight::at(int frame_number) const {
   float height = 0, aside = 0;
   const Pose pose = pose_at(scene_, job_, frame_number);
   for (std::size_t i = 0; i + 1 < pose.instances.size(); ++i) {
-    const Bounds& box = boxes_[pose.instances[i].mesh];
+    const std::uint32_t mesh = pose.instances[i].mesh;
+    const Bounds box = pose.instances[i].deforms
+                           ? bounds_of(vertices_of(scene_, pose.shapes, mesh).positions)
+                           : boxes_[mesh];
     for (std::size_t k = 0; k < 8; ++k) {
       const Vec3 corner = pose.instances[i].to_world.point(box.corner(k));
       height = std::max(height, corner.y - job_.scene.ground->height);

@@ -31,13 +31,16 @@ std::uint32_t bits(float f) { return std::bit_cast<std::uint32_t>(f + 0.0f); }
 
 }  // namespace
 
+bool has_area(const Vec3& a, const Vec3& b, const Vec3& c) {
+  const Vec3 to_b = b - a, to_c = c - a;
+  const double longest =
+      std::max({squared_length(to_b), squared_length(to_c), squared_length(c - b)});
+  return doubled_area(to_b, to_c) > kMinRelativeArea * longest;
+}
+
 void MeshBuilder::add(const std::array<Vec3, 3>& corners, const std::array<Vec3, 3>& normals,
                       const std::array<UvSets, 3>& uvs, const std::array<Tangent, 3>& tangents) {
-  const Vec3 a = corners[1] - corners[0];
-  const Vec3 b = corners[2] - corners[0];
-  const double longest =
-      std::max({squared_length(a), squared_length(b), squared_length(corners[2] - corners[1])});
-  if (!(doubled_area(a, b) > kMinRelativeArea * longest)) {
+  if (!has_area(corners[0], corners[1], corners[2])) {
     ++mesh_.dropped_triangles;
     return;
   }

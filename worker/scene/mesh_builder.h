@@ -45,6 +45,9 @@ class MeshBuilder {
   std::vector<std::uint32_t> slots_;
 };
 
+/// Whether a triangle has a normal in float.
+bool has_area(const Vec3& a, const Vec3& b, const Vec3& c);
+
 /// Angle-weighted unit vertex normals [Thuermer & Wuethrich 1998]. Where faces cancel each other (a
 /// sheet with two sides) the vertex takes the normal of one of them.
 std::vector<Vec3> smooth_vertex_normals(const TriangleMesh& mesh);

@@ -138,10 +138,13 @@ std::set<std::string> textured_meshes(const SceneSpec& spec) {
   return names;
 }
 
-Result<TriangleMesh> load_part(const MeshSpec& spec, bool with_uvs, gltf::FileCache& files) {
+Result<TriangleMesh> load_part(const MeshSpec& spec, bool with_uvs, gltf::FileCache& files,
+                               gltf::MotionCache& motions) {
   if (spec.mesh < 0) return load_mesh(spec.path, spec.smooth_normals, with_uvs);
   BATON_ASSIGN(const auto document, files.get(spec.path));
-  return gltf::primitive_mesh(*document, spec.mesh, spec.primitive, spec.smooth_normals);
+  if (!spec.shaped_by) return gltf::primitive_mesh(*document, spec);
+  BATON_ASSIGN(auto motion, motions.get(document, spec.shaped_by->places));
+  return gltf::shaped_mesh(*document, std::move(motion), spec);
 }
 
 /// Whether the mesh has the texture coordinates that the material's textures need; makes tangents
@@ -165,10 +168,11 @@ void fit_mesh(const Material& material, const std::string& material_name,
 /// well.
 NameIndex load_meshes(const SceneSpec& spec, gltf::FileCache& files, Scene& scene, Faults& faults) {
   NameIndex names;
+  gltf::MotionCache motions;
   const std::set<std::string> textured = textured_meshes(spec);
   for (const auto& [name, mesh_spec] : spec.meshes) {
     names[name] = static_cast<std::uint32_t>(scene.meshes.size());
-    Result<TriangleMesh> mesh = load_part(mesh_spec, textured.contains(name), files);
+    Result<TriangleMesh> mesh = load_part(mesh_spec, textured.contains(name), files, motions);
     if (!mesh) faults.add("scene.meshes." + name + ": " + mesh.error().message);
     scene.meshes.push_back(mesh ? std::move(*mesh) : TriangleMesh{});
   }
@@ -189,10 +193,25 @@ void place_object(const ObjectSpec& object, std::size_t index, const std::string
     return;
   }
   const std::int32_t moving_object = moves(object) ? static_cast<std::int32_t>(index) : -1;
-  scene.instances.push_back({mesh, material, *to_world, *normal_to_world, moving_object});
+  scene.instances.push_back({.mesh = mesh,
+                             .material = material,
+                             .to_world = *to_world,
+                             .normal_to_world = *normal_to_world,
+                             .moving_object = moving_object,
+                             .deforms = scene.meshes[mesh].deformation != nullptr});
 }
 
 }  // namespace
+
+MeshShape TriangleMesh::shape_at(double frame) const {
+  MeshShape shape = deformation->at(frame);
+  for (const std::uint32_t vertex : copied_vertices) {
+    shape.positions.push_back(shape.positions[vertex]);
+    if (!shape.normals.empty()) shape.normals.push_back(shape.normals[vertex]);
+  }
+  if (tangent_uv_set >= 0) shape.tangents = tangents_of(*this, shape);
+  return shape;
+}
 
 std::uint64_t Scene::size_bytes() const {
   std::uint64_t size = 0;
@@ -205,6 +224,7 @@ std::uint64_t Scene::size_bytes() const {
     for (const auto& uvs : mesh.uvs) add(uvs);
     add(mesh.tangents);
     add(mesh.triangles);
+    if (mesh.deformation != nullptr) size += mesh.deformation->size_bytes();
   }
   std::set<const Texture*> textures;  // materials share them
   for (const Material& material : materials) {
@@ -217,6 +237,15 @@ std::uint64_t Scene::size_bytes() const {
     }
   }
   return size;
+}
+
+MeshVertices vertices_of(const Scene& scene, const MeshShapes& shapes, std::uint32_t mesh) {
+  if (mesh < shapes.size() && shapes[mesh] != nullptr) {
+    const MeshShape& shape = *shapes[mesh];
+    return {shape.positions, shape.normals, shape.tangents};
+  }
+  const TriangleMesh& rest = scene.meshes[mesh];
+  return {rest.positions, rest.normals, rest.tangents};
 }
 
 Result<Scene> load_scene(const JobSpec& job) {

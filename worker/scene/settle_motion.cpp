@@ -51,11 +51,13 @@ void add_meshes(const Scene& scene, const Pose& now, const Pose& before, StepMet
   const std::size_t share = kScenePoints / std::max<std::size_t>(now.instances.size(), 1);
   const std::size_t most = std::clamp(share, kLeastMeshPoints, kMeshPoints);
   for (std::size_t i = 0; i < now.instances.size(); ++i) {
-    const std::vector<Vec3>& points = scene.meshes[now.instances[i].mesh].positions;
+    const std::uint32_t mesh = now.instances[i].mesh;
+    const std::span<const Vec3> points = vertices_of(scene, now.shapes, mesh).positions;
+    const std::span<const Vec3> old = vertices_of(scene, before.shapes, mesh).positions;
     const std::size_t stride = std::max<std::size_t>(points.size() / most, 1);
     for (std::size_t k = 0; k < points.size(); k += stride)
       meter.add(now.instances[i].to_world.point(points[k]),
-                before.instances[i].to_world.point(points[k]));
+                before.instances[i].to_world.point(old[k]));
   }
 }
 
@@ -76,7 +78,8 @@ void add_ground(const JobSpec& job, const Camera& camera, StepMeter& meter) {
 }
 
 /// The frames between which motion is measured: from the first key to the last, in the job's step,
-/// so that all jobs of a shot measure the same.
+/// so that all jobs of a shot measure the same; where meshes deform, which have no keys, the job's
+/// frames, too.
 std::vector<int> measured_frames(const JobSpec& job) {
   std::vector<double> keys;
   const auto add = [&](const auto& list) {
@@ -84,6 +87,10 @@ std::vector<int> measured_frames(const JobSpec& job) {
   };
   add(job.camera.keys);
   for (const ObjectSpec& object : job.scene.objects) add(object.keys);
+  const bool deforms =
+      std::ranges::any_of(job.scene.meshes, [](const auto& mesh) { return mesh.second.deforms(); });
+  if (deforms && !keys.empty())
+    keys.insert(keys.end(), {job.frames.front() * 1.0, job.frames.back() * 1.0});
   const auto [first, last] = std::minmax_element(keys.begin(), keys.end());
   if (first == keys.end()) return job.frames;
   int step = 1;

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <map>
+#include <optional>
 #include <set>
 
 #include "common/base/limits.h"
@@ -12,6 +13,8 @@
 #include "common/math/inverse.h"
 #include "worker/scene/gltf/file_cache.h"
 #include "worker/scene/gltf/materials.h"
+#include "worker/scene/gltf/meshes.h"
+#include "worker/scene/gltf/vertices.h"
 #include "worker/scene/gltf_motion.h"
 
 namespace baton {
@@ -21,14 +24,12 @@ namespace {
 constexpr std::size_t kLongestShown = 60;
 
 /// No job has such a name by accident; people see it in warnings.
-std::string mesh_name(const gltf::Document& file, int mesh, std::size_t primitive) {
+std::string mesh_name(const gltf::Document& file, int mesh, std::size_t primitive,
+                      const std::optional<ShapeSpec>& shape) {
   const std::string& name = file.meshes[static_cast<std::size_t>(mesh)].name;
-  return fmt::format("gltf/{}/{}{}{}", mesh, primitive, name.empty() ? "" : " ",
+  return fmt::format("gltf/{}/{}{}{}{}", mesh, primitive,
+                     shape ? fmt::format("/{}", shape->node) : "", name.empty() ? "" : " ",
                      name.size() <= kLongestShown ? name : "");
-}
-
-bool has_surface(const gltf::Primitive& primitive) {
-  return primitive.mode >= 4 && primitive.mode <= 6;
 }
 
 bool is_flat(const Matrix34& matrix) { return !inverse_transposed(to_transform(matrix).linear); }
@@ -73,17 +74,26 @@ class SceneTaker {
       const Mat3 r = rotation_about({0, 0, 1}, said.place->rotate_deg.z) *
                      rotation_about({0, 1, 0}, said.place->rotate_deg.y) *
                      rotation_about({1, 0, 0}, said.place->rotate_deg.x);
-      motion_.place(node, {r.m[0] * s.x, r.m[1] * s.y, r.m[2] * s.z, t.x,  //
-                           r.m[3] * s.x, r.m[4] * s.y, r.m[5] * s.z, t.y,  //
-                           r.m[6] * s.x, r.m[7] * s.y, r.m[8] * s.z, t.z});
+      places_.push_back({node,
+                         {r.m[0] * s.x, r.m[1] * s.y, r.m[2] * s.z, t.x,  //
+                          r.m[3] * s.x, r.m[4] * s.y, r.m[5] * s.z, t.y,  //
+                          r.m[6] * s.x, r.m[7] * s.y, r.m[8] * s.z, t.z}});
+      const gltf::Node& given = file_.nodes[static_cast<std::size_t>(node)];
+      if (given.mesh >= 0 && given.skin >= 0 && given.children.empty())
+        return file_.error(
+            fmt::format("node \"{}\": follows its bones, expected `place` of these, or of what is "
+                        "above them",
+                        name));
     }
+    gltf::place(places_, motion_);
     return follow_nodes();
   }
 
   /// Where all nodes are in the first frame, and those with meshes that move in all frames.
   Status follow_nodes() {
     for (const int node : gltf::shown_nodes(file_)) {
-      if (motion_.moves(node) && file_.nodes[static_cast<std::size_t>(node)].mesh >= 0)
+      const gltf::Node& given = file_.nodes[static_cast<std::size_t>(node)];
+      if (motion_.moves(node) && given.mesh >= 0 && given.skin < 0)
         moved_[static_cast<std::size_t>(node)];
     }
     if (moved_.size() * job_.frames.size() > limits::kMaxGltfKeys) return too_many_keys();
@@ -135,9 +145,22 @@ class SceneTaker {
     return {};
   }
 
+  /// What shapes the meshes of a node, if something does.
+  std::optional<ShapeSpec> shape_of(std::size_t node) const {
+    const auto number = static_cast<int>(node);
+    const gltf::Shaping shaping = gltf::shaping_of(motion_, number);
+    if (shaping == gltf::Shaping::none) return std::nullopt;
+    ShapeSpec shape{.node = number, .animation = {}, .places = places_};
+    if (shaping == gltf::Shaping::animated) shape.animation = clock();
+    return shape;
+  }
+
   Status take_node(std::size_t node, const std::string& material) {
     ObjectSpec object;
-    if (const auto moved = moved_.find(node); moved != moved_.end()) {
+    const std::optional<ShapeSpec> shape = shape_of(node);
+    if (file_.nodes[node].skin >= 0) {
+      // Its bones say where it is.
+    } else if (const auto moved = moved_.find(node); moved != moved_.end()) {
       const auto flat = std::ranges::find_if(moved->second, is_flat);
       if (flat != moved->second.end())
         return file_.error(
@@ -154,8 +177,8 @@ class SceneTaker {
     const std::vector<gltf::Primitive>& primitives =
         file_.meshes[static_cast<std::size_t>(mesh)].primitives;
     for (std::size_t p = 0; p < primitives.size(); ++p) {
-      if (!has_surface(primitives[p])) continue;
-      object.mesh = mesh_name(file_, mesh, p);
+      if (!gltf::has_surface(primitives[p])) continue;
+      object.mesh = mesh_name(file_, mesh, p, shape);
       object.material = material;
       if (material.empty()) {
         object.material = material_names_[static_cast<std::size_t>(primitives[p].material + 1)];
@@ -165,7 +188,8 @@ class SceneTaker {
       spec = {.path = gltf_.file,
               .smooth_normals = true,
               .mesh = mesh,
-              .primitive = static_cast<int>(p)};
+              .primitive = static_cast<int>(p),
+              .shaped_by = shape};
       job_.scene.objects.push_back(object);
       num_keys_ += object.keys.size();
     }
@@ -188,6 +212,7 @@ class SceneTaker {
   const gltf::Document& file_;
   const std::vector<std::string> material_names_;  ///< of material i - 1; first the default one
   std::vector<const GltfNodeSpec*> said_;          ///< by node; null: nothing
+  std::vector<PlacedNode> places_;                 ///< that the job says
   std::vector<gltf::Matrix> rest_;                 ///< by node, in the first frame
   std::map<std::size_t, std::vector<Matrix34>> moved_;  ///< by node that moves, (frames)
   std::set<int> used_materials_;
@@ -273,16 +298,17 @@ std::vector<std::string> gltf_warnings(const SceneSpec& scene) {
       if (!gltf::is_read(extension)) add("extension " + extension + " is not read");
     }
     warn_of_materials(file, warnings);
-    std::size_t skinned = 0, morphed = 0, colored = 0;
-    for (const gltf::Node& node : file.nodes) skinned += node.skin >= 0 && node.mesh >= 0 ? 1 : 0;
+    std::size_t morphed = 0, colored = 0;
     for (const gltf::Mesh& mesh : file.meshes) {
       for (const gltf::Primitive& primitive : mesh.primitives) {
-        morphed += primitive.morphed ? 1 : 0;
+        morphed += primitive.morphs_more ? 1 : 0;
         colored += primitive.colored ? 1 : 0;
       }
     }
-    if (skinned > 0) add(fmt::format("{} meshes follow bones: they are shown at rest", skinned));
-    if (morphed > 0) add(fmt::format("{} parts have morph targets, which are not read", morphed));
+    if (morphed > 0)
+      add(fmt::format(
+          "{} parts have morph targets of colours or texture coordinates, which are not read",
+          morphed));
     if (colored > 0) add(fmt::format("{} parts have vertex colours, which are not read", colored));
   }
   return warnings;

@@ -27,8 +27,10 @@ Uv mapped(const std::array<float, 4>& m, const Uv& uv) {
 /// The triangle at a place, in the world.
 class Patch {
  public:
-  Patch(const Scene& scene, const Instance& instance, const SurfacePlace& place)
+  Patch(const Scene& scene, const Instance& instance, const SurfacePlace& place,
+        const MeshShapes& shapes)
       : mesh_(scene.meshes[instance.mesh]),
+        vertices_(vertices_of(scene, shapes, instance.mesh)),
         instance_(instance),
         place_(place),
         corner_(mesh_.triangles[place.triangle]) {}
@@ -65,7 +67,7 @@ class Patch {
   /// The normal that (x, y, z) of tangent space is, z along that of the mesh; unit, on the side of
   /// ns.
   Vec3 from_tangent_space(const Vec3& local, const Vec3& ns) const {
-    const auto& t = mesh_.tangents;
+    const std::span<const Tangent> t = vertices_.tangents;
     const float u = place_.u, v = place_.v;
     const Vec3 normal = own_normal();
     Vec3 tangent =
@@ -79,19 +81,22 @@ class Patch {
   }
 
  private:
-  Vec3 world(std::size_t k) const { return instance_.to_world.point(mesh_.positions[corner_[k]]); }
+  Vec3 world(std::size_t k) const {
+    return instance_.to_world.point(vertices_.positions[corner_[k]]);
+  }
 
   /// The interpolated normal in the space of the mesh.
   Vec3 own_normal() const {
-    const auto corner = [&](const std::vector<Vec3>& values, std::size_t k) {
+    const auto corner = [&](std::span<const Vec3> values, std::size_t k) {
       return values[corner_[k]];
     };
-    if (mesh_.normals.empty()) {
-      const Vec3 a = corner(mesh_.positions, 0);
-      return normalize(cross(corner(mesh_.positions, 1) - a, corner(mesh_.positions, 2) - a));
+    const auto [positions, normals, tangents] = vertices_;
+    if (normals.empty()) {
+      const Vec3 a = corner(positions, 0);
+      return normalize(cross(corner(positions, 1) - a, corner(positions, 2) - a));
     }
-    return normalize(mix(corner(mesh_.normals, 0), corner(mesh_.normals, 1),
-                         corner(mesh_.normals, 2), place_.u, place_.v));
+    return normalize(
+        mix(corner(normals, 0), corner(normals, 1), corner(normals, 2), place_.u, place_.v));
   }
 
   /// A step in the world, in edges of the triangle.
@@ -103,6 +108,7 @@ class Patch {
   }
 
   const TriangleMesh& mesh_;
+  const MeshVertices vertices_;
   const Instance& instance_;
   const SurfacePlace& place_;
   const std::array<std::uint32_t, 3>& corner_;
@@ -143,9 +149,9 @@ void see_coat_detail(const Patch& patch, const SurfaceDetail& detail, const Shad
 }  // namespace
 
 SeenSurface see_detail(const Scene& scene, const Instance& instance, const SurfacePlace& place,
-                       const ShadingPoint& point) {
+                       const ShadingPoint& point, const MeshShapes& shapes) {
   const SurfaceDetail& detail = *scene.material_of(instance).detail;
-  Patch patch(scene, instance, place);
+  Patch patch(scene, instance, place, shapes);
   patch.set_footprint(point);
   const MaterialSpec& spec = detail.spec;
   Rgb color = spec.base_color, emission = spec.emission;
@@ -173,7 +179,7 @@ bool is_cut_away(const Scene& scene, const Instance& instance, const SurfacePlac
   const SurfaceDetail& detail = *scene.material_of(instance).detail;
   float alpha = detail.spec.alpha;
   if (detail.color.texture != nullptr && detail.color.texture->has_alpha())
-    alpha *= Patch(scene, instance, place).look_up(detail.color)[3];
+    alpha *= Patch(scene, instance, place, {}).look_up(detail.color)[3];
   return alpha < std::max(detail.spec.alpha_cutoff, detail.spec.alpha_blend ? draw : 0.0f);
 }
 

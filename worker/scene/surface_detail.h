@@ -48,9 +48,9 @@ struct SeenSurface {
 /// The surface at a hit of `instance`, whose material has detail. point: with the normals of the
 /// mesh. A mapped normal is bent just so far towards the geometric one that the viewer's mirror
 /// image lies above the surface. Textures are averaged over the width of the place, which the
-/// surface's slope stretches.
+/// surface's slope stretches. shapes: of the frame.
 SeenSurface see_detail(const Scene& scene, const Instance& instance, const SurfacePlace& place,
-                       const ShadingPoint& point);
+                       const ShadingPoint& point, const MeshShapes& shapes = {});
 
 /// Whether a ray passes the instance, whose material is cut out, at that place: its alpha, blended
 /// in the image of full size, is below the cut-off, or where the surface blends below `draw`. A

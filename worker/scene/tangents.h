@@ -9,4 +9,7 @@ namespace baton {
 /// as MikkTSpace does. Where images that are mirrored to each other meet, vertices become two.
 void derive_tangents(TriangleMesh& mesh, std::size_t uv_set);
 
+/// The tangents of a mesh that had them derived, in another shape, which has none yet.
+std::vector<Tangent> tangents_of(const TriangleMesh& mesh, const MeshShape& shape);
+
 }  // namespace baton

@@ -164,7 +164,7 @@ TEST(Accel, MovedInstancesAreWhereAFreshSceneHasThem) {
   moved[1].normal_to_world = moved[1].to_world.linear;
   moved[2].to_world = {rotation_about({0, 1, 0}, 20), {-0.4f, 2.1f, 0.3f}};
   moved[2].normal_to_world = moved[2].to_world.linear;
-  const auto placed = rest->place(moved);
+  const auto placed = rest->place(moved, {});
   ASSERT_TRUE(placed) << placed.error().message;
 
   Scene flat = scene;

@@ -7,6 +7,7 @@
 
 #include "common/image/cryptomatte.h"
 #include "common/job/aov.h"
+#include "tests/support/alive_box.h"
 #include "tests/support/render_tiled.h"
 #include "worker/scene/camera.h"
 
@@ -31,6 +32,7 @@ TEST(GeometryPlanes, SameBytesForAnyTiling) {
   job.quality.sweeps = 2;
   for (const bool moves : {false, true}) {
     if (moves) test::set_in_motion(job, true, true);
+    if (moves) test::set_deforming(job, 0.7f, 0.5f);
     const std::vector<FilmTile> whole = render_tiled(job, 4096, 3);
     EXPECT_EQ(render_tiled(job, 5, 1), whole);
   }
@@ -86,6 +88,33 @@ TEST(GeometryPlanes, MotionIsInPixelsToTheNextFrameAndTheLast) {
     EXPECT_NEAR(channel(film, "forward.u")[i], moved, 2e-3) << i;
     EXPECT_NEAR(channel(film, "backward.u")[i], -moved, 2e-3) << i;
     EXPECT_NEAR(channel(film, "forward.v")[i], 0, 2e-3) << i;
+  }
+}
+
+// From 8 above a pixel is 0.1 wide on the ground. Frames 0 and 3 are no frames of the job.
+TEST(GeometryPlanes, MotionOfASheetThatStretches) {
+  JobSpec job = geometry_job(2);
+  job.image = {.width = 32, .height = 24, .sites = 1, .tile_size = 4096};
+  job.camera = {.position = {0, 8, 0},
+                .look_at = {0, 0, 0},
+                .up = {0, 0, -1},
+                .vertical_fov_deg = 2 * std::atan(1.2f / 8) * 180 / kPi};
+  job.quality.rounds = 1;
+  job.motion.max_px = 8;
+  test::show_stretching_sheet(job);
+  const std::vector<FilmTile> films = render_tile(job).films;
+  for (int frame = 1; frame <= 2; ++frame) {
+    const FilmTile& film = films.at(static_cast<std::size_t>(frame - 1));
+    int on_sheet = 0;
+    for (std::size_t i = 0; i < film.num_pixels(); ++i) {
+      const float along = (channel(film, "P.X")[i] + 0.6f) / 0.1f;
+      const bool sheet = channel(film, "object")[i] == 1;
+      on_sheet += sheet ? 1 : 0;
+      EXPECT_NEAR(channel(film, "forward.u")[i], sheet && frame == 1 ? along : 0, 0.03f) << i;
+      EXPECT_NEAR(channel(film, "backward.u")[i], sheet && frame == 2 ? -along / 2 : 0, 0.03f) << i;
+      EXPECT_NEAR(channel(film, "forward.v")[i], 0, 2e-3) << i;
+    }
+    EXPECT_EQ(on_sheet, 36 * frame);
   }
 }
 

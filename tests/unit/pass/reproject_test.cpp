@@ -5,6 +5,7 @@
 #include <cmath>
 #include <functional>
 
+#include "tests/support/alive_box.h"
 #include "tests/support/small_scene.h"
 
 namespace baton {
@@ -14,10 +15,17 @@ namespace {
 /// 16 particles spread over the sites: what `take` returns tells where it came from.
 class Follower {
  public:
-  explicit Follower(const JobSpec& job) : context_(*load_render_context(job, Digest{1, 2})) {
+  /// believes_rigid: points are looked for as if no mesh had another shape in the frame before.
+  explicit Follower(const JobSpec& job, bool believes_rigid = false)
+      : context_(*load_render_context(job, Digest{1, 2})) {
     const PixelRect rect = context_->grid.rect(0);
     before_ = *context_->geometry->at(0);
     now_ = *context_->geometry->at(1);
+    if (believes_rigid) {
+      auto planted = std::make_shared<FrameGeometry>(*before_);
+      planted->pose.shapes = now_->pose.shapes;
+      before_ = planted;
+    }
     surfaces_ = trace_primary(context_->job, *now_, rect);
     const TileSurfaces old = trace_primary(context_->job, *before_, rect);
     auto state = std::make_shared<SampleState>();
@@ -224,6 +232,31 @@ TEST(Reprojection, TolerancesDecideWhatIsTheSameSurface) {
   job.motion.normal_tolerance_deg = 0.1f;
   job.motion.depth_tolerance = 1e-3f;
   EXPECT_EQ(Follower(job).at(16, 12).history, PixelHistory::moved);
+}
+
+JobSpec stretching_job() {
+  JobSpec job = ground_job(1);
+  test::show_stretching_sheet(job);
+  job.motion.max_px = 6;
+  return job;
+}
+
+TEST(Reprojection, ADeformingSurfaceIsFollowedOnItsTriangles) {
+  const Follower sheet(stretching_job());
+  const Follower rigid(stretching_job(), true);
+  int missed = 0;
+  for (int y = 10; y < 14; ++y) {
+    for (int x = 10; x < 22; ++x) {
+      ASSERT_EQ(sheet.hits(x, y)[0].instance, 0u);
+      EXPECT_EQ(sheet.at(x, y).history, PixelHistory::moved);
+      EXPECT_EQ(sheet.source_x(x, y), 10 + (x - 10) / 2) << x;
+      missed +=
+          rigid.at(x, y).history == PixelHistory::none || rigid.source_x(x, y) != 10 + (x - 10) / 2;
+    }
+  }
+  // Looked for where it is now, it is found where it has not moved alone.
+  EXPECT_EQ(missed, 4 * 11);
+  EXPECT_EQ(sheet.at(3, 3).history, PixelHistory::same);
 }
 
 }  // namespace

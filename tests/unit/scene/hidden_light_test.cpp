@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "tests/support/alive_box.h"
 #include "tests/support/image_files.h"
 #include "tests/support/small_scene.h"
 #include "worker/scene/pose.h"
@@ -67,6 +68,15 @@ TEST(HiddenLight, IsThatOfEachFrame) {
                      {.frame = 20, .position = {0, -1, 4}, .look_at = {0, 0, 0}}};
   EXPECT_NEAR(degrees(9), 60, 1e-3f);
   EXPECT_EQ(degrees(20), 0) << "the camera has dived";
+}
+
+TEST(HiddenLight, IsThatOfWhatHasGrown) {
+  JobSpec job = test::box_job();
+  const float rest = hidden(job).angle;
+  job.frames = test::frame_numbers(4);
+  test::set_deforming(job, 0, 9);
+  EXPECT_EQ(hidden(job, 1).angle, rest);
+  EXPECT_LT(hidden(job, 4).angle, rest);
 }
 
 TEST(HiddenLight, TurnsWithTheMap) {

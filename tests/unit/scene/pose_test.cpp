@@ -69,13 +69,15 @@ TEST(Pose, PointsAndNormalsAreCarriedWithTheirObject) {
   job.scene.objects[0].keys[1].scale = {2, 1, 1};
   const auto scene = load_scene(job);
   ASSERT_TRUE(scene.ok());
-  const Instance from = pose_at(*scene, job, 2).instances[0];
-  const Instance to = pose_at(*scene, job, 1).instances[0];
+  const Pose now = pose_at(*scene, job, 2), before = pose_at(*scene, job, 1);
+  const Instance &from = now.instances[0], &to = before.instances[0];
   const Vec3 local{0.3f, -0.2f, 0.4f};
-  expect_near(carry_point(from, to, from.to_world.point(local)), to.to_world.point(local));
+  expect_near(carry_point(*scene, now, before, {.world = from.to_world.point(local)}),
+              to.to_world.point(local));
   const Vec3 normal = normalize({0.2f, 0.9f, -0.4f});
-  expect_near(carry_normal(from, to, normalize(from.normal_to_world * normal)),
-              normalize(to.normal_to_world * normal));
+  expect_near(
+      carry_normal(*scene, now, before, {.world = normalize(from.normal_to_world * normal)}),
+      normalize(to.normal_to_world * normal));
 }
 
 TEST(SettleMotion, MeasuresTheLargestStepInTheImage) {

@@ -46,17 +46,38 @@ struct Accessor {
   Sparse sparse;
 };
 
+/// What a morph target adds, as accessors.
+struct MorphTarget {
+  int positions = -1, normals = -1, tangents = -1;
+};
+
+/// Four joints of each vertex and their weights, as accessors.
+struct JointSet {
+  int joints = -1, weights = -1;
+};
+
 struct Primitive {
   int mode = 4;  ///< as OpenGL counts: 4 triangles, 5 strip, 6 fan; others have no surface
   int material = -1;
   int indices = -1, positions = -1, normals = -1, tangents = -1;  ///< accessors
   std::array<int, 2> uvs{-1, -1};                                 ///< accessors of sets 0 and 1
-  bool colored = false, morphed = false;  ///< has vertex colours, morph targets
+  std::vector<JointSet> joint_sets{};  ///< JOINTS_0 with WEIGHTS_0 and so on
+  std::vector<MorphTarget> targets{};
+  bool colored = false;      ///< has vertex colours
+  bool morphs_more = false;  ///< has targets of attributes that are not read
 };
 
 struct Mesh {
   std::string name;
-  std::vector<Primitive> primitives;
+  std::vector<Primitive> primitives;  ///< all with as many targets
+  std::vector<double> weights;        ///< of the targets; as many, or none: zeros
+
+  std::size_t num_targets() const { return primitives.empty() ? 0 : primitives[0].targets.size(); }
+};
+
+struct Skin {
+  std::vector<int> joints;  ///< nodes, no two alike, at least one
+  int inverse_binds = -1;   ///< accessor of one matrix for each; -1: identities
 };
 
 /// Row-major 3 x 4.
@@ -72,6 +93,7 @@ struct Node {
   std::array<double, 3> translation{0, 0, 0};
   std::array<double, 4> rotation{0, 0, 0, 1};  ///< x, y, z, w
   std::array<double, 3> scale{1, 1, 1};
+  std::vector<double> weights{};  ///< of its mesh's targets; as many, or none: those of the mesh
 };
 
 struct Camera {
@@ -141,6 +163,7 @@ struct Document {
   std::vector<Accessor> accessors;
   std::vector<Mesh> meshes;
   std::vector<Node> nodes;
+  std::vector<Skin> skins;
   std::vector<int> roots;  ///< nodes of the scene that is shown
   std::vector<Camera> cameras;
   std::vector<Channel> channels;  ///< of all animations, in the order of the file
@@ -149,6 +172,10 @@ struct Document {
   std::vector<Image> images;
   std::vector<std::string> extensions_used;
 
+  /// The mesh of a node that has one.
+  const Mesh& mesh_of(const Node& node) const {
+    return meshes[static_cast<std::size_t>(node.mesh)];
+  }
   /// What image `image` is: bytes of this file, else nothing and Image::file.
   ByteView bytes_of_image(std::size_t image) const;
 

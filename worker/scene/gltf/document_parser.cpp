@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <array>
 #include <optional>
+#include <set>
 
 namespace baton::gltf {
 namespace {
@@ -81,6 +82,29 @@ Accessor parse_accessor(const JsonView& accessor, std::size_t num_views) {
   return read;
 }
 
+/// Both of a set, and no set without the ones before it.
+std::vector<JointSet> parse_joint_sets(const JsonView& attributes, std::size_t num_accessors) {
+  std::vector<JointSet> sets;
+  while (true) {
+    const std::string number = std::to_string(sets.size());
+    const std::string joints = "JOINTS_" + number, weights = "WEIGHTS_" + number;
+    const bool has_joints = attributes.has(joints.c_str());
+    if (has_joints != attributes.has(weights.c_str()))
+      attributes.fail("expected " + joints + " and " + weights + ", or neither");
+    if (!has_joints || !attributes.has(weights.c_str())) return sets;
+    sets.push_back({attributes.index(joints.c_str(), num_accessors),
+                    attributes.index(weights.c_str(), num_accessors)});
+  }
+}
+
+/// weights: of `owner`, of as many morph targets, or none.
+void check_weights(const JsonView& owner, const std::vector<double>& weights,
+                   std::size_t num_targets) {
+  if (weights.empty() || weights.size() == num_targets) return;
+  owner.at("weights").fail("expected one for each of " + std::to_string(num_targets) +
+                           " morph targets, got " + std::to_string(weights.size()));
+}
+
 Primitive parse_primitive(const JsonView& primitive, std::size_t num_accessors,
                           std::size_t num_materials) {
   Primitive read;
@@ -94,7 +118,41 @@ Primitive parse_primitive(const JsonView& primitive, std::size_t num_accessors,
   read.uvs = {attributes.index("TEXCOORD_0", num_accessors),
               attributes.index("TEXCOORD_1", num_accessors)};
   read.colored = attributes.has("COLOR_0");
-  read.morphed = primitive.has("targets");
+  read.joint_sets = parse_joint_sets(attributes, num_accessors);
+  primitive.each("targets", [&](const JsonView& target) {
+    read.targets.push_back({.positions = target.index("POSITION", num_accessors),
+                            .normals = target.index("NORMAL", num_accessors),
+                            .tangents = target.index("TANGENT", num_accessors)});
+    const MorphTarget& t = read.targets.back();
+    const auto known = (t.positions >= 0) + (t.normals >= 0) + (t.tangents >= 0);
+    read.morphs_more = read.morphs_more || target.num_members() > static_cast<std::size_t>(known);
+  });
+  return read;
+}
+
+/// The primitives of a mesh have as many targets, and weights for them.
+Mesh parse_mesh(const JsonView& mesh, std::size_t num_accessors, std::size_t num_materials) {
+  Mesh read{mesh.text("name"), {}, mesh.all_numbers("weights")};
+  mesh.each("primitives", [&](const JsonView& primitive) {
+    read.primitives.push_back(parse_primitive(primitive, num_accessors, num_materials));
+    if (read.primitives.back().targets.size() != read.num_targets())
+      primitive.fail("expected " + std::to_string(read.num_targets()) +
+                     " morph targets as in the first primitive, got " +
+                     std::to_string(read.primitives.back().targets.size()));
+  });
+  check_weights(mesh, read.weights, read.num_targets());
+  return read;
+}
+
+Skin parse_skin(const JsonView& skin, std::size_t num_accessors, std::size_t num_nodes) {
+  Skin read;
+  read.inverse_binds = skin.index("inverseBindMatrices", num_accessors);
+  std::set<int> seen;
+  skin.each("joints", [&](const JsonView& joint) {
+    read.joints.push_back(joint.as_index(num_nodes));
+    if (!seen.insert(read.joints.back()).second) joint.fail("a joint of the skin already");
+  });
+  if (read.joints.empty()) skin.at("joints").fail("expected at least one joint");
   return read;
 }
 
@@ -118,6 +176,7 @@ Node parse_node(const JsonView& node, const NodeLimits& limits) {
   node.numbers("translation", read.translation);
   node.numbers("rotation", read.rotation);
   node.numbers("scale", read.scale);
+  read.weights = node.all_numbers("weights");
   return read;
 }
 
@@ -228,19 +287,20 @@ void parse_lists(const JsonView& root, Document& document) {
   });
   const std::size_t num_materials = count_of(root, "materials");
   root.each("meshes", [&](const JsonView& mesh) {
-    Mesh read{mesh.text("name"), {}};
-    mesh.each("primitives", [&](const JsonView& primitive) {
-      read.primitives.push_back(
-          parse_primitive(primitive, document.accessors.size(), num_materials));
-    });
-    document.meshes.push_back(std::move(read));
+    document.meshes.push_back(parse_mesh(mesh, document.accessors.size(), num_materials));
   });
   root.each("cameras",
             [&](const JsonView& camera) { document.cameras.push_back(parse_camera(camera)); });
   const NodeLimits limits{count_of(root, "nodes"), document.meshes.size(), document.cameras.size(),
                           count_of(root, "skins")};
-  root.each("nodes",
-            [&](const JsonView& node) { document.nodes.push_back(parse_node(node, limits)); });
+  root.each("nodes", [&](const JsonView& node) {
+    document.nodes.push_back(parse_node(node, limits));
+    const Node& read = document.nodes.back();
+    check_weights(node, read.weights, read.mesh < 0 ? 0 : document.mesh_of(read).num_targets());
+  });
+  root.each("skins", [&](const JsonView& skin) {
+    document.skins.push_back(parse_skin(skin, document.accessors.size(), limits.nodes));
+  });
   link_parents(root, document.nodes);
   parse_scene(root, document);
   root.each("animations", [&](const JsonView& a) { parse_animation(a, document); });

@@ -94,6 +94,14 @@ int JsonView::required_index(const char* key, std::size_t count) const {
   return index(key, count);
 }
 
+std::vector<double> JsonView::all_numbers(const char* key) const {
+  const JsonView member = at(key);
+  if (!member.is_list()) return {};
+  std::vector<double> values(member.value_->size());
+  numbers(key, values);
+  return values;
+}
+
 bool JsonView::numbers(const char* key, std::span<double> values) const {
   const JsonView member = at(key);
   if (!member) return false;

@@ -6,6 +6,7 @@
 #include <span>
 #include <string>
 #include <string_view>
+#include <vector>
 
 namespace baton::gltf {
 
@@ -23,6 +24,10 @@ class JsonView {
   explicit operator bool() const { return value_ != nullptr; }
   const std::string& place() const { return place_; }
   bool has(const char* key) const { return find(key) != nullptr; }
+  /// Members of an object.
+  std::size_t num_members() const {
+    return value_ != nullptr && value_->is_object() ? value_->size() : 0;
+  }
 
   /// A member of an object; nothing where it is not there.
   JsonView at(const char* key) const;
@@ -53,6 +58,8 @@ class JsonView {
   /// This value itself as a text, as an index.
   std::string as_text() const;
   int as_index(std::size_t count) const;
+  /// A list of finite numbers; empty where the key is missing or at fault.
+  std::vector<double> all_numbers(const char* key) const;
   /// As many finite numbers as `values` has; false where the key is missing or at fault.
   bool numbers(const char* key, std::span<double> values) const;
 

@@ -3,111 +3,15 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cmath>
-#include <numeric>
+#include <set>
 
 #include "common/math/inverse.h"
-#include "worker/scene/gltf/accessor.h"
-#include "worker/scene/gltf/node_motion.h"
+#include "worker/scene/gltf/shaper.h"
+#include "worker/scene/gltf/vertices.h"
 #include "worker/scene/mesh_builder.h"
 
 namespace baton::gltf {
 namespace {
-
-constexpr int kTriangles = 4, kStrip = 5, kFan = 6;
-
-/// What lies in the accessors of a primitive.
-struct Vertices {
-  std::vector<float> positions, normals;  ///< (vertices, 3); normals may be empty
-  std::vector<float> tangents;            ///< (vertices, 4), or empty
-  std::array<std::vector<float>, 2> uvs;  ///< (vertices, 2), or empty
-  std::vector<std::uint32_t> corners;     ///< (triangles, 3)
-};
-
-bool all_finite(const std::vector<float>& values) {
-  return std::all_of(values.begin(), values.end(), [](float v) { return std::isfinite(v); });
-}
-
-Vec3 vec3_at(const std::vector<float>& values, std::size_t i) {
-  return {values[3 * i], values[3 * i + 1], values[3 * i + 2]};
-}
-
-/// Corners of triangles from a list, a strip or a fan; of other modes nothing.
-std::vector<std::uint32_t> triangles_of(const std::vector<std::uint32_t>& indices, int mode) {
-  std::vector<std::uint32_t> corners;
-  if (mode == kTriangles) {
-    corners.assign(indices.begin(),
-                   indices.end() - static_cast<std::ptrdiff_t>(indices.size() % 3));
-  }
-  for (std::size_t i = 0; mode != kTriangles && mode >= kStrip && i + 2 < indices.size(); ++i) {
-    if (mode == kFan) corners.insert(corners.end(), {indices[0], indices[i + 1], indices[i + 2]});
-    if (mode == kStrip)
-      corners.insert(corners.end(), {indices[i], indices[i + 1 + i % 2], indices[i + 2 - i % 2]});
-  }
-  return corners;
-}
-
-/// Reads a primitive with a surface. place: of the primitive in the file's JSON.
-Result<Vertices> read_vertices(const Document& document, const Primitive& primitive,
-                               const std::string& place) {
-  Vertices v;
-  if (primitive.positions < 0) return document.error(place + ": expected POSITION");
-  BATON_ASSIGN(v.positions, read_floats(document, primitive.positions, 3));
-  const std::size_t count = v.positions.size() / 3;
-  const auto attribute = [&](int accessor, int width, const char* name,
-                             std::vector<float>& values) -> Status {
-    if (accessor < 0) return {};
-    BATON_ASSIGN(values, read_floats(document, accessor, width));
-    if (values.size() == count * static_cast<std::size_t>(width)) return {};
-    return document.error(fmt::format("{}.{}: expected one for each of {} vertices, got {}", place,
-                                      name, count,
-                                      values.size() / static_cast<std::size_t>(width)));
-  };
-  BATON_TRY(attribute(primitive.normals, 3, "NORMAL", v.normals));
-  BATON_TRY(attribute(primitive.tangents, 4, "TANGENT", v.tangents));
-  BATON_TRY(attribute(primitive.uvs[0], 2, "TEXCOORD_0", v.uvs[0]));
-  BATON_TRY(attribute(primitive.uvs[1], 2, "TEXCOORD_1", v.uvs[1]));
-  if (!all_finite(v.positions))
-    return document.error(place + ": a vertex has a coordinate that is not finite");
-  if (!all_finite(v.uvs[0]) || !all_finite(v.uvs[1]))
-    return document.error(place + ": a vertex has texture coordinates that are not finite");
-
-  std::vector<std::uint32_t> indices(primitive.indices < 0 ? count : 0);
-  std::iota(indices.begin(), indices.end(), 0u);
-  if (primitive.indices >= 0) {
-    BATON_ASSIGN(indices, read_indices(document, primitive.indices));
-  }
-  for (const std::uint32_t index : indices) {
-    if (index >= count)
-      return document.error(
-          fmt::format("{}: expected a vertex index below {}, found {}", place, count, index));
-  }
-  v.corners = triangles_of(indices, primitive.mode);
-  return v;
-}
-
-/// Normals that are no directions are as good as none.
-bool has_usable_normals(const Vertices& v) {
-  if (v.normals.empty() || !all_finite(v.normals)) return false;
-  for (std::size_t i = 0; i < v.normals.size() / 3; ++i) {
-    if (!(length(vec3_at(v.normals, i)) > 0)) return false;
-  }
-  return true;
-}
-
-Tangent tangent_at(const Vertices& v, std::size_t vertex) {
-  const float* const t = v.tangents.data() + 4 * vertex;
-  return {normalize({t[0], t[1], t[2]}), t[3] < 0 ? -1.0f : 1.0f};
-}
-
-/// Tangents count where normals do, as they lie at a right angle to them.
-bool has_usable_tangents(const Vertices& v) {
-  if (v.tangents.empty() || !has_usable_normals(v) || !all_finite(v.tangents)) return false;
-  for (std::size_t i = 0; i < v.tangents.size(); i += 4) {
-    if (!(length({v.tangents[i], v.tangents[i + 1], v.tangents[i + 2]}) > 0)) return false;
-  }
-  return true;
-}
 
 void add_triangles(const Vertices& v, const Matrix& to_file, const MeshParts& parts,
                    MeshBuilder& builder) {
@@ -130,47 +34,168 @@ void add_triangles(const Vertices& v, const Matrix& to_file, const MeshParts& pa
   }
 }
 
-/// Whether the file gives the primitive a normal map: other tangents would only part its vertices.
-bool is_bumpy(const Document& document, const Primitive& primitive) {
-  return primitive.material >= 0 &&
-         document.materials[static_cast<std::size_t>(primitive.material)].normal_texture.texture >=
-             0;
+/// A primitive of the file, its vertices and which of their parts are used.
+struct Opened {
+  Vertices vertices;
+  MeshParts parts;
+};
+
+Result<Opened> open_primitive(const Document& document, const MeshSpec& spec) {
+  const std::string place = place_of(spec.mesh, static_cast<std::size_t>(spec.primitive));
+  const auto m = static_cast<std::size_t>(spec.mesh), p = static_cast<std::size_t>(spec.primitive);
+  if (spec.mesh < 0 || m >= document.meshes.size() || spec.primitive < 0 ||
+      p >= document.meshes[m].primitives.size())
+    return document.error(place + ": not there");
+  const Primitive& primitive = document.meshes[m].primitives[p];
+  BATON_ASSIGN(Vertices v, read_vertices(document, primitive, place));
+  const bool with_normals = spec.smooth_normals && has_usable_normals(v);
+  const bool with_tangents =
+      with_normals && is_bumpy(document, primitive) && has_usable_tangents(v);
+  const MeshParts parts{with_normals, v.num_uv_sets(), with_tangents};
+  return Opened{std::move(v), parts};
 }
 
-int uv_sets_of(const Vertices& v) {
-  if (v.uvs[0].empty()) return 0;
-  return v.uvs[1].empty() ? 1 : 2;
+Error without_triangles(const Document& document, const MeshSpec& spec, std::uint64_t dropped) {
+  return document.error(fmt::format("{}: no triangles ({} without area)",
+                                    place_of(spec.mesh, static_cast<std::size_t>(spec.primitive)),
+                                    dropped));
 }
 
-std::string place_of(int mesh, std::size_t primitive) {
-  return fmt::format("$.meshes[{}].primitives[{}]", mesh, primitive);
+Result<TriangleMesh> built_mesh(const Document& document, const MeshSpec& spec,
+                                const Opened& opened) {
+  MeshBuilder builder(opened.parts);
+  add_triangles(opened.vertices, kIdentity, opened.parts, builder);
+  TriangleMesh result = builder.take();
+  if (result.triangles.empty()) return without_triangles(document, spec, result.dropped_triangles);
+  return result;
 }
 
-bool has_surface(const Primitive& primitive) {
-  return primitive.mode >= kTriangles && primitive.mode <= kFan;
+/// Puts what was shaped in the place of what was read.
+void take_shape(const MeshShape& shape, Vertices& v) {
+  const auto flat = [](const std::vector<Vec3>& vectors, std::vector<float>& numbers) {
+    if (vectors.empty()) return;
+    numbers.clear();
+    for (const Vec3& p : vectors) numbers.insert(numbers.end(), {p.x, p.y, p.z});
+  };
+  flat(shape.positions, v.positions);
+  flat(shape.normals, v.normals);
+  for (std::size_t i = 0; i < shape.tangents.size(); ++i) {
+    const Tangent& t = shape.tangents[i];
+    const std::array<float, 4> numbers{t.direction.x, t.direction.y, t.direction.z, t.side};
+    std::copy(numbers.begin(), numbers.end(),
+              v.tangents.begin() + static_cast<std::ptrdiff_t>(4 * i));
+  }
+}
+
+/// A primitive that the animations of its file deform.
+class AnimatedShape final : public Deformation {
+ public:
+  AnimatedShape(std::shared_ptr<const NodeMotion> motion, const ShapeSpec& by, Shaper shaper)
+      : motion_(std::move(motion)), by_(by), shaper_(std::move(shaper)) {}
+
+  MeshShape at(double frame) const override {
+    const double seconds = by_.animation->seconds_at(frame);
+    return shaper_.shape(motion_->to_world(seconds), motion_->weights(by_.node, seconds));
+  }
+  std::uint64_t size_bytes() const override { return shaper_.size_bytes(); }
+
+ private:
+  const std::shared_ptr<const NodeMotion> motion_;  ///< meshes share it
+  const ShapeSpec by_;
+  const Shaper shaper_;
+};
+
+/// Vertices and triangles as the file lists them: those that are alike at rest may part.
+Result<TriangleMesh> deforming_mesh(const Document& document, const MeshSpec& spec, Opened opened,
+                                    std::shared_ptr<const Deformation> deformation) {
+  TriangleMesh mesh;
+  const std::vector<std::uint32_t>& corners = opened.vertices.corners;
+  for (std::size_t i = 0; i < corners.size(); i += 3) {
+    const std::array<std::uint32_t, 3> triangle{corners[i], corners[i + 1], corners[i + 2]};
+    if (std::set(triangle.begin(), triangle.end()).size() == 3) {
+      mesh.triangles.push_back(triangle);
+    } else {
+      ++mesh.dropped_triangles;
+    }
+  }
+  if (mesh.triangles.empty()) return without_triangles(document, spec, mesh.dropped_triangles);
+  for (std::size_t set = 0; set < static_cast<std::size_t>(opened.parts.uv_sets); ++set) {
+    for (std::size_t i = 0; i < opened.vertices.uvs[set].size(); i += 2)
+      mesh.uvs[set].push_back({opened.vertices.uvs[set][i], opened.vertices.uvs[set][i + 1]});
+  }
+  MeshShape first = deformation->at(spec.shaped_by->animation->start_frame);
+  mesh.positions = std::move(first.positions);
+  mesh.normals = std::move(first.normals);
+  mesh.tangents = std::move(first.tangents);
+  mesh.deformation = std::move(deformation);
+  return mesh;
 }
 
 }  // namespace
 
-Result<TriangleMesh> primitive_mesh(const Document& document, int mesh, int primitive,
-                                    bool smooth_normals) {
-  const std::string place = place_of(mesh, static_cast<std::size_t>(primitive));
-  const auto m = static_cast<std::size_t>(mesh), p = static_cast<std::size_t>(primitive);
-  if (mesh < 0 || m >= document.meshes.size() || primitive < 0 ||
-      p >= document.meshes[m].primitives.size())
-    return document.error(place + ": not there");
-  BATON_ASSIGN(const Vertices v, read_vertices(document, document.meshes[m].primitives[p], place));
-  const bool with_normals = smooth_normals && has_usable_normals(v);
-  const bool with_tangents = with_normals && is_bumpy(document, document.meshes[m].primitives[p]) &&
-                             has_usable_tangents(v);
-  const MeshParts parts{with_normals, uv_sets_of(v), with_tangents};
-  MeshBuilder builder(parts);
-  add_triangles(v, kIdentity, parts, builder);
-  TriangleMesh result = builder.take();
-  if (result.triangles.empty())
-    return document.error(
-        fmt::format("{}: no triangles ({} without area)", place, result.dropped_triangles));
-  return result;
+Shaping shaping_of(const NodeMotion& motion, int node) {
+  const Document& document = motion.document();
+  const Node& given = document.nodes[static_cast<std::size_t>(node)];
+  if (given.mesh < 0) return Shaping::none;
+  bool moves = motion.morphs(node);
+  if (given.skin >= 0) {
+    const std::vector<int>& joints = document.skins[static_cast<std::size_t>(given.skin)].joints;
+    moves = moves || std::ranges::any_of(joints, [&](int joint) { return motion.moves(joint); });
+  }
+  if (moves) return Shaping::animated;
+  const std::vector<double> weights = NodeMotion::weights_at_rest(document, node);
+  const bool rests = std::ranges::all_of(weights, [](double weight) { return weight == 0; });
+  return given.skin >= 0 || !rests ? Shaping::at_rest : Shaping::none;
+}
+
+Result<TriangleMesh> primitive_mesh(const Document& document, const MeshSpec& spec) {
+  BATON_ASSIGN(const Opened opened, open_primitive(document, spec));
+  return built_mesh(document, spec, opened);
+}
+
+Result<TriangleMesh> shaped_mesh(const Document& document, std::shared_ptr<const NodeMotion> motion,
+                                 const MeshSpec& spec) {
+  const ShapeSpec& by = *spec.shaped_by;
+  const auto node = static_cast<std::size_t>(by.node);
+  if (node >= document.nodes.size() || document.nodes[node].mesh != spec.mesh)
+    return document.error(fmt::format("expected a node that shows mesh {}, which node {} does not",
+                                      spec.mesh, by.node));
+  BATON_ASSIGN(Opened opened, open_primitive(document, spec));
+  BATON_ASSIGN(Shaper shaper,
+               Shaper::read(document, by.node, static_cast<std::size_t>(spec.primitive),
+                            opened.vertices, opened.parts.normals, opened.parts.tangents));
+  if (by.animation)
+    return deforming_mesh(
+        document, spec, std::move(opened),
+        std::make_shared<const AnimatedShape>(std::move(motion), by, std::move(shaper)));
+  take_shape(shaper.shape(motion->at_rest(), NodeMotion::weights_at_rest(document, by.node)),
+             opened.vertices);
+  return built_mesh(document, spec, opened);
+}
+
+void place(const std::vector<PlacedNode>& places, NodeMotion& motion) {
+  for (const PlacedNode& placed : places) {
+    Matrix local;
+    std::copy(placed.matrix.begin(), placed.matrix.end(), local.begin());
+    motion.place(placed.node, local);
+  }
+}
+
+Result<std::shared_ptr<const NodeMotion>> MotionCache::get(
+    const std::shared_ptr<const Document>& document, const std::vector<PlacedNode>& places) {
+  for (const Entry& entry : entries_) {
+    if (entry.document == document && entry.places == places) return entry.motion;
+  }
+  BATON_ASSIGN(NodeMotion motion, NodeMotion::read(document));
+  for (const PlacedNode& placed : places) {
+    if (static_cast<std::size_t>(placed.node) >= document->nodes.size())
+      return document->error(fmt::format("expected places of nodes below {}, got node {}",
+                                         document->nodes.size(), placed.node));
+  }
+  place(places, motion);
+  motion.let_go_of_buffers();
+  entries_.push_back({document, places, std::make_shared<const NodeMotion>(std::move(motion))});
+  return entries_.back().motion;
 }
 
 Result<TriangleMesh> whole_mesh(const Document& document, bool smooth_normals) {
@@ -185,12 +210,19 @@ Result<TriangleMesh> whole_mesh(const Document& document, bool smooth_normals) {
     const int mesh = document.nodes[static_cast<std::size_t>(node)].mesh;
     if (mesh < 0) continue;
     const Mesh& given = document.meshes[static_cast<std::size_t>(mesh)];
+    const Matrix& to_file = document.nodes[static_cast<std::size_t>(node)].skin >= 0
+                                ? kIdentity
+                                : to_world[static_cast<std::size_t>(node)];
     for (std::size_t p = 0; p < given.primitives.size(); ++p) {
       if (!has_surface(given.primitives[p])) continue;
       BATON_ASSIGN(Vertices v, read_vertices(document, given.primitives[p], place_of(mesh, p)));
+      BATON_ASSIGN(const Shaper shaper,
+                   Shaper::read(document, node, p, v, has_usable_normals(v), false));
+      if (!shaper.is_idle())
+        take_shape(shaper.shape(to_world, NodeMotion::weights_at_rest(document, node)), v);
       common.normals = common.normals && has_usable_normals(v);
-      common.uv_sets = std::min(common.uv_sets, uv_sets_of(v));
-      parts.push_back({std::move(v), to_world[static_cast<std::size_t>(node)]});
+      common.uv_sets = std::min(common.uv_sets, v.num_uv_sets());
+      parts.push_back({std::move(v), to_file});
     }
   }
   MeshBuilder builder(common);

@@ -84,11 +84,24 @@ Matrix rest_of(const Node& node) {
   return node.has_matrix ? node.matrix : compose(node.translation, unit(node.rotation), node.scale);
 }
 
+/// Numbers a time of what a channel moves.
+Result<std::size_t> width_of(const Document& document, const Channel& channel) {
+  if (channel.path == Path::rotation) return std::size_t{4};
+  if (channel.path != Path::weights) return std::size_t{3};
+  const Node& node = document.nodes[static_cast<std::size_t>(channel.node)];
+  const std::size_t width = node.mesh < 0 ? 0 : document.mesh_of(node).num_targets();
+  if (width > 0) return width;
+  return document.error(fmt::format(
+      "$.nodes[{}]: its weights are animated, expected a mesh with morph targets", channel.node));
+}
+
 Result<Curve> read_curve(const Document& document, const Channel& channel) {
-  const int width = channel.path == Path::rotation ? 4 : 3;
+  BATON_ASSIGN(const std::size_t width, width_of(document, channel));
   Curve curve{channel.interpolation, {}, {}};
   BATON_ASSIGN(curve.times, read_floats(document, channel.input, 1));
-  BATON_ASSIGN(curve.values, read_floats(document, channel.output, width));
+  BATON_ASSIGN(curve.values,
+               read_floats(document, channel.output,
+                           channel.path == Path::weights ? 1 : static_cast<int>(width)));
   const auto finite = [](float v) { return std::isfinite(v); };
   if (!std::all_of(curve.times.begin(), curve.times.end(), finite) ||
       std::adjacent_find(curve.times.begin(), curve.times.end(), std::greater_equal<>()) !=
@@ -97,7 +110,7 @@ Result<Curve> read_curve(const Document& document, const Channel& channel) {
     return document.error(fmt::format(
         "$.accessors[{}]: expected the ascending times of an animation", channel.input));
   const std::size_t rows = channel.interpolation == Interpolation::cubic_spline ? 3 : 1;
-  const std::size_t expected = curve.times.size() * rows * static_cast<std::size_t>(width);
+  const std::size_t expected = curve.times.size() * rows * width;
   if (curve.values.size() != expected ||
       !std::all_of(curve.values.begin(), curve.values.end(), finite))
     return document.error(
@@ -112,6 +125,13 @@ std::array<double, 3> Curve::vector_at(double seconds) const {
   const Span span = find_span(times, seconds);
   std::array<double, 3> v{};
   for (std::size_t c = 0; c < 3; ++c) v[c] = component_at(*this, span, 3, c);
+  return v;
+}
+
+std::vector<double> Curve::values_at(double seconds, std::size_t width) const {
+  const Span span = find_span(times, seconds);
+  std::vector<double> v;
+  for (std::size_t c = 0; c < width; ++c) v.push_back(component_at(*this, span, width, c));
   return v;
 }
 
@@ -135,19 +155,29 @@ Result<NodeMotion> NodeMotion::read(std::shared_ptr<const Document> document) {
   const Document& file = *motion.document_;
   motion.curves_.resize(file.nodes.size());
   for (const Channel& channel : file.channels) {
-    if (channel.path == Path::weights) continue;
     Moved& moved = motion.curves_[static_cast<std::size_t>(channel.node)];
     std::optional<Curve>& curve = channel.path == Path::translation ? moved.translation
                                   : channel.path == Path::rotation  ? moved.rotation
-                                                                    : moved.scale;
+                                  : channel.path == Path::scale     ? moved.scale
+                                                                    : moved.weights;
     if (curve) continue;
     BATON_ASSIGN(curve, read_curve(file, channel));
-    if (file.nodes[static_cast<std::size_t>(channel.node)].has_matrix)
+    if (channel.path != Path::weights &&
+        file.nodes[static_cast<std::size_t>(channel.node)].has_matrix)
       return file.error(fmt::format("$.nodes[{}]: is animated, expected no matrix", channel.node));
   }
   motion.order_ = parents_first(file);
   motion.find_what_moves();
   return motion;
+}
+
+void NodeMotion::let_go_of_buffers() {
+  auto rest = std::make_shared<Document>();
+  rest->path = document_->path;
+  rest->meshes = document_->meshes;
+  rest->nodes = document_->nodes;
+  rest->skins = document_->skins;
+  document_ = std::move(rest);
 }
 
 void NodeMotion::find_what_moves() {
@@ -193,9 +223,29 @@ std::vector<Matrix> NodeMotion::to_world(double seconds) const {
   return chain(*document_, order_, [&](std::size_t node) { return local(node, seconds); });
 }
 
+std::vector<Matrix> NodeMotion::at_rest() const {
+  return chain(*document_, order_, [&](std::size_t node) {
+    return curves_[node].placed.value_or(rest_of(document_->nodes[node]));
+  });
+}
+
 std::vector<Matrix> NodeMotion::at_rest(const Document& document) {
   return chain(document, parents_first(document),
                [&](std::size_t node) { return rest_of(document.nodes[node]); });
+}
+
+std::vector<double> NodeMotion::weights(int node, double seconds) const {
+  const std::optional<Curve>& curve = curves_[static_cast<std::size_t>(node)].weights;
+  if (!curve) return weights_at_rest(*document_, node);
+  return curve->values_at(
+      seconds, document_->mesh_of(document_->nodes[static_cast<std::size_t>(node)]).num_targets());
+}
+
+std::vector<double> NodeMotion::weights_at_rest(const Document& document, int node) {
+  const Node& given = document.nodes[static_cast<std::size_t>(node)];
+  if (!given.weights.empty()) return given.weights;
+  const Mesh& mesh = document.mesh_of(given);
+  return mesh.weights.empty() ? std::vector<double>(mesh.num_targets()) : mesh.weights;
 }
 
 }  // namespace baton::gltf

@@ -63,6 +63,7 @@ class Geometry:
         self.shapes = {}
         self.meshes = {}     # by what they were made of, in the first frame
         self.witnesses = {}  # vertices in the first frame of what may deform
+        self.poses = {}      # of the mesh of a witness that does: frame by frame, None where it is as in the first one
         self.first = set()   # keys of the first frame
         self.frames = 0
 
@@ -82,13 +83,15 @@ class Geometry:
                 mesh = self.mesh_of(key, shown, depsgraph)
                 if mesh is not None:
                     self.shapes[key] = Shape(shown.name, mesh)
-            elif key in self.witnesses:
+            elif key in self.witnesses and key in self.shapes:
                 self.compare(key, shown, depsgraph)
             if key in self.shapes:
                 self.shapes[key].matrices.append(instance.matrix_world.copy())
             elif key not in self.first:
                 self.report.add(where(key), "it is not there in the first frame, and never shown",
                                 "hide nothing within a shot: export frames before and after as two jobs")
+        for poses in self.poses.values():
+            poses += [None] * (self.frames + 1 - len(poses))
         for key, shape in self.shapes.items():
             if key not in seen:
                 shape.matrices.append(shape.matrices[-1])
@@ -117,11 +120,16 @@ class Geometry:
 
     def compare(self, key, shown, depsgraph):
         before, now = self.witnesses[key], vertices_of(shown, depsgraph, is_made_by_nodes(key))
-        largest = float(numpy.abs(before).max(initial=1e-9))
-        if before.shape != now.shape or float(numpy.abs(now - before).max(initial=0)) > DEFORMATION * largest:
-            self.report.add(where(key), "it deforms, but is shown as in the first frame",
-                            "move it as a whole, or render each shape as a job of its own")
+        if before.shape != now.shape:
+            self.report.add(where(key), "its vertices are others in each frame, but it is shown as in the first one",
+                            "render each shape as a job of its own")
+            self.poses.pop(self.shapes[key].mesh, None)
             del self.witnesses[key]
+            return
+        largest = float(numpy.abs(before).max(initial=1e-9))
+        if float(numpy.abs(now - before).max(initial=0)) > DEFORMATION * largest:
+            poses = self.poses.setdefault(self.shapes[key].mesh, [None] * self.frames)
+            poses.append(now)
 
 
 def where(key):

@@ -55,7 +55,8 @@ class Glb:
         return len(accessors) - 1
 
     def animate(self, name, tracks, times):
-        """Appends an animation. tracks: (node index, path, one row for each time), linear between them."""
+        """Appends an animation. tracks: (node index, path, one row for each time, of weights one for each time and target),
+        linear between them."""
         if not tracks:
             return
         clock = self.add_floats([[time] for time in times])
@@ -80,3 +81,14 @@ def tracks_of(node, places, tolerance=1e-7):
         if any(abs(a - b) > tolerance * largest for row in rows for a, b in zip(row, rows[0])):
             tracks.append((node, path, rows))
     return tracks
+
+
+def frames_of_targets(poses):
+    """The frames that have a morph target: those with a pose other than the first frame's."""
+    return [frame for frame, pose in enumerate(poses) if pose is not None]
+
+
+def weights_of(poses):
+    """Rows of a track of weights: frame by frame one for each target, 1 in its frame. In between one goes over into the next."""
+    targets = frames_of_targets(poses)
+    return [[1.0 if target == frame else 0.0] for frame in range(len(poses)) for target in targets]

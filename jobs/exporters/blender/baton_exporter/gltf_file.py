@@ -1,10 +1,11 @@
 """Writes the shapes as a .glb by Blender's own exporter, then their motion; runs inside Blender."""
 
 import bpy
+import numpy
 from mathutils import Matrix
 
 from . import gltf_materials
-from .glb import Glb, tracks_of
+from .glb import Glb, frames_of_targets, tracks_of, weights_of
 
 SHEAR = 1e-4
 
@@ -14,10 +15,14 @@ def write(path, geometry, frames, fps, diffuse, report):
 
     The job's materials for those named in `diffuse`, which glTF says less exactly."""
     shapes = list(geometry.shapes.values())
-    names = put_in_scene(shapes, report)
+    names = put_in_scene(shapes, geometry.poses, report)
+    for mesh in dict.fromkeys(shape.mesh for shape in shapes):
+        if mesh in geometry.poses:
+            add_targets(mesh, geometry.poses[mesh])
     bpy.ops.export_scene.gltf(filepath=str(path), export_format="GLB", use_active_scene=True, export_yup=True,
                               export_animations=False, export_cameras=False, export_lights=False, export_skins=False,
-                              export_morph=False, export_apply=False, export_colors=False, export_extras=False)
+                              export_morph=True, export_morph_normal=True, export_morph_tangent=False, export_apply=False,
+                              export_colors=False, export_extras=False)
     file = Glb.read(path)
     nodes = {node["name"]: index for index, node in enumerate(file.document.get("nodes", []))}
     missing = [name for name in names if name not in nodes]
@@ -27,6 +32,8 @@ def write(path, geometry, frames, fps, diffuse, report):
     for name, shape in zip(names, shapes):
         if is_moving(shape):
             tracks += tracks_of(nodes[name], [gltf_place(matrix) for matrix in shape.matrices])
+        if shape.mesh in geometry.poses:
+            tracks.append((nodes[name], "weights", weights_of(geometry.poses[shape.mesh])))
     file.animate("shot", tracks, [frame / fps for frame in frames])
     gltf_materials.mend(file.document)
     file.write(path)
@@ -55,8 +62,22 @@ def is_sheared(matrix):
                for a, b in zip(row, other))
 
 
-def put_in_scene(shapes, report):
-    """A scene of its own, without parents; the names of the objects."""
+def add_targets(mesh, poses):
+    """A shape key for each frame in which the mesh is another than in the first one."""
+    holder = next(item for item in bpy.context.scene.objects if item.data == mesh)
+    holder.shape_key_add(name="first")
+    for frame in frames_of_targets(poses):
+        key = holder.shape_key_add(name=f"frame {frame}", from_mix=False)
+        key.data.foreach_set("co", poses[frame].ravel())
+
+
+def transformed(matrix, places):
+    rows = numpy.array(matrix)
+    return (places @ rows[:3, :3].T + rows[:3, 3]).astype(numpy.float32)
+
+
+def put_in_scene(shapes, poses, report):
+    """A scene of its own, without parents; the names of the objects. poses: of meshes (geometry.py)."""
     for item in bpy.data.objects:
         if item.library:
             continue
@@ -73,6 +94,9 @@ def put_in_scene(shapes, report):
             else:
                 mesh = mesh.copy()
                 mesh.transform(matrix)
+                if shape.mesh in poses:
+                    poses[mesh] = [None if pose is None else transformed(matrix, pose) for pose in poses[shape.mesh]]
+                shape.mesh = mesh
                 if matrix.is_negative:
                     mesh.flip_normals()
                 matrix = Matrix.Identity(4)
