@@ -2,6 +2,7 @@
 
 #include "common/base/limits.h"
 #include "common/job/job_fields.h"
+#include "common/job/udim.h"
 
 namespace baton {
 namespace {
@@ -11,6 +12,22 @@ void pair(JobArchive& a, Key key, std::array<float, 2>& value, NumberRange range
   std::array<double, 2> numbers{decimal(value[0]), decimal(value[1])};
   if (!a.numbers(key, numbers, range, lone)) return;
   value = {static_cast<float>(numbers[0]), static_cast<float>(numbers[1])};
+}
+
+/// Of a file name with <UDIM>.
+void check_tiles(JobArchive& a, const TextureSpec& texture) {
+  const std::string& file = texture.file;
+  const std::size_t at = file.find(kTileMark);
+  if (at == std::string::npos) return;
+  const bool is_lone = file.find(kTileMark, at + 1) == std::string::npos;
+  if (is_gltf(file) || !is_lone || file.find('/', at) != std::string::npos)
+    a.fault("file", fmt::format("{} at most once, in the name of an image", kTileMark),
+            fmt::format("\"{}\"", file));
+  if (texture.wrap_u != TextureWrap::repeat || texture.wrap_v != TextureWrap::repeat)
+    a.fault("wrapU",
+            fmt::format("no wrapU and wrapV beside {}, whose tiles end at their edges", kTileMark),
+            std::string(kTextureWraps.at(static_cast<std::size_t>(
+                texture.wrap_u != TextureWrap::repeat ? texture.wrap_u : texture.wrap_v))));
 }
 
 void fields(JobArchive& a, TextureSpec& texture, bool is_normal_map) {
@@ -28,6 +45,7 @@ void fields(JobArchive& a, TextureSpec& texture, bool is_normal_map) {
   a.choice("wrapU", texture.wrap_u, kTextureWraps);
   a.choice("wrapV", texture.wrap_v, kTextureWraps);
   a.choice("filter", texture.filter, kTextureFilters);
+  check_tiles(a, texture);
   if (is_normal_map) a.number("strength", texture.strength, kCoordinateRange);
 }
 

@@ -36,9 +36,10 @@ enum class TextureFilter : std::uint8_t { linear, nearest };
 /// offset + R(rotate_deg) (scale * (u, v)), with (0, 0) its upper left corner, (1, 1) its lower
 /// right [KHR_texture_transform].
 struct TextureSpec {
-  std::string file;  ///< an image, or a .gltf or .glb file that holds one
-  int image = -1;    ///< of a .gltf or .glb file: place in its list of images; else -1
-  int uv = 0;        ///< set of texture coordinates, 0 or 1
+  /// An image, its tiles (udim.h), or a .gltf or .glb file that holds one.
+  std::string file;
+  int image = -1;  ///< of a .gltf or .glb file: place in its list of images; else -1
+  int uv = 0;      ///< set of texture coordinates, 0 or 1
   std::array<float, 2> offset{0, 0};
   std::array<float, 2> scale{1, 1};
   float rotate_deg = 0;  ///< counter-clockwise, of the coordinates

@@ -18,7 +18,16 @@ class Textures:
                 f"{at}.rotateDeg": lambda: self.pick(None, 33.0, -1e6), f"{at}.strength": lambda: self.pick(None, 0.4, 2.0)})
         return hands
 
+    def tiles(self):
+        """Four tiles of different sizes, and a ground that lies across their corners."""
+        for number in (1001, 1002, 1011, 1012):
+            self.files[f"tile.{number}.png"] = {"kind": "image", "width": self.pick(1, 3, 16), "height": self.pick(1, 2, 8)}
+        return {"file": "tile.<UDIM>.png", "scale": 0.018, "offset": [1.0, 0.0],
+                "filter": self.pick("linear", "nearest")}
+
     def texture(self, key):
+        if self.chance(0.2):
+            return self.tiles()
         definition = "normalTexture" if key == "normalTexture" else "texture"
         form = self.schema.schema["definitions"][definition]["oneOf"][1]
         drawn = self.schema.object(form, f"scene.materials.*.{key}")

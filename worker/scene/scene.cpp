@@ -157,6 +157,11 @@ void fit_mesh(const Material& material, const std::string& material_name,
                     user, mesh_name, missing->set, missing->texture, material_name));
     return;
   }
+  if (const auto missing = missing_tiles(*material.detail, mesh)) {
+    faults.add(
+        fmt::format("{}: {}: material \"{}\": {}", user, mesh_name, material_name, *missing));
+    return;
+  }
   if (material.detail->normal.texture != nullptr)
     derive_tangents(mesh, material.detail->normal.uv_set);
 }
@@ -210,12 +215,14 @@ std::uint64_t Scene::size_bytes() const {
   for (const Material& material : materials) {
     if (material.detail == nullptr) continue;
     const SurfaceDetail& detail = *material.detail;
-    for (const PlacedTexture* placed :
-         {&detail.color, &detail.metallic_roughness, &detail.normal, &detail.emission}) {
-      const Texture* const texture = placed->texture.get();
-      if (texture != nullptr && textures.insert(texture).second) size += texture->size_bytes();
+    for (const auto& [name, placed] : detail.textures()) {
+      textures.insert(placed->texture.get());
+      if (placed->tiles == nullptr) continue;
+      for (const auto& image : placed->tiles->images) textures.insert(image.get());
     }
   }
+  textures.erase(nullptr);
+  for (const Texture* const texture : textures) size += texture->size_bytes();
   return size;
 }
 
@@ -225,7 +232,7 @@ Result<Scene> load_scene(const JobSpec& job) {
 
   // Materials and meshes, in the order of their names.
   gltf::FileCache files;
-  DetailLoader details(files);
+  DetailLoader details(files, job.scene.files);
   NameIndex materials;
   for (const auto& [name, material] : job.scene.materials) {
     materials[name] = static_cast<std::uint32_t>(scene.materials.size());
@@ -235,6 +242,7 @@ Result<Scene> load_scene(const JobSpec& job) {
   const NameIndex meshes = load_meshes(job.scene, files, scene, faults);
 
   // Objects, in the order of the job.
+  std::set<std::pair<std::uint32_t, std::uint32_t>> fitted;
   for (std::size_t i = 0; i < job.scene.objects.size(); ++i) {
     const ObjectSpec& object = job.scene.objects[i];
     const std::string name = "scene.objects[" + std::to_string(i) + "]";
@@ -242,6 +250,7 @@ Result<Scene> load_scene(const JobSpec& job) {
     const auto material = find_name(materials, object.material, "material", name, faults);
     if (!mesh || !material) continue;
     place_object(object, i, name, *mesh, *material, scene, faults);
+    if (!fitted.insert({*mesh, *material}).second) continue;
     fit_mesh(scene.materials[*material], object.material,
              job.scene.meshes.at(object.mesh).path + ", mesh \"" + object.mesh + "\"", name,
              scene.meshes[*mesh], faults);

@@ -39,5 +39,24 @@ TEST(MaterialFields, ACoatIsWrittenOnlyWhereThereIsOne) {
             "whose factor it is, got none");
 }
 
+TEST(MaterialFields, TilesHaveTheirMarkInTheNameOfAnImage) {
+  const auto job_of = [](const std::string& texture) {
+    return R"({"name": "test", "environment": {"map": "sky.exr"}, "scene": {"materials":
+        {"skin": {"type": "diffuse", "colorTexture": )" +
+           texture + "}}}}";
+  };
+  const JobSpec job = parse_job(job_of(R"("skin.<UDIM>.exr")"), "job.json", "/").value();
+  EXPECT_EQ(job.scene.materials.at("skin").color_texture->file, "/skin.<UDIM>.exr");
+  EXPECT_EQ(asset_paths(job), std::vector<std::string>{"/sky.exr"}) << "no file of that name";
+  for (const char* const file : {"a<UDIM>/b.png", "a<UDIM>.<UDIM>.png"})
+    EXPECT_EQ(material_faults(job_of(std::string("\"") + file + '"')),
+              std::string("job.json: $.scene.materials.skin.colorTexture.file: expected <UDIM> at "
+                          "most once, in the name of an image, got \"/") +
+                  file + '"');
+  EXPECT_EQ(material_faults(job_of(R"({"file": "a.<UDIM>.png", "wrapV": "clamp"})")),
+            "job.json: $.scene.materials.skin.colorTexture.wrapU: expected no wrapU and wrapV "
+            "beside <UDIM>, whose tiles end at their edges, got clamp");
+}
+
 }  // namespace
 }  // namespace baton
