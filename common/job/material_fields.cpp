@@ -72,9 +72,10 @@ void surface_fields(JobArchive& a, MaterialSpec& material) {
 template <class Material>
 auto given_textures(Material& material) {
   std::vector<decltype(&*material.color_texture)> textures;
-  for (auto* texture : {&material.color_texture, &material.metallic_roughness_texture,
-                        &material.normal_texture, &material.emission_texture,
-                        &material.clearcoat_texture, &material.clearcoat_roughness_texture}) {
+  for (auto* texture :
+       {&material.color_texture, &material.metallic_roughness_texture, &material.normal_texture,
+        &material.emission_texture, &material.clearcoat_texture,
+        &material.clearcoat_roughness_texture, &material.clearcoat_normal_texture}) {
     if (texture->has_value()) textures.push_back(&**texture);
   }
   return textures;
@@ -115,6 +116,7 @@ void fields(JobArchive& a, MaterialSpec& material) {
         a.fault("clearcoatTexture", "clearcoat beside it, whose factor it is", "none");
       a.number("clearcoatRoughness", material.clearcoat_roughness, {0.02, 1});
       texture_field(a, "clearcoatRoughnessTexture", material.clearcoat_roughness_texture);
+      texture_field(a, "clearcoatNormalTexture", material.clearcoat_normal_texture, true);
       break;
     case MaterialKind::measured:
       asset_path(a, required("file"), material.file, {".binary"});

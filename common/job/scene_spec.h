@@ -74,6 +74,7 @@ struct MaterialSpec {
   std::optional<TextureSpec> metallic_roughness_texture{};  ///< B on metallic, G on roughness
   std::optional<TextureSpec> clearcoat_texture{};           ///< R on clearcoat
   std::optional<TextureSpec> clearcoat_roughness_texture{};  ///< G on clearcoat_roughness
+  std::optional<TextureSpec> clearcoat_normal_texture{};     ///< of the coat alone
   std::optional<TextureSpec> normal_texture{};               ///< of what is below a coat
   Rgb emission{0, 0, 0};  ///< radiance that the camera sees; it lights nothing
   std::optional<TextureSpec> emission_texture{};  ///< on emission

@@ -8,7 +8,7 @@ class Textures:
         """Textures of materials: only the ground's, since the meshes here have no texture coordinates."""
         hands = {}
         for key in ("colorTexture", "normalTexture", "emissionTexture", "metallicRoughnessTexture", "clearcoatTexture",
-                    "clearcoatRoughnessTexture"):
+                    "clearcoatRoughnessTexture", "clearcoatNormalTexture"):
             at = f"scene.materials.*.{key}"
             hands.update({
                 at: lambda key=key: self.texture(key) if self.on_ground and self.chance(0.6) else None,
@@ -28,7 +28,7 @@ class Textures:
     def texture(self, key):
         if self.chance(0.2):
             return self.tiles()
-        definition = "normalTexture" if key == "normalTexture" else "texture"
+        definition = "normalTexture" if "ormalTexture" in key else "texture"
         form = self.schema.schema["definitions"][definition]["oneOf"][1]
         drawn = self.schema.object(form, f"scene.materials.*.{key}")
         return self.image if self.chance(0.2) else drawn

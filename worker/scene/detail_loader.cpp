@@ -56,6 +56,7 @@ Result<std::shared_ptr<const SurfaceDetail>> DetailLoader::load(const MaterialSp
   BATON_TRY(place(spec.clearcoat_texture, TextureUse::red, detail->clearcoat));
   BATON_TRY(
       place(spec.clearcoat_roughness_texture, TextureUse::green, detail->clearcoat_roughness));
+  BATON_TRY(place(spec.clearcoat_normal_texture, TextureUse::normal, detail->clearcoat_normal));
   return std::shared_ptr<const SurfaceDetail>(std::move(detail));
 }
 

@@ -162,8 +162,10 @@ void fit_mesh(const Material& material, const std::string& material_name,
         fmt::format("{}: {}: material \"{}\": {}", user, mesh_name, material_name, *missing));
     return;
   }
-  if (material.detail->normal.texture != nullptr)
-    derive_tangents(mesh, material.detail->normal.uv_set);
+  for (const PlacedTexture* const map :
+       {&material.detail->normal, &material.detail->clearcoat_normal}) {
+    if (map->texture != nullptr) derive_tangents(mesh, map->uv_set);
+  }
 }
 
 /// Loads every mesh; a mesh that fails keeps an empty place, so that its users are not reported as

@@ -134,11 +134,11 @@ class Patch {
   Uv along_{}, across_{};           ///< of the footprint, in edges of the triangle
 };
 
-/// The shading normal that a normal map gives.
-Vec3 mapped_normal(const Patch& patch, const SurfaceDetail& detail, const ShadingPoint& point,
-                   bool has_lobe) {
-  const std::array<float, 4> texel = patch.look_up(detail.normal);
-  const float strength = detail.spec.normal_texture->strength;
+/// The shading normal that a normal map gives. strength: of the map. has_lobe: what it shades
+/// mirrors.
+Vec3 mapped_normal(const Patch& patch, const PlacedTexture& map, float strength,
+                   const ShadingPoint& point, bool has_lobe) {
+  const std::array<float, 4> texel = patch.look_up(map);
   const Vec3 local{(2 * texel[0] - 1) * strength, (2 * texel[1] - 1) * strength, 2 * texel[2] - 1};
   if (!(length(local) > 0)) return point.ns;
   Vec3 normal = patch.from_tangent_space(local, point.ns);
@@ -147,11 +147,15 @@ Vec3 mapped_normal(const Patch& patch, const SurfaceDetail& detail, const Shadin
   return has_lobe ? bent_normal(normal, point.ng, point.wo) : normal;
 }
 
-/// What textures say of a coat, whose normal is that of the mesh; what is below glows through it.
+/// What textures say of a coat, whose normal is that of the mesh or of a map of its own; what is
+/// below glows through it.
 void see_coat_detail(const Patch& patch, const SurfaceDetail& detail, const ShadingPoint& point,
                      SeenSurface& seen) {
   Coat& coat = seen.material.coat;
   coat.normal = point.ns;
+  if (detail.clearcoat_normal.texture != nullptr)
+    coat.normal = mapped_normal(patch, detail.clearcoat_normal,
+                                detail.spec.clearcoat_normal_texture->strength, point, true);
   if (detail.clearcoat.texture != nullptr)
     coat.weight = std::min(coat.weight * patch.look_up(detail.clearcoat)[0], 1.0f);
   if (detail.clearcoat_roughness.texture != nullptr) {
@@ -182,7 +186,8 @@ std::vector<NamedTexture> SurfaceDetail::textures() const {
                                       {"normalTexture", &normal},
                                       {"emissionTexture", &emission},
                                       {"clearcoatTexture", &clearcoat},
-                                      {"clearcoatRoughnessTexture", &clearcoat_roughness}}) {
+                                      {"clearcoatRoughnessTexture", &clearcoat_roughness},
+                                      {"clearcoatNormalTexture", &clearcoat_normal}}) {
     if (texture.placed->texture != nullptr) there.push_back(texture);
   }
   return there;
@@ -209,7 +214,8 @@ SeenSurface see_detail(const Scene& scene, const Instance& instance, const Surfa
   if (detail.emission.texture != nullptr) emission = emission * rgb(patch.look_up(detail.emission));
   SeenSurface seen{point, make_material(spec, color, metallic, roughness), emission};
   if (detail.normal.texture != nullptr)
-    seen.point.ns = mapped_normal(patch, detail, point, seen.material.lobe != Material::Lobe::none);
+    seen.point.ns = mapped_normal(patch, detail.normal, spec.normal_texture->strength, point,
+                                  seen.material.lobe != Material::Lobe::none);
   if (seen.material.coat.weight > 0) see_coat_detail(patch, detail, point, seen);
   return seen;
 }

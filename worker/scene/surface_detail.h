@@ -38,7 +38,7 @@ struct NamedTexture {
 struct SurfaceDetail {
   MaterialSpec spec;  ///< the numbers: factors of the textures
   PlacedTexture color{}, metallic_roughness{}, normal{}, emission{};
-  PlacedTexture clearcoat{}, clearcoat_roughness{};
+  PlacedTexture clearcoat{}, clearcoat_roughness{}, clearcoat_normal{};
 
   /// Those that are there, with their names in a job.
   std::vector<NamedTexture> textures() const;

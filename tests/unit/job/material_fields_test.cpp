@@ -20,7 +20,8 @@ TEST(MaterialFields, ACoatIsWrittenOnlyWhereThereIsOne) {
   EXPECT_EQ(to_json(bare).find("clearcoat"), std::string::npos);
   const JobSpec job =
       parse_job(job_of(R"(, "clearcoat": 0.5, "clearcoatTexture": "a.png", "clearcoatRoughness":
-          0.25, "clearcoatRoughnessTexture": {"file": "b.png", "uv": 1})"),
+          0.25, "clearcoatRoughnessTexture": {"file": "b.png", "uv": 1},
+          "clearcoatNormalTexture": {"file": "n.png", "strength": 2})"),
                 "job.json", "/")
           .value();
   const MaterialSpec& paint = job.scene.materials.at("paint");
@@ -28,7 +29,8 @@ TEST(MaterialFields, ACoatIsWrittenOnlyWhereThereIsOne) {
   EXPECT_EQ(paint.clearcoat_roughness, 0.25f);
   EXPECT_EQ(paint.clearcoat_texture->file, "/a.png");
   EXPECT_EQ(paint.clearcoat_roughness_texture->uv, 1);
-  EXPECT_EQ(textures_of(paint).size(), 2u);
+  EXPECT_EQ(paint.clearcoat_normal_texture->strength, 2);
+  EXPECT_EQ(textures_of(paint).size(), 3u);
   EXPECT_EQ(parse_job(to_json(job), "again", "/").value(), job);
   EXPECT_EQ(material_faults(job_of(R"(, "clearcoat": 2, "clearcoatRoughness": 0)")),
             "job.json: $.scene.materials.paint.clearcoat: expected a number in [0, 1], got 2\n"
