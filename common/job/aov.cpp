@@ -2,13 +2,14 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <array>
 #include <map>
 
 namespace baton {
 namespace {
 
-constexpr std::size_t kNumAovs = static_cast<std::size_t>(Aov::crypto_material) + 1;
+constexpr std::size_t kNumAovs = static_cast<std::size_t>(Aov::blocked) + 1;
 
 /// "CryptoObject00.R", ".G", ".B", ".A", "CryptoObject01.R", ...
 std::vector<std::string> crypto_channels(const char* layer) {
@@ -38,7 +39,9 @@ AovTraits make_traits(Aov aov) {
     case Aov::depth:
       return {.channels = {"depth"}, .is_float = true, .film_bytes = 2.9};
     case Aov::variance:
-      return {.channels = {"variance"}, .is_float = true};
+      return {.channels = {"variance.R", "variance.G", "variance.B"},
+              .is_float = true,
+              .film_bytes = 12};
     case Aov::mask:
       return {.channels = {"mask"}, .film_bytes = 0.1};
     case Aov::acceptance_local:
@@ -68,6 +71,14 @@ AovTraits make_traits(Aov aov) {
       return geometry(crypto_channels(kCryptoObject), 1);
     case Aov::crypto_material:
       return geometry(crypto_channels(kCryptoMaterial), 1);
+    case Aov::unshadowed:
+      return {.channels = {"unshadowed.R", "unshadowed.G", "unshadowed.B"},
+              .is_float = true,
+              .film_bytes = 9.3};
+    case Aov::blocked:
+      return {.channels = {"blocked.R", "blocked.G", "blocked.B"},
+              .is_float = true,
+              .film_bytes = 10.7};
   }
   return {};
 }
@@ -81,6 +92,10 @@ const AovTraits& traits(Aov aov) {
     return table;
   }();
   return kTable.at(static_cast<std::size_t>(aov));
+}
+
+bool has_aov(const JobSpec& job, Aov aov) {
+  return std::ranges::find(job.output.aovs, aov) != job.output.aovs.end();
 }
 
 std::vector<std::string> object_names(const JobSpec& job) {

@@ -20,6 +20,8 @@ struct AovTraits {
   double film_bytes = 4;              ///< of a pixel with a surface in a packed film, measured
 };
 const AovTraits& traits(Aov aov);
+/// Whether the job's frames have it.
+bool has_aov(const JobSpec& job, Aov aov);
 
 /// The job's objects for people: by their meshes, "bunny", "bunny.2" ...; the ground last.
 std::vector<std::string> object_names(const JobSpec& job);

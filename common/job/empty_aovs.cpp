@@ -13,11 +13,9 @@ std::string_view why_empty(Aov aov, const JobSpec& job) {
     case Aov::resampled:
       return traits(method).moves_samples ? "" : "only `sequential` fills it";
     case Aov::variance:
-      if (traits(method).tells_variance()) return "";
-      if (carries_state(job)) return "samples that are carried tell nothing of their error";
-      return job.quality.rounds < 4 ? "only `reference`, `pool` and `ratio` fill it, and four "
-                                      "rounds or more of the others"
-                                    : "";
+      return tells_noise(job) ? ""
+                              : "samples that are carried, or that a second pass exchanges, tell "
+                                "nothing of their error";
     case Aov::ess:
       return traits(method).keeps_samples ? "" : "the method's rays have no weights";
     default:

@@ -62,6 +62,7 @@ JobEstimate estimate_job(const JobSpec& job) {
   e.primary_rays_per_pixel =
       job.image.sites * (rounds_have_own_sites(job) ? e.rounds : job.quality.sweeps);
   e.shadow_rays_per_pixel = traits(job.sampling.method).most_rays(job.sampling) * e.rounds;
+  if (draws_twice(job)) e.shadow_rays_per_pixel *= 2;
 
   // Add up the planes: R, G, B, A and the AOVs.
   std::int64_t wide_channels = 0, frame_channels = 4;

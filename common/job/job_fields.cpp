@@ -302,6 +302,23 @@ void check_adaptive(JobArchive& a, const JobSpec& job) {
   }
 }
 
+/// Whether the method says what light would arrive if none were blocked.
+void check_unshadowed(JobArchive& a, const JobSpec& job) {
+  for (const Aov aov : {Aov::unshadowed, Aov::blocked}) {
+    if (!has_aov(job, aov)) continue;
+    const std::string_view name = kAovs.at(static_cast<std::size_t>(aov));
+    const auto refuse = [&](std::string_view why) {
+      a.fault("output", fmt::format("no {} among aovs, as {}", name, why),
+              fmt::format("\"{}\"", name));
+    };
+    if (job.visibility.correlated) refuse("the second pass exchanges shadows between pixels");
+    const bool forgets = traits(job.sampling.method).carried == Carried::weighed_samples &&
+                         job.sampling.reuse_visibility;
+    if (forgets && carries_state(job))
+      refuse("samples that were blocked are forgotten (sampling.reuseVisibility)");
+  }
+}
+
 /// What no single value shows: too many tasks, tiles that no blob holds, noise that nobody tells.
 void check_whole(JobArchive& a, const JobSpec& job) {
   if (std::int64_t{job.quality.sweeps} * static_cast<std::int64_t>(job.frames.size()) >
@@ -329,6 +346,7 @@ void check_whole(JobArchive& a, const JobSpec& job) {
         fmt::format("{}", *job.quality.noise_threshold));
   }
   check_adaptive(a, job);
+  check_unshadowed(a, job);
   const JobEstimate estimate = estimate_job(job);
   if (estimate.tasks() > limits::kMaxTasksPerJob) {
     a.fault(

@@ -13,6 +13,7 @@
 #include "common/job/job_json_writer.h"
 #include "common/job/motion.h"
 #include "common/job/picture.h"
+#include "common/job/udim.h"
 
 namespace baton {
 namespace {
@@ -135,7 +136,9 @@ std::vector<std::string> asset_paths(const JobSpec& job) {
   for (const auto& item : job.scene.meshes) paths.insert(item.second.path);
   for (const auto& item : job.scene.materials) {
     if (item.second.kind == MaterialKind::measured) paths.insert(item.second.file);
-    for (const TextureSpec* texture : textures_of(item.second)) paths.insert(texture->file);
+    for (const TextureSpec* texture : textures_of(item.second)) {
+      if (!has_tiles(texture->file)) paths.insert(texture->file);  // tiles are in scene.files
+    }
   }
   for (const FileSpec& file : job.scene.files) paths.insert(file.path);
   for (const EnvironmentKey& key : job.environment.keys) paths.insert(key.map);

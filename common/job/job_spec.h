@@ -294,7 +294,9 @@ enum class Aov : std::uint8_t {
   motion,
   object,
   crypto_object,
-  crypto_material
+  crypto_material,
+  unshadowed,
+  blocked
 };
 enum class PixelType : std::uint8_t { half_float, full_float };
 /// How channels are called in frames: as most compositors expect them, or as Blender's passes.

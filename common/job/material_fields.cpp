@@ -2,6 +2,7 @@
 
 #include "common/base/limits.h"
 #include "common/job/job_fields.h"
+#include "common/job/udim.h"
 
 namespace baton {
 namespace {
@@ -11,6 +12,22 @@ void pair(JobArchive& a, Key key, std::array<float, 2>& value, NumberRange range
   std::array<double, 2> numbers{decimal(value[0]), decimal(value[1])};
   if (!a.numbers(key, numbers, range, lone)) return;
   value = {static_cast<float>(numbers[0]), static_cast<float>(numbers[1])};
+}
+
+/// Of a file name with <UDIM>.
+void check_tiles(JobArchive& a, const TextureSpec& texture) {
+  const std::string& file = texture.file;
+  const std::size_t at = file.find(kTileMark);
+  if (at == std::string::npos) return;
+  const bool is_lone = file.find(kTileMark, at + 1) == std::string::npos;
+  if (is_gltf(file) || !is_lone || file.find('/', at) != std::string::npos)
+    a.fault("file", fmt::format("{} at most once, in the name of an image", kTileMark),
+            fmt::format("\"{}\"", file));
+  if (texture.wrap_u != TextureWrap::repeat || texture.wrap_v != TextureWrap::repeat)
+    a.fault("wrapU",
+            fmt::format("no wrapU and wrapV beside {}, whose tiles end at their edges", kTileMark),
+            std::string(kTextureWraps.at(static_cast<std::size_t>(
+                texture.wrap_u != TextureWrap::repeat ? texture.wrap_u : texture.wrap_v))));
 }
 
 void fields(JobArchive& a, TextureSpec& texture, bool is_normal_map) {
@@ -28,6 +45,7 @@ void fields(JobArchive& a, TextureSpec& texture, bool is_normal_map) {
   a.choice("wrapU", texture.wrap_u, kTextureWraps);
   a.choice("wrapV", texture.wrap_v, kTextureWraps);
   a.choice("filter", texture.filter, kTextureFilters);
+  check_tiles(a, texture);
   if (is_normal_map) a.number("strength", texture.strength, kCoordinateRange);
 }
 
@@ -54,9 +72,10 @@ void surface_fields(JobArchive& a, MaterialSpec& material) {
 template <class Material>
 auto given_textures(Material& material) {
   std::vector<decltype(&*material.color_texture)> textures;
-  for (auto* texture : {&material.color_texture, &material.metallic_roughness_texture,
-                        &material.normal_texture, &material.emission_texture,
-                        &material.clearcoat_texture, &material.clearcoat_roughness_texture}) {
+  for (auto* texture :
+       {&material.color_texture, &material.metallic_roughness_texture, &material.normal_texture,
+        &material.emission_texture, &material.clearcoat_texture,
+        &material.clearcoat_roughness_texture, &material.clearcoat_normal_texture}) {
     if (texture->has_value()) textures.push_back(&**texture);
   }
   return textures;
@@ -97,6 +116,7 @@ void fields(JobArchive& a, MaterialSpec& material) {
         a.fault("clearcoatTexture", "clearcoat beside it, whose factor it is", "none");
       a.number("clearcoatRoughness", material.clearcoat_roughness, {0.02, 1});
       texture_field(a, "clearcoatRoughnessTexture", material.clearcoat_roughness_texture);
+      texture_field(a, "clearcoatNormalTexture", material.clearcoat_normal_texture, true);
       break;
     case MaterialKind::measured:
       asset_path(a, required("file"), material.file, {".binary"});

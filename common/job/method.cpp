@@ -30,6 +30,7 @@ std::int64_t rays_of_pool(const SamplingSpec& s) {
 /// In the order of the enumeration.
 constexpr MethodTraits kTraits[] = {
     {.name = "reference",
+     .tells_variance = true,
      .no_second_pass = "which keeps no samples",
      .light = no_light,
      // A sample is a pair, one from the environment and one from the BRDF.

@@ -56,6 +56,8 @@ struct MethodTraits {
   bool moves_samples = false;
   /// SamplingSpec::mis_compensation may leave dim light to the BRDF's samples.
   bool compensates = false;
+  /// It tells the variance of each pixel.
+  bool tells_variance = false;
   /// Why the second pass can't follow; empty: it can.
   std::string_view no_second_pass = {};
   LightUse (*light)(const SamplingSpec&) = nullptr;
@@ -63,8 +65,6 @@ struct MethodTraits {
   std::int64_t (*most_rays)(const SamplingSpec&) = nullptr;
 
   bool carries() const { return carried != Carried::nothing; }
-  /// Whether it tells the error of each pixel.
-  bool tells_variance() const { return !keeps_samples; }
 };
 
 /// The row of a method.

@@ -36,9 +36,10 @@ enum class TextureFilter : std::uint8_t { linear, nearest };
 /// offset + R(rotate_deg) (scale * (u, v)), with (0, 0) its upper left corner, (1, 1) its lower
 /// right [KHR_texture_transform].
 struct TextureSpec {
-  std::string file;  ///< an image, or a .gltf or .glb file that holds one
-  int image = -1;    ///< of a .gltf or .glb file: place in its list of images; else -1
-  int uv = 0;        ///< set of texture coordinates, 0 or 1
+  /// An image, its tiles (udim.h), or a .gltf or .glb file that holds one.
+  std::string file;
+  int image = -1;  ///< of a .gltf or .glb file: place in its list of images; else -1
+  int uv = 0;      ///< set of texture coordinates, 0 or 1
   std::array<float, 2> offset{0, 0};
   std::array<float, 2> scale{1, 1};
   float rotate_deg = 0;  ///< counter-clockwise, of the coordinates
@@ -73,6 +74,7 @@ struct MaterialSpec {
   std::optional<TextureSpec> metallic_roughness_texture{};  ///< B on metallic, G on roughness
   std::optional<TextureSpec> clearcoat_texture{};           ///< R on clearcoat
   std::optional<TextureSpec> clearcoat_roughness_texture{};  ///< G on clearcoat_roughness
+  std::optional<TextureSpec> clearcoat_normal_texture{};     ///< of the coat alone
   std::optional<TextureSpec> normal_texture{};               ///< of what is below a coat
   Rgb emission{0, 0, 0};  ///< radiance that the camera sees; it lights nothing
   std::optional<TextureSpec> emission_texture{};  ///< on emission

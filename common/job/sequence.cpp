@@ -6,6 +6,7 @@
 #include <cmath>
 
 #include "common/base/check.h"
+#include "common/job/aov.h"
 #include "common/job/key_span.h"
 #include "common/job/motion.h"
 
@@ -175,6 +176,11 @@ bool asks_neighbors(const SamplingSpec& sampling) {
 bool tells_noise(const JobSpec& job) {
   const bool carries_samples = carries_state(job) && traits(job.sampling.method).keeps_samples;
   return !carries_samples && !job.visibility.correlated;
+}
+
+bool draws_twice(const JobSpec& job) {
+  return has_aov(job, Aov::variance) && job.quality.rounds == 1 && tells_noise(job) &&
+         !traits(job.sampling.method).tells_variance;
 }
 
 bool has_catcher(const JobSpec& job) { return job.scene.ground && job.scene.ground->catcher; }

@@ -113,6 +113,9 @@ SamplingSpec as_sampling(const MaterialSampling& material);
 /// Whether the noise of a job's frames is told: of pixels that draw all samples anew, and whose
 /// light no second pass shares out. Films then have a plane of errors (common/image/noise.h).
 bool tells_noise(const JobSpec& job);
+/// Whether each pixel is drawn a second time, which tells its variance (the AOV): of a frame with
+/// one round, by a method that tells none.
+bool draws_twice(const JobSpec& job);
 /// Whether the ground catches shadows; films then have channels shadow.*.
 bool has_catcher(const JobSpec& job);
 /// Samples of a pixel: the most of any material.

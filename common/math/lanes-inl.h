@@ -70,12 +70,6 @@ HWY_INLINE Rgb SumOfLanes(const Vec3Lanes& v) {
   const auto sum = [](VF x) HWY_ATTR { return hn::GetLane(hn::SumOfLanes(DF(), x)); };
   return {sum(v.x), sum(v.y), sum(v.z)};
 }
-/// 1, -1, 1, ...
-HWY_INLINE VF AlternateSigns() {
-  const DI di;
-  const VI odd = hn::And(hn::Iota(di, 0), hn::Set(di, 1));
-  return hn::ConvertTo(DF(), hn::Sub(hn::Set(di, 1), hn::Add(odd, odd)));
-}
 /// Up to a vector from `array` at i, the rest zero; and back. Whole vectors, which most are, pass
 /// no memory in between: what is stored in pieces and loaded at once waits for the stores.
 template <class D>

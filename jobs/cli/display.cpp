@@ -165,11 +165,12 @@ Result<Display> display_aov(const FilmTile& frame, const std::string& aov,
   }
   RgbImage image = interleaved(frame, planes);
   const bool is_vector = planes.size() == 3 && frame.find(aov + ".X") == planes[0];
-  const bool is_radiance = planes.size() == 3 || aov == "lns" || options.stops;
+  const bool is_share = aov != "variance";
+  const bool is_radiance = (planes.size() == 3 && is_share) || aov == "lns" || options.stops;
   if (is_vector) return display_vectors(std::move(image));
   if (is_radiance && !options.range) return display_radiance(std::move(image), options);
   if (aov == "depth" || aov == "Z") return display_depth(std::move(image), options);
-  return display_numbers(std::move(image), aov != "variance", options);
+  return display_numbers(std::move(image), is_share, options);
 }
 
 }  // namespace baton

@@ -120,6 +120,10 @@ void aov_warnings(const JobSpec& job, std::vector<std::string>& warnings) {
       warnings.push_back(fmt::format("output.aovs: {} says nothing here: {}",
                                      kAovs.at(static_cast<std::size_t>(aov)), why));
   }
+  if (draws_twice(job))
+    warnings.push_back(
+        "output.aovs: variance of a single round draws each pixel twice; with quality.rounds 2 the "
+        "same time halves the variance");
 }
 
 }  // namespace

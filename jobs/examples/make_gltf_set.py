@@ -258,7 +258,8 @@ def add_textures(b, materials):
     clay["extensions"]["KHR_materials_emissive_strength"] = {"emissiveStrength": 1.5}
     run = {"index": b.texture(32, 32, glaze)}
     clay["extensions"]["KHR_materials_clearcoat"] = {"clearcoatFactor": 1, "clearcoatTexture": run,
-                                                     "clearcoatRoughnessFactor": 1, "clearcoatRoughnessTexture": run}
+                                                     "clearcoatRoughnessFactor": 1, "clearcoatRoughnessTexture": run,
+                                                     "clearcoatNormalTexture": {"index": b.texture(64, 64, slope), "scale": 0.3}}
     samplers = [{"wrapS": 10497, "wrapT": 10497}] * len(b.images)
     return {"images": b.images, "textures": b.textures, "samplers": samplers}
 

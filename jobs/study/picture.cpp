@@ -18,6 +18,15 @@ std::vector<float> plane(const FilmTile& film, const std::string& name) {
   return {begin, begin + film.num_pixels()};
 }
 
+/// The mean of its channels R, G and B; empty when there are none.
+std::vector<float> mean_plane(const FilmTile& film, const std::string& layer) {
+  std::vector<float> mean = plane(film, layer + ".R");
+  const std::vector<float> g = plane(film, layer + ".G"), b = plane(film, layer + ".B");
+  if (g.size() != mean.size() || b.size() != mean.size()) return {};
+  for (std::size_t i = 0; i < mean.size(); ++i) mean[i] = (mean[i] + g[i] + b[i]) / 3;
+  return mean;
+}
+
 }  // namespace
 
 Result<Picture> read_picture(const std::filesystem::path& path) {
@@ -37,7 +46,7 @@ Result<Picture> read_picture(const std::filesystem::path& path) {
   picture.lns = plane(film, "lns");
   picture.ess = plane(film, "ess");
   picture.acceptance = plane(film, "acceptance");
-  picture.variance = plane(film, "variance");
+  picture.variance = mean_plane(film, "variance");
   if (picture.coverage.empty() || picture.lns.empty())
     return Error{ErrorKind::bad_input,
                  fmt::format("{}: expected channels A and lns", path.string())};
@@ -61,7 +70,7 @@ std::size_t num_blocks(int width, int height) {
 std::optional<std::string> reference_fault(const Reference& reference) {
   constexpr std::size_t kFewestPixels = 64;
   constexpr double kTwice = 2;
-  const double halves = std::sqrt(reference.grey_mse), told = std::sqrt(reference.reported_mse);
+  const double halves = std::sqrt(reference.mse), told = std::sqrt(reference.reported_mse);
   if (reference.lit_pixels.size() < kFewestPixels || halves <= kTwice * told) return std::nullopt;
   return fmt::format(
       "the two halves of the reference differ by an RMSE of {:.3g}, {:.2g} times the {:.3g} that "
@@ -75,7 +84,6 @@ Reference make_reference(Picture a, Picture b) {
   const std::size_t num_pixels = a.coverage.size();
   reference.mean = a.image;
   double sum = 0, sum_squares = 0, sum_relative = 0, sum_variance = 0, sum_lns = 0;
-  double sum_grey = 0;
   for (std::size_t i = 0; i < num_pixels; ++i) {
     for (std::size_t k = 3 * i; k < 3 * i + 3; ++k)
       reference.mean.rgb[k] = 0.5f * (a.image.rgb[k] + b.image.rgb[k]);
@@ -84,16 +92,13 @@ Reference make_reference(Picture a, Picture b) {
     reference.block.push_back(block_of(i, a.image.width));
     sum_lns += 0.5 * (a.lns[i] + b.lns[i]);
     sum_variance += 0.25 * (a.variance[i] + b.variance[i]);
-    double grey_difference = 0;
     for (std::size_t k = 3 * i; k < 3 * i + 3; ++k) {
       const double half_difference = 0.5 * (double{a.image.rgb[k]} - b.image.rgb[k]);
       sum += reference.mean.rgb[k];
       sum_squares += half_difference * half_difference;
-      grey_difference += half_difference / 3;
       const double relative = half_difference / (reference.mean.rgb[k] + kRelativeFloor);
       sum_relative += relative * relative;
     }
-    sum_grey += grey_difference * grey_difference;
   }
   reference.num_blocks = num_blocks(a.image.width, a.image.height);
   const auto count = static_cast<double>(std::max<std::size_t>(reference.lit_pixels.size(), 1));
@@ -101,7 +106,6 @@ Reference make_reference(Picture a, Picture b) {
   reference.mse = sum_squares / (3 * count);
   reference.rel_mse = sum_relative / (3 * count);
   reference.reported_mse = sum_variance / count;
-  reference.grey_mse = sum_grey / count;
   reference.lns_mean = sum_lns / count;
   reference.exposure = auto_exposure(reference.mean);
   reference.displayed = tone_map(reference.mean, reference.exposure);

@@ -17,7 +17,7 @@ struct Picture {
   std::vector<float> lns;         ///< (pixels)
   std::vector<float> ess;         ///< (pixels) ESS / N; empty for references
   std::vector<float> acceptance;  ///< (pixels) of moves; empty for references
-  std::vector<float> variance;    ///< (pixels) of the mean of R, G, B; empty but for references
+  std::vector<float> variance;    ///< (pixels) mean over R, G, B; empty but for references
 };
 
 /// Side of the squares that pictures are divided into, in pixels; those at the border are cut.
@@ -45,10 +45,8 @@ struct Reference {
   double mse = 0;
   double rel_mse = 0;  ///< the same over (R + .01)^2
   double flip = 0;     ///< mean FLIP between R and A, which is as far from R as R from the truth
-  /// The same for the mean of R, G, B, by the variance that brute force reports of itself.
-  double reported_mse = 0;
-  double grey_mse = 0;  ///< by the halves, to compare it with
-  double lns_mean = 0;  ///< over lit pixels
+  double reported_mse = 0;  ///< the same by the variance that brute force reports of itself
+  double lns_mean = 0;      ///< over lit pixels
 };
 
 /// (R + this)^2 divides squared errors in relMSE, so that black pixels count finitely.

@@ -52,6 +52,8 @@ JobSpec coated_job(Method method, int frames = 1) {
   materials["ground"].normal_texture = checker("bumps.tga", {190, 128, 230}, {100, 60, 230});
   materials["ground"].clearcoat_texture = checker("coat.tga", {255, 0, 0}, {80, 255, 255});
   materials["ground"].clearcoat_roughness_texture = checker("rough.tga", {0, 255, 0}, {9, 90, 9});
+  materials["ground"].clearcoat_normal_texture =
+      checker("waves.tga", {90, 150, 240}, {140, 200, 220});
   return job;
 }
 

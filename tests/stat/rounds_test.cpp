@@ -104,16 +104,17 @@ Estimate repeat_with_stopping(JobSpec job) {
   for (int run = 1; run <= kRuns; ++run) {
     job.seed = static_cast<std::uint64_t>(run);
     job.quality.rounds = 4;
+    job.output.aovs = {Aov::variance};
     const FilmTile few = test::render_tile(job).films.back();
     job.quality.rounds = 16;
     const std::vector<double> many = test::mean_rgb(test::render_tile(job).films.back());
     const std::vector<double> first = test::mean_rgb(few);
-    const auto variance = test::channel(few, "variance");
+    const std::vector<double> variance = test::mean_rgb(few, "variance");
     double image = 0;
     sum.resize(many.size());
     squares.resize(many.size());
     for (std::size_t i = 0; i < many.size(); ++i) {
-      const bool stops = std::sqrt(double{variance[i]}) < 0.05 * first[i];
+      const bool stops = std::sqrt(variance[i]) < 0.05 * first[i];
       const double value = stops ? first[i] : many[i];
       sum[i] += value;
       squares[i] += value * value;

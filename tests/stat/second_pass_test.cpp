@@ -47,11 +47,12 @@ Estimate judge(JobSpec job) {
   job.visibility.correlated = false;
   job.sampling.method = Method::reference;
   job.sampling.reference_samples = 60000;
+  job.output.aovs = {Aov::variance};
   job.frames = {job.frames.back()};
   job.seed = 99991;
   const FilmTile film = test::render_tile(job).films.back();
   Estimate e{test::mean_rgb(film), {}};
-  for (const float v : test::channel(film, "variance")) e.variance.push_back(v);
+  e.variance = test::mean_rgb(film, "variance");  // no less than that of the channels' mean
   return e;
 }
 

@@ -114,8 +114,8 @@ inline JobSpec box_job() {
   job.scene.ground = GroundSpec{.material = "ground", .height = 0, .size = 40};
   job.environment.keys = {{.frame = 1, .map = write_map("sky.exr", sky_map())}};
   job.output.directory = test_folder().string();
-  job.output.aovs = {Aov::lns,    Aov::visibility, Aov::ess,   Aov::acceptance,
-                     Aov::source, Aov::normal,     Aov::depth, Aov::variance};
+  job.output.aovs = {Aov::lns,    Aov::visibility, Aov::ess,  Aov::acceptance,
+                     Aov::source, Aov::normal,     Aov::depth};
   job.state.checkpoint_every = 1000;
   return job;
 }
@@ -203,12 +203,13 @@ inline std::span<const float> channel(const FilmTile& film, const std::string& n
   return {};
 }
 
-/// Mean over R, G, B per pixel.
-inline std::vector<double> mean_rgb(const FilmTile& film) {
+/// Mean over R, G, B of a layer per pixel; "": of the colours.
+inline std::vector<double> mean_rgb(const FilmTile& film, const std::string& layer = "") {
+  const std::string stem = layer.empty() ? "" : layer + ".";
+  const auto r = channel(film, stem + "R"), g = channel(film, stem + "G"),
+             b = channel(film, stem + "B");
   std::vector<double> mean(film.num_pixels());
-  for (std::size_t i = 0; i < mean.size(); ++i) {
-    mean[i] = (double{film.plane(0)[i]} + film.plane(1)[i] + film.plane(2)[i]) / 3;
-  }
+  for (std::size_t i = 0; i < mean.size(); ++i) mean[i] = (double{r[i]} + g[i] + b[i]) / 3;
   return mean;
 }
 

@@ -18,6 +18,8 @@ def work_of(job, num_frames):
         visibility = job["visibility"]
         of_pixel += n * visibility.get("partitions", 16)
     rounds = job.get("quality", {}).get("rounds", 1)
+    if rounds == 1 and {"variance", "denoise"} & set(job["output"].get("aovs", [])):
+        of_pixel *= 2
     if method_carries_memory(sampling["method"]):
         rounds += job.get("state", {}).get("preroll", 2) / num_frames
     rounds *= job.get("quality", {}).get("sweeps", 1)
@@ -78,6 +80,9 @@ def mend(job, rng):
     ground = job["scene"].get("ground", {})
     if method in ("sequential", "restir") or visibility.get("correlated"):
         ground.pop("catcher", None)
+    if (method == "restir" and sampling.get("reuseVisibility")) or visibility.get("correlated"):
+        aovs = job.get("output", {}).get("aovs", [])
+        aovs[:] = [aov for aov in aovs if aov not in ("unshadowed", "blocked")]
     rotation = job["environment"].get("rotation", {})
     if rotation.get("keys"):
         rotation.pop("startDeg", None)

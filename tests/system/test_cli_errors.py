@@ -111,14 +111,16 @@ class CliErrors(unittest.TestCase):
         objects = [{"mesh": "cube", "material": "clay", "translate": [0, 0, z]} for z in (0, 50)]
         objects += [{"mesh": "cube", "material": "clay", "translate": [99, 0, 0]},
                     {"mesh": "cube", "material": "clay", "scale": 1e-4}]
-        job = self.job(scene={**CUBE_JOB["scene"], "objects": objects}, output={"aovs": ["acceptance", "depth"]},
+        job = self.job(scene={**CUBE_JOB["scene"], "objects": objects}, output={"aovs": ["acceptance", "variance"]},
                        sampling={"method": "pool"})
         warnings = ["sky.hdr: no texel is brighter than 1 (1)",
                     "sky.hdr: 6x2 texels, a lat-long map is twice as wide as high",
                     "object 1 (cube) is behind the camera in every frame",
                     "object 2 (cube) is outside of the picture in every frame",
                     "object 3 (cube) is smaller than a pixel in every frame",
-                    "output.aovs: acceptance says nothing here: only `sequential` fills it"]
+                    "output.aovs: acceptance says nothing here: only `sequential` fills it",
+                    "output.aovs: variance of a single round draws each pixel twice; with quality.rounds 2 the same time "
+                    "halves the variance"]
         check, render = self.baton("check", job), self.baton("render", job)
         self.expect(check, OK)
         self.expect(render, OK)

@@ -9,7 +9,7 @@ from exr_frames import read_frame
 from farm import check, check_equal, make_job, run_tests, write_job
 from test_quick_looks import read_png
 
-AOVS = ["lns", "normal", "depth", "variance", "albedo", "position", "z", "motion", "object", "material", "cryptoObject"]
+AOVS = ["lns", "normal", "depth", "variance", "albedo", "position", "z", "motion", "object", "material", "cryptoObject", "unshadowed", "blocked"]
 
 
 def rendered(programs, folder, naming):
@@ -45,7 +45,8 @@ def test_both_namings_hold_the_same(programs, folder):
             check_equal(list(b.channels[channel]), list(values), f"{name}: {channel}")
     names = stored_names(programs, blender / "frame.0001.exr")
     check(all(channel.startswith("ViewLayer.") for channel in names), f"{names}")
-    check({"ViewLayer.Combined.R", "ViewLayer.Depth.Z", "ViewLayer.Vector.W", "ViewLayer.CryptoObject00.R"} <= names, f"{names}")
+    check({"ViewLayer.Combined.R", "ViewLayer.Depth.Z", "ViewLayer.Vector.W", "ViewLayer.CryptoObject00.R",
+           "ViewLayer.variance.G", "ViewLayer.unshadowed.R", "ViewLayer.blocked.B"} <= names, f"{names}")
     check("Z" in stored_names(programs, plain / "frame.0001.exr"), "plain names")
 
     # What people look at, by the same words.
@@ -80,7 +81,7 @@ def test_blender_shows_the_passes(programs, folder):
     told = json.loads(line.removeprefix("PASSES "))
     check_equal(told["type"], "MULTILAYER", "the image")
     missing = {"Combined", "Depth", "Normal", "Position", "DiffCol", "IndexOB", "IndexMA", "Vector", "lns",
-               "CryptoObject00"} - set(told["passes"])
+               "CryptoObject00", "variance", "unshadowed", "blocked"} - set(told["passes"])
     check(not missing, f"passes {missing} are missing among {told['passes']}")
     check_equal(told["crypto"], ["ViewLayer.CryptoObject"], "layers of the Cryptomatte node")
     vector, ours = read_frame(folder / "vector.exr"), read_frame(frame)

@@ -198,7 +198,7 @@ def test_view(programs, folder):
     check(white >= 1, done.stdout)
     done = programs.run("baton", "view", frame, "--aov", "variance", "--out", folder / "variance.png")
     white = float(re.search(r"0 \(black\) to (\S+) \(white\)", done.stdout)[1])
-    variance = [v for v in programs.values(frame, "variance") if v > 0]
+    variance = [v for channel in "RGB" for v in programs.values(frame, f"variance.{channel}") if v > 0]
     above = sum(v > 1.001 * white for v in variance)
     check(len(variance) > 100 and 0.005 < above / len(variance) <= 0.01, f"{done.stdout}: {above} of {len(variance)}")
 

@@ -12,7 +12,7 @@ POOL = {"method": "pool", "numParticles": 8, "numCandidates": 32}
 
 def still(folder, **quality):
     return make_job(folder, frames="3", image={"tileSize": 32, "sites": 4}, sampling=POOL, quality=quality,
-                    state={"keep": "last"}, output={"aovs": ["normal", "depth", "variance"]})
+                    state={"keep": "last"}, output={"aovs": ["normal", "depth", "variance", "unshadowed", "blocked"]})
 
 
 def turning(folder, **quality):
@@ -21,7 +21,7 @@ def turning(folder, **quality):
 
 def moving(folder, **quality):
     job = moving_job(folder, image={"tileSize": 32, "sites": 4}, sampling=POOL, quality=quality, state={"keep": "last"})
-    job["output"]["aovs"] = ["normal", "depth", "variance"]
+    job["output"]["aovs"] = ["normal", "depth", "variance", "unshadowed", "blocked"]
     return job
 
 

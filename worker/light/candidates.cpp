@@ -27,6 +27,25 @@ void DrawCandidates(const kernels::CandidateSource& from, kernels::CandidateSet&
   out.total = SumOfWeights(out.weight, out.count);
 }
 
+/// What all candidates reflect together.
+struct ReflectedLine {
+  static constexpr bool kHasColors = true;
+  Vec3Lanes colors;  ///< of w (f cos L) / p~
+
+  template <class AddColor>
+  HWY_INLINE void Add(VU /*code*/, VF /*weight*/, const AddColor& add_color) {
+    add_color(hn::Set(DF(), 1.0f), colors);
+  }
+  void BeginBsdf() {}
+};
+
+Rgb ReflectedLight(const kernels::CandidateSource& from, kernels::CandidateSet& from_bsdf) {
+  ReflectedLine line;
+  SetZero(line.colors);
+  WeighCandidates(from, from_bsdf, line);
+  return SumOfLanes(line.colors);
+}
+
 void ShadeSamples(const SiteBlock& sites, const EnvironmentView& environment,
                   std::span<const OctDirection> code, std::span<const std::uint8_t> site,
                   kernels::ShadedSamples& out) {
@@ -57,6 +76,7 @@ HWY_AFTER_NAMESPACE();
 namespace baton {
 HWY_EXPORT(DrawCandidates);
 HWY_EXPORT(ChooseCandidates);
+HWY_EXPORT(ReflectedLight);
 HWY_EXPORT(ShadeSamples);
 
 namespace kernels {
@@ -84,6 +104,12 @@ float choose_candidates(const CandidateSource& from, float u, ChoiceScratch& scr
               out.code.size() == out.r.size());
   if (from.presampled.empty()) return 0;
   return HWY_DYNAMIC_DISPATCH(ChooseCandidates)(from, u, scratch, out);
+}
+
+Rgb reflected_light(const CandidateSource& from, CandidateSet& scratch) {
+  check_source(from);
+  if (from.presampled.empty()) return {};
+  return HWY_DYNAMIC_DISPATCH(ReflectedLight)(from, scratch);
 }
 
 void shade_samples(const SiteBlock& sites, const EnvironmentView& environment,

@@ -81,6 +81,10 @@ struct SampleSpan {
 float choose_candidates(const CandidateSource& from, float u, ChoiceScratch& scratch,
                         const SampleSpan& out);
 
+/// What the candidates of draw_candidates reflect together, sum over w (f cos L)_rgb / p~: the
+/// pixel's radiance if none were blocked, without bias. scratch: work space.
+Rgb reflected_light(const CandidateSource& from, CandidateSet& scratch);
+
 /// What is left to do for a sample once its visibility is known: colour[j] = (f cos L)_rgb / p~ at
 /// (site, w), 0 where p~ is 0. directions: unit vectors for the shadow rays.
 struct ShadedSamples {

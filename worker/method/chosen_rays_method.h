@@ -12,10 +12,11 @@ class ChosenRaysMethod : public PixelMethod {
         lobe_fraction_(spec.brdf_fraction),
         num_rays_(spec.num_particles) {}
 
-  /// Writes what was chosen into the state and to the renderer. total: sum of the candidates'
-  /// weights, Lns where it is positive and finite.
-  PixelDiagnostics settle(float total, std::int32_t num_candidates, PixelSource source,
-                          const PixelRays& chosen, const PixelState& pixel, RayWriter& rays) const;
+  /// Writes what was chosen, scratch.rays, into the state and to the renderer. total: sum of the
+  /// candidates' weights, Lns where it is positive and finite.
+  PixelDiagnostics settle(float total, const kernels::CandidateSource& candidates,
+                          PixelSource source, const PixelInput& input, const PixelState& pixel,
+                          SamplerScratch& scratch, RayWriter& rays) const;
 
   std::int32_t num_candidates_;
   float lobe_fraction_;

@@ -37,6 +37,7 @@ struct PixelInput {
   std::span<const CarriedSet> neighbors{};
   std::span<const SurfaceHit> hits{};  ///< (S) what the sites were made of, for who traces itself
   const FrameGeometry* geometry = nullptr;  ///< of the frame
+  bool wants_unshadowed = false;            ///< KnownLight::unshadowed, of who can say it
 };
 
 /// The light of the pixel's two frames.

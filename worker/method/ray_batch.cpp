@@ -119,22 +119,32 @@ FreeLight SumFree(const RayBatch& batch, std::size_t first, std::size_t end) {
   const auto load = [&](const std::vector<float>& column, std::size_t i)
                         HWY_ATTR { return hn::LoadU(d, column.data() + first + i); };
   Vec3Lanes color{hn::Zero(d), hn::Zero(d), hn::Zero(d)};
+  Vec3Lanes blocked = color;
   VF visibility = hn::Zero(d);
   FreeLight out;
   const std::size_t count = end - first;
   for (std::size_t i = 0; i < count; i += hn::Lanes(d)) {
-    MF free = hn::Not(hn::Lt(load(batch.rays.t_far, i), hn::Zero(d)));
-    if (i + hn::Lanes(d) > count) free = hn::And(free, hn::FirstN(d, count - i));
+    MF hit = hn::Lt(load(batch.rays.t_far, i), hn::Zero(d));
+    MF free = hn::Not(hit);
+    if (i + hn::Lanes(d) > count) {
+      const MF is_ray = hn::FirstN(d, count - i);
+      free = hn::And(free, is_ray);
+      hit = hn::And(hit, is_ray);
+    }
     std::uint8_t bits[8] = {};
     hn::StoreMaskBits(d, free, bits);
     out.is_free |= std::uint64_t{bits[0]} << i;
-    color = Add(color, {hn::IfThenElseZero(free, load(batch.r, i)),
-                        hn::IfThenElseZero(free, load(batch.g, i)),
-                        hn::IfThenElseZero(free, load(batch.b, i))});
+    const Vec3Lanes value{load(batch.r, i), load(batch.g, i), load(batch.b, i)};
+    const auto of = [&](MF mask) HWY_ATTR -> Vec3Lanes {
+      return {hn::IfThenElseZero(mask, value.x), hn::IfThenElseZero(mask, value.y),
+              hn::IfThenElseZero(mask, value.z)};
+    };
+    color = Add(color, of(free));
+    blocked = Add(blocked, of(hit));
     visibility = hn::Add(visibility, hn::IfThenElseZero(free, load(batch.visibility, i)));
   }
   out.color = SumOfLanes(color);
-  out.difference = hn::GetLane(hn::SumOfLanes(d, hn::Mul(MeanLanes(color), AlternateSigns())));
+  out.blocked = SumOfLanes(blocked);
   out.visibility = hn::GetLane(hn::SumOfLanes(d, visibility));
   return out;
 }

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <optional>
 #include <span>
 #include <vector>
 
@@ -47,9 +48,9 @@ struct CastSamples {
 
 /// What the rays of one pixel found.
 struct FreeLight {
-  Rgb color;  ///< sum of what the free ones bring
+  Rgb color;    ///< sum of what the free ones bring
+  Rgb blocked;  ///< and of what the others would
   float visibility = 0;
-  float difference = 0;       ///< what the even ones bring more than the odd ones, grey
   std::uint64_t is_free = 0;  ///< bit by bit
 };
 /// Sums rays [first, end) of a traced batch, at most 64, in an order that only their number
@@ -80,10 +81,10 @@ void cast_samples(const CastSamples& samples, const SiteOrigins& origins, RayBat
 struct KnownLight {
   Rgb color;
   float visibility = 0;
-  /// Rays and `color` alternate between two estimates of the pixel that agree in the mean:
-  bool has_halves = false;
-  float difference = 0;  ///< what the even one has more than the odd one in `color`, grey
-  float variance = 0;    ///< of the grey mean, where the method estimates it
+  Rgb variance{};  ///< of `color`, at the pixel's sites, where MethodTraits::tells_variance
+  /// The pixel if all rays were free, of methods that say it better than their rays do
+  /// (PixelInput::wants_unshadowed).
+  std::optional<Rgb> unshadowed{};
   bool blocked = false;  ///< some of the light is known not to arrive
 };
 
@@ -101,10 +102,7 @@ class RayWriter {
   /// Rays and constant.
   void add(const PixelRays& rays) {
     cast_rays(rays, origins_, batch_);
-    known = {.color = rays.constant.color,
-             .visibility = rays.constant.visibility,
-             .has_halves = true,
-             .difference = rays.difference};
+    known = {.color = rays.constant.color, .visibility = rays.constant.visibility};
   }
 
  private:

@@ -71,7 +71,7 @@ void FilmWriter::write(std::size_t index, const PixelResult& pixel) {
         put(pixel.depth);
         break;
       case Aov::variance:
-        put(pixel.variance);
+        put_vec(pixel.variance);
         break;
       case Aov::mask:
         put(pixel.mask);
@@ -90,6 +90,12 @@ void FilmWriter::write(std::size_t index, const PixelResult& pixel) {
         break;
       case Aov::rounds:
         put(pixel.rounds);
+        break;
+      case Aov::unshadowed:
+        put_vec(pixel.radiance + pixel.blocked);
+        break;
+      case Aov::blocked:
+        put_vec(pixel.blocked);
         break;
       case Aov::albedo:
       case Aov::position:

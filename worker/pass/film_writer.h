@@ -28,9 +28,9 @@ struct PixelResult {
   float depth = 0;     ///< mean distance of the sites that see a surface
   float mask = 0.5f;   ///< 1 all rays free, 0 some failed, 0.5 background [CV Fig. 2]
   std::uint32_t material =
-      0;  ///< of the first site that sees a surface: index in the scene + 1; 0: none
-  float variance =
-      0;  ///< estimated squared error of the mean over RGB; 0 where the method has no estimate
+      0;           ///< of the first site that sees a surface: index in the scene + 1; 0: none
+  Rgb variance{};  ///< estimated, of `radiance` at its sites; 0 where it is not known
+  Rgb blocked{};   ///< light that shadows take away: `radiance` without them is the sum
   float error = kNoSurface;  ///< as in the plane kErrorChannel
   float rounds = 1;          ///< that it is the mean of
   Rgb shadow{};              ///< share of the light that arrives on the catcher, times `catcher`

@@ -22,10 +22,7 @@ GeometryPlanes::GeometryPlanes(const RenderContext& context, const FrameSpec& fr
   }
 }
 
-bool GeometryPlanes::has(Aov aov) const {
-  const std::vector<Aov>& aovs = context_.job.output.aovs;
-  return std::ranges::find(aovs, aov) != aovs.end();
-}
+bool GeometryPlanes::has(Aov aov) const { return has_aov(context_.job, aov); }
 
 void GeometryPlanes::Things::add(std::uint32_t number, double weight) {
   for (std::size_t i = 0; i < kMostThings; ++i) {

@@ -2,9 +2,9 @@
 
 namespace baton {
 
-float NoiseProbe::sample_again(const PixelMethod& method, const PixelInput& input,
-                               const FrameLight& light, SampleState& state, std::size_t index,
-                               const SiteOrigins& origins, SamplerScratch& scratch) {
+Rgb NoiseProbe::sample_again(const PixelMethod& method, const PixelInput& input,
+                             const FrameLight& light, SampleState& state, std::size_t index,
+                             const SiteOrigins& origins, SamplerScratch& scratch) {
   RngKey key = input.key;
   key.round = static_cast<std::uint32_t>(kProbeRound) - key.round;
   const AsideSampler::Aside again{.sites = input.sites,
@@ -13,7 +13,7 @@ float NoiseProbe::sample_again(const PixelMethod& method, const PixelInput& inpu
                                   .light = light,
                                   .key = key,
                                   .memory = state.memory_of(index)};
-  return mean(aside_.sample(method, input, again, state, scratch));
+  return aside_.sample(method, input, again, state, scratch);
 }
 
 }  // namespace baton

@@ -21,7 +21,7 @@ constexpr bool is_probe(std::int32_t x, std::int32_t y, std::int32_t frame_numbe
   return place % kProbeSpacing == 0;
 }
 
-/// Samples probes a second time: the same sites, what the pixel remembers, and the same method, but
+/// Samples pixels a second time: the same sites, what the pixel remembers, and the same method, but
 /// random numbers and presampled light of their own (kProbeRound). Both estimates are independent
 /// given the past and agree in the mean, so half the square of their difference is the variance of
 /// the pixel, without bias and however a method stratifies. Nothing of it enters the picture. For
@@ -29,11 +29,11 @@ constexpr bool is_probe(std::int32_t x, std::int32_t y, std::int32_t frame_numbe
 /// the first.
 class NoiseProbe {
  public:
-  /// The grey radiance of a pixel, once more. input: what the method is about to be given. light:
+  /// The radiance of a pixel, once more. input: what the method is about to be given. light:
   /// of kProbeRound. state: of the pixel's tile, where it is pixel `index`; stays as it is.
-  float sample_again(const PixelMethod& method, const PixelInput& input, const FrameLight& light,
-                     SampleState& state, std::size_t index, const SiteOrigins& origins,
-                     SamplerScratch& scratch);
+  Rgb sample_again(const PixelMethod& method, const PixelInput& input, const FrameLight& light,
+                   SampleState& state, std::size_t index, const SiteOrigins& origins,
+                   SamplerScratch& scratch);
 
  private:
   AsideSampler aside_;

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 
+#include "common/base/limits.h"
 #include "common/image/noise.h"
 #include "common/job/sequence.h"
 
@@ -23,6 +24,7 @@ Vec3 scaled(const std::array<double, 3>& sum, double factor) {
 RoundMean::RoundMean(const JobSpec& job, const PixelRect& rect)
     : num_rounds_(job.quality.rounds),
       rounds_are_uncorrelated_(rounds_have_own_sites(job)),
+      some_judge_(job.quality.adaptive_threshold.has_value()),
       film_(rect, job) {
   if (num_rounds_ > 1) sums_.resize(static_cast<std::size_t>(rect.area()));
 }
@@ -30,17 +32,16 @@ RoundMean::RoundMean(const JobSpec& job, const PixelRect& rect)
 void RoundMean::add(std::size_t index, const PixelResult& pixel, double weight) {
   if (sums_.empty()) return film_.write(index, pixel);
   PixelSum& sum = sums_[index];
-  const double grey = double{baton::mean(pixel.radiance)};
-  const double seen = grey + double{baton::mean(pixel.shadow)};
+  const double seen = double{baton::mean(pixel.radiance)} + double{baton::mean(pixel.shadow)};
+  const bool is_first = !some_judge_ || sum.num_rounds < limits::kJudgingRounds;
+  (is_first ? sum.scatter.first : sum.scatter.rest).add(pixel.radiance, weight);
   ++sum.num_rounds;
-  sum.weights_squared += weight * weight;
   sum.seen += seen;
   sum.seen_squares += seen * seen;
   add_to(sum.radiance, pixel.radiance, weight);
-  sum.squares += weight * grey * grey;
-  sum.variance += weight * weight * double{pixel.variance};
   sum.alpha += weight * double{pixel.alpha};
   add_to(sum.shadow, pixel.shadow, weight);
+  add_to(sum.blocked, pixel.blocked, weight);
   sum.catcher += weight * double{pixel.catcher};
   if (!(pixel.coverage > 0)) return;
   if (pixel.error >= 0)
@@ -73,17 +74,11 @@ PixelResult RoundMean::mean(const PixelSum& sum) const {
   PixelResult pixel;
   pixel.radiance = scaled(sum.radiance, 1 / k);
   pixel.alpha = static_cast<float>(sum.alpha / k);
+  pixel.blocked = scaled(sum.blocked, 1 / k);
   pixel.shadow = scaled(sum.shadow, 1 / k);
   pixel.catcher = static_cast<float>(sum.catcher / k);
   pixel.rounds = static_cast<float>(sum.num_rounds);
-  const double grey = (sum.radiance[0] + sum.radiance[1] + sum.radiance[2]) / 3 / k;
-  if (rounds_are_uncorrelated_) {
-    // Of equal weights k^2 / weights_squared is k.
-    const double scatter = std::max(sum.squares / k - grey * grey, 0.0);
-    pixel.variance = static_cast<float>(num_rounds_ >= kLeastForScatter
-                                            ? scatter / (k * k / sum.weights_squared - 1)
-                                            : sum.variance / (k * k));
-  }
+  if (rounds_are_uncorrelated_) pixel.variance = sum.scatter.variance_of_mean();
   if (sum.weight_seen == 0) return pixel;
   pixel.error = sum.error >= 0 ? static_cast<float>(sum.error / (k * k)) : kErrorUnknown;
   const double seen = 1.0 / sum.weight_seen;

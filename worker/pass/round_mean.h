@@ -6,19 +6,19 @@
 #include "common/image/film_tile.h"
 #include "common/job/job_spec.h"
 #include "worker/pass/film_writer.h"
+#include "worker/pass/round_scatter.h"
 
 namespace baton {
 
 /// The sums of one pixel over the rounds of its frame.
 struct PixelSum {
-  std::array<double, 3> radiance{}, normal{}, source{}, shadow{};
+  std::array<double, 3> radiance{}, normal{}, source{}, shadow{}, blocked{};
   double alpha = 0, coverage = 0, depth = 0, catcher = 0;
   double lns = 0, arrived = 0;  ///< arrived: Lns x visibility
   double ess_ratio = 0, acceptance = 0, acceptance_local = 0, acceptance_independent = 0;
   double resampled = 0, mask = 0;
-  double variance = 0, squares = 0;   ///< squares: of the grey radiance
+  RoundScatter scatter;               ///< of the radiance
   double seen = 0, seen_squares = 0;  ///< of what the picture shows: grey radiance and shadow
-  double weights_squared = 0;
   std::int32_t num_rounds = 0;
   double error = kErrorUnknown;  ///< of the rounds whose error is known
   std::uint32_t material = 0;    ///< of the first round that sees one
@@ -28,14 +28,12 @@ struct PixelSum {
 /// A frame of a tile as the mean of its rounds, each with its weight; those of a pixel add up to
 /// quality.rounds. Colours, alpha, Lns: over all rounds. Depth and
 /// normal: over the sites that see a surface; visibility: share of all rounds' light; what a method
-/// did: over the rounds that see a surface. variance: from the scatter of kLeastForScatter rounds
-/// or more, which is unbiased where rounds are uncorrelated, as they are for all methods that carry
-/// no samples; of fewer, from what the method says of each; with carried samples 0. error: the
-/// probes of all rounds are the same pixels; without bias, as each round is, given those before.
+/// did: over the rounds that see a surface. variance: from the scatter of the rounds, which is
+/// unbiased where they are uncorrelated, as they are for all methods that carry no samples; with
+/// carried samples 0. error: the probes of all rounds are the same pixels; without bias, as each
+/// round is, given those before.
 class RoundMean {
  public:
-  static constexpr int kLeastForScatter = 4;
-
   RoundMean(const JobSpec& job, const PixelRect& rect);
 
   /// Adds pixel `index` of a round; rounds must come in turn. weight: rounds that it stands for.
@@ -51,7 +49,7 @@ class RoundMean {
   PixelResult mean(const PixelSum& sum) const;
 
   const std::int32_t num_rounds_;
-  const bool rounds_are_uncorrelated_;
+  const bool rounds_are_uncorrelated_, some_judge_;
   FilmWriter film_;
   std::vector<PixelSum> sums_;  ///< empty for a single round
 };

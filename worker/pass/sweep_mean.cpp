@@ -33,7 +33,7 @@ float error_of_mean(float of_earlier, double count, float value) {
 using Rule = float (*)(float of_earlier, double count, float value);
 Rule rule_of(const std::string& channel) {
   if (channel == kErrorChannel) return error_of_mean;
-  if (channel == "variance") return variance_of_mean;
+  if (channel.starts_with("variance.")) return variance_of_mean;
   if (channel == "rounds")
     return [](float of_earlier, double, float value) { return of_earlier + value; };
   if (channel == "material" || channel == "object")

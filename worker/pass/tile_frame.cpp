@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "common/base/poison.h"
+#include "common/job/aov.h"
 #include "common/job/sequence.h"
 #include "worker/light/carried_light.h"
 #include "worker/method/populations.h"
@@ -49,8 +50,8 @@ struct TileFrameRenderer::Batch {
   std::array<std::size_t, kBatchPixels> end_ray;  ///< where each pixel's rays end
   std::array<KnownLight, kBatchPixels> known;
   std::array<PixelResult, kBatchPixels> pixels;
-  std::array<Rgb, kBatchPixels> emission;                ///< of the surfaces that are seen
-  std::array<std::optional<float>, kBatchPixels> again;  ///< grey radiance, of probes
+  std::array<Rgb, kBatchPixels> emission;              ///< of the surfaces that are seen
+  std::array<std::optional<Rgb>, kBatchPixels> again;  ///< radiance once more, where it is wanted
 
   RngKey key(const RenderContext& context, const PixelRect& rect, std::size_t index) const {
     const auto [x, y] = rect.place(index);
@@ -65,6 +66,9 @@ struct TileFrameRenderer::Batch {
 TileFrameRenderer::TileFrameRenderer(const RenderContext& context, const FrameGeometry& geometry)
     : context_(context),
       geometry_(geometry),
+      draws_twice_(draws_twice(context.job)),
+      wants_unshadowed_(has_aov(context.job, Aov::unshadowed) ||
+                        has_aov(context.job, Aov::blocked)),
       scratch_(std::make_unique<SamplerScratch>()),
       collector_(context.job) {}
 
@@ -208,7 +212,8 @@ void TileFrameRenderer::sample(Batch& batch, const TileRound& at, SampleState& s
         .neighbors =
             reprojection_ != nullptr ? reprojection_->neighbors(i) : std::span<const CarriedSet>(),
         .hits = surfaces_->pixel(slot),
-        .geometry = &geometry_};
+        .geometry = &geometry_,
+        .wants_unshadowed = wants_unshadowed_};
     const SiteOrigins from = origins(slot);
     const bool is_catcher = surfaces_->first_surface(slot).is_catcher;
     if (is_catcher && has_history_ && belongs_to_object(state, index)) {
@@ -218,7 +223,7 @@ void TileFrameRenderer::sample(Batch& batch, const TileRound& at, SampleState& s
       continue;
     }
     if (at.probe_light != nullptr && !is_catcher &&
-        batch.is_probe(context_, surfaces_->rect, index)) {
+        (draws_twice_ || batch.is_probe(context_, surfaces_->rect, index))) {
       batch.again[i] = probe_.sample_again(method_of(slot), input, *at.probe_light, state, index,
                                            from, *scratch_);
     }
@@ -279,13 +284,17 @@ void TileFrameRenderer::learn(Batch& batch, SampleState& state) {
     const bool all_free = static_cast<std::size_t>(std::popcount(found.is_free)) == count;
     pixel.mask = all_free && !known.blocked ? 1.0f : 0.0f;
 
-    // Two estimates that agree in the mean: the square of half their difference is at least the
-    // variance of the whole, as neighbours differ least.
-    const float d = known.difference + found.difference;
-    pixel.variance = known.has_halves ? d * d : known.variance;
-    const std::optional<float>& again = batch.again[i];
-    pixel.error =
-        again ? static_cast<float>(squared_error(mean(pixel.radiance), *again)) : kErrorUnknown;
+    pixel.blocked = known.unshadowed ? *known.unshadowed - pixel.radiance : found.blocked;
+
+    // Another draw tells the error of this one.
+    pixel.variance = known.variance;
+    pixel.error = kErrorUnknown;
+    if (const std::optional<Rgb>& again = batch.again[i]) {
+      const Rgb difference = pixel.radiance - *again;
+      if (draws_twice_) pixel.variance = difference * difference * 0.5f;
+      if (batch.is_probe(context_, surfaces_->rect, index))
+        pixel.error = static_cast<float>(squared_error(mean(pixel.radiance), mean(*again)));
+    }
 
     const FoundRays rays{.sample = std::span(batch.rays.sample).subspan(first, count),
                          .tag = std::span(batch.rays.tag).subspan(first, count),

@@ -88,6 +88,7 @@ class TileFrameRenderer {
 
   const RenderContext& context_;
   const FrameGeometry& geometry_;
+  const bool draws_twice_, wants_unshadowed_;
   const TileSurfaces* surfaces_ = nullptr;  ///< of the round in work
   Reprojection* reprojection_ = nullptr;    ///< of the round in work; null where pixels stay
   bool has_history_ = false;                ///< of the round in work, where pixels stay

@@ -28,15 +28,11 @@ struct PixelRays {
   Column<std::uint8_t> site;
   Column<std::uint8_t> bin;  ///< of VisibilityBins
   Value constant;
-  /// What the even samples brought to `constant`, less what the odd ones did. Plus the values of
-  /// the rays with alternating sign it is the difference of two interleaved halves of the pixel.
-  float difference = 0;
   LightVariance light_variance;  ///< of this frame's candidates
 
   void clear() {
     count = 0;
     constant = {};
-    difference = 0;
     light_variance = {};
   }
 };

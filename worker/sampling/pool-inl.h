@@ -97,12 +97,10 @@ struct WeighedLines {
   const float* first_expected = next_expected;  ///< where those of this kind of candidates begin
   VF light = hn::Zero(DF());                    ///< sum of w
   Vec3Lanes colors{hn::Zero(DF()), hn::Zero(DF()), hn::Zero(DF())};  ///< of w V^ (f cos L) / p~
-  VF difference = hn::Zero(DF());                                    ///< even less odd w V^
   VF previous = hn::Zero(DF());                                      ///< w V^ before
   VF last_step = hn::Zero(DF());                                     ///< to it
   VF bends = hn::Zero(DF());        ///< of the squares of its second differences
   VF light_bends = hn::Zero(DF());  ///< those of the candidates from the light, once they are done
-  VF sign = hn::Set(DF(), 1.0f);
 
   /// A vector of candidates. add_color(share, sum) adds share w (f cos L)_rgb / p~ to `sum`.
   template <class AddColor>
@@ -126,8 +124,6 @@ struct WeighedLines {
     last_step = step;
     previous = likely;
     add_color(prospect.expected, colors);
-    difference = hn::MulAdd(likely, sign, difference);
-    sign = hn::Neg(sign);
   }
   /// Between the candidates from the light and those from the BRDF.
   HWY_INLINE void BeginBsdf() {
@@ -157,8 +153,7 @@ struct RayPlan {
 };
 
 /// Looks up the rays and what each brings: as a candidate was chosen with probability proportional
-/// to w times a factor, w cancels. With the control variate, less what was expected of them. Rays
-/// are of the even and the odd half in turn.
+/// to w times a factor, w cancels. With the control variate, less what was expected of them.
 template <class Chosen>
 HWY_INLINE void LookUpRays(const PoolTuning& tuning, const Chosen& chosen, const RayPlan& plan,
                            const DistinctPicks& picks, const float* expected_of, PixelRays& out) {
@@ -166,9 +161,8 @@ HWY_INLINE void LookUpRays(const PoolTuning& tuning, const Chosen& chosen, const
   const DI di;
   const VF per_pick = hn::Set(d, plan.total / static_cast<float>(plan.count));
   const VF per_light = hn::Set(d, 1 / plan.lns);
-  const VF half = AlternateSigns();
   Vec3Lanes expected{hn::Zero(d), hn::Zero(d), hn::Zero(d)};
-  VF expected_share = hn::Zero(d), difference = hn::Zero(d);
+  VF expected_share = hn::Zero(d);
   for (std::size_t j = 0; j < picks.count; j += hn::Lanes(d)) {
     const VI pick = hn::Load(di, picks.pick.from(j));
     const auto c = chosen.Evaluate(pick);
@@ -183,14 +177,12 @@ HWY_INLINE void LookUpRays(const PoolTuning& tuning, const Chosen& chosen, const
     hn::StoreU(hn::DemoteTo(DB(), BinsOf(c.code)), DB(), out.bin.from(j));
     const Vec3Lanes sure = Scale(color, seen);
     expected = HWY_NAMESPACE::Add(expected, sure);
-    difference = hn::MulAdd(hn::Mul(light, seen), half, difference);
     expected_share = hn::MulAdd(share, seen, expected_share);
   }
   out.count = picks.count;
   if (!plan.control) return;
   out.constant.color += SumOfLanes(expected) * -1.0f;
   out.constant.visibility -= hn::GetLane(hn::SumOfLanes(d, expected_share));
-  out.difference -= hn::GetLane(hn::SumOfLanes(d, difference));
 }
 
 /// Chooses the rays of a pixel from its candidates by what its memory says of their directions:
@@ -231,7 +223,6 @@ HWY_INLINE float PoolStep(const PoolTuning& tuning, const Candidates& candidates
                          ? rays_for_deviation(tuning, num_rays, total_deviation, scale)
                          : num_rays,
                      lns};
-  out.difference = sum(lines.difference);
   out.light_variance = {VarianceOfOne(lines.light_bends, candidates.from_light, scale),
                         VarianceOfOne(lines.bends, candidates.from_bsdf, scale)};
   if (control) out.constant = {visible, expected / lns};

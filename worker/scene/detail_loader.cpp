@@ -2,9 +2,12 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
 #include <cmath>
+#include <utility>
 
 #include "common/base/limits.h"
+#include "common/job/udim.h"
 
 namespace baton {
 namespace {
@@ -18,6 +21,7 @@ PlacedTexture placed_texture(const TextureSpec& spec, std::shared_ptr<const Text
   const double angle = spec.rotate_deg * (3.14159265358979323846 / 180);
   const auto c = static_cast<float>(std::cos(angle)), s = static_cast<float>(std::sin(angle));
   return {.texture = std::move(texture),
+          .tiles = {},
           .uv_set = static_cast<std::size_t>(spec.uv),
           .linear = {c * spec.scale[0], s * spec.scale[1], -s * spec.scale[0], c * spec.scale[1]},
           .offset = spec.offset,
@@ -34,6 +38,11 @@ bool has_detail(const MaterialSpec& spec) {
 
 }  // namespace
 
+DetailLoader::DetailLoader(gltf::FileCache& files, const std::vector<FileSpec>& listed)
+    : files_(files) {
+  for (const FileSpec& file : listed) listed_.insert(file.path);
+}
+
 Result<std::shared_ptr<const SurfaceDetail>> DetailLoader::load(const MaterialSpec& spec) {
   if (!has_detail(spec)) return std::shared_ptr<const SurfaceDetail>();
   auto detail = std::make_shared<SurfaceDetail>();
@@ -47,18 +56,53 @@ Result<std::shared_ptr<const SurfaceDetail>> DetailLoader::load(const MaterialSp
   BATON_TRY(place(spec.clearcoat_texture, TextureUse::red, detail->clearcoat));
   BATON_TRY(
       place(spec.clearcoat_roughness_texture, TextureUse::green, detail->clearcoat_roughness));
+  BATON_TRY(place(spec.clearcoat_normal_texture, TextureUse::normal, detail->clearcoat_normal));
   return std::shared_ptr<const SurfaceDetail>(std::move(detail));
 }
 
 Status DetailLoader::place(const std::optional<TextureSpec>& spec, TextureUse use,
                            PlacedTexture& placed) {
   if (!spec) return {};
-  const auto key = std::tuple(spec->file, spec->image, use);
-  auto found = textures_.find(key);
-  if (found == textures_.end()) found = textures_.emplace(key, load_texture(*spec, use)).first;
-  if (!found->second) return found->second.error();
-  placed = placed_texture(*spec, *found->second);
+  if (!has_tiles(spec->file)) {
+    BATON_ASSIGN(TexturePtr texture, texture_of(*spec, use));
+    placed = placed_texture(*spec, std::move(texture));
+    return {};
+  }
+  BATON_ASSIGN(auto tiles, tiles_of(*spec, use));
+  const auto first =
+      std::ranges::find_if(tiles->images, [](const auto& t) { return t != nullptr; });
+  placed = placed_texture(*spec, *first);
+  placed.sampling.wrap_u = placed.sampling.wrap_v = Wrap::clamp;
+  placed.tiles = std::move(tiles);
   return {};
+}
+
+/// From those that are there, or loaded.
+Result<DetailLoader::TexturePtr> DetailLoader::texture_of(const TextureSpec& spec, TextureUse use) {
+  const auto key = std::tuple(spec.file, spec.image, use);
+  auto found = textures_.find(key);
+  if (found == textures_.end()) found = textures_.emplace(key, load_texture(spec, use)).first;
+  return found->second;
+}
+
+/// At least one.
+Result<std::shared_ptr<const TextureTiles>> DetailLoader::tiles_of(const TextureSpec& spec,
+                                                                   TextureUse use) {
+  auto tiles = std::make_shared<TextureTiles>();
+  tiles->file = spec.file;
+  bool any = false;
+  for (int i = 0; i < kNumTiles; ++i) {
+    TextureSpec tile = spec;
+    tile.file = tile_file(spec.file, kFirstTile + i);
+    if (!listed_.contains(tile.file)) continue;
+    BATON_ASSIGN(tiles->images[static_cast<std::size_t>(i)], texture_of(tile, use));
+    any = true;
+  }
+  if (!any)
+    return Error{ErrorKind::bad_input,
+                 fmt::format("{}: none of the tiles {} to {} is there", spec.file, kFirstTile,
+                             kFirstTile + kNumTiles - 1)};
+  return std::shared_ptr<const TextureTiles>(std::move(tiles));
 }
 
 Result<DetailLoader::TexturePtr> DetailLoader::load_texture(const TextureSpec& spec,
@@ -86,17 +130,20 @@ Result<Image> DetailLoader::read(const TextureSpec& spec) {
 }
 
 std::optional<MissingUvs> missing_uvs(const SurfaceDetail& detail, const TriangleMesh& mesh) {
-  const auto missing = [&](const PlacedTexture& texture) {
-    return texture.texture != nullptr && mesh.uvs[texture.uv_set].empty();
-  };
-  if (missing(detail.color)) return MissingUvs{detail.color.uv_set, "colorTexture"};
-  if (missing(detail.metallic_roughness))
-    return MissingUvs{detail.metallic_roughness.uv_set, "metallicRoughnessTexture"};
-  if (missing(detail.normal)) return MissingUvs{detail.normal.uv_set, "normalTexture"};
-  if (missing(detail.emission)) return MissingUvs{detail.emission.uv_set, "emissionTexture"};
-  if (missing(detail.clearcoat)) return MissingUvs{detail.clearcoat.uv_set, "clearcoatTexture"};
-  if (missing(detail.clearcoat_roughness))
-    return MissingUvs{detail.clearcoat_roughness.uv_set, "clearcoatRoughnessTexture"};
+  for (const auto& [name, placed] : detail.textures()) {
+    if (mesh.uvs[placed->uv_set].empty()) return MissingUvs{placed->uv_set, name};
+  }
+  return std::nullopt;
+}
+
+std::optional<std::string> missing_tiles(const SurfaceDetail& detail, const TriangleMesh& mesh) {
+  for (const auto& [name, placed] : detail.textures()) {
+    if (placed->tiles == nullptr) continue;
+    for (const auto& corner : mesh.triangles) {
+      if (const auto fault = tile_fault(*placed->tiles, placed->triangle(mesh, corner)))
+        return fmt::format("{} {}", name, *fault);
+    }
+  }
   return std::nullopt;
 }
 

@@ -1,7 +1,11 @@
 #pragma once
 
 #include <map>
+#include <optional>
+#include <set>
+#include <string>
 #include <tuple>
+#include <vector>
 
 #include "worker/scene/gltf/file_cache.h"
 #include "worker/scene/surface_detail.h"
@@ -11,8 +15,8 @@ namespace baton {
 /// Loads the textures of materials, each image once for each use.
 class DetailLoader {
  public:
-  /// files: must outlive the object.
-  explicit DetailLoader(gltf::FileCache& files) : files_(files) {}
+  /// files: must outlive the object. listed: the tiles of textures are among them.
+  DetailLoader(gltf::FileCache& files, const std::vector<FileSpec>& listed);
 
   /// What a material of numbers has beside them; null: nothing. Errors name the file: no image,
   /// not there, together larger than kMaxTextureBytes.
@@ -21,10 +25,13 @@ class DetailLoader {
  private:
   using TexturePtr = std::shared_ptr<const Texture>;
   Status place(const std::optional<TextureSpec>& spec, TextureUse use, PlacedTexture& placed);
+  Result<TexturePtr> texture_of(const TextureSpec& spec, TextureUse use);
+  Result<std::shared_ptr<const TextureTiles>> tiles_of(const TextureSpec& spec, TextureUse use);
   Result<TexturePtr> load_texture(const TextureSpec& spec, TextureUse use);
   Result<Image> read(const TextureSpec& spec);
 
   gltf::FileCache& files_;
+  std::set<std::string> listed_;
   std::map<std::tuple<std::string, int, TextureUse>, Result<TexturePtr>> textures_;
   std::uint64_t size_bytes_ = 0;
 };
@@ -36,5 +43,9 @@ struct MissingUvs {
   const char* texture;
 };
 std::optional<MissingUvs> missing_uvs(const SurfaceDetail& detail, const TriangleMesh& mesh);
+
+/// What a texture of tiles lacks on a mesh that has the coordinates: "colorTexture needs
+/// skin.1002.png, which is missing"; nullopt: nothing.
+std::optional<std::string> missing_tiles(const SurfaceDetail& detail, const TriangleMesh& mesh);
 
 }  // namespace baton

@@ -160,8 +160,15 @@ void fit_mesh(const Material& material, const std::string& material_name,
                     user, mesh_name, missing->set, missing->texture, material_name));
     return;
   }
-  if (material.detail->normal.texture != nullptr)
-    derive_tangents(mesh, material.detail->normal.uv_set);
+  if (const auto missing = missing_tiles(*material.detail, mesh)) {
+    faults.add(
+        fmt::format("{}: {}: material \"{}\": {}", user, mesh_name, material_name, *missing));
+    return;
+  }
+  for (const PlacedTexture* const map :
+       {&material.detail->normal, &material.detail->clearcoat_normal}) {
+    if (map->texture != nullptr) derive_tangents(mesh, map->uv_set);
+  }
 }
 
 /// Loads every mesh; a mesh that fails keeps an empty place, so that its users are not reported as
@@ -230,12 +237,14 @@ std::uint64_t Scene::size_bytes() const {
   for (const Material& material : materials) {
     if (material.detail == nullptr) continue;
     const SurfaceDetail& detail = *material.detail;
-    for (const PlacedTexture* placed :
-         {&detail.color, &detail.metallic_roughness, &detail.normal, &detail.emission}) {
-      const Texture* const texture = placed->texture.get();
-      if (texture != nullptr && textures.insert(texture).second) size += texture->size_bytes();
+    for (const auto& [name, placed] : detail.textures()) {
+      textures.insert(placed->texture.get());
+      if (placed->tiles == nullptr) continue;
+      for (const auto& image : placed->tiles->images) textures.insert(image.get());
     }
   }
+  textures.erase(nullptr);
+  for (const Texture* const texture : textures) size += texture->size_bytes();
   return size;
 }
 
@@ -254,7 +263,7 @@ Result<Scene> load_scene(const JobSpec& job) {
 
   // Materials and meshes, in the order of their names.
   gltf::FileCache files;
-  DetailLoader details(files);
+  DetailLoader details(files, job.scene.files);
   NameIndex materials;
   for (const auto& [name, material] : job.scene.materials) {
     materials[name] = static_cast<std::uint32_t>(scene.materials.size());
@@ -264,6 +273,7 @@ Result<Scene> load_scene(const JobSpec& job) {
   const NameIndex meshes = load_meshes(job.scene, files, scene, faults);
 
   // Objects, in the order of the job.
+  std::set<std::pair<std::uint32_t, std::uint32_t>> fitted;
   for (std::size_t i = 0; i < job.scene.objects.size(); ++i) {
     const ObjectSpec& object = job.scene.objects[i];
     const std::string name = "scene.objects[" + std::to_string(i) + "]";
@@ -271,6 +281,7 @@ Result<Scene> load_scene(const JobSpec& job) {
     const auto material = find_name(materials, object.material, "material", name, faults);
     if (!mesh || !material) continue;
     place_object(object, i, name, *mesh, *material, scene, faults);
+    if (!fitted.insert({*mesh, *material}).second) continue;
     fit_mesh(scene.materials[*material], object.material,
              job.scene.meshes.at(object.mesh).path + ", mesh \"" + object.mesh + "\"", name,
              scene.meshes[*mesh], faults);

@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <filesystem>
 #include <map>
 #include <optional>
 #include <set>
@@ -10,6 +11,7 @@
 #include "common/base/limits.h"
 #include "common/job/motion.h"
 #include "common/job/suggest.h"
+#include "common/job/udim.h"
 #include "common/math/inverse.h"
 #include "worker/scene/gltf/file_cache.h"
 #include "worker/scene/gltf/materials.h"
@@ -236,7 +238,16 @@ Status check_names(const JobSpec& job) {
   return {};
 }
 
-/// What glTF files refer to is part of the job.
+/// The tiles of a texture that are there.
+void list_tiles(const std::string& path, std::set<std::string>& files) {
+  std::error_code error;
+  for (int number = kFirstTile; number < kFirstTile + kNumTiles; ++number) {
+    const std::string file = tile_file(path, number);
+    if (std::filesystem::exists(file, error)) files.insert(file);
+  }
+}
+
+/// What glTF files refer to, and the tiles of textures, are part of the job.
 Status list_files(SceneSpec& scene, gltf::FileCache& cache) {
   std::set<std::string> files;
   for (const FileSpec& file : scene.files) files.insert(file.path);
@@ -248,6 +259,7 @@ Status list_files(SceneSpec& scene, gltf::FileCache& cache) {
   }
   for (const auto& [name, material] : scene.materials) {
     for (const TextureSpec* texture : textures_of(material)) {
+      if (has_tiles(texture->file)) list_tiles(texture->file, files);
       if (texture->image < 0) continue;
       const auto document = cache.get(texture->file);
       if (!document) continue;

@@ -11,7 +11,8 @@ namespace baton {
 /// Puts what scene.gltf shows in its place: the materials of the file where the job has none of the
 /// same name, a mesh for each primitive, an object for each node that shows one, with a matrix a
 /// frame where an animation moves it, and the camera where the job takes one of the file. Lists the
-/// files that glTF files refer to in scene.files. A job without glTF files comes back as it is.
+/// files that glTF files refer to, and the tiles of textures, in scene.files. A job without any
+/// comes back as it is.
 /// Errors name file and node: not there, more than the limits, without extent in a frame.
 Status settle_scene(JobSpec& job);
 

@@ -20,10 +20,6 @@ Uv mix_uv(const Uv& a, const Uv& b, const Uv& c, float u, float v) {
   return {mix(a[0], b[0], c[0], u, v), mix(a[1], b[1], c[1], u, v)};
 }
 
-Uv mapped(const std::array<float, 4>& m, const Uv& uv) {
-  return {m[0] * uv[0] + m[1] * uv[1], m[2] * uv[0] + m[3] * uv[1]};
-}
-
 /// The triangle at a place, in the world.
 class Patch {
  public:
@@ -52,16 +48,13 @@ class Patch {
   }
 
   std::array<float, 4> look_up(const PlacedTexture& t) const {
-    const std::vector<Uv>& uvs = mesh_.uvs[t.uv_set];
-    const Uv &a = uvs[corner_[0]], &b = uvs[corner_[1]], &c = uvs[corner_[2]];
-    const Uv at = mapped(t.linear, mix_uv(a, b, c, place_.u, place_.v));
-    const Uv to_b = mapped(t.linear, {b[0] - a[0], b[1] - a[1]});
-    const Uv to_c = mapped(t.linear, {c[0] - a[0], c[1] - a[1]});
-    const auto edge = [&](const Uv& step) -> Uv {
-      return {step[0] * to_b[0] + step[1] * to_c[0], step[0] * to_b[1] + step[1] * to_c[1]};
-    };
-    const Footprint seen{edge(along_), edge(across_)};
-    return t.texture->look_up({at[0] + t.offset[0], at[1] + t.offset[1]}, seen, t.sampling);
+    const Place at = find(t);
+    return at.image->look_up(at.uv, at.seen, at.sampling);
+  }
+  /// 1 where the image has no alpha.
+  float alpha(const PlacedTexture& t) const {
+    const Place at = find(t);
+    return at.image->has_alpha() ? at.image->look_up(at.uv, at.seen, at.sampling)[3] : 1;
   }
 
   /// The normal that (x, y, z) of tangent space is, z along that of the mesh; unit, on the side of
@@ -99,6 +92,36 @@ class Patch {
         mix(corner(normals, 0), corner(normals, 1), corner(normals, 2), place_.u, place_.v));
   }
 
+  /// What is looked up of a texture.
+  struct Place {
+    const Texture* image;
+    Uv uv;
+    Footprint seen;
+    TextureSampling sampling;
+  };
+  Place find(const PlacedTexture& t) const {
+    const std::vector<Uv>& uvs = mesh_.uvs[t.uv_set];
+    const Uv &a = uvs[corner_[0]], &b = uvs[corner_[1]], &c = uvs[corner_[2]];
+    const Uv at = t.turned(mix_uv(a, b, c, place_.u, place_.v));
+    const Uv to_b = t.turned({b[0] - a[0], b[1] - a[1]});
+    const Uv to_c = t.turned({c[0] - a[0], c[1] - a[1]});
+    const auto edge = [&](const Uv& step) -> Uv {
+      return {step[0] * to_b[0] + step[1] * to_c[0], step[0] * to_b[1] + step[1] * to_c[1]};
+    };
+    const Footprint seen{edge(along_), edge(across_)};
+    const Uv uv{at[0] + t.offset[0], at[1] + t.offset[1]};
+    if (t.tiles != nullptr) return find_tile(t, uv, seen);
+    return {t.texture.get(), uv, seen, t.sampling};
+  }
+  /// Of a texture of tiles: each ends at its edges. Where rounding leads to one that no triangle
+  /// needs, the first stands for it.
+  Place find_tile(const PlacedTexture& t, const Uv& uv, const Footprint& seen) const {
+    const TilePlace place = tile_place(t.triangle(mesh_, corner_), {uv[0], 1 - uv[1]});
+    const Texture* const image =
+        place.is_in_range() ? t.tiles->images[place.index()].get() : nullptr;
+    return {image != nullptr ? image : t.texture.get(), place.uv, seen, t.sampling};
+  }
+
   /// A step in the world, in edges of the triangle.
   Uv on_triangle(const Vec3& step) const {
     const float sb = dot(step, edge_b_), sc = dot(step, edge_c_);
@@ -117,11 +140,11 @@ class Patch {
   Uv along_{}, across_{};           ///< of the footprint, in edges of the triangle
 };
 
-/// The shading normal that a normal map gives.
-Vec3 mapped_normal(const Patch& patch, const SurfaceDetail& detail, const ShadingPoint& point,
-                   bool has_lobe) {
-  const std::array<float, 4> texel = patch.look_up(detail.normal);
-  const float strength = detail.spec.normal_texture->strength;
+/// The shading normal that a normal map gives. strength: of the map. has_lobe: what it shades
+/// mirrors.
+Vec3 mapped_normal(const Patch& patch, const PlacedTexture& map, float strength,
+                   const ShadingPoint& point, bool has_lobe) {
+  const std::array<float, 4> texel = patch.look_up(map);
   const Vec3 local{(2 * texel[0] - 1) * strength, (2 * texel[1] - 1) * strength, 2 * texel[2] - 1};
   if (!(length(local) > 0)) return point.ns;
   Vec3 normal = patch.from_tangent_space(local, point.ns);
@@ -130,11 +153,15 @@ Vec3 mapped_normal(const Patch& patch, const SurfaceDetail& detail, const Shadin
   return has_lobe ? bent_normal(normal, point.ng, point.wo) : normal;
 }
 
-/// What textures say of a coat, whose normal is that of the mesh; what is below glows through it.
+/// What textures say of a coat, whose normal is that of the mesh or of a map of its own; what is
+/// below glows through it.
 void see_coat_detail(const Patch& patch, const SurfaceDetail& detail, const ShadingPoint& point,
                      SeenSurface& seen) {
   Coat& coat = seen.material.coat;
   coat.normal = point.ns;
+  if (detail.clearcoat_normal.texture != nullptr)
+    coat.normal = mapped_normal(patch, detail.clearcoat_normal,
+                                detail.spec.clearcoat_normal_texture->strength, point, true);
   if (detail.clearcoat.texture != nullptr)
     coat.weight = std::min(coat.weight * patch.look_up(detail.clearcoat)[0], 1.0f);
   if (detail.clearcoat_roughness.texture != nullptr) {
@@ -147,6 +174,30 @@ void see_coat_detail(const Patch& patch, const SurfaceDetail& detail, const Shad
 }
 
 }  // namespace
+
+TileTriangle PlacedTexture::triangle(const TriangleMesh& mesh,
+                                     const std::array<std::uint32_t, 3>& corner) const {
+  TileTriangle places;
+  for (std::size_t k = 0; k < 3; ++k) {
+    const Uv at = turned(mesh.uvs[uv_set][corner[k]]);
+    places[k] = {at[0] + offset[0], 1 - (at[1] + offset[1])};
+  }
+  return places;
+}
+
+std::vector<NamedTexture> SurfaceDetail::textures() const {
+  std::vector<NamedTexture> there;
+  for (const NamedTexture& texture : {NamedTexture{"colorTexture", &color},
+                                      {"metallicRoughnessTexture", &metallic_roughness},
+                                      {"normalTexture", &normal},
+                                      {"emissionTexture", &emission},
+                                      {"clearcoatTexture", &clearcoat},
+                                      {"clearcoatRoughnessTexture", &clearcoat_roughness},
+                                      {"clearcoatNormalTexture", &clearcoat_normal}}) {
+    if (texture.placed->texture != nullptr) there.push_back(texture);
+  }
+  return there;
+}
 
 SeenSurface see_detail(const Scene& scene, const Instance& instance, const SurfacePlace& place,
                        const ShadingPoint& point, const MeshShapes& shapes) {
@@ -169,7 +220,8 @@ SeenSurface see_detail(const Scene& scene, const Instance& instance, const Surfa
   if (detail.emission.texture != nullptr) emission = emission * rgb(patch.look_up(detail.emission));
   SeenSurface seen{point, make_material(spec, color, metallic, roughness), emission};
   if (detail.normal.texture != nullptr)
-    seen.point.ns = mapped_normal(patch, detail, point, seen.material.lobe != Material::Lobe::none);
+    seen.point.ns = mapped_normal(patch, detail.normal, spec.normal_texture->strength, point,
+                                  seen.material.lobe != Material::Lobe::none);
   if (seen.material.coat.weight > 0) see_coat_detail(patch, detail, point, seen);
   return seen;
 }
@@ -178,8 +230,8 @@ bool is_cut_away(const Scene& scene, const Instance& instance, const SurfacePlac
                  float draw) {
   const SurfaceDetail& detail = *scene.material_of(instance).detail;
   float alpha = detail.spec.alpha;
-  if (detail.color.texture != nullptr && detail.color.texture->has_alpha())
-    alpha *= Patch(scene, instance, place, {}).look_up(detail.color)[3];
+  if (detail.color.texture != nullptr)
+    alpha *= Patch(scene, instance, place, {}).alpha(detail.color);
   return alpha < std::max(detail.spec.alpha_cutoff, detail.spec.alpha_blend ? draw : 0.0f);
 }
 

@@ -3,28 +3,45 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <vector>
 
 #include "worker/scene/scene.h"
+#include "worker/scene/texture_tiles.h"
 #include "worker/texture/texture.h"
 
 namespace baton {
 
 /// A texture and where it lies on a surface.
 struct PlacedTexture {
-  std::shared_ptr<const Texture> texture;  ///< null: none
+  std::shared_ptr<const Texture> texture;     ///< null: none; of tiles the first
+  std::shared_ptr<const TextureTiles> tiles;  ///< null: it is one image
   std::size_t uv_set = 0;
   /// Image place of texture coordinates c: offset + linear c.
   std::array<float, 4> linear{1, 0, 0, 1};  ///< row by row
   std::array<float, 2> offset{0, 0};
   TextureSampling sampling{};
+
+  /// linear uv.
+  Uv turned(const Uv& uv) const {
+    return {linear[0] * uv[0] + linear[1] * uv[1], linear[2] * uv[0] + linear[3] * uv[1]};
+  }
+  /// A triangle of the mesh, which has the coordinates, in the plane of tiles.
+  TileTriangle triangle(const TriangleMesh& mesh, const std::array<std::uint32_t, 3>& corner) const;
+};
+
+struct NamedTexture {
+  const char* name;
+  const PlacedTexture* placed;
 };
 
 /// What a material of numbers has beside them.
 struct SurfaceDetail {
   MaterialSpec spec;  ///< the numbers: factors of the textures
   PlacedTexture color{}, metallic_roughness{}, normal{}, emission{};
-  PlacedTexture clearcoat{}, clearcoat_roughness{};
+  PlacedTexture clearcoat{}, clearcoat_roughness{}, clearcoat_normal{};
 
+  /// Those that are there, with their names in a job.
+  std::vector<NamedTexture> textures() const;
   /// Not every ray that meets the surface stops there.
   bool is_cut_out() const { return spec.alpha_cutoff > 0 || spec.alpha_blend; }
 };

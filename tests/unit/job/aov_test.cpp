@@ -3,7 +3,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "common/job/empty_aovs.h"
 #include "common/job/job_json.h"
+#include "common/job/sequence.h"
 
 namespace baton {
 namespace {
@@ -30,6 +32,55 @@ TEST(Aovs, ASetIsWrittenAsItsMembers) {
   JobSpec job;
   job.output.aovs = aovs_of(R"(["denoise"])");
   EXPECT_THAT(to_json(job), testing::Not(testing::HasSubstr("denoise")));
+}
+
+TEST(Aovs, LightHasThreeChannelsOf32Bits) {
+  for (const Aov aov : {Aov::variance, Aov::unshadowed, Aov::blocked}) {
+    EXPECT_TRUE(traits(aov).is_float);
+    ASSERT_EQ(traits(aov).channels.size(), 3u);
+    EXPECT_TRUE(traits(aov).channels[1].ends_with(".G"));
+  }
+}
+
+std::string fault_of(const std::string& sampling, const std::string& rest = "") {
+  const Result<JobSpec> job =
+      parse_job(R"({"name": "a", "scene": {}, "environment": {"map": "a.exr"}, "sampling": {)" +
+                    sampling + R"(}, "output": {"aovs": ["unshadowed"]})" + rest + "}",
+                "a.json", "/");
+  return job.ok() ? "none" : job.error().message;
+}
+
+TEST(Aovs, WhoForgetsWhatIsBlockedKnowsNoLightWithoutShadows) {
+  EXPECT_EQ(fault_of(R"("method": "pool")"), "none");
+  EXPECT_EQ(fault_of(R"("method": "restir")"), "none");
+  const std::string forgets = R"("method": "restir", "reuseVisibility": true)";
+  EXPECT_EQ(fault_of(forgets, R"(, "state": {"carry": false})"), "none");
+  EXPECT_EQ(fault_of(forgets),
+            "a.json: $.output: expected no unshadowed among aovs, as samples that were blocked are "
+            "forgotten (sampling.reuseVisibility), got \"unshadowed\"");
+  EXPECT_EQ(
+      fault_of(R"("method": "bidirectional")", R"(, "visibility": {"correlated": true})"),
+      "a.json: $.output: expected no unshadowed among aovs, as the second pass exchanges shadows "
+      "between pixels, got \"unshadowed\"");
+}
+
+TEST(Aovs, TheVarianceOfASingleRoundIsASecondDraw) {
+  JobSpec job;
+  job.output.aovs = {Aov::variance};
+  job.sampling.method = Method::pool;
+  EXPECT_TRUE(draws_twice(job));
+  job.quality.rounds = 2;
+  EXPECT_FALSE(draws_twice(job)) << "their scatter tells";
+  job.quality.rounds = 1;
+  for (const Method method : {Method::reference, Method::sequential, Method::restir}) {
+    job.sampling.method = method;
+    EXPECT_FALSE(draws_twice(job)) << static_cast<int>(method);
+    EXPECT_EQ(why_empty(Aov::variance, job).empty(), method == Method::reference);
+  }
+  job.state.carry = false;
+  EXPECT_TRUE(draws_twice(job)) << "samples are fresh";
+  job.output.aovs = {Aov::depth};
+  EXPECT_FALSE(draws_twice(job));
 }
 
 }  // namespace

@@ -98,6 +98,12 @@ TEST(Estimate, AddsUpTheChannelsOfAFrame) {
   EXPECT_EQ(e.film_channels, 4 + 1 + 3 + 3 + 1);     // films also hold the error of probes
   EXPECT_EQ(e.frame_bytes, 5000 * (7 * 2 + 4 * 4));  // lns and normal stay float32
 
+  // A second draw has rays.
+  JobSpec drawn_twice = job;
+  drawn_twice.output.aovs.push_back(Aov::variance);
+  EXPECT_EQ(estimate_job(drawn_twice).shadow_rays_per_pixel, 2 * e.shadow_rays_per_pixel);
+  EXPECT_EQ(estimate_job(drawn_twice).frame_bytes, e.frame_bytes + 5000 * 3 * 4);
+
   // Samples that are carried tell nothing of their error.
   job.sampling.method = Method::sequential;
   EXPECT_EQ(estimate_job(job).film_channels, e.film_channels - 1);

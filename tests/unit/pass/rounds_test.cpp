@@ -115,7 +115,7 @@ TEST(Preroll, MakesTheFirstFrameLikeALaterOne) {
     for (int seed = 1; seed <= 20; ++seed) {
       job.seed = static_cast<std::uint64_t>(seed);
       const auto output = render_tile(job);
-      for (const float v : channel(output.films.back(), "variance")) sum += double{v};
+      for (const double v : mean_rgb(output.films.back(), "variance")) sum += v;
     }
     return sum;
   };
@@ -162,8 +162,8 @@ FilmTile mean_of(Method method, const std::vector<PixelResult>& rounds) {
   JobSpec job;
   job.sampling.method = method;
   job.quality.rounds = static_cast<int>(rounds.size());
-  job.output.aovs = {Aov::lns,   Aov::visibility, Aov::source, Aov::normal,
-                     Aov::depth, Aov::variance,   Aov::mask,   Aov::material};
+  job.output.aovs = {Aov::lns,      Aov::visibility, Aov::source,   Aov::normal,     Aov::depth,
+                     Aov::variance, Aov::mask,       Aov::material, Aov::unshadowed, Aov::blocked};
   RoundMean mean(job, {0, 0, 1, 1});
   for (const PixelResult& pixel : rounds) mean.add(0, pixel);
   return mean.finish();
@@ -180,7 +180,7 @@ TEST(RoundMean, EveryAovHasItsMeaning) {
                      .depth = 2,
                      .mask = 1,
                      .material = 3,
-                     .variance = 0.4f,
+                     .blocked = {1, 2, 3},
                      .error = 0.2f};
   PixelResult half = bright;
   half.radiance = {1, 1, 1};
@@ -205,7 +205,9 @@ TEST(RoundMean, EveryAovHasItsMeaning) {
   EXPECT_FLOAT_EQ(value("mask"), 0.5f) << "of two rounds";
   EXPECT_FLOAT_EQ(value("source.G"), 1);
   EXPECT_EQ(value("material"), 3) << "of the first that sees one";
-  EXPECT_FLOAT_EQ(value("variance"), 0.8f / 9);
+  EXPECT_FLOAT_EQ(value("variance.G"), 3.0f / 3) << "of 1, 4 and 1, a third of it";
+  EXPECT_FLOAT_EQ(value("blocked.B"), 6.0f / 3);
+  EXPECT_FLOAT_EQ(value("unshadowed.B"), 4);
   EXPECT_FLOAT_EQ(value(kErrorChannel), 0.9f / 9);
   EXPECT_EQ(channel(mean_of(Method::pool, {nothing, nothing}), kErrorChannel)[0], kNoSurface);
   bright.error = half.error = kErrorUnknown;
@@ -219,22 +221,25 @@ TEST(RoundMean, ARoundAloneIsAsItWas) {
                           .alpha = 1,
                           .lns = 0.7f,
                           .visibility = 0.3f,
-                          .variance = 0.1f};
+                          .variance = {0.1f, 0.2f, 0.3f}};
   const FilmTile film = mean_of(Method::sequential, {pixel});
   EXPECT_EQ(channel(film, "G")[0], 0.7f);
   EXPECT_EQ(channel(film, "visibility")[0], 0.3f);
-  EXPECT_EQ(channel(film, "variance")[0], 0.1f);
+  EXPECT_EQ(channel(film, "variance.B")[0], 0.3f);
 }
 
-TEST(RoundMean, VarianceIsTheScatterOfFourRoundsOrMore) {
+TEST(RoundMean, VarianceIsTheScatterOfRounds) {
   std::vector<PixelResult> rounds(4);
   for (std::size_t i = 0; i < 4; ++i) {
     const auto value = static_cast<float>(i);
-    rounds[i] = {.radiance = {value, value, value}, .variance = 100};
+    rounds[i] = {.radiance = {value, 2 * value, 5}, .variance = {100, 100, 100}};
   }
   // 1.25 x 4 / 3 of one, a quarter of it of the mean.
-  EXPECT_FLOAT_EQ(channel(mean_of(Method::bidirectional, rounds), "variance")[0], 1.25f / 3);
-  EXPECT_EQ(channel(mean_of(Method::sequential, rounds), "variance")[0], 0) << "rounds correlate";
+  const FilmTile film = mean_of(Method::bidirectional, rounds);
+  EXPECT_FLOAT_EQ(channel(film, "variance.R")[0], 1.25f / 3);
+  EXPECT_FLOAT_EQ(channel(film, "variance.G")[0], 4 * 1.25f / 3);
+  EXPECT_EQ(channel(film, "variance.B")[0], 0);
+  EXPECT_EQ(channel(mean_of(Method::sequential, rounds), "variance.R")[0], 0) << "rounds correlate";
 }
 
 // 18 rounds: two that count once, then two that count eight times.
@@ -242,13 +247,15 @@ TEST(RoundMean, RoundsHaveWeights) {
   JobSpec job;
   job.sampling.method = Method::bidirectional;
   job.quality.rounds = 18;
-  job.output.aovs = {Aov::depth, Aov::variance, Aov::rounds};
+  job.quality.adaptive_threshold = 1;
+  job.output.aovs = {Aov::depth, Aov::variance, Aov::rounds, Aov::blocked};
   RoundMean mean(job, {0, 0, 1, 1});
   const std::array<float, 4> values{1, 3, 4, 6};
   for (std::size_t i = 0; i < 4; ++i) {
     PixelResult pixel{.radiance = {values[i], values[i], values[i]}, .error = 0.5f};
     pixel.coverage = pixel.alpha = i == 3 ? 1.0f : 0.0f;
     pixel.depth = 7;
+    pixel.blocked = {1, values[i], 1};
     mean.add(0, pixel, i < 2 ? 1 : 8);
     // Of two: variance 2, mean 2.
     if (i == 1) {
@@ -261,44 +268,23 @@ TEST(RoundMean, RoundsHaveWeights) {
   EXPECT_FLOAT_EQ(value("A"), 8 / 18.0f);
   EXPECT_FLOAT_EQ(value("depth"), 7);
   EXPECT_EQ(value("rounds"), 4);
-  // Sums of squares of weights 130, scatter (1 + 9 + 128 + 288) / 18 - (84 / 18)^2.
-  const double share = 130.0 / 324;
-  EXPECT_FLOAT_EQ(value("variance"),
-                  static_cast<float>((426.0 / 18 - 84.0 * 84 / 324) * share / (1 - share)));
+  EXPECT_FLOAT_EQ(value("blocked.G"), value("R"));
+  // Both pairs have the variance 2, their means half of it, and weigh 2 and 16 of 18.
+  EXPECT_FLOAT_EQ(value("variance.R"), (4 + 256) / 324.0f);
   EXPECT_FLOAT_EQ(value(kErrorChannel), 64 * 0.5f / 324);
 }
 
-// The variance that four rounds state is what 300 seeds show, in pixels that see one plane alone
-// (so that sites, which are stratified from round to round, do not matter). The mean over pixels
-// and seeds of the stated one is within 10 % (its own error is 2 %).
-TEST(Rounds, ScatterStatesTheVarianceOfTheMean) {
-  for (const Method method : {Method::bidirectional, Method::pool}) {
-    JobSpec job = rounds_job(method, 4);
-    job.frames = {1};
-    job.scene.objects.resize(1);
-    job.camera = {.position = {2.5f, 2, 2}, .look_at = {0.9f, 0, 0.3f}, .vertical_fov_deg = 8};
-    constexpr int kSeeds = 300;
-    std::vector<double> sum, squares;
-    double stated = 0;
-    for (int seed = 1; seed <= kSeeds; ++seed) {
-      job.seed = static_cast<std::uint64_t>(seed);
-      const FilmTile film = render_tile(job).films.back();
-      const std::vector<double> pixels = mean_rgb(film);
-      sum.resize(pixels.size());
-      squares.resize(pixels.size());
-      for (std::size_t i = 0; i < pixels.size(); ++i) {
-        sum[i] += pixels[i];
-        squares[i] += pixels[i] * pixels[i];
-        stated += double{channel(film, "variance")[i]} / kSeeds;
-      }
-    }
-    double seen = 0;
-    for (std::size_t i = 0; i < sum.size(); ++i)
-      seen += (squares[i] / kSeeds - sum[i] / kSeeds * sum[i] / kSeeds) * kSeeds / (kSeeds - 1);
-    std::printf("  %s: stated over seen %.3f\n", std::string(traits(method).name).c_str(),
-                stated / seen);
-    EXPECT_NEAR(stated / seen, 1, 0.1) << static_cast<int>(method);
-  }
+// Of 10 rounds one after those that judge: its distance from their mean, 6, is all that is known.
+TEST(RoundMean, ASingleLaterRoundHasAVariance) {
+  JobSpec job;
+  job.sampling.method = Method::bidirectional;
+  job.quality.rounds = 10;
+  job.quality.adaptive_threshold = 1;
+  job.output.aovs = {Aov::variance};
+  RoundMean mean(job, {0, 0, 1, 1});
+  for (const float value : {1.0f, 3.0f, 8.0f})
+    mean.add(0, {.radiance = {value, value, value}}, value < 8 ? 1 : 8);
+  EXPECT_FLOAT_EQ(channel(mean.finish(), "variance.R")[0], 0.2f * 0.2f * 1 + 0.8f * 0.8f * 24);
 }
 
 }  // namespace

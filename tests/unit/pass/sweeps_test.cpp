@@ -64,8 +64,8 @@ FilmTile film_of(std::vector<std::string> channels, std::vector<float> values) {
 }
 
 TEST(SweepMean, WeighsSweepsAlike) {
-  const FilmTile earlier = film_of({"R", "variance", "error"}, {1, 2, .3f, .6f, .2f, -1});
-  FilmTile film = film_of({"R", "variance", "error"}, {5, 2, .6f, 0, -1, -1});
+  const FilmTile earlier = film_of({"R", "variance.G", "error"}, {1, 2, .3f, .6f, .2f, -1});
+  FilmTile film = film_of({"R", "variance.G", "error"}, {5, 2, .6f, 0, -1, -1});
   ASSERT_TRUE(add_sweeps(earlier, 3, film));
   EXPECT_EQ(film.values[0], 2);  // (3 * 1 + 5) / 4
   EXPECT_EQ(film.values[1], 2);

@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 #include <limits>
 
@@ -14,6 +15,7 @@ namespace {
 using test::box_job;
 using test::channel;
 using test::frame_numbers;
+using test::mean_rgb;
 using test::render_tile;
 using test::render_tiled;
 using test::sequence_job;
@@ -165,36 +167,40 @@ TEST(RunTile, JobsThatShareASiteSeedSeeTheSamePoints) {
   EXPECT_EQ(depths(9, 0), depths(2, 9)) << "else it is the job's seed";
 }
 
-// The variance that the presampled light states from its even and odd samples is, on average, at
-// least what is seen over 64 seeds (whose own error is 5 % of it), and not many times more.
-TEST(RunTile, PoolStatesItsVariance) {
-  JobSpec job = sequence_job(4);
-  job.image.sites = 1;
-  job.sampling.method = Method::pool;
-  job.sampling.num_candidates = 64;
-  job.output.aovs = {Aov::variance};
-  constexpr int kSeeds = 64;
-  std::vector<double> sum, squares;
-  double stated = 0;
-  for (int seed = 1; seed <= kSeeds; ++seed) {
-    job.seed = static_cast<std::uint64_t>(seed);
-    const FilmTile film = render_tile(job).films.back();
-    const auto r = channel(film, "R"), g = channel(film, "G"), b = channel(film, "B");
-    sum.resize(r.size());
-    squares.resize(r.size());
-    for (std::size_t i = 0; i < r.size(); ++i) {
-      const double value = (r[i] + g[i] + b[i]) / 3;
-      sum[i] += value / kSeeds;
-      squares[i] += value * value / kSeeds;
+// The second draw that tells the variance, and what is said of the light that is blocked, enter
+// nothing else.
+TEST(RunTile, AovsOfLightChangeNoPicture) {
+  for (const Method method : {Method::pool, Method::ratio, Method::bidirectional,
+                              Method::sequential, Method::reference}) {
+    JobSpec job = sequence_job(3);
+    job.image.sites = 4;
+    job.sampling.method = method;
+    job.sampling.num_candidates = 64;
+    job.sampling.reference_samples = 8;
+    job.output.aovs.clear();
+    const test::TileResult plain = render_tile(job);
+    job.output.aovs = {Aov::depth, Aov::variance, Aov::unshadowed, Aov::blocked};
+    const test::TileResult with = render_tile(job);
+    EXPECT_EQ(with.state.memory, plain.state.memory);
+    for (const char* const name : {"R", "G", "B", "A"}) {
+      const auto a = channel(plain.films.back(), name), b = channel(with.films.back(), name);
+      EXPECT_TRUE(std::ranges::equal(a, b)) << static_cast<int>(method) << " " << name;
     }
-    for (const float v : channel(film, "variance")) stated += v / kSeeds;
+    // RGB + blocked = unshadowed; nothing is blocked where the sky is seen.
+    const std::vector<double> shown = mean_rgb(with.films.back()),
+                              blocked = mean_rgb(with.films.back(), "blocked"),
+                              unshadowed = mean_rgb(with.films.back(), "unshadowed");
+    const auto depth = channel(with.films.back(), "depth");
+    double most = 0;
+    for (std::size_t i = 0; i < shown.size(); ++i) {
+      EXPECT_NEAR(shown[i] + blocked[i], unshadowed[i], 1e-5 * (1 + unshadowed[i]));
+      if (depth[i] == 0) {
+        EXPECT_EQ(blocked[i], 0);
+      }
+      most = std::max(most, blocked[i]);
+    }
+    EXPECT_GT(most, 0.05) << static_cast<int>(method);
   }
-  double seen = 0;
-  for (std::size_t i = 0; i < sum.size(); ++i)
-    seen += (squares[i] - sum[i] * sum[i]) * kSeeds / (kSeeds - 1);
-  std::printf("  stated over seen: %.2f\n", stated / seen);
-  EXPECT_GT(stated, 0.9 * seen);
-  EXPECT_LT(stated, 3 * seen);
 }
 
 TEST(RunTile, CarriesEverySurfacePixelOn) {

@@ -173,15 +173,17 @@ TEST(SettleScene, ReadsCoats) {
 
   const std::string textured = R"({"clearcoatFactor":1,"clearcoatTexture":{"index":0},
       "clearcoatRoughnessFactor":0.5,"clearcoatRoughnessTexture":{"index":1,"texCoord":1},
-      "clearcoatNormalTexture":{"index":0}})";
+      "clearcoatNormalTexture":{"index":0,"scale":0.5}})";
   const JobSpec job = settled(job_of(coated_file(textured), "", camera));
   const MaterialSpec& paint = job.scene.materials.at("paint");
   ASSERT_TRUE(paint.clearcoat_texture && paint.clearcoat_roughness_texture);
   EXPECT_TRUE(paint.clearcoat_texture->file.ends_with("b.png"));
   EXPECT_TRUE(paint.clearcoat_roughness_texture->file.ends_with("a.png"));
   EXPECT_EQ(paint.clearcoat_roughness_texture->uv, 1);
-  EXPECT_THAT(gltf_warnings(job.scene),
-              testing::ElementsAre(HasSubstr("the normal map of its coat is not read")));
+  ASSERT_TRUE(paint.clearcoat_normal_texture);
+  EXPECT_TRUE(paint.clearcoat_normal_texture->file.ends_with("b.png"));
+  EXPECT_EQ(paint.clearcoat_normal_texture->strength, 0.5f);
+  EXPECT_THAT(gltf_warnings(job.scene), testing::IsEmpty());
 }
 
 /// Node "spun" turns (animation 1), its parent "cart" goes along x (animation 2), "hop" jumps by

@@ -103,7 +103,7 @@ TEST(SurfaceDetail, MetalAndRoughnessAreFactors) {
   EXPECT_NEAR(got.kd.y, expected.kd.y, 1e-5f);
 }
 
-// The coat keeps the normal of the mesh, where a map turns that of what is below.
+// The coat keeps the normal of the mesh where a map turns that of what is below.
 TEST(SurfaceDetail, ACoatHasImagesAndANormalOfItsOwn) {
   MaterialSpec spec{
       .kind = MaterialKind::metallic_roughness, .clearcoat = 0.8f, .clearcoat_roughness = 0.5f};
@@ -120,6 +120,22 @@ TEST(SurfaceDetail, ACoatHasImagesAndANormalOfItsOwn) {
   EXPECT_NEAR(seen.point.ns.x, std::sqrt(0.5f), 0.01f);
   // What glows below shines through.
   EXPECT_NEAR(seen.emission.x, 2 * (1 - 0.04f * weight), 1e-4f);
+
+  // A map of the coat turns it alone, by its own strength; bent so that it mirrors no light from
+  // below.
+  spec.clearcoat_normal_texture =
+      TextureSpec{.file = write_targa("cn.tga", 1, 1, 3, {128, 255, 255}), .strength = 0.5f};
+  const SeenSurface both = seen_at(scene_of(spec), 0.3f, 0.4f);
+  EXPECT_EQ(both.point.ns, seen.point.ns);
+  EXPECT_NEAR(both.material.coat.normal.y, 0.5f / std::sqrt(1.25f), 0.01f);
+  EXPECT_NEAR(both.material.coat.normal.x, 0, 0.01f);
+  spec.clearcoat_normal_texture->strength = 30;
+  const Vec3 steep = seen_at(scene_of(spec), 0.3f, 0.4f).material.coat.normal;
+  EXPECT_GT(reflect({0, 0, 1}, steep).z, 0.005f);
+  MaterialSpec coat_only = spec;
+  coat_only.normal_texture.reset();
+  EXPECT_EQ(seen_at(scene_of(coat_only), 0.3f, 0.4f).point.ns, (Vec3{0, 0, 1}));
+  spec.clearcoat_normal_texture.reset();
 
   // Grey images stand for all channels; smoother than smooth is smooth.
   spec.clearcoat_roughness_texture = TextureSpec{.file = write_targa("g.tga", 1, 1, 1, {1})};

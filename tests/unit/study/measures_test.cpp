@@ -110,19 +110,18 @@ TEST(Measures, FlickerOfIndependentAndOfFrozenErrors) {
 }
 
 TEST(Reference, OneWhoseHalvesDifferByMoreThanItSaysIsNotTrusted) {
-  // Noise of 0.3 in each of three channels is 0.3 / sqrt(3) in their mean.
   const auto reference = [](float told) {
     Picture a = noisy(2, 0.3f, 5), b = noisy(2, 0.3f, 6);
     a.variance.assign(kPixels, told * told);
     b.variance = a.variance;
     return make_reference(std::move(a), std::move(b));
   };
-  const float true_deviation = 0.3f / std::sqrt(3.0f);
+  constexpr float true_deviation = 0.3f;
   EXPECT_FALSE(reference_fault(reference(true_deviation)));
   EXPECT_FALSE(reference_fault(reference(true_deviation / 1.6f)));
   const auto fault = reference_fault(reference(true_deviation / 4));
   ASSERT_TRUE(fault);
-  EXPECT_NE(fault->find("times the 0.03"), std::string::npos) << *fault;
+  EXPECT_NE(fault->find("times the 0.05"), std::string::npos) << *fault;
   EXPECT_TRUE(reference_fault(reference(0))) << "no error at all is said";
 
   // Too few pixels say nothing.

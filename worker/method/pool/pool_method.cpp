@@ -45,13 +45,14 @@ PixelDiagnostics PoolMethod::sample(const PixelInput& input, const PixelState& p
   const PixelMemory& memory = own != nullptr ? *own : kNothing;
   const kernels::CandidateCounts counts = counts_for_noise(tuning_, input.sites, num_candidates_,
                                                            lobe_fraction_, light_variance(memory));
-  const float total = kernels::choose_pool_rays(tuning_, candidate_source(input, counts),
+  const kernels::CandidateSource candidates = candidate_source(input, counts);
+  const float total = kernels::choose_pool_rays(tuning_, candidates,
                                                 Rng(input.key, PassId::choose).uniforms(0, 0)[0],
                                                 num_rays_, memory, scratch.pool, scratch.rays);
   if (own != nullptr && scratch.rays.count > 0)
     remember_light_variance(tuning_, scratch.rays.light_variance, *own);
   const auto source = input.has_history ? PixelSource::carried : PixelSource::fresh;
-  return settle(total, counts.total(), source, scratch.rays, pixel, rays);
+  return settle(total, candidates, source, input, pixel, scratch, rays);
 }
 
 void PoolMethod::learn(const FoundRays& found, const PixelState& pixel) const {

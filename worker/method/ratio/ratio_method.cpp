@@ -7,10 +7,12 @@ namespace baton {
 
 PixelDiagnostics RatioMethod::sample(const PixelInput& input, const PixelState& pixel,
                                      SamplerScratch& scratch, RayWriter& rays) const {
-  const float total = kernels::choose_ratio_rays(
-      candidate_source(input, candidate_counts(input.sites, num_candidates_, lobe_fraction_)),
-      Rng(input.key, PassId::choose).uniforms(0, 0)[0], num_rays_, scratch.choice, scratch.rays);
-  return settle(total, num_candidates_, PixelSource::fresh, scratch.rays, pixel, rays);
+  const kernels::CandidateSource candidates =
+      candidate_source(input, candidate_counts(input.sites, num_candidates_, lobe_fraction_));
+  const float total =
+      kernels::choose_ratio_rays(candidates, Rng(input.key, PassId::choose).uniforms(0, 0)[0],
+                                 num_rays_, scratch.choice, scratch.rays);
+  return settle(total, candidates, PixelSource::fresh, input, pixel, scratch, rays);
 }
 
 }  // namespace baton

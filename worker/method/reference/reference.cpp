@@ -16,6 +16,24 @@ struct Contribution {
   bool is_hidden = false;
 };
 
+/// Colours in double.
+struct ColorSum {
+  std::array<double, 3> value{};
+
+  void add(const Rgb& color) {
+    value[0] += color.x;
+    value[1] += color.y;
+    value[2] += color.z;
+  }
+  void add_squares(const ColorSum& of) {
+    for (std::size_t c = 0; c < 3; ++c) value[c] += of.value[c] * of.value[c];
+  }
+  Rgb over(double n) const {
+    return {static_cast<float>(value[0] / n), static_cast<float>(value[1] / n),
+            static_cast<float>(value[2] / n)};
+  }
+};
+
 /// f cos L / (q_environment + q_bsdf): the balance heuristic with one sample of each kind. What
 /// hidden_light.h leaves out is traced, too: a reference tells whether it was hidden.
 Contribution weighted_radiance(const SeenSurface& site, const Environment& environment,
@@ -39,10 +57,8 @@ ReferenceEstimate ReferenceRenderer::render(std::span<const SurfaceHit> hits,
                                             std::int32_t num_samples, const RngKey& key,
                                             ShadowRays& rays, std::uint64_t& rays_traced) const {
   const Rng rng(key, PassId::reference);
-  std::array<double, 3> sum{};
-  double sum_lns = 0;
-  double sum_mean = 0;
-  double sum_mean_squared = 0;
+  ColorSum sum, squares, unshadowed;
+  double sum_lns = 0, sum_mean = 0;
   if (environment.map->black()) return {};
   std::vector<SeenSurface> seen;
   for (const SurfaceHit& hit : hits) seen.push_back(hit.hit ? geometry_.see(hit) : SeenSurface{});
@@ -74,31 +90,34 @@ ReferenceEstimate ReferenceRenderer::render(std::span<const SurfaceHit> hits,
     rays_traced += rays.size();
 
     // Add them up, pair by pair.
+    std::array<ColorSum, kBatch> of_pair{};
     std::array<double, kBatch> mean_of_pair{};
     for (std::size_t i = 0; i < contributions.size(); ++i) {
       const Contribution& c = contributions[i];
-      if (!c.is_hidden) sum_lns += mean(c.value);
+      if (!c.is_hidden) {
+        unshadowed.add(c.value);
+        sum_lns += mean(c.value);
+      }
       if (rays.t_far[i] < 0) continue;
-      sum[0] += c.value.x;
-      sum[1] += c.value.y;
-      sum[2] += c.value.z;
+      sum.add(c.value);
+      of_pair[static_cast<std::size_t>(c.pair)].add(c.value);
       mean_of_pair[static_cast<std::size_t>(c.pair)] += mean(c.value);
     }
-    for (const double m : mean_of_pair) {
-      sum_mean += m;
-      sum_mean_squared += m * m;
-    }
+    for (const ColorSum& pair : of_pair) squares.add_squares(pair);
+    for (const double m : mean_of_pair) sum_mean += m;
   }
 
   const double n = num_samples;
-  const double mean_radiance = sum_mean / n;
-  const double variance =
-      std::max(sum_mean_squared / n - mean_radiance * mean_radiance, 0.0) / std::max(n - 1, 1.0);
-  return {.radiance = {static_cast<float>(sum[0] / n), static_cast<float>(sum[1] / n),
-                       static_cast<float>(sum[2] / n)},
+  ColorSum variance;
+  for (std::size_t c = 0; c < 3; ++c) {
+    const double mean = sum.value[c] / n;
+    variance.value[c] = std::max(squares.value[c] / n - mean * mean, 0.0) / std::max(n - 1, 1.0);
+  }
+  return {.radiance = sum.over(n),
+          .unshadowed = unshadowed.over(n),
           .lns = static_cast<float>(sum_lns / n),
           .visibility = sum_lns > 0 ? static_cast<float>(sum_mean / sum_lns) : 0.0f,
-          .mean_variance = static_cast<float>(variance)};
+          .variance = variance.over(1)};
 }
 
 PixelDiagnostics ReferenceMethod::sample(const PixelInput& input, const PixelState& pixel,
@@ -110,7 +129,8 @@ PixelDiagnostics ReferenceMethod::sample(const PixelInput& input, const PixelSta
           .render(input.hits, input.light.now, num_samples_, input.key, own, did.rays_traced);
   rays.known = {.color = estimate.radiance,
                 .visibility = estimate.visibility,
-                .variance = estimate.mean_variance,
+                .variance = estimate.variance,
+                .unshadowed = estimate.unshadowed,
                 .blocked = estimate.visibility < 1};
   SampleState& state = pixel.tile;
   state.lns[pixel.index] = state.lns_fresh[pixel.index] = estimate.lns;

@@ -11,11 +11,12 @@ namespace baton {
 
 /// Brute-force estimate of one pixel with its own error.
 struct ReferenceEstimate {
-  Rgb radiance;   ///< mean over the sites of the reflected, shadowed radiance
-  float lns = 0;  ///< the same without shadows, mean over RGB
+  Rgb radiance;    ///< mean over the sites of the reflected, shadowed radiance
+  Rgb unshadowed;  ///< the same without shadows
+  float lns = 0;   ///< its mean over RGB
   float visibility =
-      0;  ///< share of the unshadowed light that arrives, mean over RGB; 0 without light
-  float mean_variance = 0;  ///< squared standard error of mean(radiance)
+      0;         ///< share of the unshadowed light that arrives, mean over RGB; 0 without light
+  Rgb variance;  ///< squared standard errors of `radiance`
 };
 
 /// `reference`, brute force: `num_samples` independent pairs of one environment and one BRDF sample

@@ -149,8 +149,7 @@ struct Material {
   std::array<double, 3> specular_color{1, 1, 1};
   bool specular_textured = false;  ///< by textures, which are not read
   double clearcoat = 0, clearcoat_roughness = 0;
-  TextureInfo clearcoat_texture, clearcoat_roughness_texture;
-  bool has_coat_normals = false;  ///< clearcoatNormalTexture, which is not read
+  TextureInfo clearcoat_texture, clearcoat_roughness_texture, clearcoat_normal_texture;
   AlphaMode alpha_mode = AlphaMode::opaque;
   double alpha_cutoff = 0.5;
 };

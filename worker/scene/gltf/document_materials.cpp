@@ -39,7 +39,8 @@ void parse_extensions(const JsonView& extensions, const Document& document, Mate
   material.clearcoat_texture = parse_texture_info(coat.at("clearcoatTexture"), document);
   material.clearcoat_roughness_texture =
       parse_texture_info(coat.at("clearcoatRoughnessTexture"), document);
-  material.has_coat_normals = coat.has("clearcoatNormalTexture");
+  material.clearcoat_normal_texture =
+      parse_texture_info(coat.at("clearcoatNormalTexture"), document);
 }
 
 Material parse_material(const JsonView& material, const Document& document) {

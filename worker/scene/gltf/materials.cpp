@@ -78,6 +78,7 @@ MaterialSpec material_spec(const Document& document, int material) {
         static_cast<float>(std::max(given.clearcoat_roughness, kLeastRoughness));
     spec.clearcoat_texture = texture_spec(document, given.clearcoat_texture);
     spec.clearcoat_roughness_texture = texture_spec(document, given.clearcoat_roughness_texture);
+    spec.clearcoat_normal_texture = texture_spec(document, given.clearcoat_normal_texture);
   }
   spec.emission = rgb(given.emission);
   if (!(spec.emission == Rgb{}))
@@ -96,12 +97,10 @@ std::vector<std::string> unsupported_parts(const Document& document, const Mater
   std::vector<std::string> parts;
   if (material.emission != std::array<double, 3>{}) parts.push_back("it glows, but lights nothing");
   if (material.specular_textured) parts.push_back("its textures of `specular` are not read");
-  if (material.clearcoat > 0 && material.has_coat_normals)
-    parts.push_back("the normal map of its coat is not read");
   for (const TextureInfo* info :
        {&material.base_color_texture, &material.metallic_roughness_texture,
         &material.normal_texture, &material.emissive_texture, &material.clearcoat_texture,
-        &material.clearcoat_roughness_texture}) {
+        &material.clearcoat_roughness_texture, &material.clearcoat_normal_texture}) {
     if (info->texture < 0 || document.textures[static_cast<std::size_t>(info->texture)].image >= 0)
       continue;
     parts.push_back("one of its textures has no image of a kind that is read");
