@@ -83,7 +83,10 @@ void load_geometry(const JobSpec& job, AssetReport& report, std::vector<std::str
   if (!scene) return faults.push_back(scene.error().message);
   report.meshes = scene->meshes.size();
   report.instances = scene->instances.size();
-  for (const TriangleMesh& mesh : scene->meshes) report.dropped_triangles += mesh.dropped_triangles;
+  for (const TriangleMesh& mesh : scene->meshes) {
+    report.dropped_triangles += mesh.dropped_triangles;
+    report.deforming_meshes += mesh.deformation != nullptr ? 1 : 0;
+  }
   for (const Instance& instance : scene->instances) {
     report.triangles += scene->meshes[instance.mesh].triangles.size();
     report.objects_move = report.objects_move || instance.moves();

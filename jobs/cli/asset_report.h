@@ -25,7 +25,7 @@ struct MapReport {
 struct AssetReport {
   std::vector<MapReport> maps;  ///< in the order of their first key
   bool every_map = true;        ///< else some were left out
-  std::uint64_t meshes = 0, instances = 0;
+  std::uint64_t meshes = 0, deforming_meshes = 0, instances = 0;
   std::uint64_t triangles = 0;  ///< of all instances
   bool objects_move = false;
   double surface_share = 1;              ///< of the pixels (surface_share)

@@ -74,6 +74,7 @@ void print_json(const JobSpec& job, const JobEstimate& e, const AssetReport& ass
                          {"outputDirectory", job.output.directory},
                          {"meshes", assets.meshes},
                          {"instances", assets.instances},
+                         {"deformingMeshes", assets.deforming_meshes},
                          {"triangles", assets.triangles},
                          {"droppedTriangles", assets.dropped_triangles},
                          {"maps", std::move(maps)},
@@ -91,6 +92,8 @@ void print_json(const JobSpec& job, const JobEstimate& e, const AssetReport& ass
 void print_assets(const AssetReport& assets) {
   fmt::print("geometry   {} triangles in {} instances of {} meshes\n", assets.triangles,
              assets.instances, assets.meshes);
+  if (assets.deforming_meshes > 0)
+    fmt::print("           {} of the meshes deform\n", assets.deforming_meshes);
   for (const MapReport& map : assets.maps) {
     fmt::print("map        {} ({}x{})\n", map.path, map.file_width, map.file_height);
     if (map.width < map.file_width)

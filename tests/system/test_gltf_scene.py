@@ -140,6 +140,7 @@ def what_deforms_is_said(programs, folder):
     check_equal(hidden["motionMaxPx"], 0, "motion without what deforms")
     alive = checked(gltf={"nodes": {**still, "drop": {"visible": False}}})
     check(alive["motionMaxPx"] > 1, f"motion of {alive['motionMaxPx']} pixels")
+    check_equal((hidden["deformingMeshes"], alive["deformingMeshes"]), (0, 1), "meshes that deform")
     check(not [line for line in alive["warnings"] if "morph" in line or "bones" in line], alive["warnings"])
     wrong = set_job(folder, alive=True, gltf={"nodes": {"reed": {"place": {"translate": [0, 1, 0]}}}})
     failed = programs.run("baton", "check", write_job(folder / "wrong.json", wrong), expect=BAD_INPUT)
