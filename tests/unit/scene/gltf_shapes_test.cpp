@@ -30,7 +30,7 @@ void expect_near(const Vec3& a, const Vec3& b) {
 JobSpec job_of(const BarParts& parts, const std::string& nodes = "") {
   const std::string file = test::write_test_file("bar.glb", bar_glb(parts));
   const auto job = parse_job(R"({"name": "j", "frames": "1-25", "environment": {"map": "/m.exr"},
-      "camera": {"position": [0, 0, 9], "lookAt": [0, 0, 0]}, "image": {"width": 64, "height": 48},
+      "camera": {"position": [0, 0, 9], "lookAt": [0, 0, 0]}, "image": {"width": 640, "height": 480},
       "scene": {"gltf": {"file": ")" +
                                  file + R"(", "fps": 24, "startFrame": 1)" + nodes + "}}}",
                              "job", "/");
@@ -198,9 +198,10 @@ TEST(GltfShapes, ADeformingJobIsInMotionAndItsDocumentSaysHow) {
   EXPECT_EQ(*mesh.shaped_by->animation, (FileClock{.fps = 24, .start_frame = 1}));
   EXPECT_EQ(parse_job(to_json(bar.job), "again", "/").value(), bar.job);
 
-  // Measured where the vertices go: (2, 1) to (0, 1) and above, at 8.7 pixels a unit or so.
-  const float per_unit = 24 / (9 * std::tan(0.5f * bar.job.camera.vertical_fov_deg * kPi / 180));
+  // Measured where the vertices go: the tip by 1/24 of its quarter circle a frame.
+  const float per_unit = 240 / (9 * std::tan(0.5f * bar.job.camera.vertical_fov_deg * kPi / 180));
   const float step = 1.4142136f * (kPi / 2 / 24) * per_unit;
+  EXPECT_GT(step, 4);
   EXPECT_GE(bar.job.motion.max_px, static_cast<int>(std::ceil(step)));
   EXPECT_LE(bar.job.motion.max_px, static_cast<int>(std::ceil(1.1f * step)) + 2);
 }
