@@ -29,8 +29,12 @@ JobSpec unshadowed_job(Method method, int sites, int frames) {
   job.sampling.method = method;
   job.sampling.num_candidates = 64;
   job.sampling.reuse_visibility = false;
+  job.sampling.num_particles = 8;
   // Of 8 samples of the map few meet the sun: no sum of 64 seeds is near to normal.
-  job.sampling.num_particles = method == Method::environment ? 64 : 8;
+  if (method == Method::environment) {
+    job.sampling.num_particles = 64;
+    job.environment.keys[0].map = test::write_map("soft.exr", test::sky_map(64, 32, 3));
+  }
   job.sampling.reference_samples = 64;
   job.output.aovs = {Aov::unshadowed};
   return job;
