@@ -309,6 +309,6 @@ def make_set(pillars=7, textured=False, alive=False):
 
 
 if __name__ == "__main__":
-    if len(sys.argv) < 2 or not set(sys.argv[2:]) <= {"--textured", "--alive"}:
+    if len(sys.argv) < 2 or sys.argv[1].startswith("-") or not set(sys.argv[2:]) <= {"--textured", "--alive"}:
         sys.exit(__doc__)
     Path(sys.argv[1]).write_bytes(make_set(textured="--textured" in sys.argv, alive="--alive" in sys.argv))
