@@ -36,9 +36,8 @@ Result<PictureColors> read_picture_colors(const std::filesystem::path& path);
 using ImageMetadata = std::vector<std::pair<std::string, std::string>>;
 
 struct ExrOptions {
-  /// Distances, positions, normals, motion, IDs, `lns` and `variance` stay float32 always.
-  bool half_float = true;
-  std::vector<std::string> whole{};  ///< channels that are float32 whatever half_float says
+  bool half_float = true;            ///< of all channels but `whole`
+  std::vector<std::string> whole{};  ///< channels that are float32 always
   std::string compression = "zip";   ///< none, rle, zips, zip, piz
   ImageMetadata metadata{};
   /// Attributes of their own, which compositors read: worldToCamera, worldToNDC (row by row; points

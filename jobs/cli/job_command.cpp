@@ -46,7 +46,7 @@ Result<ExitCode> submit(const JobOptions& options, RequestClient& client) {
   if (job.sampling.method == Method::automatic) BATON_TRY(ask<JobList>(client, ListJobs{}));
   BATON_TRY(settle_method_at(job, options.link));
   const bool restart = options.restart || options.from_frame || wanted.is_look;
-  const MoreSweeps more(job, restart);
+  begin_sweeps(job, restart);
   BATON_ASSIGN(std::string document, make_job_document(job));
   BATON_ASSIGN(const JobAccepted accepted,
                ask<JobAccepted>(client, SubmitJob{std::move(document), restart}));
@@ -108,24 +108,31 @@ Result<ExitCode> show(const JobOptions& options, RequestClient& client) {
 /// A job that is waited for, with the sweeps that it gets meanwhile.
 class GrowingJob {
  public:
-  /// After the job is done: the ID of the job that has more sweeps, or nullopt: there are enough.
+  /// After the job is done: the ID of the job that has more sweeps, or nullopt: there are enough,
+  /// or only its owner may add some. After an error `timeout` it can be asked again.
   Result<std::optional<std::string>> grow(const Digest& job, RequestClient& client) {
     if (!more_) {
-      BATON_ASSIGN(const JobDocument document, ask<JobDocument>(client, JobDocumentRequest{job}));
-      BATON_ASSIGN(ParsedJobDocument parsed, parse_job_document(document.json));
+      const Result<JobDocument> document = ask<JobDocument>(client, JobDocumentRequest{job});
+      if (!document && document.error().kind == ErrorKind::usage)
+        return std::optional<std::string>();
+      if (!document) return document.error();
+      BATON_ASSIGN(ParsedJobDocument parsed, parse_job_document(document->json));
       spec_ = std::move(parsed.job);
       more_.emplace(spec_, false);
     }
-    if (!more_->add_to(spec_)) return std::optional<std::string>();
-    BATON_ASSIGN(std::string document, make_job_document(spec_));
-    BATON_ASSIGN(const JobAccepted accepted,
-                 ask<JobAccepted>(client, SubmitJob{std::move(document)}));
+    if (next_.empty()) {
+      if (!more_->add_to(spec_)) return std::optional<std::string>();
+      BATON_ASSIGN(next_, make_job_document(spec_));
+    }
+    BATON_ASSIGN(const JobAccepted accepted, ask<JobAccepted>(client, SubmitJob{next_}));
+    next_.clear();
     fmt::print(stderr, "{}", accepted.plan);
     return std::optional(accepted.job.hex());
   }
 
  private:
   JobSpec spec_;
+  std::string next_;  ///< its document, until it is accepted
   std::optional<MoreSweeps> more_;
 };
 
@@ -152,9 +159,11 @@ Result<ExitCode> wait(const JobOptions& options, RequestClient& client) {
     const JobDetail& detail = *answer;
     const bool expired = options.timeout_s > 0 && waited.count() >= options.timeout_s;
     if (detail.summary.status == JobStatus::done && !expired) {
-      BATON_ASSIGN(const std::optional<std::string> next, growing.grow(detail.summary.job, client));
-      if (next) {
-        job = *next;
+      const Result<std::optional<std::string>> next = growing.grow(detail.summary.job, client);
+      if (!next && next.error().kind != ErrorKind::timeout) return next.error();
+      if (next && *next) job = **next;
+      if (!next || *next) {
+        std::this_thread::sleep_for(kPollInterval);
         continue;
       }
     }

@@ -47,11 +47,12 @@ int written_sweeps(const JobSpec& job) {
 
 }  // namespace
 
-MoreSweeps::MoreSweeps(JobSpec& job, bool afresh)
-    : first_sweeps_(job.quality.may_grow() && !afresh ? written_sweeps(job) : 0) {
-  if (!job.quality.may_grow()) return;
+int begin_sweeps(JobSpec& job, bool afresh) {
+  if (!job.quality.may_grow()) return 0;
+  const int written = afresh ? 0 : written_sweeps(job);
   job.quality.refinable = true;
-  job.quality.sweeps = std::max(job.quality.sweeps, first_sweeps_);
+  job.quality.sweeps = std::max(job.quality.sweeps, written);
+  return written;
 }
 
 bool MoreSweeps::add_to(JobSpec& job) {

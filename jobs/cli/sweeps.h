@@ -6,6 +6,10 @@
 
 namespace baton {
 
+/// Makes a job that may grow refinable, and has it go on with the sweeps of the frames that are
+/// there. afresh: they are replaced. Returns how many of its sweeps these have.
+int begin_sweeps(JobSpec& job, bool afresh);
+
 /// Adds sweeps to a job until quality.noiseThreshold, maxRounds or timeLimit ends it. Each time it
 /// is twice as many, so that frames after 1, 2, 4 ... times quality.rounds can be looked at, or as
 /// many as the noise so far asks for, if those are fewer.
@@ -16,9 +20,8 @@ namespace baton {
 /// own.
 class MoreSweeps {
  public:
-  /// Makes a job that may grow refinable, and has it go on with the sweeps of the frames that are
-  /// there. afresh: they are replaced.
-  MoreSweeps(JobSpec& job, bool afresh);
+  /// Begins the job (begin_sweeps).
+  MoreSweeps(JobSpec& job, bool afresh) : first_sweeps_(begin_sweeps(job, afresh)) {}
 
   /// After the job is done: whether it has more sweeps now; says why on stderr.
   bool add_to(JobSpec& job);

@@ -59,6 +59,7 @@ def roles_decide_who_may_do_what(programs, folder):
         job = json.loads(farm.speak("user", "job", "submit", path, "--json").stdout)["id"]
         farm.speak("user", "job", "wait", job)
         check_equal(json.loads(farm.speak("anna", "job", "show", job, "--json").stdout)["owner"], "user", "the owner")
+        farm.speak("anna", "job", "wait", job)
 
         # A user's key stops nothing that is not its own; a worker's key asks for nothing.
         farm.refused("user", "worker", "drain", "worker0", says="user 'user' may not drain workers")

@@ -96,8 +96,8 @@ class Accel {
  public:
   /// Keeps a reference to `scene`, which must outlive it. What stands still is one flat hierarchy;
   /// each mesh that moves has its own, placed where the scene says, unless it deforms: then it has
-  /// one in each frame. Errors: bad_input where it
-  /// would take more than limits.max_bytes; Embree's own message.
+  /// one in each frame. Errors: bad_input where it would take more than limits.max_bytes; Embree's
+  /// own message.
   static Result<std::unique_ptr<Accel>> build(const Scene& scene, const AccelLimits& limits = {});
   virtual ~Accel() = default;
 

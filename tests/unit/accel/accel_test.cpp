@@ -10,37 +10,12 @@
 
 #include "tests/support/chi_square.h"
 #include "tests/support/mesh_files.h"
+#include "tests/unit/accel/spheres.h"
 
 namespace baton {
 namespace {
 
 using test::test_uniforms;
-
-/// A sphere of 2 * rings * sectors triangles, its vertices moved by `bumps` along the normal.
-TriangleMesh sphere_mesh(int rings, int sectors, float bumps = 0) {
-  TriangleMesh mesh;
-  for (int i = 0; i <= rings; ++i) {
-    for (int j = 0; j < sectors; ++j) {
-      const float theta = kPi * static_cast<float>(i) / static_cast<float>(rings);
-      const float phi = 2 * kPi * static_cast<float>(j) / static_cast<float>(sectors);
-      const Vec3 n{std::sin(theta) * std::cos(phi), std::cos(theta),
-                   std::sin(theta) * std::sin(phi)};
-      const float u = test_uniforms(9, static_cast<std::uint32_t>(mesh.positions.size()))[0];
-      mesh.positions.push_back(n * (1 + bumps * (u - 0.5f)));
-      mesh.normals.push_back(n);
-    }
-  }
-  const auto at = [sectors](int i, int j) {
-    return static_cast<std::uint32_t>(i * sectors + j % sectors);
-  };
-  for (int i = 0; i < rings; ++i) {
-    for (int j = 0; j < sectors; ++j) {
-      if (i > 0) mesh.triangles.push_back({at(i, j), at(i, j + 1), at(i + 1, j)});
-      if (i + 1 < rings) mesh.triangles.push_back({at(i, j + 1), at(i + 1, j + 1), at(i + 1, j)});
-    }
-  }
-  return mesh;
-}
 
 /// Many small triangles with gaps between them: an edge decides whether a ray gets through.
 TriangleMesh triangle_soup(std::uint32_t count) {
@@ -56,28 +31,6 @@ TriangleMesh triangle_soup(std::uint32_t count) {
     mesh.triangles.push_back({3 * i, 3 * i + 1, 3 * i + 2});
   }
   return mesh;
-}
-
-Scene scene_of(TriangleMesh mesh, const Transform& to_world = {},
-               const Mat3& normal_to_world = {}) {
-  Scene scene;
-  scene.meshes.push_back(std::move(mesh));
-  scene.materials.emplace_back();
-  scene.instances.push_back({0, 0, to_world, normal_to_world});
-  return scene;
-}
-
-std::unique_ptr<Accel> build(const Scene& scene) {
-  auto accel = Accel::build(scene);
-  EXPECT_TRUE(accel.ok());
-  return std::move(*accel);
-}
-
-SurfaceHit trace(const Accel& accel, const Vec3& origin, const Vec3& direction) {
-  const Ray ray{origin, normalize(direction)};
-  SurfaceHit hit;
-  accel.intersect({&ray, 1}, {&hit, 1});
-  return hit;
 }
 
 /// Copy of the rays in `order`, not traced yet.
