@@ -2,7 +2,6 @@
 #include <spdlog/spdlog.h>
 #include <CLI/CLI.hpp>
 
-#include <malloc.h>
 #include <signal.h>
 
 #include <algorithm>
@@ -16,15 +15,15 @@
 #include "worker/run/replay.h"
 #include "worker/run/worker.h"
 
-namespace {
-
-/// Work space of tiles is freed and taken again all the time. What is freed stays with the process,
-/// as giving it back costs the system as much as all of its other work for a worker. Larger blocks
-/// than malloc keeps (32 MiB) go back.
-void keep_freed_memory() {
-  ::mallopt(M_MMAP_THRESHOLD, 32 << 20);
-  ::mallopt(M_TRIM_THRESHOLD, 1 << 30);
+/// What jemalloc reads when the process starts. Work space of tiles is freed and taken again all the
+/// time, and giving it back at once would cost the system as much as all of its other work for a
+/// worker: freed pages go back after a minute without use, large ones as well.
+extern "C" {
+extern const char* const malloc_conf;
+const char* const malloc_conf = "background_thread:true,oversize_threshold:0,dirty_decay_ms:60000";
 }
+
+namespace {
 
 /// SIGTERMs and SIGINTs so far, read by the control thread.
 std::atomic<int> g_signals{0};
@@ -147,7 +146,6 @@ int main(int argc, char** argv) {
     return app.exit(error) == 0 ? 0 : static_cast<int>(baton::ExitCode::usage);
   }
 
-  keep_freed_memory();
   baton::init_logging("baton-worker");
   baton::install_crash_handler();
   if (replay_command->parsed()) {
