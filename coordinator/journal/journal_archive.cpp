@@ -10,28 +10,8 @@
 namespace baton {
 namespace {
 
-/// A row of `completions` as it stands in the archive.
-struct ArchivedCompletion {
-  TaskKey task;
-  std::vector<BlobRef> outputs;
-  RenderStats stats;
-  std::vector<FrameStats> frames;
-  template <class A>
-  void fields(A& a) {
-    a(task, outputs, stats, frames);
-  }
-};
-
 /// How many of a job stand in one piece, so that no piece is large once unpacked.
 constexpr std::size_t kCompletionsPerPiece = 4096;
-
-struct ArchivedPiece {
-  std::vector<ArchivedCompletion> completions;
-  template <class A>
-  void fields(A& a) {
-    a(completions);
-  }
-};
 
 constexpr int kMaxFound = 20;
 
@@ -44,9 +24,9 @@ Status Journal::archive_job(const Digest& job, const Bytes& summary, const Bytes
                write("INSERT INTO archived_completions (job, raw_bytes, stored_raw, packed) "
                      "VALUES (?, ?, ?, ?)"));
   SectionPacker packer;
-  ArchivedPiece piece;
+  std::vector<Completion> piece;
   const auto store = [&]() -> Status {
-    if (piece.completions.empty()) return {};
+    if (piece.empty()) return {};
     const Bytes raw = to_bytes(std::exchange(piece, {}));
     Bytes packed;
     const bool stored_raw = packer.append(raw, 1, Packing::zstd, packed);
@@ -58,8 +38,8 @@ Status Journal::archive_job(const Digest& job, const Bytes& summary, const Bytes
   };
   // Not those that the archive has: they are the ones that are written here.
   BATON_TRY(visit_recorded(job, [&](const Completion& c) -> Status {
-    piece.completions.push_back({c.task, c.outputs, c.stats, c.frames});
-    return piece.completions.size() < kCompletionsPerPiece ? Status() : store();
+    piece.push_back(c);
+    return piece.size() < kCompletionsPerPiece ? Status() : store();
   }));
   BATON_TRY(store());
 
@@ -103,7 +83,7 @@ Status Journal::visit_archived(const Digest& job,
     if (!row) return {};
     const auto raw_bytes = static_cast<std::size_t>(query.integer(0));
     Result<Bytes> raw = unpacker.unpack(query.blob(2), query.integer(1) != 0, 1, raw_bytes);
-    ArchivedPiece piece;
+    std::vector<Completion> piece;
     bool complete = raw.ok();
     if (complete) {
       ArchiveReader reader(*raw);
@@ -115,8 +95,7 @@ Status Journal::visit_archived(const Digest& job,
                    fmt::format("{}: the archived completions of job {} cannot be read",
                                database_.name(), job.hex())};
     }
-    for (const ArchivedCompletion& c : piece.completions)
-      BATON_TRY(visit({c.task, c.outputs, c.stats, c.frames}));
+    for (const Completion& completion : piece) BATON_TRY(visit(completion));
   }
 }
 
