@@ -27,15 +27,8 @@ void add(T& a, const T& b) {
 }  // namespace
 
 std::string_view task_name(TaskKind kind) {
-  switch (kind) {
-    case TaskKind::render:
-      return "render";
-    case TaskKind::assemble:
-      return "assemble";
-    case TaskKind::second_pass:
-      return "second pass";
-  }
-  return "unknown";
+  constexpr std::array<std::string_view, 3> kNames{"render", "assemble", "second pass"};
+  return kNames.at(static_cast<std::size_t>(kind));
 }
 
 std::string describe_task(const TaskKey& task) {
@@ -48,6 +41,11 @@ std::string describe_task(const TaskKey& task) {
       return fmt::format("second pass of tile {} frame index {}", task.tile, task.step);
   }
   return "unknown task";
+}
+
+std::string_view blob_kind_name(BlobKind kind) {
+  constexpr std::array<std::string_view, 4> kNames{"state", "film", "image", "first-pass samples"};
+  return kNames.at(static_cast<std::size_t>(kind));
 }
 
 Digest held_state_name(const Digest& job, std::int32_t frame, std::int32_t tile) {
@@ -63,19 +61,9 @@ std::vector<Digest> stored_blobs(const std::vector<BlobRef>& blobs) {
 }
 
 std::string_view job_status_name(JobStatus status) {
-  switch (status) {
-    case JobStatus::running:
-      return "running";
-    case JobStatus::done:
-      return "done";
-    case JobStatus::failed:
-      return "failed";
-    case JobStatus::cancelled:
-      return "cancelled";
-    case JobStatus::paused:
-      return "paused";
-  }
-  return "unknown";
+  constexpr std::array<std::string_view, 5> kNames{"running", "done", "failed", "cancelled",
+                                                   "paused"};
+  return kNames.at(static_cast<std::size_t>(status));
 }
 
 void SamplingStats::count_ess(float ess_ratio) {
@@ -86,17 +74,8 @@ void SamplingStats::count_ess(float ess_ratio) {
 void SamplingStats::merge(const SamplingStats& b) { add(*this, b); }
 
 std::string_view noise_source_name(NoiseSource source) {
-  switch (source) {
-    case NoiseSource::none:
-      return "none";
-    case NoiseSource::halves:
-      return "halves";
-    case NoiseSource::neighbors:
-      return "neighbors";
-    case NoiseSource::probes:
-      return "probes";
-  }
-  return "unknown";
+  constexpr std::array<std::string_view, 4> kNames{"none", "halves", "neighbors", "probes"};
+  return kNames.at(static_cast<std::size_t>(source));
 }
 
 void FrameStats::merge(const FrameStats& b) {

@@ -39,6 +39,8 @@ std::string describe_task(const TaskKey& task);
 /// samples that of a step (common/job/sequence.h). Stored and sent; values are for ever.
 enum class BlobKind : std::uint8_t { state = 0, film = 1, image = 2, first_pass = 3 };
 constexpr BlobKind last_of(BlobKind) { return BlobKind::first_pass; }
+/// "state", "film", "image", "first-pass samples".
+std::string_view blob_kind_name(BlobKind kind);
 
 struct BlobRef {
   BlobKind kind = BlobKind::state;
