@@ -1,29 +1,28 @@
 #pragma once
 
 #include <array>
-#include <concepts>
 #include <cstdint>
 #include <string>
+#include <tuple>
 #include <type_traits>
 #include <vector>
 
 #include "common/base/bytes.h"
-#include "common/base/digest.h"
+#include "common/base/members.h"
 
 namespace baton {
 
-/// The byte form of plain structs that list their members in `template <class A> void fields(A&
-/// a)`: members in order, little-endian, no padding. A bool is one byte 0 or 1; an enum its
-/// underlying integer; a string u32 length and bytes; a vector u32 count and elements; an array its
-/// elements; a Digest its two halves. Every enum that is archived has a `last_of(Enum)` beside it,
-/// found by argument-dependent lookup: larger values are refused.
+/// The byte form of plain structs: members in the order of their declaration, little-endian, no
+/// padding. A bool is one byte 0 or 1; an enum its underlying integer; a string u32 length and
+/// bytes; a vector u32 count and elements; an array its elements. Every enum that is archived has a
+/// `last_of(Enum)` beside it, found by argument-dependent lookup: larger values are refused.
 
-/// Appends what `fields` lists to a ByteWriter.
+/// Appends values to a ByteWriter.
 class ArchiveWriter {
  public:
-  template <class... T>
-  void operator()(T&... values) {
-    (write(values), ...);
+  template <class T>
+  void operator()(const T& value) {
+    write(value);
   }
   Bytes take() { return writer_.take(); }
 
@@ -35,22 +34,20 @@ class ArchiveWriter {
   requires std::is_enum_v<T>
   void write(const T& value) { writer_.put(static_cast<std::underlying_type_t<T>>(value)); }
   void write(const std::string& text) { writer_.put_string(text); }
-  void write(const Digest& digest) {
-    writer_.put(digest.high);
-    writer_.put(digest.low);
-  }
   template <class T>
-  void write(std::vector<T>& values) {
+  void write(const std::vector<T>& values) {
     writer_.put(static_cast<std::uint32_t>(values.size()));
-    for (T& value : values) write(value);
+    for (const T& value : values) write(value);
   }
   template <class T, std::size_t N>
-  void write(std::array<T, N>& values) {
-    for (T& value : values) write(value);
+  void write(const std::array<T, N>& values) {
+    for (const T& value : values) write(value);
   }
   template <class T>
-  requires requires(T& value, ArchiveWriter& a) { value.fields(a); }
-  void write(T& value) { value.fields(*this); }
+  requires std::is_aggregate_v<T>
+  void write(const T& value) {
+    std::apply([&](const auto&... members) { (write(members), ...); }, members_of(value));
+  }
 
   ByteWriter writer_;
 };
@@ -61,9 +58,9 @@ class ArchiveReader {
  public:
   explicit ArchiveReader(ByteView bytes) : reader_(bytes) {}
 
-  template <class... T>
-  void operator()(T&... values) {
-    (read(values), ...);
+  template <class T>
+  void operator()(T& value) {
+    read(value);
   }
   /// True when every value was there and in range, and nothing is left over.
   bool complete() const { return in_range_ && reader_.ok() && reader_.at_end(); }
@@ -87,10 +84,6 @@ class ArchiveReader {
     }
   }
   void read(std::string& text) { text = reader_.get_string(); }
-  void read(Digest& digest) {
-    digest.high = reader_.get<std::uint64_t>();
-    digest.low = reader_.get<std::uint64_t>();
-  }
   template <class T>
   void read(std::vector<T>& values) {
     // Grow with what is really there: the count alone must not reserve memory.
@@ -103,17 +96,18 @@ class ArchiveReader {
     for (T& value : values) read(value);
   }
   template <class T>
-  requires requires(T& value, ArchiveReader& a) { value.fields(a); }
-  void read(T& value) { value.fields(*this); }
+  requires std::is_aggregate_v<T>
+  void read(T& value) {
+    std::apply([&](auto&... members) { (read(members), ...); }, members_of(value));
+  }
 
   ByteReader reader_;
   bool in_range_ = true;
 };
 
-/// The bytes of one struct. Takes a copy because `fields` is shared with the reader and so not
-/// const.
+/// The bytes of one value.
 template <class T>
-Bytes to_bytes(T value) {
+Bytes to_bytes(const T& value) {
   ArchiveWriter writer;
   writer(value);
   return writer.take();

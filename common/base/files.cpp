@@ -8,8 +8,8 @@
 #include <atomic>
 #include <cerrno>
 #include <cstring>
-#include <utility>
 
+#include "common/base/file_descriptor.h"
 #include "common/base/limits.h"
 
 namespace baton {
@@ -23,23 +23,10 @@ Error io_error(std::string_view what, const fs::path& path) {
           fmt::format("{}: {}: {}", path.string(), what, std::strerror(errno))};
 }
 
-/// Closes on scope exit.
-struct FileDescriptor {
-  int fd = -1;
-  explicit FileDescriptor(int descriptor) : fd(descriptor) {}
-  FileDescriptor(const FileDescriptor&) = delete;
-  FileDescriptor& operator=(const FileDescriptor&) = delete;
-  ~FileDescriptor() {
-    if (fd >= 0) ::close(fd);
-  }
-  /// Closes now: some file systems tell only then that they could not write.
-  bool close() { return ::close(std::exchange(fd, -1)) == 0; }
-};
-
 Status sync_path(const fs::path& path, int flags) {
   const FileDescriptor file(::open(path.c_str(), flags | O_CLOEXEC));
-  if (file.fd < 0) return io_error("cannot open to sync", path);
-  if (::fsync(file.fd) != 0) return io_error("cannot sync", path);
+  if (!file) return io_error("cannot open to sync", path);
+  if (::fsync(file.number()) != 0) return io_error("cannot sync", path);
   return {};
 }
 
@@ -64,7 +51,7 @@ Status expect_file(const fs::path& path) {
 Result<Bytes> read_file(const fs::path& path, std::uint64_t max_size_bytes) {
   // O_NONBLOCK: a named pipe must not make us wait for its writer.
   const FileDescriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
-  if (file.fd < 0) return io_error("cannot open", path);
+  if (!file) return io_error("cannot open", path);
   std::error_code error;
   if (fs::is_directory(path, error)) {
     return Error{ErrorKind::bad_input,
@@ -82,7 +69,7 @@ Result<Bytes> read_file(const fs::path& path, std::uint64_t max_size_bytes) {
   Bytes bytes(size);
   std::size_t done = 0;
   while (done < bytes.size()) {
-    const ssize_t count = ::read(file.fd, bytes.data() + done, bytes.size() - done);
+    const ssize_t count = ::read(file.number(), bytes.data() + done, bytes.size() - done);
     if (count < 0 && errno == EINTR) continue;
     if (count < 0) return io_error("cannot read", path);
     if (count == 0) break;
@@ -124,8 +111,8 @@ Status write_then(const fs::path& path, ByteView bytes, Publish publish) {
   const fs::path temporary = temporary_sibling(path);
   {
     FileDescriptor file(::open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644));
-    if (file.fd < 0) return io_error("cannot create", temporary);
-    Status written = write_all(file.fd, bytes, temporary);
+    if (!file) return io_error("cannot create", temporary);
+    Status written = write_all(file.number(), bytes, temporary);
     if (!file.close() && written) written = io_error("cannot write", temporary);
     if (!written) {
       ::unlink(temporary.c_str());
@@ -192,8 +179,8 @@ Status expect_space(const fs::path& folder, std::uint64_t size_bytes, std::uint6
 
 Status sync_file_system(const fs::path& path) {
   const FileDescriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC));
-  if (file.fd < 0) return io_error("cannot open to sync", path);
-  if (::syncfs(file.fd) != 0) return io_error("cannot sync the file system of", path);
+  if (!file) return io_error("cannot open to sync", path);
+  if (::syncfs(file.number()) != 0) return io_error("cannot sync the file system of", path);
   return {};
 }
 

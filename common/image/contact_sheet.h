@@ -1,5 +1,6 @@
 #pragma once
 
+#include <array>
 #include <span>
 
 #include "common/image/image_io.h"
@@ -16,6 +17,11 @@ float auto_exposure(const RgbImage& image);
 /// luminance), bright ones fade to white (it runs per channel). Negative and not finite values
 /// count as 0.
 RgbImage tone_map(const RgbImage& image, float exposure);
+
+/// Copies a crop (x, y, width, height) with its corner at (left, top), each pixel as a square of
+/// `scale` pixels.
+void paste(const RgbImage& from, const std::array<int, 4>& crop, int scale, int left, int top,
+           RgbImage& to);
 
 /// The picture `width` pixels wide, height by its aspect, shrunk with a box filter; an enlarged
 /// pixel stays a rectangle.

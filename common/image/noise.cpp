@@ -1,26 +1,10 @@
 #include "common/image/noise.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <numbers>
 
 namespace baton {
-namespace {
-
-/// The colours of a film; false: it has not all of them.
-struct Colors {
-  std::array<const float*, 3> plane;
-
-  explicit Colors(const FilmTile& film) : plane{film.find("R"), film.find("G"), film.find("B")} {}
-  explicit operator bool() const { return plane[0] && plane[1] && plane[2]; }
-  double grey(std::size_t i) const {
-    return (double{plane[0][i]} + double{plane[1][i]} + double{plane[2][i]}) / 3;
-  }
-};
-
-}  // namespace
-
 void FrameNoise::add_pixel(double grey) {
   if (!std::isfinite(grey)) return;
   light_ += grey;
@@ -55,7 +39,7 @@ double cycles_noise_squared(double variance, double grey) {
 }
 
 float cycles_noise(const FilmTile& film) {
-  const Colors colors(film);
+  const FilmColors colors(film);
   const float* const error = film.find(kErrorChannel);
   if (!colors || error == nullptr) return 0;
   double sum = 0;
@@ -72,7 +56,7 @@ float cycles_noise(const FilmTile& film) {
 
 FrameNoise noise_of_film(const FilmTile& film) {
   FrameNoise noise;
-  const Colors colors(film);
+  const FilmColors colors(film);
   const float* const error = film.find(kErrorChannel);
   if (!colors || error == nullptr) return noise;
   for (std::size_t i = 0; i < film.num_pixels(); ++i) {
@@ -85,7 +69,7 @@ FrameNoise noise_of_film(const FilmTile& film) {
 
 FrameNoise noise_of_seeds(const FilmTile& a, const FilmTile& b) {
   FrameNoise noise;
-  const Colors first(a), second(b);
+  const FilmColors first(a), second(b);
   const float* const alpha = a.find("A");
   if (!first || !second || alpha == nullptr || a.rect != b.rect) return noise;
   for (std::size_t i = 0; i < a.num_pixels(); ++i) {

@@ -1,10 +1,23 @@
 #pragma once
 
+#include <array>
 #include <cstddef>
 
 #include "common/image/film_tile.h"
 
 namespace baton {
+
+/// The colours of a film; false: it has not all of them.
+struct FilmColors {
+  std::array<const float*, 3> plane;
+
+  explicit FilmColors(const FilmTile& film)
+      : plane{film.find("R"), film.find("G"), film.find("B")} {}
+  explicit operator bool() const { return plane[0] && plane[1] && plane[2]; }
+  double grey(std::size_t i) const {
+    return (double{plane[0][i]} + double{plane[1][i]} + double{plane[2][i]}) / 3;
+  }
+};
 
 /// The noise of a frame, the one measure of it in the program:
 ///

@@ -3,13 +3,12 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
 #include <map>
+
+#include "common/job/sequence.h"
 
 namespace baton {
 namespace {
-
-constexpr std::size_t kNumAovs = static_cast<std::size_t>(Aov::blocked) + 1;
 
 /// "CryptoObject00.R", ".G", ".B", ".A", "CryptoObject01.R", ...
 std::vector<std::string> crypto_channels(const char* layer) {
@@ -19,83 +18,73 @@ std::vector<std::string> crypto_channels(const char* layer) {
   return channels;
 }
 
-AovTraits make_traits(Aov aov) {
-  const auto geometry = [](std::vector<std::string> channels, double bytes) {
-    return AovTraits{std::move(channels), true, true, bytes};
+/// In the order of the enumeration.
+const std::vector<AovTraits>& table() {
+  const auto rgb = [](const std::string& layer) {
+    return std::vector<std::string>{layer + ".R", layer + ".G", layer + ".B"};
   };
-  switch (aov) {
-    case Aov::lns:
-      return {.channels = {"lns"}, .is_float = true, .film_bytes = 3.2};
-    case Aov::visibility:
-      return {.channels = {"visibility"}, .film_bytes = 2.9};
-    case Aov::ess:
-      return {.channels = {"ess"}, .film_bytes = 1.6};
-    case Aov::acceptance:
-      return {.channels = {"acceptance"}, .film_bytes = 1.6};
-    case Aov::source:
-      return {.channels = {"source.R", "source.G", "source.B"}, .film_bytes = 0.1};
-    case Aov::normal:
-      return {.channels = {"normal.X", "normal.Y", "normal.Z"}, .is_float = true};
-    case Aov::depth:
-      return {.channels = {"depth"}, .is_float = true, .film_bytes = 2.9};
-    case Aov::variance:
-      return {.channels = {"variance.R", "variance.G", "variance.B"},
-              .is_float = true,
-              .film_bytes = 12};
-    case Aov::mask:
-      return {.channels = {"mask"}, .film_bytes = 0.1};
-    case Aov::acceptance_local:
-      return {.channels = {"acceptanceLocal"}, .film_bytes = 1.6};
-    case Aov::acceptance_independent:
-      return {.channels = {"acceptanceIndependent"}, .film_bytes = 1.6};
-    case Aov::resampled:
-      return {.channels = {"resampled"}, .film_bytes = 0.1};
-    case Aov::rounds:
-      return {.channels = {"rounds"}, .is_float = true, .film_bytes = 0.1};
-    case Aov::material:
-      return {.channels = {"material"}, .is_float = true, .film_bytes = 0.1};
-    case Aov::albedo: {
-      AovTraits row = geometry({"albedo.R", "albedo.G", "albedo.B"}, 1);
-      row.is_float = false;
-      return row;
-    }
-    case Aov::position:
-      return geometry({"P.X", "P.Y", "P.Z"}, 7);
-    case Aov::z:
-      return geometry({"Z"}, 2.5);
-    case Aov::motion:
-      return geometry({"forward.u", "forward.v", "backward.u", "backward.v"}, 12);
-    case Aov::object:
-      return geometry({"object"}, 0.1);
-    case Aov::crypto_object:
-      return geometry(crypto_channels(kCryptoObject), 1);
-    case Aov::crypto_material:
-      return geometry(crypto_channels(kCryptoMaterial), 1);
-    case Aov::unshadowed:
-      return {.channels = {"unshadowed.R", "unshadowed.G", "unshadowed.B"},
-              .is_float = true,
-              .film_bytes = 9.3};
-    case Aov::blocked:
-      return {.channels = {"blocked.R", "blocked.G", "blocked.B"},
-              .is_float = true,
-              .film_bytes = 10.7};
-  }
-  return {};
+  // clang-format off
+  static const std::vector<AovTraits> kTable{
+      // name                   channels                               is_float  of_geometry  film_bytes
+      {"lns",                   {"lns"},                               true,     false,       3.2},
+      {"visibility",            {"visibility"},                        false,    false,       2.9},
+      {"ess",                   {"ess"},                               false,    false,       1.6},
+      {"acceptance",            {"acceptance"},                        false,    false,       1.6},
+      {"source",                rgb("source"),                         false,    false,       0.1},
+      {"normal",                {"normal.X", "normal.Y", "normal.Z"},  true,     false,       4},
+      {"depth",                 {"depth"},                             true,     false,       2.9},
+      {"variance",              rgb("variance"),                       true,     false,       12},
+      {"mask",                  {"mask"},                              false,    false,       0.1},
+      {"acceptanceLocal",       {"acceptanceLocal"},                   false,    false,       1.6},
+      {"acceptanceIndependent", {"acceptanceIndependent"},             false,    false,       1.6},
+      {"resampled",             {"resampled"},                         false,    false,       0.1},
+      {"rounds",                {"rounds"},                            true,     false,       0.1},
+      {"material",              {"material"},                          true,     false,       0.1},
+      {"albedo",                rgb("albedo"),                         false,    true,        1},
+      {"position",              {"P.X", "P.Y", "P.Z"},                 true,     true,        7},
+      {"z",                     {"Z"},                                 true,     true,        2.5},
+      {"motion", {"forward.u", "forward.v", "backward.u", "backward.v"}, true,   true,        12},
+      {"object",                {"object"},                            true,     true,        0.1},
+      {"cryptoObject",          crypto_channels(kCryptoObject),        true,     true,        1},
+      {"cryptoMaterial",        crypto_channels(kCryptoMaterial),      true,     true,        1},
+      {"unshadowed",            rgb("unshadowed"),                     true,     false,       9.3},
+      {"blocked",               rgb("blocked"),                        true,     false,       10.7},
+  };
+  // clang-format on
+  return kTable;
 }
 
 }  // namespace
 
-const AovTraits& traits(Aov aov) {
-  static const std::array<AovTraits, kNumAovs> kTable = [] {
-    std::array<AovTraits, kNumAovs> table;
-    for (std::size_t i = 0; i < kNumAovs; ++i) table.at(i) = make_traits(static_cast<Aov>(i));
-    return table;
-  }();
-  return kTable.at(static_cast<std::size_t>(aov));
+const AovTraits& traits(Aov aov) { return table().at(static_cast<std::size_t>(aov)); }
+
+std::vector<std::string_view> aov_names() {
+  std::vector<std::string_view> names;
+  for (const AovTraits& row : table()) names.push_back(row.name);
+  return names;
 }
 
 bool has_aov(const JobSpec& job, Aov aov) {
   return std::ranges::find(job.output.aovs, aov) != job.output.aovs.end();
+}
+
+std::string_view why_empty(Aov aov, const JobSpec& job) {
+  const Method method = job.sampling.method;
+  switch (aov) {
+    case Aov::acceptance:
+    case Aov::acceptance_local:
+    case Aov::acceptance_independent:
+    case Aov::resampled:
+      return traits(method).moves_samples ? "" : "only `sequential` fills it";
+    case Aov::variance:
+      return tells_noise(job) ? ""
+                              : "samples that are carried, or that a second pass exchanges, tell "
+                                "nothing of their error";
+    case Aov::ess:
+      return traits(method).keeps_samples ? "" : "the method's rays have no weights";
+    default:
+      return "";
+  }
 }
 
 std::vector<std::string> object_names(const JobSpec& job) {

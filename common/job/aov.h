@@ -1,6 +1,7 @@
 #pragma once
 
 #include <string>
+#include <string_view>
 #include <vector>
 
 #include "common/job/job_spec.h"
@@ -14,14 +15,20 @@ inline constexpr std::size_t kCryptoRanks = 6;
 
 /// What is known of an AOV without a frame.
 struct AovTraits {
+  std::string_view name;              ///< in JSON
   std::vector<std::string> channels;  ///< of the EXR file, as compositors expect them
   bool is_float = false;              ///< 32 bits whatever output.pixelType says
   bool of_geometry = false;           ///< follows from what the sites see, not from samples
   double film_bytes = 4;              ///< of a pixel with a surface in a packed film, measured
 };
 const AovTraits& traits(Aov aov);
+/// By value of the enumeration.
+std::vector<std::string_view> aov_names();
 /// Whether the job's frames have it.
 bool has_aov(const JobSpec& job, Aov aov);
+
+/// Why an AOV shows nothing of this job: it is the same everywhere. Empty: it shows something.
+std::string_view why_empty(Aov aov, const JobSpec& job);
 
 /// The job's objects for people: by their meshes, "bunny", "bunny.2" ...; the ground last.
 std::vector<std::string> object_names(const JobSpec& job);

@@ -7,6 +7,7 @@
 #include <cmath>
 
 #include "common/base/limits.h"
+#include "common/job/aov.h"
 #include "common/job/estimate.h"
 #include "common/job/frame_range.h"
 #include "common/job/sequence.h"
@@ -268,7 +269,7 @@ void fields(JobArchive& a, OutputSpec& output, const JobSpec& job) {
   }
   a.choice("background", output.background, kBackgrounds);
   const NamedSet<Aov> denoise{"denoise", {Aov::normal, Aov::variance, Aov::albedo, Aov::motion}};
-  a.choices("aovs", output.aovs, kAovs, std::span(&denoise, 1));
+  a.choices("aovs", output.aovs, aov_names(), std::span(&denoise, 1));
   a.choice("pixelType", output.pixel_type, kPixelTypes);
   a.word("compression", output.compression, kCompressions);
   a.number("framesPerSecond", output.frames_per_second, {1, 1000});
@@ -306,7 +307,7 @@ void check_adaptive(JobArchive& a, const JobSpec& job) {
 void check_unshadowed(JobArchive& a, const JobSpec& job) {
   for (const Aov aov : {Aov::unshadowed, Aov::blocked}) {
     if (!has_aov(job, aov)) continue;
-    const std::string_view name = kAovs.at(static_cast<std::size_t>(aov));
+    const std::string_view name = traits(aov).name;
     const auto refuse = [&](std::string_view why) {
       a.fault("output", fmt::format("no {} among aovs, as {}", name, why),
               fmt::format("\"{}\"", name));

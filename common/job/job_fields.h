@@ -42,29 +42,6 @@ inline constexpr std::array<std::string_view, 3> kMaskPolicies{"same-samples", "
 inline constexpr std::array<std::string_view, 4> kLnsUpdates{"ratio", "pathLeft", "pathRight",
                                                              "pathTrapezoid"};
 inline constexpr std::array<std::string_view, 2> kBackgrounds{"environment", "transparent"};
-inline constexpr std::array<std::string_view, 23> kAovs{"lns",
-                                                        "visibility",
-                                                        "ess",
-                                                        "acceptance",
-                                                        "source",
-                                                        "normal",
-                                                        "depth",
-                                                        "variance",
-                                                        "mask",
-                                                        "acceptanceLocal",
-                                                        "acceptanceIndependent",
-                                                        "resampled",
-                                                        "rounds",
-                                                        "material",
-                                                        "albedo",
-                                                        "position",
-                                                        "z",
-                                                        "motion",
-                                                        "object",
-                                                        "cryptoObject",
-                                                        "cryptoMaterial",
-                                                        "unshadowed",
-                                                        "blocked"};
 inline constexpr std::array<std::string_view, 3> kUpAxes{"x", "y", "z"};
 inline constexpr std::array<std::string_view, 2> kPixelTypes{"half", "float"};
 inline constexpr std::array<std::string_view, 5> kCompressions{"none", "rle", "zips", "zip", "piz"};

@@ -71,16 +71,9 @@ std::set<Gloss> glosses_of(const SceneSpec& scene) {
 }
 
 std::string_view gloss_word(const KnownLimit& limit) {
-  if (limit.any_gloss) return "";
-  switch (limit.gloss) {
-    case Gloss::diffuse:
-      return " on diffuse surfaces";
-    case Gloss::glossy:
-      return " on glossy surfaces";
-    case Gloss::mirror:
-      return " on near mirrors";
-  }
-  return "";
+  constexpr std::array<std::string_view, 3> kWords{" on diffuse surfaces", " on glossy surfaces",
+                                                   " on near mirrors"};
+  return limit.any_gloss ? "" : kWords.at(static_cast<std::size_t>(limit.gloss));
 }
 
 std::string in_words(const KnownLimit& limit, double turn_deg) {

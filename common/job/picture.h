@@ -34,9 +34,7 @@ class FrameComparison {
   /// Whether they show the same and, where samples are carried, so do all frames before; in later
   /// sweeps these are all frames.
   bool are_alike(std::size_t index_a, std::size_t index_b) const;
-  /// How many frames from the first on are the same in both.
-  std::size_t num_common() const { return num_common_; }
-  /// The same of steps (common/job/sequence.h).
+  /// How many steps (common/job/sequence.h) from the first on are the same in both.
   std::size_t num_common_steps() const;
   /// What differs in two frames that are not equal: "$.camera.keys", ...; "$.frames" where it is
   /// the frames before.
@@ -53,7 +51,7 @@ class FrameComparison {
   std::size_t sweeps_a_, sweeps_b_;
   std::vector<Facts> a_, b_;
   bool carried_;
-  std::size_t num_common_ = 0;
+  std::size_t num_common_ = 0;  ///< frames from the first on
 };
 
 }  // namespace baton

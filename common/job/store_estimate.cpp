@@ -4,7 +4,6 @@
 #include <vector>
 
 #include "common/job/aov.h"
-#include "common/job/empty_aovs.h"
 #include "common/job/estimate.h"
 #include "common/job/motion.h"
 #include "common/job/sequence.h"

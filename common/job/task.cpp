@@ -3,19 +3,32 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <type_traits>
+
+#include "common/base/members.h"
 
 namespace baton {
+namespace {
+
+/// Adds every number of `b` to that of `a`.
+template <class T>
+void add(T& a, const T& b) {
+  if constexpr (std::is_arithmetic_v<T>) {
+    a += b;
+  } else if constexpr (requires { a.begin(); }) {
+    for (std::size_t i = 0; i < a.size(); ++i) add(a[i], b[i]);
+  } else {
+    std::apply(
+        [&](auto&... x) { std::apply([&](const auto&... y) { (add(x, y), ...); }, members_of(b)); },
+        members_of(a));
+  }
+}
+
+}  // namespace
 
 std::string_view task_name(TaskKind kind) {
-  switch (kind) {
-    case TaskKind::render:
-      return "render";
-    case TaskKind::assemble:
-      return "assemble";
-    case TaskKind::second_pass:
-      return "second pass";
-  }
-  return "unknown";
+  constexpr std::array<std::string_view, 3> kNames{"render", "assemble", "second pass"};
+  return kNames.at(static_cast<std::size_t>(kind));
 }
 
 std::string describe_task(const TaskKey& task) {
@@ -28,6 +41,11 @@ std::string describe_task(const TaskKey& task) {
       return fmt::format("second pass of tile {} frame index {}", task.tile, task.step);
   }
   return "unknown task";
+}
+
+std::string_view blob_kind_name(BlobKind kind) {
+  constexpr std::array<std::string_view, 4> kNames{"state", "film", "image", "first-pass samples"};
+  return kNames.at(static_cast<std::size_t>(kind));
 }
 
 Digest held_state_name(const Digest& job, std::int32_t frame, std::int32_t tile) {
@@ -43,19 +61,9 @@ std::vector<Digest> stored_blobs(const std::vector<BlobRef>& blobs) {
 }
 
 std::string_view job_status_name(JobStatus status) {
-  switch (status) {
-    case JobStatus::running:
-      return "running";
-    case JobStatus::done:
-      return "done";
-    case JobStatus::failed:
-      return "failed";
-    case JobStatus::cancelled:
-      return "cancelled";
-    case JobStatus::paused:
-      return "paused";
-  }
-  return "unknown";
+  constexpr std::array<std::string_view, 5> kNames{"running", "done", "failed", "cancelled",
+                                                   "paused"};
+  return kNames.at(static_cast<std::size_t>(status));
 }
 
 void SamplingStats::count_ess(float ess_ratio) {
@@ -63,32 +71,11 @@ void SamplingStats::count_ess(float ess_ratio) {
   ++ess_histogram[std::min(bin, kEssBins - 1)];
 }
 
-void SamplingStats::merge(const SamplingStats& b) {
-  pixels_fresh += b.pixels_fresh;
-  pixels_carried += b.pixels_carried;
-  pixels_restarted += b.pixels_restarted;
-  pixels_refreshed += b.pixels_refreshed;
-  pixels_refreshed_by_ratio += b.pixels_refreshed_by_ratio;
-  pixels_resampled += b.pixels_resampled;
-  local_proposed += b.local_proposed;
-  local_accepted += b.local_accepted;
-  independent_proposed += b.independent_proposed;
-  independent_accepted += b.independent_accepted;
-  for (std::size_t i = 0; i < kEssBins; ++i) ess_histogram[i] += b.ess_histogram[i];
-}
+void SamplingStats::merge(const SamplingStats& b) { add(*this, b); }
 
 std::string_view noise_source_name(NoiseSource source) {
-  switch (source) {
-    case NoiseSource::none:
-      return "none";
-    case NoiseSource::halves:
-      return "halves";
-    case NoiseSource::neighbors:
-      return "neighbors";
-    case NoiseSource::probes:
-      return "probes";
-  }
-  return "unknown";
+  constexpr std::array<std::string_view, 4> kNames{"none", "halves", "neighbors", "probes"};
+  return kNames.at(static_cast<std::size_t>(source));
 }
 
 void FrameStats::merge(const FrameStats& b) {
@@ -96,24 +83,6 @@ void FrameStats::merge(const FrameStats& b) {
   if (b.quality.pixels > 0) quality = b.quality;
 }
 
-void RenderStats::merge(const RenderStats& b) {
-  pixels += b.pixels;
-  rays_primary += b.rays_primary;
-  rays_shadow += b.rays_shadow;
-  target_evaluations += b.target_evaluations;
-  pixels_background += b.pixels_background;
-  sampling.merge(b.sampling);
-  cpu_seconds += b.cpu_seconds;
-  seconds_light += b.seconds_light;
-  seconds_primary += b.seconds_primary;
-  seconds_sample += b.seconds_sample;
-  seconds_visibility += b.seconds_visibility;
-  seconds_shade += b.seconds_shade;
-  seconds_state += b.seconds_state;
-  pixels_masked += b.pixels_masked;
-  rays_second_pass += b.rays_second_pass;
-  seconds_second_pass += b.seconds_second_pass;
-  seconds_second_rays += b.seconds_second_rays;
-}
+void RenderStats::merge(const RenderStats& b) { add(*this, b); }
 
 }  // namespace baton

@@ -11,8 +11,8 @@
 namespace baton {
 
 /// The words that scheduler, journal, messages and workers share: which piece of work, which
-/// attempt at it, which bytes it needs or made. Plain data; `fields` lists the members for
-/// common/base/archive.h.
+/// attempt at it, which bytes it needs or made. Plain data, written member by member
+/// (common/base/archive.h): their order is stored and sent.
 
 /// What a task does. Stored and sent; values are for ever.
 enum class TaskKind : std::uint8_t {
@@ -31,10 +31,6 @@ struct TaskKey {
   std::int32_t tile = 0;
 
   auto operator<=>(const TaskKey&) const = default;
-  template <class A>
-  void fields(A& a) {
-    a(kind, step, tile);
-  }
 };
 /// "run 3 of tile 7", "assembly of frame index 5": the task in words, steps and tiles 0-based.
 std::string describe_task(const TaskKey& task);
@@ -43,6 +39,8 @@ std::string describe_task(const TaskKey& task);
 /// samples that of a step (common/job/sequence.h). Stored and sent; values are for ever.
 enum class BlobKind : std::uint8_t { state = 0, film = 1, image = 2, first_pass = 3 };
 constexpr BlobKind last_of(BlobKind) { return BlobKind::first_pass; }
+/// "state", "film", "image", "first-pass samples".
+std::string_view blob_kind_name(BlobKind kind);
 
 struct BlobRef {
   BlobKind kind = BlobKind::state;
@@ -56,10 +54,6 @@ struct BlobRef {
   bool is_held() const { return kind == BlobKind::state && size_bytes == 0; }
 
   auto operator<=>(const BlobRef&) const = default;
-  template <class A>
-  void fields(A& a) {
-    a(kind, frame, tile, digest, size_bytes);
-  }
 };
 
 /// A held state that its worker has packed and put into the store.
@@ -67,10 +61,6 @@ struct PublishedState {
   BlobRef held, published;
 
   bool operator==(const PublishedState&) const = default;
-  template <class A>
-  void fields(A& a) {
-    a(held, published);
-  }
 };
 
 /// Names the state of a tile and frame (0-based) of a job that is held: nothing of it is packed, so
@@ -105,10 +95,6 @@ struct LeaseId {
   std::uint32_t epoch = 0;
 
   auto operator<=>(const LeaseId&) const = default;
-  template <class A>
-  void fields(A& a) {
-    a(job, task, attempt, epoch);
-  }
 };
 
 /// What the sampler did with the pixels that see a surface; merging is addition.
@@ -132,12 +118,6 @@ struct SamplingStats {
   /// ess_ratio: ESS / N, [0, 1].
   void count_ess(float ess_ratio);
   void merge(const SamplingStats& b);
-  template <class A>
-  void fields(A& a) {
-    a(pixels_fresh, pixels_carried, pixels_restarted, pixels_refreshed, pixels_refreshed_by_ratio,
-      pixels_resampled, local_proposed, local_accepted, independent_proposed, independent_accepted,
-      ess_histogram);
-  }
 };
 
 /// What the noise of a frame was told from. Stored and sent; values are for ever. probes: pixels
@@ -162,11 +142,6 @@ struct FrameQuality {
   bool clamped = false;        ///< what lay below zero was set to 0
 
   bool operator==(const FrameQuality&) const = default;
-  template <class A>
-  void fields(A& a) {
-    a(pixels, pixels_below_zero, pixels_beyond_half, pixels_not_finite, noise_source, noise,
-      noise_error, mean, lowest, light_below_zero, clamped);
-  }
 };
 
 /// The sampling of one tile in one frame, or what was seen of the whole frame.
@@ -179,37 +154,26 @@ struct FrameStats {
   bool operator==(const FrameStats&) const = default;
   /// Adds another tile's sampling, or takes the frame's quality. Place and number stay.
   void merge(const FrameStats& b);
-  template <class A>
-  void fields(A& a) {
-    a(frame, tile, sampling, quality);
-  }
 };
 
 /// Counters that workers add up and `baton job show` prints; merging is addition.
 struct RenderStats {
   std::uint64_t pixels = 0, rays_primary = 0, rays_shadow = 0, target_evaluations = 0;
   std::uint64_t pixels_background = 0;
-  std::uint64_t pixels_masked = 0;     ///< that the second pass did again
-  std::uint64_t rays_second_pass = 0;  ///< not in rays_shadow
   SamplingStats sampling;
   double cpu_seconds = 0;
   /// CPU seconds of the stages; light is shared by all tiles of a frame and counted where it was
   /// prepared.
   double seconds_light = 0, seconds_primary = 0, seconds_sample = 0, seconds_visibility = 0,
          seconds_shade = 0;
-  double seconds_state = 0;        ///< encoding, writing, reading and decoding sample states
-  double seconds_second_pass = 0;  ///< all of the second pass
-  double seconds_second_rays = 0;  ///< its occlusion rays alone
+  double seconds_state = 0;            ///< encoding, writing, reading and decoding sample states
+  std::uint64_t pixels_masked = 0;     ///< that the second pass did again
+  std::uint64_t rays_second_pass = 0;  ///< not in rays_shadow
+  double seconds_second_pass = 0;      ///< all of the second pass
+  double seconds_second_rays = 0;      ///< its occlusion rays alone
 
   bool operator==(const RenderStats&) const = default;
   void merge(const RenderStats& b);
-  template <class A>
-  void fields(A& a) {
-    a(pixels, rays_primary, rays_shadow, target_evaluations, pixels_background, sampling,
-      cpu_seconds, seconds_light, seconds_primary, seconds_sample, seconds_visibility,
-      seconds_shade, seconds_state, pixels_masked, rays_second_pass, seconds_second_pass,
-      seconds_second_rays);
-  }
 };
 
 }  // namespace baton

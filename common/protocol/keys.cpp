@@ -133,9 +133,9 @@ std::string_view role_name(Role role) {
 // ---- files --------------------------------------------------------------------------------------
 
 Result<ClientKey> read_client_key(const fs::path& path) {
+  constexpr std::array kNeeded{"role", "name", "public", "secret", "server"};
   BATON_ASSIGN(const std::vector<KeyLine> lines, read_lines(path));
-  ClientKey key;
-  bool has_role = false;
+  std::map<std::string, std::string> said;
   for (const KeyLine& line : lines) {
     const std::string& what = line.words[0];
     const std::string value = line.words.size() == 2 ? line.words[1] : "";
@@ -144,25 +144,17 @@ Result<ClientKey> read_client_key(const fs::path& path) {
                    fmt::format("{}: is the key of a coordinator, expected that of a worker, a user "
                                "or an admin",
                                path.string())};
-    if (what == "role" && role_of(value)) {
-      key.speaker.role = *role_of(value);
-      has_role = true;
-    } else if (what == "name" && is_name(value)) {
-      key.speaker.name = value;
-    } else if (what == "public" && is_key(value)) {
-      key.own.public_key = value;
-    } else if (what == "secret" && is_key(value)) {
-      key.own.secret_key = value;
-    } else if (what == "server" && is_key(value)) {
-      key.server_public_key = value;
-    } else {
+    const bool good = what == "role"   ? role_of(value).has_value()
+                      : what == "name" ? is_name(value)
+                                       : is_key(value);
+    if (!good || std::ranges::find(kNeeded, what) == kNeeded.end())
       return line_error(path, line,
                         "role, name, public, secret or server, and a value of its kind");
-    }
+    said[what] = value;
   }
-  if (has_role && !key.speaker.name.empty() && !key.own.public_key.empty() &&
-      !key.own.secret_key.empty() && !key.server_public_key.empty())
-    return key;
+  if (said.size() == kNeeded.size())
+    return ClientKey{
+        {*role_of(said["role"]), said["name"]}, {said["public"], said["secret"]}, said["server"]};
   return Error{ErrorKind::bad_input,
                fmt::format("{}: no whole key: role, name, public, secret and server are needed",
                            path.string())};

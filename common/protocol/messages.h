@@ -13,8 +13,8 @@
 namespace baton {
 
 /// Every message between coordinator, workers and the command line. PROTOCOL.md describes the
-/// conversation; each struct's `fields` is at once its encoder and its decoder. Bulk data never
-/// travels here: blobs go through the store, messages carry their digests.
+/// conversation; the members of a struct, in order, are what is sent (common/base/archive.h). Bulk
+/// data never travels here: blobs go through the store, messages carry their digests.
 
 inline constexpr const char* kProtocolName = "BATON";
 inline constexpr std::uint16_t kProtocolVersion = 10;
@@ -28,88 +28,47 @@ struct WorkerHello {  ///< first, and again after a reconnect or a new epoch
   std::string build;             ///< build_identity()
   std::string renderer;          ///< e.g. "AVX2, Embree 3.13.5": equal ones make equal bytes
   std::vector<LeaseId> running;  ///< leases in hand: a restarted coordinator may adopt them
-  template <class A>
-  void fields(A& a) {
-    a(worker_id, host, instance, pid, num_threads, build, renderer, running);
-  }
 };
 /// `count` more leases are wanted; replaces what was asked before.
 struct LeaseRequest {
   std::int32_t count = 1;
-  template <class A>
-  void fields(A& a) {
-    a(count);
-  }
 };
 struct Heartbeat {
   std::vector<LeaseId> running;
-  template <class A>
-  void fields(A& a) {
-    a(running);
-  }
 };
 struct TaskDone {
   LeaseId lease;
   std::vector<BlobRef> outputs;
   RenderStats stats;
   std::vector<FrameStats> frames = {};  ///< of a render task one for each frame, of an assembly one
-  template <class A>
-  void fields(A& a) {
-    a(lease, outputs, stats, frames);
-  }
 };
 struct TaskFailed {
   LeaseId lease;
   std::string message;
   bool permanent = false;  ///< bad input: no retry can help
   bool no_space = false;   ///< a disk is full: nobody's failure, waiting can help
-  template <class A>
-  void fields(A& a) {
-    a(lease, message, permanent, no_space);
-  }
 };
 /// The worker will not do it: nobody's failure, and no loss.
 struct LeaseReturn {
   LeaseId lease;
   std::string unseen =
       {};  ///< the folder of the job that it cannot see; empty: it has no time left
-  template <class A>
-  void fields(A& a) {
-    a(lease, unseen);
-  }
 };
 struct JobDocumentRequest {
   Digest job;
-  template <class A>
-  void fields(A& a) {
-    a(job);
-  }
 };
 /// States that the worker held are in the store.
 struct StatesPublished {
   Digest job;
   std::vector<PublishedState> states;
-  template <class A>
-  void fields(A& a) {
-    a(job, states);
-  }
 };
 /// What an attempt put into the store that ended without a result, or too late: nobody else knows
 /// of it.
 struct BlobsLeft {
   LeaseId lease;
   std::vector<Digest> blobs;
-  template <class A>
-  void fields(A& a) {
-    a(lease, blobs);
-  }
 };
-struct WorkerGoodbye {
-  template <class A>
-  void fields(A& a) {
-    a();
-  }
-};
+struct WorkerGoodbye {};
 
 // ---- coordinator to worker ----------------------------------------------------------------------
 struct WorkerWelcome {
@@ -117,10 +76,6 @@ struct WorkerWelcome {
   std::int32_t heartbeat_ms = 1000;
   std::string store_directory;  ///< shared by coordinator and workers
   std::string token = {};       ///< stands in its file `token`: whoever reads it sees the folder
-  template <class A>
-  void fields(A& a) {
-    a(epoch, heartbeat_ms, store_directory, token);
-  }
 };
 struct LeaseGrant {
   LeaseId lease;
@@ -129,137 +84,61 @@ struct LeaseGrant {
   bool may_hold = false;         ///< the task's state may stay in the worker's memory
   std::int32_t states_from = 0;  ///< states of earlier frames (0-based) are needed by no task
   double expected_seconds = 0;   ///< of CPU time, as the longest of late; 0: not known
-  template <class A>
-  void fields(A& a) {
-    a(lease, inputs, first_frame, last_frame, may_hold, states_from, expected_seconds);
-  }
 };
 /// Others wait for these states, which the worker holds: they should go into the store.
 struct RequestStates {
   Digest job;
   std::vector<Digest> states;
-  template <class A>
-  void fields(A& a) {
-    a(job, states);
-  }
 };
 struct LeaseRevoke {
   LeaseId lease;
-  template <class A>
-  void fields(A& a) {
-    a(lease);
-  }
 };
 struct NoWork {
   std::int32_t retry_ms = 200;
-  template <class A>
-  void fields(A& a) {
-    a(retry_ms);
-  }
 };
 /// A TaskDone or TaskFailed of this lease has come, and what follows from it is durable.
 struct ReportReceived {
   LeaseId lease;
-  template <class A>
-  void fields(A& a) {
-    a(lease);
-  }
 };
-struct HelloAgain {
-  template <class A>
-  void fields(A& a) {
-    a();
-  }
-};  ///< "I do not know you": send WorkerHello
+struct HelloAgain {};  ///< "I do not know you": send WorkerHello
 struct JobDocument {
   Digest job;
   std::string json;  ///< resolved: absolute paths, asset digests
   /// Stands in its output folder (output_token_file); empty: that could not be marked.
   std::string token = {};
-  template <class A>
-  void fields(A& a) {
-    a(job, json, token);
-  }
 };
 /// Finish what runs, take nothing new, end.
-struct Drain {
-  template <class A>
-  void fields(A& a) {
-    a();
-  }
-};
-struct Shutdown {
-  template <class A>
-  void fields(A& a) {
-    a();
-  }
-};
+struct Drain {};
+struct Shutdown {};
 
 // ---- client to coordinator ----------------------------------------------------------------------
 /// restart: frames of another picture in the output folder may be replaced.
 struct SubmitJob {
   std::string json;
   bool restart = false;
-  template <class A>
-  void fields(A& a) {
-    a(json, restart);
-  }
 };
 struct ListJobs {
   bool all = false;  ///< also those that have ended, the newest of them
-  template <class A>
-  void fields(A& a) {
-    a(all);
-  }
 };
 struct ShowJob {
   std::string job;
-  template <class A>
-  void fields(A& a) {
-    a(job);
-  }
 };  ///< name, digest, or the unique beginning of one
 struct PauseJob {
   std::string job;
-  template <class A>
-  void fields(A& a) {
-    a(job);
-  }
 };
 struct ResumeJob {
   std::string job;
-  template <class A>
-  void fields(A& a) {
-    a(job);
-  }
 };
 struct DrainWorker {
   std::string worker_id;
-  template <class A>
-  void fields(A& a) {
-    a(worker_id);
-  }
 };
 struct CancelJob {
   std::string job;
-  template <class A>
-  void fields(A& a) {
-    a(job);
-  }
 };
 struct DeleteJob {
   std::string job;
-  template <class A>
-  void fields(A& a) {
-    a(job);
-  }
 };
-struct StopCoordinator {
-  template <class A>
-  void fields(A& a) {
-    a();
-  }
-};
+struct StopCoordinator {};
 
 // ---- coordinator to client ----------------------------------------------------------------------
 struct JobSummary {
@@ -274,29 +153,15 @@ struct JobSummary {
   std::uint64_t states_held = 0;      ///< states that are in the memory of workers alone
   std::int32_t checkpoint_every = 0;  ///< frames
   RenderStats stats;
-  template <class A>
-  void fields(A& a) {
-    a(job, name, owner, output_directory, status, priority, tasks_total, tasks_done, tasks_leased,
-      tasks_failed, attempts_lost, frames_total, frames_done, state_bytes, state_pixels,
-      states_held, checkpoint_every, stats);
-  }
 };
 struct WorkerSummary {
   std::string worker_id, host;
   std::int32_t pid = 0, num_threads = 0, leases = 0;
-  template <class A>
-  void fields(A& a) {
-    a(worker_id, host, pid, num_threads, leases);
-  }
 };
 struct JobAccepted {
   Digest job;
   bool already_there = false;  ///< equal digest: the same job goes on (a success)
   std::string plan = {};       ///< what is kept and what is done again, lines; empty: all is new
-  template <class A>
-  void fields(A& a) {
-    a(job, already_there, plan);
-  }
 };
 struct JobList {
   std::vector<JobSummary> jobs;
@@ -304,10 +169,6 @@ struct JobList {
   std::uint64_t num_ended = 0;    ///< jobs that have ended, listed or not
   std::uint64_t tasks_ready = 0;  ///< of running jobs, that a worker may have at once
   double task_seconds = 0;        ///< CPU time of their longest tasks of late; 0: not known
-  template <class A>
-  void fields(A& a) {
-    a(jobs, workers, num_ended, tasks_ready, task_seconds);
-  }
 };
 struct JobDetail {
   JobSummary summary;
@@ -319,18 +180,10 @@ struct JobDetail {
   std::string plan = {};   ///< of the answer to ResumeJob: as JobAccepted's
   /// It waits for room in the store, and nothing that is in work will make some.
   bool lacks_room = false;
-  template <class A>
-  void fields(A& a) {
-    a(summary, frames_done, failures, frames, waits, plan, lacks_room);
-  }
 };
 struct Refused {
   std::uint8_t kind = 0;  ///< ErrorKind
   std::string message;
-  template <class A>
-  void fields(A& a) {
-    a(kind, message);
-  }
 };
 
 /// The closed set; the index is the type code on the wire, so new messages go at the end.

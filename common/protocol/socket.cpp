@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 #include <sys/eventfd.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <array>
@@ -10,6 +9,7 @@
 #include <zmq.hpp>
 
 #include "common/base/check.h"
+#include "common/base/file_descriptor.h"
 #include "common/base/limits.h"
 #include "common/protocol/connection_watch.h"
 #include "common/protocol/doorkeeper.h"
@@ -68,11 +68,8 @@ struct Socket::Impl {
         watch(context, socket, {.handshakes = has_key || !listens, .connections = listens}),
         wake_fd(::eventfd(0, EFD_CLOEXEC | EFD_NONBLOCK)),
         is_server(listens) {
-    BATON_CHECK(wake_fd >= 0);
+    BATON_CHECK(bool{wake_fd});
   }
-  Impl(const Impl&) = delete;
-  Impl& operator=(const Impl&) = delete;
-  ~Impl() { ::close(wake_fd); }
 
   /// The keys come before bind and connect.
   void use(const ClientKey& key) {
@@ -108,12 +105,12 @@ struct Socket::Impl {
   bool wait_for_message(std::chrono::milliseconds timeout) {
     const auto deadline = Clock::now() + timeout;
     std::vector<zmq::pollitem_t> items = poll_items(ZMQ_POLLIN);
-    items.push_back({nullptr, wake_fd, ZMQ_POLLIN, 0});
+    items.push_back({nullptr, wake_fd.number(), ZMQ_POLLIN, 0});
     while (true) {
       if (!poll_until(deadline, items)) return false;
       const bool is_woken = (items.back().revents & ZMQ_POLLIN) != 0;
       eventfd_t count = 0;
-      if (is_woken) ::eventfd_read(wake_fd, &count);
+      if (is_woken) ::eventfd_read(wake_fd.number(), &count);
       const bool has_failed = look_at_connections();
       if (items[0].revents & ZMQ_POLLIN) return true;
       if (is_woken || has_failed || Clock::now() >= deadline) return false;
@@ -124,7 +121,7 @@ struct Socket::Impl {
   zmq::socket_t socket;
   ConnectionWatch watch;
   std::optional<Doorkeeper> doorkeeper;
-  int wake_fd;
+  FileDescriptor wake_fd;
   std::string endpoint, sender_key;
   bool is_server;
   Clock::time_point next_closing;
@@ -263,7 +260,7 @@ std::optional<Error> Socket::take_refusal() {
                            impl_->endpoint)};
 }
 
-void Socket::wake() { ::eventfd_write(impl_->wake_fd, 1); }
+void Socket::wake() { ::eventfd_write(impl_->wake_fd.number(), 1); }
 
 const std::string& Socket::endpoint() const { return impl_->endpoint; }
 

@@ -360,14 +360,8 @@ Result<SampleState> decode_state(ByteView bytes, const std::string& name) {
   return state;
 }
 
-Result<std::vector<StateSectionInfo>> state_sections(ByteView bytes, const std::string& name) {
-  BATON_ASSIGN(const std::vector<SectionInfo> sections,
-               list_sections(bytes, kMagic, kStateVersion, name));
-  std::vector<StateSectionInfo> infos;
-  for (const SectionInfo& section : sections) {
-    infos.push_back({tag_text(section.tag), section.stored_bytes, section.raw_bytes});
-  }
-  return infos;
+Result<std::vector<SectionInfo>> state_sections(ByteView bytes, const std::string& name) {
+  return list_sections(bytes, kMagic, kStateVersion, name);
 }
 
 }  // namespace baton

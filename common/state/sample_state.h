@@ -8,6 +8,7 @@
 #include "common/base/bytes.h"
 #include "common/base/digest.h"
 #include "common/base/result.h"
+#include "common/base/section_file.h"
 #include "common/math/octahedral.h"
 #include "common/math/pixel_rect.h"
 #include "common/state/pixel_memory.h"
@@ -84,13 +85,7 @@ Bytes encode_state(const SampleState& state);
 /// 1 nor 0, sites past 15.
 Result<SampleState> decode_state(ByteView bytes, const std::string& name);
 
-/// One line per section for `baton state show`.
-struct StateSectionInfo {
-  std::string tag;
-  std::uint64_t stored_bytes = 0;
-  std::uint64_t raw_bytes = 0;
-};
 /// The sections of a state file in file order, after every check that needs no unpacking.
-Result<std::vector<StateSectionInfo>> state_sections(ByteView bytes, const std::string& name);
+Result<std::vector<SectionInfo>> state_sections(ByteView bytes, const std::string& name);
 
 }  // namespace baton

@@ -5,8 +5,10 @@
 #include <memory>
 #include <string>
 #include <string_view>
+#include <type_traits>
 
 #include "common/base/bytes.h"
+#include "common/base/digest.h"
 #include "common/base/result.h"
 
 struct sqlite3;
@@ -22,6 +24,11 @@ class SqlStatement {
   SqlStatement& bind(std::int64_t value);
   SqlStatement& bind(std::string_view text);
   SqlStatement& bind(ByteView blob);
+  SqlStatement& bind(const Digest& digest) { return bind(digest.hex()); }
+  template <class E>
+  requires std::is_enum_v<E> SqlStatement& bind(E value) {
+    return bind(static_cast<std::int64_t>(value));
+  }
 
   /// True: a row is there. False: done.
   Result<bool> step();

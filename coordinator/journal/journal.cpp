@@ -2,7 +2,6 @@
 
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <array>
 #include <utility>
 
@@ -112,7 +111,7 @@ Status Journal::visit_recorded(const Digest& job,
   BATON_ASSIGN(SqlStatement query,
                database_.prepare("SELECT kind, step, tile, outputs, stats, frames FROM completions "
                                  "WHERE job = ? ORDER BY position"));
-  query.bind(job.hex());
+  query.bind(job);
   while (true) {
     BATON_ASSIGN(const bool row, query.step());
     if (!row) return {};
@@ -137,7 +136,7 @@ Result<JournalledJob> Journal::load(const Digest& digest) {
   result.job = digest;
   BATON_ASSIGN(SqlStatement job,
                database_.prepare("SELECT status, document, plan FROM jobs WHERE digest = ?"));
-  BATON_ASSIGN(const bool found, job.bind(digest.hex()).step());
+  BATON_ASSIGN(const bool found, job.bind(digest).step());
   if (!found)
     return Error{ErrorKind::internal, fmt::format("{}: no job {}", database_.name(), digest.hex())};
   BATON_TRY(read_enum(database_, job.integer(0), "jobs.status", result.status));
@@ -149,23 +148,15 @@ Result<JournalledJob> Journal::load(const Digest& digest) {
     return {};
   }));
 
-  BATON_ASSIGN(SqlStatement failed,
-               database_.prepare("SELECT lease, worker, message, permanent FROM failures "
-                                 "WHERE job = ? ORDER BY position"));
-  failed.bind(digest.hex());
-  while (true) {
-    BATON_ASSIGN(const bool row, failed.step());
-    if (!row) return result;
-    BATON_ASSIGN(Failure failure, read_failure(failed));
-    result.failures.push_back(std::move(failure));
-  }
+  BATON_ASSIGN(result.failures, recent_failures(digest, -1));
+  return result;
 }
 
 Result<std::vector<FrameStats>> Journal::frame_stats(const Digest& job, TaskKind kind,
                                                      std::int32_t step) {
   BATON_ASSIGN(SqlStatement query, database_.prepare("SELECT frames FROM completions "
                                                      "WHERE job = ? AND kind = ? AND step = ?"));
-  query.bind(job.hex()).bind(static_cast<std::int64_t>(kind)).bind(step);
+  query.bind(job).bind(kind).bind(step);
   std::vector<FrameStats> all;
   while (true) {
     BATON_ASSIGN(const bool row, query.step());
@@ -178,24 +169,23 @@ Result<std::vector<FrameStats>> Journal::frame_stats(const Digest& job, TaskKind
 
 Result<std::optional<std::string>> Journal::document(const Digest& job) {
   BATON_ASSIGN(SqlStatement query, database_.prepare("SELECT document FROM jobs WHERE digest = ?"));
-  BATON_ASSIGN(const bool row, query.bind(job.hex()).step());
+  BATON_ASSIGN(const bool row, query.bind(job).step());
   return row ? std::optional(query.text(0)) : std::nullopt;
 }
 
 Result<std::vector<Failure>> Journal::recent_failures(const Digest& job, int count) {
   BATON_ASSIGN(SqlStatement query,
-               database_.prepare("SELECT lease, worker, message, permanent FROM failures "
-                                 "WHERE job = ? ORDER BY position DESC LIMIT ?"));
-  query.bind(job.hex()).bind(count);
+               database_.prepare("SELECT lease, worker, message, permanent FROM (SELECT * FROM "
+                                 "failures WHERE job = ? ORDER BY position DESC LIMIT ?) "
+                                 "ORDER BY position"));
+  query.bind(job).bind(count);
   std::vector<Failure> failures;
   while (true) {
     BATON_ASSIGN(const bool row, query.step());
-    if (!row) break;
+    if (!row) return failures;
     BATON_ASSIGN(Failure failure, read_failure(query));
     failures.push_back(std::move(failure));
   }
-  std::reverse(failures.begin(), failures.end());
-  return failures;
 }
 
 /// Columns: kind, step, tile, outputs, stats, frames.
@@ -239,27 +229,17 @@ Result<SqlStatement*> Journal::write(std::string_view sql) {
 }
 
 Status Journal::add_job(const Digest& job, const std::string& document, const JobIndex& index) {
-  BATON_ASSIGN(SqlStatement * insert,
-               write("INSERT INTO jobs (digest, status, document, name, folder, plan) "
-                     "VALUES (?, ?, ?, ?, ?, ?)"));
-  return insert->bind(job.hex())
-      .bind(static_cast<std::int64_t>(JobStatus::running))
-      .bind(document)
-      .bind(index.name)
-      .bind(index.folder)
-      .bind(to_bytes(JobPlan{}))
-      .run();
+  return change(
+      "INSERT INTO jobs (digest, status, document, name, folder, plan) VALUES (?, ?, ?, ?, ?, ?)",
+      job, JobStatus::running, document, index.name, index.folder, to_bytes(JobPlan{}));
 }
 
 Status Journal::record_plan(const Digest& job, const JobPlan& plan) {
-  BATON_ASSIGN(SqlStatement * update, write("UPDATE jobs SET plan = ? WHERE digest = ?"));
-  return update->bind(to_bytes(plan)).bind(job.hex()).run();
+  return change("UPDATE jobs SET plan = ? WHERE digest = ?", to_bytes(plan), job);
 }
 
 Status Journal::record_owner(const Digest& job, const std::string& owner) {
-  BATON_ASSIGN(SqlStatement * insert,
-               write("INSERT OR REPLACE INTO owners (job, name) VALUES (?, ?)"));
-  return insert->bind(job.hex()).bind(owner).run();
+  return change("INSERT OR REPLACE INTO owners (job, name) VALUES (?, ?)", job, owner);
 }
 
 Status Journal::delete_job(const Digest& job) {
@@ -267,67 +247,42 @@ Status Journal::delete_job(const Digest& job) {
        {"DELETE FROM completions WHERE job = ?", "DELETE FROM failures WHERE job = ?",
         "DELETE FROM archive WHERE job = ?", "DELETE FROM archived_completions WHERE job = ?",
         "DELETE FROM kept_blobs WHERE job = ?", "DELETE FROM owners WHERE job = ?",
-        "DELETE FROM jobs WHERE digest = ?"}) {
-    BATON_ASSIGN(SqlStatement * remove, write(sql));
-    BATON_TRY(remove->bind(job.hex()).run());
-  }
+        "DELETE FROM jobs WHERE digest = ?"})
+    BATON_TRY(change(sql, job));
   return {};
 }
 
 Status Journal::record_status(const Digest& job, JobStatus status) {
-  BATON_ASSIGN(SqlStatement * update, write("UPDATE jobs SET status = ? WHERE digest = ?"));
-  return update->bind(static_cast<std::int64_t>(status)).bind(job.hex()).run();
+  return change("UPDATE jobs SET status = ? WHERE digest = ?", status, job);
 }
 
 Status Journal::record_completion(const Digest& job, const Completion& completion) {
-  BATON_ASSIGN(SqlStatement * insert,
-               write("INSERT OR REPLACE INTO completions (job, kind, step, tile, outputs, stats, "
-                     "frames) VALUES (?, ?, ?, ?, ?, ?, ?)"));
-  return insert->bind(job.hex())
-      .bind(static_cast<std::int64_t>(completion.task.kind))
-      .bind(completion.task.step)
-      .bind(completion.task.tile)
-      .bind(to_bytes(completion.outputs))
-      .bind(to_bytes(completion.stats))
-      .bind(to_bytes(completion.frames))
-      .run();
+  const TaskKey& task = completion.task;
+  return change(
+      "INSERT OR REPLACE INTO completions (job, kind, step, tile, outputs, stats, frames) "
+      "VALUES (?, ?, ?, ?, ?, ?, ?)",
+      job, task.kind, task.step, task.tile, to_bytes(completion.outputs),
+      to_bytes(completion.stats), to_bytes(completion.frames));
 }
 
 Status Journal::record_outputs(const Digest& job, const TaskKey& task,
                                const std::vector<BlobRef>& outputs) {
-  BATON_ASSIGN(SqlStatement * update, write("UPDATE completions SET outputs = ? WHERE job = ? AND "
-                                            "kind = ? AND step = ? AND tile = ?"));
-  return update->bind(to_bytes(outputs))
-      .bind(job.hex())
-      .bind(static_cast<std::int64_t>(task.kind))
-      .bind(task.step)
-      .bind(task.tile)
-      .run();
+  return change(
+      "UPDATE completions SET outputs = ? WHERE job = ? AND kind = ? AND step = ? AND tile = ?",
+      to_bytes(outputs), job, task.kind, task.step, task.tile);
 }
 
 Status Journal::record_failure(const Failure& failure) {
-  BATON_ASSIGN(
-      SqlStatement * insert,
-      write(
-          "INSERT INTO failures (job, lease, worker, message, permanent) VALUES (?, ?, ?, ?, ?)"));
-  return insert->bind(failure.lease.job.hex())
-      .bind(to_bytes(failure.lease))
-      .bind(failure.worker)
-      .bind(failure.message)
-      .bind(std::int64_t{failure.permanent} | std::int64_t{failure.last} << 1)
-      .run();
+  return change(
+      "INSERT INTO failures (job, lease, worker, message, permanent) VALUES (?, ?, ?, ?, ?)",
+      failure.lease.job, to_bytes(failure.lease), failure.worker, failure.message,
+      std::int64_t{failure.permanent} | std::int64_t{failure.last} << 1);
 }
 
 Status Journal::record_reopened(const Digest& job, const std::vector<TaskKey>& tasks) {
   for (const TaskKey& task : tasks) {
-    BATON_ASSIGN(SqlStatement * remove,
-                 write("DELETE FROM completions WHERE job = ? AND kind = ? AND "
-                       "step = ? AND tile = ?"));
-    BATON_TRY(remove->bind(job.hex())
-                  .bind(static_cast<std::int64_t>(task.kind))
-                  .bind(task.step)
-                  .bind(task.tile)
-                  .run());
+    BATON_TRY(change("DELETE FROM completions WHERE job = ? AND kind = ? AND step = ? AND tile = ?",
+                     job, task.kind, task.step, task.tile));
   }
   return {};
 }

@@ -66,7 +66,7 @@ class Journal {
   /// Every completion of a job, in the archive or not, in the order in which they were recorded.
   Status for_each_completion(const Digest& job,
                              const std::function<Status(const Completion&)>& visit);
-  /// At most `count` failed attempts, the newest last.
+  /// At most `count` failed attempts, the newest last; below 0: all.
   Result<std::vector<Failure>> recent_failures(const Digest& job, int count);
 
   Status add_job(const Digest& job, const std::string& document, const JobIndex& index = {});
@@ -124,6 +124,13 @@ class Journal {
   Result<std::vector<Digest>> read_digests(SqlStatement& query) const;
   Result<SqlStatement*> read(std::string_view sql);
   Result<SqlStatement*> write(std::string_view sql);
+  /// Runs a statement within a transaction, bound to these values.
+  template <class... V>
+  Status change(std::string_view sql, const V&... values) {
+    BATON_ASSIGN(SqlStatement * statement, write(sql));
+    (statement->bind(values), ...);
+    return statement->run();
+  }
 
   SqlDatabase database_;
   std::map<std::string_view, SqlStatement> statements_;  ///< prepared once, by their text

@@ -1,6 +1,5 @@
 #include <fmt/format.h>
 
-#include <algorithm>
 #include <utility>
 
 #include "common/base/archive.h"
@@ -10,28 +9,8 @@
 namespace baton {
 namespace {
 
-/// A row of `completions` as it stands in the archive.
-struct ArchivedCompletion {
-  TaskKey task;
-  std::vector<BlobRef> outputs;
-  RenderStats stats;
-  std::vector<FrameStats> frames;
-  template <class A>
-  void fields(A& a) {
-    a(task, outputs, stats, frames);
-  }
-};
-
 /// How many of a job stand in one piece, so that no piece is large once unpacked.
 constexpr std::size_t kCompletionsPerPiece = 4096;
-
-struct ArchivedPiece {
-  std::vector<ArchivedCompletion> completions;
-  template <class A>
-  void fields(A& a) {
-    a(completions);
-  }
-};
 
 constexpr int kMaxFound = 20;
 
@@ -40,43 +19,34 @@ constexpr int kMaxFound = 20;
 Status Journal::archive_job(const Digest& job, const Bytes& summary, const Bytes& detail,
                             const std::vector<BlobRef>& kept) {
   // The completions, piece by piece.
-  BATON_ASSIGN(SqlStatement * insert_piece,
-               write("INSERT INTO archived_completions (job, raw_bytes, stored_raw, packed) "
-                     "VALUES (?, ?, ?, ?)"));
   SectionPacker packer;
-  ArchivedPiece piece;
+  std::vector<Completion> piece;
   const auto store = [&]() -> Status {
-    if (piece.completions.empty()) return {};
+    if (piece.empty()) return {};
     const Bytes raw = to_bytes(std::exchange(piece, {}));
     Bytes packed;
     const bool stored_raw = packer.append(raw, 1, Packing::zstd, packed);
-    return insert_piece->bind(job.hex())
-        .bind(static_cast<std::int64_t>(raw.size()))
-        .bind(std::int64_t{stored_raw})
-        .bind(ByteView(packed))
-        .run();
+    return change(
+        "INSERT INTO archived_completions (job, raw_bytes, stored_raw, packed) VALUES (?, ?, ?, ?)",
+        job, static_cast<std::int64_t>(raw.size()), std::int64_t{stored_raw}, packed);
   };
   // Not those that the archive has: they are the ones that are written here.
   BATON_TRY(visit_recorded(job, [&](const Completion& c) -> Status {
-    piece.completions.push_back({c.task, c.outputs, c.stats, c.frames});
-    return piece.completions.size() < kCompletionsPerPiece ? Status() : store();
+    piece.push_back(c);
+    return piece.size() < kCompletionsPerPiece ? Status() : store();
   }));
   BATON_TRY(store());
 
-  BATON_ASSIGN(SqlStatement * insert,
-               write("INSERT INTO archive (job, summary, detail) VALUES (?, ?, ?)"));
-  BATON_TRY(insert->bind(job.hex()).bind(ByteView(summary)).bind(ByteView(detail)).run());
-  BATON_ASSIGN(SqlStatement * keep, write("INSERT OR IGNORE INTO kept_blobs VALUES (?, ?, ?)"));
+  BATON_TRY(
+      change("INSERT INTO archive (job, summary, detail) VALUES (?, ?, ?)", job, summary, detail));
   for (const BlobRef& blob : kept) {
-    const auto bytes = static_cast<std::int64_t>(blob.size_bytes);
-    BATON_TRY(keep->bind(blob.digest.hex()).bind(job.hex()).bind(bytes).run());
+    BATON_TRY(change("INSERT OR IGNORE INTO kept_blobs VALUES (?, ?, ?)", blob.digest, job,
+                     static_cast<std::int64_t>(blob.size_bytes)));
   }
   for (const char* const sql :
        {"DELETE FROM completions WHERE job = ?", "DELETE FROM failures WHERE job = ?",
-        "UPDATE jobs SET archived = 1 WHERE digest = ?"}) {
-    BATON_ASSIGN(SqlStatement * remove, write(sql));
-    BATON_TRY(remove->bind(job.hex()).run());
-  }
+        "UPDATE jobs SET archived = 1 WHERE digest = ?"})
+    BATON_TRY(change(sql, job));
   return {};
 }
 
@@ -84,10 +54,8 @@ Status Journal::restart_job(const Digest& job) {
   for (const char* const sql :
        {"DELETE FROM archive WHERE job = ?", "DELETE FROM archived_completions WHERE job = ?",
         "DELETE FROM kept_blobs WHERE job = ?", "DELETE FROM failures WHERE job = ?",
-        "DELETE FROM completions WHERE job = ?", "UPDATE jobs SET archived = 0 WHERE digest = ?"}) {
-    BATON_ASSIGN(SqlStatement * change, write(sql));
-    BATON_TRY(change->bind(job.hex()).run());
-  }
+        "DELETE FROM completions WHERE job = ?", "UPDATE jobs SET archived = 0 WHERE digest = ?"})
+    BATON_TRY(change(sql, job));
   return record_status(job, JobStatus::running);
 }
 
@@ -96,14 +64,14 @@ Status Journal::visit_archived(const Digest& job,
   BATON_ASSIGN(SqlStatement query,
                database_.prepare("SELECT raw_bytes, stored_raw, packed FROM archived_completions "
                                  "WHERE job = ? ORDER BY position"));
-  query.bind(job.hex());
+  query.bind(job);
   SectionUnpacker unpacker;
   while (true) {
     BATON_ASSIGN(const bool row, query.step());
     if (!row) return {};
     const auto raw_bytes = static_cast<std::size_t>(query.integer(0));
     Result<Bytes> raw = unpacker.unpack(query.blob(2), query.integer(1) != 0, 1, raw_bytes);
-    ArchivedPiece piece;
+    std::vector<Completion> piece;
     bool complete = raw.ok();
     if (complete) {
       ArchiveReader reader(*raw);
@@ -115,22 +83,20 @@ Status Journal::visit_archived(const Digest& job,
                    fmt::format("{}: the archived completions of job {} cannot be read",
                                database_.name(), job.hex())};
     }
-    for (const ArchivedCompletion& c : piece.completions)
-      BATON_TRY(visit({c.task, c.outputs, c.stats, c.frames}));
+    for (const Completion& completion : piece) BATON_TRY(visit(completion));
   }
 }
 
 Status Journal::describe_archived(const Digest& job, JobStatus status, const Bytes& summary,
                                   const Bytes& detail) {
-  BATON_ASSIGN(SqlStatement * update,
-               write("UPDATE archive SET summary = ?, detail = ? WHERE job = ?"));
-  BATON_TRY(update->bind(ByteView(summary)).bind(ByteView(detail)).bind(job.hex()).run());
+  BATON_TRY(
+      change("UPDATE archive SET summary = ?, detail = ? WHERE job = ?", summary, detail, job));
   return record_status(job, status);
 }
 
 Result<std::optional<Bytes>> Journal::archived_detail(const Digest& job) {
   BATON_ASSIGN(SqlStatement query, database_.prepare("SELECT detail FROM archive WHERE job = ?"));
-  BATON_ASSIGN(const bool row, query.bind(job.hex()).step());
+  BATON_ASSIGN(const bool row, query.bind(job).step());
   if (!row) return std::optional<Bytes>();
   const ByteView bytes = query.blob(0);
   return std::optional(Bytes(bytes.begin(), bytes.end()));
@@ -138,17 +104,16 @@ Result<std::optional<Bytes>> Journal::archived_detail(const Digest& job) {
 
 Result<std::vector<Bytes>> Journal::archived_summaries(int count) {
   BATON_ASSIGN(SqlStatement query,
-               database_.prepare("SELECT summary FROM archive ORDER BY position DESC LIMIT ?"));
+               database_.prepare("SELECT summary FROM (SELECT * FROM archive ORDER BY position "
+                                 "DESC LIMIT ?) ORDER BY position"));
   query.bind(count);
   std::vector<Bytes> summaries;
   while (true) {
     BATON_ASSIGN(const bool row, query.step());
-    if (!row) break;
+    if (!row) return summaries;
     const ByteView bytes = query.blob(0);
     summaries.emplace_back(bytes.begin(), bytes.end());
   }
-  std::reverse(summaries.begin(), summaries.end());
-  return summaries;
 }
 
 Result<std::uint64_t> Journal::num_archived() {
@@ -185,14 +150,14 @@ Result<std::vector<FoundJob>> Journal::find_jobs(const std::string& text) {
 
 Result<bool> Journal::is_kept(const Digest& blob) {
   BATON_ASSIGN(SqlStatement * query, read("SELECT 1 FROM kept_blobs WHERE blob = ? LIMIT 1"));
-  BATON_ASSIGN(const bool row, query->bind(blob.hex()).step());
+  BATON_ASSIGN(const bool row, query->bind(blob).step());
   query->reset();
   return row;
 }
 
 Result<std::vector<Digest>> Journal::kept_blobs(const Digest& job) {
   BATON_ASSIGN(SqlStatement query, database_.prepare("SELECT blob FROM kept_blobs WHERE job = ?"));
-  query.bind(job.hex());
+  query.bind(job);
   return read_digests(query);
 }
 
@@ -205,8 +170,7 @@ Result<std::uint64_t> Journal::kept_bytes() {
 }
 
 Status Journal::let_go(const Digest& job, const Digest& blob) {
-  BATON_ASSIGN(SqlStatement * remove, write("DELETE FROM kept_blobs WHERE blob = ? AND job = ?"));
-  return remove->bind(blob.hex()).bind(job.hex()).run();
+  return change("DELETE FROM kept_blobs WHERE blob = ? AND job = ?", blob, job);
 }
 
 }  // namespace baton

@@ -34,10 +34,6 @@ struct Cut {
   std::vector<BlobRef> states;
 
   bool operator==(const Cut&) const = default;
-  template <class A>
-  void fields(A& a) {
-    a(task, states);
-  }
 };
 
 /// Where a job goes on from former jobs of its picture.
@@ -48,10 +44,6 @@ struct JobPlan {
   std::vector<std::int32_t> others_frames;
 
   bool operator==(const JobPlan&) const = default;
-  template <class A>
-  void fields(A& a) {
-    a(leading_runs, cuts, others_frames);
-  }
 };
 
 /// All that is recorded as done of a job. A task without outputs is one of which nothing is needed

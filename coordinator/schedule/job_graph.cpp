@@ -9,24 +9,6 @@
 #include "common/job/motion.h"
 
 namespace baton {
-namespace {
-
-std::string_view name_of(BlobKind kind) {
-  switch (kind) {
-    case BlobKind::state:
-      return "state";
-    case BlobKind::film:
-      return "film";
-    case BlobKind::image:
-      return "image";
-    case BlobKind::first_pass:
-      return "first-pass samples";
-  }
-  return "blob";
-}
-
-}  // namespace
-
 std::int64_t count_tasks(const JobSpec& job) {
   const auto frames = static_cast<std::int64_t>(job.frames.size());
   const std::int64_t tiles = TileGrid(job.image).count();
@@ -172,8 +154,8 @@ std::optional<std::string> JobGraph::check_outputs(const TaskKey& key,
     const BlobRef& e = expected[i];
     if (i >= outputs.size() || outputs[i].kind != e.kind || outputs[i].frame != e.frame ||
         outputs[i].tile != e.tile) {
-      return fmt::format("the report lacks the {} of frame index {}, tile {}", name_of(e.kind),
-                         e.frame, e.tile);
+      return fmt::format("the report lacks the {} of frame index {}, tile {}",
+                         blob_kind_name(e.kind), e.frame, e.tile);
     }
   }
   if (outputs.size() > expected.size()) {

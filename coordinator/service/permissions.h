@@ -48,15 +48,9 @@ template <class M>
 May may_say(const Speaker& speaker) {
   if (speaker.name.empty()) return May::yes;
   constexpr Rights rights = kRights<M>;
-  switch (speaker.role) {
-    case Role::worker:
-      return rights.worker;
-    case Role::user:
-      return rights.user;
-    case Role::admin:
-      return rights.admin;
-  }
-  return May::no;
+  return speaker.role == Role::worker ? rights.worker
+         : speaker.role == Role::user ? rights.user
+                                      : rights.admin;
 }
 
 }  // namespace baton

@@ -127,30 +127,25 @@ Status Service::step(const Event& event) {
 
 Status Service::receive(const PeerId& peer, const WorkerHello& message) {
   if (message.worker_id.empty() || message.worker_id.size() > limits::kMaxTextLength) {
-    refuse(peer, {ErrorKind::bad_input, "a worker needs a name of at most 4096 bytes"});
-    return {};
+    return refuse(peer, {ErrorKind::bad_input, "a worker needs a name of at most 4096 bytes"});
   }
-  if (const Status few = check_leases(message.running); !few) {
-    refuse(peer, few.error());
-    return {};
-  }
+  if (const Status few = check_leases(message.running); !few) return refuse(peer, few.error());
   // A worker is the instance that it drew; its name is for people, and others may have it, too.
   WorkerHello hello = message;
   hello.worker_id = peers_.id_for(message);
   const bool is_new = peers_.hello_of(hello.worker_id) == nullptr;
   if (is_new && peers_.num_workers() >= limits::kMaxWorkers) {
-    refuse(peer,
-           {ErrorKind::io, fmt::format("the farm is full: {} workers", peers_.num_workers())});
-    return {};
+    return refuse(
+        peer, {ErrorKind::io, fmt::format("the farm is full: {} workers", peers_.num_workers())});
   }
   if (const std::optional<std::string> difference = other_build(hello)) {
     if (!options_.mixed_builds) {
       tell("refused: " + *difference);
-      refuse(peer, {ErrorKind::version,
-                    fmt::format("{}; pixels may differ: use one build on all machines, or start "
-                                "the coordinator with --mixed-builds",
-                                *difference)});
-      return {};
+      return refuse(peer,
+                    {ErrorKind::version,
+                     fmt::format("{}; pixels may differ: use one build on all machines, or start "
+                                 "the coordinator with --mixed-builds",
+                                 *difference)});
     }
     if (is_new) spdlog::warn("{}: results may differ", *difference);
   }
@@ -160,8 +155,9 @@ Status Service::receive(const PeerId& peer, const WorkerHello& message) {
   if (is_new)
     spdlog::info("worker {} joined: {} threads on {}", hello.worker_id, hello.num_threads,
                  hello.host);
-  reply(peer, WorkerWelcome{journal_.epoch(), static_cast<std::int32_t>(options_.heartbeat.count()),
-                            store_directory_.string(), token_});
+  BATON_TRY(reply(
+      peer, WorkerWelcome{journal_.epoch(), static_cast<std::int32_t>(options_.heartbeat.count()),
+                          store_directory_.string(), token_}));
   // A process that has only become impatient may not have received yet what it was granted.
   if (!is_new) return step(WorkerAlive{hello.worker_id, hello.running});
   return step(WorkerJoined{hello.worker_id, hello.running});
@@ -184,15 +180,16 @@ Status Service::receive_from(const std::string& worker, const LeaseRequest& mess
 
 Status Service::receive_from(const std::string& worker, const Heartbeat& message) {
   if (const Status few = check_leases(message.running); !few) {
-    if (const auto peer = peers_.peer_of(worker)) refuse(*peer, few.error());
-    return {};
+    const auto peer = peers_.peer_of(worker);
+    return peer ? refuse(*peer, few.error()) : Status();
   }
-  reply_to(worker, Heartbeat{});
+  BATON_TRY(reply_to(worker, Heartbeat{}));
   return step(WorkerAlive{worker, message.running});
 }
 
 Status Service::receive_from(const std::string& worker, const TaskDone& message) {
-  reply_to(worker, ReportReceived{message.lease});  // leaves after what follows is durable
+  // Leaves after what follows is durable.
+  BATON_TRY(reply_to(worker, ReportReceived{message.lease}));
   // Accepted results must be there: a blob may have gone between publishing and reporting. A frame
   // that is not where it belongs is on a disk that only the worker sees.
   if (const auto missing = find_missing_frame(message)) {
@@ -212,7 +209,7 @@ Status Service::receive_from(const std::string& worker, const TaskDone& message)
 }
 
 Status Service::receive_from(const std::string& worker, const TaskFailed& message) {
-  reply_to(worker, ReportReceived{message.lease});
+  BATON_TRY(reply_to(worker, ReportReceived{message.lease}));
   // A disk that takes nothing, as far as the coordinator sees, takes nothing from other workers.
   const bool read_only = !message.no_space && writes_nowhere(message.lease);
   if (message.no_space || read_only) {
@@ -318,16 +315,18 @@ std::optional<std::vector<BlobRef>> Service::find_bad_inputs(const LeaseId& leas
 
 // ---- answers ------------------------------------------------------------------------------------
 
-void Service::reply(const PeerId& peer, Message message) {
+Status Service::reply(const PeerId& peer, Message message) {
   outbox_.push_back({peer, std::move(message)});
+  return {};
 }
 
-void Service::reply_to(const std::string& worker, Message message) {
-  if (const auto peer = peers_.peer_of(worker)) reply(*peer, std::move(message));
+Status Service::reply_to(const std::string& worker, Message message) {
+  const auto peer = peers_.peer_of(worker);
+  return peer ? reply(*peer, std::move(message)) : Status();
 }
 
-void Service::refuse(const PeerId& peer, const Error& error) {
-  reply(peer, Refused{static_cast<std::uint8_t>(error.kind), error.message});
+Status Service::refuse(const PeerId& peer, const Error& error) {
+  return reply(peer, Refused{static_cast<std::uint8_t>(error.kind), error.message});
 }
 
 }  // namespace baton

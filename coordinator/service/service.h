@@ -80,7 +80,7 @@ class Service {
 
   // Who may do what (service_access.cpp).
   template <class M>
-  bool is_allowed(const PeerId& peer);
+  Status forbid(const PeerId& peer);
   Status check_own(const Digest& job) const;
   Result<Digest> resolve_own(const std::string& text);
   std::string owner_of(const Digest& job) const;
@@ -135,9 +135,10 @@ class Service {
 
   std::string mark_output(const Digest& job) const;
   void remove_job_file(const Digest& job, JobStatus status);
-  void reply(const PeerId& peer, Message message);
-  void reply_to(const std::string& worker, Message message);
-  void refuse(const PeerId& peer, const Error& error);
+  // What is answered waits for the end of the turn; these never fail.
+  Status reply(const PeerId& peer, Message message);
+  Status reply_to(const std::string& worker, Message message);
+  Status refuse(const PeerId& peer, const Error& error);
   const Scheduler::Job* job_of_open_task(const LeaseId& lease) const;
   bool writes_nowhere(const LeaseId& lease) const;
   std::optional<std::string> find_missing_blob(const TaskDone& report) const;

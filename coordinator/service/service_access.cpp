@@ -16,36 +16,33 @@ constexpr std::size_t kMaxTold = 100;
 
 /// Refuses, and logs, what the speaker may not say.
 template <class M>
-bool Service::is_allowed(const PeerId& peer) {
-  if (may_say<M>(speaker_) != May::no) return true;
+Status Service::forbid(const PeerId& peer) {
   const std::string text =
       fmt::format("{} '{}' may not {}", role_name(speaker_.role), speaker_.name, kRights<M>.what);
   if (complained_.first(peer)) spdlog::warn("refused: {}", text);
-  refuse(peer, {ErrorKind::usage, text});
-  return false;
+  return refuse(peer, {ErrorKind::usage, text});
 }
 
 Status Service::handle(const Incoming& incoming) {
   const PeerId& peer = incoming.peer;
   if (!incoming.message) {
     if (complained_.first(peer)) spdlog::warn("bad message: {}", incoming.message.error().message);
-    refuse(peer, incoming.message.error());
-    return {};
+    return refuse(peer, incoming.message.error());
   }
   const std::string worker = peers_.worker_of(peer);
   speaker_ = incoming.speaker;
   return std::visit(
       [&](const auto& message) -> Status {
-        if (!is_allowed<std::decay_t<decltype(message)>>(peer)) return {};
+        using M = std::decay_t<decltype(message)>;
+        if (may_say<M>(speaker_) == May::no) return forbid<M>(peer);
         if constexpr (requires { this->receive(peer, message); }) {
           return receive(peer, message);
         } else if constexpr (requires { this->receive_from(worker, message); }) {
           if (!worker.empty()) return receive_from(worker, message);
-          if (asked_for_hello_.first(peer)) reply(peer, HelloAgain{});
+          return asked_for_hello_.first(peer) ? reply(peer, HelloAgain{}) : Status();
         } else {
-          refuse(peer, {ErrorKind::bad_input, "this message is not for a coordinator"});
+          return refuse(peer, {ErrorKind::bad_input, "this message is not for a coordinator"});
         }
-        return {};
       },
       *incoming.message);
 }

@@ -56,25 +56,21 @@ Status Service::perform(const RecordJobStatus& action) {
 }
 
 Status Service::perform(const GrantLease& action) {
-  reply_to(action.worker,
-           LeaseGrant{action.lease, action.inputs, action.frames.first, action.frames.last,
-                      action.may_hold, action.states_from, action.expected_seconds});
-  return {};
+  return reply_to(action.worker,
+                  LeaseGrant{action.lease, action.inputs, action.frames.first, action.frames.last,
+                             action.may_hold, action.states_from, action.expected_seconds});
 }
 
 Status Service::perform(const AskForStates& action) {
-  reply_to(action.worker, RequestStates{action.job, action.states});
-  return {};
+  return reply_to(action.worker, RequestStates{action.job, action.states});
 }
 
 Status Service::perform(const RevokeLease& action) {
-  reply_to(action.worker, LeaseRevoke{action.lease});
-  return {};
+  return reply_to(action.worker, LeaseRevoke{action.lease});
 }
 
 Status Service::perform(const ReportNoWork& action) {
-  reply_to(action.worker, NoWork{kRetryMs});
-  return {};
+  return reply_to(action.worker, NoWork{kRetryMs});
 }
 
 Status Service::perform(const ForgetWorker& action) {

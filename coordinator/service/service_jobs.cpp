@@ -110,19 +110,15 @@ Status Service::restore_job(const Digest& digest) {
 // ---- questions ----------------------------------------------------------------------------------
 
 Status Service::receive(const PeerId& peer, const JobDocumentRequest& message) {
-  if (const Status own = check_own(message.job); !own) {
-    refuse(peer, own.error());
-    return {};
-  }
+  if (const Status own = check_own(message.job); !own) return refuse(peer, own.error());
   BATON_ASSIGN(std::optional<std::string> document, journal_.document(message.job));
-  if (document) {
-    const bool for_worker = !peers_.worker_of(peer).empty();
-    reply(peer, JobDocument{message.job, std::move(*document),
-                            for_worker ? mark_output(message.job) : std::string()});
-  } else {
-    refuse(peer, {ErrorKind::bad_input, fmt::format("job {}: not known here", message.job.hex())});
+  if (!document) {
+    return refuse(peer,
+                  {ErrorKind::bad_input, fmt::format("job {}: not known here", message.job.hex())});
   }
-  return {};
+  const bool for_worker = !peers_.worker_of(peer).empty();
+  return reply(peer, JobDocument{message.job, std::move(*document),
+                                 for_worker ? mark_output(message.job) : std::string()});
 }
 
 void Service::tell_lost(const Digest& job, const LostFiles& lost) {
@@ -158,8 +154,7 @@ Status Service::receive(const PeerId& peer, const ListJobs& message) {
   for (WorkerSummary& worker : list.workers) {
     worker.leases = static_cast<std::int32_t>(scheduler_.num_leases(worker.worker_id));
   }
-  reply(peer, std::move(list));
-  return {};
+  return reply(peer, std::move(list));
 }
 
 Result<Digest> Service::resolve(const std::string& text) {
@@ -171,8 +166,7 @@ Result<Digest> Service::resolve(const std::string& text) {
 Status Service::receive(const PeerId& peer, const ShowJob& message) {
   const Result<Digest> job = resolve(message.job);
   if (job) return answer_detail(peer, *job);
-  refuse(peer, job.error());
-  return {};
+  return refuse(peer, job.error());
 }
 
 Status Service::receive(const PeerId& peer, const CancelJob& message) {
@@ -185,18 +179,14 @@ Status Service::receive(const PeerId& peer, const PauseJob& message) {
 
 Status Service::receive(const PeerId& peer, const ResumeJob& message) {
   const Result<Digest> job = resolve_own(message.job);
-  if (!job) {
-    refuse(peer, job.error());
-    return {};
-  }
+  if (!job) return refuse(peer, job.error());
   std::string plan;
   const Scheduler::Job* const known = scheduler_.find_job(*job);
   if (known != nullptr && known->status == JobStatus::paused) {
     BATON_ASSIGN(LostFiles lost, lost_files_of(*job));
     if (lost.unreadable) {
-      refuse(peer, {ErrorKind::io,
-                    fmt::format("job {} stays paused: {}", job->short_hex(), *lost.unreadable)});
-      return {};
+      return refuse(peer, {ErrorKind::io, fmt::format("job {} stays paused: {}", job->short_hex(),
+                                                      *lost.unreadable)});
     }
     tell_lost(*job, lost);
     const std::vector<std::string> reasons = lost_reasons(lost);
@@ -208,15 +198,12 @@ Status Service::receive(const PeerId& peer, const ResumeJob& message) {
 
 Status Service::receive(const PeerId& peer, const DeleteJob& message) {
   const Result<Digest> job = resolve_own(message.job);
-  if (!job) {
-    refuse(peer, job.error());
-    return {};
-  }
+  if (!job) return refuse(peer, job.error());
   const Scheduler::Job* const known = scheduler_.find_job(*job);
   if (known != nullptr && is_open(known->status)) {
-    refuse(peer, {ErrorKind::usage, fmt::format("job {} is {}: cancel it first", job->short_hex(),
-                                                job_status_name(known->status))});
-    return {};
+    return refuse(peer,
+                  {ErrorKind::usage, fmt::format("job {} is {}: cancel it first", job->short_hex(),
+                                                 job_status_name(known->status))});
   }
   BATON_TRY(archive_job(*job));
   BATON_ASSIGN(std::vector<Digest> kept, journal_.kept_blobs(*job));
@@ -241,30 +228,25 @@ Result<LostFiles> Service::lost_files_of(const Digest& job) {
 
 Status Service::receive(const PeerId& peer, const DrainWorker& message) {
   if (!peers_.peer_of(message.worker_id)) {
-    refuse(peer, {ErrorKind::bad_input,
-                  fmt::format("worker '{}': no worker has this name", message.worker_id)});
-    return {};
+    return refuse(peer, {ErrorKind::bad_input,
+                         fmt::format("worker '{}': no worker has this name", message.worker_id)});
   }
   spdlog::info("worker {} is told to finish", message.worker_id);
-  reply_to(message.worker_id, Drain{});
+  BATON_TRY(reply_to(message.worker_id, Drain{}));
   return receive(peer, ListJobs{});
 }
 
 Status Service::receive(const PeerId& peer, const StopCoordinator&) {
   spdlog::info("asked to stop");
   stop_requested_ = true;
-  reply(peer, Shutdown{});
-  return {};
+  return reply(peer, Shutdown{});
 }
 
 /// Event E happens to the job whose ID begins with `prefix`; the answer shows what came of it.
 template <class E>
 Status Service::change_job(const PeerId& peer, const std::string& prefix) {
   const Result<Digest> job = resolve_own(prefix);
-  if (!job) {
-    refuse(peer, job.error());
-    return {};
-  }
+  if (!job) return refuse(peer, job.error());
   BATON_TRY(step(E{*job}));
   return answer_detail(peer, *job);
 }
@@ -277,18 +259,15 @@ Status Service::answer_detail(const PeerId& peer, const Digest& job, std::string
     JobDetail detail = describe_job(scheduler_, job, failures);
     detail.plan = std::move(plan);
     detail.summary.owner = owner_of(job);
-    reply(peer, std::move(detail));
-    return {};
+    return reply(peer, std::move(detail));
   }
   BATON_ASSIGN(std::optional<JobDetail> detail, archived_detail(job));
-  if (detail) {
-    detail->summary.owner = owner_of(job);
-    reply(peer, std::move(*detail));
-  } else {
-    refuse(peer, {ErrorKind::bad_input,
-                  fmt::format("job {}: its document cannot be read", job.short_hex())});
+  if (!detail) {
+    return refuse(peer, {ErrorKind::bad_input,
+                         fmt::format("job {}: its document cannot be read", job.short_hex())});
   }
-  return {};
+  detail->summary.owner = owner_of(job);
+  return reply(peer, std::move(*detail));
 }
 
 // ---- the archive --------------------------------------------------------------------------------

@@ -194,44 +194,36 @@ Status Service::receive(const PeerId& peer, const SubmitJob& message) {
   BATON_TRY(archive_ended());
   // A job that cannot be run is refused before it leaves a trace.
   Result<ParsedJobDocument> document = parse_job_document(message.json);
-  if (!document) {
-    refuse(peer, document.error());
-    return {};
-  }
+  if (!document) return refuse(peer, document.error());
   if (const Status within = check_roots(*document, options_.roots); !within) {
     spdlog::warn("refused: job '{}': {}", document->job.name, within.error().message);
-    refuse(peer, within.error());
-    return {};
+    return refuse(peer, within.error());
   }
   if (const std::int64_t count = count_tasks(document->job); count > limits::kMaxTasksPerJob) {
-    refuse(
+    return refuse(
         peer,
         {ErrorKind::bad_input,
          fmt::format("job {}: {} tasks, at most {}: use larger tiles or more frames per checkpoint",
                      document->digest.short_hex(), count, limits::kMaxTasksPerJob)});
-    return {};
   }
   const Scheduler::Job* const known = scheduler_.find_job(document->digest);
   if (known != nullptr) {
     if (const Status own = check_own(document->digest);
         known->status != JobStatus::running && !own) {
-      refuse(peer, own.error());
-      return {};
+      return refuse(peer, own.error());
     }
     return go_on(peer, document->digest);
   }
 
   if (scheduler_.num_jobs() >= limits::kMaxJobs) {
-    refuse(peer, {ErrorKind::io,
-                  fmt::format("the farm is full: {} jobs that have not ended", limits::kMaxJobs)});
-    return {};
+    return refuse(peer, {ErrorKind::io, fmt::format("the farm is full: {} jobs that have not ended",
+                                                    limits::kMaxJobs)});
   }
   Result<std::vector<std::string>> reasons = make_way(*document, message.restart);
   if (!reasons) {
     const ErrorKind kind = reasons.error().kind;
     if (kind != ErrorKind::bad_input && kind != ErrorKind::usage) return reasons.error();
-    refuse(peer, reasons.error());
-    return {};
+    return refuse(peer, reasons.error());
   }
   return begin(peer, *document, message.json, std::move(*reasons));
 }

@@ -39,8 +39,7 @@ Result<PilotResult> run_pilot(const JobSpec& job, double ray_factor,
   std::vector<double> lit(candidates.size());
   double all_lit = 0, all_pixels = 0;
   for (std::size_t c = 0; c < study.cells.size(); ++c) {
-    const auto method = static_cast<std::size_t>(study.cells[c].method);
-    const auto scene = static_cast<std::size_t>(study.cells[c].scene);
+    const auto [scene, method] = std::pair(study.cells[c].scene, study.cells[c].method);
     PilotNumbers& seen = pilot.numbers[method];
     seen.error += relative_square(results.runs[c], results.references[scene]) /
                   static_cast<double>(study.scenes.size());
@@ -88,7 +87,7 @@ Study pilot_study(const JobSpec& job, const std::vector<AutoCandidate>& candidat
   const std::vector<JobSpec> windows = pilot_windows(job);
   for (const JobSpec& window : windows) {
     for (std::size_t c = 0; c < candidates.size(); ++c) {
-      StudyCell cell{static_cast<int>(study.scenes.size()), static_cast<int>(c), "", window};
+      StudyCell cell{study.scenes.size(), c, "", window};
       cell.job.sampling = candidates[c].sampling;
       cell.job.visibility.correlated = candidates[c].correlated;
       cell.job.name = "pilot " + candidates[c].name();

@@ -15,9 +15,6 @@ constexpr int kReferenceSamples = 512;
 /// Far from the seeds that people give.
 constexpr std::uint64_t kReferenceSeed = 2'000'000'000;
 
-/// Candidates, seeds and reference see the same points of the scene.
-constexpr std::uint64_t kSiteSeed = 1;
-
 /// The job with at most kPilotPixels a picture, for some of its frames.
 JobSpec small_job(const JobSpec& job, std::vector<int> frames) {
   JobSpec small = job;
@@ -25,13 +22,8 @@ JobSpec small_job(const JobSpec& job, std::vector<int> frames) {
   const auto pixels = static_cast<double>(job.image.rendered().area());
   small.image = scaled(job.image, std::min(1.0, std::sqrt(kPilotPixels / pixels)));
   small.metadata.clear();
-  small.output.background = Background::transparent;
-  small.output.pixel_type = PixelType::full_float;
-  small.output.clamp_negative = false;
-  small.output.pattern = kFramePattern;
+  prepare_measured(small);
   small.output.aovs = {Aov::lns};
-  small.state.keep = StateKeep::last;
-  if (small.image.site_seed == 0) small.image.site_seed = kSiteSeed;
   small.state.preroll = 0;  // by the frames that are measured pixels know enough
   return small;
 }
@@ -55,14 +47,9 @@ StudyScene pilot_scene(const JobSpec& window) {
   scene.crop = {0, 0, image.width(), image.height()};
   for (std::size_t half = 0; half < 2; ++half) {
     JobSpec& reference = scene.reference[half];
-    reference = window;
-    reference.frames = scene.frames;
+    reference = reference_job(window, kReferenceSamples, scene.frames, static_cast<int>(half));
     reference.name = "pilot reference";
-    reference.sampling = {};
-    reference.sampling.method = Method::reference;
-    reference.sampling.reference_samples = kReferenceSamples;
     reference.seed = kReferenceSeed + half;
-    reference.output.aovs = {Aov::lns, Aov::variance};
   }
   return scene;
 }

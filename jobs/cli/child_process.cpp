@@ -3,10 +3,12 @@
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <signal.h>
+#include <sys/mman.h>
 #include <sys/prctl.h>
 #include <sys/wait.h>
 #include <unistd.h>
 
+#include <algorithm>
 #include <cerrno>
 #include <cstring>
 #include <thread>
@@ -20,7 +22,8 @@ namespace fs = std::filesystem;
 constexpr int kCannotRun = 127;
 
 /// What the child does between fork and exec: only calls that are safe there.
-[[noreturn]] void become_program(char* const* arguments, int output, int input, pid_t parent) {
+[[noreturn]] void become_program(char* const* arguments, const ChildProcess::Files& files,
+                                 pid_t parent) {
   // Die with the parent, also when it died before this line.
   ::prctl(PR_SET_PDEATHSIG, SIGKILL);
   if (::getppid() != parent) ::_exit(kCannotRun);
@@ -29,28 +32,46 @@ constexpr int kCannotRun = 127;
   sigset_t none;
   sigemptyset(&none);
   ::sigprocmask(SIG_SETMASK, &none, nullptr);
-  ::dup2(input, STDIN_FILENO);
-  ::dup2(output, STDOUT_FILENO);
-  ::dup2(output, STDERR_FILENO);
+  ::dup2(files.input.value_or(STDIN_FILENO), STDIN_FILENO);
+  ::dup2(files.output, STDOUT_FILENO);
+  ::dup2(files.error.value_or(files.output), STDERR_FILENO);
   ::execvp(arguments[0], arguments);
   ::_exit(kCannotRun);
 }
 
 }  // namespace
 
-Result<ChildProcess> ChildProcess::start(const std::vector<std::string>& command,
-                                         const fs::path& log) {
-  const int log_file = ::open(log.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0644);
-  if (log_file < 0)
-    return Error{ErrorKind::io,
-                 fmt::format("{}: cannot open: {}", log.string(), std::strerror(errno))};
-  Result<ChildProcess> started = start(command, log_file);
-  ::close(log_file);
-  return started;
+Result<MemoryFile> MemoryFile::open(const std::string& name) {
+  FileDescriptor file(::memfd_create("printed", MFD_CLOEXEC));
+  if (!file) return Error{ErrorKind::io, fmt::format("{}: {}", name, std::strerror(errno))};
+  return MemoryFile(std::move(file));
 }
 
-Result<ChildProcess> ChildProcess::start(const std::vector<std::string>& command, int output,
-                                         std::optional<int> input) {
+std::string MemoryFile::text() const {
+  std::string text(static_cast<std::size_t>(std::max<off_t>(0, ::lseek(number(), 0, SEEK_END))),
+                   '\0');
+  const ssize_t count = ::pread(number(), text.data(), text.size(), 0);
+  text.resize(count > 0 ? static_cast<std::size_t>(count) : 0);
+  return text;
+}
+
+std::string MemoryFile::last_line() const {
+  std::string line = text();
+  while (line.ends_with('\n')) line.pop_back();
+  return line.substr(line.rfind('\n') + 1);
+}
+
+Result<ChildProcess> ChildProcess::start(const std::vector<std::string>& command,
+                                         const fs::path& log) {
+  const FileDescriptor file(::open(log.c_str(), O_WRONLY | O_CREAT | O_APPEND | O_CLOEXEC, 0644));
+  if (!file)
+    return Error{ErrorKind::io,
+                 fmt::format("{}: cannot open: {}", log.string(), std::strerror(errno))};
+  return start(command, {.output = file.number()});
+}
+
+Result<ChildProcess> ChildProcess::start(const std::vector<std::string>& command,
+                                         const Files& files) {
   // Everything that needs memory comes before fork.
   std::vector<std::string> words = command;
   std::vector<char*> arguments;
@@ -59,7 +80,7 @@ Result<ChildProcess> ChildProcess::start(const std::vector<std::string>& command
 
   const pid_t parent = ::getpid();
   const pid_t pid = ::fork();
-  if (pid == 0) become_program(arguments.data(), output, input.value_or(STDIN_FILENO), parent);
+  if (pid == 0) become_program(arguments.data(), files, parent);
   if (pid < 0)
     return Error{ErrorKind::io,
                  fmt::format("{}: cannot start: {}", command[0], std::strerror(errno))};

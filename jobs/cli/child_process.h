@@ -6,11 +6,30 @@
 #include <filesystem>
 #include <optional>
 #include <string>
+#include <utility>
 #include <vector>
 
+#include "common/base/file_descriptor.h"
 #include "common/base/result.h"
 
 namespace baton {
+
+/// A file without a name, in memory, for what a program prints.
+class MemoryFile {
+ public:
+  /// `name` goes first in the error.
+  static Result<MemoryFile> open(const std::string& name);
+  int number() const { return file_.number(); }
+  /// All that was written so far.
+  std::string text() const;
+  /// The last line that is not empty.
+  std::string last_line() const;
+
+ private:
+  explicit MemoryFile(FileDescriptor file) : file_(std::move(file)) {}
+
+  FileDescriptor file_;
+};
 
 /// A program that this process started. It has a process group of its own, so that Ctrl-C on the
 /// terminal reaches only this process, and the kernel kills it when this process dies, however that
@@ -21,16 +40,20 @@ class ChildProcess {
   /// and stderr are appended to `log`.
   static Result<ChildProcess> start(const std::vector<std::string>& command,
                                     const std::filesystem::path& log);
-  /// The same with open files, which stay the caller's. input: none is this process's.
-  static Result<ChildProcess> start(const std::vector<std::string>& command, int output,
-                                    std::optional<int> input = std::nullopt);
+  /// The same with open files, which stay the caller's.
+  struct Files {
+    int output;
+    std::optional<int> error = {};  ///< none: as output
+    std::optional<int> input = {};  ///< none: this process's
+  };
+  static Result<ChildProcess> start(const std::vector<std::string>& command, const Files& files);
 
   ChildProcess(ChildProcess&& other) noexcept;
   ChildProcess& operator=(ChildProcess&& other) noexcept;
   ~ChildProcess();
 
-  /// What ended() says of a command that is no program.
-  static constexpr const char* kCannotBeRun = "exit code 127";
+  /// What ended() says of success, and of a command that is no program.
+  static constexpr const char *kSuccess = "exit code 0", *kCannotBeRun = "exit code 127";
 
   pid_t pid() const { return pid_; }
   /// How it ended: "exit code 2" or "signal 9 (Killed)"; nullopt while it runs.

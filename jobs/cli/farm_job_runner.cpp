@@ -4,8 +4,6 @@
 #include <fmt/ranges.h>
 #include <spdlog/spdlog.h>
 
-#include <chrono>
-
 #include "common/job/job_json.h"
 #include "jobs/cli/job_summary.h"
 #include "jobs/cli/text.h"
@@ -15,9 +13,6 @@ namespace {
 
 constexpr std::size_t kMaxOpenJobs = 8;
 constexpr std::chrono::milliseconds kPause{20};
-/// How long a coordinator that has answered may be away, and one question may take.
-constexpr std::chrono::minutes kAwayPatience{5};
-constexpr std::chrono::seconds kAnswerPatience{2};
 
 Error stopped() { return {ErrorKind::cancelled, "stopped; finished runs are kept"}; }
 
@@ -43,41 +38,30 @@ void FarmJobRunner::say(const std::string& text) {
 Status FarmJobRunner::start() {
   if (client_) return {};
   if (coordinator_) {
-    BATON_ASSIGN(RequestClient client, coordinator_->connect());
-    client_.emplace(std::move(client));
-    return {};
+    farm_.emplace(LocalFarm::attach(coordinator_->endpoint));
+  } else {
+    BATON_ASSIGN(LocalFarm farm, LocalFarm::start(options_));
+    coordinator_.emplace().endpoint = farm.endpoint();
+    farm_.emplace(std::move(farm));
   }
-  BATON_ASSIGN(LocalFarm farm, LocalFarm::start(options_));
-  BATON_ASSIGN(RequestClient client, RequestClient::connect(farm.endpoint()));
-  farm_.emplace(std::move(farm));
+  BATON_ASSIGN(RequestClient client, coordinator_->connect());
   client_.emplace(std::move(client));
   return {};
-}
-
-template <class A>
-Result<std::optional<A>> FarmJobRunner::ask_about(const Message& question) {
-  if (farm_) return ask_farm<A>(*farm_, *client_, signals_, question);
-  const auto end = std::chrono::steady_clock::now() + kAwayPatience;
-  for (;;) {
-    Result<A> answer = baton::ask<A>(*client_, question, kAnswerPatience);
-    if (answer) return std::optional<A>(std::move(answer).value());
-    const bool away = answer.error().kind == ErrorKind::timeout;
-    if (!away || std::chrono::steady_clock::now() > end) return answer.error();
-    if (signals_.stop_requested_within(kFarmPollInterval)) return std::optional<A>();
-  }
 }
 
 Status FarmJobRunner::submit(const JobSpec& job, std::size_t index, std::vector<Open>& open) {
   BATON_ASSIGN(std::string document, make_job_document(job));
   BATON_ASSIGN(const std::optional<JobAccepted> accepted,
-               ask_about<JobAccepted>(SubmitJob{std::move(document), /*restart=*/true}));
+               ask_farm<JobAccepted>(*farm_, *client_, signals_,
+                                     SubmitJob{std::move(document), /*restart=*/true}));
   if (!accepted) return stopped();
   open.push_back({index, accepted->job});
   return {};
 }
 
 Result<JobSummary> FarmJobRunner::ask(Open& job, const JobSpec& spec) {
-  BATON_ASSIGN(const std::optional<JobDetail> detail, ask_about<JobDetail>(ShowJob{job.job.hex()}));
+  BATON_ASSIGN(const std::optional<JobDetail> detail,
+               ask_farm<JobDetail>(*farm_, *client_, signals_, ShowJob{job.job.hex()}));
   if (!detail) return stopped();
   const JobSummary& summary = detail->summary;
   if (!detail->waits.empty() && job.waits.empty())
@@ -113,14 +97,15 @@ Status FarmJobRunner::run(const std::vector<JobSpec>& jobs,
         continue;
       }
       BATON_TRY(done(open[i].index, summary));
-      if (!farm_) BATON_TRY(ask_about<JobList>(DeleteJob{open[i].job.hex()}));
+      if (!farm_->is_own())
+        BATON_TRY(ask_farm<JobList>(*farm_, *client_, signals_, DeleteJob{open[i].job.hex()}));
       count.job_done();
       open.erase(open.begin() + static_cast<std::ptrdiff_t>(i));
       ++num_done;
     }
     count.update();
     if (signals_.stop_requested_within(kPause)) return stopped();
-    if (farm_) BATON_TRY(farm_->tend());
+    BATON_TRY(farm_->tend());
   }
   own.finish();
   return {};

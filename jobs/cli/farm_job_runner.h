@@ -37,15 +37,12 @@ class FarmJobRunner final : public JobRunner {
   };
 
   Status start();
-  /// nullopt when the user asked to stop.
-  template <class A>
-  Result<std::optional<A>> ask_about(const Message& question);
   Status submit(const JobSpec& job, std::size_t index, std::vector<Open>& open);
   /// How far the job is; says once what it waits for. Error: it has failed.
   Result<JobSummary> ask(Open& job, const JobSpec& spec);
 
   FarmOptions options_;
-  std::optional<CoordinatorLink> coordinator_;  ///< none: a local farm
+  std::optional<CoordinatorLink> coordinator_;  ///< none before a local farm is started
   std::optional<RunCount> whole_;
   SignalWait signals_;
   std::optional<LocalFarm> farm_;

@@ -38,6 +38,18 @@ struct JobOptions {
   bool json = false;
 };
 
+/// What became of a job that was handed in.
+void print_accepted(const JobAccepted& accepted, bool json) {
+  if (json)
+    return fmt::print("{}\n", ordered_json{{"id", accepted.job.hex()},
+                                           {"alreadyThere", accepted.already_there},
+                                           {"plan", accepted.plan}}
+                                  .dump(2));
+  fmt::print("{}\n", accepted.job.hex());
+  if (accepted.already_there) fmt::print(stderr, "an equal job is there already: it goes on\n");
+  fmt::print(stderr, "{}", accepted.plan);
+}
+
 Result<ExitCode> submit(const JobOptions& options, RequestClient& client) {
   BATON_ASSIGN(WantedJob wanted, load_settled(options.wanted));
   JobSpec& job = wanted.job;
@@ -50,22 +62,14 @@ Result<ExitCode> submit(const JobOptions& options, RequestClient& client) {
   BATON_ASSIGN(std::string document, make_job_document(job));
   BATON_ASSIGN(const JobAccepted accepted,
                ask<JobAccepted>(client, SubmitJob{std::move(document), restart}));
-  if (options.json) {
-    fmt::print("{}\n", ordered_json{{"id", accepted.job.hex()},
-                                    {"alreadyThere", accepted.already_there},
-                                    {"plan", accepted.plan}}
-                           .dump(2));
-  } else {
-    fmt::print("{}\n", accepted.job.hex());
-    if (wanted.is_look) fmt::print(stderr, "a look: frames go to {}\n", job.output.directory);
-    if (accepted.already_there) fmt::print(stderr, "an equal job is there already: it goes on\n");
-    fmt::print(stderr, "{}", accepted.plan);
-    if (job.quality.may_grow())
-      fmt::print(stderr, "baton job wait adds rounds until quality.{} ends it\n",
-                 job.quality.noise_threshold ? "noiseThreshold"
-                 : job.quality.time_limit    ? "timeLimit"
-                                             : "maxRounds");
-  }
+  print_accepted(accepted, options.json);
+  if (options.json) return ExitCode::ok;
+  if (wanted.is_look) fmt::print(stderr, "a look: frames go to {}\n", job.output.directory);
+  if (job.quality.may_grow())
+    fmt::print(stderr, "baton job wait adds rounds until quality.{} ends it\n",
+               job.quality.noise_threshold ? "noiseThreshold"
+               : job.quality.time_limit    ? "timeLimit"
+                                           : "maxRounds");
   return ExitCode::ok;
 }
 
@@ -230,12 +234,7 @@ Result<ExitCode> refine(const JobOptions& options, RequestClient& client) {
   quality.refinable = true;
   BATON_ASSIGN(std::string wanted, make_job_document(parsed.job));
   BATON_ASSIGN(const JobAccepted accepted, ask<JobAccepted>(client, SubmitJob{std::move(wanted)}));
-  if (options.json) {
-    fmt::print("{}\n", ordered_json{{"id", accepted.job.hex()}, {"plan", accepted.plan}}.dump(2));
-  } else {
-    fmt::print("{}\n", accepted.job.hex());
-    fmt::print(stderr, "{}", accepted.plan);
-  }
+  print_accepted(accepted, options.json);
   return ExitCode::ok;
 }
 

@@ -75,17 +75,8 @@ ordered_json judgement_json(std::span<const FrameStats> frames) {
 }  // namespace
 
 ExitCode exit_code_of(JobStatus status) {
-  switch (status) {
-    case JobStatus::running:
-    case JobStatus::paused:
-    case JobStatus::done:
-      return ExitCode::ok;
-    case JobStatus::failed:
-      return ExitCode::failed;
-    case JobStatus::cancelled:
-      return ExitCode::cancelled;
-  }
-  return ExitCode::internal;
+  if (status == JobStatus::failed) return ExitCode::failed;
+  return status == JobStatus::cancelled ? ExitCode::cancelled : ExitCode::ok;
 }
 
 std::string job_line(const JobSummary& job) {

@@ -8,9 +8,8 @@
 #include <filesystem>
 #include <map>
 
-#include "common/job/empty_aovs.h"
+#include "common/job/aov.h"
 #include "common/job/estimate.h"
-#include "common/job/job_fields.h"
 #include "common/job/known_limits.h"
 #include "common/job/sequence.h"
 #include "common/job/store_estimate.h"
@@ -117,8 +116,8 @@ void output_warnings(const JobSpec& job, double surface_share, std::vector<std::
 void aov_warnings(const JobSpec& job, std::vector<std::string>& warnings) {
   for (const Aov aov : job.output.aovs) {
     if (const std::string_view why = why_empty(aov, job); !why.empty())
-      warnings.push_back(fmt::format("output.aovs: {} says nothing here: {}",
-                                     kAovs.at(static_cast<std::size_t>(aov)), why));
+      warnings.push_back(
+          fmt::format("output.aovs: {} says nothing here: {}", traits(aov).name, why));
   }
   if (draws_twice(job))
     warnings.push_back(

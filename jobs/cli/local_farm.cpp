@@ -48,11 +48,7 @@ std::uint64_t memory_mib_of_each(const FarmOptions& options) {
 
 }  // namespace
 
-LocalFarm::Lock::~Lock() {
-  if (file_ >= 0) ::close(file_);
-}
-
-Result<LocalFarm::Lock> LocalFarm::lock_directory(const fs::path& directory) {
+Result<FileDescriptor> LocalFarm::lock_directory(const fs::path& directory) {
   std::error_code error;
   fs::create_directories(directory, error);
   if (error)
@@ -60,11 +56,11 @@ Result<LocalFarm::Lock> LocalFarm::lock_directory(const fs::path& directory) {
                  fmt::format("{}: cannot create: {}", directory.string(), error.message())};
 
   const fs::path path = directory / "lock";
-  Lock lock(::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644));
-  if (lock.file() < 0)
+  FileDescriptor lock(::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644));
+  if (!lock)
     return Error{ErrorKind::io,
                  fmt::format("{}: cannot open: {}", path.string(), std::strerror(errno))};
-  if (::flock(lock.file(), LOCK_EX | LOCK_NB) != 0) {
+  if (::flock(lock.number(), LOCK_EX | LOCK_NB) != 0) {
     return Error{ErrorKind::io,
                  fmt::format("{}: another `baton render` works here", directory.string())};
   }
@@ -75,7 +71,7 @@ Result<LocalFarm> LocalFarm::start(const FarmOptions& options) {
   ::unsetenv("BATON_KEY");  // nobody else reaches this farm, and one key does not fit all
   BATON_ASSIGN(const std::string coordinator, sibling_program("baton-coordinator"));
   BATON_ASSIGN(const std::string worker, sibling_program("baton-worker"));
-  BATON_ASSIGN(Lock lock, lock_directory(options.work_directory));
+  BATON_ASSIGN(FileDescriptor lock, lock_directory(options.work_directory));
   LocalFarm farm(options, options.listen.empty() ? draw_endpoint() : options.listen,
                  std::move(lock));
   BATON_TRY(farm.start_coordinator(coordinator));

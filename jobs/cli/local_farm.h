@@ -33,7 +33,9 @@ class LocalFarm {
   static Result<LocalFarm> start(const FarmOptions& options);
 
   /// The farm of a coordinator that somebody else looks after: it has no programs to tend.
-  static LocalFarm attach(const std::string& endpoint) { return {{}, endpoint, Lock(-1)}; }
+  static LocalFarm attach(const std::string& endpoint) {
+    return {{}, endpoint, FileDescriptor(-1)};
+  }
 
   /// Replaces programs that have ended, with a warning. Error: one has ended too often, each time
   /// soon after its start.
@@ -55,29 +57,16 @@ class LocalFarm {
     std::chrono::steady_clock::time_point started = std::chrono::steady_clock::now();
   };
 
-  /// Holds the work directory as long as it lives.
-  class Lock {
-   public:
-    explicit Lock(int file) : file_(file) {}
-    Lock(Lock&& other) noexcept : file_(std::exchange(other.file_, -1)) {}
-    Lock& operator=(Lock&& other) = delete;
-    ~Lock();
-    int file() const { return file_; }
-
-   private:
-    int file_;
-  };
-
-  LocalFarm(FarmOptions options, std::string endpoint, Lock lock)
+  LocalFarm(FarmOptions options, std::string endpoint, FileDescriptor lock)
       : options_(std::move(options)), endpoint_(std::move(endpoint)), lock_(std::move(lock)) {}
-  static Result<Lock> lock_directory(const std::filesystem::path& directory);
+  static Result<FileDescriptor> lock_directory(const std::filesystem::path& directory);
   Status start_coordinator(const std::string& program);
   Status add_member(const std::string& name, std::vector<std::string> command);
   std::filesystem::path log_of(const std::string& name) const;
 
   FarmOptions options_;
   std::string endpoint_;
-  Lock lock_;
+  FileDescriptor lock_;          ///< holds the work directory as long as it is open
   std::vector<Member> members_;  ///< the coordinator first
 };
 

@@ -1,9 +1,7 @@
 #include "jobs/cli/movie_encoder.h"
 
 #include <fmt/format.h>
-#include <sys/mman.h>
 #include <sys/socket.h>
-#include <unistd.h>
 
 #include <algorithm>
 #include <array>
@@ -93,16 +91,6 @@ std::vector<std::uint8_t> even_bytes(const RgbImage& frame) {
   return padded;
 }
 
-std::string last_line_of(int log) {
-  std::string text(4096, '\0');
-  const off_t size = ::lseek(log, 0, SEEK_END);
-  const off_t from = std::max<off_t>(0, size - static_cast<off_t>(text.size()));
-  const ssize_t count = ::pread(log, text.data(), text.size(), from);
-  text.resize(count > 0 ? static_cast<std::size_t>(count) : 0);
-  while (text.ends_with('\n')) text.pop_back();
-  return text.substr(text.rfind('\n') + 1);
-}
-
 }  // namespace
 
 bool is_movie_name(const fs::path& path) { return kind_of(path) != nullptr; }
@@ -114,47 +102,26 @@ Result<MovieEncoder> MovieEncoder::start(const fs::path& path, int width, int he
   if (!path.parent_path().empty()) fs::create_directories(path.parent_path(), error);
   if (error) return Error{ErrorKind::io, fmt::format("{}: {}", path.string(), error.message())};
   std::array<int, 2> ends{-1, -1};
-  const int log = ::memfd_create("ffmpeg", MFD_CLOEXEC);
-  if (log < 0 || ::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends.data()) != 0)
+  BATON_ASSIGN(MemoryFile log, MemoryFile::open(path.string()));
+  if (::socketpair(AF_UNIX, SOCK_STREAM | SOCK_CLOEXEC, 0, ends.data()) != 0)
     return Error{ErrorKind::io, fmt::format("{}: {}", path.string(), std::strerror(errno))};
-  Result<ChildProcess> program =
-      ChildProcess::start(ffmpeg_command(path, width, height, frames_per_second), log, ends[1]);
-  ::close(ends[1]);
-  if (!program) {
-    ::close(ends[0]);
-    ::close(log);
-    return program.error();
-  }
-  return MovieEncoder(path, width, height, ends[0], log, std::move(program).value());
+  FileDescriptor ours(ends[0]);
+  const FileDescriptor its(ends[1]);
+  BATON_ASSIGN(ChildProcess program,
+               ChildProcess::start(ffmpeg_command(path, width, height, frames_per_second),
+                                   {.output = log.number(), .input = its.number()}));
+  return MovieEncoder(path, width, height, std::move(ours), std::move(log), std::move(program));
 }
 
-MovieEncoder::MovieEncoder(fs::path path, int width, int height, int socket, int log,
-                           ChildProcess program)
-    : path_(std::move(path)),
-      width_(width),
-      height_(height),
-      socket_(socket),
-      log_(log),
-      program_(std::move(program)) {}
-
-MovieEncoder::MovieEncoder(MovieEncoder&& other) noexcept
-    : path_(std::move(other.path_)),
-      width_(other.width_),
-      height_(other.height_),
-      socket_(std::exchange(other.socket_, -1)),
-      log_(std::exchange(other.log_, -1)),
-      program_(std::move(other.program_)) {}
-
 MovieEncoder::~MovieEncoder() {
-  if (log_ < 0) return;
-  if (socket_ >= 0) ::close(socket_);
-  ::close(log_);
+  if (log_.number() < 0) return;
+  socket_.close();
   std::error_code error;
   fs::remove(unfinished(path_), error);
 }
 
 Error MovieEncoder::failure(const std::string& how) const {
-  const std::string said = last_line_of(log_);
+  const std::string said = log_.last_line();
   if (said.empty() && how == ChildProcess::kCannotBeRun) {
     return {ErrorKind::io,
             fmt::format("{}: the program ffmpeg, of Debian's package ffmpeg, is not there; frames "
@@ -170,7 +137,8 @@ Status MovieEncoder::add(const RgbImage& frame) {
   std::size_t sent = 0;
   while (sent < bytes.size()) {
     // No SIGPIPE where it has ended: what it said is the error.
-    const ssize_t count = ::send(socket_, bytes.data() + sent, bytes.size() - sent, MSG_NOSIGNAL);
+    const ssize_t count =
+        ::send(socket_.number(), bytes.data() + sent, bytes.size() - sent, MSG_NOSIGNAL);
     if (count < 0 && errno == EINTR) continue;
     if (count < 0) {
       const std::string fault = std::strerror(errno);
@@ -183,10 +151,10 @@ Status MovieEncoder::add(const RgbImage& frame) {
 }
 
 Status MovieEncoder::finish() {
-  ::close(std::exchange(socket_, -1));
+  socket_.close();
   program_.wait_for_end(kPatience);
   const std::string how = program_.ended().value_or("does not end");
-  if (how != "exit code 0") return failure(how);
+  if (how != ChildProcess::kSuccess) return failure(how);
   std::error_code error;
   fs::rename(unfinished(path_), path_, error);
   if (error) return Error{ErrorKind::io, fmt::format("{}: {}", path_.string(), error.message())};

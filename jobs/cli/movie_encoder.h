@@ -20,7 +20,7 @@ class MovieEncoder {
   /// it, "24" or "24000/1001". Error: the folder cannot be made.
   static Result<MovieEncoder> start(const std::filesystem::path& path, int width, int height,
                                     const std::string& frames_per_second);
-  MovieEncoder(MovieEncoder&& other) noexcept;
+  MovieEncoder(MovieEncoder&& other) noexcept = default;
   ~MovieEncoder();
 
   /// Linear light in [0, 1], as write_png takes it. Error: what ffmpeg said before it ended, or
@@ -30,14 +30,20 @@ class MovieEncoder {
   Status finish();
 
  private:
-  MovieEncoder(std::filesystem::path path, int width, int height, int socket, int log,
-               ChildProcess program);
+  MovieEncoder(std::filesystem::path path, int width, int height, FileDescriptor socket,
+               MemoryFile log, ChildProcess program)
+      : path_(std::move(path)),
+        width_(width),
+        height_(height),
+        socket_(std::move(socket)),
+        log_(std::move(log)),
+        program_(std::move(program)) {}
   Error failure(const std::string& how) const;
 
   std::filesystem::path path_;
   int width_, height_;
-  int socket_;  ///< to ffmpeg; -1: closed
-  int log_;     ///< what it prints, in memory; -1: moved from
+  FileDescriptor socket_;  ///< to ffmpeg
+  MemoryFile log_;         ///< what it prints
   ChildProcess program_;
 };
 

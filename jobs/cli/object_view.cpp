@@ -4,9 +4,9 @@
 
 #include <algorithm>
 #include <array>
-#include <limits>
 #include <span>
 
+#include "common/math/bounds.h"
 #include "jobs/cli/frame_sheet.h"
 #include "worker/scene/pose.h"
 
@@ -19,15 +19,10 @@ using Corners = std::array<Vec3, 8>;
 
 /// The corners of the box around the points of a mesh.
 Corners corners_of(std::span<const Vec3> points) {
-  constexpr float kFar = std::numeric_limits<float>::max();
-  Vec3 low{kFar, kFar, kFar}, high{-kFar, -kFar, -kFar};
-  for (const Vec3& p : points) {
-    low = {std::min(low.x, p.x), std::min(low.y, p.y), std::min(low.z, p.z)};
-    high = {std::max(high.x, p.x), std::max(high.y, p.y), std::max(high.z, p.z)};
-  }
+  Bounds bounds;
+  for (const Vec3& p : points) bounds.add(p);
   Corners corners;
-  for (std::size_t i = 0; i < corners.size(); ++i)
-    corners[i] = {i & 1 ? high.x : low.x, i & 2 ? high.y : low.y, i & 4 ? high.z : low.z};
+  for (std::size_t i = 0; i < corners.size(); ++i) corners[i] = bounds.corner(i);
   return corners;
 }
 
@@ -82,18 +77,11 @@ class View {
   std::array<Plane, 5> planes_;
 };
 
-std::string words(Sight best) {
-  switch (best) {
-    case Sight::behind:
-      return "is behind the camera in every frame";
-    case Sight::outside:
-      return "is outside of the picture in every frame";
-    case Sight::tiny:
-      return "is smaller than a pixel in every frame";
-    case Sight::seen:
-      break;
-  }
-  return {};
+std::string_view words(Sight best) {
+  constexpr std::array<std::string_view, 4> kWords{"is behind the camera in every frame",
+                                                   "is outside of the picture in every frame",
+                                                   "is smaller than a pixel in every frame", ""};
+  return kWords.at(static_cast<std::size_t>(best));
 }
 
 }  // namespace

@@ -6,6 +6,7 @@
 #include <cmath>
 #include <limits>
 
+#include "common/image/contact_sheet.h"
 #include "common/job/motion.h"
 #include "common/math/bounds.h"
 #include "jobs/cli/preview_canvas.h"
@@ -143,14 +144,6 @@ void draw_view(const JobSpec& job, const Shot& shot, PreviewCanvas& canvas) {
   canvas.label(shot.camera.position, "camera");
 }
 
-void paste(const RgbImage& from, int left, RgbImage& to) {
-  for (int y = 0; y < from.height; ++y) {
-    std::copy_n(from.rgb.begin() + std::ptrdiff_t{y} * from.width * 3,
-                std::ptrdiff_t{from.width} * 3,
-                to.rgb.begin() + (std::ptrdiff_t{y} * to.width + left) * 3);
-  }
-}
-
 }  // namespace
 
 RgbImage scene_picture(const JobSpec& job, const Scene& scene) {
@@ -167,8 +160,11 @@ RgbImage scene_picture(const JobSpec& job, const Scene& scene) {
   RgbImage picture{width + kGap + kPanelWidth, around.image().height, {}};
   picture.rgb.resize(static_cast<std::size_t>(picture.width) *
                      static_cast<std::size_t>(picture.height) * 3);
-  paste(seen.image(), 0, picture);
-  paste(around.image(), width + kGap, picture);
+  const auto add = [&](const RgbImage& panel, int left) {
+    paste(panel, {0, 0, panel.width, panel.height}, 1, left, 0, picture);
+  };
+  add(seen.image(), 0);
+  add(around.image(), width + kGap);
   return picture;
 }
 

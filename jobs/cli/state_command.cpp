@@ -26,7 +26,7 @@ struct StateOptions {
 /// A state file and what its pixels add up to.
 struct StateReport {
   SampleState state;
-  std::vector<StateSectionInfo> sections;
+  std::vector<SectionInfo> sections;
   std::uint64_t file_bytes = 0;
   std::array<std::uint64_t, kSourceNames.size()> sources{};
   std::array<std::uint64_t, kEssBins>
@@ -70,9 +70,9 @@ double bytes_per_pixel(const StateReport& report) {
 ordered_json report_json(const StateReport& report) {
   const SampleState& state = report.state;
   ordered_json sections = ordered_json::array();
-  for (const StateSectionInfo& s : report.sections) {
+  for (const SectionInfo& s : report.sections) {
     sections.push_back(
-        {{"tag", s.tag}, {"storedBytes", s.stored_bytes}, {"rawBytes", s.raw_bytes}});
+        {{"tag", tag_text(s.tag)}, {"storedBytes", s.stored_bytes}, {"rawBytes", s.raw_bytes}});
   }
   ordered_json sources = ordered_json::object();
   for (std::size_t i = 0; i < kSourceNames.size(); ++i)
@@ -98,8 +98,8 @@ void print_report(const StateReport& report) {
   fmt::print("frame      index {}\n", state.frame_index);
   fmt::print("particles  {} a pixel\n", state.num_particles);
   fmt::print("size       {} bytes, {:.1f} a pixel\n", report.file_bytes, bytes_per_pixel(report));
-  for (const StateSectionInfo& s : report.sections) {
-    fmt::print("section    {} {:>10} bytes stored, {:>10} raw\n", s.tag, s.stored_bytes,
+  for (const SectionInfo& s : report.sections) {
+    fmt::print("section    {} {:>10} bytes stored, {:>10} raw\n", tag_text(s.tag), s.stored_bytes,
                s.raw_bytes);
   }
   for (std::size_t i = 0; i < kSourceNames.size(); ++i) {

@@ -18,24 +18,15 @@ std::vector<std::size_t> fixed_cells(const Study& study, std::size_t scene,
   std::vector<std::size_t> cells;
   for (std::size_t c = 0; c < study.cells.size(); ++c) {
     const StudyCell& cell = study.cells[c];
-    if (static_cast<std::size_t>(cell.scene) == scene && cell.budget == budget && !is_auto(cell))
-      cells.push_back(c);
+    if (cell.scene == scene && cell.budget == budget && !is_auto(cell)) cells.push_back(c);
   }
   return cells;
-}
-
-std::size_t scene_of(const Study& study, std::size_t cell) {
-  return static_cast<std::size_t>(study.cells[cell].scene);
-}
-
-std::string method_name(const Study& study, std::size_t cell) {
-  return study.methods[static_cast<std::size_t>(study.cells[cell].method)];
 }
 
 /// Whether the reference can tell the cell's error.
 bool is_resolved(const Study& study, const StudyResults& results, std::size_t cell) {
   return cell_error(results.runs[cell], ErrorKindOfImage::rmse, {}).value >=
-         reference_error(results.references[scene_of(study, cell)], ErrorKindOfImage::rmse, {});
+         reference_error(results.references[study.cells[cell].scene], ErrorKindOfImage::rmse, {});
 }
 
 /// What is known of a choice for every block: squared error and time, both to be multiplied.
@@ -118,7 +109,8 @@ std::vector<AutoRow> compare_auto(const Study& study, const StudyResults& result
   for (std::size_t c = 0; c < study.cells.size(); ++c) {
     if (!is_auto(study.cells[c]) || !is_resolved(study, results, c)) continue;
     std::optional<std::size_t> best, worst;
-    for (const std::size_t fixed : fixed_cells(study, scene_of(study, c), study.cells[c].budget)) {
+    for (const std::size_t fixed :
+         fixed_cells(study, study.cells[c].scene, study.cells[c].budget)) {
       if (!is_resolved(study, results, fixed)) continue;
       if (!best || efficiency_ratio(results, *best, fixed).value > 1) best = fixed;
       if (!worst || efficiency_ratio(results, *worst, fixed).value < 1) worst = fixed;
@@ -166,11 +158,11 @@ std::string auto_csv(const Study& study, const StudyResults& results) {
     const StudyCell& cell = study.cells[row.cell];
     fmt::format_to(std::back_inserter(csv),
                    "{},{},{},{},{:.4g},{:.4g},{:.4g},{},{:.4g},{:.4g},{:.4g},{:.4g}\n",
-                   study.scenes[scene_of(study, row.cell)].name, cell.budget, choice_text(cell),
-                   method_name(study, row.best), row.over_best.value, row.over_best.low,
-                   row.over_best.high, method_name(study, row.worst), row.over_worst.value,
+                   study.scene_of(row.cell).name, cell.budget, choice_text(cell),
+                   study.method_of(row.best), row.over_best.value, row.over_best.low,
+                   row.over_best.high, study.method_of(row.worst), row.over_worst.value,
                    row.over_worst.low, row.over_worst.high,
-                   block_headroom(study, results, scene_of(study, row.cell), cell.budget));
+                   block_headroom(study, results, study.cells[row.cell].scene, cell.budget));
   }
   return csv;
 }
@@ -187,11 +179,11 @@ std::string auto_html(const Study& study, const StudyResults& results) {
     fmt::format_to(std::back_inserter(html),
                    "<tr><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td><td>{}</td>"
                    "<td>{}</td><td>{:.2f}</td></tr>\n",
-                   escaped(study.scenes[scene_of(study, row.cell)].name),
-                   escaped(choice_text(cell)), escaped(cell.budget),
-                   escaped(method_name(study, row.best)), interval_text(row.over_best),
-                   escaped(method_name(study, row.worst)), interval_text(row.over_worst),
-                   block_headroom(study, results, scene_of(study, row.cell), cell.budget));
+                   escaped(study.scene_of(row.cell).name), escaped(choice_text(cell)),
+                   escaped(cell.budget), escaped(study.method_of(row.best)),
+                   interval_text(row.over_best), escaped(study.method_of(row.worst)),
+                   interval_text(row.over_worst),
+                   block_headroom(study, results, study.cells[row.cell].scene, cell.budget));
   }
   return html + fmt::format(
                     "</table>\n<p class=\"note\">Efficiency of auto over that of the best and the "

@@ -41,20 +41,6 @@ RgbImage heat_map(const std::vector<float>& errors, int width, int height) {
   return image;
 }
 
-/// Copies the crop with its corner at (left, top), each pixel as a square of `scale` pixels.
-void paste(const RgbImage& from, const std::array<int, 4>& crop, int scale, int left, int top,
-           RgbImage& to) {
-  for (int y = 0; y < crop[3] * scale; ++y) {
-    for (int x = 0; x < crop[2] * scale; ++x) {
-      const std::size_t source =
-          static_cast<std::size_t>(crop[1] + y / scale) * from.width + crop[0] + x / scale;
-      const std::size_t target = static_cast<std::size_t>(top + y) * to.width + left + x;
-      std::copy_n(from.rgb.begin() + static_cast<std::ptrdiff_t>(3 * source), 3,
-                  to.rgb.begin() + static_cast<std::ptrdiff_t>(3 * target));
-    }
-  }
-}
-
 }  // namespace
 
 RgbImage crop_strip(const Reference& reference, std::span<const Picture> tests,

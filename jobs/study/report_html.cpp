@@ -66,15 +66,15 @@ std::string summary_table(const Study& study, std::size_t scene,
       "<th>efficiency / bidirectional</th></tr>\n";
   for (const CellSummary& row : rows) {
     const StudyCell& cell = study.cells[row.cell];
-    if (static_cast<std::size_t>(cell.scene) != scene) continue;
+    if (cell.scene != scene) continue;
     fmt::format_to(std::back_inserter(html),
                    "<tr><td>{}</td><td>{}</td><td>{:.3g}</td><td>{:.3g}</td><td>{:.3g}</td>{}{}{}"
                    "<td>{:.3g}</td><td{}>{:.2g} [{:.2g}, {:.2g}]</td>{}<td>{}</td><td>{:.3g}</td>",
-                   escaped(study.methods[static_cast<std::size_t>(cell.method)]),
-                   escaped(cell.budget), row.cost.cpu_us, row.cost.rays, row.cost.light_ms,
-                   interval_cell(row.rmse), interval_cell(row.rel_mse), interval_cell(row.flip),
-                   row.percentile_99_9, row.biased ? " class=\"bad\"" : "", row.bias.value,
-                   row.bias.low, row.bias.high, interval_cell(row.flicker),
+                   escaped(study.methods[cell.method]), escaped(cell.budget), row.cost.cpu_us,
+                   row.cost.rays, row.cost.light_ms, interval_cell(row.rmse),
+                   interval_cell(row.rel_mse), interval_cell(row.flip), row.percentile_99_9,
+                   row.biased ? " class=\"bad\"" : "", row.bias.value, row.bias.low, row.bias.high,
+                   interval_cell(row.flicker),
                    std::isnan(row.lag) ? "" : fmt::format("{}", row.lag), row.cost.state_bytes);
     html += row.resolved ? ratio_cell(row.against_mis) + ratio_cell(row.against_bidirectional)
                          : "<td class=\"weak\" colspan=\"2\">below the reference's own error</td>";
@@ -122,10 +122,8 @@ std::string crops_block(const Study& study, const StudyResults& results, std::si
                         const ReportCrops& crops) {
   std::string caption = "reference";
   for (const std::size_t cell : crops.cells) {
-    caption +=
-        fmt::format(" &middot; {} {} ({:.2g} &micro;s/px)",
-                    escaped(study.methods[static_cast<std::size_t>(study.cells[cell].method)]),
-                    escaped(study.cells[cell].budget), cell_cost(results.runs[cell]).cpu_us);
+    caption += fmt::format(" &middot; {} {} ({:.2g} &micro;s/px)", escaped(study.method_of(cell)),
+                           escaped(study.cells[cell].budget), cell_cost(results.runs[cell]).cpu_us);
   }
   return fmt::format(
       "<h3>About equal time, frame {}, seed 1</h3><img alt=\"crops\" "

@@ -23,8 +23,6 @@ constexpr int kMaxSeeds = 10000;
 /// Far from the seeds of runs, which count from 1.
 constexpr std::uint64_t kReferenceSeed = 1'000'000'000;
 
-/// All runs and the reference see the same points of the scene, or the noise of edges would count
-/// as that of the light.
 constexpr std::uint64_t kSiteSeed = 1;
 
 struct Budget {
@@ -84,31 +82,13 @@ std::vector<MethodEntry> read_methods(StudyObject& study, StudyFaults& faults) {
   return methods;
 }
 
-/// Adds what the measures need and takes what would disturb them.
+/// prepare_measured, and the AOVs.
 void prepare_output(JobSpec& job) {
-  job.output.background = Background::transparent;
-  job.output.pixel_type = PixelType::full_float;
-  job.output.clamp_negative = false;
-  job.output.pattern = kFramePattern;
-  job.state.keep = StateKeep::last;
-  if (job.image.site_seed == 0) job.image.site_seed = kSiteSeed;
+  prepare_measured(job);
   std::vector<Aov>& aovs = job.output.aovs;
   aovs.insert(aovs.end(), {Aov::lns, Aov::ess, Aov::acceptance});
   std::sort(aovs.begin(), aovs.end());
   aovs.erase(std::unique(aovs.begin(), aovs.end()), aovs.end());
-}
-
-/// The brute-force twin of a job for the given frames.
-JobSpec reference_job(const JobSpec& job, int samples, const std::vector<int>& frames, int half) {
-  JobSpec reference = job;
-  reference.frames = frames;
-  reference.name = "reference";
-  reference.sampling = {};
-  reference.sampling.method = Method::reference;
-  reference.sampling.reference_samples = samples;
-  reference.seed = kReferenceSeed + static_cast<std::uint64_t>(half);
-  reference.output.aovs = {Aov::lns, Aov::variance};
-  return reference;
 }
 
 /// The measured frames: those of `text`, or all.
@@ -189,7 +169,7 @@ void read_scene(StudyObject& object, const Shared& shared, Study& study, StudyFa
     scene.reference[half] = reference_job(*plain, shared.reference_samples, scene.frames, half);
 
   // Every method with every budget.
-  const int index = static_cast<int>(study.scenes.size());
+  const std::size_t index = study.scenes.size();
   for (std::size_t m = 0; m < shared.methods.size(); ++m) {
     for (const Budget& budget : shared.methods[m].budgets) {
       patches.resize(2);
@@ -200,13 +180,34 @@ void read_scene(StudyObject& object, const Shared& shared, Study& study, StudyFa
       if (!job) continue;
       prepare_output(*job);
       job->name = fmt::format("{} {} {}", scene.name, shared.methods[m].name, budget.name);
-      study.cells.push_back({index, static_cast<int>(m), budget.name, std::move(*job)});
+      study.cells.push_back({index, m, budget.name, std::move(*job)});
     }
   }
   study.scenes.push_back(std::move(scene));
 }
 
 }  // namespace
+
+void prepare_measured(JobSpec& job) {
+  job.output.background = Background::transparent;
+  job.output.pixel_type = PixelType::full_float;
+  job.output.clamp_negative = false;
+  job.output.pattern = kFramePattern;
+  job.state.keep = StateKeep::last;
+  if (job.image.site_seed == 0) job.image.site_seed = kSiteSeed;
+}
+
+JobSpec reference_job(const JobSpec& job, int samples, const std::vector<int>& frames, int half) {
+  JobSpec reference = job;
+  reference.frames = frames;
+  reference.name = "reference";
+  reference.sampling = {};
+  reference.sampling.method = Method::reference;
+  reference.sampling.reference_samples = samples;
+  reference.seed = kReferenceSeed + static_cast<std::uint64_t>(half);
+  reference.output.aovs = {Aov::lns, Aov::variance};
+  return reference;
+}
 
 Result<Study> parse_study(std::string_view text, const std::string& name,
                           const fs::path& base_directory) {

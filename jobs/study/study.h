@@ -14,6 +14,13 @@ namespace baton {
 /// Of every job of a study.
 inline constexpr const char* kFramePattern = "frame.####.exr";
 
+/// Adds what the measures need of a job's frames and takes what would disturb them, but for AOVs.
+/// All jobs see the same points of the scene, or the noise of edges would count as that of the
+/// light.
+void prepare_measured(JobSpec& job);
+/// Brute force for some frames of such a job. half: 0 or 1, of two with seeds of their own.
+JobSpec reference_job(const JobSpec& job, int samples, const std::vector<int>& frames, int half);
+
 /// A scene of a study, with the two halves of its reference: equal jobs with different seeds, so
 /// that their difference tells what the reference can resolve.
 struct StudyScene {
@@ -26,7 +33,7 @@ struct StudyScene {
 
 /// One combination: everything but the seed.
 struct StudyCell {
-  int scene = 0, method = 0;  ///< indices into the study's lists
+  std::size_t scene = 0, method = 0;  ///< indices into the study's lists
   std::string budget;
   JobSpec job;  ///< seed, output folder: filled in run by run
   /// What `auto` chose for it, "CHOICE: what is expected of it"; empty: its job was fixed.
@@ -40,6 +47,9 @@ struct Study {
   std::vector<StudyScene> scenes;
   std::vector<std::string> methods;
   std::vector<StudyCell> cells;  ///< by scene, then method, then budget, in the order of the file
+
+  const StudyScene& scene_of(std::size_t cell) const { return scenes[cells[cell].scene]; }
+  const std::string& method_of(std::size_t cell) const { return methods[cells[cell].method]; }
 };
 
 /// The study of a JSON text, every combination checked as a job. name goes first in every error

@@ -9,8 +9,7 @@ namespace baton {
 namespace {
 
 bool belongs(const StudyCell& cell, std::size_t scene, std::size_t method) {
-  return static_cast<std::size_t>(cell.scene) == scene &&
-         static_cast<std::size_t>(cell.method) == method;
+  return cell.scene == scene && cell.method == method;
 }
 
 /// Marks the points of all series that no other beats.
@@ -117,10 +116,8 @@ std::vector<NamedChart> temporal_charts(const Study& study, const StudyResults& 
     chart.x_scale = AxisScale::whole;
     chart.y_scale = course.scale;
     for (const std::size_t cell : equal_time_cells(study, results, scene)) {
-      const int method = study.cells[cell].method;
-      ChartSeries series{fmt::format("{} {}", study.methods[static_cast<std::size_t>(method)],
-                                     study.cells[cell].budget),
-                         method,
+      ChartSeries series{fmt::format("{} {}", study.method_of(cell), study.cells[cell].budget),
+                         static_cast<int>(study.cells[cell].method),
                          {}};
       for (std::size_t f = 0; f < frames.size(); ++f)
         series.points.push_back(course_point(course, results, scene, cell, f, frames[f]));
@@ -137,8 +134,7 @@ std::vector<std::size_t> equal_time_cells(const Study& study, const StudyResults
   // The middle of what the scene's cells take.
   std::vector<double> times;
   for (std::size_t c = 0; c < study.cells.size(); ++c) {
-    if (static_cast<std::size_t>(study.cells[c].scene) == scene)
-      times.push_back(cell_cost(results.runs[c]).cpu_us);
+    if (study.cells[c].scene == scene) times.push_back(cell_cost(results.runs[c]).cpu_us);
   }
   const double target = std::max(median(times), 1e-9);
 

@@ -23,8 +23,8 @@ void for_each_run(const Study& study, const StudyResults& results, F line) {
   for (std::size_t c = 0; c < study.cells.size(); ++c) {
     const StudyCell& cell = study.cells[c];
     for (std::size_t s = 0; s < results.runs[c].size(); ++s) {
-      line(fmt::format("{},{},{},{}", study.scenes[static_cast<std::size_t>(cell.scene)].name,
-                       study.methods[static_cast<std::size_t>(cell.method)], cell.budget, s + 1),
+      line(fmt::format("{},{},{},{}", study.scenes[cell.scene].name, study.methods[cell.method],
+                       cell.budget, s + 1),
            results.runs[c][s]);
     }
   }
@@ -97,12 +97,12 @@ std::string efficiency_csv(const Study& study, const std::vector<CellSummary>& r
     const StudyCell& cell = study.cells[row.cell];
     fmt::format_to(
         std::back_inserter(csv), "{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{},{}\n",
-        study.scenes[static_cast<std::size_t>(cell.scene)].name,
-        study.methods[static_cast<std::size_t>(cell.method)], cell.budget, number(row.cost.cpu_us),
-        number(row.cost.rays), number(row.cost.evaluations), number(row.cost.light_ms),
-        number(row.cost.state_bytes), interval(row.rmse), interval(row.rel_mse), interval(row.flip),
-        number(row.percentile_99_9), interval(row.bias), number(row.flicker.value), number(row.lag),
-        row.resolved ? 1 : 0, interval(row.against_mis), interval(row.against_bidirectional));
+        study.scenes[cell.scene].name, study.methods[cell.method], cell.budget,
+        number(row.cost.cpu_us), number(row.cost.rays), number(row.cost.evaluations),
+        number(row.cost.light_ms), number(row.cost.state_bytes), interval(row.rmse),
+        interval(row.rel_mse), interval(row.flip), number(row.percentile_99_9), interval(row.bias),
+        number(row.flicker.value), number(row.lag), row.resolved ? 1 : 0, interval(row.against_mis),
+        interval(row.against_bidirectional));
   }
   return csv;
 }

@@ -162,7 +162,7 @@ Result<StudyResults> run_study(const Study& study, const StudyFolder& folder, Jo
   for (int seed = 1; seed <= study.num_seeds; ++seed) {
     for (std::size_t c = 0; c < study.cells.size(); ++c) {
       const std::string key = run_key(cell_keys[c], seed);
-      const StudyScene& scene = study.scenes[static_cast<std::size_t>(study.cells[c].scene)];
+      const StudyScene& scene = study.scene_of(c);
       if (std::optional<RunRecord> record = kept_record(folder, scene, key, seed)) {
         results.runs[c][static_cast<std::size_t>(seed - 1)] = std::move(*record);
         continue;
@@ -180,7 +180,7 @@ Result<StudyResults> run_study(const Study& study, const StudyFolder& folder, Jo
 
   const auto keep = [&](std::size_t index, const JobSummary& summary) -> Status {
     const Run& run = runs[index];
-    const auto scene = static_cast<std::size_t>(study.cells[run.cell].scene);
+    const auto scene = study.cells[run.cell].scene;
     BATON_ASSIGN(RunRecord record,
                  measure_run(jobs[index], study.scenes[scene].frames, results.references[scene]));
     record.key = run.key;

@@ -1,6 +1,7 @@
 #include "jobs/study/study_summary.h"
 
 #include <algorithm>
+#include <array>
 #include <cmath>
 #include <limits>
 #include <numeric>
@@ -14,16 +15,18 @@ constexpr double kNormal95 = 1.96;
 /// Squared error over the settled one at which a cut counts as overcome.
 constexpr double kOvercome = 1.5;
 
-double measure_of(const FrameMeasures& m, ErrorKindOfImage kind) {
-  switch (kind) {
-    case ErrorKindOfImage::rmse:
-      return m.mse;
-    case ErrorKindOfImage::rel_mse:
-      return m.rel_mse;
-    case ErrorKindOfImage::flip:
-      return m.flip;
-  }
-  return kNone;
+/// What there is of an error in frames and in references.
+struct ErrorRow {
+  const char* name;
+  double FrameMeasures::*measured;
+  double Reference::*own;
+};
+const ErrorRow& row_of(ErrorKindOfImage kind) {
+  static constexpr std::array<ErrorRow, 3> kRows{
+      {{"RMSE", &FrameMeasures::mse, &Reference::mse},
+       {"relMSE", &FrameMeasures::rel_mse, &Reference::rel_mse},
+       {"FLIP", &FrameMeasures::flip, &Reference::flip}}};
+  return kRows.at(static_cast<std::size_t>(kind));
 }
 
 /// One number a run: a measure at a frame, or its mean over those frames that have it.
@@ -77,8 +80,7 @@ std::optional<std::size_t> baseline(const Study& study, const StudyResults& resu
 
 CellSummary summarize_cell(const Study& study, const StudyResults& results, std::size_t cell) {
   const std::vector<RunRecord>& runs = results.runs[cell];
-  const std::vector<Reference>& references =
-      results.references[static_cast<std::size_t>(study.cells[cell].scene)];
+  const std::vector<Reference>& references = results.references[study.cells[cell].scene];
   CellSummary row;
   row.cell = cell;
   row.cost = cell_cost(runs);
@@ -89,7 +91,7 @@ CellSummary summarize_cell(const Study& study, const StudyResults& results, std:
   row.percentile_99_9 = mean_interval(tails).value;
   const auto flicker = per_run(runs, {}, [](const FrameMeasures& m) { return m.flicker; });
   row.flicker = flicker.empty() ? Interval{kNone, kNone, kNone} : mean_interval(flicker);
-  row.lag = lag_after_cut(study.scenes[static_cast<std::size_t>(study.cells[cell].scene)], runs);
+  row.lag = lag_after_cut(study.scene_of(cell), runs);
   row.resolved = row.rmse.value >= reference_error(references, ErrorKindOfImage::rmse, {});
 
   // The reference's own uncertainty widens the interval of the bias.
@@ -110,17 +112,7 @@ CellSummary summarize_cell(const Study& study, const StudyResults& results, std:
 
 }  // namespace
 
-const char* name_of(ErrorKindOfImage kind) {
-  switch (kind) {
-    case ErrorKindOfImage::rmse:
-      return "RMSE";
-    case ErrorKindOfImage::rel_mse:
-      return "relMSE";
-    case ErrorKindOfImage::flip:
-      return "FLIP";
-  }
-  return "";
-}
+const char* name_of(ErrorKindOfImage kind) { return row_of(kind).name; }
 
 CellCost cell_cost(const std::vector<RunRecord>& runs) {
   std::vector<double> cpu, rays, evaluations, light, state;
@@ -143,7 +135,7 @@ CellCost cell_cost(const std::vector<RunRecord>& runs) {
 
 Interval cell_error(const std::vector<RunRecord>& runs, ErrorKindOfImage kind, FrameChoice frame) {
   const auto values =
-      per_run(runs, frame, [kind](const FrameMeasures& m) { return measure_of(m, kind); });
+      per_run(runs, frame, [kind](const FrameMeasures& m) { return m.*row_of(kind).measured; });
   const Interval mean = mean_interval(values);
   return kind == ErrorKindOfImage::rmse ? root(mean) : mean;
 }
@@ -153,9 +145,7 @@ double reference_error(const std::vector<Reference>& references, ErrorKindOfImag
   double sum = 0, count = 0;
   for (std::size_t f = 0; f < references.size(); ++f) {
     if (frame && *frame != f) continue;
-    sum += kind == ErrorKindOfImage::rmse      ? references[f].mse
-           : kind == ErrorKindOfImage::rel_mse ? references[f].rel_mse
-                                               : references[f].flip;
+    sum += references[f].*row_of(kind).own;
     count += 1;
   }
   const double mean = count > 0 ? sum / count : 0;

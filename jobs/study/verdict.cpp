@@ -8,10 +8,6 @@
 namespace baton {
 namespace {
 
-const std::string& method_name(const Study& study, std::size_t cell) {
-  return study.methods[static_cast<std::size_t>(study.cells[cell].method)];
-}
-
 /// The most efficient resolved row of each method of a scene, the best first.
 std::vector<const CellSummary*> best_rows(const Study& study, const StudyResults& results,
                                           const std::vector<CellSummary>& rows, std::size_t scene) {
@@ -21,7 +17,7 @@ std::vector<const CellSummary*> best_rows(const Study& study, const StudyResults
   };
   for (const CellSummary& row : rows) {
     const StudyCell& cell = study.cells[row.cell];
-    if (static_cast<std::size_t>(cell.scene) != scene || !row.resolved) continue;
+    if (cell.scene != scene || !row.resolved) continue;
     const auto same = std::find_if(best.begin(), best.end(), [&](const CellSummary* other) {
       return study.cells[other->cell].method == cell.method;
     });
@@ -37,7 +33,7 @@ std::vector<const CellSummary*> best_rows(const Study& study, const StudyResults
 }
 
 std::string shown(const Study& study, std::size_t cell, bool biased) {
-  return fmt::format("`{}`{}", method_name(study, cell), biased ? " (biased)" : "");
+  return fmt::format("`{}`{}", study.method_of(cell), biased ? " (biased)" : "");
 }
 
 }  // namespace
@@ -57,8 +53,8 @@ std::vector<Verdict> verdicts(const Study& study, const StudyResults& results,
       verdict.ratio = efficiency_ratio(results, best[1]->cell, best[0]->cell);
     }
     for (const CellSummary& row : rows) {
-      if (static_cast<std::size_t>(study.cells[row.cell].scene) != scene || row.resolved) continue;
-      const std::string& name = method_name(study, row.cell);
+      if (study.cells[row.cell].scene != scene || row.resolved) continue;
+      const std::string& name = study.method_of(row.cell);
       if (std::find(verdict.not_resolved.begin(), verdict.not_resolved.end(), name) ==
           verdict.not_resolved.end())
         verdict.not_resolved.push_back(name);

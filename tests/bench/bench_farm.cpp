@@ -11,17 +11,20 @@
 
 #include <algorithm>
 #include <array>
+#include <atomic>
 #include <chrono>
 #include <cstdlib>
 #include <filesystem>
 #include <functional>
+#include <future>
+#include <map>
+#include <thread>
 #include <vector>
 
 #include "common/base/files.h"
 #include "common/job/job_json.h"
 #include "tests/bench/bench_program.h"
-#include "worker/run/frame_output.h"
-#include "worker/run/local_render.h"
+#include "tests/support/local_frames.h"
 #include "worker/scene/settle_motion.h"
 
 namespace baton {
@@ -60,17 +63,43 @@ Result<Cost> measure(const std::function<Status()>& work) {
   return Cost{wall.count(), cpu_seconds() - cpu_start};
 }
 
-/// write: frames become files; otherwise they are only rendered.
+/// All tiles of a frame, by two threads.
+Status render_tiles(LocalRender& render, std::int32_t num_tiles, std::int32_t frame) {
+  std::vector<Result<RenderedTile>> rendered(static_cast<std::size_t>(num_tiles), RenderedTile{});
+  std::atomic<std::int32_t> next{0};
+  const auto work = [&] {
+    for (std::int32_t tile = next++; tile < num_tiles; tile = next++)
+      rendered[static_cast<std::size_t>(tile)] = render.render(frame, tile);
+  };
+  std::thread other(work);
+  work();
+  other.join();
+  std::map<std::int32_t, RenderedTile> tiles;
+  for (std::int32_t tile = 0; tile < num_tiles; ++tile) {
+    BATON_ASSIGN(tiles[tile], std::move(rendered[static_cast<std::size_t>(tile)]));
+  }
+  render.keep(std::move(tiles));
+  return {};
+}
+
+/// write: frames become files, while the next one is rendered; otherwise they are only rendered.
 Status render_in_process(const JobSpec& given, bool write) {
   BATON_ASSIGN(const JobSpec job, settle_motion(given));
   BATON_ASSIGN(const auto context, load_render_context(job, Digest{1, 1}));
-  const FrameSink sink = [&](std::int32_t frame, const FilmTile& image) -> Status {
-    if (!write) return {};
-    BATON_ASSIGN(const WrittenFrame written, write_frame(job, Digest{1, 1}, frame, image));
-    return written.file.size_bytes > 0 ? Status() : Error{ErrorKind::internal, "empty frame"};
-  };
-  BATON_ASSIGN(const RenderStats stats, render_locally(*context, job, 2, sink));
-  return stats.pixels > 0 ? Status() : Error{ErrorKind::internal, "nothing was rendered"};
+  LocalRender render(*context);
+  std::future<Status> written;
+  for (std::int32_t frame = 0; frame < std::ssize(job.frames); ++frame) {
+    BATON_TRY(render_tiles(render, context->grid.count(), frame));
+    if (written.valid()) BATON_TRY(written.get());
+    RenderStats stats;
+    BATON_ASSIGN(FilmTile image, test::local_image(render, job, frame, stats));
+    if (!write) continue;
+    written = std::async(std::launch::async, [&job, frame, image = std::move(image)]() -> Status {
+      BATON_ASSIGN(const WrittenFrame file, write_frame(job, Digest{1, 1}, frame, image));
+      return file.file.size_bytes > 0 ? Status() : Error{ErrorKind::internal, "empty frame"};
+    });
+  }
+  return written.valid() ? written.get() : Status();
 }
 
 /// `baton render` as a person starts it.

@@ -7,6 +7,7 @@
 #include <utility>
 
 #include "common/base/files.h"
+#include "common/base/members.h"
 #include "common/base/section_file.h"
 #include "common/image/image_io.h"
 #include "common/protocol/messages.h"
@@ -114,8 +115,8 @@ struct Filling {
  private:
   template <class T>
   void fill(T& member) {
-    if constexpr (requires { member.fields(*this); }) {
-      member.fields(*this);
+    if constexpr (std::is_aggregate_v<T>) {
+      std::apply(*this, members_of(member));
     } else if constexpr (std::is_same_v<T, std::string>) {
       member = "text";
     } else if constexpr (std::is_same_v<T, Digest>) {
@@ -151,7 +152,7 @@ Status write_messages(const fs::path& folder, std::index_sequence<Types...>) {
   const auto write_type = [&]<std::size_t Type>(std::integral_constant<std::size_t, Type>) {
     std::variant_alternative_t<Type, Message> body;
     Filling filling;
-    body.fields(filling);
+    filling(body);
     if (status) status = write_message(folder / fmt::format("type{:02}", Type), Message(body));
   };
   (write_type(std::integral_constant<std::size_t, Types>()), ...);

@@ -59,7 +59,7 @@ MAY_INCLUDE = {
 THIRD_PARTY = {
     r"embree3/": ["worker/accel/"],
     r"OpenImageIO/": ["worker/texture/reader/"],
-    r"assimp/": ["worker/scene/assimp_file.h", "worker/scene/assimp_file.cpp"],
+    r"assimp/": ["worker/scene/obj_reader.cpp"],
     r"OpenEXR/|Imath/|png\.h": ["common/image/"],
     r"zmq": ["common/protocol/"],
     r"sqlite3": ["coordinator/journal/"],

@@ -12,9 +12,9 @@
 #include "tests/stability/grid.h"
 #include "tests/stability/maps.h"
 #include "tests/stability/truth.h"
+#include "tests/support/local_frames.h"
 #include "tests/support/small_scene.h"
 #include "worker/method/sequential/sequential_kernels.h"
-#include "worker/run/local_render.h"
 
 namespace baton::stability {
 namespace {
@@ -168,14 +168,14 @@ PixelVerdict judge_pixels(const JobSpec& job) {
   EXPECT_TRUE(truth.ok() && context.ok());
   const std::vector<double>& expected = truth->frames[0].radiance;
   std::vector<std::vector<double>> seen(job.frames.size(), std::vector<double>(expected.size()));
-  const FrameSink sink = [&](std::int32_t frame, const FilmTile& film) {
+  const test::FrameSink sink = [&](std::int32_t frame, const FilmTile& film) {
     for (std::size_t p = 0; p < expected.size(); ++p) {
       seen[static_cast<std::size_t>(frame)][p] =
           mean({film.plane(0)[p], film.plane(1)[p], film.plane(2)[p]});
     }
     return Status();
   };
-  EXPECT_TRUE(render_locally(**context, job, kThreads, sink).ok());
+  EXPECT_TRUE(test::render_locally(**context, sink).ok());
 
   PixelVerdict verdict;
   std::vector<double> resolution;

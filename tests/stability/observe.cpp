@@ -8,9 +8,9 @@
 
 #include "common/image/noise.h"
 #include "tests/stability/parallel.h"
+#include "tests/support/local_frames.h"
 #include "worker/method/weighted_method.h"
 #include "worker/pass/render_context.h"
-#include "worker/run/local_render.h"
 
 namespace baton::stability {
 namespace {
@@ -93,7 +93,7 @@ class SharedLights {
  private:
   static Status render_run(const RenderContext& context, const std::vector<int>& judged, Run& run) {
     run.resize(judged.size());
-    const FrameSink sink = [&](std::int32_t index, const FilmTile& film) {
+    const test::FrameSink sink = [&](std::int32_t index, const FilmTile& film) {
       run.count_values(film);
       const int number = context.job.frames[static_cast<std::size_t>(index)];
       const auto slot = std::lower_bound(judged.begin(), judged.end(), number);
@@ -101,7 +101,7 @@ class SharedLights {
         run.keep(static_cast<std::size_t>(slot - judged.begin()), film);
       return Status();
     };
-    BATON_ASSIGN(run.stats, render_locally(context, context.job, 1, sink));
+    BATON_ASSIGN(run.stats, test::render_locally(context, sink));
     return {};
   }
 

@@ -6,20 +6,9 @@
 
 namespace baton {
 Rgb source_color(PixelSource source) {
-  switch (source) {
-    case PixelSource::background:
-    case PixelSource::catcher:
-      return {0, 0, 0};
-    case PixelSource::fresh:
-      return {1, 0, 0};
-    case PixelSource::carried:
-      return {0, 1, 0};
-    case PixelSource::restarted:
-      return {1, 1, 0};
-    case PixelSource::refreshed:
-      return {0, 0, 1};
-  }
-  return {};
+  constexpr std::array<Rgb, 6> kColors{
+      {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0}, {0, 0, 1}, {0, 0, 0}}};
+  return kColors.at(static_cast<std::size_t>(source));
 }
 
 FilmWriter::FilmWriter(const PixelRect& rect, const JobSpec& job)

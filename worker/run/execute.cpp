@@ -15,11 +15,8 @@ namespace baton {
 namespace {
 
 std::string blob_name(const BlobRef& ref) {
-  const char* const kind = ref.kind == BlobKind::state        ? "state"
-                           : ref.kind == BlobKind::first_pass ? "first-pass samples"
-                                                              : "film";
-  return fmt::format("{} of frame index {} tile {} ({})", kind, ref.frame, ref.tile,
-                     ref.digest.hex());
+  return fmt::format("{} of frame index {} tile {} ({})", blob_kind_name(ref.kind), ref.frame,
+                     ref.tile, ref.digest.hex());
 }
 
 /// A film of the job's frame, as one pass made it.

@@ -11,7 +11,6 @@
 #include "common/image/noise.h"
 #include "common/image/shadow.h"
 #include "common/job/aov.h"
-#include "common/job/job_fields.h"
 #include "common/job/motion.h"
 #include "common/job/sequence.h"
 #include "worker/run/frame_quality.h"

@@ -1,7 +1,6 @@
 #include "worker/run/frame_quality.h"
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 
 #include "common/image/noise.h"
@@ -9,21 +8,10 @@
 namespace baton {
 namespace {
 
-constexpr std::array kColors{"R", "G", "B"};
 constexpr float kMaxHalf = 65504;
 
-struct Colors {
-  std::array<const float*, 3> plane;
-
-  explicit Colors(const FilmTile& image) {
-    std::transform(kColors.begin(), kColors.end(), plane.begin(),
-                   [&](const char* name) { return image.find(name); });
-  }
-  explicit operator bool() const { return plane[0] && plane[1] && plane[2]; }
-};
-
 /// Counts and sums of single values.
-void judge_values(const Colors& colors, FrameQuality& quality) {
+void judge_values(const FilmColors& colors, FrameQuality& quality) {
   double sum = 0, below = 0;
   for (std::size_t i = 0; i < quality.pixels; ++i) {
     float least = 0, largest = 0;
@@ -54,7 +42,7 @@ void judge_values(const Colors& colors, FrameQuality& quality) {
 
 FrameQuality judge_frame(const FilmTile& image) {
   FrameQuality quality{.pixels = image.num_pixels()};
-  const Colors colors(image);
+  const FilmColors colors(image);
   if (!colors) return quality;
   judge_values(colors, quality);
   if (const FrameNoise noise = noise_of_film(image); noise.is_told()) {
@@ -66,7 +54,7 @@ FrameQuality judge_frame(const FilmTile& image) {
 }
 
 void clamp_negative(FilmTile& image) {
-  for (const char* name : kColors) {
+  for (const char* name : {"R", "G", "B"}) {
     float* const plane = image.find(name);
     if (plane == nullptr) continue;
     // Not std::max: NaN stays NaN, for who looks for it.

@@ -1,26 +1,54 @@
 #pragma once
 
-#include <functional>
-#include <stop_token>
+#include <cstdint>
+#include <map>
+#include <set>
+#include <vector>
 
 #include "common/base/result.h"
 #include "common/image/film_tile.h"
-#include "common/job/job_spec.h"
 #include "common/job/task.h"
+#include "worker/exchange/sample_region.h"
 #include "worker/pass/tile_renderer.h"
 
 namespace baton {
 
-/// Receives a finished image; frame_index is 0-based. Called on a render thread, for different
-/// frames possibly at the same time and not in order.
-using FrameSink = std::function<Status(std::int32_t frame_index, const FilmTile& image)>;
+/// What a tile is after a frame.
+struct RenderedTile {
+  FilmTile film;
+  StatePtr state;        ///< null: nothing is carried
+  FirstPassPtr samples;  ///< null: no second pass
+  RenderStats stats;
+};
 
-/// Renders every tile of every frame of the job in this process with `num_threads` threads: no
-/// coordinator, no store, no files. The images are those of the farm; the time is what the farm's
-/// overhead is measured against. `context` is that of `job`. Errors: the renderer's, the sink's;
-/// cancelled when `stop` is requested.
-Result<RenderStats> render_locally(const RenderContext& context, const JobSpec& job,
-                                   int num_threads, const FrameSink& sink,
-                                   const std::stop_token& stop = {});
+/// The frames of a job's first sweep, one after the other in this process: no coordinator, no
+/// store, no files. The pixels are those of the farm.
+class LocalRender {
+ public:
+  /// context must outlive the object.
+  explicit LocalRender(const RenderContext& context) : context_(context) {}
+
+  /// For each frame up to the one of index `frame` the tiles without which `wanted` of that frame
+  /// cannot be rendered; none where nothing is carried.
+  std::vector<std::set<std::int32_t>> tiles_before(std::int32_t frame,
+                                                   std::set<std::int32_t> wanted) const;
+
+  /// Renders a tile of the frame after those that are kept. Any number of threads. Errors: the
+  /// renderer's.
+  Result<RenderedTile> render(std::int32_t frame, std::int32_t tile) const;
+  /// Keeps the tiles of a frame in place of those of the frame before.
+  void keep(std::map<std::int32_t, RenderedTile> tiles) { tiles_ = std::move(tiles); }
+  /// Both, for all of these tiles.
+  Status render_all(std::int32_t frame, const std::set<std::int32_t>& tiles);
+
+  const std::map<std::int32_t, RenderedTile>& tiles() const { return tiles_; }
+  /// A tile of the frame that is kept after the job's second pass, if it has one; what is near it
+  /// must be kept, too.
+  Result<RenderedTile> finished(std::int32_t frame, std::int32_t tile) const;
+
+ private:
+  const RenderContext& context_;
+  std::map<std::int32_t, RenderedTile> tiles_;
+};
 
 }  // namespace baton

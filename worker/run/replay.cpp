@@ -4,29 +4,18 @@
 
 #include <algorithm>
 #include <iterator>
-#include <map>
-#include <memory>
 #include <set>
 
-#include "common/image/film_tile.h"
+#include "common/image/image_io.h"
 #include "common/job/job_json.h"
-#include "common/job/motion.h"
 #include "common/job/sequence.h"
 #include "common/state/source_names.h"
-#include "worker/exchange/second_pass.h"
-#include "worker/pass/tile_renderer.h"
-#include "worker/run/frame_output.h"
+#include "worker/pass/render_context.h"
+#include "worker/run/local_render.h"
 #include "worker/scene/settle_motion.h"
 
 namespace baton {
 namespace {
-
-/// What a replay keeps of its run: the last frame.
-struct LastFrame {
-  FilmTile film;
-  std::optional<SampleState> state;
-  RenderStats stats;
-};
 
 Result<std::int32_t> find_frame(const JobSpec& job, int frame_number) {
   const auto found = std::lower_bound(job.frames.begin(), job.frames.end(), frame_number);
@@ -54,112 +43,21 @@ Status check_place(const JobSpec& job, const ReplayOptions& options) {
   return {};
 }
 
-/// The tiles of each frame before `frame_index` that a tile depends on: they spread by whole tiles
-/// with each step back.
-std::vector<std::set<std::int32_t>> find_ancestors(const JobSpec& job, std::int32_t frame_index,
-                                                   std::int32_t tile) {
-  const TileGrid grid(job.image);
-  std::vector<std::set<std::int32_t>> ancestors(static_cast<std::size_t>(frame_index));
-  std::set<std::int32_t> heirs{tile};
-  for (auto tiles = ancestors.rbegin(); tiles != ancestors.rend(); ++tiles) {
-    for (const std::int32_t heir : heirs) {
-      for (const std::int32_t near : grid.tiles_near(heir, history_reach_px(job)))
-        tiles->insert(near);
-    }
-    heirs = *tiles;
-  }
-  return ancestors;
-}
-
-/// The states of the frame before `frame_index` that a tile starts from.
-Result<std::vector<StatePtr>> render_history(const RenderContext& context, const JobSpec& job,
-                                             std::int32_t frame_index, std::int32_t tile) {
-  const TileGrid grid(job.image);
-  const std::vector<std::set<std::int32_t>> ancestors = find_ancestors(job, frame_index, tile);
-  std::map<std::int32_t, StatePtr> states;
-  for (std::int32_t frame = 0; frame < frame_index; ++frame) {
-    std::map<std::int32_t, StatePtr> next;
-    for (const std::int32_t t : ancestors[static_cast<std::size_t>(frame)]) {
-      std::vector<StatePtr> previous;
-      for (const std::int32_t near : grid.tiles_near(t, history_reach_px(job))) {
-        if (frame > 0) previous.push_back(states.at(near));
-      }
-      const TileRunSink sink{.film = [](int, const FilmTile&) { return Status(); },
-                             .state =
-                                 [&](const SampleState& state) {
-                                   next[t] = std::make_shared<const SampleState>(state);
-                                   return Status();
-                                 },
-                             .samples = [](const FirstPassSamples&) { return Status(); }};
-      BATON_ASSIGN([[maybe_unused]] const RenderStats stats,
-                   run_tile(context, {t, frame, frame, frame}, previous, sink, {}));
-    }
-    states = std::move(next);
-  }
-  std::vector<StatePtr> history;
-  for (const auto& [t, state] : states) history.push_back(state);
-  return history;
-}
-
-/// One tile up to a frame, first pass only.
-struct FirstPass {
-  LastFrame last;
-  FirstPassPtr samples;
-};
-Result<FirstPass> render_first_pass(const RenderContext& context, const JobSpec& job,
-                                    std::int32_t frame_index, std::int32_t tile) {
-  FirstPass pass;
-  const TileRunSink sink{.film =
-                             [&](int, const FilmTile& film) {
-                               pass.last.film = film;
-                               return Status();
-                             },
-                         .state =
-                             [&](const SampleState& state) {
-                               pass.last.state = state;
-                               return Status();
-                             },
-                         .samples =
-                             [&](FirstPassSamples samples) {
-                               pass.samples =
-                                   std::make_shared<const FirstPassSamples>(std::move(samples));
-                               return Status();
-                             }};
-  // Carried samples depend on every frame before: where pixels keep to themselves, of this tile
-  // alone.
-  const bool shares = shares_history(job);
-  std::vector<StatePtr> previous;
-  if (carries_state(job) && shares) {
-    BATON_ASSIGN(previous, render_history(context, job, frame_index, tile));
-  }
-  const std::int32_t first_frame = carries_state(job) && !shares ? 0 : frame_index;
-  BATON_ASSIGN(pass.last.stats,
-               run_tile(context, {tile, 0, first_frame, frame_index}, previous, sink, {}));
-  return pass;
-}
-
-Result<LastFrame> render(const JobSpec& job, std::int32_t frame_index, std::int32_t tile) {
+/// The tile as it is in a frame, after all that it depends on.
+Result<RenderedTile> render(const JobSpec& job, std::int32_t frame_index, std::int32_t tile) {
   BATON_ASSIGN(const std::string document, make_job_document(job));
   BATON_ASSIGN(const auto context, load_render_context(job, digest_of(document)));
-  if (!job.visibility.correlated) {
-    BATON_ASSIGN(FirstPass pass, render_first_pass(*context, job, frame_index, tile));
-    return std::move(pass.last);
+  std::set<std::int32_t> wanted{tile};
+  if (job.visibility.correlated) {
+    const auto near = context->grid.tiles_near(tile, exchange_reach_px(job.visibility));
+    wanted = {near.begin(), near.end()};
   }
-
-  // The second pass needs the tiles around.
-  LastFrame last;
-  std::vector<FirstPassPtr> near;
-  for (const std::int32_t t :
-       TileGrid(job.image).tiles_near(tile, exchange_reach_px(job.visibility))) {
-    BATON_ASSIGN(FirstPass pass, render_first_pass(*context, job, frame_index, t));
-    near.push_back(pass.samples);
-    if (t == tile) last = std::move(pass.last);
-  }
-  BATON_ASSIGN(SecondPassOutput second,
-               run_second_pass(*context, frame_index, tile, last.film, near));
-  last.film = std::move(second.film);
-  last.stats.merge(second.stats);
-  return last;
+  LocalRender render(*context);
+  const std::vector<std::set<std::int32_t>> before = render.tiles_before(frame_index, wanted);
+  for (std::int32_t frame = 0; frame < frame_index; ++frame)
+    BATON_TRY(render.render_all(frame, before[static_cast<std::size_t>(frame)]));
+  BATON_TRY(render.render_all(frame_index, wanted));
+  return render.finished(frame_index, tile);
 }
 
 std::string describe_stats(const RenderStats& s) {
@@ -177,7 +75,7 @@ std::string describe_stats(const RenderStats& s) {
       s.seconds_visibility, s.seconds_shade);
 }
 
-std::string describe_pixel(const LastFrame& last, const PixelPosition& position) {
+std::string describe_pixel(const RenderedTile& last, const PixelPosition& position) {
   const PixelRect& rect = last.film.rect;
   const auto pixel =
       static_cast<std::size_t>((position.y - rect.y0) * rect.width() + position.x - rect.x0);
@@ -212,7 +110,7 @@ Result<std::string> replay_tile(const ReplayOptions& options) {
   BATON_ASSIGN(const JobSpec job, settle_motion(std::move(written)));
   BATON_ASSIGN(const std::int32_t frame_index, find_frame(job, options.frame_number));
   BATON_TRY(check_place(job, options));
-  BATON_ASSIGN(const LastFrame last, render(job, frame_index, options.tile));
+  BATON_ASSIGN(const RenderedTile last, render(job, frame_index, options.tile));
 
   // The tile becomes a picture of its own.
   FilmTile picture = last.film;

@@ -8,7 +8,7 @@
 
 namespace baton {
 
-/// Readers of the formats of scanned meshes, our own: assimp 5.2 takes truncated OFF files and
+/// Readers of meshes. Those of scanned ones are our own: assimp 5.2 takes truncated OFF files and
 /// wrong indices without a word and hangs or reads past the end on damaged PLY files. `name` goes
 /// first in every error. Polygons are cut into fans; triangles without area are dropped and
 /// counted.
@@ -22,5 +22,9 @@ Result<TriangleMesh> parse_off(std::string_view text, const std::string& name);
 /// `with_normals` and all usable) and `face` (vertex_indices or vertex_index); other elements and
 /// properties are skipped.
 Result<TriangleMesh> parse_ply(std::string_view bytes, const std::string& name, bool with_normals);
+
+/// Wavefront's OBJ, by assimp: faces of all its objects; normals if `with_normals` and all usable,
+/// texture coordinates if `with_uvs` and all objects have some. It may throw on odd files.
+Result<TriangleMesh> read_obj(const std::string& path, bool with_normals, bool with_uvs);
 
 }  // namespace baton

@@ -122,26 +122,14 @@ class ValueReader {
   ValueReader(std::string_view bytes, Format format) : bytes_(bytes), format_(format) {}
 
   std::optional<double> next(Scalar type) {
+    using Next = std::optional<double> (ValueReader::*)();
+    constexpr std::array<Next, 8> kNext{
+        &ValueReader::next_binary<std::int8_t>,  &ValueReader::next_binary<std::uint8_t>,
+        &ValueReader::next_binary<std::int16_t>, &ValueReader::next_binary<std::uint16_t>,
+        &ValueReader::next_binary<std::int32_t>, &ValueReader::next_binary<std::uint32_t>,
+        &ValueReader::next_binary<float>,        &ValueReader::next_binary<double>};
     if (format_ == Format::text) return next_word();
-    switch (type) {
-      case Scalar::int8:
-        return next_binary<std::int8_t>();
-      case Scalar::uint8:
-        return next_binary<std::uint8_t>();
-      case Scalar::int16:
-        return next_binary<std::int16_t>();
-      case Scalar::uint16:
-        return next_binary<std::uint16_t>();
-      case Scalar::int32:
-        return next_binary<std::int32_t>();
-      case Scalar::uint32:
-        return next_binary<std::uint32_t>();
-      case Scalar::float32:
-        return next_binary<float>();
-      case Scalar::float64:
-        return next_binary<double>();
-    }
-    return std::nullopt;
+    return (this->*kNext[static_cast<std::size_t>(type)])();
   }
 
  private:

@@ -3,7 +3,6 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "common/job/empty_aovs.h"
 #include "common/job/job_json.h"
 #include "common/job/sequence.h"
 

@@ -4,6 +4,7 @@
 #include <array>
 
 #include "common/base/limits.h"
+#include "common/base/members.h"
 #include "common/protocol/messages.h"
 
 namespace baton {
@@ -25,8 +26,8 @@ struct Numbering {
  private:
   template <class T>
   void number(T& member) {
-    if constexpr (requires { member.fields(*this); }) {
-      member.fields(*this);
+    if constexpr (std::is_aggregate_v<T>) {
+      std::apply(*this, members_of(member));
     } else {
       member = static_cast<T>(factor * ++next);
     }
@@ -40,7 +41,7 @@ struct Numbering {
 RenderStats numbered_stats(int factor) {
   Numbering numbering{factor};
   RenderStats stats;
-  stats.fields(numbering);
+  numbering(stats);
   return stats;
 }
 

@@ -4,14 +4,14 @@
 #include <gtest/gtest.h>
 
 #include <map>
-#include <mutex>
+#include <thread>
 
 #include "common/base/files.h"
 #include "common/base/limits.h"
 #include "common/job/job_json.h"
 #include "common/job/sequence.h"
+#include "tests/support/local_frames.h"
 #include "worker/run/frame_output.h"
-#include "worker/run/local_render.h"
 #include "worker/run/replay.h"
 
 namespace baton {
@@ -95,15 +95,13 @@ class ExecuteTest : public testing::Test {
     return films;
   }
 
-  Images render_in_process(int num_threads) {
+  Images render_in_process() {
     Images images;
-    std::mutex mutex;
-    const auto stats = render_locally(*loaded_->context, job_, num_threads,
-                                      [&](std::int32_t frame, const FilmTile& image) {
-                                        const std::lock_guard lock(mutex);
-                                        EXPECT_TRUE(images.emplace(frame, image).second);
-                                        return Status();
-                                      });
+    const auto stats =
+        test::render_locally(*loaded_->context, [&](std::int32_t frame, const FilmTile& image) {
+          EXPECT_TRUE(images.emplace(frame, image).second);
+          return Status();
+        });
     EXPECT_TRUE(stats) << stats.error().message;
     EXPECT_EQ(stats->pixels, 5u * 40 * 24);
     return images;
@@ -116,7 +114,7 @@ class ExecuteTest : public testing::Test {
 };
 
 TEST_F(ExecuteTest, TasksThroughTheStoreMakeTheImagesOfOneProcess) {
-  const Images expected = render_in_process(1);
+  const Images expected = render_in_process();
   ASSERT_EQ(expected.size(), 5u);
   job_.output.pixel_type = PixelType::full_float;
   loaded_ = load().value();
@@ -143,7 +141,20 @@ TEST_F(ExecuteTest, TasksThroughTheStoreMakeTheImagesOfOneProcess) {
 }
 
 TEST_F(ExecuteTest, TheNumberOfThreadsDoesNotShow) {
-  EXPECT_EQ(render_in_process(1), render_in_process(3));
+  const Images expected = render_in_process();
+  LocalRender render(*loaded_->context);
+  const std::int32_t num_tiles = TileGrid(job_.image).count();
+  for (std::int32_t frame = 0; frame < 5; ++frame) {
+    std::map<std::int32_t, RenderedTile> tiles;
+    for (std::int32_t tile = 0; tile < num_tiles; ++tile) tiles[tile];
+    std::vector<std::thread> threads;
+    for (std::int32_t tile = 0; tile < num_tiles; ++tile)
+      threads.emplace_back([&, tile] { tiles.at(tile) = render.render(frame, tile).value(); });
+    for (std::thread& thread : threads) thread.join();
+    render.keep(std::move(tiles));
+    RenderStats stats;
+    EXPECT_EQ(test::local_image(render, job_, frame, stats).value(), expected.at(frame));
+  }
 }
 
 TEST_F(ExecuteTest, ARunHandsOnItsStateAndCountsItsWork) {
@@ -262,14 +273,6 @@ TEST_F(ExecuteTest, AnAssetThatChangedSinceSubmissionIsNamed) {
   EXPECT_THAT(loaded.error().message, testing::HasSubstr("tetrahedron.off"));
 }
 
-TEST_F(ExecuteTest, AFailingSinkEndsALocalRender) {
-  const auto stats = render_locally(*loaded_->context, job_, 2, [](std::int32_t, const FilmTile&) {
-    return Status(Error{ErrorKind::io, "disk full"});
-  });
-  ASSERT_FALSE(stats);
-  EXPECT_EQ(stats.error().message, "disk full");
-}
-
 TEST_F(ExecuteTest, AReplayMakesTheFarmsTile) {
   const std::string path = folder_ + "job.json";
   ASSERT_TRUE(write_file_atomic(path, as_bytes_view(to_json(job_))));
@@ -284,7 +287,7 @@ TEST_F(ExecuteTest, AReplayMakesTheFarmsTile) {
 
   // Tile 2 covers x in [32, 40), y in [0, 16).
   const FilmTile tile = read_exr(options.out).value();
-  const FilmTile expected = render_in_process(1).at(3);
+  const FilmTile expected = render_in_process().at(3);
   ASSERT_EQ(tile.rect, (PixelRect{0, 0, 8, 16}));
   for (int y = 0; y < 16; ++y) {
     for (int x = 0; x < 8; ++x)

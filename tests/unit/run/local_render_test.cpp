@@ -2,21 +2,22 @@
 
 #include <gtest/gtest.h>
 
+#include "tests/support/local_frames.h"
 #include "tests/support/small_scene.h"
 
 namespace baton {
 namespace {
 
 /// The images of a job, by frame.
-std::vector<FilmTile> images(const JobSpec& job, int threads) {
+std::vector<FilmTile> images(const JobSpec& job) {
   std::vector<FilmTile> films(job.frames.size());
   const auto context = load_render_context(job, Digest{1, 2});
   EXPECT_TRUE(context.ok());
-  const FrameSink sink = [&](std::int32_t frame, const FilmTile& film) {
+  const test::FrameSink sink = [&](std::int32_t frame, const FilmTile& film) {
     films[static_cast<std::size_t>(frame)] = film;
     return Status();
   };
-  EXPECT_TRUE(render_locally(**context, job, threads, sink).ok());
+  EXPECT_TRUE(test::render_locally(**context, sink).ok());
   return films;
 }
 
@@ -30,9 +31,9 @@ void expect_no_tiling_in_the_second_pass_of_what_moves(const ImageSpec& image) {
   job.visibility = {.correlated = true, .dilate = 1};
   job.output.aovs = {Aov::source, Aov::mask};
   test::set_in_motion(job, true, true);
-  const std::vector<FilmTile> whole = images(job, 1);
+  const std::vector<FilmTile> whole = images(job);
   job.image.tile_size = 8;
-  EXPECT_EQ(images(job, 2), whole);
+  EXPECT_EQ(images(job), whole);
 }
 
 TEST(LocalRender, TilingsDoNotShowInTheSecondPassOfWhatMoves) {
@@ -61,9 +62,9 @@ TEST(LocalRender, ARegionIsThatPartOfTheWholePicture) {
   for (const Method method : {Method::pool, Method::sequential, Method::bidirectional}) {
     job.sampling.method = method;
     job.image.region.reset();
-    const std::vector<FilmTile> whole = images(job, 1);
+    const std::vector<FilmTile> whole = images(job);
     job.image.region = region;
-    const std::vector<FilmTile> part = images(job, 1);
+    const std::vector<FilmTile> part = images(job);
     for (std::size_t frame = 0; frame < whole.size(); ++frame)
       EXPECT_EQ(part[frame], cut(whole[frame], region)) << traits(method).name << " " << frame;
   }
@@ -79,11 +80,11 @@ TEST(LocalRender, APictureIsTheSameBytesWithOverscan) {
   for (const Method method : {Method::pool, Method::sequential, Method::bidirectional}) {
     job.sampling.method = method;
     job.image.overscan = {};
-    const std::vector<FilmTile> plain = images(job, 1);
+    const std::vector<FilmTile> plain = images(job);
     job.image.overscan = {5, 0, 2, 9};
-    const std::vector<FilmTile> wide = images(job, 1);
+    const std::vector<FilmTile> wide = images(job);
     job.image.region = region;
-    const std::vector<FilmTile> part = images(job, 1);
+    const std::vector<FilmTile> part = images(job);
     job.image.region.reset();
     for (std::size_t frame = 0; frame < plain.size(); ++frame) {
       EXPECT_EQ(wide[frame].rect, (PixelRect{-5, 0, 23, 26}));

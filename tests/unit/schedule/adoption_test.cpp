@@ -267,7 +267,7 @@ TEST(Adoption, AKeyChangesTheFramesThatItMoves) {
   other.camera.keys[2].position.x = 1;
   EXPECT_EQ(document_of(job).picture, document_of(other).picture);
   const FrameComparison comparison(document_of(job), document_of(other));
-  EXPECT_EQ(comparison.num_common(), 5u);
+  EXPECT_EQ(comparison.num_common_steps(), 5u);
   EXPECT_FALSE(comparison.are_equal(5, 5));
   EXPECT_EQ(comparison.difference(5, 5), "$.camera.keys at frame 6");
 }

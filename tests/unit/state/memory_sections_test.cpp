@@ -77,8 +77,8 @@ TEST(SampleState, StoresOnlyBinsThatRaysReached) {
   SampleState state = remembering_state();
   const auto raw_bytes = [](const SampleState& s, const std::string& tag) {
     const auto sections = *state_sections(encode_state(s), "test");
-    for (const StateSectionInfo& section : sections) {
-      if (section.tag == tag) return section.raw_bytes;
+    for (const SectionInfo& section : sections) {
+      if (tag_text(section.tag) == tag) return section.raw_bytes;
     }
     return std::uint64_t{0};
   };

@@ -237,7 +237,7 @@ TEST(SampleState, ListsItsSections) {
   const auto sections = state_sections(encode_state(tiny_state()), "t.bst");
   ASSERT_TRUE(sections.ok()) << sections.error().message;
   ASSERT_EQ(sections->size(), 7u);
-  EXPECT_EQ((*sections)[0].tag, "META");
+  EXPECT_EQ(tag_text((*sections)[0].tag), "META");
   EXPECT_EQ((*sections)[0].raw_bytes, 44u);
   EXPECT_FALSE(state_sections({}, "t.bst").ok());
 }

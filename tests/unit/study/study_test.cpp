@@ -66,7 +66,7 @@ TEST_F(StudyTest, EveryCombinationIsAJob) {
   EXPECT_EQ(small.job.sampling.num_candidates, 64);
   EXPECT_THAT(small.job.frames, ElementsAre(1, 2, 3, 4));
   const StudyCell& more = study->cells[5];
-  EXPECT_EQ(more.scene, 1);
+  EXPECT_EQ(more.scene, 1u);
   EXPECT_EQ(more.budget, "more");
   EXPECT_EQ(more.job.sampling.num_candidates, 256);
   EXPECT_EQ(more.job.environment.rotation_deg_per_frame, 2);

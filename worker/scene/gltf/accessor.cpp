@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <array>
 #include <cstring>
 #include <limits>
 
@@ -33,21 +34,11 @@ double load_number(const std::byte* at, bool normalized) {
 }
 
 double load_component(const std::byte* at, Component component, bool normalized) {
-  switch (component) {
-    case Component::i8:
-      return load_number<std::int8_t>(at, normalized);
-    case Component::u8:
-      return load_number<std::uint8_t>(at, normalized);
-    case Component::i16:
-      return load_number<std::int16_t>(at, normalized);
-    case Component::u16:
-      return load_number<std::uint16_t>(at, normalized);
-    case Component::u32:
-      return load_number<std::uint32_t>(at, false);
-    case Component::f32:
-      break;
-  }
-  return static_cast<double>(load<float>(at));
+  constexpr std::array kLoad{load_number<std::int8_t>,   load_number<std::uint8_t>,
+                             load_number<std::int16_t>,  load_number<std::uint16_t>,
+                             load_number<std::uint32_t>, load_number<float>};
+  return kLoad.at(static_cast<std::size_t>(component))(at,
+                                                       normalized && component <= Component::u16);
 }
 
 /// Reads accessors of one file.

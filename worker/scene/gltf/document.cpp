@@ -89,18 +89,8 @@ void check_views(const JsonView& root, const Document& document) {
 }  // namespace
 
 int size_of(Component component) {
-  switch (component) {
-    case Component::i8:
-    case Component::u8:
-      return 1;
-    case Component::i16:
-    case Component::u16:
-      return 2;
-    case Component::u32:
-    case Component::f32:
-      break;
-  }
-  return 4;
+  constexpr std::array<int, 6> kSizes{1, 1, 2, 2, 4, 4};
+  return kSizes.at(static_cast<std::size_t>(component));
 }
 
 ByteView Document::bytes_of_image(std::size_t image) const {

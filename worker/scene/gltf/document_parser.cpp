@@ -2,7 +2,6 @@
 
 #include <algorithm>
 #include <array>
-#include <optional>
 #include <set>
 
 namespace baton::gltf {
@@ -14,29 +13,12 @@ std::size_t count_of(const JsonView& root, const char* key) {
   return count;
 }
 
-std::optional<Component> component_of(std::uint64_t type) {
-  switch (type) {
-    case 5120:
-      return Component::i8;
-    case 5121:
-      return Component::u8;
-    case 5122:
-      return Component::i16;
-    case 5123:
-      return Component::u16;
-    case 5125:
-      return Component::u32;
-    case 5126:
-      return Component::f32;
-    default:
-      return std::nullopt;
-  }
-}
-
 Component parse_component(const JsonView& owner) {
-  const std::optional<Component> component = component_of(owner.size("componentType"));
-  if (!component) owner.at("componentType").fail("expected one of 5120 to 5123, 5125, 5126");
-  return component.value_or(Component::f32);
+  constexpr std::array<std::uint64_t, 6> kTypes{5120, 5121, 5122, 5123, 5125, 5126};  // Component
+  const auto* const found = std::ranges::find(kTypes, owner.size("componentType"));
+  if (found != kTypes.end()) return static_cast<Component>(found - kTypes.begin());
+  owner.at("componentType").fail("expected one of 5120 to 5123, 5125, 5126");
+  return Component::f32;
 }
 
 int parse_width(const JsonView& accessor) {

@@ -34,12 +34,6 @@ bool JsonView::is_list() const {
   return value_->is_array();
 }
 
-bool JsonView::is_object() const {
-  if (value_ == nullptr) return false;
-  if (!value_->is_object()) fail("expected an object");
-  return value_->is_object();
-}
-
 std::string JsonView::text(const char* key) const {
   const JsonView member = at(key);
   return member ? member.as_text() : std::string();

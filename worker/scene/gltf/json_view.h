@@ -38,13 +38,6 @@ class JsonView {
     if (!list.is_list()) return;
     for (std::size_t i = 0; i < list.value_->size(); ++i) body(list.element(i));
   }
-  /// The same for an object: body(key, member).
-  template <class Body>
-  void each_member(const char* key, const Body& body) const {
-    const JsonView object = at(key);
-    if (!object.is_object()) return;
-    for (const auto& item : object.value_->items()) body(item.key(), object.at(item.key().c_str()));
-  }
 
   std::string text(const char* key) const;
   bool boolean(const char* key, bool otherwise = false) const;
@@ -73,7 +66,6 @@ class JsonView {
     return {&(*value_)[i], place_ + "[" + std::to_string(i) + "]", *fault_};
   }
   bool is_list() const;
-  bool is_object() const;
 
   const nlohmann::json* value_;
   std::string place_;
