@@ -15,9 +15,9 @@
 #include "worker/run/replay.h"
 #include "worker/run/worker.h"
 
-/// What jemalloc reads when the process starts. Work space of tiles is freed and taken again all the
-/// time, and giving it back at once would cost the system as much as all of its other work for a
-/// worker: freed pages go back after a minute without use, large ones as well.
+/// What jemalloc reads when the process starts. Work space of tiles is freed and taken again all
+/// the time, and giving it back at once would cost the system as much as all of its other work for
+/// a worker: freed pages go back after a minute without use, large ones as well.
 extern "C" {
 extern const char* const malloc_conf;
 const char* const malloc_conf = "background_thread:true,oversize_threshold:0,dirty_decay_ms:60000";
