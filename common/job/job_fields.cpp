@@ -327,17 +327,8 @@ void check_whole(JobArchive& a, const JobSpec& job) {
                    fmt::format("at most {} frames in all sweeps", limits::kMaxTasksPerJob),
                    fmt::format("{} sweeps of {}", job.quality.sweeps, job.frames.size()));
   }
-  if (has_catcher(job)) {
-    const bool carries_samples =
-        traits(job.sampling.method).keeps_samples && traits(job.sampling.method).carries();
-    if (carries_samples || job.visibility.correlated) {
-      a.fault(
-          "scene.ground.catcher",
-          "false, as samples that are carried, and the second pass, know no albedo that changes "
-          "with the light",
-          "true");
-    }
-  }
+  if (const std::string key = catcher_key(job); job.visibility.correlated && !key.empty())
+    a.fault(key, "false, as the second pass exchanges shadows between pixels", "true");
   if (job.quality.noise_threshold && !tells_noise(job)) {
     a.fault(
         "quality",
