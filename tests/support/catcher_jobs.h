@@ -51,9 +51,9 @@ inline JobSpec ball_job(Method method, int frames) {
   return job;
 }
 
-/// Lets camera, a box and the ball move.
-inline void set_all_in_motion(JobSpec& job) {
-  set_in_motion(job, true, true);
+/// Lets a box and the ball move, and the camera if it shall.
+inline void set_all_in_motion(JobSpec& job, bool camera = true) {
+  set_in_motion(job, camera, true);
   const auto last = static_cast<double>(job.frames.size() + 1);
   job.scene.objects.back().keys = {
       {.frame = 1}, {.frame = last, .translate = {0.1f, 0.05f, 0}, .rotate_deg = {0, 20, 10}}};
