@@ -328,7 +328,10 @@ void check_whole(JobArchive& a, const JobSpec& job) {
                    fmt::format("{} sweeps of {}", job.quality.sweeps, job.frames.size()));
   }
   if (const std::string key = catcher_key(job); job.visibility.correlated && !key.empty())
-    a.fault(key, "false, as the second pass exchanges shadows between pixels", "true");
+    a.fault(
+        "visibility",
+        fmt::format("correlated false, as {} is true, whose shadows no second pass exchanges", key),
+        "true");
   if (job.quality.noise_threshold && !tells_noise(job)) {
     a.fault(
         "quality",

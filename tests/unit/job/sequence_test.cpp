@@ -103,12 +103,13 @@ TEST(Catchers, AreGroundObjectsAndNodes) {
       catcher_key(
           job_of(R"("gltf": {"file": "a.glb", "nodes": {"stairs": {"catcher": true}}})").value()),
       "scene.gltf.nodes.stairs.catcher");
-  EXPECT_EQ(job_of(objects + "true}]", R"(, "sampling": {"method": "bidirectional"},
+  EXPECT_EQ(
+      job_of(objects + "true}]", R"(, "sampling": {"method": "bidirectional"},
                                        "visibility": {"correlated": true})")
-                .error()
-                .message,
-            "job: $.scene.objects[1].catcher: expected false, as the second pass exchanges shadows "
-            "between pixels, got true");
+          .error()
+          .message,
+      "job: $.visibility: expected correlated false, as scene.objects[1].catcher is true, whose "
+      "shadows no second pass exchanges, got true");
 }
 
 TEST(ImageSpec, IsReadWithOverscan) {
