@@ -79,6 +79,8 @@ class JobArchive {
   virtual ~JobArchive() = default;
 
   virtual bool boolean(Key key, bool& value) = 0;
+  /// The same; what is false is not written, so that jobs without it keep their digests.
+  virtual bool flag(Key key, bool& value) { return boolean(key, value); }
   /// Range inclusive.
   virtual bool integer(Key key, int& value, int min, int max) = 0;
   virtual bool integer(Key key, std::uint64_t& value) = 0;

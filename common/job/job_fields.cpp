@@ -328,17 +328,11 @@ void check_whole(JobArchive& a, const JobSpec& job) {
                    fmt::format("at most {} frames in all sweeps", limits::kMaxTasksPerJob),
                    fmt::format("{} sweeps of {}", job.quality.sweeps, job.frames.size()));
   }
-  if (has_catcher(job)) {
-    const bool carries_samples =
-        traits(job.sampling.method).keeps_samples && traits(job.sampling.method).carries();
-    if (carries_samples || job.visibility.correlated) {
-      a.fault(
-          "scene.ground.catcher",
-          "false, as samples that are carried, and the second pass, know no albedo that changes "
-          "with the light",
-          "true");
-    }
-  }
+  if (const std::string key = catcher_key(job); job.visibility.correlated && !key.empty())
+    a.fault(
+        "visibility",
+        fmt::format("correlated false, as {} is true, whose shadows no second pass exchanges", key),
+        "true");
   if (job.quality.noise_threshold && !tells_noise(job)) {
     a.fault(
         "quality",

@@ -13,6 +13,7 @@ class JobJsonWriter final : public JobArchive {
 
   using JobArchive::number;
   bool boolean(Key key, bool& value) override;
+  bool flag(Key key, bool& value) override { return value && boolean(key, value); }
   bool integer(Key key, int& value, int min, int max) override;
   bool integer(Key key, std::uint64_t& value) override;
   bool number(Key key, double& value, NumberRange range) override;

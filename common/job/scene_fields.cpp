@@ -84,6 +84,7 @@ void fields(JobArchive& a, ObjectSpec& object, const SceneSpec& scene) {
   a.number("fitHeight", object.fit_height, kPositiveRange);
   a.boolean("center", object.center);
   a.boolean("placeOnGround", object.place_on_ground);
+  a.flag("catcher", object.catcher);
   matrix_field(a, "matrix", object.matrix);
   motion_fields(a, object);
 }
@@ -98,6 +99,7 @@ void fields(JobArchive& a, GroundSpec& ground, const SceneSpec& scene) {
 void fields(JobArchive& a, GltfNodeSpec& node) {
   a.boolean("visible", node.visible);
   a.text(alternative("material"), node.material);
+  a.flag("catcher", node.catcher);
   PlaceSpec place = node.place.value_or(PlaceSpec{});
   const auto visit = [&] {
     a.vector("translate", place.translate, kCoordinateRange);

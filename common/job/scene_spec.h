@@ -169,6 +169,8 @@ struct ObjectSpec {
   std::optional<Matrix34> matrix{};
   std::vector<ObjectKey> keys{};  ///< ascending frames; none: stands still
   std::optional<GltfMotion> gltf{};
+  /// It is not in the picture: what shadows take from it is in the channels `shadow`.
+  bool catcher = false;
 
   bool operator==(const ObjectSpec&) const = default;
 };
@@ -177,9 +179,8 @@ struct ObjectSpec {
 struct GroundSpec {
   std::string material;
   float height = 0;
-  float size = 100;  ///< side length
-  /// It is not in the picture: what shadows take from it is in the channels `shadow`.
-  bool catcher = false;
+  float size = 100;      ///< side length
+  bool catcher = false;  ///< as of objects
 
   bool operator==(const GroundSpec&) const = default;
 };
@@ -197,6 +198,7 @@ struct PlaceSpec {
 struct GltfNodeSpec {
   bool visible = true;
   std::string material{};  ///< in place of those of the file; empty: those of the file
+  bool catcher = false;    ///< as of objects
   std::optional<PlaceSpec>
       place{};  ///< of the node alone, in place of the file's and its animation
 

@@ -183,7 +183,19 @@ bool draws_twice(const JobSpec& job) {
          !traits(job.sampling.method).tells_variance;
 }
 
-bool has_catcher(const JobSpec& job) { return job.scene.ground && job.scene.ground->catcher; }
+bool has_catcher(const JobSpec& job) { return !catcher_key(job).empty(); }
+
+std::string catcher_key(const JobSpec& job) {
+  const SceneSpec& scene = job.scene;
+  if (scene.ground && scene.ground->catcher) return "scene.ground.catcher";
+  const auto object = std::ranges::find_if(scene.objects, &ObjectSpec::catcher);
+  if (object != scene.objects.end())
+    return "scene.objects[" + std::to_string(object - scene.objects.begin()) + "].catcher";
+  if (!scene.gltf) return {};
+  const auto node =
+      std::ranges::find_if(scene.gltf->nodes, [](const auto& item) { return item.second.catcher; });
+  return node == scene.gltf->nodes.end() ? "" : "scene.gltf.nodes." + node->first + ".catcher";
+}
 
 SamplingSpec as_sampling(const MaterialSampling& material) {
   SamplingSpec spec;

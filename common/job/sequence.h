@@ -4,6 +4,7 @@
 #include <cstdint>
 #include <filesystem>
 #include <optional>
+#include <string>
 #include <vector>
 
 #include "common/job/job_spec.h"
@@ -116,8 +117,10 @@ bool tells_noise(const JobSpec& job);
 /// Whether each pixel is drawn a second time, which tells its variance (the AOV): of a frame with
 /// one round, by a method that tells none.
 bool draws_twice(const JobSpec& job);
-/// Whether the ground catches shadows; films then have channels shadow.*.
+/// Whether something catches shadows; films then have channels shadow.*.
 bool has_catcher(const JobSpec& job);
+/// The key that says so, the first of them: "scene.objects[2].catcher"; empty: none.
+std::string catcher_key(const JobSpec& job);
 /// Samples of a pixel: the most of any material.
 std::int32_t most_particles(const SamplingSpec& sampling);
 /// Particles per pixel in the job's states; 0 where rays are chosen apart from samples.

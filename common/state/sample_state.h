@@ -22,7 +22,7 @@ enum class PixelSource : std::uint8_t {
   carried = 2,     ///< carried on from the previous frame
   restarted = 3,   ///< carried, but all weights died: SIR again
   refreshed = 4,   ///< carried, Lns recomputed by the refresh rule
-  catcher = 5,     ///< of the ground that catches shadows, whose memory no object takes up
+  catcher = 5,     ///< of a shadow catcher, whose memory no object takes up
 };
 
 /// The baton: what one tile hands to its next frame. Structure of arrays; pixels row by row inside

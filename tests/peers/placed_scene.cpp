@@ -193,7 +193,7 @@ Status place(const std::string& job_file, const fs::path& folder,
   if (camera.projection != Projection::perspective || camera.shift != std::array<float, 2>{} ||
       camera.aperture > 0)
     return refusal("camera: only pinholes without shift are compared");
-  if (has_catcher(job)) return refusal("scene.ground: catchers are not compared");
+  if (has_catcher(job)) return refusal(catcher_key(job) + ": catchers are not compared");
   BATON_ASSIGN(json shown_materials, materials(job.scene));
   BATON_ASSIGN(const Scene scene, load_scene(job));
   std::error_code error;

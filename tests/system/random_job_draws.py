@@ -133,6 +133,7 @@ class Draw(Motion, Textures):
             "shapedBy.animation.fps": lambda: self.pick(4, 24), "shapedBy.places[].node": lambda: self.pick(9, 10, 11, 0),
             "shapedBy.places[].matrix": self.matrix,
             "scene.objects[].fitHeight": lambda: self.pick(None, None, None, 1.2),
+            "scene.objects[].catcher": lambda: self.pick(None, None, None, False, True),
             "scene.objects[].keys": lambda: self.object_keys() if self.chance(0.2) else None,
             "scene.objects[].gltf": lambda: self.gltf("hip") if self.chance(0.03) else None,
             "scene.ground.height": lambda: self.pick(None, -1.0, 0.3),
@@ -216,6 +217,7 @@ class Draw(Motion, Textures):
         at = "scene.gltf.nodes.*"
         self.schema.hand.update({
             f"{at}.material": lambda: self.rng.choice([None, *names]),
+            f"{at}.catcher": lambda: self.pick(None, None, True),
             f"{at}.place.translate": lambda: self.vector(1.3),
             f"{at}.place.rotateDeg": lambda: self.pick(None, self.vector(180)),
             f"{at}.place.scale": lambda: self.pick(None, 0.3, [0.2, 1, 1.5])})

@@ -49,6 +49,13 @@ def whole_blocks(tile_size):
     return (tile_size + 7) // 8 * 8
 
 
+def catchers(scene):
+    """All that may catch shadows."""
+    gltf = scene.get("gltf", {})
+    nodes = gltf.get("nodes", {}) if isinstance(gltf, dict) else {}
+    return [scene.get("ground", {}), *scene.get("objects", []), *nodes.values()]
+
+
 def mend(job, rng):
     """What the keys of a legal job demand of each other."""
     sampling, visibility = job["sampling"], job.setdefault("visibility", {})
@@ -77,9 +84,9 @@ def mend(job, rng):
         else:
             sampling["numParticles"] += 1 if sampling["numParticles"] < 64 else -1
             sampling["numCandidates"] = max(sampling["numCandidates"], sampling["numParticles"])
-    ground = job["scene"].get("ground", {})
-    if method in ("sequential", "restir") or visibility.get("correlated"):
-        ground.pop("catcher", None)
+    if visibility.get("correlated"):
+        for catcher in catchers(job["scene"]):
+            catcher.pop("catcher", None)
     if (method == "restir" and sampling.get("reuseVisibility")) or visibility.get("correlated"):
         aovs = job.get("output", {}).get("aovs", [])
         aovs[:] = [aov for aov in aovs if aov not in ("unshadowed", "blocked")]

@@ -23,8 +23,8 @@ struct SurfaceHit {
   std::uint32_t instance = 0;
   std::uint32_t material = 0;
   bool hit = false;
-  /// Of the ground that catches shadows (worker/pass/catcher.h). `hit` is false where the pixel
-  /// sees an object, too.
+  /// Of what catches shadows (worker/pass/catcher.h). `hit` is false where the pixel sees an
+  /// object, too.
   bool is_catcher = false;
   SurfacePlace place{};  ///< where the material has detail or the mesh deforms, else all 0
 
@@ -91,7 +91,7 @@ struct AccelLimits {
 };
 
 /// The ray tracer: the only user of Embree. Immutable after construction; any number of
-/// threads may trace.
+/// threads may trace. Shadow catchers (Instance::is_catcher) are apart from all else.
 class Accel {
  public:
   /// Keeps a reference to `scene`, which must outlive it. What stands still is one flat hierarchy;
@@ -112,6 +112,8 @@ class Accel {
   /// of another group.
   virtual void intersect(std::span<const Ray> rays, std::span<SurfaceHit> hits,
                          std::size_t group = 1) const = 0;
+  /// The same of shadow catchers alone, which intersect() and occluded() pass, ray by ray.
+  virtual void intersect_catchers(std::span<const Ray> rays, std::span<SurfaceHit> hits) const = 0;
   /// Traces all rays; t_far of the occluded ones becomes -inf.
   virtual void occluded(ShadowRays& rays) const = 0;
   /// What Embree has allocated for this geometry in all its placements.

@@ -15,18 +15,31 @@
 namespace baton {
 namespace {
 
+/// Instances that rays meet together: the objects, or the shadow catchers.
+struct Layer {
+  bool catchers = false;
+  Owned<RTCScene> still;  ///< all that does not move, in world space; null without instances
+  bool any_moves = false;
+
+  bool has(const Instance& instance) const { return instance.is_catcher == catchers; }
+};
+
+/// What a ray asks: what stands still, then what moves; null where there is nothing.
+struct PlacedLayer {
+  RTCScene still = nullptr, moving = nullptr;
+};
+
 /// What all poses of a scene share.
 struct SharedGeometry {
   AllocationCount allocated;     ///< outlives what it counts
   mutable std::mutex placing{};  ///< placements of several jobs tell their errors one by one
   Owned<RTCDevice> device;
-  Owned<RTCScene> still;  ///< all that does not move, in world space
+  Layer objects, catchers{.catchers = true, .still = {}};
   /// By index of the mesh, in its own space: those that move, or that are in too many places.
   std::map<std::uint32_t, Owned<RTCScene>> own_meshes;
   std::set<std::uint32_t> with_holes;  ///< meshes that are cut out somewhere
-  bool any_moves = false;
-  bool any_blends = false;            ///< rays need their bits
-  std::uint64_t placement_bytes = 0;  ///< of what is built for each placement
+  bool any_blends = false;             ///< rays need their bits
+  std::uint64_t placement_bytes = 0;   ///< of what is built for each placement
 
   const Scene* holes_of(const Scene& scene, std::uint32_t mesh) const {
     return with_holes.contains(mesh) ? &scene : nullptr;
@@ -50,13 +63,17 @@ struct SharedGeometry {
 /// thread that traces.
 class EmbreeAccel final : public Accel {
  public:
-  /// moving: null when nothing moves.
+  /// moving, moving_catchers: null when nothing moves.
   EmbreeAccel(const Scene& scene, std::shared_ptr<const SharedGeometry> geometry,
-              std::span<const Instance> instances, const MeshShapes& shapes, Owned<RTCScene> moving)
+              std::span<const Instance> instances, const MeshShapes& shapes, Owned<RTCScene> moving,
+              Owned<RTCScene> moving_catchers)
       : scene_(scene),
         geometry_(std::move(geometry)),
         instances_(instances),
-        moving_(std::move(moving)) {
+        moving_(std::move(moving)),
+        moving_catchers_(std::move(moving_catchers)),
+        objects_{geometry_->objects.still.get(), moving_.get()},
+        catchers_{geometry_->catchers.still.get(), moving_catchers_.get()} {
     for (std::uint32_t i = 0; i < scene.meshes.size(); ++i)
       vertices_.push_back(vertices_of(scene, shapes, i));
   }
@@ -65,31 +82,19 @@ class EmbreeAccel final : public Accel {
                                                    std::shared_ptr<const SharedGeometry> geometry,
                                                    std::span<const Instance> instances,
                                                    const MeshShapes& shapes) {
-    Owned<RTCScene> moving;
+    Owned<RTCScene> moving, moving_catchers;
     std::string message;
-    if (geometry->any_moves) {
+    if (geometry->objects.any_moves || geometry->catchers.any_moves) {
       const std::lock_guard lock(geometry->placing);
       RTCDevice device = geometry->device.get();
       rtcSetDeviceErrorFunction(device, remember_error, &message);
-      moving = geometry->new_scene(std::ranges::none_of(
-          instances, [](const Instance& instance) { return instance.deforms; }));
-      for (unsigned i = 0; i < instances.size(); ++i) {
-        const Instance& instance = instances[i];
-        if (instance.deforms) {
-          attach_instance(device, moving.get(), scene.meshes[instance.mesh],
-                          vertices_of(scene, shapes, instance.mesh).positions, instance.to_world,
-                          geometry->holes_of(scene, instance.mesh), i);
-        } else if (instance.moves()) {
-          attach_placed(device, moving.get(), geometry->own_meshes.at(instance.mesh).get(),
-                        instance.to_world, i);
-        }
-      }
-      rtcCommitScene(moving.get());
+      moving = move(scene, *geometry, geometry->objects, instances, shapes);
+      moving_catchers = move(scene, *geometry, geometry->catchers, instances, shapes);
       rtcSetDeviceErrorFunction(device, nullptr, nullptr);
     }
     if (!message.empty()) return Error{ErrorKind::internal, "Embree: " + message};
     return std::make_unique<EmbreeAccel>(scene, std::move(geometry), instances, shapes,
-                                         std::move(moving));
+                                         std::move(moving), std::move(moving_catchers));
   }
 
   Result<std::unique_ptr<const Accel>> place(std::span<const Instance> instances,
@@ -110,13 +115,21 @@ class EmbreeAccel final : public Accel {
     for (std::size_t i = 0; i < rays.size(); i += group) {
       const std::span<const Ray> some = rays.subspan(i, group);
       if (group == 1) {
-        hits[i] = intersect_one(some[0], context);
+        hits[i] = intersect_one(objects_, some[0], context);
       } else if (group <= 4) {
         intersect_packet<RTCRayHit4, 4>(rtcIntersect4, some, hits.subspan(i, group), context);
       } else {
         intersect_packet<RTCRayHit16, 16>(rtcIntersect16, some, hits.subspan(i, group), context);
       }
     }
+  }
+
+  void intersect_catchers(std::span<const Ray> rays, std::span<SurfaceHit> hits) const override {
+    BATON_CHECK(rays.size() == hits.size());
+    RTCIntersectContext context;
+    rtcInitIntersectContext(&context);
+    for (std::size_t i = 0; i < rays.size(); ++i)
+      hits[i] = intersect_one(catchers_, rays[i], context);
   }
 
   /// One stream of all rays, without the `coherent` flag, which makes scattered rays three times
@@ -141,9 +154,9 @@ class EmbreeAccel final : public Accel {
                           .id = bits.empty() ? nullptr : bits.data(),
                           .flags = nullptr};
     const auto count = static_cast<unsigned>(rays.size());
-    rtcOccludedNp(geometry_->still.get(), &context, &stream, count);
+    rtcOccludedNp(objects_.still, &context, &stream, count);
     // Rays that are blocked already have t_far = -inf, which Embree leaves alone.
-    if (moving_ != nullptr) rtcOccludedNp(moving_.get(), &context, &stream, count);
+    if (objects_.moving != nullptr) rtcOccludedNp(objects_.moving, &context, &stream, count);
   }
 
   std::uint64_t size_bytes() const override { return geometry_->size_bytes(); }
@@ -162,11 +175,38 @@ class EmbreeAccel final : public Accel {
   }
 
  private:
+  /// The instances of a layer that move, in a pose; null: there are none.
+  static Owned<RTCScene> move(const Scene& scene, const SharedGeometry& geometry,
+                              const Layer& layer, std::span<const Instance> instances,
+                              const MeshShapes& shapes) {
+    if (!layer.any_moves) return nullptr;
+    RTCDevice device = geometry.device.get();
+    Owned<RTCScene> moving =
+        geometry.new_scene(std::ranges::none_of(instances, [&](const Instance& instance) {
+          return instance.deforms && layer.has(instance);
+        }));
+    for (unsigned i = 0; i < instances.size(); ++i) {
+      const Instance& instance = instances[i];
+      if (!layer.has(instance)) continue;
+      if (instance.deforms) {
+        attach_instance(device, moving.get(), scene.meshes[instance.mesh],
+                        vertices_of(scene, shapes, instance.mesh).positions, instance.to_world,
+                        geometry.holes_of(scene, instance.mesh), i);
+      } else if (instance.moves()) {
+        attach_placed(device, moving.get(), geometry.own_meshes.at(instance.mesh).get(),
+                      instance.to_world, i);
+      }
+    }
+    rtcCommitScene(moving.get());
+    return moving;
+  }
+
   std::uint32_t bits_of(const Ray& ray) const {
     return geometry_->any_blends ? ray_bits(ray.origin, ray.direction) : 0;
   }
 
-  SurfaceHit intersect_one(const Ray& ray, RTCIntersectContext& context) const {
+  SurfaceHit intersect_one(const PlacedLayer& layer, const Ray& ray,
+                           RTCIntersectContext& context) const {
     RTCRayHit query{};
     query.ray = {.org_x = ray.origin.x,
                  .org_y = ray.origin.y,
@@ -182,13 +222,13 @@ class EmbreeAccel final : public Accel {
                  .flags = 0};
     query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
     query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
-    rtcIntersect1(geometry_->still.get(), &context, &query);
-    if (moving_ != nullptr) rtcIntersect1(moving_.get(), &context, &query);
+    if (layer.still != nullptr) rtcIntersect1(layer.still, &context, &query);
+    if (layer.moving != nullptr) rtcIntersect1(layer.moving, &context, &query);
     return surface_at(ray, {query.ray.tfar, query.hit.u, query.hit.v, query.hit.primID,
                             query.hit.geomID, query.hit.instID[0]});
   }
 
-  /// Up to Width rays at once; the lanes that are left over are off.
+  /// Up to Width rays at once that meet objects; the lanes that are left over are off.
   template <class Packet, std::size_t Width, class Intersect>
   void intersect_packet(Intersect intersect_some, std::span<const Ray> rays,
                         std::span<SurfaceHit> hits, RTCIntersectContext& context) const {
@@ -208,8 +248,8 @@ class EmbreeAccel final : public Accel {
       query.hit.geomID[k] = RTC_INVALID_GEOMETRY_ID;
       query.hit.instID[0][k] = RTC_INVALID_GEOMETRY_ID;
     }
-    intersect_some(valid.data(), geometry_->still.get(), &context, &query);
-    if (moving_ != nullptr) intersect_some(valid.data(), moving_.get(), &context, &query);
+    intersect_some(valid.data(), objects_.still, &context, &query);
+    if (objects_.moving != nullptr) intersect_some(valid.data(), objects_.moving, &context, &query);
     for (std::size_t k = 0; k < rays.size(); ++k) {
       hits[k] =
           surface_at(rays[k], {query.ray.tfar[k], query.hit.u[k], query.hit.v[k],
@@ -259,6 +299,7 @@ class EmbreeAccel final : public Accel {
             .instance = index,
             .material = instance.material,
             .hit = true,
+            .is_catcher = instance.is_catcher,
             .place = is_placed ? SurfacePlace{hit.triangle, u, v} : SurfacePlace{}};
   }
 
@@ -266,19 +307,51 @@ class EmbreeAccel final : public Accel {
   const std::shared_ptr<const SharedGeometry> geometry_;
   const std::span<const Instance> instances_;
   std::vector<MeshVertices> vertices_;  ///< by mesh
-  const Owned<RTCScene> moving_;
+  const Owned<RTCScene> moving_, moving_catchers_;
+  const PlacedLayer objects_, catchers_;
 };
 
-/// Meshes that stand still in several places, where their copies would be too many.
-std::set<std::uint32_t> shared_meshes(const Scene& scene, std::uint64_t max_copied_triangles) {
+/// Meshes of a layer that stand still in several places, where their copies would be too many.
+std::set<std::uint32_t> shared_meshes(const Scene& scene, const Layer& layer,
+                                      std::uint64_t max_copied_triangles) {
   std::set<std::uint32_t> seen, repeated;
   std::uint64_t copied = 0;
   for (const Instance& instance : scene.instances) {
-    if (instance.moves() || seen.insert(instance.mesh).second) continue;
+    if (!layer.has(instance) || instance.moves() || seen.insert(instance.mesh).second) continue;
     repeated.insert(instance.mesh);
     copied += scene.meshes[instance.mesh].triangles.size();
   }
   return copied > max_copied_triangles ? repeated : std::set<std::uint32_t>{};
+}
+
+/// Builds what stands still of a layer, and the meshes that do not lie flat.
+void build_layer(const Scene& scene, std::uint64_t max_copied_triangles, SharedGeometry& geometry,
+                 Layer& layer) {
+  RTCDevice device = geometry.device.get();
+  const std::set<std::uint32_t> shared = shared_meshes(scene, layer, max_copied_triangles);
+  layer.still = geometry.new_scene();
+  for (unsigned i = 0; i < scene.instances.size(); ++i) {
+    const Instance& instance = scene.instances[i];
+    if (!layer.has(instance)) continue;
+    layer.any_moves = layer.any_moves || instance.moves();
+    if (instance.deforms) continue;
+    const std::vector<Vec3>& positions = scene.meshes[instance.mesh].positions;
+    const Scene* const holes = geometry.holes_of(scene, instance.mesh);
+    if (!instance.moves() && !shared.contains(instance.mesh)) {
+      attach_instance(device, layer.still.get(), scene.meshes[instance.mesh], positions,
+                      instance.to_world, holes, i);
+      continue;
+    }
+    Owned<RTCScene>& own = geometry.own_meshes[instance.mesh];
+    if (own == nullptr) {
+      own = geometry.new_scene();
+      attach_instance(device, own.get(), scene.meshes[instance.mesh], positions, {}, holes, 0);
+      rtcCommitScene(own.get());
+    }
+    if (!instance.moves())
+      attach_placed(device, layer.still.get(), own.get(), instance.to_world, i);
+  }
+  rtcCommitScene(layer.still.get());
 }
 
 }  // namespace
@@ -301,32 +374,11 @@ Result<std::unique_ptr<Accel>> Accel::build(const Scene& scene, const AccelLimit
   rtcSetDeviceMemoryMonitorFunction(device, AllocationCount::note, &allocated);
 
   // What stands still, in world space; each mesh that moves, in its own.
-  geometry->still = geometry->new_scene();
   geometry->any_blends = any_blends(scene);
-  const std::set<std::uint32_t> shared = shared_meshes(scene, limits.max_copied_triangles);
   geometry->with_holes = meshes_with_holes(scene);
-  for (unsigned i = 0; i < scene.instances.size(); ++i) {
-    const Instance& instance = scene.instances[i];
-    if (instance.is_catcher) continue;
-    geometry->any_moves = geometry->any_moves || instance.moves();
-    if (instance.deforms) continue;
-    const std::vector<Vec3>& positions = scene.meshes[instance.mesh].positions;
-    const Scene* const holes = geometry->holes_of(scene, instance.mesh);
-    if (!instance.moves() && !shared.contains(instance.mesh)) {
-      attach_instance(device, geometry->still.get(), scene.meshes[instance.mesh], positions,
-                      instance.to_world, holes, i);
-      continue;
-    }
-    Owned<RTCScene>& own = geometry->own_meshes[instance.mesh];
-    if (own == nullptr) {
-      own = geometry->new_scene();
-      attach_instance(device, own.get(), scene.meshes[instance.mesh], positions, {}, holes, 0);
-      rtcCommitScene(own.get());
-    }
-    if (!instance.moves())
-      attach_placed(device, geometry->still.get(), own.get(), instance.to_world, i);
-  }
-  rtcCommitScene(geometry->still.get());
+  build_layer(scene, limits.max_copied_triangles, *geometry, geometry->objects);
+  if (std::ranges::any_of(scene.instances, &Instance::is_catcher))
+    build_layer(scene, limits.max_copied_triangles, *geometry, geometry->catchers);
   rtcSetDeviceErrorFunction(device, nullptr, nullptr);
   const std::uint64_t shared_bytes = geometry->size_bytes();
   Result<std::unique_ptr<EmbreeAccel>> accel =

@@ -6,7 +6,6 @@
 #include <cmath>
 
 #include "common/math/octahedral.h"
-#include "worker/light/irradiance.h"
 
 namespace baton {
 namespace {
@@ -56,7 +55,10 @@ LightSequence::LightSequence(const JobSpec& job, std::shared_ptr<MapCache> maps,
           share, [](const EnvironmentMap& map) { return map.size_bytes(); }, frames_in_hand(job)),
       presampled_(
           share, [](const PresampledLight& light) { return light.size_bytes(); },
-          frames_in_hand(job) * (static_cast<std::size_t>(job.quality.rounds) + 1)) {}
+          frames_in_hand(job) * (static_cast<std::size_t>(job.quality.rounds) + 1)),
+      irradiances_(
+          share, [](const Irradiance& irradiance) { return irradiance.size_bytes(); },
+          frames_in_hand(job)) {}
 
 Result<std::shared_ptr<const EnvironmentMap>> LightSequence::file_map(
     const std::string& path, const EnvironmentSpec& environment, bool compensate,
@@ -78,13 +80,17 @@ Result<std::shared_ptr<const EnvironmentMap>> LightSequence::key_map(std::int32_
                   job_.sampling.mis_compensation, hidden);
 }
 
-Result<std::shared_ptr<const EnvironmentMap>> LightSequence::mixed_map(
-    const EnvironmentFrame& frame, const HiddenCone& hidden) {
-  if (frame.mix <= 0 && frame.scale == 1) return key_map(frame.map_a, hidden);
+std::int32_t LightSequence::first_with_texels_of(const EnvironmentFrame& frame) const {
   const auto first = std::find_if(frames_.begin(), frames_.end(), [&](const FrameSpec& f) {
     return f.environment.same_texels(frame);
   });
-  const std::pair name(static_cast<std::int32_t>(first - frames_.begin()), hidden);
+  return static_cast<std::int32_t>(first - frames_.begin());
+}
+
+Result<std::shared_ptr<const EnvironmentMap>> LightSequence::mixed_map(
+    const EnvironmentFrame& frame, const HiddenCone& hidden) {
+  if (frame.mix <= 0 && frame.scale == 1) return key_map(frame.map_a, hidden);
+  const std::pair name(first_with_texels_of(frame), hidden);
   if (auto found = mixed_maps_.find(name)) return found;
   BATON_ASSIGN(const auto a, key_map(frame.map_a, hidden));
   BATON_ASSIGN(const auto b, key_map(frame.map_b, hidden));
@@ -134,7 +140,11 @@ Result<std::shared_ptr<const FrameLight>> LightSequence::at(std::int32_t index,
   BATON_ASSIGN(light->seen, seen_environment(light->now));
   light->still = round == 0 && frame.environment == frame_before.environment &&
                  hidden_in(frame) == hidden_in(frame_before);
-  if (has_catcher(job_)) light->catcher = catcher_albedo(frame.environment, light->now);
+  if (has_catcher(job_)) {
+    light->irradiance = irradiance(frame.environment, light->now);
+    if (carries_state(job_) && traits(job_.sampling.method).keeps_samples)
+      light->irradiance_before = irradiance(frame_before.environment, light->before);
+  }
   if (frame.environment.same_texels(frame_before.environment))
     light->turn = turn_between(light->before, light->now);
   light->presampled = presampled_.find({index, round});
@@ -148,13 +158,11 @@ Result<std::shared_ptr<const FrameLight>> LightSequence::at(std::int32_t index,
   return std::shared_ptr<const FrameLight>(std::move(light));
 }
 
-Rgb LightSequence::catcher_albedo(const EnvironmentFrame& frame, const Environment& now) {
-  const auto same = std::ranges::find(catchers_, frame, &std::pair<EnvironmentFrame, Rgb>::first);
-  if (same != catchers_.end()) return same->second;
-  const Rgb e = irradiance(now, {0, 1, 0});
-  const auto albedo = [](float received) { return received > 0 ? kPi / received : 0.0f; };
-  if (catchers_.size() >= frames_in_hand(job_)) catchers_.erase(catchers_.begin());
-  return catchers_.emplace_back(frame, Rgb{albedo(e.x), albedo(e.y), albedo(e.z)}).second;
+std::shared_ptr<const Irradiance> LightSequence::irradiance(const EnvironmentFrame& frame,
+                                                            const Environment& environment) {
+  const std::int32_t name = first_with_texels_of(frame);
+  if (auto found = irradiances_.find(name)) return found;
+  return irradiances_.insert(name, std::make_shared<const Irradiance>(*environment.map));
 }
 
 std::vector<std::string> LightSequence::repair_notes() const {

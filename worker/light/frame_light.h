@@ -9,6 +9,7 @@
 #include "common/base/lru_cache.h"
 #include "common/base/result.h"
 #include "common/job/sequence.h"
+#include "worker/light/irradiance.h"
 #include "worker/light/map_cache.h"
 #include "worker/light/presampled_light.h"
 #include "worker/scene/environment.h"
@@ -29,9 +30,9 @@ struct FrameLight {
   /// see turn_between()
   std::optional<Mat3> turn;
   std::shared_ptr<const PresampledLight> presampled;
-  /// Albedo with which an unshadowed ground reflects 1 in each channel: pi / E; 0: no light
-  /// of that colour arrives. Of jobs whose ground catches shadows.
-  Rgb catcher{1, 1, 1};
+  /// What arrives without shadows, of jobs with shadow catchers. `before` where samples are
+  /// carried.
+  std::shared_ptr<const Irradiance> irradiance, irradiance_before;
 };
 
 /// R_now R_before^-1 of a map whose texels stay: along it, directions on the lattice are carried
@@ -63,7 +64,9 @@ class LightSequence {
   std::vector<std::string> repair_notes() const;
 
  private:
-  Rgb catcher_albedo(const EnvironmentFrame& frame, const Environment& now);
+  std::int32_t first_with_texels_of(const EnvironmentFrame& frame) const;
+  std::shared_ptr<const Irradiance> irradiance(const EnvironmentFrame& frame,
+                                               const Environment& environment);
   /// A map of a file; notes its repairs.
   Result<std::shared_ptr<const EnvironmentMap>> file_map(const std::string& path,
                                                          const EnvironmentSpec& environment,
@@ -84,7 +87,7 @@ class LightSequence {
   /// By the first frame index that shows these texels, and what is hidden of them.
   LruCache<std::pair<std::int32_t, HiddenCone>, EnvironmentMap> mixed_maps_;
   LruCache<std::pair<std::int32_t, std::int32_t>, PresampledLight> presampled_;  ///< frame, round
-  std::vector<std::pair<EnvironmentFrame, Rgb>> catchers_;  ///< of the last frames
+  LruCache<std::int32_t, Irradiance> irradiances_;  ///< by the first frame with these texels
   std::vector<std::string> repair_notes_;
 };
 

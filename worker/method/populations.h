@@ -39,7 +39,7 @@ inline float unit_contribution(const SampleState& state, std::size_t index, std:
          static_cast<float>(state.num_populations);
 }
 
-/// What the pixel carries is of the ground that catches shadows.
+/// What the pixel carries is of a shadow catcher.
 void set_catcher(SampleState& state, std::size_t index);
 /// Makes pixel `index` one that sees nothing.
 void set_background(SampleState& state, std::size_t index);

@@ -1,42 +1,46 @@
 #include "worker/pass/catcher.h"
 
 #include <algorithm>
-#include <cmath>
 
-#include "common/job/sequence.h"
 #include "worker/accel/accel.h"
 #include "worker/method/populations.h"
 
 namespace baton {
 
-void see_catcher(const JobSpec& job, const FrameGeometry& geometry, std::span<const Ray> rays,
-                 std::span<SurfaceHit> hits) {
-  if (!has_catcher(job)) return;
-  const GroundSpec& ground = *job.scene.ground;
-  const std::vector<Instance>& instances = geometry.scene->instances;
-  const float half = 0.5f * ground.size;
-  const auto num_sites = static_cast<std::size_t>(job.image.sites);
-  for (std::size_t first = 0; first < hits.size(); first += num_sites) {
-    const std::span<SurfaceHit> pixel = hits.subspan(first, num_sites);
-    const bool sees_object =
-        std::ranges::any_of(pixel, [](const SurfaceHit& hit) { return hit.hit; });
-    for (std::size_t s = 0; s < num_sites; ++s) {
-      const Ray& ray = rays[first + s];
-      if (pixel[s].hit || !(ray.direction.y < 0)) continue;  // it is seen from above
-      const float t = (ground.height - ray.origin.y) / ray.direction.y;
-      Vec3 position = ray.origin + ray.direction * t;
-      position.y = ground.height;
-      if (!(t > 0) || std::fabs(position.x) > half || std::fabs(position.z) > half) continue;
-      constexpr Vec3 kUp{0, 1, 0};
-      pixel[s] = {.point = {.position = position, .ng = kUp, .ns = kUp, .wo = -ray.direction},
-                  .ray_origin = lift_off(position, kUp),
-                  .depth = t,
-                  .instance = static_cast<std::uint32_t>(instances.size() - 1),
-                  .material = instances.back().material,
-                  .hit = !sees_object,
-                  .is_catcher = true};
+void see_catchers(const FrameGeometry& geometry, std::size_t sites, std::span<const Ray> rays,
+                  std::span<SurfaceHit> hits) {
+  if (!geometry.scene->has_catcher) return;
+  std::vector<Ray> passed;
+  for (std::size_t i = 0; i < hits.size(); ++i) {
+    if (!hits[i].hit) passed.push_back(rays[i]);
+  }
+  std::vector<SurfaceHit> caught(passed.size());
+  geometry.accel->intersect_catchers(passed, caught);
+  auto next = caught.cbegin();
+  for (std::size_t first = 0; first < hits.size(); first += sites) {
+    const std::span<SurfaceHit> pixel = hits.subspan(first, sites);
+    const bool sees_object = std::ranges::any_of(pixel, &SurfaceHit::hit);
+    for (SurfaceHit& hit : pixel) {
+      if (hit.hit) continue;
+      hit = *next++;
+      hit.hit = hit.is_catcher && !sees_object;
     }
   }
+}
+
+float catcher_share(std::span<const SurfaceHit> hits) {
+  const auto count = std::ranges::count_if(hits, &SurfaceHit::is_catcher);
+  return static_cast<float>(count) / static_cast<float>(hits.size());
+}
+
+Rgb dark_share(std::span<const SurfaceHit> hits, const SiteBlock& sites) {
+  Rgb count;
+  for (std::size_t s = 0; s < hits.size(); ++s) {
+    if (!hits[s].is_catcher || !hits[s].hit) continue;
+    count += {sites.kd_r[s] == 0 ? 1.0f : 0, sites.kd_g[s] == 0 ? 1.0f : 0,
+              sites.kd_b[s] == 0 ? 1.0f : 0};
+  }
+  return count / static_cast<float>(hits.size());
 }
 
 bool belongs_to_object(const SampleState& state, std::size_t index) {
@@ -45,29 +49,29 @@ bool belongs_to_object(const SampleState& state, std::size_t index) {
 }
 
 bool takes_up(bool sees_catcher, SampleState& state, std::size_t index) {
-  const bool is_grounds = latest_source(state, index) == PixelSource::catcher;
-  if (sees_catcher) return is_grounds;
-  if (!is_grounds) return belongs_to_object(state, index);
+  const bool is_catchers = latest_source(state, index) == PixelSource::catcher;
+  if (sees_catcher) return is_catchers;
+  if (!is_catchers) return belongs_to_object(state, index);
   if (PixelMemory* const memory = state.memory_of(index)) *memory = {};
   return false;
 }
 
 Rgb CatcherEdge::sample(const PixelMethod& method, const PixelInput& input, const FrameLight& light,
-                        const SampleState& like, SamplerScratch& scratch) {
-  // The sites on the ground alone.
+                        CatcherAlbedo& albedo, const SampleState& like, SamplerScratch& scratch) {
+  // The sites on catchers alone.
   hits_.assign(input.hits.begin(), input.hits.end());
   SiteOrigins origins{.num_sites = static_cast<std::int32_t>(hits_.size())};
   for (std::size_t s = 0; s < hits_.size(); ++s) {
     hits_[s].hit = hits_[s].is_catcher;
     if (hits_[s].hit) origins.set(s, hits_[s].ray_origin);
   }
-  gather_sites(*input.geometry, hits_, sites_, light.catcher);
+  gather_sites(*input.geometry, hits_, sites_, albedo);
   // Random numbers of pixels that no picture has.
   RngKey key = input.key;
   key.pixel ^= 0x80000000u;
-  const AsideSampler::Aside ground{
+  const AsideSampler::Aside catcher{
       .sites = sites_, .hits = hits_, .origins = origins, .light = light, .key = key};
-  return aside_.sample(method, input, ground, like, scratch);
+  return aside_.sample(method, input, catcher, like, scratch) + dark_share(hits_, sites_);
 }
 
 }  // namespace baton

@@ -38,7 +38,7 @@ struct PixelResult {
 };
 
 /// Pass: writes pixels into the channels of the job: R, G, B, A, the AOVs in their order, shadow.*
-/// and kCatcherChannel where the ground catches shadows, and where the noise is told kErrorChannel.
+/// and kCatcherChannel where something catches shadows, and where the noise is told kErrorChannel.
 class FilmWriter {
  public:
   FilmWriter(const PixelRect& rect, const JobSpec& job);

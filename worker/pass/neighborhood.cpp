@@ -55,7 +55,8 @@ bool Neighborhood::agrees(std::span<const SurfaceHit> now, std::span<const Surfa
          std::fabs(b->depth - a->depth) <= kDepthTolerance * a->depth;
 }
 
-std::span<const CarriedSet> Neighborhood::sets(std::size_t i, std::span<const SurfaceHit> hits) {
+std::span<const CarriedSet> Neighborhood::sets(std::size_t i, std::span<const SurfaceHit> hits,
+                                               CatcherAlbedo& catchers) {
   std::size_t count = 0;
   for (const OldPixels::Place& place : places_[i]) {
     if (place.state == nullptr) continue;
@@ -63,7 +64,7 @@ std::span<const CarriedSet> Neighborhood::sets(std::size_t i, std::span<const Su
     const SampleState& state = *place.state;
     if (!agrees(hits, old) || state.confidence[place.index] == 0) continue;
     poison(surfaces_[count].sites);
-    gather_sites(old_pixels_.geometry(), old, surfaces_[count].sites);
+    gather_sites(old_pixels_.geometry(), old, surfaces_[count].sites, catchers);
     const auto n = static_cast<std::size_t>(state.num_particles);
     const std::size_t first = place.index * n;
     sets_[count] = {.direction = std::span(state.direction).subspan(first, n),

@@ -25,7 +25,9 @@ class Neighborhood {
   void look_up(std::size_t i, std::span<const SurfaceHit> hits, const RngKey& key, std::int32_t x,
                std::int32_t y);
   /// The sets of those neighbours that agree, until the next call; after OldPixels::trace().
-  std::span<const CarriedSet> sets(std::size_t i, std::span<const SurfaceHit> hits);
+  /// catchers: of the frame before.
+  std::span<const CarriedSet> sets(std::size_t i, std::span<const SurfaceHit> hits,
+                                   CatcherAlbedo& catchers);
 
  private:
   using Places = std::array<OldPixels::Place, limits::kMaxNeighbors>;  ///< null state: none

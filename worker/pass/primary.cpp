@@ -110,7 +110,7 @@ void append_primary_rays(const JobSpec& job, const FrameGeometry& geometry, std:
 void trace_primary_rays(const JobSpec& job, const FrameGeometry& geometry,
                         std::span<const Ray> rays, std::span<SurfaceHit> hits) {
   geometry.accel->intersect(rays, hits, static_cast<std::size_t>(job.image.sites));
-  see_catcher(job, geometry, rays, hits);
+  see_catchers(geometry, static_cast<std::size_t>(job.image.sites), rays, hits);
   if (!geometry.scene->has_detail) return;
   const float share = 1 / std::sqrt(static_cast<float>(job.image.sites));
   for (std::size_t i = 0; i < hits.size(); ++i) {

@@ -51,14 +51,12 @@ Result<std::shared_ptr<const RenderContext>> make_render_context(
 }
 
 Rgb gather_sites(const FrameGeometry& geometry, std::span<const SurfaceHit> hits, SiteBlock& sites,
-                 const Rgb& catcher) {
+                 CatcherAlbedo& catchers) {
   Rgb emission;
   sites.clear(static_cast<int>(hits.size()));
   for (std::size_t s = 0; s < hits.size(); ++s) {
-    if (hits[s].hit && hits[s].is_catcher) {
-      sites.add(static_cast<int>(s), hits[s].point, Material{.kd = catcher, .ks = {}});
-    } else if (hits[s].hit) {
-      emission += geometry.add_to(sites, static_cast<int>(s), hits[s]);
+    if (hits[s].hit) {
+      emission += catchers.add_to(sites, static_cast<int>(s), geometry, hits[s]);
     } else {
       sites.add_miss(static_cast<int>(s));
     }

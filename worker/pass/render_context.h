@@ -7,6 +7,7 @@
 #include "worker/accel/geometry_sequence.h"
 #include "worker/light/frame_light.h"
 #include "worker/method/pixel_method.h"
+#include "worker/pass/catcher_albedo.h"
 #include "worker/pass/tile_renderer.h"
 
 namespace baton {
@@ -29,10 +30,10 @@ class RenderContext {
   std::shared_ptr<SurfaceCache> surfaces;  ///< of the last frames, where things move
 };
 
-/// The surfaces of one pixel, which its sites hit in that frame, with their materials; catcher: the
-/// albedo of a ground that catches shadows. Returns the radiance that they emit, the mean over the
+/// The surfaces of one pixel, which its sites hit in that frame, with their materials; catchers:
+/// the albedo of those that catch shadows. Returns the radiance that they emit, the mean over the
 /// sites.
 Rgb gather_sites(const FrameGeometry& geometry, std::span<const SurfaceHit> hits, SiteBlock& sites,
-                 const Rgb& catcher = {1, 1, 1});
+                 CatcherAlbedo& catchers);
 
 }  // namespace baton

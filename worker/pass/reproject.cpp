@@ -26,6 +26,13 @@ const SurfaceHit* draw_hit(std::span<const SurfaceHit> hits, const Rng& rng) {
                         [&](const SurfaceHit& hit) { return in_front(hit) && k-- == 0; });
 }
 
+/// Whether all sites see the same surfaces. What catchers show between objects does not count.
+bool see_the_same(std::span<const SurfaceHit> a, std::span<const SurfaceHit> b) {
+  return std::ranges::equal(a, b, [](const SurfaceHit& one, const SurfaceHit& other) {
+    return one.hit || other.hit ? one == other : true;
+  });
+}
+
 /// Copies all that a pixel carries.
 void copy_pixel(const SampleState& from, std::size_t source, SampleState& to, std::size_t target) {
   const auto copy = [&](const auto& in, auto& out, std::int32_t per_pixel) {
@@ -183,14 +190,14 @@ void Reprojection::copy_samples(const Slot& slot, const Inheritance& inheritance
   }
 }
 
-PixelHistory Reprojection::take(std::size_t i, std::size_t pixel, SampleState& state,
-                                OldSurfaces& old) const {
+PixelHistory Reprojection::take(std::size_t i, std::size_t pixel, CatcherAlbedo& catchers,
+                                SampleState& state, OldSurfaces& old) const {
   const Slot& slot = slots_[i];
   if (!slot.old) return PixelHistory::none;
   const std::span<const SurfaceHit> old_hits = old_pixels_.hits(*slot.old);
 
   // Where nothing has changed, everything stays as it is.
-  if (slot.same_pixel && std::equal(old_hits.begin(), old_hits.end(), slot.hits.begin())) {
+  if (slot.same_pixel && see_the_same(old_hits, slot.hits)) {
     copy_pixel(*slot.old->state, slot.old->index, state, pixel);
     return PixelHistory::same;
   }
@@ -205,15 +212,15 @@ PixelHistory Reprojection::take(std::size_t i, std::size_t pixel, SampleState& s
       continue;
     }
     const std::size_t from = inheritance->from[t];
-    before_.add_to(old.sites, static_cast<int>(t), old_hits[from]);
+    catchers.add_to(old.sites, static_cast<int>(t), before_, old_hits[from]);
     old.log_share[t] = -std::log(static_cast<float>(inheritance->count[from]));
   }
   return PixelHistory::moved;
 }
 
-std::span<const CarriedSet> Reprojection::neighbors(std::size_t i) {
+std::span<const CarriedSet> Reprojection::neighbors(std::size_t i, CatcherAlbedo& catchers) {
   if (!neighborhood_) return {};
-  return neighborhood_->sets(i, slots_[i].hits);
+  return neighborhood_->sets(i, slots_[i].hits, catchers);
 }
 
 }  // namespace baton

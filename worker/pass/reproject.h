@@ -37,11 +37,12 @@ class Reprojection {
   void look_up(const TileSurfaces& surfaces, std::size_t first, std::size_t count,
                const FrameSpec& frame);
   /// Copies the samples that pixel first + i of the last look_up takes over to pixel `pixel` of
-  /// `state`. `old` is filled for `moved`.
-  PixelHistory take(std::size_t i, std::size_t pixel, SampleState& state, OldSurfaces& old) const;
+  /// `state`. `old` is filled for `moved`. catchers: of the frame before.
+  PixelHistory take(std::size_t i, std::size_t pixel, CatcherAlbedo& catchers, SampleState& state,
+                    OldSurfaces& old) const;
 
   /// What the neighbours of pixel first + i hold, until the next call.
-  std::span<const CarriedSet> neighbors(std::size_t i);
+  std::span<const CarriedSet> neighbors(std::size_t i, CatcherAlbedo& catchers);
 
   /// Rays traced so far.
   std::uint64_t num_rays() const { return old_pixels_.num_rays(); }

@@ -16,19 +16,6 @@
 namespace baton {
 namespace {
 
-/// Of the sites.
-float catcher_share(std::span<const SurfaceHit> hits) {
-  const auto count = std::ranges::count_if(hits, &SurfaceHit::is_catcher);
-  return static_cast<float>(count) / static_cast<float>(hits.size());
-}
-
-/// Where no light of a colour arrives, none is taken away.
-void lighten_black(const Rgb& albedo, PixelResult& pixel) {
-  if (albedo.x == 0) pixel.shadow.x = pixel.catcher;
-  if (albedo.y == 0) pixel.shadow.y = pixel.catcher;
-  if (albedo.z == 0) pixel.shadow.z = pixel.catcher;
-}
-
 /// Prefetches what a pixel remembers: the memories of a tile are larger than the caches.
 void fetch_ahead(const PixelMemory* memory) {
   if (memory == nullptr) return;
@@ -92,6 +79,8 @@ void TileFrameRenderer::render_batches(const TileRound& at, SampleState& state, 
   const WorkClock clock;
   stages_ = {};
   surfaces_ = &at.surfaces;
+  catchers_ = CatcherAlbedo(at.light.irradiance.get(), at.light.now);
+  catchers_before_ = CatcherAlbedo(at.light.irradiance_before.get(), at.light.before);
   Batch batch;
   batch.frame_number = at.frame.number;
   batch.round = at.round;
@@ -157,11 +146,26 @@ void TileFrameRenderer::look_ahead(std::size_t pixel_of_batch, std::size_t slot,
   const bool was_seen = has_history_ && takes_up(sees_catcher, state, index);
   ahead.history = was_seen ? PixelHistory::same : PixelHistory::none;
   if (reprojection_ != nullptr) {
-    ahead.history = reprojection_->take(pixel_of_batch, index, state, ahead.old);
+    ahead.history = reprojection_->take(pixel_of_batch, index, catchers_before_, state, ahead.old);
   }
+  if (sees_catcher && ahead.history == PixelHistory::same && is_catcher_new())
+    ahead.history = give_old_albedo(surfaces_->pixel(slot), ahead.old);
   ahead.is_located =
       ahead.history != PixelHistory::none &&
       method_of(slot).look_ahead(light, knows_targets_, {state, index}, ahead.located);
+}
+
+/// Whether catchers that stay have another albedo than in the frame before.
+bool TileFrameRenderer::is_catcher_new() const {
+  return catchers_before_.is_known() && !catchers_.is_like(catchers_before_);
+}
+
+/// Surfaces that stay, with the albedo of the frame before.
+PixelHistory TileFrameRenderer::give_old_albedo(std::span<const SurfaceHit> hits,
+                                                OldSurfaces& old) {
+  gather_sites(geometry_, hits, old.sites, catchers_before_);
+  old.log_share.fill(0);
+  return PixelHistory::moved;
 }
 
 /// Pass: what every pixel's method knows of it, and the rays that tell the rest.
@@ -192,7 +196,7 @@ void TileFrameRenderer::sample(Batch& batch, const TileRound& at, SampleState& s
       continue;
     }
     poison(sites);
-    batch.emission[i] = gather_sites(geometry_, surfaces_->pixel(slot), sites, light.catcher);
+    batch.emission[i] = gather_sites(geometry_, surfaces_->pixel(slot), sites, catchers_);
 
     // Sample it.
     const Ahead& ahead = ahead_[slot % 2];
@@ -209,15 +213,15 @@ void TileFrameRenderer::sample(Batch& batch, const TileRound& at, SampleState& s
         .located = ahead.is_located ? std::span(ahead.located).first(populations)
                                     : std::span<const kernels::LocatedDirections>(),
         .target = targets_of(index, state),
-        .neighbors =
-            reprojection_ != nullptr ? reprojection_->neighbors(i) : std::span<const CarriedSet>(),
+        .neighbors = reprojection_ != nullptr ? reprojection_->neighbors(i, catchers_before_)
+                                              : std::span<const CarriedSet>(),
         .hits = surfaces_->pixel(slot),
         .geometry = &geometry_,
         .wants_unshadowed = wants_unshadowed_};
     const SiteOrigins from = origins(slot);
     const bool is_catcher = surfaces_->first_surface(slot).is_catcher;
     if (is_catcher && has_history_ && belongs_to_object(state, index)) {
-      batch.pixels[i].shadow = edge_.sample(*context_.method, input, light, state, *scratch_);
+      batch.pixels[i].shadow = sample_edge(input, light, state);
       batch.pixels[i].catcher = 1;
       batch.end_ray[i] = batch.rays.size();
       continue;
@@ -233,9 +237,11 @@ void TileFrameRenderer::sample(Batch& batch, const TileRound& at, SampleState& s
     batch.known[i] = rays.known;
     batch.end_ray[i] = batch.rays.size();
 
-    if (is_catcher) set_catcher(state, index);
-    if (const float share = catcher_share(input.hits); share > 0 && !is_catcher) {
-      batch.pixels[i].shadow = edge_.sample(*context_.method, input, light, state, *scratch_);
+    if (is_catcher) {
+      set_catcher(state, index);
+      batch.pixels[i].shadow = dark_share(input.hits, sites);
+    } else if (const float share = catcher_share(input.hits); share > 0) {
+      batch.pixels[i].shadow = sample_edge(input, light, state);
       batch.pixels[i].catcher = share;
     }
 
@@ -248,6 +254,12 @@ void TileFrameRenderer::sample(Batch& batch, const TileRound& at, SampleState& s
     stats_.target_evaluations += static_cast<std::uint64_t>(did.target_evaluations);
     stats_.rays_shadow += did.rays_traced;
   }
+}
+
+/// The sites on catchers of a pixel that belongs to an object.
+Rgb TileFrameRenderer::sample_edge(const PixelInput& input, const FrameLight& light,
+                                   const SampleState& state) {
+  return edge_.sample(*context_.method, input, light, catchers_, state, *scratch_);
 }
 
 /// Where the shadow rays of a pixel's sites start.
@@ -330,11 +342,10 @@ void TileFrameRenderer::finish(Batch& batch, const FrameLight& light, RoundMean&
     const std::size_t slot = batch.first + i;
     const std::span<const SurfaceHit> hits = surfaces_->pixel(slot);
     if (surfaces_->sees_surface(slot) && surfaces_->first_surface(slot).is_catcher) {
-      const PixelResult ground = std::exchange(pixel, {});  // which is not in the picture
-      pixel.shadow = ground.catcher > 0 ? ground.shadow : ground.radiance;
+      const PixelResult caught = std::exchange(pixel, {});  // which is not in the picture
+      pixel.shadow = caught.catcher > 0 ? caught.shadow : caught.radiance + caught.shadow;
       pixel.catcher = catcher_share(hits);
     }
-    if (pixel.catcher > 0) lighten_black(light.catcher, pixel);
     record_geometry(hits, pixel);
     pixel.radiance += background[i] + batch.emission[i];
     pixel.alpha = show_environment ? 1 : pixel.coverage;

@@ -80,6 +80,9 @@ class TileFrameRenderer {
   const PixelMethod& method_of(std::size_t slot) const;
   void look_ahead(std::size_t pixel_of_batch, std::size_t slot, const kernels::CarriedLight& light,
                   SampleState& state);
+  bool is_catcher_new() const;
+  PixelHistory give_old_albedo(std::span<const SurfaceHit> hits, OldSurfaces& old);
+  Rgb sample_edge(const PixelInput& input, const FrameLight& light, const SampleState& state);
   SiteOrigins origins(std::size_t slot) const;
   void trace(Batch& batch);
   void learn(Batch& batch, SampleState& state);
@@ -100,6 +103,7 @@ class TileFrameRenderer {
   std::unique_ptr<SamplerScratch> scratch_;
   NoiseProbe probe_;
   CatcherEdge edge_;
+  CatcherAlbedo catchers_, catchers_before_;  ///< of the light of the round in work
   FirstPassCollector collector_;
   RenderStats stats_;
   Stages stages_;

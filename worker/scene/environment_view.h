@@ -12,14 +12,16 @@ struct EnvironmentView {
   std::array<float, 9> to_map{};  ///< row-major: map direction = to_map * world direction
 };
 
-inline EnvironmentView view_of(const Environment& environment) {
-  const EnvironmentMap& map = *environment.map;
+inline EnvironmentView view_of(const EnvironmentMap& map, const Mat3& rotation) {
   return {.texels = &map.texels()->r,
           .width = map.width(),
           .height = map.height(),
           .stride = map.stride(),
           .bilinear = map.filter() == MapFilter::bilinear,
-          .to_map = environment.rotation.transposed().m};
+          .to_map = rotation.transposed().m};
+}
+inline EnvironmentView view_of(const Environment& environment) {
+  return view_of(*environment.map, environment.rotation);
 }
 
 }  // namespace baton

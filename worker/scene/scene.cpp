@@ -205,6 +205,7 @@ void place_object(const ObjectSpec& object, std::size_t index, const std::string
                              .to_world = *to_world,
                              .normal_to_world = *normal_to_world,
                              .moving_object = moving_object,
+                             .is_catcher = object.catcher,
                              .deforms = scene.meshes[mesh].deformation != nullptr});
 }
 
@@ -300,6 +301,7 @@ Result<Scene> load_scene(const JobSpec& job) {
     }
   }
   if (faults.any()) return faults.error();
+  scene.has_catcher = std::ranges::any_of(scene.instances, &Instance::is_catcher);
   return scene;
 }
 

@@ -49,7 +49,7 @@ struct Instance {
   Mat3 normal_to_world;             ///< inverse transpose of to_world.linear
   std::int32_t moving_object = -1;  ///< index of the job's object, where that has keys; else -1
 
-  bool is_catcher = false;  ///< seen by catcher.h alone, not by the ray tracer
+  bool is_catcher = false;  ///< catches shadows: rays that look for objects pass it
   bool deforms = false;     ///< its mesh does
 
   bool moves() const { return moving_object >= 0 || deforms; }
@@ -61,6 +61,7 @@ struct Scene {
   std::vector<Material> materials;
   std::vector<Instance> instances;  ///< placed as without keys; pose.h moves them
   bool has_detail = false;          ///< some material has
+  bool has_catcher = false;         ///< some instance is one
 
   const Material& material_of(const Instance& instance) const {
     return materials[instance.material];

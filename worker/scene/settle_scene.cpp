@@ -130,6 +130,7 @@ class SceneTaker {
   Status take_objects() {
     struct Passed {
       bool visible = true;
+      bool catcher = false;
       std::string material;
     };
     std::vector<Passed> passed(file_.nodes.size());
@@ -139,10 +140,11 @@ class SceneTaker {
         passed[node] = passed[static_cast<std::size_t>(parent)];
       if (const GltfNodeSpec* said = said_[node]) {
         passed[node].visible = passed[node].visible && said->visible;
+        passed[node].catcher = passed[node].catcher || said->catcher;
         if (!said->material.empty()) passed[node].material = said->material;
       }
       if (passed[node].visible && file_.nodes[node].mesh >= 0)
-        BATON_TRY(take_node(node, passed[node].material));
+        BATON_TRY(take_node(node, passed[node].material, passed[node].catcher));
     }
     return {};
   }
@@ -157,8 +159,9 @@ class SceneTaker {
     return shape;
   }
 
-  Status take_node(std::size_t node, const std::string& material) {
+  Status take_node(std::size_t node, const std::string& material, bool catcher) {
     ObjectSpec object;
+    object.catcher = catcher;
     const std::optional<ShapeSpec> shape = shape_of(node);
     if (file_.nodes[node].skin >= 0) {
       // Its bones say where it is.

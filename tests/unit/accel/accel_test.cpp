@@ -77,6 +77,31 @@ TEST(Accel, HitTellsTheSurface) {
   EXPECT_FALSE(trace(*accel, {0, 0, 9}, {0, 0, 1}).hit);
 }
 
+// Still and moving ones, which no ray meets that asks for objects.
+TEST(Accel, CatchersAreApart) {
+  Scene scene = scene_of(sphere_mesh(16, 32));
+  scene.instances.push_back({0, 0, {{}, {0, 0, 3}}, {}, -1, true});
+  scene.instances.push_back({0, 0, {{}, {5, 0, 0}}, {}, 0, true});
+  const auto rest = build(scene);
+  std::vector<Instance> moved = scene.instances;
+  moved[2].to_world.offset = {0, 0, 6};
+  const auto placed = rest->place(moved, {}).value();
+  const Ray ray{{0.1f, 0.2f, 9}, {0, 0, -1}};
+  SurfaceHit hit;
+  for (const Accel* accel : {static_cast<const Accel*>(rest.get()), placed.get()}) {
+    accel->intersect({&ray, 1}, {&hit, 1});
+    EXPECT_EQ(hit.instance, 0u);
+    EXPECT_FALSE(hit.is_catcher);
+    accel->intersect_catchers({&ray, 1}, {&hit, 1});
+    EXPECT_EQ(hit.instance, accel == rest.get() ? 1u : 2u);
+    EXPECT_TRUE(hit.hit && hit.is_catcher);
+    ShadowRays shadows;
+    shadows.push({0, 0, 1.5f}, {0, 0, 1});
+    accel->occluded(shadows);
+    EXPECT_GT(shadows.t_far[0], 0);
+  }
+}
+
 TEST(Accel, NormalsFaceTheViewerInsideTheMesh) {
   const Scene scene = scene_of(sphere_mesh(16, 32));
   const auto accel = build(scene);

@@ -80,6 +80,38 @@ TEST(ImageSpec, IsReadWithARegionAndScaled) {
   EXPECT_EQ(to_json(image_of("{}").value()).find("region"), std::string::npos);
 }
 
+TEST(Catchers, AreGroundObjectsAndNodes) {
+  const auto job_of = [](const std::string& scene, const std::string& more = "") {
+    return parse_job(
+        R"({"name": "t", "environment": {"map": "a.exr"}, "scene": {)" + scene + "}" + more + "}",
+        "job", "/");
+  };
+  const std::string things = R"("materials": {"m": {"type": "diffuse"}}, "meshes": {"a": "a.ply"})";
+  const std::string objects = things + R"(, "objects": [{"mesh": "a", "material": "m"},
+                                            {"mesh": "a", "material": "m", "catcher": )";
+  const JobSpec plain = job_of(objects + "false}]").value(),
+                job = job_of(objects + "true}]").value();
+  EXPECT_FALSE(has_catcher(plain));
+  EXPECT_EQ(to_json(plain).find("catcher"), std::string::npos)
+      << "as without the key: the digest of a picture stays";
+  EXPECT_EQ(catcher_key(job), "scene.objects[1].catcher");
+  EXPECT_EQ(parse_job(to_json(job), "again", "/").value(), job);
+  EXPECT_EQ(
+      catcher_key(job_of(things + R"(, "ground": {"material": "m", "catcher": true})").value()),
+      "scene.ground.catcher");
+  EXPECT_EQ(
+      catcher_key(
+          job_of(R"("gltf": {"file": "a.glb", "nodes": {"stairs": {"catcher": true}}})").value()),
+      "scene.gltf.nodes.stairs.catcher");
+  EXPECT_EQ(
+      job_of(objects + "true}]", R"(, "sampling": {"method": "bidirectional"},
+                                       "visibility": {"correlated": true})")
+          .error()
+          .message,
+      "job: $.visibility: expected correlated false, as scene.objects[1].catcher is true, whose "
+      "shadows no second pass exchanges, got true");
+}
+
 TEST(ImageSpec, IsReadWithOverscan) {
   const auto image_of = [](const std::string& image) {
     return parse_job(

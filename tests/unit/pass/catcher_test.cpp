@@ -1,11 +1,11 @@
-// A ground that catches shadows and is in no picture.
+// A ground and objects that catch shadows and are in no picture.
 #include <gtest/gtest.h>
 
 #include <algorithm>
 #include <cmath>
 
 #include "common/image/shadow.h"
-#include "tests/support/render_tiled.h"
+#include "tests/support/catcher_jobs.h"
 
 namespace baton {
 namespace {
@@ -27,6 +27,13 @@ JobSpec catcher_job(Method method, int frames) {
   return job;
 }
 
+/// The last film as frames have it.
+FilmTile finished(const JobSpec& job) {
+  FilmTile film = render_tile(job).films.back();
+  finish_shadows(film);
+  return film;
+}
+
 TEST(Catcher, SameBytesForAnyTiling) {
   for (const bool moves : {false, true}) {
     JobSpec job = catcher_job(Method::pool, 3);
@@ -37,29 +44,66 @@ TEST(Catcher, SameBytesForAnyTiling) {
   }
 }
 
+TEST(Catcher, OfObjectsHasTheSameBytesForAnyTiling) {
+  for (const Method method : {Method::pool, Method::sequential, Method::restir}) {
+    JobSpec job = test::ball_job(method, 3);
+    for (const bool moves : {false, true}) {
+      if (moves) test::set_all_in_motion(job);
+      const std::vector<FilmTile> whole = render_tiled(job, 4096, 3);
+      EXPECT_EQ(render_tiled(job, 5, 1), whole);
+      EXPECT_EQ(render_tiled(job, 8, 2, MemoryBudget::of(0)), whole);
+    }
+  }
+}
+
+/// All that frames without catchers have, with and without them.
+void expect_same(const JobSpec& with_catcher, const JobSpec& without_catcher) {
+  const std::vector<FilmTile> with = render_tile(with_catcher).films;
+  const std::vector<FilmTile> without = render_tile(without_catcher).films;
+  for (std::size_t f = 0; f < with.size(); ++f) {
+    for (const std::string& name : without[f].channels) {
+      if (name == "error") continue;  // of the pixels of the ground there is one less
+      const auto a = channel(with[f], name), b = channel(without[f], name);
+      EXPECT_TRUE(std::equal(a.begin(), a.end(), b.begin())) << name << " of frame " << f;
+    }
+  }
+}
+
 // It hides nothing, casts nothing and lights nothing: all else is as if it were not there.
 TEST(Catcher, ObjectsHaveTheSameBytesWithoutIt) {
   for (const Background background : {Background::transparent, Background::environment}) {
     JobSpec job = catcher_job(Method::pool, 2);
     job.output.background = background;
-    const std::vector<FilmTile> with = render_tile(job).films;
-    job.scene.ground.reset();
-    const std::vector<FilmTile> without = render_tile(job).films;
-    for (std::size_t f = 0; f < with.size(); ++f) {
-      for (const std::string& name : without[f].channels) {
-        if (name == "error") continue;  // of the pixels of the ground there is one less
-        const auto a = channel(with[f], name), b = channel(without[f], name);
-        EXPECT_TRUE(std::equal(a.begin(), a.end(), b.begin())) << name;
-      }
+    JobSpec without = job;
+    without.scene.ground.reset();
+    expect_same(job, without);
+  }
+}
+
+TEST(Catcher, ObjectsHaveTheSameBytesWithoutOneOfObjects) {
+  for (const Method method : {Method::pool, Method::sequential, Method::restir}) {
+    // At rest; with a camera and light that stay, where pixels at edges see the ball pass; all.
+    for (const int motion : {0, 1, 2}) {
+      JobSpec job = test::ball_job(method, 3);
+      if (motion == 1) job.environment.rotation_deg_per_frame = 0;
+      if (motion > 0) test::set_all_in_motion(job, motion == 2);
+      JobSpec without = job;
+      without.scene.objects.pop_back();
+      without.scene.meshes.erase("ball");
+      expect_same(job, without);
     }
   }
 }
 
-/// The last film as frames have it.
-FilmTile finished(const JobSpec& job) {
-  FilmTile film = render_tile(job).films.back();
-  finish_shadows(film);
-  return film;
+// The nearest one is seen, from either side, and what it hides of another is lost.
+TEST(Catcher, HidesOthersOnly) {
+  JobSpec job = test::ball_job(Method::pool, 1);
+  const FilmTile one = finished(job);
+  JobSpec two = job;
+  two.scene.objects.push_back(two.scene.objects.back());
+  two.scene.objects.back().translate.y -= 0.1f;
+  two.scene.objects.back().scale = {2, 1.7f, 1.7f};  // within the first one
+  EXPECT_EQ(finished(two), one);
 }
 
 /// Means over seeds of shadow.G in every pixel, and their standard errors.

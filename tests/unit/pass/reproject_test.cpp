@@ -85,7 +85,8 @@ class Follower {
     state.resize(states_[0]->rect, 16);
     for (std::size_t i = 0; i < num_pixels; ++i) {
       OldSurfaces old;
-      found_[i].history = reprojection.take(i, i, state, old);
+      CatcherAlbedo none;
+      found_[i].history = reprojection.take(i, i, none, state, old);
       found_[i].lns = state.lns[i];
       std::copy_n(state.site.data() + 16 * i, 16, found_[i].site.data());
       std::copy_n(state.weight.data() + 16 * i, 16, found_[i].weight.data());

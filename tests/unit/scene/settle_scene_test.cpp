@@ -101,22 +101,26 @@ TEST(SettleScene, NodesBecomeObjectsThatShareMeshes) {
 TEST(SettleScene, TheJobSaysOtherwiseByName) {
   const std::string file = still_set();
   const std::string mesh = write_test_file("own.off", test::kSquareOff);
-  const JobSpec job =
-      settled(job_of(file,
-                     R"(, "nodes": {"tree": {"material": "gold"}, "left": {"visible": false},
+  const JobSpec job = settled(job_of(
+      file,
+      R"(, "nodes": {"tree": {"material": "gold", "catcher": true}, "left": {"visible": false},
       "right": {"place": {"translate": [0, 0, 7], "rotateDeg": [0, 0, 90], "scale": 2}}}},
       "materials": {"gold": {"type": "diffuse"}, "stone": {"type": "diffuse", "color": [1, 0, 0]}},
       "meshes": {"own": ")" +
-                         mesh + R"("}, "objects": [{"mesh": "own", "material": "leaf"}])",
-                     R"(, "camera": {"position": [0, 9, 0], "lookAt": [0, 0, 1]})"));
+          mesh + R"("}, "objects": [{"mesh": "own", "material": "leaf"}])",
+      R"(, "camera": {"position": [0, 9, 0], "lookAt": [0, 0, 1]})"));
   ASSERT_EQ(job.scene.objects.size(), 3u);
   EXPECT_EQ(job.scene.objects[0].mesh, "own");
   EXPECT_EQ(job.scene.objects[0].material, "leaf");
   EXPECT_EQ(job.scene.objects[1].material, "gold");
+  EXPECT_FALSE(job.scene.objects[0].catcher);
+  EXPECT_TRUE(job.scene.objects[1].catcher);
+  EXPECT_EQ(parse_job(to_json(job), "again", "/").value(), job);
   EXPECT_EQ(job.scene.materials.at("stone").kind, MaterialKind::diffuse);
   EXPECT_EQ(job.camera.position, (Vec3{0, 9, 0}));
   const auto scene = load_scene(job);
   ASSERT_TRUE(scene) << scene.error().message;
+  EXPECT_TRUE(scene->has_catcher);
   // x doubled becomes y; the parent moves by 1.
   expect_near(scene->instances[1].to_world.point({1, 0, 0}), {1, 2, 7});
 }

@@ -115,9 +115,6 @@ def check_object(item, report):
 def check_rays(item, where, report):
     if item.is_holdout:
         report.add(where, "a holdout", "hide it from the render")
-    if item.is_shadow_catcher:
-        report.add(where, "a shadow catcher: it is shown as a surface",
-                   "hide it, and add a ground with `catcher` to the job")
     for name, rays in RAYS.items():
         if not getattr(item, f"visible_{name}"):
             report.add(where, f"it is hidden from {rays}", "let all rays see it, or hide it from the render")

@@ -50,8 +50,8 @@ def layer_collections(layer):
 class Shape:
     """A mesh in one place of each frame."""
 
-    def __init__(self, name, mesh):
-        self.name, self.mesh = name, mesh
+    def __init__(self, name, mesh, catcher):
+        self.name, self.mesh, self.catcher = name, mesh, catcher
         self.matrices = []
 
 
@@ -82,7 +82,7 @@ class Geometry:
                 self.first.add(key)
                 mesh = self.mesh_of(key, shown, depsgraph)
                 if mesh is not None:
-                    self.shapes[key] = Shape(shown.name, mesh)
+                    self.shapes[key] = Shape(shown.name, mesh, shown.original.is_shadow_catcher)
             elif key in self.witnesses and key in self.shapes:
                 self.compare(key, shown, depsgraph)
             if key in self.shapes:

@@ -13,7 +13,7 @@ SHEAR = 1e-4
 def write(path, geometry, frames, fps, diffuse, report):
     """geometry: shapes with a matrix for each frame. Frame n is at n / fps seconds, as Blender has it.
 
-    The job's materials for those named in `diffuse`, which glTF says less exactly."""
+    The job's materials for those named in `diffuse`, which glTF says less exactly, and what it says of nodes."""
     shapes = list(geometry.shapes.values())
     names = put_in_scene(shapes, geometry.poses, report)
     for mesh in dict.fromkeys(shape.mesh for shape in shapes):
@@ -37,8 +37,9 @@ def write(path, geometry, frames, fps, diffuse, report):
     file.animate("shot", tracks, [frame / fps for frame in frames])
     gltf_materials.mend(file.document)
     file.write(path)
-    return {material["name"]: gltf_materials.diffuse(file.document, material, path.name)
-            for material in file.document.get("materials", []) if material["name"] in diffuse}
+    own = {material["name"]: gltf_materials.diffuse(file.document, material, path.name)
+           for material in file.document.get("materials", []) if material["name"] in diffuse}
+    return own, {name: {"catcher": True} for name, shape in zip(names, shapes) if shape.catcher}
 
 
 def is_moving(shape):

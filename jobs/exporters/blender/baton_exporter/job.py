@@ -60,9 +60,11 @@ def export(folder, strict=False, frames=None):
         job["motion"] = {"curve": "linear"}
     job["output"] = output_of(scene, fps)
     if not (strict and report.entries):
-        own = gltf_file.write(folder / "scene.glb", shapes, numbers, fps, materials.diffuse, report)
+        own, nodes = gltf_file.write(folder / "scene.glb", shapes, numbers, fps, materials.diffuse, report)
         if own:
             job["scene"]["materials"] = own
+        if nodes:
+            job["scene"]["gltf"]["nodes"] = nodes
     if not (strict and report.entries):
         (folder / "job.json").write_text(json.dumps(job, indent=2) + "\n", encoding="utf-8")
     else:
