@@ -15,9 +15,10 @@ namespace baton {
 /// their lobe. A number of candidates that depends on their own values would be a bias; one that
 /// depends on what earlier frames saw of the pixel is not.
 
-/// What noise is compared with: a pixel's light and that of its surroundings.
-inline float noise_scale(const PoolTuning& tuning, float light, float mean_radiance) {
-  return light + tuning.surroundings * mean_radiance;
+/// What noise is compared with: a pixel's light, as its memory expects it, and that of its
+/// surroundings.
+inline float noise_scale(const PoolTuning& tuning, float expected, float mean_radiance) {
+  return expected + tuning.surroundings * mean_radiance;
 }
 
 /// Variance of a pixel's light, in squares of noise_scale(), that one candidate of each kind would

@@ -216,7 +216,7 @@ HWY_INLINE float PoolStep(const PoolTuning& tuning, const Candidates& candidates
   const Rgb visible = SumOfLanes(lines.colors);
   const float expected = mean(visible);
   const bool control = use_control(tuning, expected, total_deviation);
-  const float scale = noise_scale(tuning, lns, candidates.mean_radiance);
+  const float scale = noise_scale(tuning, expected, candidates.mean_radiance);
   const RayPlan plan{control ? deviation : contribution,
                      control ? total_deviation : contribution.Finish(), control,
                      memory.outcomes != 0

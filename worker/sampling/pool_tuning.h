@@ -8,15 +8,15 @@ namespace baton {
 /// candidates and rays go. docs/studies-pool.md shows what half and twice of each does
 /// (tests/studies/study_pool_tuning.cpp).
 struct PoolTuning {
-  /// What a pixel's noise is compared with: its light and so many times the mean radiance of the
-  /// environment, as nobody sees the noise of dark pixels among bright ones.
+  /// What a pixel's noise is compared with: the light that it expects and so many times the mean
+  /// radiance of the environment, as nobody sees the noise of dark pixels among bright ones.
   float surroundings = 3;
 
   /// Least factor on a candidate's weight where V^ is the control variate: candidates whose
   /// visibility has no variance still get some rays.
-  float least_deviation = 0.05f;
-  /// The same where V^ is no control variate.
-  float least_contribution = 0.2f;
+  float least_deviation = 0.1f;
+  /// The same where V^ is no control variate. A lamp that is always blocked leaves rays to the rest.
+  float least_contribution = 0.05f;
   /// V^ is the control variate where the expected light is so many times its deviation. Later
   /// loses; earlier, a blocked ray may leave a value below zero more often.
   float control_from = 2;

@@ -175,17 +175,36 @@ TEST_P(PoolRays, TellTheVarianceOfTheirLight) {
                                     0.5f, 16, memory, *scratch, *rays)};
       sum += lns / kRuns;
       squares += lns * lns / kRuns;
-      const double scale = noise_scale(tuning, static_cast<float>(lns), one_run.mean_radiance);
+      // Half of the light is expected to come: nothing is known of shadows.
+      const double scale = noise_scale(tuning, static_cast<float>(lns / 2), one_run.mean_radiance);
       const LightVariance& of_one = rays->light_variance;
       const double share = double{of_one.from_light} / counts(sites).from_light +
                            double{of_one.from_lobes} / std::max(counts(sites).from_bsdf, 1);
       variance += share * scale * scale / kRuns;
     }
-    // Half of the light was expected to come: nothing is known of shadows.
     const double truth = 0.25 * (squares - sum * sum);
     EXPECT_GT(variance, truth) << glossy;
     EXPECT_LT(variance, (GetParam() == HWY_SSE4 ? 16 : 4) * truth) << glossy;
   }
+}
+
+// The same candidates, of which all are expected to be as visible: their noise and what it counts
+// beside shrink alike, but for the surroundings.
+TEST_P(PoolRays, JudgeNoiseBesideTheLightThatTheyExpect) {
+  const SiteBlock sites = pixel(true);
+  const auto judged = [&](std::uint16_t share) {
+    PixelMemory memory;
+    memory.all_rays = static_cast<VisibilityCell>(share << 4 | 15);
+    memory.outcomes = PixelMemory::kSawBlocked;
+    const float lns = kernels::choose_pool_rays(
+        tuning, {sites, view, presampled, counts(sites), rng.bits(0, 0)}, 0.5f, 16, memory,
+        *scratch, *rays);
+    const float expected = (static_cast<float>(share) + 0.5f) / 4096;
+    const float scale = noise_scale(tuning, expected * lns, presampled.mean_radiance) / expected;
+    return rays->light_variance.from_light * scale * scale;
+  };
+  EXPECT_GT(judged(4000), 0);
+  EXPECT_NEAR(judged(4) / judged(4000), 1, 1e-3);
 }
 
 TEST_P(PoolRays, AreNWithoutAMemoryAndByDeviationWithOne) {
