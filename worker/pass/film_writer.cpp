@@ -6,6 +6,7 @@
 
 namespace baton {
 Rgb source_color(PixelSource source) {
+  // By PixelSource.
   constexpr std::array<Rgb, 6> kColors{
       {{0, 0, 0}, {1, 0, 0}, {0, 1, 0}, {1, 1, 0}, {0, 0, 1}, {0, 0, 0}}};
   return kColors.at(static_cast<std::size_t>(source));

@@ -107,6 +107,17 @@ TEST(Messages, EveryTypeSurvivesTheRoundTrip) {
   }
 }
 
+// Another kind or order of members is another version.
+TEST(Messages, TheirBytesAreThoseOfTheVersion) {
+  static_assert(kProtocolVersion == 10);
+  Bytes all;
+  for (const Message& message : examples()) {
+    for (const Bytes& frame : encode_message(message))
+      all.insert(all.end(), frame.begin(), frame.end());
+  }
+  EXPECT_EQ(digest_of(all).hex(), "1255f5c193ea4a606f8b70cd50f708ca");
+}
+
 TEST(Messages, MembersArriveWhereTheyWereSent) {
   const Message decoded = decode_message(encode_message(examples()[3])).value();
   const auto& done = std::get<TaskDone>(decoded);
