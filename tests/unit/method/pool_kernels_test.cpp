@@ -196,9 +196,9 @@ TEST_P(PoolRays, JudgeNoiseBesideTheLightThatTheyExpect) {
     PixelMemory memory;
     memory.all_rays = static_cast<VisibilityCell>(share << 4 | 15);
     memory.outcomes = PixelMemory::kSawBlocked;
-    const float lns = kernels::choose_pool_rays(
-        tuning, {sites, view, presampled, counts(sites), rng.bits(0, 0)}, 0.5f, 16, memory,
-        *scratch, *rays);
+    const float lns =
+        kernels::choose_pool_rays(tuning, {sites, view, presampled, counts(sites), rng.bits(0, 0)},
+                                  0.5f, 16, memory, *scratch, *rays);
     const float expected = (static_cast<float>(share) + 0.5f) / 4096;
     const float scale = noise_scale(tuning, expected * lns, presampled.mean_radiance) / expected;
     return rays->light_variance.from_light * scale * scale;
