@@ -32,7 +32,7 @@ struct FrameLight {
   std::shared_ptr<const PresampledLight> presampled;
   /// What arrives without shadows, of jobs with shadow catchers. `before` where samples are
   /// carried.
-  std::shared_ptr<const Irradiance> irradiance, irradiance_before;
+  std::shared_ptr<const Irradiance> irradiance{}, irradiance_before{};
 };
 
 /// R_now R_before^-1 of a map whose texels stay: along it, directions on the lattice are carried
