@@ -50,15 +50,16 @@ Result<std::shared_ptr<const RenderContext>> make_render_context(
   return std::shared_ptr<const RenderContext>(std::move(context));
 }
 
-Rgb gather_sites(const FrameGeometry& geometry, std::span<const SurfaceHit> hits, SiteBlock& sites,
-                 const Rgb& catcher) {
+Rgb gather_sites(const FrameGeometry& geometry, std::span<const SurfaceHit> hits,
+                 std::span<const SurfaceLook> looks, SiteBlock& sites, const Rgb& catcher) {
   Rgb emission;
   sites.clear(static_cast<int>(hits.size()));
   for (std::size_t s = 0; s < hits.size(); ++s) {
     if (hits[s].hit && hits[s].is_catcher) {
       sites.add(static_cast<int>(s), hits[s].point, Material{.kd = catcher, .ks = {}});
     } else if (hits[s].hit) {
-      emission += geometry.add_to(sites, static_cast<int>(s), hits[s]);
+      emission +=
+          geometry.add_to(sites, static_cast<int>(s), hits[s], looks.empty() ? nullptr : &looks[s]);
     } else {
       sites.add_miss(static_cast<int>(s));
     }

@@ -29,10 +29,11 @@ class RenderContext {
   std::shared_ptr<SurfaceCache> surfaces;  ///< of the last frames, where things move
 };
 
-/// The surfaces of one pixel, which its sites hit in that frame, with their materials; catcher: the
-/// albedo of a ground that catches shadows. Returns the radiance that they emit, the mean over the
-/// sites.
-Rgb gather_sites(const FrameGeometry& geometry, std::span<const SurfaceHit> hits, SiteBlock& sites,
+/// The surfaces of one pixel, which its sites hit in that frame, with their materials; looks: of
+/// the hits, or none: then textures are looked up; catcher: the albedo of a ground that catches
+/// shadows. Returns the radiance that they emit, the mean over the sites.
+Rgb gather_sites(const FrameGeometry& geometry, std::span<const SurfaceHit> hits,
+                 std::span<const SurfaceLook> looks, SiteBlock& sites,
                  const Rgb& catcher = {1, 1, 1});
 
 }  // namespace baton

@@ -192,7 +192,8 @@ void TileFrameRenderer::sample(Batch& batch, const TileRound& at, SampleState& s
       continue;
     }
     poison(sites);
-    batch.emission[i] = gather_sites(geometry_, surfaces_->pixel(slot), sites, light.catcher);
+    batch.emission[i] = gather_sites(geometry_, surfaces_->pixel(slot),
+                                     surfaces_->pixel_looks(slot), sites, light.catcher);
 
     // Sample it.
     const Ahead& ahead = ahead_[slot % 2];
