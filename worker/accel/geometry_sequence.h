@@ -21,22 +21,25 @@ struct FrameGeometry {
   const Material& material_of(const SurfaceHit& hit) const {
     return scene->materials[hit.material];
   }
-  /// Sets a site to what it hit. Returns the radiance that the surface emits.
-  Rgb add_to(SiteBlock& sites, int site, const SurfaceHit& hit) const {
+  /// Sets a site to what it hit. look: of the hit, where it is kept, else null. Returns the
+  /// radiance that the surface emits.
+  Rgb add_to(SiteBlock& sites, int site, const SurfaceHit& hit,
+             const SurfaceLook* look = nullptr) const {
     const Material& material = material_of(hit);
     if (material.detail == nullptr) {
       sites.add(site, hit.point, material);
       return {};
     }
-    const SeenSurface seen = see(hit);
+    const SeenSurface seen = see(hit, look);
     sites.add(site, seen.point, seen.material);
     return seen.emission;
   }
   /// A hit, with what textures say of it. Normals of hits are those of the mesh: history compares
   /// them.
-  SeenSurface see(const SurfaceHit& hit) const {
+  SeenSurface see(const SurfaceHit& hit, const SurfaceLook* look = nullptr) const {
     const Material& material = material_of(hit);
     if (material.detail == nullptr) return {hit.point, material, {}};
+    if (look != nullptr) return look->at(hit.point);
     return see_detail(*scene, pose.instances[hit.instance], hit.place, hit.point, pose.shapes);
   }
   /// Where the point of a hit of this frame is in another pose, and its shading normal.

@@ -22,7 +22,7 @@ Rgb ExtraSampler::radiance(std::int32_t x, std::int32_t y, std::size_t fold) {
   const std::int32_t position = work_.surfaces.find(work_.masks.any.index(x, y));
   poison(sites_);
   CatcherAlbedo none;  // there are no catchers beside a second pass
-  gather_sites(work_.geometry, work_.surfaces.hits(position), sites_, none);
+  gather_sites(work_.geometry, work_.surfaces.hits(position), {}, sites_, none);
   const Rgb first = first_pass(work_.samples.find(x, y), fold);
   if (!work_.masks.of_fold[fold].at(x, y)) return first;
   draw(x, y, fold, work_.surfaces.hits(position));

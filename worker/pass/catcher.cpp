@@ -65,7 +65,7 @@ Rgb CatcherEdge::sample(const PixelMethod& method, const PixelInput& input, cons
     hits_[s].hit = hits_[s].is_catcher;
     if (hits_[s].hit) origins.set(s, hits_[s].ray_origin);
   }
-  gather_sites(*input.geometry, hits_, sites_, albedo);
+  gather_sites(*input.geometry, hits_, {}, sites_, albedo);
   // Random numbers of pixels that no picture has.
   RngKey key = input.key;
   key.pixel ^= 0x80000000u;

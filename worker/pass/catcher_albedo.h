@@ -25,8 +25,10 @@ class CatcherAlbedo {
            (!is_known() || environment_->rotation == other.environment_->rotation);
   }
   Rgb of(const Vec3& normal);
-  /// Sets a site to what it hit, a catcher or not. Returns the radiance that the surface emits.
-  Rgb add_to(SiteBlock& sites, int site, const FrameGeometry& geometry, const SurfaceHit& hit);
+  /// Sets a site to what it hit, a catcher or not; look: of the hit, null: textures are looked up.
+  /// Returns the radiance that the surface emits.
+  Rgb add_to(SiteBlock& sites, int site, const FrameGeometry& geometry, const SurfaceHit& hit,
+             const SurfaceLook* look);
 
  private:
   const Irradiance* irradiance_ = nullptr;

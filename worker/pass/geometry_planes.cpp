@@ -65,8 +65,9 @@ void GeometryPlanes::add(const TileSurfaces& surfaces) {
     Sum& sum = sums_[pixel];
     sum.sites += weight * static_cast<double>(num_sites);
     for (std::size_t s = 0; s < num_sites; ++s) {
-      const SurfaceHit& hit = surfaces.hits[slot * num_sites + s];
-      if (with_motion) add_motion(camera, surfaces.rays[slot * num_sites + s], hit, weight, sum);
+      const std::size_t at = slot * num_sites + s;
+      const SurfaceHit& hit = surfaces.hits[at];
+      if (with_motion) add_motion(camera, surfaces.rays[at], hit, weight, sum);
       if (!hit.hit || hit.is_catcher) continue;
       sum.seen += weight;
       if (sum.object == 0) sum.object = hit.instance + 1;
@@ -78,7 +79,7 @@ void GeometryPlanes::add(const TileSurfaces& surfaces) {
       if (!objects_.empty()) objects_[pixel].add(hit.instance + 1, weight);
       if (!materials_.empty()) materials_[pixel].add(hit.material + 1, weight);
       if (!with_albedo) continue;
-      const Material material = geometry_.see(hit).material;
+      const Material material = geometry_.see(hit, surfaces.look(at)).material;
       sum.albedo[0] += weight * (double{material.kd.x} + double{material.ks.x});
       sum.albedo[1] += weight * (double{material.kd.y} + double{material.ks.y});
       sum.albedo[2] += weight * (double{material.kd.z} + double{material.ks.z});

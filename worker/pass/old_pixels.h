@@ -41,6 +41,12 @@ class OldPixels {
     return std::span(hits_).subspan(place.first_hit, num_sites);
   }
 
+  /// Their looks, where they are kept, else none.
+  std::span<const SurfaceLook> looks(const Place& place) const {
+    if (place.kept == nullptr) return {};
+    return place.kept->pixel_looks(place.index);
+  }
+
   /// Rays of all pixels requested so far; those of kept tiles count, too, so that the number does
   /// not depend on who rendered what.
   std::uint64_t num_rays() const { return num_rays_; }

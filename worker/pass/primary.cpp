@@ -22,6 +22,16 @@ std::array<float, 2> site_position(std::int32_t site, std::int32_t side, float u
           (static_cast<float>(site / side) + v) * cell};
 }
 
+/// Of hits whose materials have detail; what the others have is never read.
+std::vector<SurfaceLook> looks_of(const FrameGeometry& geometry, std::span<const SurfaceHit> hits) {
+  std::vector<SurfaceLook> looks(hits.size());
+  for (std::size_t i = 0; i < hits.size(); ++i) {
+    if (hits[i].hit && !hits[i].is_catcher && geometry.material_of(hits[i]).detail != nullptr)
+      looks[i] = SurfaceLook::of(geometry.see(hits[i]));
+  }
+  return looks;
+}
+
 }  // namespace
 
 TileSurfaces trace_primary(const JobSpec& job, const FrameGeometry& geometry, const PixelRect& rect,
@@ -37,6 +47,7 @@ TileSurfaces trace_primary(const JobSpec& job, const FrameGeometry& geometry, co
                         .num_sites = job.image.sites,
                         .hits = {},
                         .rays = {},
+                        .looks = {},
                         .first_site = {}};
   const std::size_t count = surfaces.pixels.size();
   surfaces.rays.reserve(count * static_cast<std::size_t>(job.image.sites));
@@ -52,6 +63,7 @@ TileSurfaces trace_primary(const JobSpec& job, const FrameGeometry& geometry, co
         std::find_if(hits.begin(), hits.end(), [](const SurfaceHit& hit) { return hit.hit; });
     surfaces.first_site.push_back(static_cast<std::uint8_t>(first - hits.begin()));
   }
+  if (geometry.scene->has_detail) surfaces.looks = looks_of(geometry, surfaces.hits);
   return surfaces;
 }
 
@@ -61,6 +73,7 @@ TileSurfaces part_of(const TileSurfaces& whole, RoundPixels pixels) {
                     .num_sites = whole.num_sites,
                     .hits = {},
                     .rays = {},
+                    .looks = {},
                     .first_site = {}};
   const auto num_sites = static_cast<std::ptrdiff_t>(whole.num_sites);
   part.hits.reserve(part.pixels.size() * static_cast<std::size_t>(num_sites));
@@ -72,6 +85,9 @@ TileSurfaces part_of(const TileSurfaces& whole, RoundPixels pixels) {
                      whole.hits.begin() + first + num_sites);
     part.rays.insert(part.rays.end(), whole.rays.begin() + first,
                      whole.rays.begin() + first + num_sites);
+    if (!whole.looks.empty())
+      part.looks.insert(part.looks.end(), whole.looks.begin() + first,
+                        whole.looks.begin() + first + num_sites);
     part.first_site.push_back(whole.first_site[index]);
   }
   return part;

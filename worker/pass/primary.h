@@ -17,6 +17,9 @@ struct TileSurfaces {
   std::int32_t num_sites = 1;    ///< S
   std::vector<SurfaceHit> hits;  ///< (slots, S)
   std::vector<Ray> rays;         ///< (slots, S) primary rays
+  /// (slots, S) Of hits whose materials have detail: textures are looked up once for all frames and
+  /// rounds that see the same. Empty where the scene has none.
+  std::vector<SurfaceLook> looks;
   /// (slots) The first site that sees a surface, S where none does: hits are large, and whether
   /// there is one is asked several times a frame.
   std::vector<std::uint8_t> first_site;
@@ -30,11 +33,20 @@ struct TileSurfaces {
     return std::span(hits).subspan(slot * static_cast<std::size_t>(num_sites),
                                    static_cast<std::size_t>(num_sites));
   }
-  std::size_t size_bytes() const { return size_bytes(pixels.size(), num_sites); }
+  /// Of its sites; empty where the scene has no detail.
+  std::span<const SurfaceLook> pixel_looks(std::size_t slot) const {
+    if (looks.empty()) return {};
+    return std::span(looks).subspan(slot * static_cast<std::size_t>(num_sites),
+                                    static_cast<std::size_t>(num_sites));
+  }
+  /// Of hit number `at`, or null.
+  const SurfaceLook* look(std::size_t at) const { return looks.empty() ? nullptr : &looks[at]; }
+  std::size_t size_bytes() const { return size_bytes(pixels.size(), num_sites, !looks.empty()); }
   /// Of so many pixels.
-  static std::size_t size_bytes(std::size_t num_pixels, std::int32_t num_sites) {
+  static std::size_t size_bytes(std::size_t num_pixels, std::int32_t num_sites, bool has_detail) {
     const auto rays = num_pixels * static_cast<std::size_t>(num_sites);
-    return rays * (sizeof(SurfaceHit) + sizeof(Ray)) + num_pixels;
+    return rays * (sizeof(SurfaceHit) + sizeof(Ray) + (has_detail ? sizeof(SurfaceLook) : 0)) +
+           num_pixels;
   }
 };
 

@@ -50,13 +50,14 @@ Result<std::shared_ptr<const RenderContext>> make_render_context(
   return std::shared_ptr<const RenderContext>(std::move(context));
 }
 
-Rgb gather_sites(const FrameGeometry& geometry, std::span<const SurfaceHit> hits, SiteBlock& sites,
-                 CatcherAlbedo& catchers) {
+Rgb gather_sites(const FrameGeometry& geometry, std::span<const SurfaceHit> hits,
+                 std::span<const SurfaceLook> looks, SiteBlock& sites, CatcherAlbedo& catchers) {
   Rgb emission;
   sites.clear(static_cast<int>(hits.size()));
   for (std::size_t s = 0; s < hits.size(); ++s) {
     if (hits[s].hit) {
-      emission += catchers.add_to(sites, static_cast<int>(s), geometry, hits[s]);
+      emission += catchers.add_to(sites, static_cast<int>(s), geometry, hits[s],
+                                  looks.empty() ? nullptr : &looks[s]);
     } else {
       sites.add_miss(static_cast<int>(s));
     }

@@ -30,10 +30,10 @@ class RenderContext {
   std::shared_ptr<SurfaceCache> surfaces;  ///< of the last frames, where things move
 };
 
-/// The surfaces of one pixel, which its sites hit in that frame, with their materials; catchers:
-/// the albedo of those that catch shadows. Returns the radiance that they emit, the mean over the
-/// sites.
-Rgb gather_sites(const FrameGeometry& geometry, std::span<const SurfaceHit> hits, SiteBlock& sites,
-                 CatcherAlbedo& catchers);
+/// The surfaces of one pixel, which its sites hit in that frame, with their materials; looks: of
+/// the hits, or none: then textures are looked up; catchers: the albedo of those that catch
+/// shadows. Returns the radiance that they emit, the mean over the sites.
+Rgb gather_sites(const FrameGeometry& geometry, std::span<const SurfaceHit> hits,
+                 std::span<const SurfaceLook> looks, SiteBlock& sites, CatcherAlbedo& catchers);
 
 }  // namespace baton

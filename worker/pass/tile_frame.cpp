@@ -163,7 +163,7 @@ bool TileFrameRenderer::is_catcher_new() const {
 /// Surfaces that stay, with the albedo of the frame before.
 PixelHistory TileFrameRenderer::give_old_albedo(std::span<const SurfaceHit> hits,
                                                 OldSurfaces& old) {
-  gather_sites(geometry_, hits, old.sites, catchers_before_);
+  gather_sites(geometry_, hits, {}, old.sites, catchers_before_);
   old.log_share.fill(0);
   return PixelHistory::moved;
 }
@@ -196,7 +196,8 @@ void TileFrameRenderer::sample(Batch& batch, const TileRound& at, SampleState& s
       continue;
     }
     poison(sites);
-    batch.emission[i] = gather_sites(geometry_, surfaces_->pixel(slot), sites, catchers_);
+    batch.emission[i] = gather_sites(geometry_, surfaces_->pixel(slot),
+                                     surfaces_->pixel_looks(slot), sites, catchers_);
 
     // Sample it.
     const Ahead& ahead = ahead_[slot % 2];

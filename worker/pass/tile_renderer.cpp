@@ -171,8 +171,8 @@ class TileWalk {
   }
   /// For what another round sees, until the next frame.
   bool has_room() const {
-    const std::size_t of_round =
-        TileSurfaces::size_bytes(state_.num_pixels(), context_.job.image.sites);
+    const std::size_t of_round = TileSurfaces::size_bytes(
+        state_.num_pixels(), context_.job.image.sites, context_.scene->has_detail);
     return keeps_surfaces_ && (kept_.size() + 1) * of_round <= limits::kMaxRoundSurfaceBytes;
   }
   std::shared_ptr<const TileSurfaces> trace(std::int32_t round, RoundPixels pixels) {

@@ -9,7 +9,8 @@
 #include "common/job/estimate.h"
 #include "common/job/job_json.h"
 #include "common/store/folder_token.h"
-#include "worker/accel/accel.h"
+#include "worker/pass/primary.h"
+#include "worker/scene/detail_loader.h"
 
 namespace baton {
 namespace {
@@ -19,11 +20,13 @@ std::uint64_t work_bytes(const JobSpec& job, int num_threads) {
   const JobEstimate e = estimate_job(job);
   const std::int64_t side = job.image.tile_size;
   const std::int64_t pixels = std::min(job.image.rendered().area(), side * side);
-  const auto site_bytes = static_cast<std::int64_t>(sizeof(SurfaceHit) + sizeof(Ray));
-  const std::int64_t pixel_bytes =
-      job.image.sites * site_bytes + 4 * e.film_channels + e.state_bytes_per_pixel;
-  return static_cast<std::uint64_t>(num_threads * pixels * pixel_bytes + e.film_bytes +
-                                    e.frame_bytes);
+  const bool any_detail = std::ranges::any_of(
+      job.scene.materials, [](const auto& material) { return has_detail(material.second); });
+  const auto surface_bytes = static_cast<std::int64_t>(
+      TileSurfaces::size_bytes(static_cast<std::size_t>(pixels), job.image.sites, any_detail));
+  const std::int64_t tile_bytes =
+      surface_bytes + pixels * (4 * e.film_channels + e.state_bytes_per_pixel);
+  return static_cast<std::uint64_t>(num_threads * tile_bytes + e.film_bytes + e.frame_bytes);
 }
 
 /// What the worker's memory leaves to the job's scene. Error: nothing.

@@ -30,13 +30,31 @@ PlacedTexture placed_texture(const TextureSpec& spec, std::shared_ptr<const Text
                        .nearest = spec.filter == TextureFilter::nearest}};
 }
 
+/// Of the images that are there, in the order of DetailImage.
+std::vector<std::vector<DetailImage>> groups_of(const SurfaceDetail& detail) {
+  std::vector<std::vector<DetailImage>> groups;
+  for (std::size_t i = 0; i < kNumDetailImages; ++i) {
+    const auto image = static_cast<DetailImage>(i);
+    if (!detail.has(image)) continue;
+    const auto group = std::ranges::find_if(groups, [&](const std::vector<DetailImage>& others) {
+      return detail[others.front()].lies_as(detail[image]);
+    });
+    if (group != groups.end()) {
+      group->push_back(image);
+    } else {
+      groups.push_back({image});
+    }
+  }
+  return groups;
+}
+
+}  // namespace
+
 bool has_detail(const MaterialSpec& spec) {
   return spec.kind != MaterialKind::measured &&
          (!textures_of(spec).empty() || !(spec.emission == Rgb{}) ||
           SurfaceDetail{spec}.is_cut_out());
 }
-
-}  // namespace
 
 DetailLoader::DetailLoader(gltf::FileCache& files, const std::vector<FileSpec>& listed)
     : files_(files) {
@@ -48,15 +66,21 @@ Result<std::shared_ptr<const SurfaceDetail>> DetailLoader::load(const MaterialSp
   auto detail = std::make_shared<SurfaceDetail>();
   detail->spec = spec;
   const TextureUse color = detail->is_cut_out() ? TextureUse::color_and_alpha : TextureUse::color;
-  BATON_TRY(place(spec.color_texture, color, detail->color));
-  BATON_TRY(place(spec.metallic_roughness_texture, TextureUse::metallic_roughness,
-                  detail->metallic_roughness));
-  BATON_TRY(place(spec.normal_texture, TextureUse::normal, detail->normal));
-  BATON_TRY(place(spec.emission_texture, TextureUse::color, detail->emission));
-  BATON_TRY(place(spec.clearcoat_texture, TextureUse::red, detail->clearcoat));
+  const auto place_as = [&](const std::optional<TextureSpec>& texture, TextureUse use,
+                            DetailImage image) {
+    return place(texture, use, detail->images[static_cast<std::size_t>(image)]);
+  };
+  BATON_TRY(place_as(spec.color_texture, color, DetailImage::color));
+  BATON_TRY(place_as(spec.metallic_roughness_texture, TextureUse::metallic_roughness,
+                     DetailImage::metallic_roughness));
+  BATON_TRY(place_as(spec.normal_texture, TextureUse::normal, DetailImage::normal));
+  BATON_TRY(place_as(spec.emission_texture, TextureUse::color, DetailImage::emission));
+  BATON_TRY(place_as(spec.clearcoat_texture, TextureUse::red, DetailImage::clearcoat));
+  BATON_TRY(place_as(spec.clearcoat_roughness_texture, TextureUse::green,
+                     DetailImage::clearcoat_roughness));
   BATON_TRY(
-      place(spec.clearcoat_roughness_texture, TextureUse::green, detail->clearcoat_roughness));
-  BATON_TRY(place(spec.clearcoat_normal_texture, TextureUse::normal, detail->clearcoat_normal));
+      place_as(spec.clearcoat_normal_texture, TextureUse::normal, DetailImage::clearcoat_normal));
+  detail->alike = groups_of(*detail);
   return std::shared_ptr<const SurfaceDetail>(std::move(detail));
 }
 

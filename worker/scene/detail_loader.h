@@ -12,6 +12,9 @@
 
 namespace baton {
 
+/// Whether a material has a SurfaceDetail.
+bool has_detail(const MaterialSpec& spec);
+
 /// Loads the textures of materials, each image once for each use.
 class DetailLoader {
  public:

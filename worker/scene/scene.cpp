@@ -165,9 +165,8 @@ void fit_mesh(const Material& material, const std::string& material_name,
         fmt::format("{}: {}: material \"{}\": {}", user, mesh_name, material_name, *missing));
     return;
   }
-  for (const PlacedTexture* const map :
-       {&material.detail->normal, &material.detail->clearcoat_normal}) {
-    if (map->texture != nullptr) derive_tangents(mesh, map->uv_set);
+  for (const DetailImage map : {DetailImage::normal, DetailImage::clearcoat_normal}) {
+    if (material.detail->has(map)) derive_tangents(mesh, (*material.detail)[map].uv_set);
   }
 }
 

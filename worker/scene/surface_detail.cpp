@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <optional>
 
 namespace baton {
 namespace {
@@ -19,6 +20,16 @@ T mix(const T& a, const T& b, const T& c, float u, float v) {
 Uv mix_uv(const Uv& a, const Uv& b, const Uv& c, float u, float v) {
   return {mix(a[0], b[0], c[0], u, v), mix(a[1], b[1], c[1], u, v)};
 }
+
+/// What the images of a material say at a place. Of those that it does not have, nothing is there.
+struct DetailTexels {
+  std::array<std::array<float, 4>, kNumDetailImages> means;
+
+  std::array<float, 4>& operator[](DetailImage i) { return means[static_cast<std::size_t>(i)]; }
+  const std::array<float, 4>& operator[](DetailImage i) const {
+    return means[static_cast<std::size_t>(i)];
+  }
+};
 
 /// The triangle at a place, in the world.
 class Patch {
@@ -47,14 +58,24 @@ class Patch {
     across_ = on_triangle(cross(point.ng, along) * place_.width);
   }
 
-  std::array<float, 4> look_up(const PlacedTexture& t) const {
-    const Place at = find(t);
-    return at.image->look_up(at.uv, at.seen, at.sampling);
+  /// All images of a material.
+  DetailTexels look_up(const SurfaceDetail& detail) const {
+    DetailTexels texels;
+    for (const std::vector<DetailImage>& alike : detail.alike) {
+      const Place at = find(detail[alike.front()]);
+      std::array<const Texture*, kNumDetailImages> images;
+      std::array<std::array<float, 4>, kNumDetailImages> means;
+      for (std::size_t i = 0; i < alike.size(); ++i) images[i] = image_at(detail[alike[i]], at);
+      look_up_together(std::span(images).first(alike.size()), at.uv, at.seen, at.sampling, means);
+      for (std::size_t i = 0; i < alike.size(); ++i) texels[alike[i]] = means[i];
+    }
+    return texels;
   }
   /// 1 where the image has no alpha.
   float alpha(const PlacedTexture& t) const {
     const Place at = find(t);
-    return at.image->has_alpha() ? at.image->look_up(at.uv, at.seen, at.sampling)[3] : 1;
+    const Texture& image = *image_at(t, at);
+    return image.has_alpha() ? image.look_up(at.uv, at.seen, at.sampling)[3] : 1;
   }
 
   /// The normal that (x, y, z) of tangent space is, z along that of the mesh; unit, on the side of
@@ -92,12 +113,12 @@ class Patch {
         mix(corner(normals, 0), corner(normals, 1), corner(normals, 2), place_.u, place_.v));
   }
 
-  /// What is looked up of a texture.
+  /// Where textures that lie alike are looked up.
   struct Place {
-    const Texture* image;
     Uv uv;
     Footprint seen;
     TextureSampling sampling;
+    std::optional<std::size_t> tile{};  ///< of tiles, where it is one of them
   };
   Place find(const PlacedTexture& t) const {
     const std::vector<Uv>& uvs = mesh_.uvs[t.uv_set];
@@ -110,16 +131,16 @@ class Patch {
     };
     const Footprint seen{edge(along_), edge(across_)};
     const Uv uv{at[0] + t.offset[0], at[1] + t.offset[1]};
-    if (t.tiles != nullptr) return find_tile(t, uv, seen);
-    return {t.texture.get(), uv, seen, t.sampling};
-  }
-  /// Of a texture of tiles: each ends at its edges. Where rounding leads to one that no triangle
-  /// needs, the first stands for it.
-  Place find_tile(const PlacedTexture& t, const Uv& uv, const Footprint& seen) const {
+    if (t.tiles == nullptr) return {uv, seen, t.sampling};
+    // Each tile ends at its edges.
     const TilePlace place = tile_place(t.triangle(mesh_, corner_), {uv[0], 1 - uv[1]});
-    const Texture* const image =
-        place.is_in_range() ? t.tiles->images[place.index()].get() : nullptr;
-    return {image != nullptr ? image : t.texture.get(), place.uv, seen, t.sampling};
+    return {place.uv, seen, t.sampling,
+            place.is_in_range() ? std::optional(place.index()) : std::nullopt};
+  }
+  /// Where rounding leads to a tile that no triangle needs, the first stands for it.
+  static const Texture* image_at(const PlacedTexture& t, const Place& at) {
+    const Texture* const tile = at.tile ? t.tiles->images[*at.tile].get() : nullptr;
+    return tile != nullptr ? tile : t.texture.get();
   }
 
   /// A step in the world, in edges of the triangle.
@@ -140,11 +161,10 @@ class Patch {
   Uv along_{}, across_{};           ///< of the footprint, in edges of the triangle
 };
 
-/// The shading normal that a normal map gives. strength: of the map. has_lobe: what it shades
-/// mirrors.
-Vec3 mapped_normal(const Patch& patch, const PlacedTexture& map, float strength,
+/// The shading normal that a normal map's texel gives. strength: of the map. has_lobe: what it
+/// shades mirrors.
+Vec3 mapped_normal(const Patch& patch, const std::array<float, 4>& texel, float strength,
                    const ShadingPoint& point, bool has_lobe) {
-  const std::array<float, 4> texel = patch.look_up(map);
   const Vec3 local{(2 * texel[0] - 1) * strength, (2 * texel[1] - 1) * strength, 2 * texel[2] - 1};
   if (!(length(local) > 0)) return point.ns;
   Vec3 normal = patch.from_tangent_space(local, point.ns);
@@ -155,19 +175,19 @@ Vec3 mapped_normal(const Patch& patch, const PlacedTexture& map, float strength,
 
 /// What textures say of a coat, whose normal is that of the mesh or of a map of its own; what is
 /// below glows through it.
-void see_coat_detail(const Patch& patch, const SurfaceDetail& detail, const ShadingPoint& point,
-                     SeenSurface& seen) {
+void see_coat_detail(const Patch& patch, const SurfaceDetail& detail, const DetailTexels& texels,
+                     const ShadingPoint& point, SeenSurface& seen) {
   Coat& coat = seen.material.coat;
   coat.normal = point.ns;
-  if (detail.clearcoat_normal.texture != nullptr)
-    coat.normal = mapped_normal(patch, detail.clearcoat_normal,
+  if (detail.has(DetailImage::clearcoat_normal))
+    coat.normal = mapped_normal(patch, texels[DetailImage::clearcoat_normal],
                                 detail.spec.clearcoat_normal_texture->strength, point, true);
-  if (detail.clearcoat.texture != nullptr)
-    coat.weight = std::min(coat.weight * patch.look_up(detail.clearcoat)[0], 1.0f);
-  if (detail.clearcoat_roughness.texture != nullptr) {
+  if (detail.has(DetailImage::clearcoat))
+    coat.weight = std::min(coat.weight * texels[DetailImage::clearcoat][0], 1.0f);
+  if (detail.has(DetailImage::clearcoat_roughness)) {
     const float given = detail.spec.clearcoat_roughness.value_or(kLeastRoughness);
     const float roughness =
-        std::clamp(given * patch.look_up(detail.clearcoat_roughness)[0], kLeastRoughness, 1.0f);
+        std::clamp(given * texels[DetailImage::clearcoat_roughness][0], kLeastRoughness, 1.0f);
     coat.alpha = roughness * roughness;
   }
   seen.emission = seen.emission * (1 - see_coat(seen.material, seen.point).share);
@@ -187,14 +207,11 @@ TileTriangle PlacedTexture::triangle(const TriangleMesh& mesh,
 
 std::vector<NamedTexture> SurfaceDetail::textures() const {
   std::vector<NamedTexture> there;
-  for (const NamedTexture& texture : {NamedTexture{"colorTexture", &color},
-                                      {"metallicRoughnessTexture", &metallic_roughness},
-                                      {"normalTexture", &normal},
-                                      {"emissionTexture", &emission},
-                                      {"clearcoatTexture", &clearcoat},
-                                      {"clearcoatRoughnessTexture", &clearcoat_roughness},
-                                      {"clearcoatNormalTexture", &clearcoat_normal}}) {
-    if (texture.placed->texture != nullptr) there.push_back(texture);
+  constexpr std::array<const char*, kNumDetailImages> kNames{
+      "colorTexture",     "metallicRoughnessTexture",  "normalTexture",         "emissionTexture",
+      "clearcoatTexture", "clearcoatRoughnessTexture", "clearcoatNormalTexture"};
+  for (std::size_t i = 0; i < kNumDetailImages; ++i) {
+    if (images[i].texture != nullptr) there.push_back({kNames[i], &images[i]});
   }
   return there;
 }
@@ -207,22 +224,52 @@ SeenSurface see_detail(const Scene& scene, const Instance& instance, const Surfa
   const MaterialSpec& spec = detail.spec;
   Rgb color = spec.base_color, emission = spec.emission;
   float metallic = spec.metallic, roughness = spec.roughness;
-  const auto rgb = [](const std::array<float, 4>& t) { return Rgb{t[0], t[1], t[2]}; };
-  if (detail.color.texture != nullptr) {
-    color = color * rgb(patch.look_up(detail.color));
+  const DetailTexels texels = patch.look_up(detail);
+  const auto rgb = [&](DetailImage image) {
+    return Rgb{texels[image][0], texels[image][1], texels[image][2]};
+  };
+  if (detail.has(DetailImage::color)) {
+    color = color * rgb(DetailImage::color);
     color = {std::min(color.x, 1.0f), std::min(color.y, 1.0f), std::min(color.z, 1.0f)};
   }
-  if (detail.metallic_roughness.texture != nullptr) {
-    const std::array<float, 4> t = patch.look_up(detail.metallic_roughness);
+  if (detail.has(DetailImage::metallic_roughness)) {
+    const std::array<float, 4>& t = texels[DetailImage::metallic_roughness];
     roughness = std::clamp(roughness * t[0], kLeastRoughness, 1.0f);
     metallic = std::min(metallic * t[1], 1.0f);
   }
-  if (detail.emission.texture != nullptr) emission = emission * rgb(patch.look_up(detail.emission));
+  if (detail.has(DetailImage::emission)) emission = emission * rgb(DetailImage::emission);
   SeenSurface seen{point, make_material(spec, color, metallic, roughness), emission};
-  if (detail.normal.texture != nullptr)
-    seen.point.ns = mapped_normal(patch, detail.normal, spec.normal_texture->strength, point,
-                                  seen.material.lobe != Material::Lobe::none);
-  if (seen.material.coat.weight > 0) see_coat_detail(patch, detail, point, seen);
+  if (detail.has(DetailImage::normal))
+    seen.point.ns = mapped_normal(patch, texels[DetailImage::normal], spec.normal_texture->strength,
+                                  point, seen.material.lobe != Material::Lobe::none);
+  if (seen.material.coat.weight > 0) see_coat_detail(patch, detail, texels, point, seen);
+  return seen;
+}
+
+SurfaceLook SurfaceLook::of(const SeenSurface& seen) {
+  const Material& m = seen.material;
+  return {.ns = seen.point.ns,
+          .kd = m.kd,
+          .ks = m.ks,
+          .emission = seen.emission,
+          .shape = m.shape,
+          .specular_probability = m.specular_probability,
+          .f90 = m.f90,
+          .lobe = m.lobe,
+          .coat = m.coat};
+}
+
+SeenSurface SurfaceLook::at(const ShadingPoint& point) const {
+  SeenSurface seen{point,
+                   {.lobe = lobe,
+                    .kd = kd,
+                    .ks = ks,
+                    .shape = shape,
+                    .specular_probability = specular_probability,
+                    .f90 = f90,
+                    .coat = coat},
+                   emission};
+  seen.point.ns = ns;
   return seen;
 }
 
@@ -230,8 +277,8 @@ bool is_cut_away(const Scene& scene, const Instance& instance, const SurfacePlac
                  float draw) {
   const SurfaceDetail& detail = *scene.material_of(instance).detail;
   float alpha = detail.spec.alpha;
-  if (detail.color.texture != nullptr)
-    alpha *= Patch(scene, instance, place, {}).alpha(detail.color);
+  if (detail.has(DetailImage::color))
+    alpha *= Patch(scene, instance, place, {}).alpha(detail[DetailImage::color]);
   return alpha < std::max(detail.spec.alpha_cutoff, detail.spec.alpha_blend ? draw : 0.0f);
 }
 

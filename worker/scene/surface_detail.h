@@ -21,6 +21,11 @@ struct PlacedTexture {
   std::array<float, 2> offset{0, 0};
   TextureSampling sampling{};
 
+  /// Whether both are at the same place everywhere.
+  bool lies_as(const PlacedTexture& other) const {
+    return uv_set == other.uv_set && linear == other.linear && offset == other.offset &&
+           sampling == other.sampling && (tiles == nullptr) == (other.tiles == nullptr);
+  }
   /// linear uv.
   Uv turned(const Uv& uv) const {
     return {linear[0] * uv[0] + linear[1] * uv[1], linear[2] * uv[0] + linear[3] * uv[1]};
@@ -28,6 +33,18 @@ struct PlacedTexture {
   /// A triangle of the mesh, which has the coordinates, in the plane of tiles.
   TileTriangle triangle(const TriangleMesh& mesh, const std::array<std::uint32_t, 3>& corner) const;
 };
+
+/// The textures of a material.
+enum class DetailImage : std::uint8_t {
+  color,
+  metallic_roughness,
+  normal,
+  emission,
+  clearcoat,
+  clearcoat_roughness,
+  clearcoat_normal,
+};
+inline constexpr std::size_t kNumDetailImages = 7;
 
 struct NamedTexture {
   const char* name;
@@ -37,9 +54,14 @@ struct NamedTexture {
 /// What a material of numbers has beside them.
 struct SurfaceDetail {
   MaterialSpec spec;  ///< the numbers: factors of the textures
-  PlacedTexture color{}, metallic_roughness{}, normal{}, emission{};
-  PlacedTexture clearcoat{}, clearcoat_roughness{}, clearcoat_normal{};
+  std::array<PlacedTexture, kNumDetailImages> images{};
+  /// Those of them that a look is for, in groups that lie alike on a surface.
+  std::vector<std::vector<DetailImage>> alike{};
 
+  const PlacedTexture& operator[](DetailImage image) const {
+    return images[static_cast<std::size_t>(image)];
+  }
+  bool has(DetailImage image) const { return (*this)[image].texture != nullptr; }
   /// Those that are there, with their names in a job.
   std::vector<NamedTexture> textures() const;
   /// Not every ray that meets the surface stops there.
@@ -60,6 +82,19 @@ struct SeenSurface {
   ShadingPoint point;
   Material material;
   Rgb emission{};  ///< radiance to the viewer
+};
+
+/// What detail makes of a surface, without the place: it is kept for as long as the place is.
+struct SurfaceLook {
+  Vec3 ns{};  ///< shading normal
+  Rgb kd{}, ks{}, emission{};
+  float shape = 1, specular_probability = 0, f90 = 1;
+  Material::Lobe lobe = Material::Lobe::none;
+  Coat coat{};
+
+  static SurfaceLook of(const SeenSurface& seen);
+  /// At the place where it was seen.
+  SeenSurface at(const ShadingPoint& point) const;
 };
 
 /// The surface at a hit of `instance`, whose material has detail. point: with the normals of the

@@ -5,12 +5,16 @@
 #include <algorithm>
 #include <cmath>
 
+#include "worker/texture/texel_kernels.h"
+
 namespace baton {
 namespace {
 
 constexpr float kFullScale = 65535;
-/// Blends along the longer side of a footprint.
-constexpr float kMostProbes = 16;
+/// Texels are read four channels at a time.
+constexpr std::size_t kTexelPadding = 3;
+/// Images in one call of the kernel.
+constexpr std::size_t kMostTogether = 8;
 /// Brighter values of images of floats are cut.
 constexpr float kBrightest = 65504;
 
@@ -91,35 +95,6 @@ std::vector<float> halve(const std::vector<float>& values, std::size_t count, st
   return result;
 }
 
-/// A coordinate within one period of the image, in units of it; what is not finite is 0.
-float within_period(float u, Wrap wrap) {
-  if (!std::isfinite(u)) return 0;
-  switch (wrap) {
-    case Wrap::repeat:
-      return u - std::floor(u);
-    case Wrap::clamp:
-      return std::clamp(u, -1.0f, 2.0f);
-    case Wrap::mirror:
-      return u - 2 * std::floor(0.5f * u);
-  }
-  return 0;
-}
-
-/// The texel at a place at most one image away from it.
-std::int32_t wrap_texel(std::int32_t i, std::int32_t size, Wrap wrap) {
-  switch (wrap) {
-    case Wrap::repeat:
-      return i < 0 ? i + size : (i >= size ? i - size : i);
-    case Wrap::clamp:
-      return std::clamp(i, 0, size - 1);
-    case Wrap::mirror:
-      if (i < 0) i = -1 - i;
-      if (i >= 2 * size) i -= 2 * size;
-      return i < size ? i : 2 * size - 1 - i;
-  }
-  return 0;
-}
-
 float length2(const std::array<float, 2>& v) { return std::sqrt(v[0] * v[0] + v[1] * v[1]); }
 
 }  // namespace
@@ -147,110 +122,81 @@ Result<std::shared_ptr<const Texture>> Texture::build(const Image& image, Textur
     height = std::max(height / 2, 1);
     texture->append_level(values, width, height);
   }
+  texture->texels_.resize(texture->texels_.size() + kTexelPadding);
   return std::shared_ptr<const Texture>(std::move(texture));
 }
 
 void Texture::append_level(const std::vector<float>& values, std::int32_t width,
                            std::int32_t height) {
-  levels_.push_back({width, height, texels_.size()});
+  levels_.push_back(
+      {width, height,
+       static_cast<std::uint32_t>(texels_.size() / static_cast<std::size_t>(channels_))});
   texels_.reserve(texels_.size() + values.size());
   for (const float v : values)
     texels_.push_back(static_cast<std::uint16_t>(std::lround(std::min(v / scale_, kFullScale))));
 }
 
 std::array<float, 4> Texture::texel(std::int32_t level, std::int32_t x, std::int32_t y) const {
-  const Level& l = levels_[static_cast<std::size_t>(level)];
+  const TextureLevel& l = levels_[static_cast<std::size_t>(level)];
   const std::size_t at =
-      l.first + static_cast<std::size_t>(y * l.width + x) * static_cast<std::size_t>(channels_);
+      (l.first + static_cast<std::size_t>(y * l.width + x)) * static_cast<std::size_t>(channels_);
   std::array<float, 4> value{};
   for (std::size_t c = 0; c < static_cast<std::size_t>(channels_); ++c)
     value[c] = static_cast<float>(texels_[at + c]) * scale_;
   return value;
 }
 
-/// Adds weight times the blend of the four texels around (u, v), or the nearest one. kChannels:
-/// those of the image.
-template <std::size_t kChannels>
-void Texture::add_channels(const Level& level, std::array<float, 2> uv,
-                           const TextureSampling& sampling, float weight,
-                           std::array<float, 4>& sum) const {
-  const float half = sampling.nearest ? 0.0f : 0.5f;
-  const float x = within_period(uv[0], sampling.wrap_u) * static_cast<float>(level.width) - half;
-  const float y = within_period(uv[1], sampling.wrap_v) * static_cast<float>(level.height) - half;
-  const float x0 = std::floor(x), y0 = std::floor(y);
-  const float fx = sampling.nearest ? 0 : x - x0, fy = sampling.nearest ? 0 : y - y0;
-  const auto column = static_cast<std::int32_t>(x0), row = static_cast<std::int32_t>(y0);
-  const std::array<std::int32_t, 2> columns{wrap_texel(column, level.width, sampling.wrap_u),
-                                            wrap_texel(column + 1, level.width, sampling.wrap_u)};
-  const std::array<std::int32_t, 2> rows{wrap_texel(row, level.height, sampling.wrap_v),
-                                         wrap_texel(row + 1, level.height, sampling.wrap_v)};
-  const std::uint16_t* const first = texels_.data() + level.first;
-  for (std::size_t j = 0; j < 2; ++j) {
-    const float wy = weight * (j == 0 ? 1 - fy : fy);
-    if (wy == 0) continue;
-    const std::size_t line =
-        static_cast<std::size_t>(rows[j]) * static_cast<std::size_t>(level.width);
-    for (std::size_t i = 0; i < 2; ++i) {
-      const float w = wy * (i == 0 ? 1 - fx : fx);
-      if (w == 0) continue;
-      const std::uint16_t* const texel =
-          first + (line + static_cast<std::size_t>(columns[i])) * kChannels;
-      for (std::size_t c = 0; c < kChannels; ++c)
-        sum[c] += w * (static_cast<float>(texel[c]) * scale_);
-    }
-  }
-}
-
-void Texture::add(const Level& level, std::array<float, 2> uv, const TextureSampling& sampling,
-                  float weight, std::array<float, 4>& sum) const {
-  switch (channels_) {
-    case 1:
-      return add_channels<1>(level, uv, sampling, weight, sum);
-    case 2:
-      return add_channels<2>(level, uv, sampling, weight, sum);
-    case 3:
-      return add_channels<3>(level, uv, sampling, weight, sum);
-    default:
-      return add_channels<4>(level, uv, sampling, weight, sum);
-  }
-}
-
-std::array<float, 4> Texture::look_up(std::array<float, 2> uv, const Footprint& footprint,
-                                      const TextureSampling& sampling) const {
+/// As many probes along the longer side of a footprint as are as wide as the shorter one.
+ProbeLine Texture::probe_line(std::array<float, 2> uv, const Footprint& footprint) const {
   // The footprint in texels.
   const auto w = static_cast<float>(width()), h = static_cast<float>(height());
   const float size_a = length2({footprint.a[0] * w, footprint.a[1] * h});
   const float size_b = length2({footprint.b[0] * w, footprint.b[1] * h});
   const bool along_a = !(size_b > size_a);
-  const std::array<float, 2>& along = along_a ? footprint.a : footprint.b;
   const float longer = along_a ? size_a : size_b, shorter = along_a ? size_b : size_a;
 
-  // As many probes along the longer side as are as wide as the shorter one.
-  std::array<float, 4> sum{};
-  if (!(longer > 1)) {
-    add(levels_.front(), uv, sampling, 1, sum);
-    return sum;
-  }
+  ProbeLine line{.middle = uv, .fine = levels_.front(), .coarse = levels_.front()};
+  if (!(longer > 1)) return line;
+  line.is_smaller = true;
   if (!std::isfinite(longer)) {
-    add(levels_.back(), uv, sampling, 1, sum);
-    return sum;
+    line.fine = line.coarse = levels_.back();
+    return line;
   }
-  const float probes = std::ceil(std::min(longer / std::max(shorter, 1.0f), kMostProbes));
+  const float probes =
+      std::ceil(std::min(longer / std::max(shorter, 1.0f), static_cast<float>(kMostProbes)));
   const float last = static_cast<float>(num_levels() - 1);
   const float level = std::min(std::log2(std::max(longer / probes, std::max(shorter, 1.0f))), last);
   const float below = std::floor(level);
-  const float blend = level - below;
   const auto fine = static_cast<std::size_t>(below);
-  const std::size_t coarse = std::min(fine + 1, levels_.size() - 1);
-  const TextureSampling smooth{sampling.wrap_u, sampling.wrap_v, false};
-  const float share = 1 / probes;
-  for (float p = 0.5f; p < probes; ++p) {
-    const float t = p * share - 0.5f;
-    const std::array<float, 2> at{uv[0] + t * along[0], uv[1] + t * along[1]};
-    add(levels_[fine], at, smooth, share * (1 - blend), sum);
-    if (blend > 0) add(levels_[coarse], at, smooth, share * blend, sum);
+  line.along = along_a ? footprint.a : footprint.b;
+  line.num_probes = static_cast<int>(probes);
+  line.fine = levels_[fine];
+  line.coarse = levels_[std::min(fine + 1, levels_.size() - 1)];
+  line.blend = level - below;
+  return line;
+}
+
+std::array<float, 4> Texture::look_up(std::array<float, 2> uv, const Footprint& footprint,
+                                      const TextureSampling& sampling) const {
+  std::array<float, 4> mean;
+  const Texture* const image = this;
+  look_up_together({&image, 1}, uv, footprint, sampling, {&mean, 1});
+  return mean;
+}
+
+void look_up_together(std::span<const Texture* const> images, std::array<float, 2> uv,
+                      const Footprint& footprint, const TextureSampling& sampling,
+                      std::span<std::array<float, 4>> means) {
+  std::array<TexelArray, kMostTogether> texels;
+  for (std::size_t first = 0, end = 0; first < images.size(); first = end) {
+    while (end < images.size() && end - first < kMostTogether &&
+           images[end]->has_size_of(*images[first])) {
+      texels[end - first] = images[end]->texels();
+      ++end;
+    }
+    kernels::blend_texels(images[first]->probe_line(uv, footprint), sampling,
+                          std::span(texels).first(end - first), means.subspan(first, end - first));
   }
-  return sum;
 }
 
 }  // namespace baton

@@ -3,10 +3,12 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <span>
 #include <string>
 #include <vector>
 
 #include "worker/texture/image_reader.h"
+#include "worker/texture/texel_blend.h"
 
 namespace baton {
 
@@ -18,15 +20,6 @@ enum class TextureUse : std::uint8_t {
   normal,              ///< RGB, numbers
   red,                 ///< R, numbers
   green,               ///< G, numbers
-};
-
-/// How an image goes on past its edges.
-enum class Wrap : std::uint8_t { repeat, clamp, mirror };
-
-/// How a texture is looked up.
-struct TextureSampling {
-  Wrap wrap_u = Wrap::repeat, wrap_v = Wrap::repeat;
-  bool nearest = false;  ///< no blending of texels that are larger than the footprint
 };
 
 /// The parallelogram that a look-up is the mean over: two edges, in units of the whole image. All
@@ -49,6 +42,9 @@ class Texture {
   std::int32_t num_levels() const { return static_cast<std::int32_t>(levels_.size()); }
   bool has_alpha() const { return channels_ == 4; }
   std::size_t size_bytes() const { return 2 * texels_.size(); }
+  bool has_size_of(const Texture& other) const {
+    return width() == other.width() && height() == other.height();
+  }
 
   /// The mean over a footprint around (u, v); (0, 0) is the upper left corner of the image, (1, 1)
   /// the lower right. Channels as of TextureUse; those that are not kept are 0. Up to 16 blends of
@@ -59,21 +55,26 @@ class Texture {
   std::array<float, 4> texel(std::int32_t level, std::int32_t x, std::int32_t y) const;
 
  private:
-  struct Level {
-    std::int32_t width, height;
-    std::size_t first;  ///< of its values
-  };
+  friend void look_up_together(std::span<const Texture* const> images, std::array<float, 2> uv,
+                               const Footprint& footprint, const TextureSampling& sampling,
+                               std::span<std::array<float, 4>> means);
+
   void append_level(const std::vector<float>& values, std::int32_t width, std::int32_t height);
-  template <std::size_t kChannels>
-  void add_channels(const Level& level, std::array<float, 2> uv, const TextureSampling& sampling,
-                    float weight, std::array<float, 4>& sum) const;
-  void add(const Level& level, std::array<float, 2> uv, const TextureSampling& sampling,
-           float weight, std::array<float, 4>& sum) const;
+  ProbeLine probe_line(std::array<float, 2> uv, const Footprint& footprint) const;
+  TexelArray texels() const {
+    return {texels_.data(), static_cast<std::uint32_t>(channels_), scale_};
+  }
 
   std::int32_t channels_ = 0;
   float scale_ = 0;  ///< value of the number 1
-  std::vector<Level> levels_;
-  std::vector<std::uint16_t> texels_;
+  std::vector<TextureLevel> levels_;
+  std::vector<std::uint16_t> texels_;  ///< then three more, which belong to none
 };
+
+/// The means of several images at one place, as look_up has them. Those of one size that follow
+/// each other are looked up at little more than the price of one. means: a place for each.
+void look_up_together(std::span<const Texture* const> images, std::array<float, 2> uv,
+                      const Footprint& footprint, const TextureSampling& sampling,
+                      std::span<std::array<float, 4>> means);
 
 }  // namespace baton

@@ -89,6 +89,39 @@ TEST(SurfaceDetail, ATransformTurnsScalesAndMoves) {
   EXPECT_EQ(seen_at(turned, 0.2f, 0.7f).material.kd, (Rgb{0, 0, 1}));
 }
 
+TEST(SurfaceDetail, TexturesThatLieDifferentlyAreFoundApart) {
+  // Left half rough, right half metal.
+  const std::string file = write_targa("mr.tga", 2, 1, 3, {0, 255, 0, 0, 51, 255});
+  MaterialSpec spec{.kind = MaterialKind::metallic_roughness,
+                    .base_color = {1, 1, 1},
+                    .metallic = 1,
+                    .roughness = 1};
+  spec.color_texture = four_colors();
+  spec.metallic_roughness_texture = TextureSpec{.file = file, .filter = TextureFilter::nearest};
+  const auto is_metal = [&](float x) {
+    const Scene scene = scene_of(spec);
+    const Material seen = seen_at(scene, x, 0.7f).material;
+    const bool is_green = x > 0.5f;
+    EXPECT_EQ(seen.ks.x > 0.9f, false);
+    EXPECT_NEAR(std::max(seen.kd.y, seen.ks.y), is_green ? 1 : 0.04f, 1e-4f) << x;
+    return seen.kd == Rgb{};
+  };
+  EXPECT_EQ(is_metal(0.7f), true);
+  EXPECT_EQ(is_metal(0.2f), false);
+  spec.metallic_roughness_texture->offset = {0.5f, 0};
+  EXPECT_EQ(scene_of(spec).materials[0].detail->alike.size(), 2u);
+  EXPECT_EQ(is_metal(0.7f), false);
+  spec.metallic_roughness_texture->offset = {0, 0};
+  spec.metallic_roughness_texture->scale = {-1, 1};
+  EXPECT_EQ(is_metal(0.7f), false);
+  spec.metallic_roughness_texture->scale = {1, 1};
+  spec.normal_texture =
+      TextureSpec{.file = write_targa("n.tga", 4, 4, 3, std::vector<std::uint8_t>(48, 128))};
+  EXPECT_EQ(scene_of(spec).materials[0].detail->alike.size(), 2u);  // it blends
+  spec.normal_texture->filter = TextureFilter::nearest;
+  EXPECT_EQ(scene_of(spec).materials[0].detail->alike.size(), 1u);
+}
+
 TEST(SurfaceDetail, MetalAndRoughnessAreFactors) {
   const std::string file = write_targa("mr.tga", 1, 1, 3, {9, 128, 51});
   MaterialSpec spec{.kind = MaterialKind::metallic_roughness,

@@ -3,6 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
+#include <array>
 #include <cmath>
 #include <random>
 
@@ -128,6 +130,78 @@ TEST(Texture, AFootprintIsAveragedAlongBothSides) {
   EXPECT_NEAR(at({{0.2f, 0}, {0, 1 / 64.0f}}), 1, 1e-5f);
   EXPECT_NEAR(at({{0, 1 / 64.0f}, {0.2f, 0}}), 1, 1e-5f);
   EXPECT_NEAR(at({{INFINITY, 0}, {0, 1}}), 0.5f, 1e-4f);
+}
+
+/// Random numbers for each channel of each texel.
+std::shared_ptr<const Texture> noise(int width, int height, int channels, TextureUse use,
+                                     unsigned seed) {
+  std::mt19937 random(seed);
+  std::uniform_real_distribution<float> uniform(0, 1);
+  std::vector<float> samples(static_cast<std::size_t>(width * height * channels));
+  for (float& v : samples) v = uniform(random);
+  return texture_of(image_of(width, height, channels, samples), use);
+}
+
+/// Texel i of an endless row of images.
+int texel_of_row(int i, int size, Wrap wrap) {
+  if (wrap == Wrap::clamp) return std::clamp(i, 0, size - 1);
+  const int image = static_cast<int>(std::floor(static_cast<double>(i) / size));
+  const int within = i - image * size;
+  return wrap == Wrap::mirror && image % 2 != 0 ? size - 1 - within : within;
+}
+
+TEST(Texture, ABlendIsOfTheFourTexelsAround) {
+  std::mt19937 random(5);
+  std::uniform_real_distribution<float> uniform(-3, 3);
+  for (const auto& [width, height] : {std::pair{5, 3}, {1, 4}, {8, 1}, {2, 2}, {1, 1}}) {
+    const auto texture = noise(width, height, 3, TextureUse::normal, 2);
+    for (int i = 0; i < 900; ++i) {
+      const auto wrap_u = static_cast<Wrap>(i % 3), wrap_v = static_cast<Wrap>(i / 3 % 3);
+      // Beyond a clamped edge lies what is at the edge.
+      const float u = uniform(random), v = uniform(random);
+      const float x = u * static_cast<float>(width) - 0.5f;
+      const float y = v * static_cast<float>(height) - 0.5f;
+      const int column = static_cast<int>(std::floor(x)), row = static_cast<int>(std::floor(y));
+      std::array<float, 4> expected{};
+      for (const int k : {0, 1, 2, 3}) {
+        const int i_x = column + k % 2, i_y = row + k / 2;
+        const float w = (1 - std::abs(x - static_cast<float>(i_x))) *
+                        (1 - std::abs(y - static_cast<float>(i_y)));
+        const auto texel =
+            texture->texel(0, texel_of_row(i_x, width, wrap_u), texel_of_row(i_y, height, wrap_v));
+        for (std::size_t c = 0; c < 4; ++c) expected[c] += w * texel[c];
+      }
+      const auto got = texture->look_up({u, v}, {}, {wrap_u, wrap_v, false});
+      for (std::size_t c = 0; c < 4; ++c)
+        EXPECT_NEAR(got[c], expected[c], 2e-5f) << u << ' ' << v << ' ' << i % 9 << ' ' << c;
+    }
+  }
+}
+
+TEST(Texture, ImagesLookedUpTogetherAreLookedUpAsAlone) {
+  const std::array textures{
+      noise(64, 32, 3, TextureUse::normal, 1), noise(64, 32, 3, TextureUse::metallic_roughness, 2),
+      noise(64, 32, 4, TextureUse::color_and_alpha, 3), noise(17, 40, 1, TextureUse::red, 4),
+      noise(64, 32, 3, TextureUse::color, 5)};
+  std::array<const Texture*, 5> images{};
+  std::transform(textures.begin(), textures.end(), images.begin(),
+                 [](const auto& texture) { return texture.get(); });
+  std::mt19937 random(7);
+  std::uniform_real_distribution<float> uniform(-2, 2);
+  for (int i = 0; i < 500; ++i) {
+    const std::array uv{uniform(random), uniform(random)};
+    const float size = i % 5 == 0 ? 0 : std::exp2(2 * uniform(random) - 4);
+    const Footprint seen{{size * uniform(random), size * uniform(random)},
+                         {size * uniform(random), size * uniform(random)}};
+    const TextureSampling sampling{static_cast<Wrap>(i % 3), static_cast<Wrap>(i / 3 % 3),
+                                   i % 2 == 0};
+    std::array<std::array<float, 4>, 5> means;
+    look_up_together(images, uv, seen, sampling, means);
+    for (std::size_t k = 0; k < images.size(); ++k)
+      EXPECT_EQ(means[k], images[k]->look_up(uv, seen, sampling)) << k;
+    EXPECT_EQ(means[1][2], 0);
+    EXPECT_EQ(means[3][1], 0);
+  }
 }
 
 TEST(ImageReader, ReadsFilesAndBytes) {
