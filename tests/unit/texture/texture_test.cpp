@@ -9,6 +9,7 @@
 #include <random>
 
 #include "tests/support/image_files.h"
+#include "tests/support/instruction_sets.h"
 
 namespace baton {
 namespace {
@@ -150,7 +151,11 @@ int texel_of_row(int i, int size, Wrap wrap) {
   return wrap == Wrap::mirror && image % 2 != 0 ? size - 1 - within : within;
 }
 
-TEST(Texture, ABlendIsOfTheFourTexelsAround) {
+class TextureBlend : public OnInstructionSet {};
+INSTANTIATE_TEST_SUITE_P(Sets, TextureBlend, testing::ValuesIn(instruction_sets()),
+                         instruction_set_name);
+
+TEST_P(TextureBlend, IsOfTheFourTexelsAround) {
   std::mt19937 random(5);
   std::uniform_real_distribution<float> uniform(-3, 3);
   for (const auto& [width, height] : {std::pair{5, 3}, {1, 4}, {8, 1}, {2, 2}, {1, 1}}) {
