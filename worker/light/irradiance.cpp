@@ -12,8 +12,10 @@ namespace {
 constexpr int kLeastColumns = 1024, kLeastRows = 512;
 constexpr int kSmallest = 8;   ///< points of the smallest blocks in each direction
 constexpr int kMostRoots = 8;  ///< largest blocks in a row
-/// See Irradiance. Over 100 normals of seven maps errors are at most 3e-5 of the sum, rms 8e-6;
-/// five times as much makes them three times as large, in 0.6 times the time.
+/// See Irradiance. Over 100 normals of each of four maps errors are at most 1.3e-5 of the sum, rms
+/// 4e-6, in 8 to 13 us; down to the points it takes 60 to 98 us, 740 us for a map of 4096 columns.
+/// Without the spread, by the size of a block alone, errors are ten times as large in the same
+/// time.
 constexpr float kOpenShare = 2e-5f;
 
 int blocks_of(int points, int side) { return (points + side - 1) / side; }

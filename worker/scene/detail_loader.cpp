@@ -66,20 +66,22 @@ Result<std::shared_ptr<const SurfaceDetail>> DetailLoader::load(const MaterialSp
   auto detail = std::make_shared<SurfaceDetail>();
   detail->spec = spec;
   const TextureUse color = detail->is_cut_out() ? TextureUse::color_and_alpha : TextureUse::color;
-  const auto place_as = [&](const std::optional<TextureSpec>& texture, TextureUse use,
-                            DetailImage image) {
-    return place(texture, use, detail->images[static_cast<std::size_t>(image)]);
+  const struct {
+    DetailImage image;
+    const std::optional<TextureSpec>& texture;
+    TextureUse use;
+  } images[] = {
+      {DetailImage::color, spec.color_texture, color},
+      {DetailImage::metallic_roughness, spec.metallic_roughness_texture,
+       TextureUse::metallic_roughness},
+      {DetailImage::normal, spec.normal_texture, TextureUse::normal},
+      {DetailImage::emission, spec.emission_texture, TextureUse::color},
+      {DetailImage::clearcoat, spec.clearcoat_texture, TextureUse::red},
+      {DetailImage::clearcoat_roughness, spec.clearcoat_roughness_texture, TextureUse::green},
+      {DetailImage::clearcoat_normal, spec.clearcoat_normal_texture, TextureUse::normal},
   };
-  BATON_TRY(place_as(spec.color_texture, color, DetailImage::color));
-  BATON_TRY(place_as(spec.metallic_roughness_texture, TextureUse::metallic_roughness,
-                     DetailImage::metallic_roughness));
-  BATON_TRY(place_as(spec.normal_texture, TextureUse::normal, DetailImage::normal));
-  BATON_TRY(place_as(spec.emission_texture, TextureUse::color, DetailImage::emission));
-  BATON_TRY(place_as(spec.clearcoat_texture, TextureUse::red, DetailImage::clearcoat));
-  BATON_TRY(place_as(spec.clearcoat_roughness_texture, TextureUse::green,
-                     DetailImage::clearcoat_roughness));
-  BATON_TRY(
-      place_as(spec.clearcoat_normal_texture, TextureUse::normal, DetailImage::clearcoat_normal));
+  for (const auto& [image, texture, use] : images)
+    BATON_TRY(place(texture, use, detail->images[static_cast<std::size_t>(image)]));
   detail->alike = groups_of(*detail);
   return std::shared_ptr<const SurfaceDetail>(std::move(detail));
 }
