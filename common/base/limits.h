@@ -42,8 +42,10 @@ inline constexpr int kMaxTileSize = 32768;
 /// Side of the blocks of pixels that get the same number of rounds; tiles are whole numbers of
 /// them.
 inline constexpr int kAdaptiveBlock = 8;
-inline constexpr int kJudgingRounds = 2;  ///< of all pixels; they say how many more a block gets
-inline constexpr int kMaxSites = 16;
+inline constexpr int kJudgingRounds = 2;   ///< of all pixels; they say how many more a block gets
+inline constexpr int kMaxSites = 16;       ///< of every pixel
+inline constexpr int kMaxFineSites = 256;  ///< of pixels whose geometry is fine
+inline constexpr int kGeometryProbes = 4;  ///< primary rays that tell how fine a pixel's is
 inline constexpr int kMaxRounds = 65536;
 inline constexpr int kMaxPreroll = 64;  ///< rounds
 inline constexpr int kMaxParticles = 64;
@@ -67,6 +69,8 @@ inline constexpr std::uint64_t kMaxFilmBytesAhead =
     2ull << 30;  ///< films, before compression, of frames that are rendered ahead of an open one
 inline constexpr std::uint64_t kMaxRoundSurfaceBytes =
     1ull << 27;  ///< what a tile keeps of its rounds' surfaces from frame to frame
+/// Sites of pixels, where they differ in number, that are in work at a time.
+inline constexpr std::size_t kMaxSitesAtOnce = 1u << 18;
 /// Of meshes in several places, in one flat hierarchy: some 600 MB. A second level costs a third of
 /// the shadow rays' speed.
 inline constexpr std::uint64_t kMaxCopiedTriangles = 4000000;

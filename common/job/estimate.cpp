@@ -60,7 +60,8 @@ JobEstimate estimate_job(const JobSpec& job) {
   e.rounds = std::int64_t{job.quality.rounds} * job.quality.sweeps;
   e.preroll_rounds = num_preroll_rounds(job);
   e.primary_rays_per_pixel =
-      job.image.sites * (rounds_have_own_sites(job) ? e.rounds : job.quality.sweeps);
+      job.image.most_sites() * (rounds_have_own_sites(job) ? e.rounds : job.quality.sweeps);
+  if (has_fine_sites(job)) e.primary_rays_per_pixel += limits::kGeometryProbes;
   e.shadow_rays_per_pixel = traits(job.sampling.method).most_rays(job.sampling) * e.rounds;
   if (draws_twice(job)) e.shadow_rays_per_pixel *= 2;
 

@@ -40,68 +40,6 @@ void frame_fields(JobArchive& a, JobSpec& job) {
   }
 }
 
-/// A region as x, y, width, height; four NaN: none.
-std::array<double, 4> to_numbers(const std::optional<PixelRect>& region) {
-  constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
-  if (!region) return {kNone, kNone, kNone, kNone};
-  return {double(region->x0), double(region->y0), double(region->width()),
-          double(region->height())};
-}
-
-void region_fields(JobArchive& a, ImageSpec& image) {
-  std::array<double, 4> r = to_numbers(image.region);
-  if (!a.numbers("region", r, {.min = 0, .max = limits::kMaxImageSide}, false)) return;
-  const bool whole = std::all_of(r.begin(), r.end(), [](double n) { return n == std::floor(n); });
-  if (!whole || r[2] < 1 || r[3] < 1 || r[0] + r[2] > image.width || r[1] + r[3] > image.height) {
-    a.fault("region",
-            fmt::format("x, y, width and height in whole pixels, inside of {} x {}", image.width,
-                        image.height),
-            fmt::format("[{}]", fmt::join(r, ", ")));
-    return;
-  }
-  const auto x = static_cast<int>(r[0]), y = static_cast<int>(r[1]);
-  image.region = PixelRect{x, y, x + static_cast<int>(r[2]), y + static_cast<int>(r[3])};
-}
-
-/// The pixels on the left, on top, on the right and below; four NaN: none.
-void overscan_fields(JobArchive& a, ImageSpec& image) {
-  const Overscan& old = image.overscan;
-  std::array<double, 4> sides{double(old.left), double(old.top), double(old.right),
-                              double(old.bottom)};
-  if (old == Overscan{}) sides.fill(std::numeric_limits<double>::quiet_NaN());
-  if (!a.numbers("overscan", sides, {.min = 0, .max = limits::kMaxOverscan}, true)) return;
-  const bool whole =
-      std::all_of(sides.begin(), sides.end(), [](double n) { return n == std::floor(n); });
-  const auto at = [&](std::size_t i) { return static_cast<int>(sides[i]); };
-  if (whole) image.overscan = {at(0), at(1), at(2), at(3)};
-  const PixelRect extent = image.extent();
-  if (!whole || std::max(extent.width(), extent.height()) > limits::kMaxImageSide) {
-    a.fault("overscan",
-            fmt::format("whole pixels, and with them at most {} a side", limits::kMaxImageSide),
-            fmt::format("[{}]", fmt::join(sides, ", ")));
-    image.overscan = {};
-  }
-}
-
-void fields(JobArchive& a, ImageSpec& image) {
-  a.integer("width", image.width, 1, limits::kMaxImageSide);
-  a.integer("height", image.height, 1, limits::kMaxImageSide);
-  if (a.integer("sites", image.sites, 1, limits::kMaxSites)) {
-    const int root = static_cast<int>(std::lround(std::sqrt(image.sites)));
-    if (root * root != image.sites)
-      a.fault("sites", "one of 1, 4, 9, 16", std::to_string(image.sites));
-  }
-  a.choice("filter", image.filter, kPixelFilters);
-  a.integer("tileSize", image.tile_size, limits::kMinTileSize, limits::kMaxTileSize);
-  region_fields(a, image);
-  overscan_fields(a, image);
-  a.integer("siteSeed", image.site_seed);
-  // Applied where it is read: what is written is the smaller image.
-  double scale = std::numeric_limits<double>::quiet_NaN();
-  if (a.number("scale", scale, {.min = 0, .max = 1, .min_open = true}) && scale > 0)
-    image = scaled(image, scale);
-}
-
 void method_that_draws_anew(JobArchive& a, Key key, Method& method) {
   std::vector<std::string_view> names;
   for (const std::string_view name : method_names()) {
@@ -303,6 +241,20 @@ void check_adaptive(JobArchive& a, const JobSpec& job) {
   }
 }
 
+/// Whether pixels can have numbers of sites of their own.
+void check_max_sites(JobArchive& a, const JobSpec& job) {
+  if (!has_fine_sites(job)) return;
+  const auto refuse = [&](const std::string& why) {
+    a.fault("image", "no maxSites, as " + why, fmt::format("{}", job.image.max_sites));
+  };
+  if (job.visibility.correlated) {
+    refuse("visibility.correlated has pixels of equal sites");
+  } else if (!rounds_have_own_sites(job)) {
+    refuse(fmt::format("the samples that {} carries belong to sites",
+                       traits(job.sampling.method).name));
+  }
+}
+
 /// Whether the method says what light would arrive if none were blocked.
 void check_unshadowed(JobArchive& a, const JobSpec& job) {
   for (const Aov aov : {Aov::unshadowed, Aov::blocked}) {
@@ -341,6 +293,7 @@ void check_whole(JobArchive& a, const JobSpec& job) {
         fmt::format("{}", *job.quality.noise_threshold));
   }
   check_adaptive(a, job);
+  check_max_sites(a, job);
   check_unshadowed(a, job);
   const JobEstimate estimate = estimate_job(job);
   if (estimate.tasks() > limits::kMaxTasksPerJob) {

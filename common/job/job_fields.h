@@ -67,6 +67,8 @@ void fields(JobArchive& a, JobSpec& job);
 void fields(JobArchive& a, SceneSpec& scene);
 /// material_fields.cpp
 void fields(JobArchive& a, MaterialSpec& material);
+/// image_fields.cpp
+void fields(JobArchive& a, ImageSpec& image);
 /// motion_fields.cpp
 void fields(JobArchive& a, CameraSpec& camera);
 void fields(JobArchive& a, MotionSpec& motion);

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <map>
@@ -43,6 +44,8 @@ struct ImageSpec {
   int width = 640;   ///< pixels of the whole picture, [1, limits::kMaxImageSide]
   int height = 360;  ///< pixels
   int sites = 1;     ///< primary rays per pixel: 1, 4, 9 or 16 (stratified)
+  /// The same where geometry is fine, at most: `sites` times a power of 4. 0: `sites`.
+  int max_sites = 0;
   PixelFilter filter = PixelFilter::box;
   int tile_size = 64;                 ///< side of a farm tile in pixels; never changes the picture
   std::optional<PixelRect> region{};  ///< the part that is shown, inside the whole; none: all
@@ -55,6 +58,8 @@ struct ImageSpec {
   PixelRect shown() const { return region.value_or(PixelRect{0, 0, width, height}); }
   /// The pixels that are rendered: their data window.
   PixelRect rendered() const { return overscan.around(shown()); }
+  /// Most sites that a pixel has.
+  int most_sites() const { return std::max(sites, max_sites); }
   /// The whole picture with its overscan; every region lies inside with its own.
   PixelRect extent() const { return overscan.around({0, 0, width, height}); }
 };

@@ -126,6 +126,8 @@ std::int32_t most_particles(const SamplingSpec& sampling);
 /// Particles per pixel in the job's states; 0 where rays are chosen apart from samples.
 std::int32_t num_carried_particles(const SamplingSpec& sampling);
 
+/// Whether pixels have more sites where geometry is fine.
+inline bool has_fine_sites(const JobSpec& job) { return job.image.most_sites() > job.image.sites; }
 /// Whether each round of a frame has sites of its own. Samples that are carried belong to a
 /// surface: where pixels carry them, all rounds have the same sites.
 bool rounds_have_own_sites(const JobSpec& job);

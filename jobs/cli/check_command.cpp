@@ -120,8 +120,9 @@ void print_text(const JobSpec& job, const JobEstimate& e, const AssetReport& ass
   print_assets(assets);
   fmt::print("tasks      {}: {} to render ({} a tile), {} to assemble; {} dependencies\n",
              e.tasks(), e.render_tasks, e.runs, e.assemble_tasks, e.dependencies);
-  fmt::print("rays       {} primary and at most {} shadow rays a pixel and frame\n",
-             e.primary_rays_per_pixel, e.shadow_rays_per_pixel);
+  fmt::print("rays       {}{} primary and at most {} shadow rays a pixel and frame\n",
+             has_fine_sites(job) ? "at most " : "", e.primary_rays_per_pixel,
+             e.shadow_rays_per_pixel);
   if (e.rounds > 1)
     fmt::print("           in {}{} rounds\n", job.quality.adaptive_threshold ? "at most " : "",
                e.rounds);

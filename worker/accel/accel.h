@@ -92,6 +92,9 @@ struct AccelLimits {
 
 /// The ray tracer: the only user of Embree. Immutable after construction; any number of
 /// threads may trace. Shadow catchers (Instance::is_catcher) are apart from all else.
+/// Most rays that are traced as one packet.
+inline constexpr std::size_t kMaxRayGroup = 16;
+
 class Accel {
  public:
   /// Keeps a reference to `scene`, which must outlive it. What stands still is one flat hierarchy;
@@ -108,8 +111,8 @@ class Accel {
                                                      const MeshShapes& shapes) const = 0;
 
   /// Closest hit of each ray; hits.size() == rays.size(). The rays come in groups of `group` (1 to
-  /// 16) that start nearby and point alike, such as the sites of a pixel; a hit depends on no ray
-  /// of another group.
+  /// kMaxRayGroup; the last one may be smaller) that start nearby and point alike, such as the
+  /// sites of a pixel; a hit depends on no ray of another group.
   virtual void intersect(std::span<const Ray> rays, std::span<SurfaceHit> hits,
                          std::size_t group = 1) const = 0;
   /// The same of shadow catchers alone, which intersect() and occluded() pass, ray by ray.

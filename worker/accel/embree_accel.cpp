@@ -107,19 +107,19 @@ class EmbreeAccel final : public Accel {
   /// A group is one packet: the same rays give the same hits, whatever else is traced with them.
   void intersect(std::span<const Ray> rays, std::span<SurfaceHit> hits,
                  std::size_t group) const override {
-    BATON_CHECK(rays.size() == hits.size() && group >= 1 && group <= 16 &&
-                rays.size() % group == 0);
+    BATON_CHECK(rays.size() == hits.size() && group >= 1 && group <= kMaxRayGroup);
     RTCIntersectContext context;
     rtcInitIntersectContext(&context);
     context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
     for (std::size_t i = 0; i < rays.size(); i += group) {
-      const std::span<const Ray> some = rays.subspan(i, group);
+      const std::size_t count = std::min(group, rays.size() - i);
+      const std::span<const Ray> some = rays.subspan(i, count);
       if (group == 1) {
         hits[i] = intersect_one(objects_, some[0], context);
       } else if (group <= 4) {
-        intersect_packet<RTCRayHit4, 4>(rtcIntersect4, some, hits.subspan(i, group), context);
+        intersect_packet<RTCRayHit4, 4>(rtcIntersect4, some, hits.subspan(i, count), context);
       } else {
-        intersect_packet<RTCRayHit16, 16>(rtcIntersect16, some, hits.subspan(i, group), context);
+        intersect_packet<RTCRayHit16, 16>(rtcIntersect16, some, hits.subspan(i, count), context);
       }
     }
   }

@@ -54,7 +54,8 @@ Rgb ExtraSampler::first_pass(const SampleRegion::Place& pixel, std::size_t fold)
 void ExtraSampler::draw(std::int32_t x, std::int32_t y, std::size_t fold,
                         std::span<const SurfaceHit> hits) {
   rays_.clear();
-  SiteOrigins origins{.num_sites = work_.context.job.image.sites};
+  SiteOrigins origins;
+  origins.num_sites = work_.context.job.image.sites;
   for (std::size_t s = 0; s < hits.size(); ++s) {
     if (hits[s].hit) origins.set(s, hits[s].ray_origin);
   }

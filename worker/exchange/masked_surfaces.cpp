@@ -10,12 +10,14 @@ MaskedSurfaces::MaskedSurfaces(const RenderContext& context, const FrameGeometry
     : num_sites_(static_cast<std::size_t>(context.job.image.sites)), position_(mask.ranks()) {
   // Trace.
   mask.visit_all([&](std::int32_t x, std::int32_t y) {
-    append_primary_rays(context.job, geometry, x, y, rays_);
+    append_primary_rays(context.job, geometry, x, y, rays_, 0, context.job.image.sites);
   });
   hits_.resize(rays_.size());
   {
     const StageTimer timer(seconds_rays_);
-    trace_primary_rays(context.job, geometry, rays_, hits_);
+    const std::vector<std::uint16_t> num_sites(rays_.size() / num_sites_,
+                                               static_cast<std::uint16_t>(num_sites_));
+    trace_primary_rays(geometry, rays_, num_sites, hits_);
   }
 
   // Tabulate.
@@ -39,9 +41,10 @@ std::span<const SurfaceHit> MaskedSurfaces::hits(std::int32_t position) const {
 Rgb MaskedSurfaces::background(std::int32_t position, const Environment& environment) const {
   const std::size_t first = static_cast<std::size_t>(position) * num_sites_;
   Rgb radiance;
-  add_environment_behind(
-      std::span(hits_).subspan(first, num_sites_), std::span(rays_).subspan(first, num_sites_),
-      static_cast<std::int32_t>(num_sites_), view_of(environment), {&radiance, 1});
+  const EnvironmentView view = view_of(environment);
+  EnvironmentBehind behind(view, {&radiance, 1});
+  behind.add(0, hits(position), std::span(rays_).subspan(first, num_sites_));
+  behind.flush();
   return radiance;
 }
 

@@ -59,7 +59,7 @@ FreeLight sum_free(const RayBatch& batch, std::size_t first, std::size_t end);
 
 /// Where the shadow rays of a pixel's sites start.
 struct SiteOrigins {
-  alignas(64) SiteBlock::Array x{}, y{}, z{};
+  alignas(64) SiteBlock::Array x, y, z;  ///< of sites that see a surface; else not set
   std::int32_t num_sites = 1;
 
   void set(std::size_t site, const Vec3& origin) {

@@ -7,8 +7,8 @@
 
 namespace baton {
 
-void see_catchers(const FrameGeometry& geometry, std::size_t sites, std::span<const Ray> rays,
-                  std::span<SurfaceHit> hits) {
+void see_catchers(const FrameGeometry& geometry, std::span<const std::uint16_t> num_sites,
+                  std::span<const Ray> rays, std::span<SurfaceHit> hits) {
   if (!geometry.scene->has_catcher) return;
   std::vector<Ray> passed;
   for (std::size_t i = 0; i < hits.size(); ++i) {
@@ -17,8 +17,10 @@ void see_catchers(const FrameGeometry& geometry, std::size_t sites, std::span<co
   std::vector<SurfaceHit> caught(passed.size());
   geometry.accel->intersect_catchers(passed, caught);
   auto next = caught.cbegin();
-  for (std::size_t first = 0; first < hits.size(); first += sites) {
+  std::size_t first = 0;
+  for (const std::size_t sites : num_sites) {
     const std::span<SurfaceHit> pixel = hits.subspan(first, sites);
+    first += sites;
     const bool sees_object = std::ranges::any_of(pixel, &SurfaceHit::hit);
     for (SurfaceHit& hit : pixel) {
       if (hit.hit) continue;
@@ -60,7 +62,8 @@ Rgb CatcherEdge::sample(const PixelMethod& method, const PixelInput& input, cons
                         CatcherAlbedo& albedo, const SampleState& like, SamplerScratch& scratch) {
   // The sites on catchers alone.
   hits_.assign(input.hits.begin(), input.hits.end());
-  SiteOrigins origins{.num_sites = static_cast<std::int32_t>(hits_.size())};
+  SiteOrigins origins;
+  origins.num_sites = static_cast<std::int32_t>(hits_.size());
   for (std::size_t s = 0; s < hits_.size(); ++s) {
     hits_[s].hit = hits_[s].is_catcher;
     if (hits_[s].hit) origins.set(s, hits_[s].ray_origin);

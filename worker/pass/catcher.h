@@ -16,10 +16,10 @@ namespace baton {
 /// earlier round, belongs to that: its sites on catchers are sampled beside it, afresh in each
 /// round, so that objects have the same bytes with and without catchers.
 
-/// Lets rays that meet no object see catchers. sites: of a pixel; those of a pixel follow each
-/// other. In pixels that see an object `hit` stays false.
-void see_catchers(const FrameGeometry& geometry, std::size_t sites, std::span<const Ray> rays,
-                  std::span<SurfaceHit> hits);
+/// Lets rays that meet no object see catchers. num_sites: of each pixel; those of a pixel follow
+/// each other. In pixels that see an object `hit` stays false.
+void see_catchers(const FrameGeometry& geometry, std::span<const std::uint16_t> num_sites,
+                  std::span<const Ray> rays, std::span<SurfaceHit> hits);
 
 /// Share of the sites that see a catcher.
 float catcher_share(std::span<const SurfaceHit> hits);

@@ -57,15 +57,13 @@ void GeometryPlanes::add_motion(const Camera& camera, const Ray& ray, const Surf
 void GeometryPlanes::add(const TileSurfaces& surfaces) {
   if (is_empty()) return;
   const Camera& camera = geometry_.pose.camera;
-  const auto num_sites = static_cast<std::size_t>(surfaces.num_sites);
   const bool with_albedo = has(Aov::albedo), with_motion = has(Aov::motion);
   for (std::size_t slot = 0; slot < surfaces.pixels.size(); ++slot) {
     const std::size_t pixel = surfaces.pixels.index(slot);
     const double weight = surfaces.pixels.weight(slot);
     Sum& sum = sums_[pixel];
-    sum.sites += weight * static_cast<double>(num_sites);
-    for (std::size_t s = 0; s < num_sites; ++s) {
-      const std::size_t at = slot * num_sites + s;
+    sum.sites += weight * static_cast<double>(surfaces.num_sites(slot));
+    for (std::size_t at = surfaces.first_hit[slot]; at < surfaces.first_hit[slot + 1]; ++at) {
       const SurfaceHit& hit = surfaces.hits[at];
       if (with_motion) add_motion(camera, surfaces.rays[at], hit, weight, sum);
       if (!hit.hit || hit.is_catcher) continue;

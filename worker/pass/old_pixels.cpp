@@ -32,14 +32,21 @@ std::optional<OldPixels::Place> OldPixels::ask(std::int32_t x, std::int32_t y) {
   num_rays_ += static_cast<std::uint64_t>(job_.image.sites);
   const TileSurfaces* const kept = kept_[static_cast<std::size_t>(found - states_.begin())].get();
   if (kept != nullptr) return Place{&state, index, kept};
-  const Place place{&state, index, nullptr, rays_.size()};
-  append_primary_rays(job_, before_, x, y, rays_, round_);
-  return place;
+  asked_.push_back({x, y});
+  return Place{&state, index, nullptr, asked_.size() - 1};
 }
 
 void OldPixels::trace() {
-  hits_.resize(rays_.size());
-  trace_primary_rays(job_, before_, rays_, hits_);
+  std::vector<std::uint16_t> num_sites(asked_.size(), static_cast<std::uint16_t>(job_.image.sites));
+  if (has_fine_sites(job_)) num_sites = count_sites(job_, before_, asked_);
+  std::vector<Ray> rays;
+  first_hit_.clear();
+  for (std::size_t i = 0; i < asked_.size(); ++i) {
+    first_hit_.push_back(rays.size());
+    append_primary_rays(job_, before_, asked_[i][0], asked_[i][1], rays, round_, num_sites[i]);
+  }
+  hits_.resize(rays.size());
+  trace_primary_rays(before_, rays, num_sites, hits_);
 }
 
 }  // namespace baton

@@ -6,6 +6,7 @@
 #include <vector>
 
 #include "worker/accel/geometry_sequence.h"
+#include "worker/pass/fine_sites.h"
 #include "worker/pass/primary.h"
 #include "worker/pass/tile_renderer.h"
 
@@ -19,7 +20,7 @@ class OldPixels {
     const SampleState* state = nullptr;
     std::size_t index = 0;               ///< pixel of `state`
     const TileSurfaces* kept = nullptr;  ///< what the tile saw; null: traced again
-    std::size_t first_hit = 0;           ///< of those traced again, of its sites
+    std::size_t traced = 0;              ///< its number among those traced again
   };
 
   /// states: of the frame before, of every tile within reach. All must outlive the object.
@@ -29,16 +30,16 @@ class OldPixels {
   const FrameGeometry& geometry() const { return before_; }
 
   /// Forgets all pixels.
-  void clear() { rays_.clear(); }
+  void clear() { asked_.clear(); }
   /// Requests a pixel; nullopt where it lies in no state or saw no surface.
   std::optional<Place> ask(std::int32_t x, std::int32_t y);
   /// Traces what was requested since clear() and is not kept.
   void trace();
-  /// What the sites of a pixel saw; after trace().
+  /// What the first image.sites sites of a pixel saw; after trace().
   std::span<const SurfaceHit> hits(const Place& place) const {
-    if (place.kept != nullptr) return place.kept->pixel(place.index);
     const auto num_sites = static_cast<std::size_t>(job_.image.sites);
-    return std::span(hits_).subspan(place.first_hit, num_sites);
+    if (place.kept != nullptr) return place.kept->pixel(place.index).first(num_sites);
+    return std::span(hits_).subspan(first_hit_[place.traced], num_sites);
   }
 
   /// Their looks, where they are kept, else none.
@@ -57,7 +58,8 @@ class OldPixels {
   std::span<const StatePtr> states_;
   const std::int32_t round_;                               ///< whose sites carry them
   std::vector<std::shared_ptr<const TileSurfaces>> kept_;  ///< (states)
-  std::vector<Ray> rays_;
+  std::vector<PixelPlace> asked_;                          ///< that are not kept
+  std::vector<std::size_t> first_hit_;                     ///< (asked)
   std::vector<SurfaceHit> hits_;
   std::uint64_t num_rays_ = 0;
 };

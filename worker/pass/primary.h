@@ -1,5 +1,8 @@
 #pragma once
 
+#include <array>
+#include <cstdint>
+#include <span>
 #include <utility>
 #include <vector>
 
@@ -13,40 +16,47 @@ namespace baton {
 /// of the frame where camera or objects move.
 struct TileSurfaces {
   PixelRect rect;
-  RoundPixels pixels;            ///< with a slot each
-  std::int32_t num_sites = 1;    ///< S
-  std::vector<SurfaceHit> hits;  ///< (slots, S)
-  std::vector<Ray> rays;         ///< (slots, S) primary rays
-  /// (slots, S) Of hits whose materials have detail: textures are looked up once for all frames and
+  RoundPixels pixels;  ///< with a slot each
+  /// (slots + 1) where the hits of each slot begin, and where the last one's end.
+  std::vector<std::uint32_t> first_hit{0};
+  std::vector<SurfaceHit> hits;  ///< (sum of S)
+  std::vector<Ray> rays;         ///< (sum of S) primary rays
+  /// (sum of S) Of hits whose materials have detail: textures are looked up once for all frames and
   /// rounds that see the same. Empty where the scene has none.
   std::vector<SurfaceLook> looks;
   /// (slots) The first site that sees a surface, S where none does: hits are large, and whether
   /// there is one is asked several times a frame.
-  std::vector<std::uint8_t> first_site;
+  std::vector<std::uint16_t> first_site;
 
-  bool sees_surface(std::size_t slot) const { return first_site[slot] < num_sites; }
+  /// S of a slot.
+  std::size_t num_sites(std::size_t slot) const { return first_hit[slot + 1] - first_hit[slot]; }
+  bool sees_surface(std::size_t slot) const { return first_site[slot] < num_sites(slot); }
   /// Of a pixel that sees one.
   const SurfaceHit& first_surface(std::size_t slot) const {
-    return hits[slot * static_cast<std::size_t>(num_sites) + first_site[slot]];
+    return hits[first_hit[slot] + first_site[slot]];
   }
-  std::span<const SurfaceHit> pixel(std::size_t slot) const {
-    return std::span(hits).subspan(slot * static_cast<std::size_t>(num_sites),
-                                   static_cast<std::size_t>(num_sites));
-  }
+  std::span<const SurfaceHit> pixel(std::size_t slot) const { return part(hits, slot); }
+  std::span<const Ray> pixel_rays(std::size_t slot) const { return part(rays, slot); }
   /// Of its sites; empty where the scene has no detail.
   std::span<const SurfaceLook> pixel_looks(std::size_t slot) const {
-    if (looks.empty()) return {};
-    return std::span(looks).subspan(slot * static_cast<std::size_t>(num_sites),
-                                    static_cast<std::size_t>(num_sites));
+    return looks.empty() ? std::span<const SurfaceLook>() : part(looks, slot);
   }
+  /// Adds what a slot of `from` sees, of its first `most_sites` sites; `pixels` stays.
+  void add(const TileSurfaces& from, std::size_t slot, std::size_t most_sites);
   /// Of hit number `at`, or null.
   const SurfaceLook* look(std::size_t at) const { return looks.empty() ? nullptr : &looks[at]; }
-  std::size_t size_bytes() const { return size_bytes(pixels.size(), num_sites, !looks.empty()); }
-  /// Of so many pixels.
-  static std::size_t size_bytes(std::size_t num_pixels, std::int32_t num_sites, bool has_detail) {
-    const auto rays = num_pixels * static_cast<std::size_t>(num_sites);
-    return rays * (sizeof(SurfaceHit) + sizeof(Ray) + (has_detail ? sizeof(SurfaceLook) : 0)) +
-           num_pixels;
+  std::size_t size_bytes() const {
+    return size_bytes(hits.size(), !looks.empty()) + first_site.size();
+  }
+  /// Of so many sites.
+  static std::size_t size_bytes(std::size_t num_sites, bool has_detail) {
+    return num_sites * (sizeof(SurfaceHit) + sizeof(Ray) + (has_detail ? sizeof(SurfaceLook) : 0));
+  }
+
+ private:
+  template <class T>
+  std::span<const T> part(const std::vector<T>& all, std::size_t slot) const {
+    return std::span(all).subspan(first_hit[slot], num_sites(slot));
   }
 };
 
@@ -63,24 +73,42 @@ class SurfaceCache : public FrameKeep<std::pair<std::int32_t, std::int32_t>, Til
 /// points of a low-discrepancy sequence. The same for all frames.
 TileSurfaces trace_primary(const JobSpec& job, const FrameGeometry& geometry, const PixelRect& rect,
                            std::int32_t round = 0);
-/// Of some pixels of a tile.
+/// Of some pixels of a tile. counts: S of each pixel of the tile, row by row (fine_sites.h); empty:
+/// image.sites for all.
 TileSurfaces trace_primary(const JobSpec& job, const FrameGeometry& geometry, const PixelRect& rect,
-                           RoundPixels pixels, std::int32_t round);
+                           RoundPixels pixels, std::int32_t round,
+                           std::span<const std::uint16_t> counts);
 
 /// What some pixels of a tile see, of what all of them do.
 TileSurfaces part_of(const TileSurfaces& whole, RoundPixels pixels);
 
-/// The same for pixels one by one: appends the rays of the sites of pixel (x, y). Hits are the same
-/// as of a whole tile.
+/// The same for pixels one by one: appends the rays of the `num_sites` sites of pixel (x, y). The
+/// first image.sites of them are spread over the pixel. Hits are the same as of a whole tile.
 void append_primary_rays(const JobSpec& job, const FrameGeometry& geometry, std::int32_t x,
-                         std::int32_t y, std::vector<Ray>& rays, std::int32_t round = 0);
-void trace_primary_rays(const JobSpec& job, const FrameGeometry& geometry,
-                        std::span<const Ray> rays, std::span<SurfaceHit> hits);
+                         std::int32_t y, std::vector<Ray>& rays, std::int32_t round,
+                         std::int32_t num_sites);
+/// num_sites: (pixels) S of each.
+void trace_primary_rays(const FrameGeometry& geometry, std::span<const Ray> rays,
+                        std::span<const std::uint16_t> num_sites, std::span<SurfaceHit> hits);
 
-/// Adds to each pixel what its sites that see no surface show of the environment, as a share of all
-/// its sites. hits, rays: (pixels, num_sites); radiance: (pixels).
-void add_environment_behind(std::span<const SurfaceHit> hits, std::span<const Ray> rays,
-                            std::int32_t num_sites, const EnvironmentView& environment,
-                            std::span<Rgb> radiance);
+/// Adds up what the sites of a pixel that see no surface show of the environment, as a share of all
+/// its sites. hits, rays: (S).
+class EnvironmentBehind {
+ public:
+  /// radiance: (pixels), is added to.
+  EnvironmentBehind(const EnvironmentView& environment, std::span<Rgb> radiance)
+      : environment_(environment), radiance_(radiance) {}
+  void add(std::size_t pixel, std::span<const SurfaceHit> hits, std::span<const Ray> rays);
+  /// Must be called at the end.
+  void flush();
+
+ private:
+  static constexpr std::size_t kBatch = 64;
+  const EnvironmentView& environment_;
+  std::span<Rgb> radiance_;
+  std::array<float, kBatch> x_, y_, z_, share_;
+  std::array<std::size_t, kBatch> pixel_;
+  std::size_t count_ = 0;
+};
 
 }  // namespace baton

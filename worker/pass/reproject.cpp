@@ -102,10 +102,10 @@ void Reprojection::look_up(const TileSurfaces& surfaces, std::size_t first, std:
   old_pixels_.clear();
   if (neighborhood_) neighborhood_->clear(count);
   for (std::size_t i = 0; i < count; ++i) {
-    const auto [x, y] = surfaces.rect.place(first + i);
+    const auto [x, y] = surfaces.rect.place(surfaces.pixels.index(first + i));
     const Position pixel{x, y};
     Slot& slot = slots_[i];
-    slot.hits = surfaces.pixel(first + i);
+    slot.hits = surfaces.pixel(first + i).first(static_cast<std::size_t>(job.image.sites));
     slot.key =
         pixel_key(job.seed, frame.number, job.image.width, pixel.x, pixel.y, frame.first_round);
     const std::optional<Position> source =

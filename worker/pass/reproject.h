@@ -22,9 +22,10 @@ enum class PixelHistory {
 /// Pass: follows each pixel back to where its surface was in the frame before [SS section 6, but
 /// gathering, so that nothing collides]: a hit of the object in front, drawn at random so that
 /// motion by fractions of a pixel is followed on average, goes back with its object and is
-/// projected by the camera of then. The samples of that pixel are taken when each site of now finds
-/// a site of then that saw the same object at about the same place and turned about the same way,
-/// and each of then is found; else there is no history. Neighbours, where the method uses them, are
+/// projected by the camera of then. (Where geometry is fine: of the first image.sites sites, which
+/// are spread over the pixel.) The samples of that pixel are taken when each site of now finds a
+/// site of then that saw the same object at about the same place and turned about the same way, and
+/// each of then is found; else there is no history. Neighbours, where the method uses them, are
 /// found around the same place.
 class Reprojection {
  public:
@@ -61,8 +62,8 @@ class Reprojection {
   /// For each site of now, the site of then that it inherits from; and how many inherit from a site
   /// of then.
   struct Inheritance {
-    std::array<std::uint8_t, SiteBlock::kMaxSites> from{};
-    std::array<std::uint8_t, SiteBlock::kMaxSites> count{};
+    std::array<std::uint8_t, limits::kMaxSites> from{};
+    std::array<std::uint8_t, limits::kMaxSites> count{};
   };
 
   std::optional<Position> find_source(std::span<const SurfaceHit> hits, const Position& pixel,

@@ -104,10 +104,7 @@ void TileFrameRenderer::render_batches(const TileRound& at, SampleState& state, 
     finish(batch, at.light, film);
   }
   state.frame_index = at.frame.index;
-  if (at.round == 0) {
-    stats_.pixels += num_pixels;
-    frame_sampling_ = {};
-  }
+  if (at.round == 0) stats_.pixels += num_pixels;
   if (at.round >= 0) {
     frame_sampling_.merge(round_sampling_);
     stats_.sampling.merge(round_sampling_);
@@ -266,7 +263,8 @@ Rgb TileFrameRenderer::sample_edge(const PixelInput& input, const FrameLight& li
 /// Where the shadow rays of a pixel's sites start.
 SiteOrigins TileFrameRenderer::origins(std::size_t slot) const {
   const std::span<const SurfaceHit> hits = surfaces_->pixel(slot);
-  SiteOrigins origins{.num_sites = surfaces_->num_sites};
+  SiteOrigins origins;
+  origins.num_sites = static_cast<std::int32_t>(hits.size());
   for (std::size_t s = 0; s < hits.size(); ++s) {
     if (hits[s].hit) origins.set(s, hits[s].ray_origin);
   }
@@ -332,11 +330,11 @@ void TileFrameRenderer::finish(Batch& batch, const FrameLight& light, RoundMean&
   const bool show_environment = context_.job.output.background == Background::environment;
   std::array<Rgb, kBatchPixels> background{};
   if (show_environment) {
-    const auto num_sites = static_cast<std::size_t>(surfaces_->num_sites);
-    add_environment_behind(
-        std::span(surfaces_->hits).subspan(batch.first * num_sites, batch.count * num_sites),
-        std::span(surfaces_->rays).subspan(batch.first * num_sites, batch.count * num_sites),
-        surfaces_->num_sites, view_of(light.seen), background);
+    const EnvironmentView seen = view_of(light.seen);
+    EnvironmentBehind behind(seen, background);
+    for (std::size_t i = 0; i < batch.count; ++i)
+      behind.add(i, surfaces_->pixel(batch.first + i), surfaces_->pixel_rays(batch.first + i));
+    behind.flush();
   }
   for (std::size_t i = 0; i < batch.count; ++i) {
     PixelResult& pixel = batch.pixels[i];

@@ -51,6 +51,8 @@ class TileFrameRenderer {
     return collector_.finish(state, state.frame_index);
   }
 
+  /// The next round is the first one of a frame.
+  void begin_frame() { frame_sampling_ = {}; }
   const RenderStats& stats() const { return stats_; }
   /// Of the frame that was rendered last, over its rounds.
   const SamplingStats& frame_sampling() const { return frame_sampling_; }

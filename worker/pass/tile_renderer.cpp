@@ -4,12 +4,14 @@
 
 #include <algorithm>
 #include <map>
+#include <numeric>
 #include <optional>
 #include <utility>
 
 #include "common/job/motion.h"
 #include "worker/pass/adaptive_rounds.h"
 #include "worker/pass/cpu_clock.h"
+#include "worker/pass/fine_sites.h"
 #include "worker/pass/geometry_planes.h"
 #include "worker/pass/sweep_mean.h"
 #include "worker/pass/tile_frame.h"
@@ -81,6 +83,7 @@ class TileWalk {
     RoundMean film(context_.job, rect_);
     AdaptiveRounds adaptive(context_.job, rect_);
     GeometryPlanes planes(context_, frame, *geometry_, rect_);
+    renderer_->begin_frame();
     const std::int32_t first = frame.index == 0 ? -num_preroll_rounds(context_.job) : 0;
     std::optional<RoundMean> unseen;
     if (first < 0) unseen.emplace(context_.job, rect_);
@@ -94,19 +97,35 @@ class TileWalk {
       RoundPixels pixels = adaptive.pixels(round);
       if (pixels.size() == 0) break;
       BATON_ASSIGN(const std::shared_ptr<const FrameLight> light, light_of(frame, round));
-      const std::shared_ptr<const TileSurfaces> surfaces =
-          surfaces_of(frame.first_round + round, std::move(pixels));
-      const TileRound at{frame, round, *light, *surfaces, round < 0 ? nullptr : probe_light.get()};
       RoundMean& mean = round < 0 ? *unseen : film;
-      if (round >= 0) planes.add(*surfaces);
-      if (shares_ && round == first) {
+      std::optional<Reprojection> history;
+      if (shares_ && round == first) history.emplace(context_, *geometry_, *before_, previous);
+      TileSurfaces seen{.rect = rect_,
+                        .pixels = RoundPixels::all(state_.num_pixels()),
+                        .first_hit = {0},
+                        .hits = {},
+                        .rays = {},
+                        .looks = {},
+                        .first_site = {}};
+      for (RoundPixels& part : parts_of(std::move(pixels))) {
+        const std::shared_ptr<const TileSurfaces> surfaces =
+            surfaces_of(frame.first_round + round, std::move(part));
+        const TileRound at{frame, round, *light, *surfaces,
+                           round < 0 ? nullptr : probe_light.get()};
+        if (round >= 0) planes.add(*surfaces);
+        if (history) {
+          for (std::size_t slot = 0; slot < surfaces->pixels.size(); ++slot)
+            seen.add(*surfaces, slot, static_cast<std::size_t>(context_.job.image.sites));
+          renderer_->render(at, *history, state_, mean);
+        } else {
+          renderer_->render(at, has_history_, state_, mean);
+        }
+      }
+      if (history) {
         // Tiles ask for those of the frame before; one that is behind them traces them again.
         context_.surfaces->release_before(frame.index - 1);
-        context_.surfaces->keep({frame.index, state_.tile}, frame.index, surfaces);
-        Reprojection history(context_, *geometry_, *before_, previous);
-        renderer_->render(at, history, state_, mean);
-      } else {
-        renderer_->render(at, has_history_, state_, mean);
+        context_.surfaces->keep({frame.index, state_.tile}, frame.index,
+                                std::make_shared<const TileSurfaces>(std::move(seen)));
       }
       has_history_ = carries_state(context_.job);
     }
@@ -147,8 +166,39 @@ class TileWalk {
       if (renderer_ != nullptr) stats_.merge(renderer_->stats());
     }
     kept_.clear();
+    count_tile_sites();
     renderer_ = std::make_unique<TileFrameRenderer>(context_, *geometry_);
     return {};
+  }
+  /// Where geometry is fine, pixels have numbers of sites of their own.
+  void count_tile_sites() {
+    num_tile_sites_ = state_.num_pixels() * static_cast<std::size_t>(context_.job.image.sites);
+    if (!has_fine_sites(context_.job)) return;
+    const CpuTimer timer(stats_.seconds_primary);
+    std::vector<PixelPlace> pixels;
+    for (std::size_t i = 0; i < state_.num_pixels(); ++i) pixels.push_back(rect_.place(i));
+    counts_ = count_sites(context_.job, *geometry_, pixels);
+    stats_.rays_primary += limits::kGeometryProbes * pixels.size();
+    num_tile_sites_ = std::accumulate(counts_.begin(), counts_.end(), std::size_t{0});
+  }
+  /// The pixels of a round, as many at a time as their sites leave room for.
+  std::vector<RoundPixels> parts_of(RoundPixels pixels) const {
+    std::vector<RoundPixels> parts;
+    if (num_tile_sites_ <= limits::kMaxSitesAtOnce || counts_.empty()) {
+      parts.push_back(std::move(pixels));
+      return parts;
+    }
+    std::size_t room = 0;
+    for (std::size_t slot = 0; slot < pixels.size(); ++slot) {
+      const std::size_t index = pixels.index(slot), sites = counts_[index];
+      if (sites > room) {
+        parts.emplace_back();
+        room = limits::kMaxSitesAtOnce;
+      }
+      parts.back().add(index, pixels.weight(slot));
+      room -= sites;
+    }
+    return parts;
   }
   Result<std::shared_ptr<const FrameLight>> light_of(const FrameSpec& frame, std::int32_t round) {
     const CpuTimer timer(stats_.seconds_light);
@@ -160,7 +210,7 @@ class TileWalk {
     const CpuTimer timer(stats_.seconds_primary);
     const bool is_whole = pixels.are_all(state_.num_pixels());
     auto found = kept_.find(of);
-    if (found == kept_.end() && (of == 0 || has_room())) {
+    if (found == kept_.end() && ((of == 0 && counts_.empty()) || has_room())) {
       // Of all pixels: the next frame may want others.
       found = kept_.emplace(of, trace(of, RoundPixels::all(state_.num_pixels()))).first;
     }
@@ -171,13 +221,13 @@ class TileWalk {
   }
   /// For what another round sees, until the next frame.
   bool has_room() const {
-    const std::size_t of_round = TileSurfaces::size_bytes(
-        state_.num_pixels(), context_.job.image.sites, context_.scene->has_detail);
+    const std::size_t of_round =
+        TileSurfaces::size_bytes(num_tile_sites_, context_.scene->has_detail);
     return keeps_surfaces_ && (kept_.size() + 1) * of_round <= limits::kMaxRoundSurfaceBytes;
   }
   std::shared_ptr<const TileSurfaces> trace(std::int32_t round, RoundPixels pixels) {
     auto surfaces = std::make_shared<const TileSurfaces>(
-        trace_primary(context_.job, *geometry_, rect_, std::move(pixels), round));
+        trace_primary(context_.job, *geometry_, rect_, std::move(pixels), round, counts_));
     stats_.rays_primary += surfaces->rays.size();
     return surfaces;
   }
@@ -190,6 +240,8 @@ class TileWalk {
   SampleState state_;
   bool has_history_ = false;
   std::shared_ptr<const FrameGeometry> geometry_, before_;
+  std::vector<std::uint16_t> counts_;  ///< S of each pixel; empty: image.sites of all
+  std::size_t num_tile_sites_ = 0;     ///< of all pixels
   std::map<std::int32_t, std::shared_ptr<const TileSurfaces>> kept_;  ///< by round
   std::unique_ptr<TileFrameRenderer> renderer_;
   RenderStats stats_;

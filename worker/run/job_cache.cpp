@@ -22,8 +22,12 @@ std::uint64_t work_bytes(const JobSpec& job, int num_threads) {
   const std::int64_t pixels = std::min(job.image.rendered().area(), side * side);
   const bool any_detail = std::ranges::any_of(
       job.scene.materials, [](const auto& material) { return has_detail(material.second); });
-  const auto surface_bytes = static_cast<std::int64_t>(
-      TileSurfaces::size_bytes(static_cast<std::size_t>(pixels), job.image.sites, any_detail));
+  const auto sites_of = [&](int of_pixel) { return static_cast<std::size_t>(pixels * of_pixel); };
+  const std::size_t num_sites =
+      std::max(sites_of(job.image.sites),
+               std::min(sites_of(job.image.most_sites()), limits::kMaxSitesAtOnce));
+  const auto surface_bytes =
+      static_cast<std::int64_t>(TileSurfaces::size_bytes(num_sites, any_detail));
   const std::int64_t tile_bytes =
       surface_bytes + pixels * (4 * e.film_channels + e.state_bytes_per_pixel);
   return static_cast<std::uint64_t>(num_threads * tile_bytes + e.film_bytes + e.frame_bytes);

@@ -44,6 +44,7 @@ HWY_INLINE VF LookUp(const SiteBlock::Array& table, VI site, int num_sites) {
   const DF d;
   if constexpr (hn::MaxLanes(DF()) == 8) {
     const DI di;
+    if (num_sites > 16) return hn::GatherIndex(d, table.data(), site);
     const VF low = hn::TableLookupLanes(hn::Load(d, table.data()),
                                         hn::IndicesFromVec(d, hn::And(site, hn::Set(di, 7))));
     if (num_sites <= 8) return low;

@@ -19,6 +19,11 @@ void SiteBlock::clear(int sites) {
   any_coat = false;
 }
 
+void SiteBlock::Coats::clear(int sites) {
+  for (Array* const array : {&ns_x, &ns_y, &ns_z, &wo_x, &wo_y, &wo_z, &alpha, &share, &chance})
+    std::fill_n(array->begin(), sites, 0.0f);
+}
+
 void SiteBlock::add_miss(int site) {
   const auto s = static_cast<std::size_t>(site);
   for (Array* array : {&ns_x,     &ns_y,        &ns_z,
@@ -77,7 +82,7 @@ void SiteBlock::add(int site, const ShadingPoint& point, const Material& materia
 }
 
 void SiteBlock::add_coat(std::size_t site, const ShadingPoint& point, const Material& material) {
-  if (!any_coat) coats = {};
+  if (!any_coat) coats.clear(num_sites);
   any_coat = true;
   const SeenCoat seen = see_coat(material, point);
   const LobeChances chance = lobe_chances(material, seen.share);

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdint>
 
+#include "common/base/limits.h"
 #include "worker/scene/material.h"
 
 namespace baton {
@@ -11,8 +12,9 @@ namespace baton {
 /// Index: site, [0, S). A site without a surface has zero reflectance, so its target is 0
 /// everywhere.
 struct alignas(64) SiteBlock {
-  static constexpr int kMaxSites = 16;
-  using Array = std::array<float, kMaxSites>;
+  static constexpr int kMaxSites = limits::kMaxFineSites;
+  /// A cache line more, so that the same site of several arrays is not in one set of a cache.
+  using Array = std::array<float, kMaxSites + 16>;
 
   Array ns_x{}, ns_y{}, ns_z{};              ///< shading normal
   Array ng_x{}, ng_y{}, ng_z{};              ///< geometric normal
@@ -36,6 +38,9 @@ struct alignas(64) SiteBlock {
     Array alpha{};
     Array share{};   ///< SeenCoat::share; kd and ks hold what it leaves
     Array chance{};  ///< LobeChances::coat
+
+    /// No coats on the first `sites` sites.
+    void clear(int sites);
   };
   Coats coats;
 

@@ -148,7 +148,7 @@ TEST(Rounds, SitesAreNewWhereNothingBelongsToThem) {
     const auto geometry = *context->geometry->at(0);
     const auto rays_of = [&](std::int32_t round) {
       std::vector<Ray> rays;
-      append_primary_rays(context->job, *geometry, 3, 4, rays, round);
+      append_primary_rays(context->job, *geometry, 3, 4, rays, round, 4);
       return rays;
     };
     const auto first = rays_of(0), third = rays_of(2);

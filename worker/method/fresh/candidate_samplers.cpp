@@ -51,11 +51,16 @@ CandidateCounts split_candidates(std::int32_t total, float brdf_fraction) {
 CandidateCounts candidate_counts(const SiteBlock& sites, std::int32_t total, float lobe_fraction) {
   if (lobe_fraction >= 1) return {.from_bsdf = total};
   constexpr std::int32_t kVector = 8;  // candidates that cost as much as one
+  // Where geometry is fine each site gets one of each kind at least: those that get none would be
+  // noise.
+  const bool fine = sites.num_hits > limits::kMaxSites;
+  if (fine) total = std::max(total, 2 * sites.num_hits);
   const float specular = sites.specular_sum / static_cast<float>(std::max(sites.num_hits, 1));
   const float wanted = lobe_fraction * specular * static_cast<float>(total);
   const std::int32_t rounded = static_cast<std::int32_t>(std::ceil(wanted / kVector)) * kVector;
   const std::int32_t most = std::min(total / 2, kMaxLobeCandidates);
-  const std::int32_t from_bsdf = sites.num_lobes > 0 ? std::min(rounded, most) : 0;
+  std::int32_t from_bsdf = sites.num_lobes > 0 ? std::min(rounded, most) : 0;
+  if (fine) from_bsdf = std::max(from_bsdf, sites.num_lobes);
   return {.from_light = total - from_bsdf, .from_bsdf = from_bsdf, .lobe_only = true};
 }
 
@@ -76,8 +81,8 @@ PixelDiagnostics DirectSampler::sample(const PixelInput& input, SamplerScratch& 
 
 PixelDiagnostics BidirectionalSampler::sample(const PixelInput& input, SamplerScratch& scratch,
                                               const PixelSamples& samples) const {
-  PixelDiagnostics diagnostics{.target_evaluations = num_candidates_};
   const CandidateCounts counts = candidate_counts(input.sites, num_candidates_, lobe_fraction_);
+  PixelDiagnostics diagnostics{.target_evaluations = counts.total()};
   const float total = kernels::choose_candidates(
       candidate_source(input, counts), Rng(input.key, PassId::choose).uniforms(0, 0)[0],
       scratch.choice, {samples.direction, samples.site, samples.r, samples.g, samples.b});
