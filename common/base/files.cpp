@@ -108,6 +108,10 @@ template <class Publish>
 Status write_then(const fs::path& path, ByteView bytes, Publish publish) {
   std::error_code error;
   if (path.has_parent_path()) fs::create_directories(path.parent_path(), error);
+  if (error) {
+    errno = error.value();  // a disk may be full already
+    return io_error("cannot create", path.parent_path());
+  }
   const fs::path temporary = temporary_sibling(path);
   {
     FileDescriptor file(::open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644));

@@ -38,15 +38,11 @@ bool is_put_again(const fs::path& file, ByteView bytes) {
 }  // namespace
 
 Result<BlobStore> BlobStore::open(const fs::path& directory) {
-  // Make every subfolder now, so that put() need not.
-  for (int i = 0; i < 256; ++i) {
-    const fs::path folder = directory / fmt::format("{:02x}", i);
-    std::error_code error;
-    fs::create_directories(folder, error);
-    if (error)
-      return Error{ErrorKind::io,
-                   fmt::format("{}: cannot create: {}", folder.string(), error.message())};
-  }
+  std::error_code error;
+  fs::create_directories(directory, error);
+  if (error)
+    return Error{ErrorKind::io,
+                 fmt::format("{}: cannot create: {}", directory.string(), error.message())};
   BATON_TRY(sync_folder(directory));
   return BlobStore(directory);
 }

@@ -16,8 +16,8 @@ namespace baton {
 /// appears whole or not at all, and two writers of the same blob write the same bytes.
 class BlobStore {
  public:
-  /// Creates the folder and its 256 subfolders where they are missing. Errors: a path that cannot
-  /// be created.
+  /// Creates the folder where it is missing; its subfolders come with their first blobs. Errors: a
+  /// path that cannot be created.
   static Result<BlobStore> open(const std::filesystem::path& directory);
 
   /// Publishes the bytes: from now on every process sees the blob, but it survives a power cut only

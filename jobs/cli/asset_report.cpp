@@ -7,46 +7,61 @@
 #include <cmath>
 #include <set>
 #include <span>
+#include <utility>
 
 #include "common/image/image_io.h"
 #include "common/math/vec3.h"
 #include "jobs/cli/object_view.h"
-#include "jobs/cli/surface_share.h"
 #include "worker/scene/map_reduction.h"
 #include "worker/scene/scene.h"
 
 namespace baton {
 namespace {
 
-float mean_over_sphere(const RgbImage& image) {
+/// What the texels of a picture are, one by one.
+struct TexelReport {
+  double mean = 0;  ///< over the sphere and the three channels, of what is finite and positive
+  float brightest = 0;
+  TexelRepairs repairs;
+};
+
+TexelReport look_at_texels(const RgbImage& image, float scale) {
   const auto row_values = static_cast<std::size_t>(3 * image.width);
+  TexelReport report;
   double sum = 0, weights = 0;
   for (int y = 0; y < image.height; ++y) {
-    const double weight = std::sin((y + 0.5) * double{kPi} / image.height);
     const auto row =
         std::span(image.rgb).subspan(static_cast<std::size_t>(y) * row_values, row_values);
-    for (const float v : row) sum += std::isfinite(v) && v > 0 ? weight * v : 0.0;
+    double row_sum = 0;
+    for (const float v : row) {
+      if (!std::isfinite(v) || v <= 0) continue;
+      row_sum += v;
+      report.brightest = std::max(report.brightest, v);
+    }
+    for (std::size_t i = 0; i < row_values; i += 3) texel_radiance(&row[i], scale, report.repairs);
+    const double weight = std::sin((y + 0.5) * double{kPi} / image.height);
+    sum += weight * row_sum;
     weights += weight * static_cast<double>(row_values);
   }
-  return weights > 0 ? static_cast<float>(sum / weights) : 0.0f;
+  report.mean = weights > 0 ? sum / weights : 0.0;
+  return report;
 }
 
 Result<MapReport> load_map(const std::string& path, const EnvironmentSpec& environment) {
   BATON_ASSIGN(const RgbImage image, read_rgb_image(path));
-  const EnvironmentMap map = make_map(image, environment, false);
-  float brightest = 0;
-  for (const float v : image.rgb) brightest = std::isfinite(v) ? std::max(brightest, v) : brightest;
   BATON_ASSIGN(const PictureColors colors, read_picture_colors(path));
+  const TexelReport texels = look_at_texels(image, environment.scale);
+  const auto [width, height] = map_sides(image.width, image.height, environment.max_width);
   return MapReport{.path = path,
-                   .width = map.width(),
-                   .height = map.height(),
+                   .width = width,
+                   .height = height,
                    .file_width = image.width,
                    .file_height = image.height,
-                   .repaired_texels = map.repairs().total(),
-                   .black = map.black(),
-                   .brightest = brightest,
+                   .repaired_texels = texels.repairs.total(),
+                   .black = !(texels.mean * double{environment.scale} > 0),
+                   .brightest = texels.brightest,
                    .colors = conversion_text(colors),
-                   .mean = mean_over_sphere(image)};
+                   .mean = static_cast<float>(texels.mean)};
 }
 
 void load_maps(const EnvironmentSpec& environment, AssetReport& report,
@@ -79,20 +94,21 @@ void load_camera_map(const EnvironmentSpec& environment, std::vector<std::string
 }
 
 void load_geometry(const JobSpec& job, AssetReport& report, std::vector<std::string>& faults) {
-  const Result<Scene> scene = load_scene(job);
-  if (!scene) return faults.push_back(scene.error().message);
-  report.meshes = scene->meshes.size();
-  report.instances = scene->instances.size();
-  for (const TriangleMesh& mesh : scene->meshes) {
+  Result<Scene> loaded = load_scene(job);
+  if (!loaded) return faults.push_back(loaded.error().message);
+  report.scene = std::make_shared<const Scene>(std::move(*loaded));
+  const Scene& scene = *report.scene;
+  report.meshes = scene.meshes.size();
+  report.instances = scene.instances.size();
+  for (const TriangleMesh& mesh : scene.meshes) {
     report.dropped_triangles += mesh.dropped_triangles;
     report.deforming_meshes += mesh.deformation != nullptr ? 1 : 0;
   }
-  for (const Instance& instance : scene->instances) {
-    report.triangles += scene->meshes[instance.mesh].triangles.size();
+  for (const Instance& instance : scene.instances) {
+    report.triangles += scene.meshes[instance.mesh].triangles.size();
     report.objects_move = report.objects_move || instance.moves();
   }
-  report.surface_share = surface_share(job, *scene);
-  report.odd_objects = object_warnings(job, *scene);
+  report.odd_objects = object_warnings(job, scene);
 }
 
 }  // namespace

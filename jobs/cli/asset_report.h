@@ -1,11 +1,13 @@
 #pragma once
 
 #include <cstdint>
+#include <memory>
 #include <string>
 #include <vector>
 
 #include "common/base/result.h"
 #include "common/job/job_spec.h"
+#include "worker/scene/scene.h"
 
 namespace baton {
 
@@ -28,9 +30,9 @@ struct AssetReport {
   std::uint64_t meshes = 0, deforming_meshes = 0, instances = 0;
   std::uint64_t triangles = 0;  ///< of all instances
   bool objects_move = false;
-  double surface_share = 1;              ///< of the pixels (surface_share)
   std::uint64_t dropped_triangles = 0;   ///< of all meshes: without area
   std::vector<std::string> odd_objects;  ///< object_warnings
+  std::shared_ptr<const Scene> scene;
 };
 
 /// Loads everything that the job names. One error lists every fault: files that cannot be loaded,

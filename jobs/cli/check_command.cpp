@@ -14,7 +14,9 @@
 #include "jobs/cli/job_warnings.h"
 #include "jobs/cli/scene_picture.h"
 #include "jobs/cli/settle_method.h"
+#include "jobs/cli/surface_share.h"
 #include "jobs/cli/text.h"
+#include "worker/scene/scene.h"
 #include "worker/scene/settle_motion.h"
 
 namespace baton {
@@ -51,6 +53,7 @@ void print_json(const JobSpec& job, const JobEstimate& e, const AssetReport& ass
                     {"repairedTexels", map.repaired_texels},
                     {"black", map.black}});
   }
+  const double share = surface_share(job, *assets.scene);
   ordered_json result = {{"name", job.name},
                          {"frames", e.frames},
                          {"tiles", e.tiles},
@@ -67,7 +70,7 @@ void print_json(const JobSpec& job, const JobEstimate& e, const AssetReport& ass
                          {"frameBytes", e.frame_bytes},
                          {"stateBytesPerPixel", e.state_bytes_per_pixel},
                          {"stateBytes", e.state_bytes},
-                         {"storeBytes", estimate_store(job, assets.surface_share).total()},
+                         {"storeBytes", estimate_store(job, share).total()},
                          {"storeBytesMost", bound_store(job).total()},
                          {"diskBytes", e.frames * e.frame_bytes + bound_store(job).total()},
                          {"motionMaxPx", moves(job) ? job.motion.max_px : 0},
@@ -140,7 +143,7 @@ void print_text(const JobSpec& job, const JobEstimate& e, const AssetReport& ass
     fmt::print("state      at most {} bytes a pixel\n", e.state_bytes_per_pixel);
   }
   fmt::print("film       {} channels, {} a frame in tiles\n", e.film_channels, total(e.film_bytes));
-  const StoreEstimate store = estimate_store(job, assets.surface_share);
+  const StoreEstimate store = estimate_store(job, surface_share(job, *assets.scene));
   fmt::print("store      {} at its fullest with one worker: states {}, tiles on their way {}\n",
              total(store.total()), total(store.states), total(store.films + store.samples));
   fmt::print("           at most {}, however many workers\n", total(bound_store(job).total()));
@@ -156,9 +159,8 @@ void print_settings(const std::vector<JobSetting>& settings) {
   }
 }
 
-Status write_picture(const CheckOptions& options, const JobSpec& job) {
+Status write_picture(const CheckOptions& options, const JobSpec& job, const Scene& scene) {
   if (options.picture.empty()) return {};
-  BATON_ASSIGN(const Scene scene, load_scene(job));
   BATON_TRY(write_png(options.picture, scene_picture(job, scene)));
   if (options.json) return {};
   for (const std::string& line : object_lines(job, scene)) fmt::print("object     {}\n", line);
@@ -185,13 +187,13 @@ Result<ExitCode> run_check(const CheckOptions& options) {
           ? plan_pilot(job, ray_cost_factor(assets.triangles, assets.objects_move))
           : PilotPlan{};
   if (options.json) {
-    BATON_TRY(write_picture(options, job));
+    BATON_TRY(write_picture(options, job, *assets.scene));
     print_json(job, estimate, assets, warnings, settings, plan);
   } else {
     print_text(job, estimate, assets);
     if (job.sampling.method == Method::automatic)
       fmt::print("pilot      before the first frame: {}\n", pilot_text(plan));
-    BATON_TRY(write_picture(options, job));
+    BATON_TRY(write_picture(options, job, *assets.scene));
     for (const std::string& warning : warnings) fmt::print("warning    {}\n", warning);
     if (options.explain) print_settings(settings);
   }

@@ -186,11 +186,14 @@ Result<ExitCode> show_status(const CoordinatorLink& link) {
   for (const SlurmPilot& pilot : pilots ? *pilots : std::vector<SlurmPilot>()) {
     if (!pilot.job_name.starts_with(kJobNamePrefix)) continue;
     ++count;
-    const auto worker = of_pilots.find(pilot.id);
-    fmt::print("pilot {:<10} {:<10} {:<10} {:>10} left  {}\n", pilot.id, pilot.state_text,
-               pilot.node.empty() ? pilot.reason : pilot.node, pilot.time_left,
-               worker == of_pilots.end() ? "no worker" : worker_line(*worker->second));
-    if (worker != of_pilots.end()) of_pilots.erase(worker);
+    const auto print = [&](const std::string& worker) {
+      fmt::print("pilot {:<10} {:<10} {:<10} {:>10} left  {}\n", pilot.id, pilot.state_text,
+                 pilot.node.empty() ? pilot.reason : pilot.node, pilot.time_left, worker);
+    };
+    const auto [first, last] = of_pilots.equal_range(pilot.id);
+    if (first == last) print("no worker");
+    for (auto worker = first; worker != last; ++worker) print(worker_line(*worker->second));
+    of_pilots.erase(first, last);
   }
   for (const auto& [id, worker] : of_pilots)
     fmt::print("pilot {:<10} {:<10} {:<10} {:>10}       {}\n", id, "", "not in the queue", "",

@@ -13,6 +13,7 @@
 #include "common/job/known_limits.h"
 #include "common/job/sequence.h"
 #include "common/job/store_estimate.h"
+#include "jobs/cli/surface_share.h"
 #include "jobs/cli/text.h"
 #include "worker/scene/settle_scene.h"
 
@@ -92,7 +93,7 @@ std::string jump_text(const LightJump& jump) {
                      jump.to, jump.ratio);
 }
 
-void output_warnings(const JobSpec& job, double surface_share, std::vector<std::string>& warnings) {
+void output_warnings(const JobSpec& job, const Scene& scene, std::vector<std::string>& warnings) {
   // The part of the path that is there already.
   fs::path folder = job.output.directory;
   std::error_code error;
@@ -105,11 +106,15 @@ void output_warnings(const JobSpec& job, double surface_share, std::vector<std::
   const fs::space_info space = fs::space(folder, error);
   const JobEstimate e = estimate_job(job);
   const auto frames = static_cast<std::uint64_t>(e.frames * e.frame_bytes);
-  const auto store = static_cast<std::uint64_t>(estimate_store(job, surface_share).total());
-  if (!error && space.available < frames + store) {
+  const auto store = [&](double share) {
+    return static_cast<std::uint64_t>(estimate_store(job, share).total());
+  };
+  if (error || space.available >= frames + store(1)) return;
+  const std::uint64_t needed = store(surface_share(job, scene));
+  if (space.available < frames + needed) {
     warnings.push_back(fmt::format("{}: {} are free, and frames may take {}, states and tiles {}",
                                    job.output.directory, bytes_text(space.available),
-                                   bytes_text(frames), bytes_text(store)));
+                                   bytes_text(frames), bytes_text(needed)));
   }
 }
 
@@ -123,6 +128,21 @@ void aov_warnings(const JobSpec& job, std::vector<std::string>& warnings) {
     warnings.push_back(
         "output.aovs: variance of a single round draws each pixel twice; with quality.rounds 2 the "
         "same time halves the variance");
+}
+
+/// The job with those files alone that warnings look at: some maps, and meshes without normals.
+/// What surfaces look like is left out.
+JobSpec outline_of(JobSpec job) {
+  std::vector<EnvironmentKey>& keys = job.environment.keys;
+  if (keys.size() > kMostMaps) {
+    const std::size_t stride = (keys.size() + kMostMaps - 1) / kMostMaps;
+    for (std::size_t i = 0; i * stride < keys.size(); ++i) keys[i] = keys[i * stride];
+    keys.resize((keys.size() + stride - 1) / stride);
+  }
+  job.environment.camera_map.file.clear();
+  for (auto& [name, mesh] : job.scene.meshes) mesh.smooth_normals = false;
+  for (auto& [name, material] : job.scene.materials) material = {};
+  return job;
 }
 
 }  // namespace
@@ -144,22 +164,16 @@ std::vector<std::string> job_warnings(const JobSpec& job, const AssetReport& ass
     warnings.push_back(std::move(warning));
   for (std::string& warning : gltf_warnings(job.scene)) warnings.push_back(std::move(warning));
   aov_warnings(job, warnings);
-  output_warnings(job, assets.surface_share, warnings);
+  output_warnings(job, *assets.scene, warnings);
   return warnings;
 }
 
 WarningsAside::WarningsAside(JobSpec job)
-    : thread_([job = std::move(job)]() mutable {
-        std::vector<EnvironmentKey>& keys = job.environment.keys;
-        const std::size_t num_keys = keys.size();
-        if (keys.size() > kMostMaps) {
-          const std::size_t stride = (keys.size() + kMostMaps - 1) / kMostMaps;
-          for (std::size_t i = 0; i * stride < keys.size(); ++i) keys[i] = keys[i * stride];
-          keys.resize((keys.size() + stride - 1) / stride);
-        }
-        Result<AssetReport> assets = load_assets(job);
+    : thread_([job = std::move(job)] {
+        const JobSpec outline = outline_of(job);
+        Result<AssetReport> assets = load_assets(outline);
         if (!assets) return;
-        assets->every_map = num_keys == keys.size();
+        assets->every_map = outline.environment.keys.size() == job.environment.keys.size();
         for (const std::string& warning : job_warnings(job, *assets)) spdlog::warn("{}", warning);
       }) {}
 

@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 #include "common/job/motion.h"
 #include "jobs/cli/preview_canvas.h"
@@ -57,7 +58,7 @@ double share_in(const JobSpec& job, const Scene& scene, int frame) {
 double surface_share(const JobSpec& job, const Scene& scene) {
   const std::vector<int>& frames = job.frames;
   double share = 0;
-  for (const int frame : {frames.front(), frames[frames.size() / 2], frames.back()})
+  for (const int frame : std::set{frames.front(), frames[frames.size() / 2], frames.back()})
     share = std::max(share, share_in(job, scene, frame));
   return share;
 }

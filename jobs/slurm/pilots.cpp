@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cstdint>
+#include <map>
 #include <utility>
 
 namespace baton {
@@ -9,6 +10,26 @@ namespace {
 
 bool is_of_array(const std::string& pilot, const std::string& array) {
   return pilot.starts_with(array) && pilot.substr(array.size()).starts_with('_');
+}
+
+/// A pilot that the coordinator sees, with the worker of each time that Slurm has started it.
+struct WorkingPilot {
+  std::vector<std::string> workers;
+  int leases = 0;
+};
+
+/// In the order of their ids; workers that were told to end do not count.
+std::vector<WorkingPilot> working_pilots(const std::vector<SlurmWorker>& workers) {
+  std::map<std::string, WorkingPilot> pilots;
+  for (const SlurmWorker& worker : workers) {
+    if (worker.told_to_end) continue;
+    WorkingPilot& pilot = pilots[worker.id];
+    pilot.workers.push_back(worker.name);
+    pilot.leases += worker.leases;
+  }
+  std::vector<WorkingPilot> working;
+  for (auto& [id, pilot] : pilots) working.push_back(std::move(pilot));
+  return working;
 }
 
 bool is_mute(const SlurmPilot& pilot) {
@@ -28,8 +49,7 @@ SlurmOrders give_orders(const SlurmSnapshot& now) {
   SlurmOrders orders;
 
   // Who is there, and who will be.
-  std::vector<SlurmWorker> working = now.workers;
-  std::erase_if(working, [](const SlurmWorker& worker) { return worker.told_to_end; });
+  std::vector<WorkingPilot> working = working_pilots(now.workers);
   std::vector<std::string> coming;
   for (const SlurmPilot& pilot : now.pilots) {
     const bool is_seen = std::any_of(now.workers.begin(), now.workers.end(),
@@ -51,7 +71,8 @@ SlurmOrders give_orders(const SlurmSnapshot& now) {
   std::stable_sort(working.begin(), working.end(),
                    [](const auto& a, const auto& b) { return a.leases < b.leases; });
   for (int i = 0; i < surplus; ++i) {
-    orders.drain.push_back(working[static_cast<std::size_t>(i)].name);
+    const WorkingPilot& pilot = working[static_cast<std::size_t>(i)];
+    orders.drain.insert(orders.drain.end(), pilot.workers.begin(), pilot.workers.end());
   }
   return orders;
 }

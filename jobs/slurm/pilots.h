@@ -29,7 +29,7 @@ struct SlurmPilot {
   bool operator==(const SlurmPilot&) const = default;
 };
 
-/// A pilot that the coordinator has: a connected worker.
+/// A worker of a pilot that the coordinator has, connected or not yet missed.
 struct SlurmWorker {
   std::string id;    ///< of its pilot
   std::string name;  ///< by which it goes at the coordinator
@@ -62,7 +62,8 @@ int wanted_pilots(const SlurmSnapshot& now);
 /// Whom the coordinator sees is there, whatever Slurm says: a controller that was killed may have
 /// forgotten it. Of the others counts who waits or has just begun. A pilot that rests or is alone
 /// for long is given up; a suspended one is replaced and left to whoever suspended it. When there
-/// are too many, those that wait go first, then the workers with the fewest leases are drained.
+/// are too many, those that wait go first, then those with the fewest leases are drained. A pilot
+/// counts once: when Slurm has started it again, the coordinator still has its dead worker, too.
 SlurmOrders give_orders(const SlurmSnapshot& now);
 
 /// Counts arrays in a row whose pilots have all gone without ever having worked: they cannot, and

@@ -132,9 +132,11 @@ def pilots_follow_the_work_and_are_replaced(programs, folder):
         cluster.start_controller()
 
         def agreed():
-            """The pilots, when processes, coordinator and queue agree on them."""
+            """The pilots, when queue, coordinator and processes agree on them. Slurm may end one that it took up wrongly
+            and start it again: what it says runs now has processes after that."""
+            running, workers = set(cluster.running()), farm.workers()
             alive = {name.removeprefix("slurm-") for name in ends_of_pilots(cluster)}
-            return alive if alive == farm.workers() == set(cluster.running()) else set()
+            return alive if alive == workers == running else set()
         first = farm.wait_while_busy(lambda: len(pilots := agreed()) == 3 and pilots, "three pilots work and are known")
 
         status = cluster.run(programs.path("baton"), "farm", "status", *farm.link())

@@ -38,10 +38,14 @@ double zone(double a, double b) { return 2 * std::sin(0.5 * (a + b)) * std::sin(
 
 }  // namespace
 
+std::array<int, 2> map_sides(int width, int height, int max_width) {
+  if (max_width == 0 || width <= max_width) return {width, height};
+  return {max_width, std::max(1, static_cast<int>(std::lround(1.0 * height * max_width / width)))};
+}
+
 ReducedMap reduce_map(const RgbImage& map, int width, float scale) {
   BATON_CHECK(width > 0 && width < map.width);
-  const int height =
-      std::max(1, static_cast<int>(std::lround(1.0 * map.height * width / map.width)));
+  const int height = map_sides(map.width, map.height, width)[1];
   ReducedMap reduced{{width, height, {}}, {}};
   reduced.image.rgb.reserve(std::size_t{3} * static_cast<std::size_t>(width) * height);
   const auto angle = [&](std::int64_t edge) {
@@ -69,9 +73,10 @@ ReducedMap reduce_map(const RgbImage& map, int width, float scale) {
 
 EnvironmentMap make_map(const RgbImage& picture, const EnvironmentSpec& environment,
                         bool compensate, const HiddenCone& hidden) {
-  if (environment.max_width == 0 || picture.width <= environment.max_width)
+  const int width = map_sides(picture.width, picture.height, environment.max_width)[0];
+  if (width == picture.width)
     return {picture, environment.filter, environment.scale, compensate, {}, hidden};
-  const ReducedMap reduced = reduce_map(picture, environment.max_width, environment.scale);
+  const ReducedMap reduced = reduce_map(picture, width, environment.scale);
   return {reduced.image, environment.filter, 1, compensate, reduced.repairs, hidden};
 }
 

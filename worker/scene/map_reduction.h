@@ -1,5 +1,7 @@
 #pragma once
 
+#include <array>
+
 #include "common/image/image_io.h"
 #include "common/job/job_spec.h"
 #include "worker/scene/environment.h"
@@ -11,6 +13,9 @@ struct ReducedMap {
   RgbImage image;
   TexelRepairs repairs;
 };
+
+/// Columns and rows of what make_map makes of a picture with these sides. max_width: 0: any.
+std::array<int, 2> map_sides(int width, int height, int max_width);
 
 /// A lat-long map as `width` columns and round(height * width / its width) rows, at least one. Each
 /// texel is the mean of the radiance, times `scale`, over its part of the sphere: texels of the map

@@ -38,7 +38,8 @@ bool has_area(const Vec3& a, const Vec3& b, const Vec3& c) {
   return doubled_area(to_b, to_c) > kMinRelativeArea * longest;
 }
 
-void MeshBuilder::add(const std::array<Vec3, 3>& corners, const std::array<Vec3, 3>& normals,
+void MeshBuilder::add(const std::array<std::uint32_t, 3>& vertices,
+                      const std::array<Vec3, 3>& corners, const std::array<Vec3, 3>& normals,
                       const std::array<UvSets, 3>& uvs, const std::array<Tangent, 3>& tangents) {
   if (!has_area(corners[0], corners[1], corners[2])) {
     ++mesh_.dropped_triangles;
@@ -46,7 +47,10 @@ void MeshBuilder::add(const std::array<Vec3, 3>& corners, const std::array<Vec3,
   }
   std::array<std::uint32_t, 3> triangle{};
   for (std::size_t k = 0; k < 3; ++k) {
-    triangle[k] = vertex(corners[k], parts_.normals ? normals[k] : Vec3{}, uvs[k], tangents[k]);
+    std::uint32_t& known = of_part_[vertices[k]];
+    if (known == 0)
+      known = vertex(corners[k], parts_.normals ? normals[k] : Vec3{}, uvs[k], tangents[k]) + 1;
+    triangle[k] = known - 1;
   }
   mesh_.triangles.push_back(triangle);
 }
@@ -122,10 +126,13 @@ std::vector<Vec3> smooth_vertex_normals(const TriangleMesh& mesh) {
   for (const auto& triangle : mesh.triangles) {
     const std::array<Vec3, 3> p{mesh.positions[triangle[0]], mesh.positions[triangle[1]],
                                 mesh.positions[triangle[2]]};
-    const Vec3 normal = normalize(cross(normalize(p[1] - p[0]), normalize(p[2] - p[0])));
+    // From each corner to the next, and back: exactly as if each were normalized.
+    const std::array<Vec3, 3> to{normalize(p[1] - p[0]), normalize(p[2] - p[1]),
+                                 normalize(p[0] - p[2])};
+    const std::array<Vec3, 3> back{Vec3{} - to[0], Vec3{} - to[1], Vec3{} - to[2]};
+    const Vec3 normal = normalize(cross(to[0], back[2]));
     for (std::size_t k = 0; k < 3; ++k) {
-      const Vec3 a = normalize(p[(k + 1) % 3] - p[k]);
-      const Vec3 b = normalize(p[(k + 2) % 3] - p[k]);
+      const Vec3 &a = to[k], &b = back[(k + 2) % 3];
       sum[triangle[k]] += normal * std::atan2(length(cross(a, b)), dot(a, b));
       of_one_face[triangle[k]] = normal;
     }

@@ -22,9 +22,14 @@ class MeshBuilder {
   /// Corners that differ in one of `parts` stay different vertices.
   explicit MeshBuilder(MeshParts parts) : parts_(parts) {}
 
-  /// Adds a triangle of finite corners. normals: unit. What `parts` does not name is not looked at.
-  void add(const std::array<Vec3, 3>& corners, const std::array<Vec3, 3>& normals = {},
-           const std::array<UvSets, 3>& uvs = {}, const std::array<Tangent, 3>& tangents = {});
+  /// The triangles that follow are of a list of so many vertices, another one than before.
+  void begin_part(std::size_t num_vertices) { of_part_.assign(num_vertices, 0); }
+  /// Adds a triangle of finite corners. vertices: their places in the part's list; a place always
+  /// has the same position, normal and so on. normals: unit. What `parts` does not name is not
+  /// looked at.
+  void add(const std::array<std::uint32_t, 3>& vertices, const std::array<Vec3, 3>& corners,
+           const std::array<Vec3, 3>& normals = {}, const std::array<UvSets, 3>& uvs = {},
+           const std::array<Tangent, 3>& tangents = {});
   TriangleMesh take() { return std::move(mesh_); }
 
  private:
@@ -43,6 +48,8 @@ class MeshBuilder {
   /// Hash table of open addressing: numbers of vertices + 1, 0 where there is none. Its size is a
   /// power of two, at least twice the vertices.
   std::vector<std::uint32_t> slots_;
+  /// By place in the part's list, likewise: each vertex is looked for once.
+  std::vector<std::uint32_t> of_part_;
 };
 
 /// Whether a triangle has a normal in float.

@@ -53,12 +53,15 @@ bool has_normals(const aiMesh* part) {
 }
 
 void add_part(const aiMesh& part, const MeshParts& parts, MeshBuilder& builder) {
+  builder.begin_part(part.mNumVertices);
   for (const aiFace& face : std::span(part.mFaces, part.mNumFaces)) {
     if (face.mNumIndices != 3) continue;  // points and lines
+    const std::array<std::uint32_t, 3> vertices{face.mIndices[0], face.mIndices[1],
+                                                face.mIndices[2]};
     std::array<Vec3, 3> corners, normals;
     std::array<UvSets, 3> uvs{};
     for (std::size_t k = 0; k < 3; ++k) {
-      const unsigned index = face.mIndices[k];
+      const std::uint32_t index = vertices[k];
       const aiVector3D& p = part.mVertices[index];
       corners[k] = {p.x, p.y, p.z};
       // In these files v grows upward.
@@ -68,7 +71,7 @@ void add_part(const aiMesh& part, const MeshParts& parts, MeshBuilder& builder) 
       const aiVector3D& n = part.mNormals[index];
       normals[k] = normalize({n.x, n.y, n.z});
     }
-    builder.add(corners, normals, uvs);
+    builder.add(vertices, corners, normals, uvs);
   }
 }
 

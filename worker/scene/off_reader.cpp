@@ -90,7 +90,7 @@ Status read_face(WordReader& reader, std::uint32_t face, const std::vector<Vec3>
   if (!corners)
     return off_error(name, reader,
                      "expected the number of corners of face " + std::to_string(face));
-  std::array<Vec3, 3> fan;
+  std::array<std::uint32_t, 3> fan{};
   for (std::uint32_t k = 0; k < *corners; ++k) {
     const auto index = reader.number<std::uint32_t>();
     if (!index || *index >= vertices.size()) {
@@ -98,9 +98,9 @@ Status read_face(WordReader& reader, std::uint32_t face, const std::vector<Vec3>
                        "expected a vertex index below " + std::to_string(vertices.size()) +
                            " in face " + std::to_string(face));
     }
-    fan[k < 2 ? k : 2] = vertices[*index];
+    fan[k < 2 ? k : 2] = *index;
     if (k < 2) continue;
-    builder.add(fan);
+    builder.add(fan, {vertices[fan[0]], vertices[fan[1]], vertices[fan[2]]});
     fan[1] = fan[2];
   }
   reader.skip_line();
@@ -130,6 +130,7 @@ Result<TriangleMesh> parse_off(std::string_view text, const std::string& name) {
 
   BATON_ASSIGN(const std::vector<Vec3> vertices, read_vertices(reader, *num_vertices, name));
   MeshBuilder builder(MeshParts{});
+  builder.begin_part(vertices.size());
   for (std::uint32_t face = 0; face < *num_faces; ++face) {
     BATON_TRY(read_face(reader, face, vertices, builder, name));
   }

@@ -18,16 +18,21 @@ namespace {
 enum class Scalar : std::uint8_t { int8, uint8, int16, uint16, int32, uint32, float32, float64 };
 enum class Format : std::uint8_t { text, little_endian, big_endian };
 
+/// What a property says of the mesh.
+enum class Role : std::uint8_t { nothing, x, y, z, nx, ny, nz, corners };
+
 struct Property {
   std::string name;
   Scalar type = Scalar::float32;
   std::optional<Scalar> count_type;  ///< a list
+  Role role = Role::nothing;
 };
 
 struct Element {
   std::string name;
   std::uint64_t count = 0;
   std::vector<Property> properties;
+  bool is_vertex = false;
 };
 
 struct Header {
@@ -74,6 +79,24 @@ std::optional<Property> parse_property(std::istringstream& words) {
   return property;
 }
 
+Role role_of(const std::string& element, const Property& property) {
+  using Named = std::pair<std::string_view, Role>;
+  static constexpr std::array<Named, 6> kOfVertex{{{"x", Role::x},
+                                                   {"y", Role::y},
+                                                   {"z", Role::z},
+                                                   {"nx", Role::nx},
+                                                   {"ny", Role::ny},
+                                                   {"nz", Role::nz}}};
+  const std::string& name = property.name;
+  if (property.count_type) {
+    const bool corners = element == "face" && (name == "vertex_indices" || name == "vertex_index");
+    return corners ? Role::corners : Role::nothing;
+  }
+  if (element != "vertex") return Role::nothing;
+  const auto* const found = std::ranges::find(kOfVertex, name, &Named::first);
+  return found != kOfVertex.end() ? found->second : Role::nothing;
+}
+
 Result<Header> parse_header(std::string_view bytes, const std::string& name) {
   const auto fail = [&](const std::string& what) {
     return Error{ErrorKind::bad_input, name + ": " + what};
@@ -104,10 +127,12 @@ Result<Header> parse_header(std::string_view bytes, const std::string& name) {
     } else if (keyword == "element") {
       Element element;
       if (!(words >> element.name >> element.count)) return bad_line();
+      element.is_vertex = element.name == "vertex";
       header.elements.push_back(element);
     } else if (keyword == "property" && !header.elements.empty()) {
       std::optional<Property> property = parse_property(words);
       if (!property) return bad_line();
+      property->role = role_of(header.elements.back().name, *property);
       header.elements.back().properties.push_back(std::move(*property));
     } else if (keyword != "comment" && keyword != "obj_info" && !keyword.empty()) {
       return bad_line();
@@ -122,14 +147,26 @@ class ValueReader {
   ValueReader(std::string_view bytes, Format format) : bytes_(bytes), format_(format) {}
 
   std::optional<double> next(Scalar type) {
-    using Next = std::optional<double> (ValueReader::*)();
-    constexpr std::array<Next, 8> kNext{
-        &ValueReader::next_binary<std::int8_t>,  &ValueReader::next_binary<std::uint8_t>,
-        &ValueReader::next_binary<std::int16_t>, &ValueReader::next_binary<std::uint16_t>,
-        &ValueReader::next_binary<std::int32_t>, &ValueReader::next_binary<std::uint32_t>,
-        &ValueReader::next_binary<float>,        &ValueReader::next_binary<double>};
     if (format_ == Format::text) return next_word();
-    return (this->*kNext[static_cast<std::size_t>(type)])();
+    switch (type) {
+      case Scalar::int8:
+        return next_binary<std::int8_t>();
+      case Scalar::uint8:
+        return next_binary<std::uint8_t>();
+      case Scalar::int16:
+        return next_binary<std::int16_t>();
+      case Scalar::uint16:
+        return next_binary<std::uint16_t>();
+      case Scalar::int32:
+        return next_binary<std::int32_t>();
+      case Scalar::uint32:
+        return next_binary<std::uint32_t>();
+      case Scalar::float32:
+        return next_binary<float>();
+      case Scalar::float64:
+        return next_binary<double>();
+    }
+    return std::nullopt;
   }
 
  private:
@@ -169,8 +206,9 @@ class PlyReader {
       for (std::uint64_t i = 0; i < element.count; ++i) BATON_TRY(read_record(element, i));
     }
     MeshBuilder builder({.normals = with_normals_});
+    builder.begin_part(positions_.size());
     for (const auto& t : triangles_) {
-      builder.add({positions_[t[0]], positions_[t[1]], positions_[t[2]]},
+      builder.add(t, {positions_[t[0]], positions_[t[1]], positions_[t[2]]},
                   {normals_[t[0]], normals_[t[1]], normals_[t[2]]});
     }
     return builder.take();
@@ -184,18 +222,20 @@ class PlyReader {
 
   Status read_record(const Element& element, std::uint64_t index) {
     Vec3 position, normal;
+    const std::array<float*, 7> targets{nullptr,   &position.x, &position.y, &position.z,
+                                        &normal.x, &normal.y,   &normal.z};
     for (const Property& property : element.properties) {
       const std::optional<double> value = values_.next(property.count_type.value_or(property.type));
       if (!value) return error_at(element, index, "expected a number of property " + property.name);
       if (property.count_type) {
         BATON_TRY(read_list(element, index, property, *value));
-      } else if (element.name == "vertex") {
-        set_coordinate(property.name, static_cast<float>(*value), position, normal);
+      } else if (property.role != Role::nothing) {
+        *targets[static_cast<std::size_t>(property.role)] = static_cast<float>(*value);
       }
     }
 
     // A file with one unusable normal has none.
-    if (element.name != "vertex") return {};
+    if (!element.is_vertex) return {};
     if (!std::isfinite(position.x) || !std::isfinite(position.y) || !std::isfinite(position.z)) {
       return error_at(element, index, "expected finite coordinates");
     }
@@ -206,28 +246,16 @@ class PlyReader {
     return {};
   }
 
-  static void set_coordinate(const std::string& property, float value, Vec3& position,
-                             Vec3& normal) {
-    if (property == "x") position.x = value;
-    if (property == "y") position.y = value;
-    if (property == "z") position.z = value;
-    if (property == "nx") normal.x = value;
-    if (property == "ny") normal.y = value;
-    if (property == "nz") normal.z = value;
-  }
-
   /// Reads `count` entries; those of a face's corners become triangles around its first.
   Status read_list(const Element& element, std::uint64_t index, const Property& property,
                    double count) {
-    const bool corners = element.name == "face" &&
-                         (property.name == "vertex_indices" || property.name == "vertex_index");
     if (!(count >= 0 && count <= 0xFFFFFFFFu))
       return error_at(element, index, "expected the length of a list");
     std::array<std::uint32_t, 3> fan{};
     for (double k = 0; k < count; ++k) {
       const std::optional<double> value = values_.next(property.type);
       if (!value) return error_at(element, index, "expected a number of property " + property.name);
-      if (!corners) continue;
+      if (property.role != Role::corners) continue;
       if (!(*value >= 0 && *value < static_cast<double>(positions_.size()))) {
         return error_at(element, index,
                         "expected a vertex index below " + std::to_string(positions_.size()));

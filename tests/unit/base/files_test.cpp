@@ -44,6 +44,13 @@ TEST_F(FilesTest, CreatesMissingFolders) {
   EXPECT_EQ(*read_text_file(file, 100), "deep");
 }
 
+TEST_F(FilesTest, AFolderThatCannotBeMadeIsNamedWithItsReason) {
+  const fs::path folder = folder_ / std::string(300, 'x');
+  const Status written = write_file_unsynced(folder / "file", as_bytes_view("1"));
+  ASSERT_FALSE(written.ok());
+  EXPECT_EQ(written.error().message, folder.string() + ": cannot create: File name too long");
+}
+
 TEST_F(FilesTest, AFailedPublicationNamesThePathAndLeavesNothing) {
   const fs::path occupied = folder_ / "a";
   fs::create_directories(occupied / "inside");

@@ -132,6 +132,8 @@ TEST(MapReduction, AMapThatIsNarrowEnoughStaysAsItIs) {
   const EnvironmentMap coarse = make_map(map, environment, false);
   EXPECT_EQ(coarse.width(), 8);
   EXPECT_EQ(coarse.height(), 4);
+  EXPECT_EQ(map_sides(32, 16, 8), (std::array{8, 4}));
+  EXPECT_EQ(map_sides(32, 16, 0), (std::array{32, 16}));
   EXPECT_NEAR(coarse.total_power(), plain.total_power(), 0.05 * plain.total_power());
 }
 

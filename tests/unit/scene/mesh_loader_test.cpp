@@ -122,6 +122,35 @@ TEST(MeshLoader, FlattensNodeTransforms) {
   }
 }
 
+TEST(MeshLoader, AMeshOfTwoNodesHasTheVerticesOfBoth) {
+  std::string json = square_gltf_json(R"(,"uri":"square.bin")");
+  const auto replace = [&](const std::string& from, const std::string& to) {
+    json.replace(json.find(from), from.size(), to);
+  };
+  replace(R"("children":[1])", R"("children":[1,2])");
+  replace(R"("scale":[2,2,2]})", R"("scale":[2,2,2]},{"mesh":0,"translation":[5,0,0]})");
+  write_test_file("square.bin", square_buffer());
+  const auto mesh = load_mesh(write_test_file("two_nodes.gltf", json), true);
+  ASSERT_TRUE(mesh.ok()) << mesh.error().message;
+  EXPECT_EQ(mesh->positions.size(), 8u);
+  EXPECT_NEAR(area(*mesh), 5, 1e-6);
+}
+
+TEST(MeshLoader, VerticesAtOnePlaceAreOneAndUnusedOnesAreNone) {
+  // The edge that both triangles share is in the list twice; nobody uses the last one.
+  const std::string vertices = "0 0 0\n0 0 1\n1 0 1\n0 0 0\n1 0 1\n1 0 0\n9 9 9\n";
+  const std::string faces = "3 0 1 2\n3 3 4 5\n";
+  std::string ply = kPlyHeader;
+  ply.replace(ply.find("vertex 4"), 8, "vertex 7");
+  for (const std::string& path :
+       {write_test_file("twice.off", "OFF 7 2 0\n" + vertices + faces),
+        write_test_file("twice.ply", ply + vertices + faces),
+        write_test_file("twice.obj",
+                        "v 0 0 0\nv 0 0 1\nv 1 0 1\nv 0 0 0\nv 1 0 1\nv 1 0 0\nv 9 9 9\n"
+                        "f 1 2 3\nf 4 5 6\n")})
+    expect_square(path);
+}
+
 TEST(MeshLoader, ReadsOffAsPeopleWriteIt) {
   expect_square(write_test_file(
       "comments.off",

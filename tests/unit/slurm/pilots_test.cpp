@@ -63,6 +63,19 @@ TEST(SlurmPilots, WhoWaitsGoesFirstThenWhoHoldsLeast) {
   EXPECT_EQ(give_orders(now), SlurmOrders{});
 }
 
+// Slurm has ended it and started it again before the coordinator missed its first worker.
+TEST(SlurmPilots, AreNotTooManyWhenOneHasTwoWorkers) {
+  SlurmSnapshot now = snapshot(100);
+  now.workers = {worker("1_1", 3), worker("1_2", 2), worker("1_3", 3)};
+  now.workers.push_back({"1_1", "slurm-1_1#6203e0e8", 0});
+  EXPECT_EQ(give_orders(now), SlurmOrders{});
+  now.most = 2;
+  EXPECT_EQ(give_orders(now), (SlurmOrders{0, {}, {"slurm-1_2"}}));
+  now.most = 1;
+  EXPECT_EQ(give_orders(now),
+            (SlurmOrders{0, {}, {"slurm-1_2", "slurm-1_1", "slurm-1_1#6203e0e8"}}));
+}
+
 TEST(SlurmPilots, TheLeastStay) {
   SlurmSnapshot now = snapshot(0);
   now.workers = {worker("1_1", 0), worker("1_2", 0)};

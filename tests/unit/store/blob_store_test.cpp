@@ -54,6 +54,16 @@ TEST_F(BlobStoreTest, BlobsOutliveTheStoreObject) {
   EXPECT_EQ(text_of(*open().get(digest)), "state");
 }
 
+// A small job has few blobs: 256 folders would take longer than it does.
+TEST_F(BlobStoreTest, FoldersComeWithTheirFirstBlob) {
+  BlobStore store = open();
+  EXPECT_TRUE(fs::is_directory(folder_));
+  EXPECT_TRUE(fs::is_empty(folder_));
+  const fs::path file = store.path(*store.put(as_bytes_view("film")));
+  EXPECT_TRUE(fs::is_regular_file(file));
+  EXPECT_EQ(std::distance(fs::directory_iterator(folder_), fs::directory_iterator()), 1);
+}
+
 TEST_F(BlobStoreTest, NamesAreTheDigestSplitAfterTwoDigits) {
   const BlobStore store = open();
   const Digest digest{0xab23456789abcdefull, 0x1ull};

@@ -18,19 +18,23 @@ void add_triangles(const Vertices& v, const Matrix& to_file, const MeshParts& pa
   const Transform transform = to_transform(to_file);
   const Mat3 normal_to_file = inverse_transposed(transform.linear).value_or(Mat3{});
   const bool mirrored = determinant(to_file) < 0;
+  builder.begin_part(v.positions.size() / 3);
   for (std::size_t i = 0; i < v.corners.size(); i += 3) {
+    std::array<std::uint32_t, 3> vertices{};
     std::array<Vec3, 3> corners, normals;
     std::array<UvSets, 3> uvs{};
     std::array<Tangent, 3> tangents{};
     for (std::size_t k = 0; k < 3; ++k) {
-      const std::size_t vertex = v.corners[i + (mirrored ? 2 - k : k)];
+      const std::uint32_t vertex = v.corners[i + (mirrored ? 2 - k : k)];
+      vertices[k] = vertex;
       corners[k] = transform.point(vec3_at(v.positions, vertex));
       if (parts.normals) normals[k] = normalize(normal_to_file * vec3_at(v.normals, vertex));
       for (std::size_t set = 0; set < static_cast<std::size_t>(parts.uv_sets); ++set)
-        uvs[k][set] = {v.uvs[set][2 * vertex], v.uvs[set][2 * vertex + 1]};
+        uvs[k][set] = {v.uvs[set][std::size_t{2} * vertex],
+                       v.uvs[set][std::size_t{2} * vertex + 1]};
       if (parts.tangents) tangents[k] = tangent_at(v, vertex);
     }
-    builder.add(corners, normals, uvs, tangents);
+    builder.add(vertices, corners, normals, uvs, tangents);
   }
 }
 
