@@ -1,7 +1,6 @@
 #pragma once
 
 #include <cstdint>
-#include <utility>
 
 namespace baton {
 
@@ -10,18 +9,19 @@ namespace baton {
 /// is a square.
 constexpr std::uint32_t hilbert_index(std::uint32_t x, std::uint32_t y) {
   std::uint32_t index = 0;
-  for (std::uint32_t bit = 1u << 15; bit > 0; bit /= 2) {
-    const bool right = (x & bit) != 0;
-    const bool up = (y & bit) != 0;
-    index = index * 4 + ((right ? 3u : 0u) ^ (up ? 1u : 0u));
+  for (std::uint32_t bit = 16; bit-- > 0;) {
+    const std::uint32_t right = x >> bit & 1, up = y >> bit & 1;
+    index = index * 4 + ((3 * right) ^ up);
 
-    // Turn the quadrant so that the curve enters it at its lower left and leaves it at the right.
-    if (up) continue;
-    if (right) {
-      x = ~x;
-      y = ~y;
-    }
-    std::swap(x, y);
+    // Turn the quadrant so that the curve enters it at its lower left and leaves it at the right:
+    // below, x and y change places, on the right after they are turned round. Without branches,
+    // which nothing could predict.
+    const std::uint32_t below = up - 1, turned = (0 - right) & below;
+    x ^= turned;
+    y ^= turned;
+    const std::uint32_t swapped = (x ^ y) & below;
+    x ^= swapped;
+    y ^= swapped;
   }
   return index;
 }

@@ -51,10 +51,12 @@ LightSequence::LightSequence(const JobSpec& job, std::shared_ptr<MapCache> maps,
       hidden_(std::move(hidden)),
       cones_(static_cast<std::size_t>(num_steps(job))),
       frames_(expand_sequence(job)),
+      num_sets_(num_presampled_sets(std::int64_t{job.image.width} * job.image.height,
+                                    job.quality.rounds)),
       mixed_maps_(
           share, [](const EnvironmentMap& map) { return map.size_bytes(); }, frames_in_hand(job)),
       presampled_(
-          share, [](const PresampledLight& light) { return light.size_bytes(); },
+          share, [](const PresampledSets& light) { return light.size_bytes(); },
           frames_in_hand(job) * (static_cast<std::size_t>(job.quality.rounds) + 1)),
       irradiances_(
           share, [](const Irradiance& irradiance) { return irradiance.size_bytes(); },
@@ -151,9 +153,9 @@ Result<std::shared_ptr<const FrameLight>> LightSequence::at(std::int32_t index,
   if (light->presampled == nullptr) {
     light->presampled = presampled_.insert(
         {index, round},
-        std::make_shared<const PresampledLight>(presample_light(
+        std::make_shared<const PresampledSets>(presample_sets(
             light->now, light->before, job_.seed, static_cast<std::uint32_t>(frame.number),
-            presampled_layout(job_), frame.first_round + round)));
+            presampled_layout(job_), frame.first_round + round, num_sets_)));
   }
   return std::shared_ptr<const FrameLight>(std::move(light));
 }

@@ -29,7 +29,7 @@ struct FrameLight {
   /// How directions turn with the light from the frame before to now, if that is all that it does;
   /// see turn_between()
   std::optional<Mat3> turn;
-  std::shared_ptr<const PresampledLight> presampled;
+  std::shared_ptr<const PresampledSets> presampled;
   /// What arrives without shadows, of jobs with shadow catchers. `before` where samples are
   /// carried.
   std::shared_ptr<const Irradiance> irradiance{}, irradiance_before{};
@@ -83,10 +83,11 @@ class LightSequence {
   const std::shared_ptr<const HiddenLight> hidden_;
   std::vector<std::optional<HiddenCone>> cones_;  ///< (frames), of those that were asked for
   std::vector<FrameSpec> frames_;
+  const std::int32_t num_sets_;  ///< of presampled light
   mutable std::mutex mutex_;
   /// By the first frame index that shows these texels, and what is hidden of them.
   LruCache<std::pair<std::int32_t, HiddenCone>, EnvironmentMap> mixed_maps_;
-  LruCache<std::pair<std::int32_t, std::int32_t>, PresampledLight> presampled_;  ///< frame, round
+  LruCache<std::pair<std::int32_t, std::int32_t>, PresampledSets> presampled_;  ///< frame, round
   LruCache<std::int32_t, Irradiance> irradiances_;  ///< by the first frame with these texels
   std::vector<std::string> repair_notes_;
 };

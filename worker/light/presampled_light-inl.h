@@ -37,10 +37,9 @@ HWY_INLINE LightLanes LoadLight(const PresampledLight& presampled, std::size_t e
 /// Radiance of the same entries in the frame before; the presampled light must have it.
 HWY_INLINE Vec3Lanes LoadLightBefore(const PresampledLight& presampled, std::size_t entry) {
   const DF d;
-  const PresampledLight::Block& block = presampled.blocks[entry / PresampledLight::kBlock];
+  const PresampledLight::Before& block = presampled.before[entry / PresampledLight::kBlock];
   const std::size_t at = entry % PresampledLight::kBlock;
-  return {hn::Load(d, block.before_r + at), hn::Load(d, block.before_g + at),
-          hn::Load(d, block.before_b + at)};
+  return {hn::Load(d, block.r + at), hn::Load(d, block.g + at), hn::Load(d, block.b + at)};
 }
 
 }  // namespace baton::HWY_NAMESPACE

@@ -7,6 +7,7 @@
 #include <span>
 #include <utility>
 
+#include "common/base/limits.h"
 #include "common/math/hilbert.h"
 #include "common/math/low_discrepancy.h"
 #include "worker/light/candidates.h"
@@ -15,12 +16,12 @@
 namespace baton {
 namespace {
 
-/// The directions of all entries, in the order of the sequence.
-std::vector<OctDirection> draw_directions(const Environment& now,
-                                          const Philox4x32::Counter& seeds) {
+/// The directions of a set's entries, in the order of the sequence.
+std::vector<OctDirection> draw_directions(const Environment& now, const Philox4x32::Counter& seeds,
+                                          std::uint32_t set) {
   std::vector<OctDirection> directions(PresampledLight::kSize);
   for (std::uint32_t i = 0; i < PresampledLight::kSize; ++i) {
-    const auto [sx, sy] = sobol_2d(i);
+    const auto [sx, sy] = sobol_2d(set * PresampledLight::kSize + i);
     const Vec3 w = now.map->sample(
         {uniform_float(owen_scramble(sx, seeds[0])), uniform_float(owen_scramble(sy, seeds[1]))});
     directions[i] = encode_octahedral(now.rotation * w);
@@ -30,13 +31,13 @@ std::vector<OctDirection> draw_directions(const Environment& now,
 
 /// Sorts directions along the curve.
 void sort_along_curve(std::span<OctDirection> directions) {
-  std::vector<std::pair<std::uint32_t, OctDirection>> order;
+  std::vector<std::uint64_t> order;  // place, direction
   order.reserve(directions.size());
   for (const OctDirection w : directions)
-    order.emplace_back(hilbert_index(w & 0xFFFFu, w >> 16), w);
+    order.push_back(std::uint64_t{hilbert_index(w & 0xFFFFu, w >> 16)} << 32 | w);
   std::sort(order.begin(), order.end());
   std::transform(order.begin(), order.end(), directions.begin(),
-                 [](const auto& entry) { return entry.second; });
+                 [](std::uint64_t entry) { return static_cast<OctDirection>(entry); });
 }
 
 /// Puts a sorted run into its blocks; place 0 of them gets the eighth `first` of the curve.
@@ -65,7 +66,8 @@ float mean_radiance(std::span<const PresampledLight::Block> blocks) {
 
 PresampledLight presample_light(const Environment& now, const Environment& before,
                                 std::uint64_t job_seed, std::uint32_t frame,
-                                const PresampledLightLayout& layout, std::int32_t round) {
+                                const PresampledLightLayout& layout, std::int32_t round,
+                                std::uint32_t set) {
   PresampledLight presampled;
   if (now.map->black()) return presampled;
   const Rng rng({.job_seed = job_seed,
@@ -82,7 +84,7 @@ PresampledLight presample_light(const Environment& now, const Environment& befor
   presampled.run_blocks =
       layout.one_run ? PresampledLight::kNumBlocks
                      : std::bit_ceil(std::clamp(num_blocks, 1u, PresampledLight::kMaxRunBlocks));
-  std::vector<OctDirection> directions = draw_directions(now, rng.bits(0, 0));
+  std::vector<OctDirection> directions = draw_directions(now, rng.bits(0, 0), set);
   for (std::uint32_t first = 0; first < PresampledLight::kNumBlocks;
        first += presampled.run_blocks) {
     const auto run = std::span(directions)
@@ -95,20 +97,53 @@ PresampledLight presample_light(const Environment& now, const Environment& befor
 
   // Look everything up at the lattice directions, with the look-up that the pixels use.
   const EnvironmentView before_view = view_of(before);
-  presampled.has_before = layout.with_before;
-  for (PresampledLight::Block& block : presampled.blocks) {
+  if (layout.with_before) presampled.before.resize(presampled.blocks.size());
+  for (std::size_t b = 0; b < presampled.blocks.size(); ++b) {
+    PresampledLight::Block& block = presampled.blocks[b];
     kernels::decode_directions(block.code, block.x, block.y, block.z);
     kernels::evaluate_environment(now_view, block.x, block.y, block.z, block.r, block.g, block.b,
                                   block.density);
     std::transform(std::begin(block.density), std::end(block.density), block.inverse_density,
                    [](float density) { return density > 0 ? 1 / density : 0.0f; });
-    if (!presampled.has_before) continue;
+    if (presampled.before.empty()) continue;
+    PresampledLight::Before& old = presampled.before[b];
     float unused[PresampledLight::kBlock];
-    kernels::evaluate_environment(before_view, block.x, block.y, block.z, block.before_r,
-                                  block.before_g, block.before_b, unused);
+    kernels::evaluate_environment(before_view, block.x, block.y, block.z, old.r, old.g, old.b,
+                                  unused);
   }
   presampled.mean_radiance = mean_radiance(presampled.blocks);
   return presampled;
+}
+
+PresampledSets presample_sets(const Environment& now, const Environment& before,
+                              std::uint64_t job_seed, std::uint32_t frame,
+                              const PresampledLightLayout& layout, std::int32_t round,
+                              std::int32_t num_sets) {
+  PresampledSets result;
+  for (std::int32_t set = 0; set < num_sets; ++set)
+    result.sets.push_back(presample_light(now, before, job_seed, frame, layout, round,
+                                          static_cast<std::uint32_t>(set)));
+  return result;
+}
+
+std::int32_t num_presampled_sets(std::int64_t num_pixels, std::int32_t rounds) {
+  const auto most = static_cast<std::uint32_t>(std::max(kMostSetsOfFrame / rounds, 1));
+  const auto wanted = static_cast<std::uint64_t>((num_pixels + kPixelsOfSet - 1) / kPixelsOfSet);
+  return static_cast<std::int32_t>(
+      std::min<std::uint64_t>(std::bit_ceil(wanted), std::bit_floor(most)));
+}
+
+const PresampledLight& PresampledSets::of(std::int32_t x, std::int32_t y) const {
+  if (sets.size() == 1) return sets.front();
+  // Overscan has negative places.
+  const auto across = static_cast<std::uint32_t>((x + limits::kMaxOverscan) / kSquare);
+  const auto down = static_cast<std::uint32_t>((y + limits::kMaxOverscan) / kSquare);
+  const int bits = std::countr_zero(sets.size());
+  const std::uint32_t columns = 1u << (bits + 1) / 2, rows = 1u << bits / 2;
+  const std::uint32_t number = across % columns + columns * (down % rows);
+  const std::uint32_t turn =
+      owen_scramble(across / columns * 0x9E3779B9u + down / rows, 0x5BD1E995u);
+  return sets[(number ^ turn) % sets.size()];
 }
 
 }  // namespace baton

@@ -10,9 +10,9 @@
 namespace baton {
 
 /// Directions drawn from a frame's environment before its pixels are rendered; pixels pick
-/// candidates and proposals from it. One Owen-scrambled Sobol' sequence through the map's sampling
-/// table. Each entry's direction has density `density`, so a pixel that chooses entries
-/// independently of their contents stays unbiased; pixels that choose the same entries have
+/// candidates and proposals from it. A stretch of an Owen-scrambled Sobol' sequence through the
+/// map's sampling table. Each entry's direction has density `density`, so a pixel that chooses
+/// entries independently of their contents stays unbiased; pixels that choose the same entries have
 /// correlated errors.
 ///
 /// Every aligned run of `run_blocks` blocks is a net of the sequence, laid out along a Hilbert
@@ -41,16 +41,49 @@ struct PresampledLight {
     float r[kBlock], g[kBlock], b[kBlock];  ///< radiance of this frame
     float density[kBlock];                  ///< 1/sr
     float inverse_density[kBlock];          ///< sr; 0 where the density is
-    float before_r[kBlock], before_g[kBlock], before_b[kBlock];  ///< radiance of the frame before
+  };
+  /// Radiance of the same entries in the frame before.
+  struct alignas(32) Before {
+    float r[kBlock], g[kBlock], b[kBlock];
   };
   std::vector<Block> blocks;     ///< (kNumBlocks); empty for a black map
-  bool has_before = false;       ///< whether before_* are set, as the layout asks; else they are 0
+  std::vector<Before> before;    ///< (kNumBlocks), where the layout asks for it; else empty
   std::uint32_t run_blocks = 1;  ///< a power of two
   float mean_radiance = 0;       ///< of the environment over the sphere, grey; by its entries
 
   bool empty() const { return blocks.empty(); }
-  std::size_t size_bytes() const { return blocks.size() * sizeof(Block); }
+  std::size_t size_bytes() const {
+    return blocks.size() * sizeof(Block) + before.size() * sizeof(Before);
+  }
 };
+
+/// The presampled light of a frame and round in one or several sets, of which a pixel reads one.
+/// Pixels of a set err together; in a picture with many sets their errors average out. The sets are
+/// stretches of one Sobol' sequence: each is a net, and so are all together, which takes the error
+/// of the mean over the sets down faster than independent ones would. Which set a pixel reads
+/// depends on where it is in the picture alone, and not on what the sets contain: no bias.
+struct PresampledSets {
+  /// Side of the squares of pixels that read one set: they do it one after the other, while it is
+  /// in the cache.
+  static constexpr std::int32_t kSquare = 32;
+
+  std::vector<PresampledLight> sets;
+
+  /// The set of pixel (x, y). The squares of a larger square with as many squares as there are sets
+  /// read all of them, each larger square in another order.
+  const PresampledLight& of(std::int32_t x, std::int32_t y) const;
+  std::size_t size_bytes() const {
+    std::size_t sum = 0;
+    for (const PresampledLight& set : sets) sum += set.size_bytes();
+    return sum;
+  }
+};
+
+/// Number of sets, a power of two: one for so many pixels of the picture, and most of all rounds of
+/// a frame together, as all of them are kept.
+inline constexpr std::int64_t kPixelsOfSet = 1 << 16;
+inline constexpr std::int32_t kMostSetsOfFrame = 64;
+std::int32_t num_presampled_sets(std::int64_t num_pixels, std::int32_t rounds);
 
 /// How presampled light is laid out.
 struct PresampledLightLayout {
@@ -62,10 +95,17 @@ struct PresampledLightLayout {
   bool with_before = false;
 };
 
-/// The presampled light of one frame. before: the environment of the frame before (the same as
-/// `now` for the first frame). round: each has other directions.
+/// The presampled light of one frame and round, in num_sets sets. Arguments as below.
+PresampledSets presample_sets(const Environment& now, const Environment& before,
+                              std::uint64_t job_seed, std::uint32_t frame,
+                              const PresampledLightLayout& layout, std::int32_t round,
+                              std::int32_t num_sets);
+
+/// One set of the presampled light of one frame. before: the environment of the frame before (the
+/// same as `now` for the first frame). round: each has other directions. set: its number.
 PresampledLight presample_light(const Environment& now, const Environment& before,
                                 std::uint64_t job_seed, std::uint32_t frame,
-                                const PresampledLightLayout& layout = {}, std::int32_t round = 0);
+                                const PresampledLightLayout& layout = {}, std::int32_t round = 0,
+                                std::uint32_t set = 0);
 
 }  // namespace baton

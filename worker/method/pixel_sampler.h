@@ -22,6 +22,7 @@ namespace baton {
 struct PixelInput {
   const SiteBlock& sites;  ///< at least one of them sees a surface
   const FrameLight& light;
+  const PresampledLight& presampled;  ///< the set of light.presampled that the pixel reads
   const EnvironmentView& now;  ///< views of light.now and light.before
   const EnvironmentView& before;
   RngKey key;
@@ -45,14 +46,14 @@ inline kernels::CarriedLight carried_light(const PixelInput& input) {
   return {.before = input.before,
           .now = input.now,
           .still = input.light.still,
-          .presampled = *input.light.presampled,
+          .presampled = input.presampled,
           .turn = input.light.turn ? &*input.light.turn : nullptr};
 }
 
 /// What its fresh candidates are drawn from.
 inline kernels::CandidateSource candidate_source(const PixelInput& input,
                                                  const kernels::CandidateCounts& counts) {
-  return {input.sites, input.now, *input.light.presampled, counts,
+  return {input.sites, input.now, input.presampled, counts,
           Rng(input.key, PassId::candidates).bits(0, 0)};
 }
 

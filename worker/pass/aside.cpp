@@ -12,6 +12,7 @@ Rgb AsideSampler::sample(const PixelMethod& method, const PixelInput& pixel, con
   target_.resize(static_cast<std::size_t>(like.num_particles));
   const PixelInput input{.sites = aside.sites,
                          .light = aside.light,
+                         .presampled = aside.presampled,
                          .now = pixel.now,
                          .before = pixel.before,
                          .key = aside.key,

@@ -16,6 +16,7 @@ class AsideSampler {
     std::span<const SurfaceHit> hits;  ///< (S) of the sites
     const SiteOrigins& origins;        ///< of the sites
     const FrameLight& light;
+    const PresampledLight& presampled;  ///< of the light, what the pixel reads
     RngKey key;
     const PixelMemory* memory = nullptr;  ///< what it starts from; null: afresh
   };

@@ -72,8 +72,12 @@ Rgb CatcherEdge::sample(const PixelMethod& method, const PixelInput& input, cons
   // Random numbers of pixels that no picture has.
   RngKey key = input.key;
   key.pixel ^= 0x80000000u;
-  const AsideSampler::Aside catcher{
-      .sites = sites_, .hits = hits_, .origins = origins, .light = light, .key = key};
+  const AsideSampler::Aside catcher{.sites = sites_,
+                                    .hits = hits_,
+                                    .origins = origins,
+                                    .light = light,
+                                    .presampled = input.presampled,
+                                    .key = key};
   return aside_.sample(method, input, catcher, like, scratch) + dark_share(hits_, sites_);
 }
 

@@ -30,10 +30,11 @@ constexpr bool is_probe(std::int32_t x, std::int32_t y, std::int32_t frame_numbe
 class NoiseProbe {
  public:
   /// The radiance of a pixel, once more. input: what the method is about to be given. light:
-  /// of kProbeRound. state: of the pixel's tile, where it is pixel `index`; stays as it is.
+  /// of kProbeRound; presampled: what the pixel reads of it. state: of the pixel's tile, where it
+  /// is pixel `index`; stays as it is.
   Rgb sample_again(const PixelMethod& method, const PixelInput& input, const FrameLight& light,
-                   SampleState& state, std::size_t index, const SiteOrigins& origins,
-                   SamplerScratch& scratch);
+                   const PresampledLight& presampled, SampleState& state, std::size_t index,
+                   const SiteOrigins& origins, SamplerScratch& scratch);
 
  private:
   AsideSampler aside_;

@@ -178,7 +178,7 @@ void TileFrameRenderer::sample(Batch& batch, const TileRound& at, SampleState& s
   batch.known.fill({});
   batch.emission.fill({});
   batch.again.fill({});
-  const kernels::CarriedLight carried{before, now, light.still, *light.presampled};
+  const kernels::CarriedLight carried{before, now, light.still, light.presampled->sets.front()};
   look_ahead(0, batch.first, carried, state);
   for (std::size_t i = 0; i < batch.count; ++i) {
     const std::size_t slot = batch.first + i, index = surfaces_->pixels.index(slot);
@@ -198,9 +198,11 @@ void TileFrameRenderer::sample(Batch& batch, const TileRound& at, SampleState& s
 
     // Sample it.
     const Ahead& ahead = ahead_[slot % 2];
+    const auto [x, y] = surfaces_->rect.place(index);
     const PixelInput input{
         .sites = sites,
         .light = light,
+        .presampled = light.presampled->of(x, y),
         .now = now,
         .before = before,
         .key = batch.key(context_, surfaces_->rect, index),
@@ -226,8 +228,9 @@ void TileFrameRenderer::sample(Batch& batch, const TileRound& at, SampleState& s
     }
     if (at.probe_light != nullptr && !is_catcher &&
         (draws_twice_ || batch.is_probe(context_, surfaces_->rect, index))) {
-      batch.again[i] = probe_.sample_again(method_of(slot), input, *at.probe_light, state, index,
-                                           from, *scratch_);
+      batch.again[i] =
+          probe_.sample_again(method_of(slot), input, *at.probe_light,
+                              at.probe_light->presampled->of(x, y), state, index, from, *scratch_);
     }
     RayWriter rays(from, batch.rays);
     poison(*scratch_);

@@ -173,6 +173,13 @@ void EnvironmentMap::build_table(bool compensate) {
   row_cdf_.assign(static_cast<std::size_t>(rows) + 1, 0.0);
   block_cdf_.assign(static_cast<std::size_t>(rows) * (blocks + 1), 0.0);
   for (int r = 0; r < rows; ++r) {
+    const double top = row_angle(r), bottom = row_angle(r + 1);
+    const double sin_row = std::sin(0.5 * (top + bottom));
+    rows_.push_back(
+        {.top = std::cos(top),
+         .drop = zone_solid_angle(top, bottom) / (2 * std::numbers::pi),
+         .margin_right = std::min(
+             0.5, kOctahedralError * width_ / (2 * std::numbers::pi * std::max(sin_row, 1e-9)))});
     Texel* texel = &texels_[cell_row(r)];
     double* block_cdf = &block_cdf_[static_cast<std::size_t>(r) * (blocks + 1)];
     for (int block = 0; block < blocks; ++block) {
@@ -240,10 +247,8 @@ Vec3 EnvironmentMap::sample(const std::array<float, 2>& u) const {
   // The remainders place it in the cell. The margins keep it there when it is rounded to float or
   // to the lattice of carried directions: light that slips from a bright cell into a dim one would
   // be divided by too small a density, and what slips the other way does not make up for it.
-  const double sin_row = std::sin(0.5 * (row_angle(row) + row_angle(row + 1)));
+  const auto& [top, drop, margin_right] = rows_[static_cast<std::size_t>(row)];
   const double margin_down = std::min(0.5, kOctahedralError * height_ / std::numbers::pi);
-  const double margin_right =
-      std::min(0.5, kOctahedralError * width_ / (2 * std::numbers::pi * std::max(sin_row, 1e-9)));
   const double down =
       std::clamp((u[0] * row_cdf_.back() - row_cdf_[row]) / (row_cdf_[row + 1] - row_cdf_[row]),
                  margin_down, 1 - margin_down);
@@ -251,9 +256,7 @@ Vec3 EnvironmentMap::sample(const std::array<float, 2>& u) const {
       std::clamp((x - below) / texel[column].density, margin_right, 1 - margin_right);
 
   // Place the direction uniformly in the cell's solid angle.
-  const double top = row_angle(row);
-  const double drop = zone_solid_angle(top, row_angle(row + 1)) / (2 * std::numbers::pi);
-  const double y = std::cos(top) - drop * down;
+  const double y = top - drop * down;
   const double sin_polar = std::sqrt(std::max(0.0, (1 - y) * (1 + y)));
   const double shift = filter_ == MapFilter::bilinear ? 0.5 : 0.0;
   const double longitude = (0.5 - (column + shift + right) / width_) * 2 * std::numbers::pi;

@@ -99,7 +99,14 @@ class EnvironmentMap {
   /// Cumulative sums, in double: no dim cell is lost beside a sun. Of a row's cells only every
   /// kBlock-th sum is kept; between them the densities are added up again, so what is sampled is
   /// exactly what evaluate() reports.
-  std::vector<double> row_cdf_;    ///< (cell rows + 1) probability
+  std::vector<double> row_cdf_;  ///< (cell rows + 1) probability
+  /// Where a row of cells lies on the sphere.
+  struct Row {
+    double top;           ///< cosine of the polar angle of its upper edge
+    double drop;          ///< how far the cosine falls to the lower one
+    double margin_right;  ///< see sample(), in cells
+  };
+  std::vector<Row> rows_;          ///< (cell rows)
   std::vector<double> block_cdf_;  ///< (cell rows, ceil(W / kBlock) + 1) densities of the row
   TexelRepairs repairs_;
   double total_power_ = 0;

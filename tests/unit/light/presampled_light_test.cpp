@@ -60,7 +60,7 @@ TEST(PresampledLight, EntriesAgreeWithTheEnvironment) {
       const Vec3 w = decode_octahedral(block.code[j]);
       EXPECT_LT(length(w - Vec3{block.x[j], block.y[j], block.z[j]}), 1e-6f);
       EXPECT_NEAR(block.r[j], environment.evaluate(w).r, 1e-3f);
-      EXPECT_EQ(block.r[j], block.before_r[j]);
+      EXPECT_EQ(block.r[j], presampled.before[b].r[j]);
       EXPECT_GT(block.density[j], 0);
     }
   }

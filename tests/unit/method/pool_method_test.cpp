@@ -29,8 +29,8 @@ FrameLight light_of(const Radiance& radiance) {
           .before = map,
           .still = true,
           .turn = {},
-          .presampled = std::make_shared<const PresampledLight>(
-              presample_light(map, map, 3, 1, {.one_run = true}))};
+          .presampled = std::make_shared<const PresampledSets>(
+              presample_sets(map, map, 3, 1, {.one_run = true}, 0, 1))};
 }
 FrameLight sky() {
   return light_of([](int i) { return static_cast<float>(1 + (i * 37) % 23); });
@@ -60,6 +60,7 @@ struct OnePixel {
     RayWriter rays(origins, batch);
     return PoolMethod(spec).sample({.sites = sites,
                                     .light = light,
+                                    .presampled = light.presampled->sets.front(),
                                     .now = view,
                                     .before = view,
                                     .key = {.job_seed = 5, .pixel = number}},

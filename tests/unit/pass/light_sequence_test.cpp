@@ -25,7 +25,7 @@ TEST(LightSequence, KeepsTheLightOfTheLastFramesAlone) {
   const auto share = std::make_shared<MemoryShare>(std::uint64_t{1} << 30);
   LightSequence lights(job, std::make_shared<MapCache>(share), share);
   std::vector<std::weak_ptr<const EnvironmentMap>> maps;
-  std::vector<std::weak_ptr<const PresampledLight>> presampled;
+  std::vector<std::weak_ptr<const PresampledSets>> presampled;
   for (std::int32_t f = 0; f < 60; ++f) {
     const auto light = lights.at(f);
     ASSERT_TRUE(light.ok());
@@ -48,10 +48,9 @@ TEST(LightSequence, MakesAFrameAgainAlike) {
   for (std::int32_t f = 4; f < 40; ++f) ASSERT_TRUE(lights.at(f).ok());
   const auto again = *lights.at(3);
   ASSERT_NE(again->presampled, first->presampled) << "it was let go";
-  ASSERT_EQ(again->presampled->blocks.size(), first->presampled->blocks.size());
-  EXPECT_EQ(std::memcmp(again->presampled->blocks.data(), first->presampled->blocks.data(),
-                        first->presampled->size_bytes()),
-            0);
+  const PresampledLight &a = again->presampled->sets.front(), &b = first->presampled->sets.front();
+  ASSERT_EQ(a.blocks.size(), b.blocks.size());
+  EXPECT_EQ(std::memcmp(a.blocks.data(), b.blocks.data(), b.size_bytes()), 0);
 }
 
 // A box rises, so that less and less lies behind the ground for all that is lit.

@@ -78,11 +78,13 @@ struct CarriedTarget {
 
   /// Brings the block of proposals that BlockStart(bits) will name into the cache.
   HWY_INLINE void Prefetch(std::uint32_t bits) const {
-    const auto* block = reinterpret_cast<const char*>(
-        &light.presampled.blocks[BlockStart(bits) / PresampledLight::kBlock]);
-    for (std::size_t line = 0; line < sizeof(PresampledLight::Block); line += 64) {
-      hwy::Prefetch(block + line);
-    }
+    const std::size_t number = BlockStart(bits) / PresampledLight::kBlock;
+    const auto fetch = [](const auto& part) {
+      for (std::size_t line = 0; line < sizeof(part); line += 64)
+        hwy::Prefetch(reinterpret_cast<const char*>(&part) + line);
+    };
+    fetch(light.presampled.blocks[number]);
+    fetch(light.presampled.before[number]);
   }
 
   /// First entry of a uniformly drawn block of proposals.

@@ -48,7 +48,7 @@ SequentialOutcome sequential_step(const SiteBlock& sites, const OldSurfaces* old
                                   const RngKey& key, ParticleSpan particles) {
   BATON_CHECK(settings.num_particles >= 1 && settings.num_particles <= limits::kMaxParticles);
   if (light.presampled.empty() || !(lns_before > 0)) return {};
-  BATON_CHECK(light.presampled.has_before);
+  BATON_CHECK(!light.presampled.before.empty());
   if (old != nullptr) {
     return HWY_DYNAMIC_DISPATCH(SequentialMovedPixel)(sites, *old, light, located, settings,
                                                       lns_before, key, particles);
