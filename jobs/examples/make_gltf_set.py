@@ -264,9 +264,9 @@ def add_textures(b, materials):
     return {"images": b.images, "textures": b.textures, "samplers": samplers}
 
 
-def make_set(pillars=7, textured=False, alive=False):
-    """The bytes of the .glb."""
-    b = Builder()
+def make_set(pillars=7, textured=False, alive=False, builder=None):
+    """The bytes of the .glb. builder: another that puts it together."""
+    b = builder or Builder()
     materials = [pbr("floor", (0.5, 0.45, 0.4), 0, 0.7), pbr("clay", (0.6, 0.25, 0.15), 0, 0.6),
                  pbr("steel", (0.75, 0.77, 0.8), 1, 0.3), pbr("rubber", (0.1, 0.3, 0.6), 0, 0.4)]
     materials[1]["extensions"] = {"KHR_materials_clearcoat": {"clearcoatFactor": 1, "clearcoatRoughnessFactor": 0.1}}

@@ -2,10 +2,13 @@
 inside Blender 3.4:
 
 blender -b --factory-startup -P cycles_gltf.py -- SCENE.glb MAP.exr OUT.exr --frame 7 --width 480 --height 270 --spp 64
-    --seed 1 --threads 2
+    --seed 1 --threads 2 [--catcher NODE [--unblocked]]
 
 Of each material the images, their places and holes are the importer's; the Principled BSDF, which models other surfaces
 than glTF does, gives way to a diffuse one and, as far as it is metal, to a white GGX lobe.
+
+--catcher: the node is white and diffuse and blocks nothing, all else is black: the picture is the catcher's light, as far
+as it is seen. --unblocked: the other nodes block nothing either, but hide as much.
 """
 
 import argparse
@@ -28,6 +31,8 @@ def parse_arguments():
         parser.add_argument(name, type=Path)
     for name in ("frame", "width", "height", "spp", "seed", "threads"):
         parser.add_argument(f"--{name}", type=int, required=True)
+    parser.add_argument("--catcher")
+    parser.add_argument("--unblocked", action="store_true")
     return parser.parse_args(sys.argv[sys.argv.index("--") + 1:])
 
 
@@ -77,6 +82,38 @@ def replace_principled(material):
     material.cycles.sample_as_light = False
 
 
+def blacken(material):
+    """No light from a material of replace_principled, whose holes stay."""
+    nodes, links = material.node_tree.nodes, material.node_tree.links
+    output = next(node for node in nodes if node.type == "OUTPUT_MATERIAL")
+    holes = output.inputs["Surface"].links[0].from_node.inputs[1].links[0].from_node
+    black = nodes.new("ShaderNodeBsdfDiffuse")
+    black.inputs["Color"].default_value = (0, 0, 0, 1)
+    links.new(black.outputs[0], holes.inputs[2])
+    links.new(holes.outputs[0], output.inputs["Surface"])
+
+
+def catch(scene, name, unblocked):
+    """Light of the catcher alone, and what blocks it."""
+    catcher = scene.objects[name]
+    for material in bpy.data.materials:
+        if material.use_nodes:
+            blacken(material)
+    white = bpy.data.materials.new("catcher")
+    white.use_nodes = True
+    nodes, links = white.node_tree.nodes, white.node_tree.links
+    nodes.clear()
+    surface = nodes.new("ShaderNodeBsdfDiffuse")
+    surface.inputs["Color"].default_value = (1, 1, 1, 1)
+    links.new(surface.outputs[0], nodes.new("ShaderNodeOutputMaterial").inputs["Surface"])
+    catcher.data.materials.clear()
+    catcher.data.materials.append(white)
+    for shown in scene.objects:
+        if shown == catcher or unblocked:
+            shown.visible_shadow = shown.visible_diffuse = False
+    scene.render.film_transparent = True
+
+
 def main():
     options = parse_arguments()
     for collection in (bpy.data.objects, bpy.data.meshes, bpy.data.cameras, bpy.data.lights):
@@ -95,6 +132,8 @@ def main():
         shown.cycles.shadow_terminator_geometry_offset = 0
         shown.cycles.shadow_terminator_offset = 0
     cycles_scene.set_picture(scene, {"width": options.width, "height": options.height})
+    if options.catcher:
+        catch(scene, options.catcher, options.unblocked)
     cycles_settings.set_direct_light(scene, options)
     sky = cycles_scene.Sky(scene, options.map.parent, {"maps": [options.map.name], "bilinear": True}, None)
     sky.show({"map": 0, "rotation": [1, 0, 0, 0, 1, 0, 0, 0, 1]})

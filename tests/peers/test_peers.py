@@ -10,8 +10,10 @@ from pathlib import Path
 import numpy as np
 
 sys.path += [str(Path(__file__).parent), str(Path(__file__).parents[1] / "system")]
+import compare_gltf  # noqa: E402
 import conventions  # noqa: E402
 import errors  # noqa: E402
+import gltf_scenes  # noqa: E402
 import pictures  # noqa: E402
 from farm import BAD_INPUT, check, check_equal, make_job, run_tests, write_job  # noqa: E402
 
@@ -178,6 +180,73 @@ def blocks_at_the_edge_count_by_their_pixels(_, __):
     check_close(errors.block_means(values) @ sizes / sizes.sum(), values.mean((1, 2)), "mean", 1e-9)
 
 
+# ---- a glTF scene -------------------------------------------------------------------------------------------
+
+
+def beyond(a, b):
+    return float(np.mean(np.abs(compare_gltf.z_of(a, b)) > 3))
+
+
+def pixels_differ_as_often_as_chance_says(_, __):
+    chance = compare_gltf.by_chance(8, random)
+    check_close(chance, 0.0096, "8 pictures of both", 5e-4)
+    a, b = random.normal(5, 1, size=(2, 8, 300, 300))
+    check_close(beyond(a, b), chance, "the same", 1.5e-3)
+    check(beyond(a + 1, b) > 10 * chance, "one by a standard deviation, which is 2 standard errors, off")
+    still = np.full((8, 10), 3.0)
+    check_equal([beyond(still, still * 1.00001), beyond(still, still * 1.01)], [0.0, 1.0], "without noise")
+
+
+def a_pixel_is_put_where_it_belongs(_, __):
+    """4 x 2 pixels of 2 x 2: sky, then two objects of clay side by side, in the last column of steel."""
+    planes = {"object": np.zeros((4, 8)), "material": np.zeros((4, 8))}
+    for name, number in (("object", 1), ("material", 1)):
+        planes[name][:, 2:] = number
+    planes["object"][:, 6:], planes["material"][:2, 6:] = 2, 4
+    places = compare_gltf.places_of(planes, 2)
+    check_equal({name: mask.astype(int).tolist() for name, mask in places.items() if mask.any()},
+                {"edges": [[1, 1, 1, 1]] * 2}, "next to another object")
+    planes["object"][:] = 1
+    places = compare_gltf.places_of(planes, 2)
+    check_equal({name: mask.astype(int).tolist() for name, mask in places.items() if mask.any()},
+                {"sky": [[1, 0, 0, 0]] * 2, "clay": [[0, 1, 1, 0], [0, 1, 1, 1]], "steel": [[0, 0, 0, 1], [0, 0, 0, 0]]},
+                "by material")
+    check_equal(compare_gltf.blocks(np.arange(8).reshape(2, 4), 2).mean(-1).tolist(), [[2.5, 4.5]], "means")
+
+
+def hills_have_their_normals(_, __):
+    positions, normals, _, triangles = gltf_scenes.hills()
+    at, to = np.array(positions), np.array(normals)
+    corners = at[np.array(triangles)]
+    flat = np.cross(corners[:, 1] - corners[:, 0], corners[:, 2] - corners[:, 0])
+    flat /= np.linalg.norm(flat, axis=1, keepdims=True)
+    check(float(np.sum(flat[:, None] * to[np.array(triangles)], -1).min()) > 0.9995, "normals of corners and triangles")
+    check(at[:, 1].max() <= 0, "below what stands on the floor")
+
+
+def sets_of_both_kinds_render(programs, folder):
+    """As Baton reads them: with fewer texels, normal maps and hills that catch."""
+    folder.mkdir(parents=True)
+    for name, arguments in (("set", {}), ("hills", {"texels": 4, "normals": True, "hilly": True})):
+        scene = folder / f"{name}.glb"
+        scene.write_bytes(gltf_scenes.make_scene(**arguments))
+        document, buffer = gltf_scenes.open_glb(scene.read_bytes())
+        check(gltf_scenes.write_glb(document, buffer) == scene.read_bytes(), f"{name}: read and written")
+        if name == "hills":
+            check_equal(document["accessors"][-1]["count"], 6 * 96 * 96, "indices of the hills")
+        nodes = {"floor": {"catcher": True}} if name == "hills" else {}
+        output = {"directory": str(folder / name), "compression": "none", "pixelType": "float"}
+        job = make_job(folder, frames="1", output=output)
+        job["scene"] = {"gltf": {"file": str(scene), "nodes": nodes}}
+        job.pop("camera", None)
+        programs.render(write_job(folder / f"{name}.json", job), folder / "work")
+        frame = pictures.read_frame(next((folder / name).glob("*.exr")))
+        check_equal("shadow.R" in frame.channels, name == "hills", f"{name}: channels of a catcher")
+        if name == "hills":
+            shadow = np.array(frame.channels["shadow.R"])
+            check(float(shadow.min()) < 0.7 and float(np.median(shadow)) > 0.8, f"{name}: shadows")
+
+
 # ---- files --------------------------------------------------------------------------------------------------
 
 
@@ -233,5 +302,6 @@ if __name__ == "__main__":
                arrays_are_turned_like_points, the_error_is_that_planted, a_ratio_is_that_planted, a_curve_ends_honestly,
                an_error_as_shown_counts_what_a_screen_shows,
                a_difference_is_seen_and_noise_is_not, a_difference_of_single_pixels_is_seen,
-               blocks_at_the_edge_count_by_their_pixels, frames_are_read_as_written,
+               blocks_at_the_edge_count_by_their_pixels, pixels_differ_as_often_as_chance_says,
+               a_pixel_is_put_where_it_belongs, hills_have_their_normals, sets_of_both_kinds_render, frames_are_read_as_written,
                a_picture_is_written_as_it_is, what_is_not_modelled_alike_is_refused])
