@@ -50,6 +50,85 @@ TEST(PresampledLight, EveryPlaceInABlockSeesTheWholeMap) {
     EXPECT_NEAR(mean[j], all, 4 * error) << j;
 }
 
+// Hypothesis: the mean over four sets has at most half the variance that four independent ones
+// would have, by 64 seeds. Independent ones (other rounds) have a ratio near 1.
+TEST(PresampledSets, AreOneNetTogether) {
+  const Environment environment = gradient_environment();
+  const auto mean_y = [](const PresampledLight& light) {
+    double sum = 0;
+    for (const PresampledLight::Block& block : light.blocks)
+      for (const float y : block.y) sum += double{y} / PresampledLight::kSize;
+    return sum;
+  };
+  constexpr int kSeeds = 64;
+  const auto variance_of = [&](auto estimate) {
+    double sum = 0, squares = 0;
+    for (int seed = 1; seed <= kSeeds; ++seed) {
+      const double value = estimate(static_cast<std::uint64_t>(seed));
+      sum += value / kSeeds;
+      squares += value * value / kSeeds;
+    }
+    return squares - sum * sum;
+  };
+  const auto mean_of_four = [&](auto set_of) {
+    double sum = 0;
+    for (std::uint32_t k = 0; k < 4; ++k) sum += mean_y(set_of(k)) / 4;
+    return sum;
+  };
+  const double one = variance_of([&](std::uint64_t seed) {
+    return mean_y(presample_light(environment, environment, seed, 1));
+  });
+  const double together = variance_of([&](std::uint64_t seed) {
+    const auto all = presample_sets(environment, environment, seed, 1, {}, 0, 4);
+    return mean_of_four([&](std::uint32_t k) { return all.sets[k]; });
+  });
+  const double independent = variance_of([&](std::uint64_t seed) {
+    return mean_of_four([&](std::uint32_t k) {
+      return presample_light(environment, environment, seed, 1, {}, static_cast<std::int32_t>(k));
+    });
+  });
+  EXPECT_LT(together, 0.5 * one / 4);
+  EXPECT_GT(independent, 0.5 * one / 4);
+}
+
+TEST(PresampledSets, AreAllReadInEachSquareOfThem) {
+  const Environment environment = gradient_environment();
+  for (const std::int32_t count : {1, 2, 8, 16}) {
+    const PresampledSets sets = presample_sets(environment, environment, 5, 1, {}, 0, count);
+    const auto number_at = [&](std::int32_t column, std::int32_t row) {
+      const PresampledLight& set =
+          sets.of(column * PresampledSets::kSquare, row * PresampledSets::kSquare + 3);
+      return &set - sets.sets.data();
+    };
+    // Overscan, too, which begins a whole number of squares before the picture.
+    const std::int32_t columns = count == 1 ? 1 : count == 2 ? 2 : 4, rows = count / columns;
+    const std::int32_t margin = limits::kMaxOverscan / PresampledSets::kSquare;
+    int num_orders = 0;
+    for (std::int32_t x = -margin; x + columns <= 64; x += columns) {
+      for (std::int32_t y = -margin; y + rows <= 64; y += rows) {
+        std::map<std::ptrdiff_t, int> times;
+        for (std::int32_t i = 0; i < count; ++i)
+          ++times[number_at(x + i % columns, y + i / columns)];
+        ASSERT_EQ(times.size(), static_cast<std::size_t>(count)) << x << ", " << y;
+        num_orders += number_at(x, y) != 0 ? 1 : 0;
+      }
+    }
+    if (count > 1) {
+      EXPECT_GT(num_orders, 20);
+    }
+  }
+}
+
+TEST(PresampledSets, AreAsManyAsThePictureHasRoomFor) {
+  EXPECT_EQ(num_presampled_sets(240 * 160, 1), 1);
+  EXPECT_EQ(num_presampled_sets(512 * 512, 1), 4);
+  EXPECT_EQ(num_presampled_sets(1280 * 720, 1), 16);
+  EXPECT_EQ(num_presampled_sets(1920 * 1080, 1), 32);
+  EXPECT_EQ(num_presampled_sets(1920 * 1080, 4), 16);
+  EXPECT_EQ(num_presampled_sets(1920 * 1080, 65), 1);
+  EXPECT_EQ(num_presampled_sets(std::int64_t{16384} * 16384, 1), 64);
+}
+
 TEST(PresampledLight, EntriesAgreeWithTheEnvironment) {
   const Environment environment = gradient_environment();
   const PresampledLight presampled =
