@@ -23,7 +23,7 @@ struct PixelInput {
   const SiteBlock& sites;  ///< at least one of them sees a surface
   const FrameLight& light;
   const PresampledLight& presampled;  ///< the set of light.presampled that the pixel reads
-  const EnvironmentView& now;  ///< views of light.now and light.before
+  const EnvironmentView& now;         ///< views of light.now and light.before
   const EnvironmentView& before;
   RngKey key;
   std::int32_t frame_index = 0;  ///< 0-based position in the sequence
