@@ -134,7 +134,8 @@ void add_schema(const json& root, const json& schema, const std::string& path, S
   if (schema.contains("enum")) {
     const json& values = schema.at("enum");
     if (values.front().is_number()) {
-      here.insert("integer " + show({values.front().get<double>(), values.back().get<double>()}));
+      here.insert(schema.value("type", "integer") + " " +
+                  show({values.front().get<double>(), values.back().get<double>()}));
       return;
     }
     for (const json& value : values) here.insert("word " + value.get<std::string>());
