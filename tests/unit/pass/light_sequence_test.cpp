@@ -50,7 +50,8 @@ TEST(LightSequence, MakesAFrameAgainAlike) {
   ASSERT_NE(again->presampled, first->presampled) << "it was let go";
   const PresampledLight &a = again->presampled->sets.front(), &b = first->presampled->sets.front();
   ASSERT_EQ(a.blocks.size(), b.blocks.size());
-  EXPECT_EQ(std::memcmp(a.blocks.data(), b.blocks.data(), b.blocks.size() * sizeof(b.blocks[0])), 0);
+  EXPECT_EQ(std::memcmp(a.blocks.data(), b.blocks.data(), b.blocks.size() * sizeof(b.blocks[0])),
+            0);
 }
 
 // A box rises, so that less and less lies behind the ground for all that is lit.
