@@ -39,6 +39,7 @@ VARIANTS = {
     THE_JOB: Variant({}, (1, 4, 16, 64), (1, 4)),
     "M = 128": Variant({"sampling.numCandidates": 128}, (1, 4, 16), (1,)),
     "4 sites": Variant({"image.sites": 4, "sampling.numCandidates": 128}, (1, 4, 16, 64), (1, 4)),
+    "4 to 16 sites": Variant({"image.sites": 4, "image.maxSites": 16, "sampling.numCandidates": 128}, (1, 4, 16), (1, 4)),
     "bidirectional": Variant({"sampling.method": "bidirectional"}, (1, 4, 16), (1,)),
     "bidirectional, 4 sites": Variant({"sampling.method": "bidirectional", "sampling.numCandidates": 128,
                                        "image.sites": 4}, (1, 4, 16), (1,)),
