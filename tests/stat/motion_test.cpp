@@ -158,6 +158,7 @@ class TurningViewer {
     const EnvironmentView before = view_of(light_->before);
     sampler_->sample({.sites = sites,
                       .light = *light_,
+                      .presampled = light_->presampled->sets.front(),
                       .now = now,
                       .before = before,
                       .key = key,
