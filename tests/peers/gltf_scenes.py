@@ -49,7 +49,7 @@ def with_alike_materials(document, normals):
     document["extensionsUsed"] = [*used, "KHR_materials_specular"]
 
 
-def hills(cells=96, side=4, height=0.12, wave=1.3):
+def hills(cells=240, side=4, height=0.12, wave=1.3):
     """Smooth positions, normals, coordinates and triangles in place of the floor."""
     positions, normals, uvs, triangles = [], [], [], []
     for i in range(cells + 1):
