@@ -249,6 +249,8 @@ void check_max_sites(JobArchive& a, const JobSpec& job) {
   };
   if (job.visibility.correlated) {
     refuse("visibility.correlated has pixels of equal sites");
+  } else if (job.sampling.method == Method::automatic) {
+    refuse("auto may choose a method whose samples belong to sites");
   } else if (!rounds_have_own_sites(job)) {
     refuse(fmt::format("the samples that {} carries belong to sites",
                        traits(job.sampling.method).name));

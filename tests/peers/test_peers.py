@@ -3,6 +3,7 @@
 
 import json
 import math
+import subprocess
 import sys
 import zlib
 from pathlib import Path
@@ -247,6 +248,13 @@ def sets_of_both_kinds_render(programs, folder):
             check(float(shadow.min()) < 0.7 and float(np.median(shadow)) > 0.8, f"{name}: shadows")
 
 
+def jobs_are_legal(programs, _):
+    """Their files may be missing."""
+    for job in sorted((Path(__file__).parent / "scenes").glob("*.json")):
+        done = subprocess.run([programs.path("baton"), "check", job], capture_output=True, text=True)
+        check(f"{job.name}: $" not in done.stderr, done.stderr)
+
+
 # ---- files --------------------------------------------------------------------------------------------------
 
 
@@ -303,5 +311,5 @@ if __name__ == "__main__":
                an_error_as_shown_counts_what_a_screen_shows,
                a_difference_is_seen_and_noise_is_not, a_difference_of_single_pixels_is_seen,
                blocks_at_the_edge_count_by_their_pixels, pixels_differ_as_often_as_chance_says,
-               a_pixel_is_put_where_it_belongs, hills_have_their_normals, sets_of_both_kinds_render, frames_are_read_as_written,
+               a_pixel_is_put_where_it_belongs, hills_have_their_normals, sets_of_both_kinds_render, jobs_are_legal, frames_are_read_as_written,
                a_picture_is_written_as_it_is, what_is_not_modelled_alike_is_refused])

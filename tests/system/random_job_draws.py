@@ -116,7 +116,7 @@ class Draw(Motion, Textures):
             "quality.noiseThreshold": nothing, "quality.timeLimit": nothing, "quality.maxRounds": nothing,
             "visibility.correlated": lambda: self.chance(0.9),
             "visibility.mask": lambda: self.rng.choice(self.enum("visibility", "mask") + ["same-samples"]),
-            "image.maxSites": lambda: self.pick(None, None, None, 16, 64, 144),
+            "image.maxSites": lambda: self.pick(None, None, None, 4),
             "image.sites": lambda: self.rng.choice(self.enum("image", "sites") + [4]),
             "maxRetriesPerTask": nothing, "maxSecondsPerTask": nothing, "maxFailuresPerWorker": nothing,
             # Geometry.

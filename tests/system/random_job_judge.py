@@ -308,6 +308,10 @@ def compare_prediction(predicted, summary, job):
     of_step = pixels * predicted["primaryRaysPerPixel"] // sweeps
     least = of_step * (steps if shares else predicted["runs"])
     most = least * (2 + asks if shares else 1) + (9 * of_step * steps if second_pass else 0)
+    image = job.get("image", {})
+    sites = image.get("sites", 1)
+    if image.get("maxSites", sites) > sites:  # of a round as few as `sites`
+        least = least * sites // (image["maxSites"] + 4)
     if "adaptiveThreshold" in job.get("quality", {}):  # three rounds at least
         least = least * 3 // job["quality"]["rounds"]
     require(least <= stats["raysPrimary"] <= most, "predicted primary rays",

@@ -78,6 +78,11 @@ def mend(job, rng):
         job.get("quality", {}).pop("adaptiveThreshold", None)
     if "adaptiveThreshold" in job.get("quality", {}) and "tileSize" in job["image"]:
         job["image"]["tileSize"] = whole_blocks(job["image"]["tileSize"])
+    image = job["image"]
+    if visibility.get("correlated") or method in ("sequential", "restir", "auto"):
+        image.pop("maxSites", None)
+    elif "maxSites" in image:
+        image["maxSites"] = image.get("sites", 1) * rng.choice((1, 4, 4, 16, 16))
     if visibility.get("correlated") and visibility.get("mask") != "same-samples" and sampling["numParticles"] % 2:
         if rng.random() < 0.5:
             visibility["mask"] = "same-samples"

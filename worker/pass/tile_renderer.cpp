@@ -181,10 +181,11 @@ class TileWalk {
     stats_.rays_primary += limits::kGeometryProbes * pixels.size();
     num_tile_sites_ = std::accumulate(counts_.begin(), counts_.end(), std::size_t{0});
   }
+  bool is_one_part() const { return counts_.empty() || num_tile_sites_ <= limits::kMaxSitesAtOnce; }
   /// The pixels of a round, as many at a time as their sites leave room for.
   std::vector<RoundPixels> parts_of(RoundPixels pixels) const {
     std::vector<RoundPixels> parts;
-    if (num_tile_sites_ <= limits::kMaxSitesAtOnce || counts_.empty()) {
+    if (is_one_part()) {
       parts.push_back(std::move(pixels));
       return parts;
     }
@@ -210,7 +211,7 @@ class TileWalk {
     const CpuTimer timer(stats_.seconds_primary);
     const bool is_whole = pixels.are_all(state_.num_pixels());
     auto found = kept_.find(of);
-    if (found == kept_.end() && ((of == 0 && counts_.empty()) || has_room())) {
+    if (found == kept_.end() && ((of == 0 && is_one_part()) || has_room())) {
       // Of all pixels: the next frame may want others.
       found = kept_.emplace(of, trace(of, RoundPixels::all(state_.num_pixels()))).first;
     }

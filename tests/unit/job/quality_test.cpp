@@ -28,6 +28,24 @@ TEST(Quality, RoundsGoWithNeitherASecondPassNorAuto) {
             "second pass takes one round, got true");
 }
 
+TEST(Quality, FineSitesAreForMethodsWhoseSamplesBelongToNone) {
+  EXPECT_EQ(quality_faults(R"("image": {"maxSites": 64}, "sampling": {"method": "pool"})"), "");
+  EXPECT_EQ(quality_faults(R"("image": {"maxSites": 64}, "sampling": {"method": "sequential"},
+                      "state": {"carry": false})"),
+            "");
+  EXPECT_EQ(
+      quality_faults(R"("image": {"maxSites": 64}, "sampling": {"method": "sequential"})"),
+      "job.json: $.image: expected no maxSites, as the samples that sequential carries belong "
+      "to sites, got 64");
+  EXPECT_EQ(quality_faults(R"("image": {"maxSites": 64}, "sampling": {"method": "mis"},
+                      "visibility": {"correlated": true})"),
+            "job.json: $.image: expected no maxSites, as visibility.correlated has pixels of equal "
+            "sites, got 64");
+  EXPECT_EQ(quality_faults(R"("image": {"maxSites": 64}, "sampling": {"method": "auto"})"),
+            "job.json: $.image: expected no maxSites, as auto may choose a method whose samples "
+            "belong to sites, got 64");
+}
+
 TEST(Quality, SweepsAreBoundedAndNoiseMustBeKnown) {
   EXPECT_EQ(quality_faults(R"("quality": {"sweeps": 3, "noiseThreshold": 0.01, "maxRounds": 64})"),
             "");
