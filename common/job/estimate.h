@@ -18,7 +18,7 @@ struct JobEstimate {
   std::int64_t dependencies = 0;            ///< of a task on another
   std::int64_t rounds = 1;                  ///< of a frame
   std::int64_t preroll_rounds = 0;          ///< before the first frame
-  std::int64_t primary_rays_per_pixel = 0;  ///< in a frame; where geometry is fine
+  std::int64_t primary_rays_per_pixel = 0;  ///< in a frame; with maxSites at most
   std::int64_t shadow_rays_per_pixel = 0;   ///< at most, in a frame, in the first pass
   std::int64_t film_channels = 0;
   std::int64_t film_bytes = 0;             ///< of one frame as float32 tiles, before compression

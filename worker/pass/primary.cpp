@@ -92,19 +92,6 @@ TileSurfaces trace_primary(const JobSpec& job, const FrameGeometry& geometry, co
   return surfaces;
 }
 
-void TileSurfaces::add(const TileSurfaces& from, std::size_t slot, std::size_t most_sites) {
-  const std::size_t count = std::min(from.num_sites(slot), most_sites);
-  const auto take = [count](auto some, auto& all) {
-    const auto first = some.first(count);
-    all.insert(all.end(), first.begin(), first.end());
-  };
-  take(from.pixel(slot), hits);
-  take(from.pixel_rays(slot), rays);
-  if (!from.looks.empty()) take(from.pixel_looks(slot), looks);
-  first_hit.push_back(static_cast<std::uint32_t>(hits.size()));
-  first_site.push_back(std::min(from.first_site[slot], static_cast<std::uint16_t>(count)));
-}
-
 TileSurfaces part_of(const TileSurfaces& whole, RoundPixels pixels) {
   TileSurfaces part{.rect = whole.rect,
                     .pixels = std::move(pixels),
@@ -113,17 +100,28 @@ TileSurfaces part_of(const TileSurfaces& whole, RoundPixels pixels) {
                     .rays = {},
                     .looks = {},
                     .first_site = {}};
-  for (std::size_t slot = 0; slot < part.pixels.size(); ++slot)
-    part.add(whole, part.pixels.index(slot), limits::kMaxFineSites);
+  const auto take = [](auto some, auto& all) { all.insert(all.end(), some.begin(), some.end()); };
+  for (std::size_t slot = 0; slot < part.pixels.size(); ++slot) {
+    const std::size_t index = part.pixels.index(slot);
+    take(whole.pixel(index), part.hits);
+    take(whole.pixel_rays(index), part.rays);
+    take(whole.pixel_looks(index), part.looks);
+    part.first_hit.push_back(static_cast<std::uint32_t>(part.hits.size()));
+    part.first_site.push_back(whole.first_site[index]);
+  }
   return part;
+}
+
+Rng site_random(const JobSpec& job, std::int32_t x, std::int32_t y) {
+  const std::uint64_t seed = job.image.site_seed > 0 ? job.image.site_seed : job.seed;
+  return {pixel_key(seed, 0, job.image.width, x, y), PassId::site_position};
 }
 
 void append_primary_rays(const JobSpec& job, const FrameGeometry& geometry, std::int32_t x,
                          std::int32_t y, std::vector<Ray>& rays, std::int32_t round,
                          std::int32_t num_sites) {
   const Camera& camera = geometry.pose.camera;
-  const std::uint64_t seed = job.image.site_seed > 0 ? job.image.site_seed : job.seed;
-  const Rng rng(pixel_key(seed, 0, job.image.width, x, y), PassId::site_position);
+  const Rng rng = site_random(job, x, y);
   const bool own_sites = rounds_have_own_sites(job);
   const Philox4x32::Counter lens_shift = camera.has_lens() ? rng.bits(1, 0) : Philox4x32::Counter{};
   std::uint32_t lens_point =

@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "common/base/frame_keep.h"
+#include "common/math/philox.h"
 #include "worker/pass/render_context.h"
 #include "worker/pass/round_pixels.h"
 
@@ -41,8 +42,6 @@ struct TileSurfaces {
   std::span<const SurfaceLook> pixel_looks(std::size_t slot) const {
     return looks.empty() ? std::span<const SurfaceLook>() : part(looks, slot);
   }
-  /// Adds what a slot of `from` sees, of its first `most_sites` sites; `pixels` stays.
-  void add(const TileSurfaces& from, std::size_t slot, std::size_t most_sites);
   /// Of hit number `at`, or null.
   const SurfaceLook* look(std::size_t at) const { return looks.empty() ? nullptr : &looks[at]; }
   std::size_t size_bytes() const {
@@ -81,6 +80,10 @@ TileSurfaces trace_primary(const JobSpec& job, const FrameGeometry& geometry, co
 
 /// What some pixels of a tile see, of what all of them do.
 TileSurfaces part_of(const TileSurfaces& whole, RoundPixels pixels);
+
+/// Where a pixel's rays of all frames and rounds lie: bits of step 0 place sites, of step 1 they
+/// shift the lens, of step 2 they place the probes of fine_sites.h.
+Rng site_random(const JobSpec& job, std::int32_t x, std::int32_t y);
 
 /// The same for pixels one by one: appends the rays of the `num_sites` sites of pixel (x, y). The
 /// first image.sites of them are spread over the pixel. Hits are the same as of a whole tile.

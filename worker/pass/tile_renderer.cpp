@@ -100,13 +100,6 @@ class TileWalk {
       RoundMean& mean = round < 0 ? *unseen : film;
       std::optional<Reprojection> history;
       if (shares_ && round == first) history.emplace(context_, *geometry_, *before_, previous);
-      TileSurfaces seen{.rect = rect_,
-                        .pixels = RoundPixels::all(state_.num_pixels()),
-                        .first_hit = {0},
-                        .hits = {},
-                        .rays = {},
-                        .looks = {},
-                        .first_site = {}};
       for (RoundPixels& part : parts_of(std::move(pixels))) {
         const std::shared_ptr<const TileSurfaces> surfaces =
             surfaces_of(frame.first_round + round, std::move(part));
@@ -114,18 +107,11 @@ class TileWalk {
                            round < 0 ? nullptr : probe_light.get()};
         if (round >= 0) planes.add(*surfaces);
         if (history) {
-          for (std::size_t slot = 0; slot < surfaces->pixels.size(); ++slot)
-            seen.add(*surfaces, slot, static_cast<std::size_t>(context_.job.image.sites));
+          keep_for_next(frame, surfaces);
           renderer_->render(at, *history, state_, mean);
         } else {
           renderer_->render(at, has_history_, state_, mean);
         }
-      }
-      if (history) {
-        // Tiles ask for those of the frame before; one that is behind them traces them again.
-        context_.surfaces->release_before(frame.index - 1);
-        context_.surfaces->keep({frame.index, state_.tile}, frame.index,
-                                std::make_shared<const TileSurfaces>(std::move(seen)));
       }
       has_history_ = carries_state(context_.job);
     }
@@ -219,6 +205,12 @@ class TileWalk {
     return is_whole
                ? found->second
                : std::make_shared<const TileSurfaces>(part_of(*found->second, std::move(pixels)));
+  }
+  /// Tiles ask for what those of the frame before saw; one that is behind them traces it again. Of
+  /// a tile in parts nothing is kept.
+  void keep_for_next(const FrameSpec& frame, const std::shared_ptr<const TileSurfaces>& surfaces) {
+    context_.surfaces->release_before(frame.index - 1);
+    if (is_one_part()) context_.surfaces->keep({frame.index, state_.tile}, frame.index, surfaces);
   }
   /// For what another round sees, until the next frame.
   bool has_room() const {

@@ -138,6 +138,7 @@ ImageMetadata frame_metadata(const JobSpec& job, const Digest& job_digest, int f
   add("baton:numCandidates", sampling.num_candidates);
   add("baton:seed", job.seed);
   add("baton:sites", job.image.sites);
+  if (has_fine_sites(job)) add("baton:maxSites", job.image.max_sites);
   add("baton:rounds", std::int64_t{job.quality.rounds} * job.quality.sweeps);
   if (job.quality.adaptive_threshold)
     add("baton:adaptiveThreshold", *job.quality.adaptive_threshold);

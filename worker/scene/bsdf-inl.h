@@ -39,7 +39,7 @@ struct SurfaceLanes {
   VF coat_share, coat_chance;  ///< SiteBlock::Coats; 0 where a lane has none
 };
 
-/// table[site] per lane; site in [0, 16).
+/// table[site] per lane; site in [0, num_sites).
 HWY_INLINE VF LookUp(const SiteBlock::Array& table, VI site, int num_sites) {
   const DF d;
   if constexpr (hn::MaxLanes(DF()) == 8) {

@@ -67,6 +67,19 @@ TEST(FineSites, AreWhereGeometryIsFine) {
   EXPECT_GT(num_found * 2, num_edges);  // four probes miss small parts
 }
 
+// Jobs of one siteSeed see the same points, whatever their seeds.
+TEST(FineSites, FollowTheSeedOfTheSites) {
+  const auto counts_of = [](std::uint64_t seed, std::uint64_t site_seed) {
+    JobSpec job = fine_job(Method::pool, 1);
+    job.seed = seed;
+    job.image.site_seed = site_seed;
+    const auto context = *load_render_context(job, Digest{1, 2});
+    return count_sites(job, **context->geometry->at(0), places_of(context->grid.rect(0)));
+  };
+  EXPECT_EQ(counts_of(1, 9), counts_of(2, 9));
+  EXPECT_NE(counts_of(1, 0), counts_of(2, 0));
+}
+
 TEST(FineSites, ContrastIsThatOfWhatReflects) {
   const auto context = *load_render_context(fine_job(Method::pool, 1), Digest{1, 2});
   FrameGeometry geometry = **context->geometry->at(0);
