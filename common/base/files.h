@@ -14,6 +14,9 @@ namespace baton {
 /// failed.
 Status expect_file(const std::filesystem::path& path);
 
+/// ".exr" of "a/b.EXR"; empty: it has none.
+std::string lower_extension(const std::filesystem::path& path);
+
 /// The whole file. Errors name the file: missing, not readable, larger than `max_size_bytes`.
 Result<Bytes> read_file(const std::filesystem::path& path, std::uint64_t max_size_bytes);
 Result<std::string> read_text_file(const std::filesystem::path& path, std::uint64_t max_size_bytes);

@@ -15,9 +15,6 @@ constexpr float kWhite = 8.0f;
 constexpr int kGapPixels = 2;
 constexpr float kGapGrey = 0.02f;
 
-/// Rec. 709.
-float luminance(const Rgb& c) { return 0.2126f * c.x + 0.7152f * c.y + 0.0722f * c.z; }
-
 /// 0 -> 0, kWhite -> 1.
 float reinhard(float v) { return v * (1 + v / (kWhite * kWhite)) / (1 + v); }
 

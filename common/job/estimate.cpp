@@ -72,8 +72,9 @@ JobEstimate estimate_job(const JobSpec& job) {
     frame_channels += count;
     wide_channels += traits(aov).is_float ? count : 0;
   }
-  if (has_catcher(job)) frame_channels += 3;
-  e.film_channels = frame_channels + (tells_noise(job) ? 1 : 0) + (has_catcher(job) ? 1 : 0);
+  // Films have S / U and its share, frames the quotient, if it is not in A.
+  e.film_channels = frame_channels + (tells_noise(job) ? 1 : 0) + (has_catcher(job) ? 4 : 0);
+  if (has_catcher(job) && job.output.shadows == ShadowForm::channels) frame_channels += 3;
   e.film_bytes = pixels * e.film_channels * 4;
   const std::int64_t sample_bytes = job.output.pixel_type == PixelType::half_float ? 2 : 4;
   e.frame_bytes = pixels * ((frame_channels - wide_channels) * sample_bytes + wide_channels * 4);

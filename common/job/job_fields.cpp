@@ -206,6 +206,18 @@ void fields(JobArchive& a, OutputSpec& output, const JobSpec& job) {
             got());
   }
   a.choice("background", output.background, kBackgrounds);
+  FileSequence plate = output.plate.value_or(FileSequence{});
+  const auto visit_plate = [&] {
+    fields(a, plate,
+           {".exr", ".hdr", ".png", ".jpg", ".jpeg", ".tif", ".tiff", ".tga", ".bmp", ".webp"});
+  };
+  if (a.object("plate", visit_plate, {.shorthand = "files", .present = output.plate.has_value()}))
+    output.plate = plate;
+  if (output.background == Background::plate && !output.plate)
+    a.fault("plate", "a picture or numbered pictures, as background is plate", "none");
+  a.choice("shadows", output.shadows, kShadowForms);
+  if (output.shadows == ShadowForm::alpha && output.background != Background::transparent)
+    a.fault("shadows", "channels, as background is not transparent", "\"alpha\"");
   const NamedSet<Aov> denoise{"denoise", {Aov::normal, Aov::variance, Aov::albedo, Aov::motion}};
   a.choices("aovs", output.aovs, aov_names(), std::span(&denoise, 1));
   a.choice("pixelType", output.pixel_type, kPixelTypes);

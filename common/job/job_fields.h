@@ -41,7 +41,10 @@ inline constexpr std::array<std::string_view, 3> kMaskPolicies{"same-samples", "
                                                                "cross-fold"};
 inline constexpr std::array<std::string_view, 4> kLnsUpdates{"ratio", "pathLeft", "pathRight",
                                                              "pathTrapezoid"};
-inline constexpr std::array<std::string_view, 2> kBackgrounds{"environment", "transparent"};
+inline constexpr std::array<std::string_view, 3> kBackgrounds{"environment", "transparent",
+                                                              "plate"};
+inline constexpr std::array<std::string_view, 2> kShadowForms{"channels", "alpha"};
+inline constexpr std::array<std::string_view, 2> kFilesBeyond{"hold", "loop"};
 inline constexpr std::array<std::string_view, 3> kUpAxes{"x", "y", "z"};
 inline constexpr std::array<std::string_view, 2> kPixelTypes{"half", "float"};
 inline constexpr std::array<std::string_view, 5> kCompressions{"none", "rle", "zips", "zip", "piz"};
@@ -79,6 +82,9 @@ void matrix_field(JobArchive& a, Key key, std::optional<Matrix34>& matrix);
 /// A path whose name ends in one of `extensions`.
 void asset_path(JobArchive& a, Key key, std::string& path,
                 std::initializer_list<std::string_view> extensions);
+/// Numbered files; `extensions`: as of asset_path.
+void fields(JobArchive& a, FileSequence& sequence,
+            std::initializer_list<std::string_view> extensions);
 void fields(JobArchive& a, EnvironmentSpec& environment, const std::vector<int>& frames);
 
 }  // namespace baton

@@ -64,6 +64,12 @@ std::string json_path(std::string_view pointer) {
 
 using Facts = std::map<std::string, std::string>;
 
+/// The job as its films are made.
+JobSpec without_plate(JobSpec job) {
+  if (job.output.background == Background::plate) job.output.background = Background::transparent;
+  return job;
+}
+
 /// The values that decide all frames, and the contents of the files but the maps, by name.
 Facts picture_facts(const JobSpec& job, const std::vector<AssetDigest>& assets) {
   Facts facts;
@@ -81,8 +87,10 @@ Facts picture_facts(const JobSpec& job, const std::vector<AssetDigest>& assets) 
   std::set<std::string> maps;
   for (const EnvironmentKey& key : job.environment.keys) maps.insert(key.map);
   maps.erase(job.environment.camera_map.file);  // which all frames show
+  const std::vector<std::string> of_films = asset_paths(without_plate(job));
   for (const AssetDigest& asset : assets) {
-    if (!maps.contains(asset.path)) facts.emplace(asset.path, asset.digest.hex());
+    if (!maps.contains(asset.path) && std::ranges::binary_search(of_films, asset.path))
+      facts.emplace(asset.path, asset.digest.hex());
   }
   return facts;
 }
@@ -164,6 +172,17 @@ std::vector<FrameComparison::Facts> FrameComparison::facts_of(const ParsedJobDoc
   return facts;
 }
 
+std::vector<Digest> FrameComparison::plates_of(const ParsedJobDocument& document) {
+  const JobSpec& job = document.job;
+  std::vector<Digest> plates(job.frames.size());
+  for (std::size_t i = 0; has_plate(job.output) && i < plates.size(); ++i) {
+    const auto plate = std::ranges::find(document.assets, file_at(*job.output.plate, job.frames[i]),
+                                         &AssetDigest::path);
+    if (plate != document.assets.end()) plates[i] = plate->digest;
+  }
+  return plates;
+}
+
 FrameComparison::FrameComparison(const ParsedJobDocument& a, const ParsedJobDocument& b)
     : frames_a_(a.job.frames),
       frames_b_(b.job.frames),
@@ -171,6 +190,8 @@ FrameComparison::FrameComparison(const ParsedJobDocument& a, const ParsedJobDocu
       sweeps_b_(static_cast<std::size_t>(b.job.quality.sweeps)),
       a_(facts_of(a)),
       b_(facts_of(b)),
+      plates_a_(plates_of(a)),
+      plates_b_(plates_of(b)),
       carried_(carries_state(a.job) || carries_state(b.job)) {
   while (num_common_ < std::min(a_.size(), b_.size()) &&
          frames_a_[num_common_] == frames_b_[num_common_] && a_[num_common_] == b_[num_common_])
@@ -179,6 +200,10 @@ FrameComparison::FrameComparison(const ParsedJobDocument& a, const ParsedJobDocu
 
 bool FrameComparison::are_equal(std::size_t index_a, std::size_t index_b) const {
   return sweeps_a_ == sweeps_b_ && are_alike(index_a, index_b);
+}
+
+bool FrameComparison::have_one_plate(std::size_t index_a, std::size_t index_b) const {
+  return plates_a_[index_a] == plates_b_[index_b];
 }
 
 bool FrameComparison::are_alike(std::size_t index_a, std::size_t index_b) const {

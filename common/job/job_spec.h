@@ -10,6 +10,7 @@
 #include <vector>
 
 #include "common/base/digest.h"
+#include "common/job/file_sequence.h"
 #include "common/job/method.h"
 #include "common/job/scene_spec.h"
 #include "common/math/pixel_rect.h"
@@ -277,7 +278,10 @@ struct VisibilitySpec {
 
 // ---- output, state, farm
 // -----------------------------------------------------------------------------------
-enum class Background : std::uint8_t { environment, transparent };
+/// What is seen where no object is: the map, nothing, or a picture that the frame is laid over.
+enum class Background : std::uint8_t { environment, transparent, plate };
+/// Where frames tell what catches shadows: in channels shadow.*, or as black in A.
+enum class ShadowForm : std::uint8_t { channels, alpha };
 enum class Aov : std::uint8_t {
   lns,
   visibility,
@@ -311,6 +315,9 @@ struct OutputSpec {
   std::string directory;                   ///< absolute
   std::string pattern = "frame.####.exr";  ///< '#'s are the zero-padded frame number
   Background background = Background::environment;
+  std::optional<FileSequence>
+      plate{};  ///< pictures, as large as the frame or larger; with Background::plate
+  ShadowForm shadows = ShadowForm::channels;
   std::vector<Aov> aovs;  ///< in the order of the enum, no duplicates
   PixelType pixel_type = PixelType::half_float;
   std::string compression = "zip";  ///< none, rle, zips, zip, piz
@@ -320,6 +327,11 @@ struct OutputSpec {
 
   bool operator==(const OutputSpec&) const = default;
 };
+
+/// Whether frames are laid over pictures.
+inline bool has_plate(const OutputSpec& output) {
+  return output.background == Background::plate && output.plate;
+}
 
 enum class StateKeep : std::uint8_t { last, all };
 

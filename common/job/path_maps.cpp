@@ -65,6 +65,7 @@ JobSpec map_paths(JobSpec job, const PathMaps& maps) {
   }
   for (EnvironmentKey& key : job.environment.keys) map(key.map);
   map(job.environment.camera_map.file);
+  if (job.output.plate) map(job.output.plate->files);
   return job;
 }
 

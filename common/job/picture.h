@@ -34,6 +34,8 @@ class FrameComparison {
   /// Whether they show the same and, where samples are carried, so do all frames before; in later
   /// sweeps these are all frames.
   bool are_alike(std::size_t index_a, std::size_t index_b) const;
+  /// Whether they are laid over the same plate, or over none.
+  bool have_one_plate(std::size_t index_a, std::size_t index_b) const;
   /// How many steps (common/job/sequence.h) from the first on are the same in both.
   std::size_t num_common_steps() const;
   /// What differs in two frames that are not equal: "$.camera.keys", ...; "$.frames" where it is
@@ -46,10 +48,12 @@ class FrameComparison {
     bool operator==(const Facts&) const = default;
   };
   static std::vector<Facts> facts_of(const ParsedJobDocument& document);
+  static std::vector<Digest> plates_of(const ParsedJobDocument& document);
 
   std::vector<int> frames_a_, frames_b_;
   std::size_t sweeps_a_, sweeps_b_;
   std::vector<Facts> a_, b_;
+  std::vector<Digest> plates_a_, plates_b_;  ///< by frame; a digest of zeros: none
   bool carried_;
   std::size_t num_common_ = 0;  ///< frames from the first on
 };

@@ -1,9 +1,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <cctype>
 #include <filesystem>
 
+#include "common/base/files.h"
 #include "common/base/limits.h"
 #include "common/job/job_fields.h"
 #include "common/job/sequence.h"
@@ -13,12 +13,6 @@ namespace baton {
 namespace {
 
 namespace fs = std::filesystem;
-
-std::string lower_extension(const std::string& path) {
-  std::string extension = fs::path(path).extension().string();
-  for (char& c : extension) c = static_cast<char>(std::tolower(static_cast<unsigned char>(c)));
-  return extension;
-}
 
 /// A name that must be a key of `named`; a required one unless `key` says otherwise.
 template <class T>
@@ -121,18 +115,12 @@ void fields(JobArchive& a, EnvironmentKey& key) {
   asset_path(a, required("map"), key.map, {".exr", ".hdr"});
 }
 
-/// One key per frame of the job from a numbered name such as "sky.####.exr".
-void expand_numbered(JobArchive& a, const fs::path& numbered, const std::vector<int>& frames,
+/// One key per frame of the job.
+void expand_numbered(const FileSequence& numbered, const std::vector<int>& frames,
                      std::vector<EnvironmentKey>& keys) {
-  const std::string name = numbered.filename().string();
-  if (name.find('#') == std::string::npos) {
-    a.fault("frames", "a numbered file name such as sky.####.exr", fmt::format("\"{}\"", name));
-  }
   keys.clear();
-  for (const int frame : frames) {
-    keys.push_back({static_cast<double>(frame),
-                    (numbered.parent_path() / frame_file_name(name, frame)).string()});
-  }
+  for (const int frame : frames)
+    keys.push_back({static_cast<double>(frame), file_at(numbered, frame)});
 }
 
 /// Numbers at ascending frames; `name`: the key of the number.
@@ -172,6 +160,21 @@ void asset_path(JobArchive& a, Key key, std::string& path,
   a.fault(key.name, expected, fmt::format("\"{}\"", fs::path(path).filename().string()));
 }
 
+void fields(JobArchive& a, FileSequence& sequence,
+            std::initializer_list<std::string_view> extensions) {
+  asset_path(a, required("files"), sequence.files, extensions);
+  a.number("speed", sequence.speed, {-1e6, 1e6});
+  a.integer("offset", sequence.offset, -limits::kMaxFrameNumber, limits::kMaxFrameNumber);
+  a.integer("first", sequence.first, 0, limits::kMaxFrameNumber);
+  a.integer("last", sequence.last, 0, limits::kMaxFrameNumber);
+  if (sequence.last < sequence.first)
+    a.fault("last", fmt::format("at least first, {}", sequence.first),
+            std::to_string(sequence.last));
+  a.choice("beyond", sequence.beyond, kFilesBeyond);
+  if (sequence.beyond == FilesBeyond::loop && sequence.last == limits::kMaxFrameNumber)
+    a.fault("last", "the number after which files begin anew, as beyond is loop", "none");
+}
+
 void fields(JobArchive& a, SceneSpec& scene) {
   GltfSceneSpec gltf = scene.gltf.value_or(GltfSceneSpec{});
   if (a.object("gltf", [&] { fields(a, gltf); },
@@ -206,10 +209,17 @@ void fields(JobArchive& a, EnvironmentSpec& environment, const std::vector<int>&
   }
 
   // Numbered maps.
-  std::string numbered;
-  asset_path(a, alternative("frames"), numbered, {".exr", ".hdr"});
-  if (!numbered.empty()) {
-    expand_numbered(a, numbered, frames, keys);
+  FileSequence numbered;
+  a.object(alternative("frames"),
+           [&] {
+             fields(a, numbered, {".exr", ".hdr"});
+             if (!numbered.files.empty() && !numbered.is_numbered())
+               a.fault("files", "a numbered file name such as sky.####.exr",
+                       fmt::format("\"{}\"", fs::path(numbered.files).filename().string()));
+           },
+           {.shorthand = "files", .present = false});
+  if (!numbered.files.empty()) {
+    expand_numbered(numbered, frames, keys);
     environment.interpolate = false;
     ++forms;
   }

@@ -234,15 +234,6 @@ std::int32_t exchange_reach_px(const VisibilitySpec& visibility) {
   return visibility.tile_size - 1 + visibility.dilate;
 }
 
-std::string frame_file_name(const std::string& pattern, int frame_number) {
-  const std::size_t first = pattern.find('#');
-  if (first == std::string::npos) return pattern;
-  const std::size_t last = pattern.find_first_not_of('#', first);
-  const std::size_t count = (last == std::string::npos ? pattern.size() : last) - first;
-  std::string name = pattern;
-  return name.replace(first, count, fmt::format("{:0{}}", frame_number, count));
-}
-
 std::filesystem::path frame_path(const JobSpec& job, std::int32_t frame_index) {
   const int number = job.frames.at(static_cast<std::size_t>(frame_index));
   return std::filesystem::path(job.output.directory) / frame_file_name(job.output.pattern, number);

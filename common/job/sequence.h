@@ -141,8 +141,6 @@ std::int32_t num_populations(const JobSpec& job);
 /// decide the mask.
 std::int32_t exchange_reach_px(const VisibilitySpec& visibility);
 
-/// "frame.####.exr" with frame 7 -> "frame.0007.exr". A pattern without '#' is returned unchanged.
-std::string frame_file_name(const std::string& pattern, int frame_number);
 /// Where frame `frame_index` (0-based) of the job is written.
 std::filesystem::path frame_path(const JobSpec& job, std::int32_t frame_index);
 

@@ -14,7 +14,10 @@ namespace baton {
 namespace {
 
 bool films_alike(const OutputSpec& a, const OutputSpec& b) {
-  return a.aovs == b.aovs && a.background == b.background;
+  const auto shows_map = [](const OutputSpec& output) {
+    return output.background == Background::environment;
+  };
+  return a.aovs == b.aovs && shows_map(a) == shows_map(b);
 }
 
 /// Looks for the frames of the wanted job that a former one has written.
@@ -32,7 +35,9 @@ class KeptFrames {
       const auto old = static_cast<std::size_t>(task.task.step);
       const auto found = index_.find(former.document.job.frames.at(old));
       if (found == index_.end() || images_[found->second]) continue;
-      if (!comparison.are_equal(old, found->second)) continue;
+      if (!comparison.are_equal(old, found->second) ||
+          !comparison.have_one_plate(old, found->second))
+        continue;
 
       // The same pixels: is the file as it was written?
       const auto frame = static_cast<std::int32_t>(found->second);
@@ -253,9 +258,9 @@ std::vector<TaskKey> settled_tasks(const JobSpec& job, const KeptFrames& kept,
 }  // namespace
 
 bool writes_alike(const OutputSpec& a, const OutputSpec& b) {
-  return films_alike(a, b) && a.pattern == b.pattern && a.pixel_type == b.pixel_type &&
-         a.compression == b.compression && a.naming == b.naming &&
-         a.clamp_negative == b.clamp_negative;
+  return films_alike(a, b) && a.background == b.background && a.shadows == b.shadows &&
+         a.pattern == b.pattern && a.pixel_type == b.pixel_type && a.compression == b.compression &&
+         a.naming == b.naming && a.clamp_negative == b.clamp_negative;
 }
 
 Adoption adopt(const ParsedJobDocument& wanted, const std::vector<FormerJob>& formers,

@@ -15,6 +15,7 @@ std::string plan_text(const Scheduler::Job& job, const std::vector<std::string>&
 
 /// Why a new job does not keep what a former one of its picture has done, and what it keeps as it
 /// is: settings of the output that differ, headers.
-std::vector<std::string> output_reasons(const JobSpec& former, const JobSpec& wanted);
+std::vector<std::string> output_reasons(const ParsedJobDocument& former,
+                                        const ParsedJobDocument& wanted);
 
 }  // namespace baton

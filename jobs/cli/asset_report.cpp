@@ -13,6 +13,7 @@
 #include "common/math/vec3.h"
 #include "jobs/cli/object_view.h"
 #include "worker/scene/map_reduction.h"
+#include "worker/scene/plate.h"
 #include "worker/scene/scene.h"
 
 namespace baton {
@@ -93,6 +94,16 @@ void load_camera_map(const EnvironmentSpec& environment, std::vector<std::string
   if (const auto image = read_rgb_image(file); !image) faults.push_back(image.error().message);
 }
 
+/// The same of all plates.
+void load_plates(const JobSpec& job, std::vector<std::string>& faults) {
+  if (!has_plate(job.output)) return;
+  std::set<std::string> seen;
+  for (const int frame : job.frames) {
+    if (!seen.insert(file_at(*job.output.plate, frame)).second) continue;
+    if (const auto plate = load_plate(job, frame); !plate) faults.push_back(plate.error().message);
+  }
+}
+
 void load_geometry(const JobSpec& job, AssetReport& report, std::vector<std::string>& faults) {
   Result<Scene> loaded = load_scene(job);
   if (!loaded) return faults.push_back(loaded.error().message);
@@ -119,6 +130,7 @@ Result<AssetReport> load_assets(const JobSpec& job) {
   load_geometry(job, report, faults);
   load_maps(job.environment, report, faults);
   load_camera_map(job.environment, faults);
+  load_plates(job, faults);
   if (!faults.empty())
     return Error{ErrorKind::bad_input, fmt::format("{}", fmt::join(faults, "\n"))};
   return report;

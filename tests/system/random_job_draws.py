@@ -6,6 +6,7 @@ import random
 
 from random_job_means import tame
 from random_job_motion import Motion
+from random_job_pictures import Pictures
 from random_job_rules import mend, spoil, whole_blocks, work_of
 from random_job_schema import SchemaDraw
 from random_job_textures import Textures
@@ -18,7 +19,7 @@ FRESH_METHODS = {"environment", "brdf", "mis", "bidirectional"}
 MOST_WORK = 5e6
 
 
-class Draw(Motion, Textures):
+class Draw(Motion, Pictures, Textures):
     """One random case: {"job", "files", "first", "second"}, as random_job_judge.py takes it."""
 
     def __init__(self, schema, rng):
@@ -64,6 +65,7 @@ class Draw(Motion, Textures):
         self.by_material(job)
         mend(job, self.rng)
         self.cheapen(job)
+        self.plates(job)
         self.part_of_image(job["image"])
         if '"table.binary"' not in json.dumps(job["scene"]):
             self.files.pop("table.binary", None)
@@ -96,7 +98,8 @@ class Draw(Motion, Textures):
             "image.width": lambda: self.side(), "image.height": lambda: self.side(),
             "image.tileSize": lambda: self.tile_size(), "image.region": nothing, "image.scale": nothing,
             "image.overscan": lambda: self.overscan() if self.chance(0.2) else None,
-            "output.directory": nothing,
+            "output.directory": nothing, "output.plate": nothing,
+            "output.background": lambda: self.pick("environment", "transparent", "transparent", "plate"),
             "output.pattern": lambda: self.pick(None, "f.#.exr", "a b ######.exr", "\u00e4####x.exr"),
             # 16 bits hide what differs in the last ones.
             "output.pixelType": lambda: "half" if self.chance(0.15) else "float",
@@ -273,42 +276,6 @@ class Draw(Motion, Textures):
         # Overwritten when there is a second one; unused when the material is drawn again.
         self.files["table.binary"] = {"kind": "merl", "lobe": self.pick(3, 60), "base": self.pick(0.05, 0.4)}
         return "table.binary"
-
-    # ---- light ----------------------------------------------------------------------------------------------
-
-    def maps(self, job):
-        """One map, keys or numbered maps, all of one size where they may be mixed."""
-        form = self.pick("map", "map", "keys", "keys", "frames")
-        width, height = self.pick((1, 1), (2, 1), (3, 7), (4, 2), (16, 8), (32, 16), (64, 32), (33, 17))
-        if self.chance(0.01):
-            width, height = 2048, 1024
-            self.shorten(job, 2)
-        ending = self.pick(".hdr", ".exr")
-
-        def add(name):
-            kinds = ["sky", "lamp", "lamp", "sun", "dots", "flat", "halves", "black"] + ["wild"] * (ending == ".exr")
-            self.files[name] = {"kind": self.rng.choice(kinds), "width": width, "height": height,
-                                "seed": self.rng.randrange(1000), "count": self.pick(1, 1, 3, 20),
-                                "level": self.pick(1.0, 1.0, 1.0, 1e-3, 100.0)}
-            if self.plain and self.chance(0.8):
-                self.files[name].update(kind="lamp", level=1.0)
-            return name
-
-        environment = job["environment"]
-        if form == "map":
-            environment["map"] = add("map" + ending)
-        elif form == "frames":
-            environment["frames"] = "map.####" + ending
-            for number in self.frame_numbers():
-                add(f"map.{number:04}{ending}")
-        else:
-            frames = self.key_frames()
-            environment["keys"] = [{"frame": f, "map": add(f"map{i}{ending}")} for i, f in enumerate(frames)]
-
-    def camera_map(self):
-        self.files["seen.exr"] = {"kind": "dots", "width": 8, "height": 4, "seed": 1, "count": 3, "level": 2.0}
-        form = self.schema.schema["properties"]["environment"]["properties"]["cameraMap"]["oneOf"][1]
-        return self.pick("seen.exr", self.schema.object(form, "environment.cameraMap"))
 
     def by_material(self, job):
         """Settings of single materials, where the method allows them; names are known only now."""

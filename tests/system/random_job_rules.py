@@ -95,6 +95,8 @@ def mend(job, rng):
     if (method == "restir" and sampling.get("reuseVisibility")) or visibility.get("correlated"):
         aovs = job.get("output", {}).get("aovs", [])
         aovs[:] = [aov for aov in aovs if aov not in ("unshadowed", "blocked")]
+    if job["output"].get("background") != "transparent":
+        job["output"].pop("shadows", None)
     rotation = job["environment"].get("rotation", {})
     if rotation.get("keys"):
         rotation.pop("startDeg", None)

@@ -3,13 +3,16 @@
 #include <fmt/format.h>
 
 #include "common/image/film_tile.h"
+#include "common/image/shadow.h"
 #include "common/job/motion.h"
 #include "common/job/sequence.h"
 #include "common/state/join_states.h"
 #include "common/state/sample_state.h"
 #include "worker/exchange/second_pass.h"
 #include "worker/pass/cpu_clock.h"
+#include "worker/pass/render_context.h"
 #include "worker/run/frame_output.h"
+#include "worker/scene/plate.h"
 
 namespace baton {
 namespace {
@@ -215,7 +218,13 @@ Result<TaskOutput> execute_assemble(const LoadedJob& loaded, const BlobStore& st
     pasted[static_cast<std::size_t>(input.tile)] = true;
   }
 
-  image.rect = image.rect.relative_to(loaded.job.image.shown());
+  const PixelRect shown = loaded.job.image.shown();
+  image.rect = image.rect.relative_to(shown);
+  if (const JobSpec& here = loaded.context->job; has_plate(here.output)) {
+    const int number = here.frames[static_cast<std::size_t>(task.step)];
+    BATON_ASSIGN(const RgbImage plate, load_plate(here, number));
+    lay_over_plate(image, plate, {shown.x0, shown.y0});
+  }
   BATON_ASSIGN(const WrittenFrame written,
                write_frame(loaded.job, loaded.digest, task.step, std::move(image)));
   return TaskOutput{{written.file}, {}, {{task.step, task.tile, {}, written.quality}}};

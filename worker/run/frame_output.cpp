@@ -151,6 +151,7 @@ ImageMetadata frame_metadata(const JobSpec& job, const Digest& job_digest, int f
   }
   add("baton:mapScale", environment.scale * light.scale);
   if (!environment.camera_map.file.empty()) add("baton:cameraMap", environment.camera_map.file);
+  if (has_plate(job.output)) add("baton:plate", file_at(*job.output.plate, frame_number));
   add("baton:rotationDeg", rotation_deg_at(environment, frame_number));
   if (quality.noise_source != NoiseSource::none) {
     metadata.emplace_back("baton:noise", fmt::format("{:.4g}", quality.noise));
@@ -182,7 +183,12 @@ Result<WrittenFrame> write_frame(const JobSpec& job, const Digest& job_digest,
   quality.clamped = job.output.clamp_negative;
   if (job.output.clamp_negative) clamp_negative(image);
   drop_channel(image, kErrorChannel);
-  finish_shadows(image);
+  if (job.output.shadows == ShadowForm::alpha) {
+    put_shadows_in_alpha(image);
+    for (const char* const name : kShadowChannels) drop_channel(image, name);
+  } else {
+    finish_shadows(image);
+  }
   drop_channel(image, kCatcherChannel);
 
   const std::filesystem::path path = frame_path(job, frame_index);

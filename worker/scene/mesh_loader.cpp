@@ -16,21 +16,16 @@ Error bad_mesh(const std::string& path, const std::string& what) {
 
 /// Reads the triangles with the reader that fits the file.
 Result<TriangleMesh> read_triangles(const std::string& path, bool smooth_normals, bool with_uvs) {
-  const std::string extension = std::filesystem::path(path).extension().string();
-  const auto is = [&](std::string_view e) {
-    return std::equal(extension.begin(), extension.end(), e.begin(), e.end(), [](char a, char b) {
-      return std::tolower(static_cast<unsigned char>(a)) == b;
-    });
-  };
-  if (is(".off")) {
+  const std::string extension = lower_extension(path);
+  if (extension == ".off") {
     BATON_ASSIGN(const std::string text, read_text_file(path, limits::kMaxAssetFileBytes));
     return parse_off(text, path);
   }
-  if (is(".ply")) {
+  if (extension == ".ply") {
     BATON_ASSIGN(const std::string bytes, read_text_file(path, limits::kMaxAssetFileBytes));
     return parse_ply(bytes, path, smooth_normals);
   }
-  if (is(".gltf") || is(".glb")) {
+  if (extension == ".gltf" || extension == ".glb") {
     BATON_ASSIGN(const auto document, gltf::read_document(path));
     return gltf::whole_mesh(*document, smooth_normals);
   }

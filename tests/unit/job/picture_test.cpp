@@ -1,5 +1,6 @@
 #include "common/job/picture.h"
 
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 namespace baton {
@@ -36,6 +37,32 @@ TEST(Picture, NamesWhatDecidesPixelsAlone) {
   EXPECT_NE(picture_digest(plain.job, {}), picture_digest(document(R"("seed": 3)").job, {}));
   // Where samples are carried the history begins with the first frame.
   EXPECT_EQ(picture_differences(plain, document(R"("frames": "2-8")")).size(), 1u);
+}
+
+// A plate is laid under what is rendered: other plates make other frames of the same films.
+TEST(Picture, PlatesBelongToFramesAlone) {
+  const auto document = [](const std::string& output, const Digest& second) {
+    return ParsedJobDocument{
+        .job = job_with(R"("frames": "1-2", "output": {"pattern": "f.#.exr", )" + output + "}"),
+        .assets = {{"/jobs/a.1.png", {1, 1}}, {"/jobs/a.2.png", second}, {"/jobs/sky.exr", {3, 3}}},
+        .digest = {},
+        .picture = {}};
+  };
+  const auto plated = [&](const Digest& second) {
+    return document(R"("background": "plate", "plate": "a.#.png")", second);
+  };
+  const ParsedJobDocument one = plated({2, 2}), other = plated({7, 7});
+  const ParsedJobDocument none = document(R"("background": "transparent")", {2, 2});
+  EXPECT_EQ(picture_digest(one.job, one.assets), picture_digest(other.job, other.assets));
+  EXPECT_TRUE(picture_differences(one, other).empty());
+  const FrameComparison comparison(one, other);
+  EXPECT_TRUE(comparison.are_equal(1, 1));
+  EXPECT_TRUE(comparison.have_one_plate(0, 0));
+  EXPECT_FALSE(comparison.have_one_plate(1, 1));
+  EXPECT_FALSE(FrameComparison(one, none).have_one_plate(0, 0));
+  EXPECT_THAT(asset_paths(one.job),
+              testing::ElementsAre("/jobs/a.1.png", "/jobs/a.2.png", "/jobs/sky.exr"));
+  EXPECT_THAT(asset_paths(none.job), testing::ElementsAre("/jobs/sky.exr"));
 }
 
 }  // namespace

@@ -1,0 +1,93 @@
+#include "worker/scene/plate.h"
+
+#include <gmock/gmock.h>
+#include <gtest/gtest.h>
+
+#include <filesystem>
+
+#include "tests/support/image_files.h"
+
+namespace baton {
+namespace {
+
+namespace fs = std::filesystem;
+using testing::ElementsAre;
+using testing::HasSubstr;
+
+std::vector<float> down(int width, std::vector<float> grey, int new_width, int new_height) {
+  RgbImage image{width, static_cast<int>(grey.size()) / width, {}};
+  for (const float v : grey) image.rgb.insert(image.rgb.end(), {v, 10 * v, -v});
+  const RgbImage result = averaged_down(image, new_width, new_height);
+  EXPECT_EQ(result.width, new_width);
+  EXPECT_EQ(result.height, new_height);
+  std::vector<float> reds;
+  for (std::size_t i = 0; i < result.rgb.size(); i += 3) {
+    EXPECT_FLOAT_EQ(result.rgb[i + 1], 10 * result.rgb[i]);
+    EXPECT_FLOAT_EQ(result.rgb[i + 2], -result.rgb[i]);
+    reds.push_back(result.rgb[i]);
+  }
+  return reds;
+}
+
+TEST(Plate, EachPixelIsTheMeanOverItsPart) {
+  EXPECT_THAT(down(2, {1, 2, 3, 4}, 2, 2), ElementsAre(1, 2, 3, 4));
+  EXPECT_THAT(down(4, {1, 3, 5, 7, 3, 5, 7, 9}, 2, 1), ElementsAre(3, 7));
+  EXPECT_THAT(down(3, {3, 6, 9}, 2, 1), ElementsAre(4, 8));
+  EXPECT_THAT(down(1, {3, 6, 9}, 1, 2), ElementsAre(4, 8));
+  EXPECT_THAT(down(5, {0, 1, 2, 3, 4}, 1, 1), ElementsAre(2));
+}
+
+class PlateFile : public testing::Test {
+ protected:
+  PlateFile() {
+    job_.image.width = 2;
+    job_.image.height = 1;
+    job_.output.background = Background::plate;
+  }
+
+  JobSpec job_;
+};
+
+TEST_F(PlateFile, IntegersAreSrgbAndFloatsAreLinear) {
+  const std::string first =
+      test::write_targa("plate.0007.tga", 2, 1, 4, {0, 188, 0, 9, 255, 188, 0, 9});
+  const fs::path folder = fs::path(first).parent_path();
+  job_.output.plate = FileSequence{.files = (folder / "plate.####.tga").string(), .offset = 5};
+  const RgbImage seen = load_plate(job_, 2).value();
+  EXPECT_THAT(seen.rgb, ElementsAre(0, testing::FloatNear(0.5029f, 1e-4f), 0, 1,
+                                    testing::FloatNear(0.5029f, 1e-4f), 0));
+
+  const FilmTile film{
+      .rect = {0, 0, 4, 2}, .channels = {"R", "G", "B"}, .values = std::vector<float>(24, 0.25f)};
+  ASSERT_TRUE(write_exr(folder / "plate.exr", film, {}));
+  job_.output.plate = FileSequence{.files = (folder / "plate.exr").string()};
+  EXPECT_THAT(load_plate(job_, 2).value().rgb, testing::Each(0.25f));
+}
+
+TEST_F(PlateFile, FaultsNameTheFileAndTheSize) {
+  const fs::path folder = testing::TempDir();
+  const auto fault = [&](int width, int height) {
+    const FilmTile film{.rect = {0, 0, width, height},
+                        .channels = {"R", "G", "B"},
+                        .values = std::vector<float>(std::size_t(3 * width * height))};
+    EXPECT_TRUE(write_exr(folder / "plate.exr", film, {}));
+    const auto plate = load_plate(job_, 1);
+    return plate ? std::string("none") : plate.error().message;
+  };
+  job_.output.plate = FileSequence{.files = (folder / "plate.exr").string()};
+  job_.image.width = 90;
+  job_.image.height = 61;
+  EXPECT_EQ(fault(90, 61), "none");
+  EXPECT_EQ(fault(180, 122), "none");
+  EXPECT_EQ(fault(100, 68), "none") << "61.2 rows to 90 columns";
+  EXPECT_THAT(
+      fault(180, 100),
+      HasSubstr("plate.exr: expected a plate of the picture's 90 x 61 pixels or of that shape "
+                "and larger, got 180 x 100"));
+  EXPECT_THAT(fault(45, 31), HasSubstr("got 45 x 31"));
+  job_.output.plate->files = (folder / "none.png").string();
+  EXPECT_THAT(load_plate(job_, 1).error().message, HasSubstr("none.png: missing"));
+}
+
+}  // namespace
+}  // namespace baton

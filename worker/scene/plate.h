@@ -1,0 +1,21 @@
+#pragma once
+
+#include <string>
+
+#include "common/base/result.h"
+#include "common/image/image_io.h"
+#include "common/job/job_spec.h"
+
+namespace baton {
+
+/// The picture that a frame of a job with plates is laid over, as large as the whole picture of the
+/// job: each pixel is the mean of the plate over it. Linear Rec. 709; integers are taken as sRGB,
+/// alpha is dropped. Errors name the file: missing, not an image, smaller than the picture or of
+/// another shape.
+Result<RgbImage> load_plate(const JobSpec& job, int frame_number);
+
+/// `image` with `width` columns and `height` rows, no more than it has: each pixel is the mean over
+/// its part of the image, to which pixels across its edges count by their share.
+RgbImage averaged_down(const RgbImage& image, int width, int height);
+
+}  // namespace baton
