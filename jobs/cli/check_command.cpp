@@ -150,6 +150,11 @@ void print_text(const JobSpec& job, const JobEstimate& e, const AssetReport& ass
   fmt::print("disk       frames take at most {}, {} each\n", total(e.frames * e.frame_bytes),
              total(e.frame_bytes));
   fmt::print("output     {}/{}\n", job.output.directory, job.output.pattern);
+  if (has_plate(job.output)) {
+    const auto file = [&](int frame) { return file_at(*job.output.plate, frame); };
+    fmt::print("over       {}{}\n", file(job.frames.front()),
+               job.frames.size() > 1 ? " ... " + file(job.frames.back()) : "");
+  }
 }
 
 void print_settings(const std::vector<JobSetting>& settings) {

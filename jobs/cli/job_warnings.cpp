@@ -140,6 +140,7 @@ JobSpec outline_of(JobSpec job) {
     keys.resize((keys.size() + stride - 1) / stride);
   }
   job.environment.camera_map.file.clear();
+  job.output.plate.reset();
   for (auto& [name, mesh] : job.scene.meshes) mesh.smooth_normals = false;
   for (auto& [name, material] : job.scene.materials) material = {};
   return job;

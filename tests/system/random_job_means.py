@@ -73,6 +73,9 @@ def settle_claims(job):
         sampling.pop("byMaterial", None)
     if sampling["method"] != "mis":
         sampling.pop("misCompensation", None)
+    if sampling["method"] in ("sequential", "restir"):
+        job["image"].pop("maxSites", None)
+        job.get("quality", {}).pop("adaptiveThreshold", None)
     sampling.pop("targetError", None)
     sampling.pop("timeBudget", None)
     if visibility.get("correlated"):

@@ -33,13 +33,15 @@ TEST(PathMaps, AllFilesOfAJobAreMapped) {
                               .normal_texture = TextureSpec{.file = "/from/n.png"}};
   job.scene.files = {{"/from/extra.bin"}};
   job.environment.keys = {{1, "/from/sky.exr"}};
-  job.environment.camera_map.file = "/from/plate.exr";
+  job.environment.camera_map.file = "/from/seen.exr";
+  job.output.background = Background::plate;
+  job.output.plate = FileSequence{.files = "/from/plate.exr"};
   const PathMaps maps{{"/from", "/to"}};
   const JobSpec mapped = map_paths(job, maps);
   EXPECT_EQ(mapped.output.directory, "/to/out");
   const std::vector<std::string> before = asset_paths(job), after = asset_paths(mapped);
-  ASSERT_EQ(before.size(), 7u);
-  ASSERT_EQ(after.size(), 7u);
+  ASSERT_EQ(before.size(), 8u);
+  ASSERT_EQ(after.size(), 8u);
   for (std::size_t i = 0; i < before.size(); ++i) EXPECT_EQ(after[i], map_path(before[i], maps));
   EXPECT_EQ(map_paths(std::vector<AssetDigest>{{"/from/a", {1, 2}}}, maps).front().path, "/to/a");
 }
