@@ -133,6 +133,13 @@ Digest object_facts(const JobSpec& job, int frame) {
   return digest_of(writer.bytes());
 }
 
+/// Digests by path.
+std::map<std::string, Digest> contents_of(const ParsedJobDocument& document) {
+  std::map<std::string, Digest> contents;
+  for (const AssetDigest& asset : document.assets) contents.emplace(asset.path, asset.digest);
+  return contents;
+}
+
 }  // namespace
 
 Digest picture_digest(const JobSpec& job, const std::vector<AssetDigest>& assets) {
@@ -162,8 +169,7 @@ std::vector<std::string> picture_differences(const ParsedJobDocument& a,
 }
 
 std::vector<FrameComparison::Facts> FrameComparison::facts_of(const ParsedJobDocument& document) {
-  std::map<std::string, Digest> contents;
-  for (const AssetDigest& asset : document.assets) contents.emplace(asset.path, asset.digest);
+  const std::map<std::string, Digest> contents = contents_of(document);
   std::vector<Facts> facts;
   for (const int frame : document.job.frames) {
     facts.push_back({light_facts(document.job.environment, frame, contents),
@@ -175,10 +181,11 @@ std::vector<FrameComparison::Facts> FrameComparison::facts_of(const ParsedJobDoc
 std::vector<Digest> FrameComparison::plates_of(const ParsedJobDocument& document) {
   const JobSpec& job = document.job;
   std::vector<Digest> plates(job.frames.size());
-  for (std::size_t i = 0; has_plate(job.output) && i < plates.size(); ++i) {
-    const auto plate = std::ranges::find(document.assets, file_at(*job.output.plate, job.frames[i]),
-                                         &AssetDigest::path);
-    if (plate != document.assets.end()) plates[i] = plate->digest;
+  if (!has_plate(job.output)) return plates;
+  const std::map<std::string, Digest> contents = contents_of(document);
+  for (std::size_t i = 0; i < plates.size(); ++i) {
+    const auto plate = contents.find(file_at(*job.output.plate, job.frames[i]));
+    if (plate != contents.end()) plates[i] = plate->second;
   }
   return plates;
 }
