@@ -34,7 +34,7 @@ class FrameComparison {
   /// Whether they show the same and, where samples are carried, so do all frames before; in later
   /// sweeps these are all frames.
   bool are_alike(std::size_t index_a, std::size_t index_b) const;
-  /// Whether they are laid over the same plate, or over none.
+  /// Whether frames with the same pixels are laid over the same plate, or over none.
   bool have_one_plate(std::size_t index_a, std::size_t index_b) const;
   /// How many steps (common/job/sequence.h) from the first on are the same in both.
   std::size_t num_common_steps() const;

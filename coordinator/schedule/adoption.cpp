@@ -35,9 +35,11 @@ class KeptFrames {
       const auto old = static_cast<std::size_t>(task.task.step);
       const auto found = index_.find(former.document.job.frames.at(old));
       if (found == index_.end() || images_[found->second]) continue;
-      if (!comparison.are_equal(old, found->second) ||
-          !comparison.have_one_plate(old, found->second))
+      if (!comparison.are_equal(old, found->second)) continue;
+      if (!comparison.have_one_plate(old, found->second)) {
+        other_plates_ = true;
         continue;
+      }
 
       // The same pixels: is the file as it was written?
       const auto frame = static_cast<std::int32_t>(found->second);
@@ -75,6 +77,7 @@ class KeptFrames {
     for (const auto& image : images_) {
       if (image) adoption.images.push_back(*image);
     }
+    adoption.other_plates = other_plates_;
     adoption.plan.others_frames.assign(others_.begin(), others_.end());
     for (const std::int32_t frame : lost_) {
       if (!has(frame)) adoption.lost.push_back(frame);
@@ -87,6 +90,7 @@ class KeptFrames {
   std::map<int, std::size_t> index_;
   std::vector<std::optional<BlobRef>> images_;
   std::set<std::int32_t> lost_, others_;
+  bool other_plates_ = false;
 };
 
 /// How far the work of a former job reaches; the more, the better.

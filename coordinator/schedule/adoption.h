@@ -32,6 +32,7 @@ struct Adoption {
   std::vector<TaskKey> tasks;    ///< of that one, which count as the new job's under their keys
   std::vector<TaskKey> settled;  ///< done without outputs until something of them is needed
   JobPlan plan;
+  bool other_plates = false;       ///< frames are written anew, as they lie over other plates
   std::vector<std::int32_t> lost;  ///< frames that were written and are not there, by index
 
   bool empty() const { return images.empty() && tasks.empty() && plan.cuts.empty(); }

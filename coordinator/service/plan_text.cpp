@@ -43,19 +43,6 @@ OpenRuns find_open_runs(const JobTasks& tasks) {
   return open;
 }
 
-/// Of all frames that both have.
-bool have_the_same_plates(const ParsedJobDocument& a, const ParsedJobDocument& b) {
-  const FrameComparison comparison(a, b);
-  const std::vector<int>&frames_a = a.job.frames, &frames_b = b.job.frames;
-  for (std::size_t i = 0, j = 0; i < frames_a.size() && j < frames_b.size();) {
-    if (frames_a[i] == frames_b[j] && !comparison.have_one_plate(i, j)) return false;
-    const bool next_a = frames_a[i] <= frames_b[j], next_b = frames_b[j] <= frames_a[i];
-    i += next_a ? 1 : 0;
-    j += next_b ? 1 : 0;
-  }
-  return true;
-}
-
 }  // namespace
 
 std::string plan_text(const Scheduler::Job& job, const std::vector<std::string>& reasons) {
@@ -101,16 +88,16 @@ std::string plan_text(const Scheduler::Job& job, const std::vector<std::string>&
   return text;
 }
 
-std::vector<std::string> output_reasons(const ParsedJobDocument& former,
-                                        const ParsedJobDocument& wanted) {
-  const OutputSpec &a = former.job.output, &b = wanted.job.output;
+std::vector<std::string> output_reasons(const JobSpec& former, const JobSpec& wanted,
+                                        bool other_plates) {
+  const OutputSpec &a = former.output, &b = wanted.output;
   std::vector<std::string> differing;
   const auto compare = [&](bool equal, const char* key) {
     if (!equal) differing.emplace_back(key);
   };
   compare(a.aovs == b.aovs, "output.aovs");
   compare(a.background == b.background, "output.background");
-  compare(have_the_same_plates(former, wanted), "output.plate");
+  compare(!other_plates, "output.plate");
   compare(a.shadows == b.shadows, "output.shadows");
   compare(a.pattern == b.pattern, "output.pattern");
   compare(a.pixel_type == b.pixel_type, "output.pixelType");
@@ -122,7 +109,7 @@ std::vector<std::string> output_reasons(const ParsedJobDocument& former,
     reasons.push_back(fmt::format("frames are written anew: {} {} changed",
                                   fmt::join(differing, ", "),
                                   differing.size() == 1 ? "has" : "have"));
-  } else if (former.job.name != wanted.job.name || former.job.metadata != wanted.job.metadata ||
+  } else if (former.name != wanted.name || former.metadata != wanted.metadata ||
              a.frames_per_second != b.frames_per_second) {
     reasons.emplace_back(
         "frames that are kept keep their headers: name, metadata or frames per second of before");

@@ -14,8 +14,8 @@ namespace baton {
 std::string plan_text(const Scheduler::Job& job, const std::vector<std::string>& reasons);
 
 /// Why a new job does not keep what a former one of its picture has done, and what it keeps as it
-/// is: settings of the output that differ, headers.
-std::vector<std::string> output_reasons(const ParsedJobDocument& former,
-                                        const ParsedJobDocument& wanted);
+/// is: settings of the output that differ, headers. other_plates: as of Adoption.
+std::vector<std::string> output_reasons(const JobSpec& former, const JobSpec& wanted,
+                                        bool other_plates);
 
 }  // namespace baton

@@ -288,7 +288,8 @@ Result<Adoption> Service::find_heritage(const ParsedJobDocument& document,
       .has_blob = [&](const BlobRef& blob) { return store_.contains(blob.digest); }};
   Adoption adoption = adopt(document, formers, kept);
   if (!formers.empty()) {
-    for (std::string& reason : output_reasons(formers.back().document, document))
+    for (std::string& reason :
+         output_reasons(formers.back().document.job, document.job, adoption.other_plates))
       reasons.push_back(std::move(reason));
   }
   constexpr std::size_t kMost = 8;

@@ -77,11 +77,13 @@ inline Estimate judge(JobSpec job, int samples) {
   return e;
 }
 
+/// A bias of so many standard errors of the image mean would have shown.
+inline constexpr double kResolvedErrors = 3.9;
+
 /// What the comparison found: the largest |z| of any pixel and that of the image mean.
 struct Verdict {
   double worst_pixel = 0, image = 0;
-  double resolution =
-      0;  ///< smallest relative bias of the image mean that |z| > 3.9 would have shown
+  double resolution = 0;  ///< smallest relative bias of the image mean that would have shown
 };
 inline Verdict compare(const Estimate& a, const Estimate& b) {
   Verdict v;
@@ -93,7 +95,7 @@ inline Verdict compare(const Estimate& a, const Estimate& b) {
   }
   const double error = std::sqrt(a.image_variance + b.image_variance);
   v.image = std::fabs(a.image_mean - b.image_mean) / error;
-  v.resolution = 3.9 * error / b.image_mean;
+  v.resolution = kResolvedErrors * error / b.image_mean;
   return v;
 }
 

@@ -3,7 +3,7 @@
 // (Sidak) and for the mean of the picture.
 #include <gtest/gtest.h>
 
-#include "tests/stat/against_brute_force.h"
+#include "tests/stat/sites_study.h"
 #include "worker/pass/primary.h"
 #include "worker/scene/pixel_filter.h"
 
@@ -52,51 +52,22 @@ void expect_agreement(const JobSpec& job, double resolution) {
               v.worst_pixel, 100 * v.resolution);
 }
 
-TEST(Rounds, OfBidirectionalAgreeWithBruteForce) {
-  expect_agreement(rounds_job(Method::bidirectional, 1, false), 0.02);
-}
-TEST(Rounds, OfThePoolAgreeWithBruteForce) {
-  expect_agreement(rounds_job(Method::pool, 3, false), 0.02);
-}
-TEST(Rounds, OfThePoolWithOneSiteAgreeWithBruteForce) {
-  JobSpec job = rounds_job(Method::pool, 2, false);
-  job.image.sites = 1;
-  expect_agreement(job, 0.02);
-}
-TEST(Rounds, OfSequentialAgreeWithBruteForce) {
-  expect_agreement(rounds_job(Method::sequential, 3, false), 0.03);
-}
-TEST(Rounds, OfRestirAgreeWithBruteForce) {
-  expect_agreement(rounds_job(Method::restir, 3, false), 0.03);
-}
-TEST(Rounds, OfBidirectionalAgreeInMotion) {
-  expect_agreement(rounds_job(Method::bidirectional, 3, true), 0.02);
-}
-TEST(Rounds, OfThePoolAgreeInMotion) { expect_agreement(rounds_job(Method::pool, 3, true), 0.02); }
-TEST(Rounds, OfSequentialAgreeInMotion) {
-  JobSpec job = rounds_job(Method::sequential, 3, true);
-  job.sampling.refresh_every = 0;
-  expect_agreement(job, 0.03);
+// Rounds of every method, with any number of sites, at one size for all.
+void expect_agreement_of_all(bool in_motion) {
+  test::study_sites(in_motion, {.runs = kRuns, .rounds = 4}, [](const test::StudyRow& row) {
+    const Verdict& v = row.verdict;
+    SCOPED_TRACE(std::string(traits(row.method).name) + ", sites: " + std::to_string(row.sites));
+    EXPECT_LT(v.worst_pixel, kPixelLimit);
+    EXPECT_LT(v.image, kImageLimit);
+    EXPECT_LT(v.resolution, 0.006);
+    std::printf("  %-14s %2d sites: image |z| %.2f, worst pixel |z| %.2f, resolves %.2f %%\n",
+                std::string(traits(row.method).name).c_str(), row.sites, v.image, v.worst_pixel,
+                100 * v.resolution);
+  });
 }
 
-/// Up to 64 sites where geometry is fine. (`brdf` is left out: its rare fireflies on the sun have
-/// no normal distribution.)
-JobSpec fine_job(Method method, int frames, bool in_motion) {
-  JobSpec job = rounds_job(method, frames, in_motion);
-  job.quality.rounds = 2;
-  job.image.sites = 1;
-  job.image.max_sites = 64;
-  return job;
-}
-
-TEST(Rounds, OfFineSitesAgreeWithBruteForce) {
-  for (const Method method :
-       {Method::environment, Method::mis, Method::bidirectional, Method::pool}) {
-    SCOPED_TRACE(traits(method).name);
-    expect_agreement(fine_job(method, 2, false), 0.03);
-  }
-}
-TEST(Rounds, OfFineSitesAgreeInMotion) { expect_agreement(fine_job(Method::pool, 3, true), 0.02); }
+TEST(Rounds, OfAllMethodsAgreeWithBruteForce) { expect_agreement_of_all(false); }
+TEST(Rounds, OfAllMethodsAgreeInMotion) { expect_agreement_of_all(true); }
 
 /// Six rounds or fewer after two that judge, with the noise of two rays a round.
 JobSpec adaptive_job(Method method, int frames, bool in_motion) {

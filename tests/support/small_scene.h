@@ -14,12 +14,13 @@
 
 namespace baton::test {
 
-/// A folder of the running test in this process, made on demand.
+/// A folder of the running test, or of a study, in this process, made on demand.
 inline std::filesystem::path test_folder() {
   const auto* info = testing::UnitTest::GetInstance()->current_test_info();
+  const std::string name =
+      info == nullptr ? "study" : std::string(info->test_suite_name()) + "_" + info->name();
   std::filesystem::path folder = std::filesystem::path(testing::TempDir()) /
-                                 (std::string("baton_") + info->test_suite_name() + "_" +
-                                  info->name() + "_" + std::to_string(getpid()));
+                                 ("baton_" + name + "_" + std::to_string(getpid()));
   std::filesystem::create_directories(folder);
   return folder;
 }

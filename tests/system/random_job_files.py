@@ -8,14 +8,13 @@ import os
 import random
 import struct
 import sys
-import zlib
 from array import array
 from pathlib import Path
 
 from farm import write_sphere
 
 sys.path.append(str(Path(__file__).parents[2] / "jobs/examples"))
-from make_gltf_set import make_set  # noqa: E402
+from make_gltf_set import make_set, png  # noqa: E402
 
 # ---- recipes ------------------------------------------------------------------------------------------------
 # A recipe is {"kind": ..., its numbers}; the file's ending says the format.
@@ -51,10 +50,7 @@ def write_image(path, width, height):
         head = struct.pack("<BBBHHBHHHHBB", 0, 0, 2, 0, 0, 0, 0, 0, width, height, 32, 0x28)
         path.write_bytes(head + b"".join(bytes([b, g, r, a]) for r, g, b, a in texels))
         return
-    rows = b"".join(b"\0" + bytes(sum(texels[y * width:(y + 1) * width], [])) for y in range(height))
-    chunks = [(b"IHDR", struct.pack(">IIBBBBB", width, height, 8, 6, 0, 0, 0)), (b"IDAT", zlib.compress(rows)), (b"IEND", b"")]
-    path.write_bytes(b"\x89PNG\r\n\x1a\n" + b"".join(
-        struct.pack(">I", len(body)) + tag + body + struct.pack(">I", zlib.crc32(tag + body)) for tag, body in chunks))
+    path.write_bytes(png(width, height, lambda x, y: texels[y * width + x]))
 
 
 def write_triangles(path, vertices, triangles):

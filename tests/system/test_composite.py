@@ -2,12 +2,14 @@
 """Pictures laid over plates: objects with the shadows that they cast on what is in the plate."""
 
 import math
-import struct
-import zlib
+import sys
 from pathlib import Path
 
 from exr_frames import read_frame
 from farm import BAD_INPUT, check, check_equal, make_job, run_tests, write_job, write_map
+
+sys.path.append(str(Path(__file__).parents[2] / "jobs/examples"))
+from make_gltf_set import png  # noqa: E402
 
 WIDTH, HEIGHT = 96, 56
 # What the camera sees behind: colour of the ground, colour of the sky. Dark, bright, and of a strong colour.
@@ -104,13 +106,10 @@ def test_three_backgrounds_without_fringe(programs, folder):
                                          f"allowed {bound / sum(c):.4%}")
 
 
-def write_png(path, width, height, color):
-    """8 bits, RGB."""
-    rows = b"".join(b"\0" + b"".join(bytes(color(x, y)) for x in range(width)) for y in range(height))
-    chunks = [(b"IHDR", struct.pack(">IIBBBBB", width, height, 8, 2, 0, 0, 0)), (b"IDAT", zlib.compress(rows)), (b"IEND", b"")]
+def write_png(path, color):
+    """Twice as large as the picture."""
     path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_bytes(b"\x89PNG\r\n\x1a\n" + b"".join(
-        struct.pack(">I", len(body)) + tag + body + struct.pack(">I", zlib.crc32(tag + body)) for tag, body in chunks))
+    path.write_bytes(png(2 * WIDTH, 2 * HEIGHT, color))
 
 
 def light_of(value):
@@ -122,8 +121,7 @@ def light_of(value):
 def plates_of_a_shot(folder):
     """Twice as large as the picture; numbers 11 to 13."""
     for number in (11, 12, 13):
-        write_png(folder / f"shot.{number:03}.png", 2 * WIDTH, 2 * HEIGHT,
-                  lambda x, y, n=number: (x % 256, (2 * y) % 256, 20 * n % 256))
+        write_png(folder / f"shot.{number:03}.png", lambda x, y, n=number: (x % 256, (2 * y) % 256, 20 * n % 256))
 
 
 def shot(folder, **output):
@@ -181,15 +179,20 @@ def test_other_plates_write_frames_anew(programs, folder):
     job = shot(folder, background="plate", plate=PLATE)
     rendered(programs, folder / "shot", job)
     before = programs.pixels(folder / "shot/frames")
-    write_png(folder / "shot.012.png", 2 * WIDTH, 2 * HEIGHT, lambda x, y: (9, 99, 199))
+    write_png(folder / "shot.012.png", lambda x, y: (9, 99, 199))
     told, _ = rendered(programs, folder / "shot", job)
     check("frames 1,3 are kept" in told and "output.plate has changed" in told, told)
     after = programs.pixels(folder / "shot/frames")
     check_equal([name for name in before if before[name] != after[name]], ["frame.0002.exr"], "other frames")
-    # Without the plate all are others; refined ones are put together from the same films.
+    # Without the plate all are others. Films that stay, for another sweep, are those of frames with and without it.
     job["output"]["background"] = "transparent"
+    job["quality"]["refinable"] = True
     told, _ = rendered(programs, folder / "shot", job)
     check("are kept" not in told and "output.background" in told, told)
+    job["output"]["background"] = "plate"
+    told, _ = rendered(programs, folder / "shot", job)
+    check("frames 1-3 are put together from what is rendered" in told, told)
+    check_equal(programs.pixels(folder / "shot/frames"), after, "pixels over the plates again")
 
 
 def test_shadows_in_alpha(programs, folder):
@@ -211,7 +214,7 @@ def test_shadows_in_alpha(programs, folder):
 def test_faults_name_file_and_place(programs, folder):
     plates_of_a_shot(folder)
     (folder / "text.png").write_text("no picture", encoding="ascii")
-    write_png(folder / "small.png", WIDTH // 2, HEIGHT // 2, lambda x, y: (1, 2, 3))
+    (folder / "small.png").write_bytes(png(WIDTH // 2, HEIGHT // 2, lambda x, y: (1, 2, 3)))
     cases = [({"background": "plate"}, "$.output.plate: expected a picture or numbered pictures, as background is plate"),
              ({"background": "plate", "plate": "none.png"}, "none.png"),
              ({"background": "plate", "plate": {**PLATE, "offset": 9}}, "shot.010.png"),

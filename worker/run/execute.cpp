@@ -3,7 +3,6 @@
 #include <fmt/format.h>
 
 #include "common/image/film_tile.h"
-#include "common/image/shadow.h"
 #include "common/job/motion.h"
 #include "common/job/sequence.h"
 #include "common/state/join_states.h"
@@ -218,15 +217,13 @@ Result<TaskOutput> execute_assemble(const LoadedJob& loaded, const BlobStore& st
     pasted[static_cast<std::size_t>(input.tile)] = true;
   }
 
-  const PixelRect shown = loaded.job.image.shown();
-  image.rect = image.rect.relative_to(shown);
+  image.rect = image.rect.relative_to(loaded.job.image.shown());
+  std::optional<RgbImage> plate;
   if (const JobSpec& here = loaded.context->job; has_plate(here.output)) {
-    const int number = here.frames[static_cast<std::size_t>(task.step)];
-    BATON_ASSIGN(const RgbImage plate, load_plate(here, number));
-    lay_over_plate(image, plate, {shown.x0, shown.y0});
+    BATON_ASSIGN(plate, load_plate(here, here.frames[static_cast<std::size_t>(task.step)]));
   }
   BATON_ASSIGN(const WrittenFrame written,
-               write_frame(loaded.job, loaded.digest, task.step, std::move(image)));
+               write_frame(loaded.job, loaded.digest, task.step, std::move(image), plate));
   return TaskOutput{{written.file}, {}, {{task.step, task.tile, {}, written.quality}}};
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
 #include <filesystem>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -30,6 +31,7 @@ struct WrittenFrame {
 };
 
 /// Writes one finished frame as EXR with the job's name, digest and program version in its header.
+/// With a plate, which is as large as the whole picture, the frame is laid over it.
 /// What is below zero is set to 0 where the job wants that; colours past a half float make those of
 /// the frame float32; planes that no AOV of the job has are left out.
 ///
@@ -37,7 +39,8 @@ struct WrittenFrame {
 /// header and the table of blocks must be whole, and one block of rows, another one in each frame,
 /// must unpack to the film. Errors: the disk, or a file that does not hold what was written.
 Result<WrittenFrame> write_frame(const JobSpec& job, const Digest& job_digest,
-                                 std::int32_t frame_index, FilmTile image);
+                                 std::int32_t frame_index, FilmTile image,
+                                 const std::optional<RgbImage>& plate = {});
 
 /// Checks that the EXR file at `path` has the size and the channels of `image`, and in block
 /// `block` (0-based, modulo the number of blocks) its values. ErrorKind::corrupt names channel and

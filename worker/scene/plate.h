@@ -14,8 +14,4 @@ namespace baton {
 /// another shape.
 Result<RgbImage> load_plate(const JobSpec& job, int frame_number);
 
-/// `image` with `width` columns and `height` rows, no more than it has: each pixel is the mean over
-/// its part of the image, to which pixels across its edges count by their share.
-RgbImage averaged_down(const RgbImage& image, int width, int height);
-
 }  // namespace baton

@@ -4,7 +4,6 @@
 #include <fmt/format.h>
 
 #include <cctype>
-#include <cmath>
 #include <cstring>
 #include <filesystem>
 #include <optional>
@@ -103,10 +102,6 @@ std::string name_by_content(ByteView bytes) {
 }
 
 }  // namespace
-
-float linear_from_srgb(float value) {
-  return value <= 0.04045f ? value / 12.92f : std::pow((value + 0.055f) / 1.055f, 2.4f);
-}
 
 Result<Image> read_image(const std::string& path) {
   std::error_code error;

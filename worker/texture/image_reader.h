@@ -17,9 +17,6 @@ struct Image {
   bool is_integer = false;  ///< not made of floats: colours are sRGB
 };
 
-/// Linear light of an sRGB value [IEC 61966-2-1].
-float linear_from_srgb(float value);
-
 /// Reads an image file of any format but that of video. OpenImageIO is loaded when the first image
 /// is read: it and what it brings take a quarter of a second and 40 MB. Alpha stays unassociated,
 /// of several pictures in a file the first is read. Errors name the file: missing, not an image,

@@ -21,6 +21,11 @@ constexpr float kBrightest = 65504;
 /// Of what integers of 8 or 16 bits say.
 constexpr std::size_t kTableSize = 65536;
 
+/// IEC 61966-2-1.
+float decode_srgb(float v) {
+  return v <= 0.04045f ? v / 12.92f : std::pow((v + 0.055f) / 1.055f, 2.4f);
+}
+
 /// The channels of an image that a use keeps.
 std::vector<std::int32_t> kept_channels(TextureUse use, std::int32_t channels) {
   const bool is_grey = channels < 3;
@@ -50,7 +55,7 @@ std::vector<float> linear_values(const Image& image, TextureUse use,
   const auto channels = static_cast<std::size_t>(image.channels);
   std::vector<float> light(is_srgb ? kTableSize : 0);
   for (std::size_t i = 0; i < light.size(); ++i)
-    light[i] = linear_from_srgb(static_cast<float>(i) / static_cast<float>(kTableSize - 1));
+    light[i] = decode_srgb(static_cast<float>(i) / static_cast<float>(kTableSize - 1));
   std::vector<float> values;
   values.reserve(image.samples.size() / channels * kept.size());
   for (std::size_t pixel = 0; pixel < image.samples.size(); pixel += channels) {
@@ -64,6 +69,14 @@ std::vector<float> linear_values(const Image& image, TextureUse use,
   }
   return values;
 }
+
+}  // namespace
+
+std::vector<float> linear_colors(const Image& image) {
+  return linear_values(image, TextureUse::color, kept_channels(TextureUse::color, image.channels));
+}
+
+namespace {
 
 /// Half as many samples along one axis, each the mean of the stretch that it covers. values:
 /// (outer, count, inner).

@@ -22,6 +22,9 @@ enum class TextureUse : std::uint8_t {
   green,               ///< G, numbers
 };
 
+/// R, G and B of each pixel as linear light, none below 0; grey stands for all three.
+std::vector<float> linear_colors(const Image& image);
+
 /// The parallelogram that a look-up is the mean over: two edges, in units of the whole image. All
 /// 0: a point.
 struct Footprint {
