@@ -55,7 +55,11 @@ Status expect_file(const fs::path& path) {
   return Error{ErrorKind::bad_input, fmt::format("{}: no such file", path.string())};
 }
 
-Result<Bytes> read_file(const fs::path& path, std::uint64_t max_size_bytes) {
+namespace {
+
+/// Content: Bytes or std::string.
+template <class Content>
+Result<Content> read_whole(const fs::path& path, std::uint64_t max_size_bytes) {
   // O_NONBLOCK: a named pipe must not make us wait for its writer.
   const FileDescriptor file(::open(path.c_str(), O_RDONLY | O_CLOEXEC | O_NONBLOCK));
   if (!file) return io_error("cannot open", path);
@@ -73,7 +77,7 @@ Result<Bytes> read_file(const fs::path& path, std::uint64_t max_size_bytes) {
     return Error{ErrorKind::bad_input, fmt::format("{}: {} bytes, at most {} are read",
                                                    path.string(), size, max_size_bytes)};
   }
-  Bytes bytes(size);
+  Content bytes(size, {});
   std::size_t done = 0;
   while (done < bytes.size()) {
     const ssize_t count = ::read(file.number(), bytes.data() + done, bytes.size() - done);
@@ -86,9 +90,14 @@ Result<Bytes> read_file(const fs::path& path, std::uint64_t max_size_bytes) {
   return bytes;
 }
 
+}  // namespace
+
+Result<Bytes> read_file(const fs::path& path, std::uint64_t max_size_bytes) {
+  return read_whole<Bytes>(path, max_size_bytes);
+}
+
 Result<std::string> read_text_file(const fs::path& path, std::uint64_t max_size_bytes) {
-  BATON_ASSIGN(const Bytes bytes, read_file(path, max_size_bytes));
-  return std::string(reinterpret_cast<const char*>(bytes.data()), bytes.size());
+  return read_whole<std::string>(path, max_size_bytes);
 }
 
 fs::path temporary_sibling(const fs::path& path) {

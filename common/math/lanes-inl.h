@@ -20,6 +20,10 @@ HWY_BEFORE_NAMESPACE();
 namespace baton::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
+/// After the parameters of a lambda that a loop over vectors calls: it becomes part of the loop, so
+/// that what it adds to stays in registers.
+#define BATON_IN_LOOP HWY_ATTR __attribute__((always_inline))
+
 /// All kernels run on (up to) eight float lanes: wide enough for AVX2, and the same grouping on
 /// wider machines.
 using DF = hn::CappedTag<float, 8>;

@@ -45,20 +45,12 @@ struct SiteDeal {
     const std::size_t least = in_turn ? kBlock : hn::Lanes(DF());
     return static_cast<std::size_t>(count) >= static_cast<std::size_t>(num_sites) * least;
   }
-  /// Site of the k-th share, where the vectors are shared out, or of the k-th block.
-  std::int32_t SiteOfShare(std::size_t k) const {
-    const auto n = static_cast<std::size_t>(num_sites);
-    if (n == 1) return sites[0];
-    return sites[(k + FirstSite()) % n];
-  }
-  /// Site of candidate i, as ForEach deals it.
-  std::int32_t SiteOf(std::size_t i) const {
-    if (num_sites == 1) return sites[0];
-    if (ByVector()) return SiteOfShare(in_turn ? i / kBlock : ShareOf(i / hn::Lanes(DF())));
-    const float turn = (static_cast<float>(i) + Rest()) *
-                       (static_cast<float>(num_sites) / static_cast<float>(count));
-    return SiteOfShare(
-        static_cast<std::size_t>(std::min(static_cast<std::int32_t>(turn), num_sites - 1)));
+  /// The sites of candidates that lie along a curve, as ForEachRunOf deals them.
+  HWY_INLINE VI SitesOf(VI candidate) const {
+    const DI di;
+    if (num_sites == 1) return hn::Set(di, sites[0]);
+    if (!ByVector()) return SitesOfLanes(hn::ConvertTo(DF(), candidate));
+    return SitesOfShares(hn::ShiftRight<std::countr_zero(kBlock)>(candidate));
   }
 
   /// use(read(reader), first, last) for vectors [first, last) that share their surface, in turn;
@@ -69,7 +61,7 @@ struct SiteDeal {
     const DI di;
     if (!ByVector()) {
       for (std::size_t v = 0; v < vectors; ++v) {
-        const VI site = SitesOfLanes(v * hn::Lanes(DF()));
+        const VI site = SitesOfLanes(CountFrom(DF(), static_cast<float>(v * hn::Lanes(DF()))));
         use(read(site, [&](const SiteBlock::Array& field)
                            HWY_ATTR { return LookUp(field, site, block.num_sites); }),
             v, v + 1);
@@ -91,14 +83,15 @@ struct SiteDeal {
   template <class Use>
   HWY_INLINE void ForEachRun(const SiteBlock& block, const Use& use) const {
     ForEachRunOf(
-        block, [&](VI site, const auto& read) HWY_ATTR { return ReadSurfaces(block, site, read); },
+        block,
+        [&](VI site, const auto& read) BATON_IN_LOOP { return ReadSurfaces(block, site, read); },
         use);
   }
   /// use(surface, i) for each vector of candidates i, i + 1, ... in turn.
   template <class Use>
   HWY_INLINE void ForEach(const SiteBlock& block, const Use& use) const {
     ForEachRun(block,
-               [&](const SurfaceLanes& surface, std::size_t first, std::size_t last) HWY_ATTR {
+               [&](const SurfaceLanes& surface, std::size_t first, std::size_t last) BATON_IN_LOOP {
                  for (std::size_t v = first; v < last; ++v) use(surface, v * hn::Lanes(DF()));
                });
   }
@@ -111,26 +104,29 @@ struct SiteDeal {
   float Rest() const {
     return start * static_cast<float>(num_sites) - static_cast<float>(FirstSite());
   }
-  std::size_t ShareOf(std::size_t vector) const {
-    return vector * static_cast<std::size_t>(num_sites) / Vectors();
-  }
   /// Vector after the k-th share.
   std::size_t EndOfShare(std::size_t k) const {
     const auto n = static_cast<std::size_t>(num_sites);
     if (n == 1) return Vectors();
     return in_turn ? (k + 1) * kVectorsOfBlock : ((k + 1) * Vectors() + n - 1) / n;
   }
-  HWY_INLINE VI SitesOfLanes(std::size_t i) const {
+  /// Where each lane has its own site.
+  HWY_INLINE VI SitesOfLanes(VF candidate) const {
     const DF d;
     const DI di;
-    const VF position = hn::Add(CountFrom(d, static_cast<float>(i)), hn::Set(d, Rest()));
-    const VF turn =
-        hn::Mul(position, hn::Set(d, static_cast<float>(num_sites) / static_cast<float>(count)));
-    const VI share = hn::Min(hn::ConvertTo(di, turn), hn::Set(di, num_sites - 1));
-    const VI site = hn::Add(share, hn::Set(di, static_cast<std::int32_t>(FirstSite())));
-    const VI n = hn::Set(di, num_sites);
-    const auto is_past = hn::Gt(site, hn::Set(di, num_sites - 1));
-    return hn::GatherIndex(di, sites, hn::Sub(site, hn::IfThenElseZero(is_past, n)));
+    const VF turn = hn::Mul(hn::Add(candidate, hn::Set(d, Rest())),
+                            hn::Set(d, static_cast<float>(num_sites) / static_cast<float>(count)));
+    return SitesOfShares(hn::Min(hn::ConvertTo(di, turn), hn::Set(di, num_sites - 1)));
+  }
+  /// Whose turn it is: the remainders of small whole numbers, for which floats are exact enough.
+  HWY_INLINE VI SitesOfShares(VI share) const {
+    const DF d;
+    const DI di;
+    const VI turn = hn::Add(share, hn::Set(di, static_cast<std::int32_t>(FirstSite())));
+    const VF rounds = hn::Mul(hn::Add(hn::ConvertTo(d, turn), hn::Set(d, 0.5f)),
+                              hn::Set(d, 1.0f / static_cast<float>(num_sites)));
+    const VI gone = hn::Mul(hn::ConvertTo(di, rounds), hn::Set(di, num_sites));
+    return hn::GatherIndex(di, sites, hn::Sub(turn, gone));
   }
 };
 
@@ -274,7 +270,7 @@ HWY_INLINE void LightCandidates(const kernels::CandidateSource& from, const Use&
   const CandidateWeights weigh{sites, counts};
   const LightRun run(presampled, counts.from_light, random[0]);
   const SiteDeal deal = LightSites(from);
-  deal.ForEach(sites, [&](const SurfaceLanes& surface, std::size_t i) HWY_ATTR {
+  deal.ForEach(sites, [&](const SurfaceLanes& surface, std::size_t i) BATON_IN_LOOP {
     const LightLanes light = run.Load(i);
     const BsdfLanes f = EvaluateBsdf(surface, light.direction);
     const Vec3Lanes reflected =

@@ -46,27 +46,28 @@ HWY_INLINE void WeighDiffuse(const kernels::CandidateSource& from, Line& line) {
   };
   deal.ForEachRunOf(
       sites, read,
-      [&](const std::array<Vec3Lanes, 3>& surface, std::size_t first, std::size_t last) HWY_ATTR {
-        const Vec3Lanes ns = surface[0], ng = surface[1], kd = Scale(surface[2], scale);
-        if constexpr (Line::kHasColors) SetZero(adding.colors);
-        for (std::size_t v = first; v < last; ++v) {
-          const std::size_t i = v * hn::Lanes(d);
-          const LightLanes light = run.Load(i);
-          const VF cosine = Dot(ns, light.direction);
-          const VF above = hn::Min(cosine, Dot(ng, light.direction));  // its sign alone counts
-          MF live = hn::Gt(above, hn::Zero(d));
-          if (i + hn::Lanes(d) > count) live = hn::And(live, hn::FirstN(d, count - i));
-          const VF each = hn::IfThenElseZero(live, hn::Mul(cosine, run.LoadInverse(i)));
-          const auto add_color = [&](VF share, Vec3Lanes& sum) HWY_ATTR {
-            sum = AddScaled({light.now.r, light.now.g, light.now.b}, hn::Mul(each, share), sum);
-          };
-          const VF reflected = Dot(kd, {light.now.r, light.now.g, light.now.b});
-          adding.Add(light.code, hn::Mul(each, reflected), add_color);
-        }
-        if constexpr (Line::kHasColors) {
-          colors = AddProduct(Scale(kd, hn::Set(d, 3.0f)), adding.colors, colors);
-        }
-      });
+      [&](const std::array<Vec3Lanes, 3>& surface, std::size_t first, std::size_t last)
+          BATON_IN_LOOP {
+            const Vec3Lanes ns = surface[0], ng = surface[1], kd = Scale(surface[2], scale);
+            if constexpr (Line::kHasColors) SetZero(adding.colors);
+            for (std::size_t v = first; v < last; ++v) {
+              const std::size_t i = v * hn::Lanes(d);
+              const LightLanes light = run.Load(i);
+              const VF cosine = Dot(ns, light.direction);
+              const VF above = hn::Min(cosine, Dot(ng, light.direction));  // its sign alone counts
+              MF live = hn::Gt(above, hn::Zero(d));
+              if (i + hn::Lanes(d) > count) live = hn::And(live, hn::FirstN(d, count - i));
+              const VF each = hn::IfThenElseZero(live, hn::Mul(cosine, run.LoadInverse(i)));
+              const auto add_color = [&](VF share, Vec3Lanes& sum) HWY_ATTR {
+                sum = AddScaled({light.now.r, light.now.g, light.now.b}, hn::Mul(each, share), sum);
+              };
+              const VF reflected = Dot(kd, {light.now.r, light.now.g, light.now.b});
+              adding.Add(light.code, hn::Mul(each, reflected), add_color);
+            }
+            if constexpr (Line::kHasColors) {
+              colors = AddProduct(Scale(kd, hn::Set(d, 3.0f)), adding.colors, colors);
+            }
+          });
   if constexpr (Line::kHasColors) adding.colors = Add(line.colors, colors);
   line = adding;
 }
@@ -83,17 +84,19 @@ HWY_INLINE void WeighCandidates(const kernels::CandidateSource& from,
     line.BeginBsdf();
     return;
   }
-  const auto add = [&](const CandidateLanes& c) HWY_ATTR {
-    line.Add(c.code, c.weight, [&](VF share, Vec3Lanes& sum) HWY_ATTR {
+  Line adding = line;
+  const auto add = [&](const CandidateLanes& c) BATON_IN_LOOP {
+    adding.Add(c.code, c.weight, [&](VF share, Vec3Lanes& sum) BATON_IN_LOOP {
       sum = AddScaled(c.reflected, hn::Mul(c.per_target, share), sum);
     });
   };
-  LightCandidates(from, [&](const CandidateLanes& c, std::size_t) HWY_ATTR { add(c); });
-  line.BeginBsdf();
-  BsdfCandidates(from, [&](const CandidateLanes& c, std::size_t i) HWY_ATTR {
+  LightCandidates(from, [&](const CandidateLanes& c, std::size_t) BATON_IN_LOOP { add(c); });
+  adding.BeginBsdf();
+  BsdfCandidates(from, [&](const CandidateLanes& c, std::size_t i) BATON_IN_LOOP {
     StoreCandidates(c, i, from_bsdf);
     add(c);
   });
+  line = adding;
 }
 
 /// The line of weights alone.
@@ -151,7 +154,7 @@ class ChosenCandidates {
     CandidateLanes out;
     out.code = hn::BitCast(
         DU(), hn::GatherIndex(di, reinterpret_cast<const std::int32_t*>(first.code), at));
-    out.site = SitesOf(pick);
+    out.site = deal_.SitesOf(pick);
     const SurfaceLanes surface = LoadSurfaces(sites_, out.site);
     const BsdfLanes f = EvaluateBsdf(surface, {read(first.x), read(first.y), read(first.z)});
     out.reflected = ReflectedRadiance(surface, f, read(first.r), read(first.g), read(first.b));
@@ -170,16 +173,6 @@ class ChosenCandidates {
                      hn::GatherIndex(d, from_bsdf_.g.from(0), index),
                      hn::GatherIndex(d, from_bsdf_.b.from(0), index)};
     return out;
-  }
-
-  /// The sites that the deal gave them.
-  HWY_INLINE VI SitesOf(VI pick) const {
-    const DI di;
-    if (deal_.num_sites == 1) return hn::Set(di, deal_.sites[0]);
-    HWY_ALIGN std::int32_t lane[hn::MaxLanes(DI())];
-    hn::Store(pick, di, lane);
-    for (std::int32_t& l : lane) l = deal_.SiteOf(static_cast<std::size_t>(l));
-    return hn::Load(di, lane);
   }
 
   const SiteBlock& sites_;

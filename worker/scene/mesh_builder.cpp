@@ -98,16 +98,17 @@ std::size_t MeshBuilder::find_slot(const VertexKey& key) const {
   return slot;
 }
 
-void MeshBuilder::grow() {
-  constexpr std::size_t kFirstSize = 1024;
-  slots_.assign(std::max(kFirstSize, 4 * slots_.size()), 0);
+void MeshBuilder::begin_part(std::size_t num_vertices) {
+  of_part_.assign(num_vertices, 0);
+  const std::size_t most = mesh_.positions.size() + num_vertices;
+  if (slots_.size() >= 2 * most) return;
+  slots_.assign(std::bit_ceil(2 * most), 0);
   for (std::uint32_t v = 0; v < mesh_.positions.size(); ++v) slots_[find_slot(key_of(v))] = v + 1;
 }
 
 std::uint32_t MeshBuilder::vertex(const Vec3& position, const Vec3& normal, const UvSets& uvs,
                                   const Tangent& tangent) {
   const auto sets = static_cast<std::size_t>(parts_.uv_sets);
-  if (2 * (mesh_.positions.size() + 1) > slots_.size()) grow();
   const std::size_t slot = find_slot(key_of(position, normal, uvs, tangent));
   if (slots_[slot] == 0) {
     mesh_.positions.push_back(position);
@@ -123,19 +124,20 @@ std::vector<Vec3> smooth_vertex_normals(const TriangleMesh& mesh) {
   // Sum the face normals at each vertex, weighted by the corner's angle.
   std::vector<Vec3> sum(mesh.positions.size());
   std::vector<Vec3> of_one_face(mesh.positions.size());
-  for (const auto& triangle : mesh.triangles) {
-    const std::array<Vec3, 3> p{mesh.positions[triangle[0]], mesh.positions[triangle[1]],
-                                mesh.positions[triangle[2]]};
-    // From each corner to the next, and back: exactly as if each were normalized.
-    const std::array<Vec3, 3> to{normalize(p[1] - p[0]), normalize(p[2] - p[1]),
-                                 normalize(p[0] - p[2])};
-    const std::array<Vec3, 3> back{Vec3{} - to[0], Vec3{} - to[1], Vec3{} - to[2]};
-    const Vec3 normal = normalize(cross(to[0], back[2]));
-    for (std::size_t k = 0; k < 3; ++k) {
-      const Vec3 &a = to[k], &b = back[(k + 2) % 3];
-      sum[triangle[k]] += normal * std::atan2(length(cross(a, b)), dot(a, b));
-      of_one_face[triangle[k]] = normal;
-    }
+  for (const auto& [a, b, c] : mesh.triangles) {
+    const Vec3 &at_a = mesh.positions[a], &at_b = mesh.positions[b], &at_c = mesh.positions[c];
+    // There and back: exactly as if each were normalized.
+    const Vec3 a_to_b = normalize(at_b - at_a), b_to_a = Vec3{} - a_to_b;
+    const Vec3 b_to_c = normalize(at_c - at_b), c_to_b = Vec3{} - b_to_c;
+    const Vec3 c_to_a = normalize(at_a - at_c), a_to_c = Vec3{} - c_to_a;
+    const Vec3 normal = normalize(cross(a_to_b, a_to_c));
+    const auto add = [&](std::uint32_t vertex, const Vec3& to_next, const Vec3& to_last) {
+      sum[vertex] += normal * std::atan2(length(cross(to_next, to_last)), dot(to_next, to_last));
+      of_one_face[vertex] = normal;
+    };
+    add(a, a_to_b, a_to_c);
+    add(b, b_to_c, b_to_a);
+    add(c, c_to_a, c_to_b);
   }
 
   // Normalise what did not cancel.

@@ -23,7 +23,7 @@ class MeshBuilder {
   explicit MeshBuilder(MeshParts parts) : parts_(parts) {}
 
   /// The triangles that follow are of a list of so many vertices, another one than before.
-  void begin_part(std::size_t num_vertices) { of_part_.assign(num_vertices, 0); }
+  void begin_part(std::size_t num_vertices);
   /// Adds a triangle of finite corners. vertices: their places in the part's list; a place always
   /// has the same position, normal and so on. normals: unit. What `parts` does not name is not
   /// looked at.
@@ -41,7 +41,6 @@ class MeshBuilder {
   std::uint32_t vertex(const Vec3& position, const Vec3& normal, const UvSets& uvs,
                        const Tangent& tangent);
   std::size_t find_slot(const VertexKey& key) const;
-  void grow();
 
   MeshParts parts_;
   TriangleMesh mesh_;
