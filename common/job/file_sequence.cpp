@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <filesystem>
 
 namespace baton {
@@ -18,8 +19,10 @@ std::string frame_file_name(const std::string& pattern, int number) {
 }
 
 int number_at(const FileSequence& sequence, int frame) {
-  const auto wanted =
-      static_cast<std::int64_t>(std::floor(sequence.speed * frame)) + sequence.offset;
+  // A product that rounding has left just below a whole number counts as that: .7 x 90 is 63.
+  const double product = sequence.speed * frame;
+  const double rounding = 2 * std::numeric_limits<double>::epsilon() * std::fabs(product);
+  const auto wanted = static_cast<std::int64_t>(std::floor(product + rounding)) + sequence.offset;
   if (sequence.beyond == FilesBeyond::hold)
     return static_cast<int>(std::clamp<std::int64_t>(wanted, sequence.first, sequence.last));
   const std::int64_t count = std::int64_t{sequence.last} - sequence.first + 1;

@@ -9,6 +9,7 @@
 #include "common/base/check.h"
 #include "common/base/limits.h"
 #include "common/job/job_fields.h"
+#include "common/job/job_json.h"
 
 namespace baton {
 namespace {
@@ -19,6 +20,15 @@ constexpr double kGain = 1.05;
 /// The second pass keeps two halves of everything.
 bool can_take(const AutoCandidate& candidate, int num_particles) {
   return !candidate.correlated || num_particles % 2 == 0;
+}
+
+/// Whether the job may have the candidate's method: its AOVs, catchers, thresholds and so on may
+/// exclude one.
+bool suits(const JobSpec& job, const AutoCandidate& candidate) {
+  JobSpec with = job;
+  with.sampling = candidate.sampling;
+  with.visibility.correlated = candidate.correlated;
+  return static_cast<bool>(parse_job(to_json(with), "", "/"));
 }
 
 /// A family at some N.
@@ -110,7 +120,8 @@ std::vector<AutoCandidate> auto_candidates(const JobSpec& job) {
           job.sampling.mis_compensation && traits(method).compensates;
       candidate.sampling.target_error.reset();
       candidate.sampling.time_budget.reset();
-      if (can_take(candidate, n)) candidates.push_back(std::move(candidate));
+      if (can_take(candidate, n) && suits(job, candidate))
+        candidates.push_back(std::move(candidate));
     };
     if (!chooses_particles(job.sampling)) return add_one(job.sampling.num_particles);
     for (const int n : kPilotParticles) add_one(n);
@@ -127,9 +138,8 @@ std::vector<AutoCandidate> auto_candidates(const JobSpec& job) {
   if (job.frames.size() > 1 && job.state.carry) {
     for (const int p : {1, 5})
       add(fmt::format("sequential P={}", p), Method::sequential, asked.num_candidates, p);
-    if (!job.visibility.correlated)
-      for (const int m : {64, 128, 256, 512})
-        add(fmt::format("pool M={}", m), Method::pool, m, asked.num_distributions);
+    for (const int m : {64, 128, 256, 512})
+      add(fmt::format("pool M={}", m), Method::pool, m, asked.num_distributions);
   }
   return candidates;
 }

@@ -32,12 +32,12 @@ std::vector<std::string> aovs_of(const FilmTile& frame) {
   return names;
 }
 
-/// The planes of an AOV: three or one; empty: it has no such channels.
+/// The planes of an AOV: three, two or one; empty: it has no such channels.
 std::vector<const float*> planes_of(const FilmTile& frame, const std::string& aov) {
   const std::string stem = aov.empty() ? "" : aov + ".";
-  for (const char* const letters : {"RGB", "XYZ"}) {
+  for (const std::string_view letters : {"RGB", "XYZ", "uv"}) {
     std::vector<const float*> planes;
-    for (int c = 0; c < 3; ++c) planes.push_back(frame.find(stem + letters[c]));
+    for (const char letter : letters) planes.push_back(frame.find(stem + letter));
     if (std::ranges::find(planes, nullptr) == planes.end()) return planes;
   }
   const float* const single = frame.find(aov);
@@ -56,6 +56,27 @@ RgbImage interleaved(const FilmTile& frame, const std::vector<const float*>& pla
 Display display_vectors(RgbImage image) {
   for (float& v : image.rgb) v = light_of((v + 1) / 2);
   return {std::move(image), "vectors as (v + 1) / 2"};
+}
+
+/// Motion in pixels, u red and v green; what stands still is grey.
+Display display_motion(const FilmTile& frame, const std::vector<const float*>& uv,
+                       const DisplayOptions& options) {
+  float most = 0;
+  for (const float* const plane : uv) {
+    for (std::size_t i = 0; i < frame.num_pixels(); ++i)
+      if (std::isfinite(plane[i])) most = std::max(most, std::fabs(plane[i]));
+  }
+  if (most == 0) most = 1;
+  const auto [black, white] = options.range.value_or(std::pair{-most, most});
+  const auto shown = [&](float v) {
+    return light_of(std::isfinite(v) ? (v - black) / (white - black) : 0.5f);
+  };
+  RgbImage image{frame.rect.width(), frame.rect.height(), {}};
+  for (std::size_t i = 0; i < frame.num_pixels(); ++i)
+    image.rgb.insert(image.rgb.end(), {shown(uv[0][i]), shown(uv[1][i]), light_of(0.5f)});
+  return {std::move(image),
+          fmt::format("u red, v green, {:.4g} (dark) to {:.4g} (bright) pixels", black, white),
+          std::pair{black, white}};
 }
 
 /// The smallest and largest of the finite values that are not 0; 0, 0 when there are none.
@@ -163,6 +184,7 @@ Result<Display> display_aov(const FilmTile& frame, const std::string& aov,
                                          : "--aov " + aov + ": no such AOV in the file",
                              fmt::join(aovs_of(frame), ", "))};
   }
+  if (planes.size() == 2) return display_motion(frame, planes, options);
   RgbImage image = interleaved(frame, planes);
   const bool is_vector = planes.size() == 3 && frame.find(aov + ".X") == planes[0];
   const bool is_share = aov != "variance";

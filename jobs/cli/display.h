@@ -39,10 +39,10 @@ Display display_radiance(RgbImage image, const DisplayOptions& options);
 std::string radiance_text(const DisplayOptions& options);
 
 /// A frame's colours ("") or the named AOV. Colours and `lns` are shown as radiance. Vectors are
-/// shown as (v + 1) / 2. Single numbers go from 0, black, to 1, white, or to the largest where that
-/// is larger; `depth` from the nearest, white, to the farthest, dark grey, with black where nothing
-/// is. Data has no display curve: pixel value 128 is the middle. Errors: no such AOV, with those
-/// that there are.
+/// shown as (v + 1) / 2, motion with u as red and v as green. Single numbers go from 0, black, to
+/// 1, white, or to the largest where that is larger; `depth` from the nearest, white, to the
+/// farthest, dark grey, with black where nothing is. Data has no display curve: pixel value 128 is
+/// the middle. Errors: no such AOV, with those that there are.
 Result<Display> display_aov(const FilmTile& frame, const std::string& aov,
                             const DisplayOptions& options);
 

@@ -157,7 +157,9 @@ INSTANTIATE_TEST_SUITE_P(Methods, CurvedCatcher,
                                          Case{Method::sequential, false},
                                          Case{Method::sequential, true},
                                          Case{Method::restir, false}, Case{Method::restir, true},
-                                         Case{Method::mis, false}));
+                                         Case{Method::mis, false}, Case{Method::environment, true},
+                                         Case{Method::reference, false},
+                                         Case{Method::reference, true}));
 
 // Where nothing casts a shadow the share is 1, in all directions that the ball faces.
 TEST(CatcherInTheOpen, IsNotDarkened) {

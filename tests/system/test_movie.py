@@ -10,11 +10,11 @@ from test_quick_looks import read_png, srgb
 IO_ERROR = 74
 
 
-def rendered(programs, folder, **changes):
+def rendered(programs, folder, aovs=("depth",), **changes):
     """The file of a job of six frames of 81x47 pixels, rendered; a lamp that turns."""
     job = make_job(folder, frames="1-6", sampling={"method": "bidirectional", "numParticles": 2, "numCandidates": 4},
                    image={"width": 81, "height": 47}, **changes)
-    job["output"].update(aovs=["depth"], framesPerSecond=12)
+    job["output"].update(aovs=list(aovs), framesPerSecond=12)
     path = write_job(folder / "job.json", job)
     programs.render(path, folder / "work", threads=2)
     return path
@@ -110,6 +110,17 @@ def test_an_aov_means_the_same_in_all_frames(programs, folder):
     check(read_png(folder / "own.png")[2] != shown, "frame 6 has other values")
 
 
+def test_motion_is_seen_as_colors(programs, folder):
+    """What stands still is grey; the camera goes to the right, so all of the scene goes to the left."""
+    job = rendered(programs, folder, camera={"keys": [{"frame": 1, "position": [0, 1.2, 5], "lookAt": [0, 1.2, 0]},
+                                                      {"frame": 6, "position": [2, 1.2, 5], "lookAt": [2, 1.2, 0]}]},
+                   aovs=["motion"])
+    told = programs.run("baton", "view", folder / "frames/frame.0003.exr", "--aov", "forward", "--out", folder / "1.png").stdout
+    check("u red, v green, -" in told, told)
+    row = read_png(folder / "1.png")[2][-1]
+    check(max(row[0::3]) < 120 and all(abs(v - 128) < 8 for v in row[2::3]), f"the ground goes to the left: {row[:9]}")
+
+
 def test_faults(programs, folder):
     job = rendered(programs, folder)
     frames = folder / "frames"
@@ -153,5 +164,6 @@ def test_check_tells_of_exposures_of_maps(programs, folder):
 
 if __name__ == "__main__":
     run_tests([test_a_movie_shows_what_view_shows, test_the_filmic_curve, test_pngs_need_no_ffmpeg,
-               test_an_aov_means_the_same_in_all_frames, test_faults,
+               test_an_aov_means_the_same_in_all_frames,
+        test_motion_is_seen_as_colors, test_faults,
                test_check_tells_of_exposures_of_maps])

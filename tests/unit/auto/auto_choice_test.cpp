@@ -3,8 +3,10 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <algorithm>
 #include <cmath>
 
+#include "common/job/job_json.h"
 #include "jobs/auto/auto_pilot.h"
 
 namespace baton {
@@ -20,10 +22,13 @@ PilotNumbers numbers(const std::string& family, int n, double error, double cost
 }
 
 JobSpec automatic_job() {
-  JobSpec job;
-  job.name = "job";
-  job.sampling.method = Method::automatic;
-  return job;
+  return parse_job(R"({"name": "job", "frames": "1",
+                       "scene": {"materials": {"grey": {"type": "diffuse", "color": [0.5, 0.5, 0.5]}},
+                                 "ground": {"material": "grey"}},
+                       "environment": {"map": "sky.exr"},
+                       "sampling": {"method": "auto"}})",
+                   "job.json", "/")
+      .value();
 }
 
 TEST(AutoChoice, TakesTheBestEfficiencyAtTheGivenN) {
@@ -102,6 +107,33 @@ TEST(AutoCandidates, SecondPassTakesEvenNumbersAndNoPool) {
   job.sampling.num_particles = 4;
   job.visibility.correlated = true;
   EXPECT_FALSE(tries_pool(job));
+}
+
+// Whatever the pilot chooses, the job must be legal with it.
+TEST(AutoCandidates, SuitTheWholeJob) {
+  const auto has = [](const JobSpec& job, const auto& is) {
+    return std::ranges::any_of(auto_candidates(job), is);
+  };
+  const auto correlated = [](const AutoCandidate& c) { return c.correlated; };
+  const auto sequential = [](const AutoCandidate& c) {
+    return c.sampling.method == Method::sequential;
+  };
+  JobSpec job = automatic_job();
+  job.frames = {1, 2};
+  EXPECT_TRUE(has(job, correlated));
+  EXPECT_TRUE(has(job, sequential));
+  JobSpec catches = job;
+  catches.scene.ground->catcher = true;
+  EXPECT_FALSE(has(catches, correlated));
+  JobSpec shows = job;
+  shows.output.aovs = {Aov::unshadowed};
+  EXPECT_FALSE(has(shows, correlated));
+  JobSpec adapts = job;
+  adapts.quality.rounds = 16;
+  adapts.quality.adaptive_threshold = 0.01;
+  EXPECT_FALSE(has(adapts, sequential));
+  EXPECT_TRUE(
+      has(adapts, [](const AutoCandidate& c) { return c.sampling.method == Method::pool; }));
 }
 
 TEST(AutoCandidates, PoolComesWithFewCandidatesFirst) {

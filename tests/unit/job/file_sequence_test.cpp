@@ -31,6 +31,19 @@ TEST(FileSequence, HoldsOrLoopsBeyondItsFiles) {
   EXPECT_EQ(number_at(sequence, 9999999), 3 + (9999999000000 - 3) % 9999996);
 }
 
+// .7 x 90 is 62.99... in doubles.
+TEST(FileSequence, CountsDecimalSpeedsExactly) {
+  FileSequence sequence{.files = "sky.####.exr", .first = -100000, .last = 100000};
+  for (int hundredths = -250; hundredths <= 250; ++hundredths) {
+    sequence.speed = hundredths / 100.0;
+    for (int frame = 0; frame <= 400; ++frame) {
+      const int exact = hundredths * frame;
+      const int whole = exact / 100 - (exact % 100 < 0 ? 1 : 0);
+      ASSERT_EQ(number_at(sequence, frame), whole) << sequence.speed << " x " << frame;
+    }
+  }
+}
+
 TEST(FileSequence, NamesFiles) {
   EXPECT_EQ(file_at({.files = "/plates/shot#2/a.####.exr", .offset = 3}, 9),
             "/plates/shot#2/a.0012.exr");

@@ -50,10 +50,22 @@ Contribution weighted_radiance(const SeenSurface& site, const Environment& envir
   return {.value = value, .is_hidden = light.is_hidden()};
 }
 
+/// What site s sees. A catcher has the albedo with which `sites` know it, and one horizon, as it
+/// blocks nothing.
+SeenSurface see(const FrameGeometry& geometry, const SiteBlock& sites, const SurfaceHit& hit,
+                std::size_t s) {
+  if (!hit.hit) return {};
+  if (!hit.is_catcher) return geometry.see(hit);
+  ShadingPoint point = hit.point;
+  point.ng = point.ns;
+  return {.point = point,
+          .material = {.kd = {sites.kd_r[s], sites.kd_g[s], sites.kd_b[s]}, .ks = {}}};
+}
+
 }  // namespace
 
 ReferenceEstimate ReferenceRenderer::render(std::span<const SurfaceHit> hits,
-                                            const Environment& environment,
+                                            const SiteBlock& sites, const Environment& environment,
                                             std::int32_t num_samples, const RngKey& key,
                                             ShadowRays& rays, std::uint64_t& rays_traced) const {
   const Rng rng(key, PassId::reference);
@@ -61,7 +73,7 @@ ReferenceEstimate ReferenceRenderer::render(std::span<const SurfaceHit> hits,
   double sum_lns = 0, sum_mean = 0;
   if (environment.map->black()) return {};
   std::vector<SeenSurface> seen;
-  for (const SurfaceHit& hit : hits) seen.push_back(hit.hit ? geometry_.see(hit) : SeenSurface{});
+  for (std::size_t s = 0; s < hits.size(); ++s) seen.push_back(see(geometry_, sites, hits[s], s));
   std::vector<Contribution> contributions;
   for (std::int32_t first = 0; first < num_samples; first += kBatch) {
     const std::int32_t count = std::min(kBatch, num_samples - first);
@@ -124,9 +136,9 @@ PixelDiagnostics ReferenceMethod::sample(const PixelInput& input, const PixelSta
                                          SamplerScratch& /*scratch*/, RayWriter& rays) const {
   PixelDiagnostics did{.target_evaluations = 2 * num_samples_};
   ShadowRays own;
-  const ReferenceEstimate estimate =
-      ReferenceRenderer(*input.geometry)
-          .render(input.hits, input.light.now, num_samples_, input.key, own, did.rays_traced);
+  const ReferenceEstimate estimate = ReferenceRenderer(*input.geometry)
+                                         .render(input.hits, input.sites, input.light.now,
+                                                 num_samples_, input.key, own, did.rays_traced);
   rays.known = {.color = estimate.radiance,
                 .visibility = estimate.visibility,
                 .variance = estimate.variance,

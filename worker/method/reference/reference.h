@@ -22,14 +22,15 @@ struct ReferenceEstimate {
 /// `reference`, brute force: `num_samples` independent pairs of one environment and one BRDF sample
 /// under the balance heuristic, each pair at a site drawn uniformly, plain random numbers, scalar
 /// code and exact directions throughout; it shares nothing with the SIMD kernels but the ray
-/// tracer and the textures. hits: the pixel's sites (1 to 16), some may see nothing.
+/// tracer, the textures and the albedo of catchers. hits: the pixel's sites (1 to 16), some may see
+/// nothing; sites: of the hits, asked for catchers alone.
 class ReferenceRenderer {
  public:
   explicit ReferenceRenderer(const FrameGeometry& geometry) : geometry_(geometry) {}
   /// rays: scratch, reused. Returns the number of shadow rays in rays_traced.
-  ReferenceEstimate render(std::span<const SurfaceHit> hits, const Environment& environment,
-                           std::int32_t num_samples, const RngKey& key, ShadowRays& rays,
-                           std::uint64_t& rays_traced) const;
+  ReferenceEstimate render(std::span<const SurfaceHit> hits, const SiteBlock& sites,
+                           const Environment& environment, std::int32_t num_samples,
+                           const RngKey& key, ShadowRays& rays, std::uint64_t& rays_traced) const;
 
  private:
   const FrameGeometry& geometry_;
