@@ -54,15 +54,16 @@ struct ImageSpec {
   std::uint64_t site_seed = 0;        ///< of the sites' places in their pixels; 0: the job's seed
 
   bool operator==(const ImageSpec&) const = default;
-  /// Pixels are always addressed by their place in the whole picture, whose corner is (0, 0). What
-  /// frames show: their display window.
-  PixelRect shown() const { return region.value_or(PixelRect{0, 0, width, height}); }
-  /// The pixels that are rendered: their data window.
+  /// Pixels are always addressed by their place in the whole picture, the display window of frames.
+  PixelRect whole() const { return {0, 0, width, height}; }
+  /// What people see of frames.
+  PixelRect shown() const { return region.value_or(whole()); }
+  /// The pixels that are rendered: the data window of frames.
   PixelRect rendered() const { return overscan.around(shown()); }
   /// Most sites that a pixel has.
   int most_sites() const { return std::max(sites, max_sites); }
   /// The whole picture with its overscan; every region lies inside with its own.
-  PixelRect extent() const { return overscan.around({0, 0, width, height}); }
+  PixelRect extent() const { return overscan.around(whole()); }
 };
 
 /// The image with its sides times `scale`, (0, 1]; region and overscan grow to whole pixels.

@@ -18,18 +18,12 @@ struct PixelRect {
   constexpr bool contains(std::int32_t x, std::int32_t y) const {
     return x >= x0 && x < x1 && y >= y0 && y < y1;
   }
-  /// The same rectangle in coordinates whose origin is the upper left corner of `rect`.
-  constexpr PixelRect relative_to(const PixelRect& rect) const {
-    return {x0 - rect.x0, y0 - rect.y0, x1 - rect.x0, y1 - rect.y0};
-  }
   /// x and y of pixel `index`, row by row.
   constexpr std::array<std::int32_t, 2> place(std::size_t index) const {
     const auto across = static_cast<std::size_t>(width());
     return {x0 + static_cast<std::int32_t>(index % across),
             y0 + static_cast<std::int32_t>(index / across)};
   }
-  /// The rectangle of this size at (0, 0).
-  constexpr PixelRect at_origin() const { return relative_to(*this); }
   /// Whether `rect` lies inside.
   constexpr bool contains(const PixelRect& rect) const {
     return rect.x0 >= x0 && rect.y0 >= y0 && rect.x1 <= x1 && rect.y1 <= y1;

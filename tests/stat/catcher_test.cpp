@@ -150,16 +150,14 @@ TEST_P(CurvedCatcher, ShowsTheShareOfTheLightThatArrives) {
   expect_unbiased(job, expected, method == Method::sequential ? 128 : 32, 0.004);
 }
 
-INSTANTIATE_TEST_SUITE_P(Methods, CurvedCatcher,
-                         testing::Values(Case{Method::pool, false}, Case{Method::pool, true},
-                                         Case{Method::bidirectional, false},
-                                         Case{Method::bidirectional, true},
-                                         Case{Method::sequential, false},
-                                         Case{Method::sequential, true},
-                                         Case{Method::restir, false}, Case{Method::restir, true},
-                                         Case{Method::mis, false}, Case{Method::environment, true},
-                                         Case{Method::reference, false},
-                                         Case{Method::reference, true}));
+INSTANTIATE_TEST_SUITE_P(
+    Methods, CurvedCatcher,
+    testing::Values(Case{Method::pool, false}, Case{Method::pool, true},
+                    Case{Method::bidirectional, false}, Case{Method::bidirectional, true},
+                    Case{Method::sequential, false}, Case{Method::sequential, true},
+                    Case{Method::restir, false}, Case{Method::restir, true},
+                    Case{Method::mis, false}, Case{Method::environment, true},
+                    Case{Method::reference, false}, Case{Method::reference, true}));
 
 // Where nothing casts a shadow the share is 1, in all directions that the ball faces.
 TEST(CatcherInTheOpen, IsNotDarkened) {

@@ -21,7 +21,6 @@ inline Result<FilmTile> local_image(const LocalRender& render, const JobSpec& jo
     BATON_TRY(paste_tile(finished.film, image));
     stats.merge(finished.stats);
   }
-  image.rect = image.rect.relative_to(job.image.shown());
   return image;
 }
 

@@ -248,11 +248,11 @@ def judge_frames(frames, job, predicted):
 
 
 def windows_of(image):
-    """Display and data window of the frames, half-open: a region of that size, and its overscan around it."""
+    """Display and data window of the frames, half-open: the whole picture, and its region with overscan around it."""
     scale, around = image.get("scale", 1), image.get("overscan", 0)
     left, top, right, bottom = (math.ceil(side * scale) for side in (around if isinstance(around, list) else 4 * [around]))
-    width, height = shown_size(image)
-    return (0, 0, width, height), (-left, -top, width + right, height + bottom)
+    x0, y0, x1, y1 = shown_part(image)
+    return (0, 0, *whole_size(image)), (x0 - left, y0 - top, x1 + right, y1 + bottom)
 
 
 def rendered_size(image):
@@ -261,16 +261,19 @@ def rendered_size(image):
     return x1 - x0, y1 - y0
 
 
-def shown_size(image):
-    """Width and height of the frames: those of the region, each edge scaled and moved out to a whole pixel."""
-    scale = image.get("scale", 1)
-    # Halves are rounded up, as in C.
-    whole = [max(1, math.floor(image.get(key, side) * scale + 0.5)) for key, side in (("width", 640), ("height", 360))]
+def whole_size(image):
+    """Width and height of the picture. Halves are rounded up, as in C."""
+    return [max(1, math.floor(image.get(key, side) * image.get("scale", 1) + 0.5)) for key, side in (("width", 640), ("height", 360))]
+
+
+def shown_part(image):
+    """What is shown, half-open: the region, each edge scaled and moved out to a whole pixel."""
+    scale, whole = image.get("scale", 1), whole_size(image)
     if "region" not in image:
-        return tuple(whole)
+        return (0, 0, *whole)
     x, y, width, height = image["region"]
-    return tuple(min(math.ceil((low + size) * scale), limit) - min(math.floor(low * scale), limit - 1)
-                 for low, size, limit in ((x, width, whole[0]), (y, height, whole[1])))
+    return (*(min(math.floor(low * scale), limit - 1) for low, limit in zip((x, y), whole)),
+            *(min(math.ceil(high * scale), limit) for high, limit in zip((x + width, y + height), whole)))
 
 
 def compare(first, second):

@@ -217,7 +217,6 @@ Result<TaskOutput> execute_assemble(const LoadedJob& loaded, const BlobStore& st
     pasted[static_cast<std::size_t>(input.tile)] = true;
   }
 
-  image.rect = image.rect.relative_to(loaded.job.image.shown());
   std::optional<RgbImage> plate;
   if (const JobSpec& here = loaded.context->job; has_plate(here.output)) {
     BATON_ASSIGN(plate, load_plate(here, here.frames[static_cast<std::size_t>(task.step)]));

@@ -179,8 +179,7 @@ ImageMetadata frame_metadata(const JobSpec& job, const Digest& job_digest, int f
 Result<WrittenFrame> write_frame(const JobSpec& job, const Digest& job_digest,
                                  std::int32_t frame_index, FilmTile image,
                                  const std::optional<RgbImage>& plate) {
-  const PixelRect shown = job.image.shown();
-  if (plate) lay_over_plate(image, *plate, {shown.x0, shown.y0});
+  if (plate) lay_over_plate(image, *plate, {0, 0});
   FrameQuality quality = judge_frame(image);
   const float noise = cycles_noise(image);
   quality.clamped = job.output.clamp_negative;
@@ -204,11 +203,11 @@ Result<WrittenFrame> write_frame(const JobSpec& job, const Digest& job_digest,
                            .compression = job.output.compression,
                            .metadata = frame_metadata(job, job_digest, number, quality, noise),
                            .world_to_camera = camera.world_to_camera(),
-                           .world_to_ndc = camera.world_to_ndc(shown),
+                           .world_to_ndc = camera.world_to_ndc(job.image.whole()),
                            .frames_per_second = job.output.frames_per_second,
                            .frame_number = number,
                            .naming = naming_of(job),
-                           .display_window = shown.at_origin()}));
+                           .display_window = job.image.whole()}));
   BATON_TRY(write_file_verified(path, bytes, [&](const std::filesystem::path& temporary) {
     return verify_frame(temporary, image, frame_index);
   }));
