@@ -2,11 +2,14 @@
 
 Both save a copy of the file and export that in a Blender of its own (headless.py), so the open file stays as it is."""
 
+import shutil
 import subprocess
 import tempfile
 from pathlib import Path
 
 import bpy
+
+from .folders import new_numbered
 
 bl_info = {
     "name": "Baton jobs",
@@ -86,8 +89,11 @@ class SubmitJob(bpy.types.Operator):
         if chosen.folder.startswith("//") and not bpy.data.filepath:
             self.report({"ERROR"}, "save the file first: jobs go beside it")
             return {"CANCELLED"}
-        name = Path(bpy.data.filepath).stem or "untitled"
-        folder = Path(bpy.path.abspath(chosen.folder)) / name
+        try:
+            folder = new_numbered(Path(bpy.path.abspath(chosen.folder)) / (Path(bpy.data.filepath).stem or "untitled"))
+        except OSError as fault:
+            self.report({"ERROR"}, f"{fault.filename}: {fault.strerror}")
+            return {"CANCELLED"}
         command = [bpy.path.abspath(chosen.program), "job", "submit", folder / "job.json", "--coordinator", chosen.coordinator]
         if chosen.key:
             command += ["--key", bpy.path.abspath(chosen.key)]
@@ -95,6 +101,7 @@ class SubmitJob(bpy.types.Operator):
             written, report = export_copy(folder, chosen.strict)
             show(self, report)
             if not written:
+                shutil.rmtree(folder, ignore_errors=True)
                 return {"CANCELLED"}
             done = run(command)
             if done.returncode:

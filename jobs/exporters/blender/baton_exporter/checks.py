@@ -1,19 +1,20 @@
 """What of a scene, its objects and its camera is not carried over, beside world and materials; runs inside Blender."""
 
-from . import nodes
-
 SHAPES = {"MESH", "CURVE", "SURFACE", "FONT", "META"}
 UNSEEN = {"EMPTY", "CAMERA", "ARMATURE", "LATTICE", "SPEAKER", "LIGHT_PROBE"}
 RAYS = {"camera": "the camera", "diffuse": "diffuse rays", "glossy": "glossy rays", "shadow": "shadow rays"}
 LINEAR_VIEWS = {"Standard", "Raw"}
 
 
-def check(scene, view_layer, report):
+def check_scene(scene, view_layer, report):
     check_render(scene, view_layer, report)
     check_camera(scene, report)
-    for item in scene.objects:
-        if not item.hide_render:
-            check_object(item, report)
+
+
+def check_objects(objects, report):
+    """objects: what any frame shows."""
+    for item in sorted(objects, key=lambda item: item.name):
+        check_object(item, report)
 
 
 def check_render(scene, view_layer, report):
@@ -107,9 +108,6 @@ def check_object(item, report):
             report.add(where, f'particles "{system.name}" without a shape', "render them as objects")
     if item.type in SHAPES:
         check_rays(item, where, report)
-    if nodes.is_animated(item) and changes_visibility(item):
-        report.add(where, "its visibility changes, but stays as in the first frame",
-                   "export frames before and after as two jobs")
 
 
 def check_rays(item, where, report):
@@ -118,9 +116,3 @@ def check_rays(item, where, report):
     for name, rays in RAYS.items():
         if not getattr(item, f"visible_{name}"):
             report.add(where, f"it is hidden from {rays}", "let all rays see it, or hide it from the render")
-
-
-def changes_visibility(item):
-    data = item.animation_data
-    curves = list(data.drivers) + (list(data.action.fcurves) if data.action else [])
-    return any(curve.data_path in ("hide_render", "hide_viewport") for curve in curves)

@@ -4,47 +4,11 @@ import bmesh
 import bpy
 import numpy
 
-from .flat_faces import cut_bent
+from .faces import cut_bent, drop_without_area
 
 DEFORMATION = 1e-5  # of the size of a mesh
-
-
-def as_rendered(scene, view_layer):
-    """Makes what the evaluated scene shows that what renders show: Blender evaluates it as its viewport does."""
-    scene.render.use_simplify, simplify = False, scene.render.use_simplify
-    for item in scene.objects:
-        item.hide_viewport = item.hide_render
-        if item.name in view_layer.objects:
-            item.hide_set(False, view_layer=view_layer)
-        item.show_instancer_for_viewport = item.show_instancer_for_render
-        for modifier in item.modifiers:
-            modifier.show_viewport = modifier.show_render
-            show_as_rendered(modifier)
-            if simplify and modifier.type == "SUBSURF":
-                modifier.levels = min(modifier.levels, scene.render.simplify_subdivision_render)
-        for system in item.particle_systems:
-            system.settings.display_percentage = 100
-    for collection in (scene.collection, *scene.collection.children_recursive):
-        collection.hide_viewport = collection.hide_render
-    for layer in layer_collections(view_layer.layer_collection):
-        layer.hide_viewport = False
-    for curve in bpy.data.curves:
-        curve.resolution_u = curve.render_resolution_u or curve.resolution_u
-        curve.resolution_v = curve.render_resolution_v or curve.resolution_v
-    for ball in bpy.data.metaballs:
-        ball.resolution = ball.render_resolution
-
-
-def show_as_rendered(modifier):
-    for viewport, render in (("levels", "render_levels"), ("viewport_resolution", "resolution")):
-        if modifier.type in ("SUBSURF", "MULTIRES", "OCEAN") and hasattr(modifier, render):
-            setattr(modifier, viewport, getattr(modifier, render))
-
-
-def layer_collections(layer):
-    yield layer
-    for child in layer.children:
-        yield from layer_collections(child)
+# What geometry nodes make beside meshes, and Cycles shows. Curves without a surface it does not.
+PARTS = {"POINTCLOUD": "points", "CURVES": "hair", "VOLUME": "a volume"}
 
 
 class Shape:
@@ -56,15 +20,16 @@ class Shape:
 
 
 class Geometry:
-    """Collects the shapes, frame by frame."""
+    """Collects the shapes, frame by frame. One that is seen in some frames is there in all, and reported."""
 
     def __init__(self, report):
         self.report = report
+        self.objects = set()   # of the file, that any frame shows
         self.shapes = {}
-        self.meshes = {}     # by what they were made of, in the first frame
-        self.witnesses = {}  # vertices in the first frame of what may deform
-        self.poses = {}      # of the mesh of a witness that does: frame by frame, None where it is as in the first one
-        self.first = set()   # keys of the first frame
+        self.meshes = {}       # by what they were made of, and by the object of the file
+        self.witnesses = {}    # vertices of what may deform, in the first frame that has it
+        self.poses = {}        # of the mesh of a witness that does: frame by frame, None where it is as in its first one
+        self.without = {}      # why nothing of a key is seen
         self.frames = 0
 
     def take(self, depsgraph):
@@ -72,56 +37,92 @@ class Geometry:
         seen = set()
         for instance in depsgraph.object_instances:
             shown = instance.object
+            parent = instance.parent.name if instance.parent else ""
+            key = (shown.name, parent, tuple(instance.persistent_id) if instance.is_instance else ())
+            self.objects.add(shown.original)
+            if shown.type in PARTS and shown.type != shown.original.type:
+                self.report.add(where(key), f"{PARTS[shown.type]} that its geometry nodes make",
+                                "make meshes of them within the nodes")
             # Curves, texts and metaballs are listed twice: as they are, and as the mesh they have become.
             if not instance.show_self or shown.type != "MESH":
                 continue
-            parent = instance.parent.name if instance.parent else ""
-            key = (shown.name, parent, tuple(instance.persistent_id) if instance.is_instance else ())
-            seen.add(key)
-            if self.frames == 0:
-                self.first.add(key)
-                mesh = self.mesh_of(key, shown, depsgraph)
-                if mesh is not None:
-                    self.shapes[key] = Shape(shown.name, mesh, shown.original.is_shadow_catcher)
-            elif key in self.witnesses and key in self.shapes:
+            if key not in self.shapes:
+                self.begin(key, instance, depsgraph)
+            elif key in self.witnesses:
                 self.compare(key, shown, depsgraph)
-            if key in self.shapes:
+            if key in self.shapes and has_faces(shown):
                 self.shapes[key].matrices.append(instance.matrix_world.copy())
-            elif key not in self.first:
-                self.report.add(where(key), "it is not there in the first frame, and never shown",
-                                "hide nothing within a shot: export frames before and after as two jobs")
+                seen.add(key)
         for poses in self.poses.values():
             poses += [None] * (self.frames + 1 - len(poses))
         for key, shape in self.shapes.items():
             if key not in seen:
                 shape.matrices.append(shape.matrices[-1])
-                self.report.add(where(key), "it is not there in some frames, but always shown",
-                                "hide nothing within a shot: export frames before and after as two jobs")
+                self.report_partly(key)
         self.frames += 1
+
+    def begin(self, key, instance, depsgraph):
+        """A shape, once it has a surface; in the frames before it stands where it is now."""
+        shown = instance.object
+        mesh = self.mesh_of(key, shown, depsgraph)
+        if mesh is None:
+            return
+        self.shapes[key] = Shape(shown.name, mesh, shown.original.is_shadow_catcher)
+        self.shapes[key].matrices = [instance.matrix_world.copy() for _ in range(self.frames)]
+        if self.frames:
+            self.report_partly(key)
+
+    def report_partly(self, key):
+        self.report.add(where(key), "it is not there, or has no faces, in some frames, but is shown in all",
+                        "hide nothing within a shot: export frames before and after as two jobs")
+
+    def finish(self):
+        """Reports what no frame has shown."""
+        for key, why in self.without.items():
+            if key not in self.shapes:
+                self.report.add(where(key), f"{why}, so nothing of it is seen",
+                                "give it a surface, such as a curve's bevel, or hide it")
 
     def mesh_of(self, key, shown, depsgraph):
         """The evaluated mesh, one for all that share it; None where there is no surface."""
         slots = tuple(material.name if material else "" for material in materials_of(shown))
-        made_of = (shown.data.as_pointer(), slots)
-        if made_of not in self.meshes:
-            mesh = new_mesh(shown, depsgraph, is_made_by_nodes(key))
-            if mesh is not None and len(mesh.polygons) == 0:
-                if mesh.vertices:
-                    self.report.add(where(key), "it has no faces, so nothing of it is seen",
-                                    "give edges and points a surface, such as a curve's bevel")
-                mesh = None
-            if mesh is not None:
-                set_materials(mesh, shown)
-                cut_bent(mesh)
-                if may_deform(shown):
-                    self.witnesses[key] = vertices_of(shown, depsgraph, is_made_by_nodes(key))
-            self.meshes[made_of] = mesh
-        return self.meshes[made_of]
+        made_by_nodes = is_made_by_nodes(key)
+        # A place in memory means something within its frame alone.
+        made_of = (self.frames, shown.data.as_pointer(), slots)
+        source = made_of if made_by_nodes else (shown.original, slots)
+        if source in self.meshes or made_of in self.meshes:
+            mesh = self.meshes.get(source) or self.meshes.get(made_of)
+        else:
+            mesh = self.new_mesh(key, shown, depsgraph)
+            if mesh is not None and may_deform(shown):
+                self.witnesses[key] = vertices_of(shown, depsgraph, made_by_nodes)
+        self.meshes[made_of] = mesh
+        if mesh is not None:
+            self.meshes[source] = mesh
+        return mesh
+
+    def new_mesh(self, key, shown, depsgraph):
+        """The evaluated mesh; None where there is no surface."""
+        if not has_faces(shown):
+            if len(shown.data.vertices):
+                self.without[key] = "it has no faces"
+            return None
+        mesh = evaluated_mesh(shown, depsgraph, is_made_by_nodes(key))
+        set_materials(mesh, shown)
+        dropped = drop_without_area(mesh)
+        if not len(mesh.polygons):
+            self.without[key] = "its faces have no area"
+            return None
+        if dropped and may_deform(shown):
+            self.report.add(where(key), "the faces of a material of which none has an area when it is first seen",
+                            "give one of them an area there")
+        cut_bent(mesh)
+        return mesh
 
     def compare(self, key, shown, depsgraph):
         before, now = self.witnesses[key], vertices_of(shown, depsgraph, is_made_by_nodes(key))
         if before.shape != now.shape:
-            self.report.add(where(key), "its vertices are others in each frame, but it is shown as in the first one",
+            self.report.add(where(key), "its vertices are others in some frames, but it is shown as when it is first seen",
                             "render each shape as a job of its own")
             self.poses.pop(self.shapes[key].mesh, None)
             del self.witnesses[key]
@@ -136,6 +137,10 @@ def where(key):
     return f'object "{key[0]}"'
 
 
+def has_faces(shown):
+    return len(shown.data.polygons) > 0
+
+
 def is_made_by_nodes(key):
     """What is no object of the file: a curve's mesh, or instances that geometry nodes have made."""
     name, parent, path = key
@@ -147,7 +152,7 @@ def evaluated(shown, depsgraph):
     return shown.original.evaluated_get(depsgraph)
 
 
-def new_mesh(shown, depsgraph, made_by_nodes):
+def evaluated_mesh(shown, depsgraph, made_by_nodes):
     if not made_by_nodes:
         return bpy.data.meshes.new_from_object(evaluated(shown, depsgraph), preserve_all_data_layers=True,
                                                depsgraph=depsgraph)

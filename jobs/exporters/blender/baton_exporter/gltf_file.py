@@ -1,5 +1,9 @@
 """Writes the shapes as a .glb by Blender's own exporter, then their motion; runs inside Blender."""
 
+import contextlib
+import os
+import sys
+
 import bpy
 import numpy
 from mathutils import Matrix
@@ -8,6 +12,10 @@ from . import gltf_materials
 from .glb import Glb, frames_of_targets, tracks_of, weights_of
 
 SHEAR = 1e-4
+
+
+class ExporterFailed(Exception):
+    """What Blender's glTF exporter says when it fails."""
 
 
 def write(path, geometry, frames, fps, diffuse, report):
@@ -19,10 +27,7 @@ def write(path, geometry, frames, fps, diffuse, report):
     for mesh in dict.fromkeys(shape.mesh for shape in shapes):
         if mesh in geometry.poses:
             add_targets(mesh, geometry.poses[mesh])
-    bpy.ops.export_scene.gltf(filepath=str(path), export_format="GLB", use_active_scene=True, export_yup=True,
-                              export_animations=False, export_cameras=False, export_lights=False, export_skins=False,
-                              export_morph=True, export_morph_normal=True, export_morph_tangent=False, export_apply=False,
-                              export_colors=False, export_extras=False)
+    run_exporter(path)
     file = Glb.read(path)
     nodes = {node["name"]: index for index, node in enumerate(file.document.get("nodes", []))}
     missing = [name for name in names if name not in nodes]
@@ -40,6 +45,43 @@ def write(path, geometry, frames, fps, diffuse, report):
     own = {material["name"]: gltf_materials.diffuse(file.document, material, path.name)
            for material in file.document.get("materials", []) if material["name"] in diffuse}
     return own, {name: {"catcher": True} for name, shape in zip(names, shapes) if shape.catcher}
+
+
+def run_exporter(path):
+    # It would look for UV maps in these, too.
+    shown = {item.data for item in bpy.context.scene.objects}
+    for mesh in bpy.data.meshes:
+        if mesh not in shown:
+            mesh.materials.clear()
+    try:
+        with silence():
+            bpy.ops.export_scene.gltf(filepath=str(path), export_format="GLB", use_active_scene=True, export_yup=True,
+                                      export_animations=False, export_cameras=False, export_lights=False, export_skins=False,
+                                      export_morph=True, export_morph_normal=True, export_morph_tangent=False,
+                                      export_apply=False, export_colors=False, export_extras=False)
+    except RuntimeError as fault:  # its traceback
+        said = [line.strip() for line in str(fault).splitlines() if line.strip() and not line.lower().startswith("location:")]
+        raise ExporterFailed(f"Blender's glTF exporter failed: {said[-1]}") from None
+
+
+@contextlib.contextmanager
+def silence():
+    """Of what Blender and its add-ons print: twice the traceback where one fails."""
+    sys.stdout.flush()
+    sys.stderr.flush()
+    kept = os.dup(1), os.dup(2)
+    nothing = os.open(os.devnull, os.O_WRONLY)
+    try:
+        os.dup2(nothing, 1)
+        os.dup2(nothing, 2)
+        yield
+    finally:
+        sys.stdout.flush()
+        sys.stderr.flush()
+        for number, copy in zip((1, 2), kept):
+            os.dup2(copy, number)
+            os.close(copy)
+        os.close(nothing)
 
 
 def is_moving(shape):

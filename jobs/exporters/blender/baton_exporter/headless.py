@@ -15,12 +15,15 @@ def main():
 
     sys.dont_write_bytecode = True
     sys.path.insert(0, str(Path(__file__).resolve().parents[1]))
-    from baton_exporter import job
+    from baton_exporter import gltf_file, job
     try:
         report = job.export(options.out, options.strict, options.frames)
     except job.CannotExport as fault:
         print(f"export_baton: {fault}", file=sys.stderr)
         return 65
+    except gltf_file.ExporterFailed as fault:
+        print(f"export_baton: {fault}", file=sys.stderr)
+        return 70
     print(report.text(), end="")
     if options.strict and report.entries:
         print(f"no job is written; {options.out / 'report.txt'} has this list")

@@ -12,20 +12,31 @@ LINEAR = {"Linear", "Raw", "Non-Color", "Linear ACEScg", "scene_linear"}
 READ = {".exr", ".hdr"}
 
 
-def export(texture, folder, frames, add):
-    """`map` or numbered maps, and `filter`, of `environment`. add(what, remedy): reports."""
+def export(texture, users, folder, frames, add):
+    """`map` or numbered maps, and `filter`, of `environment`. add(what, remedy): reports.
+
+    users: start, length, offset and cyclic of a sequence, for each frame."""
     image = texture.image
+    check(texture, add)
     out = {"filter": "nearest"} if texture.interpolation == "Closest" else {}
+    if image.source == "SEQUENCE":
+        return {**out, **export_sequence(image, users, folder, frames, add)}
+    return {**out, "map": copy(image, folder, "sky", add)}
+
+
+def check(texture, add):
+    image = texture.image
     if texture.interpolation in ("Cubic", "Smart"):
         add(f"interpolation {texture.interpolation}, read as Linear", "choose Linear")
     if image.colorspace_settings.name not in LINEAR | {"sRGB"}:
         add(f'the colour space "{image.colorspace_settings.name}" of its image', "save it as a linear EXR")
-    if image.source == "SEQUENCE":
-        return {**out, **export_sequence(texture, folder, frames, add)}
-    if image.source not in ("FILE", "GENERATED"):
+    if image.source not in ("FILE", "GENERATED", "SEQUENCE"):
         add(f"its image is of kind {image.source.lower()}", "save it as one EXR, or as a sequence of them")
-    name = copy(image, folder, "sky", add)
-    return {**out, "map": name}
+
+
+def is_readable(image):
+    """Whether its file is there, or it needs none. Reading the size loads it."""
+    return min(image.size) > 0
 
 
 def copy(image, folder, name, add):
@@ -40,7 +51,7 @@ def copy(image, folder, name, add):
         if path.is_file():
             shutil.copyfile(path, target)
             return target.name
-    if not image.has_data and not len(image.pixels):
+    if not is_readable(image):
         add(f'its image "{image.name}" cannot be read', "find the file (File > External Data)")
         return write_plain(folder / f"{name}.exr", (1, 0, 1))
     return write(folder / f"{name}.exr", *linear_pixels(image))
@@ -69,12 +80,10 @@ def write_plain(path, color):
     return write(path, numpy.broadcast_to(numpy.array(color, numpy.float32), (8, 16, 3)), 16, 8)
 
 
-def export_sequence(texture, folder, frames, add):
+def export_sequence(image, users, folder, frames, add):
     """The files that the frames show, each once; under numbers of frames where each frame has one of its own."""
-    image, user = texture.image, texture.image_user
     given = Path(bpy.path.abspath(image.filepath, library=image.library))
-    numbers = [keys.sequence_number(f, user.frame_start, user.frame_duration, user.frame_offset, user.use_cyclic)
-               for f in frames]
+    numbers = [keys.sequence_number(frame, *user) for frame, user in zip(frames, users)]
     files = {}
     for number in sorted(set(numbers)):
         name = keys.numbered_file(given.name, number)

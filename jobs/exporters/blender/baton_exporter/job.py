@@ -9,7 +9,8 @@ from pathlib import Path
 
 import bpy
 
-from . import checks, conventions, geometry, gltf_file, keys
+from . import checks, conventions, geometry, gltf_file, keys, uv_maps
+from .as_rendered import as_rendered
 from .camera import Camera, number, picture_size
 from .materials import Materials, used_materials
 from .report import Report
@@ -34,8 +35,8 @@ def export(folder, strict=False, frames=None):
     view_layer = next((layer for layer in scene.view_layers if layer.use), scene.view_layers[0])
     bpy.context.window.view_layer = view_layer
     fps = scene.render.fps / scene.render.fps_base
-    checks.check(scene, view_layer, report)
-    geometry.as_rendered(scene, view_layer)
+    checks.check_scene(scene, view_layer, report)
+    as_rendered(scene, view_layer)
 
     # Evaluate each frame once.
     shapes, camera, world = geometry.Geometry(report), Camera(scene, report), World(scene, report)
@@ -44,10 +45,13 @@ def export(folder, strict=False, frames=None):
         depsgraph = bpy.context.evaluated_depsgraph_get()
         for part in (shapes, camera, world):
             part.take(depsgraph)
+    shapes.finish()
+    checks.check_objects(shapes.objects, report)
     if not shapes.shapes:
         raise CannotExport("the scene shows no surface: expected a mesh that is rendered")
     materials = Materials(report)
     materials.check(used_materials(shapes))
+    uv_maps.lay_out(shapes.shapes.values(), report)
 
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
@@ -60,7 +64,11 @@ def export(folder, strict=False, frames=None):
         job["motion"] = {"curve": "linear"}
     job["output"] = output_of(scene, fps)
     if not (strict and report.entries):
-        own, nodes = gltf_file.write(folder / "scene.glb", shapes, numbers, fps, materials.diffuse, report)
+        try:
+            own, nodes = gltf_file.write(folder / "scene.glb", shapes, numbers, fps, materials.diffuse, report)
+        except gltf_file.ExporterFailed:
+            clear(folder)
+            raise
         if own:
             job["scene"]["materials"] = own
         if nodes:
@@ -75,7 +83,8 @@ def export(folder, strict=False, frames=None):
 
 def clear(folder):
     """Removes what an export has written."""
-    for old in [folder / "job.json", folder / "scene.glb", folder / "report.txt", *folder.glob("sky.*")]:
+    for old in [folder / "job.json", folder / "scene.glb", folder / "report.txt", *folder.glob("sky.*"),
+                *folder.glob("backdrop.*")]:
         old.unlink(missing_ok=True)
     shutil.rmtree(folder / "sky", ignore_errors=True)
 

@@ -69,8 +69,7 @@ def sequence_number(frame, start, duration, offset, cyclic):
     """Number of the file that an image sequence of Blender shows in a frame of the scene."""
     number = frame - start + 1
     number = (number - 1) % duration + 1 if cyclic else min(max(number, 0), duration)
-    number += offset
-    return (number - 1) % duration + 1 if cyclic else number
+    return number + offset  # also of a cyclic one, which so may loop over 101 to 110
 
 
 def numbered_file(name, number):

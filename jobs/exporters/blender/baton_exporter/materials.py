@@ -3,7 +3,7 @@
 Carried over: a Principled BSDF with constants, images, normal maps, a coat and cut-outs, and a Diffuse BSDF. The glTF exporter
 reads Principled ones alone, so a Diffuse one becomes one of these."""
 
-from . import nodes
+from . import images, nodes
 
 # Inputs of the Principled BSDF that change nothing at these values.
 NEUTRAL = {"Subsurface": 0, "Specular Tint": 0, "Anisotropic": 0, "Sheen": 0, "Transmission": 0}
@@ -43,6 +43,7 @@ class Materials:
         for name in ("Volume", "Displacement"):
             if nodes.source(output.inputs[name]):
                 add(f"its {name.lower()}", "model it, or bake a normal map" if name == "Displacement" else "remove it")
+        drop_tiled(material, output, add)
         surface = nodes.source(output.inputs["Surface"])
         if surface is None:
             add("it has no surface, so Cycles shows it black", "connect a Principled BSDF")
@@ -80,6 +81,8 @@ class Surface:
         self.check_input(inputs["Base Color"], {"MIX"})
         for name in ("Metallic", "Roughness", "Clearcoat", "Clearcoat Roughness"):
             self.check_input(inputs[name], {"SEPARATE_COLOR", "SEPRGB", "MATH"})
+        self.check_pair(inputs["Base Color"], inputs["Alpha"])
+        self.check_pair(inputs["Metallic"], inputs["Roughness"])
         self.check_normal(inputs["Normal"])
         self.check_alpha(inputs["Alpha"])
 
@@ -93,7 +96,8 @@ class Surface:
     def check_emission(self, color, strength):
         if nodes.source(strength):
             self.add("Emission Strength of the Principled BSDF is connected", "set it to one value")
-        if nodes.source(color) or (strength.default_value != 0 and max(color.default_value[:3]) > 0):
+        glows = nodes.source(strength) or strength.default_value != 0
+        if glows and (nodes.source(color) or max(color.default_value[:3]) > 0):
             self.add("it glows, which the camera sees, but lights nothing", "put lights into the world's image")
             self.check_input(color, {"MIX"})
 
@@ -102,7 +106,7 @@ class Surface:
         given = nodes.source(socket)
         if given is None or given.node.type in ("RGB", "VALUE"):
             return
-        what = f"{socket.name} of {self.bsdf.name}"
+        what, is_color = f"{socket.name} of {self.bsdf.name}", socket.type == "RGBA"
         if given.node.type in helpers and not given.node.mute:
             if given.node.type == "MIX" and not is_product(given.node):
                 self.add(f'node "{given.node.name}"')
@@ -111,25 +115,25 @@ class Surface:
                 self.add(f'node "{given.node.name}"')
                 return
             behind = [nodes.source(s) for s in given.node.inputs if s.enabled]
-            images = [s for s in behind if s is not None and s.node.type not in ("RGB", "VALUE")]
+            behind = [s for s in behind if s is not None and s.node.type not in ("RGB", "VALUE")]
             if given.node.type in ("SEPARATE_COLOR", "SEPRGB"):
                 wanted = CHANNELS[socket.name]
                 if given.name[0] != wanted[0]:
                     self.add(f"{what} takes {given.name} of an image", f"put it into the image's {wanted.lower()}")
-            for behind_socket in images:
-                self.check_image(behind_socket, what, 1)
-            if len(images) > 1:
+            for behind_socket in behind:
+                self.check_image(behind_socket, what, is_color, 1)
+            if len(behind) > 1:
                 self.add(f'node "{given.node.name}" of two images')
             return
-        self.check_image(given, what)
+        self.check_image(given, what, is_color)
 
-    def check_image(self, given, what, depth=0):
+    def check_image(self, given, what, is_color, depth=0):
         """The output of an Image Texture with coordinates of UVs."""
         node = given.node
         if depth == 1 and node.type in ("SEPARATE_COLOR", "SEPRGB"):
             behind = nodes.source(node.inputs[0])
             if behind is not None:
-                self.check_image(behind, what, 2)
+                self.check_image(behind, what, is_color, 2)
             return
         if node.type != "TEX_IMAGE" or node.mute:
             self.add(f'node "{node.name}" ({what})')
@@ -137,10 +141,17 @@ class Surface:
         if node.image is None:
             self.add(f'node "{node.name}" has no image', "choose one")
             return
-        if node.image.source in ("SEQUENCE", "MOVIE"):
-            self.add(f'image "{node.image.name}" changes, but stays as it is first', "use one image")
-        if node.image.is_float or node.image.file_format not in FILES and node.image.depth > 32:
-            self.add(f'image "{node.image.name}" becomes a PNG of 8 bits', "use an image of 8 bits")
+        image, where = node.image, f'image "{node.image.name}"'
+        if image.source in ("SEQUENCE", "MOVIE"):
+            self.add(f"{where} changes, but stays as it is first", "use one image")
+            image = node.image = image.copy()  # the world may show it, too
+            image.source = "FILE"
+        if not images.is_readable(image):
+            self.add(f"{where} cannot be read", "find the file (File > External Data)")
+            return
+        self.check_space(image, given, where, what, is_color)
+        if image.is_float or image.file_format not in FILES and image.depth > 32:
+            self.add(f"{where} becomes a PNG of 8 bits", "use an image of 8 bits")
         if node.projection != "FLAT":
             self.add(f'node "{node.name}": projection {node.projection.lower()}', "unwrap the mesh, use UVs")
         if node.extension == "CLIP":
@@ -148,6 +159,23 @@ class Surface:
         if not nodes.is_identity(node.texture_mapping):
             self.add(f'node "{node.name}": its own mapping', "use a Mapping node")
         self.check_coordinates(node)
+
+    def check_space(self, image, given, where, what, is_color):
+        """glTF says by an image's place whether it holds colours in sRGB or plain numbers. Floats: they are reported anyway."""
+        space = image.colorspace_settings.name
+        if given.name == "Alpha":
+            if is_color:
+                self.add(f"{what} takes Alpha of {where}", BAKE)
+        elif not image.is_float and space not in ({"sRGB"} if is_color else images.LINEAR):
+            read = "sRGB" if is_color else "Non-Color"
+            self.add(f"{where} of colour space {space} ({what}): it is read as {read}", f"convert the image, and set {read}")
+
+    def check_pair(self, *sockets):
+        """Two inputs that glTF has in one image."""
+        textures = [next((n for n in nodes.feeding(socket) if n.type == "TEX_IMAGE"), None) for socket in sockets]
+        if None not in textures and coordinates(textures[0]) != coordinates(textures[1]):
+            self.add(f"{sockets[1].name} has other coordinates than {sockets[0].name}: glTF has one image for both",
+                     "give both the same UV map and Mapping")
 
     def check_coordinates(self, node):
         vector = nodes.source(node.inputs["Vector"])
@@ -174,10 +202,7 @@ class Surface:
             self.add(f'node "{node.name}"', "use a normal map in tangent space with a constant strength")
         color = nodes.source(node.inputs["Color"])
         if color is not None:
-            self.check_image(color, "normal map")
-            if color.node.type == "TEX_IMAGE" and color.node.image and \
-                    color.node.image.colorspace_settings.name not in ("Non-Color", "Raw", "Linear"):
-                self.add(f'normal map "{color.node.image.name}" is not of colour space Non-Color', "set Non-Color")
+            self.check_image(color, "normal map", is_color=False)
 
     def check_alpha(self, socket):
         given, method = nodes.source(socket), self.material.blend_method
@@ -194,6 +219,26 @@ def is_product(mix):
     factor = mix.inputs[0]
     return (mix.data_type == "RGBA" and mix.blend_type == "MULTIPLY" and not nodes.source(factor)
             and factor.default_value == 1)
+
+
+def coordinates(texture):
+    """What places an Image Texture: name of the UV map, values of the Mapping."""
+    vector = nodes.source(texture.inputs["Vector"])
+    placed = []
+    if vector is not None and vector.node.type == "MAPPING" and not vector.node.mute:
+        placed = [tuple(s.default_value) for s in vector.node.inputs if s.name != "Vector"]
+        vector = nodes.source(vector.node.inputs["Vector"])
+    return vector.node.uv_map if vector is not None and vector.node.type == "UVMAP" else "", placed
+
+
+def drop_tiled(material, output, add):
+    """Removes images of tiles, at which Blender's glTF exporter fails."""
+    used = nodes.feeding(output.inputs["Surface"])
+    for node in [n for n in material.node_tree.nodes if n.type == "TEX_IMAGE" and n.image and n.image.source == "TILED"]:
+        if node in used:
+            add(f'image "{node.image.name}" of tiles (UDIM): the material is without it',
+                'give the job a material of this name with "name.<UDIM>.exr" as texture (docs/jobs.md, Textures)')
+        material.node_tree.nodes.remove(node)
 
 
 def replace_diffuse(material, diffuse):

@@ -1,32 +1,33 @@
 """The world of a scene as the environment of a job; runs inside Blender.
 
-What is carried over: Background, Environment Texture, Mapping, Texture Coordinate (Generated), and a plain colour."""
+What is carried over: Background, Environment Texture, Mapping, Texture Coordinate (Generated), a plain colour, and what the
+camera sees instead: nothing (Ray Visibility), or another Background (a Mix Shader by Is Camera Ray)."""
 
 from . import conventions, images, keys, nodes
+from .background import BAKE, DARK, TOLERANCE, Background
 from .camera import number, numbers
 
-BAKE = "bake the world into one image and use that"
 TURN_TOLERANCE_DEG = 2e-3
-SCALE_TOLERANCE = 1e-5
-DARK = (0.0, 0.0, 0.0)
 
 
 class World:
-    """Finds the nodes of the world, then collects their values frame by frame."""
+    """Finds the backgrounds of the world, then collects their values frame by frame."""
 
     def __init__(self, scene, report):
         self.scene, self.report = scene, report
         self.world = scene.world
-        self.background = self.texture = self.mapping = None
-        self.scales, self.colors, self.rotations = [], [], []
-        self.reported = False
+        self.light, self.seen = None, None  # seen: by the camera, where it is another
+        self.is_in_picture = not scene.render.film_transparent
         if self.world and self.world.use_nodes:
-            self.find_nodes()
+            self.find_backgrounds()
+        self.light = self.light or Background(None, self.add)
+        if self.world:
+            self.check_rays()
 
     def add(self, what, remedy=BAKE):
         self.report.add(f'world "{self.world.name}"', what, remedy)
 
-    def find_nodes(self):
+    def find_backgrounds(self):
         output = nodes.active_output(self.world.node_tree, "OUTPUT_WORLD")
         if output is None:
             return
@@ -35,115 +36,89 @@ class World:
         surface = nodes.source(output.inputs["Surface"])
         if surface is None:
             return
-        if surface.node.type != "BACKGROUND" or surface.node.mute:
-            self.add(f'node "{surface.node.name}": only a Background is read')
-            surface = next((s for s in [n.outputs[0] for n in nodes.feeding(output.inputs["Surface"])]
-                            if s.node.type == "BACKGROUND"), None)
-            if surface is None:
-                return
-        self.background = surface.node
-        strength = nodes.source(self.background.inputs["Strength"])
-        if strength is not None:
-            self.add(f'node "{strength.node.name}" on the strength', "key the strength itself")
-        color = nodes.source(self.background.inputs["Color"])
-        if color is None:
-            return
-        if color.node.type != "TEX_ENVIRONMENT" or color.node.mute:
-            self.add(f'node "{color.node.name}": only an Environment Texture is read')
-            color = next((n.outputs[0] for n in nodes.feeding(self.background.inputs["Color"])
-                          if n.type == "TEX_ENVIRONMENT"), None)
-            if color is None:
-                return
-        self.take_texture(color.node)
+        if is_background(surface):
+            self.light = Background(surface.node, self.add)
+        elif is_camera_mix(surface.node):
+            light, seen = map(nodes.source, surface.node.inputs[1:])
+            self.light = Background(light and light.node, self.add)
+            if self.is_in_picture:
+                self.seen = Background(seen and seen.node, self.add)
+        else:
+            taken = next((node for node in nodes.feeding(output.inputs["Surface"]) if node.type == "BACKGROUND"), None)
+            self.light = Background(taken, self.add)
+            self.add(f'node "{surface.node.name}": only a Background is read, '
+                     + (f'"{taken.name}" is taken' if taken else "so the world is dark"))
 
-    def take_texture(self, texture):
-        if texture.image is None:
-            self.add(f'node "{texture.name}" has no image', "choose one")
-            return
-        self.texture = texture
-        if texture.projection != "EQUIRECTANGULAR":
-            self.add("its mirror ball", "convert it to an equirectangular image")
-        if not nodes.is_identity(texture.texture_mapping):
-            self.add("the texture's own mapping", "use a Mapping node")
-        vector = nodes.source(texture.inputs["Vector"])
-        if vector is not None and vector.node.type == "MAPPING" and not vector.node.mute:
-            self.mapping = vector.node
-            for name in ("Location", "Rotation", "Scale"):
-                given = nodes.source(self.mapping.inputs[name])
-                if given is not None:
-                    self.add(f'node "{given.node.name}" on the mapping', "key the Mapping node itself")
-            vector = nodes.source(self.mapping.inputs["Vector"])
-            if vector is None:
-                self.add("a Mapping node without a direction", "connect Texture Coordinate, Generated")
-        if vector is not None and (vector.node.type, vector.name) != ("TEX_COORD", "Generated"):
-            self.add(f'node "{vector.node.name}" ({vector.name}) as direction', "use Texture Coordinate, Generated")
+    def check_rays(self):
+        """Ray Visibility of the world, which Cycles has."""
+        rays = getattr(self.world, "cycles_visibility", None)
+        if rays and not rays.camera and self.is_in_picture:
+            self.seen = Background(None, self.add)
+        for name in ("diffuse", "glossy"):
+            if rays and not getattr(rays, name):
+                self.add(f"it is hidden from {name} rays", "let all rays see it (Ray Visibility)")
 
     def take(self, depsgraph):
         """The values of one frame."""
         exposure = self.scene.cycles.film_exposure if hasattr(self.scene, "cycles") else 1.0
-        if self.world is None:
-            self.scales.append(0.0)
-            self.colors.append(DARK)
-            return
-        evaluated = self.world.evaluated_get(depsgraph)
-        tree = evaluated.node_tree
-        if self.world.use_nodes:
-            background = tree.nodes[self.background.name] if self.background else None
-            strength = background.inputs["Strength"].default_value if background else 0.0
-            self.colors.append(tuple(background.inputs["Color"].default_value)[:3] if background else DARK)
-        else:
-            strength = 1.0
-            self.colors.append(tuple(evaluated.color))
-        self.scales.append(max(strength, 0.0) * exposure)
-        if self.texture:
-            self.rotations.append(conventions.map_rotation(self.lookup(tree)))
-
-    def lookup(self, tree):
-        """Rotation from the world to the map."""
-        if self.mapping is None:
-            return conventions.euler_matrix((0, 0, 0))
-        mapping = tree.nodes[self.mapping.name]
-        location, angles, scale = (tuple(mapping.inputs[name].default_value) if name in mapping.inputs else (0, 0, 0)
-                                   for name in ("Location", "Rotation", "Scale"))
-        try:
-            return conventions.mapping_lookup(mapping.vector_type, location, angles, scale)
-        except conventions.NotARotation as fault:
-            self.add(f'node "{mapping.name}": {fault}', "change the image itself, and only turn it here")
-            return conventions.mapping_lookup(mapping.vector_type, (0, 0, 0), angles, (1, 1, 1))
+        world = self.world.evaluated_get(depsgraph) if self.world else None
+        tree = world.node_tree if world else None
+        self.light.take(tree, exposure, tuple(world.color) if world and not world.use_nodes else DARK)
+        if self.seen:
+            self.seen.take(tree, exposure, DARK)
 
     def job(self, folder, frames):
         """`environment` of the job; its images go to the folder."""
-        if self.texture is None or max(self.scales) == 0:
-            return self.plain(folder, frames)
-        environment = images.export(self.texture, folder, frames, self.add)
-        environment.update(self.scale(frames))
-        rotation = self.rotation(frames)
+        light = self.light
+        turned = next((b for b in (light, self.seen) if b and b.shows_texture()), None)
+        if not light.shows_texture():
+            environment = self.plain(folder, frames)
+        else:
+            environment = images.export(light.texture, light.users, folder, frames, self.add)
+            environment.update(self.scale(frames))
+        if self.seen:
+            environment.update(self.camera_map(folder))
+        rotation = self.rotation(turned.rotations, frames) if turned else {}
         if rotation:
             environment["rotation"] = rotation
         return environment
 
+    def camera_map(self, folder):
+        """`cameraMap`: what the camera sees in place of the light."""
+        light, seen = self.light, self.seen
+        if not seen.is_constant() or not turn_alike(light, seen):
+            self.add(f'node "{seen.node.name}", which the camera alone sees: it sees '
+                     + (f'the light of "{light.node.name}"' if light.node else "darkness"),
+                     "give it one colour or image, of constant strength, mapped as that of the light")
+            return {}
+        if not seen.shows_texture():
+            return {"cameraMap": images.write_plain(folder / "backdrop.exr", seen.light()[0])}
+        images.check(seen.texture, self.add)
+        name, scale = images.copy(seen.texture.image, folder, "backdrop", self.add), number(seen.scales[0])
+        return {"cameraMap": name if scale == 1 else {"file": name, "scale": scale}}
+
     def plain(self, folder, frames):
         """A world of one colour."""
-        light = [[c * scale for c in color] for color, scale in zip(self.colors, self.scales)]
-        if keys.is_constant(light, SCALE_TOLERANCE * max(map(max, light))):
+        light = self.light.light()
+        if self.light.is_constant():
             return {"map": images.write_plain(folder / "sky.exr", light[0])}
-        kept = keys.reduce_linear(frames, light, SCALE_TOLERANCE * max(map(max, light)))
+        kept = keys.reduce_linear(frames, light, TOLERANCE * max(map(max, light)))
         return {"keys": [{"frame": frames[i], "map": images.write_plain(folder / f"sky.{frames[i]:04}.exr", light[i])}
                          for i in kept]}
 
     def scale(self, frames):
-        rows = [[scale] for scale in self.scales]
-        kept = keys.reduce_linear(frames, rows, SCALE_TOLERANCE * max(self.scales))
+        scales = self.light.scales
+        kept = keys.reduce_linear(frames, [[scale] for scale in scales], TOLERANCE * max(scales))
         if len(kept) == 1:
-            return {} if self.scales[0] == 1 else {"scale": number(self.scales[0])}
-        return {"scaleKeys": [{"frame": frames[i], "scale": number(self.scales[i])} for i in kept]}
+            return {} if scales[0] == 1 else {"scale": number(scales[0])}
+        return {"scaleKeys": [{"frame": frames[i], "scale": number(scales[i])} for i in kept]}
 
-    def rotation(self, frames):
+    def rotation(self, rotations, frames):
         """About up where it can be said so; else one axis, at rest."""
-        angles = [conventions.up_angle(rotation) for rotation in self.rotations]
+        angles = [conventions.up_angle(rotation) for rotation in rotations]
         if None in angles:
-            axis, degrees = conventions.axis_angle(self.rotations[0])
-            if not keys.is_constant([sum(r, []) for r in self.rotations], 1e-6):
+            axis, degrees = conventions.axis_angle(rotations[0])
+            if not keys.is_constant([sum(r, []) for r in rotations], 1e-6):
                 self.add("it turns, but not about the vertical alone", "turn it about z only; tilt the image itself")
             return {"axis": numbers(axis), "startDeg": number(degrees)}
         angles = keys.unwrapped(angles)
@@ -155,3 +130,25 @@ class World:
         if abs(speed) <= 1e-7:
             return {"startDeg": round(angles[0], 5)} if abs(angles[0]) > 1e-6 else {}
         return {"startFrame": frames[0], "startDeg": round(angles[0], 5), "degPerFrame": round(speed, 7)}
+
+
+def is_background(socket):
+    return socket is None or (socket.node.type == "BACKGROUND" and not socket.node.mute)
+
+
+def is_camera_mix(node):
+    """Whether a node shows the camera one Background, and all other rays another."""
+    if node.type != "MIX_SHADER" or node.mute:
+        return False
+    factor, *mixed = map(nodes.source, node.inputs)
+    return (factor is not None and (factor.node.type, factor.name) == ("LIGHT_PATH", "Is Camera Ray")
+            and all(map(is_background, mixed)))
+
+
+def turn_alike(light, seen):
+    """Whether two backgrounds can share the job's rotation and filter."""
+    if not (light.shows_texture() and seen.shows_texture()):
+        return True
+    nearest = [b.texture.interpolation == "Closest" for b in (light, seen)]
+    pairs = zip(light.rotations, seen.rotations)
+    return nearest[0] == nearest[1] and all(keys.is_constant([sum(a, []), sum(b, [])], TOLERANCE) for a, b in pairs)

@@ -1,11 +1,35 @@
-"""Bent faces that are shaded flat; runs inside Blender.
+"""Faces that the glTF file cannot hold as Cycles shows them; runs inside Blender.
 
-Cycles shades each triangle of them by itself, the glTF exporter writes one normal for the face: so they are cut."""
+Bent faces that are shaded flat: Cycles shades each triangle of them by itself, the glTF exporter writes one normal for the
+face: so they are cut. Faces without area: Baton refuses a part of a mesh that has only such ones."""
 
 import bmesh
 import numpy
 
-BENT = 1e-4  # difference of unit normals
+BENT = 1e-4     # difference of unit normals
+NO_AREA = 1e-7  # of the longest edge squared, as worker/scene/mesh_builder.cpp has it
+
+
+def drop_without_area(mesh):
+    """Removes the faces of each material that has none with an area; vertices stay. How many faces."""
+    if not len(mesh.polygons):
+        return 0
+    mesh.calc_loop_triangles()
+    places = values(mesh.vertices, "co", 3).astype(numpy.float64)
+    corners = places[values(mesh.loop_triangles, "vertices", 3, numpy.int32)]
+    edges = numpy.roll(corners, 1, 1) - corners
+    longest = (edges ** 2).sum(2).max(1)
+    has_area = numpy.linalg.norm(numpy.cross(edges[:, 0], edges[:, 1]), axis=1) > NO_AREA * longest
+    slots = values(mesh.polygons, "material_index", 1, numpy.int32).ravel()
+    slot_of = slots[values(mesh.loop_triangles, "polygon_index", 1, numpy.int32).ravel()]
+    unseen = ~numpy.isin(slots, slot_of[has_area])
+    if unseen.any():
+        edited = bmesh.new()
+        edited.from_mesh(mesh)
+        edited.faces.ensure_lookup_table()
+        bmesh.ops.delete(edited, geom=[edited.faces[int(i)] for i in numpy.flatnonzero(unseen)], context="FACES_ONLY")
+        write_back(edited, mesh)
+    return int(unseen.sum())
 
 
 def cut_bent(mesh):
@@ -39,6 +63,10 @@ def cut_bent(mesh):
             for loop, corner in zip(new.loops, corners):
                 loop.copy_from(loops[corner])
     bmesh.ops.delete(edited, geom=cut, context="FACES_ONLY")
+    write_back(edited, mesh)
+
+
+def write_back(edited, mesh):
     edited.to_mesh(mesh)
     edited.free()
     mesh.update()
