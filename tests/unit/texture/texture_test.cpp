@@ -235,6 +235,14 @@ TEST(ImageReader, ReadsFilesAndBytes) {
     EXPECT_NEAR(image->samples[i], values[i] / 255.0f, 1e-6f) << i;
 }
 
+TEST(ImageReader, GreyMayHaveAlpha) {
+  const Image image = read_image(write_targa("grey.tga", 2, 1, 2, {255, 51, 0, 255})).value();
+  EXPECT_TRUE(image.has_alpha && !image.is_associated);
+  EXPECT_EQ(image.num_colors(), 1);
+  EXPECT_THAT(image.samples,
+              testing::Pointwise(testing::FloatNear(1e-6f), std::array{1.0f, 0.2f, 0.0f, 1.0f}));
+}
+
 TEST(ImageReader, AlphaIsWhatATiffFileCallsSo) {
   const std::vector<float> values{0.1f, 0.2f, 0.3f, 0.5f};
   const auto read = [&](test::TiffExtra extra) {
