@@ -19,6 +19,9 @@ inline constexpr int kMaxSections = 64;          // of one state or film file
 inline constexpr int kMaxChannels = 256;         // of one picture
 inline constexpr int kMaxImageSide = 32768;
 inline constexpr int kMaxOverscan = 4096;  // pixels on a side
+/// Numbers of an EXR picture whose data does not fill its display window: the rest costs a file
+/// nothing.
+inline constexpr std::int64_t kMaxFramedValues = std::int64_t{1} << 29;
 inline constexpr int kMaxFrames = 100000;
 inline constexpr int kMaxFrameNumber = 9999999;
 inline constexpr int kMaxMaterials = 4096;

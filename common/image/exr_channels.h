@@ -12,7 +12,8 @@
 namespace baton {
 
 /// What of an EXR file is read: all that it holds, or what it shows, without the pixels around it.
-/// Of a file whose data does not fill its display window, the data there is within.
+/// What a file shows is its display window: 0 where its data does not reach, such as around what
+/// compositors cut to its content.
 enum class ExrWindow : std::uint8_t { data, display };
 /// The channels wanted of those that a file has, by name.
 using ChannelChoice =

@@ -239,6 +239,20 @@ Result<FilmTile> describe(const Imf::Header& header, const std::string& name) {
   return image;
 }
 
+/// Whether `shown`, the display window, is no larger than an image may be, nor much larger than
+/// what the file holds of `image`.
+Status check_display(const PixelRect& shown, const FilmTile& image, const std::string& name) {
+  const auto values = static_cast<std::int64_t>(image.channels.size()) * shown.area();
+  const bool fits = shown.width() <= limits::kMaxImageSide &&
+                    shown.height() <= limits::kMaxImageSide && values <= limits::kMaxFramedValues;
+  if (fits || image.rect.contains(shown)) return {};
+  return Error{ErrorKind::bad_input,
+               fmt::format("{}: a display window of {} x {} pixels, expected at most {} a side and "
+                           "{} numbers where the data does not fill it",
+                           name, shown.width(), shown.height(), limits::kMaxImageSide,
+                           limits::kMaxFramedValues)};
+}
+
 /// Reads `image.channels` into `image.values`. Throws what OpenEXR throws.
 void read_planes(Imf::InputFile& file, FilmTile& image) {
   std::vector<StoredChannel> stored;
@@ -312,11 +326,11 @@ Result<FilmTile> read_exr_channels(const std::filesystem::path& path, const Chan
   return with_exr_file(path, [&](Imf::InputFile& file) -> Result<FilmTile> {
     BATON_ASSIGN(FilmTile image, describe(file.header(), path.string()));
     BATON_ASSIGN(image.channels, choose(image.channels));
+    const PixelRect shown =
+        window == ExrWindow::data ? image.rect : rect_of(file.header().displayWindow());
+    BATON_TRY(check_display(shown, image, path.string()));
     read_planes(file, image);
-    if (window == ExrWindow::data) return image;
-    const PixelRect shown = common_part(rect_of(file.header().displayWindow()), image.rect);
-    const bool is_all = shown == image.rect || shown.width() < 1 || shown.height() < 1;
-    return is_all ? std::move(image) : part_of(image, shown);
+    return shown == image.rect ? std::move(image) : framed(image, shown);
   });
 }
 

@@ -83,17 +83,23 @@ float* FilmTile::find(std::string_view channel) {
 
 FilmTile part_of(const FilmTile& film, const PixelRect& rect) {
   BATON_CHECK(film.rect.contains(rect) && rect.area() > 0);
-  FilmTile part{rect, film.channels, {}};
-  part.values.reserve(part.channels.size() * part.num_pixels());
+  return framed(film, rect);
+}
+
+FilmTile framed(const FilmTile& film, const PixelRect& rect) {
+  FilmTile picture{rect, film.channels, {}};
+  picture.values.resize(picture.channels.size() * picture.num_pixels());
+  const PixelRect common = common_part(film.rect, rect);
+  if (common.width() < 1) return picture;
   for (std::size_t c = 0; c < film.channels.size(); ++c) {
-    for (std::int32_t y = rect.y0; y < rect.y1; ++y) {
-      const float* const row = film.plane(c) +
-                               std::ptrdiff_t{y - film.rect.y0} * film.rect.width() +
-                               (rect.x0 - film.rect.x0);
-      part.values.insert(part.values.end(), row, row + rect.width());
+    for (std::int32_t y = common.y0; y < common.y1; ++y) {
+      const auto at = [&](const PixelRect& in) {
+        return std::ptrdiff_t{y - in.y0} * in.width() + (common.x0 - in.x0);
+      };
+      std::copy_n(film.plane(c) + at(film.rect), common.width(), picture.plane(c) + at(rect));
     }
   }
-  return part;
+  return picture;
 }
 
 Bytes encode_film_tile(const FilmTile& tile, const FilmOrigin& origin) {

@@ -30,6 +30,8 @@ struct FilmTile {
 
 /// The pixels of a film that lie in `rect`, which it contains.
 FilmTile part_of(const FilmTile& film, const PixelRect& rect);
+/// The film as `rect` frames it: its pixels inside, 0 where it has none.
+FilmTile framed(const FilmTile& film, const PixelRect& rect);
 
 /// Which pass made a film. Stored; values are for ever.
 enum class FilmPass : std::uint8_t { first = 0, second = 1 };

@@ -18,7 +18,7 @@ void finish_shadows(FilmTile& film) {
   }
 }
 
-void lay_over_plate(FilmTile& film, const RgbImage& plate, std::array<int, 2> corner) {
+void lay_over_plate(FilmTile& film, const RgbImage& plate) {
   const std::array color = planes(film, {"R", "G", "B"});
   const std::array shadow = planes(film, kShadowChannels);
   float* const alpha = film.find("A");
@@ -26,10 +26,8 @@ void lay_over_plate(FilmTile& film, const RgbImage& plate, std::array<int, 2> co
   std::size_t i = 0;
   for (int y = film.rect.y0; y < film.rect.y1; ++y) {
     for (int x = film.rect.x0; x < film.rect.x1; ++x, ++i) {
-      const int column = x + corner[0], row = y + corner[1];
-      if (column < 0 || column >= plate.width || row < 0 || row >= plate.height) continue;
-      const float* const behind =
-          &plate.rgb[(static_cast<std::size_t>(row) * plate.width + column) * 3];
+      if (x < 0 || x >= plate.width || y < 0 || y >= plate.height) continue;
+      const float* const behind = &plate.rgb[(static_cast<std::size_t>(y) * plate.width + x) * 3];
       const float open = 1 - alpha[i] - (share != nullptr ? share[i] : 0);
       for (std::size_t c = 0; c < 3; ++c)
         color[c][i] += (open + (share != nullptr ? shadow[c][i] : 0)) * behind[c];

@@ -19,9 +19,9 @@ void finish_shadows(FilmTile& film);
 
 /// Lays a film without background over a plate: each site that sees nothing shows it, each that
 /// sees a catcher shows it in shadow, so R, G and B get (share of nothing + shadow share) times
-/// the plate, and A becomes 1. corner: of the film's pixel (0, 0) on the plate. Pixels beside the
-/// plate stay.
-void lay_over_plate(FilmTile& film, const RgbImage& plate, std::array<int, 2> corner);
+/// the plate, and A becomes 1. The plate's corner is the film's pixel (0, 0); pixels beside it
+/// stay.
+void lay_over_plate(FilmTile& film, const RgbImage& plate);
 
 /// Makes what shadows take black in A: it grows by the share of catchers times one less the
 /// luminance of S / U [Rec. 709]. Nothing without the planes shadow.*.

@@ -48,18 +48,18 @@ TexelReport look_at_texels(const RgbImage& image, float scale) {
   return report;
 }
 
-Result<MapReport> load_map(const std::string& path, const EnvironmentSpec& environment) {
+Result<MapReport> load_map(const std::string& path, float scale, int max_width) {
   BATON_ASSIGN(const RgbImage image, read_rgb_image(path));
   BATON_ASSIGN(const PictureColors colors, read_picture_colors(path));
-  const TexelReport texels = look_at_texels(image, environment.scale);
-  const auto [width, height] = map_sides(image.width, image.height, environment.max_width);
+  const TexelReport texels = look_at_texels(image, scale);
+  const auto [width, height] = map_sides(image.width, image.height, max_width);
   return MapReport{.path = path,
                    .width = width,
                    .height = height,
                    .file_width = image.width,
                    .file_height = image.height,
                    .repaired_texels = texels.repairs.total(),
-                   .black = !(texels.mean * double{environment.scale} > 0),
+                   .black = !(texels.mean * double{scale} > 0),
                    .brightest = texels.brightest,
                    .colors = conversion_text(colors),
                    .mean = static_cast<float>(texels.mean)};
@@ -70,7 +70,7 @@ void load_maps(const EnvironmentSpec& environment, AssetReport& report,
   std::set<std::string> seen;
   for (const EnvironmentKey& key : environment.keys) {
     if (!seen.insert(key.map).second) continue;
-    const Result<MapReport> map = load_map(key.map, environment);
+    const Result<MapReport> map = load_map(key.map, environment.scale, environment.max_width);
     if (!map) {
       faults.push_back(map.error().message);
       continue;
@@ -87,20 +87,34 @@ void load_maps(const EnvironmentSpec& environment, AssetReport& report,
   }
 }
 
-/// A map that the camera sees can be read; nothing else is asked of it.
-void load_camera_map(const EnvironmentSpec& environment, std::vector<std::string>& faults) {
-  const std::string& file = environment.camera_map.file;
-  if (file.empty()) return;
-  if (const auto image = read_rgb_image(file); !image) faults.push_back(image.error().message);
+void load_camera_map(const CameraMapSpec& spec, AssetReport& report,
+                     std::vector<std::string>& faults) {
+  if (spec.file.empty()) return;
+  const Result<MapReport> map = load_map(spec.file, spec.scale, 0);
+  if (!map) return faults.push_back(map.error().message);
+  report.camera_map = *map;
 }
 
-/// The same of all plates.
-void load_plates(const JobSpec& job, std::vector<std::string>& faults) {
+Result<PlateReport> load_plate_file(const JobSpec& job, int frame, const std::string& path) {
+  BATON_ASSIGN(const Plate plate, load_plate(job, frame));
+  PlateReport report{.path = path, .repaired = plate.repaired, .colors = {}};
+  if (!is_radiance_file(path)) return report;
+  BATON_ASSIGN(const PictureColors colors, read_picture_colors(path));
+  report.colors = conversion_text(colors);
+  return report;
+}
+
+void load_plates(const JobSpec& job, AssetReport& report, std::vector<std::string>& faults) {
   if (!has_plate(job.output)) return;
   std::set<std::string> seen;
   for (const int frame : job.frames) {
-    if (!seen.insert(file_at(*job.output.plate, frame)).second) continue;
-    if (const auto plate = load_plate(job, frame); !plate) faults.push_back(plate.error().message);
+    const std::string path = file_at(*job.output.plate, frame);
+    if (!seen.insert(path).second) continue;
+    const Result<PlateReport> plate = load_plate_file(job, frame, path);
+    if (plate)
+      report.plates.push_back(*plate);
+    else
+      faults.push_back(plate.error().message);
   }
 }
 
@@ -129,8 +143,8 @@ Result<AssetReport> load_assets(const JobSpec& job) {
   std::vector<std::string> faults;
   load_geometry(job, report, faults);
   load_maps(job.environment, report, faults);
-  load_camera_map(job.environment, faults);
-  load_plates(job, faults);
+  load_camera_map(job.environment.camera_map, report, faults);
+  load_plates(job, report, faults);
   if (!faults.empty())
     return Error{ErrorKind::bad_input, fmt::format("{}", fmt::join(faults, "\n"))};
   return report;

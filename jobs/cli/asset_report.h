@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <memory>
+#include <optional>
 #include <string>
 #include <vector>
 
@@ -23,10 +24,19 @@ struct MapReport {
   float mean = 0;       ///< radiance over the sphere and the three channels, of finite ones
 };
 
+/// A plate of the job, as read.
+struct PlateReport {
+  std::string path;
+  std::uint64_t repaired = 0;  ///< Plate::repaired
+  std::string colors;          ///< as of maps
+};
+
 /// The geometry of the job, as loaded.
 struct AssetReport {
   std::vector<MapReport> maps;  ///< in the order of their first key
   bool every_map = true;        ///< else some were left out
+  std::optional<MapReport> camera_map;
+  std::vector<PlateReport> plates;  ///< in the order of their first frame
   std::uint64_t meshes = 0, deforming_meshes = 0, instances = 0;
   std::uint64_t triangles = 0;  ///< of all instances
   bool objects_move = false;

@@ -1,5 +1,6 @@
 #include <fmt/format.h>
 
+#include <map>
 #include <nlohmann/json.hpp>
 
 #include "common/job/estimate.h"
@@ -39,20 +40,25 @@ ordered_json settings_json(const std::vector<JobSetting>& settings) {
   return list;
 }
 
+ordered_json map_json(const MapReport& map) {
+  return {{"path", map.path},
+          {"width", map.width},
+          {"height", map.height},
+          {"fileWidth", map.file_width},
+          {"fileHeight", map.file_height},
+          {"colors", map.colors},
+          {"repairedTexels", map.repaired_texels},
+          {"black", map.black}};
+}
+
 void print_json(const JobSpec& job, const JobEstimate& e, const AssetReport& assets,
                 const std::vector<std::string>& warnings, const std::vector<JobSetting>& settings,
                 const PilotPlan& plan) {
-  ordered_json maps = ordered_json::array();
-  for (const MapReport& map : assets.maps) {
-    maps.push_back({{"path", map.path},
-                    {"width", map.width},
-                    {"height", map.height},
-                    {"fileWidth", map.file_width},
-                    {"fileHeight", map.file_height},
-                    {"colors", map.colors},
-                    {"repairedTexels", map.repaired_texels},
-                    {"black", map.black}});
-  }
+  ordered_json maps = ordered_json::array(), plates = ordered_json::array();
+  for (const MapReport& map : assets.maps) maps.push_back(map_json(map));
+  for (const PlateReport& plate : assets.plates)
+    plates.push_back(
+        {{"path", plate.path}, {"colors", plate.colors}, {"repairedPixels", plate.repaired}});
   const double share = surface_share(job, *assets.scene);
   ordered_json result = {{"name", job.name},
                          {"frames", e.frames},
@@ -82,6 +88,8 @@ void print_json(const JobSpec& job, const JobEstimate& e, const AssetReport& ass
                          {"droppedTriangles", assets.dropped_triangles},
                          {"maps", std::move(maps)},
                          {"warnings", warnings}};
+  if (assets.camera_map) result["cameraMap"] = map_json(*assets.camera_map);
+  if (!plates.empty()) result["plates"] = std::move(plates);
   if (plan.candidates > 0) {
     result["pilot"] = {{"candidates", plan.candidates},
                        {"frames", plan.frames},
@@ -103,6 +111,24 @@ void print_assets(const AssetReport& assets) {
       fmt::print("           reduced to {}x{}\n", map.width, map.height);
     if (!map.colors.empty()) fmt::print("           converted: {}\n", map.colors);
   }
+  if (const auto& map = assets.camera_map) {
+    fmt::print("cameraMap  {} ({}x{})\n", map->path, map->file_width, map->file_height);
+    if (!map->colors.empty()) fmt::print("           converted: {}\n", map->colors);
+  }
+}
+
+/// Each conversion once, however many plates there are.
+void print_plates(const JobSpec& job, const std::vector<PlateReport>& plates) {
+  if (plates.empty()) return;
+  const auto file = [&](int frame) { return file_at(*job.output.plate, frame); };
+  fmt::print("over       {}{}\n", file(job.frames.front()),
+             job.frames.size() > 1 ? " ... " + file(job.frames.back()) : "");
+  std::map<std::string, std::size_t> conversions;
+  for (const PlateReport& plate : plates) ++conversions[plate.colors];
+  conversions.erase("");
+  for (const auto& [text, count] : conversions)
+    fmt::print("           {}converted: {}\n",
+               count < plates.size() ? fmt::format("{} of {} ", count, plates.size()) : "", text);
 }
 
 void print_text(const JobSpec& job, const JobEstimate& e, const AssetReport& assets) {
@@ -150,11 +176,7 @@ void print_text(const JobSpec& job, const JobEstimate& e, const AssetReport& ass
   fmt::print("disk       frames take at most {}, {} each\n", total(e.frames * e.frame_bytes),
              total(e.frame_bytes));
   fmt::print("output     {}/{}\n", job.output.directory, job.output.pattern);
-  if (has_plate(job.output)) {
-    const auto file = [&](int frame) { return file_at(*job.output.plate, frame); };
-    fmt::print("over       {}{}\n", file(job.frames.front()),
-               job.frames.size() > 1 ? " ... " + file(job.frames.back()) : "");
-  }
+  print_plates(job, assets.plates);
 }
 
 void print_settings(const std::vector<JobSetting>& settings) {

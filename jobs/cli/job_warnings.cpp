@@ -15,6 +15,7 @@
 #include "common/job/store_estimate.h"
 #include "jobs/cli/surface_share.h"
 #include "jobs/cli/text.h"
+#include "worker/scene/plate.h"
 #include "worker/scene/settle_scene.h"
 
 namespace baton {
@@ -27,12 +28,30 @@ constexpr std::size_t kMostMaps = 16;
 /// Factor by which the light's mean changes in a jump, and how many jumps are told one by one.
 constexpr float kJump = 2;
 constexpr std::size_t kMostJumps = 3;
+/// Plates that are told one by one.
+constexpr std::size_t kMostPlates = 3;
+
+/// Of any map, also one that only the camera sees.
+void texel_warning(const MapReport& map, std::vector<std::string>& warnings) {
+  if (map.repaired_texels > 0)
+    warnings.push_back(fmt::format("{}: {} texels are negative, NaN or infinite and count as 0",
+                                   map.path, map.repaired_texels));
+}
+
+void plate_warnings(const std::vector<PlateReport>& plates, std::vector<std::string>& warnings) {
+  std::size_t count = 0;
+  for (const PlateReport& plate : plates) {
+    if (plate.repaired == 0) continue;
+    if (++count <= kMostPlates) warnings.push_back(repair_note(plate.path, plate.repaired));
+  }
+  if (count > kMostPlates)
+    warnings.push_back(
+        fmt::format("{} more plates have pixels that are NaN or infinite", count - kMostPlates));
+}
 
 void map_warnings(const MapReport& map, std::vector<std::string>& warnings) {
   const auto add = [&](const std::string& text) { warnings.push_back(map.path + ": " + text); };
-  if (map.repaired_texels > 0) {
-    add(fmt::format("{} texels are negative, NaN or infinite and count as 0", map.repaired_texels));
-  }
+  texel_warning(map, warnings);
   if (map.black) {
     add("the map is black: nothing will be lit");
   } else if (map.brightest <= 1) {
@@ -118,6 +137,14 @@ void output_warnings(const JobSpec& job, const Scene& scene, std::vector<std::st
   }
 }
 
+/// Values of `output` that say nothing here.
+void idle_output_warnings(const JobSpec& job, std::vector<std::string>& warnings) {
+  if (job.output.plate && !has_plate(job.output))
+    warnings.push_back("output.plate: no effect without \"background\": \"plate\"");
+  if (job.output.shadows == ShadowForm::alpha && !has_catcher(job))
+    warnings.push_back("output.shadows: \"alpha\" has no effect, as nothing catches shadows");
+}
+
 void aov_warnings(const JobSpec& job, std::vector<std::string>& warnings) {
   for (const Aov aov : job.output.aovs) {
     if (const std::string_view why = why_empty(aov, job); !why.empty())
@@ -151,6 +178,8 @@ JobSpec outline_of(JobSpec job) {
 std::vector<std::string> job_warnings(const JobSpec& job, const AssetReport& assets) {
   std::vector<std::string> warnings;
   for (const MapReport& map : assets.maps) map_warnings(map, warnings);
+  if (assets.camera_map) texel_warning(*assets.camera_map, warnings);
+  plate_warnings(assets.plates, warnings);
   if (assets.dropped_triangles > 0) {
     warnings.push_back(
         fmt::format("{} triangles without area are left out", assets.dropped_triangles));
@@ -165,6 +194,7 @@ std::vector<std::string> job_warnings(const JobSpec& job, const AssetReport& ass
     warnings.push_back(std::move(warning));
   for (std::string& warning : gltf_warnings(job.scene)) warnings.push_back(std::move(warning));
   aov_warnings(job, warnings);
+  idle_output_warnings(job, warnings);
   output_warnings(job, *assets.scene, warnings);
   return warnings;
 }

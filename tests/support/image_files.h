@@ -1,6 +1,7 @@
 #pragma once
 
 #include <cstdint>
+#include <iterator>
 #include <string>
 #include <vector>
 
@@ -8,23 +9,23 @@
 
 namespace baton::test {
 
-/// An 8-bit image as a Targa file: rows from the top; `channels` 1 (grey), 3 (RGB) or 4 (RGBA)
-/// values a pixel.
+/// An 8-bit image as a Targa file: rows from the top; `channels` 1 (grey), 2 (with alpha), 3 (RGB)
+/// or 4 (RGBA) values a pixel.
 inline std::string targa(int width, int height, int channels,
                          const std::vector<std::uint8_t>& values) {
   std::string bytes(18, '\0');
-  bytes[2] = static_cast<char>(channels == 1 ? 3 : 2);
+  bytes[2] = static_cast<char>(channels < 3 ? 3 : 2);
   for (int i = 0; i < 2; ++i) {
     bytes[static_cast<std::size_t>(12 + i)] = static_cast<char>(width >> 8 * i & 0xFF);
     bytes[static_cast<std::size_t>(14 + i)] = static_cast<char>(height >> 8 * i & 0xFF);
   }
   bytes[16] = static_cast<char>(8 * channels);
-  bytes[17] = static_cast<char>(0x20 | (channels == 4 ? 8 : 0));
+  bytes[17] = static_cast<char>(0x20 | (channels % 2 == 0 ? 8 : 0));
   for (std::size_t i = 0; i < values.size(); i += static_cast<std::size_t>(channels)) {
     // The file has B, G, R, A.
     for (int c = 0; c < channels; ++c)
       bytes += static_cast<char>(
-          values[i + static_cast<std::size_t>(channels > 1 && c < 3 ? 2 - c : c)]);
+          values[i + static_cast<std::size_t>(channels > 2 && c < 3 ? 2 - c : c)]);
   }
   return bytes;
 }
@@ -33,6 +34,49 @@ inline std::string targa(int width, int height, int channels,
 inline std::string write_targa(const std::string& name, int width, int height, int channels,
                                const std::vector<std::uint8_t>& values) {
   return write_test_file(name, targa(width, height, channels, values));
+}
+
+/// What a TIFF file says of its last channel.
+enum class TiffExtra : std::uint16_t { unspecified = 0, associated = 1, unassociated = 2 };
+
+/// RGB floats and a fourth channel, (height, width, 4), as a TIFF file; its path.
+inline std::string write_tiff(const std::string& name, int width, int height, TiffExtra extra,
+                              const std::vector<float>& values) {
+  std::string bytes = "II*";
+  bytes += '\0';
+  const auto put = [&](std::uint32_t v, int size) {
+    for (int i = 0; i < size; ++i) bytes += static_cast<char>(v >> 8 * i & 0xFF);
+  };
+  // Behind the header the arrays, the samples, then the list of tags.
+  constexpr std::uint32_t kBits = 8, kFormats = 16, kSamples = 24;
+  const auto size = static_cast<std::uint32_t>(4 * values.size());
+  put(kSamples + size, 4);
+  for (int i = 0; i < 4; ++i) put(32, 2);
+  for (int i = 0; i < 4; ++i) put(3, 2);  // floats
+  bytes.append(reinterpret_cast<const char*>(values.data()), size);
+  const struct {
+    std::uint32_t tag, type, count, value;
+  } tags[] = {{256, 4, 1, static_cast<std::uint32_t>(width)},
+              {257, 4, 1, static_cast<std::uint32_t>(height)},
+              {258, 3, 4, kBits},
+              {259, 3, 1, 1},
+              {262, 3, 1, 2},
+              {273, 4, 1, kSamples},
+              {277, 3, 1, 4},
+              {278, 4, 1, static_cast<std::uint32_t>(height)},
+              {279, 4, 1, size},
+              {284, 3, 1, 1},
+              {338, 3, 1, static_cast<std::uint32_t>(extra)},
+              {339, 3, 4, kFormats}};
+  put(std::size(tags), 2);
+  for (const auto& t : tags) {
+    put(t.tag, 2);
+    put(t.type, 2);
+    put(t.count, 4);
+    put(t.value, 4);
+  }
+  put(0, 4);
+  return write_test_file(name, bytes);
 }
 
 }  // namespace baton::test

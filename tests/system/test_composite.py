@@ -3,10 +3,12 @@
 
 import math
 import sys
+from array import array
 from pathlib import Path
 
 from exr_frames import read_frame
 from farm import BAD_INPUT, check, check_equal, make_job, run_tests, write_job, write_map
+from random_job_files import write_exr
 
 sys.path.append(str(Path(__file__).parents[2] / "jobs/examples"))
 from make_gltf_set import png  # noqa: E402
@@ -211,6 +213,40 @@ def test_shadows_in_alpha(programs, folder):
     check(dark > 50, f"{dark} pixels in shadow")
 
 
+def test_pixels_that_are_odd(programs, folder):
+    """NaN counts as 0 and is told, what is below zero stays and is not Baton's own."""
+    folder.mkdir(parents=True, exist_ok=True)
+    rows = [array("f", [-0.5, 0.25, 2.0] * WIDTH) for _ in range(HEIGHT)]
+    for y in range(HEIGHT):
+        rows[y][3 * 48 + 1] = math.nan  # a column through sky, spheres and ground
+    write_exr(folder / "odd.exr", WIDTH, rows)
+    job = shot(folder, background="plate", plate="odd.exr")
+    job["frames"] = "1"
+    path = write_job(folder / "job.json", job)
+    told = f"odd.exr: {HEIGHT} pixels are NaN or infinite and count as 0"
+    check_equal(programs.run("baton", "check", path).stdout.count(told), 1, "warnings")
+    result = programs.render(path, folder / "work")
+    check("below zero" not in result.stdout and "WRONG" not in result.stdout, result.stdout)
+    check(any(told in log.read_text(encoding="utf-8") for log in (folder / "work").glob("worker-*.log")), "in no worker's log")
+    frame = read_frame(folder / "frames/frame.0001.exr")
+    at = 3 * WIDTH + 48  # in the sky
+    check_equal([frame.channels[c][at + 1] for c in "RGB"], [-0.5, 0.25, 2.0], "the plate's own colours")
+    check_equal([frame.channels[c][at] for c in "RGB"], [-0.5, 0.0, 2.0], "what is repaired")
+
+
+def test_values_without_effect_are_told(programs, folder):
+    plates_of_a_shot(folder)
+    for output, told in [({"background": "transparent", "plate": PLATE}, "output.plate: no effect"),
+                         ({"background": "transparent", "shadows": "alpha"}, 'output.shadows: "alpha" has no effect')]:
+        job = shot(folder, **output)
+        del job["scene"]["ground"]["catcher"]
+        path = write_job(folder / "job.json", job)
+        check(told in programs.run("baton", "check", path).stdout, told)
+    for output in ({"background": "plate", "plate": PLATE}, {"background": "transparent", "shadows": "alpha"}):
+        path = write_job(folder / "job.json", shot(folder, **output))
+        check("no effect" not in programs.run("baton", "check", path).stdout, f"{output}")
+
+
 def test_faults_name_file_and_place(programs, folder):
     plates_of_a_shot(folder)
     (folder / "text.png").write_text("no picture", encoding="ascii")
@@ -233,4 +269,5 @@ def test_faults_name_file_and_place(programs, folder):
 
 if __name__ == "__main__":
     run_tests([test_three_backgrounds_without_fringe, test_numbered_plates_reach_their_frames,
-               test_other_plates_write_frames_anew, test_shadows_in_alpha, test_faults_name_file_and_place])
+               test_other_plates_write_frames_anew, test_shadows_in_alpha, test_pixels_that_are_odd,
+               test_values_without_effect_are_told, test_faults_name_file_and_place])

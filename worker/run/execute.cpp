@@ -217,13 +217,21 @@ Result<TaskOutput> execute_assemble(const LoadedJob& loaded, const BlobStore& st
     pasted[static_cast<std::size_t>(input.tile)] = true;
   }
 
-  std::optional<RgbImage> plate;
+  std::optional<RgbImage> picture;
+  std::vector<std::string> notes;
   if (const JobSpec& here = loaded.context->job; has_plate(here.output)) {
-    BATON_ASSIGN(plate, load_plate(here, here.frames[static_cast<std::size_t>(task.step)]));
+    const int frame = here.frames[static_cast<std::size_t>(task.step)];
+    BATON_ASSIGN(Plate plate, load_plate(here, frame));
+    if (plate.repaired > 0)
+      notes.push_back(repair_note(file_at(*here.output.plate, frame), plate.repaired));
+    picture = std::move(plate.picture);
   }
   BATON_ASSIGN(const WrittenFrame written,
-               write_frame(loaded.job, loaded.digest, task.step, std::move(image), plate));
-  return TaskOutput{{written.file}, {}, {{task.step, task.tile, {}, written.quality}}};
+               write_frame(loaded.job, loaded.digest, task.step, std::move(image), picture));
+  return TaskOutput{.outputs = {written.file},
+                    .stats = {},
+                    .frames = {{task.step, task.tile, {}, written.quality}},
+                    .notes = std::move(notes)};
 }
 
 }  // namespace

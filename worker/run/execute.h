@@ -20,6 +20,7 @@ struct TaskOutput {
   std::vector<FrameStats> frames = {};  ///< of a render task in frame order, of an assembly one
   /// What this machine does not see of the job, a line; then nothing was done.
   std::string unseen = {};
+  std::vector<std::string> notes = {};  ///< to log: what was repaired of files
 };
 
 /// How a task that was leased has ended.

@@ -179,11 +179,15 @@ ImageMetadata frame_metadata(const JobSpec& job, const Digest& job_digest, int f
 Result<WrittenFrame> write_frame(const JobSpec& job, const Digest& job_digest,
                                  std::int32_t frame_index, FilmTile image,
                                  const std::optional<RgbImage>& plate) {
-  if (plate) lay_over_plate(image, *plate, {0, 0});
   FrameQuality quality = judge_frame(image);
-  const float noise = cycles_noise(image);
-  quality.clamped = job.output.clamp_negative;
+  float noise = cycles_noise(image);
   if (job.output.clamp_negative) clamp_negative(image);
+  if (plate) {
+    lay_over_plate(image, *plate);
+    quality = judge_composite(image, quality);
+    noise = cycles_noise(image);
+  }
+  quality.clamped = job.output.clamp_negative;
   drop_channel(image, kErrorChannel);
   if (job.output.shadows == ShadowForm::alpha) {
     put_shadows_in_alpha(image);

@@ -31,9 +31,9 @@ struct WrittenFrame {
 };
 
 /// Writes one finished frame as EXR with the job's name, digest and program version in its header.
-/// With a plate, which is as large as the whole picture, the frame is laid over it.
-/// What is below zero is set to 0 where the job wants that; colours past a half float make those of
-/// the frame float32; planes that no AOV of the job has are left out.
+/// What is below zero is set to 0 where the job wants that. With a plate, which is as large as the
+/// whole picture, the frame is then laid over it; the plate's own values stay. Colours past a half
+/// float make those of the frame float32; planes that no AOV of the job has are left out.
 ///
 /// Before the file gets its name it is read back from disk: every byte must be the encoder's, the
 /// header and the table of blocks must be whole, and one block of rows, another one in each frame,

@@ -53,6 +53,15 @@ FrameQuality judge_frame(const FilmTile& image) {
   return quality;
 }
 
+FrameQuality judge_composite(const FilmTile& image, const FrameQuality& rendered) {
+  FrameQuality quality = judge_frame(image);
+  quality.pixels_below_zero = rendered.pixels_below_zero;
+  quality.lowest = rendered.lowest;
+  quality.light_below_zero =
+      quality.mean > 0 ? rendered.light_below_zero * rendered.mean / quality.mean : 0.0f;
+  return quality;
+}
+
 void clamp_negative(FilmTile& image) {
   for (const char* name : {"R", "G", "B"}) {
     float* const plane = image.find(name);

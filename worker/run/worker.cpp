@@ -120,7 +120,9 @@ Result<TaskOutput> execute_pooled(const PooledTask& task, const std::stop_token&
   // Again for each frame: links may have changed.
   BATON_TRY(check_output_root(loaded->job, roots));
   if (key.kind == TaskKind::assemble) {
-    return execute_task(*loaded, *task.store, key, task.grant, stop);
+    Result<TaskOutput> frame = execute_task(*loaded, *task.store, key, task.grant, stop);
+    if (frame) notes.report(frame->notes);
+    return frame;
   }
 
   // A replay renders up to the last frame of the run, or the frame of the second pass.

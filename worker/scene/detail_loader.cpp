@@ -8,6 +8,7 @@
 
 #include "common/base/limits.h"
 #include "common/job/udim.h"
+#include "worker/scene/image_colors.h"
 
 namespace baton {
 namespace {
@@ -75,7 +76,7 @@ Result<std::shared_ptr<const SurfaceDetail>> DetailLoader::load(const MaterialSp
       {DetailImage::metallic_roughness, spec.metallic_roughness_texture,
        TextureUse::metallic_roughness},
       {DetailImage::normal, spec.normal_texture, TextureUse::normal},
-      {DetailImage::emission, spec.emission_texture, TextureUse::color},
+      {DetailImage::emission, spec.emission_texture, TextureUse::light},
       {DetailImage::clearcoat, spec.clearcoat_texture, TextureUse::red},
       {DetailImage::clearcoat_roughness, spec.clearcoat_roughness_texture, TextureUse::green},
       {DetailImage::clearcoat_normal, spec.clearcoat_normal_texture, TextureUse::normal},
@@ -133,7 +134,8 @@ Result<std::shared_ptr<const TextureTiles>> DetailLoader::tiles_of(const Texture
 
 Result<DetailLoader::TexturePtr> DetailLoader::load_texture(const TextureSpec& spec,
                                                             TextureUse use) {
-  BATON_ASSIGN(const Image image, read(spec));
+  BATON_ASSIGN(Image image, read(spec));
+  BATON_TRY(settle_colors(image, use, name_of(spec)));
   BATON_ASSIGN(TexturePtr texture, Texture::build(image, use, name_of(spec)));
   size_bytes_ += texture->size_bytes();
   if (size_bytes_ > limits::kMaxTextureBytes)

@@ -45,8 +45,6 @@ std::string fault_of(const BatonImageLayout& layout) {
   if (layout.width < 1 || layout.height < 1 || layout.width > max || layout.height > max)
     return fmt::format("expected an image of 1 to {} pixels a side, got {} x {}", max, layout.width,
                        layout.height);
-  if (layout.channels < 1 || layout.channels > 4)
-    return fmt::format("expected an image of 1 to 4 channels, got {}", layout.channels);
   return {};
 }
 
@@ -63,7 +61,11 @@ struct Taker {
                    .height = layout->height,
                    .channels = layout->channels,
                    .samples = {},
-                   .is_integer = layout->is_integer != 0};
+                   .is_integer = layout->is_integer != 0,
+                   .has_alpha = layout->has_alpha != 0,
+                   .is_associated = layout->is_associated != 0};
+    if (layout->has_chromaticities != 0)
+      taker.image.chromaticities = std::to_array(layout->chromaticities);
     taker.image.samples.resize(static_cast<std::size_t>(layout->width) *
                                static_cast<std::size_t>(layout->height) *
                                static_cast<std::size_t>(layout->channels));

@@ -26,19 +26,29 @@ float decode_srgb(float v) {
   return v <= 0.04045f ? v / 12.92f : std::pow((v + 0.055f) / 1.055f, 2.4f);
 }
 
+/// A channel that an image lacks: 0.
+constexpr std::int32_t kNone = -1;
+
+bool is_color(TextureUse use) {
+  return use == TextureUse::color || use == TextureUse::color_and_alpha || use == TextureUse::light;
+}
+
 /// The channels of an image that a use keeps.
-std::vector<std::int32_t> kept_channels(TextureUse use, std::int32_t channels) {
-  const bool is_grey = channels < 3;
+std::vector<std::int32_t> kept_channels(TextureUse use, const Image& image) {
+  const bool is_grey = image.num_colors() == 1;
+  const std::int32_t blue = image.num_colors() > 2 ? 2 : kNone;
   switch (use) {
     case TextureUse::color:
+    case TextureUse::light:
     case TextureUse::normal:
-      return is_grey ? std::vector<std::int32_t>{0, 0, 0} : std::vector<std::int32_t>{0, 1, 2};
-    case TextureUse::color_and_alpha:
-      if (channels == 2) return {0, 0, 0, 1};
-      if (channels == 4) return {0, 1, 2, 3};
-      return kept_channels(TextureUse::color, channels);
+      return is_grey ? std::vector{0, 0, 0} : std::vector{0, 1, blue};
+    case TextureUse::color_and_alpha: {
+      std::vector<std::int32_t> kept = kept_channels(TextureUse::color, image);
+      if (image.has_alpha) kept.push_back(image.channels - 1);
+      return kept;
+    }
     case TextureUse::metallic_roughness:
-      return is_grey ? std::vector<std::int32_t>{0, 0} : std::vector<std::int32_t>{1, 2};
+      return is_grey ? std::vector{0, 0} : std::vector{1, blue};
     case TextureUse::red:
       return {0};
     case TextureUse::green:
@@ -47,11 +57,10 @@ std::vector<std::int32_t> kept_channels(TextureUse use, std::int32_t channels) {
   return {};
 }
 
-/// Values of the kept channels, colours as linear light, none below 0.
-std::vector<float> linear_values(const Image& image, TextureUse use,
-                                 const std::vector<std::int32_t>& kept) {
-  const bool is_srgb =
-      image.is_integer && (use == TextureUse::color || use == TextureUse::color_and_alpha);
+/// Values of the kept channels, colours as linear light.
+std::vector<float> linear_values(const Image& image, TextureUse use) {
+  const std::vector<std::int32_t> kept = kept_channels(use, image);
+  const bool is_srgb = image.is_integer && is_color(use);
   const auto channels = static_cast<std::size_t>(image.channels);
   std::vector<float> light(is_srgb ? kTableSize : 0);
   for (std::size_t i = 0; i < light.size(); ++i)
@@ -60,20 +69,26 @@ std::vector<float> linear_values(const Image& image, TextureUse use,
   values.reserve(image.samples.size() / channels * kept.size());
   for (std::size_t pixel = 0; pixel < image.samples.size(); pixel += channels) {
     for (std::size_t k = 0; k < kept.size(); ++k) {
-      const float v = image.samples[pixel + static_cast<std::size_t>(kept[k])];
-      const float positive = v > 0 ? std::min(v, kBrightest) : 0;  // NaN is 0
-      const auto step =
-          static_cast<std::size_t>(positive * static_cast<float>(kTableSize - 1) + 0.5f);
-      values.push_back(is_srgb && k < 3 ? light[std::min(step, kTableSize - 1)] : positive);
+      const float v =
+          kept[k] == kNone ? 0.0f : image.samples[pixel + static_cast<std::size_t>(kept[k])];
+      const auto step = [&] {  // in [0, 1]
+        return static_cast<std::size_t>(v * static_cast<float>(kTableSize - 1) + 0.5f);
+      };
+      values.push_back(is_srgb && k < 3 ? light[std::min(step(), kTableSize - 1)] : v);
     }
   }
   return values;
 }
 
+/// What a texture can hold: none below 0, and no NaN.
+void limit(std::vector<float>& values) {
+  for (float& v : values) v = v > 0 ? std::min(v, kBrightest) : 0;
+}
+
 }  // namespace
 
 std::vector<float> linear_colors(const Image& image) {
-  return linear_values(image, TextureUse::color, kept_channels(TextureUse::color, image.channels));
+  return linear_values(image, TextureUse::light);
 }
 
 namespace {
@@ -109,24 +124,25 @@ float length2(const std::array<float, 2>& v) { return std::sqrt(v[0] * v[0] + v[
 
 Result<std::shared_ptr<const Texture>> Texture::build(const Image& image, TextureUse use,
                                                       const std::string& name) {
-  if (use == TextureUse::normal && image.channels < 3)
-    return Error{
-        ErrorKind::bad_input,
-        fmt::format("{}: expected 3 or 4 channels of a normal map, got {}", name, image.channels)};
-  const std::vector<std::int32_t> kept = kept_channels(use, image.channels);
+  if (use == TextureUse::normal && image.num_colors() < 3)
+    return Error{ErrorKind::bad_input,
+                 fmt::format("{}: expected red, green and blue of a normal map, got {} channels",
+                             name, image.channels)};
+  const std::size_t num_kept = kept_channels(use, image).size();
   auto texture = std::make_shared<Texture>();
-  texture->channels_ = static_cast<std::int32_t>(kept.size());
-  std::vector<float> values = linear_values(image, use, kept);
+  texture->channels_ = static_cast<std::int32_t>(num_kept);
+  std::vector<float> values = linear_values(image, use);
+  limit(values);
   const float brightest = *std::max_element(values.begin(), values.end());
   texture->scale_ = std::max(brightest, 1.0f) / kFullScale;
 
   std::int32_t width = image.width, height = image.height;
   texture->append_level(values, width, height);
   while (width > 1 || height > 1) {
-    values = halve(values, static_cast<std::size_t>(width), kept.size());
+    values = halve(values, static_cast<std::size_t>(width), num_kept);
     width = std::max(width / 2, 1);
-    values = halve(values, static_cast<std::size_t>(height),
-                   static_cast<std::size_t>(width) * kept.size());
+    values =
+        halve(values, static_cast<std::size_t>(height), static_cast<std::size_t>(width) * num_kept);
     height = std::max(height / 2, 1);
     texture->append_level(values, width, height);
   }

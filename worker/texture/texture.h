@@ -16,13 +16,14 @@ namespace baton {
 enum class TextureUse : std::uint8_t {
   color,               ///< RGB; sRGB in files of integers
   color_and_alpha,     ///< the same with A
+  light,               ///< RGB as of color, but as the file has it where that is multiplied by A
   metallic_roughness,  ///< G and B, numbers
   normal,              ///< RGB, numbers
   red,                 ///< R, numbers
   green,               ///< G, numbers
 };
 
-/// R, G and B of each pixel as linear light, none below 0; grey stands for all three.
+/// R, G and B of each pixel as linear light; grey stands for all three. Floats are as in the file.
 std::vector<float> linear_colors(const Image& image);
 
 /// The parallelogram that a look-up is the mean over: two edges, in units of the whole image. All

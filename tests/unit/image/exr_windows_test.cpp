@@ -1,3 +1,4 @@
+#include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <filesystem>
@@ -34,12 +35,37 @@ TEST(ExrWindows, DataAndDisplayAreReadApart) {
   EXPECT_EQ(picture.rgb[0], wide_picture().find("R")[3 * 37 + 5]);
 }
 
-TEST(ExrWindows, DataThatDoesNotFillTheDisplayIsWhatThereIs) {
-  const auto path = written({.half_float = false, .display_window = PixelRect{0, 0, 100, 5}});
-  EXPECT_EQ(read_exr(path, ExrWindow::display).value().rect, (PixelRect{0, 0, 32, 5}));
-  const auto beside =
-      written({.half_float = false, .display_window = PixelRect{100, 100, 120, 130}});
-  EXPECT_EQ(read_exr(beside, ExrWindow::display).value(), wide_picture()) << "none in common: all";
+TEST(ExrWindows, ThePictureIsTheDisplayWindowAndBlackWhereNoDataIs) {
+  const FilmTile data = wide_picture();
+  // Cut on top and on the left, larger on the right; inside; all around; beside.
+  for (const PixelRect& shown : {PixelRect{0, 0, 100, 5}, PixelRect{3, 4, 5, 6},
+                                 PixelRect{-9, -8, 50, 40}, PixelRect{100, 100, 120, 130}}) {
+    const auto path = written({.half_float = false, .display_window = shown});
+    const FilmTile read = read_exr(path, ExrWindow::display).value();
+    ASSERT_EQ(read.rect, shown);
+    const RgbImage picture = read_rgb_image(path).value();
+    ASSERT_EQ(picture.width, shown.width());
+    ASSERT_EQ(picture.height, shown.height());
+    for (std::size_t i = 0; i < read.num_pixels(); ++i) {
+      const auto [x, y] = shown.place(i);
+      const auto in_data =
+          static_cast<std::size_t>(y - data.rect.y0) * 37 + static_cast<std::size_t>(x + 5);
+      for (std::size_t c = 0; c < 4; ++c)
+        ASSERT_EQ(read.plane(c)[i], data.rect.contains(x, y) ? data.plane(c)[in_data] : 0);
+      ASSERT_EQ(picture.rgb[3 * i + 2], read.find("B")[i]);
+    }
+    EXPECT_EQ(read_exr(path).value(), data) << "frames are read back whole";
+  }
+}
+
+TEST(ExrWindows, ADisplayWindowThatIsTooLargeIsAnErrorBeforeItsMemoryIsReserved) {
+  for (const PixelRect& shown : {PixelRect{0, 0, 32769, 5}, PixelRect{0, 0, 32768, 16384}}) {
+    const auto path = written({.half_float = false, .display_window = shown});
+    const auto read = read_exr(path, ExrWindow::display);
+    ASSERT_FALSE(read.ok());
+    EXPECT_THAT(read.error().message, testing::HasSubstr("baton_windows.exr: a display window of"));
+    EXPECT_TRUE(read_exr(path).ok());
+  }
 }
 
 TEST(ExrWindows, WithoutADisplayWindowAllIsShown) {

@@ -29,7 +29,7 @@ const std::vector<std::array<float, 8>> kPixels{{1, 2, 3, 1, 0, 0, 0, 0},
 
 TEST(Shadow, EachSiteOfAPixelShowsItsPartOfThePlate) {
   FilmTile film = film_of({0, 0, 4, 1}, kPixels);
-  lay_over_plate(film, {4, 1, {9, 9, 9, 4, 5, 6, 4, 4, 4, 8, 16, 24}}, {0, 0});
+  lay_over_plate(film, {4, 1, {9, 9, 9, 4, 5, 6, 4, 4, 4, 8, 16, 24}});
   EXPECT_EQ(rgba(film, 0), (std::array<float, 4>{1, 2, 3, 1}));
   EXPECT_EQ(rgba(film, 1), (std::array<float, 4>{4, 5, 6, 1}));
   EXPECT_EQ(rgba(film, 2), (std::array<float, 4>{2, 1, 0, 1}));
@@ -40,20 +40,20 @@ TEST(Shadow, EachSiteOfAPixelShowsItsPartOfThePlate) {
 TEST(Shadow, PixelsBesideThePlateStay) {
   // The second and the third column of the film lie on the plate's first and second.
   FilmTile film = film_of({-1, 0, 3, 1}, kPixels);
-  lay_over_plate(film, {2, 1, {4, 5, 6, 4, 4, 4}}, {0, 0});
+  lay_over_plate(film, {2, 1, {4, 5, 6, 4, 4, 4}});
   EXPECT_EQ(rgba(film, 0), (std::array<float, 4>{1, 2, 3, 1}));
   EXPECT_EQ(rgba(film, 1), (std::array<float, 4>{4, 5, 6, 1}));
   EXPECT_EQ(rgba(film, 2), (std::array<float, 4>{2, 1, 0, 1}));
   EXPECT_EQ(rgba(film, 3), (std::array<float, 4>{1, 1, 1, .5f}));
-  // A region whose corner is the plate's pixel (1, 1).
-  FilmTile part = film_of({0, 0, 1, 1}, {kPixels[1]});
-  lay_over_plate(part, {2, 2, {0, 0, 0, 0, 0, 0, 0, 0, 0, 7, 8, 9}}, {1, 1});
+  // A region of one pixel.
+  FilmTile part = film_of({1, 1, 2, 2}, {kPixels[1]});
+  lay_over_plate(part, {2, 2, {0, 0, 0, 0, 0, 0, 0, 0, 0, 7, 8, 9}});
   EXPECT_EQ(rgba(part, 0), (std::array<float, 4>{7, 8, 9, 1}));
 }
 
 TEST(Shadow, WithoutCatchersOnlyAlphaCounts) {
   FilmTile film{.rect = {0, 0, 1, 1}, .channels = {"R", "G", "B", "A"}, .values = {1, 1, 1, .25f}};
-  lay_over_plate(film, {1, 1, {4, 8, 0}}, {0, 0});
+  lay_over_plate(film, {1, 1, {4, 8, 0}});
   EXPECT_EQ(film.values, (std::vector<float>{4, 7, 1, 1}));
 }
 
@@ -66,7 +66,7 @@ TEST(Shadow, InAlphaIsBlackOverThePlate) {
   EXPECT_FLOAT_EQ(rgba(film, 2)[3], 1 - (0.2126f * .5f + 0.7152f * .25f));
   EXPECT_FLOAT_EQ(rgba(film, 3)[3], .5f + .125f);
   FilmTile laid = film_of({0, 0, 4, 1}, kPixels);
-  lay_over_plate(laid, {4, 1, {8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8}}, {0, 0});
+  lay_over_plate(laid, {4, 1, {8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8, 8}});
   EXPECT_FLOAT_EQ(rgba(laid, 3)[0], rgba(film, 3)[0] + (1 - rgba(film, 3)[3]) * 8);
 }
 

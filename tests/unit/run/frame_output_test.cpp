@@ -169,6 +169,36 @@ TEST(FrameOutput, ValuesBelowZeroAreSetToZeroAndCounted) {
   }
 }
 
+TEST(FrameOutput, APlateKeepsItsValuesBelowZeroAndIsNotCounted) {
+  JobSpec job = small_job("composite");
+  job.output.pixel_type = PixelType::full_float;
+  FilmTile image{.rect = {0, 0, 20, 10}, .channels = {"R", "G", "B", "A"}, .values = {}};
+  image.values.resize(4 * image.num_pixels());  // sees nothing but
+  for (const std::size_t i : {5u, 6u}) {        // two pixels
+    for (std::size_t c = 0; c < 3; ++c) image.plane(c)[i] = 0.5f;
+    image.find("A")[i] = 1;
+  }
+  image.find("R")[5] = -0.25f;
+  RgbImage plate{20, 10, std::vector<float>(600, 1.0f)};
+  for (std::size_t i = 0; i < 200; ++i) plate.rgb[3 * i] = -0.125f;
+  for (const bool clamp : {true, false}) {
+    job.output.clamp_negative = clamp;
+    const FrameQuality seen = write_frame(job, {3, 4}, 0, image, plate).value().quality;
+    EXPECT_EQ(seen.pixels_below_zero, 1u);
+    EXPECT_EQ(seen.lowest, -0.25f);
+    EXPECT_EQ(seen.pixels_not_finite, 0u);
+    // The plate shows in 198 pixels.
+    const float light = 198 * (2 - 0.125f) + 5 * 0.5f + (clamp ? 0.0f : -0.25f);
+    EXPECT_NEAR(seen.mean, light / 600, 1e-6f);
+    EXPECT_NEAR(seen.light_below_zero, 0.25f / light, 1e-7f);
+    const FilmTile stored = read_exr(frame_path(job, 0)).value();
+    EXPECT_EQ(stored.find("R")[5], clamp ? 0.0f : -0.25f);
+    EXPECT_EQ(stored.find("R")[6], 0.5f);
+    EXPECT_EQ(stored.find("R")[7], -0.125f);
+    EXPECT_EQ(stored.find("G")[7], 1.0f);
+  }
+}
+
 TEST(FrameOutput, ColoursPastAHalfFloatAreWrittenAsFloat) {
   const JobSpec job = small_job("bright");
   FilmTile image = assembled(job);

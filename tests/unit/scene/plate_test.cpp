@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include <cmath>
 #include <filesystem>
 
 #include "tests/support/image_files.h"
@@ -30,7 +31,7 @@ TEST_F(PlateFile, IntegersAreSrgbAndFloatsAreLinear) {
       test::write_targa("plate.0007.tga", 2, 1, 4, {0, 188, 0, 9, 255, 188, 0, 9});
   const fs::path folder = fs::path(first).parent_path();
   job_.output.plate = FileSequence{.files = (folder / "plate.####.tga").string(), .offset = 5};
-  const RgbImage seen = load_plate(job_, 2).value();
+  const RgbImage seen = load_plate(job_, 2).value().picture;
   EXPECT_THAT(seen.rgb, ElementsAre(0, testing::FloatNear(0.5029f, 1e-4f), 0, 1,
                                     testing::FloatNear(0.5029f, 1e-4f), 0));
 
@@ -38,7 +39,40 @@ TEST_F(PlateFile, IntegersAreSrgbAndFloatsAreLinear) {
       .rect = {0, 0, 4, 2}, .channels = {"R", "G", "B"}, .values = std::vector<float>(24, 0.25f)};
   ASSERT_TRUE(write_exr(folder / "plate.exr", film, {}));
   job_.output.plate = FileSequence{.files = (folder / "plate.exr").string()};
-  EXPECT_THAT(load_plate(job_, 2).value().rgb, testing::Each(0.25f));
+  EXPECT_THAT(load_plate(job_, 2).value().picture.rgb, testing::Each(0.25f));
+}
+
+TEST_F(PlateFile, WhatIsNoNumberBecomesZeroAndIsCountedWhatIsNegativeStays) {
+  const float inf = INFINITY, nan = NAN;
+  // Twice as large as the picture: planes of two rows. What is repaired counts in the means.
+  const FilmTile film{.rect = {0, 0, 4, 2},
+                      .channels = {"R", "G", "B"},
+                      .values = {inf, 4,  0,  0, 4,  4,    0,  0,  //
+                                 nan, 4,  0,  0, 4,  -inf, 0,  0,  //
+                                 -8,  -8, -8, 4, -8, -8,   -8, nan}};
+  const fs::path exr = fs::path(testing::TempDir()) / "odd.exr";
+  ASSERT_TRUE(write_exr(exr, film, {.half_float = false}));
+  job_.output.plate = FileSequence{.files = exr.string()};
+  const Plate plate = load_plate(job_, 1).value();
+  EXPECT_EQ(plate.repaired, 3u) << "a pixel counts once";
+  EXPECT_THAT(plate.picture.rgb, ElementsAre(3, 2, -8, 0, 0, -3));
+  EXPECT_EQ(repair_note("odd.exr", plate.repaired),
+            "odd.exr: 3 pixels are NaN or infinite and count as 0");
+
+  const std::string tiff = test::write_tiff("odd.tif", 2, 1, test::TiffExtra::associated,
+                                            {-0.5f, 70000, nan, 0.5f, 0.25f, 0.5f, 0.75f, 1});
+  job_.output.plate = FileSequence{.files = tiff};
+  const Plate floats = load_plate(job_, 1).value();
+  EXPECT_EQ(floats.repaired, 1u);
+  EXPECT_THAT(floats.picture.rgb, ElementsAre(-0.5f, 70000, 0, 0.25f, 0.5f, 0.75f));
+}
+
+TEST_F(PlateFile, IsTheDisplayWindowOfAnExrFile) {
+  const FilmTile film{.rect = {1, 0, 2, 1}, .channels = {"R", "G", "B"}, .values = {5, 6, 7}};
+  const fs::path exr = fs::path(testing::TempDir()) / "cropped.exr";
+  ASSERT_TRUE(write_exr(exr, film, {.display_window = PixelRect{0, 0, 2, 1}}));
+  job_.output.plate = FileSequence{.files = exr.string()};
+  EXPECT_THAT(load_plate(job_, 1).value().picture.rgb, ElementsAre(0, 0, 0, 5, 6, 7));
 }
 
 TEST_F(PlateFile, FaultsNameTheFileAndTheSize) {

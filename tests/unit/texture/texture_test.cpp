@@ -7,6 +7,7 @@
 #include <array>
 #include <cmath>
 #include <random>
+#include <span>
 
 #include "tests/support/image_files.h"
 #include "tests/support/instruction_sets.h"
@@ -18,9 +19,9 @@ using test::write_targa;
 using test::write_test_file;
 using testing::HasSubstr;
 
-/// An image of integers.
+/// An image of integers; the second or the fourth channel is alpha.
 Image image_of(int width, int height, int channels, std::vector<float> samples) {
-  return {width, height, channels, std::move(samples), true};
+  return {width, height, channels, std::move(samples), true, channels % 2 == 0};
 }
 
 std::shared_ptr<const Texture> texture_of(const Image& image, TextureUse use) {
@@ -93,7 +94,20 @@ TEST(Texture, ChannelsGoWhereTheirUseSays) {
   EXPECT_NEAR(texture_of(grey, TextureUse::color_and_alpha)->texel(0, 0, 0)[3], 0.25f, 1e-5f);
   const auto flat = Texture::build(grey, TextureUse::normal, "grey.png");
   ASSERT_FALSE(flat.ok());
-  EXPECT_EQ(flat.error().message, "grey.png: expected 3 or 4 channels of a normal map, got 2");
+  EXPECT_EQ(flat.error().message,
+            "grey.png: expected red, green and blue of a normal map, got 2 channels");
+}
+
+TEST(Texture, AChannelIsAlphaWhereTheImageSaysSoAlone) {
+  Image two = image_of(1, 1, 2, {0.5f, 0.25f});
+  two.is_integer = two.has_alpha = false;  // red and green
+  const auto color = texture_of(two, TextureUse::color_and_alpha);
+  EXPECT_FALSE(color->has_alpha());
+  EXPECT_THAT(color->texel(0, 0, 0),
+              testing::Pointwise(testing::FloatNear(1e-5f), std::array{0.5f, 0.25f, 0.0f, 0.0f}));
+  EXPECT_NEAR(texture_of(two, TextureUse::green)->texel(0, 0, 0)[0], 0.25f, 1e-5f);
+  EXPECT_NEAR(texture_of(two, TextureUse::metallic_roughness)->texel(0, 0, 0)[0], 0.25f, 1e-5f);
+  EXPECT_FALSE(Texture::build(two, TextureUse::normal, "rg.exr").ok());
 }
 
 TEST(Texture, GoesOnPastItsEdges) {
@@ -215,10 +229,49 @@ TEST(ImageReader, ReadsFilesAndBytes) {
   ASSERT_TRUE(image.ok()) << image.error().message;
   EXPECT_EQ(image->width, 2);
   EXPECT_EQ(image->channels, 4);
-  EXPECT_TRUE(image->is_integer);
+  EXPECT_TRUE(image->is_integer && image->has_alpha && !image->is_associated);
   // Colours are not multiplied by alpha.
   for (std::size_t i = 0; i < values.size(); ++i)
     EXPECT_NEAR(image->samples[i], values[i] / 255.0f, 1e-6f) << i;
+}
+
+TEST(ImageReader, GreyMayHaveAlpha) {
+  const Image image = read_image(write_targa("grey.tga", 2, 1, 2, {255, 51, 0, 255})).value();
+  EXPECT_TRUE(image.has_alpha && !image.is_associated);
+  EXPECT_EQ(image.num_colors(), 1);
+  EXPECT_THAT(image.samples,
+              testing::Pointwise(testing::FloatNear(1e-6f), std::array{1.0f, 0.2f, 0.0f, 1.0f}));
+}
+
+TEST(ImageReader, AlphaIsWhatATiffFileCallsSo) {
+  const std::vector<float> values{0.1f, 0.2f, 0.3f, 0.5f};
+  const auto read = [&](test::TiffExtra extra) {
+    return read_image(test::write_tiff("extra.tif", 1, 1, extra, values)).value();
+  };
+  for (const auto extra : {test::TiffExtra::associated, test::TiffExtra::unassociated}) {
+    const Image image = read(extra);
+    EXPECT_TRUE(image.has_alpha);
+    EXPECT_EQ(image.is_associated, extra == test::TiffExtra::associated);
+    EXPECT_EQ(image.samples, values);
+  }
+  const Image plain = read(test::TiffExtra::unspecified);
+  EXPECT_FALSE(plain.has_alpha);
+  EXPECT_EQ(plain.samples, (std::vector<float>{0.1f, 0.2f, 0.3f}));
+}
+
+// (200, 100, 50) of alpha 128 beside green of alpha 255.
+constexpr unsigned char kWebp[] = {0x52, 0x49, 0x46, 0x46, 0x20, 0,    0,    0,    0x57, 0x45,
+                                   0x42, 0x50, 0x56, 0x50, 0x38, 0x4c, 0x14, 0,    0,    0,
+                                   0x2f, 0x01, 0,    0,    0x10, 0x0f, 0xf0, 0xb2, 0xff, 0x41,
+                                   0x1e, 0x99, 0x07, 0xfe, 0x47, 0x1a, 0x32, 0xa2, 0xff, 0x01};
+
+TEST(ImageReader, ColoursOfWebpFilesAreNotMultipliedByAlpha) {
+  const auto image = read_image(std::as_bytes(std::span(kWebp)), "set.glb, image 1");
+  ASSERT_TRUE(image.ok()) << image.error().message;
+  EXPECT_TRUE(image->has_alpha && image->is_integer && !image->is_associated);
+  const float expected[] = {200, 100, 50, 128, 0, 255, 0, 255};
+  for (std::size_t i = 0; i < 8; ++i)
+    EXPECT_NEAR(image->samples[i], expected[i] / 255, 1 / 255.0f) << i;
 }
 
 TEST(ImageReader, SaysWhatIsWrong) {

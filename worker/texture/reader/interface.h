@@ -8,14 +8,19 @@
 extern "C" {
 
 struct BatonImageLayout {
-  std::int32_t width, height, channels;
+  std::int32_t width, height;
+  std::int32_t channels;  ///< colours, in the order of red, green, blue, or grey; then alpha
+  std::int32_t has_alpha;
+  std::int32_t is_associated;  ///< colours are multiplied by alpha
   std::int32_t is_integer;
+  std::int32_t has_chromaticities;
+  float chromaticities[8];  ///< CIE xy of red, green, blue, white, where the file says them
 };
 
 /// Where an image goes.
 struct BatonImageSink {
   void* self;
-  /// Room for height * width * channels floats; null: it does not want such an image.
+  /// Room for height * width * channels floats, which are 0; null: it does not want such an image.
   float* (*accept)(void* self, const BatonImageLayout* layout);
   void (*fail)(void* self, const char* message);
 };

@@ -1,0 +1,42 @@
+#include "worker/scene/image_colors.h"
+
+#include <optional>
+
+#include "common/image/color_space.h"
+
+namespace baton {
+namespace {
+
+void divide_by_alpha(Image& image) {
+  const auto channels = static_cast<std::size_t>(image.channels);
+  for (std::size_t i = 0; i < image.samples.size(); i += channels) {
+    const float alpha = image.samples[i + channels - 1];
+    for (std::size_t c = 0; alpha > 0 && c + 1 < channels; ++c) image.samples[i + c] /= alpha;
+  }
+}
+
+}  // namespace
+
+Status settle_colors(Image& image, TextureUse use, const std::string& name) {
+  const bool is_base = use == TextureUse::color || use == TextureUse::color_and_alpha;
+  if (!is_base && use != TextureUse::light) return {};
+  if (is_base && image.has_alpha && image.is_associated) divide_by_alpha(image);
+  if (!image.chromaticities || image.num_colors() < 3) return {};
+
+  const auto& xy = *image.chromaticities;
+  const Result<std::optional<Mat3>> matrix =
+      to_rec709({{xy[0], xy[1]}, {xy[2], xy[3]}, {xy[4], xy[5]}, {xy[6], xy[7]}});
+  if (!matrix) return Error{ErrorKind::bad_input, name + ": " + matrix.error().message};
+  if (!*matrix) return {};
+  const auto channels = static_cast<std::size_t>(image.channels);
+  for (std::size_t i = 0; i < image.samples.size(); i += channels) {
+    float* const pixel = &image.samples[i];
+    const Rgb color = **matrix * Rgb{pixel[0], pixel[1], pixel[2]};
+    pixel[0] = color.x;
+    pixel[1] = color.y;
+    pixel[2] = color.z;
+  }
+  return {};
+}
+
+}  // namespace baton
