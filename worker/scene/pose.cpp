@@ -61,9 +61,9 @@ Pose pose_at(const Scene& scene, const JobSpec& job, double frame) {
     instance.to_world.linear = motion.linear * rest.linear;
     instance.to_world.offset =
         motion.linear * (rest.offset - object.translate) + object.translate + motion.offset;
-    // Scales are positive and rotations rigid: no motion is singular, unless it leaves the range of
-    // floats.
-    instance.normal_to_world = inverse_transposed(instance.to_world.linear).value_or(Mat3{});
+    const std::optional<Mat3> normals = inverse_transposed(instance.to_world.linear);
+    instance.normal_to_world = normals.value_or(Mat3{});
+    instance.is_absent = !normals;
   }
   return pose;
 }
