@@ -123,6 +123,8 @@ TEST(GeometryPlanes, MotionOfASheetThatStretches) {
 TEST(GeometryPlanes, ObjectsOfOneNameAreOneInMattes) {
   JobSpec job = geometry_job(1);
   job.output.background = Background::transparent;
+  job.scene.objects.push_back(job.scene.objects[0]);
+  job.scene.objects.back().translate.x += 0.4f;
   for (ObjectSpec& object : job.scene.objects) object.name = "all";
   job.scene.ground.reset();
   const FilmTile film = render_tile(job).films.back();

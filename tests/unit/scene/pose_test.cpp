@@ -88,6 +88,12 @@ TEST(Pose, WhatHasNoVolumeIsNotThere) {
   EXPECT_FALSE(pose_at(*scene, job, 1).instances[0].is_absent);
   EXPECT_FALSE(pose_at(*scene, job, 2).instances[0].is_absent);
   EXPECT_TRUE(pose_at(*scene, job, 3).instances[0].is_absent);
+  // So thin that float32 does not hold the way back.
+  job.scene.objects[0].keys[1].scale = {1, 1e-14f, 1};
+  EXPECT_TRUE(pose_at(*scene, job, 3).instances[0].is_absent);
+  job.scene.objects[0].keys[1].scale = {1, 1e-9f, 1};
+  EXPECT_FALSE(pose_at(*scene, job, 3).instances[0].is_absent);
+  job.scene.objects[0].keys[1].scale = {1, 0, 1};
   // Nothing that is there moves.
   job.frames = {1, 3};
   EXPECT_EQ(settle_motion(job)->motion.max_px, 1);
