@@ -93,7 +93,7 @@ std::vector<std::string> object_names(const JobSpec& job) {
   if (job.scene.ground) objects.push_back({.mesh = "ground", .material = {}});
   std::set<std::string> named, meshes;
   for (const ObjectSpec& object : objects)
-    object.name.empty() ? meshes.insert(object.mesh) : named.insert(object.name);
+    (object.name.empty() ? meshes : named).insert(object.name.empty() ? object.mesh : object.name);
 
   std::vector<std::string> names;
   std::map<std::string, int> counts;

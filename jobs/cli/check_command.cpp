@@ -6,6 +6,7 @@
 #include "common/job/frame_range.h"
 #include "common/job/job_json.h"
 #include "common/job/motion.h"
+#include "common/job/sequence.h"
 #include "common/job/store_estimate.h"
 #include "jobs/auto/unit_costs.h"
 #include "jobs/cli/asset_report.h"

@@ -21,7 +21,8 @@ GeometryPlanes::GeometryPlanes(const RenderContext& context, const FrameSpec& fr
     object_names_ = object_names(context.job);
     std::map<std::string_view, std::uint32_t> first;
     for (const std::string& name : object_names_)
-      first_parts_.push_back(first.emplace(name, first_parts_.size() + 1).first->second);
+      first_parts_.push_back(
+          first.emplace(name, static_cast<std::uint32_t>(first_parts_.size() + 1)).first->second);
   }
   if (has(Aov::crypto_material)) materials_.resize(num_pixels);
   if (has(Aov::motion)) {
