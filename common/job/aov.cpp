@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <map>
+#include <set>
 
 #include "common/job/sequence.h"
 
@@ -88,14 +89,29 @@ std::string_view why_empty(Aov aov, const JobSpec& job) {
 }
 
 std::vector<std::string> object_names(const JobSpec& job) {
+  std::vector<ObjectSpec> objects = job.scene.objects;
+  if (job.scene.ground) objects.push_back({.mesh = "ground", .material = {}});
+  std::set<std::string> named, meshes;
+  for (const ObjectSpec& object : objects)
+    (object.name.empty() ? meshes : named).insert(object.name.empty() ? object.mesh : object.name);
+
   std::vector<std::string> names;
   std::map<std::string, int> counts;
-  for (const ObjectSpec& object : job.scene.objects) {
-    const int count = ++counts[object.mesh];
-    names.push_back(count == 1 ? object.mesh : fmt::format("{}.{}", object.mesh, count));
+  for (const ObjectSpec& object : objects) {
+    std::string name = object.name;
+    while (name.empty()) {
+      const int count = ++counts[object.mesh];
+      name = count == 1 ? object.mesh : fmt::format("{}.{}", object.mesh, count);
+      if (named.contains(name) || (count > 1 && meshes.contains(name))) name.clear();
+    }
+    names.push_back(name);
   }
-  if (job.scene.ground) names.emplace_back("ground");
   return names;
+}
+
+bool mattes_alike(const JobSpec& a, const JobSpec& b) {
+  return !has_aov(a, Aov::crypto_object) || !has_aov(b, Aov::crypto_object) ||
+         object_names(a) == object_names(b);
 }
 
 std::vector<std::string> material_names(const JobSpec& job) {

@@ -30,8 +30,12 @@ bool has_aov(const JobSpec& job, Aov aov);
 /// Why an AOV shows nothing of this job: it is the same everywhere. Empty: it shows something.
 std::string_view why_empty(Aov aov, const JobSpec& job);
 
-/// The job's objects for people: by their meshes, "bunny", "bunny.2" ...; the ground last.
+/// The job's objects for people, the ground last: as they are named, or else by their meshes,
+/// "bunny", "bunny.2" ..., with the next number that no name and no mesh has. Equal ones are those
+/// of objects that are named alike.
 std::vector<std::string> object_names(const JobSpec& job);
+/// Whether the mattes of objects, where both have them, show the same of the same objects.
+bool mattes_alike(const JobSpec& a, const JobSpec& b);
 /// Its materials in the order of their numbers.
 std::vector<std::string> material_names(const JobSpec& job);
 

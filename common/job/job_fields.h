@@ -20,6 +20,8 @@ inline constexpr NumberRange kCoordinateRange{-1e9, 1e9};
 /// Radiance.
 inline constexpr NumberRange kLightRange{0, 1e9};
 inline constexpr NumberRange kFrameRange{0, limits::kMaxFrameNumber};
+/// Factors that may be zero.
+inline constexpr NumberRange kFactorRange{0, 1e9};
 /// Lengths and factors above zero.
 inline constexpr NumberRange kPositiveRange{.min = 0, .max = 1e9, .min_open = true};
 /// Angles in degrees.

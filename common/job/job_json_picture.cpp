@@ -37,6 +37,8 @@ constexpr std::array<std::string_view, 2> kOfThePicture{"/state/carry", "/state/
 constexpr const char* kFirstFrame = "$.frames (samples are carried from the first one on)";
 
 bool is_setting(std::string_view path) {
+  // What objects are called is in mattes alone.
+  if (path.starts_with("/scene/objects/") && path.ends_with("/name")) return true;
   if (std::ranges::find(kOfThePicture, path) != kOfThePicture.end()) return false;
   return std::any_of(kSettings.begin(), kSettings.end(),
                      [&](std::string_view start) { return path.starts_with(start); });

@@ -120,6 +120,8 @@ struct CameraSpec {
   std::optional<GltfMotion> gltf{};
   /// The camera of scene.gltf that is taken, by the name of its node; kFirstCamera: the first one.
   std::string node{};
+  /// What the job says instead of the file, of a camera that `gltf` or `node` names; one at most.
+  std::optional<float> own_vertical_fov_deg{}, own_orthographic_height{};
 
   bool operator==(const CameraSpec&) const = default;
 };
@@ -159,8 +161,8 @@ struct EnvironmentSpec {
   std::vector<EnvironmentKey> keys;  ///< sorted by frame, at least one
   bool interpolate = true;
   MapFilter filter = MapFilter::bilinear;
-  float scale = 1;                      ///< radiance factor, (0, inf)
-  std::vector<NumberKey> scale_keys{};  ///< further factors, > 0; ascending frames
+  float scale = 1;                      ///< radiance factor, [0, inf)
+  std::vector<NumberKey> scale_keys{};  ///< further factors, >= 0; ascending frames
   int max_width =
       0;  ///< wider maps are reduced to so many columns, [0, limits::kMaxEnvironmentSide]; 0: none
   Vec3 rotation_axis{0, 1, 0};

@@ -50,6 +50,16 @@ Transform matrix_at(const ObjectKey& from, const ObjectKey& to, double share) {
   return to_transform(m);
 }
 
+/// Curves may swing below 0, but not where a key says that the object is not there.
+Vec3 scale_at(const std::vector<ObjectKey>& keys, const KeySpan& span, KeyCurve curve) {
+  const Vec3 s = join(keys, span, curve, [](const ObjectKey& key) { return key.scale; });
+  const Vec3 &a = keys[span.from].scale, &b = keys[span.to].scale;
+  const auto held = [](float from, float to, float between) {
+    return from == 0 || to == 0 ? std::max(0.0f, between) : between;
+  };
+  return {held(a.x, b.x, s.x), held(a.y, b.y, s.y), held(a.z, b.z, s.z)};
+}
+
 Mat3 scaling(const Vec3& s) { return {{s.x, 0, 0, 0, s.y, 0, 0, 0, s.z}}; }
 
 }  // namespace
@@ -121,7 +131,7 @@ Transform object_motion_at(const ObjectSpec& object, KeyCurve curve, double fram
                       rotation_about({1, 0, 0}, degrees.x);
   const Quaternion spin = slerp(to_quaternion(object.keys[span.from].quaternion),
                                 to_quaternion(object.keys[span.to].quaternion), span.share);
-  return {to_matrix(spin) * turned * scaling(at([](const ObjectKey& key) { return key.scale; })),
+  return {to_matrix(spin) * turned * scaling(scale_at(object.keys, span, curve)),
           at([](const ObjectKey& key) { return key.translate; })};
 }
 

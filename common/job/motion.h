@@ -38,7 +38,7 @@ CameraSpec camera_at(const JobSpec& job, double frame);
 /// What the keys do to the placed object at a frame number; the identity without keys. Translation,
 /// angles and scale follow `curve`, the quaternion is slerped [Shoemake 1985] the short way round.
 /// The map is about the origin of the placed object: world = object.translate + map(placed -
-/// object.translate).
+/// object.translate). It is singular where the object is not there: at a scale of 0.
 Transform object_motion_at(const ObjectSpec& object, KeyCurve curve, double frame);
 
 }  // namespace baton

@@ -1,7 +1,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <limits>
 #include <optional>
+#include <string>
 
 #include "common/base/limits.h"
 #include "common/job/job_fields.h"
@@ -46,7 +48,7 @@ void fields(JobArchive& a, ObjectKey& key) {
     if (key.quaternion == std::array<float, 4>{})
       a.fault("quaternion", "a rotation", "[0, 0, 0, 0]");
   }
-  a.vector("scale", key.scale, kPositiveRange, true);
+  a.vector("scale", key.scale, kFactorRange, true);
   matrix_field(a, "matrix", key.matrix);
 }
 
@@ -57,19 +59,21 @@ void fields(JobArchive& a, GltfMotion& gltf) {
   a.integer("startFrame", gltf.start_frame, 0, limits::kMaxFrameNumber);
 }
 
-/// The two sources of motion: keys and a file.
-template <class K>
-void source_fields(JobArchive& a, std::vector<K>& keys, std::optional<GltfMotion>& gltf) {
-  a.list("keys", keys, limits::kMaxFrames, [&](K& key) { fields(a, key); });
-  check_ascending(a, "keys", keys);
+void gltf_field(JobArchive& a, std::optional<GltfMotion>& gltf) {
   GltfMotion source = gltf.value_or(GltfMotion{});
   if (a.object("gltf", [&] { fields(a, source); }, {.present = gltf.has_value()})) gltf = source;
+}
+
+/// Keys, where no file says how things move.
+template <class K>
+void key_fields(JobArchive& a, std::vector<K>& keys, const std::optional<GltfMotion>& gltf) {
+  a.list("keys", keys, limits::kMaxFrames, [&](K& key) { fields(a, key); });
+  check_ascending(a, "keys", keys);
   if (gltf && !keys.empty()) a.fault("gltf", "either keys or gltf", "both");
 }
 
-}  // namespace
-
-void fields(JobArchive& a, CameraSpec& camera) {
+/// Where the camera is, and how much it sees.
+void view_fields(JobArchive& a, CameraSpec& camera) {
   a.vector("position", camera.position, kCoordinateRange);
   a.vector("lookAt", camera.look_at, kCoordinateRange);
   a.vector("up", camera.up, kCoordinateRange);
@@ -77,19 +81,49 @@ void fields(JobArchive& a, CameraSpec& camera) {
   check_view(a, camera.position, camera.look_at, camera.up);
   a.choice("projection", camera.projection, kProjections);
   a.number("orthographicHeight", camera.orthographic_height, kLengthRange);
+}
+
+/// The same of a camera of a file, which says where it is.
+void own_view_fields(JobArchive& a, CameraSpec& camera) {
+  constexpr float kNone = std::numeric_limits<float>::quiet_NaN();  // which is not written
+  for (const char* const key : {"position", "lookAt", "up"}) {
+    Vec3 given{kNone, kNone, kNone};
+    if (a.vector(alternative(key), given, kCoordinateRange))
+      a.fault(key, "none, as the glTF file says where its camera is", "a place or direction");
+  }
+  a.number(alternative("verticalFovDeg"), camera.own_vertical_fov_deg, kFovRange);
+  a.number(alternative("orthographicHeight"), camera.own_orthographic_height, kLengthRange);
+  if (camera.own_vertical_fov_deg && camera.own_orthographic_height)
+    a.fault("orthographicHeight", "either it or verticalFovDeg in place of what the file says",
+            "both");
+  std::string projection;
+  if (!a.word(alternative("projection"), projection, kProjections)) return;
+  if (projection == kProjections[0] && !camera.own_vertical_fov_deg)
+    a.fault("projection", "verticalFovDeg beside it, in place of what the file says", "none");
+  if (projection == kProjections[1] && !camera.own_orthographic_height)
+    a.fault("projection", "orthographicHeight beside it, in place of what the file says", "none");
+}
+
+}  // namespace
+
+void fields(JobArchive& a, CameraSpec& camera) {
+  gltf_field(a, camera.gltf);
+  a.text(alternative("node"), camera.node);
+  const bool is_of_file = camera.gltf || !camera.node.empty();
+  is_of_file ? own_view_fields(a, camera) : view_fields(a, camera);
   std::array<double, 2> shift{camera.shift[0], camera.shift[1]};
   if (a.numbers("shift", shift, {-kMaxShift, kMaxShift}, false))
     camera.shift = {static_cast<float>(shift[0]), static_cast<float>(shift[1])};
   a.number("aperture", camera.aperture, {0, kMaxLength});
   a.number("focusDistance", camera.focus_distance, {0, kMaxLength});
-  source_fields(a, camera.keys, camera.gltf);
-  a.text(alternative("node"), camera.node);
+  key_fields(a, camera.keys, camera.gltf);
   if (!camera.node.empty() && (camera.gltf || !camera.keys.empty()))
     a.fault("node", "either node, keys or gltf", "several");
 }
 
 void motion_fields(JobArchive& a, ObjectSpec& object) {
-  source_fields(a, object.keys, object.gltf);
+  gltf_field(a, object.gltf);
+  key_fields(a, object.keys, object.gltf);
   const auto has_matrix = [](const ObjectKey& key) { return key.matrix.has_value(); };
   const auto count = std::count_if(object.keys.begin(), object.keys.end(), has_matrix);
   if (count != 0 && count != std::ssize(object.keys))

@@ -71,6 +71,7 @@ void fields(JobArchive& a, MeshSpec& mesh) {
 void fields(JobArchive& a, ObjectSpec& object, const SceneSpec& scene) {
   reference(a, required("mesh"), object.mesh, scene.meshes, "mesh");
   material_reference(a, required("material"), object.material, scene);
+  a.text(alternative("name"), object.name);
   a.vector("translate", object.translate, kCoordinateRange);
   a.vector("rotateDeg", object.rotate_deg, kAngleRange);
   a.vector("scale", object.scale, kPositiveRange, true);
@@ -237,8 +238,8 @@ void fields(JobArchive& a, EnvironmentSpec& environment, const std::vector<int>&
 
   a.boolean("interpolate", environment.interpolate);
   a.choice("filter", environment.filter, kMapFilters);
-  a.number("scale", environment.scale, kPositiveRange);
-  number_keys(a, "scaleKeys", environment.scale_keys, "scale", kPositiveRange);
+  a.number("scale", environment.scale, kFactorRange);
+  number_keys(a, "scaleKeys", environment.scale_keys, "scale", kFactorRange);
   a.integer("maxWidth", environment.max_width, 0, limits::kMaxEnvironmentSide);
   a.object("rotation", [&] {
     a.vector("axis", environment.rotation_axis, kCoordinateRange);

@@ -137,7 +137,7 @@ struct MeshSpec {
 /// A rigid motion, with scale, of an object that is already placed: scaled, turned by `rotate_deg`
 /// (x, then y, then z; angles are joined as numbers, so 0 to 360 is a full turn), turned by
 /// `quaternion`, each about the place that the object's `translate` names, then moved by
-/// `translate`.
+/// `translate`. With a scale of 0 the object is not there.
 struct ObjectKey {
   double frame = 1;
   Vec3 translate{};
@@ -159,6 +159,7 @@ enum class UpAxis : std::uint8_t { x, y, z };
 struct ObjectSpec {
   std::string mesh;
   std::string material;
+  std::string name{};  ///< for people (object_names); those of one name are one object to them
   Vec3 translate{0, 0, 0};
   Vec3 rotate_deg{0, 0, 0};
   Vec3 scale{1, 1, 1};

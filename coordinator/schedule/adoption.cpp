@@ -6,6 +6,7 @@
 #include <set>
 
 #include "common/base/limits.h"
+#include "common/job/aov.h"
 #include "common/job/motion.h"
 #include "common/job/sequence.h"
 #include "coordinator/schedule/job_graph.h"
@@ -13,11 +14,11 @@
 namespace baton {
 namespace {
 
-bool films_alike(const OutputSpec& a, const OutputSpec& b) {
-  const auto shows_map = [](const OutputSpec& output) {
-    return output.background == Background::environment;
+bool films_alike(const JobSpec& a, const JobSpec& b) {
+  const auto shows_map = [](const JobSpec& job) {
+    return job.output.background == Background::environment;
   };
-  return a.aovs == b.aovs && shows_map(a) == shows_map(b);
+  return a.output.aovs == b.output.aovs && shows_map(a) == shows_map(b) && mattes_alike(a, b);
 }
 
 /// Looks for the frames of the wanted job that a former one has written.
@@ -29,7 +30,7 @@ class KeptFrames {
   }
 
   void look(const FormerJob& former, const FrameComparison& comparison) {
-    if (!writes_alike(former.document.job.output, wanted_.job.output)) return;
+    if (!writes_alike(former.document.job, wanted_.job)) return;
     for (const Completions::Task& task : former.tasks) {
       if (task.task.kind != TaskKind::assemble || task.outputs.size() != 1) continue;
       const auto old = static_cast<std::size_t>(task.task.step);
@@ -115,8 +116,8 @@ class Predecessor {
 
   /// How far its work reaches that the wanted job can use.
   Reach reach(std::int32_t first_open, const KeptFiles& files) {
-    const bool same = num_common_ > 0 && job_.image.tile_size == old_.image.tile_size &&
-                      films_alike(job_.output, old_.output);
+    const bool same =
+        num_common_ > 0 && job_.image.tile_size == old_.image.tile_size && films_alike(job_, old_);
     // States of another tiling come without the films of their sweep.
     const bool may_cut = job_.quality.sweeps == 1 && old_.quality.sweeps == 1;
     const std::int32_t states = carries_state(job_) && (same || may_cut)
@@ -261,8 +262,9 @@ std::vector<TaskKey> settled_tasks(const JobSpec& job, const KeptFrames& kept,
 
 }  // namespace
 
-bool writes_alike(const OutputSpec& a, const OutputSpec& b) {
-  return films_alike(a, b) && a.background == b.background && a.shadows == b.shadows &&
+bool writes_alike(const JobSpec& one, const JobSpec& other) {
+  const OutputSpec &a = one.output, &b = other.output;
+  return films_alike(one, other) && a.background == b.background && a.shadows == b.shadows &&
          a.pattern == b.pattern && a.pixel_type == b.pixel_type && a.compression == b.compression &&
          a.naming == b.naming && a.clamp_negative == b.clamp_negative;
 }

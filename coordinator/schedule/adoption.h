@@ -40,7 +40,7 @@ struct Adoption {
 
 /// Whether frames are written alike: in the same channels, format and names. What stands in headers
 /// alone may differ.
-bool writes_alike(const OutputSpec& a, const OutputSpec& b);
+bool writes_alike(const JobSpec& one, const JobSpec& other);
 
 /// What jobs of one picture leave to a new one.
 ///

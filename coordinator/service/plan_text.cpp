@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <set>
 
+#include "common/job/aov.h"
 #include "common/job/frame_range.h"
 #include "common/job/sequence.h"
 
@@ -96,6 +97,7 @@ std::vector<std::string> output_reasons(const JobSpec& former, const JobSpec& wa
     if (!equal) differing.emplace_back(key);
   };
   compare(a.aovs == b.aovs, "output.aovs");
+  compare(mattes_alike(former, wanted), "the name of an object");
   compare(a.background == b.background, "output.background");
   compare(!other_plates, "output.plate");
   compare(a.shadows == b.shadows, "output.shadows");

@@ -7,6 +7,7 @@
 #include "common/job/frame_range.h"
 #include "common/job/job_json.h"
 #include "common/job/motion.h"
+#include "common/job/sequence.h"
 #include "common/job/store_estimate.h"
 #include "jobs/auto/unit_costs.h"
 #include "jobs/cli/asset_report.h"
@@ -198,7 +199,8 @@ Status write_picture(const CheckOptions& options, const JobSpec& job, const Scen
 
 Result<ExitCode> run_check(const CheckOptions& options) {
   BATON_ASSIGN(const WantedJob wanted, load_wanted(options.job));
-  const Result<JobSpec> settled = settle_motion(wanted.job);
+  std::vector<std::string> left_out;
+  const Result<JobSpec> settled = settle_motion(wanted.job, &left_out);
   const JobSpec& job = settled ? *settled : wanted.job;
   BATON_ASSIGN(const AssetReport assets, load_assets(job));  // lists the faults of all files
   if (!settled) return settled.error();
@@ -208,7 +210,8 @@ Result<ExitCode> run_check(const CheckOptions& options) {
   }
 
   const JobEstimate estimate = estimate_job(job);
-  const std::vector<std::string> warnings = job_warnings(job, assets);
+  std::vector<std::string> warnings = job_warnings(job, assets);
+  warnings.insert(warnings.end(), left_out.begin(), left_out.end());
   const PilotPlan plan =
       job.sampling.method == Method::automatic
           ? plan_pilot(job, ray_cost_factor(assets.triangles, assets.objects_move))

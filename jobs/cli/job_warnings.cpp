@@ -16,7 +16,7 @@
 #include "jobs/cli/surface_share.h"
 #include "jobs/cli/text.h"
 #include "worker/scene/plate.h"
-#include "worker/scene/settle_scene.h"
+#include "worker/scene/scene_warnings.h"
 
 namespace baton {
 namespace {
@@ -192,7 +192,7 @@ std::vector<std::string> job_warnings(const JobSpec& job, const AssetReport& ass
     warnings.push_back(fmt::format("the light jumps {} more times", jumps.size() - kMostJumps));
   for (std::string& warning : limit_warnings(job, !jumps.empty()))
     warnings.push_back(std::move(warning));
-  for (std::string& warning : gltf_warnings(job.scene)) warnings.push_back(std::move(warning));
+  for (std::string& warning : scene_warnings(job.scene)) warnings.push_back(std::move(warning));
   aov_warnings(job, warnings);
   idle_output_warnings(job, warnings);
   output_warnings(job, *assets.scene, warnings);

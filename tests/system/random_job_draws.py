@@ -52,7 +52,7 @@ class Draw(Motion, Pictures, Textures):
         job["scene"] = self.scene()
         job["camera"] = self.camera()
         if "gltf" in job["scene"] and self.chance(0.4):
-            job["camera"] = {"node": self.pick("eye", "*")}
+            job["camera"] = {"node": self.pick("eye", "*"), **self.pick({}, {}, {"verticalFovDeg": 60}, {"orthographicHeight": 3})}
         for key, inner in keys.items():
             if key in job:
                 continue
@@ -137,12 +137,13 @@ class Draw(Motion, Pictures, Textures):
             "shapedBy.animation.fps": lambda: self.pick(4, 24), "shapedBy.places[].node": lambda: self.pick(9, 10, 11, 0),
             "shapedBy.places[].matrix": self.matrix,
             "scene.objects[].fitHeight": lambda: self.pick(None, None, None, 1.2),
+            "scene.objects[].name": lambda: self.pick(None, None, None, "a name", "ground"),
             "scene.objects[].catcher": lambda: self.pick(None, None, None, False, True),
             "scene.objects[].keys": lambda: self.object_keys() if self.chance(0.2) else None,
             "scene.objects[].gltf": lambda: self.gltf("hip") if self.chance(0.03) else None,
             "scene.ground.height": lambda: self.pick(None, -1.0, 0.3),
             "scene.ground.size": lambda: self.pick(None, 2.0, 50.0),
-            "environment.scale": lambda: self.pick(None, None, 0.1, 7.0, 1e-9, 1e9),
+            "environment.scale": lambda: self.pick(None, None, 0.1, 7.0, 1e-9, 1e9, 0),
             "environment.scaleKeys": lambda: self.number_keys("scale", 0.1, 4) if self.chance(0.2) else None,
             "environment.rotation.keys": lambda: self.number_keys("deg", -90, 90) if self.chance(0.2) else None,
             "environment.maxWidth": lambda: self.pick(None, None, 0, 1, 3, 8, 16),

@@ -26,7 +26,7 @@ class Motion:
                 del key["quaternion"]
             key.pop("scale", None)
             if self.chance(0.2):
-                key["scale"] = self.pick(1.1, [0.9, 1.0, 1.2])
+                key["scale"] = self.pick(1.1, [0.9, 1.0, 1.2], 0)
             keys.append(key)
         if self.chance(0.15):
             keys = [{"frame": key["frame"], "matrix": self.matrix()} for key in keys]
@@ -63,7 +63,9 @@ class Motion:
                 if self.chance(0.2):
                     camera["keys"][-1]["verticalFovDeg"] = self.pick(20, 60)
         elif self.chance(0.02):
-            camera["gltf"] = self.gltf("eye")
+            own = self.pick({}, {}, {"verticalFovDeg": 60}, {"orthographicHeight": 3})
+            lens = {key: camera[key] for key in ("shift", "aperture", "focusDistance") if key in camera}
+            return {"gltf": self.gltf("eye"), **lens, **own}
         for view in [camera, *camera.get("keys", [])]:
             mend_view(view, self.rng)
         return camera

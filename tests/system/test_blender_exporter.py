@@ -239,10 +239,6 @@ def numbered_folders(_programs, folder):
     check_equal(new_numbered(folder / "shot").name, "0018", "folder after others")
 
 
-# Jobs with a number that `baton check` may still refuse.
-WITH_ZEROS = {"strength_from_zero", "scale_from_zero"}
-
-
 def files_of_blender(programs, folder):
     """What each of many small files becomes (blender_cases.py). The report says what is lost, and no more; the job is one."""
     if not shutil.which("blender"):
@@ -260,7 +256,7 @@ def files_of_blender(programs, folder):
         lines = [line for line in told["report"].splitlines() if line.startswith(("- ", "Blender's"))]
         if len(lines) != len(told["expected"]) or any(all(text not in line for line in lines) for text in told["expected"]):
             wrong.append(f"{name}: the report is {told['report']!r}, expected {told['expected']}")
-        elif (folder / name / "job/job.json").exists() and name not in WITH_ZEROS:
+        elif (folder / name / "job/job.json").exists():
             checked = programs.run("baton", "check", folder / name / "job/job.json", expect=None)
             if checked.returncode:
                 wrong.append(f"{name}: {checked.stderr}")

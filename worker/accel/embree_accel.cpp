@@ -187,7 +187,7 @@ class EmbreeAccel final : public Accel {
         }));
     for (unsigned i = 0; i < instances.size(); ++i) {
       const Instance& instance = instances[i];
-      if (!layer.has(instance)) continue;
+      if (!layer.has(instance) || instance.is_absent) continue;
       if (instance.deforms) {
         attach_instance(device, moving.get(), scene.meshes[instance.mesh],
                         vertices_of(scene, shapes, instance.mesh).positions, instance.to_world,

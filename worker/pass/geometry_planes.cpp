@@ -1,6 +1,8 @@
 #include "worker/pass/geometry_planes.h"
 
 #include <algorithm>
+#include <map>
+#include <string_view>
 
 #include "common/image/cryptomatte.h"
 #include "common/job/aov.h"
@@ -14,7 +16,14 @@ GeometryPlanes::GeometryPlanes(const RenderContext& context, const FrameSpec& fr
   if (std::ranges::none_of(aovs, [](Aov aov) { return traits(aov).of_geometry; })) return;
   const auto num_pixels = static_cast<std::size_t>(rect.area());
   sums_.resize(num_pixels);
-  if (has(Aov::crypto_object)) objects_.resize(num_pixels);
+  if (has(Aov::crypto_object)) {
+    objects_.resize(num_pixels);
+    object_names_ = object_names(context.job);
+    std::map<std::string_view, std::uint32_t> first;
+    for (const std::string& name : object_names_)
+      first_parts_.push_back(
+          first.emplace(name, static_cast<std::uint32_t>(first_parts_.size() + 1)).first->second);
+  }
   if (has(Aov::crypto_material)) materials_.resize(num_pixels);
   if (has(Aov::motion)) {
     before_ = pose_at(*context.scene, context.job, frame.number - 1);
@@ -74,7 +83,7 @@ void GeometryPlanes::add(const TileSurfaces& surfaces) {
       sum.position[1] += weight * double{p.y};
       sum.position[2] += weight * double{p.z};
       sum.z += weight * double{camera.distance_ahead(p)};
-      if (!objects_.empty()) objects_[pixel].add(hit.instance + 1, weight);
+      if (!objects_.empty()) objects_[pixel].add(first_parts_[hit.instance], weight);
       if (!materials_.empty()) materials_[pixel].add(hit.material + 1, weight);
       if (!with_albedo) continue;
       const Material material = geometry_.see(hit, surfaces.look(at)).material;
@@ -122,7 +131,7 @@ void GeometryPlanes::write(FilmTile& film) const {
   for (std::size_t c = 0; c < 4; ++c)
     fill(Aov::motion, c, [&](const Sum& sum) { return sum.motion[c] / sum.sites; });
   fill(Aov::object, 0, [](const Sum& sum) { return static_cast<double>(sum.object); });
-  if (!objects_.empty()) write_ids(objects_, object_names(context_.job), Aov::crypto_object, film);
+  if (!objects_.empty()) write_ids(objects_, object_names_, Aov::crypto_object, film);
   if (!materials_.empty())
     write_ids(materials_, material_names(context_.job), Aov::crypto_material, film);
 }

@@ -2,6 +2,7 @@
 
 #include <array>
 #include <cstdint>
+#include <string>
 #include <vector>
 
 #include "common/image/film_tile.h"
@@ -56,6 +57,8 @@ class GeometryPlanes {
   Pose before_, after_;  ///< of the frame numbers one less and one more; only for motion
   std::vector<Sum> sums_;
   std::vector<Things> objects_, materials_;  ///< (pixels), or empty
+  std::vector<std::string> object_names_;    ///< only for mattes, as the next
+  std::vector<std::uint32_t> first_parts_;   ///< by object: number of the first that is named alike
 };
 
 }  // namespace baton

@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <set>
 
 #include "common/base/files.h"
 #include "common/base/version.h"
@@ -52,6 +53,16 @@ void drop_channel(FilmTile& image, std::string_view name) {
   const auto first = image.values.begin() + (plane - image.values.data());
   image.values.erase(first, first + static_cast<std::ptrdiff_t>(image.num_pixels()));
   image.channels.erase(found);
+}
+
+/// Each name where it comes first.
+std::vector<std::string> without_repeats(const std::vector<std::string>& names) {
+  std::set<std::string> seen;
+  std::vector<std::string> result;
+  for (const std::string& name : names) {
+    if (seen.insert(name).second) result.push_back(name);
+  }
+  return result;
 }
 
 }  // namespace
@@ -166,7 +177,7 @@ ImageMetadata frame_metadata(const JobSpec& job, const Digest& job_digest, int f
     ImageMetadata ids;
     const std::string in(naming_of(job) == ChannelNaming::blender ? kBlenderLayer : "");
     if (aov == Aov::crypto_object)
-      ids = cryptomatte_metadata(in + kCryptoObject, object_names(job));
+      ids = cryptomatte_metadata(in + kCryptoObject, without_repeats(object_names(job)));
     if (aov == Aov::crypto_material)
       ids = cryptomatte_metadata(in + kCryptoMaterial, material_names(job));
     metadata.insert(metadata.end(), ids.begin(), ids.end());

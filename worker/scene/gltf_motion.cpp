@@ -35,17 +35,20 @@ Status put_camera(const gltf::NodeMotion& motion, int node, const FileClock& clo
   if (given.camera < 0) return file.error(fmt::format("node \"{}\" holds no camera", given.name));
   const gltf::Camera& lens = file.cameras[static_cast<std::size_t>(given.camera)];
 
-  // The file says nothing of shift and lens: the job does.
+  // The file says nothing of shift and lens: the job does. What it sees, both may say.
   const CameraSpec wanted = camera;
   camera = {};
   camera.shift = wanted.shift;
   camera.aperture = wanted.aperture;
   camera.focus_distance = wanted.focus_distance;
-  if (lens.perspective) {
+  if (wanted.own_vertical_fov_deg) {
+    camera.vertical_fov_deg = *wanted.own_vertical_fov_deg;
+  } else if (lens.perspective && !wanted.own_orthographic_height) {
     camera.vertical_fov_deg = static_cast<float>(lens.yfov * 180 / 3.14159265358979323846);
   } else {
     camera.projection = Projection::orthographic;
-    camera.orthographic_height = static_cast<float>(2 * lens.ymag);
+    camera.orthographic_height =
+        wanted.own_orthographic_height.value_or(static_cast<float>(2 * lens.ymag));
   }
   const auto at = [&](int frame) {
     const std::vector<gltf::Matrix> world = motion.to_world(clock.seconds_at(frame));

@@ -1,5 +1,9 @@
 #include "worker/scene/pose.h"
 
+#include <algorithm>
+#include <cmath>
+#include <optional>
+
 #include "common/job/motion.h"
 #include "common/math/inverse.h"
 
@@ -48,6 +52,17 @@ MeshShapes shapes_at(const Scene& scene, double frame) {
   return shapes;
 }
 
+/// Of the inverse of a map that rays are taken through: float32 then holds its determinant, and
+/// places of up to a million units in the space of a mesh.
+constexpr float kMostInverse = 1e12f;
+
+/// Inverse transpose of a map from a mesh to the world; none where rays cannot be taken back.
+std::optional<Mat3> normal_map(const Mat3& to_world) {
+  const std::optional<Mat3> normals = inverse_transposed(to_world);
+  const auto is_far = [](float x) { return std::fabs(x) > kMostInverse; };
+  return normals && std::ranges::any_of(normals->m, is_far) ? std::nullopt : normals;
+}
+
 }  // namespace
 
 Pose pose_at(const Scene& scene, const JobSpec& job, double frame) {
@@ -61,9 +76,9 @@ Pose pose_at(const Scene& scene, const JobSpec& job, double frame) {
     instance.to_world.linear = motion.linear * rest.linear;
     instance.to_world.offset =
         motion.linear * (rest.offset - object.translate) + object.translate + motion.offset;
-    // Scales are positive and rotations rigid: no motion is singular, unless it leaves the range of
-    // floats.
-    instance.normal_to_world = inverse_transposed(instance.to_world.linear).value_or(Mat3{});
+    const std::optional<Mat3> normals = normal_map(instance.to_world.linear);
+    instance.normal_to_world = normals.value_or(Mat3{});
+    instance.is_absent = !normals;
   }
   return pose;
 }

@@ -51,6 +51,7 @@ struct Instance {
 
   bool is_catcher = false;  ///< catches shadows: rays that look for objects pass it
   bool deforms = false;     ///< its mesh does
+  bool is_absent = false;   ///< in a pose: to_world is singular, and no ray meets it
 
   bool moves() const { return moving_object >= 0 || deforms; }
 };

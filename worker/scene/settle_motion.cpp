@@ -51,6 +51,7 @@ void add_meshes(const Scene& scene, const Pose& now, const Pose& before, StepMet
   const std::size_t share = kScenePoints / std::max<std::size_t>(now.instances.size(), 1);
   const std::size_t most = std::clamp(share, kLeastMeshPoints, kMeshPoints);
   for (std::size_t i = 0; i < now.instances.size(); ++i) {
+    if (now.instances[i].is_absent || before.instances[i].is_absent) continue;
     const std::uint32_t mesh = now.instances[i].mesh;
     const std::span<const Vec3> points = vertices_of(scene, now.shapes, mesh).positions;
     const std::span<const Vec3> old = vertices_of(scene, before.shapes, mesh).positions;
@@ -127,8 +128,8 @@ int measure_max_px(const JobSpec& job, const Scene& scene) {
 
 }  // namespace
 
-Result<JobSpec> settle_motion(JobSpec job) {
-  BATON_TRY(settle_scene(job));
+Result<JobSpec> settle_motion(JobSpec job, std::vector<std::string>* left_out) {
+  BATON_TRY(settle_scene(job, left_out));
   if (job.camera.gltf) BATON_TRY(take_camera_keys(job.frames, job.camera));
   for (ObjectSpec& object : job.scene.objects) {
     if (object.gltf) BATON_TRY(take_object_keys(job.frames, object));

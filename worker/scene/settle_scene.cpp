@@ -16,6 +16,7 @@
 #include "worker/scene/gltf/file_cache.h"
 #include "worker/scene/gltf/materials.h"
 #include "worker/scene/gltf/meshes.h"
+#include "worker/scene/gltf/names.h"
 #include "worker/scene/gltf/vertices.h"
 #include "worker/scene/gltf_motion.h"
 
@@ -39,18 +40,20 @@ bool is_flat(const Matrix34& matrix) { return !inverse_transposed(to_transform(m
 /// Puts the scene of one file into a job.
 class SceneTaker {
  public:
-  SceneTaker(JobSpec& job, gltf::NodeMotion motion)
+  SceneTaker(JobSpec& job, gltf::NodeMotion motion, std::vector<std::string>& left_out)
       : job_(job),
+        left_out_(left_out),
         gltf_(*job.scene.gltf),
         motion_(std::move(motion)),
         file_(motion_.document()),
-        material_names_(gltf::material_names(file_)) {}
+        material_names_(gltf::material_names(file_)),
+        object_names_(gltf::object_names(file_)) {}
 
   Status take() {
     BATON_TRY(place_nodes());
     BATON_TRY(take_camera());
     BATON_TRY(take_objects());
-    take_materials();
+    BATON_TRY(take_materials());
     if (job_.scene.materials.size() > limits::kMaxMaterials ||
         job_.scene.meshes.size() > limits::kMaxMeshes ||
         job_.scene.objects.size() > limits::kMaxObjects)
@@ -159,23 +162,26 @@ class SceneTaker {
     return shape;
   }
 
+  /// Nothing is seen of a node whose scale has a zero.
+  Status leave_out(const std::string& node) {
+    left_out_.push_back(fmt::format(
+        "{}: node \"{}\" has a scale of 0 in all frames: it is not there", file_.path, node));
+    return {};
+  }
+
   Status take_node(std::size_t node, const std::string& material, bool catcher) {
     ObjectSpec object;
+    object.name = object_names_[node];
     object.catcher = catcher;
     const std::optional<ShapeSpec> shape = shape_of(node);
     if (file_.nodes[node].skin >= 0) {
       // Its bones say where it is.
     } else if (const auto moved = moved_.find(node); moved != moved_.end()) {
-      const auto flat = std::ranges::find_if(moved->second, is_flat);
-      if (flat != moved->second.end())
-        return file_.error(
-            fmt::format("node \"{}\": no extent in frame {}, expected a scale without zeros",
-                        file_.nodes[node].name,
-                        job_.frames[static_cast<std::size_t>(flat - moved->second.begin())]));
+      if (std::ranges::all_of(moved->second, is_flat)) return leave_out(object.name);
       object.keys = matrix_keys(job_.frames, moved->second);
     } else {
       object.matrix = gltf::to_floats(rest_[node]);
-      if (is_flat(*object.matrix)) return {};  // nothing is seen of it
+      if (is_flat(*object.matrix)) return leave_out(object.name);
     }
 
     const int mesh = file_.nodes[node].mesh;
@@ -202,20 +208,33 @@ class SceneTaker {
     return {};
   }
 
-  /// Those that are in use, or that the job's own objects name.
-  void take_materials() {
+  /// All of the file, as they have numbers. What is wrong with one, and the files that its textures
+  /// name, matter where something is made of it.
+  Status take_materials() {
+    std::set<std::string> used;
+    for (const ObjectSpec& object : job_.scene.objects) used.insert(object.material);
+    if (job_.scene.ground) used.insert(job_.scene.ground->material);
     for (std::size_t m = 0; m < material_names_.size(); ++m) {
+      const std::string& name = material_names_[m];
       const int index = static_cast<int>(m) - 1;
       if (index < 0 && !used_materials_.contains(index)) continue;
-      job_.scene.materials.try_emplace(material_names_[m], gltf::material_spec(file_, index));
+      if (job_.scene.materials.contains(name)) continue;
+      const bool is_used = used.contains(name);
+      if (is_used && index >= 0 && !file_.materials[m - 1].fault.empty())
+        return file_.error(fmt::format("material \"{}\": {}", name, file_.materials[m - 1].fault));
+      job_.scene.materials.emplace(name, is_used ? gltf::material_spec(file_, index)
+                                                 : gltf::plain_material_spec(file_, index));
     }
+    return {};
   }
 
   JobSpec& job_;
+  std::vector<std::string>& left_out_;
   const GltfSceneSpec gltf_;
   gltf::NodeMotion motion_;
   const gltf::Document& file_;
   const std::vector<std::string> material_names_;  ///< of material i - 1; first the default one
+  const std::vector<std::string> object_names_;    ///< by node
   std::vector<const GltfNodeSpec*> said_;          ///< by node; null: nothing
   std::vector<PlacedNode> places_;                 ///< that the job says
   std::vector<gltf::Matrix> rest_;                 ///< by node, in the first frame
@@ -277,56 +296,18 @@ Status list_files(SceneSpec& scene, gltf::FileCache& cache) {
   return {};
 }
 
-void warn_of_materials(const gltf::Document& file, std::vector<std::string>& warnings) {
-  const std::vector<std::string> names = gltf::material_names(file);
-  for (std::size_t m = 0; m < file.materials.size(); ++m) {
-    for (const std::string& what : gltf::unsupported_parts(file, file.materials[m]))
-      warnings.push_back(fmt::format("{}: material \"{}\": {}", file.path, names[m + 1], what));
-  }
-}
-
 }  // namespace
 
-Status settle_scene(JobSpec& job) {
+Status settle_scene(JobSpec& job, std::vector<std::string>* left_out) {
+  std::vector<std::string> unsaid;
   gltf::FileCache cache;
   if (job.scene.gltf) {
     BATON_ASSIGN(auto document, cache.get(job.scene.gltf->file));
     BATON_ASSIGN(gltf::NodeMotion motion, gltf::NodeMotion::read(std::move(document)));
-    BATON_TRY(SceneTaker(job, std::move(motion)).take());
+    BATON_TRY(SceneTaker(job, std::move(motion), left_out == nullptr ? unsaid : *left_out).take());
     BATON_TRY(check_names(job));
   }
   return list_files(job.scene, cache);
-}
-
-std::vector<std::string> gltf_warnings(const SceneSpec& scene) {
-  std::set<std::string> paths;
-  for (const auto& [name, mesh] : scene.meshes) {
-    if (mesh.mesh >= 0) paths.insert(mesh.path);
-  }
-  std::vector<std::string> warnings;
-  for (const std::string& path : paths) {
-    const auto document = gltf::read_document(path);
-    if (!document) continue;
-    const gltf::Document& file = **document;
-    const auto add = [&](const std::string& what) { warnings.push_back(path + ": " + what); };
-    for (const std::string& extension : file.extensions_used) {
-      if (!gltf::is_read(extension)) add("extension " + extension + " is not read");
-    }
-    warn_of_materials(file, warnings);
-    std::size_t morphed = 0, colored = 0;
-    for (const gltf::Mesh& mesh : file.meshes) {
-      for (const gltf::Primitive& primitive : mesh.primitives) {
-        morphed += primitive.morphs_more ? 1 : 0;
-        colored += primitive.colored ? 1 : 0;
-      }
-    }
-    if (morphed > 0)
-      add(fmt::format(
-          "{} parts have morph targets of colours or texture coordinates, which are not read",
-          morphed));
-    if (colored > 0) add(fmt::format("{} parts have vertex colours, which are not read", colored));
-  }
-  return warnings;
 }
 
 }  // namespace baton

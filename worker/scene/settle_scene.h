@@ -13,10 +13,8 @@ namespace baton {
 /// frame where an animation moves it, and the camera where the job takes one of the file. Lists the
 /// files that glTF files refer to, and the tiles of textures, in scene.files. A job without any
 /// comes back as it is.
-/// Errors name file and node: not there, more than the limits, without extent in a frame.
-Status settle_scene(JobSpec& job);
-
-/// What is in the glTF files of a settled scene and is not shown, or not as there: one line each.
-std::vector<std::string> gltf_warnings(const SceneSpec& scene);
+/// left_out: gets a line for each node that is shown and has no volume in any frame. Errors name
+/// file and node or material: not there, more than the limits, not as glTF has them.
+Status settle_scene(JobSpec& job, std::vector<std::string>* left_out = nullptr);
 
 }  // namespace baton

@@ -178,6 +178,24 @@ TEST(Accel, MovedInstancesAreWhereAFreshSceneHasThem) {
   EXPECT_LT(different, 8);
 }
 
+TEST(Accel, NoRayMeetsWhatIsAbsent) {
+  Scene scene = scene_of(sphere_mesh(24, 48));
+  scene.instances[0].moving_object = 0;
+  const auto rest = build(scene);
+  EXPECT_TRUE(trace(*rest, {0, 0, 5}, {0, 0, -1}).hit);
+  // A disk: its hierarchy alone would be met.
+  std::vector<Instance> moved = scene.instances;
+  moved[0].to_world = {{{1, 0, 0, 0, 1, 0, 0, 0, 0}}, {}};
+  moved[0].is_absent = true;
+  const auto placed = rest->place(moved, {});
+  ASSERT_TRUE(placed) << placed.error().message;
+  EXPECT_FALSE(trace(**placed, {0, 0, 5}, {0, 0, -1}).hit);
+  ShadowRays shadow;
+  shadow.push({0.1f, 0.2f, 5}, {0, 0, -1});
+  (*placed)->occluded(shadow);
+  EXPECT_GE(shadow.t_far[0], 0);
+}
+
 TEST(Accel, AGroupOfRaysIsTracedTheSameWhateverIsTracedWithIt) {
   const Scene scene = scene_of(triangle_soup(20000));
   const auto accel = build(scene);

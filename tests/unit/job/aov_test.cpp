@@ -4,6 +4,7 @@
 #include <gtest/gtest.h>
 
 #include "common/job/job_json.h"
+#include "common/job/picture.h"
 #include "common/job/sequence.h"
 
 namespace baton {
@@ -80,6 +81,31 @@ TEST(Aovs, TheVarianceOfASingleRoundIsASecondDraw) {
   EXPECT_TRUE(draws_twice(job)) << "samples are fresh";
   job.output.aovs = {Aov::depth};
   EXPECT_FALSE(draws_twice(job));
+}
+
+TEST(Aovs, NoTwoObjectsHaveOneNameUnlessItIsGiven) {
+  JobSpec job;
+  for (const char* mesh : {"b", "b", "b.2", "ground", "b", "hero"})
+    job.scene.objects.push_back({.mesh = mesh, .material = "m"});
+  job.scene.ground.emplace();
+  EXPECT_THAT(object_names(job),
+              testing::ElementsAre("b", "b.3", "b.2", "ground", "b.4", "hero", "ground.2"));
+  job.scene.objects[0].name = job.scene.objects[1].name = "hero";
+  job.scene.objects[2].name = "ground";
+  EXPECT_THAT(object_names(job), testing::ElementsAre("hero", "hero", "ground", "ground.2", "b",
+                                                      "hero.2", "ground.3"));
+}
+
+TEST(Aovs, NamesOfObjectsAreSeenInMattesAlone) {
+  JobSpec one;
+  one.scene.objects.push_back({.mesh = "b", .material = "m"});
+  JobSpec other = one;
+  other.scene.objects[0].name = "hero";
+  EXPECT_TRUE(mattes_alike(one, other));
+  EXPECT_EQ(picture_digest(one, {}), picture_digest(other, {}));
+  one.output.aovs = other.output.aovs = {Aov::crypto_object};
+  EXPECT_FALSE(mattes_alike(one, other));
+  EXPECT_EQ(picture_digest(one, {}), picture_digest(other, {}));
 }
 
 }  // namespace

@@ -167,6 +167,48 @@ TEST(MotionJson, ReadsBackWhatItWrites) {
   EXPECT_EQ(parse_job(to_json(*gltf), "again", "/").value(), *gltf);
 }
 
+// A file says where its camera is; what the camera sees of that, the job may say.
+TEST(MotionJson, CamerasOfFiles) {
+  const std::string file = R"("gltf": {"file": "a.glb", "node": "eye"})";
+  const auto camera = [&](const std::string& more) {
+    return parse(R"(, "camera": {)" + file + more + "}");
+  };
+  const Result<JobSpec> wide = camera(R"(, "verticalFovDeg": 80, "projection": "perspective")");
+  ASSERT_TRUE(wide) << wide.error().message;
+  EXPECT_EQ(wide->camera.own_vertical_fov_deg, 80.0f);
+  EXPECT_EQ(parse_job(to_json(*wide), "again", "/").value(), *wide);
+  EXPECT_EQ(camera(R"(, "orthographicHeight": 3)")->camera.own_orthographic_height, 3.0f);
+  const auto error = [&](const std::string& more) {
+    const Result<JobSpec> job = camera(more);
+    return job ? "none" : job.error().message;
+  };
+  for (const char* const key : {"position", "lookAt", "up"})
+    EXPECT_THAT(error(std::string(", \"") + key + "\": [0, 1, 9]"),
+                HasSubstr(std::string("$.camera.") + key + ": expected none, as the glTF file"));
+  EXPECT_THAT(error(R"(, "projection": "orthographic")"),
+              HasSubstr("$.camera.projection: expected orthographicHeight beside it"));
+  EXPECT_THAT(error(R"(, "projection": "perspective")"),
+              HasSubstr("$.camera.projection: expected verticalFovDeg beside it"));
+  EXPECT_THAT(error(R"(, "verticalFovDeg": 80, "orthographicHeight": 3)"),
+              HasSubstr("$.camera.orthographicHeight: expected either it or verticalFovDeg"));
+}
+
+// Smooth curves swing past keys, but an object that is not there stays so between them.
+TEST(Motion, AScaleOfZeroStays) {
+  ObjectSpec object;
+  object.keys = {{.frame = 1},
+                 {.frame = 3, .scale = {0, 0, 0}},
+                 {.frame = 5, .scale = {0, 0, 0}},
+                 {.frame = 7}};
+  const auto width = [&](double frame) {
+    return object_motion_at(object, KeyCurve::smooth, frame).linear.m[0];
+  };
+  EXPECT_EQ(width(1), 1);
+  EXPECT_GT(width(2), 0);
+  for (const double frame : {3.0, 3.5, 4.0, 4.9, 5.0}) EXPECT_EQ(width(frame), 0) << frame;
+  EXPECT_GT(width(6), 0);
+}
+
 TEST(MotionJson, NamesWhatIsWrong) {
   const auto error = [](const std::string& motion, const std::string& object = "") {
     const Result<JobSpec> job = parse(motion, object);

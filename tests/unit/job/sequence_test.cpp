@@ -38,14 +38,15 @@ TEST(Sequence, TurnsFromTheFrameThatIsSaid) {
 TEST(Environment, ScaleAndRotationFollowKeys) {
   const auto job = parse_job(
       R"({"name": "t", "scene": {}, "frames": "1-9", "environment": {"map": "a.exr", "scale": 2,
-          "scaleKeys": [{"frame": 2, "scale": 1}, {"frame": 6, "scale": 3}],
+          "scaleKeys": [{"frame": 2, "scale": 1}, {"frame": 6, "scale": 3}, {"frame": 8, "scale": 0}],
           "rotation": {"keys": [{"frame": 1, "deg": 10}, {"frame": 5, "deg": 50}]}}})",
       "job", "/");
   ASSERT_TRUE(job) << job.error().message;
   const EnvironmentSpec& environment = job->environment;
   EXPECT_EQ(environment_at(environment, 1).scale, 1) << "held";
   EXPECT_EQ(environment_at(environment, 3).scale, 1.5f);
-  EXPECT_EQ(environment_at(environment, 9).scale, 3);
+  EXPECT_EQ(environment_at(environment, 6).scale, 3);
+  EXPECT_EQ(environment_at(environment, 9).scale, 0) << "no light";
   EXPECT_EQ(rotation_deg_at(environment, 2), 20);
   EXPECT_EQ(rotation_deg_at(environment, 8), 50);
   EXPECT_FALSE(environment_at(environment, 3).same_texels(environment_at(environment, 4)));
@@ -53,13 +54,13 @@ TEST(Environment, ScaleAndRotationFollowKeys) {
 
   const auto wrong = parse_job(
       R"({"name": "t", "scene": {}, "environment": {"map": "a.exr",
-          "scaleKeys": [{"frame": 2, "scale": 1}, {"frame": 2, "scale": 0}],
+          "scaleKeys": [{"frame": 2, "scale": 1}, {"frame": 2, "scale": -1}],
           "rotation": {"startDeg": 5, "keys": [{"frame": 1, "deg": 10}]}}})",
       "job", "/");
   ASSERT_FALSE(wrong);
   EXPECT_EQ(
       wrong.error().message,
-      "job: $.environment.scaleKeys[1].scale: expected a number in (0, 1000000000], got 0\n"
+      "job: $.environment.scaleKeys[1].scale: expected a number in [0, 1000000000], got -1\n"
       "job: $.environment.scaleKeys: expected ascending frames without duplicates, got 2 after 2\n"
       "job: $.environment.rotation.keys: expected either keys or startDeg and degPerFrame, got "
       "both");

@@ -119,6 +119,29 @@ TEST(GeometryPlanes, MotionOfASheetThatStretches) {
   }
 }
 
+// Parts that are named alike are one object: no ID stands twice in a pixel.
+TEST(GeometryPlanes, ObjectsOfOneNameAreOneInMattes) {
+  JobSpec job = geometry_job(1);
+  job.output.background = Background::transparent;
+  job.scene.objects.push_back(job.scene.objects[0]);
+  job.scene.objects.back().translate.x += 0.4f;
+  for (ObjectSpec& object : job.scene.objects) object.name = "all";
+  job.scene.ground.reset();
+  const FilmTile film = render_tile(job).films.back();
+  const std::vector<std::string>& channels = traits(Aov::crypto_object).channels;
+  int seen = 0;
+  for (std::size_t i = 0; i < film.num_pixels(); ++i) {
+    const float share = channel(film, channels[1])[i];
+    EXPECT_EQ(channel(film, channels[3])[i], 0);
+    EXPECT_NEAR(share, channel(film, "A")[i], 1e-6);
+    if (share > 0) {
+      EXPECT_EQ(channel(film, channels[0])[i], cryptomatte_id("all"));
+      ++seen;
+    }
+  }
+  EXPECT_GT(seen, 5);
+}
+
 TEST(GeometryPlanes, MattesCoverWhatIsSeen) {
   JobSpec job = geometry_job(1);
   job.output.background = Background::transparent;

@@ -195,6 +195,23 @@ TEST(Reprojection, AnObjectTakesItsHistoryAlongAndUncoversGround) {
   EXPECT_EQ(box.source_x(3, 3), 3);
 }
 
+// What was not there has no history, and leaves none.
+TEST(Reprojection, AnObjectComesAndGoes) {
+  JobSpec job = sliding_job(1);
+  for (const bool comes : {true, false}) {
+    job.scene.objects[0].keys = {{.frame = 1}, {.frame = 2}};
+    job.scene.objects[0].keys[comes ? 0 : 1].scale = {0, 0, 0};
+    const Follower box(job);
+    for (int y = 10; y < 14; ++y) {
+      for (int x = 14; x < 18; ++x) {
+        EXPECT_EQ(box.hits(x, y)[0].instance == 0u, comes);
+        EXPECT_EQ(box.at(x, y).history, PixelHistory::none);
+      }
+    }
+    EXPECT_EQ(box.at(3, 3).history, PixelHistory::same);
+  }
+}
+
 TEST(Reprojection, SitesInheritFromSitesThatSawTheSame) {
   // At the edges of the box a pixel's sites see two objects; whatever is inherited stays with its
   // object.

@@ -80,6 +80,25 @@ TEST(Pose, PointsAndNormalsAreCarriedWithTheirObject) {
       normalize(to.normal_to_world * normal));
 }
 
+TEST(Pose, WhatHasNoVolumeIsNotThere) {
+  JobSpec job = turning_job();
+  job.scene.objects[0].keys[1].scale = {1, 0, 1};
+  const auto scene = load_scene(job);
+  ASSERT_TRUE(scene.ok());
+  EXPECT_FALSE(pose_at(*scene, job, 1).instances[0].is_absent);
+  EXPECT_FALSE(pose_at(*scene, job, 2).instances[0].is_absent);
+  EXPECT_TRUE(pose_at(*scene, job, 3).instances[0].is_absent);
+  // So thin that float32 does not hold the way back.
+  job.scene.objects[0].keys[1].scale = {1, 1e-14f, 1};
+  EXPECT_TRUE(pose_at(*scene, job, 3).instances[0].is_absent);
+  job.scene.objects[0].keys[1].scale = {1, 1e-9f, 1};
+  EXPECT_FALSE(pose_at(*scene, job, 3).instances[0].is_absent);
+  job.scene.objects[0].keys[1].scale = {1, 0, 1};
+  // Nothing that is there moves.
+  job.frames = {1, 3};
+  EXPECT_EQ(settle_motion(job)->motion.max_px, 1);
+}
+
 TEST(SettleMotion, MeasuresTheLargestStepInTheImage) {
   // The camera shifts by 0.5 a frame; the cube's near face is 9 ahead: 50 pixels span the
   // tangent 1.

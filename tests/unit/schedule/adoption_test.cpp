@@ -256,6 +256,19 @@ TEST(Adoption, OtherChannelsAreWrittenAnew) {
   EXPECT_EQ(shop.work(more).size(), 4u);
 }
 
+TEST(Adoption, OtherNamesAreWrittenAnewWhereMattesShowThem) {
+  JobSpec plain = small_job(2, 4, 2);
+  plain.scene.objects = {{.mesh = "m", .material = "m"}};
+  for (const bool mattes : {false, true}) {
+    if (mattes) plain.output.aovs = {Aov::crypto_object};
+    JobSpec named = plain;
+    named.scene.objects[0].name = "hero";
+    Shop shop;
+    shop.work(plain);
+    EXPECT_EQ(shop.work(named).size(), static_cast<std::size_t>(mattes ? count_tasks(named) : 0));
+  }
+}
+
 // A key that only later frames see leaves those before as they are.
 TEST(Adoption, AKeyChangesTheFramesThatItMoves) {
   JobSpec job = moving_job(2, 8, 3);

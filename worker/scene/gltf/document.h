@@ -141,6 +141,7 @@ enum class AlphaMode : std::uint8_t { opaque, mask, blend };
 
 struct Material {
   std::string name;
+  std::string fault;  ///< what is wrong with it, which counts where it is used; empty: nothing
   std::array<double, 4> base_color{1, 1, 1, 1};
   double metallic = 1, roughness = 1;
   TextureInfo base_color_texture, metallic_roughness_texture, normal_texture, emissive_texture;
@@ -148,6 +149,7 @@ struct Material {
   double ior = 1.5, specular = 1;
   std::array<double, 3> specular_color{1, 1, 1};
   bool specular_textured = false;  ///< by textures, which are not read
+  bool occluded = false;           ///< by a texture, which is not read
   double clearcoat = 0, clearcoat_roughness = 0;
   TextureInfo clearcoat_texture, clearcoat_roughness_texture, clearcoat_normal_texture;
   AlphaMode alpha_mode = AlphaMode::opaque;

@@ -45,7 +45,7 @@ void parse_extensions(const JsonView& extensions, const Document& document, Mate
 
 Material parse_material(const JsonView& material, const Document& document) {
   Material read;
-  read.name = material.text("name");
+  read.name = material.name("name");
   const JsonView pbr = material.at("pbrMetallicRoughness");
   pbr.numbers("baseColorFactor", read.base_color);
   for (double& c : read.base_color) c = std::clamp(c, 0.0, 1.0);
@@ -55,6 +55,7 @@ Material parse_material(const JsonView& material, const Document& document) {
   read.metallic_roughness_texture =
       parse_texture_info(pbr.at("metallicRoughnessTexture"), document);
   read.normal_texture = parse_texture_info(material.at("normalTexture"), document);
+  read.occluded = material.has("occlusionTexture");
 
   const std::string mode = material.text("alphaMode");
   if (mode == "MASK") read.alpha_mode = AlphaMode::mask;
@@ -89,7 +90,9 @@ void parse_materials(const JsonView& root, Document& document) {
     document.textures.push_back(read);
   });
   root.each("materials", [&](const JsonView& material) {
-    document.materials.push_back(parse_material(material, document));
+    Fault fault;
+    document.materials.push_back(parse_material(material.apart(fault), document));
+    document.materials.back().fault = fault.value_or("");
   });
 }
 

@@ -114,7 +114,7 @@ Primitive parse_primitive(const JsonView& primitive, std::size_t num_accessors,
 
 /// The primitives of a mesh have as many targets, and weights for them.
 Mesh parse_mesh(const JsonView& mesh, std::size_t num_accessors, std::size_t num_materials) {
-  Mesh read{mesh.text("name"), {}, mesh.all_numbers("weights")};
+  Mesh read{mesh.name("name"), {}, mesh.all_numbers("weights")};
   mesh.each("primitives", [&](const JsonView& primitive) {
     read.primitives.push_back(parse_primitive(primitive, num_accessors, num_materials));
     if (read.primitives.back().targets.size() != read.num_targets())
@@ -144,7 +144,7 @@ struct NodeLimits {
 
 Node parse_node(const JsonView& node, const NodeLimits& limits) {
   Node read;
-  read.name = node.text("name");
+  read.name = node.name("name");
   read.mesh = node.index("mesh", limits.meshes);
   read.camera = node.index("camera", limits.cameras);
   read.skin = node.index("skin", limits.skins);

@@ -1,10 +1,15 @@
 #include "worker/scene/gltf/json_view.h"
 
+#include <algorithm>
 #include <cmath>
+
+#include "common/base/limits.h"
 
 namespace baton::gltf {
 namespace {
 
+/// Bytes. What makes names different has room behind them.
+constexpr std::size_t kLongestName = limits::kMaxTextLength - 96;
 constexpr double kMaxSize = 9007199254740992.0;  // 2^53
 
 bool is_whole(const nlohmann::json& value, double max) {
@@ -37,6 +42,18 @@ bool JsonView::is_list() const {
 std::string JsonView::text(const char* key) const {
   const JsonView member = at(key);
   return member ? member.as_text() : std::string();
+}
+
+std::string JsonView::name(const char* key) const {
+  std::string name = text(key);
+  if (name.size() > kLongestName) {
+    std::size_t end = kLongestName;
+    while (end > 0 && (static_cast<unsigned char>(name[end]) & 0xC0) == 0x80) --end;  // whole UTF-8
+    name.resize(end);
+  }
+  std::ranges::replace_if(
+      name, [](unsigned char c) { return c < 0x20 || c == 0x7F; }, ' ');
+  return name;
 }
 
 std::string JsonView::as_text() const {

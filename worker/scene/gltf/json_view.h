@@ -40,6 +40,8 @@ class JsonView {
   }
 
   std::string text(const char* key) const;
+  /// A text as a job may say it: with spaces for control characters, and cut where it is longer.
+  std::string name(const char* key) const;
   bool boolean(const char* key, bool otherwise = false) const;
   double number(const char* key, double otherwise, double min, double max) const;
   /// Bytes, counts: [0, 2^53].
@@ -55,6 +57,9 @@ class JsonView {
   std::vector<double> all_numbers(const char* key) const;
   /// As many finite numbers as `values` has; false where the key is missing or at fault.
   bool numbers(const char* key, std::span<double> values) const;
+
+  /// The same value, whose faults go to `fault`.
+  JsonView apart(Fault& fault) const { return {value_, place_, fault}; }
 
   void fail(const std::string& what) const {
     if (!*fault_) *fault_ = place_ + ": " + what;

@@ -5,7 +5,8 @@
 #include <algorithm>
 #include <numbers>
 #include <optional>
-#include <set>
+
+#include "worker/scene/gltf/names.h"
 
 namespace baton::gltf {
 namespace {
@@ -13,18 +14,15 @@ namespace {
 /// What the schema of jobs takes.
 constexpr double kLeastRoughness = 0.02;
 constexpr float kMirrorIor = 100;
+constexpr const char* kDefaultName = "glTF default";
 
 }  // namespace
 
 std::vector<std::string> material_names(const Document& document) {
-  std::vector<std::string> names{"glTF default"};
-  std::set<std::string> taken{names.front()};
-  for (std::size_t m = 0; m < document.materials.size(); ++m) {
-    const std::string& given = document.materials[m].name;
-    std::string name = given.empty() ? fmt::format("material {}", m) : given;
-    while (!taken.insert(name).second) name = fmt::format("{} ({})", name, m);
-    names.push_back(name);
-  }
+  std::vector<std::string> given;
+  for (const Material& material : document.materials) given.push_back(material.name);
+  std::vector<std::string> names = distinct_names(given, "material", {kDefaultName});
+  names.insert(names.begin(), kDefaultName);
   return names;
 }
 
@@ -54,7 +52,7 @@ std::optional<TextureSpec> texture_spec(const Document& document, const TextureI
 
 }  // namespace
 
-MaterialSpec material_spec(const Document& document, int material) {
+MaterialSpec plain_material_spec(const Document& document, int material) {
   const Material given =
       material < 0 ? Material{} : document.materials[static_cast<std::size_t>(material)];
   const auto rgb = [](const auto& c) {
@@ -69,20 +67,12 @@ MaterialSpec material_spec(const Document& document, int material) {
   spec.ior = given.ior == 0 ? kMirrorIor : static_cast<float>(std::max(given.ior, 1.0));
   spec.specular = static_cast<float>(given.specular);
   spec.specular_color = rgb(given.specular_color);
-  spec.color_texture = texture_spec(document, given.base_color_texture);
-  spec.metallic_roughness_texture = texture_spec(document, given.metallic_roughness_texture);
-  spec.normal_texture = texture_spec(document, given.normal_texture);
   if (given.clearcoat > 0) {
     spec.clearcoat = static_cast<float>(given.clearcoat);
     spec.clearcoat_roughness =
         static_cast<float>(std::max(given.clearcoat_roughness, kLeastRoughness));
-    spec.clearcoat_texture = texture_spec(document, given.clearcoat_texture);
-    spec.clearcoat_roughness_texture = texture_spec(document, given.clearcoat_roughness_texture);
-    spec.clearcoat_normal_texture = texture_spec(document, given.clearcoat_normal_texture);
   }
   spec.emission = rgb(given.emission);
-  if (!(spec.emission == Rgb{}))
-    spec.emission_texture = texture_spec(document, given.emissive_texture);
   if (given.alpha_mode != AlphaMode::opaque) spec.alpha = static_cast<float>(given.base_color[3]);
   spec.alpha_blend = given.alpha_mode == AlphaMode::blend;
   if (given.alpha_mode == AlphaMode::mask) {
@@ -93,10 +83,28 @@ MaterialSpec material_spec(const Document& document, int material) {
   return spec;
 }
 
+MaterialSpec material_spec(const Document& document, int material) {
+  MaterialSpec spec = plain_material_spec(document, material);
+  if (material < 0) return spec;
+  const Material& given = document.materials[static_cast<std::size_t>(material)];
+  spec.color_texture = texture_spec(document, given.base_color_texture);
+  spec.metallic_roughness_texture = texture_spec(document, given.metallic_roughness_texture);
+  spec.normal_texture = texture_spec(document, given.normal_texture);
+  if (spec.clearcoat) {
+    spec.clearcoat_texture = texture_spec(document, given.clearcoat_texture);
+    spec.clearcoat_roughness_texture = texture_spec(document, given.clearcoat_roughness_texture);
+    spec.clearcoat_normal_texture = texture_spec(document, given.clearcoat_normal_texture);
+  }
+  if (!(spec.emission == Rgb{}))
+    spec.emission_texture = texture_spec(document, given.emissive_texture);
+  return spec;
+}
+
 std::vector<std::string> unsupported_parts(const Document& document, const Material& material) {
   std::vector<std::string> parts;
-  if (material.emission != std::array<double, 3>{}) parts.push_back("it glows, but lights nothing");
   if (material.specular_textured) parts.push_back("its textures of `specular` are not read");
+  if (material.occluded)
+    parts.push_back("its occlusion texture is not read, as all light is direct");
   for (const TextureInfo* info :
        {&material.base_color_texture, &material.metallic_roughness_texture,
         &material.normal_texture, &material.emissive_texture, &material.clearcoat_texture,

@@ -14,6 +14,8 @@ std::vector<std::string> material_names(const Document& document);
 
 /// A material of the file as a job says it; -1: the default material of glTF.
 MaterialSpec material_spec(const Document& document, int material);
+/// The same without textures.
+MaterialSpec plain_material_spec(const Document& document, int material);
 
 /// What a material has and Baton does not show, one text each.
 std::vector<std::string> unsupported_parts(const Document& document, const Material& material);
