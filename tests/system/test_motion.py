@@ -121,8 +121,7 @@ def the_range_of_motion_is_measured(programs, folder):
     check(2 <= checked["motionMaxPx"] <= 12, f"measured {checked['motionMaxPx']} pixels")
 
     job = moving_job(folder)
-    del job["camera"]["keys"]
-    job["camera"]["gltf"] = {"file": "/nowhere.glb", "node": "eye"}
+    job["camera"] = {"gltf": {"file": "/nowhere.glb", "node": "eye"}}
     failed = programs.run("baton", "check", write_job(folder / "bad.json", job), expect=BAD_INPUT)
     check("/nowhere.glb: missing" in failed.stderr, failed.stderr)
 
