@@ -11,10 +11,10 @@
 
 namespace baton {
 
-/// What of an EXR file is read: all that it holds, or what it shows, without the pixels around it.
-/// What a file shows is its display window: 0 where its data does not reach, such as around what
-/// compositors cut to its content.
-enum class ExrWindow : std::uint8_t { data, display };
+/// What of an EXR file is read. data: all that it holds. display: what it shows, 0 where its data
+/// does not reach, such as around what compositors cut to its content. seen: of what it shows the
+/// part that its data reaches, all if none does: a frame of a part of the picture is that part.
+enum class ExrWindow : std::uint8_t { data, display, seen };
 /// The channels wanted of those that a file has, by name.
 using ChannelChoice =
     std::function<Result<std::vector<std::string>>(const std::vector<std::string>& all)>;

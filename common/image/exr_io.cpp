@@ -299,6 +299,13 @@ auto with_exr_file(const std::filesystem::path& path, Use use)
   }
 }
 
+PixelRect window_of(const Imf::Header& header, const PixelRect& data, ExrWindow window) {
+  if (window == ExrWindow::data) return data;
+  const PixelRect display = rect_of(header.displayWindow());
+  const PixelRect seen = common_part(display, data);
+  return window == ExrWindow::display || seen.width() < 1 || seen.height() < 1 ? display : seen;
+}
+
 }  // namespace
 
 Result<Bytes> encode_exr(const std::string& name, const FilmTile& image,
@@ -326,8 +333,7 @@ Result<FilmTile> read_exr_channels(const std::filesystem::path& path, const Chan
   return with_exr_file(path, [&](Imf::InputFile& file) -> Result<FilmTile> {
     BATON_ASSIGN(FilmTile image, describe(file.header(), path.string()));
     BATON_ASSIGN(image.channels, choose(image.channels));
-    const PixelRect shown =
-        window == ExrWindow::data ? image.rect : rect_of(file.header().displayWindow());
+    const PixelRect shown = window_of(file.header(), image.rect, window);
     BATON_TRY(check_display(shown, image, path.string()));
     read_planes(file, image);
     return shown == image.rect ? std::move(image) : framed(image, shown);

@@ -76,11 +76,10 @@ Result<RgbImage> converted(const std::filesystem::path& path, RgbImage image,
   return image;
 }
 
-Result<RgbImage> rgb_from_exr(const std::filesystem::path& path) {
-  BATON_ASSIGN(
-      const FilmTile film,
-      read_exr_channels(
-          path, [&](const auto& all) { return choose_rgb(path, all); }, ExrWindow::display));
+Result<RgbImage> rgb_from_exr(const std::filesystem::path& path, ExrWindow window) {
+  BATON_ASSIGN(const FilmTile film,
+               read_exr_channels(
+                   path, [&](const auto& all) { return choose_rgb(path, all); }, window));
   RgbImage image{film.rect.width(), film.rect.height(), {}};
   if (!sides_ok(image.width, image.height)) return side_error(path, image.width, image.height);
 
@@ -114,11 +113,11 @@ std::uint8_t channel_to_srgb8(float linear) {
 
 }  // namespace
 
-Result<RgbImage> read_rgb_image(const std::filesystem::path& path) {
+Result<RgbImage> read_rgb_image(const std::filesystem::path& path, ExrWindow window) {
   BATON_ASSIGN(const PictureFormat format, picture_format(path));
   switch (format) {
     case PictureFormat::exr:
-      return rgb_from_exr(path);
+      return rgb_from_exr(path, window);
     case PictureFormat::radiance:
       return rgb_from_radiance(path);
     case PictureFormat::unknown:

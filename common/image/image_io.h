@@ -23,11 +23,12 @@ struct RgbImage {
   std::vector<float> rgb;  ///< (height, width, 3)
 };
 
-/// Reads an EXR (its display window) or Radiance HDR picture as float32 RGB (grey is spread to
+/// Reads an EXR or Radiance HDR picture as float32 RGB (grey is spread to
 /// three channels, alpha dropped), in linear Rec. 709 as the header says what its numbers are
 /// (read_picture_colors). Errors name the file: missing, not an image, truncated, sides past
 /// limits::kMaxEnvironmentSide, neither R, G, B nor one channel to spread.
-Result<RgbImage> read_rgb_image(const std::filesystem::path& path);
+Result<RgbImage> read_rgb_image(const std::filesystem::path& path,
+                                ExrWindow window = ExrWindow::display);
 /// What read_rgb_image converts from: `chromaticities` of an EXR file; PRIMARIES, EXPOSURE and
 /// COLORCORR of a Radiance one. Of a picture of one channel, only factors.
 Result<PictureColors> read_picture_colors(const std::filesystem::path& path);

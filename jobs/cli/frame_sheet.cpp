@@ -27,7 +27,7 @@ std::vector<int> pick_frames(const std::vector<int>& frames, std::size_t count) 
 }
 
 Result<RgbImage> read_thumbnail(const fs::path& path) {
-  BATON_ASSIGN(const RgbImage image, read_rgb_image(path));
+  BATON_ASSIGN(const RgbImage image, read_rgb_image(path, ExrWindow::seen));
   return resize(image, std::min(image.width, kMaxThumbWidth));
 }
 

@@ -74,7 +74,7 @@ Result<std::optional<std::string>> show_frames(const FrameFolder& folder, MovieO
   for (const NumberedFrame& frame : folder.frames) {
     if (signals.stop_requested_within(std::chrono::milliseconds(0)))
       return std::optional<std::string>();
-    BATON_ASSIGN(const FilmTile pixels, read_exr(frame.file, ExrWindow::display));
+    BATON_ASSIGN(const FilmTile pixels, read_exr(frame.file, ExrWindow::seen));
     Result<Display> shown = display_aov(pixels, options.aov, options.display);
     if (!shown)
       return Error{shown.error().kind,

@@ -24,7 +24,7 @@ fs::path default_output(const ViewOptions& options) {
 
 Result<ExitCode> run_view(const ViewOptions& options) {
   BATON_ASSIGN(const FilmTile frame,
-               read_exr(options.frame, options.overscan ? ExrWindow::data : ExrWindow::display));
+               read_exr(options.frame, options.overscan ? ExrWindow::data : ExrWindow::seen));
   const Result<Display> shown = display_aov(frame, options.aov, options.display);
   if (!shown)
     return Error{shown.error().kind, fmt::format("{}: {}", options.frame, shown.error().message)};

@@ -30,7 +30,7 @@ std::vector<float> mean_plane(const FilmTile& film, const std::string& layer) {
 }  // namespace
 
 Result<Picture> read_picture(const std::filesystem::path& path) {
-  BATON_ASSIGN(const FilmTile film, read_exr(path, ExrWindow::display));
+  BATON_ASSIGN(const FilmTile film, read_exr(path, ExrWindow::seen));
   Picture picture;
   picture.image = {film.rect.width(), film.rect.height(), {}};
   picture.image.rgb.resize(3 * film.num_pixels());

@@ -55,6 +55,8 @@ TEST(ExrWindows, ThePictureIsTheDisplayWindowAndBlackWhereNoDataIs) {
       ASSERT_EQ(picture.rgb[3 * i + 2], read.find("B")[i]);
     }
     EXPECT_EQ(read_exr(path).value(), data) << "frames are read back whole";
+    const PixelRect seen = common_part(shown, data.rect);
+    EXPECT_EQ(read_exr(path, ExrWindow::seen).value().rect, seen.width() > 0 ? seen : shown);
   }
 }
 
