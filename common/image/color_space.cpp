@@ -68,6 +68,20 @@ Result<std::optional<Mat3>> to_rec709(const Chromaticities& from) {
   return whole;
 }
 
+Status convert_to_rec709(std::span<float> pixels, std::size_t channels, const PictureColors& from) {
+  BATON_ASSIGN(const std::optional<Mat3> matrix, to_rec709(from.chromaticities));
+  const Rgb& f = from.factor;
+  if (!matrix && f == Rgb{1, 1, 1}) return {};
+  for (; pixels.size() >= channels; pixels = pixels.subspan(channels)) {
+    Rgb color{pixels[0] / f.x, pixels[1] / f.y, pixels[2] / f.z};
+    if (matrix) color = *matrix * color;
+    pixels[0] = color.x;
+    pixels[1] = color.y;
+    pixels[2] = color.z;
+  }
+  return {};
+}
+
 std::string conversion_text(const PictureColors& colors) {
   std::string text;
   if (!nearly(colors.chromaticities, {}))

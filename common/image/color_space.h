@@ -2,6 +2,7 @@
 
 #include <array>
 #include <optional>
+#include <span>
 #include <string>
 
 #include "common/base/result.h"
@@ -29,6 +30,10 @@ struct PictureColors {
 
   bool operator==(const PictureColors&) const = default;
 };
+
+/// Makes linear RGB of a space, the first three of `channels` numbers of each pixel, that of
+/// Rec. 709, undoing the factor. Error: no such space.
+Status convert_to_rec709(std::span<float> pixels, std::size_t channels, const PictureColors& from);
 
 /// "to Rec. 709, from red (0.713, 0.293), ...; divided by its exposure, 2"; empty: the numbers are
 /// taken as they are.

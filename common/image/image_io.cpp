@@ -62,17 +62,8 @@ Result<std::vector<std::string>> choose_rgb(const std::filesystem::path& path,
 /// Pixels as they are stored, as linear Rec. 709.
 Result<RgbImage> converted(const std::filesystem::path& path, RgbImage image,
                            const PictureColors& colors) {
-  const Result<std::optional<Mat3>> matrix = to_rec709(colors.chromaticities);
-  if (!matrix) return Error{ErrorKind::bad_input, path.string() + ": " + matrix.error().message};
-  const Rgb& f = colors.factor;
-  const bool scales = !(f == Rgb{1, 1, 1});
-  for (std::size_t i = 0; (*matrix || scales) && i < image.rgb.size(); i += 3) {
-    Rgb color{image.rgb[i] / f.x, image.rgb[i + 1] / f.y, image.rgb[i + 2] / f.z};
-    if (*matrix) color = **matrix * color;
-    image.rgb[i] = color.x;
-    image.rgb[i + 1] = color.y;
-    image.rgb[i + 2] = color.z;
-  }
+  const Status done = convert_to_rec709(image.rgb, 3, colors);
+  if (!done) return Error{done.error().kind, path.string() + ": " + done.error().message};
   return image;
 }
 

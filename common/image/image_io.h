@@ -23,9 +23,9 @@ struct RgbImage {
   std::vector<float> rgb;  ///< (height, width, 3)
 };
 
-/// Reads an EXR or Radiance HDR picture as float32 RGB (grey is spread to
-/// three channels, alpha dropped), in linear Rec. 709 as the header says what its numbers are
-/// (read_picture_colors). Errors name the file: missing, not an image, truncated, sides past
+/// Reads an EXR or Radiance HDR picture as float32 RGB (grey is spread to three channels, alpha
+/// dropped), in linear Rec. 709 as the header says what its numbers are (read_picture_colors).
+/// window: of an EXR file. Errors name the file: missing, not an image, truncated, sides past
 /// limits::kMaxEnvironmentSide, neither R, G, B nor one channel to spread.
 Result<RgbImage> read_rgb_image(const std::filesystem::path& path,
                                 ExrWindow window = ExrWindow::display);

@@ -18,11 +18,8 @@ Rgb CatcherAlbedo::of(const Vec3& normal) {
 Rgb CatcherAlbedo::add_to(SiteBlock& sites, int site, const FrameGeometry& geometry,
                           const SurfaceHit& hit, const SurfaceLook* look) {
   if (!hit.is_catcher) return geometry.add_to(sites, site, hit, look);
-  // E counts light from above the shading normal's horizon. A catcher blocks nothing, so what lies
-  // below its triangle there arrives, too: without objects the share is 1.
-  ShadingPoint point = hit.point;
-  point.ng = point.ns;
-  sites.add(site, point, Material{.kd = of(point.ns), .ks = {}});
+  const SeenSurface catcher = as_catcher(hit.point, of(hit.point.ns));
+  sites.add(site, catcher.point, catcher.material);
   return {};
 }
 

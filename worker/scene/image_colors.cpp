@@ -1,7 +1,5 @@
 #include "worker/scene/image_colors.h"
 
-#include <optional>
-
 #include "common/image/color_space.h"
 
 namespace baton {
@@ -24,18 +22,13 @@ Status settle_colors(Image& image, TextureUse use, const std::string& name) {
   if (!image.chromaticities || image.num_colors() < 3) return {};
 
   const auto& xy = *image.chromaticities;
-  const Result<std::optional<Mat3>> matrix =
-      to_rec709({{xy[0], xy[1]}, {xy[2], xy[3]}, {xy[4], xy[5]}, {xy[6], xy[7]}});
-  if (!matrix) return Error{ErrorKind::bad_input, name + ": " + matrix.error().message};
-  if (!*matrix) return {};
-  const auto channels = static_cast<std::size_t>(image.channels);
-  for (std::size_t i = 0; i < image.samples.size(); i += channels) {
-    float* const pixel = &image.samples[i];
-    const Rgb color = **matrix * Rgb{pixel[0], pixel[1], pixel[2]};
-    pixel[0] = color.x;
-    pixel[1] = color.y;
-    pixel[2] = color.z;
-  }
+  const Chromaticities space{.red = {xy[0], xy[1]},
+                             .green = {xy[2], xy[3]},
+                             .blue = {xy[4], xy[5]},
+                             .white = {xy[6], xy[7]}};
+  const Status done = convert_to_rec709(image.samples, static_cast<std::size_t>(image.channels),
+                                        {.chromaticities = space});
+  if (!done) return Error{done.error().kind, name + ": " + done.error().message};
   return {};
 }
 

@@ -84,6 +84,14 @@ struct SeenSurface {
   Rgb emission{};  ///< radiance to the viewer
 };
 
+/// A catcher of shadows (worker/pass/catcher.h): it blocks nothing, so light that comes from below
+/// its triangle but from above the shading normal's horizon arrives, too, and without objects the
+/// share is 1.
+inline SeenSurface as_catcher(ShadingPoint point, const Rgb& albedo) {
+  point.ng = point.ns;
+  return {.point = point, .material = {.kd = albedo, .ks = {}}};
+}
+
 /// What detail makes of a surface, without the place: it is kept for as long as the place is.
 struct SurfaceLook {
   Vec3 ns{};  ///< shading normal

@@ -50,16 +50,12 @@ Contribution weighted_radiance(const SeenSurface& site, const Environment& envir
   return {.value = value, .is_hidden = light.is_hidden()};
 }
 
-/// What site s sees. A catcher has the albedo with which `sites` know it, and one horizon, as it
-/// blocks nothing.
+/// What site s sees. A catcher has the albedo with which `sites` know it.
 SeenSurface see(const FrameGeometry& geometry, const SiteBlock& sites, const SurfaceHit& hit,
                 std::size_t s) {
   if (!hit.hit) return {};
   if (!hit.is_catcher) return geometry.see(hit);
-  ShadingPoint point = hit.point;
-  point.ng = point.ns;
-  return {.point = point,
-          .material = {.kd = {sites.kd_r[s], sites.kd_g[s], sites.kd_b[s]}, .ks = {}}};
+  return as_catcher(hit.point, {sites.kd_r[s], sites.kd_g[s], sites.kd_b[s]});
 }
 
 }  // namespace
