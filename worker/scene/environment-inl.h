@@ -57,23 +57,23 @@ HWY_INLINE RadianceLanes LoadTexels(const EnvironmentView& view, VI index) {
   return {texel.row[0], texel.row[1], texel.row[2], texel.row[3]};
 }
 
-/// Four texels of lanes k, k + 4, ... weighted bilinearly; the fourth float is the upper left
-/// one's.
+/// Four texels of lanes k, k + 4, ... weighted bilinearly; the sign of the fourth float is the
+/// upper left one's.
 template <int k>
 HWY_INLINE VF BlendBlocks(const Records& upper, const Records& lower, VF fx, VF fy) {
   const DF d;
   const VF x = hn::Broadcast<k>(fx);
   const VF y = hn::Broadcast<k>(fy);
-  const VF upper_left = LoadBlocks(d, &upper[k], 0);
-  const VF lower_left = LoadBlocks(d, &lower[k], 0);
-  const VF top = hn::MulAdd(x, hn::Sub(LoadBlocks(d, &upper[k], 4), upper_left), upper_left);
-  const VF bottom = hn::MulAdd(x, hn::Sub(LoadBlocks(d, &lower[k], 4), lower_left), lower_left);
-  const MF fourth =
-      hn::RebindMask(d, hn::Eq(hn::And(hn::Iota(DI(), 0), hn::Set(DI(), 3)), hn::Set(DI(), 3)));
-  return hn::IfThenElse(fourth, upper_left, hn::MulAdd(y, hn::Sub(bottom, top), top));
+  const VF corner = LoadBlocks(d, &upper[k], 0);
+  const VF upper_left = hn::Abs(corner), upper_right = hn::Abs(LoadBlocks(d, &upper[k], 4));
+  const VF lower_left = hn::Abs(LoadBlocks(d, &lower[k], 0));
+  const VF lower_right = hn::Abs(LoadBlocks(d, &lower[k], 4));
+  const VF top = hn::MulAdd(x, hn::Sub(upper_right, upper_left), upper_left);
+  const VF bottom = hn::MulAdd(x, hn::Sub(lower_right, lower_left), lower_left);
+  return hn::CopySign(hn::MulAdd(y, hn::Sub(bottom, top), top), corner);
 }
 
-/// Four texels per lane, weighted bilinearly; the density is the upper left texel's.
+/// Four texels per lane, weighted bilinearly; the sign of the density is the upper left texel's.
 HWY_INLINE RadianceLanes LoadTexelsBilinear(const EnvironmentView& view, VI index, VF fx, VF fy) {
   const Records upper = TexelRecords(view, index);
   Records lower;
@@ -142,6 +142,7 @@ HWY_INLINE RadianceLanes EvaluateTexels(const EnvironmentView& view, const Texel
   light.r = hn::AndNot(hidden, light.r);
   light.g = hn::AndNot(hidden, light.g);
   light.b = hn::AndNot(hidden, light.b);
+  light.density = hn::AndNot(hidden, light.density);
   return light;
 }
 

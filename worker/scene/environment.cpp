@@ -4,6 +4,7 @@
 #include <cmath>
 #include <limits>
 #include <numbers>
+#include <span>
 
 #include "common/base/check.h"
 #include "common/math/octahedral.h"
@@ -14,7 +15,7 @@ namespace {
 /// Cells between two kept cumulative sums of a row.
 constexpr int kBlock = 16;
 
-/// Density of cells so dim that float cannot hold theirs.
+/// Density of texels so dim that float cannot hold theirs.
 constexpr float kMinDensity = std::numeric_limits<float>::min();
 
 /// Compensation that leaves less than this share of the power is noise: the map is constant.
@@ -22,11 +23,6 @@ constexpr double kMinCompensatedShare = 1e-5;
 
 double mean_rgb(const EnvironmentMap::Texel& t) {
   return (static_cast<double>(t.r) + t.g + t.b) * (1.0 / 3.0);
-}
-
-/// Solid angle between two polar angles, cos a - cos b without cancellation, times 2 pi.
-double zone_solid_angle(double a, double b) {
-  return 4 * std::numbers::pi * std::sin(0.5 * (a + b)) * std::sin(0.5 * (b - a));
 }
 
 int num_blocks(int width) { return (width + kBlock - 1) / kBlock; }
@@ -110,93 +106,78 @@ void EnvironmentMap::hide(const HiddenCone& cone) {
       if (std::sin(polar) * around[i] + std::cos(polar) * cone.axis[1] >= least)
         texel[i].density = -0.0f;
     }
+    texel[-1].density = texel[width_ - 1].density;
+    texel[width_].density = texel[0].density;
   }
 }
 
-std::vector<double> EnvironmentMap::row_means(int row) const {
-  const Texel* texel = &texels_[cell_row(row)];
-  std::vector<double> means(static_cast<std::size_t>(width_) + 1);
-  for (int i = 0; i <= width_; ++i) means[static_cast<std::size_t>(i)] = mean_rgb(texel[i]);
-  return means;
+EnvironmentMap::Edges EnvironmentMap::edges_of(const Texel* texel) const {
+  if (texel->is_hidden()) return {};
+  const auto weight = [](const Texel& t) { return std::fabs(double{t.density}); };
+  if (filter_ == MapFilter::nearest) return {weight(*texel), weight(*texel)};
+  const Texel* below = texel + stride();
+  return {0.5 * (weight(texel[0]) + weight(texel[1])), 0.5 * (weight(below[0]) + weight(below[1]))};
 }
 
-double EnvironmentMap::measure_row(int row, const std::vector<double>& means,
-                                   const std::vector<double>& means_below) {
-  // A nearest cell is one texel; a bilinear cell has corners in two columns of two rows. What is
-  // hidden counts as black.
-  Texel* texel = &texels_[cell_row(row)];
+double EnvironmentMap::weight_down(const Texel* texel, double place) const {
+  const auto weight = [](const Texel& t) { return std::fabs(double{t.density}); };
+  if (filter_ == MapFilter::nearest) return weight(*texel);
+  return (1 - place) * weight(*texel) + place * weight(texel[stride()]);
+}
+
+double EnvironmentMap::weigh_texels() {
+  for (Texel& texel : texels_)
+    texel.density = std::copysign(static_cast<float>(mean_rgb(texel)), texel.density);
+  return integral_of_weights();
+}
+
+void EnvironmentMap::reduce_weights(double offset, double factor) {
+  for (Texel& texel : texels_) {
+    const double weight = std::fabs(double{texel.density}) - offset;
+    const float density =
+        weight > 0 ? std::max(static_cast<float>(weight * factor), kMinDensity) : 0.0f;
+    texel.density = std::copysign(density, texel.density);
+  }
+}
+
+double EnvironmentMap::integral_of_weights() const {
   double sum = 0;
-  const bool nearest = filter_ == MapFilter::nearest;
-  for (std::size_t i = 0; i < static_cast<std::size_t>(width_); ++i) {
-    const double mean =
-        nearest ? means[i]
-                : 0.25 * ((means[i] + means_below[i]) + (means[i + 1] + means_below[i + 1]));
-    if (!texel[i].is_hidden()) texel[i].density = static_cast<float>(mean);
-    sum += texel[i].density;
+  for (int r = 0; r < cell_rows(); ++r) {
+    const Texel* texel = &texels_[cell_row(r)];
+    Edges row;
+    for (int i = 0; i < width_; ++i) row += edges_of(texel + i);
+    sum += rows_[static_cast<std::size_t>(r)].integral(row.upper, row.lower);
   }
   return sum;
 }
 
-std::pair<double, double> EnvironmentMap::compensation(
-    const std::vector<double>& solid_angle) const {
-  const double offset = total_power_ / (4 * std::numbers::pi);
-  double power = 0;
-  for (int r = 0; r < cell_rows(); ++r) {
-    const Texel* texel = &texels_[cell_row(r)];
-    double sum = 0;
-    for (int i = 0; i < width_; ++i) sum += std::max(0.0, texel[i].density - offset);
-    power += sum * solid_angle[r];
-  }
-  if (power < kMinCompensatedShare * total_power_) return {0.0, total_power_};
-  return {offset, power};
-}
-
 void EnvironmentMap::build_table(bool compensate) {
-  // Measure the cells and the map's power.
-  const int rows = cell_rows();
-  std::vector<double> solid_angle(static_cast<std::size_t>(rows));
-  std::vector<double> means = row_means(0);
-  for (int r = 0; r < rows; ++r) {
-    solid_angle[r] = zone_solid_angle(row_angle(r), row_angle(r + 1)) / width_;
-    const bool ends = filter_ == MapFilter::nearest && r + 1 == rows;
-    std::vector<double> below = ends ? std::vector<double>() : row_means(r + 1);
-    total_power_ += measure_row(r, means, below) * solid_angle[r];
-    means = std::move(below);
-  }
-  const auto [offset, power] =
-      compensate ? compensation(solid_angle) : std::pair(0.0, total_power_);
-  const double inverse_power = power > 0 ? 1 / power : 0.0;
+  const int rows = cell_rows(), blocks = num_blocks(width_);
+  for (int r = 0; r < rows; ++r) rows_.emplace_back(row_angle(r), row_angle(r + 1), width_);
 
-  // Turn radiance into densities and cumulative sums; a cell with any weight keeps a positive
-  // density.
-  const int blocks = num_blocks(width_);
-  row_cdf_.assign(static_cast<std::size_t>(rows) + 1, 0.0);
-  block_cdf_.assign(static_cast<std::size_t>(rows) * (blocks + 1), 0.0);
+  // Turn radiance into densities.
+  double power = total_power_ = weigh_texels();
+  if (compensate) {
+    reduce_weights(total_power_ / (4 * std::numbers::pi), 1);
+    power = integral_of_weights();
+    if (power < kMinCompensatedShare * total_power_) power = weigh_texels();
+  }
+  reduce_weights(0, power > 0 ? 1 / power : 0);
+
+  // Sum them up.
+  row_cdf_.assign(1, 0.0);
+  block_cdf_.reserve(static_cast<std::size_t>(rows) * static_cast<std::size_t>(blocks + 1));
   for (int r = 0; r < rows; ++r) {
-    const double top = row_angle(r), bottom = row_angle(r + 1);
-    const double sin_row = std::sin(0.5 * (top + bottom));
-    rows_.push_back(
-        {.top = std::cos(top),
-         .drop = zone_solid_angle(top, bottom) / (2 * std::numbers::pi),
-         .margin_right = std::min(
-             0.5, kOctahedralError * width_ / (2 * std::numbers::pi * std::max(sin_row, 1e-9)))});
-    Texel* texel = &texels_[cell_row(r)];
-    double* block_cdf = &block_cdf_[static_cast<std::size_t>(r) * (blocks + 1)];
+    const Texel* texel = &texels_[cell_row(r)];
+    Edges sum;
+    block_cdf_.push_back(sum);
     for (int block = 0; block < blocks; ++block) {
-      double sum = block_cdf[block];
       const int end = std::min((block + 1) * kBlock, width_);
-      for (int i = block * kBlock; i < end; ++i) {
-        const double weight = texel[i].density - offset;
-        const auto density = static_cast<float>(weight * inverse_power);
-        texel[i].density =
-            weight > 0 ? std::max(density, kMinDensity) : std::copysign(0.0f, texel[i].density);
-        sum += texel[i].density;
-      }
-      block_cdf[block + 1] = sum;
+      for (int i = block * kBlock; i < end; ++i) sum += edges_of(texel + i);
+      block_cdf_.push_back(sum);
     }
-    texel[-1].density = texel[width_ - 1].density;
-    texel[width_].density = texel[0].density;
-    row_cdf_[r + 1] = row_cdf_[r] + block_cdf[blocks] * solid_angle[r];
+    row_cdf_.push_back(row_cdf_.back() +
+                       rows_[static_cast<std::size_t>(r)].integral(sum.upper, sum.lower));
   }
 }
 
@@ -211,7 +192,9 @@ EnvironmentMap::Texel EnvironmentMap::evaluate(const Vec3& w) const {
   };
   if (filter_ == MapFilter::nearest) {
     const int i = std::clamp(static_cast<int>(x), 0, width_ - 1);
-    return *texel(i, std::min(static_cast<int>(y), height_ - 1));
+    Texel found = *texel(i, std::min(static_cast<int>(y), height_ - 1));
+    if (found.is_hidden()) found.density = -0.0f;
+    return found;
   }
 
   // Interpolate the four corners of the dual cell.
@@ -224,43 +207,64 @@ EnvironmentMap::Texel EnvironmentMap::evaluate(const Vec3& w) const {
   const auto blend = [fx, fy](float ul, float ur, float ll, float lr) {
     return (1 - fy) * ((1 - fx) * ul + fx * ur) + fy * ((1 - fx) * ll + fx * lr);
   };
+  const float density = a->is_hidden() ? -0.0f
+                                       : blend(std::fabs(a[0].density), std::fabs(a[1].density),
+                                               std::fabs(b[0].density), std::fabs(b[1].density));
   return {blend(a[0].r, a[1].r, b[0].r, b[1].r), blend(a[0].g, a[1].g, b[0].g, b[1].g),
-          blend(a[0].b, a[1].b, b[0].b, b[1].b), a->density};
+          blend(a[0].b, a[1].b, b[0].b, b[1].b), density};
 }
 
 Vec3 EnvironmentMap::sample(const std::array<float, 2>& u) const {
   BATON_CHECK(row_cdf_.back() > 0);
 
-  // Choose the row, then the block of cells, then the cell.
-  const auto row_end = std::upper_bound(row_cdf_.begin(), row_cdf_.end(), u[0] * row_cdf_.back());
-  const int row = static_cast<int>(row_end - row_cdf_.begin()) - 1;
-  const int blocks = num_blocks(width_);
-  const double* block_cdf = &block_cdf_[static_cast<std::size_t>(row) * (blocks + 1)];
-  const double x = u[1] * block_cdf[blocks];
-  const int block =
-      static_cast<int>(std::upper_bound(block_cdf, block_cdf + blocks + 1, x) - block_cdf) - 1;
-  const Texel* texel = &texels_[cell_row(row)];
-  int column = block * kBlock;
-  double below = block_cdf[block];
-  while (below + texel[column].density <= x) below += texel[column++].density;
+  // Choose the row, and the place in it; then, along that parallel, the block of cells.
+  const double z = u[0] * row_cdf_.back();
+  const auto row_end = std::upper_bound(row_cdf_.begin(), row_cdf_.end(), z);
+  const auto r = static_cast<std::size_t>(row_end - row_cdf_.begin()) - 1;
+  const auto blocks = static_cast<std::size_t>(num_blocks(width_));
+  const std::span block_cdf = std::span(block_cdf_).subspan(r * (blocks + 1), blocks + 1);
+  const MapRow& row = rows_[r];
+  const double down = std::clamp(row.place(block_cdf.back().upper, block_cdf.back().lower,
+                                           (z - row_cdf_[r]) / (row_cdf_[r + 1] - row_cdf_[r])),
+                                 row.margin_down(), 1 - row.margin_down());
+  const double x = u[1] * block_cdf.back().at(down);
+  const auto block_end =
+      std::partition_point(block_cdf.begin(), block_cdf.end() - 1,
+                           [&](const Edges& below) { return below.at(down) <= x; });
+  const std::ptrdiff_t block = block_end - block_cdf.begin() - 1;
 
-  // The remainders place it in the cell. The margins keep it there when it is rounded to float or
-  // to the lattice of carried directions: light that slips from a bright cell into a dim one would
-  // be divided by too small a density, and what slips the other way does not make up for it.
-  const auto& [top, drop, margin_right] = rows_[static_cast<std::size_t>(row)];
-  const double margin_down = std::min(0.5, kOctahedralError * height_ / std::numbers::pi);
-  const double down =
-      std::clamp((u[0] * row_cdf_.back() - row_cdf_[row]) / (row_cdf_[row + 1] - row_cdf_[row]),
-                 margin_down, 1 - margin_down);
+  // Choose the cell, and the place in it. The margins keep it there when it is rounded to float or
+  // to the lattice of carried directions: with `nearest` light that slips from a bright cell into a
+  // dim one would be divided by too small a density, and what slips the other way does not make up
+  // for it; and what is hidden has none.
+  const Texel* texels = &texels_[cell_row(static_cast<int>(r))];
+  const bool is_nearest = filter_ == MapFilter::nearest;
+  const auto side = [&](int i) { return weight_down(texels + i, down); };
+  const int first = static_cast<int>(block) * kBlock, end = std::min(first + kBlock, width_);
+  double below = block_cdf[static_cast<std::size_t>(block)].at(down), rest = 0;
+  double left = side(first), left_of_chosen = 0, right_of_chosen = 0;
+  int column = first;
+  for (int i = first; i < end && below <= x; ++i) {
+    if (is_nearest) left = side(i);
+    const double right = is_nearest ? left : side(i + 1);
+    if (const double cell = texels[i].is_hidden() ? 0 : 0.5 * (left + right); cell > 0) {
+      column = i;
+      rest = (x - below) / cell;
+      left_of_chosen = left;
+      right_of_chosen = right;
+      below += cell;
+    }
+    left = right;
+  }
   const double right =
-      std::clamp((x - below) / texel[column].density, margin_right, 1 - margin_right);
+      std::clamp(place_in_linear(left_of_chosen, right_of_chosen, std::clamp(rest, 0.0, 1.0)),
+                 row.margin_across(), 1 - row.margin_across());
 
-  // Place the direction uniformly in the cell's solid angle.
-  const double y = top - drop * down;
-  const double sin_polar = std::sqrt(std::max(0.0, (1 - y) * (1 + y)));
-  const double shift = filter_ == MapFilter::bilinear ? 0.5 : 0.0;
+  // Where that is on the sphere.
+  const double polar = row.angle(down), sin_polar = std::sin(polar);
+  const double shift = is_nearest ? 0.0 : 0.5;
   const double longitude = (0.5 - (column + shift + right) / width_) * 2 * std::numbers::pi;
-  return {static_cast<float>(sin_polar * std::sin(longitude)), static_cast<float>(y),
+  return {static_cast<float>(sin_polar * std::sin(longitude)), static_cast<float>(std::cos(polar)),
           static_cast<float>(sin_polar * std::cos(longitude))};
 }
 

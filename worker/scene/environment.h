@@ -10,6 +10,7 @@
 
 #include "common/image/image_io.h"
 #include "common/job/sequence.h"
+#include "worker/scene/map_row.h"
 #include "worker/scene/map_texel.h"
 
 namespace baton {
@@ -29,22 +30,22 @@ struct HiddenCone {
 /// j+1)/H.
 ///
 /// The table's cells: with `nearest` the texels, with `bilinear` the cells of the dual grid between
-/// four texel centres (W x (H+1), the first and last row half as high). A cell's probability is
-/// proportional to the mean over RGB and over its four corners of the radiance, times its solid
-/// angle, and the density is constant inside: it is positive wherever the reconstruction is.
-/// Cells that lie in a HiddenCone have density -0: they are seen, and light nothing.
+/// four texel centres (W x (H+1), the first and last row half as high). Every texel has a weight,
+/// the mean over RGB of its radiance (less what MIS compensation takes off), and the density is the
+/// same reconstruction of these weights over their integral: without compensation it is the mean
+/// radiance along the direction over the map's power, exactly. Cells that lie in a HiddenCone are
+/// seen, and light nothing: no density.
 ///
 /// Texels are stored once, padded by one texel on every side, as {R, G, B, density}: texel (i, j)
-/// at
-/// [(j + 1) * stride + (i + 1)], i in [-1, W], j in [-1, H]. `density` is the table's pdf in 1/sr
-/// of the cell whose upper left corner (nearest: which itself) is the texel, so that one look-up
-/// gives radiance and pdf.
+/// at [(j + 1) * stride + (i + 1)], i in [-1, W], j in [-1, H]. `density` is the table's pdf in
+/// 1/sr at the texel's centre, so that one look-up gives radiance and pdf; its sign says whether
+/// the cell whose upper left corner (nearest: which itself) is the texel is hidden.
 class EnvironmentMap {
  public:
   struct Texel {
     float r = 0, g = 0, b = 0, density = 0;
 
-    /// Reaches no surface.
+    /// Reaches no surface; stored: the texel's cell.
     bool is_hidden() const { return std::signbit(density); }
   };
 
@@ -76,6 +77,19 @@ class EnvironmentMap {
   Vec3 sample(const std::array<float, 2>& u) const;
 
  private:
+  /// What a row of cells holds: for its upper and its lower edge, the sum over its visible cells of
+  /// the mean along the cell's edge.
+  struct Edges {
+    double upper = 0, lower = 0;
+    /// At a place from the upper edge (0) to the lower one (1).
+    double at(double place) const { return (1 - place) * upper + place * lower; }
+    Edges& operator+=(const Edges& other) {
+      upper += other.upper;
+      lower += other.lower;
+      return *this;
+    }
+  };
+
   int cell_rows() const;
   /// Polar angle of the upper edge of a cell row; `cell_rows()` gives the lower edge of the last.
   double row_angle(int row) const;
@@ -83,31 +97,28 @@ class EnvironmentMap {
   std::size_t cell_row(int row) const;
   /// Marks the cells that lie wholly in the cone.
   void hide(const HiddenCone& cone);
-  /// Mean over RGB of the texels of a row of cells, and of the first one again: (width + 1).
-  std::vector<double> row_means(int row) const;
-  /// Writes the mean radiance of a row's cells to their densities; returns the sum. means: of the
-  /// row, and of the one below where the map is bilinear.
-  double measure_row(int row, const std::vector<double>& means,
-                     const std::vector<double>& means_below);
-  /// Radiance that the table leaves out, and the power that remains in the table.
-  std::pair<double, double> compensation(const std::vector<double>& solid_angle) const;
+  /// Weights as means over RGB; the power of the map.
+  double weigh_texels();
+  /// Weights less an offset, where positive, times a factor.
+  void reduce_weights(double offset, double factor);
+  /// Edges of the cell that a texel owns; zero where it is hidden.
+  Edges edges_of(const Texel* texel) const;
+  /// Weight at a place down in the cell that a texel owns, on its left side (nearest: of all of
+  /// it).
+  double weight_down(const Texel* texel, double place) const;
+  /// Integral of the weights over the visible cells.
+  double integral_of_weights() const;
   void build_table(bool compensate);
 
   int width_ = 0, height_ = 0;
   MapFilter filter_ = MapFilter::bilinear;
   std::vector<Texel> texels_;
+  std::vector<MapRow> rows_;  ///< (cell rows)
   /// Cumulative sums, in double: no dim cell is lost beside a sun. Of a row's cells only every
-  /// kBlock-th sum is kept; between them the densities are added up again, so what is sampled is
+  /// kBlock-th sum is kept; between them the cells are added up again, so what is sampled is
   /// exactly what evaluate() reports.
-  std::vector<double> row_cdf_;  ///< (cell rows + 1) probability
-  /// Where a row of cells lies on the sphere.
-  struct Row {
-    double top;           ///< cosine of the polar angle of its upper edge
-    double drop;          ///< how far the cosine falls to the lower one
-    double margin_right;  ///< see sample(), in cells
-  };
-  std::vector<Row> rows_;          ///< (cell rows)
-  std::vector<double> block_cdf_;  ///< (cell rows, ceil(W / kBlock) + 1) densities of the row
+  std::vector<double> row_cdf_;   ///< (cell rows + 1) probability
+  std::vector<Edges> block_cdf_;  ///< (cell rows, ceil(W / kBlock) + 1) of the row
   TexelRepairs repairs_;
   double total_power_ = 0;
 };

@@ -19,7 +19,8 @@ inline std::array<float, 3> texel_radiance(const float* rgb, float scale, TexelR
   const auto is_radiance = [](float value) {
     return value >= 0 && value <= std::numeric_limits<float>::max();
   };
-  std::array<float, 3> texel{rgb[0] * scale, rgb[1] * scale, rgb[2] * scale};
+  // + 0: no channel is a negative zero, whose sign would be taken for that of its neighbours.
+  std::array<float, 3> texel{rgb[0] * scale + 0.0f, rgb[1] * scale + 0.0f, rgb[2] * scale + 0.0f};
   if (is_radiance(texel[0]) && is_radiance(texel[1]) && is_radiance(texel[2])) return texel;
   bool nan = false;
   bool infinite = false;

@@ -91,6 +91,38 @@ TEST(PresampledSets, AreOneNetTogether) {
   EXPECT_GT(independent, 0.5 * one / 4);
 }
 
+// Hypothesis: the irradiance that a set of a map full of detail gives has at most a tenth of the
+// variance that independent entries would, by 64 seeds. What cells hold of noise no net takes away:
+// with a table that is constant in its cells, the ratio is 0.3.
+TEST(PresampledLight, DetailOfTheMapIsNoNoise) {
+  RgbImage image{256, 128, {}};
+  for (std::uint32_t i = 0; i < 256 * 128; ++i) {
+    const float u = uniform_float(i * 0x9E3779B9u ^ (i >> 3) * 0x85EBCA6Bu);
+    image.rgb.insert(image.rgb.end(), 3, 0.05f + u * u * u * 8);
+  }
+  const Environment environment{
+      std::make_shared<EnvironmentMap>(image, MapFilter::bilinear, 1.0f, false), Mat3{}};
+  constexpr int kSeeds = 64;
+  double sum = 0, squares = 0, of_entries = 0;
+  for (int seed = 1; seed <= kSeeds; ++seed) {
+    const PresampledLight light =
+        presample_light(environment, environment, static_cast<std::uint64_t>(seed), 1);
+    double mean = 0, square = 0;
+    for (const PresampledLight::Block& block : light.blocks) {
+      for (std::size_t j = 0; j < PresampledLight::kBlock; ++j) {
+        const double value =
+            double{block.g[j] * block.inverse_density[j]} * std::max(block.y[j], 0.0f);
+        mean += value / PresampledLight::kSize;
+        square += value * value / PresampledLight::kSize;
+      }
+    }
+    sum += mean / kSeeds;
+    squares += mean * mean / kSeeds;
+    of_entries += (square - mean * mean) / PresampledLight::kSize / kSeeds;
+  }
+  EXPECT_LT((squares - sum * sum) / of_entries, 0.1);
+}
+
 TEST(PresampledSets, AreAllReadInEachSquareOfThem) {
   const Environment environment = gradient_environment();
   for (const std::int32_t count : {1, 2, 8, 16}) {
