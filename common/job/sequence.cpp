@@ -234,6 +234,14 @@ std::int32_t exchange_reach_px(const VisibilitySpec& visibility) {
   return visibility.tile_size - 1 + visibility.dilate;
 }
 
+std::vector<int> pick_frames(const std::vector<int>& frames, std::size_t count) {
+  if (frames.size() <= count) return frames;
+  std::vector<int> picked;
+  for (std::size_t i = 0; i < count; ++i)
+    picked.push_back(frames[i * (frames.size() - 1) / (count - 1)]);
+  return picked;
+}
+
 std::filesystem::path frame_path(const JobSpec& job, std::int32_t frame_index) {
   const int number = job.frames.at(static_cast<std::size_t>(frame_index));
   return std::filesystem::path(job.output.directory) / frame_file_name(job.output.pattern, number);

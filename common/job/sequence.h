@@ -141,6 +141,9 @@ std::int32_t num_populations(const JobSpec& job);
 /// decide the mask.
 std::int32_t exchange_reach_px(const VisibilitySpec& visibility);
 
+/// At most `count` (> 1) of `frames`, evenly picked, the first and the last among them.
+std::vector<int> pick_frames(const std::vector<int>& frames, std::size_t count);
+
 /// Where frame `frame_index` (0-based) of the job is written.
 std::filesystem::path frame_path(const JobSpec& job, std::int32_t frame_index);
 

@@ -17,7 +17,7 @@ namespace baton {
 /// data never travels here: blobs go through the store, messages carry their digests.
 
 inline constexpr const char* kProtocolName = "BATON";
-inline constexpr std::uint16_t kProtocolVersion = 10;
+inline constexpr std::uint16_t kProtocolVersion = 11;
 
 // ---- worker to coordinator ----------------------------------------------------------------------
 struct WorkerHello {  ///< first, and again after a reconnect or a new epoch
@@ -41,6 +41,7 @@ struct TaskDone {
   std::vector<BlobRef> outputs;
   RenderStats stats;
   std::vector<FrameStats> frames = {};  ///< of a render task one for each frame, of an assembly one
+  std::vector<std::string> notes = {};  ///< of the job's files, for people; each once of a worker
 };
 struct TaskFailed {
   LeaseId lease;
@@ -180,6 +181,7 @@ struct JobDetail {
   std::string plan = {};   ///< of the answer to ResumeJob: as JobAccepted's
   /// It waits for room in the store, and nothing that is in work will make some.
   bool lacks_room = false;
+  std::vector<std::string> notes = {};  ///< of workers, of the job's files
 };
 struct Refused {
   std::uint8_t kind = 0;  ///< ErrorKind

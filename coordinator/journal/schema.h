@@ -5,15 +5,15 @@
 namespace baton {
 
 /// Of `PRAGMA user_version`.
-inline constexpr std::int64_t kSchemaVersion = 5;
+inline constexpr std::int64_t kSchemaVersion = 6;
 inline constexpr std::int64_t kApplicationId = 0x4241544e;  // "BATN"
 
 // Digests, keys and statuses are written as numbers and hexadecimal text, so that the sqlite3 shell
 // shows them; outputs, statistics and leases in the form of common/base/archive.h: a change of
-// BlobRef, RenderStats, FrameStats or LeaseId is a new schema version. Of `permanent` bit 0 says
-// that no retry by this worker can help, bit 1 that the task has failed for good with it. The
-// completions of a job in the archive are pieces, packed by zstd (journal_archive.cpp). `kept` is
-// what the blobs of kept_blobs take, each counted once.
+// BlobRef, RenderStats, FrameStats, LeaseId or JobDetail is a new schema version. Of `permanent`
+// bit 0 says that no retry by this worker can help, bit 1 that the task has failed for good with
+// it. The completions of a job in the archive are pieces, packed by zstd (journal_archive.cpp).
+// `kept` is what the blobs of kept_blobs take, each counted once.
 inline constexpr const char* kSchema = R"sql(
   CREATE TABLE starts (epoch INTEGER NOT NULL);
   INSERT INTO starts VALUES (0);

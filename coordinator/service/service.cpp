@@ -205,7 +205,20 @@ Status Service::receive_from(const std::string& worker, const TaskDone& message)
                  *missing);
     return step(ResultMissing{worker, message.lease, message.outputs});
   }
+  keep_notes(message);
   return step(TaskCompleted{worker, message.lease, message.outputs, message.stats, message.frames});
+}
+
+/// What a worker has to say of a job's files, for those who ask for the job.
+void Service::keep_notes(const TaskDone& report) {
+  constexpr std::size_t kMostNotes = 100;
+  if (report.notes.empty() || scheduler_.find_job(report.lease.job) == nullptr) return;
+  std::vector<std::string>& notes = notes_[report.lease.job];
+  for (const std::string& note : report.notes) {
+    std::string text = note.substr(0, limits::kMaxTextLength);
+    if (notes.size() < kMostNotes && std::ranges::find(notes, text) == notes.end())
+      notes.push_back(std::move(text));
+  }
 }
 
 Status Service::receive_from(const std::string& worker, const TaskFailed& message) {

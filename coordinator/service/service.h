@@ -103,6 +103,7 @@ class Service {
   template <class E>
   Status change_job(const PeerId& peer, const std::string& prefix);
   Status answer_detail(const PeerId& peer, const Digest& job, std::string plan = {});
+  Result<JobDetail> living_detail(const Digest& job);
   Result<std::optional<JobDetail>> archived_detail(const Digest& job);
   Result<Digest> resolve(const std::string& text);
   Status archive_job(const Digest& job);
@@ -141,6 +142,7 @@ class Service {
   Status refuse(const PeerId& peer, const Error& error);
   const Scheduler::Job* job_of_open_task(const LeaseId& lease) const;
   bool writes_nowhere(const LeaseId& lease) const;
+  void keep_notes(const TaskDone& report);
   std::optional<std::string> find_missing_blob(const TaskDone& report) const;
   std::optional<std::string> find_missing_frame(const TaskDone& report) const;
   std::optional<std::vector<BlobRef>> find_bad_inputs(const LeaseId& lease) const;
@@ -172,6 +174,7 @@ class Service {
   std::set<Digest> unremoved_;    ///< that the disk would not let go: tried again with each tick
   std::vector<Digest> ended_;     ///< jobs, to be archived at the end of the turn
   FrameFiles frame_files_;
+  std::map<Digest, std::vector<std::string>> notes_;  ///< of workers, of the files of living jobs
   std::map<Digest, std::vector<std::string>> lost_before_;  ///< what open jobs lacked at the start
 };
 

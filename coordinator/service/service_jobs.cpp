@@ -251,12 +251,19 @@ Status Service::change_job(const PeerId& peer, const std::string& prefix) {
   return answer_detail(peer, *job);
 }
 
+/// Of a job that is known here.
+Result<JobDetail> Service::living_detail(const Digest& job) {
+  BATON_ASSIGN(const std::vector<Failure> failures,
+               journal_.recent_failures(job, kMaxFailuresShown));
+  JobDetail detail = describe_job(scheduler_, job, failures);
+  if (const auto notes = notes_.find(job); notes != notes_.end()) detail.notes = notes->second;
+  return detail;
+}
+
 /// Of a job that is known here or in the archive.
 Status Service::answer_detail(const PeerId& peer, const Digest& job, std::string plan) {
   if (scheduler_.find_job(job) != nullptr) {
-    BATON_ASSIGN(const std::vector<Failure> failures,
-                 journal_.recent_failures(job, kMaxFailuresShown));
-    JobDetail detail = describe_job(scheduler_, job, failures);
+    BATON_ASSIGN(JobDetail detail, living_detail(job));
     detail.plan = std::move(plan);
     detail.summary.owner = owner_of(job);
     return reply(peer, std::move(detail));
@@ -307,11 +314,10 @@ Status Service::archive_job(const Digest& digest) {
       for (const BlobRef& blob : job->tasks.inputs(task)) kept.push_back(blob);
     }
   }
-  BATON_ASSIGN(const std::vector<Failure> failures,
-               journal_.recent_failures(digest, kMaxFailuresShown));
-  const JobDetail detail = describe_job(scheduler_, digest, failures);
+  BATON_ASSIGN(const JobDetail detail, living_detail(digest));
   BATON_TRY(journal_.archive_job(digest, to_bytes(detail.summary), to_bytes(detail), kept));
   lost_before_.erase(digest);
+  notes_.erase(digest);
   return step(JobForgotten{digest});
 }
 

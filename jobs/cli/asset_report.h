@@ -8,21 +8,10 @@
 
 #include "common/base/result.h"
 #include "common/job/job_spec.h"
+#include "worker/scene/map_report.h"
 #include "worker/scene/scene.h"
 
 namespace baton {
-
-/// A map of the job, as loaded.
-struct MapReport {
-  std::string path;
-  int width = 0, height = 0;            ///< texels in force
-  int file_width = 0, file_height = 0;  ///< what the file holds
-  std::uint64_t repaired_texels = 0;    ///< negative, NaN or infinite ones, taken as 0
-  bool black = false;
-  float brightest = 0;  ///< the largest finite channel of the file
-  std::string colors;   ///< what was converted (conversion_text); empty: nothing
-  float mean = 0;       ///< radiance over the sphere and the three channels, of finite ones
-};
 
 /// A plate of the job, as read.
 struct PlateReport {
@@ -34,14 +23,13 @@ struct PlateReport {
 /// The geometry of the job, as loaded.
 struct AssetReport {
   std::vector<MapReport> maps;  ///< in the order of their first key
-  bool every_map = true;        ///< else some were left out
   std::optional<MapReport> camera_map;
   std::vector<PlateReport> plates;  ///< in the order of their first frame
   std::uint64_t meshes = 0, deforming_meshes = 0, instances = 0;
   std::uint64_t triangles = 0;  ///< of all instances
   bool objects_move = false;
-  std::uint64_t dropped_triangles = 0;   ///< of all meshes: without area
-  std::vector<std::string> odd_objects;  ///< object_warnings
+  std::uint64_t dropped_triangles = 0;    ///< of all meshes: without area
+  std::vector<std::string> odd_geometry;  ///< geometry_warnings
   std::shared_ptr<const Scene> scene;
 };
 

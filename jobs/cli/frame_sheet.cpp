@@ -18,14 +18,6 @@ constexpr int kMaxThumbWidth = 320;
 
 }  // namespace
 
-std::vector<int> pick_frames(const std::vector<int>& frames, std::size_t count) {
-  if (frames.size() <= count) return frames;
-  std::vector<int> picked;
-  for (std::size_t i = 0; i < count; ++i)
-    picked.push_back(frames[i * (frames.size() - 1) / (count - 1)]);
-  return picked;
-}
-
 Result<RgbImage> read_thumbnail(const fs::path& path) {
   BATON_ASSIGN(const RgbImage image, read_rgb_image(path, ExrWindow::seen));
   return resize(image, std::min(image.width, kMaxThumbWidth));

@@ -12,9 +12,6 @@
 
 namespace baton {
 
-/// At most `count` of `frames` (> 1), evenly picked, the first and the last among them.
-std::vector<int> pick_frames(const std::vector<int>& frames, std::size_t count);
-
 /// A frame small enough for a sheet. Errors: read_rgb_image's.
 Result<RgbImage> read_thumbnail(const std::filesystem::path& path);
 

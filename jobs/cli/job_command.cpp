@@ -100,6 +100,7 @@ void print_detail(const JobDetail& detail, bool json) {
   if (!detail.frames_done.empty()) fmt::print("frames     {}\n", format_frames(detail.frames_done));
   fmt::print("{}{}", job_statistics(detail.summary), judgement_text(detail));
   if (!detail.waits.empty()) fmt::print("waits      {}\n", detail.waits);
+  for (const std::string& note : detail.notes) fmt::print("warning    {}\n", note);
   for (const std::string& failure : detail.failures) fmt::print("failure    {}\n", failure);
 }
 

@@ -223,6 +223,7 @@ ordered_json detail_json(const JobDetail& detail) {
     result["frames"].push_back(std::move(row));
   }
   result["failures"] = detail.failures;
+  result["warnings"] = detail.notes;
   return result;
 }
 

@@ -6,6 +6,8 @@
 
 #include <algorithm>
 #include <filesystem>
+#include <functional>
+#include <iterator>
 #include <map>
 
 #include "common/job/aov.h"
@@ -23,20 +25,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// Maps that are looked at while a job is rendered.
-constexpr std::size_t kMostMaps = 16;
-/// Factor by which the light's mean changes in a jump, and how many jumps are told one by one.
-constexpr float kJump = 2;
-constexpr std::size_t kMostJumps = 3;
 /// Plates that are told one by one.
 constexpr std::size_t kMostPlates = 3;
-
-/// Of any map, also one that only the camera sees.
-void texel_warning(const MapReport& map, std::vector<std::string>& warnings) {
-  if (map.repaired_texels > 0)
-    warnings.push_back(fmt::format("{}: {} texels are negative, NaN or infinite and count as 0",
-                                   map.path, map.repaired_texels));
-}
 
 void plate_warnings(const std::vector<PlateReport>& plates, std::vector<std::string>& warnings) {
   std::size_t count = 0;
@@ -49,70 +39,27 @@ void plate_warnings(const std::vector<PlateReport>& plates, std::vector<std::str
         fmt::format("{} more plates have pixels that are NaN or infinite", count - kMostPlates));
 }
 
-void map_warnings(const MapReport& map, std::vector<std::string>& warnings) {
-  const auto add = [&](const std::string& text) { warnings.push_back(map.path + ": " + text); };
-  texel_warning(map, warnings);
-  if (map.black) {
-    add("the map is black: nothing will be lit");
-  } else if (map.brightest <= 1) {
-    add(
-        fmt::format("no texel is brighter than 1 ({:.3g}): a picture of low dynamic range? Its "
-                    "lamps and its sun are then too dark",
-                    map.brightest));
-  }
-  if (map.file_width != 2 * map.file_height) {
-    add(
-        fmt::format("{}x{} texels, a lat-long map is twice as wide as high: the light will be "
-                    "distorted",
-                    map.file_width, map.file_height));
-  }
+void append(std::vector<std::string> lines, std::vector<std::string>& warnings) {
+  std::ranges::move(lines, std::back_inserter(warnings));
 }
 
-/// Between two of the job's frames.
-struct LightJump {
-  int from = 0, to = 0;
-  float ratio = 1;  ///< of the mean radiance; 1: only the map is another one
-};
-
-/// Where the light changes at once: its mean by a factor of two, or from one key's map to another's
-/// within a frame. Numbered maps are a film, so that there only the mean tells.
-std::vector<LightJump> light_jumps(const JobSpec& job, const AssetReport& assets) {
-  std::vector<LightJump> jumps;
-  if (!assets.every_map) return jumps;
+std::vector<std::string> light_jumps(const JobSpec& job, const AssetReport& assets) {
   std::map<std::string, float> means;
   for (const MapReport& map : assets.maps) means[map.path] = map.mean;
-  const std::vector<EnvironmentKey>& keys = job.environment.keys;
-  const auto key = [&](std::int32_t i) -> const EnvironmentKey& {
-    return keys[static_cast<std::size_t>(i)];
-  };
-  const auto level = [&](const EnvironmentFrame& at) {
-    return (1 - at.mix) * means[key(at.map_a).map] + at.mix * means[key(at.map_b).map];
-  };
+  std::vector<std::string> jumps;
   for (std::size_t i = 1; i < job.frames.size(); ++i) {
-    const int from = job.frames[i - 1], to = job.frames[i];
-    if (to != from + 1) continue;  // frames between them were left out on purpose
-    const EnvironmentFrame a = environment_at(job.environment, from);
-    const EnvironmentFrame b = environment_at(job.environment, to);
-    const float before = level(a), after = level(b);
-    const float ratio = before > 0 ? after / before : 1.0f;
-    const bool cut = job.environment.interpolate && a.mix == 0 && b.mix == 0 &&
-                     key(a.map_a).map != key(b.map_a).map;
-    if (ratio > kJump || ratio * kJump < 1)
-      jumps.push_back({from, to, ratio});
-    else if (cut)
-      jumps.push_back({from, to});
+    const auto jump =
+        light_jump(job.environment, job.frames[i - 1], job.frames[i], [&](std::int32_t key) {
+          return means[job.environment.keys[static_cast<std::size_t>(key)].map];
+        });
+    if (jump) jumps.push_back(*jump);
   }
   return jumps;
 }
 
-std::string jump_text(const LightJump& jump) {
-  if (jump.ratio == 1)
-    return fmt::format("the light jumps from frame {} to {}: another map", jump.from, jump.to);
-  return fmt::format("the light jumps from frame {} to {}: {:.3g} times as bright", jump.from,
-                     jump.to, jump.ratio);
-}
-
-void output_warnings(const JobSpec& job, const Scene& scene, std::vector<std::string>& warnings) {
+/// share: of the pixels that see a surface; asked where it matters.
+void output_warnings(const JobSpec& job, const std::function<double()>& share,
+                     std::vector<std::string>& warnings) {
   // The part of the path that is there already.
   fs::path folder = job.output.directory;
   std::error_code error;
@@ -125,11 +72,11 @@ void output_warnings(const JobSpec& job, const Scene& scene, std::vector<std::st
   const fs::space_info space = fs::space(folder, error);
   const JobEstimate e = estimate_job(job);
   const auto frames = static_cast<std::uint64_t>(e.frames * e.frame_bytes);
-  const auto store = [&](double share) {
-    return static_cast<std::uint64_t>(estimate_store(job, share).total());
+  const auto store = [&](double of_pixels) {
+    return static_cast<std::uint64_t>(estimate_store(job, of_pixels).total());
   };
   if (error || space.available >= frames + store(1)) return;
-  const std::uint64_t needed = store(surface_share(job, scene));
+  const std::uint64_t needed = store(share());
   if (space.available < frames + needed) {
     warnings.push_back(fmt::format("{}: {} are free, and frames may take {}, states and tiles {}",
                                    job.output.directory, bytes_text(space.available),
@@ -157,55 +104,57 @@ void aov_warnings(const JobSpec& job, std::vector<std::string>& warnings) {
         "same time halves the variance");
 }
 
-/// The job with those files alone that warnings look at: some maps, and meshes without normals.
-/// What surfaces look like is left out.
-JobSpec outline_of(JobSpec job) {
-  std::vector<EnvironmentKey>& keys = job.environment.keys;
-  if (keys.size() > kMostMaps) {
-    const std::size_t stride = (keys.size() + kMostMaps - 1) / kMostMaps;
-    for (std::size_t i = 0; i * stride < keys.size(); ++i) keys[i] = keys[i * stride];
-    keys.resize((keys.size() + stride - 1) / stride);
-  }
-  job.environment.camera_map.file.clear();
-  job.output.plate.reset();
+/// surface_share, from meshes without normals.
+double share_of_outline(JobSpec job) {
   for (auto& [name, mesh] : job.scene.meshes) mesh.smooth_normals = false;
   for (auto& [name, material] : job.scene.materials) material = {};
-  return job;
+  const Result<Scene> scene = load_scene(job);
+  return scene ? surface_share(job, *scene) : 1;
+}
+
+/// What the text of the job tells, light_jumps or not.
+void text_warnings(const JobSpec& job, bool light_jumps, const std::function<double()>& share,
+                   std::vector<std::string>& warnings) {
+  append(limit_warnings(job, light_jumps), warnings);
+  append(scene_warnings(job.scene), warnings);
+  aov_warnings(job, warnings);
+  idle_output_warnings(job, warnings);
+  output_warnings(job, share, warnings);
 }
 
 }  // namespace
 
 std::vector<std::string> job_warnings(const JobSpec& job, const AssetReport& assets) {
   std::vector<std::string> warnings;
-  for (const MapReport& map : assets.maps) map_warnings(map, warnings);
-  if (assets.camera_map) texel_warning(*assets.camera_map, warnings);
-  plate_warnings(assets.plates, warnings);
-  if (assets.dropped_triangles > 0) {
-    warnings.push_back(
-        fmt::format("{} triangles without area are left out", assets.dropped_triangles));
+  for (const MapReport& map : assets.maps) {
+    append(texel_warnings(map), warnings);
+    append(light_warnings(map), warnings);
   }
-  warnings.insert(warnings.end(), assets.odd_objects.begin(), assets.odd_objects.end());
-  const std::vector<LightJump> jumps = light_jumps(job, assets);
-  for (std::size_t i = 0; i < std::min(jumps.size(), kMostJumps); ++i)
-    warnings.push_back(jump_text(jumps[i]));
-  if (jumps.size() > kMostJumps)
-    warnings.push_back(fmt::format("the light jumps {} more times", jumps.size() - kMostJumps));
-  for (std::string& warning : limit_warnings(job, !jumps.empty()))
-    warnings.push_back(std::move(warning));
-  for (std::string& warning : scene_warnings(job.scene)) warnings.push_back(std::move(warning));
-  aov_warnings(job, warnings);
-  idle_output_warnings(job, warnings);
-  output_warnings(job, *assets.scene, warnings);
+  if (assets.camera_map) append(texel_warnings(*assets.camera_map), warnings);
+  plate_warnings(assets.plates, warnings);
+  append(assets.odd_geometry, warnings);
+  const std::vector<std::string> jumps = light_jumps(job, assets);
+  const std::size_t told = std::min(jumps.size(), kMostJumps);
+  append({jumps.begin(), jumps.begin() + static_cast<std::ptrdiff_t>(told)}, warnings);
+  if (jumps.size() > told)
+    warnings.push_back(fmt::format("the light jumps {} more times", jumps.size() - told));
+  text_warnings(
+      job, !jumps.empty(), [&] { return surface_share(job, *assets.scene); }, warnings);
   return warnings;
 }
 
-WarningsAside::WarningsAside(JobSpec job)
-    : thread_([job = std::move(job)] {
-        const JobSpec outline = outline_of(job);
-        Result<AssetReport> assets = load_assets(outline);
-        if (!assets) return;
-        assets->every_map = outline.environment.keys.size() == job.environment.keys.size();
-        for (const std::string& warning : job_warnings(job, *assets)) spdlog::warn("{}", warning);
-      }) {}
+std::vector<std::string> WarningLog::fresh(const std::vector<std::string>& lines) {
+  std::vector<std::string> fresh;
+  for (const std::string& line : lines)
+    if (told_.insert(line).second) fresh.push_back(line);
+  return fresh;
+}
+
+void WarningLog::begin(const JobSpec& job) {
+  std::vector<std::string> warnings;
+  text_warnings(
+      job, false, [&] { return share_of_outline(job); }, warnings);
+  for (const std::string& warning : fresh(warnings)) spdlog::warn("{}", warning);
+}
 
 }  // namespace baton

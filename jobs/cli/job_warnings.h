@@ -1,7 +1,7 @@
 #pragma once
 
+#include <set>
 #include <string>
-#include <thread>
 #include <vector>
 
 #include "jobs/cli/asset_report.h"
@@ -15,18 +15,17 @@ namespace baton {
 /// little room. assets: of this job, with settled motion.
 std::vector<std::string> job_warnings(const JobSpec& job, const AssetReport& assets);
 
-/// Says on stderr what job_warnings says, while the job is rendered already: files are read by a
-/// thread of its own, at most 16 of the maps. Files that cannot be loaded are left to the workers,
-/// whose job then fails.
-class WarningsAside {
+/// Says on stderr what a person should know of a job that is rendered, each line once: what its
+/// text tells at once, what its files tell as the workers find it (JobDetail::notes).
+class WarningLog {
  public:
-  /// Construct it after SignalWait. job: with settled motion.
-  explicit WarningsAside(JobSpec job);
-  /// Waits for the thread.
-  ~WarningsAside() = default;
+  /// job: with settled motion.
+  void begin(const JobSpec& job);
+  /// The lines that were not told yet; now they count as told.
+  std::vector<std::string> fresh(const std::vector<std::string>& lines);
 
  private:
-  std::jthread thread_;
+  std::set<std::string> told_;
 };
 
 }  // namespace baton

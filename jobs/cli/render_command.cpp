@@ -6,7 +6,6 @@
 #include "jobs/cli/coordinator_link.h"
 #include "jobs/cli/display.h"
 #include "jobs/cli/job_summary.h"
-#include "jobs/cli/job_warnings.h"
 #include "jobs/cli/render_watch.h"
 #include "jobs/cli/settle_method.h"
 
@@ -32,7 +31,6 @@ Result<ExitCode> run_render(const RenderOptions& options) {
 
   const SignalWait signals;
   BATON_ASSIGN(RenderSession session, RenderSession::start(options, farm, signals));
-  const WarningsAside warnings(job);
   BATON_ASSIGN(const std::optional<JobStatus> status,
                session.render(job, options.restart || options.from_frame || wanted.is_look));
   if (status && options.keep_running) {

@@ -88,6 +88,10 @@ Result<std::optional<JobDetail>> RenderSession::follow(const Digest& job, FrameS
     BATON_ASSIGN(std::optional<JobDetail> detail,
                  ask_farm<JobDetail>(farm_, client_, signals_, ShowJob{job.hex()}));
     if (detail) {
+      for (const std::string& note : warnings_.fresh(detail->notes)) {
+        progress.finish();
+        spdlog::warn("{}", note);
+      }
       progress.update(detail->summary, Clock::now());
       if (!detail->waits.empty() && waits.empty() && !(detail->lacks_room && farm_.is_own())) {
         progress.finish();
@@ -123,6 +127,7 @@ Result<std::optional<JobDetail>> RenderSession::render_sweeps(
 Result<std::optional<JobStatus>> RenderSession::render(JobSpec job, bool restart,
                                                        const std::function<bool()>& interrupted) {
   const Clock::time_point start = Clock::now();
+  warnings_.begin(job);
   MoreSweeps more(job, restart);
   std::optional<FrameSheet> sheet;
   std::optional<JobDetail> detail;

@@ -9,6 +9,7 @@
 #include "jobs/cli/ask_farm.h"
 #include "jobs/cli/display.h"
 #include "jobs/cli/job_argument.h"
+#include "jobs/cli/job_warnings.h"
 
 namespace baton {
 
@@ -73,6 +74,7 @@ class RenderSession {
   const SignalWait& signals_;
   LocalFarm farm_;
   RequestClient client_;
+  WarningLog warnings_;
 };
 
 }  // namespace baton

@@ -5,7 +5,6 @@
 
 #include <filesystem>
 
-#include "jobs/cli/job_warnings.h"
 #include "jobs/cli/settle_method.h"
 #include "worker/scene/settle_motion.h"
 
@@ -62,7 +61,6 @@ Result<ExitCode> watch_and_render(const RenderOptions& options) {
   const FarmOptions farm = farm_options(options, wanted.job);
   const SignalWait signals;
   BATON_ASSIGN(RenderSession session, RenderSession::start(options, farm, signals));
-  const WarningsAside warnings(wanted.job);
   bool stop = false;
   while (!stop) {
     const std::string state = watched_state(options.job);

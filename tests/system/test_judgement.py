@@ -127,6 +127,7 @@ def one_frame_of_another_light_stands_out(programs, folder):
     write_job(path, job)
     check("the light jumps from frame 4 to 5" in programs.run("baton", "check", path).stdout, "no warning of the jump")
     done = programs.render(path, folder / "work")
+    check_equal(done.stderr.count("the light jumps from frame 4 to 5"), 1, "the jump is told once")
     check(re.search(r"stands out frame 5: mean radiance [\d.]+ times", done.stdout), f"not told:\n{done.stdout}")
 
 

@@ -5,7 +5,9 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/job/known_limits.h"
 #include "common/math/octahedral.h"
+#include "worker/scene/map_report.h"
 
 namespace baton {
 namespace {
@@ -62,24 +64,10 @@ LightSequence::LightSequence(const JobSpec& job, std::shared_ptr<MapCache> maps,
           share, [](const Irradiance& irradiance) { return irradiance.size_bytes(); },
           frames_in_hand(job)) {}
 
-Result<std::shared_ptr<const EnvironmentMap>> LightSequence::file_map(
-    const std::string& path, const EnvironmentSpec& environment, bool compensate,
-    const HiddenCone& hidden) {
-  BATON_ASSIGN(const auto map, maps_->get(path, environment, compensate, hidden));
-  if (const auto& repairs = map->repairs(); repairs.total() > 0) {
-    const std::string note = fmt::format("{}: {} negative, {} NaN, {} infinite texels set to 0",
-                                         path, repairs.negative, repairs.nan, repairs.infinite);
-    if (std::find(repair_notes_.begin(), repair_notes_.end(), note) == repair_notes_.end()) {
-      repair_notes_.push_back(note);
-    }
-  }
-  return map;
-}
-
 Result<std::shared_ptr<const EnvironmentMap>> LightSequence::key_map(std::int32_t key,
                                                                      const HiddenCone& hidden) {
-  return file_map(job_.environment.keys[static_cast<std::size_t>(key)].map, job_.environment,
-                  job_.sampling.mis_compensation, hidden);
+  return maps_->get(job_.environment.keys[static_cast<std::size_t>(key)].map, job_.environment,
+                    job_.sampling.mis_compensation, hidden);
 }
 
 std::int32_t LightSequence::first_with_texels_of(const EnvironmentFrame& frame) const {
@@ -126,7 +114,7 @@ Result<Environment> LightSequence::seen_environment(const Environment& now) {
   if (camera_map.file.empty()) return now;
   const EnvironmentSpec as_is{
       .keys = {}, .filter = job_.environment.filter, .scale = camera_map.scale};
-  BATON_ASSIGN(auto map, file_map(camera_map.file, as_is, false, {}));
+  BATON_ASSIGN(auto map, maps_->get(camera_map.file, as_is, false, {}));
   return Environment{std::move(map), now.rotation};
 }
 
@@ -149,13 +137,15 @@ Result<std::shared_ptr<const FrameLight>> LightSequence::at(std::int32_t index,
   }
   if (frame.environment.same_texels(frame_before.environment))
     light->turn = turn_between(light->before, light->now);
+  if (round == 0) note(frame);
+  const bool is_seen = round >= 0 && round != kProbeRound;
   light->presampled = presampled_.find({index, round});
   if (light->presampled == nullptr) {
     light->presampled = presampled_.insert(
         {index, round},
         std::make_shared<const PresampledSets>(presample_sets(
             light->now, light->before, job_.seed, static_cast<std::uint32_t>(frame.number),
-            presampled_layout(job_), frame.first_round + round, num_sets_)));
+            presampled_layout(job_), frame.first_round + round, is_seen ? num_sets_ : 1)));
   }
   return std::shared_ptr<const FrameLight>(std::move(light));
 }
@@ -167,9 +157,38 @@ std::shared_ptr<const Irradiance> LightSequence::irradiance(const EnvironmentFra
   return irradiances_.insert(name, std::make_shared<const Irradiance>(*environment.map));
 }
 
-std::vector<std::string> LightSequence::repair_notes() const {
+/// What is odd about the maps of a frame that are not known yet, and about the step to it.
+void LightSequence::note(const FrameSpec& frame) {
+  if (!noted_.insert(frame.index).second) return;
+  const auto add = [&](const std::vector<std::string>& lines) {
+    for (const std::string& line : lines)
+      if (std::ranges::find(notes_, line) == notes_.end()) notes_.push_back(line);
+  };
+  const EnvironmentSpec& environment = job_.environment;
+  const auto report = [&](std::int32_t key) {
+    return maps_->report(environment.keys[static_cast<std::size_t>(key)].map, environment.scale);
+  };
+  for (const std::int32_t key : {frame.environment.map_a, frame.environment.map_b}) {
+    const MapReport map = report(key);
+    if (map.path.empty() || !noted_keys_.insert(key).second) continue;
+    add(texel_warnings(map));
+    add(light_warnings(map));
+  }
+  if (const CameraMapSpec& camera = environment.camera_map; !camera.file.empty())
+    add(texel_warnings(maps_->report(camera.file, camera.scale)));
+  if (frame.index == 0 || num_jumps_ == kMostJumps) return;
+  const int before = frames_[static_cast<std::size_t>(frame.index) - 1].number;
+  const auto jump = light_jump(environment, before, frame.number,
+                               [&](std::int32_t key) { return report(key).mean; });
+  if (!jump) return;
+  ++num_jumps_;
+  add({*jump});
+  add(limit_warnings(job_, true));
+}
+
+std::vector<std::string> LightSequence::notes() const {
   const std::lock_guard lock(mutex_);
-  return repair_notes_;
+  return notes_;
 }
 
 }  // namespace baton

@@ -4,6 +4,7 @@
 #include <memory>
 #include <mutex>
 #include <optional>
+#include <set>
 #include <vector>
 
 #include "common/base/lru_cache.h"
@@ -59,24 +60,21 @@ class LightSequence {
   /// kProbeRound. Errors: a map that cannot be read, or two key frames of different size.
   Result<std::shared_ptr<const FrameLight>> at(std::int32_t index, std::int32_t round = 0);
 
-  /// Texels set to 0 because they were negative, NaN or infinite, per map read so far: "path: 12
-  /// negative ...".
-  std::vector<std::string> repair_notes() const;
+  /// What people should know of the maps read so far, and of jumps of the light from one frame to
+  /// the next, a line each.
+  std::vector<std::string> notes() const;
 
  private:
   std::int32_t first_with_texels_of(const EnvironmentFrame& frame) const;
   std::shared_ptr<const Irradiance> irradiance(const EnvironmentFrame& frame,
                                                const Environment& environment);
-  /// A map of a file; notes its repairs.
-  Result<std::shared_ptr<const EnvironmentMap>> file_map(const std::string& path,
-                                                         const EnvironmentSpec& environment,
-                                                         bool compensate, const HiddenCone& hidden);
   Result<std::shared_ptr<const EnvironmentMap>> key_map(std::int32_t key, const HiddenCone& hidden);
   Result<std::shared_ptr<const EnvironmentMap>> mixed_map(const EnvironmentFrame& frame,
                                                           const HiddenCone& hidden);
   HiddenCone hidden_in(const FrameSpec& frame);
   Result<Environment> environment(const FrameSpec& frame);
   Result<Environment> seen_environment(const Environment& now);
+  void note(const FrameSpec& frame);
 
   const JobSpec& job_;
   const std::shared_ptr<MapCache> maps_;
@@ -89,7 +87,9 @@ class LightSequence {
   LruCache<std::pair<std::int32_t, HiddenCone>, EnvironmentMap> mixed_maps_;
   LruCache<std::pair<std::int32_t, std::int32_t>, PresampledSets> presampled_;  ///< frame, round
   LruCache<std::int32_t, Irradiance> irradiances_;  ///< by the first frame with these texels
-  std::vector<std::string> repair_notes_;
+  std::set<std::int32_t> noted_, noted_keys_;       ///< frames and keys that notes_ knows
+  std::size_t num_jumps_ = 0;                       ///< among them
+  std::vector<std::string> notes_;
 };
 
 }  // namespace baton

@@ -11,8 +11,16 @@ Result<MapCache::MapPtr> MapCache::get(const std::string& path, const Environmen
   const std::lock_guard lock(reading_);
   if (MapPtr found = maps_.find(key)) return found;
   BATON_ASSIGN(const RgbImage image, read_rgb_image(path));
+  reports_.insert_or_assign({path, environment.scale},
+                            report_map(path, image, environment.scale, environment.max_width));
   return maps_.insert(key, std::make_shared<const EnvironmentMap>(
                                make_map(image, environment, compensate, hidden)));
+}
+
+MapReport MapCache::report(const std::string& path, float scale) const {
+  const std::lock_guard lock(reading_);
+  const auto found = reports_.find({path, scale});
+  return found == reports_.end() ? MapReport() : found->second;
 }
 
 }  // namespace baton

@@ -1,13 +1,16 @@
 #pragma once
 
+#include <map>
 #include <memory>
 #include <mutex>
 #include <string>
+#include <utility>
 
 #include "common/base/lru_cache.h"
 #include "common/base/result.h"
 #include "common/job/job_spec.h"
 #include "worker/scene/environment.h"
+#include "worker/scene/map_report.h"
 
 namespace baton {
 
@@ -25,6 +28,8 @@ class MapCache {
   /// for. Error: a map that cannot be read.
   Result<MapPtr> get(const std::string& path, const EnvironmentSpec& environment, bool compensate,
                      const HiddenCone& hidden = {});
+  /// Of a map that was asked for with this scale; of none nothing is known.
+  MapReport report(const std::string& path, float scale) const;
 
  private:
   struct Key {
@@ -38,8 +43,9 @@ class MapCache {
     auto operator<=>(const Key&) const = default;
   };
 
-  std::mutex reading_;
+  mutable std::mutex reading_;
   LruCache<Key, EnvironmentMap> maps_;
+  std::map<std::pair<std::string, float>, MapReport> reports_;  ///< by path and scale
 };
 
 }  // namespace baton

@@ -19,12 +19,22 @@ namespace {
 /// The directions of a set's entries, in the order of the sequence.
 std::vector<OctDirection> draw_directions(const Environment& now, const Philox4x32::Counter& seeds,
                                           std::uint32_t set) {
-  std::vector<OctDirection> directions(PresampledLight::kSize);
+  // A net has one point in each of as many equal stretches. They are drawn from the top of the map
+  // to its bottom: what neighbours read of the table is in the cache.
+  constexpr int kShift = 32 - std::countr_zero(PresampledLight::kSize);
+  struct Point {
+    std::uint32_t number, x, y;
+  };
+  std::vector<Point> points(PresampledLight::kSize);
   for (std::uint32_t i = 0; i < PresampledLight::kSize; ++i) {
-    const auto [sx, sy] = sobol_2d(set * PresampledLight::kSize + i);
-    const Vec3 w = now.map->sample(
-        {uniform_float(owen_scramble(sx, seeds[0])), uniform_float(owen_scramble(sy, seeds[1]))});
-    directions[i] = encode_octahedral(now.rotation * w);
+    const auto [x, y] = sobol_2d(set * PresampledLight::kSize + i);
+    const std::uint32_t down = owen_scramble(x, seeds[0]);
+    points[down >> kShift] = {i, down, owen_scramble(y, seeds[1])};
+  }
+  std::vector<OctDirection> directions(PresampledLight::kSize);
+  for (const auto& [number, x, y] : points) {
+    const Vec3 w = now.map->sample({uniform_float(x), uniform_float(y)});
+    directions[number] = encode_octahedral(now.rotation * w);
   }
   return directions;
 }

@@ -1,9 +1,13 @@
 #include "worker/pass/render_context.h"
 
+#include <algorithm>
+#include <iterator>
+
 #include "common/job/motion.h"
 #include "worker/pass/primary.h"
 #include "worker/pass/shared_assets.h"
 #include "worker/scene/hidden_light.h"
+#include "worker/scene/object_view.h"
 #include "worker/scene/scene_kernels.h"
 
 namespace baton {
@@ -65,8 +69,12 @@ Rgb gather_sites(const FrameGeometry& geometry, std::span<const SurfaceHit> hits
   return emission / static_cast<float>(hits.size());
 }
 
-std::vector<std::string> repair_notes(const RenderContext& context) {
-  return context.lights->repair_notes();
+std::vector<std::string> asset_notes(const RenderContext& context, std::int32_t step,
+                                     std::int32_t tile) {
+  std::vector<std::string> notes = context.lights->notes();
+  if (step == 0 && tile == 0)
+    std::ranges::move(geometry_warnings(context.job, *context.scene), std::back_inserter(notes));
+  return notes;
 }
 
 std::string instruction_set() { return kernels::instruction_set(); }

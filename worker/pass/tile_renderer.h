@@ -60,9 +60,10 @@ Result<RenderStats> run_tile(const RenderContext& context, const TileRun& run,
                              std::span<const StatePtr> previous, const TileRunSink& sink,
                              const std::stop_token& stop);
 
-/// Texels of the job's maps that were set to 0 because they were negative, NaN or infinite; one
-/// line per map read so far.
-std::vector<std::string> repair_notes(const RenderContext& context);
+/// What people should know of the job's files, one line each, after a run of a tile: of the maps
+/// read so far, and with the job's first run of its first tile of meshes and objects.
+std::vector<std::string> asset_notes(const RenderContext& context, std::int32_t step,
+                                     std::int32_t tile);
 
 /// Name of the SIMD instruction set in use, e.g. "AVX2".
 std::string instruction_set();

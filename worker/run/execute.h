@@ -20,7 +20,7 @@ struct TaskOutput {
   std::vector<FrameStats> frames = {};  ///< of a render task in frame order, of an assembly one
   /// What this machine does not see of the job, a line; then nothing was done.
   std::string unseen = {};
-  std::vector<std::string> notes = {};  ///< to log: what was repaired of files
+  std::vector<std::string> notes = {};  ///< of files, for people: what was repaired, what is odd
 };
 
 /// How a task that was leased has ended.

@@ -80,10 +80,10 @@ void Session::on(const TaskEnded& event, TimePoint now, Actions& actions) {
   if (event.result && !event.result->unseen.empty()) {
     actions.push_back(SendMessage{LeaseReturn{event.lease, event.result->unseen}});
   } else if (event.result) {
-    reports_.push_back(
-        {event.lease,
-         TaskDone{event.lease, event.result->outputs, event.result->stats, event.result->frames},
-         now});
+    reports_.push_back({event.lease,
+                        TaskDone{event.lease, event.result->outputs, event.result->stats,
+                                 event.result->frames, event.result->notes},
+                        now});
     send_report(reports_.back(), now, actions);
   } else if (event.result.error().kind != ErrorKind::cancelled) {
     const Error& error = event.result.error();

@@ -78,19 +78,24 @@ Result<std::filesystem::path> save_job(const LoadedJob& loaded, const BlobStore&
   return path;
 }
 
-/// Logs each note once in the life of the process.
+/// Notes that the process had.
 class NoteLog {
  public:
-  void report(const std::vector<std::string>& notes) {
+  /// Logs each once. Returns those that are new of the job.
+  std::vector<std::string> report(const Digest& job, const std::vector<std::string>& notes) {
     const std::lock_guard lock(mutex_);
+    std::vector<std::string> fresh;
     for (const std::string& note : notes) {
       if (seen_.insert(note).second) spdlog::warn("{}", note);
+      if (of_jobs_.emplace(job, note).second) fresh.push_back(note);
     }
+    return fresh;
   }
 
  private:
   std::mutex mutex_;
   std::set<std::string> seen_;
+  std::set<std::pair<Digest, std::string>> of_jobs_;
 };
 
 /// What loading a job may take, the wait for its document and for another thread's loading
@@ -110,7 +115,7 @@ Result<TaskOutput> execute_pooled(const PooledTask& task, const std::stop_token&
     BATON_ASSIGN(loaded, task.job->load(stop));
   }
   if (!loaded->unseen.empty()) {
-    notes.report({loaded->unseen});
+    notes.report(loaded->digest, {loaded->unseen});
     return TaskOutput{.outputs = {}, .stats = {}, .unseen = loaded->unseen};
   }
   const TaskWatch::Mark mark(
@@ -121,7 +126,7 @@ Result<TaskOutput> execute_pooled(const PooledTask& task, const std::stop_token&
   BATON_TRY(check_output_root(loaded->job, roots));
   if (key.kind == TaskKind::assemble) {
     Result<TaskOutput> frame = execute_task(*loaded, *task.store, key, task.grant, stop);
-    if (frame) notes.report(frame->notes);
+    if (frame) frame->notes = notes.report(loaded->digest, frame->notes);
     return frame;
   }
 
@@ -136,7 +141,8 @@ Result<TaskOutput> execute_pooled(const PooledTask& task, const std::stop_token&
   }
   const CrashNote note(command);
   Result<TaskOutput> output = execute_task(*loaded, *task.store, key, task.grant, stop, &left);
-  notes.report(repair_notes(*loaded->context));
+  if (output)
+    output->notes = notes.report(loaded->digest, asset_notes(*loaded->context, key.step, key.tile));
   if (output || output.error().kind == ErrorKind::cancelled ||
       output.error().kind == ErrorKind::no_space)
     return output;
@@ -283,7 +289,7 @@ class Worker {
     if (refusal->kind == ErrorKind::usage) {
       leave_ = Leave{exit_code_of(refusal->kind), refusal->message};
     } else {
-      notes_.report({refusal->message});
+      notes_.report({}, {refusal->message});
     }
   }
 

@@ -241,7 +241,7 @@ Vec3 EnvironmentMap::sample(const std::array<float, 2>& u) const {
   const bool is_nearest = filter_ == MapFilter::nearest;
   const auto side = [&](int i) { return weight_down(texels + i, down); };
   const int first = static_cast<int>(block) * kBlock, end = std::min(first + kBlock, width_);
-  double below = block_cdf[static_cast<std::size_t>(block)].at(down), rest = 0;
+  double below = block_cdf[static_cast<std::size_t>(block)].at(down), rest = 0, chosen = 1;
   double left = side(first), left_of_chosen = 0, right_of_chosen = 0;
   int column = first;
   for (int i = first; i < end && below <= x; ++i) {
@@ -249,16 +249,17 @@ Vec3 EnvironmentMap::sample(const std::array<float, 2>& u) const {
     const double right = is_nearest ? left : side(i + 1);
     if (const double cell = texels[i].is_hidden() ? 0 : 0.5 * (left + right); cell > 0) {
       column = i;
-      rest = (x - below) / cell;
+      rest = x - below;
+      chosen = cell;
       left_of_chosen = left;
       right_of_chosen = right;
       below += cell;
     }
     left = right;
   }
-  const double right =
-      std::clamp(place_in_linear(left_of_chosen, right_of_chosen, std::clamp(rest, 0.0, 1.0)),
-                 row.margin_across(), 1 - row.margin_across());
+  const double right = std::clamp(
+      place_in_linear(left_of_chosen, right_of_chosen, std::clamp(rest / chosen, 0.0, 1.0)),
+      row.margin_across(), 1 - row.margin_across());
 
   // Where that is on the sphere.
   const double polar = row.angle(down), sin_polar = std::sin(polar);

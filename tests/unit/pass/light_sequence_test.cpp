@@ -54,6 +54,40 @@ TEST(LightSequence, MakesAFrameAgainAlike) {
             0);
 }
 
+// Of maps that were read, each once, and of steps from one of the job's frames to the next.
+TEST(LightSequence, NotesWhatIsOdd) {
+  JobSpec job = test::sequence_job(8);
+  job.frames = {1, 2, 3, 4, 6, 7, 8, 9};
+  job.sampling.method = Method::pool;
+  const auto key = [](double frame, const char* name, float radiance, int width) {
+    return EnvironmentKey{
+        .frame = frame,
+        .map = test::write_map(name, {width, 4, std::vector<float>(12u * width, radiance)})};
+  };
+  job.environment.interpolate = false;
+  job.environment.keys = {key(1, "dim.exr", 0.5f, 8),    key(3, "bright.exr", 9, 8),
+                          key(5, "dark.exr", 2, 8),      key(7, "square.exr", 9, 4),
+                          key(8, "unseen.exr", 0.1f, 8), key(9, "last.exr", 9, 8)};
+  const auto share = std::make_shared<MemoryShare>(std::uint64_t{1} << 30);
+  LightSequence lights(job, std::make_shared<MapCache>(share), share);
+  for (const std::int32_t f : {0, 1, 2, 3, 4, 5}) ASSERT_TRUE(lights.at(f).ok());
+  ASSERT_TRUE(lights.at(5, 1).ok());
+  const auto told = [&](const char* text) {
+    return std::ranges::count_if(lights.notes(), [&](const std::string& note) {
+      return note.find(text) != std::string::npos;
+    });
+  };
+  EXPECT_EQ(told("dim.exr: no texel is brighter than 1 (0.5)"), 1);
+  EXPECT_EQ(told("square.exr: 4x4 texels, a lat-long map is twice as wide as high"), 1);
+  EXPECT_EQ(told("the light jumps from frame 2 to 3: 18 times as bright"), 1);
+  EXPECT_EQ(told("the light jumps from frame 6 to 7: 4.5 times as bright"), 1);
+  EXPECT_EQ(told("the light jumps"), 2) << "frame 5 was left out";
+  EXPECT_EQ(lights.notes().size(), 4u);
+  for (const std::int32_t f : {6, 7}) ASSERT_TRUE(lights.at(f).ok());
+  EXPECT_EQ(told("unseen.exr: no texel"), 1);
+  EXPECT_EQ(told("the light jumps"), 3) << "no more than three are told";
+}
+
 // A box rises, so that less and less lies behind the ground for all that is lit.
 TEST(LightSequence, HidesWhatEachFrameHides) {
   JobSpec job = test::box_job();

@@ -56,7 +56,7 @@ const std::vector<Message>& examples() {
       WorkerHello{"w", "h\xc3\xb6st", 77, 1, 2, "baton 1", "AVX2", {kLease, kLease}},
       LeaseRequest{7},
       Heartbeat{{kLease}},
-      TaskDone{kLease, {kBlob, kBlob}, kStats, {{3, 4, kStats.sampling}}},
+      TaskDone{kLease, {kBlob, kBlob}, kStats, {{3, 4, kStats.sampling}}, {"odd", ""}},
       TaskFailed{kLease, "no", true, true},
       JobDocumentRequest{{1, 2}},
       WorkerGoodbye{},
@@ -74,7 +74,14 @@ const std::vector<Message>& examples() {
       StopCoordinator{},
       JobAccepted{{5, 6}, true, "all is kept"},
       JobList{{kSummary}, {{"w", "h", 1, 2, 3}}, 4, 5, 6.5},
-      JobDetail{kSummary, {1, 2, 3}, {"one", ""}, {{3, -1, kStats.sampling}}, "space", "on"},
+      JobDetail{kSummary,
+                {1, 2, 3},
+                {"one", ""},
+                {{3, -1, kStats.sampling}},
+                "space",
+                "on",
+                false,
+                {"odd"}},
       Refused{4, "because"},
       PauseJob{"abc"},
       ResumeJob{"def"},
@@ -109,13 +116,13 @@ TEST(Messages, EveryTypeSurvivesTheRoundTrip) {
 
 // Another kind or order of members is another version.
 TEST(Messages, TheirBytesAreThoseOfTheVersion) {
-  static_assert(kProtocolVersion == 10);
+  static_assert(kProtocolVersion == 11);
   Bytes all;
   for (const Message& message : examples()) {
     for (const Bytes& frame : encode_message(message))
       all.insert(all.end(), frame.begin(), frame.end());
   }
-  EXPECT_EQ(digest_of(all).hex(), "1255f5c193ea4a606f8b70cd50f708ca");
+  EXPECT_EQ(digest_of(all).hex(), "1ae86f8148b44aa073a713a320ec4eb2");
 }
 
 TEST(Messages, MembersArriveWhereTheyWereSent) {
@@ -128,7 +135,7 @@ TEST(Messages, MembersArriveWhereTheyWereSent) {
 
 TEST(Messages, BytesAreThoseOfTheGrammar) {
   const std::vector<Bytes> frames = encode_message(NoWork{0x01020304});
-  EXPECT_EQ(frames[0], text(std::string_view("BATON\x0A\x00", 7)));
+  EXPECT_EQ(frames[0], text(std::string_view("BATON\x0B\x00", 7)));
   EXPECT_EQ(frames[1], text(std::string_view("\x0a\x00", 2)));
   EXPECT_EQ(frames[2], text("\x04\x03\x02\x01"));
 }
@@ -168,12 +175,12 @@ TEST(Messages, AnyChangedByteIsReadOrRefusedButNeverCrashes) {
 
 TEST(Messages, AnotherVersionIsAVersionError) {
   std::vector<Bytes> frames = encode_message(ListJobs{});
-  frames[0][5] = std::byte{11};
+  frames[0][5] = std::byte{12};
   frames.resize(1);  // nothing after the header may matter
   const Result<Message> decoded = decode_message(frames);
   ASSERT_FALSE(decoded.ok());
   EXPECT_EQ(decoded.error().kind, ErrorKind::version);
-  EXPECT_THAT(decoded.error().message, HasSubstr("version 11, this program speaks 10"));
+  EXPECT_THAT(decoded.error().message, HasSubstr("version 12, this program speaks 11"));
 }
 
 TEST(Messages, OtherProtocolsAreRefused) {

@@ -59,13 +59,21 @@ TEST_F(ServiceTest, HundredsOfJobsThatHaveEndedAreInTheArchiveAlone) {
 
 // What a done job shows is what it showed before; its last states stay until it is deleted.
 TEST_F(ServiceTest, ADoneJobShowsWhatItDidAndKeepsItsStates) {
+  const auto notes = testing::ElementsAre("a.exr: black", "b.exr: black");
   Digest id;
   {
     const RunningService service(options);
     id = ask<JobAccepted>(service.endpoint(), SubmitJob{document}).job;
     FakeWorker worker(service.endpoint(), store(), job);
     worker.hello();
-    for (int i = 0; i < kNumTasks; ++i) worker.do_one_task();
+    for (const char* note : {"a.exr: black", "a.exr: black", "b.exr: black"}) {
+      worker.say(LeaseRequest{1});
+      TaskDone done = worker.work(worker.expect<LeaseGrant>().lease);
+      done.notes = {note};
+      worker.say(done);
+    }
+    EXPECT_THAT(show(service.endpoint(), id).notes, notes);
+    for (int i = 3; i < kNumTasks; ++i) worker.do_one_task();
     worker.say(LeaseRequest{0});
     worker.say(Heartbeat{});
     worker.expect<Heartbeat>();
@@ -77,6 +85,7 @@ TEST_F(ServiceTest, ADoneJobShowsWhatItDidAndKeepsItsStates) {
   EXPECT_EQ(detail.summary.stats.pixels, static_cast<std::uint64_t>(kNumTasks));
   EXPECT_THAT(detail.frames_done, testing::ElementsAre(1, 2, 3, 4));
   EXPECT_THAT(detail.frames, SizeIs(4));
+  EXPECT_THAT(detail.notes, notes);
   EXPECT_EQ(num_blobs(store()), 2u) << "a state of each tile";
   ask<JobList>(service.endpoint(), DeleteJob{id.hex()});
   ask<JobList>(service.endpoint(), ListJobs{});

@@ -1,4 +1,4 @@
-#include "jobs/cli/object_view.h"
+#include "worker/scene/object_view.h"
 
 #include <fmt/format.h>
 
@@ -6,8 +6,8 @@
 #include <array>
 #include <span>
 
+#include "common/job/sequence.h"
 #include "common/math/bounds.h"
-#include "jobs/cli/frame_sheet.h"
 #include "worker/scene/pose.h"
 
 namespace baton {
@@ -86,7 +86,13 @@ std::string_view words(Sight best) {
 
 }  // namespace
 
-std::vector<std::string> object_warnings(const JobSpec& job, const Scene& scene) {
+std::uint64_t count_dropped(const Scene& scene) {
+  std::uint64_t dropped = 0;
+  for (const TriangleMesh& mesh : scene.meshes) dropped += mesh.dropped_triangles;
+  return dropped;
+}
+
+std::vector<std::string> geometry_warnings(const JobSpec& job, const Scene& scene) {
   std::vector<Corners> boxes;
   for (const TriangleMesh& mesh : scene.meshes) boxes.push_back(corners_of(mesh.positions));
   std::vector<Sight> best(scene.instances.size(), Sight::behind);
@@ -104,6 +110,8 @@ std::vector<std::string> object_warnings(const JobSpec& job, const Scene& scene)
   }
 
   std::vector<std::string> warnings;
+  if (const std::uint64_t dropped = count_dropped(scene); dropped > 0)
+    warnings.push_back(fmt::format("{} triangles without area are left out", dropped));
   for (std::size_t i = 0; i < std::min(best.size(), job.scene.objects.size()); ++i) {
     if (best[i] != Sight::seen)
       warnings.push_back(
