@@ -81,7 +81,7 @@ struct PresampledSets {
 
 /// Number of sets, a power of two: one for so many pixels of the picture, and most of all rounds of
 /// a frame together, as all of them are kept.
-inline constexpr std::int64_t kPixelsOfSet = 1 << 16;
+inline constexpr std::int64_t kPixelsOfSet = 1 << 15;
 inline constexpr std::int32_t kMostSetsOfFrame = 64;
 std::int32_t num_presampled_sets(std::int64_t num_pixels, std::int32_t rounds);
 

@@ -152,10 +152,10 @@ TEST(PresampledSets, AreAllReadInEachSquareOfThem) {
 }
 
 TEST(PresampledSets, AreAsManyAsThePictureHasRoomFor) {
-  EXPECT_EQ(num_presampled_sets(240 * 160, 1), 1);
-  EXPECT_EQ(num_presampled_sets(512 * 512, 1), 4);
-  EXPECT_EQ(num_presampled_sets(1280 * 720, 1), 16);
-  EXPECT_EQ(num_presampled_sets(1920 * 1080, 1), 32);
+  EXPECT_EQ(num_presampled_sets(240 * 160, 1), 2);
+  EXPECT_EQ(num_presampled_sets(512 * 512, 1), 8);
+  EXPECT_EQ(num_presampled_sets(1280 * 720, 1), 32);
+  EXPECT_EQ(num_presampled_sets(1920 * 1080, 1), 64);
   EXPECT_EQ(num_presampled_sets(1920 * 1080, 4), 16);
   EXPECT_EQ(num_presampled_sets(1920 * 1080, 65), 1);
   EXPECT_EQ(num_presampled_sets(std::int64_t{16384} * 16384, 1), 64);
