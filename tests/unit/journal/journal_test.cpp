@@ -200,7 +200,7 @@ TEST_F(JournalTest, ANewerJournalIsRefused) {
   const Result<Journal> journal = Journal::open(path);
   ASSERT_FALSE(journal.ok());
   EXPECT_EQ(journal.error().kind, ErrorKind::version);
-  EXPECT_THAT(journal.error().message, HasSubstr("journal version 9, this program reads 5"));
+  EXPECT_THAT(journal.error().message, HasSubstr("journal version 9, this program reads 6"));
 }
 
 TEST_F(JournalTest, AnotherProgramsDatabaseIsRefused) {
