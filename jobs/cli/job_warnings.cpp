@@ -25,6 +25,8 @@ namespace {
 
 namespace fs = std::filesystem;
 
+/// Lines that are told while a job is rendered.
+constexpr std::size_t kMostTold = 20;
 /// Plates that are told one by one.
 constexpr std::size_t kMostPlates = 3;
 
@@ -145,8 +147,10 @@ std::vector<std::string> job_warnings(const JobSpec& job, const AssetReport& ass
 
 std::vector<std::string> WarningLog::fresh(const std::vector<std::string>& lines) {
   std::vector<std::string> fresh;
-  for (const std::string& line : lines)
-    if (told_.insert(line).second) fresh.push_back(line);
+  for (const std::string& line : lines) {
+    if (told_.size() > kMostTold || !told_.insert(line).second) continue;
+    fresh.push_back(told_.size() <= kMostTold ? line : "there is more: `baton check` tells all");
+  }
   return fresh;
 }
 

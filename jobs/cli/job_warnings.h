@@ -21,7 +21,8 @@ class WarningLog {
  public:
   /// job: with settled motion.
   void begin(const JobSpec& job);
-  /// The lines that were not told yet; now they count as told.
+  /// The lines that were not told yet; now they count as told. After 20 of them, as of the maps of
+  /// a long sequence, one that says where the rest is told.
   std::vector<std::string> fresh(const std::vector<std::string>& lines);
 
  private:

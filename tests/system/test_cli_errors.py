@@ -138,6 +138,15 @@ class CliErrors(unittest.TestCase):
             image={"width": 8192, "height": 8192, "tileSize": 512}, frames="1-3000", output={"pixelType": "float"}))
         self.assertIn(" are free, and frames may take ", result.stdout)
 
+    def test_a_film_of_odd_maps_does_not_flood_the_terminal(self):
+        for frame in range(1, 31):
+            (self.folder / f"film.{frame:04}.hdr").write_bytes(radiance_hdr(4, 2))
+        job = self.job(environment={"frames": "film.####.hdr"}, frames="1-30", sampling={"method": "pool"})
+        odd, more = "no texel is brighter than 1", "there is more: `baton check` tells all"
+        told = self.baton("render", job).stderr
+        self.assertEqual((told.count(odd), told.count(more)), (20, 1), told)
+        self.assertEqual(self.baton("check", job).stdout.count(odd), 30)
+
     def test_texels_that_are_no_light_are_counted(self):
         rows = [array("f", [2.0] * 9 + [math.nan, -1.0, math.inf]), array("f", [2.0] * 12)]
         write_exr(self.folder / "sky.exr", 4, rows)

@@ -8,6 +8,7 @@
 
 #include "common/base/check.h"
 #include "common/math/octahedral.h"
+#include "worker/scene/map_texel.h"
 
 namespace baton {
 namespace {
@@ -30,9 +31,8 @@ int num_blocks(int width) { return (width + kBlock - 1) / kBlock; }
 }  // namespace
 
 EnvironmentMap::EnvironmentMap(const RgbImage& image, MapFilter filter, float scale,
-                               bool compensate, const TexelRepairs& repairs,
-                               const HiddenCone& hidden)
-    : width_(image.width), height_(image.height), filter_(filter), repairs_(repairs) {
+                               bool compensate, const HiddenCone& hidden)
+    : width_(image.width), height_(image.height), filter_(filter) {
   BATON_CHECK(width_ > 0 && height_ > 0);
   BATON_CHECK(image.rgb.size() == std::size_t{3} * static_cast<std::size_t>(width_) * height_);
   texels_.resize(static_cast<std::size_t>(stride()) * (height_ + 2));
@@ -42,7 +42,7 @@ EnvironmentMap::EnvironmentMap(const RgbImage& image, MapFilter filter, float sc
   for (int j = 0; j < height_; ++j) {
     Texel* row = &texels_[static_cast<std::size_t>(j + 1) * stride() + 1];
     for (int i = 0; i < width_; ++i, source += 3) {
-      const auto [r, g, b] = texel_radiance(source, scale, repairs_);
+      const auto [r, g, b] = texel_radiance(source, scale);
       row[i] = {r, g, b, 0};
     }
 

@@ -11,7 +11,6 @@
 #include "common/image/image_io.h"
 #include "common/job/sequence.h"
 #include "worker/scene/map_row.h"
-#include "worker/scene/map_texel.h"
 
 namespace baton {
 
@@ -50,10 +49,9 @@ class EnvironmentMap {
   };
 
   /// image: at least 1x1. scale: radiance factor. compensate: the table of MIS compensation, max(0,
-  /// L - mean L) [Karlik et al. 2019] (a constant map keeps its plain table). repairs: of what the
-  /// image was made from.
+  /// L - mean L) [Karlik et al. 2019] (a constant map keeps its plain table).
   EnvironmentMap(const RgbImage& image, MapFilter filter, float scale, bool compensate,
-                 const TexelRepairs& repairs = {}, const HiddenCone& hidden = {});
+                 const HiddenCone& hidden = {});
   /// Texels scale ((1 - t) a + t b); a and b of one size and filter, with one cone. t in [0, 1].
   EnvironmentMap(const EnvironmentMap& a, const EnvironmentMap& b, float t, float scale,
                  bool compensate);
@@ -65,7 +63,6 @@ class EnvironmentMap {
   const Texel* texels() const { return texels_.data(); }
   /// Memory of the texels; the tables are small beside them.
   std::size_t size_bytes() const { return texels_.size() * sizeof(Texel); }
-  const TexelRepairs& repairs() const { return repairs_; }
   /// Integral of the reconstruction over what is not hidden, as the table sees it, mean over RGB; 0
   /// for a black map.
   double total_power() const { return total_power_; }
@@ -119,7 +116,6 @@ class EnvironmentMap {
   /// exactly what evaluate() reports.
   std::vector<double> row_cdf_;   ///< (cell rows + 1) probability
   std::vector<Edges> block_cdf_;  ///< (cell rows, ceil(W / kBlock) + 1) of the row
-  TexelRepairs repairs_;
   double total_power_ = 0;
 };
 

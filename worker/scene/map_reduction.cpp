@@ -4,11 +4,11 @@
 #include <cmath>
 #include <cstdint>
 #include <numbers>
-#include <utility>
 #include <vector>
 
 #include "common/base/check.h"
 #include "common/image/averaged_down.h"
+#include "worker/scene/map_texel.h"
 
 namespace baton {
 namespace {
@@ -23,37 +23,34 @@ std::array<int, 2> map_sides(int width, int height, int max_width) {
   return {max_width, std::max(1, static_cast<int>(std::lround(1.0 * height * max_width / width)))};
 }
 
-ReducedMap reduce_map(const RgbImage& map, int width, float scale) {
+RgbImage reduce_map(const RgbImage& map, int width, float scale) {
   BATON_CHECK(width > 0 && width < map.width);
   const int height = map_sides(map.width, map.height, width)[1];
   const auto angle = [&](std::int64_t edge) {
     return std::numbers::pi * static_cast<double>(edge) / (1.0 * map.height * height);
   };
 
-  // The radiance of the row that is asked for; its repairs are counted once.
-  TexelRepairs repairs;
+  // The radiance of the row that is asked for.
   std::vector<float> radiance(static_cast<std::size_t>(map.width) * 3);
   int last = -1;
   const auto row = [&](int y) {
     const float* texel = &map.rgb[static_cast<std::size_t>(y) * map.width * 3];
     for (std::size_t i = 0; y != last && i < radiance.size(); i += 3)
-      std::ranges::copy(texel_radiance(texel + i, scale, repairs), radiance.begin() + i);
+      std::ranges::copy(texel_radiance(texel + i, scale), radiance.begin() + i);
     last = y;
     return radiance.data();
   };
-  RgbImage image = averaged_down(
+  return averaged_down(
       RowSource{map.width, map.height, row}, width, height,
       [&](std::int64_t from, std::int64_t to) { return zone(angle(from), angle(to)); });
-  return {std::move(image), repairs};
 }
 
 EnvironmentMap make_map(const RgbImage& picture, const EnvironmentSpec& environment,
                         bool compensate, const HiddenCone& hidden) {
   const int width = map_sides(picture.width, picture.height, environment.max_width)[0];
   if (width == picture.width)
-    return {picture, environment.filter, environment.scale, compensate, {}, hidden};
-  const ReducedMap reduced = reduce_map(picture, width, environment.scale);
-  return {reduced.image, environment.filter, 1, compensate, reduced.repairs, hidden};
+    return {picture, environment.filter, environment.scale, compensate, hidden};
+  return {reduce_map(picture, width, environment.scale), environment.filter, 1, compensate, hidden};
 }
 
 }  // namespace baton

@@ -8,12 +8,6 @@
 
 namespace baton {
 
-/// A map with fewer texels, and what was repaired before they were averaged.
-struct ReducedMap {
-  RgbImage image;
-  TexelRepairs repairs;
-};
-
 /// Columns and rows of what make_map makes of a picture with these sides. max_width: 0: any.
 std::array<int, 2> map_sides(int width, int height, int max_width);
 
@@ -21,7 +15,7 @@ std::array<int, 2> map_sides(int width, int height, int max_width);
 /// texel is the mean of the radiance, times `scale`, over its part of the sphere: texels of the map
 /// that lie across its edges count for the solid angle inside, so the power of the map, and of
 /// every box, is kept for any sizes (texels taken as constant). width: [1, the map's).
-ReducedMap reduce_map(const RgbImage& map, int width, float scale);
+RgbImage reduce_map(const RgbImage& map, int width, float scale);
 
 /// The map of a file's picture as the environment says: scaled, repaired, and reduced to
 /// max_width columns where it has more.

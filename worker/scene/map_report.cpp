@@ -21,7 +21,7 @@ constexpr float kJump = 2;
 struct TexelReport {
   double mean = 0;  ///< over the sphere and the three channels, of what is finite and positive
   float brightest = 0;
-  TexelRepairs repairs;
+  std::uint64_t repaired = 0;  ///< those with a channel that is no radiance
 };
 
 TexelReport look_at_texels(const RgbImage& image, float scale) {
@@ -37,7 +37,11 @@ TexelReport look_at_texels(const RgbImage& image, float scale) {
       row_sum += v;
       report.brightest = std::max(report.brightest, v);
     }
-    for (std::size_t i = 0; i < row_values; i += 3) texel_radiance(&row[i], scale, report.repairs);
+    for (std::size_t i = 0; i < row_values; i += 3) {
+      const bool is_whole = is_radiance(row[i], scale) && is_radiance(row[i + 1], scale) &&
+                            is_radiance(row[i + 2], scale);
+      report.repaired += is_whole ? 0 : 1;
+    }
     const double weight = std::sin((y + 0.5) * double{kPi} / image.height);
     sum += weight * row_sum;
     weights += weight * static_cast<double>(row_values);
@@ -56,7 +60,7 @@ MapReport report_map(const std::string& path, const RgbImage& image, float scale
           .height = height,
           .file_width = image.width,
           .file_height = image.height,
-          .repaired_texels = texels.repairs.total(),
+          .repaired_texels = texels.repaired,
           .black = !(texels.mean * double{scale} > 0),
           .brightest = texels.brightest,
           .mean = static_cast<float>(texels.mean)};

@@ -61,7 +61,7 @@ TEST_P(Kernels, EnvironmentAsTheScalarCode) {
   for (const MapFilter filter : {MapFilter::nearest, MapFilter::bilinear}) {
     const HiddenCone below{.axis = {0, -1, 0}, .angle = 1.2f};
     const Environment environment{
-        std::make_shared<EnvironmentMap>(image, filter, 1.0f, false, TexelRepairs{}, below),
+        std::make_shared<EnvironmentMap>(image, filter, 1.0f, false, below),
         rotation_about({0.2f, 1, 0.1f}, 33)};
     std::vector<float> r(w.x.size()), g(r), b(r), density(r);
     kernels::evaluate_environment(view_of(environment), w.x, w.y, w.z, r, g, b, density);
