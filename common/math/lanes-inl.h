@@ -140,6 +140,18 @@ HWY_INLINE FourRows LoadFour(const Records& records, int first) {
                          LoadBlocks(d, &records[2], first), LoadBlocks(d, &records[3], first));
 }
 
+/// Block after block of a vector to address(block), in pieces of four floats.
+template <class D, class Address>
+HWY_INLINE void StoreBlocks(D d, hn::Vec<D> v, const Address& address, std::size_t first = 0) {
+  if constexpr (hn::MaxLanes(D()) > 4) {
+    const hn::Half<D> half;
+    StoreBlocks(half, hn::LowerHalf(half, v), address, first);
+    StoreBlocks(half, hn::UpperHalf(half, v), address, first + 1);
+  } else {
+    hn::StoreU(v, d, address(first));
+  }
+}
+
 /// Mean of the three channels.
 HWY_INLINE VF MeanLanes(const Vec3Lanes& c) {
   return hn::Mul(hn::Add(hn::Add(c.x, c.y), c.z), hn::Set(DF(), 1.0f / 3.0f));

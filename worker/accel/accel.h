@@ -81,6 +81,8 @@ struct ShadowRays {
 /// The origin of a shadow ray: `position` lifted along the geometric normal just so far that float
 /// error cannot make the surface shadow itself [Waechter & Binder 2019].
 Vec3 lift_off(const Vec3& position, const Vec3& ng);
+/// Below kLiftOrigin a coordinate is lifted by a distance, above it by a number of float steps.
+inline constexpr float kLiftOrigin = 1.0f / 32, kLiftNear = 1.0f / 65536, kLiftSteps = 256;
 
 /// How a ray tracer is built.
 struct AccelLimits {
@@ -90,11 +92,11 @@ struct AccelLimits {
   std::uint64_t max_bytes = std::numeric_limits<std::uint64_t>::max();
 };
 
-/// The ray tracer: the only user of Embree. Immutable after construction; any number of
-/// threads may trace. Shadow catchers (Instance::is_catcher) are apart from all else.
 /// Most rays that are traced as one packet.
 inline constexpr std::size_t kMaxRayGroup = 16;
 
+/// The ray tracer: the only user of Embree. Immutable after construction; any number of
+/// threads may trace. Shadow catchers (Instance::is_catcher) are apart from all else.
 class Accel {
  public:
   /// Keeps a reference to `scene`, which must outlive it. What stands still is one flat hierarchy;

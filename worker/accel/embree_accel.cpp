@@ -11,6 +11,7 @@
 #include "worker/accel/allocation_count.h"
 #include "worker/accel/cut_outs.h"
 #include "worker/accel/embree_geometry.h"
+#include "worker/accel/surface_kernels.h"
 
 namespace baton {
 namespace {
@@ -111,25 +112,14 @@ class EmbreeAccel final : public Accel {
     RTCIntersectContext context;
     rtcInitIntersectContext(&context);
     context.flags = RTC_INTERSECT_CONTEXT_FLAG_COHERENT;
-    for (std::size_t i = 0; i < rays.size(); i += group) {
-      const std::size_t count = std::min(group, rays.size() - i);
-      const std::span<const Ray> some = rays.subspan(i, count);
-      if (group == 1) {
-        hits[i] = intersect_one(objects_, some[0], context);
-      } else if (group <= 4) {
-        intersect_packet<RTCRayHit4, 4>(rtcIntersect4, some, hits.subspan(i, count), context);
-      } else {
-        intersect_packet<RTCRayHit16, 16>(rtcIntersect16, some, hits.subspan(i, count), context);
-      }
-    }
+    see(objects_, rays, hits, group, context);
   }
 
   void intersect_catchers(std::span<const Ray> rays, std::span<SurfaceHit> hits) const override {
     BATON_CHECK(rays.size() == hits.size());
     RTCIntersectContext context;
     rtcInitIntersectContext(&context);
-    for (std::size_t i = 0; i < rays.size(); ++i)
-      hits[i] = intersect_one(catchers_, rays[i], context);
+    see(catchers_, rays, hits, 1, context);
   }
 
   /// One stream of all rays, without the `coherent` flag, which makes scattered rays three times
@@ -205,35 +195,42 @@ class EmbreeAccel final : public Accel {
     return geometry_->any_blends ? ray_bits(ray.origin, ray.direction) : 0;
   }
 
-  SurfaceHit intersect_one(const PlacedLayer& layer, const Ray& ray,
-                           RTCIntersectContext& context) const {
-    RTCRayHit query{};
-    query.ray = {.org_x = ray.origin.x,
-                 .org_y = ray.origin.y,
-                 .org_z = ray.origin.z,
-                 .tnear = 0,
-                 .dir_x = ray.direction.x,
-                 .dir_y = ray.direction.y,
-                 .dir_z = ray.direction.z,
-                 .time = 0,
-                 .tfar = std::numeric_limits<float>::infinity(),
-                 .mask = ~0u,
-                 .id = bits_of(ray),
-                 .flags = 0};
-    query.hit.geomID = RTC_INVALID_GEOMETRY_ID;
-    query.hit.instID[0] = RTC_INVALID_GEOMETRY_ID;
-    if (layer.still != nullptr) rtcIntersect1(layer.still, &context, &query);
-    if (layer.moving != nullptr) rtcIntersect1(layer.moving, &context, &query);
-    return surface_at(ray, {query.ray.tfar, query.hit.u, query.hit.v, query.hit.primID,
-                            query.hit.geomID, query.hit.instID[0]});
+  /// As many groups at a time as there are lanes for the surfaces that they see.
+  void see(const PlacedLayer& layer, std::span<const Ray> rays, std::span<SurfaceHit> hits,
+           std::size_t group, RTCIntersectContext& context) const {
+    const std::size_t width = group == 1 ? 1 : group <= 4 ? 4 : 16;
+    const std::size_t at_once = kMaxRayGroup / width * group;
+    for (std::size_t first = 0; first < rays.size(); first += at_once) {
+      const std::size_t end = std::min(first + at_once, rays.size());
+      kernels::MetTriangles met;
+      for (std::size_t i = first; i < end; i += group) {
+        const std::span<const Ray> some = rays.subspan(i, std::min(group, end - i));
+        if (width == 1) {
+          trace<RTCRayHit>(layer, some, met, [&](const int*, RTCScene scene, RTCRayHit* query) {
+            rtcIntersect1(scene, &context, query);
+          });
+        } else if (width == 4) {
+          trace<RTCRayHit4>(layer, some, met, [&](const int* on, RTCScene scene, auto* query) {
+            rtcIntersect4(on, scene, &context, query);
+          });
+        } else {
+          trace<RTCRayHit16>(layer, some, met, [&](const int* on, RTCScene scene, auto* query) {
+            rtcIntersect16(on, scene, &context, query);
+          });
+        }
+      }
+      see(met, hits.subspan(first, end - first));
+    }
   }
 
-  /// Up to Width rays at once that meet objects; the lanes that are left over are off.
-  template <class Packet, std::size_t Width, class Intersect>
-  void intersect_packet(Intersect intersect_some, std::span<const Ray> rays,
-                        std::span<SurfaceHit> hits, RTCIntersectContext& context) const {
-    alignas(64) Packet query{};
-    alignas(64) std::array<int, Width> valid{};
+  /// Adds what a packet of rays meets; the lanes that are left over are off.
+  template <class Packet, class Intersect>
+  void trace(const PlacedLayer& layer, std::span<const Ray> rays, kernels::MetTriangles& met,
+             const Intersect& intersect) const {
+    constexpr std::size_t kWidth = sizeof(Packet::ray.org_x) / sizeof(float);
+    alignas(64) RTCRayHitNt<kWidth> query{};
+    static_assert(sizeof(query) % sizeof(Packet) == 0);
+    alignas(64) std::array<int, kWidth> valid{};
     for (std::size_t k = 0; k < rays.size(); ++k) {
       valid[k] = -1;
       query.ray.org_x[k] = rays[k].origin.x;
@@ -248,59 +245,44 @@ class EmbreeAccel final : public Accel {
       query.hit.geomID[k] = RTC_INVALID_GEOMETRY_ID;
       query.hit.instID[0][k] = RTC_INVALID_GEOMETRY_ID;
     }
-    intersect_some(valid.data(), objects_.still, &context, &query);
-    if (objects_.moving != nullptr) intersect_some(valid.data(), objects_.moving, &context, &query);
-    for (std::size_t k = 0; k < rays.size(); ++k) {
-      hits[k] =
-          surface_at(rays[k], {query.ray.tfar[k], query.hit.u[k], query.hit.v[k],
-                               query.hit.primID[k], query.hit.geomID[k], query.hit.instID[0][k]});
+    auto* const packet = reinterpret_cast<Packet*>(&query);
+    if (layer.still != nullptr) intersect(valid.data(), layer.still, packet);
+    if (layer.moving != nullptr) intersect(valid.data(), layer.moving, packet);
+
+    BATON_DCHECK(met.count + kWidth <= kMaxRayGroup);
+    const auto note = [at = met.count](const auto& from, auto& lanes) {
+      std::copy_n(from, kWidth, lanes.begin() + at);
+    };
+    note(query.ray.dir_x, met.direction_x);
+    note(query.ray.dir_y, met.direction_y);
+    note(query.ray.dir_z, met.direction_z);
+    note(query.ray.tfar, met.depth);
+    note(query.hit.u, met.u);
+    note(query.hit.v, met.v);
+    note(query.hit.primID, met.triangle);
+    for (std::size_t k = 0; k < kWidth; ++k) {
+      const unsigned instance = query.hit.instID[0][k];
+      met.instance[met.count + k] =
+          instance != RTC_INVALID_GEOMETRY_ID ? instance : query.hit.geomID[k];
     }
+    met.count += rays.size();
   }
 
-  /// What Embree says of a hit.
-  struct RawHit {
-    float depth, u, v;
-    unsigned triangle, geometry, instance;
-  };
-
-  /// The surface at a hit. The position comes from the barycentric coordinates: it lies on the
-  /// triangle to a few float steps, however far the ray has come.
-  SurfaceHit surface_at(const Ray& ray, const RawHit& hit) const {
-    if (hit.geometry == RTC_INVALID_GEOMETRY_ID) return {};
-    const unsigned index = hit.instance != RTC_INVALID_GEOMETRY_ID ? hit.instance : hit.geometry;
-    const Instance& instance = instances_[index];
-    const auto [positions, normals, tangents] = vertices_[instance.mesh];
-    const auto& corner = scene_.meshes[instance.mesh].triangles[hit.triangle];
-    const float u = hit.u;
-    const float v = hit.v;
-    const auto interpolate = [u, v](const Vec3& a, const Vec3& b, const Vec3& c) {
-      return a * (1 - u - v) + b * u + c * v;
-    };
-    const Vec3 a = instance.to_world.point(positions[corner[0]]);
-    const Vec3 b = instance.to_world.point(positions[corner[1]]);
-    const Vec3 c = instance.to_world.point(positions[corner[2]]);
-
-    // Turn the geometric normal to the viewer, the shading normal to the geometric one.
-    const Vec3 wo = -ray.direction;
-    Vec3 ng = normalize(cross(b - a, c - a));
-    if (dot(ng, wo) < 0) ng = -ng;
-    Vec3 ns = ng;
-    if (!normals.empty()) {
-      ns = normalize(instance.normal_to_world *
-                     interpolate(normals[corner[0]], normals[corner[1]], normals[corner[2]]));
-      if (dot(ns, ng) < 0) ns = -ns;
-      if (!(dot(ns, ng) > 0)) ns = ng;
+  /// The surfaces of all lanes, instance by instance.
+  void see(const kernels::MetTriangles& met, std::span<SurfaceHit> hits) const {
+    for (std::size_t lane = 0; lane < met.count; ++lane) {
+      const std::uint32_t index = met.instance[lane];
+      if (index == kernels::MetTriangles::kNothing) {
+        hits[lane] = {};
+        continue;
+      }
+      const auto before = std::span(met.instance).first(lane);
+      if (std::find(before.begin(), before.end(), index) != before.end()) continue;
+      const Instance& instance = instances_[index];
+      kernels::see_surfaces(
+          met, lane, instance, scene_.meshes[instance.mesh].triangles, vertices_[instance.mesh],
+          scene_.material_of(instance).detail != nullptr || instance.deforms, hits);
     }
-    const Vec3 position = interpolate(a, b, c);
-    const bool is_placed = scene_.material_of(instance).detail != nullptr || instance.deforms;
-    return {.point = {.position = position, .ng = ng, .ns = ns, .wo = wo},
-            .ray_origin = lift_off(position, ng),
-            .depth = hit.depth,
-            .instance = index,
-            .material = instance.material,
-            .hit = true,
-            .is_catcher = instance.is_catcher,
-            .place = is_placed ? SurfacePlace{hit.triangle, u, v} : SurfacePlace{}};
   }
 
   const Scene& scene_;

@@ -6,15 +6,10 @@
 namespace baton {
 namespace {
 
-/// Below kOrigin the offset is absolute, above it a number of float steps [Waechter & Binder 2019,
-/// listing 6.1].
-constexpr float kOrigin = 1.0f / 32.0f;
-constexpr float kFloatScale = 1.0f / 65536.0f;
-constexpr float kIntScale = 256.0f;
-
+/// [Waechter & Binder 2019, listing 6.1]
 float lift(float position, float normal) {
-  if (std::fabs(position) < kOrigin) return position + kFloatScale * normal;
-  const auto steps = static_cast<std::int32_t>(kIntScale * normal);
+  if (std::fabs(position) < kLiftOrigin) return position + kLiftNear * normal;
+  const auto steps = static_cast<std::int32_t>(kLiftSteps * normal);
   return std::bit_cast<float>(std::bit_cast<std::int32_t>(position) +
                               (position < 0 ? -steps : steps));
 }

@@ -52,20 +52,20 @@ std::vector<SurfaceLook> looks_of(const FrameGeometry& geometry, std::span<const
 
 TileSurfaces trace_primary(const JobSpec& job, const FrameGeometry& geometry, const PixelRect& rect,
                            std::int32_t round) {
-  return trace_primary(job, geometry, rect, RoundPixels::all(static_cast<std::size_t>(rect.area())),
-                       round, {});
+  TileSurfaces surfaces;
+  trace_primary(job, geometry, rect, RoundPixels::all(static_cast<std::size_t>(rect.area())), round,
+                {}, surfaces);
+  return surfaces;
 }
 
-TileSurfaces trace_primary(const JobSpec& job, const FrameGeometry& geometry, const PixelRect& rect,
-                           RoundPixels pixels, std::int32_t round,
-                           std::span<const std::uint16_t> counts) {
-  TileSurfaces surfaces{.rect = rect,
-                        .pixels = std::move(pixels),
-                        .first_hit = {0},
-                        .hits = {},
-                        .rays = {},
-                        .looks = {},
-                        .first_site = {}};
+void trace_primary(const JobSpec& job, const FrameGeometry& geometry, const PixelRect& rect,
+                   RoundPixels pixels, std::int32_t round, std::span<const std::uint16_t> counts,
+                   TileSurfaces& surfaces) {
+  surfaces.rect = rect;
+  surfaces.pixels = std::move(pixels);
+  surfaces.first_hit.assign(1, 0);
+  surfaces.rays.clear();
+  surfaces.first_site.clear();
   const std::size_t num_slots = surfaces.pixels.size();
   const auto usual = static_cast<std::uint16_t>(job.image.sites);
   std::vector<std::uint16_t> num_sites;
@@ -79,7 +79,7 @@ TileSurfaces trace_primary(const JobSpec& job, const FrameGeometry& geometry, co
     append_primary_rays(job, geometry, x, y, surfaces.rays, round, num_sites.back());
     surfaces.first_hit.push_back(static_cast<std::uint32_t>(surfaces.rays.size()));
   }
-  surfaces.hits.resize(surfaces.rays.size());
+  surfaces.hits.resize(surfaces.rays.size());  // all are written below
   trace_primary_rays(geometry, surfaces.rays, num_sites, surfaces.hits);
   surfaces.first_site.reserve(num_slots);
   for (std::size_t slot = 0; slot < num_slots; ++slot) {
@@ -89,7 +89,6 @@ TileSurfaces trace_primary(const JobSpec& job, const FrameGeometry& geometry, co
     surfaces.first_site.push_back(static_cast<std::uint16_t>(first - hits.begin()));
   }
   if (geometry.scene->has_detail) surfaces.looks = looks_of(geometry, surfaces.hits);
-  return surfaces;
 }
 
 TileSurfaces part_of(const TileSurfaces& whole, RoundPixels pixels) {

@@ -73,10 +73,10 @@ class SurfaceCache : public FrameKeep<std::pair<std::int32_t, std::int32_t>, Til
 TileSurfaces trace_primary(const JobSpec& job, const FrameGeometry& geometry, const PixelRect& rect,
                            std::int32_t round = 0);
 /// Of some pixels of a tile. counts: S of each pixel of the tile, row by row (fine_sites.h); empty:
-/// image.sites for all.
-TileSurfaces trace_primary(const JobSpec& job, const FrameGeometry& geometry, const PixelRect& rect,
-                           RoundPixels pixels, std::int32_t round,
-                           std::span<const std::uint16_t> counts);
+/// image.sites for all. surfaces: any, is replaced; its memory is used again.
+void trace_primary(const JobSpec& job, const FrameGeometry& geometry, const PixelRect& rect,
+                   RoundPixels pixels, std::int32_t round, std::span<const std::uint16_t> counts,
+                   TileSurfaces& surfaces);
 
 /// What some pixels of a tile see, of what all of them do.
 TileSurfaces part_of(const TileSurfaces& whole, RoundPixels pixels);

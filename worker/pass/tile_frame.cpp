@@ -59,23 +59,19 @@ TileFrameRenderer::TileFrameRenderer(const RenderContext& context, const FrameGe
       scratch_(std::make_unique<SamplerScratch>()),
       collector_(context.job) {}
 
-void TileFrameRenderer::render(const TileRound& at, bool has_history, SampleState& state,
-                               RoundMean& film) {
-  reprojection_ = nullptr;
-  has_history_ = has_history;
-  render_batches(at, state, film);
+void TileFrameRenderer::begin_round(const SampleState& state, Reprojection* history,
+                                    bool has_history) {
+  reprojection_ = history;
+  has_history_ = has_history && history == nullptr;
+  // The targets of the round before are there if it was rendered here.
+  const std::size_t num_samples =
+      state.num_pixels() * static_cast<std::size_t>(state.num_particles);
+  knows_targets_ = has_history_ && targets_.size() == num_samples;
+  targets_.resize(num_samples);
+  if (context_.job.visibility.correlated) collector_.begin(state);
 }
 
-void TileFrameRenderer::render(const TileRound& at, Reprojection& history, SampleState& state,
-                               RoundMean& film) {
-  reprojection_ = &history;
-  has_history_ = false;
-  const std::uint64_t rays_before = history.num_rays();
-  render_batches(at, state, film);
-  stats_.rays_primary += history.num_rays() - rays_before;
-}
-
-void TileFrameRenderer::render_batches(const TileRound& at, SampleState& state, RoundMean& film) {
+void TileFrameRenderer::render(const TileRound& at, SampleState& state, RoundMean& film) {
   const WorkClock clock;
   stages_ = {};
   surfaces_ = &at.surfaces;
@@ -88,8 +84,7 @@ void TileFrameRenderer::render_batches(const TileRound& at, SampleState& state, 
   batch.step = at.step(context_.job.quality.rounds);
   round_sampling_ = {};
   const std::size_t num_pixels = at.surfaces.pixels.size();
-  keep_targets(state.num_pixels() * static_cast<std::size_t>(state.num_particles));
-  if (context_.job.visibility.correlated) collector_.begin(state);
+  const std::uint64_t rays_before = reprojection_ != nullptr ? reprojection_->num_rays() : 0;
   for (std::size_t first = 0; first < num_pixels; first += kBatchPixels) {
     batch.first = first;
     batch.count = std::min(kBatchPixels, num_pixels - first);
@@ -104,6 +99,7 @@ void TileFrameRenderer::render_batches(const TileRound& at, SampleState& state, 
     finish(batch, at.light, film);
   }
   state.frame_index = at.frame.index;
+  if (reprojection_ != nullptr) stats_.rays_primary += reprojection_->num_rays() - rays_before;
   if (at.round == 0) stats_.pixels += num_pixels;
   if (at.round >= 0) {
     frame_sampling_.merge(round_sampling_);
@@ -114,13 +110,6 @@ void TileFrameRenderer::render_batches(const TileRound& at, SampleState& state, 
   stats_.seconds_sample += share * stages_.sample;
   stats_.seconds_visibility += share * stages_.visibility;
   stats_.seconds_shade += share * stages_.shade;
-}
-
-/// Makes room for the targets of the round's samples, and says whether those of the one before are
-/// there.
-void TileFrameRenderer::keep_targets(std::size_t num_samples) {
-  knows_targets_ = has_history_ && reprojection_ == nullptr && targets_.size() == num_samples;
-  targets_.resize(num_samples);
 }
 
 /// The setting of the material of the first surface, or the job's.

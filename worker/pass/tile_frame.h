@@ -16,7 +16,7 @@
 
 namespace baton {
 
-/// One pass over a tile.
+/// One pass over some pixels of a tile.
 struct TileRound {
   const FrameSpec& frame;
   std::int32_t round = 0;  ///< of the step; negative: before those that are seen
@@ -38,12 +38,13 @@ class TileFrameRenderer {
   /// geometry: of the frames that are rendered; must outlive the object.
   TileFrameRenderer(const RenderContext& context, const FrameGeometry& geometry);
 
-  /// Where a pixel stays where it was. state: what the previous round or frame left when
-  /// has_history, else only its sizes matter; becomes this round's. film: takes the pixels.
-  void render(const TileRound& at, bool has_history, SampleState& state, RoundMean& film);
-  /// The first round where surfaces move: what the previous frame left comes from `history`. state:
-  /// sized, all zero.
-  void render(const TileRound& at, Reprojection& history, SampleState& state, RoundMean& film);
+  /// Before the pixels of a round. state: what the previous round or frame left when has_history or
+  /// history, else only its sizes matter. history: of the first round where surfaces move, what the
+  /// previous frame left, and `state` is all zero; else null. Both must last until the round ends.
+  void begin_round(const SampleState& state, Reprojection* history, bool has_history);
+  /// Each pixel of a round must be in one part. state: becomes this round's. film: takes the
+  /// pixels.
+  void render(const TileRound& at, SampleState& state, RoundMean& film);
 
   /// What the second pass needs of the frame that was rendered last; once, and only if the job has
   /// a second pass.
@@ -72,8 +73,6 @@ class TileFrameRenderer {
     double reproject = 0, sample = 0, visibility = 0, shade = 0;
   };
 
-  void render_batches(const TileRound& at, SampleState& state, RoundMean& film);
-  void keep_targets(std::size_t num_samples);
   std::span<float> targets_of(std::size_t index, const SampleState& state) {
     const auto n = static_cast<std::size_t>(state.num_particles);
     return std::span(targets_).subspan(index * n, n);
@@ -94,7 +93,7 @@ class TileFrameRenderer {
   const RenderContext& context_;
   const FrameGeometry& geometry_;
   const bool draws_twice_, wants_unshadowed_;
-  const TileSurfaces* surfaces_ = nullptr;  ///< of the round in work
+  const TileSurfaces* surfaces_ = nullptr;  ///< of the pixels in work
   Reprojection* reprojection_ = nullptr;    ///< of the round in work; null where pixels stay
   bool has_history_ = false;                ///< of the round in work, where pixels stay
   std::array<Ahead, 2> ahead_;              ///< of odd and even slots

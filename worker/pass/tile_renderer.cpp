@@ -56,6 +56,9 @@ Status check_previous(const RenderContext& context, const TileRun& run,
   return {};
 }
 
+/// What sites see takes 120 bytes each, which their pixels' methods read soon after.
+constexpr std::size_t kSitesInCache = 4096;
+
 /// A tile on its way through its frames, round by round.
 class TileWalk {
  public:
@@ -100,18 +103,15 @@ class TileWalk {
       RoundMean& mean = round < 0 ? *unseen : film;
       std::optional<Reprojection> history;
       if (shares_ && round == first) history.emplace(context_, *geometry_, *before_, previous);
-      for (RoundPixels& part : parts_of(std::move(pixels))) {
-        const std::shared_ptr<const TileSurfaces> surfaces =
-            surfaces_of(frame.first_round + round, std::move(part));
-        const TileRound at{frame, round, *light, *surfaces,
-                           round < 0 ? nullptr : probe_light.get()};
+      const auto whole = kept_surfaces(frame.first_round + round, history.has_value());
+      if (history && whole != nullptr) keep_for_next(frame, whole);
+      renderer_->begin_round(state_, history ? &*history : nullptr, has_history_);
+      for (RoundPixels& part : parts_of(std::move(pixels), whole != nullptr)) {
+        const auto surfaces = surfaces_of(frame.first_round + round, std::move(part), whole);
         if (round >= 0) planes.add(*surfaces);
-        if (history) {
-          keep_for_next(frame, surfaces);
-          renderer_->render(at, *history, state_, mean);
-        } else {
-          renderer_->render(at, has_history_, state_, mean);
-        }
+        renderer_->render(
+            {frame, round, *light, *surfaces, round < 0 ? nullptr : probe_light.get()}, state_,
+            mean);
       }
       has_history_ = carries_state(context_.job);
     }
@@ -168,19 +168,22 @@ class TileWalk {
     num_tile_sites_ = std::accumulate(counts_.begin(), counts_.end(), std::size_t{0});
   }
   bool is_one_part() const { return counts_.empty() || num_tile_sites_ <= limits::kMaxSitesAtOnce; }
-  /// The pixels of a round, as many at a time as their sites leave room for.
-  std::vector<RoundPixels> parts_of(RoundPixels pixels) const {
+  /// The pixels of a round, as many at a time as caches hold the surfaces of; all together where
+  /// these are kept.
+  std::vector<RoundPixels> parts_of(RoundPixels pixels, bool are_kept) const {
     std::vector<RoundPixels> parts;
-    if (is_one_part()) {
+    if (are_kept && pixels.are_all(state_.num_pixels())) {
       parts.push_back(std::move(pixels));
       return parts;
     }
     std::size_t room = 0;
     for (std::size_t slot = 0; slot < pixels.size(); ++slot) {
-      const std::size_t index = pixels.index(slot), sites = counts_[index];
+      const std::size_t index = pixels.index(slot);
+      const std::size_t sites =
+          counts_.empty() ? static_cast<std::size_t>(context_.job.image.sites) : counts_[index];
       if (sites > room) {
         parts.emplace_back();
-        room = limits::kMaxSitesAtOnce;
+        room = kSitesInCache;
       }
       parts.back().add(index, pixels.weight(slot));
       room -= sites;
@@ -191,20 +194,32 @@ class TileWalk {
     const CpuTimer timer(stats_.seconds_light);
     return context_.lights->at(frame.index, round);
   }
-  /// What the sites of a round of all sweeps see: traced, or kept from a frame before.
-  std::shared_ptr<const TileSurfaces> surfaces_of(std::int32_t round, RoundPixels pixels) {
-    const std::int32_t of = rounds_have_own_sites(context_.job) ? std::max(round, 0) : 0;
-    const CpuTimer timer(stats_.seconds_primary);
-    const bool is_whole = pixels.are_all(state_.num_pixels());
-    auto found = kept_.find(of);
-    if (found == kept_.end() && ((of == 0 && is_one_part()) || has_room())) {
-      // Of all pixels: the next frame may want others.
-      found = kept_.emplace(of, trace(of, RoundPixels::all(state_.num_pixels()))).first;
+  /// The round, of all sweeps, whose sites a round has.
+  std::int32_t sites_of(std::int32_t round) const {
+    return rounds_have_own_sites(context_.job) ? std::max(round, 0) : 0;
+  }
+  /// What the whole tile sees in a round of all sweeps, if that is kept: for the rounds and frames
+  /// after it, or for the next frame's history. Else null.
+  std::shared_ptr<const TileSurfaces> kept_surfaces(std::int32_t round, bool for_history) {
+    const std::int32_t of = sites_of(round);
+    const auto found = kept_.find(of);
+    if (found != kept_.end()) return found->second;
+    if (!(is_one_part() && (of == 0 || for_history)) && !has_room()) return nullptr;
+    auto whole = std::make_shared<TileSurfaces>();
+    trace(of, RoundPixels::all(state_.num_pixels()), *whole);
+    return kept_.emplace(of, std::move(whole)).first->second;
+  }
+  /// What some pixels see: of `whole`, or, where that is null, traced, until the next call.
+  std::shared_ptr<const TileSurfaces> surfaces_of(
+      std::int32_t round, RoundPixels pixels, const std::shared_ptr<const TileSurfaces>& whole) {
+    if (whole != nullptr && pixels.are_all(state_.num_pixels())) return whole;
+    if (whole == nullptr) {
+      trace(sites_of(round), std::move(pixels), *passing_);
+    } else {
+      const CpuTimer timer(stats_.seconds_primary);
+      *passing_ = part_of(*whole, std::move(pixels));
     }
-    if (found == kept_.end()) return trace(of, std::move(pixels));
-    return is_whole
-               ? found->second
-               : std::make_shared<const TileSurfaces>(part_of(*found->second, std::move(pixels)));
+    return passing_;
   }
   /// Tiles ask for what those of the frame before saw; one that is behind them traces it again. Of
   /// a tile in parts nothing is kept.
@@ -218,11 +233,10 @@ class TileWalk {
         TileSurfaces::size_bytes(num_tile_sites_, context_.scene->has_detail);
     return keeps_surfaces_ && (kept_.size() + 1) * of_round <= limits::kMaxRoundSurfaceBytes;
   }
-  std::shared_ptr<const TileSurfaces> trace(std::int32_t round, RoundPixels pixels) {
-    auto surfaces = std::make_shared<const TileSurfaces>(
-        trace_primary(context_.job, *geometry_, rect_, std::move(pixels), round, counts_));
-    stats_.rays_primary += surfaces->rays.size();
-    return surfaces;
+  void trace(std::int32_t round, RoundPixels pixels, TileSurfaces& surfaces) {
+    const CpuTimer timer(stats_.seconds_primary);
+    trace_primary(context_.job, *geometry_, rect_, std::move(pixels), round, counts_, surfaces);
+    stats_.rays_primary += surfaces.rays.size();
   }
 
   const RenderContext& context_;
@@ -235,7 +249,8 @@ class TileWalk {
   std::shared_ptr<const FrameGeometry> geometry_, before_;
   std::vector<std::uint16_t> counts_;  ///< S of each pixel; empty: image.sites of all
   std::size_t num_tile_sites_ = 0;     ///< of all pixels
-  std::map<std::int32_t, std::shared_ptr<const TileSurfaces>> kept_;  ///< by round
+  std::map<std::int32_t, std::shared_ptr<const TileSurfaces>> kept_;          ///< by round
+  std::shared_ptr<TileSurfaces> passing_ = std::make_shared<TileSurfaces>();  ///< of a part
   std::unique_ptr<TileFrameRenderer> renderer_;
   RenderStats stats_;
 };
