@@ -8,44 +8,14 @@
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
-#include "common/math/lanes-inl.h"
+#include "common/math/exact_lanes-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace baton::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-// The functions of common/math/vec3.h, product by product and sum by sum: surfaces are the same on
-// all instruction sets.
-
-HWY_INLINE VF ExactDot(const Vec3Lanes& a, const Vec3Lanes& b) {
-  return hn::Add(hn::Add(hn::Mul(a.x, b.x), hn::Mul(a.y, b.y)), hn::Mul(a.z, b.z));
-}
-HWY_INLINE Vec3Lanes Sub(const Vec3Lanes& a, const Vec3Lanes& b) {
-  return {hn::Sub(a.x, b.x), hn::Sub(a.y, b.y), hn::Sub(a.z, b.z)};
-}
-HWY_INLINE Vec3Lanes Cross(const Vec3Lanes& a, const Vec3Lanes& b) {
-  const auto minor = [](VF a0, VF b1, VF a1, VF b0)
-                         HWY_ATTR { return hn::Sub(hn::Mul(a0, b1), hn::Mul(a1, b0)); };
-  return {minor(a.y, b.z, a.z, b.y), minor(a.z, b.x, a.x, b.z), minor(a.x, b.y, a.y, b.x)};
-}
-HWY_INLINE Vec3Lanes Times(const Mat3& m, const Vec3Lanes& v) {
-  const auto row = [&](std::size_t r) HWY_ATTR {
-    const DF d;
-    return ExactDot({hn::Set(d, m.m[r]), hn::Set(d, m.m[r + 1]), hn::Set(d, m.m[r + 2])}, v);
-  };
-  return {row(0), row(3), row(6)};
-}
 HWY_INLINE Vec3Lanes PointIn(const baton::Transform& t, const Vec3Lanes& v) {
-  const DF d;
-  return Add(Times(t.linear, v),
-             {hn::Set(d, t.offset.x), hn::Set(d, t.offset.y), hn::Set(d, t.offset.z)});
-}
-HWY_INLINE Vec3Lanes Normalized(const Vec3Lanes& v) {
-  const DF d;
-  const VF length = hn::Sqrt(ExactDot(v, v));
-  const MF is_usual = hn::And(hn::Gt(length, hn::Zero(d)), hn::Lt(length, hn::Inf(d)));
-  return Select(is_usual, {hn::Div(v.x, length), hn::Div(v.y, length), hn::Div(v.z, length)},
-                {hn::Zero(d), hn::Zero(d), hn::Set(d, 1.0f)});
+  return Add(ExactTimes(t.linear, v), SetLanes(t.offset));
 }
 /// v or -v: that on the side of `to`.
 HWY_INLINE Vec3Lanes TurnedTo(const Vec3Lanes& to, const Vec3Lanes& v) {
@@ -143,12 +113,12 @@ void SeeSurfaces(const kernels::MetTriangles& met, std::size_t first, const Inst
     const Vec3Lanes b = PointIn(instance.to_world, positions.load(1, lane));
     const Vec3Lanes c = PointIn(instance.to_world, positions.load(2, lane));
     const Vec3Lanes position = weights.mean(a, b, c);
-    const Vec3Lanes ng = TurnedTo(wo, Normalized(Cross(Sub(b, a), Sub(c, a))));
+    const Vec3Lanes ng = TurnedTo(wo, ExactNormalize(ExactCross(Sub(b, a), Sub(c, a))));
     Vec3Lanes ns = ng;
     if (is_smooth) {
       const Vec3Lanes normal =
           weights.mean(normals.load(0, lane), normals.load(1, lane), normals.load(2, lane));
-      ns = TurnedTo(ng, Normalized(Times(instance.normal_to_world, normal)));
+      ns = TurnedTo(ng, ExactNormalize(ExactTimes(instance.normal_to_world, normal)));
       ns = Select(hn::Gt(ExactDot(ns, ng), hn::Zero(d)), ns, ng);
     }
     const Vec3Lanes origin{Lifted(position.x, ng.x), Lifted(position.y, ng.y),

@@ -2,6 +2,7 @@
 
 #include "worker/pass/cpu_clock.h"
 #include "worker/pass/primary.h"
+#include "worker/pass/site_rays.h"
 
 namespace baton {
 
@@ -9,9 +10,9 @@ MaskedSurfaces::MaskedSurfaces(const RenderContext& context, const FrameGeometry
                                const PixelMask& mask)
     : num_sites_(static_cast<std::size_t>(context.job.image.sites)), position_(mask.ranks()) {
   // Trace.
-  mask.visit_all([&](std::int32_t x, std::int32_t y) {
-    append_primary_rays(context.job, geometry, x, y, rays_, 0, context.job.image.sites);
-  });
+  SiteRays sites(context.job, geometry.pose.camera, 0);
+  mask.visit_all(
+      [&](std::int32_t x, std::int32_t y) { sites.append(x, y, context.job.image.sites, rays_); });
   hits_.resize(rays_.size());
   {
     const StageTimer timer(seconds_rays_);

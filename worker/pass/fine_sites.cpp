@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "worker/pass/primary.h"
+#include "worker/pass/site_rays.h"
 #include "worker/scene/pixel_filter.h"
 
 namespace baton {

@@ -4,6 +4,7 @@
 
 #include "worker/method/populations.h"
 #include "worker/pass/render_context.h"
+#include "worker/pass/site_rays.h"
 
 namespace baton {
 
@@ -40,10 +41,11 @@ void OldPixels::trace() {
   std::vector<std::uint16_t> num_sites(asked_.size(), static_cast<std::uint16_t>(job_.image.sites));
   if (has_fine_sites(job_)) num_sites = count_sites(job_, before_, asked_);
   std::vector<Ray> rays;
+  SiteRays sites(job_, before_.pose.camera, round_);
   first_hit_.clear();
   for (std::size_t i = 0; i < asked_.size(); ++i) {
     first_hit_.push_back(rays.size());
-    append_primary_rays(job_, before_, asked_[i][0], asked_[i][1], rays, round_, num_sites[i]);
+    sites.append(asked_[i][0], asked_[i][1], num_sites[i], rays);
   }
   hits_.resize(rays.size());
   trace_primary_rays(before_, rays, num_sites, hits_);

@@ -5,38 +5,13 @@
 #include <cmath>
 #include <utility>
 
-#include "common/job/sequence.h"
-#include "common/math/low_discrepancy.h"
 #include "worker/light/candidates.h"
 #include "worker/pass/catcher.h"
-#include "worker/scene/pixel_filter.h"
+#include "worker/pass/site_rays.h"
 #include "worker/scene/scene_kernels.h"
 
 namespace baton {
 namespace {
-
-/// Grid of a pixel's sites: image.sites cells, each of them cut into 4^k where geometry is fine.
-class SiteGrid {
- public:
-  SiteGrid(std::int32_t coarse, std::int32_t sites)
-      : coarse_(coarse), side_(root(coarse)), cuts_(root(sites / coarse)) {}
-  /// Position of a site inside its pixel, [0, 1)^2, from two uniforms. Sites 0, 1, ... of the
-  /// coarse grid come first: what needs few takes those.
-  std::array<float, 2> position(std::int32_t site, float u, float v) const {
-    const std::int32_t cell = site % coarse_, cut = site / coarse_;
-    const auto width = 1.0f / static_cast<float>(side_ * cuts_);
-    return {(static_cast<float>(cell % side_ * cuts_ + cut % cuts_) + u) * width,
-            (static_cast<float>(cell / side_ * cuts_ + cut / cuts_) + v) * width};
-  }
-
- private:
-  static std::int32_t root(std::int32_t square) {
-    return static_cast<std::int32_t>(std::sqrt(static_cast<float>(square)));
-  }
-  std::int32_t coarse_;
-  std::int32_t side_;  ///< coarse cells in a row
-  std::int32_t cuts_;  ///< of a coarse cell's side
-};
 
 /// Of hits whose materials have detail; what the others have is never read.
 std::vector<SurfaceLook> looks_of(const FrameGeometry& geometry, std::span<const SurfaceHit> hits) {
@@ -68,6 +43,7 @@ void trace_primary(const JobSpec& job, const FrameGeometry& geometry, const Pixe
   surfaces.first_site.clear();
   const std::size_t num_slots = surfaces.pixels.size();
   const auto usual = static_cast<std::uint16_t>(job.image.sites);
+  SiteRays sites(job, geometry.pose.camera, round);
   std::vector<std::uint16_t> num_sites;
   num_sites.reserve(num_slots);
   surfaces.first_hit.reserve(num_slots + 1);
@@ -76,7 +52,7 @@ void trace_primary(const JobSpec& job, const FrameGeometry& geometry, const Pixe
     const std::size_t index = surfaces.pixels.index(slot);
     const auto [x, y] = rect.place(index);
     num_sites.push_back(counts.empty() ? usual : counts[index]);
-    append_primary_rays(job, geometry, x, y, surfaces.rays, round, num_sites.back());
+    sites.append(x, y, num_sites.back(), surfaces.rays);
     surfaces.first_hit.push_back(static_cast<std::uint32_t>(surfaces.rays.size()));
   }
   surfaces.hits.resize(surfaces.rays.size());  // all are written below
@@ -109,41 +85,6 @@ TileSurfaces part_of(const TileSurfaces& whole, RoundPixels pixels) {
     part.first_site.push_back(whole.first_site[index]);
   }
   return part;
-}
-
-Rng site_random(const JobSpec& job, std::int32_t x, std::int32_t y) {
-  const std::uint64_t seed = job.image.site_seed > 0 ? job.image.site_seed : job.seed;
-  return {pixel_key(seed, 0, job.image.width, x, y), PassId::site_position};
-}
-
-void append_primary_rays(const JobSpec& job, const FrameGeometry& geometry, std::int32_t x,
-                         std::int32_t y, std::vector<Ray>& rays, std::int32_t round,
-                         std::int32_t num_sites) {
-  const Camera& camera = geometry.pose.camera;
-  const Rng rng = site_random(job, x, y);
-  const bool own_sites = rounds_have_own_sites(job);
-  const Philox4x32::Counter lens_shift = camera.has_lens() ? rng.bits(1, 0) : Philox4x32::Counter{};
-  std::uint32_t lens_point =
-      own_sites ? static_cast<std::uint32_t>(std::max(round, 0) * num_sites) : 0;
-  const auto add = [&](const std::array<float, 2>& position) {
-    const float px = static_cast<float>(x) + position[0], py = static_cast<float>(y) + position[1];
-    if (!camera.has_lens()) return rays.push_back(camera.ray(px, py));
-    const auto u = sobol_2d(lens_point++);
-    rays.push_back(camera.ray(
-        px, py, {uniform_float(u[0] ^ lens_shift[0]), uniform_float(u[1] ^ lens_shift[1])}));
-  };
-  const bool lone =
-      num_sites == 1 && !has_fine_sites(job) && (job.quality.rounds == 1 || !own_sites);
-  if (lone && job.image.filter == PixelFilter::box) return add({0.5f, 0.5f});
-  const SiteGrid grid(job.image.sites, num_sites);
-  const auto shift = sobol_2d(own_sites && round > 0 ? static_cast<std::uint32_t>(round) : 0);
-  Philox4x32::Counter bits{};  // of two sites
-  for (std::int32_t site = 0; site < num_sites; ++site) {
-    if (site % 2 == 0) bits = rng.bits(0, static_cast<std::uint32_t>(site / 2));
-    const auto k = static_cast<std::size_t>(site % 2 * 2);
-    add(filter_position(job.image.filter, grid.position(site, uniform_float(bits[k] ^ shift[0]),
-                                                        uniform_float(bits[k + 1] ^ shift[1]))));
-  }
 }
 
 void trace_primary_rays(const FrameGeometry& geometry, std::span<const Ray> rays,

@@ -7,7 +7,6 @@
 #include <vector>
 
 #include "common/base/frame_keep.h"
-#include "common/math/philox.h"
 #include "worker/pass/render_context.h"
 #include "worker/pass/round_pixels.h"
 
@@ -66,10 +65,7 @@ class SurfaceCache : public FrameKeep<std::pair<std::int32_t, std::int32_t>, Til
   using FrameKeep::FrameKeep;
 };
 
-/// Pass 1: one primary ray for each site of each pixel. A single site of a single round shoots
-/// through the pixel's centre, if the filter is the box; else sites are jittered on a sqrt(S) x
-/// sqrt(S) grid over image.filter, in each round anew (rounds_have_own_sites): those of a cell are
-/// points of a low-discrepancy sequence. The same for all frames.
+/// Pass 1: one primary ray for each site of each pixel (SiteRays).
 TileSurfaces trace_primary(const JobSpec& job, const FrameGeometry& geometry, const PixelRect& rect,
                            std::int32_t round = 0);
 /// Of some pixels of a tile. counts: S of each pixel of the tile, row by row (fine_sites.h); empty:
@@ -81,15 +77,7 @@ void trace_primary(const JobSpec& job, const FrameGeometry& geometry, const Pixe
 /// What some pixels of a tile see, of what all of them do.
 TileSurfaces part_of(const TileSurfaces& whole, RoundPixels pixels);
 
-/// Where a pixel's rays of all frames and rounds lie: bits of step 0 place sites, of step 1 they
-/// shift the lens, of step 2 they place the probes of fine_sites.h.
-Rng site_random(const JobSpec& job, std::int32_t x, std::int32_t y);
-
-/// The same for pixels one by one: appends the rays of the `num_sites` sites of pixel (x, y). The
-/// first image.sites of them are spread over the pixel. Hits are the same as of a whole tile.
-void append_primary_rays(const JobSpec& job, const FrameGeometry& geometry, std::int32_t x,
-                         std::int32_t y, std::vector<Ray>& rays, std::int32_t round,
-                         std::int32_t num_sites);
+/// What rays of pixels see that follow each other; hits are the same as of a whole tile.
 /// num_sites: (pixels) S of each.
 void trace_primary_rays(const FrameGeometry& geometry, std::span<const Ray> rays,
                         std::span<const std::uint16_t> num_sites, std::span<SurfaceHit> hits);

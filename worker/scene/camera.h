@@ -17,6 +17,17 @@ struct Ray {
   Vec3 direction;  ///< unit
 };
 
+/// Where rays of a camera come from and what they pass, lens aside: position (x, y) of the image is
+/// the point corner + x right + y down of the plane one unit ahead, seen from the eye.
+struct ImagePlane {
+  Vec3 eye;
+  Vec3 forward;  ///< unit
+  Vec3 right;    ///< step of one pixel
+  Vec3 down;
+  Vec3 corner;
+  bool is_orthographic = false;
+};
+
 /// Perspective or orthographic camera with a thin lens. Pixel coordinates: (0, 0) is the upper left
 /// corner of the upper left pixel, x to the right, y down.
 class Camera {
@@ -30,6 +41,7 @@ class Camera {
   /// the picture is sharp [Cook et al. 1984].
   Ray ray(float x, float y, const std::array<float, 2>& u) const;
   bool has_lens() const { return lens_radius_ > 0; }
+  ImagePlane plane() const { return {origin_, forward_, right_, down_, corner_, is_orthographic_}; }
   /// Width of a pixel at `depth` along a unit direction, across the view.
   float pixel_width(const Vec3& direction, float depth) const {
     return length(right_) * (is_orthographic_ ? 1 : depth * dot(direction, forward_));
