@@ -9,6 +9,7 @@
 
 #include "tests/support/render_tiled.h"
 #include "worker/pass/primary.h"
+#include "worker/pass/site_rays.h"
 
 namespace baton {
 namespace {
@@ -121,7 +122,7 @@ TEST(FineSites, AreStratified) {
     const auto geometry = *context->geometry->at(0);
     const Camera& camera = geometry->pose.camera;
     std::vector<Ray> rays;
-    append_primary_rays(context->job, *geometry, 3, 4, rays, 1, 16 * coarse);
+    SiteRays(context->job, camera, 1).append(3, 4, 16 * coarse, rays);
     ASSERT_EQ(rays.size(), static_cast<std::size_t>(16 * coarse));
     const auto cells = [&](int count, int side) {
       std::vector<int> hits(static_cast<std::size_t>(side * side));

@@ -47,6 +47,26 @@ TEST(Rounds, SameBytesForAnyTilingWhileCameraAndObjectsMove) {
   }
 }
 
+// Tiles of more sites than caches hold the surfaces of (kSitesInCache) are rendered in parts.
+TEST(Rounds, OfLargeTilesHaveTheSameBytes) {
+  for (const Method method : {Method::pool, Method::bidirectional}) {
+    for (const int max_sites : {0, 64}) {
+      JobSpec job = rounds_job(method, 2);
+      job.image.width = 48;
+      job.image.height = 32;
+      job.image.max_sites = max_sites;
+      for (const bool in_motion : {false, true}) {
+        if (in_motion) test::set_in_motion(job, true, true);
+        const std::vector<FilmTile> whole = render_tiled(job, 4096, 3);
+        const std::string what =
+            std::to_string(static_cast<int>(method)) + ", " + std::to_string(max_sites);
+        EXPECT_EQ(render_tiled(job, 16, 1), whole) << what;
+        EXPECT_EQ(render_tiled(job, 4096, 1, MemoryBudget::of(0)), whole) << what;
+      }
+    }
+  }
+}
+
 /// RMSE beside a mean of many rounds, over mean radiance.
 double error_of(const JobSpec& job, const std::vector<double>& truth) {
   constexpr int kSeeds = 6;
@@ -137,23 +157,6 @@ TEST(Preroll, IsForMethodsWithAMemory) {
     EXPECT_EQ(none.stats.rays_primary, two.stats.rays_primary);
     EXPECT_EQ(none.stats.pixels, two.stats.pixels);
     EXPECT_EQ(none.stats.sampling.pixels(), two.stats.sampling.pixels());
-  }
-}
-
-// Where pixels carry samples, those belong to the sites.
-TEST(Rounds, SitesAreNewWhereNothingBelongsToThem) {
-  for (const Method method : {Method::pool, Method::sequential}) {
-    JobSpec job = rounds_job(method, 4);
-    const auto context = *load_render_context(job, Digest{1, 2});
-    const auto geometry = *context->geometry->at(0);
-    const auto rays_of = [&](std::int32_t round) {
-      std::vector<Ray> rays;
-      append_primary_rays(context->job, *geometry, 3, 4, rays, round, 4);
-      return rays;
-    };
-    const auto first = rays_of(0), third = rays_of(2);
-    ASSERT_EQ(first.size(), 4u);
-    EXPECT_EQ(first[0].direction == third[0].direction, method == Method::sequential);
   }
 }
 
