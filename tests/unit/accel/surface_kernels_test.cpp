@@ -3,6 +3,8 @@
 
 #include <gtest/gtest.h>
 
+#include <cmath>
+
 #include "tests/support/instruction_sets.h"
 #include "tests/unit/accel/spheres.h"
 
@@ -104,6 +106,19 @@ TEST_P(SurfaceKernels, GiveWhatTheFormulasOfOneSurfaceGive) {
       }
     }
     EXPECT_GT(num_hits, 2000);
+  }
+}
+
+TEST_P(SurfaceKernels, ShadeWithTheGeometricNormalWhereTheOtherLiesInTheSurface) {
+  const std::vector<Vec3> positions{{0, 0, 0}, {1, 0, 0}, {0, 1, 0}}, normals(3, Vec3{1, 0, 0});
+  const std::vector<std::array<std::uint32_t, 3>> triangles{{0, 1, 2}};
+  MetTriangles met = draw(3, 5, 1);
+  met.instance.fill(0);
+  std::vector<SurfaceHit> hits(5);
+  kernels::see_surfaces(met, 0, {}, triangles, {positions, normals, {}}, false, hits);
+  for (const SurfaceHit& hit : hits) {
+    EXPECT_EQ(std::fabs(hit.point.ng.z), 1);
+    EXPECT_EQ(hit.point.ns, hit.point.ng);
   }
 }
 
