@@ -72,7 +72,7 @@ inline constexpr std::uint64_t kMaxFilmBytesAhead =
     2ull << 30;  ///< films, before compression, of frames that are rendered ahead of an open one
 inline constexpr std::uint64_t kMaxRoundSurfaceBytes =
     1ull << 27;  ///< what a tile keeps of its rounds' surfaces from frame to frame
-/// Sites of pixels, where they differ in number, that are in work at a time.
+/// Sites of a tile, where pixels differ in number, up to which what they see is kept.
 inline constexpr std::size_t kMaxSitesAtOnce = 1u << 18;
 /// Of meshes in several places, in one flat hierarchy: some 600 MB. A second level costs a third of
 /// the shadow rays' speed.

@@ -206,15 +206,15 @@ class EmbreeAccel final : public Accel {
       for (std::size_t i = first; i < end; i += group) {
         const std::span<const Ray> some = rays.subspan(i, std::min(group, end - i));
         if (width == 1) {
-          trace<RTCRayHit>(layer, some, met, [&](const int*, RTCScene scene, RTCRayHit* query) {
+          trace<RTCRayHit, 1>(layer, some, met, [&](const int*, RTCScene scene, RTCRayHit* query) {
             rtcIntersect1(scene, &context, query);
           });
         } else if (width == 4) {
-          trace<RTCRayHit4>(layer, some, met, [&](const int* on, RTCScene scene, auto* query) {
+          trace<RTCRayHit4, 4>(layer, some, met, [&](const int* on, RTCScene scene, auto* query) {
             rtcIntersect4(on, scene, &context, query);
           });
         } else {
-          trace<RTCRayHit16>(layer, some, met, [&](const int* on, RTCScene scene, auto* query) {
+          trace<RTCRayHit16, 16>(layer, some, met, [&](const int* on, RTCScene scene, auto* query) {
             rtcIntersect16(on, scene, &context, query);
           });
         }
@@ -224,12 +224,12 @@ class EmbreeAccel final : public Accel {
   }
 
   /// Adds what a packet of rays meets; the lanes that are left over are off.
-  template <class Packet, class Intersect>
+  template <class Packet, std::size_t kWidth, class Intersect>
   void trace(const PlacedLayer& layer, std::span<const Ray> rays, kernels::MetTriangles& met,
              const Intersect& intersect) const {
-    constexpr std::size_t kWidth = sizeof(Packet::ray.org_x) / sizeof(float);
     alignas(64) RTCRayHitNt<kWidth> query{};
-    static_assert(sizeof(query) % sizeof(Packet) == 0);
+    static_assert(sizeof(query.ray) == sizeof(Packet::ray) &&
+                  sizeof(query.hit) == sizeof(Packet::hit));
     alignas(64) std::array<int, kWidth> valid{};
     for (std::size_t k = 0; k < rays.size(); ++k) {
       valid[k] = -1;
