@@ -15,12 +15,9 @@ Rgb CatcherAlbedo::of(const Vec3& normal) {
   return albedo_ = {albedo(e.x), albedo(e.y), albedo(e.z)};
 }
 
-Rgb CatcherAlbedo::add_to(SiteBlock& sites, int site, const FrameGeometry& geometry,
-                          const SurfaceHit& hit, const SurfaceLook* look) {
-  if (!hit.is_catcher) return geometry.add_to(sites, site, hit, look);
+void CatcherAlbedo::add_catcher(SiteBlock& sites, int site, const SurfaceHit& hit) {
   const SeenSurface catcher = as_catcher(hit.point, of(hit.point.ns));
   sites.add(site, catcher.point, catcher.material);
-  return {};
 }
 
 }  // namespace baton

@@ -28,9 +28,15 @@ class CatcherAlbedo {
   /// Sets a site to what it hit, a catcher or not; look: of the hit, null: textures are looked up.
   /// Returns the radiance that the surface emits.
   Rgb add_to(SiteBlock& sites, int site, const FrameGeometry& geometry, const SurfaceHit& hit,
-             const SurfaceLook* look);
+             const SurfaceLook* look) {
+    if (!hit.is_catcher) return geometry.add_to(sites, site, hit, look);
+    add_catcher(sites, site, hit);
+    return {};
+  }
 
  private:
+  void add_catcher(SiteBlock& sites, int site, const SurfaceHit& hit);
+
   const Irradiance* irradiance_ = nullptr;
   const Environment* environment_ = nullptr;
   std::optional<Vec3> normal_;

@@ -12,18 +12,19 @@ float acceptance_rate(const MoveCounts& moves) {
 }  // namespace
 
 void record_geometry(std::span<const SurfaceHit> hits, PixelResult& pixel) {
-  float num_hits = 0;
+  float num_hits = 0, depth = 0;
+  Vec3 normal;
   for (const SurfaceHit& hit : hits) {
     if (!hit.hit || hit.is_catcher) continue;
     if (num_hits == 0) pixel.material = hit.material + 1;
     num_hits += 1;
-    pixel.normal += hit.point.ns;
-    pixel.depth += hit.depth;
+    normal += hit.point.ns;
+    depth += hit.depth;
   }
   if (num_hits == 0) return;
   pixel.coverage = num_hits / static_cast<float>(hits.size());
-  if (num_hits > 1) pixel.normal = normalize(pixel.normal);
-  pixel.depth /= num_hits;
+  pixel.normal = num_hits > 1 ? normalize(normal) : normal;
+  pixel.depth = depth / num_hits;
 }
 
 void record_sampling(const PixelDiagnostics& did, PixelResult& pixel, SamplingStats& stats) {

@@ -184,6 +184,7 @@ void TileFrameRenderer::sample(Batch& batch, const TileRound& at, SampleState& s
     poison(sites);
     batch.emission[i] = gather_sites(geometry_, surfaces_->pixel(slot),
                                      surfaces_->pixel_looks(slot), sites, catchers_);
+    record_geometry(surfaces_->pixel(slot), batch.pixels[i]);  // while it is in the cache
 
     // Sample it.
     const Ahead& ahead = ahead_[slot % 2];
@@ -230,9 +231,11 @@ void TileFrameRenderer::sample(Batch& batch, const TileRound& at, SampleState& s
     if (is_catcher) {
       set_catcher(state, index);
       batch.pixels[i].shadow = dark_share(input.hits, sites);
-    } else if (const float share = catcher_share(input.hits); share > 0) {
-      batch.pixels[i].shadow = sample_edge(input, light, state);
-      batch.pixels[i].catcher = share;
+    } else if (context_.scene->has_catcher) {
+      if (const float share = catcher_share(input.hits); share > 0) {
+        batch.pixels[i].shadow = sample_edge(input, light, state);
+        batch.pixels[i].catcher = share;
+      }
     }
 
     // Count what the method did.
@@ -331,13 +334,11 @@ void TileFrameRenderer::finish(Batch& batch, const FrameLight& light, RoundMean&
   for (std::size_t i = 0; i < batch.count; ++i) {
     PixelResult& pixel = batch.pixels[i];
     const std::size_t slot = batch.first + i;
-    const std::span<const SurfaceHit> hits = surfaces_->pixel(slot);
     if (surfaces_->sees_surface(slot) && surfaces_->first_surface(slot).is_catcher) {
       const PixelResult caught = std::exchange(pixel, {});  // which is not in the picture
       pixel.shadow = caught.catcher > 0 ? caught.shadow : caught.radiance + caught.shadow;
-      pixel.catcher = catcher_share(hits);
+      pixel.catcher = catcher_share(surfaces_->pixel(slot));
     }
-    record_geometry(hits, pixel);
     pixel.radiance += background[i] + batch.emission[i];
     pixel.alpha = show_environment ? 1 : pixel.coverage;
     film.add(surfaces_->pixels.index(slot), pixel, surfaces_->pixels.weight(slot));
