@@ -33,8 +33,11 @@ class Lab:
         self.made = {row["csv"]: row for row in self.rows(MADE)}
 
     def rows(self, path):
+        """Rows by the names of their columns; a second column of a name is called "NAME 2"."""
         with (self.root / path).open(encoding="utf-8", newline="") as file:
-            return list(csv.DictReader(file))
+            header, *rows = csv.reader(file)
+        names = [name if name not in header[:i] else f"{name} {header[:i].count(name) + 1}" for i, name in enumerate(header)]
+        return [dict(zip(names, row)) for row in rows]
 
     def csv_of(self, name):
         """The files that a table shows."""
