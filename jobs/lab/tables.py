@@ -117,7 +117,7 @@ def faults(root):
         found += [f"{path}: no table is called {name}" for name in unknown]
         if unknown:
             continue
-        if text.count("<!-- table:") != len(TABLE.findall(text)):
+        if len(re.findall(r"^<!-- table:", text, re.MULTILINE)) != len(TABLE.findall(text)):
             found.append(f"{path}: a table has no end")
         for match in TABLE.finditer(text):
             if match[2] != lab.markdown(match[1]):
