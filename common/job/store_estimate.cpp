@@ -11,7 +11,7 @@
 namespace baton {
 namespace {
 
-// Measured sizes, in bytes a pixel that sees a surface: docs/scheduling.md has the table.
+// Measured sizes, in bytes a pixel that sees a surface: docs/lab/store.md has the table.
 /// One of R, G, B; also in a sky.
 constexpr double kColorBytes = 3.2;
 /// The errors of a few pixels.

@@ -17,7 +17,7 @@ struct StoreEstimate {
 };
 
 /// What the store of a job holds at its fullest with one worker, as it is likely: sizes are those
-/// that docs/scheduling.md measures. surface_share: of the pixels that see a surface, [0, 1].
+/// that docs/lab/store.md measures. surface_share: of the pixels that see a surface, [0, 1].
 StoreEstimate estimate_store(const JobSpec& job, double surface_share);
 
 /// What it holds at most, however many workers there are and however badly blobs pack.

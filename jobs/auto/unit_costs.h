@@ -20,7 +20,7 @@ Result<double> ray_cost_factor(const JobSpec& job);
 
 /// CPU microseconds of a job's counted work: a stand-in for time that is the same on every run and
 /// machine, for choices that must be repeatable. Rays count with ray_factor (ray_cost_factor), the
-/// rest with fixed unit costs, a fit to the runs of jobs/studies/unit-costs.json (docs/auto.md
+/// rest with fixed unit costs, a fit to the runs of jobs/studies/unit-costs.json (docs/lab/auto.md
 /// names machine and residual).
 double counted_cost_us(const JobSpec& job, double ray_factor, const RunCounts& counts);
 

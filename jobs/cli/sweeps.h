@@ -16,8 +16,8 @@ int begin_sweeps(JobSpec& job, bool afresh);
 ///
 /// What is averaged decides how long it goes on, but only through one number of a whole frame, the
 /// rms over thousands of probes, so what one pixel found moves its own number of rounds by less
-/// than a thousandth: docs/sampling.md says how large the bias can be. A pixel has no say of its
-/// own.
+/// than a thousandth: docs/build/rounds.md says how large the bias can be. A pixel has no say of
+/// its own.
 class MoreSweeps {
  public:
   /// Begins the job (begin_sweeps).

@@ -151,7 +151,7 @@ def rendered(programs, folder, job, **options):
 
 
 def over(frame, number, x, y, channel):
-    """A pixel laid over the plate by hand, as docs/frames.md says."""
+    """A pixel laid over the plate by hand, as docs/plates.md says."""
     i = (y - frame.window[1]) * frame.width + x - frame.window[0]
     texel = [light_of((u % 256, (2 * v) % 256, 20 * number % 256)["RGB".index(channel)])
              for v in (2 * y, 2 * y + 1) for u in (2 * x, 2 * x + 1)]

@@ -237,7 +237,7 @@ def drop_tiled(material, output, add):
     for node in [n for n in material.node_tree.nodes if n.type == "TEX_IMAGE" and n.image and n.image.source == "TILED"]:
         if node in used:
             add(f'image "{node.image.name}" of tiles (UDIM): the material is without it',
-                'give the job a material of this name with "name.<UDIM>.exr" as texture (docs/jobs.md, Textures)')
+                'give the job a material of this name with "name.<UDIM>.exr" as texture (docs/scenes.md, Textures)')
         material.node_tree.nodes.remove(node)
 
 
