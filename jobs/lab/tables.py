@@ -108,6 +108,9 @@ def faults(root):
     """What is wrong with tables and pages: lines that name the page. Empty where all is well."""
     lab = Lab(root)
     found, shown = [], {}
+    unmade = sorted({path for name in lab.tables for path in lab.csv_of(name) if path not in lab.made})
+    if unmade:
+        return [f"{MADE}: no row for {path}" for path in unmade]
     for page in pages(root):
         text = page.read_text(encoding="utf-8")
         path = page.relative_to(root).as_posix()

@@ -333,3 +333,10 @@ def cycles(rows):
     return [["scene", "linear radiance", "as shown"]] + [
         [name, *(of_scene[scene][column].replace("*", "") for column in ("times cheaper", "times cheaper 2"))]
         for scene, name in names.items()]
+
+
+def over_frames_time(rows):
+    """CPU microseconds a pixel and frame, from the cheapest to the dearest scene."""
+    methods = ("environment", "bidirectional", "sequential", "pool")
+    times = {method: [float(row["cpuMicrosecondsPerPixel"]) for row in rows if row["method"] == method] for method in methods}
+    return [[f"`{method}`" for method in methods], [f"{min(times[method]):.1f} to {max(times[method]):.1f}" for method in methods]]

@@ -101,6 +101,7 @@ PLANTED = [
     ("docs/page.md", "<!-- end -->", "", "a table has no end"),
     ("docs/page.md", "table: times", "table: hours", "no table is called hours"),
     ("docs/lab/tables/times.csv", "2.5", "2.6", "table times differs"),
+    ("docs/lab/made.csv", "times.csv", "hours.csv", "no row for docs/lab/tables/times.csv"),
     ("docs/page.md", "lab/other.md", "lab/another.md", "leads nowhere"),
     ("docs/page.md", "#the-other", "#the-end", "no heading of that name"),
     ("docs/page.md", "# A page\n", "# A page\n" + "word " * (PAGE_WORDS + 1), f"words, at most {PAGE_WORDS}"),
