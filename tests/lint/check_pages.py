@@ -1,5 +1,6 @@
 #!/usr/bin/env python3
-"""Checks the pages: tables and numbers are those of their CSV files, links lead somewhere, and pages are short enough.
+"""Checks the pages: tables and numbers are those of their CSV files, links lead somewhere, files that are
+named exist, and pages are short enough.
 
 usage: check_pages.py [ROOT]      print every fault as page: what, exit 1 when there is any
        check_pages.py --self-test plant one fault of each kind in a small tree and see it found
@@ -18,6 +19,8 @@ import tables  # noqa: E402
 
 USER_WORDS, ARCHITECTURE_WORDS, PAGE_WORDS = 20000, 1200, 2400
 LINK = re.compile(r"!?\[[^\]]*\]\(([^)\s]+)\)")
+# A file of the tree that a sentence names.
+FILE = re.compile(r"`((?:common|worker|coordinator|jobs|tests|docker|docs)/[\w/.-]*\.[a-z]+)`")
 FENCE = re.compile(r"^```.*?^```$", re.DOTALL | re.MULTILINE)
 # Folders whose Markdown files are pages, too.
 FOLDERS = ["docs", "docker", "common", "jobs", "tests"]
@@ -46,6 +49,13 @@ def link_faults(root, page):
             yield f"{path}: {link}: no heading of that name"
 
 
+def file_faults(root, page):
+    """Yields which files a page names that are not there."""
+    for name in FILE.findall(page.read_text(encoding="utf-8")):
+        if not (root / name).exists():
+            yield f"{page.relative_to(root).as_posix()}: names {name}, which is not there"
+
+
 def words_of(*files):
     return sum(len(file.read_text(encoding="utf-8").split()) for file in files)
 
@@ -66,7 +76,10 @@ def length_faults(root):
 def faults(root):
     root = root.resolve()
     linked = {*tables.pages(root), *(page for folder in FOLDERS for page in (root / folder).rglob("*.md"))}
-    return [*tables.faults(root), *(fault for page in sorted(linked) for fault in link_faults(root, page)), *length_faults(root)]
+    found = [*tables.faults(root), *length_faults(root)]
+    for page in sorted(linked):
+        found += [*link_faults(root, page), *file_faults(root, page)]
+    return found
 
 
 # ---- faults on purpose -------------------------------------------------------------------------------------
@@ -103,6 +116,7 @@ PLANTED = [
     ("docs/lab/tables/times.csv", "2.5", "2.6", "table times differs"),
     ("docs/lab/made.csv", "times.csv", "hours.csv", "no row for docs/lab/tables/times.csv"),
     ("docs/page.md", "lab/other.md", "lab/another.md", "leads nowhere"),
+    ("docs/page.md", "# A page\n", "# A page\n\n`worker/gone.h`\n", "names worker/gone.h"),
     ("docs/page.md", "#the-other", "#the-end", "no heading of that name"),
     ("docs/page.md", "# A page\n", "# A page\n" + "word " * (PAGE_WORDS + 1), f"words, at most {PAGE_WORDS}"),
     ("ARCHITECTURE.md", "# How", "word " * ARCHITECTURE_WORDS + "# How", f"at most {ARCHITECTURE_WORDS}"),
