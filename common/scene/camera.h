@@ -52,7 +52,7 @@ class Camera {
 
   /// The same of a point infinitely far away.
   std::optional<std::array<float, 2>> project_direction(const Vec3& direction) const;
-  /// Of a point from the eye, along the view.
+  /// Distance of a point from the eye, along the view.
   float distance_ahead(const Vec3& point) const { return dot(point - origin_, forward_); }
 
   /// Points of the world, as row vectors (x, y, z, 1), to the camera's own frame: x to the right, y
@@ -68,9 +68,11 @@ class Camera {
  private:
   Vec3 origin_;
   Vec3 forward_{0, 0, -1};  ///< unit
-  Vec3 right_{1, 0, 0};     ///< step of one pixel on the plane one unit ahead
+  /// Step of one pixel on the plane one unit ahead.
+  Vec3 right_{1, 0, 0};
   Vec3 down_{0, -1, 0};
-  Vec3 corner_{0, 0, -1};  ///< of position (0, 0) on that plane, from the eye; not unit
+  /// Position (0, 0) on the plane one unit ahead, from the eye; not unit.
+  Vec3 corner_{0, 0, -1};
   bool is_orthographic_ = false;
   float lens_radius_ = 0, focus_distance_ = 1;
   float center_x_ = 0, center_y_ = 0;  ///< image position straight ahead

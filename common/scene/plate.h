@@ -12,7 +12,8 @@ namespace baton {
 /// A picture that frames are laid over.
 struct Plate {
   RgbImage picture;
-  std::uint64_t repaired = 0;  ///< pixels of the file that are NaN or infinite, taken as 0
+  /// Pixels of the file that are NaN or infinite, taken as 0.
+  std::uint64_t repaired = 0;
 };
 
 /// The plate of a frame of a job with plates, as large as the whole picture of the job: each pixel

@@ -20,7 +20,7 @@ class PlacedTriangle {
         place_(point.place) {}
 
   Vec3 position() const { return mix(world(0), world(1), world(2)); }
-  /// Of the interpolated normals, or of the face where there are none.
+  /// The interpolated normal, or that of the face where vertices have none.
   Vec3 normal() const {
     const std::span<const Vec3> n = vertices_.normals;
     if (n.empty()) return normalize(cross(world(1) - world(0), world(2) - world(0)));
@@ -41,7 +41,7 @@ class PlacedTriangle {
   const SurfacePlace& place_;
 };
 
-/// Of the meshes that deform.
+/// Shapes of the meshes that deform.
 MeshShapes shapes_at(const Scene& scene, double frame) {
   MeshShapes shapes;
   for (std::size_t i = 0; i < scene.meshes.size(); ++i) {
@@ -52,8 +52,8 @@ MeshShapes shapes_at(const Scene& scene, double frame) {
   return shapes;
 }
 
-/// Of the inverse of a map that rays are taken through: float32 then holds its determinant, and
-/// places of up to a million units in the space of a mesh.
+/// Largest element of the inverse of a map that rays are taken through: float32 then holds its
+/// determinant, and places of up to a million units in the space of a mesh.
 constexpr float kMostInverse = 1e12f;
 
 /// Inverse transpose of a map from a mesh to the world; none where rays cannot be taken back.

@@ -11,7 +11,7 @@ namespace baton {
 struct Pose {
   Camera camera;
   std::vector<Instance> instances;  ///< those of the scene, in its order, moved
-  MeshShapes shapes{};              ///< of those that deform
+  MeshShapes shapes{};              ///< meshes that deform, in their shape
 };
 
 /// The pose at a frame number: a pure function of the job. scene: that of the job, with motion as
@@ -21,8 +21,9 @@ Pose pose_at(const Scene& scene, const JobSpec& job, double frame);
 /// A point of an instance.
 struct InstancePoint {
   std::uint32_t instance = 0;
-  SurfacePlace place{};  ///< where its mesh deforms; else not looked at
-  Vec3 world{};          ///< where it is, or a normal there
+  /// Needed where its mesh deforms; else not looked at.
+  SurfacePlace place{};
+  Vec3 world{};  ///< where it is, or a normal there
 };
 /// Where a point of an instance that moves, which is at `point.world` in one pose, is in another
 /// one: where the instance has gone, and on the same place of the triangle.

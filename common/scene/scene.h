@@ -18,12 +18,15 @@ struct Instance {
   std::uint32_t mesh = 0;
   std::uint32_t material = 0;
   Transform to_world;
-  Mat3 normal_to_world;             ///< inverse transpose of to_world.linear
-  std::int32_t moving_object = -1;  ///< index of the job's object, where that has keys; else -1
+  Mat3 normal_to_world;  ///< inverse transpose of to_world.linear
+  /// Index of the job's object, where that has keys; else -1.
+  std::int32_t moving_object = -1;
 
-  bool is_catcher = false;  ///< catches shadows: rays that look for objects pass it
-  bool deforms = false;     ///< its mesh does
-  bool is_absent = false;   ///< in a pose: to_world is singular, and no ray meets it
+  /// It catches shadows: rays that look for objects pass it.
+  bool is_catcher = false;
+  bool deforms = false;  ///< its mesh does
+  /// In a pose: to_world is singular, and no ray meets it.
+  bool is_absent = false;
 
   bool moves() const { return moving_object >= 0 || deforms; }
 };
@@ -32,9 +35,10 @@ struct Instance {
 struct Scene {
   std::vector<TriangleMesh> meshes;
   std::vector<Material> materials;
-  std::vector<Instance> instances;  ///< placed as without keys; pose.h moves them
-  bool has_detail = false;          ///< some material has
-  bool has_catcher = false;         ///< some instance is one
+  /// Instances placed as without keys; pose.h moves them.
+  std::vector<Instance> instances;
+  bool has_detail = false;   ///< some material has
+  bool has_catcher = false;  ///< some instance is one
 
   const Material& material_of(const Instance& instance) const {
     return materials[instance.material];

@@ -41,7 +41,8 @@ class FilterTable {
  private:
   static constexpr std::size_t kCells = 2048;
   std::array<float, kCells + 1> cumulative_;
-  std::array<std::uint16_t, kCells> guide_;  ///< the first cell that u >= k / kCells may lie in
+  /// By k: the first cell that u >= k / kCells may lie in.
+  std::array<std::uint16_t, kCells> guide_;
   float radius_, step_;
 };
 

@@ -30,13 +30,16 @@ struct SurfaceLanes {
   VF alpha2, view_cosine, view_masking;  ///< SiteBlock; of a ggx lobe
   MF is_ggx;
   bool any_phong, any_ggx, any_measured;
-  bool any_lobe;  ///< any of them; if not, only ns, ng and kd matter and the rest is 0
+  /// Any lane has a lobe; if not, only ns, ng and kd matter and the rest is 0.
+  bool any_lobe;
   VI site;
-  const float* const* tables;  ///< texels of measured BRDFs, some of them null
-  VI table;                    ///< index into `tables`
-  bool any_coat;               ///< if not, the rest is undefined
+  /// Texels of measured BRDFs, some of them null.
+  const float* const* tables;
+  VI table;       ///< index into `tables`
+  bool any_coat;  ///< if not, the coat's lanes are undefined
   GgxLanes coat;
-  VF coat_share, coat_chance;  ///< SiteBlock::Coats; 0 where a lane has none
+  /// As SiteBlock::Coats has them; 0 where a lane has none.
+  VF coat_share, coat_chance;
 };
 
 /// table[site] per lane; site in [0, num_sites).

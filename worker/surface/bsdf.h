@@ -43,8 +43,10 @@ float evaluate_coat(const Material& material, const ShadingPoint& point, const V
 
 /// A coat as a viewer sees it.
 struct SeenCoat {
-  ShadingPoint point;  ///< with the coat's normal, and wo clamped to it
-  float share = 0;     ///< of light that it reflects, [0, 1]; the material below keeps the rest
+  /// The point with the coat's normal, and wo clamped to it.
+  ShadingPoint point;
+  /// Share of light that it reflects, [0, 1]; the material below keeps the rest.
+  float share = 0;
 };
 SeenCoat see_coat(const Material& material, const ShadingPoint& point);
 

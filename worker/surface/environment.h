@@ -114,8 +114,9 @@ class EnvironmentMap {
   /// Cumulative sums, in double: no dim cell is lost beside a sun. Of a row's cells only every
   /// kBlock-th sum is kept; between them the cells are added up again, so what is sampled is
   /// exactly what evaluate() reports.
-  std::vector<double> row_cdf_;   ///< (cell rows + 1) probability
-  std::vector<Edges> block_cdf_;  ///< (cell rows, ceil(W / kBlock) + 1) of the row
+  std::vector<double> row_cdf_;  ///< (cell rows + 1) probability
+  /// Cumulative sums, (cell rows, ceil(W / kBlock) + 1) of the row.
+  std::vector<Edges> block_cdf_;
   double total_power_ = 0;
 };
 

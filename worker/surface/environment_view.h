@@ -6,10 +6,12 @@ namespace baton {
 
 /// What the SIMD kernels need of an Environment: borrowed, plain, cheap to copy.
 struct EnvironmentView {
-  const float* texels = nullptr;  ///< EnvironmentMap::texels(), four floats each
+  /// EnvironmentMap::texels(), four floats each.
+  const float* texels = nullptr;
   int width = 0, height = 0, stride = 0;
   bool bilinear = true;
-  std::array<float, 9> to_map{};  ///< row-major: map direction = to_map * world direction
+  /// row-major: map direction = to_map * world direction.
+  std::array<float, 9> to_map{};
 };
 
 inline EnvironmentView view_of(const EnvironmentMap& map, const Mat3& rotation) {

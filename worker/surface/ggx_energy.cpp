@@ -60,7 +60,7 @@ class AlbedoTable {
   Albedo& at(int i, int j) { return nodes_[static_cast<std::size_t>(i * kSide + j)]; }
   const Albedo& at(int i, int j) const { return nodes_[static_cast<std::size_t>(i * kSide + j)]; }
 
-  /// Of samples of the lobe, f cos / pdf = F G2 / G1 [Heitz 2018].
+  /// Albedo from samples of the lobe, f cos / pdf = F G2 / G1 [Heitz 2018].
   static Albedo integrate(float cos_view, float alpha) {
     const Material lobe{.lobe = Material::Lobe::ggx,
                         .kd = {},

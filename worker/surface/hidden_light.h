@@ -30,7 +30,8 @@ class HiddenLight {
  private:
   const JobSpec& job_;
   const Scene& scene_;
-  std::optional<Vec3> down_;   ///< straight down in the map's own frame; none: nothing is hidden
+  /// Straight down in the map's own frame; none: nothing is hidden.
+  std::optional<Vec3> down_;
   std::vector<Bounds> boxes_;  ///< (meshes) around each, in its own space
 };
 

@@ -32,7 +32,7 @@ MapRow::MapRow(double top, double bottom, int width)
 }
 
 double MapRow::place(double upper, double lower, double u) const {
-  // Of g(angle) sin(angle), g linear, the integral is g' sin(angle) - g(angle) cos(angle).
+  // The integral of g(angle) sin(angle), g linear, is g' sin(angle) - g(angle) cos(angle).
   const double slope = (lower - upper) / height_;
   const double above = slope * sin_top_ - upper * cos_top_;
   const double wanted = above + u * (slope * sin_bottom_ - lower * cos_bottom_ - above);

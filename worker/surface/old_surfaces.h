@@ -10,7 +10,8 @@ namespace baton {
 /// it, drawn uniformly. So at a site of this frame the density of the old samples is p~_{n-1} of
 /// surface g(t) over T(g(t)), whatever g is: the weights stay right for any choice.
 struct OldSurfaces {
-  SiteBlock sites;               ///< by site of this frame: the surface of g(t)
+  /// By site of this frame: the surface of g(t).
+  SiteBlock sites;
   SiteBlock::Array log_share{};  ///< -log T(g(t))
 };
 

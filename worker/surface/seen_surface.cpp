@@ -120,7 +120,7 @@ class Patch {
     Uv uv;
     Footprint seen;
     TextureSampling sampling;
-    std::optional<std::size_t> tile{};  ///< of tiles, where it is one of them
+    std::optional<std::size_t> tile{};  ///< index of the tile, where it is one
   };
   Place find(const PlacedTexture& t) const {
     const std::vector<Uv>& uvs = mesh_.uvs[t.uv_set];
@@ -159,8 +159,9 @@ class Patch {
   const SurfacePlace& place_;
   const std::array<std::uint32_t, 3>& corner_;
   Vec3 edge_b_{}, edge_c_{};
-  float bb_ = 0, bc_ = 0, cc_ = 0;  ///< of these edges
-  Uv along_{}, across_{};           ///< of the footprint, in edges of the triangle
+  float bb_ = 0, bc_ = 0, cc_ = 0;  ///< dot products of the two edges
+  /// Sides of the footprint, in edges of the triangle.
+  Uv along_{}, across_{};
 };
 
 /// The shading normal that a normal map's texel gives. strength: of the map. has_lobe: what it

@@ -20,23 +20,28 @@ struct alignas(64) SiteBlock {
   Array ng_x{}, ng_y{}, ng_z{};              ///< geometric normal
   Array wo_x{}, wo_y{}, wo_z{};              ///< to the viewer
   Array mirror_x{}, mirror_y{}, mirror_z{};  ///< wo mirrored about ns
-  Array kd_r{}, kd_g{}, kd_b{};              ///< diffuse albedo; ggx: kd (1 - F0) diffuse_left()
-  Array ks_r{}, ks_g{}, ks_b{};              ///< phong: specular albedo; ggx: F0
-  Array shape{};                             ///< phong: exponent; ggx: alpha
-  Array lobe_scale{};                        ///< phong: (s + 2) / (2 pi); ggx: F90; measured: 0
-  Array specular_probability{};              ///< LobeChances::any
-  Array alpha2{};                            ///< ggx: alpha^2
-  Array view_cosine{};                       ///< ggx: n.wo, at least 1e-4
-  Array view_masking{};                      ///< ggx: 1 + Lambda(wo) [Heitz 2014]
-  Array is_ggx{};  ///< 1 for ggx, and for measured, which is sampled by such a lobe; else 0
+  /// Diffuse albedo; ggx: kd (1 - F0) diffuse_left().
+  Array kd_r{}, kd_g{}, kd_b{};
+  Array ks_r{}, ks_g{}, ks_b{};  ///< phong: specular albedo; ggx: F0
+  Array shape{};                 ///< phong: exponent; ggx: alpha
+  /// Phong: (s + 2) / (2 pi); ggx: F90; measured: 0.
+  Array lobe_scale{};
+  Array specular_probability{};  ///< LobeChances::any
+  Array alpha2{};                ///< ggx: alpha^2
+  Array view_cosine{};           ///< ggx: n.wo, at least 1e-4
+  Array view_masking{};          ///< ggx: 1 + Lambda(wo) [Heitz 2014]
+  /// 1 for ggx, and for measured, which is sampled by such a lobe; else 0.
+  Array is_ggx{};
   std::array<const float*, kMaxSites> measured{};  ///< texels of a MeasuredBrdf, or null
 
   /// Clear coats, all 0 where a site has none. Only what any_coat says is there is read.
   struct Coats {
     Array ns_x{}, ns_y{}, ns_z{};  ///< the coat's normal
-    Array wo_x{}, wo_y{}, wo_z{};  ///< to the viewer, as a ggx lobe about it has it
+    /// To the viewer, as a ggx lobe about it has it.
+    Array wo_x{}, wo_y{}, wo_z{};
     Array alpha{};
-    Array share{};   ///< SeenCoat::share; kd and ks hold what it leaves
+    /// SeenCoat::share; kd and ks hold what it leaves.
+    Array share{};
     Array chance{};  ///< LobeChances::coat
 
     /// No coats on the first `sites` sites.
@@ -46,10 +51,12 @@ struct alignas(64) SiteBlock {
 
   std::int32_t num_sites = 1;  ///< S
   std::int32_t num_hits = 0;   ///< sites that see a surface
-  std::int32_t num_lobes = 0;  ///< sites whose surface has a lobe beside the diffuse one
+  /// Number of sites whose surface has a lobe beside the diffuse one.
+  std::int32_t num_lobes = 0;
   std::array<std::int32_t, kMaxSites> hit_sites{};   ///< their indices, ascending
   std::array<std::int32_t, kMaxSites> lobe_sites{};  ///< their indices, ascending
-  float specular_sum = 0;  ///< specular_probability of all sites that see a surface
+  /// specular_probability of all sites that see a surface.
+  float specular_sum = 0;
   bool any_phong = false;
   bool any_ggx = false;
   bool any_measured = false;

@@ -15,8 +15,9 @@ struct ProbeLine {
   std::array<float, 2> middle{}, along{};  ///< in units of the whole image
   int num_probes = 1;                      ///< [1, kMostProbes]
   TextureLevel fine, coarse;
-  float blend = 0;          ///< share of the coarse level, [0, 1)
-  bool is_smaller = false;  ///< texels are smaller than the footprint: always blended
+  float blend = 0;  ///< share of the coarse level, [0, 1)
+  /// Texels are smaller than the footprint: always blended.
+  bool is_smaller = false;
 };
 
 }  // namespace baton

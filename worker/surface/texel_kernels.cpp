@@ -28,9 +28,10 @@ struct WrapLanes {
   VF4 size;        ///< texels
   VF4 period;      ///< images until it repeats; 0: never
   VF4 per_period;  ///< its inverse; 0: never
-  VI4 texels,
-      mirror;  ///< of a period, or 0; the sum of two texels that mirror each other, or large
-  VI4 last;    ///< texel
+  VI4 texels;      ///< texels of a period, or 0
+  /// The sum of two texels that mirror each other, or large.
+  VI4 mirror;
+  VI4 last;  ///< texel
 
   WrapLanes(const ProbeLine& line, const TextureSampling& sampling) {
     const auto lanes = [](auto d, auto fine_u, auto fine_v, auto coarse_u, auto coarse_v) HWY_ATTR {

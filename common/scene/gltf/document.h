@@ -41,7 +41,8 @@ struct Accessor {
   std::uint64_t offset = 0;
   std::uint64_t count = 0;
   Component component = Component::f32;
-  int width = 1;  ///< components of an element: 1 to 4, 9 or 16
+  /// Components of an element: 1 to 4, 9 or 16.
+  int width = 1;
   bool normalized = false;
   Sparse sparse;
 };
@@ -57,27 +58,30 @@ struct JointSet {
 };
 
 struct Primitive {
-  int mode = 4;  ///< as OpenGL counts: 4 triangles, 5 strip, 6 fan; others have no surface
+  /// Topology as OpenGL counts: 4 triangles, 5 strip, 6 fan; others have no surface.
+  int mode = 4;
   int material = -1;
   int indices = -1, positions = -1, normals = -1, tangents = -1;  ///< accessors
   std::array<int, 2> uvs{-1, -1};                                 ///< accessors of sets 0 and 1
   std::vector<JointSet> joint_sets{};  ///< JOINTS_0 with WEIGHTS_0 and so on
   std::vector<MorphTarget> targets{};
-  bool colored = false;      ///< has vertex colours
-  bool morphs_more = false;  ///< has targets of attributes that are not read
+  bool colored = false;  ///< has vertex colours
+  /// Some targets are of attributes that are not read.
+  bool morphs_more = false;
 };
 
 struct Mesh {
   std::string name;
   std::vector<Primitive> primitives;  ///< all with as many targets
-  std::vector<double> weights;        ///< of the targets; as many, or none: zeros
+  std::vector<double> weights;        ///< one for each target, or none: zeros
 
   std::size_t num_targets() const { return primitives.empty() ? 0 : primitives[0].targets.size(); }
 };
 
 struct Skin {
   std::vector<int> joints;  ///< nodes, no two alike, at least one
-  int inverse_binds = -1;   ///< accessor of one matrix for each; -1: identities
+  /// Accessor of one matrix for each joint; -1: identities.
+  int inverse_binds = -1;
 };
 
 /// Row-major 3 x 4.
@@ -93,13 +97,15 @@ struct Node {
   std::array<double, 3> translation{0, 0, 0};
   std::array<double, 4> rotation{0, 0, 0, 1};  ///< x, y, z, w
   std::array<double, 3> scale{1, 1, 1};
-  std::vector<double> weights{};  ///< of its mesh's targets; as many, or none: those of the mesh
+  /// A weight for each target of its mesh, or none: those of the mesh.
+  std::vector<double> weights{};
 };
 
 struct Camera {
   bool perspective = true;
   double yfov = 0;  ///< radians, (0, pi)
-  double ymag = 1;  ///< orthographic: half the height of the picture
+  /// Orthographic: half the height of the picture.
+  double ymag = 1;
 };
 
 enum class Path : std::uint8_t { translation, rotation, scale, weights };
@@ -119,7 +125,7 @@ struct TextureInfo {
   int uv = 0;  ///< set
   std::array<double, 2> offset{0, 0}, scale{1, 1};
   double rotation = 0;  ///< radians
-  double strength = 1;  ///< of a normal texture
+  double strength = 1;  ///< normal textures: how far they tilt
 };
 
 enum class Wrap : std::uint8_t { repeat, clamp, mirror };
@@ -141,7 +147,8 @@ enum class AlphaMode : std::uint8_t { opaque, mask, blend };
 
 struct Material {
   std::string name;
-  std::string fault;  ///< what is wrong with it, which counts where it is used; empty: nothing
+  /// What is wrong with the material, which counts where it is used; empty: nothing.
+  std::string fault;
   std::array<double, 4> base_color{1, 1, 1, 1};
   double metallic = 1, roughness = 1;
   TextureInfo base_color_texture, metallic_roughness_texture, normal_texture, emissive_texture;
@@ -159,7 +166,8 @@ struct Material {
 struct Document {
   std::string path;  ///< goes first in every error
   std::vector<Bytes> buffers;
-  std::vector<std::string> buffer_files;  ///< those that are files of their own; absolute
+  /// Paths of buffers that are files of their own; absolute.
+  std::vector<std::string> buffer_files;
   std::vector<View> views;
   std::vector<Accessor> accessors;
   std::vector<Mesh> meshes;
@@ -167,7 +175,8 @@ struct Document {
   std::vector<Skin> skins;
   std::vector<int> roots;  ///< nodes of the scene that is shown
   std::vector<Camera> cameras;
-  std::vector<Channel> channels;  ///< of all animations, in the order of the file
+  /// Channels of all animations, in the order of the file.
+  std::vector<Channel> channels;
   std::vector<Material> materials;
   std::vector<Texture> textures;
   std::vector<Image> images;

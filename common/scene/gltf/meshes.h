@@ -12,7 +12,8 @@ namespace baton::gltf {
 /// What a node does to the vertices of its mesh.
 enum class Shaping : std::uint8_t {
   none,
-  at_rest,   ///< a skin or morph weights shape them once and for all
+  /// A skin or morph weights shape them once and for all.
+  at_rest,
   animated,  ///< animations do
 };
 Shaping shaping_of(const NodeMotion& motion, int node);

@@ -18,7 +18,7 @@ struct Curve {
   /// Rotations are unit quaternions. Held before the first time and after the last one.
   std::array<double, 3> vector_at(double seconds) const;
   Quaternion rotation_at(double seconds) const;
-  /// Of `width` numbers a time, each by itself.
+  /// A curve of `width` numbers a time, each by itself.
   std::vector<double> values_at(double seconds, std::size_t width) const;
 };
 

@@ -19,7 +19,8 @@ constexpr float kJump = 2;
 
 /// What the texels of a picture are, one by one.
 struct TexelReport {
-  double mean = 0;  ///< over the sphere and the three channels, of what is finite and positive
+  /// Mean over the sphere and the three channels, of what is finite and positive.
+  double mean = 0;
   float brightest = 0;
   std::uint64_t repaired = 0;  ///< those with a channel that is no radiance
 };

@@ -16,11 +16,14 @@ struct MapReport {
   std::string path;
   int width = 0, height = 0;            ///< texels in force
   int file_width = 0, file_height = 0;  ///< what the file holds
-  std::uint64_t repaired_texels = 0;    ///< negative, NaN or infinite ones, taken as 0
+  /// Texels that are negative, NaN or infinite, taken as 0.
+  std::uint64_t repaired_texels = 0;
   bool black = false;
-  float brightest = 0;   ///< the largest finite channel of the file
-  float mean = 0;        ///< radiance over the sphere and the three channels, of finite ones
-  std::string colors{};  ///< what was converted (conversion_text); empty: nothing, or not asked
+  float brightest = 0;  ///< the largest finite channel of the file
+  /// Mean radiance over the sphere and the three channels, of finite values.
+  float mean = 0;
+  /// What was converted (conversion_text); empty: nothing, or not asked.
+  std::string colors{};
 };
 
 /// image: what was read of the file. scale, max_width: of the environment.

@@ -31,7 +31,7 @@ PlacedTexture placed_texture(const TextureSpec& spec, std::shared_ptr<const Text
                        .nearest = spec.filter == TextureFilter::nearest}};
 }
 
-/// Of the images that are there, in the order of DetailImage.
+/// The images that are there, in the order of DetailImage, in groups that lie alike.
 std::vector<std::vector<DetailImage>> groups_of(const SurfaceDetail& detail) {
   std::vector<std::vector<DetailImage>> groups;
   for (std::size_t i = 0; i < kNumDetailImages; ++i) {

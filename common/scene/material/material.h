@@ -18,10 +18,11 @@ struct SurfaceDetail;
 /// G2 / (4 |n.wi| |n.wo|), with the share s of what it reflects = weight times Schlick's term of
 /// F0 = 0.04 and n.wo. It reflects no more than it receives if the material below does not.
 struct Coat {
-  float weight = 0;       ///< [0, 1]; 0: none
-  float alpha = 1;        ///< roughness^2
-  Vec3 normal{};          ///< unit; 0: the shading normal
-  float base_albedo = 0;  ///< about what the material below reflects, [0, 1]; for sampling alone
+  float weight = 0;  ///< [0, 1]; 0: none
+  float alpha = 1;   ///< roughness^2
+  Vec3 normal{};     ///< unit; 0: the shading normal
+  /// About what the material below reflects, [0, 1]; for sampling alone.
+  float base_albedo = 0;
 };
 
 /// A material in the one form that all code evaluates. lobe measured: f is the table. Else:
@@ -37,12 +38,14 @@ struct Material {
   enum class Lobe : std::uint8_t { none, phong, ggx, measured };
 
   Lobe lobe = Lobe::none;
-  Rgb kd;                          ///< diffuse albedo
-  Rgb ks;                          ///< phong: specular albedo; ggx: F0
-  float shape = 1;                 ///< phong: exponent s; ggx: alpha = roughness^2
-  float specular_probability = 0;  ///< chance of the lobe in sample_bsdf, without a coat, [0, 1]
-  std::shared_ptr<const MeasuredBrdf>
-      table{};    ///< measured: the whole BRDF; kd and ks are 0, shape is the sampled lobe's alpha
+  Rgb kd;  ///< diffuse albedo
+  Rgb ks;  ///< phong: specular albedo; ggx: F0
+  /// Phong: exponent s; ggx: alpha = roughness^2.
+  float shape = 1;
+  /// Chance of the lobe in sample_bsdf, without a coat, [0, 1].
+  float specular_probability = 0;
+  /// Measured: the whole BRDF; kd and ks are 0, shape is the sampled lobe's alpha.
+  std::shared_ptr<const MeasuredBrdf> table{};
   float f90 = 1;  ///< ggx
   /// What differs from place to place, glows or is not there (surface_detail.h); null: nothing. The
   /// rest is then only what methods look at ahead.

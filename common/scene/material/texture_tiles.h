@@ -24,7 +24,8 @@ using TileTriangle = std::array<Uv, 3>;
 /// within that tile to its end.
 struct TilePlace {
   int column, row;  ///< may be outside of the tiles
-  Uv uv;            ///< in that tile's image, (0, 0) its upper left corner
+  /// Place in that tile's image, (0, 0) its upper left corner.
+  Uv uv;
 
   bool is_in_range() const {
     return column >= 0 && column < kTileColumns && row >= 0 && row < kTileRows;

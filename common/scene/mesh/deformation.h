@@ -10,7 +10,8 @@ namespace baton {
 /// Which way the first texture coordinate grows.
 struct Tangent {
   Vec3 direction;  ///< unit, at a right angle to the normal
-  float side = 1;  ///< side * cross(normal, direction) points up in the image: 1 or -1
+  /// side * cross(normal, direction) points up in the image: 1 or -1.
+  float side = 1;
 
   bool operator==(const Tangent&) const = default;
 };

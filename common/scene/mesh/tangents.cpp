@@ -9,8 +9,10 @@ using Corners = std::array<std::uint32_t, 3>;
 
 /// How the image lies on one triangle.
 struct Lie {
-  Vec3 along;     ///< unit, where u grows; 0 where the triangle has no extent in the image
-  bool mirrored;  ///< seen from where its corners go round against the clock
+  /// Unit direction in which u grows; 0 where the triangle has no extent in the image.
+  Vec3 along;
+  /// The image is seen from where its corners go round against the clock.
+  bool mirrored;
 };
 
 Lie lie_of(const std::vector<Vec3>& positions, const std::vector<Uv>& uvs, const Corners& t) {

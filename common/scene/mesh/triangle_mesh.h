@@ -19,7 +19,8 @@ struct TriangleMesh {
   std::vector<Vec3> positions;
   std::vector<Vec3> normals;             ///< per vertex, unit; empty: flat shading
   std::array<std::vector<Uv>, 2> uvs{};  ///< by set, per vertex, or empty
-  std::vector<Tangent> tangents{};       ///< per vertex, where a normal map needs them, or empty
+  /// Tangents per vertex, where a normal map needs them, or empty.
+  std::vector<Tangent> tangents{};
   std::vector<std::array<std::uint32_t, 3>> triangles;
   std::uint64_t dropped_triangles = 0;
   /// How the vertices move, the arrays above being those of the frame at time 0; null: not at all.
@@ -35,8 +36,10 @@ struct TriangleMesh {
 /// Where on a mesh a surface was hit.
 struct SurfacePlace {
   std::uint32_t triangle = 0;
-  float u = 0, v = 0;  ///< barycentric coordinates of its second and third corner
-  float width = 0;     ///< of what the site sees, across the ray, in the world
+  /// Barycentric coordinates of the triangle's second and third corner.
+  float u = 0, v = 0;
+  /// Width of what the site sees, across the ray, in the world.
+  float width = 0;
 
   bool operator==(const SurfacePlace&) const = default;
 };

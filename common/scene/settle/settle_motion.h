@@ -12,7 +12,7 @@ namespace baton {
 /// a scene that is in a glTF file becomes objects (settle_scene.h), motion that is in glTF files
 /// becomes keys, one a frame, and motion.max_px, where it is 0, is measured between the first key
 /// and the last. A job without glTF files in which nothing moves comes back as it is. Errors: those
-/// of load_scene, a glTF file or a node of it that is not there. left_out: as of settle_scene.
+/// of load_scene, a glTF file or a node of it that is not there. left_out: as settle_scene has it.
 Result<JobSpec> settle_motion(JobSpec job, std::vector<std::string>* left_out = nullptr);
 
 }  // namespace baton

@@ -233,11 +233,11 @@ class SceneTaker {
   const GltfSceneSpec gltf_;
   gltf::NodeMotion motion_;
   const gltf::Document& file_;
-  const std::vector<std::string> material_names_;  ///< of material i - 1; first the default one
-  const std::vector<std::string> object_names_;    ///< by node
-  std::vector<const GltfNodeSpec*> said_;          ///< by node; null: nothing
-  std::vector<PlacedNode> places_;                 ///< that the job says
-  std::vector<gltf::Matrix> rest_;                 ///< by node, in the first frame
+  const std::vector<std::string> material_names_;       ///< the default one, then material 0 ...
+  const std::vector<std::string> object_names_;         ///< by node
+  std::vector<const GltfNodeSpec*> said_;               ///< by node; null: nothing
+  std::vector<PlacedNode> places_;                      ///< that the job says
+  std::vector<gltf::Matrix> rest_;                      ///< by node, in the first frame
   std::map<std::size_t, std::vector<Matrix34>> moved_;  ///< by node that moves, (frames)
   std::set<int> used_materials_;
   std::size_t num_keys_ = 0;

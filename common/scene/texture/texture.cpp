@@ -14,7 +14,7 @@ constexpr std::size_t kTexelPadding = 3;
 /// Brighter values of images of floats are cut.
 constexpr float kBrightest = 65504;
 
-/// Of what integers of 8 or 16 bits say.
+/// Entries of the table of sRGB: the values of integers of 8 or 16 bits.
 constexpr std::size_t kTableSize = 65536;
 
 /// IEC 61966-2-1.

@@ -13,9 +13,10 @@ namespace baton {
 
 /// What an image says of a surface, and so which of its channels are kept.
 enum class TextureUse : std::uint8_t {
-  color,               ///< RGB; sRGB in files of integers
-  color_and_alpha,     ///< the same with A
-  light,               ///< RGB as of color, but as the file has it where that is multiplied by A
+  color,            ///< RGB; sRGB in files of integers
+  color_and_alpha,  ///< the same with A
+  /// RGB as of color, but as the file has it where that is multiplied by A.
+  light,
   metallic_roughness,  ///< G and B, numbers
   normal,              ///< RGB, numbers
   red,                 ///< R, numbers
@@ -31,7 +32,8 @@ enum class Wrap : std::uint8_t { repeat, clamp, mirror };
 /// How a texture is looked up.
 struct TextureSampling {
   Wrap wrap_u = Wrap::repeat, wrap_v = Wrap::repeat;
-  bool nearest = false;  ///< no blending of texels that are larger than the footprint
+  /// No blending of texels that are larger than the footprint.
+  bool nearest = false;
 
   bool operator==(const TextureSampling&) const = default;
 };
@@ -39,7 +41,8 @@ struct TextureSampling {
 /// An image, or a smaller one that was made of it.
 struct TextureLevel {
   std::int32_t width = 1, height = 1;
-  std::uint32_t first = 0;  ///< its first texel, counted from that of the image
+  /// Index of its first texel, counted from that of the image.
+  std::uint32_t first = 0;
 
   bool operator==(const TextureLevel&) const = default;
 };

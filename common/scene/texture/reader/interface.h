@@ -9,12 +9,14 @@ extern "C" {
 
 struct BatonImageLayout {
   std::int32_t width, height;
-  std::int32_t channels;  ///< colours, in the order of red, green, blue, or grey; then alpha
+  /// Colours, in the order of red, green, blue, or grey; then alpha.
+  std::int32_t channels;
   std::int32_t has_alpha;
   std::int32_t is_associated;  ///< colours are multiplied by alpha
   std::int32_t is_integer;
   std::int32_t has_chromaticities;
-  float chromaticities[8];  ///< CIE xy of red, green, blue, white, where the file says them
+  /// CIE xy of red, green, blue, white, where the file says them.
+  float chromaticities[8];
 };
 
 /// Where an image goes.

@@ -29,7 +29,7 @@ int fail(const BatonImageSink& sink, const std::string& message) {
   return 0;
 }
 
-/// Of a data window that is not the picture.
+/// Reads a data window that is not the picture.
 constexpr OIIO::imagesize_t kMostPixels = OIIO::imagesize_t{8192} * 8192;
 /// A channel that a file lacks.
 constexpr int kNone = -1;
@@ -79,7 +79,7 @@ std::vector<int> named_colors(const OIIO::ImageSpec& spec) {
 Choice choose_channels(const std::string& format, const OIIO::ImageSpec& spec) {
   Choice choice;
   int alpha = spec.alpha_channel;
-  // Of two channels, OpenImageIO names alpha in PNG and TIFF files alone.
+  // Where there are two channels, OpenImageIO names alpha in PNG and TIFF files alone.
   if (alpha < 0 && spec.nchannels == 2 && format != "openexr" && format != "tiff") alpha = 1;
   if (format == "openexr") choice.channels = named_colors(spec);
   if (!choice.channels.empty() && alpha >= 0) {
