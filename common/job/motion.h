@@ -16,7 +16,7 @@ bool moves(const JobSpec& job);
 bool moves(const ObjectSpec& object);
 
 /// Whether all that moves has keys of its own, none in another file, and motion.max_px is known:
-/// what worker/scene/settle_motion.h makes of a job before it is submitted.
+/// what common/scene/settle/settle_motion.h makes of a job before it is submitted.
 bool is_settled(const JobSpec& job);
 /// The same as an error that says what is missing.
 Status check_settled(const JobSpec& job);

@@ -223,7 +223,7 @@ struct FileSpec {
 };
 
 /// gltf becomes materials, meshes and objects before a job is submitted
-/// (worker/scene/settle_scene.h).
+/// (common/scene/settle/settle_scene.h).
 struct SceneSpec {
   std::optional<GltfSceneSpec> gltf;
   std::map<std::string, MaterialSpec> materials;

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "worker/scene/scene.h"
+#include "common/scene/scene.h"
 
 namespace baton {
 namespace {

@@ -7,9 +7,9 @@
 #include <utility>
 
 #include "common/image/image_io.h"
-#include "worker/scene/object_view.h"
-#include "worker/scene/plate.h"
-#include "worker/scene/scene.h"
+#include "common/scene/object_view.h"
+#include "common/scene/plate.h"
+#include "common/scene/scene.h"
 
 namespace baton {
 namespace {

@@ -8,8 +8,8 @@
 
 #include "common/base/result.h"
 #include "common/job/job_spec.h"
-#include "worker/scene/map_report.h"
-#include "worker/scene/scene.h"
+#include "common/scene/map/map_report.h"
+#include "common/scene/scene.h"
 
 namespace baton {
 

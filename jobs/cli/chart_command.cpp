@@ -6,12 +6,12 @@
 #include <memory>
 #include <thread>
 
+#include "common/scene/settle/settle_motion.h"
 #include "jobs/auto/auto_pilot.h"
 #include "jobs/cli/commands.h"
 #include "jobs/cli/farm_job_runner.h"
 #include "jobs/study/study_report.h"
 #include "jobs/study/verdict.h"
-#include "worker/scene/settle_motion.h"
 
 namespace baton {
 namespace {
@@ -53,7 +53,8 @@ bool move_alike(const JobSpec& a, const JobSpec& b) {
          a.motion == b.motion;
 }
 
-/// Settles the motion of every job (worker/scene/settle_motion.h), of cells that move alike once.
+/// Settles the motion of every job (common/scene/settle/settle_motion.h), of cells that move alike
+/// once.
 Status settle_jobs(Study& study) {
   for (StudyScene& scene : study.scenes) {
     for (JobSpec& job : scene.reference) {

@@ -9,6 +9,8 @@
 #include "common/job/motion.h"
 #include "common/job/sequence.h"
 #include "common/job/store_estimate.h"
+#include "common/scene/scene.h"
+#include "common/scene/settle/settle_motion.h"
 #include "jobs/auto/unit_costs.h"
 #include "jobs/cli/asset_report.h"
 #include "jobs/cli/commands.h"
@@ -18,8 +20,6 @@
 #include "jobs/cli/settle_method.h"
 #include "jobs/cli/surface_share.h"
 #include "jobs/cli/text.h"
-#include "worker/scene/scene.h"
-#include "worker/scene/settle_motion.h"
 
 namespace baton {
 namespace {

@@ -11,12 +11,12 @@
 #include "common/image/noise.h"
 #include "common/job/job_json.h"
 #include "common/job/sequence.h"
+#include "common/scene/settle/settle_motion.h"
 #include "jobs/cli/commands.h"
 #include "jobs/cli/farm_job_runner.h"
 #include "jobs/cli/frame_sheet.h"
 #include "jobs/cli/settle_method.h"
 #include "jobs/cli/text.h"
-#include "worker/scene/settle_motion.h"
 
 namespace baton {
 namespace {

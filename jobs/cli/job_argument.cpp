@@ -2,7 +2,7 @@
 
 #include <fmt/format.h>
 
-#include "worker/scene/settle_motion.h"
+#include "common/scene/settle/settle_motion.h"
 
 namespace baton {
 namespace {

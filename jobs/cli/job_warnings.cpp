@@ -15,10 +15,10 @@
 #include "common/job/known_limits.h"
 #include "common/job/sequence.h"
 #include "common/job/store_estimate.h"
+#include "common/scene/plate.h"
+#include "common/scene/scene_warnings.h"
 #include "jobs/cli/surface_share.h"
 #include "jobs/cli/text.h"
-#include "worker/scene/plate.h"
-#include "worker/scene/scene_warnings.h"
 
 namespace baton {
 namespace {

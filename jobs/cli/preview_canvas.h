@@ -5,7 +5,7 @@
 #include <vector>
 
 #include "common/image/image_io.h"
-#include "worker/scene/camera.h"
+#include "common/scene/camera.h"
 
 namespace baton {
 

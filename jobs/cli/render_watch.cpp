@@ -5,8 +5,8 @@
 
 #include <filesystem>
 
+#include "common/scene/settle/settle_motion.h"
 #include "jobs/cli/settle_method.h"
-#include "worker/scene/settle_motion.h"
 
 namespace baton {
 namespace {

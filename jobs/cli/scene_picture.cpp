@@ -9,8 +9,8 @@
 #include "common/image/contact_sheet.h"
 #include "common/job/motion.h"
 #include "common/math/bounds.h"
+#include "common/scene/pose.h"
 #include "jobs/cli/preview_canvas.h"
-#include "worker/scene/pose.h"
 
 namespace baton {
 namespace {

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "common/image/image_io.h"
-#include "worker/scene/scene.h"
+#include "common/scene/scene.h"
 
 namespace baton {
 

@@ -5,8 +5,8 @@
 #include <set>
 
 #include "common/job/motion.h"
+#include "common/scene/pose.h"
 #include "jobs/cli/preview_canvas.h"
-#include "worker/scene/pose.h"
 
 namespace baton {
 namespace {

@@ -1,7 +1,7 @@
 #pragma once
 
 #include "common/job/job_spec.h"
-#include "worker/scene/scene.h"
+#include "common/scene/scene.h"
 
 namespace baton {
 

@@ -23,9 +23,9 @@
 
 #include "common/base/files.h"
 #include "common/job/job_json.h"
+#include "common/scene/settle/settle_motion.h"
 #include "tests/bench/bench_program.h"
 #include "tests/support/local_frames.h"
-#include "worker/scene/settle_motion.h"
 
 namespace baton {
 namespace {

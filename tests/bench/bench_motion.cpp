@@ -12,10 +12,10 @@
 
 #include "common/job/job_json.h"
 #include "common/job/motion.h"
+#include "common/scene/settle/settle_motion.h"
 #include "tests/bench/orbit.h"
 #include "worker/pass/cpu_clock.h"
 #include "worker/pass/render_context.h"
-#include "worker/scene/settle_motion.h"
 
 namespace baton {
 namespace {

@@ -1,10 +1,10 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/scene/gltf/meshes.h"
+#include "common/scene/mesh/mesh_builder.h"
+#include "common/scene/mesh/mesh_readers.h"
 #include "tests/fuzz/fuzz_target.h"
-#include "worker/scene/gltf/meshes.h"
-#include "worker/scene/mesh_builder.h"
-#include "worker/scene/mesh_readers.h"
 
 namespace baton {
 namespace {

@@ -17,10 +17,10 @@
 #include "common/job/job_json.h"
 #include "common/job/motion.h"
 #include "common/job/sequence.h"
-#include "worker/scene/map_reduction.h"
-#include "worker/scene/mesh_builder.h"
-#include "worker/scene/pose.h"
-#include "worker/scene/settle_motion.h"
+#include "common/scene/mesh/mesh_builder.h"
+#include "common/scene/pose.h"
+#include "common/scene/settle/settle_motion.h"
+#include "worker/surface/environment.h"
 
 namespace baton {
 namespace {

@@ -5,7 +5,7 @@
 
 #include "tests/stat/sites_study.h"
 #include "worker/pass/primary.h"
-#include "worker/scene/pixel_filter.h"
+#include "worker/sampling/pixel_filter.h"
 
 namespace baton {
 namespace {

@@ -6,10 +6,10 @@
 // Usage: study_pool_tuning STUDY.json [SEEDS] > CSV; the study's cells with method `pool`
 #include <string>
 
+#include "common/scene/settle/settle_motion.h"
 #include "jobs/study/study.h"
 #include "tests/studies/sequential_runs.h"
 #include "worker/method/pool/pool_method.h"
-#include "worker/scene/settle_motion.h"
 
 namespace baton {
 namespace {

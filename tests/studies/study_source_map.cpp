@@ -8,8 +8,8 @@
 
 #include "common/image/contact_sheet.h"
 #include "common/image/image_io.h"
+#include "common/scene/settle/settle_motion.h"
 #include "tests/studies/sequential_runs.h"
-#include "worker/scene/settle_motion.h"
 
 namespace baton {
 namespace {

@@ -12,8 +12,8 @@
 #include <numeric>
 #include <string>
 
+#include "common/scene/settle/settle_motion.h"
 #include "tests/studies/sequential_runs.h"
-#include "worker/scene/settle_motion.h"
 
 namespace baton {
 namespace {

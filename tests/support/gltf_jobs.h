@@ -5,9 +5,9 @@
 #include <string>
 
 #include "common/job/job_json.h"
+#include "common/scene/settle/settle_motion.h"
 #include "tests/support/gltf_files.h"
 #include "tests/support/mesh_files.h"
-#include "worker/scene/settle_motion.h"
 
 /// Jobs of small glTF files.
 namespace baton::test {

@@ -7,7 +7,7 @@
 #include <fstream>
 #include <vector>
 
-#include "worker/scene/measured_brdf.h"
+#include "common/scene/material/measured_brdf.h"
 
 namespace baton::test {
 

@@ -9,9 +9,9 @@
 
 #include "common/base/limits.h"
 #include "common/base/poison.h"
-#include "worker/scene/camera.h"
-#include "worker/scene/scene.h"
-#include "worker/scene/surface_detail.h"
+#include "common/scene/camera.h"
+#include "common/scene/scene.h"
+#include "worker/surface/seen_surface.h"
 
 namespace baton {
 

@@ -4,7 +4,7 @@
 #include <bit>
 
 #include "common/math/murmur3.h"
-#include "worker/scene/surface_detail.h"
+#include "worker/surface/seen_surface.h"
 
 namespace baton {
 

@@ -6,7 +6,7 @@
 #include <set>
 
 #include "common/math/vec3.h"
-#include "worker/scene/scene.h"
+#include "common/scene/scene.h"
 
 /// Embree's side of surfaces that not every ray stops at: holes, and alpha that blends.
 namespace baton {

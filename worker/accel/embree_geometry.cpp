@@ -4,8 +4,8 @@
 #include <cstring>
 #include <vector>
 
+#include "common/scene/mesh/mesh_builder.h"
 #include "worker/accel/cut_outs.h"
-#include "worker/scene/mesh_builder.h"
 
 namespace baton {
 namespace {

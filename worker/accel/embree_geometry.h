@@ -7,7 +7,7 @@
 #include <string>
 #include <type_traits>
 
-#include "worker/scene/scene.h"
+#include "common/scene/scene.h"
 
 /// Embree's objects, and how meshes become some.
 namespace baton {

@@ -6,9 +6,9 @@
 
 #include "common/base/limits.h"
 #include "common/base/lru_cache.h"
+#include "common/scene/pose.h"
 #include "worker/accel/accel.h"
-#include "worker/scene/pose.h"
-#include "worker/scene/site_block.h"
+#include "worker/surface/site_block.h"
 
 namespace baton {
 

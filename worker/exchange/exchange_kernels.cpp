@@ -12,8 +12,8 @@
 #include <hwy/highway.h>
 
 #include "common/math/front_lanes-inl.h"
-#include "worker/scene/bsdf-inl.h"
-#include "worker/scene/environment-inl.h"
+#include "worker/surface/bsdf-inl.h"
+#include "worker/surface/environment-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace baton::HWY_NAMESPACE {

@@ -7,7 +7,7 @@
 #include "worker/accel/accel.h"
 #include "worker/exchange/energy_exchange.h"
 #include "worker/exchange/surface_table.h"
-#include "worker/scene/environment_view.h"
+#include "worker/surface/environment_view.h"
 
 namespace baton {
 

@@ -3,7 +3,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "worker/scene/site_block.h"
+#include "worker/surface/site_block.h"
 
 namespace baton {
 

@@ -9,8 +9,8 @@
 #include "common/math/philox.h"
 #include "worker/light/presampled_light.h"
 #include "worker/sampling/pool.h"
-#include "worker/scene/environment_view.h"
-#include "worker/scene/site_block.h"
+#include "worker/surface/environment_view.h"
+#include "worker/surface/site_block.h"
 
 /// Candidates of a pixel, in SIMD with run-time dispatch. Work space is read and written in whole
 /// vectors (PaddedArray), what spans hold is not.

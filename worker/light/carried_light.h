@@ -8,7 +8,7 @@
 #include "common/math/padded_array.h"
 #include "common/math/vec3.h"
 #include "worker/light/presampled_light.h"
-#include "worker/scene/environment_view.h"
+#include "worker/surface/environment_view.h"
 
 namespace baton::kernels {
 

@@ -7,7 +7,7 @@
 
 #include "common/job/known_limits.h"
 #include "common/math/octahedral.h"
-#include "worker/scene/map_report.h"
+#include "common/scene/map/map_report.h"
 
 namespace baton {
 namespace {

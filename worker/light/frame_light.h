@@ -13,8 +13,8 @@
 #include "worker/light/irradiance.h"
 #include "worker/light/map_cache.h"
 #include "worker/light/presampled_light.h"
-#include "worker/scene/environment.h"
-#include "worker/scene/hidden_light.h"
+#include "worker/surface/environment.h"
+#include "worker/surface/hidden_light.h"
 
 namespace baton {
 

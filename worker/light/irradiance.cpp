@@ -4,7 +4,7 @@
 #include <cmath>
 #include <numbers>
 
-#include "worker/scene/scene_kernels.h"
+#include "worker/surface/scene_kernels.h"
 
 namespace baton {
 namespace {

@@ -4,7 +4,7 @@
 #include <cstddef>
 #include <vector>
 
-#include "worker/scene/environment.h"
+#include "worker/surface/environment.h"
 
 namespace baton {
 

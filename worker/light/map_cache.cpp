@@ -1,6 +1,6 @@
 #include "worker/light/map_cache.h"
 
-#include "worker/scene/map_reduction.h"
+#include "common/scene/map/map_reduction.h"
 
 namespace baton {
 

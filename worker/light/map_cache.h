@@ -9,8 +9,8 @@
 #include "common/base/lru_cache.h"
 #include "common/base/result.h"
 #include "common/job/job_spec.h"
-#include "worker/scene/environment.h"
-#include "worker/scene/map_report.h"
+#include "common/scene/map/map_report.h"
+#include "worker/surface/environment.h"
 
 namespace baton {
 

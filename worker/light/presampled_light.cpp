@@ -11,7 +11,7 @@
 #include "common/math/hilbert.h"
 #include "common/math/low_discrepancy.h"
 #include "worker/light/candidates.h"
-#include "worker/scene/scene_kernels.h"
+#include "worker/surface/scene_kernels.h"
 
 namespace baton {
 namespace {

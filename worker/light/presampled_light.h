@@ -5,7 +5,7 @@
 
 #include "common/math/octahedral.h"
 #include "common/math/philox.h"
-#include "worker/scene/environment_view.h"
+#include "worker/surface/environment_view.h"
 
 namespace baton {
 

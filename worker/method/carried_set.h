@@ -4,7 +4,7 @@
 #include <span>
 
 #include "common/math/octahedral.h"
-#include "worker/scene/old_surfaces.h"
+#include "worker/surface/old_surfaces.h"
 
 namespace baton {
 

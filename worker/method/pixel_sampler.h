@@ -14,7 +14,7 @@
 #include "worker/method/pool/pool_kernels.h"
 #include "worker/method/restir/restir_kernels.h"
 #include "worker/sampling/sequential.h"
-#include "worker/scene/old_surfaces.h"
+#include "worker/surface/old_surfaces.h"
 
 namespace baton {
 

@@ -10,7 +10,7 @@
 #include <hwy/highway.h>
 
 #include "common/math/front_lanes-inl.h"
-#include "worker/scene/bsdf-inl.h"
+#include "worker/surface/bsdf-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace baton::HWY_NAMESPACE {

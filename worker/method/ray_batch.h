@@ -9,7 +9,7 @@
 #include "common/math/octahedral.h"
 #include "worker/accel/accel.h"
 #include "worker/sampling/pixel_rays.h"
-#include "worker/scene/site_block.h"
+#include "worker/surface/site_block.h"
 
 namespace baton {
 

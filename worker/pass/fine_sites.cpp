@@ -5,7 +5,7 @@
 
 #include "worker/pass/primary.h"
 #include "worker/pass/site_rays.h"
-#include "worker/scene/pixel_filter.h"
+#include "worker/sampling/pixel_filter.h"
 
 namespace baton {
 namespace {

@@ -8,7 +8,7 @@
 #include "worker/light/candidates.h"
 #include "worker/pass/catcher.h"
 #include "worker/pass/site_rays.h"
-#include "worker/scene/scene_kernels.h"
+#include "worker/surface/scene_kernels.h"
 
 namespace baton {
 namespace {

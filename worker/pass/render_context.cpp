@@ -4,11 +4,11 @@
 #include <iterator>
 
 #include "common/job/motion.h"
+#include "common/scene/object_view.h"
 #include "worker/pass/primary.h"
 #include "worker/pass/shared_assets.h"
-#include "worker/scene/hidden_light.h"
-#include "worker/scene/object_view.h"
-#include "worker/scene/scene_kernels.h"
+#include "worker/surface/hidden_light.h"
+#include "worker/surface/scene_kernels.h"
 
 namespace baton {
 namespace {

@@ -8,7 +8,7 @@
 #include "worker/pass/neighborhood.h"
 #include "worker/pass/old_pixels.h"
 #include "worker/pass/primary.h"
-#include "worker/scene/old_surfaces.h"
+#include "worker/surface/old_surfaces.h"
 
 namespace baton {
 

@@ -5,7 +5,7 @@
 #include <span>
 
 #include "common/math/philox.h"
-#include "worker/scene/camera.h"
+#include "common/scene/camera.h"
 
 namespace baton::kernels {
 

@@ -6,7 +6,7 @@
 #include "common/job/sequence.h"
 #include "common/math/low_discrepancy.h"
 #include "worker/pass/site_kernels.h"
-#include "worker/scene/pixel_filter.h"
+#include "worker/sampling/pixel_filter.h"
 
 namespace baton {
 

@@ -6,7 +6,7 @@
 
 #include "common/job/job_spec.h"
 #include "common/math/philox.h"
-#include "worker/scene/camera.h"
+#include "common/scene/camera.h"
 
 namespace baton {
 

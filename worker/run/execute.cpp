@@ -5,13 +5,13 @@
 #include "common/image/film_tile.h"
 #include "common/job/motion.h"
 #include "common/job/sequence.h"
+#include "common/scene/plate.h"
 #include "common/state/join_states.h"
 #include "common/state/sample_state.h"
 #include "worker/exchange/second_pass.h"
 #include "worker/pass/cpu_clock.h"
 #include "worker/pass/render_context.h"
 #include "worker/run/frame_output.h"
-#include "worker/scene/plate.h"
 
 namespace baton {
 namespace {

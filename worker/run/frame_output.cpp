@@ -14,8 +14,8 @@
 #include "common/job/aov.h"
 #include "common/job/motion.h"
 #include "common/job/sequence.h"
+#include "common/scene/camera.h"
 #include "worker/run/frame_quality.h"
-#include "worker/scene/camera.h"
 
 namespace baton {
 namespace {

@@ -8,9 +8,9 @@
 #include "common/base/limits.h"
 #include "common/job/estimate.h"
 #include "common/job/job_json.h"
+#include "common/scene/material/detail_loader.h"
 #include "common/store/folder_token.h"
 #include "worker/pass/primary.h"
-#include "worker/scene/detail_loader.h"
 
 namespace baton {
 namespace {

@@ -9,10 +9,10 @@
 #include "common/image/image_io.h"
 #include "common/job/job_json.h"
 #include "common/job/sequence.h"
+#include "common/scene/settle/settle_motion.h"
 #include "common/state/source_names.h"
 #include "worker/pass/render_context.h"
 #include "worker/run/local_render.h"
-#include "worker/scene/settle_motion.h"
 
 namespace baton {
 namespace {

@@ -4,9 +4,9 @@
 #include <cmath>
 
 #include "common/math/philox.h"
+#include "common/scene/pose.h"
 #include "tests/support/image_files.h"
 #include "worker/accel/accel.h"
-#include "worker/scene/pose.h"
 
 namespace baton {
 namespace {

@@ -1,5 +1,6 @@
 #include <gtest/gtest.h>
 
+#include "common/scene/mesh_loader.h"
 #include "tests/support/mesh_files.h"
 #include "worker/accel/accel.h"
 

@@ -11,7 +11,7 @@
 #include "tests/support/directions.h"
 #include "tests/support/instruction_sets.h"
 #include "worker/light/candidates.h"
-#include "worker/scene/scene_kernels.h"
+#include "worker/surface/scene_kernels.h"
 
 namespace baton {
 namespace {

@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "worker/light/candidates.h"
-#include "worker/scene/scene_kernels.h"
+#include "worker/surface/scene_kernels.h"
 
 namespace baton {
 namespace {

@@ -8,8 +8,8 @@
 
 #include "tests/support/directions.h"
 #include "tests/support/instruction_sets.h"
-#include "worker/scene/material.h"
-#include "worker/scene/scene_kernels.h"
+#include "worker/surface/bsdf.h"
+#include "worker/surface/scene_kernels.h"
 
 namespace baton {
 namespace {

@@ -14,7 +14,7 @@
 
 #include "common/math/hilbert.h"
 #include "worker/light/candidates.h"
-#include "worker/scene/material.h"
+#include "worker/surface/bsdf.h"
 
 namespace baton {
 namespace {

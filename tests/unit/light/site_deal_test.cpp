@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "worker/light/candidates.h"
-#include "worker/scene/material.h"
+#include "worker/surface/bsdf.h"
 
 namespace baton {
 namespace {

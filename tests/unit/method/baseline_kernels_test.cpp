@@ -11,8 +11,8 @@
 #include "worker/light/frame_light.h"
 #include "worker/method/ratio/ratio_kernels.h"
 #include "worker/method/restir/restir_kernels.h"
-#include "worker/scene/material.h"
-#include "worker/scene/scene_kernels.h"
+#include "worker/surface/bsdf.h"
+#include "worker/surface/scene_kernels.h"
 
 namespace baton {
 namespace {

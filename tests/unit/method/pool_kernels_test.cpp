@@ -12,7 +12,7 @@
 
 #include "tests/support/instruction_sets.h"
 #include "tests/support/remembered.h"
-#include "worker/scene/material.h"
+#include "worker/surface/bsdf.h"
 
 namespace baton {
 namespace {

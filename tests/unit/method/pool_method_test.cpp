@@ -10,7 +10,7 @@
 
 #include "tests/support/remembered.h"
 #include "worker/sampling/light_noise.h"
-#include "worker/scene/material.h"
+#include "worker/surface/bsdf.h"
 
 namespace baton {
 namespace {

@@ -7,9 +7,9 @@
 
 #include "common/image/cryptomatte.h"
 #include "common/job/aov.h"
+#include "common/scene/camera.h"
 #include "tests/support/alive_box.h"
 #include "tests/support/render_tiled.h"
-#include "worker/scene/camera.h"
 
 namespace baton {
 namespace {

@@ -9,7 +9,7 @@
 #include "common/math/low_discrepancy.h"
 #include "tests/support/instruction_sets.h"
 #include "tests/support/render_tiled.h"
-#include "worker/scene/pixel_filter.h"
+#include "worker/sampling/pixel_filter.h"
 
 namespace baton {
 namespace {

@@ -1,4 +1,4 @@
-#include "worker/scene/camera.h"
+#include "common/scene/camera.h"
 
 #include <gtest/gtest.h>
 

@@ -4,9 +4,9 @@
 #include <cmath>
 #include <limits>
 
+#include "common/scene/mesh_loader.h"
 #include "tests/support/gltf_files.h"
 #include "tests/support/mesh_files.h"
-#include "worker/scene/scene.h"
 
 namespace baton {
 namespace {

@@ -6,10 +6,11 @@
 
 #include "common/job/job_json.h"
 #include "common/job/motion.h"
+#include "common/scene/mesh_loader.h"
+#include "common/scene/pose.h"
+#include "common/scene/settle/settle_motion.h"
+#include "common/scene/settle/settle_scene.h"
 #include "tests/support/deforming_files.h"
-#include "worker/scene/pose.h"
-#include "worker/scene/settle_motion.h"
-#include "worker/scene/settle_scene.h"
 
 namespace baton {
 namespace {

@@ -1,4 +1,4 @@
-#include "worker/scene/image_colors.h"
+#include "common/scene/texture/image_colors.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

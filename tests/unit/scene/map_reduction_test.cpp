@@ -1,4 +1,4 @@
-#include "worker/scene/map_reduction.h"
+#include "common/scene/map/map_reduction.h"
 
 #include <gtest/gtest.h>
 
@@ -102,29 +102,6 @@ TEST(MapReduction, RepairsBeforeItAverages) {
   for (const std::size_t k : {0, 3 * 17 + 1, 3 * 30 + 2, 3 * 45}) repaired.rgb[k] = 0;
   // 3 rows: the map's lie across their edges.
   EXPECT_EQ(reduce_map(map, 5, 2).rgb, reduce_map(repaired, 5, 2).rgb);
-}
-
-TEST(MapReduction, AMapThatIsNarrowEnoughStaysAsItIs) {
-  const RgbImage map = random_image(32, 16);
-  EnvironmentSpec environment;
-  environment.scale = 3;
-  const EnvironmentMap plain(map, environment.filter, environment.scale, false);
-  for (const int max_width : {0, 32, 100}) {
-    environment.max_width = max_width;
-    const EnvironmentMap made = make_map(map, environment, false);
-    ASSERT_EQ(made.width(), 32);
-    EXPECT_TRUE(std::equal(
-        plain.texels(), plain.texels() + 34 * 18, made.texels(), [](const auto& a, const auto& b) {
-          return a.r == b.r && a.g == b.g && a.b == b.b && a.density == b.density;
-        }));
-  }
-  environment.max_width = 8;
-  const EnvironmentMap coarse = make_map(map, environment, false);
-  EXPECT_EQ(coarse.width(), 8);
-  EXPECT_EQ(coarse.height(), 4);
-  EXPECT_EQ(map_sides(32, 16, 8), (std::array{8, 4}));
-  EXPECT_EQ(map_sides(32, 16, 0), (std::array{32, 16}));
-  EXPECT_NEAR(coarse.total_power(), plain.total_power(), 0.05 * plain.total_power());
 }
 
 }  // namespace

@@ -6,8 +6,8 @@
 #include <string>
 #include <vector>
 
+#include "common/scene/mesh_loader.h"
 #include "tests/support/mesh_files.h"
-#include "worker/scene/scene.h"
 
 namespace baton {
 namespace {

@@ -1,4 +1,4 @@
-#include "worker/scene/plate.h"
+#include "common/scene/plate.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,11 +1,11 @@
-#include "worker/scene/pose.h"
+#include "common/scene/pose.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include "common/job/motion.h"
+#include "common/scene/settle/settle_motion.h"
 #include "tests/support/mesh_files.h"
-#include "worker/scene/settle_motion.h"
 
 namespace baton {
 namespace {

@@ -1,4 +1,4 @@
-#include "worker/scene/scene.h"
+#include "common/scene/scene.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -4,11 +4,11 @@
 
 #include "common/base/limits.h"
 #include "common/job/aov.h"
+#include "common/scene/gltf/names.h"
+#include "common/scene/pose.h"
+#include "common/scene/scene_warnings.h"
+#include "common/scene/settle/settle_scene.h"
 #include "tests/support/gltf_jobs.h"
-#include "worker/scene/gltf/names.h"
-#include "worker/scene/pose.h"
-#include "worker/scene/scene_warnings.h"
-#include "worker/scene/settle_scene.h"
 
 namespace baton {
 namespace {

@@ -1,4 +1,4 @@
-#include "worker/scene/settle_scene.h"
+#include "common/scene/settle/settle_scene.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -7,12 +7,12 @@
 
 #include "common/job/job_json.h"
 #include "common/job/motion.h"
+#include "common/scene/pose.h"
+#include "common/scene/scene_warnings.h"
+#include "common/scene/settle/settle_motion.h"
 #include "tests/support/gltf_files.h"
 #include "tests/support/gltf_jobs.h"
 #include "tests/support/mesh_files.h"
-#include "worker/scene/pose.h"
-#include "worker/scene/scene_warnings.h"
-#include "worker/scene/settle_motion.h"
 
 namespace baton {
 namespace {

@@ -10,8 +10,8 @@
 #include <hwy/highway.h>
 
 #include "worker/light/carried_light.h"
-#include "worker/scene/bsdf-inl.h"
-#include "worker/scene/environment-inl.h"
+#include "worker/surface/bsdf-inl.h"
+#include "worker/surface/environment-inl.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace baton::HWY_NAMESPACE {

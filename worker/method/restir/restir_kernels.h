@@ -3,7 +3,7 @@
 #include "worker/light/candidates.h"
 #include "worker/light/carried_light.h"
 #include "worker/sampling/restir.h"
-#include "worker/scene/old_surfaces.h"
+#include "worker/surface/old_surfaces.h"
 
 namespace baton::kernels {
 

@@ -13,7 +13,7 @@
 #include "worker/light/carried_light.h"
 #include "worker/light/presampled_light-inl.h"
 #include "worker/sampling/sequential-inl.h"
-#include "worker/scene/old_surfaces.h"
+#include "worker/surface/old_surfaces.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace baton::HWY_NAMESPACE {

@@ -3,8 +3,8 @@
 #include "common/math/philox.h"
 #include "worker/light/carried_light.h"
 #include "worker/sampling/sequential.h"
-#include "worker/scene/old_surfaces.h"
-#include "worker/scene/site_block.h"
+#include "worker/surface/old_surfaces.h"
+#include "worker/surface/site_block.h"
 
 namespace baton::kernels {
 

@@ -7,7 +7,7 @@ import bmesh
 import numpy
 
 BENT = 1e-4     # difference of unit normals
-NO_AREA = 1e-7  # of the longest edge squared, as worker/scene/mesh_builder.cpp has it
+NO_AREA = 1e-7  # of the longest edge squared, as common/scene/mesh/mesh_builder.cpp has it
 
 
 def drop_without_area(mesh):

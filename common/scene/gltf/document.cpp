@@ -1,0 +1,150 @@
+#include "common/scene/gltf/document.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <array>
+#include <filesystem>
+
+#include "common/base/files.h"
+#include "common/base/limits.h"
+#include "common/job/job_json_text.h"
+#include "common/scene/gltf/container.h"
+#include "common/scene/gltf/document_parser.h"
+
+namespace baton::gltf {
+namespace {
+
+constexpr std::array<std::string_view, 7> kRead{
+    "KHR_texture_transform",  "KHR_mesh_quantization",  "KHR_materials_emissive_strength",
+    "KHR_materials_ior",      "KHR_materials_specular", "EXT_texture_webp",
+    "KHR_materials_clearcoat"};
+
+/// Files that need an extension that is not read cannot be shown right.
+void check_extensions(const JsonView& root) {
+  root.each("extensionsRequired", [](const JsonView& name) {
+    if (const std::string text = name.as_text(); !is_read(text))
+      name.fail("\"" + text + "\" is required by the file, and is not read");
+  });
+}
+
+void check_version(const JsonView& root) {
+  const JsonView asset = root.at("asset");
+  if (!asset) root.fail("expected asset.version 2.x, got nothing");
+  if (const std::string version = asset.text("version"); asset && !version.starts_with("2."))
+    asset.fail("expected version 2.x, got \"" + version + "\"");
+}
+
+Bytes copy_of(ByteView bytes) { return {bytes.begin(), bytes.end()}; }
+
+/// What a buffer holds, at least as many bytes as it says.
+void load_buffer(const JsonView& buffer, const std::optional<ByteView>& binary,
+                 Document& document) {
+  const std::uint64_t size = buffer.size("byteLength");
+  Bytes bytes;
+  if (buffer.has("uri")) {
+    Result<Resource> resource = resolve_uri(buffer.text("uri"), document.path);
+    if (!resource) return buffer.fail("uri: " + resource.error().message);
+    if (resource->bytes) {
+      bytes = std::move(*resource->bytes);
+    } else {
+      Result<Bytes> file = read_file(resource->file, limits::kMaxAssetFileBytes);
+      if (!file) return buffer.fail("its file: " + file.error().message);
+      bytes = std::move(*file);
+      document.buffer_files.push_back(resource->file);
+    }
+  } else if (document.buffers.empty() && binary) {
+    bytes = copy_of(binary->first(std::min<std::size_t>(binary->size(), size)));
+  }
+  if (bytes.size() < size)
+    return buffer.fail(fmt::format("expected {} bytes, got {}", size, bytes.size()));
+  document.buffers.push_back(std::move(bytes));
+}
+
+void load_image(const JsonView& image, Document& document) {
+  Image read;
+  read.view = image.index("bufferView", document.views.size());
+  if (image.has("uri")) {
+    Result<Resource> resource = resolve_uri(image.text("uri"), document.path);
+    if (!resource) return image.fail("uri: " + resource.error().message);
+    read.file = resource->file;
+    if (resource->bytes) read.bytes = std::move(*resource->bytes);
+  }
+  if (read.view < 0 && read.file.empty() && read.bytes.empty())
+    image.fail("expected a uri or a bufferView");
+  document.images.push_back(std::move(read));
+}
+
+void check_views(const JsonView& root, const Document& document) {
+  for (std::size_t v = 0; v < document.views.size(); ++v) {
+    const View& view = document.views[v];
+    const std::size_t size = view.buffer < 0 ? 0 : document.buffers[view.buffer].size();
+    if (view.size <= size && view.offset <= size - view.size) continue;
+    return root.at("bufferViews")
+        .fail(fmt::format("view {}: bytes {} to {} of a buffer of {}", v, view.offset,
+                          view.offset + view.size, size));
+  }
+}
+
+}  // namespace
+
+int size_of(Component component) {
+  constexpr std::array<int, 6> kSizes{1, 1, 2, 2, 4, 4};
+  return kSizes.at(static_cast<std::size_t>(component));
+}
+
+ByteView Document::bytes_of_image(std::size_t image) const {
+  const Image& given = images[image];
+  if (given.view < 0) return given.bytes;
+  const View& view = views[static_cast<std::size_t>(given.view)];
+  return ByteView(buffers[static_cast<std::size_t>(view.buffer)]).subspan(view.offset, view.size);
+}
+
+std::vector<int> shown_nodes(const Document& document) {
+  std::vector<int> nodes = document.roots;  // grows while it is walked
+  for (std::size_t i = 0; i < nodes.size(); ++i) {
+    const std::vector<int>& children = document.nodes[static_cast<std::size_t>(nodes[i])].children;
+    nodes.insert(nodes.end(), children.begin(), children.end());
+  }
+  return nodes;
+}
+
+bool is_read(std::string_view extension) {
+  return std::find(kRead.begin(), kRead.end(), extension) != kRead.end();
+}
+
+Result<std::shared_ptr<const Document>> parse_document(ByteView bytes, const std::string& path) {
+  BATON_ASSIGN(const Container container, open_container(bytes, path));
+  BATON_ASSIGN(const nlohmann::json json,
+               parse_json_text(container.json, path + ": not a glTF file"));
+  if (!json.is_object())
+    return Error{ErrorKind::bad_input, path + ": not a glTF file: expected an object"};
+  Fault fault;
+  const JsonView root(&json, "$", fault);
+  auto document = std::make_shared<Document>();
+  document->path = path;
+  check_version(root);
+  check_extensions(root);
+  const auto good = [&] { return !fault.has_value(); };
+  if (good())
+    root.each("buffers", [&](const JsonView& buffer) {
+      if (good()) load_buffer(buffer, container.binary, *document);
+    });
+  // Views come before images, which come before textures.
+  if (good()) parse_views(root, *document);
+  if (good()) check_views(root, *document);
+  if (good()) root.each("images", [&](const JsonView& image) { load_image(image, *document); });
+  if (good()) parse_lists(root, *document);
+  if (fault) return document->error(*fault);
+  return std::shared_ptr<const Document>(std::move(document));
+}
+
+Result<std::shared_ptr<const Document>> read_document(const std::string& path) {
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(path, error))
+    return Error{ErrorKind::bad_input, path + ": missing: expected a glTF file"};
+  BATON_ASSIGN(const Bytes bytes, read_file(path, limits::kMaxAssetFileBytes));
+  return parse_document(bytes, path);
+}
+
+}  // namespace baton::gltf

@@ -1,0 +1,55 @@
+#pragma once
+
+#include <memory>
+#include <vector>
+
+#include "common/job/scene_spec.h"
+#include "common/scene/gltf/node_motion.h"
+#include "common/scene/mesh/triangle_mesh.h"
+
+namespace baton::gltf {
+
+/// What a node does to the vertices of its mesh.
+enum class Shaping : std::uint8_t {
+  none,
+  /// A skin or morph weights shape them once and for all.
+  at_rest,
+  animated,  ///< animations do
+};
+Shaping shaping_of(const NodeMotion& motion, int node);
+
+/// The triangles of one primitive, in the space of its mesh, with the UV sets that it has. Without
+/// normals of its own it is flat, as glTF says. Errors name file and place: accessors that do not
+/// fit, indices out of range, coordinates that are not finite, no triangles.
+Result<TriangleMesh> primitive_mesh(const Document& document, const MeshSpec& spec);
+
+/// The same as spec.shaped_by, which is there, shapes it: posed, or with a deformation. motion: of
+/// the file, with the places of its nodes. More errors: those of shaper.h, a node that does not
+/// show the mesh.
+Result<TriangleMesh> shaped_mesh(const Document& document, std::shared_ptr<const NodeMotion> motion,
+                                 const MeshSpec& spec);
+
+/// All that the scene of a file shows, in its world, at rest; with the UV sets that all of it has.
+/// The mesh has no normals where a part has none.
+Result<TriangleMesh> whole_mesh(const Document& document, bool smooth_normals);
+
+/// Puts nodes elsewhere. Their places must be there.
+void place(const std::vector<PlacedNode>& places, NodeMotion& motion);
+
+/// Reads the animations of each file once for all that is placed alike. Not for several threads.
+class MotionCache {
+ public:
+  /// Errors: those of NodeMotion, a place of a node that is not there.
+  Result<std::shared_ptr<const NodeMotion>> get(const std::shared_ptr<const Document>& document,
+                                                const std::vector<PlacedNode>& places);
+
+ private:
+  struct Entry {
+    std::shared_ptr<const Document> document;
+    std::vector<PlacedNode> places;
+    std::shared_ptr<const NodeMotion> motion;
+  };
+  std::vector<Entry> entries_;
+};
+
+}  // namespace baton::gltf

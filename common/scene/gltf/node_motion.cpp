@@ -1,0 +1,251 @@
+#include "common/scene/gltf/node_motion.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <cmath>
+
+#include "common/job/suggest.h"
+#include "common/scene/gltf/accessor.h"
+
+namespace baton::gltf {
+namespace {
+
+/// The keys around a time: `share` of the way from key `from` to key `to`.
+struct Span {
+  std::size_t from = 0, to = 0;
+  double share = 0;    ///< [0, 1)
+  double seconds = 0;  ///< between the keys
+};
+
+Span find_span(const std::vector<float>& times, double seconds) {
+  const auto next = std::upper_bound(times.begin(), times.end(), seconds,
+                                     [](double s, float time) { return s < double{time}; });
+  if (next == times.begin()) return {};
+  const auto from = static_cast<std::size_t>(next - times.begin()) - 1;
+  if (next == times.end()) return {from, from, 0, 0};
+  const double length = double{*next} - double{times[from]};
+  return {from, from + 1, (seconds - double{times[from]}) / length, length};
+}
+
+/// Component c of a curve of `width` numbers, each by itself.
+double component_at(const Curve& curve, const Span& span, std::size_t width, std::size_t c) {
+  const bool cubic = curve.interpolation == Interpolation::cubic_spline;
+  const std::size_t row = cubic ? 3 * width : width;
+  const std::size_t middle = cubic ? width : 0;
+  const auto value = [&](std::size_t key, std::size_t part) {
+    return double{curve.values[key * row + part + c]};
+  };
+  const double a = value(span.from, middle), b = value(span.to, middle), t = span.share;
+  if (curve.interpolation == Interpolation::step || span.from == span.to) return a;
+  if (!cubic) return a + (b - a) * t;
+  // [glTF 2.0, appendix C.4]
+  const double out = value(span.from, 2 * width) * span.seconds,
+               in = value(span.to, 0) * span.seconds;
+  const double t2 = t * t, t3 = t2 * t;
+  return (2 * t3 - 3 * t2 + 1) * a + (t3 - 2 * t2 + t) * out + (3 * t2 - 2 * t3) * b +
+         (t3 - t2) * in;
+}
+
+Quaternion unit(const std::array<double, 4>& q) {
+  const double length = std::sqrt(q[0] * q[0] + q[1] * q[1] + q[2] * q[2] + q[3] * q[3]);
+  if (!(length > 0)) return {};
+  return {q[0] / length, q[1] / length, q[2] / length, q[3] / length};
+}
+
+/// All nodes, parents first: a list that grows while it is walked.
+std::vector<int> parents_first(const Document& document) {
+  std::vector<int> order;
+  for (std::size_t n = 0; n < document.nodes.size(); ++n) {
+    if (document.nodes[n].parent < 0) order.push_back(static_cast<int>(n));
+  }
+  for (std::size_t i = 0; i < order.size(); ++i) {
+    const Node& node = document.nodes[static_cast<std::size_t>(order[i])];
+    order.insert(order.end(), node.children.begin(), node.children.end());
+  }
+  return order;
+}
+
+/// From each node to the world; local(node): to its parent.
+template <class Local>
+std::vector<Matrix> chain(const Document& document, const std::vector<int>& order,
+                          const Local& local) {
+  std::vector<Matrix> world(document.nodes.size(), kIdentity);
+  for (const int n : order) {
+    const auto node = static_cast<std::size_t>(n);
+    const int parent = document.nodes[node].parent;
+    world[node] = local(node);
+    if (parent >= 0) world[node] = multiply(world[static_cast<std::size_t>(parent)], world[node]);
+  }
+  return world;
+}
+
+Matrix rest_of(const Node& node) {
+  return node.has_matrix ? node.matrix : compose(node.translation, unit(node.rotation), node.scale);
+}
+
+/// Numbers a time of what a channel moves.
+Result<std::size_t> width_of(const Document& document, const Channel& channel) {
+  if (channel.path == Path::rotation) return std::size_t{4};
+  if (channel.path != Path::weights) return std::size_t{3};
+  const Node& node = document.nodes[static_cast<std::size_t>(channel.node)];
+  const std::size_t width = node.mesh < 0 ? 0 : document.mesh_of(node).num_targets();
+  if (width > 0) return width;
+  return document.error(fmt::format(
+      "$.nodes[{}]: its weights are animated, expected a mesh with morph targets", channel.node));
+}
+
+Result<Curve> read_curve(const Document& document, const Channel& channel) {
+  BATON_ASSIGN(const std::size_t width, width_of(document, channel));
+  Curve curve{channel.interpolation, {}, {}};
+  BATON_ASSIGN(curve.times, read_floats(document, channel.input, 1));
+  BATON_ASSIGN(curve.values,
+               read_floats(document, channel.output,
+                           channel.path == Path::weights ? 1 : static_cast<int>(width)));
+  const auto finite = [](float v) { return std::isfinite(v); };
+  if (!std::all_of(curve.times.begin(), curve.times.end(), finite) ||
+      std::adjacent_find(curve.times.begin(), curve.times.end(), std::greater_equal<>()) !=
+          curve.times.end() ||
+      curve.times.empty())
+    return document.error(fmt::format(
+        "$.accessors[{}]: expected the ascending times of an animation", channel.input));
+  const std::size_t rows = channel.interpolation == Interpolation::cubic_spline ? 3 : 1;
+  const std::size_t expected = curve.times.size() * rows * width;
+  if (curve.values.size() != expected ||
+      !std::all_of(curve.values.begin(), curve.values.end(), finite))
+    return document.error(
+        fmt::format("$.accessors[{}]: expected {} finite numbers for an animation, got {}",
+                    channel.output, expected, curve.values.size()));
+  return curve;
+}
+
+}  // namespace
+
+std::array<double, 3> Curve::vector_at(double seconds) const {
+  const Span span = find_span(times, seconds);
+  std::array<double, 3> v{};
+  for (std::size_t c = 0; c < 3; ++c) v[c] = component_at(*this, span, 3, c);
+  return v;
+}
+
+std::vector<double> Curve::values_at(double seconds, std::size_t width) const {
+  const Span span = find_span(times, seconds);
+  std::vector<double> v;
+  for (std::size_t c = 0; c < width; ++c) v.push_back(component_at(*this, span, width, c));
+  return v;
+}
+
+Quaternion Curve::rotation_at(double seconds) const {
+  const Span span = find_span(times, seconds);
+  if (interpolation == Interpolation::linear) {
+    const auto key = [&](std::size_t k) {
+      return unit({double{values[4 * k]}, double{values[4 * k + 1]}, double{values[4 * k + 2]},
+                   double{values[4 * k + 3]}});
+    };
+    return slerp(key(span.from), key(span.to), span.share);
+  }
+  std::array<double, 4> q{};
+  for (std::size_t c = 0; c < 4; ++c) q[c] = component_at(*this, span, 4, c);
+  return unit(q);
+}
+
+Result<NodeMotion> NodeMotion::read(std::shared_ptr<const Document> document) {
+  NodeMotion motion;
+  motion.document_ = std::move(document);
+  const Document& file = *motion.document_;
+  motion.curves_.resize(file.nodes.size());
+  for (const Channel& channel : file.channels) {
+    Moved& moved = motion.curves_[static_cast<std::size_t>(channel.node)];
+    std::optional<Curve>& curve = channel.path == Path::translation ? moved.translation
+                                  : channel.path == Path::rotation  ? moved.rotation
+                                  : channel.path == Path::scale     ? moved.scale
+                                                                    : moved.weights;
+    if (curve) continue;
+    BATON_ASSIGN(curve, read_curve(file, channel));
+    if (channel.path != Path::weights &&
+        file.nodes[static_cast<std::size_t>(channel.node)].has_matrix)
+      return file.error(fmt::format("$.nodes[{}]: is animated, expected no matrix", channel.node));
+  }
+  motion.order_ = parents_first(file);
+  motion.find_what_moves();
+  return motion;
+}
+
+void NodeMotion::let_go_of_buffers() {
+  auto rest = std::make_shared<Document>();
+  rest->path = document_->path;
+  rest->meshes = document_->meshes;
+  rest->nodes = document_->nodes;
+  rest->skins = document_->skins;
+  document_ = std::move(rest);
+}
+
+void NodeMotion::find_what_moves() {
+  moves_.assign(curves_.size(), false);
+  for (const int n : order_) {
+    const auto node = static_cast<std::size_t>(n);
+    const int parent = document_->nodes[node].parent;
+    moves_[node] = curves_[node].any() || (parent >= 0 && moves_[static_cast<std::size_t>(parent)]);
+  }
+}
+
+Result<int> NodeMotion::find(const std::string& name) const {
+  int found = -1, count = 0;
+  std::vector<std::string> names;
+  for (std::size_t n = 0; n < document_->nodes.size(); ++n) {
+    names.push_back(document_->nodes[n].name);
+    if (document_->nodes[n].name != name) continue;
+    found = static_cast<int>(n);
+    ++count;
+  }
+  if (count == 1) return found;
+  if (count > 1)
+    return document_->error(fmt::format("{} nodes are named \"{}\", expected one", count, name));
+  return document_->error(fmt::format("no node \"{}\"{}", name, suggestion(name, names)));
+}
+
+void NodeMotion::place(int node, const Matrix& local) {
+  curves_[static_cast<std::size_t>(node)].placed = local;
+  find_what_moves();
+}
+
+Matrix NodeMotion::local(std::size_t n, double seconds) const {
+  const Node& node = document_->nodes[n];
+  const Moved& moved = curves_[n];
+  if (moved.placed) return *moved.placed;
+  if (!moved.any()) return rest_of(node);
+  return compose(moved.translation ? moved.translation->vector_at(seconds) : node.translation,
+                 moved.rotation ? moved.rotation->rotation_at(seconds) : unit(node.rotation),
+                 moved.scale ? moved.scale->vector_at(seconds) : node.scale);
+}
+
+std::vector<Matrix> NodeMotion::to_world(double seconds) const {
+  return chain(*document_, order_, [&](std::size_t node) { return local(node, seconds); });
+}
+
+std::vector<Matrix> NodeMotion::at_rest() const {
+  return chain(*document_, order_, [&](std::size_t node) {
+    return curves_[node].placed.value_or(rest_of(document_->nodes[node]));
+  });
+}
+
+std::vector<Matrix> NodeMotion::at_rest(const Document& document) {
+  return chain(document, parents_first(document),
+               [&](std::size_t node) { return rest_of(document.nodes[node]); });
+}
+
+std::vector<double> NodeMotion::weights(int node, double seconds) const {
+  const std::optional<Curve>& curve = curves_[static_cast<std::size_t>(node)].weights;
+  if (!curve) return weights_at_rest(*document_, node);
+  return curve->values_at(
+      seconds, document_->mesh_of(document_->nodes[static_cast<std::size_t>(node)]).num_targets());
+}
+
+std::vector<double> NodeMotion::weights_at_rest(const Document& document, int node) {
+  const Node& given = document.nodes[static_cast<std::size_t>(node)];
+  if (!given.weights.empty()) return given.weights;
+  const Mesh& mesh = document.mesh_of(given);
+  return mesh.weights.empty() ? std::vector<double>(mesh.num_targets()) : mesh.weights;
+}
+
+}  // namespace baton::gltf

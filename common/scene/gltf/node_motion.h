@@ -1,0 +1,73 @@
+#pragma once
+
+#include <memory>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/scene/gltf/matrix.h"
+
+namespace baton::gltf {
+
+/// Values over time, (times, width); cubic: (times, 3, width) with the tangents before and behind.
+struct Curve {
+  Interpolation interpolation = Interpolation::linear;
+  std::vector<float> times;  ///< seconds, ascending, at least one
+  std::vector<float> values;
+
+  /// Rotations are unit quaternions. Held before the first time and after the last one.
+  std::array<double, 3> vector_at(double seconds) const;
+  Quaternion rotation_at(double seconds) const;
+  /// A curve of `width` numbers a time, each by itself.
+  std::vector<double> values_at(double seconds, std::size_t width) const;
+};
+
+/// Where the nodes of a file are at any time: all its animations together. Where several move one
+/// property of a node, the first in the file counts.
+class NodeMotion {
+ public:
+  /// Errors name the file and the accessor.
+  static Result<NodeMotion> read(std::shared_ptr<const Document> document);
+
+  const Document& document() const { return *document_; }
+  /// Lets go of all of the document but its nodes, skins and what its meshes are called and made
+  /// of: motion that is kept needs no more.
+  void let_go_of_buffers();
+  /// The only node of a name. Error: none, or several.
+  Result<int> find(const std::string& name) const;
+  /// Whether a node, or one above it, is moved by an animation.
+  bool moves(int node) const { return moves_[static_cast<std::size_t>(node)]; }
+  /// Whether the morph weights of a node are.
+  bool morphs(int node) const {
+    return curves_[static_cast<std::size_t>(node)].weights.has_value();
+  }
+  /// Puts a node elsewhere below its parent, and at rest there.
+  void place(int node, const Matrix& local);
+  /// From each node to the world of the file.
+  std::vector<Matrix> to_world(double seconds) const;
+  /// The same without the animations.
+  std::vector<Matrix> at_rest() const;
+  /// The same as the file places them.
+  static std::vector<Matrix> at_rest(const Document& document);
+
+  /// How far the targets of a node's mesh are added to it.
+  std::vector<double> weights(int node, double seconds) const;
+  /// The same without the animations.
+  static std::vector<double> weights_at_rest(const Document& document, int node);
+
+ private:
+  struct Moved {
+    std::optional<Curve> translation, rotation, scale, weights;
+    std::optional<Matrix> placed;
+    bool any() const { return !placed && (translation || rotation || scale); }
+  };
+  Matrix local(std::size_t node, double seconds) const;
+  void find_what_moves();
+
+  std::shared_ptr<const Document> document_;
+  std::vector<int> order_;     ///< all nodes, parents first
+  std::vector<Moved> curves_;  ///< by node
+  std::vector<bool> moves_;    ///< by node
+};
+
+}  // namespace baton::gltf

@@ -1,0 +1,61 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <vector>
+
+#include "common/scene/mesh/triangle_mesh.h"
+
+namespace baton {
+
+/// What vertices have beside their position.
+struct MeshParts {
+  bool normals = false;
+  int uv_sets = 0;  ///< [0, 2]
+  bool tangents = false;
+};
+
+/// Collects the triangles of all parts of a file into one mesh: equal vertices become one,
+/// triangles without area are dropped and counted.
+class MeshBuilder {
+ public:
+  /// Corners that differ in one of `parts` stay different vertices.
+  explicit MeshBuilder(MeshParts parts) : parts_(parts) {}
+
+  /// The triangles that follow are of a list of so many vertices, another one than before.
+  void begin_part(std::size_t num_vertices);
+  /// Adds a triangle of finite corners. vertices: their places in the part's list; a place always
+  /// has the same position, normal and so on. normals: unit. What `parts` does not name is not
+  /// looked at.
+  void add(const std::array<std::uint32_t, 3>& vertices, const std::array<Vec3, 3>& corners,
+           const std::array<Vec3, 3>& normals = {}, const std::array<UvSets, 3>& uvs = {},
+           const std::array<Tangent, 3>& tangents = {});
+  TriangleMesh take() { return std::move(mesh_); }
+
+ private:
+  /// Bits of position, normal, UVs and tangent.
+  using VertexKey = std::array<std::uint32_t, 14>;
+  VertexKey key_of(const Vec3& position, const Vec3& normal, const UvSets& uvs,
+                   const Tangent& tangent) const;
+  VertexKey key_of(std::uint32_t vertex) const;
+  std::uint32_t vertex(const Vec3& position, const Vec3& normal, const UvSets& uvs,
+                       const Tangent& tangent);
+  std::size_t find_slot(const VertexKey& key) const;
+
+  MeshParts parts_;
+  TriangleMesh mesh_;
+  /// Hash table of open addressing: numbers of vertices + 1, 0 where there is none. Its size is a
+  /// power of two, at least twice the vertices.
+  std::vector<std::uint32_t> slots_;
+  /// By place in the part's list, likewise: each vertex is looked for once.
+  std::vector<std::uint32_t> of_part_;
+};
+
+/// Whether a triangle has a normal in float.
+bool has_area(const Vec3& a, const Vec3& b, const Vec3& c);
+
+/// Angle-weighted unit vertex normals [Thuermer & Wuethrich 1998]. Where faces cancel each other (a
+/// sheet with two sides) the vertex takes the normal of one of them.
+std::vector<Vec3> smooth_vertex_normals(const TriangleMesh& mesh);
+
+}  // namespace baton

@@ -1,0 +1,140 @@
+#include <charconv>
+#include <cmath>
+#include <cstdint>
+#include <optional>
+#include <system_error>
+
+#include "common/scene/mesh/mesh_builder.h"
+#include "common/scene/mesh/mesh_readers.h"
+
+namespace baton {
+namespace {
+
+/// Least bytes of a vertex ("0 0 0\n") and of a face ("0\n"): counts past the file's size are
+/// refused before they are believed.
+constexpr std::uint64_t kMinVertexBytes = 6;
+constexpr std::uint64_t kMinFaceBytes = 2;
+
+/// Words of a text with '#' comments, and the line they are on.
+class WordReader {
+ public:
+  explicit WordReader(std::string_view text) : text_(text) {}
+
+  /// The next word on this or a later line; empty at the end.
+  std::string_view word() {
+    skip_space();
+    const std::size_t begin = at_;
+    while (at_ < text_.size() && !is_space(text_[at_]) && text_[at_] != '#') ++at_;
+    return text_.substr(begin, at_ - begin);
+  }
+  void skip_line() {
+    while (at_ < text_.size() && text_[at_] != '\n') ++at_;
+  }
+  template <class T>
+  std::optional<T> number() {
+    std::string_view digits = word();
+    if (digits.starts_with('+')) digits.remove_prefix(1);
+    T value{};
+    const auto [end, error] = std::from_chars(digits.data(), digits.data() + digits.size(), value);
+    if (error != std::errc{} || end != digits.data() + digits.size()) return std::nullopt;
+    return value;
+  }
+  int line() const { return line_; }
+  bool at_end() {
+    skip_space();
+    return at_ == text_.size();
+  }
+
+ private:
+  static bool is_space(char c) { return c == ' ' || c == '\t' || c == '\r' || c == '\n'; }
+  void skip_space() {
+    for (; at_ < text_.size(); ++at_) {
+      if (text_[at_] == '#') skip_line();
+      if (at_ == text_.size() || !is_space(text_[at_])) return;
+      line_ += text_[at_] == '\n';
+    }
+  }
+
+  std::string_view text_;
+  std::size_t at_ = 0;
+  int line_ = 1;
+};
+
+Error off_error(const std::string& name, WordReader& reader, const std::string& what) {
+  const std::string place = name + ": line " + std::to_string(reader.line()) + ": ";
+  return {ErrorKind::bad_input, place + what + (reader.at_end() ? ", but the file ends here" : "")};
+}
+
+Result<std::vector<Vec3>> read_vertices(WordReader& reader, std::uint32_t count,
+                                        const std::string& name) {
+  std::vector<Vec3> vertices;
+  vertices.reserve(count);
+  for (std::uint32_t i = 0; i < count; ++i) {
+    const auto x = reader.number<float>();
+    const auto y = x ? reader.number<float>() : std::nullopt;
+    const auto z = y ? reader.number<float>() : std::nullopt;
+    if (!z || !std::isfinite(*x) || !std::isfinite(*y) || !std::isfinite(*z)) {
+      return off_error(name, reader,
+                       "expected three finite coordinates of vertex " + std::to_string(i));
+    }
+    vertices.push_back({*x, *y, *z});
+    reader.skip_line();
+  }
+  return vertices;
+}
+
+/// Reads one face and adds it as a fan around its first corner.
+Status read_face(WordReader& reader, std::uint32_t face, const std::vector<Vec3>& vertices,
+                 MeshBuilder& builder, const std::string& name) {
+  const auto corners = reader.number<std::uint32_t>();
+  if (!corners)
+    return off_error(name, reader,
+                     "expected the number of corners of face " + std::to_string(face));
+  std::array<std::uint32_t, 3> fan{};
+  for (std::uint32_t k = 0; k < *corners; ++k) {
+    const auto index = reader.number<std::uint32_t>();
+    if (!index || *index >= vertices.size()) {
+      return off_error(name, reader,
+                       "expected a vertex index below " + std::to_string(vertices.size()) +
+                           " in face " + std::to_string(face));
+    }
+    fan[k < 2 ? k : 2] = *index;
+    if (k < 2) continue;
+    builder.add(fan, {vertices[fan[0]], vertices[fan[1]], vertices[fan[2]]});
+    fan[1] = fan[2];
+  }
+  reader.skip_line();
+  return {};
+}
+
+}  // namespace
+
+Result<TriangleMesh> parse_off(std::string_view text, const std::string& name) {
+  WordReader reader(text);
+  const std::string_view magic = reader.word();
+  if (magic != "OFF" && magic != "COFF" && magic != "NOFF" && magic != "CNOFF") {
+    return Error{ErrorKind::bad_input, name + ": not a mesh: expected \"OFF\" in line 1"};
+  }
+
+  // The third count, of edges, is optional and without a meaning.
+  const auto num_vertices = reader.number<std::uint32_t>();
+  const auto num_faces = num_vertices ? reader.number<std::uint32_t>() : std::nullopt;
+  if (!num_faces) return off_error(name, reader, "expected the numbers of vertices and faces");
+  if (*num_vertices * kMinVertexBytes + *num_faces * kMinFaceBytes > text.size()) {
+    return off_error(name, reader,
+                     "expected " + std::to_string(*num_vertices) + " vertices and " +
+                         std::to_string(*num_faces) +
+                         " faces, which the file is too small to hold");
+  }
+  reader.skip_line();
+
+  BATON_ASSIGN(const std::vector<Vec3> vertices, read_vertices(reader, *num_vertices, name));
+  MeshBuilder builder(MeshParts{});
+  builder.begin_part(vertices.size());
+  for (std::uint32_t face = 0; face < *num_faces; ++face) {
+    BATON_TRY(read_face(reader, face, vertices, builder, name));
+  }
+  return builder.take();
+}
+
+}  // namespace baton

@@ -1,0 +1,15 @@
+#pragma once
+
+#include "common/scene/mesh/triangle_mesh.h"
+
+namespace baton {
+
+/// Gives the mesh tangents from its texture coordinates of set `uv_set`, which it has, where it has
+/// none: at each vertex the mean over the triangles around it, weighted by their corners' angles,
+/// as MikkTSpace does. Where images that are mirrored to each other meet, vertices become two.
+void derive_tangents(TriangleMesh& mesh, std::size_t uv_set);
+
+/// The tangents of a mesh that had them derived, in another shape, which has none yet.
+std::vector<Tangent> tangents_of(const TriangleMesh& mesh, const MeshShape& shape);
+
+}  // namespace baton

@@ -1,0 +1,47 @@
+#pragma once
+
+#include <array>
+#include <cstdint>
+#include <memory>
+#include <vector>
+
+#include "common/scene/mesh/deformation.h"
+
+namespace baton {
+
+/// Texture coordinates, (0, 0) at the upper left of the image; sets 0 and 1.
+using Uv = std::array<float, 2>;
+using UvSets = std::array<Uv, 2>;
+
+/// Triangles of one file. Degenerate triangles (zero area, equal corners) are dropped and counted;
+/// where the mesh deforms, those with equal corners alone.
+struct TriangleMesh {
+  std::vector<Vec3> positions;
+  std::vector<Vec3> normals;             ///< per vertex, unit; empty: flat shading
+  std::array<std::vector<Uv>, 2> uvs{};  ///< by set, per vertex, or empty
+  /// Tangents per vertex, where a normal map needs them, or empty.
+  std::vector<Tangent> tangents{};
+  std::vector<std::array<std::uint32_t, 3>> triangles;
+  std::uint64_t dropped_triangles = 0;
+  /// How the vertices move, the arrays above being those of the frame at time 0; null: not at all.
+  std::shared_ptr<const Deformation> deformation{};
+  /// Those of which the last vertices are copies, which it does not know (tangents.h).
+  std::vector<std::uint32_t> copied_vertices{};
+  int tangent_uv_set = -1;  ///< whose tangents were derived; -1: none
+
+  /// Where vertices are at a frame, of a mesh that deforms.
+  MeshShape shape_at(double frame) const;
+};
+
+/// Where on a mesh a surface was hit.
+struct SurfacePlace {
+  std::uint32_t triangle = 0;
+  /// Barycentric coordinates of the triangle's second and third corner.
+  float u = 0, v = 0;
+  /// Width of what the site sees, across the ray, in the world.
+  float width = 0;
+
+  bool operator==(const SurfacePlace&) const = default;
+};
+
+}  // namespace baton

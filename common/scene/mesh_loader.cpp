@@ -1,0 +1,64 @@
+#include "common/scene/mesh_loader.h"
+
+#include <algorithm>
+#include <filesystem>
+
+#include "common/base/files.h"
+#include "common/base/limits.h"
+#include "common/scene/gltf/meshes.h"
+#include "common/scene/mesh/mesh_builder.h"
+#include "common/scene/mesh/mesh_readers.h"
+
+namespace baton {
+namespace {
+
+Error bad_mesh(const std::string& path, const std::string& what) {
+  return {ErrorKind::bad_input, path + ": " + what};
+}
+
+/// Reads the triangles with the reader that fits the file.
+Result<TriangleMesh> read_triangles(const std::string& path, bool smooth_normals, bool with_uvs) {
+  const std::string extension = lower_extension(path);
+  if (extension == ".off") {
+    BATON_ASSIGN(const std::string text, read_text_file(path, limits::kMaxAssetFileBytes));
+    return parse_off(text, path);
+  }
+  if (extension == ".ply") {
+    BATON_ASSIGN(const std::string bytes, read_text_file(path, limits::kMaxAssetFileBytes));
+    return parse_ply(bytes, path, smooth_normals);
+  }
+  if (extension == ".gltf" || extension == ".glb") {
+    BATON_ASSIGN(const auto document, gltf::read_document(path));
+    return gltf::whole_mesh(*document, smooth_normals);
+  }
+  return read_obj(path, smooth_normals, with_uvs);
+}
+
+}  // namespace
+
+Result<TriangleMesh> load_mesh(const std::string& path, bool smooth_normals, bool with_uvs) {
+  // Look at the file before any reader does.
+  std::error_code error;
+  const std::filesystem::file_status status = std::filesystem::status(path, error);
+  if (!std::filesystem::exists(status)) return bad_mesh(path, "missing: expected a mesh file");
+  if (!std::filesystem::is_regular_file(status))
+    return bad_mesh(path, "expected a mesh file, found no regular file");
+  if (std::filesystem::file_size(path, error) > limits::kMaxAssetFileBytes) {
+    return bad_mesh(path, "larger than " + std::to_string(limits::kMaxAssetFileBytes) + " bytes");
+  }
+
+  // Postprocessing and odd files may throw.
+  try {
+    BATON_ASSIGN(TriangleMesh mesh, read_triangles(path, smooth_normals, with_uvs));
+    if (mesh.triangles.empty()) {
+      return bad_mesh(path,
+                      "no triangles (" + std::to_string(mesh.dropped_triangles) + " without area)");
+    }
+    if (smooth_normals && mesh.normals.empty()) mesh.normals = smooth_vertex_normals(mesh);
+    return mesh;
+  } catch (const std::exception& e) {
+    return bad_mesh(path, std::string("not a mesh: ") + e.what());
+  }
+}
+
+}  // namespace baton

@@ -1,0 +1,100 @@
+#include "common/scene/settle/gltf_motion.h"
+
+#include <fmt/format.h>
+
+namespace baton {
+namespace {
+
+/// The file, and the node of it that must move.
+Result<std::pair<gltf::NodeMotion, int>> open_moving(const GltfMotion& given) {
+  BATON_ASSIGN(auto document, gltf::read_document(given.file));
+  BATON_ASSIGN(gltf::NodeMotion motion, gltf::NodeMotion::read(std::move(document)));
+  BATON_ASSIGN(const int node, motion.find(given.node));
+  if (!motion.moves(node))
+    return motion.document().error(
+        fmt::format("node \"{}\": no animation moves it or a node above it", given.node));
+  return std::pair(std::move(motion), node);
+}
+
+/// A camera of glTF looks along -z of its node, y up.
+CameraKey camera_key(double frame, const gltf::Matrix& to_world) {
+  const Transform map = gltf::to_transform(to_world);
+  return {.frame = frame,
+          .position = map.offset,
+          .look_at = map.offset + normalize(map.linear * Vec3{0, 0, -1}),
+          .up = normalize(map.linear * Vec3{0, 1, 0}),
+          .vertical_fov_deg = {}};
+}
+
+}  // namespace
+
+Status put_camera(const gltf::NodeMotion& motion, int node, const FileClock& clock,
+                  const std::vector<int>& frames, CameraSpec& camera) {
+  const gltf::Document& file = motion.document();
+  const gltf::Node& given = file.nodes[static_cast<std::size_t>(node)];
+  if (given.camera < 0) return file.error(fmt::format("node \"{}\" holds no camera", given.name));
+  const gltf::Camera& lens = file.cameras[static_cast<std::size_t>(given.camera)];
+
+  // The file says nothing of shift and lens: the job does. What it sees, both may say.
+  const CameraSpec wanted = camera;
+  camera = {};
+  camera.shift = wanted.shift;
+  camera.aperture = wanted.aperture;
+  camera.focus_distance = wanted.focus_distance;
+  if (wanted.own_vertical_fov_deg) {
+    camera.vertical_fov_deg = *wanted.own_vertical_fov_deg;
+  } else if (lens.perspective && !wanted.own_orthographic_height) {
+    camera.vertical_fov_deg = static_cast<float>(lens.yfov * 180 / 3.14159265358979323846);
+  } else {
+    camera.projection = Projection::orthographic;
+    camera.orthographic_height =
+        wanted.own_orthographic_height.value_or(static_cast<float>(2 * lens.ymag));
+  }
+  const auto at = [&](int frame) {
+    const std::vector<gltf::Matrix> world = motion.to_world(clock.seconds_at(frame));
+    return camera_key(static_cast<double>(frame), world[static_cast<std::size_t>(node)]);
+  };
+  const CameraKey first = at(frames.front());
+  camera.position = first.position;
+  camera.look_at = first.look_at;
+  camera.up = first.up;
+  for (const int frame : frames) {
+    if (motion.moves(node)) camera.keys.push_back(at(frame));
+  }
+  return {};
+}
+
+std::vector<ObjectKey> matrix_keys(const std::vector<int>& frames,
+                                   const std::vector<Matrix34>& matrices) {
+  std::vector<ObjectKey> keys;
+  for (std::size_t i = 0; i < frames.size(); ++i) {
+    const bool inner = i > 0 && i + 1 < frames.size();
+    if (inner && matrices[i] == matrices[i - 1] && matrices[i] == matrices[i + 1]) continue;
+    ObjectKey key;
+    key.frame = static_cast<double>(frames[i]);
+    key.matrix = matrices[i];
+    keys.push_back(key);
+  }
+  return keys;
+}
+
+Status take_camera_keys(const std::vector<int>& frames, CameraSpec& camera) {
+  const GltfMotion gltf = *camera.gltf;
+  BATON_ASSIGN(const auto opened, open_moving(gltf));
+  return put_camera(opened.first, opened.second, {gltf.fps, gltf.start_frame}, frames, camera);
+}
+
+Status take_object_keys(const std::vector<int>& frames, ObjectSpec& object) {
+  const GltfMotion gltf = *object.gltf;
+  BATON_ASSIGN(const auto opened, open_moving(gltf));
+  const FileClock clock{gltf.fps, gltf.start_frame};
+  std::vector<Matrix34> matrices;
+  for (const int frame : frames)
+    matrices.push_back(gltf::to_floats(
+        opened.first.to_world(clock.seconds_at(frame))[static_cast<std::size_t>(opened.second)]));
+  object.keys = matrix_keys(frames, matrices);
+  object.gltf.reset();
+  return {};
+}
+
+}  // namespace baton

@@ -1,0 +1,29 @@
+#pragma once
+
+#include <vector>
+
+#include "common/base/result.h"
+#include "common/job/job_spec.h"
+#include "common/scene/gltf/node_motion.h"
+
+namespace baton {
+
+/// Replace `gltf` by keys, one for each frame number: where the file's animations have the node
+/// then, in the world of the file. Errors name the file: missing, not a glTF file, no such node, a
+/// node that no animation moves.
+
+/// The node must hold a camera, which also gives the angle of view.
+Status take_camera_keys(const std::vector<int>& frames, CameraSpec& camera);
+/// What the node does is done to the object.
+Status take_object_keys(const std::vector<int>& frames, ObjectSpec& object);
+
+/// Makes `camera` that of a node: with keys where it moves, at one place where it does not. Error:
+/// the node holds no camera.
+Status put_camera(const gltf::NodeMotion& motion, int node, const FileClock& clock,
+                  const std::vector<int>& frames, CameraSpec& camera);
+
+/// Keys of matrices, one a frame, but for those between equal ones. matrices: of `frames`.
+std::vector<ObjectKey> matrix_keys(const std::vector<int>& frames,
+                                   const std::vector<Matrix34>& matrices);
+
+}  // namespace baton

@@ -1,0 +1,121 @@
+#include "common/scene/texture/image_reader.h"
+
+#include <dlfcn.h>
+#include <fmt/format.h>
+
+#include <cctype>
+#include <cstring>
+#include <filesystem>
+#include <optional>
+
+#include "common/base/files.h"
+#include "common/base/limits.h"
+#include "common/scene/texture/reader/interface.h"
+
+namespace baton {
+namespace {
+
+Error bad_image(const std::string& name, const std::string& what) {
+  return {ErrorKind::bad_input, name + ": " + what};
+}
+
+struct Reader {
+  BatonReadImage read;
+};
+
+/// The reader, from the library beside the program; loaded once and never unloaded.
+const Result<Reader>& reader() {
+  static const Result<Reader> loaded = []() -> Result<Reader> {
+    std::error_code error;
+    const auto program = std::filesystem::read_symlink("/proc/self/exe", error);
+    const std::string path = (program.parent_path() / "libbaton-images.so").string();
+    void* const library = dlopen(path.c_str(), RTLD_NOW | RTLD_LOCAL);
+    void* const entry = library != nullptr ? dlsym(library, kBatonReadImage) : nullptr;
+    if (entry == nullptr)
+      return Error{ErrorKind::internal,
+                   fmt::format("cannot load what reads images: {}", dlerror())};
+    return Reader{reinterpret_cast<BatonReadImage>(entry)};
+  }();
+  return loaded;
+}
+
+/// What is wrong with the size of an image; empty: nothing.
+std::string fault_of(const BatonImageLayout& layout) {
+  const auto max = limits::kMaxTextureSide;
+  if (layout.width < 1 || layout.height < 1 || layout.width > max || layout.height > max)
+    return fmt::format("expected an image of 1 to {} pixels a side, got {} x {}", max, layout.width,
+                       layout.height);
+  return {};
+}
+
+/// Takes what the reader hands over.
+struct Taker {
+  Image image;
+  std::string fault;
+
+  static float* accept(void* self, const BatonImageLayout* layout) {
+    auto& taker = *static_cast<Taker*>(self);
+    taker.fault = fault_of(*layout);
+    if (!taker.fault.empty()) return nullptr;
+    taker.image = {.width = layout->width,
+                   .height = layout->height,
+                   .channels = layout->channels,
+                   .samples = {},
+                   .is_integer = layout->is_integer != 0,
+                   .has_alpha = layout->has_alpha != 0,
+                   .is_associated = layout->is_associated != 0};
+    if (layout->has_chromaticities != 0)
+      taker.image.chromaticities = std::to_array(layout->chromaticities);
+    taker.image.samples.resize(static_cast<std::size_t>(layout->width) *
+                               static_cast<std::size_t>(layout->height) *
+                               static_cast<std::size_t>(layout->channels));
+    return taker.image.samples.data();
+  }
+  static void fail(void* self, const char* message) {
+    std::string& text = static_cast<Taker*>(self)->fault;
+    text = "not an image: ";
+    // Messages have lines.
+    for (const char* c = message; *c != '\0'; ++c)
+      text += std::iscntrl(static_cast<unsigned char>(*c)) != 0 ? ' ' : *c;
+  }
+};
+
+Result<Image> read(const std::string& file_name, std::optional<ByteView> bytes,
+                   const std::string& name) {
+  const Result<Reader>& loaded = reader();
+  if (!loaded) return loaded.error();
+  Taker taker;
+  const BatonImageSink sink{&taker, &Taker::accept, &Taker::fail};
+  const bool done = loaded->read(file_name.c_str(), bytes ? bytes->data() : nullptr,
+                                 bytes ? bytes->size() : 0, &sink) != 0;
+  if (!done) return bad_image(name, taker.fault);
+  return std::move(taker.image);
+}
+
+/// What formats that glTF files contain are called; the reader looks at names first.
+std::string name_by_content(ByteView bytes) {
+  const auto starts = [&](const char* magic) {
+    const std::size_t size = std::strlen(magic);
+    return bytes.size() >= size && std::memcmp(bytes.data(), magic, size) == 0;
+  };
+  if (starts("\x89PNG")) return "image.png";
+  if (starts("\xFF\xD8")) return "image.jpg";
+  return starts("RIFF") ? "image.webp" : "";
+}
+
+}  // namespace
+
+Result<Image> read_image(const std::string& path) {
+  std::error_code error;
+  if (!std::filesystem::is_regular_file(path, error))
+    return bad_image(path, "missing: expected an image file");
+  return read(path, std::nullopt, path);
+}
+
+Result<Image> read_image(ByteView bytes, const std::string& name) {
+  const std::string file_name = name_by_content(bytes);
+  if (file_name.empty()) return bad_image(name, "not an image: expected PNG, JPEG or WebP");
+  return read(file_name, bytes, name);
+}
+
+}  // namespace baton
