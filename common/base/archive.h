@@ -9,13 +9,15 @@
 
 #include "common/base/bytes.h"
 #include "common/base/members.h"
+#include "common/base/ordinal.h"
 
 namespace baton {
 
 /// The byte form of plain structs: members in the order of their declaration, little-endian, no
-/// padding. A bool is one byte 0 or 1; an enum its underlying integer; a string u32 length and
-/// bytes; a vector u32 count and elements; an array its elements. Every enum that is archived has a
-/// `last_of(Enum)` beside it, found by argument-dependent lookup: larger values are refused.
+/// padding. A bool is one byte 0 or 1; an enum its underlying integer; an Ordinal its int32; a
+/// string u32 length and bytes; a vector u32 count and elements; an array its elements. Every enum
+/// that is archived has a `last_of(Enum)` beside it, found by argument-dependent lookup: larger
+/// values are refused.
 
 /// Appends values to a ByteWriter.
 class ArchiveWriter {
@@ -33,6 +35,10 @@ class ArchiveWriter {
   template <class T>
   requires std::is_enum_v<T>
   void write(const T& value) { writer_.put(static_cast<std::underlying_type_t<T>>(value)); }
+  template <class Tag>
+  void write(Ordinal<Tag> position) {
+    writer_.put(position.value());
+  }
   void write(const std::string& text) { writer_.put_string(text); }
   template <class T>
   void write(const std::vector<T>& values) {
@@ -82,6 +88,10 @@ class ArchiveReader {
       in_range_ = false;
       value = last_of(value);
     }
+  }
+  template <class Tag>
+  void read(Ordinal<Tag>& position) {
+    position = Ordinal<Tag>(reader_.get<std::int32_t>());
   }
   void read(std::string& text) { text = reader_.get_string(); }
   template <class T>

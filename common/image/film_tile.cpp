@@ -46,15 +46,15 @@ Status decode_meta(const SectionFile& file, const std::string& name, StoredFilm&
   }
   stored.origin.picture.high = reader.get<std::uint64_t>();
   stored.origin.picture.low = reader.get<std::uint64_t>();
-  stored.origin.frame_index = reader.get<std::int32_t>();
+  stored.origin.step = Step(reader.get<std::int32_t>());
   const auto pass = reader.get<std::uint8_t>();
   if (!reader.ok() || !reader.at_end())
     return fail("is not a rectangle, a list of names, a job, a frame and a pass");
   if (pass > static_cast<std::uint8_t>(FilmPass::second))
     return fail(fmt::format("has pass {}, expected 0 or 1", pass));
   stored.origin.pass = static_cast<FilmPass>(pass);
-  if (stored.origin.frame_index < 0 || stored.origin.frame_index >= limits::kMaxFrames) {
-    return fail(fmt::format("has frame index {}, expected 0 to {}", stored.origin.frame_index,
+  if (stored.origin.step < Step(0) || stored.origin.step >= Step(limits::kMaxFrames)) {
+    return fail(fmt::format("has frame index {}, expected 0 to {}", stored.origin.step,
                             limits::kMaxFrames - 1));
   }
 
@@ -112,7 +112,7 @@ Bytes encode_film_tile(const FilmTile& tile, const FilmOrigin& origin) {
   for (const std::string& channel : tile.channels) meta.put_string(channel);
   meta.put(origin.picture.high);
   meta.put(origin.picture.low);
-  meta.put(origin.frame_index);
+  meta.put(origin.step.value());
   meta.put(static_cast<std::uint8_t>(origin.pass));
   const std::array sections{SectionView{.tag = kMeta, .payload = meta.bytes()},
                             SectionView{.tag = kPixels,

@@ -8,6 +8,7 @@
 #include "common/base/bytes.h"
 #include "common/base/digest.h"
 #include "common/base/result.h"
+#include "common/job/time.h"
 #include "common/math/pixel_rect.h"
 
 namespace baton {
@@ -41,7 +42,7 @@ enum class FilmPass : std::uint8_t { first = 0, second = 1 };
 /// made.
 struct FilmOrigin {
   Digest picture;
-  std::int32_t frame_index = 0;  ///< 0-based
+  Step step{};
   FilmPass pass = FilmPass::first;
 
   bool operator==(const FilmOrigin&) const = default;

@@ -18,9 +18,9 @@ std::string frame_file_name(const std::string& pattern, int number) {
   return name.replace(first, count, fmt::format("{:0{}}", number, count));
 }
 
-int number_at(const FileSequence& sequence, int frame) {
+int number_at(const FileSequence& sequence, FrameNumber frame) {
   // A product that rounding has left just below a whole number counts as that: .7 x 90 is 63.
-  const double product = sequence.speed * frame;
+  const double product = sequence.speed * frame.value();
   const double rounding = 2 * std::numeric_limits<double>::epsilon() * std::fabs(product);
   const auto wanted = static_cast<std::int64_t>(std::floor(product + rounding)) + sequence.offset;
   if (sequence.beyond == FilesBeyond::hold)
@@ -30,7 +30,7 @@ int number_at(const FileSequence& sequence, int frame) {
   return static_cast<int>(sequence.first + (place < 0 ? place + count : place));
 }
 
-std::string file_at(const FileSequence& sequence, int frame) {
+std::string file_at(const FileSequence& sequence, FrameNumber frame) {
   const std::filesystem::path path = sequence.files;
   return (path.parent_path() /
           frame_file_name(path.filename().string(), number_at(sequence, frame)))

@@ -4,6 +4,7 @@
 #include <string>
 
 #include "common/base/limits.h"
+#include "common/job/time.h"
 
 namespace baton {
 
@@ -25,10 +26,10 @@ struct FileSequence {
 /// "frame.####.exr" with number 7 -> "frame.0007.exr". A pattern without '#' is returned unchanged.
 std::string frame_file_name(const std::string& pattern, int number);
 
-/// The number of the file at a frame: floor(speed frame) + offset, brought between `first` and
+/// The number of the file at a frame of the job: floor(speed frame) + offset, brought between `first` and
 /// `last`.
-int number_at(const FileSequence& sequence, int frame);
+int number_at(const FileSequence& sequence, FrameNumber frame);
 /// Its path.
-std::string file_at(const FileSequence& sequence, int frame);
+std::string file_at(const FileSequence& sequence, FrameNumber frame);
 
 }  // namespace baton

@@ -34,7 +34,7 @@ float deviation(const std::vector<float>& values, float from) {
 struct Around {
   std::vector<float> before, after, both;
 
-  Around(std::span<const FrameStats* const> written, std::size_t at, float FrameQuality::*number) {
+  Around(std::span<const FrameReport* const> written, std::size_t at, float FrameQuality::*number) {
     const std::size_t end = std::min(at + kAround + 1, written.size());
     for (std::size_t k = at - std::min(at, kAround); k < end; ++k) {
       if (k == at) continue;
@@ -62,7 +62,7 @@ std::optional<float> odd_mean(float value, const Around& around) {
   return odd_ratio(value, value > high ? high : low, around.both);
 }
 
-void find_odd_frames(std::span<const FrameStats* const> written, Judgement& judgement) {
+void find_odd_frames(std::span<const FrameReport* const> written, Judgement& judgement) {
   for (std::size_t i = 0; i < written.size(); ++i) {
     const Around mean(written, i, &FrameQuality::mean), noise(written, i, &FrameQuality::noise);
     if (noise.both.size() < kFewest) continue;
@@ -78,7 +78,7 @@ void find_odd_frames(std::span<const FrameStats* const> written, Judgement& judg
 }
 
 /// Enters the noise of a frame that tells it. squares: the sum over these frames.
-void add_noise(const FrameStats& frame, double& squares, Judgement& judgement) {
+void add_noise(const FrameReport& frame, double& squares, Judgement& judgement) {
   const float noise = frame.quality.noise;
   const bool is_first = judgement.frames_told == 0;
   squares += double{noise} * noise;
@@ -93,9 +93,9 @@ void add_noise(const FrameStats& frame, double& squares, Judgement& judgement) {
 
 }  // namespace
 
-Judgement judge_frames(std::span<const FrameStats> frames) {
+Judgement judge_frames(std::span<const FrameReport> frames) {
   Judgement judgement;
-  std::vector<const FrameStats*> written;
+  std::vector<const FrameReport*> written;
   double squares = 0, light = 0, below = 0;
   for (std::size_t i = 0; i < frames.size(); ++i) {
     const SamplingStats& sampling = frames[i].sampling;

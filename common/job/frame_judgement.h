@@ -10,7 +10,7 @@ namespace baton {
 
 /// A frame that differs from those around it.
 struct OddFrame {
-  std::int32_t frame = 0;
+  FrameNumber frame{};
   bool by_noise = false;  ///< else by its mean radiance
   float ratio = 1;        ///< to the median of those around it
 };
@@ -22,7 +22,7 @@ struct Judgement {
   NoiseSource noise_source = NoiseSource::none;
   float noise = 0;  ///< rms over these frames
   float noise_least = 0, noise_most = 0;
-  std::int32_t noisiest = 0;  ///< the frame of noise_most
+  FrameNumber noisiest{};  ///< the frame of noise_most
   std::vector<OddFrame> odd;
   std::uint64_t frames_below_zero = 0, pixels_below_zero = 0;
   float lowest = 0;
@@ -41,6 +41,6 @@ struct Judgement {
 /// A frame is odd when its noise is above the median of the three frames on each side by more than
 /// half of that and five times their median absolute deviation, or its mean radiance as far outside
 /// of the medians of either side. Cuts and steady changes thus are not; a flash of one frame is.
-Judgement judge_frames(std::span<const FrameStats> frames);
+Judgement judge_frames(std::span<const FrameReport> frames);
 
 }  // namespace baton

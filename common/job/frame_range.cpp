@@ -31,7 +31,7 @@ bool take_char(std::string_view& text, char c) {
 }
 
 /// Appends "7", "1-48" or "1-100x2".
-Status append_range(std::string_view range, std::vector<int>& frames) {
+Status append_range(std::string_view range, std::vector<FrameNumber>& frames) {
   std::string_view rest = range;
   const auto syntax = [&] {
     return wrong(fmt::format("frames like 1-48, 1-100x2 or 1,5,9-12 with numbers in [0, {}]",
@@ -51,21 +51,21 @@ Status append_range(std::string_view range, std::vector<int>& frames) {
 
   // Append them, in order and within the limit.
   if (*last < *first) return wrong("a last frame not before the first", range);
-  if (!frames.empty() && *first <= frames.back()) {
+  if (!frames.empty() && *first <= frames.back().value()) {
     return wrong("ascending frames without duplicates",
                  fmt::format("{} after {}", *first, frames.back()));
   }
   if ((*last - *first) / *step + 1 > limits::kMaxFrames - static_cast<int>(frames.size())) {
     return wrong(fmt::format("at most {} frames", limits::kMaxFrames), range);
   }
-  for (int frame = *first; frame <= *last; frame += *step) frames.push_back(frame);
+  for (int frame = *first; frame <= *last; frame += *step) frames.emplace_back(frame);
   return {};
 }
 
 }  // namespace
 
-Result<std::vector<int>> parse_frames(std::string_view text) {
-  std::vector<int> frames;
+Result<std::vector<FrameNumber>> parse_frames(std::string_view text) {
+  std::vector<FrameNumber> frames;
   for (std::size_t start = 0; start <= text.size();) {
     const std::size_t comma = std::min(text.find(',', start), text.size());
     BATON_TRY(append_range(text.substr(start, comma - start), frames));
@@ -74,7 +74,7 @@ Result<std::vector<int>> parse_frames(std::string_view text) {
   return frames;
 }
 
-std::string format_frames(const std::vector<int>& frames) {
+std::string format_frames(const std::vector<FrameNumber>& frames) {
   std::string text;
   for (std::size_t i = 0; i < frames.size();) {
     // The longest run of equal steps that starts here; with gaps it takes four frames to be worth a
@@ -85,7 +85,7 @@ std::string format_frames(const std::vector<int>& frames) {
     if (step != 1 && last < i + 3) last = i;
 
     if (!text.empty()) text += ',';
-    text += std::to_string(frames[i]);
+    text += std::to_string(frames[i].value());
     if (last > i) text += fmt::format("-{}", frames[last]);
     if (last > i && step != 1) text += fmt::format("x{}", step);
     i = last + 1;

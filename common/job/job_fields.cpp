@@ -32,7 +32,7 @@ void name_fields(JobArchive& a, JobSpec& job) {
 void frame_fields(JobArchive& a, JobSpec& job) {
   std::string text = format_frames(job.frames);
   if (!a.text("frames", text)) return;
-  Result<std::vector<int>> frames = parse_frames(text);
+  Result<std::vector<FrameNumber>> frames = parse_frames(text);
   if (frames) {
     job.frames = std::move(frames).value();
   } else {

@@ -87,6 +87,6 @@ void asset_path(JobArchive& a, Key key, std::string& path,
 /// Numbered files; `extensions`: as of asset_path.
 void fields(JobArchive& a, FileSequence& sequence,
             std::initializer_list<std::string_view> extensions);
-void fields(JobArchive& a, EnvironmentSpec& environment, const std::vector<int>& frames);
+void fields(JobArchive& a, EnvironmentSpec& environment, const std::vector<FrameNumber>& frames);
 
 }  // namespace baton

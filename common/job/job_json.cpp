@@ -144,7 +144,7 @@ std::vector<std::string> asset_paths(const JobSpec& job) {
   for (const EnvironmentKey& key : job.environment.keys) paths.insert(key.map);
   if (const std::string& map = job.environment.camera_map.file; !map.empty()) paths.insert(map);
   if (has_plate(job.output)) {
-    for (const int frame : job.frames) paths.insert(file_at(*job.output.plate, frame));
+    for (const FrameNumber frame : job.frames) paths.insert(file_at(*job.output.plate, frame));
   }
   return {paths.begin(), paths.end()};
 }

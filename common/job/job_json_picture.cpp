@@ -85,7 +85,7 @@ Facts picture_facts(const JobSpec& job, const std::vector<AssetDigest>& assets) 
     if (moves(job.scene.objects[i]))
       facts.emplace("$.scene.objects[" + std::to_string(i) + "].keys", "given");
   }
-  if (carries_state(job)) facts.emplace(kFirstFrame, std::to_string(job.frames.front()));
+  if (carries_state(job)) facts.emplace(kFirstFrame, std::to_string(job.frames.front().value()));
   std::set<std::string> maps;
   for (const EnvironmentKey& key : job.environment.keys) maps.insert(key.map);
   maps.erase(job.environment.camera_map.file);  // which all frames show
@@ -101,7 +101,7 @@ void put(ByteWriter& writer, const Vec3& v) {
   for (const float x : {v.x, v.y, v.z}) writer.put(x);
 }
 
-Digest light_facts(const EnvironmentSpec& environment, int frame,
+Digest light_facts(const EnvironmentSpec& environment, FrameNumber frame,
                    const std::map<std::string, Digest>& contents) {
   const EnvironmentFrame light = environment_at(environment, frame);
   ByteWriter writer;
@@ -116,19 +116,19 @@ Digest light_facts(const EnvironmentSpec& environment, int frame,
   return digest_of(writer.bytes());
 }
 
-Digest camera_facts(const JobSpec& job, int frame) {
-  const CameraSpec camera = camera_at(job, frame);
+Digest camera_facts(const JobSpec& job, FrameNumber frame) {
+  const CameraSpec camera = camera_at(job, frame.value());
   ByteWriter writer;
   for (const Vec3& v : {camera.position, camera.look_at, camera.up}) put(writer, v);
   writer.put(camera.vertical_fov_deg);
   return digest_of(writer.bytes());
 }
 
-Digest object_facts(const JobSpec& job, int frame) {
+Digest object_facts(const JobSpec& job, FrameNumber frame) {
   ByteWriter writer;
   for (const ObjectSpec& object : job.scene.objects) {
     if (!moves(object)) continue;
-    const Transform pose = object_motion_at(object, job.motion.curve, frame);
+    const Transform pose = object_motion_at(object, job.motion.curve, frame.value());
     for (const float x : pose.linear.m) writer.put(x);
     put(writer, pose.offset);
   }
@@ -173,7 +173,7 @@ std::vector<std::string> picture_differences(const ParsedJobDocument& a,
 std::vector<FrameComparison::Facts> FrameComparison::facts_of(const ParsedJobDocument& document) {
   const std::map<std::string, Digest> contents = contents_of(document);
   std::vector<Facts> facts;
-  for (const int frame : document.job.frames) {
+  for (const FrameNumber frame : document.job.frames) {
     facts.push_back({light_facts(document.job.environment, frame, contents),
                      camera_facts(document.job, frame), object_facts(document.job, frame)});
   }
@@ -207,37 +207,39 @@ FrameComparison::FrameComparison(const ParsedJobDocument& a, const ParsedJobDocu
     ++num_common_;
 }
 
-bool FrameComparison::are_equal(std::size_t index_a, std::size_t index_b) const {
-  return sweeps_a_ == sweeps_b_ && are_alike(index_a, index_b);
+bool FrameComparison::are_equal(FrameIndex frame_a, FrameIndex frame_b) const {
+  return sweeps_a_ == sweeps_b_ && are_alike(frame_a, frame_b);
 }
 
-bool FrameComparison::have_one_plate(std::size_t index_a, std::size_t index_b) const {
-  return plates_a_[index_a] == plates_b_[index_b];
+bool FrameComparison::have_one_plate(FrameIndex frame_a, FrameIndex frame_b) const {
+  return plates_a_[frame_a.index()] == plates_b_[frame_b.index()];
 }
 
-bool FrameComparison::are_alike(std::size_t index_a, std::size_t index_b) const {
+bool FrameComparison::are_alike(FrameIndex frame_a, FrameIndex frame_b) const {
   const bool all_common = num_common_ == a_.size() && num_common_ == b_.size();
   if (carried_ && std::min(sweeps_a_, sweeps_b_) > 1 && !all_common) return false;
-  if (carried_) return index_a == index_b && index_a < num_common_;
-  return frames_a_[index_a] == frames_b_[index_b] && a_[index_a] == b_[index_b];
+  if (carried_) return frame_a == frame_b && frame_a.index() < num_common_;
+  return frames_a_[frame_a.index()] == frames_b_[frame_b.index()] &&
+         a_[frame_a.index()] == b_[frame_b.index()];
 }
 
-std::size_t FrameComparison::num_common_steps() const {
+std::int32_t FrameComparison::num_common_steps() const {
   const bool all_common = num_common_ == a_.size() && num_common_ == b_.size();
-  return all_common ? num_common_ * std::min(sweeps_a_, sweeps_b_) : num_common_;
+  const std::size_t sweeps = all_common ? std::min(sweeps_a_, sweeps_b_) : 1;
+  return static_cast<std::int32_t>(num_common_ * sweeps);
 }
 
-std::string FrameComparison::difference(std::size_t index_a, std::size_t index_b) const {
-  const Facts &a = a_[index_a], &b = b_[index_b];
-  const int frame = frames_b_[index_b];
-  if (frames_a_[index_a] == frame && !(a == b)) {
+std::string FrameComparison::difference(FrameIndex frame_a, FrameIndex frame_b) const {
+  const Facts &a = a_[frame_a.index()], &b = b_[frame_b.index()];
+  const FrameNumber frame = frames_b_[frame_b.index()];
+  if (frames_a_[frame_a.index()] == frame && !(a == b)) {
     const char* const what = !(a.light == b.light)     ? "$.environment"
                              : !(a.camera == b.camera) ? "$.camera.keys"
                                                        : "$.scene.objects: keys";
-    return std::string(what) + " at frame " + std::to_string(frame);
+    return std::string(what) + " at frame " + std::to_string(frame.value());
   }
   if (sweeps_a_ != sweeps_b_) return "$.quality.sweeps";
-  return "$.frames before frame " + std::to_string(frame) + " (samples are carried)";
+  return "$.frames before frame " + std::to_string(frame.value()) + " (samples are carried)";
 }
 
 }  // namespace baton

@@ -353,7 +353,7 @@ struct JobSpec {
   std::string name;
   int priority = 50;  ///< [0, 100], higher runs first
   std::map<std::string, std::string> metadata;
-  std::vector<int> frames{1};  ///< ascending, no duplicates
+  std::vector<FrameNumber> frames{FrameNumber(1)};  ///< ascending, no duplicates
   ImageSpec image;
   CameraSpec camera;
   SceneSpec scene;
@@ -371,10 +371,10 @@ struct JobSpec {
   std::uint64_t seed = 1;
 
   /// Not said by the user, nor part of the JSON: where runs begin that a former job of the same
-  /// picture made otherwise than every checkpoint_every frames (0-based, ascending, from 0). After
+  /// picture made otherwise than every checkpoint_every frames (ascending, from 0). After
   /// the last of them they begin at multiples again. Said by the coordinator; only who makes what
   /// depends on it.
-  std::vector<std::int32_t> leading_runs{};
+  std::vector<Step> leading_runs{};
 
   bool operator==(const JobSpec&) const = default;
 };

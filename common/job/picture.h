@@ -28,19 +28,19 @@ class FrameComparison {
  public:
   FrameComparison(const ParsedJobDocument& a, const ParsedJobDocument& b);
 
-  /// Whether frame `index_a` of one and `index_b` of the other have the same pixels: they are
-  /// alike, and the means of as many sweeps. Indices are 0-based.
-  bool are_equal(std::size_t index_a, std::size_t index_b) const;
+  /// Whether frame `frame_a` of one and `frame_b` of the other have the same pixels: they are
+  /// alike, and the means of as many sweeps.
+  bool are_equal(FrameIndex frame_a, FrameIndex frame_b) const;
   /// Whether they show the same and, where samples are carried, so do all frames before; in later
   /// sweeps these are all frames.
-  bool are_alike(std::size_t index_a, std::size_t index_b) const;
+  bool are_alike(FrameIndex frame_a, FrameIndex frame_b) const;
   /// Whether frames with the same pixels are laid over the same plate, or over none.
-  bool have_one_plate(std::size_t index_a, std::size_t index_b) const;
+  bool have_one_plate(FrameIndex frame_a, FrameIndex frame_b) const;
   /// How many steps (common/job/sequence.h) from the first on are the same in both.
-  std::size_t num_common_steps() const;
+  std::int32_t num_common_steps() const;
   /// What differs in two frames that are not equal: "$.camera.keys", ...; "$.frames" where it is
   /// the frames before.
-  std::string difference(std::size_t index_a, std::size_t index_b) const;
+  std::string difference(FrameIndex frame_a, FrameIndex frame_b) const;
 
  private:
   struct Facts {
@@ -50,7 +50,7 @@ class FrameComparison {
   static std::vector<Facts> facts_of(const ParsedJobDocument& document);
   static std::vector<Digest> plates_of(const ParsedJobDocument& document);
 
-  std::vector<int> frames_a_, frames_b_;
+  std::vector<FrameNumber> frames_a_, frames_b_;
   std::size_t sweeps_a_, sweeps_b_;
   std::vector<Facts> a_, b_;
   std::vector<Digest> plates_a_, plates_b_;  ///< by frame; a digest of zeros: none

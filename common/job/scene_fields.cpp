@@ -117,11 +117,11 @@ void fields(JobArchive& a, EnvironmentKey& key) {
 }
 
 /// One key per frame of the job.
-void expand_numbered(const FileSequence& numbered, const std::vector<int>& frames,
+void expand_numbered(const FileSequence& numbered, const std::vector<FrameNumber>& frames,
                      std::vector<EnvironmentKey>& keys) {
   keys.clear();
-  for (const int frame : frames)
-    keys.push_back({static_cast<double>(frame), file_at(numbered, frame)});
+  for (const FrameNumber frame : frames)
+    keys.push_back({static_cast<double>(frame.value()), file_at(numbered, frame)});
 }
 
 /// Numbers at ascending frames; `name`: the key of the number.
@@ -197,7 +197,7 @@ void fields(JobArchive& a, SceneSpec& scene) {
          [&](FileSpec& file) { a.path(required("path"), file.path); });
 }
 
-void fields(JobArchive& a, EnvironmentSpec& environment, const std::vector<int>& frames) {
+void fields(JobArchive& a, EnvironmentSpec& environment, const std::vector<FrameNumber>& frames) {
   std::vector<EnvironmentKey>& keys = environment.keys;
   int forms = 0;
 

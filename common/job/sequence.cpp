@@ -23,50 +23,41 @@ double value_at(const std::vector<NumberKey>& keys, double frame) {
 
 }  // namespace
 
-double rotation_deg_at(const EnvironmentSpec& environment, int frame_number) {
-  if (!environment.rotation_keys.empty()) return value_at(environment.rotation_keys, frame_number);
+double rotation_deg_at(const EnvironmentSpec& environment, FrameNumber frame) {
+  if (!environment.rotation_keys.empty()) return value_at(environment.rotation_keys, frame.value());
   return environment.rotation_start_deg +
-         environment.rotation_deg_per_frame * (frame_number - environment.rotation_start_frame);
+         environment.rotation_deg_per_frame * (frame.value() - environment.rotation_start_frame);
 }
 
-EnvironmentFrame environment_at(const EnvironmentSpec& environment, int frame_number) {
+EnvironmentFrame environment_at(const EnvironmentSpec& environment, FrameNumber frame) {
   const std::vector<EnvironmentKey>& keys = environment.keys;
   EnvironmentFrame result;
 
   // The last key at or before the frame holds; before the first key the first one does. Between two
   // keys the texels are mixed linearly.
-  const KeySpan span = find_span(keys, frame_number);
+  const KeySpan span = find_span(keys, frame.value());
   result.map_a = result.map_b = static_cast<std::int32_t>(span.from);
   if (environment.interpolate) result.mix = static_cast<float>(span.share);
   if (result.mix > 0) result.map_b = static_cast<std::int32_t>(span.to);
   if (!environment.scale_keys.empty())
-    result.scale = static_cast<float>(value_at(environment.scale_keys, frame_number));
-  const double degrees = rotation_deg_at(environment, frame_number);
+    result.scale = static_cast<float>(value_at(environment.scale_keys, frame.value()));
+  const double degrees = rotation_deg_at(environment, frame);
   if (degrees != 0) result.rotation = rotation_about(environment.rotation_axis, degrees);
   return result;
 }
 
 std::vector<FrameSpec> expand_sequence(const JobSpec& job) {
   std::vector<FrameSpec> frames;
-  const std::int32_t end = num_steps(job);
-  frames.reserve(static_cast<std::size_t>(end));
-  for (std::int32_t step = 0; step < end; ++step) {
-    const int number = job.frames[static_cast<std::size_t>(frame_of_step(job, step))];
-    const auto sweep = step / static_cast<std::int32_t>(job.frames.size());
-    frames.push_back({.index = step,
+  const Timeline timeline(job);
+  frames.reserve(static_cast<std::size_t>(timeline.num_steps()));
+  for (Step step; step.value() < timeline.num_steps(); ++step) {
+    const FrameNumber number = job.frames[timeline.frame_of(step).index()];
+    frames.push_back({.step = step,
                       .number = number,
-                      .first_round = sweep * job.quality.rounds,
+                      .first_round = timeline.sweep_of(step).value() * job.quality.rounds,
                       .environment = environment_at(job.environment, number)});
   }
   return frames;
-}
-
-std::int32_t num_steps(const JobSpec& job) {
-  return static_cast<std::int32_t>(job.frames.size()) * job.quality.sweeps;
-}
-
-std::int32_t frame_of_step(const JobSpec& job, std::int32_t step) {
-  return step % static_cast<std::int32_t>(job.frames.size());
 }
 
 ImageSpec scaled(const ImageSpec& image, double scale) {
@@ -118,51 +109,8 @@ std::vector<std::int32_t> TileGrid::tiles_near(std::int32_t tile, std::int32_t r
   return tiles;
 }
 
-std::int32_t frames_per_run(const JobSpec& job) {
-  return shares_history(job) && carries_state(job) ? 1 : job.state.checkpoint_every;
-}
-
-std::vector<std::int32_t> run_starts(const JobSpec& job) {
-  const auto frames = static_cast<std::int32_t>(job.frames.size());
-  const std::int32_t end = num_steps(job);
-  std::vector<std::int32_t> starts = job.leading_runs;
-  std::erase_if(starts, [&](std::int32_t start) { return start >= end; });
-  if (starts.empty()) starts.push_back(0);
-  const std::int32_t length = frames_per_run(job);
-  while (true) {
-    const std::int32_t frame = starts.back() % frames, sweep = starts.back() - frame;
-    const std::int32_t next = sweep + std::min((frame / length + 1) * length, frames);
-    if (next >= end) return starts;
-    starts.push_back(next);
-  }
-}
-
-std::int32_t num_runs(const JobSpec& job) {
-  if (!job.leading_runs.empty()) return static_cast<std::int32_t>(run_starts(job).size());
-  const auto frames = static_cast<std::int32_t>(job.frames.size());
-  return (frames + frames_per_run(job) - 1) / frames_per_run(job) * job.quality.sweeps;
-}
-
-std::int32_t runs_per_checkpoint(const JobSpec& job) {
-  return (job.state.checkpoint_every + frames_per_run(job) - 1) / frames_per_run(job);
-}
-
-bool ends_in_checkpoint(const JobSpec& job, std::int32_t run) {
-  return carries_state(job) &&
-         ((run + 1) % runs_per_checkpoint(job) == 0 || run + 1 == num_runs(job));
-}
-
-TileRun tile_run(const JobSpec& job, std::int32_t tile, std::int32_t run) {
-  const std::vector<std::int32_t> starts = run_starts(job);
-  const auto r = static_cast<std::size_t>(run);
-  BATON_CHECK(run >= 0 && r < starts.size());
-  return {tile, run, starts[r], (r + 1 < starts.size() ? starts[r + 1] : num_steps(job)) - 1};
-}
-
-std::size_t num_common_frames(const JobSpec& a, const JobSpec& b) {
-  const auto end =
-      std::mismatch(a.frames.begin(), a.frames.end(), b.frames.begin(), b.frames.end());
-  return static_cast<std::size_t>(end.first - a.frames.begin());
+TileRun tile_run(const JobSpec& job, std::int32_t tile, Run run) {
+  return {tile, run, Timeline(job).steps_of(run)};
 }
 
 bool carries_state(const JobSpec& job) {
@@ -234,17 +182,17 @@ std::int32_t exchange_reach_px(const VisibilitySpec& visibility) {
   return visibility.tile_size - 1 + visibility.dilate;
 }
 
-std::vector<int> pick_frames(const std::vector<int>& frames, std::size_t count) {
+std::vector<FrameNumber> pick_frames(const std::vector<FrameNumber>& frames, std::size_t count) {
   if (frames.size() <= count) return frames;
-  std::vector<int> picked;
+  std::vector<FrameNumber> picked;
   for (std::size_t i = 0; i < count; ++i)
     picked.push_back(frames[i * (frames.size() - 1) / (count - 1)]);
   return picked;
 }
 
-std::filesystem::path frame_path(const JobSpec& job, std::int32_t frame_index) {
-  const int number = job.frames.at(static_cast<std::size_t>(frame_index));
-  return std::filesystem::path(job.output.directory) / frame_file_name(job.output.pattern, number);
+std::filesystem::path frame_path(const JobSpec& job, FrameIndex frame) {
+  const FrameNumber number = job.frames.at(frame.index());
+  return std::filesystem::path(job.output.directory) / frame_file_name(job.output.pattern, number.value());
 }
 
 }  // namespace baton

@@ -8,6 +8,8 @@
 #include <vector>
 
 #include "common/job/job_spec.h"
+#include "common/job/time.h"
+#include "common/job/timeline.h"
 #include "common/math/pixel_rect.h"
 
 namespace baton {
@@ -29,24 +31,22 @@ struct EnvironmentFrame {
   }
 };
 
-/// What the environment is at a frame, by the user's number; at least one key.
-EnvironmentFrame environment_at(const EnvironmentSpec& environment, int frame_number);
+/// What the environment is at a frame; at least one key.
+EnvironmentFrame environment_at(const EnvironmentSpec& environment, FrameNumber frame);
 /// By how much it is turned about its axis, degrees.
-double rotation_deg_at(const EnvironmentSpec& environment, int frame_number);
+double rotation_deg_at(const EnvironmentSpec& environment, FrameNumber frame);
 
-/// What is particular to one frame of the sequence.
+/// What is particular to one step of the sequence.
 struct FrameSpec {
-  std::int32_t index = 0;        ///< 0-based position in the sequence: the step
-  std::int32_t number = 1;       ///< the user's frame number
+  Step step{};
+  FrameNumber number{1};
   std::int32_t first_round = 0;  ///< rounds of this frame that were rendered in earlier sweeps
   EnvironmentFrame environment;
+
+  /// Number of a round among those of the frame over all sweeps: the address of its random numbers.
+  std::int32_t round_of_frame(Round round) const { return first_round + round.value(); }
 };
 
-/// A job renders its frames quality.sweeps times over. A *step* is one of these renderings: step s
-/// is frame index s % frames of sweep s / frames. What is carried goes from step to step.
-std::int32_t num_steps(const JobSpec& job);
-/// The frame index of a step.
-std::int32_t frame_of_step(const JobSpec& job, std::int32_t step);
 /// One FrameSpec per step of the job, in order.
 std::vector<FrameSpec> expand_sequence(const JobSpec& job);
 
@@ -70,41 +70,18 @@ class TileGrid {
   std::int32_t tile_size_, columns_, rows_;
 };
 
-/// The unit that a lease hands out: one tile for steps [first_frame, last_frame] (inclusive) of one
-/// sweep. Consecutive runs of a tile are chained by the sample state when the job carries it.
+/// The unit that a lease hands out: one tile for the steps of a run. Consecutive runs of a tile are
+/// chained by the sample state when the job carries it.
 struct TileRun {
   std::int32_t tile = 0;
-  std::int32_t run = 0;  ///< 0-based; run r covers the steps from run_starts(job)[r]
-  std::int32_t first_frame = 0;
-  std::int32_t last_frame = 0;
+  Run run{};
+  StepSpan steps{};
 
-  auto operator<=>(const TileRun&) const = default;
+  bool operator==(const TileRun&) const = default;
 };
+/// run in [0, num_runs(job)), tile in [0, TileGrid(job.image).count()).
+TileRun tile_run(const JobSpec& job, std::int32_t tile, Run run);
 
-/// Frames or steps of a sequence: 0-based indices, inclusive.
-struct FrameSpan {
-  std::int32_t first = 0;
-  std::int32_t last = 0;
-};
-
-/// Frames of a run: state.checkpoint_every, or 1 where pixels take samples from others, since a
-/// tile then needs its neighbours.
-std::int32_t frames_per_run(const JobSpec& job);
-/// First steps of the runs that cover the sequence (0-based, ascending, from 0): those of
-/// job.leading_runs, and after the last of them every multiple of frames_per_run in a sweep.
-std::vector<std::int32_t> run_starts(const JobSpec& job);
-/// Their number.
-std::int32_t num_runs(const JobSpec& job);
-/// Runs from one checkpoint to the next: those in state.checkpoint_every frames.
-std::int32_t runs_per_checkpoint(const JobSpec& job);
-/// Whether what is lost later is made again from the states of this run, or they are the job's
-/// last: those must be durable, all else that tasks hand to each other can be made again.
-bool ends_in_checkpoint(const JobSpec& job, std::int32_t run);
-/// The run's steps; run in [0, num_runs(job)), tile in [0, TileGrid(job.image).count()).
-TileRun tile_run(const JobSpec& job, std::int32_t tile, std::int32_t run);
-/// How many frames from the first on two jobs have in common. Where samples are carried, only these
-/// have the same history.
-std::size_t num_common_frames(const JobSpec& a, const JobSpec& b);
 /// True when the method hands something from frame to frame and state.carry lets it.
 bool carries_state(const JobSpec& job);
 /// Whether pixels weigh the samples of their neighbours: `restir` with neighbours.
@@ -142,9 +119,9 @@ std::int32_t num_populations(const JobSpec& job);
 std::int32_t exchange_reach_px(const VisibilitySpec& visibility);
 
 /// At most `count` (> 1) of `frames`, evenly picked, the first and the last among them.
-std::vector<int> pick_frames(const std::vector<int>& frames, std::size_t count);
+std::vector<FrameNumber> pick_frames(const std::vector<FrameNumber>& frames, std::size_t count);
 
-/// Where frame `frame_index` (0-based) of the job is written.
-std::filesystem::path frame_path(const JobSpec& job, std::int32_t frame_index);
+/// Where a frame of the job is written.
+std::filesystem::path frame_path(const JobSpec& job, FrameIndex frame);
 
 }  // namespace baton

@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <type_traits>
 
+#include "common/base/check.h"
 #include "common/base/members.h"
 
 namespace baton {
@@ -31,14 +32,37 @@ std::string_view task_name(TaskKind kind) {
   return kNames.at(static_cast<std::size_t>(kind));
 }
 
+Run TaskKey::run() const {
+  BATON_CHECK(kind == TaskKind::render);
+  return Run(position);
+}
+
+FrameIndex TaskKey::frame() const {
+  BATON_CHECK(kind == TaskKind::assemble);
+  return FrameIndex(position);
+}
+
+Step TaskKey::step() const {
+  BATON_CHECK(kind == TaskKind::second_pass);
+  return Step(position);
+}
+
+TaskKey render_task(Run run, std::int32_t tile) { return {TaskKind::render, run.value(), tile}; }
+
+TaskKey assemble_task(FrameIndex frame) { return {TaskKind::assemble, frame.value(), 0}; }
+
+TaskKey second_pass_task(Step step, std::int32_t tile) {
+  return {TaskKind::second_pass, step.value(), tile};
+}
+
 std::string describe_task(const TaskKey& task) {
   switch (task.kind) {
     case TaskKind::render:
-      return fmt::format("run {} of tile {}", task.step, task.tile);
+      return fmt::format("run {} of tile {}", task.run(), task.tile);
     case TaskKind::assemble:
-      return fmt::format("assembly of frame index {}", task.step);
+      return fmt::format("assembly of frame index {}", task.frame());
     case TaskKind::second_pass:
-      return fmt::format("second pass of tile {} frame index {}", task.tile, task.step);
+      return fmt::format("second pass of tile {} frame index {}", task.tile, task.step());
   }
   return "unknown task";
 }
@@ -48,8 +72,18 @@ std::string_view blob_kind_name(BlobKind kind) {
   return kNames.at(static_cast<std::size_t>(kind));
 }
 
-Digest held_state_name(const Digest& job, std::int32_t frame, std::int32_t tile) {
-  return digest_of(fmt::format("{} holds frame {} tile {}", job.hex(), frame, tile));
+FrameIndex BlobRef::frame() const {
+  BATON_CHECK(kind == BlobKind::image);
+  return FrameIndex(position);
+}
+
+Step BlobRef::step() const {
+  BATON_CHECK(kind != BlobKind::image);
+  return Step(position);
+}
+
+Digest held_state_name(const Digest& job, Step step, std::int32_t tile) {
+  return digest_of(fmt::format("{} holds frame {} tile {}", job.hex(), step, tile));
 }
 
 std::vector<Digest> stored_blobs(const std::vector<BlobRef>& blobs) {

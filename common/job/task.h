@@ -7,6 +7,7 @@
 #include <vector>
 
 #include "common/base/digest.h"
+#include "common/job/time.h"
 
 namespace baton {
 
@@ -16,35 +17,44 @@ namespace baton {
 
 /// What a task does. Stored and sent; values are for ever.
 enum class TaskKind : std::uint8_t {
-  render = 0,  ///< one TileRun: step is the run, tile the tile
-  assemble =
-      1,  ///< one frame's EXR from its tile films: step is the 0-based frame index, tile is 0
-  second_pass = 2,  ///< one tile of one frame: step is the 0-based frame index, tile the tile
+  render = 0,       ///< one TileRun
+  assemble = 1,     ///< the EXR of one frame from its tile films
+  second_pass = 2,  ///< one tile of one step
 };
 constexpr TaskKind last_of(TaskKind) { return TaskKind::second_pass; }
 /// "render", "assemble", "second pass".
 std::string_view task_name(TaskKind kind);
 
+/// A task of a job. Made by the three functions below, read by run(), frame() and step().
 struct TaskKey {
   TaskKind kind = TaskKind::render;
-  std::int32_t step = 0;
-  std::int32_t tile = 0;
+  std::int32_t position = 0;  ///< a Run, a FrameIndex or a Step, as `kind` says
+  std::int32_t tile = 0;      ///< of an assembly 0
 
   auto operator<=>(const TaskKey&) const = default;
+  /// Of a render task.
+  Run run() const;
+  /// Of an assembly.
+  FrameIndex frame() const;
+  /// Of a second pass.
+  Step step() const;
 };
+TaskKey render_task(Run run, std::int32_t tile);
+TaskKey assemble_task(FrameIndex frame);
+TaskKey second_pass_task(Step step, std::int32_t tile);
 /// "run 3 of tile 7", "assembly of frame index 5": the task in words, steps and tiles 0-based.
 std::string describe_task(const TaskKey& task);
 
-/// A blob that a task needs or made. `frame` is a 0-based index; of states, films and first-pass
-/// samples that of a step (common/job/sequence.h). Stored and sent; values are for ever.
+/// What a blob is. Stored and sent; values are for ever.
 enum class BlobKind : std::uint8_t { state = 0, film = 1, image = 2, first_pass = 3 };
 constexpr BlobKind last_of(BlobKind) { return BlobKind::first_pass; }
 /// "state", "film", "image", "first-pass samples".
 std::string_view blob_kind_name(BlobKind kind);
 
+/// A blob that a task needs or made.
 struct BlobRef {
   BlobKind kind = BlobKind::state;
-  std::int32_t frame = 0;
+  std::int32_t position = 0;  ///< of an image its FrameIndex, else its Step
   std::int32_t tile = 0;
   Digest digest;  ///< for `image`: digest of the EXR file in the output folder
   std::uint64_t size_bytes = 0;
@@ -52,6 +62,10 @@ struct BlobRef {
   /// A state without bytes in the store: it is in the memory of the worker that made it, where
   /// `digest` names it (held_state_name).
   bool is_held() const { return kind == BlobKind::state && size_bytes == 0; }
+  /// Of an image.
+  FrameIndex frame() const;
+  /// Of a state, a film or first-pass samples.
+  Step step() const;
 
   auto operator<=>(const BlobRef&) const = default;
 };
@@ -63,9 +77,9 @@ struct PublishedState {
   bool operator==(const PublishedState&) const = default;
 };
 
-/// Names the state of a tile and frame (0-based) of a job that is held: nothing of it is packed, so
-/// it has no digest of bytes.
-Digest held_state_name(const Digest& job, std::int32_t frame, std::int32_t tile);
+/// Names the state of a tile and step of a job that is held: nothing of it is packed, so it has no
+/// digest of bytes.
+Digest held_state_name(const Digest& job, Step step, std::int32_t tile);
 
 /// Those of the blobs that lie in the store: neither frames nor held states.
 std::vector<Digest> stored_blobs(const std::vector<BlobRef>& blobs);
@@ -144,16 +158,28 @@ struct FrameQuality {
   bool operator==(const FrameQuality&) const = default;
 };
 
-/// The sampling of one tile in one frame, or what was seen of the whole frame.
+/// The sampling of one tile in one step, or what was seen of the whole frame when it was written.
 struct FrameStats {
-  std::int32_t frame = 0;  ///< 0-based index
+  std::int32_t position = 0;  ///< the Step of a render task, the FrameIndex of an assembly
   std::int32_t tile = 0;
   SamplingStats sampling;
   FrameQuality quality = {};
 
   bool operator==(const FrameStats&) const = default;
-  /// Adds another tile's sampling, or takes the frame's quality. Place and number stay.
+  Step step() const { return Step(position); }
+  FrameIndex frame() const { return FrameIndex(position); }
+  /// Adds another tile's sampling, or takes the frame's quality. Position and tile stay.
   void merge(const FrameStats& b);
+};
+
+/// All tiles of a frame together, as people are told.
+struct FrameReport {
+  FrameNumber frame{};
+  std::int32_t tile = -1;  ///< none
+  SamplingStats sampling;
+  FrameQuality quality = {};
+
+  bool operator==(const FrameReport&) const = default;
 };
 
 /// Counters that workers add up and `baton job show` prints; merging is addition.

@@ -81,9 +81,9 @@ struct WorkerWelcome {
 struct LeaseGrant {
   LeaseId lease;
   std::vector<BlobRef> inputs;
-  std::int32_t first_frame = 0, last_frame = 0;  ///< of the task, 0-based, inclusive
-  bool may_hold = false;         ///< the task's state may stay in the worker's memory
-  std::int32_t states_from = 0;  ///< states of earlier frames (0-based) are needed by no task
+  StepSpan steps{};       ///< of a render task; of another the position of its key, twice
+  bool may_hold = false;  ///< the task's state may stay in the worker's memory
+  Step states_from{};     ///< states of earlier steps are needed by no task
   double expected_seconds = 0;   ///< of CPU time, as the longest of late; 0: not known
 };
 /// Others wait for these states, which the worker holds: they should go into the store.
@@ -173,10 +173,9 @@ struct JobList {
 };
 struct JobDetail {
   JobSummary summary;
-  std::vector<std::int32_t> frames_done;  ///< user's frame numbers
+  std::vector<FrameNumber> frames_done;
   std::vector<std::string> failures;      ///< newest last, at most 100
-  std::vector<FrameStats> frames =
-      {};                  ///< of each frame so far: frame is the user's number, tile -1
+  std::vector<FrameReport> frames = {};  ///< of each frame so far
   std::string waits = {};  ///< for what, where it does
   std::string plan = {};   ///< of the answer to ResumeJob: as JobAccepted's
   /// It waits for room in the store, and nothing that is in work will make some.

@@ -96,8 +96,8 @@ std::vector<std::string> geometry_warnings(const JobSpec& job, const Scene& scen
   std::vector<BoxCorners> boxes;
   for (const TriangleMesh& mesh : scene.meshes) boxes.push_back(corners_of(mesh.positions));
   std::vector<Sight> best(scene.instances.size(), Sight::behind);
-  for (const int frame : pick_frames(job.frames, kMostFrames)) {
-    const Pose pose = pose_at(scene, job, frame);
+  for (const FrameNumber frame : pick_frames(job.frames, kMostFrames)) {
+    const Pose pose = pose_at(scene, job, frame.value());
     const View view(pose.camera, job.image);
     for (std::size_t i = 0; i < best.size(); ++i) {
       const std::uint32_t mesh = pose.instances[i].mesh;

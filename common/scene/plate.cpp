@@ -38,8 +38,8 @@ std::uint64_t repair(RgbImage& image) {
 
 }  // namespace
 
-Result<Plate> load_plate(const JobSpec& job, int frame_number) {
-  const std::string path = file_at(*job.output.plate, frame_number);
+Result<Plate> load_plate(const JobSpec& job, FrameNumber frame) {
+  const std::string path = file_at(*job.output.plate, frame);
   BATON_ASSIGN(RgbImage plate, read_picture(path));
   const std::uint64_t repaired = repair(plate);
 

@@ -20,7 +20,7 @@ struct Plate {
 /// is the mean of the file over it. Linear Rec. 709; integers are taken as sRGB, alpha is dropped.
 /// What is NaN or infinite becomes 0, what is below zero stays. Errors name the file: missing, not
 /// an image, smaller than the picture or of another shape.
-Result<Plate> load_plate(const JobSpec& job, int frame_number);
+Result<Plate> load_plate(const JobSpec& job, FrameNumber frame);
 
 /// Whether a plate is an EXR or Radiance HDR file, whose header may say what its numbers are
 /// (read_picture_colors); by its name.

@@ -47,11 +47,12 @@ Status decode_meta(const SectionFile& file, const std::string& name, FirstPassSa
   ByteReader reader(payload);
   s.picture.high = reader.get<std::uint64_t>();
   s.picture.low = reader.get<std::uint64_t>();
-  for (std::int32_t* value : {&s.frame_index, &s.tile, &s.rect.x0, &s.rect.y0, &s.rect.x1,
+  s.step = Step(reader.get<std::int32_t>());
+  for (std::int32_t* value : {&s.tile, &s.rect.x0, &s.rect.y0, &s.rect.x1,
                               &s.rect.y1, &s.num_slots, &s.num_populations}) {
     *value = reader.get<std::int32_t>();
   }
-  const bool good = s.frame_index >= 0 && s.frame_index < limits::kMaxFrames && s.tile >= 0 &&
+  const bool good = s.step >= Step(0) && s.step < Step(limits::kMaxFrames) && s.tile >= 0 &&
                     s.rect.fits_within(limits::kMaxImageSide, limits::kMaxOverscan) &&
                     s.num_slots >= 1 && s.num_slots <= limits::kMaxParticles &&
                     (s.num_populations == 1 || s.num_populations == 2) &&
@@ -61,7 +62,7 @@ Status decode_meta(const SectionFile& file, const std::string& name, FirstPassSa
                fmt::format("{}: section META: frame index {}, tile {}, rectangle [{}, {}) x [{}, "
                            "{}), {} samples in {} "
                            "populations, expected values within the limits",
-                           name, s.frame_index, s.tile, s.rect.x0, s.rect.x1, s.rect.y0, s.rect.y1,
+                           name, s.step, s.tile, s.rect.x0, s.rect.x1, s.rect.y0, s.rect.y1,
                            s.num_slots, s.num_populations)};
 }
 
@@ -142,7 +143,7 @@ Bytes encode_first_pass_samples(const FirstPassSamples& s) {
   ByteWriter meta;
   meta.put(s.picture.high);
   meta.put(s.picture.low);
-  for (const std::int32_t value : {s.frame_index, s.tile, s.rect.x0, s.rect.y0, s.rect.x1,
+  for (const std::int32_t value : {s.step.value(), s.tile, s.rect.x0, s.rect.y0, s.rect.x1,
                                    s.rect.y1, s.num_slots, s.num_populations}) {
     meta.put(value);
   }

@@ -7,6 +7,7 @@
 #include "common/base/bytes.h"
 #include "common/base/digest.h"
 #include "common/base/result.h"
+#include "common/job/time.h"
 #include "common/math/octahedral.h"
 #include "common/math/pixel_rect.h"
 
@@ -21,7 +22,7 @@ struct FirstPassSamples {
   static constexpr std::uint8_t kFailed[2] = {2, 4};
 
   Digest picture;                ///< of the job (picture_digest)
-  std::int32_t frame_index = 0;  ///< 0-based
+  Step step{};
   std::int32_t tile = 0;
   PixelRect rect;
   std::int32_t num_slots = 0;        ///< N: samples of a pixel, of all populations

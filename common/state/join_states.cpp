@@ -9,7 +9,7 @@ namespace {
 
 /// Whether two states are of one frame and hold the same things.
 bool are_alike(const SampleState& a, const SampleState& b) {
-  return a.picture == b.picture && a.frame_index == b.frame_index &&
+  return a.picture == b.picture && a.step == b.step &&
          a.num_particles == b.num_particles && a.num_populations == b.num_populations &&
          a.memory.empty() == b.memory.empty() && a.confidence.empty() == b.confidence.empty();
 }
@@ -56,7 +56,7 @@ Result<SampleState> join_states(std::span<const SampleState* const> parts, const
   const SampleState& model = *parts.front();
   SampleState joined;
   joined.picture = model.picture;
-  joined.frame_index = model.frame_index;
+  joined.step = model.step;
   joined.tile = tile;
   joined.resize(rect, model.num_particles, model.num_populations);
   if (!model.memory.empty()) joined.add_memory();

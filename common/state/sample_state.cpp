@@ -127,7 +127,7 @@ Bytes encode_meta(const SampleState& state) {
   ByteWriter writer;
   writer.put(state.picture.high);
   writer.put(state.picture.low);
-  for (const std::int32_t value : {state.frame_index, state.tile, state.rect.x0, state.rect.y0,
+  for (const std::int32_t value : {state.step.value(), state.tile, state.rect.x0, state.rect.y0,
                                    state.rect.x1, state.rect.y1, state.num_particles}) {
     writer.put(value);
   }
@@ -140,7 +140,8 @@ Status decode_meta(const SectionFile& file, const std::string& name, SampleState
   ByteReader reader(payload);
   state.picture.high = reader.get<std::uint64_t>();
   state.picture.low = reader.get<std::uint64_t>();
-  for (std::int32_t* value : {&state.frame_index, &state.tile, &state.rect.x0, &state.rect.y0,
+  state.step = Step(reader.get<std::int32_t>());
+  for (std::int32_t* value : {&state.tile, &state.rect.x0, &state.rect.y0,
                               &state.rect.x1, &state.rect.y1, &state.num_particles}) {
     *value = reader.get<std::int32_t>();
   }
@@ -150,8 +151,8 @@ Status decode_meta(const SectionFile& file, const std::string& name, SampleState
     return Error{ErrorKind::bad_input, fmt::format("{}: section META: {}", name, what)};
   };
   const PixelRect& rect = state.rect;
-  if (state.frame_index < 0 || state.frame_index >= limits::kMaxFrames || state.tile < 0) {
-    return fail(fmt::format("frame index {}, tile {}", state.frame_index, state.tile));
+  if (state.step < Step(0) || state.step >= Step(limits::kMaxFrames) || state.tile < 0) {
+    return fail(fmt::format("frame index {}, tile {}", state.step, state.tile));
   }
   if (!rect.fits_within(limits::kMaxImageSide, limits::kMaxOverscan)) {
     return fail(fmt::format("rectangle [{}, {}) x [{}, {}), expected a non-empty one within {}..{}",

@@ -9,6 +9,7 @@
 #include "common/base/digest.h"
 #include "common/base/result.h"
 #include "common/base/section_file.h"
+#include "common/job/time.h"
 #include "common/math/octahedral.h"
 #include "common/math/pixel_rect.h"
 #include "common/state/pixel_memory.h"
@@ -30,8 +31,8 @@ enum class PixelSource : std::uint8_t {
 /// site) and are traced again. A background pixel carries nothing: every array is 0 there, and the
 /// file leaves it out.
 struct SampleState {
-  Digest picture;                ///< of the job (picture_digest)
-  std::int32_t frame_index = 0;  ///< 0-based; the frame that these samples belong to
+  Digest picture;  ///< of the job (picture_digest)
+  Step step{};     ///< that the samples belong to
   std::int32_t tile = 0;
   PixelRect rect;
   std::int32_t num_particles = 0;  ///< N: of all populations; 0 where only a memory is carried

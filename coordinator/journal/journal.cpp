@@ -152,11 +152,21 @@ Result<JournalledJob> Journal::load(const Digest& digest) {
   return result;
 }
 
-Result<std::vector<FrameStats>> Journal::frame_stats(const Digest& job, TaskKind kind,
-                                                     std::int32_t step) {
+Result<std::vector<FrameStats>> Journal::run_stats(const Digest& job, Run run) {
+  return stats_of(job, TaskKind::render, run.value());
+}
+
+Result<std::optional<FrameStats>> Journal::frame_stats(const Digest& job, FrameIndex frame) {
+  BATON_ASSIGN(const std::vector<FrameStats> all, stats_of(job, TaskKind::assemble, frame.value()));
+  return all.empty() ? std::nullopt : std::optional(all.front());
+}
+
+/// What all tasks of a kind and position have recorded of their steps or frame.
+Result<std::vector<FrameStats>> Journal::stats_of(const Digest& job, TaskKind kind,
+                                                  std::int32_t position) {
   BATON_ASSIGN(SqlStatement query, database_.prepare("SELECT frames FROM completions "
                                                      "WHERE job = ? AND kind = ? AND step = ?"));
-  query.bind(job).bind(kind).bind(step);
+  query.bind(job).bind(kind).bind(position);
   std::vector<FrameStats> all;
   while (true) {
     BATON_ASSIGN(const bool row, query.step());
@@ -192,7 +202,7 @@ Result<std::vector<Failure>> Journal::recent_failures(const Digest& job, int cou
 Result<Completion> Journal::read_completion(const SqlStatement& row) const {
   Completion completion;
   BATON_TRY(read_enum(database_, row.integer(0), "completions.kind", completion.task.kind));
-  completion.task.step = static_cast<std::int32_t>(row.integer(1));
+  completion.task.position = static_cast<std::int32_t>(row.integer(1));
   completion.task.tile = static_cast<std::int32_t>(row.integer(2));
   BATON_TRY(read_blob(database_, row.blob(3), "completions.outputs", completion.outputs));
   BATON_TRY(read_blob(database_, row.blob(4), "completions.stats", completion.stats));
@@ -261,7 +271,7 @@ Status Journal::record_completion(const Digest& job, const Completion& completio
   return change(
       "INSERT OR REPLACE INTO completions (job, kind, step, tile, outputs, stats, frames) "
       "VALUES (?, ?, ?, ?, ?, ?, ?)",
-      job, task.kind, task.step, task.tile, to_bytes(completion.outputs),
+      job, task.kind, task.position, task.tile, to_bytes(completion.outputs),
       to_bytes(completion.stats), to_bytes(completion.frames));
 }
 
@@ -269,7 +279,7 @@ Status Journal::record_outputs(const Digest& job, const TaskKey& task,
                                const std::vector<BlobRef>& outputs) {
   return change(
       "UPDATE completions SET outputs = ? WHERE job = ? AND kind = ? AND step = ? AND tile = ?",
-      to_bytes(outputs), job, task.kind, task.step, task.tile);
+      to_bytes(outputs), job, task.kind, task.position, task.tile);
 }
 
 Status Journal::record_failure(const Failure& failure) {
@@ -282,7 +292,7 @@ Status Journal::record_failure(const Failure& failure) {
 Status Journal::record_reopened(const Digest& job, const std::vector<TaskKey>& tasks) {
   for (const TaskKey& task : tasks) {
     BATON_TRY(change("DELETE FROM completions WHERE job = ? AND kind = ? AND step = ? AND tile = ?",
-                     job, task.kind, task.step, task.tile));
+                     job, task.kind, task.position, task.tile));
   }
   return {};
 }

@@ -60,9 +60,10 @@ class Journal {
   Status record_owner(const Digest& job, const std::string& owner);
   /// nullopt: no such job.
   Result<std::optional<std::string>> document(const Digest& job);
-  /// What the tasks of one kind and step recorded of frames so far, in no order: those of a run for
-  /// each frame and tile what the sampler did, an assembly what was seen of its frame.
-  Result<std::vector<FrameStats>> frame_stats(const Digest& job, TaskKind kind, std::int32_t step);
+  /// What the sampler did, for each step of a run and tile that is recorded so far; in no order.
+  Result<std::vector<FrameStats>> run_stats(const Digest& job, Run run);
+  /// What was seen of a frame when it was put together; nullopt: it is not, or nothing was told.
+  Result<std::optional<FrameStats>> frame_stats(const Digest& job, FrameIndex frame);
   /// Every completion of a job, in the archive or not, in the order in which they were recorded.
   Status for_each_completion(const Digest& job,
                              const std::function<Status(const Completion&)>& visit);
@@ -122,6 +123,7 @@ class Journal {
   Status visit_recorded(const Digest& job, const std::function<Status(const Completion&)>& visit);
   Status visit_archived(const Digest& job, const std::function<Status(const Completion&)>& visit);
   Result<std::vector<Digest>> read_digests(SqlStatement& query) const;
+  Result<std::vector<FrameStats>> stats_of(const Digest& job, TaskKind kind, std::int32_t position);
   Result<SqlStatement*> read(std::string_view sql);
   Result<SqlStatement*> write(std::string_view sql);
   /// Runs a statement within a transaction, bound to these values.

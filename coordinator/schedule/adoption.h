@@ -20,8 +20,8 @@ struct FormerJob {
 
 /// What is there of what former jobs have made.
 struct KeptFiles {
-  /// Whether the file of the new job's frame `frame_index` has this size and digest.
-  std::function<bool(std::int32_t frame_index, const BlobRef& image)> has_frame;
+  /// Whether the file of this frame of the new job has this size and digest.
+  std::function<bool(FrameIndex frame, const BlobRef& image)> has_frame;
   std::function<bool(const BlobRef& blob)> has_blob;
 };
 
@@ -32,8 +32,8 @@ struct Adoption {
   std::vector<TaskKey> tasks;    ///< of that one, which count as the new job's under their keys
   std::vector<TaskKey> settled;  ///< done without outputs until something of them is needed
   JobPlan plan;
-  bool other_plates = false;       ///< frames are written anew, as they lie over other plates
-  std::vector<std::int32_t> lost;  ///< frames that were written and are not there, by index
+  bool other_plates = false;     ///< frames are written anew, as they lie over other plates
+  std::vector<FrameIndex> lost;  ///< frames that were written and are not there
 
   bool empty() const { return images.empty() && tasks.empty() && plan.cuts.empty(); }
 };

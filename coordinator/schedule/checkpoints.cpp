@@ -10,18 +10,18 @@ Checkpoints::Checkpoints(const JobGraph& graph)
       num_runs_(graph.num_runs()),
       num_tiles_(graph.num_tiles()),
       tiles_per_stage_(graph.shares_history() ? static_cast<std::size_t>(num_tiles_) : 1),
-      stages_per_step_(static_cast<std::size_t>(num_tiles_) / tiles_per_stage_) {
+      stages_per_row_(static_cast<std::size_t>(num_tiles_) / tiles_per_stage_) {
   if (!graph.carries_state()) return;
-  const std::int32_t num_steps = (num_runs_ + runs_per_stage_ - 1) / runs_per_stage_;
-  stages_.resize(static_cast<std::size_t>(num_steps) * stages_per_step_);
-  for (std::int32_t run = 0; run < num_runs_; ++run) {
+  const std::int32_t num_rows = (num_runs_ + runs_per_stage_ - 1) / runs_per_stage_;
+  stages_.resize(static_cast<std::size_t>(num_rows) * stages_per_row_);
+  for (Run run{0}; run < Run(num_runs_); ++run) {
     for (std::int32_t tile = 0; tile < num_tiles_; ++tile)
-      ++stages_[stage_of({TaskKind::render, run, tile})].open;
+      ++stages_[stage_of(render_task(run, tile))].open;
   }
 }
 
 std::size_t Checkpoints::stage_of(const TaskKey& render) const {
-  return static_cast<std::size_t>(render.step / runs_per_stage_) * stages_per_step_ +
+  return static_cast<std::size_t>(render.run().value() / runs_per_stage_) * stages_per_row_ +
          static_cast<std::size_t>(render.tile) / tiles_per_stage_;
 }
 
@@ -33,9 +33,10 @@ bool Checkpoints::is_over(std::size_t stage) const {
 bool Checkpoints::keeps(const TaskKey& render) const {
   if (stages_.empty()) return false;
   const std::size_t stage = stage_of(render);
-  if (render.step + 1 == num_runs_) return !stages_[stage].let_go;
-  if ((render.step + 1) % runs_per_stage_ != 0) return false;
-  return stage + stages_per_step_ < stages_.size() && !stages_[stage].let_go;
+  const std::int32_t end = render.run().value() + 1;
+  if (end == num_runs_) return !stages_[stage].let_go;
+  if (end % runs_per_stage_ != 0) return false;
+  return stage + stages_per_row_ < stages_.size() && !stages_[stage].let_go;
 }
 
 bool Checkpoints::keeps_between(const TaskKey& render) const {
@@ -44,13 +45,13 @@ bool Checkpoints::keeps_between(const TaskKey& render) const {
 
 void Checkpoints::let_between_go(std::size_t stage, std::vector<TaskKey>& gone) {
   if (std::exchange(stages_[stage].between_let_go, true)) return;
-  const auto step = static_cast<std::int32_t>(stage / stages_per_step_);
+  const auto row = static_cast<std::int32_t>(stage / stages_per_row_);
   const auto count = static_cast<std::int32_t>(tiles_per_stage_);
-  const std::int32_t first = static_cast<std::int32_t>(stage % stages_per_step_) * count;
-  const std::int32_t end = std::min((step + 1) * runs_per_stage_, num_runs_);
-  for (std::int32_t run = step * runs_per_stage_; run < end; ++run) {
+  const std::int32_t first = static_cast<std::int32_t>(stage % stages_per_row_) * count;
+  const Run end{std::min((row + 1) * runs_per_stage_, num_runs_)};
+  for (Run run{row * runs_per_stage_}; run < end; ++run) {
     for (std::int32_t tile = first; tile < first + count; ++tile) {
-      const TaskKey render{TaskKind::render, run, tile};
+      const TaskKey render = render_task(run, tile);
       if (!is_checkpoint(render)) gone.push_back(render);
     }
   }
@@ -69,18 +70,18 @@ std::vector<TaskKey> Checkpoints::complete(const TaskKey& render) {
 
   // Of the two checkpoints before.
   for (std::int32_t back = 1; back <= 2; ++back) {
-    const std::int32_t step = render.step / runs_per_stage_ - back;
-    if (step < 0) break;
-    const std::int32_t run = (step + 1) * runs_per_stage_ - 1;
-    const std::size_t stage = stage_of({TaskKind::render, run, render.tile});
-    if (stages_[stage].let_go || !is_over(stage + stages_per_step_) ||
-        !is_over(stage + 2 * stages_per_step_))
+    const std::int32_t row = render.run().value() / runs_per_stage_ - back;
+    if (row < 0) break;
+    const Run run{(row + 1) * runs_per_stage_ - 1};
+    const std::size_t stage = stage_of(render_task(run, render.tile));
+    if (stages_[stage].let_go || !is_over(stage + stages_per_row_) ||
+        !is_over(stage + 2 * stages_per_row_))
       continue;
     stages_[stage].let_go = true;
     const auto count = static_cast<std::int32_t>(tiles_per_stage_);
     const std::int32_t first = render.tile / count * count;
     for (std::int32_t tile = first; tile < first + count; ++tile)
-      gone.push_back({TaskKind::render, run, tile});
+      gone.push_back(render_task(run, tile));
   }
   return gone;
 }

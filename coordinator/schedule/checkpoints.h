@@ -23,7 +23,8 @@ class Checkpoints {
   bool keeps(const TaskKey& render) const;
   /// Whether it is at a checkpoint, or a result; else it is between two.
   bool is_checkpoint(const TaskKey& render) const {
-    return render.step + 1 == num_runs_ || (render.step + 1) % runs_per_stage_ == 0;
+    const std::int32_t end = render.run().value() + 1;
+    return end == num_runs_ || end % runs_per_stage_ == 0;
   }
   /// Whether it is between two of which the second is not complete.
   bool keeps_between(const TaskKey& render) const;
@@ -49,8 +50,9 @@ class Checkpoints {
   void let_between_go(std::size_t stage, std::vector<TaskKey>& gone);
 
   std::int32_t runs_per_stage_, num_runs_, num_tiles_;
-  std::size_t tiles_per_stage_, stages_per_step_;  ///< a step: from one checkpoint to the next
-  std::vector<Stage> stages_;                      ///< by step, then tile
+  /// A row of stages: from one checkpoint to the next, those of all tiles.
+  std::size_t tiles_per_stage_, stages_per_row_;
+  std::vector<Stage> stages_;  ///< by row, then tile
 };
 
 }  // namespace baton

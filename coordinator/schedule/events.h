@@ -38,10 +38,10 @@ struct Cut {
 
 /// Where a job goes on from former jobs of its picture.
 struct JobPlan {
-  std::vector<std::int32_t> leading_runs;  ///< JobSpec::leading_runs
+  std::vector<Step> leading_runs;  ///< JobSpec::leading_runs
   std::vector<Cut> cuts;
-  /// Frames (0-based) whose files another job has written: once made again, their headers differ.
-  std::vector<std::int32_t> others_frames;
+  /// Frames whose files another job has written: once made again, their headers differ.
+  std::vector<FrameIndex> others_frames;
 
   bool operator==(const JobPlan&) const = default;
 };
@@ -56,12 +56,15 @@ struct Completions {
   };
   std::vector<Task> tasks;
   RenderStats stats;
-  std::map<std::int32_t, FrameStats> frames;  ///< by 0-based index
+  std::map<Step, FrameStats> steps;         ///< of render tasks
+  std::map<FrameIndex, FrameStats> frames;  ///< of assemblies
 
   void add(Completion completion) {
     tasks.push_back({completion.task, std::move(completion.outputs)});
     stats.merge(completion.stats);
-    for (const FrameStats& frame : completion.frames) frames[frame.frame].merge(frame);
+    const bool is_frame = completion.task.kind == TaskKind::assemble;
+    for (const FrameStats& of_tile : completion.frames)
+      (is_frame ? frames[of_tile.frame()] : steps[of_tile.step()]).merge(of_tile);
   }
 };
 
@@ -222,10 +225,10 @@ struct GrantLease {
   std::string worker;
   LeaseId lease;
   std::vector<BlobRef> inputs;
-  FrameSpan frames = {};
+  StepSpan steps = {};
   bool may_hold = false;  ///< the state that it makes may stay in the worker's memory
-  /// States of earlier frames (0-based) are needed by no task.
-  std::int32_t states_from = 0;
+  /// States of earlier steps are needed by no task.
+  Step states_from{};
   double expected_seconds = 0;  ///< CPU time, as the longest of late; 0: not known
 };
 /// Somebody waits for states that the worker holds: it should put them into the store.

@@ -8,11 +8,12 @@
 #include "common/job/job_spec.h"
 #include "common/job/sequence.h"
 #include "common/job/task.h"
+#include "common/job/timeline.h"
 
 namespace baton {
 
 /// Position of a task in its job: first the assemble tasks by frame, then the second-pass tasks by
-/// frame and tile, if there is a second pass, then the render tasks by run and tile. This is also
+/// step and tile, if there is a second pass, then the render tasks by run and tile. This is also
 /// the order in which ready tasks are granted: frames are finished before new ones are begun.
 using TaskIndex = std::int32_t;
 
@@ -20,27 +21,24 @@ using TaskIndex = std::int32_t;
 std::int64_t count_tasks(const JobSpec& job);
 
 /// The task graph of a job, by arithmetic: nothing is stored per task, and of a run its first
-/// frame.
+/// step.
 ///
 /// If the job carries state, render(run, tile) needs render(run - 1, t) of every tile t that
 /// history may come from: itself, and its neighbours within history_reach_px. In a later sweep it
-/// needs the films of its tile of the sweep before. Runs and the blobs that they make are numbered
-/// by steps (common/job/sequence.h), all else by frames; without sweeps these are the same.
-/// second_pass(frame, tile) needs the render tasks of that frame of all tiles within
-/// exchange_reach_px. assemble(frame) needs all tiles of its run in the last sweep, or all its
-/// second passes.
+/// needs the films of its tile of the sweep before.
+/// second_pass(step, tile) needs the render tasks of that step of all tiles within
+/// exchange_reach_px; jobs with a second pass have one sweep. assemble(frame) needs all tiles of
+/// its run in the last sweep, or all its second passes.
 class JobGraph {
  public:
   /// count_tasks(job) must be at most limits::kMaxTasksPerJob.
   explicit JobGraph(const JobSpec& job);
 
-  TaskIndex num_tasks() const { return first_render_ + num_runs_ * num_tiles_; }
-  std::int32_t num_frames() const { return num_frames_; }
+  TaskIndex num_tasks() const { return first_render_ + num_runs() * num_tiles_; }
+  std::int32_t num_frames() const { return timeline_.num_frames(); }
   std::int32_t num_tiles() const { return num_tiles_; }
-  std::int32_t num_runs() const { return num_runs_; }
-  std::int32_t num_steps() const { return num_steps_; }
-  /// The step whose films make the frame.
-  std::int32_t last_step_of(std::int32_t frame) const { return num_steps_ - num_frames_ + frame; }
+  std::int32_t num_runs() const { return timeline_.num_runs(); }
+  const Timeline& timeline() const { return timeline_; }
 
   /// nullopt: the job has no such task.
   std::optional<TaskIndex> find(const TaskKey& key) const;
@@ -54,16 +52,8 @@ class JobGraph {
   /// The tasks that this one needs, in tile order.
   std::vector<TaskIndex> inputs(const TaskKey& key) const;
 
-  /// First and last step (0-based, inclusive) of a run.
-  std::int32_t first_frame(std::int32_t run) const {
-    return starts_[static_cast<std::size_t>(run)];
-  }
-  std::int32_t last_frame(std::int32_t run) const;
-  /// The run that renders a step.
-  std::int32_t run_of(std::int32_t step) const;
-
-  /// The steps that a render task works on; the frame of the others.
-  FrameSpan frames(const TaskKey& key) const;
+  /// The steps that a render task works on; of another task the position of its key, twice.
+  StepSpan steps(const TaskKey& key) const;
 
   /// Whether a render task hands its samples to the next run.
   bool carries_state() const { return carries_state_; }
@@ -79,11 +69,11 @@ class JobGraph {
     all,
     state,  ///< its films are not needed: its state is a Cut
   };
-  /// Sorts the outputs that a task reported: state first, then films by frame. nullopt when they
+  /// Sorts the outputs that a task reported: state first, then films by step. nullopt when they
   /// are exactly what the task must make; else what is wrong with them.
   std::optional<std::string> check_outputs(const TaskKey& key, std::vector<BlobRef>& outputs,
                                            Extent extent = Extent::all) const;
-  /// nullopt when the statistics are of the task's own tile and frames, each frame once at most;
+  /// nullopt when the statistics are of the task's own tile and steps or frame, each once at most;
   /// else what is wrong.
   std::optional<std::string> check_frames(const TaskKey& key,
                                           const std::vector<FrameStats>& frames) const;
@@ -95,16 +85,16 @@ class JobGraph {
   bool takes(const TaskKey& reader, const TaskKey& maker, const BlobRef& output) const;
 
  private:
-  TaskIndex render_index(std::int32_t run, std::int32_t tile) const;
-  TaskIndex second_pass_index(std::int32_t frame, std::int32_t tile) const;
+  TaskIndex render_index(Run run, std::int32_t tile) const;
+  TaskIndex second_pass_index(Step step, std::int32_t tile) const;
   std::vector<BlobRef> expected_outputs(const TaskKey& key) const;
-  void add_neighbours(std::int32_t run, std::int32_t tile, std::vector<TaskIndex>& tasks) const;
-  void add_same_frames(const FrameSpan& steps, std::int32_t tile,
-                       std::vector<TaskIndex>& tasks) const;
+  void add_neighbours(Run run, std::int32_t tile, std::vector<TaskIndex>& tasks) const;
+  void add_renders_of(const StepSpan& steps, std::int32_t tile,
+                      std::vector<TaskIndex>& tasks) const;
 
   TileGrid grid_;
-  std::vector<std::int32_t> starts_;  ///< of the runs
-  std::int32_t num_frames_, num_steps_, num_runs_, num_tiles_, runs_per_checkpoint_, reach_px_;
+  Timeline timeline_;
+  std::int32_t num_tiles_, runs_per_checkpoint_, reach_px_;
   bool carries_state_, shares_history_, has_second_pass_;
   std::int32_t exchange_reach_px_;
   TaskIndex first_render_;

@@ -59,9 +59,9 @@ bool JobTasks::apply(TaskIndex task, TaskEvent event) {
       break;
   }
   if (task < graph_.num_frames()) {  // its assembly
-    first_open_frame_ = std::min(first_open_frame_, task);
-    while (first_open_frame_ < graph_.num_frames() && !is_open(status(first_open_frame_)))
-      ++first_open_frame_;
+    TaskIndex first = std::min(first_open_frame_.value(), task);
+    while (first < graph_.num_frames() && !is_open(status(first))) ++first;
+    first_open_frame_ = FrameIndex(first);
   }
   if (was_open != is_open(r.status)) count_run(task, is_open(r.status));
   return true;
@@ -71,10 +71,9 @@ bool JobTasks::apply(TaskIndex task, TaskEvent event) {
 void JobTasks::count_run(TaskIndex task, bool opened) {
   const TaskKey key = graph_.key(task);
   if (key.kind != TaskKind::render) return;
-  open_renders_[static_cast<std::size_t>(key.step)] += opened ? 1 : -1;
-  first_open_run_ = std::min(first_open_run_, key.step);
-  while (first_open_run_ < graph_.num_runs() &&
-         open_renders_[static_cast<std::size_t>(first_open_run_)] == 0)
+  open_renders_[key.run().index()] += opened ? 1 : -1;
+  first_open_run_ = std::min(first_open_run_, key.run());
+  while (first_open_run_ < Run(graph_.num_runs()) && num_open_renders(first_open_run_) == 0)
     ++first_open_run_;
 }
 
@@ -106,7 +105,9 @@ void JobTasks::complete(TaskIndex task, const Completion& completion, const std:
   record(task).maker = maker != maker_numbers_.end() ? maker->second : std::uint16_t{0};
   if (!former_outputs_.contains(task)) {
     progress_.stats.merge(completion.stats);
-    for (const FrameStats& frame : completion.frames) add_stats(frame.frame, frame);
+    const bool is_frame = completion.task.kind == TaskKind::assemble;
+    for (const FrameStats& stats : completion.frames)
+      add_stats(is_frame ? stats.frame() : graph_.timeline().frame_of(stats.step()), stats);
   }
   force_done(task, completion.outputs);
   record(task).is_shared = is_shared;
@@ -121,15 +122,16 @@ void JobTasks::complete(TaskIndex task, const Completion& completion, const std:
   }
 }
 
-/// Of a frame, over its sweeps.
-void JobTasks::add_stats(std::int32_t step, const FrameStats& stats) {
-  progress_.frames[step % graph_.num_frames()].merge(stats);
+/// Adds to what a frame counts over its tiles and sweeps.
+void JobTasks::add_stats(FrameIndex frame, const FrameStats& stats) {
+  progress_.frames[frame].merge(stats);
 }
 
-std::int32_t JobTasks::first_open_step() const {
-  const std::int32_t step = graph_.last_step_of(first_open_frame_);
-  if (first_open_run_ >= graph_.num_runs()) return step;
-  return std::min(step, graph_.first_frame(first_open_run_));
+Step JobTasks::first_open_step() const {
+  const Timeline& timeline = graph_.timeline();
+  const Step step = timeline.last_step_of(first_open_frame_);
+  if (first_open_run_ >= Run(graph_.num_runs())) return step;
+  return std::min(step, timeline.steps_of(first_open_run_).first);
 }
 
 /// Brings a task to done, along the legal way, and keeps what it made.
@@ -161,7 +163,9 @@ std::vector<TaskIndex> JobTasks::restore(const Completions& completions,
     done.push_back(*task);
   }
   progress_.stats = completions.stats;
-  for (const auto& [step, frame] : completions.frames) add_stats(step, frame);
+  for (const auto& [step, stats] : completions.steps)
+    add_stats(graph_.timeline().frame_of(step), stats);
+  for (const auto& [frame, stats] : completions.frames) add_stats(frame, stats);
   for (const TaskIndex task : done) {
     for (const TaskIndex dependent : graph_.dependents(graph_.key(task)))
       --record(dependent).missing_inputs;
@@ -174,7 +178,7 @@ std::vector<TaskIndex> JobTasks::restore(const Completions& completions,
       checkpoints_.complete(key);
   }
   for (const BlobRef& blob : gone) {
-    const TaskKey key{TaskKind::render, graph_.run_of(blob.frame), blob.tile};
+    const TaskKey key = render_task(graph_.timeline().run_of(blob.step()), blob.tile);
     const std::optional<TaskIndex> task = graph_.find(key);
     if (!task) continue;
     if (blob.kind == BlobKind::state) checkpoints_.let_go(key);
@@ -236,8 +240,8 @@ std::vector<TaskIndex> JobTasks::reopen(TaskIndex task, BlobReferences& blobs) {
     if (const TaskKey key = graph_.key(next); key.kind == TaskKind::render)
       checkpoints_.reopen(key);
     std::vector<BlobRef> before = std::exchange(record(next).outputs, {});
-    if (!before.empty() && !others_frames_.contains(next))
-      former_outputs_[next] = std::move(before);
+    const bool is_others = next < graph_.num_frames() && others_frames_.contains(FrameIndex(next));
+    if (!before.empty() && !is_others) former_outputs_[next] = std::move(before);
     BATON_CHECK(apply(next, TaskEvent::output_lost));
     reopened.push_back(next);
     for (const TaskIndex dependent : graph_.dependents(graph_.key(next))) {

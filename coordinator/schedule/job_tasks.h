@@ -24,7 +24,7 @@ struct JobProgress {
   std::uint32_t frames_done = 0;
   std::uint64_t state_bytes = 0, state_pixels = 0;
   RenderStats stats;
-  std::map<std::int32_t, FrameStats> frames;  ///< by 0-based index, over the tiles so far
+  std::map<FrameIndex, FrameStats> frames;  ///< over the tiles and sweeps so far
 };
 
 /// How a worker failed a task.
@@ -47,17 +47,15 @@ class JobTasks {
   /// Tasks that a worker may have, in the order in which they should be granted.
   const std::set<TaskIndex>& ready() const { return ready_; }
   /// The first frame that is not written and may still be; num_frames: there is none.
-  std::int32_t first_open_frame() const { return first_open_frame_; }
+  FrameIndex first_open_frame() const { return first_open_frame_; }
   /// The first step that is not done: not rendered, or in the last sweep not written.
-  std::int32_t first_open_step() const;
+  Step first_open_step() const;
   /// The first run with an open render task; num_runs: there is none.
-  std::int32_t first_open_run() const { return first_open_run_; }
+  Run first_open_run() const { return first_open_run_; }
   /// Render tasks of the run that are open.
-  std::int32_t num_open_renders(std::int32_t run) const {
-    return open_renders_[static_cast<std::size_t>(run)];
-  }
-  /// States of earlier frames (0-based) than this are inputs of no open task.
-  std::int32_t states_from() const;
+  std::int32_t num_open_renders(Run run) const { return open_renders_[run.index()]; }
+  /// States of earlier steps than this are inputs of no open task.
+  Step states_from() const;
   /// Whether all tasks that it needs are done. A leased task may lose one of them.
   bool has_inputs(TaskIndex task) const { return record(task).missing_inputs == 0; }
   /// The blobs that the task needs: see LeaseGrant in PROTOCOL.md. It must have its inputs, or be
@@ -172,7 +170,7 @@ class JobTasks {
   const Record& record(TaskIndex task) const { return records_[static_cast<std::size_t>(task)]; }
   bool apply(TaskIndex task, TaskEvent event);
   void count_run(TaskIndex task, bool opened);
-  void add_stats(std::int32_t step, const FrameStats& stats);
+  void add_stats(FrameIndex frame, const FrameStats& stats);
   std::int32_t num_needs(TaskIndex task, const BlobRef& output) const;
   std::int32_t num_uses(TaskIndex task, const BlobRef& output) const;
   void count_output(const BlobRef& output, bool made);
@@ -198,14 +196,14 @@ class JobTasks {
       "(not known)"};  ///< names, of at most kMaxWorkers; the first: all others
   std::map<std::string, std::uint16_t> maker_numbers_;
   std::set<TaskIndex> ready_;
-  std::int32_t first_open_frame_ = 0;
+  FrameIndex first_open_frame_{0};
   std::vector<std::int32_t> open_renders_;  ///< of each run
-  std::int32_t first_open_run_ = 0;
+  Run first_open_run_{0};
   std::size_t num_held_ = 0;                              ///< of done tasks, needed or not
   std::map<TaskIndex, std::vector<EndedAttempt>> ended_;  ///< and not done
   bool has_failed_ = false;                               ///< some attempt
   std::map<TaskIndex, std::vector<BlobRef>> former_outputs_;
-  std::set<TaskIndex> others_frames_;               ///< JobPlan::others_frames
+  std::set<FrameIndex> others_frames_;              ///< JobPlan::others_frames
   std::map<TaskIndex, std::vector<BlobRef>> cuts_;  ///< of open tasks: the states they are cut from
   JobProgress progress_;
 };

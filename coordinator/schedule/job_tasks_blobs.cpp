@@ -47,7 +47,8 @@ std::int32_t JobTasks::num_needs(TaskIndex task, const BlobRef& output) const {
 /// workers have read of others stays: the rest of what a lost worker has made is lost with it.
 bool JobTasks::stays(TaskIndex task, const BlobRef& output) const {
   if (output.kind == BlobKind::film) {
-    return keep_films_ && output.frame >= graph_.last_step_of(0) && !record(task).films_let_go;
+    const bool is_last_sweep = output.step() >= graph_.timeline().last_step_of(FrameIndex(0));
+    return keep_films_ && is_last_sweep && !record(task).films_let_go;
   }
   if (output.kind != BlobKind::state || output.is_held()) return false;
   const TaskKey key = graph_.key(task);

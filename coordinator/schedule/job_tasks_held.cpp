@@ -5,16 +5,17 @@
 
 namespace baton {
 
-std::int32_t JobTasks::states_from() const {
-  if (first_open_run_ >= graph_.num_runs()) return graph_.num_steps();
-  return graph_.first_frame(first_open_run_) - 1;
+Step JobTasks::states_from() const {
+  const Timeline& timeline = graph_.timeline();
+  if (first_open_run_ >= Run(graph_.num_runs())) return Step(timeline.num_steps());
+  return timeline.steps_of(first_open_run_).first - 1;
 }
 
 bool JobTasks::may_hold(TaskIndex task) const {
   const TaskKey key = graph_.key(task);
   return key.kind == TaskKind::render && graph_.carries_state() && graph_.shares_history() &&
-         key.step + 1 < graph_.num_runs() && !keep_all_states_ && !checkpoints_.keeps(key) &&
-         graph_.first_frame(key.step) < graph_.num_frames() && !cuts_.contains(task) &&
+         key.run() + 1 < Run(graph_.num_runs()) && !keep_all_states_ && !checkpoints_.keeps(key) &&
+         graph_.timeline().sweep_of(graph_.steps(key).first) == Sweep(0) && !cuts_.contains(task) &&
          !has_failed_ && makers_.size() <= limits::kMaxWorkers;
 }
 
@@ -47,10 +48,10 @@ bool JobTasks::can_read(TaskIndex task, const std::string& worker) const {
 std::vector<TaskIndex> JobTasks::held_now() const {
   std::vector<TaskIndex> tasks;
   if (num_held_ == 0) return tasks;
-  for (std::int32_t run = std::max(0, first_open_run_ - 1); run < graph_.num_runs(); ++run) {
-    if (open_renders_[static_cast<std::size_t>(run)] == graph_.num_tiles()) continue;
+  for (Run run = std::max(Run(0), first_open_run_ - 1); run < Run(graph_.num_runs()); ++run) {
+    if (num_open_renders(run) == graph_.num_tiles()) continue;
     for (std::int32_t tile = 0; tile < graph_.num_tiles(); ++tile) {
-      const TaskIndex task = *graph_.find({TaskKind::render, run, tile});
+      const TaskIndex task = *graph_.find(render_task(run, tile));
       const BlobRef* state = held_state(task);
       if (state != nullptr && num_needs(task, *state) > 0) tasks.push_back(task);
     }
@@ -80,13 +81,16 @@ void JobTasks::share_inputs(TaskIndex task, const std::string& worker, BlobRefer
 
 std::optional<TaskIndex> JobTasks::publish(const PublishedState& state, const std::string& worker,
                                            BlobReferences& blobs) {
-  if (state.held.frame < 0 || state.held.frame >= graph_.num_steps()) return std::nullopt;
-  const auto task =
-      graph_.find({TaskKind::render, graph_.run_of(state.held.frame), state.held.tile});
+  if (state.held.kind != BlobKind::state) return std::nullopt;
+  const Timeline& timeline = graph_.timeline();
+  const Step step = state.held.step();
+  if (step < Step(0) || step >= Step(timeline.num_steps())) return std::nullopt;
+  const auto task = graph_.find(render_task(timeline.run_of(step), state.held.tile));
   const BlobRef* held = task ? held_state(*task) : nullptr;
   const bool fits = held != nullptr && *held == state.held && maker(*task) == worker &&
                     !state.published.is_held() && state.published.kind == held->kind &&
-                    state.published.frame == held->frame && state.published.tile == held->tile;
+                    state.published.position == held->position &&
+                    state.published.tile == held->tile;
   if (!fits) return std::nullopt;
 
   // Whoever needs it needs the blob from now on.

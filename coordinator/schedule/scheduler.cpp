@@ -281,7 +281,8 @@ void Scheduler::replay(Job& job, const JobAdded& event, Actions& actions) {
   for (const Completions::Task& done : event.completions.tasks) {
     job.sizes.learn(done.outputs);
     if (done.task.kind == TaskKind::render && !done.outputs.empty())
-      job.begun_runs = std::clamp(done.task.step + 1, job.begun_runs, job.tasks.graph().num_runs());
+      job.begun_runs =
+          std::clamp(done.task.run() + 1, job.begun_runs, Run(job.tasks.graph().num_runs()));
   }
   // Before it is counted who needs what.
   if (store_limit_ > 0 || !event.failures.empty()) job.tasks.let_between_go(blobs_);

@@ -40,7 +40,7 @@ class Scheduler {
     TileHomes homes;
     std::int32_t max_frames_ahead = 0;  ///< of the first frame that is not written
     BlobSizes sizes;
-    std::int32_t begun_runs = 0;  ///< in order, up to the last of which a task was granted
+    Run begun_runs{0};  ///< the one after the last of which a task was granted
     std::array<TimePoint, 3> rests_until = {};  ///< tasks of each kind
     std::string waits = {};                     ///< for what, as far as an event said so
     struct Standing {
@@ -160,7 +160,7 @@ class Scheduler {
   bool grant_one(const std::string& worker, TimePoint now, Actions& actions);
   std::vector<std::string> worker_names() const;
   void share_out_tiles();
-  std::int32_t last_run(const Job& job) const;
+  Run last_run(const Job& job) const;
   bool is_due(const Job& job, TaskIndex task, const std::string& worker, TimePoint now) const;
   bool may_try(const Job& job, TaskIndex task, const std::string& worker, TimePoint now) const;
   bool is_exhausted(const Job& job, TaskIndex task) const;
@@ -170,8 +170,8 @@ class Scheduler {
   // Room in the store (scheduler_room.cpp).
   bool fits(std::uint64_t more_bytes) const;
   bool has_room(const Job& job, TaskIndex task, bool others_wait) const;
-  bool may_begin(const Job& job, std::int32_t run) const;
-  std::uint64_t unmade_bytes(const Job& job, std::int32_t end) const;
+  bool may_begin(const Job& job, Run run) const;
+  std::uint64_t unmade_bytes(const Job& job, Run end) const;
   std::string lacking_room(const Job& job) const;
 
   // Jobs (scheduler.cpp).

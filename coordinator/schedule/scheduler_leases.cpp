@@ -135,7 +135,7 @@ Scheduler::Lease& Scheduler::add_lease(const std::string& worker, const LeaseId&
   workers_.at(worker).leases.emplace(lease.job, task);
   if (lease.task.kind == TaskKind::render) {
     job.homes.settle(lease.task.tile, worker);
-    job.begun_runs = std::max(job.begun_runs, lease.task.step + 1);
+    job.begun_runs = std::max(job.begun_runs, lease.task.run() + 1);
   }
   return leases_.insert_or_assign({lease.job, task}, Lease{lease, worker, now, bytes})
       .first->second;
@@ -242,7 +242,7 @@ void Scheduler::ask_for_states(const std::string& worker, TimePoint now, Actions
     for (const TaskIndex task : job.tasks.ready()) {
       const TaskKey key = job.tasks.graph().key(task);
       if (key.kind != TaskKind::render || !is_due(job, task, worker, now)) continue;
-      if (key.step > last_run(job)) break;
+      if (key.run() > last_run(job)) break;
       tasks.push_back(task);
     }
     // Its own tiles first, so that it need not settle among those of others.
@@ -287,7 +287,7 @@ bool Scheduler::grant_one(const std::string& worker, TimePoint now, Actions& act
     granted.may_hold = job.tasks.may_hold(*task) && job.homes.surround(lease.task.tile, worker);
     job.tasks.share_inputs(*task, worker, blobs_);
     actions.push_back(
-        GrantLease{worker, lease, job.tasks.inputs(*task), graph.frames(lease.task),
+        GrantLease{worker, lease, job.tasks.inputs(*task), graph.steps(lease.task),
                    granted.may_hold, job.tasks.states_from(),
                    job.longest_seconds.at(static_cast<std::size_t>(lease.task.kind))});
     return true;
@@ -297,10 +297,10 @@ bool Scheduler::grant_one(const std::string& worker, TimePoint now, Actions& act
 
 /// The last run of which a task may be granted: nothing is rendered far ahead of the first open
 /// step.
-std::int32_t Scheduler::last_run(const Job& job) const {
-  const JobGraph& graph = job.tasks.graph();
-  return graph.run_of(
-      std::min(job.tasks.first_open_step() + job.max_frames_ahead, graph.num_steps()) - 1);
+Run Scheduler::last_run(const Job& job) const {
+  const Timeline& timeline = job.tasks.graph().timeline();
+  const Step end = job.tasks.first_open_step() + job.max_frames_ahead;
+  return timeline.run_of(std::min(end, Step(timeline.num_steps())) - 1);
 }
 
 /// Whether the worker may try the task now, could it read its inputs.

@@ -43,7 +43,7 @@ bool Scheduler::has_room(const Job& job, TaskIndex task, bool others_wait) const
     return is_idle && !job.sizes.are_known(graph, key) && store_bytes() < store_limit_;
   }
   // What an idle farm does not begin nobody begins.
-  const std::int32_t run = key.kind == TaskKind::render ? key.step : graph.run_of(key.step);
+  const Run run = key.kind == TaskKind::render ? key.run() : graph.timeline().run_of(key.step());
   if (is_idle) return true;
   if (run >= job.begun_runs) return !others_wait && may_begin(job, run);
   // What is lost of earlier runs, and made again, comes first.
@@ -51,7 +51,7 @@ bool Scheduler::has_room(const Job& job, TaskIndex task, bool others_wait) const
 }
 
 /// Whether there is room for all that the run makes, beside what runs in work still make.
-bool Scheduler::may_begin(const Job& job, std::int32_t run) const {
+bool Scheduler::may_begin(const Job& job, Run run) const {
   std::uint64_t bytes = store_bytes() + unmade_bytes(job, run + 1);
   for (const auto& [digest, other] : jobs_) {
     if (&other != &job && is_open(other.status)) bytes += unmade_bytes(other, other.begun_runs);
@@ -61,18 +61,20 @@ bool Scheduler::may_begin(const Job& job, std::int32_t run) const {
 
 /// What the open tasks of the runs before `end` will add to the store, second passes of frames that
 /// are not written included.
-std::uint64_t Scheduler::unmade_bytes(const Job& job, std::int32_t end) const {
+std::uint64_t Scheduler::unmade_bytes(const Job& job, Run end) const {
   const JobGraph& graph = job.tasks.graph();
   std::uint64_t bytes = 0;
-  for (std::int32_t run = job.tasks.first_open_run(); run < end; ++run) {
+  for (Run run = job.tasks.first_open_run(); run < end; ++run) {
     bytes += static_cast<std::uint64_t>(job.tasks.num_open_renders(run)) *
-             job.sizes.mean(graph, {TaskKind::render, run, 0});
+             job.sizes.mean(graph, render_task(run, 0));
   }
-  if (!job.spec.visibility.correlated || end == 0) return bytes;
-  const std::int32_t frames = graph.last_frame(end - 1) + 1 - job.tasks.first_open_frame();
-  return bytes + static_cast<std::uint64_t>(std::max(0, frames)) *
+  if (!job.spec.visibility.correlated || end == Run(0)) return bytes;
+  const Timeline& timeline = graph.timeline();
+  const Step last = timeline.steps_of(end - 1).last;
+  const std::int32_t steps = last + 1 - timeline.last_step_of(job.tasks.first_open_frame());
+  return bytes + static_cast<std::uint64_t>(std::max(0, steps)) *
                      static_cast<std::uint64_t>(graph.num_tiles()) *
-                     job.sizes.mean(graph, {TaskKind::second_pass, 0, 0});
+                     job.sizes.mean(graph, second_pass_task(Step(0), 0));
 }
 
 bool Scheduler::lacks_room(const Digest& digest) const {

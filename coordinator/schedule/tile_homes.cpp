@@ -72,18 +72,18 @@ std::int64_t TileHomes::num_own_near(std::int32_t tile, const std::string& worke
 }
 
 std::optional<TaskIndex> TileHomes::choose(const JobGraph& graph, const std::set<TaskIndex>& ready,
-                                           std::int32_t last_run, const std::string& worker,
+                                           Run last_run, const std::string& worker,
                                            const std::function<bool(TaskIndex)>& may_try) const {
   std::vector<TaskIndex> others;  // of the earliest run
-  std::int32_t first_run = last_run;
+  Run first_run = last_run;
   for (const TaskIndex task : ready) {
     const TaskKey key = graph.key(task);
     const bool is_render = key.kind == TaskKind::render;
-    if (is_render && (key.step > last_run || key.step > first_run + 1)) break;
+    if (is_render && (key.run() > last_run || key.run() > first_run + 1)) break;
     if (!may_try(task)) continue;
     if (!is_render || is_home(key.tile, worker)) return task;
-    if (others.empty()) first_run = key.step;
-    if (key.step == first_run) others.push_back(task);
+    if (others.empty()) first_run = key.run();
+    if (key.run() == first_run) others.push_back(task);
   }
   const auto nearest =
       std::max_element(others.begin(), others.end(), [&](const TaskIndex a, const TaskIndex b) {

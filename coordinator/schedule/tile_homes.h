@@ -41,7 +41,7 @@ class TileHomes {
   /// run of all or the one after; then of that earliest run the tile with most of its own tiles
   /// around it. nullopt: there is none.
   std::optional<TaskIndex> choose(const JobGraph& graph, const std::set<TaskIndex>& ready,
-                                  std::int32_t last_run, const std::string& worker,
+                                  Run last_run, const std::string& worker,
                                   const std::function<bool(TaskIndex)>& may_try) const;
 
  private:

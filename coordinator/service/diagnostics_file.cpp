@@ -8,14 +8,13 @@
 #include <tuple>
 
 #include "common/base/files.h"
-#include "common/job/sequence.h"
-#include "coordinator/schedule/job_graph.h"
+#include "common/job/timeline.h"
 
 namespace baton {
 namespace {
 
 /// quality: of a frame that is written; else its columns stay empty.
-std::string line(int frame_number, const std::string& tile, const SamplingStats& s,
+std::string line(FrameNumber frame_number, const std::string& tile, const SamplingStats& s,
                  const FrameQuality& quality = {}) {
   std::string text =
       fmt::format("{},{},{},{},{},{},{},{},{},{},{},{},{}", frame_number, tile, s.pixels(),
@@ -45,20 +44,21 @@ std::string diagnostics_header() {
          "pixelsNotFinite\n";
 }
 
-std::string diagnostics_lines(std::vector<FrameStats> stats,
-                              const std::map<std::int32_t, FrameQuality>& qualities,
-                              const std::vector<int>& frame_numbers) {
-  std::sort(stats.begin(), stats.end(), [](const FrameStats& a, const FrameStats& b) {
+std::string diagnostics_lines(std::vector<TileDiagnostics> tiles,
+                              const std::map<FrameIndex, FrameQuality>& qualities,
+                              const std::vector<FrameNumber>& frames) {
+  using Tile = TileDiagnostics;
+  std::sort(tiles.begin(), tiles.end(), [](const Tile& a, const Tile& b) {
     return std::tie(a.frame, a.tile) < std::tie(b.frame, b.tile);
   });
   std::string text;
-  for (auto first = stats.begin(); first != stats.end();) {
-    const auto last = std::find_if(first, stats.end(),
-                                   [&](const FrameStats& s) { return s.frame != first->frame; });
-    const int number = frame_numbers.at(static_cast<std::size_t>(first->frame));
+  for (auto first = tiles.begin(); first != tiles.end();) {
+    const auto last = std::find_if(first, tiles.end(),
+                                   [&](const Tile& tile) { return tile.frame != first->frame; });
+    const FrameNumber number = frames.at(first->frame.index());
 
     SamplingStats sum;
-    std::for_each(first, last, [&](const FrameStats& s) { sum.merge(s.sampling); });
+    std::for_each(first, last, [&](const Tile& tile) { sum.merge(tile.sampling); });
     const auto quality = qualities.find(first->frame);
     text += line(number, "all", sum, quality != qualities.end() ? quality->second : FrameQuality{});
     for (; first != last; ++first)
@@ -69,26 +69,23 @@ std::string diagnostics_lines(std::vector<FrameStats> stats,
 
 namespace {
 
-/// What the tiles did in these frames, over all sweeps.
-Result<std::vector<FrameStats>> stats_of(Journal& journal, const Digest& digest, const JobSpec& job,
-                                         const JobGraph& graph, const FrameSpan& frames) {
-  std::map<std::pair<std::int32_t, std::int32_t>, FrameStats> sums;  // by frame and tile
-  for (std::int32_t sweep = 0; sweep < job.quality.sweeps; ++sweep) {
-    const std::int32_t first = sweep * graph.num_frames() + frames.first;
-    const std::int32_t last = sweep * graph.num_frames() + frames.last;
-    for (std::int32_t run = graph.run_of(first); run <= graph.run_of(last); ++run) {
-      BATON_ASSIGN(const std::vector<FrameStats> all,
-                   journal.frame_stats(digest, TaskKind::render, run));
-      for (FrameStats stats : all) {
-        if (stats.frame < first || stats.frame > last) continue;
-        stats.frame = frame_of_step(job, stats.frame);
-        const auto [sum, is_new] = sums.try_emplace({stats.frame, stats.tile}, stats);
-        if (!is_new) sum->second.merge(stats);
+/// What the tiles did in the frames of a run of the first sweep, over all sweeps.
+Result<std::vector<TileDiagnostics>> tiles_of(Journal& journal, const Digest& digest,
+                                              const Timeline& timeline, const StepSpan& run) {
+  std::map<std::pair<FrameIndex, std::int32_t>, SamplingStats> sums;  // by frame and tile
+  for (StepSpan steps = run; steps.first < Step(timeline.num_steps());
+       steps = {steps.first + timeline.num_frames(), steps.last + timeline.num_frames()}) {
+    const Run end = timeline.run_of(steps.last) + 1;
+    for (Run of_sweep = timeline.run_of(steps.first); of_sweep < end; ++of_sweep) {
+      BATON_ASSIGN(const std::vector<FrameStats> all, journal.run_stats(digest, of_sweep));
+      for (const FrameStats& stats : all) {
+        if (!steps.contains(stats.step())) continue;
+        sums[{timeline.frame_of(stats.step()), stats.tile}].merge(stats.sampling);
       }
     }
   }
-  std::vector<FrameStats> result;
-  for (const auto& [place, stats] : sums) result.push_back(stats);
+  std::vector<TileDiagnostics> result;
+  for (const auto& [place, sum] : sums) result.push_back({place.first, place.second, sum});
   return result;
 }
 
@@ -97,19 +94,18 @@ Result<std::vector<FrameStats>> stats_of(Journal& journal, const Digest& digest,
 Status write_diagnostics(Journal& journal, const Digest& digest, const JobSpec& job) {
   // Run by run: the rows of all tiles of a long job need not be in memory at once, their text may.
   std::string text;
-  const JobGraph graph(job);
-  for (std::int32_t run = 0; run < graph.num_runs(); ++run) {
-    const FrameSpan frames{graph.first_frame(run), graph.last_frame(run)};
-    if (frames.first >= graph.num_frames()) break;  // of a later sweep
-    BATON_ASSIGN(std::vector<FrameStats> stats, stats_of(journal, digest, job, graph, frames));
-    std::map<std::int32_t, FrameQuality> qualities;
-    for (const FrameStats& of_tile : stats) {
-      if (qualities.contains(of_tile.frame)) continue;
-      BATON_ASSIGN(const std::vector<FrameStats> whole,
-                   journal.frame_stats(digest, TaskKind::assemble, of_tile.frame));
-      qualities[of_tile.frame] = whole.empty() ? FrameQuality{} : whole.front().quality;
+  const Timeline timeline(job);
+  for (Run run{0}; run < Run(timeline.num_runs()); ++run) {
+    const StepSpan steps = timeline.steps_of(run);
+    if (timeline.sweep_of(steps.first) > Sweep(0)) break;
+    BATON_ASSIGN(std::vector<TileDiagnostics> tiles, tiles_of(journal, digest, timeline, steps));
+    std::map<FrameIndex, FrameQuality> qualities;
+    for (const TileDiagnostics& tile : tiles) {
+      if (qualities.contains(tile.frame)) continue;
+      BATON_ASSIGN(const std::optional<FrameStats> whole, journal.frame_stats(digest, tile.frame));
+      qualities[tile.frame] = whole ? whole->quality : FrameQuality{};
     }
-    text += diagnostics_lines(std::move(stats), qualities, job.frames);
+    text += diagnostics_lines(std::move(tiles), qualities, job.frames);
   }
   if (text.empty()) return {};
   text.insert(0, diagnostics_header());

@@ -10,31 +10,38 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// The frames that are finished, by user's number. Assemble tasks come first, by frame.
-std::vector<std::int32_t> finished_frames(const Scheduler::Job& job) {
-  std::vector<std::int32_t> frames;
+/// The frames that are finished. Assemble tasks come first, by frame.
+std::vector<FrameNumber> finished_frames(const Scheduler::Job& job) {
+  std::vector<FrameNumber> frames;
   for (TaskIndex frame = 0; frame < job.tasks.graph().num_frames(); ++frame) {
-    if (job.tasks.status(frame) == TaskStatus::done) {
+    if (job.tasks.status(frame) == TaskStatus::done)
       frames.push_back(job.spec.frames[static_cast<std::size_t>(frame)]);
-    }
   }
   return frames;
 }
 
+/// Where a task of the job stands, for people: "frames 9-12, tile 3".
+std::string place_text(const Scheduler::Job& job, const TaskKey& task) {
+  const Timeline& timeline = job.tasks.graph().timeline();
+  const auto number = [&](FrameIndex frame) { return job.spec.frames[frame.index()]; };
+  switch (task.kind) {
+    case TaskKind::assemble:
+      return fmt::format("frame {}", number(task.frame()));
+    case TaskKind::second_pass:
+      return fmt::format("frame {}, tile {}, second pass", number(timeline.frame_of(task.step())),
+                         task.tile);
+    case TaskKind::render:
+      const StepSpan steps = timeline.steps_of(task.run());
+      return fmt::format("frames {}-{}, tile {}", number(timeline.frame_of(steps.first)),
+                         number(timeline.frame_of(steps.last)), task.tile);
+  }
+  return {};
+}
+
 std::string describe(const Scheduler::Job& job, const Failure& failure) {
   const TaskKey& task = failure.lease.task;
-  const JobGraph& graph = job.tasks.graph();
-  const auto number = [&](std::int32_t frame) {
-    return job.spec.frames[static_cast<std::size_t>(frame)];
-  };
-  if (!graph.find(task)) return failure.message;
-  const std::string place =
-      task.kind == TaskKind::assemble ? fmt::format("frame {}", number(task.step))
-      : task.kind == TaskKind::second_pass
-          ? fmt::format("frame {}, tile {}, second pass", number(task.step), task.tile)
-          : fmt::format("frames {}-{}, tile {}", number(graph.first_frame(task.step)),
-                        number(graph.last_frame(task.step)), task.tile);
-  return fmt::format("{} on {}: {}", place, failure.worker, failure.message);
+  if (!job.tasks.graph().find(task)) return failure.message;
+  return fmt::format("{} on {}: {}", place_text(job, task), failure.worker, failure.message);
 }
 
 }  // namespace
@@ -68,9 +75,9 @@ JobDetail describe_job(const Scheduler& scheduler, const Digest& digest,
   JobDetail detail{summarize(digest, job), finished_frames(job), {}};
   for (const Failure& failure : failures) detail.failures.push_back(describe(job, failure));
   for (const auto& [frame, stats] : job.tasks.progress().frames) {
-    detail.frames.push_back(stats);
-    detail.frames.back().frame = job.spec.frames[static_cast<std::size_t>(frame)];
-    detail.frames.back().tile = -1;
+    const FrameNumber number = job.spec.frames[frame.index()];
+    detail.frames.push_back(
+        {.frame = number, .sampling = stats.sampling, .quality = stats.quality});
   }
   detail.waits = scheduler.waits_for(digest, std::chrono::steady_clock::now());
   detail.lacks_room = scheduler.lacks_room(digest);
@@ -150,7 +157,7 @@ LostFiles find_lost_files(const JobAdded& job, const BlobStore& store, FrameFile
   }
   for (TaskIndex frame = 0; frame < graph.num_frames(); ++frame) {
     if (recorded.status(frame) != TaskStatus::done) continue;
-    const fs::path path = frame_path(job.spec, frame);
+    const fs::path path = frame_path(job.spec, FrameIndex(frame));
     const BlobRef& image = recorded.outputs(frame).front();
     const bool is_there = look(frame, path, image.size_bytes);
     if (is_there && (frames == nullptr || lost.unreadable || frames->holds(path, image))) continue;

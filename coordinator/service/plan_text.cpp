@@ -12,19 +12,17 @@
 namespace baton {
 namespace {
 
-std::string frames_text(const JobSpec& job, const std::vector<std::int32_t>& indices) {
-  std::vector<int> numbers;
-  for (const std::int32_t i : indices) numbers.push_back(job.frames[static_cast<std::size_t>(i)]);
+std::string frames_text(const JobSpec& job, const std::vector<FrameIndex>& frames) {
+  std::vector<FrameNumber> numbers;
+  for (const FrameIndex frame : frames) numbers.push_back(job.frames[frame.index()]);
   return fmt::format("{} {}", numbers.size() == 1 ? "frame" : "frames", format_frames(numbers));
 }
 
-const char* are(const std::vector<std::int32_t>& indices) {
-  return indices.size() == 1 ? "is" : "are";
-}
+const char* are(const std::vector<FrameIndex>& frames) { return frames.size() == 1 ? "is" : "are"; }
 
 /// What the render tasks that are open have before them.
 struct OpenRuns {
-  std::set<std::int32_t> runs;
+  std::set<Run> runs;
   bool cuts = false;  ///< states are cut into other tiles first
 };
 
@@ -38,7 +36,7 @@ OpenRuns find_open_runs(const JobTasks& tasks) {
     if (tasks.is_cut(task)) {
       open.cuts = true;
     } else {
-      open.runs.insert(key.step);
+      open.runs.insert(key.run());
     }
   }
   return open;
@@ -49,17 +47,21 @@ OpenRuns find_open_runs(const JobTasks& tasks) {
 std::string plan_text(const Scheduler::Job& job, const std::vector<std::string>& reasons) {
   const JobGraph& graph = job.tasks.graph();
   const JobSpec& spec = job.spec;
-  std::vector<std::int32_t> kept, left, again;
-  for (std::int32_t frame = 0; frame < graph.num_frames(); ++frame)
-    (job.tasks.status(frame) == TaskStatus::done ? kept : left).push_back(frame);
+  const Timeline& timeline = graph.timeline();
+  const auto is_written = [&](FrameIndex frame) {
+    return job.tasks.status(*graph.find(assemble_task(frame))) == TaskStatus::done;
+  };
+  std::vector<FrameIndex> kept, left, again;
+  for (FrameIndex frame{0}; frame < FrameIndex(graph.num_frames()); ++frame)
+    (is_written(frame) ? kept : left).push_back(frame);
   const OpenRuns open = find_open_runs(job.tasks);
   const bool some_work = kept.size() + left.size() > 0 && job.tasks.progress().tasks_done > 0;
   if (kept.empty() && reasons.empty() && !some_work) return {};
-  for (const std::int32_t run : open.runs) {
-    for (std::int32_t step = graph.first_frame(run); step <= graph.last_frame(run); ++step) {
-      const std::int32_t frame = frame_of_step(spec, step);
-      const bool is_written = job.tasks.status(frame) == TaskStatus::done;
-      if (is_written && std::find(again.begin(), again.end(), frame) == again.end())
+  for (const Run run : open.runs) {
+    const StepSpan steps = timeline.steps_of(run);
+    for (Step step = steps.first; step <= steps.last; ++step) {
+      const FrameIndex frame = timeline.frame_of(step);
+      if (is_written(frame) && std::find(again.begin(), again.end(), frame) == again.end())
         again.push_back(frame);
     }
   }
@@ -69,12 +71,12 @@ std::string plan_text(const Scheduler::Job& job, const std::vector<std::string>&
   if (!left.empty()) {
     text += fmt::format("{} {} {}", frames_text(spec, left), are(left),
                         open.runs.empty() ? "put together from what is rendered" : "rendered");
-    const std::int32_t first = open.runs.empty() ? 0 : graph.first_frame(*open.runs.begin());
-    if (const std::int32_t sweep = first / graph.num_frames(); sweep > 0)
+    const Step first = open.runs.empty() ? Step(0) : timeline.steps_of(*open.runs.begin()).first;
+    if (const Sweep sweep = timeline.sweep_of(first); sweep > Sweep(0))
       text += fmt::format(" from sweep {} of {} on", sweep + 1, spec.quality.sweeps);
-    if (graph.carries_state() && first > 0) {
+    if (graph.carries_state() && first > Step(0)) {
       text += fmt::format(", going on from the states of {}",
-                          frames_text(spec, {frame_of_step(spec, first - 1)}));
+                          frames_text(spec, {timeline.frame_of(first - 1)}));
       if (open.cuts) text += fmt::format(", cut into tiles of {} pixels", spec.image.tile_size);
     } else if (graph.carries_state() && !open.runs.empty() && !kept.empty()) {
       text += ", from the first frame on";

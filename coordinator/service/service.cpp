@@ -291,7 +291,7 @@ std::optional<std::string> Service::find_missing_blob(const TaskDone& report) co
 std::optional<std::string> Service::find_missing_frame(const TaskDone& report) const {
   const Scheduler::Job* job = job_of_open_task(report.lease);
   if (job == nullptr || report.lease.task.kind != TaskKind::assemble) return std::nullopt;
-  const fs::path path = frame_path(job->spec, report.lease.task.step);
+  const fs::path path = frame_path(job->spec, report.lease.task.frame());
   for (const BlobRef& output : report.outputs) {
     std::error_code error;
     if (fs::file_size(path, error) != output.size_bytes || error) return path.string();

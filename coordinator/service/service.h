@@ -111,7 +111,7 @@ class Service {
   // Submission (service_submit.cpp).
   Result<std::optional<FormerJob>> former_job(const Digest& digest);
   Result<std::vector<std::string>> make_way(const ParsedJobDocument& document, bool restart);
-  Status disown(const Digest& job, const std::vector<int>& frames);
+  Status disown(const Digest& job, const std::vector<FrameNumber>& frames);
   Status go_on(const PeerId& peer, const Digest& digest);
   Status begin(const PeerId& peer, const ParsedJobDocument& document, const std::string& text,
                std::vector<std::string> reasons);

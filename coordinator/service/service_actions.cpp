@@ -57,8 +57,8 @@ Status Service::perform(const RecordJobStatus& action) {
 
 Status Service::perform(const GrantLease& action) {
   return reply_to(action.worker,
-                  LeaseGrant{action.lease, action.inputs, action.frames.first, action.frames.last,
-                             action.may_hold, action.states_from, action.expected_seconds});
+                  LeaseGrant{action.lease, action.inputs, action.steps, action.may_hold,
+                             action.states_from, action.expected_seconds});
 }
 
 Status Service::perform(const AskForStates& action) {
@@ -84,7 +84,7 @@ Status Service::perform(const ReportConflict& action) {
       "BUG: job {}: {}: worker {} reports {} for frame index {}, tile {}, but worker {} has "
       "reported {}",
       action.lease.job.short_hex(), describe_task(action.lease.task), action.worker,
-      action.reported.digest.hex(), action.reported.frame, action.reported.tile, action.maker,
+      action.reported.digest.hex(), action.reported.position, action.reported.tile, action.maker,
       action.expected.digest.hex());
   return {};
 }

@@ -23,15 +23,20 @@ std::string folder_of(const JobSpec& job) {
   return fs::path(job.output.directory).lexically_normal().string();
 }
 
-/// Of two jobs that write the same file the indices of the frame in each.
-std::vector<std::pair<std::size_t, std::size_t>> shared_frames(const JobSpec& a, const JobSpec& b) {
-  std::map<std::string, std::size_t> of_b;
-  for (std::size_t i = 0; i < b.frames.size(); ++i)
-    of_b[frame_file_name(b.output.pattern, b.frames[i])] = i;
-  std::vector<std::pair<std::size_t, std::size_t>> shared;
-  for (std::size_t i = 0; i < a.frames.size(); ++i) {
-    const auto found = of_b.find(frame_file_name(a.output.pattern, a.frames[i]));
-    if (found != of_b.end()) shared.emplace_back(i, found->second);
+/// The frames of two jobs that write the same file.
+std::vector<std::pair<FrameIndex, FrameIndex>> shared_frames(const JobSpec& a, const JobSpec& b) {
+  std::map<std::string, FrameIndex> of_b;
+  FrameIndex place{0};
+  for (const FrameNumber frame : b.frames) {
+    of_b[frame_file_name(b.output.pattern, frame.value())] = place;
+    ++place;
+  }
+  std::vector<std::pair<FrameIndex, FrameIndex>> shared;
+  place = FrameIndex(0);
+  for (const FrameNumber frame : a.frames) {
+    const auto found = of_b.find(frame_file_name(a.output.pattern, frame.value()));
+    if (found != of_b.end()) shared.emplace_back(place, found->second);
+    ++place;
   }
   return shared;
 }
@@ -40,11 +45,12 @@ std::vector<std::pair<std::size_t, std::size_t>> shared_frames(const JobSpec& a,
 struct Neighbour {
   Digest job;
   JobStatus status = JobStatus::running;
-  std::vector<int> written;  ///< frames in common that it has written; all of them if it is open
+  /// Frames in common that it has written; all of them if it is open.
+  std::vector<FrameNumber> written;
   std::vector<std::string> differing;  ///< what makes their pixels others; empty: they are the same
-  std::optional<int> first_differing;  ///< frame
-  bool busy = false;                   ///< it is open and shares no frame
-  std::size_t num_there = 0;           ///< frames in common that it has written
+  std::optional<FrameNumber> first_differing;
+  bool busy = false;          ///< it is open and shares no frame
+  std::size_t num_there = 0;  ///< frames in common that it has written
 };
 
 std::string differing_text(const std::vector<std::string>& differing) {
@@ -71,15 +77,15 @@ Error another_picture(const JobSpec& job, const Neighbour& other, const JobSpec&
 /// What a journalled job has written, beside a new one. owned: its frames by number, without those
 /// that another one has replaced; null: all.
 Neighbour look_at(const FormerJob& former, const Digest& job, const ParsedJobDocument& wanted,
-                  FrameFiles& files, const std::vector<std::int32_t>* owned) {
+                  FrameFiles& files, const std::vector<FrameNumber>* owned) {
   const JobStatus status = former.status;
   Neighbour other{job, status, {}, {}, {}, false, 0};
   const JobSpec& theirs = former.document.job;
   const auto shared = shared_frames(theirs, wanted.job);
-  std::map<std::size_t, BlobRef> images;
+  std::map<FrameIndex, BlobRef> images;
   for (const Completions::Task& task : former.tasks) {
     if (task.task.kind == TaskKind::assemble && task.outputs.size() == 1)
-      images[static_cast<std::size_t>(task.task.step)] = task.outputs.front();
+      images[task.task.frame()] = task.outputs.front();
   }
 
   // A frame belongs to the job that wrote it as long as its file is unchanged.
@@ -88,14 +94,14 @@ Neighbour look_at(const FormerJob& former, const Digest& job, const ParsedJobDoc
   std::set<std::string> differing;
   for (const auto& [mine, its] : shared) {
     const auto image = images.find(mine);
-    const bool is_owned = owned == nullptr || std::find(owned->begin(), owned->end(),
-                                                        theirs.frames[mine]) != owned->end();
+    const bool is_owned =
+        owned == nullptr ||
+        std::find(owned->begin(), owned->end(), theirs.frames[mine.index()]) != owned->end();
     const bool is_there =
-        is_owned && image != images.end() &&
-        files.holds(frame_path(theirs, static_cast<std::int32_t>(mine)), image->second);
+        is_owned && image != images.end() && files.holds(frame_path(theirs, mine), image->second);
     other.num_there += is_there ? 1 : 0;
     if (!is_there && !is_open(status)) continue;
-    other.written.push_back(wanted.job.frames[its]);
+    other.written.push_back(wanted.job.frames[its.index()]);
     differing.insert(picture.begin(), picture.end());
     // More sweeps make a frame cleaner; what is not written may have had more.
     const bool may_replace = !is_there || wanted.job.quality.sweeps > theirs.quality.sweeps;
@@ -103,7 +109,7 @@ Neighbour look_at(const FormerJob& former, const Digest& job, const ParsedJobDoc
         may_replace ? comparison.are_alike(mine, its) : comparison.are_equal(mine, its);
     if (picture.empty() && is_same) continue;
     if (picture.empty() && differing.size() < 3) differing.insert(comparison.difference(mine, its));
-    if (!other.first_differing) other.first_differing = wanted.job.frames[its];
+    if (!other.first_differing) other.first_differing = wanted.job.frames[its.index()];
   }
   other.differing.assign(differing.begin(), differing.end());
   other.busy = is_open(status) && shared.empty();
@@ -175,10 +181,10 @@ Result<std::vector<std::string>> Service::make_way(const ParsedJobDocument& docu
 }
 
 /// Takes frames that another picture replaces off the record of a job in the archive.
-Status Service::disown(const Digest& job, const std::vector<int>& frames) {
+Status Service::disown(const Digest& job, const std::vector<FrameNumber>& frames) {
   BATON_ASSIGN(std::optional<JobDetail> detail, archived_detail(job));
   if (!detail) return {};
-  std::erase_if(detail->frames_done, [&](std::int32_t frame) {
+  std::erase_if(detail->frames_done, [&](FrameNumber frame) {
     return std::find(frames.begin(), frames.end(), frame) != frames.end();
   });
   JobSummary& summary = detail->summary;
@@ -282,7 +288,7 @@ Result<Adoption> Service::find_heritage(const ParsedJobDocument& document,
   }
   const KeptFiles kept{
       .has_frame =
-          [&](std::int32_t frame, const BlobRef& image) {
+          [&](FrameIndex frame, const BlobRef& image) {
             return frame_files_.holds(frame_path(document.job, frame), image);
           },
       .has_blob = [&](const BlobRef& blob) { return store_.contains(blob.digest); }};
@@ -308,29 +314,29 @@ Status Service::take_over(const Adoption& adoption, const std::vector<Digest>& f
                           const std::string& text, JobAdded& event) {
   // Read before the journal changes, since the job may go on from itself. A kept frame has the
   // statistics of its assembly if that is the former job's.
-  std::map<std::int32_t, BlobRef> images;
-  for (const BlobRef& image : adoption.images) images[image.frame] = image;
+  std::map<FrameIndex, BlobRef> images;
+  for (const BlobRef& image : adoption.images) images[image.frame()] = image;
   const std::set<TaskKey> tasks(adoption.tasks.begin(), adoption.tasks.end());
-  const std::set<std::int32_t> lost(adoption.lost.begin(), adoption.lost.end());
+  const std::set<FrameIndex> lost(adoption.lost.begin(), adoption.lost.end());
   std::vector<Completion> taken;
   if (adoption.former) {
     const Digest& former = formers[*adoption.former];
     BATON_TRY(journal_.for_each_completion(former, [&](const Completion& completion) -> Status {
-      const auto image = images.find(completion.task.step);
-      const bool is_frame = completion.task.kind == TaskKind::assemble && image != images.end() &&
-                            completion.outputs.size() == 1 &&
+      const bool is_assembly = completion.task.kind == TaskKind::assemble;
+      const auto image = is_assembly ? images.find(completion.task.frame()) : images.end();
+      const bool is_frame = image != images.end() && completion.outputs.size() == 1 &&
                             completion.outputs.front() == image->second;
       if (is_frame) images.erase(image);
       // A frame that the job itself wrote and that is gone must come out as it was.
-      const bool is_lost = former == event.job && completion.task.kind == TaskKind::assemble &&
-                           lost.contains(completion.task.step);
+      const bool is_lost =
+          former == event.job && is_assembly && lost.contains(completion.task.frame());
       if (is_lost) event.lost.push_back(completion.task);
       if (is_frame || is_lost || tasks.contains(completion.task)) taken.push_back(completion);
       return {};
     }));
   }
   for (const auto& [frame, image] : images)
-    taken.push_back({{TaskKind::assemble, frame, 0}, {image}, {}, {}});
+    taken.push_back({assemble_task(frame), {image}, {}, {}});
   for (const TaskKey& task : adoption.settled) taken.push_back({task, {}, {}, {}});
 
   if (text.empty()) {

@@ -16,7 +16,7 @@ constexpr int kReferenceSamples = 512;
 constexpr std::uint64_t kReferenceSeed = 2'000'000'000;
 
 /// The job with at most kPilotPixels a picture, for some of its frames.
-JobSpec small_job(const JobSpec& job, std::vector<int> frames) {
+JobSpec small_job(const JobSpec& job, std::vector<FrameNumber> frames) {
   JobSpec small = job;
   small.frames = std::move(frames);
   const auto pixels = static_cast<double>(job.image.rendered().area());

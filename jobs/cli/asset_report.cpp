@@ -52,7 +52,8 @@ void load_camera_map(const CameraMapSpec& spec, AssetReport& report,
   report.camera_map = *map;
 }
 
-Result<PlateReport> load_plate_file(const JobSpec& job, int frame, const std::string& path) {
+Result<PlateReport> load_plate_file(const JobSpec& job, FrameNumber frame,
+                                    const std::string& path) {
   BATON_ASSIGN(const Plate plate, load_plate(job, frame));
   PlateReport report{.path = path, .repaired = plate.repaired, .colors = {}};
   if (!is_radiance_file(path)) return report;
@@ -64,7 +65,7 @@ Result<PlateReport> load_plate_file(const JobSpec& job, int frame, const std::st
 void load_plates(const JobSpec& job, AssetReport& report, std::vector<std::string>& faults) {
   if (!has_plate(job.output)) return;
   std::set<std::string> seen;
-  for (const int frame : job.frames) {
+  for (const FrameNumber frame : job.frames) {
     const std::string path = file_at(*job.output.plate, frame);
     if (!seen.insert(path).second) continue;
     const Result<PlateReport> plate = load_plate_file(job, frame, path);

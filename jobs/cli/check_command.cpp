@@ -121,7 +121,7 @@ void print_assets(const AssetReport& assets) {
 /// Each conversion once, however many plates there are.
 void print_plates(const JobSpec& job, const std::vector<PlateReport>& plates) {
   if (plates.empty()) return;
-  const auto file = [&](int frame) { return file_at(*job.output.plate, frame); };
+  const auto file = [&](FrameNumber frame) { return file_at(*job.output.plate, frame); };
   fmt::print("over       {}{}\n", file(job.frames.front()),
              job.frames.size() > 1 ? " ... " + file(job.frames.back()) : "");
   std::map<std::string, std::size_t> conversions;

@@ -90,28 +90,28 @@ Status check_alike(const std::vector<Compared>& jobs, const CompareOptions& opti
 }
 
 Result<double> noise_of(const Compared& compared) {
-  const auto count = static_cast<std::int32_t>(compared.seeds[0].frames.size());
-  const std::int32_t begin = std::max(count - static_cast<std::int32_t>(kNoiseFrames), 0);
+  const FrameIndex end(static_cast<std::int32_t>(compared.seeds[0].frames.size()));
+  const FrameIndex begin = std::max(end - static_cast<std::int32_t>(kNoiseFrames), FrameIndex());
   double squares = 0;
-  for (std::int32_t f = begin; f < count; ++f) {
+  for (FrameIndex f = begin; f < end; ++f) {
     BATON_ASSIGN(const FilmTile first, read_exr(frame_path(compared.seeds[0], f)));
     BATON_ASSIGN(const FilmTile second, read_exr(frame_path(compared.seeds[1], f)));
     const double noise = noise_of_seeds(first, second).relative();
     squares += noise * noise;
   }
-  return std::sqrt(squares / (count - begin));
+  return std::sqrt(squares / (end - begin));
 }
 
 /// A row of frames for each job.
 Status write_rows(const std::vector<Compared>& jobs, const fs::path& path) {
-  const std::vector<int> frames = pick_frames(jobs.front().job.frames, kSheetColumns);
+  const std::vector<FrameNumber> frames = pick_frames(jobs.front().job.frames, kSheetColumns);
   std::vector<RgbImage> thumbnails;
-  std::vector<int> numbers;
+  std::vector<FrameNumber> numbers;
   for (const Compared& compared : jobs) {
     const OutputSpec& out = compared.job.output;
-    for (const int frame : frames) {
-      BATON_ASSIGN(RgbImage thumbnail,
-                   read_thumbnail(fs::path(out.directory) / frame_file_name(out.pattern, frame)));
+    for (const FrameNumber frame : frames) {
+      BATON_ASSIGN(RgbImage thumbnail, read_thumbnail(fs::path(out.directory) /
+                                                      frame_file_name(out.pattern, frame.value())));
       thumbnails.push_back(std::move(thumbnail));
       numbers.push_back(frame);
     }

@@ -24,21 +24,25 @@ Result<RgbImage> read_thumbnail(const fs::path& path) {
 }
 
 Status write_sheet(const fs::path& path, std::vector<RgbImage> thumbnails,
-                   const std::vector<int>& numbers, int columns, const DisplayOptions& display) {
+                   const std::vector<FrameNumber>& numbers, int columns,
+                   const DisplayOptions& display) {
   for (RgbImage& thumbnail : thumbnails)
     thumbnail = display_radiance(std::move(thumbnail), display).image;
-  return write_png(path, contact_sheet(thumbnails, columns, thumbnails.front().width, numbers));
+  std::vector<int> labels;
+  for (const FrameNumber number : numbers) labels.push_back(number.value());
+  return write_png(path, contact_sheet(thumbnails, columns, thumbnails.front().width, labels));
 }
 
 FrameSheet::FrameSheet(const JobSpec& job)
     : output_(job.output), wanted_(pick_frames(job.frames, kMaxFrames)) {}
 
-void FrameSheet::add(const std::vector<int>& finished) {
-  for (const int frame : finished) {
+void FrameSheet::add(const std::vector<FrameNumber>& finished) {
+  for (const FrameNumber frame : finished) {
     const bool is_new = read_.ok() && !thumbnails_.contains(frame) &&
                         std::binary_search(wanted_.begin(), wanted_.end(), frame);
     if (!is_new) continue;
-    const fs::path path = fs::path(output_.directory) / frame_file_name(output_.pattern, frame);
+    const fs::path path =
+        fs::path(output_.directory) / frame_file_name(output_.pattern, frame.value());
     Result<RgbImage> thumbnail = read_thumbnail(path);
     if (!thumbnail) {
       read_ = thumbnail.error();
@@ -53,7 +57,7 @@ Result<std::optional<fs::path>> FrameSheet::write(const DisplayOptions& display)
   if (thumbnails_.empty()) return std::optional<fs::path>();
 
   std::vector<RgbImage> frames;
-  std::vector<int> numbers;
+  std::vector<FrameNumber> numbers;
   for (const auto& [frame, thumbnail] : thumbnails_) {
     frames.push_back(thumbnail);
     numbers.push_back(frame);

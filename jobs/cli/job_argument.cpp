@@ -82,16 +82,17 @@ Result<WantedJob> load_wanted(const JobArgument& argument, bool look) {
   return wanted;
 }
 
-void add_from_frame_option(CLI::App& command, std::optional<int>& frame) {
-  command.add_option("--from-frame", frame,
-                     "keep the frames before this one, of whatever picture they are, and render "
-                     "from here on afresh, in place of those that are there");
+void add_from_frame_option(CLI::App& command, std::optional<FrameNumber>& frame) {
+  command.add_option_function<int>(
+      "--from-frame", [&frame](int number) { frame = FrameNumber(number); },
+      "keep the frames before this one, of whatever picture they are, and render "
+      "from here on afresh, in place of those that are there");
 }
 
-Status begin_at(JobSpec& job, std::optional<int> frame) {
+Status begin_at(JobSpec& job, std::optional<FrameNumber> frame) {
   if (!frame) return {};
-  const int last = job.frames.back();
-  std::erase_if(job.frames, [&](int number) { return number < *frame; });
+  const FrameNumber last = job.frames.back();
+  std::erase_if(job.frames, [&](FrameNumber number) { return number < *frame; });
   if (!job.frames.empty()) return {};
   return Error{ErrorKind::usage,
                fmt::format("--from-frame {}: the last frame of the job is {}", *frame, last)};

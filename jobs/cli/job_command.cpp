@@ -27,14 +27,14 @@ constexpr std::chrono::minutes kWaitPatience{5};
 
 struct JobOptions {
   CoordinatorLink link;
-  std::string job;                ///< name, digest or its beginning
-  JobArgument wanted;             ///< of submit
-  double timeout_s = 0;           ///< of wait; 0: none
-  bool restart = false;           ///< of submit
-  std::optional<int> from_frame;  ///< of submit
-  int rounds = 0;                 ///< of refine; 0: as many as a sweep has
-  bool all = false;               ///< of list
-  bool all_ended = false;         ///< of delete
+  std::string job;                        ///< name, digest or its beginning
+  JobArgument wanted;                     ///< of submit
+  double timeout_s = 0;                   ///< of wait; 0: none
+  bool restart = false;                   ///< of submit
+  std::optional<FrameNumber> from_frame;  ///< of submit
+  int rounds = 0;                         ///< of refine; 0: as many as a sweep has
+  bool all = false;                       ///< of list
+  bool all_ended = false;                 ///< of delete
   bool json = false;
 };
 

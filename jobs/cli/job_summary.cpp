@@ -49,11 +49,11 @@ void add_quality(const FrameQuality& q, ordered_json& row) {
   row["pixelsNotFinite"] = q.pixels_not_finite;
 }
 
-ordered_json judgement_json(std::span<const FrameStats> frames) {
+ordered_json judgement_json(std::span<const FrameReport> frames) {
   const Judgement j = judge_frames(frames);
   ordered_json odd = ordered_json::array();
   for (const OddFrame& frame : j.odd) {
-    odd.push_back({{"frame", frame.frame},
+    odd.push_back({{"frame", frame.frame.value()},
                    {"by", frame.by_noise ? "noise" : "mean"},
                    {"ratio", frame.ratio}});
   }
@@ -212,12 +212,14 @@ ordered_json summary_json(const JobSummary& job) {
 
 ordered_json detail_json(const JobDetail& detail) {
   ordered_json result = summary_json(detail.summary);
-  result["framesDoneNumbers"] = detail.frames_done;
+  result["framesDoneNumbers"] = ordered_json::array();
+  for (const FrameNumber frame : detail.frames_done)
+    result["framesDoneNumbers"].push_back(frame.value());
   if (!detail.waits.empty()) result["waits"] = detail.waits;
   result["judgement"] = judgement_json(detail.frames);
   result["frames"] = ordered_json::array();
-  for (const FrameStats& frame : detail.frames) {
-    ordered_json row = {{"frame", frame.frame}};
+  for (const FrameReport& frame : detail.frames) {
+    ordered_json row = {{"frame", frame.frame.value()}};
     add_sampling(frame.sampling, row);
     add_quality(frame.quality, row);
     result["frames"].push_back(std::move(row));

@@ -18,7 +18,7 @@ namespace {
 namespace fs = std::filesystem;
 
 /// "shot.0012.exr" as "shot.#.exr" and 12; nullopt: no EXR file with a number before its ending.
-std::optional<std::pair<std::string, int>> split_name(const std::string& name) {
+std::optional<std::pair<std::string, FrameNumber>> split_name(const std::string& name) {
   constexpr std::string_view kEnding = ".exr";
   if (!name.ends_with(kEnding)) return std::nullopt;
   const std::string stem = name.substr(0, name.size() - kEnding.size());
@@ -27,12 +27,12 @@ std::optional<std::pair<std::string, int>> split_name(const std::string& name) {
   const char* const end = stem.data() + stem.size();
   const auto read = std::from_chars(stem.data() + first, end, number);
   if (read.ec != std::errc() || read.ptr != end) return std::nullopt;
-  return std::pair{stem.substr(0, first) + "#" + std::string(kEnding), number};
+  return std::pair{stem.substr(0, first) + "#" + std::string(kEnding), FrameNumber(number)};
 }
 
 /// Every numbered EXR file of a folder, by number.
-Result<std::map<int, fs::path>> files_in(const fs::path& folder) {
-  std::map<int, fs::path> files;
+Result<std::map<FrameNumber, fs::path>> files_in(const fs::path& folder) {
+  std::map<FrameNumber, fs::path> files;
   std::string pattern;
   std::error_code error;
   for (const fs::directory_entry& entry : fs::directory_iterator(folder, error)) {
@@ -66,12 +66,12 @@ Result<std::string> rate_of(const fs::path& frame) {
 Result<FrameFolder> in_folder(const fs::path& path, const std::string& range) {
   BATON_ASSIGN(const auto files, files_in(path));
   FrameFolder folder{path, {}, {}, {}};
-  std::vector<int> wanted;
+  std::vector<FrameNumber> wanted;
   for (const auto& [number, file] : files) wanted.push_back(number);
   if (!range.empty()) {
     BATON_ASSIGN(wanted, parse_frames(range));
   }
-  for (const int number : wanted) {
+  for (const FrameNumber number : wanted) {
     const auto found = files.find(number);
     if (found == files.end()) {
       folder.missing.push_back(number);
@@ -91,8 +91,8 @@ Result<FrameFolder> of_job(const fs::path& path, const std::string& range) {
     BATON_ASSIGN(job.frames, parse_frames(range));
   }
   FrameFolder folder{job.output.directory, {}, {}, fmt::format("{}", job.output.frames_per_second)};
-  for (const int number : job.frames) {
-    const fs::path file = folder.directory / frame_file_name(job.output.pattern, number);
+  for (const FrameNumber number : job.frames) {
+    const fs::path file = folder.directory / frame_file_name(job.output.pattern, number.value());
     std::error_code error;
     if (fs::is_regular_file(file, error)) {
       folder.frames.push_back({number, file});

@@ -5,12 +5,13 @@
 #include <vector>
 
 #include "common/base/result.h"
+#include "common/job/time.h"
 
 namespace baton {
 
 /// A frame of a sequence on disk.
 struct NumberedFrame {
-  int number = 0;
+  FrameNumber number{};
   std::filesystem::path file;
 };
 
@@ -18,7 +19,7 @@ struct NumberedFrame {
 struct FrameFolder {
   std::filesystem::path directory;
   std::vector<NumberedFrame> frames;  ///< those that are there; ascending, at least one
-  std::vector<int> missing;           ///< ascending
+  std::vector<FrameNumber> missing;   ///< ascending
   std::string frames_per_second;      ///< a number, "24" or "24000/1001"
 };
 

@@ -155,7 +155,7 @@ Result<std::optional<JobStatus>> RenderSession::render(JobSpec job, bool restart
 
 Status RenderSession::write_png_of(const JobSpec& job) const {
   if (options_.out.empty()) return {};
-  BATON_ASSIGN(RgbImage image, read_rgb_image(frame_path(job, 0), ExrWindow::seen));
+  BATON_ASSIGN(RgbImage image, read_rgb_image(frame_path(job, FrameIndex(0)), ExrWindow::seen));
   const Display shown = display_radiance(std::move(image), options_.display);
   BATON_TRY(write_png(options_.out, shown.image));
   if (!options_.json) fmt::print("picture    {}, {}\n", options_.out, shown.how);

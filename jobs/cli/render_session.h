@@ -24,7 +24,7 @@ struct RenderOptions {
   DisplayOptions display;             ///< of the sheet and of `out`
   bool watch = false;
   bool restart = false;
-  std::optional<int> from_frame;
+  std::optional<FrameNumber> from_frame;
   bool keep_running = false;
   bool json = false;
 };

@@ -37,7 +37,7 @@ struct Shot {
 };
 
 Shot first_shot(const JobSpec& job, const Scene& scene) {
-  const double frame = job.frames.front();
+  const double frame = job.frames.front().value();
   Shot shot{pose_at(scene, job, frame), camera_at(job, frame), {}, {}};
   shot.objects.resize(std::min(job.scene.objects.size(), shot.pose.instances.size()));
   for (std::size_t i = 0; i < shot.objects.size(); ++i) {

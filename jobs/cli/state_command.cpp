@@ -78,7 +78,7 @@ ordered_json report_json(const StateReport& report) {
   for (std::size_t i = 0; i < kSourceNames.size(); ++i)
     sources[std::string(kSourceNames[i])] = report.sources[i];
   return {{"picture", state.picture.hex()},
-          {"frameIndex", state.frame_index},
+          {"frameIndex", state.step.value()},
           {"tile", state.tile},
           {"rect", {state.rect.x0, state.rect.y0, state.rect.x1, state.rect.y1}},
           {"numParticles", state.num_particles},
@@ -95,7 +95,7 @@ void print_report(const StateReport& report) {
   fmt::print("picture    {}\n", state.picture.hex());
   fmt::print("tile       {}, pixels [{}, {}) x [{}, {})\n", state.tile, rect.x0, rect.x1, rect.y0,
              rect.y1);
-  fmt::print("frame      index {}\n", state.frame_index);
+  fmt::print("frame      index {}\n", state.step);
   fmt::print("particles  {} a pixel\n", state.num_particles);
   fmt::print("size       {} bytes, {:.1f} a pixel\n", report.file_bytes, bytes_per_pixel(report));
   for (const SectionInfo& s : report.sections) {

@@ -21,11 +21,11 @@ bool sees_ground(const JobSpec& job, const Ray& ray) {
   return distance > 0 && std::max(std::abs(at.x), std::abs(at.z)) <= ground.size / 2;
 }
 
-double share_in(const JobSpec& job, const Scene& scene, int frame) {
-  const Pose pose = pose_at(scene, job, frame);
+double share_in(const JobSpec& job, const Scene& scene, FrameNumber frame) {
+  const Pose pose = pose_at(scene, job, frame.value());
   const int height = std::clamp(
       static_cast<int>(std::int64_t{kWidth} * job.image.height / job.image.width), 1, 2 * kWidth);
-  PreviewCanvas canvas(camera_at(job, frame), kWidth, height);
+  PreviewCanvas canvas(camera_at(job, frame.value()), kWidth, height);
   for (const Instance& instance : pose.instances) {
     const std::span<const Vec3> at = vertices_of(scene, pose.shapes, instance.mesh).positions;
     for (const auto& corners : scene.meshes[instance.mesh].triangles) {
@@ -56,9 +56,9 @@ double share_in(const JobSpec& job, const Scene& scene, int frame) {
 }  // namespace
 
 double surface_share(const JobSpec& job, const Scene& scene) {
-  const std::vector<int>& frames = job.frames;
+  const std::vector<FrameNumber>& frames = job.frames;
   double share = 0;
-  for (const int frame : std::set{frames.front(), frames[frames.size() / 2], frames.back()})
+  for (const FrameNumber frame : std::set{frames.front(), frames[frames.size() / 2], frames.back()})
     share = std::max(share, share_in(job, scene, frame));
   return share;
 }

@@ -27,8 +27,8 @@ double header_number(const std::filesystem::path& frame, const std::string& name
 /// Of the noisiest frame.
 float largest_noise(const JobSpec& job) {
   float noise = 0;
-  for (std::size_t frame = 0; frame < job.frames.size(); ++frame) {
-    const auto path = frame_path(job, static_cast<std::int32_t>(frame));
+  for (FrameIndex frame; frame.index() < job.frames.size(); ++frame) {
+    const auto path = frame_path(job, frame);
     noise = std::max(noise, static_cast<float>(header_number(path, "baton:cyclesNoise")));
   }
   return noise;
@@ -37,8 +37,8 @@ float largest_noise(const JobSpec& job) {
 /// Of the frames that are there, at most; 0: there are none, or not of whole sweeps.
 int written_sweeps(const JobSpec& job) {
   double rounds = 0;
-  for (std::size_t frame = 0; frame < job.frames.size(); ++frame) {
-    const auto path = frame_path(job, static_cast<std::int32_t>(frame));
+  for (FrameIndex frame; frame.index() < job.frames.size(); ++frame) {
+    const auto path = frame_path(job, frame);
     rounds = std::max(rounds, header_number(path, "baton:rounds"));
   }
   const int whole = static_cast<int>(std::min<double>(rounds, limits::kMaxRounds));

@@ -3,6 +3,7 @@
 #include <limits>
 #include <vector>
 
+#include "common/job/time.h"
 #include "jobs/study/picture.h"
 
 namespace baton {
@@ -13,7 +14,7 @@ inline constexpr double kNotMeasured = std::numeric_limits<double>::quiet_NaN();
 /// (I - A)(I - B) with the halves A and B of the reference: their expectation is the error against
 /// the truth, free of the reference's own noise (a value below zero is such noise).
 struct FrameMeasures {
-  int frame = 0;
+  FrameNumber frame{};
   double mse = 0;              ///< over R, G, B
   double rel_mse = 0;          ///< mean of (I - R)^2 / (R + .01)^2
   double flip = 0;             ///< mean LDR-FLIP of the tone-mapped pictures, [0, 1]

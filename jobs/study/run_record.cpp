@@ -50,10 +50,14 @@ void visit_frame(Frame& m, F visit) {
 struct Write {
   json& out;
   void operator()(const char* name, const auto& value) const { out[name] = value; }
+  void operator()(const char* name, FrameNumber value) const { out[name] = value.value(); }
 };
 struct Read {
   const json& in;
   void operator()(const char* name, auto& value) const { in.at(name).get_to(value); }
+  void operator()(const char* name, FrameNumber& value) const {
+    value = FrameNumber(in.at(name).get<std::int32_t>());
+  }
   void operator()(const char* name, double& value) const {
     value = in.at(name).is_null() ? kNotMeasured : in.at(name).get<double>();
   }

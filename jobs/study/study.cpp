@@ -92,15 +92,15 @@ void prepare_output(JobSpec& job) {
 }
 
 /// The measured frames: those of `text`, or all.
-std::vector<int> measured_frames(const std::string& text, const JobSpec& job,
-                                 const std::string& path, StudyFaults& faults) {
+std::vector<FrameNumber> measured_frames(const std::string& text, const JobSpec& job,
+                                         const std::string& path, StudyFaults& faults) {
   if (text.empty()) return job.frames;
-  Result<std::vector<int>> frames = parse_frames(text);
+  Result<std::vector<FrameNumber>> frames = parse_frames(text);
   if (!frames) {
     faults.add(path, frames.error().message);
     return job.frames;
   }
-  for (const int frame : *frames) {
+  for (const FrameNumber frame : *frames) {
     if (!std::binary_search(job.frames.begin(), job.frames.end(), frame))
       faults.add(path, fmt::format("expected frames of the job ({}), got {}",
                                    format_frames(job.frames), frame));
@@ -142,7 +142,7 @@ void read_scene(StudyObject& object, const Shared& shared, Study& study, StudyFa
   scene.name = object.name("name");
   const fs::path file = object.file("job", shared.base_directory);
   const StudyPatch patch{object.path_of("patch"), object.patch("patch")};
-  scene.cut_frame = object.integer("cutFrame", 0, 1, limits::kMaxFrameNumber);
+  scene.cut_frame = FrameNumber(object.integer("cutFrame", 0, 1, limits::kMaxFrameNumber));
   if (file.empty()) return;
   const Result<JobSpec> given = load_job(file);
   if (!given) {
@@ -159,7 +159,7 @@ void read_scene(StudyObject& object, const Shared& shared, Study& study, StudyFa
   prepare_output(*plain);
   scene.crop = read_crop(object, plain->image.shown(), faults);
   scene.frames = measured_frames(shared.measured, *plain, shared.measured_path, faults);
-  if (scene.cut_frame > 0 &&
+  if (scene.cut_frame > FrameNumber(0) &&
       !std::binary_search(scene.frames.begin() + 1, scene.frames.end(), scene.cut_frame)) {
     faults.add(object.path_of("cutFrame"),
                fmt::format("expected a measured frame after the first ({}), got {}",
@@ -197,7 +197,8 @@ void prepare_measured(JobSpec& job) {
   if (job.image.site_seed == 0) job.image.site_seed = kSiteSeed;
 }
 
-JobSpec reference_job(const JobSpec& job, int samples, const std::vector<int>& frames, int half) {
+JobSpec reference_job(const JobSpec& job, int samples, const std::vector<FrameNumber>& frames,
+                      int half) {
   JobSpec reference = job;
   reference.frames = frames;
   reference.name = "reference";

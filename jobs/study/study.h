@@ -19,15 +19,16 @@ inline constexpr const char* kFramePattern = "frame.####.exr";
 /// light.
 void prepare_measured(JobSpec& job);
 /// Brute force for some frames of such a job. half: 0 or 1, of two with seeds of their own.
-JobSpec reference_job(const JobSpec& job, int samples, const std::vector<int>& frames, int half);
+JobSpec reference_job(const JobSpec& job, int samples, const std::vector<FrameNumber>& frames,
+                      int half);
 
 /// A scene of a study, with the two halves of its reference: equal jobs with different seeds, so
 /// that their difference tells what the reference can resolve.
 struct StudyScene {
   std::string name;
   std::array<JobSpec, 2> reference;  ///< of the measured frames alone
-  std::vector<int> frames;           ///< measured frame numbers
-  int cut_frame = 0;          ///< a measured frame at which the light changes at once; 0: none
+  std::vector<FrameNumber> frames;   ///< measured
+  FrameNumber cut_frame{};    ///< a measured frame at which the light changes at once; 0: none
   std::array<int, 4> crop{};  ///< x, y, width, height in pixels, shown side by side
 };
 

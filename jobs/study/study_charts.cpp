@@ -71,7 +71,7 @@ constexpr Course kCourses[] = {
 };
 
 ChartPoint course_point(const Course& course, const StudyResults& results, std::size_t scene,
-                        std::size_t cell, std::size_t frame, int number) {
+                        std::size_t cell, std::size_t frame, FrameNumber number) {
   std::vector<double> values;
   for (const RunRecord& run : results.runs[cell]) values.push_back(run.frames[frame].*course.value);
   Interval i = mean_interval(values);
@@ -81,8 +81,8 @@ ChartPoint course_point(const Course& course, const StudyResults& results, std::
     const double mean = std::max(results.references[scene][frame].mean_radiance, 1e-12);
     i = {i.low / mean, i.value / mean, i.high / mean};
   }
-  return {static_cast<double>(number), i.value, i.low, i.high,
-          std::to_string(number),      false,   false};
+  return {static_cast<double>(number.value()), i.value, i.low, i.high,
+          fmt::format("{}", number),           false,   false};
 }
 
 }  // namespace
@@ -106,7 +106,7 @@ std::vector<NamedChart> error_charts(const Study& study, const StudyResults& res
 std::vector<NamedChart> temporal_charts(const Study& study, const StudyResults& results,
                                         std::size_t scene) {
   std::vector<NamedChart> charts;
-  const std::vector<int>& frames = study.scenes[scene].frames;
+  const std::vector<FrameNumber>& frames = study.scenes[scene].frames;
   if (frames.size() < 2) return charts;
   for (const Course& course : kCourses) {
     Chart chart;

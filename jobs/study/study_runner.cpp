@@ -15,7 +15,7 @@ namespace {
 namespace fs = std::filesystem;
 
 /// A run that has a name and may be done.
-struct Run {
+struct KeyedRun {
   std::size_t cell = 0;
   int seed = 0;
   std::string key;
@@ -45,7 +45,7 @@ Result<std::vector<Reference>> load_references(const StudyScene& scene, const St
     frames[half] = folder.frames_folder(key);
   }
   std::vector<Reference> references;
-  for (const int frame : scene.frames) {
+  for (const FrameNumber frame : scene.frames) {
     BATON_ASSIGN(Picture a, read_picture(frame_file(frames[0], frame)));
     BATON_ASSIGN(Picture b, read_picture(frame_file(frames[1], frame)));
     references.push_back(make_reference(std::move(a), std::move(b)));
@@ -85,7 +85,7 @@ Status render_references(const Study& study, const StudyFolder& folder, JobRunne
 }
 
 /// Measures the frames of a finished run.
-Result<RunRecord> measure_run(const JobSpec& job, const std::vector<int>& frames,
+Result<RunRecord> measure_run(const JobSpec& job, const std::vector<FrameNumber>& frames,
                               const std::vector<Reference>& references) {
   RunRecord record;
   Picture before;
@@ -118,8 +118,8 @@ std::optional<RunRecord> kept_record(const StudyFolder& folder, const StudyScene
 
 void JobRunner::say(const std::string& text) { spdlog::info("{}", text); }
 
-fs::path frame_file(const fs::path& folder, int frame) {
-  return folder / frame_file_name(kFramePattern, frame);
+fs::path frame_file(const fs::path& folder, FrameNumber frame) {
+  return folder / frame_file_name(kFramePattern, frame.value());
 }
 
 std::string file_slug(const std::string& name) {
@@ -157,7 +157,7 @@ Result<StudyResults> run_study(const Study& study, const StudyFolder& folder, Jo
     cell_keys.push_back(std::move(key));
     results.runs[c].resize(static_cast<std::size_t>(study.num_seeds));
   }
-  std::vector<Run> runs;
+  std::vector<KeyedRun> runs;
   std::vector<JobSpec> jobs;
   for (int seed = 1; seed <= study.num_seeds; ++seed) {
     for (std::size_t c = 0; c < study.cells.size(); ++c) {
@@ -179,7 +179,7 @@ Result<StudyResults> run_study(const Study& study, const StudyFolder& folder, Jo
   if (runs.empty()) return results;
 
   const auto keep = [&](std::size_t index, const JobSummary& summary) -> Status {
-    const Run& run = runs[index];
+    const KeyedRun& run = runs[index];
     const auto scene = study.cells[run.cell].scene;
     BATON_ASSIGN(RunRecord record,
                  measure_run(jobs[index], study.scenes[scene].frames, results.references[scene]));

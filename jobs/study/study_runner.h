@@ -46,7 +46,7 @@ class StudyFolder {
 };
 
 /// The file of a frame in a folder of frames.
-std::filesystem::path frame_file(const std::filesystem::path& folder, int frame);
+std::filesystem::path frame_file(const std::filesystem::path& folder, FrameNumber frame);
 /// For file names: lower case, nothing but letters, digits and '-'.
 std::string file_slug(const std::string& name);
 

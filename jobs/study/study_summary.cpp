@@ -181,7 +181,7 @@ std::vector<bool> pareto_front(const std::vector<double>& costs,
 double lag_after_cut(const StudyScene& scene, const std::vector<RunRecord>& runs) {
   std::vector<double> errors;
   for (std::size_t f = 0; f < scene.frames.size(); ++f) {
-    if (scene.cut_frame == 0 || scene.frames[f] < scene.cut_frame) continue;
+    if (scene.cut_frame == FrameNumber(0) || scene.frames[f] < scene.cut_frame) continue;
     const auto values = per_run(runs, f, [](const FrameMeasures& m) { return m.mse; });
     errors.push_back(mean_interval(values).value);
   }

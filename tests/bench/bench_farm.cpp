@@ -64,12 +64,12 @@ Result<Cost> measure(const std::function<Status()>& work) {
 }
 
 /// All tiles of a frame, by two threads.
-Status render_tiles(LocalRender& render, std::int32_t num_tiles, std::int32_t frame) {
+Status render_tiles(LocalRender& render, std::int32_t num_tiles, Step step) {
   std::vector<Result<RenderedTile>> rendered(static_cast<std::size_t>(num_tiles), RenderedTile{});
   std::atomic<std::int32_t> next{0};
   const auto work = [&] {
     for (std::int32_t tile = next++; tile < num_tiles; tile = next++)
-      rendered[static_cast<std::size_t>(tile)] = render.render(frame, tile);
+      rendered[static_cast<std::size_t>(tile)] = render.render(step, tile);
   };
   std::thread other(work);
   work();
@@ -88,8 +88,8 @@ Status render_in_process(const JobSpec& given, bool write) {
   BATON_ASSIGN(const auto context, load_render_context(job, Digest{1, 1}));
   LocalRender render(*context);
   std::future<Status> written;
-  for (std::int32_t frame = 0; frame < std::ssize(job.frames); ++frame) {
-    BATON_TRY(render_tiles(render, context->grid.count(), frame));
+  for (FrameIndex frame; frame.index() < job.frames.size(); ++frame) {
+    BATON_TRY(render_tiles(render, context->grid.count(), Step(frame.value())));
     if (written.valid()) BATON_TRY(written.get());
     RenderStats stats;
     BATON_ASSIGN(FilmTile image, test::local_image(render, job, frame, stats));

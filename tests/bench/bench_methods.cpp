@@ -56,10 +56,11 @@ std::vector<Case> make_cases() {
 Result<RenderStats> measure(const JobSpec& job) {
   BATON_ASSIGN(const auto context, load_render_context(job, Digest{1, 1}));
   RenderStats total;
-  const TileRunSink sink{[](int, const FilmTile&) { return Status(); },
+  const TileRunSink sink{[](Step, const FilmTile&) { return Status(); },
                          [](const SampleState&) { return Status(); }};
   for (std::int32_t tile = 0; tile < context->grid.count(); ++tile) {
-    BATON_ASSIGN(const RenderStats stats, run_tile(*context, tile_run(job, tile, 0), {}, sink, {}));
+    BATON_ASSIGN(const RenderStats stats,
+                 run_tile(*context, tile_run(job, tile, Run(0)), {}, sink, {}));
     total.merge(stats);
   }
   return total;

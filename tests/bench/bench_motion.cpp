@@ -57,7 +57,7 @@ Result<Cost> measure(const JobSpec& job) {
   Cost cost;
   std::vector<StatePtr> states(num_tiles);
   std::vector<double> seconds_of(num_tiles);
-  for (std::int32_t run = 0; run < num_runs(job); ++run) {
+  for (Run run; run.value() < num_runs(job); ++run) {
     Cost frame;
     std::vector<StatePtr> next(num_tiles);
     std::vector<double> next_seconds(num_tiles);
@@ -65,11 +65,11 @@ Result<Cost> measure(const JobSpec& job) {
       const auto t = static_cast<std::size_t>(tile);
       std::vector<StatePtr> previous;
       for (const std::int32_t near : context->grid.tiles_near(tile, history_reach_px(job))) {
-        if (run == 0) continue;
+        if (run == Run(0)) continue;
         previous.push_back(states[static_cast<std::size_t>(near)]);
         frame.seconds_decode_inputs += seconds_of[static_cast<std::size_t>(near)];
       }
-      const TileRunSink sink{[](int, const FilmTile&) { return Status(); },
+      const TileRunSink sink{[](Step, const FilmTile&) { return Status(); },
                              [&](const SampleState& state) -> Status {
                                BATON_ASSIGN(next[t], hand_on(state, frame, next_seconds[t]));
                                frame.seconds_decode += next_seconds[t];
@@ -81,7 +81,7 @@ Result<Cost> measure(const JobSpec& job) {
     }
     states = std::move(next);
     seconds_of = std::move(next_seconds);
-    if (run == 0) continue;
+    if (run == Run(0)) continue;
 
     // run_tile counts what its sink does.
     frame.stats.cpu_seconds -= frame.seconds_encode + frame.seconds_decode;

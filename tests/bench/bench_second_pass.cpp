@@ -27,12 +27,12 @@ Result<RenderStats> measure(const JobSpec& job, std::uint64_t& blob_bytes,
   RenderStats total;
   blob_bytes = 0;
   seconds_primary_again = 0;
-  for (std::int32_t frame = 0; frame < static_cast<std::int32_t>(job.frames.size()); ++frame) {
+  for (Step step; step.index() < job.frames.size(); ++step) {
     std::vector<FilmTile> films;
     std::vector<FirstPassPtr> samples;
     const TileRunSink sink{
         .film =
-            [&](int, const FilmTile& film) {
+            [&](Step, const FilmTile& film) {
               films.push_back(film);
               return Status();
             },
@@ -44,7 +44,7 @@ Result<RenderStats> measure(const JobSpec& job, std::uint64_t& blob_bytes,
         }};
     for (std::int32_t tile = 0; tile < context->grid.count(); ++tile) {
       BATON_ASSIGN(const RenderStats stats,
-                   run_tile(*context, {tile, 0, frame, frame}, {}, sink, {}));
+                   run_tile(*context, {tile, Run(0), {step, step}}, {}, sink, {}));
       total.merge(stats);
     }
     for (std::int32_t tile = 0; tile < context->grid.count(); ++tile) {
@@ -54,7 +54,7 @@ Result<RenderStats> measure(const JobSpec& job, std::uint64_t& blob_bytes,
       for (int k = 0; k < repeat; ++k) {
         BATON_ASSIGN(
             const SecondPassOutput second,
-            run_second_pass(*context, frame, tile, films[static_cast<std::size_t>(tile)], near));
+            run_second_pass(*context, step, tile, films[static_cast<std::size_t>(tile)], near));
         total.merge(second.stats);
         seconds_primary_again += second.seconds_primary_rays;
       }

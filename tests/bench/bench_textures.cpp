@@ -135,11 +135,11 @@ JobSpec sheet_job(const JobSpec& light, const fs::path& folder, Images images) {
 /// Nanoseconds of a pixel with a surface.
 Result<double> measure(const RenderContext& context) {
   RenderStats total;
-  const TileRunSink sink{[](int, const FilmTile&) { return Status(); },
+  const TileRunSink sink{[](Step, const FilmTile&) { return Status(); },
                          [](const SampleState&) { return Status(); }};
   for (std::int32_t tile = 0; tile < context.grid.count(); tile += kTileStep) {
     BATON_ASSIGN(const RenderStats stats,
-                 run_tile(context, tile_run(context.job, tile, 0), {}, sink, {}));
+                 run_tile(context, tile_run(context.job, tile, Run(0)), {}, sink, {}));
     total.merge(stats);
   }
   return total.cpu_seconds / static_cast<double>(total.pixels - total.pixels_background) * 1e9;
@@ -159,7 +159,7 @@ Status compare(const JobSpec& light, const fs::path& folder, int frames, int tur
       JobSpec job = sheet_job(light, folder, images);
       job.image.sites = sites;
       job.frames.clear();
-      for (int frame = 1; frame <= frames; ++frame) job.frames.push_back(frame);
+      for (int frame = 1; frame <= frames; ++frame) job.frames.emplace_back(frame);
       job.state.checkpoint_every = frames;
       BATON_ASSIGN(contexts[static_cast<std::size_t>(images)],
                    load_render_context(job, Digest{1, 1}));

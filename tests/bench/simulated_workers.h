@@ -207,12 +207,12 @@ class SimulatedWorker {
   Status finish(const LeaseId& lease) {
     const TaskKey& task = lease.task;
     TaskDone done{lease, {}, numbers_like_those_of_a_tile()};
-    const auto publish = [&](BlobKind kind, std::int32_t frame) -> Status {
-      const std::string text =
-          fmt::format("{} {} {} {}", static_cast<int>(kind), frame, task.tile, run_.digest.hex());
-      BlobRef blob{kind, frame, task.tile, {}, text.size()};
+    const auto publish = [&](BlobKind kind, std::int32_t position) -> Status {
+      const std::string text = fmt::format("{} {} {} {}", static_cast<int>(kind), position,
+                                           task.tile, run_.digest.hex());
+      BlobRef blob{kind, position, task.tile, {}, text.size()};
       if (kind == BlobKind::image) {
-        BATON_TRY(write_file_unsynced(frame_path(run_.job, frame), as_bytes_view(text)));
+        BATON_TRY(write_file_unsynced(frame_path(run_.job, blob.frame()), as_bytes_view(text)));
         blob.digest = digest_of(text);
       } else {
         BATON_ASSIGN(blob.digest, run_.store.put(as_bytes_view(text)));
@@ -221,14 +221,14 @@ class SimulatedWorker {
       return {};
     };
     if (task.kind == TaskKind::assemble) {
-      BATON_TRY(publish(BlobKind::image, task.step));
+      BATON_TRY(publish(BlobKind::image, task.position));
     } else {
-      const TileRun tiles = tile_run(run_.job, task.tile, task.step);
-      for (std::int32_t frame = tiles.first_frame; frame <= tiles.last_frame; ++frame) {
-        BATON_TRY(publish(BlobKind::film, frame));
-        done.frames.push_back({frame, task.tile, done.stats.sampling});
+      const TileRun tiles = tile_run(run_.job, task.tile, task.run());
+      for (Step step = tiles.steps.first; step <= tiles.steps.last; ++step) {
+        BATON_TRY(publish(BlobKind::film, step.value()));
+        done.frames.push_back({step.value(), task.tile, done.stats.sampling});
       }
-      if (carries_state(run_.job)) BATON_TRY(publish(BlobKind::state, tiles.last_frame));
+      if (carries_state(run_.job)) BATON_TRY(publish(BlobKind::state, tiles.steps.last.value()));
     }
     send(done);
     ++run_.reports;

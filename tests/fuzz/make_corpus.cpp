@@ -40,7 +40,7 @@ Status write_both(const fs::path& folder, const std::string& name, const Bytes& 
 SampleState small_state(std::int32_t particles, std::int32_t populations) {
   SampleState state;
   state.picture = {1, 2};
-  state.frame_index = 5;
+  state.step = Step(5);
   state.tile = 7;
   state.resize({8, 16, 12, 19}, particles, populations);
   const auto n = static_cast<std::size_t>(particles);

@@ -263,7 +263,7 @@ void add_frame_cases(std::vector<Case>& cases) {
 
 }  // namespace
 
-std::vector<int> Timeline::judged() const {
+std::vector<FrameNumber> Timeline::judged() const {
   std::set<int> numbers{1, 2};
   for (int pair = 1; pair < 5; ++pair) {
     numbers.insert({1 + frames * 3 * pair / 20, 2 + frames * 3 * pair / 20});
@@ -273,7 +273,9 @@ std::vector<int> Timeline::judged() const {
   if (event > 0) {
     for (const int after : {-1, 0, 1, 2, 4, 8, 16}) numbers.insert(std::min(event + after, frames));
   }
-  return {numbers.begin(), numbers.end()};
+  std::vector<FrameNumber> judged;
+  for (const int number : numbers) judged.emplace_back(number);
+  return judged;
 }
 
 Timeline Case::timeline(const Effort& effort) const {

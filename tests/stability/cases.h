@@ -28,7 +28,7 @@ struct Timeline {
   int late() const { return frames - frames / 4 + 1; }
   /// The frames that are compared with the exact answer, ascending: the first two, pairs spread
   /// over the sequence, those about the jump, four pairs in the late window.
-  std::vector<int> judged() const;
+  std::vector<FrameNumber> judged() const;
 };
 
 /// One way to make samplers stumble: a small job, what it tries, and what must hold.

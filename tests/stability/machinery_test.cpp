@@ -143,8 +143,7 @@ JobSpec second_pass_job(MaskPolicy mask) {
   job.sampling.num_particles = 4;
   job.visibility = {.correlated = true, .mask = mask};
   job.state.carry = false;
-  job.frames.resize(2500);
-  std::iota(job.frames.begin(), job.frames.end(), 1);
+  job.frames = test::frame_numbers(2500);
   return job;
 }
 
@@ -162,7 +161,7 @@ struct PixelVerdict {
 /// how pixels correlate.
 PixelVerdict judge_pixels(const JobSpec& job) {
   JobSpec one = job;
-  one.frames = {1};
+  one.frames = {FrameNumber(1)};
   const auto truth = exact_truth(one, 8, 1);
   const auto context = load_render_context(job, Digest{1, 2});
   EXPECT_TRUE(truth.ok() && context.ok());

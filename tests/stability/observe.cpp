@@ -73,7 +73,7 @@ struct Run {
 class SharedLights {
  public:
   /// Renders `job` with the lights of earlier jobs of the same run.
-  Status render(const JobSpec& job, const std::vector<int>& judged, const Subject& subject,
+  Status render(const JobSpec& job, const std::vector<FrameNumber>& judged, const Subject& subject,
                 Run& run) {
     BATON_ASSIGN(const auto loaded, load_render_context(job, Digest{1, 2}));
     auto& owner = owners_[{job.sampling.method, job.sampling.mis_compensation}];
@@ -91,11 +91,11 @@ class SharedLights {
   }
 
  private:
-  static Status render_run(const RenderContext& context, const std::vector<int>& judged, Run& run) {
+  static Status render_run(const RenderContext& context, const std::vector<FrameNumber>& judged, Run& run) {
     run.resize(judged.size());
-    const test::FrameSink sink = [&](std::int32_t index, const FilmTile& film) {
+    const test::FrameSink sink = [&](Step step, const FilmTile& film) {
       run.count_values(film);
-      const int number = context.job.frames[static_cast<std::size_t>(index)];
+      const FrameNumber number = context.job.frames[step.index()];
       const auto slot = std::lower_bound(judged.begin(), judged.end(), number);
       if (slot != judged.end() && *slot == number)
         run.keep(static_cast<std::size_t>(slot - judged.begin()), film);
@@ -114,14 +114,13 @@ class SharedLights {
 Status render_subjects(const JobSpec& job, const Timeline& time,
                        const std::vector<Subject>& subjects, std::vector<Run>& runs) {
   SharedLights lights;
-  const std::vector<int> judged = time.judged();
+  const std::vector<FrameNumber> judged = time.judged();
   for (std::size_t s = 0; s < subjects.size(); ++s) {
     JobSpec own = job;
     subjects[s].configure(own);
     own.frames = judged;
     if (carries_state(own)) {
-      own.frames.resize(static_cast<std::size_t>(time.frames));
-      std::iota(own.frames.begin(), own.frames.end(), 1);
+      own.frames = test::frame_numbers(time.frames);
     }
     BATON_TRY(lights.render(own, judged, subjects[s], runs[s]));
   }

@@ -149,7 +149,8 @@ std::uint64_t light_in_the_dark(const FrameTruth& truth,
 }  // namespace
 
 Summary summarise(const Timeline& time, const Truth& truth, const Observations& seen) {
-  const std::vector<int> frames = time.judged();
+  std::vector<int> frames;
+  for (const FrameNumber number : time.judged()) frames.push_back(number.value());
   Summary summary;
   Numbers& n = summary.numbers;
   n.unlawful = seen.unlawful;

@@ -101,9 +101,9 @@ Result<Truth> exact_truth(const JobSpec& job, int nodes, int threads) {
   std::vector<Environment> lights;
   std::vector<std::shared_ptr<const FrameGeometry>> geometry;
   for (std::size_t f = 0; f < job.frames.size(); ++f) {
-    BATON_ASSIGN(const auto light, context->lights->at(static_cast<std::int32_t>(f)));
+    BATON_ASSIGN(const auto light, context->lights->at(Step(static_cast<std::int32_t>(f))));
     lights.push_back(light->now);
-    BATON_ASSIGN(auto placed, context->geometry->at(static_cast<std::int32_t>(f)));
+    BATON_ASSIGN(auto placed, context->geometry->at(Step(static_cast<std::int32_t>(f))));
     geometry.push_back(std::move(placed));
   }
   Truth truth;

@@ -66,7 +66,7 @@ class BruteForce {
 /// Of the last frame, for each pixel that sees a catcher the mean over its sites on it; else -1.
 std::vector<Rgb> brute_force(const JobSpec& job) {
   const auto context = load_render_context(job, Digest{1, 2}).value();
-  const auto last = static_cast<std::int32_t>(job.frames.size()) - 1;
+  const Step last(static_cast<std::int32_t>(job.frames.size()) - 1);
   const auto geometry = context->geometry->at(last).value();
   const auto light = context->lights->at(last).value();
   const TileSurfaces surfaces =

@@ -126,7 +126,7 @@ class TurningViewer {
  public:
   TurningViewer()
       : job_(moving_job(true, false, 1)), context_(*load_render_context(job_, Digest{1, 2})) {
-    light_ = *context_->lights->at(0);
+    light_ = *context_->lights->at(Step(0));
     const Material glossy = make_material(job_.scene.materials.at("glossy"));
     const Vec3 up{0, 1, 0};
     sites_.clear(1);
@@ -162,7 +162,7 @@ class TurningViewer {
                       .now = now,
                       .before = before,
                       .key = key,
-                      .frame_index = 1,
+                      .rounds_before = 1,
                       .has_history = has_history,
                       .old = old},
                      *scratch_, samples);

@@ -157,8 +157,8 @@ JobSpec silhouettes(PixelFilter filter) {
 std::vector<double> filtered_by_hand(const JobSpec& job) {
   constexpr int kGrid = 24;  ///< rays a pixel along either axis
   const auto context = *load_render_context(job, Digest{1, 2});
-  const auto geometry = *context->geometry->at(0);
-  const auto light = *context->lights->at(0);
+  const auto geometry = *context->geometry->at(Step(0));
+  const auto light = *context->lights->at(Step(0));
   const double radius = filter_radius(job.image.filter);
   const int reach = static_cast<int>(std::ceil((radius - 0.5) * kGrid)) + kGrid;
   std::vector<double> pixels;

@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "common/job/frame_range.h"
 #include "tests/support/second_pass.h"
 
 namespace baton {
@@ -106,7 +107,7 @@ TEST(SecondPassStat, MovingInstancesAgreeWithBruteForce) {
   JobSpec job = still_job(SecondPassForm::corrected, MaskPolicy::cross_fold);
   job.frames = test::frame_numbers(3);
   test::set_in_motion(job, true, true);
-  job.frames = {2, 3};
+  job.frames = parse_frames("2-3").value();
   expect_agreement(job);
 }
 TEST(SecondPassStat, SequentialPopulationsAgreeWithBruteForce) {

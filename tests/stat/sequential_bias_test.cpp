@@ -98,7 +98,7 @@ Estimates truth(const JobSpec& sequence) {
       JobSpec job = sequence;
       job.sampling.method = Method::reference;
       job.sampling.reference_samples = 4096;
-      job.frames = {1};
+      job.frames = {FrameNumber(1)};
       job.environment.rotation_start_deg = 0.3 * static_cast<double>(kFrames[i] - 1);
       job.seed = static_cast<std::uint64_t>(90001 + run);
       const ImageMeans one = means_of(test::render_tile(job).films, {1, 1, 1});

@@ -84,7 +84,7 @@ std::array<double, 3> reflected(const SeenSurface& site, const Environment& ligh
 /// The last frame by brute force.
 Estimate without_occlusion(const JobSpec& job) {
   const auto context = *load_render_context(job, Digest{1, 2});
-  const auto last = static_cast<std::int32_t>(job.frames.size()) - 1;
+  const Step last(static_cast<std::int32_t>(job.frames.size()) - 1);
   const auto geometry = *context->geometry->at(last);
   const auto light = *context->lights->at(last);
   const PixelRect rect = job.image.rendered();

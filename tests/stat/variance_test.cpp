@@ -6,6 +6,7 @@
 // all 45 comparisons of this file (Sidak): |t| of 95 degrees of freedom below 4.5.
 #include <gtest/gtest.h>
 
+#include "common/job/frame_range.h"
 #include "tests/support/small_scene.h"
 
 namespace baton {
@@ -16,7 +17,7 @@ constexpr double kLimit = 4.5;
 
 JobSpec variance_job(Method method, int rounds) {
   JobSpec job = test::box_job();
-  job.frames = {1, 2};
+  job.frames = parse_frames("1-2").value();
   job.image.sites = 4;
   job.image.site_seed = 5;
   job.environment.rotation_deg_per_frame = 3;

@@ -87,7 +87,7 @@ inline std::vector<FrameResult> render(JobSpec job, const SharedAssetsPtr& asset
     std::vector<std::shared_ptr<const SampleState>> next;
     const TileRunSink sink{
         .film =
-            [&](int, const FilmTile& film) {
+            [&](Step, const FilmTile& film) {
               frames[i].film = film;
               return Status();
             },
@@ -97,8 +97,8 @@ inline std::vector<FrameResult> render(JobSpec job, const SharedAssetsPtr& asset
               return Status();
             },
         .diagnostics = [&](const FrameStats& s) { frames[i].sampling = s.sampling; }};
-    const auto f = static_cast<std::int32_t>(i);
-    frames[i].stats = value_of(run_tile(*context, {0, f, f, f}, states, sink, {}));
+    const Step step(static_cast<std::int32_t>(i));
+    frames[i].stats = value_of(run_tile(*context, {0, {}, {step, step}}, states, sink, {}));
     states = std::move(next);
   }
   return frames;

@@ -90,11 +90,11 @@ struct Picture {
 };
 
 /// Both passes of one frame, as one tile.
-Result<Picture> render(const RenderContext& context, std::int32_t frame) {
+Result<Picture> render(const RenderContext& context, Step step) {
   Picture picture;
   FirstPassPtr samples;
   const TileRunSink sink{.film =
-                             [&](int, const FilmTile& film) {
+                             [&](Step, const FilmTile& film) {
                                picture.film = film;
                                return Status();
                              },
@@ -103,10 +103,10 @@ Result<Picture> render(const RenderContext& context, std::int32_t frame) {
                                samples = std::make_shared<const FirstPassSamples>(std::move(s));
                                return Status();
                              }};
-  BATON_ASSIGN(picture.stats, run_tile(context, {0, 0, frame, frame}, {}, sink, {}));
+  BATON_ASSIGN(picture.stats, run_tile(context, {0, {}, {step, step}}, {}, sink, {}));
   if (!context.job.visibility.correlated) return picture;
   BATON_ASSIGN(SecondPassOutput second,
-               run_second_pass(context, frame, 0, picture.film, std::span(&samples, 1)));
+               run_second_pass(context, step, 0, picture.film, std::span(&samples, 1)));
   picture.film = std::move(second.film);
   picture.stats.merge(second.stats);
   return picture;
@@ -122,7 +122,7 @@ struct Truth {
 Result<Truth> judge(JobSpec job, int samples) {
   job.sampling.method = Method::reference;
   job.sampling.reference_samples = samples;
-  job.frames = {1};
+  job.frames = {FrameNumber(1)};
   job.seed = 99991;
   job.output.aovs = {Aov::visibility, Aov::depth, Aov::variance};
   BATON_ASSIGN(const auto context, load_render_context(job, Digest{1, 1}));
@@ -181,7 +181,7 @@ Result<Row> prepare(const JobSpec& base, const Case& c, int runs,
   job.sampling.num_candidates = c.num_candidates;
   job.visibility = c.visibility;
   job.frames.clear();
-  for (int run = 1; run <= runs; ++run) job.frames.push_back(run);
+  for (int run = 1; run <= runs; ++run) job.frames.emplace_back(run);
   Row row{.of = c, .context = {}, .image = {}, .mask = {}, .bias = {}, .seconds = {}};
   BATON_ASSIGN(row.context, make_render_context(job, Digest{1, 1}, assets));
   return row;

@@ -102,7 +102,7 @@ std::vector<std::string> describe(const Message& message) {
     std::string text = "TaskDone " + describe(done->lease);
     for (const BlobRef& output : done->outputs) {
       if (output.is_held()) continue;  // no bytes that anybody could compare
-      text += fmt::format(" {}:{}:{}", static_cast<int>(output.kind), output.frame,
+      text += fmt::format(" {}:{}:{}", static_cast<int>(output.kind), output.position,
                           output.digest.hex());
     }
     texts.push_back(text);

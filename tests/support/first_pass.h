@@ -8,7 +8,7 @@ namespace baton::test {
 inline FirstPassSamples small_first_pass() {
   FirstPassSamples s;
   s.picture = {3, 4};
-  s.frame_index = 2;
+  s.step = Step(2);
   s.tile = 1;
   s.rect = {10, 20, 15, 24};
   s.num_slots = 8;

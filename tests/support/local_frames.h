@@ -9,15 +9,15 @@
 
 namespace baton::test {
 
-/// Receives a finished image; frame_index is 0-based.
-using FrameSink = std::function<Status(std::int32_t frame_index, const FilmTile& image)>;
+/// Receives a finished image.
+using FrameSink = std::function<Status(Step step, const FilmTile& image)>;
 
 /// The image of the frame that is kept; adds what its tiles counted.
 inline Result<FilmTile> local_image(const LocalRender& render, const JobSpec& job,
-                                    std::int32_t frame, RenderStats& stats) {
+                                    Step step, RenderStats& stats) {
   FilmTile image = blank_image(job.image, render.tiles().begin()->second.film.channels);
   for (const auto& [tile, first_pass] : render.tiles()) {
-    BATON_ASSIGN(const RenderedTile finished, render.finished(frame, tile));
+    BATON_ASSIGN(const RenderedTile finished, render.finished(step, tile));
     BATON_TRY(paste_tile(finished.film, image));
     stats.merge(finished.stats);
   }
@@ -30,10 +30,10 @@ inline Result<RenderStats> render_locally(const RenderContext& context, const Fr
   std::set<std::int32_t> tiles;
   for (std::int32_t tile = 0; tile < context.grid.count(); ++tile) tiles.insert(tile);
   RenderStats stats;
-  for (std::int32_t frame = 0; frame < std::ssize(context.job.frames); ++frame) {
-    BATON_TRY(render.render_all(frame, tiles));
-    BATON_ASSIGN(const FilmTile image, local_image(render, context.job, frame, stats));
-    BATON_TRY(sink(frame, image));
+  for (Step step; step.index() < context.job.frames.size(); ++step) {
+    BATON_TRY(render.render_all(step, tiles));
+    BATON_ASSIGN(const FilmTile image, local_image(render, context.job, step, stats));
+    BATON_TRY(sink(step, image));
   }
   return stats;
 }

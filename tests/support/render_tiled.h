@@ -34,19 +34,20 @@ inline std::vector<FilmTile> render_tiled(JobSpec job, int tile_size, int run_le
   std::vector<FilmTile> images(job.frames.size());
   const TileGrid grid(job.image);
   std::vector<StatePtr> states(static_cast<std::size_t>(grid.count()));
-  std::map<std::pair<std::int32_t, std::int32_t>, FilmTile> films;  // of all sweeps
-  for (std::int32_t run = 0; run < num_runs(job); ++run) {
+  std::map<std::pair<Step, std::int32_t>, FilmTile> films;  // of all sweeps
+  const Timeline timeline(job);
+  for (Run run; run < Run(timeline.num_runs()); ++run) {
     std::vector<StatePtr> next(states.size());
     for (std::int32_t tile = 0; tile < grid.count(); ++tile) {
       std::vector<StatePtr> previous;
       for (const std::int32_t near : grid.tiles_near(tile, history_reach_px(job))) {
-        if (run > 0 && carries_state(job))
+        if (run > Run(0) && carries_state(job))
           previous.push_back(states[static_cast<std::size_t>(near)]);
       }
       const TileRunSink sink{
-          [&](std::int32_t step, const FilmTile& film) {
+          [&](Step step, const FilmTile& film) {
             films[{step, tile}] = film;
-            FilmTile& image = images[static_cast<std::size_t>(frame_of_step(job, step))];
+            FilmTile& image = images[timeline.frame_of(step).index()];
             image.rect = {0, 0, job.image.width, job.image.height};
             image.channels = film.channels;
             image.values.resize(image.channels.size() * image.num_pixels());
@@ -67,7 +68,7 @@ inline std::vector<FilmTile> render_tiled(JobSpec job, int tile_size, int run_le
           },
           {},
           {},
-          [&](std::int32_t step) -> Result<FilmTile> {
+          [&](Step step) -> Result<FilmTile> {
             return films.at({step, tile});
           }};
       const auto done = run_tile(**context, tile_run(job, tile, run), previous, sink, {});

@@ -16,7 +16,7 @@ struct CorrelatedResult {
 inline CorrelatedResult render_correlated(const RenderContext& context) {
   const JobSpec& job = context.job;
   const TileGrid grid(job.image);
-  const auto frame = static_cast<std::int32_t>(job.frames.size()) - 1;
+  const Step last_step(static_cast<std::int32_t>(job.frames.size()) - 1);
   CorrelatedResult result;
 
   // First pass: films and samples of all tiles; samples go through their file form.
@@ -26,8 +26,8 @@ inline CorrelatedResult render_correlated(const RenderContext& context) {
     FirstPassPtr last;
     const TileRunSink sink{
         .film =
-            [&](int index, const FilmTile& film) {
-              if (index == frame) films.push_back(film);
+            [&](Step step, const FilmTile& film) {
+              if (step == last_step) films.push_back(film);
               return Status();
             },
         .state = [](const SampleState&) { return Status(); },
@@ -37,7 +37,7 @@ inline CorrelatedResult render_correlated(const RenderContext& context) {
                   *decode_first_pass_samples(encode_first_pass_samples(s), "test"));
               return Status();
             }};
-    const auto stats = run_tile(context, {tile, 0, 0, frame}, {}, sink, {});
+    const auto stats = run_tile(context, {tile, {}, {Step(0), last_step}}, {}, sink, {});
     EXPECT_TRUE(stats.ok());
     result.stats.merge(*stats);
     samples.push_back(last);
@@ -49,7 +49,7 @@ inline CorrelatedResult render_correlated(const RenderContext& context) {
     for (const std::int32_t t : grid.tiles_near(tile, exchange_reach_px(job.visibility)))
       near.push_back(samples[static_cast<std::size_t>(t)]);
     const auto second =
-        run_second_pass(context, frame, tile, films[static_cast<std::size_t>(tile)], near);
+        run_second_pass(context, last_step, tile, films[static_cast<std::size_t>(tile)], near);
     EXPECT_TRUE(second.ok());
     result.stats.merge(second->stats);
     const FilmTile& film = second->film;

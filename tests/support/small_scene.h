@@ -121,9 +121,9 @@ inline JobSpec box_job() {
   return job;
 }
 
-inline std::vector<int> frame_numbers(int count) {
-  std::vector<int> frames;
-  for (int i = 1; i <= count; ++i) frames.push_back(i);
+inline std::vector<FrameNumber> frame_numbers(int count) {
+  std::vector<FrameNumber> frames;
+  for (int i = 1; i <= count; ++i) frames.emplace_back(i);
   return frames;
 }
 
@@ -164,7 +164,7 @@ inline TileResult render_tile(const JobSpec& job, std::int32_t tile = 0) {
     return result;
   }
   const TileRunSink sink{.film =
-                             [&](int, const FilmTile& film) {
+                             [&](Step, const FilmTile& film) {
                                result.films.push_back(film);
                                return Status();
                              },
@@ -178,12 +178,12 @@ inline TileResult render_tile(const JobSpec& job, std::int32_t tile = 0) {
                                result.samples.push_back(std::move(samples));
                                return Status();
                              },
-                         .earlier_film = [&](std::int32_t step) -> Result<FilmTile> {
-                           return result.films.at(static_cast<std::size_t>(step));
+                         .earlier_film = [&](Step step) -> Result<FilmTile> {
+                           return result.films.at(step.index());
                          }};
-  for (std::int32_t run = 0; run < num_runs(job); ++run) {
+  for (Run run; run < Run(num_runs(job)); ++run) {
     std::vector<StatePtr> previous;
-    if (carries_state(job) && run > 0)
+    if (carries_state(job) && run > Run(0))
       previous = {std::make_shared<const SampleState>(result.state)};
     const auto stats = run_tile(**context, tile_run(job, tile, run), previous, sink, {});
     if (!stats) {

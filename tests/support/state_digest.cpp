@@ -53,7 +53,7 @@ int main(int argc, char** argv) {
     const auto bytes = baton::read_file(entry.path(), baton::limits::kMaxBlobBytes);
     if (!bytes) continue;
     const auto state = baton::decode_state(*bytes, entry.path().string());
-    if (state) add_pixels(*state, frames[state->frame_index]);
+    if (state) add_pixels(*state, frames[state->step.value()]);
   }
 
   for (const auto& [frame, pixels] : frames) {

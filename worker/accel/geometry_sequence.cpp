@@ -3,7 +3,6 @@
 #include <algorithm>
 
 #include "common/job/motion.h"
-#include "common/job/sequence.h"
 
 namespace baton {
 
@@ -13,16 +12,16 @@ std::size_t FrameGeometry::size_bytes() const {
   return size > 0 ? size + accel->placement_bytes() : 0;
 }
 
-Result<std::shared_ptr<const FrameGeometry>> GeometrySequence::at(std::int32_t index) {
+Result<std::shared_ptr<const FrameGeometry>> GeometrySequence::at(Step step) {
   // A job in which nothing moves has one frame for all.
-  const std::int32_t name = moves(job_) ? frame_of_step(job_, index) : 0;
+  const FrameIndex name = moves(job_) ? timeline_.frame_of(step) : FrameIndex(0);
   if (auto found = frames_.find(name)) return found;  // while another frame is built
   const std::lock_guard lock(placing_);
   if (auto found = frames_.find(name)) return found;
 
   // The placed ray tracer refers to the instances beside it.
   auto frame = std::make_shared<FrameGeometry>();
-  frame->pose = pose_at(scene_, job_, job_.frames[static_cast<std::size_t>(name)]);
+  frame->pose = pose_at(scene_, job_, job_.frames[name.index()].value());
   const bool placed = std::any_of(scene_.instances.begin(), scene_.instances.end(),
                                   [](const Instance& instance) { return instance.moves(); });
   frame->accel = rest_;

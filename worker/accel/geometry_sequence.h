@@ -6,6 +6,7 @@
 
 #include "common/base/limits.h"
 #include "common/base/lru_cache.h"
+#include "common/job/timeline.h"
 #include "common/scene/pose.h"
 #include "worker/accel/accel.h"
 #include "worker/surface/site_block.h"
@@ -65,21 +66,23 @@ class GeometrySequence {
   GeometrySequence(const JobSpec& job, const Scene& scene, std::shared_ptr<const Accel> rest,
                    MemorySharePtr share)
       : job_(job),
+        timeline_(job),
         scene_(scene),
         rest_(std::move(rest)),
         frames_(
             std::move(share), [](const FrameGeometry& frame) { return frame.size_bytes(); },
             limits::kMaxCachedPoses, 2) {}
 
-  /// The geometry of frame `index` (0-based). Error: Embree's own message.
-  Result<std::shared_ptr<const FrameGeometry>> at(std::int32_t index);
+  /// The geometry of a step. Error: Embree's own message.
+  Result<std::shared_ptr<const FrameGeometry>> at(Step step);
 
  private:
   const JobSpec& job_;
+  const Timeline timeline_;
   const Scene& scene_;
   const std::shared_ptr<const Accel> rest_;  ///< every frame's, when no object moves
   std::mutex placing_;
-  LruCache<std::int32_t, FrameGeometry> frames_;
+  LruCache<FrameIndex, FrameGeometry> frames_;
 };
 
 }  // namespace baton

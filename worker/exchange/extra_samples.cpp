@@ -67,11 +67,11 @@ void ExtraSampler::draw(std::int32_t x, std::int32_t y, std::size_t fold,
     const std::uint32_t stream = 2 + static_cast<std::uint32_t>(fold) * count + c;
     const JobSpec& job = work_.context.job;
     const RngKey key =
-        pixel_key(stream_seed(job.seed, stream), work_.frame.number, job.image.width, x, y);
+        pixel_key(stream_seed(job.seed, stream), work_.frame.number.value(), job.image.width, x, y);
     poison(*scratch_);
     sample_populations(*sampler_, static_cast<std::size_t>(drawn_.num_particles),
                        {sites_, work_.light, work_.light.presampled->of(x, y), now_, before_, key,
-                        work_.frame.index, false},
+                        work_.frame.step.value(), false},
                        0, *scratch_, drawn_, colors);
     cast_samples({.direction = drawn_.direction,
                   .site = drawn_.site,

@@ -12,18 +12,18 @@
 namespace baton {
 namespace {
 
-Status check_inputs(const RenderContext& context, std::int32_t frame_index, std::int32_t tile,
+Status check_inputs(const RenderContext& context, Step step, std::int32_t tile,
                     const FilmTile& film, std::span<const FirstPassPtr> near) {
   const std::vector<std::int32_t> tiles =
       context.grid.tiles_near(tile, exchange_reach_px(context.job.visibility));
   if (near.size() != tiles.size()) {
     return Error{ErrorKind::bad_input,
                  fmt::format("tile {} frame index {}: samples of {} tiles, expected {}", tile,
-                             frame_index, near.size(), tiles.size())};
+                             step, near.size(), tiles.size())};
   }
   for (std::size_t i = 0; i < near.size(); ++i) {
     const FirstPassSamples& s = *near[i];
-    if (s.picture == context.picture && s.frame_index == frame_index && s.tile == tiles[i] &&
+    if (s.picture == context.picture && s.step == step && s.tile == tiles[i] &&
         s.rect == context.grid.rect(tiles[i]) &&
         s.num_slots == context.job.sampling.num_particles &&
         s.num_populations == num_populations(context.job)) {
@@ -32,8 +32,8 @@ Status check_inputs(const RenderContext& context, std::int32_t frame_index, std:
     return Error{
         ErrorKind::bad_input,
         fmt::format("first-pass samples: of picture {} tile {} frame index {}, expected {}, {}, {}",
-                    s.picture.hex(), s.tile, s.frame_index, context.picture.hex(), tiles[i],
-                    frame_index)};
+                    s.picture.hex(), s.tile, s.step, context.picture.hex(), tiles[i],
+                    step)};
   }
   if (film.rect == context.grid.rect(tile)) return {};
   return Error{ErrorKind::bad_input, fmt::format("film: of another tile than {}", tile)};
@@ -57,7 +57,7 @@ void exchange(const SecondPassWork& work, std::span<Rgb> radiance, RenderStats& 
   const SquarePartitions partitions(job.image.extent(), job.visibility.tile_size,
                                     job.visibility.partitions,
                                     Rng({.job_seed = job.seed,
-                                         .frame = static_cast<std::uint32_t>(work.frame.number),
+                                         .frame = static_cast<std::uint32_t>(work.frame.number.value()),
                                          .pixel = 0},
                                         PassId::partition));
   TracedExchange scene(work);
@@ -66,7 +66,7 @@ void exchange(const SecondPassWork& work, std::span<Rgb> radiance, RenderStats& 
                             .num_sites = static_cast<std::uint32_t>(job.image.sites),
                             .fold = 0,
                             .job_seed = job.seed,
-                            .frame = work.frame.number,
+                            .frame = work.frame.number.value(),
                             .image_width = job.image.width};
   for (const Fold& fold : folds_of(job.visibility.mask)) {
     scene.use(fold);
@@ -116,18 +116,18 @@ void write_pixels(const SecondPassWork& work, std::span<const Rgb> radiance, Fil
 
 /// The light of the frame; preparing it, where the first pass left none, counts as in that pass.
 Result<std::shared_ptr<const FrameLight>> light_of(const RenderContext& context,
-                                                   std::int32_t frame_index, RenderStats& stats) {
+                                                   Step step, RenderStats& stats) {
   const CpuTimer timer(stats.seconds_light);
-  return context.lights->at(frame_index);
+  return context.lights->at(step);
 }
 
 }  // namespace
 
-Result<SecondPassOutput> run_second_pass(const RenderContext& context, std::int32_t frame_index,
+Result<SecondPassOutput> run_second_pass(const RenderContext& context, Step step,
                                          std::int32_t tile, const FilmTile& first_film,
                                          std::span<const FirstPassPtr> near) {
   const WorkClock clock;
-  BATON_TRY(check_inputs(context, frame_index, tile, first_film, near));
+  BATON_TRY(check_inputs(context, step, tile, first_film, near));
   SecondPassOutput output{.film = first_film};
 
   // Find who takes part.
@@ -140,13 +140,13 @@ Result<SecondPassOutput> run_second_pass(const RenderContext& context, std::int3
       make_masks(visibility, samples, reach, grown(reach, visibility.dilate, image));
 
   // Do their pixels again.
-  BATON_ASSIGN(const auto geometry, context.geometry->at(frame_index));
+  BATON_ASSIGN(const auto geometry, context.geometry->at(step));
   const MaskedSurfaces surfaces(context, *geometry, masks.any);
   output.stats.rays_primary = surfaces.num_rays();
   output.seconds_primary_rays = surfaces.seconds_rays();
-  BATON_ASSIGN(const auto light, light_of(context, frame_index, output.stats));
+  BATON_ASSIGN(const auto light, light_of(context, step, output.stats));
   const SecondPassWork work{
-      context,  *geometry, context.frames[static_cast<std::size_t>(frame_index)],
+      context,  *geometry, context.frames[step.index()],
       *light,   samples,   masks,
       surfaces, rect};
   std::vector<Rgb> radiance(static_cast<std::size_t>(rect.area()));

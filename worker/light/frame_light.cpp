@@ -70,11 +70,11 @@ Result<std::shared_ptr<const EnvironmentMap>> LightSequence::key_map(std::int32_
                     job_.sampling.mis_compensation, hidden);
 }
 
-std::int32_t LightSequence::first_with_texels_of(const EnvironmentFrame& frame) const {
+Step LightSequence::first_with_texels_of(const EnvironmentFrame& frame) const {
   const auto first = std::find_if(frames_.begin(), frames_.end(), [&](const FrameSpec& f) {
     return f.environment.same_texels(frame);
   });
-  return static_cast<std::int32_t>(first - frames_.begin());
+  return Step(static_cast<std::int32_t>(first - frames_.begin()));
 }
 
 Result<std::shared_ptr<const EnvironmentMap>> LightSequence::mixed_map(
@@ -99,7 +99,7 @@ Result<std::shared_ptr<const EnvironmentMap>> LightSequence::mixed_map(
 
 HiddenCone LightSequence::hidden_in(const FrameSpec& frame) {
   if (hidden_ == nullptr) return {};
-  std::optional<HiddenCone>& cone = cones_[static_cast<std::size_t>(frame.index)];
+  std::optional<HiddenCone>& cone = cones_[frame.step.index()];
   if (!cone) cone = hidden_->at(frame.number);
   return *cone;
 }
@@ -118,17 +118,17 @@ Result<Environment> LightSequence::seen_environment(const Environment& now) {
   return Environment{std::move(map), now.rotation};
 }
 
-Result<std::shared_ptr<const FrameLight>> LightSequence::at(std::int32_t index,
-                                                            std::int32_t round) {
+Result<std::shared_ptr<const FrameLight>> LightSequence::at(Step step, Round round) {
   const std::lock_guard lock(mutex_);
-  const FrameSpec& frame = frames_[static_cast<std::size_t>(index)];
-  const FrameSpec& frame_before =
-      frames_[static_cast<std::size_t>(round == 0 ? std::max(index - 1, 0) : index)];
+  const FrameSpec& frame = frames_[step.index()];
+  const bool is_first = round == Round(0);
+  const Step step_before = is_first ? std::max(step - 1, Step(0)) : step;
+  const FrameSpec& frame_before = frames_[step_before.index()];
   auto light = std::make_shared<FrameLight>();
   BATON_ASSIGN(light->now, environment(frame));
   BATON_ASSIGN(light->before, environment(frame_before));
   BATON_ASSIGN(light->seen, seen_environment(light->now));
-  light->still = round == 0 && frame.environment == frame_before.environment &&
+  light->still = is_first && frame.environment == frame_before.environment &&
                  hidden_in(frame) == hidden_in(frame_before);
   if (has_catcher(job_)) {
     light->irradiance = irradiance(frame.environment, light->now);
@@ -137,29 +137,29 @@ Result<std::shared_ptr<const FrameLight>> LightSequence::at(std::int32_t index,
   }
   if (frame.environment.same_texels(frame_before.environment))
     light->turn = turn_between(light->before, light->now);
-  if (round == 0) note(frame);
-  const bool is_seen = round >= 0 && round != kProbeRound;
-  light->presampled = presampled_.find({index, round});
+  if (is_first) note(frame);
+  const bool is_seen = round >= Round(0) && round != kProbeRound;
+  light->presampled = presampled_.find({step, round});
   if (light->presampled == nullptr) {
     light->presampled = presampled_.insert(
-        {index, round},
+        {step, round},
         std::make_shared<const PresampledSets>(presample_sets(
-            light->now, light->before, job_.seed, static_cast<std::uint32_t>(frame.number),
-            presampled_layout(job_), frame.first_round + round, is_seen ? num_sets_ : 1)));
+            light->now, light->before, job_.seed, static_cast<std::uint32_t>(frame.number.value()),
+            presampled_layout(job_), frame.round_of_frame(round), is_seen ? num_sets_ : 1)));
   }
   return std::shared_ptr<const FrameLight>(std::move(light));
 }
 
 std::shared_ptr<const Irradiance> LightSequence::irradiance(const EnvironmentFrame& frame,
                                                             const Environment& environment) {
-  const std::int32_t name = first_with_texels_of(frame);
+  const Step name = first_with_texels_of(frame);
   if (auto found = irradiances_.find(name)) return found;
   return irradiances_.insert(name, std::make_shared<const Irradiance>(*environment.map));
 }
 
 /// What is odd about the maps of a frame that are not known yet, and about the step to it.
 void LightSequence::note(const FrameSpec& frame) {
-  if (!noted_.insert(frame.index).second) return;
+  if (!noted_.insert(frame.step).second) return;
   const auto add = [&](const std::vector<std::string>& lines) {
     for (const std::string& line : lines)
       if (std::ranges::find(notes_, line) == notes_.end()) notes_.push_back(line);
@@ -176,8 +176,8 @@ void LightSequence::note(const FrameSpec& frame) {
   }
   if (const CameraMapSpec& camera = environment.camera_map; !camera.file.empty())
     add(texel_warnings(maps_->report(camera.file, camera.scale)));
-  if (frame.index == 0 || num_jumps_ == kMostJumps) return;
-  const int before = frames_[static_cast<std::size_t>(frame.index) - 1].number;
+  if (frame.step == Step(0) || num_jumps_ == kMostJumps) return;
+  const FrameNumber before = frames_[(frame.step - 1).index()].number;
   const auto jump = light_jump(environment, before, frame.number,
                                [&](std::int32_t key) { return report(key).mean; });
   if (!jump) return;

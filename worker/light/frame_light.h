@@ -43,7 +43,7 @@ struct FrameLight {
 std::optional<Mat3> turn_between(const Environment& before, const Environment& now);
 
 /// The round whose presampled light and random numbers no picture has (noise_probe.h).
-inline constexpr std::int32_t kProbeRound = 1 << 30;
+inline constexpr Round kProbeRound(1 << 30);
 
 /// The environments of a job's frames, prepared on demand. What is made for a frame is kept while
 /// memory allows, of as many frames as tasks in hand may ask for. Any number of threads may ask; a
@@ -56,16 +56,15 @@ class LightSequence {
   LightSequence(const JobSpec& job, std::shared_ptr<MapCache> maps, const MemorySharePtr& share,
                 std::shared_ptr<const HiddenLight> hidden = nullptr);
 
-  /// The light of frame `index` (0-based) in a round; negative: before those that are seen; or of
-  /// kProbeRound. Errors: a map that cannot be read, or two key frames of different size.
-  Result<std::shared_ptr<const FrameLight>> at(std::int32_t index, std::int32_t round = 0);
+  /// The light of a step in a round, or of kProbeRound. Errors: a map that cannot be read, or two key frames of different size.
+  Result<std::shared_ptr<const FrameLight>> at(Step step, Round round = Round(0));
 
   /// What people should know of the maps read so far, and of jumps of the light from one frame to
   /// the next, a line each.
   std::vector<std::string> notes() const;
 
  private:
-  std::int32_t first_with_texels_of(const EnvironmentFrame& frame) const;
+  Step first_with_texels_of(const EnvironmentFrame& frame) const;
   std::shared_ptr<const Irradiance> irradiance(const EnvironmentFrame& frame,
                                                const Environment& environment);
   Result<std::shared_ptr<const EnvironmentMap>> key_map(std::int32_t key, const HiddenCone& hidden);
@@ -83,12 +82,13 @@ class LightSequence {
   std::vector<FrameSpec> frames_;
   const std::int32_t num_sets_;  ///< of presampled light
   mutable std::mutex mutex_;
-  /// By the first frame index that shows these texels, and what is hidden of them.
-  LruCache<std::pair<std::int32_t, HiddenCone>, EnvironmentMap> mixed_maps_;
-  LruCache<std::pair<std::int32_t, std::int32_t>, PresampledSets> presampled_;  ///< frame, round
-  LruCache<std::int32_t, Irradiance> irradiances_;  ///< by the first frame with these texels
-  std::set<std::int32_t> noted_, noted_keys_;       ///< frames and keys that notes_ knows
-  std::size_t num_jumps_ = 0;                       ///< among them
+  /// By the first step that shows these texels, and what is hidden of them.
+  LruCache<std::pair<Step, HiddenCone>, EnvironmentMap> mixed_maps_;
+  LruCache<std::pair<Step, Round>, PresampledSets> presampled_;
+  LruCache<Step, Irradiance> irradiances_;  ///< by the first step with these texels
+  std::set<Step> noted_;               ///< steps that notes_ has
+  std::set<std::int32_t> noted_keys_;  ///< keys that notes_ has
+  std::size_t num_jumps_ = 0;          ///< jumps of the light in notes_
   std::vector<std::string> notes_;
 };
 

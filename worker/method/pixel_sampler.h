@@ -26,8 +26,10 @@ struct PixelInput {
   const EnvironmentView& now;         ///< views of light.now and light.before
   const EnvironmentView& before;
   RngKey key;
-  std::int32_t frame_index = 0;  ///< 0-based position in the sequence
-  bool has_history = false;      ///< the samples hold the previous frame's properly weighted set
+  /// Rounds of the sequence before this one; to a method each is a frame. Negative before those
+  /// that are seen.
+  std::int32_t rounds_before = 0;
+  bool has_history = false;  ///< the samples hold the previous frame's properly weighted set
   /// (N) p~ of the previous frame at those samples, where it is known; else empty.
   std::span<const float> target_before{};
   const OldSurfaces* old = nullptr;  ///< the surfaces of that set, where they are not `sites`

@@ -19,14 +19,14 @@ std::size_t AdaptiveRounds::block_of(std::size_t pixel) const {
   return pixel / width / side * static_cast<std::size_t>(columns_) + pixel % width / side;
 }
 
-RoundPixels AdaptiveRounds::pixels(std::int32_t round) const {
+RoundPixels AdaptiveRounds::pixels(Round round) const {
   const auto num_pixels = static_cast<std::size_t>(rect_.area());
-  if (round < limits::kJudgingRounds || rounds_of_block_.empty())
+  if (round < Round(limits::kJudgingRounds) || rounds_of_block_.empty())
     return RoundPixels::all(num_pixels);
   RoundPixels taken;
   for (std::size_t pixel = 0; pixel < num_pixels; ++pixel) {
     const std::int32_t count = rounds_of_block_[block_of(pixel)];
-    if (round - limits::kJudgingRounds < count)
+    if (round - Round(limits::kJudgingRounds) < count)
       taken.add(pixel, static_cast<double>(rounds_ - limits::kJudgingRounds) / count);
   }
   return taken;

@@ -28,9 +28,9 @@ class AdaptiveRounds {
   /// Of a tile.
   AdaptiveRounds(const JobSpec& job, const PixelRect& rect);
 
-  /// The pixels of round `round` of the frame, below K, or negative in preroll; later rounds have
+  /// The pixels of a round of the step, below K, or negative in preroll; later rounds have
   /// no others than earlier ones. After the judging rounds only once judge() was called.
-  RoundPixels pixels(std::int32_t round) const;
+  RoundPixels pixels(Round round) const;
   /// film: the sums of the judging rounds. Does nothing where all pixels get all rounds.
   void judge(const RoundMean& film);
 

@@ -16,7 +16,7 @@ Rgb AsideSampler::sample(const PixelMethod& method, const PixelInput& pixel, con
                          .now = pixel.now,
                          .before = pixel.before,
                          .key = aside.key,
-                         .frame_index = pixel.frame_index,
+                         .rounds_before = pixel.rounds_before,
                          .has_history = pixel.has_history && aside.memory != nullptr,
                          .target = target_,
                          .hits = aside.hits,

@@ -37,8 +37,8 @@ void FirstPassCollector::add_ray(const SampleState& state, std::size_t particle,
                             state.weight[particle]);
 }
 
-FirstPassSamples FirstPassCollector::finish(const SampleState& state, std::int32_t frame_index) {
-  samples_.frame_index = frame_index;
+FirstPassSamples FirstPassCollector::finish(const SampleState& state, Step step) {
+  samples_.step = step;
   for (std::size_t pixel = 0; pixel < state.num_pixels(); ++pixel) {
     if (latest_source(state, pixel) != PixelSource::background)
       samples_.flags[pixel] |= FirstPassSamples::kSurface;

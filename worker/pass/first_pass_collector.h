@@ -16,7 +16,7 @@ class FirstPassCollector {
   /// Takes a traced ray; they must come by particle, ascending. particle: pixel * N + j.
   void add_ray(const SampleState& state, std::size_t particle, bool occluded);
   /// Ends the frame.
-  FirstPassSamples finish(const SampleState& state, std::int32_t frame_index);
+  FirstPassSamples finish(const SampleState& state, Step step);
 
  private:
   const JobSpec& job_;

@@ -26,8 +26,8 @@ GeometryPlanes::GeometryPlanes(const RenderContext& context, const FrameSpec& fr
   }
   if (has(Aov::crypto_material)) materials_.resize(num_pixels);
   if (has(Aov::motion)) {
-    before_ = pose_at(*context.scene, context.job, frame.number - 1);
-    after_ = pose_at(*context.scene, context.job, frame.number + 1);
+    before_ = pose_at(*context.scene, context.job, frame.number.value() - 1);
+    after_ = pose_at(*context.scene, context.job, frame.number.value() + 1);
   }
 }
 

@@ -7,7 +7,7 @@ Rgb NoiseProbe::sample_again(const PixelMethod& method, const PixelInput& input,
                              SampleState& state, std::size_t index, const SiteOrigins& origins,
                              SamplerScratch& scratch) {
   RngKey key = input.key;
-  key.round = static_cast<std::uint32_t>(kProbeRound) - key.round;
+  key.round = static_cast<std::uint32_t>(kProbeRound.value()) - key.round;
   const AsideSampler::Aside again{.sites = input.sites,
                                   .hits = input.hits,
                                   .origins = origins,

@@ -11,12 +11,12 @@ inline constexpr std::uint32_t kProbeSpacing = 128;
 
 /// Whether a pixel is one. Probes lie on a lattice with about equal distances of 12 pixels. It
 /// moves with frame and seed: 128 frames, or seeds, look at every pixel once.
-constexpr bool is_probe(std::int32_t x, std::int32_t y, std::int32_t frame_number,
+constexpr bool is_probe(std::int32_t x, std::int32_t y, FrameNumber frame,
                         std::uint64_t job_seed) {
   constexpr std::uint32_t kRowShift = 12, kFrameShift = 79, kSeedShift = 37;
   const std::uint32_t place = static_cast<std::uint32_t>(x) +
                               kRowShift * static_cast<std::uint32_t>(y) +
-                              kFrameShift * static_cast<std::uint32_t>(frame_number) +
+                              kFrameShift * static_cast<std::uint32_t>(frame.value()) +
                               kSeedShift * static_cast<std::uint32_t>(job_seed);
   return place % kProbeSpacing == 0;
 }

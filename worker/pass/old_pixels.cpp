@@ -16,9 +16,9 @@ OldPixels::OldPixels(const RenderContext& context, const FrameGeometry& before,
       round_(
           states.empty()
               ? 0
-              : context.frames[static_cast<std::size_t>(states.front()->frame_index)].first_round) {
+              : context.frames[states.front()->step.index()].first_round) {
   for (const StatePtr& state : states)
-    kept_.push_back(context.surfaces->find({state->frame_index, state->tile}));
+    kept_.push_back(context.surfaces->find({state->step, state->tile}));
 }
 
 std::optional<OldPixels::Place> OldPixels::ask(std::int32_t x, std::int32_t y) {

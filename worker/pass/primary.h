@@ -6,7 +6,7 @@
 #include <utility>
 #include <vector>
 
-#include "common/base/frame_keep.h"
+#include "common/job/step_keep.h"
 #include "worker/pass/render_context.h"
 #include "worker/pass/round_pixels.h"
 
@@ -60,9 +60,9 @@ struct TileSurfaces {
 
 /// What the tiles of this process saw last, by frame index and tile, where things move: the next
 /// frame asks for it again, and tracing it a second time is the same work with the same result.
-class SurfaceCache : public FrameKeep<std::pair<std::int32_t, std::int32_t>, TileSurfaces> {
+class SurfaceCache : public StepKeep<std::pair<Step, std::int32_t>, TileSurfaces> {
  public:
-  using FrameKeep::FrameKeep;
+  using StepKeep::StepKeep;
 };
 
 /// Pass 1: one primary ray for each site of each pixel (SiteRays).

@@ -69,10 +69,9 @@ Rgb gather_sites(const FrameGeometry& geometry, std::span<const SurfaceHit> hits
   return emission / static_cast<float>(hits.size());
 }
 
-std::vector<std::string> asset_notes(const RenderContext& context, std::int32_t step,
-                                     std::int32_t tile) {
+std::vector<std::string> asset_notes(const RenderContext& context, const TaskKey& task) {
   std::vector<std::string> notes = context.lights->notes();
-  if (step == 0 && tile == 0)
+  if (task.position == 0 && task.tile == 0)
     std::ranges::move(geometry_warnings(context.job, *context.scene), std::back_inserter(notes));
   return notes;
 }

@@ -67,7 +67,8 @@ void normalize_normals(FilmTile& film) {
 
 }  // namespace
 
-Status add_sweeps(FilmTile earlier, std::int32_t num_sweeps, FilmTile& film) {
+Status add_sweeps(FilmTile earlier, Sweep sweep, FilmTile& film) {
+  const std::int32_t num_sweeps = sweep.value();  // that `earlier` is the mean of
   if (earlier.rect != film.rect || earlier.channels != film.channels) {
     return Error{ErrorKind::bad_input,
                  fmt::format("film of an earlier sweep: at {},{} with channels {}, expected {},{}, "

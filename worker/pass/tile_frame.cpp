@@ -30,9 +30,10 @@ void fetch_ahead(const PixelMemory* memory) {
 struct TileFrameRenderer::Batch {
   std::size_t first = 0;
   std::size_t count = 0;
-  std::int32_t frame_number = 0;
-  std::int32_t round = 0, round_of_frame = 0;
-  std::int32_t step = 0;
+  FrameNumber frame{};
+  Round round{};
+  std::int32_t round_of_frame = 0;
+  std::int32_t rounds_before = 0;  ///< TileRound::rounds_before
   RayBatch rays;
   std::array<std::size_t, kBatchPixels> end_ray;  ///< where each pixel's rays end
   std::array<KnownLight, kBatchPixels> known;
@@ -42,11 +43,12 @@ struct TileFrameRenderer::Batch {
 
   RngKey key(const RenderContext& context, const PixelRect& rect, std::size_t index) const {
     const auto [x, y] = rect.place(index);
-    return pixel_key(context.job.seed, frame_number, context.job.image.width, x, y, round_of_frame);
+    return pixel_key(context.job.seed, frame.value(), context.job.image.width, x, y,
+                     round_of_frame);
   }
   bool is_probe(const RenderContext& context, const PixelRect& rect, std::size_t index) const {
     const auto [x, y] = rect.place(index);
-    return baton::is_probe(x, y, frame_number, context.job.seed);
+    return baton::is_probe(x, y, frame, context.job.seed);
   }
 };
 
@@ -78,10 +80,10 @@ void TileFrameRenderer::render(const TileRound& at, SampleState& state, RoundMea
   catchers_ = CatcherAlbedo(at.light.irradiance.get(), at.light.now);
   catchers_before_ = CatcherAlbedo(at.light.irradiance_before.get(), at.light.before);
   Batch batch;
-  batch.frame_number = at.frame.number;
+  batch.frame = at.frame.number;
   batch.round = at.round;
-  batch.round_of_frame = at.round_of_frame();
-  batch.step = at.step(context_.job.quality.rounds);
+  batch.round_of_frame = at.frame.round_of_frame(at.round);
+  batch.rounds_before = at.rounds_before(context_.job.quality.rounds);
   round_sampling_ = {};
   const std::size_t num_pixels = at.surfaces.pixels.size();
   const std::uint64_t rays_before = reprojection_ != nullptr ? reprojection_->num_rays() : 0;
@@ -98,10 +100,10 @@ void TileFrameRenderer::render(const TileRound& at, SampleState& state, RoundMea
     learn(batch, state);
     finish(batch, at.light, film);
   }
-  state.frame_index = at.frame.index;
+  state.step = at.frame.step;
   if (reprojection_ != nullptr) stats_.rays_primary += reprojection_->num_rays() - rays_before;
-  if (at.round == 0) stats_.pixels += num_pixels;
-  if (at.round >= 0) {
+  if (at.round == Round(0)) stats_.pixels += num_pixels;
+  if (at.round >= Round(0)) {
     frame_sampling_.merge(round_sampling_);
     stats_.sampling.merge(round_sampling_);
   }
@@ -176,8 +178,8 @@ void TileFrameRenderer::sample(Batch& batch, const TileRound& at, SampleState& s
     // Gather the pixel's surfaces.
     if (!surfaces_->sees_surface(slot)) {
       // Other rounds, whose sites are elsewhere, may have seen something.
-      if (batch.round <= 0 && !has_history_) set_background(state, index);
-      if (batch.round == 0) ++stats_.pixels_background;
+      if (batch.round <= Round(0) && !has_history_) set_background(state, index);
+      if (batch.round == Round(0)) ++stats_.pixels_background;
       batch.end_ray[i] = batch.rays.size();
       continue;
     }
@@ -196,7 +198,7 @@ void TileFrameRenderer::sample(Batch& batch, const TileRound& at, SampleState& s
         .now = now,
         .before = before,
         .key = batch.key(context_, surfaces_->rect, index),
-        .frame_index = batch.step,
+        .rounds_before = batch.rounds_before,
         .has_history = ahead.history != PixelHistory::none,
         .target_before = knows_targets_ ? targets_of(index, state) : std::span<float>(),
         .old = ahead.history == PixelHistory::moved ? &ahead.old : nullptr,

@@ -19,16 +19,17 @@ namespace baton {
 /// One pass over some pixels of a tile.
 struct TileRound {
   const FrameSpec& frame;
-  std::int32_t round = 0;  ///< of the step; negative: before those that are seen
+  Round round{};
   const FrameLight& light;
   const TileSurfaces& surfaces;  ///< what its sites see
   /// The light that probes are sampled again with; null: there are none.
   const FrameLight* probe_light = nullptr;
 
-  /// Number of the pass in the sequence: to a method a round is a frame of standing light.
-  std::int32_t step(std::int32_t num_rounds) const { return frame.index * num_rounds + round; }
-  /// Of the frame, over all sweeps: the address of its random numbers.
-  std::int32_t round_of_frame() const { return frame.first_round + round; }
+  /// How many rounds of the sequence come before it, of num_rounds a step; less than 0 before those
+  /// that are seen. To a method a round is a frame of standing light.
+  std::int32_t rounds_before(std::int32_t num_rounds) const {
+    return frame.step.value() * num_rounds + round.value();
+  }
 };
 
 /// Renders a round of one tile: look ahead, sample, trace, learn, film, a batch of pixels at a time
@@ -49,7 +50,7 @@ class TileFrameRenderer {
   /// What the second pass needs of the frame that was rendered last; once, and only if the job has
   /// a second pass.
   FirstPassSamples take_first_pass(const SampleState& state) {
-    return collector_.finish(state, state.frame_index);
+    return collector_.finish(state, state.step);
   }
 
   /// The next round is the first one of a frame.

@@ -19,22 +19,22 @@
 namespace baton {
 namespace {
 
-/// A state must be that of the job, a tile and a frame.
+/// A state must be that of the job, a tile and a step.
 Status check_state(const RenderContext& context, const SampleState& state, std::int32_t tile,
-                   std::int32_t frame_index) {
+                   Step step) {
   if (state.picture != context.picture) {
     return Error{ErrorKind::bad_input, fmt::format("sample state: of picture {}, expected {}",
                                                    state.picture.hex(), context.picture.hex())};
   }
   const std::int32_t num_particles = num_carried_particles(context.job.sampling);
-  if (state.tile != tile || state.frame_index != frame_index ||
+  if (state.tile != tile || state.step != step ||
       state.rect != context.grid.rect(tile) || state.num_particles != num_particles ||
       state.num_populations != num_populations(context.job)) {
     return Error{
         ErrorKind::bad_input,
         fmt::format("sample state: of tile {} frame index {} with {} particles, expected {}, "
                     "{}, {}",
-                    state.tile, state.frame_index, state.num_particles, tile, frame_index,
+                    state.tile, state.step, state.num_particles, tile, step,
                     num_particles)};
   }
   return {};
@@ -44,15 +44,15 @@ Status check_state(const RenderContext& context, const SampleState& state, std::
 Status check_previous(const RenderContext& context, const TileRun& run,
                       std::span<const StatePtr> previous) {
   std::vector<std::int32_t> tiles;
-  if (carries_state(context.job) && run.first_frame > 0)
+  if (carries_state(context.job) && run.steps.first > Step(0))
     tiles = context.grid.tiles_near(run.tile, history_reach_px(context.job));
   if (previous.size() != tiles.size()) {
     return Error{ErrorKind::internal,
                  fmt::format("tile {} frame index {}: got {} previous states, expected {}",
-                             run.tile, run.first_frame, previous.size(), tiles.size())};
+                             run.tile, run.steps.first, previous.size(), tiles.size())};
   }
   for (std::size_t i = 0; i < tiles.size(); ++i)
-    BATON_TRY(check_state(context, *previous[i], tiles[i], run.first_frame - 1));
+    BATON_TRY(check_state(context, *previous[i], tiles[i], run.steps.first - 1));
   return {};
 }
 
@@ -66,7 +66,7 @@ class TileWalk {
       : context_(context),
         rect_(context.grid.rect(run.tile)),
         shares_(shares_history(context.job)),
-        keeps_surfaces_(!shares_ && run.first_frame < run.last_frame),
+        keeps_surfaces_(!shares_ && run.steps.size() > 1),
         stop_(stop) {
     start_state();
     state_.picture = context.picture;
@@ -87,30 +87,31 @@ class TileWalk {
     AdaptiveRounds adaptive(context_.job, rect_);
     GeometryPlanes planes(context_, frame, *geometry_, rect_);
     renderer_->begin_frame();
-    const std::int32_t first = frame.index == 0 ? -num_preroll_rounds(context_.job) : 0;
+    const Round first(frame.step == Step(0) ? -num_preroll_rounds(context_.job) : 0);
     std::optional<RoundMean> unseen;
-    if (first < 0) unseen.emplace(context_.job, rect_);
+    if (first < Round(0)) unseen.emplace(context_.job, rect_);
     std::shared_ptr<const FrameLight> probe_light;
     if (tells_noise(context_.job)) {
       BATON_ASSIGN(probe_light, light_of(frame, kProbeRound));
     }
-    for (std::int32_t round = first; round < context_.job.quality.rounds; ++round) {
+    for (Round round = first; round < Round(context_.job.quality.rounds); ++round) {
       if (stop_.stop_requested()) return Error{ErrorKind::cancelled, "stopped"};
-      if (round == limits::kJudgingRounds) adaptive.judge(film);
+      if (round == Round(limits::kJudgingRounds)) adaptive.judge(film);
       RoundPixels pixels = adaptive.pixels(round);
       if (pixels.size() == 0) break;
       BATON_ASSIGN(const std::shared_ptr<const FrameLight> light, light_of(frame, round));
-      RoundMean& mean = round < 0 ? *unseen : film;
+      const bool is_seen = round >= Round(0);
+      RoundMean& mean = !is_seen ? *unseen : film;
       std::optional<Reprojection> history;
       if (shares_ && round == first) history.emplace(context_, *geometry_, *before_, previous);
-      const auto whole = kept_surfaces(frame.first_round + round, history.has_value());
+      const auto whole = kept_surfaces(frame.round_of_frame(round), history.has_value());
       if (history && whole != nullptr) keep_for_next(frame, whole);
       renderer_->begin_round(state_, history ? &*history : nullptr, has_history_);
       for (RoundPixels& part : parts_of(std::move(pixels), whole != nullptr)) {
-        const auto surfaces = surfaces_of(frame.first_round + round, std::move(part), whole);
-        if (round >= 0) planes.add(*surfaces);
+        const auto surfaces = surfaces_of(frame.round_of_frame(round), std::move(part), whole);
+        if (is_seen) planes.add(*surfaces);
         renderer_->render(
-            {frame, round, *light, *surfaces, round < 0 ? nullptr : probe_light.get()}, state_,
+            {frame, round, *light, *surfaces, is_seen ? probe_light.get() : nullptr}, state_,
             mean);
       }
       has_history_ = carries_state(context_.job);
@@ -145,9 +146,9 @@ class TileWalk {
   /// Where surfaces move, a frame has a geometry, surfaces and a state of its own.
   Status prepare(const FrameSpec& frame) {
     if (renderer_ != nullptr && !shares_) return {};
-    BATON_ASSIGN(geometry_, context_.geometry->at(frame.index));
+    BATON_ASSIGN(geometry_, context_.geometry->at(frame.step));
     if (shares_) {
-      BATON_ASSIGN(before_, context_.geometry->at(std::max(frame.index - 1, 0)));
+      BATON_ASSIGN(before_, context_.geometry->at(std::max(frame.step - 1, Step(0))));
       start_state();
       if (renderer_ != nullptr) stats_.merge(renderer_->stats());
     }
@@ -190,18 +191,18 @@ class TileWalk {
     }
     return parts;
   }
-  Result<std::shared_ptr<const FrameLight>> light_of(const FrameSpec& frame, std::int32_t round) {
+  Result<std::shared_ptr<const FrameLight>> light_of(const FrameSpec& frame, Round round) {
     const CpuTimer timer(stats_.seconds_light);
-    return context_.lights->at(frame.index, round);
+    return context_.lights->at(frame.step, round);
   }
-  /// The round, of all sweeps, whose sites a round has.
-  std::int32_t sites_of(std::int32_t round) const {
-    return rounds_have_own_sites(context_.job) ? std::max(round, 0) : 0;
+  /// The round of the frame whose sites a round of it has.
+  std::int32_t sites_of(std::int32_t round_of_frame) const {
+    return rounds_have_own_sites(context_.job) ? std::max(round_of_frame, 0) : 0;
   }
-  /// What the whole tile sees in a round of all sweeps, if that is kept: for the rounds and frames
+  /// What the whole tile sees in a round of the frame, if that is kept: for the rounds and frames
   /// after it, or for the next frame's history. Else null.
-  std::shared_ptr<const TileSurfaces> kept_surfaces(std::int32_t round, bool for_history) {
-    const std::int32_t of = sites_of(round);
+  std::shared_ptr<const TileSurfaces> kept_surfaces(std::int32_t round_of_frame, bool for_history) {
+    const std::int32_t of = sites_of(round_of_frame);
     const auto found = kept_.find(of);
     if (found != kept_.end()) return found->second;
     if (!(is_one_part() && (of == 0 || for_history)) && !has_room()) return nullptr;
@@ -211,10 +212,10 @@ class TileWalk {
   }
   /// What some pixels see: of `whole`, or, where that is null, traced, until the next call.
   std::shared_ptr<const TileSurfaces> surfaces_of(
-      std::int32_t round, RoundPixels pixels, const std::shared_ptr<const TileSurfaces>& whole) {
+      std::int32_t round_of_frame, RoundPixels pixels, const std::shared_ptr<const TileSurfaces>& whole) {
     if (whole != nullptr && pixels.are_all(state_.num_pixels())) return whole;
     if (whole == nullptr) {
-      trace(sites_of(round), std::move(pixels), *passing_);
+      trace(sites_of(round_of_frame), std::move(pixels), *passing_);
     } else {
       const CpuTimer timer(stats_.seconds_primary);
       *passing_ = part_of(*whole, std::move(pixels));
@@ -224,8 +225,8 @@ class TileWalk {
   /// Tiles ask for what those of the frame before saw; one that is behind them traces it again. Of
   /// a tile in parts nothing is kept.
   void keep_for_next(const FrameSpec& frame, const std::shared_ptr<const TileSurfaces>& surfaces) {
-    context_.surfaces->release_before(frame.index - 1);
-    if (is_one_part()) context_.surfaces->keep({frame.index, state_.tile}, frame.index, surfaces);
+    context_.surfaces->release_before(frame.step - 1);
+    if (is_one_part()) context_.surfaces->keep({frame.step, state_.tile}, frame.step, surfaces);
   }
   /// For what another round sees, until the next frame.
   bool has_room() const {
@@ -263,21 +264,22 @@ Result<RenderStats> run_tile(const RenderContext& context, const TileRun& run,
   const double start = thread_cpu_seconds();
   BATON_TRY(check_previous(context, run, previous));
   const bool shares = shares_history(context.job);
+  const Timeline timeline(context.job);
   TileWalk walk(context, run, stop);
   if (!shares && !previous.empty()) walk.go_on_from(*previous.front());
 
   // Frame by frame.
-  for (std::int32_t f = run.first_frame; f <= run.last_frame; ++f) {
+  for (Step step = run.steps.first; step <= run.steps.last; ++step) {
     if (stop.stop_requested()) return Error{ErrorKind::cancelled, "stopped"};
-    const FrameSpec& frame = context.frames[static_cast<std::size_t>(f)];
+    const FrameSpec& frame = context.frames[step.index()];
     BATON_ASSIGN(FilmTile film, walk.render(frame, previous));
-    if (const std::int32_t sweep = frame.first_round / context.job.quality.rounds; sweep > 0) {
-      const auto num_frames = static_cast<std::int32_t>(context.job.frames.size());
-      BATON_ASSIGN(FilmTile earlier, sink.earlier_film(f - num_frames));
+    if (const Sweep sweep = timeline.sweep_of(step); sweep > Sweep(0)) {
+      const Step earlier_step = timeline.step_of(timeline.frame_of(step), sweep - 1);
+      BATON_ASSIGN(FilmTile earlier, sink.earlier_film(earlier_step));
       BATON_TRY(add_sweeps(std::move(earlier), sweep, film));
     }
-    BATON_TRY(sink.film(f, film));
-    if (sink.diagnostics) sink.diagnostics({f, run.tile, walk.frame_sampling()});
+    BATON_TRY(sink.film(step, film));
+    if (sink.diagnostics) sink.diagnostics({step.value(), run.tile, walk.frame_sampling()});
     if (context.job.visibility.correlated) BATON_TRY(sink.samples(walk.take_first_pass()));
   }
   if (carries_state(context.job)) BATON_TRY(sink.state(walk.take_state()));

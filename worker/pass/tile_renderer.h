@@ -37,7 +37,7 @@ Result<std::shared_ptr<const RenderContext>> make_render_context(
 /// Where the films of a tile run go, step by step. Called on the rendering thread.
 struct TileRunSink {
   /// film: the mean of this sweep and all before it.
-  std::function<Status(std::int32_t step, const FilmTile& film)> film;
+  std::function<Status(Step step, const FilmTile& film)> film;
   /// Called for the last frame of the run when the job carries state.
   std::function<Status(SampleState state)> state = {};
   /// Called after each film with what the sampler did; may be empty.
@@ -45,12 +45,12 @@ struct TileRunSink {
   /// Called after each film when the job has a second pass.
   std::function<Status(FirstPassSamples samples)> samples = {};
   /// Where films of an earlier sweep come from; called for the steps of later ones.
-  std::function<Result<FilmTile>(std::int32_t step)> earlier_film = {};
+  std::function<Result<FilmTile>(Step step)> earlier_film = {};
 };
 
 using StatePtr = std::shared_ptr<const SampleState>;
 
-/// Renders one tile for the steps of `run`. previous: the states of step run.first_frame - 1 of
+/// Renders one tile for the steps of `run`. previous: the states of step run.steps.first - 1 of
 /// all tiles within history_reach_px (TileGrid::tiles_near, in that order; the tile's own where
 /// pixels keep to themselves), required exactly when the job carries state and the run is not the
 /// first. The bytes that reach the sink are a function of (job, run, previous, earlier films)
@@ -60,10 +60,9 @@ Result<RenderStats> run_tile(const RenderContext& context, const TileRun& run,
                              std::span<const StatePtr> previous, const TileRunSink& sink,
                              const std::stop_token& stop);
 
-/// What people should know of the job's files, one line each, after a run of a tile: of the maps
-/// read so far, and with the job's first run of its first tile of meshes and objects.
-std::vector<std::string> asset_notes(const RenderContext& context, std::int32_t step,
-                                     std::int32_t tile);
+/// What people should know of the job's files, one line each, after a task: of the maps read so far,
+/// and with the first task of the first tile of meshes and objects.
+std::vector<std::string> asset_notes(const RenderContext& context, const TaskKey& task);
 
 /// Name of the SIMD instruction set in use, e.g. "AVX2".
 std::string instruction_set();

@@ -17,20 +17,22 @@ namespace baton {
 namespace {
 
 std::string blob_name(const BlobRef& ref) {
-  return fmt::format("{} of frame index {} tile {} ({})", blob_kind_name(ref.kind), ref.frame,
+  return fmt::format("{} of frame index {} tile {} ({})", blob_kind_name(ref.kind), ref.position,
                      ref.tile, ref.digest.hex());
 }
 
-/// A film of the job's frame, as one pass made it.
+/// A film of the job's step, as one pass made it.
 Result<FilmTile> read_film(const LoadedJob& loaded, const BlobStore& store, const BlobRef& ref,
                            FilmPass pass) {
+  if (ref.kind != BlobKind::film)
+    return Error{ErrorKind::bad_input, fmt::format("{}: expected a film", blob_name(ref))};
   BATON_ASSIGN(const Bytes bytes, store.get(ref.digest));
   BATON_ASSIGN(StoredFilm stored, decode_film_tile(bytes, blob_name(ref)));
-  if (stored.origin == FilmOrigin{loaded.picture, ref.frame, pass}) return std::move(stored.film);
+  if (stored.origin == FilmOrigin{loaded.picture, ref.step(), pass}) return std::move(stored.film);
   return Error{ErrorKind::bad_input,
                fmt::format("{}: of picture {} frame index {} pass {}, expected {}, {}, {}",
-                           blob_name(ref), stored.origin.picture.hex(), stored.origin.frame_index,
-                           static_cast<int>(stored.origin.pass), loaded.picture.hex(), ref.frame,
+                           blob_name(ref), stored.origin.picture.hex(), stored.origin.step,
+                           static_cast<int>(stored.origin.pass), loaded.picture.hex(), ref.step(),
                            static_cast<int>(pass))};
 }
 
@@ -69,15 +71,15 @@ Result<TaskOutput> cut_state(const LoadedJob& loaded, BlobStore& store, const Ta
   BATON_ASSIGN(const SampleState state, join_states(parts, rect, task.tile));
   const Bytes bytes = encode_state(state);
   BATON_ASSIGN(const Digest digest, store.put(bytes));
-  output.outputs.push_back({BlobKind::state, state.frame_index, task.tile, digest, bytes.size()});
+  output.outputs.push_back({BlobKind::state, state.step.value(), task.tile, digest, bytes.size()});
   return output;
 }
 
 /// Keeps what a render task hands on: in this process if it may stay here, else in the store.
 Status keep_state(const LoadedJob& loaded, BlobStore& store, bool may_hold, SampleState&& state,
                   std::vector<BlobRef>& outputs) {
-  BlobRef ref{BlobKind::state, state.frame_index, state.tile,
-              held_state_name(loaded.digest, state.frame_index, state.tile)};
+  BlobRef ref{BlobKind::state, state.step.value(), state.tile,
+              held_state_name(loaded.digest, state.step, state.tile)};
   const auto shared = std::make_shared<const SampleState>(std::move(state));
   if (may_hold && loaded.states->hold(ref, shared)) {
     outputs.push_back(ref);
@@ -94,12 +96,12 @@ Status keep_state(const LoadedJob& loaded, BlobStore& store, bool may_hold, Samp
 Result<TaskOutput> execute_render(const LoadedJob& loaded, BlobStore& store, const TaskKey& task,
                                   const TaskGrant& grant, const std::stop_token& stop,
                                   std::vector<BlobRef>* left) {
-  const FrameSpan& frames = grant.frames;
+  const StepSpan& steps = grant.steps;
   // Check what came over the wire against the job.
-  if (frames.first < 0 || frames.last < frames.first || frames.last >= num_steps(loaded.job) ||
+  if (steps.first < Step(0) || steps.last < steps.first || steps.last >= Step(num_steps(loaded.job)) ||
       task.tile < 0 || task.tile >= TileGrid(loaded.job.image).count()) {
     return Error{ErrorKind::bad_input, fmt::format("the job has no tile {} in steps {} to {}",
-                                                   task.tile, frames.first, frames.last)};
+                                                   task.tile, steps.first, steps.last)};
   }
   double seconds_read = 0;
   std::vector<StatePtr> previous;
@@ -107,21 +109,21 @@ Result<TaskOutput> execute_render(const LoadedJob& loaded, BlobStore& store, con
     const CpuTimer timer(seconds_read);
     BATON_ASSIGN(previous, read_states(loaded, store, grant.inputs));
   }
-  const bool is_cut = !previous.empty() && previous.front()->frame_index == frames.last &&
+  const bool is_cut = !previous.empty() && previous.front()->step == steps.last &&
                       previous.front()->picture == loaded.picture;
   if (is_cut) return cut_state(loaded, store, task, previous);
   double seconds_state = seconds_read;
 
   // Render.
   TaskOutput output;
-  const auto keep = [&](BlobKind kind, std::int32_t frame, const Bytes& bytes) -> Status {
+  const auto keep = [&](BlobKind kind, Step step, const Bytes& bytes) -> Status {
     BATON_ASSIGN(const Digest digest, store.put(bytes));
-    output.outputs.push_back({kind, frame, task.tile, digest, bytes.size()});
+    output.outputs.push_back({kind, step.value(), task.tile, digest, bytes.size()});
     return {};
   };
   const TileRunSink sink{
       .film =
-          [&](std::int32_t step, const FilmTile& film) {
+          [&](Step step, const FilmTile& film) {
             return keep(BlobKind::film, step, encode_film_tile(film, {loaded.picture, step}));
           },
       .state = [&](SampleState state) -> Status {
@@ -130,17 +132,17 @@ Result<TaskOutput> execute_render(const LoadedJob& loaded, BlobStore& store, con
       },
       .diagnostics = [&](const FrameStats& stats) { output.frames.push_back(stats); },
       .samples = [&](const FirstPassSamples& samples) -> Status {
-        return keep(BlobKind::first_pass, samples.frame_index, encode_first_pass_samples(samples));
+        return keep(BlobKind::first_pass, samples.step, encode_first_pass_samples(samples));
       },
-      .earlier_film = [&](std::int32_t step) -> Result<FilmTile> {
+      .earlier_film = [&](Step step) -> Result<FilmTile> {
         for (const BlobRef& input : grant.inputs) {
-          if (input.kind == BlobKind::film && input.frame == step && input.tile == task.tile)
+          if (input.kind == BlobKind::film && input.step() == step && input.tile == task.tile)
             return read_film(loaded, store, input, FilmPass::first);
         }
         return Error{ErrorKind::bad_input,
                      fmt::format("the task lacks the film of step {} tile {}", step, task.tile)};
       }};
-  const TileRun run{task.tile, task.step, frames.first, frames.last};
+  const TileRun run{task.tile, task.run(), steps};
   Result<RenderStats> stats = run_tile(*loaded.context, run, previous, sink, stop);
   if (!stats) {
     if (left != nullptr) *left = std::move(output.outputs);
@@ -158,11 +160,11 @@ Result<TaskOutput> execute_render(const LoadedJob& loaded, BlobStore& store, con
 Result<TaskOutput> execute_second_pass(const LoadedJob& loaded, BlobStore& store,
                                        const TaskKey& task, const std::vector<BlobRef>& inputs) {
   const auto num_frames = static_cast<std::int32_t>(loaded.job.frames.size());
-  if (!loaded.job.visibility.correlated || task.step < 0 || task.step >= num_frames ||
+  if (!loaded.job.visibility.correlated || task.step() < Step(0) || task.step() >= Step(num_frames) ||
       task.tile < 0 || task.tile >= TileGrid(loaded.job.image).count()) {
     return Error{ErrorKind::bad_input,
                  fmt::format("the job has no second pass of tile {} in frame index {}", task.tile,
-                             task.step)};
+                             task.step())};
   }
 
   // Read.
@@ -179,10 +181,10 @@ Result<TaskOutput> execute_second_pass(const LoadedJob& loaded, BlobStore& store
   }
 
   BATON_ASSIGN(const SecondPassOutput second,
-               run_second_pass(*loaded.context, task.step, task.tile, film, near));
-  const Bytes bytes = encode_film_tile(second.film, {loaded.picture, task.step, FilmPass::second});
+               run_second_pass(*loaded.context, task.step(), task.tile, film, near));
+  const Bytes bytes = encode_film_tile(second.film, {loaded.picture, task.step(), FilmPass::second});
   BATON_ASSIGN(const Digest digest, store.put(bytes));
-  return TaskOutput{{{BlobKind::film, task.step, task.tile, digest, bytes.size()}}, second.stats};
+  return TaskOutput{{{BlobKind::film, task.position, task.tile, digest, bytes.size()}}, second.stats};
 }
 
 Result<TaskOutput> execute_assemble(const LoadedJob& loaded, const BlobStore& store,
@@ -190,27 +192,28 @@ Result<TaskOutput> execute_assemble(const LoadedJob& loaded, const BlobStore& st
                                     const std::stop_token& stop) {
   const TileGrid grid(loaded.job.image);
   const auto num_frames = static_cast<std::int32_t>(loaded.job.frames.size());
-  if (task.step < 0 || task.step >= num_frames ||
+  const FrameIndex frame = task.frame();
+  if (frame < FrameIndex(0) || frame >= FrameIndex(num_frames) ||
       inputs.size() != static_cast<std::size_t>(grid.count())) {
     return Error{ErrorKind::bad_input,
-                 fmt::format("frame index {} of {}: got {} films, expected {}", task.step,
+                 fmt::format("frame index {} of {}: got {} films, expected {}", frame,
                              num_frames, inputs.size(), grid.count())};
   }
 
   // Paste every tile of the last sweep once.
-  const std::int32_t step = num_steps(loaded.job) - num_frames + task.step;
+  const Step step = Timeline(loaded.job).last_step_of(frame);
   FilmTile image;
   std::vector<bool> pasted(inputs.size(), false);
   for (const BlobRef& input : inputs) {
     if (stop.stop_requested()) return Error{ErrorKind::cancelled, "stopped while assembling"};
     const FilmPass pass = loaded.job.visibility.correlated ? FilmPass::second : FilmPass::first;
     BATON_ASSIGN(const FilmTile film, read_film(loaded, store, input, pass));
-    const bool fits = input.kind == BlobKind::film && input.frame == step && input.tile >= 0 &&
+    const bool fits = input.kind == BlobKind::film && input.step() == step && input.tile >= 0 &&
                       input.tile < grid.count() && film.rect == grid.rect(input.tile) &&
                       !pasted[static_cast<std::size_t>(input.tile)];
     if (!fits) {
       return Error{ErrorKind::bad_input, fmt::format("{}: is not a new tile of frame index {}",
-                                                     blob_name(input), task.step)};
+                                                     blob_name(input), frame)};
     }
     if (image.channels.empty()) image = blank_image(loaded.job.image, film.channels);
     BATON_TRY(paste_tile(film, image));
@@ -220,17 +223,17 @@ Result<TaskOutput> execute_assemble(const LoadedJob& loaded, const BlobStore& st
   std::optional<RgbImage> picture;
   std::vector<std::string> notes;
   if (const JobSpec& here = loaded.context->job; has_plate(here.output)) {
-    const int frame = here.frames[static_cast<std::size_t>(task.step)];
-    BATON_ASSIGN(Plate plate, load_plate(here, frame));
+    const FrameNumber number = here.frames[frame.index()];
+    BATON_ASSIGN(Plate plate, load_plate(here, number));
     if (plate.repaired > 0)
-      notes.push_back(repair_note(file_at(*here.output.plate, frame), plate.repaired));
+      notes.push_back(repair_note(file_at(*here.output.plate, number), plate.repaired));
     picture = std::move(plate.picture);
   }
   BATON_ASSIGN(const WrittenFrame written,
-               write_frame(loaded.job, loaded.digest, task.step, std::move(image), picture));
+               write_frame(loaded.job, loaded.digest, frame, std::move(image), picture));
   return TaskOutput{.outputs = {written.file},
                     .stats = {},
-                    .frames = {{task.step, task.tile, {}, written.quality}},
+                    .frames = {{frame.value(), task.tile, {}, written.quality}},
                     .notes = std::move(notes)};
 }
 
@@ -256,7 +259,7 @@ Result<std::vector<PublishedState>> publish_held(const JobStates::List& states, 
   for (const auto& [ref, state] : states) {
     const Bytes bytes = encode_state(*state);
     BATON_ASSIGN(const Digest digest, store.put(bytes));
-    published.push_back({ref, {ref.kind, ref.frame, ref.tile, digest, bytes.size()}});
+    published.push_back({ref, {ref.kind, ref.position, ref.tile, digest, bytes.size()}});
   }
   return published;
 }

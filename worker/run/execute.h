@@ -33,9 +33,9 @@ struct TaskEnded {
 /// What a lease says beside the task: LeaseGrant in PROTOCOL.md.
 struct TaskGrant {
   std::vector<BlobRef> inputs;
-  FrameSpan frames = {};
+  StepSpan steps{};  ///< of a render task
   bool may_hold = false;
-  std::int32_t states_from = 0;
+  Step states_from{};
 };
 
 /// Runs one task, of the grant's frames: reads its inputs from `store`, writes its outputs there

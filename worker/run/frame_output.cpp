@@ -134,12 +134,12 @@ Status paste_tile(const FilmTile& tile, FilmTile& image) {
   return {};
 }
 
-ImageMetadata frame_metadata(const JobSpec& job, const Digest& job_digest, int frame_number,
+ImageMetadata frame_metadata(const JobSpec& job, const Digest& job_digest, FrameNumber frame,
                              const FrameQuality& quality, float cycles_noise) {
   ImageMetadata metadata{{"baton:version", kVersion},
                          {"baton:jobName", job.name},
                          {"baton:jobDigest", job_digest.hex()},
-                         {"baton:frame", std::to_string(frame_number)},
+                         {"baton:frame", std::to_string(frame.value())},
                          {"baton:method", std::string(traits(job.sampling.method).name)}};
   const SamplingSpec& sampling = job.sampling;
   const auto add = [&](const char* key, const auto& value) {
@@ -154,7 +154,7 @@ ImageMetadata frame_metadata(const JobSpec& job, const Digest& job_digest, int f
   if (job.quality.adaptive_threshold)
     add("baton:adaptiveThreshold", *job.quality.adaptive_threshold);
   const EnvironmentSpec& environment = job.environment;
-  const EnvironmentFrame light = environment_at(environment, frame_number);
+  const EnvironmentFrame light = environment_at(environment, frame);
   add("baton:map", environment.keys.at(static_cast<std::size_t>(light.map_a)).map);
   if (light.mix > 0) {
     add("baton:mapMixedIn", environment.keys.at(static_cast<std::size_t>(light.map_b)).map);
@@ -162,8 +162,8 @@ ImageMetadata frame_metadata(const JobSpec& job, const Digest& job_digest, int f
   }
   add("baton:mapScale", environment.scale * light.scale);
   if (!environment.camera_map.file.empty()) add("baton:cameraMap", environment.camera_map.file);
-  if (has_plate(job.output)) add("baton:plate", file_at(*job.output.plate, frame_number));
-  add("baton:rotationDeg", rotation_deg_at(environment, frame_number));
+  if (has_plate(job.output)) add("baton:plate", file_at(*job.output.plate, frame));
+  add("baton:rotationDeg", rotation_deg_at(environment, frame));
   if (quality.noise_source != NoiseSource::none) {
     metadata.emplace_back("baton:noise", fmt::format("{:.4g}", quality.noise));
     add("baton:noiseFrom", noise_source_name(quality.noise_source));
@@ -188,7 +188,7 @@ ImageMetadata frame_metadata(const JobSpec& job, const Digest& job_digest, int f
 }
 
 Result<WrittenFrame> write_frame(const JobSpec& job, const Digest& job_digest,
-                                 std::int32_t frame_index, FilmTile image,
+                                 FrameIndex frame, FilmTile image,
                                  const std::optional<RgbImage>& plate) {
   FrameQuality quality = judge_frame(image);
   float noise = cycles_noise(image);
@@ -208,9 +208,9 @@ Result<WrittenFrame> write_frame(const JobSpec& job, const Digest& job_digest,
   }
   drop_channel(image, kCatcherChannel);
 
-  const std::filesystem::path path = frame_path(job, frame_index);
-  const int number = job.frames.at(static_cast<std::size_t>(frame_index));
-  const Camera camera(camera_at(job, number), job.image.width, job.image.height);
+  const std::filesystem::path path = frame_path(job, frame);
+  const FrameNumber number = job.frames.at(frame.index());
+  const Camera camera(camera_at(job, number.value()), job.image.width, job.image.height);
   BATON_ASSIGN(const Bytes bytes,
                encode_exr(path.string(), image,
                           {.half_float = job.output.pixel_type == PixelType::half_float,
@@ -220,13 +220,13 @@ Result<WrittenFrame> write_frame(const JobSpec& job, const Digest& job_digest,
                            .world_to_camera = camera.world_to_camera(),
                            .world_to_ndc = camera.world_to_ndc(job.image.whole()),
                            .frames_per_second = job.output.frames_per_second,
-                           .frame_number = number,
+                           .frame_number = number.value(),
                            .naming = naming_of(job),
                            .display_window = job.image.whole()}));
   BATON_TRY(write_file_verified(path, bytes, [&](const std::filesystem::path& temporary) {
-    return verify_frame(temporary, image, frame_index);
+    return verify_frame(temporary, image, frame.value());
   }));
-  return WrittenFrame{{BlobKind::image, frame_index, 0, digest_of(bytes), bytes.size()}, quality};
+  return WrittenFrame{{BlobKind::image, frame.value(), 0, digest_of(bytes), bytes.size()}, quality};
 }
 
 }  // namespace baton

@@ -39,7 +39,7 @@ struct WrittenFrame {
 /// header and the table of blocks must be whole, and one block of rows, another one in each frame,
 /// must unpack to the film. Errors: the disk, or a file that does not hold what was written.
 Result<WrittenFrame> write_frame(const JobSpec& job, const Digest& job_digest,
-                                 std::int32_t frame_index, FilmTile image,
+                                 FrameIndex frame, FilmTile image,
                                  const std::optional<RgbImage>& plate = {});
 
 /// Checks that the EXR file at `path` has the size and the channels of `image`, and in block
@@ -49,7 +49,7 @@ Status verify_frame(const std::filesystem::path& path, const FilmTile& image, st
 
 /// The header attributes that Baton adds to its pictures: what they are made from, what was seen of
 /// them, and the job's own metadata as baton:metadata:NAME. cycles_noise: 0 where it is not told.
-ImageMetadata frame_metadata(const JobSpec& job, const Digest& job_digest, int frame_number,
+ImageMetadata frame_metadata(const JobSpec& job, const Digest& job_digest, FrameNumber frame,
                              const FrameQuality& quality, float cycles_noise = 0);
 
 }  // namespace baton

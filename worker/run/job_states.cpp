@@ -4,15 +4,15 @@ namespace baton {
 namespace {
 
 BlobRef ref_of(const Digest& name, const SampleState& state) {
-  return {BlobKind::state, state.frame_index, state.tile, name};
+  return {BlobKind::state, state.step.value(), state.tile, name};
 }
 
 }  // namespace
 
 bool JobStates::hold(const BlobRef& ref, const StatePtr& state) {
-  if (held_.keep(ref.digest, ref.frame, state)) return true;
+  if (held_.keep(ref.digest, ref.step(), state)) return true;
   kept_.clear();
-  return held_.keep(ref.digest, ref.frame, state);
+  return held_.keep(ref.digest, ref.step(), state);
 }
 
 JobStates::StatePtr JobStates::find(const BlobRef& ref) const {

@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "common/base/digest.h"
-#include "common/base/frame_keep.h"
+#include "common/job/step_keep.h"
 #include "common/job/task.h"
 #include "common/state/sample_state.h"
 
@@ -25,7 +25,7 @@ class JobStates {
   bool hold(const BlobRef& ref, const StatePtr& state);
   /// Keeps a state of the store, if there is room.
   void keep(const Digest& digest, const StatePtr& state) {
-    kept_.keep(digest, state->frame_index, state);
+    kept_.keep(digest, state->step, state);
   }
   /// Null: it is not here.
   StatePtr find(const BlobRef& ref) const;
@@ -34,10 +34,10 @@ class JobStates {
   List held(const std::vector<Digest>& names) const;
   List held() const;
 
-  /// Forgets the states of frames (0-based) before this one: no task needs them.
-  void release_before(std::int32_t frame) {
-    held_.release_before(frame);
-    kept_.release_before(frame);
+  /// Forgets the states of steps before this one: no task needs them.
+  void release_before(Step step) {
+    held_.release_before(step);
+    kept_.release_before(step);
   }
   /// Leaves the room of what it keeps to other jobs.
   void drop_kept() { kept_.clear(); }
@@ -45,7 +45,7 @@ class JobStates {
   std::size_t size_bytes() const { return held_.size_bytes() + kept_.size_bytes(); }
 
  private:
-  FrameKeep<Digest, SampleState> held_, kept_;
+  StepKeep<Digest, SampleState> held_, kept_;
 };
 
 }  // namespace baton

@@ -10,9 +10,9 @@
 
 namespace baton {
 
-std::vector<std::set<std::int32_t>> LocalRender::tiles_before(std::int32_t frame,
+std::vector<std::set<std::int32_t>> LocalRender::tiles_before(Step step,
                                                               std::set<std::int32_t> wanted) const {
-  std::vector<std::set<std::int32_t>> needed(static_cast<std::size_t>(frame));
+  std::vector<std::set<std::int32_t>> needed(step.index());
   if (!carries_state(context_.job)) return needed;
   // They spread by whole tiles with each frame back.
   for (auto tiles = needed.rbegin(); tiles != needed.rend(); ++tiles) {
@@ -25,16 +25,16 @@ std::vector<std::set<std::int32_t>> LocalRender::tiles_before(std::int32_t frame
   return needed;
 }
 
-Result<RenderedTile> LocalRender::render(std::int32_t frame, std::int32_t tile) const {
+Result<RenderedTile> LocalRender::render(Step step, std::int32_t tile) const {
   std::vector<StatePtr> previous;
-  if (frame > 0 && carries_state(context_.job)) {
+  if (step > Step(0) && carries_state(context_.job)) {
     for (const std::int32_t near : context_.grid.tiles_near(tile, history_reach_px(context_.job)))
       previous.push_back(tiles_.at(near).state);
   }
   RenderedTile rendered;
   const TileRunSink sink{
       .film =
-          [&](std::int32_t, const FilmTile& film) {
+          [&](Step, const FilmTile& film) {
             rendered.film = film;
             return Status();
           },
@@ -48,27 +48,29 @@ Result<RenderedTile> LocalRender::render(std::int32_t frame, std::int32_t tile) 
             rendered.samples = std::make_shared<const FirstPassSamples>(std::move(samples));
             return Status();
           }};
-  BATON_ASSIGN(rendered.stats, run_tile(context_, {tile, frame, frame, frame}, previous, sink, {}));
+  // A run has its number for the farm alone.
+  const TileRun run{tile, {}, {step, step}};
+  BATON_ASSIGN(rendered.stats, run_tile(context_, run, previous, sink, {}));
   return rendered;
 }
 
-Status LocalRender::render_all(std::int32_t frame, const std::set<std::int32_t>& tiles) {
+Status LocalRender::render_all(Step step, const std::set<std::int32_t>& tiles) {
   std::map<std::int32_t, RenderedTile> rendered;
   for (const std::int32_t tile : tiles) {
-    BATON_ASSIGN(rendered[tile], render(frame, tile));
+    BATON_ASSIGN(rendered[tile], render(step, tile));
   }
   keep(std::move(rendered));
   return {};
 }
 
-Result<RenderedTile> LocalRender::finished(std::int32_t frame, std::int32_t tile) const {
+Result<RenderedTile> LocalRender::finished(Step step, std::int32_t tile) const {
   RenderedTile result = tiles_.at(tile);
   const VisibilitySpec& visibility = context_.job.visibility;
   if (!visibility.correlated) return result;
   std::vector<FirstPassPtr> near;
   for (const std::int32_t t : context_.grid.tiles_near(tile, exchange_reach_px(visibility)))
     near.push_back(tiles_.at(t).samples);
-  BATON_ASSIGN(SecondPassOutput second, run_second_pass(context_, frame, tile, result.film, near));
+  BATON_ASSIGN(SecondPassOutput second, run_second_pass(context_, step, tile, result.film, near));
   result.film = std::move(second.film);
   result.stats.merge(second.stats);
   return result;

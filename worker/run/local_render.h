@@ -28,23 +28,23 @@ class LocalRender {
   /// context must outlive the object.
   explicit LocalRender(const RenderContext& context) : context_(context) {}
 
-  /// For each frame up to the one of index `frame` the tiles without which `wanted` of that frame
+  /// For each frame before `step` the tiles without which `wanted` of that step
   /// cannot be rendered; none where nothing is carried.
-  std::vector<std::set<std::int32_t>> tiles_before(std::int32_t frame,
+  std::vector<std::set<std::int32_t>> tiles_before(Step step,
                                                    std::set<std::int32_t> wanted) const;
 
-  /// Renders a tile of the frame after those that are kept. Any number of threads. Errors: the
+  /// Renders a tile of the step after those that are kept. Any number of threads. Errors: the
   /// renderer's.
-  Result<RenderedTile> render(std::int32_t frame, std::int32_t tile) const;
+  Result<RenderedTile> render(Step step, std::int32_t tile) const;
   /// Keeps the tiles of a frame in place of those of the frame before.
   void keep(std::map<std::int32_t, RenderedTile> tiles) { tiles_ = std::move(tiles); }
   /// Both, for all of these tiles.
-  Status render_all(std::int32_t frame, const std::set<std::int32_t>& tiles);
+  Status render_all(Step step, const std::set<std::int32_t>& tiles);
 
   const std::map<std::int32_t, RenderedTile>& tiles() const { return tiles_; }
   /// A tile of the frame that is kept after the job's second pass, if it has one; what is near it
   /// must be kept, too.
-  Result<RenderedTile> finished(std::int32_t frame, std::int32_t tile) const;
+  Result<RenderedTile> finished(Step step, std::int32_t tile) const;
 
  private:
   const RenderContext& context_;

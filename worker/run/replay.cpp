@@ -17,14 +17,14 @@
 namespace baton {
 namespace {
 
-Result<std::int32_t> find_frame(const JobSpec& job, int frame_number) {
-  const auto found = std::lower_bound(job.frames.begin(), job.frames.end(), frame_number);
-  if (found == job.frames.end() || *found != frame_number) {
+Result<FrameIndex> find_frame(const JobSpec& job, FrameNumber number) {
+  const auto found = std::lower_bound(job.frames.begin(), job.frames.end(), number);
+  if (found == job.frames.end() || *found != number) {
     return Error{ErrorKind::usage,
                  fmt::format("--frame {}: the job has no such frame, its frames are {} to {}",
-                             frame_number, job.frames.front(), job.frames.back())};
+                             number, job.frames.front(), job.frames.back())};
   }
-  return static_cast<std::int32_t>(found - job.frames.begin());
+  return FrameIndex(static_cast<std::int32_t>(found - job.frames.begin()));
 }
 
 Status check_place(const JobSpec& job, const ReplayOptions& options) {
@@ -44,7 +44,7 @@ Status check_place(const JobSpec& job, const ReplayOptions& options) {
 }
 
 /// The tile as it is in a frame, after all that it depends on.
-Result<RenderedTile> render(const JobSpec& job, std::int32_t frame_index, std::int32_t tile) {
+Result<RenderedTile> render(const JobSpec& job, Step step, std::int32_t tile) {
   BATON_ASSIGN(const std::string document, make_job_document(job));
   BATON_ASSIGN(const auto context, load_render_context(job, digest_of(document)));
   std::set<std::int32_t> wanted{tile};
@@ -53,11 +53,10 @@ Result<RenderedTile> render(const JobSpec& job, std::int32_t frame_index, std::i
     wanted = {near.begin(), near.end()};
   }
   LocalRender render(*context);
-  const std::vector<std::set<std::int32_t>> before = render.tiles_before(frame_index, wanted);
-  for (std::int32_t frame = 0; frame < frame_index; ++frame)
-    BATON_TRY(render.render_all(frame, before[static_cast<std::size_t>(frame)]));
-  BATON_TRY(render.render_all(frame_index, wanted));
-  return render.finished(frame_index, tile);
+  const std::vector<std::set<std::int32_t>> before = render.tiles_before(step, wanted);
+  for (Step s; s < step; ++s) BATON_TRY(render.render_all(s, before[s.index()]));
+  BATON_TRY(render.render_all(step, wanted));
+  return render.finished(step, tile);
 }
 
 std::string describe_stats(const RenderStats& s) {
@@ -108,9 +107,10 @@ std::string describe_pixel(const RenderedTile& last, const PixelPosition& positi
 Result<std::string> replay_tile(const ReplayOptions& options) {
   BATON_ASSIGN(JobSpec written, load_job(options.job));
   BATON_ASSIGN(const JobSpec job, settle_motion(std::move(written)));
-  BATON_ASSIGN(const std::int32_t frame_index, find_frame(job, options.frame_number));
+  BATON_ASSIGN(const FrameIndex frame, find_frame(job, FrameNumber(options.frame_number)));
+  const Step step = Timeline(job).step_of(frame, Sweep(0));
   BATON_TRY(check_place(job, options));
-  BATON_ASSIGN(const RenderedTile last, render(job, frame_index, options.tile));
+  BATON_ASSIGN(const RenderedTile last, render(job, step, options.tile));
 
   // The tile becomes a picture of its own.
   FilmTile picture = last.film;
@@ -127,8 +127,8 @@ Result<std::string> replay_tile(const ReplayOptions& options) {
   return report + fmt::format("wrote {}\n", out.string());
 }
 
-std::string replay_command(const std::filesystem::path& job, int frame_number, int tile) {
-  return fmt::format("baton-worker replay '{}' --frame {} --tile {}", job.string(), frame_number,
+std::string replay_command(const std::filesystem::path& job, FrameNumber frame, int tile) {
+  return fmt::format("baton-worker replay '{}' --frame {} --tile {}", job.string(), frame,
                      tile);
 }
 

@@ -30,6 +30,6 @@ struct ReplayOptions {
 Result<std::string> replay_tile(const ReplayOptions& options);
 
 /// The command line that replays the tile.
-std::string replay_command(const std::filesystem::path& job, int frame_number, int tile);
+std::string replay_command(const std::filesystem::path& job, FrameNumber frame, int tile);
 
 }  // namespace baton

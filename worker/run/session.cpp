@@ -196,7 +196,7 @@ void Session::receive(const LeaseGrant& grant, TimePoint now, Actions& actions) 
   in_hand_.insert(grant.lease);
   actions.push_back(StartTask{
       grant.lease,
-      {grant.inputs, {grant.first_frame, grant.last_frame}, grant.may_hold, grant.states_from}});
+      {grant.inputs, grant.steps, grant.may_hold, grant.states_from}});
   request_leases(now, actions);
 }
 

@@ -132,17 +132,16 @@ Result<TaskOutput> execute_pooled(const PooledTask& task, const std::stop_token&
 
   // A replay renders up to the last frame of the run, or the frame of the second pass.
   std::string command;
-  const std::vector<int>& numbers = loaded->job.frames;
-  if (task.grant.frames.last >= 0 &&
-      static_cast<std::size_t>(task.grant.frames.last) < numbers.size()) {
+  const std::vector<FrameNumber>& numbers = loaded->job.frames;
+  const Step last = task.grant.steps.last;
+  if (last >= Step(0) && last.index() < numbers.size()) {
     BATON_ASSIGN(const std::filesystem::path path, save_job(*loaded, *task.store));
-    command =
-        replay_command(path, numbers[static_cast<std::size_t>(task.grant.frames.last)], key.tile);
+    command = replay_command(path, numbers[last.index()], key.tile);
   }
   const CrashNote note(command);
   Result<TaskOutput> output = execute_task(*loaded, *task.store, key, task.grant, stop, &left);
   if (output)
-    output->notes = notes.report(loaded->digest, asset_notes(*loaded->context, key.step, key.tile));
+    output->notes = notes.report(loaded->digest, asset_notes(*loaded->context, key));
   if (output || output.error().kind == ErrorKind::cancelled ||
       output.error().kind == ErrorKind::no_space)
     return output;
@@ -162,7 +161,7 @@ Status publish_pooled(std::span<const PooledTask> tasks, TaskWatch& watch) {
   for (const PooledTask& task : tasks) {
     const TaskKey& key = task.lease.task;
     BATON_ASSIGN(const LoadedJobPtr loaded, task.job->load({}));
-    if (key.kind != TaskKind::render || !ends_in_checkpoint(loaded->job, key.step)) continue;
+    if (key.kind != TaskKind::render || !ends_in_checkpoint(loaded->job, key.run())) continue;
     marks.emplace_back(watch, task.lease, deadline);
     stores.insert(task.store);
   }
@@ -348,7 +347,7 @@ class Worker {
   static void log_failure(const TaskEnded& ended) {
     if (ended.result || ended.result.error().kind == ErrorKind::cancelled) return;
     spdlog::error("job {} {} step {} tile {} failed: {}", ended.lease.job.short_hex(),
-                  task_name(ended.lease.task.kind), ended.lease.task.step, ended.lease.task.tile,
+                  task_name(ended.lease.task.kind), ended.lease.task.position, ended.lease.task.tile,
                   ended.result.error().message);
   }
 

@@ -38,9 +38,9 @@ float reach_of(const CameraSpec& camera, const ImageSpec& image) {
 }
 
 /// Whether the camera is above the ground: then it sees nothing that is below.
-bool looks_from_above(const JobSpec& job, int frame_number) {
+bool looks_from_above(const JobSpec& job, FrameNumber frame) {
   const GroundSpec& ground = *job.scene.ground;
-  const CameraSpec camera = camera_at(job, frame_number);
+  const CameraSpec camera = camera_at(job, frame.value());
   const float reach = reach_of(camera, job.image);
   const float aside = std::max(std::fabs(camera.position.x), std::fabs(camera.position.z));
   return camera.position.y - reach > ground.height && aside + reach < 0.5f * ground.size;
@@ -59,7 +59,7 @@ std::optional<Vec3> down_in_map(const EnvironmentSpec& environment) {
   if (environment.rotation_axis.x == 0 && environment.rotation_axis.z == 0) return down;
   if (environment.rotation_deg_per_frame != 0 || !environment.rotation_keys.empty())
     return std::nullopt;
-  return environment_at(environment, 0).rotation.transposed() * down;
+  return environment_at(environment, FrameNumber(0)).rotation.transposed() * down;
 }
 
 }  // namespace
@@ -70,12 +70,12 @@ HiddenLight::HiddenLight(const JobSpec& job, const Scene& scene) : job_(job), sc
   for (const TriangleMesh& mesh : scene.meshes) boxes_.push_back(bounds_of(mesh.positions));
 }
 
-HiddenCone HiddenLight::at(int frame_number) const {
-  if (!down_ || !looks_from_above(job_, frame_number)) return {};
+HiddenCone HiddenLight::at(FrameNumber frame) const {
+  if (!down_ || !looks_from_above(job_, frame)) return {};
 
   // The highest point and the farthest one of all that stands on the ground.
   float height = 0, aside = 0;
-  const Pose pose = pose_at(scene_, job_, frame_number);
+  const Pose pose = pose_at(scene_, job_, frame.value());
   for (std::size_t i = 0; i + 1 < pose.instances.size(); ++i) {
     const std::uint32_t mesh = pose.instances[i].mesh;
     const Bounds box = pose.instances[i].deforms

@@ -25,7 +25,7 @@ class HiddenLight {
 
   /// The cone of a frame, a pure function of what the frame shows. Its angle is one of a few, so
   /// that most frames of a sequence share a map.
-  HiddenCone at(int frame_number) const;
+  HiddenCone at(FrameNumber frame) const;
 
  private:
   const JobSpec& job_;

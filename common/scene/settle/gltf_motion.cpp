@@ -29,7 +29,7 @@ CameraKey camera_key(double frame, const gltf::Matrix& to_world) {
 }  // namespace
 
 Status put_camera(const gltf::NodeMotion& motion, int node, const FileClock& clock,
-                  const std::vector<int>& frames, CameraSpec& camera) {
+                  const std::vector<FrameNumber>& frames, CameraSpec& camera) {
   const gltf::Document& file = motion.document();
   const gltf::Node& given = file.nodes[static_cast<std::size_t>(node)];
   if (given.camera < 0) return file.error(fmt::format("node \"{}\" holds no camera", given.name));
@@ -50,48 +50,48 @@ Status put_camera(const gltf::NodeMotion& motion, int node, const FileClock& clo
     camera.orthographic_height =
         wanted.own_orthographic_height.value_or(static_cast<float>(2 * lens.ymag));
   }
-  const auto at = [&](int frame) {
-    const std::vector<gltf::Matrix> world = motion.to_world(clock.seconds_at(frame));
-    return camera_key(static_cast<double>(frame), world[static_cast<std::size_t>(node)]);
+  const auto at = [&](FrameNumber frame) {
+    const std::vector<gltf::Matrix> world = motion.to_world(clock.seconds_at(frame.value()));
+    return camera_key(frame.value(), world[static_cast<std::size_t>(node)]);
   };
   const CameraKey first = at(frames.front());
   camera.position = first.position;
   camera.look_at = first.look_at;
   camera.up = first.up;
-  for (const int frame : frames) {
+  for (const FrameNumber frame : frames) {
     if (motion.moves(node)) camera.keys.push_back(at(frame));
   }
   return {};
 }
 
-std::vector<ObjectKey> matrix_keys(const std::vector<int>& frames,
+std::vector<ObjectKey> matrix_keys(const std::vector<FrameNumber>& frames,
                                    const std::vector<Matrix34>& matrices) {
   std::vector<ObjectKey> keys;
   for (std::size_t i = 0; i < frames.size(); ++i) {
     const bool inner = i > 0 && i + 1 < frames.size();
     if (inner && matrices[i] == matrices[i - 1] && matrices[i] == matrices[i + 1]) continue;
     ObjectKey key;
-    key.frame = static_cast<double>(frames[i]);
+    key.frame = frames[i].value();
     key.matrix = matrices[i];
     keys.push_back(key);
   }
   return keys;
 }
 
-Status take_camera_keys(const std::vector<int>& frames, CameraSpec& camera) {
+Status take_camera_keys(const std::vector<FrameNumber>& frames, CameraSpec& camera) {
   const GltfMotion gltf = *camera.gltf;
   BATON_ASSIGN(const auto opened, open_moving(gltf));
   return put_camera(opened.first, opened.second, {gltf.fps, gltf.start_frame}, frames, camera);
 }
 
-Status take_object_keys(const std::vector<int>& frames, ObjectSpec& object) {
+Status take_object_keys(const std::vector<FrameNumber>& frames, ObjectSpec& object) {
   const GltfMotion gltf = *object.gltf;
   BATON_ASSIGN(const auto opened, open_moving(gltf));
   const FileClock clock{gltf.fps, gltf.start_frame};
   std::vector<Matrix34> matrices;
-  for (const int frame : frames)
+  for (const FrameNumber frame : frames)
     matrices.push_back(gltf::to_floats(
-        opened.first.to_world(clock.seconds_at(frame))[static_cast<std::size_t>(opened.second)]));
+        opened.first.to_world(clock.seconds_at(frame.value()))[static_cast<std::size_t>(opened.second)]));
   object.keys = matrix_keys(frames, matrices);
   object.gltf.reset();
   return {};

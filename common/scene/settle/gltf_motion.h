@@ -13,17 +13,17 @@ namespace baton {
 /// node that no animation moves.
 
 /// The node must hold a camera, which also gives the angle of view.
-Status take_camera_keys(const std::vector<int>& frames, CameraSpec& camera);
+Status take_camera_keys(const std::vector<FrameNumber>& frames, CameraSpec& camera);
 /// What the node does is done to the object.
-Status take_object_keys(const std::vector<int>& frames, ObjectSpec& object);
+Status take_object_keys(const std::vector<FrameNumber>& frames, ObjectSpec& object);
 
 /// Makes `camera` that of a node: with keys where it moves, at one place where it does not. Error:
 /// the node holds no camera.
 Status put_camera(const gltf::NodeMotion& motion, int node, const FileClock& clock,
-                  const std::vector<int>& frames, CameraSpec& camera);
+                  const std::vector<FrameNumber>& frames, CameraSpec& camera);
 
 /// Keys of matrices, one a frame, but for those between equal ones. matrices: of `frames`.
-std::vector<ObjectKey> matrix_keys(const std::vector<int>& frames,
+std::vector<ObjectKey> matrix_keys(const std::vector<FrameNumber>& frames,
                                    const std::vector<Matrix34>& matrices);
 
 }  // namespace baton

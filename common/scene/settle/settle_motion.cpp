@@ -81,7 +81,7 @@ void add_ground(const JobSpec& job, const Camera& camera, StepMeter& meter) {
 /// The frames between which motion is measured: from the first key to the last, in the job's step,
 /// so that all jobs of a shot measure the same; where meshes deform, which have no keys, the job's
 /// frames, too.
-std::vector<int> measured_frames(const JobSpec& job) {
+std::vector<FrameNumber> measured_frames(const JobSpec& job) {
   std::vector<double> keys;
   const auto add = [&](const auto& list) {
     for (const auto& key : list) keys.push_back(key.frame);
@@ -91,7 +91,7 @@ std::vector<int> measured_frames(const JobSpec& job) {
   const bool deforms =
       std::ranges::any_of(job.scene.meshes, [](const auto& mesh) { return mesh.second.deforms(); });
   if (deforms && !keys.empty())
-    keys.insert(keys.end(), {job.frames.front() * 1.0, job.frames.back() * 1.0});
+    keys.insert(keys.end(), {job.frames.front().value() * 1.0, job.frames.back().value() * 1.0});
   const auto [first, last] = std::minmax_element(keys.begin(), keys.end());
   if (first == keys.end()) return job.frames;
   int step = 1;
@@ -101,19 +101,19 @@ std::vector<int> measured_frames(const JobSpec& job) {
       step = std::min(step, job.frames[i] - job.frames[i - 1]);
   }
   if ((*last - *first) / step > limits::kMaxFrames) return job.frames;
-  std::vector<int> frames;
+  std::vector<FrameNumber> frames;
   for (int frame = static_cast<int>(std::floor(*first)); frame < *last + step; frame += step)
-    frames.push_back(frame);
+    frames.emplace_back(frame);
   return frames;
 }
 
 /// An estimate is enough: a pixel that moved farther starts afresh.
 int measure_max_px(const JobSpec& job, const Scene& scene) {
   float largest = 0;
-  const std::vector<int> frames = measured_frames(job);
-  Pose before = pose_at(scene, job, frames.front());
-  for (const int frame : frames) {
-    Pose now = pose_at(scene, job, frame);
+  const std::vector<FrameNumber> frames = measured_frames(job);
+  Pose before = pose_at(scene, job, frames.front().value());
+  for (const FrameNumber frame : frames) {
+    Pose now = pose_at(scene, job, frame.value());
     StepMeter meter(now.camera, before.camera, job.image.rendered());
     add_meshes(scene, now, before, meter);
     if (job.scene.ground) add_ground(job, now.camera, meter);

@@ -102,9 +102,9 @@ class SceneTaker {
         moved_[static_cast<std::size_t>(node)];
     }
     if (moved_.size() * job_.frames.size() > limits::kMaxGltfKeys) return too_many_keys();
-    for (const int frame : job_.frames) {
+    for (const FrameNumber frame : job_.frames) {
       if (!rest_.empty() && moved_.empty()) break;
-      const std::vector<gltf::Matrix> world = motion_.to_world(clock().seconds_at(frame));
+      const std::vector<gltf::Matrix> world = motion_.to_world(clock().seconds_at(frame.value()));
       for (auto& [node, matrices] : moved_) matrices.push_back(gltf::to_floats(world[node]));
       if (rest_.empty()) rest_ = world;
     }

@@ -6,6 +6,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/job/frame_range.h"
 #include "common/job/job_json.h"
 #include "jobs/auto/auto_pilot.h"
 
@@ -84,7 +85,7 @@ TEST(AutoCandidates, NothingIsCarriedWhereThereIsOneFrame) {
   };
   JobSpec job = automatic_job();
   EXPECT_FALSE(carries(job));
-  job.frames = {1, 2};
+  job.frames = parse_frames("1-2").value();
   EXPECT_TRUE(carries(job));
   job.state.carry = false;
   EXPECT_FALSE(carries(job));
@@ -100,7 +101,7 @@ TEST(AutoCandidates, SecondPassTakesEvenNumbersAndNoPool) {
     return found;
   };
   JobSpec job = automatic_job();
-  job.frames = {1, 2};
+  job.frames = parse_frames("1-2").value();
   EXPECT_TRUE(tries_pool(job));
   job.sampling.num_particles = 3;
   EXPECT_TRUE(tries_pool(job));
@@ -119,7 +120,7 @@ TEST(AutoCandidates, SuitTheWholeJob) {
     return c.sampling.method == Method::sequential;
   };
   JobSpec job = automatic_job();
-  job.frames = {1, 2};
+  job.frames = parse_frames("1-2").value();
   EXPECT_TRUE(has(job, correlated));
   EXPECT_TRUE(has(job, sequential));
   JobSpec catches = job;
@@ -138,7 +139,7 @@ TEST(AutoCandidates, SuitTheWholeJob) {
 
 TEST(AutoCandidates, PoolComesWithFewCandidatesFirst) {
   JobSpec job = automatic_job();
-  job.frames = {1, 2};
+  job.frames = parse_frames("1-2").value();
   std::vector<int> num_candidates;
   for (const AutoCandidate& candidate : auto_candidates(job)) {
     if (candidate.sampling.method == Method::pool)
@@ -149,7 +150,7 @@ TEST(AutoCandidates, PoolComesWithFewCandidatesFirst) {
 
 TEST(AutoCandidates, AreSettledThemselves) {
   JobSpec job = automatic_job();
-  job.frames = {1, 2};
+  job.frames = parse_frames("1-2").value();
   job.sampling.target_error = 0.1f;
   for (const AutoCandidate& candidate : auto_candidates(job)) {
     EXPECT_NE(candidate.sampling.method, Method::automatic);
@@ -171,7 +172,7 @@ TEST(AutoChoice, IsWrittenIntoTheJob) {
 TEST(PilotPlan, GrowsWithTheCandidatesAndTheirSamples) {
   JobSpec job = automatic_job();
   job.image = {.width = 640, .height = 360};
-  job.frames = {1, 2, 3};
+  job.frames = parse_frames("1-3").value();
   const PilotPlan one = plan_pilot(job, 1);
   EXPECT_EQ(one.windows, 1u);
   EXPECT_EQ(one.candidates, auto_candidates(job).size());
@@ -180,22 +181,20 @@ TEST(PilotPlan, GrowsWithTheCandidatesAndTheirSamples) {
   EXPECT_GT(one.cpu_seconds, 0.5);
   EXPECT_LT(one.cpu_seconds, 60);
   EXPECT_GT(plan_pilot(job, 3).cpu_seconds, 1.2 * one.cpu_seconds) << "dearer rays";
-  job.frames.clear();
-  for (int frame = 1; frame <= 48; ++frame) job.frames.push_back(frame);
+  job.frames = parse_frames("1-48").value();
   EXPECT_GT(plan_pilot(job, 1).cpu_seconds, 2 * one.cpu_seconds);
 }
 
 TEST(PilotStudy, LooksAtTheStartAndTheEndOfALongJob) {
   JobSpec job = automatic_job();
   job.image = {.width = 640, .height = 360};
-  job.frames.clear();
-  for (int frame = 1; frame <= 48; ++frame) job.frames.push_back(frame);
+  job.frames = parse_frames("1-48").value();
   const Study study = pilot_study(job, auto_candidates(job));
   ASSERT_EQ(study.scenes.size(), 2u);
-  EXPECT_THAT(study.scenes[0].frames, ElementsAre(11, 12));
-  EXPECT_THAT(study.scenes[1].frames, ElementsAre(47, 48));
+  EXPECT_EQ(format_frames(study.scenes[0].frames), "11-12");
+  EXPECT_EQ(format_frames(study.scenes[1].frames), "47-48");
   const JobSpec& end = study.scenes[1].reference[0];
-  EXPECT_THAT(end.frames, ElementsAre(47, 48));
+  EXPECT_EQ(format_frames(end.frames), "47-48");
   EXPECT_EQ(end.image.width, 64);
   EXPECT_EQ(end.image.height, 36);
 
@@ -205,7 +204,7 @@ TEST(PilotStudy, LooksAtTheStartAndTheEndOfALongJob) {
     EXPECT_EQ(cell.job.image.site_seed, end.image.site_seed);
 
   // A short one is looked at once.
-  job.frames = {1, 2, 3};
+  job.frames = parse_frames("1-3").value();
   EXPECT_EQ(pilot_study(job, auto_candidates(job)).scenes.size(), 1u);
 }
 

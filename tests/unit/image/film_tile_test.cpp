@@ -15,7 +15,7 @@ namespace {
 using testing::HasSubstr;
 
 constexpr SectionTag kMagic{'B', 'T', 'F', '1'};
-const FilmOrigin kOrigin{digest_of("job"), 7, FilmPass::second};
+const FilmOrigin kOrigin{digest_of("job"), Step(7), FilmPass::second};
 
 FilmTile small_tile() {
   return {{4, 8, 6, 9},
@@ -46,14 +46,14 @@ TEST(FilmTile, GivesBackTheSameBits) {
 TEST(FilmTile, FilmsThatLookAlikeAreDifferentBlobs) {
   std::set<Digest> digests;
   for (const char* job : {"job", "other"}) {
-    for (const std::int32_t frame : {0, 1}) {
+    for (const Step step : {Step(0), Step(1)}) {
       for (const FilmPass pass : {FilmPass::first, FilmPass::second})
-        digests.insert(digest_of(encode_film_tile(small_tile(), {digest_of(job), frame, pass})));
+        digests.insert(digest_of(encode_film_tile(small_tile(), {digest_of(job), step, pass})));
     }
   }
   FilmTile beside = small_tile();
   beside.rect = {6, 8, 8, 9};
-  digests.insert(digest_of(encode_film_tile(beside, {digest_of("job"), 0, FilmPass::first})));
+  digests.insert(digest_of(encode_film_tile(beside, {digest_of("job"), Step(0), FilmPass::first})));
   EXPECT_EQ(digests.size(), 9u);
 }
 

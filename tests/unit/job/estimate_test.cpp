@@ -4,6 +4,7 @@
 
 #include <utility>
 
+#include "common/job/frame_range.h"
 #include "common/job/sequence.h"
 
 namespace baton {
@@ -12,7 +13,7 @@ namespace {
 JobSpec small_job() {
   JobSpec job;
   job.sampling.method = Method::sequential;
-  job.frames = {1, 2, 3, 4, 5};
+  job.frames = parse_frames("1-5").value();
   job.image = {.width = 100, .height = 50, .sites = 4, .tile_size = 32};
   job.state.checkpoint_every = 2;
   return job;

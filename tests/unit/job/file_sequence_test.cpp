@@ -9,7 +9,7 @@ namespace {
 
 std::vector<int> numbers(const FileSequence& sequence, const std::vector<int>& frames) {
   std::vector<int> result;
-  for (const int frame : frames) result.push_back(number_at(sequence, frame));
+  for (const int frame : frames) result.push_back(number_at(sequence, FrameNumber(frame)));
   return result;
 }
 
@@ -28,7 +28,7 @@ TEST(FileSequence, HoldsOrLoopsBeyondItsFiles) {
             (std::vector{3, 4, 5, 3, 4, 5, 3, 4, 5, 3}));
   sequence.speed = 1e6;
   sequence.last = 9999998;
-  EXPECT_EQ(number_at(sequence, 9999999), 3 + (9999999000000 - 3) % 9999996);
+  EXPECT_EQ(number_at(sequence, FrameNumber(9999999)), 3 + (9999999000000 - 3) % 9999996);
 }
 
 // .7 x 90 is 62.99... in doubles.
@@ -39,15 +39,15 @@ TEST(FileSequence, CountsDecimalSpeedsExactly) {
     for (int frame = 0; frame <= 400; ++frame) {
       const int exact = hundredths * frame;
       const int whole = exact / 100 - (exact % 100 < 0 ? 1 : 0);
-      ASSERT_EQ(number_at(sequence, frame), whole) << sequence.speed << " x " << frame;
+      ASSERT_EQ(number_at(sequence, FrameNumber(frame)), whole) << sequence.speed << " x " << frame;
     }
   }
 }
 
 TEST(FileSequence, NamesFiles) {
-  EXPECT_EQ(file_at({.files = "/plates/shot#2/a.####.exr", .offset = 3}, 9),
+  EXPECT_EQ(file_at({.files = "/plates/shot#2/a.####.exr", .offset = 3}, FrameNumber(9)),
             "/plates/shot#2/a.0012.exr");
-  EXPECT_EQ(file_at({.files = "/plates/a.png"}, 9), "/plates/a.png");
+  EXPECT_EQ(file_at({.files = "/plates/a.png"}, FrameNumber(9)), "/plates/a.png");
   EXPECT_EQ(frame_file_name("f.#.exr", 1234), "f.1234.exr");
 }
 

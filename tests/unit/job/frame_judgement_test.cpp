@@ -8,10 +8,10 @@
 namespace baton {
 namespace {
 
-std::vector<FrameStats> sequence(std::size_t count, float noise = 0.04f, float mean = 1) {
-  std::vector<FrameStats> frames(count);
+std::vector<FrameReport> sequence(std::size_t count, float noise = 0.04f, float mean = 1) {
+  std::vector<FrameReport> frames(count);
   for (std::size_t i = 0; i < count; ++i) {
-    frames[i].frame = static_cast<std::int32_t>(i + 1);
+    frames[i].frame = FrameNumber(static_cast<std::int32_t>(i + 1));
     frames[i].sampling.pixels_carried = 90;
     const float wobble = i % 2 == 0 ? 1.02f : 0.98f;
     frames[i].quality = {.pixels = 100,
@@ -22,26 +22,26 @@ std::vector<FrameStats> sequence(std::size_t count, float noise = 0.04f, float m
   return frames;
 }
 
-std::vector<std::int32_t> odd_numbers(const std::vector<FrameStats>& frames) {
+std::vector<std::int32_t> odd_numbers(const std::vector<FrameReport>& frames) {
   std::vector<std::int32_t> numbers;
   for (const OddFrame& odd : judge_frames(frames).odd)
-    numbers.push_back(odd.by_noise ? odd.frame : -odd.frame);
+    numbers.push_back(odd.by_noise ? odd.frame.value() : -odd.frame.value());
   return numbers;
 }
 
 TEST(Judgement, SaysHowNoisyTheFramesAre) {
-  std::vector<FrameStats> frames = sequence(12);
+  std::vector<FrameReport> frames = sequence(12);
   frames[4].quality.noise = 0.09f;
   const Judgement j = judge_frames(frames);
   EXPECT_EQ(j.frames, 12u);
-  EXPECT_EQ(j.noisiest, 5);
+  EXPECT_EQ(j.noisiest, FrameNumber(5));
   EXPECT_FLOAT_EQ(j.noise_most, 0.09f);
   EXPECT_FLOAT_EQ(j.noise_least, 0.04f * 0.98f);
   EXPECT_NEAR(j.noise, std::sqrt((11 * 0.04 * 0.04 + 0.09 * 0.09) / 12), 5e-4);
 }
 
 TEST(Judgement, FramesThatStandOutAreNamed) {
-  std::vector<FrameStats> frames = sequence(20);
+  std::vector<FrameReport> frames = sequence(20);
   EXPECT_THAT(odd_numbers(frames), testing::IsEmpty());
   frames[0].quality.noise = 0.095f;  // the first has nothing to go on from
   frames[9].quality.noise = 0.07f;
@@ -53,16 +53,16 @@ TEST(Judgement, FramesThatStandOutAreNamed) {
 
 // A few bright pixels that happen to be looked at are no noisy frame.
 TEST(Judgement, NoiseThatIsToldBadlyDoesNotStandOut) {
-  std::vector<FrameStats> frames = sequence(20);
+  std::vector<FrameReport> frames = sequence(20);
   frames[9].quality.noise = 0.08f;
-  for (FrameStats& frame : frames) frame.quality.noise_error = 0.1f;
+  for (FrameReport& frame : frames) frame.quality.noise_error = 0.1f;
   EXPECT_THAT(odd_numbers(frames), testing::ElementsAre(10));
   frames[9].quality.noise_error = 0.2f;
   EXPECT_THAT(odd_numbers(frames), testing::IsEmpty());
 }
 
 TEST(Judgement, CutsAndSteadyChangesDoNotStandOut) {
-  std::vector<FrameStats> frames = sequence(20);
+  std::vector<FrameReport> frames = sequence(20);
   for (std::size_t i = 10; i < 20; ++i) frames[i].quality.mean *= 7;
   EXPECT_THAT(odd_numbers(frames), testing::IsEmpty()) << "a cut";
   frames = sequence(20);
@@ -75,7 +75,7 @@ TEST(Judgement, CutsAndSteadyChangesDoNotStandOut) {
 }
 
 TEST(Judgement, FramesThatAreNotWrittenAreLeftOut) {
-  std::vector<FrameStats> frames = sequence(6);
+  std::vector<FrameReport> frames = sequence(6);
   frames[3].quality = {};
   frames[5].quality = {};
   EXPECT_EQ(judge_frames(frames).frames, 4u);
@@ -84,7 +84,7 @@ TEST(Judgement, FramesThatAreNotWrittenAreLeftOut) {
 }
 
 TEST(Judgement, OddValuesAreAddedUp) {
-  std::vector<FrameStats> frames = sequence(4, 0.04f, 2);
+  std::vector<FrameReport> frames = sequence(4, 0.04f, 2);
   frames[1].quality.pixels_below_zero = 3;
   frames[1].quality.lowest = -4.4f;
   frames[1].quality.light_below_zero = 0.02f;
@@ -101,7 +101,7 @@ TEST(Judgement, OddValuesAreAddedUp) {
 }
 
 TEST(Judgement, AfreshArePixelsThatCouldHaveCarried) {
-  std::vector<FrameStats> frames = sequence(3);
+  std::vector<FrameReport> frames = sequence(3);
   frames[0].sampling = {.pixels_fresh = 90};
   frames[1].sampling.pixels_fresh = 4;
   frames[2].sampling.pixels_restarted = 6;
@@ -110,7 +110,7 @@ TEST(Judgement, AfreshArePixelsThatCouldHaveCarried) {
   EXPECT_TRUE(j.carries);
   EXPECT_EQ(j.pixels_afresh, 10u);
   EXPECT_EQ(j.pixels_after_first, 90u + 4 + 90 + 6 + 10);
-  for (FrameStats& frame : frames) frame.sampling = {.pixels_fresh = 100};
+  for (FrameReport& frame : frames) frame.sampling = {.pixels_fresh = 100};
   EXPECT_FALSE(judge_frames(frames).carries);
 }
 

@@ -9,22 +9,28 @@ namespace {
 using testing::ElementsAre;
 using testing::HasSubstr;
 
-std::vector<int> frames(std::string_view text) {
-  const Result<std::vector<int>> result = parse_frames(text);
+std::vector<FrameNumber> frames(std::string_view text) {
+  const Result<std::vector<FrameNumber>> result = parse_frames(text);
   EXPECT_TRUE(result.ok()) << text;
-  return result.ok() ? *result : std::vector<int>{};
+  return result.ok() ? *result : std::vector<FrameNumber>{};
+}
+
+std::vector<int> numbers(std::string_view text) {
+  std::vector<int> result;
+  for (const FrameNumber frame : frames(text)) result.push_back(frame.value());
+  return result;
 }
 
 std::string message(std::string_view text) {
-  const Result<std::vector<int>> result = parse_frames(text);
+  const Result<std::vector<FrameNumber>> result = parse_frames(text);
   return result.ok() ? "ok" : result.error().message;
 }
 
 TEST(Frames, ReadsNumbersRangesStepsAndLists) {
-  EXPECT_THAT(frames("7"), ElementsAre(7));
-  EXPECT_THAT(frames("0-3"), ElementsAre(0, 1, 2, 3));
-  EXPECT_THAT(frames("1-8x3"), ElementsAre(1, 4, 7));
-  EXPECT_THAT(frames("1,5,9-12"), ElementsAre(1, 5, 9, 10, 11, 12));
+  EXPECT_THAT(numbers("7"), ElementsAre(7));
+  EXPECT_THAT(numbers("0-3"), ElementsAre(0, 1, 2, 3));
+  EXPECT_THAT(numbers("1-8x3"), ElementsAre(1, 4, 7));
+  EXPECT_THAT(numbers("1,5,9-12"), ElementsAre(1, 5, 9, 10, 11, 12));
 }
 
 TEST(Frames, WritesAShortTextThatReadsBack) {

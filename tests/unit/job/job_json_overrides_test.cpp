@@ -39,7 +39,7 @@ std::string faults_with(const std::vector<JobOverride>& overrides) {
 
 TEST(JobOverrides, ReplaceValuesAndMakeObjects) {
   JobSpec expected = with({});
-  expected.frames = {12};
+  expected.frames = {FrameNumber(12)};
   expected.image.width = 64;
   expected.image.sites = 4;
   expected.sampling.brdf_fraction = 0.5f;

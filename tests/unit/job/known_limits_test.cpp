@@ -6,6 +6,8 @@
 #include <fstream>
 #include <map>
 
+#include "common/job/frame_range.h"
+
 namespace baton {
 namespace {
 
@@ -16,7 +18,7 @@ using testing::IsEmpty;
 /// A turning light on one material.
 JobSpec turning(Method method, double deg, const MaterialSpec& material) {
   JobSpec job;
-  job.frames = {1, 2, 3};
+  job.frames = parse_frames("1-3").value();
   job.sampling.method = method;
   job.environment.rotation_deg_per_frame = deg;
   job.scene.materials["only"] = material;
@@ -69,7 +71,7 @@ TEST(KnownLimits, PublishedFormsFailEarlier) {
 
 TEST(KnownLimits, FramesThatAreLeftOutCount) {
   JobSpec job = turning(Method::sequential, 1, kLacquer);
-  job.frames = {1, 3, 5};
+  job.frames = parse_frames("1-5x2").value();
   EXPECT_EQ(turn_deg_per_frame(job), 2);
   EXPECT_THAT(limit_warnings(job, false), ElementsAre(HasSubstr("turns 2 degrees")));
 }

@@ -56,10 +56,10 @@ TEST(Picture, PlatesBelongToFramesAlone) {
   EXPECT_EQ(picture_digest(one.job, one.assets), picture_digest(other.job, other.assets));
   EXPECT_TRUE(picture_differences(one, other).empty());
   const FrameComparison comparison(one, other);
-  EXPECT_TRUE(comparison.are_equal(1, 1));
-  EXPECT_TRUE(comparison.have_one_plate(0, 0));
-  EXPECT_FALSE(comparison.have_one_plate(1, 1));
-  EXPECT_FALSE(FrameComparison(one, none).have_one_plate(0, 0));
+  EXPECT_TRUE(comparison.are_equal(FrameIndex(1), FrameIndex(1)));
+  EXPECT_TRUE(comparison.have_one_plate(FrameIndex(0), FrameIndex(0)));
+  EXPECT_FALSE(comparison.have_one_plate(FrameIndex(1), FrameIndex(1)));
+  EXPECT_FALSE(FrameComparison(one, none).have_one_plate(FrameIndex(0), FrameIndex(0)));
   EXPECT_THAT(asset_paths(one.job),
               testing::ElementsAre("/jobs/a.1.png", "/jobs/a.2.png", "/jobs/sky.exr"));
   EXPECT_THAT(asset_paths(none.job), testing::ElementsAre("/jobs/sky.exr"));

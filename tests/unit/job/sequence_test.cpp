@@ -2,14 +2,15 @@
 
 #include <gtest/gtest.h>
 
+#include "common/job/frame_range.h"
 #include "common/job/job_json.h"
 
 namespace baton {
 namespace {
 
-JobSpec turning(std::vector<int> frames) {
+JobSpec turning(std::string_view frames) {
   JobSpec job;
-  job.frames = std::move(frames);
+  job.frames = parse_frames(frames).value();
   job.environment.keys = {{1, "a.exr"}, {20, "b.exr"}};
   job.environment.interpolate = true;
   job.environment.rotation_start_deg = 10;
@@ -18,16 +19,14 @@ JobSpec turning(std::vector<int> frames) {
 }
 
 TEST(Sequence, LightsAFrameAlikeInEveryJobThatHasIt) {
-  std::vector<int> all;
-  for (int frame = 1; frame <= 24; ++frame) all.push_back(frame);
-  const EnvironmentFrame of_all = expand_sequence(turning(all))[11].environment;
-  EXPECT_EQ(of_all, expand_sequence(turning({12}))[0].environment);
-  EXPECT_EQ(of_all, expand_sequence(turning({3, 12, 20}))[1].environment);
+  const EnvironmentFrame of_all = expand_sequence(turning("1-24"))[11].environment;
+  EXPECT_EQ(of_all, expand_sequence(turning("12"))[0].environment);
+  EXPECT_EQ(of_all, expand_sequence(turning("3,12,20"))[1].environment);
   EXPECT_EQ(of_all.rotation, rotation_about({0, 1, 0}, 10 + 11 * 15));
 }
 
 TEST(Sequence, TurnsFromTheFrameThatIsSaid) {
-  JobSpec job = turning({1001, 1003});
+  JobSpec job = turning("1001,1003");
   job.environment.rotation_start_frame = 1001;
   const std::vector<FrameSpec> frames = expand_sequence(job);
   EXPECT_EQ(frames[0].environment.rotation, rotation_about({0, 1, 0}, 10));
@@ -43,13 +42,14 @@ TEST(Environment, ScaleAndRotationFollowKeys) {
       "job", "/");
   ASSERT_TRUE(job) << job.error().message;
   const EnvironmentSpec& environment = job->environment;
-  EXPECT_EQ(environment_at(environment, 1).scale, 1) << "held";
-  EXPECT_EQ(environment_at(environment, 3).scale, 1.5f);
-  EXPECT_EQ(environment_at(environment, 6).scale, 3);
-  EXPECT_EQ(environment_at(environment, 9).scale, 0) << "no light";
-  EXPECT_EQ(rotation_deg_at(environment, 2), 20);
-  EXPECT_EQ(rotation_deg_at(environment, 8), 50);
-  EXPECT_FALSE(environment_at(environment, 3).same_texels(environment_at(environment, 4)));
+  const auto at = [&](int frame) { return environment_at(environment, FrameNumber(frame)); };
+  EXPECT_EQ(at(1).scale, 1) << "held";
+  EXPECT_EQ(at(3).scale, 1.5f);
+  EXPECT_EQ(at(6).scale, 3);
+  EXPECT_EQ(at(9).scale, 0) << "no light";
+  EXPECT_EQ(rotation_deg_at(environment, FrameNumber(2)), 20);
+  EXPECT_EQ(rotation_deg_at(environment, FrameNumber(8)), 50);
+  EXPECT_FALSE(at(3).same_texels(at(4)));
   EXPECT_EQ(parse_job(to_json(*job), "again", "/").value(), *job);
 
   const auto wrong = parse_job(
@@ -141,42 +141,6 @@ TEST(ImageSpec, IsReadWithOverscan) {
   EXPECT_EQ(image_of(R"({"width": 32768, "height": 1, "overscan": 1})").error().message,
             "job: $.image.overscan: expected whole pixels, and with them at most 32768 a side, got "
             "[1, 1, 1, 1]");
-}
-
-// Runs of a job that was shorter stay as they were.
-TEST(Runs, LeadingOnesComeBeforeTheRegularOnes) {
-  JobSpec job;
-  job.frames.clear();
-  for (int frame = 1; frame <= 30; ++frame) job.frames.push_back(frame);
-  job.state.checkpoint_every = 12;
-  EXPECT_EQ(run_starts(job), (std::vector<std::int32_t>{0, 12, 24}));
-  job.leading_runs = {0, 5, 8};
-  EXPECT_EQ(run_starts(job), (std::vector<std::int32_t>{0, 5, 8, 12, 24}));
-  EXPECT_EQ(num_runs(job), 5);
-  EXPECT_EQ(tile_run(job, 0, 2).last_frame, 11);
-  job.frames.resize(7);
-  EXPECT_EQ(run_starts(job), (std::vector<std::int32_t>{0, 5}));
-  EXPECT_EQ(tile_run(job, 0, 1).last_frame, 6);
-}
-
-// Runs end with their sweep; the frames before stay as they were when there are more sweeps.
-TEST(Runs, EachSweepHasTheSame) {
-  JobSpec job;
-  job.frames = {3, 4, 5, 6, 8};
-  job.state.checkpoint_every = 2;
-  job.quality = {.rounds = 4, .sweeps = 3};
-  EXPECT_EQ(num_steps(job), 15);
-  EXPECT_EQ(run_starts(job), (std::vector<std::int32_t>{0, 2, 4, 5, 7, 9, 10, 12, 14}));
-  EXPECT_EQ(num_runs(job), 9);
-  EXPECT_EQ(tile_run(job, 0, 2).last_frame, 4);
-  job.leading_runs = {0, 1};
-  EXPECT_EQ(run_starts(job), (std::vector<std::int32_t>{0, 1, 2, 4, 5, 7, 9, 10, 12, 14}));
-
-  const std::vector<FrameSpec> steps = expand_sequence(job);
-  EXPECT_EQ(steps[8].index, 8);
-  EXPECT_EQ(steps[8].number, 6);
-  EXPECT_EQ(steps[8].first_round, 4);
-  EXPECT_EQ(frame_of_step(job, 8), 3);
 }
 
 }  // namespace

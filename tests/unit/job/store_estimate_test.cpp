@@ -12,7 +12,7 @@ JobSpec job_of(Method method, int frames) {
   JobSpec job;
   job.sampling.method = method;
   job.frames.clear();
-  for (int frame = 1; frame <= frames; ++frame) job.frames.push_back(frame);
+  for (int frame = 1; frame <= frames; ++frame) job.frames.emplace_back(frame);
   job.image = {.width = 640, .height = 360, .sites = 4, .tile_size = 64};
   job.state.checkpoint_every = 12;
   job.environment.keys = {{.frame = 1, .map = "sky.exr"}};

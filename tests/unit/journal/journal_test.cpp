@@ -104,8 +104,10 @@ TEST_F(JournalTest, WhatWasCommittedIsThereAgain) {
   EXPECT_EQ(job.completions.tasks[0].outputs, completion(1).outputs);
   EXPECT_EQ(job.completions.stats, expected.stats);
   EXPECT_EQ(job.completions.frames, expected.frames);
-  EXPECT_EQ(journal.frame_stats(kJob, TaskKind::render, 3).value().size(), 2u);
-  EXPECT_TRUE(journal.frame_stats(kJob, TaskKind::render, 2).value().empty());
+  EXPECT_EQ(job.completions.steps, expected.steps);
+  EXPECT_EQ(journal.run_stats(kJob, baton::Run(3)).value().size(), 2u);
+  EXPECT_TRUE(journal.run_stats(kJob, baton::Run(2)).value().empty());
+  EXPECT_FALSE(journal.frame_stats(kJob, FrameIndex(3)).value());
   ASSERT_EQ(job.failures.size(), 1u);
   EXPECT_EQ(job.failures[0].lease, failure.lease);
   EXPECT_EQ(job.failures[0].worker, failure.worker);

@@ -104,7 +104,7 @@ TEST(AdaptiveRounds, RoundsAreInProportionToTheNoise) {
     adaptive.judge(judged(job, 0.9f, 1.1f));
     std::int32_t rounds = 0;
     double weight = 0;
-    for (std::int32_t round = 0; round < 18; ++round) {
+    for (Round round; round < Round(18); ++round) {
       const RoundPixels pixels = adaptive.pixels(round);
       EXPECT_TRUE(pixels.size() == 0 || pixels.size() == 64);
       if (pixels.size() == 0) continue;

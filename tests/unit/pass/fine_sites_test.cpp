@@ -39,7 +39,7 @@ std::vector<PixelPlace> places_of(const PixelRect& rect) {
 // A plane has the least, an edge the most; no number depends on the pixels beside it.
 TEST(FineSites, AreWhereGeometryIsFine) {
   const auto context = *load_render_context(fine_job(Method::pool, 1), Digest{1, 2});
-  const auto geometry = *context->geometry->at(0);
+  const auto geometry = *context->geometry->at(Step(0));
   const PixelRect rect = context->grid.rect(0);
   const std::vector<PixelPlace> places = places_of(rect);
   const auto counts = count_sites(context->job, *geometry, places);
@@ -75,7 +75,7 @@ TEST(FineSites, FollowTheSeedOfTheSites) {
     job.seed = seed;
     job.image.site_seed = site_seed;
     const auto context = *load_render_context(job, Digest{1, 2});
-    return count_sites(job, **context->geometry->at(0), places_of(context->grid.rect(0)));
+    return count_sites(job, **context->geometry->at(Step(0)), places_of(context->grid.rect(0)));
   };
   EXPECT_EQ(counts_of(1, 9), counts_of(2, 9));
   EXPECT_NE(counts_of(1, 0), counts_of(2, 0));
@@ -83,7 +83,7 @@ TEST(FineSites, FollowTheSeedOfTheSites) {
 
 TEST(FineSites, ContrastIsThatOfWhatReflects) {
   const auto context = *load_render_context(fine_job(Method::pool, 1), Digest{1, 2});
-  FrameGeometry geometry = **context->geometry->at(0);
+  FrameGeometry geometry = **context->geometry->at(Step(0));
   Scene scene = *context->scene;
   scene.materials = {
       make_material({.kind = MaterialKind::diffuse}),
@@ -119,7 +119,7 @@ TEST(FineSites, AreStratified) {
     job.image.sites = coarse;
     job.image.max_sites = 16 * coarse;
     const auto context = *load_render_context(job, Digest{1, 2});
-    const auto geometry = *context->geometry->at(0);
+    const auto geometry = *context->geometry->at(Step(0));
     const Camera& camera = geometry->pose.camera;
     std::vector<Ray> rays;
     SiteRays(context->job, camera, 1).append(3, 4, 16 * coarse, rays);
@@ -164,7 +164,7 @@ TEST(FineSites, OfLargeTilesAreTheSame) {
         .kind = MaterialKind::metallic_roughness, .metallic = 1, .roughness = 0.02f};
     if (in_motion) test::set_in_motion(job, true, false);
     const auto context = *load_render_context(job, Digest{1, 2});
-    const auto counts = count_sites(job, **context->geometry->at(0), places_of({0, 0, 96, 72}));
+    const auto counts = count_sites(job, **context->geometry->at(Step(0)), places_of({0, 0, 96, 72}));
     const auto sum = std::accumulate(counts.begin(), counts.end(), std::size_t{0});
     EXPECT_GT(sum, 6912u * 4);
     EXPECT_EQ(render_tiled(job, 16, 1), render_tiled(job, 96, 2)) << in_motion << ", " << sum;

@@ -4,6 +4,7 @@
 #include <algorithm>
 #include <cstring>
 
+#include "common/job/frame_range.h"
 #include "tests/support/render_tiled.h"
 #include "worker/light/frame_light.h"
 
@@ -26,10 +27,10 @@ TEST(LightSequence, KeepsTheLightOfTheLastFramesAlone) {
   LightSequence lights(job, std::make_shared<MapCache>(share), share);
   std::vector<std::weak_ptr<const EnvironmentMap>> maps;
   std::vector<std::weak_ptr<const PresampledSets>> presampled;
-  for (std::int32_t f = 0; f < 60; ++f) {
-    const auto light = lights.at(f);
+  for (Step step; step < Step(60); ++step) {
+    const auto light = lights.at(step);
     ASSERT_TRUE(light.ok());
-    ASSERT_TRUE(lights.at(f, kProbeRound).ok());
+    ASSERT_TRUE(lights.at(step, kProbeRound).ok());
     maps.push_back((*light)->now.map);
     presampled.push_back((*light)->presampled);
   }
@@ -44,9 +45,9 @@ TEST(LightSequence, MakesAFrameAgainAlike) {
   const JobSpec job = dissolve(60);
   const auto share = std::make_shared<MemoryShare>(std::uint64_t{1} << 30);
   LightSequence lights(job, std::make_shared<MapCache>(share), share);
-  const auto first = *lights.at(3);
-  for (std::int32_t f = 4; f < 40; ++f) ASSERT_TRUE(lights.at(f).ok());
-  const auto again = *lights.at(3);
+  const auto first = *lights.at(Step(3));
+  for (Step step(4); step < Step(40); ++step) ASSERT_TRUE(lights.at(step).ok());
+  const auto again = *lights.at(Step(3));
   ASSERT_NE(again->presampled, first->presampled) << "it was let go";
   const PresampledLight &a = again->presampled->sets.front(), &b = first->presampled->sets.front();
   ASSERT_EQ(a.blocks.size(), b.blocks.size());
@@ -57,7 +58,7 @@ TEST(LightSequence, MakesAFrameAgainAlike) {
 // Of maps that were read, each once, and of steps from one of the job's frames to the next.
 TEST(LightSequence, NotesWhatIsOdd) {
   JobSpec job = test::sequence_job(8);
-  job.frames = {1, 2, 3, 4, 6, 7, 8, 9};
+  job.frames = parse_frames("1-4,6-9").value();
   job.sampling.method = Method::pool;
   const auto key = [](double frame, const char* name, float radiance, int width) {
     return EnvironmentKey{
@@ -70,8 +71,8 @@ TEST(LightSequence, NotesWhatIsOdd) {
                           key(8, "unseen.exr", 0.1f, 8), key(9, "last.exr", 9, 8)};
   const auto share = std::make_shared<MemoryShare>(std::uint64_t{1} << 30);
   LightSequence lights(job, std::make_shared<MapCache>(share), share);
-  for (const std::int32_t f : {0, 1, 2, 3, 4, 5}) ASSERT_TRUE(lights.at(f).ok());
-  ASSERT_TRUE(lights.at(5, 1).ok());
+  for (const std::int32_t f : {0, 1, 2, 3, 4, 5}) ASSERT_TRUE(lights.at(Step(f)).ok());
+  ASSERT_TRUE(lights.at(Step(5), Round(1)).ok());
   const auto told = [&](const char* text) {
     return std::ranges::count_if(lights.notes(), [&](const std::string& note) {
       return note.find(text) != std::string::npos;
@@ -83,7 +84,7 @@ TEST(LightSequence, NotesWhatIsOdd) {
   EXPECT_EQ(told("the light jumps from frame 6 to 7: 4.5 times as bright"), 1);
   EXPECT_EQ(told("the light jumps"), 2) << "frame 5 was left out";
   EXPECT_EQ(lights.notes().size(), 4u);
-  for (const std::int32_t f : {6, 7}) ASSERT_TRUE(lights.at(f).ok());
+  for (const std::int32_t f : {6, 7}) ASSERT_TRUE(lights.at(Step(f)).ok());
   EXPECT_EQ(told("unseen.exr: no texel"), 1);
   EXPECT_EQ(told("the light jumps"), 3) << "no more than three are told";
 }
@@ -100,7 +101,7 @@ TEST(LightSequence, HidesWhatEachFrameHides) {
   LightSequence lights(job, std::make_shared<MapCache>(share), share,
                        std::make_shared<const HiddenLight>(job, *scene));
   const Vec3 aslant{0.77f, -0.64f, 0};  // by 50 degrees
-  const auto first = *lights.at(0), second = *lights.at(1), third = *lights.at(2);
+  const auto first = *lights.at(Step(0)), second = *lights.at(Step(1)), third = *lights.at(Step(2));
   EXPECT_EQ(first->now.map, second->now.map);
   EXPECT_TRUE(second->still);
   EXPECT_TRUE(second->now.evaluate(aslant).is_hidden());
@@ -111,7 +112,7 @@ TEST(LightSequence, HidesWhatEachFrameHides) {
 
 TEST(LightSequence, TheCameraMaySeeAnotherMap) {
   JobSpec job = test::box_job();
-  job.frames = {7};
+  job.frames = {FrameNumber(7)};
   job.environment.rotation_start_frame = 7;
   job.environment.rotation_start_deg = 90;
   const auto share = std::make_shared<MemoryShare>(std::uint64_t{1} << 30);

@@ -55,7 +55,7 @@ TEST(Primary, LooksAreWhatIsSeen) {
   const auto context = load_render_context(detailed_job(1), Digest{1, 2});
   ASSERT_TRUE(context.ok()) << context.error().message;
   const RenderContext& c = **context;
-  const auto geometry = *c.geometry->at(0);
+  const auto geometry = *c.geometry->at(Step(0));
   const TileSurfaces whole = trace_primary(c.job, *geometry, c.grid.rect(0));
   RoundPixels some;
   for (std::size_t i = 3; i < whole.pixels.size(); i += 4) some.add(i, 1);
@@ -74,7 +74,7 @@ TEST(Primary, LooksAreWhatIsSeen) {
 
   // Without detail there is nothing to keep.
   const auto bare = *load_render_context(sequence_job(1), Digest{1, 2});
-  const auto place = *bare->geometry->at(0);
+  const auto place = *bare->geometry->at(Step(0));
   EXPECT_TRUE(trace_primary(bare->job, *place, bare->grid.rect(0)).looks.empty());
 }
 

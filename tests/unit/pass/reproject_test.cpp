@@ -5,6 +5,7 @@
 #include <cmath>
 #include <functional>
 
+#include "common/job/frame_range.h"
 #include "tests/support/alive_box.h"
 #include "tests/support/small_scene.h"
 
@@ -19,8 +20,8 @@ class Follower {
   explicit Follower(const JobSpec& job, bool believes_rigid = false)
       : context_(*load_render_context(job, Digest{1, 2})) {
     const PixelRect rect = context_->grid.rect(0);
-    before_ = *context_->geometry->at(0);
-    now_ = *context_->geometry->at(1);
+    before_ = *context_->geometry->at(Step(0));
+    now_ = *context_->geometry->at(Step(1));
     if (believes_rigid) {
       auto planted = std::make_shared<FrameGeometry>(*before_);
       planted->pose.shapes = now_->pose.shapes;
@@ -103,7 +104,7 @@ class Follower {
 /// Looks straight down on the ground from 8 above: 32 x 24 pixels of 0.1.
 JobSpec ground_job(int sites) {
   JobSpec job = test::box_job();
-  job.frames = {1, 2};
+  job.frames = parse_frames("1-2").value();
   job.image = {.width = 32, .height = 24, .sites = sites, .tile_size = 4096};
   job.scene.objects.clear();
   job.camera = {.position = {0, 8, 0},

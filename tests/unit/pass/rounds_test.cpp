@@ -4,6 +4,7 @@
 #include <bit>
 #include <cmath>
 
+#include "common/job/frame_range.h"
 #include "tests/support/render_tiled.h"
 #include "worker/pass/primary.h"
 #include "worker/pass/round_mean.h"
@@ -89,7 +90,7 @@ double error_of(const JobSpec& job, const std::vector<double>& truth) {
 TEST(Rounds, ErrorFallsWithTheirNumber) {
   for (const Method method : {Method::bidirectional, Method::pool, Method::mis, Method::ratio}) {
     JobSpec job = rounds_job(method, 1);
-    job.frames = {1};
+    job.frames = {FrameNumber(1)};
     JobSpec reference = job;
     reference.sampling.method = Method::reference;
     reference.sampling.reference_samples = 64;
@@ -112,7 +113,7 @@ TEST(Rounds, ErrorFallsWithTheirNumber) {
 // A round starts from what those before have learnt; so does the next frame.
 TEST(Rounds, APixelsMemoryGoesFromRoundToRound) {
   JobSpec job = rounds_job(Method::pool, 3);
-  job.frames = {1, 2};
+  job.frames = parse_frames("1-2").value();
   job.state.preroll = 0;
   const SamplingStats did = render_tile(job).stats.sampling;
   EXPECT_GT(did.pixels_fresh, 0u);

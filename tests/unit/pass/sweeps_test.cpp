@@ -49,7 +49,7 @@ TEST(Sweeps, SameBytesForAnyTilingWhileCameraAndObjectsMove) {
 TEST(Sweeps, OfAStillAreItsRounds) {
   for (const Method method : {Method::pool, Method::bidirectional, Method::mis}) {
     JobSpec job = sweeps_job(method, 12, 1);
-    job.frames = {5};
+    job.frames = {FrameNumber(5)};
     const std::vector<double> at_once = mean_rgb(render_tile(job).films.back());
     job.quality = {.rounds = 4, .sweeps = 3};
     const std::vector<double> in_sweeps = mean_rgb(render_tiled(job, 4096, 1).back());
@@ -66,7 +66,7 @@ FilmTile film_of(std::vector<std::string> channels, std::vector<float> values) {
 TEST(SweepMean, WeighsSweepsAlike) {
   const FilmTile earlier = film_of({"R", "variance.G", "error"}, {1, 2, .3f, .6f, .2f, -1});
   FilmTile film = film_of({"R", "variance.G", "error"}, {5, 2, .6f, 0, -1, -1});
-  ASSERT_TRUE(add_sweeps(earlier, 3, film));
+  ASSERT_TRUE(add_sweeps(earlier, Sweep(3), film));
   EXPECT_EQ(film.values[0], 2);  // (3 * 1 + 5) / 4
   EXPECT_EQ(film.values[1], 2);
   EXPECT_FLOAT_EQ(film.values[2], (9 * .3f + .6f) / 16);
@@ -79,7 +79,7 @@ TEST(SweepMean, LeavesOutWhatSeesNoSurface) {
   const std::vector<std::string> channels{"normal.X", "normal.Y", "normal.Z", "depth", "material"};
   const FilmTile earlier = film_of(channels, {0, 1, 0, 0, 0, 0, 0, 7, 0, 2});
   FilmTile film = film_of(channels, {0, 0, 1, 1, 0, 0, 4, 0, 3, 1});
-  ASSERT_TRUE(add_sweeps(earlier, 1, film));
+  ASSERT_TRUE(add_sweeps(earlier, Sweep(1), film));
   EXPECT_EQ(film.values[6], 4) << "depth of the sweep that sees something";
   EXPECT_EQ(film.values[7], 7);
   EXPECT_EQ(film.values[8], 3) << "material";
@@ -93,7 +93,7 @@ TEST(SweepMean, RefusesAnotherTile) {
   FilmTile film = film_of({"R"}, {1, 2});
   FilmTile earlier = film;
   earlier.rect = {0, 0, 2, 1};
-  const Status status = add_sweeps(earlier, 1, film);
+  const Status status = add_sweeps(earlier, Sweep(1), film);
   ASSERT_FALSE(status);
   EXPECT_EQ(status.error().message,
             "film of an earlier sweep: at 0,0 with channels R, expected 4,2, R");

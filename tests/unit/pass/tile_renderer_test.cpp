@@ -253,16 +253,16 @@ TEST(RunTile, CountsEverySurfacePixelOnceInEachFrame) {
   const auto context = load_render_context(job, Digest{1, 2});
   ASSERT_TRUE(context.ok());
   std::vector<FrameStats> rows;
-  const TileRunSink sink{.film = [](int, const FilmTile&) { return Status(); },
+  const TileRunSink sink{.film = [](Step, const FilmTile&) { return Status(); },
                          .state = [](const SampleState&) { return Status(); },
                          .diagnostics = [&](const FrameStats& stats) { rows.push_back(stats); }};
-  const auto stats = run_tile(**context, tile_run(job, 0, 0), {}, sink, {});
+  const auto stats = run_tile(**context, tile_run(job, 0, baton::Run(0)), {}, sink, {});
   ASSERT_TRUE(stats.ok());
   SamplingStats sum;
   for (const FrameStats& row : rows) {
     std::uint64_t in_bins = 0;
     for (const std::uint64_t count : row.sampling.ess_histogram) in_bins += count;
-    EXPECT_EQ(in_bins, row.sampling.pixels()) << row.frame;
+    EXPECT_EQ(in_bins, row.sampling.pixels()) << row.step();
     EXPECT_EQ(row.sampling.pixels(), (stats->pixels - stats->pixels_background) / 3);
     sum.merge(row.sampling);
   }
@@ -322,13 +322,13 @@ TEST(RunTile, RefusesTheStateOfAnotherJobTileOrFrame) {
   const auto given = [](const SampleState& s) {
     return std::vector{std::make_shared<const SampleState>(s)};
   };
-  const TileRunSink sink{[](int, const FilmTile&) { return Status(); },
+  const TileRunSink sink{[](Step, const FilmTile&) { return Status(); },
                          [](const SampleState&) { return Status(); }};
-  const TileRun run{.tile = 0, .run = 1, .first_frame = 2, .last_frame = 3};
+  const TileRun run{.tile = 0, .run = baton::Run(1), .steps = {Step(2), Step(3)}};
   EXPECT_THAT(run_tile(**context, run, given(state), sink, {}).error().message,
               HasSubstr("of picture"));
   state.picture = {7, 7};
-  state.frame_index = 0;
+  state.step = Step(0);
   EXPECT_THAT(run_tile(**context, run, given(state), sink, {}).error().message,
               HasSubstr("frame index 0"));
   EXPECT_FALSE(run_tile(**context, run, {}, sink, {}).ok());
@@ -338,13 +338,13 @@ TEST(RunTile, StopsWhenAsked) {
   const auto context = load_render_context(sequence_job(4), Digest{1, 2});
   std::stop_source stop;
   int frames = 0;
-  const TileRunSink sink{[&](int, const FilmTile&) {
+  const TileRunSink sink{[&](Step, const FilmTile&) {
                            ++frames;
                            stop.request_stop();
                            return Status();
                          },
                          [](const SampleState&) { return Status(); }};
-  const auto stats = run_tile(**context, {0, 0, 0, 3}, {}, sink, stop.get_token());
+  const auto stats = run_tile(**context, {0, baton::Run(0), {Step(0), Step(3)}}, {}, sink, stop.get_token());
   ASSERT_FALSE(stats.ok());
   EXPECT_EQ(stats.error().kind, ErrorKind::cancelled);
   EXPECT_EQ(frames, 1);
@@ -355,9 +355,9 @@ TEST(LoadRenderContext, NamesAMissingMap) {
   job.environment.keys[0].map = "/nowhere/sky.exr";
   const auto context = load_render_context(job, Digest{1, 2});
   ASSERT_TRUE(context.ok());
-  const TileRunSink sink{[](int, const FilmTile&) { return Status(); },
+  const TileRunSink sink{[](Step, const FilmTile&) { return Status(); },
                          [](const SampleState&) { return Status(); }};
-  const auto stats = run_tile(**context, {0, 0, 0, 0}, {}, sink, {});
+  const auto stats = run_tile(**context, {0, baton::Run(0), {}}, {}, sink, {});
   ASSERT_FALSE(stats.ok());
   EXPECT_THAT(stats.error().message, HasSubstr("/nowhere/sky.exr"));
 }

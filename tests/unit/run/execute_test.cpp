@@ -8,6 +8,7 @@
 
 #include "common/base/files.h"
 #include "common/base/limits.h"
+#include "common/job/frame_range.h"
 #include "common/job/job_json.h"
 #include "common/job/sequence.h"
 #include "tests/support/local_frames.h"
@@ -17,7 +18,7 @@
 namespace baton {
 namespace {
 
-using Images = std::map<std::int32_t, FilmTile>;
+using Images = std::map<Step, FilmTile>;
 
 /// A tetrahedron on a ground under a map with one lamp: 5 frames of 40x24 pixels in tiles of 16,
 /// checkpoints every 2.
@@ -32,7 +33,7 @@ class ExecuteTest : public testing::Test {
     write_map();
 
     job_.name = "execute";
-    job_.frames = {1, 2, 3, 4, 5};
+    job_.frames = parse_frames("1-5").value();
     job_.image = {.width = 40, .height = 24, .sites = 1, .tile_size = 16};
     job_.scene.materials["chalk"] = {};
     job_.scene.meshes["tetrahedron"] = {.path = folder_ + "tetrahedron.off",
@@ -68,27 +69,24 @@ class ExecuteTest : public testing::Test {
     return load_job_document({digest_of(document), document}, {}, shelf);
   }
 
-  FrameSpan frames_of(std::int32_t step) const {
-    const TileRun run = tile_run(job_, 0, step);
-    return {run.first_frame, run.last_frame};
-  }
-  Result<TaskOutput> render(std::int32_t step, std::int32_t tile,
+  StepSpan steps_of(baton::Run run) const { return Timeline(job_).steps_of(run); }
+  Result<TaskOutput> render(baton::Run run, std::int32_t tile,
                             const std::vector<BlobRef>& inputs) {
-    return execute_task(*loaded_, store_.value(), {TaskKind::render, step, tile},
-                        {inputs, frames_of(step)}, {});
+    return execute_task(*loaded_, store_.value(), render_task(run, tile),
+                        {inputs, steps_of(run)}, {});
   }
 
   /// Every render task in the order of a farm; returns the films by frame, the states in `states_`.
-  std::map<std::int32_t, std::vector<BlobRef>> render_all() {
-    std::map<std::int32_t, std::vector<BlobRef>> films;
+  std::map<Step, std::vector<BlobRef>> render_all() {
+    std::map<Step, std::vector<BlobRef>> films;
     for (std::int32_t tile = 0; tile < TileGrid(job_.image).count(); ++tile) {
       std::vector<BlobRef> previous;
-      for (std::int32_t step = 0; step < num_runs(job_); ++step) {
-        const Result<TaskOutput> output = render(step, tile, previous);
+      for (baton::Run run; run < baton::Run(num_runs(job_)); ++run) {
+        const Result<TaskOutput> output = render(run, tile, previous);
         EXPECT_TRUE(output) << output.error().message;
         previous.clear();
         for (const BlobRef& ref : output->outputs) {
-          (ref.kind == BlobKind::film ? films[ref.frame] : previous).push_back(ref);
+          (ref.kind == BlobKind::film ? films[ref.step()] : previous).push_back(ref);
         }
       }
     }
@@ -98,8 +96,8 @@ class ExecuteTest : public testing::Test {
   Images render_in_process() {
     Images images;
     const auto stats =
-        test::render_locally(*loaded_->context, [&](std::int32_t frame, const FilmTile& image) {
-          EXPECT_TRUE(images.emplace(frame, image).second);
+        test::render_locally(*loaded_->context, [&](Step step, const FilmTile& image) {
+          EXPECT_TRUE(images.emplace(step, image).second);
           return Status();
         });
     EXPECT_TRUE(stats) << stats.error().message;
@@ -119,16 +117,17 @@ TEST_F(ExecuteTest, TasksThroughTheStoreMakeTheImagesOfOneProcess) {
   job_.output.pixel_type = PixelType::full_float;
   loaded_ = load().value();
 
-  for (const auto& [frame, films] : render_all()) {
-    const Result<TaskOutput> output = execute_task(
-        *loaded_, *store_, {TaskKind::assemble, frame, 0}, {films, {frame, frame}}, {});
+  for (const auto& [step, films] : render_all()) {
+    const FrameIndex frame = Timeline(job_).frame_of(step);
+    const Result<TaskOutput> output =
+        execute_task(*loaded_, *store_, assemble_task(frame), {films, {step, step}}, {});
     ASSERT_TRUE(output) << output.error().message;
     ASSERT_EQ(output->outputs.size(), 1u);
     EXPECT_EQ(output->outputs[0].kind, BlobKind::image);
 
     // Compare channel by channel: a file sorts its channels.
     const FilmTile image = read_exr(frame_path(job_, frame)).value();
-    const FilmTile& in_process = expected.at(frame);
+    const FilmTile& in_process = expected.at(step);
     for (std::size_t channel = 0; channel < in_process.channels.size(); ++channel) {
       const std::string& name = in_process.channels[channel];
       const float* const found = image.find(name);
@@ -144,74 +143,74 @@ TEST_F(ExecuteTest, TheNumberOfThreadsDoesNotShow) {
   const Images expected = render_in_process();
   LocalRender render(*loaded_->context);
   const std::int32_t num_tiles = TileGrid(job_.image).count();
-  for (std::int32_t frame = 0; frame < 5; ++frame) {
+  for (Step step; step < Step(5); ++step) {
     std::map<std::int32_t, RenderedTile> tiles;
     for (std::int32_t tile = 0; tile < num_tiles; ++tile) tiles[tile];
     std::vector<std::thread> threads;
     for (std::int32_t tile = 0; tile < num_tiles; ++tile)
-      threads.emplace_back([&, tile] { tiles.at(tile) = render.render(frame, tile).value(); });
+      threads.emplace_back([&, tile] { tiles.at(tile) = render.render(step, tile).value(); });
     for (std::thread& thread : threads) thread.join();
     render.keep(std::move(tiles));
     RenderStats stats;
-    EXPECT_EQ(test::local_image(render, job_, frame, stats).value(), expected.at(frame));
+    EXPECT_EQ(test::local_image(render, job_, step, stats).value(), expected.at(step));
   }
 }
 
 TEST_F(ExecuteTest, ARunHandsOnItsStateAndCountsItsWork) {
-  const Result<TaskOutput> first = render(0, 1, {});
+  const Result<TaskOutput> first = render(baton::Run(0), 1, {});
   ASSERT_TRUE(first) << first.error().message;
   ASSERT_EQ(first->outputs.size(), 3u);
   EXPECT_EQ(first->outputs[2].kind, BlobKind::state);
-  EXPECT_EQ(first->outputs[2].frame, 1);
+  EXPECT_EQ(first->outputs[2].step(), Step(1));
   EXPECT_EQ(first->stats.pixels, 2u * 16 * 16);
-  EXPECT_EQ(render(0, 1, {})->outputs, first->outputs);
+  EXPECT_EQ(render(baton::Run(0), 1, {})->outputs, first->outputs);
 
   // The next run needs exactly that state.
-  EXPECT_TRUE(render(1, 1, {first->outputs[2]}));
-  EXPECT_FALSE(render(1, 1, {}));
-  EXPECT_FALSE(render(1, 0, {first->outputs[2]}));
-  EXPECT_FALSE(render(1, 1, {first->outputs[0]}));
+  EXPECT_TRUE(render(baton::Run(1), 1, {first->outputs[2]}));
+  EXPECT_FALSE(render(baton::Run(1), 1, {}));
+  EXPECT_FALSE(render(baton::Run(1), 0, {first->outputs[2]}));
+  EXPECT_FALSE(render(baton::Run(1), 1, {first->outputs[0]}));
 }
 
 // What is held is what a file would have said: the next run makes the same films of either, and
 // packing it later gives the file that packing at once does.
 TEST_F(ExecuteTest, AHeldStateIsTheStateOfItsFile) {
   const TaskKey first{TaskKind::render, 0, 1}, next{TaskKind::render, 1, 1};
-  const BlobRef packed = render(0, 1, {}).value().outputs.back();
+  const BlobRef packed = render(baton::Run(0), 1, {}).value().outputs.back();
   const Result<TaskOutput> made =
-      execute_task(*loaded_, *store_, first, {{}, frames_of(0), /*may_hold=*/true}, {});
+      execute_task(*loaded_, *store_, first, {{}, steps_of(baton::Run(0)), /*may_hold=*/true}, {});
   ASSERT_TRUE(made) << made.error().message;
   const BlobRef held = made->outputs.back();
   EXPECT_TRUE(held.is_held());
-  EXPECT_EQ(held.digest, held_state_name(loaded_->digest, 1, 1));
+  EXPECT_EQ(held.digest, held_state_name(loaded_->digest, Step(1), 1));
   EXPECT_EQ(loaded_->states->size_bytes(), loaded_->states->find(held)->size_bytes());
-  EXPECT_EQ(render(1, 1, {held}).value().outputs, render(1, 1, {packed}).value().outputs);
+  EXPECT_EQ(render(baton::Run(1), 1, {held}).value().outputs, render(baton::Run(1), 1, {packed}).value().outputs);
 
   const auto published = publish_held(loaded_->states->held(), *store_);
   ASSERT_TRUE(published) << published.error().message;
   EXPECT_EQ(*published, (std::vector<PublishedState>{{held, packed}}));
 
   // A grant says which states nobody needs any more; one that is not here is an error.
-  EXPECT_TRUE(execute_task(*loaded_, *store_, next, {{held}, frames_of(1), false, 1}, {}));
+  EXPECT_TRUE(execute_task(*loaded_, *store_, next, {{held}, steps_of(baton::Run(1)), false, Step(1)}, {}));
   const Result<TaskOutput> late =
-      execute_task(*loaded_, *store_, next, {{held}, frames_of(1), false, 2}, {});
+      execute_task(*loaded_, *store_, next, {{held}, steps_of(baton::Run(1)), false, Step(2)}, {});
   ASSERT_FALSE(late);
   EXPECT_THAT(late.error().message, testing::HasSubstr("is not held here"));
   EXPECT_EQ(loaded_->states->size_bytes(), 0u);
 }
 
 TEST_F(ExecuteTest, ADamagedOrMissingStateIsAnErrorThatNamesIt) {
-  const BlobRef state = render(0, 0, {}).value().outputs.back();
+  const BlobRef state = render(baton::Run(0), 0, {}).value().outputs.back();
   Bytes bytes = read_file(store_->path(state.digest), limits::kMaxBlobBytes).value();
   bytes[bytes.size() / 2] ^= std::byte{1};
   ASSERT_TRUE(write_file_atomic(store_->path(state.digest), bytes));
-  const Result<TaskOutput> damaged = render(1, 0, {state});
+  const Result<TaskOutput> damaged = render(baton::Run(1), 0, {state});
   ASSERT_FALSE(damaged);
   EXPECT_EQ(damaged.error().kind, ErrorKind::corrupt);
   EXPECT_THAT(damaged.error().message, testing::HasSubstr(state.digest.hex()));
 
   ASSERT_TRUE(store_->remove(state.digest));
-  EXPECT_FALSE(render(1, 0, {state}));
+  EXPECT_FALSE(render(baton::Run(1), 0, {state}));
 }
 
 TEST_F(ExecuteTest, TasksThatTheJobDoesNotHaveAreBadInput) {
@@ -219,14 +218,14 @@ TEST_F(ExecuteTest, TasksThatTheJobDoesNotHaveAreBadInput) {
                               TaskKey{TaskKind::render, -1, 0}, TaskKey{TaskKind::assemble, 5, 0},
                               TaskKey{TaskKind::assemble, 0, 0}}) {
     const Result<TaskOutput> output =
-        execute_task(*loaded_, *store_, task, {{}, {2 * task.step, 2 * task.step}}, {});
+        execute_task(*loaded_, *store_, task, {{}, {Step(2 * task.position), Step(2 * task.position)}}, {});
     ASSERT_FALSE(output);
     EXPECT_EQ(output.error().kind, ErrorKind::bad_input);
   }
 }
 
 TEST_F(ExecuteTest, AFrameNeedsEveryTileOnce) {
-  auto films = render_all()[0];
+  auto films = render_all()[Step(0)];
   films[1] = films[0];
   EXPECT_FALSE(execute_task(*loaded_, *store_, {TaskKind::assemble, 0, 0}, {films}, {}));
 }
@@ -235,7 +234,7 @@ TEST_F(ExecuteTest, AStoppedTaskIsCancelled) {
   std::stop_source stop;
   stop.request_stop();
   const Result<TaskOutput> output = execute_task(*loaded_, *store_, {TaskKind::render, 0, 0},
-                                                 {{}, frames_of(0)}, stop.get_token());
+                                                 {{}, steps_of(baton::Run(0))}, stop.get_token());
   ASSERT_FALSE(output);
   EXPECT_EQ(output.error().kind, ErrorKind::cancelled);
 }

@@ -8,6 +8,7 @@
 #include "common/base/limits.h"
 #include "common/base/version.h"
 #include "common/image/noise.h"
+#include "common/job/frame_range.h"
 #include "common/job/sequence.h"
 
 namespace baton {
@@ -17,7 +18,7 @@ JobSpec small_job(const std::string& name) {
   JobSpec job;
   job.sampling.method = Method::sequential;
   job.name = "small";
-  job.frames = {7, 9};
+  job.frames = parse_frames("7,9").value();
   job.environment.keys = {{.frame = 1, .map = "sky.exr"}};
   job.image = {.width = 20, .height = 10, .sites = 1, .tile_size = 8};
   job.output.directory = testing::TempDir() + "frame_output_" + name;

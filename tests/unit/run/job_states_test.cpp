@@ -16,12 +16,12 @@ StatePtr state_of(std::int32_t side, bool with_memory) {
 
 StatePtr state_of_frame(std::int32_t frame) {
   SampleState state = *state_of(10, false);
-  state.frame_index = frame;
+  state.step = Step(frame);
   return std::make_shared<const SampleState>(std::move(state));
 }
 
 BlobRef held_ref(std::int32_t frame) {
-  return {BlobKind::state, frame, 0, held_state_name({1, 2}, frame, 0)};
+  return {BlobKind::state, frame, 0, held_state_name({1, 2}, Step(frame), 0)};
 }
 BlobRef stored_ref(std::int32_t frame) {
   return {BlobKind::state, frame, 0, digest_of(std::to_string(frame)), 100};
@@ -53,7 +53,7 @@ TEST(JobStates, HoldsWhatFitsUntilNobodyNeedsIt) {
   ASSERT_EQ(held.size(), 1u);
   EXPECT_EQ(held.front().first, held_ref(1));
 
-  states.release_before(1);
+  states.release_before(Step(1));
   EXPECT_EQ(states.find(held_ref(0)), nullptr);
   EXPECT_NE(states.find(held_ref(1)), nullptr);
   EXPECT_TRUE(states.hold(held_ref(2), state_of_frame(2)));

@@ -48,7 +48,7 @@ class PilotSessionTest : public SessionTest {
     welcome();
   }
   std::vector<SessionAction> grant_of(const LeaseId& lease, double expected_seconds) {
-    return receive(LeaseGrant{lease, {}, 0, 0, false, 0, expected_seconds});
+    return receive(LeaseGrant{lease, {}, {}, false, {}, expected_seconds});
   }
 };
 

@@ -31,7 +31,7 @@ TEST_F(PlateFile, IntegersAreSrgbAndFloatsAreLinear) {
       test::write_targa("plate.0007.tga", 2, 1, 4, {0, 188, 0, 9, 255, 188, 0, 9});
   const fs::path folder = fs::path(first).parent_path();
   job_.output.plate = FileSequence{.files = (folder / "plate.####.tga").string(), .offset = 5};
-  const RgbImage seen = load_plate(job_, 2).value().picture;
+  const RgbImage seen = load_plate(job_, FrameNumber(2)).value().picture;
   EXPECT_THAT(seen.rgb, ElementsAre(0, testing::FloatNear(0.5029f, 1e-4f), 0, 1,
                                     testing::FloatNear(0.5029f, 1e-4f), 0));
 
@@ -39,7 +39,7 @@ TEST_F(PlateFile, IntegersAreSrgbAndFloatsAreLinear) {
       .rect = {0, 0, 4, 2}, .channels = {"R", "G", "B"}, .values = std::vector<float>(24, 0.25f)};
   ASSERT_TRUE(write_exr(folder / "plate.exr", film, {}));
   job_.output.plate = FileSequence{.files = (folder / "plate.exr").string()};
-  EXPECT_THAT(load_plate(job_, 2).value().picture.rgb, testing::Each(0.25f));
+  EXPECT_THAT(load_plate(job_, FrameNumber(2)).value().picture.rgb, testing::Each(0.25f));
 }
 
 TEST_F(PlateFile, WhatIsNoNumberBecomesZeroAndIsCountedWhatIsNegativeStays) {
@@ -53,7 +53,7 @@ TEST_F(PlateFile, WhatIsNoNumberBecomesZeroAndIsCountedWhatIsNegativeStays) {
   const fs::path exr = fs::path(testing::TempDir()) / "odd.exr";
   ASSERT_TRUE(write_exr(exr, film, {.half_float = false}));
   job_.output.plate = FileSequence{.files = exr.string()};
-  const Plate plate = load_plate(job_, 1).value();
+  const Plate plate = load_plate(job_, FrameNumber(1)).value();
   EXPECT_EQ(plate.repaired, 3u) << "a pixel counts once";
   EXPECT_THAT(plate.picture.rgb, ElementsAre(3, 2, -8, 0, 0, -3));
   EXPECT_EQ(repair_note("odd.exr", plate.repaired),
@@ -62,7 +62,7 @@ TEST_F(PlateFile, WhatIsNoNumberBecomesZeroAndIsCountedWhatIsNegativeStays) {
   const std::string tiff = test::write_tiff("odd.tif", 2, 1, test::TiffExtra::associated,
                                             {-0.5f, 70000, nan, 0.5f, 0.25f, 0.5f, 0.75f, 1});
   job_.output.plate = FileSequence{.files = tiff};
-  const Plate floats = load_plate(job_, 1).value();
+  const Plate floats = load_plate(job_, FrameNumber(1)).value();
   EXPECT_EQ(floats.repaired, 1u);
   EXPECT_THAT(floats.picture.rgb, ElementsAre(-0.5f, 70000, 0, 0.25f, 0.5f, 0.75f));
 }
@@ -72,7 +72,7 @@ TEST_F(PlateFile, IsTheDisplayWindowOfAnExrFile) {
   const fs::path exr = fs::path(testing::TempDir()) / "cropped.exr";
   ASSERT_TRUE(write_exr(exr, film, {.display_window = PixelRect{0, 0, 2, 1}}));
   job_.output.plate = FileSequence{.files = exr.string()};
-  EXPECT_THAT(load_plate(job_, 1).value().picture.rgb, ElementsAre(0, 0, 0, 5, 6, 7));
+  EXPECT_THAT(load_plate(job_, FrameNumber(1)).value().picture.rgb, ElementsAre(0, 0, 0, 5, 6, 7));
 }
 
 TEST_F(PlateFile, FaultsNameTheFileAndTheSize) {
@@ -82,7 +82,7 @@ TEST_F(PlateFile, FaultsNameTheFileAndTheSize) {
                         .channels = {"R", "G", "B"},
                         .values = std::vector<float>(std::size_t(3 * width * height))};
     EXPECT_TRUE(write_exr(folder / "plate.exr", film, {}));
-    const auto plate = load_plate(job_, 1);
+    const auto plate = load_plate(job_, FrameNumber(1));
     return plate ? std::string("none") : plate.error().message;
   };
   job_.output.plate = FileSequence{.files = (folder / "plate.exr").string()};
@@ -97,7 +97,7 @@ TEST_F(PlateFile, FaultsNameTheFileAndTheSize) {
                 "and larger, got 180 x 100"));
   EXPECT_THAT(fault(45, 31), HasSubstr("got 45 x 31"));
   job_.output.plate->files = (folder / "none.png").string();
-  EXPECT_THAT(load_plate(job_, 1).error().message, HasSubstr("none.png: missing"));
+  EXPECT_THAT(load_plate(job_, FrameNumber(1)).error().message, HasSubstr("none.png: missing"));
 }
 
 }  // namespace

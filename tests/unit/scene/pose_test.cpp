@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "common/job/frame_range.h"
 #include "common/job/motion.h"
 #include "common/scene/settle/settle_motion.h"
 #include "tests/support/mesh_files.h"
@@ -22,7 +23,7 @@ void expect_near(const Vec3& a, const Vec3& b, float tolerance = 1e-4f) {
 /// -z.
 JobSpec turning_job() {
   JobSpec job;
-  job.frames = {1, 2, 3};
+  job.frames = parse_frames("1-3").value();
   job.image = {.width = 200, .height = 100};
   job.camera = {
       .position = {0, 0, 10}, .look_at = {0, 0, 0}, .up = {0, 1, 0}, .vertical_fov_deg = 90};
@@ -95,7 +96,7 @@ TEST(Pose, WhatHasNoVolumeIsNotThere) {
   EXPECT_FALSE(pose_at(*scene, job, 3).instances[0].is_absent);
   job.scene.objects[0].keys[1].scale = {1, 0, 1};
   // Nothing that is there moves.
-  job.frames = {1, 3};
+  job.frames = parse_frames("1,3").value();
   EXPECT_EQ(settle_motion(job)->motion.max_px, 1);
 }
 

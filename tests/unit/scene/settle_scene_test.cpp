@@ -5,6 +5,7 @@
 
 #include <cmath>
 
+#include "common/job/frame_range.h"
 #include "common/job/job_json.h"
 #include "common/job/motion.h"
 #include "common/scene/pose.h"
@@ -193,7 +194,7 @@ Transform placed(const JobSpec& job, std::size_t i, double frame) {
 TEST(SettleScene, AllAnimationsAndAllCurvesMove) {
   // Four frames a second: frame 3 shows 0.75 s, as Blender writes them.
   JobSpec job = job_of(moving_set(), R"(, "fps": 4})");
-  job.frames = {1, 2, 3, 4, 6, 8, 9};
+  job.frames = parse_frames("1-4,6,8-9").value();
   job = settled(job);
   ASSERT_EQ(job.scene.objects.size(), 4u);
   EXPECT_EQ(job.scene.materials.at("glTF default").metallic, 1);
@@ -220,11 +221,11 @@ TEST(SettleScene, AllAnimationsAndAllCurvesMove) {
 
 TEST(SettleScene, TimeZeroIsStartFrame) {
   JobSpec job = job_of(moving_set(), R"(, "fps": 4, "startFrame": 101})");
-  job.frames = {105};
+  job.frames = {FrameNumber(105)};
   EXPECT_NEAR(placed(settled(job), 0, 105).offset.x, 2, 1e-5f);
   GltfMotion motion{.file = moving_set(), .node = "cart", .fps = 4};
   job = {};
-  job.frames = {4};
+  job.frames = {FrameNumber(4)};
   job.scene.objects.push_back({.mesh = "m", .material = "d"});
   job.scene.objects[0].gltf = motion;
   job.scene.meshes["m"].path = write_test_file("m.off", test::kSquareOff);

@@ -19,8 +19,8 @@ class Shop {
   std::vector<TaskKey> work(JobSpec wanted, int count = 1000000) {
     const KeptFiles files{
         .has_frame =
-            [&](std::int32_t frame, const BlobRef& image) {
-              const auto found = frames_.find(wanted.frames[static_cast<std::size_t>(frame)]);
+            [&](FrameIndex frame, const BlobRef& image) {
+              const auto found = frames_.find(wanted.frames[frame.index()]);
               return found != frames_.end() && found->second == image.digest;
             },
         .has_blob = [&](const BlobRef& blob) { return store_.contains(blob.digest); }};
@@ -39,11 +39,11 @@ class Shop {
       for (const BlobRef& input : grant.inputs)
         EXPECT_TRUE(store_.contains(input.digest)) << "an input that is not there";
       const auto outputs =
-          outputs_of_grant(wanted, farm.job, grant.lease.task, grant.inputs, grant.frames);
+          outputs_of_grant(wanted, farm.job, grant.lease.task, grant.inputs, grant.steps);
       for (const BlobRef& blob : outputs) {
         store_.insert(blob.digest);
         if (blob.kind == BlobKind::image)
-          frames_[wanted.frames[static_cast<std::size_t>(blob.frame)]] = blob.digest;
+          frames_[wanted.frames[blob.frame().index()]] = blob.digest;
       }
       inputs_of_last_ = grant.inputs;
       if (tasks.empty()) first_inputs_ = grant.inputs;
@@ -55,7 +55,7 @@ class Shop {
     return tasks;
   }
   void lose_states() { store_.clear(); }
-  void lose_frame(int number) { frames_.erase(number); }
+  void lose_frame(int number) { frames_.erase(FrameNumber(number)); }
   const Adoption& adoption() const { return adoption_; }
   /// Of the first task of the last job.
   const std::vector<BlobRef>& first_inputs() const { return first_inputs_; }
@@ -70,7 +70,7 @@ class Shop {
       }
     }
     for (const BlobRef& image : adoption_.images)
-      done.push_back({{TaskKind::assemble, image.frame, 0}, {image}, {}, {}});
+      done.push_back({assemble_task(image.frame()), {image}, {}, {}});
     for (const TaskKey& task : adoption_.settled) done.push_back({task, {}, {}, {}});
     return done;
   }
@@ -85,7 +85,7 @@ class Shop {
 
   std::vector<FormerJob> formers_;
   std::set<Digest> store_;
-  std::map<int, Digest> frames_;
+  std::map<FrameNumber, Digest> frames_;
   Adoption adoption_;
   std::vector<BlobRef> first_inputs_, inputs_of_last_;
 };
@@ -93,21 +93,21 @@ class Shop {
 std::set<int> rendered_runs(const std::vector<TaskKey>& tasks) {
   std::set<int> runs;
   for (const TaskKey& task : tasks) {
-    if (task.kind == TaskKind::render) runs.insert(task.step);
+    if (task.kind == TaskKind::render) runs.insert(task.run().value());
   }
   return runs;
 }
 std::set<int> written_frames(const std::vector<TaskKey>& tasks) {
   std::set<int> frames;
   for (const TaskKey& task : tasks) {
-    if (task.kind == TaskKind::assemble) frames.insert(task.step);
+    if (task.kind == TaskKind::assemble) frames.insert(task.frame().value());
   }
   return frames;
 }
 
 JobSpec with_frames(JobSpec job, int first, int last) {
   job.frames.clear();
-  for (int frame = first; frame <= last; ++frame) job.frames.push_back(frame);
+  for (int frame = first; frame <= last; ++frame) job.frames.emplace_back(frame);
   return job;
 }
 
@@ -152,7 +152,7 @@ TEST(Adoption, MoreFramesGoOnFromTheLastStatesInMotion) {
   EXPECT_EQ(rendered_runs(tasks), (std::set<int>{8, 9, 10, 11}));
   EXPECT_EQ(written_frames(tasks), (std::set<int>{8, 9, 10, 11}));
   ASSERT_FALSE(shop.first_inputs().empty());
-  EXPECT_EQ(shop.first_inputs().front().frame, 7);
+  EXPECT_EQ(shop.first_inputs().front().step(), Step(7));
 }
 
 // The last run of the shorter job was cut short: it stays as it is.
@@ -160,10 +160,10 @@ TEST(Adoption, MoreFramesGoOnFromTheLastStatesAtRest) {
   Shop shop;
   shop.work(small_job(2, 8, 12));
   const auto tasks = shop.work(small_job(2, 30, 12));
-  EXPECT_THAT(shop.adoption().plan.leading_runs, ElementsAre(0, 8));
+  EXPECT_THAT(shop.adoption().plan.leading_runs, ElementsAre(Step(0), Step(8)));
   EXPECT_EQ(tasks.size(), 2u * 3 + 22) << "frames 9-12, 13-24 and 25-30 of two tiles";
   EXPECT_EQ(*written_frames(tasks).begin(), 8);
-  EXPECT_EQ(shop.first_inputs().front().frame, 7);
+  EXPECT_EQ(shop.first_inputs().front().step(), Step(7));
 }
 
 TEST(Adoption, ASecondPassGoesOnToo) {
@@ -208,7 +208,7 @@ TEST(Adoption, StatesAreCutIntoOtherTiles) {
     const std::int32_t runs = moves(job) ? 2 : 1;  // after the frame that is cut
     EXPECT_EQ(tasks.size(), static_cast<std::size_t>(2 + 2 * runs + 2));
     ASSERT_EQ(shop.first_inputs().size(), 2u) << "two tiles make one";
-    EXPECT_EQ(shop.first_inputs().front().frame, 5);
+    EXPECT_EQ(shop.first_inputs().front().step(), Step(5));
   }
 }
 
@@ -234,7 +234,7 @@ TEST(Adoption, AFrameThatIsGoneIsMadeAgain) {
   const auto tasks = shop.work(smaller_tiles);
   EXPECT_EQ(written_frames(tasks), std::set<int>{2});
   EXPECT_EQ(rendered_runs(tasks), (std::set<int>{0, 1}));
-  EXPECT_THAT(shop.adoption().lost, ElementsAre(2));
+  EXPECT_THAT(shop.adoption().lost, ElementsAre(FrameIndex(2)));
 }
 
 TEST(Adoption, WithoutHistoryFramesAreKeptByNumber) {
@@ -280,9 +280,9 @@ TEST(Adoption, AKeyChangesTheFramesThatItMoves) {
   other.camera.keys[2].position.x = 1;
   EXPECT_EQ(document_of(job).picture, document_of(other).picture);
   const FrameComparison comparison(document_of(job), document_of(other));
-  EXPECT_EQ(comparison.num_common_steps(), 5u);
-  EXPECT_FALSE(comparison.are_equal(5, 5));
-  EXPECT_EQ(comparison.difference(5, 5), "$.camera.keys at frame 6");
+  EXPECT_EQ(comparison.num_common_steps(), 5);
+  EXPECT_FALSE(comparison.are_equal(FrameIndex(5), FrameIndex(5)));
+  EXPECT_EQ(comparison.difference(FrameIndex(5), FrameIndex(5)), "$.camera.keys at frame 6");
 }
 
 TEST(Adoption, ACarriedHistoryBeginsWithTheFirstFrame) {

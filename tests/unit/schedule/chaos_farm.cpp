@@ -51,16 +51,14 @@ void ChaosFarm::change_job(JobSpec next) {
   old_reports_.clear();
 
   // Frames are files with numbers.
-  std::set<int> written;
+  std::set<FrameNumber> written;
   for (const Completion& done : completions_) {
     if (done.task.kind == TaskKind::assemble && !lost_frames_.contains(done.task))
-      written.insert(spec_.frames[static_cast<std::size_t>(done.task.step)]);
+      written.insert(spec_.frames[done.task.frame().index()]);
   }
   const KeptFiles files{
-      .has_frame =
-          [&](std::int32_t frame, const BlobRef&) {
-            return written.contains(next.frames[static_cast<std::size_t>(frame)]);
-          },
+      .has_frame = [&](FrameIndex frame,
+                       const BlobRef&) { return written.contains(next.frames[frame.index()]); },
       .has_blob = [&](const BlobRef& blob) { return store_.contains(blob.digest); }};
   const Adoption adoption = adopt(document_of(next), {former}, files);
   num_kept_frames_ += adoption.images.size();
@@ -72,7 +70,7 @@ void ChaosFarm::change_job(JobSpec next) {
     if (tasks.contains(done.task)) taken.push_back(done);
   }
   for (const BlobRef& image : adoption.images)
-    taken.push_back({{TaskKind::assemble, image.frame, 0}, {image}, {}, {}});
+    taken.push_back({assemble_task(image.frame()), {image}, {}, {}});
   for (const TaskKey& task : adoption.settled) taken.push_back({task, {}, {}, {}});
   spec_ = std::move(next);
   spec_.leading_runs = adoption.plan.leading_runs;
@@ -178,7 +176,7 @@ void ChaosFarm::on(const GrantLease& a) {
   const bool arrives = roll(20) > 0 && known_.contains(a.worker);
   Memory& memory = memory_[a.worker];
   if (arrives)
-    std::erase_if(memory, [&](const auto& s) { return s.second.held.frame < a.states_from; });
+    std::erase_if(memory, [&](const auto& s) { return s.second.held.step() < a.states_from; });
   for (const BlobRef& input : a.inputs) {
     EXPECT_TRUE(scheduler_->is_referenced(input.digest));
     if (input.is_held()) {
@@ -189,8 +187,7 @@ void ChaosFarm::on(const GrantLease& a) {
           << "granted with an input that was removed";
     }
   }
-  if (arrives)
-    held_[a.worker].emplace(a.lease, Held{a.inputs, a.frames, a.may_hold && roll(5) > 0});
+  if (arrives) held_[a.worker].emplace(a.lease, Held{a.inputs, a.steps, a.may_hold && roll(5) > 0});
 }
 
 /// Where no file and no coordinator is lost, a lost worker costs what it has made itself, and of
@@ -204,7 +201,7 @@ void ChaosFarm::check_own_loss(const RecordReopened& a) const {
     EXPECT_TRUE(std::any_of(
         makers.begin(), makers.end(),
         [&](const std::string& maker) { return a.gone == "what worker " + maker + " held"; }))
-        << a.gone << ": tile " << task.tile << " of run " << task.step
+        << a.gone << ": tile " << task.tile << " of run " << task.run().value()
         << " is lost with another worker";
     EXPECT_LE(++frames[task.tile], spec_.state.checkpoint_every);
   }

@@ -75,7 +75,7 @@ class ChaosFarm {
  private:
   struct Held {
     std::vector<BlobRef> inputs;
-    FrameSpan frames;
+    StepSpan steps;
     bool holds = false;  ///< the state that it makes
     bool published = false;
   };
@@ -266,12 +266,12 @@ class ChaosFarm {
 
   std::vector<BlobRef> outputs(const TaskKey& task, const Held& held) const {
     const Digest tiling = digest_of("tiles of " + std::to_string(spec_.image.tile_size));
-    std::vector<BlobRef> outputs = outputs_of_grant(spec_, tiling, task, held.inputs, held.frames);
+    std::vector<BlobRef> outputs = outputs_of_grant(spec_, tiling, task, held.inputs, held.steps);
     for (BlobRef& blob : outputs) {
       if (options_.alike && blob.kind == BlobKind::film)
-        blob.digest = digest_of("empty tile " + std::to_string((blob.frame + blob.tile) / 2));
+        blob.digest = digest_of("empty tile " + std::to_string((blob.position + blob.tile) / 2));
       if (held.holds && blob.kind == BlobKind::state) {
-        blob.digest = held_state_name(job_, blob.frame, blob.tile);
+        blob.digest = held_state_name(job_, blob.step(), blob.tile);
         blob.size_bytes = 0;
       }
     }

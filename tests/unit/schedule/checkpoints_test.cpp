@@ -33,7 +33,7 @@ class CheckpointFarm : public Farm {
       note(actions);
       const auto grants = all_of<GrantLease>(actions);
       if (grants.empty()) return {};
-      if (grants[0].lease.task.kind == TaskKind::render && grants[0].lease.task.step >= run)
+      if (grants[0].lease.task.kind == TaskKind::render && grants[0].lease.task.run() >= Run(run))
         return grants[0];
       note(finish(grants[0]));
     }
@@ -51,7 +51,7 @@ class CheckpointFarm : public Farm {
     for (const auto& record : all_of<RecordReopened>(actions)) again = record.tasks;
     return again;
   }
-  std::set<int> frames_of_states() const { return states_.frames(); }
+  std::set<int> steps_of_states() const { return states_.steps(); }
   const std::vector<Completion>& completions() const { return completions_; }
 
  private:
@@ -68,7 +68,7 @@ class CheckpointFarm : public Farm {
 int first_run(const std::vector<TaskKey>& tasks) {
   int first = kFrames;
   for (const TaskKey& task : tasks) {
-    if (task.kind == TaskKind::render) first = std::min(first, task.step);
+    if (task.kind == TaskKind::render) first = std::min(first, task.run().value());
   }
   return first;
 }
@@ -76,17 +76,17 @@ int first_run(const std::vector<TaskKey>& tasks) {
 TEST(Checkpoints, TwoCompleteOnesStayInMotion) {
   CheckpointFarm farm(in_motion());
   const GrantLease next = farm.work_until(23);
-  EXPECT_EQ(farm.frames_of_states(), (std::set<int>{14, 19, 22}));
+  EXPECT_EQ(farm.steps_of_states(), (std::set<int>{14, 19, 22}));
   farm.work_from(next);
   EXPECT_EQ(farm.status(), JobStatus::done);
-  EXPECT_EQ(farm.frames_of_states(), std::set<int>{kFrames - 1}) << "the result";
+  EXPECT_EQ(farm.steps_of_states(), std::set<int>{kFrames - 1}) << "the result";
 }
 
 // Where a pixel depends on itself alone, each tile has its own.
 TEST(Checkpoints, TwoOfEachTileStayAtRest) {
   CheckpointFarm farm(small_job(2, 40, kEvery));
   farm.work_until(5);
-  EXPECT_EQ(farm.frames_of_states(), (std::set<int>{19, 24}));
+  EXPECT_EQ(farm.steps_of_states(), (std::set<int>{19, 24}));
 }
 
 TEST(Checkpoints, ALostStateIsMadeFromTheNewestCheckpoint) {
@@ -115,7 +115,7 @@ TEST(Checkpoints, AnOlderOneThatIsGoneIsLetGo) {
   BlobRef gone;  // the state of run 14, tile 0
   for (const Completion& done : farm.completions()) {
     for (const BlobRef& blob : done.outputs) {
-      if (blob.kind == BlobKind::state && blob.frame == 14 && blob.tile == 0) gone = blob;
+      if (blob.kind == BlobKind::state && blob.step() == Step(14) && blob.tile == 0) gone = blob;
     }
   }
   const auto actions = again.step(JobAdded{.job = again.job,

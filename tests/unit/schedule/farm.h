@@ -25,7 +25,7 @@ inline JobSpec small_job(int tiles, int frames, int per_run, bool carry = true) 
   job.sampling.method = Method::sequential;
   job.image = {.width = 8 * tiles, .height = 8, .sites = 1, .tile_size = 8};
   job.frames.clear();
-  for (int i = 0; i < frames; ++i) job.frames.push_back(i + 1);
+  for (int i = 0; i < frames; ++i) job.frames.emplace_back(i + 1);
   job.state.carry = carry;
   job.state.checkpoint_every = per_run;
   return job;
@@ -49,7 +49,7 @@ inline JobSpec with_sweeps(JobSpec job, int sweeps, bool refinable = true) {
 /// The one right output of a task; `variant` makes another, wrong one.
 inline Digest blob_digest(const Digest& job, const BlobRef& blob, int variant = 0) {
   return digest_of(job.hex() + std::to_string(static_cast<int>(blob.kind)) + "/" +
-                   std::to_string(blob.frame) + "/" + std::to_string(blob.tile) + "/" +
+                   std::to_string(blob.position) + "/" + std::to_string(blob.tile) + "/" +
                    std::to_string(variant));
 }
 
@@ -57,17 +57,17 @@ inline std::vector<BlobRef> outputs_of(const JobSpec& spec, const Digest& job, c
                                        int variant = 0) {
   std::vector<BlobRef> outputs;
   if (task.kind == TaskKind::assemble) {
-    outputs.push_back({BlobKind::image, task.step, 0, {}, 100});
+    outputs.push_back({BlobKind::image, task.position, 0, {}, 100});
   } else if (task.kind == TaskKind::second_pass) {
-    outputs.push_back({BlobKind::film, task.step, task.tile, {}, 11});
+    outputs.push_back({BlobKind::film, task.position, task.tile, {}, 11});
   } else {
-    const TileRun run = tile_run(spec, task.tile, task.step);
-    for (int f = run.first_frame; f <= run.last_frame; ++f)
-      outputs.push_back({BlobKind::film, f, task.tile, {}, 10});
-    for (int f = run.first_frame; spec.visibility.correlated && f <= run.last_frame; ++f)
-      outputs.push_back({BlobKind::first_pass, f, task.tile, {}, 30});
+    const StepSpan steps = tile_run(spec, task.tile, task.run()).steps;
+    for (Step s = steps.first; s <= steps.last; ++s)
+      outputs.push_back({BlobKind::film, s.value(), task.tile, {}, 10});
+    for (Step s = steps.first; spec.visibility.correlated && s <= steps.last; ++s)
+      outputs.push_back({BlobKind::first_pass, s.value(), task.tile, {}, 30});
     if (carries_state(spec))
-      outputs.push_back({BlobKind::state, run.last_frame, task.tile, {}, 20});
+      outputs.push_back({BlobKind::state, steps.last.value(), task.tile, {}, 20});
   }
   const bool second = task.kind == TaskKind::second_pass;  // its film is another
   for (BlobRef& blob : outputs) blob.digest = blob_digest(job, blob, variant + (second ? 100 : 0));
@@ -78,10 +78,10 @@ inline std::vector<BlobRef> outputs_of(const JobSpec& spec, const Digest& job, c
 inline std::vector<BlobRef> outputs_of_grant(const JobSpec& spec, const Digest& job,
                                              const TaskKey& task,
                                              const std::vector<BlobRef>& inputs,
-                                             const FrameSpan& frames) {
+                                             const StepSpan& steps) {
   std::vector<BlobRef> outputs = outputs_of(spec, job, task);
   const bool is_cut =
-      task.kind == TaskKind::render && !inputs.empty() && inputs.front().frame == frames.last;
+      task.kind == TaskKind::render && !inputs.empty() && inputs.front().step() == steps.last;
   if (is_cut)
     std::erase_if(outputs, [](const BlobRef& blob) { return blob.kind != BlobKind::state; });
   return outputs;
@@ -111,32 +111,32 @@ std::vector<T> all_of(const std::vector<Action>& actions) {
   return result;
 }
 
-/// The states that are in the store, with their frames, as far as the actions tell.
+/// The states that are in the store, with their steps, as far as the actions tell.
 class StoredStates {
  public:
   void note(const std::vector<Action>& actions) {
     for (const RecordCompletion& done : all_of<RecordCompletion>(actions)) {
       for (const BlobRef& blob : done.completion.outputs) {
-        if (blob.kind == BlobKind::state && !blob.is_held()) frames_[blob.digest] = blob.frame;
+        if (blob.kind == BlobKind::state && !blob.is_held()) steps_[blob.digest] = blob.position;
       }
     }
     for (const RemoveBlobs& removed : all_of<RemoveBlobs>(actions)) {
-      for (const Digest& blob : removed.blobs) frames_.erase(blob);
+      for (const Digest& blob : removed.blobs) steps_.erase(blob);
     }
   }
-  std::size_t size() const { return frames_.size(); }
-  std::set<int> frames() const {
-    std::set<int> frames;
-    for (const auto& [digest, frame] : frames_) frames.insert(frame);
-    return frames;
+  std::size_t size() const { return steps_.size(); }
+  std::set<int> steps() const {
+    std::set<int> steps;
+    for (const auto& [digest, step] : steps_) steps.insert(step);
+    return steps;
   }
 
  private:
-  std::map<Digest, int> frames_;
+  std::map<Digest, int> steps_;
 };
 
-inline TaskKey render(int run, int tile) { return {TaskKind::render, run, tile}; }
-inline TaskKey assemble(int frame) { return {TaskKind::assemble, frame, 0}; }
+inline TaskKey render(int run, int tile) { return render_task(Run(run), tile); }
+inline TaskKey assemble(int frame) { return assemble_task(FrameIndex(frame)); }
 
 inline std::vector<TaskKey> tasks_of(const std::vector<GrantLease>& grants) {
   std::vector<TaskKey> tasks;

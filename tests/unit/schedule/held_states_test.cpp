@@ -14,7 +14,8 @@ std::vector<Action> finish_holding(Farm& farm, const GrantLease& grant) {
   std::vector<BlobRef> outputs = outputs_of(farm.spec(), farm.job, grant.lease.task);
   for (BlobRef& blob : outputs) {
     if (grant.may_hold && blob.kind == BlobKind::state)
-      blob = {blob.kind, blob.frame, blob.tile, held_state_name(farm.job, blob.frame, blob.tile)};
+      blob = {blob.kind, blob.position, blob.tile,
+              held_state_name(farm.job, blob.step(), blob.tile)};
   }
   return farm.step(TaskCompleted{grant.worker, grant.lease, outputs, {}});
 }
@@ -44,9 +45,10 @@ class HeldStatesTest : public testing::Test {
 };
 
 TEST_F(HeldStatesTest, OneWorkerHoldsAllButCheckpointsAndResults) {
-  std::map<std::int32_t, int> held;
+  std::map<std::int32_t, int> held;  // by run
   for (GrantLease grant = farm.ask_one("a"); grant.lease.attempt > 0; grant = farm.ask_one("a")) {
-    if (grant.lease.task.kind == TaskKind::render) held[grant.lease.task.step] += grant.may_hold;
+    if (grant.lease.task.kind == TaskKind::render)
+      held[grant.lease.task.run().value()] += grant.may_hold;
     finish(grant);
   }
   EXPECT_EQ(farm.status(), JobStatus::done);
@@ -71,7 +73,7 @@ TEST_F(HeldStatesTest, WhoHasNothingToDoMakesTheHolderPublish) {
     for (std::int32_t tile = 0; tile < 4; ++tile) {
       const BlobRef packed{state.kind, 0, tile, digest_of(std::to_string(tile)), 20};
       published.states.push_back(
-          {{state.kind, 0, tile, held_state_name(farm.job, 0, tile)}, packed});
+          {{state.kind, 0, tile, held_state_name(farm.job, Step(0), tile)}, packed});
     }
   }
   const auto after = farm.step(published);
@@ -85,7 +87,7 @@ TEST_F(HeldStatesTest, WhoHasNothingToDoMakesTheHolderPublish) {
 TEST_F(HeldStatesTest, NobodyElsePublishesThem) {
   render_first_frame();
   farm.step(WorkerJoined{"b", {}});
-  const BlobRef held{BlobKind::state, 0, 1, held_state_name(farm.job, 0, 1)};
+  const BlobRef held{BlobKind::state, 0, 1, held_state_name(farm.job, Step(0), 1)};
   const BlobRef packed{BlobKind::state, 0, 1, digest_of("1"), 20};
   for (const HeldPublished& event :
        {HeldPublished{"b", farm.job, {{held, packed}}},
@@ -106,7 +108,7 @@ TEST_F(HeldStatesTest, WithTheHolderTheyAreGone) {
 
 // The worker may have reported it once already, and dropped it since.
 TEST_F(HeldStatesTest, WhatWasGrantedBeforeARestartIsMadeAgain) {
-  const GrantLease before{"b", {farm.job, render(0, 0), 1, /*epoch=*/0}, {}, {}, true, 0, 0};
+  const GrantLease before{"b", {farm.job, render(0, 0), 1, /*epoch=*/0}, {}, {}, true, Step(0), 0};
   farm.step(WorkerJoined{"b", {before.lease}});
   EXPECT_TRUE(all_of<RecordCompletion>(finish(before)).empty());
   EXPECT_EQ(farm.ask_one("a").lease.task, render(0, 0));
@@ -155,7 +157,7 @@ TEST(HeldStates, WhoComesGetsAStripAndAsksForItsStatesFirst) {
   ASSERT_EQ(asked.size(), 1u);
   std::set<Digest> expected;  // eight tiles, and their neighbours
   for (std::int32_t tile = 9; tile <= 18; ++tile)
-    expected.insert(held_state_name(farm.job, 0, tile));
+    expected.insert(held_state_name(farm.job, Step(0), tile));
   EXPECT_EQ(std::set<Digest>(asked[0].states.begin(), asked[0].states.end()), expected);
 }
 
@@ -168,7 +170,7 @@ class BorderTest : public testing::Test {
   }
   /// The workers take turns until all renders of the run are done.
   void finish_run(int run) {
-    while (farm.scheduler.find_job(farm.job)->tasks.first_open_run() <= run) {
+    while (farm.scheduler.find_job(farm.job)->tasks.first_open_run().value() <= run) {
       for (const char* const worker : {"a", "b"}) {
         const GrantLease grant = farm.ask_one(worker);
         if (grant.lease.attempt > 0) states.note(finish_holding(farm, grant));

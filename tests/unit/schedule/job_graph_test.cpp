@@ -21,10 +21,10 @@ TEST(JobGraph, IndexAndKeyAreInverse) {
 
 TEST(JobGraph, UnknownKeysAreNotFound) {
   const JobGraph graph(small_job(3, 5, 2));
-  EXPECT_FALSE(graph.find({TaskKind::render, 3, 0}));
-  EXPECT_FALSE(graph.find({TaskKind::render, 0, 3}));
-  EXPECT_FALSE(graph.find({TaskKind::render, -1, 0}));
-  EXPECT_FALSE(graph.find({TaskKind::assemble, 5, 0}));
+  EXPECT_FALSE(graph.find(render(3, 0)));
+  EXPECT_FALSE(graph.find(render(0, 3)));
+  EXPECT_FALSE(graph.find(render(-1, 0)));
+  EXPECT_FALSE(graph.find(assemble(5)));
   EXPECT_FALSE(graph.find({TaskKind::assemble, 0, 1}));
 }
 
@@ -50,8 +50,8 @@ TEST(JobGraph, InputsAndDependentsMirrorEachOther) {
 TEST(JobGraph, ALaterSweepTakesTheFilmsOfTheOneBefore) {
   const JobGraph graph(with_sweeps(small_job(3, 5, 2), 2));
   EXPECT_EQ(graph.num_tasks(), 5 + 6 * 3);
-  EXPECT_EQ(graph.first_frame(3), 5);
-  EXPECT_EQ(graph.last_frame(4), 8);
+  EXPECT_EQ(graph.steps(render(3, 0)), (StepSpan{Step(5), Step(6)}));
+  EXPECT_EQ(graph.steps(render(4, 0)), (StepSpan{Step(7), Step(8)}));
   const auto keys = [&](const std::vector<TaskIndex>& tasks) {
     std::vector<TaskKey> result;
     for (const TaskIndex task : tasks) result.push_back(graph.key(task));
@@ -79,7 +79,7 @@ TEST(JobGraph, WhereThingsMoveATileNeedsItsNeighboursInReach) {
   const auto tiles = [](const JobGraph& graph, const TaskKey& task) {
     std::vector<std::int32_t> result;
     for (const TaskIndex input : graph.inputs(task)) {
-      EXPECT_EQ(graph.key(input).step, task.step - 1);
+      EXPECT_EQ(graph.key(input).run() + 1, task.run());
       result.push_back(graph.key(input).tile);
     }
     return result;
@@ -125,24 +125,24 @@ TEST(JobGraph, SecondPassStandsBetweenRenderAndAssembly) {
       }
     }
     // The corner tile looks at the four tiles around it, the middle one at all six.
-    EXPECT_EQ(graph.num_inputs({TaskKind::second_pass, 2, 0}), 4);
-    EXPECT_EQ(graph.num_inputs({TaskKind::second_pass, 2, 1}), 6);
+    EXPECT_EQ(graph.num_inputs(second_pass_task(Step(2), 0)), 4);
+    EXPECT_EQ(graph.num_inputs(second_pass_task(Step(2), 1)), 6);
   }
-  EXPECT_FALSE(JobGraph(small_job(3, 3, 2)).find({TaskKind::second_pass, 0, 0}));
+  EXPECT_FALSE(JobGraph(small_job(3, 3, 2)).find(second_pass_task(Step(0), 0)));
 }
 
 TEST(JobGraph, OutputsMustBeExactlyWhatTheTaskMakes) {
   const JobSpec spec = small_job(3, 5, 2);
   const JobGraph graph(spec);
-  const TaskKey task{TaskKind::render, 1, 2};
+  const TaskKey task = render(1, 2);
   const std::vector<BlobRef> right = outputs_of(spec, {}, task);
   ASSERT_EQ(right.size(), 3u);
 
   std::vector<BlobRef> outputs = right;
   EXPECT_FALSE(graph.check_outputs(task, outputs));
   EXPECT_EQ(outputs.front().kind, BlobKind::state);
-  EXPECT_EQ(graph.taken_outputs({TaskKind::assemble, 3, 0}, task), std::vector<std::size_t>{2});
-  EXPECT_EQ(outputs[2].frame, 3);
+  EXPECT_EQ(graph.taken_outputs(assemble(3), task), std::vector<std::size_t>{2});
+  EXPECT_EQ(outputs[2].step(), Step(3));
 
   outputs = {right[0], right[2]};
   EXPECT_EQ(graph.check_outputs(task, outputs),
@@ -169,7 +169,7 @@ TEST(JobGraph, StatisticsMustBeOfTheTasksOwnFramesAndTile) {
   EXPECT_FALSE(graph.check_frames(assemble(2), {{2, 0, {}}})) << "what was seen of the frame";
   EXPECT_TRUE(graph.check_frames(assemble(2), {{3, 0, {}}})) << "another frame";
   EXPECT_TRUE(graph.check_frames(assemble(2), {{2, 0, {}}, {2, 0, {}}})) << "twice";
-  EXPECT_TRUE(graph.check_frames({TaskKind::second_pass, 2, 1}, {{2, 1, {}}}));
+  EXPECT_TRUE(graph.check_frames(second_pass_task(Step(2), 1), {{2, 1, {}}}));
 }
 
 TEST(BlobReferences, ASharedBlobIsGarbageWhenItsLastUserLetsGo) {

@@ -19,7 +19,7 @@ JobSpec changed(JobSpec job, std::uint32_t how) {
   }
   const std::uint32_t frames = 3 + how * 5 % 12;
   job.frames.clear();
-  for (std::uint32_t i = 0; i < frames; ++i) job.frames.push_back(static_cast<int>(i) + 1);
+  for (std::uint32_t i = 0; i < frames; ++i) job.frames.emplace_back(static_cast<int>(i) + 1);
   if (how % 3 == 0) job.image.tile_size = job.image.tile_size == 8 ? 12 : 8;
   if (how % 2 == 0) job.state.checkpoint_every = 1 + static_cast<int>(how % 5);
   job.state.keep = how % 7 == 0 ? StateKeep::all : StateKeep::last;

@@ -24,7 +24,7 @@ TEST_F(SchedulerTest, NextRunGetsTheStateOfThePreviousOne) {
   ASSERT_THAT(tasks_of(grants), ElementsAre(render(0, 1), render(1, 0)));
   ASSERT_THAT(grants[1].inputs, SizeIs(1));
   EXPECT_EQ(grants[1].inputs[0].kind, BlobKind::state);
-  EXPECT_EQ(grants[1].inputs[0].frame, 1);
+  EXPECT_EQ(grants[1].inputs[0].step(), Step(1));
   EXPECT_EQ(grants[1].inputs[0].digest, blob_digest(farm.job, grants[1].inputs[0]));
 }
 
@@ -37,7 +37,7 @@ TEST_F(SchedulerTest, FramesComeFirstAndGetOneFilmPerTile) {
   ASSERT_THAT(next[1].inputs, SizeIs(2));
   for (int tile = 0; tile < 2; ++tile) {
     EXPECT_EQ(next[1].inputs[tile].kind, BlobKind::film);
-    EXPECT_EQ(next[1].inputs[tile].frame, 1);
+    EXPECT_EQ(next[1].inputs[tile].step(), Step(1));
     EXPECT_EQ(next[1].inputs[tile].tile, tile);
   }
 }

@@ -158,7 +158,7 @@ TEST(StoreLimit, HeldStatesStayWhereTheyAreWhileTheStoreIsFull) {
       EXPECT_TRUE(grant.may_hold);
       for (BlobRef& blob : made) {
         if (blob.kind != BlobKind::state) continue;
-        blob.digest = held_state_name(farm.job, blob.frame, blob.tile);
+        blob.digest = held_state_name(farm.job, blob.step(), blob.tile);
         blob.size_bytes = 0;
       }
       farm.step(TaskCompleted{"a", grant.lease, made, {}});

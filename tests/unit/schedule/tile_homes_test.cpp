@@ -30,7 +30,7 @@ class TileHomesTest : public testing::Test {
   TileHomesTest() { homes.share_out({"a", "b"}); }
   /// The tile that one of "a" and "b" gets.
   std::int32_t choice(const std::string& worker, const std::set<TaskIndex>& ready) const {
-    const std::optional<TaskIndex> task = homes.choose(graph, ready, 9, worker, kAny);
+    const std::optional<TaskIndex> task = homes.choose(graph, ready, baton::Run(9), worker, kAny);
     return task ? graph.key(*task).tile : -1;
   }
   std::set<TaskIndex> tiles(std::int32_t run, std::initializer_list<std::int32_t> which) const {
@@ -106,7 +106,7 @@ TEST_F(TileHomesTest, ATileIsSurroundedWhereAllThatReadItsStateAreAtHomeWithTheS
 TEST_F(TileHomesTest, AssemblyComesBeforeAllTiles) {
   std::set<TaskIndex> ready = tiles(0, {0});
   ready.insert(*graph.find(assemble(0)));
-  const auto task = homes.choose(graph, ready, 9, "a", kAny);
+  const auto task = homes.choose(graph, ready, baton::Run(9), "a", kAny);
   EXPECT_EQ(graph.key(*task), assemble(0));
 }
 
@@ -142,7 +142,7 @@ Played play(const JobSpec& job, double speed) {
       }
       if (renders) {
         played.most_ahead =
-            std::max(played.most_ahead, graph.last_frame(grant.lease.task.step) + 1 -
+            std::max(played.most_ahead, graph.steps(grant.lease.task).last.value() + 1 -
                                             static_cast<std::int32_t>(farm.progress().frames_done));
       }
     }
@@ -199,7 +199,7 @@ TEST(FramesAhead, AreBoundedByTheirFilms) {
   std::int32_t last_run = 0;
   for (std::vector<GrantLease> grants = farm.ask("a", 1); !grants.empty();
        grants = farm.ask("a", 1)) {
-    last_run = std::max(last_run, grants[0].lease.task.step);
+    last_run = std::max(last_run, grants[0].lease.task.run().value());
     farm.finish(grants[0]);
   }
   const auto film_bytes = static_cast<double>(estimate_job(job).film_bytes);

@@ -96,22 +96,21 @@ class FakeWorker {
     TaskDone done{lease, {}, {}};
     done.stats.pixels = 1;
     if (lease.task.kind == TaskKind::assemble) {
-      const int number = job_.frames[static_cast<std::size_t>(lease.task.step)];
-      const fs::path path =
-          fs::path(job_.output.directory) / frame_file_name(job_.output.pattern, number);
+      const fs::path path = frame_path(job_, lease.task.frame());
       const std::string image = "image of seed " + std::to_string(job_.seed);
       EXPECT_TRUE(write_file_atomic(path, as_bytes_view(image)).ok());
-      done.outputs.push_back({BlobKind::image, lease.task.step, 0, digest_of(image), image.size()});
+      done.outputs.push_back(
+          {BlobKind::image, lease.task.position, 0, digest_of(image), image.size()});
       return done;
     }
-    const TileRun run = tile_run(job_, lease.task.tile, lease.task.step);
-    for (int frame = run.first_frame; frame <= run.last_frame; ++frame) {
-      done.outputs.push_back(blob(BlobKind::film, frame, run.tile));
-      done.frames.push_back({frame, run.tile, {}});
+    const TileRun run = tile_run(job_, lease.task.tile, lease.task.run());
+    for (Step step = run.steps.first; step <= run.steps.last; ++step) {
+      done.outputs.push_back(blob(BlobKind::film, step, run.tile));
+      done.frames.push_back({step.value(), run.tile, {}});
       done.frames.back().sampling.pixels_carried = static_cast<std::uint64_t>(10 + run.tile);
     }
     if (carries_state(job_))
-      done.outputs.push_back(blob(BlobKind::state, run.last_frame, run.tile));
+      done.outputs.push_back(blob(BlobKind::state, run.steps.last, run.tile));
     return done;
   }
 
@@ -124,10 +123,10 @@ class FakeWorker {
   }
 
  private:
-  BlobRef blob(BlobKind kind, int frame, int tile) {
-    const std::string text = std::to_string(static_cast<int>(kind)) + " " + std::to_string(frame) +
-                             " " + std::to_string(tile);
-    return {kind, frame, tile, store_.put(as_bytes_view(text)).value(), text.size()};
+  BlobRef blob(BlobKind kind, Step step, int tile) {
+    const std::string text = std::to_string(static_cast<int>(kind)) + " " +
+                             std::to_string(step.value()) + " " + std::to_string(tile);
+    return {kind, step.value(), tile, store_.put(as_bytes_view(text)).value(), text.size()};
   }
 
   WorkerChannel channel_;
@@ -151,7 +150,7 @@ struct ServiceTest : testing::Test {
     ASSERT_TRUE(write_file_atomic(folder / "sky.hdr", as_bytes_view("sky")).ok());
     job.name = "test";
     job.sampling.method = Method::sequential;
-    job.frames = {1, 2, 3, 4};
+    for (int frame = 2; frame <= 4; ++frame) job.frames.emplace_back(frame);
     job.image = {.width = 16, .height = 8, .sites = 1, .tile_size = 8};
     job.scene.materials["grey"] = {};
     job.scene.ground = GroundSpec{.material = "grey"};

@@ -83,7 +83,8 @@ TEST_F(ServiceTest, ADoneJobShowsWhatItDidAndKeepsItsStates) {
   const JobDetail detail = show(service.endpoint(), id);
   EXPECT_EQ(detail.summary.status, JobStatus::done);
   EXPECT_EQ(detail.summary.stats.pixels, static_cast<std::uint64_t>(kNumTasks));
-  EXPECT_THAT(detail.frames_done, testing::ElementsAre(1, 2, 3, 4));
+  EXPECT_THAT(detail.frames_done,
+              testing::ElementsAre(FrameNumber(1), FrameNumber(2), FrameNumber(3), FrameNumber(4)));
   EXPECT_THAT(detail.frames, SizeIs(4));
   EXPECT_THAT(detail.notes, notes);
   EXPECT_EQ(num_blobs(store()), 2u) << "a state of each tile";
@@ -102,7 +103,7 @@ TEST_F(ServiceTest, MoreFramesGoOnFromTheStatesOfADoneJob) {
     worker.say(WorkerGoodbye{});
   }
   JobSpec longer = job;
-  longer.frames = {1, 2, 3, 4, 5, 6};
+  for (const int frame : {5, 6}) longer.frames.emplace_back(frame);
   const auto accepted =
       ask<JobAccepted>(service.endpoint(), SubmitJob{make_job_document(longer).value()});
   EXPECT_EQ(accepted.plan,
@@ -113,10 +114,9 @@ TEST_F(ServiceTest, MoreFramesGoOnFromTheStatesOfADoneJob) {
   for (int i = 0; i < 2; ++i) {
     worker.say(LeaseRequest{1});
     const LeaseGrant grant = worker.expect<LeaseGrant>();
-    EXPECT_EQ(grant.first_frame, 4);
-    EXPECT_EQ(grant.last_frame, 5);
+    EXPECT_EQ(grant.steps, (StepSpan{Step(4), Step(5)}));
     ASSERT_FALSE(grant.inputs.empty());
-    EXPECT_EQ(grant.inputs.front().frame, 3);
+    EXPECT_EQ(grant.inputs.front().step(), Step(3));
     worker.say(worker.work(grant.lease));
   }
   for (int i = 0; i < 2; ++i) worker.do_one_task();

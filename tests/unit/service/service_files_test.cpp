@@ -38,7 +38,7 @@ TEST_F(ServiceTest, ADoneJobOfWhichAFrameIsGoneOrCutMakesThatFrameAgain) {
     }
     EXPECT_FALSE(ask<JobAccepted>(service.endpoint(), SubmitJob{document}).already_there);
     const JobDetail detail = show(service.endpoint(), id);
-    EXPECT_THAT(detail.frames_done, ElementsAre(1, 2, 4));
+    EXPECT_THAT(detail.frames_done, ElementsAre(FrameNumber(1), FrameNumber(2), FrameNumber(4)));
     EXPECT_EQ(detail.summary.tasks_done, 3u);
   }
 }
@@ -80,7 +80,7 @@ TEST_F(ServiceTest, AnOutputFolderBelongsToOneJob) {
 
   // Nobody else writes into the folder meanwhile, not even other frames.
   JobSpec later = other;
-  later.frames = {5, 6};
+  later.frames = {FrameNumber(5), FrameNumber(6)};
   const std::string others = make_job_document(later).value();
   EXPECT_THAT(refused(service.endpoint(), SubmitJob{others}).message, HasSubstr("writes into"));
   const auto open = ask<JobList>(service.endpoint(), ListJobs{}).jobs;

@@ -68,7 +68,7 @@ TEST_F(ServiceStoreTest, AStartRemovesWhatNoJobNeedsAndNothingElse) {
     EXPECT_EQ(num_blobs(), 2u);
     EXPECT_FALSE(fs::exists(young)) << "it has grown old";
     JobSpec longer = job;
-    longer.frames.push_back(5);
+    longer.frames.emplace_back(5);
     const auto accepted =
         ask<JobAccepted>(service.endpoint(), SubmitJob{make_job_document(longer).value()});
     EXPECT_THAT(accepted.plan, HasSubstr("going on from the states of frame 4"));

@@ -46,12 +46,13 @@ TEST_F(ServiceTest, AJobGoesFromSubmissionToItsLastFrame) {
   EXPECT_EQ(detail.summary.status, JobStatus::done);
   EXPECT_EQ(detail.summary.tasks_done, 8u);
   EXPECT_EQ(detail.summary.stats.pixels, 8u);
-  EXPECT_THAT(detail.frames_done, ElementsAre(1, 2, 3, 4));
+  EXPECT_THAT(detail.frames_done,
+              ElementsAre(FrameNumber(1), FrameNumber(2), FrameNumber(3), FrameNumber(4)));
   EXPECT_EQ(count_blobs(store()), 2u) << "the last states are kept, all else is gone";
 
   // What the sampler did: frame by frame in the answer, tile by tile in the file.
   ASSERT_THAT(detail.frames, SizeIs(4));
-  EXPECT_EQ(detail.frames[3].frame, 4);
+  EXPECT_EQ(detail.frames[3].frame, FrameNumber(4));
   EXPECT_EQ(detail.frames[3].sampling.pixels_carried, 10u + 11u);
   const Result<std::string> csv = read_text_file(folder / "out/diagnostics.csv", 1 << 20);
   ASSERT_TRUE(csv.ok());

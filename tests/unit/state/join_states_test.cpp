@@ -11,7 +11,7 @@ namespace {
 SampleState state_of(const PixelRect& rect, std::int32_t tile) {
   SampleState state;
   state.picture = {1, 2};
-  state.frame_index = 3;
+  state.step = Step(3);
   state.tile = tile;
   state.resize(rect, 4, 2);
   state.add_memory();
@@ -54,7 +54,7 @@ TEST(JoinStates, PartsThatDoNotFitAreRefused) {
   SampleState b = state_of({5, 0, 7, 4}, 1);
   EXPECT_THAT(join_states(std::array{&a}, {0, 0, 6, 4}, 9).error().message,
               testing::HasSubstr("they cover 20 of 24 pixels"));
-  b.frame_index = 4;
+  b.step = Step(4);
   EXPECT_THAT(
       join_states(std::array<const SampleState*, 2>{&a, &b}, {0, 0, 7, 4}, 9).error().message,
       testing::HasSubstr("another picture, frame or layout"));

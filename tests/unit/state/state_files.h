@@ -16,7 +16,7 @@ inline constexpr SectionTag kMagic{'B', 'S', 'T', '1'};
 inline SampleState tiny_state() {
   SampleState state;
   state.picture = {0x0011223344556677ull, 0x8899aabbccddeeffull};
-  state.frame_index = 5;
+  state.step = Step(5);
   state.tile = 7;
   state.resize({10, 20, 12, 21}, 2);
   state.source[1] = PixelSource::carried;

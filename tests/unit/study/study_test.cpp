@@ -7,6 +7,7 @@
 #include <cmath>
 #include <fstream>
 
+#include "common/job/frame_range.h"
 #include "jobs/study/run_record.h"
 
 namespace baton {
@@ -64,7 +65,7 @@ TEST_F(StudyTest, EveryCombinationIsAJob) {
   EXPECT_EQ(small.job.sampling.method, Method::mis);
   EXPECT_EQ(small.job.sampling.num_particles, 4);
   EXPECT_EQ(small.job.sampling.num_candidates, 64);
-  EXPECT_THAT(small.job.frames, ElementsAre(1, 2, 3, 4));
+  EXPECT_EQ(format_frames(small.job.frames), "1-4");
   const StudyCell& more = study->cells[5];
   EXPECT_EQ(more.scene, 1u);
   EXPECT_EQ(more.budget, "more");
@@ -77,7 +78,7 @@ TEST_F(StudyTest, ReferencesAreTwoHalvesOfTheMeasuredFrames) {
   const Result<Study> study = parse(kStudy);
   ASSERT_TRUE(study) << study.error().message;
   const StudyScene& scene = study->scenes[1];
-  EXPECT_THAT(scene.frames, ElementsAre(3, 4));
+  EXPECT_EQ(format_frames(scene.frames), "3-4");
   EXPECT_THAT(scene.crop, ElementsAre(1, 2, 3, 4));
   EXPECT_EQ(scene.reference[0].sampling.method, Method::reference);
   EXPECT_EQ(scene.reference[0].sampling.reference_samples, 64);
@@ -160,8 +161,10 @@ TEST_F(StudyTest, RecordsKeepEveryNumber) {
                    .seconds_visibility = 0.5,
                    .seconds_shade = 0.6,
                    .seconds_second_pass = 0.7};
-  record.frames.push_back(
-      {.frame = 4, .mse = 0.1 + 0.2, .flicker = kNotMeasured, .block_mse = {0.1, 0.2}});
+  record.frames.push_back({.frame = FrameNumber(4),
+                           .mse = 0.1 + 0.2,
+                           .flicker = kNotMeasured,
+                           .block_mse = {0.1, 0.2}});
   ASSERT_TRUE(write_record(folder_ / "r.json", record));
   const std::optional<RunRecord> read = read_record(folder_ / "r.json");
   ASSERT_TRUE(read);

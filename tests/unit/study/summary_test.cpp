@@ -4,6 +4,7 @@
 
 #include <cmath>
 
+#include "common/job/frame_range.h"
 #include "common/math/philox.h"
 #include "jobs/study/auto_table.h"
 #include "jobs/study/chart_axis.h"
@@ -70,14 +71,14 @@ std::vector<RunRecord> runs(const std::vector<double>& mse, double cpu_us) {
     record.counts.rays_shadow = 16000;
     record.counts.seconds_sample = 1000 * cpu_us * 1e-6;
     record.counts.seconds_light = 0.002;
-    record.frames.push_back({.frame = 1, .mse = value});
+    record.frames.push_back({.frame = FrameNumber(1), .mse = value});
   }
   return records;
 }
 
 Study two_methods() {
   Study study;
-  study.scenes.push_back({.name = "s", .reference = {}, .frames = {1}});
+  study.scenes.push_back({.name = "s", .reference = {}, .frames = {FrameNumber(1)}});
   study.methods = {"mis", "other"};
   study.cells = {{0, 0, "16", {}}, {0, 1, "16", {}}};
   study.cells[0].job.sampling.method = Method::mis;
@@ -166,14 +167,14 @@ TEST(Verdict, NamesWhatItsReferenceCannotJudge) {
 
 TEST(Summary, LagCountsFramesFromTheCut) {
   StudyScene scene;
-  scene.frames = {1, 2, 3, 4, 5, 6, 7};
+  scene.frames = parse_frames("1-7").value();
   std::vector<RunRecord> records(1);
   for (const double mse : {1.0, 1.0, 9.0, 4.0, 2.0, 2.0, 2.0})
-    records[0].frames.push_back({.frame = 0, .mse = mse});
+    records[0].frames.push_back({.frame = FrameNumber(0), .mse = mse});
   EXPECT_TRUE(std::isnan(lag_after_cut(scene, records)));
-  scene.cut_frame = 3;
+  scene.cut_frame = FrameNumber(3);
   EXPECT_EQ(lag_after_cut(scene, records), 2);
-  scene.cut_frame = 5;
+  scene.cut_frame = FrameNumber(5);
   EXPECT_EQ(lag_after_cut(scene, records), 0);
 }
 

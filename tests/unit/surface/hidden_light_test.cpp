@@ -15,7 +15,7 @@ namespace {
 HiddenCone hidden(const JobSpec& job, int frame = 1) {
   const auto scene = load_scene(job);
   EXPECT_TRUE(scene.ok());
-  return HiddenLight(job, *scene).at(frame);
+  return HiddenLight(job, *scene).at(FrameNumber(frame));
 }
 
 /// Whether a ray ends on the ground.
@@ -34,7 +34,7 @@ TEST(HiddenLight, EndsOnTheGroundFromEveryPointAndNotFarBeyond) {
   JobSpec job = test::box_job();
   job.scene.ground->size = 9;
   const auto scene = load_scene(job);
-  const HiddenCone cone = HiddenLight(job, *scene).at(1);
+  const HiddenCone cone = HiddenLight(job, *scene).at(FrameNumber(1));
   EXPECT_EQ(cone.axis, (std::array<float, 3>{0, -1, 0}));
   ASSERT_GT(cone.angle, 1);
   int missed = 0;
@@ -92,7 +92,7 @@ TEST(HiddenLight, TurnsWithTheMap) {
   job.environment.rotation_start_deg = 90;
   const HiddenCone tilted = hidden(job);
   EXPECT_EQ(tilted.angle, angle);
-  const Vec3 down = environment_at(job.environment, 7).rotation *
+  const Vec3 down = environment_at(job.environment, FrameNumber(7)).rotation *
                     Vec3{tilted.axis[0], tilted.axis[1], tilted.axis[2]};
   EXPECT_NEAR(down.y, -1, 1e-6f);
 

@@ -10,13 +10,13 @@ namespace {
 /// Whether the pixel starts afresh in this frame. A pixel's turn comes every `refresh_every`
 /// frames; the turns are spread over the image and over the frames but the second, in which every
 /// pixel has just begun.
-bool is_refresh_turn(const RngKey& key, std::int32_t frame_index, std::int32_t refresh_every) {
+bool is_refresh_turn(const RngKey& key, std::int32_t rounds_before, std::int32_t refresh_every) {
   if (refresh_every == 0) return false;
-  if (refresh_every <= 2) return frame_index % refresh_every == 0;
+  if (refresh_every <= 2) return rounds_before % refresh_every == 0;
   const Rng rng({.job_seed = key.job_seed, .frame = 0, .pixel = key.pixel}, PassId::refresh);
   const auto turn =
       static_cast<std::int32_t>(rng.bits(0, 0)[0] % static_cast<std::uint32_t>(refresh_every - 1));
-  return (frame_index - 2 - turn) % refresh_every == 0;
+  return (rounds_before - 2 - turn) % refresh_every == 0;
 }
 
 }  // namespace
@@ -28,7 +28,7 @@ bool SequentialSampler::has_wandered(float lns, float lns_fresh) const {
 PixelDiagnostics SequentialSampler::sample(const PixelInput& input, SamplerScratch& scratch,
                                            const PixelSamples& samples) const {
   if (!input.has_history) return start_->sample(input, scratch, samples);
-  if (is_refresh_turn(input.key, input.frame_index, refresh_every_)) {
+  if (is_refresh_turn(input.key, input.rounds_before, refresh_every_)) {
     const PixelDiagnostics diagnostics = start_->sample(input, scratch, samples);
     samples.source = PixelSource::refreshed;
     return diagnostics;

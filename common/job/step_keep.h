@@ -9,32 +9,33 @@
 #include <vector>
 
 #include "common/base/memory_share.h"
+#include "common/job/time.h"
 
 namespace baton {
 
-/// Values of frames, by key, that stay until their frame is released, as far as a share of memory
-/// has room: what does not fit is not kept. Nothing is pushed out by what comes later: frames ask
-/// for the values of the frame before in the order in which they came, so what came first is needed
-/// first. Any number of threads. Key: ordered.
+/// Values of steps, by key, that stay until their step is released, as far as a share of memory has
+/// room: what does not fit is not kept. Nothing is pushed out by what comes later: steps need the
+/// values of the step before in the order in which they came, so what came first is needed first.
+/// Any number of threads. Key: ordered.
 template <class Key, class Value>
-class FrameKeep {
+class StepKeep {
  public:
   using ValuePtr = std::shared_ptr<const Value>;
 
-  explicit FrameKeep(MemorySharePtr share) : share_(std::move(share)) {}
-  FrameKeep(const FrameKeep&) = delete;
-  FrameKeep& operator=(const FrameKeep&) = delete;
-  ~FrameKeep() { clear(); }
+  explicit StepKeep(MemorySharePtr share) : share_(std::move(share)) {}
+  StepKeep(const StepKeep&) = delete;
+  StepKeep& operator=(const StepKeep&) = delete;
+  ~StepKeep() { clear(); }
 
-  /// Keeps the value of a frame (0-based), which has a size_bytes(); where there is one of this
+  /// Keeps the value of a step, which has a size_bytes(); where there is one of this
   /// key, that one stays. False: there is no room.
-  bool keep(const Key& key, std::int32_t frame, ValuePtr value) {
+  bool keep(const Key& key, Step step, ValuePtr value) {
     const std::lock_guard lock(mutex_);
     if (entries_.contains(key)) return true;
     const std::size_t size = value->size_bytes();
     if (!share_->take(size)) return false;
     size_ += size;
-    entries_.emplace(key, Entry{frame, size, std::move(value)});
+    entries_.emplace(key, Entry{step, size, std::move(value)});
     return true;
   }
   /// Null: not here.
@@ -43,9 +44,9 @@ class FrameKeep {
     const auto found = entries_.find(key);
     return found == entries_.end() ? nullptr : found->second.value;
   }
-  /// Forgets the values of frames before this one.
-  void release_before(std::int32_t frame) {
-    release_if([frame](const Entry& entry) { return entry.frame < frame; });
+  /// Forgets the values of steps before this one.
+  void release_before(Step step) {
+    release_if([step](const Entry& entry) { return entry.step < step; });
   }
   void clear() {
     release_if([](const Entry&) { return true; });
@@ -65,7 +66,7 @@ class FrameKeep {
 
  private:
   struct Entry {
-    std::int32_t frame = 0;
+    Step step{};
     std::size_t size = 0;
     ValuePtr value;
   };

@@ -1,0 +1,39 @@
+#include "coordinator/service/job_report.h"
+
+#include <gmock/gmock.h>
+
+#include "tests/unit/schedule/farm.h"
+
+namespace baton {
+namespace {
+
+using namespace testing_farm;
+
+std::string report_of(const JobSpec& spec, const TaskKey& task) {
+  Farm farm(spec);
+  farm.submit();
+  const Failure failure{{farm.job, task, 1, 1}, "w", "boom"};
+  const JobDetail detail = describe_job(farm.scheduler, farm.job, {failure});
+  return detail.failures.empty() ? std::string() : detail.failures.front();
+}
+
+TEST(JobReport, AFailureIsToldWithTheFramesOfItsTask) {
+  JobSpec job = small_job(2, 4, 2);
+  for (FrameNumber& frame : job.frames) frame = frame + 1000;
+  EXPECT_EQ(report_of(job, render(1, 1)), "frames 1003-1004, tile 1 on w: boom");
+  EXPECT_EQ(report_of(job, assemble(3)), "frame 1004 on w: boom");
+  EXPECT_EQ(report_of(job, render(9, 1)), "boom") << "no such task";
+  job.visibility.correlated = true;
+  EXPECT_EQ(report_of(job, second_pass_task(Step(2), 0)),
+            "frame 1003, tile 0, second pass on w: boom");
+}
+
+// Runs 0 and 1 are the first sweep, 2 and 3 the second.
+TEST(JobReport, ATaskOfALaterSweepStandsAtTheSameFrames) {
+  const JobSpec job = with_sweeps(small_job(2, 4, 2), 3);
+  EXPECT_EQ(report_of(job, render(3, 0)), "frames 3-4, tile 0 on w: boom");
+  EXPECT_EQ(report_of(job, render(4, 0)), "frames 1-2, tile 0 on w: boom");
+}
+
+}  // namespace
+}  // namespace baton
