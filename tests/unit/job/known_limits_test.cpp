@@ -29,7 +29,7 @@ const MaterialSpec kChrome{
     .kind = MaterialKind::metallic_roughness, .metallic = 1, .roughness = 0.1f};
 
 TEST(KnownLimits, AreTheVerdictsOfTheStabilitySuite) {
-  std::ifstream file(std::string(BATON_SOURCE_DIR) + "/tests/stability/expected.csv");
+  std::ifstream file(std::string(BATON_SOURCE_DIR) + "/jobs/lab/stability/expected.csv");
   std::map<std::string, std::string> verdicts;
   std::string test_case, subject, full, rest;
   while (std::getline(file, test_case, ',') && std::getline(file, subject, ',') &&
