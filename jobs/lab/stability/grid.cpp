@@ -3,7 +3,9 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <set>
 #include <sstream>
+#include <utility>
 
 #include "common/base/files.h"
 
@@ -11,10 +13,38 @@ namespace baton::stability {
 namespace {
 
 constexpr std::uint64_t kMaxTableBytes = 1 << 20;
-constexpr const char* kHeader = "case,subject,full,quick";
 
-std::string key_of(const std::string& case_name, const std::string& subject) {
-  return case_name + "," + subject;
+/// The columns of grid.csv that are numbers of a summary.
+constexpr std::pair<const char*, double Numbers::*> kColumns[] = {
+    {"negative", &Numbers::negative},
+    {"bias", &Numbers::bias},
+    {"bias_interval", &Numbers::bias_interval},
+    {"lns_mean", &Numbers::lns_mean},
+    {"lns_mean_interval", &Numbers::lns_mean_interval},
+    {"lns_median", &Numbers::lns_median},
+    {"noise", &Numbers::noise},
+    {"noise_after", &Numbers::noise_after},
+    {"p999", &Numbers::tail},
+    {"lost", &Numbers::lost},
+    {"growth", &Numbers::growth},
+    {"flicker", &Numbers::flicker},
+    {"ess", &Numbers::ess},
+    {"acceptance", &Numbers::acceptance},
+    {"restarted", &Numbers::restarted},
+    {"refreshed", &Numbers::refreshed},
+    {"resampled", &Numbers::resampled},
+};
+
+/// The parts of a line between commas.
+std::vector<std::string> parts_of(const std::string& line, char separator = ',') {
+  std::vector<std::string> parts{""};
+  for (const char c : line) {
+    if (c == separator)
+      parts.emplace_back();
+    else
+      parts.back() += c;
+  }
+  return parts;
 }
 
 Status write_text(const std::filesystem::path& path, const std::string& text) {
@@ -65,42 +95,54 @@ Result<Expectations> Expectations::read(const std::filesystem::path& path) {
   BATON_ASSIGN(const std::string text, read_text_file(path, kMaxTableBytes));
   std::istringstream lines(text);
   std::string line;
-  for (int number = 1; std::getline(lines, line); ++number) {
-    if (number == 1 && line == kHeader) continue;
-    std::istringstream fields(line);
-    std::string c, subject, full, quick, rest;
-    std::getline(fields, c, ',');
-    std::getline(fields, subject, ',');
-    std::getline(fields, full, ',');
-    std::getline(fields, quick, ',');
-    Verdict verdict{};
-    const bool good = !subject.empty() && (full.empty() || from_string(full, verdict)) &&
-                      (quick.empty() || from_string(quick, verdict)) && !std::getline(fields, rest);
-    if (number == 1 || !good) {
-      return Error{ErrorKind::bad_input,
-                   fmt::format("{}:{}: \"{}\", expected {} with holds, degrades or fails",
-                               path.string(), number, line, kHeader)};
+  std::getline(lines, line);
+  const std::vector<std::string> subjects = parts_of(line);
+  for (int number = 2; std::getline(lines, line); ++number) {
+    const std::vector<std::string> cells = parts_of(line);
+    for (std::size_t s = 1; s < subjects.size(); ++s) {
+      std::vector<std::string> verdicts = parts_of(s < cells.size() ? cells[s] : "?", '/');
+      verdicts.resize(2);
+      for (const std::string& text_of : verdicts) {
+        Verdict verdict{};
+        if (!text_of.empty() && !from_string(text_of, verdict))
+          return Error{ErrorKind::bad_input,
+                       fmt::format("{}:{}: {}: expected holds, degrades or fails", path.string(),
+                                   number, subjects[s])};
+      }
+      table.verdicts_[cells[0]][subjects[s]] = {verdicts[0], verdicts[1]};
     }
-    table.verdicts_[key_of(c, subject)] = {full, quick};
   }
   return table;
 }
 
 Status Expectations::write(const std::filesystem::path& path) const {
-  std::string text = std::string(kHeader) + "\n";
-  for (const auto& [key, verdicts] : verdicts_)
-    text += fmt::format("{},{},{}\n", key, verdicts.full, verdicts.quick);
+  std::set<std::string> subjects;
+  for (const auto& [name, row] : verdicts_) {
+    for (const auto& [subject, verdicts] : row) subjects.insert(subject);
+  }
+  std::string text = fmt::format("case,{}\n", fmt::join(subjects, ","));
+  for (const auto& [name, row] : verdicts_) {
+    text += name;
+    for (const std::string& subject : subjects) {
+      const auto found = row.find(subject);
+      const Verdicts verdicts = found == row.end() ? Verdicts{} : found->second;
+      text += "," + verdicts.full + (verdicts.quick.empty() ? "" : "/" + verdicts.quick);
+    }
+    text += "\n";
+  }
   return write_text(path, text);
 }
 
 std::string Expectations::find(const Cell& cell, bool quick) const {
-  const auto found = verdicts_.find(key_of(cell.case_name, cell.subject));
-  if (found == verdicts_.end()) return "";
+  const auto row = verdicts_.find(cell.case_name);
+  if (row == verdicts_.end()) return "";
+  const auto found = row->second.find(cell.subject);
+  if (found == row->second.end()) return "";
   return quick ? found->second.quick : found->second.full;
 }
 
 void Expectations::record(const Cell& cell, bool quick) {
-  Verdicts& verdicts = verdicts_[key_of(cell.case_name, cell.subject)];
+  Verdicts& verdicts = verdicts_[cell.case_name][cell.subject];
   (quick ? verdicts.quick : verdicts.full) = to_string(cell.judgement.verdict);
 }
 
@@ -114,40 +156,18 @@ std::string change(const Cell& cell, const std::string& recorded) {
 
 Status write_tables(const std::filesystem::path& folder, const std::vector<Cell>& cells,
                     const Expectations& expectations, bool quick) {
-  std::string grid =
-      "case,subject,verdict,expected,number,unlawful,negative,bias,bias_interval,lns_mean,lns_mean_"
-      "interval,"
-      "lns_median,noise,"
-      "noise_after,p999,lost,growth,flicker,ess,acceptance,restarted,refreshed,resampled,"
-      "quadrature_error,cpu_seconds,pixel_us\n";
+  std::string grid = "case,subject,verdict,expected,number,unlawful";
+  for (const auto& [name, member] : kColumns) grid += fmt::format(",{}", name);
+  grid += ",quadrature_error,cpu_seconds,pixel_us\n";
   std::string series = "case,subject,frame,lns_mean,lns_median,lns_p5,lns_p95,bias,noise,ess\n";
   for (const Cell& cell : cells) {
     const Numbers& n = cell.summary.numbers;
     grid += fmt::format("{},{},{},{},{},{}", cell.case_name, cell.subject,
                         to_string(cell.judgement.verdict), expectations.find(cell, quick),
                         cell.judgement.number, n.unlawful);
-    for (const double value : {n.negative,
-                               n.bias,
-                               n.bias_interval,
-                               n.lns_mean,
-                               n.lns_mean_interval,
-                               n.lns_median,
-                               n.noise,
-                               n.noise_after,
-                               n.tail,
-                               n.lost,
-                               n.growth,
-                               n.flicker,
-                               n.ess,
-                               n.acceptance,
-                               n.restarted,
-                               n.refreshed,
-                               n.resampled,
-                               cell.quadrature_error,
-                               cell.cpu_seconds,
-                               cell.pixel_us}) {
+    for (const auto& [name, member] : kColumns) grid += fmt::format(",{:.5g}", n.*member);
+    for (const double value : {cell.quadrature_error, cell.cpu_seconds, cell.pixel_us})
       grid += fmt::format(",{:.5g}", value);
-    }
     grid += "\n";
     for (const FramePoint& p : cell.summary.series) {
       series += fmt::format("{},{},{},{:.4g},{:.4g},{:.4g},{:.4g},{:.4g},{:.4g},{:.4g}\n",

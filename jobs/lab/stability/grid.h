@@ -17,8 +17,8 @@ struct Cell {
   Summary summary;
   double quadrature_error = 0;
   double cpu_seconds = 0;
-  double pixel_us =
-      0;  ///< CPU microseconds per pixel with a surface and frame: samples, rays, shade
+  /// CPU microseconds per pixel with a surface and frame: samples, rays, shade.
+  double pixel_us = 0;
 };
 
 /// Runs one case with every subject. stage_folder: for its maps and meshes. Subjects are compared
@@ -27,7 +27,8 @@ Result<std::vector<Cell>> run_case(const Case& c, const std::vector<Subject>& su
                                    const Effort& effort, const std::filesystem::path& stage_folder,
                                    int threads);
 
-/// Recorded verdicts by "case,subject"; the columns of expected.csv are case, subject, full, quick.
+/// Recorded verdicts. expected.csv has a row a case and a column a subject, whose cells are the
+/// verdict of the full form, and behind a slash that of the quick one if the case has it.
 class Expectations {
  public:
   struct Verdicts {
@@ -42,7 +43,7 @@ class Expectations {
   void record(const Cell& cell, bool quick);
 
  private:
-  std::map<std::string, Verdicts> verdicts_;
+  std::map<std::string, std::map<std::string, Verdicts>> verdicts_;  ///< by case and subject
 };
 
 /// "" when the cell is as recorded, or not recorded; else what changed.
