@@ -18,7 +18,8 @@ import conventions  # noqa: E402
 import errors  # noqa: E402
 import gltf_scenes  # noqa: E402
 import pictures  # noqa: E402
-from farm import BAD_INPUT, check, check_equal, make_job, run_tests, write_job  # noqa: E402
+from farm import BAD_INPUT, check, check_equal, run_tests  # noqa: E402
+from jobs import make_job, write_job  # noqa: E402
 
 random = np.random.default_rng(7)
 
@@ -61,13 +62,13 @@ def place(programs, folder, expect=0, lacquer=None, **changes):
 # ---- axes and angles ----------------------------------------------------------------------------------------
 
 
-def a_map_lies_alike(_, __):
+def a_map_lies_alike(_programs, _folder):
     for w in some_directions(200):
         check_close(conventions.cycles_texel(conventions.to_blender(w), 64, 32), conventions.baton_texel(w, 64, 32),
                     f"texel along {w}", 1e-4)
 
 
-def a_turned_map_lies_alike(_, __):
+def a_turned_map_lies_alike(_programs, _folder):
     rotations = [some_rotation() for _ in range(50)] + [about(0, math.pi / 2), about(1, -math.pi / 2), np.eye(3)]
     for rotation in rotations:
         a, b, c = conventions.map_euler(rotation.ravel().tolist())
@@ -77,7 +78,7 @@ def a_turned_map_lies_alike(_, __):
                         f"direction {w} in a map turned by {rotation}")
 
 
-def objects_stand_alike(_, __):
+def objects_stand_alike(_programs, _folder):
     for _ in range(20):
         m, p = random.normal(size=(3, 4)), random.normal(size=3)
         got = np.array(conventions.object_matrix(m.ravel().tolist())) @ [*conventions.to_blender(p), 1]
@@ -103,7 +104,7 @@ def the_camera_sees_alike(programs, folder):
         check_close((width / 2 + px * scale, height / 2 - py * scale), (x, y), "a pixel", 2e-4)
 
 
-def arrays_are_turned_like_points(_, __):
+def arrays_are_turned_like_points(_programs, _folder):
     import array
     values = array.array("f", range(9))
     turned = conventions.flat_to_blender(values)
@@ -123,7 +124,7 @@ def planted(level, pairs, variance, cpu, bias=0.0, size=(2, 48, 40)):
     return errors.Setting("planted", level, kept, errors.block_sizes(*size[1:]))
 
 
-def the_error_is_that_planted(_, __):
+def the_error_is_that_planted(_programs, _folder):
     inside = 0
     for _ in range(40):
         setting = planted(1, 2, 0.01, 1.0)
@@ -135,14 +136,14 @@ def the_error_is_that_planted(_, __):
     check(inside >= 36, f"of 40 intervals {inside} hold the truth")
 
 
-def an_error_as_shown_counts_what_a_screen_shows(_, __):
+def an_error_as_shown_counts_what_a_screen_shows(_programs, _folder):
     """Above white nothing is seen; at linear .001 the slope of sRGB is 12.92."""
     grey = np.full((32, 32, 3), 0.001)
     check_close(errors.shown_error(grey, grey + 0.0002), 0.5 * (12.92 * 0.0002) ** 2, "in the dark", 1e-9)
     check_close(errors.shown_error(grey + 1, grey + 7), 0, "above white", 1e-9)
 
 
-def a_ratio_is_that_planted(_, __):
+def a_ratio_is_that_planted(_programs, _folder):
     """One renderer has the variance .08 / CPU s; the other takes 12 s for what it has after 2.5 s."""
     curve = [planted(level, 2, 0.08 / level, float(level)) for level in (1, 4, 16)]
     other = planted(64, 2, 0.08 / 2.5, 12.0)
@@ -152,14 +153,14 @@ def a_ratio_is_that_planted(_, __):
     check(ratio.low < 12 / 2.5 < ratio.high and not ratio.bound and not ratio.extrapolated, f"interval: {ratio}")
 
 
-def a_curve_ends_honestly(_, __):
+def a_curve_ends_honestly(_programs, _folder):
     check_close(errors.cpu_at([1, 4], [1.0, 0.25], 0.5), 2.0, "between", 1e-9)
     check_close(errors.cpu_at([1, 4], [1.0, 0.25], 0.125), 8.0, "beyond the dearest: as 1 / CPU", 1e-9)
     check_close(errors.cpu_at([1, 4], [1.0, 0.25], 0.25), 4.0, "on a point", 1e-9)
     check_equal(errors.cpu_at([1, 4], [1.0, 0.25], 2.0), None, "the cheapest is better already")
 
 
-def a_difference_is_seen_and_noise_is_not(_, __):
+def a_difference_is_seen_and_noise_is_not(_programs, _folder):
     exact, same, off = (planted(1, 2, 0.01, 1.0, bias, (1, 160, 160)) for bias in (0, 0, 0.004))
     none, some = errors.difference(same, exact), errors.difference(off, exact)
     check(abs(none.z()) < 4 and 0.6 < none.z_squared < 1.5, f"of nothing: {none}")
@@ -167,7 +168,7 @@ def a_difference_is_seen_and_noise_is_not(_, __):
     check(some.systematic * some.mean > 0.003, f"systematic: {some}")
 
 
-def a_difference_of_single_pixels_is_seen(_, __):
+def a_difference_of_single_pixels_is_seen(_programs, _folder):
     """Of +- .01 from pixel to pixel, which no block's mean shows."""
     checkered = 0.01 * (np.indices((160, 160)).sum(0) % 2 * 2 - 1)[None, :, :, None]
     first, second = (0.05 * random.normal(size=(2, 160, 160, 3)) for _ in range(2))
@@ -176,7 +177,7 @@ def a_difference_of_single_pixels_is_seen(_, __):
         check(abs(got - planted_square) < 4 * error and error < 2e-5, f"planted {planted_square}: {got} +- {error}")
 
 
-def blocks_at_the_edge_count_by_their_pixels(_, __):
+def blocks_at_the_edge_count_by_their_pixels(_programs, _folder):
     values = random.normal(size=(2, 37, 50))
     sizes = errors.block_sizes(37, 50)
     check_equal(int(sizes.sum()), 37 * 50, "pixels")
@@ -190,7 +191,7 @@ def beyond(a, b):
     return float(np.mean(np.abs(compare_gltf.z_of(a, b)) > 3))
 
 
-def pixels_differ_as_often_as_chance_says(_, __):
+def pixels_differ_as_often_as_chance_says(_programs, _folder):
     chance = compare_gltf.by_chance(8, random)
     check_close(chance, 0.0096, "8 pictures of both", 5e-4)
     a, b = random.normal(5, 1, size=(2, 8, 300, 300))
@@ -200,7 +201,7 @@ def pixels_differ_as_often_as_chance_says(_, __):
     check_equal([beyond(still, still * 1.00001), beyond(still, still * 1.01)], [0.0, 1.0], "without noise")
 
 
-def a_pixel_is_put_where_it_belongs(_, __):
+def a_pixel_is_put_where_it_belongs(_programs, _folder):
     """4 x 2 pixels of 2 x 2: sky, then two objects of clay side by side, in the last column of steel."""
     planes = {"object": np.zeros((4, 8)), "material": np.zeros((4, 8))}
     for name, number in (("object", 1), ("material", 1)):
@@ -217,7 +218,7 @@ def a_pixel_is_put_where_it_belongs(_, __):
     check_equal(compare_gltf.blocks(np.arange(8).reshape(2, 4), 2).mean(-1).tolist(), [[2.5, 4.5]], "means")
 
 
-def hills_have_their_normals(_, __):
+def hills_have_their_normals(_programs, _folder):
     positions, normals, _, triangles = gltf_scenes.hills()
     at, to = np.array(positions), np.array(normals)
     corners = at[np.array(triangles)]
@@ -250,7 +251,7 @@ def sets_of_both_kinds_render(programs, folder):
             check(float(shadow.min()) < 0.7 and float(np.median(shadow)) > 0.8, f"{name}: shadows")
 
 
-def jobs_are_legal(programs, _):
+def jobs_are_legal(programs, _folder):
     """Their files may be missing."""
     for job in sorted((PEERS / "scenes").glob("*.json")):
         done = subprocess.run([programs.path("baton"), "check", job], capture_output=True, text=True)
@@ -270,7 +271,7 @@ def frames_are_read_as_written(programs, folder):
         check_close(got[:, :, k].ravel(), programs.values(file, name), f"channel {name}", 1e-5)
 
 
-def a_picture_is_written_as_it_is(_, folder):
+def a_picture_is_written_as_it_is(_programs, folder):
     folder.mkdir(parents=True)
     picture = random.integers(0, 256, (13, 17, 3)).astype(np.uint8)
     pictures.write_png(folder / "a.png", picture)
@@ -308,10 +309,4 @@ def what_is_not_modelled_alike_is_refused(programs, folder):
 
 
 if __name__ == "__main__":
-    run_tests([a_map_lies_alike, a_turned_map_lies_alike, objects_stand_alike, the_camera_sees_alike,
-               arrays_are_turned_like_points, the_error_is_that_planted, a_ratio_is_that_planted, a_curve_ends_honestly,
-               an_error_as_shown_counts_what_a_screen_shows,
-               a_difference_is_seen_and_noise_is_not, a_difference_of_single_pixels_is_seen,
-               blocks_at_the_edge_count_by_their_pixels, pixels_differ_as_often_as_chance_says,
-               a_pixel_is_put_where_it_belongs, hills_have_their_normals, sets_of_both_kinds_render, jobs_are_legal, frames_are_read_as_written,
-               a_picture_is_written_as_it_is, what_is_not_modelled_alike_is_refused])
+    run_tests()

@@ -11,7 +11,8 @@ from collections import Counter
 from pathlib import Path
 
 from chaos_witness import STATE, in_hand
-from farm import BAD_INPUT, OK, PATIENCE, check, make_job, wait_until, write_job
+from farm import BAD_INPUT, OK, PATIENCE, check, wait_until
+from jobs import make_job, merged, write_job
 
 NUM_WORKERS = 3
 NOTICED_S = 6 * PATIENCE  # a fault of a disk that nobody notices in this time has not struck

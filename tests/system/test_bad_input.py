@@ -4,7 +4,8 @@
 import shutil
 import socket
 
-from farm import BAD_INPUT, FAILED, IO, OK, USAGE, Farm, check, check_equal, make_job, run_tests, write_job
+from farm import BAD_INPUT, FAILED, IO, OK, Farm, check, check_equal, run_tests
+from jobs import make_job, write_job
 
 
 def check_error(done, exit_codes, *parts):
@@ -82,9 +83,8 @@ def text_named_exr(programs, folder):
 
 def a_damaged_state(programs, folder):
     """One changed byte anywhere is found by `baton state verify`."""
-    path = write_job(folder / "job.json", make_job(folder, frames="1-2"))
-    programs.render(path, folder / "work")
-    state = next(f for f in (folder / "work").rglob("*.blob") if f.read_bytes()[:4] == state_magic(programs, folder))
+    programs.render_in(folder, make_job(folder, frames="1-2"))
+    state = next(f for f in (folder / "work").rglob("*.blob") if f.read_bytes()[:4] == _state_magic(programs, folder))
     copy = folder / "copy.bst"
     shutil.copyfile(state, copy)
     programs.run("baton", "state", "verify", copy)
@@ -98,7 +98,7 @@ def a_damaged_state(programs, folder):
     check_error(programs.run("baton", "state", "verify", copy, expect=None), [BAD_INPUT], "copy.bst")
 
 
-def state_magic(programs, folder):
+def _state_magic(programs, folder):
     """The first four bytes of a blob that `baton state verify` accepts."""
     for blob in sorted((folder / "work").rglob("*.blob")):
         if programs.run("baton", "state", "verify", blob, expect=None).returncode == OK:
@@ -110,7 +110,6 @@ def state_magic(programs, folder):
 def a_live_coordinator_survives_any_message(programs, folder):
     """Messages of another version, cut, too long or of no meaning, and plain bytes: the next job is rendered."""
     with Farm(programs, folder / "farm") as farm:
-        farm.start_coordinator()
         worker = farm.start_worker()
         for kind in ["version", "garbage", "empty", "short", "many"]:
             answer = programs.run("send_raw", farm.endpoint, kind).stdout
@@ -133,7 +132,6 @@ def a_live_coordinator_survives_any_message(programs, folder):
 def a_failing_job_leaves_the_farm_alone(programs, folder):
     """A mesh that disappears after submission fails its job with its name; the next job is rendered."""
     with Farm(programs, folder / "farm") as farm:
-        farm.start_coordinator()
         bad_path = write_job(folder / "bad/job.json", make_job(folder / "bad", maxRetriesPerTask=0))
         bad = farm.submit(bad_path)
         (folder / "bad/sphere.off").unlink()
@@ -147,17 +145,4 @@ def a_failing_job_leaves_the_farm_alone(programs, folder):
 
 
 if __name__ == "__main__":
-    run_tests([
-        a_misspelt_key,
-        a_wrong_type,
-        a_negative_resolution,
-        absurd_values,
-        text_that_is_no_json,
-        a_missing_job,
-        a_missing_mesh,
-        a_truncated_map,
-        text_named_exr,
-        a_damaged_state,
-        a_live_coordinator_survives_any_message,
-        a_failing_job_leaves_the_farm_alone,
-    ])
+    run_tests()

@@ -13,7 +13,7 @@ import time
 import unittest
 from array import array
 
-from random_job_files import write_exr
+from assets import write_exr
 
 PATIENCE = int(os.environ.get("BATON_PATIENCE", "1"))
 OK, USAGE, BAD_INPUT, UNAVAILABLE, IO = 0, 64, 65, 69, 74

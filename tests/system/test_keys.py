@@ -7,15 +7,15 @@ import re
 import time
 from pathlib import Path
 
-from farm import (BAD_INPUT, DEADLINE_S, OK, UNAVAILABLE, USAGE, Farm, Process, check, check_equal, make_job, run_tests,
-                  wait_until, write_job)
+from farm import BAD_INPUT, DEADLINE_S, OK, UNAVAILABLE, USAGE, Farm, Process, check, check_equal, run_tests, wait_until
+from jobs import make_job, write_job
 
 
 class KeyedFarm(Farm):
     """A farm on loopback whose coordinator and workers have keys."""
 
     def __init__(self, programs, folder, coordinator_options=(), worker_options=()):
-        super().__init__(programs, folder)
+        super().__init__(programs, folder, workers=None)
         self.keys = self.folder / "keys"
         self.coordinator_options, self.worker_options = coordinator_options, worker_options
         programs.run("baton", "key", "create", self.keys)
@@ -183,7 +183,6 @@ def jobs_stay_within_the_roots(programs, folder):
 def two_workers_of_one_name_work_side_by_side(programs, folder):
     path = write_job(folder / "job.json", make_job(folder, image={"tileSize": 16}))
     with Farm(programs, folder / "farm") as farm:
-        farm.start_coordinator()
         for number in range(2):
             command = [programs.path("baton-worker"), "--coordinator", farm.endpoint, "--threads", "1", "--name", "twin"]
             farm.workers.append(Process(command, farm.folder / f"twin{number}.log"))
@@ -212,9 +211,7 @@ def a_worker_of_another_build_is_sent_away(programs, folder):
     check(build in program, f"{build} is not in the program")
     other.write_bytes(program.replace(build, b"f" * len(build)))
     other.chmod(0o755)
-    with Farm(programs, folder / "farm") as farm:
-        farm.start_coordinator()
-        farm.start_worker()
+    with Farm(programs, folder / "farm", workers=1) as farm:
         job = farm.submit(path)
         stranger = Process([str(other), "--coordinator", farm.endpoint, "--name", "stranger"], folder / "stranger.log",
                            {"LD_LIBRARY_PATH": str(programs.bin.resolve())})
@@ -227,11 +224,4 @@ def a_worker_of_another_build_is_sent_away(programs, folder):
 
 
 if __name__ == "__main__":
-    run_tests([
-        roles_decide_who_may_do_what,
-        without_the_right_key_nobody_comes_in,
-        other_machines_need_keys,
-        jobs_stay_within_the_roots,
-        two_workers_of_one_name_work_side_by_side,
-        a_worker_of_another_build_is_sent_away,
-    ])
+    run_tests()

@@ -4,8 +4,9 @@ import os
 import re
 import subprocess
 
-from farm import BAD_INPUT, OK, check, check_equal, make_job, run_tests, write_job, write_map
-from test_quick_looks import read_png, srgb
+from farm import BAD_INPUT, OK, check, check_equal, run_tests
+from jobs import make_job, write_job
+from png_files import read_png, srgb
 
 IO_ERROR = 74
 
@@ -15,8 +16,7 @@ def rendered(programs, folder, aovs=("depth",), **changes):
     job = make_job(folder, frames="1-6", sampling={"method": "bidirectional", "numParticles": 2, "numCandidates": 4},
                    image={"width": 81, "height": 47}, **changes)
     job["output"].update(aovs=list(aovs), framesPerSecond=12)
-    path = write_job(folder / "job.json", job)
-    programs.render(path, folder / "work", threads=2)
+    programs.render_in(folder, job, threads=2)
     return path
 
 
@@ -163,7 +163,4 @@ def test_check_tells_of_exposures_of_maps(programs, folder):
 
 
 if __name__ == "__main__":
-    run_tests([test_a_movie_shows_what_view_shows, test_the_filmic_curve, test_pngs_need_no_ffmpeg,
-               test_an_aov_means_the_same_in_all_frames,
-        test_motion_is_seen_as_colors, test_faults,
-               test_check_tells_of_exposures_of_maps])
+    run_tests()

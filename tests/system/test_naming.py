@@ -6,8 +6,9 @@ import subprocess
 from pathlib import Path
 
 from exr_frames import read_frame
-from farm import check, check_equal, make_job, run_tests, write_job
-from test_quick_looks import read_png
+from farm import check, check_equal, run_tests
+from jobs import make_job, write_job
+from png_files import read_png
 
 AOVS = ["lns", "normal", "depth", "variance", "albedo", "position", "z", "motion", "object", "material", "cryptoObject", "unshadowed", "blocked"]
 
@@ -93,4 +94,4 @@ def test_blender_shows_the_passes(programs, folder):
 
 
 if __name__ == "__main__":
-    run_tests([test_both_namings_hold_the_same, test_blender_shows_the_passes])
+    run_tests()

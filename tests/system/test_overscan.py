@@ -3,8 +3,9 @@
 from array import array
 
 from exr_frames import read_frame
-from farm import BAD_INPUT, check, check_equal, make_job, run_tests, write_job
-from test_quick_looks import read_png
+from farm import BAD_INPUT, check, check_equal, run_tests
+from jobs import make_job, write_job
+from png_files import read_png
 
 AROUND = [9, 4, 0, 17]
 
@@ -95,4 +96,4 @@ def test_looks_and_pictures_of_it(programs, folder):
 
 
 if __name__ == "__main__":
-    run_tests([test_the_picture_is_the_same_bytes, test_what_comes_into_view_has_its_history, test_looks_and_pictures_of_it])
+    run_tests()

@@ -4,7 +4,8 @@ split, whoever dies, and whatever was kept. `baton render` adds sweeps by itself
 
 import json
 
-from farm import BAD_INPUT, USAGE, Farm, check, check_equal, make_job, run_tests, wait_until, write_job
+from farm import BAD_INPUT, USAGE, Farm, check, check_equal, run_tests, wait_until
+from jobs import make_job, write_job
 from test_motion import moving_job
 
 POOL = {"method": "pool", "numParticles": 8, "numCandidates": 32}
@@ -27,15 +28,13 @@ def moving(folder, **quality):
 
 def at_once(programs, folder, job, **render):
     """The pixels of a job as `baton render` makes them."""
-    path = write_job(folder / "job.json", job)
-    programs.render(path, folder / "work", **render)
+    programs.render_in(folder, job, **render)
     return programs.pixels(folder / "frames")
 
 
 def refined(programs, folder, job, times, workers, kill_at=None):
     """The pixels of a job that is refined so many times; a worker dies in the refinement number kill_at."""
     with Farm(programs, folder / "farm") as farm:
-        farm.start_coordinator()
         hands = [farm.start_worker() for _ in range(workers)]
         done = farm.submit(write_job(folder / "job.json", job))
         farm.wait_for(done)
@@ -78,7 +77,6 @@ def only_new_sweeps_are_rendered(programs, folder):
     job = still(folder, rounds=2, refinable=True)
     job["image"]["tileSize"] = 160
     with Farm(programs, folder / "farm") as farm:
-        farm.start_coordinator()
         worker = farm.start_worker()
         first = farm.submit(write_job(folder / "job.json", job))
         farm.wait_for(first)
@@ -99,8 +97,7 @@ def only_new_sweeps_are_rendered(programs, folder):
 def render_adds_sweeps(programs, folder):
     """Until a noise is reached, or so many rounds are; a second call has nothing to do."""
     job = turning(folder, rounds=4, noiseThreshold=0.02, maxRounds=64)
-    path = write_job(folder / "job.json", job)
-    told = programs.render(path, folder / "work").stderr
+    told = programs.render_in(folder, job).stderr
     lines = [line for line in told.splitlines() if "as Cycles measures it" in line]
     noises = [float(line.split("noise ")[1].split()[0]) for line in lines]
     check(len(lines) > 1 and lines[0].startswith("4 rounds: "), told)
@@ -135,9 +132,7 @@ def waiting_adds_sweeps(programs, folder):
     quality = {"rounds": 4, "noiseThreshold": 0.02, "maxRounds": 64}
     expected = at_once(programs, folder / "rendered", turning(folder / "rendered", **quality))
     path = write_job(folder / "farm/job.json", turning(folder / "farm", **quality))
-    with Farm(programs, folder / "work") as farm:
-        farm.start_coordinator()
-        farm.start_worker()
+    with Farm(programs, folder / "work", workers=1) as farm:
         said = farm.baton("job", "submit", path)
         check("baton job wait adds rounds until quality.noiseThreshold ends it" in said.stderr, said.stderr)
         farm.wait_for(said.stdout.strip())
@@ -153,5 +148,4 @@ def waiting_adds_sweeps(programs, folder):
 
 
 if __name__ == "__main__":
-    run_tests([a_still_in_four_steps, sequences_at_rest_and_in_motion, only_new_sweeps_are_rendered, render_adds_sweeps,
-               waiting_adds_sweeps])
+    run_tests()

@@ -1,10 +1,10 @@
 #!/usr/bin/env python3
 """What the store holds: as `baton check` says, and never more than a limit."""
 
-import json
 
 from disk_use import StoreWatch, measure
-from farm import FAILED, check, check_equal, make_job, run_tests, write_job
+from farm import FAILED, check, check_equal, run_tests
+from jobs import make_job, write_job
 
 MIB = 1 << 20
 MOVING = {"keys": [{"frame": 1, "position": [0, 1.2, 5], "lookAt": [0, 0.6, 0]},
@@ -36,7 +36,7 @@ def a_limit_holds_and_the_job_ends(programs, folder):
     path = job_in(folder)
     programs.render(path, folder / "free")
     witness = programs.pixels(folder / "frames")
-    predicted = json.loads(programs.run("baton", "check", path, "--json").stdout)["storeBytes"]
+    predicted = programs.checked(path)["storeBytes"]
     limit = round(1.2 * predicted / MIB)
     check(limit < 0.6 * predicted * 30 / 12 / MIB, "the limit is far below what all frames take")
     with StoreWatch(folder / "work/store") as watch:
@@ -57,5 +57,4 @@ def a_limit_that_is_too_low_ends_the_render_with_an_error(programs, folder):
 
 
 if __name__ == "__main__":
-    run_tests([check_says_what_the_store_holds, two_workers_leave_nothing_but_the_last_states,
-               a_limit_holds_and_the_job_ends, a_limit_that_is_too_low_ends_the_render_with_an_error])
+    run_tests()

@@ -2,13 +2,10 @@
 """Images of tiles (UDIM): each tile is seen where its number says, for any tiling; a missing one is one error; all are part
 of the job."""
 
-import sys
-from pathlib import Path
 
-from farm import BAD_INPUT, check, check_equal, make_job, run_tests, write_job
-
-sys.path.append(str(Path(__file__).parents[2] / "jobs/examples"))
-from make_gltf_set import png  # noqa: E402
+from assets import png
+from farm import BAD_INPUT, check, check_equal, run_tests
+from jobs import make_job, write_job
 
 # Four squares, from the lower left on.
 COLOURS = {1001: (255, 0, 0), 1002: (0, 255, 0), 1011: (0, 0, 255), 1012: (255, 255, 0)}
@@ -74,4 +71,4 @@ def tiles_are_part_of_the_job(programs, folder):
 
 
 if __name__ == "__main__":
-    run_tests([tiles_lie_where_their_numbers_say, a_missing_tile_is_one_error, tiles_are_part_of_the_job])
+    run_tests()
