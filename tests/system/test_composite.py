@@ -6,8 +6,8 @@ from array import array
 
 from assets import png, write_exr, write_map
 from exr_frames import read_frame
-from farm import BAD_INPUT, check, check_equal, run_tests
-from jobs import make_job, write_job
+from farm import check, check_equal, run_tests
+from jobs import camera_keys, make_job, write_job
 
 WIDTH, HEIGHT = 96, 56
 # What the camera sees behind: colour of the ground, colour of the sky. Dark, bright, and of a strong colour.
@@ -130,8 +130,7 @@ def shot(folder, **output):
     job["sampling"]["method"] = "bidirectional"  # of which overscan changes no pixel
     job["scene"]["ground"]["size"] = 100
     job["image"].update(tileSize=32)
-    job["camera"] = {"keys": [{"frame": 1, "position": [0, 1.2, 5], "lookAt": [0, 0.6, 0]},
-                              {"frame": 3, "position": [0.5, 1.2, 5], "lookAt": [0.1, 0.6, 0]}]}
+    job["camera"] = camera_keys((1, [0, 1.2, 5], [0, 0.6, 0]), (3, [0.5, 1.2, 5], [0.1, 0.6, 0]))
     return job
 
 # Above only the sky and spheres, below only the ground and spheres: beside spheres all sites of a pixel see the same.
@@ -258,8 +257,7 @@ def test_faults_name_file_and_place(programs, folder):
     for output, expected in cases:
         path = write_job(folder / "job.json", shot(folder, **output))
         for command in ("check", "render"):
-            error = programs.run("baton", command, path, expect=BAD_INPUT).stderr
-            check(expected in error, f"{command} {output}: {error}")
+            programs.refuses(command, path, says=expected)
 
 
 if __name__ == "__main__":

@@ -6,6 +6,7 @@ import json
 import math
 import re
 
+from assets import write_map
 from farm import check, check_equal, run_tests
 from jobs import make_job, write_job
 
@@ -118,7 +119,6 @@ def values_below_zero_are_counted_and_set_to_zero(programs, folder):
 
 def one_frame_of_another_light_stands_out(programs, folder):
     """A frame lit by a map of its own among others: named, and warned of before."""
-    from farm import write_map
     folder.mkdir(parents=True, exist_ok=True)
     write_map(folder / "flash.hdr", colour=lambda x, y, width, height: (30.0, 30.0, 30.0))
     path = job_at(folder, frames="1-8")

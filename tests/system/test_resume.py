@@ -51,10 +51,9 @@ def a_killed_render_goes_on(programs, folder):
 
 
 def a_finished_render_has_nothing_to_do(programs, folder):
-    programs.render_in(folder, make_job(folder, frames="1-2"))
-    before = programs.pixels(folder / "frames")
-    programs.render(path, folder / "work")
-    check_equal(programs.pixels(folder / "frames"), before, "pixels after the second run")
+    job = make_job(folder, frames="1-2")
+    before = programs.rendered(folder, job)
+    check_equal(programs.rendered(folder, job), before, "pixels after the second run")
 
 
 def two_farms_of_one_machine_never_meet(programs, folder):

@@ -4,11 +4,10 @@
 
 from disk_use import StoreWatch, measure
 from farm import FAILED, check, check_equal, run_tests
-from jobs import make_job, write_job
+from jobs import camera_keys, make_job, write_job
 
 MIB = 1 << 20
-MOVING = {"keys": [{"frame": 1, "position": [0, 1.2, 5], "lookAt": [0, 0.6, 0]},
-                   {"frame": 30, "position": [1.5, 1.2, 4.8], "lookAt": [0, 0.6, 0]}]}
+MOVING = camera_keys((1, [0, 1.2, 5], [0, 0.6, 0]), (30, [1.5, 1.2, 4.8], [0, 0.6, 0]))
 
 
 def job_in(folder, **changes):
