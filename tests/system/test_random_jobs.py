@@ -1,19 +1,25 @@
 #!/usr/bin/env python3
 """A hundred random jobs, always the same, and the test of that test. More: random_jobs.py by hand."""
 
+import json
 import os
+import random
 import tempfile
 from pathlib import Path
 
-from farm import check, check_equal, run_tests
-from jobs import make_job
+from farm import BAD_INPUT, OK, check, check_equal, run_tests
+from jobs import make_job, write_job
 from exr_frames import read_frame
+from random_job_draws import Draw
+from random_job_files import write_file
 from random_job_judge import Judge, Wrong
+from random_job_rules import RULES, breaks
 from random_job_self_test import self_test
 from random_jobs import parse_options, run_jobs
 
 SEED = 1
 JOBS = 100
+TRIED_OF_A_RULE = 4
 MEMORY = "/dev/shm"
 SOURCE = Path(__file__).resolve().parents[2]
 
@@ -48,6 +54,25 @@ def a_wrong_bit_is_found(programs, folder):
         check("frame.0002.exr" in str(found) and "1 of 240 pixels of R, first at (19, 11)" in str(found), str(found))
         return
     check(False, "nobody saw a bit that was turned")
+
+
+def rules_are_those_of_check(programs, folder):
+    """What obeys all of them is accepted, what breaks one alone is refused."""
+    schema = json.loads((SOURCE / "jobs/schema/job.schema.json").read_text(encoding="utf-8"))
+    for rule in [None, *RULES]:
+        tried = 0
+        for number in range(600):
+            case = Draw(schema, random.Random(number), without=rule).case()
+            if rule is None or (isinstance(case["job"]["scene"], dict) and breaks(case["job"], rule)):
+                place = folder / f"{rule.__name__ if rule else 'all'}-{number}"
+                for name, recipe in case["files"].items():
+                    write_file(place / name, recipe, folder)
+                done = programs.run("baton", "check", write_job(place / "job.json", case["job"]), expect=None)
+                check_equal(done.returncode, BAD_INPUT if rule else OK, f"{place}: exit code, which says\n{done.stderr}")
+                tried += 1
+            if tried == TRIED_OF_A_RULE:
+                break
+        check(tried == TRIED_OF_A_RULE, f"{rule}: {tried} jobs break it")
 
 
 def random_jobs_render(programs, folder):
