@@ -7,9 +7,10 @@ import random
 import tempfile
 from pathlib import Path
 
-from farm import BAD_INPUT, OK, check, check_equal, run_tests
+from farm import BAD_INPUT, OK, Fault, check, check_equal, check_says, run_tests
 from jobs import make_job, write_job
 from exr_frames import read_frame
+from png_files import read_png
 from random_job_draws import Draw
 from random_job_files import write_file
 from random_job_judge import Judge, Wrong
@@ -54,6 +55,24 @@ def a_wrong_bit_is_found(programs, folder):
         check("frame.0002.exr" in str(found) and "1 of 240 pixels of R, first at (19, 11)" in str(found), str(found))
         return
     check(False, "nobody saw a bit that was turned")
+
+
+def frames_that_differ_leave_pictures(programs, folder):
+    """Of another seed: both frames, and where they are apart."""
+    jobs = [make_job(folder / str(seed), frames="1", seed=seed, image={"width": 20, "height": 12}) for seed in (1, 2)]
+    one, other = (programs.rendered(folder / str(job["seed"]), job) for job in jobs)
+    check_equal(one, programs.pixels(folder / "1/frames"), "frames and themselves")
+    try:
+        check_equal(other, one, "frames of two seeds")
+    except Fault as found:
+        left = folder / "2/frames-frame.0001-differs"
+        check_says(str(found), "frames of two seeds", "frame.0001.exr", str(left))
+        sizes = [read_png(left / f"{name}.png")[:2] for name in ("got", "expected", "difference")]
+        check_equal(sizes, [(20, 12)] * 3, "sizes")
+        texels = {value for row in read_png(left / "difference.png")[2] for value in row}
+        check(127 in texels and texels & {0, 255}, f"values of the difference: {sorted(texels)}")
+        return
+    check(False, "frames of two seeds are equal")
 
 
 def rules_are_those_of_check(programs, folder):
