@@ -24,8 +24,8 @@ def nobody_listens(programs, folder):
     endpoint = f"tcp://127.0.0.1:{free_port()}"
     for words in [["list"], ["show", "ab"], ["wait", "ab"], ["cancel", "ab"]]:
         start = time.monotonic()
-        done = programs.run("baton", "job", *words, "--coordinator", endpoint, expect=UNAVAILABLE)
-        check(f"{endpoint}: no coordinator listens there" in done.stderr, done.stderr)
+        programs.refuses("job", *words, "--coordinator", endpoint, expect=UNAVAILABLE,
+                         says=f"{endpoint}: no coordinator listens there")
         check(time.monotonic() - start < 9 * PATIENCE, f"{words[0]} took {time.monotonic() - start:.1f} s")
 
 

@@ -121,16 +121,15 @@ def other_machines_need_keys(programs, folder):
 
     # A key that others may read, and one of another kind.
     programs.run("baton", "key", "create", folder / "keys")
-    again = programs.run("baton", "key", "create", folder / "keys", expect=USAGE)
-    check("a key is not replaced" in again.stderr, again.stderr)
-    wrong = programs.run("baton", "job", "list", "--key", folder / "keys/server.key", expect=USAGE)
-    check("is the key of a coordinator" in wrong.stderr, wrong.stderr)
-    no_worker_key = programs.run("baton", "farm", "slurm", "--work-dir", folder / "slurm", "--coordinator",
-                                 "tcp://192.0.2.1:5570", "--key", folder / "keys/admin.key", expect=USAGE)
-    check("a coordinator with keys needs both" in no_worker_key.stderr, no_worker_key.stderr)
-    os.chmod(folder / "keys/user.key", 0o644)
-    open_key = programs.run("baton", "job", "list", "--key", folder / "keys/user.key", expect=USAGE)
-    check("chmod 600" in open_key.stderr, open_key.stderr)
+    keys = folder / "keys"
+    os.chmod(keys / "user.key", 0o644)
+    for words, says in [
+            (["key", "create", keys], "a key is not replaced"),
+            (["job", "list", "--key", keys / "server.key"], "is the key of a coordinator"),
+            (["farm", "slurm", "--work-dir", folder / "slurm", "--coordinator", "tcp://192.0.2.1:5570", "--key",
+              keys / "admin.key"], "a coordinator with keys needs both"),
+            (["job", "list", "--key", keys / "user.key"], "chmod 600")]:
+        programs.refuses(*words, says=says, expect=USAGE)
 
     # A key of the environment is not that of a farm of this machine alone.
     os.environ["BATON_KEY"] = str(folder / "keys/admin.key")

@@ -18,6 +18,15 @@ std::vector<Law> usual_laws_and(Law law) {
   return laws;
 }
 
+using Build = std::function<JobSpec(const Stage&, const Timeline&)>;
+
+/// Adds a case with its job; its laws are the usual ones where it has none of its own.
+void add_case(std::vector<Case>& cases, Case added, Build build) {
+  added.build = std::move(build);
+  if (added.laws.empty()) added.laws = usual_laws();
+  cases.push_back(std::move(added));
+}
+
 constexpr Law kNoWorseAfterTheJump{Measure::noise_after, 2, 5};
 
 JobSpec turning(JobSpec job, double degrees_per_frame) {
@@ -38,18 +47,17 @@ JobSpec switching(JobSpec job, const Stage& stage,
 
 void add_turning_case(double degrees, const std::string& name, const MaterialSpec& material,
                       bool quick, std::vector<Case>& cases) {
-  cases.push_back({.name = fmt::format("turn-{}-{}", degrees, name),
-                   .text = fmt::format("The studio map turns by {} degrees a frame over boxes, {}.",
-                                       degrees, name),
-                   .build =
-                       [degrees, material](const Stage& stage, const Timeline&) {
-                         JobSpec job = turning(stage.boxes(studio_map()), degrees);
-                         job.scene.materials["ground"] = material;
-                         return job;
-                       },
-                   .laws = usual_laws(),
-                   .nodes = name == "phong1000" ? 8 : 4,
-                   .quick = quick});
+  add_case(cases,
+           {.name = fmt::format("turn-{}-{}", degrees, name),
+            .text = fmt::format("The studio map turns by {} degrees a frame over boxes, {}.",
+                                degrees, name),
+            .nodes = name == "phong1000" ? 8 : 4,
+            .quick = quick},
+           [degrees, material](const Stage& stage, const Timeline&) {
+             JobSpec job = turning(stage.boxes(studio_map()), degrees);
+             job.scene.materials["ground"] = material;
+             return job;
+           });
 }
 
 void add_turning_cases(std::vector<Case>& cases) {
@@ -63,14 +71,14 @@ void add_turning_cases(std::vector<Case>& cases) {
 }
 
 void add_jumping_cases(std::vector<Case>& cases) {
-  const auto add = [&](const char* name, const char* text, bool quick,
-                       std::function<JobSpec(const Stage&, const Timeline&)> build) {
-    cases.push_back({.name = name,
-                     .text = text,
-                     .build = std::move(build),
-                     .laws = usual_laws_and(kNoWorseAfterTheJump),
-                     .jumps = true,
-                     .quick = quick});
+  const auto add = [&](const char* name, const char* text, bool quick, Build build) {
+    add_case(cases,
+             {.name = name,
+              .text = text,
+              .laws = usual_laws_and(kNoWorseAfterTheJump),
+              .jumps = true,
+              .quick = quick},
+             std::move(build));
   };
   add("cut", "The studio map, then with one frame another one, for good.", true,
       [](const Stage& stage, const Timeline& time) {
@@ -101,17 +109,12 @@ void add_jumping_cases(std::vector<Case>& cases) {
 void add_hard_light_cases(std::vector<Case>& cases) {
   const auto add = [&](const char* name, const char* text, bool quick, int nodes,
                        const RgbImage& map, double degrees, MapFilter filter) {
-    cases.push_back({.name = name,
-                     .text = text,
-                     .build =
-                         [map, degrees, filter](const Stage& stage, const Timeline&) {
-                           JobSpec job = turning(stage.boxes(map), degrees);
-                           job.environment.filter = filter;
-                           return job;
-                         },
-                     .laws = usual_laws(),
-                     .nodes = nodes,
-                     .quick = quick});
+    add_case(cases, {.name = name, .text = text, .nodes = nodes, .quick = quick},
+             [map, degrees, filter](const Stage& stage, const Timeline&) {
+               JobSpec job = turning(stage.boxes(map), degrees);
+               job.environment.filter = filter;
+               return job;
+             });
   };
   add("lit-texel", "One lit texel moves over black, 1.5 degrees a frame.", true, 12,
       lit_texel_map(), 1.5, MapFilter::nearest);
@@ -119,146 +122,133 @@ void add_hard_light_cases(std::vector<Case>& cases) {
       panels_map(), 1.5, MapFilter::nearest);
   add("sun-1e5", "A sun of 1e5 in two texels over a sky of 1 turns by 0.7 degrees a frame.", true,
       4, two_texel_sun_map(), 0.7, MapFilter::bilinear);
-  cases.push_back(
-      {.name = "broken-texels",
-       .text = "NaN, infinite and negative texels in the turning studio map count as black.",
-       .build = [](const Stage& stage,
-                   const Timeline&) { return turning(stage.boxes(broken_map(false)), 0.7); },
-       .laws = usual_laws()});
+  add_case(cases,
+           {.name = "broken-texels",
+            .text = "NaN, infinite and negative texels in the turning studio map count as black."},
+           [](const Stage& stage, const Timeline&) {
+             return turning(stage.boxes(broken_map(false)), 0.7);
+           });
 }
 
 void add_surface_cases(std::vector<Case>& cases) {
-  cases.push_back({.name = "horizon",
-                   .text = "A lone panel sets and rises about a coarse sphere with smooth normals, "
-                           "3 degrees a frame.",
-                   .build =
-                       [](const Stage& stage, const Timeline&) {
-                         JobSpec job = turning(stage.plain(lone_panel_map()), 3);
-                         job.environment.rotation_axis = {1, 0, 0.3f};
-                         job.camera = {.position = {0, 1, 4},
-                                       .look_at = {0, 0, 0},
-                                       .up = {0, 1, 0},
-                                       .vertical_fov_deg = 27};
-                         stage.add(job, "sphere", sphere_obj(), phong(20, 0.5f, 0.5f), true);
-                         job.scene.ground->height = -1;
-                         return job;
-                       },
-                   .laws = usual_laws(),
-                   .nodes = 8,
-                   .quick = true});
-  cases.push_back(
+  add_case(
+      cases,
+      {.name = "horizon",
+       .text = "A lone panel sets and rises about a coarse sphere with smooth normals, "
+               "3 degrees a frame.",
+       .nodes = 8,
+       .quick = true},
+      [](const Stage& stage, const Timeline&) {
+        JobSpec job = turning(stage.plain(lone_panel_map()), 3);
+        job.environment.rotation_axis = {1, 0, 0.3f};
+        job.camera = {
+            .position = {0, 1, 4}, .look_at = {0, 0, 0}, .up = {0, 1, 0}, .vertical_fov_deg = 27};
+        stage.add(job, "sphere", sphere_obj(), phong(20, 0.5f, 0.5f), true);
+        job.scene.ground->height = -1;
+        return job;
+      });
+  add_case(
+      cases,
       {.name = "mirror-beside-diffuse",
        .text =
            "Near-mirrors (exponent 20000) checkered with diffuse under panels that turn slowly.",
-       .build =
-           [](const Stage& stage, const Timeline&) {
-             JobSpec job = turning(stage.boxes(panels_map()), 0.1);
-             job.environment.filter = MapFilter::nearest;
-             stage.add(job, "mirror", checker_obj(12, 12, 0.35f, 0.01f), phong(20000, 0.9f, 0.1f));
-             return job;
-           },
-       .laws = usual_laws(),
-       .nodes = 24});
-  cases.push_back(
-      {.name = "albedo-checker",
-       .text = "Albedo 1 beside 0.01, the studio map turning by 0.7 degrees a frame.",
-       .build =
+       .nodes = 24},
+      [](const Stage& stage, const Timeline&) {
+        JobSpec job = turning(stage.boxes(panels_map()), 0.1);
+        job.environment.filter = MapFilter::nearest;
+        stage.add(job, "mirror", checker_obj(12, 12, 0.35f, 0.01f), phong(20000, 0.9f, 0.1f));
+        return job;
+      });
+  add_case(cases,
+           {.name = "albedo-checker",
+            .text = "Albedo 1 beside 0.01, the studio map turning by 0.7 degrees a frame."},
            [](const Stage& stage, const Timeline&) {
              JobSpec job = turning(stage.boxes(studio_map()), 0.7);
              job.scene.materials["ground"] = diffuse({0.01f, 0.01f, 0.01f});
              stage.add(job, "white", checker_obj(12, 12, 0.35f, 0.01f), diffuse({1, 1, 1}));
              return job;
-           },
-       .laws = usual_laws()});
-  cases.push_back({.name = "coloured-walls",
-                   .text = "A corner of a pure red and a pure green wall, the studio map turning "
-                           "by 0.7 degrees a frame.",
-                   .build =
-                       [](const Stage& stage, const Timeline&) {
-                         JobSpec job = turning(stage.plain(studio_map()), 0.7);
-                         stage.add(job, "red", box_obj({-1.2f, 0, -1.3f}, {-0.9f, 1.5f, 1.3f}),
-                                   diffuse({0.9f, 0, 0}));
-                         stage.add(job, "green", box_obj({-0.9f, 0, -1.3f}, {1.5f, 1.5f, -1}),
-                                   diffuse({0, 0.9f, 0}));
-                         return job;
-                       },
-                   .laws = usual_laws()});
+           });
+  add_case(cases,
+           {.name = "coloured-walls",
+            .text = "A corner of a pure red and a pure green wall, the studio map turning "
+                    "by 0.7 degrees a frame."},
+           [](const Stage& stage, const Timeline&) {
+             JobSpec job = turning(stage.plain(studio_map()), 0.7);
+             stage.add(job, "red", box_obj({-1.2f, 0, -1.3f}, {-0.9f, 1.5f, 1.3f}),
+                       diffuse({0.9f, 0, 0}));
+             stage.add(job, "green", box_obj({-0.9f, 0, -1.3f}, {1.5f, 1.5f, -1}),
+                       diffuse({0, 0.9f, 0}));
+             return job;
+           });
 }
 
 void add_shadow_cases(std::vector<Case>& cases) {
-  cases.push_back(
+  add_case(
+      cases,
       {.name = "dark-cave",
        .text = "Under a plate with a small hole: at most 3 % of the light arrives, most pixels see "
                "none of it.",
-       .build =
-           [](const Stage& stage, const Timeline&) {
-             JobSpec job = turning(stage.plain(studio_map()), 0.7);
-             job.camera = {.position = {0, 0.9f, 1.2f},
-                           .look_at = {0, 0, 0},
-                           .up = {0, 1, 0},
-                           .vertical_fov_deg = 50};
-             stage.add(job, "plate", pierced_plate_obj(60, 0.35f, 1), diffuse({0.5f, 0.5f, 0.5f}));
-             return job;
-           },
        // What arrives is so rare that noise is all there is: only bias and Lns are judged.
        .laws = {{Measure::unlawful, 0, 0},
                 {Measure::negative, 1e-4, 1e-2},
                 {Measure::bias, 0.01, 0.05},
                 {Measure::lns_bias, 0.01, 0.05},
                 {Measure::lns_median, 0.1, 0.3},
-                {Measure::lost, 0.01, 0.1}}});
-  cases.push_back({.name = "open-plain",
-                   .text = "A thin pole on a plain: nearly everything is visible.",
-                   .build =
-                       [](const Stage& stage, const Timeline&) {
-                         JobSpec job = turning(stage.plain(studio_map()), 0.7);
-                         stage.add(job, "pole", box_obj({-0.02f, 0, -0.02f}, {0.02f, 0.6f, 0.02f}),
-                                   diffuse({0.5f, 0.5f, 0.5f}));
-                         return job;
-                       },
-                   .laws = usual_laws()});
-  cases.push_back({.name = "lone-shadow",
-                   .text = "A small box hovers under a tiny sun: about one pixel is in its shadow.",
-                   .build =
-                       [](const Stage& stage, const Timeline&) {
-                         JobSpec job = stage.plain(two_texel_sun_map());
-                         stage.add(job, "chip", box_obj({-0.1f, 0.3f, -0.1f}, {0.1f, 0.32f, 0.1f}),
-                                   diffuse({0.5f, 0.5f, 0.5f}));
-                         return job;
-                       },
-                   .laws = usual_laws()});
+                {Measure::lost, 0.01, 0.1}}},
+      [](const Stage& stage, const Timeline&) {
+        JobSpec job = turning(stage.plain(studio_map()), 0.7);
+        job.camera = {.position = {0, 0.9f, 1.2f},
+                      .look_at = {0, 0, 0},
+                      .up = {0, 1, 0},
+                      .vertical_fov_deg = 50};
+        stage.add(job, "plate", pierced_plate_obj(60, 0.35f, 1), diffuse({0.5f, 0.5f, 0.5f}));
+        return job;
+      });
+  add_case(cases,
+           {.name = "open-plain", .text = "A thin pole on a plain: nearly everything is visible."},
+           [](const Stage& stage, const Timeline&) {
+             JobSpec job = turning(stage.plain(studio_map()), 0.7);
+             stage.add(job, "pole", box_obj({-0.02f, 0, -0.02f}, {0.02f, 0.6f, 0.02f}),
+                       diffuse({0.5f, 0.5f, 0.5f}));
+             return job;
+           });
+  add_case(cases,
+           {.name = "lone-shadow",
+            .text = "A small box hovers under a tiny sun: about one pixel is in its shadow."},
+           [](const Stage& stage, const Timeline&) {
+             JobSpec job = stage.plain(two_texel_sun_map());
+             stage.add(job, "chip", box_obj({-0.1f, 0.3f, -0.1f}, {0.1f, 0.32f, 0.1f}),
+                       diffuse({0.5f, 0.5f, 0.5f}));
+             return job;
+           });
 }
 
 void add_frame_cases(std::vector<Case>& cases) {
   const auto add = [&](const char* name, const char* text, int width, int height, bool quick) {
-    cases.push_back({.name = name,
-                     .text = text,
-                     .build =
-                         [width, height](const Stage& stage, const Timeline&) {
-                           JobSpec job = turning(stage.boxes(studio_map()), 0.7);
-                           job.image.width = width;
-                           job.image.height = height;
-                           job.image.tile_size = 8;
-                           return job;
-                         },
-                     .laws = usual_laws(),
-                     .quick = quick});
+    add_case(cases, {.name = name, .text = text, .quick = quick},
+             [width, height](const Stage& stage, const Timeline&) {
+               JobSpec job = turning(stage.boxes(studio_map()), 0.7);
+               job.image.width = width;
+               job.image.height = height;
+               job.image.tile_size = 8;
+               return job;
+             });
   };
   add("one-column", "An image one pixel wide in clipped tiles.", 1, 27, true);
   add("one-row", "An image one pixel high in clipped tiles.", 27, 1, false);
   add("clipped-tiles", "Tiles clipped at both borders.", 11, 9, false);
-  cases.push_back({.name = "thousand-frames",
-                   .text = "A thousand frames of the overcast sky turning about a tilted axis by "
-                           "0.7 degrees a frame.",
-                   .build =
-                       [](const Stage& stage, const Timeline&) {
-                         // The sky is the same all around: only a tilted axis changes it.
-                         JobSpec job = turning(stage.boxes(overcast_map()), 0.7);
-                         job.environment.rotation_axis = {1, 1, 0};
-                         return job;
-                       },
-                   .laws = usual_laws_and({Measure::growth, 1.5, 3}),
-                   .stretch = 5});
+  add_case(cases,
+           {.name = "thousand-frames",
+            .text = "A thousand frames of the overcast sky turning about a tilted axis by "
+                    "0.7 degrees a frame.",
+            .laws = usual_laws_and({Measure::growth, 1.5, 3}),
+            .stretch = 5},
+           [](const Stage& stage, const Timeline&) {
+             // The sky is the same all around: only a tilted axis changes it.
+             JobSpec job = turning(stage.boxes(overcast_map()), 0.7);
+             job.environment.rotation_axis = {1, 1, 0};
+             return job;
+           });
 }
 
 }  // namespace
@@ -290,12 +280,12 @@ std::vector<Law> usual_laws() {
 
 std::vector<Case> all_cases() {
   std::vector<Case> cases;
-  cases.push_back(
-      {.name = "static",
-       .text = "Nothing moves, so the samples' Lns must not either.",
-       .build = [](const Stage& stage, const Timeline&) { return stage.boxes(studio_map()); },
-       .laws = usual_laws_and({Measure::growth, 1.2, 2}),
-       .quick = true});
+  add_case(cases,
+           {.name = "static",
+            .text = "Nothing moves, so the samples' Lns must not either.",
+            .laws = usual_laws_and({Measure::growth, 1.2, 2}),
+            .quick = true},
+           [](const Stage& stage, const Timeline&) { return stage.boxes(studio_map()); });
   add_turning_cases(cases);
   add_jumping_cases(cases);
   add_hard_light_cases(cases);

@@ -36,8 +36,8 @@ struct Case {
   std::string name;
   std::string text;  ///< one sentence for the report
   /// Frames are set by the caller.
-  std::function<JobSpec(const Stage&, const Timeline&)> build;
-  std::vector<Law> laws;
+  std::function<JobSpec(const Stage&, const Timeline&)> build{};
+  std::vector<Law> laws{};
   bool jumps = false;  ///< the light jumps at three tenths of the sequence
   int stretch = 1;     ///< so many times the usual number of frames
   int nodes = 4;       ///< multiple of 4: quadrature nodes per texel side
