@@ -12,7 +12,7 @@ namespace {
 
 using Light = KnownLimit::Light;
 
-/// tests/stability/expected.csv, the rows in which a method no longer holds for the first time;
+/// jobs/lab/stability/expected.csv, the rows in which a method no longer holds for the first time;
 /// `unit_job` compares them.
 constexpr KnownLimit kLimits[] = {
     {"sequential", "turn-0.7-diffuse", "degrades", Method::sequential, false, Light::turns, 0.7,

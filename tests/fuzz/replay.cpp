@@ -1,5 +1,5 @@
 // Runs a fuzz target without libFuzzer: on every file of its corpus, and on changed ones that
-// follow from a seed. The same inputs on every machine. usage: fuzz_TARGET CORPUS CHANGED
+// follow from a seed. The same inputs on every machine. usage: fuzz_TARGET CHANGED CORPUS [FILE...]
 #include <fcntl.h>
 #include <fmt/format.h>
 #include <signal.h>
@@ -81,8 +81,7 @@ void change(Bytes& input, const Bytes& other, Random& random) {
   }
 }
 
-Status run(const fs::path& corpus, int num_changed) {
-  std::vector<fs::path> paths;
+Status run(int num_changed, const fs::path& corpus, std::vector<fs::path> paths) {
   for (const auto& entry : fs::directory_iterator(corpus)) paths.push_back(entry.path());
   std::sort(paths.begin(), paths.end());
   std::vector<Bytes> files;
@@ -91,7 +90,6 @@ Status run(const fs::path& corpus, int num_changed) {
     files.push_back(std::move(bytes));
     look_at(files.back());
   }
-  if (files.empty()) return Error{ErrorKind::bad_input, corpus.string() + ": an empty corpus"};
 
   Random random(1);
   for (int i = 0; i < num_changed; ++i) {
@@ -110,8 +108,8 @@ Status run(const fs::path& corpus, int num_changed) {
 }  // namespace baton
 
 int main(int argc, char** argv) {
-  if (argc != 3) {
-    fmt::print(stderr, "usage: {} CORPUS CHANGED\n", argv[0]);
+  if (argc < 3) {
+    fmt::print(stderr, "usage: {} CHANGED CORPUS [FILE...]\n", argv[0]);
     return 64;
   }
   for (const int signal : {SIGABRT, SIGSEGV, SIGFPE, SIGBUS}) {
@@ -123,7 +121,8 @@ int main(int argc, char** argv) {
     action.sa_flags = static_cast<int>(SA_RESETHAND);
     ::sigaction(signal, &action, nullptr);
   }
-  const baton::Status status = baton::run(argv[1], std::atoi(argv[2]));
+  const baton::Status status = baton::run(
+      std::atoi(argv[1]), argv[2], std::vector<std::filesystem::path>(argv + 3, argv + argc));
   if (status) return 0;
   fmt::print(stderr, "{}\n", status.error().message);
   return 1;

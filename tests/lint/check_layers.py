@@ -24,6 +24,8 @@ METHODS = {f"worker/method/{folder.name}" for folder in METHOD_FOLDERS if folder
 PASS = METHOD | {"worker/method"}
 EXCHANGE = PASS | {"worker/pass"}
 RUN = EXCHANGE | {"common/protocol", "common/store", "common/scene/settle", "worker/exchange"}
+# Programs that measure look into every room of the worker, and share scenes and statistics with the tests.
+LAB = RUN | METHODS | {"worker/run", "jobs/study", "tests/support", "tests/stat"}
 
 MAY_INCLUDE = {
     "common/base": set(),
@@ -60,6 +62,7 @@ MAY_INCLUDE = {
     "jobs/study": COMMON_DATA | {"common/job", "common/image", "common/protocol"},
     "jobs/auto": COMMON_DATA | {"common/job", "jobs/study", "common/scene", "common/scene/mesh"},  # how large a scene is
     "jobs/slurm": COMMON_BASE,
+    **{f"jobs/lab/{folder}": LAB for folder in ("peers", "stability", "studies")},
     "jobs/cli": COMMON_ALL
     | {"common/scene", "common/scene/map", "common/scene/mesh", "common/scene/settle"}  # `baton check` loads the scene
     | {"jobs/study", "jobs/auto", "jobs/slurm"},
@@ -74,8 +77,8 @@ THIRD_PARTY = {
     r"zmq": ["common/protocol/"],
     r"sqlite3": ["coordinator/journal/"],
     r"zstd|xxhash": ["common/base/"],
-    r"nlohmann/": ["common/job/job_json", "jobs/cli/", "jobs/study/", "common/scene/gltf/json_view"],
-    r"CLI/": ["worker/main.cpp", "coordinator/main.cpp", "jobs/cli/"],
+    r"nlohmann/": ["common/job/job_json", "jobs/cli/", "jobs/lab/", "jobs/study/", "common/scene/gltf/json_view"],
+    r"CLI/": ["worker/main.cpp", "coordinator/main.cpp", "jobs/cli/", "jobs/lab/"],
 }
 
 # Assembled from pieces, so that this file does not find itself.

@@ -91,42 +91,20 @@ TEST(Rounds, AdaptiveOnesAgreeInMotion) {
 /// A frame of 16 rounds of each pixel that stopped after four where their scatter is small: what
 /// adaptive renderers do, and a bias. The four are the first of the sixteen.
 Estimate repeat_with_stopping(JobSpec job) {
-  Estimate e;
-  std::vector<double> sum, squares;
-  double image_sum = 0, image_squares = 0;
-  for (int run = 1; run <= kRuns; ++run) {
-    job.seed = static_cast<std::uint64_t>(run);
+  return test::estimate_over(kRuns, [&](std::uint64_t seed) {
+    job.seed = seed;
     job.quality.rounds = 4;
     job.output.aovs = {Aov::variance};
     const FilmTile few = test::render_tile(job).films.back();
     job.quality.rounds = 16;
-    const std::vector<double> many = test::mean_rgb(test::render_tile(job).films.back());
+    std::vector<double> values = test::mean_rgb(test::render_tile(job).films.back());
     const std::vector<double> first = test::mean_rgb(few);
     const std::vector<double> variance = test::mean_rgb(few, "variance");
-    double image = 0;
-    sum.resize(many.size());
-    squares.resize(many.size());
-    for (std::size_t i = 0; i < many.size(); ++i) {
-      const bool stops = std::sqrt(variance[i]) < 0.05 * first[i];
-      const double value = stops ? first[i] : many[i];
-      sum[i] += value;
-      squares[i] += value * value;
-      image += value / static_cast<double>(many.size());
+    for (std::size_t i = 0; i < values.size(); ++i) {
+      if (std::sqrt(variance[i]) < 0.05 * first[i]) values[i] = first[i];
     }
-    image_sum += image;
-    image_squares += image * image;
-  }
-  const auto variance_of_mean = [](double s, double s2) {
-    const double mean = s / kRuns;
-    return std::max(s2 / kRuns - mean * mean, 0.0) / (kRuns - 1);
-  };
-  for (std::size_t i = 0; i < sum.size(); ++i) {
-    e.mean.push_back(sum[i] / kRuns);
-    e.variance.push_back(variance_of_mean(sum[i], squares[i]));
-  }
-  e.image_mean = image_sum / kRuns;
-  e.image_variance = variance_of_mean(image_sum, image_squares);
-  return e;
+    return values;
+  });
 }
 
 // The same machinery must see it.

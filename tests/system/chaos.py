@@ -92,7 +92,7 @@ def run(programs, folder, num_faults, seed, longest_freeze_s=5):
         disk = Disk(folder / "farm/work", folder / "farm/frames") if may_mount() else None
         if disk:
             stack.callback(disk.close)
-        farm = stack.enter_context(Farm(programs, folder / "farm"))
+        farm = stack.enter_context(Farm(programs, folder / "farm", workers=None))
         power = PowerCut(programs, farm.folder) if Path(programs.path("libsync_witness.so")).exists() else None
         farm.environment = power.environment if power else {}
         farm.start_coordinator()

@@ -11,7 +11,8 @@ from collections import Counter
 from pathlib import Path
 
 from chaos_witness import STATE, in_hand
-from farm import BAD_INPUT, OK, PATIENCE, check, make_job, wait_until, write_job
+from farm import BAD_INPUT, OK, PATIENCE, check, wait_until
+from jobs import camera_keys, make_job, merged, write_job
 
 NUM_WORKERS = 3
 NOTICED_S = 6 * PATIENCE  # a fault of a disk that nobody notices in this time has not struck
@@ -19,12 +20,10 @@ SUPERSEDED_S = 8 * PATIENCE  # so long after a worker fell silent its leases are
 SUPERSEDER_STOPS_S = 0.5
 RECENT_LINES = 3000  # of the record: who has which lease
 
-MOVING_CAMERA = [{"frame": 1, "position": [0, 1.2, 5], "lookAt": [0, 0.6, 0]},
-                 {"frame": 6, "position": [0.5, 1.3, 4.6], "lookAt": [0, 0.6, 0]}]
 KINDS = {
     "rest": {"frames": "1-8", "sampling": {"method": "sequential", "numCandidates": 256, "numDistributions": 12}},
     "motion": {"frames": "1-6", "sampling": {"method": "pool", "numParticles": 32, "numCandidates": 512},
-               "camera": {"keys": MOVING_CAMERA}},
+               "camera": camera_keys((1, [0, 1.2, 5], [0, 0.6, 0]), (6, [0.5, 1.3, 4.6], [0, 0.6, 0]))},
     "second-pass": {"frames": "1-5", "sampling": {"method": "bidirectional", "numCandidates": 512},
                     "visibility": {"correlated": True}},
 }
@@ -54,9 +53,7 @@ class Job:
         """Writes the job file. changes: of settings, which stay, or of the picture."""
         changes = {**KINDS[self.kind], "name": f"{self.kind} {self.number}", "output": {"directory": str(self.frames)},
                    "image": {"tileSize": 16}, "state": {"keep": "last"}, **self._edits, **changes}
-        merged = {key: {**self._plain.get(key, {}), **value} if isinstance(value, dict) else value
-                  for key, value in changes.items()}
-        return write_job(self.path, {**self._plain, **merged})
+        return write_job(self.path, merged(self._plain, changes))
 
     def edit(self, **settings):
         self._edits.update(settings)

@@ -77,7 +77,7 @@ class StoreWatch:
 
 def measure(programs, job, workers=1, arguments=(), folder=None):
     """(what `baton check` says, StoreWatch) of a job that is rendered into `folder`."""
-    predicted = json.loads(programs.run("baton", "check", job, "--json", *arguments).stdout)
+    predicted = programs.checked(job, *arguments)
     with tempfile.TemporaryDirectory(dir=folder) as work:
         out = ["--set", f"output.directory={work}/frames"]
         with StoreWatch(Path(work) / "work/store") as watch:

@@ -2,20 +2,24 @@
 
 import argparse
 import contextlib
+import inspect
 import json
-import math
 import os
 import random
 import re
 import shutil
 import signal
 import socket
-import struct
 import subprocess
 import sys
 import tempfile
 import time
+import traceback
 from pathlib import Path
+
+from exr_frames import read_frame, values_by
+from jobs import write_job
+from png_files import leave_pictures
 
 # Generous: a busy machine must not fail a test. Builds with sanitizers ask for more patience.
 PATIENCE = int(os.environ.get("BATON_PATIENCE", "1"))
@@ -35,8 +39,19 @@ def check(condition, message):
 
 
 def check_equal(got, expected, what):
-    """Ends the test unless both are equal."""
+    """Ends the test unless both are equal, or all that two tuples hold. Of unequal frames pictures are left behind."""
+    if isinstance(got, tuple) and isinstance(expected, tuple) and len(got) == len(expected):
+        for one, other in zip(got, expected):
+            check_equal(one, other, what)
+    if isinstance(got, Frames) and isinstance(expected, Frames) and got != expected:
+        raise Fault(f"{what}: {got.apart_from(expected)}")
     check(got == expected, f"{what}: got {got!r}, expected {expected!r}")
+
+
+def check_says(text, *parts):
+    """Ends the test unless every part is in what a program said."""
+    for part in parts:
+        check(part in text, f"expected {part!r} in:\n{text}")
 
 
 def wait_until(condition, what, deadline_s=DEADLINE_S):
@@ -50,108 +65,27 @@ def wait_until(condition, what, deadline_s=DEADLINE_S):
     raise Fault(f"{what}: not within {deadline_s} s")
 
 
-# ---- inputs -------------------------------------------------------------------------------------------------
-
-
-def write_sphere(path, rings=8, segments=12):
-    """A unit sphere of triangles as OFF."""
-    vertices = [(0.0, 1.0, 0.0)]
-    for ring in range(1, rings):
-        theta = math.pi * ring / rings
-        for segment in range(segments):
-            phi = 2 * math.pi * segment / segments
-            vertices.append((math.sin(theta) * math.cos(phi), math.cos(theta), math.sin(theta) * math.sin(phi)))
-    vertices.append((0.0, -1.0, 0.0))
-
-    def index(ring, segment):
-        return 1 + (ring - 1) * segments + segment % segments
-
-    triangles = []
-    for segment in range(segments):
-        triangles.append((0, index(1, segment + 1), index(1, segment)))
-        for ring in range(1, rings - 1):
-            a, b = index(ring, segment), index(ring, segment + 1)
-            c, d = index(ring + 1, segment), index(ring + 1, segment + 1)
-            triangles += [(a, b, c), (b, d, c)]
-        triangles.append((len(vertices) - 1, index(rings - 1, segment), index(rings - 1, segment + 1)))
-    lines = ["OFF", f"{len(vertices)} {len(triangles)} 0"]
-    lines += [" ".join(f"{x:.6f}" for x in vertex) for vertex in vertices]
-    lines += ["3 " + " ".join(str(i) for i in triangle) for triangle in triangles]
-    path.write_text("\n".join(lines) + "\n", encoding="ascii")
-
-
-def lamp(x, y, width, height):
-    """Colour of a texel: a gradient sky, a dark floor and one small bright lamp."""
-    if abs(x - width // 4) <= 1 and abs(y - height // 4) <= 1:
-        return (40.0, 36.0, 30.0)
-    sky = 0.2 + 0.8 * (height - y) / height if y < height / 2 else 0.05
-    return (sky * 0.7, sky * 0.8, sky)
-
-
-def write_map(path, width=32, height=16, colour=lamp):
-    """A lat-long Radiance HDR map of colour(x, y, width, height), no texel of it black."""
-    rows = bytearray()
-    for y in range(height):
-        for x in range(width):
-            rgb = colour(x, y, width, height)
-            mantissa, exponent = math.frexp(max(rgb))
-            scale = mantissa * 256.0 / max(rgb)
-            rows += struct.pack("4B", *(int(c * scale) for c in rgb), exponent + 128)
-    header = f"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y {height} +X {width}\n"
-    path.write_bytes(header.encode("ascii") + bytes(rows))
-
-
-def make_job(folder, **changes):
-    """A small job as a dict; its assets are written to `folder`. changes: top-level keys, merged one level deep."""
-    folder.mkdir(parents=True, exist_ok=True)
-    write_sphere(folder / "sphere.off")
-    write_map(folder / "lamp.hdr")
-    job = {
-        "specificationVersion": 1,
-        "name": "system test",
-        "frames": "1-6",
-        "seed": 7,
-        "image": {"width": 160, "height": 96, "sites": 1, "tileSize": 64},
-        "camera": {"position": [0, 1.2, 5], "lookAt": [0, 0.6, 0], "verticalFovDeg": 35},
-        "scene": {
-            "materials": {
-                "chalk": {"type": "diffuse", "color": [0.7, 0.7, 0.65]},
-                "lacquer": {"type": "phong", "color": [0.6, 0.1, 0.1], "kd": 0.5, "ks": 0.4, "exponent": 50},
-            },
-            "meshes": {"sphere": str(folder / "sphere.off")},
-            "objects": [
-                {"mesh": "sphere", "material": "lacquer", "translate": [-0.9, 0.8, 0], "scale": [0.8, 0.8, 0.8]},
-                {"mesh": "sphere", "material": "chalk", "translate": [0.9, 0.6, 0.3], "scale": [0.6, 0.6, 0.6]},
-            ],
-            "ground": {"material": "chalk", "height": 0, "size": 20},
-        },
-        "environment": {
-            "keys": [{"frame": 1, "map": str(folder / "lamp.hdr")}],
-            "rotation": {"axis": [0, 1, 0], "startDeg": 0, "degPerFrame": 1.5},
-        },
-        "sampling": {"method": "sequential", "numParticles": 16, "numCandidates": 64, "numDistributions": 3},
-        "output": {
-            "directory": str(folder / "frames"),
-            "aovs": ["lns", "visibility", "ess", "acceptance", "source", "normal", "depth"],
-        },
-        "state": {"carry": True, "checkpointEvery": 2, "keep": "all"},
-    }
-    for key, value in changes.items():
-        if isinstance(value, dict):
-            job[key] = {**job.get(key, {}), **value}
-        else:
-            job[key] = value
-    return job
-
-
-def write_job(path, job):
-    """Writes the job file; returns its path."""
-    path.parent.mkdir(parents=True, exist_ok=True)
-    path.write_text(json.dumps(job, indent=2), encoding="utf-8")
-    return path
-
-
 # ---- programs -----------------------------------------------------------------------------------------------
+
+
+class Frames(dict):
+    """File name -> digests of the decoded channels, for every EXR of a folder."""
+
+    def __init__(self, programs, folder):
+        self.folder, self.read_values = Path(folder), values_by(programs.path("exr_values"))
+        files = sorted(self.folder.glob("*.exr"))
+        super().__init__(zip((file.name for file in files), programs.run("exr_digest", *files).stdout.splitlines()))
+
+    def apart_from(self, expected):
+        """What differs, in words; the pictures of the first frame that does are left beside it."""
+        if self.keys() != expected.keys():
+            return f"got the frames {sorted(self)}, expected {sorted(expected)}"
+        names = [name for name in self if self[name] != expected[name]]
+        pictures = self.folder.parent / f"{self.folder.name}-{Path(names[0]).stem}-differs"
+        with contextlib.suppress(OSError):  # where the frames have been replaced since, the digests must do
+            leave_pictures(pictures, *(read_frame(frames.folder / names[0], self.read_values) for frames in (self, expected)))
+        return f"{names} of {self.folder} differ from {expected.folder}; pictures are in {pictures}\n" \
+               f"{self[names[0]]}\n{expected[names[0]]}"
 
 
 class Programs:
@@ -173,10 +107,8 @@ class Programs:
         return done
 
     def pixels(self, frames_folder):
-        """File name -> digests of the decoded channels, for every EXR of the folder."""
-        files = sorted(Path(frames_folder).glob("*.exr"))
-        lines = self.run("exr_digest", *files).stdout.splitlines()
-        return {file.name: line for file, line in zip(files, lines)}
+        """What the frames of a folder show."""
+        return Frames(self, frames_folder)
 
     def values(self, file, channel):
         """All pixels of one channel."""
@@ -190,6 +122,26 @@ class Programs:
         """`baton render` of a whole job in one command. extra: more arguments."""
         return self.run("baton", "render", job_path, "--workers", workers, "--threads-per-worker", threads,
                         "--work-dir", work_folder, *extra, **options)
+
+    def render_in(self, folder, job, *layout, **options):
+        """The same of a job that is a dict, whose file and work are in `folder`."""
+        return self.render(write_job(folder / "job.json", job), folder / "work", *layout, **options)
+
+    def rendered(self, folder, job, *layout, **options):
+        """The same; returns what its frames show."""
+        self.render_in(folder, job, *layout, **options)
+        return self.pixels(folder / "frames")
+
+    def checked(self, job_path, *args):
+        """`baton check` as a dict."""
+        return json.loads(self.run("baton", "check", job_path, "--json", *args).stdout)
+
+    def refuses(self, *command, says, expect=BAD_INPUT):
+        """`baton` with these words says every part on stderr; returns all of that. expect: the exit code, None for any but 0."""
+        done = self.run("baton", *command, expect=expect)
+        check(done.returncode != OK, f"{command}: not refused")
+        check_says(done.stderr, *([says] if isinstance(says, str) else says))
+        return done.stderr
 
 
 class Process:
@@ -232,10 +184,10 @@ class Process:
 
 
 class Farm:
-    """A coordinator and its workers; everything is killed on leaving the `with` block."""
+    """A coordinator and its workers, which a `with` block starts and kills. workers: None where nothing is started at once."""
 
-    def __init__(self, programs, folder):
-        self.programs = programs
+    def __init__(self, programs, folder, workers=0, threads=1):
+        self.programs, self._at_once = programs, (workers, threads)
         self.folder = Path(folder)
         self.folder.mkdir(parents=True, exist_ok=True)
         self.work_folder = self.folder / "work"
@@ -247,6 +199,11 @@ class Farm:
         self._port = free_port()
 
     def __enter__(self):
+        workers, threads = self._at_once
+        if workers is not None:
+            self.start_coordinator()
+            for _ in range(workers):
+                self.start_worker(threads)
         return self
 
     def __exit__(self, kind, *_):
@@ -304,12 +261,41 @@ def free_port():
             return port
 
 
+# ---- what several scripts check -------------------------------------------------------------------------------
+
+# No picture may depend on these: workers, threads of each, size of tiles.
+LAYOUTS = {"whole image": (1, 2, 160), "small tiles": (2, 1, 16), "many workers": (3, 1, 64)}
+
+
+def check_layouts(programs, folder, job_of, layouts=LAYOUTS, states=True):
+    """Every layout gives the pixels of the first one, and leaves its samples. job_of: of a folder. Returns both of the
+    first."""
+    first = None
+    for name, (workers, threads, tile_size) in layouts.items():
+        place = folder / name.replace(" ", "-")
+        job = job_of(place)
+        job["image"]["tileSize"] = tile_size
+        pixels = programs.rendered(place, job, workers, threads)
+        got = pixels, programs.states(place / "work") if states else ""
+        first = first or got
+        check_equal(got, first, f"pixels and samples, {name}")
+    check(first[0], f"no frames in {folder}")
+    return first
+
+
 # ---- a test script ------------------------------------------------------------------------------------------
 
 
-def run_tests(tests, long_tests=()):
-    """Main of a test script: --bin and --source, then each test with its own folder. Exits 1 when one fails.
-    long_tests: run with --long, too."""
+def tests_of(module):
+    """Its functions of (programs, folder), or of (_programs, _folder), in order; those that begin with _ are for others."""
+    functions = [value for name, value in vars(module).items() if inspect.isfunction(value) and not name.startswith("_")]
+    return [function for function in functions if function.__module__ == module.__name__
+            and [name.strip("_") for name in inspect.signature(function).parameters] == ["programs", "folder"]]
+
+
+def run_tests(long_tests=()):
+    """Main of a test script: --bin and --source, then each of its tests with its own folder. Exits 1 when one fails.
+    long_tests: run with --long alone."""
     parser = argparse.ArgumentParser()
     parser.add_argument("--bin", required=True, help="folder of the programs")
     parser.add_argument("--source", required=True, help="root of the project")
@@ -321,16 +307,17 @@ def run_tests(tests, long_tests=()):
     programs = Programs(options.bin)
     root = Path(tempfile.mkdtemp(prefix="baton-system-"))
     failures = 0
-    for test in [*tests, *(long_tests if options.long else [])]:
-        if not re.search(options.only, test.__name__):
+    for test in tests_of(sys.modules["__main__"]):
+        if not re.search(options.only, test.__name__) or (test in long_tests and not options.long):
             continue
         start = time.monotonic()
         try:
             test(programs, root / test.__name__)
             verdict = "ok"
-        except (Fault, subprocess.TimeoutExpired) as fault:
+        except Exception as fault:  # so that the other tests run
             failures += 1
-            verdict = f"FAILED: {fault}"
+            expected = isinstance(fault, (Fault, subprocess.TimeoutExpired))
+            verdict = f"FAILED: {fault if expected else traceback.format_exc()}"
         print(f"{test.__name__}: {verdict} ({time.monotonic() - start:.1f} s)", flush=True)
     if failures == 0 and not options.keep:
         shutil.rmtree(root, ignore_errors=True)

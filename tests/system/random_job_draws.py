@@ -22,8 +22,9 @@ MOST_WORK = 5e6
 class Draw(Motion, Pictures, Textures):
     """One random case: {"job", "files", "first", "second"}, as random_job_judge.py takes it."""
 
-    def __init__(self, schema, rng):
-        self.rng = rng
+    def __init__(self, schema, rng, without=None):
+        """without: the one of random_job_rules.RULES that the job need not obey."""
+        self.rng, self.without = rng, without
         self.files = {}
         self.first_frame, self.step, self.count = 1, 1, 1
         self.on_ground, self.image = False, None
@@ -63,7 +64,7 @@ class Draw(Motion, Pictures, Textures):
                     job[key] = value
         self.maps(job)
         self.by_material(job)
-        mend(job, self.rng)
+        mend(job, self.rng, self.without)
         self.cheapen(job)
         self.plates(job)
         self.part_of_image(job["image"])

@@ -7,14 +7,10 @@ import math
 import os
 import random
 import struct
-import sys
 from array import array
 from pathlib import Path
 
-from farm import write_sphere
-
-sys.path.append(str(Path(__file__).parents[2] / "jobs/examples"))
-from make_gltf_set import make_set, png  # noqa: E402
+from assets import make_set, png, rgbe, sphere, write_exr, write_hdr, write_mesh
 
 # ---- recipes ------------------------------------------------------------------------------------------------
 # A recipe is {"kind": ..., its numbers}; the file's ending says the format.
@@ -29,7 +25,7 @@ def write_file(path, recipe, shared):
     elif kind in MESHES:
         MESHES[kind](path, recipe)
     elif kind in SKIES:
-        write_map(path, recipe)
+        write_sky(path, recipe)
     elif kind == "image":
         write_image(path, recipe["width"], recipe["height"])
     elif kind == "merl":
@@ -53,42 +49,14 @@ def write_image(path, width, height):
     path.write_bytes(png(width, height, lambda x, y: texels[y * width + x]))
 
 
-def write_triangles(path, vertices, triangles):
-    """A mesh as OFF, OBJ or PLY."""
-    ending = path.suffix
-    points = [" ".join(repr(float(x)) for x in vertex) for vertex in vertices]
-    if ending == ".off":
-        lines = ["OFF", f"{len(points)} {len(triangles)} 0", *points]
-        lines += ["3 " + " ".join(map(str, triangle)) for triangle in triangles]
-    elif ending == ".obj":
-        lines = [f"v {point}" for point in points]
-        lines += ["f " + " ".join(str(i + 1) for i in triangle) for triangle in triangles]
-    else:
-        lines = ["ply", "format ascii 1.0", f"element vertex {len(points)}"]
-        lines += [f"property float {axis}" for axis in "xyz"]
-        lines += [f"element face {len(triangles)}", "property list uchar int vertex_indices", "end_header", *points]
-        lines += ["3 " + " ".join(map(str, triangle)) for triangle in triangles]
-    path.write_text("\n".join(lines) + "\n", encoding="ascii")
-
-
-def sphere(path, recipe):
-    """A closed unit sphere: a camera can be inside."""
-    off = path.with_suffix(".off")
-    write_sphere(off, recipe["rings"], recipe["segments"])
-    if off == path:
-        return
-    words = off.read_text(encoding="ascii").split()[1:]
-    off.unlink()
-    count, faces = int(words[0]), int(words[1])
-    numbers = words[3:]
-    vertices = [tuple(map(float, numbers[3 * i:3 * i + 3])) for i in range(count)]
-    rest = numbers[3 * count:]
-    write_triangles(path, vertices, [tuple(map(int, rest[4 * i + 1:4 * i + 4])) for i in range(faces)])
+def closed_sphere(path, recipe):
+    """A camera can be inside."""
+    write_mesh(path, *sphere(recipe["rings"], recipe["segments"]))
 
 
 def card(path, _):
     """A square that has a back."""
-    write_triangles(path, [(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)], [(0, 1, 2), (0, 2, 3)])
+    write_mesh(path, [(-1, -1, 0), (1, -1, 0), (1, 1, 0), (-1, 1, 0)], [(0, 1, 2), (0, 2, 3)])
 
 
 def shards(path, recipe):
@@ -96,10 +64,10 @@ def shards(path, recipe):
     rng = random.Random(recipe["seed"])
     vertices = [tuple(rng.uniform(-1, 1) for _ in range(3)) for _ in range(3 * recipe["count"])]
     triangles = [(3 * i, 3 * i + 1, 3 * i + (2 if i % 4 or i == 0 else 1)) for i in range(recipe["count"])]
-    write_triangles(path, vertices, triangles)
+    write_mesh(path, vertices, triangles)
 
 
-MESHES = {"sphere": sphere, "card": card, "shards": shards}
+MESHES = {"sphere": closed_sphere, "card": card, "shards": shards}
 
 
 def gradient(v):
@@ -119,7 +87,7 @@ SKIES = {
 }
 
 
-def write_map(path, recipe):
+def write_sky(path, recipe):
     """A lat-long map: rows of one colour each, and `count` special texels at places that `seed` draws."""
     width, height = recipe["width"], recipe["height"]
     row_colour, special = SKIES[recipe["kind"]]
@@ -138,48 +106,11 @@ def write_map(path, recipe):
     if path.suffix == ".exr":
         write_exr(path, width, rows)
     else:
-        header = f"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y {height} +X {width}\n"
-        path.write_bytes(header.encode("ascii") + b"".join(rows))
-
-
-def rgbe(rgb):
-    """A texel of a Radiance file."""
-    largest = max(rgb)
-    if largest < 1e-32:
-        return b"\0\0\0\0"
-    exponent = math.frexp(largest)[1]
-    return bytes([*(min(255, int(c * math.ldexp(256, -exponent))) for c in rgb), exponent + 128])
+        write_hdr(path, width, rows)
 
 
 def exr_texel(rgb):
     return struct.pack("<3f", *rgb)
-
-
-def write_exr(path, width, rows):
-    """An uncompressed scan-line EXR of float B, G, R. rows: interleaved float R, G, B."""
-
-    def attribute(name, kind, value):
-        return name + b"\0" + kind + b"\0" + struct.pack("<i", len(value)) + value
-
-    channels = b"".join(name + b"\0" + struct.pack("<iiii", 2, 0, 1, 1) for name in (b"B", b"G", b"R")) + b"\0"
-    window = struct.pack("<4i", 0, 0, width - 1, len(rows) - 1)
-    header = b"\x76\x2f\x31\x01\x02\0\0\0" + b"".join([
-        attribute(b"channels", b"chlist", channels),
-        attribute(b"compression", b"compression", b"\0"),
-        attribute(b"dataWindow", b"box2i", window),
-        attribute(b"displayWindow", b"box2i", window),
-        attribute(b"lineOrder", b"lineOrder", b"\0"),
-        attribute(b"pixelAspectRatio", b"float", struct.pack("<f", 1)),
-        attribute(b"screenWindowCenter", b"v2f", struct.pack("<2f", 0, 0)),
-        attribute(b"screenWindowWidth", b"float", struct.pack("<f", 1))]) + b"\0"
-    first, size = len(header) + 8 * len(rows), 8 + 12 * width
-    with path.open("wb") as file:
-        file.write(header + b"".join(struct.pack("<Q", first + size * y) for y in range(len(rows))))
-        for y, row in enumerate(rows):
-            floats = array("f", bytes(row))
-            file.write(struct.pack("<2i", y, 12 * width))
-            for channel in (2, 1, 0):
-                file.write(floats[channel::3].tobytes())
 
 
 def link_table(path, recipe, shared):

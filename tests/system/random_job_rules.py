@@ -1,7 +1,12 @@
-"""What the keys of a legal job demand of each other, what a job costs, and how one is spoiled."""
+"""What the keys of a legal job demand of each other, what a job costs, and how one is spoiled.
+
+The rules are a second witness of what `baton check` says: written from the pages, not from the program. test_random_jobs.py
+compares both ways: what obeys all rules is accepted, and what breaks a single one is refused.
+"""
 
 import copy
 import math
+import random
 
 
 def work_of(job, num_frames):
@@ -49,6 +54,15 @@ def whole_blocks(tile_size):
     return (tile_size + 7) // 8 * 8
 
 
+def is_correlated(job):
+    return job["visibility"].get("correlated", False)
+
+
+def drop_if_true(values, key):
+    if values.get(key):
+        del values[key]
+
+
 def catchers(scene):
     """All that may catch shadows."""
     gltf = scene.get("gltf", {})
@@ -56,47 +70,88 @@ def catchers(scene):
     return [scene.get("ground", {}), *scene.get("objects", []), *nodes.values()]
 
 
-def mend(job, rng):
-    """What the keys of a legal job demand of each other."""
-    sampling, visibility = job["sampling"], job.setdefault("visibility", {})
-    method = sampling["method"]
+# ---- the rules ----------------------------------------------------------------------------------------------
+# Each mends a job in one respect, and leaves one that is legal in it alone.
+
+
+def at_least_as_many_candidates_as_particles(job, _rng):
+    sampling = job["sampling"]
     for counts in [sampling, *sampling.get("byMaterial", {}).values()]:
         n = counts.get("numParticles", sampling["numParticles"])
-        counts["numCandidates"] = max(counts.get("numCandidates", sampling["numCandidates"]), n)
+        if counts.get("numCandidates", sampling["numCandidates"]) < n:
+            counts["numCandidates"] = n
     if "refreshCandidates" in sampling:
         sampling["refreshCandidates"] = max(sampling["refreshCandidates"], sampling["numParticles"])
-    if method != "mis" or sampling.get("byMaterial"):
-        sampling.pop("misCompensation", None)
+
+
+def compensation_is_of_mis(job, _rng):
+    sampling = job["sampling"]
+    if sampling["method"] != "mis" or sampling.get("byMaterial"):
+        drop_if_true(sampling, "misCompensation")
+
+
+def one_target_and_only_of_auto(job, _rng):
+    sampling = job["sampling"]
     for key in ("targetError", "timeBudget"):
-        if method != "auto" or (key == "timeBudget" and "targetError" in sampling):
+        if sampling["method"] != "auto" or (key == "timeBudget" and "targetError" in sampling):
             sampling.pop(key, None)
-    if method in ("reference", "pool", "ratio", "restir", "auto") or sampling.get("byMaterial"):
-        visibility["correlated"] = False
-    if (visibility.get("correlated") or method == "auto") and "quality" in job:
-        job["quality"] = {}
-    if job.get("quality", {}).get("rounds", 1) < 3 or method in ("sequential", "restir"):
-        job.get("quality", {}).pop("adaptiveThreshold", None)
-    if "adaptiveThreshold" in job.get("quality", {}) and "tileSize" in job["image"]:
-        job["image"]["tileSize"] = whole_blocks(job["image"]["tileSize"])
-    image = job["image"]
-    if visibility.get("correlated") or method in ("sequential", "restir", "auto"):
-        image.pop("maxSites", None)
-    elif "maxSites" in image:
-        image["maxSites"] = image.get("sites", 1) * rng.choice((1, 4, 4, 16, 16))
-    if visibility.get("correlated") and visibility.get("mask") != "same-samples" and sampling["numParticles"] % 2:
+
+
+def a_second_pass_of_few_methods(job, _rng):
+    if job["sampling"]["method"] in ("reference", "pool", "ratio", "restir", "auto") or job["sampling"].get("byMaterial"):
+        drop_if_true(job["visibility"], "correlated")
+
+
+def one_round_with_a_second_pass_or_auto(job, _rng):
+    if is_correlated(job) or job["sampling"]["method"] == "auto":
+        job.pop("quality", None)
+
+
+def adaptive_rounds(job, _rng):
+    quality, image = job.get("quality", {}), job["image"]
+    if quality.get("rounds", 1) < 3 or job["sampling"]["method"] in ("sequential", "restir"):
+        quality.pop("adaptiveThreshold", None)
+    if "adaptiveThreshold" in quality and "tileSize" in image:
+        image["tileSize"] = whole_blocks(image["tileSize"])
+
+
+def more_sites_in_later_rounds(job, rng):
+    image, sites = job["image"], job["image"].get("sites", 1)
+    most = image.get("maxSites", sites)
+    if most > sites and (is_correlated(job) or job["sampling"]["method"] in ("sequential", "restir", "auto")):
+        image.pop("maxSites")
+    elif most not in [sites * factor for factor in (1, 4, 16)]:
+        image["maxSites"] = sites * rng.choice((1, 4, 4, 16, 16))
+
+
+def two_folds_are_of_one_size(job, rng):
+    sampling, visibility = job["sampling"], job["visibility"]
+    if is_correlated(job) and visibility.get("mask") != "same-samples" and sampling["numParticles"] % 2:
         if rng.random() < 0.5:
             visibility["mask"] = "same-samples"
         else:
             sampling["numParticles"] += 1 if sampling["numParticles"] < 64 else -1
-            sampling["numCandidates"] = max(sampling["numCandidates"], sampling["numParticles"])
-    if visibility.get("correlated"):
-        for catcher in catchers(job["scene"]):
-            catcher.pop("catcher", None)
-    if (method == "restir" and sampling.get("reuseVisibility")) or visibility.get("correlated"):
+            at_least_as_many_candidates_as_particles(job, rng)
+
+
+def no_catchers_with_a_second_pass(job, _rng):
+    for catcher in catchers(job["scene"]) if is_correlated(job) else []:
+        drop_if_true(catcher, "catcher")
+
+
+def what_arrives_is_known(job, _rng):
+    sampling = job["sampling"]
+    if (sampling["method"] == "restir" and sampling.get("reuseVisibility")) or is_correlated(job):
         aovs = job.get("output", {}).get("aovs", [])
         aovs[:] = [aov for aov in aovs if aov not in ("unshadowed", "blocked")]
-    if job["output"].get("background") != "transparent":
-        job["output"].pop("shadows", None)
+
+
+def shadows_in_alpha_of_what_is_transparent(job, _rng):
+    if job["output"].get("background") != "transparent" and job["output"].get("shadows") == "alpha":
+        del job["output"]["shadows"]
+
+
+def one_kind_of_motion(job, _rng):
     rotation = job["environment"].get("rotation", {})
     if rotation.get("keys"):
         rotation.pop("startDeg", None)
@@ -104,6 +159,26 @@ def mend(job, rng):
     for movable in [job["camera"], *job["scene"]["objects"]]:
         if movable.get("keys"):
             movable.pop("gltf", None)
+
+
+RULES = [at_least_as_many_candidates_as_particles, compensation_is_of_mis, one_target_and_only_of_auto,
+         a_second_pass_of_few_methods, one_round_with_a_second_pass_or_auto, adaptive_rounds, more_sites_in_later_rounds,
+         two_folds_are_of_one_size, no_catchers_with_a_second_pass, what_arrives_is_known,
+         shadows_in_alpha_of_what_is_transparent, one_kind_of_motion]
+
+
+def mend(job, rng, without=None):
+    """Makes a drawn job legal; or, `without` one of the rules, legal but for it."""
+    job.setdefault("visibility", {})
+    for rule in RULES:
+        if rule is not without:
+            rule(job, rng)
+
+
+def breaks(job, rule):
+    mended = copy.deepcopy(job)
+    rule(mended, random.Random(1))
+    return mended != job
 
 
 def spoil(case, rng):

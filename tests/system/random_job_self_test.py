@@ -12,7 +12,8 @@ from pathlib import Path
 
 from exr_frames import Frame, read_frame, unpack_runs
 from random_job_draws import NUM_CANDIDATES, NUM_PARTICLES, Draw, draw_case
-from random_job_files import rgbe, write_file
+from assets import rgbe
+from random_job_files import write_file
 from random_job_judge import FAULT_LINE, Wrong, compare, compare_prediction, judge_frames
 from random_job_means import FIRST_LOOK, SECOND_LOOK, significant
 from random_job_rules import spoil

@@ -4,87 +4,65 @@
 import shutil
 import socket
 
-from farm import BAD_INPUT, FAILED, IO, OK, USAGE, Farm, check, check_equal, make_job, run_tests, write_job
+from farm import BAD_INPUT, FAILED, IO, OK, Farm, check, check_equal, check_says, run_tests
+from jobs import make_job, write_job
 
 
-def check_error(done, exit_codes, *parts):
-    """The program ended with one of the exit codes and said every part on stderr."""
-    check(done.returncode in exit_codes, f"exit code {done.returncode}, expected {exit_codes}\n{done.stderr}")
-    for part in parts:
-        check(part in done.stderr, f"expected {part!r} in:\n{done.stderr}")
+# What is said of a job with these changes: each fault is named, all in one go.
+FAULTS = [
+    ({"image": {"widht": 100}}, ["job.json", "$.image.widht", "width"]),
+    ({"image": {"width": "wide"}}, ["$.image.width", "integer"]),
+    ({"image": {"height": -96}}, ["$.image.height", "-96"]),
+    ({"frames": "1-999999999", "image": {"width": 1e12}, "sampling": {"numParticles": 1000000}},
+     ["$.image.width", "$.sampling.numParticles", "$.frames"]),
+]
 
 
-def check_job(programs, folder, exit_codes, *parts, **changes):
-    """`baton check` of a job with the changes."""
-    path = write_job(folder / "job.json", make_job(folder, **changes))
-    check_error(programs.run("baton", "check", path, expect=None), exit_codes, *parts)
+def wrong_keys_types_and_values(programs, folder):
+    for changes, words in FAULTS:
+        programs.refuses("check", write_job(folder / "job.json", make_job(folder, **changes)), says=words)
 
 
-def a_misspelt_key(programs, folder):
-    check_job(programs, folder, [BAD_INPUT], "job.json", "$.image.widht", "width", image={"widht": 100})
-
-
-def a_wrong_type(programs, folder):
-    check_job(programs, folder, [BAD_INPUT], "$.image.width", "integer", image={"width": "wide"})
-
-
-def a_negative_resolution(programs, folder):
-    check_job(programs, folder, [BAD_INPUT], "$.image.height", "-96", image={"height": -96})
-
-
-def absurd_values(programs, folder):
-    """Each fault is named, all in one go."""
-    check_job(programs, folder, [BAD_INPUT], "$.image.width", "$.sampling.numParticles", "$.frames",
-              frames="1-999999999", image={"width": 1e12}, sampling={"numParticles": 1000000})
+def fails(programs, *command, says, codes):
+    """The command ends with one of the exit codes and says so on stderr."""
+    done = programs.run("baton", *command, expect=None)
+    check(done.returncode in codes, f"exit code {done.returncode}, expected {codes}\n{done.stderr}")
+    check_says(done.stderr, says)
 
 
 def text_that_is_no_json(programs, folder):
     folder.mkdir(parents=True)
     path = folder / "job.json"
     path.write_text('{"name": "cut off', encoding="utf-8")
-    check_error(programs.run("baton", "check", path, expect=None), [BAD_INPUT], "job.json")
+    programs.refuses("check", path, says="job.json")
 
 
 def a_missing_job(programs, folder):
-    done = programs.run("baton", "render", folder / "nothing.json", expect=None)
-    check_error(done, [BAD_INPUT], "nothing.json: no such file")
+    programs.refuses("render", folder / "nothing.json", says="nothing.json: no such file")
 
 
 def a_missing_mesh(programs, folder):
     changes = {"scene": {**make_job(folder)["scene"], "meshes": {"sphere": str(folder / "gone.off")}}}
     path = write_job(folder / "job.json", make_job(folder, **changes))
-    for command in [["check"], ["render", "--work-dir", folder / "work"]]:
-        done = programs.run("baton", command[0], path, *command[1:], expect=None)
-        check_error(done, [BAD_INPUT, IO], "gone.off")
+    for command in [["check", path], ["render", path, "--work-dir", folder / "work"]]:
+        fails(programs, *command, says="gone.off", codes=[BAD_INPUT, IO])
 
 
-def render_with_map(programs, folder, map_path):
-    """`baton render` of a job lit by the map."""
-    keys = {"keys": [{"frame": 1, "map": str(map_path)}]}
-    path = write_job(folder / "job.json", make_job(folder, frames="1", environment=keys))
-    return programs.run("baton", "render", path, "--work-dir", folder / "work", expect=None)
-
-
-def a_truncated_map(programs, folder):
-    """An EXR that was cut in the middle, as a broken copy leaves it."""
-    good = write_job(folder / "good/job.json", make_job(folder / "good", frames="1"))
-    programs.render(good, folder / "good/work")
+def maps_that_are_none(programs, folder):
+    """An EXR that was cut in the middle, as a broken copy leaves it, and text."""
+    programs.render_in(folder / "good", make_job(folder / "good", frames="1"))
     whole = (folder / "good/frames/frame.0001.exr").read_bytes()
-    (folder / "cut.exr").write_bytes(whole[: len(whole) // 2])
-    check_error(render_with_map(programs, folder, folder / "cut.exr"), [BAD_INPUT, IO, FAILED], "cut.exr")
-
-
-def text_named_exr(programs, folder):
-    folder.mkdir(parents=True)
-    (folder / "text.exr").write_text("this is no picture\n" * 20, encoding="ascii")
-    check_error(render_with_map(programs, folder, folder / "text.exr"), [BAD_INPUT, IO, FAILED], "text.exr")
+    for name, content in {"cut.exr": whole[: len(whole) // 2], "text.exr": b"this is no picture\n" * 20}.items():
+        (folder / name).write_bytes(content)
+        job = make_job(folder, frames="1", environment={"keys": [{"frame": 1, "map": str(folder / name)}]})
+        fails(programs, "render", write_job(folder / "job.json", job), "--work-dir", folder / "work", says=name,
+              codes=[BAD_INPUT, IO, FAILED])
 
 
 def a_damaged_state(programs, folder):
     """One changed byte anywhere is found by `baton state verify`."""
-    path = write_job(folder / "job.json", make_job(folder, frames="1-2"))
-    programs.render(path, folder / "work")
-    state = next(f for f in (folder / "work").rglob("*.blob") if f.read_bytes()[:4] == state_magic(programs, folder))
+    programs.render_in(folder, make_job(folder, frames="1-2"))
+    state = next(f for f in (folder / "work").rglob("*.blob") if f.read_bytes()[:4] == _state_magic(programs, folder))
     copy = folder / "copy.bst"
     shutil.copyfile(state, copy)
     programs.run("baton", "state", "verify", copy)
@@ -93,12 +71,12 @@ def a_damaged_state(programs, folder):
         damaged = bytearray(whole)
         damaged[position] ^= 1
         copy.write_bytes(damaged)
-        check_error(programs.run("baton", "state", "verify", copy, expect=None), [BAD_INPUT], "copy.bst")
+        programs.refuses("state", "verify", copy, says="copy.bst")
     copy.write_bytes(whole[: len(whole) // 2])
-    check_error(programs.run("baton", "state", "verify", copy, expect=None), [BAD_INPUT], "copy.bst")
+    programs.refuses("state", "verify", copy, says="copy.bst")
 
 
-def state_magic(programs, folder):
+def _state_magic(programs, folder):
     """The first four bytes of a blob that `baton state verify` accepts."""
     for blob in sorted((folder / "work").rglob("*.blob")):
         if programs.run("baton", "state", "verify", blob, expect=None).returncode == OK:
@@ -110,7 +88,6 @@ def state_magic(programs, folder):
 def a_live_coordinator_survives_any_message(programs, folder):
     """Messages of another version, cut, too long or of no meaning, and plain bytes: the next job is rendered."""
     with Farm(programs, folder / "farm") as farm:
-        farm.start_coordinator()
         worker = farm.start_worker()
         for kind in ["version", "garbage", "empty", "short", "many"]:
             answer = programs.run("send_raw", farm.endpoint, kind).stdout
@@ -133,12 +110,11 @@ def a_live_coordinator_survives_any_message(programs, folder):
 def a_failing_job_leaves_the_farm_alone(programs, folder):
     """A mesh that disappears after submission fails its job with its name; the next job is rendered."""
     with Farm(programs, folder / "farm") as farm:
-        farm.start_coordinator()
         bad_path = write_job(folder / "bad/job.json", make_job(folder / "bad", maxRetriesPerTask=0))
         bad = farm.submit(bad_path)
         (folder / "bad/sphere.off").unlink()
         worker = farm.start_worker()
-        check_error(farm.baton("job", "wait", bad, expect=None), [FAILED])
+        farm.baton("job", "wait", bad, expect=FAILED)
         check(any("sphere.off" in failure for failure in farm.show(bad)["failures"]), "the failure names no file")
 
         good = farm.submit(write_job(folder / "good/job.json", make_job(folder / "good", frames="1-2")))
@@ -147,17 +123,4 @@ def a_failing_job_leaves_the_farm_alone(programs, folder):
 
 
 if __name__ == "__main__":
-    run_tests([
-        a_misspelt_key,
-        a_wrong_type,
-        a_negative_resolution,
-        absurd_values,
-        text_that_is_no_json,
-        a_missing_job,
-        a_missing_mesh,
-        a_truncated_map,
-        text_named_exr,
-        a_damaged_state,
-        a_live_coordinator_survives_any_message,
-        a_failing_job_leaves_the_farm_alone,
-    ])
+    run_tests()

@@ -12,7 +12,8 @@ import subprocess
 import sys
 from pathlib import Path
 
-from farm import check, check_equal, make_job, run_tests, write_job
+from farm import check, check_equal, run_tests
+from jobs import make_job, write_job
 
 ROOT = Path(__file__).parents[2]
 sys.path += [str(ROOT / "jobs/exporters/blender/baton_exporter"), str(ROOT / "jobs/examples")]
@@ -173,7 +174,7 @@ def animations_that_baton_reads(programs, folder):
             file.document.pop("animations")
             file.write(folder / "still.glb")
         job["scene"] = {"gltf": {"file": f"{name}.glb"}}
-        checked = json.loads(programs.run("baton", "check", write_job(folder / f"{name}.json", job), "--json").stdout)
+        checked = programs.checked(write_job(folder / f"{name}.json", job))
         moved[name] = checked.get("motionMaxPx", 0)
     check(moved["moved"] > 1 and moved["still"] <= 1, f"motion in pixels: {moved}")
 
@@ -192,7 +193,7 @@ def shapes_of_frames(programs, folder):
     file.write(folder / "moved.glb")
     job = make_job(folder, frames="1-3")
     job["scene"] = {"gltf": {"file": "moved.glb"}}
-    checked = json.loads(programs.run("baton", "check", write_job(folder / "job.json", job), "--json").stdout)
+    checked = programs.checked(write_job(folder / "job.json", job))
     check(checked["motionMaxPx"] > 1, f"motion of {checked['motionMaxPx']} pixels")
 
 
@@ -298,6 +299,4 @@ def check_uv_sets(path):
 
 if __name__ == "__main__":
     sys.dont_write_bytecode = True
-    run_tests([map_of_every_mapping, mappings_that_are_no_rotation, angles_of_rotations, cameras, keys_are_reduced,
-               frame_numbers, animations_that_baton_reads, shapes_of_frames, images_that_baton_reads, diffuse_materials, reports,
-               numbered_folders, files_of_blender])
+    run_tests()

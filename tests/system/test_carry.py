@@ -4,14 +4,14 @@ few pixels that look down and hardly see light: all of their samples may end wit
 
 import json
 
-from farm import check, check_equal, make_job, run_tests, write_job
+from farm import check, check_equal, run_tests
+from jobs import make_job
 
 
 def render(programs, folder, carry):
     """Two frames; returns (summary, pixels with a surface, red and green of the `source` AOV of frame 2)."""
     job = make_job(folder, frames="1-2", state={"carry": carry, "checkpointEvery": 1})
-    path = write_job(folder / "job.json", job)
-    done = programs.render(path, folder / "work", workers=2, extra=["--json"])
+    done = programs.render_in(folder, job, workers=2, extra=["--json"])
     frame = folder / "frames/frame.0002.exr"
     red, green = programs.values(frame, "source.R"), programs.values(frame, "source.G")
     surfaces = [depth > 0 for depth in programs.values(frame, "depth")]
@@ -44,4 +44,4 @@ def carry_on_starts_none(programs, folder):
 
 
 if __name__ == "__main__":
-    run_tests([carry_off_starts_every_pixel, carry_on_starts_none])
+    run_tests()

@@ -14,4 +14,4 @@ def every_frame_is_right_after_random_faults(programs, folder):
 
 if __name__ == "__main__":
     enter_namespace()
-    run_tests([every_frame_is_right_after_random_faults])
+    run_tests()

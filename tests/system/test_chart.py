@@ -7,7 +7,8 @@ import json
 import re
 import shutil
 
-from farm import (BAD_INPUT, Process, check, check_equal, make_job, run_tests, wait_until, write_job)
+from farm import BAD_INPUT, Process, check, check_equal, run_tests, wait_until
+from jobs import make_job, write_job
 
 
 def make_study(folder, **changes):
@@ -153,8 +154,7 @@ def auto_is_settled_once_and_repeatably(programs, folder):
         job = make_job(folder, frames="1-2", image={"width": 48, "height": 32, "tileSize": 16},
                        sampling={"method": "auto", "numParticles": 8, "targetError": 0.2})
         job["output"]["directory"] = str(place / "frames")
-        path = write_job(place / "job.json", job)
-        return programs.render(path, place / "work", extra=["--json"])
+        return programs.render_in(place, job, extra=["--json"])
 
     def told(done):
         return [line for line in done.stderr.splitlines() if line.startswith(("pilot", "chosen", "because"))]
@@ -172,5 +172,4 @@ def auto_is_settled_once_and_repeatably(programs, folder):
 
 
 if __name__ == "__main__":
-    run_tests([a_killed_study_goes_on, the_report_needs_no_other_file, the_second_pass_is_paid_for,
-               auto_is_settled_once_and_repeatably, a_reference_that_is_not_what_it_says_stops_a_study, a_bad_entry_is_named])
+    run_tests()

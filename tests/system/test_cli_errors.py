@@ -1,24 +1,21 @@
+#!/usr/bin/env python3
 """What a person sees who gets something wrong: one clear message, the right exit code, nothing on stdout."""
 
-import argparse
 import json
 import math
 import os
-import pathlib
+import re
 import shutil
 import signal
 import subprocess
-import tempfile
-import time
-import unittest
 from array import array
+from pathlib import Path
 
-from random_job_files import write_exr
+from assets import write_exr, write_hdr
+from farm import BAD_INPUT, DEADLINE_S, IO, OK, UNAVAILABLE, USAGE, check, check_equal, check_says, run_tests, wait_until
+from jobs import write_job
 
-PATIENCE = int(os.environ.get("BATON_PATIENCE", "1"))
-OK, USAGE, BAD_INPUT, UNAVAILABLE, IO = 0, 64, 65, 69, 74
-BIN = SOURCE = None
-
+CUBE = Path(__file__).resolve().parents[2] / "jobs/examples/meshes/cube.obj"
 CUBE_JOB = {
     "name": "cube",
     "image": {"width": 16, "height": 16, "tileSize": 8},
@@ -31,208 +28,201 @@ CUBE_JOB = {
 }
 
 
-def radiance_hdr(width, height):
-    """A grey lat-long map, Radiance HDR without run lengths."""
-    header = f"#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n\n-Y {height} +X {width}\n"
-    return header.encode() + bytes([128, 128, 128, 129]) * (width * height)
+def grey_map(path, width, height):
+    write_hdr(path, width, [bytes([128, 128, 128, 129]) * width] * height)
 
 
-class CliErrors(unittest.TestCase):
-    def setUp(self):
-        self.folder = pathlib.Path(tempfile.mkdtemp(prefix="baton-cli-"))
-        self.addCleanup(shutil.rmtree, self.folder)
-        shutil.copy(SOURCE / "jobs/examples/meshes/cube.obj", self.folder / "cube.obj")
-        (self.folder / "sky.hdr").write_bytes(radiance_hdr(4, 2))
+class Desk:
+    """A folder with a cube and a map, where a person types."""
 
-    def baton(self, *arguments, program=None):
+    def __init__(self, programs, folder):
+        self.folder, self.program = folder, programs.bin.resolve() / "baton"
+        folder.mkdir(parents=True)
+        shutil.copy(CUBE, folder / "cube.obj")
+        grey_map(folder / "sky.hdr", 4, 2)
+
+    def baton(self, *arguments):
         environment = {k: v for k, v in os.environ.items() if not k.startswith("BATON_")}
-        return subprocess.run(
-            [program or BIN / "baton", *map(str, arguments)],
-            cwd=self.folder, env=environment, capture_output=True, text=True, timeout=120 * PATIENCE)
+        return subprocess.run([self.program, *map(str, arguments)], cwd=self.folder, env=environment, capture_output=True,
+                              text=True, timeout=DEADLINE_S, check=False)
 
     def job(self, **changes):
-        path = self.folder / "job.json"
-        path.write_text(json.dumps({**CUBE_JOB, **changes}))
-        return path
+        return write_job(self.folder / "job.json", {**CUBE_JOB, **changes})
 
-    def expect(self, result, code, *texts):
-        self.assertEqual(result.returncode, code, result.stderr)
-        for text in texts:
-            self.assertIn(text, result.stderr)
-        if code != OK:
-            self.assertEqual(result.stdout, "")
+    def expect(self, code, *arguments, says=()):
+        """Runs `baton`; the exit code, what is on stderr, and where it is an error nothing on stdout."""
+        done = self.baton(*arguments)
+        check_equal(done.returncode, code, f"exit code of {arguments}, which says\n{done.stderr}")
+        check_says(done.stderr, *([says] if isinstance(says, str) else says))
+        check(code == OK or done.stdout == "", f"on stdout: {done.stdout}")
+        return done
 
-    def test_a_good_job_passes(self):
-        self.job()
-        result = self.baton("check", "job.json")
-        self.expect(result, OK)
-        self.assertIn("12 triangles", result.stdout)
-        self.assertEqual(result.stderr, "")
-        summary = json.loads(self.baton("check", self.job(), "--json", "--explain").stdout)
-        self.assertEqual(summary["tiles"], 4)
-        given = {s["path"]: s["given"] for s in summary["settings"]}
-        self.assertTrue(given["$.image.width"])
-        self.assertFalse(given["$.image.sites"])
 
-    def test_wrong_command_lines(self):
-        self.expect(self.baton(), USAGE, "subcommand is required")
-        self.expect(self.baton("rendr", "job.json"), USAGE, "baton rendr: no such command; did you mean \"render\"?")
-        self.expect(self.baton("job", "lst"), USAGE, "job lst: no such command; did you mean \"list\"?")
-        self.expect(self.baton("rendr"), USAGE)
-        self.expect(self.baton("check"), USAGE, "JOB is required")
-        self.expect(self.baton("job", "wait", "abc", "--timeout", "-1"), USAGE, "--timeout")
-        self.expect(self.baton("job", "list", "--coordinator", "nonsense"), USAGE, "nonsense")
+def a_good_job_passes(programs, folder):
+    desk = Desk(programs, folder)
+    done = desk.expect(OK, "check", desk.job())
+    check_says(done.stdout, "12 triangles")
+    check_equal(done.stderr, "", "stderr")
+    summary = json.loads(desk.baton("check", "job.json", "--json", "--explain").stdout)
+    check_equal(summary["tiles"], 4, "tiles")
+    given = {s["path"]: s["given"] for s in summary["settings"]}
+    check(given["$.image.width"] and not given["$.image.sites"], "what is given")
 
-    def test_job_faults_come_all_at_once(self):
-        path = self.job(image={"widht": 3}, priority="high", frames="4-1")
-        self.expect(self.baton("check", path), BAD_INPUT,
-                    f'{path}: $.priority: expected an integer in [0, 100], got "high"',
-                    f'{path}: $.image.widht: unknown key; did you mean "width"?',
-                    f"{path}: $.frames: expected a last frame not before the first")
 
-    def test_broken_json_names_line_and_column(self):
-        path = self.folder / "job.json"
-        path.write_text('{\n  "name": "x",\n}')
-        self.expect(self.baton("check", path), BAD_INPUT, f"{path}: line 3, column 1: syntax error")
+def wrong_command_lines(programs, folder):
+    desk = Desk(programs, folder)
+    for words, code, says in [
+            ([], USAGE, "subcommand is required"),
+            (["rendr", "job.json"], USAGE, 'baton rendr: no such command; did you mean "render"?'),
+            (["job", "lst"], USAGE, 'job lst: no such command; did you mean "list"?'),
+            (["rendr"], USAGE, ""),
+            (["check"], USAGE, "JOB is required"),
+            (["job", "wait", "abc", "--timeout", "-1"], USAGE, "--timeout"),
+            (["job", "list", "--coordinator", "nonsense"], USAGE, "nonsense"),
+            (["job", "list", "--coordinator", "tcp://127.0.0.1:1"], UNAVAILABLE,
+             "tcp://127.0.0.1:1: no coordinator listens there"),
+            (["check", "missing.json"], BAD_INPUT, "missing.json: no such file")]:
+        desk.expect(code, *words, says=says)
 
-    def test_missing_and_broken_assets_are_all_named(self):
-        (self.folder / "cube.obj").write_text("no mesh at all\n")
-        (self.folder / "sky.hdr").write_bytes(b"no picture")
-        self.expect(self.baton("check", self.job()), BAD_INPUT, "cube.obj", "sky.hdr")
-        self.expect(self.baton("check", "missing.json"), BAD_INPUT, "missing.json: no such file")
-        # Motion is settled from the meshes; that they are missing hides nothing.
-        keys = [{"frame": f, "position": [f, 1, 4], "lookAt": [0, 0, 0]} for f in (1, 2)]
-        self.job(camera={"keys": keys}, environment={"map": "gone.exr"})
-        (self.folder / "cube.obj").unlink()
-        self.expect(self.baton("check", "job.json"), BAD_INPUT, "cube.obj", "gone.exr: no such file")
 
-    def test_check_and_render_warn_alike(self):
-        (self.folder / "sky.hdr").write_bytes(radiance_hdr(6, 2))
-        objects = [{"mesh": "cube", "material": "clay", "translate": [0, 0, z]} for z in (0, 50)]
-        objects += [{"mesh": "cube", "material": "clay", "translate": [99, 0, 0]},
-                    {"mesh": "cube", "material": "clay", "scale": 1e-4}]
-        job = self.job(scene={**CUBE_JOB["scene"], "objects": objects}, output={"aovs": ["acceptance", "variance"]},
-                       sampling={"method": "pool"})
-        warnings = ["sky.hdr: no texel is brighter than 1 (1)",
-                    "sky.hdr: 6x2 texels, a lat-long map is twice as wide as high",
-                    "object 1 (cube) is behind the camera in every frame",
-                    "object 2 (cube) is outside of the picture in every frame",
-                    "object 3 (cube) is smaller than a pixel in every frame",
-                    "output.aovs: acceptance says nothing here: only `sequential` fills it",
-                    "output.aovs: variance of a single round draws each pixel twice; with quality.rounds 2 the same time "
-                    "halves the variance"]
-        check, render = self.baton("check", job), self.baton("render", job)
-        self.expect(check, OK)
-        self.expect(render, OK)
-        for warning in warnings:
-            self.assertEqual(check.stdout.count(warning), 1, check.stdout)
-            self.assertEqual(render.stderr.count(warning), 1, render.stderr)
-        self.assertEqual(check.stdout.count("warning "), len(warnings), check.stdout)
-        told = json.loads(self.baton("check", job, "--json").stdout)["warnings"]
-        self.assertEqual(len(told), len(warnings), told)
+def job_faults_come_all_at_once(programs, folder):
+    desk = Desk(programs, folder)
+    path = desk.job(image={"widht": 3}, priority="high", frames="4-1")
+    desk.expect(BAD_INPUT, "check", path,
+                says=[f'{path}: $.priority: expected an integer in [0, 100], got "high"',
+                      f'{path}: $.image.widht: unknown key; did you mean "width"?',
+                      f"{path}: $.frames: expected a last frame not before the first"])
+    path.write_text('{\n  "name": "x",\n}')
+    desk.expect(BAD_INPUT, "check", path, says=f"{path}: line 3, column 1: syntax error")
 
-        # Where frames cannot go.
-        result = self.baton("check", self.job(output={"directory": "sky.hdr/frames"}))
-        self.assertIn("sky.hdr cannot be written", result.stdout)
-        result = self.baton("check", self.job(
-            image={"width": 8192, "height": 8192, "tileSize": 512}, frames="1-3000", output={"pixelType": "float"}))
-        self.assertIn(" are free, and frames may take ", result.stdout)
 
-    def test_a_film_of_odd_maps_does_not_flood_the_terminal(self):
-        for frame in range(1, 31):
-            (self.folder / f"film.{frame:04}.hdr").write_bytes(radiance_hdr(4, 2))
-        job = self.job(environment={"frames": "film.####.hdr"}, frames="1-30", sampling={"method": "pool"})
-        odd, more = "no texel is brighter than 1", "there is more: `baton check` tells all"
-        told = self.baton("render", job).stderr
-        self.assertEqual((told.count(odd), told.count(more)), (20, 1), told)
-        self.assertEqual(self.baton("check", job).stdout.count(odd), 30)
+def missing_and_broken_assets_are_all_named(programs, folder):
+    desk = Desk(programs, folder)
+    (folder / "cube.obj").write_text("no mesh at all\n")
+    (folder / "sky.hdr").write_bytes(b"no picture")
+    desk.expect(BAD_INPUT, "check", desk.job(), says=["cube.obj", "sky.hdr"])
+    # Motion is settled from the meshes; that they are missing hides nothing.
+    keys = [{"frame": f, "position": [f, 1, 4], "lookAt": [0, 0, 0]} for f in (1, 2)]
+    desk.job(camera={"keys": keys}, environment={"map": "gone.exr"})
+    (folder / "cube.obj").unlink()
+    desk.expect(BAD_INPUT, "check", "job.json", says=["cube.obj", "gone.exr: no such file"])
 
-    def test_texels_that_are_no_light_are_counted(self):
-        rows = [array("f", [2.0] * 9 + [math.nan, -1.0, math.inf]), array("f", [2.0] * 12)]
-        write_exr(self.folder / "sky.exr", 4, rows)
-        job = self.job(environment={"map": "sky.exr"}, sampling={"method": "pool"})
-        warning = "sky.exr: 1 texels are negative, NaN or infinite and count as 0"
-        self.assertIn(warning, self.baton("check", job).stdout)
-        self.assertIn(warning, self.baton("render", job).stderr)
 
-    def test_check_tells_of_the_pilot(self):
-        job = self.job(sampling={"method": "auto"}, frames="1-48")
-        told = self.baton("check", job)
-        self.expect(told, OK)
-        self.assertRegex(told.stdout, r"pilot +before the first frame: \d+ candidates at both ends of the job, "
-                                      r"some \d+ frames of \d+ pixels, about [\dms]+ of CPU time")
-        pilot = json.loads(self.baton("check", job, "--json").stdout)["pilot"]
-        self.assertGreater(pilot["cpuSeconds"], 0)
-        self.assertNotIn("pilot", self.baton("check", self.job(sampling={"method": "pool"})).stdout)
+def check_and_render_warn_alike(programs, folder):
+    desk = Desk(programs, folder)
+    grey_map(folder / "sky.hdr", 6, 2)
+    objects = [{"mesh": "cube", "material": "clay", "translate": [0, 0, z]} for z in (0, 50)]
+    objects += [{"mesh": "cube", "material": "clay", "translate": [99, 0, 0]},
+                {"mesh": "cube", "material": "clay", "scale": 1e-4}]
+    job = desk.job(scene={**CUBE_JOB["scene"], "objects": objects}, output={"aovs": ["acceptance", "variance"]},
+                   sampling={"method": "pool"})
+    warnings = ["sky.hdr: no texel is brighter than 1 (1)",
+                "sky.hdr: 6x2 texels, a lat-long map is twice as wide as high",
+                "object 1 (cube) is behind the camera in every frame",
+                "object 2 (cube) is outside of the picture in every frame",
+                "object 3 (cube) is smaller than a pixel in every frame",
+                "output.aovs: acceptance says nothing here: only `sequential` fills it",
+                "output.aovs: variance of a single round draws each pixel twice; with quality.rounds 2 the same time "
+                "halves the variance"]
+    checked, rendered = desk.expect(OK, "check", job), desk.expect(OK, "render", job)
+    for warning in warnings:
+        check_equal((checked.stdout.count(warning), rendered.stderr.count(warning)), (1, 1), warning)
+    check_equal(checked.stdout.count("warning "), len(warnings), checked.stdout)
+    told = json.loads(desk.baton("check", job, "--json").stdout)["warnings"]
+    check_equal(len(told), len(warnings), f"{told}")
 
-    def test_rendering_a_file_that_is_no_picture(self):
-        (self.folder / "sky.hdr").write_bytes(b"no picture")
-        result = self.baton("render", self.job())
-        self.assertEqual(result.returncode, BAD_INPUT, result.stderr)
-        self.assertIn("sky.hdr: neither an EXR nor a Radiance HDR picture", result.stderr)
+    # Where frames cannot go.
+    check_says(desk.baton("check", desk.job(output={"directory": "sky.hdr/frames"})).stdout, "sky.hdr cannot be written")
+    many = desk.job(image={"width": 8192, "height": 8192, "tileSize": 512}, frames="1-3000", output={"pixelType": "float"})
+    check_says(desk.baton("check", many).stdout, " are free, and frames may take ")
 
-    def test_maps_that_cannot_be_mixed(self):
-        (self.folder / "small.hdr").write_bytes(radiance_hdr(2, 1))
-        keys = [{"frame": 1, "map": "sky.hdr"}, {"frame": 2, "map": "small.hdr"}]
-        self.expect(self.baton("check", self.job(environment={"keys": keys})), BAD_INPUT,
-                    "small.hdr: expected 4x2 texels")
 
-    def test_no_coordinator(self):
-        result = self.baton("job", "list", "--coordinator", "tcp://127.0.0.1:1")
-        self.expect(result, UNAVAILABLE, "tcp://127.0.0.1:1: no coordinator listens there")
+def a_film_of_odd_maps_does_not_flood_the_terminal(programs, folder):
+    desk = Desk(programs, folder)
+    for frame in range(1, 31):
+        grey_map(folder / f"film.{frame:04}.hdr", 4, 2)
+    job = desk.job(environment={"frames": "film.####.hdr"}, frames="1-30", sampling={"method": "pool"})
+    odd, more = "no texel is brighter than 1", "there is more: `baton check` tells all"
+    told = desk.baton("render", job).stderr
+    check_equal((told.count(odd), told.count(more)), (20, 1), told)
+    check_equal(desk.baton("check", job).stdout.count(odd), 30, "warnings of check")
 
-    def test_files_that_are_no_states(self):
-        (self.folder / "empty.bst").write_bytes(b"")
-        (self.folder / "text.bst").write_text("this is no sample state")
-        self.expect(self.baton("state", "show", "text.bst"), BAD_INPUT, "text.bst")
-        self.expect(self.baton("state", "verify", "empty.bst", "text.bst"), BAD_INPUT, "empty.bst", "text.bst")
 
-    def fake_programs(self, coordinator):
-        """A folder with baton and, beside it, scripts in place of the other programs."""
-        folder = self.folder / "bin"
-        folder.mkdir()
-        shutil.copy(BIN / "baton", folder / "baton")
-        for name, text in {"baton-coordinator": coordinator, "baton-worker": "sleep 60"}.items():
-            (folder / name).write_text("#!/bin/sh\n" + text + "\n")
-            (folder / name).chmod(0o755)
-        return folder / "baton"
+def texels_that_are_no_light_are_counted(programs, folder):
+    desk = Desk(programs, folder)
+    rows = [array("f", [2.0] * 9 + [math.nan, -1.0, math.inf]), array("f", [2.0] * 12)]
+    write_exr(folder / "sky.exr", 4, rows)
+    job = desk.job(environment={"map": "sky.exr"}, sampling={"method": "pool"})
+    warning = "sky.exr: 1 texels are negative, NaN or infinite and count as 0"
+    check_says(desk.baton("check", job).stdout, warning)
+    check_says(desk.baton("render", job).stderr, warning)
 
-    def test_render_names_the_log_of_a_coordinator_that_fails(self):
-        program = self.fake_programs("echo the disk is on fire; exit 3")
-        result = self.baton("render", self.job(), program=program)
-        log = self.folder / "cube-frames/.baton/coordinator.log"
-        self.expect(result, IO, "the coordinator did not start (exit code 3)", str(log))
-        self.assertIn("the disk is on fire", log.read_text())
 
-    def test_children_die_with_a_killed_parent(self):
-        pid_file = self.folder / "pid"
-        program = self.fake_programs(f"echo $$ > {pid_file}.new; mv {pid_file}.new {pid_file}; exec sleep 60")
-        render = subprocess.Popen([program, "render", self.job()], cwd=self.folder)
-        self.wait_until(pid_file.exists)
-        child = int(pid_file.read_text())
-        render.send_signal(signal.SIGKILL)
-        render.wait(timeout=30 * PATIENCE)
-        self.wait_until(lambda: not is_running(child))
+def what_auto_will_look_at_is_told(programs, folder):
+    desk = Desk(programs, folder)
+    job = desk.job(sampling={"method": "auto"}, frames="1-48")
+    told = desk.expect(OK, "check", job).stdout
+    check(re.search(r"pilot +before the first frame: \d+ candidates at both ends of the job, "
+                    r"some \d+ frames of \d+ pixels, about [\dms]+ of CPU time", told), told)
+    check(json.loads(desk.baton("check", job, "--json").stdout)["pilot"]["cpuSeconds"] > 0, "it costs something")
+    check("pilot" not in desk.baton("check", desk.job(sampling={"method": "pool"})).stdout, "of a job without one")
 
-    def wait_until(self, condition):
-        deadline = time.monotonic() + 30 * PATIENCE
-        while not condition():
-            self.assertLess(time.monotonic(), deadline, "waited in vain")
-            time.sleep(0.02)
+
+def maps_that_are_none_or_of_two_sizes(programs, folder):
+    desk = Desk(programs, folder)
+    grey_map(folder / "small.hdr", 2, 1)
+    keys = [{"frame": 1, "map": "sky.hdr"}, {"frame": 2, "map": "small.hdr"}]
+    desk.expect(BAD_INPUT, "check", desk.job(environment={"keys": keys}), says="small.hdr: expected 4x2 texels")
+    (folder / "sky.hdr").write_bytes(b"no picture")
+    done = desk.baton("render", desk.job())
+    check_equal(done.returncode, BAD_INPUT, "exit code")
+    check_says(done.stderr, "sky.hdr: neither an EXR nor a Radiance HDR picture")
+
+
+def files_that_are_no_states(programs, folder):
+    desk = Desk(programs, folder)
+    (folder / "empty.bst").write_bytes(b"")
+    (folder / "text.bst").write_text("this is no sample state")
+    desk.expect(BAD_INPUT, "state", "show", "text.bst", says="text.bst")
+    desk.expect(BAD_INPUT, "state", "verify", "empty.bst", "text.bst", says=["empty.bst", "text.bst"])
+
+
+def replace_programs(desk, coordinator):
+    """baton gets, beside it, scripts in place of the other programs."""
+    (desk.folder / "bin").mkdir()
+    shutil.copy(desk.program, desk.folder / "bin/baton")
+    desk.program = desk.folder / "bin/baton"
+    for name, text in {"baton-coordinator": coordinator, "baton-worker": "sleep 60"}.items():
+        (desk.folder / "bin" / name).write_text("#!/bin/sh\n" + text + "\n")
+        (desk.folder / "bin" / name).chmod(0o755)
+
+
+def render_names_the_log_of_a_coordinator_that_fails(programs, folder):
+    desk = Desk(programs, folder)
+    replace_programs(desk, "echo the disk is on fire; exit 3")
+    log = folder / "cube-frames/.baton/coordinator.log"
+    desk.expect(IO, "render", desk.job(), says=["the coordinator did not start (exit code 3)", str(log)])
+    check_says(log.read_text(), "the disk is on fire")
+
+
+def children_die_with_a_killed_parent(programs, folder):
+    desk, pid_file = Desk(programs, folder), folder / "pid"
+    replace_programs(desk, f"echo $$ > {pid_file}.new; mv {pid_file}.new {pid_file}; exec sleep 60")
+    render = subprocess.Popen([desk.program, "render", desk.job()], cwd=folder)
+    wait_until(pid_file.exists, "a child runs")
+    child = int(pid_file.read_text())
+    render.send_signal(signal.SIGKILL)
+    render.wait(timeout=DEADLINE_S)
+    wait_until(lambda: not is_running(child), "the child ends")
 
 
 def is_running(pid):
     """A zombie that nobody has waited for yet has ended."""
     try:
-        return pathlib.Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0] != "Z"
+        return Path(f"/proc/{pid}/stat").read_text().rsplit(")", 1)[1].split()[0] != "Z"
     except (FileNotFoundError, ProcessLookupError):
         return False
 
 
 if __name__ == "__main__":
-    parser = argparse.ArgumentParser()
-    parser.add_argument("--bin", type=pathlib.Path, required=True)
-    parser.add_argument("--source", type=pathlib.Path, required=True)
-    known, rest = parser.parse_known_args()
-    BIN, SOURCE = known.bin.resolve(), known.source.resolve()
-    unittest.main(argv=[__file__, *rest])
+    run_tests()

@@ -4,7 +4,8 @@
 import csv
 import json
 
-from farm import check, check_equal, make_job, run_tests, write_job
+from farm import check, check_equal, run_tests
+from jobs import make_job
 
 COUNTS = ["carried", "fresh", "refreshed", "restarted"]
 OF_FRAMES = ["noise", "noiseFrom", "mean", "pixelsBelowZero", "lowest", "lightBelowZero", "pixelsBeyondHalf", "pixelsNotFinite"]
@@ -14,8 +15,7 @@ def render(programs, folder, workers):
     """Three frames of small tiles in runs of two; returns (rows of diagnostics.csv, summary)."""
     job = make_job(folder, frames="1-3", state={"checkpointEvery": 2}, output={"aovs": ["depth", "resampled"]},
                    environment={"rotation": {"degPerFrame": 3}}, sampling={"refreshEvery": 0, "refreshRatio": 1.2})
-    path = write_job(folder / "job.json", job)
-    done = programs.render(path, folder / "work", workers=workers, extra=["--json"])
+    done = programs.render_in(folder, job, workers=workers, extra=["--json"])
     with (folder / "frames/diagnostics.csv").open(encoding="ascii") as file:
         return list(csv.DictReader(file)), json.loads(done.stdout)
 
@@ -58,7 +58,7 @@ def workers_do_not_matter(programs, folder):
 def frames_say_what_they_are(programs, folder):
     """M, the matrices, an AOV under its name, and normals of length 1 where sites of two surfaces meet."""
     job = make_job(folder, frames="1-2", image={"sites": 4}, output={"aovs": ["acceptanceLocal", "normal", "depth"]})
-    programs.render(write_job(folder / "job.json", job), folder / "work")
+    programs.render_in(folder, job)
     frame = folder / "frames/frame.0002.exr"
     header = frame.read_bytes()[:4000]
     for attribute in [b"baton:numCandidates\0string\0\x02\0\0\x0064", b"worldToCamera\0m44f\0", b"worldToNDC\0m44f\0"]:
@@ -70,4 +70,4 @@ def frames_say_what_they_are(programs, folder):
 
 
 if __name__ == "__main__":
-    run_tests([rows_add_up, workers_do_not_matter, frames_say_what_they_are])
+    run_tests()

@@ -2,16 +2,13 @@
 """A glTF scene as a job: nodes, materials and animations are shown, the same for any tiling; what is wrong with the file
 is said once; the file is part of the job."""
 
-import json
-import sys
-from pathlib import Path
 
-from farm import BAD_INPUT, check, check_equal, make_job, run_tests, write_job
-
-sys.path.append(str(Path(__file__).parents[2] / "jobs/examples"))
-from make_gltf_set import make_set, png  # noqa: E402
+from assets import make_set, png
+from farm import check, check_equal, check_layouts, run_tests
+from jobs import make_job, write_job
 
 NUM_FRAMES = 3
+LAYOUTS = {"whole image": (1, 1, 128), "small tiles": (2, 1, 16)}
 
 
 def set_job(folder, tile_size=64, method="pool", textured=False, alive=False, **scene):
@@ -25,36 +22,25 @@ def set_job(folder, tile_size=64, method="pool", textured=False, alive=False, **
     return job
 
 
-def rendered(programs, folder, job, **how):
-    path = write_job(folder / "job.json", job)
-    programs.render(path, folder / "work", **how)
-    pixels = programs.pixels(folder / "frames")
-    check_equal(len(pixels), NUM_FRAMES, f"frames in {folder}")
-    return pixels
-
-
 def any_tiling(programs, folder):
-    """Small tiles on two workers and the whole image on one give the same pixels, while everything moves."""
+    """The same pixels while everything moves."""
     for method in ("pool", "sequential"):
-        whole, small = folder / method / "whole", folder / method / "small"
-        expected = rendered(programs, whole, set_job(whole, 128, method), workers=1, threads=1)
-        got = rendered(programs, small, set_job(small, 16, method), workers=2, threads=1)
-        check_equal(got, expected, f"pixels of {method} in small tiles")
-        depths = [programs.values(whole / f"frames/frame.{frame:04}.exr", "depth") for frame in (12, 14)]
+        pixels, _ = check_layouts(programs, folder / method, lambda place: set_job(place, method=method), LAYOUTS)
+        check_equal(len(pixels), NUM_FRAMES, "frames")
+        depths = [programs.values(pixels.folder / f"frame.{frame:04}.exr", "depth") for frame in (12, 14)]
         check(depths[0] != depths[1], "nothing moves")
 
 
 def the_job_says_otherwise(programs, folder):
     """`check` counts what is shown; hidden nodes are not, and names that are not there are suggested."""
-    checked = json.loads(programs.run("baton", "check", write_job(folder / "job.json", set_job(folder)), "--json").stdout)
+    checked = programs.checked(write_job(folder / "job.json", set_job(folder)))
     check_equal((checked["meshes"], checked["instances"]), (4, 6), "meshes and instances")
     check(checked["motionMaxPx"] > 1, f"motion of {checked['motionMaxPx']} pixels")
     hidden = set_job(folder, gltf={"nodes": {"ring": {"visible": False}}})
-    checked = json.loads(programs.run("baton", "check", write_job(folder / "hidden.json", hidden), "--json").stdout)
+    checked = programs.checked(write_job(folder / "hidden.json", hidden))
     check_equal(checked["instances"], 3, "instances without the ring")
     wrong = set_job(folder, gltf={"nodes": {"rings": {"visible": False}}})
-    failed = programs.run("baton", "check", write_job(folder / "wrong.json", wrong), expect=BAD_INPUT)
-    check('set.glb: no node "rings"; did you mean "ring"?' in failed.stderr, failed.stderr)
+    programs.refuses("check", write_job(folder / "wrong.json", wrong), says='set.glb: no node "rings"; did you mean "ring"?')
 
 
 def a_cut_file_is_one_error(programs, folder):
@@ -62,19 +48,16 @@ def a_cut_file_is_one_error(programs, folder):
     whole = (folder / "set.glb").read_bytes()
     for size in (0, 1024, len(whole) // 2, len(whole) - 1):
         (folder / "set.glb").write_bytes(whole[:size])
-        failed = programs.run("baton", "check", path, expect=BAD_INPUT)
-        check_equal(len(failed.stderr.strip().splitlines()), 1, f"lines on stderr for {size} bytes: {failed.stderr}")
-        check("set.glb: not a glTF file" in failed.stderr, failed.stderr)
+        told = programs.refuses("check", path, says="set.glb: not a glTF file")
+        check_equal(len(told.strip().splitlines()), 1, f"lines on stderr for {size} bytes: {told}")
 
 
 def textures_for_any_tiling(programs, folder):
     """Holes, bumps, glow and images are the same in small tiles, and are seen."""
     for method in ("pool", "bidirectional"):
-        whole, small, plain = (folder / method / name for name in ("whole", "small", "plain"))
-        expected = rendered(programs, whole, set_job(whole, 128, method, textured=True), workers=1, threads=1)
-        got = rendered(programs, small, set_job(small, 16, method, textured=True), workers=2, threads=1)
-        check_equal(got, expected, f"pixels of {method} in small tiles")
-        check(rendered(programs, plain, set_job(plain, 128, method), workers=1, threads=1) != expected, "no texture is seen")
+        pixels, _ = check_layouts(programs, folder / method, lambda place: set_job(place, method=method, textured=True), LAYOUTS)
+        plain = folder / method / "plain"
+        check(programs.rendered(plain, set_job(plain, 128, method)) != pixels, "no texture is seen")
 
 
 def textures_are_said_and_part_of_the_job(programs, folder):
@@ -99,8 +82,7 @@ def textures_are_said_and_part_of_the_job(programs, folder):
         (folder / "wood.png").unlink()
         if content is not None:
             (folder / "wood.png").write_bytes(content)
-        failed = programs.run("baton", "check", path, expect=BAD_INPUT)
-        check("wood.png: " + said in failed.stderr, failed.stderr)
+        programs.refuses("check", path, says="wood.png: " + said)
         (folder / "wood.png").write_bytes(b"")
 
 
@@ -108,25 +90,21 @@ def deforming_for_any_tiling(programs, folder):
     """A reed on bones and a drop that flattens: the same pixels in small tiles, by a run that is cut in two, and in a job of
     the last frame alone, where nothing is carried; they are where the file's animation has them."""
     for method in ("pool", "mis"):
-        whole, small, split = (folder / method / name for name in ("whole", "small", "split"))
-        expected = rendered(programs, whole, set_job(whole, 128, method, textured=True, alive=True), workers=1, threads=1)
-        got = rendered(programs, small, set_job(small, 16, method, textured=True, alive=True), workers=2, threads=2)
-        check_equal(got, expected, f"pixels of {method} in small tiles")
-        job = set_job(split, 32, method, textured=True, alive=True)
-        path = write_job(split / "first.json", {**job, "frames": "12-13", "motion": {"maxPx": 9}})
+        def alive(place):
+            return set_job(place, method=method, textured=True, alive=True)
+        check_layouts(programs, folder / method, alive, LAYOUTS)
+        split, once = folder / method / "split", folder / method / "once"
+        path = write_job(split / "first.json", {**alive(split), "frames": "12-13", "motion": {"maxPx": 9}})
         programs.render(path, split / "work")
-        job["motion"] = {"maxPx": 9}
-        again = rendered(programs, split, job)
-        job = set_job(folder / method / "once", 32, method, textured=True, alive=True)
-        job["motion"] = {"maxPx": 9}
-        check_equal(again, rendered(programs, folder / method / "once", job), f"pixels of {method} in two runs")
+        pixels = [programs.rendered(place, {**alive(place), "motion": {"maxPx": 9}}) for place in (split, once)]
+        check_equal(*pixels, f"pixels of {method} in two runs")
     last = set_job(folder / "last", 64, "mis", textured=True, alive=True)
     path = write_job(folder / "last/job.json", {**last, "frames": "14"})
     programs.render(path, folder / "last/work")
     alone = programs.values(folder / "last/frames/frame.0014.exr", "depth")
-    check(alone == programs.values(folder / "mis/whole/frames/frame.0014.exr", "depth"), "frame 14 alone is another one")
+    check(alone == programs.values(folder / "mis/whole-image/frames/frame.0014.exr", "depth"), "frame 14 alone is another one")
     still = set_job(folder / "still", 64, "mis", textured=True, alive=True, gltf={"startFrame": 14})
-    rendered(programs, folder / "still", still)
+    programs.render_in(folder / "still", still)
     check(programs.values(folder / "still/frames/frame.0014.exr", "depth") != alone, "startFrame moves nothing")
 
 
@@ -134,7 +112,7 @@ def what_deforms_is_said(programs, folder):
     """`check` counts what deforms as motion; bones can be placed, a mesh that follows them cannot."""
     def checked(**how):
         path = write_job(folder / "job.json", set_job(folder, alive=True, **how))
-        return json.loads(programs.run("baton", "check", path, "--json").stdout)
+        return programs.checked(path)
     still = {name: {"place": {}} for name in ("lift", "vane", "ball", "dolly")}
     hidden = checked(gltf={"nodes": {**still, "reed": {"visible": False}, "drop": {"visible": False}}})
     check_equal(hidden["motionMaxPx"], 0, "motion without what deforms")
@@ -143,10 +121,9 @@ def what_deforms_is_said(programs, folder):
     check_equal((hidden["deformingMeshes"], alive["deformingMeshes"]), (0, 1), "meshes that deform")
     check(not [line for line in alive["warnings"] if "morph" in line or "bones" in line], alive["warnings"])
     wrong = set_job(folder, alive=True, gltf={"nodes": {"reed": {"place": {"translate": [0, 1, 0]}}}})
-    failed = programs.run("baton", "check", write_job(folder / "wrong.json", wrong), expect=BAD_INPUT)
-    check('set.glb: node "reed": follows its bones, expected `place` of these' in failed.stderr, failed.stderr)
+    programs.refuses("check", write_job(folder / "wrong.json", wrong),
+                     says='set.glb: node "reed": follows its bones, expected `place` of these')
 
 
 if __name__ == "__main__":
-    run_tests([any_tiling, the_job_says_otherwise, a_cut_file_is_one_error, textures_for_any_tiling,
-               textures_are_said_and_part_of_the_job, deforming_for_any_tiling, what_deforms_is_said])
+    run_tests()

@@ -7,13 +7,12 @@ Bytes are those of the whole job rendered at once, in a folder of its own.
 import json
 import os
 
-from farm import BAD_INPUT, OK, USAGE, Farm, check, check_equal, make_job, run_tests, wait_until, write_job
+from farm import BAD_INPUT, OK, USAGE, Farm, check, check_equal, check_says, run_tests, wait_until
+from jobs import camera_keys, make_job, write_job
 
-CAMERA_KEYS = [{"frame": 1, "position": [0, 1.2, 5], "lookAt": [0, 0.6, 0]},
-               {"frame": 6, "position": [0.5, 1.3, 4.8], "lookAt": [0, 0.6, 0]}]
 KINDS = {
     "rest": {},
-    "motion": {"camera": {"keys": CAMERA_KEYS}},
+    "motion": {"camera": camera_keys((1, [0, 1.2, 5], [0, 0.6, 0]), (6, [0.5, 1.3, 4.8], [0, 0.6, 0]))},
     "second-pass": {"visibility": {"correlated": True, "dilate": 1}},
 }
 METHODS = {"pool": {"method": "pool", "numParticles": 8},
@@ -34,8 +33,7 @@ def small_job(folder, frames, **changes):
 
 def render(programs, folder, job, *extra, expect=OK):
     """Renders in the folder's own farm; returns what was said on stderr."""
-    path = write_job(folder / "job.json", job)
-    return programs.render(path, folder / "work", extra=extra, expect=expect).stderr
+    return programs.render_in(folder, job, extra=extra, expect=expect).stderr
 
 
 def files(folder):
@@ -56,14 +54,7 @@ def rewritten(before, folder):
 
 def witness(programs, folder, frames, **changes):
     """The pixels of the whole job."""
-    job = small_job(folder, frames, **changes)
-    render(programs, folder, job)
-    return programs.pixels(folder / FOLDER)
-
-
-def say(text, *words):
-    for word in words:
-        check(word in text, f"expected {word!r} in:\n{text}")
+    return programs.rendered(folder, small_job(folder, frames, **changes))
 
 
 def each_kind():
@@ -74,30 +65,19 @@ def each_kind():
             yield f"{kind}-{method}", {**changes, "sampling": sampling}
 
 
-def more_frames(programs, folder):
-    """Frames 1-4, then 1-6: the first four are left alone, the rest goes on from their last states."""
+def more_frames_and_other_tiles(programs, folder):
+    """Frames 1-4, then 1-6: the first four are left alone, the rest goes on from their last states, which are cut and
+    joined where tiles are others."""
     for name, changes in each_kind():
         expected = witness(programs, folder / f"whole-{name}", "1-6", **changes)
-        place = folder / name
-        render(programs, place, small_job(place, "1-4", **changes))
-        before = stamps(place)
-        text = render(programs, place, small_job(place, "1-6", **changes))
-        say(text, "frames 1-4 are kept", "frames 5-6 are rendered, going on from the states of frame 4")
-        check_equal(rewritten(before, place), [], f"frames of {name} written again")
-        check_equal(programs.pixels(place / FOLDER), expected, f"pixels of {name}")
-
-
-def other_tiles(programs, folder):
-    """The same with other tiles: states are cut and joined."""
-    for name, changes in each_kind():
-        expected = witness(programs, folder / f"whole-{name}", "1-6", **changes)
-        place = folder / name
-        render(programs, place, small_job(place, "1-4", **changes))
-        before = stamps(place)
-        text = render(programs, place, small_job(place, "1-6", image={"tileSize": 32}, **changes))
-        say(text, "frames 1-4 are kept", "going on from the states of frame 4, cut into tiles of 32 pixels")
-        check_equal(rewritten(before, place), [], f"frames of {name} written again")
-        check_equal(programs.pixels(place / FOLDER), expected, f"pixels of {name}")
+        for tile_size, told in ((64, ""), (32, ", cut into tiles of 32 pixels")):
+            place = folder / f"{name}-{tile_size}"
+            render(programs, place, small_job(place, "1-4", **changes))
+            before = stamps(place)
+            text = render(programs, place, small_job(place, "1-6", image={"tileSize": tile_size}, **changes))
+            check_says(text, "frames 1-4 are kept", "frames 5-6 are rendered, going on from the states of frame 4" + told)
+            check_equal(rewritten(before, place), [], f"frames of {name} written again")
+            check_equal(programs.pixels(place / FOLDER), expected, f"pixels of {name} in tiles of {tile_size}")
 
 
 def settings_alone(programs, folder):
@@ -109,10 +89,10 @@ def settings_alone(programs, folder):
                     {"metadata": {"shot": "7"}}, {"state": {"checkpointEvery": 2, "keep": "all"}},
                     {"image": {**job["image"], "tileSize": 32}}, {}]:
         text = render(programs, folder, {**job, **changes})
-        say(text, "are kept")
+        check_says(text, "are kept")
         check("rendered" not in text, f"{changes}: {text}")
         check_equal(rewritten(before, folder), [], f"frames written again for {changes}")
-    say(render(programs, folder, {**job, "metadata": {"shot": "8"}}), "keep their headers")
+    check_says(render(programs, folder, {**job, "metadata": {"shot": "8"}}), "keep their headers")
 
 
 def what_is_written_otherwise(programs, folder):
@@ -121,7 +101,7 @@ def what_is_written_otherwise(programs, folder):
     render(programs, folder, job)
     before = stamps(folder)
     changed = {**job, "output": {**job["output"], "aovs": ["depth"], "compression": "piz"}}
-    say(render(programs, folder, changed), "written anew: output.aovs, output.compression have changed")
+    check_says(render(programs, folder, changed), "written anew: output.aovs, output.compression have changed")
     check_equal(len(rewritten(before, folder)), 3, "frames written again")
 
 
@@ -140,7 +120,7 @@ def one_frame_is_gone_or_damaged(programs, folder):
         else:
             frame.unlink()
         text = render(programs, folder, job)
-        say(text, f"frame {number} is rendered", f"{frame} is gone, or not as it was written")
+        check_says(text, f"frame {number} is rendered", f"{frame} is gone, or not as it was written")
         check_equal(rewritten(before, folder), [frame.name], "frames written again")
         check(files(folder) == expected, f"frame {number} is not what it was")
 
@@ -152,7 +132,7 @@ def another_picture(programs, folder):
     before, first = stamps(folder), programs.pixels(folder / FOLDER)
     other = {**job, "seed": 8}
     text = render(programs, folder, other, expect=BAD_INPUT)
-    say(text, "what differs: $.seed", "--restart", "--from-frame")
+    check_says(text, "what differs: $.seed", "--restart", "--from-frame")
     check_equal(rewritten(before, folder), [], "frames that a refused job has touched")
 
     # As a job that begins there.
@@ -163,10 +143,10 @@ def another_picture(programs, folder):
         name = f"frame.{number:04}.exr"
         check_equal(now[name], first[name] if number < 4 else later[name], name)
     check_equal(len(rewritten(before, folder)), 3, "frames replaced from frame 4 on")
-    say(render(programs, folder, other, "--from-frame", "4"), "frames 4-6 are kept")
+    check_says(render(programs, folder, other, "--from-frame", "4"), "frames 4-6 are kept")
     render(programs, folder, other, "--from-frame", "9", expect=USAGE)
 
-    say(render(programs, folder, other, "--restart"), "are replaced: $.seed differs")
+    check_says(render(programs, folder, other, "--restart"), "are replaced: $.seed differs")
     check_equal(programs.pixels(folder / FOLDER), witness(programs, folder / "all", "1-6", seed=8), "pixels")
 
 
@@ -179,7 +159,7 @@ def a_key_of_later_frames(programs, folder):
     keys[2]["position"][1] = 1.4
     job = small_job(folder, "1-6", camera={"keys": keys}, **moving)
     text = render(programs, folder, job, expect=BAD_INPUT)
-    say(text, "$.camera.keys at frame 4", "frames before 4 are the same and stay")
+    check_says(text, "$.camera.keys at frame 4", "frames before 4 are the same and stay")
     render(programs, folder, job, "--restart")
     check_equal(rewritten(before, folder), [f"frame.{n:04}.exr" for n in (4, 5, 6)], "frames written again")
     expected = witness(programs, folder / "whole", "1-6", camera={"keys": keys}, **moving)
@@ -192,14 +172,12 @@ def an_open_job_is_extended(programs, folder):
     changes = {**KINDS["motion"], "sampling": slow, "image": {"tileSize": 32}}
     expected = witness(programs, folder / "whole", "1-6", **changes)
     place = folder / "changed"
-    with Farm(programs, folder / "farm") as farm:
-        farm.start_coordinator()
-        farm.start_worker(threads=2)
+    with Farm(programs, folder / "farm", workers=1, threads=2) as farm:
         first = farm.submit(write_job(place / "job.json", small_job(place, "1-4", **changes)))
         wait_until(lambda: farm.show(first)["framesDone"] >= 1, "the first frame is written")
         longer = write_job(place / "longer.json", small_job(place, "1-6", **changes))
         answer = json.loads(farm.baton("job", "submit", longer, "--json").stdout)
-        say(answer["plan"], "kept")
+        check_says(answer["plan"], "kept")
         farm.wait_for(answer["id"])
         check_equal(farm.show(first)["status"] in ("cancelled", "done"), True, "the first job has ended")
         check("0 jobs" in farm.baton("job", "list").stdout, "jobs that have ended are listed")
@@ -212,21 +190,12 @@ def an_open_job_is_extended(programs, folder):
         farm.baton("job", "pause", farm.submit(write_job(place / "longest.json", small_job(
             place, "1-8", **changes))))
         other = write_job(place / "other.json", small_job(place, "20-21", seed=9, **changes))
-        say(farm.baton("job", "submit", other, expect=BAD_INPUT).stderr, "writes into", "wait for its end")
-        say(farm.baton("job", "resume", "system test").stderr, " are kept",
+        check_says(farm.baton("job", "submit", other, expect=BAD_INPUT).stderr, "writes into", "wait for its end")
+        check_says(farm.baton("job", "resume", "system test").stderr, " are kept",
             "going on from the states of frame ")
     check_equal({name: line for name, line in programs.pixels(place / FOLDER).items() if name < "frame.0007"},
                 expected, "pixels")
 
 
 if __name__ == "__main__":
-    run_tests([
-        more_frames,
-        other_tiles,
-        settings_alone,
-        what_is_written_otherwise,
-        one_frame_is_gone_or_damaged,
-        another_picture,
-        a_key_of_later_frames,
-        an_open_job_is_extended,
-    ])
+    run_tests()

@@ -4,8 +4,8 @@
 import json
 import time
 
-from farm import BAD_INPUT, FAILED, OK, PATIENCE, UNAVAILABLE, Farm, Process, check, check_equal, free_port, make_job
-from farm import run_tests, wait_until, write_job
+from farm import BAD_INPUT, FAILED, OK, PATIENCE, UNAVAILABLE, Farm, Process, check, check_equal, free_port, run_tests, wait_until
+from jobs import make_job, write_job
 
 TIMEOUT, CANCELLED, USAGE = 1, 3, 64
 
@@ -24,14 +24,13 @@ def nobody_listens(programs, folder):
     endpoint = f"tcp://127.0.0.1:{free_port()}"
     for words in [["list"], ["show", "ab"], ["wait", "ab"], ["cancel", "ab"]]:
         start = time.monotonic()
-        done = programs.run("baton", "job", *words, "--coordinator", endpoint, expect=UNAVAILABLE)
-        check(f"{endpoint}: no coordinator listens there" in done.stderr, done.stderr)
+        programs.refuses("job", *words, "--coordinator", endpoint, expect=UNAVAILABLE,
+                         says=f"{endpoint}: no coordinator listens there")
         check(time.monotonic() - start < 9 * PATIENCE, f"{words[0]} took {time.monotonic() - start:.1f} s")
 
 
 def a_job_from_submission_to_its_end(programs, folder):
     with Farm(programs, folder / "farm") as farm:
-        farm.start_coordinator()
         path = small_job(folder)
         job = farm.submit(path)
 
@@ -65,7 +64,6 @@ def a_job_from_submission_to_its_end(programs, folder):
 
 def unknown_and_ambiguous_ids(programs, folder):
     with Farm(programs, folder / "farm") as farm:
-        farm.start_coordinator()
         for i in range(17):
             farm.submit(small_job(folder / str(i), seed=i))
         jobs = [job["id"] for job in json.loads(farm.baton("job", "list", "--json").stdout)["jobs"]]
@@ -82,7 +80,6 @@ def unknown_and_ambiguous_ids(programs, folder):
 def names_of_jobs(programs, folder):
     """A name is as good as an ID; where two jobs have it, both are listed."""
     with Farm(programs, folder / "farm") as farm:
-        farm.start_coordinator()
         first = farm.submit(small_job(folder / "a", name="old oak"))
         second = farm.submit(small_job(folder / "b", name="new oak", seed=2))
         check_equal(farm.show("old oak")["id"], first, "job of this name")
@@ -106,7 +103,6 @@ def names_of_jobs(programs, folder):
 
 def a_cancelled_job_goes_on_when_submitted_again(programs, folder):
     with Farm(programs, folder / "farm") as farm:
-        farm.start_coordinator()
         path = small_job(folder)
         job = farm.submit(path)
         check("cancelled" in farm.baton("job", "cancel", job).stdout, "cancel does not say so")
@@ -119,7 +115,6 @@ def a_cancelled_job_goes_on_when_submitted_again(programs, folder):
 
 def waiting_outlasts_a_restart_of_the_coordinator(programs, folder):
     with Farm(programs, folder / "farm") as farm:
-        farm.start_coordinator()
         job = farm.submit(small_job(folder))
         command = [programs.path("baton"), "job", "wait", job, "--coordinator", farm.endpoint]
         waiting = Process(command, folder / "wait.log")
@@ -138,7 +133,6 @@ def waiting_outlasts_a_restart_of_the_coordinator(programs, folder):
 
 def a_paused_job_waits_until_it_is_resumed(programs, folder):
     with Farm(programs, folder / "farm") as farm:
-        farm.start_coordinator()
         job = farm.submit(small_job(folder))
         check("paused" in farm.baton("job", "pause", job).stdout, "pause does not say so")
         farm.start_worker()
@@ -150,7 +144,6 @@ def a_paused_job_waits_until_it_is_resumed(programs, folder):
 
 def a_drained_worker_ends_and_its_work_goes_on(programs, folder):
     with Farm(programs, folder / "farm") as farm:
-        farm.start_coordinator()
         job = farm.submit(small_job(folder))
         first = farm.start_worker()
         wait_until(lambda: "worker0" in farm.baton("worker", "list").stdout, "the worker is listed")
@@ -166,7 +159,6 @@ def a_drained_worker_ends_and_its_work_goes_on(programs, folder):
 def a_failed_job_is_retried(programs, folder):
     """What was wrong is mended meanwhile: a mesh that was gone is back."""
     with Farm(programs, folder / "farm") as farm:
-        farm.start_coordinator()
         job = farm.submit(small_job(folder, maxRetriesPerTask=0))
         mesh = folder / "sphere.off"
         mesh.rename(folder / "elsewhere.off")
@@ -180,7 +172,6 @@ def a_failed_job_is_retried(programs, folder):
 def a_map_that_is_away_is_waited_for(programs, folder):
     """Gone after the submission and back some seconds later: the job goes on by itself."""
     with Farm(programs, folder / "farm") as farm:
-        farm.start_coordinator()
         job = farm.submit(small_job(folder))
         away = folder / "away.hdr"
         (folder / "lamp.hdr").rename(away)
@@ -194,7 +185,6 @@ def a_map_that_is_away_is_waited_for(programs, folder):
 def a_task_that_takes_too_long_fails(programs, folder):
     """One second for billions of samples: the attempt is counted, the reason named, the job kept for a replay."""
     with Farm(programs, folder / "farm") as farm:
-        farm.start_coordinator()
         endless = {"method": "reference", "referenceSamples": 1 << 24}
         job = farm.submit(small_job(folder, sampling=endless, state={"carry": False}, maxSecondsPerTask=1,
                                     maxRetriesPerTask=0))
@@ -208,16 +198,4 @@ def a_task_that_takes_too_long_fails(programs, folder):
 
 
 if __name__ == "__main__":
-    run_tests([
-        nobody_listens,
-        a_job_from_submission_to_its_end,
-        unknown_and_ambiguous_ids,
-        names_of_jobs,
-        a_cancelled_job_goes_on_when_submitted_again,
-        waiting_outlasts_a_restart_of_the_coordinator,
-        a_paused_job_waits_until_it_is_resumed,
-        a_drained_worker_ends_and_its_work_goes_on,
-        a_failed_job_is_retried,
-        a_map_that_is_away_is_waited_for,
-        a_task_that_takes_too_long_fails,
-    ])
+    run_tests()

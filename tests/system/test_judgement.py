@@ -6,7 +6,9 @@ import json
 import math
 import re
 
-from farm import check, check_equal, make_job, run_tests, write_job
+from assets import write_map
+from farm import check, check_equal, run_tests
+from jobs import make_job, write_job
 
 
 def job_at(folder, **changes):
@@ -117,7 +119,6 @@ def values_below_zero_are_counted_and_set_to_zero(programs, folder):
 
 def one_frame_of_another_light_stands_out(programs, folder):
     """A frame lit by a map of its own among others: named, and warned of before."""
-    from farm import write_map
     folder.mkdir(parents=True, exist_ok=True)
     write_map(folder / "flash.hdr", colour=lambda x, y, width, height: (30.0, 30.0, 30.0))
     path = job_at(folder, frames="1-8")
@@ -132,5 +133,4 @@ def one_frame_of_another_light_stands_out(programs, folder):
 
 
 if __name__ == "__main__":
-    run_tests([noise_told_is_noise, a_method_that_fails_is_named, what_half_floats_cannot_hold_is_written_as_float,
-               values_below_zero_are_counted_and_set_to_zero, one_frame_of_another_light_stands_out])
+    run_tests()

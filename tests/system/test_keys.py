@@ -7,15 +7,15 @@ import re
 import time
 from pathlib import Path
 
-from farm import (BAD_INPUT, DEADLINE_S, OK, UNAVAILABLE, USAGE, Farm, Process, check, check_equal, make_job, run_tests,
-                  wait_until, write_job)
+from farm import BAD_INPUT, DEADLINE_S, OK, UNAVAILABLE, USAGE, Farm, Process, check, check_equal, run_tests, wait_until
+from jobs import make_job, write_job
 
 
 class KeyedFarm(Farm):
     """A farm on loopback whose coordinator and workers have keys."""
 
     def __init__(self, programs, folder, coordinator_options=(), worker_options=()):
-        super().__init__(programs, folder)
+        super().__init__(programs, folder, workers=None)
         self.keys = self.folder / "keys"
         self.coordinator_options, self.worker_options = coordinator_options, worker_options
         programs.run("baton", "key", "create", self.keys)
@@ -121,16 +121,15 @@ def other_machines_need_keys(programs, folder):
 
     # A key that others may read, and one of another kind.
     programs.run("baton", "key", "create", folder / "keys")
-    again = programs.run("baton", "key", "create", folder / "keys", expect=USAGE)
-    check("a key is not replaced" in again.stderr, again.stderr)
-    wrong = programs.run("baton", "job", "list", "--key", folder / "keys/server.key", expect=USAGE)
-    check("is the key of a coordinator" in wrong.stderr, wrong.stderr)
-    no_worker_key = programs.run("baton", "farm", "slurm", "--work-dir", folder / "slurm", "--coordinator",
-                                 "tcp://192.0.2.1:5570", "--key", folder / "keys/admin.key", expect=USAGE)
-    check("a coordinator with keys needs both" in no_worker_key.stderr, no_worker_key.stderr)
-    os.chmod(folder / "keys/user.key", 0o644)
-    open_key = programs.run("baton", "job", "list", "--key", folder / "keys/user.key", expect=USAGE)
-    check("chmod 600" in open_key.stderr, open_key.stderr)
+    keys = folder / "keys"
+    os.chmod(keys / "user.key", 0o644)
+    for words, says in [
+            (["key", "create", keys], "a key is not replaced"),
+            (["job", "list", "--key", keys / "server.key"], "is the key of a coordinator"),
+            (["farm", "slurm", "--work-dir", folder / "slurm", "--coordinator", "tcp://192.0.2.1:5570", "--key",
+              keys / "admin.key"], "a coordinator with keys needs both"),
+            (["job", "list", "--key", keys / "user.key"], "chmod 600")]:
+        programs.refuses(*words, says=says, expect=USAGE)
 
     # A key of the environment is not that of a farm of this machine alone.
     os.environ["BATON_KEY"] = str(folder / "keys/admin.key")
@@ -183,7 +182,6 @@ def jobs_stay_within_the_roots(programs, folder):
 def two_workers_of_one_name_work_side_by_side(programs, folder):
     path = write_job(folder / "job.json", make_job(folder, image={"tileSize": 16}))
     with Farm(programs, folder / "farm") as farm:
-        farm.start_coordinator()
         for number in range(2):
             command = [programs.path("baton-worker"), "--coordinator", farm.endpoint, "--threads", "1", "--name", "twin"]
             farm.workers.append(Process(command, farm.folder / f"twin{number}.log"))
@@ -212,9 +210,7 @@ def a_worker_of_another_build_is_sent_away(programs, folder):
     check(build in program, f"{build} is not in the program")
     other.write_bytes(program.replace(build, b"f" * len(build)))
     other.chmod(0o755)
-    with Farm(programs, folder / "farm") as farm:
-        farm.start_coordinator()
-        farm.start_worker()
+    with Farm(programs, folder / "farm", workers=1) as farm:
         job = farm.submit(path)
         stranger = Process([str(other), "--coordinator", farm.endpoint, "--name", "stranger"], folder / "stranger.log",
                            {"LD_LIBRARY_PATH": str(programs.bin.resolve())})
@@ -227,11 +223,4 @@ def a_worker_of_another_build_is_sent_away(programs, folder):
 
 
 if __name__ == "__main__":
-    run_tests([
-        roles_decide_who_may_do_what,
-        without_the_right_key_nobody_comes_in,
-        other_machines_need_keys,
-        jobs_stay_within_the_roots,
-        two_workers_of_one_name_work_side_by_side,
-        a_worker_of_another_build_is_sent_away,
-    ])
+    run_tests()

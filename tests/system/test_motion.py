@@ -2,9 +2,9 @@
 """With camera and objects in motion a tile needs its neighbours: the picture and the samples still are the same for any
 tiling, number of workers and death on the way."""
 
-import json
 
-from farm import BAD_INPUT, Farm, check, check_equal, make_job, run_tests, wait_until, write_job
+from farm import Farm, check, check_equal, check_layouts, run_tests, wait_until
+from jobs import camera_keys, make_job, write_job
 
 NUM_FRAMES = 5
 
@@ -12,15 +12,9 @@ NUM_FRAMES = 5
 def moving_job(folder, **changes):
     """The camera goes round the scene and one sphere rolls towards it."""
     job = make_job(folder, frames=f"1-{NUM_FRAMES}", **changes)
-    job["camera"]["keys"] = [
-        {"frame": 1, "position": [0, 1.2, 5], "lookAt": [0, 0.6, 0]},
-        {"frame": 3, "position": [0.2, 1.25, 4.95], "lookAt": [0, 0.6, 0]},
-        {"frame": 6, "position": [0.6, 1.3, 4.8], "lookAt": [0.05, 0.6, 0]},
-    ]
-    job["scene"]["objects"][1]["keys"] = [
-        {"frame": 1},
-        {"frame": 6, "translate": [-0.3, 0, 0.4], "rotateDeg": [40, 0, 0]},
-    ]
+    job["camera"] |= camera_keys((1, [0, 1.2, 5], [0, 0.6, 0]), (3, [0.2, 1.25, 4.95], [0, 0.6, 0]),
+                                 (6, [0.6, 1.3, 4.8], [0.05, 0.6, 0]))
+    job["scene"]["objects"][1]["keys"] = [{"frame": 1}, {"frame": 6, "translate": [-0.3, 0, 0.4], "rotateDeg": [40, 0, 0]}]
     return job
 
 
@@ -33,23 +27,13 @@ def result_of(programs, job_folder, work_folder):
     return pixels, states
 
 
-def rendered(programs, folder, name, workers, threads, tile_size, sites=4):
-    """Renders the job with `baton render`; returns its result."""
-    job = moving_job(folder / name, image={"tileSize": tile_size, "sites": sites})
-    path = write_job(folder / name / "job.json", job)
-    told = programs.render(path, folder / name / "work", workers, threads).stdout
-    check("\nafresh " in told and "nothing to go on from" in told, f"what came into view is not told\n{told}")
-    return result_of(programs, folder / name, folder / name / "work")
-
-
 def any_tiling_and_workers(programs, folder):
-    """Tiles of 16, 64 and the whole image on 1 to 3 workers with 1 or 2 threads."""
-    expected = rendered(programs, folder, "plain", workers=1, threads=1, tile_size=64)
-    for name, workers, threads, tile_size in [("small-tiles", 2, 1, 16), ("whole-image", 1, 2, 160),
-                                              ("many-workers", 3, 1, 64)]:
-        got = rendered(programs, folder, name, workers, threads, tile_size)
-        check_equal(got[0], expected[0], f"pixels of {name}")
-        check_equal(got[1], expected[1], f"samples of {name}")
+    def job_of(place):
+        return moving_job(place, image={"sites": 4})
+    pixels, states = check_layouts(programs, folder, job_of)
+    check_equal((len(pixels), len(states.splitlines())), (NUM_FRAMES, NUM_FRAMES), "frames, and those with states")
+    told = programs.render_in(folder / "told", job_of(folder / "told")).stdout
+    check("\nafresh " in told and "nothing to go on from" in told, f"what came into view is not told\n{told}")
 
 
 def a_killed_worker(programs, folder):
@@ -62,7 +46,6 @@ def a_killed_worker(programs, folder):
 
     path = write_job(folder / "job.json", moving_job(folder, image=image, sampling=slow))
     with Farm(programs, folder / "farm") as farm:
-        farm.start_coordinator()
         first, _ = farm.start_worker(), farm.start_worker()
         job = farm.submit(path)
         wait_until(lambda: farm.show(job)["tasksDone"] >= 20, "the first frame is done")
@@ -86,7 +69,6 @@ def held_states(programs, folder):
     expected = programs.pixels(folder / "quiet" / "frames")
     for name, end in [("drained", "terminate"), ("killed", "kill"), ("joined", None)]:
         with Farm(programs, folder / name / "farm") as farm:
-            farm.start_coordinator()
             first = farm.start_worker()
             job = farm.submit(make(name))
             wait_until(lambda: farm.show(job)["framesDone"] >= 2 and farm.show(job)["statesHeld"] > 0, "states are held")
@@ -105,9 +87,8 @@ def held_states(programs, folder):
 
 def a_replay_makes_the_same_tile(programs, folder):
     """The command that replays a tile renders all of the past that the tile depends on."""
-    path = write_job(folder / "job.json", moving_job(folder, image={"tileSize": 32}, output={"pixelType": "float"}))
-    programs.render(path, folder / "work", workers=2)
-    programs.run("baton-worker", "replay", path, "--frame", 4, "--tile", 7, "--out", folder / "tile.exr")
+    programs.render_in(folder, moving_job(folder, image={"tileSize": 32}, output={"pixelType": "float"}), workers=2)
+    programs.run("baton-worker", "replay", folder / "job.json", "--frame", 4, "--tile", 7, "--out", folder / "tile.exr")
     # Tile 7 of 5 columns: x in [64, 96), y in [32, 64).
     whole = programs.values(folder / "frames" / "frame.0004.exr", "R")
     tile = programs.values(folder / "tile.exr", "R")
@@ -117,14 +98,13 @@ def a_replay_makes_the_same_tile(programs, folder):
 def the_range_of_motion_is_measured(programs, folder):
     """`baton check` tells how far history is followed; a glTF file that is not there is named."""
     path = write_job(folder / "job.json", moving_job(folder))
-    checked = json.loads(programs.run("baton", "check", path, "--json").stdout)
+    checked = programs.checked(path)
     check(2 <= checked["motionMaxPx"] <= 12, f"measured {checked['motionMaxPx']} pixels")
 
     job = moving_job(folder)
     job["camera"] = {"gltf": {"file": "/nowhere.glb", "node": "eye"}}
-    failed = programs.run("baton", "check", write_job(folder / "bad.json", job), expect=BAD_INPUT)
-    check("/nowhere.glb: missing" in failed.stderr, failed.stderr)
+    programs.refuses("check", write_job(folder / "bad.json", job), says="/nowhere.glb: missing")
 
 
 if __name__ == "__main__":
-    run_tests([any_tiling_and_workers, a_killed_worker, held_states, a_replay_makes_the_same_tile, the_range_of_motion_is_measured])
+    run_tests()

@@ -4,8 +4,9 @@ import os
 import re
 import subprocess
 
-from farm import BAD_INPUT, OK, check, check_equal, make_job, run_tests, write_job, write_map
-from test_quick_looks import read_png, srgb
+from farm import BAD_INPUT, OK, check, check_equal, run_tests
+from jobs import camera_keys, make_job, write_job
+from png_files import read_png, srgb
 
 IO_ERROR = 74
 
@@ -15,9 +16,8 @@ def rendered(programs, folder, aovs=("depth",), **changes):
     job = make_job(folder, frames="1-6", sampling={"method": "bidirectional", "numParticles": 2, "numCandidates": 4},
                    image={"width": 81, "height": 47}, **changes)
     job["output"].update(aovs=list(aovs), framesPerSecond=12)
-    path = write_job(folder / "job.json", job)
-    programs.render(path, folder / "work", threads=2)
-    return path
+    programs.render_in(folder, job, threads=2)
+    return folder / "job.json"
 
 
 def probe(movie):
@@ -96,8 +96,7 @@ def test_pngs_need_no_ffmpeg(programs, folder):
 
 def test_an_aov_means_the_same_in_all_frames(programs, folder):
     """As the first frame has it: depth under a camera that moves away."""
-    job = rendered(programs, folder, camera={"keys": [{"frame": 1, "position": [0, 1.2, 5], "lookAt": [0, 0.6, 0]},
-                                                      {"frame": 6, "position": [0, 1.2, 9], "lookAt": [0, 0.6, 0]}]})
+    job = rendered(programs, folder, camera=camera_keys((1, [0, 1.2, 5], [0, 0.6, 0]), (6, [0, 1.2, 9], [0, 0.6, 0])))
     programs.run("baton", "movie", job, "--aov", "depth", "--out", folder / "depth")
     first, last = (folder / f"frames/frame.000{f}.exr" for f in (1, 6))
     told = programs.run("baton", "view", first, "--aov", "depth", "--out", folder / "1.png").stdout
@@ -112,9 +111,7 @@ def test_an_aov_means_the_same_in_all_frames(programs, folder):
 
 def test_motion_is_seen_as_colors(programs, folder):
     """What stands still is grey; the camera goes to the right, so all of the scene goes to the left."""
-    job = rendered(programs, folder, camera={"keys": [{"frame": 1, "position": [0, 1.2, 5], "lookAt": [0, 1.2, 0]},
-                                                      {"frame": 6, "position": [2, 1.2, 5], "lookAt": [2, 1.2, 0]}]},
-                   aovs=["motion"])
+    rendered(programs, folder, aovs=["motion"], camera=camera_keys((1, [0, 1.2, 5], [0, 1.2, 0]), (6, [2, 1.2, 5], [2, 1.2, 0])))
     told = programs.run("baton", "view", folder / "frames/frame.0003.exr", "--aov", "forward", "--out", folder / "1.png").stdout
     check("u red, v green, -" in told, told)
     row = read_png(folder / "1.png")[2][-1]
@@ -139,11 +136,9 @@ def test_faults(programs, folder):
             ([frames, "--range", 2, 1], 64, "--range: 2 1: expected a larger second number"),
             ([frames, "--curve", "film"], 64, "film"),
             ([folder, "--frames", "1"], BAD_INPUT, f"{folder}: no frames, such as frame.0001.exr")]:
-        done = programs.run("baton", "movie", *options, expect=code)
-        check(text in done.stderr, f"{options}: {done.stderr}")
+        programs.refuses("movie", *options, says=text, expect=code)
     (frames / "other.0001.exr").write_bytes((frames / "frame.0001.exr").read_bytes())
-    done = programs.run("baton", "movie", frames, expect=BAD_INPUT)
-    check("frames named frame.#.exr and other.#.exr, expected one sequence" in done.stderr, done.stderr)
+    programs.refuses("movie", frames, says="frames named frame.#.exr and other.#.exr, expected one sequence")
     (frames / "frame.0004.exr").write_bytes(b"no frame")
     done = programs.run("baton", "movie", job, "--skip-missing", "--out", folder / "b.mp4", expect=BAD_INPUT)
     check("frame.0004.exr" in done.stderr and not (folder / "b.mp4").exists(), done.stderr)
@@ -163,7 +158,4 @@ def test_check_tells_of_exposures_of_maps(programs, folder):
 
 
 if __name__ == "__main__":
-    run_tests([test_a_movie_shows_what_view_shows, test_the_filmic_curve, test_pngs_need_no_ffmpeg,
-               test_an_aov_means_the_same_in_all_frames,
-        test_motion_is_seen_as_colors, test_faults,
-               test_check_tells_of_exposures_of_maps])
+    run_tests()

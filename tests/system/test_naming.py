@@ -5,35 +5,27 @@ import shutil
 import subprocess
 from pathlib import Path
 
-from exr_frames import read_frame
-from farm import check, check_equal, make_job, run_tests, write_job
-from test_quick_looks import read_png
+from exr_frames import read_channel_list, read_frame
+from farm import check, check_equal, run_tests
+from jobs import camera_keys, make_job, write_job
+from png_files import read_png
 
 AOVS = ["lns", "normal", "depth", "variance", "albedo", "position", "z", "motion", "object", "material", "cryptoObject", "unshadowed", "blocked"]
 
 
 def rendered(programs, folder, naming):
     job = make_job(folder / naming, frames="1-2", sampling={"method": "pool"},
-                   camera={"keys": [{"frame": 1, "position": [0, 1.2, 5], "lookAt": [0, 0.6, 0]},
-                                    {"frame": 2, "position": [0.3, 1.2, 5], "lookAt": [0.1, 0.6, 0]}]})
+                   camera=camera_keys((1, [0, 1.2, 5], [0, 0.6, 0]), (2, [0.3, 1.2, 5], [0.1, 0.6, 0])))
     job["output"].update(aovs=AOVS, pixelType="float", naming=naming, compression="zip")
     path = write_job(folder / naming / "job.json", job)
     programs.render(path, folder / naming / "work", threads=2)
     return folder / naming / "frames"
 
 
-def stored_names(programs, frame):
+def stored_names(frame):
     """Channel names as the file has them."""
     data = frame.read_bytes()
-    at, end = data.index(b"channels\0chlist\0") + 20, data.index(b"chromaticities\0")
-    return {part[:part.index(b"\0")].decode() for part in split_list(data[at:end])}
-
-
-def split_list(value):
-    at = 0
-    while value[at]:
-        start, at = at, value.index(b"\0", at) + 17
-        yield value[start:at]
+    return {name for name, _ in read_channel_list(data[data.index(b"channels\0chlist\0") + 20:])}
 
 
 def test_both_namings_hold_the_same(programs, folder):
@@ -43,11 +35,11 @@ def test_both_namings_hold_the_same(programs, folder):
         check_equal(set(b.channels), set(a.channels), "channels by their plain names")
         for channel, values in a.channels.items():
             check_equal(list(b.channels[channel]), list(values), f"{name}: {channel}")
-    names = stored_names(programs, blender / "frame.0001.exr")
+    names = stored_names(blender / "frame.0001.exr")
     check(all(channel.startswith("ViewLayer.") for channel in names), f"{names}")
     check({"ViewLayer.Combined.R", "ViewLayer.Depth.Z", "ViewLayer.Vector.W", "ViewLayer.CryptoObject00.R",
            "ViewLayer.variance.G", "ViewLayer.unshadowed.R", "ViewLayer.blocked.B"} <= names, f"{names}")
-    check("Z" in stored_names(programs, plain / "frame.0001.exr"), "plain names")
+    check("Z" in stored_names(plain / "frame.0001.exr"), "plain names")
 
     # What people look at, by the same words.
     for options in ([], ["--aov", "depth"], ["--aov", "normal"]):
@@ -64,7 +56,7 @@ def test_both_namings_hold_the_same(programs, folder):
     job["output"]["naming"] = "blender"
     done = programs.render(write_job(path, job), folder / "plain/work")
     check("written anew: output.naming" in done.stderr or "output.naming" in done.stderr, done.stderr)
-    check("ViewLayer.Combined.R" in stored_names(programs, plain / "frame.0001.exr"), "written anew")
+    check("ViewLayer.Combined.R" in stored_names(plain / "frame.0001.exr"), "written anew")
 
 
 def test_blender_shows_the_passes(programs, folder):
@@ -93,4 +85,4 @@ def test_blender_shows_the_passes(programs, folder):
 
 
 if __name__ == "__main__":
-    run_tests([test_both_namings_hold_the_same, test_blender_shows_the_passes])
+    run_tests()

@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 """Machines that have the farm's folders elsewhere, or not at all."""
 
-from farm import IO, Farm, check, check_equal, make_job, run_tests, wait_until, write_job
+from farm import IO, Farm, check, check_equal, run_tests, wait_until
+from jobs import make_job, write_job
 
 UNSEEN = "not the folder that the coordinator sees"
 
@@ -24,7 +25,6 @@ def folders_may_lie_elsewhere(programs, folder):
     (folder / "mnt").symlink_to(folder / "studio")
 
     with Farm(programs, folder) as farm:
-        farm.start_coordinator()
         blind = farm.start_worker(name="blind", extra=["--map", f"{folder}/studio={folder}/empty"])
         job = farm.submit(path)
         waits = wait_until(lambda: farm.show(job).get("waits"), "the job waits")
@@ -45,7 +45,6 @@ def folders_may_lie_elsewhere(programs, folder):
 
 def a_worker_without_the_store_ends(programs, folder):
     with Farm(programs, folder) as farm:
-        farm.start_coordinator()
         (folder / "empty").mkdir()
         worker = farm.start_worker(extra=["--map", f"{farm.work_folder}={folder}/empty"])
         check_equal(worker.wait(), IO, "exit code")
@@ -55,4 +54,4 @@ def a_worker_without_the_store_ends(programs, folder):
 
 
 if __name__ == "__main__":
-    run_tests([folders_may_lie_elsewhere, a_worker_without_the_store_ends])
+    run_tests()

@@ -2,46 +2,12 @@
 
 import json
 import re
-import struct
 import subprocess
-import zlib
 
-from farm import (BAD_INPUT, OK, USAGE, Process, check, check_equal, make_job, run_tests, wait_until, write_job,
-                  write_map)
-
-
-def read_png(path):
-    """Width, height and the rows of RGB bytes of an 8-bit PNG."""
-    data = path.read_bytes()
-    check_equal(data[:8], b"\x89PNG\r\n\x1a\n", f"start of {path}")
-    at, packed, size = 8, b"", None
-    while at < len(data):
-        length, kind = struct.unpack(">I4s", data[at:at + 8])
-        body = data[at + 8:at + 8 + length]
-        if kind == b"IHDR":
-            size = struct.unpack(">II", body[:8])
-        if kind == b"IDAT":
-            packed += body
-        at += 12 + length
-    width, height = size
-    raw, rows, before = zlib.decompress(packed), [], bytes(3 * width)
-    for y in range(height):
-        start = y * (3 * width + 1)
-        row = bytearray(raw[start + 1:start + 1 + 3 * width])
-        for i, up in enumerate(before):
-            left = row[i - 3] if i >= 3 else 0
-            left_up = before[i - 3] if i >= 3 else 0
-            guess = {0: 0, 1: left, 2: up, 3: (left + up) // 2, 4: paeth(left, up, left_up)}[raw[start]]
-            row[i] = (row[i] + guess) & 255
-        rows.append(bytes(row))
-        before = row
-    return width, height, rows
-
-
-def paeth(left, up, left_up):
-    """The predictor of PNG."""
-    guess = left + up - left_up
-    return min((left, up, left_up), key=lambda value: abs(guess - value))
+from assets import write_map
+from farm import BAD_INPUT, OK, USAGE, Process, check, check_equal, run_tests, wait_until
+from jobs import make_job, write_job
+from png_files import read_png, srgb
 
 
 def job_at(folder, **changes):
@@ -111,7 +77,7 @@ def test_a_region_has_the_pixels_of_the_whole(programs, folder):
 def test_check_and_explain_take_the_same_options(programs, folder):
     job = job_at(folder)
     options = ["--frames", "2", "--region", "40,16,80,48", "--set", "image.sites=4"]
-    report = json.loads(programs.run("baton", "check", job, *options, "--json", "--explain").stdout)
+    report = programs.checked(job, *options, "--explain")
     check_equal(report["frames"], 1, "frames")
     check_equal(report["primaryRaysPerPixel"], 4, "sites")
     check_equal(report["outputDirectory"], str(folder / "frames-look"), "folder")
@@ -202,16 +168,9 @@ def test_view(programs, folder):
     above = sum(v > 1.001 * white for v in variance)
     check(len(variance) > 100 and 0.005 < above / len(variance) <= 0.01, f"{done.stdout}: {above} of {len(variance)}")
 
-    done = programs.run("baton", "view", frame, "--aov", "dept", expect=BAD_INPUT)
-    check("--aov dept: no such AOV in the file; there is A, depth, normal, variance, visibility" in done.stderr, done.stderr)
-    done = programs.run("baton", "view", folder / "job.json", expect=BAD_INPUT)
-    check("job.json" in done.stderr, done.stderr)
-
-
-def srgb(linear):
-    """The 8-bit value of linear light."""
-    v = min(max(linear, 0), 1)
-    return 255 * (12.92 * v if v <= 0.0031308 else 1.055 * v**(1 / 2.4) - 0.055)
+    programs.refuses("view", frame, "--aov", "dept",
+                     says="--aov dept: no such AOV in the file; there is A, depth, normal, variance, visibility")
+    programs.refuses("view", folder / "job.json", says="job.json")
 
 
 def test_watch_follows_job_and_files(programs, folder):
@@ -256,9 +215,4 @@ def test_watch_follows_job_and_files(programs, folder):
 
 
 if __name__ == "__main__":
-    run_tests([
-        test_a_look_leaves_finished_frames_alone, test_the_sheet_has_numbers_and_one_exposure,
-        test_a_region_has_the_pixels_of_the_whole,
-        test_check_and_explain_take_the_same_options, test_faults_name_the_option, test_check_draws_the_scene, test_view,
-        test_watch_follows_job_and_files
-    ])
+    run_tests()

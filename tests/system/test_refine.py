@@ -4,7 +4,8 @@ split, whoever dies, and whatever was kept. `baton render` adds sweeps by itself
 
 import json
 
-from farm import BAD_INPUT, USAGE, Farm, check, check_equal, make_job, run_tests, wait_until, write_job
+from farm import BAD_INPUT, USAGE, Farm, check, check_equal, run_tests, wait_until
+from jobs import make_job, write_job
 from test_motion import moving_job
 
 POOL = {"method": "pool", "numParticles": 8, "numCandidates": 32}
@@ -25,17 +26,9 @@ def moving(folder, **quality):
     return job
 
 
-def at_once(programs, folder, job, **render):
-    """The pixels of a job as `baton render` makes them."""
-    path = write_job(folder / "job.json", job)
-    programs.render(path, folder / "work", **render)
-    return programs.pixels(folder / "frames")
-
-
 def refined(programs, folder, job, times, workers, kill_at=None):
     """The pixels of a job that is refined so many times; a worker dies in the refinement number kill_at."""
     with Farm(programs, folder / "farm") as farm:
-        farm.start_coordinator()
         hands = [farm.start_worker() for _ in range(workers)]
         done = farm.submit(write_job(folder / "job.json", job))
         farm.wait_for(done)
@@ -52,7 +45,7 @@ def refined(programs, folder, job, times, workers, kill_at=None):
 
 def a_still_in_four_steps(programs, folder):
     """64 rounds at once, and 16 refined three times, on 1 to 3 workers with a kill."""
-    expected = at_once(programs, folder / "whole", still(folder / "whole", rounds=16, sweeps=4))
+    expected = programs.rendered(folder / "whole", still(folder / "whole", rounds=16, sweeps=4))
     for workers in (1, 2, 3):
         place = folder / f"refined-{workers}"
         got = refined(programs, place, still(place, rounds=16, refinable=True), 3, workers,
@@ -63,7 +56,7 @@ def a_still_in_four_steps(programs, folder):
 def sequences_at_rest_and_in_motion(programs, folder):
     for make in (turning, moving):
         name = make.__name__
-        expected = at_once(programs, folder / f"{name}-whole", make(folder / f"{name}-whole", rounds=2, sweeps=3))
+        expected = programs.rendered(folder / f"{name}-whole", make(folder / f"{name}-whole", rounds=2, sweeps=3))
         got = refined(programs, folder / name, make(folder / name, rounds=2, refinable=True), 2, 2, kill_at=0)
         check_equal(got, expected, f"pixels of {name} refined")
 
@@ -78,7 +71,6 @@ def only_new_sweeps_are_rendered(programs, folder):
     job = still(folder, rounds=2, refinable=True)
     job["image"]["tileSize"] = 160
     with Farm(programs, folder / "farm") as farm:
-        farm.start_coordinator()
         worker = farm.start_worker()
         first = farm.submit(write_job(folder / "job.json", job))
         farm.wait_for(first)
@@ -99,8 +91,7 @@ def only_new_sweeps_are_rendered(programs, folder):
 def render_adds_sweeps(programs, folder):
     """Until a noise is reached, or so many rounds are; a second call has nothing to do."""
     job = turning(folder, rounds=4, noiseThreshold=0.02, maxRounds=64)
-    path = write_job(folder / "job.json", job)
-    told = programs.render(path, folder / "work").stderr
+    told = programs.render_in(folder, job).stderr
     lines = [line for line in told.splitlines() if "as Cycles measures it" in line]
     noises = [float(line.split("noise ")[1].split()[0]) for line in lines]
     check(len(lines) > 1 and lines[0].startswith("4 rounds: "), told)
@@ -108,36 +99,34 @@ def render_adds_sweeps(programs, folder):
     rounds = int(lines[-1].split()[0])
     check(noises[-1] <= 0.02 or rounds == 64, f"ended at {lines[-1]}")
     pixels = programs.pixels(folder / "frames")
-    again = programs.render(path, folder / "work").stderr
+    again = programs.render_in(folder, job).stderr
     check(f"{rounds} rounds: noise" in again and "more" not in again, again)
     check_equal(programs.pixels(folder / "frames"), pixels, "pixels after a second call")
 
     # The same at once.
     check(rounds % 4 == 0, lines[-1])
-    expected = at_once(programs, folder / "whole", turning(folder / "whole", rounds=4, sweeps=rounds // 4))
+    expected = programs.rendered(folder / "whole", turning(folder / "whole", rounds=4, sweeps=rounds // 4))
     check_equal(pixels, expected, "pixels beside those at once")
 
     # With a limit of rounds the last step is shorter.
     job = still(folder / "most", rounds=2, maxRounds=10)
-    told = programs.render(write_job(folder / "most/job.json", job), folder / "most/work", extra=["--json"])
+    told = programs.render_in(folder / "most", job, extra=["--json"])
     check_equal([line.split()[0] for line in told.stderr.splitlines() if "as Cycles" in line], ["2", "4", "8", "10"],
                 "rounds after each step")
     check_equal(json.loads(told.stdout)["status"], "done", "the one result of --json")
 
     # No time: one sweep.
     job = still(folder / "hurry", rounds=2, timeLimit=0.001)
-    told = programs.render(write_job(folder / "hurry/job.json", job), folder / "hurry/work").stderr
+    told = programs.render_in(folder / "hurry", job).stderr
     check("2 rounds: noise" in told and "more" not in told, told)
 
 
 def waiting_adds_sweeps(programs, folder):
     """A job that was submitted grows while somebody waits for it, as `baton render` would have it."""
     quality = {"rounds": 4, "noiseThreshold": 0.02, "maxRounds": 64}
-    expected = at_once(programs, folder / "rendered", turning(folder / "rendered", **quality))
+    expected = programs.rendered(folder / "rendered", turning(folder / "rendered", **quality))
     path = write_job(folder / "farm/job.json", turning(folder / "farm", **quality))
-    with Farm(programs, folder / "work") as farm:
-        farm.start_coordinator()
-        farm.start_worker()
+    with Farm(programs, folder / "work", workers=1) as farm:
         said = farm.baton("job", "submit", path)
         check("baton job wait adds rounds until quality.noiseThreshold ends it" in said.stderr, said.stderr)
         farm.wait_for(said.stdout.strip())
@@ -153,5 +142,4 @@ def waiting_adds_sweeps(programs, folder):
 
 
 if __name__ == "__main__":
-    run_tests([a_still_in_four_steps, sequences_at_rest_and_in_motion, only_new_sweeps_are_rendered, render_adds_sweeps,
-               waiting_adds_sweeps])
+    run_tests()

@@ -4,7 +4,8 @@
 import json
 import re
 
-from farm import BAD_INPUT, Farm, Process, check, check_equal, make_job, run_tests, wait_until, write_job
+from farm import BAD_INPUT, Farm, Process, check, check_equal, run_tests, wait_until
+from jobs import make_job, write_job
 
 SLOW = {"numParticles": 16, "numCandidates": 512, "numDistributions": 48}
 
@@ -50,11 +51,9 @@ def a_killed_render_goes_on(programs, folder):
 
 
 def a_finished_render_has_nothing_to_do(programs, folder):
-    path = write_job(folder / "job.json", make_job(folder, frames="1-2"))
-    programs.render(path, folder / "work")
-    before = programs.pixels(folder / "frames")
-    programs.render(path, folder / "work")
-    check_equal(programs.pixels(folder / "frames"), before, "pixels after the second run")
+    job = make_job(folder, frames="1-2")
+    before = programs.rendered(folder, job)
+    check_equal(programs.rendered(folder, job), before, "pixels after the second run")
 
 
 def two_farms_of_one_machine_never_meet(programs, folder):
@@ -97,9 +96,7 @@ def what_is_gone_is_made_again_and_only_that(programs, folder):
         job = make_job(place, **changes, **extra)
         del job["sampling"]["numDistributions"]
         path = write_job(place / "job.json", job)
-        with Farm(programs, place / "farm") as farm:
-            farm.start_coordinator()
-            farm.start_worker(threads=2)
+        with Farm(programs, place / "farm", workers=1, threads=2) as farm:
             ident = farm.submit(path)
             farm.wait_for(ident)
             expected = programs.pixels(place / "frames")
@@ -120,7 +117,6 @@ def damaged_blobs_are_made_again(programs, folder):
     witness = folder / "witness"
     programs.render(make(witness), witness / "work", workers=2)
     with Farm(programs, folder / "farm") as farm:
-        farm.start_coordinator()
         worker = farm.start_worker()
         ident = farm.submit(path)
         wait_until(lambda: num_blobs(farm.work_folder) >= 12, "the first results are in the store")
@@ -151,7 +147,6 @@ def a_killed_coordinator_goes_on_with_a_second_pass(programs, folder):
         job["sampling"] = sampling
         path = write_job(place / "job.json", job)
         with Farm(programs, place / "farm") as farm:
-            farm.start_coordinator()
             worker = farm.start_worker()
             ident = farm.submit(path)
             wait_until(lambda: farm.show(ident)["framesDone"] >= 1, "a frame is done")
@@ -166,12 +161,4 @@ def a_killed_coordinator_goes_on_with_a_second_pass(programs, folder):
 
 
 if __name__ == "__main__":
-    run_tests([
-        a_killed_render_goes_on,
-        a_finished_render_has_nothing_to_do,
-        two_farms_of_one_machine_never_meet,
-        an_edited_job_does_not_mix_with_the_one_before,
-        what_is_gone_is_made_again_and_only_that,
-        damaged_blobs_are_made_again,
-        a_killed_coordinator_goes_on_with_a_second_pass,
-    ])
+    run_tests()

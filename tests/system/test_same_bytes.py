@@ -1,7 +1,8 @@
 #!/usr/bin/env python3
 """The picture and the samples are the same for any tiling, number of workers and threads, and death on the way."""
 
-from farm import DEADLINE_S, Farm, check, check_equal, make_job, run_tests, wait_until, write_job
+from farm import DEADLINE_S, Farm, check, check_equal, check_layouts, run_tests, wait_until
+from jobs import camera_keys, make_job, write_job
 
 NUM_FRAMES = 6
 # Dear enough that a process can be killed while the job runs.
@@ -17,93 +18,37 @@ def result_of(programs, job_folder, work_folder):
     return pixels, states
 
 
-def rendered(programs, folder, name, workers, threads, tile_size, sites):
-    """Renders the job with `baton render`; returns its result."""
-    job = make_job(folder / name, image={"tileSize": tile_size, "sites": sites})
-    path = write_job(folder / name / "job.json", job)
-    programs.render(path, folder / name / "work", workers, threads)
-    return result_of(programs, folder / name, folder / name / "work")
+FOUR_SITES = {"image": {"sites": 4}}
+MOVING = camera_keys((1, [0, 1.2, 5], [0, 0.6, 0]), (4, [0.4, 1.3, 4.9], [0, 0.6, 0]))
+POOL = {"method": "pool", "numParticles": 16, "numCandidates": 64}
+RESTIR = {**POOL, "method": "restir", "numNeighbors": 1, "neighborRadius": 5}
+BY_MATERIAL = {"method": "mis", "numParticles": 8, "byMaterial": {
+    "chalk": {"method": "environment", "numParticles": 4},
+    "lacquer": {"method": "bidirectional", "numParticles": 12, "numCandidates": 64}}}
+# What no layout may show in: (changes of the small job, its sampling if not its own).
+CASES = {
+    "one site": ({}, None),
+    "four sites": (FOUR_SITES, None),
+    "a second pass, which reaches into other tiles": ({**FOUR_SITES, "visibility": {"correlated": True, "dilate": 1}}, None),
+    "settings by material": (FOUR_SITES, BY_MATERIAL),
+    "a sampler with a memory": (FOUR_SITES, POOL),
+    "the same in motion": ({**FOUR_SITES, "camera": MOVING}, POOL),
+    "one that asks neighbours": (FOUR_SITES, RESTIR),
+    "it in motion": ({**FOUR_SITES, "camera": MOVING}, RESTIR),
+}
 
 
-def compare_tilings(programs, folder, sites):
-    """Tiles of 16, 64 and the whole image on 1 to 3 workers with 1 or 2 threads."""
-    expected = rendered(programs, folder, "plain", workers=1, threads=1, tile_size=64, sites=sites)
-    for name, workers, threads, tile_size in [
-        ("small-tiles", 2, 1, 16),
-        ("whole-image", 1, 2, 160),
-        ("many-workers", 3, 1, 64),
-    ]:
-        got = rendered(programs, folder, name, workers, threads, tile_size, sites)
-        check_equal(got[0], expected[0], f"pixels of {name}")
-        check_equal(got[1], expected[1], f"samples of {name}")
+def no_layout_shows(programs, folder):
+    for name, (changes, sampling) in CASES.items():
+        frames = 6 if not sampling and "visibility" not in changes else 4
 
-
-def one_site(programs, folder):
-    compare_tilings(programs, folder, sites=1)
-
-
-def four_sites(programs, folder):
-    compare_tilings(programs, folder, sites=4)
-
-
-def correlated_visibility(programs, folder):
-    """The second pass reaches into other tiles; no tiling shows."""
-    changes = {"visibility": {"correlated": True, "dilate": 1}, "frames": "1-4"}
-    expected = None
-    for name, workers, threads, tile_size in [
-        ("whole-image", 1, 1, 160),
-        ("small-tiles", 2, 1, 16),
-        ("tiles-of-64", 3, 1, 64),
-    ]:
-        job = make_job(folder / name, image={"tileSize": tile_size, "sites": 4}, **changes)
-        path = write_job(folder / name / "job.json", job)
-        programs.render(path, folder / name / "work", workers, threads)
-        got = programs.pixels(folder / name / "frames")
-        check_equal(len(got), 4, f"frames of {name}")
-        expected = expected or got
-        check_equal(got, expected, f"pixels of {name}")
-
-
-def settings_by_material(programs, folder):
-    """Methods and numbers of samples that differ by material."""
-    sampling = {"method": "mis", "numParticles": 8, "byMaterial": {
-        "chalk": {"method": "environment", "numParticles": 4},
-        "lacquer": {"method": "bidirectional", "numParticles": 12, "numCandidates": 64}}}
-    expected = None
-    for name, workers, threads, tile_size in [("whole-image", 1, 2, 160), ("small-tiles", 2, 1, 16)]:
-        place = folder / name
-        job = make_job(place, frames="1-2", image={"tileSize": tile_size, "sites": 4})
-        job["sampling"] = sampling
-        programs.render(write_job(place / "job.json", job), place / "work", workers, threads)
-        got = programs.pixels(place / "frames")
-        check_equal(len(got), 2, f"frames of {name}")
-        expected = expected or got
-        check_equal(got, expected, f"pixels of {name}")
-
-
-def carrying(programs, folder):
-    """The sampler with a memory and the one that asks neighbours, still and with a camera that moves."""
-    for sampling in [{"method": "pool"}, {"method": "restir", "numNeighbors": 1, "neighborRadius": 5}]:
-        carrying_with(programs, folder / sampling["method"], sampling)
-
-
-def carrying_with(programs, folder, sampling):
-    keys = [{"frame": 1, "position": [0, 1.2, 5], "lookAt": [0, 0.6, 0]},
-            {"frame": 4, "position": [0.4, 1.3, 4.9], "lookAt": [0, 0.6, 0]}]
-    for motion in ["still", "moving"]:
-        expected = None
-        for name, workers, threads, tile_size in [("whole-image", 1, 2, 160), ("small-tiles", 2, 1, 16)]:
-            place = folder / motion / name
-            job = make_job(place, frames="1-4", image={"tileSize": tile_size, "sites": 4},
-                           sampling=dict(sampling))
-            del job["sampling"]["numDistributions"]
-            if motion == "moving":
-                job["camera"]["keys"] = keys
-            programs.render(write_job(place / "job.json", job), place / "work", workers, threads)
-            got = programs.pixels(place / "frames"), programs.states(place / "work")
-            check_equal(len(got[0]), 4, f"frames of {motion} {name}")
-            expected = expected or got
-            check_equal(got, expected, f"pixels and samples of {motion} {name}")
+        def job_of(place):
+            job = make_job(place, frames=f"1-{frames}", **changes)
+            return {**job, "sampling": sampling or job["sampling"]}
+        pixels, states = check_layouts(programs, folder / name.replace(" ", "-"), job_of)
+        check_equal(len(pixels), frames, f"{name}: frames")
+        with_states = 0 if sampling == BY_MATERIAL else frames if "camera" in changes else frames // 2
+        check_equal(len(states.splitlines()), with_states, f"{name}: frames with states")
 
 
 def equal_jobs_make_equal_files(programs, folder):
@@ -125,9 +70,7 @@ def tiles_that_look_alike(programs, folder):
                    camera={"verticalFovDeg": 80}, sampling={"method": "bidirectional"},
                    output={"background": "transparent"})
     del job["scene"]["ground"], job["sampling"]["numDistributions"]
-    with Farm(programs, folder / "farm") as farm:
-        farm.start_coordinator()
-        farm.start_worker(threads=2)
+    with Farm(programs, folder / "farm", workers=1, threads=2) as farm:
         ident = farm.submit(write_job(folder / "job.json", job))
         farm.wait_for(ident)
         check_equal(farm.show(ident)["attemptsLost"], 0, "attempts lost though nothing was disturbed")
@@ -137,7 +80,7 @@ def slow_job(folder):
     return write_job(folder / "job.json", make_job(folder, image={"tileSize": 32}, sampling=SLOW))
 
 
-def undisturbed(programs, folder):
+def _undisturbed(programs, folder):
     """The result of the slow job when nobody dies; rendered once for all tests."""
     folder = folder.parent / "undisturbed"
     if (folder / "work").exists():
@@ -156,9 +99,8 @@ def wait_for_progress(farm, job):
 
 
 def a_killed_worker(programs, folder):
-    expected = undisturbed(programs, folder)
+    expected = _undisturbed(programs, folder)
     with Farm(programs, folder / "farm") as farm:
-        farm.start_coordinator()
         first, _ = farm.start_worker(), farm.start_worker()
         job = farm.submit(slow_job(folder))
         wait_for_progress(farm, job)
@@ -170,9 +112,8 @@ def a_killed_worker(programs, folder):
 
 
 def a_killed_coordinator(programs, folder):
-    expected = undisturbed(programs, folder)
+    expected = _undisturbed(programs, folder)
     with Farm(programs, folder / "farm") as farm:
-        farm.start_coordinator()
         workers = [farm.start_worker(), farm.start_worker()]
         job = farm.submit(slow_job(folder))
         wait_for_progress(farm, job)
@@ -189,7 +130,6 @@ def a_killed_coordinator(programs, folder):
 def a_terminated_worker_finishes_its_task(programs, folder):
     """SIGTERM drains: the worker reports what it runs and exits 0; the job goes on with another."""
     with Farm(programs, folder / "farm") as farm:
-        farm.start_coordinator()
         worker = farm.start_worker()
         job = farm.submit(slow_job(folder))
         wait_for_progress(farm, job)
@@ -200,15 +140,4 @@ def a_terminated_worker_finishes_its_task(programs, folder):
 
 
 if __name__ == "__main__":
-    run_tests([
-        one_site,
-        four_sites,
-        correlated_visibility,
-        settings_by_material,
-        carrying,
-        equal_jobs_make_equal_files,
-        tiles_that_look_alike,
-        a_killed_worker,
-        a_killed_coordinator,
-        a_terminated_worker_finishes_its_task,
-    ])
+    run_tests()

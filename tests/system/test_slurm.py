@@ -8,7 +8,8 @@ import shutil
 import time
 from pathlib import Path
 
-from farm import OK, Farm, Process, check, check_equal, make_job, run_tests, wait_until, write_job
+from farm import OK, Farm, Process, check, check_equal, run_tests, wait_until
+from jobs import make_job, write_job
 from slurm_cluster import Cluster
 
 NUM_FRAMES = 12
@@ -228,7 +229,6 @@ def the_recipes_do_without_the_command(programs, folder):
 
         shutil.rmtree(farm.frames)
         with Farm(programs, folder / "outside") as outside:
-            outside.start_coordinator()
             cluster.environment["BATON_COORDINATOR"] = outside.endpoint
             cluster.run("sbatch", "--array=1-2", "--time=10", f"--output={folder}/worker-%a.log", recipes / "workers.sbatch")
             wait_until(lambda: len(ends_of_pilots(cluster)) == 2, "both workers run")
@@ -279,6 +279,4 @@ def pilots_of_half_a_minute(programs, folder):
 
 
 if __name__ == "__main__":
-    run_tests([pilots_follow_the_work_and_are_replaced, a_pilot_ends_with_its_time,
-               a_job_of_its_own_is_rendered_and_resumed, pilots_that_cannot_work_are_told_of, the_recipes_do_without_the_command],
-              long_tests=[what_slurm_finds_out_late, pilots_of_half_a_minute])
+    run_tests(long_tests=[what_slurm_finds_out_late, pilots_of_half_a_minute])

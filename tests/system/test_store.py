@@ -1,14 +1,13 @@
 #!/usr/bin/env python3
 """What the store holds: as `baton check` says, and never more than a limit."""
 
-import json
 
 from disk_use import StoreWatch, measure
-from farm import FAILED, check, check_equal, make_job, run_tests, write_job
+from farm import FAILED, check, check_equal, run_tests
+from jobs import camera_keys, make_job, write_job
 
 MIB = 1 << 20
-MOVING = {"keys": [{"frame": 1, "position": [0, 1.2, 5], "lookAt": [0, 0.6, 0]},
-                   {"frame": 30, "position": [1.5, 1.2, 4.8], "lookAt": [0, 0.6, 0]}]}
+MOVING = camera_keys((1, [0, 1.2, 5], [0, 0.6, 0]), (30, [1.5, 1.2, 4.8], [0, 0.6, 0]))
 
 
 def job_in(folder, **changes):
@@ -36,7 +35,7 @@ def a_limit_holds_and_the_job_ends(programs, folder):
     path = job_in(folder)
     programs.render(path, folder / "free")
     witness = programs.pixels(folder / "frames")
-    predicted = json.loads(programs.run("baton", "check", path, "--json").stdout)["storeBytes"]
+    predicted = programs.checked(path)["storeBytes"]
     limit = round(1.2 * predicted / MIB)
     check(limit < 0.6 * predicted * 30 / 12 / MIB, "the limit is far below what all frames take")
     with StoreWatch(folder / "work/store") as watch:
@@ -57,5 +56,4 @@ def a_limit_that_is_too_low_ends_the_render_with_an_error(programs, folder):
 
 
 if __name__ == "__main__":
-    run_tests([check_says_what_the_store_holds, two_workers_leave_nothing_but_the_last_states,
-               a_limit_holds_and_the_job_ends, a_limit_that_is_too_low_ends_the_render_with_an_error])
+    run_tests()

@@ -6,7 +6,7 @@ namespace baton {
 
 /// The numbers of the pool sampler that no theory gives. None of them can bias: they say where
 /// candidates and rays go. docs/lab/pool.md shows what half and twice of each does
-/// (tests/studies/study_pool_tuning.cpp).
+/// (jobs/lab/studies/study_pool_tuning.cpp).
 struct PoolTuning {
   /// What a pixel's noise is compared with: the light that it expects and so many times the mean
   /// radiance of the environment, as nobody sees the noise of dark pixels among bright ones.

@@ -8,6 +8,7 @@
 #include <numeric>
 #include <vector>
 
+#include "tests/support/moments.h"
 #include "worker/light/candidates.h"
 #include "worker/surface/bsdf.h"
 
@@ -47,18 +48,7 @@ SiteBlock mixed_pixel(int num_sites, int only = -1) {
   return sites;
 }
 
-struct Moments {
-  double sum = 0, squares = 0;
-  int count = 0;
-  void add(double x) {
-    sum += x;
-    squares += x * x;
-    ++count;
-  }
-  double mean() const { return sum / count; }
-  double variance() const { return std::max(squares / count - mean() * mean(), 0.0); }
-  double error() const { return std::sqrt(variance() / (count - 1)); }
-};
+using test::Moments;
 
 class SiteDeals : public testing::Test {
  protected:

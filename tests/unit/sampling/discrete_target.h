@@ -7,6 +7,7 @@
 #include <numeric>
 #include <vector>
 
+#include "tests/support/moments.h"
 #include "worker/sampling/sequential-inl.h"
 
 namespace baton::HWY_NAMESPACE {
@@ -90,18 +91,6 @@ inline SequentialOutcome step(const DiscreteTarget& target, const SequentialSett
                         Rng(key, PassId::resample), p.span());
 }
 
-/// Mean and standard error of values.
-struct Moments {
-  double sum = 0, squares = 0;
-  int count = 0;
-
-  void add(double value) {
-    sum += value;
-    squares += value * value;
-    ++count;
-  }
-  double mean() const { return sum / count; }
-  double error() const { return std::sqrt((squares / count - mean() * mean()) / (count - 1)); }
-};
+using test::Moments;
 
 }  // namespace baton::HWY_NAMESPACE

@@ -8,6 +8,7 @@
 #include <memory>
 #include <vector>
 
+#include "tests/support/moments.h"
 #include "tests/unit/sampling/discrete_pool.h"
 
 namespace baton::HWY_NAMESPACE {
@@ -28,18 +29,7 @@ struct Verdict {
   double lns = 0, image = 0, resolution = 0;
 };
 
-struct Moments {
-  double sum = 0, squares = 0;
-  void add(double x) {
-    sum += x;
-    squares += x * x;
-  }
-  double z(double expected, int n) const {
-    const double mean = sum / n;
-    return std::fabs(mean - expected) / std::max(error(n), 1e-12);
-  }
-  double error(int n) const { return std::sqrt((squares / n - sum / n * sum / n) / (n - 1)); }
-};
+using test::Moments;
 
 Verdict run(const Light& light, int frame, int chains, Fault fault = Fault::none) {
   const StateValues last = light(frame - 1);
@@ -57,8 +47,8 @@ Verdict run(const Light& light, int frame, int chains, Fault fault = Fault::none
     lns_moments.add(e.lns);
     image_moments.add(e.image);
   }
-  return {lns_moments.z(lns, chains), image_moments.z(image, chains),
-          image > 0 ? 4.5 * image_moments.error(chains) / image : 0};
+  return {lns_moments.z(lns), image_moments.z(image),
+          image > 0 ? 4.5 * image_moments.error() / image : 0};
 }
 
 const Light kTurning = [](int f) { return lobe(static_cast<std::size_t>(f / 3) % kStates, 0.2f); };
