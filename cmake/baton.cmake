@@ -53,11 +53,15 @@ function(baton_decides_only target)
   endif()
 endfunction()
 
-# baton_library(NAME DIR folder DEPS public... PRIVATE private...): all .cpp files of one folder and those below; but for
-# folders named `reader`, which are loaded (baton_image_reader).
+# baton_library(NAME [FLAT] DIR folder DEPS public... PRIVATE private...): all .cpp files of one folder and, without FLAT, of
+# those below; but for folders named `reader`, which are loaded (baton_image_reader).
 function(baton_library name)
-  cmake_parse_arguments(A "" "DIR" "DEPS;PRIVATE" ${ARGN})
-  file(GLOB_RECURSE sources CONFIGURE_DEPENDS ${CMAKE_SOURCE_DIR}/${A_DIR}/*.cpp)
+  cmake_parse_arguments(A "FLAT" "DIR" "DEPS;PRIVATE" ${ARGN})
+  set(glob GLOB_RECURSE)
+  if(A_FLAT)
+    set(glob GLOB)
+  endif()
+  file(${glob} sources CONFIGURE_DEPENDS ${CMAKE_SOURCE_DIR}/${A_DIR}/*.cpp)
   list(FILTER sources EXCLUDE REGEX "/reader/[^/]*$")
   if(sources)
     add_library(${name} STATIC ${sources})

@@ -6,7 +6,7 @@
 #include <map>
 #include <set>
 
-#include "common/job/sequence.h"
+#include "common/job/job_facts.h"
 
 namespace baton {
 namespace {

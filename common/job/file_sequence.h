@@ -26,8 +26,8 @@ struct FileSequence {
 /// "frame.####.exr" with number 7 -> "frame.0007.exr". A pattern without '#' is returned unchanged.
 std::string frame_file_name(const std::string& pattern, int number);
 
-/// The number of the file at a frame of the job: floor(speed frame) + offset, brought between `first` and
-/// `last`.
+/// The number of the file at a frame of the job: floor(speed frame) + offset, brought between
+/// `first` and `last`.
 int number_at(const FileSequence& sequence, FrameNumber frame);
 /// Its path.
 std::string file_at(const FileSequence& sequence, FrameNumber frame);

@@ -7,7 +7,7 @@
 
 #include "common/base/check.h"
 #include "common/base/limits.h"
-#include "common/job/sequence.h"
+#include "common/job/job_facts.h"
 
 namespace baton {
 namespace {

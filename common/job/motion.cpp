@@ -3,8 +3,8 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/job/job_facts.h"
 #include "common/job/key_span.h"
-#include "common/job/sequence.h"
 #include "common/math/quaternion.h"
 
 namespace baton {

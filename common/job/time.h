@@ -7,7 +7,7 @@
 namespace baton {
 
 /// The words for time. Each is a type of its own, so that the compiler refuses mixtures; what one
-/// is in another is asked of a Timeline (common/job/timeline.h) alone.
+/// is in another is asked of a Timeline (common/job/plan/timeline.h) alone.
 
 /// What a person types and reads in file names: "frame 1001". In [0, limits::kMaxFrameNumber].
 using FrameNumber = Ordinal<struct FrameNumberTag>;

@@ -6,7 +6,7 @@
 #include <array>
 #include <span>
 
-#include "common/job/sequence.h"
+#include "common/job/plan/sequence.h"
 #include "common/math/bounds.h"
 #include "common/scene/pose.h"
 

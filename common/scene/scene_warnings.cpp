@@ -4,7 +4,7 @@
 
 #include <set>
 
-#include "common/job/suggest.h"
+#include "common/base/suggest.h"
 #include "common/scene/gltf/document.h"
 #include "common/scene/gltf/materials.h"
 

@@ -48,8 +48,8 @@ Status decode_meta(const SectionFile& file, const std::string& name, FirstPassSa
   s.picture.high = reader.get<std::uint64_t>();
   s.picture.low = reader.get<std::uint64_t>();
   s.step = Step(reader.get<std::int32_t>());
-  for (std::int32_t* value : {&s.tile, &s.rect.x0, &s.rect.y0, &s.rect.x1,
-                              &s.rect.y1, &s.num_slots, &s.num_populations}) {
+  for (std::int32_t* value : {&s.tile, &s.rect.x0, &s.rect.y0, &s.rect.x1, &s.rect.y1, &s.num_slots,
+                              &s.num_populations}) {
     *value = reader.get<std::int32_t>();
   }
   const bool good = s.step >= Step(0) && s.step < Step(limits::kMaxFrames) && s.tile >= 0 &&

@@ -21,7 +21,7 @@ struct FirstPassSamples {
   static constexpr std::uint8_t kSurface = 1;
   static constexpr std::uint8_t kFailed[2] = {2, 4};
 
-  Digest picture;                ///< of the job (picture_digest)
+  Digest picture;  ///< of the job (picture_digest)
   Step step{};
   std::int32_t tile = 0;
   PixelRect rect;

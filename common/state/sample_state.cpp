@@ -141,8 +141,8 @@ Status decode_meta(const SectionFile& file, const std::string& name, SampleState
   state.picture.high = reader.get<std::uint64_t>();
   state.picture.low = reader.get<std::uint64_t>();
   state.step = Step(reader.get<std::int32_t>());
-  for (std::int32_t* value : {&state.tile, &state.rect.x0, &state.rect.y0,
-                              &state.rect.x1, &state.rect.y1, &state.num_particles}) {
+  for (std::int32_t* value : {&state.tile, &state.rect.x0, &state.rect.y0, &state.rect.x1,
+                              &state.rect.y1, &state.num_particles}) {
     *value = reader.get<std::int32_t>();
   }
 

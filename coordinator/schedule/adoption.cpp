@@ -8,7 +8,7 @@
 #include "common/base/limits.h"
 #include "common/job/aov.h"
 #include "common/job/motion.h"
-#include "common/job/sequence.h"
+#include "common/job/plan/sequence.h"
 #include "coordinator/schedule/job_graph.h"
 
 namespace baton {

@@ -5,7 +5,7 @@
 #include <optional>
 #include <vector>
 
-#include "common/job/picture.h"
+#include "common/job/text/picture.h"
 #include "coordinator/schedule/events.h"
 
 namespace baton {

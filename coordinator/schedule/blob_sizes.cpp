@@ -2,7 +2,7 @@
 
 #include <algorithm>
 
-#include "common/job/store_estimate.h"
+#include "common/job/plan/store_estimate.h"
 
 namespace baton {
 

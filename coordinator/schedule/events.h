@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "common/job/job_spec.h"
-#include "common/job/sequence.h"
+#include "common/job/plan/sequence.h"
 #include "common/job/task.h"
 
 namespace baton {

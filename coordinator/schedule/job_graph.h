@@ -6,9 +6,9 @@
 #include <vector>
 
 #include "common/job/job_spec.h"
-#include "common/job/sequence.h"
+#include "common/job/plan/sequence.h"
+#include "common/job/plan/timeline.h"
 #include "common/job/task.h"
-#include "common/job/timeline.h"
 
 namespace baton {
 

@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <utility>
 
-#include "common/job/estimate.h"
+#include "common/job/plan/estimate.h"
 
 namespace baton {
 namespace {

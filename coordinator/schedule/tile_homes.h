@@ -8,7 +8,7 @@
 #include <utility>
 #include <vector>
 
-#include "common/job/sequence.h"
+#include "common/job/plan/sequence.h"
 #include "coordinator/schedule/job_graph.h"
 
 namespace baton {

@@ -8,7 +8,7 @@
 #include <tuple>
 
 #include "common/base/files.h"
-#include "common/job/timeline.h"
+#include "common/job/plan/timeline.h"
 
 namespace baton {
 namespace {

@@ -6,8 +6,8 @@
 #include <set>
 
 #include "common/job/aov.h"
-#include "common/job/frame_range.h"
-#include "common/job/sequence.h"
+#include "common/job/plan/sequence.h"
+#include "common/job/text/frame_range.h"
 
 namespace baton {
 namespace {

@@ -9,8 +9,8 @@
 #include <string>
 #include <vector>
 
-#include "common/job/job_json.h"
-#include "common/job/roots.h"
+#include "common/job/text/job_json.h"
+#include "common/job/text/roots.h"
 #include "common/protocol/router.h"
 #include "common/store/blob_store.h"
 #include "coordinator/journal/journal.h"

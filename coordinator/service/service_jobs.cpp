@@ -8,7 +8,7 @@
 #include "common/base/archive.h"
 #include "common/base/limits.h"
 #include "common/base/size_text.h"
-#include "common/job/job_json.h"
+#include "common/job/text/job_json.h"
 #include "coordinator/service/job_report.h"
 #include "coordinator/service/plan_text.h"
 #include "coordinator/service/service.h"

@@ -10,7 +10,7 @@
 
 #include "common/base/archive.h"
 #include "common/base/limits.h"
-#include "common/job/sequence.h"
+#include "common/job/plan/sequence.h"
 #include "coordinator/service/plan_text.h"
 #include "coordinator/service/service.h"
 

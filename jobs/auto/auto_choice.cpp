@@ -8,8 +8,8 @@
 
 #include "common/base/check.h"
 #include "common/base/limits.h"
-#include "common/job/job_fields.h"
-#include "common/job/job_json.h"
+#include "common/job/text/job_fields.h"
+#include "common/job/text/job_json.h"
 
 namespace baton {
 namespace {

@@ -3,12 +3,12 @@
 #include <map>
 #include <nlohmann/json.hpp>
 
-#include "common/job/estimate.h"
-#include "common/job/frame_range.h"
-#include "common/job/job_json.h"
 #include "common/job/motion.h"
-#include "common/job/sequence.h"
-#include "common/job/store_estimate.h"
+#include "common/job/plan/estimate.h"
+#include "common/job/plan/sequence.h"
+#include "common/job/plan/store_estimate.h"
+#include "common/job/text/frame_range.h"
+#include "common/job/text/job_json.h"
 #include "common/scene/scene.h"
 #include "common/scene/settle/settle_motion.h"
 #include "jobs/auto/unit_costs.h"

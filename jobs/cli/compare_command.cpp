@@ -9,8 +9,8 @@
 
 #include "common/image/image_io.h"
 #include "common/image/noise.h"
-#include "common/job/job_json.h"
-#include "common/job/sequence.h"
+#include "common/job/plan/sequence.h"
+#include "common/job/text/job_json.h"
 #include "common/scene/settle/settle_motion.h"
 #include "jobs/cli/commands.h"
 #include "jobs/cli/farm_job_runner.h"

@@ -4,7 +4,7 @@
 #include <fmt/ranges.h>
 #include <spdlog/spdlog.h>
 
-#include "common/job/job_json.h"
+#include "common/job/text/job_json.h"
 #include "jobs/cli/job_summary.h"
 #include "jobs/cli/text.h"
 

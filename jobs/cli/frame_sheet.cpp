@@ -5,7 +5,7 @@
 #include <iterator>
 
 #include "common/image/contact_sheet.h"
-#include "common/job/sequence.h"
+#include "common/job/plan/sequence.h"
 
 namespace baton {
 namespace {

@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "common/base/result.h"
-#include "common/job/job_json.h"
+#include "common/job/text/job_json.h"
 
 namespace baton {
 

@@ -7,8 +7,8 @@
 #include <thread>
 
 #include "common/base/limits.h"
-#include "common/job/frame_range.h"
-#include "common/job/job_json.h"
+#include "common/job/text/frame_range.h"
+#include "common/job/text/job_json.h"
 #include "jobs/cli/commands.h"
 #include "jobs/cli/coordinator_link.h"
 #include "jobs/cli/job_argument.h"

@@ -4,7 +4,7 @@
 
 #include <span>
 
-#include "common/job/frame_judgement.h"
+#include "common/job/plan/frame_judgement.h"
 #include "jobs/cli/text.h"
 
 namespace baton {

@@ -10,11 +10,11 @@
 #include <iterator>
 #include <map>
 
+#include "common/advice/known_limits.h"
 #include "common/job/aov.h"
-#include "common/job/estimate.h"
-#include "common/job/known_limits.h"
-#include "common/job/sequence.h"
-#include "common/job/store_estimate.h"
+#include "common/job/plan/estimate.h"
+#include "common/job/plan/sequence.h"
+#include "common/job/plan/store_estimate.h"
 #include "common/scene/plate.h"
 #include "common/scene/scene_warnings.h"
 #include "jobs/cli/surface_share.h"

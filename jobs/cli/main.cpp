@@ -7,7 +7,7 @@
 
 #include "common/base/build.h"
 #include "common/base/log.h"
-#include "common/job/suggest.h"
+#include "common/base/suggest.h"
 #include "jobs/cli/commands.h"
 
 namespace baton {

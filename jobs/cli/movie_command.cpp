@@ -2,7 +2,7 @@
 
 #include <optional>
 
-#include "common/job/frame_range.h"
+#include "common/job/text/frame_range.h"
 #include "jobs/cli/commands.h"
 #include "jobs/cli/display.h"
 #include "jobs/cli/movie_encoder.h"

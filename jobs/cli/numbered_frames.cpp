@@ -8,9 +8,9 @@
 #include <optional>
 
 #include "common/image/image_io.h"
-#include "common/job/frame_range.h"
-#include "common/job/job_json.h"
-#include "common/job/sequence.h"
+#include "common/job/plan/sequence.h"
+#include "common/job/text/frame_range.h"
+#include "common/job/text/job_json.h"
 
 namespace baton {
 namespace {

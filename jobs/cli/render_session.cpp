@@ -8,7 +8,7 @@
 #include <thread>
 
 #include "common/base/limits.h"
-#include "common/job/sequence.h"
+#include "common/job/plan/sequence.h"
 #include "jobs/cli/frame_sheet.h"
 #include "jobs/cli/job_summary.h"
 #include "jobs/cli/progress.h"

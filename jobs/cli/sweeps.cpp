@@ -8,8 +8,8 @@
 
 #include "common/base/limits.h"
 #include "common/image/image_io.h"
-#include "common/job/next_sweeps.h"
-#include "common/job/sequence.h"
+#include "common/job/plan/next_sweeps.h"
+#include "common/job/plan/sequence.h"
 
 namespace baton {
 namespace {

@@ -8,9 +8,9 @@
 
 #include "common/base/files.h"
 #include "common/base/limits.h"
-#include "common/job/frame_range.h"
-#include "common/job/job_json.h"
-#include "common/job/job_json_text.h"
+#include "common/job/text/frame_range.h"
+#include "common/job/text/job_json.h"
+#include "common/job/text/job_json_text.h"
 #include "jobs/study/study_layers.h"
 
 namespace baton {

@@ -2,8 +2,8 @@
 
 #include <sstream>
 
-#include "common/job/job_json.h"
-#include "common/job/job_json_text.h"
+#include "common/job/text/job_json.h"
+#include "common/job/text/job_json_text.h"
 
 namespace baton {
 namespace {

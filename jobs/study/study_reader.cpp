@@ -6,8 +6,8 @@
 #include <algorithm>
 
 #include "common/base/limits.h"
-#include "common/job/job_json_text.h"
-#include "common/job/suggest.h"
+#include "common/base/suggest.h"
+#include "common/job/text/job_json_text.h"
 
 namespace baton {
 namespace {

@@ -6,8 +6,8 @@
 #include <algorithm>
 #include <cctype>
 
-#include "common/job/job_json.h"
-#include "common/job/sequence.h"
+#include "common/job/plan/sequence.h"
+#include "common/job/text/job_json.h"
 
 namespace baton {
 namespace {

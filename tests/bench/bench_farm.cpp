@@ -22,7 +22,7 @@
 #include <vector>
 
 #include "common/base/files.h"
-#include "common/job/job_json.h"
+#include "common/job/text/job_json.h"
 #include "common/scene/settle/settle_motion.h"
 #include "tests/bench/bench_program.h"
 #include "tests/support/local_frames.h"

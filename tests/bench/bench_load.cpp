@@ -15,7 +15,7 @@
 #include <numeric>
 #include <thread>
 
-#include "common/job/job_json.h"
+#include "common/job/text/job_json.h"
 #include "common/protocol/client.h"
 #include "jobs/cli/child_process.h"
 #include "tests/bench/simulated_workers.h"

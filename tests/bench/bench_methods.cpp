@@ -11,7 +11,7 @@
 #include <string_view>
 #include <vector>
 
-#include "common/job/job_json.h"
+#include "common/job/text/job_json.h"
 #include "worker/pass/render_context.h"
 
 namespace baton {

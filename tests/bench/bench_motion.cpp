@@ -10,8 +10,8 @@
 #include <string>
 #include <vector>
 
-#include "common/job/job_json.h"
 #include "common/job/motion.h"
+#include "common/job/text/job_json.h"
 #include "common/scene/settle/settle_motion.h"
 #include "tests/bench/orbit.h"
 #include "worker/pass/cpu_clock.h"

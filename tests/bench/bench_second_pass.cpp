@@ -9,7 +9,7 @@
 #include <string>
 #include <vector>
 
-#include "common/job/job_json.h"
+#include "common/job/text/job_json.h"
 #include "worker/exchange/second_pass.h"
 #include "worker/pass/render_context.h"
 

@@ -20,8 +20,8 @@
 
 #include "common/base/files.h"
 #include "common/base/limits.h"
-#include "common/job/job_json.h"
 #include "common/job/motion.h"
+#include "common/job/text/job_json.h"
 #include "tests/bench/bench_program.h"
 #include "tests/bench/orbit.h"
 

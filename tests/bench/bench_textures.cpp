@@ -22,7 +22,7 @@
 #include <vector>
 
 #include "common/image/image_io.h"
-#include "common/job/job_json.h"
+#include "common/job/text/job_json.h"
 #include "common/math/philox.h"
 #include "worker/pass/render_context.h"
 

@@ -15,7 +15,7 @@
 #include "common/base/build.h"
 #include "common/base/files.h"
 #include "common/base/limits.h"
-#include "common/job/sequence.h"
+#include "common/job/plan/sequence.h"
 #include "common/protocol/keys.h"
 #include "common/protocol/messages.h"
 #include "common/store/blob_store.h"

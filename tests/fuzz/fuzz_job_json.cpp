@@ -1,6 +1,6 @@
-#include "common/job/estimate.h"
-#include "common/job/job_json.h"
-#include "common/job/picture.h"
+#include "common/job/plan/estimate.h"
+#include "common/job/text/job_json.h"
+#include "common/job/text/picture.h"
 #include "coordinator/schedule/job_graph.h"
 #include "tests/fuzz/fuzz_target.h"
 

@@ -13,15 +13,18 @@ from pathlib import Path
 # Room -> rooms whose headers it may include besides its own. A room is a folder with sources. No rules go in a circle.
 COMMON_BASE = {"common/base"}
 COMMON_DATA = COMMON_BASE | {"common/math"}
-COMMON_ALL = COMMON_DATA | {"common/job", "common/state", "common/image", "common/store", "common/protocol"}
+JOB = COMMON_DATA | {"common/job"}
+PLAN = JOB | {"common/state", "common/job/plan"}
+TEXT = PLAN | {"common/job/text"}
+COMMON_ALL = TEXT | {"common/advice", "common/image", "common/store", "common/protocol"}
 SCENE_PARTS = {f"common/scene/{part}" for part in ["mesh", "texture", "gltf", "map", "material"]}
-SCENE = COMMON_DATA | {"common/job", "common/image", "common/scene"} | SCENE_PARTS
+SCENE = PLAN | {"common/image", "common/scene"} | SCENE_PARTS
 ACCEL = SCENE | {"worker/surface"}
-LIGHT = ACCEL | {"common/state", "worker/sampling"}
+LIGHT = ACCEL | {"common/advice", "worker/sampling"}
 METHOD = LIGHT | {"worker/accel", "worker/light"}
 METHOD_FOLDERS = (Path(__file__).parents[2] / "worker/method").glob("*/")
 METHODS = {f"worker/method/{folder.name}" for folder in METHOD_FOLDERS if folder.is_dir()}
-PASS = METHOD | {"worker/method"}
+PASS = METHOD | {"common/job/text", "worker/method"}
 EXCHANGE = PASS | {"worker/pass"}
 RUN = EXCHANGE | {"common/protocol", "common/store", "common/scene/settle", "worker/exchange"}
 # Programs that measure look into every room of the worker, and share scenes and statistics with the tests.
@@ -30,19 +33,22 @@ LAB = RUN | METHODS | {"worker/run", "jobs/study", "tests/support", "tests/stat"
 MAY_INCLUDE = {
     "common/base": set(),
     "common/math": COMMON_BASE,
-    "common/job": COMMON_DATA | {"common/state"},  # how large a state is
-    "common/state": COMMON_DATA,
-    "common/image": COMMON_DATA,
+    "common/job": COMMON_DATA,
+    "common/job/plan": JOB | {"common/state"},  # how large a state is
+    "common/job/text": PLAN,
+    "common/advice": PLAN,
+    "common/state": JOB,
+    "common/image": JOB,
     "common/store": COMMON_BASE,
-    "common/protocol": COMMON_DATA | {"common/job"},
+    "common/protocol": JOB,
     "common/scene/mesh": COMMON_DATA,
     "common/scene/texture": COMMON_BASE | {"common/image", "common/scene/texture/reader"},
     "common/scene/texture/reader": set(),
-    "common/scene/gltf": COMMON_DATA | {"common/job", "common/scene/mesh"},
-    "common/scene/map": COMMON_DATA | {"common/job", "common/image"},
+    "common/scene/gltf": TEXT | {"common/scene/mesh"},
+    "common/scene/map": PLAN | {"common/image"},
     "common/scene/material": COMMON_DATA
     | {"common/job", "common/scene/mesh", "common/scene/texture", "common/scene/gltf"},
-    "common/scene": COMMON_DATA | {"common/job", "common/image"} | SCENE_PARTS,
+    "common/scene": PLAN | {"common/image"} | SCENE_PARTS,
     "common/scene/settle": COMMON_DATA | {"common/job", "common/scene", "common/scene/gltf"},
     "worker/sampling": COMMON_DATA | {"common/job", "common/state"},
     "worker/surface": SCENE,
@@ -54,13 +60,12 @@ MAY_INCLUDE = {
     "worker/exchange": EXCHANGE,
     "worker/run": RUN,
     "worker": COMMON_BASE | {"worker/run"},
-    "coordinator/schedule": COMMON_DATA | {"common/job"},
-    "coordinator/journal": COMMON_DATA | {"common/job", "coordinator/schedule"},
-    "coordinator/service": COMMON_DATA
-    | {"common/job", "common/protocol", "common/store", "coordinator/schedule", "coordinator/journal"},
+    "coordinator/schedule": TEXT,
+    "coordinator/journal": TEXT | {"coordinator/schedule"},
+    "coordinator/service": TEXT | {"common/protocol", "common/store", "coordinator/schedule", "coordinator/journal"},
     "coordinator": COMMON_ALL | {"coordinator/schedule", "coordinator/journal", "coordinator/service"},
-    "jobs/study": COMMON_DATA | {"common/job", "common/image", "common/protocol"},
-    "jobs/auto": COMMON_DATA | {"common/job", "jobs/study", "common/scene", "common/scene/mesh"},  # how large a scene is
+    "jobs/study": TEXT | {"common/image", "common/protocol"},
+    "jobs/auto": TEXT | {"jobs/study", "common/scene", "common/scene/mesh"},  # how large a scene is
     "jobs/slurm": COMMON_BASE,
     **{f"jobs/lab/{folder}": LAB for folder in ("peers", "stability", "studies")},
     "jobs/cli": COMMON_ALL
@@ -77,7 +82,7 @@ THIRD_PARTY = {
     r"zmq": ["common/protocol/"],
     r"sqlite3": ["coordinator/journal/"],
     r"zstd|xxhash": ["common/base/"],
-    r"nlohmann/": ["common/job/job_json", "jobs/cli/", "jobs/lab/", "jobs/study/", "common/scene/gltf/json_view"],
+    r"nlohmann/": ["common/job/text/job_json", "jobs/cli/", "jobs/lab/", "jobs/study/", "common/scene/gltf/json_view"],
     r"CLI/": ["worker/main.cpp", "coordinator/main.cpp", "jobs/cli/", "jobs/lab/"],
 }
 

@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "common/job/frame_range.h"
+#include "common/job/text/frame_range.h"
 #include "tests/support/second_pass.h"
 
 namespace baton {

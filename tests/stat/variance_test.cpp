@@ -6,7 +6,7 @@
 // all 45 comparisons of this file (Sidak): |t| of 95 degrees of freedom below 4.5.
 #include <gtest/gtest.h>
 
-#include "common/job/frame_range.h"
+#include "common/job/text/frame_range.h"
 #include "tests/support/small_scene.h"
 
 namespace baton {

@@ -4,7 +4,7 @@
 
 #include <string>
 
-#include "common/job/job_json.h"
+#include "common/job/text/job_json.h"
 #include "common/scene/settle/settle_motion.h"
 #include "tests/support/gltf_files.h"
 #include "tests/support/mesh_files.h"

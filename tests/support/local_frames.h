@@ -13,8 +13,8 @@ namespace baton::test {
 using FrameSink = std::function<Status(Step step, const FilmTile& image)>;
 
 /// The image of the frame that is kept; adds what its tiles counted.
-inline Result<FilmTile> local_image(const LocalRender& render, const JobSpec& job,
-                                    Step step, RenderStats& stats) {
+inline Result<FilmTile> local_image(const LocalRender& render, const JobSpec& job, Step step,
+                                    RenderStats& stats) {
   FilmTile image = blank_image(job.image, render.tiles().begin()->second.film.channels);
   for (const auto& [tile, first_pass] : render.tiles()) {
     BATON_ASSIGN(const RenderedTile finished, render.finished(step, tile));

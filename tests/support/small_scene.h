@@ -163,24 +163,23 @@ inline TileResult render_tile(const JobSpec& job, std::int32_t tile = 0) {
     ADD_FAILURE() << context.error().message;
     return result;
   }
-  const TileRunSink sink{.film =
-                             [&](Step, const FilmTile& film) {
-                               result.films.push_back(film);
-                               return Status();
-                             },
-                         .state =
-                             [&](const SampleState& state) {
-                               result.state = state;
-                               return Status();
-                             },
-                         .samples =
-                             [&](FirstPassSamples samples) {
-                               result.samples.push_back(std::move(samples));
-                               return Status();
-                             },
-                         .earlier_film = [&](Step step) -> Result<FilmTile> {
-                           return result.films.at(step.index());
-                         }};
+  const TileRunSink sink{
+      .film =
+          [&](Step, const FilmTile& film) {
+            result.films.push_back(film);
+            return Status();
+          },
+      .state =
+          [&](const SampleState& state) {
+            result.state = state;
+            return Status();
+          },
+      .samples =
+          [&](FirstPassSamples samples) {
+            result.samples.push_back(std::move(samples));
+            return Status();
+          },
+      .earlier_film = [&](Step step) -> Result<FilmTile> { return result.films.at(step.index()); }};
   for (Run run; run < Run(num_runs(job)); ++run) {
     std::vector<StatePtr> previous;
     if (carries_state(job) && run > Run(0))

@@ -6,7 +6,7 @@
 
 #include "common/base/limits.h"
 #include "common/base/lru_cache.h"
-#include "common/job/timeline.h"
+#include "common/job/plan/timeline.h"
 #include "common/scene/pose.h"
 #include "worker/accel/accel.h"
 #include "worker/surface/site_block.h"

@@ -18,8 +18,8 @@ Status check_inputs(const RenderContext& context, Step step, std::int32_t tile,
       context.grid.tiles_near(tile, exchange_reach_px(context.job.visibility));
   if (near.size() != tiles.size()) {
     return Error{ErrorKind::bad_input,
-                 fmt::format("tile {} frame index {}: samples of {} tiles, expected {}", tile,
-                             step, near.size(), tiles.size())};
+                 fmt::format("tile {} frame index {}: samples of {} tiles, expected {}", tile, step,
+                             near.size(), tiles.size())};
   }
   for (std::size_t i = 0; i < near.size(); ++i) {
     const FirstPassSamples& s = *near[i];
@@ -32,8 +32,7 @@ Status check_inputs(const RenderContext& context, Step step, std::int32_t tile,
     return Error{
         ErrorKind::bad_input,
         fmt::format("first-pass samples: of picture {} tile {} frame index {}, expected {}, {}, {}",
-                    s.picture.hex(), s.tile, s.step, context.picture.hex(), tiles[i],
-                    step)};
+                    s.picture.hex(), s.tile, s.step, context.picture.hex(), tiles[i], step)};
   }
   if (film.rect == context.grid.rect(tile)) return {};
   return Error{ErrorKind::bad_input, fmt::format("film: of another tile than {}", tile)};
@@ -54,12 +53,12 @@ ExchangeMasks make_masks(const VisibilitySpec& visibility, const SampleRegion& s
 /// The exchange, fold by fold.
 void exchange(const SecondPassWork& work, std::span<Rgb> radiance, RenderStats& stats) {
   const JobSpec& job = work.context.job;
-  const SquarePartitions partitions(job.image.extent(), job.visibility.tile_size,
-                                    job.visibility.partitions,
-                                    Rng({.job_seed = job.seed,
-                                         .frame = static_cast<std::uint32_t>(work.frame.number.value()),
-                                         .pixel = 0},
-                                        PassId::partition));
+  const SquarePartitions partitions(
+      job.image.extent(), job.visibility.tile_size, job.visibility.partitions,
+      Rng({.job_seed = job.seed,
+           .frame = static_cast<std::uint32_t>(work.frame.number.value()),
+           .pixel = 0},
+          PassId::partition));
   TracedExchange scene(work);
   ExchangeSettings settings{.form = job.visibility.form,
                             .num_slots = static_cast<std::uint32_t>(job.sampling.num_particles),
@@ -115,16 +114,16 @@ void write_pixels(const SecondPassWork& work, std::span<const Rgb> radiance, Fil
 }
 
 /// The light of the frame; preparing it, where the first pass left none, counts as in that pass.
-Result<std::shared_ptr<const FrameLight>> light_of(const RenderContext& context,
-                                                   Step step, RenderStats& stats) {
+Result<std::shared_ptr<const FrameLight>> light_of(const RenderContext& context, Step step,
+                                                   RenderStats& stats) {
   const CpuTimer timer(stats.seconds_light);
   return context.lights->at(step);
 }
 
 }  // namespace
 
-Result<SecondPassOutput> run_second_pass(const RenderContext& context, Step step,
-                                         std::int32_t tile, const FilmTile& first_film,
+Result<SecondPassOutput> run_second_pass(const RenderContext& context, Step step, std::int32_t tile,
+                                         const FilmTile& first_film,
                                          std::span<const FirstPassPtr> near) {
   const WorkClock clock;
   BATON_TRY(check_inputs(context, step, tile, first_film, near));
@@ -146,9 +145,7 @@ Result<SecondPassOutput> run_second_pass(const RenderContext& context, Step step
   output.seconds_primary_rays = surfaces.seconds_rays();
   BATON_ASSIGN(const auto light, light_of(context, step, output.stats));
   const SecondPassWork work{
-      context,  *geometry, context.frames[step.index()],
-      *light,   samples,   masks,
-      surfaces, rect};
+      context, *geometry, context.frames[step.index()], *light, samples, masks, surfaces, rect};
   std::vector<Rgb> radiance(static_cast<std::size_t>(rect.area()));
   if (visibility.form == SecondPassForm::extra_samples) {
     sample_more(work, radiance, output.stats);

@@ -22,8 +22,8 @@ struct SecondPassOutput {
 /// within exchange_reach_px (TileGrid::tiles_near, in that order). The bytes are a function of the
 /// arguments alone, and the image is the same for any tiling. Errors: samples of another job, frame
 /// or tile; a film of another tile.
-Result<SecondPassOutput> run_second_pass(const RenderContext& context, Step step,
-                                         std::int32_t tile, const FilmTile& first_film,
+Result<SecondPassOutput> run_second_pass(const RenderContext& context, Step step, std::int32_t tile,
+                                         const FilmTile& first_film,
                                          std::span<const FirstPassPtr> near);
 
 }  // namespace baton

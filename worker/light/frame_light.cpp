@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "common/job/known_limits.h"
+#include "common/advice/known_limits.h"
 #include "common/math/octahedral.h"
 #include "common/scene/map/map_report.h"
 

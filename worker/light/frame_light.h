@@ -9,7 +9,7 @@
 
 #include "common/base/lru_cache.h"
 #include "common/base/result.h"
-#include "common/job/sequence.h"
+#include "common/job/plan/sequence.h"
 #include "worker/light/irradiance.h"
 #include "worker/light/map_cache.h"
 #include "worker/light/presampled_light.h"
@@ -56,7 +56,8 @@ class LightSequence {
   LightSequence(const JobSpec& job, std::shared_ptr<MapCache> maps, const MemorySharePtr& share,
                 std::shared_ptr<const HiddenLight> hidden = nullptr);
 
-  /// The light of a step in a round, or of kProbeRound. Errors: a map that cannot be read, or two key frames of different size.
+  /// The light of a step in a round, or of kProbeRound. Errors: a map that cannot be read, or two
+  /// key frames of different size.
   Result<std::shared_ptr<const FrameLight>> at(Step step, Round round = Round(0));
 
   /// What people should know of the maps read so far, and of jumps of the light from one frame to
@@ -86,9 +87,9 @@ class LightSequence {
   LruCache<std::pair<Step, HiddenCone>, EnvironmentMap> mixed_maps_;
   LruCache<std::pair<Step, Round>, PresampledSets> presampled_;
   LruCache<Step, Irradiance> irradiances_;  ///< by the first step with these texels
-  std::set<Step> noted_;               ///< steps that notes_ has
-  std::set<std::int32_t> noted_keys_;  ///< keys that notes_ has
-  std::size_t num_jumps_ = 0;          ///< jumps of the light in notes_
+  std::set<Step> noted_;                    ///< steps that notes_ has
+  std::set<std::int32_t> noted_keys_;       ///< keys that notes_ has
+  std::size_t num_jumps_ = 0;               ///< jumps of the light in notes_
   std::vector<std::string> notes_;
 };
 

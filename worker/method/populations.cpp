@@ -3,7 +3,7 @@
 #include <algorithm>
 
 #include "common/base/poison.h"
-#include "common/job/sequence.h"
+#include "common/job/plan/sequence.h"
 
 namespace baton {
 

@@ -3,7 +3,7 @@
 #include <utility>
 
 #include "common/base/poison.h"
-#include "common/job/sequence.h"
+#include "common/job/plan/sequence.h"
 #include "worker/light/carried_light.h"
 #include "worker/method/blocked_samples.h"
 #include "worker/method/populations.h"

@@ -2,7 +2,7 @@
 
 #include "common/image/shadow.h"
 #include "common/job/aov.h"
-#include "common/job/sequence.h"
+#include "common/job/plan/sequence.h"
 
 namespace baton {
 Rgb source_color(PixelSource source) {

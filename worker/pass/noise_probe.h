@@ -11,8 +11,7 @@ inline constexpr std::uint32_t kProbeSpacing = 128;
 
 /// Whether a pixel is one. Probes lie on a lattice with about equal distances of 12 pixels. It
 /// moves with frame and seed: 128 frames, or seeds, look at every pixel once.
-constexpr bool is_probe(std::int32_t x, std::int32_t y, FrameNumber frame,
-                        std::uint64_t job_seed) {
+constexpr bool is_probe(std::int32_t x, std::int32_t y, FrameNumber frame, std::uint64_t job_seed) {
   constexpr std::uint32_t kRowShift = 12, kFrameShift = 79, kSeedShift = 37;
   const std::uint32_t place = static_cast<std::uint32_t>(x) +
                               kRowShift * static_cast<std::uint32_t>(y) +

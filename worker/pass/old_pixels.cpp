@@ -13,10 +13,7 @@ OldPixels::OldPixels(const RenderContext& context, const FrameGeometry& before,
     : job_(context.job),
       before_(before),
       states_(states),
-      round_(
-          states.empty()
-              ? 0
-              : context.frames[states.front()->step.index()].first_round) {
+      round_(states.empty() ? 0 : context.frames[states.front()->step.index()].first_round) {
   for (const StatePtr& state : states)
     kept_.push_back(context.surfaces->find({state->step, state->tile}));
 }

@@ -3,7 +3,7 @@
 #include <memory>
 #include <vector>
 
-#include "common/job/sequence.h"
+#include "common/job/plan/sequence.h"
 #include "worker/accel/geometry_sequence.h"
 #include "worker/light/frame_light.h"
 #include "worker/method/pixel_method.h"

@@ -106,8 +106,8 @@ void Reprojection::look_up(const TileSurfaces& surfaces, std::size_t first, std:
     const Position pixel{x, y};
     Slot& slot = slots_[i];
     slot.hits = surfaces.pixel(first + i).first(static_cast<std::size_t>(job.image.sites));
-    slot.key =
-        pixel_key(job.seed, frame.number.value(), job.image.width, pixel.x, pixel.y, frame.first_round);
+    slot.key = pixel_key(job.seed, frame.number.value(), job.image.width, pixel.x, pixel.y,
+                         frame.first_round);
     const std::optional<Position> source =
         find_source(slot.hits, pixel, Rng(slot.key, PassId::reproject));
     if (!source) continue;

@@ -4,7 +4,7 @@
 
 #include "common/base/limits.h"
 #include "common/image/noise.h"
-#include "common/job/sequence.h"
+#include "common/job/plan/sequence.h"
 
 namespace baton {
 namespace {

@@ -6,8 +6,8 @@
 #include <vector>
 
 #include "common/base/result.h"
-#include "common/job/job_json.h"
 #include "common/job/job_spec.h"
+#include "common/job/text/job_json.h"
 #include "worker/accel/accel.h"
 #include "worker/light/map_cache.h"
 #include "worker/pass/memory_budget.h"

@@ -3,7 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "common/job/sequence.h"
+#include "common/job/plan/sequence.h"
 #include "common/math/low_discrepancy.h"
 #include "worker/pass/site_kernels.h"
 #include "worker/sampling/pixel_filter.h"

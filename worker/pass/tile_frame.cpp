@@ -7,7 +7,7 @@
 
 #include "common/base/poison.h"
 #include "common/job/aov.h"
-#include "common/job/sequence.h"
+#include "common/job/plan/sequence.h"
 #include "worker/light/carried_light.h"
 #include "worker/method/populations.h"
 #include "worker/pass/cpu_clock.h"

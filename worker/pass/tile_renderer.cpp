@@ -27,15 +27,14 @@ Status check_state(const RenderContext& context, const SampleState& state, std::
                                                    state.picture.hex(), context.picture.hex())};
   }
   const std::int32_t num_particles = num_carried_particles(context.job.sampling);
-  if (state.tile != tile || state.step != step ||
-      state.rect != context.grid.rect(tile) || state.num_particles != num_particles ||
+  if (state.tile != tile || state.step != step || state.rect != context.grid.rect(tile) ||
+      state.num_particles != num_particles ||
       state.num_populations != num_populations(context.job)) {
     return Error{
         ErrorKind::bad_input,
         fmt::format("sample state: of tile {} frame index {} with {} particles, expected {}, "
                     "{}, {}",
-                    state.tile, state.step, state.num_particles, tile, step,
-                    num_particles)};
+                    state.tile, state.step, state.num_particles, tile, step, num_particles)};
   }
   return {};
 }
@@ -110,9 +109,8 @@ class TileWalk {
       for (RoundPixels& part : parts_of(std::move(pixels), whole != nullptr)) {
         const auto surfaces = surfaces_of(frame.round_of_frame(round), std::move(part), whole);
         if (is_seen) planes.add(*surfaces);
-        renderer_->render(
-            {frame, round, *light, *surfaces, is_seen ? probe_light.get() : nullptr}, state_,
-            mean);
+        renderer_->render({frame, round, *light, *surfaces, is_seen ? probe_light.get() : nullptr},
+                          state_, mean);
       }
       has_history_ = carries_state(context_.job);
     }
@@ -212,7 +210,8 @@ class TileWalk {
   }
   /// What some pixels see: of `whole`, or, where that is null, traced, until the next call.
   std::shared_ptr<const TileSurfaces> surfaces_of(
-      std::int32_t round_of_frame, RoundPixels pixels, const std::shared_ptr<const TileSurfaces>& whole) {
+      std::int32_t round_of_frame, RoundPixels pixels,
+      const std::shared_ptr<const TileSurfaces>& whole) {
     if (whole != nullptr && pixels.are_all(state_.num_pixels())) return whole;
     if (whole == nullptr) {
       trace(sites_of(round_of_frame), std::move(pixels), *passing_);

@@ -10,7 +10,7 @@
 #include "common/base/result.h"
 #include "common/image/film_tile.h"
 #include "common/job/job_spec.h"
-#include "common/job/sequence.h"
+#include "common/job/plan/sequence.h"
 #include "common/job/task.h"
 #include "common/state/first_pass_samples.h"
 #include "common/state/sample_state.h"
@@ -60,8 +60,8 @@ Result<RenderStats> run_tile(const RenderContext& context, const TileRun& run,
                              std::span<const StatePtr> previous, const TileRunSink& sink,
                              const std::stop_token& stop);
 
-/// What people should know of the job's files, one line each, after a task: of the maps read so far,
-/// and with the first task of the first tile of meshes and objects.
+/// What people should know of the job's files, one line each, after a task: of the maps read so
+/// far, and with the first task of the first tile of meshes and objects.
 std::vector<std::string> asset_notes(const RenderContext& context, const TaskKey& task);
 
 /// Name of the SIMD instruction set in use, e.g. "AVX2".

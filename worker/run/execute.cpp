@@ -4,7 +4,7 @@
 
 #include "common/image/film_tile.h"
 #include "common/job/motion.h"
-#include "common/job/sequence.h"
+#include "common/job/plan/sequence.h"
 #include "common/scene/plate.h"
 #include "common/state/join_states.h"
 #include "common/state/sample_state.h"
@@ -98,8 +98,9 @@ Result<TaskOutput> execute_render(const LoadedJob& loaded, BlobStore& store, con
                                   std::vector<BlobRef>* left) {
   const StepSpan& steps = grant.steps;
   // Check what came over the wire against the job.
-  if (steps.first < Step(0) || steps.last < steps.first || steps.last >= Step(num_steps(loaded.job)) ||
-      task.tile < 0 || task.tile >= TileGrid(loaded.job.image).count()) {
+  if (steps.first < Step(0) || steps.last < steps.first ||
+      steps.last >= Step(num_steps(loaded.job)) || task.tile < 0 ||
+      task.tile >= TileGrid(loaded.job.image).count()) {
     return Error{ErrorKind::bad_input, fmt::format("the job has no tile {} in steps {} to {}",
                                                    task.tile, steps.first, steps.last)};
   }
@@ -160,8 +161,9 @@ Result<TaskOutput> execute_render(const LoadedJob& loaded, BlobStore& store, con
 Result<TaskOutput> execute_second_pass(const LoadedJob& loaded, BlobStore& store,
                                        const TaskKey& task, const std::vector<BlobRef>& inputs) {
   const auto num_frames = static_cast<std::int32_t>(loaded.job.frames.size());
-  if (!loaded.job.visibility.correlated || task.step() < Step(0) || task.step() >= Step(num_frames) ||
-      task.tile < 0 || task.tile >= TileGrid(loaded.job.image).count()) {
+  if (!loaded.job.visibility.correlated || task.step() < Step(0) ||
+      task.step() >= Step(num_frames) || task.tile < 0 ||
+      task.tile >= TileGrid(loaded.job.image).count()) {
     return Error{ErrorKind::bad_input,
                  fmt::format("the job has no second pass of tile {} in frame index {}", task.tile,
                              task.step())};
@@ -182,9 +184,11 @@ Result<TaskOutput> execute_second_pass(const LoadedJob& loaded, BlobStore& store
 
   BATON_ASSIGN(const SecondPassOutput second,
                run_second_pass(*loaded.context, task.step(), task.tile, film, near));
-  const Bytes bytes = encode_film_tile(second.film, {loaded.picture, task.step(), FilmPass::second});
+  const Bytes bytes =
+      encode_film_tile(second.film, {loaded.picture, task.step(), FilmPass::second});
   BATON_ASSIGN(const Digest digest, store.put(bytes));
-  return TaskOutput{{{BlobKind::film, task.position, task.tile, digest, bytes.size()}}, second.stats};
+  return TaskOutput{{{BlobKind::film, task.position, task.tile, digest, bytes.size()}},
+                    second.stats};
 }
 
 Result<TaskOutput> execute_assemble(const LoadedJob& loaded, const BlobStore& store,
@@ -196,8 +200,8 @@ Result<TaskOutput> execute_assemble(const LoadedJob& loaded, const BlobStore& st
   if (frame < FrameIndex(0) || frame >= FrameIndex(num_frames) ||
       inputs.size() != static_cast<std::size_t>(grid.count())) {
     return Error{ErrorKind::bad_input,
-                 fmt::format("frame index {} of {}: got {} films, expected {}", frame,
-                             num_frames, inputs.size(), grid.count())};
+                 fmt::format("frame index {} of {}: got {} films, expected {}", frame, num_frames,
+                             inputs.size(), grid.count())};
   }
 
   // Paste every tile of the last sweep once.
@@ -212,8 +216,8 @@ Result<TaskOutput> execute_assemble(const LoadedJob& loaded, const BlobStore& st
                       input.tile < grid.count() && film.rect == grid.rect(input.tile) &&
                       !pasted[static_cast<std::size_t>(input.tile)];
     if (!fits) {
-      return Error{ErrorKind::bad_input, fmt::format("{}: is not a new tile of frame index {}",
-                                                     blob_name(input), frame)};
+      return Error{ErrorKind::bad_input,
+                   fmt::format("{}: is not a new tile of frame index {}", blob_name(input), frame)};
     }
     if (image.channels.empty()) image = blank_image(loaded.job.image, film.channels);
     BATON_TRY(paste_tile(film, image));

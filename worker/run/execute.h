@@ -6,7 +6,7 @@
 #include <vector>
 
 #include "common/base/result.h"
-#include "common/job/sequence.h"
+#include "common/job/plan/sequence.h"
 #include "common/job/task.h"
 #include "common/store/blob_store.h"
 #include "worker/run/job_cache.h"

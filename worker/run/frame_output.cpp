@@ -13,7 +13,7 @@
 #include "common/image/shadow.h"
 #include "common/job/aov.h"
 #include "common/job/motion.h"
-#include "common/job/sequence.h"
+#include "common/job/plan/sequence.h"
 #include "common/scene/camera.h"
 #include "worker/run/frame_quality.h"
 
@@ -187,9 +187,8 @@ ImageMetadata frame_metadata(const JobSpec& job, const Digest& job_digest, Frame
   return metadata;
 }
 
-Result<WrittenFrame> write_frame(const JobSpec& job, const Digest& job_digest,
-                                 FrameIndex frame, FilmTile image,
-                                 const std::optional<RgbImage>& plate) {
+Result<WrittenFrame> write_frame(const JobSpec& job, const Digest& job_digest, FrameIndex frame,
+                                 FilmTile image, const std::optional<RgbImage>& plate) {
   FrameQuality quality = judge_frame(image);
   float noise = cycles_noise(image);
   if (job.output.clamp_negative) clamp_negative(image);

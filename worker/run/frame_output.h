@@ -38,9 +38,8 @@ struct WrittenFrame {
 /// Before the file gets its name it is read back from disk: every byte must be the encoder's, the
 /// header and the table of blocks must be whole, and one block of rows, another one in each frame,
 /// must unpack to the film. Errors: the disk, or a file that does not hold what was written.
-Result<WrittenFrame> write_frame(const JobSpec& job, const Digest& job_digest,
-                                 FrameIndex frame, FilmTile image,
-                                 const std::optional<RgbImage>& plate = {});
+Result<WrittenFrame> write_frame(const JobSpec& job, const Digest& job_digest, FrameIndex frame,
+                                 FilmTile image, const std::optional<RgbImage>& plate = {});
 
 /// Checks that the EXR file at `path` has the size and the channels of `image`, and in block
 /// `block` (0-based, modulo the number of blocks) its values. ErrorKind::corrupt names channel and

@@ -6,8 +6,8 @@
 #include <algorithm>
 
 #include "common/base/limits.h"
-#include "common/job/estimate.h"
-#include "common/job/job_json.h"
+#include "common/job/plan/estimate.h"
+#include "common/job/text/job_json.h"
 #include "common/scene/material/detail_loader.h"
 #include "common/store/folder_token.h"
 #include "worker/pass/primary.h"

@@ -14,8 +14,8 @@
 
 #include "common/base/digest.h"
 #include "common/job/job_spec.h"
-#include "common/job/path_maps.h"
-#include "common/job/roots.h"
+#include "common/job/text/path_maps.h"
+#include "common/job/text/roots.h"
 #include "common/protocol/messages.h"
 #include "worker/pass/memory_budget.h"
 #include "worker/pass/shared_assets.h"

@@ -24,9 +24,7 @@ class JobStates {
   /// False: there is no room, and it is not held.
   bool hold(const BlobRef& ref, const StatePtr& state);
   /// Keeps a state of the store, if there is room.
-  void keep(const Digest& digest, const StatePtr& state) {
-    kept_.keep(digest, state->step, state);
-  }
+  void keep(const Digest& digest, const StatePtr& state) { kept_.keep(digest, state->step, state); }
   /// Null: it is not here.
   StatePtr find(const BlobRef& ref) const;
 

@@ -4,7 +4,7 @@
 #include <utility>
 
 #include "common/job/motion.h"
-#include "common/job/sequence.h"
+#include "common/job/plan/sequence.h"
 #include "worker/exchange/second_pass.h"
 #include "worker/pass/render_context.h"
 

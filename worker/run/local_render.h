@@ -30,8 +30,7 @@ class LocalRender {
 
   /// For each frame before `step` the tiles without which `wanted` of that step
   /// cannot be rendered; none where nothing is carried.
-  std::vector<std::set<std::int32_t>> tiles_before(Step step,
-                                                   std::set<std::int32_t> wanted) const;
+  std::vector<std::set<std::int32_t>> tiles_before(Step step, std::set<std::int32_t> wanted) const;
 
   /// Renders a tile of the step after those that are kept. Any number of threads. Errors: the
   /// renderer's.

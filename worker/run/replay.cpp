@@ -7,8 +7,8 @@
 #include <set>
 
 #include "common/image/image_io.h"
-#include "common/job/job_json.h"
-#include "common/job/sequence.h"
+#include "common/job/plan/sequence.h"
+#include "common/job/text/job_json.h"
 #include "common/scene/settle/settle_motion.h"
 #include "common/state/source_names.h"
 #include "worker/pass/render_context.h"
@@ -128,8 +128,7 @@ Result<std::string> replay_tile(const ReplayOptions& options) {
 }
 
 std::string replay_command(const std::filesystem::path& job, FrameNumber frame, int tile) {
-  return fmt::format("baton-worker replay '{}' --frame {} --tile {}", job.string(), frame,
-                     tile);
+  return fmt::format("baton-worker replay '{}' --frame {} --tile {}", job.string(), frame, tile);
 }
 
 }  // namespace baton

@@ -15,8 +15,8 @@
 
 #include "common/base/build.h"
 #include "common/base/files.h"
-#include "common/job/job_json.h"
-#include "common/job/sequence.h"
+#include "common/job/plan/sequence.h"
+#include "common/job/text/job_json.h"
 #include "common/protocol/worker_channel.h"
 #include "common/store/folder_token.h"
 #include "worker/accel/accel.h"
@@ -140,8 +140,7 @@ Result<TaskOutput> execute_pooled(const PooledTask& task, const std::stop_token&
   }
   const CrashNote note(command);
   Result<TaskOutput> output = execute_task(*loaded, *task.store, key, task.grant, stop, &left);
-  if (output)
-    output->notes = notes.report(loaded->digest, asset_notes(*loaded->context, key));
+  if (output) output->notes = notes.report(loaded->digest, asset_notes(*loaded->context, key));
   if (output || output.error().kind == ErrorKind::cancelled ||
       output.error().kind == ErrorKind::no_space)
     return output;
@@ -347,8 +346,8 @@ class Worker {
   static void log_failure(const TaskEnded& ended) {
     if (ended.result || ended.result.error().kind == ErrorKind::cancelled) return;
     spdlog::error("job {} {} step {} tile {} failed: {}", ended.lease.job.short_hex(),
-                  task_name(ended.lease.task.kind), ended.lease.task.position, ended.lease.task.tile,
-                  ended.result.error().message);
+                  task_name(ended.lease.task.kind), ended.lease.task.position,
+                  ended.lease.task.tile, ended.result.error().message);
   }
 
   WorkerChannel channel_;

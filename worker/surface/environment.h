@@ -9,7 +9,7 @@
 #include <vector>
 
 #include "common/image/image_io.h"
-#include "common/job/sequence.h"
+#include "common/job/plan/sequence.h"
 #include "worker/surface/map_row.h"
 
 namespace baton {

@@ -5,7 +5,7 @@
 #include <cmath>
 
 #include "common/job/motion.h"
-#include "common/job/sequence.h"
+#include "common/job/plan/sequence.h"
 #include "common/scene/pose.h"
 #include "worker/surface/seen_surface.h"
 

@@ -8,7 +8,7 @@
 
 #include "common/base/files.h"
 #include "common/base/limits.h"
-#include "common/job/job_json_text.h"
+#include "common/job/text/job_json_text.h"
 #include "common/scene/gltf/container.h"
 #include "common/scene/gltf/document_parser.h"
 

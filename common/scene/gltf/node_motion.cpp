@@ -5,7 +5,7 @@
 #include <algorithm>
 #include <cmath>
 
-#include "common/job/suggest.h"
+#include "common/base/suggest.h"
 #include "common/scene/gltf/accessor.h"
 
 namespace baton::gltf {

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <span>
 
-#include "common/job/sequence.h"
+#include "common/job/plan/sequence.h"
 #include "common/math/vec3.h"
 #include "common/scene/map/map_reduction.h"
 #include "common/scene/map/map_texel.h"
@@ -93,7 +93,8 @@ std::vector<std::string> light_warnings(const MapReport& map) {
   return warnings;
 }
 
-std::optional<std::string> light_jump(const EnvironmentSpec& environment, FrameNumber from, FrameNumber to,
+std::optional<std::string> light_jump(const EnvironmentSpec& environment, FrameNumber from,
+                                      FrameNumber to,
                                       const std::function<float(std::int32_t key)>& mean) {
   if (to != from + 1) return std::nullopt;  // frames between them were left out on purpose
   const EnvironmentFrame a = environment_at(environment, from), b = environment_at(environment, to);

@@ -37,7 +37,8 @@ std::vector<std::string> light_warnings(const MapReport& map);
 /// A line where the light changes at once from one frame to the next: its mean by a factor of two,
 /// or from one key's map to another's within a frame. Numbered maps are a film, so that there only
 /// the mean tells. mean: of the map of a key.
-std::optional<std::string> light_jump(const EnvironmentSpec& environment, FrameNumber from, FrameNumber to,
+std::optional<std::string> light_jump(const EnvironmentSpec& environment, FrameNumber from,
+                                      FrameNumber to,
                                       const std::function<float(std::int32_t key)>& mean);
 /// Jumps of a job that are told one by one.
 inline constexpr std::size_t kMostJumps = 3;

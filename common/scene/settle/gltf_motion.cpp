@@ -90,8 +90,8 @@ Status take_object_keys(const std::vector<FrameNumber>& frames, ObjectSpec& obje
   const FileClock clock{gltf.fps, gltf.start_frame};
   std::vector<Matrix34> matrices;
   for (const FrameNumber frame : frames)
-    matrices.push_back(gltf::to_floats(
-        opened.first.to_world(clock.seconds_at(frame.value()))[static_cast<std::size_t>(opened.second)]));
+    matrices.push_back(gltf::to_floats(opened.first.to_world(
+        clock.seconds_at(frame.value()))[static_cast<std::size_t>(opened.second)]));
   object.keys = matrix_keys(frames, matrices);
   object.gltf.reset();
   return {};

@@ -9,8 +9,8 @@
 #include <set>
 
 #include "common/base/limits.h"
+#include "common/base/suggest.h"
 #include "common/job/motion.h"
-#include "common/job/suggest.h"
 #include "common/job/udim.h"
 #include "common/math/inverse.h"
 #include "common/scene/gltf/file_cache.h"

@@ -14,9 +14,9 @@
 #include <tuple>
 
 #include "common/image/image_io.h"
-#include "common/job/job_json.h"
 #include "common/job/motion.h"
-#include "common/job/sequence.h"
+#include "common/job/plan/sequence.h"
+#include "common/job/text/job_json.h"
 #include "common/scene/mesh/mesh_builder.h"
 #include "common/scene/pose.h"
 #include "common/scene/settle/settle_motion.h"

@@ -6,7 +6,7 @@
 #include <cmath>
 #include <set>
 
-#include "common/job/job_fields.h"
+#include "common/job/text/job_fields.h"
 #include "jobs/lab/stability/maps.h"
 
 namespace baton::stability {

@@ -91,7 +91,8 @@ class SharedLights {
   }
 
  private:
-  static Status render_run(const RenderContext& context, const std::vector<FrameNumber>& judged, Run& run) {
+  static Status render_run(const RenderContext& context, const std::vector<FrameNumber>& judged,
+                           Run& run) {
     run.resize(judged.size());
     const test::FrameSink sink = [&](Step step, const FilmTile& film) {
       run.count_values(film);

@@ -15,7 +15,7 @@
 #include <utility>
 #include <vector>
 
-#include "common/job/job_json.h"
+#include "common/job/text/job_json.h"
 #include "common/math/philox.h"
 #include "jobs/study/intervals.h"
 #include "worker/pass/render_context.h"

@@ -16,7 +16,7 @@
 
 #include "common/base/files.h"
 #include "common/image/image_io.h"
-#include "common/job/job_json.h"
+#include "common/job/text/job_json.h"
 #include "jobs/study/intervals.h"
 #include "jobs/study/svg_chart.h"
 #include "worker/exchange/second_pass.h"

@@ -6,8 +6,8 @@
 #include <algorithm>
 #include <cmath>
 
-#include "common/job/frame_range.h"
-#include "common/job/job_json.h"
+#include "common/job/text/frame_range.h"
+#include "common/job/text/job_json.h"
 #include "jobs/auto/auto_pilot.h"
 
 namespace baton {

@@ -7,8 +7,8 @@
 #include <cmath>
 #include <cstdint>
 
-#include "common/job/job_json.h"
 #include "common/job/motion.h"
+#include "common/job/text/job_json.h"
 #include "tests/support/render_tiled.h"
 #include "tests/support/second_pass.h"
 

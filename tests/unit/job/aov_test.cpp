@@ -3,9 +3,9 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "common/job/job_json.h"
-#include "common/job/picture.h"
-#include "common/job/sequence.h"
+#include "common/job/plan/sequence.h"
+#include "common/job/text/job_json.h"
+#include "common/job/text/picture.h"
 
 namespace baton {
 namespace {

@@ -1,11 +1,11 @@
-#include "common/job/estimate.h"
+#include "common/job/plan/estimate.h"
 
 #include <gtest/gtest.h>
 
 #include <utility>
 
-#include "common/job/frame_range.h"
-#include "common/job/sequence.h"
+#include "common/job/plan/sequence.h"
+#include "common/job/text/frame_range.h"
 
 namespace baton {
 namespace {

@@ -1,4 +1,4 @@
-#include "common/job/frame_judgement.h"
+#include "common/job/plan/frame_judgement.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

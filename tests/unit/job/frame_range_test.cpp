@@ -1,4 +1,4 @@
-#include "common/job/frame_range.h"
+#include "common/job/text/frame_range.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -2,7 +2,7 @@
 #include <gtest/gtest.h>
 
 #include "common/base/files.h"
-#include "common/job/job_json.h"
+#include "common/job/text/job_json.h"
 
 namespace baton {
 namespace {

@@ -1,4 +1,4 @@
-#include "common/job/job_json.h"
+#include "common/job/text/job_json.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,4 +1,4 @@
-#include "common/job/known_limits.h"
+#include "common/advice/known_limits.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
@@ -7,7 +7,7 @@
 #include <map>
 #include <sstream>
 
-#include "common/job/frame_range.h"
+#include "common/job/text/frame_range.h"
 
 namespace baton {
 namespace {

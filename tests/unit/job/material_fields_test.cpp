@@ -1,6 +1,6 @@
 #include <gtest/gtest.h>
 
-#include "common/job/job_json.h"
+#include "common/job/text/job_json.h"
 
 namespace baton {
 namespace {

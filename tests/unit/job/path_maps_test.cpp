@@ -1,4 +1,4 @@
-#include "common/job/path_maps.h"
+#include "common/job/text/path_maps.h"
 
 #include <gtest/gtest.h>
 

@@ -1,4 +1,4 @@
-#include "common/job/picture.h"
+#include "common/job/text/picture.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

@@ -1,8 +1,8 @@
 #include <gtest/gtest.h>
 
-#include "common/job/job_json.h"
-#include "common/job/next_sweeps.h"
-#include "common/job/picture.h"
+#include "common/job/plan/next_sweeps.h"
+#include "common/job/text/job_json.h"
+#include "common/job/text/picture.h"
 
 namespace baton {
 namespace {

@@ -1,4 +1,4 @@
-#include "common/job/roots.h"
+#include "common/job/text/roots.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>

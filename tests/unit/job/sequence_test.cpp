@@ -1,9 +1,9 @@
-#include "common/job/sequence.h"
+#include "common/job/plan/sequence.h"
 
 #include <gtest/gtest.h>
 
-#include "common/job/frame_range.h"
-#include "common/job/job_json.h"
+#include "common/job/text/frame_range.h"
+#include "common/job/text/job_json.h"
 
 namespace baton {
 namespace {

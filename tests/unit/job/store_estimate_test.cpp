@@ -1,9 +1,9 @@
-#include "common/job/store_estimate.h"
+#include "common/job/plan/store_estimate.h"
 
 #include <gtest/gtest.h>
 
-#include "common/job/estimate.h"
-#include "common/job/sequence.h"
+#include "common/job/plan/estimate.h"
+#include "common/job/plan/sequence.h"
 
 namespace baton {
 namespace {

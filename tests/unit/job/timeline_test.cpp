@@ -1,11 +1,11 @@
-#include "common/job/timeline.h"
+#include "common/job/plan/timeline.h"
 
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <numeric>
 
-#include "common/job/sequence.h"
+#include "common/job/plan/sequence.h"
 
 namespace baton {
 namespace {

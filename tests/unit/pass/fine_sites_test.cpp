@@ -164,7 +164,8 @@ TEST(FineSites, OfLargeTilesAreTheSame) {
         .kind = MaterialKind::metallic_roughness, .metallic = 1, .roughness = 0.02f};
     if (in_motion) test::set_in_motion(job, true, false);
     const auto context = *load_render_context(job, Digest{1, 2});
-    const auto counts = count_sites(job, **context->geometry->at(Step(0)), places_of({0, 0, 96, 72}));
+    const auto counts =
+        count_sites(job, **context->geometry->at(Step(0)), places_of({0, 0, 96, 72}));
     const auto sum = std::accumulate(counts.begin(), counts.end(), std::size_t{0});
     EXPECT_GT(sum, 6912u * 4);
     EXPECT_EQ(render_tiled(job, 16, 1), render_tiled(job, 96, 2)) << in_motion << ", " << sum;

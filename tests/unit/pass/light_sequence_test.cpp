@@ -4,7 +4,7 @@
 #include <algorithm>
 #include <cstring>
 
-#include "common/job/frame_range.h"
+#include "common/job/text/frame_range.h"
 #include "tests/support/render_tiled.h"
 #include "worker/light/frame_light.h"
 

@@ -5,7 +5,7 @@
 #include <cmath>
 #include <functional>
 
-#include "common/job/frame_range.h"
+#include "common/job/text/frame_range.h"
 #include "tests/support/alive_box.h"
 #include "tests/support/small_scene.h"
 

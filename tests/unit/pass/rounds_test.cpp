@@ -4,7 +4,7 @@
 #include <bit>
 #include <cmath>
 
-#include "common/job/frame_range.h"
+#include "common/job/text/frame_range.h"
 #include "tests/support/render_tiled.h"
 #include "worker/pass/primary.h"
 #include "worker/pass/round_mean.h"

@@ -5,7 +5,7 @@
 
 #include <cmath>
 
-#include "common/job/sequence.h"
+#include "common/job/plan/sequence.h"
 #include "common/math/low_discrepancy.h"
 #include "tests/support/instruction_sets.h"
 #include "tests/support/render_tiled.h"

@@ -344,7 +344,8 @@ TEST(RunTile, StopsWhenAsked) {
                            return Status();
                          },
                          [](const SampleState&) { return Status(); }};
-  const auto stats = run_tile(**context, {0, baton::Run(0), {Step(0), Step(3)}}, {}, sink, stop.get_token());
+  const auto stats =
+      run_tile(**context, {0, baton::Run(0), {Step(0), Step(3)}}, {}, sink, stop.get_token());
   ASSERT_FALSE(stats.ok());
   EXPECT_EQ(stats.error().kind, ErrorKind::cancelled);
   EXPECT_EQ(frames, 1);

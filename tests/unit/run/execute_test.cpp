@@ -8,9 +8,9 @@
 
 #include "common/base/files.h"
 #include "common/base/limits.h"
-#include "common/job/frame_range.h"
-#include "common/job/job_json.h"
-#include "common/job/sequence.h"
+#include "common/job/plan/sequence.h"
+#include "common/job/text/frame_range.h"
+#include "common/job/text/job_json.h"
 #include "tests/support/local_frames.h"
 #include "worker/run/frame_output.h"
 #include "worker/run/replay.h"
@@ -70,10 +70,9 @@ class ExecuteTest : public testing::Test {
   }
 
   StepSpan steps_of(baton::Run run) const { return Timeline(job_).steps_of(run); }
-  Result<TaskOutput> render(baton::Run run, std::int32_t tile,
-                            const std::vector<BlobRef>& inputs) {
-    return execute_task(*loaded_, store_.value(), render_task(run, tile),
-                        {inputs, steps_of(run)}, {});
+  Result<TaskOutput> render(baton::Run run, std::int32_t tile, const std::vector<BlobRef>& inputs) {
+    return execute_task(*loaded_, store_.value(), render_task(run, tile), {inputs, steps_of(run)},
+                        {});
   }
 
   /// Every render task in the order of a farm; returns the films by frame, the states in `states_`.
@@ -184,14 +183,16 @@ TEST_F(ExecuteTest, AHeldStateIsTheStateOfItsFile) {
   EXPECT_TRUE(held.is_held());
   EXPECT_EQ(held.digest, held_state_name(loaded_->digest, Step(1), 1));
   EXPECT_EQ(loaded_->states->size_bytes(), loaded_->states->find(held)->size_bytes());
-  EXPECT_EQ(render(baton::Run(1), 1, {held}).value().outputs, render(baton::Run(1), 1, {packed}).value().outputs);
+  EXPECT_EQ(render(baton::Run(1), 1, {held}).value().outputs,
+            render(baton::Run(1), 1, {packed}).value().outputs);
 
   const auto published = publish_held(loaded_->states->held(), *store_);
   ASSERT_TRUE(published) << published.error().message;
   EXPECT_EQ(*published, (std::vector<PublishedState>{{held, packed}}));
 
   // A grant says which states nobody needs any more; one that is not here is an error.
-  EXPECT_TRUE(execute_task(*loaded_, *store_, next, {{held}, steps_of(baton::Run(1)), false, Step(1)}, {}));
+  EXPECT_TRUE(
+      execute_task(*loaded_, *store_, next, {{held}, steps_of(baton::Run(1)), false, Step(1)}, {}));
   const Result<TaskOutput> late =
       execute_task(*loaded_, *store_, next, {{held}, steps_of(baton::Run(1)), false, Step(2)}, {});
   ASSERT_FALSE(late);
@@ -217,8 +218,8 @@ TEST_F(ExecuteTest, TasksThatTheJobDoesNotHaveAreBadInput) {
   for (const TaskKey& task : {TaskKey{TaskKind::render, 3, 0}, TaskKey{TaskKind::render, 0, 6},
                               TaskKey{TaskKind::render, -1, 0}, TaskKey{TaskKind::assemble, 5, 0},
                               TaskKey{TaskKind::assemble, 0, 0}}) {
-    const Result<TaskOutput> output =
-        execute_task(*loaded_, *store_, task, {{}, {Step(2 * task.position), Step(2 * task.position)}}, {});
+    const Result<TaskOutput> output = execute_task(
+        *loaded_, *store_, task, {{}, {Step(2 * task.position), Step(2 * task.position)}}, {});
     ASSERT_FALSE(output);
     EXPECT_EQ(output.error().kind, ErrorKind::bad_input);
   }

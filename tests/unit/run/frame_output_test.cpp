@@ -8,8 +8,8 @@
 #include "common/base/limits.h"
 #include "common/base/version.h"
 #include "common/image/noise.h"
-#include "common/job/frame_range.h"
-#include "common/job/sequence.h"
+#include "common/job/plan/sequence.h"
+#include "common/job/text/frame_range.h"
 
 namespace baton {
 namespace {

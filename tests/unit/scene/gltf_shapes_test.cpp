@@ -4,8 +4,8 @@
 
 #include <cmath>
 
-#include "common/job/job_json.h"
 #include "common/job/motion.h"
+#include "common/job/text/job_json.h"
 #include "common/scene/mesh_loader.h"
 #include "common/scene/pose.h"
 #include "common/scene/settle/settle_motion.h"

@@ -3,8 +3,8 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
-#include "common/job/frame_range.h"
 #include "common/job/motion.h"
+#include "common/job/text/frame_range.h"
 #include "common/scene/settle/settle_motion.h"
 #include "tests/support/mesh_files.h"
 

@@ -5,9 +5,9 @@
 
 #include <cmath>
 
-#include "common/job/frame_range.h"
-#include "common/job/job_json.h"
 #include "common/job/motion.h"
+#include "common/job/text/frame_range.h"
+#include "common/job/text/job_json.h"
 #include "common/scene/pose.h"
 #include "common/scene/scene_warnings.h"
 #include "common/scene/settle/settle_motion.h"

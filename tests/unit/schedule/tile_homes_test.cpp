@@ -6,7 +6,7 @@
 #include <cmath>
 
 #include "common/base/limits.h"
-#include "common/job/estimate.h"
+#include "common/job/plan/estimate.h"
 #include "tests/unit/schedule/farm.h"
 
 namespace baton {

@@ -12,7 +12,7 @@
 
 #include "common/base/build.h"
 #include "common/base/files.h"
-#include "common/job/job_json.h"
+#include "common/job/text/job_json.h"
 #include "common/protocol/client.h"
 #include "common/protocol/worker_channel.h"
 #include "common/store/blob_store.h"

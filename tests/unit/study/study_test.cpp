@@ -7,7 +7,7 @@
 #include <cmath>
 #include <fstream>
 
-#include "common/job/frame_range.h"
+#include "common/job/text/frame_range.h"
 #include "jobs/study/run_record.h"
 
 namespace baton {

@@ -4,7 +4,7 @@
 
 #include <cmath>
 
-#include "common/job/frame_range.h"
+#include "common/job/text/frame_range.h"
 #include "common/math/philox.h"
 #include "jobs/study/auto_table.h"
 #include "jobs/study/chart_axis.h"

@@ -1,0 +1,92 @@
+#pragma once
+
+#include <compare>
+#include <cstdint>
+#include <filesystem>
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "common/job/job_facts.h"
+#include "common/job/job_spec.h"
+#include "common/job/plan/timeline.h"
+#include "common/job/time.h"
+#include "common/math/pixel_rect.h"
+
+namespace baton {
+
+/// The environment at one frame: texels are scale lerp(map[map_a], map[map_b], mix), directions
+/// are turned by `rotation` (world = rotation * map direction). Maps are indices into
+/// JobSpec::environment.keys.
+struct EnvironmentFrame {
+  std::int32_t map_a = 0;
+  std::int32_t map_b = 0;  ///< equal to map_a when mix is 0
+  float mix = 0;           ///< [0, 1)
+  float scale = 1;         ///< radiance factor beside EnvironmentSpec::scale, > 0
+  Mat3 rotation;
+
+  bool operator==(const EnvironmentFrame&) const = default;
+  /// True when both frames show the same texels, whatever the rotation.
+  bool same_texels(const EnvironmentFrame& b) const {
+    return map_a == b.map_a && map_b == b.map_b && mix == b.mix && scale == b.scale;
+  }
+};
+
+/// What the environment is at a frame; at least one key.
+EnvironmentFrame environment_at(const EnvironmentSpec& environment, FrameNumber frame);
+/// By how much it is turned about its axis, degrees.
+double rotation_deg_at(const EnvironmentSpec& environment, FrameNumber frame);
+
+/// What is particular to one step of the sequence.
+struct FrameSpec {
+  Step step{};
+  FrameNumber number{1};
+  std::int32_t first_round = 0;  ///< rounds of this frame that were rendered in earlier sweeps
+  EnvironmentFrame environment;
+
+  /// Number of a round among those of the frame over all sweeps: the address of its random numbers.
+  std::int32_t round_of_frame(Round round) const { return first_round + round.value(); }
+};
+
+/// One FrameSpec per step of the job, in order.
+std::vector<FrameSpec> expand_sequence(const JobSpec& job);
+
+/// The rendered pixels cut into square tiles, row by row; border tiles are clipped.
+class TileGrid {
+ public:
+  TileGrid(const PixelRect& image, int tile_size);
+  explicit TileGrid(const ImageSpec& image) : TileGrid(image.rendered(), image.tile_size) {}
+
+  std::int32_t count() const { return columns_ * rows_; }
+  std::int32_t columns() const { return columns_; }
+  std::int32_t rows() const { return rows_; }
+  /// tile in [0, count()).
+  PixelRect rect(std::int32_t tile) const;
+  /// The tiles that have a pixel within `reach_px` of one of `tile`, in either direction;
+  /// ascending, with `tile` itself. The relation is symmetric.
+  std::vector<std::int32_t> tiles_near(std::int32_t tile, std::int32_t reach_px) const;
+
+ private:
+  PixelRect image_;
+  std::int32_t tile_size_, columns_, rows_;
+};
+
+/// The unit that a lease hands out: one tile for the steps of a run. Consecutive runs of a tile are
+/// chained by the sample state when the job carries it.
+struct TileRun {
+  std::int32_t tile = 0;
+  Run run{};
+  StepSpan steps{};
+
+  bool operator==(const TileRun&) const = default;
+};
+/// run in [0, num_runs(job)), tile in [0, TileGrid(job.image).count()).
+TileRun tile_run(const JobSpec& job, std::int32_t tile, Run run);
+
+/// At most `count` (> 1) of `frames`, evenly picked, the first and the last among them.
+std::vector<FrameNumber> pick_frames(const std::vector<FrameNumber>& frames, std::size_t count);
+
+/// Where a frame of the job is written.
+std::filesystem::path frame_path(const JobSpec& job, FrameIndex frame);
+
+}  // namespace baton

@@ -1,0 +1,245 @@
+#include "common/job/text/picture.h"
+
+#include <algorithm>
+#include <array>
+#include <map>
+#include <nlohmann/json.hpp>
+#include <set>
+#include <string_view>
+
+#include "common/job/motion.h"
+#include "common/job/plan/sequence.h"
+
+namespace baton {
+namespace {
+
+/// Beginnings of the paths that do not decide pixels.
+constexpr std::array<std::string_view, 17> kSettings{"/name",
+                                                     "/priority",
+                                                     "/metadata",
+                                                     "/frames",
+                                                     "/image/tileSize",
+                                                     "/output",
+                                                     "/state/",
+                                                     "/quality/sweeps",
+                                                     "/quality/refinable",
+                                                     "/quality/noiseThreshold",
+                                                     "/quality/maxRounds",
+                                                     "/quality/timeLimit",
+                                                     "/maxRetriesPerTask",
+                                                     "/maxFailedTasks",
+                                                     "/maxFailuresPerWorker",
+                                                     "/maxSecondsPerTask",
+                                                     "/specificationVersion"};
+/// Exceptions, which decide pixels: what is remembered of earlier frames says where rays go.
+constexpr std::array<std::string_view, 2> kOfThePicture{"/state/carry", "/state/preroll"};
+/// How the first frame is named among the differences.
+constexpr const char* kFirstFrame = "$.frames (samples are carried from the first one on)";
+
+bool is_setting(std::string_view path) {
+  // What objects are called is in mattes alone.
+  if (path.starts_with("/scene/objects/") && path.ends_with("/name")) return true;
+  if (std::ranges::find(kOfThePicture, path) != kOfThePicture.end()) return false;
+  return std::any_of(kSettings.begin(), kSettings.end(),
+                     [&](std::string_view start) { return path.starts_with(start); });
+}
+
+/// Keys decide single frames (FrameComparison).
+bool is_key(std::string_view path) {
+  return path.starts_with("/environment/keys/") || path.starts_with("/environment/scaleKeys/") ||
+         path.starts_with("/environment/rotation/keys/") || path.starts_with("/camera/keys/") ||
+         (path.starts_with("/scene/objects/") && path.find("/keys/") != path.npos);
+}
+
+/// "/image/sites" as "$.image.sites", "/objects/3/mesh" as "$.objects[3].mesh".
+std::string json_path(std::string_view pointer) {
+  std::string path = "$";
+  while (!pointer.empty()) {
+    const std::size_t end = std::min(pointer.find('/', 1), pointer.size());
+    const std::string_view key = pointer.substr(1, end - 1);
+    const bool is_index = !key.empty() && key.find_first_not_of("0123456789") == key.npos;
+    path += is_index ? "[" + std::string(key) + "]" : "." + std::string(key);
+    pointer.remove_prefix(end);
+  }
+  return path;
+}
+
+using Facts = std::map<std::string, std::string>;
+
+/// The job as its films are made.
+JobSpec without_plate(JobSpec job) {
+  if (job.output.background == Background::plate) job.output.background = Background::transparent;
+  return job;
+}
+
+/// The values that decide all frames, and the contents of the files but the maps, by name.
+Facts picture_facts(const JobSpec& job, const std::vector<AssetDigest>& assets) {
+  Facts facts;
+  const nlohmann::json all = nlohmann::json::parse(to_json(job)).flatten();
+  for (const auto& [path, value] : all.items()) {
+    if (!is_setting(path) && !is_key(path)) facts.emplace(json_path(path), value.dump());
+  }
+  // Whether anything moves decides how all frames follow their history.
+  if (!job.camera.keys.empty()) facts.emplace("$.camera.keys", "given");
+  for (std::size_t i = 0; i < job.scene.objects.size(); ++i) {
+    if (moves(job.scene.objects[i]))
+      facts.emplace("$.scene.objects[" + std::to_string(i) + "].keys", "given");
+  }
+  if (carries_state(job)) facts.emplace(kFirstFrame, std::to_string(job.frames.front().value()));
+  std::set<std::string> maps;
+  for (const EnvironmentKey& key : job.environment.keys) maps.insert(key.map);
+  maps.erase(job.environment.camera_map.file);  // which all frames show
+  const std::vector<std::string> of_films = asset_paths(without_plate(job));
+  for (const AssetDigest& asset : assets) {
+    if (!maps.contains(asset.path) && std::ranges::binary_search(of_films, asset.path))
+      facts.emplace(asset.path, asset.digest.hex());
+  }
+  return facts;
+}
+
+void put(ByteWriter& writer, const Vec3& v) {
+  for (const float x : {v.x, v.y, v.z}) writer.put(x);
+}
+
+Digest light_facts(const EnvironmentSpec& environment, FrameNumber frame,
+                   const std::map<std::string, Digest>& contents) {
+  const EnvironmentFrame light = environment_at(environment, frame);
+  ByteWriter writer;
+  for (const std::int32_t map : {light.map_a, light.map_b}) {
+    const std::string& path = environment.keys.at(static_cast<std::size_t>(map)).map;
+    const auto found = contents.find(path);
+    writer.put_string(found == contents.end() ? path : found->second.hex());
+  }
+  writer.put(light.mix);
+  writer.put(light.scale);
+  writer.put(rotation_deg_at(environment, frame));
+  return digest_of(writer.bytes());
+}
+
+Digest camera_facts(const JobSpec& job, FrameNumber frame) {
+  const CameraSpec camera = camera_at(job, frame.value());
+  ByteWriter writer;
+  for (const Vec3& v : {camera.position, camera.look_at, camera.up}) put(writer, v);
+  writer.put(camera.vertical_fov_deg);
+  return digest_of(writer.bytes());
+}
+
+Digest object_facts(const JobSpec& job, FrameNumber frame) {
+  ByteWriter writer;
+  for (const ObjectSpec& object : job.scene.objects) {
+    if (!moves(object)) continue;
+    const Transform pose = object_motion_at(object, job.motion.curve, frame.value());
+    for (const float x : pose.linear.m) writer.put(x);
+    put(writer, pose.offset);
+  }
+  return digest_of(writer.bytes());
+}
+
+/// Digests by path.
+std::map<std::string, Digest> contents_of(const ParsedJobDocument& document) {
+  std::map<std::string, Digest> contents;
+  for (const AssetDigest& asset : document.assets) contents.emplace(asset.path, asset.digest);
+  return contents;
+}
+
+}  // namespace
+
+Digest picture_digest(const JobSpec& job, const std::vector<AssetDigest>& assets) {
+  ByteWriter writer;
+  for (const auto& [name, value] : picture_facts(job, assets)) {
+    writer.put_string(name);
+    writer.put_string(value);
+  }
+  return digest_of(writer.bytes());
+}
+
+std::vector<std::string> picture_differences(const ParsedJobDocument& a,
+                                             const ParsedJobDocument& b) {
+  const Facts left = picture_facts(a.job, a.assets), right = picture_facts(b.job, b.assets);
+  std::set<std::string> differences;
+  const auto compare = [&](const Facts& one, const Facts& other) {
+    for (const auto& [name, value] : one) {
+      const auto found = other.find(name);
+      // A file that only one job reads, and whether samples are carried, have keys of their own.
+      const bool has_key = name.front() == '/' || name == kFirstFrame;
+      if (found == other.end() ? !has_key : found->second != value) differences.insert(name);
+    }
+  };
+  compare(left, right);
+  compare(right, left);
+  return {differences.begin(), differences.end()};
+}
+
+std::vector<FrameComparison::Facts> FrameComparison::facts_of(const ParsedJobDocument& document) {
+  const std::map<std::string, Digest> contents = contents_of(document);
+  std::vector<Facts> facts;
+  for (const FrameNumber frame : document.job.frames) {
+    facts.push_back({light_facts(document.job.environment, frame, contents),
+                     camera_facts(document.job, frame), object_facts(document.job, frame)});
+  }
+  return facts;
+}
+
+std::vector<Digest> FrameComparison::plates_of(const ParsedJobDocument& document) {
+  const JobSpec& job = document.job;
+  std::vector<Digest> plates(job.frames.size());
+  if (!has_plate(job.output)) return plates;
+  const std::map<std::string, Digest> contents = contents_of(document);
+  for (std::size_t i = 0; i < plates.size(); ++i) {
+    const auto plate = contents.find(file_at(*job.output.plate, job.frames[i]));
+    if (plate != contents.end()) plates[i] = plate->second;
+  }
+  return plates;
+}
+
+FrameComparison::FrameComparison(const ParsedJobDocument& a, const ParsedJobDocument& b)
+    : frames_a_(a.job.frames),
+      frames_b_(b.job.frames),
+      sweeps_a_(static_cast<std::size_t>(a.job.quality.sweeps)),
+      sweeps_b_(static_cast<std::size_t>(b.job.quality.sweeps)),
+      a_(facts_of(a)),
+      b_(facts_of(b)),
+      plates_a_(plates_of(a)),
+      plates_b_(plates_of(b)),
+      carried_(carries_state(a.job) || carries_state(b.job)) {
+  while (num_common_ < std::min(a_.size(), b_.size()) &&
+         frames_a_[num_common_] == frames_b_[num_common_] && a_[num_common_] == b_[num_common_])
+    ++num_common_;
+}
+
+bool FrameComparison::are_equal(FrameIndex frame_a, FrameIndex frame_b) const {
+  return sweeps_a_ == sweeps_b_ && are_alike(frame_a, frame_b);
+}
+
+bool FrameComparison::have_one_plate(FrameIndex frame_a, FrameIndex frame_b) const {
+  return plates_a_[frame_a.index()] == plates_b_[frame_b.index()];
+}
+
+bool FrameComparison::are_alike(FrameIndex frame_a, FrameIndex frame_b) const {
+  const bool all_common = num_common_ == a_.size() && num_common_ == b_.size();
+  if (carried_ && std::min(sweeps_a_, sweeps_b_) > 1 && !all_common) return false;
+  if (carried_) return frame_a == frame_b && frame_a.index() < num_common_;
+  return frames_a_[frame_a.index()] == frames_b_[frame_b.index()] &&
+         a_[frame_a.index()] == b_[frame_b.index()];
+}
+
+std::int32_t FrameComparison::num_common_steps() const {
+  const bool all_common = num_common_ == a_.size() && num_common_ == b_.size();
+  const std::size_t sweeps = all_common ? std::min(sweeps_a_, sweeps_b_) : 1;
+  return static_cast<std::int32_t>(num_common_ * sweeps);
+}
+
+std::string FrameComparison::difference(FrameIndex frame_a, FrameIndex frame_b) const {
+  const Facts &a = a_[frame_a.index()], &b = b_[frame_b.index()];
+  const FrameNumber frame = frames_b_[frame_b.index()];
+  if (frames_a_[frame_a.index()] == frame && !(a == b)) {
+    const char* const what = !(a.light == b.light)     ? "$.environment"
+                             : !(a.camera == b.camera) ? "$.camera.keys"
+                                                       : "$.scene.objects: keys";
+    return std::string(what) + " at frame " + std::to_string(frame.value());
+  }
+  if (sweeps_a_ != sweeps_b_) return "$.quality.sweeps";
+  return "$.frames before frame " + std::to_string(frame.value()) + " (samples are carried)";
+}
+
+}  // namespace baton

@@ -1,0 +1,61 @@
+#pragma once
+
+#include <cstdint>
+#include <string>
+#include <vector>
+
+#include "common/job/text/job_json.h"
+
+namespace baton {
+
+/// What decides the pixels of a job, apart from its settings: those say which frames are made, in
+/// which tiles, when, by whom, and how they are stored. Two jobs of one picture make the same bytes
+/// of a frame that both have the same way up to there, and go on with each other's work.
+
+/// Names what holds for all frames: every value of the job that is no setting and no key, the
+/// contents of the meshes and, where samples are carried, the first frame, since the history begins
+/// there. States and films say it.
+Digest picture_digest(const JobSpec& job, const std::vector<AssetDigest>& assets);
+
+/// What holds for all frames and differs: the JSON paths, and the files whose content changed;
+/// sorted. Empty exactly when the picture digests are equal.
+std::vector<std::string> picture_differences(const ParsedJobDocument& a,
+                                             const ParsedJobDocument& b);
+
+/// What two jobs show in their frames, for jobs of one picture digest: the number of a frame, its
+/// light with the contents of its maps, the camera and the poses of all that moves.
+class FrameComparison {
+ public:
+  FrameComparison(const ParsedJobDocument& a, const ParsedJobDocument& b);
+
+  /// Whether frame `frame_a` of one and `frame_b` of the other have the same pixels: they are
+  /// alike, and the means of as many sweeps.
+  bool are_equal(FrameIndex frame_a, FrameIndex frame_b) const;
+  /// Whether they show the same and, where samples are carried, so do all frames before; in later
+  /// sweeps these are all frames.
+  bool are_alike(FrameIndex frame_a, FrameIndex frame_b) const;
+  /// Whether frames with the same pixels are laid over the same plate, or over none.
+  bool have_one_plate(FrameIndex frame_a, FrameIndex frame_b) const;
+  /// How many steps (common/job/plan/sequence.h) from the first on are the same in both.
+  std::int32_t num_common_steps() const;
+  /// What differs in two frames that are not equal: "$.camera.keys", ...; "$.frames" where it is
+  /// the frames before.
+  std::string difference(FrameIndex frame_a, FrameIndex frame_b) const;
+
+ private:
+  struct Facts {
+    Digest light, camera, objects;
+    bool operator==(const Facts&) const = default;
+  };
+  static std::vector<Facts> facts_of(const ParsedJobDocument& document);
+  static std::vector<Digest> plates_of(const ParsedJobDocument& document);
+
+  std::vector<FrameNumber> frames_a_, frames_b_;
+  std::size_t sweeps_a_, sweeps_b_;
+  std::vector<Facts> a_, b_;
+  std::vector<Digest> plates_a_, plates_b_;  ///< by frame; a digest of zeros: none
+  bool carried_;
+  std::size_t num_common_ = 0;  ///< frames from the first on
+};
+
+}  // namespace baton
