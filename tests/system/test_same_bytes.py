@@ -47,7 +47,9 @@ def no_layout_shows(programs, folder):
             return {**job, "sampling": sampling or job["sampling"]}
         pixels, states = check_layouts(programs, folder / name.replace(" ", "-"), job_of)
         check_equal(len(pixels), frames, f"{name}: frames")
-        with_states = 0 if sampling == BY_MATERIAL else frames if "camera" in changes else frames // 2
+        # Where pixels go on from others, a run is one frame long.
+        with_states = frames if "camera" in changes or sampling == RESTIR else frames // 2
+        with_states = 0 if sampling == BY_MATERIAL else with_states
         check_equal(len(states.splitlines()), with_states, f"{name}: frames with states")
 
 
