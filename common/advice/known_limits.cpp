@@ -7,6 +7,8 @@
 #include <cmath>
 #include <set>
 
+#include "common/job/plan/sequence.h"
+
 namespace baton {
 namespace {
 
