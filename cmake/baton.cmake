@@ -82,10 +82,14 @@ function(baton_simd_kernels)
   endif()
 endfunction()
 
-# baton_program(NAME DIR folder DEPS libraries...): the .cpp files directly in one folder.
+# baton_program(NAME DIR folder ROOMS folders... DEPS libraries...): the .cpp files directly in one folder, and in these of it.
 function(baton_program name)
-  cmake_parse_arguments(A "" "DIR" "DEPS" ${ARGN})
-  file(GLOB sources CONFIGURE_DEPENDS ${CMAKE_SOURCE_DIR}/${A_DIR}/*.cpp)
+  cmake_parse_arguments(A "" "DIR" "ROOMS;DEPS" ${ARGN})
+  set(patterns ${CMAKE_SOURCE_DIR}/${A_DIR}/*.cpp)
+  foreach(room ${A_ROOMS})
+    list(APPEND patterns ${CMAKE_SOURCE_DIR}/${A_DIR}/${room}/*.cpp)
+  endforeach()
+  file(GLOB sources CONFIGURE_DEPENDS ${patterns})
   if(sources)
     add_executable(${name} ${sources})
     target_link_libraries(${name} PRIVATE baton_options ${A_DEPS})

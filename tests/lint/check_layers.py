@@ -29,6 +29,8 @@ EXCHANGE = PASS | {"worker/pass"}
 RUN = EXCHANGE | {"common/protocol", "common/store", "common/scene/settle", "worker/exchange"}
 # Programs that measure look into every room of the worker, and share scenes and statistics with the tests.
 LAB = RUN | METHODS | {"worker/run", "jobs/study", "tests/support", "tests/stat"}
+# Families of commands, and what they share.
+CLI = COMMON_ALL | {"common/scene/settle", "jobs/study", "jobs/auto"}
 
 MAY_INCLUDE = {
     "common/base": set(),
@@ -68,9 +70,12 @@ MAY_INCLUDE = {
     "jobs/auto": TEXT | {"jobs/study", "common/scene", "common/scene/mesh"},  # how large a scene is
     "jobs/slurm": COMMON_BASE,
     **{f"jobs/lab/{folder}": LAB for folder in ("peers", "stability", "studies")},
-    "jobs/cli": COMMON_ALL
-    | {"common/scene", "common/scene/map", "common/scene/mesh", "common/scene/settle"}  # `baton check` loads the scene
-    | {"jobs/study", "jobs/auto", "jobs/slurm"},
+    "jobs/cli": CLI,
+    "jobs/cli/check": CLI | {"jobs/cli", "common/scene", "common/scene/map", "common/scene/mesh"},  # it loads the scene
+    "jobs/cli/render": CLI | {"jobs/cli", "jobs/cli/check"},  # what is rendered is checked before
+    "jobs/cli/farm": CLI | {"jobs/cli", "jobs/cli/render", "jobs/slurm"},
+    "jobs/cli/look": COMMON_ALL | {"jobs/cli"},
+    "jobs/cli/compare": CLI | {"jobs/cli"},
 }
 
 # Library, by how its headers are spelled -> files that may include them (prefix of the path).
@@ -181,6 +186,8 @@ def violations(root):
 PLANTED = [
     ("worker/sampling/a.cpp", '#include "common/scene/scene.h"\n', "may not include common/scene/scene.h"),
     ("jobs/cli/a.cpp", '#include "worker/surface/bsdf.h"\n', "may not include worker/surface/bsdf.h"),
+    ("jobs/cli/b.cpp", '#include "jobs/cli/look/x.h"\n', "may not include jobs/cli/look/x.h"),
+    ("jobs/cli/render/a.cpp", '#include "jobs/cli/farm/x.h"\n', "may not include jobs/cli/farm/x.h"),
     ("jobs/auto/a.cpp", '#include "worker/accel/accel.h"\n', "may not include worker/accel/accel.h"),
     ("coordinator/schedule/a.cpp", '#include "common/scene/scene.h"\n', "may not include common/scene/scene.h"),
     ("coordinator/a.cpp", '#include "common/scene/mesh/x.h"\n', "may not include common/scene/mesh/x.h"),

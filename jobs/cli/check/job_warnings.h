@@ -4,7 +4,7 @@
 #include <string>
 #include <vector>
 
-#include "jobs/cli/asset_report.h"
+#include "jobs/cli/check/asset_report.h"
 
 namespace baton {
 

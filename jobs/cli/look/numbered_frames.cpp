@@ -1,4 +1,4 @@
-#include "jobs/cli/numbered_frames.h"
+#include "jobs/cli/look/numbered_frames.h"
 
 #include <fmt/format.h>
 

@@ -1,12 +1,12 @@
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
 
-#include "jobs/cli/asset_report.h"
+#include "jobs/cli/check/asset_report.h"
 #include "jobs/cli/commands.h"
 #include "jobs/cli/coordinator_link.h"
 #include "jobs/cli/display.h"
 #include "jobs/cli/job_summary.h"
-#include "jobs/cli/render_watch.h"
+#include "jobs/cli/render/render_watch.h"
 #include "jobs/cli/settle_method.h"
 
 namespace baton {

@@ -1,4 +1,4 @@
-#include "jobs/cli/scene_picture.h"
+#include "jobs/cli/check/scene_picture.h"
 
 #include <fmt/format.h>
 
@@ -10,7 +10,7 @@
 #include "common/job/motion.h"
 #include "common/math/bounds.h"
 #include "common/scene/pose.h"
-#include "jobs/cli/preview_canvas.h"
+#include "jobs/cli/check/preview_canvas.h"
 
 namespace baton {
 namespace {

@@ -1,4 +1,4 @@
-#include "jobs/cli/job_warnings.h"
+#include "jobs/cli/check/job_warnings.h"
 
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
@@ -17,7 +17,7 @@
 #include "common/job/plan/store_estimate.h"
 #include "common/scene/plate.h"
 #include "common/scene/scene_warnings.h"
-#include "jobs/cli/surface_share.h"
+#include "jobs/cli/check/surface_share.h"
 #include "jobs/cli/text.h"
 
 namespace baton {

@@ -1,4 +1,4 @@
-#include "jobs/cli/movie_encoder.h"
+#include "jobs/cli/look/movie_encoder.h"
 
 #include <fmt/format.h>
 #include <sys/socket.h>

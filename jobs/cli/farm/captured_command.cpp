@@ -1,4 +1,4 @@
-#include "jobs/cli/captured_command.h"
+#include "jobs/cli/farm/captured_command.h"
 
 #include <fmt/format.h>
 #include <signal.h>

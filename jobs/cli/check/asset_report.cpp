@@ -1,4 +1,4 @@
-#include "jobs/cli/asset_report.h"
+#include "jobs/cli/check/asset_report.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>

@@ -1,4 +1,4 @@
-#include "jobs/cli/preview_canvas.h"
+#include "jobs/cli/check/preview_canvas.h"
 
 #include <algorithm>
 #include <cmath>

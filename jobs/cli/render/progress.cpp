@@ -1,4 +1,4 @@
-#include "jobs/cli/progress.h"
+#include "jobs/cli/render/progress.h"
 
 #include <fmt/format.h>
 

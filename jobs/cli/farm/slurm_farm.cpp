@@ -1,4 +1,4 @@
-#include "jobs/cli/slurm_farm.h"
+#include "jobs/cli/farm/slurm_farm.h"
 
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
@@ -6,8 +6,8 @@
 #include <algorithm>
 
 #include "common/base/files.h"
-#include "jobs/cli/captured_command.h"
 #include "jobs/cli/coordinator_link.h"
+#include "jobs/cli/farm/captured_command.h"
 
 namespace baton {
 namespace {

@@ -5,8 +5,8 @@
 #include "common/job/text/frame_range.h"
 #include "jobs/cli/commands.h"
 #include "jobs/cli/display.h"
-#include "jobs/cli/movie_encoder.h"
-#include "jobs/cli/numbered_frames.h"
+#include "jobs/cli/look/movie_encoder.h"
+#include "jobs/cli/look/numbered_frames.h"
 #include "jobs/cli/signals.h"
 
 namespace baton {

@@ -1,4 +1,4 @@
-#include "jobs/cli/render_watch.h"
+#include "jobs/cli/render/render_watch.h"
 
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>

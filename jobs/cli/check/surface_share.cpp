@@ -1,4 +1,4 @@
-#include "jobs/cli/surface_share.h"
+#include "jobs/cli/check/surface_share.h"
 
 #include <algorithm>
 #include <cmath>
@@ -6,7 +6,7 @@
 
 #include "common/job/motion.h"
 #include "common/scene/pose.h"
-#include "jobs/cli/preview_canvas.h"
+#include "jobs/cli/check/preview_canvas.h"
 
 namespace baton {
 namespace {

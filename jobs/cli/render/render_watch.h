@@ -1,7 +1,7 @@
 #pragma once
 
 #include "common/base/exit_codes.h"
-#include "jobs/cli/render_session.h"
+#include "jobs/cli/render/render_session.h"
 
 namespace baton {
 

@@ -7,9 +7,9 @@
 
 #include "common/protocol/messages.h"
 #include "jobs/cli/ask_farm.h"
+#include "jobs/cli/check/job_warnings.h"
 #include "jobs/cli/display.h"
 #include "jobs/cli/job_argument.h"
-#include "jobs/cli/job_warnings.h"
 
 namespace baton {
 

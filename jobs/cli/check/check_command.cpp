@@ -12,13 +12,13 @@
 #include "common/scene/scene.h"
 #include "common/scene/settle/settle_motion.h"
 #include "jobs/auto/unit_costs.h"
-#include "jobs/cli/asset_report.h"
+#include "jobs/cli/check/asset_report.h"
+#include "jobs/cli/check/job_warnings.h"
+#include "jobs/cli/check/scene_picture.h"
+#include "jobs/cli/check/surface_share.h"
 #include "jobs/cli/commands.h"
 #include "jobs/cli/job_argument.h"
-#include "jobs/cli/job_warnings.h"
-#include "jobs/cli/scene_picture.h"
 #include "jobs/cli/settle_method.h"
-#include "jobs/cli/surface_share.h"
 #include "jobs/cli/text.h"
 
 namespace baton {

@@ -1,4 +1,4 @@
-#include "jobs/cli/render_session.h"
+#include "jobs/cli/render/render_session.h"
 
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
@@ -11,7 +11,7 @@
 #include "common/job/plan/sequence.h"
 #include "jobs/cli/frame_sheet.h"
 #include "jobs/cli/job_summary.h"
-#include "jobs/cli/progress.h"
+#include "jobs/cli/render/progress.h"
 #include "jobs/cli/sweeps.h"
 #include "jobs/cli/text.h"
 

@@ -12,10 +12,10 @@
 #include "common/protocol/keys.h"
 #include "jobs/cli/commands.h"
 #include "jobs/cli/coordinator_link.h"
+#include "jobs/cli/farm/slurm_farm.h"
 #include "jobs/cli/job_summary.h"
-#include "jobs/cli/render_session.h"
+#include "jobs/cli/render/render_session.h"
 #include "jobs/cli/settle_method.h"
-#include "jobs/cli/slurm_farm.h"
 
 namespace baton {
 namespace {
