@@ -10,8 +10,9 @@ enum class ExitCode : int {
   timeout = 1,
   failed = 2,  ///< the job or the operation failed
   cancelled = 3,
-  usage = 64,        ///< the command line is wrong
-  bad_input = 65,    ///< a job, scene, image or state file is wrong
+  usage = 64,  ///< the command line is wrong
+  /// A job, scene, image or state file is wrong.
+  bad_input = 65,
   unavailable = 69,  ///< no coordinator answers
   internal = 70,
   io = 74,

@@ -37,7 +37,7 @@ Result<PictureColors> read_picture_colors(const std::filesystem::path& path);
 using ImageMetadata = std::vector<std::pair<std::string, std::string>>;
 
 struct ExrOptions {
-  bool half_float = true;            ///< of all channels but `whole`
+  bool half_float = true;            ///< all channels but `whole`
   std::vector<std::string> whole{};  ///< channels that are float32 always
   std::string compression = "zip";   ///< none, rle, zips, zip, piz
   ImageMetadata metadata{};
@@ -51,7 +51,7 @@ struct ExrOptions {
   ChannelNaming naming = ChannelNaming::plain;  ///< in the file
   /// What is shown, in pixels of the picture, with its corner at (0, 0); none: all.
   std::optional<PixelRect> display_window{};
-  Chromaticities chromaticities{};  ///< of R, G and B; written always
+  Chromaticities chromaticities{};  ///< those of R, G and B; written always
 };
 
 /// All channels of `image`, whose rectangle is the data window, as one scan-line EXR file in

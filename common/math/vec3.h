@@ -39,9 +39,9 @@ inline Vec3 normalize(const Vec3& v) {
 }
 /// Mirror direction of unit `w` about unit `n`; both point away from the surface.
 constexpr Vec3 reflect(const Vec3& w, const Vec3& n) { return n * (2 * dot(n, w)) - w; }
-/// Mean over R, G, B: the scalar that targets are made of.
-/// Of linear Rec. 709.
+/// Luminance of linear Rec. 709.
 constexpr float luminance(const Rgb& c) { return 0.2126f * c.x + 0.7152f * c.y + 0.0722f * c.z; }
+/// Mean over R, G, B: the scalar that targets are made of.
 constexpr float mean(const Rgb& c) { return (c.x + c.y + c.z) * (1.0f / 3.0f); }
 
 /// Right-handed orthonormal frame around unit z [Duff et al. 2017].

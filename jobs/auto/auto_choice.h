@@ -19,9 +19,11 @@ bool chooses_particles(const SamplingSpec& asked);
 
 /// A way to render a job, as a pilot may try it.
 struct AutoCandidate {
-  std::string family;  ///< e.g. "bidirectional M=128"; its members differ in N alone
+  /// E.g. "bidirectional M=128"; its members differ in N alone.
+  std::string family;
   SamplingSpec sampling;
-  bool correlated = false;  ///< with the second pass of correlated visibility
+  /// With the second pass of correlated visibility.
+  bool correlated = false;
 
   std::string name() const;
 };
@@ -34,8 +36,9 @@ std::vector<AutoCandidate> auto_candidates(const JobSpec& job);
 /// What a pilot saw of a candidate.
 struct PilotNumbers {
   AutoCandidate candidate;
-  double error = 0;    ///< RMSE over mean radiance
-  double cost_us = 0;  ///< counted_cost_us per pixel with a surface and frame
+  double error = 0;  ///< RMSE over mean radiance
+  /// counted_cost_us per pixel with a surface and frame.
+  double cost_us = 0;
 };
 
 struct AutoChoice {

@@ -17,14 +17,16 @@ enum class DisplayCurve : std::uint8_t { none, filmic };
 struct DisplayOptions {
   std::optional<float> stops{};  ///< radiance times 2^stops; none: 0
   DisplayCurve curve = DisplayCurve::none;
-  std::optional<std::pair<float, float>> range{};  ///< of data: black, white; none: by its values
+  /// Values of data that are black and white; none: its own range.
+  std::optional<std::pair<float, float>> range{};
 };
 
 /// A picture for write_png, and what was done to it, for people.
 struct Display {
   RgbImage image;
-  std::string how;  ///< "exposure +2 stops (x4)", "depth 1.2 (white) to 7.5 (dark grey)"
-  std::optional<std::pair<float, float>> range{};  ///< of data, given or by its values
+  /// "exposure +2 stops (x4)", "depth 1.2 (white) to 7.5 (dark grey)".
+  std::string how;
+  std::optional<std::pair<float, float>> range{};  ///< black and white, where it is data
 };
 
 /// Adds --exposure and --curve.

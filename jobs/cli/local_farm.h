@@ -15,11 +15,15 @@ namespace baton {
 struct FarmOptions {
   int workers = 1;
   int threads_per_worker = 1;
-  std::uint64_t memory_bytes = 0;        ///< of all workers together; 0: default_memory_bytes()
-  std::filesystem::path work_directory;  ///< journal, blobs, logs; what a resume needs
-  std::string listen = {};      ///< of the coordinator; empty: where only this machine reaches it
-  std::string server_key = {};  ///< file of the coordinator's key; empty: none
-  std::uint64_t store_limit_mib = 0;  ///< of the coordinator; 0: none
+  /// Memory of all workers together; 0: default_memory_bytes().
+  std::uint64_t memory_bytes = 0;
+  /// Journal, blobs, logs; what a resume needs.
+  std::filesystem::path work_directory;
+  /// Where the coordinator listens; empty: where only this machine reaches it.
+  std::string listen = {};
+  /// File of the coordinator's key; empty: none.
+  std::string server_key = {};
+  std::uint64_t store_limit_mib = 0;  ///< limit of its store; 0: none
 };
 
 /// A coordinator and workers on this machine, as child processes, at an address of their own. A
@@ -66,7 +70,8 @@ class LocalFarm {
 
   FarmOptions options_;
   std::string endpoint_;
-  FileDescriptor lock_;          ///< holds the work directory as long as it is open
+  /// Holds the work directory as long as it is open.
+  FileDescriptor lock_;
   std::vector<Member> members_;  ///< the coordinator first
 };
 

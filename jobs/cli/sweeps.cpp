@@ -24,7 +24,7 @@ double header_number(const std::filesystem::path& frame, const std::string& name
   return 0;
 }
 
-/// Of the noisiest frame.
+/// Noise of the noisiest frame.
 float largest_noise(const JobSpec& job) {
   float noise = 0;
   for (FrameIndex frame; frame.index() < job.frames.size(); ++frame) {
@@ -34,7 +34,7 @@ float largest_noise(const JobSpec& job) {
   return noise;
 }
 
-/// Of the frames that are there, at most; 0: there are none, or not of whole sweeps.
+/// Sweeps of the frames that are there, at most; 0: there are none, or not of whole sweeps.
 int written_sweeps(const JobSpec& job) {
   double rounds = 0;
   for (FrameIndex frame; frame.index() < job.frames.size(); ++frame) {

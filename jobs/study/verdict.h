@@ -11,9 +11,11 @@ namespace baton {
 /// Who wins in a scene: each method at its most efficient budget, by 1 / (MSE x time).
 struct Verdict {
   std::size_t scene = 0;
-  std::size_t winner = 0;           ///< a cell
-  std::optional<std::size_t> next;  ///< of the second best method; none: there is one alone
-  Interval ratio;                   ///< of the winner's efficiency over the next one's
+  std::size_t winner = 0;  ///< a cell
+  /// Place of the second best method; none: there is one alone.
+  std::optional<std::size_t> next;
+  /// Efficiency of the winner over that of the next.
+  Interval ratio;
   bool winner_biased = false;
   bool next_biased = false;
   /// Methods whose error lies below the reference's own: they may be the best.

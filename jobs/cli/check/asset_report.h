@@ -26,9 +26,9 @@ struct AssetReport {
   std::optional<MapReport> camera_map;
   std::vector<PlateReport> plates;  ///< in the order of their first frame
   std::uint64_t meshes = 0, deforming_meshes = 0, instances = 0;
-  std::uint64_t triangles = 0;  ///< of all instances
+  std::uint64_t triangles = 0;  ///< in all instances
   bool objects_move = false;
-  std::uint64_t dropped_triangles = 0;    ///< of all meshes: without area
+  std::uint64_t dropped_triangles = 0;    ///< without area, in all meshes
   std::vector<std::string> odd_geometry;  ///< geometry_warnings
   std::shared_ptr<const Scene> scene;
 };

@@ -37,7 +37,8 @@ class PreviewCanvas {
   Camera camera_;
   Vec3 eye_;
   RgbImage image_;
-  std::vector<float> nearness_;  ///< 1 / distance from the eye; 0: nothing there
+  /// 1 / distance from the eye; 0: nothing there.
+  std::vector<float> nearness_;
 };
 
 }  // namespace baton

@@ -33,7 +33,7 @@ struct Shot {
   Pose pose;
   CameraSpec camera;
   std::vector<Bounds> objects;  ///< by object of the job; the ground is none
-  Bounds all;                   ///< of the objects
+  Bounds all;                   ///< bounds of the objects
 };
 
 Shot first_shot(const JobSpec& job, const Scene& scene) {

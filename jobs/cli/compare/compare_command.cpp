@@ -30,7 +30,8 @@ constexpr std::size_t kSheetColumns = 6;
 
 struct CompareOptions {
   std::vector<std::string> jobs;
-  std::string output;  ///< empty: FILE-compared beside the first job
+  /// empty: FILE-compared beside the first job.
+  std::string output;
   int workers = 1;
 };
 

@@ -26,8 +26,8 @@ struct FarmCommandOptions {
   RenderOptions render;
   std::string nodes = "1", partition, time;
   std::vector<std::string> sbatch_arguments, worker_arguments;
-  std::string coordinator, key, worker_key;  ///< of a coordinator that is there
-  std::string listen = "tcp://*:*", host;    ///< of one that is started
+  std::string coordinator, key, worker_key;  ///< a coordinator that is there
+  std::string listen = "tcp://*:*", host;    ///< a coordinator that is started
   std::int64_t idle_exit_s = 300, drain_s = 20;
   double poll_s = 10;
 };

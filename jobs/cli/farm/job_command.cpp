@@ -28,13 +28,13 @@ constexpr std::chrono::minutes kWaitPatience{5};
 struct JobOptions {
   CoordinatorLink link;
   std::string job;                        ///< name, digest or its beginning
-  JobArgument wanted;                     ///< of submit
-  double timeout_s = 0;                   ///< of wait; 0: none
-  bool restart = false;                   ///< of submit
-  std::optional<FrameNumber> from_frame;  ///< of submit
-  int rounds = 0;                         ///< of refine; 0: as many as a sweep has
-  bool all = false;                       ///< of list
-  bool all_ended = false;                 ///< of delete
+  JobArgument wanted;                     ///< submit
+  double timeout_s = 0;                   ///< wait; 0: none
+  bool restart = false;                   ///< submit
+  std::optional<FrameNumber> from_frame;  ///< submit
+  int rounds = 0;                         ///< refine; 0: as many as a sweep has
+  bool all = false;                       ///< list
+  bool all_ended = false;                 ///< delete
   bool json = false;
 };
 

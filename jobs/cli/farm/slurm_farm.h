@@ -17,7 +17,8 @@ namespace baton {
 struct SlurmFarmOptions {
   PilotJob pilot;
   NodeRange nodes;
-  std::filesystem::path script;           ///< where the script of the pilots is written
+  /// Where the script of the pilots is written.
+  std::filesystem::path script;
   std::chrono::milliseconds poll{10000};  ///< between two questions to Slurm
 };
 
@@ -50,7 +51,7 @@ class SlurmFarm {
   std::deque<std::uint64_t> tasks_;  ///< that could be in work, at the last looks
   std::map<std::string, Clock::time_point> alone_since_;  ///< running pilots, no worker
   std::set<std::string> told_to_end_;                     ///< workers
-  int threads_per_pilot_ = 1;                             ///< of the last that was seen
+  int threads_per_pilot_ = 1;                             ///< as last seen
   VainArrays vain_;
   Clock::time_point submitted_{};  ///< last
   bool told_short_time_ = false;

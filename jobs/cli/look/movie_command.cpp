@@ -18,7 +18,8 @@ struct MovieOptions {
   std::string source;  ///< job file or folder of frames
   std::string frames;  ///< empty: all
   std::string aov;     ///< empty: the colours
-  std::string out;     ///< movie or folder; empty: preview.mp4 beside the frames
+  /// Movie or folder; empty: preview.mp4 beside the frames.
+  std::string out;
   std::optional<double> frames_per_second;
   bool skip_missing = false;
   DisplayOptions display;

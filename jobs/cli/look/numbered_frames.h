@@ -18,9 +18,10 @@ struct NumberedFrame {
 /// Frames of a sequence, some of which need not be there.
 struct FrameFolder {
   std::filesystem::path directory;
-  std::vector<NumberedFrame> frames;  ///< those that are there; ascending, at least one
-  std::vector<FrameNumber> missing;   ///< ascending
-  std::string frames_per_second;      ///< a number, "24" or "24000/1001"
+  /// Those that are there; ascending, at least one.
+  std::vector<NumberedFrame> frames;
+  std::vector<FrameNumber> missing;  ///< ascending
+  std::string frames_per_second;     ///< a number, "24" or "24000/1001"
 };
 
 /// What is there of the frames of a job file, or of a folder with numbered EXR files

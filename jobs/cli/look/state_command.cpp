@@ -29,8 +29,8 @@ struct StateReport {
   std::vector<SectionInfo> sections;
   std::uint64_t file_bytes = 0;
   std::array<std::uint64_t, kSourceNames.size()> sources{};
-  std::array<std::uint64_t, kEssBins>
-      ess_histogram{};  ///< pixels with a surface, by ESS / N in (0, 1]
+  /// Pixels with a surface, by ESS / N in (0, 1].
+  std::array<std::uint64_t, kEssBins> ess_histogram{};
 };
 
 /// (sum W)^2 / sum W^2 over the particles of pixel `pixel`; 0 when all weights are 0.

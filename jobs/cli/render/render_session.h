@@ -15,13 +15,14 @@ namespace baton {
 
 struct RenderOptions {
   JobArgument job;
-  int workers = 0;                    ///< 0: one, whose threads share scene and light
+  /// 0: one, whose threads share scene and light.
+  int workers = 0;
   int threads_per_worker = 0;         ///< 0: the processors shared out
-  std::uint64_t memory_mib = 0;       ///< of all workers; 0: half of the machine's
+  std::uint64_t memory_mib = 0;       ///< for all workers; 0: half of all
   std::string work_directory;         ///< empty: .baton in the output folder
   std::uint64_t store_limit_mib = 0;  ///< 0: as the disk has room
   std::string out;                    ///< the only frame as PNG; empty: none
-  DisplayOptions display;             ///< of the sheet and of `out`
+  DisplayOptions display;             ///< the sheet and `out`
   bool watch = false;
   bool restart = false;
   std::optional<FrameNumber> from_frame;
