@@ -114,6 +114,19 @@ struct LeaseId {
   auto operator<=>(const LeaseId&) const = default;
 };
 
+/// A task that is given to a worker, with all that it needs for it. Sent: the order of the members
+/// is that of the bytes.
+struct Grant {
+  LeaseId lease;
+  std::vector<BlobRef> inputs;
+  /// The steps of a render task; of another task the position of its key, twice.
+  StepSpan steps{};
+  bool may_hold = false;  ///< the task's state may stay in the worker's memory
+  Step states_from{};     ///< states of earlier steps are needed by no task
+  /// CPU time, as the longest of late; 0: not known.
+  double expected_seconds = 0;
+};
+
 /// What the sampler did with the pixels that see a surface; merging is addition.
 struct SamplingStats {
   static constexpr std::size_t kEssBins = 8;

@@ -78,14 +78,7 @@ struct WorkerWelcome {
   std::string store_directory;  ///< shared by coordinator and workers
   std::string token = {};       ///< stands in its file `token`: whoever reads it sees the folder
 };
-struct LeaseGrant {
-  LeaseId lease;
-  std::vector<BlobRef> inputs;
-  StepSpan steps{};             ///< of a render task; of another the position of its key, twice
-  bool may_hold = false;        ///< the task's state may stay in the worker's memory
-  Step states_from{};           ///< states of earlier steps are needed by no task
-  double expected_seconds = 0;  ///< of CPU time, as the longest of late; 0: not known
-};
+using LeaseGrant = Grant;
 /// Others wait for these states, which the worker holds: they should go into the store.
 struct RequestStates {
   Digest job;

@@ -51,7 +51,7 @@ class SqlStatement {
       : statement_(statement), name_(std::move(name)) {}
 
   std::unique_ptr<sqlite3_stmt, Finalize> statement_;
-  std::string name_;  ///< of the file, for errors
+  std::string name_;  ///< the file's, for errors
   int num_bound_ = 0;
 };
 

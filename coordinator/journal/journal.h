@@ -79,7 +79,7 @@ class Journal {
   Status delete_job(const Digest& job);
   Status record_status(const Digest& job, JobStatus status);
   Status record_completion(const Digest& job, const Completion& completion);
-  /// Of a task that is recorded as done; else nothing happens.
+  /// Replaces the outputs of a task that is recorded as done; else nothing happens.
   Status record_outputs(const Digest& job, const TaskKey& task,
                         const std::vector<BlobRef>& outputs);
   Status record_failure(const Failure& failure);
@@ -96,7 +96,7 @@ class Journal {
                            const Bytes& detail);
   /// nullopt: the job is not in the archive.
   Result<std::optional<Bytes>> archived_detail(const Digest& job);
-  /// Of the newest `count` jobs in the archive, the oldest first.
+  /// Summaries of the newest `count` jobs in the archive, the oldest first.
   Result<std::vector<Bytes>> archived_summaries(int count);
   Result<std::uint64_t> num_archived();
   /// The jobs, in the archive or not, that write to a folder, in the order of submission.

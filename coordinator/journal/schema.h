@@ -4,7 +4,7 @@
 
 namespace baton {
 
-/// Of `PRAGMA user_version`.
+/// Stands in `PRAGMA user_version`.
 inline constexpr std::int64_t kSchemaVersion = 6;
 inline constexpr std::int64_t kApplicationId = 0x4241544e;  // "BATN"
 

@@ -98,9 +98,11 @@ class KeptFrames {
 
 /// How far the work of a former job reaches; the more, the better.
 struct Reach {
-  Step states{0};           ///< the one after the newest step all of whose states are there
+  /// The one after the newest step all of whose states are there.
+  Step states{0};
   bool same_tasks = false;  ///< its tasks are those of the wanted job
-  Step tasks{0};            ///< then the one after the newest step that a task of it has rendered
+  /// Then the one after the newest step that a task of it has rendered.
+  Step tasks{0};
 
   auto operator<=>(const Reach&) const = default;
 };
@@ -222,7 +224,8 @@ class Predecessor {
   const FormerJob& former_;
   const JobSpec& old_;
   const JobGraph old_graph_;
-  const Step common_end_;  ///< the one after the last that both jobs have
+  /// The one after the last that both jobs have.
+  const Step common_end_;
   std::vector<BlobRef> states_;
 };
 

@@ -27,13 +27,18 @@ struct KeptFiles {
 
 /// What a new job need not do.
 struct Adoption {
-  std::vector<BlobRef> images;        ///< frames that are written, by the new job's index
+  /// Frames that are written, by the new job's index.
+  std::vector<BlobRef> images;
   std::optional<std::size_t> former;  ///< whose work goes on
-  std::vector<TaskKey> tasks;    ///< of that one, which count as the new job's under their keys
-  std::vector<TaskKey> settled;  ///< done without outputs until something of them is needed
+  /// Tasks of `former` that count as the new job's, under their keys.
+  std::vector<TaskKey> tasks;
+  /// Done without outputs until something of them is needed.
+  std::vector<TaskKey> settled;
   JobPlan plan;
-  bool other_plates = false;     ///< frames are written anew, as they lie over other plates
-  std::vector<FrameIndex> lost;  ///< frames that were written and are not there
+  /// Frames are written anew, as they lie over other plates.
+  bool other_plates = false;
+  /// Frames that were written and are not there.
+  std::vector<FrameIndex> lost;
 
   bool empty() const { return images.empty() && tasks.empty() && plan.cuts.empty(); }
 };

@@ -16,11 +16,11 @@ class BlobSizes {
 
   /// Held states tell nothing.
   void learn(const std::vector<BlobRef>& made);
-  /// Of the outputs of a task at most, as far as those before it tell.
+  /// What the outputs of a task take at most, as far as those before it tell.
   std::uint64_t largest(const JobGraph& graph, const TaskKey& task) const;
   /// The same on average.
   std::uint64_t mean(const JobGraph& graph, const TaskKey& task) const;
-  /// Of the largest state.
+  /// What the largest state takes.
   std::uint64_t largest_state() const { return of(BlobKind::state).largest; }
   /// Whether nothing in these sizes of the task's outputs is estimated.
   bool are_known(const JobGraph& graph, const TaskKey& task) const;

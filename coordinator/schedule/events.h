@@ -24,7 +24,8 @@ struct Completion {
   TaskKey task;
   std::vector<BlobRef> outputs;
   RenderStats stats;
-  std::vector<FrameStats> frames = {};  ///< at most one for each frame of a render task or assembly
+  /// At most one for each frame of a render task or assembly.
+  std::vector<FrameStats> frames = {};
 };
 
 /// A render task that is not rendered: its states are cut and joined from those of another tiling,
@@ -56,8 +57,8 @@ struct Completions {
   };
   std::vector<Task> tasks;
   RenderStats stats;
-  std::map<Step, FrameStats> steps;         ///< of render tasks
-  std::map<FrameIndex, FrameStats> frames;  ///< of assemblies
+  std::map<Step, FrameStats> steps;         ///< what render tasks counted
+  std::map<FrameIndex, FrameStats> frames;  ///< what assemblies saw
 
   void add(Completion completion) {
     tasks.push_back({completion.task, std::move(completion.outputs)});
@@ -86,10 +87,11 @@ struct JobAdded {
   JobStatus status = JobStatus::running;
   Completions completions;
   std::vector<Failure> failures;
-  /// Of the completed tasks, those whose outputs are gone; of the cuts, those whose states are.
+  /// Completed tasks whose outputs are gone, and cuts whose states are.
   std::vector<TaskKey> lost = {};
-  std::vector<BlobRef> lost_spares = {};  ///< blobs that nobody needs now (JobTasks::spare_blobs)
-  JobPlan plan = {};                      ///< its leading runs stand in `spec`, too
+  /// Blobs that are gone and that nobody needs now (BlobLedger::spare_blobs).
+  std::vector<BlobRef> lost_spares = {};
+  JobPlan plan = {};  ///< its leading runs stand in `spec`, too
 };
 struct JobCancelled {
   Digest job;
@@ -221,15 +223,8 @@ struct RecordJobStatus {
   std::string reason;
 };
 
-struct GrantLease {
+struct GrantLease : Grant {
   std::string worker;
-  LeaseId lease;
-  std::vector<BlobRef> inputs;
-  StepSpan steps = {};
-  bool may_hold = false;  ///< the state that it makes may stay in the worker's memory
-  /// States of earlier steps are needed by no task.
-  Step states_from{};
-  double expected_seconds = 0;  ///< CPU time, as the longest of late; 0: not known
 };
 /// Somebody waits for states that the worker holds: it should put them into the store.
 struct AskForStates {

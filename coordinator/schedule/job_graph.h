@@ -59,6 +59,7 @@ class JobGraph {
   bool carries_state() const { return carries_state_; }
   /// Whether a render task needs states of other tiles than its own.
   bool shares_history() const { return shares_history_; }
+  bool has_second_pass() const { return has_second_pass_; }
   /// Runs in state.checkpointEvery frames.
   std::int32_t runs_per_checkpoint() const { return runs_per_checkpoint_; }
   /// Pixels of a tile.
@@ -67,7 +68,8 @@ class JobGraph {
   /// What of a render task must be there.
   enum class Extent {
     all,
-    state,  ///< its films are not needed: its state is a Cut
+    /// Its films are not needed: its state is a Cut.
+    state,
   };
   /// Sorts the outputs that a task reported: state first, then films by step. nullopt when they
   /// are exactly what the task must make; else what is wrong with them.

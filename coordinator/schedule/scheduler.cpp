@@ -6,6 +6,7 @@
 #include <utility>
 
 #include "common/job/plan/estimate.h"
+#include "coordinator/schedule/held_states.h"
 
 namespace baton {
 namespace {
@@ -71,7 +72,7 @@ void Scheduler::on(const JobAdded& event, TimePoint, Actions& actions) {
                                          TileHomes(event.spec), max_frames_ahead(event.spec),
                                          BlobSizes(event.spec)})
                  .first->second;
-  job.homes.share_out(worker_names());
+  job.homes.share_out(connected_);
   replay(job, event, actions);
   if (!is_open(event.status)) {
     job.tasks.cancel_open();
@@ -111,7 +112,7 @@ void Scheduler::on(const JobResumed& event, TimePoint, Actions& actions) {
   if (!job || job->status != JobStatus::paused) return;
   job->status = JobStatus::running;
   running_.emplace(rank(*job), event.job);
-  job->tasks.forget_losses();
+  job->tasks.attempts().forget_losses();
   job->waits.clear();
   reopen({event.job, event.lost}, *job, actions);
   actions.push_back(RecordJobStatus{event.job, job->status, "resumed"});
@@ -138,7 +139,7 @@ void Scheduler::on(const TaskCompleted& event, TimePoint now, Actions& actions) 
     const auto task = job ? job->tasks.graph().find(event.lease.task) : std::nullopt;
     on(AttemptLeft{event.lease, stored_blobs(outputs)}, now, actions);
     if (!task || job->tasks.graph().check_outputs(event.lease.task, outputs)) return;
-    compare_results(event, job->tasks.outputs(*task), outputs, actions);
+    compare_results(event, job->tasks.made().outputs(*task), outputs, actions);
     return;
   }
 
@@ -152,7 +153,7 @@ void Scheduler::on(const TaskCompleted& event, TimePoint now, Actions& actions) 
   // An incomplete report is a failed attempt.
   const JobGraph& graph = held.job->tasks.graph();
   const auto extent =
-      held.job->tasks.is_cut(held.task) ? JobGraph::Extent::state : JobGraph::Extent::all;
+      held.job->tasks.ledger().is_cut(held.task) ? JobGraph::Extent::state : JobGraph::Extent::all;
   std::optional<std::string> fault = graph.check_outputs(event.lease.task, outputs, extent);
   if (!fault) fault = graph.check_frames(event.lease.task, event.frames);
   if (fault) {
@@ -162,7 +163,7 @@ void Scheduler::on(const TaskCompleted& event, TimePoint now, Actions& actions) 
   }
   // What was done before must come out alike.
   const bool is_equal =
-      compare_results(event, held.job->tasks.former_outputs(held.task), outputs, actions);
+      compare_results(event, held.job->tasks.made().former_outputs(held.task), outputs, actions);
   Completion completion{event.lease.task, std::move(outputs), event.stats, event.frames};
   const bool is_shared = !leases_.at({event.lease.job, held.task}).may_hold;
   held.job->tasks.complete(held.task, completion, event.worker, is_shared, blobs_);
@@ -186,7 +187,7 @@ bool Scheduler::compare_results(const TaskCompleted& event, const std::vector<Bl
   if (e == expected.end() || r == reported.end()) return true;
   const Digest digest = event.lease.job;
   Job& job = jobs_.at(digest);
-  const std::string& maker = job.tasks.maker(*job.tasks.graph().find(event.lease.task));
+  const std::string& maker = job.tasks.made().maker(*job.tasks.graph().find(event.lease.task));
   actions.push_back(ReportConflict{event.lease, event.worker, maker, *e, *r});
   if (job.status != JobStatus::running) return false;
   job.waits = fmt::format("somebody to look: workers {} and {} have made different bytes of {}",
@@ -205,7 +206,7 @@ void Scheduler::on(const AttemptFailed& event, TimePoint now, Actions& actions) 
 void Scheduler::on(const ResultMissing& event, TimePoint now, Actions& actions) {
   if (!touch(event.worker, now)) return;
   if (const Held held = hold(event.worker, event.lease, now); held.job) {
-    held.job->tasks.add_returned(held.task, event.lease, event.worker);
+    held.job->tasks.attempts().add_returned(held.task, event.lease, event.worker);
     lose_lease(event.lease.job, held.task, actions);
   }
   on(AttemptLeft{event.lease, stored_blobs(event.outputs)}, now, actions);
@@ -226,7 +227,7 @@ void Scheduler::on(const SpaceLacking& event, TimePoint now, Actions&) {
 void Scheduler::on(const LeaseReturned& event, TimePoint now, Actions&) {
   if (!touch(event.worker, now)) return;
   if (Job* job = find(event.lease.job); job != nullptr && !event.unseen.empty())
-    job->blind[event.worker] = {event.unseen, now + kBlindRest};
+    job->standings.add_blind(event.worker, event.unseen, now);
   const Held held = hold(event.worker, event.lease, now);
   if (held.job) return_lease(held, event.lease, event.worker);
 }
@@ -237,15 +238,15 @@ void Scheduler::on(const InputsLost& event, TimePoint now, Actions& actions) {
   if (!held.job) return;
   JobTasks& tasks = held.job->tasks;
   std::vector<TaskKey> makers;
-  if (tasks.is_cut(held.task)) makers.push_back(event.lease.task);  // it will be rendered
+  if (tasks.ledger().is_cut(held.task)) makers.push_back(event.lease.task);  // it will be rendered
   for (const TaskIndex input : tasks.graph().inputs(event.lease.task)) {
-    const std::vector<BlobRef>& made = tasks.outputs(input);
+    const std::vector<BlobRef>& made = tasks.made().outputs(input);
     const bool lost = std::any_of(made.begin(), made.end(), [&](const BlobRef& output) {
       return std::find(event.inputs.begin(), event.inputs.end(), output) != event.inputs.end();
     });
     if (lost) makers.push_back(tasks.graph().key(input));
   }
-  tasks.add_returned(held.task, event.lease, event.worker);
+  tasks.attempts().add_returned(held.task, event.lease, event.worker);
   lose_lease(event.lease.job, held.task, actions);
   if (is_open(held.job->status)) reopen({event.lease.job, makers}, *held.job, actions);
 }
@@ -262,7 +263,7 @@ void Scheduler::on(const HeldPublished& event, TimePoint now, Actions& actions) 
     }
     job->sizes.learn({state.published});
     actions.push_back(
-        RecordOutputs{event.job, job->tasks.graph().key(*task), job->tasks.outputs(*task)});
+        RecordOutputs{event.job, job->tasks.graph().key(*task), job->tasks.made().outputs(*task)});
   }
   asked_.erase({event.worker, event.job});
 }
@@ -292,12 +293,12 @@ void Scheduler::replay(Job& job, const JobAdded& event, Actions& actions) {
     needed.tasks.push_back(job.tasks.graph().key(task));
   if (!needed.tasks.empty()) actions.push_back(std::move(needed));
   reopen({event.job, event.lost}, job, actions);
-  reopen({event.job, job.tasks.held_by_strangers(), "what workers held"}, job, actions);
+  reopen({event.job, held_by_strangers(job.tasks), "what workers held"}, job, actions);
   for (const Failure& failure : event.failures) {
     const auto task = job.tasks.graph().find(failure.lease.task);
     if (!task) continue;
     job.tasks.add_failure(*task, failure, blobs_);
-    if (!failure.last || !job.tasks.ready().contains(*task)) continue;
+    if (!failure.last || !job.tasks.book().ready().contains(*task)) continue;
     job.tasks.grant(*task);
     job.tasks.give_up(*task);
   }
@@ -319,11 +320,11 @@ void Scheduler::fail_attempt(const Held& held, Failure failure, TimePoint now, A
   Job& job = *held.job;
   drop_lease(digest, held.task);
   job.tasks.add_failure(held.task, failure, blobs_);
-  failure.last = is_exhausted(job, held.task);
+  failure.last = is_exhausted(connected_, job.tasks.attempts().blame(held.task),
+                              job.spec.max_retries_per_task);
   actions.push_back(RecordFailure{failure});
 
-  Job::Standing& standing = job.workers[failure.worker];
-  if (++standing.failures >= job.spec.max_failures_per_worker) standing = {0, now + kWorkerRest};
+  job.standings.add_failure(failure.worker, job.spec.max_failures_per_worker, now);
   if (failure.last) {
     give_up(digest, job, held.task, failure.message, actions);
     return;
@@ -333,7 +334,8 @@ void Scheduler::fail_attempt(const Held& held, Failure failure, TimePoint now, A
   // Another worker should try, so nothing that it needs may be bound to this one.
   std::vector<TaskKey> bound;
   for (const TaskIndex input : job.tasks.graph().inputs(failure.lease.task)) {
-    if (job.tasks.is_held(input)) bound.push_back(job.tasks.graph().key(input));
+    if (job.tasks.made().held_state(input) != nullptr)
+      bound.push_back(job.tasks.graph().key(input));
   }
   reopen({digest, bound, "what a worker held that failed"}, job, actions);
 }
@@ -343,7 +345,7 @@ void Scheduler::fail_attempt(const Held& held, Failure failure, TimePoint now, A
 void Scheduler::give_up(const Digest& digest, Job& job, TaskIndex task, const std::string& reason,
                         Actions& actions) {
   for (const TaskIndex hopeless : job.tasks.give_up(task)) revoke_lease(digest, hopeless, actions);
-  if (job.tasks.progress().tasks_failed >= static_cast<std::uint64_t>(job.spec.max_failed_tasks)) {
+  if (job.tasks.book().counts().failed >= static_cast<std::uint64_t>(job.spec.max_failed_tasks)) {
     end_job(digest, job, JobStatus::failed,
             fmt::format("{} failed: {}", describe_task(job.tasks.graph().key(task)), reason),
             actions);
@@ -360,14 +362,13 @@ void Scheduler::pause_job(const Digest& digest, Job& job, const std::string& rea
 }
 
 void Scheduler::end_if_finished(const Digest& digest, Job& job, Actions& actions) {
-  const JobProgress& progress = job.tasks.progress();
+  const TaskCounts& tasks = job.tasks.book().counts();
   const auto max_failed = static_cast<std::uint64_t>(job.spec.max_failed_tasks);
-  if (progress.tasks_open > 0 && progress.tasks_failed < max_failed) return;
-  if (progress.tasks_failed == 0) {
+  if (tasks.open > 0 && tasks.failed < max_failed) return;
+  if (tasks.failed == 0) {
     end_job(digest, job, JobStatus::done, "all frames are written", actions);
   } else {
-    end_job(digest, job, JobStatus::failed, fmt::format("{} tasks failed", progress.tasks_failed),
-            actions);
+    end_job(digest, job, JobStatus::failed, fmt::format("{} tasks failed", tasks.failed), actions);
   }
 }
 

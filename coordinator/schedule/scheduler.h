@@ -13,6 +13,9 @@
 #include "coordinator/schedule/blob_sizes.h"
 #include "coordinator/schedule/events.h"
 #include "coordinator/schedule/job_tasks.h"
+#include "coordinator/schedule/policy.h"
+#include "coordinator/schedule/standings.h"
+#include "coordinator/schedule/store_room.h"
 #include "coordinator/schedule/tile_homes.h"
 
 namespace baton {
@@ -23,7 +26,7 @@ namespace baton {
 /// A task goes to the first worker in line; of the tasks, the job of highest priority comes
 /// first, then the job that was submitted first, then what TileHomes prefers, then the order of
 /// TaskIndex. Nothing is rendered so far ahead of the first open frame that films pile up, and
-/// nothing for which the store has no room (scheduler_room.cpp).
+/// nothing for which the store has no room (store_room.h). Who may try what is said in policy.h.
 ///
 /// A task fails for good when as many workers have failed it as the job allows attempts, or, where
 /// fewer are connected, when those have had all attempts or can do no more. A retry goes to a
@@ -38,21 +41,13 @@ class Scheduler {
     std::uint64_t sequence = 0;  ///< position in the order of submission
     JobTasks tasks;
     TileHomes homes;
-    std::int32_t max_frames_ahead = 0;  ///< of the first frame that is not written
+    std::int32_t max_frames_ahead = 0;  ///< of the first open frame
     BlobSizes sizes;
-    Run begun_runs{0};  ///< the one after the last of which a task was granted
+    /// The one after the last of which a task was granted.
+    Run begun_runs{0};
     std::array<TimePoint, 3> rests_until = {};  ///< tasks of each kind
     std::string waits = {};                     ///< for what, as far as an event said so
-    struct Standing {
-      std::int32_t failures = 0;  ///< since its last rest
-      TimePoint rests_until = {};
-    };
-    std::map<std::string, Standing> workers = {};  ///< those that have failed
-    struct Blind {
-      std::string unseen;
-      TimePoint until;
-    };
-    std::map<std::string, Blind> blind = {};     ///< workers that do not see its folders
+    Standings standings = {};
     std::array<double, 3> longest_seconds = {};  ///< CPU time of tasks of each kind, of late
   };
 
@@ -63,14 +58,8 @@ class Scheduler {
 
   /// How long tasks of a kind rest after one of them found no space.
   static constexpr std::chrono::seconds kRest{5};
-  /// How long a worker rests from a job of whose tasks it has failed max_failures_per_worker, while
-  /// another is there that does not.
-  static constexpr std::chrono::minutes kWorkerRest{10};
   /// For so many tasks held states are asked for at once where a worker has nothing to do.
   static constexpr std::size_t kMaxTasksFreed = 8;
-
-  /// How long a worker gets nothing of a job whose folders it cannot see; then it looks again.
-  static constexpr std::chrono::minutes kBlindRest{1};
 
   /// What follows from the event. Unknown jobs, workers and leases are normal: they are late, and
   /// nothing follows.
@@ -102,7 +91,8 @@ class Scheduler {
     std::string worker;
     TimePoint granted_at;
     std::uint64_t expected_bytes = 0;  ///< that its outputs will take in the store
-    bool may_hold = false;             ///< its state; false where the lease was taken up again
+    /// Its state; false where the lease was taken up again.
+    bool may_hold = false;
   };
   struct Worker {
     TimePoint last_sign;
@@ -158,20 +148,14 @@ class Scheduler {
   void serve(TimePoint now, Actions& actions);
   void ask_for_states(const std::string& worker, TimePoint now, Actions& actions);
   bool grant_one(const std::string& worker, TimePoint now, Actions& actions);
-  std::vector<std::string> worker_names() const;
   void share_out_tiles();
-  Run last_run(const Job& job) const;
   bool is_due(const Job& job, TaskIndex task, const std::string& worker, TimePoint now) const;
-  bool may_try(const Job& job, TaskIndex task, const std::string& worker, TimePoint now) const;
-  bool is_exhausted(const Job& job, TaskIndex task) const;
-  bool rests(const Job& job, const std::string& worker, TimePoint now) const;
-  static bool is_blind(const Job& job, const std::string& worker, TimePoint now);
+  Crew crew_of(const Job& job, TimePoint now) const { return {connected_, job.standings, now}; }
 
   // Room in the store (scheduler_room.cpp).
-  bool fits(std::uint64_t more_bytes) const;
-  bool has_room(const Job& job, TaskIndex task, bool others_wait) const;
-  bool may_begin(const Job& job, Run run) const;
-  std::uint64_t unmade_bytes(const Job& job, Run end) const;
+  StoreRoom room() const;
+  static JobInStore in_store(const Job& job);
+  bool has_room_for(const Job& job, TaskIndex task, bool others_wait) const;
   std::string lacking_room(const Job& job) const;
 
   // Jobs (scheduler.cpp).
@@ -197,13 +181,16 @@ class Scheduler {
   std::map<Rank, Digest> running_;
   std::map<std::pair<Digest, TaskIndex>, Lease> leases_;
   std::map<std::string, Worker> workers_;
+  std::vector<std::string> connected_;  ///< names of workers_, sorted
   /// Blobs of attempts without a result, of tasks that somebody works on: he may count on them.
   std::map<std::pair<Digest, TaskIndex>, std::vector<Digest>> left_;
-  std::deque<std::string> hungry_;  ///< workers with wanted > 0, who asked first comes first
-  std::set<std::pair<std::string, Digest>> asked_;  ///< of whom states of a job were asked
+  /// Workers with wanted > 0, who asked first comes first.
+  std::deque<std::string> hungry_;
+  /// Workers that were asked for states, with the job.
+  std::set<std::pair<std::string, Digest>> asked_;
   BlobReferences blobs_;
-  std::uint64_t kept_bytes_ = 0;      ///< of jobs that have ended
-  std::uint64_t expected_bytes_ = 0;  ///< of all leases
+  std::uint64_t kept_bytes_ = 0;      ///< what ended jobs leave
+  std::uint64_t expected_bytes_ = 0;  ///< outputs of all leases
 };
 
 }  // namespace baton

@@ -5,6 +5,7 @@
 
 #include "common/base/check.h"
 #include "common/base/limits.h"
+#include "coordinator/schedule/held_states.h"
 #include "coordinator/schedule/scheduler.h"
 
 namespace baton {
@@ -18,11 +19,13 @@ void Scheduler::on(const WorkerJoined& event, TimePoint now, Actions& actions) {
   worker.wanted = 0;
   std::erase(hungry_, event.worker);
   for (auto& [digest, job] : jobs_) {
-    job.workers.erase(event.worker);
-    job.blind.erase(event.worker);
-    job.tasks.forgive(event.worker);
+    job.standings.forget(event.worker);
+    job.tasks.attempts().forgive(event.worker);
   }
-  if (is_new) share_out_tiles();
+  if (is_new) {
+    connected_.insert(std::ranges::upper_bound(connected_, event.worker), event.worker);
+    share_out_tiles();
+  }
   lose_held(event.worker, actions);
   reconcile(event.worker, event.running, now, now, actions);
 }
@@ -65,7 +68,7 @@ std::size_t Scheduler::num_leases(const std::string& worker) const {
 
 std::size_t Scheduler::num_ready() const {
   std::size_t count = 0;
-  for (const auto& [rank, job] : running_) count += jobs_.at(job).tasks.ready().size();
+  for (const auto& [rank, job] : running_) count += jobs_.at(job).tasks.book().ready().size();
   return count;
 }
 
@@ -97,12 +100,12 @@ Scheduler::Held Scheduler::hold(const std::string& worker, const LeaseId& lease,
   const std::optional<TaskIndex> task = job->tasks.graph().find(lease.task);
   if (!task) return {};
 
-  if (job->tasks.status(*task) == TaskStatus::leased) {
+  if (job->tasks.book().status(*task) == TaskStatus::leased) {
     const Lease& current = leases_.at({lease.job, *task});
     return current.id == lease && current.worker == worker ? Held{job, *task} : Held{};
   }
-  if (job->tasks.status(*task) != TaskStatus::ready || job->tasks.has_ended(*task, lease) ||
-      !job->tasks.can_read(*task, worker))
+  if (job->tasks.book().status(*task) != TaskStatus::ready ||
+      job->tasks.attempts().has_ended(*task, lease) || !can_read(job->tasks, *task, worker))
     return {};
   job->tasks.grant(*task);
   add_lease(worker, lease, *task, now);
@@ -161,7 +164,7 @@ void Scheduler::revoke_lease(const Digest& job, TaskIndex task, Actions& actions
 /// A lease that ends without a result, and without anybody's failure.
 void Scheduler::return_lease(const Held& held, const LeaseId& lease, const std::string& worker) {
   drop_lease(lease.job, held.task);
-  held.job->tasks.add_returned(held.task, lease, worker);
+  held.job->tasks.attempts().add_returned(held.task, lease, worker);
   held.job->tasks.give_back(held.task);
 }
 
@@ -169,7 +172,7 @@ void Scheduler::return_lease(const Held& held, const LeaseId& lease, const std::
 /// too often probably kills its workers, and people should look at it.
 void Scheduler::lose_lease(const Digest& digest, TaskIndex task, Actions& actions) {
   Job& job = jobs_.at(digest);
-  const std::int32_t losses = job.tasks.add_loss(task);
+  const std::int32_t losses = job.tasks.attempts().add_loss(task);
   drop_lease(digest, task);
   job.tasks.give_back(task);
   if (losses < limits::kMaxTaskLosses || job.status != JobStatus::running) return;
@@ -195,6 +198,7 @@ void Scheduler::remove_worker(const std::string& worker, bool lost, Actions& act
   }
   std::erase(hungry_, worker);
   workers_.erase(found);
+  std::erase(connected_, worker);
   for (auto& [digest, job] : jobs_) job.homes.leave(worker);
   lose_held(worker, actions);
 }
@@ -203,7 +207,7 @@ void Scheduler::remove_worker(const std::string& worker, bool lost, Actions& act
 void Scheduler::lose_held(const std::string& worker, Actions& actions) {
   for (auto& [digest, job] : jobs_) {
     if (is_open(job.status))
-      reopen({digest, job.tasks.held_by(worker), "what worker " + worker + " held"}, job, actions);
+      reopen({digest, held_by(job.tasks, worker), "what worker " + worker + " held"}, job, actions);
   }
 }
 
@@ -213,7 +217,7 @@ void Scheduler::lose_held(const std::string& worker, Actions& actions) {
 /// have.
 void Scheduler::serve(TimePoint now, Actions& actions) {
   const auto has_work = [this](const auto& entry) {
-    return !jobs_.at(entry.second).tasks.ready().empty();
+    return !jobs_.at(entry.second).tasks.book().ready().empty();
   };
   if (hungry_.empty() || std::none_of(running_.begin(), running_.end(), has_work)) return;
   std::deque<std::string> unserved;
@@ -237,12 +241,13 @@ void Scheduler::serve(TimePoint now, Actions& actions) {
 void Scheduler::ask_for_states(const std::string& worker, TimePoint now, Actions& actions) {
   for (const auto& [rank, digest] : running_) {
     const Job& job = jobs_.at(digest);
-    if (!job.tasks.has_held() || rests(job, worker, now)) continue;
+    if (job.tasks.made().totals().num_held == 0 || rests(crew_of(job, now), worker)) continue;
     std::vector<TaskIndex> tasks;
-    for (const TaskIndex task : job.tasks.ready()) {
+    for (const TaskIndex task : job.tasks.book().ready()) {
       const TaskKey key = job.tasks.graph().key(task);
       if (key.kind != TaskKind::render || !is_due(job, task, worker, now)) continue;
-      if (key.run() > last_run(job)) break;
+      if (key.run() > last_due_run(job.tasks.graph(), job.tasks.book(), job.max_frames_ahead))
+        break;
       tasks.push_back(task);
     }
     // Its own tiles first, so that it need not settle among those of others.
@@ -252,13 +257,13 @@ void Scheduler::ask_for_states(const std::string& worker, TimePoint now, Actions
     if (tasks.size() > kMaxTasksFreed) tasks.resize(kMaxTasksFreed);
     std::map<std::string, std::set<Digest>> wanted;  // by holder
     for (const TaskIndex task : tasks) {
-      for (const auto& [holder, state] : job.tasks.held_inputs(task)) {
+      for (const auto& [holder, state] : held_inputs(job.tasks, task)) {
         if (holder != worker) wanted[holder].insert(state);
       }
     }
     std::uint64_t num_states = 0;
     for (const auto& [holder, states] : wanted) num_states += states.size();
-    if (!fits(num_states * job.sizes.largest_state())) return;
+    if (!room().fits(num_states * job.sizes.largest_state())) return;
     for (const auto& [holder, states] : wanted) {
       if (asked_.emplace(holder, digest).second)
         actions.push_back(AskForStates{holder, digest, {states.begin(), states.end()}});
@@ -271,36 +276,34 @@ bool Scheduler::grant_one(const std::string& worker, TimePoint now, Actions& act
   bool others_wait = false;
   for (const auto& [rank, digest] : running_) {
     Job& job = jobs_.at(digest);
-    if (job.tasks.ready().empty() || rests(job, worker, now)) continue;
+    if (job.tasks.book().ready().empty() || rests(crew_of(job, now), worker)) continue;
     const JobGraph& graph = job.tasks.graph();
-    const auto task =
-        job.homes.choose(graph, job.tasks.ready(), last_run(job), worker, [&](TaskIndex ready) {
-          return is_due(job, ready, worker, now) && job.tasks.can_read(ready, worker);
+    const auto task = job.homes.choose(
+        graph, job.tasks.book().ready(),
+        last_due_run(graph, job.tasks.book(), job.max_frames_ahead), worker, [&](TaskIndex ready) {
+          return is_due(job, ready, worker, now) && can_read(job.tasks, ready, worker);
         });
     if (!task) continue;
-    if (!has_room(job, *task, others_wait)) {
+    if (!has_room_for(job, *task, others_wait)) {
       others_wait = true;
       continue;
     }
     const LeaseId lease{digest, graph.key(*task), job.tasks.grant(*task), epoch_};
     Lease& granted = add_lease(worker, lease, *task, now);
-    granted.may_hold = job.tasks.may_hold(*task) && job.homes.surround(lease.task.tile, worker);
+    granted.may_hold =
+        baton::may_hold(job.tasks, *task) && job.homes.surround(lease.task.tile, worker);
     job.tasks.share_inputs(*task, worker, blobs_);
-    actions.push_back(
-        GrantLease{worker, lease, job.tasks.inputs(*task), graph.steps(lease.task),
-                   granted.may_hold, job.tasks.states_from(),
-                   job.longest_seconds.at(static_cast<std::size_t>(lease.task.kind))});
+    const double seconds = job.longest_seconds.at(static_cast<std::size_t>(lease.task.kind));
+    actions.push_back(GrantLease{{.lease = lease,
+                                  .inputs = job.tasks.ledger().inputs(job.tasks.view(), *task),
+                                  .steps = graph.steps(lease.task),
+                                  .may_hold = granted.may_hold,
+                                  .states_from = states_from(graph, job.tasks.book()),
+                                  .expected_seconds = seconds},
+                                 worker});
     return true;
   }
   return false;
-}
-
-/// The last run of which a task may be granted: nothing is rendered far ahead of the first open
-/// step.
-Run Scheduler::last_run(const Job& job) const {
-  const Timeline& timeline = job.tasks.graph().timeline();
-  const Step end = job.tasks.first_open_step() + job.max_frames_ahead;
-  return timeline.run_of(std::min(end, Step(timeline.num_steps())) - 1);
 }
 
 /// Whether the worker may try the task now, could it read its inputs.
@@ -308,87 +311,27 @@ bool Scheduler::is_due(const Job& job, TaskIndex task, const std::string& worker
                        TimePoint now) const {
   const TaskKind kind = job.tasks.graph().key(task).kind;
   return job.rests_until.at(static_cast<std::size_t>(kind)) <= now &&
-         may_try(job, task, worker, now);
-}
-
-std::vector<std::string> Scheduler::worker_names() const {
-  std::vector<std::string> names;
-  names.reserve(workers_.size());
-  for (const auto& [name, worker] : workers_) names.push_back(name);
-  return names;
+         may_try(crew_of(job, now), job.tasks.attempts().blame(task), worker);
 }
 
 void Scheduler::share_out_tiles() {
-  const std::vector<std::string> names = worker_names();
-  for (auto& [digest, job] : jobs_) job.homes.share_out(names);
-}
-
-/// Whether the worker could succeed, and no other connected one has failed the task less often.
-bool Scheduler::may_try(const Job& job, TaskIndex task, const std::string& worker,
-                        TimePoint now) const {
-  const std::map<std::string, Blame> blame = job.tasks.blame(task);
-  const auto own = blame.find(worker);
-  if (own == blame.end()) return true;
-  if (own->second.for_good) return false;
-  return std::all_of(workers_.begin(), workers_.end(), [&](const auto& other) {
-    if (rests(job, other.first, now)) return true;
-    const auto found = blame.find(other.first);
-    return found != blame.end() &&
-           (found->second.for_good || found->second.failures >= own->second.failures);
-  });
-}
-
-/// Whether the task has failed for good: with as many workers as it may have attempts, or with all
-/// that are connected, where each can do no more or all attempts are used up.
-bool Scheduler::is_exhausted(const Job& job, TaskIndex task) const {
-  const std::map<std::string, Blame> blame = job.tasks.blame(task);
-  const auto allowed = static_cast<std::size_t>(job.spec.max_retries_per_task) + 1;
-  if (blame.size() >= allowed) return true;
-  std::size_t failures = 0;
-  for (const auto& [worker, of_worker] : blame)
-    failures += static_cast<std::size_t>(of_worker.failures);
-  return std::all_of(workers_.begin(), workers_.end(), [&](const auto& worker) {
-    const auto found = blame.find(worker.first);
-    return found != blame.end() && (found->second.for_good || failures >= allowed);
-  });
+  for (auto& [digest, job] : jobs_) job.homes.share_out(connected_);
 }
 
 std::string Scheduler::waits_for(const Digest& digest, TimePoint now) const {
   const Job& job = jobs_.at(digest);
   if (!is_open(job.status) || !job.waits.empty()) return is_open(job.status) ? job.waits : "";
   if (lacks_room(digest)) return lacking_room(job);
-  if (!job.blind.empty() && std::all_of(workers_.begin(), workers_.end(), [&](const auto& other) {
-        return is_blind(job, other.first, now);
-      }))
-    return fmt::format("a worker that sees {}", job.blind.begin()->second.unseen);
-  for (const TaskIndex task : job.tasks.tried()) {
-    if (job.tasks.status(task) != TaskStatus::ready) continue;
-    const bool somebody_may = std::any_of(workers_.begin(), workers_.end(), [&](const auto& other) {
-      return !rests(job, other.first, now) && may_try(job, task, other.first, now);
-    });
-    if (!somebody_may)
+  const Crew crew = crew_of(job, now);
+  if (const std::string unseen = job.standings.unseen(); !unseen.empty() && are_all_blind(crew))
+    return fmt::format("a worker that sees {}", unseen);
+  for (const TaskIndex task : job.tasks.attempts().tried()) {
+    if (job.tasks.book().status(task) != TaskStatus::ready) continue;
+    if (!somebody_may_try(crew, job.tasks.attempts().blame(task)))
       return fmt::format("a worker that can do {}: those that are connected have failed it or rest",
                          describe_task(job.tasks.graph().key(task)));
   }
   return {};
-}
-
-/// Whether the worker gets nothing of the job: it does not see its folders, or it has failed much,
-/// while others have not.
-bool Scheduler::rests(const Job& job, const std::string& worker, TimePoint now) const {
-  const auto failed_much = [&](const std::string& name) {
-    const auto found = job.workers.find(name);
-    return found != job.workers.end() && now < found->second.rests_until;
-  };
-  if (is_blind(job, worker, now)) return true;
-  return failed_much(worker) && !std::all_of(workers_.begin(), workers_.end(), [&](const auto& w) {
-           return failed_much(w.first) || is_blind(job, w.first, now);
-         });
-}
-
-bool Scheduler::is_blind(const Job& job, const std::string& worker, TimePoint now) {
-  const auto found = job.blind.find(worker);
-  return found != job.blind.end() && now < found->second.until;
 }
 
 }  // namespace baton

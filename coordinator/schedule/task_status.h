@@ -7,12 +7,13 @@ namespace baton {
 
 /// Where a task stands.
 enum class TaskStatus : std::uint8_t {
-  blocked,    ///< waits for the outputs of other tasks
-  ready,      ///< a worker may have it
-  leased,     ///< a worker has it
-  done,       ///< its outputs are there
-  failed,     ///< given up after too many attempts
-  cancelled,  ///< no longer wanted, or in need of a task that failed
+  blocked,  ///< waits for the outputs of other tasks
+  ready,    ///< a worker may have it
+  leased,   ///< a worker has it
+  done,     ///< its outputs are there
+  failed,   ///< given up after too many attempts
+  /// No longer wanted, or in need of a task that failed.
+  cancelled,
 };
 
 /// Whether the task may still be done.
@@ -24,8 +25,10 @@ enum class TaskEvent : std::uint8_t {
   input_lost,   ///< an input that was there is gone
   granted,      ///< leased to a worker
   completed,    ///< the leased attempt reported all outputs
-  returned,     ///< the leased attempt failed or was lost; another one may follow
-  exhausted,    ///< the leased attempt failed or was lost, and it was the last one
+  /// The leased attempt failed or was lost; another one may follow.
+  returned,
+  /// The leased attempt failed or was lost, and it was the last one.
+  exhausted,
   output_lost,  ///< what it made is gone and needed again
   cancelled,
 };

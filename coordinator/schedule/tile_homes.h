@@ -52,7 +52,8 @@ class TileHomes {
 
   TileGrid grid_;
   std::int32_t reach_px_;
-  std::vector<std::string> homes_;  ///< by place along the longer side; empty: nobody has one
+  /// By place along the longer side; empty: nobody has one.
+  std::vector<std::string> homes_;
 };
 
 }  // namespace baton

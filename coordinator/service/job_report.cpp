@@ -5,6 +5,8 @@
 #include <algorithm>
 #include <filesystem>
 
+#include "coordinator/schedule/held_states.h"
+
 namespace baton {
 namespace {
 
@@ -14,7 +16,7 @@ namespace fs = std::filesystem;
 std::vector<FrameNumber> finished_frames(const Scheduler::Job& job) {
   std::vector<FrameNumber> frames;
   for (TaskIndex frame = 0; frame < job.tasks.graph().num_frames(); ++frame) {
-    if (job.tasks.status(frame) == TaskStatus::done)
+    if (job.tasks.book().status(frame) == TaskStatus::done)
       frames.push_back(job.spec.frames[static_cast<std::size_t>(frame)]);
   }
   return frames;
@@ -47,7 +49,7 @@ std::string describe(const Scheduler::Job& job, const Failure& failure) {
 }  // namespace
 
 JobSummary summarize(const Digest& digest, const Scheduler::Job& job) {
-  const JobProgress& progress = job.tasks.progress();
+  const JobProgress progress = job.tasks.progress();
   JobSummary summary;
   summary.job = digest;
   summary.name = job.spec.name;
@@ -63,9 +65,9 @@ JobSummary summarize(const Digest& digest, const Scheduler::Job& job) {
   summary.frames_done = progress.frames_done;
   summary.state_bytes = progress.state_bytes;
   summary.state_pixels = progress.state_pixels;
-  summary.states_held = is_open(job.status) ? job.tasks.num_held() : 0;
+  summary.states_held = is_open(job.status) ? held_now(job.tasks).size() : 0;
   summary.checkpoint_every = job.spec.state.checkpoint_every;
-  summary.stats = progress.stats;
+  summary.stats = job.tasks.stats();
   return summary;
 }
 
@@ -74,7 +76,7 @@ JobDetail describe_job(const Scheduler& scheduler, const Digest& digest,
   const Scheduler::Job& job = *scheduler.find_job(digest);
   JobDetail detail{summarize(digest, job), finished_frames(job), {}};
   for (const Failure& failure : failures) detail.failures.push_back(describe(job, failure));
-  for (const auto& [frame, stats] : job.tasks.progress().frames) {
+  for (const auto& [frame, stats] : job.tasks.frames()) {
     const FrameNumber number = job.spec.frames[frame.index()];
     detail.frames.push_back(
         {.frame = number, .sampling = stats.sampling, .quality = stats.quality});
@@ -143,22 +145,22 @@ LostFiles find_lost_files(const JobAdded& job, const BlobStore& store, FrameFile
   };
 
   for (TaskIndex task = graph.num_frames(); task < graph.num_tasks(); ++task) {
-    for (const BlobRef& blob : recorded.live_blobs(task)) {
+    for (const BlobRef& blob : recorded.ledger().live_blobs(recorded.view(), task)) {
       if (!look(task, store.path(blob.digest), blob.size_bytes)) break;
     }
-    if (recorded.is_cut(task)) {
-      for (const BlobRef& blob : recorded.inputs(task)) {
+    if (recorded.ledger().is_cut(task)) {
+      for (const BlobRef& blob : recorded.ledger().inputs(recorded.view(), task)) {
         if (!look(task, store.path(blob.digest), blob.size_bytes)) break;
       }
     }
-    for (const BlobRef& blob : recorded.spare_blobs(task)) {
+    for (const BlobRef& blob : recorded.ledger().spare_blobs(recorded.view(), task)) {
       if (!blob.is_held() && !store.contains(blob.digest)) lost.spares.push_back(blob);
     }
   }
   for (TaskIndex frame = 0; frame < graph.num_frames(); ++frame) {
-    if (recorded.status(frame) != TaskStatus::done) continue;
+    if (recorded.book().status(frame) != TaskStatus::done) continue;
     const fs::path path = frame_path(job.spec, FrameIndex(frame));
-    const BlobRef& image = recorded.outputs(frame).front();
+    const BlobRef& image = recorded.made().outputs(frame).front();
     const bool is_there = look(frame, path, image.size_bytes);
     if (is_there && (frames == nullptr || lost.unreadable || frames->holds(path, image))) continue;
     if (is_there) lost.tasks.push_back(graph.key(frame));
@@ -169,7 +171,7 @@ LostFiles find_lost_files(const JobAdded& job, const BlobStore& store, FrameFile
   // A folder that is not there is not mounted rather than empty.
   std::error_code error;
   const fs::path& folder = job.spec.output.directory;
-  const bool any_frame = recorded.progress().frames_done > 0;
+  const bool any_frame = recorded.made().totals().frames > 0;
   if (any_frame && !fs::is_directory(folder, error) && !lost.unreadable)
     lost.unreadable = fmt::format("{}: the output folder is not there", folder.string());
   return lost;

@@ -14,7 +14,7 @@ namespace baton {
 
 /// What people are told of a job.
 JobSummary summarize(const Digest& digest, const Scheduler::Job& job);
-/// Of a job that the scheduler knows. `failures`: the newest last.
+/// Describes a job that the scheduler knows. `failures`: the newest last.
 JobDetail describe_job(const Scheduler& scheduler, const Digest& digest,
                        const std::vector<Failure>& failures);
 
@@ -26,11 +26,13 @@ Result<Digest> choose_job(const std::vector<FoundJob>& found, const std::string&
 /// What is not there of the files that a job's recorded completions promise: blobs that are still
 /// needed, and finished frames. Sizes are compared; the contents of frames only with `frames`.
 struct LostFiles {
-  std::vector<TaskKey> tasks;             ///< that made them
-  std::vector<BlobRef> spares;            ///< that nobody needs now (JobTasks::spare_blobs)
-  std::vector<std::string> frames;        ///< the files of finished frames among them
-  std::string first;                      ///< one of the files
-  std::optional<std::string> unreadable;  ///< why it cannot be told now, of a file or folder
+  std::vector<TaskKey> tasks;  ///< that made them
+  /// That nobody needs now (BlobLedger::spare_blobs).
+  std::vector<BlobRef> spares;
+  std::vector<std::string> frames;  ///< the files of finished frames among them
+  std::string first;                ///< one of the files
+  /// Why it cannot be told now, of a file or folder.
+  std::optional<std::string> unreadable;
 };
 LostFiles find_lost_files(const JobAdded& job, const BlobStore& store,
                           FrameFiles* frames = nullptr);

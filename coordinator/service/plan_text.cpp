@@ -32,8 +32,8 @@ OpenRuns find_open_runs(const JobTasks& tasks) {
   for (TaskIndex task = graph.num_tasks() - 1; task >= 0; --task) {
     const TaskKey key = graph.key(task);
     if (key.kind != TaskKind::render) break;
-    if (!is_open(tasks.status(task))) continue;
-    if (tasks.is_cut(task)) {
+    if (!is_open(tasks.book().status(task))) continue;
+    if (tasks.ledger().is_cut(task)) {
       open.cuts = true;
     } else {
       open.runs.insert(key.run());
@@ -49,13 +49,13 @@ std::string plan_text(const Scheduler::Job& job, const std::vector<std::string>&
   const JobSpec& spec = job.spec;
   const Timeline& timeline = graph.timeline();
   const auto is_written = [&](FrameIndex frame) {
-    return job.tasks.status(*graph.find(assemble_task(frame))) == TaskStatus::done;
+    return job.tasks.book().status(*graph.find(assemble_task(frame))) == TaskStatus::done;
   };
   std::vector<FrameIndex> kept, left, again;
   for (FrameIndex frame{0}; frame < FrameIndex(graph.num_frames()); ++frame)
     (is_written(frame) ? kept : left).push_back(frame);
   const OpenRuns open = find_open_runs(job.tasks);
-  const bool some_work = kept.size() + left.size() > 0 && job.tasks.progress().tasks_done > 0;
+  const bool some_work = kept.size() + left.size() > 0 && job.tasks.book().counts().done > 0;
   if (kept.empty() && reasons.empty() && !some_work) return {};
   for (const Run run : open.runs) {
     const StepSpan steps = timeline.steps_of(run);

@@ -275,7 +275,7 @@ Status Service::receive_from(const std::string& worker, const WorkerGoodbye&) {
 const Scheduler::Job* Service::job_of_open_task(const LeaseId& lease) const {
   const Scheduler::Job* job = scheduler_.find_job(lease.job);
   const auto task = job ? job->tasks.graph().find(lease.task) : std::nullopt;
-  return task && job->tasks.status(*task) != TaskStatus::done ? job : nullptr;
+  return task && job->tasks.book().status(*task) != TaskStatus::done ? job : nullptr;
 }
 
 std::optional<std::string> Service::find_missing_blob(const TaskDone& report) const {
@@ -317,9 +317,9 @@ std::optional<std::vector<BlobRef>> Service::find_bad_inputs(const LeaseId& leas
   const Scheduler::Job* job = job_of_open_task(lease);
   if (job == nullptr) return std::nullopt;
   const auto task = job->tasks.graph().find(lease.task);
-  if (job->tasks.status(*task) != TaskStatus::leased) return std::nullopt;
-  if (!job->tasks.has_inputs(*task)) return bad;
-  for (const BlobRef& input : job->tasks.inputs(*task)) {
+  if (job->tasks.book().status(*task) != TaskStatus::leased) return std::nullopt;
+  if (!job->tasks.book().has_inputs(*task)) return bad;
+  for (const BlobRef& input : job->tasks.ledger().inputs(job->tasks.view(), *task)) {
     if (!input.is_held() && store_.is_bad(input.digest)) bad.push_back(input);
   }
   if (bad.empty()) return std::nullopt;

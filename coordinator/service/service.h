@@ -24,13 +24,17 @@ namespace baton {
 struct ServiceOptions {
   std::string listen = "tcp://127.0.0.1:5570";
   std::filesystem::path work_dir;  ///< holds journal.sqlite and store/
-  std::chrono::milliseconds heartbeat{
-      1000};                      ///< of workers; four silent ones lose a worker its leases
-  bool mixed_builds = false;      ///< workers may be of other builds and instruction sets
-  ServerAccess access = {};       ///< who is let in
-  Roots roots = {};               ///< folders that jobs may read from and write to
-  std::uint64_t store_limit = 0;  ///< bytes that blobs may take; 0: as the disk has room
-  std::chrono::milliseconds sweep_every = BlobStore::kLeftoverAge;  ///< of leftovers in the store
+  /// Between signs of life of a worker; without four of them it loses its leases.
+  std::chrono::milliseconds heartbeat{1000};
+  /// Workers may be of other builds and instruction sets.
+  bool mixed_builds = false;
+  ServerAccess access = {};  ///< who is let in
+  /// Folders that jobs may read from and write to.
+  Roots roots = {};
+  /// Bytes that blobs may take; 0: as the disk has room.
+  std::uint64_t store_limit = 0;
+  std::chrono::milliseconds sweep_every =
+      BlobStore::kLeftoverAge;  ///< when the store is searched for leftovers
 };
 
 /// The coordinator: one thread that turns messages into events, actions into messages. A turn of
@@ -149,7 +153,8 @@ class Service {
 
   ServiceOptions options_;
   std::filesystem::path store_directory_;
-  std::string token_;  ///< by which workers tell the folders that this coordinator sees
+  /// By which workers tell the folders that this coordinator sees.
+  std::string token_;
   Router router_;
   Journal journal_;
   BlobStore store_;
@@ -157,13 +162,14 @@ class Service {
   Peers peers_;
   OncePerPeer complained_, asked_for_hello_;
   std::map<Digest, std::string> owners_;
-  Speaker speaker_;                        ///< of the message that is being handled
+  Speaker speaker_;                        ///< who sent the message in hand
   std::map<std::string, TimePoint> told_;  ///< warnings, and when
   TimePoint next_tick_{};
   TimePoint next_sweep_;
   bool stop_requested_ = false;
   bool has_unread_jobs_ = false;  ///< in the journal
-  std::uint64_t kept_bytes_ = 0;  ///< that the archive keeps, as the scheduler was told
+  /// That the archive keeps, as the scheduler was told.
+  std::uint64_t kept_bytes_ = 0;
 
   struct Outgoing {
     PeerId peer;
@@ -171,10 +177,13 @@ class Service {
   };
   std::vector<Outgoing> outbox_;  ///< waits for the commit
   std::vector<Digest> garbage_;   ///< likewise
-  std::set<Digest> unremoved_;    ///< that the disk would not let go: tried again with each tick
-  std::vector<Digest> ended_;     ///< jobs, to be archived at the end of the turn
+  /// That the disk would not let go: tried again with each tick.
+  std::set<Digest> unremoved_;
+  /// Jobs, to be archived at the end of the turn.
+  std::vector<Digest> ended_;
   FrameFiles frame_files_;
-  std::map<Digest, std::vector<std::string>> notes_;  ///< of workers, of the files of living jobs
+  /// What workers say of the files of living jobs.
+  std::map<Digest, std::vector<std::string>> notes_;
   std::map<Digest, std::vector<std::string>> lost_before_;  ///< what open jobs lacked at the start
 };
 

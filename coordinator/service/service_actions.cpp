@@ -56,9 +56,8 @@ Status Service::perform(const RecordJobStatus& action) {
 }
 
 Status Service::perform(const GrantLease& action) {
-  return reply_to(action.worker,
-                  LeaseGrant{action.lease, action.inputs, action.steps, action.may_hold,
-                             action.states_from, action.expected_seconds});
+  const Grant& grant = action;
+  return reply_to(action.worker, grant);
 }
 
 Status Service::perform(const AskForStates& action) {

@@ -101,7 +101,7 @@ Status Service::restore_job(const Digest& digest) {
   BATON_TRY(step(std::move(event)));
   if (!is_open(status)) ended_.push_back(digest);
   remove_job_file(digest, status);
-  const JobProgress& progress = scheduler_.find_job(digest)->tasks.progress();
+  const JobProgress progress = scheduler_.find_job(digest)->tasks.progress();
   spdlog::info("job {} of the journal: {} of {} tasks are done", digest.short_hex(),
                progress.tasks_done, progress.tasks_total);
   return {};
@@ -215,7 +215,7 @@ Status Service::receive(const PeerId& peer, const DeleteJob& message) {
   return receive(peer, ListJobs{});
 }
 
-/// Of a job that the scheduler knows.
+/// What is not there of a job that the scheduler knows.
 Result<LostFiles> Service::lost_files_of(const Digest& job) {
   BATON_ASSIGN(JournalledJob known, journal_.load(job));
   return find_lost_files({.job = job,
@@ -251,7 +251,7 @@ Status Service::change_job(const PeerId& peer, const std::string& prefix) {
   return answer_detail(peer, *job);
 }
 
-/// Of a job that is known here.
+/// Describes a job that is known here.
 Result<JobDetail> Service::living_detail(const Digest& job) {
   BATON_ASSIGN(const std::vector<Failure> failures,
                journal_.recent_failures(job, kMaxFailuresShown));
@@ -260,7 +260,7 @@ Result<JobDetail> Service::living_detail(const Digest& job) {
   return detail;
 }
 
-/// Of a job that is known here or in the archive.
+/// Describes a job that is known here or in the archive.
 Status Service::answer_detail(const PeerId& peer, const Digest& job, std::string plan) {
   if (scheduler_.find_job(job) != nullptr) {
     BATON_ASSIGN(JobDetail detail, living_detail(job));
@@ -305,13 +305,15 @@ Status Service::archive_job(const Digest& digest) {
   std::vector<BlobRef> kept;
   for (TaskIndex task = job->tasks.graph().num_frames(); task < job->tasks.graph().num_tasks();
        ++task) {
-    for (const auto& blobs : {job->tasks.live_blobs(task), job->tasks.spare_blobs(task)}) {
+    for (const auto& blobs : {job->tasks.ledger().live_blobs(job->tasks.view(), task),
+                              job->tasks.ledger().spare_blobs(job->tasks.view(), task)}) {
       for (const BlobRef& blob : blobs) {
         if (!blob.is_held()) kept.push_back(blob);
       }
     }
-    if (job->tasks.is_cut(task)) {
-      for (const BlobRef& blob : job->tasks.inputs(task)) kept.push_back(blob);
+    if (job->tasks.ledger().is_cut(task)) {
+      for (const BlobRef& blob : job->tasks.ledger().inputs(job->tasks.view(), task))
+        kept.push_back(blob);
     }
   }
   BATON_ASSIGN(const JobDetail detail, living_detail(digest));

@@ -47,7 +47,8 @@ struct Neighbour {
   JobStatus status = JobStatus::running;
   /// Frames in common that it has written; all of them if it is open.
   std::vector<FrameNumber> written;
-  std::vector<std::string> differing;  ///< what makes their pixels others; empty: they are the same
+  /// What makes their pixels others; empty: they are the same.
+  std::vector<std::string> differing;
   std::optional<FrameNumber> first_differing;
   bool busy = false;          ///< it is open and shares no frame
   std::size_t num_there = 0;  ///< frames in common that it has written

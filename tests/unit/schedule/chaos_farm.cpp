@@ -110,12 +110,12 @@ void ChaosFarm::add_job() {
   trial.step(added, now_);
   const JobTasks& tasks = trial.find_job(job_)->tasks;
   for (const Completion& done : completions_) {
-    const auto live = tasks.live_blobs(*graph_.find(done.task));
+    const auto live = tasks.ledger().live_blobs(tasks.view(), *graph_.find(done.task));
     const bool lost = std::any_of(live.begin(), live.end(), [this](const BlobRef& blob) {
       return !blob.is_held() && !store_.contains(blob.digest);
     });
     if (lost || lost_frames_.erase(done.task) > 0) added.lost.push_back(done.task);
-    for (const BlobRef& spare : tasks.spare_blobs(*graph_.find(done.task))) {
+    for (const BlobRef& spare : tasks.ledger().spare_blobs(tasks.view(), *graph_.find(done.task))) {
       if (!store_.contains(spare.digest)) added.lost_spares.push_back(spare);
     }
   }
@@ -123,7 +123,7 @@ void ChaosFarm::add_job() {
     const bool lost =
         std::any_of(cut.states.begin(), cut.states.end(),
                     [this](const BlobRef& blob) { return !store_.contains(blob.digest); });
-    if (lost && tasks.is_cut(*graph_.find(cut.task))) added.lost.push_back(cut.task);
+    if (lost && tasks.ledger().is_cut(*graph_.find(cut.task))) added.lost.push_back(cut.task);
   }
   step(added);
 }

@@ -52,7 +52,7 @@ class ChaosFarm {
   }
 
   JobStatus status() const { return scheduler_->find_job(job_)->status; }
-  const JobProgress& progress() const { return scheduler_->find_job(job_)->tasks.progress(); }
+  JobProgress progress() const { return scheduler_->find_job(job_)->tasks.progress(); }
   std::size_t num_recorded() const { return completions_.size(); }
   std::size_t num_tasks() const { return static_cast<std::size_t>(graph_.num_tasks()); }
   /// Blobs that were removed from the store, all told.
@@ -98,10 +98,13 @@ class ChaosFarm {
   void keep_blobs() {
     const JobTasks& tasks = scheduler_->find_job(job_)->tasks;
     for (TaskIndex task = 0; task < graph_.num_tasks(); ++task) {
-      for (const BlobRef& blob : tasks.live_blobs(task)) kept_.insert(blob.digest);
-      for (const BlobRef& blob : tasks.spare_blobs(task)) kept_.insert(blob.digest);
-      if (!tasks.is_cut(task)) continue;
-      for (const BlobRef& blob : tasks.inputs(task)) kept_.insert(blob.digest);
+      for (const BlobRef& blob : tasks.ledger().live_blobs(tasks.view(), task))
+        kept_.insert(blob.digest);
+      for (const BlobRef& blob : tasks.ledger().spare_blobs(tasks.view(), task))
+        kept_.insert(blob.digest);
+      if (!tasks.ledger().is_cut(task)) continue;
+      for (const BlobRef& blob : tasks.ledger().inputs(tasks.view(), task))
+        kept_.insert(blob.digest);
     }
   }
 

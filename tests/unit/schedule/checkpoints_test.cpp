@@ -126,8 +126,10 @@ TEST(Checkpoints, AnOlderOneThatIsGoneIsLetGo) {
   EXPECT_TRUE(all_of<RecordReopened>(actions).empty());
   const JobTasks& tasks = again.scheduler.find_job(again.job)->tasks;
   for (int tile = 0; tile < kTiles; ++tile) {
-    EXPECT_TRUE(tasks.spare_blobs(*tasks.graph().find(render(14, tile))).empty());
-    EXPECT_FALSE(tasks.spare_blobs(*tasks.graph().find(render(19, tile))).empty());
+    EXPECT_TRUE(
+        tasks.ledger().spare_blobs(tasks.view(), *tasks.graph().find(render(14, tile))).empty());
+    EXPECT_FALSE(
+        tasks.ledger().spare_blobs(tasks.view(), *tasks.graph().find(render(19, tile))).empty());
   }
   again.step(WorkerJoined{"a", {}});
   again.work_off("a");

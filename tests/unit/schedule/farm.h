@@ -184,7 +184,7 @@ class Farm {
     }
     return seen;
   }
-  const JobProgress& progress() const { return scheduler.find_job(job)->tasks.progress(); }
+  JobProgress progress() const { return scheduler.find_job(job)->tasks.progress(); }
   JobStatus status() const { return scheduler.find_job(job)->status; }
   const JobSpec& spec() const { return spec_; }
 

@@ -2,6 +2,7 @@
 
 #include <set>
 
+#include "coordinator/schedule/held_states.h"
 #include "tests/unit/schedule/farm.h"
 
 namespace baton {
@@ -39,7 +40,7 @@ class HeldStatesTest : public testing::Test {
   void render_first_frame() {
     for (int tile = 0; tile < 4; ++tile) finish(farm.ask_one("a"));
     while (farm.progress().frames_done == 0) finish(farm.ask_one("a"));
-    ASSERT_EQ(farm.scheduler.find_job(farm.job)->tasks.num_held(), 4u);
+    ASSERT_EQ(held_now(farm.scheduler.find_job(farm.job)->tasks).size(), 4u);
   }
   Farm farm{row_of(4)};
 };
@@ -108,7 +109,8 @@ TEST_F(HeldStatesTest, WithTheHolderTheyAreGone) {
 
 // The worker may have reported it once already, and dropped it since.
 TEST_F(HeldStatesTest, WhatWasGrantedBeforeARestartIsMadeAgain) {
-  const GrantLease before{"b", {farm.job, render(0, 0), 1, /*epoch=*/0}, {}, {}, true, Step(0), 0};
+  const LeaseId lease{farm.job, render(0, 0), 1, /*epoch=*/0};
+  const GrantLease before{{.lease = lease, .inputs = {}, .may_hold = true}, "b"};
   farm.step(WorkerJoined{"b", {before.lease}});
   EXPECT_TRUE(all_of<RecordCompletion>(finish(before)).empty());
   EXPECT_EQ(farm.ask_one("a").lease.task, render(0, 0));
@@ -170,7 +172,7 @@ class BorderTest : public testing::Test {
   }
   /// The workers take turns until all renders of the run are done.
   void finish_run(int run) {
-    while (farm.scheduler.find_job(farm.job)->tasks.first_open_run().value() <= run) {
+    while (farm.scheduler.find_job(farm.job)->tasks.book().first_open_run().value() <= run) {
       for (const char* const worker : {"a", "b"}) {
         const GrantLease grant = farm.ask_one(worker);
         if (grant.lease.attempt > 0) states.note(finish_holding(farm, grant));

@@ -278,7 +278,7 @@ TEST(SchedulerFailures, AWorkerThatFailsMuchRestsAndIsForgiven) {
   farm.fail_twice();
   EXPECT_THAT(farm.ask("bad", 1), IsEmpty());
   EXPECT_THAT(farm.ask("good", 3), SizeIs(3));
-  farm.now += Scheduler::kWorkerRest - 1s;
+  farm.now += Standings::kWorkerRest - 1s;
   EXPECT_THAT(farm.ask("bad", 1), IsEmpty());
   farm.now += 1s;
   farm.step(WorkerAlive{"good", {}});
@@ -339,7 +339,7 @@ TEST(SchedulerFailures, WhoDoesNotSeeAJobGetsNothingOfItForAWhile) {
   EXPECT_THAT(farm.scheduler.waits_for(farm.job, farm.now), IsEmpty());
   EXPECT_THAT(farm.ask("sees", 1), SizeIs(1));
   EXPECT_EQ(farm.progress().attempts_lost, 0u);
-  farm.now += Scheduler::kBlindRest;
+  farm.now += Standings::kBlindRest;
   farm.step(WorkerJoined{"sees", {}});
   EXPECT_THAT(farm.ask("blind", 1), SizeIs(1));
 }

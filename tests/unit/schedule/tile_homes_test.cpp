@@ -216,7 +216,7 @@ TEST(FramesAhead, AreNeverFewerThanTwoRuns) {
   EXPECT_EQ(farm.ask("a", 10).size(), 1u);
   farm.step(WorkRequested{"a", 0});
   std::vector<TaskKey> done;
-  farm.finish({"a", {farm.job, render(0, 1), 1, 1}, {}});
+  farm.finish({{.lease = {farm.job, render(0, 1), 1, 1}, .inputs = {}}, "a"});
   for (const GrantLease& grant : farm.ask("a", 10)) done.push_back(grant.lease.task);
   EXPECT_THAT(done, testing::ElementsAre(render(1, 1)));
 }

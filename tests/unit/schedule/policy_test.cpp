@@ -1,0 +1,109 @@
+#include "coordinator/schedule/policy.h"
+
+#include <gtest/gtest.h>
+
+#include "coordinator/schedule/store_room.h"
+#include "tests/unit/schedule/farm.h"
+
+namespace baton {
+namespace {
+
+using namespace testing_farm;
+
+/// Three workers and how they stand with a job that lets a worker rest after two failures.
+struct PolicyTest : testing::Test {
+  std::vector<std::string> connected{"a", "b", "c"};
+  Standings standings;
+  TimePoint now{};
+
+  Crew crew() const { return {connected, standings, now}; }
+  void fail_much(const std::string& worker) {
+    for (int i = 0; i < 2; ++i) standings.add_failure(worker, 2, now);
+  }
+};
+
+TEST_F(PolicyTest, AWorkerRestsWhileAnotherHasFailedLess) {
+  standings.add_failure("a", 2, now);
+  EXPECT_FALSE(rests(crew(), "a")) << "once is not much";
+  standings.add_failure("a", 2, now);
+  EXPECT_TRUE(rests(crew(), "a"));
+  EXPECT_FALSE(rests(crew(), "b"));
+  fail_much("b");
+  standings.add_blind("c", "/shows", now);
+  EXPECT_FALSE(rests(crew(), "a")) << "all would";
+  EXPECT_TRUE(rests(crew(), "c")) << "who does not see the folders can do nothing";
+}
+
+TEST_F(PolicyTest, ARestEndsWithTimeOrAFreshStart) {
+  fail_much("a");
+  standings.add_blind("b", "/shows", now);
+  now += Standings::kBlindRest - 1ms;
+  EXPECT_TRUE(rests(crew(), "b"));
+  now += 1ms;
+  EXPECT_FALSE(rests(crew(), "b"));
+  EXPECT_TRUE(rests(crew(), "a"));
+  now = TimePoint{} + Standings::kWorkerRest;
+  EXPECT_FALSE(rests(crew(), "a"));
+  fail_much("a");
+  standings.forget("a");
+  EXPECT_FALSE(rests(crew(), "a"));
+}
+
+TEST_F(PolicyTest, ARetryGoesToWhoHasFailedTheTaskLeast) {
+  const TaskBlame blame{{"a", {2, false}}, {"b", {1, false}}};
+  EXPECT_FALSE(may_try(crew(), blame, "a"));
+  EXPECT_FALSE(may_try(crew(), blame, "b")) << "c has not failed it";
+  EXPECT_TRUE(may_try(crew(), blame, "c"));
+  standings.add_blind("c", "/shows", now);
+  EXPECT_TRUE(may_try(crew(), blame, "b")) << "c cannot";
+  EXPECT_FALSE(may_try(crew(), blame, "a"));
+  EXPECT_FALSE(may_try(crew(), {{"b", {1, true}}}, "b")) << "for good";
+  EXPECT_FALSE(somebody_may_try({connected, standings, now},
+                                {{"a", {1, true}}, {"b", {1, true}}, {"c", {1, true}}}));
+}
+
+TEST_F(PolicyTest, ATaskIsGivenUpWhenNobodyIsLeft) {
+  const TaskBlame two{{"a", {1, false}}, {"b", {1, false}}};
+  EXPECT_FALSE(is_exhausted(connected, two, /*max_retries=*/2));
+  EXPECT_TRUE(is_exhausted(connected, two, 1)) << "as many workers as attempts";
+  const TaskBlame one{{"a", {3, false}}};
+  EXPECT_FALSE(is_exhausted(connected, one, 2)) << "b and c are there";
+  connected = {"a"};
+  EXPECT_TRUE(is_exhausted(connected, one, 2)) << "the only one has had all attempts";
+  EXPECT_FALSE(is_exhausted(connected, {{"a", {1, false}}}, 2));
+  EXPECT_TRUE(is_exhausted(connected, {{"a", {1, true}}}, 2)) << "the only one can do no more";
+}
+
+// Two tiles, four frames in runs of two; a film takes 10 bytes and a state 20.
+TEST(StoreRoom, ARunIsBegunWhenAllOfItFits) {
+  const JobSpec spec = small_job(2, 4, 2);
+  const JobGraph graph(spec);
+  const TaskBook book(graph);
+  BlobSizes sizes(spec);
+  sizes.learn({{BlobKind::film, 0, 0, {}, 10}, {BlobKind::state, 1, 0, {}, 20}});
+  const TaskIndex first = *graph.find(render(0, 0)), later = *graph.find(render(1, 0));
+  const JobInStore fresh{graph, book, sizes, baton::Run(0)};
+  EXPECT_EQ(unmade_bytes(fresh, baton::Run(1)), 2u * (20 + 2 * 10));
+
+  StoreRoom room{.limit = 80, .is_idle = false};
+  EXPECT_TRUE(has_room(room, fresh, {}, first, false));
+  EXPECT_FALSE(has_room(room, fresh, {}, first, /*others_wait=*/true));
+  EXPECT_FALSE(has_room(room, fresh, {}, later, false)) << "with the first run it is too much";
+  room.used = 1;
+  EXPECT_FALSE(has_room(room, fresh, {}, first, false));
+  room.is_idle = true;
+  EXPECT_TRUE(has_room(room, fresh, {}, first, false)) << "nobody else begins anything";
+  room.expected = 40;
+  EXPECT_FALSE(has_room(room, fresh, {}, first, false)) << "the task itself does not fit";
+  EXPECT_TRUE(has_room(room, fresh, {}, *graph.find(assemble(0)), false));
+
+  const JobInStore begun{graph, book, sizes, baton::Run(1)};
+  const std::vector others{begun};
+  room = {.limit = 159, .is_idle = false};
+  EXPECT_FALSE(has_room(room, fresh, others, first, false)) << "the other has begun a run";
+  room.limit = 160;
+  EXPECT_TRUE(has_room(room, fresh, others, first, false));
+}
+
+}  // namespace
+}  // namespace baton
