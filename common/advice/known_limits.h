@@ -15,7 +15,7 @@ enum class Gloss : std::uint8_t { diffuse, glossy, mirror };
 
 /// One fact of the stability suite: from which light on a method that is set so no longer holds.
 struct KnownLimit {
-  std::string_view subject;    ///< of jobs/lab/stability/expected.csv
+  std::string_view subject;    ///< row of jobs/lab/stability/expected.csv
   std::string_view test_case;  ///< the case that shows it
   std::string_view verdict;    ///< its verdict: degrades or fails
   Method method;

@@ -11,7 +11,7 @@ enum class ExitCode : int {
   failed = 2,  ///< the job or the operation failed
   cancelled = 3,
   usage = 64,        ///< the command line is wrong
-  bad_input = 65,    ///< a job, scene, image or state file is wrong
+  bad_input = 65,    ///< a job, scene, image or state is wrong
   unavailable = 69,  ///< no coordinator answers
   internal = 70,
   io = 74,

@@ -11,12 +11,12 @@ inline constexpr std::uint64_t kMaxAssetFileBytes = 8ull << 30;
 inline constexpr std::uint64_t kMaxBlobBytes = 4ull << 30;
 inline constexpr std::uint64_t kMaxMessageBytes = 64ull << 20;
 inline constexpr std::uint64_t kMaxWorkerMessageBytes = 8ull << 20;  // what a worker says
-inline constexpr std::uint64_t kMaxUnendedBytes =
-    2 * kMaxMessageBytes;                    ///< from one connection without the end of a message
-inline constexpr int kMaxMessageFrames = 4;  // with the peer's identity
+/// Bytes from one connection without the end of a message.
+inline constexpr std::uint64_t kMaxUnendedBytes = 2 * kMaxMessageBytes;
+inline constexpr int kMaxMessageFrames = 4;      // with the peer's identity
 inline constexpr int kMaxQueuedMessages = 4096;  // per connection, either way
-inline constexpr int kMaxSections = 64;          // of one state or film file
-inline constexpr int kMaxChannels = 256;         // of one picture
+inline constexpr int kMaxSections = 64;          // sections of one state or film file
+inline constexpr int kMaxChannels = 256;         // channels of one image
 inline constexpr int kMaxImageSide = 32768;
 inline constexpr int kMaxOverscan = 4096;  // pixels on a side
 /// Numbers of an EXR picture whose data does not fill its display window: the rest costs a file
@@ -27,16 +27,20 @@ inline constexpr int kMaxFrameNumber = 9999999;
 inline constexpr int kMaxMaterials = 4096;
 inline constexpr int kMaxMeshes = 4096;
 inline constexpr int kMaxObjects = 100000;
-inline constexpr int kMaxGltfIndex = 1 << 24;  ///< of a mesh or a primitive of a file
-inline constexpr std::uint64_t kMaxGltfElements = 1ull << 28;  ///< of an accessor without a view
-inline constexpr std::size_t kMaxGltfKeys = 300000;  ///< of all objects: 40 MB of a job's document
+/// Number of a mesh or a primitive of a file.
+inline constexpr int kMaxGltfIndex = 1 << 24;
+/// Elements of an accessor without a view.
+inline constexpr std::uint64_t kMaxGltfElements = 1ull << 28;
+/// Keys of all objects together: 40 MB of a job's document.
+inline constexpr std::size_t kMaxGltfKeys = 300000;
 inline constexpr std::uint64_t kMaxGltfStride = 4096;  ///< bytes; the format allows 252
 inline constexpr int kMaxTextureSide = 8192;
-inline constexpr std::uint64_t kMaxTextureBytes = 4ull << 30;  ///< of a scene, with smaller images
+/// Memory of all textures of a scene, with their smaller images.
+inline constexpr std::uint64_t kMaxTextureBytes = 4ull << 30;
 inline constexpr int kMaxMetadata = 256;
 inline constexpr int kMaxNameLength = 100;
 inline constexpr int kMaxTextLength = 4096;
-/// Of a frame's file name: file systems take 255, a temporary name has some more.
+/// Characters of a frame's file name: file systems take 255, a temporary name has some more.
 inline constexpr std::size_t kMaxFileNameLength = 200;
 inline constexpr int kMaxJsonDepth = 32;
 inline constexpr int kMaxFaultsReported = 100;
@@ -45,14 +49,16 @@ inline constexpr int kMaxTileSize = 32768;
 /// Side of the blocks of pixels that get the same number of rounds; tiles are whole numbers of
 /// them.
 inline constexpr int kAdaptiveBlock = 8;
-inline constexpr int kJudgingRounds = 2;   ///< of all pixels; they say how many more a block gets
-inline constexpr int kMaxSites = 16;       ///< of every pixel
-inline constexpr int kMaxFineSites = 256;  ///< of pixels whose geometry is fine
-inline constexpr int kGeometryProbes = 4;  ///< primary rays that tell how fine a pixel's is
+/// Rounds that all pixels get; they say how many more a block gets.
+inline constexpr int kJudgingRounds = 2;
+inline constexpr int kMaxSites = 16;       ///< sites of every pixel
+inline constexpr int kMaxFineSites = 256;  ///< sites of pixels whose geometry is fine
+/// Primary rays of a pixel that tell how fine its geometry is.
+inline constexpr int kGeometryProbes = 4;
 inline constexpr int kMaxRounds = 65536;
 inline constexpr int kMaxPreroll = 64;  ///< rounds
 inline constexpr int kMaxParticles = 64;
-inline constexpr int kMaxPopulations = 2;  // of a pixel's particles
+inline constexpr int kMaxPopulations = 2;  // parts of a pixel's particles
 inline constexpr int kMaxCandidates = 8192;
 inline constexpr int kMaxDistributions = 64;
 inline constexpr int kMaxExchangeSide = 16;
@@ -62,23 +68,23 @@ inline constexpr int kMaxMoves = 64;  ///< per distribution
 inline constexpr int kMaxHistoryLimit = 1000;
 inline constexpr int kMaxNeighbors = 8;  ///< per pixel
 inline constexpr int kMaxNeighborRadius = 64;
-inline constexpr int kMostPoolRays = 4;  ///< of a pixel of method pool, in numParticles
+inline constexpr int kMostPoolRays = 4;  ///< rays of a `pool` pixel, over N
 inline constexpr int kMaxReferenceSamples = 1 << 24;
 inline constexpr int kMaxCheckpointEvery = 1000;
 inline constexpr int kMaxEnvironmentSide = 32768;
-inline constexpr std::uint64_t kStoreReserveBytes =
-    64ull << 20;  ///< of a disk that blobs leave to frames and the journal
-inline constexpr std::uint64_t kMaxFilmBytesAhead =
-    2ull << 30;  ///< films, before compression, of frames that are rendered ahead of an open one
-inline constexpr std::uint64_t kMaxRoundSurfaceBytes =
-    1ull << 27;  ///< what a tile keeps of its rounds' surfaces from frame to frame
+/// Space of a disk that blobs leave to frames and the journal.
+inline constexpr std::uint64_t kStoreReserveBytes = 64ull << 20;
+/// Films of frames that are rendered ahead of an unwritten one, before compression.
+inline constexpr std::uint64_t kMaxFilmBytesAhead = 2ull << 30;
+/// What a tile keeps of its rounds' surfaces from frame to frame.
+inline constexpr std::uint64_t kMaxRoundSurfaceBytes = 1ull << 27;
 /// Sites of a tile, where pixels differ in number, up to which what they see is kept.
 inline constexpr std::size_t kMaxSitesAtOnce = 1u << 18;
-/// Of meshes in several places, in one flat hierarchy: some 600 MB. A second level costs a third of
-/// the shadow rays' speed.
+/// Triangles of meshes in several places that stand in one flat hierarchy: some 600 MB. A second
+/// level costs a third of the shadow rays' speed.
 inline constexpr std::uint64_t kMaxCopiedTriangles = 4000000;
-inline constexpr std::size_t kMaxCachedPoses =
-    16;  ///< frames whose moved geometry a worker keeps, per job
+/// Frames of a job whose moved geometry a worker keeps.
+inline constexpr std::size_t kMaxCachedPoses = 16;
 inline constexpr int kMaxTasksPerJob = 4000000;
 inline constexpr int kMaxTaskAttempts = 16;
 inline constexpr int kMaxTaskLosses = 16;  ///< lost leases of a task that pause its job

@@ -12,11 +12,12 @@ namespace baton {
 /// What kind of thing went wrong; decides the exit code (exit_codes.h) and whether a retry can
 /// help.
 enum class ErrorKind {
-  usage,      ///< the command line is wrong
-  bad_input,  ///< a job, scene, image, state or message is not what it must be
-  io,         ///< the disk or the network did not do its part
-  corrupt,    ///< a checksum or digest does not match
-  version,    ///< made by another version than this program reads
+  usage,  ///< the command line is wrong
+  /// A job, scene, image, state or message is not what it must be.
+  bad_input,
+  io,       ///< the disk or the network has failed
+  corrupt,  ///< a checksum or digest does not match
+  version,  ///< made by another version of the program
   timeout,
   cancelled,
   internal,  ///< a bug in this program

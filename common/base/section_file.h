@@ -21,9 +21,10 @@ using SectionTag = std::array<char, 4>;
 
 struct Section {
   SectionTag tag{};
-  bool required = true;  ///< a reader that does not know a required tag must refuse the file
-  std::uint8_t stride =
-      1;  ///< bytes of one element; bytes are stored plane by plane when > 1, which packs better
+  /// A reader that does not know a required tag must refuse the file.
+  bool required = true;
+  /// Bytes of one element; where it is > 1, bytes are stored plane by plane, which packs better.
+  std::uint8_t stride = 1;
   Bytes payload;  ///< uncompressed
 };
 

@@ -26,7 +26,8 @@ Result<std::optional<Mat3>> to_rec709(const Chromaticities& from);
 /// What the header of a picture says of its numbers.
 struct PictureColors {
   Chromaticities chromaticities;
-  Rgb factor{1, 1, 1};  ///< by which radiance was multiplied before it was stored, > 0
+  /// Factor by which radiance was multiplied before it was stored, > 0.
+  Rgb factor{1, 1, 1};
 
   bool operator==(const PictureColors&) const = default;
 };

@@ -33,7 +33,8 @@ namespace {
 
 /// OpenEXR compresses on the calling thread: the worker has its own threads.
 constexpr int kOpenExrThreads = 0;
-/// Of zlib. OpenEXR's own choice is 4: a quarter slower for files that are two per cent smaller.
+/// Level of zlib. OpenEXR's own choice is 4: a quarter slower for files that are two per cent
+/// smaller.
 constexpr int kZipLevel = 1;
 constexpr float kMaxHalf = 65504.0f;
 constexpr int kMostSmpteFrames = 30;  // a second

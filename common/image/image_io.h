@@ -37,7 +37,8 @@ Result<PictureColors> read_picture_colors(const std::filesystem::path& path);
 using ImageMetadata = std::vector<std::pair<std::string, std::string>>;
 
 struct ExrOptions {
-  bool half_float = true;            ///< of all channels but `whole`
+  /// The type of all channels but those in `whole`.
+  bool half_float = true;
   std::vector<std::string> whole{};  ///< channels that are float32 always
   std::string compression = "zip";   ///< none, rle, zips, zip, piz
   ImageMetadata metadata{};
@@ -51,7 +52,8 @@ struct ExrOptions {
   ChannelNaming naming = ChannelNaming::plain;  ///< in the file
   /// What is shown, in pixels of the picture, with its corner at (0, 0); none: all.
   std::optional<PixelRect> display_window{};
-  Chromaticities chromaticities{};  ///< of R, G and B; written always
+  /// Colours that R, G and B stand for; always written.
+  Chromaticities chromaticities{};
 };
 
 /// All channels of `image`, whose rectangle is the data window, as one scan-line EXR file in

@@ -63,12 +63,13 @@ double cycles_noise_squared(double variance, double grey);
 /// Its rms over the probes. 0: a film without errors.
 float cycles_noise(const FilmTile& film);
 
-/// Of a film with an error plane and R, G, B; not told without them. Sums are taken in the order of
-/// the pixels.
+/// The noise of a film with an error plane and R, G, B; not told without them. Sums are taken in
+/// the order of the pixels.
 FrameNoise noise_of_film(const FilmTile& film);
 
-/// Of two frames with the channels R, G, B, A of one size, by two seeds that see the same sites;
-/// pixels that see a surface are those with alpha. Not told without the channels.
+/// The noise of either of two frames of one size by two seeds that see the same sites, from their
+/// channels R, G, B, A; pixels that see a surface are those with alpha. Not told without the
+/// channels.
 FrameNoise noise_of_seeds(const FilmTile& a, const FilmTile& b);
 
 }  // namespace baton

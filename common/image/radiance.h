@@ -14,7 +14,8 @@ namespace baton {
 struct RadianceHeader {
   int width = 0, height = 0;
   std::size_t size_bytes = 0;  ///< the pixels start here
-  PictureColors colors;        ///< PRIMARIES; EXPOSURE times COLORCORR, of all such lines
+  /// PRIMARIES; EXPOSURE times COLORCORR, over all such lines.
+  PictureColors colors;
 };
 
 /// `name` goes first in every error. Errors: no Radiance header, another pixel format than RGBE,

@@ -16,10 +16,12 @@ inline constexpr std::size_t kCryptoRanks = 6;
 /// What is known of an AOV without a frame.
 struct AovTraits {
   std::string_view name;              ///< in JSON
-  std::vector<std::string> channels;  ///< of the EXR file, as compositors expect them
+  std::vector<std::string> channels;  ///< names in the EXR file, for compositors
   bool is_float = false;              ///< 32 bits whatever output.pixelType says
-  bool of_geometry = false;           ///< follows from what the sites see, not from samples
-  double film_bytes = 4;              ///< of a pixel with a surface in a packed film, measured
+  /// It follows from what the sites see, not from samples.
+  bool of_geometry = false;
+  /// Bytes of a pixel with a surface in a packed film, as measured.
+  double film_bytes = 4;
 };
 const AovTraits& traits(Aov aov);
 /// By value of the enumeration.

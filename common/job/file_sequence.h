@@ -13,9 +13,10 @@ enum class FilesBeyond : std::uint8_t { hold, loop };
 
 /// Files with a number in their name, one for each frame of a job; or one file for all.
 struct FileSequence {
-  std::string files{};  ///< absolute; '#'s are the zero-padded number, none: the same file always
-  double speed = 1;     ///< numbers a frame, [-1e6, 1e6]
-  int offset = 0;       ///< added to frame times speed
+  /// Absolute path; '#'s are the zero-padded number, none: the same file always.
+  std::string files{};
+  double speed = 1;                               ///< numbers a frame, [-1e6, 1e6]
+  int offset = 0;                                 ///< added to frame times speed
   int first = 0, last = limits::kMaxFrameNumber;  ///< numbers that there are
   FilesBeyond beyond = FilesBeyond::hold;
 

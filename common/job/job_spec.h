@@ -22,12 +22,12 @@ namespace baton {
 /// job_json.cpp. Units: lengths in scene units, angles in degrees, colours linear RGB. Paths are
 /// absolute after parsing.
 
-// ---- image
-// -------------------------------------------------------------------------------------------------
+// ---- image --------------------------------------------------------------------------------------
 /// From where in a pixel, and around it, its light comes. Widths are those of Cycles at 1.5.
 enum class PixelFilter : std::uint8_t {
-  box,              ///< the pixel
-  gaussian,         ///< standard deviation .375 pixels, to 2.25 pixels from the centre
+  box,  ///< the pixel
+  /// Standard deviation .375 pixels, to 2.25 pixels from the centre.
+  gaussian,
   blackman_harris,  ///< to 1.5 pixels from the centre
 };
 
@@ -42,16 +42,17 @@ struct Overscan {
 };
 
 struct ImageSpec {
-  int width = 640;   ///< pixels of the whole picture, [1, limits::kMaxImageSide]
+  int width = 640;   ///< pixels, [1, limits::kMaxImageSide]
   int height = 360;  ///< pixels
-  int sites = 1;     ///< primary rays per pixel: 1, 4, 9 or 16 (stratified)
+  int sites = 1;     ///< primary rays per pixel: 1, 4, 9 or 16
   /// The same where geometry is fine, at most: `sites` times a power of 4. 0: `sites`.
   int max_sites = 0;
   PixelFilter filter = PixelFilter::box;
-  int tile_size = 64;                 ///< side of a farm tile in pixels; never changes the picture
-  std::optional<PixelRect> region{};  ///< the part that is shown, inside the whole; none: all
+  /// Side of a farm tile in pixels; no pixel depends on it.
+  int tile_size = 64;
+  std::optional<PixelRect> region{};  ///< part of the image shown; none: all
   Overscan overscan{};                ///< around what is shown
-  std::uint64_t site_seed = 0;        ///< of the sites' places in their pixels; 0: the job's seed
+  std::uint64_t site_seed = 0;        ///< places sites in pixels; 0: job's seed
 
   bool operator==(const ImageSpec&) const = default;
   /// Pixels are always addressed by their place in the whole picture, the display window of frames.
@@ -69,8 +70,7 @@ struct ImageSpec {
 /// The image with its sides times `scale`, (0, 1]; region and overscan grow to whole pixels.
 ImageSpec scaled(const ImageSpec& image, double scale);
 
-// ---- motion
-// ------------------------------------------------------------------------------------------------
+// ---- motion -------------------------------------------------------------------------------------
 /// How keys are joined. linear: straight lines. smooth: Catmull-Rom splines through the keys.
 /// Quaternions are slerped either way; before the first key and after the last one the pose holds.
 enum class KeyCurve : std::uint8_t { linear, smooth };
@@ -78,18 +78,18 @@ enum class KeyCurve : std::uint8_t { linear, smooth };
 /// How samples follow what moves; says nothing when nothing does (common/job/motion.h).
 struct MotionSpec {
   KeyCurve curve = KeyCurve::smooth;
-  int max_px = 0;  ///< history is followed so far per frame, in either direction of the image; 0:
-                   ///< derived from the scene
-  float depth_tolerance =
-      0.02f;  ///< history is taken from within this share of the depth off the surface, (0, 1]
-  float normal_tolerance_deg =
-      25;  ///< and where shading normals differ by at most so much, [0, 180]
+  /// History is followed so far per frame, in either direction of the image; 0: derived from the
+  /// scene.
+  int max_px = 0;
+  /// History is taken from within this share of the depth off the surface, (0, 1].
+  float depth_tolerance = 0.02f;
+  /// History is taken from where shading normals differ by at most so much, [0, 180].
+  float normal_tolerance_deg = 25;
 
   bool operator==(const MotionSpec&) const = default;
 };
 
-// ---- camera
-// ------------------------------------------------------------------------------------------------
+// ---- camera -------------------------------------------------------------------------------------
 struct CameraKey {
   double frame = 1;
   Vec3 position{};
@@ -112,10 +112,12 @@ struct CameraSpec {
   Vec3 up{0, 1, 0};
   float vertical_fov_deg = 40;  ///< perspective: (0, 180)
   Projection projection = Projection::perspective;
-  float orthographic_height = 2;  ///< of the picture, scene units, > 0
-  std::array<float, 2> shift{};   ///< of the picture to the right and up, in its heights
-  float aperture = 0;             ///< diameter of the lens, scene units; 0: a pinhole
-  float focus_distance = 0;       ///< along the view, scene units; 0: as far as look_at
+  float orthographic_height = 2;  ///< height of the image, scene units, > 0
+  /// The image to the right and up, in its heights.
+  std::array<float, 2> shift{};
+  float aperture = 0;  ///< lens diameter, scene units; 0: a pinhole
+  /// Distance along the view, scene units; 0: as far as look_at.
+  float focus_distance = 0;
   std::vector<CameraKey> keys{};  ///< ascending frames
   std::optional<GltfMotion> gltf{};
   /// The camera of scene.gltf that is taken, by the name of its node; kFirstCamera: the first one.
@@ -126,8 +128,7 @@ struct CameraSpec {
   bool operator==(const CameraSpec&) const = default;
 };
 
-// ---- environment
-// -------------------------------------------------------------------------------------------
+// ---- environment --------------------------------------------------------------------------------
 enum class MapFilter : std::uint8_t { nearest, bilinear };
 
 /// The map at one frame number; between keys the texels are interpolated linearly, outside they are
@@ -147,36 +148,38 @@ struct NumberKey {
   bool operator==(const NumberKey&) const = default;
 };
 
-/// Numbered frames are keys at every frame with `interpolate` false: the last key at or before the
-/// frame holds.
 /// A map that the camera sees and that lights nothing.
 struct CameraMapSpec {
-  std::string file{};  ///< lat-long .exr or .hdr; empty: the camera sees the map that lights
-  float scale = 1;     ///< radiance factor, (0, inf)
+  /// Lat-long .exr or .hdr; empty: the camera sees the map that lights.
+  std::string file{};
+  float scale = 1;  ///< radiance factor, (0, inf)
 
   bool operator==(const CameraMapSpec&) const = default;
 };
 
+/// The map that lights. Numbered map files are keys at every frame with `interpolate` false: the
+/// last key at or before the frame is taken.
 struct EnvironmentSpec {
   std::vector<EnvironmentKey> keys;  ///< sorted by frame, at least one
   bool interpolate = true;
   MapFilter filter = MapFilter::bilinear;
   float scale = 1;                      ///< radiance factor, [0, inf)
   std::vector<NumberKey> scale_keys{};  ///< further factors, >= 0; ascending frames
-  int max_width =
-      0;  ///< wider maps are reduced to so many columns, [0, limits::kMaxEnvironmentSide]; 0: none
+  /// Wider maps are reduced to so many columns, [0, limits::kMaxEnvironmentSide]; 0: none are.
+  int max_width = 0;
   Vec3 rotation_axis{0, 1, 0};
   std::int32_t rotation_start_frame = 1;
-  double rotation_start_deg = 0;  ///< at that frame, whichever frames the job has
+  /// Angle at rotation_start_frame, whichever frames the job has.
+  double rotation_start_deg = 0;
   double rotation_deg_per_frame = 0;
-  std::vector<NumberKey> rotation_keys{};  ///< degrees, instead of the two; ascending frames
-  CameraMapSpec camera_map{};              ///< turned like the others
+  /// Degrees at frame numbers, instead of start and speed; ascending frames.
+  std::vector<NumberKey> rotation_keys{};
+  CameraMapSpec camera_map{};  ///< turned like the others
 
   bool operator==(const EnvironmentSpec&) const = default;
 };
 
-// ---- sampling
-// ----------------------------------------------------------------------------------------------
+// ---- sampling -----------------------------------------------------------------------------------
 enum class ResamplingScheme : std::uint8_t { systematic, stratified, multinomial, residual };
 /// How `sequential` carries the normalising constant: by the ratio of the weights, or by path
 /// sampling with a left, right or trapezoidal sum over the intermediate distributions.
@@ -194,41 +197,48 @@ struct MaterialSampling {
 };
 
 struct SamplingSpec {
-  Method method = Method::pool;   ///< holds in every case of the stability suite
-  int num_particles = 16;         ///< N: shadow rays per pixel, [1, limits::kMaxParticles]
-  int num_candidates = 128;       ///< M: SIR candidates, [N, limits::kMaxCandidates]
-  float brdf_fraction = 0.25f;    ///< [0, 1], of candidates: mis: from the BRDF; SIR: at most, from
-                                  ///< glossy lobes; 1: whole BRDF
+  Method method = Method::pool;  ///< *holds* in all stability cases
+  /// N: shadow rays per pixel, [1, limits::kMaxParticles].
+  int num_particles = 16;
+  /// M: SIR candidates, [N, limits::kMaxCandidates].
+  int num_candidates = 128;
+  /// Share of the candidates, [0, 1]. mis: from the BRDF. SIR: from glossy lobes, at most; 1: from
+  /// the whole BRDF.
+  float brdf_fraction = 0.25f;
   bool mis_compensation = false;  ///< [Karlik et al. 2019]; mis
-  int num_distributions =
-      5;              ///< P: intermediate distributions per frame, [1, limits::kMaxDistributions]
-  int num_moves = 1;  ///< Metropolis-Hastings moves per distribution, [1, limits::kMaxMoves]
+  /// P: intermediate distributions per frame, [1, limits::kMaxDistributions].
+  int num_distributions = 5;
+  /// Metropolis-Hastings moves per distribution, [1, limits::kMaxMoves].
+  int num_moves = 1;
   LnsUpdate lns_update = LnsUpdate::ratio;
-  float ess_ratio_min = 0.5f;  ///< resample when ESS < ess_ratio_min * N, [0, 1]
+  float ess_ratio_min = 0.5f;  ///< resample below this ESS / N, [0, 1]
   ResamplingScheme resampling = ResamplingScheme::systematic;
   float local_move_deg = 4;                     ///< half-angle of local moves, (0, 90]
   float local_move_fraction = 0.125f;           ///< share of moves that are local, [0, 1]
-  Method start_method = Method::bidirectional;  ///< of fresh pixels; one that draws anew
-  int refresh_every =
-      8;  ///< sequential: each pixel starts afresh once in so many frames, staggered; 0: never
+  Method start_method = Method::bidirectional;  ///< for fresh pixels; one that draws anew
+  /// sequential: each pixel starts afresh once in so many frames, staggered; 0: never.
+  int refresh_every = 8;
   /// sequential: a pixel whose carried Lns has left [Lns / rho, Lns * rho] of its last start, rho
   /// in (1, 1e6], starts afresh with refresh_candidates; none: never. The rule looks at the
   /// samples, so it is a (small) bias.
   std::optional<float> refresh_ratio{};
   int refresh_candidates = 800;  ///< [N, limits::kMaxCandidates]
-  int history_limit = 20;    ///< restir: a carried set counts as at most so many fresh ones, [1,
-                             ///< limits::kMaxHistoryLimit]
-  int num_neighbors = 0;     ///< restir: other pixels of the frame before whose samples a pixel
-                             ///< weighs, [0, limits::kMaxNeighbors]
-  int neighbor_radius = 30;  ///< restir: how far from the pixel's own history they are, pixels, [1,
-                             ///< limits::kMaxNeighborRadius]
+  /// restir: a carried set counts as at most so many fresh ones, [1, limits::kMaxHistoryLimit].
+  int history_limit = 20;
+  /// restir: other pixels of the frame before whose samples a pixel weighs,
+  /// [0, limits::kMaxNeighbors].
+  int num_neighbors = 0;
+  /// restir: how far from the pixel's own history they are, pixels,
+  /// [1, limits::kMaxNeighborRadius].
+  int neighbor_radius = 30;
   /// restir: only samples whose ray was free are carried on. Unbiased while nothing moves or turns
   /// and no neighbours are asked.
   bool reuse_visibility = false;
-  std::optional<float> target_error{};  ///< automatic: RMSE over mean radiance to reach, (0, 10]
-  std::optional<float>
-      time_budget{};  ///< automatic: CPU seconds of the whole job to stay within, (0, 1e9]
-  int reference_samples = 1024;  ///< paired samples per pixel of `reference`, [2, 2^24]
+  /// automatic: RMSE over mean radiance to reach, (0, 10].
+  std::optional<float> target_error{};
+  /// automatic: CPU seconds of the whole job to stay within, (0, 1e9].
+  std::optional<float> time_budget{};
+  int reference_samples = 1024;  ///< sample pairs of `reference`, [2, 2^24]
   /// By name of a material of the scene: replaces method, N, M and brdf_fraction in the pixels
   /// whose first site with a surface sees it. Not with methods that carry samples, nor with a
   /// second pass.
@@ -237,21 +247,21 @@ struct SamplingSpec {
   bool operator==(const SamplingSpec&) const = default;
 };
 
-// ---- quality
-// ------------------------------------------------------------------------------------------------
+// ---- quality ------------------------------------------------------------------------------------
 /// How much of the job's sampling a frame is the mean of.
 struct QualitySpec {
-  int rounds = 1;  ///< K: passes over a frame, each with other random numbers and sites,
-                   ///< [1, limits::kMaxRounds]
-  int sweeps = 1;  ///< how often the sequence is rendered, K rounds a frame each time; a frame is
-                   ///< the mean of its sweeps. rounds * sweeps <= limits::kMaxRounds
+  /// K: renderings of a frame, each with other random numbers and sites, [1, limits::kMaxRounds].
+  int rounds = 1;
+  /// How often the sequence is rendered, K rounds a frame each time; a frame is the mean of its
+  /// sweeps. rounds * sweeps <= limits::kMaxRounds.
+  int sweeps = 1;
   /// Pixels that are cleaner get fewer of the rounds (worker/pass/adaptive_rounds.h); > 0.
   std::optional<float> adaptive_threshold{};
-  bool refinable = false;  ///< films stay after the job, for one of more sweeps
+  bool refinable = false;  ///< films stay for a job of more sweeps
   /// `baton render` adds sweeps until no frame is noisier, in Cycles' measure; > 0.
   std::optional<float> noise_threshold{};
-  std::optional<float> time_limit{};  ///< it adds none that would end later, s; > 0
-  int max_rounds = 0;                 ///< it adds none past so many rounds; >= rounds, 0: no limit
+  std::optional<float> time_limit{};  ///< no sweep that would end later, s; > 0
+  int max_rounds = 0;                 ///< most rounds, >= `rounds`; 0: no limit
 
   /// Whether `baton render` may add sweeps.
   bool may_grow() const { return noise_threshold || time_limit || max_rounds > 0; }
@@ -259,8 +269,7 @@ struct QualitySpec {
   bool operator==(const QualitySpec&) const = default;
 };
 
-// ---- visibility
-// --------------------------------------------------------------------------------------------
+// ---- visibility ---------------------------------------------------------------------------------
 /// What a second pass does with the pixels whose shadow rays did not all agree.
 enum class SecondPassForm : std::uint8_t { corrected, published, published_kept, extra_samples };
 /// Which samples decide that a pixel takes part in the second pass, and which are then used.
@@ -271,16 +280,17 @@ struct VisibilitySpec {
   bool correlated = false;  ///< run the second pass
   SecondPassForm form = SecondPassForm::corrected;
   MaskPolicy mask = MaskPolicy::cross_fold;
-  int tile_size = 5;    ///< side of the squares in which energy is exchanged, pixels, [2,
-                        ///< limits::kMaxExchangeSide]
-  int partitions = 16;  ///< C: offers per free sample, [1, limits::kMaxPartitions]
-  int dilate = 0;       ///< the mask grows by so many pixels, [0, limits::kMaxDilation]
+  /// Side of the squares in which energy is exchanged, pixels, [2, limits::kMaxExchangeSide].
+  int tile_size = 5;
+  /// C: offers per free sample, [1, limits::kMaxPartitions].
+  int partitions = 16;
+  /// The mask grows by so many pixels, [0, limits::kMaxDilation].
+  int dilate = 0;
 
   bool operator==(const VisibilitySpec&) const = default;
 };
 
-// ---- output, state, farm
-// -----------------------------------------------------------------------------------
+// ---- output, state, farm ------------------------------------------------------------------------
 /// What is seen where no object is: the map, nothing, or a picture that the frame is laid over.
 enum class Background : std::uint8_t { environment, transparent, plate };
 /// Where frames tell what catches shadows: in channels shadow.*, or as black in A.
@@ -318,13 +328,13 @@ struct OutputSpec {
   std::string directory;                   ///< absolute
   std::string pattern = "frame.####.exr";  ///< '#'s are the zero-padded frame number
   Background background = Background::environment;
-  std::optional<FileSequence>
-      plate{};  ///< pictures, as large as the frame or larger; with Background::plate
+  /// Image files, as large as the frame or larger; with Background::plate.
+  std::optional<FileSequence> plate{};
   ShadowForm shadows = ShadowForm::channels;
   std::vector<Aov> aovs;  ///< in the order of the enum, no duplicates
   PixelType pixel_type = PixelType::half_float;
   std::string compression = "zip";  ///< none, rle, zips, zip, piz
-  double frames_per_second = 24;    ///< of movies; said in the header of frames; [1, 1000]
+  double frames_per_second = 24;    ///< movies and frame headers; [1, 1000]
   FrameNaming naming = FrameNaming::plain;
   bool clamp_negative = true;  ///< colours below zero become 0 in frames
 
@@ -339,11 +349,12 @@ inline bool has_plate(const OutputSpec& output) {
 enum class StateKeep : std::uint8_t { last, all };
 
 struct StateSpec {
-  bool carry = true;                 ///< pass samples from frame to frame
-  int checkpoint_every = 12;         ///< frames between checkpoints; at rest, of a lease, [1, 1000]
-  int preroll = 2;                   ///< pool: rounds before the first frame that are not seen, [0,
-                                     ///< limits::kMaxPreroll]
-  StateKeep keep = StateKeep::last;  ///< `all` keeps every checkpoint after the job
+  bool carry = true;  ///< pass samples from frame to frame
+  /// Frames between checkpoints; at rest, frames of a lease, [1, 1000].
+  int checkpoint_every = 12;
+  /// pool: rounds before the first frame that are not seen, [0, limits::kMaxPreroll].
+  int preroll = 2;
+  StateKeep keep = StateKeep::last;  ///< `all`: checkpoints stay after the job
 
   bool operator==(const StateSpec&) const = default;
 };
@@ -366,8 +377,10 @@ struct JobSpec {
   StateSpec state;
   int max_retries_per_task = 3;
   int max_seconds_per_task = 3600;  ///< a task that takes longer has failed
-  int max_failed_tasks = 1;         ///< the job fails when so many tasks have failed for good
-  int max_failures_per_worker = 8;  ///< after so many failures a worker rests from the job
+  /// The job fails when so many tasks have failed for good.
+  int max_failed_tasks = 1;
+  /// After so many failures a worker rests from the job.
+  int max_failures_per_worker = 8;
   std::uint64_t seed = 1;
 
   /// Not said by the user, nor part of the JSON: where runs begin that a former job of the same

@@ -26,16 +26,19 @@ enum class Method : std::uint8_t {
 /// What a method hands from frame to frame.
 enum class Carried : std::uint8_t {
   nothing,
-  samples,          ///< the pixel's weighted samples
-  weighed_samples,  ///< with the confidence that they are weighed by
-  memory,           ///< what its rays found, and how noisy its light was
+  samples,  ///< the pixel's weighted samples
+  /// Weighted samples with the confidence by which each pixel's are weighed.
+  weighed_samples,
+  /// What the pixel's rays found, and how noisy its light was.
+  memory,
 };
 
 /// How a method reads the directions that are drawn from the environment once a frame.
 struct LightUse {
   std::int32_t num_taken = 1;  ///< by most pixels
   bool one_run = false;        ///< pixels differ in how many they take
-  bool with_before = false;    ///< their light in the frame before is needed as well
+  /// Their light in the frame before is needed as well.
+  bool with_before = false;
 };
 
 /// All that sets a method apart outside the code that samples, which make_pixel_method() finds, and
@@ -76,7 +79,7 @@ std::span<const std::string_view> method_names();
 /// name: one of method_names().
 Method method_of(std::string_view name);
 
-/// Of `total` samples those from the BRDF, rounded.
+/// How many of `total` samples come from the BRDF, rounded.
 std::int32_t num_from_brdf(std::int32_t total, float brdf_fraction);
 
 }  // namespace baton

@@ -22,7 +22,8 @@ struct GltfMotion {
   std::string file;  ///< .gltf .glb
   std::string node;  ///< its name in the file
   float fps = 24;
-  int start_frame = 0;  ///< the frame at time 0; Blender writes frame f at f / fps seconds
+  /// The frame at time 0; Blender writes frame f at f / fps seconds.
+  int start_frame = 0;
 
   bool operator==(const GltfMotion&) const = default;
 };
@@ -38,8 +39,9 @@ enum class TextureFilter : std::uint8_t { linear, nearest };
 struct TextureSpec {
   /// An image, its tiles (udim.h), or a .gltf or .glb file that holds one.
   std::string file;
-  int image = -1;  ///< of a .gltf or .glb file: place in its list of images; else -1
-  int uv = 0;      ///< set of texture coordinates, 0 or 1
+  /// Place in the list of images of a .gltf or .glb file; else -1.
+  int image = -1;
+  int uv = 0;  ///< set of texture coordinates, 0 or 1
   std::array<float, 2> offset{0, 0};
   std::array<float, 2> scale{1, 1};
   float rotate_deg = 0;  ///< counter-clockwise, of the coordinates
@@ -58,29 +60,36 @@ enum class MaterialKind : std::uint8_t { diffuse, phong, metallic_roughness, mea
 struct MaterialSpec {
   MaterialKind kind = MaterialKind::diffuse;
   Rgb base_color{0.8f, 0.8f, 0.8f};
-  Rgb specular_color{1, 1, 1};       ///< phong; metallic_roughness: on F0 of what is no metal
-  float kd = 0.5f;                   ///< phong, [0, 1]
-  float ks = 0.5f;                   ///< phong, [0, 1]; kd + ks <= 1
-  float exponent = 50;               ///< phong, [1, 100000]
-  float metallic = 0;                ///< [0, 1]
-  float roughness = 0.5f;            ///< [0.02, 1]; alpha = roughness^2
-  float ior = 1.5f;                  ///< metallic_roughness, of what is no metal, [1, 100]
-  float specular = 1;                ///< the same: strength of its reflection, [0, 1]
-  std::optional<float> clearcoat{};  ///< metallic_roughness, [0, 1]; none: no coat
-  std::optional<float> clearcoat_roughness{};  ///< of the coat, [0.02, 1]; none: 0.02
+  /// phong; metallic_roughness: factor on F0 of what is no metal.
+  Rgb specular_color{1, 1, 1};
+  float kd = 0.5f;         ///< phong, [0, 1]
+  float ks = 0.5f;         ///< phong, [0, 1]; kd + ks <= 1
+  float exponent = 50;     ///< phong, [1, 100000]
+  float metallic = 0;      ///< [0, 1]
+  float roughness = 0.5f;  ///< [0.02, 1]; alpha = roughness^2
+  /// metallic_roughness: index of refraction of what is no metal, [1, 100].
+  float ior = 1.5f;
+  /// metallic_roughness: strength of the reflection of what is no metal, [0, 1].
+  float specular = 1;
+  /// metallic_roughness: share of the coat, [0, 1]; none: no coat.
+  std::optional<float> clearcoat{};
+  std::optional<float> clearcoat_roughness{};  ///< coat's roughness, [0.02, 1]; none: 0.02
   std::string file{};                          ///< measured: .binary
 
   std::optional<TextureSpec> color_texture{};               ///< on base_color; its alpha on `alpha`
   std::optional<TextureSpec> metallic_roughness_texture{};  ///< B on metallic, G on roughness
   std::optional<TextureSpec> clearcoat_texture{};           ///< R on clearcoat
   std::optional<TextureSpec> clearcoat_roughness_texture{};  ///< G on clearcoat_roughness
-  std::optional<TextureSpec> clearcoat_normal_texture{};     ///< of the coat alone
-  std::optional<TextureSpec> normal_texture{};               ///< of what is below a coat
-  Rgb emission{0, 0, 0};  ///< radiance that the camera sees; it lights nothing
+  std::optional<TextureSpec> clearcoat_normal_texture{};     ///< normals of the coat alone
+  std::optional<TextureSpec> normal_texture{};               ///< normals below a coat
+  /// Radiance that the camera sees; it lights nothing.
+  Rgb emission{0, 0, 0};
   std::optional<TextureSpec> emission_texture{};  ///< on emission
   float alpha = 1;                                ///< [0, 1]
-  float alpha_cutoff = 0;    ///< where alpha is below, there is no surface; [0, 1]
-  bool alpha_blend = false;  ///< where there is, the share 1 - alpha of all rays passes
+  /// Where alpha is below, there is no surface; [0, 1].
+  float alpha_cutoff = 0;
+  /// Where there is a surface, the share 1 - alpha of all rays passes.
+  bool alpha_blend = false;
 
   bool operator==(const MaterialSpec&) const = default;
 };
@@ -114,16 +123,18 @@ struct PlacedNode {
 /// What shapes a primitive of a glTF file: the morph weights and the skin of a node that shows it.
 /// With a skin its vertices are in the world of the file.
 struct ShapeSpec {
-  int node = 0;                          ///< place in the file's list
-  std::optional<FileClock> animation{};  ///< it deforms as the file's animations say; none: rests
-  std::vector<PlacedNode> places{};      ///< of nodes of the file, such as bones
+  int node = 0;  ///< place in the file's list
+  /// The shape deforms as the file's animations say; none: it rests.
+  std::optional<FileClock> animation{};
+  std::vector<PlacedNode> places{};  ///< nodes of the file, such as bones
 
   bool operator==(const ShapeSpec&) const = default;
 };
 
 struct MeshSpec {
-  std::string path;            ///< .ply .obj .off .gltf .glb
-  bool smooth_normals = true;  ///< interpolate vertex normals (computed when the file has none)
+  std::string path;  ///< .ply .obj .off .gltf .glb
+  /// Interpolate vertex normals (computed when the file has none).
+  bool smooth_normals = true;
   /// One primitive of one mesh of a glTF file, by their places in its lists, flat where it has no
   /// normals; -1: all that the file shows.
   int mesh = -1;
@@ -144,7 +155,8 @@ struct ObjectKey {
   Vec3 rotate_deg{};
   std::array<float, 4> quaternion{0, 0, 0, 1};  ///< x, y, z, w; need not be unit
   Vec3 scale{1, 1, 1};
-  std::optional<Matrix34> matrix{};  ///< in place of all the others; joined linearly
+  /// In place of all the others; joined linearly.
+  std::optional<Matrix34> matrix{};
 
   bool operator==(const ObjectKey&) const = default;
 };
@@ -159,7 +171,8 @@ enum class UpAxis : std::uint8_t { x, y, z };
 struct ObjectSpec {
   std::string mesh;
   std::string material;
-  std::string name{};  ///< for people (object_names); those of one name are one object to them
+  /// For people (object_names); objects of one name are one object to them.
+  std::string name{};
   Vec3 translate{0, 0, 0};
   Vec3 rotate_deg{0, 0, 0};
   Vec3 scale{1, 1, 1};
@@ -198,10 +211,11 @@ struct PlaceSpec {
 /// What a job says of a node of its glTF file, and of all nodes below it.
 struct GltfNodeSpec {
   bool visible = true;
-  std::string material{};  ///< in place of those of the file; empty: those of the file
-  bool catcher = false;    ///< as of objects
-  std::optional<PlaceSpec>
-      place{};  ///< of the node alone, in place of the file's and its animation
+  /// Replaces those of the file; empty: those of the file.
+  std::string material{};
+  bool catcher = false;  ///< as of objects
+  /// Place of the node alone, instead of the file's and its animation.
+  std::optional<PlaceSpec> place{};
 
   bool operator==(const GltfNodeSpec&) const = default;
 };
@@ -230,7 +244,8 @@ struct SceneSpec {
   std::map<std::string, MeshSpec> meshes;
   std::vector<ObjectSpec> objects;
   std::optional<GroundSpec> ground;
-  std::vector<FileSpec> files;  ///< beside those that meshes and materials name
+  /// Files beside those that meshes and materials name.
+  std::vector<FileSpec> files;
 
   bool operator==(const SceneSpec&) const = default;
 };

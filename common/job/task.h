@@ -28,15 +28,16 @@ std::string_view task_name(TaskKind kind);
 /// A task of a job. Made by the three functions below, read by run(), frame() and step().
 struct TaskKey {
   TaskKind kind = TaskKind::render;
-  std::int32_t position = 0;  ///< a Run, a FrameIndex or a Step, as `kind` says
-  std::int32_t tile = 0;      ///< of an assembly 0
+  /// A Run, a FrameIndex or a Step, as `kind` says.
+  std::int32_t position = 0;
+  std::int32_t tile = 0;  ///< an assembly has 0
 
   auto operator<=>(const TaskKey&) const = default;
-  /// Of a render task.
+  /// The run of a render task.
   Run run() const;
-  /// Of an assembly.
+  /// The frame of an assembly.
   FrameIndex frame() const;
-  /// Of a second pass.
+  /// The step of a second pass.
   Step step() const;
 };
 TaskKey render_task(Run run, std::int32_t tile);
@@ -54,17 +55,17 @@ std::string_view blob_kind_name(BlobKind kind);
 /// A blob that a task needs or made.
 struct BlobRef {
   BlobKind kind = BlobKind::state;
-  std::int32_t position = 0;  ///< of an image its FrameIndex, else its Step
+  std::int32_t position = 0;  ///< an image's FrameIndex, others' Step
   std::int32_t tile = 0;
-  Digest digest;  ///< for `image`: digest of the EXR file in the output folder
+  Digest digest;  ///< `image`: digest of the EXR file
   std::uint64_t size_bytes = 0;
 
   /// A state without bytes in the store: it is in the memory of the worker that made it, where
   /// `digest` names it (held_state_name).
   bool is_held() const { return kind == BlobKind::state && size_bytes == 0; }
-  /// Of an image.
+  /// The frame of an image.
   FrameIndex frame() const;
-  /// Of a state, a film or first-pass samples.
+  /// The step of a state, a film or first-pass samples.
   Step step() const;
 
   auto operator<=>(const BlobRef&) const = default;
@@ -117,7 +118,7 @@ struct SamplingStats {
 
   std::uint64_t pixels_fresh = 0, pixels_carried = 0, pixels_restarted = 0;
   std::uint64_t pixels_refreshed = 0;           ///< on schedule or by ratio
-  std::uint64_t pixels_refreshed_by_ratio = 0;  ///< of these, because Lns had moved too far
+  std::uint64_t pixels_refreshed_by_ratio = 0;  ///< refreshed as Lns had moved too far
   std::uint64_t pixels_resampled = 0;
   std::uint64_t local_proposed = 0, local_accepted = 0;  ///< moves
   std::uint64_t independent_proposed = 0, independent_accepted = 0;
@@ -146,21 +147,23 @@ struct FrameQuality {
   std::uint64_t pixels = 0;              ///< 0: the frame is not written
   std::uint64_t pixels_below_zero = 0;   ///< in one of the three at least
   std::uint64_t pixels_beyond_half = 0;  ///< past what a half float can say
-  std::uint64_t pixels_not_finite = 0;   ///< NaN or infinite; in none of the other numbers
+  std::uint64_t pixels_not_finite = 0;   ///< NaN or infinite; in none of the others
   NoiseSource noise_source = NoiseSource::none;
-  float noise = 0;             ///< FrameNoise::relative() (common/image/noise.h)
-  float noise_error = 0;       ///< its standard error, as a share of it
-  float mean = 0;              ///< radiance, over pixels and the three
-  float lowest = 0;            ///< the least value, at most 0
-  float light_below_zero = 0;  ///< what lies below zero over all light, [0, ...)
-  bool clamped = false;        ///< what lay below zero was set to 0
+  float noise = 0;        ///< FrameNoise::relative()
+  float noise_error = 0;  ///< its standard error, as a share of it
+  float mean = 0;         ///< radiance, over pixels and the three
+  float lowest = 0;       ///< the least value, at most 0
+  /// What lies below zero over all light, [0, ...).
+  float light_below_zero = 0;
+  bool clamped = false;  ///< what lay below zero was set to 0
 
   bool operator==(const FrameQuality&) const = default;
 };
 
 /// The sampling of one tile in one step, or what was seen of the whole frame when it was written.
 struct FrameStats {
-  std::int32_t position = 0;  ///< the Step of a render task, the FrameIndex of an assembly
+  /// The Step of a render task, the FrameIndex of an assembly.
+  std::int32_t position = 0;
   std::int32_t tile = 0;
   SamplingStats sampling;
   FrameQuality quality = {};
@@ -192,7 +195,7 @@ struct RenderStats {
   /// prepared.
   double seconds_light = 0, seconds_primary = 0, seconds_sample = 0, seconds_visibility = 0,
          seconds_shade = 0;
-  double seconds_state = 0;            ///< encoding, writing, reading and decoding sample states
+  double seconds_state = 0;            ///< encoding, storing and reading states
   std::uint64_t pixels_masked = 0;     ///< that the second pass did again
   std::uint64_t rays_second_pass = 0;  ///< not in rays_shadow
   double seconds_second_pass = 0;      ///< all of the second pass

@@ -37,7 +37,7 @@ struct Philox4x32 {
 /// Which part of the program asks: the third word of every address. Values are for ever.
 enum class PassId : std::uint32_t {
   site_position = 1,     ///< where a pixel's sites lie
-  presampled_light = 2,  ///< the frame's presampled environment directions
+  presampled_light = 2,  ///< the frame's presampled directions
   candidates = 3,        ///< SIR candidates
   choose = 4,            ///< SIR choice
   resample = 5,          ///< resampling of carried particles
@@ -45,9 +45,10 @@ enum class PassId : std::uint32_t {
   reference = 7,         ///< brute force
   refresh = 8,           ///< a pixel's turn to start afresh
   partition = 9,         ///< where the squares of the second pass lie
-  exchange = 10,         ///< who is offered a sample in the second pass
-  reproject = 11,        ///< the site that is followed back, and which site inherits a sample
-  neighbor = 12,         ///< which neighbours a pixel asks
+  exchange = 10,         ///< receivers of a sample in the second pass
+  /// The site that is followed back, and which site inherits a sample.
+  reproject = 11,
+  neighbor = 12,  ///< which neighbours a pixel asks
 };
 
 /// uint32 -> float uniform in [0, 1): the top 24 bits.

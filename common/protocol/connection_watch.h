@@ -49,8 +49,10 @@ class ConnectionWatch {
 
  private:
   struct Connection {
-    std::uint64_t bytes = 0;  ///< received when its last whole message was noticed
-    bool has_spoken = false;  ///< a whole message since the last close_endless()
+    /// Bytes received when the last whole message was noticed.
+    std::uint64_t bytes = 0;
+    /// A whole message has come since the last close_endless().
+    bool has_spoken = false;
   };
   void note(Failure failure);
 

@@ -13,18 +13,18 @@ struct JobEstimate {
   std::int64_t tiles = 0;
   std::int64_t runs = 0;                    ///< per tile
   std::int64_t render_tasks = 0;            ///< tiles * runs
-  std::int64_t second_pass_tasks = 0;       ///< tiles * frames, with correlated visibility
+  std::int64_t second_pass_tasks = 0;       ///< tiles * frames; correlated visibility
   std::int64_t assemble_tasks = 0;          ///< one a frame
-  std::int64_t dependencies = 0;            ///< of a task on another
-  std::int64_t rounds = 1;                  ///< of a frame
+  std::int64_t dependencies = 0;            ///< pairs: a task waits for another
+  std::int64_t rounds = 1;                  ///< per frame
   std::int64_t preroll_rounds = 0;          ///< before the first frame
   std::int64_t primary_rays_per_pixel = 0;  ///< in a frame; with maxSites at most
   std::int64_t shadow_rays_per_pixel = 0;   ///< at most, in a frame, in the first pass
   std::int64_t film_channels = 0;
-  std::int64_t film_bytes = 0;             ///< of one frame as float32 tiles, before compression
-  std::int64_t frame_bytes = 0;            ///< of one EXR, before compression
+  std::int64_t film_bytes = 0;             ///< one frame as float32 tiles, unpacked
+  std::int64_t frame_bytes = 0;            ///< one EXR, before compression
   std::int64_t state_bytes_per_pixel = 0;  ///< in memory; 0 when no state is carried
-  std::int64_t state_bytes = 0;            ///< of all tiles at one checkpoint, in memory
+  std::int64_t state_bytes = 0;            ///< all tiles at one checkpoint, in memory
   std::int64_t largest_blob_bytes = 0;     ///< one tile's film or state in memory
 
   std::int64_t tasks() const { return render_tasks + second_pass_tasks + assemble_tasks; }

@@ -22,7 +22,8 @@ struct EnvironmentFrame {
   std::int32_t map_a = 0;
   std::int32_t map_b = 0;  ///< equal to map_a when mix is 0
   float mix = 0;           ///< [0, 1)
-  float scale = 1;         ///< radiance factor beside EnvironmentSpec::scale, > 0
+  /// Radiance factor beside EnvironmentSpec::scale, > 0.
+  float scale = 1;
   Mat3 rotation;
 
   bool operator==(const EnvironmentFrame&) const = default;
@@ -41,7 +42,8 @@ double rotation_deg_at(const EnvironmentSpec& environment, FrameNumber frame);
 struct FrameSpec {
   Step step{};
   FrameNumber number{1};
-  std::int32_t first_round = 0;  ///< rounds of this frame that were rendered in earlier sweeps
+  /// Number of rounds of this frame that earlier sweeps have rendered.
+  std::int32_t first_round = 0;
   EnvironmentFrame environment;
 
   /// Number of a round among those of the frame over all sweeps: the address of its random numbers.

@@ -9,9 +9,10 @@ namespace baton {
 
 /// Bytes of blobs in the store.
 struct StoreEstimate {
-  std::int64_t states = 0;   ///< checkpoints that stay, and states on their way to the next frame
-  std::int64_t films = 0;    ///< of the frames that are not written yet
-  std::int64_t samples = 0;  ///< of the first pass, for the second
+  /// Checkpoints that stay, and states on their way to the next frame.
+  std::int64_t states = 0;
+  std::int64_t films = 0;    ///< those of frames not written yet
+  std::int64_t samples = 0;  ///< first-pass samples for the second pass
 
   std::int64_t total() const { return states + films + samples; }
 };

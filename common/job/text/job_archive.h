@@ -52,9 +52,10 @@ double decimal(float value);
 /// How an object may be written besides `{...}`.
 struct ObjectForm {
   const char* shorthand = nullptr;  ///< a lone text means {shorthand: text}
-  bool file = false;                ///< a lone text names a JSON file that holds the object
-  bool present =
-      true;  ///< without the key: true means all defaults, false means there is no such object
+  /// A lone text names a JSON file with the object.
+  bool file = false;
+  /// Without the key: true means all defaults, false means there is no such object.
+  bool present = true;
 };
 
 /// A word for several values of an enumeration.

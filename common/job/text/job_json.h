@@ -20,8 +20,9 @@ Result<JobSpec> parse_job(std::string_view json, const std::string& name,
 
 /// A value that is said in place of the job file's.
 struct JobOverride {
-  std::string path;   ///< in the JSON of the job: `image.sites`, `$.scene.objects[0].fitHeight`
-  std::string value;  ///< JSON; what is none counts as a text
+  /// Path in the JSON of the job: `image.sites`, `$.scene.objects[0].fitHeight`.
+  std::string path;
+  std::string value;             ///< JSON; what is none counts as a text
   std::string option = "--set";  ///< named in faults
 };
 
@@ -36,9 +37,11 @@ std::string to_json(const JobSpec& job);
 
 /// One value in force, for `baton check --explain`.
 struct JobSetting {
-  std::string path;    ///< in the canonical JSON, e.g. `$.image.width`
-  std::string value;   ///< as JSON
-  bool given = false;  ///< said by the job file; otherwise a default
+  /// Path in the canonical JSON, e.g. `$.image.width`.
+  std::string path;
+  std::string value;  ///< as JSON
+  /// Said by the job file; otherwise a default.
+  bool given = false;
 };
 
 /// Every value of a job file in force, in the order of to_json. Errors: those of load_job.

@@ -28,11 +28,13 @@ class JobOverrides {
     bool is_index = false;
   };
   struct Entry {
-    std::string path;         ///< as faults write it: `$.scene.objects[0].fitHeight`
+    /// Path as faults write it: `$.scene.objects[0].fitHeight`.
+    std::string path;
     std::vector<Step> steps;  ///< empty: the path is none
     nlohmann::json value;
     std::string option;
-    std::string made;  ///< the first part of the path that the file does not have; "": not applied
+    /// The first part of the path that the file does not have; "": not applied.
+    std::string made;
   };
 
   static std::vector<Step> steps_of(const std::string& path);

@@ -73,7 +73,7 @@ class JobJsonReader final : public JobArchive {
   void report_unknown_keys();
 
   Place place_;
-  std::list<nlohmann::json> documents_;  ///< of other files; places point into them
+  std::list<nlohmann::json> documents_;  ///< other files' JSON; places point into it
   JobOverrides overrides_;
   std::set<std::string> defaulted_;
   std::vector<std::string> faults_;
