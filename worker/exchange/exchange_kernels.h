@@ -21,7 +21,8 @@ struct LightRecord {
 /// The shadow rays of some offers.
 struct OfferRays {
   ShadowRays rays;
-  std::vector<std::uint32_t> offer;  ///< (capacity) whose ray it is; the first rays.size() count
+  /// (capacity) whose ray it is; the first rays.size() count.
+  std::vector<std::uint32_t> offer;
 };
 
 /// The inner loops of the second pass.

@@ -68,7 +68,8 @@ class PixelMask {
   }
 
   PixelRect rect_;
-  std::size_t words_per_row_;  ///< one more than needed, so that row_bits may read two
+  /// One more than needed, so that row_bits may read two.
+  std::size_t words_per_row_;
   std::vector<std::uint64_t> words_;
 };
 
@@ -113,9 +114,10 @@ class SquareMembers {
 
   /// The others in the square of a masked pixel (x, y) of this row of squares.
   struct Others {
-    const std::uint32_t* members = nullptr;  ///< names, row by row, the pixel itself among them
-    std::uint32_t rank = 0;                  ///< of the pixel itself
-    std::uint32_t count = 0;                 ///< without it
+    /// Names, row by row, the pixel itself among them.
+    const std::uint32_t* members = nullptr;
+    std::uint32_t rank = 0;   ///< place of the pixel itself in `members`
+    std::uint32_t count = 0;  ///< without it
     /// The k-th other, k < count.
     std::uint32_t pick(std::uint32_t k) const { return members[k + (k >= rank ? 1 : 0)]; }
   };
@@ -130,11 +132,11 @@ class SquareMembers {
   void list(const PixelMask& mask, const SquarePartitions& partitions, std::int32_t partition,
             std::int32_t y, std::span<const std::int32_t> names);
 
-  std::int32_t x0_ = 0, y0_ = 0, y1_ = 0;  ///< of the rows in the lists; none at first
+  std::int32_t x0_ = 0, y0_ = 0, y1_ = 0;  ///< rows that are listed; none at first
   std::size_t width_ = 0;
   std::vector<std::uint32_t> members_;  ///< square after square
-  std::vector<std::uint32_t> first_,
-      end_;                          ///< (columns of the mask) members of the square of this column
+  /// (columns of the mask) members of the square of this column: [first, end).
+  std::vector<std::uint32_t> first_, end_;
   std::vector<std::uint16_t> rank_;  ///< (rows of squares, columns)
 };
 

@@ -184,9 +184,11 @@ class LightRun {
   }
 
   const PresampledLight& presampled_;
-  std::int32_t first_ = 0;              ///< block at which the region begins that is read from
-  std::int32_t start_ = 0;              ///< where in it the reading begins
-  std::int32_t within_ = 0;             ///< its blocks, less one; a power of two, less one
+  /// Block at which the region begins that is read from.
+  std::int32_t first_ = 0;
+  std::int32_t start_ = 0;  ///< where in it the reading begins
+  /// Blocks of the region, less one: a power of two, less one.
+  std::int32_t within_ = 0;
   std::int32_t step_ = 1 << kStepBits;  ///< blocks from one vector to the next
 };
 
@@ -219,7 +221,8 @@ struct CandidateWeights {
   const SiteBlock& sites;
   const kernels::CandidateCounts& counts;
 
-  /// Of points that reflect `target` in the mean; the first `left` count.
+  /// The weights, over their targets, of points that reflect `target` in the mean; the first `left`
+  /// count, the others get 0.
   HWY_INLINE VF operator()(VF target, const SurfaceLanes& surface, const BsdfLanes& f,
                            VF light_density, std::size_t left) const {
     const DF d;

@@ -81,7 +81,7 @@ class LightSequence {
   const std::shared_ptr<const HiddenLight> hidden_;
   std::vector<std::optional<HiddenCone>> cones_;  ///< (frames), of those that were asked for
   std::vector<FrameSpec> frames_;
-  const std::int32_t num_sets_;  ///< of presampled light
+  const std::int32_t num_sets_;  ///< sets of presampled light
   mutable std::mutex mutex_;
   /// By the first step that shows these texels, and what is hidden of them.
   LruCache<std::pair<Step, HiddenCone>, EnvironmentMap> mixed_maps_;

@@ -23,9 +23,9 @@ namespace baton {
 /// that are spread over the light, and so its shadow rays are stratified. In each run place 0 is
 /// another eighth, so that one who takes the same place of random blocks sees the whole map.
 struct PresampledLight {
-  static constexpr std::uint32_t kSize = 1u
-                                         << 13;  ///< entries: few enough to stay in a core's cache
-  static constexpr std::uint32_t kBlock = 8;     ///< entries that lie together in memory
+  /// Number of entries: few enough to stay in a core's cache.
+  static constexpr std::uint32_t kSize = 1u << 13;
+  static constexpr std::uint32_t kBlock = 8;  ///< entries that lie together in memory
 
   /// Which eighth of the curve each place in the first run's blocks stands for; its own inverse.
   static constexpr std::uint32_t kEighthOf[kBlock] = {0, 4, 2, 6, 1, 5, 3, 7};
@@ -46,10 +46,12 @@ struct PresampledLight {
   struct alignas(32) Before {
     float r[kBlock], g[kBlock], b[kBlock];
   };
-  std::vector<Block> blocks;     ///< (kNumBlocks); empty for a black map
-  std::vector<Before> before;    ///< (kNumBlocks), where the layout asks for it; else empty
+  std::vector<Block> blocks;  ///< (kNumBlocks); empty for a black map
+  /// (kNumBlocks), where the layout asks for it; else empty.
+  std::vector<Before> before;
   std::uint32_t run_blocks = 1;  ///< a power of two
-  float mean_radiance = 0;       ///< of the environment over the sphere, grey; by its entries
+  /// Mean of the environment over the sphere, grey; by the entries.
+  float mean_radiance = 0;
 
   bool empty() const { return blocks.empty(); }
   std::size_t size_bytes() const {

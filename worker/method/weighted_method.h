@@ -20,7 +20,7 @@ class WeightedMethod : public PixelMethod {
 
  private:
   std::unique_ptr<const PixelSampler> sampler_;
-  std::size_t num_particles_;         ///< of all populations
+  std::size_t num_particles_;         ///< N, over all populations
   std::vector<float> picture_scale_;  ///< (populations)
 };
 

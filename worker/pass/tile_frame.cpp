@@ -38,7 +38,7 @@ struct TileFrameRenderer::Batch {
   std::array<std::size_t, kBatchPixels> end_ray;  ///< where each pixel's rays end
   std::array<KnownLight, kBatchPixels> known;
   std::array<PixelResult, kBatchPixels> pixels;
-  std::array<Rgb, kBatchPixels> emission;              ///< of the surfaces that are seen
+  std::array<Rgb, kBatchPixels> emission;              ///< emission of what pixels see
   std::array<std::optional<Rgb>, kBatchPixels> again;  ///< radiance once more, where it is wanted
 
   RngKey key(const RenderContext& context, const PixelRect& rect, std::size_t index) const {

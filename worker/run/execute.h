@@ -17,10 +17,12 @@ namespace baton {
 struct TaskOutput {
   std::vector<BlobRef> outputs;
   RenderStats stats;
-  std::vector<FrameStats> frames = {};  ///< of a render task in frame order, of an assembly one
+  /// A render task: in frame order; an assembly: one.
+  std::vector<FrameStats> frames = {};
   /// What this machine does not see of the job, a line; then nothing was done.
   std::string unseen = {};
-  std::vector<std::string> notes = {};  ///< of files, for people: what was repaired, what is odd
+  /// About files, for people: what was repaired, what is odd.
+  std::vector<std::string> notes = {};
 };
 
 /// How a task that was leased has ended.
@@ -33,7 +35,7 @@ struct TaskEnded {
 /// What a lease says beside the task: LeaseGrant in PROTOCOL.md.
 struct TaskGrant {
   std::vector<BlobRef> inputs;
-  StepSpan steps{};  ///< of a render task
+  StepSpan steps{};  ///< what a render task renders
   bool may_hold = false;
   Step states_from{};
 };

@@ -62,7 +62,7 @@ class RenderThreads {
 
   struct Executed {
     std::vector<PooledTask> tasks;
-    std::vector<TaskEnded> ends;  ///< of each
+    std::vector<TaskEnded> ends;  ///< (tasks) how each has ended
   };
 
   void work();

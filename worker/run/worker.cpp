@@ -361,7 +361,8 @@ class Worker {
   NoteLog notes_;
   TaskWatch watch_;
   std::list<std::future<std::vector<StatesPublished>>> packing_;
-  RenderThreads pool_;  ///< last: its threads use the rest and are joined first
+  /// Last: its threads use the rest and are joined first.
+  RenderThreads pool_;
 };
 
 }  // namespace

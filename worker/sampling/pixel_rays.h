@@ -26,9 +26,9 @@ struct PixelRays {
   Column<float> r, g, b;     ///< what a free ray brings
   Column<float> visibility;  ///< and its share of Lns
   Column<std::uint8_t> site;
-  Column<std::uint8_t> bin;  ///< of VisibilityBins
+  Column<std::uint8_t> bin;  ///< cell of VisibilityBins
   Value constant;
-  LightVariance light_variance;  ///< of this frame's candidates
+  LightVariance light_variance;  ///< variance of this frame's candidates
 
   void clear() {
     count = 0;

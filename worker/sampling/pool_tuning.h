@@ -28,8 +28,10 @@ struct PoolTuning {
 
   /// Candidates of a kind.
   struct Candidates {
-    float usual_noise;  ///< over noise_scale(), that gives the usual number
-    float least;        ///< share of the usual number that every pixel gets
+    /// Noise over noise_scale() that gives the usual number.
+    float usual_noise;
+    /// Share of the usual number that every pixel gets.
+    float least;
   };
   Candidates light{0.0015f, 0.25f};
   /// Those from lobes take more time, and too few of them miss lamps without showing any noise.

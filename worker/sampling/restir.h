@@ -25,8 +25,9 @@ inline constexpr std::size_t kMaxRestirSets = 2 + limits::kMaxNeighbors;
 /// Samples [end of the set before, end) of all, and what is known of their set.
 struct RestirSet {
   std::size_t end = 0;
-  float confidence = 1;                  ///< c, >= 0
-  const float* target_before = nullptr;  ///< p~_t at the samples of all sets; null: of now (fresh)
+  float confidence = 1;  ///< c, >= 0
+  /// p~_t at the samples of all sets; null: that of this frame (fresh).
+  const float* target_before = nullptr;
 };
 
 /// weight[i] of all samples. contribution, target_now: at all samples; set 0 is the fresh one.
