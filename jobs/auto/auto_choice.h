@@ -19,9 +19,10 @@ bool chooses_particles(const SamplingSpec& asked);
 
 /// A way to render a job, as a pilot may try it.
 struct AutoCandidate {
-  std::string family;  ///< e.g. "bidirectional M=128"; its members differ in N alone
+  /// E.g. "bidirectional M=128"; members of a family differ in N alone.
+  std::string family;
   SamplingSpec sampling;
-  bool correlated = false;  ///< with the second pass of correlated visibility
+  bool correlated = false;  ///< with a second pass
 
   std::string name() const;
 };
@@ -35,7 +36,7 @@ std::vector<AutoCandidate> auto_candidates(const JobSpec& job);
 struct PilotNumbers {
   AutoCandidate candidate;
   double error = 0;    ///< RMSE over mean radiance
-  double cost_us = 0;  ///< counted_cost_us per pixel with a surface and frame
+  double cost_us = 0;  ///< counted_cost_us per surface pixel, frame
 };
 
 struct AutoChoice {

@@ -10,9 +10,10 @@ namespace baton {
 /// What settle_auto is going to do.
 struct PilotPlan {
   std::size_t candidates = 0, windows = 0;
-  std::int64_t pixels = 0;  ///< of a picture
-  std::size_t frames = 0;   ///< in all, if half of the candidates are looked at again
-  double cpu_seconds = 0;   ///< as much, of counted work
+  std::int64_t pixels = 0;  ///< pixels of a pilot's frame
+  /// All frames, if half of the candidates are measured again.
+  std::size_t frames = 0;
+  double cpu_seconds = 0;  ///< as much, of counted work
 };
 /// job: with `auto`. ray_factor: ray_cost_factor of the job.
 PilotPlan plan_pilot(const JobSpec& job, double ray_factor);

@@ -8,15 +8,17 @@
 namespace baton {
 namespace {
 
-/// Of the fit to jobs/studies/ray-costs.json.
+/// Constants of the fit to jobs/studies/ray-costs.json.
 constexpr double kFittedTriangles = 75'000;
 constexpr double kTriangleExponent = 0.14;
 constexpr double kMovingFactor = 3;
 
 /// Microseconds of one of each. A move costs what it evaluates.
 struct UnitCosts {
-  double pixel;       ///< surfaces, film, the pixel's share of its sampler
-  double shadow_ray;  ///< trace and shade; with a second pass, of either pass
+  /// Surfaces, film, and the pixel's share of its sampler.
+  double pixel;
+  /// Trace and shade; with a second pass, a ray of either pass.
+  double shadow_ray;
   double evaluation;
 };
 

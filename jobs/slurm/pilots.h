@@ -10,18 +10,20 @@ namespace baton {
 /// in an allocation of Slurm. All here is pure: snapshots in, orders out.
 
 enum class SlurmState {
-  waiting,    ///< will begin
-  resting,    ///< was put back into the queue, which lets it wait for minutes
+  waiting,  ///< will begin
+  /// Put back into the queue, which lets it wait for minutes.
+  resting,
   running,    ///< its program runs, or is believed to
-  suspended,  ///< stands still until somebody lets it go on
+  suspended,  ///< stands still until somebody resumes it
   ending,
 };
 
 /// A pilot that Slurm has.
 struct SlurmPilot {
-  std::string id;  ///< "17_3": array and task, as scancel takes it
+  std::string id;  ///< "17_3": array and task, as for scancel
   SlurmState state = SlurmState::waiting;
-  double alone_s = 0;  ///< how long it has been running without a worker of its name
+  /// How long it has been there without a worker of its name.
+  double alone_s = 0;
   /// For people: Slurm's own word and its reason, the name of the job, the node, what is left of
   /// the time.
   std::string state_text = {}, reason = {}, job_name = {}, node = {}, time_left = {};
@@ -31,7 +33,7 @@ struct SlurmPilot {
 
 /// A worker of a pilot that the coordinator has, connected or not yet missed.
 struct SlurmWorker {
-  std::string id;    ///< of its pilot
+  std::string id;    ///< id of its pilot
   std::string name;  ///< by which it goes at the coordinator
   int leases = 0;
   bool told_to_end = false;
@@ -79,7 +81,8 @@ class VainArrays {
   const std::string& last() const { return last_; }  ///< in vain
 
  private:
-  std::string open_;  ///< of whose pilots nothing has been seen; empty: none
+  /// The array of whose pilots nothing has been seen; empty: none.
+  std::string open_;
   std::string last_;
   int count_ = 0;
 };

@@ -29,12 +29,13 @@ inline constexpr std::string_view kJobNamePrefix = "baton-";
 /// What a pilot is started with.
 struct PilotJob {
   std::string worker;      ///< path of baton-worker
-  std::string endpoint;    ///< of the coordinator, as nodes reach it
+  std::string endpoint;    ///< the coordinator, as nodes reach it
   std::string key;         ///< file; empty: none
   std::string script_log;  ///< file; %A and %a are array and task
-  std::string job_name;    ///< by which squeue finds the pilots of this farm
-  std::string partition;   ///< empty: Slurm's default
-  std::string time;        ///< empty: the partition's default
+  /// Name by which squeue finds the pilots of this farm.
+  std::string job_name;
+  std::string partition;  ///< empty: Slurm's default
+  std::string time;       ///< empty: the partition's default
   std::int64_t time_s = 0;
   std::vector<std::string> worker_arguments, sbatch_arguments;  ///< those of the user, as they are
 };

@@ -17,13 +17,15 @@ struct FrameMeasures {
   FrameNumber frame{};
   double mse = 0;              ///< over R, G, B
   double rel_mse = 0;          ///< mean of (I - R)^2 / (R + .01)^2
-  double flip = 0;             ///< mean LDR-FLIP of the tone-mapped pictures, [0, 1]
-  double percentile_99_9 = 0;  ///< of |I - R|, the mean over R, G, B of a pixel
-  double bias = 0;             ///< mean of I - R, signed; noise of the run included
-  double lns_mean = 0;         ///< mean Lns over mean Lns of the reference
-  double lns_median = 0;       ///< median over pixels of Lns / Lns of the reference
-  double ess = 0;              ///< mean ESS / N
-  double acceptance = 0;       ///< mean share of accepted moves; of pixels
+  double flip = 0;             ///< mean LDR-FLIP, tone-mapped, [0, 1]
+  double percentile_99_9 = 0;  ///< |I - R|, mean over R, G, B of a pixel
+  /// Mean of I - R, signed; noise of the rendering included.
+  double bias = 0;
+  double lns_mean = 0;  ///< mean Lns over mean Lns of the reference
+  /// Median over pixels of Lns / Lns of the reference.
+  double lns_median = 0;
+  double ess = 0;         ///< mean ESS / N
+  double acceptance = 0;  ///< mean share of accepted moves; of pixels
   /// E[(dI - dR)^2] / (E[(I - R)^2] + E[(I' - R')^2]) with the frame before: 1 for errors that are
   /// independent from frame to frame, 0 for errors that stand still. kNotMeasured without it.
   double flicker = kNotMeasured;

@@ -17,7 +17,8 @@ struct Picture {
   std::vector<float> lns;         ///< (pixels)
   std::vector<float> ess;         ///< (pixels) ESS / N; empty for references
   std::vector<float> acceptance;  ///< (pixels) of moves; empty for references
-  std::vector<float> variance;    ///< (pixels) mean over R, G, B; empty but for references
+  /// (pixels) mean over R, G, B; empty but for references.
+  std::vector<float> variance;
 };
 
 /// Side of the squares that pictures are divided into, in pixels; those at the border are cut.
@@ -33,20 +34,23 @@ Result<Picture> read_picture(const std::filesystem::path& path);
 struct Reference {
   std::array<Picture, 2> half;
   RgbImage mean;
-  float exposure = 1;  ///< of all pictures that are compared with it
+  float exposure = 1;  ///< exposure of all frames compared with it
   RgbImage displayed;  ///< tone-mapped mean
 
   /// Pixels with a surface, as indices.
   std::vector<std::size_t> lit_pixels;
-  std::vector<std::size_t> block;  ///< by lit pixel: the square in which its error counts
+  /// By lit pixel: the square in which its error counts.
+  std::vector<std::size_t> block;
   std::size_t num_blocks = 0;
   double mean_radiance = 0;  ///< over lit pixels and R, G, B
   /// Mean squared error of R by its halves, mean (A - B)^2 / 4: what R cannot resolve.
   double mse = 0;
   double rel_mse = 0;  ///< the same over (R + .01)^2
-  double flip = 0;     ///< mean FLIP between R and A, which is as far from R as R from the truth
-  double reported_mse = 0;  ///< the same by the variance that brute force reports of itself
-  double lns_mean = 0;      ///< over lit pixels
+  /// Mean FLIP between R and A, which is as far from R as R from the truth.
+  double flip = 0;
+  /// `mse` by the variance that brute force reports of itself.
+  double reported_mse = 0;
+  double lns_mean = 0;  ///< over lit pixels
 };
 
 /// (R + this)^2 divides squared errors in relMSE, so that black pixels count finitely.

@@ -14,7 +14,7 @@ namespace baton {
 /// Counted work and CPU seconds of a run, over all its frames.
 struct RunCounts {
   std::uint64_t pixels = 0, pixels_background = 0;
-  std::uint64_t rays_shadow = 0;  ///< of both passes
+  std::uint64_t rays_shadow = 0;  ///< rays of both passes
   std::uint64_t target_evaluations = 0, moves_proposed = 0;
   std::uint64_t pixels_resampled = 0, pixels_restarted = 0;
   double cpu_seconds = 0;
@@ -28,7 +28,8 @@ RunCounts counts_of(const RenderStats& stats);
 
 /// What is kept of one run: one cell with one seed.
 struct RunRecord {
-  std::string key;  ///< names the run whatever the study: see run_key
+  /// Names the rendering whatever the study: see run_key.
+  std::string key;
   RunCounts counts;
   std::uint64_t state_bytes = 0, state_pixels = 0;
   std::uint64_t frames_rendered = 0;

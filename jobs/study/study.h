@@ -11,7 +11,7 @@
 
 namespace baton {
 
-/// Of every job of a study.
+/// File names of the frames of every job of a study.
 inline constexpr const char* kFramePattern = "frame.####.exr";
 
 /// Adds what the measures need of a job's frames and takes what would disturb them, but for AOVs.
@@ -26,17 +26,20 @@ JobSpec reference_job(const JobSpec& job, int samples, const std::vector<FrameNu
 /// that their difference tells what the reference can resolve.
 struct StudyScene {
   std::string name;
-  std::array<JobSpec, 2> reference;  ///< of the measured frames alone
+  std::array<JobSpec, 2> reference;  ///< jobs of the measured frames alone
   std::vector<FrameNumber> frames;   ///< measured
-  FrameNumber cut_frame{};    ///< a measured frame at which the light changes at once; 0: none
-  std::array<int, 4> crop{};  ///< x, y, width, height in pixels, shown side by side
+  /// A measured frame at which the light changes at once; 0: none.
+  FrameNumber cut_frame{};
+  /// Corner, width and height in pixels, shown side by side.
+  std::array<int, 4> crop{};
 };
 
 /// One combination: everything but the seed.
 struct StudyCell {
   std::size_t scene = 0, method = 0;  ///< indices into the study's lists
   std::string budget;
-  JobSpec job;  ///< seed, output folder: filled in run by run
+  /// Its seed and output folder are filled in for each rendering.
+  JobSpec job;
   /// What `auto` chose for it, "CHOICE: what is expected of it"; empty: its job was fixed.
   std::string chosen{};
 };
@@ -47,7 +50,8 @@ struct Study {
   int num_seeds = 20;
   std::vector<StudyScene> scenes;
   std::vector<std::string> methods;
-  std::vector<StudyCell> cells;  ///< by scene, then method, then budget, in the order of the file
+  /// By scene, then method, then budget, in the order of the file.
+  std::vector<StudyCell> cells;
 
   const StudyScene& scene_of(std::size_t cell) const { return scenes[cells[cell].scene]; }
   const std::string& method_of(std::size_t cell) const { return methods[cells[cell].method]; }

@@ -17,10 +17,12 @@ const char* name_of(ErrorKindOfImage kind);
 
 /// What a run of a cell costs: middle of its runs, per pixel with a surface and frame.
 struct CellCost {
-  double cpu_us = 0;       ///< primary rays, sampling, visibility, shading, second pass
+  /// Primary rays, sampling, visibility, shading, second pass.
+  double cpu_us = 0;
   double rays = 0;         ///< shadow rays of both passes
-  double evaluations = 0;  ///< of the target
-  double light_ms = 0;     ///< preparing the light, per frame, whatever the number of pixels
+  double evaluations = 0;  ///< target evaluations
+  /// Preparing the light, per frame, whatever the number of pixels.
+  double light_ms = 0;
   double state_bytes = 0;
 };
 CellCost cell_cost(const std::vector<RunRecord>& runs);
@@ -53,10 +55,13 @@ struct CellSummary {
   CellCost cost;
   Interval rmse, rel_mse, flip, bias;
   double percentile_99_9 = 0;
-  Interval flicker;       ///< over runs; NaN when no two measured frames follow each other
-  double lag = 0;         ///< lag_after_cut; NaN without a cut
-  bool resolved = false;  ///< the squared error is at least that of the reference
-  bool biased = false;    ///< the interval of the bias, with the reference's, leaves out 0
+  /// Over renderings; NaN when no two measured frames follow each other.
+  Interval flicker;
+  double lag = 0;  ///< lag_after_cut; NaN without a cut
+  /// The squared error is at least that of the reference.
+  bool resolved = false;
+  /// The interval of the bias, with the reference's, leaves out 0.
+  bool biased = false;
   /// MSE x time of the baseline over MSE x time of this cell: > 1 is better. The baseline has the
   /// budget of the same name, or is the best of its method. NaN without the method in the study.
   Interval against_mis, against_bidirectional;

@@ -10,15 +10,17 @@ namespace baton {
 
 struct ChartPoint {
   double x = 0, y = 0;
-  double low = 0, high = 0;  ///< of the band around y
-  std::string label;         ///< shown when the pointer rests on it, and beside it when `marked`
-  bool marked = false;       ///< on the Pareto front: with a ring
-  bool hollow = false;       ///< not resolved by the reference
+  double low = 0, high = 0;  ///< band around y
+  /// Shown when the pointer rests on it, and beside it when `marked`.
+  std::string label;
+  bool marked = false;  ///< on the Pareto front: with a ring
+  bool hollow = false;  ///< not resolved by the reference
 };
 
 struct ChartSeries {
   std::string name;
-  int colour = 0;                  ///< index into the palette, which repeats after eight, dashed
+  /// Index into the palette, which repeats after eight, dashed.
+  int colour = 0;
   std::vector<ChartPoint> points;  ///< in the order in which they are joined
 };
 
@@ -26,7 +28,8 @@ struct Chart {
   std::string title, x_label, y_label;
   AxisScale x_scale = AxisScale::log, y_scale = AxisScale::log;
   std::vector<ChartSeries> series;
-  std::optional<double> floor;  ///< a line across: what the reference cannot resolve
+  /// A line across: what the reference cannot resolve.
+  std::optional<double> floor;
 };
 
 /// A picture of the chart, 620 x 400 pixels, with ticks, bands, markers and a legend.

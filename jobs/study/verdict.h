@@ -12,8 +12,8 @@ namespace baton {
 struct Verdict {
   std::size_t scene = 0;
   std::size_t winner = 0;           ///< a cell
-  std::optional<std::size_t> next;  ///< of the second best method; none: there is one alone
-  Interval ratio;                   ///< of the winner's efficiency over the next one's
+  std::optional<std::size_t> next;  ///< second best method; none: there is one
+  Interval ratio;                   ///< efficiency of the winner over the next
   bool winner_biased = false;
   bool next_biased = false;
   /// Methods whose error lies below the reference's own: they may be the best.

@@ -79,7 +79,8 @@ struct SphereGrid {
   Vec3 axis{0, 0, 1};
   int num_rings = 24;
   int num_sectors = 32;
-  double power = 1;  ///< 1: equal solid angles; larger for sharp lobes
+  /// 1: equal solid angles; larger for sharp lobes.
+  double power = 1;
 
   std::size_t num_cells() const { return static_cast<std::size_t>(num_rings) * num_sectors; }
 

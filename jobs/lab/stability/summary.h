@@ -21,7 +21,8 @@ struct FramePoint {
 
 struct Summary {
   Numbers numbers;
-  std::vector<FramePoint> series;  ///< frames whose exact answer is black are left out
+  /// Frames whose exact answer is black are left out.
+  std::vector<FramePoint> series;
 };
 
 /// Compares observations with the exact answer. truth.frames are the judged frames of `time`.

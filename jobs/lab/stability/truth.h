@@ -15,8 +15,8 @@ struct FrameTruth {
 
 struct Truth {
   std::vector<FrameTruth> frames;  ///< in the order of job.frames
-  double quadrature_error =
-      0;  ///< rms difference to half as many nodes / mean radiance, first lit frame
+  /// RMS difference to half as many nodes / mean radiance, first lit frame.
+  double quadrature_error = 0;
 };
 
 /// Sums f cos L V over all texels of the map: a midpoint rule of nodes x nodes points in each

@@ -42,8 +42,8 @@ inline std::span<const float> plane(const FilmTile& film, std::string_view name)
   return {film.find(name), film.num_pixels()};
 }
 
-/// of(seeds), and its 95 % interval by resampling the seeds, for everything that it looks at alike.
-/// of: takes 0-based seeds, as often as they were drawn.
+/// The value of(seeds), and its 95 % interval by resampling the seeds, for all that `of` reads
+/// alike. of: takes 0-based seeds, as often as they were drawn.
 template <class Of>
 Interval over_seeds(std::size_t num_seeds, const Of& of) {
   constexpr std::uint32_t kResamples = 1000;

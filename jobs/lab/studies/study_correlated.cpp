@@ -32,7 +32,7 @@ struct Case {
   int num_particles = 16;
   int num_candidates = 725;
   VisibilitySpec visibility = {};
-  std::string curve = {};  ///< of the charts; none: only in the table
+  std::string curve = {};  ///< name in the charts; none: table only
 };
 
 VisibilitySpec second_pass(SecondPassForm form, MaskPolicy mask, int partitions = 16,
@@ -169,9 +169,9 @@ struct Row {
   Case of;
   std::shared_ptr<const RenderContext> context;
   std::vector<double> image, mask, bias, seconds;  ///< (runs)
-  double second_share = 0;                         ///< of the second pass in the time
-  double rays =
-      0;  ///< shadow rays per penumbra pixel: all of the second pass, its own of the first
+  double second_share = 0;                         ///< second pass over all time
+  /// Shadow rays per penumbra pixel: all of the second pass, its own of the first.
+  double rays = 0;
 };
 Result<Row> prepare(const JobSpec& base, const Case& c, int runs,
                     const std::shared_ptr<const SharedAssets>& assets) {

@@ -14,7 +14,7 @@
 namespace baton {
 namespace {
 
-constexpr std::size_t kShown = 3;  ///< frames in the picture, the last among them
+constexpr std::size_t kShown = 3;  ///< frames in the image, with the last one
 constexpr int kGap = 4;
 
 RgbImage image_of(const FilmTile& film, const std::array<const char*, 3>& channels) {
