@@ -19,7 +19,7 @@ inline constexpr int kMaxSections = 64;          // sections of one state or fil
 inline constexpr int kMaxChannels = 256;         // channels of one image
 inline constexpr int kMaxImageSide = 32768;
 inline constexpr int kMaxOverscan = 4096;  // pixels on a side
-/// Numbers of an EXR picture whose data does not fill its display window: the rest costs a file
+/// Numbers of an EXR image whose data does not fill its display window: the rest costs a file
 /// nothing.
 inline constexpr std::int64_t kMaxFramedValues = std::int64_t{1} << 29;
 inline constexpr int kMaxFrames = 100000;

@@ -241,7 +241,7 @@ Result<FilmTile> describe(const Imf::Header& header, const std::string& name) {
 }
 
 /// Whether `shown`, the display window, is no larger than an image may be, nor much larger than
-/// what the file holds of `image`.
+/// what the file has of `image`.
 Status check_display(const PixelRect& shown, const FilmTile& image, const std::string& name) {
   const auto values = static_cast<std::int64_t>(image.channels.size()) * shown.area();
   const bool fits = shown.width() <= limits::kMaxImageSide &&

@@ -122,7 +122,7 @@ struct SamplingStats {
   std::uint64_t pixels_resampled = 0;
   std::uint64_t local_proposed = 0, local_accepted = 0;  ///< moves
   std::uint64_t independent_proposed = 0, independent_accepted = 0;
-  /// Pixels by ESS / N before resampling: bin b holds [b, b + 1) / kEssBins, the last one 1 as
+  /// Pixels by ESS / N before resampling: bin b is for [b, b + 1) / kEssBins, the last one 1 as
   /// well; dark pixels are in bin 0.
   std::array<std::uint64_t, kEssBins> ess_histogram{};
 

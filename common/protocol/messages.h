@@ -119,7 +119,7 @@ struct JobDocument {
   /// Stands in its output folder (output_token_file); empty: that could not be marked.
   std::string token = {};
 };
-/// Finish what runs, take nothing new, end.
+/// Finish what is in work, take nothing new, end.
 struct Drain {};
 struct Shutdown {};
 

@@ -43,7 +43,7 @@ struct FirstPassSamples {
 
   bool operator==(const FirstPassSamples&) const = default;
   std::size_t num_pixels() const { return static_cast<std::size_t>(rect.area()); }
-  /// Drops the samples of pixels that no mask dilated by `radius` can hold, whatever the tiles
+  /// Drops the samples of pixels that no mask dilated by `radius` can have, whatever the tiles
   /// around say.
   void keep_possible(std::int32_t radius);
 };
