@@ -87,8 +87,8 @@ class SquarePartitions {
   SquarePartitions(const PixelRect& image, std::int32_t side, std::int32_t count, const Rng& rng);
 
   std::int32_t count() const { return static_cast<std::int32_t>(offsets_.size()); }
-  /// The square of partition `partition` that holds the pixel, clipped to the image: the same for
-  /// all pixels in it.
+  /// The square of partition `partition` with the pixel, clipped to the image: the same for all
+  /// pixels in it.
   PixelRect square(std::int32_t partition, std::int32_t x, std::int32_t y) const;
 
  private:
@@ -104,9 +104,9 @@ class SquarePartitions {
 /// may offer its samples to.
 class SquareMembers {
  public:
-  /// Moves to the row of squares that holds row y of the mask; cheap when it is there already. A
-  /// square that reaches past the mask has fewer members here. names: (pixels of the rectangle)
-  /// what to call a pixel of the mask.
+  /// Moves to the row of squares with row y of the mask; cheap when it is there already. A square
+  /// that reaches past the mask has fewer members here. names: (pixels of the rectangle) what to
+  /// call a pixel of the mask.
   void move_to(const PixelMask& mask, const SquarePartitions& partitions, std::int32_t partition,
                std::int32_t y, std::span<const std::int32_t> names) {
     if (y < y0_ || y >= y1_) list(mask, partitions, partition, y, names);

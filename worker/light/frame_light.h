@@ -42,7 +42,7 @@ struct FrameLight {
 /// another light at once.
 std::optional<Mat3> turn_between(const Environment& before, const Environment& now);
 
-/// The round whose presampled light and random numbers no picture has (noise_probe.h).
+/// The round whose presampled light and random numbers no image has (noise_probe.h).
 inline constexpr Round kProbeRound(1 << 30);
 
 /// The environments of a job's frames, prepared on demand. What is made for a frame is kept while

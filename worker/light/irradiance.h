@@ -14,7 +14,7 @@ namespace baton {
 ///
 /// Points are joined to blocks of 8 x 8, these to blocks of 2 x 2, and so on. A block above the
 /// horizon of n adds n.(sum of its light times direction), one below nothing, and one that is cut
-/// is looked at more closely, down to its points. Where all that is open of a block is less than
+/// is summed more finely, down to its points. Where all that is open of a block is less than
 /// kOpenShare of the sum so far, its light is taken as spread evenly about its mean: see at().
 class Irradiance {
  public:

@@ -8,7 +8,7 @@
 
 namespace baton {
 
-/// The samples that a pixel held in the frame before, borrowed from its state, (N) each: a properly
+/// The samples that a pixel had in the frame before, borrowed from its state, (N) each: a properly
 /// weighted set for the target of then.
 struct CarriedSet {
   std::span<const OctDirection> direction;

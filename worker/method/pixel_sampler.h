@@ -40,7 +40,7 @@ struct PixelInput {
   std::span<const kernels::LocatedDirections> located{};
   /// (N) out: p~ at this frame's samples; may be target_before.
   std::span<float> target{};
-  /// What the neighbours that the pixel asks held in the frame before; at most kMaxNeighbors.
+  /// What the neighbours that the pixel asks had in the frame before; at most kMaxNeighbors.
   std::span<const CarriedSet> neighbors{};
   /// (S) what the sites were made of, for a method that traces itself.
   std::span<const SurfaceHit> hits{};

@@ -6,7 +6,7 @@
 
 namespace baton {
 
-/// Samples a pixel beside the picture: with a method, random numbers, sites and light of one's
+/// Samples a pixel beside the image: with a method, random numbers, sites and light of one's
 /// choice, in a state of its own, so that nothing of it enters what the pixel carries.
 class AsideSampler {
  public:

@@ -9,7 +9,7 @@
 
 namespace baton {
 
-/// What catches shadows (ObjectSpec::catcher, GroundSpec::catcher) is in no picture. Where a ray
+/// What catches shadows (ObjectSpec::catcher, GroundSpec::catcher) is in no image. Where a ray
 /// meets no object it sees the nearest catcher, which reflects with the albedo pi / E per channel
 /// (CatcherAlbedo): what methods estimate of it is the share of the light that arrives, S / U, with
 /// all their machinery and without bias. A pixel that sees an object, too, or has seen one in an

@@ -13,7 +13,7 @@
 namespace baton {
 
 /// Pixels of the frame before, by their place in the image: what they carry, and what they saw.
-/// States hold no surfaces: those that this process no longer keeps are traced again, exactly.
+/// States have no surfaces: those that this process no longer keeps are traced again, exactly.
 class OldPixels {
  public:
   struct Place {
@@ -42,7 +42,7 @@ class OldPixels {
     return std::span(hits_).subspan(first_hit_[place.traced], num_sites);
   }
 
-  /// Their looks, where they are kept, else none.
+  /// Textures at their hits, where they are kept, else none.
   std::span<const SurfaceLook> looks(const Place& place) const {
     if (place.kept == nullptr) return {};
     return place.kept->pixel_looks(place.index);

@@ -337,7 +337,7 @@ void TileFrameRenderer::finish(Batch& batch, const FrameLight& light, RoundMean&
     PixelResult& pixel = batch.pixels[i];
     const std::size_t slot = batch.first + i;
     if (surfaces_->sees_surface(slot) && surfaces_->first_surface(slot).is_catcher) {
-      const PixelResult caught = std::exchange(pixel, {});  // which is not in the picture
+      const PixelResult caught = std::exchange(pixel, {});  // which is not in the image
       pixel.shadow = caught.catcher > 0 ? caught.shadow : caught.radiance + caught.shadow;
       pixel.catcher = catcher_share(surfaces_->pixel(slot));
     }

@@ -167,7 +167,7 @@ class TileWalk {
     num_tile_sites_ = std::accumulate(counts_.begin(), counts_.end(), std::size_t{0});
   }
   bool is_one_part() const { return counts_.empty() || num_tile_sites_ <= limits::kMaxSitesAtOnce; }
-  /// The pixels of a round, as many at a time as caches hold the surfaces of; all together where
+  /// The pixels of a round, as many at a time as caches have room for; all together where
   /// these are kept.
   std::vector<RoundPixels> parts_of(RoundPixels pixels, bool are_kept) const {
     std::vector<RoundPixels> parts;

@@ -5,7 +5,7 @@
 
 namespace baton {
 
-/// Looks at a whole finished film: its R, G, B, and the noise that its errors tell
+/// Judges a whole finished film: its R, G, B, and the noise that its errors tell
 /// (common/image/noise.h).
 FrameQuality judge_frame(const FilmTile& image);
 /// The same of a film that was laid over a plate and was `rendered` before: noise, mean and very

@@ -90,11 +90,11 @@ class JobEntry {
   std::optional<Result<LoadedJobPtr>> result_;
 };
 
-/// The jobs that this process has seen last, most recent first, and all that somebody holds. Used
-/// by the control thread alone; the entries it hands out are safe to share.
+/// The jobs that this process has seen last, most recent first, and all that are in use. Used by
+/// the control thread alone; the entries it hands out are safe to share.
 class JobCache {
  public:
-  /// max_idle_scene_bytes: scenes of jobs that nobody holds go when they take more.
+  /// max_idle_scene_bytes: scenes of jobs that nobody uses go when they take more.
   explicit JobCache(JobLoader loader, std::chrono::milliseconds file_patience = kFilePatience,
                     std::uint64_t max_idle_scene_bytes = std::numeric_limits<std::uint64_t>::max())
       : loader_(std::move(loader)),

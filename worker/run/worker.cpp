@@ -102,7 +102,7 @@ class NoteLog {
 /// included.
 constexpr std::chrono::minutes kLoadPatience{15};
 
-/// Runs a task on a render thread. The command that repeats it stands in its error message and,
+/// Executes a task on a render thread. The command that repeats it stands in its error message and,
 /// should the process die, in the crash report.
 Result<TaskOutput> execute_pooled(const PooledTask& task, const std::stop_token& stop,
                                   std::vector<BlobRef>& left, NoteLog& notes, TaskWatch& watch,

@@ -31,7 +31,7 @@ struct WorkerOptions {
 std::string describe_worker();
 
 /// Works for a coordinator until it says Shutdown (ok), the worker is to end and has finished or
-/// given back what it holds (ok), or the coordinator has been silent for too long (unavailable).
+/// given back its leases (ok), or the coordinator has been silent for too long (unavailable).
 /// signals: how many have asked it to end; from the second one on it gives back what it has begun.
 /// The calling thread becomes the control thread: it owns the channel and never renders.
 ExitCode run_worker(const WorkerOptions& options, const std::atomic<int>& signals);

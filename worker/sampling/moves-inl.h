@@ -50,8 +50,8 @@ struct PointLanes {
   VI site;
 };
 
-/// The particles of one pixel with everything the step needs, (N) each; the last vector is filled
-/// up with particles without weight.
+/// The particles of one pixel with everything the sampler needs, (N) each; the last vector is
+/// filled up with particles without weight.
 struct ParticleArrays {
   template <class T>
   using Column = PaddedArray<T, limits::kMaxParticles>;

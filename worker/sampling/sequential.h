@@ -36,7 +36,7 @@ struct MoveCounts {
   std::int32_t accepted = 0;
 };
 
-/// What one step did.
+/// What the sampler did in one frame.
 struct SequentialOutcome {
   /// False: all weights died or Lns is not a positive finite number; start again with SIR.
   bool alive = false;
