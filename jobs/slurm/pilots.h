@@ -13,7 +13,7 @@ enum class SlurmState {
   waiting,  ///< will begin
   /// Put back into the queue, which lets it wait for minutes.
   resting,
-  running,    ///< its program runs, or is believed to
+  running,    ///< its program is at work, or should be
   suspended,  ///< stands still until somebody resumes it
   ending,
 };
@@ -24,8 +24,8 @@ struct SlurmPilot {
   SlurmState state = SlurmState::waiting;
   /// How long it has been there without a worker of its name.
   double alone_s = 0;
-  /// For people: Slurm's own word and its reason, the name of the job, the node, what is left of
-  /// the time.
+  /// For people: Slurm's own word and its reason, its name there, the node, what is left of the
+  /// time.
   std::string state_text = {}, reason = {}, job_name = {}, node = {}, time_left = {};
 
   bool operator==(const SlurmPilot&) const = default;
@@ -73,7 +73,7 @@ SlurmOrders give_orders(const SlurmSnapshot& now);
 class VainArrays {
  public:
   void submitted(const std::string& array) { open_ = array; }
-  /// What a look has found. True: one more has been in vain.
+  /// What a snapshot has found. True: one more has been in vain.
   bool look(const SlurmSnapshot& now);
   /// Pilots of it that are cancelled as there are too many do not count.
   void cancelled(const std::vector<std::string>& pilots);

@@ -37,7 +37,7 @@ struct Blocks {
   std::vector<double> cost;                   ///< (cells) of a pixel
 };
 
-/// The mean over runs of one parity, and frames, of a cell's errors by block.
+/// The mean over renderings of one parity, and frames, of a cell's errors by block.
 std::vector<double> mean_blocks(const std::vector<RunRecord>& runs, std::size_t parity,
                                 std::size_t num_blocks) {
   std::vector<double> sum(num_blocks);

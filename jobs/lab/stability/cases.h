@@ -33,7 +33,7 @@ struct Timeline {
   std::vector<FrameNumber> judged() const;
 };
 
-/// One way to make samplers stumble: a small job, what it tries, and what must hold.
+/// One way to make samplers stumble: a small job, what it tries, and what must be so.
 struct Case {
   std::string name;
   std::string text;  ///< one sentence for the report

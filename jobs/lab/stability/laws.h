@@ -7,7 +7,7 @@
 namespace baton::stability {
 
 /// What is measured of a method on a case. Relative to the exact answer; "late" is the last quarter
-/// of the frames. Intervals are Student's over independent runs at kIntervalLevel, two-sided.
+/// of the frames. Intervals are Student's over independent renderings at kIntervalLevel, two-sided.
 struct Numbers {
   /// Values that are NaN or infinite, or pixels with light where the map is black.
   std::uint64_t unlawful = 0;
@@ -33,7 +33,7 @@ struct Numbers {
 };
 inline constexpr double kIntervalLevel = 1e-4;
 
-/// What a law looks at.
+/// What a law judges.
 enum class Measure : std::uint8_t {
   unlawful,
   negative,

@@ -8,7 +8,8 @@
 
 namespace baton::stability {
 
-/// What a subject made of a case in independent runs. Index: (judged frames, runs, pixels).
+/// What a subject made of a case in independent renderings. Index: (judged frames, renderings,
+/// pixels).
 struct Observations {
   using Values = std::vector<std::vector<std::vector<float>>>;
 
@@ -24,7 +25,7 @@ struct Observations {
   RenderStats stats;
 };
 
-/// Renders every frame of the case's job with every subject in `runs` runs with seeds 1, 2, ... in
+/// Renders every frame of the case's job with every subject `runs` times with seeds 1, 2, ... in
 /// this process. Returns (subjects). job: as built by the case.
 Result<std::vector<Observations>> observe(const JobSpec& job, const Timeline& time,
                                           const std::vector<Subject>& subjects, int runs,

@@ -12,7 +12,7 @@ namespace baton::stability {
 /// One judged frame of one subject, for the plots.
 struct FramePoint {
   int frame = 0;
-  double lns_mean = 1, lns_median = 1;  ///< Lns^/Lns over lit pixels and runs
+  double lns_mean = 1, lns_median = 1;  ///< Lns^/Lns over lit pixels and renderings
   double lns_low = 1, lns_high = 1;     ///< its 5th and 95th percentile
   double bias = 0;                      ///< mean radiance / exact - 1
   double noise = 0;                     ///< root mean square error / mean radiance

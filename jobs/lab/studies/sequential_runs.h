@@ -1,4 +1,4 @@
-// What the programs study_* share: runs of a job in one tile and thread,
+// What the programs study_* share: renderings of a job in one tile and thread,
 // variants of its sampling, and the reference.
 #pragma once
 
@@ -25,7 +25,7 @@ namespace baton {
 
 using SharedAssetsPtr = std::shared_ptr<const SharedAssets>;
 
-/// A frame of one run.
+/// A frame of one rendering.
 struct FrameResult {
   FilmTile film;
   RenderStats stats;

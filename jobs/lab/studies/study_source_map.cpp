@@ -27,7 +27,7 @@ RgbImage image_of(const FilmTile& film, const std::array<const char*, 3>& channe
   return image;
 }
 
-/// Copies a picture with its corner at (left, top).
+/// Copies an image with its corner at (left, top).
 void paste(const RgbImage& from, int left, int top, RgbImage& to) {
   for (int y = 0; y < from.height; ++y) {
     const auto row = from.rgb.begin() + std::ptrdiff_t{3} * y * from.width;
