@@ -45,7 +45,7 @@ struct ImageSpec {
   int width = 640;   ///< pixels, [1, limits::kMaxImageSide]
   int height = 360;  ///< pixels
   int sites = 1;     ///< primary rays per pixel: 1, 4, 9 or 16
-  /// The same where geometry is fine, at most: `sites` times a power of 4. 0: `sites`.
+  /// Sites where geometry is fine, at most: `sites` times a power of 4. 0: `sites`.
   int max_sites = 0;
   PixelFilter filter = PixelFilter::box;
   /// Side of a farm tile in pixels; no pixel depends on it.

@@ -20,7 +20,7 @@ using Matrix34 = std::array<float, 12>;
 /// start_frame) / fps seconds.
 struct GltfMotion {
   std::string file;  ///< .gltf .glb
-  std::string node;  ///< its name in the file
+  std::string node;  ///< the node's name in the file
   float fps = 24;
   /// The frame at time 0; Blender writes frame f at f / fps seconds.
   int start_frame = 0;

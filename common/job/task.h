@@ -150,7 +150,7 @@ struct FrameQuality {
   std::uint64_t pixels_not_finite = 0;   ///< NaN or infinite; in none of the others
   NoiseSource noise_source = NoiseSource::none;
   float noise = 0;        ///< FrameNoise::relative()
-  float noise_error = 0;  ///< its standard error, as a share of it
+  float noise_error = 0;  ///< standard error of `noise`, as a share
   float mean = 0;         ///< radiance, over pixels and the three
   float lowest = 0;       ///< the least value, at most 0
   /// What lies below zero over all light, [0, ...).
@@ -196,10 +196,10 @@ struct RenderStats {
   double seconds_light = 0, seconds_primary = 0, seconds_sample = 0, seconds_visibility = 0,
          seconds_shade = 0;
   double seconds_state = 0;            ///< encoding, storing and reading states
-  std::uint64_t pixels_masked = 0;     ///< that the second pass did again
+  std::uint64_t pixels_masked = 0;     ///< pixels that the second pass did again
   std::uint64_t rays_second_pass = 0;  ///< not in rays_shadow
   double seconds_second_pass = 0;      ///< all of the second pass
-  double seconds_second_rays = 0;      ///< its occlusion rays alone
+  double seconds_second_rays = 0;      ///< occlusion rays of the second pass
 
   bool operator==(const RenderStats&) const = default;
   void merge(const RenderStats& b);

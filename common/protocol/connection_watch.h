@@ -25,8 +25,8 @@ class ConnectionWatch {
   /// denied: the key is not known. endless: see above.
   enum class Failure { broken_off, replayed, denied, endless };
   struct Hears {
-    bool handshakes;   ///< that fail
-    bool connections;  ///< that are accepted: of a listening socket
+    bool handshakes;   ///< failed handshakes
+    bool connections;  ///< accepted ones, of a listening socket
   };
 
   ConnectionWatch(zmq::context_t& context, zmq::socket_t& watched, Hears what);

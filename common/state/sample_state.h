@@ -33,7 +33,7 @@ enum class PixelSource : std::uint8_t {
 /// file leaves it out.
 struct SampleState {
   Digest picture;  ///< picture_digest of the job
-  Step step{};     ///< that the samples belong to
+  Step step{};     ///< the samples are of this step
   std::int32_t tile = 0;
   PixelRect rect;
   /// N: particles of all populations; 0 where only a memory is carried.

@@ -11,7 +11,7 @@ namespace baton {
 struct StoreEstimate {
   /// Checkpoints that stay, and states on their way to the next frame.
   std::int64_t states = 0;
-  std::int64_t films = 0;    ///< those of frames not written yet
+  std::int64_t films = 0;    ///< films of frames not written yet
   std::int64_t samples = 0;  ///< first-pass samples for the second pass
 
   std::int64_t total() const { return states + films + samples; }
