@@ -63,7 +63,7 @@ struct ShadowRays {
     if (count_ == t_far.size()) reserve(std::max<std::size_t>(1024, 2 * count_));
     push_if(true, origin, direction);
   }
-  /// The same for a ray that may not be wanted, without a branch; there must be room (reserve).
+  /// Adds a ray that may not be wanted, without a branch; there must be room (reserve).
   void push_if(bool wanted, const Vec3& origin, const Vec3& direction) {
     const std::size_t i = count_;
     count_ += wanted ? 1 : 0;
@@ -119,7 +119,7 @@ class Accel {
   /// sites of a pixel; a hit depends on no ray of another group.
   virtual void intersect(std::span<const Ray> rays, std::span<SurfaceHit> hits,
                          std::size_t group = 1) const = 0;
-  /// The same of shadow catchers alone, which intersect() and occluded() pass, ray by ray.
+  /// Closest hits of shadow catchers alone, which intersect() and occluded() pass, ray by ray.
   virtual void intersect_catchers(std::span<const Ray> rays, std::span<SurfaceHit> hits) const = 0;
   /// Traces all rays; t_far of the occluded ones becomes -inf.
   virtual void occluded(ShadowRays& rays) const = 0;

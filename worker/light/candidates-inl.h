@@ -79,7 +79,7 @@ struct SiteDeal {
       if (++next == static_cast<std::size_t>(num_sites)) next = 0;
     }
   }
-  /// The same with all of a surface.
+  /// As ForEachRunOf, with all of a surface.
   template <class Use>
   HWY_INLINE void ForEachRun(const SiteBlock& block, const Use& use) const {
     ForEachRunOf(

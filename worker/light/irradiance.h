@@ -30,10 +30,10 @@ class Irradiance {
   /// The light of one channel.
   struct Light {
     float power = 0;  ///< sum of radiance times solid angle
-    Vec3 sum;         ///< the same times direction
+    Vec3 sum;         ///< sum of radiance x angle x direction
   };
   struct Block {
-    Vec3 axis;  ///< its points lie within `sine` of here
+    Vec3 axis;  ///< points are within `sine` of this axis
     /// Sine of the cone's half-angle; above 1: more than 90 degrees.
     float sine = 0;
     std::array<Light, 3> light;

@@ -51,7 +51,7 @@ struct CastSamples {
 /// What the rays of one pixel found.
 struct FreeLight {
   Rgb color;    ///< sum of what the free ones bring
-  Rgb blocked;  ///< and of what the others would
+  Rgb blocked;  ///< sum of what the blocked ones would bring
   float visibility = 0;
   std::uint64_t is_free = 0;  ///< bit by bit
 };

@@ -23,8 +23,8 @@ void see_catchers(const FrameGeometry& geometry, std::span<const std::uint16_t> 
 
 /// Share of the sites that see a catcher.
 float catcher_share(std::span<const SurfaceHit> hits);
-/// The same of those where no light of a colour arrives without shadows, so that none is taken
-/// away. sites: gathered of the hits.
+/// Share of the sites that see a catcher where no light of a colour arrives without shadows, so
+/// that shadows take none away. sites: gathered of the hits.
 Rgb dark_share(std::span<const SurfaceHit> hits, const SiteBlock& sites);
 
 /// Prepares what a pixel carries for what it sees now: a catcher does not start from an object's

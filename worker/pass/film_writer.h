@@ -22,7 +22,7 @@ struct PixelResult {
   float ess_ratio = 0;   ///< ESS / N
   float acceptance = 0;  ///< accepted moves / proposed moves
   float acceptance_local = 0,
-        acceptance_independent = 0;  ///< the same by kind of move, 0 without any
+        acceptance_independent = 0;  ///< acceptance by kind, 0 without moves
   float resampled = 0;               ///< 1 where it was
   PixelSource source = PixelSource::background;
   Rgb source_color{};  ///< colour by which `source` is shown
@@ -39,7 +39,7 @@ struct PixelResult {
   /// Light that shadows take away: `radiance` without them is the sum.
   Rgb blocked{};
   float error = kNoSurface;  ///< as in the plane kErrorChannel
-  float rounds = 1;          ///< that it is the mean of
+  float rounds = 1;          ///< number of rounds in this mean
   /// Share of the light that arrives on the catcher, times `catcher`.
   Rgb shadow{};
   float catcher = 0;  ///< share of the sites that see it

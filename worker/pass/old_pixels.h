@@ -20,7 +20,7 @@ class OldPixels {
     const SampleState* state = nullptr;
     std::size_t index = 0;               ///< pixel of `state`
     const TileSurfaces* kept = nullptr;  ///< what the tile saw; null: traced again
-    std::size_t traced = 0;              ///< its number among those traced again
+    std::size_t traced = 0;              ///< number among those traced again
   };
 
   /// states: of the frame before, of every tile within reach. All must outlive the object.
@@ -56,9 +56,9 @@ class OldPixels {
   const JobSpec& job_;
   const FrameGeometry& before_;
   std::span<const StatePtr> states_;
-  const std::int32_t round_;                               ///< whose sites carry them
+  const std::int32_t round_;                               ///< whose sites carry the samples
   std::vector<std::shared_ptr<const TileSurfaces>> kept_;  ///< (states)
-  std::vector<PixelPlace> asked_;                          ///< that are not kept
+  std::vector<PixelPlace> asked_;                          ///< pixels that are not kept
   std::vector<std::size_t> first_hit_;                     ///< (asked)
   std::vector<SurfaceHit> hits_;
   std::uint64_t num_rays_ = 0;

@@ -21,8 +21,8 @@ struct TileSurfaces {
   std::vector<std::uint32_t> first_hit{0};
   std::vector<SurfaceHit> hits;  ///< (sum of S)
   std::vector<Ray> rays;         ///< (sum of S) primary rays
-  /// (sum of S) Of hits whose materials have detail: textures are looked up once for all frames and
-  /// rounds that see the same. Empty where the scene has none.
+  /// (sum of S) Textures at hits whose materials have detail, which are looked up once for all
+  /// frames and rounds that see the same. Empty where the scene has none.
   std::vector<SurfaceLook> looks;
   /// (slots) The first site that sees a surface, S where none does: hits are large, and whether
   /// there is one is asked several times a frame.

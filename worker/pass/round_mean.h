@@ -22,7 +22,7 @@ struct PixelSum {
   double seen = 0, seen_squares = 0;
   std::int32_t num_rounds = 0;
   double error = kErrorUnknown;  ///< sum over the rounds where it is known
-  std::uint32_t material = 0;    ///< that of the first round that sees one
+  std::uint32_t material = 0;    ///< as in the first round that sees one
   double weight_seen = 0;        ///< weight of rounds that see a surface
 };
 

@@ -99,8 +99,8 @@ struct WeighedLines {
   VF light = hn::Zero(DF());                                         ///< sum of w
   Vec3Lanes colors{hn::Zero(DF()), hn::Zero(DF()), hn::Zero(DF())};  ///< sum of w V^ (f cos L) / p~
   VF previous = hn::Zero(DF());                                      ///< w V^ before
-  VF last_step = hn::Zero(DF());                                     ///< to it
-  VF bends = hn::Zero(DF());  ///< sum of squared second differences
+  VF last_step = hn::Zero(DF());  ///< difference that led to `previous`
+  VF bends = hn::Zero(DF());      ///< sum of squared second differences
   /// `bends` of the candidates from the light, once they are done.
   VF light_bends = hn::Zero(DF());
 

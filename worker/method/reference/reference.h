@@ -13,8 +13,8 @@ namespace baton {
 struct ReferenceEstimate {
   /// Mean over the sites of the reflected, shadowed radiance.
   Rgb radiance;
-  Rgb unshadowed;  ///< the same without shadows
-  float lns = 0;   ///< its mean over RGB
+  Rgb unshadowed;  ///< radiance without shadows
+  float lns = 0;   ///< mean of `unshadowed` over RGB
   /// Share of the unshadowed light that arrives, mean over RGB; 0 without light.
   float visibility = 0;
   Rgb variance;  ///< squared standard errors of `radiance`
