@@ -42,7 +42,7 @@ struct SlurmWorker {
 struct SlurmSnapshot {
   std::vector<SlurmPilot> pilots;
   std::vector<SlurmWorker> workers;
-  std::uint64_t tasks = 0;    ///< that could be in work at the same time
+  std::uint64_t tasks = 0;    ///< tasks that could be in work at once
   int threads_per_pilot = 1;  ///< at least 1
   int least = 1, most = 1;
 };

@@ -33,7 +33,7 @@ bool is_resolved(const Study& study, const StudyResults& results, std::size_t ce
 struct Blocks {
   std::vector<double> pixels;                 ///< with a surface
   std::vector<std::vector<double>> train;     ///< (cells, blocks) squared error
-  std::vector<std::vector<double>> held_out;  ///< the same of other seeds
+  std::vector<std::vector<double>> held_out;  ///< errors of other seeds
   std::vector<double> cost;                   ///< (cells) of a pixel
 };
 

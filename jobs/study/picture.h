@@ -45,7 +45,7 @@ struct Reference {
   double mean_radiance = 0;  ///< over lit pixels and R, G, B
   /// Mean squared error of R by its halves, mean (A - B)^2 / 4: what R cannot resolve.
   double mse = 0;
-  double rel_mse = 0;  ///< the same over (R + .01)^2
+  double rel_mse = 0;  ///< squared error over (R + .01)^2
   /// Mean FLIP between R and A, which is as far from R as R from the truth.
   double flip = 0;
   /// `mse` by the variance that brute force reports of itself.

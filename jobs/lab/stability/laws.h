@@ -42,7 +42,7 @@ enum class Measure : std::uint8_t {
   lns_median,  ///< max(m, 1/m) - 1 of lns_median
   /// Noise over that of fresh samples (`bidirectional`, same N and M).
   noise,
-  noise_after,  ///< likewise right after the jump
+  noise_after,  ///< as `noise`, right after the jump
   lost,
   /// Growth over that of fresh samples, for which only the light has changed.
   growth,

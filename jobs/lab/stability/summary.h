@@ -13,7 +13,7 @@ namespace baton::stability {
 struct FramePoint {
   int frame = 0;
   double lns_mean = 1, lns_median = 1;  ///< Lns^/Lns over lit pixels and renderings
-  double lns_low = 1, lns_high = 1;     ///< its 5th and 95th percentile
+  double lns_low = 1, lns_high = 1;     ///< 5th and 95th percentile of that ratio
   double bias = 0;                      ///< mean radiance / exact - 1
   double noise = 0;                     ///< root mean square error / mean radiance
   double ess = 0;                       ///< mean ESS / N

@@ -103,7 +103,7 @@ inline std::vector<FrameResult> render(JobSpec job, const SharedAssetsPtr& asset
   }
   return frames;
 }
-/// The same with assets of its own.
+/// Renders with assets of its own.
 inline std::vector<FrameResult> render(const JobSpec& job) {
   return render(job, value_of(load_shared_assets(job)));
 }
