@@ -116,7 +116,7 @@ std::vector<std::string> limit_warnings(const JobSpec& job, bool light_jumps) {
   const std::set<Gloss> glosses = glosses_of(job.scene);
   const bool never_refreshed = job.sampling.refresh_every == 0;
 
-  // Of each situation the worst that is known, the last.
+  // Take the worst of each situation: the last.
   std::vector<const KnownLimit*> found;
   for (const KnownLimit& limit : kLimits) {
     const bool lit_so = limit.light == Light::any ||

@@ -15,7 +15,7 @@ namespace baton::detail {
   ((condition) ? static_cast<void>(0) \
                : ::baton::detail::check_failed(#condition, __FILE__, __LINE__))
 
-/// The same in checked builds alone (BATON_CHECKED in cmake/baton.cmake): it guards what inner
+/// A BATON_CHECK in checked builds alone (BATON_CHECKED in cmake/baton.cmake): it guards what inner
 /// loops do.
 #ifdef BATON_CHECKED
 #define BATON_DCHECK(condition) BATON_CHECK(condition)

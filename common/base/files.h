@@ -26,19 +26,19 @@ Result<std::string> read_text_file(const std::filesystem::path& path, std::uint6
 /// the last rename wins.
 Status write_file_atomic(const std::filesystem::path& path, ByteView bytes);
 
-/// The same for a file that nobody looks at again before it counts: the temporary file, once it is
-/// on disk, is handed to `check`, read back and compared with `bytes` byte by byte; only then it
-/// gets its name. Errors: that of `check`; ErrorKind::corrupt names the first byte that differs.
-/// Nothing is left behind on failure.
+/// Publishes a file that nobody reads again before it counts: the temporary file, once it is on
+/// disk, is handed to `check`, read back and compared with `bytes` byte by byte; only then it gets
+/// its name. Errors: that of `check`; ErrorKind::corrupt names the first byte that differs. Nothing
+/// is left behind on failure.
 Status write_file_verified(
     const std::filesystem::path& path, ByteView bytes,
     const std::function<Status(const std::filesystem::path& temporary)>& check);
 
-/// ErrorKind::corrupt unless the file holds exactly `bytes`.
+/// ErrorKind::corrupt unless the file has exactly `bytes`.
 Status expect_content(const std::filesystem::path& path, ByteView bytes);
 
-/// The same as write_file_atomic without waiting for the disk: other processes see the file whole
-/// or not at all, but only sync_file_system() makes it survive a power cut.
+/// Publishes as write_file_atomic does, without waiting for the disk: other processes see the file
+/// whole or not at all, but only sync_file_system() makes it survive a power cut.
 Status write_file_unsynced(const std::filesystem::path& path, ByteView bytes);
 
 /// Error no_space: writing so much to the file system of `folder` would leave less than a reserve,

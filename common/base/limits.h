@@ -15,11 +15,11 @@ inline constexpr std::uint64_t kMaxWorkerMessageBytes = 8ull << 20;  // what a w
 inline constexpr std::uint64_t kMaxUnendedBytes = 2 * kMaxMessageBytes;
 inline constexpr int kMaxMessageFrames = 4;      // with the peer's identity
 inline constexpr int kMaxQueuedMessages = 4096;  // per connection, either way
-inline constexpr int kMaxSections = 64;          // of one state or film file
-inline constexpr int kMaxChannels = 256;         // of one picture
+inline constexpr int kMaxSections = 64;          // sections of one state or film file
+inline constexpr int kMaxChannels = 256;         // channels of one image
 inline constexpr int kMaxImageSide = 32768;
 inline constexpr int kMaxOverscan = 4096;  // pixels on a side
-/// Numbers of an EXR picture whose data does not fill its display window: the rest costs a file
+/// Numbers of an EXR image whose data does not fill its display window: the rest costs a file
 /// nothing.
 inline constexpr std::int64_t kMaxFramedValues = std::int64_t{1} << 29;
 inline constexpr int kMaxFrames = 100000;
@@ -55,7 +55,7 @@ inline constexpr int kGeometryProbes = 4;
 inline constexpr int kMaxRounds = 65536;
 inline constexpr int kMaxPreroll = 64;  ///< rounds
 inline constexpr int kMaxParticles = 64;
-inline constexpr int kMaxPopulations = 2;  // of a pixel's particles
+inline constexpr int kMaxPopulations = 2;  // parts of a pixel's particles
 inline constexpr int kMaxCandidates = 8192;
 inline constexpr int kMaxDistributions = 64;
 inline constexpr int kMaxExchangeSide = 16;

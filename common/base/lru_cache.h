@@ -13,8 +13,8 @@
 namespace baton {
 
 /// Values by key, as many as fit into a share of memory, which other caches may use, too: the least
-/// recently used go first, and the one used last always stays. Whoever holds a value keeps it
-/// alive, so a value should not hold one of another cache. Any number of threads. Key: ordered.
+/// recently used go first, and the one used last always stays. Whoever has a value keeps it alive,
+/// so a value should not contain one of another cache. Any number of threads. Key: ordered.
 template <class Key, class Value>
 class LruCache {
  public:

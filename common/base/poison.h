@@ -13,8 +13,8 @@ namespace baton {
 /// Work space is reused from pixel to pixel, so what reads more of it than was written finds some
 /// other pixel's values, and mostly nobody notices. In checked builds (BATON_CHECKED in
 /// cmake/baton.cmake) a test can have work space filled with a pattern before each use: whoever
-/// renders with two patterns and gets two pictures has read what nobody wrote. Other builds have
-/// none of this.
+/// renders with two patterns and gets two images has read what nobody wrote. Other builds have none
+/// of this.
 #ifdef BATON_CHECKED
 
 inline constexpr bool kCanPoison = true;

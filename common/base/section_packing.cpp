@@ -9,7 +9,7 @@
 namespace baton {
 namespace {
 
-/// The fast levels look for repetitions only and leave what is not repeated as it is: some per cent
+/// The fast levels find repetitions only and leave what is not repeated as it is: some per cent
 /// larger than level 1, which also shortens frequent bytes, and several times faster both ways.
 constexpr int kZstdLevel = -8;
 

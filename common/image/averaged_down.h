@@ -7,19 +7,19 @@
 
 namespace baton {
 
-/// A picture row by row.
+/// An image row by row.
 struct RowSource {
   int width = 0, height = 0;
   /// (width, 3) of row y; rows are asked for from the top, some twice in succession.
   std::function<const float*(int y)> row;
 };
 
-/// How much of a picture a stretch of its height is; `from` and `to` count from the top in units of
+/// How much of an image a stretch of its height is; `from` and `to` count from the top in units of
 /// 1 / (old height x new height).
 using HeightMeasure = std::function<double(std::int64_t from, std::int64_t to)>;
 
-/// The picture with `width` columns and `height` rows, no more than it has: each pixel is the mean
-/// over its part of the picture. Pixels across its edges count for their share, so the mean of the
+/// The image with `width` columns and `height` rows, no more than it has: each pixel is the mean
+/// over its part of the image. Pixels across its edges count for their share, so the mean of the
 /// whole is kept for any sizes.
 RgbImage averaged_down(const RowSource& picture, int width, int height,
                        const HeightMeasure& measure);

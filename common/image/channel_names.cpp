@@ -34,7 +34,7 @@ constexpr Pair kPasses[] = {
     {"forward.u", "Vector.Z", true},
     {"forward.v", "Vector.W", true},
 };
-/// Of a pass with one channel.
+/// Suffix of a pass with one channel.
 constexpr std::string_view kOnly = ".X";
 
 /// A name of the file without the layer.

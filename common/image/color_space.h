@@ -23,7 +23,7 @@ struct Chromaticities {
 /// annex E]. nullopt: it is Rec. 709, but for the rounding of a header. Error: no such space.
 Result<std::optional<Mat3>> to_rec709(const Chromaticities& from);
 
-/// What the header of a picture says of its numbers.
+/// What the header of an image says of its numbers.
 struct PictureColors {
   Chromaticities chromaticities;
   /// By which radiance was multiplied before it was stored, > 0.

@@ -11,7 +11,7 @@
 namespace baton {
 namespace {
 
-/// Of a text [Appleby 2011].
+/// MurmurHash3 of a text, 32 bits [Appleby 2011].
 std::uint32_t hash_of(std::string_view text) {
   const auto byte = [&](std::size_t i) {
     return std::uint32_t{static_cast<std::uint8_t>(text[i])};

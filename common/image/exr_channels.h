@@ -11,9 +11,9 @@
 
 namespace baton {
 
-/// What of an EXR file is read. data: all that it holds. display: what it shows, 0 where its data
+/// What of an EXR file is read. data: all that it has. display: what it shows, 0 where its data
 /// does not reach, such as around what compositors cut to its content. seen: of what it shows the
-/// part that its data reaches, all if none does: a frame of a part of the picture is that part.
+/// part that its data reaches, all if none does: a frame of a part of the image is that part.
 enum class ExrWindow : std::uint8_t { data, display, seen };
 /// The channels wanted of those that a file has, by name.
 using ChannelChoice =

@@ -33,7 +33,8 @@ namespace {
 
 /// OpenEXR compresses on the calling thread: the worker has its own threads.
 constexpr int kOpenExrThreads = 0;
-/// Of zlib. OpenEXR's own choice is 4: a quarter slower for files that are two per cent smaller.
+/// Level of zlib. OpenEXR's own choice is 4: a quarter slower for files that are two per cent
+/// smaller.
 constexpr int kZipLevel = 1;
 constexpr float kMaxHalf = 65504.0f;
 constexpr int kMostSmpteFrames = 30;  // a second
@@ -240,7 +241,7 @@ Result<FilmTile> describe(const Imf::Header& header, const std::string& name) {
 }
 
 /// Whether `shown`, the display window, is no larger than an image may be, nor much larger than
-/// what the file holds of `image`.
+/// what the file has of `image`.
 Status check_display(const PixelRect& shown, const FilmTile& image, const std::string& name) {
   const auto values = static_cast<std::int64_t>(image.channels.size()) * shown.area();
   const bool fits = shown.width() <= limits::kMaxImageSide &&

@@ -37,7 +37,7 @@ FilmTile framed(const FilmTile& film, const PixelRect& rect);
 /// Which pass made a film. Stored; values are for ever.
 enum class FilmPass : std::uint8_t { first = 0, second = 1 };
 
-/// Where a film comes from. It stands in the file so that films that look alike, such as empty
+/// Where a film comes from. It stands in the file so that films of equal planes, such as empty
 /// tiles of two frames, are different blobs: what one task no longer needs is never what another
 /// made.
 struct FilmOrigin {

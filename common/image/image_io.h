@@ -23,14 +23,14 @@ struct RgbImage {
   std::vector<float> rgb;  ///< (height, width, 3)
 };
 
-/// Reads an EXR or Radiance HDR picture as float32 RGB (grey is spread to three channels, alpha
+/// Reads an EXR or Radiance HDR image as float32 RGB (grey is spread to three channels, alpha
 /// dropped), in linear Rec. 709 as the header says what its numbers are (read_picture_colors).
 /// window: of an EXR file. Errors name the file: missing, not an image, truncated, sides past
 /// limits::kMaxEnvironmentSide, neither R, G, B nor one channel to spread.
 Result<RgbImage> read_rgb_image(const std::filesystem::path& path,
                                 ExrWindow window = ExrWindow::display);
 /// What read_rgb_image converts from: `chromaticities` of an EXR file; PRIMARIES, EXPOSURE and
-/// COLORCORR of a Radiance one. Of a picture of one channel, only factors.
+/// COLORCORR of a Radiance one. Of an image of one channel, only factors.
 Result<PictureColors> read_picture_colors(const std::filesystem::path& path);
 
 /// Header attribute of an EXR file.
@@ -49,7 +49,7 @@ struct ExrOptions {
   /// frame 0 at 00:00:00:00, modulo a day.
   std::optional<int> frame_number{};
   ChannelNaming naming = ChannelNaming::plain;  ///< in the file
-  /// What is shown, in pixels of the picture, with its corner at (0, 0); none: all.
+  /// What is shown, in pixels of the image, with its corner at (0, 0); none: all.
   std::optional<PixelRect> display_window{};
   Chromaticities chromaticities{};  ///< those of R, G and B; written always
 };
@@ -64,7 +64,7 @@ Status write_exr(const std::filesystem::path& path, const FilmTile& image,
                  const ExrOptions& options);
 /// Reads every channel of a flat EXR file as float32, by its plain name (channel_names.h), in
 /// alphabetical order. The rectangle is that of the pixels in the file's coordinates. Errors name
-/// the file: missing, not an EXR, truncated, subsampled channels, past the limits of picture sides.
+/// the file: missing, not an EXR, truncated, subsampled channels, past the limits of image sides.
 Result<FilmTile> read_exr(const std::filesystem::path& path, ExrWindow window = ExrWindow::data);
 /// Rows y0 to y1 - 1 of every channel, clipped to the data window. Errors: read_exr's, a file whose
 /// table of blocks has gaps.

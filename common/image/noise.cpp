@@ -26,7 +26,7 @@ float FrameNoise::relative() const {
 
 float FrameNoise::error_share() const {
   if (!is_told() || !(squares_ > 0)) return 0;
-  // Of a mean, by the scatter of its values; a root has half of it.
+  // The relative error of a mean, by the scatter of its values; a root has half of it.
   const double n = static_cast<double>(num_errors_);
   if (n < 2) return 1;
   const double scatter = std::max(0.0, n * squares_of_squares_ / (squares_ * squares_) - 1);

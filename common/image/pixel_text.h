@@ -14,7 +14,7 @@ int text_width(std::string_view text);
 int text_height();
 
 /// Writes small white letters into a black box whose lower left corner is (left, bottom); what does
-/// not fit into the picture is cut off. Letters have no case; what has no letter shows as '?'.
+/// not fit into the image is cut off. Letters have no case; what has no letter shows as '?'.
 void draw_text(std::string_view text, int left, int bottom, RgbImage& image);
 
 }  // namespace baton

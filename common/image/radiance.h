@@ -8,8 +8,8 @@
 
 namespace baton {
 
-/// Radiance HDR pictures [Ward 1991, "Real pixels"]: a text header, then pixels of three 8-bit
-/// mantissas and one exponent, with or without run lengths.
+/// Radiance HDR images [Ward 1991, "Real pixels"]: a text header, then pixels of three 8-bit
+/// mantissas and one exponent, with or without run-length encoding.
 
 struct RadianceHeader {
   int width = 0, height = 0;

@@ -7,9 +7,9 @@
 
 namespace baton {
 
-/// The plane of films that tells which share of a pixel's sites sees what catches
-/// shadows; frames do not have it. In films the planes shadow.* hold S / U times that share, so
-/// that films have means like any others.
+/// The plane of films that tells which share of a pixel's sites sees what catches shadows; frames
+/// do not have it. In films the planes shadow.* are S / U times that share, so that films have
+/// means like any others.
 inline constexpr char kCatcherChannel[] = "catcher";
 inline constexpr std::array<const char*, 3> kShadowChannels{"shadow.R", "shadow.G", "shadow.B"};
 

@@ -13,7 +13,7 @@ namespace baton {
 bool carries_state(const JobSpec& job);
 /// Whether pixels weigh the samples of their neighbours: `restir` with neighbours.
 bool asks_neighbors(const SamplingSpec& sampling);
-/// A material's setting as one of the whole picture.
+/// A material's setting as one of the whole image.
 SamplingSpec as_sampling(const MaterialSampling& material);
 /// Whether the noise of a job's frames is told: of pixels that draw all samples anew, and whose
 /// light no second pass shares out. Films then have a plane of errors (common/image/noise.h).
@@ -41,7 +41,7 @@ std::int32_t num_preroll_rounds(const JobSpec& job);
 /// Sets of samples of a pixel that never exchange anything: 2 when one decides what is done with
 /// the other, else 1.
 std::int32_t num_populations(const JobSpec& job);
-/// How far from a tile the second pass looks: pixels whose samples it exchanges, and whose rays
+/// How far from a tile the second pass reads: pixels whose samples it exchanges, and whose rays
 /// decide the mask.
 std::int32_t exchange_reach_px(const VisibilitySpec& visibility);
 

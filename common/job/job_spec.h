@@ -30,7 +30,7 @@ enum class PixelFilter : std::uint8_t {
   blackman_harris,  ///< to 1.5 pixels from the centre
 };
 
-/// Pixels that are rendered around a picture, [0, limits::kMaxOverscan] each.
+/// Pixels that are rendered around an image, [0, limits::kMaxOverscan] each.
 struct Overscan {
   int left = 0, top = 0, right = 0, bottom = 0;
 
@@ -57,7 +57,7 @@ struct ImageSpec {
   std::uint64_t site_seed = 0;
 
   bool operator==(const ImageSpec&) const = default;
-  /// Pixels are always addressed by their place in the whole picture, the display window of frames.
+  /// Pixels are always addressed by their place in the whole image, the display window of frames.
   PixelRect whole() const { return {0, 0, width, height}; }
   /// What people see of frames.
   PixelRect shown() const { return region.value_or(whole()); }
@@ -65,7 +65,7 @@ struct ImageSpec {
   PixelRect rendered() const { return overscan.around(shown()); }
   /// Most sites that a pixel has.
   int most_sites() const { return std::max(sites, max_sites); }
-  /// The whole picture with its overscan; every region lies inside with its own.
+  /// The whole image with its overscan; every region lies inside with its own.
   PixelRect extent() const { return overscan.around(whole()); }
 };
 
@@ -74,7 +74,7 @@ ImageSpec scaled(const ImageSpec& image, double scale);
 
 // ---- motion -------------------------------------------------------------------------------------
 /// How keys are joined. linear: straight lines. smooth: Catmull-Rom splines through the keys.
-/// Quaternions are slerped either way; before the first key and after the last one the pose holds.
+/// Quaternions are slerped either way; before the first key and after the last one the pose stays.
 enum class KeyCurve : std::uint8_t { linear, smooth };
 
 /// How samples follow what moves; says nothing when nothing does (common/job/motion.h).
@@ -131,8 +131,8 @@ struct CameraSpec {
 // ---- environment --------------------------------------------------------------------------------
 enum class MapFilter : std::uint8_t { nearest, bilinear };
 
-/// The map at one frame number; between keys the texels are interpolated linearly, outside they are
-/// held.
+/// The map at one frame number; between keys the texels are interpolated linearly, outside they
+/// stay.
 struct EnvironmentKey {
   double frame = 1;
   std::string map;  ///< lat-long .exr or .hdr
@@ -140,7 +140,7 @@ struct EnvironmentKey {
   bool operator==(const EnvironmentKey&) const = default;
 };
 
-/// A number at a frame number; linear between keys, held outside.
+/// A number at a frame number; linear between keys, constant outside.
 struct NumberKey {
   double frame = 1;
   double value = 0;
@@ -184,7 +184,7 @@ enum class ResamplingScheme : std::uint8_t { systematic, stratified, multinomial
 /// How `sequential` carries the normalising constant: by the ratio of the weights, or by path
 /// sampling with a left, right or trapezoidal sum over the intermediate distributions.
 enum class LnsUpdate : std::uint8_t { ratio, path_left, path_right, path_trapezoid };
-/// How the pixels of one material are sampled, where that differs from the rest of the picture;
+/// How the pixels of one material are sampled, where that differs from the rest of the image;
 /// members as in SamplingSpec. Samples are drawn anew in each frame, so nothing is handed over
 /// between settings.
 struct MaterialSampling {
@@ -220,7 +220,7 @@ struct SamplingSpec {
   /// sequential: each pixel starts afresh once in so many frames, staggered; 0: never.
   int refresh_every = 8;
   /// sequential: a pixel whose carried Lns has left [Lns / rho, Lns * rho] of its last start, rho
-  /// in (1, 1e6], starts afresh with refresh_candidates; none: never. The rule looks at the
+  /// in (1, 1e6], starts afresh with refresh_candidates; none: never. The rule depends on the
   /// samples, so it is a (small) bias.
   std::optional<float> refresh_ratio{};
   int refresh_candidates = 800;  ///< [N, limits::kMaxCandidates]
@@ -280,7 +280,7 @@ enum class MaskPolicy : std::uint8_t { same_samples, split, cross_fold };
 
 /// Correlated visibility [Ghosh & Heidrich 2006], after any sampling method but `reference`.
 struct VisibilitySpec {
-  bool correlated = false;  ///< run the second pass
+  bool correlated = false;  ///< make the second pass
   SecondPassForm form = SecondPassForm::corrected;
   MaskPolicy mask = MaskPolicy::cross_fold;
   /// Side of the squares in which energy is exchanged, pixels, [2, limits::kMaxExchangeSide].
@@ -345,7 +345,7 @@ struct OutputSpec {
   bool operator==(const OutputSpec&) const = default;
 };
 
-/// Whether frames are laid over pictures.
+/// Whether frames are laid over images.
 inline bool has_plate(const OutputSpec& output) {
   return output.background == Background::plate && output.plate;
 }
@@ -366,7 +366,7 @@ struct StateSpec {
 struct JobSpec {
   int specification_version = 1;
   std::string name;
-  int priority = 50;  ///< [0, 100], higher runs first
+  int priority = 50;  ///< [0, 100], higher is rendered first
   std::map<std::string, std::string> metadata;
   std::vector<FrameNumber> frames{FrameNumber(1)};  ///< ascending, no duplicates
   ImageSpec image;

@@ -46,7 +46,8 @@ struct LightUse {
 struct MethodTraits {
   std::string_view name;  ///< in a job
   Carried carried = Carried::nothing;
-  /// Its rays are N weighted samples, which its states hold; else rays are chosen apart from them.
+  /// Its rays are N weighted samples, which are in its states; else rays are chosen apart from
+  /// them.
   bool keeps_samples = false;
   /// All samples are drawn anew in each frame, so that it may start `sequential` and serve a single
   /// material.

@@ -18,7 +18,7 @@ bool moves(const ObjectSpec& object);
 /// Whether all that moves has keys of its own, none in another file, and motion.max_px is known:
 /// what common/scene/settle/settle_motion.h makes of a job before it is submitted.
 bool is_settled(const JobSpec& job);
-/// The same as an error that says what is missing.
+/// An error that says what is missing unless is_settled().
 Status check_settled(const JobSpec& job);
 
 /// Whether pixels take history from other pixels: camera or objects move, or neighbours are asked.

@@ -20,7 +20,7 @@ using Matrix34 = std::array<float, 12>;
 /// start_frame) / fps seconds.
 struct GltfMotion {
   std::string file;  ///< .gltf .glb
-  std::string node;  ///< its name in the file
+  std::string node;  ///< the node's name in the file
   float fps = 24;
   /// The frame at time 0; Blender writes frame f at f / fps seconds.
   int start_frame = 0;
@@ -37,7 +37,7 @@ enum class TextureFilter : std::uint8_t { linear, nearest };
 /// offset + R(rotate_deg) (scale * (u, v)), with (0, 0) its upper left corner, (1, 1) its lower
 /// right [KHR_texture_transform].
 struct TextureSpec {
-  /// An image, its tiles (udim.h), or a .gltf or .glb file that holds one.
+  /// An image, its tiles (udim.h), or a .gltf or .glb file that contains one.
   std::string file;
   /// Place in the list of images of a .gltf or .glb file; else -1.
   int image = -1;
@@ -183,7 +183,7 @@ struct ObjectSpec {
   std::optional<Matrix34> matrix{};
   std::vector<ObjectKey> keys{};  ///< ascending frames; none: stands still
   std::optional<GltfMotion> gltf{};
-  /// It is not in the picture: what shadows take from it is in the channels `shadow`.
+  /// It is not in the image: what shadows take from it is in the channels `shadow`.
   bool catcher = false;
 
   bool operator==(const ObjectSpec&) const = default;

@@ -137,7 +137,7 @@ struct SamplingStats {
   std::uint64_t pixels_resampled = 0;
   std::uint64_t local_proposed = 0, local_accepted = 0;  ///< moves
   std::uint64_t independent_proposed = 0, independent_accepted = 0;
-  /// Pixels by ESS / N before resampling: bin b holds [b, b + 1) / kEssBins, the last one 1 as
+  /// Pixels by ESS / N before resampling: bin b is for [b, b + 1) / kEssBins, the last one 1 as
   /// well; dark pixels are in bin 0.
   std::array<std::uint64_t, kEssBins> ess_histogram{};
 
@@ -217,7 +217,7 @@ struct RenderStats {
   std::uint64_t pixels_masked = 0;     ///< that the second pass did again
   std::uint64_t rays_second_pass = 0;  ///< not in rays_shadow
   double seconds_second_pass = 0;      ///< all of the second pass
-  double seconds_second_rays = 0;      ///< its occlusion rays alone
+  double seconds_second_rays = 0;      ///< occlusion rays of the second pass
 
   bool operator==(const RenderStats&) const = default;
   void merge(const RenderStats& b);

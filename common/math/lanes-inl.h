@@ -24,7 +24,7 @@ namespace hn = hwy::HWY_NAMESPACE;
 /// that what it adds to stays in registers.
 #define BATON_IN_LOOP HWY_ATTR __attribute__((always_inline))
 
-/// All kernels run on (up to) eight float lanes: wide enough for AVX2, and the same grouping on
+/// All kernels work on (up to) eight float lanes: wide enough for AVX2, and the same grouping on
 /// wider machines.
 using DF = hn::CappedTag<float, 8>;
 using DI = hn::RebindToSigned<DF>;

@@ -3,7 +3,7 @@
 #include <bit>
 #include <cstdint>
 
-/// The steps of MurmurHash3 for 32 bits [Appleby 2011].
+/// The stages of MurmurHash3 for 32 bits [Appleby 2011].
 namespace baton::murmur3 {
 
 /// A word, mixed for itself.

@@ -71,7 +71,7 @@ struct RngKey {
   constexpr std::uint64_t philox_key() const { return job_seed + 0x9E3779B97F4A7C15ull * round; }
 };
 /// A number for each pixel: y * image_width + x from the first row on, from the left edge to the
-/// right one. Pixels outside of these, which overscan has, count in a larger picture, behind all
+/// right one. Pixels outside of these, which overscan has, count in a larger image, behind all
 /// others: width + 2 margins to a row. Limits of sides and overscan keep both parts below 2^31.
 constexpr std::uint32_t pixel_number(std::int32_t image_width, std::int32_t x, std::int32_t y) {
   if (y >= 0 && x >= 0 && x < image_width) return static_cast<std::uint32_t>(y * image_width + x);

@@ -25,8 +25,8 @@ class ConnectionWatch {
   /// denied: the key is not known. endless: see above.
   enum class Failure { broken_off, replayed, denied, endless };
   struct Hears {
-    bool handshakes;   ///< that fail
-    bool connections;  ///< that are accepted: of a listening socket
+    bool handshakes;   ///< failed handshakes
+    bool connections;  ///< accepted ones, of a listening socket
   };
 
   ConnectionWatch(zmq::context_t& context, zmq::socket_t& watched, Hears what);
@@ -49,8 +49,10 @@ class ConnectionWatch {
 
  private:
   struct Connection {
-    std::uint64_t bytes = 0;  ///< received when its last whole message was noticed
-    bool has_spoken = false;  ///< a whole message since the last close_endless()
+    /// Bytes received when the last whole message was noticed.
+    std::uint64_t bytes = 0;
+    /// A whole message has come since the last close_endless().
+    bool has_spoken = false;
   };
   void note(Failure failure);
 

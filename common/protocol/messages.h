@@ -20,14 +20,17 @@ inline constexpr const char* kProtocolName = "BATON";
 inline constexpr std::uint16_t kProtocolVersion = 11;
 
 // ---- worker to coordinator ----------------------------------------------------------------------
-struct WorkerHello {  ///< first, and again after a reconnect or a new epoch
+/// The first message, sent again after a reconnect or a new epoch.
+struct WorkerHello {
   std::string worker_id, host;
-  std::uint64_t instance =
-      0;  ///< drawn when the process starts: who the worker is, whatever its name
+  /// Drawn when the process starts: who the worker is, whatever its name.
+  std::uint64_t instance = 0;
   std::int32_t pid = 0, num_threads = 0;
-  std::string build;             ///< build_identity()
-  std::string renderer;          ///< e.g. "AVX2, Embree 3.13.5": equal ones make equal bytes
-  std::vector<LeaseId> running;  ///< leases in hand: a restarted coordinator may adopt them
+  std::string build;  ///< build_identity()
+  /// E.g. "AVX2, Embree 3.13.5": equal ones make equal bytes.
+  std::string renderer;
+  /// Leases of the worker, which a restarted coordinator may adopt.
+  std::vector<LeaseId> running;
 };
 /// `count` more leases are wanted; replaces what was asked before.
 struct LeaseRequest {
@@ -40,20 +43,23 @@ struct TaskDone {
   LeaseId lease;
   std::vector<BlobRef> outputs;
   RenderStats stats;
-  std::vector<FrameStats> frames = {};  ///< of a render task one for each frame, of an assembly one
-  std::vector<std::string> notes = {};  ///< of the job's files, for people; each once of a worker
+  /// A render task: one for each frame; an assembly: one.
+  std::vector<FrameStats> frames = {};
+  /// About the job's files, for people; a worker sends each once.
+  std::vector<std::string> notes = {};
 };
 struct TaskFailed {
   LeaseId lease;
   std::string message;
   bool permanent = false;  ///< bad input: no retry can help
-  bool no_space = false;   ///< a disk is full: nobody's failure, waiting can help
+  /// A disk is full: nobody's failure, waiting can help.
+  bool no_space = false;
 };
 /// The worker will not do it: nobody's failure, and no loss.
 struct LeaseReturn {
   LeaseId lease;
-  std::string unseen =
-      {};  ///< the folder of the job that it cannot see; empty: it has no time left
+  /// The folder of the job that the worker cannot see; empty: it has no time left.
+  std::string unseen = {};
 };
 struct JobDocumentRequest {
   Digest job;
@@ -76,7 +82,8 @@ struct WorkerWelcome {
   std::uint32_t epoch = 0;
   std::int32_t heartbeat_ms = 1000;
   std::string store_directory;  ///< shared by coordinator and workers
-  std::string token = {};       ///< stands in its file `token`: whoever reads it sees the folder
+  /// Text of the store's file `token`: whoever reads it sees the folder.
+  std::string token = {};
 };
 using LeaseGrant = Grant;
 /// Others wait for these states, which the worker holds: they should go into the store.
@@ -101,7 +108,7 @@ struct JobDocument {
   /// Stands in its output folder (output_token_file); empty: that could not be marked.
   std::string token = {};
 };
-/// Finish what runs, take nothing new, end.
+/// Finish what is in work, take nothing new, end.
 struct Drain {};
 struct Shutdown {};
 
@@ -112,11 +119,12 @@ struct SubmitJob {
   bool restart = false;
 };
 struct ListJobs {
-  bool all = false;  ///< also those that have ended, the newest of them
+  bool all = false;  ///< also jobs that have ended, the newest
 };
+/// Names a job by its name, digest, or the unique beginning of one.
 struct ShowJob {
   std::string job;
-};  ///< name, digest, or the unique beginning of one
+};
 struct PauseJob {
   std::string job;
 };
@@ -137,15 +145,16 @@ struct StopCoordinator {};
 // ---- coordinator to client ----------------------------------------------------------------------
 struct JobSummary {
   Digest job;
-  std::string name, owner, output_directory;  ///< owner: who submitted it; empty: without a key
+  /// owner: who submitted it; empty: without a key.
+  std::string name, owner, output_directory;
   JobStatus status = JobStatus::running;
   std::int32_t priority = 0;
   std::uint64_t tasks_total = 0, tasks_done = 0, tasks_leased = 0, tasks_failed = 0,
                 attempts_lost = 0;
   std::uint32_t frames_total = 0, frames_done = 0;
-  std::uint64_t state_bytes = 0, state_pixels = 0;  ///< of all states published so far
-  std::uint64_t states_held = 0;      ///< states that are in the memory of workers alone
-  std::int32_t checkpoint_every = 0;  ///< frames
+  std::uint64_t state_bytes = 0, state_pixels = 0;  ///< all states published so far
+  std::uint64_t states_held = 0;                    ///< in workers' memory alone
+  std::int32_t checkpoint_every = 0;                ///< frames
   RenderStats stats;
 };
 struct WorkerSummary {
@@ -154,26 +163,31 @@ struct WorkerSummary {
 };
 struct JobAccepted {
   Digest job;
-  bool already_there = false;  ///< equal digest: the same job goes on (a success)
-  std::string plan = {};       ///< what is kept and what is done again, lines; empty: all is new
+  /// Equal digest: the same job goes on (a success).
+  bool already_there = false;
+  /// What is kept and what is done again, lines; empty: all is new.
+  std::string plan = {};
 };
 struct JobList {
   std::vector<JobSummary> jobs;
   std::vector<WorkerSummary> workers;
-  std::uint64_t num_ended = 0;    ///< jobs that have ended, listed or not
-  std::uint64_t tasks_ready = 0;  ///< of running jobs, that a worker may have at once
-  double task_seconds = 0;        ///< CPU time of their longest tasks of late; 0: not known
+  std::uint64_t num_ended = 0;  ///< jobs that have ended, listed or not
+  /// Tasks of running jobs that workers may have at once.
+  std::uint64_t tasks_ready = 0;
+  /// CPU time of the longest recent tasks of these jobs; 0: not known.
+  double task_seconds = 0;
 };
 struct JobDetail {
   JobSummary summary;
   std::vector<FrameNumber> frames_done;
   std::vector<std::string> failures;     ///< newest last, at most 100
-  std::vector<FrameReport> frames = {};  ///< of each frame so far
+  std::vector<FrameReport> frames = {};  ///< one for each frame so far
   std::string waits = {};                ///< for what, where it does
-  std::string plan = {};                 ///< of the answer to ResumeJob: as JobAccepted's
+  /// The plan in the answer to ResumeJob, as that of JobAccepted.
+  std::string plan = {};
   /// It waits for room in the store, and nothing that is in work will make some.
   bool lacks_room = false;
-  std::vector<std::string> notes = {};  ///< of workers, of the job's files
+  std::vector<std::string> notes = {};  ///< workers' notes about the job's files
 };
 struct Refused {
   std::uint8_t kind = 0;  ///< ErrorKind

@@ -21,26 +21,29 @@ struct FirstPassSamples {
   static constexpr std::uint8_t kSurface = 1;
   static constexpr std::uint8_t kFailed[2] = {2, 4};
 
-  Digest picture;  ///< of the job (picture_digest)
+  Digest picture;  ///< picture_digest of the job
   Step step{};
   std::int32_t tile = 0;
   PixelRect rect;
-  std::int32_t num_slots = 0;        ///< N: samples of a pixel, of all populations
-  std::int32_t num_populations = 1;  ///< K, 1 or 2; population k has slots [k N / K, (k + 1) N / K)
+  std::int32_t num_slots = 0;  ///< N: samples of a pixel, all populations
+  /// K, 1 or 2; population k has slots [k N / K, (k + 1) N / K).
+  std::int32_t num_populations = 1;
 
   std::vector<std::uint8_t> flags;  ///< (pixels)
   std::vector<std::uint8_t> count;  ///< (pixels) stored samples, at most N
-  std::vector<float> lns;  ///< (pixels, K), or empty where the second pass has no use for it
+  /// (pixels, K), or empty where the second pass has no use for it.
+  std::vector<float> lns;
 
   // (samples), pixel after pixel, slots ascending
   std::vector<std::uint8_t> slot;
   std::vector<std::uint8_t> site;
   std::vector<OctDirection> direction;
-  std::vector<float> energy;  ///< u_j / K: all samples of a pixel together estimate its Lns
+  /// u_j / K: all samples of a pixel together estimate its Lns.
+  std::vector<float> energy;
 
   bool operator==(const FirstPassSamples&) const = default;
   std::size_t num_pixels() const { return static_cast<std::size_t>(rect.area()); }
-  /// Drops the samples of pixels that no mask dilated by `radius` can hold, whatever the tiles
+  /// Drops the samples of pixels that no mask dilated by `radius` can have, whatever the tiles
   /// around say.
   void keep_possible(std::int32_t radius);
 };

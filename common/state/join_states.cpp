@@ -7,7 +7,7 @@
 namespace baton {
 namespace {
 
-/// Whether two states are of one frame and hold the same things.
+/// Whether two states are of one frame and have the same things.
 bool are_alike(const SampleState& a, const SampleState& b) {
   return a.picture == b.picture && a.step == b.step && a.num_particles == b.num_particles &&
          a.num_populations == b.num_populations && a.memory.empty() == b.memory.empty() &&

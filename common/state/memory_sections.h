@@ -9,7 +9,7 @@
 
 namespace baton {
 
-/// The sections of a state file that hold what pixels remember (FORMAT.md).
+/// The sections of a state file with what pixels remember (FORMAT.md).
 inline constexpr SectionTag kMemorySummary{'V', 'I', 'S', 'S'};
 inline constexpr SectionTag kMemoryMasks{'V', 'I', 'S', 'M'};
 inline constexpr SectionTag kMemoryCells{'V', 'I', 'S', 'C'};

@@ -28,10 +28,12 @@ struct PixelMemory {
   static constexpr std::size_t kMaxStoredBytes =
       VisibilityBins::kCount / 8 + (VisibilityBins::kCount + 4) * sizeof(VisibilityCell);
 
-  VisibilityBins bins;  ///< all 0 until both outcomes were seen. First: kernels load two cells at
-                        ///< once, and the last one's other is all_rays
+  /// All 0 until both outcomes were seen. They come first: kernels load two cells at once, and the
+  /// neighbour of the last one is all_rays.
+  VisibilityBins bins;
   VisibilityCell all_rays = 0;
-  std::uint16_t outcomes = 0;  ///< that were ever seen: kSawFree, kSawBlocked
+  /// Outcomes that were ever seen: kSawFree, kSawBlocked.
+  std::uint16_t outcomes = 0;
   /// The variance of its unshadowed light by candidates of either kind, the upper half of a float
   /// (worker/sampling/light_noise.h).
   std::uint16_t light_noise = 0, lobe_noise = 0;

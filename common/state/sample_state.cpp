@@ -299,7 +299,7 @@ Bytes encode_state(const SampleState& state) {
   sections.gather(kLnsFresh, state.lns_fresh, populations);
 
   // Directions are as good as random, sites nearly so, and so are weights unless most pixels were
-  // just resampled: looking for repetitions costs more time than it saves bytes.
+  // just resampled: finding repetitions costs more time than it saves bytes.
   sections.gather(kDirection, state.direction, num_particles);
   sections.keep_plain();
   sections.gather(kWeight, state.weight, num_particles);

@@ -22,8 +22,9 @@ enum class PixelSource : std::uint8_t {
   fresh = 1,       ///< started with SIR
   carried = 2,     ///< carried on from the previous frame
   restarted = 3,   ///< carried, but all weights died: SIR again
-  refreshed = 4,   ///< carried, Lns recomputed by the refresh rule
-  catcher = 5,     ///< of a shadow catcher, whose memory no object takes up
+  refreshed = 4,   ///< carried, Lns computed again by a rule
+  /// A shadow catcher's pixel, whose memory no object may inherit.
+  catcher = 5,
 };
 
 /// The baton: what one tile hands to its next frame. Structure of arrays; pixels row by row inside
@@ -31,23 +32,27 @@ enum class PixelSource : std::uint8_t {
 /// site) and are traced again. A background pixel carries nothing: every array is 0 there, and the
 /// file leaves it out.
 struct SampleState {
-  Digest picture;  ///< of the job (picture_digest)
-  Step step{};     ///< that the samples belong to
+  Digest picture;  ///< picture_digest of the job
+  Step step{};     ///< the samples are of this step
   std::int32_t tile = 0;
   PixelRect rect;
-  std::int32_t num_particles = 0;  ///< N: of all populations; 0 where only a memory is carried
-  std::int32_t num_populations =
-      1;  ///< K: parts that never exchange anything; part k has particles [k N / K, (k + 1) N / K)
+  /// N: particles of all populations; 0 where only a memory is carried.
+  std::int32_t num_particles = 0;
+  /// K: parts that never exchange anything; part k has particles [k N / K, (k + 1) N / K).
+  std::int32_t num_populations = 1;
 
-  std::vector<float> lns;        ///< (pixels, K) estimate of the unshadowed radiance, mean over RGB
-  std::vector<float> lns_fresh;  ///< (pixels, K) Lns at the last SIR or refresh
+  /// (pixels, K) estimate of the unshadowed radiance, mean over RGB.
+  std::vector<float> lns;
+  /// (pixels, K) Lns at the last SIR or refresh.
+  std::vector<float> lns_fresh;
   std::vector<PixelSource> source;      ///< (pixels, K)
   std::vector<OctDirection> direction;  ///< (pixels, N)
-  std::vector<float> weight;  ///< (pixels, N) normalised, sum 1 in each population, or all 0 when
-                              ///< no particle is lit
+  /// (pixels, N) normalised, sum 1 in each population, or all 0 when no particle is lit.
+  std::vector<float> weight;
   std::vector<std::uint8_t> site;  ///< (pixels, N)
 
-  std::vector<PixelMemory> memory;  ///< (pixels), or empty: nothing is remembered
+  /// (pixels), or empty: nothing is remembered.
+  std::vector<PixelMemory> memory;
   /// (pixels) how many fresh sets a pixel's samples count as when they are weighed against fresh
   /// ones, 0: they are no history; or empty: the method has no confidence.
   std::vector<std::uint16_t> confidence;
@@ -57,8 +62,8 @@ struct SampleState {
   /// Sizes every array, all zero. new_num_populations divides new_num_particles.
   void resize(const PixelRect& new_rect, std::int32_t new_num_particles,
               std::int32_t new_num_populations = 1);
-  /// Of a pixel in a file before packing, at most, and about in memory; as the flags say with a
-  /// memory or a confidence.
+  /// Size of a pixel in a file before packing, at most, and about its size in memory; as the flags
+  /// say with a memory or a confidence.
   static constexpr std::size_t bytes_per_pixel(std::size_t particles, std::size_t populations,
                                                bool with_memory, bool with_confidence) {
     return populations * (sizeof(lns[0]) + sizeof(lns_fresh[0]) + sizeof(source[0])) +

@@ -12,7 +12,7 @@ namespace fs = std::filesystem;
 namespace {
 
 /// The files below a folder, of this extension, that nobody has written to for kLeftoverAge. What
-/// cannot be looked at is left out.
+/// cannot be read is left out.
 std::vector<fs::path> old_files(const fs::path& folder, const char* extension) {
   std::vector<fs::path> files;
   const auto oldest = fs::file_time_type::clock::now() - BlobStore::kLeftoverAge;

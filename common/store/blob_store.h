@@ -58,7 +58,7 @@ class BlobStore {
   /// The jobs whose job_file() is as old.
   std::vector<Digest> old_job_files() const;
 
-  /// Where workers save a job's document while it runs, so that a failed tile can be replayed
+  /// Where workers save a job's document until it ends, so that a failed tile can be replayed
   /// alone.
   std::filesystem::path job_file(const Digest& job) const;
 

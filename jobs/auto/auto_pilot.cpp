@@ -12,8 +12,8 @@
 namespace baton {
 namespace {
 
-/// Runs of every candidate; then of those whose efficiency is not below the best one's by more than
-/// the factor.
+/// Renderings of every candidate; then of those whose efficiency is not below the best one's by
+/// more than the factor.
 constexpr int kFirstSeeds = 3;
 constexpr int kSecondSeeds = 12;
 constexpr double kFarFromBest = 2.5;
@@ -24,8 +24,8 @@ struct PilotResult {
   double lit_share = 0;
 };
 
-/// Runs every candidate with `num_seeds` seeds; what an earlier round did is kept.
-/// ray_factor: ray_cost_factor of the job.
+/// Renders every candidate with `num_seeds` seeds; what an earlier round did is kept. ray_factor:
+/// ray_cost_factor of the job.
 Result<PilotResult> run_pilot(const JobSpec& job, double ray_factor,
                               const std::vector<AutoCandidate>& candidates, int num_seeds,
                               const StudyFolder& folder, JobRunner& runner) {
@@ -134,7 +134,7 @@ Result<std::vector<PilotNumbers>> settle_auto(JobSpec& job, const StudyFolder& f
   BATON_ASSIGN(PilotResult pilot,
                run_pilot(job, ray_factor, auto_candidates(job), kFirstSeeds, folder, runner));
 
-  // Look again, and closer, at those that may be the best.
+  // Measure again, and better, those that may be the best.
   const std::vector<AutoCandidate> near = near_the_best(pilot.numbers);
   if (near.size() > 1) {
     BATON_ASSIGN(const PilotResult closer,

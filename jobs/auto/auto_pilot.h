@@ -22,7 +22,7 @@ PilotPlan plan_pilot(const JobSpec& job, double ray_factor);
 /// its start and at its end) with every candidate and a few seeds, those near the best with more,
 /// judges them by error and counted work, and writes the choice with its reasons into the job. A
 /// job with another method is left as it is. Deterministic given the job and its assets; finished
-/// runs are kept in `folder`. Returns the numbers seen, empty for another method.
+/// renderings are kept in `folder`. Returns the numbers seen, empty for another method.
 Result<std::vector<PilotNumbers>> settle_auto(JobSpec& job, const StudyFolder& folder,
                                               JobRunner& runner);
 
@@ -30,7 +30,7 @@ Result<std::vector<PilotNumbers>> settle_auto(JobSpec& job, const StudyFolder& f
 /// fixed ones. The cost of the pilots is not part of the cells'.
 Status settle_study(Study& study, const StudyFolder& folder, JobRunner& runner);
 
-/// The study that the pilot runs: scenes are windows of frames, cells the candidates in their
+/// The study that the pilot renders: scenes are windows of frames, cells the candidates in their
 /// order. Seeds are the caller's.
 Study pilot_study(const JobSpec& job, const std::vector<AutoCandidate>& candidates);
 

@@ -15,7 +15,7 @@ constexpr int kReferenceSamples = 512;
 /// Far from the seeds that people give.
 constexpr std::uint64_t kReferenceSeed = 2'000'000'000;
 
-/// The job with at most kPilotPixels a picture, for some of its frames.
+/// The job with at most kPilotPixels an image, for some of its frames.
 JobSpec small_job(const JobSpec& job, std::vector<FrameNumber> frames) {
   JobSpec small = job;
   small.frames = std::move(frames);

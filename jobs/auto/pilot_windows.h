@@ -15,7 +15,7 @@ std::vector<JobSpec> pilot_windows(const JobSpec& job);
 /// the history that a carried sample then has.
 StudyScene pilot_scene(const JobSpec& window);
 
-/// Squared error over squared mean radiance, the mean of the runs; not below 0.
+/// Squared error over squared mean radiance, the mean of the renderings; not below 0.
 double relative_square(std::span<const RunRecord> runs, const std::vector<Reference>& references);
 
 }  // namespace baton

@@ -18,10 +18,10 @@ double ray_cost_factor(std::uint64_t num_triangles, bool objects_move);
 /// The same for the geometry of a job, which is loaded. Errors: those of load_scene.
 Result<double> ray_cost_factor(const JobSpec& job);
 
-/// CPU microseconds of a job's counted work: a stand-in for time that is the same on every run and
-/// machine, for choices that must be repeatable. Rays count with ray_factor (ray_cost_factor), the
-/// rest with fixed unit costs, a fit to the runs of jobs/studies/unit-costs.json (docs/lab/auto.md
-/// names machine and residual).
+/// CPU microseconds of a job's counted work: a stand-in for time that is the same on every
+/// rendering and machine, for choices that must be repeatable. Rays count with ray_factor
+/// (ray_cost_factor), the rest with fixed unit costs, a fit to the renderings of
+/// jobs/studies/unit-costs.json (docs/lab/auto.md names machine and residual).
 double counted_cost_us(const JobSpec& job, double ray_factor, const RunCounts& counts);
 
 }  // namespace baton

@@ -44,7 +44,7 @@ struct SlurmWorker {
 struct SlurmSnapshot {
   std::vector<SlurmPilot> pilots;
   std::vector<SlurmWorker> workers;
-  std::uint64_t tasks = 0;    ///< that could be in work at the same time
+  std::uint64_t tasks = 0;    ///< tasks that could be in work at once
   int threads_per_pilot = 1;  ///< at least 1
   int least = 1, most = 1;
 };
@@ -75,7 +75,7 @@ SlurmOrders give_orders(const SlurmSnapshot& now);
 class VainArrays {
  public:
   void submitted(const std::string& array) { open_ = array; }
-  /// What a look has found. True: one more has been in vain.
+  /// What a snapshot has found. True: one more has been in vain.
   bool look(const SlurmSnapshot& now);
   /// Pilots of it that are cancelled as there are too many do not count.
   void cancelled(const std::vector<std::string>& pilots);

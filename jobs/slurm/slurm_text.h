@@ -47,7 +47,7 @@ std::string pilot_script(const PilotJob& job);
 /// The command that submits `count` pilots; the path of the script comes last.
 std::vector<std::string> sbatch_command(const PilotJob& job, int count, const std::string& script);
 
-/// job_name: empty: all jobs of the user.
+/// job_name: empty: all that the user has in Slurm.
 std::vector<std::string> squeue_command(const std::string& job_name);
 /// Its answer. corrupt: a line that is not understood.
 Result<std::vector<SlurmPilot>> parse_squeue(std::string_view text);

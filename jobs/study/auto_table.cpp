@@ -33,11 +33,11 @@ bool is_resolved(const Study& study, const StudyResults& results, std::size_t ce
 struct Blocks {
   std::vector<double> pixels;                 ///< with a surface
   std::vector<std::vector<double>> train;     ///< (cells, blocks) squared error
-  std::vector<std::vector<double>> held_out;  ///< the same of other seeds
+  std::vector<std::vector<double>> held_out;  ///< errors of other seeds
   std::vector<double> cost;                   ///< (cells) of a pixel
 };
 
-/// The mean over runs of one parity, and frames, of a cell's errors by block.
+/// The mean over renderings of one parity, and frames, of a cell's errors by block.
 std::vector<double> mean_blocks(const std::vector<RunRecord>& runs, std::size_t parity,
                                 std::size_t num_blocks) {
   std::vector<double> sum(num_blocks);

@@ -24,7 +24,7 @@ double block_headroom(const Study& study, const StudyResults& results, std::size
                       const std::string& budget);
 
 std::string auto_csv(const Study& study, const StudyResults& results);
-/// The same as a table of the report; empty without `auto` in the study.
+/// What `auto` chose, as a table of the report; empty without `auto` in the study.
 std::string auto_html(const Study& study, const StudyResults& results);
 
 }  // namespace baton

@@ -159,9 +159,9 @@ std::array<Plane, 2> features(const Plane& lightness, double pixels_per_degree) 
   return {length_of(edge), length_of(point)};
 }
 
-/// A picture as the measure compares it.
+/// An image as the measure compares it.
 struct Seen {
-  std::vector<Colour> colour;  ///< Hunt-adjusted Lab of the blurred picture
+  std::vector<Colour> colour;  ///< Hunt-adjusted Lab of the blurred image
   std::array<Plane, 2> feature;
 };
 

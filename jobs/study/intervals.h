@@ -9,12 +9,12 @@ struct Interval {
   double low = 0, value = 0, high = 0;
 };
 
-/// Mean of independent values, one a run, with the percentile bootstrap interval [Efron 1979] of
-/// 1000 resamples, by fixed random numbers. One value is its own interval; none is 0.
+/// Mean of independent values, one a rendering, with the percentile bootstrap interval [Efron 1979]
+/// of 1000 resamples, by fixed random numbers. One value is its own interval; none is 0.
 Interval mean_interval(std::span<const double> values);
 
-/// Ratio of the means of two independent sets of runs, resampled apart. value: NaN when the second
-/// mean is not positive.
+/// Ratio of the means of two independent sets of renderings, resampled apart. value: NaN when the
+/// second mean is not positive.
 Interval ratio_interval(std::span<const double> above, std::span<const double> below);
 
 /// The middle value; 0 without any.

@@ -10,9 +10,9 @@ namespace baton {
 
 inline constexpr double kNotMeasured = std::numeric_limits<double>::quiet_NaN();
 
-/// What one frame of one run measures, over the pixels with a surface. Squared errors are taken as
-/// (I - A)(I - B) with the halves A and B of the reference: their expectation is the error against
-/// the truth, free of the reference's own noise (a value below zero is such noise).
+/// What one frame of one rendering measures, over the pixels with a surface. Squared errors are
+/// taken as (I - A)(I - B) with the halves A and B of the reference: their expectation is the error
+/// against the truth, free of the reference's own noise (a value below zero is such noise).
 struct FrameMeasures {
   FrameNumber frame{};
   double mse = 0;      ///< over R, G, B

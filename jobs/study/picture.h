@@ -10,7 +10,7 @@
 
 namespace baton {
 
-/// One rendered frame of a run as the measures use it.
+/// One frame of a rendering as the measures use it.
 struct Picture {
   RgbImage image;
   std::vector<float> coverage;    ///< (pixels) alpha: where there is a surface
@@ -21,7 +21,7 @@ struct Picture {
   std::vector<float> variance;
 };
 
-/// Side of the squares that pictures are divided into, in pixels; those at the border are cut.
+/// Side of the squares that images are divided into, in pixels; those at the border are cut.
 inline constexpr int kBlockPx = 16;
 /// The square of pixel `index` of an image of that width, and the number of squares.
 std::size_t block_of(std::size_t index, int width);

@@ -11,7 +11,7 @@
 
 namespace baton {
 
-/// Counted work and CPU seconds of a run, over all its frames.
+/// Counted work and CPU seconds of a rendering, over all its frames.
 struct RunCounts {
   std::uint64_t pixels = 0, pixels_background = 0;
   std::uint64_t rays_shadow = 0;  ///< in both passes
@@ -26,7 +26,7 @@ struct RunCounts {
 };
 RunCounts counts_of(const RenderStats& stats);
 
-/// What is kept of one run: one cell with one seed.
+/// What is kept of one rendering: one cell with one seed.
 struct RunRecord {
   /// Names the run whatever the study: see run_key.
   std::string key;
@@ -38,7 +38,7 @@ struct RunRecord {
 
 /// Publishes the record as JSON.
 Status write_record(const std::filesystem::path& path, const RunRecord& record);
-/// nullopt when there is none that can be read whole: the run is then done again.
+/// nullopt when there is none that can be read whole: the rendering is then done again.
 std::optional<RunRecord> read_record(const std::filesystem::path& path);
 
 }  // namespace baton

@@ -20,7 +20,7 @@ namespace fs = std::filesystem;
 using nlohmann::json;
 
 constexpr int kMaxSeeds = 10000;
-/// Far from the seeds of runs, which count from 1.
+/// Far from the seeds of renderings, which count from 1.
 constexpr std::uint64_t kReferenceSeed = 1'000'000'000;
 
 constexpr std::uint64_t kSiteSeed = 1;

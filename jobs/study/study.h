@@ -44,7 +44,7 @@ struct StudyCell {
   std::string chosen{};
 };
 
-/// What `baton chart` runs: every cell with num_seeds seeds, 1, 2, ...
+/// What `baton chart` renders: every cell with num_seeds seeds, 1, 2, ...
 struct Study {
   std::string name;
   int num_seeds = 20;

@@ -17,7 +17,7 @@ double per(std::uint64_t count, std::uint64_t whole) {
   return whole == 0 ? 0 : static_cast<double>(count) / static_cast<double>(whole);
 }
 
-/// Calls line(labels, run) for every run.
+/// Calls line(labels, run) for every rendering.
 template <class F>
 void for_each_run(const Study& study, const StudyResults& results, F line) {
   for (std::size_t c = 0; c < study.cells.size(); ++c) {

@@ -7,11 +7,11 @@
 
 namespace baton {
 
-/// One line per run and measured frame: errors, counted work and the sampler's numbers. Holds no
-/// time, so it is the same for any machine of one instruction set, any stop and resume.
+/// One line per rendering and measured frame: errors, counted work and the sampler's numbers. Has
+/// no time, so it is the same for any machine of one instruction set, any stop and resume.
 std::string measurements_csv(const Study& study, const StudyResults& results);
 
-/// One line per run: CPU seconds of the stages and bytes of state.
+/// One line per rendering: CPU seconds of the stages and bytes of state.
 std::string costs_csv(const Study& study, const StudyResults& results);
 
 /// One line per scene and measured frame: what the reference can resolve.

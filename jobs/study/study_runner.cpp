@@ -14,7 +14,7 @@ namespace {
 
 namespace fs = std::filesystem;
 
-/// A run that has a name and may be done.
+/// A rendering that has a name and may be done.
 struct KeyedRun {
   std::size_t cell = 0;
   int seed = 0;
@@ -84,7 +84,7 @@ Status render_references(const Study& study, const StudyFolder& folder, JobRunne
   return render_kept(jobs, folder, runner);
 }
 
-/// Measures the frames of a finished run.
+/// Measures the frames of a finished rendering.
 Result<RunRecord> measure_run(const JobSpec& job, const std::vector<FrameNumber>& frames,
                               const std::vector<Reference>& references) {
   RunRecord record;
@@ -103,8 +103,8 @@ Result<RunRecord> measure_run(const JobSpec& job, const std::vector<FrameNumber>
   return record;
 }
 
-/// The record of a finished run; nullopt when it must be done (again). The frames of seed 1 are
-/// needed for the crops.
+/// The record of a finished rendering; nullopt when it must be done (again). The frames of seed 1
+/// are needed for the crops.
 std::optional<RunRecord> kept_record(const StudyFolder& folder, const StudyScene& scene,
                                      const std::string& key, int seed) {
   std::optional<RunRecord> record = read_record(folder.record_path(key));

@@ -32,7 +32,7 @@ struct StudyResults {
   std::vector<std::vector<Reference>> references;
 };
 
-/// Where the runs of a study are kept; what a second start finds.
+/// Where the renderings of a study are kept; what a second start finds.
 class StudyFolder {
  public:
   explicit StudyFolder(std::filesystem::path root) : root_(std::move(root)) {}
@@ -50,13 +50,13 @@ std::filesystem::path frame_file(const std::filesystem::path& folder, FrameNumbe
 /// For file names: lower case, nothing but letters, digits and '-'.
 std::string file_slug(const std::string& name);
 
-/// Names a run of a cell; cell_key: digest of its job, whatever the output folder. seed counts
-/// from 1.
+/// Names a rendering of a cell; cell_key: digest of its job, whatever the output folder. seed
+/// counts from 1.
 std::string run_key(const std::string& cell_key, int seed);
 
-/// Runs what is not yet done: references first, then cells and seeds; measures each run when its
-/// frames are there and keeps the record. The frames of seed 1 stay, for the crops. Errors name the
-/// scene, method, budget and seed that failed.
+/// Renders what is not yet done: references first, then cells and seeds; measures each rendering
+/// when its frames are there and keeps the record. The frames of seed 1 stay, for the crops. Errors
+/// name the scene, method, budget and seed that failed.
 Result<StudyResults> run_study(const Study& study, const StudyFolder& folder, JobRunner& runner);
 
 }  // namespace baton

@@ -12,7 +12,7 @@ namespace {
 constexpr double kNone = std::numeric_limits<double>::quiet_NaN();
 /// Two-sided 95 % of a normal distribution.
 constexpr double kNormal95 = 1.96;
-/// Squared error over the settled one at which a cut counts as overcome.
+/// Squared error over the final one at which a cut counts as overcome.
 constexpr double kOvercome = 1.5;
 
 /// What there is of an error in frames and in references.
@@ -29,7 +29,7 @@ const ErrorRow& row_of(ErrorKindOfImage kind) {
   return kRows.at(static_cast<std::size_t>(kind));
 }
 
-/// One number a run: a measure at a frame, or its mean over those frames that have it.
+/// One number a rendering: a measure at a frame, or its mean over those frames that have it.
 template <class F>
 std::vector<double> per_run(const std::vector<RunRecord>& runs, FrameChoice frame, F measure) {
   std::vector<double> values;

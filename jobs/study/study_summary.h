@@ -15,7 +15,7 @@ inline constexpr ErrorKindOfImage kImageErrors[] = {
     ErrorKindOfImage::rmse, ErrorKindOfImage::rel_mse, ErrorKindOfImage::flip};
 const char* name_of(ErrorKindOfImage kind);
 
-/// What a run of a cell costs: middle of its runs, per pixel with a surface and frame.
+/// What a rendering of a cell costs: middle of its renderings, per pixel with a surface and frame.
 struct CellCost {
   /// Primary rays, sampling, visibility, shading, second pass.
   double cpu_us = 0;
@@ -30,7 +30,8 @@ CellCost cell_cost(const std::vector<RunRecord>& runs);
 /// Frames of a scene: one by position, or all.
 using FrameChoice = std::optional<std::size_t>;
 
-/// The error of a cell over its runs. All frames: the mean over frames of squared error or FLIP.
+/// The error of a cell over its renderings. All frames: the mean over frames of squared error or
+/// FLIP.
 Interval cell_error(const std::vector<RunRecord>& runs, ErrorKindOfImage kind, FrameChoice frame);
 
 /// What the references of a scene cannot resolve, in the same measure.
@@ -45,8 +46,8 @@ Interval efficiency_ratio(const StudyResults& results, std::size_t base, std::si
 /// count once. costs, errors: of one length.
 std::vector<bool> pareto_front(const std::vector<double>& costs, const std::vector<double>& errors);
 
-/// Measured frames from the cut on until the squared error has come down to 1.5 times what it
-/// settles at, its median over the later half of them. 0: at once. NaN without a cut.
+/// Measured frames from the cut on until the squared error has come down to 1.5 times what it stays
+/// at, its median over the later half of them. 0: at once. NaN without a cut.
 double lag_after_cut(const StudyScene& scene, const std::vector<RunRecord>& runs);
 
 /// One row of the table of efficiencies.

@@ -32,8 +32,7 @@ struct Chart {
   std::optional<double> floor;
 };
 
-/// A picture of the chart, 620 x 400 pixels, with ticks, bands, markers and a legend.
-/// Deterministic.
+/// An image of the chart, 620 x 400 pixels, with ticks, bands, markers and a legend. Deterministic.
 std::string svg_chart(const Chart& chart);
 
 /// The palette's colour for a series, as #rrggbb.

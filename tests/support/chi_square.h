@@ -50,7 +50,7 @@ inline ChiSquareResult chi_square_test(std::span<const double> observed,
   std::stable_sort(order.begin(), order.end(),
                    [&](std::size_t a, std::size_t b) { return expected[a] < expected[b]; });
 
-  // Pool from the smallest up.
+  // Join cells from the smallest up.
   ChiSquareResult result;
   double pooled_observed = 0;
   double pooled_expected = 0;
@@ -74,12 +74,13 @@ inline ChiSquareResult chi_square_test(std::span<const double> observed,
 }
 
 /// A partition of the sphere around an axis, finer towards it: 1 - cos(angle to axis) = 2 t^power,
-/// t in `num_rings` equal steps, times `num_sectors` equal sectors.
+/// t in `num_rings` equal parts, times `num_sectors` equal sectors.
 struct SphereGrid {
   Vec3 axis{0, 0, 1};
   int num_rings = 24;
   int num_sectors = 32;
-  double power = 1;  ///< 1: equal solid angles; larger for sharp lobes
+  /// 1: equal solid angles; larger for sharp lobes.
+  double power = 1;
 
   std::size_t num_cells() const { return static_cast<std::size_t>(num_rings) * num_sectors; }
 
@@ -96,8 +97,8 @@ struct SphereGrid {
     return static_cast<std::size_t>(ring) * num_sectors + sector;
   }
 
-  /// Integral of `pdf` over every cell: the midpoint rule, refined where halving its steps changes
-  /// the value. Densities may jump (visible normals do, at grazing view).
+  /// Integral of `pdf` over every cell: the midpoint rule, refined where halving its intervals
+  /// changes the value. Densities may jump (visible normals do, at grazing view).
   template <class Pdf>
   std::vector<double> integrate(const Pdf& pdf) const {
     constexpr int kMinSteps = 8;
@@ -140,7 +141,7 @@ struct SphereGrid {
   }
 };
 
-/// Four uniforms of test sample `i`: the same in every run.
+/// Four uniforms of test sample `i`: the same in every process.
 inline std::array<float, 4> test_uniforms(std::uint32_t seed, std::uint32_t i) {
   return Rng(RngKey{.job_seed = seed}, PassId::reference).uniforms(0, i);
 }

@@ -154,7 +154,7 @@ class Proxy {
         pass({worker, false, std::move(*answer)}, line.number);
     }
 
-    // What was held back.
+    // What was kept back.
     const auto now = Clock::now();
     for (auto late = late_.begin(); late != late_.end();) {
       if (late->due > now) {

@@ -30,7 +30,7 @@ inline std::string targa(int width, int height, int channels,
   return bytes;
 }
 
-/// The same as a file of its own; its path.
+/// Writes targa() to a file of its own; returns its path.
 inline std::string write_targa(const std::string& name, int width, int height, int channels,
                                const std::vector<std::uint8_t>& values) {
   return write_test_file(name, targa(width, height, channels, values));

@@ -1,6 +1,6 @@
 #pragma once
 
-// Tests that run once on each instruction set the kernels were built for and this machine has.
+// Tests that are made once on each instruction set the kernels were built for and this machine has.
 #include <gtest/gtest.h>
 #include <hwy/targets.h>
 
@@ -10,7 +10,7 @@
 
 namespace baton {
 
-/// Runs the test body on the instruction set that is the parameter, then restores the choice.
+/// Gives the test body the instruction set that is the parameter, then restores the choice.
 class OnInstructionSet : public testing::TestWithParam<std::int64_t> {
  protected:
   void SetUp() override { choose(GetParam()); }

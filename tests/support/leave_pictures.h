@@ -20,8 +20,8 @@ inline void leave_picture(const std::string& name, int width, const std::vector<
   EXPECT_TRUE(write_png(test_folder() / name, image).ok());
 }
 
-/// What a test that fails leaves of a picture and its reference, (height, width): both, and the
-/// size of their difference, each as bright as it can be. Says where.
+/// What a test that fails leaves of an image and its reference, (height, width): both, and the size
+/// of their difference, each as bright as it can be. Says where.
 inline void leave_pictures(int width, const std::vector<double>& seen,
                            const std::vector<double>& expected) {
   std::vector<double> apart(seen.size());

@@ -34,7 +34,7 @@ inline std::vector<FilmTile> render_tiled(JobSpec job, int tile_size, int run_le
   std::vector<FilmTile> images(job.frames.size());
   const TileGrid grid(job.image);
   std::vector<StatePtr> states(static_cast<std::size_t>(grid.count()));
-  std::map<std::pair<Step, std::int32_t>, FilmTile> films;  // of all sweeps
+  std::map<std::pair<Step, std::int32_t>, FilmTile> films;  // films of all sweeps
   const Timeline timeline(job);
   for (Run run; run < Run(timeline.num_runs()); ++run) {
     std::vector<StatePtr> next(states.size());

@@ -14,7 +14,7 @@
 
 namespace baton::test {
 
-/// A folder of the running test, or of a study, in this process, made on demand.
+/// A folder of the test in work, or of a study, in this process, made on demand.
 inline std::filesystem::path test_folder() {
   const auto* info = testing::UnitTest::GetInstance()->current_test_info();
   const std::string name =

@@ -17,16 +17,18 @@ namespace baton {
 
 /// What a primary ray saw.
 struct SurfaceHit {
-  ShadingPoint point;  ///< position, normals turned to the viewer, wo
-  Vec3 ray_origin{};   ///< where shadow rays start: the position, lifted off (lift_off)
-  float depth = 0;     ///< distance along the ray; 0 where hit is false
+  ShadingPoint point;  ///< position, normals to the viewer, wo
+  /// Where shadow rays start: the position, lifted off (lift_off).
+  Vec3 ray_origin{};
+  float depth = 0;  ///< distance along the ray; 0 without a hit
   std::uint32_t instance = 0;
   std::uint32_t material = 0;
   bool hit = false;
-  /// Of what catches shadows (worker/pass/catcher.h). `hit` is false where the pixel sees an
+  /// The surface catches shadows (worker/pass/catcher.h). `hit` is false where the pixel sees an
   /// object, too.
   bool is_catcher = false;
-  SurfacePlace place{};  ///< where the material has detail or the mesh deforms, else all 0
+  /// Where the material has detail or the mesh deforms, else all 0.
+  SurfacePlace place{};
 
   bool operator==(const SurfaceHit&) const = default;
 };
@@ -61,7 +63,7 @@ struct ShadowRays {
     if (count_ == t_far.size()) reserve(std::max<std::size_t>(1024, 2 * count_));
     push_if(true, origin, direction);
   }
-  /// The same for a ray that may not be wanted, without a branch; there must be room (reserve).
+  /// Adds a ray that may not be wanted, without a branch; there must be room (reserve).
   void push_if(bool wanted, const Vec3& origin, const Vec3& direction) {
     const std::size_t i = count_;
     count_ += wanted ? 1 : 0;
@@ -86,8 +88,8 @@ inline constexpr float kLiftOrigin = 1.0f / 32, kLiftNear = 1.0f / 65536, kLiftS
 
 /// How a ray tracer is built.
 struct AccelLimits {
-  /// Of meshes that stand still in several places, in one flat hierarchy; where their copies would
-  /// have more, they have hierarchies of their own.
+  /// Triangles of meshes that stand still in several places, in one flat hierarchy; where their
+  /// copies would have more, they have hierarchies of their own.
   std::uint64_t max_copied_triangles = limits::kMaxCopiedTriangles;
   std::uint64_t max_bytes = std::numeric_limits<std::uint64_t>::max();
 };
@@ -117,7 +119,7 @@ class Accel {
   /// sites of a pixel; a hit depends on no ray of another group.
   virtual void intersect(std::span<const Ray> rays, std::span<SurfaceHit> hits,
                          std::size_t group = 1) const = 0;
-  /// The same of shadow catchers alone, which intersect() and occluded() pass, ray by ray.
+  /// Closest hits of shadow catchers alone, which intersect() and occluded() pass, ray by ray.
   virtual void intersect_catchers(std::span<const Ray> rays, std::span<SurfaceHit> hits) const = 0;
   /// Traces all rays; t_far of the occluded ones becomes -inf.
   virtual void occluded(ShadowRays& rays) const = 0;

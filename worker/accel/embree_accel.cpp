@@ -19,7 +19,8 @@ namespace {
 /// Instances that rays meet together: the objects, or the shadow catchers.
 struct Layer {
   bool catchers = false;
-  Owned<RTCScene> still;  ///< all that does not move, in world space; null without instances
+  /// All that does not move, in world space; null without instances.
+  Owned<RTCScene> still;
   bool any_moves = false;
 
   bool has(const Instance& instance) const { return instance.is_catcher == catchers; }
@@ -32,15 +33,16 @@ struct PlacedLayer {
 
 /// What all poses of a scene share.
 struct SharedGeometry {
-  AllocationCount allocated;     ///< outlives what it counts
-  mutable std::mutex placing{};  ///< placements of several jobs tell their errors one by one
+  AllocationCount allocated;  ///< outlives what it counts
+  /// Placements of several jobs tell their errors one by one.
+  mutable std::mutex placing{};
   Owned<RTCDevice> device;
   Layer objects, catchers{.catchers = true, .still = {}};
   /// By index of the mesh, in its own space: those that move, or that are in too many places.
   std::map<std::uint32_t, Owned<RTCScene>> own_meshes;
   std::set<std::uint32_t> with_holes;  ///< meshes that are cut out somewhere
   bool any_blends = false;             ///< rays need their bits
-  std::uint64_t placement_bytes = 0;   ///< of what is built for each placement
+  std::uint64_t placement_bytes = 0;   ///< what is built for each placement
 
   const Scene* holes_of(const Scene& scene, std::uint32_t mesh) const {
     return with_holes.contains(mesh) ? &scene : nullptr;

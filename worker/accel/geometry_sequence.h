@@ -52,7 +52,7 @@ struct FrameGeometry {
     if (!pose.instances[hit.instance].moves()) return hit.point.ns;
     return carry_normal(*scene, pose, other, {hit.instance, hit.place, hit.point.ns});
   }
-  /// Of what deforms.
+  /// Memory of what deforms.
   std::size_t size_bytes() const;
 };
 

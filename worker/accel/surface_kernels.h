@@ -13,11 +13,12 @@ struct alignas(64) MetTriangles {
   template <class T>
   using Lanes = std::array<T, kMaxRayGroup>;
 
-  Lanes<float> direction_x, direction_y, direction_z;  ///< of the rays, unit
-  Lanes<float> depth, u, v;  ///< barycentric: of the second and third corner
+  Lanes<float> direction_x, direction_y, direction_z;  ///< the rays, unit
+  /// Distance along the ray, and barycentric coordinates: those of the second and third corner.
+  Lanes<float> depth, u, v;
   Lanes<std::uint32_t> triangle;
   Lanes<std::uint32_t> instance;  ///< kNothing: the ray met none
-  std::size_t count = 0;          ///< of the first lanes, that are rays
+  std::size_t count = 0;          ///< rays, in the first lanes
 
   static constexpr std::uint32_t kNothing = ~0u;
 };

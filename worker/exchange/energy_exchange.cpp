@@ -191,11 +191,12 @@ class Exchange {
   ExchangeScene& scene_;
   const std::vector<std::int32_t> ranks_;  ///< (rectangle of the masks)
   std::vector<SquareMembers> squares_;     ///< (C)
-  std::vector<Neighbours> neighbours_;     ///< of the pixel in work: at most C
+  std::vector<Neighbours> neighbours_;     ///< those of the pixel in work, at most C
   std::vector<std::int32_t> inner_index_;  ///< (ranks) position in `inner`, or -1
   std::vector<Reflected> sums_;            ///< (ranks) what each got
   std::vector<Giver> givers_;
-  std::vector<std::int32_t> num_lonely_;  ///< (givers) partitions with nobody to offer to
+  /// (givers) partitions with nobody to offer to.
+  std::vector<std::int32_t> num_lonely_;
   std::vector<GiverSample> batch_;
   std::vector<Offer> offers_;
   std::vector<Reflected> receptions_;

@@ -28,23 +28,26 @@ namespace baton {
 
 /// A free sample of the first pass. Its colour per energy is radiance / target of `reflected`.
 struct GiverSample {
-  std::uint32_t slot = 0;  ///< its position among the samples of the pixel, [0, num_slots)
-  float energy = 0;        ///< u_j, mean over RGB; positive
-  Reflected reflected;     ///< at its own site; target above kSmallestTarget
+  /// Its position among the samples of the pixel, [0, num_slots).
+  std::uint32_t slot = 0;
+  float energy = 0;  ///< u_j, mean over RGB; positive
+  /// Its contribution at its own site; target above kSmallestTarget.
+  Reflected reflected;
 };
 
 /// A pixel whose samples are offered.
 struct Giver {
   std::int32_t x = 0, y = 0;
   std::uint32_t rank = 0;      ///< as in Offer
-  std::size_t end_sample = 0;  ///< past its samples in the batch: the answer
+  std::size_t end_sample = 0;  ///< out: where its samples end in the batch
 };
 
 /// "May this sample be seen from there?"
 struct Offer {
-  std::uint32_t sample = 0;    ///< position in the batch
-  std::uint32_t receiver = 0;  ///< pixel: PixelMask::ranks of the pixels to recompute
-  std::uint32_t surface = 0;   ///< receiver * num_sites + site
+  std::uint32_t sample = 0;  ///< position in the batch
+  /// Pixel: PixelMask::ranks of the pixels to recompute.
+  std::uint32_t receiver = 0;
+  std::uint32_t surface = 0;  ///< receiver * num_sites + site
 };
 
 /// The answer is what the receiver reflects of the sample's light; nothing without a surface, below
@@ -68,7 +71,8 @@ struct ExchangeSettings {
   SecondPassForm form = SecondPassForm::corrected;
   std::uint32_t num_slots = 16;  ///< samples per pixel
   std::uint32_t num_sites = 1;
-  std::uint32_t fold = 0;  ///< tells the random numbers of several exchanges apart
+  /// Tells the random numbers of several exchanges apart.
+  std::uint32_t fold = 0;
   std::uint64_t job_seed = 0;
   std::int32_t frame = 0;
   std::int32_t image_width = 0;

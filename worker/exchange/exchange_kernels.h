@@ -21,7 +21,8 @@ struct LightRecord {
 /// The shadow rays of some offers.
 struct OfferRays {
   ShadowRays rays;
-  std::vector<std::uint32_t> offer;  ///< (capacity) whose ray it is; the first rays.size() count
+  /// (capacity) whose ray it is; the first rays.size() count.
+  std::vector<std::uint32_t> offer;
 };
 
 /// The inner loops of the second pass.
@@ -36,7 +37,8 @@ void look_up_lights(const EnvironmentView& environment, std::span<const OctDirec
 void reflect_lights(const SurfaceTable& surfaces, std::span<const LightRecord> lights,
                     std::span<const Offer> offers, std::span<Reflected> reflected);
 
-/// The same, and in place of the last rays one for each offer that reflects anything.
+/// As reflect_lights(), and casts in place of the last rays one for each offer that reflects
+/// anything.
 void reflect_and_cast(const SurfaceTable& surfaces, std::span<const LightRecord> lights,
                       std::span<const Offer> offers, std::span<Reflected> reflected,
                       OfferRays& rays);

@@ -17,7 +17,7 @@ class ExtraSampler {
   /// work must outlive the object.
   explicit ExtraSampler(const SecondPassWork& work);
 
-  /// Share of a fold in the radiance of a pixel that some fold's mask holds.
+  /// Share of a fold in the radiance of a pixel that is in some fold's mask.
   Rgb radiance(std::int32_t x, std::int32_t y, std::size_t fold);
 
   std::uint64_t rays_traced() const { return rays_traced_; }

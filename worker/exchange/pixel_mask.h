@@ -68,7 +68,8 @@ class PixelMask {
   }
 
   PixelRect rect_;
-  std::size_t words_per_row_;  ///< one more than needed, so that row_bits may read two
+  /// One more than needed, so that row_bits may read two.
+  std::size_t words_per_row_;
   std::vector<std::uint64_t> words_;
 };
 
@@ -86,8 +87,8 @@ class SquarePartitions {
   SquarePartitions(const PixelRect& image, std::int32_t side, std::int32_t count, const Rng& rng);
 
   std::int32_t count() const { return static_cast<std::int32_t>(offsets_.size()); }
-  /// The square of partition `partition` that holds the pixel, clipped to the image: the same for
-  /// all pixels in it.
+  /// The square of partition `partition` with the pixel, clipped to the image: the same for all
+  /// pixels in it.
   PixelRect square(std::int32_t partition, std::int32_t x, std::int32_t y) const;
 
  private:
@@ -103,9 +104,9 @@ class SquarePartitions {
 /// may offer its samples to.
 class SquareMembers {
  public:
-  /// Moves to the row of squares that holds row y of the mask; cheap when it is there already. A
-  /// square that reaches past the mask has fewer members here. names: (pixels of the rectangle)
-  /// what to call a pixel of the mask.
+  /// Moves to the row of squares with row y of the mask; cheap when it is there already. A square
+  /// that reaches past the mask has fewer members here. names: (pixels of the rectangle) what to
+  /// call a pixel of the mask.
   void move_to(const PixelMask& mask, const SquarePartitions& partitions, std::int32_t partition,
                std::int32_t y, std::span<const std::int32_t> names) {
     if (y < y0_ || y >= y1_) list(mask, partitions, partition, y, names);
@@ -113,9 +114,10 @@ class SquareMembers {
 
   /// The others in the square of a masked pixel (x, y) of this row of squares.
   struct Others {
-    const std::uint32_t* members = nullptr;  ///< names, row by row, the pixel itself among them
-    std::uint32_t rank = 0;                  ///< of the pixel itself
-    std::uint32_t count = 0;                 ///< without it
+    /// Names, row by row, the pixel itself among them.
+    const std::uint32_t* members = nullptr;
+    std::uint32_t rank = 0;   ///< place of the pixel itself in `members`
+    std::uint32_t count = 0;  ///< without it
     /// The k-th other, k < count.
     std::uint32_t pick(std::uint32_t k) const { return members[k + (k >= rank ? 1 : 0)]; }
   };
@@ -130,11 +132,11 @@ class SquareMembers {
   void list(const PixelMask& mask, const SquarePartitions& partitions, std::int32_t partition,
             std::int32_t y, std::span<const std::int32_t> names);
 
-  std::int32_t x0_ = 0, y0_ = 0, y1_ = 0;  ///< of the rows in the lists; none at first
+  std::int32_t x0_ = 0, y0_ = 0, y1_ = 0;  ///< rows that are listed; none at first
   std::size_t width_ = 0;
   std::vector<std::uint32_t> members_;  ///< square after square
-  std::vector<std::uint32_t> first_,
-      end_;                          ///< (columns of the mask) members of the square of this column
+  /// (columns of the mask) members of the square of this column: [first, end).
+  std::vector<std::uint32_t> first_, end_;
   std::vector<std::uint16_t> rank_;  ///< (rows of squares, columns)
 };
 

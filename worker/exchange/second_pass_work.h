@@ -23,8 +23,8 @@ struct SecondPassWork {
   const FrameLight& light;
   const SampleRegion& samples;
   const ExchangeMasks& masks;
-  const MaskedSurfaces& surfaces;  ///< of masks.any
-  const PixelRect& rect;           ///< of the tile
+  const MaskedSurfaces& surfaces;  ///< surfaces of the pixels in masks.any
+  const PixelRect& rect;           ///< pixels of the tile
 };
 
 }  // namespace baton

@@ -18,7 +18,8 @@ class SurfaceTable {
     ns = 0,
     lobe_scale = 3,
     ng = 4,
-    kind = 7,  ///< 0: diffuse or phong; 1: ggx; 1 + k: measured, with tables()[k]
+    /// 0: diffuse or phong; 1: ggx; 1 + k: measured, with tables()[k].
+    kind = 7,
     kd = 8,
     shape = 11,
     origin = 12,
@@ -56,7 +57,7 @@ class SurfaceTable {
   };
   std::vector<Common> common_;
   std::vector<Glossy> glossy_;
-  std::vector<Glossy> coats_;  ///< of all surfaces, or empty
+  std::vector<Glossy> coats_;  ///< one for each surface, or empty
   std::vector<const float*> tables_{nullptr};
   SiteBlock one_;  ///< the surface in work
 };

@@ -27,7 +27,8 @@ class TracedExchange final : public ExchangeScene {
   const SecondPassWork& work_;
   const EnvironmentView environment_;
   Fold fold_;
-  std::vector<float> lns_;  ///< (masked pixels) for the published forms, else empty
+  /// (masked pixels) for the published forms, else empty.
+  std::vector<float> lns_;
   std::vector<OctDirection> code_;
   std::vector<LightRecord> light_;  ///< (batch)
   std::vector<Offer> own_offers_;   ///< every sample to its own surface

@@ -23,7 +23,7 @@ namespace hn = hwy::HWY_NAMESPACE;
 
 /// How candidates 0, 1, ... of one kind are dealt to the sites: even shares, and which site has
 /// which is random. Many candidates: all lanes of a vector share a site, which needs no table
-/// look-ups; few: each lane has its own.
+/// lookups; few: each lane has its own.
 struct SiteDeal {
   const std::int32_t* sites;
   std::int32_t num_sites;
@@ -79,7 +79,7 @@ struct SiteDeal {
       if (++next == static_cast<std::size_t>(num_sites)) next = 0;
     }
   }
-  /// The same with all of a surface.
+  /// As ForEachRunOf, with all of a surface.
   template <class Use>
   HWY_INLINE void ForEachRun(const SiteBlock& block, const Use& use) const {
     ForEachRunOf(
@@ -131,8 +131,8 @@ struct SiteDeal {
 };
 
 /// The entries of the presampled light that are a pixel's candidates: blocks spread evenly over a
-/// random run, in the order of its curve; or, if one run has too few, neighbours from a random
-/// place on.
+/// random stretch, in the order of its curve; or, if one stretch has too few, neighbours from a
+/// random place on.
 class LightRun {
  public:
   /// bits: random. Which blocks are taken depends on `count` and on them alone, and each block is
@@ -144,8 +144,8 @@ class LightRun {
         (static_cast<std::uint32_t>(count) + PresampledLight::kBlock - 1) / PresampledLight::kBlock;
     const bool in_one_run = num_blocks <= presampled.run_blocks;
     const std::uint32_t region = in_one_run ? presampled.run_blocks : PresampledLight::kNumBlocks;
-    // Whole runs are read from their beginning. Else, also where the last block is not read to its
-    // end, the reading begins anywhere, and the ends are joined.
+    // Whole stretches are read from their beginning. Else, also where the last block is not read to
+    // its end, the reading begins anywhere, and the ends are joined.
     const std::uint32_t run = presampled.run_blocks * PresampledLight::kBlock;
     if (static_cast<std::uint32_t>(count) % run == 0) bits &= ~(presampled.run_blocks - 1);
     within_ = static_cast<std::int32_t>(region - 1);
@@ -164,7 +164,7 @@ class LightRun {
                               entry % PresampledLight::kBlock);
   }
 
-  /// Block of the presampled light that holds candidate i.
+  /// Block of the presampled light with candidate i.
   HWY_INLINE VI BlockOf(VI i) const {
     const DI di;
     const VI along = hn::ShiftRight<kStepBits>(hn::Mul(hn::ShiftRight<3>(i), hn::Set(di, step_)));
@@ -184,9 +184,11 @@ class LightRun {
   }
 
   const PresampledLight& presampled_;
-  std::int32_t first_ = 0;              ///< block at which the region begins that is read from
-  std::int32_t start_ = 0;              ///< where in it the reading begins
-  std::int32_t within_ = 0;             ///< its blocks, less one; a power of two, less one
+  /// Block at which the region begins that is read from.
+  std::int32_t first_ = 0;
+  std::int32_t start_ = 0;  ///< where in it the reading begins
+  /// Blocks of the region, less one: a power of two, less one.
+  std::int32_t within_ = 0;
   std::int32_t step_ = 1 << kStepBits;  ///< blocks from one vector to the next
 };
 
@@ -219,7 +221,8 @@ struct CandidateWeights {
   const SiteBlock& sites;
   const kernels::CandidateCounts& counts;
 
-  /// Of points that reflect `target` in the mean; the first `left` count.
+  /// The weights, over their targets, of points that reflect `target` in the mean; the first `left`
+  /// count, the others get 0.
   HWY_INLINE VF operator()(VF target, const SurfaceLanes& surface, const BsdfLanes& f,
                            VF light_density, std::size_t left) const {
     const DF d;

@@ -30,7 +30,7 @@ void DrawCandidates(const kernels::CandidateSource& from, kernels::CandidateSet&
 /// What all candidates reflect together.
 struct ReflectedLine {
   static constexpr bool kHasColors = true;
-  Vec3Lanes colors;  ///< of w (f cos L) / p~
+  Vec3Lanes colors;  ///< sum of w (f cos L) / p~
 
   template <class AddColor>
   HWY_INLINE void Add(VU /*code*/, VF /*weight*/, const AddColor& add_color) {

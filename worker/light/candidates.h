@@ -13,7 +13,7 @@
 #include "worker/surface/site_block.h"
 
 /// Candidates of a pixel, in SIMD with run-time dispatch. Work space is read and written in whole
-/// vectors (PaddedArray), what spans hold is not.
+/// vectors (PaddedArray), what spans refer to is not.
 namespace baton::kernels {
 
 /// How many candidates come from where: M_t of each technique.

@@ -42,7 +42,7 @@ struct FrameLight {
 /// another light at once.
 std::optional<Mat3> turn_between(const Environment& before, const Environment& now);
 
-/// The round whose presampled light and random numbers no picture has (noise_probe.h).
+/// The round whose presampled light and random numbers no image has (noise_probe.h).
 inline constexpr Round kProbeRound(1 << 30);
 
 /// The environments of a job's frames, prepared on demand. What is made for a frame is kept while
@@ -81,7 +81,7 @@ class LightSequence {
   const std::shared_ptr<const HiddenLight> hidden_;
   std::vector<std::optional<HiddenCone>> cones_;  ///< (frames), of those that were asked for
   std::vector<FrameSpec> frames_;
-  const std::int32_t num_sets_;  ///< of presampled light
+  const std::int32_t num_sets_;  ///< sets of presampled light
   mutable std::mutex mutex_;
   /// By the first step that shows these texels, and what is hidden of them.
   LruCache<std::pair<Step, HiddenCone>, EnvironmentMap> mixed_maps_;

@@ -14,7 +14,7 @@ namespace baton {
 ///
 /// Points are joined to blocks of 8 x 8, these to blocks of 2 x 2, and so on. A block above the
 /// horizon of n adds n.(sum of its light times direction), one below nothing, and one that is cut
-/// is looked at more closely, down to its points. Where all that is open of a block is less than
+/// is summed more finely, down to its points. Where all that is open of a block is less than
 /// kOpenShare of the sum so far, its light is taken as spread evenly about its mean: see at().
 class Irradiance {
  public:
@@ -27,14 +27,15 @@ class Irradiance {
 
  private:
   using Sum = std::array<double, 3>;
-  /// Of one channel.
+  /// The light of one channel.
   struct Light {
     float power = 0;  ///< sum of radiance times solid angle
-    Vec3 sum;         ///< of that times direction
+    Vec3 sum;         ///< sum of radiance x angle x direction
   };
   struct Block {
-    Vec3 axis;       ///< its points lie within `sine` of here
-    float sine = 0;  ///< of that angle; above 1: of more than 90 degrees
+    Vec3 axis;  ///< points are within `sine` of this axis
+    /// Sine of the cone's half-angle; above 1: more than 90 degrees.
+    float sine = 0;
     std::array<Light, 3> light;
     /// Covariance of the directions, by the mean of the channels: xx, xy, xz, yy, yz, zz.
     std::array<float, 6> spread{};
@@ -49,7 +50,7 @@ class Irradiance {
     std::vector<Block> blocks;
   };
   struct Row {
-    float sine = 0, cosine = 0;  ///< of the polar angle
+    float sine = 0, cosine = 0;  ///< sine and cosine of the polar angle
     float area = 0;              ///< solid angle of a point
   };
   struct Longitude {
@@ -68,7 +69,8 @@ class Irradiance {
 
   std::vector<Row> rows_;
   std::vector<Longitude> longitudes_;
-  std::vector<Rgb> points_;    ///< (rows, columns) radiance; empty: that of the texels
+  /// (rows, columns) radiance; empty: that of the texels.
+  std::vector<Rgb> points_;
   std::vector<Level> levels_;  ///< from the smallest blocks on
 };
 

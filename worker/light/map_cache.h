@@ -28,7 +28,7 @@ class MapCache {
   /// for. Error: a map that cannot be read.
   Result<MapPtr> get(const std::string& path, const EnvironmentSpec& environment, bool compensate,
                      const HiddenCone& hidden = {});
-  /// Of a map that was asked for with this scale; of none nothing is known.
+  /// What is known of a map that was got with this scale; nothing of a map that was not.
   MapReport report(const std::string& path, float scale) const;
 
  private:

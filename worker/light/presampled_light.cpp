@@ -50,7 +50,7 @@ void sort_along_curve(std::span<OctDirection> directions) {
                  [](std::uint64_t entry) { return static_cast<OctDirection>(entry); });
 }
 
-/// Puts a sorted run into its blocks; place 0 of them gets the eighth `first` of the curve.
+/// Puts a sorted stretch into its blocks; place 0 of them gets the eighth `first` of the curve.
 void lay_out(std::span<const OctDirection> sorted, std::uint32_t first,
              std::span<PresampledLight::Block> blocks) {
   for (std::uint32_t place = 0; place < PresampledLight::kBlock; ++place) {
@@ -86,7 +86,7 @@ PresampledLight presample_light(const Environment& now, const Environment& befor
                  .round = static_cast<std::uint32_t>(round)},
                 PassId::presampled_light);
 
-  // Draw the directions, run by run.
+  // Draw the directions, stretch by stretch.
   const EnvironmentView now_view = view_of(now);
   presampled.blocks.resize(PresampledLight::kNumBlocks);
   const std::uint32_t num_blocks =
@@ -105,7 +105,7 @@ PresampledLight presample_light(const Environment& now, const Environment& befor
             std::span(presampled.blocks).subspan(first, presampled.run_blocks));
   }
 
-  // Look everything up at the lattice directions, with the look-up that the pixels use.
+  // Look everything up at the lattice directions, with the lookup that the pixels use.
   const EnvironmentView before_view = view_of(before);
   if (layout.with_before) presampled.before.resize(presampled.blocks.size());
   for (std::size_t b = 0; b < presampled.blocks.size(); ++b) {

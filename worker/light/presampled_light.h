@@ -15,23 +15,26 @@ namespace baton {
 /// entries independently of their contents stays unbiased; pixels that choose the same entries have
 /// correlated errors.
 ///
-/// Every aligned run of `run_blocks` blocks is a net of the sequence, laid out along a Hilbert
+/// Every aligned stretch of `run_blocks` blocks is a net of the sequence, laid out along a Hilbert
 /// curve over the lattice of directions. Each place in a block stands for an eighth of the curve,
-/// which the run's blocks hold in order; neighbouring places stand for distant eighths, as in the
-/// van der Corput sequence, so that half a block still covers the map. A systematic choice
-/// (systematic-inl.h) goes through the places in the order of their eighths: it takes directions
-/// that are spread over the light, and so its shadow rays are stratified. In each run place 0 is
-/// another eighth, so that one who takes the same place of random blocks sees the whole map.
+/// which the blocks of the stretch follow in order; neighbouring places stand for distant eighths,
+/// as in the van der Corput sequence, so that half a block still covers the map. A systematic
+/// choice (systematic-inl.h) goes through the places in the order of their eighths: it takes
+/// directions that are spread over the light, and so its shadow rays are stratified. In each
+/// stretch place 0 is another eighth, so that one who takes the same place of random blocks sees
+/// the whole map.
 struct PresampledLight {
-  static constexpr std::uint32_t kSize = 1u
-                                         << 13;  ///< entries: few enough to stay in a core's cache
-  static constexpr std::uint32_t kBlock = 8;     ///< entries that lie together in memory
+  /// Number of entries: few enough to stay in a core's cache.
+  static constexpr std::uint32_t kSize = 1u << 13;
+  static constexpr std::uint32_t kBlock = 8;  ///< entries that lie together in memory
 
-  /// Which eighth of the curve each place in the first run's blocks stands for; its own inverse.
+  /// Which eighth of the curve each place in the blocks of the first stretch stands for; its own
+  /// inverse.
   static constexpr std::uint32_t kEighthOf[kBlock] = {0, 4, 2, 6, 1, 5, 3, 7};
 
   static constexpr std::uint32_t kNumBlocks = kSize / kBlock;
-  /// Most blocks of a run, but where all are one: there are runs for each eighth of the curve.
+  /// Most blocks of a stretch, but where all are one: there are stretches for each eighth of the
+  /// curve.
   static constexpr std::uint32_t kMaxRunBlocks = kNumBlocks / kBlock;
 
   /// Eight entries, field by field: the unit of SIMD loads.
@@ -46,10 +49,12 @@ struct PresampledLight {
   struct alignas(32) Before {
     float r[kBlock], g[kBlock], b[kBlock];
   };
-  std::vector<Block> blocks;     ///< (kNumBlocks); empty for a black map
-  std::vector<Before> before;    ///< (kNumBlocks), where the layout asks for it; else empty
+  std::vector<Block> blocks;  ///< (kNumBlocks); empty for a black map
+  /// (kNumBlocks), where the layout asks for it; else empty.
+  std::vector<Before> before;
   std::uint32_t run_blocks = 1;  ///< a power of two
-  float mean_radiance = 0;       ///< of the environment over the sphere, grey; by its entries
+  /// Mean of the environment over the sphere, grey; by the entries.
+  float mean_radiance = 0;
 
   bool empty() const { return blocks.empty(); }
   std::size_t size_bytes() const {
@@ -58,10 +63,10 @@ struct PresampledLight {
 };
 
 /// The presampled light of a frame and round in one or several sets, of which a pixel reads one.
-/// Pixels of a set err together; in a picture with many sets their errors average out. The sets are
+/// Pixels of a set err together; in an image with many sets their errors average out. The sets are
 /// stretches of one Sobol' sequence: each is a net, and so are all together, which takes the error
 /// of the mean over the sets down faster than independent ones would. Which set a pixel reads
-/// depends on where it is in the picture alone, and not on what the sets contain: no bias.
+/// depends on where it is in the image alone, and not on what the sets contain: no bias.
 struct PresampledSets {
   /// Side of the squares of pixels that read one set: they do it one after the other, while it is
   /// in the cache.
@@ -79,17 +84,17 @@ struct PresampledSets {
   }
 };
 
-/// Number of sets, a power of two: one for so many pixels of the picture, and most of all rounds of
-/// a frame together, as all of them are kept.
+/// Number of sets, a power of two: one for so many pixels of the image, and most of all rounds of a
+/// frame together, as all of them are kept.
 inline constexpr std::int64_t kPixelsOfSet = 1 << 15;
 inline constexpr std::int32_t kMostSetsOfFrame = 64;
 std::int32_t num_presampled_sets(std::int64_t num_pixels, std::int32_t rounds);
 
 /// How presampled light is laid out.
 struct PresampledLightLayout {
-  /// Entries that most pixels take: a run has so many, rounded up to a power of two.
+  /// Entries that most pixels take: a stretch has so many, rounded up to a power of two.
   std::uint32_t num_taken = 64;
-  /// All entries are one run: best where pixels differ in how many they take.
+  /// All entries are one stretch: best where pixels differ in how many they take.
   bool one_run = false;
   /// For moves of carried samples, which are compared with the light of the frame before.
   bool with_before = false;

@@ -4,7 +4,7 @@
 
 namespace baton {
 
-/// A method that chooses N rays apart from samples, among M candidates; its states hold no samples.
+/// A method that chooses N rays apart from samples, among M candidates; its states have no samples.
 class ChosenRaysMethod : public PixelMethod {
  protected:
   explicit ChosenRaysMethod(const SamplingSpec& spec)

@@ -63,7 +63,7 @@ SamplerPtr make_sequential(const SamplingSpec& s) {
 struct Maker {
   Method name;
   MethodPtr (*method)(const JobSpec&);
-  SamplerPtr (*sampler)(const SamplingSpec&);  ///< of methods that keep samples
+  SamplerPtr (*sampler)(const SamplingSpec&);  ///< null for methods that keep no samples
 };
 /// In the order of the enumeration.
 constexpr Maker kMakers[] = {

@@ -35,7 +35,7 @@ class PixelMethod {
                           const PixelState& /*pixel*/, LocatedPopulations& /*located*/) const {
     return false;
   }
-  /// Writes the pixel's rays. `pixel` holds what the frame before left where input.has_history, and
+  /// Writes the pixel's rays. `pixel` has what the frame before left where input.has_history, and
   /// becomes this frame's. scratch: the caller's, reused from pixel to pixel.
   virtual PixelDiagnostics sample(const PixelInput& input, const PixelState& pixel,
                                   SamplerScratch& scratch, RayWriter& rays) const = 0;

@@ -22,25 +22,31 @@ namespace baton {
 struct PixelInput {
   const SiteBlock& sites;  ///< at least one of them sees a surface
   const FrameLight& light;
-  const PresampledLight& presampled;  ///< the set of light.presampled that the pixel reads
-  const EnvironmentView& now;         ///< views of light.now and light.before
+  /// The set of light.presampled that the pixel reads.
+  const PresampledLight& presampled;
+  const EnvironmentView& now;  ///< views of light.now and light.before
   const EnvironmentView& before;
   RngKey key;
   /// Rounds of the sequence before this one; to a method each is a frame. Negative before those
   /// that are seen.
   std::int32_t rounds_before = 0;
-  bool has_history = false;  ///< the samples hold the previous frame's properly weighted set
+  /// The samples are the previous frame's properly weighted set.
+  bool has_history = false;
   /// (N) p~ of the previous frame at those samples, where it is known; else empty.
   std::span<const float> target_before{};
-  const OldSurfaces* old = nullptr;  ///< the surfaces of that set, where they are not `sites`
+  /// The surfaces of the carried set, where they are not `sites`.
+  const OldSurfaces* old = nullptr;
   /// (populations) That set in the maps, where it was looked up ahead; else empty.
   std::span<const kernels::LocatedDirections> located{};
-  std::span<float> target{};  ///< (N) out: p~ at this frame's samples; may be target_before
-  /// What the neighbours that the pixel asks held in the frame before; at most kMaxNeighbors.
+  /// (N) out: p~ at this frame's samples; may be target_before.
+  std::span<float> target{};
+  /// What the neighbours that the pixel asks had in the frame before; at most kMaxNeighbors.
   std::span<const CarriedSet> neighbors{};
-  std::span<const SurfaceHit> hits{};  ///< (S) what the sites were made of, for who traces itself
-  const FrameGeometry* geometry = nullptr;  ///< of the frame
-  bool wants_unshadowed = false;            ///< KnownLight::unshadowed, of who can say it
+  /// (S) what the sites were made of, for a method that traces itself.
+  std::span<const SurfaceHit> hits{};
+  const FrameGeometry* geometry = nullptr;  ///< geometry of the frame
+  /// KnownLight::unshadowed is wanted of methods that can say it.
+  bool wants_unshadowed = false;
 };
 
 /// The light of the pixel's two frames.
@@ -70,7 +76,7 @@ struct PixelSamples {
   float& lns;
   float& lns_fresh;
   PixelSource& source;
-  std::uint16_t* confidence = nullptr;  ///< SampleState::confidence; null: none is kept
+  std::uint16_t* confidence = nullptr;  ///< SampleState::confidence; null: none
 };
 
 /// What a method says about its work on a pixel.
@@ -90,7 +96,8 @@ struct SamplerScratch {
   kernels::ChoiceScratch choice;
   kernels::PoolScratch pool;
   kernels::RestirPoints restir;
-  PixelRays rays;  ///< of the pixel, where the method chooses them apart from its samples
+  /// Rays of the pixel, where the method chooses them apart from its samples.
+  PixelRays rays;
 };
 
 /// Draws one properly weighted set, the contract of PixelSamples. Stateless; any number of threads

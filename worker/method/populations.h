@@ -20,7 +20,7 @@ struct SampleColors {
   std::array<float, limits::kMaxParticles> r, g, b;
 };
 
-/// Runs the sampler once for each population of pixel `index` of the state; they share nothing but
+/// Calls the sampler once for each population of pixel `index` of the state; they share nothing but
 /// the frame's presampled light. num_particles: of all populations; the rest of the pixel's row in
 /// the state is left alone. The answer counts all of them; its ess is the sum.
 PixelDiagnostics sample_populations(const PixelSampler& sampler, std::size_t num_particles,

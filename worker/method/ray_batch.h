@@ -21,7 +21,8 @@ struct RayBatch {
   std::vector<std::uint32_t> sample;  ///< number of the sample in its pixel
   std::vector<float> r, g, b;         ///< u_j (f cos L)_rgb / p~
   std::vector<float> visibility;      ///< share of the pixel's Lns
-  std::vector<std::uint8_t> tag;      ///< handed back to the method: PixelRays::bin
+  /// Handed back to the method: PixelRays::bin.
+  std::vector<std::uint8_t> tag;
 
   void clear() {
     rays.clear();
@@ -41,15 +42,16 @@ struct CastSamples {
   std::span<const float> weight;  ///< sum 1, or all 0
   const float *r, *g, *b;         ///< (f cos L)_rgb
   float unit_contribution;        ///< u_j is this times weight_j
-  float picture_scale;            ///< factor of the set's light in the picture
-  float visibility_scale;         ///< factor of its weights in the pixel's visibility
-  std::uint32_t first_sample;     ///< number of sample 0 in the pixel
+  float picture_scale;            ///< factor of the set's light in the image
+  /// Factor of the set's weights in the pixel's visibility.
+  float visibility_scale;
+  std::uint32_t first_sample;  ///< number of sample 0 in the pixel
 };
 
 /// What the rays of one pixel found.
 struct FreeLight {
   Rgb color;    ///< sum of what the free ones bring
-  Rgb blocked;  ///< and of what the others would
+  Rgb blocked;  ///< sum of what the blocked ones would bring
   float visibility = 0;
   std::uint64_t is_free = 0;  ///< bit by bit
 };
@@ -59,7 +61,7 @@ FreeLight sum_free(const RayBatch& batch, std::size_t first, std::size_t end);
 
 /// Where the shadow rays of a pixel's sites start.
 struct SiteOrigins {
-  alignas(64) SiteBlock::Array x, y, z;  ///< of sites that see a surface; else not set
+  alignas(64) SiteBlock::Array x, y, z;  ///< sites with a surface; others are not set
   std::int32_t num_sites = 1;
 
   void set(std::size_t site, const Vec3& origin) {
@@ -81,7 +83,8 @@ void cast_samples(const CastSamples& samples, const SiteOrigins& origins, RayBat
 struct KnownLight {
   Rgb color;
   float visibility = 0;
-  Rgb variance{};  ///< of `color`, at the pixel's sites, where MethodTraits::tells_variance
+  /// Variance of `color` at the pixel's sites, where MethodTraits::tells_variance.
+  Rgb variance{};
   /// The pixel if all rays were free, of methods that say it better than their rays do
   /// (PixelInput::wants_unshadowed).
   std::optional<Rgb> unshadowed{};

@@ -7,7 +7,7 @@
 
 namespace baton {
 
-/// A method whose rays are its N weighted samples, which the state holds: each of the pixel's
+/// A method whose rays are its N weighted samples, which are in the state: each of the pixel's
 /// populations draws its own set.
 class WeightedMethod : public PixelMethod {
  public:
@@ -20,7 +20,7 @@ class WeightedMethod : public PixelMethod {
 
  private:
   std::unique_ptr<const PixelSampler> sampler_;
-  std::size_t num_particles_;         ///< of all populations
+  std::size_t num_particles_;         ///< N, over all populations
   std::vector<float> picture_scale_;  ///< (populations)
 };
 
@@ -43,7 +43,7 @@ class RestirMethod final : public WeightedMethod {
   bool reuse_visibility_;
 };
 
-/// Factor of population k's contributions in the picture of the first pass: 1, but where one half
+/// Factor of population k's contributions in the image of the first pass: 1, but where one half
 /// only decides.
 float picture_scale(const JobSpec& job, std::int32_t population);
 

@@ -25,7 +25,7 @@ namespace baton {
 /// are whole numbers of blocks, so that no tiling shows.
 class AdaptiveRounds {
  public:
-  /// Of a tile.
+  /// Plans the rounds of a tile. rect: its pixels.
   AdaptiveRounds(const JobSpec& job, const PixelRect& rect);
 
   /// The pixels of a round of the step, below K, or negative in preroll; later rounds have
@@ -40,7 +40,7 @@ class AdaptiveRounds {
   const PixelRect rect_;
   const std::int32_t rounds_;                  ///< K
   const std::optional<float> threshold_;       ///< T
-  const std::int32_t columns_;                 ///< of blocks
+  const std::int32_t columns_;                 ///< blocks in a row
   std::vector<std::int32_t> rounds_of_block_;  ///< after the judging ones; empty: all
 };
 

@@ -6,7 +6,7 @@
 
 namespace baton {
 
-/// Samples a pixel beside the picture: with a method, random numbers, sites and light of one's
+/// Samples a pixel beside the image: with a method, random numbers, sites and light of one's
 /// choice, in a state of its own, so that nothing of it enters what the pixel carries.
 class AsideSampler {
  public:
@@ -14,9 +14,9 @@ class AsideSampler {
   struct Aside {
     const SiteBlock& sites;
     std::span<const SurfaceHit> hits;  ///< (S) of the sites
-    const SiteOrigins& origins;        ///< of the sites
+    const SiteOrigins& origins;        ///< where the sites' rays start
     const FrameLight& light;
-    const PresampledLight& presampled;  ///< of the light, what the pixel reads
+    const PresampledLight& presampled;  ///< the set of `light` that the pixel reads
     RngKey key;
     const PixelMemory* memory = nullptr;  ///< what it starts from; null: afresh
   };
@@ -27,7 +27,7 @@ class AsideSampler {
              const SampleState& like, SamplerScratch& scratch);
 
  private:
-  SampleState state_;  ///< of one pixel
+  SampleState state_;  ///< a state of one pixel
   std::vector<float> target_;
   RayBatch rays_;
 };

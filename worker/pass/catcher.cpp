@@ -69,7 +69,7 @@ Rgb CatcherEdge::sample(const PixelMethod& method, const PixelInput& input, cons
     if (hits_[s].hit) origins.set(s, hits_[s].ray_origin);
   }
   gather_sites(*input.geometry, hits_, {}, sites_, albedo);
-  // Random numbers of pixels that no picture has.
+  // Random numbers of pixels that no image has.
   RngKey key = input.key;
   key.pixel ^= 0x80000000u;
   const AsideSampler::Aside catcher{.sites = sites_,

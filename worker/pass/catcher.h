@@ -9,7 +9,7 @@
 
 namespace baton {
 
-/// What catches shadows (ObjectSpec::catcher, GroundSpec::catcher) is in no picture. Where a ray
+/// What catches shadows (ObjectSpec::catcher, GroundSpec::catcher) is in no image. Where a ray
 /// meets no object it sees the nearest catcher, which reflects with the albedo pi / E per channel
 /// (CatcherAlbedo): what methods estimate of it is the share of the light that arrives, S / U, with
 /// all their machinery and without bias. A pixel that sees an object, too, or has seen one in an
@@ -23,8 +23,8 @@ void see_catchers(const FrameGeometry& geometry, std::span<const std::uint16_t> 
 
 /// Share of the sites that see a catcher.
 float catcher_share(std::span<const SurfaceHit> hits);
-/// The same of those where no light of a colour arrives without shadows, so that none is taken
-/// away. sites: gathered of the hits.
+/// Share of the sites that see a catcher where no light of a colour arrives without shadows, so
+/// that shadows take none away. sites: gathered of the hits.
 Rgb dark_share(std::span<const SurfaceHit> hits, const SiteBlock& sites);
 
 /// Prepares what a pixel carries for what it sees now: a catcher does not start from an object's

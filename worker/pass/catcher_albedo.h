@@ -12,7 +12,7 @@ namespace baton {
 /// it keeps the last answer, so that planes cost nothing.
 class CatcherAlbedo {
  public:
-  /// Of a job without catchers, or of light that nobody asks for: 1.
+  /// An albedo of 1: for a job without catchers, or light for which it is not needed.
   CatcherAlbedo() = default;
   /// irradiance: of the environment, may be null; both must outlive the object.
   CatcherAlbedo(const Irradiance* irradiance, const Environment& environment)
@@ -40,7 +40,7 @@ class CatcherAlbedo {
   const Irradiance* irradiance_ = nullptr;
   const Environment* environment_ = nullptr;
   std::optional<Vec3> normal_;
-  Rgb albedo_{1, 1, 1};  ///< of that
+  Rgb albedo_{1, 1, 1};  ///< albedo at normal_
 };
 
 }  // namespace baton

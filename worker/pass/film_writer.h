@@ -12,29 +12,37 @@ namespace baton {
 
 /// All that is known of a finished pixel.
 struct PixelResult {
-  Rgb radiance;        ///< reflected and background light, mean over the sites
+  /// Reflected and background light, mean over the sites.
+  Rgb radiance;
   float coverage = 0;  ///< share of the sites that see a surface
-  float alpha = 0;     ///< the same, or 1 where the background is shown
+  /// Coverage, or 1 where the background is shown.
+  float alpha = 0;
   float lns = 0;
   float visibility = 0;  ///< share of the weight whose rays are free
   float ess_ratio = 0;   ///< ESS / N
   float acceptance = 0;  ///< accepted moves / proposed moves
   float acceptance_local = 0,
-        acceptance_independent = 0;  ///< the same by kind of move, 0 without any
+        acceptance_independent = 0;  ///< acceptance by kind, 0 without moves
   float resampled = 0;               ///< 1 where it was
   PixelSource source = PixelSource::background;
-  Rgb source_color{};  ///< of `source`
-  Vec3 normal{};       ///< unit: mean shading normal of the sites that see a surface; else 0
-  float depth = 0;     ///< mean distance of the sites that see a surface
-  float mask = 0.5f;   ///< 1 all rays free, 0 some failed, 0.5 background [CV Fig. 2]
-  std::uint32_t material =
-      0;           ///< of the first site that sees a surface: index in the scene + 1; 0: none
-  Rgb variance{};  ///< estimated, of `radiance` at its sites; 0 where it is not known
-  Rgb blocked{};   ///< light that shadows take away: `radiance` without them is the sum
+  Rgb source_color{};  ///< colour by which `source` is shown
+  /// Unit: mean shading normal of the sites that see a surface; else 0.
+  Vec3 normal{};
+  /// Mean distance of the sites that see a surface.
+  float depth = 0;
+  /// 1: all rays free, 0: some failed, 0.5: background [CV Fig. 2].
+  float mask = 0.5f;
+  /// Material at the first site that sees a surface: index in the scene + 1; 0: none.
+  std::uint32_t material = 0;
+  /// Estimated variance of `radiance` at its sites; 0 where it is not known.
+  Rgb variance{};
+  /// Light that shadows take away: `radiance` without them is the sum.
+  Rgb blocked{};
   float error = kNoSurface;  ///< as in the plane kErrorChannel
-  float rounds = 1;          ///< that it is the mean of
-  Rgb shadow{};              ///< share of the light that arrives on the catcher, times `catcher`
-  float catcher = 0;         ///< share of the sites that see it
+  float rounds = 1;          ///< number of rounds in this mean
+  /// Share of the light that arrives on the catcher, times `catcher`.
+  Rgb shadow{};
+  float catcher = 0;  ///< share of the sites that see it
 };
 
 /// Pass: writes pixels into the channels of the job: R, G, B, A, the AOVs in their order, shadow.*

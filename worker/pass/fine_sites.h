@@ -13,10 +13,9 @@ namespace baton {
 using PixelPlace = std::array<std::int32_t, 2>;
 
 /// The number of sites S of pixels: image.sites, or 4, 16, ... times as many, at most
-/// image.maxSites, where what limits::kGeometryProbes rays of their own, which are in no
-/// picture, see asks for it. A pure function of
-/// (job, pose of the frame, pixel), in which no site of the picture has a part: so S cannot bias.
-/// Only where has_fine_sites(job).
+/// image.maxSites, where what limits::kGeometryProbes rays of their own, which are in no image, see
+/// asks for it. A pure function of (job, pose of the frame, pixel), in which no site of the image
+/// has a part: so S cannot bias. Only where has_fine_sites(job).
 std::vector<std::uint16_t> count_sites(const JobSpec& job, const FrameGeometry& geometry,
                                        std::span<const PixelPlace> pixels);
 

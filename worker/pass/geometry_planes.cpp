@@ -42,8 +42,8 @@ void GeometryPlanes::Things::add(std::uint32_t number, double weight) {
   }
 }
 
-/// From where the point is in the picture to where it is one frame later, and before; what is
-/// behind the camera then is left out. The sky is infinitely far away.
+/// From where the point is in the image to where it is one frame later, and before; what is behind
+/// the camera then is left out. The sky is infinitely far away.
 void GeometryPlanes::add_motion(const Camera& camera, const Ray& ray, const SurfaceHit& hit,
                                 double weight, Sum& sum) const {
   const auto place_in = [&](const Pose& pose) {

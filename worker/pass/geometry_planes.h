@@ -15,7 +15,7 @@ namespace baton {
 /// position, z, motion, object and the ID mattes. Nothing where the job has none of them.
 class GeometryPlanes {
  public:
-  /// Of a tile in a frame.
+  /// Planes of a tile in a frame. rect: its pixels.
   GeometryPlanes(const RenderContext& context, const FrameSpec& frame,
                  const FrameGeometry& geometry, const PixelRect& rect);
 
@@ -28,14 +28,15 @@ class GeometryPlanes {
   void write(FilmTile& film) const;
 
  private:
-  /// Of one pixel. Sums over sites that see a surface; of motion over all sites.
+  /// The sums of one pixel over the sites that see a surface; motion: over all sites.
   struct Sum {
     std::array<double, 3> albedo{}, position{};
     double z = 0;
     std::array<double, 4> motion{};
-    std::uint32_t object = 0;  ///< of the first site that sees one: number from 1; 0: none
-    double seen = 0;           ///< weight of the sites that see a surface
-    double sites = 0;          ///< of all sites
+    /// Object at the first site that sees one: number from 1; 0: none.
+    std::uint32_t object = 0;
+    double seen = 0;   ///< weight of the sites that see a surface
+    double sites = 0;  ///< weight of all sites
   };
   /// The things that one pixel sees, and with how many sites. The first kMostThings are kept.
   static constexpr std::size_t kMostThings = 8;
@@ -54,11 +55,13 @@ class GeometryPlanes {
 
   const RenderContext& context_;
   const FrameGeometry& geometry_;
-  Pose before_, after_;  ///< of the frame numbers one less and one more; only for motion
+  /// Poses at the frame numbers one less and one more; only for motion.
+  Pose before_, after_;
   std::vector<Sum> sums_;
   std::vector<Things> objects_, materials_;  ///< (pixels), or empty
   std::vector<std::string> object_names_;    ///< only for mattes, as the next
-  std::vector<std::uint32_t> first_parts_;   ///< by object: number of the first that is named alike
+  /// By object: number of the first that is named alike.
+  std::vector<std::uint32_t> first_parts_;
 };
 
 }  // namespace baton

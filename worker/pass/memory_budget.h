@@ -12,12 +12,14 @@ namespace baton {
 /// a share is read or made again; a scene that does not fit is refused.
 struct MemoryBudget {
   std::uint64_t total_bytes = 0;
-  std::uint64_t scene_bytes = 0;  ///< a job's scene, with the tiles and frames in work
-  MemorySharePtr maps;            ///< environment maps as they were read, of all jobs
-  MemorySharePtr light;           ///< mixed maps and presampled light
-  MemorySharePtr surfaces;        ///< where things move: what primary rays have seen, and
-                                  ///< the geometry of what deforms
-  MemorySharePtr states;          ///< decoded sample states
+  /// A job's scene, with the tiles and frames in work.
+  std::uint64_t scene_bytes = 0;
+  /// Environment maps as they were read, for all jobs.
+  MemorySharePtr maps;
+  MemorySharePtr light;  ///< mixed maps and presampled light
+  /// Where things move: what primary rays have seen, and the geometry of what deforms.
+  MemorySharePtr surfaces;
+  MemorySharePtr states;  ///< decoded sample states
 
   static MemoryBudget of(std::uint64_t total_bytes) {
     const auto share = [total_bytes](std::uint64_t sixteenths) {

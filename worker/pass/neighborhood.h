@@ -12,7 +12,7 @@ namespace baton {
 /// Pass: the neighbours whose samples of the frame before a pixel weighs beside its own [Wyman &
 /// Panteleev 2021]: sampling.num_neighbors pixels, each drawn anew in each frame from a disk around
 /// the place that the pixel's own history comes from. One is asked only if it saw the same object,
-/// turned alike and as far away; that looks at surfaces alone, so it cannot bias.
+/// turned alike and as far away; that depends on surfaces alone, so it cannot bias.
 class Neighborhood {
  public:
   /// now: the frame's geometry. All must outlive the object.

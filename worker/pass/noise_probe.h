@@ -10,7 +10,7 @@ namespace baton {
 inline constexpr std::uint32_t kProbeSpacing = 128;
 
 /// Whether a pixel is one. Probes lie on a lattice with about equal distances of 12 pixels. It
-/// moves with frame and seed: 128 frames, or seeds, look at every pixel once.
+/// moves with frame and seed: 128 frames, or seeds, probe every pixel once.
 constexpr bool is_probe(std::int32_t x, std::int32_t y, FrameNumber frame, std::uint64_t job_seed) {
   constexpr std::uint32_t kRowShift = 12, kFrameShift = 79, kSeedShift = 37;
   const std::uint32_t place = static_cast<std::uint32_t>(x) +
@@ -23,7 +23,7 @@ constexpr bool is_probe(std::int32_t x, std::int32_t y, FrameNumber frame, std::
 /// Samples pixels a second time: the same sites, what the pixel remembers, and the same method, but
 /// random numbers and presampled light of their own (kProbeRound). Both estimates are independent
 /// given the past and agree in the mean, so half the square of their difference is the variance of
-/// the pixel, without bias and however a method stratifies. Nothing of it enters the picture. For
+/// the pixel, without bias and however a method stratifies. Nothing of it enters the image. For
 /// methods that carry no samples (tells_noise): another draw from carried ones would be as wrong as
 /// the first.
 class NoiseProbe {

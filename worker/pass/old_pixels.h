@@ -13,14 +13,14 @@
 namespace baton {
 
 /// Pixels of the frame before, by their place in the image: what they carry, and what they saw.
-/// States hold no surfaces: those that this process no longer keeps are traced again, exactly.
+/// States have no surfaces: those that this process no longer keeps are traced again, exactly.
 class OldPixels {
  public:
   struct Place {
     const SampleState* state = nullptr;
     std::size_t index = 0;               ///< pixel of `state`
     const TileSurfaces* kept = nullptr;  ///< what the tile saw; null: traced again
-    std::size_t traced = 0;              ///< its number among those traced again
+    std::size_t traced = 0;              ///< number among those traced again
   };
 
   /// states: of the frame before, of every tile within reach. All must outlive the object.
@@ -42,7 +42,7 @@ class OldPixels {
     return std::span(hits_).subspan(first_hit_[place.traced], num_sites);
   }
 
-  /// Their looks, where they are kept, else none.
+  /// Textures at their hits, where they are kept, else none.
   std::span<const SurfaceLook> looks(const Place& place) const {
     if (place.kept == nullptr) return {};
     return place.kept->pixel_looks(place.index);
@@ -56,9 +56,9 @@ class OldPixels {
   const JobSpec& job_;
   const FrameGeometry& before_;
   std::span<const StatePtr> states_;
-  const std::int32_t round_;                               ///< whose sites carry them
+  const std::int32_t round_;                               ///< whose sites carry the samples
   std::vector<std::shared_ptr<const TileSurfaces>> kept_;  ///< (states)
-  std::vector<PixelPlace> asked_;                          ///< that are not kept
+  std::vector<PixelPlace> asked_;                          ///< pixels that are not kept
   std::vector<std::size_t> first_hit_;                     ///< (asked)
   std::vector<SurfaceHit> hits_;
   std::uint64_t num_rays_ = 0;

@@ -13,7 +13,7 @@
 namespace baton {
 namespace {
 
-/// Of hits whose materials have detail; what the others have is never read.
+/// The textures at hits whose materials have detail; what the others have is never read.
 std::vector<SurfaceLook> looks_of(const FrameGeometry& geometry, std::span<const SurfaceHit> hits) {
   std::vector<SurfaceLook> looks(hits.size());
   for (std::size_t i = 0; i < hits.size(); ++i) {

@@ -21,8 +21,8 @@ struct TileSurfaces {
   std::vector<std::uint32_t> first_hit{0};
   std::vector<SurfaceHit> hits;  ///< (sum of S)
   std::vector<Ray> rays;         ///< (sum of S) primary rays
-  /// (sum of S) Of hits whose materials have detail: textures are looked up once for all frames and
-  /// rounds that see the same. Empty where the scene has none.
+  /// (sum of S) Textures at hits whose materials have detail, which are looked up once for all
+  /// frames and rounds that see the same. Empty where the scene has none.
   std::vector<SurfaceLook> looks;
   /// (slots) The first site that sees a surface, S where none does: hits are large, and whether
   /// there is one is asked several times a frame.
@@ -31,22 +31,22 @@ struct TileSurfaces {
   /// S of a slot.
   std::size_t num_sites(std::size_t slot) const { return first_hit[slot + 1] - first_hit[slot]; }
   bool sees_surface(std::size_t slot) const { return first_site[slot] < num_sites(slot); }
-  /// Of a pixel that sees one.
+  /// The first hit of a pixel that is a surface; it must see one.
   const SurfaceHit& first_surface(std::size_t slot) const {
     return hits[first_hit[slot] + first_site[slot]];
   }
   std::span<const SurfaceHit> pixel(std::size_t slot) const { return part(hits, slot); }
   std::span<const Ray> pixel_rays(std::size_t slot) const { return part(rays, slot); }
-  /// Of its sites; empty where the scene has no detail.
+  /// Textures at the hits of a pixel's sites; empty where the scene has no detail.
   std::span<const SurfaceLook> pixel_looks(std::size_t slot) const {
     return looks.empty() ? std::span<const SurfaceLook>() : part(looks, slot);
   }
-  /// Of hit number `at`, or null.
+  /// Textures at hit number `at`, or null.
   const SurfaceLook* look(std::size_t at) const { return looks.empty() ? nullptr : &looks[at]; }
   std::size_t size_bytes() const {
     return size_bytes(hits.size(), !looks.empty()) + first_site.size();
   }
-  /// Of so many sites.
+  /// Memory of so many sites.
   static std::size_t size_bytes(std::size_t num_sites, bool has_detail) {
     return num_sites * (sizeof(SurfaceHit) + sizeof(Ray) + (has_detail ? sizeof(SurfaceLook) : 0));
   }
@@ -68,8 +68,9 @@ class SurfaceCache : public StepKeep<std::pair<Step, std::int32_t>, TileSurfaces
 /// Pass 1: one primary ray for each site of each pixel (SiteRays).
 TileSurfaces trace_primary(const JobSpec& job, const FrameGeometry& geometry, const PixelRect& rect,
                            std::int32_t round = 0);
-/// Of some pixels of a tile. counts: S of each pixel of the tile, row by row (fine_sites.h); empty:
-/// image.sites for all. surfaces: any, is replaced; its memory is used again.
+/// Traces the primary rays of some pixels of a tile. counts: S of each pixel of the tile, row by
+/// row (fine_sites.h); empty: image.sites for all. surfaces: any, is replaced; its memory is used
+/// again.
 void trace_primary(const JobSpec& job, const FrameGeometry& geometry, const PixelRect& rect,
                    RoundPixels pixels, std::int32_t round, std::span<const std::uint16_t> counts,
                    TileSurfaces& surfaces);

@@ -19,7 +19,7 @@ class SurfaceCache;
 class RenderContext {
  public:
   JobSpec job;
-  Digest picture;  ///< of the job (picture_digest)
+  Digest picture;  ///< picture_digest of the job
   TileGrid grid{{0, 0, 1, 1}, 1};
   std::vector<FrameSpec> frames;
   std::shared_ptr<const Scene> scene;
@@ -27,7 +27,8 @@ class RenderContext {
   std::unique_ptr<const PixelMethod> method;
   std::vector<std::unique_ptr<const PixelMethod>> own_methods;  ///< (materials); null: `method`
   std::unique_ptr<LightSequence> lights;
-  std::shared_ptr<SurfaceCache> surfaces;  ///< of the last frames, where things move
+  /// Surfaces of the last frames, where things move.
+  std::shared_ptr<SurfaceCache> surfaces;
 };
 
 /// The surfaces of one pixel, which its sites hit in that frame, with their materials; looks: of

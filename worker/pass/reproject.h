@@ -33,8 +33,7 @@ class Reprojection {
   Reprojection(const RenderContext& context, const FrameGeometry& now, const FrameGeometry& before,
                std::span<const StatePtr> states);
 
-  /// Looks for the history of `count` pixels of `surfaces` from `first` on. frame: the user's
-  /// number.
+  /// Finds the history of `count` pixels of `surfaces` from `first` on. frame: the user's number.
   void look_up(const TileSurfaces& surfaces, std::size_t first, std::size_t count,
                const FrameSpec& frame);
   /// Copies the samples that pixel first + i of the last look_up takes over to pixel `pixel` of
@@ -42,7 +41,7 @@ class Reprojection {
   PixelHistory take(std::size_t i, std::size_t pixel, CatcherAlbedo& catchers, SampleState& state,
                     OldSurfaces& old) const;
 
-  /// What the neighbours of pixel first + i hold, until the next call.
+  /// What the neighbours of pixel first + i carry, until the next call.
   std::span<const CarriedSet> neighbors(std::size_t i, CatcherAlbedo& catchers);
 
   /// Rays traced so far.

@@ -17,12 +17,13 @@ struct PixelSum {
   double lns = 0, arrived = 0;  ///< arrived: Lns x visibility
   double ess_ratio = 0, acceptance = 0, acceptance_local = 0, acceptance_independent = 0;
   double resampled = 0, mask = 0;
-  RoundScatter scatter;               ///< of the radiance
-  double seen = 0, seen_squares = 0;  ///< of what the picture shows: grey radiance and shadow
+  RoundScatter scatter;  ///< scatter of the radiance
+  /// What is shown: grey radiance and shadow; and its squares.
+  double seen = 0, seen_squares = 0;
   std::int32_t num_rounds = 0;
-  double error = kErrorUnknown;  ///< of the rounds whose error is known
-  std::uint32_t material = 0;    ///< of the first round that sees one
-  double weight_seen = 0;        ///< of the rounds that see a surface
+  double error = kErrorUnknown;  ///< sum over the rounds where it is known
+  std::uint32_t material = 0;    ///< as in the first round that sees one
+  double weight_seen = 0;        ///< weight of rounds that see a surface
 };
 
 /// A frame of a tile as the mean of its rounds, each with its weight; those of a pixel add up to
@@ -38,7 +39,7 @@ class RoundMean {
 
   /// Adds pixel `index` of a round; rounds must come in turn. weight: rounds that it stands for.
   void add(std::size_t index, const PixelResult& pixel, double weight = 1);
-  /// Of the mean of quality.rounds rounds of pixel `index`, as Cycles measures it
+  /// Squared noise of the mean of quality.rounds rounds of pixel `index`, as Cycles measures it
   /// (common/image/noise.h), by the scatter of those so far, two or more of weight 1. A shadow on a
   /// plate counts as light.
   double squared_noise(std::size_t index) const;

@@ -25,7 +25,7 @@ class RoundPixels {
 
   std::size_t size() const { return size_; }
   bool are_all(std::size_t num_pixels) const { return index_.empty() && size_ == num_pixels; }
-  /// Of the pixel in a slot, row by row in the tile.
+  /// Index of the pixel in a slot, row by row in the tile.
   std::size_t index(std::size_t slot) const { return index_.empty() ? slot : index_[slot]; }
   /// Rounds that it stands for.
   double weight(std::size_t slot) const { return weight_.empty() ? 1 : weight_[slot]; }

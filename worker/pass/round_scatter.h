@@ -24,7 +24,7 @@ class EqualRounds {
   std::int32_t count() const { return count_; }
   double weight() const { return weight_; }
   double mean(std::size_t c) const { return sum_[c] / count_; }
-  /// Of one round, without bias; of two or more.
+  /// Variance of one round, without bias; needs two or more rounds.
   double variance(std::size_t c) const {
     return std::max(squares_[c] - sum_[c] * mean(c), 0.0) / (count_ - 1);
   }
@@ -57,7 +57,7 @@ struct RoundScatter {
   }
 
  private:
-  /// Of one of its rounds.
+  /// Variance of one of the later rounds.
   double of_rest(std::size_t c) const {
     if (rest.count() > 1) return rest.variance(c);
     const double distance = rest.mean(c) - first.mean(c);

@@ -19,7 +19,7 @@ namespace baton {
 /// themselves.
 struct SharedAssets {
   Scene scene;
-  std::shared_ptr<const Accel> accel;  ///< of `scene`
+  std::shared_ptr<const Accel> accel;  ///< ray tracer of `scene`
   std::shared_ptr<MapCache> maps;
 
   /// What scene and ray tracer take.

@@ -14,7 +14,7 @@ HWY_BEFORE_NAMESPACE();
 namespace baton::HWY_NAMESPACE {
 namespace hn = hwy::HWY_NAMESPACE;
 
-/// Writes what belongs to the even and the odd sites of pairs: of a vector whose blocks hold pairs
+/// Writes what belongs to the even and the odd sites of pairs: of a vector whose blocks are pairs
 /// 0, 1, then 2, 3, ..., in turn (PairsFrom).
 HWY_INLINE void StoreInTurn(VF even, VF odd, float* to) {
   const DF d;

@@ -12,7 +12,7 @@ namespace baton::kernels {
 /// A pixel's sites: cells of a grid, with a place in each.
 struct SiteCells {
   std::span<const float> x, y;  ///< (S) columns and rows
-  float width = 1;              ///< of a cell, in pixels
+  float width = 1;              ///< side of a cell, in pixels
 };
 
 /// Positions of all sites in their pixel, [0, 1)^2: the bits of step 0 of `rng`, index i of which

@@ -33,7 +33,7 @@ class SiteRays {
     Grid(std::int32_t coarse, std::int32_t sites);
 
     std::vector<float> x, y;  ///< (S) columns and rows
-    float width = 1;          ///< of a cell, in pixels
+    float width = 1;          ///< side of a cell, in pixels
   };
   const Grid& grid_of(std::int32_t num_sites);
 

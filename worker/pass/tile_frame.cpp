@@ -38,7 +38,7 @@ struct TileFrameRenderer::Batch {
   std::array<std::size_t, kBatchPixels> end_ray;  ///< where each pixel's rays end
   std::array<KnownLight, kBatchPixels> known;
   std::array<PixelResult, kBatchPixels> pixels;
-  std::array<Rgb, kBatchPixels> emission;              ///< of the surfaces that are seen
+  std::array<Rgb, kBatchPixels> emission;              ///< emission of what pixels see
   std::array<std::optional<Rgb>, kBatchPixels> again;  ///< radiance once more, where it is wanted
 
   RngKey key(const RenderContext& context, const PixelRect& rect, std::size_t index) const {
@@ -337,7 +337,7 @@ void TileFrameRenderer::finish(Batch& batch, const FrameLight& light, RoundMean&
     PixelResult& pixel = batch.pixels[i];
     const std::size_t slot = batch.first + i;
     if (surfaces_->sees_surface(slot) && surfaces_->first_surface(slot).is_catcher) {
-      const PixelResult caught = std::exchange(pixel, {});  // which is not in the picture
+      const PixelResult caught = std::exchange(pixel, {});  // which is not in the image
       pixel.shadow = caught.catcher > 0 ? caught.shadow : caught.radiance + caught.shadow;
       pixel.catcher = catcher_share(surfaces_->pixel(slot));
     }

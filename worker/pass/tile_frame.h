@@ -56,7 +56,7 @@ class TileFrameRenderer {
   /// The next round is the first one of a frame.
   void begin_frame() { frame_sampling_ = {}; }
   const RenderStats& stats() const { return stats_; }
-  /// Of the frame that was rendered last, over its rounds.
+  /// Statistics of the frame that was rendered last, over its rounds.
   const SamplingStats& frame_sampling() const { return frame_sampling_; }
 
  private:
@@ -94,10 +94,12 @@ class TileFrameRenderer {
   const RenderContext& context_;
   const FrameGeometry& geometry_;
   const bool draws_twice_, wants_unshadowed_;
-  const TileSurfaces* surfaces_ = nullptr;  ///< of the pixels in work
-  Reprojection* reprojection_ = nullptr;    ///< of the round in work; null where pixels stay
-  bool has_history_ = false;                ///< of the round in work, where pixels stay
-  std::array<Ahead, 2> ahead_;              ///< of odd and even slots
+  const TileSurfaces* surfaces_ = nullptr;  ///< surfaces of the pixels in work
+  /// History for the round in work; null where pixels stay.
+  Reprojection* reprojection_ = nullptr;
+  /// The round in work has history, where pixels stay.
+  bool has_history_ = false;
+  std::array<Ahead, 2> ahead_;  ///< one for even slots, one for odd ones
   /// (pixels, N) p~ at the samples of the round before: where samples and surfaces stay, it need
   /// not be evaluated again.
   std::vector<float> targets_;
@@ -105,7 +107,8 @@ class TileFrameRenderer {
   std::unique_ptr<SamplerScratch> scratch_;
   NoiseProbe probe_;
   CatcherEdge edge_;
-  CatcherAlbedo catchers_, catchers_before_;  ///< of the light of the round in work
+  /// Albedo in the light of this frame, and in that of the frame before.
+  CatcherAlbedo catchers_, catchers_before_;
   FirstPassCollector collector_;
   RenderStats stats_;
   Stages stages_;

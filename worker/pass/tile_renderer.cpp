@@ -121,7 +121,7 @@ class TileWalk {
 
   /// At the end of the walk.
   SampleState take_state() { return std::move(state_); }
-  /// Of the frame that was rendered last.
+  /// Statistics of the frame that was rendered last.
   const SamplingStats& frame_sampling() const { return renderer_->frame_sampling(); }
   /// What the second pass needs of that frame.
   FirstPassSamples take_first_pass() { return renderer_->take_first_pass(state_); }
@@ -167,7 +167,7 @@ class TileWalk {
     num_tile_sites_ = std::accumulate(counts_.begin(), counts_.end(), std::size_t{0});
   }
   bool is_one_part() const { return counts_.empty() || num_tile_sites_ <= limits::kMaxSitesAtOnce; }
-  /// The pixels of a round, as many at a time as caches hold the surfaces of; all together where
+  /// The pixels of a round, as many at a time as caches have room for; all together where
   /// these are kept.
   std::vector<RoundPixels> parts_of(RoundPixels pixels, bool are_kept) const {
     std::vector<RoundPixels> parts;
@@ -247,10 +247,11 @@ class TileWalk {
   SampleState state_;
   bool has_history_ = false;
   std::shared_ptr<const FrameGeometry> geometry_, before_;
-  std::vector<std::uint16_t> counts_;  ///< S of each pixel; empty: image.sites of all
-  std::size_t num_tile_sites_ = 0;     ///< of all pixels
-  std::map<std::int32_t, std::shared_ptr<const TileSurfaces>> kept_;          ///< by round
-  std::shared_ptr<TileSurfaces> passing_ = std::make_shared<TileSurfaces>();  ///< of a part
+  std::vector<std::uint16_t> counts_;  ///< S of each pixel; empty: image.sites
+  std::size_t num_tile_sites_ = 0;     ///< sites of all pixels
+  std::map<std::int32_t, std::shared_ptr<const TileSurfaces>> kept_;  ///< by round
+  /// Surfaces of a part of the tile, which are not kept.
+  std::shared_ptr<TileSurfaces> passing_ = std::make_shared<TileSurfaces>();
   std::unique_ptr<TileFrameRenderer> renderer_;
   RenderStats stats_;
 };

@@ -28,7 +28,7 @@ struct SharedAssets;
 Result<std::shared_ptr<const RenderContext>> load_render_context(const JobSpec& job,
                                                                  const Digest& picture);
 
-/// The same with assets that are loaded already (worker/pass/shared_assets.h): those of the job's
+/// A context with assets that are loaded already (worker/pass/shared_assets.h): those of the job's
 /// scene. memory: whose shares it uses. Error: motion that is not settled.
 Result<std::shared_ptr<const RenderContext>> make_render_context(
     const JobSpec& job, const Digest& picture, const std::shared_ptr<const SharedAssets>& assets,

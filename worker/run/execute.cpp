@@ -41,7 +41,7 @@ Result<std::vector<StatePtr>> read_states(const LoadedJob& loaded, const BlobSto
                                           const std::vector<BlobRef>& inputs) {
   std::vector<StatePtr> states;
   for (const BlobRef& input : inputs) {
-    if (input.kind == BlobKind::film) continue;  // of an earlier sweep: read when it is its turn
+    if (input.kind == BlobKind::film) continue;  // earlier sweeps: read at their turn
     if (input.kind != BlobKind::state) {
       return Error{ErrorKind::bad_input,
                    fmt::format("{}: a render task takes states and films", blob_name(input))};

@@ -17,10 +17,12 @@ namespace baton {
 struct TaskOutput {
   std::vector<BlobRef> outputs;
   RenderStats stats;
-  std::vector<FrameStats> frames = {};  ///< of a render task in frame order, of an assembly one
+  /// A render task: in frame order; an assembly: one.
+  std::vector<FrameStats> frames = {};
   /// What this machine does not see of the job, a line; then nothing was done.
   std::string unseen = {};
-  std::vector<std::string> notes = {};  ///< of files, for people: what was repaired, what is odd
+  /// About files, for people: what was repaired, what is odd.
+  std::vector<std::string> notes = {};
 };
 
 /// How a task that was leased has ended.
@@ -33,23 +35,23 @@ struct TaskEnded {
 /// What a lease says beside the task: LeaseGrant in PROTOCOL.md.
 struct TaskGrant {
   std::vector<BlobRef> inputs;
-  StepSpan steps{};  ///< of a render task
+  StepSpan steps{};  ///< what a render task renders
   bool may_hold = false;
   Step states_from{};
 };
 
-/// Runs one task, of the grant's frames: reads its inputs from `store`, writes its outputs there
-/// (an assembled frame goes to the job's output folder and is durable on return; blobs are after
-/// store.sync()). A state that may be held stays in loaded.held if there is room. Deterministic. A
-/// render task whose inputs are states of its own last frame renders nothing: its state is cut and
-/// joined from them. Errors: a missing or damaged input, the disk, bad input of the renderer;
-/// ErrorKind::cancelled when `stop` is requested. After one, `left` is what had been put into the
-/// store.
+/// Executes one task, of the grant's frames: reads its inputs from `store`, writes its outputs
+/// there (an assembled frame goes to the job's output folder and is durable on return; blobs are
+/// after store.sync()). A state that may be held stays in loaded.held if there is room.
+/// Deterministic. A render task whose inputs are states of its own last frame renders nothing: its
+/// state is cut and joined from them. Errors: a missing or damaged input, the disk, bad input of
+/// the renderer; ErrorKind::cancelled when `stop` is requested. After one, `left` is what had been
+/// put into the store.
 Result<TaskOutput> execute_task(const LoadedJob& loaded, BlobStore& store, const TaskKey& task,
                                 const TaskGrant& grant, const std::stop_token& stop,
                                 std::vector<BlobRef>* left = nullptr);
 
-/// Packs states that a job holds into the store. Errors: the disk.
+/// Packs held states of a job into the store. Errors: the disk.
 Result<std::vector<PublishedState>> publish_held(const JobStates::List& states, BlobStore& store);
 
 }  // namespace baton

@@ -34,7 +34,7 @@ ChannelNaming naming_of(const JobSpec& job) {
   return job.output.naming == FrameNaming::blender ? ChannelNaming::blender : ChannelNaming::plain;
 }
 
-/// Channels with 32 bits whatever output.pixelType says: colours that half floats cannot hold, and
+/// Channels with 32 bits whatever output.pixelType says: colours that half floats cannot say, and
 /// AOVs whose use needs them.
 std::vector<std::string> whole_channels(const JobSpec& job, const FrameQuality& quality) {
   std::vector<std::string> whole;

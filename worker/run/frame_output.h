@@ -32,12 +32,12 @@ struct WrittenFrame {
 
 /// Writes one finished frame as EXR with the job's name, digest and program version in its header.
 /// What is below zero is set to 0 where the job wants that. With a plate, which is as large as the
-/// whole picture, the frame is then laid over it; the plate's own values stay. Colours past a half
+/// whole image, the frame is then laid over it; the plate's own values stay. Colours past a half
 /// float make those of the frame float32; planes that no AOV of the job has are left out.
 ///
 /// Before the file gets its name it is read back from disk: every byte must be the encoder's, the
 /// header and the table of blocks must be whole, and one block of rows, another one in each frame,
-/// must unpack to the film. Errors: the disk, or a file that does not hold what was written.
+/// must unpack to the film. Errors: the disk, or a file that is not what was written.
 Result<WrittenFrame> write_frame(const JobSpec& job, const Digest& job_digest, FrameIndex frame,
                                  FilmTile image, const std::optional<RgbImage>& plate = {});
 
@@ -46,7 +46,7 @@ Result<WrittenFrame> write_frame(const JobSpec& job, const Digest& job_digest, F
 /// pixel.
 Status verify_frame(const std::filesystem::path& path, const FilmTile& image, std::int32_t block);
 
-/// The header attributes that Baton adds to its pictures: what they are made from, what was seen of
+/// The header attributes that Baton adds to its images: what they are made from, what was seen of
 /// them, and the job's own metadata as baton:metadata:NAME. cycles_noise: 0 where it is not told.
 ImageMetadata frame_metadata(const JobSpec& job, const Digest& job_digest, FrameNumber frame,
                              const FrameQuality& quality, float cycles_noise = 0);

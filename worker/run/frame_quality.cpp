@@ -66,7 +66,7 @@ void clamp_negative(FilmTile& image) {
   for (const char* name : {"R", "G", "B"}) {
     float* const plane = image.find(name);
     if (plane == nullptr) continue;
-    // Not std::max: NaN stays NaN, for who looks for it.
+    // Not std::max: NaN stays NaN, for who tests for it.
     for (std::size_t i = 0; i < image.num_pixels(); ++i) plane[i] = plane[i] < 0 ? 0 : plane[i];
   }
 }

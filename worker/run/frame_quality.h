@@ -5,11 +5,11 @@
 
 namespace baton {
 
-/// Looks at a whole finished film: its R, G, B, and the noise that its errors tell
+/// Judges a whole finished film: its R, G, B, and the noise that its errors tell
 /// (common/image/noise.h).
 FrameQuality judge_frame(const FilmTile& image);
-/// The same of a film that was laid over a plate and was `rendered` before: noise, mean and very
-/// bright pixels are those of the composite, values below zero those of what was rendered.
+/// Judges a film that was laid over a plate and was `rendered` before: noise, mean and very bright
+/// pixels are those of the composite, values below zero those of what was rendered.
 FrameQuality judge_composite(const FilmTile& image, const FrameQuality& rendered);
 
 /// Sets what is below zero in R, G and B to 0. This adds FrameQuality::light_below_zero of the

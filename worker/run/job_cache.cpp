@@ -161,7 +161,7 @@ std::shared_ptr<JobEntry> JobCache::entry(const Digest& digest) {
     entries_.erase(found);
   }
 
-  // Make room. A job that tasks still hold stays: a document that arrives for it must find it.
+  // Make room. A job that tasks still use stays: a document that arrives for it must find it.
   for (auto oldest = entries_.end(); oldest != entries_.begin() && !has_room_for_another();) {
     --oldest;
     if (oldest->use_count() == 1) oldest = entries_.erase(oldest);

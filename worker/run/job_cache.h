@@ -26,7 +26,8 @@ namespace baton {
 
 /// A job with all its assets in memory; shared by every task of it.
 struct LoadedJob {
-  JobSpec job;  ///< as submitted, but for its output folder, which is where this machine has it
+  /// As submitted, but for its output folder, which is where this machine has it.
+  JobSpec job;
   Digest digest, picture;
   std::shared_ptr<const RenderContext> context;
   /// In a share of the process's memory; with none nothing is kept.
@@ -43,7 +44,8 @@ using JobLoader = std::function<Result<LoadedJobPtr>(const JobDocument& document
 /// What is particular to a worker's machine.
 struct Machine {
   PathMaps maps = {};  ///< folders that lie elsewhere here
-  Roots roots = {};    ///< folders that jobs may read from and write to; empty: all
+  /// Folders that jobs may read from and write to; empty: all.
+  Roots roots = {};
   MemoryBudget memory = MemoryBudget::of_machine();
   int num_threads = 1;  ///< tiles that are in work at once
 };
@@ -88,11 +90,11 @@ class JobEntry {
   std::optional<Result<LoadedJobPtr>> result_;
 };
 
-/// The jobs that this process has seen last, most recent first, and all that somebody holds. Used
-/// by the control thread alone; the entries it hands out are safe to share.
+/// The jobs that this process has seen last, most recent first, and all that are in use. Used by
+/// the control thread alone; the entries it hands out are safe to share.
 class JobCache {
  public:
-  /// max_idle_scene_bytes: scenes of jobs that nobody holds go when they take more.
+  /// max_idle_scene_bytes: scenes of jobs that nobody uses go when they take more.
   explicit JobCache(JobLoader loader, std::chrono::milliseconds file_patience = kFilePatience,
                     std::uint64_t max_idle_scene_bytes = std::numeric_limits<std::uint64_t>::max())
       : loader_(std::move(loader)),

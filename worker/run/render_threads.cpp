@@ -74,7 +74,7 @@ void RenderThreads::work() {
     if (closing_) return;
     slot->running = true;
 
-    // Run it without the lock; list nodes do not move.
+    // Execute it without the lock; list nodes do not move.
     lock.unlock();
     const std::stop_token stop = slot->stop.get_token();
     TaskEnded end{slot->task.lease, Error{ErrorKind::cancelled, "stopped before it began"}};

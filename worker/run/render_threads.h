@@ -14,7 +14,7 @@
 
 namespace baton {
 
-/// What a render thread needs to run one task without asking anybody.
+/// What a render thread needs to execute one task without asking anybody.
 struct PooledTask {
   LeaseId lease;
   TaskGrant grant;
@@ -23,10 +23,10 @@ struct PooledTask {
 };
 
 /// The render threads, and one more that waits for the disk. The control thread submits, stops and
-/// collects; it never renders. Each render thread takes the oldest queued task, runs it with a stop
-/// token of its own and goes on with the next; the publisher makes durable what has been executed,
-/// all that came up during one wait by the next, and leaves the results for `collect`. The queue is
-/// bounded by the session, which requests few more leases than there are threads.
+/// collects; it never renders. Each render thread takes the oldest queued task, executes it with a
+/// stop token of its own and goes on with the next; the publisher makes durable what has been
+/// executed, all that came up during one wait by the next, and leaves the results for `collect`.
+/// The queue is bounded by the session, which requests few more leases than there are threads.
 class RenderThreads {
  public:
   /// `left`: see execute_task().
@@ -35,7 +35,7 @@ class RenderThreads {
   /// Makes the outputs of tasks that went well durable; an error becomes that of each of them.
   using Publish = std::function<Status(std::span<const PooledTask> tasks)>;
 
-  /// `wake` is called on a thread of the pool whenever there is something to take or to collect.
+  /// `wake` is called on one of the threads whenever there is something to take or to collect.
   RenderThreads(int num_threads, Execute execute, Publish publish, std::function<void()> wake);
   /// Stops every task and joins.
   ~RenderThreads();
@@ -43,8 +43,8 @@ class RenderThreads {
   RenderThreads& operator=(const RenderThreads&) = delete;
 
   void submit(PooledTask task);
-  /// Asks a queued or running task to end soon; its result will be ErrorKind::cancelled unless it
-  /// was about to end.
+  /// Asks a queued or begun task to end soon; its result will be ErrorKind::cancelled unless it was
+  /// about to end.
   void stop(const LeaseId& lease);
   /// Ends every task that no thread has begun as cancelled.
   void drop_queued();
@@ -62,7 +62,7 @@ class RenderThreads {
 
   struct Executed {
     std::vector<PooledTask> tasks;
-    std::vector<TaskEnded> ends;  ///< of each
+    std::vector<TaskEnded> ends;  ///< (tasks) how each has ended
   };
 
   void work();
@@ -74,7 +74,7 @@ class RenderThreads {
   std::mutex mutex_;
   std::condition_variable changed_;       ///< for the render threads
   std::condition_variable executed_any_;  ///< for the publisher
-  std::list<Slot> slots_;                 ///< oldest first; queued and running
+  std::list<Slot> slots_;                 ///< oldest first; queued and begun
   Executed executed_;                     ///< not yet durable
   std::vector<LeaseId> left_thread_;
   std::vector<TaskEnded> ended_;

@@ -112,7 +112,7 @@ Result<std::string> replay_tile(const ReplayOptions& options) {
   BATON_TRY(check_place(job, options));
   BATON_ASSIGN(const RenderedTile last, render(job, step, options.tile));
 
-  // The tile becomes a picture of its own.
+  // The tile becomes an image of its own.
   FilmTile picture = last.film;
   picture.rect = {0, 0, last.film.rect.width(), last.film.rect.height()};
   const std::filesystem::path out =

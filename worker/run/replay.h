@@ -20,7 +20,8 @@ struct ReplayOptions {
   int frame_number = 1;                ///< the user's number
   int tile = 0;                        ///< 0-based
   std::optional<PixelPosition> pixel;  ///< prints everything about this pixel
-  std::filesystem::path out;           ///< EXR of the tile; empty: "tile<T>.frame<F>.exr"
+  /// EXR of the tile; empty: "tile<T>.frame<F>.exr".
+  std::filesystem::path out;
 };
 
 /// Renders one tile up to the frame in this process, without a farm: with carried state from the

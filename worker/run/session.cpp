@@ -304,7 +304,7 @@ void Session::forget_report(const LeaseId& lease) {
 }
 
 /// Names what an attempt without a result has put into the store, so that it need not wait there
-/// for the sweep of leftovers.
+/// until leftovers are cleaned up.
 void Session::tell_left(const LeaseId& lease, const std::vector<BlobRef>& left, Actions& actions) {
   BlobsLeft message{lease, stored_blobs(left)};
   if (!message.blobs.empty()) actions.push_back(SendMessage{std::move(message)});

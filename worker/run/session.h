@@ -20,30 +20,36 @@ using TimePoint = std::chrono::steady_clock::time_point;
 /// Who the worker is and how patient.
 struct SessionOptions {
   WorkerHello identity;  ///< `running` is filled in by the session
-  std::chrono::seconds give_up{
-      60};  ///< silence of the coordinator after which the worker ends; 0: never
+  /// Silence of the coordinator after which the worker ends; 0: never.
+  std::chrono::seconds give_up{60};
   std::optional<TimePoint> end_at = {};  ///< when it must be gone
-  std::chrono::seconds idle_exit{0};     ///< without a task, after which it ends; 0: never
-  std::chrono::seconds drain{
-      0};  ///< that it goes on with its tasks when told to end; 0: to their end
+  /// Time without a task after which the worker ends; 0: never.
+  std::chrono::seconds idle_exit{0};
+  /// Time that the worker goes on with its tasks when told to end; 0: to their end.
+  std::chrono::seconds drain{0};
 };
 
 // ---- events: what happened to the worker --------------------------------------------------------
 struct MessageArrived {
   Message message;
 };
+/// Its thread is free, its outputs are on their way to the disk: TaskEnded follows.
 struct TaskExecuted {
   LeaseId lease;
-};  ///< its thread is free, its outputs are on their way to the disk: it will end
+};
+/// A started task belongs to a job that this process has not seen.
 struct DocumentMissing {
   Digest job;
-};  ///< a started task belongs to a job that this process has not seen
+};
+/// PackHeld is done; what could not be put into the store is left out.
 struct HeldPacked {
   std::vector<StatesPublished> messages;
-};                         ///< PackHeld is done; what could not be put into the store is left out
-struct DrainRequested {};  ///< SIGTERM or the coordinator: finish what runs, take nothing new
-struct GiveBackRequested {};  ///< a second SIGTERM: finish nothing, others will
-struct Tick {};               ///< time has passed
+};
+/// SIGTERM or the coordinator: finish what is in work, take nothing new.
+struct DrainRequested {};
+/// A second SIGTERM: finish nothing, others will.
+struct GiveBackRequested {};
+struct Tick {};  ///< time has passed
 using SessionEvent = std::variant<MessageArrived, TaskExecuted, TaskEnded, DocumentMissing,
                                   HeldPacked, DrainRequested, GiveBackRequested, Tick>;
 
@@ -140,8 +146,9 @@ class Session {
   std::optional<std::string> leaving_;     ///< why; all that is held is being packed
   std::optional<TimePoint> give_back_at_;  ///< what is not finished then goes back
   std::chrono::milliseconds heartbeat_{1000};
-  std::set<LeaseId> in_hand_;           ///< granted and not ended
-  std::set<LeaseId> executed_;          ///< those of them that have left their thread
+  std::set<LeaseId> in_hand_;  ///< granted and not ended
+  /// Leases in hand whose tasks have left their thread.
+  std::set<LeaseId> executed_;
   std::set<Digest> documents_missing_;  ///< requested, not yet here
   std::deque<Report> reports_;          ///< not confirmed, oldest first
   std::int32_t requested_ = 0;          ///< leases in the last request

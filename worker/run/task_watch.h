@@ -34,7 +34,7 @@ class TaskWatch {
 
   /// The tasks whose deadline has passed; each is named once.
   std::vector<LeaseId> take_overdue(TimePoint now);
-  /// Whether a task still runs kStopPatience after its deadline.
+  /// Whether a task is still in work kStopPatience after its deadline.
   bool is_stuck(TimePoint now) const;
 
  private:

@@ -102,7 +102,7 @@ class NoteLog {
 /// included.
 constexpr std::chrono::minutes kLoadPatience{15};
 
-/// Runs a task on a render thread. The command that repeats it stands in its error message and,
+/// Executes a task on a render thread. The command that repeats it stands in its error message and,
 /// should the process die, in the crash report.
 Result<TaskOutput> execute_pooled(const PooledTask& task, const std::stop_token& stop,
                                   std::vector<BlobRef>& left, NoteLog& notes, TaskWatch& watch,
@@ -361,7 +361,8 @@ class Worker {
   NoteLog notes_;
   TaskWatch watch_;
   std::list<std::future<std::vector<StatesPublished>>> packing_;
-  RenderThreads pool_;  ///< last: its threads use the rest and are joined first
+  /// Last: its threads use the rest and are joined first.
+  RenderThreads pool_;
 };
 
 }  // namespace

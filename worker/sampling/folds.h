@@ -13,7 +13,7 @@ struct Fold {
   int giver_population = -1;  ///< -1: all
   float energy_scale = 1;
 };
-/// The folds of a policy; the picture is their sum when energies are those of all populations
+/// The folds of a policy; the image is their sum when energies are those of all populations
 /// together.
 std::span<const Fold> folds_of(MaskPolicy policy);
 

@@ -11,7 +11,7 @@
 namespace baton {
 
 /// How many candidates a pixel gets, by what it remembers of the noise of its light. On glossy
-/// surfaces a few pixels have most of the error of a picture: those that see a lamp at the rim of
+/// surfaces a few pixels have most of the error of an image: those that see a lamp at the rim of
 /// their lobe. A number of candidates that depends on their own values would be a bias; one that
 /// depends on what earlier frames saw of the pixel is not.
 

@@ -22,11 +22,12 @@ namespace hn = hwy::HWY_NAMESPACE;
 
 /// What the sampler asks of a point (site, direction).
 struct TargetLanes {
-  VF log_before, log_now;  ///< of the unnormalised targets of the frame before and of this frame;
-                           ///< kLogZero stands for log 0
-  VF density;              ///< of independent proposals
-  VF inverse_density;      ///< 0 where the density is
-  Vec3Lanes reflected;     ///< (f cos L)_rgb of this frame; `log_now` is the log of its mean
+  /// Log of the unnormalised target, of the frame before and of this one; kLogZero is log 0.
+  VF log_before, log_now;
+  VF density;          ///< density of independent proposals
+  VF inverse_density;  ///< 0 where the density is
+  /// (f cos L)_rgb of this frame; `log_now` is the log of its mean.
+  Vec3Lanes reflected;
 };
 
 /// 1 / x, 0 where x is not positive.
@@ -49,8 +50,8 @@ struct PointLanes {
   VI site;
 };
 
-/// The particles of one pixel with everything the step needs, (N) each; the last vector is filled
-/// up with particles without weight.
+/// The particles of one pixel with everything the sampler needs, (N) each; the last vector is
+/// filled up with particles without weight.
 struct ParticleArrays {
   template <class T>
   using Column = PaddedArray<T, limits::kMaxParticles>;
@@ -59,8 +60,9 @@ struct ParticleArrays {
   Column<float> weight;  ///< sum 1
   Column<float> log_before, log_now;
   Column<float> inverse_density;
-  Column<float> r, g, b;        ///< TargetLanes::reflected
-  Column<float> log_increment;  ///< sum over k of log p^k / p^(k-1) at the particle's positions
+  Column<float> r, g, b;  ///< TargetLanes::reflected
+  /// Sum over k of log p^k / p^(k-1) at the particle's positions.
+  Column<float> log_increment;
 };
 
 /// Uniform in the cap of cosine `cap_cosine` around w: symmetric, so it cancels in the acceptance

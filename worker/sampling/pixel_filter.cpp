@@ -9,7 +9,7 @@ namespace baton {
 namespace {
 
 /// Draws from a filter as a piecewise constant density: finds the cell whose share of the
-/// cumulative distribution holds u, from a guide on [Chen & Asau 1974].
+/// cumulative distribution contains u, from a guide on [Chen & Asau 1974].
 class FilterTable {
  public:
   explicit FilterTable(PixelFilter filter)

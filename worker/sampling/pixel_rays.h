@@ -24,11 +24,11 @@ struct PixelRays {
   std::size_t count = 0;
   Column<float> x, y, z;     ///< unit directions
   Column<float> r, g, b;     ///< what a free ray brings
-  Column<float> visibility;  ///< and its share of Lns
+  Column<float> visibility;  ///< share of Lns of a free ray
   Column<std::uint8_t> site;
-  Column<std::uint8_t> bin;  ///< of VisibilityBins
+  Column<std::uint8_t> bin;  ///< cell of VisibilityBins
   Value constant;
-  LightVariance light_variance;  ///< of this frame's candidates
+  LightVariance light_variance;  ///< variance of this frame's candidates
 
   void clear() {
     count = 0;

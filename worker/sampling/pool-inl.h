@@ -75,7 +75,7 @@ class RememberedLanes {
   HWY_INLINE ProspectLanes Prospect(VF expected) const {
     return {expected, ContributionFactor(tuning_, expected), DeviationFactor(tuning_, expected)};
   }
-  /// Of cells in the lower halves.
+  /// The share of free rays in cells, which are in the lower halves.
   static HWY_INLINE VF Share(VI cells) {
     const DF d;
     const VI share = hn::And(cells, hn::Set(DI(), 0xFFF0));
@@ -94,13 +94,15 @@ struct WeighedLines {
   const RememberedLanes* memory;
   RunningSums::End contribution, deviation;
   float* next_expected;
-  const float* first_expected = next_expected;  ///< where those of this kind of candidates begin
-  VF light = hn::Zero(DF());                    ///< sum of w
-  Vec3Lanes colors{hn::Zero(DF()), hn::Zero(DF()), hn::Zero(DF())};  ///< of w V^ (f cos L) / p~
+  /// Where the expectations of this kind of candidates begin.
+  const float* first_expected = next_expected;
+  VF light = hn::Zero(DF());                                         ///< sum of w
+  Vec3Lanes colors{hn::Zero(DF()), hn::Zero(DF()), hn::Zero(DF())};  ///< sum of w V^ (f cos L) / p~
   VF previous = hn::Zero(DF());                                      ///< w V^ before
-  VF last_step = hn::Zero(DF());                                     ///< to it
-  VF bends = hn::Zero(DF());        ///< of the squares of its second differences
-  VF light_bends = hn::Zero(DF());  ///< those of the candidates from the light, once they are done
+  VF last_step = hn::Zero(DF());  ///< difference that led to `previous`
+  VF bends = hn::Zero(DF());      ///< sum of squared second differences
+  /// `bends` of the candidates from the light, once they are done.
+  VF light_bends = hn::Zero(DF());
 
   /// A vector of candidates. add_color(share, sum) adds share w (f cos L)_rgb / p~ to `sum`.
   template <class AddColor>
@@ -146,7 +148,7 @@ HWY_INLINE float VarianceOfOne(VF bends, std::int32_t count, float scale) {
 /// and memory say before any ray is chosen.
 struct RayPlan {
   const RunningSums& line;
-  float total;  ///< of the line
+  float total;  ///< sum of the line
   bool control;
   std::int32_t count;
   float lns;

@@ -10,12 +10,12 @@
 
 namespace baton {
 
-/// The decisions of the pool sampler; its step is pool-inl.h. A pixel's M fresh candidates y_i have
-/// weights w_i, which sum to Lns; its memory of earlier rays expects the visibility V^ of each, the
-/// share of free rays around it. V^ steers which candidates get a ray and how many, and it cannot
-/// bias: candidates and memory decide before any ray is chosen, and each ray is divided by the
-/// factor that chose it. The factor is the standard deviation of what a ray adds, which is the
-/// choice of least variance:
+/// The decisions of the pool sampler; its work on a frame is in pool-inl.h. A pixel's M fresh
+/// candidates y_i have weights w_i, which sum to Lns; its memory of earlier rays expects the
+/// visibility V^ of each, the share of free rays around it. V^ steers which candidates get a ray
+/// and how many, and it cannot bias: candidates and memory decide before any ray is chosen, and
+/// each ray is divided by the factor that chose it. The factor is the standard deviation of what a
+/// ray adds, which is the choice of least variance:
 /// - where rays count what they bring, the *contribution* sqrt(E[V^2]) = sqrt(V^);
 /// - where V^ is a control variate, its *deviation* sqrt(E[(V - V^)^2]) = sqrt(V^ (1 - V^)).
 ///   Candidates whose visibility is nearly certain need few rays.
@@ -25,7 +25,7 @@ namespace baton {
 /// then those of the BRDF.
 using CandidateLine = PaddedArray<float, limits::kMaxCandidates + kVectorPadding>;
 
-/// Work space of a step.
+/// Work space of a pixel in a frame.
 struct PoolLines {
   CandidateLine contribution_sums, deviation_sums;
   CandidateLine expected;  ///< V^ of each candidate

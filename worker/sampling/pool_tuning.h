@@ -15,8 +15,8 @@ struct PoolTuning {
   /// Least factor on a candidate's weight where V^ is the control variate: candidates whose
   /// visibility has no variance still get some rays.
   float least_deviation = 0.1f;
-  /// The same where V^ is no control variate. A lamp that is always blocked leaves rays to the
-  /// rest.
+  /// Least factor on a candidate's weight where V^ is no control variate. A lamp that is always
+  /// blocked leaves rays to the rest.
   float least_contribution = 0.05f;
   /// V^ is the control variate where the expected light is so many times its deviation. Later
   /// loses; earlier, a blocked ray may leave a value below zero more often.
@@ -28,8 +28,10 @@ struct PoolTuning {
 
   /// Candidates of a kind.
   struct Candidates {
-    float usual_noise;  ///< over noise_scale(), that gives the usual number
-    float least;        ///< share of the usual number that every pixel gets
+    /// Noise over noise_scale() that gives the usual number.
+    float usual_noise;
+    /// Share of the usual number that every pixel gets.
+    float least;
   };
   Candidates light{0.0015f, 0.25f};
   /// Those from lobes take more time, and too few of them miss lamps without showing any noise.

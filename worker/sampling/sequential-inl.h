@@ -111,7 +111,7 @@ class PathSum {
 
   /// Adds the mean under p^k, k in [0, P].
   void Add(int k, const PathMean& at_k) {
-    // The share that no longer shines leaves the sum for good: the path itself runs within the
+    // The share that no longer shines leaves the sum for good: the path itself stays within the
     // common support.
     if (k == 0) log_ratio_ = at_k.share > 0 ? std::log(at_k.share) : double{kLogZero};
     const bool end = k == 0 || k == last_;

@@ -36,14 +36,14 @@ struct MoveCounts {
   std::int32_t accepted = 0;
 };
 
-/// What one step did.
+/// What the sampler did in one frame.
 struct SequentialOutcome {
-  bool alive = false;  ///< false: all weights died or Lns is not a positive finite number; start
-                       ///< again with SIR
-  float lns = 0;       ///< new estimate of the normalising constant
-  float ess = 0;       ///< before resampling, [1, N]
+  /// False: all weights died or Lns is not a positive finite number; start again with SIR.
+  bool alive = false;
+  float lns = 0;  ///< new estimate of the normalising constant
+  float ess = 0;  ///< before resampling, [1, N]
   bool resampled = false;
-  MoveCounts local;        ///< perturbations of the particle's direction
+  MoveCounts local;        ///< perturbations of the direction
   MoveCounts independent;  ///< fresh directions from the map
 };
 

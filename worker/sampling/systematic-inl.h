@@ -59,8 +59,8 @@ class RunningSums {
   static constexpr std::size_t kGroup = 2 * hn::MaxLanes(DF());
   static_assert(kGroup <= kVectorPadding);
 
-  /// After Finish: the weights that hold kGroup positions, each in [0, total], total > 0; never one
-  /// of weight 0. Two searches run side by side: one alone waits for its own look-ups.
+  /// After Finish: the weights that contain kGroup positions, each in [0, total], total > 0; never
+  /// one of weight 0. Two searches go side by side: one alone waits for its own lookups.
   HWY_INLINE void Find(const VF (&position)[2], std::int32_t* found) const {
     const DF d;
     const DI di;
@@ -115,8 +115,8 @@ class RunningSums {
   HWY_ALIGN float stop_[kLanes];    ///< by stretch
 };
 
-/// picks: the weights that hold positions (m + u) total / count of the line, m = 0 ... count - 1,
-/// and what fills up the last group.
+/// picks: the weights that contain positions (m + u) total / count of the line, m in [0,
+/// count), and what fills up the last group.
 HWY_INLINE void SystematicPicks(const RunningSums& sums, float total, float u, std::size_t count,
                                 PaddedArray<std::int32_t, limits::kMaxParticles>& picks) {
   const DF d;

@@ -41,7 +41,7 @@ void remember_rays(PixelMemory& memory, std::span<const std::uint8_t> bin, std::
   Tally all(memory.all_rays);
   if (all.seen == 0) all.share = kShareOfOne / 2;
 
-  // Of a pixel that has long been in the open, or in the dark, one more ray says nothing new.
+  // One more ray says nothing new of a pixel that has long been in the open, or in the dark.
   const std::uint64_t every = bin.empty() ? 0 : ~std::uint64_t{0} >> (64 - bin.size());
   if ((outcomes == PixelMemory::kSawFree && free == every) ||
       (outcomes == PixelMemory::kSawBlocked && free == 0)) {

@@ -9,9 +9,9 @@ namespace {
 
 constexpr std::size_t kAround = 3;   ///< frames on each side
 constexpr std::size_t kFewest = 3;   ///< frames to compare with
-constexpr float kLeastShare = 0.5f;  ///< of the median
+constexpr float kLeastShare = 0.5f;  ///< least deviation, over the median
 constexpr float kDeviations = 5;     ///< median absolute ones
-/// Of the noise's own standard errors: it is told by few pixels.
+/// Noise that is higher by so many of its own standard errors is odd: it is told by few pixels.
 constexpr float kErrors = 4;
 /// Less noise than this is never worth a word.
 constexpr float kNoNoise = 0.002f;

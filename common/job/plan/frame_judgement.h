@@ -12,7 +12,7 @@ namespace baton {
 struct OddFrame {
   FrameNumber frame{};
   bool by_noise = false;  ///< else by its mean radiance
-  float ratio = 1;        ///< to the median of those around it
+  float ratio = 1;        ///< to the median of the frames around
 };
 
 /// What a person should know of the frames of a job that are written.

@@ -31,8 +31,8 @@ EnvironmentFrame environment_at(const EnvironmentSpec& environment, FrameNumber 
   const std::vector<EnvironmentKey>& keys = environment.keys;
   EnvironmentFrame result;
 
-  // The last key at or before the frame holds; before the first key the first one does. Between two
-  // keys the texels are mixed linearly.
+  // The last key at or before the frame counts; before the first key the first one does. Between
+  // two keys the texels are mixed linearly.
   const KeySpan span = find_span(keys, frame.value());
   result.map_a = result.map_b = static_cast<std::int32_t>(span.from);
   if (environment.interpolate) result.mix = static_cast<float>(span.share);

@@ -43,7 +43,7 @@ double film_bytes(Aov aov, bool equal_weights) {
   return traits(aov).film_bytes;
 }
 
-/// Of a pixel of a frame, on average.
+/// Bytes of a pixel in a packed film, on average.
 double film_bytes_per_pixel(const JobSpec& job, double surface_share) {
   const bool has_sky = job.output.background == Background::environment;
   double bytes = 3 * kColorBytes * (has_sky ? 1 : surface_share);
@@ -55,7 +55,7 @@ double film_bytes_per_pixel(const JobSpec& job, double surface_share) {
   return bytes + (tells_noise(job) ? kErrorBytes : 0);
 }
 
-/// Of a pixel's state after steps [0, end), on average.
+/// Bytes of a pixel in a packed state after steps [0, end), on average.
 double state_bytes_per_pixel(const JobSpec& job, std::int64_t end, double surface_share) {
   const JobEstimate e = estimate_job(job);
   const auto whole = static_cast<double>(e.state_bytes_per_pixel);
@@ -142,7 +142,7 @@ StoreEstimate bound_store(const JobSpec& job) {
   store.states = e.state_bytes * std::min(kept + kStatesInWork, e.runs);
   store.films = e.film_bytes * (ahead + frames_that_stay(job));
   if (job.visibility.correlated) {
-    store.films *= 2;  // of both passes
+    store.films *= 2;  // each pass has its films
     const std::int64_t per_pixel = 2 + 8 + 10 * std::int64_t{job.sampling.num_particles};
     store.samples = job.image.rendered().area() * per_pixel * ahead;
   }

@@ -17,11 +17,11 @@ struct StoreEstimate {
   std::int64_t total() const { return states + films + samples; }
 };
 
-/// What the store of a job holds at its fullest with one worker, as it is likely: sizes are those
+/// What is in the store of a job at its fullest with one worker, as it is likely: sizes are those
 /// that docs/lab/store.md measures. surface_share: of the pixels that see a surface, [0, 1].
 StoreEstimate estimate_store(const JobSpec& job, double surface_share);
 
-/// What it holds at most, however many workers there are and however badly blobs pack.
+/// What is in it at most, however many workers there are and however badly blobs pack.
 StoreEstimate bound_store(const JobSpec& job);
 
 /// What a blob of a whole tile takes, as it is likely; all pixels see a surface.

@@ -39,7 +39,7 @@ Status append_range(std::string_view range, std::vector<FrameNumber>& frames) {
                  range);
   };
 
-  // Read first, last and step.
+  // Read first, last and distance.
   const std::optional<int> first = take_number(rest);
   std::optional<int> last = first;
   std::optional<int> step = 1;
@@ -77,8 +77,8 @@ Result<std::vector<FrameNumber>> parse_frames(std::string_view text) {
 std::string format_frames(const std::vector<FrameNumber>& frames) {
   std::string text;
   for (std::size_t i = 0; i < frames.size();) {
-    // The longest run of equal steps that starts here; with gaps it takes four frames to be worth a
-    // range.
+    // The longest stretch of equal distances that starts here; with gaps it takes four frames to be
+    // worth a range.
     std::size_t last = i;
     const int step = i + 1 < frames.size() ? frames[i + 1] - frames[i] : 1;
     while (last + 1 < frames.size() && frames[last + 1] - frames[last] == step) ++last;

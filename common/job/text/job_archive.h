@@ -80,7 +80,7 @@ class JobArchive {
   virtual ~JobArchive() = default;
 
   virtual bool boolean(Key key, bool& value) = 0;
-  /// The same; what is false is not written, so that jobs without it keep their digests.
+  /// A boolean of which false is not written, so that jobs without it keep their digests.
   virtual bool flag(Key key, bool& value) { return boolean(key, value); }
   /// Range inclusive.
   virtual bool integer(Key key, int& value, int min, int max) = 0;
@@ -166,7 +166,7 @@ class JobArchive {
         key, items, T(), max_count, [&](const std::string&, T& item) { body(item); }, form);
   }
 
-  /// The same where new items start as `start`, and with the name: body(name, item).
+  /// As named(), where new items start as `start`, and with the name: body(name, item).
   template <class T, class F>
   bool named_from(Key key, std::map<std::string, T>& items, const T& start, int max_count, F body,
                   ObjectForm form = {}) {

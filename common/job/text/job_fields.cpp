@@ -61,7 +61,7 @@ void count_fields(JobArchive& a, Sampling& sampling) {
   a.number("brdfFraction", sampling.brdf_fraction, kUnitRange);
 }
 
-/// Settings of single materials; what they leave out is as in the rest of the picture.
+/// Settings of single materials; what they leave out is as in the rest of the image.
 void material_fields(JobArchive& a, SamplingSpec& sampling, const SceneSpec& scene) {
   const auto visit = [&](const std::string& name, MaterialSampling& material) {
     method_that_draws_anew(a, "method", material.method);
@@ -286,7 +286,8 @@ void check_unshadowed(JobArchive& a, const JobSpec& job) {
   }
 }
 
-/// What no single value shows: too many tasks, tiles that no blob holds, noise that nobody tells.
+/// What no single value shows: too many tasks, tiles that fit into no blob, noise that nobody
+/// tells.
 void check_whole(JobArchive& a, const JobSpec& job) {
   if (std::int64_t{job.quality.sweeps} * static_cast<std::int64_t>(job.frames.size()) >
       limits::kMaxTasksPerJob) {

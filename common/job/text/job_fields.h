@@ -15,7 +15,7 @@ namespace baton {
 
 /// Colours and factors.
 inline constexpr NumberRange kUnitRange{0, 1};
-/// Positions: far beyond it float32 has no digits left for the picture.
+/// Positions: far beyond it float32 has no digits left for the image.
 inline constexpr NumberRange kCoordinateRange{-1e9, 1e9};
 /// Radiance.
 inline constexpr NumberRange kLightRange{0, 1e9};

@@ -23,7 +23,7 @@ using nlohmann::ordered_json;
 
 constexpr int kMaxAssets = limits::kMaxMeshes + limits::kMaxFrames;
 
-/// Bytes that are no UTF-8 (a folder's name can hold them) are replaced: the path will then be
+/// Bytes that are no UTF-8 (a folder's name can have them) are replaced: the path will then be
 /// reported as missing.
 std::string dump(const ordered_json& value, int indent) {
   return value.dump(indent, ' ', false, ordered_json::error_handler_t::replace);

@@ -15,7 +15,7 @@ class JobOverrides {
   explicit JobOverrides(const std::vector<JobOverride>& overrides);
 
   /// Sets the values that lie below `path` in `value`, which stands there; missing objects are
-  /// made. What is in the way of a path stays, such as the name of a file that holds the scene.
+  /// made. What is in the way of a path stays, such as the name of a file that has the scene.
   void apply(const std::string& path, nlohmann::json& value);
   /// Who said what stands at a path: the option, or "" for the file.
   std::string source_of(const std::string& path) const;

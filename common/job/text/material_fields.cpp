@@ -14,7 +14,7 @@ void pair(JobArchive& a, Key key, std::array<float, 2>& value, NumberRange range
   value = {static_cast<float>(numbers[0]), static_cast<float>(numbers[1])};
 }
 
-/// Of a file name with <UDIM>.
+/// What a file name with <UDIM> must and must not have beside it.
 void check_tiles(JobArchive& a, const TextureSpec& texture) {
   const std::string& file = texture.file;
   const std::size_t at = file.find(kTileMark);

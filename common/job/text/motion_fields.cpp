@@ -83,7 +83,7 @@ void view_fields(JobArchive& a, CameraSpec& camera) {
   a.number("orthographicHeight", camera.orthographic_height, kLengthRange);
 }
 
-/// The same of a camera of a file, which says where it is.
+/// Fields of the view of a camera of a file, which says where it is.
 void own_view_fields(JobArchive& a, CameraSpec& camera) {
   constexpr float kNone = std::numeric_limits<float>::quiet_NaN();  // which is not written
   for (const char* const key : {"position", "lookAt", "up"}) {

@@ -12,12 +12,12 @@ namespace baton {
 /// which tiles, when, by whom, and how they are stored. Two jobs of one picture make the same bytes
 /// of a frame that both have the same way up to there, and go on with each other's work.
 
-/// Names what holds for all frames: every value of the job that is no setting and no key, the
+/// Names what is so for all frames: every value of the job that is no setting and no key, the
 /// contents of the meshes and, where samples are carried, the first frame, since the history begins
 /// there. States and films say it.
 Digest picture_digest(const JobSpec& job, const std::vector<AssetDigest>& assets);
 
-/// What holds for all frames and differs: the JSON paths, and the files whose content changed;
+/// What is so for all frames and differs: the JSON paths, and the files whose content changed;
 /// sorted. Empty exactly when the picture digests are equal.
 std::vector<std::string> picture_differences(const ParsedJobDocument& a,
                                              const ParsedJobDocument& b);

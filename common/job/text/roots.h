@@ -16,7 +16,7 @@ bool lies_within(const std::filesystem::path& path, const Roots& roots);
 
 /// bad_input names the path that lies outside.
 Status check_output_root(const JobSpec& job, const Roots& roots);
-/// The same for all files that the job reads, too.
+/// As check_output_root(), for all files that the job reads, too.
 Status check_roots(const ParsedJobDocument& document, const Roots& roots);
 
 }  // namespace baton

@@ -27,8 +27,8 @@ void reference(JobArchive& a, Key key, std::string& name, const std::map<std::st
           fmt::format("\"{}\"{}", name, suggestion(name, known)));
 }
 
-/// The name of a material. Those of a glTF file are not known yet: they are looked for when the
-/// scene is loaded.
+/// The name of a material. Those of a glTF file are not known yet: they are checked when the scene
+/// is loaded.
 void material_reference(JobArchive& a, Key key, std::string& name, const SceneSpec& scene) {
   if (scene.gltf) {
     a.text(key, name);

@@ -14,7 +14,8 @@ namespace baton::stability {
 struct Effort {
   int frames = 200;
   int runs = 6;
-  bool fine = true;  ///< all quadrature nodes of the case, else half as many each way
+  /// All quadrature nodes of the case, else half as many each way.
+  bool fine = true;
 };
 inline constexpr Effort kFullEffort{200, 6, true};
 /// For ./run test.
@@ -23,7 +24,8 @@ inline constexpr Effort kQuickEffort{40, 6, false};
 /// The length of one case's sequence. Frames are numbered from 1.
 struct Timeline {
   int frames = 0;
-  int event = 0;  ///< the frame in which the light jumps, 0: it does not
+  /// The frame in which the light jumps, 0: it does not.
+  int event = 0;
   /// First frame of the late window.
   int late() const { return frames - frames / 4 + 1; }
   /// The frames that are compared with the exact answer, ascending: the first two, pairs spread
@@ -31,16 +33,18 @@ struct Timeline {
   std::vector<FrameNumber> judged() const;
 };
 
-/// One way to make samplers stumble: a small job, what it tries, and what must hold.
+/// One way to make samplers stumble: a small job, what it tries, and what must be so.
 struct Case {
   std::string name;
   std::string text;  ///< one sentence for the report
   /// Frames are set by the caller.
   std::function<JobSpec(const Stage&, const Timeline&)> build{};
   std::vector<Law> laws{};
-  bool jumps = false;  ///< the light jumps at three tenths of the sequence
-  int stretch = 1;     ///< so many times the usual number of frames
-  int nodes = 4;       ///< multiple of 4: quadrature nodes per texel side
+  /// The light jumps at three tenths of the sequence.
+  bool jumps = false;
+  int stretch = 1;  ///< so many times the usual number of frames
+  /// Multiple of 4: quadrature nodes per texel side.
+  int nodes = 4;
   bool quick = false;  ///< also in the reduced form
   Timeline timeline(const Effort& effort) const;
 };

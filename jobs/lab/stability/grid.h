@@ -21,8 +21,8 @@ struct Cell {
   double pixel_us = 0;
 };
 
-/// Runs one case with every subject. stage_folder: for its maps and meshes. Subjects are compared
-/// with kFreshSubject, which must be among them.
+/// Renders one case with every subject. stage_folder: for its maps and meshes. Subjects are
+/// compared with kFreshSubject, which must be among them.
 Result<std::vector<Cell>> run_case(const Case& c, const std::vector<Subject>& subjects,
                                    const Effort& effort, const std::filesystem::path& stage_folder,
                                    int threads);

@@ -51,7 +51,7 @@ void print(const Cell& cell) {
   std::fflush(stdout);
 }
 
-/// Runs the grid. Returns the number of changed verdicts.
+/// Renders the grid. Returns the number of changed verdicts.
 Result<int> run_grid(const Options& options) {
   BATON_ASSIGN(Expectations expectations, Expectations::read(options.expected));
   const std::vector<Subject> subjects = selected(all_subjects(), options.subjects, kFreshSubject);

@@ -31,7 +31,7 @@ double masked_mean(std::span<const float> values, std::span<const float> mask) {
   return count > 0 ? sum / count : 0.0;
 }
 
-/// One run, frame by judged frame.
+/// One rendering, frame by judged frame.
 struct Run {
   std::vector<std::vector<float>> radiance, lns;
   std::vector<double> ess, acceptance;
@@ -68,11 +68,11 @@ struct Run {
   }
 };
 
-/// The lights of one run, shared by the subjects of one method, which lay out the pool alike:
-/// preparing them costs more than a tiny image does.
+/// The lights of one rendering, shared by the subjects of one method, which lay out presampled
+/// light alike: preparing them costs more than a tiny image does.
 class SharedLights {
  public:
-  /// Renders `job` with the lights of earlier jobs of the same run.
+  /// Renders `job` with the lights of earlier jobs of the same rendering.
   Status render(const JobSpec& job, const std::vector<FrameNumber>& judged, const Subject& subject,
                 Run& run) {
     BATON_ASSIGN(const auto loaded, load_render_context(job, Digest{1, 2}));
@@ -128,7 +128,7 @@ Status render_subjects(const JobSpec& job, const Timeline& time,
   return {};
 }
 
-/// Adds a run to a subject's observations.
+/// Adds a rendering to a subject's observations.
 void merge(Run run, Observations& out) {
   out.unlawful += run.unlawful;
   out.negative += run.negative;
@@ -151,7 +151,7 @@ void merge(Run run, Observations& out) {
 Result<std::vector<Observations>> observe(const JobSpec& job, const Timeline& time,
                                           const std::vector<Subject>& subjects, int runs,
                                           int threads) {
-  // Render the runs side by side.
+  // Render side by side, seed by seed.
   std::vector<std::vector<Run>> all(static_cast<std::size_t>(runs),
                                     std::vector<Run>(subjects.size()));
   std::vector<Status> status(all.size());

@@ -37,10 +37,10 @@ double interval(const std::vector<double>& values) {
 /// All errors of one judged frame, relative to the exact answer.
 struct FrameErrors {
   bool lit = false;
-  std::vector<double> ratio;         ///< Lns^/Lns of lit pixels, all runs
-  std::vector<double> error;         ///< (I - R) / mean R of all pixels, all runs
-  std::vector<double> ratio_of_run;  ///< (runs) mean
-  std::vector<double> error_of_run;  ///< (runs) mean
+  std::vector<double> ratio;         ///< Lns^/Lns of lit pixels, all renderings
+  std::vector<double> error;         ///< (I - R) / mean R, pixels and renderings
+  std::vector<double> ratio_of_run;  ///< (renderings) mean
+  std::vector<double> error_of_run;  ///< (renderings) mean
   double mean_square() const {
     double sum = 0;
     for (const double e : error) sum += e * e;

@@ -12,8 +12,8 @@ namespace baton::stability {
 /// One judged frame of one subject, for the plots.
 struct FramePoint {
   int frame = 0;
-  double lns_mean = 1, lns_median = 1;  ///< Lns^/Lns over lit pixels and runs
-  double lns_low = 1, lns_high = 1;     ///< its 5th and 95th percentile
+  double lns_mean = 1, lns_median = 1;  ///< Lns^/Lns over lit pixels and renderings
+  double lns_low = 1, lns_high = 1;     ///< 5th and 95th percentile of that ratio
   double bias = 0;                      ///< mean radiance / exact - 1
   double noise = 0;                     ///< root mean square error / mean radiance
   double ess = 0;                       ///< mean ESS / N
@@ -21,7 +21,8 @@ struct FramePoint {
 
 struct Summary {
   Numbers numbers;
-  std::vector<FramePoint> series;  ///< frames whose exact answer is black are left out
+  /// Frames whose exact answer is black are left out.
+  std::vector<FramePoint> series;
 };
 
 /// Compares observations with the exact answer. truth.frames are the judged frames of `time`.

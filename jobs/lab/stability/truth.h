@@ -15,12 +15,12 @@ struct FrameTruth {
 
 struct Truth {
   std::vector<FrameTruth> frames;  ///< in the order of job.frames
-  double quadrature_error =
-      0;  ///< rms difference to half as many nodes / mean radiance, first lit frame
+  /// RMS difference to half as many nodes / mean radiance, first lit frame.
+  double quadrature_error = 0;
 };
 
 /// Sums f cos L V over all texels of the map: a midpoint rule of nodes x nodes points in each
-/// texel, scalar materials and look-ups, one shadow ray a point. Shares nothing with the samplers
+/// texel, scalar materials and lookups, one shadow ray a point. Shares nothing with the samplers
 /// but the ray tracer. nodes: even, so that the creases of bilinear maps lie between points. job:
 /// one site.
 Result<Truth> exact_truth(const JobSpec& job, int nodes, int threads);

@@ -1,4 +1,4 @@
-// What the programs study_* share: runs of a job in one tile and thread,
+// What the programs study_* share: renderings of a job in one tile and thread,
 // variants of its sampling, and the reference.
 #pragma once
 
@@ -25,7 +25,7 @@ namespace baton {
 
 using SharedAssetsPtr = std::shared_ptr<const SharedAssets>;
 
-/// A frame of one run.
+/// A frame of one rendering.
 struct FrameResult {
   FilmTile film;
   RenderStats stats;
@@ -42,8 +42,8 @@ inline std::span<const float> plane(const FilmTile& film, std::string_view name)
   return {film.find(name), film.num_pixels()};
 }
 
-/// of(seeds), and its 95 % interval by resampling the seeds, for everything that it looks at alike.
-/// of: takes 0-based seeds, as often as they were drawn.
+/// The value of(seeds), and its 95 % interval by resampling the seeds, for all that `of` reads
+/// alike. of: takes 0-based seeds, as often as they were drawn.
 template <class Of>
 Interval over_seeds(std::size_t num_seeds, const Of& of) {
   constexpr std::uint32_t kResamples = 1000;
@@ -103,7 +103,7 @@ inline std::vector<FrameResult> render(JobSpec job, const SharedAssetsPtr& asset
   }
   return frames;
 }
-/// The same with assets of its own.
+/// Renders with assets of its own.
 inline std::vector<FrameResult> render(const JobSpec& job) {
   return render(job, value_of(load_shared_assets(job)));
 }

@@ -1,10 +1,10 @@
 // The experiments of [Ghosh & Heidrich 2006] on one scene: error against time and rays, over the
 // image and in the penumbra. The light stands still and each frame has its own random numbers, so
-// frames are independent runs of one picture. Intervals are 95 % over runs.
+// frames are independent renderings of one image. Intervals are 95 % over renderings.
 //
 // Usage: study_correlated JOB.json [RUNS] [REFERENCE_SAMPLES] [FOLDER]
 // FOLDER gets the table as CSV, charts of the error in the penumbra against rays and time, and the
-// pictures of the first run.
+// images of the first rendering.
 #include <fmt/format.h>
 
 #include <algorithm>
@@ -32,7 +32,7 @@ struct Case {
   int num_particles = 16;
   int num_candidates = 725;
   VisibilitySpec visibility = {};
-  std::string curve = {};  ///< of the charts; none: only in the table
+  std::string curve = {};  ///< name in the charts; none: table only
 };
 
 VisibilitySpec second_pass(SecondPassForm form, MaskPolicy mask, int partitions = 16,
@@ -83,7 +83,7 @@ std::vector<Case> make_cases() {
   return cases;
 }
 
-/// One picture and its cost.
+/// One image and its cost.
 struct Picture {
   FilmTile film;
   RenderStats stats;
@@ -163,15 +163,15 @@ Errors compare(const FilmTile& film, const Truth& truth) {
   return {e.image / num_surface, e.mask / num_mask, difference / light};
 }
 
-/// What the runs of a case say. Errors are relative to bidirectional N = 20, M = 800 where they are
-/// ratios.
+/// What the renderings of a case say. Errors are relative to bidirectional N = 20, M = 800 where
+/// they are ratios.
 struct Row {
   Case of;
   std::shared_ptr<const RenderContext> context;
-  std::vector<double> image, mask, bias, seconds;  ///< (runs)
-  double second_share = 0;                         ///< of the second pass in the time
-  double rays =
-      0;  ///< shadow rays per penumbra pixel: all of the second pass, its own of the first
+  std::vector<double> image, mask, bias, seconds;  ///< (renderings)
+  double second_share = 0;                         ///< second pass over all time
+  /// Shadow rays per penumbra pixel: all of the second pass, its own of the first.
+  double rays = 0;
 };
 Result<Row> prepare(const JobSpec& base, const Case& c, int runs,
                     const std::shared_ptr<const SharedAssets>& assets) {
@@ -187,7 +187,7 @@ Result<Row> prepare(const JobSpec& base, const Case& c, int runs,
   return row;
 }
 
-/// One more run of a case; the picture of the first goes to the folder.
+/// One more rendering of a case; the image of the first goes to the folder.
 Status add_run(Row& row, const Truth& truth, const std::string& folder) {
   const auto run = static_cast<std::int32_t>(row.image.size());
   const auto runs = static_cast<double>(row.context->job.frames.size());

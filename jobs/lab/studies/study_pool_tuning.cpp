@@ -27,7 +27,7 @@ constexpr Number kNumbers[] = {{"surroundings", &PoolTuning::surroundings},
                                {"most_candidates", &PoolTuning::most_candidates},
                                {"new_frame", &PoolTuning::new_frame}};
 
-/// A set of numbers, and what its runs measured, seed by seed.
+/// A set of numbers, and what its renderings measured, seed by seed.
 struct Variant {
   std::string name;
   PoolTuning tuning;

@@ -37,7 +37,7 @@ double log_lns_error(const FilmTile& a, const FilmTile& b) {
   return std::sqrt(sum / count);
 }
 
-/// Mean RMS error and seconds of each frame in `judged` over kSeeds runs.
+/// Mean RMS error and seconds of each frame in `judged` over kSeeds renderings.
 struct Score {
   double squared_error = 0, log_lns_error = 0, seconds = 0;
 };
@@ -110,7 +110,7 @@ void study_resampled(const JobSpec& job) {
   rows("5 distributions, 1 move", carried(job, 5, 1, LnsUpdate::path_trapezoid));
 }
 
-/// Candidates that take about as long as `seconds` per frame: halved and doubled steps of a power
+/// Candidates that take about as long as `seconds` per frame: halved and doubled counts of a power
 /// law.
 int candidates_for(const JobSpec& job, double seconds) {
   JobSpec one = job;

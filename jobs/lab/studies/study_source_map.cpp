@@ -14,7 +14,7 @@
 namespace baton {
 namespace {
 
-constexpr std::size_t kShown = 3;  ///< frames in the picture, the last among them
+constexpr std::size_t kShown = 3;  ///< frames in the image, with the last one
 constexpr int kGap = 4;
 
 RgbImage image_of(const FilmTile& film, const std::array<const char*, 3>& channels) {
@@ -27,7 +27,7 @@ RgbImage image_of(const FilmTile& film, const std::array<const char*, 3>& channe
   return image;
 }
 
-/// Copies a picture with its corner at (left, top).
+/// Copies an image with its corner at (left, top).
 void paste(const RgbImage& from, int left, int top, RgbImage& to) {
   for (int y = 0; y < from.height; ++y) {
     const auto row = from.rgb.begin() + std::ptrdiff_t{3} * y * from.width;

@@ -20,7 +20,7 @@ namespace {
 
 constexpr std::array kCandidates{16, 32, 64, 128, 256, 512, 1024};
 
-/// A variant with what its runs measured.
+/// A variant with what its renderings measured.
 struct Variant {
   std::string name;
   JobSpec job;

@@ -28,8 +28,8 @@ bool settle_lns(float total, const PixelSamples& samples) {
 }
 
 /// Most candidates from lobes. One costs as much as ten of the light's, since it reads texels that
-/// no cache holds, and so many well spread points suffice: of M = 800, 200 lower the error of a
-/// lacquered bunny by 2 % for 20 % more time, that of gold not at all (8 runs).
+/// fit into no cache, and so many well spread points suffice: of M = 800, 200 lower the error of a
+/// lacquered bunny by 2 % for 20 % more time, that of gold not at all (8 renderings).
 constexpr std::int32_t kMaxLobeCandidates = 64;
 
 }  // namespace

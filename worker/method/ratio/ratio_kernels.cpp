@@ -19,7 +19,7 @@ namespace hn = hwy::HWY_NAMESPACE;
 struct ColorLine {
   RunningSums::End end;
   static constexpr bool kHasColors = true;
-  Vec3Lanes colors{hn::Zero(DF()), hn::Zero(DF()), hn::Zero(DF())};  ///< of w (f cos L) / p~
+  Vec3Lanes colors{hn::Zero(DF()), hn::Zero(DF()), hn::Zero(DF())};  ///< sum of w (f cos L) / p~
 
   template <class AddColor>
   HWY_INLINE void Add(VU /*code*/, VF weight, const AddColor& add_color) {

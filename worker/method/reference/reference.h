@@ -11,11 +11,12 @@ namespace baton {
 
 /// Brute-force estimate of one pixel with its own error.
 struct ReferenceEstimate {
-  Rgb radiance;    ///< mean over the sites of the reflected, shadowed radiance
-  Rgb unshadowed;  ///< the same without shadows
-  float lns = 0;   ///< its mean over RGB
-  float visibility =
-      0;         ///< share of the unshadowed light that arrives, mean over RGB; 0 without light
+  /// Mean over the sites of the reflected, shadowed radiance.
+  Rgb radiance;
+  Rgb unshadowed;  ///< radiance without shadows
+  float lns = 0;   ///< mean of `unshadowed` over RGB
+  /// Share of the unshadowed light that arrives, mean over RGB; 0 without light.
+  float visibility = 0;
   Rgb variance;  ///< squared standard errors of `radiance`
 };
 

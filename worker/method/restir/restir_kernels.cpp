@@ -32,7 +32,8 @@ HWY_INLINE Vec3Lanes TurnBack(const Mat3* turn, const Vec3Lanes& w) {
 struct PlacedPoints {
   VI site;
   Vec3Lanes w;
-  Vec3Lanes w_before;  ///< where carried samples at w came from: w, or turned back with the map
+  /// Where carried samples at w came from: w, or turned back with the map.
+  Vec3Lanes w_before;
   TexelLanes now, before;
 };
 HWY_INLINE PlacedPoints PlacePoints(const kernels::RestirPoints& points, std::size_t i,

@@ -24,8 +24,9 @@ struct RestirPoints {
 /// What is asked of the points [first, last).
 struct PointRange {
   std::size_t first = 0, last = 0;
-  bool wants_now = false;     ///< colours and target of now
-  std::size_t first_old = 0;  ///< targets of the carried sets first_old, ...
+  bool wants_now = false;  ///< colours and target of now
+  /// Targets of the carried sets first_old, ... are needed as well.
+  std::size_t first_old = 0;
 };
 
 /// Turns the directions of points [first, last) and rounds them to the lattice. Codes past the last

@@ -61,7 +61,7 @@ struct CarriedTarget {
     SetTargets(point.site, w, now, InverseOrZero(now.density), want_before, then, out);
   }
 
-  /// The same for the carried particles i, i + 1, ...
+  /// As Evaluate, for the carried particles i, i + 1, ...
   HWY_INLINE void EvaluateCarried(std::size_t i, const PointLanes& point, bool want_before,
                                   TargetLanes& out) const {
     if (located == nullptr) return Evaluate(point, want_before, out);

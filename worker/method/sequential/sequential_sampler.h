@@ -11,9 +11,9 @@ namespace baton {
 /// The sequential Monte Carlo sampler [Ghosh, Doucet & Heidrich 2006] for pixels whose surfaces
 /// stay. Starts with any other sampler; carries the particles from then on; starts again when all
 /// weights die, and once in `refresh_every` frames (0: never). The errors of a carried Lns multiply
-/// from frame to frame; a refresh on a schedule that looks at no sample ends them without bias. The
-/// paper's rule [section 7], a refresh when Lns has changed by more than `refresh_ratio`, does look
-/// at the samples: it cuts estimates that wandered off, which is a small bias. Pixels without a
+/// from frame to frame; a refresh on a schedule that depends on no sample ends them without bias.
+/// The paper's rule [section 7], a refresh when Lns has changed by more than `refresh_ratio`, does
+/// depend on samples: it cuts estimates that wandered off, which is a small bias. Pixels without a
 /// glossy surface make independent moves only: the map's proposals fit them up to the cosine, and a
 /// local move costs three times as much.
 class SequentialSampler final : public PixelSampler {
