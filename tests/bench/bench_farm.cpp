@@ -87,12 +87,14 @@ Status render_in_process(const JobSpec& given, bool write) {
   BATON_ASSIGN(const JobSpec job, settle_motion(given));
   BATON_ASSIGN(const auto context, load_render_context(job, Digest{1, 1}));
   LocalRender render(*context);
+  const Timeline timeline(job);
   std::future<Status> written;
   for (FrameIndex frame; frame.index() < job.frames.size(); ++frame) {
-    BATON_TRY(render_tiles(render, context->grid.count(), Step(frame.value())));
+    const Step step = timeline.step_of(frame, Sweep(0));
+    BATON_TRY(render_tiles(render, context->grid.count(), step));
     if (written.valid()) BATON_TRY(written.get());
     RenderStats stats;
-    BATON_ASSIGN(FilmTile image, test::local_image(render, job, frame, stats));
+    BATON_ASSIGN(FilmTile image, test::local_image(render, job, step, stats));
     if (!write) continue;
     written = std::async(std::launch::async, [&job, frame, image = std::move(image)]() -> Status {
       BATON_ASSIGN(const WrittenFrame file, write_frame(job, Digest{1, 1}, frame, image));

@@ -71,12 +71,12 @@ TEST(SecondPass, LeavesFreePixelsAlone) {
     const auto context = load_render_context(plain, Digest{1, 2});
     test::TileResult result;
     const TileRunSink sink{.film =
-                               [&](int, const FilmTile& film) {
+                               [&](Step, const FilmTile& film) {
                                  result.films.push_back(film);
                                  return Status();
                                },
                            .samples = [](const FirstPassSamples&) { return Status(); }};
-    EXPECT_TRUE(run_tile(**context, {0, 0, 0, 0}, {}, sink, {}).ok());
+    EXPECT_TRUE(run_tile(**context, {}, {}, sink, {}).ok());
     return result;
   }();
   const FilmTile second = render_correlated(job).film;
@@ -132,13 +132,13 @@ TEST(SecondPass, StoresASmallRecordPerSample) {
   const auto context = load_render_context(job, Digest{1, 2});
   ASSERT_TRUE(context.ok());
   FirstPassSamples samples;
-  const TileRunSink sink{.film = [](int, const FilmTile&) { return Status(); },
+  const TileRunSink sink{.film = [](Step, const FilmTile&) { return Status(); },
                          .samples =
                              [&](const FirstPassSamples& s) {
                                samples = s;
                                return Status();
                              }};
-  ASSERT_TRUE(run_tile(**context, {0, 0, 0, 0}, {}, sink, {}).ok());
+  ASSERT_TRUE(run_tile(**context, {}, {}, sink, {}).ok());
   std::size_t num_free = 0;
   for (std::size_t pixel = 0; pixel < samples.num_pixels(); ++pixel) {
     if ((samples.flags[pixel] & ~FirstPassSamples::kSurface) != 0) {
@@ -171,9 +171,9 @@ TEST(SecondPass, RefusesSamplesOfAnotherTileOrJob) {
   samples->picture = {9, 9};
   samples->rect = film.rect;
   std::vector<FirstPassPtr> near{samples};
-  EXPECT_THAT(run_second_pass(**context, 0, 0, film, near).error().message,
+  EXPECT_THAT(run_second_pass(**context, Step(0), 0, film, near).error().message,
               HasSubstr("first-pass samples: of picture"));
-  EXPECT_THAT(run_second_pass(**context, 0, 0, film, {}).error().message,
+  EXPECT_THAT(run_second_pass(**context, Step(0), 0, film, {}).error().message,
               HasSubstr("samples of 0 tiles, expected 1"));
 }
 
@@ -183,14 +183,14 @@ TEST(Populations, ShareNothing) {
   const test::TileResult result = [&] {
     test::TileResult r;
     const auto context = load_render_context(job, Digest{1, 2});
-    const TileRunSink sink{.film = [](int, const FilmTile&) { return Status(); },
+    const TileRunSink sink{.film = [](Step, const FilmTile&) { return Status(); },
                            .state =
                                [&](const SampleState& state) {
                                  r.state = *decode_state(encode_state(state), "test");
                                  return Status();
                                },
                            .samples = [](const FirstPassSamples&) { return Status(); }};
-    EXPECT_TRUE(run_tile(**context, {0, 0, 0, 0}, {}, sink, {}).ok());
+    EXPECT_TRUE(run_tile(**context, {}, {}, sink, {}).ok());
     return r;
   }();
   ASSERT_EQ(result.state.num_populations, 2);

@@ -117,11 +117,11 @@ TEST(LightSequence, TheCameraMaySeeAnotherMap) {
   job.environment.rotation_start_deg = 90;
   const auto share = std::make_shared<MemoryShare>(std::uint64_t{1} << 30);
   const auto maps = std::make_shared<MapCache>(share);
-  const auto plain = *LightSequence(job, maps, share).at(0);
+  const auto plain = *LightSequence(job, maps, share).at(Step(0));
   EXPECT_EQ(plain->seen.map, plain->now.map);
   job.environment.camera_map = {
       .file = test::write_map("plate.exr", test::constant_map(8, 4, {1, 2, 3})), .scale = 3};
-  const auto other = *LightSequence(job, maps, share).at(0);
+  const auto other = *LightSequence(job, maps, share).at(Step(0));
   EXPECT_EQ(other->now.map, plain->now.map);
   EXPECT_EQ(other->seen.rotation, plain->now.rotation);
   EXPECT_EQ(other->seen.evaluate({0, 1, 0}).b, 9);

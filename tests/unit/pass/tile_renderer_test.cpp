@@ -262,7 +262,7 @@ TEST(RunTile, CountsEverySurfacePixelOnceInEachFrame) {
   for (const FrameStats& row : rows) {
     std::uint64_t in_bins = 0;
     for (const std::uint64_t count : row.sampling.ess_histogram) in_bins += count;
-    EXPECT_EQ(in_bins, row.sampling.pixels()) << row.step();
+    EXPECT_EQ(in_bins, row.sampling.pixels()) << row.position;
     EXPECT_EQ(row.sampling.pixels(), (stats->pixels - stats->pixels_background) / 3);
     sum.merge(row.sampling);
   }

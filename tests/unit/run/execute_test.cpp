@@ -133,7 +133,7 @@ TEST_F(ExecuteTest, TasksThroughTheStoreMakeTheImagesOfOneProcess) {
       ASSERT_NE(found, nullptr) << name;
       EXPECT_TRUE(std::equal(in_process.plane(channel),
                              in_process.plane(channel) + image.num_pixels(), found))
-          << name << " of frame " << frame;
+          << name << " of frame " << frame.value();
     }
   }
 }
@@ -287,7 +287,7 @@ TEST_F(ExecuteTest, AReplayMakesTheFarmsTile) {
 
   // Tile 2 covers x in [32, 40), y in [0, 16).
   const FilmTile tile = read_exr(options.out).value();
-  const FilmTile expected = render_in_process().at(3);
+  const FilmTile expected = render_in_process().at(Step(3));
   ASSERT_EQ(tile.rect, (PixelRect{0, 0, 8, 16}));
   for (int y = 0; y < 16; ++y) {
     for (int x = 0; x < 8; ++x)

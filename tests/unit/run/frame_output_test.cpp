@@ -75,15 +75,15 @@ TEST(FrameOutput, AFrameIsWrittenVerifiedAndNamedByItsDigest) {
   job.seed = 77;
   job.output.frames_per_second = 23.976;
   const Digest digest{3, 4};
-  const Result<WrittenFrame> written = write_frame(job, digest, 1, assembled(job));
+  const Result<WrittenFrame> written = write_frame(job, digest, FrameIndex(1), assembled(job));
   ASSERT_TRUE(written) << written.error().message;
   const BlobRef* const ref = &written->file;
   EXPECT_EQ(ref->kind, BlobKind::image);
-  EXPECT_EQ(ref->frame, 1);
+  EXPECT_EQ(ref->frame(), FrameIndex(1));
   EXPECT_EQ(written->quality.pixels, 200u);
   EXPECT_EQ(written->quality.noise_source, NoiseSource::none);
 
-  const std::filesystem::path path = frame_path(job, 1);
+  const std::filesystem::path path = frame_path(job, FrameIndex(1));
   EXPECT_EQ(path.filename(), "frame.0009.exr");
   const Bytes bytes = read_file(path, limits::kMaxBlobBytes).value();
   EXPECT_EQ(ref->digest, digest_of(bytes));
@@ -115,12 +115,12 @@ TEST(FrameOutput, AWrongValueIsFoundInTheFrameThatLooksAtItsBlock) {
   JobSpec job = small_job("verified");
   job.image.height = 40;
   const FilmTile image = make_tile({0, 0, 20, 40});
-  ASSERT_TRUE(write_frame(job, {3, 4}, 0, image));
+  ASSERT_TRUE(write_frame(job, {3, 4}, FrameIndex(0), image));
   for (const std::size_t row : {0, 15, 16, 31, 32, 39}) {
     FilmTile other = image;
     other.plane(2)[row * 20 + 7] += 1;
     for (std::int32_t frame = 0; frame < 7; ++frame) {
-      const Status status = verify_frame(frame_path(job, 0), other, frame);
+      const Status status = verify_frame(frame_path(job, FrameIndex(0)), other, frame);
       const bool looks_there = static_cast<std::size_t>(frame % 3) == row / 16;
       EXPECT_EQ(status.ok(), !looks_there) << row << " in frame " << frame;
       if (status) continue;
@@ -134,19 +134,19 @@ TEST(FrameOutput, AWrongValueIsFoundInTheFrameThatLooksAtItsBlock) {
 TEST(FrameOutput, AFrameOfOtherSizeOrChannelsIsNotTheFrame) {
   const JobSpec job = small_job("shape");
   const FilmTile image = assembled(job);
-  ASSERT_TRUE(write_frame(job, {3, 4}, 0, image));
-  EXPECT_TRUE(verify_frame(frame_path(job, 0), image, 0));
-  EXPECT_FALSE(verify_frame(frame_path(job, 0), make_tile({0, 0, 19, 10}), 0));
-  EXPECT_FALSE(verify_frame(frame_path(job, 0), make_tile({0, 0, 20, 11}), 0));
+  ASSERT_TRUE(write_frame(job, {3, 4}, FrameIndex(0), image));
+  EXPECT_TRUE(verify_frame(frame_path(job, FrameIndex(0)), image, 0));
+  EXPECT_FALSE(verify_frame(frame_path(job, FrameIndex(0)), make_tile({0, 0, 19, 10}), 0));
+  EXPECT_FALSE(verify_frame(frame_path(job, FrameIndex(0)), make_tile({0, 0, 20, 11}), 0));
   FilmTile renamed = image;
   renamed.channels[1] = "Z";
-  EXPECT_FALSE(verify_frame(frame_path(job, 0), renamed, 0));
+  EXPECT_FALSE(verify_frame(frame_path(job, FrameIndex(0)), renamed, 0));
 }
 
 TEST(FrameOutput, EqualFramesAreEqualFiles) {
   const JobSpec job = small_job("equal");
-  const WrittenFrame first = write_frame(job, {3, 4}, 0, assembled(job)).value();
-  const WrittenFrame again = write_frame(job, {3, 4}, 0, assembled(job)).value();
+  const WrittenFrame first = write_frame(job, {3, 4}, FrameIndex(0), assembled(job)).value();
+  const WrittenFrame again = write_frame(job, {3, 4}, FrameIndex(0), assembled(job)).value();
   EXPECT_EQ(again.file, first.file);
   EXPECT_EQ(again.quality, first.quality);
 }
@@ -159,11 +159,11 @@ TEST(FrameOutput, ValuesBelowZeroAreSetToZeroAndCounted) {
   image.plane(1)[77] = -0.25f;
   for (const bool clamp : {true, false}) {
     job.output.clamp_negative = clamp;
-    const FrameQuality seen = write_frame(job, {3, 4}, 0, image).value().quality;
+    const FrameQuality seen = write_frame(job, {3, 4}, FrameIndex(0), image).value().quality;
     EXPECT_EQ(seen.pixels_below_zero, 2u);
     EXPECT_EQ(seen.lowest, -4.5f);
     EXPECT_EQ(seen.clamped, clamp);
-    const FilmTile stored = read_exr(frame_path(job, 0)).value();
+    const FilmTile stored = read_exr(frame_path(job, FrameIndex(0))).value();
     EXPECT_EQ(stored.find("R")[5], clamp ? 0.0f : -4.5f);
     EXPECT_EQ(stored.find("G")[77], clamp ? 0.0f : -0.25f);
     EXPECT_NEAR(stored.find("G")[5], image.plane(1)[5], 0.01f) << "what is not below zero stays";
@@ -184,7 +184,7 @@ TEST(FrameOutput, APlateKeepsItsValuesBelowZeroAndIsNotCounted) {
   for (std::size_t i = 0; i < 200; ++i) plate.rgb[3 * i] = -0.125f;
   for (const bool clamp : {true, false}) {
     job.output.clamp_negative = clamp;
-    const FrameQuality seen = write_frame(job, {3, 4}, 0, image, plate).value().quality;
+    const FrameQuality seen = write_frame(job, {3, 4}, FrameIndex(0), image, plate).value().quality;
     EXPECT_EQ(seen.pixels_below_zero, 1u);
     EXPECT_EQ(seen.lowest, -0.25f);
     EXPECT_EQ(seen.pixels_not_finite, 0u);
@@ -192,7 +192,7 @@ TEST(FrameOutput, APlateKeepsItsValuesBelowZeroAndIsNotCounted) {
     const float light = 198 * (2 - 0.125f) + 5 * 0.5f + (clamp ? 0.0f : -0.25f);
     EXPECT_NEAR(seen.mean, light / 600, 1e-6f);
     EXPECT_NEAR(seen.light_below_zero, 0.25f / light, 1e-7f);
-    const FilmTile stored = read_exr(frame_path(job, 0)).value();
+    const FilmTile stored = read_exr(frame_path(job, FrameIndex(0))).value();
     EXPECT_EQ(stored.find("R")[5], clamp ? 0.0f : -0.25f);
     EXPECT_EQ(stored.find("R")[6], 0.5f);
     EXPECT_EQ(stored.find("R")[7], -0.125f);
@@ -203,11 +203,12 @@ TEST(FrameOutput, APlateKeepsItsValuesBelowZeroAndIsNotCounted) {
 TEST(FrameOutput, ColoursPastAHalfFloatAreWrittenAsFloat) {
   const JobSpec job = small_job("bright");
   FilmTile image = assembled(job);
-  ASSERT_EQ(write_frame(job, {3, 4}, 0, image).value().quality.pixels_beyond_half, 0u);
-  EXPECT_NE(read_exr(frame_path(job, 0)).value().find("G")[9], image.plane(1)[9]) << "half";
+  ASSERT_EQ(write_frame(job, {3, 4}, FrameIndex(0), image).value().quality.pixels_beyond_half, 0u);
+  EXPECT_NE(read_exr(frame_path(job, FrameIndex(0))).value().find("G")[9], image.plane(1)[9])
+      << "half";
   image.plane(0)[5] = 1e6f;
-  ASSERT_EQ(write_frame(job, {3, 4}, 0, image).value().quality.pixels_beyond_half, 1u);
-  const FilmTile stored = read_exr(frame_path(job, 0)).value();
+  ASSERT_EQ(write_frame(job, {3, 4}, FrameIndex(0), image).value().quality.pixels_beyond_half, 1u);
+  const FilmTile stored = read_exr(frame_path(job, FrameIndex(0))).value();
   EXPECT_EQ(stored.find("R")[5], 1e6f);
   EXPECT_EQ(stored.find("G")[9], image.plane(1)[9]) << "the other colours, too";
 }
@@ -217,10 +218,10 @@ TEST(FrameOutput, ErrorsTellTheNoiseAndStayOutOfTheFrame) {
   FilmTile image = assembled(job);
   image.channels.insert(image.channels.begin() + 1, kErrorChannel);
   image.values.insert(image.values.begin() + 200, 200, 0.04f);
-  const FrameQuality seen = write_frame(job, {3, 4}, 0, image).value().quality;
+  const FrameQuality seen = write_frame(job, {3, 4}, FrameIndex(0), image).value().quality;
   EXPECT_EQ(seen.noise_source, NoiseSource::probes);
   EXPECT_NEAR(seen.noise, 0.2f / seen.mean, 1e-4f);
-  const FilmTile stored = read_exr(frame_path(job, 0)).value();
+  const FilmTile stored = read_exr(frame_path(job, FrameIndex(0))).value();
   EXPECT_EQ(stored.find(kErrorChannel), nullptr);
   EXPECT_NEAR(stored.find("G")[9], image.find("G")[9], 0.01f);
 }
@@ -228,7 +229,7 @@ TEST(FrameOutput, ErrorsTellTheNoiseAndStayOutOfTheFrame) {
 TEST(FrameOutput, AFolderThatCannotBeMadeIsAnErrorWithItsName) {
   JobSpec job = small_job("blocked");
   job.output.directory = "/dev/null/frames";
-  const Result<WrittenFrame> ref = write_frame(job, {3, 4}, 0, assembled(job));
+  const Result<WrittenFrame> ref = write_frame(job, {3, 4}, FrameIndex(0), assembled(job));
   ASSERT_FALSE(ref);
   EXPECT_THAT(ref.error().message, testing::HasSubstr("/dev/null/frames"));
 }

@@ -13,8 +13,8 @@ std::vector<FilmTile> images(const JobSpec& job) {
   std::vector<FilmTile> films(job.frames.size());
   const auto context = load_render_context(job, Digest{1, 2});
   EXPECT_TRUE(context.ok());
-  const test::FrameSink sink = [&](std::int32_t frame, const FilmTile& film) {
-    films[static_cast<std::size_t>(frame)] = film;
+  const test::FrameSink sink = [&](Step step, const FilmTile& film) {
+    films[step.index()] = film;
     return Status();
   };
   EXPECT_TRUE(test::render_locally(**context, sink).ok());
