@@ -89,10 +89,10 @@ Status write_films(const fs::path& folder) {
   constexpr SectionTag kMagic{'B', 'T', 'F', '1'};
   const FilmTile colour{{4, 8, 6, 9}, {"R", "normal.X"}, {0.5f, -0.0f, 1e30f, 1e-40f}};
   const FilmTile flat{{0, 0, 8, 4}, {"R", "G", "B"}, std::vector<float>(96, 0.25f)};
-  BATON_TRY(write_both(folder, "colour", encode_film_tile(colour, {{1, 2}, 3, FilmPass::first}),
-                       kMagic, 2));
-  return write_both(folder, "flat", encode_film_tile(flat, {{1, 2}, 3, FilmPass::second}), kMagic,
-                    2);
+  BATON_TRY(write_both(folder, "colour",
+                       encode_film_tile(colour, {{1, 2}, Step(3), FilmPass::first}), kMagic, 2));
+  return write_both(folder, "flat", encode_film_tile(flat, {{1, 2}, Step(3), FilmPass::second}),
+                    kMagic, 2);
 }
 
 Status write_first_passes(const fs::path& folder) {
@@ -123,6 +123,8 @@ struct Filling {
       member = {++next, ++next};
     } else if constexpr (std::is_enum_v<T>) {
       member = last_of(member);
+    } else if constexpr (requires { T(std::int32_t{}).value(); }) {  // an Ordinal
+      member = T(static_cast<std::int32_t>(++next));
     } else {
       member = static_cast<T>(++next);
     }

@@ -167,10 +167,9 @@ PixelVerdict judge_pixels(const JobSpec& job) {
   EXPECT_TRUE(truth.ok() && context.ok());
   const std::vector<double>& expected = truth->frames[0].radiance;
   std::vector<std::vector<double>> seen(job.frames.size(), std::vector<double>(expected.size()));
-  const test::FrameSink sink = [&](std::int32_t frame, const FilmTile& film) {
+  const test::FrameSink sink = [&](Step step, const FilmTile& film) {
     for (std::size_t p = 0; p < expected.size(); ++p) {
-      seen[static_cast<std::size_t>(frame)][p] =
-          mean({film.plane(0)[p], film.plane(1)[p], film.plane(2)[p]});
+      seen[step.index()][p] = mean({film.plane(0)[p], film.plane(1)[p], film.plane(2)[p]});
     }
     return Status();
   };

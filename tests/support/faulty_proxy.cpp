@@ -81,7 +81,7 @@ struct Passing {
 
 std::string describe(const LeaseId& lease) {
   return fmt::format("{} {} {} {} {} {}", lease.job.hex(), static_cast<int>(lease.task.kind),
-                     lease.task.step, lease.task.tile, lease.attempt, lease.epoch);
+                     lease.task.position, lease.task.tile, lease.attempt, lease.epoch);
 }
 
 /// What the record says of a message after the worker: a text for each lease that it is about.

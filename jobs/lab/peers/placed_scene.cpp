@@ -154,8 +154,8 @@ class MapWriter {
 };
 
 /// Axes of the camera in the world (x to the right, y up, looking along -z) and its angle of view.
-json camera(const JobSpec& job, const Camera& camera, int frame) {
-  const CameraSpec spec = camera_at(job, frame);
+json camera(const JobSpec& job, const Camera& camera, FrameNumber frame) {
+  const CameraSpec spec = camera_at(job, frame.value());
   const Matrix4 m = camera.world_to_camera();
   const auto axis = [&m](std::size_t c) { return json{m[c], m[4 + c], m[8 + c]}; };
   return {{"position", numbers(spec.position)},
@@ -172,11 +172,11 @@ json matrix(const Transform& t) {
 }
 
 Result<json> frame(const JobSpec& job, const Scene& scene, const FrameSpec& spec, MapWriter& maps) {
-  const Pose pose = pose_at(scene, job, spec.number);
+  const Pose pose = pose_at(scene, job, spec.number.value());
   json placed = json::array();
   for (const Instance& instance : pose.instances) placed.push_back(matrix(instance.to_world));
   BATON_ASSIGN(const std::size_t map, maps.index_of(spec.environment));
-  return json{{"number", spec.number},
+  return json{{"number", spec.number.value()},
               {"camera", camera(job, pose.camera, spec.number)},
               {"instances", std::move(placed)},
               {"map", map},
@@ -207,9 +207,10 @@ Status place(const std::string& job_file, const fs::path& folder,
   for (const Instance& instance : scene.instances)
     instances.push_back({{"mesh", instance.mesh}, {"material", instance.material}});
   MapWriter maps(job.environment, folder);
+  const Timeline timeline(job);
   for (const FrameSpec& spec : expand_sequence(job)) {
     BATON_ASSIGN(json entry, frame(job, scene, spec, maps));
-    entry["file"] = frame_path(job, spec.index).filename().string();
+    entry["file"] = frame_path(job, timeline.frame_of(spec.step)).filename().string();
     frames.push_back(std::move(entry));
   }
 

@@ -1,5 +1,7 @@
 #include "jobs/lab/stability/observe.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <cmath>
 #include <map>
@@ -7,6 +9,7 @@
 #include <utility>
 
 #include "common/image/noise.h"
+#include "common/job/text/frame_range.h"
 #include "jobs/lab/stability/parallel.h"
 #include "tests/support/local_frames.h"
 #include "worker/method/weighted_method.h"
@@ -121,7 +124,7 @@ Status render_subjects(const JobSpec& job, const Timeline& time,
     subjects[s].configure(own);
     own.frames = judged;
     if (carries_state(own)) {
-      own.frames = test::frame_numbers(time.frames);
+      own.frames = parse_frames(fmt::format("1-{}", time.frames)).value();
     }
     BATON_TRY(lights.render(own, judged, subjects[s], runs[s]));
   }

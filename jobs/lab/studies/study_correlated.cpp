@@ -126,7 +126,7 @@ Result<Truth> judge(JobSpec job, int samples) {
   job.seed = 99991;
   job.output.aovs = {Aov::visibility, Aov::depth, Aov::variance};
   BATON_ASSIGN(const auto context, load_render_context(job, Digest{1, 1}));
-  BATON_ASSIGN(const Picture picture, render(*context, 0));
+  BATON_ASSIGN(const Picture picture, render(*context, Step(0)));
   Truth truth{picture.film, {}, {}, {}};
   for (std::size_t i = 0; i < truth.film.num_pixels(); ++i) {
     const float visibility = truth.film.plane(4)[i];
@@ -189,7 +189,7 @@ Result<Row> prepare(const JobSpec& base, const Case& c, int runs,
 
 /// One more rendering of a case; the image of the first goes to the folder.
 Status add_run(Row& row, const Truth& truth, const std::string& folder) {
-  const auto run = static_cast<std::int32_t>(row.image.size());
+  const Step run(static_cast<std::int32_t>(row.image.size()));
   const auto runs = static_cast<double>(row.context->job.frames.size());
   BATON_ASSIGN(const Picture picture, render(*row.context, run));
   const Errors e = compare(picture.film, truth);
@@ -202,7 +202,7 @@ Status add_run(Row& row, const Truth& truth, const std::string& folder) {
   row.second_share += stats.seconds_second_pass / seconds / runs;
   const double masked = std::max<double>(static_cast<double>(stats.pixels_masked), 1);
   row.rays += (static_cast<double>(stats.rays_second_pass) / masked + row.of.num_particles) / runs;
-  if (run > 0 || folder.empty()) return {};
+  if (run > Step(0) || folder.empty()) return {};
   return write_exr(
       std::filesystem::path(folder) / (row.context->job.name + " " + row.of.name + ".exr"),
       picture.film, {});

@@ -110,7 +110,10 @@ TEST_F(HeldStatesTest, WithTheHolderTheyAreGone) {
 // The worker may have reported it once already, and dropped it since.
 TEST_F(HeldStatesTest, WhatWasGrantedBeforeARestartIsMadeAgain) {
   const LeaseId lease{farm.job, render(0, 0), 1, /*epoch=*/0};
-  const GrantLease before{{.lease = lease, .inputs = {}, .may_hold = true}, "b"};
+  GrantLease before;
+  before.worker = "b";
+  before.lease = lease;
+  before.may_hold = true;
   farm.step(WorkerJoined{"b", {before.lease}});
   EXPECT_TRUE(all_of<RecordCompletion>(finish(before)).empty());
   EXPECT_EQ(farm.ask_one("a").lease.task, render(0, 0));

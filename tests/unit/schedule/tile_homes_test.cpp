@@ -216,7 +216,10 @@ TEST(FramesAhead, AreNeverFewerThanTwoRuns) {
   EXPECT_EQ(farm.ask("a", 10).size(), 1u);
   farm.step(WorkRequested{"a", 0});
   std::vector<TaskKey> done;
-  farm.finish({{.lease = {farm.job, render(0, 1), 1, 1}, .inputs = {}}, "a"});
+  GrantLease first;
+  first.worker = "a";
+  first.lease = {farm.job, render(0, 1), 1, 1};
+  farm.finish(first);
   for (const GrantLease& grant : farm.ask("a", 10)) done.push_back(grant.lease.task);
   EXPECT_THAT(done, testing::ElementsAre(render(1, 1)));
 }
