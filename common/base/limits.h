@@ -11,7 +11,7 @@ inline constexpr std::uint64_t kMaxAssetFileBytes = 8ull << 30;
 inline constexpr std::uint64_t kMaxBlobBytes = 4ull << 30;
 inline constexpr std::uint64_t kMaxMessageBytes = 64ull << 20;
 inline constexpr std::uint64_t kMaxWorkerMessageBytes = 8ull << 20;  // what a worker says
-/// From one connection without the end of a message.
+/// Bytes from one connection without the end of a message.
 inline constexpr std::uint64_t kMaxUnendedBytes = 2 * kMaxMessageBytes;
 inline constexpr int kMaxMessageFrames = 4;      // with the peer's identity
 inline constexpr int kMaxQueuedMessages = 4096;  // per connection, either way
@@ -50,7 +50,7 @@ inline constexpr int kAdaptiveBlock = 8;
 inline constexpr int kJudgingRounds = 2;
 inline constexpr int kMaxSites = 16;       ///< sites of every pixel
 inline constexpr int kMaxFineSites = 256;  ///< sites of pixels whose geometry is fine
-/// Primary rays that tell how fine a pixel's is.
+/// Primary rays that tell how fine a pixel's geometry is.
 inline constexpr int kGeometryProbes = 4;
 inline constexpr int kMaxRounds = 65536;
 inline constexpr int kMaxPreroll = 64;  ///< rounds

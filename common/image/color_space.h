@@ -26,7 +26,7 @@ Result<std::optional<Mat3>> to_rec709(const Chromaticities& from);
 /// What the header of an image says of its numbers.
 struct PictureColors {
   Chromaticities chromaticities;
-  /// By which radiance was multiplied before it was stored, > 0.
+  /// Factor by which radiance was multiplied before it was stored, > 0.
   Rgb factor{1, 1, 1};
 
   bool operator==(const PictureColors&) const = default;

@@ -26,7 +26,7 @@ namespace baton {
 /// From where in a pixel, and around it, its light comes. Widths are those of Cycles at 1.5.
 enum class PixelFilter : std::uint8_t {
   box,              ///< the pixel
-  gaussian,         ///< deviation .375, to 2.25 from the centre
+  gaussian,         ///< sigma .375 px, to 2.25 from the centre
   blackman_harris,  ///< to 1.5 pixels from the centre
 };
 
@@ -41,14 +41,14 @@ struct Overscan {
 };
 
 struct ImageSpec {
-  /// Pixels of the whole picture, [1, limits::kMaxImageSide].
+  /// Pixels of the whole image, [1, limits::kMaxImageSide].
   int width = 640;
   int height = 360;  ///< pixels
   int sites = 1;     ///< primary rays per pixel: 1, 4, 9 or 16
-  /// The same where geometry is fine, at most: `sites` times a power of 4. 0: `sites`.
+  /// Sites where geometry is fine, at most: `sites` times a power of 4. 0: `sites`.
   int max_sites = 0;
   PixelFilter filter = PixelFilter::box;
-  /// Side of a farm tile in pixels; never changes the picture.
+  /// Side of a farm tile in pixels; no pixel depends on it.
   int tile_size = 64;
   /// The part that is shown, inside the whole; none: all.
   std::optional<PixelRect> region{};
@@ -113,8 +113,8 @@ struct CameraSpec {
   Vec3 up{0, 1, 0};
   float vertical_fov_deg = 40;  ///< perspective: (0, 180)
   Projection projection = Projection::perspective;
-  float orthographic_height = 2;  ///< height of the picture, > 0
-  /// How far the picture is moved to the right and up, in its heights.
+  float orthographic_height = 2;  ///< height of the image, > 0
+  /// How far the image is moved to the right and up, in its heights.
   std::array<float, 2> shift{};
   float aperture = 0;             ///< diameter of the lens; 0: a pinhole
   float focus_distance = 0;       ///< along the view; 0: as far as look_at
@@ -158,7 +158,7 @@ struct CameraMapSpec {
 };
 
 /// The light around the scene. Numbered frames are keys at every frame with `interpolate` false:
-/// the last key at or before the frame holds.
+/// the last key at or before the frame is taken.
 struct EnvironmentSpec {
   std::vector<EnvironmentKey> keys;  ///< sorted by frame, at least one
   bool interpolate = true;
@@ -197,7 +197,7 @@ struct MaterialSampling {
 };
 
 struct SamplingSpec {
-  Method method = Method::pool;  ///< holds in every case of jobs/lab
+  Method method = Method::pool;  ///< *holds* in every case of jobs/lab
   /// N: shadow rays per pixel, [1, limits::kMaxParticles].
   int num_particles = 16;
   /// M: SIR candidates, [N, limits::kMaxCandidates].
@@ -250,7 +250,7 @@ struct SamplingSpec {
 // ---- quality ------------------------------------------------------------------------------------
 /// How much of the job's sampling a frame is the mean of.
 struct QualitySpec {
-  /// K: passes over a frame, each with other random numbers and sites, [1, limits::kMaxRounds].
+  /// K: renderings of a frame, each with other random numbers and sites, [1, limits::kMaxRounds].
   int rounds = 1;
   /// How often the sequence is rendered, K rounds a frame each time; a frame is the mean of its
   /// sweeps. rounds * sweeps <= limits::kMaxRounds.
@@ -294,7 +294,7 @@ struct VisibilitySpec {
 };
 
 // ---- output, state, farm ------------------------------------------------------------------------
-/// What is seen where no object is: the map, nothing, or a picture that the frame is laid over.
+/// What is seen where no object is: the map, nothing, or an image that the frame is laid over.
 enum class Background : std::uint8_t { environment, transparent, plate };
 /// Where frames tell what catches shadows: in channels shadow.*, or as black in A.
 enum class ShadowForm : std::uint8_t { channels, alpha };
@@ -331,7 +331,7 @@ struct OutputSpec {
   std::string directory;                   ///< absolute
   std::string pattern = "frame.####.exr";  ///< '#'s are the zero-padded frame number
   Background background = Background::environment;
-  /// Pictures, as large as the frame or larger; with Background::plate.
+  /// Image files, as large as the frame or larger; with Background::plate.
   std::optional<FileSequence> plate{};
   ShadowForm shadows = ShadowForm::channels;
   std::vector<Aov> aovs;  ///< in the order of the enum, no duplicates

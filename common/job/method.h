@@ -27,9 +27,9 @@ enum class Method : std::uint8_t {
 enum class Carried : std::uint8_t {
   nothing,
   samples,  ///< the pixel's weighted samples
-  /// With the confidence that they are weighed by.
+  /// Weighted samples with the confidence that they are weighed by.
   weighed_samples,
-  /// What its rays found, and how noisy its light was.
+  /// What the pixel's rays found, and how noisy its light was.
   memory,
 };
 

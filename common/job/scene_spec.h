@@ -60,18 +60,18 @@ enum class MaterialKind : std::uint8_t { diffuse, phong, metallic_roughness, mea
 struct MaterialSpec {
   MaterialKind kind = MaterialKind::diffuse;
   Rgb base_color{0.8f, 0.8f, 0.8f};
-  /// Phong; metallic_roughness: on F0 of what is no metal.
+  /// phong; metallic_roughness: factor on F0 of what is no metal.
   Rgb specular_color{1, 1, 1};
   float kd = 0.5f;         ///< phong, [0, 1]
   float ks = 0.5f;         ///< phong, [0, 1]; kd + ks <= 1
   float exponent = 50;     ///< phong, [1, 100000]
   float metallic = 0;      ///< [0, 1]
   float roughness = 0.5f;  ///< [0.02, 1]; alpha = roughness^2
-  /// metallic_roughness, of what is no metal, [1, 100].
+  /// metallic_roughness: index of refraction of what is no metal, [1, 100].
   float ior = 1.5f;
   /// metallic_roughness: strength of the reflection of what is no metal, [0, 1].
   float specular = 1;
-  /// metallic_roughness, [0, 1]; none: no coat.
+  /// metallic_roughness: share of the coat, [0, 1]; none: no coat.
   std::optional<float> clearcoat{};
   std::optional<float> clearcoat_roughness{};  ///< the coat's, [0.02, 1]; none: 0.02
   std::string file{};                          ///< measured: .binary
@@ -124,7 +124,7 @@ struct PlacedNode {
 /// With a skin its vertices are in the world of the file.
 struct ShapeSpec {
   int node = 0;  ///< place in the file's list
-  /// It deforms as the file's animations say; none: rests.
+  /// The shape deforms as the file's animations say; none: it rests.
   std::optional<FileClock> animation{};
   std::vector<PlacedNode> places{};  ///< nodes of the file, such as bones
 
@@ -171,7 +171,7 @@ enum class UpAxis : std::uint8_t { x, y, z };
 struct ObjectSpec {
   std::string mesh;
   std::string material;
-  /// For people (object_names); those of one name are one object to them.
+  /// For people (object_names); objects of one name are one to them.
   std::string name{};
   Vec3 translate{0, 0, 0};
   Vec3 rotate_deg{0, 0, 0};

@@ -121,8 +121,8 @@ struct Grant {
   std::vector<BlobRef> inputs;
   /// The steps of a render task; of another task the position of its key, twice.
   StepSpan steps{};
-  bool may_hold = false;  ///< the task's state may stay in the worker's memory
-  Step states_from{};     ///< states of earlier steps are needed by no task
+  bool may_hold = false;  ///< the worker may hold the task's state
+  Step states_from{};     ///< no task needs states of earlier steps
   /// CPU time, as the longest of late; 0: not known.
   double expected_seconds = 0;
 };
@@ -167,7 +167,7 @@ struct FrameQuality {
   NoiseSource noise_source = NoiseSource::none;
   /// FrameNoise::relative() (common/image/noise.h).
   float noise = 0;
-  float noise_error = 0;  ///< its standard error, as a share of it
+  float noise_error = 0;  ///< standard error of `noise`, as a share
   float mean = 0;         ///< radiance, over pixels and the three
   float lowest = 0;       ///< the least value, at most 0
   /// What lies below zero over all light, [0, ...).
@@ -214,7 +214,7 @@ struct RenderStats {
          seconds_shade = 0;
   /// Encoding, writing, reading and decoding sample states.
   double seconds_state = 0;
-  std::uint64_t pixels_masked = 0;     ///< that the second pass did again
+  std::uint64_t pixels_masked = 0;     ///< pixels that the second pass did again
   std::uint64_t rays_second_pass = 0;  ///< not in rays_shadow
   double seconds_second_pass = 0;      ///< all of the second pass
   double seconds_second_rays = 0;      ///< occlusion rays of the second pass

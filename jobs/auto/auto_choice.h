@@ -19,7 +19,7 @@ bool chooses_particles(const SamplingSpec& asked);
 
 /// A way to render a job, as a pilot may try it.
 struct AutoCandidate {
-  /// E.g. "bidirectional M=128"; its members differ in N alone.
+  /// E.g. "bidirectional M=128"; members of a family differ in N alone.
   std::string family;
   SamplingSpec sampling;
   /// With the second pass of correlated visibility.

@@ -10,8 +10,8 @@ namespace baton {
 /// What settle_auto is going to do.
 struct PilotPlan {
   std::size_t candidates = 0, windows = 0;
-  std::int64_t pixels = 0;  ///< in a picture
-  /// In all, if half of the candidates are looked at again.
+  std::int64_t pixels = 0;  ///< in a small frame
+  /// All frames, if half of the candidates are measured again.
   std::size_t frames = 0;
   double cpu_seconds = 0;  ///< as much, of counted work
 };

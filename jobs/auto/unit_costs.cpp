@@ -8,7 +8,7 @@
 namespace baton {
 namespace {
 
-/// Costs as fitted to jobs/studies/ray-costs.json.
+/// Constants of the fit to jobs/studies/ray-costs.json.
 constexpr double kFittedTriangles = 75'000;
 constexpr double kTriangleExponent = 0.14;
 constexpr double kMovingFactor = 3;

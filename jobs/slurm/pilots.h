@@ -13,7 +13,7 @@ enum class SlurmState {
   waiting,  ///< will begin
   /// Was put back into the queue, which lets it wait for minutes.
   resting,
-  running,  ///< its program runs, or is believed to
+  running,  ///< its program is at work, or should be
   /// Stands still until somebody lets it go on.
   suspended,
   ending,
@@ -26,8 +26,8 @@ struct SlurmPilot {
   SlurmState state = SlurmState::waiting;
   /// How long it has been running without a worker of its name.
   double alone_s = 0;
-  /// For people: Slurm's own word and its reason, the name of the job, the node, what is left of
-  /// the time.
+  /// For people: Slurm's own word and its reason, its name there, the node, what is left of the
+  /// time.
   std::string state_text = {}, reason = {}, job_name = {}, node = {}, time_left = {};
 
   bool operator==(const SlurmPilot&) const = default;

@@ -32,7 +32,7 @@ struct PilotJob {
   std::string endpoint;    ///< the coordinator, as nodes reach it
   std::string key;         ///< file; empty: none
   std::string script_log;  ///< file; %A and %a are array and task
-  /// By which squeue finds the pilots of this farm.
+  /// Name by which squeue finds the pilots of this farm.
   std::string job_name;
   std::string partition;  ///< empty: Slurm's default
   std::string time;       ///< empty: the partition's default

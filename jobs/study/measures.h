@@ -17,11 +17,11 @@ struct FrameMeasures {
   FrameNumber frame{};
   double mse = 0;      ///< over R, G, B
   double rel_mse = 0;  ///< mean of (I - R)^2 / (R + .01)^2
-  /// Mean LDR-FLIP of the tone-mapped pictures, [0, 1].
+  /// Mean LDR-FLIP of the tone-mapped images, [0, 1].
   double flip = 0;
   /// 99.9th percentile of |I - R|, the mean over R, G, B of a pixel.
   double percentile_99_9 = 0;
-  /// Mean of I - R, signed; noise of the run included.
+  /// Mean of I - R, signed; noise of the rendering included.
   double bias = 0;
   double lns_mean = 0;  ///< mean Lns over mean Lns of the reference
   /// Median over pixels of Lns / Lns of the reference.

@@ -34,7 +34,7 @@ Result<Picture> read_picture(const std::filesystem::path& path);
 struct Reference {
   std::array<Picture, 2> half;
   RgbImage mean;
-  /// Exposure of all pictures that are compared with it.
+  /// Exposure of all images that are compared with it.
   float exposure = 1;
   RgbImage displayed;  ///< tone-mapped mean
 
@@ -46,10 +46,10 @@ struct Reference {
   double mean_radiance = 0;  ///< over lit pixels and R, G, B
   /// Mean squared error of R by its halves, mean (A - B)^2 / 4: what R cannot resolve.
   double mse = 0;
-  double rel_mse = 0;  ///< the same over (R + .01)^2
+  double rel_mse = 0;  ///< squared error over (R + .01)^2
   /// Mean FLIP between R and A, which is as far from R as R from the truth.
   double flip = 0;
-  /// The same by the variance that brute force reports of itself.
+  /// `mse` by the variance that brute force reports of itself.
   double reported_mse = 0;
   double lns_mean = 0;  ///< over lit pixels
 };

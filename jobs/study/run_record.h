@@ -28,7 +28,7 @@ RunCounts counts_of(const RenderStats& stats);
 
 /// What is kept of one rendering: one cell with one seed.
 struct RunRecord {
-  /// Names the run whatever the study: see run_key.
+  /// Names the rendering whatever the study: see run_key.
   std::string key;
   RunCounts counts;
   std::uint64_t state_bytes = 0, state_pixels = 0;

@@ -38,7 +38,7 @@ struct StudyScene {
 struct StudyCell {
   std::size_t scene = 0, method = 0;  ///< indices into the study's lists
   std::string budget;
-  /// Seed, output folder: filled in run by run.
+  /// Its seed and output folder are filled in for each rendering.
   JobSpec job;
   /// What `auto` chose for it, "CHOICE: what is expected of it"; empty: its job was fixed.
   std::string chosen{};

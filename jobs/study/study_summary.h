@@ -56,7 +56,7 @@ struct CellSummary {
   CellCost cost;
   Interval rmse, rel_mse, flip, bias;
   double percentile_99_9 = 0;
-  /// Over runs; NaN when no two measured frames follow each other.
+  /// Over renderings; NaN when no two measured frames follow each other.
   Interval flicker;
   double lag = 0;  ///< lag_after_cut; NaN without a cut
   /// The squared error is at least that of the reference.

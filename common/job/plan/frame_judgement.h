@@ -30,8 +30,8 @@ struct Judgement {
   bool clamped = false;        ///< it was set to 0
   std::uint64_t frames_beyond_half = 0, pixels_beyond_half = 0;
   std::uint64_t pixels_not_finite = 0;
-  /// Pixels after the first frame that could have carried something, but had to start
-  /// afresh; refreshes on schedule are not counted. carries: some pixels carried.
+  /// Pixels after the first frame that could have carried something, and those of them that had to
+  /// start afresh; refreshes on schedule are not counted. carries: some pixels carried.
   bool carries = false;
   std::uint64_t pixels_afresh = 0, pixels_after_first = 0;
 };

@@ -52,7 +52,7 @@ double decimal(float value);
 /// How an object may be written besides `{...}`.
 struct ObjectForm {
   const char* shorthand = nullptr;  ///< a lone text means {shorthand: text}
-  /// A lone text names a JSON file that holds the object.
+  /// A lone text names a JSON file with the object.
   bool file = false;
   /// Without the key: true means all defaults, false means there is no such object.
   bool present = true;

@@ -20,7 +20,7 @@ Result<JobSpec> parse_job(std::string_view json, const std::string& name,
 
 /// A value that is said in place of the job file's.
 struct JobOverride {
-  /// In the JSON of the job: `image.sites`, `$.scene.objects[0].fitHeight`.
+  /// Path in the JSON of the job: `image.sites`, `$.scene.objects[0].fitHeight`.
   std::string path;
   std::string value;             ///< JSON; what is none counts as a text
   std::string option = "--set";  ///< named in faults
@@ -37,7 +37,7 @@ std::string to_json(const JobSpec& job);
 
 /// One value in force, for `baton check --explain`.
 struct JobSetting {
-  /// In the canonical JSON, e.g. `$.image.width`.
+  /// Path in the canonical JSON, e.g. `$.image.width`.
   std::string path;
   std::string value;  ///< as JSON
   /// Said by the job file; otherwise a default.

@@ -28,7 +28,7 @@ class JobOverrides {
     bool is_index = false;
   };
   struct Entry {
-    /// As faults write it: `$.scene.objects[0].fitHeight`.
+    /// Path as faults write it: `$.scene.objects[0].fitHeight`.
     std::string path;
     std::vector<Step> steps;  ///< empty: the path is none
     nlohmann::json value;
