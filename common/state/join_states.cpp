@@ -10,34 +10,16 @@ namespace {
 /// Whether two states are of one frame and have the same things.
 bool are_alike(const SampleState& a, const SampleState& b) {
   return a.picture == b.picture && a.step == b.step && a.num_particles == b.num_particles &&
-         a.num_populations == b.num_populations && a.memory.empty() == b.memory.empty() &&
-         a.confidence.empty() == b.confidence.empty();
+         a.num_populations == b.num_populations && a.format == b.format;
 }
 
-/// Copies `count` pixels of `width` values each.
-template <class T>
-void copy_pixels(const std::vector<T>& from, std::size_t first_from, std::vector<T>& to,
-                 std::size_t first_to, std::size_t count, std::size_t width) {
-  if (from.empty()) return;
-  std::copy_n(from.begin() + static_cast<std::ptrdiff_t>(first_from * width), count * width,
-              to.begin() + static_cast<std::ptrdiff_t>(first_to * width));
-}
-
-void copy_row(const SampleState& from, std::size_t first_from, SampleState& to,
-              std::size_t first_to, std::size_t count) {
+/// Copies `count` pixels of a row with their sources.
+void copy_row(const SampleState& from, std::size_t first_from, SampleState& to, std::size_t first,
+              std::size_t count) {
   const auto populations = static_cast<std::size_t>(to.num_populations);
-  const auto particles = static_cast<std::size_t>(to.num_particles);
-  const auto copy = [&](const auto& a, auto& b, std::size_t width) {
-    copy_pixels(a, first_from, b, first_to, count, width);
-  };
-  copy(from.lns, to.lns, populations);
-  copy(from.lns_fresh, to.lns_fresh, populations);
-  copy(from.source, to.source, populations);
-  copy(from.direction, to.direction, particles);
-  copy(from.weight, to.weight, particles);
-  copy(from.site, to.site, particles);
-  copy(from.confidence, to.confidence, 1);
-  copy(from.memory, to.memory, 1);
+  std::copy_n(from.source.data() + first_from * populations, count * populations,
+              to.source.data() + first * populations);
+  to.copy_pixels(from, first_from, first, count);
 }
 
 std::size_t pixel_at(const PixelRect& rect, std::int32_t x, std::int32_t y) {
@@ -58,9 +40,7 @@ Result<SampleState> join_states(std::span<const SampleState* const> parts, const
   joined.picture = model.picture;
   joined.step = model.step;
   joined.tile = tile;
-  joined.resize(rect, model.num_particles, model.num_populations);
-  if (!model.memory.empty()) joined.add_memory();
-  if (!model.confidence.empty()) joined.add_confidence();
+  joined.resize(*model.format, rect, model.num_particles, model.num_populations);
 
   std::int64_t num_covered = 0;
   for (const SampleState* const part : parts) {

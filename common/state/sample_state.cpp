@@ -3,13 +3,11 @@
 #include <fmt/format.h>
 
 #include <algorithm>
-#include <array>
-#include <cmath>
-#include <deque>
 
+#include "common/base/check.h"
 #include "common/base/limits.h"
-#include "common/base/section_file.h"
-#include "common/state/memory_sections.h"
+#include "common/state/memory_plane.h"
+#include "common/state/state_format.h"
 
 namespace baton {
 namespace {
@@ -17,111 +15,9 @@ namespace {
 constexpr SectionTag kMagic{'B', 'S', 'T', '1'};
 constexpr SectionTag kMeta{'M', 'E', 'T', 'A'};
 constexpr SectionTag kSource{'S', 'R', 'C', '_'};
-constexpr SectionTag kLns{'L', 'N', 'S', '_'};
-constexpr SectionTag kLnsFresh{'L', 'N', 'S', 'F'};
-constexpr SectionTag kDirection{'D', 'I', 'R', '_'};
-constexpr SectionTag kWeight{'W', 'G', 'T', '_'};
-constexpr SectionTag kSite{'S', 'I', 'T', 'E'};
 constexpr SectionTag kPopulations{'P', 'O', 'P', 'S'};
-constexpr SectionTag kConfidence{'C', 'O', 'N', 'F'};
-constexpr std::array kTags{kMeta,
-                           kSource,
-                           kLns,
-                           kLnsFresh,
-                           kDirection,
-                           kWeight,
-                           kSite,
-                           kPopulations,
-                           kMemorySummary,
-                           kMemoryMasks,
-                           kMemoryCells,
-                           kMemoryLightNoise,
-                           kMemoryLobeNoise,
-                           kConfidence};
 
 constexpr std::size_t kMetaBytes = 2 * sizeof(std::uint64_t) + 7 * sizeof(std::int32_t);
-/// How far the sum of a pixel's weights may be from 1.
-constexpr double kWeightSumTolerance = 1e-3;
-
-/// 0-based indices of the pixels that carry samples, ascending.
-std::vector<std::size_t> surface_pixels(const SampleState& state) {
-  std::vector<std::size_t> pixels;
-  const auto populations = static_cast<std::size_t>(state.num_populations);
-  for (std::size_t i = 0; i < state.num_pixels(); ++i) {
-    if (state.source[i * populations] != PixelSource::background) pixels.push_back(i);
-  }
-  return pixels;
-}
-
-/// The sections of a state file. Values of surface pixels are gathered only where there are others.
-class StateSections {
- public:
-  explicit StateSections(const SampleState& state)
-      : num_pixels_(state.num_pixels()), pixels_(surface_pixels(state)) {}
-
-  const std::vector<std::size_t>& pixels() const { return pixels_; }
-
-  /// A section with bytes of its own.
-  void add(const SectionTag& tag, std::size_t stride, Bytes payload) {
-    owned_.push_back(std::move(payload));
-    views_.push_back(
-        {.tag = tag, .stride = static_cast<std::uint8_t>(stride), .payload = owned_.back()});
-  }
-  /// A section with `per_pixel` values of each surface pixel.
-  template <class T>
-  void gather(const SectionTag& tag, const std::vector<T>& values, std::size_t per_pixel) {
-    if (pixels_.size() == num_pixels_) {
-      views_.push_back(
-          {.tag = tag, .stride = sizeof(T), .payload = std::as_bytes(std::span(values))});
-      return;
-    }
-    const std::span all(values);
-    Bytes payload;
-    payload.reserve(pixels_.size() * per_pixel * sizeof(T));
-    for (const std::size_t pixel : pixels_) {
-      const ByteView row = std::as_bytes(all.subspan(pixel * per_pixel, per_pixel));
-      payload.insert(payload.end(), row.begin(), row.end());
-    }
-    add(tag, sizeof(T), std::move(payload));
-  }
-  /// Has the section that was added last stored as it is.
-  void keep_plain() {
-    views_.back().stride = 1;
-    views_.back().packing = Packing::none;
-  }
-  ByteView last_payload() const { return views_.back().payload; }
-  Bytes encode() const { return encode_sections(kMagic, kStateVersion, views_); }
-
- private:
-  const std::size_t num_pixels_;
-  const std::vector<std::size_t> pixels_;
-  std::deque<Bytes> owned_;
-  std::vector<SectionView> views_;
-};
-
-/// How many of `pixels` start and end with the same weight, as all do after a resampling.
-std::size_t num_resampled(const SampleState& state, const std::vector<std::size_t>& pixels) {
-  const auto count = static_cast<std::size_t>(state.num_particles);
-  if (count == 0) return 0;
-  return static_cast<std::size_t>(std::ranges::count_if(pixels, [&](std::size_t pixel) {
-    const float* const weights = state.weight.data() + pixel * count;
-    return weights[0] == weights[count - 1];
-  }));
-}
-
-/// Inverse of gather: values of all other pixels are left as they are.
-template <class T>
-Status scatter(const SectionFile& file, const SectionTag& tag,
-               const std::vector<std::size_t>& pixels, std::size_t per_pixel,
-               const std::string& name, std::vector<T>& values) {
-  const std::size_t row_bytes = per_pixel * sizeof(T);
-  BATON_ASSIGN(const ByteView payload, section_payload(file, tag, pixels.size() * row_bytes, name));
-  if (row_bytes == 0) return {};
-  for (std::size_t i = 0; i < pixels.size(); ++i) {
-    std::memcpy(values.data() + pixels[i] * per_pixel, payload.data() + i * row_bytes, row_bytes);
-  }
-  return {};
-}
 
 Bytes encode_meta(const SampleState& state) {
   ByteWriter writer;
@@ -134,8 +30,9 @@ Bytes encode_meta(const SampleState& state) {
   return writer.take();
 }
 
-/// Fills everything of `state` but its arrays.
-Status decode_meta(const SectionFile& file, const std::string& name, SampleState& state) {
+/// Fills the header but for what has its own section.
+Status decode_meta(const SectionFile& file, const std::string& name, const StateFormat& format,
+                   SampleState& state) {
   BATON_ASSIGN(const ByteView payload, section_payload(file, kMeta, kMetaBytes, name));
   ByteReader reader(payload);
   state.picture.high = reader.get<std::uint64_t>();
@@ -146,7 +43,7 @@ Status decode_meta(const SectionFile& file, const std::string& name, SampleState
     *value = reader.get<std::int32_t>();
   }
 
-  // Check what sizes the arrays before anything is allocated.
+  // Check what sizes the planes before anything is allocated.
   const auto fail = [&](const std::string& what) {
     return Error{ErrorKind::bad_input, fmt::format("{}: section META: {}", name, what)};
   };
@@ -159,7 +56,7 @@ Status decode_meta(const SectionFile& file, const std::string& name, SampleState
                             rect.x0, rect.x1, rect.y0, rect.y1, -limits::kMaxOverscan,
                             limits::kMaxImageSide + limits::kMaxOverscan));
   }
-  const int fewest = file.find(kMemorySummary) != nullptr ? 0 : 1;
+  const int fewest = format.fewest_particles();
   if (state.num_particles < fewest || state.num_particles > limits::kMaxParticles) {
     return fail(fmt::format("{} particles, expected {} to {}", state.num_particles, fewest,
                             limits::kMaxParticles));
@@ -181,52 +78,12 @@ Status decode_populations(const SectionFile& file, const std::string& name, Samp
                   name, state.num_populations, state.num_particles)};
 }
 
-/// Checks the values of one population of a surface pixel. The error has no file name yet.
-Status check_population(const SampleState& state, std::size_t pixel, std::size_t k) {
-  // Lns: radiance.
-  const std::size_t row = pixel * static_cast<std::size_t>(state.num_populations) + k;
-  for (const auto& [tag, value] :
-       {std::pair{kLns, state.lns[row]}, {kLnsFresh, state.lns_fresh[row]}}) {
-    if (!(std::isfinite(value) && value >= 0)) {
-      return value_error(state, tag, pixel,
-                         fmt::format("{}, expected a finite number >= 0", value));
-    }
-  }
-
-  // Particles: each weight and site, then the sum.
-  const auto num_particles = static_cast<std::size_t>(state.num_particles);
-  const std::size_t count = num_particles / static_cast<std::size_t>(state.num_populations);
-  double sum = 0;
-  for (std::size_t i = k * count; i < (k + 1) * count; ++i) {
-    const float weight = state.weight[pixel * num_particles + i];
-    const int site = state.site[pixel * num_particles + i];
-    if (!(std::isfinite(weight) && weight >= 0)) {
-      return value_error(
-          state, kWeight, pixel,
-          fmt::format("particle {} has weight {}, expected a finite number >= 0", i, weight));
-    }
-    if (site >= limits::kMaxSites) {
-      return value_error(
-          state, kSite, pixel,
-          fmt::format("particle {} has site {}, expected 0 to {}", i, site, limits::kMaxSites - 1));
-    }
-    sum += weight;
-  }
-  if (sum != 0 && std::fabs(sum - 1) > kWeightSumTolerance) {
-    return value_error(state, kWeight, pixel,
-                       fmt::format("weights sum to {}, expected 1 or 0", sum));
-  }
-  return {};
-}
-
-/// Fills `state.source`; resizes all arrays, which must not be larger than a file may be.
-Status decode_sources(const SectionFile& file, const std::string& name, SampleState& state) {
+/// Fills `state.source`; sizes all planes, which must not be larger than a file may be.
+Status decode_sources(const SectionFile& file, const std::string& name, const StateFormat& format,
+                      SampleState& state) {
   const auto populations = static_cast<std::size_t>(state.num_populations);
   const std::uint64_t bytes =
-      state.num_pixels() *
-      SampleState::bytes_per_pixel(static_cast<std::size_t>(state.num_particles), populations,
-                                   file.find(kMemorySummary) != nullptr,
-                                   file.find(kConfidence) != nullptr);
+      state.num_pixels() * format.most_stored_bytes(state.num_particles, state.num_populations);
   if (bytes > limits::kMaxBlobBytes) {
     return Error{
         ErrorKind::bad_input,
@@ -235,130 +92,128 @@ Status decode_sources(const SectionFile& file, const std::string& name, SampleSt
   }
   BATON_ASSIGN(const ByteView payload,
                section_payload(file, kSource, state.num_pixels() * populations, name));
-  state.resize(state.rect, state.num_particles, state.num_populations);
+  state.resize(format, state.rect, state.num_particles, state.num_populations);
   for (std::size_t row = 0; row < payload.size(); ++row) {
-    const std::size_t pixel = row / populations;
     const auto value = std::to_integer<std::uint8_t>(payload[row]);
-    if (value > static_cast<std::uint8_t>(PixelSource::catcher)) {
-      const Error error =
-          value_error(state, kSource, pixel, fmt::format("source {}, expected 0 to 5", value));
-      return Error{error.kind, fmt::format("{}: section {}", name, error.message)};
+    if (value >= kNumPixelSources) {
+      return StateReader(file, name, state)
+          .wrong_value(kSource, row / populations,
+                       fmt::format("source {}, expected 0 to 5", value));
     }
     state.source[row] = static_cast<PixelSource>(value);
   }
   return {};
 }
 
-}  // namespace
+Result<SampleState> decode_sections(const SectionFile& file, const std::string& name,
+                                    const StateFormat& format) {
+  std::vector<SectionTag> known = format.tags();
+  known.insert(known.end(), {kMeta, kSource, kPopulations});
+  BATON_TRY(check_known_sections(file, known, name));
 
-std::size_t SampleState::size_bytes() const {
-  return num_pixels() * bytes_per_pixel(static_cast<std::size_t>(num_particles),
-                                        static_cast<std::size_t>(num_populations), false,
-                                        !confidence.empty()) +
-         memory.size() * sizeof(PixelMemory);
+  // Read what sizes the planes, then the planes.
+  SampleState state;
+  BATON_TRY(decode_meta(file, name, format, state));
+  BATON_TRY(decode_populations(file, name, state));
+  BATON_TRY(decode_sources(file, name, format, state));
+  BATON_TRY(format.decode(StateReader(file, name, state), state));
+  return state;
 }
 
-void SampleState::resize(const PixelRect& new_rect, std::int32_t new_num_particles,
-                         std::int32_t new_num_populations) {
+/// Whose sections the file has. Those that no format knows are refused by the plainest one.
+const StateFormat& format_of(const SectionFile& file) {
+  for (const StateFormat* format : {static_cast<const StateFormat*>(&memory_format()),
+                                    static_cast<const StateFormat*>(&weighed_sample_format())}) {
+    std::vector<SectionTag> own = format->tags();
+    const std::vector<SectionTag> plain = sample_format().tags();
+    std::erase_if(
+        own, [&](const SectionTag& tag) { return std::ranges::find(plain, tag) != plain.end(); });
+    if (std::ranges::any_of(own, [&](const SectionTag& tag) { return file.find(tag) != nullptr; }))
+      return *format;
+  }
+  return sample_format();
+}
+
+}  // namespace
+
+void SampleState::resize(const StateFormat& new_format, const PixelRect& new_rect,
+                         std::int32_t new_num_particles, std::int32_t new_num_populations) {
   BATON_CHECK(new_rect.width() > 0 && new_rect.height() > 0 && new_num_particles >= 0);
   BATON_CHECK(new_num_populations > 0 && new_num_particles % new_num_populations == 0);
+  format = &new_format;
   rect = new_rect;
   num_particles = new_num_particles;
   num_populations = new_num_populations;
-  const std::size_t pixels = num_pixels();
-  const std::size_t particles = pixels * static_cast<std::size_t>(num_particles);
-  const std::size_t rows = pixels * static_cast<std::size_t>(num_populations);
-  lns.assign(rows, 0.0f);
-  lns_fresh.assign(rows, 0.0f);
-  source.assign(rows, PixelSource::background);
-  direction.assign(particles, 0);
-  weight.assign(particles, 0.0f);
-  site.assign(particles, 0);
-  memory.clear();
-  confidence.clear();
+  source.assign(num_pixels() * static_cast<std::size_t>(num_populations), PixelSource::background);
+  const auto sizes = format->pixel_bytes(num_particles, num_populations);
+  planes.resize(sizes.size());
+  for (std::size_t i = 0; i < sizes.size(); ++i) {
+    planes[i].pixel_bytes = sizes[i];
+    planes[i].bytes.assign(num_pixels() * sizes[i], std::byte{0});
+  }
+}
+
+std::size_t SampleState::size_bytes() const {
+  std::size_t sum = source.size() * sizeof(PixelSource);
+  for (const StatePlane& plane : planes) sum += plane.bytes.size();
+  return sum;
+}
+
+void SampleState::copy_pixels(const SampleState& from, std::size_t first_from, std::size_t first,
+                              std::size_t count) {
+  for (std::size_t i = 0; i < planes.size(); ++i) {
+    const std::size_t bytes = planes[i].pixel_bytes;
+    std::copy_n(from.planes[i].bytes.data() + first_from * bytes, count * bytes,
+                planes[i].bytes.data() + first * bytes);
+  }
+}
+
+void SampleState::forget_pixel(std::size_t pixel) {
+  for (StatePlane& plane : planes)
+    std::fill_n(plane.bytes.data() + pixel * plane.pixel_bytes, plane.pixel_bytes, std::byte{0});
+}
+
+void SampleState::set_source(std::size_t pixel, PixelSource new_source) {
+  const auto count = static_cast<std::size_t>(num_populations);
+  std::fill_n(source.data() + pixel * count, count, new_source);
+}
+
+PixelSource SampleState::latest_source(std::size_t pixel) const {
+  const auto count = static_cast<std::size_t>(num_populations);
+  const PixelSource* const first = source.data() + pixel * count;
+  return *std::max_element(first, first + count);
 }
 
 Bytes encode_state(const SampleState& state) {
-  const std::size_t num_pixels = state.num_pixels();
-  const auto num_particles = static_cast<std::size_t>(state.num_particles);
-  const auto populations = static_cast<std::size_t>(state.num_populations);
-  BATON_CHECK(state.lns.size() == num_pixels * populations &&
-              state.lns_fresh.size() == state.lns.size());
-  BATON_CHECK(state.source.size() == state.lns.size() &&
-              state.direction.size() == num_pixels * num_particles);
-  BATON_CHECK(state.weight.size() == state.direction.size() &&
-              state.site.size() == state.direction.size());
-  BATON_CHECK(state.memory.empty() || state.memory.size() == num_pixels);
-  BATON_CHECK(state.confidence.empty() || state.confidence.size() == num_pixels);
+  const auto sizes = state.format->pixel_bytes(state.num_particles, state.num_populations);
+  BATON_CHECK(state.source.size() ==
+              state.num_pixels() * static_cast<std::size_t>(state.num_populations));
+  BATON_CHECK(state.planes.size() == sizes.size());
+  for (std::size_t i = 0; i < sizes.size(); ++i)
+    BATON_CHECK(state.planes[i].bytes.size() == state.num_pixels() * sizes[i]);
 
-  StateSections sections(state);
+  StateWriter writer(state);
   const ByteView sources = std::as_bytes(std::span(state.source));
-  sections.add(kMeta, 1, encode_meta(state));
-  sections.add(kSource, 1, Bytes(sources.begin(), sources.end()));
-  sections.gather(kLns, state.lns, populations);
-  sections.gather(kLnsFresh, state.lns_fresh, populations);
-
-  // Directions are as good as random, sites nearly so, and so are weights unless most pixels were
-  // just resampled: finding repetitions costs more time than it saves bytes.
-  sections.gather(kDirection, state.direction, num_particles);
-  sections.keep_plain();
-  sections.gather(kWeight, state.weight, num_particles);
-  if (2 * num_resampled(state, sections.pixels()) < sections.pixels().size()) sections.keep_plain();
-  sections.gather(kSite, state.site, num_particles);
-  const auto is_set = [](std::byte site) { return site != std::byte{0}; };
-  if (std::ranges::any_of(sections.last_payload(), is_set)) sections.keep_plain();
-
-  if (populations > 1) {
-    ByteWriter writer;
-    writer.put(state.num_populations);
-    sections.add(kPopulations, 1, writer.take());
+  writer.add(kMeta, 1, encode_meta(state));
+  writer.add(kSource, 1, Bytes(sources.begin(), sources.end()));
+  state.format->encode(state, writer);
+  if (state.num_populations > 1) {
+    ByteWriter populations;
+    populations.put(state.num_populations);
+    writer.add(kPopulations, 1, populations.take());
   }
-  if (!state.memory.empty()) {
-    MemoryPayloads memory = encode_memory(state.memory, sections.pixels());
-    sections.add(kMemorySummary, kMemorySummaryStride, std::move(memory.summaries));
-    sections.add(kMemoryMasks, 1, std::move(memory.masks));
-    sections.add(kMemoryCells, kMemoryCellStride, std::move(memory.cells));
-    sections.keep_plain();
-    sections.add(kMemoryLightNoise, kMemoryCellStride, std::move(memory.light_noise));
-    sections.add(kMemoryLobeNoise, kMemoryCellStride, std::move(memory.lobe_noise));
-  }
-  if (!state.confidence.empty()) sections.gather(kConfidence, state.confidence, 1);
-  return sections.encode();
+  return encode_sections(kMagic, kStateVersion, writer.sections());
+}
+
+Result<SampleState> decode_state(ByteView bytes, const std::string& name,
+                                 const StateFormat& format) {
+  BATON_ASSIGN(const SectionFile file, decode_section_file(bytes, kMagic, kStateVersion, name));
+  return decode_sections(file, name, format);
 }
 
 Result<SampleState> decode_state(ByteView bytes, const std::string& name) {
   BATON_ASSIGN(const SectionFile file, decode_section_file(bytes, kMagic, kStateVersion, name));
-  BATON_TRY(check_known_sections(file, kTags, name));
-
-  // Read what sizes the arrays, then the arrays.
-  SampleState state;
-  BATON_TRY(decode_meta(file, name, state));
-  BATON_TRY(decode_populations(file, name, state));
-  BATON_TRY(decode_sources(file, name, state));
-  const std::vector<std::size_t> pixels = surface_pixels(state);
-  const auto num_particles = static_cast<std::size_t>(state.num_particles);
-  const auto populations = static_cast<std::size_t>(state.num_populations);
-  BATON_TRY(scatter(file, kLns, pixels, populations, name, state.lns));
-  BATON_TRY(scatter(file, kLnsFresh, pixels, populations, name, state.lns_fresh));
-  BATON_TRY(scatter(file, kDirection, pixels, num_particles, name, state.direction));
-  BATON_TRY(scatter(file, kWeight, pixels, num_particles, name, state.weight));
-  BATON_TRY(scatter(file, kSite, pixels, num_particles, name, state.site));
-  BATON_TRY(decode_memory(file, pixels, name, state));
-  if (file.find(kConfidence) != nullptr) {
-    state.add_confidence();
-    BATON_TRY(scatter(file, kConfidence, pixels, 1, name, state.confidence));
-  }
-
-  // Check every value.
-  for (const std::size_t pixel : pixels) {
-    for (std::size_t k = 0; k < populations; ++k) {
-      if (const Status checked = check_population(state, pixel, k); !checked) {
-        return Error{checked.error().kind,
-                     fmt::format("{}: section {}", name, checked.error().message)};
-      }
-    }
-  }
-  return state;
+  return decode_sections(file, name, format_of(file));
 }
 
 Result<std::vector<SectionInfo>> state_sections(ByteView bytes, const std::string& name) {

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <cstddef>
 #include <cstdint>
 #include <span>
 #include <string>
@@ -10,11 +11,11 @@
 #include "common/base/result.h"
 #include "common/base/section_file.h"
 #include "common/job/time.h"
-#include "common/math/octahedral.h"
 #include "common/math/pixel_rect.h"
-#include "common/state/pixel_memory.h"
 
 namespace baton {
+
+class StateFormat;
 
 /// Where a pixel's samples of this frame come from. Stored; values are for ever.
 enum class PixelSource : std::uint8_t {
@@ -26,59 +27,63 @@ enum class PixelSource : std::uint8_t {
   /// A shadow catcher's pixel, whose memory no object may inherit.
   catcher = 5,
 };
+inline constexpr std::size_t kNumPixelSources = 6;
 
-/// The baton: what one tile hands to its next frame. Structure of arrays; pixels row by row inside
-/// `rect`. The surfaces are not stored: primary hits are a pure function of (job, frame, pixel,
-/// site) and are traced again. A background pixel carries nothing: every array is 0 there, and the
-/// file leaves it out.
+/// One kind of values that the pixels of a tile carry, as many bytes for each, pixel by pixel.
+/// What they mean its StateFormat says.
+struct StatePlane {
+  std::size_t pixel_bytes = 0;
+  std::vector<std::byte> bytes;  ///< (pixels) of pixel_bytes
+
+  /// All values; T: trivially copyable, aligned as `new` aligns at most.
+  template <class T>
+  std::span<T> values() {
+    return {reinterpret_cast<T*>(bytes.data()), bytes.size() / sizeof(T)};
+  }
+  template <class T>
+  std::span<const T> values() const {
+    return {reinterpret_cast<const T*>(bytes.data()), bytes.size() / sizeof(T)};
+  }
+  bool operator==(const StatePlane&) const = default;
+};
+
+/// The baton: what one tile hands to its next frame. A header, which everybody reads, and planes,
+/// which only the method that made them reads (sample_planes.h and memory_plane.h have those of
+/// our methods). Pixels row by row inside `rect`. The surfaces are not stored: primary hits are a
+/// pure function of (job, frame, pixel, site) and are traced again. A background pixel carries
+/// nothing: every value is 0 there, and the file leaves it out.
 struct SampleState {
   Digest picture;  ///< picture_digest of the job
   Step step{};     ///< the samples are of this step
   std::int32_t tile = 0;
   PixelRect rect;
-  /// N: particles of all populations; 0 where only a memory is carried.
+  /// N: particles of all populations; 0 where none are carried.
   std::int32_t num_particles = 0;
   /// K: parts that never exchange anything; part k has particles [k N / K, (k + 1) N / K).
   std::int32_t num_populations = 1;
+  std::vector<PixelSource> source;  ///< (pixels, K)
 
-  /// (pixels, K) estimate of the unshadowed radiance, mean over RGB.
-  std::vector<float> lns;
-  /// (pixels, K) Lns at the last SIR or refresh.
-  std::vector<float> lns_fresh;
-  std::vector<PixelSource> source;      ///< (pixels, K)
-  std::vector<OctDirection> direction;  ///< (pixels, N)
-  /// (pixels, N) normalised, sum 1 in each population, or all 0 when no particle is lit.
-  std::vector<float> weight;
-  std::vector<std::uint8_t> site;  ///< (pixels, N)
-
-  /// (pixels), or empty: nothing is remembered.
-  std::vector<PixelMemory> memory;
-  /// (pixels) how many fresh sets a pixel's samples count as when they are weighed against fresh
-  /// ones, 0: they are no history; or empty: the method has no confidence.
-  std::vector<std::uint16_t> confidence;
+  const StateFormat* format = nullptr;
+  std::vector<StatePlane> planes;  ///< as StateFormat::pixel_bytes lists them
 
   bool operator==(const SampleState&) const = default;
   std::size_t num_pixels() const { return static_cast<std::size_t>(rect.area()); }
-  /// Sizes every array, all zero. new_num_populations divides new_num_particles.
-  void resize(const PixelRect& new_rect, std::int32_t new_num_particles,
-              std::int32_t new_num_populations = 1);
-  /// Size of a pixel in a file before packing, at most, and about its size in memory; as the flags
-  /// say with a memory or a confidence.
-  static constexpr std::size_t bytes_per_pixel(std::size_t particles, std::size_t populations,
-                                               bool with_memory, bool with_confidence) {
-    return populations * (sizeof(lns[0]) + sizeof(lns_fresh[0]) + sizeof(source[0])) +
-           particles * (sizeof(direction[0]) + sizeof(weight[0]) + sizeof(site[0])) +
-           (with_memory ? PixelMemory::kMaxStoredBytes : 0) +
-           (with_confidence ? sizeof(confidence[0]) : 0);
-  }
-  /// What all arrays take in memory.
+  /// Makes planes of that format, all zero, and forgets those that are there. new_num_populations
+  /// divides new_num_particles.
+  void resize(const StateFormat& new_format, const PixelRect& new_rect,
+              std::int32_t new_num_particles, std::int32_t new_num_populations = 1);
+  /// What source and planes take in memory.
   std::size_t size_bytes() const;
-  /// Lets each pixel's samples count for nothing yet.
-  void add_confidence() { confidence.assign(num_pixels(), 0); }
-  /// Gives each pixel an empty memory.
-  void add_memory() { memory.assign(num_pixels(), {}); }
-  /// The memory of a pixel, or null.
-  PixelMemory* memory_of(std::size_t pixel) { return memory.empty() ? nullptr : &memory[pixel]; }
+
+  /// Copies all that `count` pixels from `first_from` on carry, but for their sources. from: of the
+  /// same format, N and K.
+  void copy_pixels(const SampleState& from, std::size_t first_from, std::size_t first,
+                   std::size_t count);
+  /// Lets a pixel carry nothing, all zero.
+  void forget_pixel(std::size_t pixel);
+  void set_source(std::size_t pixel, PixelSource new_source);
+  /// What the pixel's populations say together.
+  PixelSource latest_source(std::size_t pixel) const;
 };
 
 /// Newest file version that this program reads, and the one that it writes.
@@ -87,8 +92,10 @@ inline constexpr std::uint16_t kStateVersion = 1;
 /// Deterministic, little-endian; grammar in common/state/FORMAT.md.
 Bytes encode_state(const SampleState& state);
 /// `name` (usually the file) goes first in every error: wrong magic or version, checksum, sizes
-/// that do not agree, weights or Lns that are negative or not finite, weights whose sum is neither
-/// 1 nor 0, sites past 15.
+/// that do not agree, values that the format refuses, sections that it does not know or lacks.
+Result<SampleState> decode_state(ByteView bytes, const std::string& name,
+                                 const StateFormat& format);
+/// The same of a file of any of our methods.
 Result<SampleState> decode_state(ByteView bytes, const std::string& name);
 
 /// The sections of a state file in file order, after every check that needs no unpacking.

@@ -8,8 +8,8 @@
 namespace baton {
 
 /// By PixelSource, for people and JSON.
-inline constexpr std::array<std::string_view, 5> kSourceNames{"background", "fresh", "carried",
-                                                              "restarted", "refreshed"};
+inline constexpr std::array<std::string_view, kNumPixelSources> kSourceNames{
+    "background", "fresh", "carried", "restarted", "refreshed", "catcher"};
 constexpr std::string_view source_name(PixelSource source) {
   return kSourceNames.at(static_cast<std::size_t>(source));
 }

@@ -11,7 +11,7 @@
 #include "common/base/section_file.h"
 #include "common/image/image_io.h"
 #include "common/protocol/messages.h"
-#include "common/state/sample_state.h"
+#include "common/state/memory_plane.h"
 #include "tests/support/first_pass.h"
 
 namespace baton {
@@ -37,32 +37,33 @@ Status write_both(const fs::path& folder, const std::string& name, const Bytes& 
 }
 
 /// A state of 4 x 3 pixels, the first of them background.
-SampleState small_state(std::int32_t particles, std::int32_t populations) {
+SampleState small_state(const StateFormat& format, std::int32_t particles,
+                        std::int32_t populations) {
   SampleState state;
   state.picture = {1, 2};
   state.step = Step(5);
   state.tile = 7;
-  state.resize({8, 16, 12, 19}, particles, populations);
+  state.resize(format, {8, 16, 12, 19}, particles, populations);
+  const SamplePlanes samples(state);
   const auto n = static_cast<std::size_t>(particles);
   const auto k = static_cast<std::size_t>(populations);
   for (std::size_t row = k; row < state.source.size(); ++row) {
     state.source[row] = static_cast<PixelSource>(1 + row % 4);
-    state.lns[row] = 1.5f + static_cast<float>(row);
-    state.lns_fresh[row] = 2;
+    samples.lns[row] = 1.5f + static_cast<float>(row);
+    samples.lns_fresh[row] = 2;
   }
-  for (std::size_t i = n; i < state.weight.size(); ++i) {
-    state.direction[i] = static_cast<OctDirection>(i * 2654435761u);
-    state.weight[i] = static_cast<float>(k) / static_cast<float>(n);
-    state.site[i] = static_cast<std::uint8_t>(i % 16);
+  for (std::size_t i = n; i < samples.weight.size(); ++i) {
+    samples.direction[i] = static_cast<OctDirection>(i * 2654435761u);
+    samples.weight[i] = static_cast<float>(k) / static_cast<float>(n);
+    samples.site[i] = static_cast<std::uint8_t>(i % 16);
   }
   return state;
 }
 
 SampleState state_with_memory() {
-  SampleState state = small_state(0, 1);
-  state.add_memory();
+  SampleState state = small_state(memory_format(), 0, 1);
   for (std::size_t pixel = 1; pixel < state.num_pixels(); ++pixel) {
-    PixelMemory& memory = state.memory[pixel];
+    PixelMemory& memory = memory_plane(state)[pixel];
     memory.all_rays = 0x8003;
     memory.outcomes = static_cast<std::uint16_t>(pixel % 4);
     memory.light_noise = 0x3f80;
@@ -73,13 +74,13 @@ SampleState state_with_memory() {
 
 Status write_states(const fs::path& folder) {
   constexpr SectionTag kMagic{'B', 'S', 'T', '1'};
-  SampleState confident = small_state(2, 1);
-  confident.add_confidence();
-  confident.confidence.back() = 9;
-  const std::pair<const char*, SampleState> states[] = {{"particles", small_state(4, 1)},
-                                                        {"populations", small_state(4, 2)},
-                                                        {"confidence", confident},
-                                                        {"memory", state_with_memory()}};
+  SampleState confident = small_state(weighed_sample_format(), 2, 1);
+  confidence_plane(confident).back() = 9;
+  const std::pair<const char*, SampleState> states[] = {
+      {"particles", small_state(sample_format(), 4, 1)},
+      {"populations", small_state(sample_format(), 4, 2)},
+      {"confidence", confident},
+      {"memory", state_with_memory()}};
   for (const auto& [name, state] : states)
     BATON_TRY(write_both(folder, name, encode_state(state), kMagic, kStateVersion));
   return {};

@@ -15,6 +15,7 @@
 #include "tests/support/local_frames.h"
 #include "tests/support/small_scene.h"
 #include "worker/method/sequential/sequential_kernels.h"
+#include "worker/method/weighted/weighted_sampler.h"
 
 namespace baton::stability {
 namespace {
@@ -54,16 +55,19 @@ Cell judged(const Case& c, const Subject& subject, const Effort& effort) {
 /// A sequential sampler whose number of distributions depends on how well its own particles do: it
 /// takes one distribution and, where their ESS is low, starts the frame again with five. Large
 /// estimates come with a low ESS, so the choice throws large estimates away.
-class SelfAdaptedSampler final : public PixelSampler {
+class SelfAdaptedSampler final : public WeightedSampler {
  public:
-  SelfAdaptedSampler(SamplingSpec spec, float ess_ratio_min) : ess_ratio_min_(ess_ratio_min) {
+  SelfAdaptedSampler(const JobSpec& job, float ess_ratio_min)
+      : WeightedSampler(job), ess_ratio_min_(ess_ratio_min) {
+    SamplingSpec spec = job.sampling;
     spec.method = Method::bidirectional;
-    start_ = make_pixel_sampler(spec);
+    start_ = make_fresh_sampler(spec);
   }
 
-  PixelDiagnostics sample(const PixelInput& input, SamplerScratch& scratch,
-                          const PixelSamples& samples) const override {
-    if (!input.has_history) return start_->sample(input, scratch, samples);
+ private:
+  PixelDiagnostics draw(const PixelInput& input, const SetPlace& /*at*/,
+                        const PixelSamples& samples) override {
+    if (!input.start.has_history) return start_->sample(input, samples);
     const auto count = samples.weight.size();
     for (const int distributions : {1, 5}) {
       Particles p;
@@ -74,8 +78,7 @@ class SelfAdaptedSampler final : public PixelSampler {
                                         .num_distributions = distributions,
                                         .local_move_cosine = std::cos(4 * kPi / 180)};
       const SequentialOutcome outcome =
-          kernels::sequential_step(input.sites, input.old, carried_light(input),
-                                   input.located.empty() ? nullptr : &input.located.front(),
+          kernels::sequential_step(input.sites, input.start.old, carried_light(input), nullptr,
                                    settings, samples.lns, input.key,
                                    {p.direction.data(), p.site.data(), p.weight.data(),
                                     samples.r.data(), samples.g.data(), samples.b.data()});
@@ -88,23 +91,24 @@ class SelfAdaptedSampler final : public PixelSampler {
       samples.source = PixelSource::carried;
       return {.ess = outcome.ess};
     }
-    return start_->sample(input, scratch, samples);
+    return start_->sample(input, samples);
   }
 
- private:
   struct Particles {
     std::array<OctDirection, limits::kMaxParticles> direction{};
     std::array<std::uint8_t, limits::kMaxParticles> site{};
     std::array<float, limits::kMaxParticles> weight{};
   };
   float ess_ratio_min_;
-  std::unique_ptr<const PixelSampler> start_;
+  std::unique_ptr<FreshSampler> start_;
 };
 
 Subject self_adapted(float ess_ratio_min) {
   return {"planted", [](JobSpec& job) { job.sampling.method = Method::sequential; },
-          [ess_ratio_min](const SamplingSpec& spec) {
-            return std::make_unique<SelfAdaptedSampler>(spec, ess_ratio_min);
+          [ess_ratio_min](const JobSpec& job) {
+            return PixelMethod{&sample_format(), [job, ess_ratio_min] {
+                                 return std::make_unique<SelfAdaptedSampler>(job, ess_ratio_min);
+                               }};
           }};
 }
 

@@ -10,7 +10,7 @@
 
 #include "tests/stat/against_brute_force.h"
 #include "tests/support/alive_box.h"
-#include "worker/method/populations.h"
+#include "worker/method/carried/old_surfaces.h"
 
 namespace baton {
 namespace {
@@ -137,49 +137,47 @@ class TurningViewer {
   }
 
   LnsMean carried(bool told_of_the_old_surface) {
-    return over_runs([&](const RngKey& key, const PixelSamples& samples) {
-      sample(old_.sites, nullptr, false, key, samples);
+    return over_runs([&](const RngKey& key) {
+      sample(old_.sites, nullptr, false, key);
       RngKey next = key;
       next.frame = 2;
-      sample(sites_, told_of_the_old_surface ? &old_ : nullptr, true, next, samples);
-      EXPECT_EQ(samples.source, PixelSource::carried);
+      const float lns = sample(sites_, told_of_the_old_surface ? &old_ : nullptr, true, next);
+      EXPECT_EQ(state_.source[0], PixelSource::carried);
+      return lns;
     });
   }
   LnsMean fresh() {
-    return over_runs([&](const RngKey& key, const PixelSamples& samples) {
-      sample(sites_, nullptr, false, key, samples);
-    });
+    return over_runs([&](const RngKey& key) { return sample(sites_, nullptr, false, key); });
   }
 
  private:
-  void sample(const SiteBlock& sites, const OldSurfaces* old, bool has_history, const RngKey& key,
-              const PixelSamples& samples) {
-    const EnvironmentView now = view_of(light_->now);
-    const EnvironmentView before = view_of(light_->before);
-    sampler_->sample({.sites = sites,
-                      .light = *light_,
-                      .presampled = light_->presampled->sets.front(),
-                      .now = now,
-                      .before = before,
-                      .key = key,
-                      .rounds_before = 1,
-                      .has_history = has_history,
-                      .old = old},
-                     *scratch_, samples);
+  /// Lns.
+  float sample(const SiteBlock& sites, const OldSurfaces* old, bool has_history,
+               const RngKey& key) {
+    const RoundLight light{*light_};
+    RayBatch batch;
+    const SiteOrigins origins{};
+    RayWriter rays(origins, batch);
+    sampler_->begin_round(state_, false);
+    return sampler_
+        ->sample({.sites = sites,
+                  .light = light,
+                  .presampled = light_->presampled->sets.front(),
+                  .key = key,
+                  .rounds_before = 1,
+                  .start = {.has_history = has_history, .old = old}},
+                 {state_, 0}, rays)
+        .lns;
   }
-  LnsMean over_runs(const std::function<void(const RngKey&, const PixelSamples&)>& estimate) {
+  LnsMean over_runs(const std::function<float(const RngKey&)>& estimate) {
     constexpr int kRuns = 3000;
     double sum = 0, squares = 0;
     for (int run = 1; run <= kRuns; ++run) {
-      std::array<OctDirection, 16> direction{};
-      std::array<std::uint8_t, 16> site{};
-      std::array<float, 16> weight{}, r{}, g{}, b{};
-      float lns = 0, lns_fresh = 0;
-      PixelSource source = PixelSource::background;
-      estimate({.job_seed = static_cast<std::uint64_t>(run), .frame = 1, .pixel = 1},
-               {direction, site, weight, r, g, b, lns, lns_fresh, source});
+      state_.resize(*context_->method.format, {0, 0, 1, 1}, 16);
+      const double lns =
+          estimate({.job_seed = static_cast<std::uint64_t>(run), .frame = 1, .pixel = 1});
       sum += lns;
-      squares += double{lns} * lns;
+      squares += lns * lns;
     }
     const double mean = sum / kRuns;
     return {mean, (squares / kRuns - mean * mean) / (kRuns - 1)};
@@ -187,11 +185,11 @@ class TurningViewer {
 
   JobSpec job_;
   std::shared_ptr<const RenderContext> context_;
-  std::unique_ptr<const PixelSampler> sampler_ = make_pixel_sampler(population_spec(job_));
+  std::unique_ptr<TileSampler> sampler_ = context_->method.start();
+  SampleState state_;
   std::shared_ptr<const FrameLight> light_;
   SiteBlock sites_;
   OldSurfaces old_;
-  std::unique_ptr<SamplerScratch> scratch_ = std::make_unique<SamplerScratch>();
 };
 
 double z_score(const LnsMean& a, const LnsMean& b) {

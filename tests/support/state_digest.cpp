@@ -12,7 +12,7 @@
 #include "common/base/digest.h"
 #include "common/base/files.h"
 #include "common/base/limits.h"
-#include "common/state/sample_state.h"
+#include "common/state/sample_planes.h"
 
 namespace {
 
@@ -22,18 +22,19 @@ using FramePixels = std::map<PixelKey, baton::Bytes>;
 /// Adds the samples of each pixel of one tile to its frame.
 void add_pixels(const baton::SampleState& state, FramePixels& pixels) {
   const auto num_particles = static_cast<std::size_t>(state.num_particles);
+  const baton::ConstSamplePlanes samples(state);
   for (std::size_t pixel = 0; pixel < state.num_pixels(); ++pixel) {
     baton::ByteWriter writer;
     const auto populations = static_cast<std::size_t>(state.num_populations);
     for (std::size_t row = pixel * populations; row < (pixel + 1) * populations; ++row) {
-      writer.put(state.lns[row]);
-      writer.put(state.lns_fresh[row]);
+      writer.put(samples.lns[row]);
+      writer.put(samples.lns_fresh[row]);
       writer.put(static_cast<std::uint8_t>(state.source[row]));
     }
     for (std::size_t i = pixel * num_particles; i < (pixel + 1) * num_particles; ++i) {
-      writer.put(state.direction[i]);
-      writer.put(state.weight[i]);
-      writer.put(state.site[i]);
+      writer.put(samples.direction[i]);
+      writer.put(samples.weight[i]);
+      writer.put(samples.site[i]);
     }
     const auto width = static_cast<std::size_t>(state.rect.width());
     const auto x = static_cast<std::int32_t>(pixel % width) + state.rect.x0;

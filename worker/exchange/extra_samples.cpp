@@ -2,21 +2,44 @@
 
 #include "common/base/poison.h"
 #include "worker/exchange/energy_exchange.h"
-#include "worker/method/populations.h"
+#include "worker/method/weighted/populations.h"
 #include "worker/pass/cpu_clock.h"
 #include "worker/pass/primary.h"
 #include "worker/sampling/folds.h"
 
 namespace baton {
+namespace {
+
+/// One population of one pixel.
+struct DrawnSet {
+  template <class T>
+  using Column = std::array<T, limits::kMaxParticles>;
+  Column<OctDirection> direction;
+  Column<std::uint8_t> site;
+  Column<float> weight, r, g, b, target;
+  float lns, lns_fresh;
+  PixelSource source;
+
+  PixelSamples samples(std::size_t n) {
+    return {std::span(direction).first(n),
+            std::span(site).first(n),
+            std::span(weight).first(n),
+            std::span(r).first(n),
+            std::span(g).first(n),
+            std::span(b).first(n),
+            lns,
+            lns_fresh,
+            source};
+  }
+};
+
+}  // namespace
 
 ExtraSampler::ExtraSampler(const SecondPassWork& work)
     : work_(work),
-      now_(view_of(work.light.now)),
-      before_(view_of(work.light.before)),
-      sampler_(make_pixel_sampler(population_spec(work.context.job))),
-      scratch_(std::make_unique<SamplerScratch>()) {
-  drawn_.resize({0, 0, 1, 1}, population_spec(work.context.job).num_particles);
-}
+      light_{work.light},
+      num_samples_(static_cast<std::size_t>(population_spec(work.context.job).num_particles)),
+      sampler_(make_fresh_sampler(population_spec(work.context.job))) {}
 
 Rgb ExtraSampler::radiance(std::int32_t x, std::int32_t y, std::size_t fold) {
   const std::int32_t position = work_.surfaces.find(work_.masks.any.index(x, y));
@@ -40,7 +63,8 @@ Rgb ExtraSampler::first_pass(const SampleRegion::Place& pixel, std::size_t fold)
   const FirstPassSamples& from = *place.tile;
   kernels::ShadedSamples shaded;
   poison(shaded);
-  kernels::shade_samples(sites_, now_, std::span(from.direction).subspan(place.first, place.count),
+  kernels::shade_samples(sites_, light_.now,
+                         std::span(from.direction).subspan(place.first, place.count),
                          std::span(from.site).subspan(place.first, place.count), shaded);
   Rgb sum;
   for (std::size_t i = 0; i < place.count; ++i) {
@@ -60,30 +84,32 @@ void ExtraSampler::draw(std::int32_t x, std::int32_t y, std::size_t fold,
     if (hits[s].hit) origins.set(s, hits[s].ray_origin);
   }
   const auto count = static_cast<std::uint32_t>(work_.context.job.visibility.partitions);
-  SampleColors colors;
-  std::array<float, limits::kMaxParticles> targets{};
   for (std::uint32_t c = 0; c < count; ++c) {
     // Streams 0 and 1 are the first pass's populations.
     const std::uint32_t stream = 2 + static_cast<std::uint32_t>(fold) * count + c;
     const JobSpec& job = work_.context.job;
     const RngKey key =
         pixel_key(stream_seed(job.seed, stream), work_.frame.number.value(), job.image.width, x, y);
-    poison(*scratch_);
-    sample_populations(*sampler_, static_cast<std::size_t>(drawn_.num_particles),
-                       {sites_, work_.light, work_.light.presampled->of(x, y), now_, before_, key,
-                        work_.frame.step.value(), false},
-                       0, *scratch_, drawn_, colors);
-    cast_samples({.direction = drawn_.direction,
-                  .site = drawn_.site,
-                  .weight = drawn_.weight,
-                  .r = colors.r.data(),
-                  .g = colors.g.data(),
-                  .b = colors.b.data(),
-                  .unit_contribution = unit_contribution(drawn_, 0, 0),
+    DrawnSet drawn;
+    poison(drawn);
+    const PixelSamples samples = drawn.samples(num_samples_);
+    sampler_->sample({.sites = sites_,
+                      .light = light_,
+                      .presampled = work_.light.presampled->of(x, y),
+                      .key = key,
+                      .rounds_before = work_.frame.step.value()},
+                     samples);
+    cast_samples({.direction = samples.direction,
+                  .site = samples.site,
+                  .weight = samples.weight,
+                  .r = samples.r.data(),
+                  .g = samples.g.data(),
+                  .b = samples.b.data(),
+                  .unit_contribution = samples.lns,
                   .picture_scale = 1,
                   .visibility_scale = 1,
                   .first_sample = 0},
-                 origins, rays_, std::span(targets).first(drawn_.weight.size()));
+                 origins, rays_, std::span(drawn.target).first(num_samples_));
   }
 }
 

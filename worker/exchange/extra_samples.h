@@ -2,10 +2,8 @@
 
 #include <memory>
 
-#include "common/state/sample_state.h"
 #include "worker/exchange/second_pass_work.h"
-#include "worker/method/pixel_sampler.h"
-#include "worker/method/ray_batch.h"
+#include "worker/method/weighted/pixel_samples.h"
 
 namespace baton {
 
@@ -29,10 +27,9 @@ class ExtraSampler {
   Rgb trace();
 
   const SecondPassWork& work_;
-  const EnvironmentView now_, before_;
-  const std::unique_ptr<const PixelSampler> sampler_;
-  std::unique_ptr<SamplerScratch> scratch_;
-  SampleState drawn_;  ///< one population of one pixel
+  const RoundLight light_;
+  const std::size_t num_samples_;  ///< of a population
+  const std::unique_ptr<FreshSampler> sampler_;
   SiteBlock sites_;
   RayBatch rays_;
   std::uint64_t rays_traced_ = 0;

@@ -1,31 +1,31 @@
 #include "worker/pass/aside.h"
 
-#include "common/base/poison.h"
-
 namespace baton {
 
-Rgb AsideSampler::sample(const PixelMethod& method, const PixelInput& pixel, const Aside& aside,
-                         const SampleState& like, SamplerScratch& scratch) {
-  state_.resize({0, 0, 1, 1}, like.num_particles, like.num_populations);
-  if (!like.memory.empty()) state_.add_memory();
-  if (aside.memory != nullptr) state_.memory[0] = *aside.memory;
-  target_.resize(static_cast<std::size_t>(like.num_particles));
-  const PixelInput input{.sites = aside.sites,
-                         .light = aside.light,
-                         .presampled = aside.presampled,
-                         .now = pixel.now,
-                         .before = pixel.before,
-                         .key = aside.key,
-                         .rounds_before = pixel.rounds_before,
-                         .has_history = pixel.has_history && aside.memory != nullptr,
-                         .target = target_,
-                         .hits = aside.hits,
-                         .geometry = pixel.geometry};
+Rgb AsideSampler::sample(const PixelMethod& method, const PixelInput& input, const Aside& aside,
+                         const PixelState& pixel) {
+  const SampleState& tile = pixel.tile;
+  if (state_.format == tile.format && state_.num_particles == tile.num_particles) {
+    state_.forget_pixel(0);
+  } else {
+    state_.resize(*tile.format, {0, 0, 1, 1}, tile.num_particles, tile.num_populations);
+  }
+  if (!aside.starts_afresh) state_.copy_pixels(tile, pixel.index, 0, 1);
+  std::unique_ptr<TileSampler>& sampler = samplers_[&method];
+  if (sampler == nullptr) sampler = method.start();
+  sampler->begin_round(state_, false);
   rays_.clear();
   RayWriter writer(aside.origins, rays_);
-  poison(scratch);
-  method.sample(input, {state_, 0}, scratch, writer);
-  pixel.geometry->accel->occluded(rays_.rays);
+  sampler->sample({.sites = aside.sites,
+                   .light = aside.light,
+                   .presampled = aside.presampled,
+                   .key = aside.key,
+                   .rounds_before = input.rounds_before,
+                   .start = {.has_history = input.start.has_history && !aside.starts_afresh},
+                   .hits = aside.hits,
+                   .geometry = input.geometry},
+                  {state_, 0}, writer);
+  input.geometry->accel->occluded(rays_.rays);
   return writer.known.color + sum_free(rays_, 0, rays_.size()).color;
 }
 

@@ -1,6 +1,7 @@
 #pragma once
 
-#include <vector>
+#include <map>
+#include <memory>
 
 #include "worker/method/pixel_method.h"
 
@@ -15,20 +16,20 @@ class AsideSampler {
     const SiteBlock& sites;
     std::span<const SurfaceHit> hits;  ///< (S) of the sites
     const SiteOrigins& origins;        ///< where the sites' rays start
-    const FrameLight& light;
+    const RoundLight& light;
     const PresampledLight& presampled;  ///< the set of `light` that the pixel reads
     RngKey key;
-    const PixelMemory* memory = nullptr;  ///< what it starts from; null: afresh
+    bool starts_afresh = false;  ///< not from what the pixel carries
   };
 
-  /// The radiance, mean over the sites. pixel: what the method is given of the pixel itself. like:
-  /// a state of the job.
-  Rgb sample(const PixelMethod& method, const PixelInput& pixel, const Aside& aside,
-             const SampleState& like, SamplerScratch& scratch);
+  /// The radiance, mean over the sites. input: what the method is given of the pixel itself, whose
+  /// state stays as it is. method: lasts as long as the object.
+  Rgb sample(const PixelMethod& method, const PixelInput& input, const Aside& aside,
+             const PixelState& pixel);
 
  private:
+  std::map<const PixelMethod*, std::unique_ptr<TileSampler>> samplers_;
   SampleState state_;  ///< a state of one pixel
-  std::vector<float> target_;
   RayBatch rays_;
 };
 

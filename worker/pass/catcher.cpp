@@ -3,7 +3,6 @@
 #include <algorithm>
 
 #include "worker/accel/accel.h"
-#include "worker/method/populations.h"
 
 namespace baton {
 
@@ -46,20 +45,17 @@ Rgb dark_share(std::span<const SurfaceHit> hits, const SiteBlock& sites) {
 }
 
 bool belongs_to_object(const SampleState& state, std::size_t index) {
-  const PixelSource source = latest_source(state, index);
+  const PixelSource source = state.latest_source(index);
   return source != PixelSource::background && source != PixelSource::catcher;
 }
 
-bool takes_up(bool sees_catcher, SampleState& state, std::size_t index) {
-  const bool is_catchers = latest_source(state, index) == PixelSource::catcher;
-  if (sees_catcher) return is_catchers;
-  if (!is_catchers) return belongs_to_object(state, index);
-  if (PixelMemory* const memory = state.memory_of(index)) *memory = {};
-  return false;
+bool is_of_its_kind(bool sees_catcher, const SampleState& state, std::size_t index) {
+  return sees_catcher ? state.latest_source(index) == PixelSource::catcher
+                      : belongs_to_object(state, index);
 }
 
-Rgb CatcherEdge::sample(const PixelMethod& method, const PixelInput& input, const FrameLight& light,
-                        CatcherAlbedo& albedo, const SampleState& like, SamplerScratch& scratch) {
+Rgb CatcherEdge::sample(const PixelMethod& method, const PixelInput& input, CatcherAlbedo& albedo,
+                        const PixelState& pixel) {
   // The sites on catchers alone.
   hits_.assign(input.hits.begin(), input.hits.end());
   SiteOrigins origins;
@@ -75,10 +71,11 @@ Rgb CatcherEdge::sample(const PixelMethod& method, const PixelInput& input, cons
   const AsideSampler::Aside catcher{.sites = sites_,
                                     .hits = hits_,
                                     .origins = origins,
-                                    .light = light,
+                                    .light = input.light,
                                     .presampled = input.presampled,
-                                    .key = key};
-  return aside_.sample(method, input, catcher, like, scratch) + dark_share(hits_, sites_);
+                                    .key = key,
+                                    .starts_afresh = true};
+  return aside_.sample(method, input, catcher, pixel) + dark_share(hits_, sites_);
 }
 
 }  // namespace baton

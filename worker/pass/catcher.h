@@ -27,18 +27,18 @@ float catcher_share(std::span<const SurfaceHit> hits);
 /// that shadows take none away. sites: gathered of the hits.
 Rgb dark_share(std::span<const SurfaceHit> hits, const SiteBlock& sites);
 
-/// Prepares what a pixel carries for what it sees now: a catcher does not start from an object's
-/// memory, nor an object from a catcher's. Returns whether it starts from what is there.
-bool takes_up(bool sees_catcher, SampleState& state, std::size_t index);
-/// Whether the pixel's memory is an object's.
+/// Whether what the pixel carries is an object's.
 bool belongs_to_object(const SampleState& state, std::size_t index);
+/// Whether what the pixel carries is of what it sees now: a catcher does not start from an object's
+/// memory, nor an object from a catcher's.
+bool is_of_its_kind(bool sees_catcher, const SampleState& state, std::size_t index);
 
 /// The sites on catchers of a pixel that belongs to an object.
 class CatcherEdge {
  public:
   /// The share of the light that arrives, times that of the sites. input: the pixel's own.
-  Rgb sample(const PixelMethod& method, const PixelInput& input, const FrameLight& light,
-             CatcherAlbedo& albedo, const SampleState& like, SamplerScratch& scratch);
+  Rgb sample(const PixelMethod& method, const PixelInput& input, CatcherAlbedo& albedo,
+             const PixelState& pixel);
 
  private:
   std::vector<SurfaceHit> hits_;

@@ -6,7 +6,7 @@
 #include "common/image/noise.h"
 #include "common/job/job_spec.h"
 #include "common/state/sample_state.h"
-#include "worker/method/pixel_sampler.h"
+#include "worker/method/pixel_method.h"
 
 namespace baton {
 

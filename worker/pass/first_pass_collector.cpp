@@ -1,9 +1,11 @@
 #include "worker/pass/first_pass_collector.h"
 
+#include <algorithm>
+#include <iterator>
 #include <utility>
 
-#include "worker/method/populations.h"
-#include "worker/method/weighted_method.h"
+#include "common/state/sample_planes.h"
+#include "worker/method/weighted/populations.h"
 
 namespace baton {
 
@@ -18,6 +20,14 @@ void FirstPassCollector::begin(const SampleState& state) {
   samples_.count.assign(state.num_pixels(), 0);
 }
 
+void FirstPassCollector::add_rays(const SampleState& state, std::size_t pixel,
+                                  const FoundRays& found) {
+  const std::size_t first = pixel * static_cast<std::size_t>(state.num_particles);
+  for (std::size_t i = 0; i < found.sample.size(); ++i)
+    add_ray(state, first + found.sample[i], !found.free(i));
+}
+
+/// Rays must come by particle, ascending. particle: pixel * N + j.
 void FirstPassCollector::add_ray(const SampleState& state, std::size_t particle, bool occluded) {
   const auto n = static_cast<std::size_t>(state.num_particles);
   const std::size_t pixel = particle / n;
@@ -31,21 +41,22 @@ void FirstPassCollector::add_ray(const SampleState& state, std::size_t particle,
   if (!(picture_scale(job_, population) > 0)) return;
   ++samples_.count[pixel];
   samples_.slot.push_back(static_cast<std::uint8_t>(slot));
-  samples_.site.push_back(state.site[particle]);
-  samples_.direction.push_back(state.direction[particle]);
+  const ConstSamplePlanes planes(state);
+  samples_.site.push_back(planes.site[particle]);
+  samples_.direction.push_back(planes.direction[particle]);
   samples_.energy.push_back(unit_contribution(state, pixel, static_cast<std::size_t>(population)) *
-                            state.weight[particle]);
+                            planes.weight[particle]);
 }
 
 FirstPassSamples FirstPassCollector::finish(const SampleState& state, Step step) {
   samples_.step = step;
   for (std::size_t pixel = 0; pixel < state.num_pixels(); ++pixel) {
-    if (latest_source(state, pixel) != PixelSource::background)
+    if (state.latest_source(pixel) != PixelSource::background)
       samples_.flags[pixel] |= FirstPassSamples::kSurface;
   }
   const SecondPassForm form = job_.visibility.form;
   if (form == SecondPassForm::published || form == SecondPassForm::published_kept)
-    samples_.lns = state.lns;
+    std::ranges::copy(ConstSamplePlanes(state).lns, std::back_inserter(samples_.lns));
   samples_.keep_possible(job_.visibility.dilate);
   return std::exchange(samples_, {});
 }

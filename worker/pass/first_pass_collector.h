@@ -2,6 +2,7 @@
 
 #include "common/state/first_pass_samples.h"
 #include "common/state/sample_state.h"
+#include "worker/method/ray_batch.h"
 #include "worker/pass/render_context.h"
 
 namespace baton {
@@ -13,12 +14,14 @@ class FirstPassCollector {
 
   /// Starts a frame; state: the samples in work.
   void begin(const SampleState& state);
-  /// Takes a traced ray; they must come by particle, ascending. particle: pixel * N + j.
-  void add_ray(const SampleState& state, std::size_t particle, bool occluded);
+  /// Takes the traced rays of a pixel; pixels must come ascending.
+  void add_rays(const SampleState& state, std::size_t pixel, const FoundRays& found);
   /// Ends the frame.
   FirstPassSamples finish(const SampleState& state, Step step);
 
  private:
+  void add_ray(const SampleState& state, std::size_t particle, bool occluded);
+
   const JobSpec& job_;
   FirstPassSamples samples_;
 };

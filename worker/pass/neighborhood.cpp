@@ -4,6 +4,7 @@
 #include <cmath>
 
 #include "common/base/poison.h"
+#include "common/state/sample_planes.h"
 
 namespace baton {
 namespace {
@@ -62,17 +63,18 @@ std::span<const CarriedSet> Neighborhood::sets(std::size_t i, std::span<const Su
     if (place.state == nullptr) continue;
     const std::span<const SurfaceHit> old = old_pixels_.hits(place);
     const SampleState& state = *place.state;
-    if (!agrees(hits, old) || state.confidence[place.index] == 0) continue;
+    if (!agrees(hits, old) || confidence_plane(state)[place.index] == 0) continue;
     poison(surfaces_[count].sites);
     gather_sites(old_pixels_.geometry(), old, old_pixels_.looks(place), surfaces_[count].sites,
                  catchers);
     const auto n = static_cast<std::size_t>(state.num_particles);
     const std::size_t first = place.index * n;
-    sets_[count] = {.direction = std::span(state.direction).subspan(first, n),
-                    .site = std::span(state.site).subspan(first, n),
-                    .weight = std::span(state.weight).subspan(first, n),
-                    .lns = state.lns[place.index],
-                    .confidence = state.confidence[place.index],
+    const ConstSamplePlanes samples(state);
+    sets_[count] = {.direction = samples.direction.subspan(first, n),
+                    .site = samples.site.subspan(first, n),
+                    .weight = samples.weight.subspan(first, n),
+                    .lns = samples.lns[place.index],
+                    .confidence = confidence_plane(state)[place.index],
                     .surfaces = &surfaces_[count]};
     ++count;
   }

@@ -4,7 +4,7 @@
 #include <span>
 #include <vector>
 
-#include "worker/method/carried_set.h"
+#include "worker/method/carried/carried_set.h"
 #include "worker/pass/old_pixels.h"
 
 namespace baton {

@@ -3,19 +3,18 @@
 namespace baton {
 
 Rgb NoiseProbe::sample_again(const PixelMethod& method, const PixelInput& input,
-                             const FrameLight& light, const PresampledLight& presampled,
-                             SampleState& state, std::size_t index, const SiteOrigins& origins,
-                             SamplerScratch& scratch) {
+                             const RoundLight& light, const PresampledLight& presampled,
+                             const PixelState& pixel, const SiteOrigins& origins) {
   RngKey key = input.key;
   key.round = static_cast<std::uint32_t>(kProbeRound.value()) - key.round;
-  const AsideSampler::Aside again{.sites = input.sites,
-                                  .hits = input.hits,
-                                  .origins = origins,
-                                  .light = light,
-                                  .presampled = presampled,
-                                  .key = key,
-                                  .memory = state.memory_of(index)};
-  return aside_.sample(method, input, again, state, scratch);
+  return aside_.sample(method, input,
+                       {.sites = input.sites,
+                        .hits = input.hits,
+                        .origins = origins,
+                        .light = light,
+                        .presampled = presampled,
+                        .key = key},
+                       pixel);
 }
 
 }  // namespace baton

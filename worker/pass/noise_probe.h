@@ -29,11 +29,10 @@ constexpr bool is_probe(std::int32_t x, std::int32_t y, FrameNumber frame, std::
 class NoiseProbe {
  public:
   /// The radiance of a pixel, once more. input: what the method is about to be given. light:
-  /// of kProbeRound; presampled: what the pixel reads of it. state: of the pixel's tile, where it
-  /// is pixel `index`; stays as it is.
-  Rgb sample_again(const PixelMethod& method, const PixelInput& input, const FrameLight& light,
-                   const PresampledLight& presampled, SampleState& state, std::size_t index,
-                   const SiteOrigins& origins, SamplerScratch& scratch);
+  /// of kProbeRound, on the maps of the pixel's round; presampled: what the pixel reads of it.
+  Rgb sample_again(const PixelMethod& method, const PixelInput& input, const RoundLight& light,
+                   const PresampledLight& presampled, const PixelState& pixel,
+                   const SiteOrigins& origins);
 
  private:
   AsideSampler aside_;

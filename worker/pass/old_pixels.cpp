@@ -2,7 +2,6 @@
 
 #include <algorithm>
 
-#include "worker/method/populations.h"
 #include "worker/pass/render_context.h"
 #include "worker/pass/site_rays.h"
 
@@ -26,7 +25,7 @@ std::optional<OldPixels::Place> OldPixels::ask(std::int32_t x, std::int32_t y) {
   const SampleState& state = **found;
   const auto index =
       static_cast<std::size_t>((y - state.rect.y0) * state.rect.width() + x - state.rect.x0);
-  if (latest_source(state, index) == PixelSource::background) return std::nullopt;
+  if (state.latest_source(index) == PixelSource::background) return std::nullopt;
   num_rays_ += static_cast<std::uint64_t>(job_.image.sites);
   const TileSurfaces* const kept = kept_[static_cast<std::size_t>(found - states_.begin())].get();
   if (kept != nullptr) return Place{&state, index, kept};

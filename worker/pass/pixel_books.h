@@ -5,7 +5,7 @@
 
 #include "common/job/task.h"
 #include "worker/accel/accel.h"
-#include "worker/method/pixel_sampler.h"
+#include "worker/method/pixel_method.h"
 #include "worker/pass/film_writer.h"
 
 namespace baton {

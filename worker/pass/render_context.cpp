@@ -14,13 +14,13 @@ namespace baton {
 namespace {
 
 /// The method of each material that has a setting of its own, beside methods that draw anew.
-std::vector<std::unique_ptr<const PixelMethod>> make_own_methods(const JobSpec& job) {
-  std::vector<std::unique_ptr<const PixelMethod>> methods;
+std::vector<PixelMethod> make_own_methods(const JobSpec& job) {
+  std::vector<PixelMethod> methods;
   for (const auto& [name, material] : job.scene.materials) {
     const auto own = job.sampling.by_material.find(name);
     const bool is_used =
         traits(job.sampling.method).draws_anew && own != job.sampling.by_material.end();
-    methods.push_back(is_used ? make_material_method(own->second) : nullptr);
+    methods.push_back(is_used ? make_material_method(own->second) : PixelMethod{});
   }
   return methods;
 }

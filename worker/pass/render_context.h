@@ -24,8 +24,9 @@ class RenderContext {
   std::vector<FrameSpec> frames;
   std::shared_ptr<const Scene> scene;
   std::unique_ptr<GeometrySequence> geometry;
-  std::unique_ptr<const PixelMethod> method;
-  std::vector<std::unique_ptr<const PixelMethod>> own_methods;  ///< (materials); null: `method`
+  PixelMethod method;
+  /// (materials), which have no `start` where `method` samples them.
+  std::vector<PixelMethod> own_methods;
   std::unique_ptr<LightSequence> lights;
   /// Surfaces of the last frames, where things move.
   std::shared_ptr<SurfaceCache> surfaces;

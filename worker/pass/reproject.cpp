@@ -4,7 +4,7 @@
 #include <cmath>
 
 #include "common/job/motion.h"
-#include "worker/method/populations.h"
+#include "common/state/state_format.h"
 
 namespace baton {
 namespace {
@@ -31,21 +31,6 @@ bool see_the_same(std::span<const SurfaceHit> a, std::span<const SurfaceHit> b) 
   return std::ranges::equal(a, b, [](const SurfaceHit& one, const SurfaceHit& other) {
     return one.hit || other.hit ? one == other : true;
   });
-}
-
-/// Copies all that a pixel carries.
-void copy_pixel(const SampleState& from, std::size_t source, SampleState& to, std::size_t target) {
-  const auto copy = [&](const auto& in, auto& out, std::int32_t per_pixel) {
-    const auto count = static_cast<std::size_t>(per_pixel);
-    std::copy_n(in.data() + source * count, count, out.data() + target * count);
-  };
-  copy(from.direction, to.direction, to.num_particles);
-  copy(from.site, to.site, to.num_particles);
-  copy(from.weight, to.weight, to.num_particles);
-  copy(from.lns, to.lns, to.num_populations);
-  copy(from.lns_fresh, to.lns_fresh, to.num_populations);
-  if (!to.memory.empty()) to.memory[target] = from.memory[source];
-  if (!to.confidence.empty()) copy(from.confidence, to.confidence, 1);
 }
 
 }  // namespace
@@ -179,15 +164,14 @@ std::uint8_t Reprojection::find_heir(std::span<const SurfaceHit> hits,
 /// Copies all samples, each to a site that inherits it.
 void Reprojection::copy_samples(const Slot& slot, const Inheritance& inheritance, std::size_t pixel,
                                 SampleState& state) const {
-  copy_pixel(*slot.old->state, slot.old->index, state, pixel);
-  const auto num_particles = static_cast<std::size_t>(state.num_particles);
+  state.copy_pixels(*slot.old->state, slot.old->index, pixel, 1);
   const Rng rng(slot.key, PassId::reproject);
-  for (std::size_t j = 0; j < num_particles; ++j) {
-    std::uint8_t& site = state.site[pixel * num_particles + j];
+  state.format->move_to_sites(state, pixel, [&](std::uint8_t site, std::size_t particle) {
     const std::uint32_t heirs = inheritance.count[site];
-    const std::uint32_t k = heirs > 1 ? rng.bits(1, static_cast<std::uint32_t>(j))[0] % heirs : 0;
-    site = find_heir(slot.hits, inheritance, site, k);
-  }
+    const std::uint32_t k =
+        heirs > 1 ? rng.bits(1, static_cast<std::uint32_t>(particle))[0] % heirs : 0;
+    return find_heir(slot.hits, inheritance, site, k);
+  });
 }
 
 PixelHistory Reprojection::take(std::size_t i, std::size_t pixel, CatcherAlbedo& catchers,
@@ -198,7 +182,7 @@ PixelHistory Reprojection::take(std::size_t i, std::size_t pixel, CatcherAlbedo&
 
   // Where nothing has changed, everything stays as it is.
   if (slot.same_pixel && see_the_same(old_hits, slot.hits)) {
-    copy_pixel(*slot.old->state, slot.old->index, state, pixel);
+    state.copy_pixels(*slot.old->state, slot.old->index, pixel, 1);
     return PixelHistory::same;
   }
 

@@ -5,10 +5,10 @@
 #include <vector>
 
 #include "worker/accel/geometry_sequence.h"
+#include "worker/method/carried/old_surfaces.h"
 #include "worker/pass/neighborhood.h"
 #include "worker/pass/old_pixels.h"
 #include "worker/pass/primary.h"
-#include "worker/surface/old_surfaces.h"
 
 namespace baton {
 

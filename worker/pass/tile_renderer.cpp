@@ -105,11 +105,18 @@ class TileWalk {
       if (shares_ && round == first) history.emplace(context_, *geometry_, *before_, previous);
       const auto whole = kept_surfaces(frame.round_of_frame(round), history.has_value());
       if (history && whole != nullptr) keep_for_next(frame, whole);
-      renderer_->begin_round(state_, history ? &*history : nullptr, has_history_);
+      const bool goes_on = has_history_ && !history;
+      renderer_->begin_round(state_, goes_on);
       for (RoundPixels& part : parts_of(std::move(pixels), whole != nullptr)) {
         const auto surfaces = surfaces_of(frame.round_of_frame(round), std::move(part), whole);
         if (is_seen) planes.add(*surfaces);
-        renderer_->render({frame, round, *light, *surfaces, is_seen ? probe_light.get() : nullptr},
+        renderer_->render({.frame = frame,
+                           .round = round,
+                           .light = *light,
+                           .surfaces = *surfaces,
+                           .probe_light = is_seen ? probe_light.get() : nullptr,
+                           .history = history ? &*history : nullptr,
+                           .goes_on = goes_on},
                           state_, mean);
       }
       has_history_ = carries_state(context_.job);
@@ -134,12 +141,8 @@ class TileWalk {
  private:
   /// Empties the samples.
   void start_state() {
-    state_.resize(rect_, num_carried_particles(context_.job.sampling),
+    state_.resize(*context_.method.format, rect_, num_carried_particles(context_.job.sampling),
                   num_populations(context_.job));
-    if (!carries_state(context_.job)) return;
-    const Carried carried = traits(context_.job.sampling.method).carried;
-    if (carried == Carried::memory) state_.add_memory();
-    if (carried == Carried::weighed_samples) state_.add_confidence();
   }
   /// Where surfaces move, a frame has a geometry, surfaces and a state of its own.
   Status prepare(const FrameSpec& frame) {

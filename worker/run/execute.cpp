@@ -51,7 +51,8 @@ Result<std::vector<StatePtr>> read_states(const LoadedJob& loaded, const BlobSto
       return Error{ErrorKind::io, fmt::format("{}: is not held here", blob_name(input))};
     if (state == nullptr) {
       BATON_ASSIGN(const Bytes bytes, store.get(input.digest));
-      BATON_ASSIGN(SampleState decoded, decode_state(bytes, blob_name(input)));
+      BATON_ASSIGN(SampleState decoded,
+                   decode_state(bytes, blob_name(input), *loaded.context->method.format));
       state = std::make_shared<const SampleState>(std::move(decoded));
       if (moves(loaded.job)) loaded.states->keep(input.digest, state);
     }

@@ -10,6 +10,7 @@
 #include "common/job/plan/sequence.h"
 #include "common/job/text/job_json.h"
 #include "common/scene/settle/settle_motion.h"
+#include "common/state/sample_planes.h"
 #include "common/state/source_names.h"
 #include "worker/pass/render_context.h"
 #include "worker/run/local_render.h"
@@ -87,17 +88,18 @@ std::string describe_pixel(const RenderedTile& last, const PixelPosition& positi
   if (!last.state) return text;
 
   const SampleState& state = *last.state;
+  const ConstSamplePlanes samples(state);
   const auto populations = static_cast<std::size_t>(state.num_populations);
   for (std::size_t row = pixel * populations; row < (pixel + 1) * populations; ++row) {
     fmt::format_to(out, "  state: {}, lns {}, lns when fresh {}\n", source_name(state.source[row]),
-                   state.lns[row], state.lns_fresh[row]);
+                   samples.lns[row], samples.lns_fresh[row]);
   }
   const auto num_particles = static_cast<std::size_t>(state.num_particles);
   for (std::size_t i = 0; i < num_particles; ++i) {
     const std::size_t particle = pixel * num_particles + i;
-    const Vec3 w = decode_octahedral(state.direction[particle]);
+    const Vec3 w = decode_octahedral(samples.direction[particle]);
     fmt::format_to(out, "  particle {:2}: site {:2} weight {:.6f} direction {:.5f} {:.5f} {:.5f}\n",
-                   i, state.site[particle], state.weight[particle], w.x, w.y, w.z);
+                   i, samples.site[particle], samples.weight[particle], w.x, w.y, w.z);
   }
   return text;
 }

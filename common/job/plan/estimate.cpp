@@ -6,7 +6,7 @@
 #include "common/job/aov.h"
 #include "common/job/motion.h"
 #include "common/job/plan/sequence.h"
-#include "common/state/sample_state.h"
+#include "common/state/sample_planes.h"
 
 namespace baton {
 namespace {
@@ -21,11 +21,9 @@ std::int64_t count_neighbours(const JobSpec& job, std::int32_t reach_px) {
 }
 
 std::int64_t state_bytes_per_pixel(const JobSpec& job) {
-  const Carried carried = traits(job.sampling.method).carried;
-  return static_cast<std::int64_t>(SampleState::bytes_per_pixel(
-      static_cast<std::size_t>(num_carried_particles(job.sampling)),
-      static_cast<std::size_t>(num_populations(job)), carried == Carried::memory,
-      carried == Carried::weighed_samples));
+  const std::size_t samples =
+      sample_format().most_stored_bytes(num_carried_particles(job.sampling), num_populations(job));
+  return static_cast<std::int64_t>(samples) + traits(job.sampling.method).most_bytes_beside_samples;
 }
 
 }  // namespace

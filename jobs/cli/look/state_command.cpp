@@ -6,6 +6,7 @@
 
 #include "common/base/files.h"
 #include "common/base/limits.h"
+#include "common/state/sample_planes.h"
 #include "common/state/source_names.h"
 #include "jobs/cli/commands.h"
 #include "jobs/cli/text.h"
@@ -37,9 +38,8 @@ struct StateReport {
 double pixel_ess(const SampleState& state, std::size_t pixel) {
   double squares = 0;
   const auto n = static_cast<std::size_t>(state.num_particles);
-  for (std::size_t i = pixel * n; i < (pixel + 1) * n; ++i) {
-    squares += static_cast<double>(state.weight[i]) * static_cast<double>(state.weight[i]);
-  }
+  for (const double weight : ConstSamplePlanes(state).weight.subspan(pixel * n, n))
+    squares += weight * weight;
   return squares > 0 ? double{1} * state.num_populations * state.num_populations / squares : 0;
 }
 
@@ -124,17 +124,18 @@ ordered_json pixel_json(const SampleState& state, std::int32_t x, std::int32_t y
                                               x - state.rect.x0);
   const std::size_t row = pixel * static_cast<std::size_t>(state.num_populations);  // the first one
   ordered_json particles = ordered_json::array();
+  const ConstSamplePlanes samples(state);
   const auto n = static_cast<std::size_t>(state.num_particles);
   for (std::size_t i = pixel * n; i < (pixel + 1) * n; ++i) {
-    const Vec3 w = decode_octahedral(state.direction[i]);
+    const Vec3 w = decode_octahedral(samples.direction[i]);
     particles.push_back(
-        {{"direction", {w.x, w.y, w.z}}, {"weight", state.weight[i]}, {"site", state.site[i]}});
+        {{"direction", {w.x, w.y, w.z}}, {"weight", samples.weight[i]}, {"site", samples.site[i]}});
   }
   return {{"x", x},
           {"y", y},
           {"source", source_name(state.source[row])},
-          {"lns", state.lns[row]},
-          {"lnsFresh", state.lns_fresh[row]},
+          {"lns", samples.lns[row]},
+          {"lnsFresh", samples.lns_fresh[row]},
           {"ess", pixel_ess(state, pixel)},
           {"particles", std::move(particles)}};
 }

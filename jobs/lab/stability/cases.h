@@ -6,7 +6,7 @@
 
 #include "jobs/lab/stability/laws.h"
 #include "jobs/lab/stability/stage.h"
-#include "worker/method/pixel_sampler.h"
+#include "worker/method/pixel_method.h"
 
 namespace baton::stability {
 
@@ -63,8 +63,8 @@ std::vector<Case> all_cases();
 struct Subject {
   std::string name;
   std::function<void(JobSpec&)> configure;
-  /// Set in tests of the machinery only: replaces the product's sampler.
-  std::function<std::unique_ptr<const PixelSampler>(const SamplingSpec&)> sampler{};
+  /// Set in tests of the machinery only: replaces the product's method.
+  std::function<PixelMethod(const JobSpec&)> method{};
 };
 
 /// Every value of Method but `automatic` with its default settings, then the published forms of the

@@ -12,7 +12,6 @@
 #include "common/job/text/frame_range.h"
 #include "jobs/lab/stability/parallel.h"
 #include "tests/support/local_frames.h"
-#include "worker/method/weighted_method.h"
 #include "worker/pass/render_context.h"
 
 namespace baton::stability {
@@ -85,8 +84,7 @@ class SharedLights {
       owner = std::const_pointer_cast<RenderContext>(first);
     }
     const auto context = std::const_pointer_cast<RenderContext>(loaded);
-    if (subject.sampler)
-      context->method = std::make_unique<WeightedMethod>(job, subject.sampler(job.sampling));
+    if (subject.method) context->method = subject.method(job);
     std::swap(context->lights, owner->lights);
     Status status = render_run(*context, judged, run);
     std::swap(context->lights, owner->lights);

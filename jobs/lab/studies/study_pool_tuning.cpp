@@ -65,7 +65,7 @@ void measure(Variant& variant, JobSpec job, std::uint64_t seed, const FilmTile& 
              const SharedAssetsPtr& assets) {
   job.seed = seed;
   const std::vector<FrameResult> frames = render(job, assets, {}, [&](RenderContext& context) {
-    context.method = std::make_unique<PoolMethod>(job.sampling, variant.tuning);
+    context.method = make_pool_method(job, variant.tuning);
   });
   const double error = rmse(frames.back().film, truth);
   variant.squared_error.push_back(error * error);

@@ -7,8 +7,8 @@
 #include <vector>
 
 #include "tests/support/instruction_sets.h"
-#include "worker/light/carried_light.h"
 #include "worker/light/frame_light.h"
+#include "worker/method/carried/carried_light.h"
 #include "worker/method/ratio/ratio_kernels.h"
 #include "worker/method/restir/restir_kernels.h"
 #include "worker/surface/bsdf.h"

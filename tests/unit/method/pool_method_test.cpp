@@ -8,6 +8,7 @@
 #include <memory>
 #include <vector>
 
+#include "common/state/memory_plane.h"
 #include "tests/support/remembered.h"
 #include "worker/sampling/light_noise.h"
 #include "worker/surface/bsdf.h"
@@ -49,26 +50,27 @@ SiteBlock pixel(bool glossy) {
   return sites;
 }
 
-/// One pixel without a memory and what sampling it needs.
+/// One pixel and what sampling it needs.
 struct OnePixel {
-  OnePixel() { state.resize({0, 0, 1, 1}, 0); }
-  PixelDiagnostics sample(const SamplingSpec& spec, const FrameLight& light, const SiteBlock& sites,
-                          std::uint32_t number) {
-    const EnvironmentView view = view_of(light.now);
+  OnePixel(const SamplingSpec& spec, bool remembers)
+      : sampler(std::make_unique<PoolSampler>(spec, remembers)) {
+    if (remembers) state.resize(memory_format(), {0, 0, 1, 1}, 0);
+    if (!remembers) state.resize(sample_format(), {0, 0, 1, 1}, 0);
+  }
+  PixelDiagnostics sample(const FrameLight& light, const SiteBlock& sites, std::uint32_t number) {
+    const RoundLight round{light};
     RayBatch batch;
     const SiteOrigins origins{};
     RayWriter rays(origins, batch);
-    return PoolMethod(spec).sample({.sites = sites,
-                                    .light = light,
-                                    .presampled = light.presampled->sets.front(),
-                                    .now = view,
-                                    .before = view,
-                                    .key = {.job_seed = 5, .pixel = number}},
-                                   {state, 0}, *scratch, rays);
+    return sampler->sample({.sites = sites,
+                            .light = round,
+                            .presampled = light.presampled->sets.front(),
+                            .key = {.job_seed = 5, .pixel = number}},
+                           {state, 0}, rays);
   }
 
   SampleState state;
-  std::unique_ptr<SamplerScratch> scratch = std::make_unique<SamplerScratch>();
+  std::unique_ptr<PoolSampler> sampler;
 };
 
 SamplingSpec spec_of(std::int32_t num_candidates) {
@@ -80,17 +82,19 @@ SamplingSpec spec_of(std::int32_t num_candidates) {
 
 class PoolCounts : public testing::Test {
  protected:
-  /// Candidates of a pixel in all. The noise that they show is then in scratch->rays.
+  /// Candidates of a pixel in all. The noise that they show is then in seen_.
   std::int32_t sample(const FrameLight& light, const SiteBlock& sites, std::int32_t num_candidates,
                       const LightVariance& known) {
-    pixel_.state.add_memory();
-    remember_ray(pixel_.state.memory[0], 0, true);
-    remember_light_variance(PoolTuning{}, known, pixel_.state.memory[0]);
-    return pixel_.sample(spec_of(num_candidates), light, sites, 0).target_evaluations;
+    OnePixel pixel(spec_of(num_candidates), true);
+    PixelMemory& memory = memory_plane(pixel.state)[0];
+    remember_ray(memory, 0, true);
+    remember_light_variance(PoolTuning{}, known, memory);
+    const PixelDiagnostics did = pixel.sample(light, sites, 0);
+    seen_ = pixel.sampler->light_variance_seen();
+    return did.target_evaluations;
   }
 
-  OnePixel pixel_;
-  SamplerScratch* const scratch = pixel_.scratch.get();
+  LightVariance seen_;
 };
 
 // A pixel without memory reads whole blocks of the pool, whatever M is: else the same eighths of
@@ -102,10 +106,9 @@ TEST_F(PoolCounts, AnyNumberOfCandidatesSeesTheWholeMap) {
   for (const std::int32_t num_candidates : {25, 50, 63, 64, 130}) {
     double sum = 0;
     constexpr std::uint32_t kPixels = 4000;
-    OnePixel pixel;
+    OnePixel pixel(spec_of(num_candidates), false);
     for (std::uint32_t i = 0; i < kPixels; ++i) {
-      pixel.sample(spec_of(num_candidates), flat, sites, i);
-      sum += pixel.state.lns[0];
+      sum += pixel.sample(flat, sites, i).lns;
     }
     const double albedo = sites.kd_r[0];
     EXPECT_NEAR(sum / kPixels / albedo, 1, 0.01) << "M = " << num_candidates;
@@ -120,7 +123,7 @@ TEST_F(PoolCounts, OfTheLightAreAlwaysEnoughToTellTheirNoise) {
     for (const std::int32_t num_candidates : {1, 8, 16, 32, 64, 100}) {
       for (const float noise : {0.0f, 1e-12f}) {
         sample(light, pixel(glossy), num_candidates, {noise, noise});
-        EXPECT_GT(scratch->rays.light_variance.from_light, 0) << num_candidates << " " << noise;
+        EXPECT_GT(seen_.from_light, 0) << num_candidates << " " << noise;
       }
     }
   }

@@ -83,14 +83,15 @@ class Follower {
     reprojection.look_up(surfaces_, 0, num_pixels, context_->frames[1]);
     found_.resize(num_pixels);
     SampleState state;
-    state.resize(states_[0]->rect, 16);
+    state.resize(sample_format(), states_[0]->rect, 16);
+    const SamplePlanes samples(state);
     for (std::size_t i = 0; i < num_pixels; ++i) {
       OldSurfaces old;
       CatcherAlbedo none;
       found_[i].history = reprojection.take(i, i, none, state, old);
-      found_[i].lns = state.lns[i];
-      std::copy_n(state.site.data() + 16 * i, 16, found_[i].site.data());
-      std::copy_n(state.weight.data() + 16 * i, 16, found_[i].weight.data());
+      found_[i].lns = samples.lns[i];
+      std::copy_n(samples.site.data() + 16 * i, 16, found_[i].site.data());
+      std::copy_n(samples.weight.data() + 16 * i, 16, found_[i].weight.data());
     }
   }
 

@@ -53,8 +53,10 @@ TEST(Restir, FreeSamplesAloneAreCarriedOn) {
   EXPECT_EQ(lit.films[0], all.films[0]);
   EXPECT_NE(lit.films[1], all.films[1]);
   std::size_t forgotten = 0;
-  for (std::size_t j = 0; j < lit.state.weight.size(); ++j)
-    forgotten += lit.state.weight[j] == 0 && all.state.weight[j] > 0 ? 1 : 0;
+  const auto lit_weight = ConstSamplePlanes(lit.state).weight;
+  const auto all_weight = ConstSamplePlanes(all.state).weight;
+  for (std::size_t j = 0; j < lit_weight.size(); ++j)
+    forgotten += lit_weight[j] == 0 && all_weight[j] > 0 ? 1 : 0;
   EXPECT_GT(forgotten, 0u);
   EXPECT_EQ(*decode_state(encode_state(lit.state), "test"), lit.state);
 }
@@ -67,7 +69,7 @@ TEST(Restir, ConfidenceGrowsByAFrameUpToTheLimit) {
     const SampleState state = render_tile(job).state;
     for (std::size_t i = 0; i < state.num_pixels(); ++i) {
       const bool seen = state.source[i] != PixelSource::background;
-      EXPECT_EQ(state.confidence[i], seen ? std::min(frames, 3) : 0);
+      EXPECT_EQ(confidence_plane(state)[i], seen ? std::min(frames, 3) : 0);
     }
   }
 }

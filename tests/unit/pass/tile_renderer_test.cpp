@@ -181,7 +181,7 @@ TEST(RunTile, AovsOfLightChangeNoPicture) {
     const test::TileResult plain = render_tile(job);
     job.output.aovs = {Aov::depth, Aov::variance, Aov::unshadowed, Aov::blocked};
     const test::TileResult with = render_tile(job);
-    EXPECT_EQ(with.state.memory, plain.state.memory);
+    EXPECT_EQ(with.state.planes, plain.state.planes);
     for (const char* const name : {"R", "G", "B", "A"}) {
       const auto a = channel(plain.films.back(), name), b = channel(with.films.back(), name);
       EXPECT_TRUE(std::ranges::equal(a, b)) << static_cast<int>(method) << " " << name;
@@ -241,10 +241,11 @@ TEST(RunTile, RefreshesByRatioAndCountsIt) {
 
   // No pixel may have left the band around its last start.
   const SampleState& state = result.state;
+  const ConstSamplePlanes samples(state);
   for (std::size_t i = 0; i < state.num_pixels(); ++i) {
     if (state.source[i] != PixelSource::carried) continue;
-    EXPECT_LE(state.lns[i], 1.0501f * state.lns_fresh[i]) << i;
-    EXPECT_GE(1.0501f * state.lns[i], state.lns_fresh[i]) << i;
+    EXPECT_LE(samples.lns[i], 1.0501f * samples.lns_fresh[i]) << i;
+    EXPECT_GE(1.0501f * samples.lns[i], samples.lns_fresh[i]) << i;
   }
 }
 
@@ -287,7 +288,7 @@ void expect_all_finite(const test::TileResult& result) {
   for (const FilmTile& film : result.films) {
     for (const float v : film.values) ASSERT_TRUE(std::isfinite(v));
   }
-  for (const float v : result.state.weight) ASSERT_TRUE(std::isfinite(v));
+  for (const float v : ConstSamplePlanes(result.state).weight) ASSERT_TRUE(std::isfinite(v));
 }
 
 TEST(RunTile, DegenerateInputGivesNoNan) {
@@ -317,7 +318,7 @@ TEST(RunTile, RefusesTheStateOfAnotherJobTileOrFrame) {
   const auto context = load_render_context(job, Digest{7, 7});
   ASSERT_TRUE(context.ok());
   SampleState state;
-  state.resize({0, 0, 12, 9}, 16);
+  state.resize(sample_format(), {0, 0, 12, 9}, 16);
   state.picture = {1, 2};
   const auto given = [](const SampleState& s) {
     return std::vector{std::make_shared<const SampleState>(s)};

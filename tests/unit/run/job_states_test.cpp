@@ -2,6 +2,7 @@
 
 #include <gtest/gtest.h>
 
+#include "common/state/memory_plane.h"
 #include "worker/pass/tile_renderer.h"
 
 namespace baton {
@@ -9,8 +10,11 @@ namespace {
 
 StatePtr state_of(std::int32_t side, bool with_memory) {
   SampleState state;
-  state.resize({0, 0, side, side}, with_memory ? 0 : 16);
-  if (with_memory) state.add_memory();
+  if (with_memory) {
+    state.resize(memory_format(), {0, 0, side, side}, 0);
+  } else {
+    state.resize(sample_format(), {0, 0, side, side}, 16);
+  }
   return std::make_shared<const SampleState>(std::move(state));
 }
 

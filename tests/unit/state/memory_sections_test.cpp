@@ -1,5 +1,5 @@
 // What pixels remember, in a file and back.
-#include "common/state/memory_sections.h"
+#include "common/state/memory_plane.h"
 
 #include <fmt/format.h>
 #include <gmock/gmock.h>
@@ -13,16 +13,15 @@ namespace {
 using testing::HasSubstr;
 
 /// One surface pixel whose rays agree, one whose rays do not.
-SampleState remembering_state() {
+SampleState remembering_state(std::int32_t num_particles = 2) {
   SampleState state = tiny_state();
-  state.resize({0, 0, 3, 1}, 2);
+  state.resize(memory_format(), {0, 0, 3, 1}, num_particles);
   state.source[1] = state.source[2] = PixelSource::carried;
-  state.add_memory();
-  PixelMemory& agreed = state.memory[1];
+  PixelMemory& agreed = memory_plane(state)[1];
   agreed.all_rays = 0x8003;
   agreed.outcomes = PixelMemory::kSawFree;
   agreed.lobe_noise = 0x3C01;
-  PixelMemory& disagreed = state.memory[2];
+  PixelMemory& disagreed = memory_plane(state)[2];
   disagreed.bins.cells[5] = 0x1234;
   disagreed.all_rays = 0x7771;
   disagreed.outcomes = PixelMemory::kSawBoth;
@@ -38,9 +37,10 @@ TEST(SampleState, RemembersRays) {
 TEST(SampleState, RemembersEveryBin) {
   SampleState state = remembering_state();
   for (const std::size_t step : {1, 2, 3, 31, 63}) {
-    state.memory[2].bins = {};
+    PixelMemory& memory = memory_plane(state)[2];
+    memory.bins = {};
     for (std::size_t bin = 0; bin < VisibilityBins::kCount; bin += step)
-      state.memory[2].bins.cells[bin] = static_cast<VisibilityCell>(0x1001 + bin);
+      memory.bins.cells[bin] = static_cast<VisibilityCell>(0x1001 + bin);
     EXPECT_EQ(*decode_state(encode_state(state), "test"), state) << step;
   }
 }
@@ -53,21 +53,17 @@ TEST(SampleState, RefusesMasksThatNameOtherCells) {
 
 TEST(SampleState, KeepsConfidences) {
   SampleState state = remembering_state();
-  state.memory.clear();
-  state.add_confidence();
-  state.confidence[1] = 1;
-  state.confidence[2] = 1000;
+  state.resize(weighed_sample_format(), state.rect, 2);
+  state.source[1] = state.source[2] = PixelSource::carried;
+  confidence_plane(state)[1] = 1;
+  confidence_plane(state)[2] = 1000;
   EXPECT_EQ(*decode_state(encode_state(state), "test"), state);
 }
 
 TEST(SampleState, NeedsNoParticlesBesideAMemory) {
-  SampleState state = remembering_state();
-  state.num_particles = 0;
-  state.direction.clear();
-  state.weight.clear();
-  state.site.clear();
+  SampleState state = remembering_state(0);
   EXPECT_EQ(*decode_state(encode_state(state), "test"), state);
-  state.memory.clear();
+  state.resize(sample_format(), state.rect, 0);
   const auto decoded = decode_state(encode_state(state), "a.bst");
   ASSERT_FALSE(decoded.ok());
   EXPECT_THAT(decoded.error().message, HasSubstr("section META: 0 particles, expected 1 to 64"));
@@ -87,13 +83,13 @@ TEST(SampleState, StoresOnlyBinsThatRaysReached) {
   EXPECT_EQ(raw_bytes(state, "VISS"), 8u);
   EXPECT_EQ(raw_bytes(state, "NOIS"), 4u);
   EXPECT_EQ(raw_bytes(state, "NOIL"), 4u);
-  state.memory.clear();
+  state.resize(sample_format(), state.rect, 2);
   EXPECT_EQ(raw_bytes(state, "VISS"), 0u);
 }
 
 TEST(SampleState, RefusesOutcomesThatCannotBe) {
   SampleState state = remembering_state();
-  state.memory[1].outcomes = 4;
+  memory_plane(state)[1].outcomes = 4;
   const auto decoded = decode_state(encode_state(state), "a.bst");
   ASSERT_FALSE(decoded.ok());
   EXPECT_THAT(decoded.error().message,
@@ -107,7 +103,7 @@ TEST(SampleState, RefusesNoiseThatIsNoNumber) {
     for (const std::uint16_t noise :
          {std::uint16_t{0x7F80}, std::uint16_t{0x8001}}) {  // infinite, negative
       SampleState state = remembering_state();
-      state.memory[2].*kind = noise;
+      memory_plane(state)[2].*kind = noise;
       const auto decoded = decode_state(encode_state(state), "a.bst");
       ASSERT_FALSE(decoded.ok());
       EXPECT_THAT(decoded.error().message,

@@ -21,23 +21,24 @@ using testing::HasSubstr;
 /// scattered directions.
 SampleState large_state() {
   SampleState state;
-  state.resize({64, 0, 128, 64}, 16);
+  state.resize(sample_format(), {64, 0, 128, 64}, 16);
+  const SamplePlanes samples(state);
   for (std::uint32_t pixel = 0; pixel < state.num_pixels(); ++pixel) {
     if (pixel % 64 < 8) continue;
     const Rng rng({.job_seed = 1, .frame = 0, .pixel = pixel}, PassId::move);
     state.source[pixel] = PixelSource::carried;
-    state.lns[pixel] = 0.5f + rng.uniforms(1, 0)[0];
-    state.lns_fresh[pixel] = 0.5f + rng.uniforms(1, 0)[1];
+    samples.lns[pixel] = 0.5f + rng.uniforms(1, 0)[0];
+    samples.lns_fresh[pixel] = 0.5f + rng.uniforms(1, 0)[1];
     float sum = 0;
     for (std::uint32_t i = 0; i < 16; ++i) {
       const auto u = rng.uniforms(0, i);
       const std::size_t at = pixel * std::size_t{16} + i;
-      state.direction[at] = encode_octahedral(normalize({u[0] - 0.5f, u[1] - 0.5f, u[2]}));
-      state.weight[at] = u[3];
-      state.site[at] = static_cast<std::uint8_t>(i);
+      samples.direction[at] = encode_octahedral(normalize({u[0] - 0.5f, u[1] - 0.5f, u[2]}));
+      samples.weight[at] = u[3];
+      samples.site[at] = static_cast<std::uint8_t>(i);
       sum += u[3];
     }
-    for (std::uint32_t i = 0; i < 16; ++i) state.weight[pixel * std::size_t{16} + i] /= sum;
+    for (std::uint32_t i = 0; i < 16; ++i) samples.weight[pixel * std::size_t{16} + i] /= sum;
   }
   return state;
 }
@@ -71,7 +72,7 @@ TEST(SampleState, GivesBackWhatWentIn) {
 
 TEST(SampleState, AllBackgroundAndUnlitPixelsAreFine) {
   SampleState state;
-  state.resize({0, 0, 3, 3}, 4);
+  state.resize(sample_format(), {0, 0, 3, 3}, 4);
   EXPECT_TRUE(*decode_state(encode_state(state), "t.bst") == state);
   state.source[4] = PixelSource::restarted;
   EXPECT_TRUE(*decode_state(encode_state(state), "t.bst") == state);
@@ -255,7 +256,7 @@ TEST(SampleState, TakesAtMost160BytesAPixel) {
 TEST(SampleState, EqualWeightsPackAway) {
   SampleState state = large_state();
   const std::size_t before = encode_state(state).size();
-  for (float& weight : state.weight) weight = weight > 0 ? 1.0f / 16 : 0.0f;
+  for (float& weight : SamplePlanes(state).weight) weight = weight > 0 ? 1.0f / 16 : 0.0f;
   EXPECT_LT(encode_state(state).size() + 40 * state.num_pixels(), before);
 }
 

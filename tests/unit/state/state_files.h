@@ -6,7 +6,7 @@
 #include <string>
 
 #include "common/base/section_file.h"
-#include "common/state/sample_state.h"
+#include "common/state/sample_planes.h"
 
 namespace baton {
 
@@ -18,16 +18,17 @@ inline SampleState tiny_state() {
   state.picture = {0x0011223344556677ull, 0x8899aabbccddeeffull};
   state.step = Step(5);
   state.tile = 7;
-  state.resize({10, 20, 12, 21}, 2);
+  state.resize(sample_format(), {10, 20, 12, 21}, 2);
+  const SamplePlanes samples(state);
   state.source[1] = PixelSource::carried;
-  state.lns[1] = 1.5f;
-  state.lns_fresh[1] = 2.0f;
-  state.direction[2] = 0x80017fffu;
-  state.direction[3] = 0x12345678u;
-  state.weight[2] = 0.25f;
-  state.weight[3] = 0.75f;
-  state.site[2] = 3;
-  state.site[3] = 15;
+  samples.lns[1] = 1.5f;
+  samples.lns_fresh[1] = 2.0f;
+  samples.direction[2] = 0x80017fffu;
+  samples.direction[3] = 0x12345678u;
+  samples.weight[2] = 0.25f;
+  samples.weight[3] = 0.75f;
+  samples.site[2] = 3;
+  samples.site[3] = 15;
   return state;
 }
 

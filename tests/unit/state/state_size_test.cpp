@@ -2,41 +2,53 @@
 #include <gtest/gtest.h>
 
 #include <cstring>
-#include <vector>
 
 #include "common/base/section_file.h"
-#include "common/state/sample_state.h"
+#include "common/job/method.h"
+#include "common/state/memory_plane.h"
 
 namespace baton {
 namespace {
 
-template <class T>
-std::size_t bytes_of(const std::vector<T>& array) {
-  return array.size() * sizeof(T);
+struct Carrying {
+  Method method;
+  const StateFormat& format;
+  std::size_t pixel_bytes;  ///< of 6 samples in 2 populations
+};
+// A pixel has 2 x (source, Lns, fresh Lns) and 6 x (direction, weight, site).
+const Carrying kCarrying[] = {
+    {Method::sequential, sample_format(), 2 * 9 + 6 * 9},
+    {Method::restir, weighed_sample_format(), 2 * 9 + 6 * 9 + 2},
+    {Method::pool, memory_format(), 2 * 9 + 6 * 9 + sizeof(PixelMemory)},
+};
+
+TEST(SampleState, SizeOfAPixelIsThatOfItsPlanes) {
+  for (const auto& [method, format, pixel_bytes] : kCarrying) {
+    SampleState state;
+    state.resize(format, {0, 0, 5, 2}, 6, 2);
+    EXPECT_EQ(state.size_bytes(), 10 * pixel_bytes);
+    // A file says which bins it has, too.
+    const std::size_t in_a_file = method == Method::pool ? 8 : 0;
+    EXPECT_EQ(format.most_stored_bytes(6, 2), pixel_bytes + in_a_file);
+  }
 }
 
-TEST(SampleState, SizeOfAPixelIsThatOfItsArrays) {
-  for (const bool memory : {false, true}) {
-    SampleState state;
-    state.resize({0, 0, 5, 2}, 6, 2);
-    if (memory) state.add_memory();
-    if (!memory) state.add_confidence();
-    const std::size_t bytes =
-        bytes_of(state.lns) + bytes_of(state.lns_fresh) + bytes_of(state.source) +
-        bytes_of(state.direction) + bytes_of(state.weight) + bytes_of(state.site) +
-        state.memory.size() * sizeof(PixelMemory) + bytes_of(state.confidence);
-    EXPECT_EQ(state.size_bytes(), bytes);
-    // A file says which bins it has, too.
-    const std::size_t in_a_file = memory ? 8 : 0;
-    EXPECT_EQ(10 * SampleState::bytes_per_pixel(6, 2, memory, !memory), bytes + 10 * in_a_file);
+TEST(SampleState, SizesOfEstimatesAreThoseOfTheFormats) {
+  for (const auto& [method, format, pixel_bytes] : kCarrying) {
+    EXPECT_EQ(format.most_stored_bytes(6, 2),
+              sample_format().most_stored_bytes(6, 2) +
+                  static_cast<std::size_t>(traits(method).most_bytes_beside_samples));
   }
 }
 
 /// The bytes of a small state whose META claims another rectangle: x1 at byte 32, y1 at 36.
 Bytes claiming(std::int32_t width, std::int32_t height, bool with_memory) {
   SampleState state;
-  state.resize({0, 0, 1, 1}, with_memory ? 0 : 1);
-  if (with_memory) state.add_memory();
+  if (with_memory) {
+    state.resize(memory_format(), {0, 0, 1, 1}, 0);
+  } else {
+    state.resize(sample_format(), {0, 0, 1, 1}, 1);
+  }
   const SectionTag magic{'B', 'S', 'T', '1'};
   SectionFile file = *decode_section_file(encode_state(state), magic, kStateVersion, "t.bst");
   for (Section& section : file.sections) {

@@ -3,6 +3,7 @@
 #include <algorithm>
 #include <cmath>
 
+#include "common/base/poison.h"
 #include "worker/sampling/ess.h"
 
 namespace baton {
@@ -20,7 +21,7 @@ void take(const kernels::CandidateSet& from, std::size_t pick, std::size_t j, fl
 }
 
 /// Sets what a pixel's candidates made of Lns; false when there is no light, which makes it dark.
-bool settle_lns(float total, const PixelSamples& samples) {
+bool set_lns(float total, const PixelSamples& samples) {
   const bool lit = total > 0 && std::isfinite(total);
   if (!lit) set_dark(samples);
   samples.lns = samples.lns_fresh = lit ? total : 0.0f;
@@ -64,30 +65,30 @@ CandidateCounts candidate_counts(const SiteBlock& sites, std::int32_t total, flo
   return {.from_light = total - from_bsdf, .from_bsdf = from_bsdf, .lobe_only = true};
 }
 
-PixelDiagnostics DirectSampler::sample(const PixelInput& input, SamplerScratch& scratch,
-                                       const PixelSamples& samples) const {
+PixelDiagnostics DirectSampler::sample(const PixelInput& input, const PixelSamples& samples) {
   PixelDiagnostics diagnostics{.target_evaluations = counts_.total()};
-  kernels::CandidateSet& candidates = scratch.candidates;
-  kernels::draw_candidates(candidate_source(input, counts_), candidates);
+  poison(candidates_);
+  kernels::draw_candidates(candidate_source(input, counts_), candidates_);
   samples.source = PixelSource::fresh;
-  if (!settle_lns(candidates.total, samples)) return diagnostics;
-  const float inverse = 1.0f / candidates.total;
+  if (!set_lns(candidates_.total, samples)) return diagnostics;
+  const float inverse = 1.0f / candidates_.total;
   for (std::size_t j = 0; j < samples.weight.size(); ++j) {
-    take(candidates, j, j, candidates.weight[j] * inverse, samples);
+    take(candidates_, j, j, candidates_.weight[j] * inverse, samples);
   }
   diagnostics.ess = effective_sample_size(samples.weight);
   return diagnostics;
 }
 
-PixelDiagnostics BidirectionalSampler::sample(const PixelInput& input, SamplerScratch& scratch,
-                                              const PixelSamples& samples) const {
+PixelDiagnostics BidirectionalSampler::sample(const PixelInput& input,
+                                              const PixelSamples& samples) {
+  poison(choice_);
   const CandidateCounts counts = candidate_counts(input.sites, num_candidates_, lobe_fraction_);
   PixelDiagnostics diagnostics{.target_evaluations = counts.total()};
   const float total = kernels::choose_candidates(
-      candidate_source(input, counts), Rng(input.key, PassId::choose).uniforms(0, 0)[0],
-      scratch.choice, {samples.direction, samples.site, samples.r, samples.g, samples.b});
+      candidate_source(input, counts), Rng(input.key, PassId::choose).uniforms(0, 0)[0], choice_,
+      {samples.direction, samples.site, samples.r, samples.g, samples.b});
   samples.source = PixelSource::fresh;
-  if (!settle_lns(total, samples)) return diagnostics;
+  if (!set_lns(total, samples)) return diagnostics;
   std::fill(samples.weight.begin(), samples.weight.end(),
             1.0f / static_cast<float>(samples.weight.size()));
   diagnostics.ess = static_cast<float>(samples.weight.size());

@@ -2,6 +2,9 @@
 
 #include <algorithm>
 
+#include "common/base/poison.h"
+#include "common/job/job_facts.h"
+#include "common/state/memory_plane.h"
 #include "worker/method/fresh/candidate_samplers.h"
 #include "worker/sampling/light_noise.h"
 #include "worker/sampling/visibility_memory.h"
@@ -38,25 +41,49 @@ kernels::CandidateCounts counts_for_noise(const PoolTuning& tuning, const SiteBl
 
 }  // namespace
 
-PixelDiagnostics PoolMethod::sample(const PixelInput& input, const PixelState& pixel,
-                                    SamplerScratch& scratch, RayWriter& rays) const {
+PixelMethod make_pool_method(const JobSpec& job, const PoolTuning& tuning) {
+  const bool remembers = carries_state(job);
+  return {.format = remembers ? static_cast<const StateFormat*>(&memory_format())
+                              : static_cast<const StateFormat*>(&sample_format()),
+          .start = [spec = job.sampling, remembers, tuning] {
+            return std::make_unique<PoolSampler>(spec, remembers, tuning);
+          }};
+}
+
+/// Null: it remembers nothing.
+PixelMemory* PoolSampler::memory_of(const PixelState& pixel) const {
+  return remembers_ ? &memory_plane(pixel.tile)[pixel.index] : nullptr;
+}
+
+/// Prefetches what the pixel remembers: the memories of a tile are larger than the caches.
+void PoolSampler::look_ahead(const RoundLight& /*light*/, bool /*has_history*/,
+                             const PixelState& pixel) {
+  const auto* const bytes = reinterpret_cast<const std::byte*>(memory_of(pixel));
+  if (bytes == nullptr) return;
+  for (std::size_t at = 0; at < sizeof(PixelMemory); at += 64) __builtin_prefetch(bytes + at);
+}
+
+PixelDiagnostics PoolSampler::sample(const PixelInput& input, const PixelState& pixel,
+                                     RayWriter& rays) {
   static const PixelMemory kNothing{};
-  PixelMemory* own = pixel.memory();
+  poison(scratch_);
+  poison(rays_);
+  PixelMemory* const own = memory_of(pixel);
   const PixelMemory& memory = own != nullptr ? *own : kNothing;
   const kernels::CandidateCounts counts = counts_for_noise(tuning_, input.sites, num_candidates_,
                                                            lobe_fraction_, light_variance(memory));
   const kernels::CandidateSource candidates = candidate_source(input, counts);
   const float total = kernels::choose_pool_rays(tuning_, candidates,
                                                 Rng(input.key, PassId::choose).uniforms(0, 0)[0],
-                                                num_rays_, memory, scratch.pool, scratch.rays);
-  if (own != nullptr && scratch.rays.count > 0)
-    remember_light_variance(tuning_, scratch.rays.light_variance, *own);
-  const auto source = input.has_history ? PixelSource::carried : PixelSource::fresh;
-  return settle(total, candidates, source, input, pixel, scratch, rays);
+                                                num_rays_, memory, scratch_, rays_);
+  if (own != nullptr && rays_.count > 0)
+    remember_light_variance(tuning_, rays_.light_variance, *own);
+  const auto source = input.start.has_history ? PixelSource::carried : PixelSource::fresh;
+  return write_chosen(total, candidates, source, input, pixel, rays);
 }
 
-void PoolMethod::learn(const FoundRays& found, const PixelState& pixel) const {
-  if (pixel.memory() != nullptr) remember_rays(*pixel.memory(), found.tag, found.is_free);
+void PoolSampler::learn(const FoundRays& found, const PixelState& pixel) {
+  if (PixelMemory* const own = memory_of(pixel)) remember_rays(*own, found.tag, found.is_free);
 }
 
 }  // namespace baton

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "worker/method/chosen_rays_method.h"
+#include "worker/method/pixel_method.h"
 
 namespace baton {
 
@@ -11,11 +11,6 @@ namespace baton {
 /// colour cancels; under grey light on grey surfaces the two methods are one. Consistent, not
 /// unbiased: a ratio of two estimates, off at finite N where the colours of the samples differ. It
 /// carries nothing.
-class RatioMethod final : public ChosenRaysMethod {
- public:
-  explicit RatioMethod(const SamplingSpec& spec) : ChosenRaysMethod(spec) {}
-  PixelDiagnostics sample(const PixelInput& input, const PixelState& pixel, SamplerScratch& scratch,
-                          RayWriter& rays) const override;
-};
+PixelMethod make_ratio_method(const JobSpec& job);
 
 }  // namespace baton

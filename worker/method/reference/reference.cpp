@@ -3,6 +3,8 @@
 #include <algorithm>
 #include <vector>
 
+#include "common/state/sample_planes.h"
+
 namespace baton {
 namespace {
 
@@ -128,22 +130,39 @@ ReferenceEstimate ReferenceRenderer::render(std::span<const SurfaceHit> hits,
           .variance = variance.over(1)};
 }
 
-PixelDiagnostics ReferenceMethod::sample(const PixelInput& input, const PixelState& pixel,
-                                         SamplerScratch& /*scratch*/, RayWriter& rays) const {
-  PixelDiagnostics did{.target_evaluations = 2 * num_samples_};
-  ShadowRays own;
-  const ReferenceEstimate estimate = ReferenceRenderer(*input.geometry)
-                                         .render(input.hits, input.sites, input.light.now,
-                                                 num_samples_, input.key, own, did.rays_traced);
-  rays.known = {.color = estimate.radiance,
-                .visibility = estimate.visibility,
-                .variance = estimate.variance,
-                .unshadowed = estimate.unshadowed,
-                .blocked = estimate.visibility < 1};
-  SampleState& state = pixel.tile;
-  state.lns[pixel.index] = state.lns_fresh[pixel.index] = estimate.lns;
-  state.source[pixel.index] = PixelSource::fresh;
-  return did;
+namespace {
+
+class ReferenceSampler final : public TileSampler {
+ public:
+  explicit ReferenceSampler(std::int32_t num_samples) : num_samples_(num_samples) {}
+
+  PixelDiagnostics sample(const PixelInput& input, const PixelState& pixel,
+                          RayWriter& rays) override {
+    PixelDiagnostics did{.target_evaluations = 2 * num_samples_};
+    ShadowRays own;
+    const ReferenceEstimate estimate = ReferenceRenderer(*input.geometry)
+                                           .render(input.hits, input.sites, input.light.frame.now,
+                                                   num_samples_, input.key, own, did.rays_traced);
+    rays.known = {.color = estimate.radiance,
+                  .visibility = estimate.visibility,
+                  .variance = estimate.variance,
+                  .unshadowed = estimate.unshadowed,
+                  .blocked = estimate.visibility < 1};
+    did.lns = estimate.lns;
+    pixel.tile.set_source(pixel.index, PixelSource::fresh);
+    return did;
+  }
+
+ private:
+  std::int32_t num_samples_;
+};
+
+}  // namespace
+
+PixelMethod make_reference_method(const JobSpec& job) {
+  return {.format = &sample_format(), .start = [count = job.sampling.reference_samples] {
+            return std::make_unique<ReferenceSampler>(count);
+          }};
 }
 
 }  // namespace baton

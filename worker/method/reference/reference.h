@@ -38,14 +38,6 @@ class ReferenceRenderer {
 };
 
 /// ReferenceRenderer as a method: it traces its rays itself, so its constant is the whole pixel.
-class ReferenceMethod final : public PixelMethod {
- public:
-  explicit ReferenceMethod(std::int32_t num_samples) : num_samples_(num_samples) {}
-  PixelDiagnostics sample(const PixelInput& input, const PixelState& pixel, SamplerScratch& scratch,
-                          RayWriter& rays) const override;
-
- private:
-  std::int32_t num_samples_;
-};
+PixelMethod make_reference_method(const JobSpec& job);
 
 }  // namespace baton

@@ -9,7 +9,7 @@
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
-#include "worker/light/carried_light.h"
+#include "worker/method/carried/carried_light.h"
 #include "worker/surface/bsdf-inl.h"
 #include "worker/surface/environment-inl.h"
 

@@ -1,9 +1,9 @@
 #pragma once
 
 #include "worker/light/candidates.h"
-#include "worker/light/carried_light.h"
+#include "worker/method/carried/carried_light.h"
+#include "worker/method/carried/old_surfaces.h"
 #include "worker/sampling/restir.h"
-#include "worker/surface/old_surfaces.h"
 
 namespace baton::kernels {
 

@@ -5,8 +5,12 @@
 #include <cmath>
 
 #include "common/base/check.h"
+#include "common/base/poison.h"
 #include "common/math/hilbert.h"
-#include "worker/light/carried_light.h"
+#include "worker/method/carried/carried_light.h"
+#include "worker/method/carried/carried_set.h"
+#include "worker/method/restir/blocked_samples.h"
+#include "worker/method/weighted/populations.h"
 
 namespace baton {
 namespace {
@@ -135,7 +139,7 @@ std::size_t evaluate(const PixelInput& input, const kernels::CarriedLight& light
                      RestirPoints& points) {
   const std::span<const RestirSet> sets = all.sets();
   const std::size_t num_old = all.surfaces().size();
-  const bool unchanged = has_own && input.old == nullptr && light.still;
+  const bool unchanged = has_own && input.start.old == nullptr && light.still;
   std::size_t evaluations = 0;
   const auto ask = [&](const PointRange& range) {
     if (range.first == range.last) return;
@@ -160,34 +164,47 @@ std::size_t evaluate(const PixelInput& input, const kernels::CarriedLight& light
 
 }  // namespace
 
-RestirSampler::RestirSampler(const SamplingSpec& spec)
-    : fresh_(spec.num_candidates, spec.brdf_fraction), history_limit_(spec.history_limit) {}
+RestirSampler::RestirSampler(const JobSpec& job)
+    : WeightedSampler(job),
+      fresh_(population_spec(job).num_candidates, job.sampling.brdf_fraction),
+      history_limit_(job.sampling.history_limit),
+      reuse_visibility_(job.sampling.reuse_visibility) {}
 
-PixelDiagnostics RestirSampler::sample(const PixelInput& input, SamplerScratch& scratch,
-                                       const PixelSamples& samples) const {
-  RestirPoints& points = scratch.restir;
+PixelMethod make_restir_method(const JobSpec& job) {
+  return {.format = &weighed_sample_format(),
+          .start = [job] { return std::make_unique<RestirSampler>(job); }};
+}
+
+void RestirSampler::learn(const FoundRays& found, const PixelState& pixel) {
+  if (reuse_visibility_) forget_blocked(found, pixel.index, pixel.tile);
+}
+
+PixelDiagnostics RestirSampler::draw(const PixelInput& input, const SetPlace& at,
+                                     const PixelSamples& samples) {
+  poison(points_);
+  RestirPoints& points = points_;
+  const std::span<const CarriedSet> neighbors = input.start.neighbors;
+  std::uint16_t& confidence = confidence_plane(at.pixel.tile)[at.pixel.index];
   const std::size_t n = samples.weight.size();
-  const bool has_own =
-      input.has_history && samples.confidence != nullptr && *samples.confidence > 0;
+  const bool has_own = input.start.has_history && confidence > 0;
 
   // A fresh set. Alone it is the pixel's.
   float lns = 0, lns_fresh = 0;
   PixelSource source = PixelSource::fresh;
-  if (!has_own && input.neighbors.empty()) {
-    if (samples.confidence != nullptr) *samples.confidence = 1;
-    return fresh_.sample(input, scratch, samples);
+  if (!has_own && neighbors.empty()) {
+    confidence = 1;
+    return fresh_.sample(input, samples);
   }
-  BATON_CHECK(samples.confidence != nullptr && input.neighbors.size() <= limits::kMaxNeighbors);
+  BATON_CHECK(neighbors.size() <= limits::kMaxNeighbors);
   PixelDiagnostics diagnostics = fresh_.sample(
-      input, scratch,
-      {points.code.first(n), points.site.first(n), points.contribution.first(n), points.r.first(n),
-       points.g.first(n), points.b.first(n), lns, lns_fresh, source});
+      input, {points.code.first(n), points.site.first(n), points.contribution.first(n),
+              points.r.first(n), points.g.first(n), points.b.first(n), lns, lns_fresh, source});
 
   // The sets of the frame before. Their own targets are those of the directions that they had: a
   // direction that has been turned is rounded anew, and all densities of a weight must be taken at
   // one place, since only there the light, which may change steeply, is the same in all of them.
   const kernels::CarriedLight light = carried_light(input);
-  const bool own_is_known = has_own && !input.target_before.empty() && light.turn == nullptr;
+  const bool own_is_known = has_own && !at.target_before.empty() && light.turn == nullptr;
   SetGatherer all(points, history_limit_);
   all.add_fresh(n, lns);
   if (has_own) {
@@ -195,11 +212,11 @@ PixelDiagnostics RestirSampler::sample(const PixelInput& input, SamplerScratch& 
                      .site = samples.site,
                      .weight = samples.weight,
                      .lns = samples.lns,
-                     .confidence = *samples.confidence,
-                     .surfaces = input.old},
-                    own_is_known ? input.target_before : std::span<const float>());
+                     .confidence = confidence,
+                     .surfaces = input.start.old},
+                    own_is_known ? at.target_before : std::span<const float>());
   }
-  for (const CarriedSet& neighbor : input.neighbors) all.add_carried(neighbor, {});
+  for (const CarriedSet& neighbor : neighbors) all.add_carried(neighbor, {});
   all.finish(light.turn);
 
   // Weigh them together and choose.
@@ -208,7 +225,7 @@ PixelDiagnostics RestirSampler::sample(const PixelInput& input, SamplerScratch& 
   const double total =
       weigh_restir_sets(all.sets(), points.contribution.first(all.count()),
                         points.target_now.first(all.count()), points.weight.first(all.count()));
-  *samples.confidence = next_confidence(all.sets(), history_limit_);
+  confidence = next_confidence(all.sets(), history_limit_);
   samples.source = PixelSource::carried;
   const auto new_lns = static_cast<float>(total);
   if (!(new_lns > 0 && std::isfinite(new_lns))) {

@@ -1,6 +1,8 @@
 #pragma once
 
 #include "worker/method/fresh/candidate_samplers.h"
+#include "worker/method/restir/restir_kernels.h"
+#include "worker/method/weighted/weighted_sampler.h"
 
 namespace baton {
 
@@ -22,15 +24,22 @@ namespace baton {
 /// surfaces, by motion or from a neighbour, or one that turned with the map, lacks directions that
 /// were blocked there and are free here: a bias, that of RTXDI's basic correction, which traces no
 /// rays for its weights, too.
-class RestirSampler final : public PixelSampler {
+class RestirSampler final : public WeightedSampler {
  public:
-  explicit RestirSampler(const SamplingSpec& spec);
-  PixelDiagnostics sample(const PixelInput& input, SamplerScratch& scratch,
-                          const PixelSamples& samples) const override;
+  explicit RestirSampler(const JobSpec& job);
+  void learn(const FoundRays& found, const PixelState& pixel) override;
+
+ protected:
+  PixelDiagnostics draw(const PixelInput& input, const SetPlace& at,
+                        const PixelSamples& samples) override;
 
  private:
   BidirectionalSampler fresh_;
   std::int32_t history_limit_;
+  bool reuse_visibility_;
+  kernels::RestirPoints points_;
 };
+
+PixelMethod make_restir_method(const JobSpec& job);
 
 }  // namespace baton

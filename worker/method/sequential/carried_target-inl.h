@@ -10,10 +10,10 @@
 #include <hwy/cache_control.h>
 #include <hwy/highway.h>
 
-#include "worker/light/carried_light.h"
 #include "worker/light/presampled_light-inl.h"
+#include "worker/method/carried/carried_light.h"
+#include "worker/method/carried/old_surfaces.h"
 #include "worker/sampling/sequential-inl.h"
-#include "worker/surface/old_surfaces.h"
 
 HWY_BEFORE_NAMESPACE();
 namespace baton::HWY_NAMESPACE {

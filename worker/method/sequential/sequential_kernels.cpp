@@ -7,7 +7,7 @@
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 
-#include "worker/light/carried_light.h"
+#include "worker/method/carried/carried_light.h"
 #include "worker/method/sequential/carried_target-inl.h"
 
 HWY_BEFORE_NAMESPACE();

@@ -1,9 +1,9 @@
 #pragma once
 
 #include "common/math/philox.h"
-#include "worker/light/carried_light.h"
+#include "worker/method/carried/carried_light.h"
+#include "worker/method/carried/old_surfaces.h"
 #include "worker/sampling/sequential.h"
-#include "worker/surface/old_surfaces.h"
 #include "worker/surface/site_block.h"
 
 namespace baton::kernels {

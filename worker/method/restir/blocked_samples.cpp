@@ -1,4 +1,4 @@
-#include "worker/method/blocked_samples.h"
+#include "worker/method/restir/blocked_samples.h"
 
 #include <numeric>
 #include <span>
@@ -10,7 +10,8 @@ namespace baton {
 void forget_blocked(const FoundRays& found, std::size_t index, SampleState& state) {
   BATON_CHECK(state.num_populations == 1);
   const auto n = static_cast<std::size_t>(state.num_particles);
-  const std::span<float> weights = std::span(state.weight).subspan(index * n, n);
+  const SamplePlanes samples(state);
+  const std::span<float> weights = samples.weight.subspan(index * n, n);
   for (std::size_t i = 0; i < found.sample.size(); ++i) {
     if (!found.free(i)) weights[found.sample[i]] = 0;
   }
@@ -18,8 +19,8 @@ void forget_blocked(const FoundRays& found, std::size_t index, SampleState& stat
   if (left > 0) {
     for (float& weight : weights) weight /= left;
   }
-  state.lns[index] *= left;
-  state.lns_fresh[index] *= left;
+  samples.lns[index] *= left;
+  samples.lns_fresh[index] *= left;
 }
 
 }  // namespace baton

@@ -1,11 +1,11 @@
-#include "worker/light/carried_light.h"
+#include "worker/method/carried/carried_light.h"
 
 #include <algorithm>
 
 #include "common/base/check.h"
 
 #undef HWY_TARGET_INCLUDE
-#define HWY_TARGET_INCLUDE "worker/light/carried_light.cpp"
+#define HWY_TARGET_INCLUDE "worker/method/carried/carried_light.cpp"
 #include <hwy/foreach_target.h>
 #include <hwy/highway.h>
 

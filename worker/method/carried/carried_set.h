@@ -4,7 +4,7 @@
 #include <span>
 
 #include "common/math/octahedral.h"
-#include "worker/surface/old_surfaces.h"
+#include "worker/method/carried/old_surfaces.h"
 
 namespace baton {
 
@@ -15,7 +15,7 @@ struct CarriedSet {
   std::span<const std::uint8_t> site;  ///< sites of the pixel that uses the samples
   std::span<const float> weight;       ///< sum 1, or all 0
   float lns = 0;
-  std::uint16_t confidence = 0;  ///< SampleState::confidence
+  std::uint16_t confidence = 0;  ///< confidence_plane()
   /// What the samples were drawn for; null: what is seen now.
   const OldSurfaces* surfaces = nullptr;
 };

@@ -1,6 +1,6 @@
 #pragma once
 
-#include "common/state/sample_state.h"
+#include "common/state/sample_planes.h"
 #include "worker/method/ray_batch.h"
 
 namespace baton {

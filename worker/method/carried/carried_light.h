@@ -8,6 +8,7 @@
 #include "common/math/padded_array.h"
 #include "common/math/vec3.h"
 #include "worker/light/presampled_light.h"
+#include "worker/method/pixel_method.h"
 #include "worker/surface/environment_view.h"
 
 namespace baton::kernels {
@@ -44,3 +45,17 @@ struct CarriedLight {
 };
 
 }  // namespace baton::kernels
+
+namespace baton {
+
+/// The light of the pixel's two frames.
+inline kernels::CarriedLight carried_light(const PixelInput& input) {
+  const FrameLight& light = input.light.frame;
+  return {.before = input.light.before,
+          .now = input.light.now,
+          .still = light.still,
+          .presampled = input.presampled,
+          .turn = light.turn ? &*light.turn : nullptr};
+}
+
+}  // namespace baton

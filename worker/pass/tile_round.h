@@ -1,0 +1,81 @@
+#pragma once
+
+#include <array>
+#include <optional>
+#include <vector>
+
+#include "common/job/task.h"
+#include "worker/method/pixel_method.h"
+#include "worker/pass/catcher_albedo.h"
+#include "worker/pass/film_writer.h"
+#include "worker/pass/noise_probe.h"
+#include "worker/pass/primary.h"
+
+namespace baton {
+
+class Reprojection;
+
+/// One pass over some pixels of a tile.
+struct TileRound {
+  const FrameSpec& frame;
+  Round round{};
+  const FrameLight& light;
+  const TileSurfaces& surfaces;  ///< what its sites see
+  /// The light that probes are sampled again with; null: there are none.
+  const FrameLight* probe_light = nullptr;
+  /// What the previous frame left, in the first round where surfaces move: the state is all zero.
+  /// Else null.
+  Reprojection* history = nullptr;
+  /// Pixels stay, and the state is what the round or frame before left.
+  bool goes_on = false;
+
+  /// How many rounds of the sequence come before it, of num_rounds a step; less than 0 before those
+  /// that are seen. To a method a round is a frame of standing light.
+  std::int32_t rounds_before(std::int32_t num_rounds) const {
+    return frame.step.value() * num_rounds + round.value();
+  }
+};
+
+/// Wall seconds of the stages.
+struct StageSeconds {
+  double history = 0, sample = 0, trace = 0, shade = 0;
+};
+
+/// A TileRound at work: what all its stages read, and what they count.
+struct RoundWork {
+  RoundWork(const RenderContext& context, const TileRound& round);
+
+  RngKey key(std::size_t index) const;
+  bool is_probe(std::size_t index) const;
+
+  const TileRound& at;
+  const JobSpec& job;
+  RoundLight light;
+  std::optional<RoundLight> probe_light;
+  /// Albedo in the light of this frame, and in that of the frame before.
+  CatcherAlbedo catchers, catchers_before;
+  StageSeconds seconds;
+  SamplingStats sampling;
+};
+
+/// The pixels in work: slots [first, first + count) of the round, so few that they stay in the
+/// cache, with what one stage hands to the next.
+struct PixelBatch {
+  static constexpr std::size_t kMost = 64;
+  template <class T>
+  using Column = std::array<T, kMost>;
+
+  std::size_t first = 0;
+  std::size_t count = 0;
+  RayBatch rays;
+  Column<std::size_t> end_ray;       ///< where each pixel's rays end
+  Column<KnownLight> known;          ///< what its method knows
+  Column<PixelResult> pixels;        ///< what the film gets
+  Column<Rgb> emission;              ///< emission of what pixels see
+  Column<std::optional<Rgb>> again;  ///< radiance once more, where it is wanted
+
+  /// Makes room for other pixels.
+  void begin(std::size_t new_first, std::size_t new_count);
+};
+
+}  // namespace baton
