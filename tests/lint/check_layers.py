@@ -24,7 +24,9 @@ LIGHT = ACCEL | {"common/advice", "worker/sampling"}
 METHOD = LIGHT | {"worker/accel", "worker/light"}
 METHOD_FOLDERS = (Path(__file__).parents[2] / "worker/method").glob("*/")
 METHODS = {f"worker/method/{folder.name}" for folder in METHOD_FOLDERS if folder.is_dir()}
-PASS = METHOD | {"common/job/text", "worker/method"}
+# What several methods are made of. Passes know those that have to do with history and second pass alone.
+METHOD_LIBRARIES = {f"worker/method/{library}" for library in ("carried", "chosen", "fresh", "weighted")}
+PASS = METHOD | {"common/job/text", "worker/method", "worker/method/carried", "worker/method/weighted"}
 EXCHANGE = PASS | {"worker/pass"}
 RUN = EXCHANGE | {"common/protocol", "common/store", "common/scene/settle", "worker/exchange"}
 # Programs that measure look into every room of the worker, and share scenes and statistics with the tests.
@@ -57,7 +59,7 @@ MAY_INCLUDE = {
     "worker/accel": ACCEL,
     "worker/light": LIGHT,
     "worker/method": METHOD | METHODS,
-    **{method: METHOD | {"worker/method", "worker/method/fresh"} for method in METHODS},
+    **{method: METHOD | {"worker/method"} | METHOD_LIBRARIES for method in METHODS},
     "worker/pass": PASS,
     "worker/exchange": EXCHANGE,
     "worker/run": RUN,

@@ -6,6 +6,7 @@
 #include <functional>
 
 #include "common/job/text/frame_range.h"
+#include "common/state/sample_planes.h"
 #include "tests/support/alive_box.h"
 #include "tests/support/small_scene.h"
 
@@ -30,16 +31,17 @@ class Follower {
     surfaces_ = trace_primary(context_->job, *now_, rect);
     const TileSurfaces old = trace_primary(context_->job, *before_, rect);
     auto state = std::make_shared<SampleState>();
-    state->resize(rect, 16);
+    state->resize(sample_format(), rect, 16);
+    const SamplePlanes samples(*state);
     for (std::size_t i = 0; i < state->num_pixels(); ++i) {
       const auto hits = old.pixel(i);
       const bool seen =
           std::any_of(hits.begin(), hits.end(), [](const SurfaceHit& hit) { return hit.hit; });
       state->source[i] = seen ? PixelSource::fresh : PixelSource::background;
-      state->lns[i] = static_cast<float>(i + 1);
+      samples.lns[i] = static_cast<float>(i + 1);
       for (std::size_t j = 0; j < 16; ++j) {
-        state->weight[16 * i + j] = 1.0f / 16;
-        state->site[16 * i + j] = static_cast<std::uint8_t>(j % hits.size());
+        samples.weight[16 * i + j] = 1.0f / 16;
+        samples.site[16 * i + j] = static_cast<std::uint8_t>(j % hits.size());
       }
     }
     states_ = {state};

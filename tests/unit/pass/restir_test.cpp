@@ -3,6 +3,7 @@
 
 #include <algorithm>
 
+#include "common/state/sample_planes.h"
 #include "tests/support/render_tiled.h"
 
 namespace baton {

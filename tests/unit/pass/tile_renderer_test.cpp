@@ -7,6 +7,7 @@
 #include <cmath>
 #include <limits>
 
+#include "common/state/sample_planes.h"
 #include "tests/support/render_tiled.h"
 
 namespace baton {
