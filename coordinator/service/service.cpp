@@ -62,7 +62,9 @@ Service::Service(const ServiceOptions& options, Router router, Journal journal, 
       scheduler_(journal_.epoch(), kSilentHeartbeats * options.heartbeat, options.store_limit) {}
 
 Status Service::run(const std::atomic<bool>& stop) {
+  waits_ = std::make_unique<FileWaits>(options_.digest_file, [this] { router_.wake(); });
   while (!stop && !stop_requested_) BATON_TRY(turn());
+  waits_.reset();
   // Who is told to stop the farm sends the workers home; who is merely ended, by a signal, will be
   // started again, and the workers wait for that.
   if (stop_requested_) {
@@ -81,6 +83,7 @@ Status Service::turn() {
     BATON_TRY(handle(*incoming));
     timeout = std::chrono::milliseconds(0);
   }
+  BATON_TRY(handle_read());
   if (Clock::now() >= next_tick_) {
     next_tick_ = Clock::now() + kTick;
     asked_for_hello_.clear();
@@ -222,10 +225,12 @@ void Service::keep_notes(const TaskDone& report) {
 }
 
 Status Service::receive_from(const std::string& worker, const TaskFailed& message) {
-  BATON_TRY(reply_to(worker, ReportReceived{message.lease}));
   // A disk that takes nothing, as far as the coordinator sees, takes nothing from other workers.
   const bool read_only = !message.no_space && writes_nowhere(message.lease);
-  if (message.no_space || read_only) {
+  const bool lacks_space = message.no_space || read_only;
+  if (!lacks_space && await_inputs(worker, message)) return {};
+  BATON_TRY(reply_to(worker, ReportReceived{message.lease}));
+  if (lacks_space) {
     const std::string waits =
         fmt::format("{}: {}", read_only ? "a folder that can be written" : "space",
                     message.message.substr(0, limits::kMaxTextLength));
@@ -310,17 +315,33 @@ bool Service::writes_nowhere(const LeaseId& lease) const {
   return ::access(folder.c_str(), W_OK) != 0 && errno == EROFS;
 }
 
+/// The blobs that a leased task of an open job reads; none where one is being made again.
+std::vector<BlobRef> Service::leased_inputs(const LeaseId& lease) const {
+  const Scheduler::Job* job = job_of_open_task(lease);
+  if (job == nullptr) return {};
+  const TaskIndex task = *job->tasks.graph().find(lease.task);
+  const TaskBook& book = job->tasks.book();
+  if (book.status(task) != TaskStatus::leased || !book.has_inputs(task)) return {};
+  std::vector<BlobRef> inputs = job->tasks.ledger().inputs(job->tasks.view(), task);
+  std::erase_if(inputs, [](const BlobRef& input) { return input.is_held(); });
+  return inputs;
+}
+
 /// The inputs of a leased task that are gone or damaged; none of them where a task that makes them
-/// is being done again meanwhile. nullopt: the inputs are sound.
-std::optional<std::vector<BlobRef>> Service::find_bad_inputs(const LeaseId& lease) const {
+/// is being done again meanwhile. nullopt: the inputs are sound, or the disk cannot tell now.
+std::optional<std::vector<BlobRef>> Service::find_bad_inputs(const LeaseId& lease) {
   std::vector<BlobRef> bad;
   const Scheduler::Job* job = job_of_open_task(lease);
   if (job == nullptr) return std::nullopt;
-  const auto task = job->tasks.graph().find(lease.task);
-  if (job->tasks.book().status(*task) != TaskStatus::leased) return std::nullopt;
-  if (!job->tasks.book().has_inputs(*task)) return bad;
-  for (const BlobRef& input : job->tasks.ledger().inputs(job->tasks.view(), *task)) {
-    if (!input.is_held() && store_.is_bad(input.digest)) bad.push_back(input);
+  const TaskIndex task = *job->tasks.graph().find(lease.task);
+  if (job->tasks.book().status(task) != TaskStatus::leased) return std::nullopt;
+  if (!job->tasks.book().has_inputs(task)) return bad;
+  std::error_code error;
+  if (!fs::is_directory(store_directory_, error)) return std::nullopt;
+  for (const BlobRef& input : leased_inputs(lease)) {
+    const fs::path path = store_.path(input.digest);
+    if (files_.holds(path, input) == false) bad.push_back(input);
+    files_.forget(path);
   }
   if (bad.empty()) return std::nullopt;
   return bad;

@@ -4,6 +4,7 @@
 #include <chrono>
 #include <filesystem>
 #include <map>
+#include <memory>
 #include <optional>
 #include <set>
 #include <string>
@@ -16,6 +17,7 @@
 #include "coordinator/journal/journal.h"
 #include "coordinator/schedule/adoption.h"
 #include "coordinator/schedule/scheduler.h"
+#include "coordinator/service/file_waits.h"
 #include "coordinator/service/job_report.h"
 #include "coordinator/service/peers.h"
 
@@ -35,12 +37,15 @@ struct ServiceOptions {
   std::uint64_t store_limit = 0;
   std::chrono::milliseconds sweep_every =
       BlobStore::kLeftoverAge;  ///< when the store is searched for leftovers
+  /// Reads whole files, on a thread of its own; a test may make it slow.
+  FileReader::DigestFile digest_file = digest_of_file;
 };
 
 /// The coordinator: one thread that turns messages into events, actions into messages. A turn of
 /// its loop takes what has arrived, commits the journal once, and only then lets out what follows:
 /// nobody learns of anything that a crash could undo, and no blob is removed before what replaces
-/// it is durable.
+/// it is durable. No file is read whole on this thread: a message that depends on the bytes of
+/// frames or blobs waits (FileWaits) for the thread of a FileReader.
 class Service {
  public:
   /// Takes up the jobs of the journal. What is missing of a running job is made again; where that
@@ -112,6 +117,13 @@ class Service {
   Result<Digest> resolve(const std::string& text);
   Status archive_job(const Digest& job);
 
+  // Files that must be read before a message can be handled (service_files.cpp).
+  Status handle_read();
+  bool await_inputs(const std::string& worker, const TaskFailed& message);
+  Result<bool> await_frames(const PeerId& peer, const Message& message, const Digest& job,
+                            const JobSpec& spec);
+  Result<std::vector<std::filesystem::path>> unread_frames(const JobSpec& job);
+
   // Submission (service_submit.cpp).
   Result<std::optional<FormerJob>> former_job(const Digest& digest);
   Result<std::vector<std::string>> make_way(const ParsedJobDocument& document, bool restart);
@@ -149,7 +161,8 @@ class Service {
   void keep_notes(const TaskDone& report);
   std::optional<std::string> find_missing_blob(const TaskDone& report) const;
   std::optional<std::string> find_missing_frame(const TaskDone& report) const;
-  std::optional<std::vector<BlobRef>> find_bad_inputs(const LeaseId& lease) const;
+  std::vector<BlobRef> leased_inputs(const LeaseId& lease) const;
+  std::optional<std::vector<BlobRef>> find_bad_inputs(const LeaseId& lease);
 
   ServiceOptions options_;
   std::filesystem::path store_directory_;
@@ -181,7 +194,8 @@ class Service {
   std::set<Digest> unremoved_;
   /// Jobs, to be archived at the end of the turn.
   std::vector<Digest> ended_;
-  FrameFiles frame_files_;
+  FileTable files_;                   ///< frames, and inputs of failed attempts
+  std::unique_ptr<FileWaits> waits_;  ///< made by run()
   /// What workers say of the files of living jobs.
   std::map<Digest, std::vector<std::string>> notes_;
   std::map<Digest, std::vector<std::string>> lost_before_;  ///< what open jobs lacked at the start

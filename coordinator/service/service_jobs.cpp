@@ -183,6 +183,8 @@ Status Service::receive(const PeerId& peer, const ResumeJob& message) {
   std::string plan;
   const Scheduler::Job* const known = scheduler_.find_job(*job);
   if (known != nullptr && known->status == JobStatus::paused) {
+    BATON_ASSIGN(const bool waits, await_frames(peer, message, *job, known->spec));
+    if (waits) return {};
     BATON_ASSIGN(LostFiles lost, lost_files_of(*job));
     if (lost.unreadable) {
       return refuse(peer, {ErrorKind::io, fmt::format("job {} stays paused: {}", job->short_hex(),
@@ -223,7 +225,7 @@ Result<LostFiles> Service::lost_files_of(const Digest& job) {
                           .completions = std::move(known.completions),
                           .failures = {},
                           .plan = std::move(known.plan)},
-                         store_, &frame_files_);
+                         store_, &files_);
 }
 
 Status Service::receive(const PeerId& peer, const DrainWorker& message) {

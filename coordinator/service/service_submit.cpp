@@ -19,10 +19,6 @@ namespace {
 
 namespace fs = std::filesystem;
 
-std::string folder_of(const JobSpec& job) {
-  return fs::path(job.output.directory).lexically_normal().string();
-}
-
 /// The frames of two jobs that write the same file.
 std::vector<std::pair<FrameIndex, FrameIndex>> shared_frames(const JobSpec& a, const JobSpec& b) {
   std::map<std::string, FrameIndex> of_b;
@@ -78,7 +74,7 @@ Error another_picture(const JobSpec& job, const Neighbour& other, const JobSpec&
 /// What a journalled job has written, beside a new one. owned: its frames by number, without those
 /// that another one has replaced; null: all.
 Neighbour look_at(const FormerJob& former, const Digest& job, const ParsedJobDocument& wanted,
-                  FrameFiles& files, const std::vector<FrameNumber>* owned) {
+                  FileTable& files, const std::vector<FrameNumber>* owned) {
   const JobStatus status = former.status;
   Neighbour other{job, status, {}, {}, {}, false, 0};
   const JobSpec& theirs = former.document.job;
@@ -98,8 +94,8 @@ Neighbour look_at(const FormerJob& former, const Digest& job, const ParsedJobDoc
     const bool is_owned =
         owned == nullptr ||
         std::find(owned->begin(), owned->end(), theirs.frames[mine.index()]) != owned->end();
-    const bool is_there =
-        is_owned && image != images.end() && files.holds(frame_path(theirs, mine), image->second);
+    const bool is_there = is_owned && image != images.end() &&
+                          files.holds(frame_path(theirs, mine), image->second).value_or(false);
     other.num_there += is_there ? 1 : 0;
     if (!is_there && !is_open(status)) continue;
     other.written.push_back(wanted.job.frames[its.index()]);
@@ -148,7 +144,7 @@ Result<std::vector<std::string>> Service::make_way(const ParsedJobDocument& docu
     if (!former) continue;
     BATON_ASSIGN(const std::optional<JobDetail> ended, archived_detail(digest));
     Neighbour other =
-        look_at(*former, digest, document, frame_files_, ended ? &ended->frames_done : nullptr);
+        look_at(*former, digest, document, files_, ended ? &ended->frames_done : nullptr);
     if (other.busy && !restart) {
       return Error{
           ErrorKind::bad_input,
@@ -213,6 +209,8 @@ Status Service::receive(const PeerId& peer, const SubmitJob& message) {
          fmt::format("job {}: {} tasks, at most {}: use larger tiles or more frames per checkpoint",
                      document->digest.short_hex(), count, limits::kMaxTasksPerJob)});
   }
+  BATON_ASSIGN(const bool waits, await_frames(peer, message, document->digest, document->job));
+  if (waits) return {};
   const Scheduler::Job* const known = scheduler_.find_job(document->digest);
   if (known != nullptr) {
     if (const Status own = check_own(document->digest);
@@ -290,7 +288,7 @@ Result<Adoption> Service::find_heritage(const ParsedJobDocument& document,
   const KeptFiles kept{
       .has_frame =
           [&](FrameIndex frame, const BlobRef& image) {
-            return frame_files_.holds(frame_path(document.job, frame), image);
+            return files_.holds(frame_path(document.job, frame), image).value_or(false);
           },
       .has_blob = [&](const BlobRef& blob) { return store_.contains(blob.digest); }};
   Adoption adoption = adopt(document, formers, kept);
