@@ -181,7 +181,8 @@ Status Service::receive(const PeerId& peer, const ListJobs& message) {
   list.task_seconds = farm_.scheduler.longest_task_seconds();
   list.workers = farm_.peers.summaries();
   for (WorkerSummary& worker : list.workers) {
-    worker.leases = static_cast<std::int32_t>(farm_.scheduler.num_leases(worker.worker_id));
+    worker.leases =
+        static_cast<std::int32_t>(farm_.scheduler.leases().of_worker(worker.worker_id).size());
   }
   return farm_.reply(peer, std::move(list));
 }
