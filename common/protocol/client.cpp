@@ -47,6 +47,7 @@ Error RequestClient::give_up(const std::string& otherwise) {
 Result<Message> RequestClient::request(const Message& message, std::chrono::milliseconds timeout) {
   using Clock = std::chrono::steady_clock;
   const Clock::time_point deadline = Clock::now() + timeout;
+  pending_.clear();
 
   // Nobody there is found out soon.
   const bool connected = socket_.wait_to_send(std::min(timeout, kConnectPatience));
@@ -62,7 +63,9 @@ Result<Message> RequestClient::request(const Message& message, std::chrono::mill
 
   BATON_ASSIGN(Message answer, decode_message(*frames));
   if (const auto* refused = std::get_if<Refused>(&answer)) {
-    return Error{error_kind_of(refused->kind), refused->message};
+    const ErrorKind kind = error_kind_of(refused->kind);
+    if (kind == ErrorKind::timeout) pending_ = refused->message;
+    return Error{kind, refused->message};
   }
   return answer;
 }

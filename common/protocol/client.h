@@ -20,6 +20,9 @@ class RequestClient {
   /// (known after 2 s times kPatienceFactor) or no answer came in time. The connection is then
   /// dropped, so that a late answer is never taken for that of the next request.
   Result<Message> request(const Message& message, std::chrono::milliseconds timeout);
+  /// What the coordinator is still doing before it can answer the last request, which is to be made
+  /// again; empty: it was answered, or nobody was there. request() says it as a timeout, too.
+  const std::string& pending() const { return pending_; }
 
  private:
   RequestClient(std::string endpoint, ClientAccess access, Socket socket);
@@ -28,6 +31,7 @@ class RequestClient {
   std::string endpoint_;
   ClientAccess access_;
   Socket socket_;
+  std::string pending_;
 };
 
 }  // namespace baton

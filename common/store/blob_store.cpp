@@ -77,14 +77,6 @@ bool BlobStore::contains(const Digest& digest) const {
   return fs::is_regular_file(path(digest), error);
 }
 
-bool BlobStore::is_bad(const Digest& digest) const {
-  std::error_code error;
-  const fs::file_status status = fs::status(path(digest), error);
-  if (status.type() == fs::file_type::not_found) return fs::is_directory(directory_, error);
-  const Result<Bytes> bytes = get(digest);
-  return !bytes && bytes.error().kind == ErrorKind::corrupt;
-}
-
 Status BlobStore::remove(const Digest& digest) {
   std::error_code error;
   fs::remove(path(digest), error);

@@ -37,10 +37,6 @@ class BlobStore {
   /// Whether the blob was published; does not read it.
   bool contains(const Digest& digest) const;
 
-  /// Whether the blob is gone, or its bytes are not those of its name. A disk that cannot be read
-  /// now says neither.
-  bool is_bad(const Digest& digest) const;
-
   /// Forgets the blob. One that is already gone is a success.
   Status remove(const Digest& digest);
 

@@ -29,9 +29,7 @@ std::vector<Action> Scheduler::step(const Event& event, TimePoint now) {
 
   // Answer the one who asked, and name what nobody needs any more.
   if (const auto* request = std::get_if<WorkRequested>(&event)) {
-    const auto worker = workers_.find(request->worker);
-    if (worker != workers_.end() && worker->second.wanted > 0)
-      actions.push_back(ReportNoWork{request->worker});
+    if (leases_.wants(request->worker)) actions.push_back(ReportNoWork{request->worker});
   }
   if (std::vector<Digest> garbage = blobs_.take_garbage(); !garbage.empty()) {
     actions.push_back(RemoveBlobs{std::move(garbage)});
@@ -72,13 +70,13 @@ void Scheduler::on(const JobAdded& event, TimePoint, Actions& actions) {
                                          TileHomes(event.spec), max_frames_ahead(event.spec),
                                          BlobSizes(event.spec)})
                  .first->second;
-  job.homes.share_out(connected_);
+  job.homes.share_out(leases_.connected());
   replay(job, event, actions);
   if (!is_open(event.status)) {
     job.tasks.cancel_open();
     return;
   }
-  if (event.status == JobStatus::running) running_.emplace(rank(job), event.job);
+  if (event.status == JobStatus::running) running_.emplace(job.rank(), event.job);
   end_if_finished(event.job, job, actions);
 }
 
@@ -111,7 +109,7 @@ void Scheduler::on(const JobResumed& event, TimePoint, Actions& actions) {
   Job* job = find(event.job);
   if (!job || job->status != JobStatus::paused) return;
   job->status = JobStatus::running;
-  running_.emplace(rank(*job), event.job);
+  running_.emplace(job->rank(), event.job);
   job->tasks.attempts().forget_losses();
   job->waits.clear();
   reopen({event.job, event.lost}, *job, actions);
@@ -129,7 +127,7 @@ void Scheduler::on(const JobForgotten& event, TimePoint, Actions&) {
 // ---- events: reports ----------------------------------------------------------------------------
 
 void Scheduler::on(const TaskCompleted& event, TimePoint now, Actions& actions) {
-  if (!touch(event.worker, now)) return;
+  if (!leases_.touch(event.worker, now)) return;
   std::vector<BlobRef> outputs = event.outputs;
 
   // A report that nobody waits for is ignored, but it must agree with what was reported before.
@@ -197,14 +195,14 @@ bool Scheduler::compare_results(const TaskCompleted& event, const std::vector<Bl
 }
 
 void Scheduler::on(const AttemptFailed& event, TimePoint now, Actions& actions) {
-  if (!touch(event.worker, now)) return;
+  if (!leases_.touch(event.worker, now)) return;
   const Held held = hold(event.worker, event.lease, now);
   if (held.job)
     fail_attempt(held, {event.lease, event.worker, event.message, event.permanent}, now, actions);
 }
 
 void Scheduler::on(const ResultMissing& event, TimePoint now, Actions& actions) {
-  if (!touch(event.worker, now)) return;
+  if (!leases_.touch(event.worker, now)) return;
   if (const Held held = hold(event.worker, event.lease, now); held.job) {
     held.job->tasks.attempts().add_returned(held.task, event.lease, event.worker);
     lose_lease(event.lease.job, held.task, actions);
@@ -213,7 +211,7 @@ void Scheduler::on(const ResultMissing& event, TimePoint now, Actions& actions) 
 }
 
 void Scheduler::on(const SpaceLacking& event, TimePoint now, Actions&) {
-  if (!touch(event.worker, now)) return;
+  if (!leases_.touch(event.worker, now)) return;
   const Held held = hold(event.worker, event.lease, now);
   if (!held.job) return;
   return_lease(held, event.lease, event.worker);
@@ -225,7 +223,7 @@ void Scheduler::on(const SpaceLacking& event, TimePoint now, Actions&) {
 }
 
 void Scheduler::on(const LeaseReturned& event, TimePoint now, Actions&) {
-  if (!touch(event.worker, now)) return;
+  if (!leases_.touch(event.worker, now)) return;
   if (Job* job = find(event.lease.job); job != nullptr && !event.unseen.empty())
     job->standings.add_blind(event.worker, event.unseen, now);
   const Held held = hold(event.worker, event.lease, now);
@@ -233,7 +231,7 @@ void Scheduler::on(const LeaseReturned& event, TimePoint now, Actions&) {
 }
 
 void Scheduler::on(const InputsLost& event, TimePoint now, Actions& actions) {
-  if (!touch(event.worker, now)) return;
+  if (!leases_.touch(event.worker, now)) return;
   const Held held = hold(event.worker, event.lease, now);
   if (!held.job) return;
   JobTasks& tasks = held.job->tasks;
@@ -252,7 +250,7 @@ void Scheduler::on(const InputsLost& event, TimePoint now, Actions& actions) {
 }
 
 void Scheduler::on(const HeldPublished& event, TimePoint now, Actions& actions) {
-  if (!touch(event.worker, now)) return;
+  if (!leases_.touch(event.worker, now)) return;
   Job* job = find(event.job);
   for (const PublishedState& state : event.states) {
     const std::optional<TaskIndex> task =
@@ -274,8 +272,6 @@ Scheduler::Job* Scheduler::find(const Digest& job) {
   const auto found = jobs_.find(job);
   return found == jobs_.end() ? nullptr : &found->second;
 }
-
-Scheduler::Rank Scheduler::rank(const Job& job) const { return {-job.spec.priority, job.sequence}; }
 
 /// Brings a fresh job to where the journal left it, less what is gone.
 void Scheduler::replay(Job& job, const JobAdded& event, Actions& actions) {
@@ -320,7 +316,7 @@ void Scheduler::fail_attempt(const Held& held, Failure failure, TimePoint now, A
   Job& job = *held.job;
   drop_lease(digest, held.task);
   job.tasks.add_failure(held.task, failure, blobs_);
-  failure.last = is_exhausted(connected_, job.tasks.attempts().blame(held.task),
+  failure.last = is_exhausted(leases_.connected(), job.tasks.attempts().blame(held.task),
                               job.spec.max_retries_per_task);
   actions.push_back(RecordFailure{failure});
 
@@ -357,7 +353,7 @@ void Scheduler::give_up(const Digest& digest, Job& job, TaskIndex task, const st
 void Scheduler::pause_job(const Digest& digest, Job& job, const std::string& reason,
                           Actions& actions) {
   job.status = JobStatus::paused;
-  running_.erase(rank(job));
+  running_.erase(job.rank());
   actions.push_back(RecordJobStatus{digest, job.status, reason});
 }
 
@@ -375,16 +371,12 @@ void Scheduler::end_if_finished(const Digest& digest, Job& job, Actions& actions
 void Scheduler::end_job(const Digest& digest, Job& job, JobStatus status, const std::string& reason,
                         Actions& actions) {
   // Take back what is leased, then close whatever is open.
-  const auto first = leases_.lower_bound({digest, 0});
-  std::vector<TaskIndex> leased;
-  for (auto lease = first; lease != leases_.end() && lease->first.first == digest; ++lease)
-    leased.push_back(lease->first.second);
-  for (const TaskIndex task : leased) revoke_lease(digest, task, actions);
+  for (const TaskIndex task : leases_.of_job(digest)) revoke_lease(digest, task, actions);
   job.tasks.cancel_open();
   job.tasks.let_between_go(blobs_);
 
   job.status = status;
-  running_.erase(rank(job));
+  running_.erase(job.rank());
   actions.push_back(RecordJobStatus{digest, status, reason});
 }
 

@@ -4,7 +4,6 @@
 #include <chrono>
 #include <compare>
 #include <cstdint>
-#include <deque>
 #include <map>
 #include <set>
 #include <string>
@@ -13,6 +12,7 @@
 #include "coordinator/schedule/blob_sizes.h"
 #include "coordinator/schedule/events.h"
 #include "coordinator/schedule/job_tasks.h"
+#include "coordinator/schedule/lease_book.h"
 #include "coordinator/schedule/policy.h"
 #include "coordinator/schedule/standings.h"
 #include "coordinator/schedule/store_room.h"
@@ -35,6 +35,12 @@ namespace baton {
 /// Lost leases are no failures; a task that loses too many pauses its job.
 class Scheduler {
  public:
+  /// Orders the running jobs; a paused one has no rank.
+  struct Rank {
+    int descending_priority = 0;
+    std::uint64_t sequence = 0;
+    auto operator<=>(const Rank&) const = default;
+  };
   struct Job {
     JobSpec spec;
     JobStatus status = JobStatus::running;
@@ -49,6 +55,14 @@ class Scheduler {
     std::string waits = {};                     ///< for what, as far as an event said so
     Standings standings = {};
     std::array<double, 3> longest_seconds = {};  ///< CPU time of tasks of each kind, of late
+
+    Rank rank() const { return {-spec.priority, sequence}; }
+    JobInStore in_store() const { return {tasks.graph(), tasks.book(), sizes, begun_runs}; }
+    Crew crew(const LeaseBook& leases, TimePoint now) const {
+      return {leases.connected(), standings, now};
+    }
+    /// Whether the worker may try the task now, could it read its inputs.
+    bool is_due(TaskIndex task, const std::string& worker, const Crew& workers) const;
   };
 
   /// epoch: how often the coordinator has started; part of each lease. silence_limit: a worker that
@@ -77,8 +91,8 @@ class Scheduler {
   bool lacks_room(const Digest& job) const;
   /// What blobs take that somebody needs: jobs, and those that have ended (StoreKeeps).
   std::uint64_t store_bytes() const { return blobs_.size_bytes() + kept_bytes_; }
-  /// Leases that the worker holds.
-  std::size_t num_leases(const std::string& worker) const;
+  /// Who is connected and has which lease.
+  const LeaseBook& leases() const { return leases_; }
   /// Tasks of running jobs that are ready.
   std::size_t num_ready() const;
   /// CPU time of the longest render tasks of running jobs, of late; 0: not known.
@@ -86,25 +100,6 @@ class Scheduler {
   bool is_referenced(const Digest& blob) const { return blobs_.contains(blob); }
 
  private:
-  struct Lease {
-    LeaseId id;
-    std::string worker;
-    TimePoint granted_at;
-    std::uint64_t expected_bytes = 0;  ///< that its outputs will take in the store
-    /// Its state; false where the lease was taken up again.
-    bool may_hold = false;
-  };
-  struct Worker {
-    TimePoint last_sign;
-    std::int32_t wanted = 0;
-    std::set<std::pair<Digest, TaskIndex>> leases;
-  };
-  /// Orders the running jobs; a paused one has no rank.
-  struct Rank {
-    int descending_priority = 0;
-    std::uint64_t sequence = 0;
-    auto operator<=>(const Rank&) const = default;
-  };
   /// A task that a worker holds.
   struct Held {
     Job* job = nullptr;
@@ -134,7 +129,6 @@ class Scheduler {
   void on(const ClockTicked& event, TimePoint now, Actions& actions);
 
   // Leases (scheduler_leases.cpp).
-  Worker* touch(const std::string& worker, TimePoint now);
   Held hold(const std::string& worker, const LeaseId& lease, TimePoint now);
   void reconcile(const std::string& worker, const std::vector<LeaseId>& named,
                  TimePoint granted_until, TimePoint now, Actions& actions);
@@ -148,19 +142,14 @@ class Scheduler {
   void serve(TimePoint now, Actions& actions);
   void ask_for_states(const std::string& worker, TimePoint now, Actions& actions);
   bool grant_one(const std::string& worker, TimePoint now, Actions& actions);
-  void share_out_tiles();
-  bool is_due(const Job& job, TaskIndex task, const std::string& worker, TimePoint now) const;
-  Crew crew_of(const Job& job, TimePoint now) const { return {connected_, job.standings, now}; }
 
   // Room in the store (scheduler_room.cpp).
   StoreRoom room() const;
-  static JobInStore in_store(const Job& job);
   bool has_room_for(const Job& job, TaskIndex task, bool others_wait) const;
   std::string lacking_room(const Job& job) const;
 
   // Jobs (scheduler.cpp).
   Job* find(const Digest& job);
-  Rank rank(const Job& job) const;
   void replay(Job& job, const JobAdded& event, Actions& actions);
   void reopen(RecordReopened record, Job& job, Actions& actions);
   bool compare_results(const TaskCompleted& event, const std::vector<BlobRef>& expected,
@@ -179,18 +168,11 @@ class Scheduler {
   std::uint64_t next_sequence_ = 0;
   std::map<Digest, Job> jobs_;
   std::map<Rank, Digest> running_;
-  std::map<std::pair<Digest, TaskIndex>, Lease> leases_;
-  std::map<std::string, Worker> workers_;
-  std::vector<std::string> connected_;  ///< names of workers_, sorted
-  /// Blobs of attempts without a result, of tasks that somebody works on: he may count on them.
-  std::map<std::pair<Digest, TaskIndex>, std::vector<Digest>> left_;
-  /// Workers with wanted > 0, who asked first comes first.
-  std::deque<std::string> hungry_;
+  LeaseBook leases_;
   /// Workers that were asked for states, with the job.
   std::set<std::pair<std::string, Digest>> asked_;
   BlobReferences blobs_;
-  std::uint64_t kept_bytes_ = 0;      ///< what ended jobs leave
-  std::uint64_t expected_bytes_ = 0;  ///< outputs of all leases
+  std::uint64_t kept_bytes_ = 0;  ///< what ended jobs leave
 };
 
 }  // namespace baton

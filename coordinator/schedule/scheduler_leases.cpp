@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <utility>
 
-#include "common/base/check.h"
 #include "common/base/limits.h"
 #include "coordinator/schedule/held_states.h"
 #include "coordinator/schedule/scheduler.h"
@@ -13,18 +12,11 @@ namespace baton {
 // ---- events: workers ----------------------------------------------------------------------------
 
 void Scheduler::on(const WorkerJoined& event, TimePoint now, Actions& actions) {
-  const auto [place, is_new] = workers_.try_emplace(event.worker);
-  Worker& worker = place->second;
-  worker.last_sign = now;
-  worker.wanted = 0;
-  std::erase(hungry_, event.worker);
+  const bool is_new = leases_.join(event.worker, now);
   for (auto& [digest, job] : jobs_) {
     job.standings.forget(event.worker);
     job.tasks.attempts().forgive(event.worker);
-  }
-  if (is_new) {
-    connected_.insert(std::ranges::upper_bound(connected_, event.worker), event.worker);
-    share_out_tiles();
+    if (is_new) job.homes.share_out(leases_.connected());
   }
   lose_held(event.worker, actions);
   reconcile(event.worker, event.running, now, now, actions);
@@ -32,7 +24,7 @@ void Scheduler::on(const WorkerJoined& event, TimePoint now, Actions& actions) {
 
 void Scheduler::on(const WorkerAlive& event, TimePoint now, Actions& actions) {
   // A lease so new that it may still be on its way need not be named.
-  if (touch(event.worker, now))
+  if (leases_.touch(event.worker, now))
     reconcile(event.worker, event.running, now - silence_limit_, now, actions);
 }
 
@@ -41,29 +33,15 @@ void Scheduler::on(const WorkerLeft& event, TimePoint, Actions& actions) {
 }
 
 void Scheduler::on(const WorkRequested& event, TimePoint now, Actions&) {
-  Worker* worker = touch(event.worker, now);
-  if (!worker) return;
-  const bool was_hungry = worker->wanted > 0;
-  worker->wanted = std::clamp(event.count, 0, limits::kMaxLeasesPerWorker);
-  if (worker->wanted > 0 && !was_hungry) hungry_.push_back(event.worker);
-  if (worker->wanted == 0 && was_hungry) std::erase(hungry_, event.worker);
+  if (leases_.touch(event.worker, now)) leases_.want(event.worker, event.count);
 }
 
 void Scheduler::on(const ClockTicked&, TimePoint now, Actions& actions) {
   asked_.clear();  // an answer may be lost
-  std::vector<std::string> silent;
-  for (const auto& [id, worker] : workers_) {
-    if (worker.last_sign + silence_limit_ < now) silent.push_back(id);
-  }
-  for (const std::string& id : silent) {
+  for (const std::string& id : leases_.silent_since(now - silence_limit_)) {
     remove_worker(id, /*lost=*/true, actions);
     actions.push_back(ForgetWorker{id});
   }
-}
-
-std::size_t Scheduler::num_leases(const std::string& worker) const {
-  const auto found = workers_.find(worker);
-  return found == workers_.end() ? 0 : found->second.leases.size();
 }
 
 std::size_t Scheduler::num_ready() const {
@@ -82,14 +60,6 @@ double Scheduler::longest_task_seconds() const {
 }
 
 // ---- leases -------------------------------------------------------------------------------------
-
-/// Notes a sign of life. nullptr: the worker is not known.
-Scheduler::Worker* Scheduler::touch(const std::string& worker, TimePoint now) {
-  const auto found = workers_.find(worker);
-  if (found == workers_.end()) return nullptr;
-  found->second.last_sign = now;
-  return &found->second;
-}
 
 /// The task of a lease that the worker says it has. A lease that was lost, or granted by an earlier
 /// coordinator, is taken up again while nobody else has the task or holds what it was made of. No
@@ -117,11 +87,10 @@ void Scheduler::reconcile(const std::string& worker, const std::vector<LeaseId>&
                           TimePoint granted_until, TimePoint now, Actions& actions) {
   // What it does not name is lost: the worker was started anew, or a message did not arrive.
   const std::set<LeaseId> in_hand(named.begin(), named.end());
-  const auto before = workers_.at(worker).leases;
-  for (const auto& [job, task] : before) {
-    const auto lease = leases_.find({job, task});
-    if (lease == leases_.end() || lease->second.granted_at > granted_until) continue;
-    if (!in_hand.contains(lease->second.id)) lose_lease(job, task, actions);
+  for (const auto& [job, task] : leases_.of_worker(worker)) {
+    const Lease* const lease = leases_.find({job, task});
+    if (lease == nullptr || lease->granted_at > granted_until) continue;
+    if (!in_hand.contains(lease->id)) lose_lease(job, task, actions);
   }
 
   // What it names it keeps, if nobody else has it.
@@ -130,29 +99,19 @@ void Scheduler::reconcile(const std::string& worker, const std::vector<LeaseId>&
   }
 }
 
-Scheduler::Lease& Scheduler::add_lease(const std::string& worker, const LeaseId& lease,
-                                       TaskIndex task, TimePoint now) {
+Lease& Scheduler::add_lease(const std::string& worker, const LeaseId& lease, TaskIndex task,
+                            TimePoint now) {
   Job& job = jobs_.at(lease.job);
-  const std::uint64_t bytes = job.sizes.largest(job.tasks.graph(), lease.task);
-  expected_bytes_ += bytes;
-  workers_.at(worker).leases.emplace(lease.job, task);
   if (lease.task.kind == TaskKind::render) {
     job.homes.settle(lease.task.tile, worker);
     job.begun_runs = std::max(job.begun_runs, lease.task.run() + 1);
   }
-  return leases_.insert_or_assign({lease.job, task}, Lease{lease, worker, now, bytes})
-      .first->second;
+  return leases_.add(task, {lease, worker, now, job.sizes.largest(job.tasks.graph(), lease.task)});
 }
 
 void Scheduler::drop_lease(const Digest& job, TaskIndex task) {
-  const auto found = leases_.find({job, task});
-  BATON_CHECK(found != leases_.end());
-  expected_bytes_ -= found->second.expected_bytes;
-  workers_.at(found->second.worker).leases.erase({job, task});
-  leases_.erase(found);
-  if (const auto left = left_.extract({job, task})) {
-    for (const Digest& blob : left.mapped()) blobs_.discard(blob);
-  }
+  const Lease lease = leases_.drop({job, task});
+  for (const Digest& blob : lease.left) blobs_.discard(blob);
 }
 
 void Scheduler::revoke_lease(const Digest& job, TaskIndex task, Actions& actions) {
@@ -183,12 +142,10 @@ void Scheduler::lose_lease(const Digest& digest, TaskIndex task, Actions& action
 
 /// lost: the worker vanished, which counts against its tasks; else it said goodbye.
 void Scheduler::remove_worker(const std::string& worker, bool lost, Actions& actions) {
-  const auto found = workers_.find(worker);
-  if (found == workers_.end()) return;
-  const auto leases = found->second.leases;
-  for (const auto& [job, task] : leases) {
+  if (!leases_.knows(worker)) return;
+  for (const auto& [job, task] : leases_.of_worker(worker)) {
     // The end of a job may have taken the lease already.
-    if (!leases_.contains({job, task})) continue;
+    if (leases_.find({job, task}) == nullptr) continue;
     if (lost) {
       lose_lease(job, task, actions);
     } else {
@@ -196,9 +153,7 @@ void Scheduler::remove_worker(const std::string& worker, bool lost, Actions& act
       jobs_.at(job).tasks.give_back(task);
     }
   }
-  std::erase(hungry_, worker);
-  workers_.erase(found);
-  std::erase(connected_, worker);
+  leases_.leave(worker);
   for (auto& [digest, job] : jobs_) job.homes.leave(worker);
   lose_held(worker, actions);
 }
@@ -219,20 +174,10 @@ void Scheduler::serve(TimePoint now, Actions& actions) {
   const auto has_work = [this](const auto& entry) {
     return !jobs_.at(entry.second).tasks.book().ready().empty();
   };
-  if (hungry_.empty() || std::none_of(running_.begin(), running_.end(), has_work)) return;
-  std::deque<std::string> unserved;
-  while (!hungry_.empty()) {
-    const std::string worker = std::move(hungry_.front());
-    hungry_.pop_front();
-    if (!grant_one(worker, now, actions)) {
-      unserved.push_back(worker);
-    } else if (--workers_.at(worker).wanted > 0) {
-      hungry_.push_back(worker);
-    }
-  }
-  hungry_ = std::move(unserved);
-  for (const std::string& worker : hungry_) {
-    if (workers_.at(worker).leases.empty()) ask_for_states(worker, now, actions);
+  if (leases_.hungry().empty() || std::none_of(running_.begin(), running_.end(), has_work)) return;
+  leases_.serve([&](const std::string& worker) { return grant_one(worker, now, actions); });
+  for (const std::string& worker : leases_.hungry()) {
+    if (leases_.of_worker(worker).empty()) ask_for_states(worker, now, actions);
   }
 }
 
@@ -241,11 +186,12 @@ void Scheduler::serve(TimePoint now, Actions& actions) {
 void Scheduler::ask_for_states(const std::string& worker, TimePoint now, Actions& actions) {
   for (const auto& [rank, digest] : running_) {
     const Job& job = jobs_.at(digest);
-    if (job.tasks.made().totals().num_held == 0 || rests(crew_of(job, now), worker)) continue;
+    const Crew crew = job.crew(leases_, now);
+    if (job.tasks.made().totals().num_held == 0 || rests(crew, worker)) continue;
     std::vector<TaskIndex> tasks;
     for (const TaskIndex task : job.tasks.book().ready()) {
       const TaskKey key = job.tasks.graph().key(task);
-      if (key.kind != TaskKind::render || !is_due(job, task, worker, now)) continue;
+      if (key.kind != TaskKind::render || !job.is_due(task, worker, crew)) continue;
       if (key.run() > last_due_run(job.tasks.graph(), job.tasks.book(), job.max_frames_ahead))
         break;
       tasks.push_back(task);
@@ -276,12 +222,13 @@ bool Scheduler::grant_one(const std::string& worker, TimePoint now, Actions& act
   bool others_wait = false;
   for (const auto& [rank, digest] : running_) {
     Job& job = jobs_.at(digest);
-    if (job.tasks.book().ready().empty() || rests(crew_of(job, now), worker)) continue;
+    const Crew crew = job.crew(leases_, now);
+    if (job.tasks.book().ready().empty() || rests(crew, worker)) continue;
     const JobGraph& graph = job.tasks.graph();
     const auto task = job.homes.choose(
         graph, job.tasks.book().ready(),
         last_due_run(graph, job.tasks.book(), job.max_frames_ahead), worker, [&](TaskIndex ready) {
-          return is_due(job, ready, worker, now) && can_read(job.tasks, ready, worker);
+          return job.is_due(ready, worker, crew) && can_read(job.tasks, ready, worker);
         });
     if (!task) continue;
     if (!has_room_for(job, *task, others_wait)) {
@@ -306,23 +253,17 @@ bool Scheduler::grant_one(const std::string& worker, TimePoint now, Actions& act
   return false;
 }
 
-/// Whether the worker may try the task now, could it read its inputs.
-bool Scheduler::is_due(const Job& job, TaskIndex task, const std::string& worker,
-                       TimePoint now) const {
-  const TaskKind kind = job.tasks.graph().key(task).kind;
-  return job.rests_until.at(static_cast<std::size_t>(kind)) <= now &&
-         may_try(crew_of(job, now), job.tasks.attempts().blame(task), worker);
-}
-
-void Scheduler::share_out_tiles() {
-  for (auto& [digest, job] : jobs_) job.homes.share_out(connected_);
+bool Scheduler::Job::is_due(TaskIndex task, const std::string& worker, const Crew& workers) const {
+  const TaskKind kind = tasks.graph().key(task).kind;
+  return rests_until.at(static_cast<std::size_t>(kind)) <= workers.now &&
+         may_try(workers, tasks.attempts().blame(task), worker);
 }
 
 std::string Scheduler::waits_for(const Digest& digest, TimePoint now) const {
   const Job& job = jobs_.at(digest);
   if (!is_open(job.status) || !job.waits.empty()) return is_open(job.status) ? job.waits : "";
   if (lacks_room(digest)) return lacking_room(job);
-  const Crew crew = crew_of(job, now);
+  const Crew crew = job.crew(leases_, now);
   if (const std::string unseen = job.standings.unseen(); !unseen.empty() && are_all_blind(crew))
     return fmt::format("a worker that sees {}", unseen);
   for (const TaskIndex task : job.tasks.attempts().tried()) {

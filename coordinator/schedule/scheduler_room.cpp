@@ -13,20 +13,16 @@ void Scheduler::on(const StoreKeeps& event, TimePoint, Actions&) { kept_bytes_ =
 void Scheduler::on(const AttemptLeft& attempt, TimePoint, Actions&) {
   const Job* const job = find_job(attempt.lease.job);
   const auto task = job ? job->tasks.graph().find(attempt.lease.task) : std::nullopt;
-  if (task && leases_.contains({attempt.lease.job, *task})) {
-    std::vector<Digest>& left = left_[{attempt.lease.job, *task}];
-    left.insert(left.end(), attempt.blobs.begin(), attempt.blobs.end());
+  Lease* const lease = task ? leases_.find({attempt.lease.job, *task}) : nullptr;
+  if (lease != nullptr) {
+    lease->left.insert(lease->left.end(), attempt.blobs.begin(), attempt.blobs.end());
   } else {
     for (const Digest& blob : attempt.blobs) blobs_.discard(blob);
   }
 }
 
 StoreRoom Scheduler::room() const {
-  return {store_limit_, store_bytes(), expected_bytes_, leases_.empty()};
-}
-
-JobInStore Scheduler::in_store(const Job& job) {
-  return {job.tasks.graph(), job.tasks.book(), job.sizes, job.begun_runs};
+  return {store_limit_, store_bytes(), leases_.expected_bytes(), leases_.empty()};
 }
 
 /// Whether a ready task of the job may be granted (store_room.h).
@@ -34,9 +30,9 @@ bool Scheduler::has_room_for(const Job& job, TaskIndex task, bool others_wait) c
   if (store_limit_ == 0) return true;
   std::vector<JobInStore> others;
   for (const auto& [digest, other] : jobs_) {
-    if (&other != &job && is_open(other.status)) others.push_back(in_store(other));
+    if (&other != &job && is_open(other.status)) others.push_back(other.in_store());
   }
-  return has_room(room(), in_store(job), others, task, others_wait);
+  return has_room(room(), job.in_store(), others, task, others_wait);
 }
 
 bool Scheduler::lacks_room(const Digest& digest) const {

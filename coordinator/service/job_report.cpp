@@ -48,6 +48,10 @@ std::string describe(const Scheduler::Job& job, const Failure& failure) {
 
 }  // namespace
 
+std::string folder_of(const JobSpec& job) {
+  return fs::path(job.output.directory).lexically_normal().string();
+}
+
 JobSummary summarize(const Digest& digest, const Scheduler::Job& job) {
   const JobProgress progress = job.tasks.progress();
   JobSummary summary;
@@ -123,7 +127,7 @@ std::vector<std::string> lost_reasons(const LostFiles& lost) {
   return reasons;
 }
 
-LostFiles find_lost_files(const JobAdded& job, const BlobStore& store, FrameFiles* frames) {
+LostFiles find_lost_files(const JobAdded& job, const BlobStore& store, FileTable* frames) {
   // What is recorded as done, and which blobs that leaves.
   JobTasks recorded(job.spec);
   BlobReferences references;
@@ -162,7 +166,9 @@ LostFiles find_lost_files(const JobAdded& job, const BlobStore& store, FrameFile
     const fs::path path = frame_path(job.spec, FrameIndex(frame));
     const BlobRef& image = recorded.made().outputs(frame).front();
     const bool is_there = look(frame, path, image.size_bytes);
-    if (is_there && (frames == nullptr || lost.unreadable || frames->holds(path, image))) continue;
+    if (is_there &&
+        (frames == nullptr || lost.unreadable || frames->holds(path, image).value_or(false)))
+      continue;
     if (is_there) lost.tasks.push_back(graph.key(frame));
     lost.frames.push_back(path.string());
     if (lost.first.empty()) lost.first = path.string();

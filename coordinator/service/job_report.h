@@ -8,10 +8,12 @@
 #include "common/store/blob_store.h"
 #include "coordinator/journal/journal.h"
 #include "coordinator/schedule/scheduler.h"
-#include "coordinator/service/frame_files.h"
+#include "coordinator/service/file_table.h"
 
 namespace baton {
 
+/// The output folder of a job, as jobs of one folder have it in common.
+std::string folder_of(const JobSpec& job);
 /// What people are told of a job.
 JobSummary summarize(const Digest& digest, const Scheduler::Job& job);
 /// Describes a job that the scheduler knows. `failures`: the newest last.
@@ -34,8 +36,7 @@ struct LostFiles {
   /// Why it cannot be told now, of a file or folder.
   std::optional<std::string> unreadable;
 };
-LostFiles find_lost_files(const JobAdded& job, const BlobStore& store,
-                          FrameFiles* frames = nullptr);
+LostFiles find_lost_files(const JobAdded& job, const BlobStore& store, FileTable* frames = nullptr);
 /// For people, of what is lost: empty, or lines.
 std::vector<std::string> lost_reasons(const LostFiles& lost);
 

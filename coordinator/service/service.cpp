@@ -2,15 +2,15 @@
 
 #include <fmt/format.h>
 #include <spdlog/spdlog.h>
-#include <unistd.h>
 
 #include <algorithm>
-#include <cerrno>
 #include <utility>
 
 #include "common/base/build.h"
 #include "common/base/limits.h"
 #include "common/store/folder_token.h"
+#include "coordinator/service/evidence.h"
+#include "coordinator/service/permissions.h"
 
 namespace baton {
 namespace {
@@ -18,9 +18,11 @@ namespace {
 namespace fs = std::filesystem;
 using Clock = std::chrono::steady_clock;
 
-constexpr int kSilentHeartbeats = 4;
 constexpr int kMaxMessagesPerTurn = 1000;
 constexpr std::chrono::milliseconds kTick{250};
+/// What comes again is told so often.
+constexpr std::chrono::minutes kTellInterval{1};
+constexpr std::size_t kMaxTold = 100;
 
 /// bad_input: no worker can have so many in hand.
 Status check_leases(const std::vector<LeaseId>& running) {
@@ -45,28 +47,20 @@ Result<Service> Service::open(const ServiceOptions& options) {
   BATON_ASSIGN(BlobStore store, BlobStore::open(options.work_dir / "store"));
   BATON_ASSIGN(std::string token, make_token(options.work_dir / "store" / "token"));
   BATON_ASSIGN(Router router, Router::bind(options.listen, options.access));
-  Service service(options, std::move(router), std::move(journal), std::move(store),
-                  std::move(token));
+  Service service(std::make_unique<FarmCore>(options, std::move(router), std::move(journal),
+                                             std::move(store), std::move(token)));
   BATON_TRY(service.restore_jobs());
   return service;
 }
 
-Service::Service(const ServiceOptions& options, Router router, Journal journal, BlobStore store,
-                 std::string token)
-    : options_(options),
-      store_directory_(fs::absolute(options.work_dir / "store").lexically_normal()),
-      token_(std::move(token)),
-      router_(std::move(router)),
-      journal_(std::move(journal)),
-      store_(std::move(store)),
-      scheduler_(journal_.epoch(), kSilentHeartbeats * options.heartbeat, options.store_limit) {}
-
 Status Service::run(const std::atomic<bool>& stop) {
+  waits_ = std::make_unique<FileWaits>(farm_.options.digest_file, [this] { farm_.router.wake(); });
   while (!stop && !stop_requested_) BATON_TRY(turn());
+  waits_.reset();
   // Who is told to stop the farm sends the workers home; who is merely ended, by a signal, will be
   // started again, and the workers wait for that.
   if (stop_requested_) {
-    for (const PeerId& worker : peers_.connections()) router_.send(worker, Shutdown{});
+    for (const PeerId& worker : farm_.peers.connections()) farm_.router.send(worker, Shutdown{});
   }
   return {};
 }
@@ -76,91 +70,69 @@ Status Service::turn() {
   const auto until_tick = std::chrono::ceil<std::chrono::milliseconds>(next_tick_ - Clock::now());
   std::chrono::milliseconds timeout = std::clamp(until_tick, std::chrono::milliseconds(0), kTick);
   for (int i = 0; i < kMaxMessagesPerTurn; ++i) {
-    const std::optional<Incoming> incoming = router_.receive(timeout);
+    const std::optional<Incoming> incoming = farm_.router.receive(timeout);
     if (!incoming) break;
     BATON_TRY(handle(*incoming));
     timeout = std::chrono::milliseconds(0);
   }
+  BATON_TRY(handle_read());
   if (Clock::now() >= next_tick_) {
     next_tick_ = Clock::now() + kTick;
     asked_for_hello_.clear();
     tell_refusals();
-    BATON_TRY(step(ClockTicked{}));
+    BATON_TRY(farm_.step(ClockTicked{}));
     if (Clock::now() >= next_sweep_) BATON_TRY(sweep());
-    garbage_.insert(garbage_.end(), unremoved_.begin(), unremoved_.end());
+    farm_.retry_removals();
   }
 
   // First durable, then known to others.
-  BATON_TRY(archive_ended());
-  BATON_TRY(count_kept());
-  BATON_TRY(journal_.commit());
-  return let_out();
-}
-
-Status Service::let_out() {
-  for (const Outgoing& outgoing : std::exchange(outbox_, {})) {
-    if (!router_.send(outgoing.peer, outgoing.message))
-      spdlog::debug("a peer is gone or does not read; message dropped");
-  }
-  for (const Digest& blob : std::exchange(garbage_, {})) {
-    BATON_ASSIGN(const bool is_kept, journal_.is_kept(blob));
-    const bool stays = is_kept || scheduler_.is_referenced(blob);
-    const Status removed = stays ? Status() : store_.remove(blob);
-    if (!removed && unremoved_.empty()) spdlog::warn("{}; tried again", removed.error().message);
-    if (removed) {
-      unremoved_.erase(blob);
-    } else {
-      unremoved_.insert(blob);
-    }
-  }
-  return {};
-}
-
-Status Service::step(const Event& event) {
-  for (const Action& action : scheduler_.step(event, Clock::now())) {
-    BATON_TRY(std::visit([this](const auto& a) { return perform(a); }, action));
-  }
-  return {};
+  BATON_TRY(farm_.archive_ended());
+  BATON_TRY(farm_.count_kept());
+  BATON_TRY(farm_.journal.commit());
+  return farm_.let_out();
 }
 
 // ---- messages of workers ------------------------------------------------------------------------
 
 Status Service::receive(const PeerId& peer, const WorkerHello& message) {
   if (message.worker_id.empty() || message.worker_id.size() > limits::kMaxTextLength) {
-    return refuse(peer, {ErrorKind::bad_input, "a worker needs a name of at most 4096 bytes"});
+    return farm_.refuse(peer,
+                        {ErrorKind::bad_input, "a worker needs a name of at most 4096 bytes"});
   }
-  if (const Status few = check_leases(message.running); !few) return refuse(peer, few.error());
+  if (const Status few = check_leases(message.running); !few)
+    return farm_.refuse(peer, few.error());
   // A worker is the instance that it drew; its name is for people, and others may have it, too.
   WorkerHello hello = message;
-  hello.worker_id = peers_.id_for(message);
-  const bool is_new = peers_.hello_of(hello.worker_id) == nullptr;
-  if (is_new && peers_.num_workers() >= limits::kMaxWorkers) {
-    return refuse(
-        peer, {ErrorKind::io, fmt::format("the farm is full: {} workers", peers_.num_workers())});
+  hello.worker_id = farm_.peers.id_for(message);
+  const bool is_new = farm_.peers.hello_of(hello.worker_id) == nullptr;
+  if (is_new && farm_.peers.num_workers() >= limits::kMaxWorkers) {
+    return farm_.refuse(peer, {ErrorKind::io, fmt::format("the farm is full: {} workers",
+                                                          farm_.peers.num_workers())});
   }
   if (const std::optional<std::string> difference = other_build(hello)) {
-    if (!options_.mixed_builds) {
+    if (!farm_.options.mixed_builds) {
       tell("refused: " + *difference);
-      return refuse(peer,
-                    {ErrorKind::version,
-                     fmt::format("{}; pixels may differ: use one build on all machines, or start "
-                                 "the coordinator with --mixed-builds",
-                                 *difference)});
+      return farm_.refuse(
+          peer, {ErrorKind::version,
+                 fmt::format("{}; pixels may differ: use one build on all machines, or start "
+                             "the coordinator with --mixed-builds",
+                             *difference)});
     }
     if (is_new) spdlog::warn("{}: results may differ", *difference);
   }
 
   // Answer before the leases that follow from it.
-  peers_.add(peer, hello);
+  farm_.peers.add(peer, hello);
   if (is_new)
     spdlog::info("worker {} joined: {} threads on {}", hello.worker_id, hello.num_threads,
                  hello.host);
-  BATON_TRY(reply(
-      peer, WorkerWelcome{journal_.epoch(), static_cast<std::int32_t>(options_.heartbeat.count()),
-                          store_directory_.string(), token_}));
+  BATON_TRY(
+      farm_.reply(peer, WorkerWelcome{farm_.journal.epoch(),
+                                      static_cast<std::int32_t>(farm_.options.heartbeat.count()),
+                                      farm_.store_directory.string(), farm_.token}));
   // A process that has only become impatient may not have received yet what it was granted.
-  if (!is_new) return step(WorkerAlive{hello.worker_id, hello.running});
-  return step(WorkerJoined{hello.worker_id, hello.running});
+  if (!is_new) return farm_.step(WorkerAlive{hello.worker_id, hello.running});
+  return farm_.step(WorkerJoined{hello.worker_id, hello.running});
 }
 
 /// Says where pixels of the worker may differ from those of the others; nullopt: nowhere.
@@ -168,52 +140,53 @@ std::optional<std::string> Service::other_build(const WorkerHello& hello) const 
   if (hello.build != build_identity())
     return fmt::format("worker {} is {}, the coordinator {}", hello.worker_id, hello.build,
                        build_identity());
-  if (const WorkerHello* const other = peers_.find_other_renderer(hello))
+  if (const WorkerHello* const other = farm_.peers.find_other_renderer(hello))
     return fmt::format("worker {} renders with {}, worker {} with {}", hello.worker_id,
                        hello.renderer, other->worker_id, other->renderer);
   return std::nullopt;
 }
 
 Status Service::receive_from(const std::string& worker, const LeaseRequest& message) {
-  return step(WorkRequested{worker, message.count});
+  return farm_.step(WorkRequested{worker, message.count});
 }
 
 Status Service::receive_from(const std::string& worker, const Heartbeat& message) {
   if (const Status few = check_leases(message.running); !few) {
-    const auto peer = peers_.peer_of(worker);
-    return peer ? refuse(*peer, few.error()) : Status();
+    const auto peer = farm_.peers.peer_of(worker);
+    return peer ? farm_.refuse(*peer, few.error()) : Status();
   }
-  BATON_TRY(reply_to(worker, Heartbeat{}));
-  return step(WorkerAlive{worker, message.running});
+  BATON_TRY(farm_.reply_to(worker, Heartbeat{}));
+  return farm_.step(WorkerAlive{worker, message.running});
 }
 
 Status Service::receive_from(const std::string& worker, const TaskDone& message) {
   // Leaves after what follows is durable.
-  BATON_TRY(reply_to(worker, ReportReceived{message.lease}));
+  BATON_TRY(farm_.reply_to(worker, ReportReceived{message.lease}));
   // Accepted results must be there: a blob may have gone between publishing and reporting. A frame
   // that is not where it belongs is on a disk that only the worker sees.
-  if (const auto missing = find_missing_frame(message)) {
-    return step(AttemptFailed{
+  if (const auto missing = find_missing_frame(farm_, message)) {
+    return farm_.step(AttemptFailed{
         worker, message.lease,
         fmt::format("{}: reported, but not there as the coordinator sees it: is the output folder "
                     "mounted where the worker runs?",
                     *missing),
         false});
   }
-  if (const auto missing = find_missing_blob(message)) {
+  if (const auto missing = find_missing_blob(farm_, message)) {
     spdlog::warn("worker {}: {}: reported, but not there; the task is done again", worker,
                  *missing);
-    return step(ResultMissing{worker, message.lease, message.outputs});
+    return farm_.step(ResultMissing{worker, message.lease, message.outputs});
   }
   keep_notes(message);
-  return step(TaskCompleted{worker, message.lease, message.outputs, message.stats, message.frames});
+  return farm_.step(
+      TaskCompleted{worker, message.lease, message.outputs, message.stats, message.frames});
 }
 
 /// What a worker has to say of a job's files, for those who ask for the job.
 void Service::keep_notes(const TaskDone& report) {
   constexpr std::size_t kMostNotes = 100;
-  if (report.notes.empty() || scheduler_.find_job(report.lease.job) == nullptr) return;
-  std::vector<std::string>& notes = notes_[report.lease.job];
+  if (report.notes.empty() || farm_.scheduler.find_job(report.lease.job) == nullptr) return;
+  std::vector<std::string>& notes = farm_.notes[report.lease.job];
   for (const std::string& note : report.notes) {
     std::string text = note.substr(0, limits::kMaxTextLength);
     if (notes.size() < kMostNotes && std::ranges::find(notes, text) == notes.end())
@@ -222,35 +195,37 @@ void Service::keep_notes(const TaskDone& report) {
 }
 
 Status Service::receive_from(const std::string& worker, const TaskFailed& message) {
-  BATON_TRY(reply_to(worker, ReportReceived{message.lease}));
   // A disk that takes nothing, as far as the coordinator sees, takes nothing from other workers.
-  const bool read_only = !message.no_space && writes_nowhere(message.lease);
-  if (message.no_space || read_only) {
+  const bool read_only = !message.no_space && writes_nowhere(farm_, message.lease);
+  const bool lacks_space = message.no_space || read_only;
+  if (!lacks_space && await_inputs(worker, message)) return {};
+  BATON_TRY(farm_.reply_to(worker, ReportReceived{message.lease}));
+  if (lacks_space) {
     const std::string waits =
         fmt::format("{}: {}", read_only ? "a folder that can be written" : "space",
                     message.message.substr(0, limits::kMaxTextLength));
     spdlog::warn("job {} waits for {}", message.lease.job.short_hex(), waits);
-    return step(SpaceLacking{worker, message.lease, waits});
+    return farm_.step(SpaceLacking{worker, message.lease, waits});
   }
   // Inputs that are gone or damaged are nobody's fault: what made them is done again.
-  const std::optional<std::vector<BlobRef>> bad = find_bad_inputs(message.lease);
+  const std::optional<std::vector<BlobRef>> bad = find_bad_inputs(farm_, files_, message.lease);
   for (const BlobRef& input : bad.value_or(std::vector<BlobRef>())) {
     spdlog::warn("job {}: {} is gone or damaged and is made again", message.lease.job.short_hex(),
-                 store_.path(input.digest).string());
-    if (const Status removed = store_.remove(input.digest); !removed)
+                 farm_.store.path(input.digest).string());
+    if (const Status removed = farm_.store.remove(input.digest); !removed)
       spdlog::warn("{}", removed.error().message);
   }
-  if (bad) return step(InputsLost{worker, message.lease, *bad});
-  return step(AttemptFailed{worker, message.lease,
-                            message.message.substr(0, limits::kMaxTextLength), message.permanent});
+  if (bad) return farm_.step(InputsLost{worker, message.lease, *bad});
+  return farm_.step(AttemptFailed{
+      worker, message.lease, message.message.substr(0, limits::kMaxTextLength), message.permanent});
 }
 
 Status Service::receive_from(const std::string& worker, const StatesPublished& message) {
   std::vector<PublishedState> states = message.states;
   std::erase_if(states, [this](const PublishedState& state) {
-    return !store_.contains(state.published.digest);
+    return !farm_.store.contains(state.published.digest);
   });
-  return step(HeldPublished{worker, message.job, std::move(states)});
+  return farm_.step(HeldPublished{worker, message.job, std::move(states)});
 }
 
 Status Service::receive_from(const std::string& worker, const LeaseReturn& message) {
@@ -258,88 +233,102 @@ Status Service::receive_from(const std::string& worker, const LeaseReturn& messa
   if (!unseen.empty())
     tell(fmt::format("worker {} takes no tasks of job {}: {}", worker,
                      message.lease.job.short_hex(), unseen));
-  return step(LeaseReturned{worker, message.lease, unseen});
+  return farm_.step(LeaseReturned{worker, message.lease, unseen});
 }
 
 Status Service::receive_from(const std::string&, const BlobsLeft& message) {
-  return step(AttemptLeft{message.lease, message.blobs});
+  return farm_.step(AttemptLeft{message.lease, message.blobs});
 }
 
 Status Service::receive_from(const std::string& worker, const WorkerGoodbye&) {
   spdlog::info("worker {} left", worker);
-  peers_.remove(worker);
-  return step(WorkerLeft{worker});
+  farm_.peers.remove(worker);
+  return farm_.step(WorkerLeft{worker});
 }
 
-/// The job of a task that is not done; null: there is none.
-const Scheduler::Job* Service::job_of_open_task(const LeaseId& lease) const {
-  const Scheduler::Job* job = scheduler_.find_job(lease.job);
-  const auto task = job ? job->tasks.graph().find(lease.task) : std::nullopt;
-  return task && job->tasks.book().status(*task) != TaskStatus::done ? job : nullptr;
-}
+// ---- files that must be read before a message can be handled -----------------------------------
 
-std::optional<std::string> Service::find_missing_blob(const TaskDone& report) const {
-  // Of a task that was done before the blobs may have served their purpose.
-  if (job_of_open_task(report.lease) == nullptr) return std::nullopt;
-  for (const BlobRef& output : report.outputs) {
-    if (output.kind != BlobKind::image && !output.is_held() && !store_.contains(output.digest))
-      return store_.path(output.digest).string();
-  }
-  return std::nullopt;
-}
-
-std::optional<std::string> Service::find_missing_frame(const TaskDone& report) const {
-  const Scheduler::Job* job = job_of_open_task(report.lease);
-  if (job == nullptr || report.lease.task.kind != TaskKind::assemble) return std::nullopt;
-  const fs::path path = frame_path(job->spec, report.lease.task.frame());
-  for (const BlobRef& output : report.outputs) {
-    std::error_code error;
-    if (fs::file_size(path, error) != output.size_bytes || error) return path.string();
-  }
-  return std::nullopt;
-}
-
-/// Whether the file system that a task of an open job writes to is mounted read-only.
-bool Service::writes_nowhere(const LeaseId& lease) const {
-  const Scheduler::Job* job = job_of_open_task(lease);
-  if (job == nullptr) return false;
-  const bool is_frame = lease.task.kind == TaskKind::assemble;
-  fs::path folder = is_frame ? fs::path(job->spec.output.directory) : store_directory_;
-  std::error_code error;
-  while (!fs::exists(folder, error) && folder.has_relative_path()) folder = folder.parent_path();
-  return ::access(folder.c_str(), W_OK) != 0 && errno == EROFS;
-}
-
-/// The inputs of a leased task that are gone or damaged; none of them where a task that makes them
-/// is being done again meanwhile. nullopt: the inputs are sound.
-std::optional<std::vector<BlobRef>> Service::find_bad_inputs(const LeaseId& lease) const {
-  std::vector<BlobRef> bad;
-  const Scheduler::Job* job = job_of_open_task(lease);
-  if (job == nullptr) return std::nullopt;
-  const auto task = job->tasks.graph().find(lease.task);
-  if (job->tasks.book().status(*task) != TaskStatus::leased) return std::nullopt;
-  if (!job->tasks.book().has_inputs(*task)) return bad;
-  for (const BlobRef& input : job->tasks.ledger().inputs(job->tasks.view(), *task)) {
-    if (!input.is_held() && store_.is_bad(input.digest)) bad.push_back(input);
-  }
-  if (bad.empty()) return std::nullopt;
-  return bad;
-}
-
-// ---- answers ------------------------------------------------------------------------------------
-
-Status Service::reply(const PeerId& peer, Message message) {
-  outbox_.push_back({peer, std::move(message)});
+/// Handles what need not wait any more; who waits on is told that it does.
+Status Service::handle_read() {
+  for (const Incoming& message : waits_->take_ready(files_)) BATON_TRY(handle(message));
+  for (const FileWaits::Notice& notice : waits_->take_notices(std::chrono::steady_clock::now()))
+    BATON_TRY(farm_.refuse(notice.peer, {ErrorKind::timeout, notice.text}));
   return {};
 }
 
-Status Service::reply_to(const std::string& worker, Message message) {
-  const auto peer = peers_.peer_of(worker);
-  return peer ? reply(*peer, std::move(message)) : Status();
+/// Whether a report of a failure waits: inputs of its task must be read before anybody is blamed.
+/// One for which there is no place is forgotten: the worker repeats it.
+bool Service::await_inputs(const std::string& worker, const TaskFailed& message) {
+  const auto peer = farm_.peers.peer_of(worker);
+  const TimePoint now = std::chrono::steady_clock::now();
+  const Incoming incoming{peer.value_or(PeerId()), Message(message), speaker_};
+  if (waits_->join(message.lease, incoming, now)) return true;
+  std::vector<fs::path> unread = unread_inputs(farm_, files_, message.lease);
+  if (unread.empty()) return false;
+  waits_->start(message.lease, {}, std::move(unread), incoming, now);
+  return true;
 }
 
-Status Service::refuse(const PeerId& peer, const Error& error) {
-  return reply(peer, Refused{static_cast<std::uint8_t>(error.kind), error.message});
+// ---- who may do what ----------------------------------------------------------------------------
+
+/// Refuses, and logs, what the speaker may not say.
+template <class M>
+Status Service::forbid(const PeerId& peer) {
+  const std::string text =
+      fmt::format("{} '{}' may not {}", role_name(speaker_.role), speaker_.name, kRights<M>.what);
+  if (complained_.first(peer)) spdlog::warn("refused: {}", text);
+  return farm_.refuse(peer, {ErrorKind::usage, text});
+}
+
+Status Service::handle(const Incoming& incoming) {
+  const PeerId& peer = incoming.peer;
+  if (!incoming.message) {
+    if (complained_.first(peer)) spdlog::warn("bad message: {}", incoming.message.error().message);
+    return farm_.refuse(peer, incoming.message.error());
+  }
+  const std::string worker = farm_.peers.worker_of(peer);
+  speaker_ = incoming.speaker;
+  return std::visit(
+      [&](const auto& message) -> Status {
+        using M = std::decay_t<decltype(message)>;
+        if (may_say<M>(speaker_) == May::no) return forbid<M>(peer);
+        if constexpr (requires { this->receive(peer, message); }) {
+          return receive(peer, message);
+        } else if constexpr (requires { this->receive_from(worker, message); }) {
+          if (!worker.empty()) return receive_from(worker, message);
+          return asked_for_hello_.first(peer) ? farm_.reply(peer, HelloAgain{}) : Status();
+        } else {
+          return farm_.refuse(peer,
+                              {ErrorKind::bad_input, "this message is not for a coordinator"});
+        }
+      },
+      *incoming.message);
+}
+
+/// The job that is meant, if the speaker may change it.
+Result<Digest> Service::resolve_own(const std::string& text) {
+  BATON_ASSIGN(const Digest job, resolve(text));
+  if (const Status own = farm_.check_own(speaker_, job); !own) {
+    spdlog::warn("refused: {}", own.error().message);
+    return own.error();
+  }
+  return job;
+}
+
+/// Logs which connections were refused.
+void Service::tell_refusals() {
+  const std::optional<Error> refusal = farm_.router.take_refusal();
+  if (refusal) tell("refused: " + refusal->message);
+}
+
+/// Logs what may come again and again, as when a stranger tries.
+void Service::tell(const std::string& warning) {
+  const TimePoint now = std::chrono::steady_clock::now();
+  if (told_.size() >= kMaxTold) told_.clear();
+  const auto [told, is_new] = told_.try_emplace(warning, now);
+  if (!is_new && now - told->second < kTellInterval) return;
+  told->second = now;
+  spdlog::warn("{}", warning);
 }
 
 }  // namespace baton

@@ -1,5 +1,10 @@
 #include "jobs/cli/coordinator_link.h"
 
+#include <fmt/core.h>
+
+#include <cstdio>
+#include <utility>
+
 #include "jobs/cli/commands.h"
 
 namespace baton {
@@ -16,6 +21,11 @@ void add_coordinator_options(CLI::App& command, CoordinatorLink& link) {
   command.add_option("--key", link.key_file, "user.key or admin.key of `baton key create`")
       ->envname("BATON_KEY");
   command.add_flag("--insecure", link.insecure, "connect to another machine without a key");
+}
+
+void print_pending(const RequestClient& client, std::string& printed) {
+  const std::string before = std::exchange(printed, client.pending());
+  if (before != printed) fmt::print(stderr, "{}\n", printed);
 }
 
 ExitCode finish_with_coordinator(const Result<ExitCode>& outcome) {

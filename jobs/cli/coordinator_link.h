@@ -3,6 +3,7 @@
 #include <CLI/CLI.hpp>
 #include <chrono>
 #include <string>
+#include <thread>
 #include <variant>
 
 #include "common/base/exit_codes.h"
@@ -32,6 +33,21 @@ Result<A> ask(RequestClient& client, const Message& question,
   if (A* expected = std::get_if<A>(&answer)) return std::move(*expected);
   return Error{ErrorKind::internal,
                "the coordinator answered with another message than was asked for"};
+}
+
+/// Prints what the coordinator is doing before it can answer, unless that was printed last.
+void print_pending(const RequestClient& client, std::string& printed);
+
+/// Like ask, and again for as long as the coordinator says that it is not done.
+template <class A>
+Result<A> ask_until_done(RequestClient& client, const Message& question) {
+  std::string printed;
+  for (;;) {
+    Result<A> answer = ask<A>(client, question);
+    if (client.pending().empty()) return answer;
+    print_pending(client, printed);
+    std::this_thread::sleep_for(std::chrono::milliseconds(200));
+  }
 }
 
 /// Like finish (commands.h), but a timeout means that no coordinator answers.

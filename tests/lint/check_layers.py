@@ -96,7 +96,7 @@ THIRD_PARTY = {
 # Assembled from pieces, so that this file does not find itself.
 FORBIDDEN = ["TO" + "DO", "FIX" + "ME", "ffast" + "-math", "GTEST" + "_SKIP", "#if" + " 0"]
 
-MAX_LINES = 400
+MAX_SCRIPT_LINES = 400  # of sources check_shape.py measures functions and classes
 SOURCE_FOLDERS = ["common", "worker", "coordinator", "jobs", "tests", "cmake"]
 CODE = {".h", ".cpp"}
 TEXT = CODE | {".py", ".cmake", ".sh", ".txt"}
@@ -159,8 +159,8 @@ def check_third_party(path, target):
 
 def check_text(path, lines):
     """Yields (line number, message) for length and forbidden words."""
-    if len(lines) > MAX_LINES:
-        yield MAX_LINES + 1, f"{len(lines)} lines, at most {MAX_LINES}"
+    if Path(path).suffix not in CODE and len(lines) > MAX_SCRIPT_LINES:
+        yield MAX_SCRIPT_LINES + 1, f"{len(lines)} lines, at most {MAX_SCRIPT_LINES}"
     for number, line in enumerate(lines, 1):
         for word in FORBIDDEN:
             if word in line:
@@ -206,7 +206,8 @@ PLANTED = [
     ("worker/run/clean.cpp", '#include "worker/pass/x.h"\n#include <vector>\n', ""),
     ("common/math/b.cpp", "int x;  // " + FORBIDDEN[0] + "\n", FORBIDDEN[0]),
     ("cmake/b.cmake", "set(x -" + FORBIDDEN[2] + ")\n", FORBIDDEN[2]),
-    ("worker/accel/long.cpp", "\n" * (MAX_LINES + 1), f"at most {MAX_LINES}"),
+    ("tests/system/long.py", "\n" * (MAX_SCRIPT_LINES + 1), f"at most {MAX_SCRIPT_LINES}"),
+    ("worker/accel/long.cpp", "\n" * (MAX_SCRIPT_LINES + 1), ""),
     ("worker/new_room/a.cpp", "int x;\n", "no layer rule"),
 ]
 

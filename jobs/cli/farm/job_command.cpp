@@ -61,7 +61,7 @@ Result<ExitCode> submit(const JobOptions& options, RequestClient& client) {
   begin_sweeps(job, restart);
   BATON_ASSIGN(std::string document, make_job_document(job));
   BATON_ASSIGN(const JobAccepted accepted,
-               ask<JobAccepted>(client, SubmitJob{std::move(document), restart}));
+               ask_until_done<JobAccepted>(client, SubmitJob{std::move(document), restart}));
   print_accepted(accepted, options.json);
   if (options.json) return ExitCode::ok;
   if (wanted.is_look) fmt::print(stderr, "a look: frames go to {}\n", job.output.directory);
@@ -193,7 +193,8 @@ void print_change(const JobDetail& before, const JobDetail& after, bool json) {
 template <class M>
 Result<ExitCode> change(const JobOptions& options, RequestClient& client) {
   BATON_ASSIGN(const JobDetail before, ask<JobDetail>(client, ShowJob{options.job}));
-  BATON_ASSIGN(const JobDetail after, ask<JobDetail>(client, M{before.summary.job.hex()}));
+  BATON_ASSIGN(const JobDetail after,
+               ask_until_done<JobDetail>(client, M{before.summary.job.hex()}));
   fmt::print(stderr, "{}", after.plan);
   print_change(before, after, options.json);
   return ExitCode::ok;
@@ -205,7 +206,7 @@ Result<ExitCode> retry(const JobOptions& options, RequestClient& client) {
   const Digest& id = before.summary.job;
   BATON_ASSIGN(JobDocument document, ask<JobDocument>(client, JobDocumentRequest{id}));
   BATON_ASSIGN(const JobAccepted accepted,
-               ask<JobAccepted>(client, SubmitJob{std::move(document.json)}));
+               ask_until_done<JobAccepted>(client, SubmitJob{std::move(document.json)}));
   fmt::print(stderr, "{}", accepted.plan);
   BATON_ASSIGN(const JobDetail after, ask<JobDetail>(client, ShowJob{id.hex()}));
   print_change(before, after, options.json);
@@ -234,7 +235,8 @@ Result<ExitCode> refine(const JobOptions& options, RequestClient& client) {
   quality.sweeps = static_cast<int>(sweeps);
   quality.refinable = true;
   BATON_ASSIGN(std::string wanted, make_job_document(parsed.job));
-  BATON_ASSIGN(const JobAccepted accepted, ask<JobAccepted>(client, SubmitJob{std::move(wanted)}));
+  BATON_ASSIGN(const JobAccepted accepted,
+               ask_until_done<JobAccepted>(client, SubmitJob{std::move(wanted)}));
   print_accepted(accepted, options.json);
   return ExitCode::ok;
 }

@@ -104,7 +104,7 @@ TEST_F(SchedulerTest, FramesAreWrittenWhileRenderingFindsNoSpace) {
   farm.step(SpaceLacking{"a", grants[2].lease, "full"});
   farm.step(AttemptFailed{"a", grants[0].lease, "boom", false});
   farm.step(WorkRequested{"b", 2});
-  EXPECT_EQ(farm.scheduler.num_leases("b"), 1u) << "the assembly, not the tile";
+  EXPECT_EQ(farm.scheduler.leases().of_worker("b").size(), 1u) << "the assembly, not the tile";
 }
 
 // ---- failures -----------------------------------------------------------------------------------

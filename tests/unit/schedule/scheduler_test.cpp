@@ -69,8 +69,8 @@ TEST_F(SchedulerTest, WorkIsDealtOneByOneToAllWhoWait) {
   fresh.ask("a", 4);
   fresh.ask("b", 4);
   fresh.submit();
-  EXPECT_EQ(fresh.scheduler.num_leases("a"), 2u);
-  EXPECT_EQ(fresh.scheduler.num_leases("b"), 2u);
+  EXPECT_EQ(fresh.scheduler.leases().of_worker("a").size(), 2u);
+  EXPECT_EQ(fresh.scheduler.leases().of_worker("b").size(), 2u);
 }
 
 TEST_F(SchedulerTest, AJobEndsWhenItsLastFrameIsWritten) {

@@ -1,0 +1,95 @@
+#include "coordinator/service/evidence.h"
+
+#include <unistd.h>
+
+#include <cerrno>
+
+#include "common/job/plan/sequence.h"
+
+namespace baton {
+namespace {
+
+namespace fs = std::filesystem;
+
+/// The job of a task that is not done; null: there is none.
+const Scheduler::Job* job_of_open_task(const FarmCore& farm, const LeaseId& lease) {
+  const Scheduler::Job* job = farm.scheduler.find_job(lease.job);
+  const auto task = job ? job->tasks.graph().find(lease.task) : std::nullopt;
+  return task && job->tasks.book().status(*task) != TaskStatus::done ? job : nullptr;
+}
+
+/// The blobs that a leased task of an open job reads; none where one is being made again.
+std::vector<BlobRef> leased_inputs(const FarmCore& farm, const LeaseId& lease) {
+  const Scheduler::Job* job = job_of_open_task(farm, lease);
+  if (job == nullptr) return {};
+  const TaskIndex task = *job->tasks.graph().find(lease.task);
+  const TaskBook& book = job->tasks.book();
+  if (book.status(task) != TaskStatus::leased || !book.has_inputs(task)) return {};
+  std::vector<BlobRef> inputs = job->tasks.ledger().inputs(job->tasks.view(), task);
+  std::erase_if(inputs, [](const BlobRef& input) { return input.is_held(); });
+  return inputs;
+}
+
+}  // namespace
+
+std::optional<std::string> find_missing_blob(const FarmCore& farm, const TaskDone& report) {
+  // Of a task that was done before the blobs may have served their purpose.
+  if (job_of_open_task(farm, report.lease) == nullptr) return std::nullopt;
+  for (const BlobRef& output : report.outputs) {
+    if (output.kind != BlobKind::image && !output.is_held() && !farm.store.contains(output.digest))
+      return farm.store.path(output.digest).string();
+  }
+  return std::nullopt;
+}
+
+std::optional<std::string> find_missing_frame(const FarmCore& farm, const TaskDone& report) {
+  const Scheduler::Job* job = job_of_open_task(farm, report.lease);
+  if (job == nullptr || report.lease.task.kind != TaskKind::assemble) return std::nullopt;
+  const fs::path path = frame_path(job->spec, report.lease.task.frame());
+  for (const BlobRef& output : report.outputs) {
+    std::error_code error;
+    if (fs::file_size(path, error) != output.size_bytes || error) return path.string();
+  }
+  return std::nullopt;
+}
+
+bool writes_nowhere(const FarmCore& farm, const LeaseId& lease) {
+  const Scheduler::Job* job = job_of_open_task(farm, lease);
+  if (job == nullptr) return false;
+  const bool is_frame = lease.task.kind == TaskKind::assemble;
+  fs::path folder = is_frame ? fs::path(job->spec.output.directory) : farm.store_directory;
+  std::error_code error;
+  while (!fs::exists(folder, error) && folder.has_relative_path()) folder = folder.parent_path();
+  return ::access(folder.c_str(), W_OK) != 0 && errno == EROFS;
+}
+
+std::optional<std::vector<BlobRef>> find_bad_inputs(const FarmCore& farm, FileTable& files,
+                                                    const LeaseId& lease) {
+  std::vector<BlobRef> bad;
+  const Scheduler::Job* job = job_of_open_task(farm, lease);
+  if (job == nullptr) return std::nullopt;
+  const TaskIndex task = *job->tasks.graph().find(lease.task);
+  if (job->tasks.book().status(task) != TaskStatus::leased) return std::nullopt;
+  if (!job->tasks.book().has_inputs(task)) return bad;
+  std::error_code error;
+  if (!fs::is_directory(farm.store_directory, error)) return std::nullopt;
+  for (const BlobRef& input : leased_inputs(farm, lease)) {
+    const fs::path path = farm.store.path(input.digest);
+    if (files.holds(path, input) == false) bad.push_back(input);
+    files.forget(path);
+  }
+  if (bad.empty()) return std::nullopt;
+  return bad;
+}
+
+std::vector<fs::path> unread_inputs(const FarmCore& farm, const FileTable& files,
+                                    const LeaseId& lease) {
+  std::vector<fs::path> unread;
+  for (const BlobRef& input : leased_inputs(farm, lease)) {
+    fs::path path = farm.store.path(input.digest);
+    if (files.must_be_read(path, input)) unread.push_back(std::move(path));
+  }
+  return unread;
+}
+
+}  // namespace baton

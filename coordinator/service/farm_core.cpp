@@ -1,0 +1,249 @@
+#include "coordinator/service/farm_core.h"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <chrono>
+#include <utility>
+
+#include "common/base/archive.h"
+#include "common/store/folder_token.h"
+#include "coordinator/service/diagnostics_file.h"
+#include "coordinator/service/job_report.h"
+
+namespace baton {
+namespace {
+
+namespace fs = std::filesystem;
+using Clock = std::chrono::steady_clock;
+
+/// Without so many of its heartbeats a worker loses its leases.
+constexpr int kSilentHeartbeats = 4;
+/// After which a worker that got less than it requested may ask again.
+constexpr std::int32_t kRetryMs = 250;
+constexpr int kMaxFailuresShown = 100;
+
+}  // namespace
+
+FarmCore::FarmCore(const ServiceOptions& with, Router messages, Journal records, BlobStore blobs,
+                   std::string mark)
+    : options(with),
+      store_directory(fs::absolute(with.work_dir / "store").lexically_normal()),
+      token(std::move(mark)),
+      router(std::move(messages)),
+      journal(std::move(records)),
+      store(std::move(blobs)),
+      scheduler(journal.epoch(), kSilentHeartbeats * with.heartbeat, with.store_limit) {}
+
+Status FarmCore::let_out() {
+  for (const Outgoing& outgoing : std::exchange(outbox_, {})) {
+    if (!router.send(outgoing.peer, outgoing.message))
+      spdlog::debug("a peer is gone or does not read; message dropped");
+  }
+  for (const Digest& blob : std::exchange(garbage_, {})) {
+    BATON_ASSIGN(const bool is_kept, journal.is_kept(blob));
+    const bool stays = is_kept || scheduler.is_referenced(blob);
+    const Status removed = stays ? Status() : store.remove(blob);
+    if (!removed && unremoved_.empty()) spdlog::warn("{}; tried again", removed.error().message);
+    if (removed) {
+      unremoved_.erase(blob);
+    } else {
+      unremoved_.insert(blob);
+    }
+  }
+  return {};
+}
+
+Status FarmCore::step(const Event& event) {
+  for (const Action& action : scheduler.step(event, Clock::now())) {
+    BATON_TRY(std::visit([this](const auto& a) { return perform(a); }, action));
+  }
+  return {};
+}
+
+// ---- answers ------------------------------------------------------------------------------------
+
+Status FarmCore::reply(const PeerId& peer, Message message) {
+  outbox_.push_back({peer, std::move(message)});
+  return {};
+}
+
+Status FarmCore::reply_to(const std::string& worker, Message message) {
+  const auto peer = peers.peer_of(worker);
+  return peer ? reply(*peer, std::move(message)) : Status();
+}
+
+void FarmCore::reply_at(std::size_t place, const PeerId& peer, Message message) {
+  outbox_.insert(outbox_.begin() + static_cast<std::ptrdiff_t>(place), {peer, std::move(message)});
+}
+
+Status FarmCore::refuse(const PeerId& peer, const Error& error) {
+  return reply(peer, Refused{static_cast<std::uint8_t>(error.kind), error.message});
+}
+
+// ---- jobs ---------------------------------------------------------------------------------------
+
+std::string FarmCore::owner_of(const Digest& job) const {
+  const auto found = owners.find(job);
+  return found == owners.end() ? std::string() : found->second;
+}
+
+Status FarmCore::check_own(const Speaker& speaker, const Digest& job) const {
+  if (speaker.name.empty() || speaker.role != Role::user) return {};
+  const std::string owner = owner_of(job);
+  if (owner == speaker.name) return {};
+  return Error{ErrorKind::usage,
+               fmt::format("job {} belongs to {}: user '{}' may not change it", job.short_hex(),
+                           owner.empty() ? "nobody" : fmt::format("'{}'", owner), speaker.name)};
+}
+
+Status FarmCore::count_kept() {
+  BATON_ASSIGN(const std::uint64_t bytes, journal.kept_bytes());
+  if (std::exchange(kept_bytes_, bytes) == bytes) return {};
+  return step(StoreKeeps{bytes});
+}
+
+Result<JobDetail> FarmCore::living_detail(const Digest& job) {
+  BATON_ASSIGN(const std::vector<Failure> failures,
+               journal.recent_failures(job, kMaxFailuresShown));
+  JobDetail detail = describe_job(scheduler, job, failures);
+  if (const auto found = notes.find(job); found != notes.end()) detail.notes = found->second;
+  return detail;
+}
+
+Result<std::optional<JobDetail>> FarmCore::archived_detail(const Digest& job) {
+  BATON_ASSIGN(const std::optional<Bytes> bytes, journal.archived_detail(job));
+  if (!bytes) return std::optional<JobDetail>();
+  JobDetail detail;
+  ArchiveReader reader(*bytes);
+  reader(detail);
+  if (!reader.complete())
+    return Error{ErrorKind::corrupt,
+                 fmt::format("the archived job {} cannot be read", job.short_hex())};
+  return std::optional(std::move(detail));
+}
+
+Status FarmCore::archive_ended() {
+  for (const Digest& job : std::exchange(ended_, {})) BATON_TRY(archive_job(job));
+  return {};
+}
+
+Status FarmCore::archive_job(const Digest& digest) {
+  const Scheduler::Job* const job = scheduler.find_job(digest);
+  if (job == nullptr || is_open(job->status)) return {};
+  std::vector<BlobRef> kept;
+  for (TaskIndex task = job->tasks.graph().num_frames(); task < job->tasks.graph().num_tasks();
+       ++task) {
+    for (const auto& blobs : {job->tasks.ledger().live_blobs(job->tasks.view(), task),
+                              job->tasks.ledger().spare_blobs(job->tasks.view(), task)}) {
+      for (const BlobRef& blob : blobs) {
+        if (!blob.is_held()) kept.push_back(blob);
+      }
+    }
+    if (job->tasks.ledger().is_cut(task)) {
+      for (const BlobRef& blob : job->tasks.ledger().inputs(job->tasks.view(), task))
+        kept.push_back(blob);
+    }
+  }
+  BATON_ASSIGN(const JobDetail detail, living_detail(digest));
+  BATON_TRY(journal.archive_job(digest, to_bytes(detail.summary), to_bytes(detail), kept));
+  lost_before.erase(digest);
+  notes.erase(digest);
+  return step(JobForgotten{digest});
+}
+
+// ---- what the scheduler decides, carried out ----------------------------------------------------
+
+Status FarmCore::perform(const RecordCompletion& action) {
+  return journal.record_completion(action.job, action.completion);
+}
+
+Status FarmCore::perform(const RecordOutputs& action) {
+  return journal.record_outputs(action.job, action.task, action.outputs);
+}
+
+Status FarmCore::perform(const RecordFailure& action) {
+  const Failure& failure = action.failure;
+  spdlog::warn("job {}: attempt {} on {} failed: {}", failure.lease.job.short_hex(),
+               failure.lease.attempt, failure.worker, failure.message);
+  return journal.record_failure(failure);
+}
+
+Status FarmCore::perform(const RecordReopened& action) {
+  spdlog::warn("job {}: {} finished tasks are done again, since {} is gone", action.job.short_hex(),
+               action.tasks.size(), action.gone);
+  return journal.record_reopened(action.job, action.tasks);
+}
+
+Status FarmCore::perform(const RecordJobStatus& action) {
+  const auto level = action.status == JobStatus::failed ? spdlog::level::err : spdlog::level::info;
+  spdlog::log(level, "job {}: {}", action.job.short_hex(), action.reason);
+  // Before the status is durable: whoever is killed in between ends the job, and writes, again.
+  const Scheduler::Job* job = scheduler.find_job(action.job);
+  if (job != nullptr && !is_open(action.status) && check_output_root(job->spec, options.roots)) {
+    const Status written = write_diagnostics(journal, action.job, job->spec);
+    if (!written) spdlog::warn("no diagnostics: {}", written.error().message);
+  }
+  remove_job_file(action.job, action.status);
+  if (job != nullptr && !is_open(action.status)) {
+    std::error_code error;  // where it cannot be removed, it could not be written
+    fs::remove(output_token_file(job->spec.output.directory, action.job), error);
+  }
+  if (!is_open(action.status)) ended_.push_back(action.job);
+  return journal.record_status(action.job, action.status);
+}
+
+Status FarmCore::perform(const GrantLease& action) {
+  const Grant& grant = action;
+  return reply_to(action.worker, grant);
+}
+
+Status FarmCore::perform(const AskForStates& action) {
+  return reply_to(action.worker, RequestStates{action.job, action.states});
+}
+
+Status FarmCore::perform(const RevokeLease& action) {
+  return reply_to(action.worker, LeaseRevoke{action.lease});
+}
+
+Status FarmCore::perform(const ReportNoWork& action) {
+  return reply_to(action.worker, NoWork{kRetryMs});
+}
+
+Status FarmCore::perform(const ForgetWorker& action) {
+  spdlog::warn("worker {} is silent: its leases go to others", action.worker);
+  peers.remove(action.worker);
+  return {};
+}
+
+Status FarmCore::perform(const ReportConflict& action) {
+  spdlog::error(
+      "BUG: job {}: {}: worker {} reports {} for frame index {}, tile {}, but worker {} has "
+      "reported {}",
+      action.lease.job.short_hex(), describe_task(action.lease.task), action.worker,
+      action.reported.digest.hex(), action.reported.position, action.reported.tile, action.maker,
+      action.expected.digest.hex());
+  return {};
+}
+
+Status FarmCore::perform(const RemoveBlobs& action) {
+  garbage_.insert(garbage_.end(), action.blobs.begin(), action.blobs.end());
+  return {};
+}
+
+std::string FarmCore::mark_output(const Digest& job) const {
+  const Scheduler::Job* const open = scheduler.find_job(job);
+  if (open == nullptr || !is_open(open->status)) return {};
+  if (!check_output_root(open->spec, options.roots)) return {};
+  const fs::path file = output_token_file(open->spec.output.directory, job);
+  return write_token(file, token) ? token : std::string();
+}
+
+void FarmCore::remove_job_file(const Digest& job, JobStatus status) {
+  if (status != JobStatus::done && status != JobStatus::cancelled) return;
+  std::error_code error;
+  fs::remove(store.job_file(job), error);
+  if (error) spdlog::warn("{}: cannot remove: {}", store.job_file(job).string(), error.message());
+}
+
+}  // namespace baton

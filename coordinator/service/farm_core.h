@@ -1,0 +1,131 @@
+#pragma once
+
+#include <chrono>
+#include <filesystem>
+#include <map>
+#include <optional>
+#include <set>
+#include <string>
+#include <vector>
+
+#include "common/job/text/roots.h"
+#include "common/protocol/router.h"
+#include "common/store/blob_store.h"
+#include "coordinator/journal/journal.h"
+#include "coordinator/schedule/scheduler.h"
+#include "coordinator/service/file_reader.h"
+#include "coordinator/service/peers.h"
+
+namespace baton {
+
+struct ServiceOptions {
+  std::string listen = "tcp://127.0.0.1:5570";
+  std::filesystem::path work_dir;  ///< holds journal.sqlite and store/
+  /// Between signs of life of a worker; without four of them it loses its leases.
+  std::chrono::milliseconds heartbeat{1000};
+  /// Workers may be of other builds and instruction sets.
+  bool mixed_builds = false;
+  ServerAccess access = {};  ///< who is let in
+  /// Folders that jobs may read from and write to.
+  Roots roots = {};
+  /// Bytes that blobs may take; 0: as the disk has room.
+  std::uint64_t store_limit = 0;
+  std::chrono::milliseconds sweep_every =
+      BlobStore::kLeftoverAge;  ///< when the store is searched for leftovers
+  /// Reads whole files, on a thread of its own; a test may make it slow.
+  FileReader::DigestFile digest_file = digest_of_file;
+};
+
+/// What the parts of a coordinator work on together: scheduler, journal, store and workers. It
+/// carries out what the scheduler decides. What others learn of it, and blobs that go, wait for
+/// let_out(), which follows the commit of the journal.
+class FarmCore {
+ public:
+  FarmCore(const ServiceOptions& options, Router router, Journal journal, BlobStore store,
+           std::string token);
+
+  const ServiceOptions options;
+  const std::filesystem::path store_directory;
+  /// By which workers tell the folders that this coordinator sees.
+  const std::string token;
+  Router router;
+  Journal journal;
+  BlobStore store;
+  Scheduler scheduler;
+  Peers peers;
+  std::map<Digest, std::string> owners;  ///< who submitted which job
+  /// What workers say of the files of living jobs.
+  std::map<Digest, std::vector<std::string>> notes;
+  std::map<Digest, std::vector<std::string>> lost_before;  ///< what open jobs lacked at the start
+
+  /// Something happens; what follows is journalled, sent or noted for the end of the turn.
+  Status step(const Event& event);
+  /// Sends what waited for the commit, and removes blobs that nobody needs.
+  Status let_out();
+  /// Blobs that the disk would not let go are tried again.
+  void retry_removals() { garbage_.insert(garbage_.end(), unremoved_.begin(), unremoved_.end()); }
+  /// Blobs that nobody may need any more: they go at the end of the turn.
+  void discard(const std::vector<Digest>& blobs) {
+    garbage_.insert(garbage_.end(), blobs.begin(), blobs.end());
+  }
+
+  // What is answered waits for the end of the turn; these never fail.
+  Status reply(const PeerId& peer, Message message);
+  Status reply_to(const std::string& worker, Message message);
+  Status refuse(const PeerId& peer, const Error& error);
+  /// How many answers wait, and an answer that goes out before all after so many.
+  std::size_t num_replies() const { return outbox_.size(); }
+  void reply_at(std::size_t place, const PeerId& peer, Message message);
+
+  /// Empty: nobody is known.
+  std::string owner_of(const Digest& job) const;
+  /// usage: the speaker is a user, and the job somebody else's.
+  Status check_own(const Speaker& speaker, const Digest& job) const;
+  /// Marks the output folder of an open job, for workers. Returns the token; empty: it cannot be
+  /// marked, or the job has ended.
+  std::string mark_output(const Digest& job) const;
+  /// The document for replays outlives its job only if that has failed.
+  void remove_job_file(const Digest& job, JobStatus status);
+
+  /// The job has ended: it leaves the memory at the end of the turn.
+  void note_ended(const Digest& job) { ended_.push_back(job); }
+  /// Jobs that have ended leave the memory.
+  Status archive_ended();
+  /// A job that has ended leaves the memory; what people may ask of it, and its blobs that a later
+  /// job may go on from, stand in the archive. One that is there, or runs again, stays as it is.
+  Status archive_job(const Digest& job);
+  /// Tells the scheduler what ended jobs leave in the store.
+  Status count_kept();
+  /// Describes a job that the scheduler has.
+  Result<JobDetail> living_detail(const Digest& job);
+  /// Describes a job of the archive; nullopt: it is not there.
+  Result<std::optional<JobDetail>> archived_detail(const Digest& job);
+
+ private:
+  // Actions of the scheduler.
+  Status perform(const RecordCompletion& action);
+  Status perform(const RecordOutputs& action);
+  Status perform(const RecordFailure& action);
+  Status perform(const RecordReopened& action);
+  Status perform(const RecordJobStatus& action);
+  Status perform(const GrantLease& action);
+  Status perform(const AskForStates& action);
+  Status perform(const RevokeLease& action);
+  Status perform(const ReportNoWork& action);
+  Status perform(const ForgetWorker& action);
+  Status perform(const ReportConflict& action);
+  Status perform(const RemoveBlobs& action);
+
+  struct Outgoing {
+    PeerId peer;
+    Message message;
+  };
+  std::vector<Outgoing> outbox_;  ///< waits for the commit
+  std::vector<Digest> garbage_;   ///< likewise
+  std::set<Digest> unremoved_;    ///< that the disk would not let go
+  std::vector<Digest> ended_;     ///< jobs to be archived
+  /// That the archive keeps, as the scheduler was told.
+  std::uint64_t kept_bytes_ = 0;
+};
+
+}  // namespace baton

@@ -1,0 +1,98 @@
+#include "coordinator/service/neighbour.h"
+
+#include <fmt/format.h>
+
+#include <algorithm>
+#include <map>
+#include <set>
+#include <span>
+#include <utility>
+
+#include "common/job/plan/sequence.h"
+#include "common/job/text/job_json.h"
+
+namespace baton {
+namespace {
+
+/// The frames of two jobs that write the same file.
+std::vector<std::pair<FrameIndex, FrameIndex>> shared_frames(const JobSpec& a, const JobSpec& b) {
+  std::map<std::string, FrameIndex> of_b;
+  FrameIndex place{0};
+  for (const FrameNumber frame : b.frames) {
+    of_b[frame_file_name(b.output.pattern, frame.value())] = place;
+    ++place;
+  }
+  std::vector<std::pair<FrameIndex, FrameIndex>> shared;
+  place = FrameIndex(0);
+  for (const FrameNumber frame : a.frames) {
+    const auto found = of_b.find(frame_file_name(a.output.pattern, frame.value()));
+    if (found != of_b.end()) shared.emplace_back(place, found->second);
+    ++place;
+  }
+  return shared;
+}
+
+}  // namespace
+
+std::string differing_text(const std::vector<std::string>& differing) {
+  constexpr std::size_t kMost = 8;
+  const auto shown = std::span(differing).first(std::min(kMost, differing.size()));
+  return fmt::format("{}{}", fmt::join(shown, ", "), differing.size() > kMost ? ", ..." : "");
+}
+
+Error another_picture(const JobSpec& job, const Neighbour& other, const JobSpec& other_job) {
+  std::string text = fmt::format(
+      "job '{}': its frames would replace those of job {} ('{}', {}, {} of {} frames) in {}, which "
+      "is another picture; what differs: {}\n"
+      "--restart replaces them, another output.directory keeps them",
+      job.name, other.job.short_hex(), other_job.name, job_status_name(other.status),
+      other.num_there, other_job.frames.size(), job.output.directory,
+      differing_text(other.differing));
+  text += "; --from-frame N keeps those before frame N and renders from there on afresh";
+  if (other.first_differing && *other.first_differing != other.written.front())
+    text +=
+        fmt::format("\nframes before {} are the same and stay in any case", *other.first_differing);
+  return {ErrorKind::bad_input, std::move(text)};
+}
+
+Neighbour look_at(const FormerJob& former, const Digest& job, const ParsedJobDocument& wanted,
+                  FileTable& files, const std::vector<FrameNumber>* owned) {
+  const JobStatus status = former.status;
+  Neighbour other{job, status, {}, {}, {}, false, 0};
+  const JobSpec& theirs = former.document.job;
+  const auto shared = shared_frames(theirs, wanted.job);
+  std::map<FrameIndex, BlobRef> images;
+  for (const Completions::Task& task : former.tasks) {
+    if (task.task.kind == TaskKind::assemble && task.outputs.size() == 1)
+      images[task.task.frame()] = task.outputs.front();
+  }
+
+  // A frame belongs to the job that wrote it as long as its file is unchanged.
+  const std::vector<std::string> picture = picture_differences(former.document, wanted);
+  const FrameComparison comparison(former.document, wanted);
+  std::set<std::string> differing;
+  for (const auto& [mine, its] : shared) {
+    const auto image = images.find(mine);
+    const bool is_owned =
+        owned == nullptr ||
+        std::find(owned->begin(), owned->end(), theirs.frames[mine.index()]) != owned->end();
+    const bool is_there = is_owned && image != images.end() &&
+                          files.holds(frame_path(theirs, mine), image->second).value_or(false);
+    other.num_there += is_there ? 1 : 0;
+    if (!is_there && !is_open(status)) continue;
+    other.written.push_back(wanted.job.frames[its.index()]);
+    differing.insert(picture.begin(), picture.end());
+    // More sweeps make a frame cleaner; what is not written may have had more.
+    const bool may_replace = !is_there || wanted.job.quality.sweeps > theirs.quality.sweeps;
+    const bool is_same =
+        may_replace ? comparison.are_alike(mine, its) : comparison.are_equal(mine, its);
+    if (picture.empty() && is_same) continue;
+    if (picture.empty() && differing.size() < 3) differing.insert(comparison.difference(mine, its));
+    if (!other.first_differing) other.first_differing = wanted.job.frames[its.index()];
+  }
+  other.differing.assign(differing.begin(), differing.end());
+  other.busy = is_open(status) && shared.empty();
+  return other;
+}
+
+}  // namespace baton

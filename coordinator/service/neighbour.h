@@ -1,0 +1,35 @@
+#pragma once
+
+#include <optional>
+#include <string>
+#include <vector>
+
+#include "coordinator/schedule/adoption.h"
+#include "coordinator/service/file_table.h"
+
+namespace baton {
+
+/// Another job that writes, or has written, into the folder of a new one.
+struct Neighbour {
+  Digest job;
+  JobStatus status = JobStatus::running;
+  /// Frames in common that it has written; all of them if it is open.
+  std::vector<FrameNumber> written;
+  /// What makes their pixels others; empty: they are the same.
+  std::vector<std::string> differing;
+  std::optional<FrameNumber> first_differing;
+  bool busy = false;          ///< it is open and shares no frame
+  std::size_t num_there = 0;  ///< frames in common that it has written
+};
+
+/// What a journalled job has written, beside a new one. owned: its frames by number, without those
+/// that another one has replaced; null: all.
+Neighbour look_at(const FormerJob& former, const Digest& job, const ParsedJobDocument& wanted,
+                  FileTable& files, const std::vector<FrameNumber>* owned);
+
+/// Some of what differs, for people.
+std::string differing_text(const std::vector<std::string>& differing);
+/// Why a job is refused whose frames would replace those of another picture.
+Error another_picture(const JobSpec& job, const Neighbour& other, const JobSpec& other_job);
+
+}  // namespace baton

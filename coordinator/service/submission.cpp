@@ -1,0 +1,298 @@
+#include "coordinator/service/submission.h"
+
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include <algorithm>
+#include <map>
+#include <set>
+#include <utility>
+
+#include "common/base/archive.h"
+#include "common/base/limits.h"
+#include "common/job/plan/sequence.h"
+#include "coordinator/service/neighbour.h"
+#include "coordinator/service/plan_text.h"
+
+namespace baton {
+
+namespace fs = std::filesystem;
+
+// ---- another job of the folder ------------------------------------------------------------------
+
+/// What the journal knows of a job, as far as a later one can use it. nullopt: it cannot be read.
+Result<std::optional<FormerJob>> Submission::former_job(const Digest& digest) {
+  BATON_ASSIGN(const std::optional<std::string> text, farm_.journal.document(digest));
+  Result<ParsedJobDocument> document = parse_job_document(text.value_or(""));
+  if (!document) return std::optional<FormerJob>();
+  BATON_ASSIGN(JournalledJob known, farm_.journal.load(digest));
+  FormerJob former{std::move(document).value(), std::move(known.completions.tasks),
+                   std::move(known.plan), known.status};
+  former.document.job.leading_runs = former.plan.leading_runs;
+  return std::optional(std::move(former));
+}
+
+/// Makes room for a new job: a folder has one open job, and a frame in it belongs to the job that
+/// wrote it. Jobs of the same picture end and leave their work. Jobs of another picture whose
+/// frames would be replaced refuse the new one (bad_input, usage); with `restart` they end. Returns
+/// lines that say what is replaced, and why.
+Result<std::vector<std::string>> Submission::make_way(const ParsedJobDocument& document,
+                                                      bool restart) {
+  std::vector<std::string> reasons;
+  std::vector<Neighbour> others;
+  BATON_ASSIGN(const std::vector<Digest> neighbours,
+               farm_.journal.jobs_in(folder_of(document.job)));
+  for (const Digest& digest : neighbours) {
+    if (digest == document.digest) continue;
+    BATON_ASSIGN(const std::optional<FormerJob> former, former_job(digest));
+    if (!former) continue;
+    BATON_ASSIGN(const std::optional<JobDetail> ended, farm_.archived_detail(digest));
+    Neighbour other =
+        look_at(*former, digest, document, files_, ended ? &ended->frames_done : nullptr);
+    if (other.busy && !restart) {
+      return Error{
+          ErrorKind::bad_input,
+          fmt::format("job '{}': job {} ('{}', {}) writes into {}: wait for its end, cancel "
+                      "it, or choose another output.directory",
+                      document.job.name, digest.short_hex(), former->document.job.name,
+                      job_status_name(other.status), document.job.output.directory)};
+    }
+    if (!other.differing.empty() && !restart)
+      return another_picture(document.job, other, former->document.job);
+    if (other.written.empty() && !other.busy) continue;
+    if (is_open(other.status) || !other.differing.empty())
+      BATON_TRY(farm_.check_own(speaker_, digest));
+    others.push_back(std::move(other));
+  }
+
+  for (const Neighbour& other : others) {
+    if (is_open(other.status)) {
+      spdlog::info("job {} makes way for job {}", other.job.short_hex(),
+                   document.digest.short_hex());
+      BATON_TRY(farm_.step(JobSuperseded{other.job, {}}));
+      BATON_TRY(farm_.archive_job(other.job));
+    }
+    if (other.differing.empty()) continue;
+    BATON_TRY(disown(other.job, other.written));
+    reasons.push_back(fmt::format("{} of job {} {} replaced: {} differs",
+                                  other.written.size() == 1 ? "a frame" : "frames",
+                                  other.job.short_hex(), other.written.size() == 1 ? "is" : "are",
+                                  differing_text(other.differing)));
+  }
+  return reasons;
+}
+
+/// Takes frames that another picture replaces off the record of a job in the archive.
+Status Submission::disown(const Digest& job, const std::vector<FrameNumber>& frames) {
+  BATON_ASSIGN(std::optional<JobDetail> detail, farm_.archived_detail(job));
+  if (!detail) return {};
+  std::erase_if(detail->frames_done, [&](FrameNumber frame) {
+    return std::find(frames.begin(), frames.end(), frame) != frames.end();
+  });
+  JobSummary& summary = detail->summary;
+  summary.frames_done = static_cast<std::uint32_t>(detail->frames_done.size());
+  if (summary.status == JobStatus::done) summary.status = JobStatus::cancelled;
+  return farm_.journal.describe_archived(job, summary.status, to_bytes(summary), to_bytes(*detail));
+}
+
+// ---- submission ---------------------------------------------------------------------------------
+
+Status Submission::submit(const PeerId& peer, const ParsedJobDocument& document,
+                          const SubmitJob& message) {
+  const Scheduler::Job* const known = farm_.scheduler.find_job(document.digest);
+  if (known != nullptr) {
+    if (const Status own = farm_.check_own(speaker_, document.digest);
+        known->status != JobStatus::running && !own) {
+      return farm_.refuse(peer, own.error());
+    }
+    return go_on(peer, document.digest);
+  }
+
+  if (farm_.scheduler.num_jobs() >= limits::kMaxJobs) {
+    return farm_.refuse(
+        peer, {ErrorKind::io,
+               fmt::format("the farm is full: {} jobs that have not ended", limits::kMaxJobs)});
+  }
+  Result<std::vector<std::string>> reasons = make_way(document, message.restart);
+  if (!reasons) {
+    const ErrorKind kind = reasons.error().kind;
+    if (kind != ErrorKind::bad_input && kind != ErrorKind::usage) return reasons.error();
+    return farm_.refuse(peer, reasons.error());
+  }
+  return begin(peer, document, message.json, std::move(*reasons));
+}
+
+/// Starts a job with all that former ones of its picture leave to it.
+Status Submission::begin(const PeerId& peer, const ParsedJobDocument& document,
+                         const std::string& text, std::vector<std::string> reasons) {
+  const Digest digest = document.digest;
+  std::vector<Digest> formers;
+  BATON_ASSIGN(Adoption adoption, find_heritage(document, formers, reasons));
+
+  JobAdded event{digest, document.job, JobStatus::running, {}, {}};
+  BATON_ASSIGN(const std::optional<std::string> known, farm_.journal.document(digest));
+  BATON_TRY(take_over(adoption, formers, known ? "" : text, event));
+  LostFiles lost = find_lost_files(event, farm_.store);
+  for (std::string& reason : lost_reasons(lost)) {
+    if (std::find(reasons.begin(), reasons.end(), reason) == reasons.end())
+      reasons.push_back(std::move(reason));
+  }
+  event.lost.insert(event.lost.end(), lost.tasks.begin(), lost.tasks.end());
+  event.lost_spares = std::move(lost.spares);
+
+  // The answer goes out before any lease of the job.
+  const std::size_t place = farm_.num_replies();
+  BATON_TRY(farm_.step(event));
+  const Scheduler::Job& job = *farm_.scheduler.find_job(digest);
+  const std::string plan = plan_text(job, reasons);
+  const bool already_there = known && !is_open(job.status) && event.lost.empty();
+  farm_.reply_at(place, peer, JobAccepted{digest, already_there, plan});
+  spdlog::info("job {} {}: '{}', {} of {} tasks are done", digest.short_hex(),
+               known ? "goes on" : "submitted", job.spec.name, job.tasks.progress().tasks_done,
+               job.tasks.progress().tasks_total);
+  if (!plan.empty()) spdlog::info("job {}: {}", digest.short_hex(), plan);
+
+  // Blobs that the new job needs are not kept for the former ones any more.
+  for (const Digest& former : formers) {
+    BATON_ASSIGN(const std::vector<Digest> kept, farm_.journal.kept_blobs(former));
+    for (const Digest& blob : kept) {
+      if (farm_.scheduler.is_referenced(blob)) BATON_TRY(farm_.journal.let_go(former, blob));
+    }
+  }
+  return {};
+}
+
+/// What jobs of the same picture in the same folder leave to a new one, itself among them.
+Result<Adoption> Submission::find_heritage(const ParsedJobDocument& document,
+                                           std::vector<Digest>& digests,
+                                           std::vector<std::string>& reasons) {
+  BATON_ASSIGN(const std::vector<Digest> neighbours,
+               farm_.journal.jobs_in(folder_of(document.job)));
+  std::vector<FormerJob> formers;
+  for (const Digest& digest : neighbours) {
+    BATON_ASSIGN(std::optional<FormerJob> former, former_job(digest));
+    if (!former || !(former->document.picture == document.picture)) continue;
+    formers.push_back(std::move(*former));
+    digests.push_back(digest);
+  }
+  const KeptFiles kept{
+      .has_frame =
+          [&](FrameIndex frame, const BlobRef& image) {
+            return files_.holds(frame_path(document.job, frame), image).value_or(false);
+          },
+      .has_blob = [&](const BlobRef& blob) { return farm_.store.contains(blob.digest); }};
+  Adoption adoption = adopt(document, formers, kept);
+  if (!formers.empty()) {
+    for (std::string& reason :
+         output_reasons(formers.back().document.job, document.job, adoption.other_plates))
+      reasons.push_back(std::move(reason));
+  }
+  constexpr std::size_t kMost = 8;
+  for (std::size_t i = 0; i < adoption.lost.size() && i < kMost; ++i) {
+    reasons.push_back(fmt::format("{} is gone, or not as it was written",
+                                  frame_path(document.job, adoption.lost[i]).string()));
+  }
+  if (adoption.lost.size() > kMost)
+    reasons.push_back(fmt::format("and {} frames more", adoption.lost.size() - kMost));
+  return adoption;
+}
+
+/// Journals a job as if it had itself done what it adopts, and adds that to the event. text: the
+/// document; empty: the journal has it.
+Status Submission::take_over(const Adoption& adoption, const std::vector<Digest>& formers,
+                             const std::string& text, JobAdded& event) {
+  // Read before the journal changes, since the job may go on from itself. A kept frame has the
+  // statistics of its assembly if that is the former job's.
+  std::map<FrameIndex, BlobRef> images;
+  for (const BlobRef& image : adoption.images) images[image.frame()] = image;
+  const std::set<TaskKey> tasks(adoption.tasks.begin(), adoption.tasks.end());
+  const std::set<FrameIndex> lost(adoption.lost.begin(), adoption.lost.end());
+  std::vector<Completion> taken;
+  if (adoption.former) {
+    const Digest& former = formers[*adoption.former];
+    BATON_TRY(
+        farm_.journal.for_each_completion(former, [&](const Completion& completion) -> Status {
+          const bool is_assembly = completion.task.kind == TaskKind::assemble;
+          const auto image = is_assembly ? images.find(completion.task.frame()) : images.end();
+          const bool is_frame = image != images.end() && completion.outputs.size() == 1 &&
+                                completion.outputs.front() == image->second;
+          if (is_frame) images.erase(image);
+          // A frame that the job itself wrote and that is gone must come out as it was.
+          const bool is_lost =
+              former == event.job && is_assembly && lost.contains(completion.task.frame());
+          if (is_lost) event.lost.push_back(completion.task);
+          if (is_frame || is_lost || tasks.contains(completion.task)) taken.push_back(completion);
+          return {};
+        }));
+  }
+  for (const auto& [frame, image] : images)
+    taken.push_back({assemble_task(frame), {image}, {}, {}});
+  for (const TaskKey& task : adoption.settled) taken.push_back({task, {}, {}, {}});
+
+  if (text.empty()) {
+    BATON_TRY(farm_.journal.restart_job(event.job));
+  } else {
+    BATON_TRY(farm_.journal.add_job(event.job, text, {event.spec.name, folder_of(event.spec)}));
+  }
+  BATON_TRY(farm_.journal.record_plan(event.job, adoption.plan));
+  if (!speaker_.name.empty() && !farm_.owners.contains(event.job)) {
+    farm_.owners[event.job] = speaker_.name;
+    BATON_TRY(farm_.journal.record_owner(event.job, speaker_.name));
+  }
+  event.spec.leading_runs = adoption.plan.leading_runs;
+  event.plan = adoption.plan;
+  for (const Completion& completion : taken) {
+    BATON_TRY(farm_.journal.record_completion(event.job, completion));
+    event.completions.add(completion);
+  }
+  return {};
+}
+
+/// A job that has not ended is submitted again. A paused one goes on, and what is gone or damaged
+/// is made again; a folder that is not there counts as empty.
+Status Submission::go_on(const PeerId& peer, const Digest& digest) {
+  BATON_ASSIGN(LostFiles lost, lost_files_of(digest));
+  const bool runs = farm_.scheduler.find_job(digest)->status == JobStatus::running;
+  std::vector<std::string> reasons = lost_reasons(lost);
+  const auto noted = farm_.lost_before.find(digest);
+  if (reasons.empty() && noted != farm_.lost_before.end()) reasons = noted->second;
+  const std::size_t place = farm_.num_replies();
+  if (runs && !lost.tasks.empty()) BATON_TRY(farm_.step(JobPaused{digest}));
+  if (!runs || !lost.tasks.empty())
+    BATON_TRY(farm_.step(JobResumed{digest, std::move(lost.tasks)}));
+  const std::string plan = plan_text(*farm_.scheduler.find_job(digest), reasons);
+  farm_.reply_at(place, peer, JobAccepted{digest, true, plan});
+  return {};
+}
+
+Result<std::vector<fs::path>> Submission::unread_frames(const JobSpec& job) {
+  std::set<fs::path> wanted, unread;
+  for (std::size_t i = 0; i < job.frames.size(); ++i)
+    wanted.insert(frame_path(job, FrameIndex(static_cast<std::int32_t>(i))).lexically_normal());
+  BATON_ASSIGN(const std::vector<Digest> neighbours, farm_.journal.jobs_in(folder_of(job)));
+  for (const Digest& digest : neighbours) {
+    BATON_ASSIGN(const std::optional<std::string> text, farm_.journal.document(digest));
+    const Result<ParsedJobDocument> document = parse_job_document(text.value_or(""));
+    if (!document) continue;
+    BATON_TRY(farm_.journal.for_each_completion(digest, [&](const Completion& done) -> Status {
+      if (done.task.kind != TaskKind::assemble || done.outputs.size() != 1) return {};
+      const fs::path path = frame_path(document->job, done.task.frame()).lexically_normal();
+      if (wanted.contains(path) && files_.must_be_read(path, done.outputs.front()))
+        unread.insert(path);
+      return {};
+    }));
+  }
+  return std::vector<fs::path>(unread.begin(), unread.end());
+}
+
+Result<LostFiles> Submission::lost_files_of(const Digest& job) {
+  BATON_ASSIGN(JournalledJob known, farm_.journal.load(job));
+  return find_lost_files({.job = job,
+                          .spec = farm_.scheduler.find_job(job)->spec,
+                          .completions = std::move(known.completions),
+                          .failures = {},
+                          .plan = std::move(known.plan)},
+                         farm_.store, &files_);
+}
+
+}  // namespace baton

@@ -1,0 +1,281 @@
+#include <gmock/gmock.h>
+
+#include <algorithm>
+#include <condition_variable>
+#include <mutex>
+
+#include "coordinator/service/service.h"
+#include "tests/unit/service/fake_farm.h"
+
+/// A disk that takes minutes for a file: nobody but who asks for the file may notice.
+namespace baton {
+namespace {
+
+using namespace testing_service;
+using testing::HasSubstr;
+using testing::SizeIs;
+
+/// Reads files only while it is let.
+class SlowDisk {
+ public:
+  Result<Digest> digest(const fs::path& path) {
+    std::unique_lock lock(mutex_);
+    ++num_begun_;
+    changed_.notify_all();
+    changed_.wait(lock, [this] { return is_fast_; });
+    return digest_of_file(path);
+  }
+  void be(bool fast) {
+    const std::lock_guard lock(mutex_);
+    is_fast_ = fast;
+    num_begun_ = 0;
+    changed_.notify_all();
+  }
+  bool has_begun() {
+    std::unique_lock lock(mutex_);
+    return changed_.wait_for(lock, kPatience, [this] { return num_begun_ > 0; });
+  }
+
+ private:
+  std::mutex mutex_;
+  std::condition_variable changed_;
+  bool is_fast_ = true;
+  int num_begun_ = 0;
+};
+
+struct SlowDiskTest : ServiceTest {
+  SlowDisk disk;
+  /// A service ends only when the file in hand is read, so tests must leave the disk fast.
+  struct Slow {
+    explicit Slow(SlowDisk& slow) : disk(slow) { disk.be(false); }
+    ~Slow() { disk.be(true); }
+    SlowDisk& disk;
+  };
+
+  void SetUp() override {
+    ServiceTest::SetUp();
+    options.digest_file = [this](const fs::path& path) { return disk.digest(path); };
+  }
+
+  static void sync(FakeWorker& worker) {
+    worker.say(LeaseRequest{0});
+    worker.say(Heartbeat{});
+    worker.expect<Heartbeat>();
+  }
+  /// Submits the job and does all of it, or but for some tasks.
+  Digest do_job(const std::string& endpoint, FakeWorker& worker, int num_open = 0) {
+    const Digest id = ask<JobAccepted>(endpoint, SubmitJob{document}).job;
+    worker.hello();
+    for (int i = 0; i < kNumTasks - num_open; ++i) worker.do_one_task();
+    sync(worker);
+    return id;
+  }
+
+  /// Asks again for as long as the coordinator says that it is not done.
+  template <class T>
+  T ask_until_done(const std::string& endpoint, const Message& question) {
+    RequestClient client = RequestClient::connect(endpoint).value();
+    for (;;) {
+      Result<Message> answer = client.request(question, kPatience);
+      if (!client.pending().empty()) continue;
+      EXPECT_TRUE(answer.ok()) << answer.error().message;
+      return std::get<T>(*answer);
+    }
+  }
+  /// Whether the worker hears the coordinator while the disk reads.
+  void expect_alive(FakeWorker& worker) {
+    ASSERT_TRUE(disk.has_begun());
+    worker.hello();  // it may have been silent for too long
+    EXPECT_TRUE(worker.answers<WorkerWelcome>(5 * kHeartbeat)) << "as if nobody were there";
+    for (int i = 0; i < 3; ++i) {
+      worker.say(Heartbeat{});
+      EXPECT_TRUE(worker.answers<Heartbeat>(5 * kHeartbeat)) << "as if nobody were there";
+    }
+  }
+};
+
+TEST_F(SlowDiskTest, NobodyWaitsForTheFramesOfASubmission) {
+  const RunningService service(options);
+  FakeWorker worker(service.endpoint(), store(), job);
+  do_job(service.endpoint(), worker);
+
+  // Whoever submits is told why there is no answer yet, each time that he asks.
+  std::optional<Slow> slow(disk);
+  RequestClient client = RequestClient::connect(service.endpoint()).value();
+  for (int i = 0; i < 2; ++i) {
+    const Result<Message> answer = client.request(SubmitJob{document}, kPatience);
+    ASSERT_FALSE(answer.ok());
+    EXPECT_EQ(answer.error().kind, ErrorKind::timeout);
+    EXPECT_EQ(client.pending(), "job 'test': looking at 4 frames in " + job.output.directory);
+  }
+  expect_alive(worker);
+  slow.reset();
+  EXPECT_TRUE(ask_until_done<JobAccepted>(service.endpoint(), SubmitJob{document}).already_there);
+
+  // What is known is not read again, unless it has changed.
+  slow.emplace(disk);
+  EXPECT_TRUE(ask<JobAccepted>(service.endpoint(), SubmitJob{document}).already_there);
+  slow.reset();
+  const fs::path frame = fs::path(job.output.directory) / "frame.0003.exr";
+  const std::string other(fs::file_size(frame), 'x');
+  ASSERT_TRUE(write_file_atomic(frame, as_bytes_view(other)).ok());
+  const auto again = ask_until_done<JobAccepted>(service.endpoint(), SubmitJob{document});
+  EXPECT_FALSE(again.already_there);
+  EXPECT_THAT(again.plan, HasSubstr("frame.0003.exr is gone, or not as it was written"));
+}
+
+// The frames of another picture are looked at before anything is replaced.
+TEST_F(SlowDiskTest, NothingHappensBeforeTheFramesAreRead) {
+  const RunningService service(options);
+  FakeWorker worker(service.endpoint(), store(), job);
+  const Digest id = do_job(service.endpoint(), worker);
+  JobSpec other = job;
+  other.seed = 99;
+  const Message question = SubmitJob{make_job_document(other).value(), true};
+  {
+    const Slow slow(disk);
+    EXPECT_EQ(refused(service.endpoint(), question).kind, ErrorKind::timeout);
+    expect_alive(worker);
+    EXPECT_EQ(show(service.endpoint(), id).summary.status, JobStatus::done);
+    EXPECT_THAT(ask<JobList>(service.endpoint(), ListJobs{}).jobs, SizeIs(0));
+  }
+  EXPECT_THAT(ask_until_done<JobAccepted>(service.endpoint(), question).plan,
+              HasSubstr("replaced: $.seed differs"));
+}
+
+// The answer is the promise: who has none asks the next coordinator.
+TEST_F(SlowDiskTest, ASubmissionThatIsNotAnsweredLeavesNothing) {
+  Digest id;
+  {
+    const RunningService service(options);
+    FakeWorker worker(service.endpoint(), store(), job);
+    id = do_job(service.endpoint(), worker);
+    fs::remove(fs::path(job.output.directory) / "frame.0003.exr");
+    const Slow slow(disk);
+    EXPECT_EQ(refused(service.endpoint(), SubmitJob{document}).kind, ErrorKind::timeout);
+  }
+  const RunningService service(options);
+  EXPECT_EQ(show(service.endpoint(), id).summary.status, JobStatus::done);
+  EXPECT_FALSE(ask_until_done<JobAccepted>(service.endpoint(), SubmitJob{document}).already_there);
+  EXPECT_THAT(show(service.endpoint(), id).frames_done, SizeIs(3));
+}
+
+TEST_F(SlowDiskTest, NobodyWaitsForTheFramesOfAPausedJob) {
+  const RunningService service(options);
+  FakeWorker worker(service.endpoint(), store(), job);
+  const Digest id = do_job(service.endpoint(), worker, 1);
+  ask<JobDetail>(service.endpoint(), PauseJob{id.hex()});
+  std::optional<Slow> slow(disk);
+  EXPECT_EQ(refused(service.endpoint(), ResumeJob{id.hex()}).kind, ErrorKind::timeout);
+  EXPECT_EQ(refused(service.endpoint(), SubmitJob{document}).kind, ErrorKind::timeout);
+  expect_alive(worker);
+  EXPECT_EQ(show(service.endpoint(), id).summary.status, JobStatus::paused);
+  slow.reset();
+  EXPECT_EQ(ask_until_done<JobDetail>(service.endpoint(), ResumeJob{id.hex()}).summary.status,
+            JobStatus::running);
+}
+
+// A report that waits is not confirmed; said twice, it is one failure.
+TEST_F(SlowDiskTest, NobodyWaitsForTheInputsOfAFailedAttempt) {
+  const RunningService service(options);
+  const Digest id = ask<JobAccepted>(service.endpoint(), SubmitJob{document}).job;
+  FakeWorker worker(service.endpoint(), store(), job);
+  worker.hello();
+  for (int i = 0; i < 2; ++i) worker.do_one_task();
+  worker.say(LeaseRequest{1});
+  const LeaseGrant reader = worker.expect<LeaseGrant>();
+  ASSERT_FALSE(reader.inputs.empty());
+  {
+    const Slow slow(disk);
+    worker.say(TaskFailed{reader.lease, "cannot read", false});
+    ASSERT_TRUE(disk.has_begun());
+    worker.say(TaskFailed{reader.lease, "cannot read", false});
+    worker.say(Heartbeat{{reader.lease}});
+    EXPECT_TRUE(worker.answers<Heartbeat>(5 * kHeartbeat)) << "as if nobody were there";
+    EXPECT_THAT(show(service.endpoint(), id).failures, SizeIs(0));
+  }
+  EXPECT_EQ(worker.expect<ReportReceived>().lease, reader.lease);
+  EXPECT_THAT(show(service.endpoint(), id).failures, SizeIs(1));
+}
+
+/// A file of its own for each test.
+struct FileTableTest : ServiceTest {
+  fs::path file = folder / "frame";
+  BlobRef recorded{BlobKind::image, 0, 0, digest_of("bytes"), 5};
+  void write(const std::string& text) {
+    ASSERT_TRUE(write_file_atomic(file, as_bytes_view(text)).ok());
+  }
+  FileContent read() { return {file, *stamp_of(file), *digest_of_file(file)}; }
+};
+
+TEST_F(FileTableTest, AFileIsReadOnceAndAgainWhenItHasChanged) {
+  FileTable table;
+  EXPECT_FALSE(table.must_be_read(file, recorded));
+  EXPECT_EQ(table.holds(file, recorded), false) << "it is not there";
+  write("bytes");
+  EXPECT_TRUE(table.must_be_read(file, recorded));
+  EXPECT_EQ(table.holds(file, recorded), std::nullopt);
+  table.add(read());
+  EXPECT_FALSE(table.must_be_read(folder / "." / "frame", recorded));
+  EXPECT_EQ(table.holds(folder / "." / "frame", recorded), true);
+
+  // The same size, at the same time.
+  const auto time = fs::last_write_time(file);
+  write("other");
+  fs::last_write_time(file, time);
+  EXPECT_TRUE(table.must_be_read(file, recorded)) << "another inode";
+  table.add(read());
+  EXPECT_EQ(table.holds(file, recorded), false);
+  write("longer");
+  EXPECT_FALSE(table.must_be_read(file, recorded));
+  EXPECT_EQ(table.holds(file, recorded), false) << "the size says it";
+}
+
+TEST_F(FileTableTest, WhatCouldNotBeReadIsNeitherAndReadAnew) {
+  FileTable table;
+  write("bytes");
+  table.add({file, *stamp_of(file), std::nullopt});
+  EXPECT_FALSE(table.must_be_read(file, recorded)) << "it was tried";
+  EXPECT_EQ(table.holds(file, recorded), std::nullopt);
+  EXPECT_TRUE(table.must_be_read(file, recorded));
+}
+
+// One file of each in turn: the short request is done before the long one.
+TEST_F(FileTableTest, AShortRequestDoesNotWaitForALongOne) {
+  write("bytes");
+  SlowDisk disk;
+  disk.be(false);
+  std::atomic<int> num_woken{0};
+  const auto digest = [&](const fs::path& path) { return disk.digest(path); };
+  FileReader reader(digest, [&] { ++num_woken; });
+  const ReadFor longer = Digest{1, 1}, shorter = LeaseId{};
+  ASSERT_TRUE(reader.request(longer, std::vector<fs::path>(5, file)));
+  ASSERT_TRUE(disk.has_begun());
+  ASSERT_TRUE(reader.request(shorter, {file, folder / "gone"}));
+  for (std::size_t i = 2; i < FileReader::kMaxRequests; ++i)
+    ASSERT_TRUE(reader.request(longer, {}));
+  EXPECT_FALSE(reader.request(longer, {})) << "the queue is full";
+  disk.be(true);
+  std::vector<FilesRead> done;
+  while (done.size() < FileReader::kMaxRequests) {
+    for (FilesRead& read : reader.take()) done.push_back(std::move(read));
+  }
+  const auto place = [&](const ReadFor& reason, std::size_t size) {
+    return std::find_if(done.begin(), done.end(), [&](const FilesRead& read) {
+      return read.reason == reason && read.contents.size() == size;
+    });
+  };
+  ASSERT_NE(place(shorter, 1), done.end()) << "what is gone is left out";
+  EXPECT_EQ(place(shorter, 1)->contents[0].digest, digest_of("bytes"));
+  EXPECT_LT(place(shorter, 1), place(longer, 5));
+  EXPECT_EQ(num_woken, static_cast<int>(FileReader::kMaxRequests));
+}
+
+TEST_F(FileTableTest, AReaderEndsWithRequestsInHand) {
+  write("bytes");
+  FileReader reader(digest_of_file, [] {});
+  ASSERT_TRUE(reader.request(Digest{1, 1}, std::vector<fs::path>(100000, file)));
+}
+
+}  // namespace
+}  // namespace baton
