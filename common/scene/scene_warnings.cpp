@@ -7,6 +7,7 @@
 #include "common/base/suggest.h"
 #include "common/scene/gltf/document.h"
 #include "common/scene/gltf/materials.h"
+#include "common/scene/gltf/node_motion.h"
 
 namespace baton {
 namespace {
@@ -34,7 +35,9 @@ void warn_of_materials(const gltf::Document& file, const SceneSpec& scene,
   }
 }
 
-void warn_of_file(const gltf::Document& file, std::vector<std::string>& warnings) {
+void warn_of_file(const std::shared_ptr<const gltf::Document>& given,
+                  std::vector<std::string>& warnings) {
+  const gltf::Document& file = *given;
   const auto add = [&](const std::string& what) { warnings.push_back(file.path + ": " + what); };
   for (const std::string& extension : file.extensions_used) {
     if (!gltf::is_read(extension)) add("extension " + extension + " is not read");
@@ -50,6 +53,11 @@ void warn_of_file(const gltf::Document& file, std::vector<std::string>& warnings
     add(fmt::format(
         "{} parts have morph targets of colours or texture coordinates, which are not read",
         morphed));
+  const auto motion = gltf::NodeMotion::read(given);
+  if (motion && motion->num_repeated_keys() > 0)
+    add(fmt::format(
+        "{} keys of its animations are at the time of another, of which the last counts",
+        motion->num_repeated_keys()));
   if (colored > 0) add(fmt::format("{} parts have vertex colours, which are not read", colored));
 }
 
@@ -81,7 +89,7 @@ std::vector<std::string> scene_warnings(const SceneSpec& scene) {
   for (const std::string& path : paths) {
     const auto document = gltf::read_document(path);
     if (!document) continue;
-    warn_of_file(**document, warnings);
+    warn_of_file(*document, warnings);
     warn_of_materials(**document, scene, used, warnings);
     for (std::string& name : gltf::material_names(**document)) names.insert(std::move(name));
   }

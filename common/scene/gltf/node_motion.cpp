@@ -11,6 +11,10 @@
 namespace baton::gltf {
 namespace {
 
+/// How far apart two numbers are that stand for one time, as a share of it: exporters multiply and
+/// round in float32, and write 23.976 frames a second for 24000/1001.
+constexpr double kSameTime = 0x1p-19;
+
 /// The keys around a time: `share` of the way from key `from` to key `to`.
 struct Span {
   std::size_t from = 0, to = 0;
@@ -18,14 +22,16 @@ struct Span {
   double seconds = 0;  ///< between the keys
 };
 
+/// A key a rounding after `seconds` is there already.
 Span find_span(const std::vector<float>& times, double seconds) {
-  const auto next = std::upper_bound(times.begin(), times.end(), seconds,
+  const double latest = seconds + std::fabs(seconds) * kSameTime;
+  const auto next = std::upper_bound(times.begin(), times.end(), latest,
                                      [](double s, float time) { return s < double{time}; });
   if (next == times.begin()) return {};
   const auto from = static_cast<std::size_t>(next - times.begin()) - 1;
   if (next == times.end()) return {from, from, 0, 0};
   const double length = double{*next} - double{times[from]};
-  return {from, from + 1, (seconds - double{times[from]}) / length, length};
+  return {from, from + 1, std::max((seconds - double{times[from]}) / length, 0.0), length};
 }
 
 /// Component c of a curve of `width` numbers, each by itself.
@@ -95,7 +101,24 @@ Result<std::size_t> width_of(const Document& document, const Channel& channel) {
       "$.nodes[{}]: its weights are animated, expected a mesh with morph targets", channel.node));
 }
 
-Result<Curve> read_curve(const Document& document, const Channel& channel) {
+/// Of keys at one time the last one counts. row: numbers a key. Returns how many were left out.
+std::size_t drop_repeated(Curve& curve, std::size_t row) {
+  std::size_t kept = 0;
+  for (std::size_t k = 0; k < curve.times.size(); ++k) {
+    if (kept > 0 && curve.times[k] == curve.times[kept - 1]) --kept;
+    curve.times[kept] = curve.times[k];
+    std::copy_n(curve.values.begin() + static_cast<std::ptrdiff_t>(k * row), row,
+                curve.values.begin() + static_cast<std::ptrdiff_t>(kept * row));
+    ++kept;
+  }
+  const std::size_t dropped = curve.times.size() - kept;
+  curve.times.resize(kept);
+  curve.values.resize(kept * row);
+  return dropped;
+}
+
+/// repeated: gets the keys that another one at their time replaces, added.
+Result<Curve> read_curve(const Document& document, const Channel& channel, std::size_t& repeated) {
   BATON_ASSIGN(const std::size_t width, width_of(document, channel));
   Curve curve{channel.interpolation, {}, {}};
   BATON_ASSIGN(curve.times, read_floats(document, channel.input, 1));
@@ -104,9 +127,7 @@ Result<Curve> read_curve(const Document& document, const Channel& channel) {
                            channel.path == Path::weights ? 1 : static_cast<int>(width)));
   const auto finite = [](float v) { return std::isfinite(v); };
   if (!std::all_of(curve.times.begin(), curve.times.end(), finite) ||
-      std::adjacent_find(curve.times.begin(), curve.times.end(), std::greater_equal<>()) !=
-          curve.times.end() ||
-      curve.times.empty())
+      !std::is_sorted(curve.times.begin(), curve.times.end()) || curve.times.empty())
     return document.error(fmt::format(
         "$.accessors[{}]: expected the ascending times of an animation", channel.input));
   const std::size_t rows = channel.interpolation == Interpolation::cubic_spline ? 3 : 1;
@@ -116,6 +137,7 @@ Result<Curve> read_curve(const Document& document, const Channel& channel) {
     return document.error(
         fmt::format("$.accessors[{}]: expected {} finite numbers for an animation, got {}",
                     channel.output, expected, curve.values.size()));
+  repeated += drop_repeated(curve, rows * width);
   return curve;
 }
 
@@ -161,7 +183,7 @@ Result<NodeMotion> NodeMotion::read(std::shared_ptr<const Document> document) {
                                   : channel.path == Path::scale     ? moved.scale
                                                                     : moved.weights;
     if (curve) continue;
-    BATON_ASSIGN(curve, read_curve(file, channel));
+    BATON_ASSIGN(curve, read_curve(file, channel, motion.num_repeated_keys_));
     if (channel.path != Path::weights &&
         file.nodes[static_cast<std::size_t>(channel.node)].has_matrix)
       return file.error(fmt::format("$.nodes[{}]: is animated, expected no matrix", channel.node));

@@ -15,7 +15,8 @@ struct Curve {
   std::vector<float> times;  ///< seconds, ascending, at least one
   std::vector<float> values;
 
-  /// Rotations are unit quaternions. Held before the first time and after the last one.
+  /// Rotations are unit quaternions. Held before the first time and after the last one. A key shows
+  /// from its time on, up to the rounding of times in files.
   std::array<double, 3> vector_at(double seconds) const;
   Quaternion rotation_at(double seconds) const;
   /// A curve of `width` numbers a time, each by itself.
@@ -30,6 +31,8 @@ class NodeMotion {
   static Result<NodeMotion> read(std::shared_ptr<const Document> document);
 
   const Document& document() const { return *document_; }
+  /// Keys that another one at the same time replaces: the last one counts.
+  std::size_t num_repeated_keys() const { return num_repeated_keys_; }
   /// Lets go of all of the document but its nodes, skins and what its meshes are called and made
   /// of: motion that is kept needs no more.
   void let_go_of_buffers();
@@ -68,6 +71,7 @@ class NodeMotion {
   std::vector<int> order_;     ///< all nodes, parents first
   std::vector<Moved> curves_;  ///< by node
   std::vector<bool> moves_;    ///< by node
+  std::size_t num_repeated_keys_ = 0;
 };
 
 }  // namespace baton::gltf
