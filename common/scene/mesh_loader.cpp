@@ -54,7 +54,8 @@ Result<TriangleMesh> load_mesh(const std::string& path, bool smooth_normals, boo
       return bad_mesh(path,
                       "no triangles (" + std::to_string(mesh.dropped_triangles) + " without area)");
     }
-    if (smooth_normals && mesh.normals.empty()) mesh.normals = smooth_vertex_normals(mesh);
+    if (smooth_normals && mesh.normals.empty())
+      mesh.normals = smooth_vertex_normals(mesh.positions, mesh.triangles);
     return mesh;
   } catch (const std::exception& e) {
     return bad_mesh(path, std::string("not a mesh: ") + e.what());

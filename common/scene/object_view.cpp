@@ -4,7 +4,9 @@
 
 #include <algorithm>
 #include <array>
+#include <map>
 #include <span>
+#include <utility>
 
 #include "common/job/plan/sequence.h"
 #include "common/math/bounds.h"
@@ -92,6 +94,32 @@ std::uint64_t count_dropped(const Scene& scene) {
   return dropped;
 }
 
+namespace {
+
+/// What was made anew or left out of files, summed over the meshes of each.
+void warn_of_repairs(const JobSpec& job, const Scene& scene, std::vector<std::string>& warnings) {
+  static constexpr std::pair<std::uint64_t MeshRepairs::*, std::string_view> kKinds[] = {
+      {&MeshRepairs::normals, "have no usable normal: they take that of the faces around"},
+      {&MeshRepairs::tangents, "have no usable tangent: they take that of the coordinates"},
+      {&MeshRepairs::weights, "are held by no joint: they follow the first one"},
+  };
+  std::map<std::string, MeshRepairs> by_file;
+  std::size_t index = 0;  // the scene has the meshes in the order of the job
+  for (const auto& [name, spec] : job.scene.meshes) {
+    MeshRepairs& sum = by_file[spec.path];
+    for (const auto& [count, what] : kKinds) sum.*count += scene.meshes[index].repairs.*count;
+    ++index;
+  }
+  for (const auto& [file, repairs] : by_file) {
+    for (const auto& [count, what] : kKinds) {
+      if (repairs.*count > 0)
+        warnings.push_back(fmt::format("{}: {} vertices {}", file, repairs.*count, what));
+    }
+  }
+}
+
+}  // namespace
+
 std::vector<std::string> geometry_warnings(const JobSpec& job, const Scene& scene) {
   std::vector<BoxCorners> boxes;
   for (const TriangleMesh& mesh : scene.meshes) boxes.push_back(corners_of(mesh.positions));
@@ -112,6 +140,7 @@ std::vector<std::string> geometry_warnings(const JobSpec& job, const Scene& scen
   std::vector<std::string> warnings;
   if (const std::uint64_t dropped = count_dropped(scene); dropped > 0)
     warnings.push_back(fmt::format("{} triangles without area are left out", dropped));
+  warn_of_repairs(job, scene, warnings);
   for (std::size_t i = 0; i < std::min(best.size(), job.scene.objects.size()); ++i) {
     if (best[i] != Sight::seen)
       warnings.push_back(

@@ -21,7 +21,7 @@ void look_at(const Result<TriangleMesh>& mesh) {
   for (const auto& triangle : mesh->triangles) {
     for (const std::uint32_t index : triangle) BATON_CHECK(index < mesh->positions.size());
   }
-  BATON_CHECK(std::ranges::all_of(smooth_vertex_normals(*mesh), finite));
+  BATON_CHECK(std::ranges::all_of(smooth_vertex_normals(mesh->positions, mesh->triangles), finite));
 }
 
 /// What nodes shape, at rest and at times between the keys.

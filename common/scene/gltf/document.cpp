@@ -101,7 +101,20 @@ ByteView Document::bytes_of_image(std::size_t image) const {
 }
 
 std::vector<int> shown_nodes(const Document& document) {
-  std::vector<int> nodes = document.roots;  // grows while it is walked
+  // A root may be below another one.
+  std::vector<bool> is_root(document.nodes.size(), false);
+  for (const int root : document.roots) is_root[static_cast<std::size_t>(root)] = true;
+  const auto is_shown_above = [&](int node) {
+    int above = document.nodes[static_cast<std::size_t>(node)].parent;
+    while (above >= 0 && !is_root[static_cast<std::size_t>(above)])
+      above = document.nodes[static_cast<std::size_t>(above)].parent;
+    return above >= 0;
+  };
+  std::vector<int> nodes;  // grows while it is walked
+  for (const int root : document.roots) {
+    const bool is_new = std::ranges::find(nodes, root) == nodes.end();
+    if (is_new && !is_shown_above(root)) nodes.push_back(root);
+  }
   for (std::size_t i = 0; i < nodes.size(); ++i) {
     const std::vector<int>& children = document.nodes[static_cast<std::size_t>(nodes[i])].children;
     nodes.insert(nodes.end(), children.begin(), children.end());

@@ -1,5 +1,6 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <limits>
@@ -72,10 +73,15 @@ struct Primitive {
 
 struct Mesh {
   std::string name;
-  std::vector<Primitive> primitives;  ///< all with as many targets
-  std::vector<double> weights;        ///< one for each target, or none: zeros
+  std::vector<Primitive> primitives;
+  std::vector<double> weights;  ///< one for each target, or none: zeros
 
-  std::size_t num_targets() const { return primitives.empty() ? 0 : primitives[0].targets.size(); }
+  /// Primitives with fewer lack the last ones.
+  std::size_t num_targets() const {
+    std::size_t most = 0;
+    for (const Primitive& primitive : primitives) most = std::max(most, primitive.targets.size());
+    return most;
+  }
 };
 
 struct Skin {
@@ -181,6 +187,8 @@ struct Document {
   std::vector<Texture> textures;
   std::vector<Image> images;
   std::vector<std::string> extensions_used;
+  /// What is unusual and read in spite of that, a line each.
+  std::vector<std::string> notes;
 
   /// The mesh of a node that has one.
   const Mesh& mesh_of(const Node& node) const {

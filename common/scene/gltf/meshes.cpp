@@ -28,7 +28,8 @@ void add_triangles(const Vertices& v, const Matrix& to_file, const MeshParts& pa
       const std::uint32_t vertex = v.corners[i + (mirrored ? 2 - k : k)];
       vertices[k] = vertex;
       corners[k] = transform.point(vec3_at(v.positions, vertex));
-      if (parts.normals) normals[k] = normalize(normal_to_file * vec3_at(v.normals, vertex));
+      if (parts.normals && !v.normals.empty())
+        normals[k] = normalize(normal_to_file * vec3_at(v.normals, vertex));
       for (std::size_t set = 0; set < static_cast<std::size_t>(parts.uv_sets); ++set)
         uvs[k][set] = {v.uvs[set][std::size_t{2} * vertex],
                        v.uvs[set][std::size_t{2} * vertex + 1]};
@@ -52,11 +53,18 @@ Result<Opened> open_primitive(const Document& document, const MeshSpec& spec) {
     return document.error(place + ": not there");
   const Primitive& primitive = document.meshes[m].primitives[p];
   BATON_ASSIGN(Vertices v, read_vertices(document, primitive, place));
-  const bool with_normals = spec.smooth_normals && has_usable_normals(v);
-  const bool with_tangents =
-      with_normals && is_bumpy(document, primitive) && has_usable_tangents(v);
+  const bool with_normals = spec.smooth_normals && !v.normals.empty();
+  const bool with_tangents = with_normals && is_bumpy(document, primitive) && !v.tangents.empty();
   const MeshParts parts{with_normals, v.num_uv_sets(), with_tangents};
   return Opened{std::move(v), parts};
+}
+
+/// Repairs of what is used.
+MeshRepairs used_repairs(const Opened& opened) {
+  MeshRepairs repairs = opened.vertices.repairs;
+  if (!opened.parts.normals) repairs.normals = 0;
+  if (!opened.parts.tangents) repairs.tangents = 0;
+  return repairs;
 }
 
 Error without_triangles(const Document& document, const MeshSpec& spec, std::uint64_t dropped) {
@@ -70,6 +78,7 @@ Result<TriangleMesh> built_mesh(const Document& document, const MeshSpec& spec,
   MeshBuilder builder(opened.parts);
   add_triangles(opened.vertices, kIdentity, opened.parts, builder);
   TriangleMesh result = builder.take();
+  result.repairs = used_repairs(opened);
   if (result.triangles.empty()) return without_triangles(document, spec, result.dropped_triangles);
   return result;
 }
@@ -123,6 +132,7 @@ Result<TriangleMesh> deforming_mesh(const Document& document, const MeshSpec& sp
     }
   }
   if (mesh.triangles.empty()) return without_triangles(document, spec, mesh.dropped_triangles);
+  mesh.repairs = used_repairs(opened);
   for (std::size_t set = 0; set < static_cast<std::size_t>(opened.parts.uv_sets); ++set) {
     for (std::size_t i = 0; i < opened.vertices.uvs[set].size(); i += 2)
       mesh.uvs[set].push_back({opened.vertices.uvs[set][i], opened.vertices.uvs[set][i + 1]});
@@ -168,6 +178,7 @@ Result<TriangleMesh> shaped_mesh(const Document& document, std::shared_ptr<const
   BATON_ASSIGN(Shaper shaper,
                Shaper::read(document, by.node, static_cast<std::size_t>(spec.primitive),
                             opened.vertices, opened.parts.normals, opened.parts.tangents));
+  opened.vertices.repairs.weights = shaper.num_loose();
   if (by.animation)
     return deforming_mesh(
         document, spec, std::move(opened),
@@ -210,6 +221,8 @@ Result<TriangleMesh> whole_mesh(const Document& document, bool smooth_normals) {
   const std::vector<Matrix> to_world = NodeMotion::at_rest(document);
   std::vector<Part> parts;
   MeshParts common{.normals = smooth_normals, .uv_sets = 2};
+  bool any_normals = false;
+  MeshRepairs repairs;
   for (const int node : shown_nodes(document)) {
     const int mesh = document.nodes[static_cast<std::size_t>(node)].mesh;
     if (mesh < 0) continue;
@@ -221,17 +234,23 @@ Result<TriangleMesh> whole_mesh(const Document& document, bool smooth_normals) {
       if (!has_surface(given.primitives[p])) continue;
       BATON_ASSIGN(Vertices v, read_vertices(document, given.primitives[p], place_of(mesh, p)));
       BATON_ASSIGN(const Shaper shaper,
-                   Shaper::read(document, node, p, v, has_usable_normals(v), false));
+                   Shaper::read(document, node, p, v, !v.normals.empty(), false));
       if (!shaper.is_idle())
         take_shape(shaper.shape(to_world, NodeMotion::weights_at_rest(document, node)), v);
-      common.normals = common.normals && has_usable_normals(v);
+      any_normals = any_normals || !v.normals.empty();
+      repairs.normals += v.repairs.normals;
+      repairs.weights += shaper.num_loose();
       common.uv_sets = std::min(common.uv_sets, v.num_uv_sets());
       parts.push_back({std::move(v), to_file});
     }
   }
+  common.normals = smooth_normals && any_normals;
   MeshBuilder builder(common);
   for (const Part& part : parts) add_triangles(part.vertices, part.to_file, common, builder);
-  return builder.take();
+  TriangleMesh mesh = builder.take();
+  mesh.repairs.normals += common.normals ? repairs.normals : 0;
+  mesh.repairs.weights = repairs.weights;
+  return mesh;
 }
 
 }  // namespace baton::gltf

@@ -30,7 +30,7 @@ Result<TriangleMesh> shaped_mesh(const Document& document, std::shared_ptr<const
                                  const MeshSpec& spec);
 
 /// All that the scene of a file shows, in its world, at rest; with the UV sets that all of it has.
-/// The mesh has no normals where a part has none.
+/// Parts without normals take smooth ones where others have some; without any the mesh has none.
 Result<TriangleMesh> whole_mesh(const Document& document, bool smooth_normals);
 
 /// Puts nodes elsewhere. Their places must be there.

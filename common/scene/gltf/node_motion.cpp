@@ -90,15 +90,11 @@ Matrix rest_of(const Node& node) {
   return node.has_matrix ? node.matrix : compose(node.translation, unit(node.rotation), node.scale);
 }
 
-/// Numbers a time of what a channel moves.
-Result<std::size_t> width_of(const Document& document, const Channel& channel) {
-  if (channel.path == Path::rotation) return std::size_t{4};
-  if (channel.path != Path::weights) return std::size_t{3};
+/// Whether a channel moves weights that nothing has.
+bool is_idle(const Document& document, const Channel& channel) {
+  if (channel.path != Path::weights) return false;
   const Node& node = document.nodes[static_cast<std::size_t>(channel.node)];
-  const std::size_t width = node.mesh < 0 ? 0 : document.mesh_of(node).num_targets();
-  if (width > 0) return width;
-  return document.error(fmt::format(
-      "$.nodes[{}]: its weights are animated, expected a mesh with morph targets", channel.node));
+  return node.mesh < 0 || document.mesh_of(node).num_targets() == 0;
 }
 
 /// Of keys at one time the last one counts. row: numbers a key. Returns how many were left out.
@@ -119,18 +115,21 @@ std::size_t drop_repeated(Curve& curve, std::size_t row) {
 
 /// repeated: gets the keys that another one at their time replaces, added.
 Result<Curve> read_curve(const Document& document, const Channel& channel, std::size_t& repeated) {
-  BATON_ASSIGN(const std::size_t width, width_of(document, channel));
+  const bool moves_weights = channel.path == Path::weights;
+  std::size_t width = channel.path == Path::rotation ? 4 : 3;
   Curve curve{channel.interpolation, {}, {}};
   BATON_ASSIGN(curve.times, read_floats(document, channel.input, 1));
   BATON_ASSIGN(curve.values,
-               read_floats(document, channel.output,
-                           channel.path == Path::weights ? 1 : static_cast<int>(width)));
+               read_floats(document, channel.output, moves_weights ? 1 : static_cast<int>(width)));
   const auto finite = [](float v) { return std::isfinite(v); };
   if (!std::all_of(curve.times.begin(), curve.times.end(), finite) ||
       !std::is_sorted(curve.times.begin(), curve.times.end()) || curve.times.empty())
     return document.error(fmt::format(
         "$.accessors[{}]: expected the ascending times of an animation", channel.input));
   const std::size_t rows = channel.interpolation == Interpolation::cubic_spline ? 3 : 1;
+  // A mesh may have other targets than the animation has weights.
+  if (moves_weights)
+    width = std::max<std::size_t>(curve.values.size() / (curve.times.size() * rows), 1);
   const std::size_t expected = curve.times.size() * rows * width;
   if (curve.values.size() != expected ||
       !std::all_of(curve.values.begin(), curve.values.end(), finite))
@@ -150,8 +149,10 @@ std::array<double, 3> Curve::vector_at(double seconds) const {
   return v;
 }
 
-std::vector<double> Curve::values_at(double seconds, std::size_t width) const {
+std::vector<double> Curve::values_at(double seconds) const {
   const Span span = find_span(times, seconds);
+  const std::size_t rows = interpolation == Interpolation::cubic_spline ? 3 : 1;
+  const std::size_t width = values.size() / (times.size() * rows);
   std::vector<double> v;
   for (std::size_t c = 0; c < width; ++c) v.push_back(component_at(*this, span, width, c));
   return v;
@@ -177,6 +178,10 @@ Result<NodeMotion> NodeMotion::read(std::shared_ptr<const Document> document) {
   const Document& file = *motion.document_;
   motion.curves_.resize(file.nodes.size());
   for (const Channel& channel : file.channels) {
+    if (is_idle(file, channel)) {
+      ++motion.num_idle_channels_;
+      continue;
+    }
     Moved& moved = motion.curves_[static_cast<std::size_t>(channel.node)];
     std::optional<Curve>& curve = channel.path == Path::translation ? moved.translation
                                   : channel.path == Path::rotation  ? moved.rotation
@@ -191,6 +196,18 @@ Result<NodeMotion> NodeMotion::read(std::shared_ptr<const Document> document) {
   motion.order_ = parents_first(file);
   motion.find_what_moves();
   return motion;
+}
+
+std::vector<std::string> NodeMotion::notes() const {
+  std::vector<std::string> notes;
+  if (num_repeated_keys_ > 0)
+    notes.push_back(fmt::format(
+        "{} keys of its animations are at the time of another, of which the last counts",
+        num_repeated_keys_));
+  if (num_idle_channels_ > 0)
+    notes.push_back(fmt::format("{} of its animations move weights of nodes without morph targets",
+                                num_idle_channels_));
+  return notes;
 }
 
 void NodeMotion::let_go_of_buffers() {
@@ -259,8 +276,9 @@ std::vector<Matrix> NodeMotion::at_rest(const Document& document) {
 std::vector<double> NodeMotion::weights(int node, double seconds) const {
   const std::optional<Curve>& curve = curves_[static_cast<std::size_t>(node)].weights;
   if (!curve) return weights_at_rest(*document_, node);
-  return curve->values_at(
-      seconds, document_->mesh_of(document_->nodes[static_cast<std::size_t>(node)]).num_targets());
+  std::vector<double> values = curve->values_at(seconds);
+  values.resize(document_->mesh_of(document_->nodes[static_cast<std::size_t>(node)]).num_targets());
+  return values;
 }
 
 std::vector<double> NodeMotion::weights_at_rest(const Document& document, int node) {

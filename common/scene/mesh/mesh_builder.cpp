@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <span>
 
 namespace baton {
 namespace {
@@ -120,12 +119,32 @@ std::uint32_t MeshBuilder::vertex(const Vec3& position, const Vec3& normal, cons
   return slots_[slot] - 1;
 }
 
-std::vector<Vec3> smooth_vertex_normals(const TriangleMesh& mesh) {
+TriangleMesh MeshBuilder::take() {
+  const auto is_missing = [](const Vec3& normal) { return normal == Vec3{}; };
+  mesh_.repairs.normals =
+      static_cast<std::uint64_t>(std::ranges::count_if(mesh_.normals, is_missing));
+  if (mesh_.repairs.normals > 0) {
+    const std::vector<Vec3> made = smooth_vertex_normals(mesh_.positions, mesh_.triangles);
+    for (std::size_t i = 0; i < made.size(); ++i) {
+      if (is_missing(mesh_.normals[i])) mesh_.normals[i] = made[i];
+    }
+  }
+  return std::move(mesh_);
+}
+
+bool is_direction(const Vec3& v) {
+  const float norm = length(v);
+  return norm > 0 && std::isfinite(norm);
+}
+
+std::vector<Vec3> smooth_vertex_normals(std::span<const Vec3> positions,
+                                        std::span<const std::array<std::uint32_t, 3>> triangles) {
   // Sum the face normals at each vertex, weighted by the corner's angle.
-  std::vector<Vec3> sum(mesh.positions.size());
-  std::vector<Vec3> of_one_face(mesh.positions.size());
-  for (const auto& [a, b, c] : mesh.triangles) {
-    const Vec3 &at_a = mesh.positions[a], &at_b = mesh.positions[b], &at_c = mesh.positions[c];
+  std::vector<Vec3> sum(positions.size());
+  std::vector<Vec3> of_one_face(positions.size());
+  for (const auto& [a, b, c] : triangles) {
+    const Vec3 &at_a = positions[a], &at_b = positions[b], &at_c = positions[c];
+    if (!has_area(at_a, at_b, at_c)) continue;
     // There and back: exactly as if each were normalized.
     const Vec3 a_to_b = normalize(at_b - at_a), b_to_a = Vec3{} - a_to_b;
     const Vec3 b_to_c = normalize(at_c - at_b), c_to_b = Vec3{} - b_to_c;

@@ -13,6 +13,18 @@ namespace baton {
 using Uv = std::array<float, 2>;
 using UvSets = std::array<Uv, 2>;
 
+/// What of a file is unusable, and so made anew or left out where it is; counted.
+struct MeshRepairs {
+  /// Vertices without a usable normal, which take that of the faces around.
+  std::uint64_t normals = 0;
+  /// Vertices without a usable tangent, which take that of the coordinates.
+  std::uint64_t tangents = 0;
+  /// Vertices that no joint holds, which follow the first one.
+  std::uint64_t weights = 0;
+
+  bool operator==(const MeshRepairs&) const = default;
+};
+
 /// Triangles of one file. Degenerate triangles (zero area, equal corners) are dropped and counted;
 /// where the mesh deforms, those with equal corners alone.
 struct TriangleMesh {
@@ -23,6 +35,7 @@ struct TriangleMesh {
   std::vector<Tangent> tangents{};
   std::vector<std::array<std::uint32_t, 3>> triangles;
   std::uint64_t dropped_triangles = 0;
+  MeshRepairs repairs{};
   /// How the vertices move, the arrays above being those of the frame at time 0; null: not at all.
   std::shared_ptr<const Deformation> deformation{};
   /// Those of which the last vertices are copies, which it does not know (tangents.h).

@@ -169,6 +169,18 @@ class SceneTaker {
     return {};
   }
 
+  /// A part without triangles is left out, and said once.
+  bool makes_triangles(int mesh, std::size_t part, bool deforms) {
+    const auto [found, is_new] = solid_.try_emplace({mesh, part}, true);
+    if (!is_new) return found->second;
+    found->second = gltf::has_triangles(
+        file_, file_.meshes[static_cast<std::size_t>(mesh)].primitives[part], deforms);
+    if (!found->second)
+      left_out_.push_back(fmt::format("{}: {} has no triangles with area: it is not there",
+                                      file_.path, gltf::place_of(mesh, part)));
+    return found->second;
+  }
+
   Status take_node(std::size_t node, const std::string& material, bool catcher) {
     ObjectSpec object;
     object.name = object_names_[node];
@@ -189,6 +201,7 @@ class SceneTaker {
         file_.meshes[static_cast<std::size_t>(mesh)].primitives;
     for (std::size_t p = 0; p < primitives.size(); ++p) {
       if (!gltf::has_surface(primitives[p])) continue;
+      if (!makes_triangles(mesh, p, shape && shape->animation)) continue;
       object.mesh = mesh_name(file_, mesh, p, shape);
       object.material = material;
       if (material.empty()) {
@@ -240,6 +253,7 @@ class SceneTaker {
   std::vector<gltf::Matrix> rest_;                      ///< by node, in the first frame
   std::map<std::size_t, std::vector<Matrix34>> moved_;  ///< by node that moves, (frames)
   std::set<int> used_materials_;
+  std::map<std::pair<int, std::size_t>, bool> solid_;  ///< parts of meshes that have triangles
   std::size_t num_keys_ = 0;
 };
 
