@@ -47,11 +47,10 @@ void warn_of_file(const std::shared_ptr<const gltf::Document>& given,
   if (const auto motion = gltf::NodeMotion::read(given)) {
     for (const std::string& note : motion->notes()) add(note);
   }
-  std::size_t morphed = 0, colored = 0, lines = 0;
+  std::size_t morphed = 0, lines = 0;
   for (const gltf::Mesh& mesh : file.meshes) {
     for (const gltf::Primitive& primitive : mesh.primitives) {
       morphed += primitive.morphs_more ? 1 : 0;
-      colored += primitive.colored ? 1 : 0;
       lines += gltf::has_surface(primitive) ? 0 : 1;
     }
   }
@@ -59,7 +58,6 @@ void warn_of_file(const std::shared_ptr<const gltf::Document>& given,
     add(fmt::format(
         "{} parts have morph targets of colours or texture coordinates, which are not read",
         morphed));
-  if (colored > 0) add(fmt::format("{} parts have vertex colours, which are not read", colored));
   if (lines > 0) add(fmt::format("{} parts are points or lines, which are not shown", lines));
 }
 

@@ -52,7 +52,7 @@ void look_at_shapes(const std::shared_ptr<const gltf::Document>& document) {
 }  // namespace
 }  // namespace baton
 
-/// The formats that we read ourselves; assimp reads OBJ.
+/// The formats of single meshes.
 extern "C" int LLVMFuzzerTestOneInput(const std::uint8_t* data, std::size_t size) {
   using namespace baton;
   const std::string_view text(reinterpret_cast<const char*>(data), size);

@@ -104,7 +104,11 @@ Primitive parse_primitive(const JsonView& primitive, std::size_t num_accessors,
   read.tangents = attributes.index("TANGENT", num_accessors);
   read.uvs = {attributes.index("TEXCOORD_0", num_accessors),
               attributes.index("TEXCOORD_1", num_accessors)};
-  read.colored = attributes.has("COLOR_0");
+  read.colors = attributes.index("COLOR_0", num_accessors);
+  attributes.each_member([&](const std::string& name) {
+    const int accessor = attributes.index(name.c_str(), num_accessors);
+    if (accessor >= 0) read.attributes.emplace(name, accessor);
+  });
   read.joint_sets = parse_joint_sets(attributes, num_accessors);
   primitive.each("targets", [&](const JsonView& target) {
     read.targets.push_back({.positions = target.index("POSITION", num_accessors),
@@ -148,7 +152,7 @@ Skin parse_skin(const JsonView& skin, std::size_t num_accessors, std::size_t num
 }
 
 struct NodeLimits {
-  std::size_t nodes, meshes, cameras, skins;
+  std::size_t nodes, meshes, cameras, skins, accessors;
 };
 
 Node parse_node(const JsonView& node, const NodeLimits& limits) {
@@ -168,6 +172,10 @@ Node parse_node(const JsonView& node, const NodeLimits& limits) {
   node.numbers("rotation", read.rotation);
   node.numbers("scale", read.scale);
   read.weights = node.all_numbers("weights");
+  const JsonView instances = node.at("extensions").at("EXT_mesh_gpu_instancing").at("attributes");
+  read.instance_translations = instances.index("TRANSLATION", limits.accessors);
+  read.instance_rotations = instances.index("ROTATION", limits.accessors);
+  read.instance_scales = instances.index("SCALE", limits.accessors);
   return read;
 }
 
@@ -286,7 +294,7 @@ void parse_lists(const JsonView& root, Document& document) {
   root.each("cameras",
             [&](const JsonView& camera) { document.cameras.push_back(parse_camera(camera)); });
   const NodeLimits limits{count_of(root, "nodes"), document.meshes.size(), document.cameras.size(),
-                          count_of(root, "skins")};
+                          count_of(root, "skins"), document.accessors.size()};
   root.each("nodes", [&](const JsonView& node) {
     document.nodes.push_back(parse_node(node, limits));
     Node& read = document.nodes.back();

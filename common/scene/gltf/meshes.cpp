@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <set>
 
 #include "common/math/inverse.h"
@@ -24,6 +25,7 @@ void add_triangles(const Vertices& v, const Matrix& to_file, const MeshParts& pa
     std::array<Vec3, 3> corners, normals;
     std::array<UvSets, 3> uvs{};
     std::array<Tangent, 3> tangents{};
+    std::array<VertexColor, 3> colors{};
     for (std::size_t k = 0; k < 3; ++k) {
       const std::uint32_t vertex = v.corners[i + (mirrored ? 2 - k : k)];
       vertices[k] = vertex;
@@ -34,8 +36,9 @@ void add_triangles(const Vertices& v, const Matrix& to_file, const MeshParts& pa
         uvs[k][set] = {v.uvs[set][std::size_t{2} * vertex],
                        v.uvs[set][std::size_t{2} * vertex + 1]};
       if (parts.tangents) tangents[k] = tangent_at(v, vertex);
+      if (parts.colors) colors[k] = v.colors.empty() ? VertexColor{1, 1, 1, 1} : v.colors[vertex];
     }
-    builder.add(vertices, corners, normals, uvs, tangents);
+    builder.add(vertices, corners, normals, uvs, tangents, colors);
   }
 }
 
@@ -55,7 +58,7 @@ Result<Opened> open_primitive(const Document& document, const MeshSpec& spec) {
   BATON_ASSIGN(Vertices v, read_vertices(document, primitive, place));
   const bool with_normals = spec.smooth_normals && !v.normals.empty();
   const bool with_tangents = with_normals && is_bumpy(document, primitive) && !v.tangents.empty();
-  const MeshParts parts{with_normals, v.num_uv_sets(), with_tangents};
+  const MeshParts parts{with_normals, v.num_uv_sets(), with_tangents, !v.colors.empty()};
   return Opened{std::move(v), parts};
 }
 
@@ -137,6 +140,7 @@ Result<TriangleMesh> deforming_mesh(const Document& document, const MeshSpec& sp
     for (std::size_t i = 0; i < opened.vertices.uvs[set].size(); i += 2)
       mesh.uvs[set].push_back({opened.vertices.uvs[set][i], opened.vertices.uvs[set][i + 1]});
   }
+  mesh.colors = std::move(opened.vertices.colors);
   MeshShape first = deformation->at(spec.shaped_by->animation->start_frame);
   mesh.positions = std::move(first.positions);
   mesh.normals = std::move(first.normals);
@@ -160,6 +164,34 @@ Shaping shaping_of(const NodeMotion& motion, int node) {
   const std::vector<double> weights = NodeMotion::weights_at_rest(document, node);
   const bool rests = std::ranges::all_of(weights, [](double weight) { return weight == 0; });
   return given.skin >= 0 || !rests ? Shaping::at_rest : Shaping::none;
+}
+
+Result<std::vector<Matrix>> instances_of(const Document& document, const Node& node) {
+  std::size_t count = 1;
+  for (const int accessor :
+       {node.instance_translations, node.instance_rotations, node.instance_scales}) {
+    if (accessor >= 0) count = document.accessors[static_cast<std::size_t>(accessor)].count;
+  }
+  const auto read = [&](int accessor, int width, const char* name,
+                        float otherwise) -> Result<std::vector<float>> {
+    if (accessor < 0) return std::vector<float>(count * static_cast<std::size_t>(width), otherwise);
+    return read_attribute(document, accessor, width, count, "EXT_mesh_gpu_instancing", name);
+  };
+  BATON_ASSIGN(const std::vector<float> t, read(node.instance_translations, 3, "TRANSLATION", 0));
+  BATON_ASSIGN(const std::vector<float> r, read(node.instance_rotations, 4, "ROTATION", 0));
+  BATON_ASSIGN(const std::vector<float> s, read(node.instance_scales, 3, "SCALE", 1));
+  std::vector<Matrix> places;
+  for (std::size_t i = 0; i < count; ++i) {
+    const float* const q = r.data() + 4 * i;
+    const double length = std::sqrt(double{q[0]} * q[0] + double{q[1]} * q[1] +
+                                    double{q[2]} * q[2] + double{q[3]} * q[3]);
+    const Quaternion turn =
+        length > 0 ? Quaternion{q[0] / length, q[1] / length, q[2] / length, q[3] / length}
+                   : Quaternion{};
+    places.push_back(compose({t[3 * i], t[3 * i + 1], t[3 * i + 2]}, turn,
+                             {s[3 * i], s[3 * i + 1], s[3 * i + 2]}));
+  }
+  return places;
 }
 
 Result<TriangleMesh> primitive_mesh(const Document& document, const MeshSpec& spec) {
@@ -230,6 +262,8 @@ Result<TriangleMesh> whole_mesh(const Document& document, bool smooth_normals) {
     const Matrix& to_file = document.nodes[static_cast<std::size_t>(node)].skin >= 0
                                 ? kIdentity
                                 : to_world[static_cast<std::size_t>(node)];
+    BATON_ASSIGN(const std::vector<Matrix> places,
+                 instances_of(document, document.nodes[static_cast<std::size_t>(node)]));
     for (std::size_t p = 0; p < given.primitives.size(); ++p) {
       if (!has_surface(given.primitives[p])) continue;
       BATON_ASSIGN(Vertices v, read_vertices(document, given.primitives[p], place_of(mesh, p)));
@@ -240,8 +274,9 @@ Result<TriangleMesh> whole_mesh(const Document& document, bool smooth_normals) {
       any_normals = any_normals || !v.normals.empty();
       repairs.normals += v.repairs.normals;
       repairs.weights += shaper.num_loose();
+      common.colors = common.colors || !v.colors.empty();
       common.uv_sets = std::min(common.uv_sets, v.num_uv_sets());
-      parts.push_back({std::move(v), to_file});
+      for (const Matrix& at : places) parts.push_back({v, multiply(to_file, at)});
     }
   }
   common.normals = smooth_normals && any_normals;

@@ -35,6 +35,30 @@ std::vector<std::uint32_t> triangles_of(const std::vector<std::uint32_t>& indice
   return corners;
 }
 
+Result<std::vector<float>> read_counted(const Document& document, int accessor, int width,
+                                        std::size_t count, const std::string& place,
+                                        const std::string& name) {
+  BATON_ASSIGN(std::vector<float> values, read_floats(document, accessor, width));
+  if (values.size() == count * static_cast<std::size_t>(width)) return values;
+  return document.error(fmt::format("{}.{}: expected one for each of {} vertices, got {}", place,
+                                    name, count, values.size() / static_cast<std::size_t>(width)));
+}
+
+/// COLOR_0, whose alpha may be missing; what is no number in [0, 1] is cut.
+Status read_colors(const Document& document, const Primitive& primitive, const std::string& place,
+                   Vertices& v) {
+  if (primitive.colors < 0) return {};
+  const bool is_opaque = document.accessors[static_cast<std::size_t>(primitive.colors)].width == 3;
+  const std::size_t width = is_opaque ? 3 : 4;
+  BATON_ASSIGN(const std::vector<float> values,
+               read_counted(document, primitive.colors, static_cast<int>(width), v.count(), place,
+                            "COLOR_0"));
+  v.colors.assign(v.count(), {1, 1, 1, 1});
+  for (std::size_t i = 0; i < values.size(); ++i)
+    v.colors[i / width][i % width] = values[i] > 0 ? std::min(values[i], 1.0f) : 0;
+  return {};
+}
+
 using Corners = std::array<std::uint32_t, 3>;
 
 /// The triangles of a primitive with area.
@@ -107,15 +131,6 @@ void mend_vertices(const Document& document, const Primitive& primitive, Vertice
   }
 }
 
-Result<std::vector<float>> read_counted(const Document& document, int accessor, int width,
-                                        std::size_t count, const std::string& place,
-                                        const std::string& name) {
-  BATON_ASSIGN(std::vector<float> values, read_floats(document, accessor, width));
-  if (values.size() == count * static_cast<std::size_t>(width)) return values;
-  return document.error(fmt::format("{}.{}: expected one for each of {} vertices, got {}", place,
-                                    name, count, values.size() / static_cast<std::size_t>(width)));
-}
-
 }  // namespace
 
 Result<Vertices> read_vertices(const Document& document, const Primitive& primitive,
@@ -134,6 +149,7 @@ Result<Vertices> read_vertices(const Document& document, const Primitive& primit
   BATON_TRY(attribute(primitive.tangents, 4, "TANGENT", v.tangents));
   BATON_TRY(attribute(primitive.uvs[0], 2, "TEXCOORD_0", v.uvs[0]));
   BATON_TRY(attribute(primitive.uvs[1], 2, "TEXCOORD_1", v.uvs[1]));
+  BATON_TRY(read_colors(document, primitive, place, v));
   if (!all_finite(v.positions))
     return document.error(place + ": a vertex has a coordinate that is not finite");
   if (!all_finite(v.uvs[0]) || !all_finite(v.uvs[1]))
@@ -166,7 +182,7 @@ Result<std::vector<float>> read_attribute(const Document& document, int accessor
 
 bool has_triangles(const Document& document, const Primitive& primitive, bool deforms) {
   Primitive shape = primitive;
-  shape.normals = shape.tangents = -1;
+  shape.normals = shape.tangents = shape.colors = -1;
   shape.uvs = {-1, -1};
   const Result<Vertices> v = read_vertices(document, shape, "");
   if (!v) return true;

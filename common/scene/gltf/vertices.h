@@ -16,6 +16,7 @@ struct Vertices {
   std::vector<float> positions, normals;  ///< (vertices, 3); normals may be empty
   std::vector<float> tangents;            ///< (vertices, 4), or empty
   std::array<std::vector<float>, 2> uvs;  ///< (vertices, 2), or empty
+  std::vector<VertexColor> colors;        ///< (vertices), or empty
   std::vector<std::uint32_t> corners;     ///< (triangles, 3)
   MeshRepairs repairs{};
 

@@ -14,6 +14,7 @@ struct MeshParts {
   bool normals = false;
   int uv_sets = 0;  ///< [0, 2]
   bool tangents = false;
+  bool colors = false;
 };
 
 /// Collects the triangles of all parts of a file into one mesh: equal vertices become one,
@@ -30,18 +31,23 @@ class MeshBuilder {
   /// does not name is not looked at.
   void add(const std::array<std::uint32_t, 3>& vertices, const std::array<Vec3, 3>& corners,
            const std::array<Vec3, 3>& normals = {}, const std::array<UvSets, 3>& uvs = {},
-           const std::array<Tangent, 3>& tangents = {});
+           const std::array<Tangent, 3>& tangents = {},
+           const std::array<VertexColor, 3>& colors = {});
   /// The mesh; vertices without a normal take that of the faces around, and are counted.
   TriangleMesh take();
 
  private:
-  /// Bits of position, normal, UVs and tangent.
-  using VertexKey = std::array<std::uint32_t, 14>;
-  VertexKey key_of(const Vec3& position, const Vec3& normal, const UvSets& uvs,
-                   const Tangent& tangent) const;
+  struct Vertex {
+    Vec3 position, normal;
+    UvSets uvs{};
+    Tangent tangent{};
+    VertexColor color{};
+  };
+  /// Bits of position, normal, UVs, tangent and colour.
+  using VertexKey = std::array<std::uint32_t, 18>;
+  VertexKey key_of(const Vertex& v) const;
   VertexKey key_of(std::uint32_t vertex) const;
-  std::uint32_t vertex(const Vec3& position, const Vec3& normal, const UvSets& uvs,
-                       const Tangent& tangent);
+  std::uint32_t vertex(const Vertex& v);
   std::size_t find_slot(const VertexKey& key) const;
 
   MeshParts parts_;

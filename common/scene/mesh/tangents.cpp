@@ -52,6 +52,7 @@ void part_mirrored(TriangleMesh& mesh, std::size_t uv_set) {
         mesh.copied_vertices.push_back(vertex);
         mesh.positions.push_back(mesh.positions[vertex]);
         if (!mesh.normals.empty()) mesh.normals.push_back(mesh.normals[vertex]);
+        if (!mesh.colors.empty()) mesh.colors.push_back(mesh.colors[vertex]);
         for (std::vector<Uv>& uvs : mesh.uvs) {
           if (!uvs.empty()) uvs.push_back(uvs[vertex]);
         }
