@@ -68,8 +68,15 @@ Result<std::optional<Mat3>> to_rec709(const Chromaticities& from) {
   return whole;
 }
 
+bool is_unknown(const Chromaticities& c) {
+  return c == Chromaticities{.red = {0, 0}, .green = {0, 0}, .blue = {0, 0}, .white = {0, 0}};
+}
+
 Status convert_to_rec709(std::span<float> pixels, std::size_t channels, const PictureColors& from) {
-  BATON_ASSIGN(const std::optional<Mat3> matrix, to_rec709(from.chromaticities));
+  std::optional<Mat3> matrix = of_columns(Imf::XYZtoRGB(to_openexr(Chromaticities()), 1));
+  if (!from.is_xyz) {
+    BATON_ASSIGN(matrix, to_rec709(from.chromaticities));
+  }
   const Rgb& f = from.factor;
   if (!matrix && f == Rgb{1, 1, 1}) return {};
   for (; pixels.size() >= channels; pixels = pixels.subspan(channels)) {
@@ -84,7 +91,9 @@ Status convert_to_rec709(std::span<float> pixels, std::size_t channels, const Pi
 
 std::string conversion_text(const PictureColors& colors) {
   std::string text;
-  if (!nearly(colors.chromaticities, {}))
+  if (colors.is_xyz)
+    text = "to Rec. 709, from CIE XYZ";
+  else if (!nearly(colors.chromaticities, {}))
     text = fmt::format("to Rec. 709, from {}", space_text(colors.chromaticities));
   const Rgb& f = colors.factor;
   if (f == Rgb{1, 1, 1}) return text;

@@ -23,9 +23,14 @@ struct Chromaticities {
 /// annex E]. nullopt: it is Rec. 709, but for the rounding of a header. Error: no such space.
 Result<std::optional<Mat3>> to_rec709(const Chromaticities& from);
 
+/// Whether a header that says these means "unknown": all are 0.
+bool is_unknown(const Chromaticities& c);
+
 /// What the header of an image says of its numbers.
 struct PictureColors {
   Chromaticities chromaticities;
+  /// They are CIE X, Y and Z, of the white of Rec. 709, in place of R, G and B.
+  bool is_xyz = false;
   /// Factor by which radiance was multiplied before it was stored, > 0.
   Rgb factor{1, 1, 1};
 

@@ -1,11 +1,12 @@
 #pragma once
 
 #include <filesystem>
-#include <functional>
+#include <optional>
 #include <string>
 #include <vector>
 
 #include "common/base/result.h"
+#include "common/image/color_choice.h"
 #include "common/image/color_space.h"
 #include "common/image/film_tile.h"
 
@@ -15,17 +16,21 @@ namespace baton {
 /// does not reach, such as around what compositors cut to its content. seen: of what it shows the
 /// part that its data reaches, all if none does: a frame of a part of the image is that part.
 enum class ExrWindow : std::uint8_t { data, display, seen };
-/// The channels wanted of those that a file has, by name.
-using ChannelChoice =
-    std::function<Result<std::vector<std::string>>(const std::vector<std::string>& all)>;
 
-/// Like read_exr (image_io.h), but only the chosen channels, in the order of the choice: the others
-/// cost neither memory nor conversion. Errors: those of read_exr and of the choice.
-Result<FilmTile> read_exr_channels(const std::filesystem::path& path, const ChannelChoice& choose,
-                                   ExrWindow window = ExrWindow::data);
+/// What the header of a part says; of one that is not flat no channels.
+struct ExrPart {
+  PictureLayout layout;
+  std::optional<Chromaticities> chromaticities;
+};
+/// The parts of an EXR file, one at least. Errors: those of read_exr.
+Result<std::vector<ExrPart>> read_exr_parts(const std::filesystem::path& path);
 
-/// The chromaticities that the header of an EXR file says, and those of Rec. 709 where it says none
-/// or has no colours.
-Result<PictureColors> read_exr_colors(const std::filesystem::path& path);
+/// Like read_exr (image_io.h), but only channels of one part, by their names in the file: the
+/// others cost neither memory nor conversion. Errors: those of read_exr.
+Result<FilmTile> read_exr_part(const std::filesystem::path& path, std::size_t part,
+                               const std::vector<std::string>& channels, ExrWindow window);
+/// R, G, B and A of luminance and chroma, in the first part; layer: without its dot, or empty.
+Result<FilmTile> read_exr_luma_chroma(const std::filesystem::path& path, const std::string& layer,
+                                      ExrWindow window);
 
 }  // namespace baton

@@ -10,7 +10,7 @@
 
 #include "common/base/files.h"
 #include "common/base/limits.h"
-#include "common/image/exr_channels.h"
+#include "common/image/exr_picture.h"
 #include "common/image/radiance.h"
 
 namespace baton {
@@ -45,20 +45,6 @@ bool sides_ok(int width, int height) {
          height <= limits::kMaxEnvironmentSide;
 }
 
-/// R, G and B, or the one channel that stands for all three.
-Result<std::vector<std::string>> choose_rgb(const std::filesystem::path& path,
-                                            const std::vector<std::string>& all) {
-  if (all.size() == 1) return all;
-  const std::vector<std::string> rgb{"R", "G", "B"};
-  for (const std::string& wanted : rgb) {
-    if (std::ranges::find(all, wanted) != all.end()) continue;
-    return Error{ErrorKind::bad_input,
-                 fmt::format("{}: no channel {} among {}, expected R, G, B or one channel",
-                             path.string(), wanted, fmt::join(all, ", "))};
-  }
-  return rgb;
-}
-
 /// Pixels as they are stored, as linear Rec. 709.
 Result<RgbImage> converted(const std::filesystem::path& path, RgbImage image,
                            const PictureColors& colors) {
@@ -67,23 +53,29 @@ Result<RgbImage> converted(const std::filesystem::path& path, RgbImage image,
   return image;
 }
 
+/// Of grey there is nothing to convert.
+PictureColors colors_of(const ExrPicture& picture) {
+  const bool has_colors = picture.num_colors() > 1 && picture.chromaticities;
+  return {.chromaticities = has_colors ? *picture.chromaticities : Chromaticities()};
+}
+
 Result<RgbImage> rgb_from_exr(const std::filesystem::path& path, ExrWindow window) {
-  BATON_ASSIGN(const FilmTile film,
-               read_exr_channels(
-                   path, [&](const auto& all) { return choose_rgb(path, all); }, window));
-  RgbImage image{film.rect.width(), film.rect.height(), {}};
+  BATON_ASSIGN(ExrPicture picture, read_exr_picture(path, window));
+  RgbImage image{picture.width, picture.height, {}, std::move(picture.notes)};
   if (!sides_ok(image.width, image.height)) return side_error(path, image.width, image.height);
 
-  // Interleave; a single channel is first, middle and last.
-  const std::size_t last = film.channels.size() - 1;
-  const std::array planes{film.plane(0), film.plane(last / 2), film.plane(last)};
-  image.rgb.resize(film.num_pixels() * 3);
-  for (std::size_t i = 0; i < film.num_pixels(); ++i) {
-    for (std::size_t c = 0; c < 3; ++c) image.rgb[i * 3 + c] = planes[c][i];
+  // A single colour is all three; one that is missing is 0.
+  const auto channels = static_cast<std::size_t>(picture.channels);
+  const auto colors = static_cast<std::size_t>(picture.num_colors());
+  const std::size_t num_pixels = picture.samples.size() / channels;
+  image.rgb.resize(num_pixels * 3);
+  for (std::size_t i = 0; i < num_pixels; ++i) {
+    for (std::size_t c = 0; c < 3; ++c) {
+      const std::size_t from = colors == 1 ? 0 : c;
+      image.rgb[i * 3 + c] = from < colors ? picture.samples[i * channels + from] : 0.0f;
+    }
   }
-  if (film.channels.size() == 1) return image;
-  BATON_ASSIGN(const PictureColors colors, read_exr_colors(path));
-  return converted(path, std::move(image), colors);
+  return converted(path, std::move(image), colors_of(picture));
 }
 
 Result<RgbImage> rgb_from_radiance(const std::filesystem::path& path) {
@@ -91,6 +83,7 @@ Result<RgbImage> rgb_from_radiance(const std::filesystem::path& path) {
   BATON_ASSIGN(const RadianceHeader header, read_radiance_header(bytes, path.string()));
   if (!sides_ok(header.width, header.height)) return side_error(path, header.width, header.height);
   BATON_ASSIGN(RgbImage image, read_radiance_pixels(bytes, header, path.string()));
+  image.notes = header.notes;
   return converted(path, std::move(image), header.colors);
 }
 
@@ -120,7 +113,7 @@ Result<RgbImage> read_rgb_image(const std::filesystem::path& path, ExrWindow win
 
 Result<PictureColors> read_picture_colors(const std::filesystem::path& path) {
   BATON_ASSIGN(const PictureFormat format, picture_format(path));
-  if (format == PictureFormat::exr) return read_exr_colors(path);
+  if (format == PictureFormat::exr) return read_exr_picture_colors(path);
   BATON_ASSIGN(const Bytes bytes, read_file(path, limits::kMaxAssetFileBytes));
   BATON_ASSIGN(const RadianceHeader header, read_radiance_header(bytes, path.string()));
   return header.colors;

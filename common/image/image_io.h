@@ -21,12 +21,15 @@ struct RgbImage {
   int width = 0;
   int height = 0;
   std::vector<float> rgb;  ///< (height, width, 3)
+  /// What a person should know of the file that was read, a line each: a choice, what counts as
+  /// unknown.
+  std::vector<std::string> notes{};
 };
 
 /// Reads an EXR or Radiance HDR image as float32 RGB (grey is spread to three channels, alpha
 /// dropped), in linear Rec. 709 as the header says what its numbers are (read_picture_colors).
 /// window: of an EXR file. Errors name the file: missing, not an image, truncated, sides past
-/// limits::kMaxEnvironmentSide, neither R, G, B nor one channel to spread.
+/// limits::kMaxEnvironmentSide, no colours (color_choice.h).
 Result<RgbImage> read_rgb_image(const std::filesystem::path& path,
                                 ExrWindow window = ExrWindow::display);
 /// What read_rgb_image converts from: `chromaticities` of an EXR file; PRIMARIES, EXPOSURE and

@@ -23,25 +23,53 @@ Error unreadable(const std::string& name, const std::string& what) {
           fmt::format("{}: not a readable Radiance HDR file: {}", name, what)};
 }
 
+/// Without blanks at both ends.
+std::string_view trimmed(std::string_view text) {
+  text.remove_prefix(std::min(text.find_first_not_of(" \t"), text.size()));
+  return text.substr(0, text.find_last_not_of(" \t") + 1);
+}
+
 /// Splits the first line, without its end, from the text. False when no line ends.
 bool take_line(std::string_view& text, std::string_view& line) {
   const std::size_t end = text.find('\n');
   if (end == std::string_view::npos) return false;
   line = text.substr(0, end);
+  if (line.ends_with('\r')) line.remove_suffix(1);
   text.remove_prefix(end + 1);
   return true;
 }
 
-/// "-Y <height> +X <width>": rows from the top down, pixels from left to right.
-bool parse_sides(std::string_view line, int& width, int& height) {
-  const auto take_number = [&](std::string_view before, int& value) {
-    if (!line.starts_with(before)) return false;
-    line.remove_prefix(before.size());
-    const auto [end, error] = std::from_chars(line.data(), line.data() + line.size(), value);
-    line.remove_prefix(static_cast<std::size_t>(end - line.data()));
-    return error == std::errc();
-  };
-  return take_number("-Y ", height) && take_number(" +X ", width) && line.empty();
+/// An axis with a sign, and a number.
+struct Side {
+  char sign = 0, axis = 0;
+  int size = 0;
+};
+
+/// Takes "-Y 512" off the line.
+std::optional<Side> take_side(std::string_view& line) {
+  line = trimmed(line);
+  if (line.size() < 2) return std::nullopt;
+  Side side{line[0], line[1], 0};
+  if ((side.sign != '-' && side.sign != '+') || (side.axis != 'X' && side.axis != 'Y'))
+    return std::nullopt;
+  line = trimmed(line.substr(2));
+  const auto [end, error] = std::from_chars(line.data(), line.data() + line.size(), side.size);
+  line.remove_prefix(static_cast<std::size_t>(end - line.data()));
+  return error == std::errc() ? std::optional(side) : std::nullopt;
+}
+
+/// "-Y <height> +X <width>": rows from the top down, pixels from left to right; +Y is from below,
+/// -X from the right, and the first axis that of what is stored one by one.
+bool parse_sides(std::string_view line, RadianceHeader& header) {
+  const std::optional<Side> outer = take_side(line), inner = take_side(line);
+  if (!outer || !inner || !line.empty() || outer->axis == inner->axis) return false;
+  header.is_by_column = outer->axis == 'X';
+  const Side &x = header.is_by_column ? *outer : *inner, &y = header.is_by_column ? *inner : *outer;
+  header.width = x.size;
+  header.height = y.size;
+  header.is_right_to_left = x.sign == '-';
+  header.is_bottom_up = y.sign == '+';
+  return true;
 }
 
 /// N numbers, apart by blanks.
@@ -58,10 +86,16 @@ std::optional<std::array<float, N>> parse_numbers(std::string_view text) {
 }
 
 /// EXPOSURE, COLORCORR and PRIMARIES; other lines are let pass. The first two may come several
-/// times: each program that changed the pixels adds its own. False: not the numbers that it needs.
-bool take_color_setting(std::string_view line, PictureColors& colors) {
+/// times: each program that changed the pixels adds its own. Zeros stand for what a program did not
+/// know. False: not the numbers that it needs.
+bool take_color_setting(std::string_view line, RadianceHeader& header) {
+  PictureColors& colors = header.colors;
   const auto value_of = [&](std::string_view key) {
     return line.starts_with(key) ? std::optional(line.substr(key.size())) : std::nullopt;
+  };
+  const auto counts_as_unknown = [&] {
+    header.notes.push_back(fmt::format("{} counts as unknown", trimmed(line.substr(0, 60))));
+    return true;
   };
   std::optional<std::array<float, 3>> factor;
   if (const auto value = value_of("EXPOSURE=")) {
@@ -75,13 +109,26 @@ bool take_color_setting(std::string_view line, PictureColors& colors) {
     const auto xy = parse_numbers<8>(*primaries);
     if (!xy) return false;
     const auto& p = *xy;
-    colors.chromaticities = {{p[0], p[1]}, {p[2], p[3]}, {p[4], p[5]}, {p[6], p[7]}};
+    const Chromaticities given{{p[0], p[1]}, {p[2], p[3]}, {p[4], p[5]}, {p[6], p[7]}};
+    if (is_unknown(given)) return counts_as_unknown();
+    colors.chromaticities = given;
   }
   if (!factor) return true;
+  if (*factor == std::array{0.0f, 0.0f, 0.0f}) return counts_as_unknown();
   const Rgb f = colors.factor * Rgb{(*factor)[0], (*factor)[1], (*factor)[2]};
   colors.factor = f;
   const auto is_good = [](float v) { return v > 0 && std::isfinite(v); };
   return is_good(f.x) && is_good(f.y) && is_good(f.z);
+}
+
+/// False: another format of pixels.
+bool take_format(std::string_view line, bool& is_known, RadianceHeader& header) {
+  constexpr std::string_view kKey = "FORMAT=";
+  if (!line.starts_with(kKey)) return true;
+  const std::string_view format = trimmed(line.substr(kKey.size()));
+  is_known = true;
+  header.colors.is_xyz = format == "32-bit_rle_xyze";
+  return header.colors.is_xyz || format == "32-bit_rle_rgbe";
 }
 
 std::uint8_t byte_at(ByteView bytes, std::size_t i) {
@@ -149,6 +196,24 @@ bool read_row(ByteView& in, std::span<Rgbe> row) {
   return true;
 }
 
+/// Colours of the pixels as they are stored, from the top down and from left to right.
+std::vector<float> turned(const RadianceHeader& header, std::vector<float> stored) {
+  if (!header.is_by_column && !header.is_bottom_up && !header.is_right_to_left) return stored;
+  const auto width = static_cast<std::size_t>(header.width);
+  const auto height = static_cast<std::size_t>(header.height);
+  std::vector<float> rgb(stored.size());
+  for (std::size_t y = 0; y < height; ++y) {
+    for (std::size_t x = 0; x < width; ++x) {
+      const std::size_t column = header.is_right_to_left ? width - 1 - x : x;
+      const std::size_t row = header.is_bottom_up ? height - 1 - y : y;
+      const std::size_t from = header.is_by_column ? column * height + row : row * width + column;
+      std::copy_n(stored.begin() + static_cast<std::ptrdiff_t>(3 * from), 3,
+                  rgb.begin() + static_cast<std::ptrdiff_t>(3 * (y * width + x)));
+    }
+  }
+  return rgb;
+}
+
 }  // namespace
 
 Result<RadianceHeader> read_radiance_header(ByteView file, const std::string& name) {
@@ -158,16 +223,17 @@ Result<RadianceHeader> read_radiance_header(ByteView file, const std::string& na
 
   // Settings up to an empty line.
   RadianceHeader header;
-  bool is_rgbe = false;
+  bool is_known = false;
   do {
     if (!take_line(text, line)) return unreadable(name, "its header does not end");
-    is_rgbe = is_rgbe || line == "FORMAT=32-bit_rle_rgbe";
-    if (!take_color_setting(line, header.colors))
+    if (!take_format(line, is_known, header))
+      return unreadable(name, "expected FORMAT=32-bit_rle_rgbe or 32-bit_rle_xyze");
+    if (!take_color_setting(line, header))
       return unreadable(name, fmt::format("a line {}", line.substr(0, 60)));
   } while (!line.empty());
-  if (!is_rgbe) return unreadable(name, "no line FORMAT=32-bit_rle_rgbe");
+  if (!is_known) header.notes.push_back("has no line FORMAT=, taken as 32-bit_rle_rgbe");
 
-  if (!take_line(text, line) || !parse_sides(line, header.width, header.height)) {
+  if (!take_line(text, line) || !parse_sides(line, header)) {
     return unreadable(name, "expected -Y HEIGHT +X WIDTH after its header");
   }
   header.size_bytes = file.size() - text.size();
@@ -176,20 +242,23 @@ Result<RadianceHeader> read_radiance_header(ByteView file, const std::string& na
 
 Result<RgbImage> read_radiance_pixels(ByteView file, const RadianceHeader& header,
                                       const std::string& name) {
-  RgbImage image{header.width, header.height, {}};
-  std::vector<Rgbe> row(static_cast<std::size_t>(header.width));
+  const int lines = header.is_by_column ? header.width : header.height;
+  std::vector<Rgbe> line(
+      static_cast<std::size_t>(header.is_by_column ? header.height : header.width));
+  std::vector<float> stored;  // line by line
   ByteView rest = file.subspan(header.size_bytes);
-  for (int y = 0; y < header.height; ++y) {
-    if (!read_row(rest, row)) {
-      return unreadable(name, fmt::format("row {} of {} is damaged or cut off", y, header.height));
+  for (int i = 0; i < lines; ++i) {
+    if (!read_row(rest, line)) {
+      return unreadable(name, fmt::format("{} {} of {} is damaged or cut off",
+                                          header.is_by_column ? "column" : "row", i, lines));
     }
-    for (const Rgbe& pixel : row) {
+    for (const Rgbe& pixel : line) {
       const float scale = pixel[3] == 0 ? 0.0f : std::ldexp(1.0f, pixel[3] - 136);
-      for (std::size_t c = 0; c < 3; ++c) {
-        image.rgb.push_back(static_cast<float>(pixel[c]) * scale);
-      }
+      for (std::size_t c = 0; c < 3; ++c) stored.push_back(static_cast<float>(pixel[c]) * scale);
     }
   }
+  RgbImage image{header.width, header.height, {}};
+  image.rgb = turned(header, std::move(stored));
   return image;
 }
 

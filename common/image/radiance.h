@@ -14,18 +14,24 @@ namespace baton {
 struct RadianceHeader {
   int width = 0, height = 0;
   std::size_t size_bytes = 0;  ///< the pixels start here
-  /// PRIMARIES; EXPOSURE times COLORCORR, of all such lines.
+  /// PRIMARIES, or XYZ; EXPOSURE times COLORCORR, of all such lines.
   PictureColors colors;
+  bool is_by_column = false;  ///< what is stored one by one are columns
+  /// Rows are stored from below, columns from the right.
+  bool is_bottom_up = false, is_right_to_left = false;
+  /// What of the header counts as unknown, a line each, for people.
+  std::vector<std::string> notes{};
 };
 
-/// `name` goes first in every error. Errors: no Radiance header, another pixel format than RGBE,
-/// rows that do not go from the top down and from left to right, settings of colours that are no
-/// numbers, an exposure that is not above zero. The sides are not checked.
+/// `name` goes first in every error. Lines end with or without a carriage return. Exposures and
+/// primaries of 0 and a missing FORMAT count as unknown. Errors: no Radiance header, another pixel
+/// format than RGBE and XYZE, settings of colours that are no numbers, an exposure below zero. The
+/// sides are not checked.
 Result<RadianceHeader> read_radiance_header(ByteView file, const std::string& name);
 
-/// The pixels, a mantissa m with exponent e as m * 2^(e - 136), as they are stored: header.colors
-/// is for the caller. Memory grows only with rows that are really there. Errors: rows that are
-/// damaged or missing.
+/// The pixels, from the top down and from left to right, a mantissa m with exponent e as
+/// m * 2^(e - 136): header.colors is for the caller. Memory grows only with rows that are really
+/// there. Errors: rows that are damaged or missing.
 Result<RgbImage> read_radiance_pixels(ByteView file, const RadianceHeader& header,
                                       const std::string& name);
 

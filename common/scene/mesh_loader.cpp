@@ -31,7 +31,8 @@ Result<TriangleMesh> read_triangles(const std::string& path, bool smooth_normals
     BATON_ASSIGN(const auto document, gltf::read_document(path));
     return gltf::whole_mesh(*document, smooth_normals);
   }
-  return read_obj(path, smooth_normals, with_uvs);
+  BATON_ASSIGN(const std::string text, read_text_file(path, limits::kMaxAssetFileBytes));
+  return parse_obj(text, path, smooth_normals, with_uvs);
 }
 
 }  // namespace
@@ -47,18 +48,14 @@ Result<TriangleMesh> load_mesh(const std::string& path, bool smooth_normals, boo
     return bad_mesh(path, "larger than " + std::to_string(limits::kMaxAssetFileBytes) + " bytes");
   }
 
-  // Postprocessing and odd files may throw.
-  try {
-    BATON_ASSIGN(TriangleMesh mesh, read_triangles(path, smooth_normals, with_uvs));
-    if (mesh.triangles.empty()) {
-      return bad_mesh(path,
-                      "no triangles (" + std::to_string(mesh.dropped_triangles) + " without area)");
-    }
-    if (smooth_normals && mesh.normals.empty()) mesh.normals = smooth_vertex_normals(mesh);
-    return mesh;
-  } catch (const std::exception& e) {
-    return bad_mesh(path, std::string("not a mesh: ") + e.what());
+  BATON_ASSIGN(TriangleMesh mesh, read_triangles(path, smooth_normals, with_uvs));
+  if (mesh.triangles.empty()) {
+    return bad_mesh(path,
+                    "no triangles (" + std::to_string(mesh.dropped_triangles) + " without area)");
   }
+  if (smooth_normals && mesh.normals.empty())
+    mesh.normals = smooth_vertex_normals(mesh.positions, mesh.triangles);
+  return mesh;
 }
 
 }  // namespace baton

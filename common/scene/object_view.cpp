@@ -4,10 +4,13 @@
 
 #include <algorithm>
 #include <array>
+#include <map>
 #include <span>
+#include <utility>
 
 #include "common/job/plan/sequence.h"
 #include "common/math/bounds.h"
+#include "common/scene/material/surface_detail.h"
 #include "common/scene/pose.h"
 
 namespace baton {
@@ -40,8 +43,9 @@ class View {
                                      camera.ray(0, h)};
     for (std::size_t i = 0; i < 4; ++i) {
       const Ray &a = corners[i], &b = corners[(i + 1) % 4];
-      const Vec3 normal = cross(a.direction, b.origin + b.direction - (a.origin + a.direction));
-      const bool is_inward = dot(normal, ahead.origin + ahead.direction - a.origin) >= 0;
+      // Differences first: far away a direction is lost beside a place.
+      const Vec3 normal = cross(a.direction, (b.origin - a.origin) + (b.direction - a.direction));
+      const bool is_inward = dot(normal, (ahead.origin - a.origin) + ahead.direction) >= 0;
       planes_[i + 1] = {a.origin, is_inward ? normal : normal * -1.0f};
     }
   }
@@ -92,6 +96,40 @@ std::uint64_t count_dropped(const Scene& scene) {
   return dropped;
 }
 
+namespace {
+
+void append(const std::vector<std::string>& lines, std::vector<std::string>& warnings) {
+  warnings.insert(warnings.end(), lines.begin(), lines.end());
+}
+
+/// What was made anew or left out of files, summed over the meshes of each.
+void warn_of_repairs(const JobSpec& job, const Scene& scene, std::vector<std::string>& warnings) {
+  static constexpr std::pair<std::uint64_t MeshRepairs::*, std::string_view> kKinds[] = {
+      {&MeshRepairs::normals, "vertices have no usable normal: they take that of the faces around"},
+      {&MeshRepairs::tangents,
+       "vertices have no usable tangent: they take that of the coordinates"},
+      {&MeshRepairs::weights, "vertices are held by no joint: they follow the first one"},
+      {&MeshRepairs::uvs, "corners have no texture coordinates: they have (0, 0)"},
+      {&MeshRepairs::crossing, "faces have edges that cross, or too many: they are cut as fans"},
+      {&MeshRepairs::lines, "points, lines or faces of two corners are not shown"},
+  };
+  std::map<std::string, MeshRepairs> by_file;
+  std::size_t index = 0;  // the scene has the meshes in the order of the job
+  for (const auto& [name, spec] : job.scene.meshes) {
+    MeshRepairs& sum = by_file[spec.path];
+    for (const auto& [count, what] : kKinds) sum.*count += scene.meshes[index].repairs.*count;
+    ++index;
+  }
+  for (const auto& [file, repairs] : by_file) {
+    for (const auto& [count, what] : kKinds) {
+      if (repairs.*count > 0)
+        warnings.push_back(fmt::format("{}: {} {}", file, repairs.*count, what));
+    }
+  }
+}
+
+}  // namespace
+
 std::vector<std::string> geometry_warnings(const JobSpec& job, const Scene& scene) {
   std::vector<BoxCorners> boxes;
   for (const TriangleMesh& mesh : scene.meshes) boxes.push_back(corners_of(mesh.positions));
@@ -112,6 +150,10 @@ std::vector<std::string> geometry_warnings(const JobSpec& job, const Scene& scen
   std::vector<std::string> warnings;
   if (const std::uint64_t dropped = count_dropped(scene); dropped > 0)
     warnings.push_back(fmt::format("{} triangles without area are left out", dropped));
+  warn_of_repairs(job, scene, warnings);
+  for (const Material& material : scene.materials) {
+    if (material.detail != nullptr) append(material.detail->notes, warnings);
+  }
   for (std::size_t i = 0; i < std::min(best.size(), job.scene.objects.size()); ++i) {
     if (best[i] != Sight::seen)
       warnings.push_back(

@@ -18,7 +18,7 @@ namespace {
 Result<RgbImage> read_picture(const std::string& path) {
   if (is_radiance_file(path)) return read_rgb_image(path);
   BATON_ASSIGN(const Image image, read_image(path));
-  return RgbImage{image.width, image.height, linear_colors(image)};
+  return RgbImage{image.width, image.height, linear_colors(image), image.notes};
 }
 
 /// Sets what is no number to 0, before means are taken; so many pixels had some.
@@ -55,8 +55,9 @@ Result<Plate> load_plate(const JobSpec& job, FrameNumber frame) {
                              "shape and larger, got {} x {}",
                              path, width, height, plate.width, plate.height)};
   }
+  std::vector<std::string> notes = std::move(plate.notes);
   if (plate.width != width || plate.height != height) plate = averaged_down(plate, width, height);
-  return Plate{std::move(plate), repaired};
+  return Plate{std::move(plate), repaired, std::move(notes)};
 }
 
 bool is_radiance_file(const std::string& path) {
@@ -64,8 +65,13 @@ bool is_radiance_file(const std::string& path) {
   return extension == ".exr" || extension == ".hdr";
 }
 
-std::string repair_note(const std::string& path, std::uint64_t repaired) {
-  return fmt::format("{}: {} pixels are NaN or infinite and count as 0", path, repaired);
+std::vector<std::string> plate_notes(const std::string& path, const Plate& plate) {
+  std::vector<std::string> notes;
+  for (const std::string& note : plate.notes) notes.push_back(fmt::format("{}: {}", path, note));
+  if (plate.repaired > 0)
+    notes.push_back(
+        fmt::format("{}: {} pixels are NaN or infinite and count as 0", path, plate.repaired));
+  return notes;
 }
 
 }  // namespace baton

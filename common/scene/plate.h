@@ -2,6 +2,7 @@
 
 #include <cstdint>
 #include <string>
+#include <vector>
 
 #include "common/base/result.h"
 #include "common/image/image_io.h"
@@ -14,6 +15,7 @@ struct Plate {
   RgbImage picture;
   /// Pixels of the file that are NaN or infinite, taken as 0.
   std::uint64_t repaired = 0;
+  std::vector<std::string> notes{};  ///< RgbImage::notes
 };
 
 /// The plate of a frame of a job with plates, as large as the whole picture of the job: each pixel
@@ -26,7 +28,8 @@ Result<Plate> load_plate(const JobSpec& job, FrameNumber frame);
 /// (read_picture_colors); by its name.
 bool is_radiance_file(const std::string& path);
 
-/// "shot.0012.exr: 7 pixels are NaN or infinite and count as 0".
-std::string repair_note(const std::string& path, std::uint64_t repaired);
+/// What a person should know of a plate, a line each: "shot.0012.exr: 7 pixels are NaN or infinite
+/// and count as 0".
+std::vector<std::string> plate_notes(const std::string& path, const Plate& plate);
 
 }  // namespace baton

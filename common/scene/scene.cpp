@@ -61,6 +61,14 @@ Transform scaled(const Transform& map, float factor) {
   return {scaling({factor, factor, factor}) * map.linear, map.offset * factor};
 }
 
+/// In doubles: far from the origin floats are coarse.
+Position turned_by(const Mat3& m, const Position& p) {
+  Position turned{};
+  for (std::size_t i = 0; i < 3; ++i)
+    turned[i] = m.m[3 * i] * p[0] + m.m[3 * i + 1] * p[1] + m.m[3 * i + 2] * p[2];
+  return turned;
+}
+
 /// The object's transform: its matrix, stand up, scale, rotate about x, y, z, fit to a height,
 /// centre, place on the ground, translate.
 Result<Transform> object_transform(const ObjectSpec& object, const TriangleMesh& mesh,
@@ -82,12 +90,25 @@ Result<Transform> object_transform(const ObjectSpec& object, const TriangleMesh&
     }
     map = scaled(map, *object.fit_height / (high.y - low.y));
   }
+  // Positions count from the origin of their own that a mesh may have.
+  Position offset = turned_by(map.linear, mesh.origin);
   if (object.place_on_ground || object.center) {
     const auto [low, high] = bounds_of(mesh, map);
-    if (object.place_on_ground) map.offset.y -= low.y;
-    if (object.center) map.offset = map.offset - Vec3{low.x + high.x, 0, low.z + high.z} * 0.5f;
+    if (object.place_on_ground) {
+      map.offset.y -= low.y;
+      offset[1] = 0;
+    }
+    if (object.center) {
+      map.offset = map.offset - Vec3{low.x + high.x, 0, low.z + high.z} * 0.5f;
+      offset[0] = offset[2] = 0;
+    }
   }
   map.offset += object.translate;
+  if (offset != Position{}) {
+    const Vec3& o = map.offset;
+    map.offset = {static_cast<float>(o.x + offset[0]), static_cast<float>(o.y + offset[1]),
+                  static_cast<float>(o.z + offset[2])};
+  }
   return map;
 }
 
@@ -186,6 +207,15 @@ NameIndex load_meshes(const SceneSpec& spec, gltf::FileCache& files, Scene& scen
   return names;
 }
 
+/// Colours of vertices are looked up where textures are.
+void add_detail(const MaterialSpec& spec, Material& material, Scene& scene) {
+  if (material.detail != nullptr || spec.kind == MaterialKind::measured) return;
+  auto detail = std::make_shared<SurfaceDetail>();
+  detail->spec = spec;
+  material.detail = std::move(detail);
+  scene.has_detail = true;
+}
+
 void place_object(const ObjectSpec& object, std::size_t index, const std::string& name,
                   std::uint32_t mesh, std::uint32_t material, Scene& scene, Faults& faults) {
   if (scene.meshes[mesh].positions.empty()) return;  // its own fault is known
@@ -221,6 +251,7 @@ std::uint64_t Scene::size_bytes() const {
     add(mesh.normals);
     for (const auto& uvs : mesh.uvs) add(uvs);
     add(mesh.tangents);
+    add(mesh.colors);
     add(mesh.triangles);
     if (mesh.deformation != nullptr) size += mesh.deformation->size_bytes();
   }
@@ -256,7 +287,9 @@ Result<Scene> load_scene(const JobSpec& job) {
   gltf::FileCache files;
   DetailLoader details(files, job.scene.files);
   NameIndex materials;
+  std::vector<const MaterialSpec*> material_specs;
   for (const auto& [name, material] : job.scene.materials) {
+    material_specs.push_back(&material);
     materials[name] = static_cast<std::uint32_t>(scene.materials.size());
     scene.materials.push_back(load_material(material, "scene.materials." + name, details, faults));
     scene.has_detail = scene.has_detail || scene.materials.back().detail != nullptr;
@@ -272,6 +305,8 @@ Result<Scene> load_scene(const JobSpec& job) {
     const auto material = find_name(materials, object.material, "material", name, faults);
     if (!mesh || !material) continue;
     place_object(object, i, name, *mesh, *material, scene, faults);
+    if (!scene.meshes[*mesh].colors.empty())
+      add_detail(*material_specs[*material], scene.materials[*material], scene);
     if (!fitted.insert({*mesh, *material}).second) continue;
     fit_mesh(scene.materials[*material], object.material,
              job.scene.meshes.at(object.mesh).path + ", mesh \"" + object.mesh + "\"", name,

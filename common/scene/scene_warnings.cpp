@@ -7,6 +7,8 @@
 #include "common/base/suggest.h"
 #include "common/scene/gltf/document.h"
 #include "common/scene/gltf/materials.h"
+#include "common/scene/gltf/node_motion.h"
+#include "common/scene/gltf/vertices.h"
 
 namespace baton {
 namespace {
@@ -34,23 +36,29 @@ void warn_of_materials(const gltf::Document& file, const SceneSpec& scene,
   }
 }
 
-void warn_of_file(const gltf::Document& file, std::vector<std::string>& warnings) {
+void warn_of_file(const std::shared_ptr<const gltf::Document>& given,
+                  std::vector<std::string>& warnings) {
+  const gltf::Document& file = *given;
   const auto add = [&](const std::string& what) { warnings.push_back(file.path + ": " + what); };
   for (const std::string& extension : file.extensions_used) {
     if (!gltf::is_read(extension)) add("extension " + extension + " is not read");
   }
-  std::size_t morphed = 0, colored = 0;
+  for (const std::string& note : file.notes) add(note);
+  if (const auto motion = gltf::NodeMotion::read(given)) {
+    for (const std::string& note : motion->notes()) add(note);
+  }
+  std::size_t morphed = 0, lines = 0;
   for (const gltf::Mesh& mesh : file.meshes) {
     for (const gltf::Primitive& primitive : mesh.primitives) {
       morphed += primitive.morphs_more ? 1 : 0;
-      colored += primitive.colored ? 1 : 0;
+      lines += gltf::has_surface(primitive) ? 0 : 1;
     }
   }
   if (morphed > 0)
     add(fmt::format(
         "{} parts have morph targets of colours or texture coordinates, which are not read",
         morphed));
-  if (colored > 0) add(fmt::format("{} parts have vertex colours, which are not read", colored));
+  if (lines > 0) add(fmt::format("{} parts are points or lines, which are not shown", lines));
 }
 
 /// Materials of the job that no object has and no file: meant to replace one of a file?
@@ -74,18 +82,19 @@ std::vector<std::string> scene_warnings(const SceneSpec& scene) {
       warnings.push_back(fmt::format("material \"{}\": it glows, but lights nothing", name));
   }
 
-  std::set<std::string> paths, names;
+  std::set<std::string> paths, parts, names;
   for (const auto& [name, mesh] : scene.meshes) {
-    if (mesh.mesh >= 0) paths.insert(mesh.path);
+    if (is_gltf(mesh.path)) paths.insert(mesh.path);
+    if (mesh.mesh >= 0) parts.insert(mesh.path);
   }
   for (const std::string& path : paths) {
     const auto document = gltf::read_document(path);
     if (!document) continue;
-    warn_of_file(**document, warnings);
+    warn_of_file(*document, warnings);
     warn_of_materials(**document, scene, used, warnings);
     for (std::string& name : gltf::material_names(**document)) names.insert(std::move(name));
   }
-  if (!paths.empty()) warn_of_names(scene, used, names, warnings);
+  if (!parts.empty()) warn_of_names(scene, used, names, warnings);
   return warnings;
 }
 

@@ -1,6 +1,7 @@
 #include "jobs/cli/job_argument.h"
 
 #include <fmt/format.h>
+#include <spdlog/spdlog.h>
 
 #include "common/scene/settle/settle_motion.h"
 
@@ -100,7 +101,9 @@ Status begin_at(JobSpec& job, std::optional<FrameNumber> frame) {
 
 Result<WantedJob> load_settled(const JobArgument& argument, bool look) {
   BATON_ASSIGN(WantedJob wanted, load_wanted(argument, look));
-  BATON_ASSIGN(wanted.job, settle_motion(std::move(wanted.job)));
+  std::vector<std::string> left_out;
+  BATON_ASSIGN(wanted.job, settle_motion(std::move(wanted.job), &left_out));
+  for (const std::string& line : left_out) spdlog::warn("{}", line);
   return wanted;
 }
 

@@ -31,6 +31,11 @@ class GltfWriter {
                        ",\"byteLength\":" + std::to_string(size) + "}");
     return num_views_++;
   }
+  /// A view by its JSON.
+  int add_raw_view(const std::string& json) {
+    append(views_, "{" + json + "}");
+    return num_views_++;
+  }
   int add_accessor(const std::string& json) {
     append(accessors_, "{" + json + "}");
     return num_accessors_++;

@@ -9,6 +9,7 @@
 
 #include "common/base/limits.h"
 #include "common/base/poison.h"
+#include "common/math/bounds.h"
 #include "common/scene/camera.h"
 #include "common/scene/scene.h"
 #include "worker/surface/seen_surface.h"
@@ -80,11 +81,22 @@ struct ShadowRays {
   std::size_t count_ = 0;
 };
 
+/// How far origins of shadow rays are lifted off a surface: coordinates below kLiftOrigin by a
+/// distance, others by a number of float steps.
+struct Lift {
+  float near = 1.0f / 65536;
+  float steps = 256;
+
+  bool operator==(const Lift&) const = default;
+};
+inline constexpr float kLiftOrigin = 1.0f / 32;
+/// The lift of a surface in these bounds, in the world. Most have the default; those that are small
+/// beside it, or beside the float spacing where they are, a smaller one: the distance is at most
+/// 2^-14 of the largest coordinate, the steps at most 2^-10 of the size, and 16 or more.
+Lift lift_of(const Bounds& bounds);
 /// The origin of a shadow ray: `position` lifted along the geometric normal just so far that float
 /// error cannot make the surface shadow itself [Waechter & Binder 2019].
-Vec3 lift_off(const Vec3& position, const Vec3& ng);
-/// Below kLiftOrigin a coordinate is lifted by a distance, above it by a number of float steps.
-inline constexpr float kLiftOrigin = 1.0f / 32, kLiftNear = 1.0f / 65536, kLiftSteps = 256;
+Vec3 lift_off(const Vec3& position, const Vec3& ng, const Lift& lift = {});
 
 /// How a ray tracer is built.
 struct AccelLimits {

@@ -43,6 +43,7 @@ struct SharedGeometry {
   std::set<std::uint32_t> with_holes;  ///< meshes that are cut out somewhere
   bool any_blends = false;             ///< rays need their bits
   std::uint64_t placement_bytes = 0;   ///< what is built for each placement
+  std::vector<std::array<Vec3, 8>> boxes;  ///< corners of each mesh's box, in its own space
 
   const Scene* holes_of(const Scene& scene, std::uint32_t mesh) const {
     return with_holes.contains(mesh) ? &scene : nullptr;
@@ -79,6 +80,12 @@ class EmbreeAccel final : public Accel {
         catchers_{geometry_->catchers.still.get(), moving_catchers_.get()} {
     for (std::uint32_t i = 0; i < scene.meshes.size(); ++i)
       vertices_.push_back(vertices_of(scene, shapes, i));
+    for (const Instance& instance : instances) {
+      const std::span<const Vec3> points = instance.deforms
+                                               ? vertices_[instance.mesh].positions
+                                               : geometry_->boxes[instance.mesh];
+      lifts_.push_back(lift_of(box_around(points, instance.to_world)));
+    }
   }
 
   static Result<std::unique_ptr<EmbreeAccel>> make(const Scene& scene,
@@ -283,7 +290,7 @@ class EmbreeAccel final : public Accel {
       const Instance& instance = instances_[index];
       kernels::see_surfaces(
           met, lane, instance, scene_.meshes[instance.mesh].triangles, vertices_[instance.mesh],
-          scene_.material_of(instance).detail != nullptr || instance.deforms, hits);
+          lifts_[index], scene_.material_of(instance).detail != nullptr || instance.deforms, hits);
     }
   }
 
@@ -291,6 +298,7 @@ class EmbreeAccel final : public Accel {
   const std::shared_ptr<const SharedGeometry> geometry_;
   const std::span<const Instance> instances_;
   std::vector<MeshVertices> vertices_;  ///< by mesh
+  std::vector<Lift> lifts_;             ///< by instance
   const Owned<RTCScene> moving_, moving_catchers_;
   const PlacedLayer objects_, catchers_;
 };
@@ -358,6 +366,8 @@ Result<std::unique_ptr<Accel>> Accel::build(const Scene& scene, const AccelLimit
   rtcSetDeviceMemoryMonitorFunction(device, AllocationCount::note, &allocated);
 
   // What stands still, in world space; each mesh that moves, in its own.
+  for (const TriangleMesh& mesh : scene.meshes)
+    geometry->boxes.push_back(corners_of(box_around(mesh.positions, {})));
   geometry->any_blends = any_blends(scene);
   geometry->with_holes = meshes_with_holes(scene);
   build_layer(scene, limits.max_copied_triangles, *geometry, geometry->objects);

@@ -63,4 +63,16 @@ void attach_placed(RTCDevice device, RTCScene target, RTCScene mesh, const Trans
   rtcAttachGeometryByID(target, geometry.get(), index);
 }
 
+Bounds box_around(std::span<const Vec3> points, const Transform& map) {
+  Bounds box;
+  for (const Vec3& p : points) box.add(map.point(p));
+  return box;
+}
+
+std::array<Vec3, 8> corners_of(const Bounds& box) {
+  std::array<Vec3, 8> corners;
+  for (std::size_t i = 0; i < corners.size(); ++i) corners[i] = box.corner(i);
+  return corners;
+}
+
 }  // namespace baton

@@ -7,6 +7,7 @@
 #include <string>
 #include <type_traits>
 
+#include "common/math/bounds.h"
 #include "common/scene/scene.h"
 
 /// Embree's objects, and how meshes become some.
@@ -36,5 +37,9 @@ void attach_instance(RTCDevice device, RTCScene target, const TriangleMesh& mesh
 /// Attaches a mesh that has a hierarchy of its own; geometry id = index of the instance.
 void attach_placed(RTCDevice device, RTCScene target, RTCScene mesh, const Transform& to_world,
                    unsigned index);
+
+/// The box around points after a map.
+Bounds box_around(std::span<const Vec3> points, const Transform& map);
+std::array<Vec3, 8> corners_of(const Bounds& box);
 
 }  // namespace baton

@@ -1,5 +1,7 @@
+#include <algorithm>
 #include <bit>
 #include <cmath>
+#include <limits>
 
 #include "worker/accel/accel.h"
 
@@ -7,17 +9,32 @@ namespace baton {
 namespace {
 
 /// [Waechter & Binder 2019, listing 6.1]
-float lift(float position, float normal) {
-  if (std::fabs(position) < kLiftOrigin) return position + kLiftNear * normal;
-  const auto steps = static_cast<std::int32_t>(kLiftSteps * normal);
+float lifted(float position, float normal, const Lift& lift) {
+  if (std::fabs(position) < kLiftOrigin) return position + lift.near * normal;
+  const auto steps = static_cast<std::int32_t>(lift.steps * normal);
   return std::bit_cast<float>(std::bit_cast<std::int32_t>(position) +
                               (position < 0 ? -steps : steps));
 }
 
 }  // namespace
 
-Vec3 lift_off(const Vec3& position, const Vec3& ng) {
-  return {lift(position.x, ng.x), lift(position.y, ng.y), lift(position.z, ng.z)};
+Lift lift_of(const Bounds& bounds) {
+  if (bounds.empty()) return {};
+  constexpr float kShareOfPlace = 1.0f / 16384, kShareOfSize = 1.0f / 1024, kLeastSteps = 16;
+  const auto largest = [](const Vec3& v) {
+    return std::max({std::fabs(v.x), std::fabs(v.y), std::fabs(v.z)});
+  };
+  const float farthest = std::max(largest(bounds.low), largest(bounds.high));
+  const float spacing = std::nextafter(farthest, std::numeric_limits<float>::max()) - farthest;
+  const float steps = kShareOfSize * largest(bounds.size()) / spacing;
+  const Lift usual;
+  return {.near = std::min(usual.near, kShareOfPlace * farthest),
+          .steps = std::floor(std::clamp(steps, kLeastSteps, usual.steps))};
+}
+
+Vec3 lift_off(const Vec3& position, const Vec3& ng, const Lift& lift) {
+  return {lifted(position.x, ng.x, lift), lifted(position.y, ng.y, lift),
+          lifted(position.z, ng.z, lift)};
 }
 
 void ShadowRays::reserve(std::size_t capacity) {

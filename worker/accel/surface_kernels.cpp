@@ -24,14 +24,14 @@ HWY_INLINE Vec3Lanes TurnedTo(const Vec3Lanes& to, const Vec3Lanes& v) {
   return {hn::Xor(v.x, sign), hn::Xor(v.y, sign), hn::Xor(v.z, sign)};
 }
 /// lift_off() of one coordinate.
-HWY_INLINE VF Lifted(VF position, VF normal) {
+HWY_INLINE VF Lifted(VF position, VF normal, const Lift& lift) {
   const DF d;
   const DI di;
-  const VI steps = hn::ConvertTo(di, hn::Mul(hn::Set(d, kLiftSteps), normal));
+  const VI steps = hn::ConvertTo(di, hn::Mul(hn::Set(d, lift.steps), normal));
   const VI outward =
       hn::IfThenElse(hn::Lt(hn::BitCast(di, position), hn::Zero(di)), hn::Neg(steps), steps);
   const VF far = hn::BitCast(d, hn::Add(hn::BitCast(di, position), outward));
-  const VF near = hn::Add(position, hn::Mul(hn::Set(d, kLiftNear), normal));
+  const VF near = hn::Add(position, hn::Mul(hn::Set(d, lift.near), normal));
   return hn::IfThenElse(hn::Lt(hn::Abs(position), hn::Set(d, kLiftOrigin)), near, far);
 }
 
@@ -83,7 +83,8 @@ HWY_INLINE void StoreFields(const HitsOfLanes& hits, std::size_t first_field, VF
 
 void SeeSurfaces(const kernels::MetTriangles& met, std::size_t first, const Instance& instance,
                  std::span<const std::array<std::uint32_t, 3>> triangles,
-                 const MeshVertices& vertices, bool with_place, std::span<SurfaceHit> hits) {
+                 const MeshVertices& vertices, const Lift& lift, bool with_place,
+                 std::span<SurfaceHit> hits) {
   const bool is_smooth = !vertices.normals.empty();
   const std::uint32_t index = met.instance[first];
   const std::size_t lanes = hn::Lanes(DF());
@@ -121,8 +122,8 @@ void SeeSurfaces(const kernels::MetTriangles& met, std::size_t first, const Inst
       ns = TurnedTo(ng, ExactNormalize(ExactTimes(instance.normal_to_world, normal)));
       ns = Select(hn::Gt(ExactDot(ns, ng), hn::Zero(d)), ns, ng);
     }
-    const Vec3Lanes origin{Lifted(position.x, ng.x), Lifted(position.y, ng.y),
-                           Lifted(position.z, ng.z)};
+    const Vec3Lanes origin{Lifted(position.x, ng.x, lift), Lifted(position.y, ng.y, lift),
+                           Lifted(position.z, ng.z, lift)};
 
     // Write them as records.
     HitsOfLanes out;
@@ -155,8 +156,10 @@ namespace kernels {
 
 void see_surfaces(const MetTriangles& met, std::size_t first, const Instance& instance,
                   std::span<const std::array<std::uint32_t, 3>> triangles,
-                  const MeshVertices& vertices, bool with_place, std::span<SurfaceHit> hits) {
-  HWY_DYNAMIC_DISPATCH(SeeSurfaces)(met, first, instance, triangles, vertices, with_place, hits);
+                  const MeshVertices& vertices, const Lift& lift, bool with_place,
+                  std::span<SurfaceHit> hits) {
+  HWY_DYNAMIC_DISPATCH(SeeSurfaces)
+  (met, first, instance, triangles, vertices, lift, with_place, hits);
 }
 
 }  // namespace kernels

@@ -30,6 +30,7 @@ struct alignas(64) MetTriangles {
 /// with_place: hits know their places on the mesh.
 void see_surfaces(const MetTriangles& met, std::size_t first, const Instance& instance,
                   std::span<const std::array<std::uint32_t, 3>> triangles,
-                  const MeshVertices& vertices, bool with_place, std::span<SurfaceHit> hits);
+                  const MeshVertices& vertices, const Lift& lift, bool with_place,
+                  std::span<SurfaceHit> hits);
 
 }  // namespace baton::kernels

@@ -230,8 +230,7 @@ Result<TaskOutput> execute_assemble(const LoadedJob& loaded, const BlobStore& st
   if (const JobSpec& here = loaded.context->job; has_plate(here.output)) {
     const FrameNumber number = here.frames[frame.index()];
     BATON_ASSIGN(Plate plate, load_plate(here, number));
-    if (plate.repaired > 0)
-      notes.push_back(repair_note(file_at(*here.output.plate, number), plate.repaired));
+    notes = plate_notes(file_at(*here.output.plate, number), plate);
     picture = std::move(plate.picture);
   }
   BATON_ASSIGN(const WrittenFrame written,

@@ -13,6 +13,8 @@ namespace {
 constexpr float kLeastSlope = 0.01f;
 /// Least cosine between a mapped and the geometric normal.
 constexpr float kLeastUpright = 0.02f;
+/// Alphas that differ by less are one: half a step of those in memory.
+constexpr float kAlphaStep = 0.5f / 65535;
 
 template <class T>
 T mix(const T& a, const T& b, const T& c, float u, float v) {
@@ -79,6 +81,17 @@ class Patch {
     const Texture& image = *image_at(t, at);
     return image.has_alpha() ? look_up(image, at.uv, at.seen, at.sampling)[3] : 1;
   }
+
+  /// Factor of base colour and alpha, of a mesh that has such.
+  VertexColor color() const {
+    const std::vector<VertexColor>& of = mesh_.colors;
+    const VertexColor &a = of[corner_[0]], &b = of[corner_[1]], &c = of[corner_[2]];
+    VertexColor blend{};
+    for (std::size_t i = 0; i < blend.size(); ++i)
+      blend[i] = mix(a[i], b[i], c[i], place_.u, place_.v);
+    return blend;
+  }
+  bool has_color() const { return !mesh_.colors.empty(); }
 
   /// The normal that (x, y, z) of tangent space is, z along that of the mesh; unit, on the side of
   /// ns.
@@ -214,6 +227,10 @@ SeenSurface see_detail(const Scene& scene, const Instance& instance, const Surfa
     color = color * rgb(DetailImage::color);
     color = {std::min(color.x, 1.0f), std::min(color.y, 1.0f), std::min(color.z, 1.0f)};
   }
+  if (patch.has_color()) {
+    const VertexColor factor = patch.color();
+    color = color * Rgb{factor[0], factor[1], factor[2]};
+  }
   if (detail.has(DetailImage::metallic_roughness)) {
     const std::array<float, 4>& t = texels[DetailImage::metallic_roughness];
     roughness = std::clamp(roughness * t[0], kLeastRoughness, 1.0f);
@@ -258,10 +275,13 @@ SeenSurface SurfaceLook::at(const ShadingPoint& point) const {
 bool is_cut_away(const Scene& scene, const Instance& instance, const SurfacePlace& place,
                  float draw) {
   const SurfaceDetail& detail = *scene.material_of(instance).detail;
+  const Patch patch(scene, instance, place, {});
   float alpha = detail.spec.alpha;
-  if (detail.has(DetailImage::color))
-    alpha *= Patch(scene, instance, place, {}).alpha(detail[DetailImage::color]);
-  return alpha < std::max(detail.spec.alpha_cutoff, detail.spec.alpha_blend ? draw : 0.0f);
+  if (detail.has(DetailImage::color)) alpha *= patch.alpha(detail[DetailImage::color]);
+  if (patch.has_color()) alpha *= patch.color()[3];
+  const float cutoff = detail.spec.alpha_cutoff;
+  return alpha < std::max(cutoff - std::min(kAlphaStep, 0.5f * cutoff),
+                          detail.spec.alpha_blend ? draw : 0.0f);
 }
 
 // With N' = x X + z ng in the plane of both normals, the mirror image's height

@@ -31,7 +31,7 @@ struct WrapLanes {
   VI4 texels;      ///< texels of a period, or 0
   /// The sum of two texels that mirror each other, or large.
   VI4 mirror;
-  VI4 last;  ///< texel
+  VI4 low, high;  ///< the first and the last texel, or those of the border
 
   WrapLanes(const ProbeLine& line, const TextureSampling& sampling) {
     const auto lanes = [](auto d, auto fine_u, auto fine_v, auto coarse_u, auto coarse_v) HWY_ATTR {
@@ -52,8 +52,10 @@ struct WrapLanes {
     period = hn::ConvertTo(d, periods);
     per_period = lanes(d, inverse(u), inverse(v), inverse(u), inverse(v));
     texels = hn::Mul(width, periods);
-    last = hn::Sub(width, hn::Set(di, 1));
+    const VI4 one = hn::Set(di, 1), last = hn::Sub(width, one);
     const auto clamped = hn::Eq(periods, hn::Zero(di));
+    low = hn::IfThenElseZero(clamped, hn::Neg(one));
+    high = hn::Add(last, hn::IfThenElseZero(clamped, one));
     mirror = hn::IfThenElse(clamped, hn::Set(di, 1 << 20), hn::Add(width, last));
   }
 
@@ -70,7 +72,7 @@ struct WrapLanes {
     i = hn::Add(i, hn::IfThenElseZero(hn::Lt(i, zero), texels));
     i = hn::Sub(i, hn::IfThenZeroElse(hn::Lt(i, texels), texels));
     i = hn::Min(i, hn::Sub(mirror, i));
-    return hn::Min(hn::Max(i, zero), last);
+    return hn::Min(hn::Max(i, low), high);
   }
 };
 
@@ -85,7 +87,7 @@ HWY_INLINE void Append(const TextureLevel& level, VI4 texel, VF4 weight, float s
   const VF4 of_column = hn::ConcatLowerLower(d, weight, weight);
   const VF4 of_row = hn::InterleaveUpper(d, weight, weight);
   const VI4 first = hn::Set(di, static_cast<std::int32_t>(level.first));
-  const VI4 at = hn::Add(hn::Add(hn::Mul(row, hn::Set(di, level.width)), column), first);
+  const VI4 at = hn::Add(hn::Add(hn::Mul(row, hn::Set(di, level.stride())), column), first);
   hn::StoreU(at, di, list.texel.data() + list.count);
   hn::StoreU(hn::Mul(hn::Mul(hn::Set(d, share), of_row), of_column), d,
              list.weight.data() + list.count);

@@ -9,23 +9,42 @@
 #include "common/base/files.h"
 #include "common/base/limits.h"
 #include "common/job/text/job_json_text.h"
+#include "common/scene/gltf/compression.h"
 #include "common/scene/gltf/container.h"
 #include "common/scene/gltf/document_parser.h"
 
 namespace baton::gltf {
 namespace {
 
-constexpr std::array<std::string_view, 7> kRead{
-    "KHR_texture_transform",  "KHR_mesh_quantization",  "KHR_materials_emissive_strength",
-    "KHR_materials_ior",      "KHR_materials_specular", "EXT_texture_webp",
-    "KHR_materials_clearcoat"};
+constexpr std::array<std::string_view, 11> kRead{"KHR_texture_transform",
+                                                 "KHR_mesh_quantization",
+                                                 "KHR_materials_emissive_strength",
+                                                 "KHR_materials_ior",
+                                                 "KHR_materials_specular",
+                                                 "KHR_materials_clearcoat",
+                                                 "EXT_texture_webp",
+                                                 "KHR_draco_mesh_compression",
+                                                 "EXT_meshopt_compression",
+                                                 "EXT_mesh_gpu_instancing",
+                                                 "KHR_materials_pbrSpecularGlossiness"};
 
-/// Files that need an extension that is not read cannot be shown right.
+/// Extensions that only add to what a file shows without them: the look of surfaces, lights, sound,
+/// words.
+constexpr std::array<std::string_view, 6> kAdding{"KHR_materials_", "EXT_materials_", "KHR_lights_",
+                                                  "EXT_lights_",    "KHR_audio",      "KHR_xmp"};
+
+/// A file that needs others that are not read, such as of geometry, cannot be shown right.
 void check_extensions(const JsonView& root) {
-  root.each("extensionsRequired", [](const JsonView& name) {
-    if (const std::string text = name.as_text(); !is_read(text))
-      name.fail("\"" + text + "\" is required by the file, and is not read");
+  std::string missing;
+  root.each("extensionsRequired", [&](const JsonView& name) {
+    const std::string text = name.as_text();
+    const bool adds = std::ranges::any_of(
+        kAdding, [&](std::string_view start) { return text.starts_with(start); });
+    if (!adds && !is_read(text)) missing += (missing.empty() ? "" : ", ") + text;
   });
+  if (!missing.empty())
+    root.at("extensionsRequired")
+        .fail("the file cannot be shown without what is not read: " + missing);
 }
 
 void check_version(const JsonView& root) {
@@ -40,7 +59,10 @@ Bytes copy_of(ByteView bytes) { return {bytes.begin(), bytes.end()}; }
 /// What a buffer holds, at least as many bytes as it says.
 void load_buffer(const JsonView& buffer, const std::optional<ByteView>& binary,
                  Document& document) {
-  const std::uint64_t size = buffer.size("byteLength");
+  // In place of what views decompress there may be nothing.
+  const bool is_fallback =
+      buffer.at("extensions").at("EXT_meshopt_compression").boolean("fallback");
+  const std::uint64_t size = is_fallback && !buffer.has("uri") ? 0 : buffer.size("byteLength");
   Bytes bytes;
   if (buffer.has("uri")) {
     Result<Resource> resource = resolve_uri(buffer.text("uri"), document.path);
@@ -53,7 +75,7 @@ void load_buffer(const JsonView& buffer, const std::optional<ByteView>& binary,
       bytes = std::move(*file);
       document.buffer_files.push_back(resource->file);
     }
-  } else if (document.buffers.empty() && binary) {
+  } else if (document.buffers.empty() && binary && !is_fallback) {
     bytes = copy_of(binary->first(std::min<std::size_t>(binary->size(), size)));
   }
   if (bytes.size() < size)
@@ -75,15 +97,49 @@ void load_image(const JsonView& image, Document& document) {
   document.images.push_back(std::move(read));
 }
 
-void check_views(const JsonView& root, const Document& document) {
-  for (std::size_t v = 0; v < document.views.size(); ++v) {
-    const View& view = document.views[v];
-    const std::size_t size = view.buffer < 0 ? 0 : document.buffers[view.buffer].size();
-    if (view.size <= size && view.offset <= size - view.size) continue;
-    return root.at("bufferViews")
-        .fail(fmt::format("view {}: bytes {} to {} of a buffer of {}", v, view.offset,
-                          view.offset + view.size, size));
-  }
+/// The bytes of a view; none, and a fault of `place`, where it is not within its buffer.
+std::optional<ByteView> bytes_of(const JsonView& place, const View& view, std::size_t number,
+                                 const Document& document) {
+  const std::size_t size = view.buffer < 0 ? 0 : document.buffers[view.buffer].size();
+  if (view.size <= size && view.offset <= size - view.size && view.buffer >= 0)
+    return ByteView(document.buffers[view.buffer]).subspan(view.offset, view.size);
+  if (view.size == 0 && view.offset == 0) return ByteView();
+  place.fail(fmt::format("view {}: bytes {} to {} of a buffer of {}", number, view.offset,
+                         view.offset + view.size, size));
+  return std::nullopt;
+}
+
+/// Checks every view; those that are compressed become plain ones.
+void settle_views(const JsonView& root, Document& document) {
+  const std::size_t num_buffers = document.buffers.size();
+  std::size_t number = 0;
+  root.each("bufferViews", [&](const JsonView& given) {
+    View& view = document.views[number];
+    if (const JsonView packed = given.at("extensions").at("EXT_meshopt_compression")) {
+      const View source{.buffer = packed.required_index("buffer", num_buffers),
+                        .offset = packed.size("byteOffset"),
+                        .size = packed.size("byteLength")};
+      if (const auto bytes = bytes_of(packed, source, number, document))
+        decode_meshopt_view(packed, Bytes(bytes->begin(), bytes->end()), document, view);
+    } else {
+      (void)bytes_of(root.at("bufferViews"), view, number, document);
+    }
+    ++number;
+  });
+}
+
+/// Decodes what is compressed of meshes.
+void settle_meshes(const JsonView& root, Document& document) {
+  std::size_t m = 0;
+  root.each("meshes", [&](const JsonView& mesh) {
+    std::size_t p = 0;
+    mesh.each("primitives", [&](const JsonView& given) {
+      if (const JsonView packed = given.at("extensions").at("KHR_draco_mesh_compression"))
+        decode_draco_primitive(packed, document, document.meshes[m].primitives[p]);
+      ++p;
+    });
+    ++m;
+  });
 }
 
 }  // namespace
@@ -101,7 +157,20 @@ ByteView Document::bytes_of_image(std::size_t image) const {
 }
 
 std::vector<int> shown_nodes(const Document& document) {
-  std::vector<int> nodes = document.roots;  // grows while it is walked
+  // A root may be below another one.
+  std::vector<bool> is_root(document.nodes.size(), false);
+  for (const int root : document.roots) is_root[static_cast<std::size_t>(root)] = true;
+  const auto is_shown_above = [&](int node) {
+    int above = document.nodes[static_cast<std::size_t>(node)].parent;
+    while (above >= 0 && !is_root[static_cast<std::size_t>(above)])
+      above = document.nodes[static_cast<std::size_t>(above)].parent;
+    return above >= 0;
+  };
+  std::vector<int> nodes;  // grows while it is walked
+  for (const int root : document.roots) {
+    const bool is_new = std::ranges::find(nodes, root) == nodes.end();
+    if (is_new && !is_shown_above(root)) nodes.push_back(root);
+  }
   for (std::size_t i = 0; i < nodes.size(); ++i) {
     const std::vector<int>& children = document.nodes[static_cast<std::size_t>(nodes[i])].children;
     nodes.insert(nodes.end(), children.begin(), children.end());
@@ -132,9 +201,10 @@ Result<std::shared_ptr<const Document>> parse_document(ByteView bytes, const std
     });
   // Views come before images, which come before textures.
   if (good()) parse_views(root, *document);
-  if (good()) check_views(root, *document);
+  if (good()) settle_views(root, *document);
   if (good()) root.each("images", [&](const JsonView& image) { load_image(image, *document); });
   if (good()) parse_lists(root, *document);
+  if (good()) settle_meshes(root, *document);
   if (fault) return document->error(*fault);
   return std::shared_ptr<const Document>(std::move(document));
 }

@@ -1,8 +1,10 @@
 #pragma once
 
+#include <algorithm>
 #include <array>
 #include <cstdint>
 #include <limits>
+#include <map>
 #include <memory>
 #include <string>
 #include <string_view>
@@ -65,17 +67,24 @@ struct Primitive {
   std::array<int, 2> uvs{-1, -1};                                 ///< accessors of sets 0 and 1
   std::vector<JointSet> joint_sets{};  ///< JOINTS_0 with WEIGHTS_0 and so on
   std::vector<MorphTarget> targets{};
-  bool colored = false;  ///< has vertex colours
+  int colors = -1;  ///< accessor of COLOR_0
+  /// All attributes by name, as accessors.
+  std::map<std::string, int> attributes{};
   /// Some targets are of attributes that are not read.
   bool morphs_more = false;
 };
 
 struct Mesh {
   std::string name;
-  std::vector<Primitive> primitives;  ///< all with as many targets
-  std::vector<double> weights;        ///< one for each target, or none: zeros
+  std::vector<Primitive> primitives;
+  std::vector<double> weights;  ///< one for each target, or none: zeros
 
-  std::size_t num_targets() const { return primitives.empty() ? 0 : primitives[0].targets.size(); }
+  /// Primitives with fewer lack the last ones.
+  std::size_t num_targets() const {
+    std::size_t most = 0;
+    for (const Primitive& primitive : primitives) most = std::max(most, primitive.targets.size());
+    return most;
+  }
 };
 
 struct Skin {
@@ -97,6 +106,9 @@ struct Node {
   std::array<double, 3> translation{0, 0, 0};
   std::array<double, 4> rotation{0, 0, 0, 1};  ///< x, y, z, w
   std::array<double, 3> scale{1, 1, 1};
+  /// It shows its mesh once for each of these places (EXT_mesh_gpu_instancing), as accessors; -1:
+  /// no such member. Without any it shows the mesh once.
+  int instance_translations = -1, instance_rotations = -1, instance_scales = -1;
   /// A weight for each target of its mesh, or none: those of the mesh.
   std::vector<double> weights{};
 };
@@ -155,8 +167,9 @@ struct Material {
   std::array<double, 3> emission{0, 0, 0};  ///< factor times strength
   double ior = 1.5, specular = 1;
   std::array<double, 3> specular_color{1, 1, 1};
-  bool specular_textured = false;  ///< by textures, which are not read
-  bool occluded = false;           ///< by a texture, which is not read
+  bool is_specular_glossy = false;  ///< made of KHR_materials_pbrSpecularGlossiness
+  bool specular_textured = false;   ///< by textures, which are not read
+  bool occluded = false;            ///< by a texture, which is not read
   double clearcoat = 0, clearcoat_roughness = 0;
   TextureInfo clearcoat_texture, clearcoat_roughness_texture, clearcoat_normal_texture;
   AlphaMode alpha_mode = AlphaMode::opaque;
@@ -181,6 +194,8 @@ struct Document {
   std::vector<Texture> textures;
   std::vector<Image> images;
   std::vector<std::string> extensions_used;
+  /// What is unusual and read in spite of that, a line each.
+  std::vector<std::string> notes;
 
   /// The mesh of a node that has one.
   const Mesh& mesh_of(const Node& node) const {

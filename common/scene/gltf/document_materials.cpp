@@ -43,6 +43,32 @@ void parse_extensions(const JsonView& extensions, const Document& document, Mate
       parse_texture_info(coat.at("clearcoatNormalTexture"), document);
 }
 
+/// Diffuse, specular and glossiness as a material that is no metal: F0 is the specular colour, and
+/// what it reflects is missing below. Of its texture of gloss, which cannot be read, a usual
+/// surface is made.
+void parse_specular_glossiness(const JsonView& given, const Document& document,
+                               Material& material) {
+  constexpr double kUsualF0 = 0.04, kUsualRoughness = 0.5;
+  std::array<double, 4> diffuse{1, 1, 1, 1};
+  std::array<double, 3> specular{1, 1, 1};
+  given.numbers("diffuseFactor", diffuse);
+  given.numbers("specularFactor", specular);
+  double glossiness = given.number("glossinessFactor", 1, 0, 1);
+  material.specular_textured = given.has("specularGlossinessTexture");
+  if (material.specular_textured) {
+    specular = {kUsualF0, kUsualF0, kUsualF0};
+    glossiness = 1 - kUsualRoughness;
+  }
+  for (double& c : specular) c = std::clamp(c, 0.0, 1.0);
+  for (std::size_t i = 0; i < 4; ++i) material.base_color[i] = std::clamp(diffuse[i], 0.0, 1.0);
+  for (std::size_t i = 0; i < 3; ++i) material.specular_color[i] = specular[i] / kUsualF0;
+  material.metallic = 0;
+  material.roughness = 1 - glossiness;
+  material.base_color_texture = parse_texture_info(given.at("diffuseTexture"), document);
+  material.metallic_roughness_texture = {};
+  material.is_specular_glossy = true;
+}
+
 Material parse_material(const JsonView& material, const Document& document) {
   Material read;
   read.name = material.name("name");
@@ -64,6 +90,10 @@ Material parse_material(const JsonView& material, const Document& document) {
   material.numbers("emissiveFactor", read.emission);
   read.emissive_texture = parse_texture_info(material.at("emissiveTexture"), document);
   parse_extensions(material.at("extensions"), document, read);
+  const JsonView glossy = material.at("extensions").at("KHR_materials_pbrSpecularGlossiness");
+  // A texture of gloss is not read: what the file has beside it may be what it means.
+  if (glossy && !(glossy.has("specularGlossinessTexture") && pbr))
+    parse_specular_glossiness(glossy, document, read);
   return read;
 }
 

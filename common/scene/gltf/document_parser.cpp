@@ -1,5 +1,7 @@
 #include "common/scene/gltf/document_parser.h"
 
+#include <fmt/format.h>
+
 #include <algorithm>
 #include <array>
 #include <set>
@@ -79,12 +81,15 @@ std::vector<JointSet> parse_joint_sets(const JsonView& attributes, std::size_t n
   }
 }
 
-/// weights: of `owner`, of as many morph targets, or none.
-void check_weights(const JsonView& owner, const std::vector<double>& weights,
-                   std::size_t num_targets) {
+/// Makes the weights of `owner` as many as there are morph targets, if it has any.
+void fit_weights(const JsonView& owner, std::size_t num_targets, std::vector<double>& weights,
+                 std::vector<std::string>& notes) {
   if (weights.empty() || weights.size() == num_targets) return;
-  owner.at("weights").fail("expected one for each of " + std::to_string(num_targets) +
-                           " morph targets, got " + std::to_string(weights.size()));
+  notes.push_back(
+      fmt::format("{}.weights: {} for {} morph targets: those that are missing count "
+                  "as 0, others are left out",
+                  owner.place(), weights.size(), num_targets));
+  weights.resize(num_targets);
 }
 
 Primitive parse_primitive(const JsonView& primitive, std::size_t num_accessors,
@@ -99,7 +104,11 @@ Primitive parse_primitive(const JsonView& primitive, std::size_t num_accessors,
   read.tangents = attributes.index("TANGENT", num_accessors);
   read.uvs = {attributes.index("TEXCOORD_0", num_accessors),
               attributes.index("TEXCOORD_1", num_accessors)};
-  read.colored = attributes.has("COLOR_0");
+  read.colors = attributes.index("COLOR_0", num_accessors);
+  attributes.each_member([&](const std::string& name) {
+    const int accessor = attributes.index(name.c_str(), num_accessors);
+    if (accessor >= 0) read.attributes.emplace(name, accessor);
+  });
   read.joint_sets = parse_joint_sets(attributes, num_accessors);
   primitive.each("targets", [&](const JsonView& target) {
     read.targets.push_back({.positions = target.index("POSITION", num_accessors),
@@ -112,17 +121,21 @@ Primitive parse_primitive(const JsonView& primitive, std::size_t num_accessors,
   return read;
 }
 
-/// The primitives of a mesh have as many targets, and weights for them.
-Mesh parse_mesh(const JsonView& mesh, std::size_t num_accessors, std::size_t num_materials) {
+Mesh parse_mesh(const JsonView& mesh, std::size_t num_accessors, std::size_t num_materials,
+                std::vector<std::string>& notes) {
   Mesh read{mesh.name("name"), {}, mesh.all_numbers("weights")};
   mesh.each("primitives", [&](const JsonView& primitive) {
     read.primitives.push_back(parse_primitive(primitive, num_accessors, num_materials));
-    if (read.primitives.back().targets.size() != read.num_targets())
-      primitive.fail("expected " + std::to_string(read.num_targets()) +
-                     " morph targets as in the first primitive, got " +
-                     std::to_string(read.primitives.back().targets.size()));
   });
-  check_weights(mesh, read.weights, read.num_targets());
+  const std::size_t most = read.num_targets();
+  const auto lacks = std::ranges::count_if(
+      read.primitives, [&](const Primitive& p) { return p.targets.size() < most; });
+  if (lacks > 0)
+    notes.push_back(
+        fmt::format("{}: {} of {} parts have fewer than {} morph targets: those that "
+                    "are missing do not move them",
+                    mesh.place(), lacks, read.primitives.size(), most));
+  fit_weights(mesh, most, read.weights, notes);
   return read;
 }
 
@@ -139,7 +152,7 @@ Skin parse_skin(const JsonView& skin, std::size_t num_accessors, std::size_t num
 }
 
 struct NodeLimits {
-  std::size_t nodes, meshes, cameras, skins;
+  std::size_t nodes, meshes, cameras, skins, accessors;
 };
 
 Node parse_node(const JsonView& node, const NodeLimits& limits) {
@@ -159,6 +172,10 @@ Node parse_node(const JsonView& node, const NodeLimits& limits) {
   node.numbers("rotation", read.rotation);
   node.numbers("scale", read.scale);
   read.weights = node.all_numbers("weights");
+  const JsonView instances = node.at("extensions").at("EXT_mesh_gpu_instancing").at("attributes");
+  read.instance_translations = instances.index("TRANSLATION", limits.accessors);
+  read.instance_rotations = instances.index("ROTATION", limits.accessors);
+  read.instance_scales = instances.index("SCALE", limits.accessors);
   return read;
 }
 
@@ -197,7 +214,9 @@ void parse_scene(const JsonView& root, Document& document) {
       const int index = node.as_index(document.nodes.size());
       if (index < 0) return;
       if (document.nodes[static_cast<std::size_t>(index)].parent >= 0)
-        return node.fail("expected a node that is no other's child");
+        document.notes.push_back(node.place() +
+                                 ": a node that is another's child is shown where "
+                                 "that one has it");
       document.roots.push_back(index);
     });
   });
@@ -269,16 +288,18 @@ void parse_lists(const JsonView& root, Document& document) {
   });
   const std::size_t num_materials = count_of(root, "materials");
   root.each("meshes", [&](const JsonView& mesh) {
-    document.meshes.push_back(parse_mesh(mesh, document.accessors.size(), num_materials));
+    document.meshes.push_back(
+        parse_mesh(mesh, document.accessors.size(), num_materials, document.notes));
   });
   root.each("cameras",
             [&](const JsonView& camera) { document.cameras.push_back(parse_camera(camera)); });
   const NodeLimits limits{count_of(root, "nodes"), document.meshes.size(), document.cameras.size(),
-                          count_of(root, "skins")};
+                          count_of(root, "skins"), document.accessors.size()};
   root.each("nodes", [&](const JsonView& node) {
     document.nodes.push_back(parse_node(node, limits));
-    const Node& read = document.nodes.back();
-    check_weights(node, read.weights, read.mesh < 0 ? 0 : document.mesh_of(read).num_targets());
+    Node& read = document.nodes.back();
+    fit_weights(node, read.mesh < 0 ? 0 : document.mesh_of(read).num_targets(), read.weights,
+                document.notes);
   });
   root.each("skins", [&](const JsonView& skin) {
     document.skins.push_back(parse_skin(skin, document.accessors.size(), limits.nodes));

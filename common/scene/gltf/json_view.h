@@ -39,6 +39,13 @@ class JsonView {
     for (std::size_t i = 0; i < list.value_->size(); ++i) body(list.element(i));
   }
 
+  /// Calls body(name) for each member of an object.
+  template <class Body>
+  void each_member(const Body& body) const {
+    if (value_ == nullptr || !value_->is_object()) return;
+    for (const auto& item : value_->items()) body(item.key());
+  }
+
   std::string text(const char* key) const;
   /// A text as a job may say it: with spaces for control characters, and cut where it is longer.
   std::string name(const char* key) const;

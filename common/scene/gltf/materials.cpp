@@ -102,7 +102,13 @@ MaterialSpec material_spec(const Document& document, int material) {
 
 std::vector<std::string> unsupported_parts(const Document& document, const Material& material) {
   std::vector<std::string> parts;
-  if (material.specular_textured) parts.push_back("its textures of `specular` are not read");
+  if (material.is_specular_glossy)
+    parts.push_back(material.specular_textured
+                        ? "its specular and glossiness are a texture, which is not read: 0.04 and "
+                          "roughness 0.5 stand for it"
+                        : "its specular and glossiness are converted: F0 and 1 - roughness");
+  else if (material.specular_textured)
+    parts.push_back("its textures of `specular` are not read");
   if (material.occluded)
     parts.push_back("its occlusion texture is not read, as all light is direct");
   for (const TextureInfo* info :

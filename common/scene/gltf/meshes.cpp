@@ -3,6 +3,7 @@
 #include <fmt/format.h>
 
 #include <algorithm>
+#include <cmath>
 #include <set>
 
 #include "common/math/inverse.h"
@@ -24,17 +25,20 @@ void add_triangles(const Vertices& v, const Matrix& to_file, const MeshParts& pa
     std::array<Vec3, 3> corners, normals;
     std::array<UvSets, 3> uvs{};
     std::array<Tangent, 3> tangents{};
+    std::array<VertexColor, 3> colors{};
     for (std::size_t k = 0; k < 3; ++k) {
       const std::uint32_t vertex = v.corners[i + (mirrored ? 2 - k : k)];
       vertices[k] = vertex;
       corners[k] = transform.point(vec3_at(v.positions, vertex));
-      if (parts.normals) normals[k] = normalize(normal_to_file * vec3_at(v.normals, vertex));
+      if (parts.normals && !v.normals.empty())
+        normals[k] = normalize(normal_to_file * vec3_at(v.normals, vertex));
       for (std::size_t set = 0; set < static_cast<std::size_t>(parts.uv_sets); ++set)
         uvs[k][set] = {v.uvs[set][std::size_t{2} * vertex],
                        v.uvs[set][std::size_t{2} * vertex + 1]};
       if (parts.tangents) tangents[k] = tangent_at(v, vertex);
+      if (parts.colors) colors[k] = v.colors.empty() ? VertexColor{1, 1, 1, 1} : v.colors[vertex];
     }
-    builder.add(vertices, corners, normals, uvs, tangents);
+    builder.add(vertices, corners, normals, uvs, tangents, colors);
   }
 }
 
@@ -52,11 +56,18 @@ Result<Opened> open_primitive(const Document& document, const MeshSpec& spec) {
     return document.error(place + ": not there");
   const Primitive& primitive = document.meshes[m].primitives[p];
   BATON_ASSIGN(Vertices v, read_vertices(document, primitive, place));
-  const bool with_normals = spec.smooth_normals && has_usable_normals(v);
-  const bool with_tangents =
-      with_normals && is_bumpy(document, primitive) && has_usable_tangents(v);
-  const MeshParts parts{with_normals, v.num_uv_sets(), with_tangents};
+  const bool with_normals = spec.smooth_normals && !v.normals.empty();
+  const bool with_tangents = with_normals && is_bumpy(document, primitive) && !v.tangents.empty();
+  const MeshParts parts{with_normals, v.num_uv_sets(), with_tangents, !v.colors.empty()};
   return Opened{std::move(v), parts};
+}
+
+/// Repairs of what is used.
+MeshRepairs used_repairs(const Opened& opened) {
+  MeshRepairs repairs = opened.vertices.repairs;
+  if (!opened.parts.normals) repairs.normals = 0;
+  if (!opened.parts.tangents) repairs.tangents = 0;
+  return repairs;
 }
 
 Error without_triangles(const Document& document, const MeshSpec& spec, std::uint64_t dropped) {
@@ -70,6 +81,7 @@ Result<TriangleMesh> built_mesh(const Document& document, const MeshSpec& spec,
   MeshBuilder builder(opened.parts);
   add_triangles(opened.vertices, kIdentity, opened.parts, builder);
   TriangleMesh result = builder.take();
+  result.repairs = used_repairs(opened);
   if (result.triangles.empty()) return without_triangles(document, spec, result.dropped_triangles);
   return result;
 }
@@ -123,10 +135,12 @@ Result<TriangleMesh> deforming_mesh(const Document& document, const MeshSpec& sp
     }
   }
   if (mesh.triangles.empty()) return without_triangles(document, spec, mesh.dropped_triangles);
+  mesh.repairs = used_repairs(opened);
   for (std::size_t set = 0; set < static_cast<std::size_t>(opened.parts.uv_sets); ++set) {
     for (std::size_t i = 0; i < opened.vertices.uvs[set].size(); i += 2)
       mesh.uvs[set].push_back({opened.vertices.uvs[set][i], opened.vertices.uvs[set][i + 1]});
   }
+  mesh.colors = std::move(opened.vertices.colors);
   MeshShape first = deformation->at(spec.shaped_by->animation->start_frame);
   mesh.positions = std::move(first.positions);
   mesh.normals = std::move(first.normals);
@@ -152,6 +166,34 @@ Shaping shaping_of(const NodeMotion& motion, int node) {
   return given.skin >= 0 || !rests ? Shaping::at_rest : Shaping::none;
 }
 
+Result<std::vector<Matrix>> instances_of(const Document& document, const Node& node) {
+  std::size_t count = 1;
+  for (const int accessor :
+       {node.instance_translations, node.instance_rotations, node.instance_scales}) {
+    if (accessor >= 0) count = document.accessors[static_cast<std::size_t>(accessor)].count;
+  }
+  const auto read = [&](int accessor, int width, const char* name,
+                        float otherwise) -> Result<std::vector<float>> {
+    if (accessor < 0) return std::vector<float>(count * static_cast<std::size_t>(width), otherwise);
+    return read_attribute(document, accessor, width, count, "EXT_mesh_gpu_instancing", name);
+  };
+  BATON_ASSIGN(const std::vector<float> t, read(node.instance_translations, 3, "TRANSLATION", 0));
+  BATON_ASSIGN(const std::vector<float> r, read(node.instance_rotations, 4, "ROTATION", 0));
+  BATON_ASSIGN(const std::vector<float> s, read(node.instance_scales, 3, "SCALE", 1));
+  std::vector<Matrix> places;
+  for (std::size_t i = 0; i < count; ++i) {
+    const float* const q = r.data() + 4 * i;
+    const double length = std::sqrt(double{q[0]} * q[0] + double{q[1]} * q[1] +
+                                    double{q[2]} * q[2] + double{q[3]} * q[3]);
+    const Quaternion turn =
+        length > 0 ? Quaternion{q[0] / length, q[1] / length, q[2] / length, q[3] / length}
+                   : Quaternion{};
+    places.push_back(compose({t[3 * i], t[3 * i + 1], t[3 * i + 2]}, turn,
+                             {s[3 * i], s[3 * i + 1], s[3 * i + 2]}));
+  }
+  return places;
+}
+
 Result<TriangleMesh> primitive_mesh(const Document& document, const MeshSpec& spec) {
   BATON_ASSIGN(const Opened opened, open_primitive(document, spec));
   return built_mesh(document, spec, opened);
@@ -168,6 +210,7 @@ Result<TriangleMesh> shaped_mesh(const Document& document, std::shared_ptr<const
   BATON_ASSIGN(Shaper shaper,
                Shaper::read(document, by.node, static_cast<std::size_t>(spec.primitive),
                             opened.vertices, opened.parts.normals, opened.parts.tangents));
+  opened.vertices.repairs.weights = shaper.num_loose();
   if (by.animation)
     return deforming_mesh(
         document, spec, std::move(opened),
@@ -210,6 +253,8 @@ Result<TriangleMesh> whole_mesh(const Document& document, bool smooth_normals) {
   const std::vector<Matrix> to_world = NodeMotion::at_rest(document);
   std::vector<Part> parts;
   MeshParts common{.normals = smooth_normals, .uv_sets = 2};
+  bool any_normals = false;
+  MeshRepairs repairs;
   for (const int node : shown_nodes(document)) {
     const int mesh = document.nodes[static_cast<std::size_t>(node)].mesh;
     if (mesh < 0) continue;
@@ -217,21 +262,30 @@ Result<TriangleMesh> whole_mesh(const Document& document, bool smooth_normals) {
     const Matrix& to_file = document.nodes[static_cast<std::size_t>(node)].skin >= 0
                                 ? kIdentity
                                 : to_world[static_cast<std::size_t>(node)];
+    BATON_ASSIGN(const std::vector<Matrix> places,
+                 instances_of(document, document.nodes[static_cast<std::size_t>(node)]));
     for (std::size_t p = 0; p < given.primitives.size(); ++p) {
       if (!has_surface(given.primitives[p])) continue;
       BATON_ASSIGN(Vertices v, read_vertices(document, given.primitives[p], place_of(mesh, p)));
       BATON_ASSIGN(const Shaper shaper,
-                   Shaper::read(document, node, p, v, has_usable_normals(v), false));
+                   Shaper::read(document, node, p, v, !v.normals.empty(), false));
       if (!shaper.is_idle())
         take_shape(shaper.shape(to_world, NodeMotion::weights_at_rest(document, node)), v);
-      common.normals = common.normals && has_usable_normals(v);
+      any_normals = any_normals || !v.normals.empty();
+      repairs.normals += v.repairs.normals;
+      repairs.weights += shaper.num_loose();
+      common.colors = common.colors || !v.colors.empty();
       common.uv_sets = std::min(common.uv_sets, v.num_uv_sets());
-      parts.push_back({std::move(v), to_file});
+      for (const Matrix& at : places) parts.push_back({v, multiply(to_file, at)});
     }
   }
+  common.normals = smooth_normals && any_normals;
   MeshBuilder builder(common);
   for (const Part& part : parts) add_triangles(part.vertices, part.to_file, common, builder);
-  return builder.take();
+  TriangleMesh mesh = builder.take();
+  mesh.repairs.normals += common.normals ? repairs.normals : 0;
+  mesh.repairs.weights = repairs.weights;
+  return mesh;
 }
 
 }  // namespace baton::gltf

@@ -18,6 +18,10 @@ enum class Shaping : std::uint8_t {
 };
 Shaping shaping_of(const NodeMotion& motion, int node);
 
+/// Where a node shows its mesh, in its own space: once, or at each place that the file lists
+/// (EXT_mesh_gpu_instancing). Errors: lists of unequal length, numbers that are not finite.
+Result<std::vector<Matrix>> instances_of(const Document& document, const Node& node);
+
 /// The triangles of one primitive, in the space of its mesh, with the UV sets that it has. Without
 /// normals of its own it is flat, as glTF says. Errors name file and place: accessors that do not
 /// fit, indices out of range, coordinates that are not finite, no triangles.
@@ -30,7 +34,7 @@ Result<TriangleMesh> shaped_mesh(const Document& document, std::shared_ptr<const
                                  const MeshSpec& spec);
 
 /// All that the scene of a file shows, in its world, at rest; with the UV sets that all of it has.
-/// The mesh has no normals where a part has none.
+/// Parts without normals take smooth ones where others have some; without any the mesh has none.
 Result<TriangleMesh> whole_mesh(const Document& document, bool smooth_normals);
 
 /// Puts nodes elsewhere. Their places must be there.

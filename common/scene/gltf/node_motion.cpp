@@ -11,6 +11,10 @@
 namespace baton::gltf {
 namespace {
 
+/// How far apart two numbers are that stand for one time, as a share of it: exporters multiply and
+/// round in float32, and write 23.976 frames a second for 24000/1001.
+constexpr double kSameTime = 0x1p-19;
+
 /// The keys around a time: `share` of the way from key `from` to key `to`.
 struct Span {
   std::size_t from = 0, to = 0;
@@ -18,14 +22,16 @@ struct Span {
   double seconds = 0;  ///< between the keys
 };
 
+/// A key a rounding after `seconds` is there already.
 Span find_span(const std::vector<float>& times, double seconds) {
-  const auto next = std::upper_bound(times.begin(), times.end(), seconds,
+  const double latest = seconds + std::fabs(seconds) * kSameTime;
+  const auto next = std::upper_bound(times.begin(), times.end(), latest,
                                      [](double s, float time) { return s < double{time}; });
   if (next == times.begin()) return {};
   const auto from = static_cast<std::size_t>(next - times.begin()) - 1;
   if (next == times.end()) return {from, from, 0, 0};
   const double length = double{*next} - double{times[from]};
-  return {from, from + 1, (seconds - double{times[from]}) / length, length};
+  return {from, from + 1, std::max((seconds - double{times[from]}) / length, 0.0), length};
 }
 
 /// Component c of a curve of `width` numbers, each by itself.
@@ -84,38 +90,53 @@ Matrix rest_of(const Node& node) {
   return node.has_matrix ? node.matrix : compose(node.translation, unit(node.rotation), node.scale);
 }
 
-/// Numbers a time of what a channel moves.
-Result<std::size_t> width_of(const Document& document, const Channel& channel) {
-  if (channel.path == Path::rotation) return std::size_t{4};
-  if (channel.path != Path::weights) return std::size_t{3};
+/// Whether a channel moves weights that nothing has.
+bool is_idle(const Document& document, const Channel& channel) {
+  if (channel.path != Path::weights) return false;
   const Node& node = document.nodes[static_cast<std::size_t>(channel.node)];
-  const std::size_t width = node.mesh < 0 ? 0 : document.mesh_of(node).num_targets();
-  if (width > 0) return width;
-  return document.error(fmt::format(
-      "$.nodes[{}]: its weights are animated, expected a mesh with morph targets", channel.node));
+  return node.mesh < 0 || document.mesh_of(node).num_targets() == 0;
 }
 
-Result<Curve> read_curve(const Document& document, const Channel& channel) {
-  BATON_ASSIGN(const std::size_t width, width_of(document, channel));
+/// Of keys at one time the last one counts. row: numbers a key. Returns how many were left out.
+std::size_t drop_repeated(Curve& curve, std::size_t row) {
+  std::size_t kept = 0;
+  for (std::size_t k = 0; k < curve.times.size(); ++k) {
+    if (kept > 0 && curve.times[k] == curve.times[kept - 1]) --kept;
+    curve.times[kept] = curve.times[k];
+    std::copy_n(curve.values.begin() + static_cast<std::ptrdiff_t>(k * row), row,
+                curve.values.begin() + static_cast<std::ptrdiff_t>(kept * row));
+    ++kept;
+  }
+  const std::size_t dropped = curve.times.size() - kept;
+  curve.times.resize(kept);
+  curve.values.resize(kept * row);
+  return dropped;
+}
+
+/// repeated: gets the keys that another one at their time replaces, added.
+Result<Curve> read_curve(const Document& document, const Channel& channel, std::size_t& repeated) {
+  const bool moves_weights = channel.path == Path::weights;
+  std::size_t width = channel.path == Path::rotation ? 4 : 3;
   Curve curve{channel.interpolation, {}, {}};
   BATON_ASSIGN(curve.times, read_floats(document, channel.input, 1));
   BATON_ASSIGN(curve.values,
-               read_floats(document, channel.output,
-                           channel.path == Path::weights ? 1 : static_cast<int>(width)));
+               read_floats(document, channel.output, moves_weights ? 1 : static_cast<int>(width)));
   const auto finite = [](float v) { return std::isfinite(v); };
   if (!std::all_of(curve.times.begin(), curve.times.end(), finite) ||
-      std::adjacent_find(curve.times.begin(), curve.times.end(), std::greater_equal<>()) !=
-          curve.times.end() ||
-      curve.times.empty())
+      !std::is_sorted(curve.times.begin(), curve.times.end()) || curve.times.empty())
     return document.error(fmt::format(
         "$.accessors[{}]: expected the ascending times of an animation", channel.input));
   const std::size_t rows = channel.interpolation == Interpolation::cubic_spline ? 3 : 1;
+  // A mesh may have other targets than the animation has weights.
+  if (moves_weights)
+    width = std::max<std::size_t>(curve.values.size() / (curve.times.size() * rows), 1);
   const std::size_t expected = curve.times.size() * rows * width;
   if (curve.values.size() != expected ||
       !std::all_of(curve.values.begin(), curve.values.end(), finite))
     return document.error(
         fmt::format("$.accessors[{}]: expected {} finite numbers for an animation, got {}",
                     channel.output, expected, curve.values.size()));
+  repeated += drop_repeated(curve, rows * width);
   return curve;
 }
 
@@ -128,8 +149,10 @@ std::array<double, 3> Curve::vector_at(double seconds) const {
   return v;
 }
 
-std::vector<double> Curve::values_at(double seconds, std::size_t width) const {
+std::vector<double> Curve::values_at(double seconds) const {
   const Span span = find_span(times, seconds);
+  const std::size_t rows = interpolation == Interpolation::cubic_spline ? 3 : 1;
+  const std::size_t width = values.size() / (times.size() * rows);
   std::vector<double> v;
   for (std::size_t c = 0; c < width; ++c) v.push_back(component_at(*this, span, width, c));
   return v;
@@ -155,13 +178,17 @@ Result<NodeMotion> NodeMotion::read(std::shared_ptr<const Document> document) {
   const Document& file = *motion.document_;
   motion.curves_.resize(file.nodes.size());
   for (const Channel& channel : file.channels) {
+    if (is_idle(file, channel)) {
+      ++motion.num_idle_channels_;
+      continue;
+    }
     Moved& moved = motion.curves_[static_cast<std::size_t>(channel.node)];
     std::optional<Curve>& curve = channel.path == Path::translation ? moved.translation
                                   : channel.path == Path::rotation  ? moved.rotation
                                   : channel.path == Path::scale     ? moved.scale
                                                                     : moved.weights;
     if (curve) continue;
-    BATON_ASSIGN(curve, read_curve(file, channel));
+    BATON_ASSIGN(curve, read_curve(file, channel, motion.num_repeated_keys_));
     if (channel.path != Path::weights &&
         file.nodes[static_cast<std::size_t>(channel.node)].has_matrix)
       return file.error(fmt::format("$.nodes[{}]: is animated, expected no matrix", channel.node));
@@ -169,6 +196,18 @@ Result<NodeMotion> NodeMotion::read(std::shared_ptr<const Document> document) {
   motion.order_ = parents_first(file);
   motion.find_what_moves();
   return motion;
+}
+
+std::vector<std::string> NodeMotion::notes() const {
+  std::vector<std::string> notes;
+  if (num_repeated_keys_ > 0)
+    notes.push_back(fmt::format(
+        "{} keys of its animations are at the time of another, of which the last counts",
+        num_repeated_keys_));
+  if (num_idle_channels_ > 0)
+    notes.push_back(fmt::format("{} of its animations move weights of nodes without morph targets",
+                                num_idle_channels_));
+  return notes;
 }
 
 void NodeMotion::let_go_of_buffers() {
@@ -237,8 +276,9 @@ std::vector<Matrix> NodeMotion::at_rest(const Document& document) {
 std::vector<double> NodeMotion::weights(int node, double seconds) const {
   const std::optional<Curve>& curve = curves_[static_cast<std::size_t>(node)].weights;
   if (!curve) return weights_at_rest(*document_, node);
-  return curve->values_at(
-      seconds, document_->mesh_of(document_->nodes[static_cast<std::size_t>(node)]).num_targets());
+  std::vector<double> values = curve->values_at(seconds);
+  values.resize(document_->mesh_of(document_->nodes[static_cast<std::size_t>(node)]).num_targets());
+  return values;
 }
 
 std::vector<double> NodeMotion::weights_at_rest(const Document& document, int node) {

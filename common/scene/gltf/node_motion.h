@@ -15,11 +15,12 @@ struct Curve {
   std::vector<float> times;  ///< seconds, ascending, at least one
   std::vector<float> values;
 
-  /// Rotations are unit quaternions. Held before the first time and after the last one.
+  /// Rotations are unit quaternions. Held before the first time and after the last one. A key shows
+  /// from its time on, up to the rounding of times in files.
   std::array<double, 3> vector_at(double seconds) const;
   Quaternion rotation_at(double seconds) const;
-  /// A curve of `width` numbers a time, each by itself.
-  std::vector<double> values_at(double seconds, std::size_t width) const;
+  /// All numbers of a time, each by itself.
+  std::vector<double> values_at(double seconds) const;
 };
 
 /// Where the nodes of a file are at any time: all its animations together. Where several move one
@@ -30,6 +31,9 @@ class NodeMotion {
   static Result<NodeMotion> read(std::shared_ptr<const Document> document);
 
   const Document& document() const { return *document_; }
+  /// What is odd about the animations and read in spite of that, a line each: keys at one time,
+  /// of which the last one counts; weights of what has no targets.
+  std::vector<std::string> notes() const;
   /// Lets go of all of the document but its nodes, skins and what its meshes are called and made
   /// of: motion that is kept needs no more.
   void let_go_of_buffers();
@@ -68,6 +72,7 @@ class NodeMotion {
   std::vector<int> order_;     ///< all nodes, parents first
   std::vector<Moved> curves_;  ///< by node
   std::vector<bool> moves_;    ///< by node
+  std::size_t num_repeated_keys_ = 0, num_idle_channels_ = 0;
 };
 
 }  // namespace baton::gltf

@@ -72,7 +72,7 @@ Result<Shaper> Shaper::read(const Document& document, int node, std::size_t prim
   const Primitive& of = document.mesh_of(given).primitives[primitive];
   const std::string place = place_of(given.mesh, primitive);
   BATON_TRY(shaper.read_targets(document, of, place));
-  if (given.skin >= 0) BATON_TRY(shaper.read_skin(document, given.skin, of, place, node));
+  if (given.skin >= 0) BATON_TRY(shaper.read_skin(document, given.skin, of, place));
   return shaper;
 }
 
@@ -100,7 +100,7 @@ Status Shaper::read_targets(const Document& document, const Primitive& given,
 }
 
 Status Shaper::read_skin(const Document& document, int skin, const Primitive& given,
-                         const std::string& place, int node) {
+                         const std::string& place) {
   const Skin& bones = document.skins[static_cast<std::size_t>(skin)];
   joints_ = bones.joints;
   from_mesh_.assign(joints_.size(), kIdentity);
@@ -118,9 +118,6 @@ Status Shaper::read_skin(const Document& document, int skin, const Primitive& gi
       }
     }
   }
-  if (given.joint_sets.empty())
-    return document.error(fmt::format(
-        "{}: expected JOINTS_0 and WEIGHTS_0, as node {} gives it a skin", place, node));
   return read_joints(document, given, place, joints_.size());
 }
 
@@ -160,10 +157,10 @@ Status Shaper::read_joints(const Document& document, const Primitive& given,
         influences_.push_back({joint, weight});
       }
     }
-    if (first_.back() == influences_.size())
-      return document.error(
-          fmt::format("{}.WEIGHTS_0: expected a weight above 0 for each vertex, vertex {} has none",
-                      place, vertex));
+    if (first_.back() == influences_.size()) {
+      influences_.push_back({0, 1});
+      ++num_loose_;
+    }
     first_.push_back(influences_.size());
   }
   return {};

@@ -17,8 +17,7 @@ class Shaper {
  public:
   /// v: the vertices of the primitive of the node's mesh. parts: which of them are moved. Errors
   /// name the file and the place: targets and joints that do not fit the vertices, values that are
-  /// not finite, joints that the skin does not have, weights below 0 or without a sum, a skin
-  /// without joints for the primitive or with too few matrices.
+  /// not finite, joints that the skin does not have, weights below 0, a skin with too few matrices.
   static Result<Shaper> read(const Document& document, int node, std::size_t primitive,
                              const Vertices& v, bool with_normals, bool with_tangents);
 
@@ -28,6 +27,8 @@ class Shaper {
   /// the space of the mesh.
   MeshShape shape(std::span<const Matrix> to_world, std::span<const double> weights) const;
   std::uint64_t size_bytes() const;
+  /// Vertices without a joint of some weight, which follow the first joint of the skin.
+  std::uint64_t num_loose() const { return num_loose_; }
 
  private:
   /// What a target adds to a vertex.
@@ -45,7 +46,7 @@ class Shaper {
 
   Status read_targets(const Document& document, const Primitive& given, const std::string& place);
   Status read_skin(const Document& document, int skin, const Primitive& given,
-                   const std::string& place, int node);
+                   const std::string& place);
   Status read_joints(const Document& document, const Primitive& given, const std::string& place,
                      std::size_t num_joints);
   Matrix blend(std::span<const Matrix> joints, std::size_t vertex) const;
@@ -56,6 +57,7 @@ class Shaper {
   std::vector<Matrix> from_mesh_;   ///< by joint, the inverse bind matrices
   std::vector<std::size_t> first_;  ///< (vertices + 1) of influences_
   std::vector<Influence> influences_;
+  std::uint64_t num_loose_ = 0;
 };
 
 }  // namespace baton::gltf

@@ -5,8 +5,11 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <span>
 
 #include "common/scene/gltf/accessor.h"
+#include "common/scene/mesh/mesh_builder.h"
+#include "common/scene/mesh/tangents.h"
 
 namespace baton::gltf {
 namespace {
@@ -41,6 +44,93 @@ Result<std::vector<float>> read_counted(const Document& document, int accessor, 
                                     name, count, values.size() / static_cast<std::size_t>(width)));
 }
 
+/// COLOR_0, whose alpha may be missing; what is no number in [0, 1] is cut.
+Status read_colors(const Document& document, const Primitive& primitive, const std::string& place,
+                   Vertices& v) {
+  if (primitive.colors < 0) return {};
+  const bool is_opaque = document.accessors[static_cast<std::size_t>(primitive.colors)].width == 3;
+  const std::size_t width = is_opaque ? 3 : 4;
+  BATON_ASSIGN(const std::vector<float> values,
+               read_counted(document, primitive.colors, static_cast<int>(width), v.count(), place,
+                            "COLOR_0"));
+  v.colors.assign(v.count(), {1, 1, 1, 1});
+  for (std::size_t i = 0; i < values.size(); ++i)
+    v.colors[i / width][i % width] = values[i] > 0 ? std::min(values[i], 1.0f) : 0;
+  return {};
+}
+
+using Corners = std::array<std::uint32_t, 3>;
+
+/// The triangles of a primitive with area.
+std::vector<Corners> whole_triangles(const Vertices& v, std::span<const Vec3> positions) {
+  std::vector<Corners> triangles;
+  for (std::size_t i = 0; i < v.corners.size(); i += 3) {
+    const Corners t{v.corners[i], v.corners[i + 1], v.corners[i + 2]};
+    if (has_area(positions[t[0]], positions[t[1]], positions[t[2]])) triangles.push_back(t);
+  }
+  return triangles;
+}
+
+std::vector<Vec3> vectors_of(const std::vector<float>& numbers) {
+  std::vector<Vec3> vectors;
+  for (std::size_t i = 0; i < numbers.size() / 3; ++i) vectors.push_back(vec3_at(numbers, i));
+  return vectors;
+}
+
+bool is_tangent(const float* t) { return is_direction({t[0], t[1], t[2]}) && std::isfinite(t[3]); }
+
+/// Tangents of the coordinates that the normal map lies by; those that face no way where there are
+/// none.
+std::vector<Tangent> made_tangents(const Document& document, const Primitive& primitive,
+                                   const Vertices& v, std::span<const Vec3> positions,
+                                   std::span<const Corners> triangles) {
+  const std::vector<Vec3> normals = vectors_of(v.normals);
+  const int set =
+      is_bumpy(document, primitive)
+          ? document.materials[static_cast<std::size_t>(primitive.material)].normal_texture.uv
+          : 0;
+  const std::vector<float>& given = v.uvs[static_cast<std::size_t>(set)];
+  std::vector<Uv> uvs(v.count());
+  for (std::size_t i = 0; i < given.size() / 2; ++i) uvs[i] = {given[2 * i], given[2 * i + 1]};
+  return tangents_of(positions, normals, triangles, uvs);
+}
+
+/// Makes normals and tangents anew that are no directions; counts those that triangles use.
+void mend_vertices(const Document& document, const Primitive& primitive, Vertices& v) {
+  std::vector<std::size_t> normals, tangents;
+  for (std::size_t i = 0; i < v.normals.size() / 3; ++i)
+    if (!is_direction(vec3_at(v.normals, i))) normals.push_back(i);
+  for (std::size_t i = 0; i < v.tangents.size() / 4; ++i)
+    if (!is_tangent(v.tangents.data() + 4 * i)) tangents.push_back(i);
+  if (normals.empty() && tangents.empty()) return;
+
+  const std::vector<Vec3> positions = vectors_of(v.positions);
+  const std::vector<Corners> triangles = whole_triangles(v, positions);
+  std::vector<bool> is_used(v.count(), false);
+  for (const Corners& t : triangles)
+    for (const std::uint32_t vertex : t) is_used[vertex] = true;
+  const auto count = [&](const std::vector<std::size_t>& vertices) {
+    return static_cast<std::uint64_t>(
+        std::ranges::count_if(vertices, [&](std::size_t i) { return is_used[i]; }));
+  };
+  v.repairs.normals = count(normals);
+  v.repairs.tangents = count(tangents);
+  if (!normals.empty()) {
+    const std::vector<Vec3> made = smooth_vertex_normals(positions, triangles);
+    for (const std::size_t i : normals) {
+      const Vec3 n = normalize(made[i]);
+      std::ranges::copy(std::array{n.x, n.y, n.z}, v.normals.begin() + static_cast<long>(3 * i));
+    }
+  }
+  if (tangents.empty() || v.normals.empty()) return;
+  const std::vector<Tangent> made = made_tangents(document, primitive, v, positions, triangles);
+  for (const std::size_t i : tangents) {
+    const Vec3& t = made[i].direction;
+    std::ranges::copy(std::array{t.x, t.y, t.z, made[i].side},
+                      v.tangents.begin() + static_cast<long>(4 * i));
+  }
+}
+
 }  // namespace
 
 Result<Vertices> read_vertices(const Document& document, const Primitive& primitive,
@@ -59,6 +149,7 @@ Result<Vertices> read_vertices(const Document& document, const Primitive& primit
   BATON_TRY(attribute(primitive.tangents, 4, "TANGENT", v.tangents));
   BATON_TRY(attribute(primitive.uvs[0], 2, "TEXCOORD_0", v.uvs[0]));
   BATON_TRY(attribute(primitive.uvs[1], 2, "TEXCOORD_1", v.uvs[1]));
+  BATON_TRY(read_colors(document, primitive, place, v));
   if (!all_finite(v.positions))
     return document.error(place + ": a vertex has a coordinate that is not finite");
   if (!all_finite(v.uvs[0]) || !all_finite(v.uvs[1]))
@@ -75,6 +166,7 @@ Result<Vertices> read_vertices(const Document& document, const Primitive& primit
           fmt::format("{}: expected a vertex index below {}, found {}", place, count, index));
   }
   v.corners = triangles_of(indices, primitive.mode);
+  mend_vertices(document, primitive, v);
   return v;
 }
 
@@ -88,25 +180,25 @@ Result<std::vector<float>> read_attribute(const Document& document, int accessor
   return values;
 }
 
-bool has_usable_normals(const Vertices& v) {
-  if (v.normals.empty() || !all_finite(v.normals)) return false;
-  for (std::size_t i = 0; i < v.normals.size() / 3; ++i) {
-    if (!(length(vec3_at(v.normals, i)) > 0)) return false;
+bool has_triangles(const Document& document, const Primitive& primitive, bool deforms) {
+  Primitive shape = primitive;
+  shape.normals = shape.tangents = shape.colors = -1;
+  shape.uvs = {-1, -1};
+  const Result<Vertices> v = read_vertices(document, shape, "");
+  if (!v) return true;
+  for (std::size_t i = 0; i < v->corners.size(); i += 3) {
+    const std::uint32_t a = v->corners[i], b = v->corners[i + 1], c = v->corners[i + 2];
+    const bool is_one = deforms ? a != b && b != c && c != a
+                                : has_area(vec3_at(v->positions, a), vec3_at(v->positions, b),
+                                           vec3_at(v->positions, c));
+    if (is_one) return true;
   }
-  return true;
+  return false;
 }
 
 Tangent tangent_at(const Vertices& v, std::size_t vertex) {
   const float* const t = v.tangents.data() + 4 * vertex;
   return {normalize({t[0], t[1], t[2]}), t[3] < 0 ? -1.0f : 1.0f};
-}
-
-bool has_usable_tangents(const Vertices& v) {
-  if (v.tangents.empty() || !has_usable_normals(v) || !all_finite(v.tangents)) return false;
-  for (std::size_t i = 0; i < v.tangents.size(); i += 4) {
-    if (!(length({v.tangents[i], v.tangents[i + 1], v.tangents[i + 2]}) > 0)) return false;
-  }
-  return true;
 }
 
 bool is_bumpy(const Document& document, const Primitive& primitive) {

@@ -16,14 +16,18 @@ struct Vertices {
   std::vector<float> positions, normals;  ///< (vertices, 3); normals may be empty
   std::vector<float> tangents;            ///< (vertices, 4), or empty
   std::array<std::vector<float>, 2> uvs;  ///< (vertices, 2), or empty
+  std::vector<VertexColor> colors;        ///< (vertices), or empty
   std::vector<std::uint32_t> corners;     ///< (triangles, 3)
+  MeshRepairs repairs{};
 
   std::size_t count() const { return positions.size() / 3; }
   int num_uv_sets() const { return uvs[0].empty() ? 0 : uvs[1].empty() ? 1 : 2; }
 };
 
-/// Reads a primitive with a surface. place: of the primitive in the file's JSON, which errors name:
-/// accessors that do not fit, indices out of range, coordinates that are not finite.
+/// Reads a primitive with a surface. Of normals and tangents those that are no directions are made
+/// anew: from the triangles around, from the coordinates of the normal map. place: of the primitive
+/// in the file's JSON, which errors name: accessors that do not fit, indices out of range,
+/// coordinates that are not finite.
 Result<Vertices> read_vertices(const Document& document, const Primitive& primitive,
                                const std::string& place);
 /// Values of an accessor that must have one element of `width` numbers for each of `count`
@@ -32,10 +36,9 @@ Result<std::vector<float>> read_attribute(const Document& document, int accessor
                                           std::size_t count, const std::string& place,
                                           const std::string& name);
 
-/// Normals that are no directions are as good as none.
-bool has_usable_normals(const Vertices& v);
-/// Tangents count where normals do, as they lie at a right angle to them.
-bool has_usable_tangents(const Vertices& v);
+/// Whether a primitive makes triangles; reads no more than it must. deforms: those with area in
+/// some frame count. What cannot be read is a fault of read_vertices.
+bool has_triangles(const Document& document, const Primitive& primitive, bool deforms);
 /// Whether the file gives the primitive a normal map: other tangents would only part its vertices.
 bool is_bumpy(const Document& document, const Primitive& primitive);
 /// Whether it has triangles.

@@ -64,13 +64,19 @@ MapReport report_map(const std::string& path, const RgbImage& image, float scale
           .repaired_texels = texels.repaired,
           .black = !(texels.mean * double{scale} > 0),
           .brightest = texels.brightest,
-          .mean = static_cast<float>(texels.mean)};
+          .mean = static_cast<float>(texels.mean),
+          .colors = {},
+          .notes = image.notes};
 }
 
 std::vector<std::string> texel_warnings(const MapReport& map) {
-  if (map.repaired_texels == 0) return {};
-  return {fmt::format("{}: {} texels are negative, NaN or infinite and count as 0", map.path,
-                      map.repaired_texels)};
+  std::vector<std::string> warnings;
+  for (const std::string& note : map.notes)
+    warnings.push_back(fmt::format("{}: {}", map.path, note));
+  if (map.repaired_texels > 0)
+    warnings.push_back(fmt::format("{}: {} texels are negative, NaN or infinite and count as 0",
+                                   map.path, map.repaired_texels));
+  return warnings;
 }
 
 std::vector<std::string> light_warnings(const MapReport& map) {

@@ -24,6 +24,7 @@ struct MapReport {
   float mean = 0;
   /// What was converted (conversion_text); empty: nothing, or not asked.
   std::string colors{};
+  std::vector<std::string> notes{};  ///< RgbImage::notes
 };
 
 /// image: what was read of the file. scale, max_width: of the environment.

@@ -84,6 +84,8 @@ Result<std::shared_ptr<const SurfaceDetail>> DetailLoader::load(const MaterialSp
   for (const auto& [image, texture, use] : images)
     BATON_TRY(place(texture, use, detail->images[static_cast<std::size_t>(image)]));
   detail->alike = groups_of(*detail);
+  detail->notes.assign(notes_.begin(), notes_.end());
+  notes_.clear();
   return std::shared_ptr<const SurfaceDetail>(std::move(detail));
 }
 
@@ -135,6 +137,8 @@ Result<std::shared_ptr<const TextureTiles>> DetailLoader::tiles_of(const Texture
 Result<DetailLoader::TexturePtr> DetailLoader::load_texture(const TextureSpec& spec,
                                                             TextureUse use) {
   BATON_ASSIGN(Image image, read(spec));
+  for (const std::string& note : image.notes)
+    notes_.insert(fmt::format("{}: {}", name_of(spec), note));
   BATON_TRY(settle_colors(image, use, name_of(spec)));
   BATON_ASSIGN(TexturePtr texture, Texture::build(image, use, name_of(spec)));
   size_bytes_ += texture->size_bytes();

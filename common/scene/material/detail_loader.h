@@ -37,6 +37,7 @@ class DetailLoader {
   std::set<std::string> listed_;
   std::map<std::tuple<std::string, int, TextureUse>, Result<TexturePtr>> textures_;
   std::uint64_t size_bytes_ = 0;
+  std::set<std::string> notes_;  ///< of images of the material that is loaded
 };
 
 /// A set of texture coordinates that a texture of the material needs and the mesh does not have;

@@ -3,6 +3,7 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <string>
 #include <vector>
 
 #include "common/job/job_spec.h"
@@ -58,6 +59,7 @@ struct SurfaceDetail {
   std::array<PlacedTexture, kNumDetailImages> images{};
   /// Those of them that a look is for, in groups that lie alike on a surface.
   std::vector<std::vector<DetailImage>> alike{};
+  std::vector<std::string> notes{};  ///< of its images' files, each with the name of the file
 
   const PlacedTexture& operator[](DetailImage image) const {
     return images[static_cast<std::size_t>(image)];

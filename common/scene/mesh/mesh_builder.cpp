@@ -3,7 +3,6 @@
 #include <algorithm>
 #include <bit>
 #include <cmath>
-#include <span>
 
 namespace baton {
 namespace {
@@ -40,7 +39,8 @@ bool has_area(const Vec3& a, const Vec3& b, const Vec3& c) {
 
 void MeshBuilder::add(const std::array<std::uint32_t, 3>& vertices,
                       const std::array<Vec3, 3>& corners, const std::array<Vec3, 3>& normals,
-                      const std::array<UvSets, 3>& uvs, const std::array<Tangent, 3>& tangents) {
+                      const std::array<UvSets, 3>& uvs, const std::array<Tangent, 3>& tangents,
+                      const std::array<VertexColor, 3>& colors) {
   if (!has_area(corners[0], corners[1], corners[2])) {
     ++mesh_.dropped_triangles;
     return;
@@ -49,43 +49,46 @@ void MeshBuilder::add(const std::array<std::uint32_t, 3>& vertices,
   for (std::size_t k = 0; k < 3; ++k) {
     std::uint32_t& known = of_part_[vertices[k]];
     if (known == 0)
-      known = vertex(corners[k], parts_.normals ? normals[k] : Vec3{}, uvs[k], tangents[k]) + 1;
+      known = vertex({corners[k], parts_.normals ? normals[k] : Vec3{}, uvs[k], tangents[k],
+                      colors[k]}) +
+              1;
     triangle[k] = known - 1;
   }
   mesh_.triangles.push_back(triangle);
 }
 
-MeshBuilder::VertexKey MeshBuilder::key_of(const Vec3& position, const Vec3& normal,
-                                           const UvSets& uvs, const Tangent& tangent) const {
-  VertexKey key{bits(position.x), bits(position.y), bits(position.z)};
+MeshBuilder::VertexKey MeshBuilder::key_of(const Vertex& v) const {
+  VertexKey key{bits(v.position.x), bits(v.position.y), bits(v.position.z)};
   if (parts_.normals) {
-    key[3] = bits(normal.x);
-    key[4] = bits(normal.y);
-    key[5] = bits(normal.z);
+    key[3] = bits(v.normal.x);
+    key[4] = bits(v.normal.y);
+    key[5] = bits(v.normal.z);
   }
   for (std::size_t i = 0; i < 2 * static_cast<std::size_t>(parts_.uv_sets); ++i)
-    key[6 + i] = bits(uvs[i / 2][i % 2]);
+    key[6 + i] = bits(v.uvs[i / 2][i % 2]);
   if (parts_.tangents) {
-    const Vec3& t = tangent.direction;
+    const Vec3& t = v.tangent.direction;
     key[10] = bits(t.x);
     key[11] = bits(t.y);
     key[12] = bits(t.z);
-    key[13] = bits(tangent.side);
+    key[13] = bits(v.tangent.side);
   }
+  for (std::size_t i = 0; parts_.colors && i < 4; ++i) key[14 + i] = bits(v.color[i]);
   return key;
 }
 
 MeshBuilder::VertexKey MeshBuilder::key_of(std::uint32_t vertex) const {
-  UvSets uvs{};
+  Vertex v{mesh_.positions[vertex], parts_.normals ? mesh_.normals[vertex] : Vec3{}};
   for (std::size_t set = 0; set < static_cast<std::size_t>(parts_.uv_sets); ++set)
-    uvs[set] = mesh_.uvs[set][vertex];
-  return key_of(mesh_.positions[vertex], parts_.normals ? mesh_.normals[vertex] : Vec3{}, uvs,
-                parts_.tangents ? mesh_.tangents[vertex] : Tangent{});
+    v.uvs[set] = mesh_.uvs[set][vertex];
+  if (parts_.tangents) v.tangent = mesh_.tangents[vertex];
+  if (parts_.colors) v.color = mesh_.colors[vertex];
+  return key_of(v);
 }
 
 /// Where the vertex is, or would be put.
 std::size_t MeshBuilder::find_slot(const VertexKey& key) const {
-  const bool is_plain = parts_.uv_sets == 0 && !parts_.tangents;
+  const bool is_plain = parts_.uv_sets == 0 && !parts_.tangents && !parts_.colors;
   const std::size_t count = !is_plain ? key.size() : parts_.normals ? 6 : 3;
   std::uint64_t hash = 0;
   for (const std::uint32_t word : std::span(key).first(count)) {
@@ -106,26 +109,46 @@ void MeshBuilder::begin_part(std::size_t num_vertices) {
   for (std::uint32_t v = 0; v < mesh_.positions.size(); ++v) slots_[find_slot(key_of(v))] = v + 1;
 }
 
-std::uint32_t MeshBuilder::vertex(const Vec3& position, const Vec3& normal, const UvSets& uvs,
-                                  const Tangent& tangent) {
+std::uint32_t MeshBuilder::vertex(const Vertex& v) {
   const auto sets = static_cast<std::size_t>(parts_.uv_sets);
-  const std::size_t slot = find_slot(key_of(position, normal, uvs, tangent));
+  const std::size_t slot = find_slot(key_of(v));
   if (slots_[slot] == 0) {
-    mesh_.positions.push_back(position);
-    if (parts_.normals) mesh_.normals.push_back(normal);
-    for (std::size_t set = 0; set < sets; ++set) mesh_.uvs[set].push_back(uvs[set]);
-    if (parts_.tangents) mesh_.tangents.push_back(tangent);
+    mesh_.positions.push_back(v.position);
+    if (parts_.normals) mesh_.normals.push_back(v.normal);
+    for (std::size_t set = 0; set < sets; ++set) mesh_.uvs[set].push_back(v.uvs[set]);
+    if (parts_.tangents) mesh_.tangents.push_back(v.tangent);
+    if (parts_.colors) mesh_.colors.push_back(v.color);
     slots_[slot] = static_cast<std::uint32_t>(mesh_.positions.size());
   }
   return slots_[slot] - 1;
 }
 
-std::vector<Vec3> smooth_vertex_normals(const TriangleMesh& mesh) {
+TriangleMesh MeshBuilder::take() {
+  const auto is_missing = [](const Vec3& normal) { return normal == Vec3{}; };
+  mesh_.repairs.normals =
+      static_cast<std::uint64_t>(std::ranges::count_if(mesh_.normals, is_missing));
+  if (mesh_.repairs.normals > 0) {
+    const std::vector<Vec3> made = smooth_vertex_normals(mesh_.positions, mesh_.triangles);
+    for (std::size_t i = 0; i < made.size(); ++i) {
+      if (is_missing(mesh_.normals[i])) mesh_.normals[i] = made[i];
+    }
+  }
+  return std::move(mesh_);
+}
+
+bool is_direction(const Vec3& v) {
+  const float norm = length(v);
+  return norm > 0 && std::isfinite(norm);
+}
+
+std::vector<Vec3> smooth_vertex_normals(std::span<const Vec3> positions,
+                                        std::span<const std::array<std::uint32_t, 3>> triangles) {
   // Sum the face normals at each vertex, weighted by the corner's angle.
-  std::vector<Vec3> sum(mesh.positions.size());
-  std::vector<Vec3> of_one_face(mesh.positions.size());
-  for (const auto& [a, b, c] : mesh.triangles) {
-    const Vec3 &at_a = mesh.positions[a], &at_b = mesh.positions[b], &at_c = mesh.positions[c];
+  std::vector<Vec3> sum(positions.size());
+  std::vector<Vec3> of_one_face(positions.size());
+  for (const auto& [a, b, c] : triangles) {
+    const Vec3 &at_a = positions[a], &at_b = positions[b], &at_c = positions[c];
+    if (!has_area(at_a, at_b, at_c)) continue;
     // There and back: exactly as if each were normalized.
     const Vec3 a_to_b = normalize(at_b - at_a), b_to_a = Vec3{} - a_to_b;
     const Vec3 b_to_c = normalize(at_c - at_b), c_to_b = Vec3{} - b_to_c;

@@ -1,107 +1,190 @@
-#include <assimp/postprocess.h>
-#include <assimp/scene.h>
-
-#include <algorithm>
-#include <assimp/Importer.hpp>
+#include <charconv>
 #include <cmath>
-#include <mutex>
+#include <cstdint>
 #include <optional>
-#include <span>
+#include <string>
+#include <string_view>
+#include <vector>
 
-#include "common/scene/mesh/mesh_builder.h"
 #include "common/scene/mesh/mesh_readers.h"
+#include "common/scene/mesh/polygons.h"
 
 namespace baton {
 namespace {
 
-/// One thread of the process is in assimp at a time: its file systems and loaders share what
-/// nothing guards.
-std::mutex& assimp_mutex() {
-  static std::mutex mutex;
-  return mutex;
-}
+constexpr bool is_blank(char c) { return c == ' ' || c == '\t' || c == '\r'; }
 
-bool finite(const aiVector3D& v) {
-  return std::isfinite(v.x) && std::isfinite(v.y) && std::isfinite(v.z);
-}
+/// The words of a line.
+class Words {
+ public:
+  explicit Words(std::string_view line) : line_(line) {}
 
-/// Looks at every coordinate and index before anything follows them.
-std::optional<std::string> find_fault(const aiMesh& part, bool with_uvs) {
-  for (unsigned i = 0; i < part.mNumVertices; ++i) {
-    if (!finite(part.mVertices[i])) {
-      return "vertex " + std::to_string(i) + " has a coordinate that is not finite";
-    }
-    if (with_uvs && part.HasTextureCoords(0) && !finite(part.mTextureCoords[0][i]))
-      return "vertex " + std::to_string(i) + " has texture coordinates that are not finite";
+  /// Empty at the end.
+  std::string_view next() {
+    while (!line_.empty() && is_blank(line_.front())) line_.remove_prefix(1);
+    std::size_t end = 0;
+    while (end < line_.size() && !is_blank(line_[end])) ++end;
+    const std::string_view word = line_.substr(0, end);
+    line_.remove_prefix(end);
+    return word;
   }
-  for (unsigned f = 0; f < part.mNumFaces; ++f) {
-    for (unsigned k = 0; k < part.mFaces[f].mNumIndices; ++k) {
-      if (const unsigned index = part.mFaces[f].mIndices[k]; index >= part.mNumVertices) {
-        return "face " + std::to_string(f) + ": expected a vertex index below " +
-               std::to_string(part.mNumVertices) + ", found " + std::to_string(index);
+
+ private:
+  std::string_view line_;
+};
+
+template <class T>
+std::optional<T> number(std::string_view word) {
+  if (word.starts_with('+')) word.remove_prefix(1);
+  T value{};
+  const auto [end, error] = std::from_chars(word.data(), word.data() + word.size(), value);
+  if (error != std::errc() || end != word.data() + word.size()) return std::nullopt;
+  return value;
+}
+
+/// Reads one file.
+class ObjReader {
+ public:
+  ObjReader(std::string_view text, const std::string& name) : text_(text), name_(name) {}
+
+  Result<Polygons> read() {
+    std::string joined;
+    while (!text_.empty()) {
+      std::string_view line = take_line();
+      // A line goes on behind a backslash.
+      joined.clear();
+      while (line.ends_with('\\') && !text_.empty()) {
+        joined += line.substr(0, line.size() - 1);
+        joined += ' ';
+        line = take_line();
       }
+      if (!joined.empty()) line = joined += line;
+      BATON_TRY(read_line(line.substr(0, line.find('#'))));
     }
+    if (polygons_.positions.empty()) return fail("not a mesh: no vertices (lines \"v x y z\")");
+    if (!any_normal_) polygons_.corner_normals.clear();
+    if (!any_uv_) polygons_.corner_uvs.clear();
+    if (!any_normal_) polygons_.normals.clear();
+    if (!any_uv_) polygons_.uvs.clear();
+    return std::move(polygons_);
   }
-  return std::nullopt;
-}
 
-/// True when every vertex of a part comes with a usable normal.
-bool has_normals(const aiMesh* part) {
-  const auto usable = [](const aiVector3D& n) { return finite(n) && n.SquareLength() > 0; };
-  return part->HasNormals() &&
-         std::all_of(part->mNormals, part->mNormals + part->mNumVertices, usable);
-}
+ private:
+  std::string_view take_line() {
+    const std::size_t end = std::min(text_.find('\n'), text_.size());
+    std::string_view line = text_.substr(0, end);
+    text_.remove_prefix(std::min(end + 1, text_.size()));
+    if (line.ends_with('\r')) line.remove_suffix(1);
+    ++line_number_;
+    return line;
+  }
+  Error fail(const std::string& what) const { return {ErrorKind::bad_input, name_ + ": " + what}; }
+  Error bad_line(const std::string& what) const {
+    return fail("not a mesh: line " + std::to_string(line_number_) + ": " + what);
+  }
 
-void add_part(const aiMesh& part, const MeshParts& parts, MeshBuilder& builder) {
-  builder.begin_part(part.mNumVertices);
-  for (const aiFace& face : std::span(part.mFaces, part.mNumFaces)) {
-    if (face.mNumIndices != 3) continue;  // points and lines
-    const std::array<std::uint32_t, 3> vertices{face.mIndices[0], face.mIndices[1],
-                                                face.mIndices[2]};
-    std::array<Vec3, 3> corners, normals;
-    std::array<UvSets, 3> uvs{};
-    for (std::size_t k = 0; k < 3; ++k) {
-      const std::uint32_t index = vertices[k];
-      const aiVector3D& p = part.mVertices[index];
-      corners[k] = {p.x, p.y, p.z};
-      // In these files v grows upward.
-      if (parts.uv_sets > 0)
-        uvs[k][0] = {part.mTextureCoords[0][index].x, 1 - part.mTextureCoords[0][index].y};
-      if (!parts.normals) continue;
-      const aiVector3D& n = part.mNormals[index];
-      normals[k] = normalize({n.x, n.y, n.z});
+  Status read_line(std::string_view line) {
+    Words words(line);
+    const std::string_view keyword = words.next();
+    if (keyword == "v") return read_vertex(words);
+    if (keyword == "vn") return read_normal(words);
+    if (keyword == "vt") return read_uv(words);
+    if (keyword == "f" || keyword == "fo") return read_face(words);
+    if (keyword == "l" || keyword == "p") ++polygons_.lines;
+    // Groups, materials and surfaces of formulas say nothing of triangles.
+    return {};
+  }
+
+  template <std::size_t N>
+  std::optional<std::array<double, N>> numbers(Words& words, std::size_t least) const {
+    std::array<double, N> values{};
+    for (std::size_t i = 0; i < N; ++i) {
+      const std::string_view word = words.next();
+      if (word.empty() && i >= least) break;
+      const auto value = number<double>(word);
+      if (!value) return std::nullopt;
+      values[i] = *value;
     }
-    builder.add(vertices, corners, normals, uvs);
+    return values;
   }
-}
+
+  Status read_vertex(Words& words) {
+    const auto p = numbers<3>(words, 3);
+    if (!p) return bad_line("expected three coordinates of a vertex");
+    for (const double c : *p)
+      if (!std::isfinite(static_cast<float>(c)))
+        return bad_line("a vertex has a coordinate that is not finite");
+    polygons_.positions.push_back(*p);
+    return {};
+  }
+  Status read_normal(Words& words) {
+    const auto n = numbers<3>(words, 3);
+    if (!n) return bad_line("expected three numbers of a normal");
+    polygons_.normals.push_back(
+        {static_cast<float>((*n)[0]), static_cast<float>((*n)[1]), static_cast<float>((*n)[2])});
+    return {};
+  }
+  Status read_uv(Words& words) {
+    const auto uv = numbers<2>(words, 1);
+    if (!uv || !std::isfinite((*uv)[0]) || !std::isfinite((*uv)[1]))
+      return bad_line("expected two finite texture coordinates");
+    // In these files v grows upward.
+    polygons_.uvs.push_back({static_cast<float>((*uv)[0]), 1 - static_cast<float>((*uv)[1])});
+    return {};
+  }
+
+  /// Corners are "position/uv/normal", counted from 1, or back from the end.
+  Status read_face(Words& words) {
+    std::uint32_t size = 0;
+    for (std::string_view word = words.next(); !word.empty(); word = words.next()) {
+      std::array<std::string_view, 3> parts{};
+      for (std::size_t k = 0; k < 3; ++k) {
+        const std::size_t end = std::min(word.find('/'), word.size());
+        parts[k] = word.substr(0, end);
+        word.remove_prefix(std::min(end + 1, word.size()));
+      }
+      const auto position = index(parts[0], polygons_.positions.size());
+      const auto uv = index(parts[1], polygons_.uvs.size());
+      const auto normal = index(parts[2], polygons_.normals.size());
+      if (!position || *position == Polygons::kNone || !uv || !normal)
+        return bad_line("expected corners of vertices 1 to " +
+                        std::to_string(polygons_.positions.size()) + " that are there");
+      polygons_.corners.push_back(*position);
+      polygons_.corner_uvs.push_back(*uv);
+      polygons_.corner_normals.push_back(*normal);
+      any_uv_ = any_uv_ || *uv != Polygons::kNone;
+      any_normal_ = any_normal_ || *normal != Polygons::kNone;
+      ++size;
+    }
+    polygons_.sizes.push_back(size);
+    polygons_.lines += size < 3 ? 1 : 0;
+    return {};
+  }
+
+  /// A place in a list; kNone where nothing stands or 0; nullopt: not there.
+  static std::optional<std::uint32_t> index(std::string_view word, std::size_t count) {
+    if (word.empty()) return Polygons::kNone;
+    const auto given = number<std::int64_t>(word);
+    if (!given) return std::nullopt;
+    if (*given == 0) return Polygons::kNone;
+    const std::int64_t at = *given > 0 ? *given - 1 : static_cast<std::int64_t>(count) + *given;
+    if (at < 0 || at >= static_cast<std::int64_t>(count)) return std::nullopt;
+    return static_cast<std::uint32_t>(at);
+  }
+
+  std::string_view text_;
+  const std::string& name_;
+  int line_number_ = 0;
+  Polygons polygons_;
+  bool any_normal_ = false, any_uv_ = false;
+};
 
 }  // namespace
 
-Result<TriangleMesh> read_obj(const std::string& path, bool with_normals, bool with_uvs) {
-  const auto fail = [&](const std::string& what) {
-    return Error{ErrorKind::bad_input, path + ": " + what};
-  };
-  std::unique_lock lock(assimp_mutex());
-  Assimp::Importer importer;
-  const aiScene* file = importer.ReadFile(path, 0);
-  if (file == nullptr || file->mRootNode == nullptr)
-    return fail(std::string("not a mesh: ") + importer.GetErrorString());
-  if (file->mNumMeshes == 0) return fail("not a mesh: nothing found in it");
-  for (const aiMesh* const part : std::span(file->mMeshes, file->mNumMeshes)) {
-    if (const auto fault = find_fault(*part, with_uvs)) return fail(*fault);
-  }
-  file = importer.ApplyPostProcessing(aiProcess_Triangulate);
-  if (file == nullptr || file->mRootNode == nullptr)
-    return fail(std::string("not a mesh: ") + importer.GetErrorString());
-  lock.unlock();
-
-  const std::span read(file->mMeshes, file->mNumMeshes);
-  const auto has_uvs = [](const aiMesh* part) { return part->HasTextureCoords(0); };
-  const MeshParts parts{.normals = with_normals && std::ranges::all_of(read, has_normals),
-                        .uv_sets = with_uvs && std::ranges::all_of(read, has_uvs) ? 1 : 0};
-  MeshBuilder builder(parts);
-  for (const aiMesh* const part : read) add_part(*part, parts, builder);
-  return builder.take();
+Result<TriangleMesh> parse_obj(std::string_view text, const std::string& name, bool with_normals,
+                               bool with_uvs) {
+  BATON_ASSIGN(const Polygons polygons, ObjReader(text, name).read());
+  return mesh_of(polygons, with_normals, with_uvs);
 }
 
 }  // namespace baton

@@ -4,8 +4,8 @@
 #include <optional>
 #include <system_error>
 
-#include "common/scene/mesh/mesh_builder.h"
 #include "common/scene/mesh/mesh_readers.h"
+#include "common/scene/mesh/polygons.h"
 
 namespace baton {
 namespace {
@@ -65,15 +65,16 @@ Error off_error(const std::string& name, WordReader& reader, const std::string& 
   return {ErrorKind::bad_input, place + what + (reader.at_end() ? ", but the file ends here" : "")};
 }
 
-Result<std::vector<Vec3>> read_vertices(WordReader& reader, std::uint32_t count,
-                                        const std::string& name) {
-  std::vector<Vec3> vertices;
+Result<std::vector<Position>> read_vertices(WordReader& reader, std::uint32_t count,
+                                            const std::string& name) {
+  std::vector<Position> vertices;
   vertices.reserve(count);
   for (std::uint32_t i = 0; i < count; ++i) {
-    const auto x = reader.number<float>();
-    const auto y = x ? reader.number<float>() : std::nullopt;
-    const auto z = y ? reader.number<float>() : std::nullopt;
-    if (!z || !std::isfinite(*x) || !std::isfinite(*y) || !std::isfinite(*z)) {
+    const auto x = reader.number<double>();
+    const auto y = x ? reader.number<double>() : std::nullopt;
+    const auto z = y ? reader.number<double>() : std::nullopt;
+    const auto finite = [](double v) { return std::isfinite(static_cast<float>(v)); };
+    if (!z || !finite(*x) || !finite(*y) || !finite(*z)) {
       return off_error(name, reader,
                        "expected three finite coordinates of vertex " + std::to_string(i));
     }
@@ -83,26 +84,24 @@ Result<std::vector<Vec3>> read_vertices(WordReader& reader, std::uint32_t count,
   return vertices;
 }
 
-/// Reads one face and adds it as a fan around its first corner.
-Status read_face(WordReader& reader, std::uint32_t face, const std::vector<Vec3>& vertices,
-                 MeshBuilder& builder, const std::string& name) {
+Status read_face(WordReader& reader, std::uint32_t face, const std::string& name,
+                 Polygons& polygons) {
   const auto corners = reader.number<std::uint32_t>();
   if (!corners)
     return off_error(name, reader,
                      "expected the number of corners of face " + std::to_string(face));
-  std::array<std::uint32_t, 3> fan{};
   for (std::uint32_t k = 0; k < *corners; ++k) {
     const auto index = reader.number<std::uint32_t>();
-    if (!index || *index >= vertices.size()) {
+    if (!index || *index >= polygons.positions.size()) {
       return off_error(name, reader,
-                       "expected a vertex index below " + std::to_string(vertices.size()) +
-                           " in face " + std::to_string(face));
+                       "expected a vertex index below " +
+                           std::to_string(polygons.positions.size()) + " in face " +
+                           std::to_string(face));
     }
-    fan[k < 2 ? k : 2] = *index;
-    if (k < 2) continue;
-    builder.add(fan, {vertices[fan[0]], vertices[fan[1]], vertices[fan[2]]});
-    fan[1] = fan[2];
+    polygons.corners.push_back(*index);
   }
+  polygons.sizes.push_back(*corners);
+  polygons.lines += *corners < 3 ? 1 : 0;
   reader.skip_line();
   return {};
 }
@@ -128,13 +127,11 @@ Result<TriangleMesh> parse_off(std::string_view text, const std::string& name) {
   }
   reader.skip_line();
 
-  BATON_ASSIGN(const std::vector<Vec3> vertices, read_vertices(reader, *num_vertices, name));
-  MeshBuilder builder(MeshParts{});
-  builder.begin_part(vertices.size());
-  for (std::uint32_t face = 0; face < *num_faces; ++face) {
-    BATON_TRY(read_face(reader, face, vertices, builder, name));
-  }
-  return builder.take();
+  Polygons polygons;
+  BATON_ASSIGN(polygons.positions, read_vertices(reader, *num_vertices, name));
+  for (std::uint32_t face = 0; face < *num_faces; ++face)
+    BATON_TRY(read_face(reader, face, name, polygons));
+  return mesh_of(polygons, false, false);
 }
 
 }  // namespace baton

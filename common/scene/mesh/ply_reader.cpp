@@ -9,8 +9,8 @@
 #include <utility>
 #include <vector>
 
-#include "common/scene/mesh/mesh_builder.h"
 #include "common/scene/mesh/mesh_readers.h"
+#include "common/scene/mesh/polygons.h"
 
 namespace baton {
 namespace {
@@ -19,7 +19,21 @@ enum class Scalar : std::uint8_t { int8, uint8, int16, uint16, int32, uint32, fl
 enum class Format : std::uint8_t { text, little_endian, big_endian };
 
 /// What a property says of the mesh.
-enum class Role : std::uint8_t { nothing, x, y, z, nx, ny, nz, corners };
+enum class Role : std::uint8_t {
+  nothing,
+  x,
+  y,
+  z,
+  nx,
+  ny,
+  nz,
+  red,
+  green,
+  blue,
+  alpha,
+  corners,
+  strips
+};
 
 struct Property {
   std::string name;
@@ -81,16 +95,22 @@ std::optional<Property> parse_property(std::istringstream& words) {
 
 Role role_of(const std::string& element, const Property& property) {
   using Named = std::pair<std::string_view, Role>;
-  static constexpr std::array<Named, 6> kOfVertex{{{"x", Role::x},
-                                                   {"y", Role::y},
-                                                   {"z", Role::z},
-                                                   {"nx", Role::nx},
-                                                   {"ny", Role::ny},
-                                                   {"nz", Role::nz}}};
+  static constexpr std::array<Named, 10> kOfVertex{{{"x", Role::x},
+                                                    {"y", Role::y},
+                                                    {"z", Role::z},
+                                                    {"nx", Role::nx},
+                                                    {"ny", Role::ny},
+                                                    {"nz", Role::nz},
+                                                    {"red", Role::red},
+                                                    {"green", Role::green},
+                                                    {"blue", Role::blue},
+                                                    {"alpha", Role::alpha}}};
   const std::string& name = property.name;
   if (property.count_type) {
-    const bool corners = element == "face" && (name == "vertex_indices" || name == "vertex_index");
-    return corners ? Role::corners : Role::nothing;
+    if (name != "vertex_indices" && name != "vertex_index") return Role::nothing;
+    return element == "face"        ? Role::corners
+           : element == "tristrips" ? Role::strips
+                                    : Role::nothing;
   }
   if (element != "vertex") return Role::nothing;
   const auto* const found = std::ranges::find(kOfVertex, name, &Named::first);
@@ -195,75 +215,141 @@ class ValueReader {
   std::size_t at_ = 0;
 };
 
-/// Reads the elements of one file into a mesh.
+/// What an integer of a type stands for at most; 0: it is no integer.
+double full_scale(Scalar type) {
+  constexpr std::array<double, 8> kMost{127, 255, 32767, 65535, 2147483647.0, 4294967295.0, 0, 0};
+  return kMost.at(static_cast<std::size_t>(type));
+}
+
+/// IEC 61966-2-1; alpha is a number.
+float channel_of(double value, Scalar type, bool is_alpha) {
+  const double most = full_scale(type);
+  const double v = std::clamp(most > 0 ? value / most : value, 0.0, 1.0);
+  if (most == 0 || is_alpha) return static_cast<float>(v);
+  return static_cast<float>(v <= 0.04045 ? v / 12.92 : std::pow((v + 0.055) / 1.055, 2.4));
+}
+
+/// Reads the elements of one file into polygons.
 class PlyReader {
  public:
   PlyReader(std::string_view body, const Header& header, const std::string& name, bool with_normals)
-      : header_(header), name_(name), values_(body, header.format), with_normals_(with_normals) {}
+      : header_(header), name_(name), values_(body, header.format), with_normals_(with_normals) {
+    bool has_blue = false, has_normal = false;
+    for (const Element& element : header.elements) {
+      for (const Property& property : element.properties) {
+        has_blue = has_blue || property.role == Role::blue;
+        has_normal = has_normal || property.role == Role::nz;
+      }
+    }
+    with_colors_ = has_blue;
+    with_normals_ = with_normals && has_normal;
+  }
 
   Result<TriangleMesh> read() {
     for (const Element& element : header_.elements) {
       for (std::uint64_t i = 0; i < element.count; ++i) BATON_TRY(read_record(element, i));
     }
-    MeshBuilder builder({.normals = with_normals_});
-    builder.begin_part(positions_.size());
-    for (const auto& t : triangles_) {
-      builder.add(t, {positions_[t[0]], positions_[t[1]], positions_[t[2]]},
-                  {normals_[t[0]], normals_[t[1]], normals_[t[2]]});
-    }
-    return builder.take();
+    BATON_TRY(check_corners());
+    return mesh_of(polygons_, with_normals_, false);
   }
 
  private:
-  Error error_at(const Element& element, std::uint64_t index, const std::string& what) const {
+  Error error_at(const std::string& element, std::uint64_t index, const std::string& what) const {
     return {ErrorKind::bad_input,
-            name_ + ": " + element.name + " " + std::to_string(index) + ": " + what};
+            name_ + ": " + element + " " + std::to_string(index) + ": " + what};
   }
 
   Status read_record(const Element& element, std::uint64_t index) {
-    Vec3 position, normal;
-    const std::array<float*, 7> targets{nullptr,   &position.x, &position.y, &position.z,
-                                        &normal.x, &normal.y,   &normal.z};
+    std::array<double, 12> values{};  // by role
+    values[static_cast<std::size_t>(Role::alpha)] = 1;
+    VertexColor color{1, 1, 1, 1};
     for (const Property& property : element.properties) {
       const std::optional<double> value = values_.next(property.count_type.value_or(property.type));
-      if (!value) return error_at(element, index, "expected a number of property " + property.name);
+      if (!value)
+        return error_at(element.name, index, "expected a number of property " + property.name);
       if (property.count_type) {
         BATON_TRY(read_list(element, index, property, *value));
-      } else if (property.role != Role::nothing) {
-        *targets[static_cast<std::size_t>(property.role)] = static_cast<float>(*value);
+      } else if (property.role >= Role::red && property.role <= Role::alpha) {
+        const auto channel =
+            static_cast<std::size_t>(property.role) - static_cast<std::size_t>(Role::red);
+        color[channel] = channel_of(*value, property.type, property.role == Role::alpha);
+      } else {
+        values[static_cast<std::size_t>(property.role)] = *value;
       }
     }
 
-    // A file with one unusable normal has none.
     if (!element.is_vertex) return {};
-    if (!std::isfinite(position.x) || !std::isfinite(position.y) || !std::isfinite(position.z)) {
-      return error_at(element, index, "expected finite coordinates");
+    for (std::size_t c = 1; c <= 3; ++c) {
+      if (!std::isfinite(static_cast<float>(values[c])))
+        return error_at(element.name, index, "expected finite coordinates");
     }
-    const float norm = length(normal);
-    with_normals_ = with_normals_ && norm > 0 && std::isfinite(norm);
-    positions_.push_back(position);
-    normals_.push_back(normalize(normal));
+    polygons_.positions.push_back({values[1], values[2], values[3]});
+    if (with_normals_)
+      polygons_.normals.push_back({static_cast<float>(values[4]), static_cast<float>(values[5]),
+                                   static_cast<float>(values[6])});
+    if (with_colors_) polygons_.colors.push_back(color);
     return {};
   }
 
-  /// Reads `count` entries; those of a face's corners become triangles around its first.
+  /// Reads `count` entries; those of a face's corners and of strips become faces.
   Status read_list(const Element& element, std::uint64_t index, const Property& property,
                    double count) {
     if (!(count >= 0 && count <= 0xFFFFFFFFu))
-      return error_at(element, index, "expected the length of a list");
-    std::array<std::uint32_t, 3> fan{};
+      return error_at(element.name, index, "expected the length of a list");
+    strip_.clear();
+    std::uint32_t size = 0;
     for (double k = 0; k < count; ++k) {
       const std::optional<double> value = values_.next(property.type);
-      if (!value) return error_at(element, index, "expected a number of property " + property.name);
-      if (property.role != Role::corners) continue;
-      if (!(*value >= 0 && *value < static_cast<double>(positions_.size()))) {
-        return error_at(element, index,
-                        "expected a vertex index below " + std::to_string(positions_.size()));
+      if (!value)
+        return error_at(element.name, index, "expected a number of property " + property.name);
+      if (property.role == Role::nothing) continue;
+      // A strip ends at -1, and the next one begins.
+      if (property.role == Role::strips && *value == -1) {
+        strip_.clear();
+        continue;
       }
-      fan[k < 2 ? static_cast<std::size_t>(k) : 2] = static_cast<std::uint32_t>(*value);
-      if (k < 2) continue;
-      triangles_.push_back(fan);
-      fan[1] = fan[2];
+      if (!(*value >= 0 && *value < 0xFFFFFFFFu)) return bad_corner(element.name, index);
+      const auto corner = static_cast<std::uint32_t>(*value);
+      if (property.role == Role::strips) {
+        add_to_strip(corner);
+      } else {
+        polygons_.corners.push_back(corner);
+        ++size;
+      }
+    }
+    if (property.role == Role::corners) {
+      polygons_.sizes.push_back(size);
+      polygons_.lines += size < 3 ? 1 : 0;
+    }
+    return {};
+  }
+
+  /// Every second triangle of a strip turns the other way.
+  void add_to_strip(std::uint32_t corner) {
+    strip_.push_back(corner);
+    const std::size_t n = strip_.size();
+    if (n < 3) return;
+    const bool is_odd = n % 2 == 0;
+    for (const std::uint32_t c :
+         {strip_[n - (is_odd ? 2 : 3)], strip_[n - (is_odd ? 3 : 2)], corner})
+      polygons_.corners.push_back(c);
+    polygons_.sizes.push_back(3);
+  }
+
+  Error bad_corner(const std::string& element, std::uint64_t index) const {
+    std::uint64_t vertices = 0;
+    for (const Element& e : header_.elements) vertices += e.is_vertex ? e.count : 0;
+    return error_at(element, index, "expected a vertex index below " + std::to_string(vertices));
+  }
+
+  /// Faces may come before vertices.
+  Status check_corners() const {
+    std::size_t corner = 0;
+    for (std::size_t face = 0; face < polygons_.num_faces(); ++face) {
+      for (std::uint32_t k = 0; k < polygons_.sizes[face]; ++k, ++corner) {
+        if (polygons_.corners[corner] >= polygons_.positions.size())
+          return bad_corner("face", face);
+      }
     }
     return {};
   }
@@ -271,9 +357,9 @@ class PlyReader {
   const Header& header_;
   const std::string& name_;
   ValueReader values_;
-  bool with_normals_;
-  std::vector<Vec3> positions_, normals_;
-  std::vector<std::array<std::uint32_t, 3>> triangles_;
+  bool with_normals_, with_colors_ = false;
+  Polygons polygons_;
+  std::vector<std::uint32_t> strip_;
 };
 
 }  // namespace

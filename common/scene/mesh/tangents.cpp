@@ -15,7 +15,7 @@ struct Lie {
   bool mirrored;
 };
 
-Lie lie_of(const std::vector<Vec3>& positions, const std::vector<Uv>& uvs, const Corners& t) {
+Lie lie_of(std::span<const Vec3> positions, std::span<const Uv> uvs, const Corners& t) {
   const Vec3 b = positions[t[1]] - positions[t[0]];
   const Vec3 c = positions[t[2]] - positions[t[0]];
   const float ub = uvs[t[1]][0] - uvs[t[0]][0], uc = uvs[t[2]][0] - uvs[t[0]][0];
@@ -28,7 +28,7 @@ Lie lie_of(const std::vector<Vec3>& positions, const std::vector<Uv>& uvs, const
   return {normalize(along), determinant > 0};
 }
 
-float angle_at(const std::vector<Vec3>& positions, const Corners& t, std::size_t k) {
+float angle_at(std::span<const Vec3> positions, const Corners& t, std::size_t k) {
   const Vec3 a = normalize(positions[t[(k + 1) % 3]] - positions[t[k]]);
   const Vec3 b = normalize(positions[t[(k + 2) % 3]] - positions[t[k]]);
   return std::atan2(length(cross(a, b)), dot(a, b));
@@ -52,6 +52,7 @@ void part_mirrored(TriangleMesh& mesh, std::size_t uv_set) {
         mesh.copied_vertices.push_back(vertex);
         mesh.positions.push_back(mesh.positions[vertex]);
         if (!mesh.normals.empty()) mesh.normals.push_back(mesh.normals[vertex]);
+        if (!mesh.colors.empty()) mesh.colors.push_back(mesh.colors[vertex]);
         for (std::vector<Uv>& uvs : mesh.uvs) {
           if (!uvs.empty()) uvs.push_back(uvs[vertex]);
         }
@@ -61,10 +62,10 @@ void part_mirrored(TriangleMesh& mesh, std::size_t uv_set) {
   }
 }
 
-std::vector<Tangent> tangents_of(const std::vector<Vec3>& positions,
-                                 const std::vector<Vec3>& normals,
-                                 const std::vector<Corners>& triangles,
-                                 const std::vector<Uv>& uvs) {
+}  // namespace
+
+std::vector<Tangent> tangents_of(std::span<const Vec3> positions, std::span<const Vec3> normals,
+                                 std::span<const Corners> triangles, std::span<const Uv> uvs) {
   std::vector<Vec3> sum(positions.size());
   std::vector<Tangent> tangents(positions.size());
   for (const Corners& t : triangles) {
@@ -87,8 +88,6 @@ std::vector<Tangent> tangents_of(const std::vector<Vec3>& positions,
   }
   return tangents;
 }
-
-}  // namespace
 
 void derive_tangents(TriangleMesh& mesh, std::size_t uv_set) {
   if (!mesh.tangents.empty()) return;

@@ -13,16 +13,44 @@ namespace baton {
 using Uv = std::array<float, 2>;
 using UvSets = std::array<Uv, 2>;
 
+/// What of a file is unusable, and so made anew or left out where it is; counted.
+struct MeshRepairs {
+  /// Vertices without a usable normal, which take that of the faces around.
+  std::uint64_t normals = 0;
+  /// Vertices without a usable tangent, which take that of the coordinates.
+  std::uint64_t tangents = 0;
+  /// Vertices that no joint holds, which follow the first one.
+  std::uint64_t weights = 0;
+  /// Corners without texture coordinates, which have (0, 0).
+  std::uint64_t uvs = 0;
+  /// Faces whose edges cross, or that have too many corners, cut around their first.
+  std::uint64_t crossing = 0;
+  /// Points, lines and faces of fewer than three corners, which are not shown.
+  std::uint64_t lines = 0;
+
+  bool operator==(const MeshRepairs&) const = default;
+};
+
+/// Coordinates as a file has them.
+using Position = std::array<double, 3>;
+
+/// Factor of base colour and alpha at a vertex, linear.
+using VertexColor = std::array<float, 4>;
+
 /// Triangles of one file. Degenerate triangles (zero area, equal corners) are dropped and counted;
 /// where the mesh deforms, those with equal corners alone.
 struct TriangleMesh {
-  std::vector<Vec3> positions;
-  std::vector<Vec3> normals;             ///< per vertex, unit; empty: flat shading
+  std::vector<Vec3> positions;  ///< from `origin`
+  /// Where positions count from, in the space of the file: 0, unless they are far away.
+  Position origin{};
+  std::vector<Vec3> normals{};           ///< per vertex, unit; empty: flat shading
   std::array<std::vector<Uv>, 2> uvs{};  ///< by set, per vertex, or empty
   /// Tangents per vertex, where a normal map needs them, or empty.
   std::vector<Tangent> tangents{};
+  std::vector<VertexColor> colors{};  ///< per vertex, or empty
   std::vector<std::array<std::uint32_t, 3>> triangles;
   std::uint64_t dropped_triangles = 0;
+  MeshRepairs repairs{};
   /// How the vertices move, the arrays above being those of the frame at time 0; null: not at all.
   std::shared_ptr<const Deformation> deformation{};
   /// Those of which the last vertices are copies, which it does not know (tangents.h).

@@ -2,6 +2,9 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+#include <cmath>
+
 namespace baton {
 namespace {
 
@@ -16,14 +19,26 @@ Result<std::pair<gltf::NodeMotion, int>> open_moving(const GltfMotion& given) {
   return std::pair(std::move(motion), node);
 }
 
+/// Within so many units of the origin a point one unit ahead says which way a camera looks.
+constexpr float kNearby = 64;
+
+/// How far ahead a camera looks, as far as it is from the origin: float32 leaves its direction 23
+/// bits there.
+float look_distance(const Vec3& position) {
+  const float farthest =
+      std::max({std::fabs(position.x), std::fabs(position.y), std::fabs(position.z)});
+  return farthest <= kNearby ? 1 : std::exp2(std::ceil(std::log2(farthest)));
+}
+
 /// A camera of glTF looks along -z of its node, y up.
 CameraKey camera_key(double frame, const gltf::Matrix& to_world) {
   const Transform map = gltf::to_transform(to_world);
-  return {.frame = frame,
-          .position = map.offset,
-          .look_at = map.offset + normalize(map.linear * Vec3{0, 0, -1}),
-          .up = normalize(map.linear * Vec3{0, 1, 0}),
-          .vertical_fov_deg = {}};
+  return {
+      .frame = frame,
+      .position = map.offset,
+      .look_at = map.offset + normalize(map.linear * Vec3{0, 0, -1}) * look_distance(map.offset),
+      .up = normalize(map.linear * Vec3{0, 1, 0}),
+      .vertical_fov_deg = {}};
 }
 
 }  // namespace
@@ -50,6 +65,8 @@ Status put_camera(const gltf::NodeMotion& motion, int node, const FileClock& clo
     camera.orthographic_height =
         wanted.own_orthographic_height.value_or(static_cast<float>(2 * lens.ymag));
   }
+  // A lens is sharp one unit ahead unless the job says it.
+  if (camera.aperture > 0 && camera.focus_distance == 0) camera.focus_distance = 1;
   const auto at = [&](FrameNumber frame) {
     const std::vector<gltf::Matrix> world = motion.to_world(clock.seconds_at(frame.value()));
     return camera_key(frame.value(), world[static_cast<std::size_t>(node)]);

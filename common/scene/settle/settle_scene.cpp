@@ -105,7 +105,7 @@ class SceneTaker {
     for (const FrameNumber frame : job_.frames) {
       if (!rest_.empty() && moved_.empty()) break;
       const std::vector<gltf::Matrix> world = motion_.to_world(clock().seconds_at(frame.value()));
-      for (auto& [node, matrices] : moved_) matrices.push_back(gltf::to_floats(world[node]));
+      for (auto& [node, matrices] : moved_) matrices.push_back(world[node]);
       if (rest_.empty()) rest_ = world;
     }
     return {};
@@ -169,7 +169,29 @@ class SceneTaker {
     return {};
   }
 
+  /// A part without triangles is left out, and said once.
+  bool makes_triangles(int mesh, std::size_t part, bool deforms) {
+    const auto [found, is_new] = solid_.try_emplace({mesh, part}, true);
+    if (!is_new) return found->second;
+    found->second = gltf::has_triangles(
+        file_, file_.meshes[static_cast<std::size_t>(mesh)].primitives[part], deforms);
+    if (!found->second)
+      left_out_.push_back(fmt::format("{}: {} has no triangles with area: it is not there",
+                                      file_.path, gltf::place_of(mesh, part)));
+    return found->second;
+  }
+
+  /// Once for each place that the node lists.
   Status take_node(std::size_t node, const std::string& material, bool catcher) {
+    BATON_ASSIGN(const std::vector<gltf::Matrix> places,
+                 gltf::instances_of(file_, file_.nodes[node]));
+    for (const gltf::Matrix& place : places)
+      BATON_TRY(take_node_at(node, place, material, catcher));
+    return {};
+  }
+
+  Status take_node_at(std::size_t node, const gltf::Matrix& place, const std::string& material,
+                      bool catcher) {
     ObjectSpec object;
     object.name = object_names_[node];
     object.catcher = catcher;
@@ -177,10 +199,13 @@ class SceneTaker {
     if (file_.nodes[node].skin >= 0) {
       // Its bones say where it is.
     } else if (const auto moved = moved_.find(node); moved != moved_.end()) {
-      if (std::ranges::all_of(moved->second, is_flat)) return leave_out(object.name);
-      object.keys = matrix_keys(job_.frames, moved->second);
+      std::vector<Matrix34> matrices;
+      for (const gltf::Matrix& world : moved->second)
+        matrices.push_back(gltf::to_floats(gltf::multiply(world, place)));
+      if (std::ranges::all_of(matrices, is_flat)) return leave_out(object.name);
+      object.keys = matrix_keys(job_.frames, matrices);
     } else {
-      object.matrix = gltf::to_floats(rest_[node]);
+      object.matrix = gltf::to_floats(gltf::multiply(rest_[node], place));
       if (is_flat(*object.matrix)) return leave_out(object.name);
     }
 
@@ -189,6 +214,7 @@ class SceneTaker {
         file_.meshes[static_cast<std::size_t>(mesh)].primitives;
     for (std::size_t p = 0; p < primitives.size(); ++p) {
       if (!gltf::has_surface(primitives[p])) continue;
+      if (!makes_triangles(mesh, p, shape && shape->animation)) continue;
       object.mesh = mesh_name(file_, mesh, p, shape);
       object.material = material;
       if (material.empty()) {
@@ -233,13 +259,14 @@ class SceneTaker {
   const GltfSceneSpec gltf_;
   gltf::NodeMotion motion_;
   const gltf::Document& file_;
-  const std::vector<std::string> material_names_;       ///< the default one, then material 0 ...
-  const std::vector<std::string> object_names_;         ///< by node
-  std::vector<const GltfNodeSpec*> said_;               ///< by node; null: nothing
-  std::vector<PlacedNode> places_;                      ///< that the job says
-  std::vector<gltf::Matrix> rest_;                      ///< by node, in the first frame
-  std::map<std::size_t, std::vector<Matrix34>> moved_;  ///< by node that moves, (frames)
+  const std::vector<std::string> material_names_;  ///< the default one, then material 0 ...
+  const std::vector<std::string> object_names_;    ///< by node
+  std::vector<const GltfNodeSpec*> said_;          ///< by node; null: nothing
+  std::vector<PlacedNode> places_;                 ///< that the job says
+  std::vector<gltf::Matrix> rest_;                 ///< by node, in the first frame
+  std::map<std::size_t, std::vector<gltf::Matrix>> moved_;  ///< by node that moves, (frames)
   std::set<int> used_materials_;
+  std::map<std::pair<int, std::size_t>, bool> solid_;  ///< parts of meshes that have triangles
   std::size_t num_keys_ = 0;
 };
 

@@ -6,10 +6,12 @@
 #include <cctype>
 #include <cstring>
 #include <filesystem>
+#include <fstream>
 #include <optional>
 
 #include "common/base/files.h"
 #include "common/base/limits.h"
+#include "common/image/exr_picture.h"
 #include "common/scene/texture/reader/interface.h"
 
 namespace baton {
@@ -40,11 +42,11 @@ const Result<Reader>& reader() {
 }
 
 /// What is wrong with the size of an image; empty: nothing.
-std::string fault_of(const BatonImageLayout& layout) {
+std::string fault_of(std::int32_t width, std::int32_t height) {
   const auto max = limits::kMaxTextureSide;
-  if (layout.width < 1 || layout.height < 1 || layout.width > max || layout.height > max)
-    return fmt::format("expected an image of 1 to {} pixels a side, got {} x {}", max, layout.width,
-                       layout.height);
+  if (width < 1 || height < 1 || width > max || height > max)
+    return fmt::format("expected an image of 1 to {} pixels a side, got {} x {}", max, width,
+                       height);
   return {};
 }
 
@@ -55,7 +57,7 @@ struct Taker {
 
   static float* accept(void* self, const BatonImageLayout* layout) {
     auto& taker = *static_cast<Taker*>(self);
-    taker.fault = fault_of(*layout);
+    taker.fault = fault_of(layout->width, layout->height);
     if (!taker.fault.empty()) return nullptr;
     taker.image = {.width = layout->width,
                    .height = layout->height,
@@ -64,8 +66,6 @@ struct Taker {
                    .is_integer = layout->is_integer != 0,
                    .has_alpha = layout->has_alpha != 0,
                    .is_associated = layout->is_associated != 0};
-    if (layout->has_chromaticities != 0)
-      taker.image.chromaticities = std::to_array(layout->chromaticities);
     taker.image.samples.resize(static_cast<std::size_t>(layout->width) *
                                static_cast<std::size_t>(layout->height) *
                                static_cast<std::size_t>(layout->channels));
@@ -103,12 +103,38 @@ std::string name_by_content(ByteView bytes) {
   return starts("RIFF") ? "image.webp" : "";
 }
 
+/// By its first bytes.
+bool is_exr(const std::string& path) {
+  std::ifstream file(path, std::ios::binary);
+  std::array<char, 4> start{};
+  file.read(start.data(), start.size());
+  return start == std::array{'\x76', '\x2f', '\x31', '\x01'};
+}
+
+Result<Image> read_exr_image(const std::string& path) {
+  BATON_ASSIGN(ExrPicture picture, read_exr_picture(path, ExrWindow::display, true));
+  Image image{.width = picture.width,
+              .height = picture.height,
+              .channels = picture.channels,
+              .samples = std::move(picture.samples),
+              .has_alpha = picture.has_alpha,
+              .is_associated = picture.has_alpha,
+              .notes = std::move(picture.notes)};
+  if (const std::string fault = fault_of(image.width, image.height); !fault.empty())
+    return bad_image(path, fault);
+  if (const auto& c = picture.chromaticities)
+    image.chromaticities = {c->red[0],  c->red[1],  c->green[0], c->green[1],
+                            c->blue[0], c->blue[1], c->white[0], c->white[1]};
+  return image;
+}
+
 }  // namespace
 
 Result<Image> read_image(const std::string& path) {
   std::error_code error;
   if (!std::filesystem::is_regular_file(path, error))
     return bad_image(path, "missing: expected an image file");
+  if (is_exr(path)) return read_exr_image(path);
   return read(path, std::nullopt, path);
 }
 

@@ -22,15 +22,16 @@ struct Image {
   bool is_associated = false;  ///< colours are multiplied by alpha
   /// CIE xy of red, green, blue and white, as an EXR file says them.
   std::optional<std::array<float, 8>> chromaticities = {};
+  std::vector<std::string> notes{};  ///< as RgbImage has them
 
   std::int32_t num_colors() const { return channels - (has_alpha ? 1 : 0); }
 };
 
 /// Reads an image file of any format but that of video. OpenImageIO is loaded when the first image
-/// is read: it and what it brings take a quarter of a second and 40 MB. Alpha is what the file
-/// calls so; of an EXR file the display window of the first layer with colours is read, and what
-/// else it has is left out; of several pictures in a file the first. Errors name the file: missing,
-/// not an image, more than kMaxTextureSide pixels a side.
+/// but EXR is read: it and what it brings take a quarter of a second and 40 MB. Alpha is what the
+/// file calls so; of an EXR file the display window of what color_choice.h says; of several
+/// pictures in another file the first. Errors name the file: missing, not an image, more than
+/// kMaxTextureSide pixels a side.
 Result<Image> read_image(const std::string& path);
 /// The same of a file in memory; `name` goes first in every error.
 Result<Image> read_image(ByteView bytes, const std::string& name);

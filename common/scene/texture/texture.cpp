@@ -116,6 +116,48 @@ std::vector<float> halve(const std::vector<float>& values, std::size_t count, st
 
 }  // namespace
 
+/// A level in the making, and the edges of the image as long as those of the level.
+struct Texture::Level {
+  std::int32_t width, height;
+  std::size_t channels;
+  std::vector<float> values;                    ///< (height, width, channels)
+  std::vector<float> top, bottom, left, right;  ///< (width or height, channels)
+  std::vector<float> corners;  ///< (4, channels): of the top left and right, below left and right
+
+  static Level of_image(std::int32_t width, std::int32_t height, std::size_t channels,
+                        std::vector<float> values) {
+    Level level{width, height, channels, std::move(values), {}, {}, {}, {}, {}};
+    const auto w = static_cast<std::size_t>(width), h = static_cast<std::size_t>(height);
+    const auto add = [&](std::size_t x, std::size_t y, std::vector<float>& edge) {
+      const float* const texel = level.values.data() + (y * w + x) * channels;
+      edge.insert(edge.end(), texel, texel + channels);
+    };
+    for (std::size_t x = 0; x < w; ++x) {
+      add(x, 0, level.top);
+      add(x, h - 1, level.bottom);
+    }
+    for (std::size_t y = 0; y < h; ++y) {
+      add(0, y, level.left);
+      add(w - 1, y, level.right);
+    }
+    for (const std::size_t y : {std::size_t{0}, h - 1}) {
+      add(0, y, level.corners);
+      add(w - 1, y, level.corners);
+    }
+    return level;
+  }
+
+  void halve() {
+    const auto w = static_cast<std::size_t>(width), h = static_cast<std::size_t>(height);
+    for (std::vector<float>* edge : {&top, &bottom, &values})
+      *edge = baton::halve(*edge, w, channels);
+    width = std::max(width / 2, 1);
+    for (std::vector<float>* edge : {&left, &right}) *edge = baton::halve(*edge, h, channels);
+    values = baton::halve(values, h, static_cast<std::size_t>(width) * channels);
+    height = std::max(height / 2, 1);
+  }
+};
+
 Result<std::shared_ptr<const Texture>> Texture::build(const Image& image, TextureUse use,
                                                       const std::string& name) {
   if (use == TextureUse::normal && image.num_colors() < 3)
@@ -130,34 +172,45 @@ Result<std::shared_ptr<const Texture>> Texture::build(const Image& image, Textur
   const float brightest = *std::max_element(values.begin(), values.end());
   texture->scale_ = std::max(brightest, 1.0f) / kFullScale;
 
-  std::int32_t width = image.width, height = image.height;
-  texture->append_level(values, width, height);
-  while (width > 1 || height > 1) {
-    values = halve(values, static_cast<std::size_t>(width), num_kept);
-    width = std::max(width / 2, 1);
-    values =
-        halve(values, static_cast<std::size_t>(height), static_cast<std::size_t>(width) * num_kept);
-    height = std::max(height / 2, 1);
-    texture->append_level(values, width, height);
+  Level level = Level::of_image(image.width, image.height, num_kept, std::move(values));
+  texture->append_level(level);
+  while (level.width > 1 || level.height > 1) {
+    level.halve();
+    texture->append_level(level);
   }
   texture->texels_.resize(texture->texels_.size() + kTexelPadding);
   return std::shared_ptr<const Texture>(std::move(texture));
 }
 
-void Texture::append_level(const std::vector<float>& values, std::int32_t width,
-                           std::int32_t height) {
-  levels_.push_back(
-      {width, height,
-       static_cast<std::uint32_t>(texels_.size() / static_cast<std::size_t>(channels_))});
-  texels_.reserve(texels_.size() + values.size());
-  for (const float v : values)
-    texels_.push_back(static_cast<std::uint16_t>(std::lround(std::min(v / scale_, kFullScale))));
+void Texture::append_level(const Level& level) {
+  const std::size_t stride = static_cast<std::size_t>(level.width) + 2;
+  const std::size_t begin = texels_.size() / level.channels;
+  levels_.push_back({level.width, level.height, static_cast<std::uint32_t>(begin + stride + 1)});
+  texels_.reserve(texels_.size() +
+                  stride * (static_cast<std::size_t>(level.height) + 2) * level.channels);
+  const auto append = [&](const float* values, std::size_t count) {
+    for (std::size_t i = 0; i < count * level.channels; ++i)
+      texels_.push_back(
+          static_cast<std::uint16_t>(std::lround(std::min(values[i] / scale_, kFullScale))));
+  };
+  const std::size_t c = level.channels, row = static_cast<std::size_t>(level.width);
+  const auto append_row = [&](const float* left, const float* middle, const float* right) {
+    append(left, 1);
+    append(middle, row);
+    append(right, 1);
+  };
+  append_row(level.corners.data(), level.top.data(), level.corners.data() + c);
+  for (std::size_t y = 0; y < static_cast<std::size_t>(level.height); ++y)
+    append_row(level.left.data() + y * c, level.values.data() + y * row * c,
+               level.right.data() + y * c);
+  append_row(level.corners.data() + 2 * c, level.bottom.data(), level.corners.data() + 3 * c);
 }
 
 std::array<float, 4> Texture::texel(std::int32_t level, std::int32_t x, std::int32_t y) const {
   const TextureLevel& l = levels_[static_cast<std::size_t>(level)];
   const std::size_t at =
-      (l.first + static_cast<std::size_t>(y * l.width + x)) * static_cast<std::size_t>(channels_);
+      static_cast<std::size_t>(static_cast<std::int32_t>(l.first) + y * l.stride() + x) *
+      static_cast<std::size_t>(channels_);
   std::array<float, 4> value{};
   for (std::size_t c = 0; c < static_cast<std::size_t>(channels_); ++c)
     value[c] = static_cast<float>(texels_[at + c]) * scale_;

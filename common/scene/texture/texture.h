@@ -41,8 +41,11 @@ struct TextureSampling {
 /// An image, or a smaller one that was made of it.
 struct TextureLevel {
   std::int32_t width = 1, height = 1;
-  /// Index of its first texel, counted from that of the image.
+  /// Index of its first texel. Around the level lies a border one texel wide, of what the edge of
+  /// the image is along it: texel (-1, y) is at first + y * stride() - 1.
   std::uint32_t first = 0;
+
+  std::int32_t stride() const { return width + 2; }
 
   bool operator==(const TextureLevel&) const = default;
 };
@@ -56,7 +59,8 @@ struct TexelArray {
 };
 
 /// An image and its halves, quarters ... down to one texel, in memory, 2 bytes a channel. Each
-/// texel of a smaller image is the mean of those that it covers, taken of linear light.
+/// texel of a smaller image is the mean of those that it covers, taken of linear light; beyond the
+/// edge of each lies the edge of the image, not its own.
 /// Immutable; any number of threads may look it up.
 class Texture {
  public:
@@ -81,7 +85,8 @@ class Texture {
   std::array<float, 4> texel(std::int32_t level, std::int32_t x, std::int32_t y) const;
 
  private:
-  void append_level(const std::vector<float>& values, std::int32_t width, std::int32_t height);
+  struct Level;
+  void append_level(const Level& level);
 
   std::int32_t channels_ = 0;
   float scale_ = 0;  ///< value of the number 1

@@ -55,7 +55,8 @@ void load_camera_map(const CameraMapSpec& spec, AssetReport& report,
 Result<PlateReport> load_plate_file(const JobSpec& job, FrameNumber frame,
                                     const std::string& path) {
   BATON_ASSIGN(const Plate plate, load_plate(job, frame));
-  PlateReport report{.path = path, .repaired = plate.repaired, .colors = {}};
+  PlateReport report{
+      .path = path, .repaired = plate.repaired, .colors = {}, .notes = plate_notes(path, plate)};
   if (!is_radiance_file(path)) return report;
   BATON_ASSIGN(const PictureColors colors, read_picture_colors(path));
   report.colors = conversion_text(colors);

@@ -16,8 +16,9 @@ namespace baton {
 /// A plate of the job, as read.
 struct PlateReport {
   std::string path;
-  std::uint64_t repaired = 0;  ///< Plate::repaired
-  std::string colors;          ///< as of maps
+  std::uint64_t repaired = 0;        ///< Plate::repaired
+  std::string colors;                ///< as of maps
+  std::vector<std::string> notes{};  ///< plate_notes
 };
 
 /// The geometry of the job, as loaded.

@@ -33,12 +33,12 @@ constexpr std::size_t kMostPlates = 3;
 void plate_warnings(const std::vector<PlateReport>& plates, std::vector<std::string>& warnings) {
   std::size_t count = 0;
   for (const PlateReport& plate : plates) {
-    if (plate.repaired == 0) continue;
-    if (++count <= kMostPlates) warnings.push_back(repair_note(plate.path, plate.repaired));
+    if (plate.notes.empty()) continue;
+    if (++count <= kMostPlates)
+      warnings.insert(warnings.end(), plate.notes.begin(), plate.notes.end());
   }
   if (count > kMostPlates)
-    warnings.push_back(
-        fmt::format("{} more plates have pixels that are NaN or infinite", count - kMostPlates));
+    warnings.push_back(fmt::format("{} more plates are odd in such ways", count - kMostPlates));
 }
 
 void append(std::vector<std::string> lines, std::vector<std::string>& warnings) {

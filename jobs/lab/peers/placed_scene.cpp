@@ -85,7 +85,7 @@ void append(std::ofstream& file, const std::vector<T>& values) {
 /// Which normals a mesh has: those of its triangles, those that follow from them, or others.
 std::string kind_of_normals(const TriangleMesh& mesh) {
   if (mesh.normals.empty()) return "flat";
-  return mesh.normals == smooth_vertex_normals(mesh) ? "smooth" : "own";
+  return mesh.normals == smooth_vertex_normals(mesh.positions, mesh.triangles) ? "smooth" : "own";
 }
 
 Result<json> write_mesh(const TriangleMesh& mesh, const fs::path& folder, const std::string& name) {

@@ -96,7 +96,8 @@ TEST_P(SurfaceKernels, GiveWhatTheFormulasOfOneSurfaceGive) {
         const auto first = std::find(met.instance.begin(), met.instance.begin() + count, i);
         const auto lane = static_cast<std::size_t>(first - met.instance.begin());
         if (lane == count) continue;
-        kernels::see_surfaces(met, lane, instances[i], mesh.triangles, vertices, with_place, hits);
+        kernels::see_surfaces(met, lane, instances[i], mesh.triangles, vertices, {}, with_place,
+                              hits);
         for (std::size_t k = 0; k < count; ++k) {
           if (met.instance[k] != i) continue;
           expected[k] = witness(met, k, instances[i], mesh, with_place);
@@ -115,7 +116,7 @@ TEST_P(SurfaceKernels, ShadeWithTheGeometricNormalWhereTheOtherLiesInTheSurface)
   MetTriangles met = draw(3, 5, 1);
   met.instance.fill(0);
   std::vector<SurfaceHit> hits(5);
-  kernels::see_surfaces(met, 0, {}, triangles, {positions, normals, {}}, false, hits);
+  kernels::see_surfaces(met, 0, {}, triangles, {positions, normals, {}}, {}, false, hits);
   for (const SurfaceHit& hit : hits) {
     EXPECT_EQ(std::fabs(hit.point.ng.z), 1);
     EXPECT_EQ(hit.point.ns, hit.point.ng);

@@ -61,8 +61,24 @@ TEST(ColorSpace, WhiteStaysWhite) {
   for (const float v : read->rgb) EXPECT_NEAR(v, 0.5f, 1e-5);
 }
 
+TEST(ColorSpace, ZerosCountAsUnknown) {
+  const Result<RgbImage> exr = through_exr({1, 2, 3}, {{0, 0}, {0, 0}, {0, 0}, {0, 0}});
+  ASSERT_TRUE(exr.ok()) << exr.error().message;
+  EXPECT_EQ(exr->rgb[2], 3);
+  EXPECT_THAT(exr->notes, testing::ElementsAre("chromaticities of 0 count as unknown"));
+  for (const char* const line :
+       {"EXPOSURE=0", "EXPOSURE= 0.0", "COLORCORR=0 0 0", "PRIMARIES=0 0 0 0 0 0 0 0"}) {
+    const Result<RgbImage> read = through_radiance(std::string(line) + "\n");
+    ASSERT_TRUE(read.ok()) << read.error().message;
+    EXPECT_EQ(read->rgb, (std::vector<float>{1, 0.5f, 0.25f})) << line;
+    EXPECT_THAT(read->notes, testing::ElementsAre(std::string(line) + " counts as unknown"));
+  }
+  EXPECT_THAT(through_radiance("EXPOSURE=2\n")->notes, testing::IsEmpty());
+}
+
 TEST(ColorSpace, ASpaceThatIsNoneIsAnError) {
-  const Result<RgbImage> read = through_exr({1, 1, 1}, {{0, 0}, {0, 0}, {0, 0}, {0, 0}});
+  const Result<RgbImage> read =
+      through_exr({1, 1, 1}, {{0.3f, 0.3f}, {0.4f, 0.4f}, {0.5f, 0.5f}, {0.3f, 0.3f}});
   ASSERT_FALSE(read.ok());
   EXPECT_THAT(read.error().message, HasSubstr("a.exr: chromaticities: expected those of a color"));
 }
@@ -92,8 +108,9 @@ TEST(ColorSpace, RadiancePrimariesAreConverted) {
 }
 
 TEST(ColorSpace, SettingsThatAreNoneAreErrors) {
-  for (const char* const line : {"EXPOSURE=0", "EXPOSURE=-1", "EXPOSURE=bright", "COLORCORR=1 2",
-                                 "EXPOSURE=1e-30\nEXPOSURE=1e-30", "PRIMARIES=1 2 3"}) {
+  for (const char* const line :
+       {"COLORCORR=0 1 1", "EXPOSURE=-1", "EXPOSURE=bright", "COLORCORR=1 2",
+        "EXPOSURE=1e-30\nEXPOSURE=1e-30", "PRIMARIES=1 2 3"}) {
     const Result<RgbImage> read = through_radiance(std::string(line) + "\n");
     ASSERT_FALSE(read.ok()) << line;
     EXPECT_THAT(read.error().message, HasSubstr("not a readable Radiance HDR file: a line "))

@@ -185,7 +185,7 @@ TEST_F(ImageIoTest, GreyIsSpreadToThreeChannels) {
 TEST_F(ImageIoTest, ExrWithoutRgbNamesItsChannels) {
   ASSERT_TRUE(write_exr(folder_ / "n.exr", picture({"normal.X", "normal.Y"}), {}).ok());
   EXPECT_THAT(read_rgb_image(folder_ / "n.exr").error().message,
-              HasSubstr("no channel R among normal.X, normal.Y, expected R, G, B or one channel"));
+              HasSubstr("no colours among normal.X, normal.Y, expected R, G, B or one channel"));
 }
 
 TEST_F(ImageIoTest, ReadsRadiancePictures) {

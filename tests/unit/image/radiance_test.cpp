@@ -86,14 +86,62 @@ TEST(Radiance, RowsThatDoNotFillTheirWidthAreErrors) {
   }
 }
 
+TEST(Radiance, EveryOrientationIsTurned) {
+  // A picture of two rows of three: 1 2 3, 4 5 6.
+  const struct {
+    const char* sides;
+    std::array<int, 6> stored;
+  } cases[] = {{"-Y 2 +X 3", {1, 2, 3, 4, 5, 6}}, {"+Y 2 +X 3", {4, 5, 6, 1, 2, 3}},
+               {"-Y 2 -X 3", {3, 2, 1, 6, 5, 4}}, {"+Y 2 -X 3", {6, 5, 4, 3, 2, 1}},
+               {"+X 3 -Y 2", {1, 4, 2, 5, 3, 6}}, {"-X 3 -Y 2", {3, 6, 2, 5, 1, 4}},
+               {"+X 3 +Y 2", {4, 1, 5, 2, 6, 3}}, {"-X 3 +Y 2", {6, 3, 5, 2, 4, 1}}};
+  for (const auto& c : cases) {
+    ByteWriter writer;
+    writer.put_raw(as_bytes_view(std::string(kStart) + c.sides + "\n"));
+    for (const int red : c.stored)
+      for (const int byte : {red, 0, 0, 136}) writer.put(static_cast<std::uint8_t>(byte));
+    const auto image = read(writer.take());
+    ASSERT_TRUE(image.ok()) << image.error().message;
+    EXPECT_EQ(image->width, 3);
+    EXPECT_THAT(reds(*image), ElementsAre(1, 2, 3, 4, 5, 6)) << c.sides;
+  }
+}
+
+TEST(Radiance, HeadersAreReadAsProgramsWriteThem) {
+  const auto read_with = [](const std::string& header) {
+    return read(file_of(header, {5, 0, 0, 136}));
+  };
+  for (const char* header : {"#?RADIANCE\r\nFORMAT=32-bit_rle_rgbe\r\n\r\n-Y 1 +X 1\r\n",
+                             "#?RGBE\nFORMAT=32-bit_rle_rgbe \n\n-Y 1 +X 1\n",
+                             "#?RADIANCE\nFORMAT= 32-bit_rle_rgbe\n\n-Y  1  +X  1 \n"}) {
+    const auto image = read_with(header);
+    ASSERT_TRUE(image.ok()) << image.error().message;
+    EXPECT_THAT(image->rgb, ElementsAre(5, 0, 0));
+  }
+  const Bytes none = file_of("#?RADIANCE\n\n-Y 1 +X 1\n", {5, 0, 0, 136});
+  EXPECT_THAT(read_radiance_header(none, "a.hdr")->notes, ElementsAre(HasSubstr("no line FORMAT")));
+}
+
+TEST(Radiance, XyzIsConverted) {
+  // White of D65 with Y = 128 / 256 is (.4752, .5, .5445).
+  const Bytes file =
+      file_of("#?RADIANCE\nFORMAT=32-bit_rle_xyze\n\n-Y 1 +X 1\n", {122, 128, 139, 128});
+  const auto header = read_radiance_header(file, "a.hdr");
+  ASSERT_TRUE(header.ok());
+  auto image = read_radiance_pixels(file, *header, "a.hdr");
+  ASSERT_TRUE(convert_to_rec709(image->rgb, 3, header->colors));
+  for (const float v : image->rgb) EXPECT_NEAR(v, 0.5f, 0.006f);
+  EXPECT_EQ(conversion_text(header->colors), "to Rec. 709, from CIE XYZ");
+}
+
 TEST(Radiance, HeadersSayWhatIsWrong) {
   const auto fault = [](const std::string& text) {
     return read_radiance_header(as_bytes_view(text), "a.hdr").error().message;
   };
   EXPECT_THAT(fault("P6\n"), HasSubstr("does not begin with #?"));
   EXPECT_THAT(fault("#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n"), HasSubstr("header does not end"));
-  EXPECT_THAT(fault("#?RADIANCE\nFORMAT=32-bit_rle_xyze\n\n-Y 1 +X 1\n"), HasSubstr("FORMAT="));
-  for (const char* sides : {"+Y 1 +X 1\n", "-Y 1 +X\n", "-Y 1 +X 99999999999\n", "-Y 1 +X 1 \n"}) {
+  EXPECT_THAT(fault("#?RADIANCE\nFORMAT=32-bit_rle_hsv\n\n-Y 1 +X 1\n"), HasSubstr("FORMAT="));
+  for (const char* sides : {"+Y 1 +Y 1\n", "-Y 1 +X\n", "-Y 1 +X 99999999999\n", "Y 1 +X 1\n"}) {
     EXPECT_THAT(fault(std::string(kStart) + sides), HasSubstr("expected -Y HEIGHT +X WIDTH"));
   }
 }

@@ -252,6 +252,46 @@ TEST(SurfaceDetail, NothingIsThereBelowTheCutOff) {
   EXPECT_FALSE(is_away(scene_of(spec), 0.8f, 0.2f));
 }
 
+TEST(SurfaceDetail, AlphaAtTheCutOffIsThere) {
+  const std::string file = write_targa("whole.tga", 8, 8, 4, std::vector<std::uint8_t>(256, 255));
+  MaterialSpec spec{.base_color = {1, 1, 1}, .alpha = 0.5f, .alpha_cutoff = 0.5f};
+  spec.color_texture = TextureSpec{.file = file};
+  const auto count_away = [&] {
+    const Scene scene = scene_of(spec);
+    int count = 0;
+    for (int i = 0; i < 5000; ++i) {
+      const float u = static_cast<float>(i % 71) / 142, v = static_cast<float>(i % 53) / 106;
+      count += is_cut_away(scene, scene.instances[0], {0, u, v}, 0.9f);
+    }
+    return count;
+  };
+  EXPECT_EQ(count_away(), 0);
+  spec.alpha = 0.4999f;
+  EXPECT_EQ(count_away(), 5000);
+  // However low the cut-off, nothing is below it where alpha is 0.
+  spec.alpha = 0;
+  spec.alpha_cutoff = 1e-6f;
+  EXPECT_EQ(count_away(), 5000);
+}
+
+TEST(SurfaceDetail, ColoursOfVerticesAreFactorsOfColourAndAlpha) {
+  const std::string ply = write_test_file(
+      "coloured.ply",
+      "ply\nformat ascii 1.0\nelement vertex 3\nproperty float x\nproperty float y\n"
+      "property float z\nproperty float red\nproperty float green\n"
+      "property float blue\nproperty float alpha\nelement face 1\n"
+      "property list uchar int vertex_indices\nend_header\n"
+      "0 0 0 1 0 0 1\n1 0 0 0 1 0 0.5\n1 1 0 0 0 1 0\n3 0 1 2\n");
+  const Scene plain = scene_of({.base_color = {0.5f, 0.5f, 1}}, ply);
+  const Rgb seen = seen_at(plain, 0.75f, 0.25f).material.kd;  // a quarter, a half, a quarter
+  EXPECT_NEAR(seen.x, 0.125f, 1e-6f);
+  EXPECT_NEAR(seen.y, 0.25f, 1e-6f);
+  EXPECT_NEAR(seen.z, 0.25f, 1e-6f);
+  const Scene holed = scene_of({.base_color = {1, 1, 1}, .alpha = 1, .alpha_cutoff = 0.5f}, ply);
+  EXPECT_FALSE(is_cut_away(holed, holed.instances[0], {0, 0.1f, 0.1f}, 1));
+  EXPECT_TRUE(is_cut_away(holed, holed.instances[0], {0, 0.1f, 0.8f}, 1));
+}
+
 TEST(SurfaceDetail, EmissionIsRadianceTimesItsImage) {
   MaterialSpec spec{.base_color = {0, 0, 0}, .emission = {4, 2, 1}};
   spec.emission_texture = four_colors();

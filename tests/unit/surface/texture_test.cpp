@@ -131,6 +131,30 @@ TEST(Texture, GoesOnPastItsEdges) {
   }
 }
 
+TEST(Texture, BeyondAClampedEdgeLiesTheEdgeOfTheImage) {
+  // Dark, with a bright last column and a bright first row.
+  for (const int size : {64, 37}) {
+    std::vector<float> texels(static_cast<std::size_t>(size * size));
+    for (int i = 0; i < size; ++i)
+      texels[static_cast<std::size_t>(i * size + size - 1)] = texels[static_cast<std::size_t>(i)] =
+          1;
+    const auto texture =
+        texture_of(image_of(size, size, 1, texels), TextureUse::metallic_roughness);
+    const auto at = [&](float u, float v, float width, Wrap wrap) {
+      return look_up(*texture, {u, v}, {{width, 0}, {0, width}}, {wrap, wrap, false})[0];
+    };
+    for (const float width : {0.03f, 0.1f, 0.25f, 0.9f}) {
+      EXPECT_NEAR(at(1 + width, 0.6f, width, Wrap::clamp), 1, 2e-4f) << width;
+      EXPECT_NEAR(at(0.4f, -width, width, Wrap::clamp), 1, 2e-4f) << width;
+      EXPECT_NEAR(at(-width, -width, width, Wrap::clamp), 1, 2e-4f) << width;
+      EXPECT_NEAR(at(-width, 1 + width, width, Wrap::clamp), 0, 2e-4f) << width;
+    }
+    // Half of the footprint is outside.
+    EXPECT_NEAR(at(1, 0.6f, 0.25f, Wrap::clamp), 0.5f, 0.1f);
+    EXPECT_LT(at(1.5f, 0.6f, 0.25f, Wrap::repeat), 0.1f);
+  }
+}
+
 TEST(Texture, AFootprintIsAveragedAlongBothSides) {
   // Bright and dark rows.
   std::vector<float> rows;

@@ -14,9 +14,6 @@ struct BatonImageLayout {
   std::int32_t has_alpha;
   std::int32_t is_associated;  ///< colours are multiplied by alpha
   std::int32_t is_integer;
-  std::int32_t has_chromaticities;
-  /// CIE xy of red, green, blue, white, where the file says them.
-  float chromaticities[8];
 };
 
 /// Where an image goes.
