@@ -43,8 +43,11 @@ struct WrapLanes {
     const VI4 width =
         lanes(di, line.fine.width, line.fine.height, line.coarse.width, line.coarse.height);
     const auto of = [&](Wrap wrap) {
-      return wrap == Wrap::clamp ? 0 : wrap == Wrap::mirror ? 2 : 1;
+      return wrap == Wrap::repeat ? 1 : wrap == Wrap::mirror ? 2 : 0;
     };
+    const int border_u = sampling.wrap_u == Wrap::clamp ? 1 : 0;
+    const int border_v = sampling.wrap_v == Wrap::clamp ? 1 : 0;
+    const VI4 border = lanes(di, border_u, border_v, border_u, border_v);
     const int u = of(sampling.wrap_u), v = of(sampling.wrap_v);
     const VI4 periods = lanes(di, u, v, u, v);
     const auto inverse = [](int p) { return p == 0 ? 0.0f : 1.0f / static_cast<float>(p); };
@@ -54,8 +57,8 @@ struct WrapLanes {
     texels = hn::Mul(width, periods);
     const VI4 one = hn::Set(di, 1), last = hn::Sub(width, one);
     const auto clamped = hn::Eq(periods, hn::Zero(di));
-    low = hn::IfThenElseZero(clamped, hn::Neg(one));
-    high = hn::Add(last, hn::IfThenElseZero(clamped, one));
+    low = hn::Neg(border);
+    high = hn::Add(last, border);
     mirror = hn::IfThenElse(clamped, hn::Set(di, 1 << 20), hn::Add(width, last));
   }
 

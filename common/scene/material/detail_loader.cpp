@@ -101,7 +101,7 @@ Status DetailLoader::place(const std::optional<TextureSpec>& spec, TextureUse us
   const auto first =
       std::ranges::find_if(tiles->images, [](const auto& t) { return t != nullptr; });
   placed = placed_texture(*spec, *first);
-  placed.sampling.wrap_u = placed.sampling.wrap_v = Wrap::clamp;
+  placed.sampling.wrap_u = placed.sampling.wrap_v = Wrap::tile;
   placed.tiles = std::move(tiles);
   return {};
 }

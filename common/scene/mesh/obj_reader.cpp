@@ -127,7 +127,7 @@ class ObjReader {
   Status read_uv(Words& words) {
     const auto uv = numbers<2>(words, 1);
     if (!uv || !std::isfinite((*uv)[0]) || !std::isfinite((*uv)[1]))
-      return bad_line("expected two finite texture coordinates");
+      return bad_line("expected two numbers, not texture coordinates that are not finite");
     // In these files v grows upward.
     polygons_.uvs.push_back({static_cast<float>((*uv)[0]), 1 - static_cast<float>((*uv)[1])});
     return {};

@@ -27,7 +27,12 @@ enum class TextureUse : std::uint8_t {
 std::vector<float> linear_colors(const Image& image);
 
 /// How an image goes on past its edges.
-enum class Wrap : std::uint8_t { repeat, clamp, mirror };
+enum class Wrap : std::uint8_t {
+  repeat,
+  clamp,
+  mirror,
+  tile,  ///< as clamp, but by the edge of each level: what lies beyond is another image
+};
 
 /// How a texture is looked up.
 struct TextureSampling {
