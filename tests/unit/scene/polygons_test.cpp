@@ -197,7 +197,7 @@ TEST(Polygons, ObjFilesAsPeopleWriteThem) {
 }
 
 TEST(Polygons, PositionsFarAwayKeepTheirForm) {
-  const double east = 448262, north = 5411932;
+  const double north = 5411932;
   const std::string path = write_test_file(
       "utm.ply",
       "ply\nformat ascii 1.0\nelement vertex 3\nproperty double x\nproperty double y\n"
