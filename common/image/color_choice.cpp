@@ -24,13 +24,13 @@ struct Layer {
   std::size_t part = 0;
   std::string name{};  ///< with its dot, or empty
   std::array<std::string, 3> rgb{};
-  std::string x{}, y{}, z{}, ry{}, by{}, alpha{};
+  std::string x{}, y{}, ry{}, by{}, alpha{};
 
   std::size_t num_colors() const {
     return 3 - static_cast<std::size_t>(std::ranges::count(rgb, std::string()));
   }
-  /// Y of X, Y, Z is a coordinate.
-  bool has_luminance() const { return !y.empty() && (x.empty() || z.empty()); }
+  /// Y beside X is a coordinate.
+  bool has_luminance() const { return !y.empty() && x.empty(); }
   bool is_luma_chroma() const { return has_luminance() && !ry.empty() && !by.empty(); }
   bool has_colors() const { return num_colors() > 0 || has_luminance(); }
 };
@@ -43,7 +43,6 @@ void take(const std::string& channel, Layer& layer) {
   if (last == "a" || last == "alpha") layer.alpha = channel;
   if (last == "x") layer.x = channel;
   if (last == "y") layer.y = channel;
-  if (last == "z") layer.z = channel;
   if (last == "ry") layer.ry = channel;
   if (last == "by") layer.by = channel;
 }

@@ -40,9 +40,9 @@ struct SharedGeometry {
   Layer objects, catchers{.catchers = true, .still = {}};
   /// By index of the mesh, in its own space: those that move, or that are in too many places.
   std::map<std::uint32_t, Owned<RTCScene>> own_meshes;
-  std::set<std::uint32_t> with_holes;  ///< meshes that are cut out somewhere
-  bool any_blends = false;             ///< rays need their bits
-  std::uint64_t placement_bytes = 0;   ///< what is built for each placement
+  std::set<std::uint32_t> with_holes;      ///< meshes that are cut out somewhere
+  bool any_blends = false;                 ///< rays need their bits
+  std::uint64_t placement_bytes = 0;       ///< what is built for each placement
   std::vector<std::array<Vec3, 8>> boxes;  ///< corners of each mesh's box, in its own space
 
   const Scene* holes_of(const Scene& scene, std::uint32_t mesh) const {
@@ -81,9 +81,8 @@ class EmbreeAccel final : public Accel {
     for (std::uint32_t i = 0; i < scene.meshes.size(); ++i)
       vertices_.push_back(vertices_of(scene, shapes, i));
     for (const Instance& instance : instances) {
-      const std::span<const Vec3> points = instance.deforms
-                                               ? vertices_[instance.mesh].positions
-                                               : geometry_->boxes[instance.mesh];
+      const std::span<const Vec3> points =
+          instance.deforms ? vertices_[instance.mesh].positions : geometry_->boxes[instance.mesh];
       lifts_.push_back(lift_of(box_around(points, instance.to_world)));
     }
   }

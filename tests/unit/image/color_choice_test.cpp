@@ -41,6 +41,7 @@ TEST(ColorChoice, KnowsColoursByTheirNames) {
 
 TEST(ColorChoice, WithoutColoursThereIsNoChoice) {
   EXPECT_FALSE(choose_colors({{"", {"N.X", "N.Y", "N.Z"}}}));
+  EXPECT_FALSE(choose_colors({{"", {"N.X", "N.Y"}}}));
   EXPECT_FALSE(choose_colors({{"", {"U", "V"}}}));
   EXPECT_FALSE(choose_colors({{"a", {"Z"}}, {"b", {"id"}}}));
   EXPECT_EQ(any_channels({{"", {"N.X", "N.Y", "N.Z", "A"}}}).colors,
