@@ -84,7 +84,6 @@ MAY_INCLUDE = {
 THIRD_PARTY = {
     r"embree3/": ["worker/accel/"],
     r"OpenImageIO/": ["common/scene/texture/reader/"],
-    r"assimp/": ["common/scene/mesh/obj_reader.cpp"],
     r"OpenEXR/|Imath/|png\.h": ["common/image/"],
     r"zmq": ["common/protocol/"],
     r"sqlite3": ["coordinator/journal/"],
