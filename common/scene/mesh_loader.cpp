@@ -50,8 +50,8 @@ Result<TriangleMesh> load_mesh(const std::string& path, bool smooth_normals, boo
 
   BATON_ASSIGN(TriangleMesh mesh, read_triangles(path, smooth_normals, with_uvs));
   if (mesh.triangles.empty()) {
-    return bad_mesh(path,
-                    "no triangles (" + std::to_string(mesh.dropped_triangles) + " without area)");
+    return bad_mesh(path, "no triangles (" + std::to_string(mesh.dropped_triangles) +
+                              " without area); points and lines are not shown");
   }
   if (smooth_normals && mesh.normals.empty())
     mesh.normals = smooth_vertex_normals(mesh.positions, mesh.triangles);

@@ -112,6 +112,10 @@ void warn_of_repairs(const JobSpec& job, const Scene& scene, std::vector<std::st
       {&MeshRepairs::uvs, "corners have no texture coordinates: they have (0, 0)"},
       {&MeshRepairs::crossing, "faces have edges that cross, or too many: they are cut as fans"},
       {&MeshRepairs::lines, "points, lines or faces of two corners are not shown"},
+      {&MeshRepairs::colors,
+       "vertices have colours that are not from 0 to 1: they are cut, or white"},
+      {&MeshRepairs::unread_colors,
+       "vertices or faces have colours in a form that is not read: they count as white"},
   };
   std::map<std::string, MeshRepairs> by_file;
   std::size_t index = 0;  // the scene has the meshes in the order of the job

@@ -274,6 +274,7 @@ Result<TriangleMesh> whole_mesh(const Document& document, bool smooth_normals) {
       any_normals = any_normals || !v.normals.empty();
       repairs.normals += v.repairs.normals;
       repairs.weights += shaper.num_loose();
+      repairs.colors += v.repairs.colors;
       common.colors = common.colors || !v.colors.empty();
       common.uv_sets = std::min(common.uv_sets, v.num_uv_sets());
       for (const Matrix& at : places) parts.push_back({v, multiply(to_file, at)});
@@ -285,6 +286,7 @@ Result<TriangleMesh> whole_mesh(const Document& document, bool smooth_normals) {
   TriangleMesh mesh = builder.take();
   mesh.repairs.normals += common.normals ? repairs.normals : 0;
   mesh.repairs.weights = repairs.weights;
+  mesh.repairs.colors = repairs.colors;
   return mesh;
 }
 

@@ -44,7 +44,7 @@ Result<std::vector<float>> read_counted(const Document& document, int accessor, 
                                     name, count, values.size() / static_cast<std::size_t>(width)));
 }
 
-/// COLOR_0, whose alpha may be missing; what is no number in [0, 1] is cut.
+/// COLOR_0, whose alpha may be missing.
 Status read_colors(const Document& document, const Primitive& primitive, const std::string& place,
                    Vertices& v) {
   if (primitive.colors < 0) return {};
@@ -54,8 +54,12 @@ Status read_colors(const Document& document, const Primitive& primitive, const s
                read_counted(document, primitive.colors, static_cast<int>(width), v.count(), place,
                             "COLOR_0"));
   v.colors.assign(v.count(), {1, 1, 1, 1});
-  for (std::size_t i = 0; i < values.size(); ++i)
-    v.colors[i / width][i % width] = values[i] > 0 ? std::min(values[i], 1.0f) : 0;
+  for (std::size_t i = 0; i < v.count(); ++i) {
+    bool is_sound = true;
+    for (std::size_t c = 0; c < width; ++c)
+      v.colors[i][c] = color_channel(values[i * width + c], is_sound);
+    v.repairs.colors += is_sound ? 0 : 1;
+  }
   return {};
 }
 
@@ -77,7 +81,15 @@ std::vector<Vec3> vectors_of(const std::vector<float>& numbers) {
   return vectors;
 }
 
-bool is_tangent(const float* t) { return is_direction({t[0], t[1], t[2]}) && std::isfinite(t[3]); }
+/// Whether tangent i lies across its normal; of a normal that is no direction nothing is asked.
+bool is_tangent(const Vertices& v, std::size_t i) {
+  constexpr float kLeastSine = 1e-3f;
+  const float* const t = v.tangents.data() + 4 * i;
+  const Vec3 tangent{t[0], t[1], t[2]};
+  if (!is_direction(tangent) || !std::isfinite(t[3])) return false;
+  const Vec3 normal = v.normals.empty() ? Vec3{} : vec3_at(v.normals, i);
+  return !is_direction(normal) || length(cross(normalize(tangent), normalize(normal))) > kLeastSine;
+}
 
 /// Tangents of the coordinates that the normal map lies by; those that face no way where there are
 /// none.
@@ -101,7 +113,7 @@ void mend_vertices(const Document& document, const Primitive& primitive, Vertice
   for (std::size_t i = 0; i < v.normals.size() / 3; ++i)
     if (!is_direction(vec3_at(v.normals, i))) normals.push_back(i);
   for (std::size_t i = 0; i < v.tangents.size() / 4; ++i)
-    if (!is_tangent(v.tangents.data() + 4 * i)) tangents.push_back(i);
+    if (!is_tangent(v, i)) tangents.push_back(i);
   if (normals.empty() && tangents.empty()) return;
 
   const std::vector<Vec3> positions = vectors_of(v.positions);

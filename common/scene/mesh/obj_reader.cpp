@@ -115,6 +115,10 @@ class ObjReader {
       if (!std::isfinite(static_cast<float>(c)))
         return bad_line("a vertex has a coordinate that is not finite");
     polygons_.positions.push_back(*p);
+    // Behind a weight, or without it, some programs write a colour.
+    std::size_t more = 0;
+    while (!words.next().empty()) ++more;
+    polygons_.unread_colors += more >= 3 ? 1 : 0;
     return {};
   }
   Status read_normal(Words& words) {

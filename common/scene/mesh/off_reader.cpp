@@ -1,3 +1,4 @@
+#include <algorithm>
 #include <charconv>
 #include <cmath>
 #include <cstdint>
@@ -40,6 +41,11 @@ class WordReader {
     return value;
   }
   int line() const { return line_; }
+  /// Whether the line has another word.
+  bool goes_on() const {
+    const std::size_t next = std::min(text_.find_first_not_of(" \t\r", at_), text_.size());
+    return next < text_.size() && text_[next] != '\n' && text_[next] != '#';
+  }
   bool at_end() {
     skip_space();
     return at_ == text_.size();
@@ -102,6 +108,7 @@ Status read_face(WordReader& reader, std::uint32_t face, const std::string& name
   }
   polygons.sizes.push_back(*corners);
   polygons.lines += *corners < 3 ? 1 : 0;
+  if (reader.goes_on()) ++polygons.unread_colors;
   reader.skip_line();
   return {};
 }
@@ -129,6 +136,7 @@ Result<TriangleMesh> parse_off(std::string_view text, const std::string& name) {
 
   Polygons polygons;
   BATON_ASSIGN(polygons.positions, read_vertices(reader, *num_vertices, name));
+  if (magic.starts_with('C')) polygons.unread_colors = polygons.positions.size();
   for (std::uint32_t face = 0; face < *num_faces; ++face)
     BATON_TRY(read_face(reader, face, name, polygons));
   return mesh_of(polygons, false, false);

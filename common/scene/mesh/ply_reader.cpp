@@ -5,6 +5,7 @@
 #include <cstdint>
 #include <cstring>
 #include <optional>
+#include <set>
 #include <sstream>
 #include <utility>
 #include <vector>
@@ -47,6 +48,7 @@ struct Element {
   std::uint64_t count = 0;
   std::vector<Property> properties;
   bool is_vertex = false;
+  bool has_unread_color = false;
 };
 
 struct Header {
@@ -93,18 +95,34 @@ std::optional<Property> parse_property(std::istringstream& words) {
   return property;
 }
 
+constexpr std::pair<std::string_view, Role> kOfVertex[] = {{"x", Role::x},
+                                                           {"y", Role::y},
+                                                           {"z", Role::z},
+                                                           {"nx", Role::nx},
+                                                           {"ny", Role::ny},
+                                                           {"nz", Role::nz},
+                                                           {"red", Role::red},
+                                                           {"green", Role::green},
+                                                           {"blue", Role::blue},
+                                                           {"alpha", Role::alpha},
+                                                           {"r", Role::red},
+                                                           {"g", Role::green},
+                                                           {"b", Role::blue},
+                                                           {"a", Role::alpha},
+                                                           {"diffuse_red", Role::red},
+                                                           {"diffuse_green", Role::green},
+                                                           {"diffuse_blue", Role::blue},
+                                                           {"diffuse_alpha", Role::alpha}};
+
+constexpr bool is_color(Role role) { return role >= Role::red && role <= Role::blue; }
+
+Role role_of_vertex(std::string_view name) {
+  const auto* const found =
+      std::ranges::find(kOfVertex, name, &std::pair<std::string_view, Role>::first);
+  return found != std::end(kOfVertex) ? found->second : Role::nothing;
+}
+
 Role role_of(const std::string& element, const Property& property) {
-  using Named = std::pair<std::string_view, Role>;
-  static constexpr std::array<Named, 10> kOfVertex{{{"x", Role::x},
-                                                    {"y", Role::y},
-                                                    {"z", Role::z},
-                                                    {"nx", Role::nx},
-                                                    {"ny", Role::ny},
-                                                    {"nz", Role::nz},
-                                                    {"red", Role::red},
-                                                    {"green", Role::green},
-                                                    {"blue", Role::blue},
-                                                    {"alpha", Role::alpha}}};
   const std::string& name = property.name;
   if (property.count_type) {
     if (name != "vertex_indices" && name != "vertex_index") return Role::nothing;
@@ -112,9 +130,25 @@ Role role_of(const std::string& element, const Property& property) {
            : element == "tristrips" ? Role::strips
                                     : Role::nothing;
   }
-  if (element != "vertex") return Role::nothing;
-  const auto* const found = std::ranges::find(kOfVertex, name, &Named::first);
-  return found != kOfVertex.end() ? found->second : Role::nothing;
+  return element == "vertex" ? role_of_vertex(name) : Role::nothing;
+}
+
+/// Marks elements whose colours count for nothing: of faces, and of vertices without all three.
+void find_unread_colors(Header& header) {
+  for (Element& element : header.elements) {
+    std::set<Role> colors;
+    for (const Property& property : element.properties) {
+      const Role role = role_of_vertex(property.name);
+      if (!property.count_type && is_color(role)) colors.insert(role);
+    }
+    const bool is_read = element.is_vertex && colors.size() == 3;
+    element.has_unread_color =
+        !colors.empty() && !is_read && (element.is_vertex || element.name == "face");
+    if (is_read || !element.is_vertex) continue;
+    for (Property& property : element.properties) {
+      if (property.role >= Role::red && property.role <= Role::alpha) property.role = Role::nothing;
+    }
+  }
 }
 
 Result<Header> parse_header(std::string_view bytes, const std::string& name) {
@@ -138,6 +172,7 @@ Result<Header> parse_header(std::string_view bytes, const std::string& name) {
     ++line_number;
     if (keyword == "ply" && line_number == 1) continue;
     if (keyword == "end_header") {
+      find_unread_colors(header);
       return header;
     } else if (keyword == "format") {
       words >> word;
@@ -215,16 +250,17 @@ class ValueReader {
   std::size_t at_ = 0;
 };
 
-/// What an integer of a type stands for at most; 0: it is no integer.
+/// What an integer of a type stands for at most; 0: it is no integer. Who writes 32 bits means
+/// bytes.
 double full_scale(Scalar type) {
-  constexpr std::array<double, 8> kMost{127, 255, 32767, 65535, 2147483647.0, 4294967295.0, 0, 0};
+  constexpr std::array<double, 8> kMost{127, 255, 32767, 65535, 255, 255, 0, 0};
   return kMost.at(static_cast<std::size_t>(type));
 }
 
 /// IEC 61966-2-1; alpha is a number.
-float channel_of(double value, Scalar type, bool is_alpha) {
+float channel_of(double value, Scalar type, bool is_alpha, bool& is_sound) {
   const double most = full_scale(type);
-  const double v = std::clamp(most > 0 ? value / most : value, 0.0, 1.0);
+  const double v = color_channel(most > 0 ? value / most : value, is_sound);
   if (most == 0 || is_alpha) return static_cast<float>(v);
   return static_cast<float>(v <= 0.04045 ? v / 12.92 : std::pow((v + 0.055) / 1.055, 2.4));
 }
@@ -263,6 +299,7 @@ class PlyReader {
     std::array<double, 12> values{};  // by role
     values[static_cast<std::size_t>(Role::alpha)] = 1;
     VertexColor color{1, 1, 1, 1};
+    bool is_sound = true;
     for (const Property& property : element.properties) {
       const std::optional<double> value = values_.next(property.count_type.value_or(property.type));
       if (!value)
@@ -272,12 +309,15 @@ class PlyReader {
       } else if (property.role >= Role::red && property.role <= Role::alpha) {
         const auto channel =
             static_cast<std::size_t>(property.role) - static_cast<std::size_t>(Role::red);
-        color[channel] = channel_of(*value, property.type, property.role == Role::alpha);
+        color[channel] = channel_of(*value, property.type, property.role == Role::alpha, is_sound);
       } else {
         values[static_cast<std::size_t>(property.role)] = *value;
       }
     }
 
+    polygons_.unread_colors += element.has_unread_color ? 1 : 0;
+    polygons_.bad_colors += is_sound ? 0 : 1;
+    polygons_.lines += element.name == "edge" ? 1 : 0;
     if (!element.is_vertex) return {};
     for (std::size_t c = 1; c <= 3; ++c) {
       if (!std::isfinite(static_cast<float>(values[c])))

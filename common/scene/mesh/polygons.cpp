@@ -186,6 +186,8 @@ class FaceTaker {
     mesh.repairs.uvs = without_uv_;
     mesh.repairs.crossing = crossing_;
     mesh.repairs.lines = polygons_.lines;
+    mesh.repairs.colors = polygons_.bad_colors;
+    mesh.repairs.unread_colors = polygons_.unread_colors;
     return mesh;
   }
 

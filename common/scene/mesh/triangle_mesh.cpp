@@ -1,8 +1,18 @@
 #include "common/scene/mesh/triangle_mesh.h"
 
+#include <algorithm>
+#include <cmath>
+
 #include "common/scene/mesh/tangents.h"
 
 namespace baton {
+
+float color_channel(double value, bool& is_sound) {
+  constexpr double kRounding = 1e-3;
+  is_sound = is_sound && value >= -kRounding && value <= 1 + kRounding;
+  if (std::isnan(value)) return 1;
+  return static_cast<float>(std::clamp(value, 0.0, 1.0));
+}
 
 MeshShape TriangleMesh::shape_at(double frame) const {
   MeshShape shape = deformation->at(frame);

@@ -27,6 +27,10 @@ struct MeshRepairs {
   std::uint64_t crossing = 0;
   /// Points, lines and faces of fewer than three corners, which are not shown.
   std::uint64_t lines = 0;
+  /// Vertices whose colour is no four numbers in [0, 1]: cut, or 1 where it is no number.
+  std::uint64_t colors = 0;
+  /// Vertices and faces with colours in a form that is not read.
+  std::uint64_t unread_colors = 0;
 
   bool operator==(const MeshRepairs&) const = default;
 };
@@ -36,6 +40,9 @@ using Position = std::array<double, 3>;
 
 /// Factor of base colour and alpha at a vertex, linear.
 using VertexColor = std::array<float, 4>;
+/// A channel of a colour as it counts: cut to [0, 1], and 1 where it is no number. is_sound: set to
+/// false where that is more than rounding.
+float color_channel(double value, bool& is_sound);
 
 /// Triangles of one file. Degenerate triangles (zero area, equal corners) are dropped and counted;
 /// where the mesh deforms, those with equal corners alone.

@@ -90,8 +90,10 @@ TEST(GltfParts, OneBadNormalIsMadeAnewAlone) {
 }
 
 TEST(GltfParts, OneBadTangentIsMadeAnewAlone) {
-  for (const float bad : {0.0f, kNan}) {
-    const Loaded one(pyramid_glb(1, {0, bad, 0}, R"(,"TANGENT":3,"TEXCOORD_0":4)", true));
+  // One that lies along its normal is none either.
+  for (const std::array<float, 3>& bad :
+       {std::array{0.0f, 0.0f, 0.0f}, {0, kNan, 0}, {0.6f, 0, 0.8f}}) {
+    const Loaded one(pyramid_glb(1, bad, R"(,"TANGENT":3,"TEXCOORD_0":4)", true));
     const TriangleMesh& mesh = one.scene.meshes.at(0);
     ASSERT_EQ(mesh.tangents.size(), mesh.positions.size());
     for (std::size_t i = 0; i < mesh.tangents.size(); ++i) {

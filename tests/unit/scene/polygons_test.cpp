@@ -171,6 +171,63 @@ TEST(Polygons, ColoursOfPlyFilesAreLinear) {
   EXPECT_NEAR(mesh->colors[0][3], 127 / 255.0f, 1e-6f);
 }
 
+/// A triangle whose vertices have a line of numbers behind their coordinates.
+Result<TriangleMesh> colored_ply(const std::string& properties, const std::string& numbers) {
+  std::string body;
+  for (const char* at : {"0 0 0 ", "1 0 0 ", "0 1 0 "}) body += at + numbers + "\n";
+  return ply("element vertex 3\nproperty float x\nproperty float y\nproperty float z\n" +
+             properties + "element face 1\nproperty list uchar int vertex_indices\nend_header\n" +
+             body + "3 0 1 2\n");
+}
+std::string three(const std::string& type, const std::string& before,
+                  const std::array<const char*, 3>& names = {"red", "green", "blue"}) {
+  std::string text;
+  for (const char* name : names) text += "property " + type + " " + before + name + "\n";
+  return text;
+}
+
+TEST(Polygons, ColoursThatPlyFilesWriteInOtherWays) {
+  for (const std::string& properties :
+       {three("int", ""), three("uint", ""), three("uchar", "diffuse_"),
+        three("uchar", "", {"r", "g", "b"}), three("int8", "")}) {
+    const bool is_signed_byte = properties.find("int8") != std::string::npos;
+    const auto mesh = colored_ply(properties, is_signed_byte ? "127 0 0" : "255 0 0");
+    ASSERT_TRUE(mesh) << mesh.error().message;
+    ASSERT_EQ(mesh->colors.size(), 3u) << properties;
+    EXPECT_EQ(mesh->colors[0], (VertexColor{1, 0, 0, 1})) << properties;
+    EXPECT_EQ(mesh->repairs.colors + mesh->repairs.unread_colors, 0u);
+  }
+}
+
+TEST(Polygons, ColoursThatAreCutOrNotReadAreCounted) {
+  const auto cut = colored_ply(three("float", ""), "nan -0.5 2");
+  ASSERT_TRUE(cut) << cut.error().message;
+  EXPECT_EQ(cut->colors[0], (VertexColor{1, 0, 1, 1}));
+  EXPECT_EQ(cut->repairs.colors, 3u);
+  EXPECT_EQ(colored_ply(three("float", ""), "1.0001 0 0")->repairs.colors, 0u) << "rounding";
+
+  const auto red = colored_ply("property uchar red\n", "255");
+  EXPECT_TRUE(red->colors.empty());
+  EXPECT_EQ(red->repairs.unread_colors, 3u);
+  const auto faces =
+      ply("element vertex 3\nproperty float x\nproperty float y\nproperty float z\n"
+          "element face 1\nproperty list uchar int vertex_indices\nproperty uchar red\n"
+          "element edge 1\nproperty int vertex1\nproperty int vertex2\nend_header\n"
+          "0 0 0\n1 0 0\n0 1 0\n3 0 1 2 9\n0 1\n");
+  EXPECT_EQ(faces->repairs.unread_colors, 1u);
+  EXPECT_EQ(faces->repairs.lines, 1u);
+
+  const auto load = [](const char* name, const std::string& text) {
+    return *load_mesh(write_test_file(name, text), true);
+  };
+  const std::string off = "3 1 0\n0 0 0 1 0 0 1\n1 0 0 1 0 0 1\n0 1 0 1 0 0 1\n3 0 1 2";
+  EXPECT_EQ(load("c.off", "COFF\n" + off + "\n").repairs.unread_colors, 3u);
+  EXPECT_EQ(load("f.off", "OFF\n" + off + " 255 0 0\n").repairs.unread_colors, 1u);
+  EXPECT_EQ(load("p.off", "OFF\n" + off + " # plain\n").repairs.unread_colors, 0u);
+  const std::string v = "v 0 0 0 1 0 0\nv 1 0 0 1 1 0 0\nv 0 1 0 1\nf 1 2 3\n";
+  EXPECT_EQ(load("c.obj", v).repairs.unread_colors, 2u);
+}
+
 TEST(Polygons, ObjFilesAsPeopleWriteThem) {
   const auto obj = [](const std::string& text) {
     return load_mesh(write_test_file("form.obj", text), true, true);
