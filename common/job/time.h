@@ -31,6 +31,7 @@ struct StepSpan {
 
   bool operator==(const StepSpan&) const = default;
   constexpr std::int32_t size() const { return last - first + 1; }
+  constexpr bool empty() const { return size() == 0; }
   constexpr bool contains(Step step) const { return first <= step && step <= last; }
 };
 

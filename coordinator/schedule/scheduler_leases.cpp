@@ -8,6 +8,15 @@
 #include "coordinator/schedule/scheduler.h"
 
 namespace baton {
+namespace {
+
+/// None for a cut: its state is that of the last step.
+StepSpan steps_to_render(const JobTasks& tasks, TaskIndex task) {
+  const StepSpan steps = tasks.graph().steps(tasks.graph().key(task));
+  return tasks.ledger().is_cut(task) ? StepSpan{steps.last + 1, steps.last} : steps;
+}
+
+}  // namespace
 
 // ---- events: workers ----------------------------------------------------------------------------
 
@@ -243,7 +252,7 @@ bool Scheduler::grant_one(const std::string& worker, TimePoint now, Actions& act
     const double seconds = job.longest_seconds.at(static_cast<std::size_t>(lease.task.kind));
     actions.push_back(GrantLease{{.lease = lease,
                                   .inputs = job.tasks.ledger().inputs(job.tasks.view(), *task),
-                                  .steps = graph.steps(lease.task),
+                                  .steps = steps_to_render(job.tasks, *task),
                                   .may_hold = granted.may_hold,
                                   .states_from = states_from(graph, job.tasks.book()),
                                   .expected_seconds = seconds},

@@ -61,14 +61,22 @@ Result<std::vector<StatePtr>> read_states(const LoadedJob& loaded, const BlobSto
   return states;
 }
 
-/// The task's state from those of another tiling, of the same frame.
-Result<TaskOutput> cut_state(const LoadedJob& loaded, BlobStore& store, const TaskKey& task,
-                             const std::vector<StatePtr>& others) {
+/// The task's state after `step` from those of another tiling.
+Result<TaskOutput> execute_cut(const LoadedJob& loaded, BlobStore& store, const TaskKey& task,
+                               Step step, const std::vector<BlobRef>& inputs) {
   TaskOutput output;
   const CpuTimer timer(output.stats.seconds_state);
   const PixelRect rect = TileGrid(loaded.job.image).rect(task.tile);
+  BATON_ASSIGN(const std::vector<StatePtr> others, read_states(loaded, store, inputs));
   std::vector<const SampleState*> parts;
-  for (const StatePtr& other : others) parts.push_back(other.get());
+  for (const StatePtr& other : others) {
+    if (other->step != step || other->picture != loaded.picture) {
+      return Error{ErrorKind::bad_input,
+                   fmt::format("a state of picture {} step {}, expected {}, {}",
+                               other->picture.hex(), other->step, loaded.picture.hex(), step)};
+    }
+    parts.push_back(other.get());
+  }
   BATON_ASSIGN(const SampleState state, join_states(parts, rect, task.tile));
   const Bytes bytes = encode_state(state);
   BATON_ASSIGN(const Digest digest, store.put(bytes));
@@ -99,21 +107,19 @@ Result<TaskOutput> execute_render(const LoadedJob& loaded, BlobStore& store, con
                                   std::vector<BlobRef>* left) {
   const StepSpan& steps = grant.steps;
   // Check what came over the wire against the job.
-  if (steps.first < Step(0) || steps.last < steps.first ||
+  if (steps.first < Step(0) || steps.size() < 0 || steps.last < Step(0) ||
       steps.last >= Step(num_steps(loaded.job)) || task.tile < 0 ||
       task.tile >= TileGrid(loaded.job.image).count()) {
     return Error{ErrorKind::bad_input, fmt::format("the job has no tile {} in steps {} to {}",
                                                    task.tile, steps.first, steps.last)};
   }
+  if (steps.empty()) return execute_cut(loaded, store, task, steps.last, grant.inputs);
   double seconds_read = 0;
   std::vector<StatePtr> previous;
   {
     const CpuTimer timer(seconds_read);
     BATON_ASSIGN(previous, read_states(loaded, store, grant.inputs));
   }
-  const bool is_cut = !previous.empty() && previous.front()->step == steps.last &&
-                      previous.front()->picture == loaded.picture;
-  if (is_cut) return cut_state(loaded, store, task, previous);
   double seconds_state = seconds_read;
 
   // Render.

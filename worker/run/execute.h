@@ -35,7 +35,7 @@ struct TaskEnded {
 /// What a lease says beside the task: LeaseGrant in PROTOCOL.md.
 struct TaskGrant {
   std::vector<BlobRef> inputs;
-  StepSpan steps{};  ///< what a render task renders
+  StepSpan steps{};  ///< as in Grant
   bool may_hold = false;
   Step states_from{};
 };
@@ -43,8 +43,8 @@ struct TaskGrant {
 /// Executes one task, of the grant's frames: reads its inputs from `store`, writes its outputs
 /// there (an assembled frame goes to the job's output folder and is durable on return; blobs are
 /// after store.sync()). A state that may be held stays in loaded.held if there is room.
-/// Deterministic. A render task whose inputs are states of its own last frame renders nothing: its
-/// state is cut and joined from them. Errors: a missing or damaged input, the disk, bad input of
+/// Deterministic. With an empty span of steps a render task's state is cut and joined from its
+/// inputs. Errors: a missing or damaged input, the disk, bad input of
 /// the renderer; ErrorKind::cancelled when `stop` is requested. After one, `left` is what had been
 /// put into the store.
 Result<TaskOutput> execute_task(const LoadedJob& loaded, BlobStore& store, const TaskKey& task,

@@ -171,6 +171,25 @@ TEST_F(ExecuteTest, ARunHandsOnItsStateAndCountsItsWork) {
   EXPECT_FALSE(render(baton::Run(1), 1, {first->outputs[0]}));
 }
 
+// Steps that are empty ask for the state after `last` alone, from states of exactly that step.
+TEST_F(ExecuteTest, ACutRendersNothing) {
+  const BlobRef state = render(baton::Run(0), 1, {}).value().outputs.back();
+  const TaskKey task = render_task(baton::Run(0), 1);
+  const auto cut = [&](Step last) {
+    return execute_task(*loaded_, *store_, task, {{state}, {last + 1, last}}, {});
+  };
+  const Result<TaskOutput> made = cut(Step(1));
+  ASSERT_TRUE(made) << made.error().message;
+  EXPECT_EQ(made->outputs, std::vector<BlobRef>{state});
+  EXPECT_EQ(made->stats.pixels, 0u);
+
+  const Result<TaskOutput> of_another_step = cut(Step(3));
+  ASSERT_FALSE(of_another_step);
+  EXPECT_THAT(of_another_step.error().message, testing::HasSubstr("expected"));
+  EXPECT_FALSE(cut(Step(-1)));
+  EXPECT_FALSE(render(baton::Run(0), 1, {state})) << "what is rendered starts from nothing here";
+}
+
 // What is held is what a file would have said: the next run makes the same films of either, and
 // packing it later gives the file that packing at once does.
 TEST_F(ExecuteTest, AHeldStateIsTheStateOfItsFile) {

@@ -38,8 +38,7 @@ class Shop {
       const GrantLease grant = farm.ask_one("a");
       for (const BlobRef& input : grant.inputs)
         EXPECT_TRUE(store_.contains(input.digest)) << "an input that is not there";
-      const auto outputs =
-          outputs_of_grant(wanted, farm.job, grant.lease.task, grant.inputs, grant.steps);
+      const auto outputs = outputs_of_grant(wanted, farm.job, grant.lease.task, grant.steps);
       for (const BlobRef& blob : outputs) {
         store_.insert(blob.digest);
         if (blob.kind == BlobKind::image)

@@ -269,7 +269,7 @@ class ChaosFarm {
 
   std::vector<BlobRef> outputs(const TaskKey& task, const Held& held) const {
     const Digest tiling = digest_of("tiles of " + std::to_string(spec_.image.tile_size));
-    std::vector<BlobRef> outputs = outputs_of_grant(spec_, tiling, task, held.inputs, held.steps);
+    std::vector<BlobRef> outputs = outputs_of_grant(spec_, tiling, task, held.steps);
     for (BlobRef& blob : outputs) {
       if (options_.alike && blob.kind == BlobKind::film)
         blob.digest = digest_of("empty tile " + std::to_string((blob.position + blob.tile) / 2));

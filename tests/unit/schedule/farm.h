@@ -74,15 +74,11 @@ inline std::vector<BlobRef> outputs_of(const JobSpec& spec, const Digest& job, c
   return outputs;
 }
 
-/// What of these a task makes that was granted these inputs: a cut renders no film.
+/// What of these a task makes that was granted these steps: a cut renders no film.
 inline std::vector<BlobRef> outputs_of_grant(const JobSpec& spec, const Digest& job,
-                                             const TaskKey& task,
-                                             const std::vector<BlobRef>& inputs,
-                                             const StepSpan& steps) {
+                                             const TaskKey& task, const StepSpan& steps) {
   std::vector<BlobRef> outputs = outputs_of(spec, job, task);
-  const bool is_cut =
-      task.kind == TaskKind::render && !inputs.empty() && inputs.front().step() == steps.last;
-  if (is_cut)
+  if (steps.empty())
     std::erase_if(outputs, [](const BlobRef& blob) { return blob.kind != BlobKind::state; });
   return outputs;
 }
