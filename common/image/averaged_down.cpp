@@ -31,20 +31,20 @@ void add_row(const float* row, int width, double weight, std::vector<double>& co
 
 }  // namespace
 
-RgbImage averaged_down(const RowSource& picture, int width, int height,
+RgbImage averaged_down(const RowSource& image, int width, int height,
                        const HeightMeasure& measure) {
-  BATON_CHECK(width > 0 && width <= picture.width && height > 0 && height <= picture.height);
+  BATON_CHECK(width > 0 && width <= image.width && height > 0 && height <= image.height);
   RgbImage result{width, height, {}};
   result.rgb.reserve(std::size_t{3} * static_cast<std::size_t>(width) * height);
   std::vector<double> sums(static_cast<std::size_t>(width) * 3);
   for (std::int64_t r = 0; r < height; ++r) {
-    const std::int64_t top = r * picture.height, bottom = top + picture.height;
+    const std::int64_t top = r * image.height, bottom = top + image.height;
     std::fill(sums.begin(), sums.end(), 0.0);
     for (std::int64_t y = top / height; y * height < bottom; ++y) {
       const std::int64_t from = std::max(y * height, top);
       const std::int64_t to = std::min((y + 1) * height, bottom);
-      add_row(picture.row(static_cast<int>(y)), picture.width,
-              measure(from, to) / measure(top, bottom), sums);
+      add_row(image.row(static_cast<int>(y)), image.width, measure(from, to) / measure(top, bottom),
+              sums);
     }
     for (const double sum : sums) result.rgb.push_back(static_cast<float>(sum));
   }

@@ -21,8 +21,7 @@ using HeightMeasure = std::function<double(std::int64_t from, std::int64_t to)>;
 /// The image with `width` columns and `height` rows, no more than it has: each pixel is the mean
 /// over its part of the image. Pixels across its edges count for their share, so the mean of the
 /// whole is kept for any sizes.
-RgbImage averaged_down(const RowSource& picture, int width, int height,
-                       const HeightMeasure& measure);
+RgbImage averaged_down(const RowSource& image, int width, int height, const HeightMeasure& measure);
 /// The same where all rows count alike.
 RgbImage averaged_down(const RgbImage& image, int width, int height);
 

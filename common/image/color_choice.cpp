@@ -48,7 +48,7 @@ void take(const std::string& channel, Layer& layer) {
 }
 
 /// All layers with colours, in the order of the file.
-std::vector<Layer> layers_of(const std::vector<PictureLayout>& parts) {
+std::vector<Layer> layers_of(const std::vector<PartLayout>& parts) {
   std::vector<Layer> layers;
   for (std::size_t part = 0; part < parts.size(); ++part) {
     for (const std::string& channel : parts[part].channels) {
@@ -74,7 +74,7 @@ auto rank(const Layer& layer) {
   return std::tuple(layer.num_colors() < 3 && !layer.is_luma_chroma(), !name.empty(), !is_beauty);
 }
 
-std::string title(const Layer& layer, const std::vector<PictureLayout>& parts) {
+std::string title(const Layer& layer, const std::vector<PartLayout>& parts) {
   const std::string name = layer.name.empty() ? "" : layer.name.substr(0, layer.name.size() - 1);
   if (parts.size() == 1) return name.empty() ? "R, G, B" : fmt::format("layer \"{}\"", name);
   const std::string& part = parts[layer.part].name;
@@ -93,7 +93,7 @@ bool is_choice(const Layer& chosen, const std::vector<Layer>& layers) {
 
 }  // namespace
 
-std::optional<ColorChoice> choose_colors(const std::vector<PictureLayout>& parts) {
+std::optional<ColorChoice> choose_colors(const std::vector<PartLayout>& parts) {
   const std::vector<Layer> layers = layers_of(parts);
   if (layers.empty()) {
     const bool has_one = parts.size() == 1 && parts[0].channels.size() == 1;
@@ -118,7 +118,7 @@ std::optional<ColorChoice> choose_colors(const std::vector<PictureLayout>& parts
   return choice;
 }
 
-ColorChoice any_channels(const std::vector<PictureLayout>& parts) {
+ColorChoice any_channels(const std::vector<PartLayout>& parts) {
   std::vector<std::string> all = parts.at(0).channels;
   const auto alpha = std::ranges::find_if(all, [&](const std::string& channel) {
     const std::string name = lower(channel);

@@ -9,7 +9,7 @@
 namespace baton {
 
 /// A part of an EXR file: a picture of its own, with a name where there are several.
-struct PictureLayout {
+struct PartLayout {
   std::string name;
   std::vector<std::string> channels;
 };
@@ -31,9 +31,9 @@ struct ColorChoice {
 /// three colours come first, among them those without a name, then those that are called beauty,
 /// combined, rgb or rgba, then the first in the file. Where none has colours: the only channel, as
 /// grey; nullopt: there are several.
-std::optional<ColorChoice> choose_colors(const std::vector<PictureLayout>& parts);
+std::optional<ColorChoice> choose_colors(const std::vector<PartLayout>& parts);
 
 /// Where no layer has colours: the first three channels of the first part, or the first as grey.
-ColorChoice any_channels(const std::vector<PictureLayout>& parts);
+ColorChoice any_channels(const std::vector<PartLayout>& parts);
 
 }  // namespace baton

@@ -72,7 +72,7 @@ bool is_unknown(const Chromaticities& c) {
   return c == Chromaticities{.red = {0, 0}, .green = {0, 0}, .blue = {0, 0}, .white = {0, 0}};
 }
 
-Status convert_to_rec709(std::span<float> pixels, std::size_t channels, const PictureColors& from) {
+Status convert_to_rec709(std::span<float> pixels, std::size_t channels, const ImageColors& from) {
   std::optional<Mat3> matrix = of_columns(Imf::XYZtoRGB(to_openexr(Chromaticities()), 1));
   if (!from.is_xyz) {
     BATON_ASSIGN(matrix, to_rec709(from.chromaticities));
@@ -89,7 +89,7 @@ Status convert_to_rec709(std::span<float> pixels, std::size_t channels, const Pi
   return {};
 }
 
-std::string conversion_text(const PictureColors& colors) {
+std::string conversion_text(const ImageColors& colors) {
   std::string text;
   if (colors.is_xyz)
     text = "to Rec. 709, from CIE XYZ";

@@ -27,22 +27,22 @@ Result<std::optional<Mat3>> to_rec709(const Chromaticities& from);
 bool is_unknown(const Chromaticities& c);
 
 /// What the header of an image says of its numbers.
-struct PictureColors {
+struct ImageColors {
   Chromaticities chromaticities;
   /// They are CIE X, Y and Z, of the white of Rec. 709, in place of R, G and B.
   bool is_xyz = false;
   /// Factor by which radiance was multiplied before it was stored, > 0.
   Rgb factor{1, 1, 1};
 
-  bool operator==(const PictureColors&) const = default;
+  bool operator==(const ImageColors&) const = default;
 };
 
 /// Makes linear RGB of a space, the first three of `channels` numbers of each pixel, that of
 /// Rec. 709, undoing the factor. Error: no such space.
-Status convert_to_rec709(std::span<float> pixels, std::size_t channels, const PictureColors& from);
+Status convert_to_rec709(std::span<float> pixels, std::size_t channels, const ImageColors& from);
 
 /// "to Rec. 709, from red (0.713, 0.293), ...; divided by its exposure, 2"; empty: the numbers are
 /// taken as they are.
-std::string conversion_text(const PictureColors& colors);
+std::string conversion_text(const ImageColors& colors);
 
 }  // namespace baton

@@ -19,7 +19,7 @@ enum class ExrWindow : std::uint8_t { data, display, seen };
 
 /// What the header of a part says; of one that is not flat no channels.
 struct ExrPart {
-  PictureLayout layout;
+  PartLayout layout;
   std::optional<Chromaticities> chromaticities;
 };
 /// The parts of an EXR file, one at least. Errors: those of read_exr.

@@ -87,19 +87,19 @@ FilmTile part_of(const FilmTile& film, const PixelRect& rect) {
 }
 
 FilmTile framed(const FilmTile& film, const PixelRect& rect) {
-  FilmTile picture{rect, film.channels, {}};
-  picture.values.resize(picture.channels.size() * picture.num_pixels());
+  FilmTile moved{rect, film.channels, {}};
+  moved.values.resize(moved.channels.size() * moved.num_pixels());
   const PixelRect common = common_part(film.rect, rect);
-  if (common.width() < 1) return picture;
+  if (common.width() < 1) return moved;
   for (std::size_t c = 0; c < film.channels.size(); ++c) {
     for (std::int32_t y = common.y0; y < common.y1; ++y) {
       const auto at = [&](const PixelRect& in) {
         return std::ptrdiff_t{y - in.y0} * in.width() + (common.x0 - in.x0);
       };
-      std::copy_n(film.plane(c) + at(film.rect), common.width(), picture.plane(c) + at(rect));
+      std::copy_n(film.plane(c) + at(film.rect), common.width(), moved.plane(c) + at(rect));
     }
   }
-  return picture;
+  return moved;
 }
 
 Bytes encode_film_tile(const FilmTile& tile, const FilmOrigin& origin) {

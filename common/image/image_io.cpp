@@ -10,16 +10,16 @@
 
 #include "common/base/files.h"
 #include "common/base/limits.h"
-#include "common/image/exr_picture.h"
+#include "common/image/exr_image.h"
 #include "common/image/radiance.h"
 
 namespace baton {
 namespace {
 
-enum class PictureFormat { exr, radiance, unknown };
+enum class ImageFormat { exr, radiance, unknown };
 
 /// By the first bytes, not by the name.
-Result<PictureFormat> picture_format(const std::filesystem::path& path) {
+Result<ImageFormat> image_format(const std::filesystem::path& path) {
   std::error_code error;
   if (!std::filesystem::is_regular_file(path, error)) {
     return Error{ErrorKind::io, fmt::format("{}: no such file", path.string())};
@@ -29,9 +29,9 @@ Result<PictureFormat> picture_format(const std::filesystem::path& path) {
   file.read(start.data(), start.size());
   if (file.bad() || !file.is_open())
     return Error{ErrorKind::io, fmt::format("{}: cannot read", path.string())};
-  if (start == std::array{'\x76', '\x2f', '\x31', '\x01'}) return PictureFormat::exr;
-  if (start[0] == '#' && start[1] == '?') return PictureFormat::radiance;
-  return PictureFormat::unknown;
+  if (start == std::array{'\x76', '\x2f', '\x31', '\x01'}) return ImageFormat::exr;
+  if (start[0] == '#' && start[1] == '?') return ImageFormat::radiance;
+  return ImageFormat::unknown;
 }
 
 Error side_error(const std::filesystem::path& path, int width, int height) {
@@ -47,35 +47,35 @@ bool sides_ok(int width, int height) {
 
 /// Pixels as they are stored, as linear Rec. 709.
 Result<RgbImage> converted(const std::filesystem::path& path, RgbImage image,
-                           const PictureColors& colors) {
+                           const ImageColors& colors) {
   const Status done = convert_to_rec709(image.rgb, 3, colors);
   if (!done) return Error{done.error().kind, path.string() + ": " + done.error().message};
   return image;
 }
 
 /// Of grey there is nothing to convert.
-PictureColors colors_of(const ExrPicture& picture) {
-  const bool has_colors = picture.num_colors() > 1 && picture.chromaticities;
-  return {.chromaticities = has_colors ? *picture.chromaticities : Chromaticities()};
+ImageColors colors_of(const ExrImage& exr) {
+  const bool has_colors = exr.num_colors() > 1 && exr.chromaticities;
+  return {.chromaticities = has_colors ? *exr.chromaticities : Chromaticities()};
 }
 
 Result<RgbImage> rgb_from_exr(const std::filesystem::path& path, ExrWindow window) {
-  BATON_ASSIGN(ExrPicture picture, read_exr_picture(path, window));
-  RgbImage image{picture.width, picture.height, {}, std::move(picture.notes)};
+  BATON_ASSIGN(ExrImage exr, read_exr_image(path, window));
+  RgbImage image{exr.width, exr.height, {}, std::move(exr.notes)};
   if (!sides_ok(image.width, image.height)) return side_error(path, image.width, image.height);
 
   // A single colour is all three; one that is missing is 0.
-  const auto channels = static_cast<std::size_t>(picture.channels);
-  const auto colors = static_cast<std::size_t>(picture.num_colors());
-  const std::size_t num_pixels = picture.samples.size() / channels;
+  const auto channels = static_cast<std::size_t>(exr.channels);
+  const auto colors = static_cast<std::size_t>(exr.num_colors());
+  const std::size_t num_pixels = exr.samples.size() / channels;
   image.rgb.resize(num_pixels * 3);
   for (std::size_t i = 0; i < num_pixels; ++i) {
     for (std::size_t c = 0; c < 3; ++c) {
       const std::size_t from = colors == 1 ? 0 : c;
-      image.rgb[i * 3 + c] = from < colors ? picture.samples[i * channels + from] : 0.0f;
+      image.rgb[i * 3 + c] = from < colors ? exr.samples[i * channels + from] : 0.0f;
     }
   }
-  return converted(path, std::move(image), colors_of(picture));
+  return converted(path, std::move(image), colors_of(exr));
 }
 
 Result<RgbImage> rgb_from_radiance(const std::filesystem::path& path) {
@@ -98,22 +98,22 @@ std::uint8_t channel_to_srgb8(float linear) {
 }  // namespace
 
 Result<RgbImage> read_rgb_image(const std::filesystem::path& path, ExrWindow window) {
-  BATON_ASSIGN(const PictureFormat format, picture_format(path));
+  BATON_ASSIGN(const ImageFormat format, image_format(path));
   switch (format) {
-    case PictureFormat::exr:
+    case ImageFormat::exr:
       return rgb_from_exr(path, window);
-    case PictureFormat::radiance:
+    case ImageFormat::radiance:
       return rgb_from_radiance(path);
-    case PictureFormat::unknown:
+    case ImageFormat::unknown:
       break;
   }
   return Error{ErrorKind::bad_input,
                fmt::format("{}: neither an EXR nor a Radiance HDR picture", path.string())};
 }
 
-Result<PictureColors> read_picture_colors(const std::filesystem::path& path) {
-  BATON_ASSIGN(const PictureFormat format, picture_format(path));
-  if (format == PictureFormat::exr) return read_exr_picture_colors(path);
+Result<ImageColors> read_image_colors(const std::filesystem::path& path) {
+  BATON_ASSIGN(const ImageFormat format, image_format(path));
+  if (format == ImageFormat::exr) return read_exr_image_colors(path);
   BATON_ASSIGN(const Bytes bytes, read_file(path, limits::kMaxAssetFileBytes));
   BATON_ASSIGN(const RadianceHeader header, read_radiance_header(bytes, path.string()));
   return header.colors;

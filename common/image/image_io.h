@@ -27,14 +27,14 @@ struct RgbImage {
 };
 
 /// Reads an EXR or Radiance HDR image as float32 RGB (grey is spread to three channels, alpha
-/// dropped), in linear Rec. 709 as the header says what its numbers are (read_picture_colors).
+/// dropped), in linear Rec. 709 as the header says what its numbers are (read_image_colors).
 /// window: of an EXR file. Errors name the file: missing, not an image, truncated, sides past
 /// limits::kMaxEnvironmentSide, no colours (color_choice.h).
 Result<RgbImage> read_rgb_image(const std::filesystem::path& path,
                                 ExrWindow window = ExrWindow::display);
 /// What read_rgb_image converts from: `chromaticities` of an EXR file; PRIMARIES, EXPOSURE and
 /// COLORCORR of a Radiance one. Of an image of one channel, only factors.
-Result<PictureColors> read_picture_colors(const std::filesystem::path& path);
+Result<ImageColors> read_image_colors(const std::filesystem::path& path);
 
 /// Header attribute of an EXR file.
 using ImageMetadata = std::vector<std::pair<std::string, std::string>>;

@@ -89,7 +89,7 @@ std::optional<std::array<float, N>> parse_numbers(std::string_view text) {
 /// times: each program that changed the pixels adds its own. Zeros stand for what a program did not
 /// know. False: not the numbers that it needs.
 bool take_color_setting(std::string_view line, RadianceHeader& header) {
-  PictureColors& colors = header.colors;
+  ImageColors& colors = header.colors;
   const auto value_of = [&](std::string_view key) {
     return line.starts_with(key) ? std::optional(line.substr(key.size())) : std::nullopt;
   };

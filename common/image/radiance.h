@@ -15,7 +15,7 @@ struct RadianceHeader {
   int width = 0, height = 0;
   std::size_t size_bytes = 0;  ///< the pixels start here
   /// PRIMARIES, or XYZ; EXPOSURE times COLORCORR, of all such lines.
-  PictureColors colors;
+  ImageColors colors;
   bool is_by_column = false;  ///< what is stored one by one are columns
   /// Rows are stored from below, columns from the right.
   bool is_bottom_up = false, is_right_to_left = false;

@@ -48,7 +48,7 @@ ConnectionWatch::ConnectionWatch(zmq::context_t& context, zmq::socket_t& watched
 
 ConnectionWatch::~ConnectionWatch() { ::zmq_socket_monitor(watched_.handle(), nullptr, 0); }
 
-bool ConnectionWatch::look() {
+bool ConnectionWatch::poll() {
   bool has_failed = false;
   while (true) {
     const std::vector<std::string> event = receive_frames(events_);

@@ -37,7 +37,7 @@ class ConnectionWatch {
   /// To be polled: something has happened.
   zmq::socket_t& events() { return events_; }
   /// Takes what has happened; true: a handshake failed.
-  bool look();
+  bool poll();
   /// A whole message has come; any frame of it but the first, which the library adds.
   void note_message(const zmq::message_t& frame);
   /// Closes the connections from which more than limits::kMaxUnendedBytes have come since their

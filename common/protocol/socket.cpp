@@ -93,7 +93,7 @@ struct Socket::Impl {
   /// True: a handshake has failed.
   bool look_at_connections() {
     if (doorkeeper) doorkeeper->answer();
-    const bool has_failed = watch.look();
+    const bool has_failed = watch.poll();
     const auto now = Clock::now();
     if (is_server && now >= next_closing) {
       watch.close_endless();

@@ -15,7 +15,7 @@ namespace baton {
 namespace {
 
 /// Any picture, linear.
-Result<RgbImage> read_picture(const std::string& path) {
+Result<RgbImage> read_plate_image(const std::string& path) {
   if (is_radiance_file(path)) return read_rgb_image(path);
   BATON_ASSIGN(const Image image, read_image(path));
   return RgbImage{image.width, image.height, linear_colors(image), image.notes};
@@ -40,7 +40,7 @@ std::uint64_t repair(RgbImage& image) {
 
 Result<Plate> load_plate(const JobSpec& job, FrameNumber frame) {
   const std::string path = file_at(*job.output.plate, frame);
-  BATON_ASSIGN(RgbImage plate, read_picture(path));
+  BATON_ASSIGN(RgbImage plate, read_plate_image(path));
   const std::uint64_t repaired = repair(plate);
 
   // Its height at the picture's width, to a pixel.

@@ -25,7 +25,7 @@ struct Plate {
 Result<Plate> load_plate(const JobSpec& job, FrameNumber frame);
 
 /// Whether a plate is an EXR or Radiance HDR file, whose header may say what its numbers are
-/// (read_picture_colors); by its name.
+/// (read_image_colors); by its name.
 bool is_radiance_file(const std::string& path);
 
 /// What a person should know of a plate, a line each: "shot.0012.exr: 7 pixels are NaN or infinite

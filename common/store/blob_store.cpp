@@ -86,7 +86,7 @@ Status BlobStore::remove(const Digest& digest) {
   return {};
 }
 
-std::size_t BlobStore::sweep() const {
+std::size_t BlobStore::clean_up() const {
   std::size_t count = 0;
   std::error_code gone;
   for (const fs::path& file : old_files(directory_, ".tmp")) count += fs::remove(file, gone);

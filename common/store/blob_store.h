@@ -42,7 +42,7 @@ class BlobStore {
 
   /// Removes what processes that died while they wrote have left: temporary files that nobody has
   /// touched for kLeftoverAge, longer than any write takes. Returns how many.
-  std::size_t sweep() const;
+  std::size_t clean_up() const;
   static constexpr std::chrono::hours kLeftoverAge{1};
 
   /// The blobs that nobody has put for kLeftoverAge: whoever needs none of them made them earlier.

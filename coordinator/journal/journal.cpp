@@ -204,9 +204,9 @@ Result<Completion> Journal::read_completion(const SqlStatement& row) const {
   BATON_TRY(read_enum(database_, row.integer(0), "completions.kind", completion.task.kind));
   completion.task.position = static_cast<std::int32_t>(row.integer(1));
   completion.task.tile = static_cast<std::int32_t>(row.integer(2));
-  BATON_TRY(read_blob(database_, row.blob(3), "completions.outputs", completion.outputs));
-  BATON_TRY(read_blob(database_, row.blob(4), "completions.stats", completion.stats));
-  BATON_TRY(read_blob(database_, row.blob(5), "completions.frames", completion.frames));
+  BATON_TRY(read_blob(database_, row.blob(3), "completions.outputs", completion.made.outputs));
+  BATON_TRY(read_blob(database_, row.blob(4), "completions.stats", completion.made.stats));
+  BATON_TRY(read_blob(database_, row.blob(5), "completions.frames", completion.made.frames));
   return completion;
 }
 
@@ -271,8 +271,8 @@ Status Journal::record_completion(const Digest& job, const Completion& completio
   return change(
       "INSERT OR REPLACE INTO completions (job, kind, step, tile, outputs, stats, frames) "
       "VALUES (?, ?, ?, ?, ?, ?, ?)",
-      job, task.kind, task.position, task.tile, to_bytes(completion.outputs),
-      to_bytes(completion.stats), to_bytes(completion.frames));
+      job, task.kind, task.position, task.tile, to_bytes(completion.made.outputs),
+      to_bytes(completion.made.stats), to_bytes(completion.made.frames));
 }
 
 Status Journal::record_outputs(const Digest& job, const TaskKey& task,

@@ -33,7 +33,7 @@ class KeptFrames {
     }
   }
 
-  void look(const FormerJob& former, const FrameComparison& comparison) {
+  void collect(const FormerJob& former, const FrameComparison& comparison) {
     if (!writes_alike(former.document.job, wanted_.job)) return;
     for (const Completions::Task& task : former.tasks) {
       if (task.task.kind != TaskKind::assemble || task.outputs.size() != 1) continue;
@@ -246,25 +246,25 @@ std::vector<Step> runs_between(const KeptFrames& kept, const Timeline& timeline,
 }
 
 /// Tasks of runs and frames that are kept as a whole and that nobody takes over.
-std::vector<TaskKey> settled_tasks(const JobSpec& job, const KeptFrames& kept,
+std::vector<TaskKey> skipped_tasks(const JobSpec& job, const KeptFrames& kept,
                                    const std::vector<TaskKey>& taken) {
   const JobGraph graph(job);
   const std::set<TaskKey> known(taken.begin(), taken.end());
-  std::vector<TaskKey> settled;
-  const auto settle = [&](TaskKey key) {
+  std::vector<TaskKey> skipped;
+  const auto skip = [&](TaskKey key) {
     for (key.tile = 0; key.tile < graph.num_tiles(); ++key.tile) {
-      if (!known.contains(key)) settled.push_back(key);
+      if (!known.contains(key)) skipped.push_back(key);
     }
   };
   const Timeline& timeline = graph.timeline();
   for (Run run{0}; run < Run(graph.num_runs()); ++run) {
     const StepSpan steps = timeline.steps_of(run);
     for (Step step = steps.first; job.visibility.correlated && step <= steps.last; ++step) {
-      if (kept.has(timeline.frame_of(step))) settle(second_pass_task(step, 0));
+      if (kept.has(timeline.frame_of(step))) skip(second_pass_task(step, 0));
     }
-    if (kept.has_all(timeline, steps)) settle(render_task(run, 0));
+    if (kept.has_all(timeline, steps)) skip(render_task(run, 0));
   }
-  return settled;
+  return skipped;
 }
 
 }  // namespace
@@ -284,7 +284,7 @@ Adoption adopt(const ParsedJobDocument& wanted, const std::vector<FormerJob>& fo
   std::vector<Predecessor> predecessors;
   for (const FormerJob& former : formers) {
     const FrameComparison comparison(former.document, wanted);
-    kept.look(former, comparison);
+    kept.collect(former, comparison);
     predecessors.emplace_back(wanted, former, comparison);
   }
   kept.write_to(adoption);
@@ -319,7 +319,7 @@ Adoption adopt(const ParsedJobDocument& wanted, const std::vector<FormerJob>& fo
     predecessors[*adoption.former].take_tasks(with_runs, kept, files, adoption);
   if (adoption.former && !best.same_tasks && best.states < Step(timeline.num_frames()))
     predecessors[*adoption.former].cut_states(with_runs, best.states, adoption);
-  adoption.settled = settled_tasks(with_runs, kept, adoption.tasks);
+  adoption.skipped = skipped_tasks(with_runs, kept, adoption.tasks);
   return adoption;
 }
 

@@ -33,7 +33,7 @@ struct Adoption {
   /// Tasks of `former` that count as the new job's, under their keys.
   std::vector<TaskKey> tasks;
   /// Done without outputs until something of them is needed.
-  std::vector<TaskKey> settled;
+  std::vector<TaskKey> skipped;
   JobPlan plan;
   /// Frames are written anew, as they lie over other plates.
   bool other_plates = false;

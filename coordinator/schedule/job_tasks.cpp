@@ -25,14 +25,14 @@ void JobTasks::complete(TaskIndex task, const Completion& completion, const std:
                         bool is_shared, BlobReferences& blobs) {
   made_.set_maker(task, worker);
   if (made_.former_outputs(task).empty()) {
-    stats_.merge(completion.stats);
+    stats_.merge(completion.made.stats);
     const bool is_frame = completion.task.kind == TaskKind::assemble;
-    for (const FrameStats& stats : completion.frames)
+    for (const FrameStats& stats : completion.made.frames)
       frames_[is_frame ? stats.frame() : graph_.timeline().frame_of(stats.step())].merge(stats);
   }
 
   // What this task needed may go; what needed this task comes closer.
-  force_done(task, completion.outputs);
+  force_done(task, completion.made.outputs);
   ledger_.complete(view(), task, is_shared, blobs);
   for (const TaskIndex dependent : graph_.dependents(completion.task))
     book_.add_input(graph_, dependent);

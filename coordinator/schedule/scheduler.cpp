@@ -128,11 +128,11 @@ void Scheduler::on(const JobForgotten& event, TimePoint, Actions&) {
 
 void Scheduler::on(const TaskCompleted& event, TimePoint now, Actions& actions) {
   if (!leases_.touch(event.worker, now)) return;
-  std::vector<BlobRef> outputs = event.outputs;
+  std::vector<BlobRef> outputs = event.made.outputs;
 
   // A report that nobody waits for is ignored, but it must agree with what was reported before.
-  const Held held = hold(event.worker, event.lease, now);
-  if (!held.job) {
+  const Claim claim = find_claim(event.worker, event.lease, now);
+  if (!claim.job) {
     const Job* job = find_job(event.lease.job);
     const auto task = job ? job->tasks.graph().find(event.lease.task) : std::nullopt;
     on(AttemptLeft{event.lease, stored_blobs(outputs)}, now, actions);
@@ -142,36 +142,37 @@ void Scheduler::on(const TaskCompleted& event, TimePoint now, Actions& actions) 
   }
 
   // A lease that was taken up again may be an old one: what it held may have been dropped since.
-  if (!leases_.at({event.lease.job, held.task}).may_hold &&
+  if (!leases_.at({event.lease.job, claim.task}).may_hold &&
       std::any_of(outputs.begin(), outputs.end(), [](const BlobRef& b) { return b.is_held(); })) {
     on(ResultMissing{event.worker, event.lease, outputs}, now, actions);
     return;
   }
 
   // An incomplete report is a failed attempt.
-  const JobGraph& graph = held.job->tasks.graph();
-  const auto extent =
-      held.job->tasks.ledger().is_cut(held.task) ? JobGraph::Extent::state : JobGraph::Extent::all;
+  const JobGraph& graph = claim.job->tasks.graph();
+  const auto extent = claim.job->tasks.ledger().is_cut(claim.task) ? JobGraph::Extent::state
+                                                                   : JobGraph::Extent::all;
   std::optional<std::string> fault = graph.check_outputs(event.lease.task, outputs, extent);
-  if (!fault) fault = graph.check_frames(event.lease.task, event.frames);
+  if (!fault) fault = graph.check_frames(event.lease.task, event.made.frames);
   if (fault) {
-    fail_attempt(held, {event.lease, event.worker, *fault}, now, actions);
+    fail_attempt(claim, {event.lease, event.worker, *fault}, now, actions);
     on(AttemptLeft{event.lease, stored_blobs(outputs)}, now, actions);
     return;
   }
   // What was done before must come out alike.
   const bool is_equal =
-      compare_results(event, held.job->tasks.made().former_outputs(held.task), outputs, actions);
-  Completion completion{event.lease.task, std::move(outputs), event.stats, event.frames};
-  const bool is_shared = !leases_.at({event.lease.job, held.task}).may_hold;
-  held.job->tasks.complete(held.task, completion, event.worker, is_shared, blobs_);
-  held.job->sizes.learn(completion.outputs);
-  follow_longest(held.job->longest_seconds.at(static_cast<std::size_t>(event.lease.task.kind)),
-                 event.stats.cpu_seconds);
-  if (held.job->status == JobStatus::running) held.job->waits.clear();
-  drop_lease(event.lease.job, held.task);
+      compare_results(event, claim.job->tasks.made().former_outputs(claim.task), outputs, actions);
+  Completion completion{event.lease.task, event.made};
+  completion.made.outputs = std::move(outputs);
+  const bool is_shared = !leases_.at({event.lease.job, claim.task}).may_hold;
+  claim.job->tasks.complete(claim.task, completion, event.worker, is_shared, blobs_);
+  claim.job->sizes.learn(completion.made.outputs);
+  follow_longest(claim.job->longest_seconds.at(static_cast<std::size_t>(event.lease.task.kind)),
+                 event.made.stats.cpu_seconds);
+  if (claim.job->status == JobStatus::running) claim.job->waits.clear();
+  drop_lease(event.lease.job, claim.task);
   actions.push_back(RecordCompletion{event.lease.job, std::move(completion)});
-  if (is_equal) end_if_finished(event.lease.job, *held.job, actions);
+  if (is_equal) end_if_finished(event.lease.job, *claim.job, actions);
 }
 
 /// Two different results for one task are a bug or a broken machine: the job pauses, so that
@@ -195,48 +196,48 @@ bool Scheduler::compare_results(const TaskCompleted& event, const std::vector<Bl
 }
 
 void Scheduler::on(const AttemptFailed& event, TimePoint now, Actions& actions) {
-  if (!leases_.touch(event.worker, now)) return;
-  const Held held = hold(event.worker, event.lease, now);
-  if (held.job)
-    fail_attempt(held, {event.lease, event.worker, event.message, event.permanent}, now, actions);
+  const Failure& failure = event.failure;
+  if (!leases_.touch(failure.worker, now)) return;
+  const Claim claim = find_claim(failure.worker, failure.lease, now);
+  if (claim.job) fail_attempt(claim, failure, now, actions);
 }
 
 void Scheduler::on(const ResultMissing& event, TimePoint now, Actions& actions) {
   if (!leases_.touch(event.worker, now)) return;
-  if (const Held held = hold(event.worker, event.lease, now); held.job) {
-    held.job->tasks.attempts().add_returned(held.task, event.lease, event.worker);
-    lose_lease(event.lease.job, held.task, actions);
+  if (const Claim claim = find_claim(event.worker, event.lease, now); claim.job) {
+    claim.job->tasks.attempts().add_returned(claim.task, event.lease, event.worker);
+    lose_lease(event.lease.job, claim.task, actions);
   }
   on(AttemptLeft{event.lease, stored_blobs(event.outputs)}, now, actions);
 }
 
 void Scheduler::on(const SpaceLacking& event, TimePoint now, Actions&) {
   if (!leases_.touch(event.worker, now)) return;
-  const Held held = hold(event.worker, event.lease, now);
-  if (!held.job) return;
-  return_lease(held, event.lease, event.worker);
-  held.job->rests_until.at(static_cast<std::size_t>(event.lease.task.kind)) = now + kRest;
+  const Claim claim = find_claim(event.worker, event.lease, now);
+  if (!claim.job) return;
+  return_lease(claim, event.lease, event.worker);
+  claim.job->rests_until.at(static_cast<std::size_t>(event.lease.task.kind)) = now + kRest;
   for (auto& [digest, job] : jobs_) {
     if (is_open(job.status)) job.tasks.let_between_go(blobs_);
   }
-  held.job->waits = event.message;
+  claim.job->waits = event.message;
 }
 
 void Scheduler::on(const LeaseReturned& event, TimePoint now, Actions&) {
   if (!leases_.touch(event.worker, now)) return;
   if (Job* job = find(event.lease.job); job != nullptr && !event.unseen.empty())
     job->standings.add_blind(event.worker, event.unseen, now);
-  const Held held = hold(event.worker, event.lease, now);
-  if (held.job) return_lease(held, event.lease, event.worker);
+  const Claim claim = find_claim(event.worker, event.lease, now);
+  if (claim.job) return_lease(claim, event.lease, event.worker);
 }
 
 void Scheduler::on(const InputsLost& event, TimePoint now, Actions& actions) {
   if (!leases_.touch(event.worker, now)) return;
-  const Held held = hold(event.worker, event.lease, now);
-  if (!held.job) return;
-  JobTasks& tasks = held.job->tasks;
+  const Claim claim = find_claim(event.worker, event.lease, now);
+  if (!claim.job) return;
+  JobTasks& tasks = claim.job->tasks;
   std::vector<TaskKey> makers;
-  if (tasks.ledger().is_cut(held.task)) makers.push_back(event.lease.task);  // it will be rendered
+  if (tasks.ledger().is_cut(claim.task)) makers.push_back(event.lease.task);  // it will be rendered
   for (const TaskIndex input : tasks.graph().inputs(event.lease.task)) {
     const std::vector<BlobRef>& made = tasks.made().outputs(input);
     const bool lost = std::any_of(made.begin(), made.end(), [&](const BlobRef& output) {
@@ -244,9 +245,9 @@ void Scheduler::on(const InputsLost& event, TimePoint now, Actions& actions) {
     });
     if (lost) makers.push_back(tasks.graph().key(input));
   }
-  tasks.attempts().add_returned(held.task, event.lease, event.worker);
-  lose_lease(event.lease.job, held.task, actions);
-  if (is_open(held.job->status)) reopen({event.lease.job, makers}, *held.job, actions);
+  tasks.attempts().add_returned(claim.task, event.lease, event.worker);
+  lose_lease(event.lease.job, claim.task, actions);
+  if (is_open(claim.job->status)) reopen({event.lease.job, makers}, *claim.job, actions);
 }
 
 void Scheduler::on(const HeldPublished& event, TimePoint now, Actions& actions) {
@@ -311,21 +312,21 @@ void Scheduler::reopen(RecordReopened record, Job& job, Actions& actions) {
   if (!record.tasks.empty()) actions.push_back(std::move(record));
 }
 
-void Scheduler::fail_attempt(const Held& held, Failure failure, TimePoint now, Actions& actions) {
+void Scheduler::fail_attempt(const Claim& claim, Failure failure, TimePoint now, Actions& actions) {
   const Digest digest = failure.lease.job;
-  Job& job = *held.job;
-  drop_lease(digest, held.task);
-  job.tasks.add_failure(held.task, failure, blobs_);
-  failure.last = is_exhausted(leases_.connected(), job.tasks.attempts().blame(held.task),
+  Job& job = *claim.job;
+  drop_lease(digest, claim.task);
+  job.tasks.add_failure(claim.task, failure, blobs_);
+  failure.last = is_exhausted(leases_.connected(), job.tasks.attempts().blame(claim.task),
                               job.spec.max_retries_per_task);
   actions.push_back(RecordFailure{failure});
 
   job.standings.add_failure(failure.worker, job.spec.max_failures_per_worker, now);
   if (failure.last) {
-    give_up(digest, job, held.task, failure.message, actions);
+    give_up(digest, job, claim.task, failure.message, actions);
     return;
   }
-  job.tasks.give_back(held.task);
+  job.tasks.give_back(claim.task);
 
   // Another worker should try, so nothing that it needs may be bound to this one.
   std::vector<TaskKey> bound;

@@ -101,7 +101,7 @@ class Scheduler {
 
  private:
   /// A task that a worker holds.
-  struct Held {
+  struct Claim {
     Job* job = nullptr;
     TaskIndex task = 0;
   };
@@ -129,13 +129,13 @@ class Scheduler {
   void on(const ClockTicked& event, TimePoint now, Actions& actions);
 
   // Leases (scheduler_leases.cpp).
-  Held hold(const std::string& worker, const LeaseId& lease, TimePoint now);
+  Claim find_claim(const std::string& worker, const LeaseId& lease, TimePoint now);
   void reconcile(const std::string& worker, const std::vector<LeaseId>& named,
                  TimePoint granted_until, TimePoint now, Actions& actions);
   Lease& add_lease(const std::string& worker, const LeaseId& lease, TaskIndex task, TimePoint now);
   void revoke_lease(const Digest& job, TaskIndex task, Actions& actions);
   void drop_lease(const Digest& job, TaskIndex task);
-  void return_lease(const Held& held, const LeaseId& lease, const std::string& worker);
+  void return_lease(const Claim& claim, const LeaseId& lease, const std::string& worker);
   void lose_lease(const Digest& job, TaskIndex task, Actions& actions);
   void remove_worker(const std::string& worker, bool lost, Actions& actions);
   void lose_held(const std::string& worker, Actions& actions);
@@ -154,7 +154,7 @@ class Scheduler {
   void reopen(RecordReopened record, Job& job, Actions& actions);
   bool compare_results(const TaskCompleted& event, const std::vector<BlobRef>& expected,
                        const std::vector<BlobRef>& reported, Actions& actions);
-  void fail_attempt(const Held& held, Failure failure, TimePoint now, Actions& actions);
+  void fail_attempt(const Claim& claim, Failure failure, TimePoint now, Actions& actions);
   void give_up(const Digest& digest, Job& job, TaskIndex task, const std::string& reason,
                Actions& actions);
   void pause_job(const Digest& digest, Job& job, const std::string& reason, Actions& actions);

@@ -73,7 +73,8 @@ double Scheduler::longest_task_seconds() const {
 /// The task of a lease that the worker says it has. A lease that was lost, or granted by an earlier
 /// coordinator, is taken up again while nobody else has the task or holds what it was made of. No
 /// job in the answer: the lease is over.
-Scheduler::Held Scheduler::hold(const std::string& worker, const LeaseId& lease, TimePoint now) {
+Scheduler::Claim Scheduler::find_claim(const std::string& worker, const LeaseId& lease,
+                                       TimePoint now) {
   Job* job = find(lease.job);
   if (!job || !is_open(job->status)) return {};
   const std::optional<TaskIndex> task = job->tasks.graph().find(lease.task);
@@ -81,7 +82,7 @@ Scheduler::Held Scheduler::hold(const std::string& worker, const LeaseId& lease,
 
   if (job->tasks.book().status(*task) == TaskStatus::leased) {
     const Lease& current = leases_.at({lease.job, *task});
-    return current.id == lease && current.worker == worker ? Held{job, *task} : Held{};
+    return current.id == lease && current.worker == worker ? Claim{job, *task} : Claim{};
   }
   if (job->tasks.book().status(*task) != TaskStatus::ready ||
       job->tasks.attempts().has_ended(*task, lease) || !can_read(job->tasks, *task, worker))
@@ -104,7 +105,7 @@ void Scheduler::reconcile(const std::string& worker, const std::vector<LeaseId>&
 
   // What it names it keeps, if nobody else has it.
   for (const LeaseId& lease : in_hand) {
-    if (!hold(worker, lease, now).job) actions.push_back(RevokeLease{worker, lease});
+    if (!find_claim(worker, lease, now).job) actions.push_back(RevokeLease{worker, lease});
   }
 }
 
@@ -112,7 +113,7 @@ Lease& Scheduler::add_lease(const std::string& worker, const LeaseId& lease, Tas
                             TimePoint now) {
   Job& job = jobs_.at(lease.job);
   if (lease.task.kind == TaskKind::render) {
-    job.homes.settle(lease.task.tile, worker);
+    job.homes.assign(lease.task.tile, worker);
     job.begun_runs = std::max(job.begun_runs, lease.task.run() + 1);
   }
   return leases_.add(task, {lease, worker, now, job.sizes.largest(job.tasks.graph(), lease.task)});
@@ -130,10 +131,10 @@ void Scheduler::revoke_lease(const Digest& job, TaskIndex task, Actions& actions
 }
 
 /// A lease that ends without a result, and without anybody's failure.
-void Scheduler::return_lease(const Held& held, const LeaseId& lease, const std::string& worker) {
-  drop_lease(lease.job, held.task);
-  held.job->tasks.attempts().add_returned(held.task, lease, worker);
-  held.job->tasks.give_back(held.task);
+void Scheduler::return_lease(const Claim& claim, const LeaseId& lease, const std::string& worker) {
+  drop_lease(lease.job, claim.task);
+  claim.job->tasks.attempts().add_returned(claim.task, lease, worker);
+  claim.job->tasks.give_back(claim.task);
 }
 
 /// The worker no longer has it, or nobody has what it made: no failure. But a task that was lost

@@ -24,7 +24,7 @@ void TileHomes::leave(const std::string& worker) {
   for (std::size_t i = first; i < end; ++i) homes_[i] = i < middle && first > 0 ? before : after;
 }
 
-void TileHomes::settle(std::int32_t tile, const std::string& worker) {
+void TileHomes::assign(std::int32_t tile, const std::string& worker) {
   if (is_home(tile, worker)) return;
   const auto [first, end] = strip(homes_[place(tile)]);
   const auto [own_first, own_end] = strip(worker);

@@ -29,7 +29,7 @@ class TileHomes {
   /// The worker is gone; who is beside it has its strip.
   void leave(const std::string& worker);
   /// The worker begins to render the tile.
-  void settle(std::int32_t tile, const std::string& worker);
+  void assign(std::int32_t tile, const std::string& worker);
 
   bool is_home(std::int32_t tile, const std::string& worker) const;
   /// Whether all tiles within the reach of history are at home with the worker: then whoever needs

@@ -35,7 +35,7 @@ std::vector<BlobRef> leased_inputs(const FarmCore& farm, const LeaseId& lease) {
 std::optional<std::string> find_missing_blob(const FarmCore& farm, const TaskDone& report) {
   // Of a task that was done before the blobs may have served their purpose.
   if (job_of_open_task(farm, report.lease) == nullptr) return std::nullopt;
-  for (const BlobRef& output : report.outputs) {
+  for (const BlobRef& output : report.made.outputs) {
     if (output.kind != BlobKind::image && !output.is_held() && !farm.store.contains(output.digest))
       return farm.store.path(output.digest).string();
   }
@@ -46,7 +46,7 @@ std::optional<std::string> find_missing_frame(const FarmCore& farm, const TaskDo
   const Scheduler::Job* job = job_of_open_task(farm, report.lease);
   if (job == nullptr || report.lease.task.kind != TaskKind::assemble) return std::nullopt;
   const fs::path path = frame_path(job->spec, report.lease.task.frame());
-  for (const BlobRef& output : report.outputs) {
+  for (const BlobRef& output : report.made.outputs) {
     std::error_code error;
     if (fs::file_size(path, error) != output.size_bytes || error) return path.string();
   }

@@ -30,7 +30,7 @@ struct ServiceOptions {
   Roots roots = {};
   /// Bytes that blobs may take; 0: as the disk has room.
   std::uint64_t store_limit = 0;
-  std::chrono::milliseconds sweep_every =
+  std::chrono::milliseconds clean_up_every =
       BlobStore::kLeftoverAge;  ///< when the store is searched for leftovers
   /// Reads whole files, on a thread of its own; a test may make it slow.
   FileReader::DigestFile digest_file = digest_of_file;

@@ -134,7 +134,8 @@ LostFiles find_lost_files(const JobAdded& job, const BlobStore& store, FileTable
   recorded.restore(job.completions, {}, references, job.plan);
   const JobGraph& graph = recorded.graph();
   LostFiles lost;
-  const auto look = [&](TaskIndex task, const fs::path& path, std::uint64_t size_bytes) {
+  const auto is_there_as_told = [&](TaskIndex task, const fs::path& path,
+                                    std::uint64_t size_bytes) {
     if (size_bytes == 0) return true;  // a held state: the scheduler knows its holder
     std::error_code error;
     const std::uintmax_t size = fs::file_size(path, error);
@@ -150,11 +151,11 @@ LostFiles find_lost_files(const JobAdded& job, const BlobStore& store, FileTable
 
   for (TaskIndex task = graph.num_frames(); task < graph.num_tasks(); ++task) {
     for (const BlobRef& blob : recorded.ledger().live_blobs(recorded.view(), task)) {
-      if (!look(task, store.path(blob.digest), blob.size_bytes)) break;
+      if (!is_there_as_told(task, store.path(blob.digest), blob.size_bytes)) break;
     }
     if (recorded.ledger().is_cut(task)) {
       for (const BlobRef& blob : recorded.ledger().inputs(recorded.view(), task)) {
-        if (!look(task, store.path(blob.digest), blob.size_bytes)) break;
+        if (!is_there_as_told(task, store.path(blob.digest), blob.size_bytes)) break;
       }
     }
     for (const BlobRef& blob : recorded.ledger().spare_blobs(recorded.view(), task)) {
@@ -165,7 +166,7 @@ LostFiles find_lost_files(const JobAdded& job, const BlobStore& store, FileTable
     if (recorded.book().status(frame) != TaskStatus::done) continue;
     const fs::path path = frame_path(job.spec, FrameIndex(frame));
     const BlobRef& image = recorded.made().outputs(frame).front();
-    const bool is_there = look(frame, path, image.size_bytes);
+    const bool is_there = is_there_as_told(frame, path, image.size_bytes);
     if (is_there &&
         (frames == nullptr || lost.unreadable || frames->holds(path, image).value_or(false)))
       continue;

@@ -81,7 +81,7 @@ Status Service::turn() {
     asked_for_hello_.clear();
     tell_refusals();
     BATON_TRY(farm_.step(ClockTicked{}));
-    if (Clock::now() >= next_sweep_) BATON_TRY(sweep());
+    if (Clock::now() >= next_clean_up_) BATON_TRY(clean_up());
     farm_.retry_removals();
   }
 
@@ -166,20 +166,18 @@ Status Service::receive_from(const std::string& worker, const TaskDone& message)
   // that is not where it belongs is on a disk that only the worker sees.
   if (const auto missing = find_missing_frame(farm_, message)) {
     return farm_.step(AttemptFailed{
-        worker, message.lease,
-        fmt::format("{}: reported, but not there as the coordinator sees it: is the output folder "
-                    "mounted where the worker runs?",
-                    *missing),
-        false});
+        {message.lease, worker,
+         fmt::format("{}: reported, but not there as the coordinator sees it: is the output folder "
+                     "mounted where the worker runs?",
+                     *missing)}});
   }
   if (const auto missing = find_missing_blob(farm_, message)) {
     spdlog::warn("worker {}: {}: reported, but not there; the task is done again", worker,
                  *missing);
-    return farm_.step(ResultMissing{worker, message.lease, message.outputs});
+    return farm_.step(ResultMissing{worker, message.lease, message.made.outputs});
   }
   keep_notes(message);
-  return farm_.step(
-      TaskCompleted{worker, message.lease, message.outputs, message.stats, message.frames});
+  return farm_.step(TaskCompleted{worker, message.lease, message.made});
 }
 
 /// What a worker has to say of a job's files, for those who ask for the job.
@@ -216,8 +214,9 @@ Status Service::receive_from(const std::string& worker, const TaskFailed& messag
       spdlog::warn("{}", removed.error().message);
   }
   if (bad) return farm_.step(InputsLost{worker, message.lease, *bad});
-  return farm_.step(AttemptFailed{
-      worker, message.lease, message.message.substr(0, limits::kMaxTextLength), message.permanent});
+  return farm_.step(
+      AttemptFailed{{message.lease, worker, message.message.substr(0, limits::kMaxTextLength),
+                     message.permanent}});
 }
 
 Status Service::receive_from(const std::string& worker, const StatesPublished& message) {

@@ -42,7 +42,7 @@ class Service {
 
   Status restore_jobs();
   Status restore_job(const Digest& job);
-  Status sweep();
+  Status clean_up();
   Status turn();
   Status handle(const Incoming& incoming);
 
@@ -96,7 +96,7 @@ class Service {
   Speaker speaker_;                        ///< who sent the message in hand
   std::map<std::string, TimePoint> told_;  ///< warnings, and when
   TimePoint next_tick_{};
-  TimePoint next_sweep_;
+  TimePoint next_clean_up_;
   bool stop_requested_ = false;
   bool has_unread_jobs_ = false;      ///< in the journal
   FileTable files_;                   ///< frames, and inputs of failed attempts

@@ -24,14 +24,14 @@ Status Service::restore_jobs() {
   BATON_TRY(farm_.count_kept());
   BATON_TRY(farm_.journal.commit());
   BATON_TRY(farm_.let_out());
-  return sweep();
+  return clean_up();
 }
 
 /// Removes what processes that died left in the store and neither an open job nor the archive
 /// needs. A job that cannot be read may need anything.
-Status Service::sweep() {
-  next_sweep_ = std::chrono::steady_clock::now() + farm_.options.sweep_every;
-  const std::size_t unfinished = farm_.store.sweep();
+Status Service::clean_up() {
+  next_clean_up_ = std::chrono::steady_clock::now() + farm_.options.clean_up_every;
+  const std::size_t unfinished = farm_.store.clean_up();
   if (unfinished > 0)
     spdlog::info("{} files that were never finished are removed from the store", unfinished);
   if (has_unread_jobs_) return {};

@@ -214,8 +214,8 @@ Status Submission::take_over(const Adoption& adoption, const std::vector<Digest>
         farm_.journal.for_each_completion(former, [&](const Completion& completion) -> Status {
           const bool is_assembly = completion.task.kind == TaskKind::assemble;
           const auto image = is_assembly ? images.find(completion.task.frame()) : images.end();
-          const bool is_frame = image != images.end() && completion.outputs.size() == 1 &&
-                                completion.outputs.front() == image->second;
+          const bool is_frame = image != images.end() && completion.made.outputs.size() == 1 &&
+                                completion.made.outputs.front() == image->second;
           if (is_frame) images.erase(image);
           // A frame that the job itself wrote and that is gone must come out as it was.
           const bool is_lost =
@@ -225,9 +225,8 @@ Status Submission::take_over(const Adoption& adoption, const std::vector<Digest>
           return {};
         }));
   }
-  for (const auto& [frame, image] : images)
-    taken.push_back({assemble_task(frame), {image}, {}, {}});
-  for (const TaskKey& task : adoption.settled) taken.push_back({task, {}, {}, {}});
+  for (const auto& [frame, image] : images) taken.push_back({assemble_task(frame), {{image}}});
+  for (const TaskKey& task : adoption.skipped) taken.push_back({task, {}});
 
   if (text.empty()) {
     BATON_TRY(farm_.journal.restart_job(event.job));
@@ -275,9 +274,9 @@ Result<std::vector<fs::path>> Submission::unread_frames(const JobSpec& job) {
     const Result<ParsedJobDocument> document = parse_job_document(text.value_or(""));
     if (!document) continue;
     BATON_TRY(farm_.journal.for_each_completion(digest, [&](const Completion& done) -> Status {
-      if (done.task.kind != TaskKind::assemble || done.outputs.size() != 1) return {};
+      if (done.task.kind != TaskKind::assemble || done.made.outputs.size() != 1) return {};
       const fs::path path = frame_path(document->job, done.task.frame()).lexically_normal();
-      if (wanted.contains(path) && files_.must_be_read(path, done.outputs.front()))
+      if (wanted.contains(path) && files_.must_be_read(path, done.made.outputs.front()))
         unread.insert(path);
       return {};
     }));

@@ -77,7 +77,7 @@ SlurmOrders give_orders(const SlurmSnapshot& now) {
   return orders;
 }
 
-bool VainArrays::look(const SlurmSnapshot& now) {
+bool VainArrays::observe(const SlurmSnapshot& now) {
   if (open_.empty()) return false;
   const auto has_come = [&](const SlurmWorker& worker) { return is_of_array(worker.id, open_); };
   if (std::any_of(now.workers.begin(), now.workers.end(), has_come)) {

@@ -76,7 +76,7 @@ class VainArrays {
  public:
   void submitted(const std::string& array) { open_ = array; }
   /// What a snapshot has found. True: one more has been in vain.
-  bool look(const SlurmSnapshot& now);
+  bool observe(const SlurmSnapshot& now);
   /// Pilots of it that are cancelled as there are too many do not count.
   void cancelled(const std::vector<std::string>& pilots);
   int count() const { return count_; }

@@ -43,7 +43,7 @@ RgbImage heat_map(const std::vector<float>& errors, int width, int height) {
 
 }  // namespace
 
-RgbImage crop_strip(const Reference& reference, std::span<const Picture> tests,
+RgbImage crop_strip(const Reference& reference, std::span<const MeasuredFrame> tests,
                     const std::array<int, 4>& crop) {
   const int scale = std::max(1, (kLeastWidth + crop[2] - 1) / crop[2]);
   const int width = crop[2] * scale, height = crop[3] * scale;

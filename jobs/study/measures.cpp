@@ -27,7 +27,7 @@ double mean_over(const std::vector<float>& values, const std::vector<std::size_t
 
 }  // namespace
 
-FrameMeasures measure_frame(const Picture& test, const Reference& reference) {
+FrameMeasures measure_frame(const MeasuredFrame& test, const Reference& reference) {
   const auto& a = reference.half[0];
   const auto& b = reference.half[1];
   BATON_CHECK(test.image.rgb.size() == reference.mean.rgb.size());
@@ -76,13 +76,13 @@ FrameMeasures measure_frame(const Picture& test, const Reference& reference) {
   return m;
 }
 
-double measure_flicker(const Picture& before, const Reference& reference_before, const Picture& now,
-                       const Reference& reference_now) {
+double measure_flicker(const MeasuredFrame& before, const Reference& reference_before,
+                       const MeasuredFrame& now, const Reference& reference_now) {
   double change = 0, error = 0;
   for (const std::size_t i : reference_now.lit_pixels) {
     for (std::size_t k = 3 * i; k < 3 * i + 3; ++k) {
       // Errors against either half, before and now.
-      const auto against = [k](const Picture& test, const Reference& reference, int half) {
+      const auto against = [k](const MeasuredFrame& test, const Reference& reference, int half) {
         return double{test.image.rgb[k]} - reference.half[half].image.rgb[k];
       };
       const double before_a = against(before, reference_before, 0);

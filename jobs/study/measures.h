@@ -4,7 +4,7 @@
 #include <vector>
 
 #include "common/job/time.h"
-#include "jobs/study/picture.h"
+#include "jobs/study/measured_frame.h"
 
 namespace baton {
 
@@ -36,10 +36,10 @@ struct FrameMeasures {
 };
 
 /// test: of the size of the reference.
-FrameMeasures measure_frame(const Picture& test, const Reference& reference);
+FrameMeasures measure_frame(const MeasuredFrame& test, const Reference& reference);
 
 /// The flicker between two consecutive frames (see FrameMeasures::flicker).
-double measure_flicker(const Picture& before, const Reference& reference_before, const Picture& now,
-                       const Reference& reference_now);
+double measure_flicker(const MeasuredFrame& before, const Reference& reference_before,
+                       const MeasuredFrame& now, const Reference& reference_now);
 
 }  // namespace baton

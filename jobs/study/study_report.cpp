@@ -27,11 +27,11 @@ Result<ReportCrops> make_crops(const Study& study, const StudyResults& results,
   const StudyScene& scene = study.scenes[index];
   ReportCrops crops;
   crops.cells = equal_time_cells(study, results, index);
-  std::vector<Picture> pictures;
+  std::vector<MeasuredFrame> pictures;
   for (const std::size_t cell : crops.cells) {
     const fs::path frames = folder.frames_folder(results.runs[cell].front().key);
-    BATON_ASSIGN(Picture picture, read_picture(frame_file(frames, scene.frames.back())));
-    pictures.push_back(std::move(picture));
+    BATON_ASSIGN(MeasuredFrame frame, read_measured_frame(frame_file(frames, scene.frames.back())));
+    pictures.push_back(std::move(frame));
   }
   const fs::path path = output / (file_slug(scene.name) + "-crops.png");
   const Reference& reference = results.references[index].back();

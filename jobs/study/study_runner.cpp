@@ -46,8 +46,8 @@ Result<std::vector<Reference>> load_references(const StudyScene& scene, const St
   }
   std::vector<Reference> references;
   for (const FrameNumber frame : scene.frames) {
-    BATON_ASSIGN(Picture a, read_picture(frame_file(frames[0], frame)));
-    BATON_ASSIGN(Picture b, read_picture(frame_file(frames[1], frame)));
+    BATON_ASSIGN(MeasuredFrame a, read_measured_frame(frame_file(frames[0], frame)));
+    BATON_ASSIGN(MeasuredFrame b, read_measured_frame(frame_file(frames[1], frame)));
     references.push_back(make_reference(std::move(a), std::move(b)));
     if (const auto fault = reference_fault(references.back())) {
       return Error{ErrorKind::corrupt,
@@ -88,17 +88,18 @@ Status render_references(const Study& study, const StudyFolder& folder, JobRunne
 Result<RunRecord> measure_run(const JobSpec& job, const std::vector<FrameNumber>& frames,
                               const std::vector<Reference>& references) {
   RunRecord record;
-  Picture before;
+  MeasuredFrame before;
   for (std::size_t i = 0; i < frames.size(); ++i) {
-    BATON_ASSIGN(Picture picture, read_picture(frame_file(job.output.directory, frames[i])));
-    FrameMeasures measures = measure_frame(picture, references[i]);
+    BATON_ASSIGN(MeasuredFrame frame,
+                 read_measured_frame(frame_file(job.output.directory, frames[i])));
+    FrameMeasures measures = measure_frame(frame, references[i]);
     measures.frame = frames[i];
     // Flicker is between neighbours of the sequence.
     const auto at = std::lower_bound(job.frames.begin(), job.frames.end(), frames[i]);
     if (i > 0 && *std::prev(at) == frames[i - 1])
-      measures.flicker = measure_flicker(before, references[i - 1], picture, references[i]);
+      measures.flicker = measure_flicker(before, references[i - 1], frame, references[i]);
     record.frames.push_back(measures);
-    before = std::move(picture);
+    before = std::move(frame);
   }
   return record;
 }

@@ -206,7 +206,7 @@ class SimulatedWorker {
   /// Publishes what a task makes, and reports it.
   Status finish(const LeaseId& lease) {
     const TaskKey& task = lease.task;
-    TaskDone done{lease, {}, numbers_like_those_of_a_tile()};
+    TaskDone done{lease, {{}, numbers_like_those_of_a_tile()}};
     const auto publish = [&](BlobKind kind, std::int32_t position) -> Status {
       const std::string text = fmt::format("{} {} {} {}", static_cast<int>(kind), position,
                                            task.tile, run_.digest.hex());
@@ -217,7 +217,7 @@ class SimulatedWorker {
       } else {
         BATON_ASSIGN(blob.digest, run_.store.put(as_bytes_view(text)));
       }
-      done.outputs.push_back(blob);
+      done.made.outputs.push_back(blob);
       return {};
     };
     if (task.kind == TaskKind::assemble) {
@@ -226,7 +226,7 @@ class SimulatedWorker {
       const TileRun tiles = tile_run(run_.job, task.tile, task.run());
       for (Step step = tiles.steps.first; step <= tiles.steps.last; ++step) {
         BATON_TRY(publish(BlobKind::film, step.value()));
-        done.frames.push_back({step.value(), task.tile, done.stats.sampling});
+        done.made.frames.push_back({step.value(), task.tile, done.made.stats.sampling});
       }
       if (carries_state(run_.job)) BATON_TRY(publish(BlobKind::state, tiles.steps.last.value()));
     }

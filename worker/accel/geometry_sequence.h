@@ -25,22 +25,22 @@ struct FrameGeometry {
   /// Sets a site to what it hit. look: of the hit, where it is kept, else null. Returns the
   /// radiance that the surface emits.
   Rgb add_to(SiteBlock& sites, int site, const SurfaceHit& hit,
-             const SurfaceLook* look = nullptr) const {
+             const SurfaceShading* shading = nullptr) const {
     const Material& material = material_of(hit);
     if (material.detail == nullptr) {
       sites.add(site, hit.point, material);
       return {};
     }
-    const SeenSurface seen = see(hit, look);
+    const SeenSurface seen = see(hit, shading);
     sites.add(site, seen.point, seen.material);
     return seen.emission;
   }
   /// A hit, with what textures say of it. Normals of hits are those of the mesh: history compares
   /// them.
-  SeenSurface see(const SurfaceHit& hit, const SurfaceLook* look = nullptr) const {
+  SeenSurface see(const SurfaceHit& hit, const SurfaceShading* shading = nullptr) const {
     const Material& material = material_of(hit);
     if (material.detail == nullptr) return {hit.point, material, {}};
-    if (look != nullptr) return look->at(hit.point);
+    if (shading != nullptr) return shading->at(hit.point);
     return see_detail(*scene, pose.instances[hit.instance], hit.place, hit.point, pose.shapes);
   }
   /// Where the point of a hit of this frame is in another pose, and its shading normal.

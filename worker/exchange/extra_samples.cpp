@@ -106,7 +106,7 @@ void ExtraSampler::draw(std::int32_t x, std::int32_t y, std::size_t fold,
                   .g = samples.g.data(),
                   .b = samples.b.data(),
                   .unit_contribution = samples.lns,
-                  .picture_scale = 1,
+                  .image_scale = 1,
                   .visibility_scale = 1,
                   .first_sample = 0},
                  origins, rays_, std::span(drawn.target).first(num_samples_));

@@ -101,7 +101,7 @@ void CastRays(const CastSamples& in, const SiteOrigins& origins, RayBatch& batch
     put(w.x, rays.direction_x);
     put(w.y, rays.direction_y);
     put(w.z, rays.direction_z);
-    const VF scale = hn::Set(d, in.picture_scale);
+    const VF scale = hn::Set(d, in.image_scale);
     put(hn::Mul(color.x, scale), batch.r);
     put(hn::Mul(color.y, scale), batch.g);
     put(hn::Mul(color.z, scale), batch.b);

@@ -42,7 +42,7 @@ struct CastSamples {
   std::span<const float> weight;  ///< sum 1, or all 0
   const float *r, *g, *b;         ///< (f cos L)_rgb
   float unit_contribution;        ///< u_j is this times weight_j
-  float picture_scale;            ///< factor of the set's light in the image
+  float image_scale;              ///< factor of the set's light in the image
   /// Factor of the set's weights in the pixel's visibility.
   float visibility_scale;
   std::uint32_t first_sample;  ///< number of sample 0 in the pixel

@@ -28,8 +28,8 @@ class CatcherAlbedo {
   /// Sets a site to what it hit, a catcher or not; look: of the hit, null: textures are looked up.
   /// Returns the radiance that the surface emits.
   Rgb add_to(SiteBlock& sites, int site, const FrameGeometry& geometry, const SurfaceHit& hit,
-             const SurfaceLook* look) {
-    if (!hit.is_catcher) return geometry.add_to(sites, site, hit, look);
+             const SurfaceShading* shading) {
+    if (!hit.is_catcher) return geometry.add_to(sites, site, hit, shading);
     add_catcher(sites, site, hit);
     return {};
   }

@@ -38,7 +38,7 @@ void FirstPassCollector::add_ray(const SampleState& state, std::size_t particle,
     samples_.flags[pixel] |= FirstPassSamples::kFailed[population];
     return;
   }
-  if (!(picture_scale(job_, population) > 0)) return;
+  if (!(image_scale(job_, population) > 0)) return;
   ++samples_.count[pixel];
   samples_.slot.push_back(static_cast<std::uint8_t>(slot));
   const ConstSamplePlanes planes(state);

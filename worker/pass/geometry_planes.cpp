@@ -86,7 +86,7 @@ void GeometryPlanes::add(const TileSurfaces& surfaces) {
       if (!objects_.empty()) objects_[pixel].add(first_parts_[hit.instance], weight);
       if (!materials_.empty()) materials_[pixel].add(hit.material + 1, weight);
       if (!with_albedo) continue;
-      const Material material = geometry_.see(hit, surfaces.look(at)).material;
+      const Material material = geometry_.see(hit, surfaces.shading(at)).material;
       sum.albedo[0] += weight * (double{material.kd.x} + double{material.ks.x});
       sum.albedo[1] += weight * (double{material.kd.y} + double{material.ks.y});
       sum.albedo[2] += weight * (double{material.kd.z} + double{material.ks.z});

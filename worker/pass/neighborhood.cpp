@@ -65,7 +65,7 @@ std::span<const CarriedSet> Neighborhood::sets(std::size_t i, std::span<const Su
     const SampleState& state = *place.state;
     if (!agrees(hits, old) || confidence_plane(state)[place.index] == 0) continue;
     poison(surfaces_[count].sites);
-    gather_sites(old_pixels_.geometry(), old, old_pixels_.looks(place), surfaces_[count].sites,
+    gather_sites(old_pixels_.geometry(), old, old_pixels_.shadings(place), surfaces_[count].sites,
                  catchers);
     const auto n = static_cast<std::size_t>(state.num_particles);
     const std::size_t first = place.index * n;

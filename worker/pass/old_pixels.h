@@ -43,9 +43,9 @@ class OldPixels {
   }
 
   /// Textures at their hits, where they are kept, else none.
-  std::span<const SurfaceLook> looks(const Place& place) const {
+  std::span<const SurfaceShading> shadings(const Place& place) const {
     if (place.kept == nullptr) return {};
-    return place.kept->pixel_looks(place.index);
+    return place.kept->pixel_shadings(place.index);
   }
 
   /// Rays of all pixels requested so far; those of kept tiles count, too, so that the number does

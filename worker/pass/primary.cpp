@@ -14,13 +14,14 @@ namespace baton {
 namespace {
 
 /// The textures at hits whose materials have detail; what the others have is never read.
-std::vector<SurfaceLook> looks_of(const FrameGeometry& geometry, std::span<const SurfaceHit> hits) {
-  std::vector<SurfaceLook> looks(hits.size());
+std::vector<SurfaceShading> shadings_of(const FrameGeometry& geometry,
+                                        std::span<const SurfaceHit> hits) {
+  std::vector<SurfaceShading> shadings(hits.size());
   for (std::size_t i = 0; i < hits.size(); ++i) {
     if (hits[i].hit && !hits[i].is_catcher && geometry.material_of(hits[i]).detail != nullptr)
-      looks[i] = SurfaceLook::of(geometry.see(hits[i]));
+      shadings[i] = SurfaceShading::of(geometry.see(hits[i]));
   }
-  return looks;
+  return shadings;
 }
 
 }  // namespace
@@ -64,7 +65,7 @@ void trace_primary(const JobSpec& job, const FrameGeometry& geometry, const Pixe
         std::find_if(hits.begin(), hits.end(), [](const SurfaceHit& hit) { return hit.hit; });
     surfaces.first_site.push_back(static_cast<std::uint16_t>(first - hits.begin()));
   }
-  if (geometry.scene->has_detail) surfaces.looks = looks_of(geometry, surfaces.hits);
+  if (geometry.scene->has_detail) surfaces.shadings = shadings_of(geometry, surfaces.hits);
 }
 
 TileSurfaces part_of(const TileSurfaces& whole, RoundPixels pixels) {
@@ -73,14 +74,14 @@ TileSurfaces part_of(const TileSurfaces& whole, RoundPixels pixels) {
                     .first_hit = {0},
                     .hits = {},
                     .rays = {},
-                    .looks = {},
+                    .shadings = {},
                     .first_site = {}};
   const auto take = [](auto some, auto& all) { all.insert(all.end(), some.begin(), some.end()); };
   for (std::size_t slot = 0; slot < part.pixels.size(); ++slot) {
     const std::size_t index = part.pixels.index(slot);
     take(whole.pixel(index), part.hits);
     take(whole.pixel_rays(index), part.rays);
-    take(whole.pixel_looks(index), part.looks);
+    take(whole.pixel_shadings(index), part.shadings);
     part.first_hit.push_back(static_cast<std::uint32_t>(part.hits.size()));
     part.first_site.push_back(whole.first_site[index]);
   }

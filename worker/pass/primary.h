@@ -23,7 +23,7 @@ struct TileSurfaces {
   std::vector<Ray> rays;         ///< (sum of S) primary rays
   /// (sum of S) Textures at hits whose materials have detail, which are looked up once for all
   /// frames and rounds that see the same. Empty where the scene has none.
-  std::vector<SurfaceLook> looks;
+  std::vector<SurfaceShading> shadings;
   /// (slots) The first site that sees a surface, S where none does: hits are large, and whether
   /// there is one is asked several times a frame.
   std::vector<std::uint16_t> first_site;
@@ -38,17 +38,20 @@ struct TileSurfaces {
   std::span<const SurfaceHit> pixel(std::size_t slot) const { return part(hits, slot); }
   std::span<const Ray> pixel_rays(std::size_t slot) const { return part(rays, slot); }
   /// Textures at the hits of a pixel's sites; empty where the scene has no detail.
-  std::span<const SurfaceLook> pixel_looks(std::size_t slot) const {
-    return looks.empty() ? std::span<const SurfaceLook>() : part(looks, slot);
+  std::span<const SurfaceShading> pixel_shadings(std::size_t slot) const {
+    return shadings.empty() ? std::span<const SurfaceShading>() : part(shadings, slot);
   }
   /// Textures at hit number `at`, or null.
-  const SurfaceLook* look(std::size_t at) const { return looks.empty() ? nullptr : &looks[at]; }
+  const SurfaceShading* shading(std::size_t at) const {
+    return shadings.empty() ? nullptr : &shadings[at];
+  }
   std::size_t size_bytes() const {
-    return size_bytes(hits.size(), !looks.empty()) + first_site.size();
+    return size_bytes(hits.size(), !shadings.empty()) + first_site.size();
   }
   /// Memory of so many sites.
   static std::size_t size_bytes(std::size_t num_sites, bool has_detail) {
-    return num_sites * (sizeof(SurfaceHit) + sizeof(Ray) + (has_detail ? sizeof(SurfaceLook) : 0));
+    return num_sites *
+           (sizeof(SurfaceHit) + sizeof(Ray) + (has_detail ? sizeof(SurfaceShading) : 0));
   }
 
  private:

@@ -55,13 +55,14 @@ Result<std::shared_ptr<const RenderContext>> make_render_context(
 }
 
 Rgb gather_sites(const FrameGeometry& geometry, std::span<const SurfaceHit> hits,
-                 std::span<const SurfaceLook> looks, SiteBlock& sites, CatcherAlbedo& catchers) {
+                 std::span<const SurfaceShading> shadings, SiteBlock& sites,
+                 CatcherAlbedo& catchers) {
   Rgb emission;
   sites.clear(static_cast<int>(hits.size()));
   for (std::size_t s = 0; s < hits.size(); ++s) {
     if (hits[s].hit) {
       emission += catchers.add_to(sites, static_cast<int>(s), geometry, hits[s],
-                                  looks.empty() ? nullptr : &looks[s]);
+                                  shadings.empty() ? nullptr : &shadings[s]);
     } else {
       sites.add_miss(static_cast<int>(s));
     }

@@ -36,6 +36,7 @@ class RenderContext {
 /// the hits, or none: then textures are looked up; catchers: the albedo of those that catch
 /// shadows. Returns the radiance that they emit, the mean over the sites.
 Rgb gather_sites(const FrameGeometry& geometry, std::span<const SurfaceHit> hits,
-                 std::span<const SurfaceLook> looks, SiteBlock& sites, CatcherAlbedo& catchers);
+                 std::span<const SurfaceShading> shadings, SiteBlock& sites,
+                 CatcherAlbedo& catchers);
 
 }  // namespace baton

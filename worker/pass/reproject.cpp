@@ -189,7 +189,7 @@ PixelHistory Reprojection::take(std::size_t i, std::size_t pixel, CatcherAlbedo&
   const std::optional<Inheritance> inheritance = inherit(slot.hits, old_hits);
   if (!inheritance) return PixelHistory::none;
   copy_samples(slot, *inheritance, pixel, state);
-  const std::span<const SurfaceLook> old_looks = old_pixels_.looks(*slot.old);
+  const std::span<const SurfaceShading> old_shadings = old_pixels_.shadings(*slot.old);
   old.sites.clear(static_cast<int>(slot.hits.size()));
   for (std::size_t t = 0; t < slot.hits.size(); ++t) {
     if (!slot.hits[t].hit) {
@@ -198,7 +198,7 @@ PixelHistory Reprojection::take(std::size_t i, std::size_t pixel, CatcherAlbedo&
     }
     const std::size_t from = inheritance->from[t];
     catchers.add_to(old.sites, static_cast<int>(t), before_, old_hits[from],
-                    old_looks.empty() ? nullptr : &old_looks[from]);
+                    old_shadings.empty() ? nullptr : &old_shadings[from]);
     old.log_share[t] = -std::log(static_cast<float>(inheritance->count[from]));
   }
   return PixelHistory::moved;

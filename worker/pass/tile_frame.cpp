@@ -104,8 +104,8 @@ void TileFrameRenderer::sample(RoundWork& work, PixelStarts& starts, SampleState
     if (i + 1 < batch.count) look_ahead(slot + 1);
     if (surfaces.sees_surface(slot)) {
       poison(sites);
-      batch.emission[i] = gather_sites(geometry_, surfaces.pixel(slot), surfaces.pixel_looks(slot),
-                                       sites, work.catchers);
+      batch.emission[i] = gather_sites(geometry_, surfaces.pixel(slot),
+                                       surfaces.pixel_shadings(slot), sites, work.catchers);
       record_geometry(surfaces.pixel(slot), batch.pixels[i]);  // while it is in the cache
       const auto [x, y] = surfaces.rect.place(index);
       sample_pixel(work,

@@ -62,10 +62,10 @@ Result<std::vector<StatePtr>> read_states(const LoadedJob& loaded, const BlobSto
 }
 
 /// The task's state after `step` from those of another tiling.
-Result<TaskOutput> execute_cut(const LoadedJob& loaded, BlobStore& store, const TaskKey& task,
+Result<TaskResult> execute_cut(const LoadedJob& loaded, BlobStore& store, const TaskKey& task,
                                Step step, const std::vector<BlobRef>& inputs) {
-  TaskOutput output;
-  const CpuTimer timer(output.stats.seconds_state);
+  TaskResult output;
+  const CpuTimer timer(output.made.stats.seconds_state);
   const PixelRect rect = TileGrid(loaded.job.image).rect(task.tile);
   BATON_ASSIGN(const std::vector<StatePtr> others, read_states(loaded, store, inputs));
   std::vector<const SampleState*> parts;
@@ -80,7 +80,8 @@ Result<TaskOutput> execute_cut(const LoadedJob& loaded, BlobStore& store, const 
   BATON_ASSIGN(const SampleState state, join_states(parts, rect, task.tile));
   const Bytes bytes = encode_state(state);
   BATON_ASSIGN(const Digest digest, store.put(bytes));
-  output.outputs.push_back({BlobKind::state, state.step.value(), task.tile, digest, bytes.size()});
+  output.made.outputs.push_back(
+      {BlobKind::state, state.step.value(), task.tile, digest, bytes.size()});
   return output;
 }
 
@@ -102,7 +103,7 @@ Status keep_state(const LoadedJob& loaded, BlobStore& store, bool may_hold, Samp
   return {};
 }
 
-Result<TaskOutput> execute_render(const LoadedJob& loaded, BlobStore& store, const TaskKey& task,
+Result<TaskResult> execute_render(const LoadedJob& loaded, BlobStore& store, const TaskKey& task,
                                   const TaskGrant& grant, const std::stop_token& stop,
                                   std::vector<BlobRef>* left) {
   const StepSpan& steps = grant.steps;
@@ -123,10 +124,10 @@ Result<TaskOutput> execute_render(const LoadedJob& loaded, BlobStore& store, con
   double seconds_state = seconds_read;
 
   // Render.
-  TaskOutput output;
+  TaskResult output;
   const auto keep = [&](BlobKind kind, Step step, const Bytes& bytes) -> Status {
     BATON_ASSIGN(const Digest digest, store.put(bytes));
-    output.outputs.push_back({kind, step.value(), task.tile, digest, bytes.size()});
+    output.made.outputs.push_back({kind, step.value(), task.tile, digest, bytes.size()});
     return {};
   };
   const TileRunSink sink{
@@ -136,9 +137,9 @@ Result<TaskOutput> execute_render(const LoadedJob& loaded, BlobStore& store, con
           },
       .state = [&](SampleState state) -> Status {
         const CpuTimer timer(seconds_state);
-        return keep_state(loaded, store, grant.may_hold, std::move(state), output.outputs);
+        return keep_state(loaded, store, grant.may_hold, std::move(state), output.made.outputs);
       },
-      .diagnostics = [&](const FrameStats& stats) { output.frames.push_back(stats); },
+      .diagnostics = [&](const FrameStats& stats) { output.made.frames.push_back(stats); },
       .samples = [&](const FirstPassSamples& samples) -> Status {
         return keep(BlobKind::first_pass, samples.step, encode_first_pass_samples(samples));
       },
@@ -153,19 +154,19 @@ Result<TaskOutput> execute_render(const LoadedJob& loaded, BlobStore& store, con
   const TileRun run{task.tile, task.run(), steps};
   Result<RenderStats> stats = run_tile(*loaded.context, run, previous, sink, stop);
   if (!stats) {
-    if (left != nullptr) *left = std::move(output.outputs);
+    if (left != nullptr) *left = std::move(output.made.outputs);
     return stats.error();
   }
-  output.stats = *stats;
+  output.made.stats = *stats;
   // run_tile counts what its sink does, not what was read before.
-  output.stats.seconds_state = seconds_state;
-  output.stats.cpu_seconds += seconds_read;
+  output.made.stats.seconds_state = seconds_state;
+  output.made.stats.cpu_seconds += seconds_read;
   return output;
 }
 
 /// Inputs: the first-pass samples of the tiles within reach in tile order, the tile's own film
 /// among them.
-Result<TaskOutput> execute_second_pass(const LoadedJob& loaded, BlobStore& store,
+Result<TaskResult> execute_second_pass(const LoadedJob& loaded, BlobStore& store,
                                        const TaskKey& task, const std::vector<BlobRef>& inputs) {
   const auto num_frames = static_cast<std::int32_t>(loaded.job.frames.size());
   if (!loaded.job.visibility.correlated || task.step() < Step(0) ||
@@ -194,11 +195,11 @@ Result<TaskOutput> execute_second_pass(const LoadedJob& loaded, BlobStore& store
   const Bytes bytes =
       encode_film_tile(second.film, {loaded.picture, task.step(), FilmPass::second});
   BATON_ASSIGN(const Digest digest, store.put(bytes));
-  return TaskOutput{{{BlobKind::film, task.position, task.tile, digest, bytes.size()}},
-                    second.stats};
+  return TaskResult{
+      {{{BlobKind::film, task.position, task.tile, digest, bytes.size()}}, second.stats}};
 }
 
-Result<TaskOutput> execute_assemble(const LoadedJob& loaded, const BlobStore& store,
+Result<TaskResult> execute_assemble(const LoadedJob& loaded, const BlobStore& store,
                                     const TaskKey& task, const std::vector<BlobRef>& inputs,
                                     const std::stop_token& stop) {
   const TileGrid grid(loaded.job.image);
@@ -231,25 +232,24 @@ Result<TaskOutput> execute_assemble(const LoadedJob& loaded, const BlobStore& st
     pasted[static_cast<std::size_t>(input.tile)] = true;
   }
 
-  std::optional<RgbImage> picture;
+  std::optional<RgbImage> plate_image;
   std::vector<std::string> notes;
   if (const JobSpec& here = loaded.context->job; has_plate(here.output)) {
     const FrameNumber number = here.frames[frame.index()];
     BATON_ASSIGN(Plate plate, load_plate(here, number));
     notes = plate_notes(file_at(*here.output.plate, number), plate);
-    picture = std::move(plate.picture);
+    plate_image = std::move(plate.picture);
   }
   BATON_ASSIGN(const WrittenFrame written,
-               write_frame(loaded.job, loaded.digest, frame, std::move(image), picture));
-  return TaskOutput{.outputs = {written.file},
-                    .stats = {},
-                    .frames = {{frame.value(), task.tile, {}, written.quality}},
+               write_frame(loaded.job, loaded.digest, frame, std::move(image), plate_image));
+  return TaskResult{.made = {.outputs = {written.file},
+                             .frames = {{frame.value(), task.tile, {}, written.quality}}},
                     .notes = std::move(notes)};
 }
 
 }  // namespace
 
-Result<TaskOutput> execute_task(const LoadedJob& loaded, BlobStore& store, const TaskKey& task,
+Result<TaskResult> execute_task(const LoadedJob& loaded, BlobStore& store, const TaskKey& task,
                                 const TaskGrant& grant, const std::stop_token& stop,
                                 std::vector<BlobRef>* left) {
   loaded.states->release_before(grant.states_from);

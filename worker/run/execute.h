@@ -14,11 +14,8 @@
 namespace baton {
 
 /// What a finished task hands back.
-struct TaskOutput {
-  std::vector<BlobRef> outputs;
-  RenderStats stats;
-  /// A render task: in frame order; an assembly: one.
-  std::vector<FrameStats> frames = {};
+struct TaskResult {
+  TaskOutput made;
   /// What this machine does not see of the job, a line; then nothing was done.
   std::string unseen = {};
   /// About files, for people: what was repaired, what is odd.
@@ -28,7 +25,7 @@ struct TaskOutput {
 /// How a task that was leased has ended.
 struct TaskEnded {
   LeaseId lease;
-  Result<TaskOutput> result;
+  Result<TaskResult> result;
   std::vector<BlobRef> left = {};  ///< in the store, by one that has no result
 };
 
@@ -47,7 +44,7 @@ struct TaskGrant {
 /// inputs. Errors: a missing or damaged input, the disk, bad input of
 /// the renderer; ErrorKind::cancelled when `stop` is requested. After one, `left` is what had been
 /// put into the store.
-Result<TaskOutput> execute_task(const LoadedJob& loaded, BlobStore& store, const TaskKey& task,
+Result<TaskResult> execute_task(const LoadedJob& loaded, BlobStore& store, const TaskKey& task,
                                 const TaskGrant& grant, const std::stop_token& stop,
                                 std::vector<BlobRef>* left = nullptr);
 

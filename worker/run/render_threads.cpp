@@ -22,7 +22,7 @@ RenderThreads::~RenderThreads() {
   for (std::thread& thread : threads_) thread.join();
 }
 
-void RenderThreads::submit(PooledTask task) {
+void RenderThreads::submit(QueuedTask task) {
   {
     const std::lock_guard lock(mutex_);
     slots_.push_back({std::move(task), {}, false});
@@ -98,7 +98,7 @@ void RenderThreads::publish_executed() {
 
     // One wait for all that went well, without the lock.
     lock.unlock();
-    std::vector<PooledTask> good;
+    std::vector<QueuedTask> good;
     for (std::size_t i = 0; i < batch.tasks.size(); ++i) {
       if (batch.ends[i].result) good.push_back(batch.tasks[i]);
     }
@@ -106,7 +106,7 @@ void RenderThreads::publish_executed() {
     lock.lock();
     for (TaskEnded& end : batch.ends) {
       if (end.result && !published) {
-        end.left = std::move(end.result->outputs);
+        end.left = std::move(end.result->made.outputs);
         end.result = published.error();
       }
       ended_.push_back(std::move(end));

@@ -15,7 +15,7 @@
 namespace baton {
 
 /// What a render thread needs to execute one task without asking anybody.
-struct PooledTask {
+struct QueuedTask {
   LeaseId lease;
   TaskGrant grant;
   std::shared_ptr<JobEntry> job;
@@ -30,10 +30,10 @@ struct PooledTask {
 class RenderThreads {
  public:
   /// `left`: see execute_task().
-  using Execute = std::function<Result<TaskOutput>(
-      const PooledTask& task, const std::stop_token& stop, std::vector<BlobRef>& left)>;
+  using Execute = std::function<Result<TaskResult>(
+      const QueuedTask& task, const std::stop_token& stop, std::vector<BlobRef>& left)>;
   /// Makes the outputs of tasks that went well durable; an error becomes that of each of them.
-  using Publish = std::function<Status(std::span<const PooledTask> tasks)>;
+  using Publish = std::function<Status(std::span<const QueuedTask> tasks)>;
 
   /// `wake` is called on one of the threads whenever there is something to take or to collect.
   RenderThreads(int num_threads, Execute execute, Publish publish, std::function<void()> wake);
@@ -42,7 +42,7 @@ class RenderThreads {
   RenderThreads(const RenderThreads&) = delete;
   RenderThreads& operator=(const RenderThreads&) = delete;
 
-  void submit(PooledTask task);
+  void submit(QueuedTask task);
   /// Asks a queued or begun task to end soon; its result will be ErrorKind::cancelled unless it was
   /// about to end.
   void stop(const LeaseId& lease);
@@ -55,13 +55,13 @@ class RenderThreads {
 
  private:
   struct Slot {
-    PooledTask task;
+    QueuedTask task;
     std::stop_source stop;
     bool running = false;
   };
 
   struct Executed {
-    std::vector<PooledTask> tasks;
+    std::vector<QueuedTask> tasks;
     std::vector<TaskEnded> ends;  ///< (tasks) how each has ended
   };
 

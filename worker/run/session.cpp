@@ -71,7 +71,7 @@ void Session::on(const TaskExecuted& event, TimePoint now, Actions& actions) {
 void Session::on(const TaskEnded& event, TimePoint now, Actions& actions) {
   executed_.erase(event.lease);
   if (in_hand_.erase(event.lease) == 0) {  // its end was told before
-    tell_left(event.lease, event.result ? event.result->outputs : event.left, actions);
+    tell_left(event.lease, event.result ? event.result->made.outputs : event.left, actions);
     return;
   }
   next_request_ = now;  // what ended may have made work
@@ -80,10 +80,8 @@ void Session::on(const TaskEnded& event, TimePoint now, Actions& actions) {
   if (event.result && !event.result->unseen.empty()) {
     actions.push_back(SendMessage{LeaseReturn{event.lease, event.result->unseen}});
   } else if (event.result) {
-    reports_.push_back({event.lease,
-                        TaskDone{event.lease, event.result->outputs, event.result->stats,
-                                 event.result->frames, event.result->notes},
-                        now});
+    reports_.push_back(
+        {event.lease, TaskDone{event.lease, event.result->made, event.result->notes}, now});
     send_report(reports_.back(), now, actions);
   } else if (event.result.error().kind != ErrorKind::cancelled) {
     const Error& error = event.result.error();
@@ -203,7 +201,7 @@ void Session::receive(const LeaseRevoke& revoke, TimePoint, Actions& actions) {
   if (in_hand_.contains(revoke.lease)) actions.push_back(StopTask{revoke.lease});
   for (const Report& report : reports_) {
     const auto* const done = std::get_if<TaskDone>(&report.message);
-    if (done && report.lease == revoke.lease) tell_left(report.lease, done->outputs, actions);
+    if (done && report.lease == revoke.lease) tell_left(report.lease, done->made.outputs, actions);
   }
   forget_report(revoke.lease);
 }

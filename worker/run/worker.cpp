@@ -104,7 +104,7 @@ constexpr std::chrono::minutes kLoadPatience{15};
 
 /// Executes a task on a render thread. The command that repeats it stands in its error message and,
 /// should the process die, in the crash report.
-Result<TaskOutput> execute_pooled(const PooledTask& task, const std::stop_token& stop,
+Result<TaskResult> execute_queued(const QueuedTask& task, const std::stop_token& stop,
                                   std::vector<BlobRef>& left, NoteLog& notes, TaskWatch& watch,
                                   const Roots& roots) {
   // The time that a task may take does not include the loading of its job, which has its own.
@@ -116,7 +116,7 @@ Result<TaskOutput> execute_pooled(const PooledTask& task, const std::stop_token&
   }
   if (!loaded->unseen.empty()) {
     notes.report(loaded->digest, {loaded->unseen});
-    return TaskOutput{.outputs = {}, .stats = {}, .unseen = loaded->unseen};
+    return TaskResult{.made = {}, .unseen = loaded->unseen};
   }
   const TaskWatch::Mark mark(
       watch, task.lease,
@@ -125,7 +125,7 @@ Result<TaskOutput> execute_pooled(const PooledTask& task, const std::stop_token&
   // Again for each frame: links may have changed.
   BATON_TRY(check_output_root(loaded->job, roots));
   if (key.kind == TaskKind::assemble) {
-    Result<TaskOutput> frame = execute_task(*loaded, *task.store, key, task.grant, stop);
+    Result<TaskResult> frame = execute_task(*loaded, *task.store, key, task.grant, stop);
     if (frame) frame->notes = notes.report(loaded->digest, frame->notes);
     return frame;
   }
@@ -139,7 +139,7 @@ Result<TaskOutput> execute_pooled(const PooledTask& task, const std::stop_token&
     command = replay_command(path, numbers[last.index()], key.tile);
   }
   const CrashNote note(command);
-  Result<TaskOutput> output = execute_task(*loaded, *task.store, key, task.grant, stop, &left);
+  Result<TaskResult> output = execute_task(*loaded, *task.store, key, task.grant, stop, &left);
   if (output) output->notes = notes.report(loaded->digest, asset_notes(*loaded->context, key));
   if (output || output.error().kind == ErrorKind::cancelled ||
       output.error().kind == ErrorKind::no_space)
@@ -153,11 +153,11 @@ constexpr std::chrono::seconds kDiskPatience{300};
 
 /// Makes the checkpoints among what the tasks made durable. What lies between is made again from
 /// them, should the machine lose it; an assembled frame is durable already.
-Status publish_pooled(std::span<const PooledTask> tasks, TaskWatch& watch) {
+Status publish_queued(std::span<const QueuedTask> tasks, TaskWatch& watch) {
   const auto deadline = std::chrono::steady_clock::now() + kDiskPatience;
   std::list<TaskWatch::Mark> marks;
   std::set<std::shared_ptr<BlobStore>> stores;
-  for (const PooledTask& task : tasks) {
+  for (const QueuedTask& task : tasks) {
     const TaskKey& key = task.lease.task;
     BATON_ASSIGN(const LoadedJobPtr loaded, task.job->load({}));
     if (key.kind != TaskKind::render || !ends_in_checkpoint(loaded->job, key.run())) continue;
@@ -198,11 +198,11 @@ class Worker {
             kFilePatience, machine_.memory.scene_bytes / 2),
         pool_(
             options.num_threads,
-            [this](const PooledTask& task, const std::stop_token& stop,
+            [this](const QueuedTask& task, const std::stop_token& stop,
                    std::vector<BlobRef>& left) {
-              return execute_pooled(task, stop, left, notes_, watch_, machine_.roots);
+              return execute_queued(task, stop, left, notes_, watch_, machine_.roots);
             },
-            [this](std::span<const PooledTask> tasks) { return publish_pooled(tasks, watch_); },
+            [this](std::span<const QueuedTask> tasks) { return publish_queued(tasks, watch_); },
             [this] { channel_.wake(); }) {}
 
   ExitCode run(const std::atomic<int>& signals) {

@@ -245,7 +245,7 @@ SeenSurface see_detail(const Scene& scene, const Instance& instance, const Surfa
   return seen;
 }
 
-SurfaceLook SurfaceLook::of(const SeenSurface& seen) {
+SurfaceShading SurfaceShading::of(const SeenSurface& seen) {
   const Material& m = seen.material;
   return {.ns = seen.point.ns,
           .kd = m.kd,
@@ -258,7 +258,7 @@ SurfaceLook SurfaceLook::of(const SeenSurface& seen) {
           .coat = m.coat};
 }
 
-SeenSurface SurfaceLook::at(const ShadingPoint& point) const {
+SeenSurface SurfaceShading::at(const ShadingPoint& point) const {
   SeenSurface seen{point,
                    {.lobe = lobe,
                     .kd = kd,

@@ -24,14 +24,14 @@ inline SeenSurface as_catcher(ShadingPoint point, const Rgb& albedo) {
 }
 
 /// What detail makes of a surface, without the place: it is kept for as long as the place is.
-struct SurfaceLook {
+struct SurfaceShading {
   Vec3 ns{};  ///< shading normal
   Rgb kd{}, ks{}, emission{};
   float shape = 1, specular_probability = 0, f90 = 1;
   Material::Lobe lobe = Material::Lobe::none;
   Coat coat{};
 
-  static SurfaceLook of(const SeenSurface& seen);
+  static SurfaceShading of(const SeenSurface& seen);
   /// At the place where it was seen.
   SeenSurface at(const ShadingPoint& point) const;
 };

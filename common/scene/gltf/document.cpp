@@ -110,7 +110,7 @@ std::optional<ByteView> bytes_of(const JsonView& place, const View& view, std::s
 }
 
 /// Checks every view; those that are compressed become plain ones.
-void settle_views(const JsonView& root, Document& document) {
+void resolve_views(const JsonView& root, Document& document) {
   const std::size_t num_buffers = document.buffers.size();
   std::size_t number = 0;
   root.each("bufferViews", [&](const JsonView& given) {
@@ -129,7 +129,7 @@ void settle_views(const JsonView& root, Document& document) {
 }
 
 /// Decodes what is compressed of meshes.
-void settle_meshes(const JsonView& root, Document& document) {
+void resolve_meshes(const JsonView& root, Document& document) {
   std::size_t m = 0;
   root.each("meshes", [&](const JsonView& mesh) {
     std::size_t p = 0;
@@ -201,10 +201,10 @@ Result<std::shared_ptr<const Document>> parse_document(ByteView bytes, const std
     });
   // Views come before images, which come before textures.
   if (good()) parse_views(root, *document);
-  if (good()) settle_views(root, *document);
+  if (good()) resolve_views(root, *document);
   if (good()) root.each("images", [&](const JsonView& image) { load_image(image, *document); });
   if (good()) parse_lists(root, *document);
-  if (good()) settle_meshes(root, *document);
+  if (good()) resolve_meshes(root, *document);
   if (fault) return document->error(*fault);
   return std::shared_ptr<const Document>(std::move(document));
 }

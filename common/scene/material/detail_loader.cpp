@@ -139,7 +139,7 @@ Result<DetailLoader::TexturePtr> DetailLoader::load_texture(const TextureSpec& s
   BATON_ASSIGN(Image image, read(spec));
   for (const std::string& note : image.notes)
     notes_.insert(fmt::format("{}: {}", name_of(spec), note));
-  BATON_TRY(settle_colors(image, use, name_of(spec)));
+  BATON_TRY(to_linear_colors(image, use, name_of(spec)));
   BATON_ASSIGN(TexturePtr texture, Texture::build(image, use, name_of(spec)));
   size_bytes_ += texture->size_bytes();
   if (size_bytes_ > limits::kMaxTextureBytes)

@@ -15,7 +15,7 @@ void divide_by_alpha(Image& image) {
 
 }  // namespace
 
-Status settle_colors(Image& image, TextureUse use, const std::string& name) {
+Status to_linear_colors(Image& image, TextureUse use, const std::string& name) {
   const bool is_base = use == TextureUse::color || use == TextureUse::color_and_alpha;
   if (!is_base && use != TextureUse::light) return {};
   if (is_base && image.has_alpha && image.is_associated) divide_by_alpha(image);

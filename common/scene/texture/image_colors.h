@@ -11,6 +11,6 @@ namespace baton {
 /// file says another color space; base colors that are multiplied by alpha divided by it, where it
 /// is above 0. Numbers and alpha stay. `name` goes first in the error: chromaticities of no color
 /// space.
-Status settle_colors(Image& image, TextureUse use, const std::string& name);
+Status to_linear_colors(Image& image, TextureUse use, const std::string& name);
 
 }  // namespace baton

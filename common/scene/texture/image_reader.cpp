@@ -11,7 +11,7 @@
 
 #include "common/base/files.h"
 #include "common/base/limits.h"
-#include "common/image/exr_picture.h"
+#include "common/image/exr_image.h"
 #include "common/scene/texture/reader/interface.h"
 
 namespace baton {
@@ -111,8 +111,8 @@ bool is_exr(const std::string& path) {
   return start == std::array{'\x76', '\x2f', '\x31', '\x01'};
 }
 
-Result<Image> read_exr_image(const std::string& path) {
-  BATON_ASSIGN(ExrPicture picture, read_exr_picture(path, ExrWindow::display, true));
+Result<Image> read_exr_texture(const std::string& path) {
+  BATON_ASSIGN(ExrImage picture, read_exr_image(path, ExrWindow::display, true));
   Image image{.width = picture.width,
               .height = picture.height,
               .channels = picture.channels,
@@ -134,7 +134,7 @@ Result<Image> read_image(const std::string& path) {
   std::error_code error;
   if (!std::filesystem::is_regular_file(path, error))
     return bad_image(path, "missing: expected an image file");
-  if (is_exr(path)) return read_exr_image(path);
+  if (is_exr(path)) return read_exr_texture(path);
   return read(path, std::nullopt, path);
 }
 

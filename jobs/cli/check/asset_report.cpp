@@ -16,7 +16,7 @@ namespace {
 
 Result<MapReport> load_map(const std::string& path, float scale, int max_width) {
   BATON_ASSIGN(const RgbImage image, read_rgb_image(path));
-  BATON_ASSIGN(const PictureColors colors, read_picture_colors(path));
+  BATON_ASSIGN(const ImageColors colors, read_image_colors(path));
   MapReport report = report_map(path, image, scale, max_width);
   report.colors = conversion_text(colors);
   return report;
@@ -58,7 +58,7 @@ Result<PlateReport> load_plate_file(const JobSpec& job, FrameNumber frame,
   PlateReport report{
       .path = path, .repaired = plate.repaired, .colors = {}, .notes = plate_notes(path, plate)};
   if (!is_radiance_file(path)) return report;
-  BATON_ASSIGN(const PictureColors colors, read_picture_colors(path));
+  BATON_ASSIGN(const ImageColors colors, read_image_colors(path));
   report.colors = conversion_text(colors);
   return report;
 }

@@ -14,7 +14,7 @@
 #include "jobs/auto/unit_costs.h"
 #include "jobs/cli/check/asset_report.h"
 #include "jobs/cli/check/job_warnings.h"
-#include "jobs/cli/check/scene_picture.h"
+#include "jobs/cli/check/scene_preview.h"
 #include "jobs/cli/check/surface_share.h"
 #include "jobs/cli/commands.h"
 #include "jobs/cli/job_argument.h"
@@ -187,9 +187,9 @@ void print_settings(const std::vector<JobSetting>& settings) {
   }
 }
 
-Status write_picture(const CheckOptions& options, const JobSpec& job, const Scene& scene) {
+Status write_preview(const CheckOptions& options, const JobSpec& job, const Scene& scene) {
   if (options.picture.empty()) return {};
-  BATON_TRY(write_png(options.picture, scene_picture(job, scene)));
+  BATON_TRY(write_png(options.picture, scene_preview(job, scene)));
   if (options.json) return {};
   for (const std::string& line : object_lines(job, scene)) fmt::print("object     {}\n", line);
   fmt::print("picture    {}: frame {} as the camera sees it, and from outside\n", options.picture,
@@ -217,13 +217,13 @@ Result<ExitCode> run_check(const CheckOptions& options) {
           ? plan_pilot(job, ray_cost_factor(assets.triangles, assets.objects_move))
           : PilotPlan{};
   if (options.json) {
-    BATON_TRY(write_picture(options, job, *assets.scene));
+    BATON_TRY(write_preview(options, job, *assets.scene));
     print_json(job, estimate, assets, warnings, settings, plan);
   } else {
     print_text(job, estimate, assets);
     if (job.sampling.method == Method::automatic)
       fmt::print("pilot      before the first frame: {}\n", pilot_text(plan));
-    BATON_TRY(write_picture(options, job, *assets.scene));
+    BATON_TRY(write_preview(options, job, *assets.scene));
     for (const std::string& warning : warnings) fmt::print("warning    {}\n", warning);
     if (options.explain) print_settings(settings);
   }

@@ -53,13 +53,13 @@ void SlurmFarm::tend(RequestClient& client) {
   if (!pilots) return warn(pilots.error().message);
   last_warning_.clear();
   warn_of_short_time(*list);
-  const SlurmSnapshot seen = look(*list, std::move(pilots).value(), now);
+  const SlurmSnapshot seen = observe(*list, std::move(pilots).value(), now);
   warn_of_vain_arrays(seen);
   carry_out(give_orders(seen), client);
 }
 
-SlurmSnapshot SlurmFarm::look(const JobList& list, std::vector<SlurmPilot> pilots,
-                              Clock::time_point now) {
+SlurmSnapshot SlurmFarm::observe(const JobList& list, std::vector<SlurmPilot> pilots,
+                                 Clock::time_point now) {
   SlurmSnapshot seen;
   seen.least = options_.nodes.least;
   seen.most = options_.nodes.most;
@@ -130,7 +130,7 @@ void SlurmFarm::submit(int count) {
 }
 
 void SlurmFarm::warn_of_vain_arrays(const SlurmSnapshot& now) {
-  if (!vain_.look(now) || vain_.count() < kMostVainArrays) return;
+  if (!vain_.observe(now) || vain_.count() < kMostVainArrays) return;
   std::string log = options_.pilot.script_log;
   log.replace(log.find("%A_%a"), 5, vain_.last() + "_1");
   spdlog::warn(

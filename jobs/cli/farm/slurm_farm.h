@@ -39,7 +39,7 @@ class SlurmFarm {
  private:
   using Clock = std::chrono::steady_clock;
 
-  SlurmSnapshot look(const JobList& list, std::vector<SlurmPilot> pilots, Clock::time_point now);
+  SlurmSnapshot observe(const JobList& list, std::vector<SlurmPilot> pilots, Clock::time_point now);
   void carry_out(const SlurmOrders& orders, RequestClient& client);
   void submit(int count);
   void warn_of_vain_arrays(const SlurmSnapshot& now);

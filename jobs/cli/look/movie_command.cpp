@@ -26,9 +26,9 @@ struct MovieOptions {
 };
 
 /// Where the pictures go: into a movie, or one by one into a folder.
-class PictureSink {
+class ImageSink {
  public:
-  PictureSink(fs::path out, std::string frames_per_second)
+  ImageSink(fs::path out, std::string frames_per_second)
       : out_(std::move(out)), frames_per_second_(std::move(frames_per_second)) {}
 
   Status add(const NumberedFrame& frame, const RgbImage& image) {
@@ -68,7 +68,7 @@ Error other_size(const NumberedFrame& frame, const RgbImage& image, const RgbIma
 
 /// nullopt: a signal came.
 Result<std::optional<std::string>> show_frames(const FrameFolder& folder, MovieOptions options,
-                                               PictureSink& sink) {
+                                               ImageSink& sink) {
   const SignalWait signals;
   std::string how;
   RgbImage first;
@@ -106,7 +106,7 @@ Result<ExitCode> run_movie(const MovieOptions& options) {
   }
   const std::string rate = options.frames_per_second ? fmt::format("{}", *options.frames_per_second)
                                                      : folder.frames_per_second;
-  PictureSink sink(out, rate);
+  ImageSink sink(out, rate);
   BATON_ASSIGN(const std::optional<std::string> how, show_frames(folder, options, sink));
   if (!how) return ExitCode::cancelled;
   fmt::print("{}  {} frames{}, {}\n", out.string(), folder.frames.size(),

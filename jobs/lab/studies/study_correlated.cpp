@@ -84,18 +84,18 @@ std::vector<Case> make_cases() {
 }
 
 /// One image and its cost.
-struct Picture {
+struct RenderedFrame {
   FilmTile film;
   RenderStats stats;
 };
 
 /// Both passes of one frame, as one tile.
-Result<Picture> render(const RenderContext& context, Step step) {
-  Picture picture;
+Result<RenderedFrame> render(const RenderContext& context, Step step) {
+  RenderedFrame rendered;
   FirstPassPtr samples;
   const TileRunSink sink{.film =
                              [&](Step, const FilmTile& film) {
-                               picture.film = film;
+                               rendered.film = film;
                                return Status();
                              },
                          .samples =
@@ -103,13 +103,13 @@ Result<Picture> render(const RenderContext& context, Step step) {
                                samples = std::make_shared<const FirstPassSamples>(std::move(s));
                                return Status();
                              }};
-  BATON_ASSIGN(picture.stats, run_tile(context, {0, {}, {step, step}}, {}, sink, {}));
-  if (!context.job.visibility.correlated) return picture;
+  BATON_ASSIGN(rendered.stats, run_tile(context, {0, {}, {step, step}}, {}, sink, {}));
+  if (!context.job.visibility.correlated) return rendered;
   BATON_ASSIGN(SecondPassOutput second,
-               run_second_pass(context, step, 0, picture.film, std::span(&samples, 1)));
-  picture.film = std::move(second.film);
-  picture.stats.merge(second.stats);
-  return picture;
+               run_second_pass(context, step, 0, rendered.film, std::span(&samples, 1)));
+  rendered.film = std::move(second.film);
+  rendered.stats.merge(second.stats);
+  return rendered;
 }
 
 /// The reference: per pixel the radiance, its squared standard error, and whether the pixel lies in
@@ -126,8 +126,8 @@ Result<Truth> judge(JobSpec job, int samples) {
   job.seed = 99991;
   job.output.aovs = {Aov::visibility, Aov::depth, Aov::variance};
   BATON_ASSIGN(const auto context, load_render_context(job, Digest{1, 1}));
-  BATON_ASSIGN(const Picture picture, render(*context, Step(0)));
-  Truth truth{picture.film, {}, {}, {}};
+  BATON_ASSIGN(const RenderedFrame rendered, render(*context, Step(0)));
+  Truth truth{rendered.film, {}, {}, {}};
   for (std::size_t i = 0; i < truth.film.num_pixels(); ++i) {
     const float visibility = truth.film.plane(4)[i];
     truth.surface.push_back(truth.film.plane(5)[i] > 0);
@@ -191,9 +191,9 @@ Result<Row> prepare(const JobSpec& base, const Case& c, int runs,
 Status add_run(Row& row, const Truth& truth, const std::string& folder) {
   const Step run(static_cast<std::int32_t>(row.image.size()));
   const auto runs = static_cast<double>(row.context->job.frames.size());
-  BATON_ASSIGN(const Picture picture, render(*row.context, run));
-  const Errors e = compare(picture.film, truth);
-  const RenderStats& stats = picture.stats;
+  BATON_ASSIGN(const RenderedFrame rendered, render(*row.context, run));
+  const Errors e = compare(rendered.film, truth);
+  const RenderStats& stats = rendered.stats;
   const double seconds = stats.cpu_seconds - stats.seconds_light;
   row.image.push_back(e.image);
   row.mask.push_back(e.mask);
@@ -205,7 +205,7 @@ Status add_run(Row& row, const Truth& truth, const std::string& folder) {
   if (run > Step(0) || folder.empty()) return {};
   return write_exr(
       std::filesystem::path(folder) / (row.context->job.name + " " + row.of.name + ".exr"),
-      picture.film, {});
+      rendered.film, {});
 }
 
 double root(double squared) { return std::sqrt(std::max(squared, 0.0)); }

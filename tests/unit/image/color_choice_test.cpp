@@ -11,7 +11,7 @@ using testing::HasSubstr;
 using testing::IsEmpty;
 using Channels = std::vector<std::string>;
 
-ColorChoice chosen(const std::vector<PictureLayout>& parts) {
+ColorChoice chosen(const std::vector<PartLayout>& parts) {
   const auto choice = choose_colors(parts);
   EXPECT_TRUE(choice);
   return choice.value_or(ColorChoice{});

@@ -91,7 +91,7 @@ TEST(ColorSpace, RadianceExposuresAreUndone) {
       through_radiance("EXPOSURE=2\nCOLORCORR= 1 .5 4\nEXPOSURE= 4.0e0\n");
   ASSERT_TRUE(read.ok()) << read.error().message;
   EXPECT_EQ(read->rgb, (std::vector<float>{1.0f / 8, 0.5f / 4, 0.25f / 32}));
-  const Result<PictureColors> colors = read_picture_colors(scratch("a.hdr"));
+  const Result<ImageColors> colors = read_image_colors(scratch("a.hdr"));
   ASSERT_TRUE(colors.ok());
   EXPECT_EQ(conversion_text(*colors), "divided by its exposure, (8, 4, 32)");
 }

@@ -21,12 +21,11 @@ const Digest kJob = digest_of("job");
 
 Completion completion(std::int32_t tile) {
   Completion c{{TaskKind::render, 3, tile},
-               {{BlobKind::film, 7, tile, {1, 2}, 99}, {BlobKind::state, 7, tile, {3, 4}, 5}},
-               {}};
-  c.stats.rays_shadow = 1000;
-  c.stats.cpu_seconds = 0.125;
-  c.frames = {{7, tile, {}}};
-  c.frames[0].sampling.ess_histogram[3] = 5;
+               {{{BlobKind::film, 7, tile, {1, 2}, 99}, {BlobKind::state, 7, tile, {3, 4}, 5}}}};
+  c.made.stats.rays_shadow = 1000;
+  c.made.stats.cpu_seconds = 0.125;
+  c.made.frames = {{7, tile, {}}};
+  c.made.frames[0].sampling.ess_histogram[3] = 5;
   return c;
 }
 

@@ -61,12 +61,12 @@ TEST(Primary, LooksAreWhatIsSeen) {
   for (std::size_t i = 3; i < whole.pixels.size(); i += 4) some.add(i, 1);
   int num_detailed = 0, num_bare = 0;
   for (const TileSurfaces& surfaces : {whole, part_of(whole, some)}) {
-    ASSERT_EQ(surfaces.looks.size(), surfaces.hits.size());
+    ASSERT_EQ(surfaces.shadings.size(), surfaces.hits.size());
     for (std::size_t i = 0; i < surfaces.hits.size(); ++i) {
       const SurfaceHit& hit = surfaces.hits[i];
       if (!hit.hit) continue;
       ++(geometry->material_of(hit).detail != nullptr ? num_detailed : num_bare);
-      expect_alike(geometry->see(hit, surfaces.look(i)), geometry->see(hit));
+      expect_alike(geometry->see(hit, surfaces.shading(i)), geometry->see(hit));
     }
   }
   EXPECT_GT(num_detailed, 100);
@@ -75,7 +75,7 @@ TEST(Primary, LooksAreWhatIsSeen) {
   // Without detail there is nothing to keep.
   const auto bare = *load_render_context(sequence_job(1), Digest{1, 2});
   const auto place = *bare->geometry->at(Step(0));
-  EXPECT_TRUE(trace_primary(bare->job, *place, bare->grid.rect(0)).looks.empty());
+  EXPECT_TRUE(trace_primary(bare->job, *place, bare->grid.rect(0)).shadings.empty());
 }
 
 // Where frames keep no surfaces they are looked up again.

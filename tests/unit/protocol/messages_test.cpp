@@ -56,7 +56,7 @@ const std::vector<Message>& examples() {
       WorkerHello{"w", "h\xc3\xb6st", 77, 1, 2, "baton 1", "AVX2", {kLease, kLease}},
       LeaseRequest{7},
       Heartbeat{{kLease}},
-      TaskDone{kLease, {kBlob, kBlob}, kStats, {{3, 4, kStats.sampling}}, {"odd", ""}},
+      TaskDone{kLease, {{kBlob, kBlob}, kStats, {{3, 4, kStats.sampling}}}, {"odd", ""}},
       TaskFailed{kLease, "no", true, true},
       JobDocumentRequest{{1, 2}},
       WorkerGoodbye{},
@@ -129,8 +129,8 @@ TEST(Messages, MembersArriveWhereTheyWereSent) {
   const Message decoded = decode_message(encode_message(examples()[3])).value();
   const auto& done = std::get<TaskDone>(decoded);
   EXPECT_EQ(done.lease, kLease);
-  EXPECT_EQ(done.outputs, (std::vector{kBlob, kBlob}));
-  EXPECT_EQ(done.stats, kStats);
+  EXPECT_EQ(done.made.outputs, (std::vector{kBlob, kBlob}));
+  EXPECT_EQ(done.made.stats, kStats);
 }
 
 TEST(Messages, BytesAreThoseOfTheGrammar) {

@@ -70,7 +70,7 @@ class ExecuteTest : public testing::Test {
   }
 
   StepSpan steps_of(baton::Run run) const { return Timeline(job_).steps_of(run); }
-  Result<TaskOutput> render(baton::Run run, std::int32_t tile, const std::vector<BlobRef>& inputs) {
+  Result<TaskResult> render(baton::Run run, std::int32_t tile, const std::vector<BlobRef>& inputs) {
     return execute_task(*loaded_, store_.value(), render_task(run, tile), {inputs, steps_of(run)},
                         {});
   }
@@ -81,10 +81,10 @@ class ExecuteTest : public testing::Test {
     for (std::int32_t tile = 0; tile < TileGrid(job_.image).count(); ++tile) {
       std::vector<BlobRef> previous;
       for (baton::Run run; run < baton::Run(num_runs(job_)); ++run) {
-        const Result<TaskOutput> output = render(run, tile, previous);
+        const Result<TaskResult> output = render(run, tile, previous);
         EXPECT_TRUE(output) << output.error().message;
         previous.clear();
-        for (const BlobRef& ref : output->outputs) {
+        for (const BlobRef& ref : output->made.outputs) {
           (ref.kind == BlobKind::film ? films[ref.step()] : previous).push_back(ref);
         }
       }
@@ -118,11 +118,11 @@ TEST_F(ExecuteTest, TasksThroughTheStoreMakeTheImagesOfOneProcess) {
 
   for (const auto& [step, films] : render_all()) {
     const FrameIndex frame = Timeline(job_).frame_of(step);
-    const Result<TaskOutput> output =
+    const Result<TaskResult> output =
         execute_task(*loaded_, *store_, assemble_task(frame), {films, {step, step}}, {});
     ASSERT_TRUE(output) << output.error().message;
-    ASSERT_EQ(output->outputs.size(), 1u);
-    EXPECT_EQ(output->outputs[0].kind, BlobKind::image);
+    ASSERT_EQ(output->made.outputs.size(), 1u);
+    EXPECT_EQ(output->made.outputs[0].kind, BlobKind::image);
 
     // Compare channel by channel: a file sorts its channels.
     const FilmTile image = read_exr(frame_path(job_, frame)).value();
@@ -156,34 +156,34 @@ TEST_F(ExecuteTest, TheNumberOfThreadsDoesNotShow) {
 }
 
 TEST_F(ExecuteTest, ARunHandsOnItsStateAndCountsItsWork) {
-  const Result<TaskOutput> first = render(baton::Run(0), 1, {});
+  const Result<TaskResult> first = render(baton::Run(0), 1, {});
   ASSERT_TRUE(first) << first.error().message;
-  ASSERT_EQ(first->outputs.size(), 3u);
-  EXPECT_EQ(first->outputs[2].kind, BlobKind::state);
-  EXPECT_EQ(first->outputs[2].step(), Step(1));
-  EXPECT_EQ(first->stats.pixels, 2u * 16 * 16);
-  EXPECT_EQ(render(baton::Run(0), 1, {})->outputs, first->outputs);
+  ASSERT_EQ(first->made.outputs.size(), 3u);
+  EXPECT_EQ(first->made.outputs[2].kind, BlobKind::state);
+  EXPECT_EQ(first->made.outputs[2].step(), Step(1));
+  EXPECT_EQ(first->made.stats.pixels, 2u * 16 * 16);
+  EXPECT_EQ(render(baton::Run(0), 1, {})->made.outputs, first->made.outputs);
 
   // The next run needs exactly that state.
-  EXPECT_TRUE(render(baton::Run(1), 1, {first->outputs[2]}));
+  EXPECT_TRUE(render(baton::Run(1), 1, {first->made.outputs[2]}));
   EXPECT_FALSE(render(baton::Run(1), 1, {}));
-  EXPECT_FALSE(render(baton::Run(1), 0, {first->outputs[2]}));
-  EXPECT_FALSE(render(baton::Run(1), 1, {first->outputs[0]}));
+  EXPECT_FALSE(render(baton::Run(1), 0, {first->made.outputs[2]}));
+  EXPECT_FALSE(render(baton::Run(1), 1, {first->made.outputs[0]}));
 }
 
 // Steps that are empty ask for the state after `last` alone, from states of exactly that step.
 TEST_F(ExecuteTest, ACutRendersNothing) {
-  const BlobRef state = render(baton::Run(0), 1, {}).value().outputs.back();
+  const BlobRef state = render(baton::Run(0), 1, {}).value().made.outputs.back();
   const TaskKey task = render_task(baton::Run(0), 1);
   const auto cut = [&](Step last) {
     return execute_task(*loaded_, *store_, task, {{state}, {last + 1, last}}, {});
   };
-  const Result<TaskOutput> made = cut(Step(1));
+  const Result<TaskResult> made = cut(Step(1));
   ASSERT_TRUE(made) << made.error().message;
-  EXPECT_EQ(made->outputs, std::vector<BlobRef>{state});
-  EXPECT_EQ(made->stats.pixels, 0u);
+  EXPECT_EQ(made->made.outputs, std::vector<BlobRef>{state});
+  EXPECT_EQ(made->made.stats.pixels, 0u);
 
-  const Result<TaskOutput> of_another_step = cut(Step(3));
+  const Result<TaskResult> of_another_step = cut(Step(3));
   ASSERT_FALSE(of_another_step);
   EXPECT_THAT(of_another_step.error().message, testing::HasSubstr("expected"));
   EXPECT_FALSE(cut(Step(-1)));
@@ -194,16 +194,16 @@ TEST_F(ExecuteTest, ACutRendersNothing) {
 // packing it later gives the file that packing at once does.
 TEST_F(ExecuteTest, AHeldStateIsTheStateOfItsFile) {
   const TaskKey first{TaskKind::render, 0, 1}, next{TaskKind::render, 1, 1};
-  const BlobRef packed = render(baton::Run(0), 1, {}).value().outputs.back();
-  const Result<TaskOutput> made =
+  const BlobRef packed = render(baton::Run(0), 1, {}).value().made.outputs.back();
+  const Result<TaskResult> made =
       execute_task(*loaded_, *store_, first, {{}, steps_of(baton::Run(0)), /*may_hold=*/true}, {});
   ASSERT_TRUE(made) << made.error().message;
-  const BlobRef held = made->outputs.back();
+  const BlobRef held = made->made.outputs.back();
   EXPECT_TRUE(held.is_held());
   EXPECT_EQ(held.digest, held_state_name(loaded_->digest, Step(1), 1));
   EXPECT_EQ(loaded_->states->size_bytes(), loaded_->states->find(held)->size_bytes());
-  EXPECT_EQ(render(baton::Run(1), 1, {held}).value().outputs,
-            render(baton::Run(1), 1, {packed}).value().outputs);
+  EXPECT_EQ(render(baton::Run(1), 1, {held}).value().made.outputs,
+            render(baton::Run(1), 1, {packed}).value().made.outputs);
 
   const auto published = publish_held(loaded_->states->held(), *store_);
   ASSERT_TRUE(published) << published.error().message;
@@ -212,7 +212,7 @@ TEST_F(ExecuteTest, AHeldStateIsTheStateOfItsFile) {
   // A grant says which states nobody needs any more; one that is not here is an error.
   EXPECT_TRUE(
       execute_task(*loaded_, *store_, next, {{held}, steps_of(baton::Run(1)), false, Step(1)}, {}));
-  const Result<TaskOutput> late =
+  const Result<TaskResult> late =
       execute_task(*loaded_, *store_, next, {{held}, steps_of(baton::Run(1)), false, Step(2)}, {});
   ASSERT_FALSE(late);
   EXPECT_THAT(late.error().message, testing::HasSubstr("is not held here"));
@@ -220,11 +220,11 @@ TEST_F(ExecuteTest, AHeldStateIsTheStateOfItsFile) {
 }
 
 TEST_F(ExecuteTest, ADamagedOrMissingStateIsAnErrorThatNamesIt) {
-  const BlobRef state = render(baton::Run(0), 0, {}).value().outputs.back();
+  const BlobRef state = render(baton::Run(0), 0, {}).value().made.outputs.back();
   Bytes bytes = read_file(store_->path(state.digest), limits::kMaxBlobBytes).value();
   bytes[bytes.size() / 2] ^= std::byte{1};
   ASSERT_TRUE(write_file_atomic(store_->path(state.digest), bytes));
-  const Result<TaskOutput> damaged = render(baton::Run(1), 0, {state});
+  const Result<TaskResult> damaged = render(baton::Run(1), 0, {state});
   ASSERT_FALSE(damaged);
   EXPECT_EQ(damaged.error().kind, ErrorKind::corrupt);
   EXPECT_THAT(damaged.error().message, testing::HasSubstr(state.digest.hex()));
@@ -237,7 +237,7 @@ TEST_F(ExecuteTest, TasksThatTheJobDoesNotHaveAreBadInput) {
   for (const TaskKey& task : {TaskKey{TaskKind::render, 3, 0}, TaskKey{TaskKind::render, 0, 6},
                               TaskKey{TaskKind::render, -1, 0}, TaskKey{TaskKind::assemble, 5, 0},
                               TaskKey{TaskKind::assemble, 0, 0}}) {
-    const Result<TaskOutput> output = execute_task(
+    const Result<TaskResult> output = execute_task(
         *loaded_, *store_, task, {{}, {Step(2 * task.position), Step(2 * task.position)}}, {});
     ASSERT_FALSE(output);
     EXPECT_EQ(output.error().kind, ErrorKind::bad_input);
@@ -253,7 +253,7 @@ TEST_F(ExecuteTest, AFrameNeedsEveryTileOnce) {
 TEST_F(ExecuteTest, AStoppedTaskIsCancelled) {
   std::stop_source stop;
   stop.request_stop();
-  const Result<TaskOutput> output = execute_task(*loaded_, *store_, {TaskKind::render, 0, 0},
+  const Result<TaskResult> output = execute_task(*loaded_, *store_, {TaskKind::render, 0, 0},
                                                  {{}, steps_of(baton::Run(0))}, stop.get_token());
   ASSERT_FALSE(output);
   EXPECT_EQ(output.error().kind, ErrorKind::cancelled);

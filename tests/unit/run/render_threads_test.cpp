@@ -16,11 +16,11 @@ LeaseId lease(std::int32_t tile) {
   return {.job = {}, .task = {TaskKind::render, 0, tile}, .attempt = 1, .epoch = 1};
 }
 
-PooledTask task(std::int32_t tile) {
+QueuedTask task(std::int32_t tile) {
   return {.lease = lease(tile), .grant = {}, .job = nullptr, .store = nullptr};
 }
 
-Status at_once(std::span<const PooledTask> /*tasks*/) { return {}; }
+Status at_once(std::span<const QueuedTask> /*tasks*/) { return {}; }
 
 /// Collects until `count` tasks have ended; each end releases `woken`.
 std::vector<TaskEnded> collect(RenderThreads& pool, std::counting_semaphore<>& woken,
@@ -37,9 +37,9 @@ TEST(RenderThreads, RunsEverythingOnceAndWakesForEachResult) {
   std::counting_semaphore<> woken(0);
   RenderThreads pool(
       3,
-      [](const PooledTask& t, const std::stop_token&, std::vector<BlobRef>&) {
-        TaskOutput output;
-        output.stats.pixels = static_cast<std::uint64_t>(t.lease.task.tile);
+      [](const QueuedTask& t, const std::stop_token&, std::vector<BlobRef>&) {
+        TaskResult output;
+        output.made.stats.pixels = static_cast<std::uint64_t>(t.lease.task.tile);
         return output;
       },
       at_once, [&] { woken.release(); });
@@ -50,7 +50,7 @@ TEST(RenderThreads, RunsEverythingOnceAndWakesForEachResult) {
             [](const auto& a, const auto& b) { return a.lease < b.lease; });
   for (int tile = 0; tile < 50; ++tile) {
     EXPECT_EQ(ended[tile].lease, lease(tile));
-    EXPECT_EQ(ended[tile].result->stats.pixels, std::uint64_t(tile));
+    EXPECT_EQ(ended[tile].result->made.stats.pixels, std::uint64_t(tile));
   }
 }
 
@@ -58,12 +58,12 @@ TEST(RenderThreads, StopReachesTheRunningTaskAlone) {
   std::counting_semaphore<> woken(0), started(0), let_go(0);
   RenderThreads pool(
       2,
-      [&](const PooledTask&, const std::stop_token& stop,
-          std::vector<BlobRef>&) -> Result<TaskOutput> {
+      [&](const QueuedTask&, const std::stop_token& stop,
+          std::vector<BlobRef>&) -> Result<TaskResult> {
         started.release();
         let_go.acquire();
         if (stop.stop_requested()) return Error{ErrorKind::cancelled, "stopped"};
-        return TaskOutput{};
+        return TaskResult{};
       },
       at_once, [&] { woken.release(); });
   pool.submit(task(0));
@@ -81,11 +81,11 @@ TEST(RenderThreads, DroppedTasksEndAsCancelledAndNeverRun) {
   std::counting_semaphore<> woken(0), started(0), let_go(0);
   RenderThreads pool(
       1,
-      [&](const PooledTask& t, const std::stop_token&, std::vector<BlobRef>&) {
+      [&](const QueuedTask& t, const std::stop_token&, std::vector<BlobRef>&) {
         EXPECT_EQ(t.lease, lease(0));
         started.release();
         let_go.acquire();
-        return TaskOutput{};
+        return TaskResult{};
       },
       at_once, [&] { woken.release(); });
   for (int tile = 0; tile < 3; ++tile) pool.submit(task(tile));
@@ -104,8 +104,8 @@ TEST(RenderThreads, NoThreadWaitsForTheDisk) {
   std::vector<std::size_t> waits;
   RenderThreads pool(
       1,
-      [](const PooledTask&, const std::stop_token&, std::vector<BlobRef>&) { return TaskOutput{}; },
-      [&](std::span<const PooledTask> tasks) {
+      [](const QueuedTask&, const std::stop_token&, std::vector<BlobRef>&) { return TaskResult{}; },
+      [&](std::span<const QueuedTask> tasks) {
         waits.push_back(tasks.size());
         waiting.release();
         let_go.acquire();
@@ -130,10 +130,10 @@ TEST(RenderThreads, WhatTheDiskRefusesHasFailed) {
   std::counting_semaphore<> woken(0);
   RenderThreads pool(
       1,
-      [](const PooledTask&, const std::stop_token&, std::vector<BlobRef>&) {
-        return TaskOutput{{{BlobKind::film, 0, 0, digest_of("film"), 10}}, {}};
+      [](const QueuedTask&, const std::stop_token&, std::vector<BlobRef>&) {
+        return TaskResult{{{{BlobKind::film, 0, 0, digest_of("film"), 10}}}};
       },
-      [](std::span<const PooledTask>) {
+      [](std::span<const QueuedTask>) {
         return Status(Error{ErrorKind::io, "disk full"});
       },
       [&] { woken.release(); });
@@ -148,8 +148,8 @@ TEST(RenderThreads, ClosingStopsWhatRuns) {
   std::counting_semaphore<> started(0);
   RenderThreads pool(
       1,
-      [&](const PooledTask&, const std::stop_token& stop,
-          std::vector<BlobRef>&) -> Result<TaskOutput> {
+      [&](const QueuedTask&, const std::stop_token& stop,
+          std::vector<BlobRef>&) -> Result<TaskResult> {
         started.release();
         while (!stop.stop_requested()) std::this_thread::yield();
         return Error{ErrorKind::cancelled, "stopped"};

@@ -22,8 +22,7 @@ TEST_F(SessionTest, GivesBackWhatItDropsWhenItDrains) {
 TEST_F(SessionTest, GivesBackATaskOfAJobThatItCannotSee) {
   welcome();
   grant(lease(0));
-  const auto actions =
-      step(TaskEnded{lease(0), TaskOutput{.outputs = {}, .stats = {}, .unseen = "/shows"}});
+  const auto actions = step(TaskEnded{lease(0), TaskResult{.made = {}, .unseen = "/shows"}});
   ASSERT_EQ(sent<LeaseReturn>(actions).size(), 1u);
   EXPECT_EQ(sent<LeaseReturn>(actions)[0].unseen, "/shows");
   EXPECT_TRUE(sent<TaskDone>(actions).empty());

@@ -35,7 +35,7 @@ class SessionTest : public testing::Test {
   }
   std::vector<SessionAction> grant(const LeaseId& lease) { return receive(LeaseGrant{lease, {}}); }
   std::vector<SessionAction> finish(const LeaseId& lease) {
-    return step(TaskEnded{lease, TaskOutput{}});
+    return step(TaskEnded{lease, TaskResult{}});
   }
   std::vector<SessionAction> fail(const LeaseId& lease, ErrorKind kind) {
     return step(TaskEnded{lease, Error{kind, "broken"}});

@@ -126,7 +126,7 @@ TEST_F(SessionTest, WhatItLeavesInTheStoreIsNamed) {
       << "its end was told before";
 
   // By one whose report came too late.
-  const TaskOutput output{{film, held, frame}, {}};
+  const TaskResult output{{{film, held, frame}}};
   EXPECT_THAT(left(step(TaskEnded{lease(1), output})), testing::IsEmpty());
   EXPECT_THAT(left(receive(LeaseRevoke{lease(1)})), testing::ElementsAre(film.digest));
   step(TaskEnded{lease(2), output});

@@ -30,7 +30,7 @@ std::string exr_of(const std::vector<std::string>& channels, const std::vector<f
 
 /// What a material gets of an image.
 std::vector<float> settled(Image image, TextureUse use) {
-  const Status done = settle_colors(image, use, "test.exr");
+  const Status done = to_linear_colors(image, use, "test.exr");
   EXPECT_TRUE(done) << done.error().message;
   return image.samples;
 }
@@ -119,7 +119,7 @@ TEST(ImageColors, AreConvertedAsThoseOfMapsAre) {
 TEST(ImageColors, ChromaticitiesOfNoColourSpaceAreAnErrorWithTheFile) {
   const Chromaticities line{{0.3f, 0.3f}, {0.4f, 0.4f}, {0.5f, 0.5f}, {0.3f, 0.3f}};
   Image image = read_image(exr_of({"R", "G", "B"}, {1, 1, 1}, line)).value();
-  const Status done = settle_colors(image, TextureUse::color, "tiles.exr");
+  const Status done = to_linear_colors(image, TextureUse::color, "tiles.exr");
   ASSERT_FALSE(done);
   EXPECT_THAT(done.error().message, HasSubstr("tiles.exr: chromaticities: expected"));
 }

@@ -47,7 +47,7 @@ class Shop {
       inputs_of_last_ = grant.inputs;
       if (tasks.empty()) first_inputs_ = grant.inputs;
       tasks.push_back(grant.lease.task);
-      note(farm.step(TaskCompleted{"a", grant.lease, outputs, {}}), done);
+      note(farm.step(TaskCompleted{"a", grant.lease, {outputs}}), done);
     }
     formers_.push_back(
         {document_of(wanted), completions_of(done).tasks, adoption_.plan, farm.status()});
@@ -65,12 +65,12 @@ class Shop {
     if (adoption_.former) {
       for (const Completions::Task& task : formers_[*adoption_.former].tasks) {
         if (std::count(adoption_.tasks.begin(), adoption_.tasks.end(), task.task) > 0)
-          done.push_back({task.task, task.outputs, {}, {}});
+          done.push_back({task.task, {task.outputs}});
       }
     }
     for (const BlobRef& image : adoption_.images)
-      done.push_back({assemble_task(image.frame()), {image}, {}, {}});
-    for (const TaskKey& task : adoption_.settled) done.push_back({task, {}, {}, {}});
+      done.push_back({assemble_task(image.frame()), {{image}}});
+    for (const TaskKey& task : adoption_.skipped) done.push_back({task, {}});
     return done;
   }
   /// The archive keeps all states, so removals are left out.

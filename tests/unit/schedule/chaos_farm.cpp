@@ -153,7 +153,7 @@ void ChaosFarm::report(const std::string& worker) {
   const bool unheld =
       std::any_of(unread.begin(), unread.end(), [](const BlobRef& blob) { return blob.is_held(); });
   if (!held.published && unheld) {
-    say(worker, lease, AttemptFailed{worker, lease, "is not held here", false});
+    say(worker, lease, AttemptFailed{{lease, worker, "is not held here"}});
     return;
   }
   if (!held.published && !unread.empty()) {
@@ -161,7 +161,7 @@ void ChaosFarm::report(const std::string& worker) {
     return;
   }
   if (!held.published) publish(worker, lease, held);
-  const TaskCompleted done{worker, lease, outputs(lease.task, held), {}};
+  const TaskCompleted done{worker, lease, {outputs(lease.task, held)}};
   old_reports_.push_back(done);
   say(worker, lease, done);
 }

@@ -44,7 +44,7 @@ class ChaosFarm {
   std::size_t num_left() const {
     std::set<Digest> left;
     for (const Completion& done : completions_) {
-      for (const BlobRef& blob : done.outputs) {
+      for (const BlobRef& blob : done.made.outputs) {
         if (blob.kind == BlobKind::state && store_.contains(blob.digest)) left.insert(blob.digest);
       }
     }
@@ -145,7 +145,7 @@ class ChaosFarm {
   }
   void tell_left(const std::string& worker, const LeaseId& lease, const Event& report) {
     if (const auto* done = std::get_if<TaskCompleted>(&report))
-      left_.push_back({worker, {lease, stored_blobs(done->outputs)}});
+      left_.push_back({worker, {lease, stored_blobs(done->made.outputs)}});
   }
   void drop_leases(const std::string& worker) {
     for (const auto& [lease, held] : held_[worker]) tell_left(worker, lease, held);
@@ -209,15 +209,16 @@ class ChaosFarm {
 
   /// What the service makes of a report: what is accepted must be in the store.
   void receive(const TaskCompleted& done) {
-    const bool is_missing =
-        !recorded_.contains(done.lease.task) &&
-        std::any_of(done.outputs.begin(), done.outputs.end(), [this](const BlobRef& blob) {
-          return blob.kind != BlobKind::image && !blob.is_held() && !store_.contains(blob.digest);
-        });
+    const bool is_missing = !recorded_.contains(done.lease.task) &&
+                            std::any_of(done.made.outputs.begin(), done.made.outputs.end(),
+                                        [this](const BlobRef& blob) {
+                                          return blob.kind != BlobKind::image && !blob.is_held() &&
+                                                 !store_.contains(blob.digest);
+                                        });
     num_missing_ += is_missing ? 1 : 0;
     reporter_ = done.worker;
     if (is_missing) {
-      step(ResultMissing{done.worker, done.lease, done.outputs});
+      step(ResultMissing{done.worker, done.lease, done.made.outputs});
     } else {
       step(done);
     }
@@ -286,7 +287,7 @@ class ChaosFarm {
     const LeaseId lease = held_[worker].begin()->first;
     tell_left(worker, lease, held_[worker].begin()->second);
     held_[worker].erase(lease);
-    say(worker, lease, AttemptFailed{worker, lease, "boom", false});
+    say(worker, lease, AttemptFailed{{lease, worker, "boom"}});
   }
 
   std::vector<LeaseId> leases(const std::string& worker) {
@@ -313,7 +314,7 @@ class ChaosFarm {
   void on(const RecordOutputs& a) {
     EXPECT_TRUE(recorded_.contains(a.task)) << "only what is done lies anywhere";
     for (Completion& done : completions_) {
-      if (done.task == a.task) done.outputs = a.outputs;
+      if (done.task == a.task) done.made.outputs = a.outputs;
     }
   }
   void on(const AskForStates& a) {

@@ -114,7 +114,7 @@ TEST(Checkpoints, AnOlderOneThatIsGoneIsLetGo) {
   Farm again(in_motion(), 2);
   BlobRef gone;  // the state of run 14, tile 0
   for (const Completion& done : farm.completions()) {
-    for (const BlobRef& blob : done.outputs) {
+    for (const BlobRef& blob : done.made.outputs) {
       if (blob.kind == BlobKind::state && blob.step() == Step(14) && blob.tile == 0) gone = blob;
     }
   }

@@ -112,7 +112,7 @@ class StoredStates {
  public:
   void note(const std::vector<Action>& actions) {
     for (const RecordCompletion& done : all_of<RecordCompletion>(actions)) {
-      for (const BlobRef& blob : done.completion.outputs) {
+      for (const BlobRef& blob : done.completion.made.outputs) {
         if (blob.kind == BlobKind::state && !blob.is_held()) steps_[blob.digest] = blob.position;
       }
     }
@@ -157,10 +157,10 @@ class Farm {
   }
   std::vector<Action> finish(const GrantLease& grant, int variant = 0) {
     return step(TaskCompleted{
-        grant.worker, grant.lease, outputs_of(spec_, job, grant.lease.task, variant), {}});
+        grant.worker, grant.lease, {outputs_of(spec_, job, grant.lease.task, variant)}});
   }
   std::vector<Action> fail(const GrantLease& grant, bool permanent = false) {
-    return step(AttemptFailed{grant.worker, grant.lease, "boom", permanent});
+    return step(AttemptFailed{{grant.lease, grant.worker, "boom", permanent}});
   }
   /// Lets the worker do whatever it is given until nothing is left. Returns every action on the
   /// way.
@@ -172,7 +172,7 @@ class Farm {
       const GrantLease grant = *found;
       for (const Event& event :
            {Event(TaskCompleted{
-                grant.worker, grant.lease, outputs_of(spec_, job, grant.lease.task), {}}),
+                grant.worker, grant.lease, {outputs_of(spec_, job, grant.lease.task)}}),
             Event(WorkRequested{worker, 10})}) {
         const std::vector<Action> more = step(event);
         seen.insert(seen.end(), more.begin(), more.end());

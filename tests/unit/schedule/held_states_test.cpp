@@ -18,7 +18,7 @@ std::vector<Action> finish_holding(Farm& farm, const GrantLease& grant) {
       blob = {blob.kind, blob.position, blob.tile,
               held_state_name(farm.job, blob.step(), blob.tile)};
   }
-  return farm.step(TaskCompleted{grant.worker, grant.lease, outputs, {}});
+  return farm.step(TaskCompleted{grant.worker, grant.lease, {outputs}});
 }
 
 /// Tiles in a row that need their neighbours, 12 frames, checkpoints every 6.

@@ -102,7 +102,7 @@ TEST_F(SchedulerTest, FramesAreWrittenWhileRenderingFindsNoSpace) {
   const auto grants = farm.ask("a", 4);
   ASSERT_THAT(tasks_of(grants), ElementsAre(assemble(0), assemble(1), render(1, 0), render(1, 1)));
   farm.step(SpaceLacking{"a", grants[2].lease, "full"});
-  farm.step(AttemptFailed{"a", grants[0].lease, "boom", false});
+  farm.step(AttemptFailed{{grants[0].lease, "a", "boom"}});
   farm.step(WorkRequested{"b", 2});
   EXPECT_EQ(farm.scheduler.leases().of_worker("b").size(), 1u) << "the assembly, not the tile";
 }
@@ -350,8 +350,8 @@ TEST(SchedulerFailures, AGrantSaysHowLongTasksTake) {
   farm.step(WorkerJoined{"a", {}});
   const auto finish_in = [&](double seconds) {
     const GrantLease grant = farm.ask_one("a");
-    TaskCompleted done{"a", grant.lease, outputs_of(farm.spec(), farm.job, grant.lease.task), {}};
-    done.stats.cpu_seconds = seconds;
+    TaskCompleted done{"a", grant.lease, {outputs_of(farm.spec(), farm.job, grant.lease.task)}};
+    done.made.stats.cpu_seconds = seconds;
     farm.step(done);
     return grant.expected_seconds;
   };

@@ -163,7 +163,7 @@ TEST_F(SchedulerTest, AReportThatLacksAnOutputIsAFailedAttempt) {
   std::vector<BlobRef> outputs = outputs_of(farm.spec(), farm.job, grant.lease.task);
   outputs.pop_back();
   const auto failures =
-      all_of<RecordFailure>(farm.step(TaskCompleted{"a", grant.lease, outputs, {}}));
+      all_of<RecordFailure>(farm.step(TaskCompleted{"a", grant.lease, {outputs}}));
   ASSERT_THAT(failures, SizeIs(1));
   EXPECT_THAT(failures[0].failure.message, testing::HasSubstr("lacks the state"));
 }
@@ -171,10 +171,9 @@ TEST_F(SchedulerTest, AReportThatLacksAnOutputIsAFailedAttempt) {
 TEST_F(SchedulerTest, NonsenseIsIgnored) {
   const LeaseId nowhere{digest_of("other"), render(0, 0), 1, 1};
   const LeaseId no_such_task{farm.job, render(9, 9), 1, 1};
-  EXPECT_THAT(farm.step(TaskCompleted{"a", nowhere, {}, {}}), IsEmpty());
-  EXPECT_THAT(farm.step(TaskCompleted{"a", no_such_task, {}, {}}), IsEmpty());
-  EXPECT_THAT(farm.step(TaskCompleted{"stranger", {farm.job, render(0, 0), 1, 1}, {}, {}}),
-              IsEmpty());
+  EXPECT_THAT(farm.step(TaskCompleted{"a", nowhere, {}}), IsEmpty());
+  EXPECT_THAT(farm.step(TaskCompleted{"a", no_such_task, {}}), IsEmpty());
+  EXPECT_THAT(farm.step(TaskCompleted{"stranger", {farm.job, render(0, 0), 1, 1}, {}}), IsEmpty());
   EXPECT_THAT(farm.step(WorkRequested{"stranger", 1}), IsEmpty());
   EXPECT_THAT(farm.step(WorkRequested{"a", -5}), IsEmpty());
   EXPECT_THAT(farm.step(JobCancelled{digest_of("other")}), IsEmpty());

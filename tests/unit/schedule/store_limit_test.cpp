@@ -101,9 +101,9 @@ TEST(StoreLimit, CountsWhatARestartFinds) {
   Farm farm(small_job(2, 8, 2), 1, 100);
   std::vector<Completion> done;
   for (int tile = 0; tile < 2; ++tile)
-    done.push_back({render(0, tile), outputs_of(farm.spec(), farm.job, render(0, tile)), {}, {}});
+    done.push_back({render(0, tile), {outputs_of(farm.spec(), farm.job, render(0, tile))}});
   for (Completion& completion : done)
-    std::sort(completion.outputs.begin(), completion.outputs.end());
+    std::sort(completion.made.outputs.begin(), completion.made.outputs.end());
   farm.step(JobAdded{farm.job, farm.spec(), JobStatus::running, completions_of(done), {}});
   farm.step(WorkerJoined{"a", {}});
   EXPECT_EQ(farm.scheduler.store_bytes(), 80u);
@@ -161,7 +161,7 @@ TEST(StoreLimit, HeldStatesStayWhereTheyAreWhileTheStoreIsFull) {
         blob.digest = held_state_name(farm.job, blob.step(), blob.tile);
         blob.size_bytes = 0;
       }
-      farm.step(TaskCompleted{"a", grant.lease, made, {}});
+      farm.step(TaskCompleted{"a", grant.lease, {made}});
     }
     farm.step(StoreKeeps{kept});
     farm.finish(farm.ask_one("a"));  // the assembly

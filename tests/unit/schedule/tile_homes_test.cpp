@@ -51,21 +51,21 @@ TEST_F(TileHomesTest, TilesAreSharedOutInStrips) {
 
 // Whichever tile "b" takes from "a", it is at home in one more from then on, beside its strip.
 TEST_F(TileHomesTest, WhoTakesATileHasALargerStrip) {
-  homes.settle(0, "b");
+  homes.assign(0, "b");
   EXPECT_TRUE(homes.is_home(0, "a"));
   EXPECT_TRUE(homes.is_home(32, "b")) << "the last of column 2";
   EXPECT_TRUE(homes.is_home(26, "a"));
-  homes.settle(35, "a");
+  homes.assign(35, "a");
   EXPECT_TRUE(homes.is_home(32, "a"));
   EXPECT_TRUE(homes.is_home(3, "b"));
 }
 
 TEST_F(TileHomesTest, StripsBetweenTheTwoMove) {
   homes.share_out({"a", "b", "c"});
-  homes.settle(0, "c");
+  homes.assign(0, "c");
   EXPECT_TRUE(homes.is_home(31, "b")) << "a gave the last of column 1 to b";
   EXPECT_TRUE(homes.is_home(33, "c")) << "which gave the last of column 3 to c";
-  homes.settle(35, "a");
+  homes.assign(35, "a");
   for (const auto& [tile, worker] : {std::pair{31, "a"}, {33, "b"}, {34, "c"}})
     EXPECT_TRUE(homes.is_home(tile, worker)) << tile;
 }
@@ -97,7 +97,7 @@ TEST_F(TileHomesTest, ATileIsSurroundedWhereAllThatReadItsStateAreAtHomeWithTheS
   EXPECT_TRUE(homes.surround(31, "a"));
   EXPECT_FALSE(homes.surround(32, "a")) << "column 3 is b's";
   EXPECT_FALSE(homes.surround(4, "a"));
-  homes.settle(0, "b");
+  homes.assign(0, "b");
   EXPECT_FALSE(homes.surround(31, "a")) << "tile 32 is b's";
   EXPECT_FALSE(homes.surround(25, "a")) << "corner to corner";
   EXPECT_TRUE(homes.surround(19, "a"));

@@ -93,24 +93,24 @@ class FakeWorker {
 
   /// Publishes what the task makes and returns the report.
   TaskDone work(const LeaseId& lease) {
-    TaskDone done{lease, {}, {}};
-    done.stats.pixels = 1;
+    TaskDone done{lease, {}};
+    done.made.stats.pixels = 1;
     if (lease.task.kind == TaskKind::assemble) {
       const fs::path path = frame_path(job_, lease.task.frame());
       const std::string image = "image of seed " + std::to_string(job_.seed);
       EXPECT_TRUE(write_file_atomic(path, as_bytes_view(image)).ok());
-      done.outputs.push_back(
+      done.made.outputs.push_back(
           {BlobKind::image, lease.task.position, 0, digest_of(image), image.size()});
       return done;
     }
     const TileRun run = tile_run(job_, lease.task.tile, lease.task.run());
     for (Step step = run.steps.first; step <= run.steps.last; ++step) {
-      done.outputs.push_back(blob(BlobKind::film, step, run.tile));
-      done.frames.push_back({step.value(), run.tile, {}});
-      done.frames.back().sampling.pixels_carried = static_cast<std::uint64_t>(10 + run.tile);
+      done.made.outputs.push_back(blob(BlobKind::film, step, run.tile));
+      done.made.frames.push_back({step.value(), run.tile, {}});
+      done.made.frames.back().sampling.pixels_carried = static_cast<std::uint64_t>(10 + run.tile);
     }
     if (carries_state(job_))
-      done.outputs.push_back(blob(BlobKind::state, run.steps.last, run.tile));
+      done.made.outputs.push_back(blob(BlobKind::state, run.steps.last, run.tile));
     return done;
   }
 

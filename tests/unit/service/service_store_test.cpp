@@ -76,7 +76,7 @@ TEST_F(ServiceStoreTest, AStartRemovesWhatNoJobNeedsAndNothingElse) {
 }
 
 TEST_F(ServiceStoreTest, ARunningCoordinatorSweepsFromTimeToTime) {
-  options.sweep_every = std::chrono::milliseconds(1);
+  options.clean_up_every = std::chrono::milliseconds(1);
   const RunningService service(options);
   ask<JobAccepted>(service.endpoint(), SubmitJob{document});
   do_tasks(service.endpoint(), 2);

@@ -163,7 +163,7 @@ TEST_F(ServiceTest, AReportWithoutItsBlobsGivesTheTaskBackWithoutBlame) {
   worker.hello();
   worker.say(LeaseRequest{1});
   TaskDone report = worker.work(worker.expect<LeaseGrant>().lease);
-  report.outputs[0].digest = digest_of("never published");
+  report.made.outputs[0].digest = digest_of("never published");
   worker.say(report);
   worker.say(LeaseRequest{1});
   worker.expect<LeaseGrant>();

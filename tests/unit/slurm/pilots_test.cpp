@@ -87,32 +87,32 @@ TEST(SlurmPilots, TheLeastStay) {
 TEST(SlurmPilots, ArraysInARowWithoutAWorkerAreCounted) {
   VainArrays vain;
   SlurmSnapshot now = snapshot(100);
-  EXPECT_FALSE(vain.look(now));
+  EXPECT_FALSE(vain.observe(now));
   vain.submitted("1");
   now.pilots = {pilot("1_1", SlurmState::ending), pilot("1_2", SlurmState::running, 1)};
-  EXPECT_FALSE(vain.look(now));
+  EXPECT_FALSE(vain.observe(now));
   now.pilots.pop_back();
   now.workers = {worker("11_1")};
-  EXPECT_TRUE(vain.look(now));
-  EXPECT_FALSE(vain.look(now));
+  EXPECT_TRUE(vain.observe(now));
+  EXPECT_FALSE(vain.observe(now));
   EXPECT_EQ(vain.count(), 1);
   EXPECT_EQ(vain.last(), "1");
 
   vain.submitted("2");
   now.pilots = {pilot("2_1", SlurmState::running, kMostAlone_s + 1)};
-  EXPECT_TRUE(vain.look(now));
+  EXPECT_TRUE(vain.observe(now));
   EXPECT_EQ(vain.count(), 2);
 
   // Nobody knows what would have become of one that was too many.
   vain.submitted("3");
   now.pilots = {pilot("3_1", SlurmState::waiting)};
   vain.cancelled({"3_1"});
-  EXPECT_FALSE(vain.look(snapshot(100)));
+  EXPECT_FALSE(vain.observe(snapshot(100)));
   EXPECT_EQ(vain.count(), 2);
 
   vain.submitted("4");
   now.workers = {worker("4_2")};
-  EXPECT_FALSE(vain.look(now));
+  EXPECT_FALSE(vain.observe(now));
   EXPECT_EQ(vain.count(), 0);
 }
 

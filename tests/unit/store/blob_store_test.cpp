@@ -161,7 +161,7 @@ TEST_F(BlobStoreTest, SweepsWhatTheDeadLeftAndNothingElse) {
   const auto long_ago = fs::file_time_type::clock::now() - 2 * BlobStore::kLeftoverAge;
   fs::last_write_time(old, long_ago);
   fs::last_write_time(store.path(digest), long_ago);
-  EXPECT_EQ(store.sweep(), 1u);
+  EXPECT_EQ(store.clean_up(), 1u);
   EXPECT_FALSE(fs::exists(old));
   EXPECT_TRUE(fs::exists(young));
   EXPECT_TRUE(store.contains(digest));

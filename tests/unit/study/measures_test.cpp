@@ -12,23 +12,23 @@ namespace {
 constexpr int kWidth = 16, kHeight = 8;
 constexpr std::size_t kPixels = kWidth * kHeight;
 
-Picture flat(float value) {
-  Picture picture;
-  picture.image = {kWidth, kHeight, std::vector<float>(3 * kPixels, value)};
-  picture.coverage.assign(kPixels, 1);
-  picture.lns.assign(kPixels, 2);
-  picture.variance.assign(kPixels, 0);
-  return picture;
+MeasuredFrame flat(float value) {
+  MeasuredFrame frame;
+  frame.image = {kWidth, kHeight, std::vector<float>(3 * kPixels, value)};
+  frame.coverage.assign(kPixels, 1);
+  frame.lns.assign(kPixels, 2);
+  frame.variance.assign(kPixels, 0);
+  return frame;
 }
 
 /// Uniform noise of variance sigma^2 on every value.
-Picture noisy(float value, float sigma, std::uint64_t seed) {
-  Picture picture = flat(value);
-  for (std::uint32_t i = 0; i < picture.image.rgb.size(); ++i) {
+MeasuredFrame noisy(float value, float sigma, std::uint64_t seed) {
+  MeasuredFrame frame = flat(value);
+  for (std::uint32_t i = 0; i < frame.image.rgb.size(); ++i) {
     const float u = uniform_float(Philox4x32::block({i, 0, 0, 0}, seed)[0]);
-    picture.image.rgb[i] += sigma * std::sqrt(12.0f) * (u - 0.5f);
+    frame.image.rgb[i] += sigma * std::sqrt(12.0f) * (u - 0.5f);
   }
-  return picture;
+  return frame;
 }
 
 TEST(Measures, EqualPicturesHaveNoError) {
@@ -54,8 +54,8 @@ TEST(Measures, AConstantOffset) {
 }
 
 TEST(Measures, OnlyPixelsWithASurfaceCount) {
-  Picture half = flat(0.5f);
-  Picture test = flat(0.5f);
+  MeasuredFrame half = flat(0.5f);
+  MeasuredFrame test = flat(0.5f);
   half.coverage[3] = 0;
   test.image.rgb[3 * 3] = 100;
   const FrameMeasures m = measure_frame(test, make_reference(half, half));
@@ -65,7 +65,7 @@ TEST(Measures, OnlyPixelsWithASurfaceCount) {
 
 TEST(Measures, LnsRatios) {
   const Reference reference = make_reference(flat(1), flat(1));
-  Picture test = flat(1);
+  MeasuredFrame test = flat(1);
   for (std::size_t i = 0; i < kPixels; ++i) test.lns[i] = i == 0 ? 2.0f * kPixels : 1.0f;
   const FrameMeasures m = measure_frame(test, reference);
   EXPECT_NEAR(m.lns_mean, (2.0 * kPixels + (kPixels - 1)) / (2.0 * kPixels), 1e-9);
@@ -81,7 +81,7 @@ TEST(Measures, TheNoiseOfTheReferenceDropsOut) {
   for (std::uint64_t seed = 0; seed < kSeeds; ++seed) {
     const Reference reference =
         make_reference(noisy(0.5f, 0.1f, 3 * seed), noisy(0.5f, 0.1f, 3 * seed + 1));
-    const Picture test = noisy(0.5f, 0.1f, 3 * seed + 2);
+    const MeasuredFrame test = noisy(0.5f, 0.1f, 3 * seed + 2);
     sum += measure_frame(test, reference).mse;
     for (std::size_t k = 0; k < test.image.rgb.size(); ++k) {
       const double error = test.image.rgb[k] - reference.mean.rgb[k];
@@ -103,7 +103,7 @@ TEST(Measures, AReferenceKnowsItsOwnError) {
 
 TEST(Measures, FlickerOfIndependentAndOfFrozenErrors) {
   const Reference reference = make_reference(flat(0.5f), flat(0.5f));
-  const Picture frozen = noisy(0.5f, 0.1f, 1);
+  const MeasuredFrame frozen = noisy(0.5f, 0.1f, 1);
   EXPECT_EQ(measure_flicker(frozen, reference, frozen, reference), 0);
   EXPECT_NEAR(measure_flicker(frozen, reference, noisy(0.5f, 0.1f, 2), reference), 1, 0.2);
   EXPECT_TRUE(std::isnan(measure_flicker(flat(0.5f), reference, flat(0.5f), reference)));
@@ -111,7 +111,7 @@ TEST(Measures, FlickerOfIndependentAndOfFrozenErrors) {
 
 TEST(Reference, OneWhoseHalvesDifferByMoreThanItSaysIsNotTrusted) {
   const auto reference = [](float told) {
-    Picture a = noisy(2, 0.3f, 5), b = noisy(2, 0.3f, 6);
+    MeasuredFrame a = noisy(2, 0.3f, 5), b = noisy(2, 0.3f, 6);
     a.variance.assign(kPixels, told * told);
     b.variance = a.variance;
     return make_reference(std::move(a), std::move(b));
@@ -125,7 +125,7 @@ TEST(Reference, OneWhoseHalvesDifferByMoreThanItSaysIsNotTrusted) {
   EXPECT_TRUE(reference_fault(reference(0))) << "no error at all is said";
 
   // Too few pixels say nothing.
-  Picture a = noisy(2, 0.3f, 5), b = noisy(2, 0.3f, 6);
+  MeasuredFrame a = noisy(2, 0.3f, 5), b = noisy(2, 0.3f, 6);
   std::fill(a.coverage.begin() + 20, a.coverage.end(), 0.0f);
   EXPECT_FALSE(reference_fault(make_reference(std::move(a), std::move(b))));
 }

@@ -23,7 +23,7 @@ std::uint64_t stream_seed(std::uint64_t job_seed, std::uint32_t stream) {
   return std::uint64_t{bits[1]} << 32 | bits[0];
 }
 
-float picture_scale(const JobSpec& job, std::int32_t population) {
+float image_scale(const JobSpec& job, std::int32_t population) {
   if (num_populations(job) == 1) return 1;
   float scale = 0;
   for (const Fold& fold : folds_of(job.visibility.mask)) {

@@ -13,6 +13,6 @@ std::uint64_t stream_seed(std::uint64_t job_seed, std::uint32_t stream);
 
 /// Factor of population k's contributions in the image of the first pass: 1, but where one half
 /// only decides.
-float picture_scale(const JobSpec& job, std::int32_t population);
+float image_scale(const JobSpec& job, std::int32_t population);
 
 }  // namespace baton

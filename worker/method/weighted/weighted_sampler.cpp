@@ -37,7 +37,7 @@ PixelMethod make_fresh_method(const JobSpec& job) {
 WeightedSampler::WeightedSampler(const JobSpec& job)
     : num_particles_(static_cast<std::size_t>(job.sampling.num_particles)) {
   for (std::int32_t k = 0; k < num_populations(job); ++k)
-    picture_scale_.push_back(picture_scale(job, k));
+    image_scale_.push_back(image_scale(job, k));
 }
 
 void WeightedSampler::begin_round(const SampleState& state, bool goes_on) {
@@ -52,7 +52,7 @@ PixelDiagnostics WeightedSampler::sample(const PixelInput& input, const PixelSta
                                          RayWriter& rays) {
   SampleState& state = pixel.tile;
   const SamplePlanes planes(state);
-  const std::size_t populations = picture_scale_.size();
+  const std::size_t populations = image_scale_.size();
   const std::size_t n = num_particles_ / populations;
   // A material may have fewer samples than the state has room for.
   const std::size_t stride = static_cast<std::size_t>(state.num_particles) / populations;
@@ -81,7 +81,7 @@ PixelDiagnostics WeightedSampler::sample(const PixelInput& input, const PixelSta
               .g = samples.g.data(),
               .b = samples.b.data(),
               .unit_contribution = unit_contribution(state, pixel.index, k),
-              .picture_scale = picture_scale_[k],
+              .image_scale = image_scale_[k],
               .visibility_scale = 1.0f / static_cast<float>(populations),
               .first_sample = static_cast<std::uint32_t>(k * n)},
              target);

@@ -38,8 +38,8 @@ class WeightedSampler : public TileSampler {
     std::array<float, limits::kMaxParticles> r, g, b;
   };
 
-  std::size_t num_particles_;         ///< N, over all populations
-  std::vector<float> picture_scale_;  ///< (populations)
+  std::size_t num_particles_;       ///< N, over all populations
+  std::vector<float> image_scale_;  ///< (populations)
   SampleColors colors_;
   /// (pixels, N) p~ at the samples of the round before: where samples and surfaces stay, it need
   /// not be evaluated again.

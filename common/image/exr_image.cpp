@@ -1,4 +1,4 @@
-#include "common/image/exr_picture.h"
+#include "common/image/exr_image.h"
 
 #include <fmt/format.h>
 #include <fmt/ranges.h>
@@ -16,7 +16,7 @@ struct Chosen {
 
 Result<Chosen> choose(const std::filesystem::path& path, bool any) {
   BATON_ASSIGN(const std::vector<ExrPart> parts, read_exr_parts(path));
-  std::vector<PictureLayout> layouts;
+  std::vector<PartLayout> layouts;
   std::vector<std::string> all;
   for (const ExrPart& part : parts) {
     layouts.push_back(part.layout);
@@ -58,38 +58,38 @@ Result<FilmTile> read_planes(const std::filesystem::path& path, const ColorChoic
 
 }  // namespace
 
-Result<ExrPicture> read_exr_picture(const std::filesystem::path& path, ExrWindow window, bool any) {
+Result<ExrImage> read_exr_image(const std::filesystem::path& path, ExrWindow window, bool any) {
   BATON_ASSIGN(Chosen chosen, choose(path, any));
   const ColorChoice& choice = chosen.choice;
   BATON_ASSIGN(const FilmTile film, read_planes(path, choice, window));
-  ExrPicture picture{.width = film.rect.width(),
-                     .height = film.rect.height(),
-                     .channels = 0,
-                     .has_alpha = !choice.alpha.empty(),
-                     .samples = {},
-                     .chromaticities = chosen.chromaticities,
-                     .notes = choice.notes};
+  ExrImage image{.width = film.rect.width(),
+                 .height = film.rect.height(),
+                 .channels = 0,
+                 .has_alpha = !choice.alpha.empty(),
+                 .samples = {},
+                 .chromaticities = chosen.chromaticities,
+                 .notes = choice.notes};
 
   // Interleave; a colour that is not there is 0.
   std::vector<const float*> planes;
   std::size_t next = 0;
   for (const std::string& color : choice.colors)
     planes.push_back(color.empty() ? nullptr : film.plane(next++));
-  if (picture.has_alpha) planes.push_back(film.plane(next));
-  picture.channels = static_cast<std::int32_t>(planes.size());
-  picture.samples.resize(film.num_pixels() * planes.size());
+  if (image.has_alpha) planes.push_back(film.plane(next));
+  image.channels = static_cast<std::int32_t>(planes.size());
+  image.samples.resize(film.num_pixels() * planes.size());
   for (std::size_t c = 0; c < planes.size(); ++c) {
     if (planes[c] == nullptr) continue;
     for (std::size_t i = 0; i < film.num_pixels(); ++i)
-      picture.samples[i * planes.size() + c] = planes[c][i];
+      image.samples[i * planes.size() + c] = planes[c][i];
   }
-  return picture;
+  return image;
 }
 
-Result<PictureColors> read_exr_picture_colors(const std::filesystem::path& path) {
+Result<ImageColors> read_exr_image_colors(const std::filesystem::path& path) {
   BATON_ASSIGN(const Chosen chosen, choose(path, false));
   const bool has_colors = chosen.choice.colors.size() > 1 && chosen.chromaticities;
-  return PictureColors{.chromaticities = has_colors ? *chosen.chromaticities : Chromaticities()};
+  return ImageColors{.chromaticities = has_colors ? *chosen.chromaticities : Chromaticities()};
 }
 
 }  // namespace baton

@@ -1,4 +1,4 @@
-#include "jobs/cli/check/scene_picture.h"
+#include "jobs/cli/check/scene_preview.h"
 
 #include <fmt/format.h>
 
@@ -146,7 +146,7 @@ void draw_view(const JobSpec& job, const Shot& shot, PreviewCanvas& canvas) {
 
 }  // namespace
 
-RgbImage scene_picture(const JobSpec& job, const Scene& scene) {
+RgbImage scene_preview(const JobSpec& job, const Scene& scene) {
   const Shot shot = first_shot(job, scene);
   const double aspect = static_cast<double>(job.image.height) / job.image.width;
   const int height = std::clamp(static_cast<int>(kPanelWidth * aspect), 1, kMostHeight);

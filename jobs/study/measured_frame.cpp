@@ -1,4 +1,4 @@
-#include "jobs/study/picture.h"
+#include "jobs/study/measured_frame.h"
 
 #include <fmt/format.h>
 
@@ -29,28 +29,28 @@ std::vector<float> mean_plane(const FilmTile& film, const std::string& layer) {
 
 }  // namespace
 
-Result<Picture> read_picture(const std::filesystem::path& path) {
+Result<MeasuredFrame> read_measured_frame(const std::filesystem::path& path) {
   BATON_ASSIGN(const FilmTile film, read_exr(path, ExrWindow::seen));
-  Picture picture;
-  picture.image = {film.rect.width(), film.rect.height(), {}};
-  picture.image.rgb.resize(3 * film.num_pixels());
+  MeasuredFrame frame;
+  frame.image = {film.rect.width(), film.rect.height(), {}};
+  frame.image.rgb.resize(3 * film.num_pixels());
   const char* const names[] = {"R", "G", "B"};
   for (std::size_t channel = 0; channel < 3; ++channel) {
     const std::vector<float> values = plane(film, names[channel]);
-    for (std::size_t i = 0; i < values.size(); ++i) picture.image.rgb[3 * i + channel] = values[i];
+    for (std::size_t i = 0; i < values.size(); ++i) frame.image.rgb[3 * i + channel] = values[i];
     if (values.empty())
       return Error{ErrorKind::bad_input,
                    fmt::format("{}: expected a channel {}", path.string(), names[channel])};
   }
-  picture.coverage = plane(film, "A");
-  picture.lns = plane(film, "lns");
-  picture.ess = plane(film, "ess");
-  picture.acceptance = plane(film, "acceptance");
-  picture.variance = mean_plane(film, "variance");
-  if (picture.coverage.empty() || picture.lns.empty())
+  frame.coverage = plane(film, "A");
+  frame.lns = plane(film, "lns");
+  frame.ess = plane(film, "ess");
+  frame.acceptance = plane(film, "acceptance");
+  frame.variance = mean_plane(film, "variance");
+  if (frame.coverage.empty() || frame.lns.empty())
     return Error{ErrorKind::bad_input,
                  fmt::format("{}: expected channels A and lns", path.string())};
-  return picture;
+  return frame;
 }
 
 std::size_t block_of(std::size_t index, int width) {
@@ -79,7 +79,7 @@ std::optional<std::string> reference_fault(const Reference& reference) {
       halves, told > 0 ? halves / told : 0.0, told);
 }
 
-Reference make_reference(Picture a, Picture b) {
+Reference make_reference(MeasuredFrame a, MeasuredFrame b) {
   Reference reference;
   const std::size_t num_pixels = a.coverage.size();
   reference.mean = a.image;

@@ -13,7 +13,7 @@
 namespace baton {
 
 /// The colours of an EXR file, row by row from the top, channels interleaved.
-struct ExrPicture {
+struct ExrImage {
   std::int32_t width = 0, height = 0;
   /// One of grey or up to three colours, then alpha.
   std::int32_t channels = 0;
@@ -29,10 +29,10 @@ struct ExrPicture {
 /// Reads what color_choice.h chooses of the file's parts, layers and channels. any: where nothing
 /// has the name of a colour, its first channels. Errors: those of read_exr_channels, no colours,
 /// luminance and chroma in another part than the first.
-Result<ExrPicture> read_exr_picture(const std::filesystem::path& path, ExrWindow window,
-                                    bool any = false);
+Result<ExrImage> read_exr_image(const std::filesystem::path& path, ExrWindow window,
+                                bool any = false);
 
 /// What its numbers are; Rec. 709 where the header says nothing or the picture is grey.
-Result<PictureColors> read_exr_picture_colors(const std::filesystem::path& path);
+Result<ImageColors> read_exr_image_colors(const std::filesystem::path& path);
 
 }  // namespace baton

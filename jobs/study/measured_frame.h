@@ -11,7 +11,7 @@
 namespace baton {
 
 /// One frame of a rendering as the measures use it.
-struct Picture {
+struct MeasuredFrame {
   RgbImage image;
   std::vector<float> coverage;    ///< (pixels) alpha: where there is a surface
   std::vector<float> lns;         ///< (pixels)
@@ -28,11 +28,11 @@ std::size_t block_of(std::size_t index, int width);
 std::size_t num_blocks(int width, int height);
 
 /// Reads a frame. Errors name the file: missing, not an EXR, without R, G, B, A or lns.
-Result<Picture> read_picture(const std::filesystem::path& path);
+Result<MeasuredFrame> read_measured_frame(const std::filesystem::path& path);
 
 /// Brute force in two independent halves A and B; R is their mean.
 struct Reference {
-  std::array<Picture, 2> half;
+  std::array<MeasuredFrame, 2> half;
   RgbImage mean;
   /// Exposure of all images that are compared with it.
   float exposure = 1;
@@ -57,7 +57,7 @@ struct Reference {
 /// (R + this)^2 divides squared errors in relMSE, so that black pixels count finitely.
 inline constexpr double kRelativeFloor = 0.01;
 
-Reference make_reference(Picture a, Picture b);
+Reference make_reference(MeasuredFrame a, MeasuredFrame b);
 
 /// Why a reference is not what it says: its halves differ by more than twice the error that it
 /// reports. nullopt: it may be trusted. Some 60 pixels are needed to say so.

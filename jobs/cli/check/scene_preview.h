@@ -12,7 +12,7 @@ namespace baton {
 /// camera sees, on the right all of it from outside, with the camera's view as lines. Objects are
 /// flat coloured and have their numbers, names and bounds; x is red, y green, z blue; axes are as
 /// long as the scene's objects are large, in a power of ten. scene: the job's, with settled motion.
-RgbImage scene_picture(const JobSpec& job, const Scene& scene);
+RgbImage scene_preview(const JobSpec& job, const Scene& scene);
 
 /// One line an object: its number, mesh, material, size and place in the first frame.
 std::vector<std::string> object_lines(const JobSpec& job, const Scene& scene);
