@@ -23,14 +23,15 @@ ACCEL = SCENE | {"worker/surface"}
 LIGHT = ACCEL | {"common/advice", "worker/sampling"}
 METHOD = LIGHT | {"worker/accel", "worker/light"}
 METHOD_FOLDERS = (Path(__file__).parents[2] / "worker/method").glob("*/")
-METHODS = {f"worker/method/{folder.name}" for folder in METHOD_FOLDERS if folder.is_dir()}
+METHOD_ROOMS = {f"worker/method/{folder.name}" for folder in METHOD_FOLDERS if folder.is_dir()}
 # What several methods are made of. Passes know those that have to do with history and second pass alone.
 METHOD_LIBRARIES = {f"worker/method/{library}" for library in ("carried", "chosen", "fresh", "weighted")}
+METHODS = METHOD_ROOMS - METHOD_LIBRARIES - {"worker/method/list"}
 PASS = METHOD | {"common/job/text", "worker/method", "worker/method/carried", "worker/method/weighted"}
 EXCHANGE = PASS | {"worker/pass"}
 RUN = EXCHANGE | {"common/protocol", "common/store", "common/scene/settle", "worker/exchange"}
 # Programs that measure look into every room of the worker, and share scenes and statistics with the tests.
-LAB = RUN | METHODS | {"worker/run", "jobs/study", "tests/support", "tests/stat"}
+LAB = RUN | METHOD_ROOMS | {"worker/run", "jobs/study", "tests/support", "tests/stat"}
 # Families of commands, and what they share.
 CLI = COMMON_ALL | {"common/scene/settle", "jobs/study", "jobs/auto"}
 
@@ -58,8 +59,13 @@ MAY_INCLUDE = {
     "worker/surface": SCENE,
     "worker/accel": ACCEL,
     "worker/light": LIGHT,
-    "worker/method": METHOD | METHODS,
+    "worker/method": METHOD,
+    "worker/method/weighted": METHOD | {"worker/method"},
+    "worker/method/carried": METHOD | {"worker/method"},
+    "worker/method/chosen": METHOD | {"worker/method"},
+    "worker/method/fresh": METHOD | {"worker/method", "worker/method/weighted"},
     **{method: METHOD | {"worker/method"} | METHOD_LIBRARIES for method in METHODS},
+    "worker/method/list": METHOD | {"worker/method"} | METHOD_ROOMS,
     "worker/pass": PASS,
     "worker/exchange": EXCHANGE,
     "worker/run": RUN,
@@ -103,12 +109,8 @@ INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]')
 
 
 def circle_in(rules):
-    """Rooms whose rules lead back to themselves; a method and `worker/method`, which lists all of them, count as one."""
-    merged = {}
-    for room, others in rules.items():
-        name = "worker/method" if room in METHODS else room
-        merged.setdefault(name, set()).update("worker/method" if other in METHODS else other for other in others)
-    left = {room: others - {room} for room, others in merged.items()}
+    """Rooms whose rules lead back to themselves."""
+    left = {room: others - {room} for room, others in rules.items()}
     while free := {room for room, others in left.items() if not others & left.keys()}:
         left = {room: others for room, others in left.items() if room not in free}
     return sorted(left)
