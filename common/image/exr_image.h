@@ -21,7 +21,8 @@ struct ExrImage {
   std::vector<float> samples;  ///< (height * width * channels), as stored
   /// What the header says of the colours; none: nothing.
   std::optional<Chromaticities> chromaticities;
-  std::vector<std::string> notes;  ///< for people, a line each: a choice, what counts as unknown
+  /// For people, a line each: a choice, what counts as unknown.
+  std::vector<std::string> notes;
 
   std::int32_t num_colors() const { return channels - (has_alpha ? 1 : 0); }
 };

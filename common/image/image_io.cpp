@@ -53,7 +53,7 @@ Result<RgbImage> converted(const std::filesystem::path& path, RgbImage image,
   return image;
 }
 
-/// Of grey there is nothing to convert.
+/// Grey has nothing to convert.
 ImageColors colors_of(const ExrImage& exr) {
   const bool has_colors = exr.num_colors() > 1 && exr.chromaticities;
   return {.chromaticities = has_colors ? *exr.chromaticities : Chromaticities()};

@@ -46,7 +46,8 @@ struct LightUse {
 struct MethodTraits {
   std::string_view name;  ///< in a job
   Carried carried = Carried::nothing;
-  /// Of a pixel's state in a file before packing, at most, beside its source, Lns and samples.
+  /// A pixel's state in a file before packing takes at most this beside its source, Lns and
+  /// samples.
   std::int32_t most_bytes_beside_samples = 0;
   /// Its rays are N weighted samples, which are in its states; else rays are chosen apart from
   /// them.

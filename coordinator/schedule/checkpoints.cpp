@@ -68,7 +68,7 @@ std::vector<TaskKey> Checkpoints::complete(const TaskKey& render) {
   if (stages_.empty() || --stages_[stage_of(render)].open > 0) return gone;
   let_between_go(stage_of(render), gone);
 
-  // Of the two checkpoints before.
+  // The two checkpoints before may go where all is complete.
   for (std::int32_t back = 1; back <= 2; ++back) {
     const std::int32_t row = render.run().value() / runs_per_stage_ - back;
     if (row < 0) break;

@@ -20,7 +20,8 @@ namespace {
 struct Case {
   std::string name;
   SamplingSpec sampling;
-  double goal = 0;  ///< highest ratio that the project accepts; 0: none
+  /// Highest ratio that the project accepts; 0: none.
+  double goal = 0;
 };
 
 std::vector<Case> make_cases() {

@@ -26,9 +26,10 @@ constexpr double kMovingGoal = 2.6;
 struct Cost {
   RenderStats stats;
   double seconds_encode = 0;
-  double seconds_decode = 0;  ///< of each state once: a worker keeps what it has decoded
-  double seconds_decode_inputs =
-      0;  ///< of all states that each task needs: a worker that keeps nothing
+  /// Each state decoded once: a worker keeps what it has decoded.
+  double seconds_decode = 0;
+  /// All states that each task needs: a worker that keeps nothing.
+  double seconds_decode_inputs = 0;
   std::uint64_t state_bytes = 0, state_pixels = 0;
 
   double ratio() const { return stats.cpu_seconds / stats.seconds_visibility; }

@@ -32,13 +32,14 @@ struct LoadRun {
   JobSpec job;
   Digest digest;  ///< of the job
   std::string endpoint;
-  std::optional<ClientKey> key;  ///< of workers; none: they speak in the clear
+  /// The workers' key; none: they speak in the clear.
+  std::optional<ClientKey> key;
   std::chrono::milliseconds heartbeat{1000}, tile_time{0};
   BlobStore store;
   std::atomic<bool> stop{false};
   std::atomic<std::uint64_t> reports{0};
-  std::atomic<std::uint64_t> bytes{
-      0};  ///< of messages, both ways, as they are before they are encrypted
+  /// Messages both ways, as they are before they are encrypted.
+  std::atomic<std::uint64_t> bytes{0};
   std::atomic<std::uint32_t> newest_epoch{0};          ///< of a lease that a worker was granted
   std::atomic<LoadClock::time_point> first_grant{};    ///< of that epoch
   std::atomic<LoadClock::time_point> first_welcome{};  ///< since this was last set to {}

@@ -22,7 +22,8 @@ namespace {
 
 /// The drift of carried samples needs many frames to show, and many runs to be told from chance.
 constexpr Effort kLongEffort{40, 24, false};
-constexpr Effort kLongestEffort{60, 48, false};  ///< a loss of 13 % +- 2 % where it is looked for
+/// A loss of 13 % +- 2 % where it is looked for.
+constexpr Effort kLongestEffort{60, 48, false};
 constexpr Effort kShortEffort{8, 12, false};
 constexpr int kThreads = 2;
 
@@ -157,8 +158,9 @@ constexpr double kPixelLimit = 4.32;
 /// What the frames say of one pixel against the exact answer.
 struct PixelVerdict {
   double worst_z = 0;
-  double bias = 0;        ///< relative, where |z| is largest
-  double resolution = 0;  ///< the middle pixel's smallest relative bias that reaches the limit
+  double bias = 0;  ///< relative, where |z| is largest
+  /// The middle pixel's smallest relative bias that reaches the limit.
+  double resolution = 0;
 };
 
 /// z-test of every pixel's mean over frames; frames are independent, so no pixel's test depends on

@@ -87,7 +87,8 @@ inline constexpr double kResolvedErrors = 3.9;
 /// What the comparison found: the largest |z| of any pixel and that of the image mean.
 struct Verdict {
   double worst_pixel = 0, image = 0;
-  double resolution = 0;  ///< smallest relative bias of the image mean that would have shown
+  /// Smallest relative bias of the image mean that would have shown.
+  double resolution = 0;
 };
 inline Verdict compare(const Estimate& a, const Estimate& b) {
   Verdict v;

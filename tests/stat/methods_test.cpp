@@ -25,7 +25,8 @@ using test::repeat;
 using test::Verdict;
 
 constexpr int kRuns = 48;
-constexpr double kFine = 0.003;  ///< resolution that `pool`, with 200 runs, is held to
+/// Resolution that `pool`, with 200 runs, is held to.
+constexpr double kFine = 0.003;
 
 JobSpec still_job(Method method) {
   JobSpec job = box_job();

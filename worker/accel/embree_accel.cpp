@@ -40,10 +40,11 @@ struct SharedGeometry {
   Layer objects, catchers{.catchers = true, .still = {}};
   /// By index of the mesh, in its own space: those that move, or that are in too many places.
   std::map<std::uint32_t, Owned<RTCScene>> own_meshes;
-  std::set<std::uint32_t> with_holes;      ///< meshes that are cut out somewhere
-  bool any_blends = false;                 ///< rays need their bits
-  std::uint64_t placement_bytes = 0;       ///< what is built for each placement
-  std::vector<std::array<Vec3, 8>> boxes;  ///< corners of each mesh's box, in its own space
+  std::set<std::uint32_t> with_holes;  ///< meshes that are cut out somewhere
+  bool any_blends = false;             ///< rays need their bits
+  std::uint64_t placement_bytes = 0;   ///< what is built for each placement
+  /// Corners of each mesh's box, in its own space.
+  std::vector<std::array<Vec3, 8>> boxes;
 
   const Scene* holes_of(const Scene& scene, std::uint32_t mesh) const {
     return with_holes.contains(mesh) ? &scene : nullptr;
@@ -51,10 +52,12 @@ struct SharedGeometry {
   std::uint64_t size_bytes() const {
     return static_cast<std::uint64_t>(std::max<std::int64_t>(0, allocated.bytes));
   }
-  /// lasts: for the whole job. The best hierarchy of one frame's triangles takes five times as long
-  /// to build as a good one, and gains at most a tenth of the rays' time.
+  /// Robust, so that rays do not slip through the edges of closed meshes. lasts: for the whole job.
+  /// The best hierarchy of one frame's triangles takes five times as long to build as a good one,
+  /// and gains at most a tenth of the rays' time.
   Owned<RTCScene> new_scene(bool lasts = true) const {
     Owned<RTCScene> scene(rtcNewScene(device.get()));
+    rtcSetSceneFlags(scene.get(), RTC_SCENE_FLAG_ROBUST);
     rtcSetSceneBuildQuality(scene.get(), lasts ? RTC_BUILD_QUALITY_HIGH : RTC_BUILD_QUALITY_MEDIUM);
     return scene;
   }

@@ -68,7 +68,8 @@ struct PixelState {
 
 /// What a method says about its work on a pixel. The state has the pixel's source.
 struct PixelDiagnostics {
-  float lns = 0;                 ///< estimate of the unshadowed radiance, mean over RGB
+  /// Estimate of the unshadowed radiance, mean over RGB.
+  float lns = 0;
   float ess = 0;                 ///< [1, N], 0 without light
   std::int32_t num_samples = 1;  ///< N
   std::int32_t target_evaluations = 0;

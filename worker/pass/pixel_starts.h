@@ -18,7 +18,7 @@ class PixelStarts {
   /// What the pixel in a slot of the batch, which sees a surface, carries in `state` becomes what
   /// the frame before left. Returns whether there is any.
   bool find(std::size_t slot, SampleState& state);
-  /// Of the pixel that was found last or the one before it, until the next call of find().
+  /// Holds for the pixel that was found last or the one before it, until the next call of find().
   PixelStart of(std::size_t slot);
 
  private:

@@ -31,7 +31,8 @@ struct WrapLanes {
   VI4 texels;      ///< texels of a period, or 0
   /// The sum of two texels that mirror each other, or large.
   VI4 mirror;
-  VI4 low, high;  ///< the first and the last texel, or those of the border
+  /// The first and the last texel, or those of the border.
+  VI4 low, high;
 
   WrapLanes(const ProbeLine& line, const TextureSampling& sampling) {
     const auto lanes = [](auto d, auto fine_u, auto fine_v, auto coarse_u, auto coarse_v) HWY_ATTR {

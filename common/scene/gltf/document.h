@@ -167,9 +167,10 @@ struct Material {
   std::array<double, 3> emission{0, 0, 0};  ///< factor times strength
   double ior = 1.5, specular = 1;
   std::array<double, 3> specular_color{1, 1, 1};
-  bool is_specular_glossy = false;  ///< made of KHR_materials_pbrSpecularGlossiness
-  bool specular_textured = false;   ///< by textures, which are not read
-  bool occluded = false;            ///< by a texture, which is not read
+  /// Made of KHR_materials_pbrSpecularGlossiness.
+  bool is_specular_glossy = false;
+  bool specular_textured = false;  ///< by textures, which are not read
+  bool occluded = false;           ///< by a texture, which is not read
   double clearcoat = 0, clearcoat_roughness = 0;
   TextureInfo clearcoat_texture, clearcoat_roughness_texture, clearcoat_normal_texture;
   AlphaMode alpha_mode = AlphaMode::opaque;

@@ -97,7 +97,8 @@ bool is_idle(const Document& document, const Channel& channel) {
   return node.mesh < 0 || document.mesh_of(node).num_targets() == 0;
 }
 
-/// Of keys at one time the last one counts. row: numbers a key. Returns how many were left out.
+/// Where several keys have one time the last one counts. row: numbers a key. Returns how many were
+/// left out.
 std::size_t drop_repeated(Curve& curve, std::size_t row) {
   std::size_t kept = 0;
   for (std::size_t k = 0; k < curve.times.size(); ++k) {

@@ -59,7 +59,8 @@ struct SurfaceDetail {
   std::array<PlacedTexture, kNumDetailImages> images{};
   /// Those of them that a look is for, in groups that lie alike on a surface.
   std::vector<std::vector<DetailImage>> alike{};
-  std::vector<std::string> notes{};  ///< of its images' files, each with the name of the file
+  /// What its images' files say, each with the name of the file.
+  std::vector<std::string> notes{};
 
   const PlacedTexture& operator[](DetailImage image) const {
     return images[static_cast<std::size_t>(image)];

@@ -122,7 +122,8 @@ struct Texture::Level {
   std::size_t channels;
   std::vector<float> values;                    ///< (height, width, channels)
   std::vector<float> top, bottom, left, right;  ///< (width or height, channels)
-  std::vector<float> corners;  ///< (4, channels): of the top left and right, below left and right
+  /// (4, channels): top left and right, below left and right.
+  std::vector<float> corners;
 
   static Level of_image(std::int32_t width, std::int32_t height, std::size_t channels,
                         std::vector<float> values) {

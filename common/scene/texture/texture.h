@@ -31,7 +31,8 @@ enum class Wrap : std::uint8_t {
   repeat,
   clamp,
   mirror,
-  tile,  ///< as clamp, but by the edge of each level: what lies beyond is another image
+  /// As clamp, but by the edge of each level: what lies beyond is another image.
+  tile,
 };
 
 /// How a texture is looked up.

@@ -34,7 +34,7 @@ double share_in(const JobSpec& job, const Scene& scene, FrameNumber frame) {
     }
   }
 
-  // Of the part that is rendered.
+  // Only the part that is rendered counts.
   const PixelRect part = job.image.rendered();
   int seen = 0, all = 0;
   for (int y = 0; y < height; ++y) {

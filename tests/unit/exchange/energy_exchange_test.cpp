@@ -19,8 +19,10 @@ using exact::Scene;
 
 struct Verdict {
   double worst_z = 0;
-  double largest_bias = 0;  ///< |mean - expected| / expected where |z| is largest
-  double resolution = 0;  ///< smallest relative bias of any value that would have reached the limit
+  /// |mean - expected| / expected where |z| is largest.
+  double largest_bias = 0;
+  /// Smallest relative bias of any value that would have reached the limit.
+  double resolution = 0;
 };
 
 Verdict compare(const Scene& scene, const Method& method, int runs,

@@ -148,7 +148,8 @@ class Source final : public ExchangeScene {
 struct Method {
   SecondPassForm form = SecondPassForm::corrected;
   MaskPolicy policy = MaskPolicy::cross_fold;
-  bool mask_all = false;  ///< every pixel takes part, whatever its rays said
+  /// Every pixel takes part, whatever its rays said.
+  bool mask_all = false;
   std::int32_t side = 5, partitions = 4, dilate = 0;
   std::uint32_t num_slots = 16;
 };

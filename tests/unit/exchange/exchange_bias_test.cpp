@@ -56,9 +56,10 @@ TEST(ExchangeBias, EveryFormByScene) {
   struct {
     const char* name;
     Scene scene;
-    bool equal_products;  ///< then the published acceptance is the right one
-    bool mask_matters;    ///< enough to be seen: energy that stays in the wrong pixel is of another
-                          ///< size
+    /// Then the published acceptance is the right one.
+    bool equal_products;
+    /// Enough to be seen: energy that stays in the wrong pixel is of another size.
+    bool mask_matters;
   } const scenes[] = {{"equal products", penumbra(), true, false},
                       {"Lns 1 : 3 : .5 : 2", scaled_penumbra(), true, false},
                       {"diffuse and glossy", mixed_materials(), false, true},

@@ -20,7 +20,8 @@ using testing::IsEmpty;
 
 struct Part {
   std::string name;
-  std::vector<std::string> channels;  ///< of one pixel, with values first, first + 1 ...
+  /// Channels of one pixel, with values first, first + 1 ...
+  std::vector<std::string> channels;
   float first;
 };
 

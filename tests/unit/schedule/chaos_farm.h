@@ -17,9 +17,11 @@ namespace baton::testing_farm {
 class ChaosFarm {
  public:
   struct Options {
-    bool alike = false;  ///< films of many tasks have the same bytes, and so are one blob
+    /// Films of many tasks have the same bytes, and so are one blob.
+    bool alike = false;
     int num_workers = 5;
-    bool failures = true;  ///< attempts fail, files vanish; else only workers and messages do
+    /// Attempts fail, files vanish; else only workers and messages do.
+    bool failures = true;
     std::uint64_t store_limit = 0;
     bool restarts = true;  ///< of the coordinator
   };
@@ -361,7 +363,8 @@ class ChaosFarm {
   TimePoint now_{};
   std::uint32_t epoch_ = 0;
   std::unique_ptr<Scheduler> scheduler_;
-  std::set<std::string> known_;  ///< to the coordinator, as the workers believe
+  /// Workers that believe the coordinator knows them.
+  std::set<std::string> known_;
   std::map<std::string, std::map<LeaseId, Held>> held_;  ///< what each worker has in hand
   std::map<std::string, Memory> memory_;                 ///< what each worker holds
   std::map<std::string, std::set<Digest>> wanted_;       ///< of it, what it was asked for
@@ -376,8 +379,9 @@ class ChaosFarm {
   std::set<Digest> store_;                                 ///< the blobs that are there
   std::vector<std::pair<std::string, AttemptLeft>> left_;  ///< still to be said
   std::set<Digest> told_;                                  ///< of, to this coordinator
-  std::set<Digest> unreported_;  ///< published for leases of which nobody will report
-  std::set<Digest> lost_;        ///< that somebody took
+  /// Published for leases of which nobody will report.
+  std::set<Digest> unreported_;
+  std::set<Digest> lost_;  ///< what somebody took
   std::set<TaskKey> lost_frames_;
   JobPlan plan_;
   std::set<Digest> kept_;  ///< blobs of jobs before this one

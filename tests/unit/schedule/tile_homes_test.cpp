@@ -114,8 +114,10 @@ TEST_F(TileHomesTest, AssemblyComesBeforeAllTiles) {
 
 /// What two workers with one thread each do with a sequence; `speed` of a over that of b.
 struct Played {
-  double hours = 0;             ///< until all is done; a tile takes b one hour
-  double strange_inputs = 0;    ///< share of the states that whoever reads them has not made
+  /// Until all is done; a tile takes b one hour.
+  double hours = 0;
+  /// Share of the states that whoever reads them has not made.
+  double strange_inputs = 0;
   std::int32_t most_ahead = 0;  ///< frames begun and not written
 };
 

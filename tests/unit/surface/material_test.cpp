@@ -50,7 +50,8 @@ struct Case {
   std::string name;
   Material material;
   double view_degrees;
-  double grid_power;  ///< how fine the cells are around the mirror direction
+  /// How fine the cells are around the mirror direction.
+  double grid_power;
 };
 
 std::vector<Case> all_cases() {

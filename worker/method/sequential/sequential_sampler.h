@@ -55,9 +55,9 @@ class SequentialSampler final : public WeightedSampler {
   SequentialSettings settings_;
   std::int32_t refresh_every_;
   std::optional<float> refresh_ratio_;
-  /// Of fresh and restarted pixels and of those whose turn it is.
+  /// Samples fresh and restarted pixels and those whose turn it is.
   std::unique_ptr<FreshSampler> start_;
-  /// Of pixels whose Lns has changed too much; null: there are none.
+  /// Samples pixels whose Lns has changed too much; null: there are none.
   std::unique_ptr<FreshSampler> by_ratio_;
   LocatedAhead located_;
 };
