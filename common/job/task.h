@@ -224,4 +224,14 @@ struct RenderStats {
   void merge(const RenderStats& b);
 };
 
+/// What a task has made. Sent and kept: the order of the members is that of the bytes.
+struct TaskOutput {
+  std::vector<BlobRef> outputs;
+  RenderStats stats = {};
+  /// A render task: one for each step, in their order; an assembly: one.
+  std::vector<FrameStats> frames = {};
+
+  bool operator==(const TaskOutput&) const = default;
+};
+
 }  // namespace baton

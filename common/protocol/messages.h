@@ -41,10 +41,7 @@ struct Heartbeat {
 };
 struct TaskDone {
   LeaseId lease;
-  std::vector<BlobRef> outputs;
-  RenderStats stats;
-  /// A render task: one for each frame; an assembly: one.
-  std::vector<FrameStats> frames = {};
+  TaskOutput made;
   /// About the job's files, for people; a worker sends each once.
   std::vector<std::string> notes = {};
 };

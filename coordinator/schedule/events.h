@@ -22,10 +22,7 @@ using TimePoint = std::chrono::steady_clock::time_point;
 /// A task that is done.
 struct Completion {
   TaskKey task;
-  std::vector<BlobRef> outputs;
-  RenderStats stats;
-  /// At most one for each frame of a render task or assembly.
-  std::vector<FrameStats> frames = {};
+  TaskOutput made;
 };
 
 /// A render task that is not rendered: its states are cut and joined from those of another tiling,
@@ -61,10 +58,10 @@ struct Completions {
   std::map<FrameIndex, FrameStats> frames;  ///< what assemblies saw
 
   void add(Completion completion) {
-    tasks.push_back({completion.task, std::move(completion.outputs)});
-    stats.merge(completion.stats);
+    tasks.push_back({completion.task, std::move(completion.made.outputs)});
+    stats.merge(completion.made.stats);
     const bool is_frame = completion.task.kind == TaskKind::assemble;
-    for (const FrameStats& of_tile : completion.frames)
+    for (const FrameStats& of_tile : completion.made.frames)
       (is_frame ? frames[of_tile.frame()] : steps[of_tile.step()]).merge(of_tile);
   }
 };
@@ -134,15 +131,10 @@ struct WorkRequested {
 struct TaskCompleted {
   std::string worker;
   LeaseId lease;
-  std::vector<BlobRef> outputs;
-  RenderStats stats;
-  std::vector<FrameStats> frames = {};
+  TaskOutput made;
 };
 struct AttemptFailed {
-  std::string worker;
-  LeaseId lease;
-  std::string message;
-  bool permanent = false;
+  Failure failure;
 };
 /// The task is done as the worker says, but an output of it is not in the store: it went between
 /// publishing and reporting. Nobody is to blame; the task is done again.

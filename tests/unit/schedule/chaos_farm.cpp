@@ -70,8 +70,8 @@ void ChaosFarm::change_job(JobSpec next) {
     if (tasks.contains(done.task)) taken.push_back(done);
   }
   for (const BlobRef& image : adoption.images)
-    taken.push_back({assemble_task(image.frame()), {image}, {}, {}});
-  for (const TaskKey& task : adoption.settled) taken.push_back({task, {}, {}, {}});
+    taken.push_back({assemble_task(image.frame()), {{image}}});
+  for (const TaskKey& task : adoption.skipped) taken.push_back({task, {}});
   spec_ = std::move(next);
   spec_.leading_runs = adoption.plan.leading_runs;
   graph_ = JobGraph(spec_);
