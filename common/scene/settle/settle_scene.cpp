@@ -162,11 +162,13 @@ class SceneTaker {
     return shape;
   }
 
-  /// Nothing is seen of a node whose scale has a zero.
-  Status leave_out(const std::string& node) {
-    left_out_.push_back(fmt::format(
-        "{}: node \"{}\" has a scale of 0 in all frames: it is not there", file_.path, node));
-    return {};
+  /// Says of how many of the places of a node nothing is seen, and why.
+  void leave_out(std::size_t node, std::size_t count, std::size_t all, const char* why) {
+    if (count == 0) return;
+    const std::string which = all == 1 ? "" : fmt::format("{} of {} instances of ", count, all);
+    left_out_.push_back(fmt::format("{}: {}node \"{}\" {} {}: {} not there", file_.path, which,
+                                    object_names_[node], count > 1 ? "have" : "has", why,
+                                    count > 1 ? "they are" : "it is"));
   }
 
   /// A part without triangles is left out, and said once.
@@ -183,15 +185,21 @@ class SceneTaker {
 
   /// Once for each place that the node lists.
   Status take_node(std::size_t node, const std::string& material, bool catcher) {
-    BATON_ASSIGN(const std::vector<gltf::Matrix> places,
-                 gltf::instances_of(file_, file_.nodes[node]));
-    for (const gltf::Matrix& place : places)
-      BATON_TRY(take_node_at(node, place, material, catcher));
+    BATON_ASSIGN(const gltf::Instances instances, gltf::instances_of(file_, file_.nodes[node]));
+    std::size_t flat = 0;
+    for (const gltf::Matrix& place : instances.places) {
+      BATON_ASSIGN(const bool is_there, take_node_at(node, place, material, catcher));
+      flat += is_there ? 0 : 1;
+    }
+    const std::size_t all = instances.places.size() + instances.num_nowhere;
+    leave_out(node, flat, all, "a scale of 0 in all frames");
+    leave_out(node, instances.num_nowhere, all, "a place that is not finite");
     return {};
   }
 
-  Status take_node_at(std::size_t node, const gltf::Matrix& place, const std::string& material,
-                      bool catcher) {
+  /// Whether anything is seen there: nothing is where the scale has a zero.
+  Result<bool> take_node_at(std::size_t node, const gltf::Matrix& place,
+                            const std::string& material, bool catcher) {
     ObjectSpec object;
     object.name = object_names_[node];
     object.catcher = catcher;
@@ -202,11 +210,11 @@ class SceneTaker {
       std::vector<Matrix34> matrices;
       for (const gltf::Matrix& world : moved->second)
         matrices.push_back(gltf::to_floats(gltf::multiply(world, place)));
-      if (std::ranges::all_of(matrices, is_flat)) return leave_out(object.name);
+      if (std::ranges::all_of(matrices, is_flat)) return false;
       object.keys = matrix_keys(job_.frames, matrices);
     } else {
       object.matrix = gltf::to_floats(gltf::multiply(rest_[node], place));
-      if (is_flat(*object.matrix)) return leave_out(object.name);
+      if (is_flat(*object.matrix)) return false;
     }
 
     const int mesh = file_.nodes[node].mesh;
@@ -231,7 +239,7 @@ class SceneTaker {
       num_keys_ += object.keys.size();
     }
     if (num_keys_ > limits::kMaxGltfKeys) return too_many_keys();
-    return {};
+    return true;
   }
 
   /// All of the file, as they have numbers. What is wrong with one, and the files that its textures
