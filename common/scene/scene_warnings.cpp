@@ -47,18 +47,18 @@ void warn_of_file(const std::shared_ptr<const gltf::Document>& given,
   if (const auto motion = gltf::NodeMotion::read(given)) {
     for (const std::string& note : motion->notes()) add(note);
   }
-  std::size_t morphed = 0, lines = 0;
+  std::size_t morphed = 0;
   for (const gltf::Mesh& mesh : file.meshes) {
     for (const gltf::Primitive& primitive : mesh.primitives) {
       morphed += primitive.morphs_more ? 1 : 0;
-      lines += gltf::has_surface(primitive) ? 0 : 1;
     }
   }
   if (morphed > 0)
     add(fmt::format(
         "{} parts have morph targets of colours or texture coordinates, which are not read",
         morphed));
-  if (lines > 0) add(fmt::format("{} parts are points or lines, which are not shown", lines));
+  if (const std::string found = gltf::surfaceless_parts(file); !found.empty())
+    add("not shown: " + found);
 }
 
 /// Materials of the job that no object has and no file: meant to replace one of a file?

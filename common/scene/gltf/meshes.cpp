@@ -56,6 +56,8 @@ Result<Opened> open_primitive(const Document& document, const MeshSpec& spec) {
       p >= document.meshes[m].primitives.size())
     return document.error(place + ": not there");
   const Primitive& primitive = document.meshes[m].primitives[p];
+  if (!has_surface(primitive))
+    return document.error(place + ": expected triangles, found points or lines");
   BATON_ASSIGN(Vertices v, read_vertices(document, primitive, place));
   const bool with_normals = spec.smooth_normals && !v.normals.empty();
   const bool with_tangents = with_normals && is_bumpy(document, primitive) && !v.tangents.empty();
@@ -289,6 +291,9 @@ Result<TriangleMesh> whole_mesh(const Document& document, bool smooth_normals) {
   MeshBuilder builder(common);
   for (const Part& part : parts) add_triangles(part.vertices, part.to_file, common, builder);
   TriangleMesh mesh = builder.take();
+  if (const std::string found = surfaceless_parts(document);
+      mesh.triangles.empty() && !found.empty())
+    return document.error("nothing to show: it has " + found + " and no triangles");
   repairs.tangents = 0;  // it has none
   if (!common.normals) repairs.normals = 0;
   if (common.uv_sets == 0) repairs.uvs = 0;

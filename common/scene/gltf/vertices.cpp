@@ -15,7 +15,7 @@
 namespace baton::gltf {
 namespace {
 
-constexpr int kTriangles = 4, kStrip = 5, kFan = 6;
+constexpr int kPoints = 0, kTriangles = 4, kStrip = 5, kFan = 6;
 
 /// Corners of triangles from a list, a strip or a fan; of other modes nothing.
 std::vector<std::uint32_t> triangles_of(const std::vector<std::uint32_t>& indices, int mode) {
@@ -251,6 +251,25 @@ std::string place_of(int mesh, std::size_t primitive) {
 
 bool has_surface(const Primitive& primitive) {
   return primitive.mode >= kTriangles && primitive.mode <= kFan;
+}
+
+std::string surfaceless_parts(const Document& document) {
+  std::size_t points = 0, lines = 0, unknown = 0;
+  for (const Mesh& mesh : document.meshes) {
+    for (const Primitive& primitive : mesh.primitives) {
+      if (has_surface(primitive)) continue;
+      ++(primitive.mode == kPoints ? points : primitive.mode < kTriangles ? lines : unknown);
+    }
+  }
+  std::vector<std::string> found;
+  for (const auto& [count, what] :
+       {std::pair{points, "points"}, {lines, "lines"}, {unknown, "an unknown form"}}) {
+    if (count == 0) continue;
+    found.push_back(found.empty()
+                        ? fmt::format("{} part{} of {}", count, count > 1 ? "s" : "", what)
+                        : fmt::format("{} of {}", count, what));
+  }
+  return fmt::format("{}", fmt::join(found, " and "));
 }
 
 }  // namespace baton::gltf

@@ -44,6 +44,8 @@ bool has_triangles(const Document& document, const Primitive& primitive, bool de
 bool is_bumpy(const Document& document, const Primitive& primitive);
 /// Whether it has triangles.
 bool has_surface(const Primitive& primitive);
+/// What the file has without a surface, such as "2 parts of points and 1 of lines"; empty: nothing.
+std::string surfaceless_parts(const Document& document);
 std::string place_of(int mesh, std::size_t primitive);
 
 inline Vec3 vec3_at(const std::vector<float>& values, std::size_t i) {

@@ -52,7 +52,9 @@ class SceneTaker {
   Status take() {
     BATON_TRY(place_nodes());
     BATON_TRY(take_camera());
+    const std::size_t num_own = job_.scene.objects.size();
     BATON_TRY(take_objects());
+    if (job_.scene.objects.size() == num_own) BATON_TRY(look_for_surfaces(num_own));
     BATON_TRY(take_materials());
     if (job_.scene.materials.size() > limits::kMaxMaterials ||
         job_.scene.meshes.size() > limits::kMaxMeshes ||
@@ -149,6 +151,16 @@ class SceneTaker {
       if (passed[node].visible && file_.nodes[node].mesh >= 0)
         BATON_TRY(take_node(node, passed[node].material, passed[node].catcher));
     }
+    return {};
+  }
+
+  /// Of a file that gives no object: an error where the job shows nothing else, either.
+  Status look_for_surfaces(std::size_t num_own) {
+    const std::string found = gltf::surfaceless_parts(file_);
+    if (found.empty()) return {};
+    if (num_own == 0 && !job_.scene.ground)
+      return file_.error("nothing to show: it has " + found + " and no triangles");
+    left_out_.push_back(fmt::format("{}: not shown: {}; nothing else is there", file_.path, found));
     return {};
   }
 

@@ -1,10 +1,12 @@
 // One part of a glTF file that cannot be used spoils nothing else, and is told of.
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
 #include <limits>
 
+#include "common/scene/gltf/meshes.h"
 #include "common/scene/mesh_loader.h"
 #include "common/scene/object_view.h"
 #include "common/scene/pose.h"
@@ -138,8 +140,46 @@ TEST(GltfParts, PartsThatHaveNoSurfaceAreLeftOutAndSaid) {
                   HasSubstr("parts.glb: $.meshes[0].primitives[1] has no triangles with area")));
   const Loaded lines(file(good + R"(,{"attributes":{"POSITION":1},"mode":1},)" +
                           R"({"attributes":{"POSITION":1},"mode":0})"));
-  EXPECT_THAT(lines.said, testing::ElementsAre(HasSubstr("2 parts are points or lines")));
+  EXPECT_THAT(lines.said, testing::ElementsAre(
+                              HasSubstr("parts.glb: not shown: 1 part of points and 1 of lines")));
   EXPECT_THAT(Loaded(file(good)).said, IsEmpty());
+}
+
+TEST(GltfParts, AFileOfPointsAndLinesAloneSaysWhatItHas) {
+  GltfWriter w;
+  w.add(test::kTriangle, "VEC3", 3);
+  const auto file = [&](const std::vector<int>& modes) {
+    std::string parts;
+    for (const int mode : modes)
+      parts += (parts.empty() ? "" : ",") +
+               (R"({"attributes":{"POSITION":0},"mode":)" + std::to_string(mode) + "}");
+    return write_test_file(
+        "cloud.glb", w.glb(R"("nodes":[{"mesh":0}],"meshes":[{"primitives":[)" + parts + "]}]"));
+  };
+  for (const auto& [modes, found] : {std::pair{std::vector{0}, "1 part of points"},
+                                     {std::vector{0, 0}, "2 parts of points"},
+                                     {std::vector{1, 2, 3}, "3 parts of lines"},
+                                     {std::vector{3, 0, 1}, "1 part of points and 2 of lines"}}) {
+    const std::string path = file(modes);
+    const std::string what =
+        fmt::format("cloud.glb: nothing to show: it has {} and no triangles", found);
+    EXPECT_THAT(test::error_of(test::job_of(path, "", kCamera)), HasSubstr(what));
+    EXPECT_THAT(load_mesh(path, true).error().message, HasSubstr(what));
+    const auto document = gltf::read_document(path);
+    ASSERT_TRUE(document);
+    EXPECT_THAT(gltf::primitive_mesh(**document, {.path = path, .mesh = 0}).error().message,
+                HasSubstr("$.meshes[0].primitives[0]: expected triangles, found points or lines"));
+    // Beside a ground it is told of.
+    std::vector<std::string> left_out;
+    const auto settled = settle_motion(
+        test::job_of(path,
+                     R"( , "materials": {"m": {"type": "diffuse"}}, "ground": {"material": "m"})",
+                     kCamera),
+        &left_out);
+    ASSERT_TRUE(settled) << settled.error().message;
+    EXPECT_THAT(left_out,
+                testing::ElementsAre(HasSubstr(std::string("not shown: ") + found + ";")));
+  }
 }
 
 TEST(GltfParts, ARootThatHasAParentIsShownOnceWhereThatHasIt) {
