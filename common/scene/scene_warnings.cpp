@@ -7,7 +7,6 @@
 #include "common/base/suggest.h"
 #include "common/scene/gltf/document.h"
 #include "common/scene/gltf/materials.h"
-#include "common/scene/gltf/node_motion.h"
 #include "common/scene/gltf/vertices.h"
 
 namespace baton {
@@ -36,17 +35,12 @@ void warn_of_materials(const gltf::Document& file, const SceneSpec& scene,
   }
 }
 
-void warn_of_file(const std::shared_ptr<const gltf::Document>& given,
-                  std::vector<std::string>& warnings) {
-  const gltf::Document& file = *given;
+void warn_of_file(const gltf::Document& file, std::vector<std::string>& warnings) {
   const auto add = [&](const std::string& what) { warnings.push_back(file.path + ": " + what); };
   for (const std::string& extension : file.extensions_used) {
     if (!gltf::is_read(extension)) add("extension " + extension + " is not read");
   }
   for (const std::string& note : file.notes) add(note);
-  if (const auto motion = gltf::NodeMotion::read(given)) {
-    for (const std::string& note : motion->notes()) add(note);
-  }
   std::size_t morphed = 0;
   for (const gltf::Mesh& mesh : file.meshes) {
     for (const gltf::Primitive& primitive : mesh.primitives) {
@@ -90,7 +84,7 @@ std::vector<std::string> scene_warnings(const SceneSpec& scene) {
   for (const std::string& path : paths) {
     const auto document = gltf::read_document(path);
     if (!document) continue;
-    warn_of_file(*document, warnings);
+    warn_of_file(**document, warnings);
     warn_of_materials(**document, scene, used, warnings);
     for (std::string& name : gltf::material_names(**document)) names.insert(std::move(name));
   }

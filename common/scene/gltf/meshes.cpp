@@ -236,19 +236,22 @@ void place(const std::vector<PlacedNode>& places, NodeMotion& motion) {
 }
 
 Result<std::shared_ptr<const NodeMotion>> MotionCache::get(
-    const std::shared_ptr<const Document>& document, const std::vector<PlacedNode>& places) {
+    const std::shared_ptr<const Document>& document, const ShapeSpec& by) {
+  const std::string animation = by.animation ? by.animation->animation : "";
   for (const Entry& entry : entries_) {
-    if (entry.document == document && entry.places == places) return entry.motion;
+    if (entry.document == document && entry.places == by.places && entry.animation == animation)
+      return entry.motion;
   }
-  BATON_ASSIGN(NodeMotion motion, NodeMotion::read(document));
-  for (const PlacedNode& placed : places) {
+  BATON_ASSIGN(NodeMotion motion, NodeMotion::read(document, animation));
+  for (const PlacedNode& placed : by.places) {
     if (static_cast<std::size_t>(placed.node) >= document->nodes.size())
       return document->error(fmt::format("expected places of nodes below {}, got node {}",
                                          document->nodes.size(), placed.node));
   }
-  place(places, motion);
+  place(by.places, motion);
   motion.let_go_of_buffers();
-  entries_.push_back({document, places, std::make_shared<const NodeMotion>(std::move(motion))});
+  entries_.push_back(
+      {document, by.places, animation, std::make_shared<const NodeMotion>(std::move(motion))});
   return entries_.back().motion;
 }
 

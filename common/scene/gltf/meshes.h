@@ -48,14 +48,16 @@ void place(const std::vector<PlacedNode>& places, NodeMotion& motion);
 /// Reads the animations of each file once for all that is placed alike. Not for several threads.
 class MotionCache {
  public:
-  /// Errors: those of NodeMotion, a place of a node that is not there.
+  /// The nodes as `by` places and moves them. Errors: those of NodeMotion, a place of a node that
+  /// is not there.
   Result<std::shared_ptr<const NodeMotion>> get(const std::shared_ptr<const Document>& document,
-                                                const std::vector<PlacedNode>& places);
+                                                const ShapeSpec& by);
 
  private:
   struct Entry {
     std::shared_ptr<const Document> document;
     std::vector<PlacedNode> places;
+    std::string animation;
     std::shared_ptr<const NodeMotion> motion;
   };
   std::vector<Entry> entries_;

@@ -7,6 +7,7 @@
 
 #include "common/base/suggest.h"
 #include "common/scene/gltf/accessor.h"
+#include "common/scene/gltf/names.h"
 
 namespace baton::gltf {
 namespace {
@@ -209,12 +210,15 @@ Quaternion Curve::rotation_at(double seconds) const {
   return unit(q);
 }
 
-Result<NodeMotion> NodeMotion::read(std::shared_ptr<const Document> document) {
+Result<NodeMotion> NodeMotion::read(std::shared_ptr<const Document> document,
+                                    const std::string& animation) {
   NodeMotion motion;
   motion.document_ = std::move(document);
   const Document& file = *motion.document_;
   motion.curves_.resize(file.nodes.size());
+  BATON_ASSIGN(const int chosen, find_animation(file, animation));
   for (const Channel& channel : file.channels) {
+    if (chosen >= 0 && channel.animation != chosen) continue;
     if (is_idle(file, channel)) {
       ++motion.num_idle_channels_;
       continue;
@@ -224,7 +228,10 @@ Result<NodeMotion> NodeMotion::read(std::shared_ptr<const Document> document) {
                                   : channel.path == Path::rotation  ? moved.rotation
                                   : channel.path == Path::scale     ? moved.scale
                                                                     : moved.weights;
-    if (curve) continue;
+    if (curve) {
+      ++motion.num_second_channels_;
+      continue;
+    }
     BATON_ASSIGN(curve, read_curve(file, channel, motion.repairs_));
     if (curve->times.empty()) {
       ++motion.repairs_.empty_curves;
@@ -253,6 +260,11 @@ std::vector<std::string> NodeMotion::notes() const {
   add(repairs_.unordered,
       "keys of its animations are earlier than the one before: they are put into order");
   add(repairs_.empty_curves, "curves of its animations have no usable key: they move nothing");
+  if (num_second_channels_ > 0)
+    notes.push_back(fmt::format(
+        "{} curves of its animations move what an earlier one moves, and are left out: `animation` "
+        "chooses one of {}",
+        num_second_channels_, shown_names(animation_names(*document_))));
   add(num_idle_channels_, "of its animations move weights of nodes without morph targets");
   return notes;
 }

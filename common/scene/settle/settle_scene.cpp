@@ -67,7 +67,7 @@ class SceneTaker {
   }
 
  private:
-  FileClock clock() const { return {gltf_.fps, gltf_.start_frame}; }
+  FileClock clock() const { return {gltf_.fps, gltf_.start_frame, gltf_.animation}; }
 
   /// What the job says of nodes; then where all of them are in each frame.
   Status place_nodes() {
@@ -307,6 +307,21 @@ Status check_names(const JobSpec& job) {
   return {};
 }
 
+/// Says what is odd about animations that shape meshes of the job. Faults are those of the meshes.
+void note_shapes(const SceneSpec& scene, gltf::FileCache& cache,
+                 std::vector<std::string>& left_out) {
+  std::set<std::pair<std::string, std::string>> seen;
+  for (const auto& [name, mesh] : scene.meshes) {
+    if (!mesh.deforms()) continue;
+    const std::string& animation = mesh.shaped_by->animation->animation;
+    if (!seen.insert({mesh.path, animation}).second) continue;
+    const auto document = cache.get(mesh.path);
+    if (!document) continue;
+    if (const auto motion = gltf::NodeMotion::read(*document, animation))
+      add_notes(*motion, left_out);
+  }
+}
+
 /// The tiles of a texture that are there.
 void list_tiles(const std::string& path, std::set<std::string>& files) {
   std::error_code error;
@@ -347,11 +362,15 @@ Status list_files(SceneSpec& scene, gltf::FileCache& cache) {
 
 Status settle_scene(JobSpec& job, std::vector<std::string>* left_out) {
   std::vector<std::string> unsaid;
+  std::vector<std::string>& said = left_out == nullptr ? unsaid : *left_out;
   gltf::FileCache cache;
+  note_shapes(job.scene, cache, said);
   if (job.scene.gltf) {
     BATON_ASSIGN(auto document, cache.get(job.scene.gltf->file));
-    BATON_ASSIGN(gltf::NodeMotion motion, gltf::NodeMotion::read(std::move(document)));
-    BATON_TRY(SceneTaker(job, std::move(motion), left_out == nullptr ? unsaid : *left_out).take());
+    BATON_ASSIGN(gltf::NodeMotion motion,
+                 gltf::NodeMotion::read(std::move(document), job.scene.gltf->animation));
+    add_notes(motion, said);
+    BATON_TRY(SceneTaker(job, std::move(motion), said).take());
     BATON_TRY(check_names(job));
   }
   return list_files(job.scene, cache);
