@@ -24,6 +24,7 @@ struct GltfMotion {
   float fps = 24;
   /// The frame at time 0; Blender writes frame f at f / fps seconds.
   int start_frame = 0;
+  std::string animation{};  ///< as of GltfSceneSpec
 
   bool operator==(const GltfMotion&) const = default;
 };
@@ -101,10 +102,11 @@ std::vector<TextureSpec*> textures_of(MaterialSpec& material);
 /// Whether a file name ends in .gltf or .glb.
 bool is_gltf(const std::string& path);
 
-/// Which time of a file a frame shows.
+/// Which time of a file's animations a frame shows.
 struct FileClock {
   float fps = 24;
-  int start_frame = 0;  ///< the frame at time 0
+  int start_frame = 0;      ///< the frame at time 0
+  std::string animation{};  ///< as of GltfSceneSpec
 
   double seconds_at(double frame) const {
     return (frame - static_cast<double>(start_frame)) / static_cast<double>(fps);
@@ -224,7 +226,9 @@ struct GltfNodeSpec {
 struct GltfSceneSpec {
   std::string file;  ///< .gltf .glb
   float fps = 24;
-  int start_frame = 0;                          ///< the frame at time 0
+  int start_frame = 0;  ///< the frame at time 0
+  /// The animation that plays, by its name or its place in the file's list; empty: all of them.
+  std::string animation{};
   std::map<std::string, GltfNodeSpec> nodes{};  ///< by name
 
   bool operator==(const GltfSceneSpec&) const = default;

@@ -104,28 +104,14 @@ void append(const std::vector<std::string>& lines, std::vector<std::string>& war
 
 /// What was made anew or left out of files, summed over the meshes of each.
 void warn_of_repairs(const JobSpec& job, const Scene& scene, std::vector<std::string>& warnings) {
-  static constexpr std::pair<std::uint64_t MeshRepairs::*, std::string_view> kKinds[] = {
-      {&MeshRepairs::normals, "vertices have no usable normal: they take that of the faces around"},
-      {&MeshRepairs::tangents,
-       "vertices have no usable tangent: they take that of the coordinates"},
-      {&MeshRepairs::weights, "vertices are held by no joint: they follow the first one"},
-      {&MeshRepairs::uvs, "corners have no texture coordinates: they have (0, 0)"},
-      {&MeshRepairs::crossing, "faces have edges that cross, or too many: they are cut as fans"},
-      {&MeshRepairs::lines, "points, lines or faces of two corners are not shown"},
-      {&MeshRepairs::colors,
-       "vertices have colours that are not from 0 to 1: they are cut, or white"},
-      {&MeshRepairs::unread_colors,
-       "vertices or faces have colours in a form that is not read: they count as white"},
-  };
   std::map<std::string, MeshRepairs> by_file;
   std::size_t index = 0;  // the scene has the meshes in the order of the job
   for (const auto& [name, spec] : job.scene.meshes) {
-    MeshRepairs& sum = by_file[spec.path];
-    for (const auto& [count, what] : kKinds) sum.*count += scene.meshes[index].repairs.*count;
+    by_file[spec.path] += scene.meshes[index].repairs;
     ++index;
   }
   for (const auto& [file, repairs] : by_file) {
-    for (const auto& [count, what] : kKinds) {
+    for (const auto& [count, what] : repair_kinds()) {
       if (repairs.*count > 0)
         warnings.push_back(fmt::format("{}: {} {}", file, repairs.*count, what));
     }

@@ -165,7 +165,7 @@ Result<TriangleMesh> load_part(const MeshSpec& spec, bool with_uvs, gltf::FileCa
   if (spec.mesh < 0) return load_mesh(spec.path, spec.smooth_normals, with_uvs);
   BATON_ASSIGN(const auto document, files.get(spec.path));
   if (!spec.shaped_by) return gltf::primitive_mesh(*document, spec);
-  BATON_ASSIGN(auto motion, motions.get(document, spec.shaped_by->places));
+  BATON_ASSIGN(auto motion, motions.get(document, *spec.shaped_by));
   return gltf::shaped_mesh(*document, std::move(motion), spec);
 }
 

@@ -7,7 +7,6 @@
 #include "common/base/suggest.h"
 #include "common/scene/gltf/document.h"
 #include "common/scene/gltf/materials.h"
-#include "common/scene/gltf/node_motion.h"
 #include "common/scene/gltf/vertices.h"
 
 namespace baton {
@@ -36,29 +35,24 @@ void warn_of_materials(const gltf::Document& file, const SceneSpec& scene,
   }
 }
 
-void warn_of_file(const std::shared_ptr<const gltf::Document>& given,
-                  std::vector<std::string>& warnings) {
-  const gltf::Document& file = *given;
+void warn_of_file(const gltf::Document& file, std::vector<std::string>& warnings) {
   const auto add = [&](const std::string& what) { warnings.push_back(file.path + ": " + what); };
   for (const std::string& extension : file.extensions_used) {
     if (!gltf::is_read(extension)) add("extension " + extension + " is not read");
   }
   for (const std::string& note : file.notes) add(note);
-  if (const auto motion = gltf::NodeMotion::read(given)) {
-    for (const std::string& note : motion->notes()) add(note);
-  }
-  std::size_t morphed = 0, lines = 0;
+  std::size_t morphed = 0;
   for (const gltf::Mesh& mesh : file.meshes) {
     for (const gltf::Primitive& primitive : mesh.primitives) {
       morphed += primitive.morphs_more ? 1 : 0;
-      lines += gltf::has_surface(primitive) ? 0 : 1;
     }
   }
   if (morphed > 0)
     add(fmt::format(
         "{} parts have morph targets of colours or texture coordinates, which are not read",
         morphed));
-  if (lines > 0) add(fmt::format("{} parts are points or lines, which are not shown", lines));
+  if (const std::string found = gltf::surfaceless_parts(file); !found.empty())
+    add("not shown: " + found);
 }
 
 /// Materials of the job that no object has and no file: meant to replace one of a file?
@@ -90,7 +84,7 @@ std::vector<std::string> scene_warnings(const SceneSpec& scene) {
   for (const std::string& path : paths) {
     const auto document = gltf::read_document(path);
     if (!document) continue;
-    warn_of_file(*document, warnings);
+    warn_of_file(**document, warnings);
     warn_of_materials(**document, scene, used, warnings);
     for (std::string& name : gltf::material_names(**document)) names.insert(std::move(name));
   }

@@ -57,6 +57,7 @@ void fields(JobArchive& a, GltfMotion& gltf) {
   a.text(required("node"), gltf.node);
   a.number("fps", gltf.fps, kPositiveRange);
   a.integer("startFrame", gltf.start_frame, 0, limits::kMaxFrameNumber);
+  a.text(alternative("animation"), gltf.animation);
 }
 
 void gltf_field(JobArchive& a, std::optional<GltfMotion>& gltf) {

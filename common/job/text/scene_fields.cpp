@@ -43,6 +43,7 @@ void fields(JobArchive& a, ShapeSpec& shape) {
   const auto visit = [&] {
     a.number("fps", clock.fps, kPositiveRange);
     a.integer("startFrame", clock.start_frame, 0, limits::kMaxFrameNumber);
+    a.text(alternative("name"), clock.animation);
   };
   if (a.object("animation", visit, {.present = shape.animation.has_value()}))
     shape.animation = clock;
@@ -108,6 +109,7 @@ void fields(JobArchive& a, GltfSceneSpec& gltf) {
   asset_path(a, required("file"), gltf.file, {".gltf", ".glb"});
   a.number("fps", gltf.fps, kPositiveRange);
   a.integer("startFrame", gltf.start_frame, 0, limits::kMaxFrameNumber);
+  a.text(alternative("animation"), gltf.animation);
   a.named("nodes", gltf.nodes, limits::kMaxObjects, [&](GltfNodeSpec& node) { fields(a, node); });
 }
 

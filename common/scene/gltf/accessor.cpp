@@ -4,6 +4,7 @@
 
 #include <algorithm>
 #include <array>
+#include <cmath>
 #include <cstring>
 #include <limits>
 
@@ -148,6 +149,11 @@ Result<std::vector<std::uint32_t>> read_indices(const Document& document, int ac
     values[element] = static_cast<std::uint32_t>(value);
   }));
   return values;
+}
+
+bool is_finite(std::span<const float> values, std::size_t width, std::size_t index) {
+  return std::ranges::all_of(values.subspan(index * width, width),
+                             [](float v) { return std::isfinite(v); });
 }
 
 }  // namespace baton::gltf

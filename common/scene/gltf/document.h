@@ -125,6 +125,7 @@ enum class Interpolation : std::uint8_t { linear, step, cubic_spline };
 
 /// A curve that moves a node.
 struct Channel {
+  int animation = 0;  ///< place in the file's list
   int node = -1;
   Path path = Path::translation;
   Interpolation interpolation = Interpolation::linear;
@@ -189,6 +190,7 @@ struct Document {
   std::vector<Skin> skins;
   std::vector<int> roots;  ///< nodes of the scene that is shown
   std::vector<Camera> cameras;
+  std::vector<std::string> animations;  ///< their names, some empty or alike
   /// Channels of all animations, in the order of the file.
   std::vector<Channel> channels;
   std::vector<Material> materials;

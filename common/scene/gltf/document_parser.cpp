@@ -262,14 +262,15 @@ void parse_animation(const JsonView& animation, Document& document) {
     if (s < 0 || node < 0) return;  // what an extension moves
     const Sampler& sampler = samplers[static_cast<std::size_t>(s)];
     const auto add = [&](Path moved) {
-      document.channels.push_back(
-          {node, moved, sampler.interpolation, sampler.input, sampler.output});
+      document.channels.push_back({static_cast<int>(document.animations.size()), node, moved,
+                                   sampler.interpolation, sampler.input, sampler.output});
     };
     if (path == "translation") add(Path::translation);
     if (path == "rotation") add(Path::rotation);
     if (path == "scale") add(Path::scale);
     if (path == "weights") add(Path::weights);
   });
+  document.animations.push_back(animation.name("name"));
 }
 
 }  // namespace

@@ -7,6 +7,7 @@
 #include <set>
 
 #include "common/math/inverse.h"
+#include "common/scene/gltf/accessor.h"
 #include "common/scene/gltf/shaper.h"
 #include "common/scene/gltf/vertices.h"
 #include "common/scene/mesh/mesh_builder.h"
@@ -55,6 +56,8 @@ Result<Opened> open_primitive(const Document& document, const MeshSpec& spec) {
       p >= document.meshes[m].primitives.size())
     return document.error(place + ": not there");
   const Primitive& primitive = document.meshes[m].primitives[p];
+  if (!has_surface(primitive))
+    return document.error(place + ": expected triangles, found points or lines");
   BATON_ASSIGN(Vertices v, read_vertices(document, primitive, place));
   const bool with_normals = spec.smooth_normals && !v.normals.empty();
   const bool with_tangents = with_normals && is_bumpy(document, primitive) && !v.tangents.empty();
@@ -166,7 +169,7 @@ Shaping shaping_of(const NodeMotion& motion, int node) {
   return given.skin >= 0 || !rests ? Shaping::at_rest : Shaping::none;
 }
 
-Result<std::vector<Matrix>> instances_of(const Document& document, const Node& node) {
+Result<Instances> instances_of(const Document& document, const Node& node) {
   std::size_t count = 1;
   for (const int accessor :
        {node.instance_translations, node.instance_rotations, node.instance_scales}) {
@@ -180,18 +183,22 @@ Result<std::vector<Matrix>> instances_of(const Document& document, const Node& n
   BATON_ASSIGN(const std::vector<float> t, read(node.instance_translations, 3, "TRANSLATION", 0));
   BATON_ASSIGN(const std::vector<float> r, read(node.instance_rotations, 4, "ROTATION", 0));
   BATON_ASSIGN(const std::vector<float> s, read(node.instance_scales, 3, "SCALE", 1));
-  std::vector<Matrix> places;
+  Instances instances;
   for (std::size_t i = 0; i < count; ++i) {
+    if (!is_finite(t, 3, i) || !is_finite(r, 4, i) || !is_finite(s, 3, i)) {
+      ++instances.num_nowhere;
+      continue;
+    }
     const float* const q = r.data() + 4 * i;
     const double length = std::sqrt(double{q[0]} * q[0] + double{q[1]} * q[1] +
                                     double{q[2]} * q[2] + double{q[3]} * q[3]);
     const Quaternion turn =
         length > 0 ? Quaternion{q[0] / length, q[1] / length, q[2] / length, q[3] / length}
                    : Quaternion{};
-    places.push_back(compose({t[3 * i], t[3 * i + 1], t[3 * i + 2]}, turn,
-                             {s[3 * i], s[3 * i + 1], s[3 * i + 2]}));
+    instances.places.push_back(compose({t[3 * i], t[3 * i + 1], t[3 * i + 2]}, turn,
+                                       {s[3 * i], s[3 * i + 1], s[3 * i + 2]}));
   }
-  return places;
+  return instances;
 }
 
 Result<TriangleMesh> primitive_mesh(const Document& document, const MeshSpec& spec) {
@@ -210,7 +217,7 @@ Result<TriangleMesh> shaped_mesh(const Document& document, std::shared_ptr<const
   BATON_ASSIGN(Shaper shaper,
                Shaper::read(document, by.node, static_cast<std::size_t>(spec.primitive),
                             opened.vertices, opened.parts.normals, opened.parts.tangents));
-  opened.vertices.repairs.weights = shaper.num_loose();
+  opened.vertices.repairs += shaper.repairs();
   if (by.animation)
     return deforming_mesh(
         document, spec, std::move(opened),
@@ -229,19 +236,22 @@ void place(const std::vector<PlacedNode>& places, NodeMotion& motion) {
 }
 
 Result<std::shared_ptr<const NodeMotion>> MotionCache::get(
-    const std::shared_ptr<const Document>& document, const std::vector<PlacedNode>& places) {
+    const std::shared_ptr<const Document>& document, const ShapeSpec& by) {
+  const std::string animation = by.animation ? by.animation->animation : "";
   for (const Entry& entry : entries_) {
-    if (entry.document == document && entry.places == places) return entry.motion;
+    if (entry.document == document && entry.places == by.places && entry.animation == animation)
+      return entry.motion;
   }
-  BATON_ASSIGN(NodeMotion motion, NodeMotion::read(document));
-  for (const PlacedNode& placed : places) {
+  BATON_ASSIGN(NodeMotion motion, NodeMotion::read(document, animation));
+  for (const PlacedNode& placed : by.places) {
     if (static_cast<std::size_t>(placed.node) >= document->nodes.size())
       return document->error(fmt::format("expected places of nodes below {}, got node {}",
                                          document->nodes.size(), placed.node));
   }
-  place(places, motion);
+  place(by.places, motion);
   motion.let_go_of_buffers();
-  entries_.push_back({document, places, std::make_shared<const NodeMotion>(std::move(motion))});
+  entries_.push_back(
+      {document, by.places, animation, std::make_shared<const NodeMotion>(std::move(motion))});
   return entries_.back().motion;
 }
 
@@ -262,8 +272,9 @@ Result<TriangleMesh> whole_mesh(const Document& document, bool smooth_normals) {
     const Matrix& to_file = document.nodes[static_cast<std::size_t>(node)].skin >= 0
                                 ? kIdentity
                                 : to_world[static_cast<std::size_t>(node)];
-    BATON_ASSIGN(const std::vector<Matrix> places,
+    BATON_ASSIGN(const Instances instances,
                  instances_of(document, document.nodes[static_cast<std::size_t>(node)]));
+    repairs.instances += instances.num_nowhere;
     for (std::size_t p = 0; p < given.primitives.size(); ++p) {
       if (!has_surface(given.primitives[p])) continue;
       BATON_ASSIGN(Vertices v, read_vertices(document, given.primitives[p], place_of(mesh, p)));
@@ -272,21 +283,24 @@ Result<TriangleMesh> whole_mesh(const Document& document, bool smooth_normals) {
       if (!shaper.is_idle())
         take_shape(shaper.shape(to_world, NodeMotion::weights_at_rest(document, node)), v);
       any_normals = any_normals || !v.normals.empty();
-      repairs.normals += v.repairs.normals;
-      repairs.weights += shaper.num_loose();
-      repairs.colors += v.repairs.colors;
+      repairs += v.repairs;
+      repairs += shaper.repairs();
       common.colors = common.colors || !v.colors.empty();
       common.uv_sets = std::min(common.uv_sets, v.num_uv_sets());
-      for (const Matrix& at : places) parts.push_back({v, multiply(to_file, at)});
+      for (const Matrix& at : instances.places) parts.push_back({v, multiply(to_file, at)});
     }
   }
   common.normals = smooth_normals && any_normals;
   MeshBuilder builder(common);
   for (const Part& part : parts) add_triangles(part.vertices, part.to_file, common, builder);
   TriangleMesh mesh = builder.take();
-  mesh.repairs.normals += common.normals ? repairs.normals : 0;
-  mesh.repairs.weights = repairs.weights;
-  mesh.repairs.colors = repairs.colors;
+  if (const std::string found = surfaceless_parts(document);
+      mesh.triangles.empty() && !found.empty())
+    return document.error("nothing to show: it has " + found + " and no triangles");
+  repairs.tangents = 0;  // it has none
+  if (!common.normals) repairs.normals = 0;
+  if (common.uv_sets == 0) repairs.uvs = 0;
+  mesh.repairs += repairs;
   return mesh;
 }
 

@@ -18,13 +18,18 @@ enum class Shaping : std::uint8_t {
 };
 Shaping shaping_of(const NodeMotion& motion, int node);
 
-/// Where a node shows its mesh, in its own space: once, or at each place that the file lists
-/// (EXT_mesh_gpu_instancing). Errors: lists of unequal length, numbers that are not finite.
-Result<std::vector<Matrix>> instances_of(const Document& document, const Node& node);
+/// Where a node shows its mesh, in its own space.
+struct Instances {
+  std::vector<Matrix> places;
+  std::uint64_t num_nowhere = 0;  ///< more, whose numbers are not finite
+};
+/// Once, or at each place that the file lists (EXT_mesh_gpu_instancing). Errors: lists of unequal
+/// length.
+Result<Instances> instances_of(const Document& document, const Node& node);
 
 /// The triangles of one primitive, in the space of its mesh, with the UV sets that it has. Without
 /// normals of its own it is flat, as glTF says. Errors name file and place: accessors that do not
-/// fit, indices out of range, coordinates that are not finite, no triangles.
+/// fit, indices out of range, no triangles.
 Result<TriangleMesh> primitive_mesh(const Document& document, const MeshSpec& spec);
 
 /// The same as spec.shaped_by, which is there, shapes it: posed, or with a deformation. motion: of
@@ -43,14 +48,16 @@ void place(const std::vector<PlacedNode>& places, NodeMotion& motion);
 /// Reads the animations of each file once for all that is placed alike. Not for several threads.
 class MotionCache {
  public:
-  /// Errors: those of NodeMotion, a place of a node that is not there.
+  /// The nodes as `by` places and moves them. Errors: those of NodeMotion, a place of a node that
+  /// is not there.
   Result<std::shared_ptr<const NodeMotion>> get(const std::shared_ptr<const Document>& document,
-                                                const std::vector<PlacedNode>& places);
+                                                const ShapeSpec& by);
 
  private:
   struct Entry {
     std::shared_ptr<const Document> document;
     std::vector<PlacedNode> places;
+    std::string animation;
     std::shared_ptr<const NodeMotion> motion;
   };
   std::vector<Entry> entries_;

@@ -2,6 +2,10 @@
 
 #include <fmt/format.h>
 
+#include <algorithm>
+
+#include "common/base/suggest.h"
+
 namespace baton::gltf {
 
 std::vector<std::string> distinct_names(const std::vector<std::string>& given, const char* what,
@@ -30,6 +34,30 @@ std::vector<std::string> object_names(const Document& document) {
     given.push_back(!shows_mesh ? "" : node.name.empty() ? document.mesh_of(node).name : node.name);
   }
   return distinct_names(given, "node");
+}
+
+std::vector<std::string> animation_names(const Document& document) {
+  return distinct_names(document.animations, "animation");
+}
+
+Result<int> find_animation(const Document& document, const std::string& choice) {
+  if (choice.empty()) return -1;
+  const std::vector<std::string> names = animation_names(document);
+  for (std::size_t i = 0; i < names.size(); ++i)
+    if (names[i] == choice) return static_cast<int>(i);
+  for (std::size_t i = 0; i < names.size(); ++i)
+    if (std::to_string(i) == choice) return static_cast<int>(i);
+  return document.error(fmt::format("no animation \"{}\"{}", choice,
+                                    names.empty() ? "; it has none" : suggestion(choice, names)));
+}
+
+std::string shown_names(const std::vector<std::string>& names) {
+  constexpr std::size_t kMostShown = 12;
+  std::string text;
+  for (std::size_t i = 0; i < std::min(names.size(), kMostShown); ++i)
+    text += fmt::format("{}\"{}\"", i > 0 ? ", " : "", names[i]);
+  if (names.size() > kMostShown) text += fmt::format(" and {} more", names.size() - kMostShown);
+  return text;
 }
 
 }  // namespace baton::gltf

@@ -18,4 +18,12 @@ std::vector<std::string> distinct_names(const std::vector<std::string>& given, c
 /// Those without a mesh take no name from others.
 std::vector<std::string> object_names(const Document& document);
 
+/// What a job calls the animations of a file, no two alike.
+std::vector<std::string> animation_names(const Document& document);
+/// The animation that a job chooses by its name or its place in the file's list; empty: -1, all of
+/// them. Error: not there.
+Result<int> find_animation(const Document& document, const std::string& choice);
+/// Names between quotes, a dozen at most, and how many more there are.
+std::string shown_names(const std::vector<std::string>& names);
+
 }  // namespace baton::gltf

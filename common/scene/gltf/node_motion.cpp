@@ -7,6 +7,7 @@
 
 #include "common/base/suggest.h"
 #include "common/scene/gltf/accessor.h"
+#include "common/scene/gltf/names.h"
 
 namespace baton::gltf {
 namespace {
@@ -114,30 +115,67 @@ std::size_t drop_repeated(Curve& curve, std::size_t row) {
   return dropped;
 }
 
-/// repeated: gets the keys that another one at their time replaces, added.
-Result<Curve> read_curve(const Document& document, const Channel& channel, std::size_t& repeated) {
+/// Makes tangents of a cubic curve 0 that are not finite; those before the first and behind the
+/// last key say nothing.
+void mend_slopes(Curve& curve, std::size_t width, KeyRepairs& repairs) {
+  const std::size_t keys = curve.times.size();
+  for (std::size_t k = 0; k < keys; ++k) {
+    for (const std::size_t part : {std::size_t{0}, std::size_t{2}}) {
+      if (is_finite(curve.values, width, 3 * k + part)) continue;
+      std::fill_n(curve.values.begin() + static_cast<std::ptrdiff_t>((3 * k + part) * width), width,
+                  0.0f);
+      repairs.slopes += (part == 0 ? k > 0 : k + 1 < keys) ? 1 : 0;
+    }
+  }
+}
+
+/// Leaves keys out that are not finite, and puts the others into the order of their times. rows:
+/// of `width` numbers a key.
+void sort_keys(Curve& curve, std::size_t rows, std::size_t width, KeyRepairs& repairs) {
+  std::vector<std::size_t> order;
+  for (std::size_t k = 0; k < curve.times.size(); ++k) {
+    if (!std::isfinite(curve.times[k]) || !is_finite(curve.values, rows * width, k)) {
+      ++repairs.unusable;
+      continue;
+    }
+    if (!order.empty() && curve.times[k] < curve.times[order.back()]) ++repairs.unordered;
+    order.push_back(k);
+  }
+  std::ranges::stable_sort(order, {}, [&](std::size_t k) { return curve.times[k]; });
+  Curve sorted{curve.interpolation, {}, {}};
+  for (const std::size_t k : order) {
+    sorted.times.push_back(curve.times[k]);
+    const auto first = curve.values.begin() + static_cast<std::ptrdiff_t>(k * rows * width);
+    sorted.values.insert(sorted.values.end(), first,
+                         first + static_cast<std::ptrdiff_t>(rows * width));
+  }
+  curve = std::move(sorted);
+}
+
+/// A curve without keys where the file has none that can be used. repairs: gets what was not
+/// usable, added.
+Result<Curve> read_curve(const Document& document, const Channel& channel, KeyRepairs& repairs) {
   const bool moves_weights = channel.path == Path::weights;
   std::size_t width = channel.path == Path::rotation ? 4 : 3;
   Curve curve{channel.interpolation, {}, {}};
   BATON_ASSIGN(curve.times, read_floats(document, channel.input, 1));
   BATON_ASSIGN(curve.values,
                read_floats(document, channel.output, moves_weights ? 1 : static_cast<int>(width)));
-  const auto finite = [](float v) { return std::isfinite(v); };
-  if (!std::all_of(curve.times.begin(), curve.times.end(), finite) ||
-      !std::is_sorted(curve.times.begin(), curve.times.end()) || curve.times.empty())
-    return document.error(fmt::format(
-        "$.accessors[{}]: expected the ascending times of an animation", channel.input));
+  if (curve.times.empty())
+    return document.error(
+        fmt::format("$.accessors[{}]: expected the times of an animation", channel.input));
   const std::size_t rows = channel.interpolation == Interpolation::cubic_spline ? 3 : 1;
   // A mesh may have other targets than the animation has weights.
   if (moves_weights)
     width = std::max<std::size_t>(curve.values.size() / (curve.times.size() * rows), 1);
   const std::size_t expected = curve.times.size() * rows * width;
-  if (curve.values.size() != expected ||
-      !std::all_of(curve.values.begin(), curve.values.end(), finite))
+  if (curve.values.size() != expected)
     return document.error(
-        fmt::format("$.accessors[{}]: expected {} finite numbers for an animation, got {}",
-                    channel.output, expected, curve.values.size()));
-  repeated += drop_repeated(curve, rows * width);
+        fmt::format("$.accessors[{}]: expected {} numbers for an animation, got {}", channel.output,
+                    expected, curve.values.size()));
+  if (rows > 1) mend_slopes(curve, width, repairs);
+  sort_keys(curve, rows, width, repairs);
+  repairs.repeated += drop_repeated(curve, rows * width);
   return curve;
 }
 
@@ -173,12 +211,15 @@ Quaternion Curve::rotation_at(double seconds) const {
   return unit(q);
 }
 
-Result<NodeMotion> NodeMotion::read(std::shared_ptr<const Document> document) {
+Result<NodeMotion> NodeMotion::read(std::shared_ptr<const Document> document,
+                                    const std::string& animation) {
   NodeMotion motion;
   motion.document_ = std::move(document);
   const Document& file = *motion.document_;
   motion.curves_.resize(file.nodes.size());
+  BATON_ASSIGN(const int chosen, find_animation(file, animation));
   for (const Channel& channel : file.channels) {
+    if (chosen >= 0 && channel.animation != chosen) continue;
     if (is_idle(file, channel)) {
       ++motion.num_idle_channels_;
       continue;
@@ -188,8 +229,16 @@ Result<NodeMotion> NodeMotion::read(std::shared_ptr<const Document> document) {
                                   : channel.path == Path::rotation  ? moved.rotation
                                   : channel.path == Path::scale     ? moved.scale
                                                                     : moved.weights;
-    if (curve) continue;
-    BATON_ASSIGN(curve, read_curve(file, channel, motion.num_repeated_keys_));
+    if (curve) {
+      ++motion.num_second_channels_;
+      continue;
+    }
+    BATON_ASSIGN(curve, read_curve(file, channel, motion.repairs_));
+    if (curve->times.empty()) {
+      ++motion.repairs_.empty_curves;
+      curve.reset();
+      continue;
+    }
     if (channel.path != Path::weights &&
         file.nodes[static_cast<std::size_t>(channel.node)].has_matrix)
       return file.error(fmt::format("$.nodes[{}]: is animated, expected no matrix", channel.node));
@@ -201,13 +250,23 @@ Result<NodeMotion> NodeMotion::read(std::shared_ptr<const Document> document) {
 
 std::vector<std::string> NodeMotion::notes() const {
   std::vector<std::string> notes;
-  if (num_repeated_keys_ > 0)
+  const auto add = [&](std::size_t count, const char* what) {
+    if (count > 0) notes.push_back(fmt::format("{} {}", count, what));
+  };
+  add(repairs_.repeated,
+      "keys of its animations are at the time of another, of which the last counts");
+  add(repairs_.unusable,
+      "keys of its animations have a time or value that is not finite: they are left out");
+  add(repairs_.slopes, "tangents of keys of its animations are not finite: they count as 0");
+  add(repairs_.unordered,
+      "keys of its animations are earlier than the one before: they are put into order");
+  add(repairs_.empty_curves, "curves of its animations have no usable key: they move nothing");
+  if (num_second_channels_ > 0)
     notes.push_back(fmt::format(
-        "{} keys of its animations are at the time of another, of which the last counts",
-        num_repeated_keys_));
-  if (num_idle_channels_ > 0)
-    notes.push_back(fmt::format("{} of its animations move weights of nodes without morph targets",
-                                num_idle_channels_));
+        "{} curves of its animations move what an earlier one moves, and are left out: `animation` "
+        "chooses one of {}",
+        num_second_channels_, shown_names(animation_names(*document_))));
+  add(num_idle_channels_, "of its animations move weights of nodes without morph targets");
   return notes;
 }
 

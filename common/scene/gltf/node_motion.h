@@ -23,16 +23,28 @@ struct Curve {
   std::vector<double> values_at(double seconds) const;
 };
 
-/// Where the nodes of a file are at any time: all its animations together. Where several move one
-/// property of a node, the first in the file counts.
+/// Keys of curves that could not be used as they are.
+struct KeyRepairs {
+  std::size_t repeated = 0;      ///< another one at their time replaces them
+  std::size_t unusable = 0;      ///< their time or value is not finite: left out
+  std::size_t slopes = 0;        ///< their tangents are not finite: 0
+  std::size_t unordered = 0;     ///< earlier than the one before them: put into order
+  std::size_t empty_curves = 0;  ///< without a key that can be used: nothing moves by them
+};
+
+/// Where the nodes of a file are at any time: all its animations together, or one of them. Where
+/// several move one property of a node, the first in the file counts.
 class NodeMotion {
  public:
-  /// Errors name the file and the accessor.
-  static Result<NodeMotion> read(std::shared_ptr<const Document> document);
+  /// animation: the one that plays, as names.h finds it; empty: all. Errors name the file and the
+  /// accessor.
+  static Result<NodeMotion> read(std::shared_ptr<const Document> document,
+                                 const std::string& animation = "");
 
   const Document& document() const { return *document_; }
-  /// What is odd about the animations and read in spite of that, a line each: keys at one time,
-  /// of which the last one counts; weights of what has no targets.
+  /// What is odd about the animations and read in spite of that, a line each: keys at one time, of
+  /// which the last one counts, keys that are not finite or out of order, weights of what has no
+  /// targets, animations that move the same.
   std::vector<std::string> notes() const;
   /// Lets go of all of the document but its nodes, skins and what its meshes are called and made
   /// of: motion that is kept needs no more.
@@ -72,7 +84,8 @@ class NodeMotion {
   std::vector<int> order_;     ///< all nodes, parents first
   std::vector<Moved> curves_;  ///< by node
   std::vector<bool> moves_;    ///< by node
-  std::size_t num_repeated_keys_ = 0, num_idle_channels_ = 0;
+  KeyRepairs repairs_;
+  std::size_t num_idle_channels_ = 0, num_second_channels_ = 0;
 };
 
 }  // namespace baton::gltf

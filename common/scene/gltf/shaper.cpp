@@ -86,6 +86,10 @@ Status Shaper::read_targets(const Document& document, const Primitive& given,
                    read_attribute(document, accessor, 3, count,
                                   fmt::format("{}.targets[{}]", place, t), name));
       for (std::size_t i = 0; i < count; ++i) {
+        if (!is_finite(values, 3, i)) {
+          ++repairs_.steps;
+          continue;
+        }
         const std::array<float, 3> step{values[3 * i], values[3 * i + 1], values[3 * i + 2]};
         if (step != std::array<float, 3>{}) deltas.push_back({static_cast<std::uint32_t>(i), step});
       }
@@ -104,25 +108,29 @@ Status Shaper::read_skin(const Document& document, int skin, const Primitive& gi
   const Skin& bones = document.skins[static_cast<std::size_t>(skin)];
   joints_ = bones.joints;
   from_mesh_.assign(joints_.size(), kIdentity);
-  if (bones.inverse_binds >= 0) {
-    BATON_ASSIGN(const std::vector<float> columns, read_floats(document, bones.inverse_binds, 16));
-    const std::string where = fmt::format("$.skins[{}].inverseBindMatrices", skin);
-    if (columns.size() < 16 * joints_.size())
-      return document.error(fmt::format("{}: expected one for each of {} joints, got {}", where,
-                                        joints_.size(), columns.size() / 16));
-    for (std::size_t j = 0; j < joints_.size(); ++j) {
-      for (std::size_t i = 0; i < 12; ++i) {
-        from_mesh_[j][i] = double{columns[16 * j + i % 4 * 4 + i / 4]};
-        if (!std::isfinite(from_mesh_[j][i]))
-          return document.error(fmt::format("{}: matrix {} is not finite", where, j));
-      }
-    }
+  holds_.assign(joints_.size(), true);
+  if (bones.inverse_binds >= 0) BATON_TRY(read_binds(document, skin));
+  return read_joints(document, given, place);
+}
+
+/// A joint whose matrix is not finite holds nothing.
+Status Shaper::read_binds(const Document& document, int skin) {
+  const int accessor = document.skins[static_cast<std::size_t>(skin)].inverse_binds;
+  BATON_ASSIGN(const std::vector<float> columns, read_floats(document, accessor, 16));
+  if (columns.size() < 16 * joints_.size())
+    return document.error(
+        fmt::format("$.skins[{}].inverseBindMatrices: expected one for each of {} joints, got {}",
+                    skin, joints_.size(), columns.size() / 16));
+  for (std::size_t j = 0; j < joints_.size(); ++j) {
+    holds_[j] = is_finite(columns, 16, j);
+    for (std::size_t i = 0; holds_[j] && i < 12; ++i)
+      from_mesh_[j][i] = double{columns[16 * j + i % 4 * 4 + i / 4]};
   }
-  return read_joints(document, given, place, joints_.size());
+  return {};
 }
 
 Status Shaper::read_joints(const Document& document, const Primitive& given,
-                           const std::string& place, std::size_t num_joints) {
+                           const std::string& place) {
   const std::size_t count = positions_.size() / 3;
   std::vector<std::vector<float>> joints, weights;
   for (std::size_t s = 0; s < given.joint_sets.size(); ++s) {
@@ -146,20 +154,18 @@ Status Shaper::read_joints(const Document& document, const Primitive& given,
       for (std::size_t i = 4 * vertex; i < 4 * vertex + 4; ++i) {
         const auto joint = static_cast<std::uint32_t>(joints[s][i]);
         const float weight = weights[s][i];
-        if (!(weight >= 0))
-          return document.error(
-              fmt::format("{}.WEIGHTS_{}: expected no weight below 0, found {}", place, s, weight));
         if (weight == 0) continue;
-        if (joint >= num_joints)
+        if (joint >= joints_.size())
           return document.error(
               fmt::format("{}.JOINTS_{}: expected joints below {}, as the skin has, found {}",
-                          place, s, num_joints, joint));
-        influences_.push_back({joint, weight});
+                          place, s, joints_.size(), joint));
+        const bool is_sound = weight > 0 && std::isfinite(weight) && holds_[joint];
+        is_sound ? influences_.push_back({joint, weight}) : void(++repairs_.holds);
       }
     }
     if (first_.back() == influences_.size()) {
       influences_.push_back({0, 1});
-      ++num_loose_;
+      ++repairs_.weights;
     }
     first_.push_back(influences_.size());
   }

@@ -15,9 +15,10 @@ namespace baton::gltf {
 /// by its skin [glTF 2.0, sections 3.7.2.2 and 3.7.3].
 class Shaper {
  public:
-  /// v: the vertices of the primitive of the node's mesh. parts: which of them are moved. Errors
-  /// name the file and the place: targets and joints that do not fit the vertices, values that are
-  /// not finite, joints that the skin does not have, weights below 0, a skin with too few matrices.
+  /// v: the vertices of the primitive of the node's mesh. parts: which of them are moved. Numbers
+  /// that cannot be used count as 0 (repairs). Errors name the file and the place: targets and
+  /// joints that do not fit the vertices, joints that the skin does not have, a skin with too few
+  /// matrices.
   static Result<Shaper> read(const Document& document, int node, std::size_t primitive,
                              const Vertices& v, bool with_normals, bool with_tangents);
 
@@ -27,8 +28,9 @@ class Shaper {
   /// the space of the mesh.
   MeshShape shape(std::span<const Matrix> to_world, std::span<const double> weights) const;
   std::uint64_t size_bytes() const;
-  /// Vertices without a joint of some weight, which follow the first joint of the skin.
-  std::uint64_t num_loose() const { return num_loose_; }
+  /// Of joints, weights and targets. Vertices without a joint of some weight follow the first joint
+  /// of the skin.
+  const MeshRepairs& repairs() const { return repairs_; }
 
  private:
   /// What a target adds to a vertex.
@@ -47,17 +49,18 @@ class Shaper {
   Status read_targets(const Document& document, const Primitive& given, const std::string& place);
   Status read_skin(const Document& document, int skin, const Primitive& given,
                    const std::string& place);
-  Status read_joints(const Document& document, const Primitive& given, const std::string& place,
-                     std::size_t num_joints);
+  Status read_binds(const Document& document, int skin);
+  Status read_joints(const Document& document, const Primitive& given, const std::string& place);
   Matrix blend(std::span<const Matrix> joints, std::size_t vertex) const;
 
   std::vector<float> positions_, normals_, tangents_;  ///< (vertices, 3), (vertices, 4); as read
   std::vector<Target> targets_;
   std::vector<int> joints_;         ///< nodes; empty: no skin
   std::vector<Matrix> from_mesh_;   ///< by joint, the inverse bind matrices
+  std::vector<bool> holds_;         ///< by joint, whether the file's matrix is finite
   std::vector<std::size_t> first_;  ///< (vertices + 1) of influences_
   std::vector<Influence> influences_;
-  std::uint64_t num_loose_ = 0;
+  MeshRepairs repairs_{};
 };
 
 }  // namespace baton::gltf

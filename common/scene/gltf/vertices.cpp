@@ -5,6 +5,7 @@
 #include <algorithm>
 #include <cmath>
 #include <numeric>
+#include <set>
 #include <span>
 
 #include "common/scene/gltf/accessor.h"
@@ -14,11 +15,7 @@
 namespace baton::gltf {
 namespace {
 
-constexpr int kTriangles = 4, kStrip = 5, kFan = 6;
-
-bool all_finite(const std::vector<float>& values) {
-  return std::all_of(values.begin(), values.end(), [](float v) { return std::isfinite(v); });
-}
+constexpr int kPoints = 0, kTriangles = 4, kStrip = 5, kFan = 6;
 
 /// Corners of triangles from a list, a strip or a fan; of other modes nothing.
 std::vector<std::uint32_t> triangles_of(const std::vector<std::uint32_t>& indices, int mode) {
@@ -35,15 +32,6 @@ std::vector<std::uint32_t> triangles_of(const std::vector<std::uint32_t>& indice
   return corners;
 }
 
-Result<std::vector<float>> read_counted(const Document& document, int accessor, int width,
-                                        std::size_t count, const std::string& place,
-                                        const std::string& name) {
-  BATON_ASSIGN(std::vector<float> values, read_floats(document, accessor, width));
-  if (values.size() == count * static_cast<std::size_t>(width)) return values;
-  return document.error(fmt::format("{}.{}: expected one for each of {} vertices, got {}", place,
-                                    name, count, values.size() / static_cast<std::size_t>(width)));
-}
-
 /// COLOR_0, whose alpha may be missing.
 Status read_colors(const Document& document, const Primitive& primitive, const std::string& place,
                    Vertices& v) {
@@ -51,8 +39,8 @@ Status read_colors(const Document& document, const Primitive& primitive, const s
   const bool is_opaque = document.accessors[static_cast<std::size_t>(primitive.colors)].width == 3;
   const std::size_t width = is_opaque ? 3 : 4;
   BATON_ASSIGN(const std::vector<float> values,
-               read_counted(document, primitive.colors, static_cast<int>(width), v.count(), place,
-                            "COLOR_0"));
+               read_attribute(document, primitive.colors, static_cast<int>(width), v.count(), place,
+                              "COLOR_0"));
   v.colors.assign(v.count(), {1, 1, 1, 1});
   for (std::size_t i = 0; i < v.count(); ++i) {
     bool is_sound = true;
@@ -107,6 +95,47 @@ std::vector<Tangent> made_tangents(const Document& document, const Primitive& pr
   return tangents_of(positions, normals, triangles, uvs);
 }
 
+/// Leaves out triangles with a corner whose place is not finite. Such a vertex gets the place of
+/// another, so that those that stay listed are finite.
+void drop_nowhere(Vertices& v) {
+  std::vector<std::size_t> nowhere;
+  std::size_t sound = 0;
+  for (std::size_t i = v.count(); i-- > 0;)
+    is_finite(v.positions, 3, i) ? void(sound = i) : nowhere.push_back(i);
+  if (nowhere.empty()) return;
+  std::vector<bool> is_nowhere(v.count(), false);
+  for (const std::size_t i : nowhere) is_nowhere[i] = true;
+  std::vector<std::uint32_t> kept;
+  for (std::size_t i = 0; i < v.corners.size(); i += 3) {
+    const std::span<const std::uint32_t> triangle = std::span(v.corners).subspan(i, 3);
+    if (std::ranges::any_of(triangle, [&](std::uint32_t vertex) { return is_nowhere[vertex]; })) {
+      ++v.repairs.nowhere;
+    } else {
+      kept.insert(kept.end(), triangle.begin(), triangle.end());
+    }
+  }
+  v.corners = std::move(kept);
+  const Vec3 place = is_nowhere[sound] ? Vec3{} : vec3_at(v.positions, sound);
+  for (const std::size_t i : nowhere)
+    std::ranges::copy(std::array{place.x, place.y, place.z},
+                      v.positions.begin() + static_cast<std::ptrdiff_t>(3 * i));
+}
+
+/// Texture coordinates that are not finite become (0, 0); counts those that triangles use.
+void mend_coordinates(Vertices& v) {
+  std::set<std::size_t> mended;
+  for (std::vector<float>& uvs : v.uvs) {
+    for (std::size_t i = 0; i < uvs.size() / 2; ++i) {
+      if (is_finite(uvs, 2, i)) continue;
+      uvs[2 * i] = uvs[2 * i + 1] = 0;
+      mended.insert(i);
+    }
+  }
+  if (mended.empty()) return;
+  for (const std::uint32_t vertex : std::set(v.corners.begin(), v.corners.end()))
+    v.repairs.uvs += mended.contains(vertex) ? 1 : 0;
+}
+
 /// Makes normals and tangents anew that are no directions; counts those that triangles use.
 void mend_vertices(const Document& document, const Primitive& primitive, Vertices& v) {
   std::vector<std::size_t> normals, tangents;
@@ -154,7 +183,7 @@ Result<Vertices> read_vertices(const Document& document, const Primitive& primit
   const auto attribute = [&](int accessor, int width, const char* name,
                              std::vector<float>& values) -> Status {
     if (accessor < 0) return {};
-    BATON_ASSIGN(values, read_counted(document, accessor, width, count, place, name));
+    BATON_ASSIGN(values, read_attribute(document, accessor, width, count, place, name));
     return {};
   };
   BATON_TRY(attribute(primitive.normals, 3, "NORMAL", v.normals));
@@ -162,10 +191,6 @@ Result<Vertices> read_vertices(const Document& document, const Primitive& primit
   BATON_TRY(attribute(primitive.uvs[0], 2, "TEXCOORD_0", v.uvs[0]));
   BATON_TRY(attribute(primitive.uvs[1], 2, "TEXCOORD_1", v.uvs[1]));
   BATON_TRY(read_colors(document, primitive, place, v));
-  if (!all_finite(v.positions))
-    return document.error(place + ": a vertex has a coordinate that is not finite");
-  if (!all_finite(v.uvs[0]) || !all_finite(v.uvs[1]))
-    return document.error(place + ": a vertex has texture coordinates that are not finite");
 
   std::vector<std::uint32_t> indices(primitive.indices < 0 ? count : 0);
   std::iota(indices.begin(), indices.end(), 0u);
@@ -178,6 +203,8 @@ Result<Vertices> read_vertices(const Document& document, const Primitive& primit
           fmt::format("{}: expected a vertex index below {}, found {}", place, count, index));
   }
   v.corners = triangles_of(indices, primitive.mode);
+  drop_nowhere(v);
+  mend_coordinates(v);
   mend_vertices(document, primitive, v);
   return v;
 }
@@ -185,11 +212,10 @@ Result<Vertices> read_vertices(const Document& document, const Primitive& primit
 Result<std::vector<float>> read_attribute(const Document& document, int accessor, int width,
                                           std::size_t count, const std::string& place,
                                           const std::string& name) {
-  BATON_ASSIGN(std::vector<float> values,
-               read_counted(document, accessor, width, count, place, name));
-  if (!all_finite(values))
-    return document.error(fmt::format("{}.{}: a value is not finite", place, name));
-  return values;
+  BATON_ASSIGN(std::vector<float> values, read_floats(document, accessor, width));
+  if (values.size() == count * static_cast<std::size_t>(width)) return values;
+  return document.error(fmt::format("{}.{}: expected one for each of {} vertices, got {}", place,
+                                    name, count, values.size() / static_cast<std::size_t>(width)));
 }
 
 bool has_triangles(const Document& document, const Primitive& primitive, bool deforms) {
@@ -225,6 +251,25 @@ std::string place_of(int mesh, std::size_t primitive) {
 
 bool has_surface(const Primitive& primitive) {
   return primitive.mode >= kTriangles && primitive.mode <= kFan;
+}
+
+std::string surfaceless_parts(const Document& document) {
+  std::size_t points = 0, lines = 0, unknown = 0;
+  for (const Mesh& mesh : document.meshes) {
+    for (const Primitive& primitive : mesh.primitives) {
+      if (has_surface(primitive)) continue;
+      ++(primitive.mode == kPoints ? points : primitive.mode < kTriangles ? lines : unknown);
+    }
+  }
+  std::vector<std::string> found;
+  for (const auto& [count, what] :
+       {std::pair{points, "points"}, {lines, "lines"}, {unknown, "an unknown form"}}) {
+    if (count == 0) continue;
+    found.push_back(found.empty()
+                        ? fmt::format("{} part{} of {}", count, count > 1 ? "s" : "", what)
+                        : fmt::format("{} of {}", count, what));
+  }
+  return fmt::format("{}", fmt::join(found, " and "));
 }
 
 }  // namespace baton::gltf

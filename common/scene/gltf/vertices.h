@@ -25,13 +25,14 @@ struct Vertices {
 };
 
 /// Reads a primitive with a surface. Of normals and tangents those that are no directions are made
-/// anew: from the triangles around, from the coordinates of the normal map. place: of the primitive
-/// in the file's JSON, which errors name: accessors that do not fit, indices out of range,
-/// coordinates that are not finite.
+/// anew: from the triangles around, from the coordinates of the normal map. Vertices whose place is
+/// not finite have no triangles, those whose texture coordinates are not have (0, 0). place: of the
+/// primitive in the file's JSON, which errors name: accessors that do not fit, indices out of
+/// range.
 Result<Vertices> read_vertices(const Document& document, const Primitive& primitive,
                                const std::string& place);
 /// Values of an accessor that must have one element of `width` numbers for each of `count`
-/// vertices, all finite. name: of the attribute.
+/// vertices; they need not be finite. name: of the attribute.
 Result<std::vector<float>> read_attribute(const Document& document, int accessor, int width,
                                           std::size_t count, const std::string& place,
                                           const std::string& name);
@@ -43,6 +44,8 @@ bool has_triangles(const Document& document, const Primitive& primitive, bool de
 bool is_bumpy(const Document& document, const Primitive& primitive);
 /// Whether it has triangles.
 bool has_surface(const Primitive& primitive);
+/// What the file has without a surface, such as "2 parts of points and 1 of lines"; empty: nothing.
+std::string surfaceless_parts(const Document& document);
 std::string place_of(int mesh, std::size_t primitive);
 
 inline Vec3 vec3_at(const std::vector<float>& values, std::size_t i) {

@@ -111,9 +111,6 @@ class ObjReader {
   Status read_vertex(Words& words) {
     const auto p = numbers<3>(words, 3);
     if (!p) return bad_line("expected three coordinates of a vertex");
-    for (const double c : *p)
-      if (!std::isfinite(static_cast<float>(c)))
-        return bad_line("a vertex has a coordinate that is not finite");
     polygons_.positions.push_back(*p);
     // Behind a weight, or without it, some programs write a colour.
     std::size_t more = 0;
@@ -130,8 +127,7 @@ class ObjReader {
   }
   Status read_uv(Words& words) {
     const auto uv = numbers<2>(words, 1);
-    if (!uv || !std::isfinite((*uv)[0]) || !std::isfinite((*uv)[1]))
-      return bad_line("expected two numbers, not texture coordinates that are not finite");
+    if (!uv) return bad_line("expected two numbers of texture coordinates");
     // In these files v grows upward.
     polygons_.uvs.push_back({static_cast<float>((*uv)[0]), 1 - static_cast<float>((*uv)[1])});
     return {};

@@ -79,11 +79,8 @@ Result<std::vector<Position>> read_vertices(WordReader& reader, std::uint32_t co
     const auto x = reader.number<double>();
     const auto y = x ? reader.number<double>() : std::nullopt;
     const auto z = y ? reader.number<double>() : std::nullopt;
-    const auto finite = [](double v) { return std::isfinite(static_cast<float>(v)); };
-    if (!z || !finite(*x) || !finite(*y) || !finite(*z)) {
-      return off_error(name, reader,
-                       "expected three finite coordinates of vertex " + std::to_string(i));
-    }
+    if (!z)
+      return off_error(name, reader, "expected three coordinates of vertex " + std::to_string(i));
     vertices.push_back({*x, *y, *z});
     reader.skip_line();
   }

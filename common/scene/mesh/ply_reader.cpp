@@ -319,10 +319,6 @@ class PlyReader {
     polygons_.bad_colors += is_sound ? 0 : 1;
     polygons_.lines += element.name == "edge" ? 1 : 0;
     if (!element.is_vertex) return {};
-    for (std::size_t c = 1; c <= 3; ++c) {
-      if (!std::isfinite(static_cast<float>(values[c])))
-        return error_at(element.name, index, "expected finite coordinates");
-    }
     polygons_.positions.push_back({values[1], values[2], values[3]});
     if (with_normals_)
       polygons_.normals.push_back({static_cast<float>(values[4]), static_cast<float>(values[5]),

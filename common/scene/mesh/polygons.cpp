@@ -2,6 +2,7 @@
 
 #include <algorithm>
 #include <cmath>
+#include <limits>
 #include <numeric>
 
 #include "common/scene/mesh/mesh_builder.h"
@@ -133,11 +134,18 @@ class EarCutter {
   std::vector<Triangle> triangles_;
 };
 
+/// Whether a place is finite in float.
+bool is_somewhere(const Position& p) {
+  return std::ranges::all_of(p, [](double c) { return std::isfinite(static_cast<float>(c)); });
+}
+
 /// The middle of positions that are far away, else 0.
 Position own_origin(const std::vector<Position>& positions) {
-  if (positions.empty()) return {};
-  Position low = positions[0], high = positions[0];
+  const auto first = std::ranges::find_if(positions, is_somewhere);
+  if (first == positions.end()) return {};
+  Position low = *first, high = *first;
   for (const Position& p : positions) {
+    if (!is_somewhere(p)) continue;
     for (std::size_t c = 0; c < 3; ++c) {
       low[c] = std::min(low[c], p[c]);
       high[c] = std::max(high[c], p[c]);
@@ -151,6 +159,8 @@ Position own_origin(const std::vector<Position>& positions) {
   if (!(farthest > kFarAway * size)) return {};
   return {(low[0] + high[0]) / 2, (low[1] + high[1]) / 2, (low[2] + high[2]) / 2};
 }
+
+constexpr Uv kNoUv{std::numeric_limits<float>::quiet_NaN(), 0};
 
 /// Puts faces into a mesh.
 class FaceTaker {
@@ -176,13 +186,18 @@ class FaceTaker {
       face.clear();
       for (std::size_t k = first; k < first + size; ++k)
         face.push_back(polygons_.positions[polygons_.corners[k]]);
-      bool is_simple = true;
-      for (const Triangle& t : triangulate(face, is_simple)) add(first, t, by_position);
-      crossing_ += is_simple ? 0 : 1;
+      if (std::ranges::all_of(face, is_somewhere)) {
+        bool is_simple = true;
+        for (const Triangle& t : triangulate(face, is_simple)) add(first, t, by_position);
+        crossing_ += is_simple ? 0 : 1;
+      } else {
+        ++nowhere_;
+      }
       first += size;
     }
     TriangleMesh mesh = builder_.take();
     mesh.origin = origin_;
+    mesh.repairs.nowhere = nowhere_;
     mesh.repairs.uvs = without_uv_;
     mesh.repairs.crossing = crossing_;
     mesh.repairs.lines = polygons_.lines;
@@ -212,8 +227,10 @@ class FaceTaker {
       }
       if (parts_.uv_sets == 0) continue;
       const std::uint32_t uv = has_own_uvs_ ? polygons_.corner_uvs[corner] : at;
-      without_uv_ += uv == Polygons::kNone ? 1 : 0;
-      uvs[k][0] = uv == Polygons::kNone ? Uv{} : polygons_.uvs[uv];
+      const Uv place = uv == Polygons::kNone ? kNoUv : polygons_.uvs[uv];
+      const bool is_sound = std::isfinite(place[0]) && std::isfinite(place[1]);
+      without_uv_ += is_sound ? 0 : 1;
+      uvs[k][0] = is_sound ? place : Uv{};
     }
     builder_.add(vertices, positions, normals, uvs, {}, colors);
   }
@@ -223,7 +240,7 @@ class FaceTaker {
   const bool has_own_normals_, has_own_uvs_;
   const MeshParts parts_;
   MeshBuilder builder_;
-  std::uint64_t without_uv_ = 0, crossing_ = 0;
+  std::uint64_t without_uv_ = 0, crossing_ = 0, nowhere_ = 0;
 };
 
 }  // namespace

@@ -16,9 +16,9 @@ struct Polygons {
   /// No normal, no texture coordinates.
   static constexpr std::uint32_t kNone = ~std::uint32_t{0};
 
-  std::vector<Position> positions;
-  std::vector<Vec3> normals;  ///< need not be unit; no direction: none
-  std::vector<Uv> uvs;
+  std::vector<Position> positions;  ///< need not be finite
+  std::vector<Vec3> normals;        ///< need not be unit; no direction: none
+  std::vector<Uv> uvs;              ///< need not be finite
   std::vector<VertexColor> colors;  ///< by position, or empty
   /// Places in the lists above, face after face. Where one of the last two is empty, its list is
   /// by position, if it has as many, or there is none.
@@ -38,8 +38,9 @@ struct Polygons {
 std::vector<std::array<std::uint32_t, 3>> triangulate(std::span<const Position> corners,
                                                       bool& is_simple);
 
-/// A mesh of the faces. with_normals, with_uvs: those of the file; what a corner lacks of them is
-/// made anew, counted. Positions far from the origin are relative to one of their own.
+/// A mesh of the faces with finite corners, the others being counted. with_normals, with_uvs: those
+/// of the file; what a corner lacks of them is made anew, counted. Positions far from the origin
+/// are relative to one of their own.
 TriangleMesh mesh_of(const Polygons& polygons, bool with_normals, bool with_uvs);
 
 }  // namespace baton

@@ -3,6 +3,8 @@
 #include <array>
 #include <cstdint>
 #include <memory>
+#include <span>
+#include <string_view>
 #include <vector>
 
 #include "common/scene/mesh/deformation.h"
@@ -21,8 +23,16 @@ struct MeshRepairs {
   std::uint64_t tangents = 0;
   /// Vertices that no joint holds, which follow the first one.
   std::uint64_t weights = 0;
-  /// Corners without texture coordinates, which have (0, 0).
+  /// Joint weights that are below 0 or not finite, or whose joint has no finite matrix: they are 0.
+  std::uint64_t holds = 0;
+  /// Steps of morph targets that are not finite: they are 0.
+  std::uint64_t steps = 0;
+  /// Corners without usable texture coordinates, which have (0, 0).
   std::uint64_t uvs = 0;
+  /// Faces with a corner whose place is not finite, which are not shown.
+  std::uint64_t nowhere = 0;
+  /// Repetitions of a mesh whose place is not finite, which are not shown.
+  std::uint64_t instances = 0;
   /// Faces whose edges cross, or that have too many corners, cut around their first.
   std::uint64_t crossing = 0;
   /// Points, lines and faces of fewer than three corners, which are not shown.
@@ -33,7 +43,16 @@ struct MeshRepairs {
   std::uint64_t unread_colors = 0;
 
   bool operator==(const MeshRepairs&) const = default;
+  MeshRepairs& operator+=(const MeshRepairs& other);
 };
+
+/// A kind of repair, and what is said of it after its count.
+struct RepairKind {
+  std::uint64_t MeshRepairs::*count;
+  std::string_view what;
+};
+/// All members of MeshRepairs.
+std::span<const RepairKind> repair_kinds();
 
 /// Coordinates as a file has them.
 using Position = std::array<double, 3>;

@@ -9,13 +9,18 @@ namespace baton {
 namespace {
 
 /// The file, and the node of it that must move.
-Result<std::pair<gltf::NodeMotion, int>> open_moving(const GltfMotion& given) {
+Result<std::pair<gltf::NodeMotion, int>> open_moving(const GltfMotion& given,
+                                                     std::vector<std::string>& left_out) {
   BATON_ASSIGN(auto document, gltf::read_document(given.file));
-  BATON_ASSIGN(gltf::NodeMotion motion, gltf::NodeMotion::read(std::move(document)));
+  BATON_ASSIGN(gltf::NodeMotion motion,
+               gltf::NodeMotion::read(std::move(document), given.animation));
+  add_notes(motion, left_out);
   BATON_ASSIGN(const int node, motion.find(given.node));
   if (!motion.moves(node))
-    return motion.document().error(
-        fmt::format("node \"{}\": no animation moves it or a node above it", given.node));
+    return motion.document().error(fmt::format(
+        "node \"{}\": {} moves it or a node above it", given.node,
+        given.animation.empty() ? "no animation"
+                                : fmt::format("nothing of animation \"{}\"", given.animation)));
   return std::pair(std::move(motion), node);
 }
 
@@ -95,15 +100,24 @@ std::vector<ObjectKey> matrix_keys(const std::vector<FrameNumber>& frames,
   return keys;
 }
 
-Status take_camera_keys(const std::vector<FrameNumber>& frames, CameraSpec& camera) {
+void add_notes(const gltf::NodeMotion& motion, std::vector<std::string>& left_out) {
+  for (const std::string& note : motion.notes()) {
+    std::string line = motion.document().path + ": " + note;
+    if (std::ranges::find(left_out, line) == left_out.end()) left_out.push_back(std::move(line));
+  }
+}
+
+Status take_camera_keys(const std::vector<FrameNumber>& frames, CameraSpec& camera,
+                        std::vector<std::string>& left_out) {
   const GltfMotion gltf = *camera.gltf;
-  BATON_ASSIGN(const auto opened, open_moving(gltf));
+  BATON_ASSIGN(const auto opened, open_moving(gltf, left_out));
   return put_camera(opened.first, opened.second, {gltf.fps, gltf.start_frame}, frames, camera);
 }
 
-Status take_object_keys(const std::vector<FrameNumber>& frames, ObjectSpec& object) {
+Status take_object_keys(const std::vector<FrameNumber>& frames, ObjectSpec& object,
+                        std::vector<std::string>& left_out) {
   const GltfMotion gltf = *object.gltf;
-  BATON_ASSIGN(const auto opened, open_moving(gltf));
+  BATON_ASSIGN(const auto opened, open_moving(gltf, left_out));
   const FileClock clock{gltf.fps, gltf.start_frame};
   std::vector<Matrix34> matrices;
   for (const FrameNumber frame : frames)

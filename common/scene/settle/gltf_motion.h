@@ -1,5 +1,6 @@
 #pragma once
 
+#include <string>
 #include <vector>
 
 #include "common/base/result.h"
@@ -10,12 +11,17 @@ namespace baton {
 
 /// Replace `gltf` by keys, one for each frame number: where the file's animations have the node
 /// then, in the world of the file. Errors name the file: missing, not a glTF file, no such node, a
-/// node that no animation moves.
+/// node that no animation moves. left_out: gets what is odd about the animations.
 
 /// The node must hold a camera, which also gives the angle of view.
-Status take_camera_keys(const std::vector<FrameNumber>& frames, CameraSpec& camera);
+Status take_camera_keys(const std::vector<FrameNumber>& frames, CameraSpec& camera,
+                        std::vector<std::string>& left_out);
 /// What the node does is done to the object.
-Status take_object_keys(const std::vector<FrameNumber>& frames, ObjectSpec& object);
+Status take_object_keys(const std::vector<FrameNumber>& frames, ObjectSpec& object,
+                        std::vector<std::string>& left_out);
+
+/// Adds what is odd about the animations, unless it is said already.
+void add_notes(const gltf::NodeMotion& motion, std::vector<std::string>& left_out);
 
 /// Makes `camera` that of a node: with keys where it moves, at one place where it does not. Error:
 /// the node holds no camera.

@@ -129,10 +129,12 @@ int measure_max_px(const JobSpec& job, const Scene& scene) {
 }  // namespace
 
 Result<JobSpec> settle_motion(JobSpec job, std::vector<std::string>* left_out) {
-  BATON_TRY(settle_scene(job, left_out));
-  if (job.camera.gltf) BATON_TRY(take_camera_keys(job.frames, job.camera));
+  std::vector<std::string> unsaid;
+  std::vector<std::string>& said = left_out == nullptr ? unsaid : *left_out;
+  BATON_TRY(settle_scene(job, &said));
+  if (job.camera.gltf) BATON_TRY(take_camera_keys(job.frames, job.camera, said));
   for (ObjectSpec& object : job.scene.objects) {
-    if (object.gltf) BATON_TRY(take_object_keys(job.frames, object));
+    if (object.gltf) BATON_TRY(take_object_keys(job.frames, object, said));
   }
   if (!is_settled(job)) {
     BATON_ASSIGN(const Scene scene, load_scene(job));

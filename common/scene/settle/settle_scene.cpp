@@ -52,7 +52,9 @@ class SceneTaker {
   Status take() {
     BATON_TRY(place_nodes());
     BATON_TRY(take_camera());
+    const std::size_t num_own = job_.scene.objects.size();
     BATON_TRY(take_objects());
+    if (job_.scene.objects.size() == num_own) BATON_TRY(look_for_surfaces(num_own));
     BATON_TRY(take_materials());
     if (job_.scene.materials.size() > limits::kMaxMaterials ||
         job_.scene.meshes.size() > limits::kMaxMeshes ||
@@ -65,7 +67,7 @@ class SceneTaker {
   }
 
  private:
-  FileClock clock() const { return {gltf_.fps, gltf_.start_frame}; }
+  FileClock clock() const { return {gltf_.fps, gltf_.start_frame, gltf_.animation}; }
 
   /// What the job says of nodes; then where all of them are in each frame.
   Status place_nodes() {
@@ -152,6 +154,16 @@ class SceneTaker {
     return {};
   }
 
+  /// Of a file that gives no object: an error where the job shows nothing else, either.
+  Status look_for_surfaces(std::size_t num_own) {
+    const std::string found = gltf::surfaceless_parts(file_);
+    if (found.empty()) return {};
+    if (num_own == 0 && !job_.scene.ground)
+      return file_.error("nothing to show: it has " + found + " and no triangles");
+    left_out_.push_back(fmt::format("{}: not shown: {}; nothing else is there", file_.path, found));
+    return {};
+  }
+
   /// What shapes the meshes of a node, if something does.
   std::optional<ShapeSpec> shape_of(std::size_t node) const {
     const auto number = static_cast<int>(node);
@@ -162,11 +174,13 @@ class SceneTaker {
     return shape;
   }
 
-  /// Nothing is seen of a node whose scale has a zero.
-  Status leave_out(const std::string& node) {
-    left_out_.push_back(fmt::format(
-        "{}: node \"{}\" has a scale of 0 in all frames: it is not there", file_.path, node));
-    return {};
+  /// Says of how many of the places of a node nothing is seen, and why.
+  void leave_out(std::size_t node, std::size_t count, std::size_t all, const char* why) {
+    if (count == 0) return;
+    const std::string which = all == 1 ? "" : fmt::format("{} of {} instances of ", count, all);
+    left_out_.push_back(fmt::format("{}: {}node \"{}\" {} {}: {} not there", file_.path, which,
+                                    object_names_[node], count > 1 ? "have" : "has", why,
+                                    count > 1 ? "they are" : "it is"));
   }
 
   /// A part without triangles is left out, and said once.
@@ -183,15 +197,21 @@ class SceneTaker {
 
   /// Once for each place that the node lists.
   Status take_node(std::size_t node, const std::string& material, bool catcher) {
-    BATON_ASSIGN(const std::vector<gltf::Matrix> places,
-                 gltf::instances_of(file_, file_.nodes[node]));
-    for (const gltf::Matrix& place : places)
-      BATON_TRY(take_node_at(node, place, material, catcher));
+    BATON_ASSIGN(const gltf::Instances instances, gltf::instances_of(file_, file_.nodes[node]));
+    std::size_t flat = 0;
+    for (const gltf::Matrix& place : instances.places) {
+      BATON_ASSIGN(const bool is_there, take_node_at(node, place, material, catcher));
+      flat += is_there ? 0 : 1;
+    }
+    const std::size_t all = instances.places.size() + instances.num_nowhere;
+    leave_out(node, flat, all, "a scale of 0 in all frames");
+    leave_out(node, instances.num_nowhere, all, "a place that is not finite");
     return {};
   }
 
-  Status take_node_at(std::size_t node, const gltf::Matrix& place, const std::string& material,
-                      bool catcher) {
+  /// Whether anything is seen there: nothing is where the scale has a zero.
+  Result<bool> take_node_at(std::size_t node, const gltf::Matrix& place,
+                            const std::string& material, bool catcher) {
     ObjectSpec object;
     object.name = object_names_[node];
     object.catcher = catcher;
@@ -202,11 +222,11 @@ class SceneTaker {
       std::vector<Matrix34> matrices;
       for (const gltf::Matrix& world : moved->second)
         matrices.push_back(gltf::to_floats(gltf::multiply(world, place)));
-      if (std::ranges::all_of(matrices, is_flat)) return leave_out(object.name);
+      if (std::ranges::all_of(matrices, is_flat)) return false;
       object.keys = matrix_keys(job_.frames, matrices);
     } else {
       object.matrix = gltf::to_floats(gltf::multiply(rest_[node], place));
-      if (is_flat(*object.matrix)) return leave_out(object.name);
+      if (is_flat(*object.matrix)) return false;
     }
 
     const int mesh = file_.nodes[node].mesh;
@@ -231,7 +251,7 @@ class SceneTaker {
       num_keys_ += object.keys.size();
     }
     if (num_keys_ > limits::kMaxGltfKeys) return too_many_keys();
-    return {};
+    return true;
   }
 
   /// All of the file, as they have numbers. What is wrong with one, and the files that its textures
@@ -287,6 +307,21 @@ Status check_names(const JobSpec& job) {
   return {};
 }
 
+/// Says what is odd about animations that shape meshes of the job. Faults are those of the meshes.
+void note_shapes(const SceneSpec& scene, gltf::FileCache& cache,
+                 std::vector<std::string>& left_out) {
+  std::set<std::pair<std::string, std::string>> seen;
+  for (const auto& [name, mesh] : scene.meshes) {
+    if (!mesh.deforms()) continue;
+    const std::string& animation = mesh.shaped_by->animation->animation;
+    if (!seen.insert({mesh.path, animation}).second) continue;
+    const auto document = cache.get(mesh.path);
+    if (!document) continue;
+    if (const auto motion = gltf::NodeMotion::read(*document, animation))
+      add_notes(*motion, left_out);
+  }
+}
+
 /// The tiles of a texture that are there.
 void list_tiles(const std::string& path, std::set<std::string>& files) {
   std::error_code error;
@@ -327,11 +362,15 @@ Status list_files(SceneSpec& scene, gltf::FileCache& cache) {
 
 Status settle_scene(JobSpec& job, std::vector<std::string>* left_out) {
   std::vector<std::string> unsaid;
+  std::vector<std::string>& said = left_out == nullptr ? unsaid : *left_out;
   gltf::FileCache cache;
+  note_shapes(job.scene, cache, said);
   if (job.scene.gltf) {
     BATON_ASSIGN(auto document, cache.get(job.scene.gltf->file));
-    BATON_ASSIGN(gltf::NodeMotion motion, gltf::NodeMotion::read(std::move(document)));
-    BATON_TRY(SceneTaker(job, std::move(motion), left_out == nullptr ? unsaid : *left_out).take());
+    BATON_ASSIGN(gltf::NodeMotion motion,
+                 gltf::NodeMotion::read(std::move(document), job.scene.gltf->animation));
+    add_notes(motion, said);
+    BATON_TRY(SceneTaker(job, std::move(motion), said).take());
     BATON_TRY(check_names(job));
   }
   return list_files(job.scene, cache);

@@ -10,6 +10,7 @@
 #include "common/job/text/frame_range.h"
 #include "common/job/text/job_json.h"
 #include "common/scene/scene.h"
+#include "common/scene/settle/animations.h"
 #include "common/scene/settle/settle_motion.h"
 #include "jobs/auto/unit_costs.h"
 #include "jobs/cli/check/asset_report.h"
@@ -53,9 +54,15 @@ ordered_json map_json(const MapReport& map) {
 }
 
 void print_json(const JobSpec& job, const JobEstimate& e, const AssetReport& assets,
+                const std::vector<AnimationUse>& animations,
                 const std::vector<std::string>& warnings, const std::vector<JobSetting>& settings,
                 const PilotPlan& plan) {
-  ordered_json maps = ordered_json::array(), plates = ordered_json::array();
+  ordered_json maps = ordered_json::array(), plates = ordered_json::array(),
+               moving = ordered_json::array();
+  for (const AnimationUse& use : animations) {
+    moving.push_back({{"path", use.file}, {"names", use.names}});
+    if (use.played >= 0) moving.back()["played"] = use.names[static_cast<std::size_t>(use.played)];
+  }
   for (const MapReport& map : assets.maps) maps.push_back(map_json(map));
   for (const PlateReport& plate : assets.plates)
     plates.push_back(
@@ -91,6 +98,7 @@ void print_json(const JobSpec& job, const JobEstimate& e, const AssetReport& ass
                          {"warnings", warnings}};
   if (assets.camera_map) result["cameraMap"] = map_json(*assets.camera_map);
   if (!plates.empty()) result["plates"] = std::move(plates);
+  if (!moving.empty()) result["animations"] = std::move(moving);
   if (plan.candidates > 0) {
     result["pilot"] = {{"candidates", plan.candidates},
                        {"frames", plan.frames},
@@ -132,7 +140,8 @@ void print_plates(const JobSpec& job, const std::vector<PlateReport>& plates) {
                count < plates.size() ? fmt::format("{} of {} ", count, plates.size()) : "", text);
 }
 
-void print_text(const JobSpec& job, const JobEstimate& e, const AssetReport& assets) {
+void print_text(const JobSpec& job, const JobEstimate& e, const AssetReport& assets,
+                const std::vector<AnimationUse>& animations) {
   const auto total = [&](std::int64_t bytes) {
     return bytes_text(static_cast<std::uint64_t>(bytes));
   };
@@ -148,6 +157,7 @@ void print_text(const JobSpec& job, const JobEstimate& e, const AssetReport& ass
                o.left, o.top, o.right, o.bottom, job.image.rendered().width(),
                job.image.rendered().height());
   print_assets(assets);
+  for (const AnimationUse& use : animations) fmt::print("animation  {}\n", text_of(use));
   fmt::print("tasks      {}: {} to render ({} a tile), {} to assemble; {} dependencies\n",
              e.tasks(), e.render_tasks, e.runs, e.assemble_tasks, e.dependencies);
   fmt::print("rays       {}{} primary and at most {} shadow rays a pixel and frame\n",
@@ -210,6 +220,7 @@ Result<ExitCode> run_check(const CheckOptions& options) {
   }
 
   const JobEstimate estimate = estimate_job(job);
+  const std::vector<AnimationUse> animations = animations_of(wanted.job);
   std::vector<std::string> warnings = job_warnings(job, assets);
   warnings.insert(warnings.end(), left_out.begin(), left_out.end());
   const PilotPlan plan =
@@ -218,9 +229,9 @@ Result<ExitCode> run_check(const CheckOptions& options) {
           : PilotPlan{};
   if (options.json) {
     BATON_TRY(write_preview(options, job, *assets.scene));
-    print_json(job, estimate, assets, warnings, settings, plan);
+    print_json(job, estimate, assets, animations, warnings, settings, plan);
   } else {
-    print_text(job, estimate, assets);
+    print_text(job, estimate, assets, animations);
     if (job.sampling.method == Method::automatic)
       fmt::print("pilot      before the first frame: {}\n", pilot_text(plan));
     BATON_TRY(write_preview(options, job, *assets.scene));

@@ -1,9 +1,12 @@
 // One part of a glTF file that cannot be used spoils nothing else, and is told of.
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
 #include <cmath>
+#include <limits>
 
+#include "common/scene/gltf/meshes.h"
 #include "common/scene/mesh_loader.h"
 #include "common/scene/object_view.h"
 #include "common/scene/pose.h"
@@ -137,8 +140,46 @@ TEST(GltfParts, PartsThatHaveNoSurfaceAreLeftOutAndSaid) {
                   HasSubstr("parts.glb: $.meshes[0].primitives[1] has no triangles with area")));
   const Loaded lines(file(good + R"(,{"attributes":{"POSITION":1},"mode":1},)" +
                           R"({"attributes":{"POSITION":1},"mode":0})"));
-  EXPECT_THAT(lines.said, testing::ElementsAre(HasSubstr("2 parts are points or lines")));
+  EXPECT_THAT(lines.said, testing::ElementsAre(
+                              HasSubstr("parts.glb: not shown: 1 part of points and 1 of lines")));
   EXPECT_THAT(Loaded(file(good)).said, IsEmpty());
+}
+
+TEST(GltfParts, AFileOfPointsAndLinesAloneSaysWhatItHas) {
+  GltfWriter w;
+  w.add(test::kTriangle, "VEC3", 3);
+  const auto file = [&](const std::vector<int>& modes) {
+    std::string parts;
+    for (const int mode : modes)
+      parts += (parts.empty() ? "" : ",") +
+               (R"({"attributes":{"POSITION":0},"mode":)" + std::to_string(mode) + "}");
+    return write_test_file(
+        "cloud.glb", w.glb(R"("nodes":[{"mesh":0}],"meshes":[{"primitives":[)" + parts + "]}]"));
+  };
+  for (const auto& [modes, found] : {std::pair{std::vector{0}, "1 part of points"},
+                                     {std::vector{0, 0}, "2 parts of points"},
+                                     {std::vector{1, 2, 3}, "3 parts of lines"},
+                                     {std::vector{3, 0, 1}, "1 part of points and 2 of lines"}}) {
+    const std::string path = file(modes);
+    const std::string what =
+        fmt::format("cloud.glb: nothing to show: it has {} and no triangles", found);
+    EXPECT_THAT(test::error_of(test::job_of(path, "", kCamera)), HasSubstr(what));
+    EXPECT_THAT(load_mesh(path, true).error().message, HasSubstr(what));
+    const auto document = gltf::read_document(path);
+    ASSERT_TRUE(document);
+    EXPECT_THAT(gltf::primitive_mesh(**document, {.path = path, .mesh = 0}).error().message,
+                HasSubstr("$.meshes[0].primitives[0]: expected triangles, found points or lines"));
+    // Beside a ground it is told of.
+    std::vector<std::string> left_out;
+    const auto settled = settle_motion(
+        test::job_of(path,
+                     R"( , "materials": {"m": {"type": "diffuse"}}, "ground": {"material": "m"})",
+                     kCamera),
+        &left_out);
+    ASSERT_TRUE(settled) << settled.error().message;
+    EXPECT_THAT(left_out,
+                testing::ElementsAre(HasSubstr(std::string("not shown: ") + found + ";")));
+  }
 }
 
 TEST(GltfParts, ARootThatHasAParentIsShownOnceWhereThatHasIt) {
@@ -205,6 +246,220 @@ TEST(GltfParts, AnimatedWeightsWithoutTargetsMoveNothing) {
   parts.animated = false;
   EXPECT_THAT(Loaded(test::bar_glb(parts)).said,
               Contains(HasSubstr("1 of its animations move weights of nodes without")));
+}
+
+/// A triangle and another one beside it, the first of which has a bad number somewhere.
+std::string two_triangles(const std::vector<float>& positions, const std::vector<float>& uvs) {
+  GltfWriter w;
+  w.add(positions, "VEC3", 3);
+  w.add(uvs, "VEC2", 2);
+  return w.glb(R"("nodes":[{"mesh":0}],)" + test::mesh_json(R"("POSITION":0,"TEXCOORD_0":1)"));
+}
+
+TEST(GltfParts, APlaceThatIsNotFiniteTakesItsFacesAlone) {
+  std::vector<float> positions{0, 0, 0, 1, 0, 0, 0, 1, 0, 5, 0, 0, 6, 0, 0, 5, 1, 0};
+  std::vector<float> uvs{0, 0, 1, 0, 0, 1, 0.5f, 0.5f, 1, 0.5f, 0.5f, 1};
+  for (const float bad : {kNan, INFINITY, -INFINITY}) {
+    for (std::size_t c = 0; c < 3; ++c) {
+      std::vector<float> odd = positions;
+      odd[3 + c] = bad;
+      const Loaded file(two_triangles(odd, uvs));
+      const TriangleMesh& mesh = file.scene.meshes.at(0);
+      EXPECT_EQ(mesh.positions, (std::vector<Vec3>{{5, 0, 0}, {6, 0, 0}, {5, 1, 0}}));
+      EXPECT_THAT(file.said, Contains(HasSubstr("parts.glb: 1 faces have a corner whose place")));
+    }
+    std::vector<float> odd = uvs;
+    odd[3] = bad;
+    const Loaded file(two_triangles(positions, odd));
+    const TriangleMesh& mesh = file.scene.meshes.at(0);
+    EXPECT_EQ(mesh.uvs[0],
+              (std::vector<Uv>{{0, 0}, {0, 0}, {0, 1}, {0.5f, 0.5f}, {1, 0.5f}, {0.5f, 1}}));
+    EXPECT_THAT(file.said, Contains(HasSubstr("1 corners have no usable texture coordinates")));
+  }
+  EXPECT_THAT(Loaded(two_triangles(positions, uvs)).said, IsEmpty());
+}
+
+TEST(GltfParts, AStepOfATargetThatIsNotFiniteMovesNothing) {
+  for (const bool animated : {true, false}) {
+    test::BarParts parts;
+    parts.skinned = false;
+    parts.morphed = true;
+    parts.animated = animated;
+    parts.mesh_more = R"(,"weights":[1])";
+    parts.target = {kNan, 0, 0, 0, 0, 3, 0, 2, 0};
+    parts.target_normals[7] = -INFINITY;
+    const Loaded bar(test::bar_glb(parts));
+    const Pose pose = pose_at(bar.scene, bar.job, 24);
+    const MeshVertices seen = vertices_of(bar.scene, pose.shapes, 0);
+    EXPECT_EQ(seen.positions[0], (Vec3{0, 0, 0})) << animated;
+    EXPECT_EQ(seen.positions[1], (Vec3{2, 0, 3})) << animated;
+    EXPECT_EQ(seen.positions[2], (Vec3{2, 3, 0})) << animated;
+    EXPECT_EQ(seen.normals[2], (Vec3{1, 0, 0})) << animated;
+    EXPECT_THAT(bar.said, Contains(HasSubstr("2 steps of morph targets are not finite")));
+  }
+}
+
+TEST(GltfParts, AWeightThatCannotBeUsedHoldsNothing) {
+  for (const float bad : {kNan, INFINITY, -0.5f}) {
+    test::BarParts parts;
+    parts.weights[4] = bad;  // of the second vertex; the tip holds the rest of it
+    const Loaded bar(test::bar_glb(parts));
+    const Pose pose = pose_at(bar.scene, bar.job, 24);
+    const Vec3 seen = vertices_of(bar.scene, pose.shapes, 0).positions[1];
+    EXPECT_NEAR(length(seen - Vec3{1, 1, 0}), 0, 1e-6f) << "as the tip turns it";
+    EXPECT_THAT(bar.said,
+                testing::ElementsAre(HasSubstr("1 weights of joints are below 0 or not")));
+  }
+  test::BarParts parts;
+  parts.inverse_binds[17] = kNan;  // of the tip
+  const Loaded bar(test::bar_glb(parts));
+  const Pose pose = pose_at(bar.scene, bar.job, 24);
+  EXPECT_EQ(vertices_of(bar.scene, pose.shapes, 0).positions[1], (Vec3{2, 0, 0}));
+  EXPECT_THAT(bar.said, Contains(HasSubstr("2 weights of joints")));
+  EXPECT_THAT(bar.said, Contains(HasSubstr("1 vertices are held by no joint")));
+}
+
+/// Three repetitions of a triangle, by their numbers.
+std::string repeated_glb(const std::vector<float>& places, const std::vector<float>& scales,
+                         const std::string& name = "grass") {
+  GltfWriter w;
+  w.add(test::kTriangle, "VEC3", 3);
+  w.add(places, "VEC3", 3);
+  w.add(scales, "VEC3", 3);
+  return w.glb(R"("nodes":[{"name":")" + name +
+               R"(","mesh":0,"extensions":{"EXT_mesh_gpu_instancing":
+                 {"attributes":{"TRANSLATION":1,"SCALE":2}}}}],)" +
+               test::mesh_json("\"POSITION\":0"));
+}
+
+TEST(GltfParts, ARepetitionThatIsNowhereIsLeftOutAlone) {
+  const std::vector<float> places{0, 0, 0, 2, 0, 0, 4, 0, 0}, scales(9, 1.0f);
+  for (const float bad : {kNan, INFINITY}) {
+    for (const bool of_scale : {false, true}) {
+      std::vector<float> odd_places = places, odd_scales = scales;
+      (of_scale ? odd_scales : odd_places)[4] = bad;
+      const Loaded file(repeated_glb(odd_places, odd_scales));
+      ASSERT_EQ(file.scene.instances.size(), 2u);
+      EXPECT_EQ(file.scene.instances[1].to_world.offset.x, 4);
+      EXPECT_THAT(file.said, testing::ElementsAre(HasSubstr(
+                                 "parts.glb: 1 of 3 instances of node \"grass\" has a place "
+                                 "that is not finite: it is not there")));
+      const auto whole =
+          load_mesh(write_test_file("whole.glb", repeated_glb(odd_places, odd_scales)), true);
+      ASSERT_TRUE(whole);
+      EXPECT_EQ(whole->triangles.size(), 2u);
+      EXPECT_EQ(whole->repairs.instances, 1u);
+    }
+  }
+  EXPECT_THAT(Loaded(repeated_glb(places, scales)).said, IsEmpty());
+}
+
+TEST(GltfParts, RepetitionsWithoutVolumeAreCounted) {
+  const std::vector<float> places{0, 0, 0, 2, 0, 0, 4, 0, 0};
+  const auto said = [&](const std::vector<float>& scales) {
+    const Loaded file(repeated_glb(places, scales));
+    return file.said.empty() ? "" : file.said.front();
+  };
+  EXPECT_THAT(
+      said({1, 1, 1, 0, 0, 0, 1, 1, 1}),
+      HasSubstr("1 of 3 instances of node \"grass\" has a scale of 0 in all frames: it is"));
+  EXPECT_THAT(
+      said({1, 1, 0, 0, 0, 0, 1, 1, 1}),
+      HasSubstr("2 of 3 instances of node \"grass\" have a scale of 0 in all frames: they"));
+}
+
+/// Where node "a" is at frames 1, 2, 3, with keys at seconds 1, 2 and 3 (frame n is second n).
+struct Keyed {
+  Keyed(const std::string& curve, const std::vector<float>& times,
+        const std::vector<float>& values) {
+    GltfWriter w;
+    w.add(test::kTriangle, "VEC3", 3);
+    w.add(times, "SCALAR", 1);
+    w.add(values, "VEC3", 3);
+    std::vector<std::string> left_out;
+    const auto settled = settle_motion(
+        test::job_of(
+            write_test_file(
+                "keys.glb",
+                w.glb(
+                    R"("nodes":[{"name":"a","mesh":0}],)" + test::mesh_json("\"POSITION\":0") +
+                    R"(,"animations":[{"samplers":[{"input":1,"output":2,"interpolation":")" +
+                    curve +
+                    R"("}],"channels":[{"sampler":0,"target":{"node":0,"path":"translation"}}]}])")),
+            R"(, "fps": 1})", kCamera),
+        &left_out);
+    EXPECT_TRUE(settled) << (settled ? "" : settled.error().message);
+    if (!settled) return;
+    for (const FrameNumber frame : settled->frames) {
+      const std::vector<ObjectKey>& keys = settled->scene.objects.at(0).keys;
+      x.push_back(keys.empty() ? 0
+                               : (*keys.at(static_cast<std::size_t>(frame.value() - 1)).matrix)[3]);
+    }
+    said = scene_warnings(settled->scene);
+    said.insert(said.end(), left_out.begin(), left_out.end());
+  }
+  std::vector<float> x;
+  std::vector<std::string> said;
+};
+
+TEST(GltfParts, AKeyThatIsNotFiniteIsLeftOut) {
+  const std::vector<float> times{1, 2, 3}, values{1, 0, 0, 8, 0, 0, 3, 0, 0};
+  for (const float bad : {kNan, INFINITY}) {
+    for (const std::string curve : {"LINEAR", "STEP"}) {
+      std::vector<float> odd_times = times, odd_values = values;
+      odd_times[1] = odd_values[4] = bad;
+      const std::vector<float> seen{1, curve == "STEP" ? 1.0f : 2.0f, 3};
+      const Keyed by_time(curve, odd_times, values), by_value(curve, times, odd_values);
+      for (const Keyed* keyed : {&by_time, &by_value}) {
+        EXPECT_EQ(keyed->x, seen) << curve;
+        EXPECT_THAT(keyed->said,
+                    Contains(HasSubstr("1 keys of its animations have a time or value")));
+      }
+    }
+  }
+  const Keyed none("LINEAR", times, std::vector<float>(9, kNan));
+  EXPECT_THAT(none.said, Contains(HasSubstr("1 curves of its animations have no usable key")));
+  const Keyed unordered("LINEAR", {1, 3, 2}, {1, 0, 0, 3, 0, 0, 8, 0, 0});
+  EXPECT_EQ(unordered.x, (std::vector<float>{1, 8, 3}));
+  EXPECT_THAT(unordered.said, Contains(HasSubstr("1 keys of its animations are earlier than")));
+  EXPECT_THAT(Keyed("LINEAR", times, values).said, IsEmpty());
+}
+
+TEST(GltfParts, ATangentOfAKeyThatIsNotFiniteIsNone) {
+  // By key: tangent before, value, tangent behind.
+  std::vector<float> values(27);
+  values[3] = 1;
+  values[12] = 8;
+  values[21] = 3;
+  const Keyed sound("CUBICSPLINE", {1, 2, 3}, values);
+  values[0] = kNan;   // before the first
+  values[24] = kNan;  // behind the last
+  EXPECT_THAT(Keyed("CUBICSPLINE", {1, 2, 3}, values).said, IsEmpty()) << "they say nothing";
+  values[9] = INFINITY;
+  const Keyed mended("CUBICSPLINE", {1, 2, 3}, values);
+  EXPECT_EQ(mended.x, sound.x);
+  EXPECT_THAT(mended.said, Contains(HasSubstr("1 tangents of keys of its animations")));
+}
+
+TEST(GltfParts, PlacesOfOtherFormatsTakeTheirFacesAlone) {
+  const std::string ply =
+      "ply\nformat ascii 1.0\nelement vertex 4\nproperty float x\nproperty float y\n"
+      "property float z\nelement face 2\nproperty list uchar int vertex_indices\n"
+      "end_header\n0 0 0\n1 0 0\n0 1 0\nnan 0 0\n3 0 1 2\n4 0 1 2 3\n";
+  const std::string off = "OFF\n4 2 0\n0 0 0\n1 0 0\n0 1 0\n0 inf 0\n3 0 1 2\n4 0 1 2 3\n";
+  const std::string obj =
+      "v 0 0 0\nv 1 0 0\nv 0 1 0\nv 0 0 -inf\nvt 0 0\nvt nan 1\n"
+      "f 1/1 2/1 3/2\nf 1/1 2/1 3/1 4/1\n";
+  for (const auto& [name, text] : {std::pair{"n.ply", ply}, {"n.off", off}, {"n.obj", obj}}) {
+    const auto mesh = load_mesh(write_test_file(name, text), true, true);
+    ASSERT_TRUE(mesh) << mesh.error().message;
+    EXPECT_EQ(mesh->triangles.size(), 1u) << name;
+    EXPECT_EQ(mesh->repairs.nowhere, 1u) << name;
+    for (const Vec3& p : mesh->positions) EXPECT_TRUE(std::isfinite(p.x + p.y + p.z)) << name;
+    if (std::string(name) != "n.obj") continue;
+    EXPECT_EQ(mesh->repairs.uvs, 1u);
+    EXPECT_EQ(mesh->uvs[0].back(), (Uv{0, 0}));
+  }
 }
 
 }  // namespace

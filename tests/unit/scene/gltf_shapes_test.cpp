@@ -250,25 +250,17 @@ TEST(GltfShapes, WhatIsWrongHasAPlace) {
   const std::string primitive = "$.meshes[0].primitives[0]";
   wrong([](BarParts& p) { p.joints[8] = 2; },
         primitive + ".JOINTS_0: expected joints below 2, as the skin has, found 2");
-  wrong([](BarParts& p) { p.weights[0] = -0.5f; },
-        primitive + ".WEIGHTS_0: expected no weight below 0, found -0.5");
-  wrong([](BarParts& p) { p.weights[0] = std::nanf(""); },
-        primitive + ".WEIGHTS_0: a value is not finite");
   wrong([](BarParts& p) { p.weights.resize(8); },
         primitive + ".WEIGHTS_0: expected one for each of 3 vertices, got 2");
   wrong([](BarParts& p) { p.inverse_binds.resize(16); },
         "$.skins[0].inverseBindMatrices: expected one for each of 2 joints, got 1");
-  wrong([](BarParts& p) { p.inverse_binds[17] = std::nanf(""); },
-        "$.skins[0].inverseBindMatrices: matrix 1 is not finite");
   wrong([](BarParts& p) { p.target.resize(6); },
         primitive + ".targets[0].POSITION: expected one for each of 3 vertices, got 2");
-  wrong([](BarParts& p) { p.target_normals[1] = INFINITY; },
-        primitive + ".targets[0].NORMAL: a value is not finite");
   wrong(
       [](BarParts& p) {
         p.weight_values = {0, 1, 2};
       },
-      "$.accessors[9]: expected 2 finite numbers for an animation, got 3");
+      "$.accessors[9]: expected 2 numbers for an animation, got 3");
 }
 
 TEST(GltfShapes, SkinsThatAreNone) {

@@ -1,4 +1,5 @@
 // Which key of a glTF file a frame shows.
+#include <fmt/format.h>
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
@@ -7,6 +8,7 @@
 #include "common/scene/gltf/node_motion.h"
 #include "common/scene/pose.h"
 #include "common/scene/scene_warnings.h"
+#include "common/scene/settle/animations.h"
 #include "tests/support/gltf_jobs.h"
 
 namespace baton {
@@ -117,16 +119,137 @@ TEST(GltfTime, OfKeysAtOneTimeTheLastCounts) {
   cubic[21] = 7;
   for (const auto& [curve, values] :
        {std::pair{"STEP", plain}, {"LINEAR", plain}, {"CUBICSPLINE", cubic}}) {
-    const JobSpec job = test::settled(
+    std::vector<std::string> said;
+    const auto settled = settle_motion(
         test::job_of(test::write_test_file("repeats.glb", repeating_glb(curve, values)),
                      R"(, "fps": 1, "startFrame": 1})",
-                     R"(, "camera": {"position": [0, 0, 4], "lookAt": [0, 0, 0]})"));
-    EXPECT_EQ((*job.scene.objects[0].keys[1].matrix)[3], 7) << curve;
-    EXPECT_THAT(scene_warnings(job.scene),
+                     R"(, "camera": {"position": [0, 0, 4], "lookAt": [0, 0, 0]})"),
+        &said);
+    ASSERT_TRUE(settled) << settled.error().message;
+    EXPECT_EQ((*settled->scene.objects[0].keys[1].matrix)[3], 7) << curve;
+    EXPECT_THAT(said,
                 testing::Contains(testing::HasSubstr("1 keys of its animations are at the time of "
                                                      "another")))
         << curve;
   }
+}
+
+/// Three animations: "slide" moves node "a" along x, "lift" along y and grows "b", one without a
+/// name turns "b".
+std::string several_glb() {
+  GltfWriter w;
+  w.add(test::kTriangle, "VEC3", 3);
+  w.add(std::vector<float>{0, 1}, "SCALAR", 1);
+  w.add(std::vector<float>{0, 0, 0, 4, 0, 0}, "VEC3", 3);
+  w.add(std::vector<float>{0, 0, 0, 0, 6, 0}, "VEC3", 3);
+  w.add(std::vector<float>{1, 1, 1, 3, 3, 3}, "VEC3", 3);
+  w.add(std::vector<float>{0, 0, 0, 1, 0, 0, 1, 0}, "VEC4", 4);
+  w.add(std::vector<float>{0, 1}, "SCALAR", 1);
+  const auto animation = [](const std::string& name, const std::string& samplers,
+                            const std::string& channels) {
+    return "{" + name + "\"samplers\":[" + samplers + "],\"channels\":[" + channels + "]}";
+  };
+  const auto channel = [](int sampler, int node, const std::string& path) {
+    return fmt::format(R"({{"sampler":{},"target":{{"node":{},"path":"{}"}}}})", sampler, node,
+                       path);
+  };
+  return w.glb(R"("nodes":[{"name":"a","mesh":0},{"name":"b","mesh":0}],)" +
+               test::mesh_json("\"POSITION\":0", R"(,"targets":[{"POSITION":0}])") +
+               R"(,"animations":[)" +
+               animation(R"("name":"slide",)", R"({"input":1,"output":2},{"input":1,"output":6})",
+                         channel(0, 0, "translation")) +
+               "," +
+               animation(R"("name":"lift",)", R"({"input":1,"output":3},{"input":1,"output":4})",
+                         channel(0, 0, "translation") + "," + channel(1, 1, "scale")) +
+               "," +
+               animation("", R"({"input":1,"output":5},{"input":1,"output":6})",
+                         channel(0, 1, "rotation") + "," + channel(1, 1, "weights")) +
+               "]");
+}
+
+TEST(GltfTime, AJobChoosesAmongAnimations) {
+  const std::string path = test::write_test_file("several.glb", several_glb());
+  struct Case {
+    std::string choice;
+    float x, y, size, turned;
+    bool deforms;
+  };
+  for (const Case& c : {Case{"", 4, 0, 3, -1, true},
+                        {"slide", 4, 0, 1, 1, false},
+                        {"lift", 0, 6, 3, 1, false},
+                        {"1", 0, 6, 3, 1, false},
+                        {"2", 0, 0, 1, -1, true},
+                        {"animation 2", 0, 0, 1, -1, true}}) {
+    const std::string choice = c.choice.empty() ? "" : R"(, "animation": ")" + c.choice + "\"";
+    const JobSpec written =
+        test::job_of(path, R"(, "fps": 1)" + choice + "}",
+                     R"(, "camera": {"position": [0, 0, 9], "lookAt": [0, 0, 0]})");
+    std::vector<std::string> said;
+    const auto settled = settle_motion(written, &said);
+    ASSERT_TRUE(settled) << settled.error().message;
+    const auto place = [&](std::size_t object) {
+      const ObjectSpec& o = settled->scene.objects.at(object);
+      return o.keys.empty() ? *o.matrix : *o.keys.front().matrix;
+    };
+    EXPECT_EQ(place(0)[3], c.x) << c.choice;
+    EXPECT_EQ(place(0)[7], c.y) << c.choice;
+    EXPECT_NEAR(place(1)[0], c.size * c.turned, 1e-6f) << c.choice;
+    const auto scene = load_scene(*settled);
+    ASSERT_TRUE(scene) << scene.error().message;
+    EXPECT_EQ(std::ranges::any_of(scene->instances, &Instance::deforms), c.deforms) << c.choice;
+    // The settled document keeps the choice of meshes that deform.
+    const auto again = parse_job(to_json(*settled), "again", "/");
+    ASSERT_TRUE(again) << again.error().message;
+    EXPECT_EQ(again->scene, settled->scene);
+    // Where nothing is chosen and two move the same, it is said.
+    const auto uses = animations_of(written);
+    ASSERT_EQ(uses.size(), 1u);
+    if (c.choice.empty()) {
+      EXPECT_THAT(said,
+                  testing::Contains(testing::HasSubstr(
+                      "1 curves of its animations move what an earlier one moves, and are left "
+                      "out: `animation` chooses one of \"slide\", \"lift\", \"animation 2\"")));
+      EXPECT_EQ(text_of(uses[0]), path + ": \"slide\", \"lift\", \"animation 2\" play");
+    } else {
+      EXPECT_THAT(said, testing::IsEmpty());
+      EXPECT_THAT(text_of(uses[0]), testing::HasSubstr(" plays, of \"slide\", "));
+    }
+  }
+  EXPECT_THAT(test::error_of(test::job_of(path, R"(, "animation": "lft"})")),
+              testing::HasSubstr("several.glb: no animation \"lft\"; did you mean \"lift\"?"));
+}
+
+TEST(GltfTime, CamerasObjectsAndShapesChooseTheirAnimation) {
+  const std::string path = test::write_test_file("several.glb", several_glb());
+  const GltfMotion motion{.file = path, .node = "a", .fps = 1, .animation = "lift"};
+  JobSpec job;
+  job.frames = {FrameNumber(1)};
+  job.scene.materials["d"] = {};
+  job.scene.meshes["m"] = {.path = path, .mesh = 0};
+  job.scene.meshes["shaped"] = {
+      .path = path,
+      .mesh = 0,
+      .shaped_by = ShapeSpec{.node = 1, .animation = FileClock{.fps = 1, .animation = "slide"}}};
+  job.scene.objects = {{.mesh = "m", .material = "d"}, {.mesh = "shaped", .material = "d"}};
+  job.scene.objects[0].gltf = motion;
+  const auto settled = settle_motion(job);
+  ASSERT_TRUE(settled) << settled.error().message;
+  EXPECT_EQ((*settled->scene.objects[0].keys[0].matrix)[7], 6);
+  const auto scene = load_scene(*settled);
+  ASSERT_TRUE(scene) << scene.error().message;
+  const auto first_vertex = [&](const Scene& s, const JobSpec& j) {
+    return vertices_of(s, pose_at(s, j, 1).shapes, s.instances.at(1).mesh).positions[1];
+  };
+  EXPECT_EQ(first_vertex(*scene, *settled), (Vec3{1, 0, 0})) << "slide does not morph";
+  job.scene.meshes["shaped"].shaped_by->animation->animation = "2";
+  const auto other = load_scene(job);
+  ASSERT_TRUE(other) << other.error().message;
+  EXPECT_EQ(first_vertex(*other, job), (Vec3{2, 0, 0}));
+  EXPECT_EQ(animations_of(job).size(), 2u);
+  job.scene.objects[0].gltf->node = "b";
+  job.scene.objects[0].gltf->animation = "slide";
+  EXPECT_THAT(test::error_of(job),
+              testing::HasSubstr("node \"b\": nothing of animation \"slide\" moves it"));
 }
 
 }  // namespace

@@ -248,9 +248,8 @@ TEST(SettleScene, OddAnimationsAreErrors) {
                            "", R"(, "camera": {"position": [0, 0, 9]})"));
   };
   EXPECT_EQ(error({0, 1}, {1, 1, 1, 2, 2, 2}), "none");
-  EXPECT_THAT(error({1, 0}, {1, 1, 1, 2, 2, 2}), HasSubstr("expected the ascending times"));
-  EXPECT_THAT(error({0, 1}, {1, 1, 1}), HasSubstr("$.accessors[2]: expected 6 finite numbers"));
-  EXPECT_THAT(error({0, 1}, {1, 1, 1, NAN, 2, 2}), HasSubstr("expected 6 finite numbers"));
+  EXPECT_THAT(error({}, {}), HasSubstr("$.accessors[1]: expected the times of an animation"));
+  EXPECT_THAT(error({0, 1}, {1, 1, 1}), HasSubstr("$.accessors[2]: expected 6 numbers"));
   EXPECT_EQ(error({0, 0.1f}, {1, 1, 1, 0, 0, 0}), "none");
 }
 
