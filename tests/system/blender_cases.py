@@ -6,8 +6,6 @@ EXPORTER: folder of the package baton_exporter. OUT gets a folder a case with it
 report, and what it must say (nothing where all is carried over)."""
 
 import json
-import math
-import struct
 import sys
 from pathlib import Path
 
@@ -15,101 +13,11 @@ import bpy
 
 sys.dont_write_bytecode = True
 EXPORTER, OUT = (Path(text) for text in sys.argv[sys.argv.index("--") + 1:])
-sys.path.insert(0, str(EXPORTER))
-from baton_exporter import exr, job  # noqa: E402
+sys.path[:0] = [str(EXPORTER), str(Path(__file__).resolve().parent)]
+from baton_exporter import job  # noqa: E402
+from blender_stage import Stage, keyed  # noqa: E402
 
 CASES = []
-
-
-class Stage:
-    """A file with a camera, a plane "floor", a ball with an own material, and an image as world."""
-
-    def __init__(self, folder):
-        self.folder = folder
-        bpy.ops.wm.read_factory_settings(use_empty=True)
-        scene = self.scene = bpy.context.scene
-        scene.render.engine, scene.frame_start, scene.frame_end = "CYCLES", 1, 4
-        scene.render.resolution_x, scene.render.resolution_y = 96, 54
-        scene.render.image_settings.file_format = "OPEN_EXR"
-        self.camera = self.add("camera", bpy.data.cameras.new("camera"))
-        self.camera.location, self.camera.rotation_euler.x, scene.camera = (0, -6, 2), math.radians(75), self.camera
-        bpy.ops.mesh.primitive_plane_add(size=10)
-        bpy.context.object.name = "floor"
-        bpy.ops.mesh.primitive_uv_sphere_add(segments=8, ring_count=6, location=(0, 0, 1))
-        self.ball = bpy.context.object
-        self.ball.name = "ball"
-        self.material = bpy.data.materials.new("paint")
-        self.material.use_nodes = True
-        self.ball.data.materials.append(self.material)
-        self.surface = self.material.node_tree.nodes["Principled BSDF"].inputs
-        self.world = scene.world = bpy.data.worlds.new("sky")
-        self.world.use_nodes = True
-        self.background = self.world.node_tree.nodes["Background"]
-        self.sky = self.environment(self.background, "sky.0001.exr")
-
-    def add(self, name, data):
-        item = bpy.data.objects.new(name, data)
-        self.scene.collection.objects.link(item)
-        return item
-
-    def mesh(self, name, places, faces):
-        data = bpy.data.meshes.new(name)
-        data.from_pydata(places, [], faces)
-        return self.add(name, data)
-
-    def exr(self, name, value=2.0):
-        exr.write(self.folder / name, 8, 4, [struct.pack("<24f", *[value] * 24)] * 4)
-        return bpy.data.images.load(str(self.folder / name))
-
-    def environment(self, background, name):
-        texture = self.world.node_tree.nodes.new("ShaderNodeTexEnvironment")
-        texture.image = self.exr(name)
-        self.world.node_tree.links.new(texture.outputs[0], background.inputs["Color"])
-        return texture
-
-    def seen_by_camera(self):
-        """Another Background, by Is Camera Ray."""
-        tree = self.world.node_tree
-        seen, mix, path = (tree.nodes.new(f"ShaderNode{kind}") for kind in ("Background", "MixShader", "LightPath"))
-        for given, socket in ((path.outputs["Is Camera Ray"], mix.inputs[0]), (self.background.outputs[0], mix.inputs[1]),
-                              (seen.outputs[0], mix.inputs[2]), (mix.outputs[0], tree.nodes["World Output"].inputs[0])):
-            tree.links.new(given, socket)
-        return seen
-
-    def texture(self, image=None, name="Base Color", uv_map=None, material=None):
-        tree = (material or self.material).node_tree
-        node = tree.nodes.new("ShaderNodeTexImage")
-        node.image = image or bpy.data.images.new("chart", 8, 8)
-        tree.links.new(node.outputs["Color"], tree.nodes["Principled BSDF"].inputs[name])
-        if uv_map:
-            chosen = tree.nodes.new("ShaderNodeUVMap")
-            chosen.uv_map = uv_map
-            tree.links.new(chosen.outputs[0], node.inputs["Vector"])
-        return node
-
-    def modify_by_nodes(self, *kinds):
-        """Geometry nodes that join what each kind makes of the mesh; None: the mesh itself."""
-        tree = self.ball.modifiers.new("nodes", "NODES").node_group = bpy.data.node_groups.new("nodes", "GeometryNodeTree")
-        start, end, join = (tree.nodes.new(kind) for kind in ("NodeGroupInput", "NodeGroupOutput", "GeometryNodeJoinGeometry"))
-        tree.inputs.new("NodeSocketGeometry", "Geometry")
-        tree.outputs.new("NodeSocketGeometry", "Geometry")
-        tree.links.new(join.outputs[0], end.inputs[0])
-        for kind in kinds:
-            made = start
-            if kind:
-                made = tree.nodes.new(kind)
-                tree.links.new(start.outputs[0], made.inputs[0])
-            tree.links.new(made.outputs[0], join.inputs[0])
-
-
-def keyed(owner, name, values, index=-1):
-    """values: by frame."""
-    for frame, value in values.items():
-        if index < 0:
-            setattr(owner, name, value)
-        else:
-            getattr(owner, name)[index] = value
-        owner.keyframe_insert(name, frame=frame, index=index)
 
 
 def case(*expected):

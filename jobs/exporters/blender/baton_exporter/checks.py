@@ -11,10 +11,13 @@ def check_scene(scene, view_layer, report):
     check_camera(scene, report)
 
 
-def check_objects(objects, report):
+def check_objects(objects, scene, report):
     """objects: what any frame shows."""
     for item in sorted(objects, key=lambda item: item.name):
         check_object(item, report)
+        if scene.cycles.feature_set == "EXPERIMENTAL" and is_diced(item):
+            report.add(f'object "{item.name}"', "adaptive subdivision: the levels of its modifier are taken",
+                       "switch it off, and set Levels Render")
 
 
 def check_render(scene, view_layer, report):
@@ -108,6 +111,12 @@ def check_object(item, report):
             report.add(where, f'particles "{system.name}" without a shape', "render them as objects")
     if item.type in SHAPES:
         check_rays(item, where, report)
+
+
+def is_diced(item):
+    """Whether Cycles subdivides an object as finely as the picture needs it."""
+    last = item.modifiers[-1] if item.modifiers else None
+    return last is not None and last.type == "SUBSURF" and last.show_render and item.cycles.use_adaptive_subdivision
 
 
 def check_rays(item, where, report):

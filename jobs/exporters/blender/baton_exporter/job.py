@@ -9,8 +9,7 @@ from pathlib import Path
 
 import bpy
 
-from . import checks, conventions, geometry, gltf_file, keys, uv_maps
-from .as_rendered import as_rendered
+from . import checks, conventions, evaluation, geometry, gltf_file, keys, uv_maps
 from .camera import Camera, number, picture_size
 from .materials import Materials, used_materials
 from .report import Report
@@ -36,17 +35,18 @@ def export(folder, strict=False, frames=None):
     bpy.context.window.view_layer = view_layer
     fps = scene.render.fps / scene.render.fps_base
     checks.check_scene(scene, view_layer, report)
-    as_rendered(scene, view_layer)
+    image, output = image_of(scene), output_of(scene, fps)
 
     # Evaluate each frame once.
     shapes, camera, world = geometry.Geometry(report), Camera(scene, report), World(scene, report)
-    for frame in numbers:
-        scene.frame_set(frame)
-        depsgraph = bpy.context.evaluated_depsgraph_get()
+
+    def take(depsgraph):
         for part in (shapes, camera, world):
             part.take(depsgraph)
+
+    evaluation.take_frames(scene, view_layer, numbers, take)
     shapes.finish()
-    checks.check_objects(shapes.objects, report)
+    checks.check_objects(shapes.objects, scene, report)
     if not shapes.shapes:
         raise CannotExport("the scene shows no surface: expected a mesh that is rendered")
     materials = Materials(report)
@@ -56,13 +56,13 @@ def export(folder, strict=False, frames=None):
     folder = Path(folder)
     folder.mkdir(parents=True, exist_ok=True)
     clear(folder)
-    job = {"specificationVersion": 1, "name": job_name(), "frames": text, "image": image_of(scene)}
+    job = {"specificationVersion": 1, "name": job_name(), "frames": text, "image": image}
     job["camera"] = camera.job(numbers)
     job["scene"] = {"gltf": {"file": "scene.glb", "fps": number(fps)}}
     job["environment"] = world.job(folder, numbers)
     if "keys" in job["camera"]:
         job["motion"] = {"curve": "linear"}
-    job["output"] = output_of(scene, fps)
+    job["output"] = output
     if not (strict and report.entries):
         try:
             own, nodes = gltf_file.write(folder / "scene.glb", shapes, numbers, fps, materials.diffuse, report)

@@ -1,0 +1,50 @@
+#!/usr/bin/env python3
+"""Each trait of Blender files alone, as Cycles and as Baton show it, and the test of that test. More: random_blender.py by hand."""
+
+import random
+import struct
+import sys
+from pathlib import Path
+
+from farm import check, check_equal, run_tests
+from random_blender import blocks_of, compare, has_blender, names_of_traits, run_files
+
+SOURCE = Path(__file__).resolve().parents[2]
+sys.path.append(str(SOURCE / "jobs/exporters/blender/baton_exporter"))
+import exr  # noqa: E402
+
+
+def differences_are_seen(_programs, _folder):
+    """Of noise alone none; one of all blocks, one of a single block, and one of size."""
+    draw = random.Random(1)
+    truth = [draw.uniform(0.5, 2) for _ in range(120)]
+
+    def noisy(share):
+        return [value * draw.gauss(1, share) for value in truth]
+
+    for share in (0, 0.002, 0.02):
+        check(not compare(noisy(share / 3), [noisy(share), noisy(share)])[0], f"noise of {share} is taken for a difference")
+    check(compare([1.01 * value for value in truth], [noisy(0.002), noisy(0.002)])[0], "nobody saw a share of 1 %")
+    check(compare([*truth[:-1], truth[-1] + 0.2], [noisy(0.002), noisy(0.002)])[0], "nobody saw a block")
+    check(compare(truth[:-1], [truth, truth])[0], "nobody saw the size")
+    check(compare([*truth[:-1], float("nan")], [truth, truth])[0], "nobody saw what is no number")
+
+
+def blocks_are_means(_programs, folder):
+    folder.mkdir()
+    lines = [struct.pack("<36f", *[row] * 12, *range(12), *[2] * 12) for row in range(10)]
+    exr.write(folder / "picture.exr", 12, 10, lines)
+    check_equal(blocks_of(folder / "picture.exr", "BGR"), [3.5, 3.5, 8.5, 8.5, 3.5, 9.5, 3.5, 9.5, 2, 2, 2, 2], "means")
+
+
+def traits_of_files(programs, folder):
+    """Nothing differs from Cycles that the report does not tell."""
+    if not has_blender():
+        print("blender is not there: left out")
+        return
+    check_equal(run_files(programs, SOURCE, "1", range(-len(names_of_traits()), 0), folder), [], "files that differ and are not told of")
+
+
+if __name__ == "__main__":
+    sys.dont_write_bytecode = True
+    run_tests()
