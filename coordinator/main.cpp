@@ -10,6 +10,7 @@
 #include "common/base/exit_codes.h"
 #include "common/base/files.h"
 #include "common/base/log.h"
+#include "common/image/exr_check.h"
 #include "coordinator/service/service.h"
 
 namespace {
@@ -93,6 +94,9 @@ int main(int argc, char** argv) {
   install_stop_handler();
   options.heartbeat = std::chrono::milliseconds(heartbeat_ms);
   options.store_limit = store_limit_mib << 20;
+  options.disk.picture_writer = [](const std::filesystem::path& file) {
+    return baton::text_of_whole_exr(file, "baton:jobDigest");
+  };
   const baton::Status status = coordinate(options, key_file, insecure, endpoint_file);
   if (status) return static_cast<int>(baton::ExitCode::ok);
   spdlog::error("{}", status.error().message);

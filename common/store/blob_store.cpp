@@ -55,6 +55,9 @@ Result<Digest> BlobStore::put(ByteView bytes) {
                              bytes.size(), limits::kMaxBlobBytes)};
   }
   if (is_put_again(path(digest), bytes)) return digest;
+  // No rename replaces a folder.
+  std::error_code error;
+  if (fs::is_directory(path(digest), error)) BATON_TRY(remove(digest));
   BATON_TRY(expect_space(directory_, bytes.size(), limits::kStoreReserveBytes));
   BATON_TRY(write_file_unsynced(path(digest), bytes));
   return digest;
@@ -79,7 +82,7 @@ bool BlobStore::contains(const Digest& digest) const {
 
 Status BlobStore::remove(const Digest& digest) {
   std::error_code error;
-  fs::remove(path(digest), error);
+  fs::remove_all(path(digest), error);
   if (error)
     return Error{ErrorKind::io,
                  fmt::format("{}: cannot remove: {}", path(digest).string(), error.message())};

@@ -22,7 +22,8 @@ class BlobStore {
 
   /// Publishes the bytes: from now on every process sees the blob, but it survives a power cut only
   /// after sync(). A blob that is there already, whole, is not written again but counts as put now:
-  /// one that survives a power cut is never replaced by one that does not. A damaged one is mended.
+  /// one that survives a power cut is never replaced by one that does not. One that is damaged or
+  /// cannot be read is mended, and what has its name makes way, whatever it is.
   /// Errors: past limits::kMaxBlobBytes, the disk; no_space where it is so full that frames and the
   /// journal may soon have none.
   Result<Digest> put(ByteView bytes);
@@ -37,7 +38,7 @@ class BlobStore {
   /// Whether the blob was published; does not read it.
   bool contains(const Digest& digest) const;
 
-  /// Forgets the blob. One that is already gone is a success.
+  /// Forgets the blob, and whatever has its name. One that is already gone is a success.
   Status remove(const Digest& digest);
 
   /// Removes what processes that died while they wrote have left: temporary files that nobody has

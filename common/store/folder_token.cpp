@@ -17,11 +17,11 @@ std::filesystem::path output_token_file(const std::filesystem::path& folder, con
   return folder / (".baton-" + job.short_hex());
 }
 
-Result<std::string> make_token(const std::filesystem::path& file) {
+Result<std::string> make_token(const std::filesystem::path& file, const std::string& known) {
   Result<std::string> there = read_text_file(file, kMaxTokenBytes);
-  if (there) return there;
+  if (there && !there->empty()) return there;
   std::random_device random;
-  std::string token = fmt::format("{:08x}{:08x}", random(), random());
+  std::string token = known.empty() ? fmt::format("{:08x}{:08x}", random(), random()) : known;
   BATON_TRY(write_token(file, token));
   return token;
 }

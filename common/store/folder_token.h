@@ -14,8 +14,9 @@ namespace baton {
 /// Where the coordinator marks the output folder of an open job.
 std::filesystem::path output_token_file(const std::filesystem::path& folder, const Digest& job);
 
-/// The token in `file`, a new random one (16 hex digits) where there is none yet.
-Result<std::string> make_token(const std::filesystem::path& file);
+/// The token in `file`; where there is none yet, `known` or, if that is empty, a new random one (16
+/// hex digits).
+Result<std::string> make_token(const std::filesystem::path& file, const std::string& known = {});
 /// Writes a token that is known.
 Status write_token(const std::filesystem::path& file, const std::string& token);
 /// The error, io, names the folder of `file`, unless the token stands there.

@@ -55,7 +55,7 @@ Status Journal::prepare_schema() {
   if (schema_changes == 0) {
     return database_.execute(
         fmt::format("BEGIN; {} PRAGMA user_version = {}; PRAGMA application_id = {}; COMMIT;",
-                    kSchema, kSchemaVersion, kApplicationId));
+                    std::string(kSchema) + kLaterTables, kSchemaVersion, kApplicationId));
   }
   if (application != kApplicationId) {
     return Error{
@@ -67,7 +67,7 @@ Status Journal::prepare_schema() {
                                                  database_.name(), version, kSchemaVersion)};
   }
   for (const char* const table : kCheckedTables) BATON_TRY(database_.check(table));
-  return {};
+  return database_.execute(kLaterTables);
 }
 
 Status Journal::count_start() {
@@ -198,6 +198,42 @@ Result<std::vector<Failure>> Journal::recent_failures(const Digest& job, int cou
   }
 }
 
+Result<std::vector<FrameFile>> Journal::frame_files(const Digest& job) {
+  BATON_ASSIGN(SqlStatement query,
+               database_.prepare("SELECT frame, digest, size_bytes, inode, time_ns "
+                                 "FROM frame_files WHERE job = ?"));
+  query.bind(job);
+  std::vector<FrameFile> files;
+  while (true) {
+    BATON_ASSIGN(const bool row, query.step());
+    if (!row) return files;
+    // Without a digest that can be read the frame is one of which nothing is known.
+    const std::optional<Digest> digest = Digest::from_hex(query.text(1));
+    if (!digest) continue;
+    files.push_back({FrameIndex(static_cast<std::int32_t>(query.integer(0))), *digest,
+                     FileStamp{.size_bytes = static_cast<std::uint64_t>(query.integer(2)),
+                               .inode = static_cast<std::uint64_t>(query.integer(3)),
+                               .time_ns = query.integer(4)}});
+  }
+}
+
+Result<std::optional<std::string>> Journal::store_token() {
+  BATON_ASSIGN(SqlStatement query, database_.prepare("SELECT token FROM store_token"));
+  BATON_ASSIGN(const bool row, query.step());
+  return row ? std::optional(query.text(0)) : std::nullopt;
+}
+
+Status Journal::record_store_token(const std::string& token) {
+  BATON_TRY(change("DELETE FROM store_token"));
+  return change("INSERT INTO store_token (token) VALUES (?)", token);
+}
+
+Result<std::set<Digest>> Journal::output_marks() {
+  BATON_ASSIGN(SqlStatement query, database_.prepare("SELECT job FROM output_marks"));
+  BATON_ASSIGN(const std::vector<Digest> jobs, read_digests(query));
+  return std::set<Digest>(jobs.begin(), jobs.end());
+}
+
 /// Columns: kind, step, tile, outputs, stats, frames.
 Result<Completion> Journal::read_completion(const SqlStatement& row) const {
   Completion completion;
@@ -257,6 +293,7 @@ Status Journal::delete_job(const Digest& job) {
        {"DELETE FROM completions WHERE job = ?", "DELETE FROM failures WHERE job = ?",
         "DELETE FROM archive WHERE job = ?", "DELETE FROM archived_completions WHERE job = ?",
         "DELETE FROM kept_blobs WHERE job = ?", "DELETE FROM owners WHERE job = ?",
+        "DELETE FROM frame_files WHERE job = ?", "DELETE FROM output_marks WHERE job = ?",
         "DELETE FROM jobs WHERE digest = ?"})
     BATON_TRY(change(sql, job));
   return {};
@@ -287,6 +324,20 @@ Status Journal::record_failure(const Failure& failure) {
       "INSERT INTO failures (job, lease, worker, message, permanent) VALUES (?, ?, ?, ?, ?)",
       failure.lease.job, to_bytes(failure.lease), failure.worker, failure.message,
       std::int64_t{failure.permanent} | std::int64_t{failure.last} << 1);
+}
+
+Status Journal::record_frame_file(const Digest& job, const FrameFile& file) {
+  return change(
+      "INSERT OR REPLACE INTO frame_files (job, frame, digest, size_bytes, inode, time_ns) "
+      "VALUES (?, ?, ?, ?, ?, ?)",
+      job, std::int64_t{file.frame.value()}, file.digest,
+      static_cast<std::int64_t>(file.stamp.size_bytes), static_cast<std::int64_t>(file.stamp.inode),
+      file.stamp.time_ns);
+}
+
+Status Journal::record_output_mark(const Digest& job, bool is_marked) {
+  return is_marked ? change("INSERT OR IGNORE INTO output_marks (job) VALUES (?)", job)
+                   : change("DELETE FROM output_marks WHERE job = ?", job);
 }
 
 Status Journal::record_reopened(const Digest& job, const std::vector<TaskKey>& tasks) {

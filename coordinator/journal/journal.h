@@ -5,10 +5,12 @@
 #include <functional>
 #include <map>
 #include <optional>
+#include <set>
 #include <string>
 #include <string_view>
 #include <vector>
 
+#include "common/base/file_stamp.h"
 #include "coordinator/journal/database.h"
 #include "coordinator/schedule/events.h"
 
@@ -22,6 +24,13 @@ struct JournalledJob {
   JobPlan plan;
   Completions completions;  ///< in the order in which they were recorded
   std::vector<Failure> failures;
+};
+
+/// How the file of a finished frame stood when its bytes had this digest.
+struct FrameFile {
+  FrameIndex frame{};
+  Digest digest;
+  FileStamp stamp;
 };
 
 /// By what a job is found.
@@ -64,6 +73,13 @@ class Journal {
   Result<std::vector<FrameStats>> run_stats(const Digest& job, Run run);
   /// What was seen of a frame when it was put together; nullopt: it is not, or nothing was told.
   Result<std::optional<FrameStats>> frame_stats(const Digest& job, FrameIndex frame);
+  /// Of the frames of a job that is not in the archive, as far as it is known.
+  Result<std::vector<FrameFile>> frame_files(const Digest& job);
+  /// By which workers know the store; nullopt: not recorded.
+  Result<std::optional<std::string>> store_token();
+  Status record_store_token(const std::string& token);
+  /// The open jobs whose output folders are marked.
+  Result<std::set<Digest>> output_marks();
   /// Every completion of a job, in the archive or not, in the order in which they were recorded.
   Status for_each_completion(const Digest& job,
                              const std::function<Status(const Completion&)>& visit);
@@ -83,6 +99,8 @@ class Journal {
   Status record_outputs(const Digest& job, const TaskKey& task,
                         const std::vector<BlobRef>& outputs);
   Status record_failure(const Failure& failure);
+  Status record_frame_file(const Digest& job, const FrameFile& file);
+  Status record_output_mark(const Digest& job, bool is_marked);
   /// Forgets that these tasks were done.
   Status record_reopened(const Digest& job, const std::vector<TaskKey>& tasks);
 

@@ -45,7 +45,7 @@ Status Journal::archive_job(const Digest& job, const Bytes& summary, const Bytes
   }
   for (const char* const sql :
        {"DELETE FROM completions WHERE job = ?", "DELETE FROM failures WHERE job = ?",
-        "UPDATE jobs SET archived = 1 WHERE digest = ?"})
+        "DELETE FROM frame_files WHERE job = ?", "UPDATE jobs SET archived = 1 WHERE digest = ?"})
     BATON_TRY(change(sql, job));
   return {};
 }
@@ -54,7 +54,8 @@ Status Journal::restart_job(const Digest& job) {
   for (const char* const sql :
        {"DELETE FROM archive WHERE job = ?", "DELETE FROM archived_completions WHERE job = ?",
         "DELETE FROM kept_blobs WHERE job = ?", "DELETE FROM failures WHERE job = ?",
-        "DELETE FROM completions WHERE job = ?", "UPDATE jobs SET archived = 0 WHERE digest = ?"})
+        "DELETE FROM completions WHERE job = ?", "DELETE FROM frame_files WHERE job = ?",
+        "UPDATE jobs SET archived = 0 WHERE digest = ?"})
     BATON_TRY(change(sql, job));
   return record_status(job, JobStatus::running);
 }

@@ -69,4 +69,16 @@ inline constexpr const char* kSchema = R"sql(
   CREATE TABLE owners (job TEXT PRIMARY KEY, name TEXT NOT NULL);
 )sql";
 
+/// Tables that a journal of this version may lack: it gets them when it is opened, and an earlier
+/// program leaves them alone. `frame_files` says how a frame's file stood when it had this digest,
+/// `output_marks` of which open jobs the output folder is marked; store_token has one row, or none.
+inline constexpr const char* kLaterTables = R"sql(
+  CREATE TABLE IF NOT EXISTS frame_files (
+    job TEXT NOT NULL, frame INTEGER NOT NULL, digest TEXT NOT NULL,
+    size_bytes INTEGER NOT NULL, inode INTEGER NOT NULL, time_ns INTEGER NOT NULL,
+    PRIMARY KEY (job, frame)) WITHOUT ROWID;
+  CREATE TABLE IF NOT EXISTS output_marks (job TEXT PRIMARY KEY) WITHOUT ROWID;
+  CREATE TABLE IF NOT EXISTS store_token (token TEXT NOT NULL);
+)sql";
+
 }  // namespace baton

@@ -88,7 +88,8 @@ struct JobAdded {
   std::vector<TaskKey> lost = {};
   /// Blobs that are gone and that nobody needs now (BlobLedger::spare_blobs).
   std::vector<BlobRef> lost_spares = {};
-  JobPlan plan = {};  ///< its leading runs stand in `spec`, too
+  JobPlan plan = {};       ///< its leading runs stand in `spec`, too
+  std::string waits = {};  ///< for what, where it is paused
 };
 struct JobCancelled {
   Digest job;
@@ -100,13 +101,23 @@ struct JobSuperseded {
   std::vector<TaskKey> replaced;
 };
 /// No more of its tasks are granted until it is resumed; what is leased goes on.
+/// waits: for what, where it is not a person who wants it so.
 struct JobPaused {
   Digest job;
+  std::string waits = {};
 };
 /// lost: done tasks whose outputs are gone.
 struct JobResumed {
   Digest job;
   std::vector<TaskKey> lost = {};
+};
+/// The files of a job's finished frames were compared with what was recorded of them. Without lost
+/// frames it is all frames of the job.
+struct FramesInspected {
+  Digest job;
+  std::vector<TaskKey> lost = {};  ///< assemblies whose frames are gone or damaged
+  /// For people: frames that are others' now, which stay as they are; empty: none is.
+  std::string strange = {};
 };
 /// A job that has ended is forgotten; nobody here needs its blobs any more.
 struct JobForgotten {
@@ -182,10 +193,11 @@ struct StoreKeeps {
 /// Time has passed: who was silent for too long?
 struct ClockTicked {};
 
-using Event = std::variant<JobAdded, JobCancelled, JobSuperseded, JobPaused, JobResumed,
-                           JobForgotten, WorkerJoined, WorkerAlive, WorkerLeft, WorkRequested,
-                           TaskCompleted, AttemptFailed, ResultMissing, SpaceLacking, InputsLost,
-                           LeaseReturned, HeldPublished, AttemptLeft, StoreKeeps, ClockTicked>;
+using Event =
+    std::variant<JobAdded, JobCancelled, JobSuperseded, JobPaused, JobResumed, FramesInspected,
+                 JobForgotten, WorkerJoined, WorkerAlive, WorkerLeft, WorkRequested, TaskCompleted,
+                 AttemptFailed, ResultMissing, SpaceLacking, InputsLost, LeaseReturned,
+                 HeldPublished, AttemptLeft, StoreKeeps, ClockTicked>;
 
 // ---- actions ------------------------------------------------------------------------------------
 /// Make it durable; nothing that comes after in the same or a later step may be sent or removed
@@ -215,6 +227,11 @@ struct RecordJobStatus {
   std::string reason;
 };
 
+/// All tasks of the job are done: FramesInspected, which should follow, says whether their files
+/// are still there.
+struct InspectFrames {
+  Digest job;
+};
 struct GrantLease : Grant {
   std::string worker;
 };
@@ -249,7 +266,7 @@ struct RemoveBlobs {
 };
 
 using Action = std::variant<RecordCompletion, RecordOutputs, RecordFailure, RecordReopened,
-                            RecordJobStatus, GrantLease, AskForStates, RevokeLease, ReportNoWork,
-                            ForgetWorker, ReportConflict, RemoveBlobs>;
+                            RecordJobStatus, InspectFrames, GrantLease, AskForStates, RevokeLease,
+                            ReportNoWork, ForgetWorker, ReportConflict, RemoveBlobs>;
 
 }  // namespace baton

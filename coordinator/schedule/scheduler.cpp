@@ -70,6 +70,7 @@ void Scheduler::on(const JobAdded& event, TimePoint, Actions& actions) {
                                          TileHomes(event.spec), max_frames_ahead(event.spec),
                                          BlobSizes(event.spec)})
                  .first->second;
+  job.waits = event.waits;
   job.homes.share_out(leases_.connected());
   replay(job, event, actions);
   if (!is_open(event.status)) {
@@ -102,7 +103,10 @@ void Scheduler::on(const JobSuperseded& event, TimePoint, Actions& actions) {
 
 void Scheduler::on(const JobPaused& event, TimePoint, Actions& actions) {
   Job* job = find(event.job);
-  if (job && job->status == JobStatus::running) pause_job(event.job, *job, "paused", actions);
+  if (!job || job->status != JobStatus::running) return;
+  const bool waits = !event.waits.empty();
+  if (waits) job->waits = event.waits;
+  pause_job(event.job, *job, waits ? "paused, it waits for " + event.waits : "paused", actions);
 }
 
 void Scheduler::on(const JobResumed& event, TimePoint, Actions& actions) {
@@ -111,10 +115,29 @@ void Scheduler::on(const JobResumed& event, TimePoint, Actions& actions) {
   job->status = JobStatus::running;
   running_.emplace(job->rank(), event.job);
   job->tasks.attempts().forget_losses();
+  job->standings.forget_blind();
   job->waits.clear();
   reopen({event.job, event.lost}, *job, actions);
   actions.push_back(RecordJobStatus{event.job, job->status, "resumed"});
   end_if_finished(event.job, *job, actions);
+}
+
+void Scheduler::on(const FramesInspected& event, TimePoint, Actions& actions) {
+  Job* job = find(event.job);
+  if (!job || job->status != JobStatus::running) return;
+  reopen({event.job, event.lost}, *job, actions);
+  for (const TaskKey& key : event.lost) {
+    const std::optional<TaskIndex> task = job->tasks.graph().find(key);
+    if (task && !count_loss(event.job, *job, *task, actions)) return;
+  }
+  const TaskCounts& tasks = job->tasks.book().counts();
+  if (tasks.open > 0 || tasks.failed > 0) return;
+  if (event.strange.empty()) {
+    end_job(event.job, *job, JobStatus::done, "all frames are written", actions);
+  } else {
+    end_job(event.job, *job, JobStatus::failed, event.strange, actions);
+    job->waits = event.strange;
+  }
 }
 
 void Scheduler::on(const JobForgotten& event, TimePoint, Actions&) {
@@ -358,12 +381,13 @@ void Scheduler::pause_job(const Digest& digest, Job& job, const std::string& rea
   actions.push_back(RecordJobStatus{digest, job.status, reason});
 }
 
+/// A job without open tasks has ended, but for a look at its frames where none has failed.
 void Scheduler::end_if_finished(const Digest& digest, Job& job, Actions& actions) {
   const TaskCounts& tasks = job.tasks.book().counts();
   const auto max_failed = static_cast<std::uint64_t>(job.spec.max_failed_tasks);
   if (tasks.open > 0 && tasks.failed < max_failed) return;
   if (tasks.failed == 0) {
-    end_job(digest, job, JobStatus::done, "all frames are written", actions);
+    actions.push_back(InspectFrames{digest});
   } else {
     end_job(digest, job, JobStatus::failed, fmt::format("{} tasks failed", tasks.failed), actions);
   }
@@ -377,6 +401,7 @@ void Scheduler::end_job(const Digest& digest, Job& job, JobStatus status, const 
   job.tasks.let_between_go(blobs_);
 
   job.status = status;
+  job.waits.clear();
   running_.erase(job.rank());
   actions.push_back(RecordJobStatus{digest, status, reason});
 }

@@ -33,6 +33,9 @@ namespace baton {
 /// worker that has failed the task least. A worker that fails much rests from the job for a
 /// while, unless all would.
 /// Lost leases are no failures; a task that loses too many pauses its job.
+///
+/// A job whose tasks are done is done when the files of its frames have been compared with the
+/// record; what is gone by then is made again.
 class Scheduler {
  public:
   /// Orders the running jobs; a paused one has no rank.
@@ -84,7 +87,8 @@ class Scheduler {
   std::size_t num_jobs() const { return jobs_.size(); }
   /// All jobs, in the order of submission.
   std::vector<Digest> jobs() const;
-  /// What the job, which must be known, cannot go on without; empty: it goes on, or has ended.
+  /// What the job, which must be known, cannot go on without; empty: it goes on, or has ended. Of a
+  /// job that failed although its tasks are done, what somebody must decide.
   std::string waits_for(const Digest& job, TimePoint now) const;
   /// Whether the store has no room for the job's next task, and nothing in work will make some. The
   /// job must be known.
@@ -112,6 +116,7 @@ class Scheduler {
   void on(const JobSuperseded& event, TimePoint now, Actions& actions);
   void on(const JobPaused& event, TimePoint now, Actions& actions);
   void on(const JobResumed& event, TimePoint now, Actions& actions);
+  void on(const FramesInspected& event, TimePoint now, Actions& actions);
   void on(const JobForgotten& event, TimePoint now, Actions& actions);
   void on(const WorkerJoined& event, TimePoint now, Actions& actions);
   void on(const WorkerAlive& event, TimePoint now, Actions& actions);
@@ -157,6 +162,7 @@ class Scheduler {
   void fail_attempt(const Claim& claim, Failure failure, TimePoint now, Actions& actions);
   void give_up(const Digest& digest, Job& job, TaskIndex task, const std::string& reason,
                Actions& actions);
+  bool count_loss(const Digest& digest, Job& job, TaskIndex task, Actions& actions);
   void pause_job(const Digest& digest, Job& job, const std::string& reason, Actions& actions);
   void end_if_finished(const Digest& digest, Job& job, Actions& actions);
   void end_job(const Digest& digest, Job& job, JobStatus status, const std::string& reason,

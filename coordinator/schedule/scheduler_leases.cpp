@@ -141,13 +141,19 @@ void Scheduler::return_lease(const Claim& claim, const LeaseId& lease, const std
 /// too often probably kills its workers, and people should look at it.
 void Scheduler::lose_lease(const Digest& digest, TaskIndex task, Actions& actions) {
   Job& job = jobs_.at(digest);
-  const std::int32_t losses = job.tasks.attempts().add_loss(task);
   drop_lease(digest, task);
   job.tasks.give_back(task);
-  if (losses < limits::kMaxTaskLosses || job.status != JobStatus::running) return;
+  count_loss(digest, job, task, actions);
+}
+
+/// The task's worker or result was lost. False: once too often, and the job is paused.
+bool Scheduler::count_loss(const Digest& digest, Job& job, TaskIndex task, Actions& actions) {
+  const std::int32_t losses = job.tasks.attempts().add_loss(task);
+  if (losses < limits::kMaxTaskLosses || job.status != JobStatus::running) return true;
   job.waits = fmt::format("somebody to look at {}: its workers or results were lost {} times",
                           describe_task(job.tasks.graph().key(task)), losses);
   pause_job(digest, job, job.waits, actions);
+  return false;
 }
 
 /// lost: the worker vanished, which counts against its tasks; else it said goodbye.
@@ -271,7 +277,7 @@ bool Scheduler::Job::is_due(TaskIndex task, const std::string& worker, const Cre
 
 std::string Scheduler::waits_for(const Digest& digest, TimePoint now) const {
   const Job& job = jobs_.at(digest);
-  if (!is_open(job.status) || !job.waits.empty()) return is_open(job.status) ? job.waits : "";
+  if (!is_open(job.status) || !job.waits.empty()) return job.waits;
   if (lacks_room(digest)) return lacking_room(job);
   const Crew crew = job.crew(leases_, now);
   if (const std::string unseen = job.standings.unseen(); !unseen.empty() && are_all_blind(crew))

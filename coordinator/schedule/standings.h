@@ -22,6 +22,8 @@ class Standings {
   void add_failure(const std::string& worker, std::int32_t max_failures, TimePoint now);
   void add_blind(const std::string& worker, const std::string& unseen, TimePoint now);
   void forget(const std::string& worker);
+  /// Folders that were not seen may be there now.
+  void forget_blind() { blind_.clear(); }
 
   bool has_failed_much(const std::string& worker, TimePoint now) const;
   bool is_blind(const std::string& worker, TimePoint now) const;

@@ -42,15 +42,18 @@ std::optional<std::string> find_missing_blob(const FarmCore& farm, const TaskDon
   return std::nullopt;
 }
 
-std::optional<std::string> find_missing_frame(const FarmCore& farm, const TaskDone& report) {
+std::optional<ReportedFrame> find_reported_frame(const FarmCore& farm, const TaskDone& report) {
   const Scheduler::Job* job = job_of_open_task(farm, report.lease);
-  if (job == nullptr || report.lease.task.kind != TaskKind::assemble) return std::nullopt;
-  const fs::path path = frame_path(job->spec, report.lease.task.frame());
-  for (const BlobRef& output : report.made.outputs) {
-    std::error_code error;
-    if (fs::file_size(path, error) != output.size_bytes || error) return path.string();
-  }
-  return std::nullopt;
+  if (job == nullptr || report.lease.task.kind != TaskKind::assemble ||
+      report.made.outputs.size() != 1)
+    return std::nullopt;
+  const BlobRef& image = report.made.outputs.front();
+  ReportedFrame frame{frame_path(job->spec, report.lease.task.frame()), image.digest,
+                      std::optional<FileStamp>()};
+  frame.stamp = stamp_of(frame.path);
+  if (frame.stamp && *frame.stamp && (*frame.stamp)->size_bytes != image.size_bytes)
+    frame.stamp = std::optional<FileStamp>();
+  return frame;
 }
 
 bool writes_nowhere(const FarmCore& farm, const LeaseId& lease) {
@@ -75,19 +78,20 @@ std::optional<std::vector<BlobRef>> find_bad_inputs(const FarmCore& farm, FileTa
   if (!fs::is_directory(farm.store_directory, error)) return std::nullopt;
   for (const BlobRef& input : leased_inputs(farm, lease)) {
     const fs::path path = farm.store.path(input.digest);
-    if (files.holds(path, input) == false) bad.push_back(input);
+    const FileState state = files.judge(path, input).state;
+    if (state != FileState::right && state != FileState::unknown) bad.push_back(input);
     files.forget(path);
   }
   if (bad.empty()) return std::nullopt;
   return bad;
 }
 
-std::vector<fs::path> unread_inputs(const FarmCore& farm, const FileTable& files,
-                                    const LeaseId& lease) {
-  std::vector<fs::path> unread;
+std::vector<FileToRead> unread_inputs(const FarmCore& farm, const FileTable& files,
+                                      const LeaseId& lease) {
+  std::vector<FileToRead> unread;
   for (const BlobRef& input : leased_inputs(farm, lease)) {
     fs::path path = farm.store.path(input.digest);
-    if (files.must_be_read(path, input)) unread.push_back(std::move(path));
+    if (files.judge(path, input).state == FileState::unknown) unread.push_back({std::move(path)});
   }
   return unread;
 }

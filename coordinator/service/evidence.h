@@ -15,15 +15,22 @@ namespace baton {
 
 /// A film or state that is reported and not in the store; nullopt: there is none.
 std::optional<std::string> find_missing_blob(const FarmCore& farm, const TaskDone& report);
-/// A frame that is reported and not where it belongs, with its size; nullopt: there is none.
-std::optional<std::string> find_missing_frame(const FarmCore& farm, const TaskDone& report);
+/// How the frame of a task that is not done stands where it belongs.
+struct ReportedFrame {
+  std::filesystem::path path;
+  Digest digest;                           ///< as reported
+  Result<std::optional<FileStamp>> stamp;  ///< nullopt: not there, or with another size
+};
+/// nullopt: no such frame is reported.
+std::optional<ReportedFrame> find_reported_frame(const FarmCore& farm, const TaskDone& report);
 /// Whether the file system that a task of an open job writes to is mounted read-only.
 bool writes_nowhere(const FarmCore& farm, const LeaseId& lease);
 /// The inputs of a leased task that must be read to tell whether they are damaged.
-std::vector<std::filesystem::path> unread_inputs(const FarmCore& farm, const FileTable& files,
-                                                 const LeaseId& lease);
-/// The inputs of a leased task that are gone or damaged; none of them where a task that makes them
-/// is being done again meanwhile. nullopt: the inputs are sound, or the disk cannot tell now.
+std::vector<FileToRead> unread_inputs(const FarmCore& farm, const FileTable& files,
+                                      const LeaseId& lease);
+/// The inputs of a leased task that are gone, damaged or cannot be read; none of them where a task
+/// that makes them is being done again meanwhile. nullopt: the inputs are sound, or the disk cannot
+/// tell now.
 std::optional<std::vector<BlobRef>> find_bad_inputs(const FarmCore& farm, FileTable& files,
                                                     const LeaseId& lease);
 

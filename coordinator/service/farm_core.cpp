@@ -40,6 +40,10 @@ Status FarmCore::let_out() {
     if (!router.send(outgoing.peer, outgoing.message))
       spdlog::debug("a peer is gone or does not read; message dropped");
   }
+  for (const auto& [job, mark] : std::exchange(unmarked_, {})) {
+    std::error_code error;  // where it cannot be removed, it could not be written
+    if (!marked_.contains(job)) fs::remove(mark, error);
+  }
   for (const Digest& blob : std::exchange(garbage_, {})) {
     BATON_ASSIGN(const bool is_kept, journal.is_kept(blob));
     const bool stays = is_kept || scheduler.is_referenced(blob);
@@ -186,11 +190,17 @@ Status FarmCore::perform(const RecordJobStatus& action) {
   }
   remove_job_file(action.job, action.status);
   if (job != nullptr && !is_open(action.status)) {
-    std::error_code error;  // where it cannot be removed, it could not be written
-    fs::remove(output_token_file(job->spec.output.directory, action.job), error);
+    unmarked_[action.job] = output_token_file(job->spec.output.directory, action.job);
+    marked_.erase(action.job);
+    BATON_TRY(journal.record_output_mark(action.job, false));
   }
   if (!is_open(action.status)) ended_.push_back(action.job);
   return journal.record_status(action.job, action.status);
+}
+
+Status FarmCore::perform(const InspectFrames& action) {
+  to_inspect.insert(action.job);
+  return {};
 }
 
 Status FarmCore::perform(const GrantLease& action) {
@@ -231,12 +241,53 @@ Status FarmCore::perform(const RemoveBlobs& action) {
   return {};
 }
 
-std::string FarmCore::mark_output(const Digest& job) const {
+// ---- marks of folders ---------------------------------------------------------------------------
+
+void FarmCore::keep_token() const {
+  const fs::path file = store_directory / "token";
+  const Result<std::optional<FileStamp>> stamp = stamp_of(file);
+  const bool is_gone = stamp && (!*stamp || (*stamp)->size_bytes < token.size());
+  if (!is_gone) return;
+  const Status written = write_token(file, token);
+  spdlog::warn(
+      "{}", written ? file.string() + ": was gone and is written again" : written.error().message);
+}
+
+Status FarmCore::take_up_marks() {
+  BATON_ASSIGN(marked_, journal.output_marks());
+  return {};
+}
+
+Result<std::string> FarmCore::mark_output(const Digest& job) {
   const Scheduler::Job* const open = scheduler.find_job(job);
-  if (open == nullptr || !is_open(open->status)) return {};
-  if (!check_output_root(open->spec, options.roots)) return {};
+  if (open == nullptr || !is_open(open->status)) return std::string();
   const fs::path file = output_token_file(open->spec.output.directory, job);
-  return write_token(file, token) ? token : std::string();
+  if (marked_.contains(job) && (lost_mark(job, open->spec) || expect_token(file, token)))
+    return token;
+  if (!check_output_root(open->spec, options.roots)) return std::string();
+  if (!write_token(file, token)) return std::string();
+  marked_.insert(job);
+  BATON_TRY(journal.record_output_mark(job, true));
+  return token;
+}
+
+Status FarmCore::mark_output_again(const Digest& job) {
+  if (marked_.erase(job) == 0) return {};
+  const Result<std::string> marked = mark_output(job);
+  return marked ? Status() : marked.error();
+}
+
+std::optional<std::string> FarmCore::lost_mark(const Digest& job, const JobSpec& spec) const {
+  if (!marked_.contains(job)) return std::nullopt;
+  const fs::path folder = spec.output.directory;
+  const fs::path file = output_token_file(folder, job);
+  const Result<std::optional<FileStamp>> stamp = stamp_of(file);
+  if (!stamp || *stamp) return std::nullopt;
+  std::error_code error;
+  if (!fs::exists(folder, error))
+    return fmt::format("{}: the output folder is not there", folder.string());
+  return fmt::format("{}: not the output folder that the job has written to: {} is gone from it",
+                     folder.string(), file.filename().string());
 }
 
 void FarmCore::remove_job_file(const Digest& job, JobStatus status) {

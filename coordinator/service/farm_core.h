@@ -32,8 +32,8 @@ struct ServiceOptions {
   std::uint64_t store_limit = 0;
   std::chrono::milliseconds clean_up_every =
       BlobStore::kLeftoverAge;  ///< when the store is searched for leftovers
-  /// Reads whole files, on a thread of its own; a test may make it slow.
-  FileReader::DigestFile digest_file = digest_of_file;
+  /// Reads whole files, on a thread of its own.
+  Disk disk = {};
 };
 
 /// What the parts of a coordinator work on together: scheduler, journal, store and workers. It
@@ -57,6 +57,7 @@ class FarmCore {
   /// What workers say of the files of living jobs.
   std::map<Digest, std::vector<std::string>> notes;
   std::map<Digest, std::vector<std::string>> lost_before;  ///< what open jobs lacked at the start
+  std::set<Digest> to_inspect;  ///< jobs whose frames are to be compared with the record
 
   /// Something happens; what follows is journalled, sent or noted for the end of the turn.
   Status step(const Event& event);
@@ -81,9 +82,19 @@ class FarmCore {
   std::string owner_of(const Digest& job) const;
   /// usage: the speaker is a user, and the job somebody else's.
   Status check_own(const Speaker& speaker, const Digest& job) const;
-  /// Marks the output folder of an open job, for workers. Returns the token; empty: it cannot be
-  /// marked, or the job has ended.
-  std::string mark_output(const Digest& job) const;
+  /// Writes the store's token again where it is gone: without it no worker believes to see the
+  /// store.
+  void keep_token() const;
+  /// Marks the output folder of an open job, once, for workers and for lost_mark(). Returns the
+  /// token; empty: it cannot be marked, or the job has ended.
+  Result<std::string> mark_output(const Digest& job);
+  /// Marks it again: it has turned out to be the folder.
+  Status mark_output_again(const Digest& job);
+  /// Why the output folder of an open job is not the one that was marked, with its name; nullopt:
+  /// it is, none was, or the disk does not say now.
+  std::optional<std::string> lost_mark(const Digest& job, const JobSpec& spec) const;
+  /// Takes up the marks of a coordinator before this one.
+  Status take_up_marks();
   /// The document for replays outlives its job only if that has failed.
   void remove_job_file(const Digest& job, JobStatus status);
 
@@ -108,6 +119,7 @@ class FarmCore {
   Status perform(const RecordFailure& action);
   Status perform(const RecordReopened& action);
   Status perform(const RecordJobStatus& action);
+  Status perform(const InspectFrames& action);
   Status perform(const GrantLease& action);
   Status perform(const AskForStates& action);
   Status perform(const RevokeLease& action);
@@ -120,10 +132,12 @@ class FarmCore {
     PeerId peer;
     Message message;
   };
-  std::vector<Outgoing> outbox_;  ///< waits for the commit
-  std::vector<Digest> garbage_;   ///< likewise
-  std::set<Digest> unremoved_;    ///< that the disk would not let go
-  std::vector<Digest> ended_;     ///< jobs to be archived
+  std::vector<Outgoing> outbox_;                      ///< waits for the commit
+  std::vector<Digest> garbage_;                       ///< likewise
+  std::set<Digest> unremoved_;                        ///< that the disk would not let go
+  std::vector<Digest> ended_;                         ///< jobs to be archived
+  std::set<Digest> marked_;                           ///< open jobs whose output folder is marked
+  std::map<Digest, std::filesystem::path> unmarked_;  ///< marks that go after the commit
   /// That the archive keeps, as the scheduler was told.
   std::uint64_t kept_bytes_ = 0;
 };

@@ -1,11 +1,12 @@
 #include "coordinator/service/file_reader.h"
 
+#include <algorithm>
 #include <utility>
 
 namespace baton {
 
-FileReader::FileReader(DigestFile digest_file, std::function<void()> wake)
-    : digest_file_(std::move(digest_file)), wake_(std::move(wake)), thread_([this] { run(); }) {}
+FileReader::FileReader(Disk disk, std::function<void()> wake)
+    : disk_(std::move(disk)), wake_(std::move(wake)), thread_([this] { run(); }) {}
 
 FileReader::~FileReader() {
   {
@@ -16,7 +17,7 @@ FileReader::~FileReader() {
   thread_.join();
 }
 
-bool FileReader::request(const ReadFor& reason, std::vector<std::filesystem::path> files) {
+bool FileReader::request(const ReadFor& reason, std::vector<FileToRead> files) {
   {
     const std::lock_guard lock(mutex_);
     if (num_open_ >= kMaxRequests) return false;
@@ -46,13 +47,8 @@ void FileReader::run() {
     // One file, while others may ask.
     lock.unlock();
     if (!request.files.empty()) {
-      FileContent content{.path = std::move(request.files.front()), .stamp = {}, .digest = {}};
+      request.read.contents.push_back(read(request.files.front()));
       request.files.pop_front();
-      if (const std::optional<FileStamp> stamp = stamp_of(content.path)) {
-        content.stamp = *stamp;
-        if (const Result<Digest> digest = digest_file_(content.path)) content.digest = *digest;
-        request.read.contents.push_back(std::move(content));
-      }
     }
     lock.lock();
 
@@ -63,6 +59,35 @@ void FileReader::run() {
       wake_();
     }
   }
+}
+
+FileContent FileReader::read(const FileToRead& file) const {
+  FileContent content{.path = file.path, .stamp = {}, .digest = {}, .fault = {}};
+  const Result<std::optional<FileStamp>> stamp = stamp_of(file.path);
+  if (!stamp) {
+    content.fault = stamp.error().message;
+    return content;
+  }
+  content.stamp = *stamp;
+  if (!content.stamp) return content;
+  if (!file.expected.empty() && file.known == content.stamp) {
+    content.digest = file.expected.front();
+  } else if (const Result<Digest> digest = disk_.digest(file.path)) {
+    content.digest = *digest;
+  } else {
+    // It may have gone meanwhile.
+    const Result<std::optional<FileStamp>> now = stamp_of(file.path);
+    if (now && !*now) {
+      content.stamp.reset();
+    } else {
+      content.fault = digest.error().message;
+    }
+    return content;
+  }
+  if (file.expected.empty()) return content;
+  const bool is_expected = std::ranges::find(file.expected, *content.digest) != file.expected.end();
+  content.writer = is_expected ? std::optional(std::string()) : disk_.picture_writer(file.path);
+  return content;
 }
 
 }  // namespace baton

@@ -5,6 +5,8 @@
 #include <filesystem>
 #include <functional>
 #include <mutex>
+#include <optional>
+#include <string>
 #include <thread>
 #include <variant>
 #include <vector>
@@ -15,13 +17,36 @@
 
 namespace baton {
 
-/// What files are read for: a job that is submitted or resumed, or a report of a failed attempt.
-using ReadFor = std::variant<Digest, LeaseId>;
+/// All frames of a job, which may be called done if they are as recorded.
+struct InspectionOf {
+  Digest job;
+  auto operator<=>(const InspectionOf&) const = default;
+};
+/// What files are read for: a job that is submitted or resumed, a report of a failed attempt, the
+/// end of a job.
+using ReadFor = std::variant<Digest, LeaseId, InspectionOf>;
 
-/// Files of one request that were read.
+struct FileToRead {
+  std::filesystem::path path;
+  /// Of a frame: digests that it may have; of another one it is seen whether it is a picture.
+  std::vector<Digest> expected = {};
+  /// How it stood when it had the first of these: then it is not read.
+  std::optional<FileStamp> known = {};
+};
+
+/// Files of one request, in its order.
 struct FilesRead {
   ReadFor reason;
-  std::vector<FileContent> contents;  ///< without those that were gone by then
+  std::vector<FileContent> contents;
+};
+
+/// How files are read; a test may have a slow or a broken disk.
+struct Disk {
+  std::function<Result<Digest>(const std::filesystem::path&)> digest = digest_of_file;
+  /// Of a whole picture: the job that wrote it, in hexadecimal digits, as far as it says; nullopt:
+  /// the file is none.
+  std::function<std::optional<std::string>(const std::filesystem::path&)> picture_writer =
+      [](const auto&) { return std::nullopt; };
 };
 
 /// Reads whole files on a thread of its own, since a slow disk may need minutes for them: one file
@@ -29,28 +54,28 @@ struct FilesRead {
 /// with the object, when the file in hand is read; what is left of the requests is forgotten.
 class FileReader {
  public:
-  using DigestFile = std::function<Result<Digest>(const std::filesystem::path&)>;
   static constexpr std::size_t kMaxRequests = 64;
 
-  /// digest_file: called by the thread. wake: called by the thread when a request is done.
-  FileReader(DigestFile digest_file, std::function<void()> wake);
+  /// disk: used by the thread. wake: called by the thread when a request is done.
+  FileReader(Disk disk, std::function<void()> wake);
   ~FileReader();
   FileReader(const FileReader&) = delete;
   FileReader& operator=(const FileReader&) = delete;
 
   /// False, and nothing follows: there are kMaxRequests already.
-  bool request(const ReadFor& reason, std::vector<std::filesystem::path> files);
+  bool request(const ReadFor& reason, std::vector<FileToRead> files);
   /// The requests that are done, each once.
   std::vector<FilesRead> take();
 
  private:
   struct Request {
-    std::deque<std::filesystem::path> files;
+    std::deque<FileToRead> files;
     FilesRead read;
   };
   void run();
+  FileContent read(const FileToRead& file) const;
 
-  const DigestFile digest_file_;
+  const Disk disk_;
   const std::function<void()> wake_;
   std::mutex mutex_;  ///< guards all below
   std::condition_variable changed_;

@@ -1,9 +1,6 @@
 #include "coordinator/service/file_table.h"
 
-#include <sys/stat.h>
-
 #include "common/base/files.h"
-#include "common/base/limits.h"
 
 namespace baton {
 
@@ -12,40 +9,52 @@ Result<Digest> digest_of_file(const std::filesystem::path& path) {
   return digest_of(bytes);
 }
 
-std::optional<FileStamp> stamp_of(const std::filesystem::path& path) {
-  struct stat status {};
-  if (::stat(path.c_str(), &status) != 0) return std::nullopt;
-  constexpr std::int64_t kNsPerSecond = 1'000'000'000;
-  return FileStamp{.size_bytes = static_cast<std::uint64_t>(status.st_size),
-                   .inode = status.st_ino,
-                   .time_ns = status.st_mtim.tv_sec * kNsPerSecond + status.st_mtim.tv_nsec};
+FileVerdict judge_content(const FileContent* content, const BlobRef& recorded) {
+  if (content == nullptr) return {FileState::unknown};
+  if (!content->fault.empty()) return {FileState::unreadable, content->fault};
+  if (!content->stamp) return {FileState::absent};
+  if (!content->digest) return {FileState::unknown};
+  if (content->digest == recorded.digest) return {FileState::right};
+  if (!content->writer) return {FileState::damaged};
+  return {FileState::strange, {}, *content->digest, *content->writer};
 }
 
 void FileTable::add(const FileContent& content) {
   if (files_.size() >= kMaxFiles) files_.clear();
-  files_.insert_or_assign(content.path.lexically_normal(), Entry{content.stamp, content.digest});
+  const std::filesystem::path path = content.path.lexically_normal();
+  forget(path);
+  if (!content.stamp) return;  // what is not there needs no reading
+  if (!content.fault.empty()) unread_.insert(path);
+  files_.emplace(path, content);
 }
 
-bool FileTable::must_be_read(const std::filesystem::path& path, const BlobRef& recorded) const {
-  const std::optional<FileStamp> stamp = stamp_of(path);
-  if (!stamp || stamp->size_bytes != recorded.size_bytes) return false;
+FileVerdict FileTable::judge(const std::filesystem::path& path, const BlobRef& recorded) const {
+  const Result<std::optional<FileStamp>> stamp = stamp_of(path);
+  if (!stamp) return {FileState::unreadable, stamp.error().message};
+  if (!*stamp) return {FileState::absent};
+  if (recorded.kind != BlobKind::image && (*stamp)->size_bytes != recorded.size_bytes)
+    return {FileState::damaged};
   const auto known = files_.find(path.lexically_normal());
-  return known == files_.end() || known->second.stamp != *stamp;
+  if (known == files_.end() || known->second.stamp != *stamp) return {FileState::unknown};
+  return judge_content(&known->second, recorded);
 }
 
-std::optional<bool> FileTable::holds(const std::filesystem::path& path, const BlobRef& recorded) {
-  const std::optional<FileStamp> stamp = stamp_of(path);
-  std::error_code error;
-  if (!stamp)
-    return std::filesystem::status(path, error).type() == std::filesystem::file_type::not_found
-               ? std::optional(false)
-               : std::nullopt;
-  if (stamp->size_bytes != recorded.size_bytes) return false;
+std::optional<FileStamp> FileTable::stamp_with(const std::filesystem::path& path,
+                                               const Digest& digest) const {
   const auto known = files_.find(path.lexically_normal());
-  if (known == files_.end() || known->second.stamp != *stamp) return std::nullopt;
-  if (known->second.digest) return known->second.digest == recorded.digest;
-  files_.erase(known);
-  return std::nullopt;
+  if (known == files_.end() || known->second.digest != digest) return std::nullopt;
+  return known->second.stamp;
+}
+
+void FileTable::forget(const std::filesystem::path& path) {
+  const std::filesystem::path normal = path.lexically_normal();
+  files_.erase(normal);
+  unread_.erase(normal);
+}
+
+void FileTable::forget_unread() {
+  for (const std::filesystem::path& path : unread_) files_.erase(path);
+  unread_.clear();
 }
 
 }  // namespace baton

@@ -4,32 +4,48 @@
 #include <filesystem>
 #include <map>
 #include <optional>
+#include <set>
+#include <string>
 
+#include "common/base/file_stamp.h"
 #include "common/base/limits.h"
 #include "common/base/result.h"
 #include "common/job/task.h"
 
 namespace baton {
 
-/// How a file stands in its folder; one that was written again differs in some of it.
-struct FileStamp {
-  std::uint64_t size_bytes = 0, inode = 0;
-  std::int64_t time_ns = 0;  ///< of the last change of the bytes
-
-  bool operator==(const FileStamp&) const = default;
-};
-
 /// What was in a file when all of it was read.
 struct FileContent {
   std::filesystem::path path;
-  FileStamp stamp;               ///< before it was read
-  std::optional<Digest> digest;  ///< nullopt: it could not be read
+  /// Before it was read; nullopt: it was not there, or could not be looked at.
+  std::optional<FileStamp> stamp;
+  std::optional<Digest> digest;  ///< nullopt: it was not read
+  std::string fault;             ///< why it could not be looked at or read, with its name
+  /// Of a frame that is a whole picture: the job in its header; empty where there is none, or the
+  /// digest is one that was expected.
+  std::optional<std::string> writer = {};
+};
+
+/// How a file stands beside what was recorded when it was written.
+enum class FileState : std::uint8_t {
+  unknown,     ///< only its bytes can tell, and they were not read
+  right,       ///< has the size and digest
+  absent,      ///< nothing has its name
+  damaged,     ///< was cut, or is no picture
+  strange,     ///< a frame: a whole picture, but another one
+  unreadable,  ///< cannot be looked at or read
+};
+struct FileVerdict {
+  FileState state = FileState::unknown;
+  std::string fault = {};   ///< of an unreadable one: why, with its name
+  Digest digest = {};       ///< of a strange one
+  std::string writer = {};  ///< likewise: FileContent::writer
 };
 
 /// Reads all of a file. Errors: those of read_file.
 Result<Digest> digest_of_file(const std::filesystem::path& path);
-/// nullopt: the file is not there, or cannot be looked at.
-std::optional<FileStamp> stamp_of(const std::filesystem::path& path);
+/// What was read, beside what was recorded; nullptr: nothing was.
+FileVerdict judge_content(const FileContent* content, const BlobRef& recorded);
 
 /// What is known of the contents of files, without reading any. It holds for a file as long as
 /// that stands as it did when it was read.
@@ -37,23 +53,27 @@ class FileTable {
  public:
   void add(const FileContent& content);
 
-  /// Whether only its bytes can tell if the file is as it was recorded, and they are not known.
-  bool must_be_read(const std::filesystem::path& path, const BlobRef& recorded) const;
+  /// How the file stands now. Of a blob another size says that it is damaged; a frame of another
+  /// size may be somebody's picture.
+  FileVerdict judge(const std::filesystem::path& path, const BlobRef& recorded) const;
+  /// Whether it is known to be as recorded.
+  bool is_right(const std::filesystem::path& path, const BlobRef& recorded) const {
+    return judge(path, recorded).state == FileState::right;
+  }
+  /// How the file stood when it had this digest; nullopt: that is not known.
+  std::optional<FileStamp> stamp_with(const std::filesystem::path& path,
+                                      const Digest& digest) const;
 
-  /// Whether the file has the size and digest that were recorded when it was written; nullopt: this
-  /// is not known, or could not be found out. What could not be read is to be read anew after that.
-  std::optional<bool> holds(const std::filesystem::path& path, const BlobRef& recorded);
   /// The file is to be read anew, whatever its stamp says.
-  void forget(const std::filesystem::path& path) { files_.erase(path.lexically_normal()); }
+  void forget(const std::filesystem::path& path);
+  /// So are those that could not be read.
+  void forget_unread();
 
  private:
-  struct Entry {
-    FileStamp stamp;
-    std::optional<Digest> digest;
-  };
   static constexpr std::size_t kMaxFiles = 2 * limits::kMaxFrames;
   /// By normal path; forgotten all at once when there are kMaxFiles.
-  std::map<std::filesystem::path, Entry> files_;
+  std::map<std::filesystem::path, FileContent> files_;
+  std::set<std::filesystem::path> unread_;  ///< of them, with a fault
 };
 
 }  // namespace baton

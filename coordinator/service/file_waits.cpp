@@ -15,9 +15,8 @@ bool FileWaits::join(const ReadFor& reason, const Incoming& message, TimePoint n
   return true;
 }
 
-bool FileWaits::start(const ReadFor& reason, const std::string& text,
-                      std::vector<std::filesystem::path> files, const Incoming& message,
-                      TimePoint now) {
+bool FileWaits::start(const ReadFor& reason, const std::string& text, std::vector<FileToRead> files,
+                      const Incoming& message, TimePoint now) {
   if (!reader_.request(reason, std::move(files))) return false;
   waits_.insert_or_assign(reason, Wait{text, {{message, now}}});
   return true;
@@ -25,10 +24,13 @@ bool FileWaits::start(const ReadFor& reason, const std::string& text,
 
 std::vector<Incoming> FileWaits::take_ready(FileTable& table) {
   std::vector<Incoming> ready;
-  for (const FilesRead& read : reader_.take()) {
+  for (FilesRead& read : reader_.take()) {
     for (const FileContent& content : read.contents) table.add(content);
-    const auto wait = waits_.extract(read.reason);
-    for (Waiting& waiting : wait.mapped().messages) ready.push_back(std::move(waiting.message));
+    if (const auto wait = waits_.extract(read.reason)) {
+      for (Waiting& waiting : wait.mapped().messages) ready.push_back(std::move(waiting.message));
+    } else {
+      inspected_.push_back(std::move(read));
+    }
   }
   return ready;
 }

@@ -2,6 +2,7 @@
 
 #include <map>
 #include <string>
+#include <utility>
 #include <vector>
 
 #include "common/protocol/router.h"
@@ -19,18 +20,23 @@ class FileWaits {
   static constexpr std::chrono::milliseconds kAnswerWithin{1000};
   static constexpr std::size_t kMaxWaiting = 64;  ///< messages for one reason
 
-  FileWaits(FileReader::DigestFile digest_file, std::function<void()> wake)
-      : reader_(std::move(digest_file), std::move(wake)) {}
+  FileWaits(Disk disk, std::function<void()> wake) : reader_(std::move(disk), std::move(wake)) {}
 
   /// Files are being read for this reason: the message waits for them. False: they are not.
   bool join(const ReadFor& reason, const Incoming& message, TimePoint now);
   /// The message waits for files. text: what its sender is told; empty: nothing. False: it does
   /// not, since too many wait.
-  bool start(const ReadFor& reason, const std::string& text,
-             std::vector<std::filesystem::path> files, const Incoming& message, TimePoint now);
+  bool start(const ReadFor& reason, const std::string& text, std::vector<FileToRead> files,
+             const Incoming& message, TimePoint now);
+  /// Nobody waits for these files but the coordinator. False: there is no place for them now.
+  bool inspect(const InspectionOf& reason, std::vector<FileToRead> files) {
+    return reader_.request(reason, std::move(files));
+  }
 
   /// The messages that need not wait any more, once `table` has what was read for them.
   std::vector<Incoming> take_ready(FileTable& table);
+  /// The inspections among what take_ready() found; each once.
+  std::vector<FilesRead> take_inspected() { return std::exchange(inspected_, {}); }
   /// Clients that are to be answered that their message waits; it is forgotten, but files are read.
   struct Notice {
     PeerId peer;
@@ -48,6 +54,7 @@ class FileWaits {
     std::vector<Waiting> messages;
   };
   std::map<ReadFor, Wait> waits_;
+  std::vector<FilesRead> inspected_;
   FileReader reader_;
 };
 

@@ -127,59 +127,62 @@ std::vector<std::string> lost_reasons(const LostFiles& lost) {
   return reasons;
 }
 
-LostFiles find_lost_files(const JobAdded& job, const BlobStore& store, FileTable* frames) {
+LostFiles find_lost_files(const JobAdded& job, const BlobStore& store, const FileTable& files,
+                          bool restart) {
   // What is recorded as done, and which blobs that leaves.
   JobTasks recorded(job.spec);
   BlobReferences references;
   recorded.restore(job.completions, {}, references, job.plan);
   const JobGraph& graph = recorded.graph();
   LostFiles lost;
-  const auto is_there_as_told = [&](TaskIndex task, const fs::path& path,
-                                    std::uint64_t size_bytes) {
-    if (size_bytes == 0) return true;  // a held state: the scheduler knows its holder
-    std::error_code error;
-    const std::uintmax_t size = fs::file_size(path, error);
-    if (!error && size == size_bytes) return true;
-    if (error && error != std::errc::no_such_file_or_directory) {
-      if (!lost.unreadable) lost.unreadable = fmt::format("{}: {}", path.string(), error.message());
-      return true;
-    }
+  const auto lose = [&](TaskIndex task, const fs::path& path) {
     if (lost.tasks.empty()) lost.first = path.string();
     lost.tasks.push_back(graph.key(task));
-    return false;
+  };
+  const auto is_blob_there = [&](const BlobRef& blob) {
+    if (blob.is_held()) return true;  // the scheduler knows its holder
+    const Result<std::optional<FileStamp>> stamp = stamp_of(store.path(blob.digest));
+    if (stamp) return *stamp && (*stamp)->size_bytes == blob.size_bytes;
+    if (stamp.error().kind != ErrorKind::io) return false;
+    if (!lost.unreadable) lost.unreadable = stamp.error().message;
+    return true;
+  };
+  const auto lose_if_gone = [&](TaskIndex task, const std::vector<BlobRef>& blobs) {
+    const auto gone = std::find_if_not(blobs.begin(), blobs.end(), is_blob_there);
+    if (gone != blobs.end()) lose(task, store.path(gone->digest));
   };
 
   for (TaskIndex task = graph.num_frames(); task < graph.num_tasks(); ++task) {
-    for (const BlobRef& blob : recorded.ledger().live_blobs(recorded.view(), task)) {
-      if (!is_there_as_told(task, store.path(blob.digest), blob.size_bytes)) break;
-    }
-    if (recorded.ledger().is_cut(task)) {
-      for (const BlobRef& blob : recorded.ledger().inputs(recorded.view(), task)) {
-        if (!is_there_as_told(task, store.path(blob.digest), blob.size_bytes)) break;
-      }
-    }
+    lose_if_gone(task, recorded.ledger().live_blobs(recorded.view(), task));
+    if (recorded.ledger().is_cut(task))
+      lose_if_gone(task, recorded.ledger().inputs(recorded.view(), task));
     for (const BlobRef& blob : recorded.ledger().spare_blobs(recorded.view(), task)) {
       if (!blob.is_held() && !store.contains(blob.digest)) lost.spares.push_back(blob);
     }
   }
   for (TaskIndex frame = 0; frame < graph.num_frames(); ++frame) {
     if (recorded.book().status(frame) != TaskStatus::done) continue;
+    ++lost.num_frames;
     const fs::path path = frame_path(job.spec, FrameIndex(frame));
-    const BlobRef& image = recorded.made().outputs(frame).front();
-    const bool is_there = is_there_as_told(frame, path, image.size_bytes);
-    if (is_there &&
-        (frames == nullptr || lost.unreadable || frames->holds(path, image).value_or(false)))
+    const FileVerdict verdict = files.judge(path, recorded.made().outputs(frame).front());
+    const bool is_strange = verdict.state == FileState::strange;
+    if (verdict.state == FileState::right) continue;
+    if (verdict.state == FileState::unreadable && !restart) {
+      if (!lost.unreadable) lost.unreadable = verdict.fault;
       continue;
-    if (is_there) lost.tasks.push_back(graph.key(frame));
+    }
+    if (verdict.state == FileState::unknown || (is_strange && !restart)) {
+      ++(is_strange ? lost.num_strange : lost.num_unknown);
+      continue;
+    }
+    lose(frame, path);
     lost.frames.push_back(path.string());
-    if (lost.first.empty()) lost.first = path.string();
   }
 
   // A folder that is not there is not mounted rather than empty.
   std::error_code error;
   const fs::path& folder = job.spec.output.directory;
-  const bool any_frame = recorded.made().totals().frames > 0;
-  if (any_frame && !fs::is_directory(folder, error) && !lost.unreadable)
+  if (!restart && lost.num_frames > 0 && !fs::is_directory(folder, error))
     lost.unreadable = fmt::format("{}: the output folder is not there", folder.string());
   return lost;
 }

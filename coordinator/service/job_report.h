@@ -26,7 +26,7 @@ JobDetail describe_job(const Scheduler& scheduler, const Digest& digest,
 Result<Digest> choose_job(const std::vector<FoundJob>& found, const std::string& text);
 
 /// What is not there of the files that a job's recorded completions promise: blobs that are still
-/// needed, and finished frames. Sizes are compared; the contents of frames only with `frames`.
+/// needed, of which sizes are compared, and finished frames.
 struct LostFiles {
   std::vector<TaskKey> tasks;  ///< that made them
   /// That nobody needs now (BlobLedger::spare_blobs).
@@ -35,8 +35,18 @@ struct LostFiles {
   std::string first;                ///< one of the files
   /// Why it cannot be told now, of a file or folder.
   std::optional<std::string> unreadable;
+  std::size_t num_frames = 0;  ///< finished, lost or not
+  /// Frames whose bytes must be read to tell, and frames that are others' now: not lost.
+  std::size_t num_unknown = 0, num_strange = 0;
+
+  bool all_frames_right() const {
+    return num_frames > 0 && frames.empty() && num_unknown == 0 && num_strange == 0 && !unreadable;
+  }
 };
-LostFiles find_lost_files(const JobAdded& job, const BlobStore& store, FileTable* frames = nullptr);
+/// restart: another picture in the place of a frame is lost, too, and a folder that is not there is
+/// an empty one.
+LostFiles find_lost_files(const JobAdded& job, const BlobStore& store, const FileTable& files,
+                          bool restart = false);
 /// For people, of what is lost: empty, or lines.
 std::vector<std::string> lost_reasons(const LostFiles& lost);
 

@@ -56,7 +56,7 @@ Error another_picture(const JobSpec& job, const Neighbour& other, const JobSpec&
 }
 
 Neighbour look_at(const FormerJob& former, const Digest& job, const ParsedJobDocument& wanted,
-                  FileTable& files, const std::vector<FrameNumber>* owned) {
+                  const FileTable& files, const std::vector<FrameNumber>* owned) {
   const JobStatus status = former.status;
   Neighbour other{job, status, {}, {}, {}, false, 0};
   const JobSpec& theirs = former.document.job;
@@ -77,7 +77,7 @@ Neighbour look_at(const FormerJob& former, const Digest& job, const ParsedJobDoc
         owned == nullptr ||
         std::find(owned->begin(), owned->end(), theirs.frames[mine.index()]) != owned->end();
     const bool is_there = is_owned && image != images.end() &&
-                          files.holds(frame_path(theirs, mine), image->second).value_or(false);
+                          files.is_right(frame_path(theirs, mine), image->second);
     other.num_there += is_there ? 1 : 0;
     if (!is_there && !is_open(status)) continue;
     other.written.push_back(wanted.job.frames[its.index()]);

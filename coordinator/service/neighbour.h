@@ -25,7 +25,7 @@ struct Neighbour {
 /// What a journalled job has written, beside a new one. owned: its frames by number, without those
 /// that another one has replaced; null: all.
 Neighbour look_at(const FormerJob& former, const Digest& job, const ParsedJobDocument& wanted,
-                  FileTable& files, const std::vector<FrameNumber>* owned);
+                  const FileTable& files, const std::vector<FrameNumber>* owned);
 
 /// Some of what differs, for people.
 std::string differing_text(const std::vector<std::string>& differing);

@@ -45,7 +45,11 @@ Result<Service> Service::open(const ServiceOptions& options) {
   }
   BATON_ASSIGN(Journal journal, Journal::open(options.work_dir / "journal.sqlite"));
   BATON_ASSIGN(BlobStore store, BlobStore::open(options.work_dir / "store"));
-  BATON_ASSIGN(std::string token, make_token(options.work_dir / "store" / "token"));
+  // Workers, and marks of output folders, have it from a coordinator before this one.
+  BATON_ASSIGN(const std::optional<std::string> known, journal.store_token());
+  BATON_ASSIGN(std::string token,
+               make_token(options.work_dir / "store" / "token", known.value_or("")));
+  if (known != token) BATON_TRY(journal.record_store_token(token));
   BATON_ASSIGN(Router router, Router::bind(options.listen, options.access));
   Service service(std::make_unique<FarmCore>(options, std::move(router), std::move(journal),
                                              std::move(store), std::move(token)));
@@ -54,7 +58,7 @@ Result<Service> Service::open(const ServiceOptions& options) {
 }
 
 Status Service::run(const std::atomic<bool>& stop) {
-  waits_ = std::make_unique<FileWaits>(farm_.options.digest_file, [this] { farm_.router.wake(); });
+  waits_ = std::make_unique<FileWaits>(farm_.options.disk, [this] { farm_.router.wake(); });
   while (!stop && !stop_requested_) BATON_TRY(turn());
   waits_.reset();
   // Who is told to stop the farm sends the workers home; who is merely ended, by a signal, will be
@@ -76,6 +80,7 @@ Status Service::turn() {
     timeout = std::chrono::milliseconds(0);
   }
   BATON_TRY(handle_read());
+  start_inspections();
   if (Clock::now() >= next_tick_) {
     next_tick_ = Clock::now() + kTick;
     asked_for_hello_.clear();
@@ -122,6 +127,7 @@ Status Service::receive(const PeerId& peer, const WorkerHello& message) {
   }
 
   // Answer before the leases that follow from it.
+  farm_.keep_token();
   farm_.peers.add(peer, hello);
   if (is_new)
     spdlog::info("worker {} joined: {} threads on {}", hello.worker_id, hello.num_threads,
@@ -163,13 +169,18 @@ Status Service::receive_from(const std::string& worker, const TaskDone& message)
   // Leaves after what follows is durable.
   BATON_TRY(farm_.reply_to(worker, ReportReceived{message.lease}));
   // Accepted results must be there: a blob may have gone between publishing and reporting. A frame
-  // that is not where it belongs is on a disk that only the worker sees.
-  if (const auto missing = find_missing_frame(farm_, message)) {
+  // that is not where it belongs is on a disk that only the worker sees, or in another folder.
+  const std::optional<ReportedFrame> frame = find_reported_frame(farm_, message);
+  BATON_ASSIGN(const bool is_elsewhere, frame ? watch_folder(message.lease.job) : false);
+  if (is_elsewhere) return farm_.step(ResultMissing{worker, message.lease, message.made.outputs});
+  if (frame && (!frame->stamp || !*frame->stamp)) {
+    const std::string why = frame->stamp ? fmt::format(
+                                               "{}: reported, but not there as the "
+                                               "coordinator sees it",
+                                               frame->path.string())
+                                         : frame->stamp.error().message;
     return farm_.step(AttemptFailed{
-        {message.lease, worker,
-         fmt::format("{}: reported, but not there as the coordinator sees it: is the output folder "
-                     "mounted where the worker runs?",
-                     *missing)}});
+        {message.lease, worker, why + ": is the output folder mounted where the worker runs?"}});
   }
   if (const auto missing = find_missing_blob(farm_, message)) {
     spdlog::warn("worker {}: {}: reported, but not there; the task is done again", worker,
@@ -177,7 +188,8 @@ Status Service::receive_from(const std::string& worker, const TaskDone& message)
     return farm_.step(ResultMissing{worker, message.lease, message.made.outputs});
   }
   keep_notes(message);
-  return farm_.step(TaskCompleted{worker, message.lease, message.made});
+  BATON_TRY(farm_.step(TaskCompleted{worker, message.lease, message.made}));
+  return frame ? keep_frame_file(message, *frame) : Status();
 }
 
 /// What a worker has to say of a job's files, for those who ask for the job.
@@ -205,11 +217,12 @@ Status Service::receive_from(const std::string& worker, const TaskFailed& messag
     spdlog::warn("job {} waits for {}", message.lease.job.short_hex(), waits);
     return farm_.step(SpaceLacking{worker, message.lease, waits});
   }
-  // Inputs that are gone or damaged are nobody's fault: what made them is done again.
+  // Inputs that are gone, damaged or cannot be read are nobody's fault: what made them is done
+  // again.
   const std::optional<std::vector<BlobRef>> bad = find_bad_inputs(farm_, files_, message.lease);
   for (const BlobRef& input : bad.value_or(std::vector<BlobRef>())) {
-    spdlog::warn("job {}: {} is gone or damaged and is made again", message.lease.job.short_hex(),
-                 farm_.store.path(input.digest).string());
+    spdlog::warn("job {}: {} is gone, damaged or unreadable and is made again",
+                 message.lease.job.short_hex(), farm_.store.path(input.digest).string());
     if (const Status removed = farm_.store.remove(input.digest); !removed)
       spdlog::warn("{}", removed.error().message);
   }
@@ -232,6 +245,10 @@ Status Service::receive_from(const std::string& worker, const LeaseReturn& messa
   if (!unseen.empty())
     tell(fmt::format("worker {} takes no tasks of job {}: {}", worker,
                      message.lease.job.short_hex(), unseen));
+  if (!unseen.empty()) {
+    BATON_ASSIGN(const bool is_elsewhere, watch_folder(message.lease.job));
+    if (is_elsewhere) return farm_.step(LeaseReturned{worker, message.lease});
+  }
   return farm_.step(LeaseReturned{worker, message.lease, unseen});
 }
 
@@ -250,6 +267,8 @@ Status Service::receive_from(const std::string& worker, const WorkerGoodbye&) {
 /// Handles what need not wait any more; who waits on is told that it does.
 Status Service::handle_read() {
   for (const Incoming& message : waits_->take_ready(files_)) BATON_TRY(handle(message));
+  for (const FilesRead& read : waits_->take_inspected()) BATON_TRY(end_inspection(read));
+  files_.forget_unread();
   for (const FileWaits::Notice& notice : waits_->take_notices(std::chrono::steady_clock::now()))
     BATON_TRY(farm_.refuse(notice.peer, {ErrorKind::timeout, notice.text}));
   return {};
@@ -262,7 +281,7 @@ bool Service::await_inputs(const std::string& worker, const TaskFailed& message)
   const TimePoint now = std::chrono::steady_clock::now();
   const Incoming incoming{peer.value_or(PeerId()), Message(message), speaker_};
   if (waits_->join(message.lease, incoming, now)) return true;
-  std::vector<fs::path> unread = unread_inputs(farm_, files_, message.lease);
+  std::vector<FileToRead> unread = unread_inputs(farm_, files_, message.lease);
   if (unread.empty()) return false;
   waits_->start(message.lease, {}, std::move(unread), incoming, now);
   return true;

@@ -10,8 +10,10 @@
 #include <string>
 #include <vector>
 
+#include "coordinator/service/evidence.h"
 #include "coordinator/service/farm_core.h"
 #include "coordinator/service/file_waits.h"
+#include "coordinator/service/folder_record.h"
 #include "coordinator/service/job_report.h"
 
 namespace baton {
@@ -52,6 +54,7 @@ class Service {
   Status receive_from(const std::string& worker, const LeaseRequest& message);
   Status receive_from(const std::string& worker, const Heartbeat& message);
   Status receive_from(const std::string& worker, const TaskDone& message);
+  Status keep_frame_file(const TaskDone& report, const ReportedFrame& frame);
   Status receive_from(const std::string& worker, const TaskFailed& message);
   Status receive_from(const std::string& worker, const StatesPublished& message);
   Status receive_from(const std::string& worker, const LeaseReturn& message);
@@ -85,8 +88,13 @@ class Service {
   // Files that must be read before a message can be handled.
   Status handle_read();
   bool await_inputs(const std::string& worker, const TaskFailed& message);
-  Result<bool> await_frames(const PeerId& peer, const Message& message, const Digest& job,
-                            const JobSpec& spec);
+  Result<std::optional<OddFrames>> await_frames(const PeerId& peer, const Message& message,
+                                                const Digest& job, const JobSpec& spec);
+
+  // Frames and their folder, while a job runs and at its end (service_frames.cpp).
+  void start_inspections();
+  Status end_inspection(const FilesRead& read);
+  Result<bool> watch_folder(const Digest& job);
 
   void keep_notes(const TaskDone& report);
 

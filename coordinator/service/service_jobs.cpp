@@ -6,6 +6,7 @@
 #include "common/base/archive.h"
 #include "common/base/limits.h"
 #include "common/base/size_text.h"
+#include "common/job/plan/sequence.h"
 #include "common/job/text/job_json.h"
 #include "coordinator/service/job_report.h"
 #include "coordinator/service/plan_text.h"
@@ -18,6 +19,7 @@ namespace baton {
 
 Status Service::restore_jobs() {
   BATON_ASSIGN(farm_.owners, farm_.journal.owners());
+  BATON_TRY(farm_.take_up_marks());
   BATON_ASSIGN(const std::vector<Digest> jobs, farm_.journal.jobs());
   for (const Digest& job : jobs) BATON_TRY(restore_job(job));
   BATON_TRY(farm_.archive_ended());
@@ -70,14 +72,26 @@ Status Service::restore_job(const Digest& digest) {
 
   // An open job needs every file that it counts on. What cannot be looked at now is not gone: the
   // job waits to be resumed.
+  bool lacks_mark = false;
   if (is_open(event.status)) {
-    LostFiles lost = find_lost_files(event, farm_.store);
+    BATON_ASSIGN(const std::vector<FrameFile> stood, farm_.journal.frame_files(digest));
+    for (const FrameFile& file : stood) {
+      if (file.frame >= FrameIndex(0) && file.frame.index() < event.spec.frames.size())
+        files_.add(
+            {frame_path(event.spec, file.frame), file.stamp, file.digest, {}, std::string()});
+    }
+    LostFiles lost = find_lost_files(event, farm_.store, files_);
+    const std::optional<std::string> mark = farm_.lost_mark(digest, event.spec);
+    lacks_mark = mark && lost.all_frames_right();
+    if (mark && !lacks_mark && !lost.unreadable) lost.unreadable = mark;
     if (lost.unreadable) {
       spdlog::error("job {} is paused, resume it when that is mended: {}", digest.short_hex(),
                     *lost.unreadable);
       event.status = JobStatus::paused;
+      event.waits = *lost.unreadable;
       BATON_TRY(farm_.journal.record_status(digest, event.status));
     } else {
+      if (lost.num_unknown > 0) farm_.to_inspect.insert(digest);
       tell_lost(digest, lost);
       if (!lost.tasks.empty()) farm_.lost_before[digest] = lost_reasons(lost);
       event.lost = std::move(lost.tasks);
@@ -86,6 +100,7 @@ Status Service::restore_job(const Digest& digest) {
   }
   const JobStatus status = event.status;
   BATON_TRY(farm_.step(std::move(event)));
+  if (lacks_mark) BATON_TRY(farm_.mark_output_again(digest));
   if (!is_open(status)) farm_.note_ended(digest);
   farm_.remove_job_file(digest, status);
   const JobProgress progress = farm_.scheduler.find_job(digest)->tasks.progress();
@@ -104,10 +119,12 @@ Status Service::receive(const PeerId& peer, const JobDocumentRequest& message) {
     return farm_.refuse(
         peer, {ErrorKind::bad_input, fmt::format("job {}: not known here", message.job.hex())});
   }
-  const bool for_worker = !farm_.peers.worker_of(peer).empty();
-  return farm_.reply(peer,
-                     JobDocument{message.job, std::move(*document),
-                                 for_worker ? farm_.mark_output(message.job) : std::string()});
+  std::string token;
+  if (!farm_.peers.worker_of(peer).empty()) {
+    if (const Result<bool> watched = watch_folder(message.job); !watched) return watched.error();
+    BATON_ASSIGN(token, farm_.mark_output(message.job));
+  }
+  return farm_.reply(peer, JobDocument{message.job, std::move(*document), std::move(token)});
 }
 
 void Service::tell_lost(const Digest& job, const LostFiles& lost) {
@@ -135,26 +152,34 @@ Status Service::receive(const PeerId& peer, const SubmitJob& message) {
          fmt::format("job {}: {} tasks, at most {}: use larger tiles or more frames per checkpoint",
                      document->digest.short_hex(), count, limits::kMaxTasksPerJob)});
   }
-  BATON_ASSIGN(const bool waits, await_frames(peer, message, document->digest, document->job));
-  if (waits) return {};
+  BATON_ASSIGN(const std::optional<OddFrames> odd,
+               await_frames(peer, message, document->digest, document->job));
+  if (!odd) return {};
+  const Scheduler::Job* const known = farm_.scheduler.find_job(document->digest);
+  const bool runs = known != nullptr && known->status == JobStatus::running;
+  const std::string& fault = odd->unreadable.empty() ? strange_text(odd->strange) : odd->unreadable;
+  if (!fault.empty() && !message.restart && !runs)
+    return farm_.refuse(peer,
+                        {ErrorKind::io, fmt::format("job '{}': {}", document->job.name, fault)});
   return Submission(farm_, files_, speaker_).submit(peer, *document, message);
 }
 
-/// Whether the message about a job waits: frames must be read that it would replace or keep.
-Result<bool> Service::await_frames(const PeerId& peer, const Message& message, const Digest& job,
-                                   const JobSpec& spec) {
+/// The frames that a message about a job would replace or keep. nullopt: some must be read, and the
+/// message waits.
+Result<std::optional<OddFrames>> Service::await_frames(const PeerId& peer, const Message& message,
+                                                       const Digest& job, const JobSpec& spec) {
   const TimePoint now = std::chrono::steady_clock::now();
   const Incoming incoming{peer, message, speaker_};
-  if (waits_->join(job, incoming, now)) return true;
-  BATON_ASSIGN(std::vector<std::filesystem::path> unread,
-               Submission(farm_, files_, speaker_).unread_frames(spec));
-  if (unread.empty()) return false;
+  if (waits_->join(job, incoming, now)) return std::optional<OddFrames>();
+  BATON_ASSIGN(const FolderRecord record, FolderRecord::read(farm_.journal, folder_of(spec)));
+  OddFrames odd = find_odd_frames(record, files_, spec);
+  if (odd.unread.empty()) return std::optional(std::move(odd));
   const std::string text = fmt::format("job '{}': looking at {} frames in {}", spec.name,
-                                       unread.size(), spec.output.directory);
+                                       odd.unread.size(), spec.output.directory);
   spdlog::info("{}", text);
-  if (!waits_->start(job, text, std::move(unread), incoming, now))
+  if (!waits_->start(job, text, std::move(odd.unread), incoming, now))
     BATON_TRY(farm_.refuse(peer, {ErrorKind::timeout, text + ", after those of other jobs"}));
-  return true;
+  return std::optional<OddFrames>();
 }
 
 Status Service::receive(const PeerId& peer, const ListJobs& message) {
@@ -213,8 +238,9 @@ Status Service::receive(const PeerId& peer, const ResumeJob& message) {
   std::string plan;
   const Scheduler::Job* const known = farm_.scheduler.find_job(*job);
   if (known != nullptr && known->status == JobStatus::paused) {
-    BATON_ASSIGN(const bool waits, await_frames(peer, message, *job, known->spec));
-    if (waits) return {};
+    BATON_ASSIGN(const std::optional<OddFrames> odd,
+                 await_frames(peer, message, *job, known->spec));
+    if (!odd) return {};
     BATON_ASSIGN(LostFiles lost, Submission(farm_, files_, speaker_).lost_files_of(*job));
     if (lost.unreadable) {
       return farm_.refuse(peer, {ErrorKind::io, fmt::format("job {} stays paused: {}",

@@ -105,7 +105,7 @@ Status Submission::submit(const PeerId& peer, const ParsedJobDocument& document,
         known->status != JobStatus::running && !own) {
       return farm_.refuse(peer, own.error());
     }
-    return go_on(peer, document.digest);
+    return go_on(peer, document.digest, message.restart);
   }
 
   if (farm_.scheduler.num_jobs() >= limits::kMaxJobs) {
@@ -132,7 +132,8 @@ Status Submission::begin(const PeerId& peer, const ParsedJobDocument& document,
   JobAdded event{digest, document.job, JobStatus::running, {}, {}};
   BATON_ASSIGN(const std::optional<std::string> known, farm_.journal.document(digest));
   BATON_TRY(take_over(adoption, formers, known ? "" : text, event));
-  LostFiles lost = find_lost_files(event, farm_.store);
+  LostFiles lost = find_lost_files(event, farm_.store, files_);
+  const bool has_all = event.lost.empty() && lost.all_frames_right();
   for (std::string& reason : lost_reasons(lost)) {
     if (std::find(reasons.begin(), reasons.end(), reason) == reasons.end())
       reasons.push_back(std::move(reason));
@@ -143,6 +144,11 @@ Status Submission::begin(const PeerId& peer, const ParsedJobDocument& document,
   // The answer goes out before any lease of the job.
   const std::size_t place = farm_.num_replies();
   BATON_TRY(farm_.step(event));
+  if (has_all) BATON_TRY(farm_.step(FramesInspected{digest}));
+  if (lost.num_frames > 0) {
+    const Result<std::string> marked = farm_.mark_output(digest);
+    if (!marked) return marked.error();
+  }
   const Scheduler::Job& job = *farm_.scheduler.find_job(digest);
   const std::string plan = plan_text(job, reasons);
   const bool already_there = known && !is_open(job.status) && event.lost.empty();
@@ -178,7 +184,7 @@ Result<Adoption> Submission::find_heritage(const ParsedJobDocument& document,
   const KeptFiles kept{
       .has_frame =
           [&](FrameIndex frame, const BlobRef& image) {
-            return files_.holds(frame_path(document.job, frame), image).value_or(false);
+            return files_.is_right(frame_path(document.job, frame), image);
           },
       .has_blob = [&](const BlobRef& blob) { return farm_.store.contains(blob.digest); }};
   Adoption adoption = adopt(document, formers, kept);
@@ -248,9 +254,15 @@ Status Submission::take_over(const Adoption& adoption, const std::vector<Digest>
 }
 
 /// A job that has not ended is submitted again. A paused one goes on, and what is gone or damaged
-/// is made again; a folder that is not there counts as empty.
-Status Submission::go_on(const PeerId& peer, const Digest& digest) {
-  BATON_ASSIGN(LostFiles lost, lost_files_of(digest));
+/// is made again; where that cannot be told, it stays paused, unless all may be made again.
+Status Submission::go_on(const PeerId& peer, const Digest& digest, bool restart) {
+  BATON_ASSIGN(LostFiles lost, lost_files_of(digest, restart));
+  if (lost.unreadable) {
+    BATON_TRY(farm_.step(JobPaused{digest, *lost.unreadable}));
+    return farm_.refuse(peer, {ErrorKind::io, fmt::format("job {} is paused: {}",
+                                                          digest.short_hex(), *lost.unreadable)});
+  }
+  if (restart) BATON_TRY(farm_.mark_output_again(digest));
   const bool runs = farm_.scheduler.find_job(digest)->status == JobStatus::running;
   std::vector<std::string> reasons = lost_reasons(lost);
   const auto noted = farm_.lost_before.find(digest);
@@ -264,34 +276,23 @@ Status Submission::go_on(const PeerId& peer, const Digest& digest) {
   return {};
 }
 
-Result<std::vector<fs::path>> Submission::unread_frames(const JobSpec& job) {
-  std::set<fs::path> wanted, unread;
-  for (std::size_t i = 0; i < job.frames.size(); ++i)
-    wanted.insert(frame_path(job, FrameIndex(static_cast<std::int32_t>(i))).lexically_normal());
-  BATON_ASSIGN(const std::vector<Digest> neighbours, farm_.journal.jobs_in(folder_of(job)));
-  for (const Digest& digest : neighbours) {
-    BATON_ASSIGN(const std::optional<std::string> text, farm_.journal.document(digest));
-    const Result<ParsedJobDocument> document = parse_job_document(text.value_or(""));
-    if (!document) continue;
-    BATON_TRY(farm_.journal.for_each_completion(digest, [&](const Completion& done) -> Status {
-      if (done.task.kind != TaskKind::assemble || done.made.outputs.size() != 1) return {};
-      const fs::path path = frame_path(document->job, done.task.frame()).lexically_normal();
-      if (wanted.contains(path) && files_.must_be_read(path, done.made.outputs.front()))
-        unread.insert(path);
-      return {};
-    }));
-  }
-  return std::vector<fs::path>(unread.begin(), unread.end());
-}
-
-Result<LostFiles> Submission::lost_files_of(const Digest& job) {
+Result<LostFiles> Submission::lost_files_of(const Digest& job, bool restart) {
   BATON_ASSIGN(JournalledJob known, farm_.journal.load(job));
-  return find_lost_files({.job = job,
-                          .spec = farm_.scheduler.find_job(job)->spec,
-                          .completions = std::move(known.completions),
-                          .failures = {},
-                          .plan = std::move(known.plan)},
-                         farm_.store, &files_);
+  const JobSpec& spec = farm_.scheduler.find_job(job)->spec;
+  LostFiles lost = find_lost_files({.job = job,
+                                    .spec = spec,
+                                    .completions = std::move(known.completions),
+                                    .failures = {},
+                                    .plan = std::move(known.plan)},
+                                   farm_.store, files_, restart);
+  const std::optional<std::string> mark = restart ? std::nullopt : farm_.lost_mark(job, spec);
+  if (!mark) return lost;
+  if (lost.num_frames == 0 || lost.all_frames_right()) {
+    BATON_TRY(farm_.mark_output_again(job));
+  } else {
+    lost.unreadable = mark;
+  }
+  return lost;
 }
 
 }  // namespace baton

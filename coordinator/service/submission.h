@@ -20,19 +20,18 @@ class Submission {
   Submission(FarmCore& farm, FileTable& files, const Speaker& speaker)
       : farm_(farm), files_(files), speaker_(speaker) {}
 
-  /// The files of the job's frames that jobs of its folder have recorded, as far as only their
-  /// bytes can tell whether they are as they were written. They must be known to submit().
-  Result<std::vector<std::filesystem::path>> unread_frames(const JobSpec& job);
-  /// Starts the job or lets it go on, and answers. The document is one that may be run.
+  /// Starts the job or lets it go on, and answers. The document is one that may be run, and its
+  /// frames are known, as far as jobs of its folder have recorded them (find_odd_frames).
   Status submit(const PeerId& peer, const ParsedJobDocument& document, const SubmitJob& message);
-  /// What is not there of a job that the scheduler has.
-  Result<LostFiles> lost_files_of(const Digest& job);
+  /// What is not there of a job that the scheduler has. A folder without its mark that has all
+  /// frames is the folder, and is marked again. restart: see find_lost_files.
+  Result<LostFiles> lost_files_of(const Digest& job, bool restart = false);
 
  private:
   Result<std::optional<FormerJob>> former_job(const Digest& digest);
   Result<std::vector<std::string>> make_way(const ParsedJobDocument& document, bool restart);
   Status disown(const Digest& job, const std::vector<FrameNumber>& frames);
-  Status go_on(const PeerId& peer, const Digest& digest);
+  Status go_on(const PeerId& peer, const Digest& digest, bool restart);
   Status begin(const PeerId& peer, const ParsedJobDocument& document, const std::string& text,
                std::vector<std::string> reasons);
   Result<Adoption> find_heritage(const ParsedJobDocument& document, std::vector<Digest>& digests,

@@ -79,6 +79,12 @@ ExitCode exit_code_of(JobStatus status) {
   return status == JobStatus::cancelled ? ExitCode::cancelled : ExitCode::ok;
 }
 
+ExitCode exit_code_of(const JobDetail& detail) {
+  const JobStatus status = detail.summary.status;
+  const bool has_strange_frames = status == JobStatus::failed && !detail.waits.empty();
+  return has_strange_frames ? ExitCode::io : exit_code_of(status);
+}
+
 std::string job_line(const JobSummary& job) {
   return fmt::format("{}  {:<9}  {:>11} frames  {:>15} tasks  {}", job.job.short_hex(),
                      job_status_name(job.status),

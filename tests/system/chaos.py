@@ -5,7 +5,7 @@ usage: chaos.py --bin FOLDER [--faults N] [--seed S] [--freeze SECONDS] [--keep]
 
 Real processes: one coordinator, three workers behind a proxy, three jobs at once (at rest, in motion, with a second pass),
 again and again until N faults have struck. Kinds of faults are dealt like cards, so that each comes once before any comes
-again. Then the farm is left alone, each job is submitted once more (frames may have been removed) and must end as done.
+again. Then the farm is left alone, and each job must end as done. Files of jobs that are done are not struck.
 
 Checked at the end: the pixels are those of an undisturbed run; no task was done under two digests; nothing was done again
 that no fault explains; no lease was taken from a worker for the sake of an older one, and no older one was kept; when all is
@@ -25,8 +25,8 @@ from pathlib import Path
 
 import chaos_witness as witness
 from chaos_disk import Disk, PowerCut, enter_namespace, may_mount
-from chaos_faults import KINDS, NUM_WORKERS, Chaos, Job, open_jobs
-from farm import OK, PATIENCE, Farm, Fault, Programs, check, wait_until
+from chaos_faults import KINDS, NUM_WORKERS, Chaos, Job
+from farm import PATIENCE, Farm, Fault, Programs, check, wait_until
 
 END_S = 300 * PATIENCE
 
@@ -52,17 +52,14 @@ def check_leftovers(farm):
     check(not left, f"temporary files are left: {left[:3]}")
 
 
-def finish(chaos, farm):
-    """Leaves the farm alone until all is done; frames that were removed are asked for once more."""
+def finish(chaos):
+    """Leaves the farm alone until all is done. Nothing is submitted once more: what is missing then stays missing."""
     def all_done():
         chaos.tend()
-        return not open_jobs(farm, chaos.jobs)
+        return not chaos.open_jobs()
     for thaw in chaos.thaws.values():
         thaw.join()
     wait_until(all_done, "all jobs are done", END_S)
-    for job in chaos.jobs:
-        check(chaos.submit(job) == OK, f"{job.path.stem} is submitted once more")
-    wait_until(all_done, "all jobs are done once more", END_S)
 
 
 def judge(programs, chaos, farm, expected):
@@ -72,12 +69,13 @@ def judge(programs, chaos, farm, expected):
         got = programs.pixels(job.frames)
         for frame, pixels in expected[job.kind].items():
             check(got.get(frame) == pixels, f"{job.frames / frame}: {'other pixels' if frame in got else 'missing'}")
+    check((farm.work_folder / "store/token").exists(), "the store's token is gone")
     check(chaos.proxy.is_quiet(4 * PATIENCE), "all is done, and somebody still reports")
     log, seen = farm.coordinator.log(), chaos.proxy.seen()
     check("BUG" not in log, "the coordinator has found a bug")
     num_tasks = witness.check_one_result_a_task(seen)
     witness.check_nothing_revoked(seen, chaos.proxy.returns(), chaos.proxy.struck_ms(), chaos.ended_jobs)
-    num_superseded = witness.check_superseded_revoked(seen, chaos.proxy.struck_ms())
+    num_superseded = witness.check_superseded_revoked(seen, chaos.proxy.struck_ms(), witness.reopened(log))
     again = witness.check_repeated(seen, log, chaos.struck, NUM_WORKERS, len(chaos.jobs), chaos.num_harmed)
     check_leftovers(farm)
     return (num_tasks, num_superseded, *again)
@@ -106,7 +104,7 @@ def run(programs, folder, num_faults, seed, longest_freeze_s=5):
             chaos.renew()
             time.sleep(rng.uniform(0, 0.5))
             chaos.strike()
-        finish(chaos, farm)
+        finish(chaos)
         num_tasks, num_superseded, again, explained = judge(programs, chaos, farm, expected)
     faults = ", ".join(f"{count} {what}" for what, count in sorted(chaos.struck.items()))
     print(f"seed {seed}: {chaos.struck.total()} faults on {len(chaos.jobs)} jobs ({faults}); {chaos.num_lost_in_cuts} files "

@@ -10,12 +10,12 @@ import time
 from collections import Counter
 from pathlib import Path
 
+from chaos_frames import NOTICED_S, FrameFaults, put_folder
 from chaos_witness import STATE, in_hand
 from farm import BAD_INPUT, OK, PATIENCE, check, wait_until
 from jobs import camera_keys, make_job, merged, write_job
 
 NUM_WORKERS = 3
-NOTICED_S = 6 * PATIENCE  # a fault of a disk that nobody notices in this time has not struck
 SUPERSEDED_S = 8 * PATIENCE  # so long after a worker fell silent its leases are another's, if there are any
 SUPERSEDER_STOPS_S = 0.5
 RECENT_LINES = 3000  # of the record: who has which lease
@@ -46,6 +46,7 @@ class Job:
         self.kind, self.frames, self.number = kind, folder / "frames" / f"{kind}{number}", number
         self.path, self._edits = folder / f"{kind}{number}.json", {}
         self.id, self.is_done = None, False
+        self.written, self.blocked = [], []  # frames, and those in whose place there are folders
         self._plain = plain_job(folder / "assets")
         self.write()
 
@@ -60,7 +61,7 @@ class Job:
         return self.write()
 
 
-class Chaos:
+class Chaos(FrameFaults):
     """Strikes a farm at random."""
 
     def __init__(self, farm, proxy, disk, power, rng, longest_freeze_s):
@@ -70,8 +71,9 @@ class Chaos:
         self.num_harmed, self.num_lost_in_cuts, self.healed_at, self.num_started = 0, 0, None, 0
         self.faults = [self.kill_worker, self.kill_coordinator, self.freeze_worker, self.freeze_coordinator,
                        self.supersede_worker, self.end_worker, self.end_coordinator, self.flip_byte, self.cut_blob,
-                       self.remove_blob, self.remove_frame, self.submit_again, self.edit_settings, self.edit_picture,
-                       self.drop_message, self.double_message, self.delay_message]
+                       self.remove_blob, self.block_blob, self.remove_frame, self.cut_frame, self.damage_frame,
+                       self.block_frame, self.rename_folder, self.lose_token, self.submit_again, self.edit_settings,
+                       self.edit_picture, self.drop_message, self.double_message, self.delay_message]
         if disk:
             self.faults += [self.fill_disk, self.make_read_only]
         if power:
@@ -107,7 +109,7 @@ class Chaos:
 
     def renew(self):
         """New jobs when all have ended."""
-        if open_jobs(self.farm, self.jobs):
+        if self.open_jobs():
             return
         number = len(self.jobs) // len(KINDS) + 1
         for kind in KINDS:
@@ -170,14 +172,16 @@ class Chaos:
     def remove_blob(self):
         return self.harm_blob(lambda path, _: path.unlink(), "blob removed")
 
-    def remove_frame(self):
-        frames = [frame for job in self.jobs for frame in job.frames.glob("*.exr")]
-        if not frames:
-            return False
-        with contextlib.suppress(OSError):  # it may be read-only now
-            self.rng.choice(frames).unlink()
-            self.num_harmed += 1
-            return self.count("frame removed")
+    def block_blob(self):
+        """As if it could not be read: what has its name is a folder."""
+        return self.harm_blob(lambda path, _: put_folder(path), "blob blocked")
+
+    def lose_token(self):
+        """Without the store's token no worker can join."""
+        with contextlib.suppress(OSError):
+            (self.farm.work_folder / "store/token").unlink()
+            self.kill_worker()
+            return self.count("token lost")
         return False
 
     def submit_again(self):
@@ -253,6 +257,26 @@ class Chaos:
     def some_worker(self):
         alive = [worker for worker in self.farm.workers if worker.alive()]
         return self.rng.choice(alive) if alive else None
+
+    def show(self, job):
+        """What the farm says of a job; None when it does not answer."""
+        shown = self.farm.baton("job", "show", job.id, "--json", expect=None)
+        return json.loads(shown.stdout) if shown.returncode == OK else None
+
+    def open_jobs(self):
+        """Those of the jobs that are not known to be done; those that wait for somebody go on. A failed one ends the test."""
+        left = []
+        for job in self.jobs:
+            shown = None if job.is_done else self.show(job)
+            if shown is not None:
+                status = shown["status"]
+                check(status not in ("failed", "cancelled"), f"job {job.path.stem} is {status}: {shown}")
+                job.is_done = status == "done"
+                if status == "paused" and job.blocked:
+                    self.mend(job)
+            if not job.is_done:
+                left.append(job)
+        return left
 
     def some_job(self):
         return self.rng.choice(self.jobs) if self.jobs and self.farm.coordinator.alive() else None
@@ -345,21 +369,3 @@ def state_of(pid):
         return Path(f"/proc/{pid}/stat").read_text(encoding="ascii").rsplit(")", 1)[1].split()[0]
     except FileNotFoundError:
         return None
-
-
-def open_jobs(farm, jobs):
-    """Those of the jobs that are not known to be done. A failed one ends the test."""
-    left = []
-    for job in jobs:
-        if job.is_done:
-            continue
-        shown = farm.baton("job", "show", job.id, "--json", expect=None)
-        if shown.returncode != OK:
-            left.append(job)
-            continue
-        status = json.loads(shown.stdout)["status"]
-        check(status not in ("failed", "cancelled"), f"job {job.path.stem} is {status}:\n{shown.stdout[-1500:]}")
-        job.is_done = status == "done"
-        if not job.is_done:
-            left.append(job)
-    return left

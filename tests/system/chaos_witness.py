@@ -4,6 +4,7 @@ The proxy (tests/support/faulty_proxy.cpp) records every message about a lease b
 is judged here does not depend on the programs that are tried.
 """
 
+import datetime
 import re
 import subprocess
 import time
@@ -166,12 +167,25 @@ def check_nothing_revoked(seen, returns, struck_ms, ended_jobs):
         raise Fault(f"its report was never confirmed: {message}")
 
 
-def check_superseded_revoked(seen, struck_ms):
+def reopened(log):
+    """(job, time) of each line of the coordinator's log that says that finished tasks of a job are done again: the beginning
+    of its ID, and the record's milliseconds."""
+    offset_s, now, times = time.time() - time.monotonic(), datetime.datetime.now(), []
+    for hours, minutes, seconds, job in re.findall(r"^(\d\d):(\d\d):([\d.]+) .* job (\w+): \d+ finished tasks are done again",
+                                                   log, re.MULTILINE):
+        at = now.replace(hour=int(hours), minute=int(minutes), second=0, microsecond=0).timestamp() + float(seconds)
+        if at > now.timestamp() + 1:
+            at -= 24 * 3600
+        times.append((job, 1000 * (at - offset_s)))
+    return times
+
+
+def check_superseded_revoked(seen, struck_ms, reopenings):
     """A worker that says hello with a lease that has gone to another one loses it: a stale attempt is not accepted.
 
     Its report is confirmed all the same, so the lease must be revoked before. That the other worker kept its newer attempt
-    is known where it reported it and never lost it, and the task was not opened again: its attempt is the last. Returns how
-    many such leases there were."""
+    is known where it reported it and never lost it, and no task of the job was opened again since (reopened()): its attempt
+    is the last. Returns how many such leases there were."""
     done = {(message.task, message.attempt) for message in seen if message.type == "TaskDone"}
     revoked = {(message.task, message.attempt) for message in seen if message.type == "LeaseRevoke"}
     last = {message.task: message.attempt for message in seen if message.type == "LeaseGrant"}
@@ -191,7 +205,9 @@ def check_superseded_revoked(seen, struck_ms):
             stale.pop((message.worker, lease), None)
         elif message.type == "ReportReceived":
             hello = stale.pop((message.worker, lease), None)
-            if hello and not any(hello.ms <= ms <= message.ms for ms in struck_ms):
+            is_open_again = any(message.task[0].startswith(job) and newest[message.task].ms <= ms <= message.ms
+                                for job, ms in reopenings)
+            if hello and not is_open_again and not any(hello.ms <= ms <= message.ms for ms in struck_ms):
                 raise Fault(f"a stale attempt was accepted: {message}, after {hello}")
     return num_stale
 

@@ -66,14 +66,11 @@ Result<LoadedJobPtr> load_job_document(const JobDocument& document, const Machin
                 .digest = document.job,
                 .picture = parsed.picture,
                 .context = nullptr,
-                .states = std::make_shared<JobStates>(machine.memory.states)});
+                .states = std::make_shared<JobStates>(machine.memory.states),
+                .token = document.token});
   loaded->job.output.directory = here.job.output.directory;
   BATON_TRY(check_roots(here, machine.roots));
-  const Status seen = document.token.empty()
-                          ? Status()
-                          : expect_token(output_token_file(here.job.output.directory, document.job),
-                                         document.token);
-  if (!seen) {
+  if (const Status seen = expect_output_folder(*loaded); !seen) {
     loaded->unseen = seen.error().message;
     return LoadedJobPtr(std::move(loaded));
   }
@@ -85,6 +82,11 @@ Result<LoadedJobPtr> load_job_document(const JobDocument& document, const Machin
                make_render_context(here.job, parsed.picture, assets, machine.memory));
   loaded->scene_bytes = assets->size_bytes();
   return LoadedJobPtr(std::move(loaded));
+}
+
+Status expect_output_folder(const LoadedJob& loaded) {
+  if (loaded.token.empty()) return {};
+  return expect_token(output_token_file(loaded.job.output.directory, loaded.digest), loaded.token);
 }
 
 void JobEntry::provide(const JobDocument& document) {

@@ -35,6 +35,7 @@ struct LoadedJob {
   std::uint64_t scene_bytes = 0;
   /// What this machine does not see of the job, a line; then nothing of it is loaded.
   std::string unseen = {};
+  std::string token = {};  ///< JobDocument::token
 };
 
 using LoadedJobPtr = std::shared_ptr<const LoadedJob>;
@@ -54,6 +55,9 @@ struct Machine {
 /// the assets, and loads the scene, or shares it with a job on the shelf.
 Result<LoadedJobPtr> load_job_document(const JobDocument& document, const Machine& machine,
                                        AssetShelf& shelf);
+
+/// Whether the job's output folder is the one that the coordinator has marked.
+Status expect_output_folder(const LoadedJob& loaded);
 
 /// How long a file that cannot be read is waited for before the attempt counts as failed: a disk of
 /// another machine may be away for a moment.

@@ -125,6 +125,11 @@ Result<TaskResult> execute_queued(const QueuedTask& task, const std::stop_token&
   // Again for each frame: links may have changed.
   BATON_TRY(check_output_root(loaded->job, roots));
   if (key.kind == TaskKind::assemble) {
+    // So may what is mounted.
+    if (const Status seen = expect_output_folder(*loaded); !seen) {
+      notes.report(loaded->digest, {seen.error().message});
+      return TaskResult{.made = {}, .unseen = seen.error().message};
+    }
     Result<TaskResult> frame = execute_task(*loaded, *task.store, key, task.grant, stop);
     if (frame) frame->notes = notes.report(loaded->digest, frame->notes);
     return frame;

@@ -5,6 +5,7 @@
 #include <filesystem>
 #include <optional>
 #include <thread>
+#include <utility>
 
 #include "common/base/limits.h"
 #include "common/job/text/frame_range.h"
@@ -146,6 +147,7 @@ Result<ExitCode> wait(const JobOptions& options, RequestClient& client) {
   const Clock::time_point start = Clock::now();
   std::optional<Clock::time_point> last_answer;
   std::string job = options.job;  // once it is found, its ID: others may take its name
+  std::string told;               // what it waits for
   GrowingJob growing;
   for (;;) {
     const Result<JobDetail> answer = ask<JobDetail>(client, ShowJob{job});
@@ -174,9 +176,10 @@ Result<ExitCode> wait(const JobOptions& options, RequestClient& client) {
     }
     if (!is_open(detail.summary.status) || expired) {
       print_detail(detail, options.json);
-      return is_open(detail.summary.status) ? ExitCode::timeout
-                                            : exit_code_of(detail.summary.status);
+      return is_open(detail.summary.status) ? ExitCode::timeout : exit_code_of(detail);
     }
+    if (const std::string waits = std::exchange(told, detail.waits); waits != told && !told.empty())
+      fmt::print(stderr, "waits for {}\n", told);
     std::this_thread::sleep_for(kPollInterval);
   }
 }

@@ -31,8 +31,13 @@ Result<ExitCode> run_render(const RenderOptions& options) {
 
   const SignalWait signals;
   BATON_ASSIGN(RenderSession session, RenderSession::start(options, farm, signals));
-  BATON_ASSIGN(const std::optional<JobStatus> status,
-               session.render(job, options.restart || options.from_frame || wanted.is_look));
+  const Result<std::optional<JobStatus>> rendered =
+      session.render(job, options.restart || options.from_frame || wanted.is_look);
+  if (!rendered) {
+    session.stop();
+    return rendered.error();
+  }
+  const std::optional<JobStatus>& status = *rendered;
   if (status && options.keep_running) {
     fmt::print(stderr, "the coordinator still answers at {}; Ctrl-C ends it\n", session.endpoint());
     BATON_TRY(session.keep_running());

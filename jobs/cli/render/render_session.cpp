@@ -150,6 +150,7 @@ Result<std::optional<JobStatus>> RenderSession::render(JobSpec job, bool restart
     fmt::print(stderr, "{}: the job waits for {}\nto go on: the same command\n",
                status == JobStatus::paused ? "paused" : "stopped", detail->waits);
   std::fflush(stdout);
+  if (exit_code_of(*detail) == ExitCode::io) return Error{ErrorKind::io, detail->waits};
   return std::optional(status);
 }
 

@@ -53,7 +53,8 @@ class RenderSession {
   /// Renders a job whose motion and method are settled, with the sweeps that its quality asks for
   /// (sweeps.h), shows how it gets on, and prints what came of it. A job that the farm has goes on
   /// where it stopped. `interrupted` is asked now and then; nullopt when it says so, or when the
-  /// user asked to stop.
+  /// user asked to stop. An error, io, of a job that has failed since frames are not what it has
+  /// written.
   Result<std::optional<JobStatus>> render(
       JobSpec job, bool restart, const std::function<bool()>& interrupted = [] { return false; });
   /// Keeps the farm up until the user asks to stop. `meanwhile` is called now and then.

@@ -258,5 +258,39 @@ TEST_F(JournalTest, CountsTheBytesThatTheArchiveKeeps) {
   EXPECT_EQ(*journal.kept_bytes(), 0u);
 }
 
+// A journal of this version may come from a program that had no such tables.
+TEST_F(JournalTest, TablesThatCameLaterAreMadeWhenTheyAreMissing) {
+  {
+    Journal journal = open();
+    ASSERT_TRUE(journal.add_job(kJob, "{}").ok());
+    ASSERT_TRUE(journal.commit().ok());
+  }
+  {
+    SqlDatabase database = SqlDatabase::open(path).value();
+    for (const char* const table : {"frame_files", "output_marks"})
+      ASSERT_TRUE(database.execute(std::string("DROP TABLE ") + table).ok());
+  }
+  const FrameFile file{FrameIndex(3), digest_of("frame"), {100, 7, 123456789}};
+  {
+    Journal journal = open();
+    EXPECT_EQ(journal.jobs().value().size(), 1u) << "the job goes on";
+    EXPECT_TRUE(journal.frame_files(kJob).value().empty());
+    ASSERT_TRUE(journal.record_frame_file(kJob, {FrameIndex(3), digest_of("old"), {}}).ok());
+    ASSERT_TRUE(journal.record_frame_file(kJob, file).ok());
+    ASSERT_TRUE(journal.record_output_mark(kJob, true).ok());
+    ASSERT_TRUE(journal.commit().ok());
+  }
+  Journal journal = open();
+  const std::vector<FrameFile> files = journal.frame_files(kJob).value();
+  ASSERT_EQ(files.size(), 1u);
+  EXPECT_EQ(files[0].frame, file.frame);
+  EXPECT_EQ(files[0].digest, file.digest);
+  EXPECT_EQ(files[0].stamp, file.stamp);
+  EXPECT_EQ(journal.output_marks().value(), std::set<Digest>{kJob});
+  ASSERT_TRUE(journal.delete_job(kJob).ok());
+  EXPECT_TRUE(journal.frame_files(kJob).value().empty());
+  EXPECT_TRUE(journal.output_marks().value().empty());
+}
+
 }  // namespace
 }  // namespace baton

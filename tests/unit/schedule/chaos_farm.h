@@ -69,6 +69,9 @@ class ChaosFarm {
   std::size_t num_published() const { return num_published_; }
   std::size_t num_held_lost() const { return num_held_lost_; }
   std::size_t num_kept_frames() const { return num_kept_frames_; }
+  bool has_all_frames() const { return lost_frames_.empty(); }
+  /// Frames that were missed when all tasks were done.
+  std::size_t num_inspected_lost() const { return num_inspected_lost_; }
   std::size_t num_cuts() const { return num_cuts_; }
   const JobSpec& spec() const { return spec_; }
   /// Bytes of blobs that somebody needs, at most so far.
@@ -305,6 +308,17 @@ class ChaosFarm {
       std::visit([this](const auto& a) { on(a); }, action);
     }
     most_bytes_ = std::max(most_bytes_, scheduler_->store_bytes());
+    if (std::exchange(inspects_, false)) inspect();
+  }
+  /// What was lost is noticed now, but for a coordinator that restarts before.
+  void inspect() {
+    if (roll(10) == 0 && options_.restarts) return start_coordinator();
+    FramesInspected found{job_};
+    for (const TaskKey& frame : std::exchange(lost_frames_, {})) {
+      if (recorded_.contains(frame)) found.lost.push_back(frame);
+    }
+    num_inspected_lost_ += found.lost.size();
+    step(found);
   }
 
   void on(const RecordCompletion& a) {
@@ -335,6 +349,7 @@ class ChaosFarm {
   void check_own_loss(const RecordReopened& a) const;
   void on(const RecordFailure& a) { failures_.push_back(a.failure); }
   void on(const RecordJobStatus&) {}
+  void on(const InspectFrames&) { inspects_ = true; }
   void on(const GrantLease& a);
   void on(const RevokeLease& a) {
     if (const auto held = held_[a.worker].find(a.lease); held != held_[a.worker].end()) {
@@ -387,6 +402,8 @@ class ChaosFarm {
   std::set<Digest> kept_;  ///< blobs of jobs before this one
   std::size_t num_changes_ = 0, num_kept_frames_ = 0, num_cuts_ = 0;
   std::size_t num_removed_ = 0, num_missing_ = 0, num_lost_ = 0, num_reopened_ = 0, num_events_ = 0;
+  bool inspects_ = false;
+  std::size_t num_inspected_lost_ = 0;
   std::size_t num_held_ = 0, num_published_ = 0, num_held_lost_ = 0;
   std::uint64_t most_bytes_ = 0;
 };

@@ -147,7 +147,15 @@ class Farm {
       : spec_(std::move(spec)), scheduler(epoch, kSilence, store_limit), job(digest_of("job")) {}
 
   std::vector<Action> submit() { return step(JobAdded{job, spec_, JobStatus::running, {}, {}}); }
-  std::vector<Action> step(const Event& event) { return scheduler.step(event, now); }
+  /// Frames that are to be inspected are all there.
+  std::vector<Action> step(const Event& event) {
+    std::vector<Action> actions = scheduler.step(event, now);
+    for (const InspectFrames& all : all_of<InspectFrames>(actions)) {
+      const std::vector<Action> more = scheduler.step(FramesInspected{all.job}, now);
+      actions.insert(actions.end(), more.begin(), more.end());
+    }
+    return actions;
+  }
   std::vector<GrantLease> ask(const std::string& worker, int count) {
     return all_of<GrantLease>(step(WorkRequested{worker, count}));
   }

@@ -1,6 +1,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 
+#include "common/base/limits.h"
 #include "tests/unit/schedule/farm.h"
 
 /// Cancelled jobs, blobs that nobody needs, restarts of the coordinator.
@@ -194,6 +195,82 @@ TEST(SchedulerLifetime, AHundredThousandTasksAreNoTrouble) {
   farm.step(WorkerJoined{"a", {}});
   farm.work_off("a");
   EXPECT_EQ(farm.status(), JobStatus::done);
+}
+
+// The scheduler sees no file: it asks, and the answer ends the job, or opens it again.
+TEST_F(SchedulerTest, AJobIsDoneWhenItsFramesHaveBeenInspected) {
+  Scheduler& scheduler = farm.scheduler;
+  const auto step = [&](const Event& event) { return scheduler.step(event, farm.now); };
+  const auto finish_all = [&] {
+    std::size_t num_asked = 0;
+    for (int i = 0; i < 100; ++i) {
+      std::vector<Action> actions = step(WorkRequested{"a", 1});
+      const auto grants = all_of<GrantLease>(actions);
+      if (grants.empty()) break;
+      actions = step(TaskCompleted{
+          "a", grants[0].lease, {outputs_of(farm.spec(), farm.job, grants[0].lease.task)}});
+      num_asked += all_of<InspectFrames>(actions).size();
+    }
+    return num_asked;
+  };
+  EXPECT_EQ(finish_all(), 1u);
+  EXPECT_EQ(farm.status(), JobStatus::running);
+
+  // A frame is gone: its films are, too.
+  const auto reopened = all_of<RecordReopened>(step(FramesInspected{farm.job, {assemble(1)}, {}}));
+  ASSERT_THAT(reopened, SizeIs(1));
+  EXPECT_EQ(farm.progress().frames_done, 3u);
+  EXPECT_THAT(step(FramesInspected{farm.job}), IsEmpty()) << "an answer that is late";
+  EXPECT_EQ(finish_all(), 1u);
+  EXPECT_EQ(farm.status(), JobStatus::running);
+
+  // Paused meanwhile, it asks again when it goes on.
+  step(JobPaused{farm.job, "a folder"});
+  EXPECT_EQ(scheduler.waits_for(farm.job, farm.now), "a folder");
+  EXPECT_THAT(step(FramesInspected{farm.job}), IsEmpty());
+  EXPECT_THAT(all_of<InspectFrames>(step(JobResumed{farm.job})), SizeIs(1));
+  EXPECT_EQ(scheduler.waits_for(farm.job, farm.now), "");
+  const auto ends = all_of<RecordJobStatus>(step(FramesInspected{farm.job}));
+  ASSERT_THAT(ends, SizeIs(1));
+  EXPECT_EQ(ends[0].status, JobStatus::done);
+}
+
+TEST_F(SchedulerTest, AJobWithFramesOfOthersFails) {
+  Scheduler strict(1, kSilence);
+  JobAdded all{farm.job, farm.spec(), JobStatus::running, {}, {}};
+  const JobGraph graph(farm.spec());
+  for (TaskIndex task = 0; task < graph.num_tasks(); ++task)
+    all.completions.add(
+        {graph.key(task), outputs_of(farm.spec(), farm.job, graph.key(task)), {}, {}});
+  EXPECT_THAT(all_of<InspectFrames>(strict.step(all, farm.now)), SizeIs(1));
+  const auto ends =
+      all_of<RecordJobStatus>(strict.step(FramesInspected{farm.job, {}, "a frame"}, farm.now));
+  ASSERT_THAT(ends, SizeIs(1));
+  EXPECT_EQ(ends[0].status, JobStatus::failed);
+  EXPECT_EQ(strict.waits_for(farm.job, farm.now), "a frame");
+}
+
+// Somebody who takes frames away as they come is told, and not served for ever.
+TEST_F(SchedulerTest, AFrameThatIsLostTooOftenPausesItsJob) {
+  Farm own(small_job(1, 1, 1, false));
+  own.step(WorkerJoined{"a", {}});
+  int num_lost = 0;
+  std::vector<Action> actions =
+      own.scheduler.step(JobAdded{own.job, own.spec(), JobStatus::running, {}, {}}, own.now);
+  for (; own.status() == JobStatus::running && num_lost < 100; ++num_lost) {
+    for (int i = 0; i < 2; ++i) {
+      const auto grants = all_of<GrantLease>(own.scheduler.step(WorkRequested{"a", 1}, own.now));
+      ASSERT_THAT(grants, SizeIs(1));
+      own.scheduler.step(
+          TaskCompleted{
+              "a", grants[0].lease, {outputs_of(own.spec(), own.job, grants[0].lease.task)}},
+          own.now);
+    }
+    own.scheduler.step(FramesInspected{own.job, {assemble(0)}, {}}, own.now);
+  }
+  EXPECT_EQ(own.status(), JobStatus::paused);
+  EXPECT_EQ(num_lost, limits::kMaxTaskLosses);
+  EXPECT_THAT(own.scheduler.waits_for(own.job, own.now), testing::HasSubstr("lost 16 times"));
 }
 
 }  // namespace

@@ -35,7 +35,7 @@ std::uint32_t num_seeds() {
 
 TEST(SchedulerModel, EveryTaskIsDoneOnceWhateverHappens) {
   std::size_t num_missing = 0, num_lost = 0, num_reopened = 0, num_events = 0, num_left = 0;
-  std::size_t num_kept_frames = 0, num_cuts = 0;
+  std::size_t num_kept_frames = 0, num_cuts = 0, num_inspected_lost = 0;
   for (std::uint32_t seed = 1; seed <= num_seeds(); ++seed) {
     SCOPED_TRACE(testing::Message() << "seed " << seed);
     JobSpec spec = small_job(1 + static_cast<int>(seed % 5), 10, 1 + static_cast<int>(seed % 4),
@@ -58,6 +58,7 @@ TEST(SchedulerModel, EveryTaskIsDoneOnceWhateverHappens) {
       farm.advance(/*trouble=*/steps < 3000);
     EXPECT_EQ(farm.status(), JobStatus::done) << "after " << steps << " steps";
     EXPECT_EQ(farm.num_recorded(), farm.num_tasks());
+    EXPECT_TRUE(farm.has_all_frames());
     EXPECT_EQ(farm.progress().tasks_open, 0u);
     EXPECT_EQ(farm.progress().tasks_leased, 0u);
     EXPECT_GE(farm.num_removed() + farm.num_lost(), seed % 3 == 0 ? 4u : 0u)
@@ -71,12 +72,14 @@ TEST(SchedulerModel, EveryTaskIsDoneOnceWhateverHappens) {
     num_events += farm.num_events();
     num_kept_frames += farm.num_kept_frames();
     num_cuts += farm.num_cuts();
+    num_inspected_lost += farm.num_inspected_lost();
     if (testing::Test::HasFailure()) return;
   }
   RecordProperty("events", std::to_string(num_events));
   EXPECT_GT(num_left, num_seeds() / 2) << "the last states, until their jobs are deleted";
   EXPECT_GT(num_kept_frames, num_seeds() / 2) << "of changed jobs";
   EXPECT_GT(num_cuts, num_seeds() / 20) << "states of another tiling";
+  EXPECT_GT(num_inspected_lost, num_seeds() / 20) << "frames that were gone in the end";
   EXPECT_GT(num_lost, num_seeds());
   EXPECT_GT(num_reopened, num_seeds()) << "something was done again";
   EXPECT_GT(num_missing, num_seeds() / 50) << "alike blobs went between publishing and reporting";

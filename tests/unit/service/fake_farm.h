@@ -185,6 +185,18 @@ struct ServiceTest : testing::Test {
   JobDetail show(const std::string& endpoint, const Digest& id) {
     return ask<JobDetail>(endpoint, ShowJob{id.hex()});
   }
+  /// Once the frames of a job whose tasks are done have been looked at.
+  JobDetail show_after(JobStatus status, const std::string& endpoint, const Digest& id) {
+    JobDetail detail = show(endpoint, id);
+    for (const auto deadline = std::chrono::steady_clock::now() + kPatience;
+         detail.summary.status == status && std::chrono::steady_clock::now() < deadline;
+         detail = show(endpoint, id))
+      std::this_thread::sleep_for(10ms);
+    return detail;
+  }
+  JobDetail show_end(const std::string& endpoint, const Digest& id) {
+    return show_after(JobStatus::running, endpoint, id);
+  }
 };
 
 }  // namespace baton::testing_service

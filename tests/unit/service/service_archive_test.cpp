@@ -77,6 +77,7 @@ TEST_F(ServiceTest, ADoneJobShowsWhatItDidAndKeepsItsStates) {
     worker.say(LeaseRequest{0});
     worker.say(Heartbeat{});
     worker.expect<Heartbeat>();
+    show_end(service.endpoint(), id);
     EXPECT_THAT(ask<JobList>(service.endpoint(), ListJobs{}).jobs, SizeIs(0));
   }
   const RunningService service(options);
@@ -102,6 +103,7 @@ TEST_F(ServiceTest, MoreFramesGoOnFromTheStatesOfADoneJob) {
     for (int i = 0; i < kNumTasks; ++i) worker.do_one_task();
     worker.say(WorkerGoodbye{});
   }
+  show_end(service.endpoint(), id);
   JobSpec longer = job;
   for (const int frame : {5, 6}) longer.frames.emplace_back(frame);
   const auto accepted =
@@ -123,11 +125,11 @@ TEST_F(ServiceTest, MoreFramesGoOnFromTheStatesOfADoneJob) {
   worker.say(LeaseRequest{0});
   worker.say(Heartbeat{});
   worker.expect<Heartbeat>();
-  const JobDetail detail = show(service.endpoint(), accepted.job);
+  const JobDetail detail = show_end(service.endpoint(), accepted.job);
   EXPECT_EQ(detail.summary.status, JobStatus::done);
   EXPECT_EQ(detail.summary.stats.pixels, static_cast<std::uint64_t>(kNumTasks + 4))
       << "what the first job counted is its own, too";
-  EXPECT_EQ(show(service.endpoint(), id).summary.status, JobStatus::done);
+  EXPECT_EQ(show_end(service.endpoint(), id).summary.status, JobStatus::done);
   EXPECT_EQ(num_blobs(store()), 2u) << "the states of frame 4 went to the longer job";
 }
 

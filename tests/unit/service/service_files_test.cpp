@@ -29,6 +29,7 @@ TEST_F(ServiceTest, ADoneJobOfWhichAFrameIsGoneOrCutMakesThatFrameAgain) {
     worker.say(LeaseRequest{0});
     worker.say(Heartbeat{});
     worker.expect<Heartbeat>();
+    EXPECT_EQ(show_end(service.endpoint(), id).summary.status, JobStatus::done);
     EXPECT_TRUE(ask<JobAccepted>(service.endpoint(), SubmitJob{document}).already_there);
 
     if (cut) {
@@ -65,7 +66,7 @@ TEST_F(ServiceTest, AnOutputFolderBelongsToOneJob) {
   worker.say(LeaseRequest{0});
   worker.say(Heartbeat{});
   worker.expect<Heartbeat>();
-  EXPECT_EQ(show(service.endpoint(), second).summary.status, JobStatus::done);
+  EXPECT_EQ(show_end(service.endpoint(), second).summary.status, JobStatus::done);
   EXPECT_THAT(refused(service.endpoint(), SubmitJob{document}).message, HasSubstr("4 of 4 frames"));
   EXPECT_FALSE(ask<JobAccepted>(service.endpoint(), SubmitJob{document, true}).already_there);
   EXPECT_EQ(show(service.endpoint(), second).summary.status, JobStatus::cancelled);
@@ -151,6 +152,69 @@ TEST_F(ServiceTest, ADamagedBlobIsMadeAgainWithoutBlame) {
   const JobDetail detail = show(service.endpoint(), id);
   EXPECT_THAT(detail.failures, SizeIs(0));
   EXPECT_EQ(detail.summary.status, JobStatus::running);
+}
+
+// A bad sector, or something else in its place: as if it were damaged.
+TEST_F(ServiceTest, ABlobThatCannotBeReadIsMadeAgainWithoutBlame) {
+  std::string broken;
+  options.disk.digest = [&](const fs::path& path) -> Result<Digest> {
+    if (path == broken) return Error{ErrorKind::io, broken + ": cannot read: Input/output error"};
+    return digest_of_file(path);
+  };
+  for (const bool is_folder : {false, true}) {
+    options.work_dir = folder / (is_folder ? "work" : "other");
+    const RunningService service(options);
+    const Digest id = ask<JobAccepted>(service.endpoint(), SubmitJob{document}).job;
+    FakeWorker worker(service.endpoint(), store(), job);
+    worker.hello();
+    worker.say(LeaseRequest{1});
+    const TaskDone first = worker.work(worker.expect<LeaseGrant>().lease);
+    worker.say(first);
+    worker.say(LeaseRequest{2});
+    LeaseGrant reader = worker.expect<LeaseGrant>();
+    if (reader.inputs.empty()) reader = worker.expect<LeaseGrant>();
+    ASSERT_FALSE(reader.inputs.empty());
+    const fs::path blob = BlobStore::open(store())->path(reader.inputs[0].digest);
+    if (is_folder) {
+      fs::remove(blob);
+      fs::create_directories(blob / "full");
+    } else {
+      broken = blob;
+    }
+    worker.say(TaskFailed{reader.lease, "cannot read", true});
+    worker.say(LeaseRequest{2});
+    EXPECT_EQ(worker.expect<LeaseGrant>().lease.task, first.lease.task) << "made again";
+    EXPECT_FALSE(fs::exists(blob));
+    const JobDetail detail = show(service.endpoint(), id);
+    EXPECT_THAT(detail.failures, SizeIs(0));
+    EXPECT_EQ(detail.summary.status, JobStatus::running);
+  }
+}
+
+TEST_F(ServiceTest, ALostTokenOfTheStoreIsWrittenAgain) {
+  std::optional<RunningService> service(std::in_place, options);
+  const auto token = [&] {
+    const Result<std::string> text = read_text_file(store() / "token", 64);
+    return text ? *text : std::string("gone");
+  };
+  const std::string first = token();
+  for (const bool is_cut : {false, true}) {
+    if (is_cut) {
+      fs::resize_file(store() / "token", 0);
+    } else {
+      fs::remove(store() / "token");
+    }
+    FakeWorker worker(service->endpoint(), store(), job, is_cut ? "v" : "w");
+    worker.hello({}, is_cut ? 2 : 1);
+    EXPECT_EQ(worker.expect<WorkerWelcome>().token, first);
+    EXPECT_EQ(token(), first);
+  }
+
+  // It is the same after a restart: workers and output folders know it.
+  service.reset();
+  fs::remove(store() / "token");
+  service.emplace(options);
+  EXPECT_EQ(token(), first);
 }
 
 // What made an input is being done again while a reader of it is leased: the reader's failure is

@@ -54,7 +54,7 @@ struct SlowDiskTest : ServiceTest {
 
   void SetUp() override {
     ServiceTest::SetUp();
-    options.digest_file = [this](const fs::path& path) { return disk.digest(path); };
+    options.disk.digest = [this](const fs::path& path) { return disk.digest(path); };
   }
 
   static void sync(FakeWorker& worker) {
@@ -62,12 +62,20 @@ struct SlowDiskTest : ServiceTest {
     worker.say(Heartbeat{});
     worker.expect<Heartbeat>();
   }
-  /// Submits the job and does all of it, or but for some tasks.
+  /// Submits the job and does all of it, or but for some tasks. Its frames must be read then.
   Digest do_job(const std::string& endpoint, FakeWorker& worker, int num_open = 0) {
     const Digest id = ask<JobAccepted>(endpoint, SubmitJob{document}).job;
     worker.hello();
     for (int i = 0; i < kNumTasks - num_open; ++i) worker.do_one_task();
     sync(worker);
+    if (num_open == 0) {
+      EXPECT_EQ(show_end(endpoint, id).summary.status, JobStatus::done);
+    }
+    // Another time, so that only their bytes can tell whether they are those of the reports.
+    for (const auto& file : fs::directory_iterator(job.output.directory)) {
+      if (file.path().extension() == ".exr")
+        fs::last_write_time(file, file.last_write_time() + std::chrono::seconds(1));
+    }
     return id;
   }
 
@@ -136,7 +144,7 @@ TEST_F(SlowDiskTest, NothingHappensBeforeTheFramesAreRead) {
     const Slow slow(disk);
     EXPECT_EQ(refused(service.endpoint(), question).kind, ErrorKind::timeout);
     expect_alive(worker);
-    EXPECT_EQ(show(service.endpoint(), id).summary.status, JobStatus::done);
+    EXPECT_EQ(show_end(service.endpoint(), id).summary.status, JobStatus::done);
     EXPECT_THAT(ask<JobList>(service.endpoint(), ListJobs{}).jobs, SizeIs(0));
   }
   EXPECT_THAT(ask_until_done<JobAccepted>(service.endpoint(), question).plan,
@@ -155,7 +163,7 @@ TEST_F(SlowDiskTest, ASubmissionThatIsNotAnsweredLeavesNothing) {
     EXPECT_EQ(refused(service.endpoint(), SubmitJob{document}).kind, ErrorKind::timeout);
   }
   const RunningService service(options);
-  EXPECT_EQ(show(service.endpoint(), id).summary.status, JobStatus::done);
+  EXPECT_EQ(show_end(service.endpoint(), id).summary.status, JobStatus::done);
   EXPECT_FALSE(ask_until_done<JobAccepted>(service.endpoint(), SubmitJob{document}).already_there);
   EXPECT_THAT(show(service.endpoint(), id).frames_done, SizeIs(3));
 }
@@ -201,43 +209,56 @@ TEST_F(SlowDiskTest, NobodyWaitsForTheInputsOfAFailedAttempt) {
 /// A file of its own for each test.
 struct FileTableTest : ServiceTest {
   fs::path file = folder / "frame";
-  BlobRef recorded{BlobKind::image, 0, 0, digest_of("bytes"), 5};
+  BlobRef blob{BlobKind::film, 0, 0, digest_of("bytes"), 5};
+  BlobRef frame{BlobKind::image, 0, 0, digest_of("bytes"), 5};
   void write(const std::string& text) {
     ASSERT_TRUE(write_file_atomic(file, as_bytes_view(text)).ok());
   }
-  FileContent read() { return {file, *stamp_of(file), *digest_of_file(file)}; }
+  FileContent read() { return {file, *stamp_of(file), *digest_of_file(file), {}}; }
 };
 
 TEST_F(FileTableTest, AFileIsReadOnceAndAgainWhenItHasChanged) {
   FileTable table;
-  EXPECT_FALSE(table.must_be_read(file, recorded));
-  EXPECT_EQ(table.holds(file, recorded), false) << "it is not there";
+  EXPECT_EQ(table.judge(file, frame).state, FileState::absent);
   write("bytes");
-  EXPECT_TRUE(table.must_be_read(file, recorded));
-  EXPECT_EQ(table.holds(file, recorded), std::nullopt);
+  EXPECT_EQ(table.judge(file, frame).state, FileState::unknown);
   table.add(read());
-  EXPECT_FALSE(table.must_be_read(folder / "." / "frame", recorded));
-  EXPECT_EQ(table.holds(folder / "." / "frame", recorded), true);
+  EXPECT_EQ(table.judge(folder / "." / "frame", frame).state, FileState::right);
+  EXPECT_EQ(table.stamp_with(file, frame.digest), *stamp_of(file));
 
   // The same size, at the same time.
   const auto time = fs::last_write_time(file);
   write("other");
   fs::last_write_time(file, time);
-  EXPECT_TRUE(table.must_be_read(file, recorded)) << "another inode";
+  EXPECT_EQ(table.judge(file, frame).state, FileState::unknown) << "another inode";
   table.add(read());
-  EXPECT_EQ(table.holds(file, recorded), false);
+  EXPECT_EQ(table.judge(file, frame).state, FileState::damaged);
+  EXPECT_EQ(table.stamp_with(file, frame.digest), std::nullopt);
   write("longer");
-  EXPECT_FALSE(table.must_be_read(file, recorded));
-  EXPECT_EQ(table.holds(file, recorded), false) << "the size says it";
+  EXPECT_EQ(table.judge(file, blob).state, FileState::damaged) << "the size says it";
+  EXPECT_EQ(table.judge(file, frame).state, FileState::unknown) << "it may be a picture";
+  FileContent picture = read();
+  picture.writer = "somebody";
+  table.add(picture);
+  EXPECT_EQ(table.judge(file, frame).state, FileState::strange);
+  EXPECT_EQ(table.judge(file, frame).writer, "somebody");
 }
 
-TEST_F(FileTableTest, WhatCouldNotBeReadIsNeitherAndReadAnew) {
+TEST_F(FileTableTest, WhatCannotBeReadIsNeitherThereNorGone) {
   FileTable table;
   write("bytes");
-  table.add({file, *stamp_of(file), std::nullopt});
-  EXPECT_FALSE(table.must_be_read(file, recorded)) << "it was tried";
-  EXPECT_EQ(table.holds(file, recorded), std::nullopt);
-  EXPECT_TRUE(table.must_be_read(file, recorded));
+  FileContent content = read();
+  content.digest.reset();
+  content.fault = "frame: cannot read";
+  table.add(content);
+  EXPECT_EQ(table.judge(file, frame).state, FileState::unreadable);
+  EXPECT_EQ(table.judge(file, frame).fault, "frame: cannot read");
+  table.forget_unread();
+  EXPECT_EQ(table.judge(file, frame).state, FileState::unknown) << "read anew";
+  fs::remove(file);
+  fs::create_directories(file);
+  EXPECT_EQ(table.judge(file, frame).state, FileState::unreadable);
+  EXPECT_THAT(table.judge(file, frame).fault, HasSubstr("is a folder, expected a file"));
 }
 
 // One file of each in turn: the short request is done before the long one.
@@ -246,12 +267,12 @@ TEST_F(FileTableTest, AShortRequestDoesNotWaitForALongOne) {
   SlowDisk disk;
   disk.be(false);
   std::atomic<int> num_woken{0};
-  const auto digest = [&](const fs::path& path) { return disk.digest(path); };
-  FileReader reader(digest, [&] { ++num_woken; });
+  FileReader reader({.digest = [&](const fs::path& path) { return disk.digest(path); }},
+                    [&] { ++num_woken; });
   const ReadFor longer = Digest{1, 1}, shorter = LeaseId{};
-  ASSERT_TRUE(reader.request(longer, std::vector<fs::path>(5, file)));
+  ASSERT_TRUE(reader.request(longer, std::vector<FileToRead>(5, FileToRead{file})));
   ASSERT_TRUE(disk.has_begun());
-  ASSERT_TRUE(reader.request(shorter, {file, folder / "gone"}));
+  ASSERT_TRUE(reader.request(shorter, {{file}, {folder / "gone"}}));
   for (std::size_t i = 2; i < FileReader::kMaxRequests; ++i)
     ASSERT_TRUE(reader.request(longer, {}));
   EXPECT_FALSE(reader.request(longer, {})) << "the queue is full";
@@ -265,16 +286,52 @@ TEST_F(FileTableTest, AShortRequestDoesNotWaitForALongOne) {
       return read.reason == reason && read.contents.size() == size;
     });
   };
-  ASSERT_NE(place(shorter, 1), done.end()) << "what is gone is left out";
-  EXPECT_EQ(place(shorter, 1)->contents[0].digest, digest_of("bytes"));
-  EXPECT_LT(place(shorter, 1), place(longer, 5));
+  ASSERT_NE(place(shorter, 2), done.end());
+  EXPECT_EQ(place(shorter, 2)->contents[0].digest, digest_of("bytes"));
+  EXPECT_EQ(place(shorter, 2)->contents[1].stamp, std::nullopt) << "it is gone";
+  EXPECT_LT(place(shorter, 2), place(longer, 5));
   EXPECT_EQ(num_woken, static_cast<int>(FileReader::kMaxRequests));
+}
+
+// A frame that stands as it did at its report is not read.
+TEST_F(FileTableTest, OnlyWhatHasChangedIsRead) {
+  write("bytes");
+  std::atomic<int> num_read{0}, num_decoded{0};
+  FileReader reader({.digest =
+                         [&](const fs::path& path) {
+                           ++num_read;
+                           return digest_of_file(path);
+                         },
+                     .picture_writer = [&](const fs::path&) -> std::optional<std::string> {
+                       ++num_decoded;
+                       return "me";
+                     }},
+                    [] {});
+  const auto read_one = [&](const FileToRead& wanted) {
+    EXPECT_TRUE(reader.request(Digest{1, 1}, {wanted}));
+    for (;;) {
+      std::vector<FilesRead> done = reader.take();
+      if (!done.empty()) return done.at(0).contents.at(0);
+    }
+  };
+  const FileStamp stamp = stamp_of(file).value().value();
+  EXPECT_EQ(read_one({file, {frame.digest}, stamp}).digest, frame.digest);
+  EXPECT_EQ(num_read, 0);
+  FileStamp older = stamp;
+  --older.time_ns;
+  EXPECT_EQ(read_one({file, {frame.digest}, older}).writer, "");
+  EXPECT_EQ(num_read, 1);
+  EXPECT_EQ(num_decoded, 0);
+  EXPECT_EQ(read_one({file, {digest_of("others")}, stamp}).digest, digest_of("others"))
+      << "as long as it stands so";
+  EXPECT_EQ(read_one({file, {digest_of("others")}, older}).writer, "me");
+  EXPECT_EQ(num_decoded, 1);
 }
 
 TEST_F(FileTableTest, AReaderEndsWithRequestsInHand) {
   write("bytes");
-  FileReader reader(digest_of_file, [] {});
-  ASSERT_TRUE(reader.request(Digest{1, 1}, std::vector<fs::path>(100000, file)));
+  FileReader reader({}, [] {});
+  ASSERT_TRUE(reader.request(Digest{1, 1}, std::vector<FileToRead>(100000, FileToRead{file})));
 }
 
 }  // namespace

@@ -58,7 +58,7 @@ TEST_F(ServiceStoreTest, AStartRemovesWhatNoJobNeedsAndNothingElse) {
     EXPECT_FALSE(fs::exists(gone));
     EXPECT_EQ(show(service.endpoint(), id).summary.tasks_done, 2u);
     do_tasks(service.endpoint(), kNumTasks - 2);
-    EXPECT_EQ(show(service.endpoint(), id).summary.status, JobStatus::done);
+    EXPECT_EQ(show_end(service.endpoint(), id).summary.status, JobStatus::done);
   }
 
   // Of one that has ended its last states, which a longer job goes on from.

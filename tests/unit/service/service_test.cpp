@@ -42,7 +42,7 @@ TEST_F(ServiceTest, AJobGoesFromSubmissionToItsLastFrame) {
   worker.say(LeaseRequest{1});
   worker.expect<NoWork>();
 
-  const JobDetail detail = show(service.endpoint(), accepted.job);
+  const JobDetail detail = show_end(service.endpoint(), accepted.job);
   EXPECT_EQ(detail.summary.status, JobStatus::done);
   EXPECT_EQ(detail.summary.tasks_done, 8u);
   EXPECT_EQ(detail.summary.stats.pixels, 8u);
@@ -90,7 +90,7 @@ TEST_F(ServiceTest, ARestartedCoordinatorGoesOnWithWhatItsWorkersHold) {
   for (int i = 4; i < kNumTasks; ++i) EXPECT_NE(worker.do_one_task().task, held.task);
   worker.say(LeaseRequest{1});
   worker.expect<NoWork>();
-  EXPECT_EQ(show(service.endpoint(), id).summary.status, JobStatus::done);
+  EXPECT_EQ(show_end(service.endpoint(), id).summary.status, JobStatus::done);
   EXPECT_EQ(count_blobs(store()), 2u);
 }
 
@@ -189,7 +189,7 @@ TEST_F(ServiceTest, ACancelledJobGoesOnWhenItIsSubmittedAgain) {
   for (int i = 1; i < kNumTasks; ++i) worker.do_one_task();
   worker.say(LeaseRequest{1});
   worker.expect<NoWork>();
-  EXPECT_EQ(show(service.endpoint(), id).summary.status, JobStatus::done);
+  EXPECT_EQ(show_end(service.endpoint(), id).summary.status, JobStatus::done);
 }
 
 TEST_F(ServiceTest, ADeletedJobLeavesNeitherStatesNorALineOfTheJournal) {

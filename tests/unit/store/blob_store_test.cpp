@@ -188,5 +188,21 @@ TEST_F(BlobStoreTest, NamesBlobsAndJobFilesThatNobodyHasTouchedForLong) {
   EXPECT_TRUE(store.contains(young));
 }
 
+// What stands in a blob's place makes way.
+TEST_F(BlobStoreTest, AFolderInThePlaceOfABlobIsReplaced) {
+  BlobStore store = open();
+  const std::string text = "bytes";
+  const fs::path file = store.path(digest_of(text));
+  fs::create_directories(file / "full");
+  EXPECT_FALSE(store.contains(digest_of(text)));
+  EXPECT_FALSE(store.get(digest_of(text)).ok());
+  ASSERT_TRUE(store.put(as_bytes_view(text)).ok());
+  EXPECT_TRUE(store.get(digest_of(text)).ok());
+  fs::remove(file);
+  fs::create_directories(file / "full");
+  EXPECT_TRUE(store.remove(digest_of(text)).ok());
+  EXPECT_FALSE(fs::exists(file));
+}
+
 }  // namespace
 }  // namespace baton

@@ -1,0 +1,29 @@
+#include "common/base/file_stamp.h"
+
+#include <fmt/format.h>
+#include <sys/stat.h>
+
+#include <cerrno>
+#include <cstring>
+
+namespace baton {
+
+Result<std::optional<FileStamp>> stamp_of(const std::filesystem::path& path) {
+  struct stat status {};
+  if (::stat(path.c_str(), &status) != 0) {
+    if (errno == ENOENT || errno == ENOTDIR) return std::optional<FileStamp>();
+    return Error{ErrorKind::io, fmt::format("{}: {}", path.string(), std::strerror(errno))};
+  }
+  if (!S_ISREG(status.st_mode)) {
+    return Error{ErrorKind::bad_input,
+                 fmt::format("{}: is {}, expected a file", path.string(),
+                             S_ISDIR(status.st_mode) ? "a folder" : "no plain file")};
+  }
+  constexpr std::int64_t kNsPerSecond = 1'000'000'000;
+  return std::optional(
+      FileStamp{.size_bytes = static_cast<std::uint64_t>(status.st_size),
+                .inode = status.st_ino,
+                .time_ns = status.st_mtim.tv_sec * kNsPerSecond + status.st_mtim.tv_nsec});
+}
+
+}  // namespace baton

@@ -1,0 +1,69 @@
+#include <fmt/format.h>
+#include <spdlog/spdlog.h>
+
+#include "coordinator/service/frame_inspection.h"
+#include "coordinator/service/service.h"
+
+namespace baton {
+
+/// Remembers how the frame of an accepted report stands: as long as it stands so, it needs no
+/// reading.
+Status Service::keep_frame_file(const TaskDone& report, const ReportedFrame& frame) {
+  const Scheduler::Job* const job = farm_.scheduler.find_job(report.lease.job);
+  const auto task = job ? job->tasks.graph().find(report.lease.task) : std::nullopt;
+  if (!task || job->tasks.made().outputs(*task) != report.made.outputs) return {};
+  const FileStamp stamp = frame.stamp.value().value();
+  files_.add({frame.path, stamp, frame.digest, {}, std::string()});
+  return farm_.journal.record_frame_file(report.lease.job,
+                                         {report.lease.task.frame(), frame.digest, stamp});
+}
+
+/// A job whose output folder is another one than that which was marked is paused: what is missing
+/// there is not gone. Returns whether the folder is another one.
+Result<bool> Service::watch_folder(const Digest& job) {
+  const Scheduler::Job* const known = farm_.scheduler.find_job(job);
+  const std::optional<std::string> fault =
+      known == nullptr ? std::nullopt : farm_.lost_mark(job, known->spec);
+  if (fault) BATON_TRY(farm_.step(JobPaused{job, "its output folder: " + *fault}));
+  return fault.has_value();
+}
+
+/// Has the frames of jobs read that may be done; a full queue has room later.
+void Service::start_inspections() {
+  std::erase_if(farm_.to_inspect, [this](const Digest& digest) {
+    const Scheduler::Job* const job = farm_.scheduler.find_job(digest);
+    return job == nullptr || job->status != JobStatus::running ||
+           waits_->inspect({digest}, files_to_inspect(*job, files_));
+  });
+}
+
+/// Only here is a job done. One whose frames are read while it runs gets back what it lacks.
+Status Service::end_inspection(const FilesRead& read) {
+  const Digest digest = std::get<InspectionOf>(read.reason).job;
+  const Scheduler::Job* const job = farm_.scheduler.find_job(digest);
+  if (job == nullptr || job->status != JobStatus::running) return {};
+  BATON_ASSIGN(const InspectedFrames found, inspect_frames(*job, read.contents, farm_.journal));
+  if (found.is_stale) {
+    farm_.to_inspect.insert(digest);
+    return {};
+  }
+
+  // What is missing in another folder is not gone.
+  BATON_ASSIGN(const bool is_elsewhere, found.all_right() ? false : watch_folder(digest));
+  if (is_elsewhere) return {};
+  std::error_code error;
+  const std::filesystem::path& folder = job->spec.output.directory;
+  if (!found.lost.empty() && !std::filesystem::is_directory(folder, error))
+    return farm_.step(
+        JobPaused{digest, fmt::format("{}: the output folder is not there", folder.string())});
+  if (!found.unreadable.empty())
+    return farm_.step(JobPaused{digest, "a frame that can be read: " + found.unreadable});
+
+  for (const std::string& file : found.lost_files)
+    spdlog::warn("job {}: {} is gone, or not as it was written, and is made again",
+                 digest.short_hex(), file);
+  if (found.lost.empty() && job->tasks.book().counts().open > 0) return {};
+  return farm_.step(FramesInspected{digest, found.lost, strange_text(found.strange)});
+}
+
+}  // namespace baton

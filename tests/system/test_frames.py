@@ -1,0 +1,180 @@
+#!/usr/bin/env python3
+"""Frames and folders that are harmed while a job runs: "done" means that every frame is there and right, without another
+submission."""
+
+import re
+import time
+
+from farm import IO, OK, Farm, Process, check, check_equal, check_says, run_tests, wait_until
+from jobs import make_job, write_job
+
+FRAMES = 8
+
+
+def make(folder, **changes):
+    return write_job(folder / "job.json", make_job(folder, **{"frames": f"1-{FRAMES}", "image": {"tileSize": 32}, **changes}))
+
+
+def _undisturbed(programs, folder):
+    programs.render(make(folder / "witness"), folder / "witness/work", threads=2)
+    return programs.pixels(folder / "witness/frames")
+
+
+def frame(folder, number):
+    return folder / f"frames/frame.{number:04d}.exr"
+
+
+def begin(farm, folder, num_done=2):
+    """Submits the job and has its first frames made, then nobody works. Returns its ID."""
+    worker = farm.start_worker()
+    ident = farm.submit(make(folder))
+    wait_until(lambda: farm.show(ident)["framesDone"] >= num_done, "frames are done")
+    worker.terminate()
+    worker.wait()
+    check(farm.show(ident)["framesDone"] < FRAMES, "all was done too soon")
+    return ident
+
+
+def finish(farm, ident, expect=OK):
+    farm.start_worker()
+    return farm.baton("job", "wait", ident, expect=expect)
+
+
+def make_unreadable_picture(programs, path):
+    """Changes one byte so that not all pixels can be decoded."""
+    content = path.read_bytes()
+    for at in range(len(content) // 2, len(content)):
+        path.write_bytes(content[:at] + bytes([content[at] ^ 0x10]) + content[at + 1:])
+        if programs.run("exr_digest", path, expect=None).returncode != OK:
+            return
+    check(False, f"{path}: no byte makes it unreadable")
+
+
+def harmed_frames_are_made_again(programs, folder):
+    expected = _undisturbed(programs, folder)
+    harms = {"removed": lambda path: path.unlink(),
+             "cut": lambda path: path.write_bytes(path.read_bytes()[:1000]),
+             "emptied": lambda path: path.write_bytes(b""),
+             "no-picture": lambda path: path.write_text("not a picture", encoding="ascii"),
+             "damaged": lambda path: make_unreadable_picture(programs, path)}
+    for name, harm in harms.items():
+        place = folder / name
+        with Farm(programs, place / "farm") as farm:
+            ident = begin(farm, place)
+            harm(frame(place, 1))
+            finish(farm, ident)
+            shown = farm.show(ident)
+            check_equal((shown["status"], shown["framesDone"]), ("done", FRAMES), f"job whose frame was {name}")
+            check_says(farm.coordinator.log(), "frame.0001.exr is gone, or not as it was written, and is made again")
+        check_equal(programs.pixels(place / "frames"), expected, f"pixels after a frame was {name}")
+
+
+def a_frame_is_missed_after_a_restart(programs, folder):
+    expected = _undisturbed(programs, folder)
+    with Farm(programs, folder / "farm") as farm:
+        ident = begin(farm, folder)
+        farm.coordinator.kill()
+        frame(folder, 1).unlink()
+        make_unreadable_picture(programs, frame(folder, 2))
+        farm.start_coordinator()
+        finish(farm, ident)
+    check_equal(programs.pixels(folder / "frames"), expected, "pixels")
+
+
+def somebody_elses_picture_is_kept(programs, folder):
+    """The job fails, says which frame it is, and goes on only with --restart."""
+    expected = _undisturbed(programs, folder)
+    other = folder / "other"
+    programs.render(make(other, seed=77), other / "work", threads=2)
+    painted = frame(other, 2).read_bytes()
+    with Farm(programs, folder / "farm") as farm:
+        ident = begin(farm, folder)
+        frame(folder, 2).write_bytes(painted)
+        words = ["frame.0002.exr is not what was written", "--restart"]
+        check_says(finish(farm, ident, expect=IO).stdout, *words)
+        check_equal(farm.show(ident)["status"], "failed", "status")
+        for command in (["submit", folder / "job.json"], ["retry", ident]):
+            check_says(farm.baton("job", *command, expect=IO).stderr, *words)
+        check_equal(frame(folder, 2).read_bytes(), painted, "the other picture")
+        farm.baton("job", "submit", folder / "job.json", "--restart")
+        farm.wait_for(ident)
+    check_equal(programs.pixels(folder / "frames"), expected, "pixels")
+
+
+def render_says_what_is_wrong(programs, folder):
+    """The same of the one command: its exit code, and the way on."""
+    expected = _undisturbed(programs, folder)
+    other = folder / "other"
+    programs.render(make(other, seed=77), other / "work", threads=2)
+    path = make(folder, sampling={"numCandidates": 512, "numDistributions": 48})
+    command = [programs.path("baton"), "render", str(path), "--workers", "1", "--threads-per-worker", "1",
+               "--work-dir", str(folder / "work")]
+    running = Process(command, folder / "render.log")
+    wait_until(frame(folder, 1).exists, "the first frame is written")
+    time.sleep(0.3)  # until it is reported
+    frame(folder, 1).write_bytes(frame(other, 1).read_bytes())
+    check_equal(running.wait(), IO, "exit code")
+    check_says(running.log(), "frame.0001.exr is not what was written", "--restart")
+    check_says(programs.run("baton", *command[1:], expect=IO).stderr, "frame.0001.exr is not what was written")
+    programs.run("baton", *command[1:], "--restart")
+    check_equal(sorted(programs.pixels(folder / "frames")), sorted(expected), "frames")
+
+
+def another_folder_is_not_the_folder(programs, folder):
+    """Renamed, and an empty one in its place: the job pauses, and goes on when it is back."""
+    expected = _undisturbed(programs, folder)
+    for name in ("gone", "empty"):
+        place = folder / name
+        with Farm(programs, place / "farm") as farm:
+            ident = begin(farm, place)
+            (place / "frames").rename(place / "away")
+            if name == "empty":
+                (place / "frames").mkdir()
+            farm.start_worker()
+            shown = wait_until(lambda: (lambda s: s if s["status"] == "paused" else None)(farm.show(ident)), "it is paused")
+            check_says(shown["waits"], "its output folder", str(place / "frames"))
+            check(not list((place / "frames").glob("*.exr")), "frames went to the wrong folder")
+            for command in (["submit", place / "job.json"], ["resume", ident]):
+                check_says(farm.baton("job", *command, expect=IO).stderr, str(place / "frames"))
+            if name == "empty":
+                (place / "frames").rmdir()
+            (place / "away").rename(place / "frames")
+            farm.baton("job", "resume", ident)
+            farm.wait_for(ident)
+        check_equal(programs.pixels(place / "frames"), expected, f"pixels, {name}")
+        check(not list((place / "frames").glob(".baton-*")), "the mark stays")
+
+
+def a_lost_folder_is_made_again_on_demand(programs, folder):
+    expected = _undisturbed(programs, folder)
+    with Farm(programs, folder / "farm") as farm:
+        ident = begin(farm, folder)
+        (folder / "frames").rename(folder / "away")
+        farm.start_worker()
+        wait_until(lambda: farm.show(ident)["status"] == "paused", "it is paused")
+        farm.baton("job", "submit", folder / "job.json", "--restart")
+        farm.wait_for(ident)
+    check_equal(programs.pixels(folder / "frames"), expected, "pixels")
+
+
+def a_frame_that_cannot_be_read_pauses_the_job(programs, folder):
+    """A folder in its place, and another frame that is gone: neither counts as there."""
+    expected = _undisturbed(programs, folder)
+    with Farm(programs, folder / "farm") as farm:
+        ident = begin(farm, folder)
+        for number in (1, 2):
+            frame(folder, number).unlink()
+        frame(folder, 1).mkdir()
+        farm.start_worker()
+        shown = wait_until(lambda: (lambda s: s if s["status"] == "paused" else None)(farm.show(ident)), "it is paused")
+        check_says(shown["waits"], "frame.0001.exr: is a folder, expected a file")
+        for command in (["submit", folder / "job.json"], ["resume", ident]):
+            check_says(farm.baton("job", *command, expect=IO).stderr, "frame.0001.exr: is a folder")
+        frame(folder, 1).rmdir()
+        farm.baton("job", "resume", ident)
+        farm.wait_for(ident)
+    check_equal(programs.pixels(folder / "frames"), expected, "pixels")
+
+
+if __name__ == "__main__":
+    run_tests()

@@ -1,0 +1,253 @@
+#include <gmock/gmock.h>
+
+#include <fstream>
+
+#include "coordinator/service/service.h"
+#include "tests/unit/service/fake_farm.h"
+
+/// Frames that were reported, and are gone or others before their job is done.
+namespace baton {
+namespace {
+
+using namespace testing_service;
+using testing::ElementsAre;
+using testing::HasSubstr;
+using testing::SizeIs;
+
+/// A file that begins so is a whole picture; the rest names the job that wrote it.
+constexpr std::string_view kPicture = "picture of ";
+
+struct FramesTest : ServiceTest {
+  std::atomic<int> num_read{0};
+  std::string broken;  ///< file name of a frame that gives an error when it is read
+
+  void SetUp() override {
+    ServiceTest::SetUp();
+    options.disk.digest = [this](const fs::path& path) -> Result<Digest> {
+      if (path.filename() == broken)
+        return Error{ErrorKind::io, path.string() + ": cannot read: Input/output error"};
+      if (path.extension() == ".exr") ++num_read;
+      return digest_of_file(path);
+    };
+    options.disk.picture_writer = [](const fs::path& path) -> std::optional<std::string> {
+      const std::string text = read_text_file(path, 1 << 20).value();
+      if (!text.starts_with(kPicture)) return std::nullopt;
+      return text.substr(kPicture.size());
+    };
+  }
+
+  fs::path frame(int number) const {
+    return fs::path(job.output.directory) / ("frame.000" + std::to_string(number) + ".exr");
+  }
+  void put(int number, const std::string& text) const {
+    ASSERT_TRUE(write_file_atomic(frame(number), as_bytes_view(text)).ok());
+  }
+  fs::path mark(const Digest& id) const {
+    return fs::path(job.output.directory) / (".baton-" + id.short_hex());
+  }
+
+  /// Submits the job, has its folder marked, and does all but its last task.
+  Digest begin(const std::string& endpoint, FakeWorker& worker) {
+    const Digest id = ask<JobAccepted>(endpoint, SubmitJob{document}).job;
+    worker.hello();
+    worker.say(JobDocumentRequest{id});
+    EXPECT_FALSE(worker.expect<JobDocument>().token.empty());
+    for (int i = 0; i < kNumTasks - 1; ++i) worker.do_one_task();
+    sync(worker);
+    return id;
+  }
+  /// Does what there is, until the job has ended.
+  JobDetail finish(const std::string& endpoint, FakeWorker& worker, const Digest& id) {
+    for (const auto deadline = std::chrono::steady_clock::now() + kPatience;
+         std::chrono::steady_clock::now() < deadline;) {
+      const JobDetail detail = show(endpoint, id);
+      if (detail.summary.status != JobStatus::running) return detail;
+      worker.say(Heartbeat{});
+      if (detail.summary.tasks_done == detail.summary.tasks_total) continue;
+      worker.do_one_task();
+      sync(worker);
+    }
+    ADD_FAILURE() << "the job does not end";
+    return show(endpoint, id);
+  }
+  static void sync(FakeWorker& worker) {
+    worker.say(LeaseRequest{0});
+    worker.say(Heartbeat{});
+    worker.expect<Heartbeat>();
+  }
+};
+
+TEST_F(FramesTest, WhatIsGoneCutOrDamagedIsMadeAgainBeforeTheJobIsDone) {
+  const RunningService service(options);
+  FakeWorker worker(service.endpoint(), store(), job);
+  const std::string image = "image of seed " + std::to_string(job.seed);
+  for (const std::string harm : {"gone", "cut", "changed", "none"}) {
+    SCOPED_TRACE(harm);
+    ask<JobList>(service.endpoint(), ListJobs{});
+    const Digest id = begin(service.endpoint(), worker);
+    if (harm == "gone") fs::remove(frame(1));
+    if (harm == "cut") fs::resize_file(frame(1), 3);
+    if (harm == "changed") put(1, "imagE" + image.substr(5));
+    const JobDetail detail = finish(service.endpoint(), worker, id);
+    EXPECT_EQ(detail.summary.status, JobStatus::done);
+    EXPECT_EQ(detail.summary.frames_done, 4u);
+    for (int number = 1; number <= 4; ++number)
+      EXPECT_EQ(read_text_file(frame(number), 100).value(), image);
+    EXPECT_EQ(num_read, harm == "gone" || harm == "none" ? 0 : 1) << "only what has changed";
+    EXPECT_FALSE(fs::exists(mark(id)));
+    num_read = 0;
+    ask<JobList>(service.endpoint(), DeleteJob{id.hex()});
+    fs::remove_all(job.output.directory);
+  }
+}
+
+// Whatever happens between the last report and the end.
+TEST_F(FramesTest, ACoordinatorThatEndsWhileItLooksLooksAgain) {
+  Digest id;
+  {
+    const RunningService service(options);
+    FakeWorker worker(service.endpoint(), store(), job);
+    id = begin(service.endpoint(), worker);
+  }
+  fs::remove(frame(2));
+  fs::resize_file(frame(3), 3);
+  const RunningService service(options);
+  FakeWorker worker(service.endpoint(), store(), job);
+  worker.hello();
+  EXPECT_EQ(finish(service.endpoint(), worker, id).summary.status, JobStatus::done);
+  EXPECT_TRUE(fs::exists(frame(2)));
+  EXPECT_GT(fs::file_size(frame(3)), 3u);
+  EXPECT_EQ(num_read, 1) << "how the others stood is in the journal";
+}
+
+TEST_F(FramesTest, ThePictureOfSomebodyElseIsKeptAndTheJobFails) {
+  const RunningService service(options);
+  FakeWorker worker(service.endpoint(), store(), job);
+  const Digest id = begin(service.endpoint(), worker);
+  put(2, std::string(kPicture));
+  JobDetail detail = finish(service.endpoint(), worker, id);
+  EXPECT_EQ(detail.summary.status, JobStatus::failed);
+  EXPECT_THAT(detail.waits, HasSubstr("frame.0002.exr is not what was written"));
+  EXPECT_THAT(detail.waits, HasSubstr("--restart"));
+  EXPECT_EQ(read_text_file(frame(2), 100).value(), kPicture);
+
+  // It stays until somebody says otherwise; and the same picture with other settings keeps it, too.
+  JobSpec urgent = job;
+  urgent.priority = 7;
+  for (const std::string& again : {document, make_job_document(urgent).value()}) {
+    const Error refusal = refused(service.endpoint(), SubmitJob{again});
+    EXPECT_EQ(refusal.kind, ErrorKind::io);
+    EXPECT_THAT(refusal.message, HasSubstr("frame.0002.exr is not what was written"));
+  }
+  EXPECT_EQ(read_text_file(frame(2), 100).value(), kPicture);
+  EXPECT_EQ(ask<JobAccepted>(service.endpoint(), SubmitJob{document, true}).job, id);
+  detail = finish(service.endpoint(), worker, id);
+  EXPECT_EQ(detail.summary.status, JobStatus::done);
+  EXPECT_THAT(read_text_file(frame(2), 100).value(), HasSubstr("image of seed"));
+}
+
+// Its worker was late: the header names a job that has not reported the frame.
+TEST_F(FramesTest, ThePictureOfAFormerJobOfTheFolderIsMadeAgain) {
+  const RunningService service(options);
+  JobSpec urgent = job;
+  urgent.priority = 7;
+  const Digest former =
+      ask<JobAccepted>(service.endpoint(), SubmitJob{make_job_document(urgent).value()}).job;
+  FakeWorker worker(service.endpoint(), store(), job);
+  const Digest id = begin(service.endpoint(), worker);
+  put(2, std::string(kPicture) + former.hex());
+  EXPECT_EQ(finish(service.endpoint(), worker, id).summary.status, JobStatus::done);
+  EXPECT_THAT(read_text_file(frame(2), 100).value(), HasSubstr("image of seed"));
+}
+
+TEST_F(FramesTest, AFolderThatLostItsMarkIsNotTheFolder) {
+  const fs::path out = job.output.directory, away = out.string() + ".away";
+  const RunningService service(options);
+  FakeWorker worker(service.endpoint(), store(), job);
+  const Digest id = begin(service.endpoint(), worker);
+  fs::rename(out, away);
+  JobDetail detail = finish(service.endpoint(), worker, id);
+  EXPECT_EQ(detail.summary.status, JobStatus::paused);
+  EXPECT_EQ(detail.summary.tasks_done, 7u) << "nothing is taken for lost, or for written";
+  EXPECT_THAT(detail.waits, HasSubstr(out.string()));
+  EXPECT_THAT(detail.waits, HasSubstr("is gone from it"));
+  worker.say(JobDocumentRequest{id});
+  worker.expect<JobDocument>();
+  EXPECT_FALSE(fs::exists(mark(id))) << "not made anew";
+  EXPECT_THAT(refused(service.endpoint(), ResumeJob{id.hex()}).message, HasSubstr("stays paused"));
+  const Error refusal = refused(service.endpoint(), SubmitJob{document});
+  EXPECT_EQ(refusal.kind, ErrorKind::io);
+  EXPECT_THAT(refusal.message, HasSubstr("is gone from it"));
+
+  // It is back.
+  fs::remove_all(out);
+  EXPECT_THAT(refused(service.endpoint(), ResumeJob{id.hex()}).message, HasSubstr("is not there"));
+  fs::rename(away, out);
+  EXPECT_EQ(ask<JobDetail>(service.endpoint(), ResumeJob{id.hex()}).summary.status,
+            JobStatus::running);
+  EXPECT_EQ(finish(service.endpoint(), worker, id).summary.status, JobStatus::done);
+  for (int number = 1; number <= 4; ++number) EXPECT_TRUE(fs::exists(frame(number)));
+}
+
+// Frames without a mark are proof enough; no frames are none, but to whoever says --restart.
+TEST_F(FramesTest, OnlyAFolderWithAllFramesIsMarkedAgain) {
+  const RunningService service(options);
+  FakeWorker worker(service.endpoint(), store(), job);
+  const Digest id = begin(service.endpoint(), worker);
+  fs::remove(mark(id));
+  EXPECT_EQ(finish(service.endpoint(), worker, id).summary.status, JobStatus::paused);
+  EXPECT_EQ(ask<JobDetail>(service.endpoint(), ResumeJob{id.hex()}).summary.status,
+            JobStatus::running);
+  EXPECT_TRUE(fs::exists(mark(id)));
+  fs::remove(mark(id));
+  fs::remove(frame(1));
+  EXPECT_EQ(finish(service.endpoint(), worker, id).summary.status, JobStatus::paused);
+  EXPECT_THAT(refused(service.endpoint(), ResumeJob{id.hex()}).message, HasSubstr("stays paused"));
+  ask<JobAccepted>(service.endpoint(), SubmitJob{document, true});
+  EXPECT_EQ(finish(service.endpoint(), worker, id).summary.status, JobStatus::done);
+  EXPECT_TRUE(fs::exists(frame(1)));
+}
+
+TEST_F(FramesTest, AnotherFolderIsFoundOutAtTheStart) {
+  const fs::path out = job.output.directory, away = out.string() + ".away";
+  Digest id;
+  {
+    const RunningService service(options);
+    FakeWorker worker(service.endpoint(), store(), job);
+    id = begin(service.endpoint(), worker);
+  }
+  fs::rename(out, away);
+  fs::create_directories(out);
+  const RunningService service(options);
+  const JobDetail detail = show(service.endpoint(), id);
+  EXPECT_EQ(detail.summary.status, JobStatus::paused);
+  EXPECT_EQ(detail.summary.tasks_done, 7u);
+  EXPECT_THAT(detail.waits, HasSubstr("is gone from it"));
+}
+
+TEST_F(FramesTest, AThousandFramesAreLookedAtInNoTime) {
+  job.frames.clear();
+  for (int number = 1; number <= 1000; ++number) job.frames.emplace_back(number);
+  job.state.carry = false;
+  job.image.tile_size = 16;
+  document = make_job_document(job).value();
+  const RunningService service(options);
+  FakeWorker worker(service.endpoint(), store(), job);
+  const Digest id = ask<JobAccepted>(service.endpoint(), SubmitJob{document}).job;
+  worker.hello();
+  constexpr int kAtOnce = 50;
+  const std::uint64_t num_tasks = show(service.endpoint(), id).summary.tasks_total;
+  ASSERT_EQ(num_tasks % kAtOnce, 0u);
+  for (std::uint64_t i = 0; i < num_tasks / kAtOnce; ++i) {
+    worker.say(LeaseRequest{kAtOnce});
+    for (int k = 0; k < kAtOnce; ++k) worker.say(worker.work(worker.expect<LeaseGrant>().lease));
+  }
+  const auto last = std::chrono::steady_clock::now();
+  sync(worker);
+  EXPECT_EQ(show_end(service.endpoint(), id).summary.status, JobStatus::done);
+  EXPECT_LT(std::chrono::steady_clock::now() - last, with_patience(2s));
+  EXPECT_EQ(num_read, 0);
+}
+
+}  // namespace
+}  // namespace baton
