@@ -41,8 +41,8 @@ class Desk:
         shutil.copy(CUBE, folder / "cube.obj")
         grey_map(folder / "sky.hdr", 4, 2)
 
-    def baton(self, *arguments):
-        environment = {k: v for k, v in os.environ.items() if not k.startswith("BATON_")}
+    def baton(self, *arguments, **variables):
+        environment = {k: v for k, v in os.environ.items() if not k.startswith("BATON_")} | variables
         return subprocess.run([self.program, *map(str, arguments)], cwd=self.folder, env=environment, capture_output=True,
                               text=True, timeout=DEADLINE_S, check=False)
 
@@ -83,6 +83,37 @@ def wrong_command_lines(programs, folder):
              "tcp://127.0.0.1:1: no coordinator listens there"),
             (["check", "missing.json"], BAD_INPUT, "missing.json: no such file")]:
         desk.expect(code, *words, says=says)
+
+
+def command_help(desk, command=()):
+    """Every command with its --help, by walking the table."""
+    text = desk.baton(*command, "--help").stdout
+    names = re.findall(r"^  ([a-z]+)  ", text.partition("Subcommands:")[2].partition("\n\n")[0], re.MULTILINE)
+    yield command, text
+    for name in names:
+        yield from command_help(desk, (*command, name))
+
+
+def what_is_typed_beats_the_environment(programs, folder):
+    """Siblings must not hand each other what the environment says: a key of the environment acted in place of the one that was typed."""
+    desk, seen = Desk(programs, folder), 0
+    job = str(desk.job())
+    for command, text in command_help(desk):
+        usage = re.search(r"^Usage: .*$", text, re.MULTILINE)[0]
+        if "--key" not in text or "--coordinator" not in text or command == ("farm", "slurm"):  # which asks Slurm first
+            continue
+        seen += 1
+        words = [*command, *([job] if " JOB" in usage else ["name"] if re.search(r" (ID|NAME)\b", usage) else [])]
+        typed = desk.baton(*words, "--key", "typed.key", BATON_KEY="environment.key")
+        check_says(typed.stderr, "typed.key")
+        check("environment.key" not in typed.stderr, f"{command} reads the key of the environment: {typed.stderr}")
+        alone = desk.baton(*words, BATON_KEY="environment.key")
+        check_says(alone.stderr, "environment.key")
+        typed = desk.baton(*words, "--coordinator", "typed://here", BATON_COORDINATOR="environment://here")
+        check_says(typed.stderr, "typed://here")
+        alone = desk.baton(*words, BATON_COORDINATOR="environment://here")
+        check_says(alone.stderr, "environment://here")
+    check(seen >= 13, f"only {seen} commands ask a coordinator")
 
 
 def job_faults_come_all_at_once(programs, folder):

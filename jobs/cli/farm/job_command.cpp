@@ -274,7 +274,6 @@ Result<ExitCode> run_job(const JobOptions& options, Action action) {
 }  // namespace
 
 void add_job_command(CLI::App& app, ExitCode& code) {
-  auto options = std::make_shared<JobOptions>();
   CLI::App* job = app.add_subcommand("job", "Submits jobs to a coordinator and looks after them");
   job->require_subcommand(1);
   job->footer(
@@ -283,8 +282,12 @@ void add_job_command(CLI::App& app, ExitCode& code) {
       "  baton job wait 3f2a --timeout 600 && echo done\n"
       "An ID is the digest that submit prints, its beginning, or the name of a job.");
 
-  const auto add = [&](const char* name, const char* what, const char* argument, Action action) {
+  // No two commands share an option: CLI11 reads the environment for those that were not called,
+  // too.
+  const auto add = [&](const char* name, const char* what, const char* argument,
+                       Action action) -> std::pair<CLI::App*, JobOptions*> {
     CLI::App* command = job->add_subcommand(name, what);
+    auto options = std::make_shared<JobOptions>();
     if (argument == std::string("JOB")) {
       add_job_argument(*command, options->wanted);
     } else if (!std::string(argument).empty()) {
@@ -295,37 +298,42 @@ void add_job_command(CLI::App& app, ExitCode& code) {
     command->add_flag("--json", options->json, "for machines");
     command->callback(
         [options, action, &code] { code = finish_with_coordinator(run_job(*options, action)); });
-    return command;
+    return {command, options.get()};
   };
-  CLI::App* hand_in = add("submit", "Hands a job over; prints its ID", "JOB", submit);
-  hand_in->add_flag("--restart", options->restart,
+  const auto [hand_in, submission] =
+      add("submit", "Hands a job over; prints its ID", "JOB", submit);
+  hand_in->add_flag("--restart", submission->restart,
                     "replace the frames of another picture in the output folder");
-  add_from_frame_option(*hand_in, options->from_frame);
-  add("list", "The jobs of the coordinator that have not ended", "", list)
-      ->add_flag("--all", options->all, "also those that have ended");
+  add_from_frame_option(*hand_in, submission->from_frame);
+  const auto [lists, wanted] =
+      add("list", "The jobs of the coordinator that have not ended", "", list);
+  lists->add_flag("--all", wanted->all, "also those that have ended");
   add("show", "One job: progress, statistics, failures", "ID", show);
   add("pause", "Hands out no more of a job's tasks; those that run are finished", "ID",
       change<PauseJob>);
   add("resume", "Goes on with a paused job", "ID", change<ResumeJob>);
   add("cancel", "Ends a job; finished frames stay", "ID", change<CancelJob>);
   add("retry", "Goes on with a failed or cancelled job where it stopped", "ID", retry);
-  add("refine",
-      "Adds rounds to a job: its frames become the mean of those and of the new ones; prints the "
-      "new ID",
-      "ID", refine)
-      ->add_option("--rounds", options->rounds,
+  const auto [refines, refinement] =
+      add("refine",
+          "Adds rounds to a job: its frames become the mean of those and of the new ones; prints "
+          "the new ID",
+          "ID", refine);
+  refines
+      ->add_option("--rounds", refinement->rounds,
                    "a multiple of the job's quality.rounds; default: as many")
       ->check(CLI::Range(1, limits::kMaxRounds));
-  CLI::App* remove =
+  const auto [removes, removal] =
       add("delete", "Forgets a job that has ended, and removes the states that it left", "",
           delete_jobs);
-  remove->add_option("ID", options->job, "job: its name, its ID, or the beginning of that");
-  remove->add_flag("--ended", options->all_ended, "every job that has ended");
-  add("wait",
-      "Returns when the job has ended, with its exit code; adds the sweeps that the job's "
-      "quality.noiseThreshold asks for; outlasts a restart of the coordinator",
-      "ID", wait)
-      ->add_option("--timeout", options->timeout_s, "seconds; default: as long as it takes")
+  removes->add_option("ID", removal->job, "job: its name, its ID, or the beginning of that");
+  removes->add_flag("--ended", removal->all_ended, "every job that has ended");
+  const auto [waits, patience] =
+      add("wait",
+          "Returns when the job has ended, with its exit code; adds the sweeps that the job's "
+          "quality.noiseThreshold asks for; outlasts a restart of the coordinator",
+          "ID", wait);
+  waits->add_option("--timeout", patience->timeout_s, "seconds; default: as long as it takes")
       ->check(CLI::Range(0.0, 1e9));
 }
 

@@ -36,7 +36,6 @@ Result<ExitCode> ask_for_workers(const WorkerCommandOptions& options, const Mess
 }  // namespace
 
 void add_worker_command(CLI::App& app, ExitCode& code) {
-  auto options = std::make_shared<WorkerCommandOptions>();
   CLI::App* worker = app.add_subcommand("worker", "Looks after the workers of a coordinator");
   worker->require_subcommand(1);
   worker->footer(
@@ -44,19 +43,23 @@ void add_worker_command(CLI::App& app, ExitCode& code) {
       "  baton worker list --coordinator tcp://farm:5570\n"
       "  baton worker drain node7-1234        before its machine goes down");
 
-  CLI::App* list = worker->add_subcommand("list", "All connected workers and what they hold");
-  CLI::App* drain = worker->add_subcommand(
-      "drain", "Lets a worker finish what it renders, then end; its other tasks go to others");
-  drain->add_option("NAME", options->worker_id, "as listed")->required();
-  for (CLI::App* command : {list, drain}) {
+  // No two commands share an option: see add_job_command().
+  const auto add = [&](const char* name, const char* what, auto question) {
+    CLI::App* command = worker->add_subcommand(name, what);
+    auto options = std::make_shared<WorkerCommandOptions>();
     add_coordinator_options(*command, options->link);
     command->add_flag("--json", options->json, "for machines");
-  }
-  list->callback(
-      [options, &code] { code = finish_with_coordinator(ask_for_workers(*options, ListJobs{})); });
-  drain->callback([options, &code] {
-    code = finish_with_coordinator(ask_for_workers(*options, DrainWorker{options->worker_id}));
-  });
+    command->callback([options, question, &code] {
+      code = finish_with_coordinator(ask_for_workers(*options, question(*options)));
+    });
+    return std::pair(command, options.get());
+  };
+  add("list", "All connected workers and what they hold",
+      [](const WorkerCommandOptions&) { return ListJobs{}; });
+  const auto [drain, drained] =
+      add("drain", "Lets a worker finish what it renders, then end; its other tasks go to others",
+          [](const WorkerCommandOptions& options) { return DrainWorker{options.worker_id}; });
+  drain->add_option("NAME", drained->worker_id, "as listed")->required();
 }
 
 }  // namespace baton

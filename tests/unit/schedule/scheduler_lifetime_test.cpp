@@ -240,8 +240,7 @@ TEST_F(SchedulerTest, AJobWithFramesOfOthersFails) {
   JobAdded all{farm.job, farm.spec(), JobStatus::running, {}, {}};
   const JobGraph graph(farm.spec());
   for (TaskIndex task = 0; task < graph.num_tasks(); ++task)
-    all.completions.add(
-        {graph.key(task), {outputs_of(farm.spec(), farm.job, graph.key(task))}});
+    all.completions.add({graph.key(task), {outputs_of(farm.spec(), farm.job, graph.key(task))}});
   EXPECT_THAT(all_of<InspectFrames>(strict.step(all, farm.now)), SizeIs(1));
   const auto ends =
       all_of<RecordJobStatus>(strict.step(FramesInspected{farm.job, {}, "a frame"}, farm.now));
