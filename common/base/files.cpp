@@ -5,10 +5,12 @@
 #include <unistd.h>
 
 #include <algorithm>
-#include <atomic>
 #include <cctype>
 #include <cerrno>
 #include <cstring>
+#include <random>
+#include <string>
+#include <utility>
 
 #include "common/base/file_descriptor.h"
 #include "common/base/limits.h"
@@ -100,55 +102,82 @@ Result<std::string> read_text_file(const fs::path& path, std::uint64_t max_size_
   return read_whole<std::string>(path, max_size_bytes);
 }
 
-fs::path temporary_sibling(const fs::path& path) {
-  static std::atomic<std::uint64_t> counter{0};
-  fs::path temporary = path;
-  temporary.replace_filename(
-      fmt::format(".{}.{}.{}.tmp", path.filename().string(), ::getpid(), counter.fetch_add(1)));
-  return temporary;
-}
-
-Status publish_file(const fs::path& temporary, const fs::path& path) {
-  BATON_TRY(sync_path(temporary, O_RDONLY));
-  if (::rename(temporary.c_str(), path.c_str()) != 0) return io_error("cannot rename to", path);
-  return sync_folder(path.has_parent_path() ? path.parent_path() : fs::path("."));
-}
-
 Status sync_folder(const fs::path& folder) { return sync_path(folder, O_RDONLY | O_DIRECTORY); }
 
 namespace {
 
-/// Writes a temporary file beside `path`, then lets `publish` turn it into `path`; nothing is left
-/// behind on failure.
-template <class Publish>
-Status write_then(const fs::path& path, ByteView bytes, Publish publish) {
-  std::error_code error;
-  if (path.has_parent_path()) fs::create_directories(path.parent_path(), error);
-  if (error) {
-    errno = error.value();  // a disk may be full already
-    return io_error("cannot create", path.parent_path());
-  }
-  const fs::path temporary = temporary_sibling(path);
-  {
-    FileDescriptor file(::open(temporary.c_str(), O_WRONLY | O_CREAT | O_TRUNC | O_CLOEXEC, 0644));
-    if (!file) return io_error("cannot create", temporary);
-    Status written = write_all(file.number(), bytes, temporary);
-    if (!file.close() && written) written = io_error("cannot write", temporary);
-    if (!written) {
-      ::unlink(temporary.c_str());
-      return written;
+/// A new file beside `path` under a name that nobody can foresee, so that no link can lie in wait
+/// for it. It goes away unless it is published.
+class NewFile {
+ public:
+  /// Creates missing folders.
+  static Result<NewFile> create(const fs::path& path) {
+    std::error_code error;
+    if (path.has_parent_path()) fs::create_directories(path.parent_path(), error);
+    if (error) {
+      errno = error.value();  // a disk may be full already
+      return io_error("cannot create", path.parent_path());
+    }
+    const fs::path folder = path.has_parent_path() ? path.parent_path() : fs::path(".");
+    FileDescriptor held(::open(folder.c_str(), O_RDONLY | O_DIRECTORY | O_CLOEXEC));
+    if (!held) return io_error("cannot open", folder);
+    std::random_device random;
+    for (int attempt = 0;; ++attempt) {
+      const std::string name = fmt::format(".{}.{:08x}{:08x}.tmp", path.filename().string(),
+                                           std::uint32_t{random()}, std::uint32_t{random()});
+      FileDescriptor file(::openat(held.number(), name.c_str(),
+                                   O_WRONLY | O_CREAT | O_EXCL | O_NOFOLLOW | O_CLOEXEC, 0644));
+      if (file) return NewFile(path, name, std::move(held), std::move(file));
+      if (errno != EEXIST || attempt == 100) return io_error("cannot create", folder / name);
     }
   }
-  Status published = publish(temporary);
-  if (!published) ::unlink(temporary.c_str());
-  return published;
-}
+  NewFile(NewFile&&) = default;
+  ~NewFile() {
+    if (folder_ && !is_published_) ::unlinkat(folder_.number(), name_.c_str(), 0);
+  }
+
+  /// Under its own name, to be read.
+  fs::path path() const { return fs::path(path_).replace_filename(name_); }
+  Status write(ByteView bytes) { return write_all(file_.number(), bytes, path()); }
+  Status sync() {
+    return ::fsync(file_.number()) == 0 ? Status() : io_error("cannot sync", path());
+  }
+  /// Gives it the name that it was made for.
+  Status publish() {
+    if (!file_.close()) return io_error("cannot write", path());
+    const int folder = folder_.number();
+    if (::renameat(folder, name_.c_str(), folder, path_.filename().c_str()) != 0)
+      return io_error("cannot rename to", path_);
+    is_published_ = true;
+    return {};
+  }
+  /// After publish(): its name survives a power cut.
+  Status sync_name() const {
+    return ::fsync(folder_.number()) == 0 ? Status() : io_error("cannot sync the folder of", path_);
+  }
+
+ private:
+  NewFile(fs::path path, std::string name, FileDescriptor folder, FileDescriptor file)
+      : path_(std::move(path)),
+        name_(std::move(name)),
+        folder_(std::move(folder)),
+        file_(std::move(file)) {}
+
+  fs::path path_;
+  std::string name_;
+  FileDescriptor folder_;  ///< held open: another one may not take its place
+  FileDescriptor file_;
+  bool is_published_ = false;
+};
 
 }  // namespace
 
 Status write_file_atomic(const fs::path& path, ByteView bytes) {
-  return write_then(path, bytes,
-                    [&](const fs::path& temporary) { return publish_file(temporary, path); });
+  BATON_ASSIGN(NewFile file, NewFile::create(path));
+  BATON_TRY(file.write(bytes));
+  BATON_TRY(file.sync());
+  BATON_TRY(file.publish());
+  return file.sync_name();
 }
 
 Status expect_content(const fs::path& path, ByteView bytes) {
@@ -167,19 +196,19 @@ Status expect_content(const fs::path& path, ByteView bytes) {
 
 Status write_file_verified(const fs::path& path, ByteView bytes,
                            const std::function<Status(const fs::path& temporary)>& check) {
-  return write_then(path, bytes, [&](const fs::path& temporary) -> Status {
-    BATON_TRY(sync_path(temporary, O_RDONLY));
-    BATON_TRY(check(temporary));
-    BATON_TRY(expect_content(temporary, bytes));
-    return publish_file(temporary, path);
-  });
+  BATON_ASSIGN(NewFile file, NewFile::create(path));
+  BATON_TRY(file.write(bytes));
+  BATON_TRY(file.sync());
+  BATON_TRY(check(file.path()));
+  BATON_TRY(expect_content(file.path(), bytes));
+  BATON_TRY(file.publish());
+  return file.sync_name();
 }
 
 Status write_file_unsynced(const fs::path& path, ByteView bytes) {
-  return write_then(path, bytes, [&](const fs::path& temporary) -> Status {
-    if (::rename(temporary.c_str(), path.c_str()) != 0) return io_error("cannot rename to", path);
-    return {};
-  });
+  BATON_ASSIGN(NewFile file, NewFile::create(path));
+  BATON_TRY(file.write(bytes));
+  return file.publish();
 }
 
 Status expect_space(const fs::path& folder, std::uint64_t size_bytes, std::uint64_t reserve_bytes) {

@@ -21,8 +21,9 @@ std::string lower_extension(const std::filesystem::path& path);
 Result<Bytes> read_file(const std::filesystem::path& path, std::uint64_t max_size_bytes);
 Result<std::string> read_text_file(const std::filesystem::path& path, std::uint64_t max_size_bytes);
 
-/// Publishes `bytes` at `path` whole or not at all: temporary file in the same folder, fsync,
-/// rename, fsync of the folder. Creates missing folders. Two writers of the same path are harmless:
+/// Publishes `bytes` at `path` whole or not at all: a new file of an unforeseeable name in the same
+/// folder, fsync, rename, fsync of the folder. Creates missing folders; follows no link at either
+/// name. Two writers of the same path are harmless:
 /// the last rename wins.
 Status write_file_atomic(const std::filesystem::path& path, ByteView bytes);
 
@@ -48,12 +49,6 @@ Status expect_space(const std::filesystem::path& folder, std::uint64_t size_byte
 
 /// Waits until everything written so far to the file system of `path` is on disk (Linux syncfs).
 Status sync_file_system(const std::filesystem::path& path);
-
-/// A temporary name beside `path` that no other process or thread uses.
-std::filesystem::path temporary_sibling(const std::filesystem::path& path);
-
-/// fsync `temporary`, rename it to `path`, fsync the folder: for files that a library wrote.
-Status publish_file(const std::filesystem::path& temporary, const std::filesystem::path& path);
 
 /// fsync a folder: names made or renamed in it survive a power cut.
 Status sync_folder(const std::filesystem::path& folder);

@@ -56,7 +56,7 @@ Result<FileDescriptor> LocalFarm::lock_directory(const fs::path& directory) {
                  fmt::format("{}: cannot create: {}", directory.string(), error.message())};
 
   const fs::path path = directory / "lock";
-  FileDescriptor lock(::open(path.c_str(), O_RDWR | O_CREAT | O_CLOEXEC, 0644));
+  FileDescriptor lock(::open(path.c_str(), O_RDWR | O_CREAT | O_NOFOLLOW | O_CLOEXEC, 0644));
   if (!lock)
     return Error{ErrorKind::io,
                  fmt::format("{}: cannot open: {}", path.string(), std::strerror(errno))};

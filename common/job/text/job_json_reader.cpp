@@ -191,6 +191,14 @@ bool JobJsonReader::texts(Key key, std::map<std::string, std::string>& values, i
   }
   bool good = true;
   for (const auto& [name, value] : found->items()) {
+    if (name.empty() || name.size() > limits::kMaxTextLength || has_control_character(name)) {
+      fault(
+          key.name,
+          fmt::format("names of 1 to {} bytes without control characters", limits::kMaxTextLength),
+          shown(json(name)));
+      good = false;
+      continue;
+    }
     good = read_text(json_path_key(path_of(key.name), name), value, values[name]) && good;
   }
   return good;

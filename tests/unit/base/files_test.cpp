@@ -3,6 +3,7 @@
 #include <gmock/gmock.h>
 #include <gtest/gtest.h>
 #include <sys/stat.h>
+#include <unistd.h>
 
 #include <algorithm>
 #include <fstream>
@@ -122,12 +123,39 @@ TEST_F(FilesTest, MissingFilesFoldersAndPipesAreErrors) {
   EXPECT_FALSE(read_file(pipe, 10).ok());
 }
 
-TEST_F(FilesTest, TemporarySiblingsDifferAndShareTheFolder) {
-  const fs::path a = temporary_sibling(folder_ / "a.txt");
-  const fs::path b = temporary_sibling(folder_ / "a.txt");
-  EXPECT_NE(a, b);
-  EXPECT_EQ(a.parent_path(), folder_);
-  EXPECT_EQ(temporary_sibling("a.txt").parent_path(), fs::path());
+// Links under every name that a counting writer would take, to a file that is not its own.
+TEST_F(FilesTest, WritersFollowNoLinksThatLieInWait) {
+  const fs::path victim = folder_ / "victim", target = folder_ / "out" / "a.txt";
+  ASSERT_TRUE(write_file_atomic(victim, as_bytes_view("mine")));
+  fs::create_directories(target.parent_path());
+  for (int i = 0; i < 1000; ++i) {
+    fs::create_symlink(victim, target.parent_path() / (".a.txt." + std::to_string(::getpid()) +
+                                                       "." + std::to_string(i) + ".tmp"));
+  }
+  ASSERT_TRUE(write_file_atomic(target, as_bytes_view("one")));
+  ASSERT_TRUE(write_file_unsynced(target, as_bytes_view("two")));
+  ASSERT_TRUE(write_file_verified(target, as_bytes_view("three"), [](const fs::path& temporary) {
+    EXPECT_FALSE(fs::is_symlink(temporary));
+    return Status();
+  }));
+  EXPECT_EQ(read_text_file(victim, 10).value(), "mine");
+  EXPECT_EQ(read_text_file(target, 10).value(), "three");
+
+  // A link in the place of the file itself is replaced, not followed.
+  fs::remove(target);
+  fs::create_symlink(victim, target);
+  ASSERT_TRUE(write_file_atomic(target, as_bytes_view("four")));
+  EXPECT_FALSE(fs::is_symlink(target));
+  EXPECT_EQ(read_text_file(victim, 10).value(), "mine");
+}
+
+TEST_F(FilesTest, WhatIsNotPublishedLeavesNothing) {
+  const auto refuse = [](const fs::path&) { return Status(Error{ErrorKind::corrupt, "no"}); };
+  EXPECT_FALSE(write_file_verified(folder_ / "b.txt", as_bytes_view("one"), refuse));
+  fs::create_directories(folder_ / "taken" / "inside");
+  EXPECT_FALSE(write_file_atomic(folder_ / "taken", as_bytes_view("one")));
+  for (const auto& entry : fs::directory_iterator(folder_))
+    EXPECT_NE(entry.path().extension(), ".tmp") << entry.path();
 }
 
 }  // namespace

@@ -140,6 +140,9 @@ TEST(JobJson, NamesPlaceAndExpectationOfEachKindOfFault) {
        "$.camera.lookAt: expected another point than position"},
       {R"("camera": {"up": [0, 0, 2]})", "$.camera.up: expected a direction across the view"},
       {R"("camera": {"up": [0, 0, 0]})", "$.camera.up: expected a direction, got [0, 0, 0]"},
+      {R"("metadata": {"odd\nkey": "1"})",
+       "$.metadata: expected names of 1 to 4096 bytes without control characters, got "
+       "\"odd\\nkey\""},
       {R"("metadata": {"odd key": 1})",
        "$.metadata[\"odd key\"]: expected a text, such as \"1\", got 1"},
       {R"("frames": "4-1")", "$.frames: expected a last frame not before the first, got \"4-1\""},
