@@ -19,11 +19,11 @@ def names():
 
 def draw_traits(seed, number):
     """Of one file: names, functions and a random source for each. Below 0: that trait of names() alone."""
-    draw = random.Random(f"{seed}/{number}")
-    if number < 0:
-        chosen = [names()[number]]
-    else:
-        groups = draw.sample(sorted(GROUPS), draw.choice((1, 2, 2, 3)))
-        chosen = [draw.choice(sorted(GROUPS[group])) for group in groups]
     functions = {name: build for group in GROUPS.values() for name, build in group.items()}
+    if number < 0:
+        name = names()[number]
+        return [(name, functions[name], random.Random(f"{seed}/{name}"))]
+    draw = random.Random(f"{seed}/{number}")
+    groups = draw.sample(sorted(GROUPS), draw.choice((1, 2, 2, 3)))
+    chosen = [draw.choice(sorted(GROUPS[group])) for group in groups]
     return [(name, functions[name], random.Random(f"{seed}/{number}/{name}")) for name in chosen]

@@ -23,9 +23,9 @@ from farm import Programs
 HERE = Path(__file__).resolve().parent
 BLOCK = 8  # pixels
 # Pictures differ where blocks are apart by more than this share of the picture's mean, and by more than so many times the noise.
-MOST_RMS, MOST_OVER_NOISE = 0.006, 2.5
-MOST_LARGEST, MOST_LARGEST_OVER_NOISE = 0.05, 7
-BATON = ["--workers", "1", "--threads-per-worker", "2", "--set", "sampling.method=bidirectional", "--set", "quality.rounds=12",
+MOST_RMS, MOST_OVER_NOISE = 0.01, 3.5
+MOST_LARGEST, MOST_LARGEST_OVER_NOISE = 0.1, 12
+BATON = ["--workers", "1", "--threads-per-worker", "2", "--set", "sampling.method=bidirectional", "--set", "quality.rounds=24",
          "--set", "output.pixelType=float", "--set", "output.clampNegative=false", "--set", "output.aovs=[]"]
 FILES_OF_A_PROCESS = 20
 LONGEST_S = 900
@@ -42,10 +42,11 @@ def has_blender():
     return shutil.which("blender") is not None
 
 
-def blocks_of(path, names):
-    """Means of blocks of these channels, one after the other, over the display window; pixels without data are 0."""
+def blocks_of(path, names, is_cropped=False):
+    """Means of blocks of these channels, one after the other, over the display window, where pixels without data are 0, or
+    over the data window."""
     frame = read_frame(path)
-    x0, y0, x1, y1 = frame.display
+    x0, y0, x1, y1 = frame.window if is_cropped else frame.display
     left, top, right, bottom = frame.window
     means = []
     for name in names:
@@ -54,7 +55,7 @@ def blocks_of(path, names):
             for bx in range(x0, x1, BLOCK):
                 inside = [plane[(y - top) * frame.width + x - left] for y in range(by, min(by + BLOCK, y1))
                           for x in range(bx, min(bx + BLOCK, x1)) if left <= x < right and top <= y < bottom]
-                means.append(sum(inside) / max(len(inside), 1))
+                means.append(sum(inside) / ((min(by + BLOCK, y1) - by) * (min(bx + BLOCK, x1) - bx)))
     return means
 
 
@@ -102,7 +103,7 @@ class Run:
         if done.returncode:
             return self.fail(number, f"{what}: {done.stderr}")
         channels = "RGBA" if told["transparent"] else "RGB"
-        found = [compare(blocks_of(ours, channels), [blocks_of(theirs, channels) for theirs in
+        found = [compare(blocks_of(ours, channels, told["cropped"]), [blocks_of(theirs, channels) for theirs in
                                                      sorted(folder.glob(f"cycles.*.{ours.name.split('.')[1]}.exr"))])
                  for ours in sorted((folder / "baton").glob("frame.*.exr"))]
         return self.account(number, what, *max(found), told["report"])
@@ -130,7 +131,8 @@ def run_files(programs, source, seed, numbers, folder):
         done = blender("random_blender_files.py", source, folder, seed, *now)
         made = [number for number in now if (folder / str(number)).exists()]
         if done.returncode:
-            print(done.stdout[-3000:] + done.stderr[-3000:], flush=True)
+            said = [line for line in (done.stdout + done.stderr).splitlines() if not line.startswith("Fra:")]
+            print("\n".join(said[-20:]), flush=True)
             left = [number for number in now if number not in made] + left if made else left
         for number in made or now:
             run.judge(number)

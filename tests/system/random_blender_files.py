@@ -23,7 +23,7 @@ from blender_stage import LitStage  # noqa: E402
 from blender_traits import draw_traits  # noqa: E402
 
 SEEDS = (1, 2)
-SPP = 32
+SPP = 24
 
 
 def render(scene, folder):
@@ -47,7 +47,8 @@ def make(seed, number, folder):
         told["traits"].append(name)
     bpy.ops.wm.save_as_mainfile(filepath=str(folder / "file.blend"), copy=True)
     render(stage.scene, folder)
-    told["transparent"] = stage.scene.render.film_transparent
+    shown = stage.scene.render
+    told["transparent"], told["cropped"] = shown.film_transparent, shown.use_border and shown.use_crop_to_border
     try:
         told["report"] = [": ".join(entry) for entry in job.export(folder / "job").entries]
     except job.CannotExport as fault:

@@ -20,6 +20,7 @@ sys.path += [str(ROOT / "jobs/exporters/blender/baton_exporter"), str(ROOT / "jo
 import conventions  # noqa: E402
 import exr  # noqa: E402
 import gltf_materials  # noqa: E402
+import headers  # noqa: E402
 import keys  # noqa: E402
 from folders import new_numbered  # noqa: E402
 from glb import Glb, tracks_of, weights_of  # noqa: E402
@@ -93,6 +94,53 @@ def about(axis, angle):
     square = conventions.product(cross, cross)
     return [[float(i == j) + math.sin(angle) * cross[i][j] + (1 - math.cos(angle)) * square[i][j] for j in range(3)]
             for i in range(3)]
+
+
+def mappings_of_textures(_programs, _folder):
+    """What a Mapping node of each type does to UVs, as glTF says it: scaled, turned, moved."""
+    for angle, scale in itertools.product((0, 0.7, -2, math.pi / 2, math.pi), ((1, 1), (2, 2), (-1.5, 1.5), (0.5, 3), (-2, 0.5))):
+        c, s = math.cos(angle), math.sin(angle)
+        location = (0.3, -0.8)
+        place = conventions.uv_mapping("TEXTURE", location, angle, scale)
+        is_stretch = abs(abs(scale[0]) - abs(scale[1])) > 1e-9 and min(abs(c), abs(s)) > 1e-9
+        check_equal(place is None, is_stretch, f"whether {angle}, {scale} cannot be said")
+        for u, v in ((0, 0), (1, 0), (0.2, 0.9)) if place else ():
+            x, y = u - location[0], v - location[1]
+            expected = ((c * x + s * y) / scale[0], (c * y - s * x) / scale[1])
+            moved, turned, scaled = place
+            x, y = u * scaled[0], v * scaled[1]
+            got = (math.cos(turned) * x - math.sin(turned) * y + moved[0], math.sin(turned) * x + math.cos(turned) * y + moved[1])
+            close(got, expected, f"TEXTURE {angle} {scale} at {u}, {v}")
+    check_equal(conventions.uv_mapping("TEXTURE", (0, 0), 0, (0, 1)), None, "scale of 0")
+    check_equal(conventions.uv_mapping("POINT", (1, 2), 3, (4, 5)), ((1, 2), 3, (4, 5)), "POINT")
+
+
+def files_that_are_read_alike(_programs, folder):
+    """Copied: what says no colours, windows or layers of its own. Exposures of an HDR file are left out."""
+    folder.mkdir()
+    exr.write(folder / "plain.exr", 2, 1, [bytes(24)])
+    plain = (folder / "plain.exr").read_bytes()
+    check_equal(headers.plain(plain), plain, "an EXR file that says nothing")
+
+    def with_attribute(*attribute):
+        return plain[:8] + exr.attribute(*attribute) + plain[8:]
+
+    for xy, is_plain in ((headers.REC709, True), ((0.713, 0.293, 0.165, 0.83, 0.128, 0.044, 0.322, 0.338), False), ((0,) * 8, False)):
+        said = with_attribute("chromaticities", "chromaticities", struct.pack("<8f", *xy))
+        check_equal(headers.plain(said) is not None, is_plain, f"chromaticities {xy}")
+    window = plain.index(b"displayWindow")
+    for what, changed in (("another window", plain[:window + 24] + b"\7" + plain[window + 25:]),
+                          ("several parts", plain[:5] + b"\x10" + plain[6:]),
+                          ("another channel", plain.replace(b"B\0\2", b"Z\0\2", 1)),
+                          ("half of it", plain[:60]), ("another file", b"\x89PNG" + plain)):
+        check_equal(headers.plain(changed), None, what)
+    start, end = b"#?RADIANCE\n", b"FORMAT=32-bit_rle_rgbe\n\n-Y 1 +X 2\n12345678"
+    check_equal(headers.plain(start + end), start + end, "an HDR file that says nothing")
+    for line in (b"EXPOSURE=2\n", b"COLORCORR=1 2 3\n", b"PRIMARIES=0 0 0 0 0 0 0 0\n"):
+        check_equal(headers.plain(start + line + end), start + end, f"{line}")
+    for what, changed in (("XYZ", end.replace(b"rgbe", b"xyze")), ("no format", end[23:]), ("rows", end.replace(b"-Y", b"+Y"))):
+        check_equal(headers.plain(start + changed), None, what)
+    check(headers.is_turned(start + end.replace(b"-Y", b"+Y")) and not headers.is_turned(start + end), "order of rows")
 
 
 def cameras(_programs, _folder):

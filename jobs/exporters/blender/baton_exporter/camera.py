@@ -6,6 +6,7 @@ from mathutils import Vector
 
 from . import conventions, keys
 
+SHEAR = 1e-4  # cosine between two axes
 TOLERANCE = 2e-6  # of the picture's height and of the distance to what is looked at
 
 
@@ -26,7 +27,9 @@ class Camera:
         data = shown.data
         width, height = picture_size(scene)
         matrix = shown.matrix_world
-        back, up = (matrix.to_3x3().col[axis].normalized() for axis in (2, 1))
+        right, up, back = (matrix.to_3x3().col[axis].normalized() for axis in range(3))
+        self.check_axes(right, up, back)
+        self.check_clipping(data, matrix.translation, back, depsgraph)
         eye = matrix.translation
         distance = self.focus_distance(data, eye, back, depsgraph)
         if not self.rows:
@@ -44,6 +47,24 @@ class Camera:
             "shift": conventions.shift_in_heights(*fit, data.shift_x, data.shift_y),
             "aperture": [conventions.aperture(is_orthographic, data.lens, data.dof.aperture_fstop) if distance else 0.0],
             "focusDistance": [distance or 0.0]})
+
+    def check_axes(self, right, up, back):
+        """Cycles takes them as they are; a camera of a job has upright ones."""
+        if right.dot(up.cross(back)) < 0:
+            self.report.add(self.where(), "it is mirrored", "make the scale of it and its parents positive")
+        if max(abs(right.dot(up)), abs(up.dot(back)), abs(back.dot(right))) > SHEAR:
+            self.report.add(self.where(), "it is sheared", "apply the scale of its parents (Object > Apply > Scale)")
+
+    def check_clipping(self, data, eye, back, depsgraph):
+        """Whether a box around an object reaches beyond the clip end, or lies ahead of the camera, but before the clip start."""
+        for instance in depsgraph.object_instances:
+            if not instance.show_self or instance.object.type != "MESH":
+                continue
+            place = instance.matrix_world
+            depths = [back.dot(eye - place @ Vector(corner)) for corner in instance.object.bound_box]
+            for is_cut, what in ((max(depths) > data.clip_end, "End"), (0 < min(depths) < data.clip_start, "Start")):
+                if is_cut:
+                    self.report.add(self.where(), f"its Clip {what}, which cuts objects", f"change its Clip {what}")
 
     def focus_distance(self, data, eye, back, depsgraph):
         """Along the view; None without depth of field."""

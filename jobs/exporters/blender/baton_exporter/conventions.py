@@ -96,6 +96,24 @@ def axis_angle(rotation):
     return [value / sine for value in q[1:]], math.degrees(2 * math.atan2(sine, q[0]))
 
 
+def uv_mapping(vector_type, location, angle, scale):
+    """What a Mapping node does to UVs as location, angle and scale of a Point: first scaled, then turned, then moved.
+
+    None where there is no such thing: a Texture that turns, then stretches."""
+    if vector_type != "TEXTURE":
+        return tuple(location), angle, tuple(scale)
+    if 0 in scale:
+        return None
+    c, s = math.cos(angle), math.sin(angle)
+    columns = (c / scale[0], -s / scale[1]), (s / scale[0], c / scale[1])
+    if abs(columns[0][0] * columns[1][0] + columns[0][1] * columns[1][1]) > ROUNDING * math.hypot(*columns[0]) * math.hypot(*columns[1]):
+        return None
+    turned = math.atan2(columns[0][1], columns[0][0])
+    stretched = math.hypot(*columns[0]), math.cos(turned) * columns[1][1] - math.sin(turned) * columns[1][0]
+    moved = [-columns[0][i] * location[0] - columns[1][i] * location[1] for i in range(2)]
+    return tuple(moved), turned, stretched
+
+
 # ---- the camera ---------------------------------------------------------------------------------------------
 
 

@@ -3,7 +3,7 @@
 Carried over: a Principled BSDF with constants, images, normal maps, a coat and cut-outs, and a Diffuse BSDF. The glTF exporter
 reads Principled ones alone, so a Diffuse one becomes one of these."""
 
-from . import images, nodes
+from . import conventions, images, nodes
 
 # Inputs of the Principled BSDF that change nothing at these values.
 NEUTRAL = {"Subsurface": 0, "Specular Tint": 0, "Anisotropic": 0, "Sheen": 0, "Transmission": 0}
@@ -40,6 +40,8 @@ class Materials:
         if output is None:
             add("it has no output", "add a Material Output")
             return
+        material.use_backface_culling = False  # Cycles does not heed it
+        nodes.keep_output(material.node_tree, output)
         for name in ("Volume", "Displacement"):
             if nodes.source(output.inputs[name]):
                 add(f"its {name.lower()}", "model it, or bake a normal map" if name == "Displacement" else "remove it")
@@ -85,9 +87,13 @@ class Surface:
         self.check_pair(inputs["Metallic"], inputs["Roughness"])
         self.check_normal(inputs["Normal"])
         self.check_alpha(inputs["Alpha"])
+        self.part_from_color(inputs["Base Color"], inputs["Alpha"])
+        if self.bsdf.distribution != "GGX":
+            self.add("its distribution Multiscatter GGX is read as GGX", "choose GGX")
 
     def check_diffuse(self):
         inputs = self.bsdf.inputs
+        self.material.blend_method = "OPAQUE"
         if nodes.source(inputs["Roughness"]) or inputs["Roughness"].default_value != 0:
             self.add("Roughness of the Diffuse BSDF", "set it to 0")
         self.check_input(inputs["Color"], {"MIX"})
@@ -104,9 +110,10 @@ class Surface:
     def check_input(self, socket, helpers):
         """A constant, an image, or an image times a constant."""
         given = nodes.source(socket)
+        what, is_color = f"{socket.name} of {self.bsdf.name}", socket.type == "RGBA"
+        self.check_constants(socket, what)
         if given is None or given.node.type in ("RGB", "VALUE"):
             return
-        what, is_color = f"{socket.name} of {self.bsdf.name}", socket.type == "RGBA"
         if given.node.type in helpers and not given.node.mute:
             if given.node.type == "MIX" and not is_product(given.node):
                 self.add(f'node "{given.node.name}"')
@@ -126,6 +133,20 @@ class Surface:
                 self.add(f'node "{given.node.name}" of two images')
             return
         self.check_image(given, what, is_color)
+
+    def check_constants(self, socket, what):
+        """Constants of glTF are from 0 to 1. Cycles cuts numbers, too, but neither colours nor what an image is multiplied by."""
+        given = nodes.source(socket)
+        is_cut_by_both = socket.type == "VALUE" and (given is None or given.node.type == "VALUE")
+        for holder in nodes.constants(socket) if socket.name != "Emission" else ():
+            is_color = holder.type == "RGBA"
+            value = list(holder.default_value)[:3] if is_color else [holder.default_value]
+            cut = [min(max(v, 0), 1) for v in value]
+            if value == cut:
+                continue
+            if not is_cut_by_both:
+                self.add(f"{what}, which is above 1 or below 0, is cut", "keep it from 0 to 1")
+            holder.default_value = (*cut, 1) if is_color else cut[0]
 
     def check_image(self, given, what, is_color, depth=0):
         """The output of an Image Texture with coordinates of UVs."""
@@ -154,11 +175,17 @@ class Surface:
             self.add(f"{where} becomes a PNG of 8 bits", "use an image of 8 bits")
         if node.projection != "FLAT":
             self.add(f'node "{node.name}": projection {node.projection.lower()}', "unwrap the mesh, use UVs")
+        if node.interpolation in ("Cubic", "Smart"):
+            self.add(f'node "{node.name}": interpolation {node.interpolation}, read as Linear', "choose Linear")
         if node.extension == "CLIP":
             self.add(f'node "{node.name}": extension Clip', "use Repeat or Extend")
         if not nodes.is_identity(node.texture_mapping):
             self.add(f'node "{node.name}": its own mapping', "use a Mapping node")
         self.check_coordinates(node)
+        is_alpha_used = nodes.is_taken(self.bsdf.inputs, node.outputs["Alpha"])
+        if is_alpha_used and image.packed_file and image.alpha_mode == "PREMUL":
+            self.add(f"{where}: alpha mode Premultiplied, read as Straight", "save it as straight, choose Straight")
+        node.image = images.as_shown(image, is_alpha_used)
 
     def check_space(self, image, given, where, what, is_color):
         """glTF says by an image's place whether it holds colours in sRGB or plain numbers. Floats: they are reported anyway."""
@@ -183,8 +210,8 @@ class Surface:
             mapping = vector.node
             connected = [s.name for s in mapping.inputs if s.name != "Vector" and nodes.source(s)]
             turned = mapping.inputs["Rotation"].default_value
-            if connected or turned[0] or turned[1] or mapping.vector_type == "NORMAL":
-                self.add(f'node "{mapping.name}"', "let it move, scale, and turn about z only, by constants")
+            if connected or turned[0] or turned[1] or not becomes_point(mapping):
+                self.add(f'node "{mapping.name}"', "let it move, scale, and turn about z only, by constants, in this order of Point")
             vector = nodes.source(mapping.inputs["Vector"])
         if vector is None or vector.node.type == "UVMAP" or (vector.node.type, vector.name) == ("TEX_COORD", "UV"):
             return
@@ -205,13 +232,36 @@ class Surface:
             self.check_image(color, "normal map", is_color=False)
 
     def check_alpha(self, socket):
-        given, method = nodes.source(socket), self.material.blend_method
-        if given is None and socket.default_value == 1:
-            return
-        if given is not None:
+        """Cycles shows alpha whatever the blend mode."""
+        is_opaque = nodes.source(socket) is None and socket.default_value == 1
+        self.material.blend_method = "OPAQUE" if is_opaque else "BLEND"
+        if not is_opaque:
             self.check_input(socket, {"MATH"})
-        if method == "OPAQUE":
-            self.add("its alpha is not read, as its blend mode is Opaque", "set another Blend Mode")
+
+    def part_from_color(self, color, alpha):
+        """Where alpha is that of an image and the colour a constant: glTF's exporter would show the image's colours."""
+        given = next((n for n in nodes.feeding(alpha) if n.type == "TEX_IMAGE" and n.image), None)
+        if given is None or not nodes.is_taken([alpha], given.outputs["Alpha"]) \
+                or any(n.type == "TEX_IMAGE" for n in nodes.feeding(color)):
+            return
+        if nodes.is_taken(self.bsdf.inputs, given.outputs["Color"]):
+            self.add(f'node "{given.name}", whose Alpha and Color go to different inputs', "use two images")
+        given.image = images.alpha_alone(given.image)
+
+
+def becomes_point(mapping):
+    """Makes the type of a Mapping node Point, which glTF has; whether it does the same then."""
+    kind, values = mapping.vector_type, {name: mapping.inputs[name].default_value for name in ("Rotation", "Scale")}
+    if kind == "NORMAL":
+        return False
+    place = conventions.uv_mapping(kind, mapping.inputs["Location"].default_value[:2] if kind != "VECTOR" else (0, 0),
+                                   values["Rotation"][2], values["Scale"][:2])
+    if place is None:
+        return False
+    mapping.vector_type = "POINT"
+    location, values["Rotation"][2], values["Scale"][:2] = place
+    mapping.inputs["Location"].default_value[:2] = location
+    return True
 
 
 def is_product(mix):

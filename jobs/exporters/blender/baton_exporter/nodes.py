@@ -28,6 +28,33 @@ def feeding(socket):
     return found
 
 
+def keep_output(tree, output):
+    """Removes all other outputs of a material, so that every reader takes this one."""
+    for node in [node for node in tree.nodes if node.type == output.type and node != output]:
+        tree.nodes.remove(node)
+    output.target, output.is_active_output = "ALL", True
+
+
+def constants(socket):
+    """The sockets that hold the constants of a value: its own, that of a node, or those that a node works on."""
+    given = source(socket)
+    if given is None:
+        return [socket]
+    if given.node.type in ("RGB", "VALUE"):
+        return [given]
+    if given.node.type in ("MIX", "MATH"):
+        kind = "VALUE" if given.node.type == "MATH" else given.type
+        inputs = [item for item in given.node.inputs if item.enabled and item.type == kind and item.name != "Factor"]
+        return [holder for item in inputs for holder in constants(item)]
+    return []
+
+
+def is_taken(sockets, given):
+    """Whether one of these inputs, or a node behind them, takes an output."""
+    behind = [socket for root in sockets for node in feeding(root) for socket in node.inputs]
+    return any(source(socket) == given for socket in [*sockets, *behind])
+
+
 def is_identity(mapping):
     """Of the mapping in the properties of texture nodes, which no panel shows."""
     return (tuple(mapping.translation) == (0, 0, 0) and tuple(mapping.rotation) == (0, 0, 0)
