@@ -199,7 +199,7 @@ Status FarmCore::perform(const RecordJobStatus& action) {
 }
 
 Status FarmCore::perform(const InspectFrames& action) {
-  to_inspect.insert(action.job);
+  to_inspect.emplace(action.job, Clock::now());
   return {};
 }
 

@@ -32,6 +32,9 @@ struct ServiceOptions {
   std::uint64_t store_limit = 0;
   std::chrono::milliseconds clean_up_every =
       BlobStore::kLeftoverAge;  ///< when the store is searched for leftovers
+  /// How long a file that a worker reports may be missing here, or a frame be unreadable: a disk of
+  /// another machine may be late, or away for a moment.
+  std::chrono::milliseconds file_patience{5000};
   /// Reads whole files, on a thread of its own.
   Disk disk = {};
 };
@@ -57,7 +60,8 @@ class FarmCore {
   /// What workers say of the files of living jobs.
   std::map<Digest, std::vector<std::string>> notes;
   std::map<Digest, std::vector<std::string>> lost_before;  ///< what open jobs lacked at the start
-  std::set<Digest> to_inspect;  ///< jobs whose frames are to be compared with the record
+  /// Jobs whose frames are to be compared with the record, and when.
+  std::map<Digest, TimePoint> to_inspect;
 
   /// Something happens; what follows is journalled, sent or noted for the end of the turn.
   Status step(const Event& event);

@@ -166,23 +166,26 @@ Status Service::receive_from(const std::string& worker, const Heartbeat& message
 }
 
 Status Service::receive_from(const std::string& worker, const TaskDone& message) {
+  // What another machine has written may be seen here a moment later; the report is said again.
+  const std::optional<ReportedFrame> frame = find_reported_frame(farm_, message);
+  const std::optional<std::string> missing = find_missing_blob(farm_, message);
+  BATON_ASSIGN(const bool is_elsewhere, frame ? watch_folder(message.lease.job) : false);
+  const bool is_frame_there = !frame || (frame->stamp && *frame->stamp);
+  if ((missing || !is_frame_there) && !is_elsewhere && await_outputs(message)) return {};
+  late_.erase(message.lease);
   // Leaves after what follows is durable.
   BATON_TRY(farm_.reply_to(worker, ReportReceived{message.lease}));
   // Accepted results must be there: a blob may have gone between publishing and reporting. A frame
   // that is not where it belongs is on a disk that only the worker sees, or in another folder.
-  const std::optional<ReportedFrame> frame = find_reported_frame(farm_, message);
-  BATON_ASSIGN(const bool is_elsewhere, frame ? watch_folder(message.lease.job) : false);
   if (is_elsewhere) return farm_.step(ResultMissing{worker, message.lease, message.made.outputs});
-  if (frame && (!frame->stamp || !*frame->stamp)) {
-    const std::string why = frame->stamp ? fmt::format(
-                                               "{}: reported, but not there as the "
-                                               "coordinator sees it",
-                                               frame->path.string())
-                                         : frame->stamp.error().message;
+  if (!is_frame_there) {
+    const std::string why =
+        frame->stamp ? frame->path.string() + ": reported, but not there as the coordinator sees it"
+                     : frame->stamp.error().message;
     return farm_.step(AttemptFailed{
         {message.lease, worker, why + ": is the output folder mounted where the worker runs?"}});
   }
-  if (const auto missing = find_missing_blob(farm_, message)) {
+  if (missing) {
     spdlog::warn("worker {}: {}: reported, but not there; the task is done again", worker,
                  *missing);
     return farm_.step(ResultMissing{worker, message.lease, message.made.outputs});
@@ -285,6 +288,14 @@ bool Service::await_inputs(const std::string& worker, const TaskFailed& message)
   if (unread.empty()) return false;
   waits_->start(message.lease, {}, std::move(unread), incoming, now);
   return true;
+}
+
+/// Whether a report waits for its files; not for longer than file_patience.
+bool Service::await_outputs(const TaskDone& message) {
+  constexpr std::size_t kMostLate = limits::kMaxWorkers;
+  const TimePoint now = std::chrono::steady_clock::now();
+  if (late_.size() >= kMostLate) late_.clear();
+  return now - late_.try_emplace(message.lease, now).first->second < farm_.options.file_patience;
 }
 
 // ---- who may do what ----------------------------------------------------------------------------

@@ -88,6 +88,7 @@ class Service {
   // Files that must be read before a message can be handled.
   Status handle_read();
   bool await_inputs(const std::string& worker, const TaskFailed& message);
+  bool await_outputs(const TaskDone& message);
   Result<std::optional<OddFrames>> await_frames(const PeerId& peer, const Message& message,
                                                 const Digest& job, const JobSpec& spec);
 
@@ -106,9 +107,12 @@ class Service {
   TimePoint next_tick_{};
   TimePoint next_clean_up_;
   bool stop_requested_ = false;
-  bool has_unread_jobs_ = false;      ///< in the journal
-  FileTable files_;                   ///< frames, and inputs of failed attempts
-  std::unique_ptr<FileWaits> waits_;  ///< made by run()
+  bool has_unread_jobs_ = false;  ///< in the journal
+  /// Reports whose files are not there yet, and since when.
+  std::map<LeaseId, TimePoint> late_;
+  std::map<Digest, TimePoint> unreadable_;  ///< jobs with a frame that is, and since when
+  FileTable files_;                         ///< frames, and inputs of failed attempts
+  std::unique_ptr<FileWaits> waits_;        ///< made by run()
 };
 
 }  // namespace baton

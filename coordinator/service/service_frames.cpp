@@ -5,6 +5,11 @@
 #include "coordinator/service/service.h"
 
 namespace baton {
+namespace {
+
+constexpr std::chrono::milliseconds kInspectAgain{500};
+
+}  // namespace
 
 /// Remembers how the frame of an accepted report stands: as long as it stands so, it needs no
 /// reading.
@@ -30,10 +35,12 @@ Result<bool> Service::watch_folder(const Digest& job) {
 
 /// Has the frames of jobs read that may be done; a full queue has room later.
 void Service::start_inspections() {
-  std::erase_if(farm_.to_inspect, [this](const Digest& digest) {
+  const TimePoint now = std::chrono::steady_clock::now();
+  std::erase_if(farm_.to_inspect, [&](const auto& wanted) {
+    const auto& [digest, due] = wanted;
     const Scheduler::Job* const job = farm_.scheduler.find_job(digest);
     return job == nullptr || job->status != JobStatus::running ||
-           waits_->inspect({digest}, files_to_inspect(*job, files_));
+           (due <= now && waits_->inspect({digest}, files_to_inspect(*job, files_)));
   });
 }
 
@@ -43,10 +50,16 @@ Status Service::end_inspection(const FilesRead& read) {
   const Scheduler::Job* const job = farm_.scheduler.find_job(digest);
   if (job == nullptr || job->status != JobStatus::running) return {};
   BATON_ASSIGN(const InspectedFrames found, inspect_frames(*job, read.contents, farm_.journal));
-  if (found.is_stale) {
-    farm_.to_inspect.insert(digest);
+  // What changes while it is read, or cannot be read now, may stand otherwise in a moment.
+  const TimePoint now = std::chrono::steady_clock::now();
+  const bool may_pass =
+      !found.unreadable.empty() &&
+      now - unreadable_.try_emplace(digest, now).first->second < farm_.options.file_patience;
+  if (found.is_stale || may_pass) {
+    farm_.to_inspect.emplace(digest, now + kInspectAgain);
     return {};
   }
+  unreadable_.erase(digest);
 
   // What is missing in another folder is not gone.
   BATON_ASSIGN(const bool is_elsewhere, found.all_right() ? false : watch_folder(digest));

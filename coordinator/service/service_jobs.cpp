@@ -91,7 +91,7 @@ Status Service::restore_job(const Digest& digest) {
       event.waits = *lost.unreadable;
       BATON_TRY(farm_.journal.record_status(digest, event.status));
     } else {
-      if (lost.num_unknown > 0) farm_.to_inspect.insert(digest);
+      if (lost.num_unknown > 0) farm_.to_inspect.emplace(digest, std::chrono::steady_clock::now());
       tell_lost(digest, lost);
       if (!lost.tasks.empty()) farm_.lost_before[digest] = lost_reasons(lost);
       event.lost = std::move(lost.tasks);

@@ -19,12 +19,13 @@ constexpr std::string_view kPicture = "picture of ";
 
 struct FramesTest : ServiceTest {
   std::atomic<int> num_read{0};
-  std::string broken;  ///< file name of a frame that gives an error when it is read
+  /// File name of a frame that gives an error when it is read.
+  std::atomic<const char*> broken = "";
 
   void SetUp() override {
     ServiceTest::SetUp();
     options.disk.digest = [this](const fs::path& path) -> Result<Digest> {
-      if (path.filename() == broken)
+      if (path.filename() == broken.load())
         return Error{ErrorKind::io, path.string() + ": cannot read: Input/output error"};
       if (path.extension() == ".exr") ++num_read;
       return digest_of_file(path);
@@ -206,6 +207,64 @@ TEST_F(FramesTest, OnlyAFolderWithAllFramesIsMarkedAgain) {
   ask<JobAccepted>(service.endpoint(), SubmitJob{document, true});
   EXPECT_EQ(finish(service.endpoint(), worker, id).summary.status, JobStatus::done);
   EXPECT_TRUE(fs::exists(frame(1)));
+}
+
+// What another machine has written may be late here; the worker repeats its report.
+TEST_F(FramesTest, AFileThatIsLateIsWaitedFor) {
+  options.file_patience = kPatience;
+  const RunningService service(options);
+  const Digest id = ask<JobAccepted>(service.endpoint(), SubmitJob{document}).job;
+  FakeWorker worker(service.endpoint(), store(), job);
+  worker.hello();
+  for (int i = 0; i < 3; ++i) {
+    worker.say(LeaseRequest{1});
+    const TaskDone report = worker.work(worker.expect<LeaseGrant>().lease);
+    const BlobRef& output = report.outputs.front();
+    const fs::path file = output.kind == BlobKind::image
+                              ? frame_path(job, output.frame())
+                              : BlobStore::open(store())->path(output.digest);
+    fs::rename(file, folder / "late");
+    worker.say(report);
+    worker.say(Heartbeat{{report.lease}});
+    worker.expect<Heartbeat>();
+    EXPECT_EQ(show(service.endpoint(), id).summary.tasks_done, static_cast<std::uint64_t>(i));
+    fs::rename(folder / "late", file);
+    worker.say(report);
+    EXPECT_EQ(worker.expect<ReportReceived>().lease, report.lease);
+  }
+  const JobDetail detail = show(service.endpoint(), id);
+  EXPECT_EQ(detail.summary.tasks_done, 3u);
+  EXPECT_EQ(detail.summary.attempts_lost, 0u);
+}
+
+// An error of the disk may pass; one that stays pauses the job, and hides no other frame.
+TEST_F(FramesTest, AFrameThatCannotBeReadIsWaitedForThenPausesTheJob) {
+  for (const bool passes : {true, false}) {
+    options.file_patience = passes ? std::chrono::milliseconds(kPatience) : 1500ms;
+    options.work_dir = folder / (passes ? "passes" : "stays");
+    const RunningService service(options);
+    FakeWorker worker(service.endpoint(), store(), job);
+    broken = "frame.0002.exr";
+    const Digest id = begin(service.endpoint(), worker);
+    for (const int number : {1, 2})
+      fs::last_write_time(frame(number), fs::last_write_time(frame(number)) + 1s);
+    worker.do_one_task();
+    sync(worker);
+    std::this_thread::sleep_for(700ms);
+    EXPECT_EQ(show(service.endpoint(), id).summary.status, JobStatus::running);
+    if (passes) broken = "";
+    const JobDetail detail = show_end(service.endpoint(), id);
+    EXPECT_EQ(detail.summary.status, passes ? JobStatus::done : JobStatus::paused);
+    if (!passes) {
+      EXPECT_THAT(detail.waits, HasSubstr("frame.0002.exr: cannot read: Input/output error"));
+      fs::remove(frame(3));
+      EXPECT_THAT(refused(service.endpoint(), SubmitJob{document}).message,
+                  HasSubstr("Input/output error"));
+      broken = "";
+      EXPECT_THAT(ask<JobAccepted>(service.endpoint(), SubmitJob{document}).plan,
+                  HasSubstr("frame.0003.exr is gone"));
+    }
+  }
 }
 
 TEST_F(FramesTest, AnotherFolderIsFoundOutAtTheStart) {
