@@ -219,7 +219,7 @@ TEST_F(FramesTest, AFileThatIsLateIsWaitedFor) {
   for (int i = 0; i < 3; ++i) {
     worker.say(LeaseRequest{1});
     const TaskDone report = worker.work(worker.expect<LeaseGrant>().lease);
-    const BlobRef& output = report.outputs.front();
+    const BlobRef& output = report.made.outputs.front();
     const fs::path file = output.kind == BlobKind::image
                               ? frame_path(job, output.frame())
                               : BlobStore::open(store())->path(output.digest);
