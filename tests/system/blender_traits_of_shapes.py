@@ -312,4 +312,5 @@ def hidden_for_a_while(stage, draw):
 def subdivided_later(stage, draw):
     stage.scene.frame_end = 3
     made = stage.post.modifiers.new("cut", "SUBSURF")
-    keyed(made, draw.choice(("render_levels", "levels", "show_render")), {1: 0, 3: 2})
+    name, first, last = draw.choice((("render_levels", 0, 2), ("levels", 0, 2), ("show_render", False, True)))
+    keyed(made, name, {1: first, 3: last})
