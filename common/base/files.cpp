@@ -165,7 +165,8 @@ class NewFile {
 
   fs::path path_;
   std::string name_;
-  FileDescriptor folder_;  ///< held open: another one may not take its place
+  /// Held open: another one may not take its place.
+  FileDescriptor folder_;
   FileDescriptor file_;
   bool is_published_ = false;
 };

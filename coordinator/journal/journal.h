@@ -73,7 +73,7 @@ class Journal {
   Result<std::vector<FrameStats>> run_stats(const Digest& job, Run run);
   /// What was seen of a frame when it was put together; nullopt: it is not, or nothing was told.
   Result<std::optional<FrameStats>> frame_stats(const Digest& job, FrameIndex frame);
-  /// Of the frames of a job that is not in the archive, as far as it is known.
+  /// How frames of a job that is not in the archive stand, as far as it is known.
   Result<std::vector<FrameFile>> frame_files(const Digest& job);
   /// By which workers know the store; nullopt: not recorded.
   Result<std::optional<std::string>> store_token();

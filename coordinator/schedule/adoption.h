@@ -53,7 +53,7 @@ bool writes_alike(const JobSpec& one, const JobSpec& other);
 /// is as it was written. Of the former job that has come farthest, all tasks of the frames in
 /// common count where tiles and films are the same. With other tiles its states are cut and joined:
 /// those of the newest frame of which all are there, before the first frame that is to be written.
-/// Tasks of runs whose frames are all kept are settled.
+/// Tasks of runs whose frames are all kept are skipped.
 Adoption adopt(const ParsedJobDocument& wanted, const std::vector<FormerJob>& formers,
                const KeptFiles& files);
 

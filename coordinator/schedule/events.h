@@ -115,7 +115,8 @@ struct JobResumed {
 /// frames it is all frames of the job.
 struct FramesInspected {
   Digest job;
-  std::vector<TaskKey> lost = {};  ///< assemblies whose frames are gone or damaged
+  /// Assemblies whose frames are gone or damaged.
+  std::vector<TaskKey> lost = {};
   /// For people: frames that are others' now, which stay as they are; empty: none is.
   std::string strange = {};
 };

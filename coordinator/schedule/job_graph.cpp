@@ -162,8 +162,9 @@ std::optional<std::string> JobGraph::check_frames(const TaskKey& key,
   if (key.kind == TaskKind::second_pass) next = last + 1;  // none
   for (const FrameStats& stats : frames) {
     if (stats.tile != key.tile || stats.position < next || stats.position > last) {
-      return fmt::format("the report has statistics of frame index {}, tile {}, out of place",
-                         stats.position, stats.tile);
+      return fmt::format("the report has statistics of {} index {}, tile {}, out of place",
+                         key.kind == TaskKind::assemble ? "frame" : "step", stats.position,
+                         stats.tile);
     }
     next = stats.position + 1;
   }

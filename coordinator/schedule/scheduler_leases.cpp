@@ -212,7 +212,7 @@ void Scheduler::ask_for_states(const std::string& worker, TimePoint now, Actions
         break;
       tasks.push_back(task);
     }
-    // Its own tiles first, so that it need not settle among those of others.
+    // Its own tiles first, so that it need not move among those of others.
     std::stable_partition(tasks.begin(), tasks.end(), [&](TaskIndex task) {
       return job.homes.is_home(job.tasks.graph().key(task).tile, worker);
     });

@@ -28,7 +28,7 @@ using ReadFor = std::variant<Digest, LeaseId, InspectionOf>;
 
 struct FileToRead {
   std::filesystem::path path;
-  /// Of a frame: digests that it may have; of another one it is seen whether it is a picture.
+  /// The digests that a frame may have; of another one it is seen whether it is a picture.
   std::vector<Digest> expected = {};
   /// How it stood when it had the first of these: then it is not read.
   std::optional<FileStamp> known = {};
@@ -43,7 +43,7 @@ struct FilesRead {
 /// How files are read; a test may have a slow or a broken disk.
 struct Disk {
   std::function<Result<Digest>(const std::filesystem::path&)> digest = digest_of_file;
-  /// Of a whole picture: the job that wrote it, in hexadecimal digits, as far as it says; nullopt:
+  /// The job that wrote a whole picture, in hexadecimal digits, as far as it says; nullopt:
   /// the file is none.
   std::function<std::optional<std::string>(const std::filesystem::path&)> picture_writer =
       [](const auto&) { return std::nullopt; };

@@ -20,19 +20,22 @@ struct FileContent {
   /// Before it was read; nullopt: it was not there, or could not be looked at.
   std::optional<FileStamp> stamp;
   std::optional<Digest> digest;  ///< nullopt: it was not read
-  std::string fault;             ///< why it could not be looked at or read, with its name
-  /// Of a frame that is a whole picture: the job in its header; empty where there is none, or the
+  /// Why it could not be looked at or read, with its name.
+  std::string fault;
+  /// The job in the header of a frame that is a whole picture; empty where there is none, or the
   /// digest is one that was expected.
   std::optional<std::string> writer = {};
 };
 
 /// How a file stands beside what was recorded when it was written.
 enum class FileState : std::uint8_t {
-  unknown,     ///< only its bytes can tell, and they were not read
-  right,       ///< has the size and digest
-  absent,      ///< nothing has its name
-  damaged,     ///< was cut, or is no picture
-  strange,     ///< a frame: a whole picture, but another one
+  /// Only its bytes can tell, and they were not read.
+  unknown,
+  right,    ///< has the size and digest
+  absent,   ///< nothing has its name
+  damaged,  ///< was cut, or is no picture
+  /// A frame: a whole picture, but another one.
+  strange,
   unreadable,  ///< cannot be looked at or read
 };
 struct FileVerdict {

@@ -37,7 +37,8 @@ class FolderRecord {
 struct OddFrames {
   std::vector<FileToRead> unread;    ///< only their bytes can tell
   std::vector<std::string> strange;  ///< files that are pictures of nobody here
-  std::string unreadable;            ///< why one of them cannot be read; empty: none is
+  /// Why one of them cannot be read; empty: none is.
+  std::string unreadable;
 };
 OddFrames find_odd_frames(const FolderRecord& record, const FileTable& files, const JobSpec& job);
 /// For people: that these are others' frames now; empty: there are none.

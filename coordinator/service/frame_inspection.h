@@ -20,7 +20,8 @@ struct InspectedFrames {
   std::vector<TaskKey> lost;            ///< gone or damaged
   std::vector<std::string> lost_files;  ///< theirs, in that order
   std::vector<std::string> strange;     ///< files that are pictures of nobody here
-  std::string unreadable;               ///< why one of them cannot be read; empty: none is
+  /// Why one of them cannot be read; empty: none is.
+  std::string unreadable;
   /// Whether a frame has changed since it was read, or was not among those that were.
   bool is_stale = false;
 

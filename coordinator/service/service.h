@@ -110,9 +110,10 @@ class Service {
   bool has_unread_jobs_ = false;  ///< in the journal
   /// Reports whose files are not there yet, and since when.
   std::map<LeaseId, TimePoint> late_;
-  std::map<Digest, TimePoint> unreadable_;  ///< jobs with a frame that is, and since when
-  FileTable files_;                         ///< frames, and inputs of failed attempts
-  std::unique_ptr<FileWaits> waits_;        ///< made by run()
+  /// Jobs with a frame that is, and since when.
+  std::map<Digest, TimePoint> unreadable_;
+  FileTable files_;                   ///< frames, and inputs of failed attempts
+  std::unique_ptr<FileWaits> waits_;  ///< made by run()
 };
 
 }  // namespace baton

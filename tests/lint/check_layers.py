@@ -105,6 +105,7 @@ MAX_SCRIPT_LINES = 400  # of sources check_shape.py measures functions and class
 SOURCE_FOLDERS = ["common", "worker", "coordinator", "jobs", "tests", "cmake"]
 CODE = {".h", ".cpp"}
 TEXT = CODE | {".py", ".cmake", ".sh", ".txt"}
+LONG_ASIDE = re.compile(r"///< .{41}")
 INCLUDE = re.compile(r'^\s*#\s*include\s*([<"])([^>"]+)[>"]')
 
 
@@ -166,6 +167,8 @@ def check_text(path, lines):
         for word in FORBIDDEN:
             if word in line:
                 yield number, f"contains {word!r}"
+        if Path(path).suffix in CODE and LONG_ASIDE.search(line):
+            yield number, "a member's comment longer than 40 characters stands above it"
 
 
 def violations(root):
@@ -209,6 +212,8 @@ PLANTED = [
     ("cmake/b.cmake", "set(x -" + FORBIDDEN[2] + ")\n", FORBIDDEN[2]),
     ("tests/system/long.py", "\n" * (MAX_SCRIPT_LINES + 1), f"at most {MAX_SCRIPT_LINES}"),
     ("worker/accel/long.cpp", "\n" * (MAX_SCRIPT_LINES + 1), ""),
+    ("worker/accel/aside.h", "int x;  ///< " + "a" * 41 + "\n", "stands above it"),
+    ("worker/accel/short.h", "int x;  ///< " + "a" * 40 + "\n", ""),
     ("worker/new_room/a.cpp", "int x;\n", "no layer rule"),
 ]
 

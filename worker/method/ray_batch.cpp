@@ -41,7 +41,7 @@ HWY_INLINE Vec3Lanes OriginsOf(const SiteOrigins& origins, VI site) {
           LookUp(origins.z, site, origins.num_sites)};
 }
 
-void CastPixelRays(const PixelRays& in, const SiteOrigins& origins, RayBatch& batch) {
+void CastRays(const PixelRays& in, const SiteOrigins& origins, RayBatch& batch) {
   const DF d;
   const DU du;
   const std::size_t first = batch.size();
@@ -68,8 +68,8 @@ void CastPixelRays(const PixelRays& in, const SiteOrigins& origins, RayBatch& ba
   rays.extend(first + in.count);
 }
 
-void CastRays(const CastSamples& in, const SiteOrigins& origins, RayBatch& batch,
-              std::span<float> target) {
+void CastSampleRays(const CastSamples& in, const SiteOrigins& origins, RayBatch& batch,
+                    std::span<float> target) {
   const DF d;
   const DU du;
   std::size_t at = batch.size();
@@ -154,8 +154,8 @@ HWY_AFTER_NAMESPACE();
 
 #if HWY_ONCE
 namespace baton {
+HWY_EXPORT(CastSampleRays);
 HWY_EXPORT(CastRays);
-HWY_EXPORT(CastPixelRays);
 HWY_EXPORT(SumFree);
 
 void RayBatch::reserve(std::size_t more) {
@@ -170,7 +170,7 @@ void RayBatch::reserve(std::size_t more) {
 
 void cast_rays(const PixelRays& rays, const SiteOrigins& origins, RayBatch& batch) {
   batch.reserve(rays.count);
-  HWY_DYNAMIC_DISPATCH(CastPixelRays)(rays, origins, batch);
+  HWY_DYNAMIC_DISPATCH(CastRays)(rays, origins, batch);
 }
 
 void cast_samples(const CastSamples& samples, const SiteOrigins& origins, RayBatch& batch,
@@ -179,7 +179,7 @@ void cast_samples(const CastSamples& samples, const SiteOrigins& origins, RayBat
               samples.site.size() == samples.weight.size() &&
               target.size() == samples.weight.size());
   batch.reserve(samples.weight.size());
-  HWY_DYNAMIC_DISPATCH(CastRays)(samples, origins, batch, target);
+  HWY_DYNAMIC_DISPATCH(CastSampleRays)(samples, origins, batch, target);
 }
 
 FreeLight sum_free(const RayBatch& batch, std::size_t first, std::size_t end) {

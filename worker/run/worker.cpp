@@ -201,7 +201,7 @@ class Worker {
               return load_job_document(document, machine_, shelf_);
             },
             kFilePatience, machine_.memory.scene_bytes / 2),
-        pool_(
+        threads_(
             options.num_threads,
             [this](const QueuedTask& task, const std::stop_token& stop,
                    std::vector<BlobRef>& left) {
@@ -214,8 +214,8 @@ class Worker {
     int heeded = 0;
     while (!leave_) {
       // Results first: they free slots that the tick then asks leases for.
-      for (const LeaseId& lease : pool_.take_executed()) step(TaskExecuted{lease});
-      for (TaskEnded& ended : pool_.collect()) {
+      for (const LeaseId& lease : threads_.take_executed()) step(TaskExecuted{lease});
+      for (TaskEnded& ended : threads_.collect()) {
         log_failure(ended);
         step(std::move(ended));
       }
@@ -256,7 +256,7 @@ class Worker {
   /// its thread for ever: nothing but the end of the process frees it.
   void end_overdue_tasks() {
     for (const LeaseId& lease : watch_.take_overdue(now())) {
-      pool_.stop(lease);
+      threads_.stop(lease);
       TaskEnded ended{
           lease,
           Error{
@@ -323,7 +323,7 @@ class Worker {
   void perform(StartTask& action) {
     std::shared_ptr<JobEntry> job = jobs_.entry(action.lease.job);
     const bool missing = !job->has_document();
-    pool_.submit({action.lease, std::move(action.grant), std::move(job), store_});
+    threads_.submit({action.lease, std::move(action.grant), std::move(job), store_});
     if (missing) step(DocumentMissing{action.lease.job});
   }
   void perform(PackHeld& action) {
@@ -342,8 +342,8 @@ class Worker {
           return messages;
         }));
   }
-  void perform(StopTask& action) { pool_.stop(action.lease); }
-  void perform(DropQueuedTasks&) { pool_.drop_queued(); }
+  void perform(StopTask& action) { threads_.stop(action.lease); }
+  void perform(DropQueuedTasks&) { threads_.drop_queued(); }
   void perform(TakeDocument& action) { jobs_.entry(action.document.job)->provide(action.document); }
   void perform(Warn& action) { spdlog::warn("{}", action.message); }
   void perform(Leave& action) { leave_ = std::move(action); }
@@ -367,7 +367,7 @@ class Worker {
   TaskWatch watch_;
   std::list<std::future<std::vector<StatesPublished>>> packing_;
   /// Last: its threads use the rest and are joined first.
-  RenderThreads pool_;
+  RenderThreads threads_;
 };
 
 }  // namespace

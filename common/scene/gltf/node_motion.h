@@ -25,11 +25,14 @@ struct Curve {
 
 /// Keys of curves that could not be used as they are.
 struct KeyRepairs {
-  std::size_t repeated = 0;      ///< another one at their time replaces them
-  std::size_t unusable = 0;      ///< their time or value is not finite: left out
-  std::size_t slopes = 0;        ///< their tangents are not finite: 0
-  std::size_t unordered = 0;     ///< earlier than the one before them: put into order
-  std::size_t empty_curves = 0;  ///< without a key that can be used: nothing moves by them
+  std::size_t repeated = 0;  ///< another one at their time replaces them
+  /// Their time or value is not finite: left out.
+  std::size_t unusable = 0;
+  std::size_t slopes = 0;  ///< their tangents are not finite: 0
+  /// Earlier than the one before them: put into order.
+  std::size_t unordered = 0;
+  /// Without a key that can be used: nothing moves by them.
+  std::size_t empty_curves = 0;
 };
 
 /// Where the nodes of a file are at any time: all its animations together, or one of them. Where

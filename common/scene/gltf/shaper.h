@@ -28,8 +28,8 @@ class Shaper {
   /// the space of the mesh.
   MeshShape shape(std::span<const Matrix> to_world, std::span<const double> weights) const;
   std::uint64_t size_bytes() const;
-  /// Of joints, weights and targets. Vertices without a joint of some weight follow the first joint
-  /// of the skin.
+  /// Made of joints, weights and targets. Vertices without a joint of some weight follow the first
+  /// joint of the skin.
   const MeshRepairs& repairs() const { return repairs_; }
 
  private:
@@ -55,9 +55,10 @@ class Shaper {
 
   std::vector<float> positions_, normals_, tangents_;  ///< (vertices, 3), (vertices, 4); as read
   std::vector<Target> targets_;
-  std::vector<int> joints_;         ///< nodes; empty: no skin
-  std::vector<Matrix> from_mesh_;   ///< by joint, the inverse bind matrices
-  std::vector<bool> holds_;         ///< by joint, whether the file's matrix is finite
+  std::vector<int> joints_;        ///< nodes; empty: no skin
+  std::vector<Matrix> from_mesh_;  ///< by joint, the inverse bind matrices
+  /// By joint, whether the file's matrix is finite.
+  std::vector<bool> holds_;
   std::vector<std::size_t> first_;  ///< (vertices + 1) of influences_
   std::vector<Influence> influences_;
   MeshRepairs repairs_{};

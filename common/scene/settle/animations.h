@@ -14,8 +14,8 @@ struct AnimationUse {
   int played = -1;                 ///< place in `names`; -1: all of them
 };
 
-/// Of a job as it is written (its motion is not settled): each file once for each choice. Files
-/// that cannot be read, or without animations, are left out.
+/// The animations of a job as it is written (its motion is not settled): each file once for each
+/// choice. Files that cannot be read, or without animations, are left out.
 std::vector<AnimationUse> animations_of(const JobSpec& job);
 /// Such as: set.glb: "run" plays, of "walk", "run".
 std::string text_of(const AnimationUse& use);

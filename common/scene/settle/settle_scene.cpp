@@ -154,7 +154,7 @@ class SceneTaker {
     return {};
   }
 
-  /// Of a file that gives no object: an error where the job shows nothing else, either.
+  /// Says why a file gives no object: an error where the job shows nothing else, either.
   Status look_for_surfaces(std::size_t num_own) {
     const std::string found = gltf::surfaceless_parts(file_);
     if (found.empty()) return {};
