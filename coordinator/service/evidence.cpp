@@ -32,12 +32,12 @@ std::vector<BlobRef> leased_inputs(const FarmCore& farm, const LeaseId& lease) {
 
 }  // namespace
 
-std::optional<std::string> find_missing_blob(const FarmCore& farm, const TaskDone& report) {
+std::optional<Digest> find_missing_blob(const FarmCore& farm, const TaskDone& report) {
   // Blobs of a task that was done before may have served their purpose.
   if (job_of_open_task(farm, report.lease) == nullptr) return std::nullopt;
   for (const BlobRef& output : report.made.outputs) {
     if (output.kind != BlobKind::image && !output.is_held() && !farm.store.contains(output.digest))
-      return farm.store.path(output.digest).string();
+      return output.digest;
   }
   return std::nullopt;
 }

@@ -14,7 +14,7 @@ namespace baton {
 /// blobs may have served their purpose.
 
 /// A film or state that is reported and not in the store; nullopt: there is none.
-std::optional<std::string> find_missing_blob(const FarmCore& farm, const TaskDone& report);
+std::optional<Digest> find_missing_blob(const FarmCore& farm, const TaskDone& report);
 /// How the frame of a task that is not done stands where it belongs.
 struct ReportedFrame {
   std::filesystem::path path;

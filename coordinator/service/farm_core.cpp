@@ -22,6 +22,7 @@ constexpr int kSilentHeartbeats = 4;
 /// After which a worker that got less than it requested may ask again.
 constexpr std::int32_t kRetryMs = 250;
 constexpr int kMaxFailuresShown = 100;
+constexpr std::size_t kMaxRemoved = 1 << 16;
 
 }  // namespace
 
@@ -49,6 +50,8 @@ Status FarmCore::let_out() {
     const bool stays = is_kept || scheduler.is_referenced(blob);
     const Status removed = stays ? Status() : store.remove(blob);
     if (!removed && unremoved_.empty()) spdlog::warn("{}; tried again", removed.error().message);
+    if (removed_.size() >= kMaxRemoved) removed_.clear();
+    if (removed && !stays) removed_.insert(blob);
     if (removed) {
       unremoved_.erase(blob);
     } else {

@@ -69,6 +69,9 @@ class FarmCore {
   Status let_out();
   /// Blobs that the disk would not let go are tried again.
   void retry_removals() { garbage_.insert(garbage_.end(), unremoved_.begin(), unremoved_.end()); }
+  /// Whether the blob was removed here, of late: it is not late, but equal to one that nobody
+  /// needed.
+  bool has_removed(const Digest& blob) const { return removed_.contains(blob); }
   /// Blobs that nobody may need any more: they go at the end of the turn.
   void discard(const std::vector<Digest>& blobs) {
     garbage_.insert(garbage_.end(), blobs.begin(), blobs.end());
@@ -136,11 +139,12 @@ class FarmCore {
     PeerId peer;
     Message message;
   };
-  std::vector<Outgoing> outbox_;                      ///< waits for the commit
-  std::vector<Digest> garbage_;                       ///< likewise
-  std::set<Digest> unremoved_;                        ///< that the disk would not let go
-  std::vector<Digest> ended_;                         ///< jobs to be archived
-  std::set<Digest> marked_;                           ///< open jobs whose output folder is marked
+  std::vector<Outgoing> outbox_;  ///< waits for the commit
+  std::vector<Digest> garbage_;   ///< likewise
+  std::set<Digest> unremoved_;    ///< that the disk would not let go
+  std::set<Digest> removed_;      ///< of late, up to kMaxRemoved; then forgotten all at once
+  std::vector<Digest> ended_;     ///< jobs to be archived
+  std::set<Digest> marked_;       ///< open jobs whose output folder is marked
   std::map<Digest, std::filesystem::path> unmarked_;  ///< marks that go after the commit
   /// That the archive keeps, as the scheduler was told.
   std::uint64_t kept_bytes_ = 0;

@@ -168,10 +168,11 @@ Status Service::receive_from(const std::string& worker, const Heartbeat& message
 Status Service::receive_from(const std::string& worker, const TaskDone& message) {
   // What another machine has written may be seen here a moment later; the report is said again.
   const std::optional<ReportedFrame> frame = find_reported_frame(farm_, message);
-  const std::optional<std::string> missing = find_missing_blob(farm_, message);
+  const std::optional<Digest> missing = find_missing_blob(farm_, message);
+  const bool is_late = missing && !farm_.has_removed(*missing);
   BATON_ASSIGN(const bool is_elsewhere, frame ? watch_folder(message.lease.job) : false);
   const bool is_frame_there = !frame || (frame->stamp && *frame->stamp);
-  if ((missing || !is_frame_there) && !is_elsewhere && await_outputs(message)) return {};
+  if ((is_late || !is_frame_there) && !is_elsewhere && await_outputs(message)) return {};
   late_.erase(message.lease);
   // Leaves after what follows is durable.
   BATON_TRY(farm_.reply_to(worker, ReportReceived{message.lease}));
@@ -187,7 +188,7 @@ Status Service::receive_from(const std::string& worker, const TaskDone& message)
   }
   if (missing) {
     spdlog::warn("worker {}: {}: reported, but not there; the task is done again", worker,
-                 *missing);
+                 farm_.store.path(*missing).string());
     return farm_.step(ResultMissing{worker, message.lease, message.made.outputs});
   }
   keep_notes(message);
