@@ -142,9 +142,10 @@ class FarmCore {
   std::vector<Outgoing> outbox_;  ///< waits for the commit
   std::vector<Digest> garbage_;   ///< likewise
   std::set<Digest> unremoved_;    ///< that the disk would not let go
-  std::set<Digest> removed_;      ///< of late, up to kMaxRemoved; then forgotten all at once
-  std::vector<Digest> ended_;     ///< jobs to be archived
-  std::set<Digest> marked_;       ///< open jobs whose output folder is marked
+  /// What was removed of late: up to kMaxRemoved, then forgotten all at once.
+  std::set<Digest> removed_;
+  std::vector<Digest> ended_;                         ///< jobs to be archived
+  std::set<Digest> marked_;                           ///< open jobs whose output folder is marked
   std::map<Digest, std::filesystem::path> unmarked_;  ///< marks that go after the commit
   /// That the archive keeps, as the scheduler was told.
   std::uint64_t kept_bytes_ = 0;
