@@ -12,6 +12,8 @@ namespace {
 
 constexpr std::size_t kMaxCompared = 64;
 constexpr std::size_t kMaxListed = 20;
+/// Shorter words begin too many others.
+constexpr std::size_t kLeastPrefix = 3;
 
 char lower(char c) { return static_cast<char>(std::tolower(static_cast<unsigned char>(c))); }
 
@@ -45,6 +47,13 @@ std::string closest_word(std::string_view word, std::span<const std::string> can
       closest = candidate;
     }
   }
+  if (!closest.empty() || word.size() < kLeastPrefix) return closest;
+  const auto begins = [&](const std::string& candidate) {
+    return candidate.size() > word.size() &&
+           edit_distance(word, candidate.substr(0, word.size())) == 0;
+  };
+  const auto found = std::ranges::find_if(candidates, begins);
+  if (std::ranges::count_if(candidates, begins) == 1) closest = *found;
   return closest;
 }
 

@@ -85,27 +85,35 @@ std::optional<std::array<float, N>> parse_numbers(std::string_view text) {
   return numbers;
 }
 
+/// What stands behind a key and "=", in whichever case; nullopt: another key.
+std::optional<std::string_view> value_of(std::string_view line, std::string_view key) {
+  const auto is_same = [](char a, char b) {
+    return (a >= 'a' && a <= 'z' ? a - 'a' + 'A' : a) == b;
+  };
+  const bool is_it = line.size() > key.size() && line[key.size()] == '=' &&
+                     std::equal(key.begin(), key.end(), line.begin(),
+                                [&](char want, char have) { return is_same(have, want); });
+  return is_it ? std::optional(line.substr(key.size() + 1)) : std::nullopt;
+}
+
 /// EXPOSURE, COLORCORR and PRIMARIES; other lines are let pass. The first two may come several
 /// times: each program that changed the pixels adds its own. Zeros stand for what a program did not
 /// know. False: not the numbers that it needs.
 bool take_color_setting(std::string_view line, RadianceHeader& header) {
   ImageColors& colors = header.colors;
-  const auto value_of = [&](std::string_view key) {
-    return line.starts_with(key) ? std::optional(line.substr(key.size())) : std::nullopt;
-  };
   const auto counts_as_unknown = [&] {
     header.notes.push_back(fmt::format("{} counts as unknown", trimmed(line.substr(0, 60))));
     return true;
   };
   std::optional<std::array<float, 3>> factor;
-  if (const auto value = value_of("EXPOSURE=")) {
+  if (const auto value = value_of(line, "EXPOSURE")) {
     const auto exposure = parse_numbers<1>(*value);
     if (!exposure) return false;
     factor = {(*exposure)[0], (*exposure)[0], (*exposure)[0]};
-  } else if (const auto correction = value_of("COLORCORR=")) {
+  } else if (const auto correction = value_of(line, "COLORCORR")) {
     factor = parse_numbers<3>(*correction);
     if (!factor) return false;
-  } else if (const auto primaries = value_of("PRIMARIES=")) {
+  } else if (const auto primaries = value_of(line, "PRIMARIES")) {
     const auto xy = parse_numbers<8>(*primaries);
     if (!xy) return false;
     const auto& p = *xy;
@@ -123,9 +131,9 @@ bool take_color_setting(std::string_view line, RadianceHeader& header) {
 
 /// False: another format of pixels.
 bool take_format(std::string_view line, bool& is_known, RadianceHeader& header) {
-  constexpr std::string_view kKey = "FORMAT=";
-  if (!line.starts_with(kKey)) return true;
-  const std::string_view format = trimmed(line.substr(kKey.size()));
+  const auto value = value_of(line, "FORMAT");
+  if (!value) return true;
+  const std::string_view format = trimmed(*value);
   is_known = true;
   header.colors.is_xyz = format == "32-bit_rle_xyze";
   return header.colors.is_xyz || format == "32-bit_rle_rgbe";

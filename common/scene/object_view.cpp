@@ -96,6 +96,10 @@ std::uint64_t count_dropped(const Scene& scene) {
   return dropped;
 }
 
+const std::string& label_of(const ObjectSpec& object) {
+  return object.name.empty() ? object.mesh : object.name;
+}
+
 namespace {
 
 void append(const std::vector<std::string>& lines, std::vector<std::string>& warnings) {
@@ -147,7 +151,7 @@ std::vector<std::string> geometry_warnings(const JobSpec& job, const Scene& scen
   for (std::size_t i = 0; i < std::min(best.size(), job.scene.objects.size()); ++i) {
     if (best[i] != Sight::seen)
       warnings.push_back(
-          fmt::format("object {} ({}) {}", i, job.scene.objects[i].mesh, words(best[i])));
+          fmt::format("object {} ({}) {}", i, label_of(job.scene.objects[i]), words(best[i])));
   }
   const bool nothing = std::ranges::none_of(best, [](Sight s) { return s >= Sight::tiny; });
   if (nothing) warnings.push_back("the camera sees no object and no ground in any frame");

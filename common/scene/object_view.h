@@ -11,6 +11,9 @@ namespace baton {
 /// Triangles without area, which are left out, of all meshes.
 std::uint64_t count_dropped(const Scene& scene);
 
+/// What people call an object: its name, such as that of its node, or else its mesh.
+const std::string& label_of(const ObjectSpec& object);
+
 /// What is odd about meshes and where objects are, one line each: triangles without area; objects
 /// in no frame's picture, behind the camera, smaller than a pixel. Looks at bounding boxes in at
 /// most 100 of the job's frames. scene: the job's, with settled motion.

@@ -29,6 +29,10 @@ std::string quoted(const std::string& word) {
 
 void add_job_argument(CLI::App& command, JobArgument& argument) {
   command.add_option("JOB", argument.file, "job file")->required();
+  add_override_options(command, argument);
+}
+
+void add_override_options(CLI::App& command, JobArgument& argument) {
   command.add_option("--frames", argument.frames, "only these frames: 12, 1-48x4, 1,5,9-12");
   command.add_option("--scale", argument.scale, "a smaller picture: its sides times this, (0, 1]");
   command.add_option("--region", argument.region,

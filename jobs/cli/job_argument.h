@@ -19,8 +19,10 @@ struct JobArgument {
   std::string region;
 };
 
-/// Adds JOB, --frames, --scale, --region and --set.
+/// Adds JOB and the options of add_override_options.
 void add_job_argument(CLI::App& command, JobArgument& argument);
+/// Adds --frames, --scale, --region and --set.
+void add_override_options(CLI::App& command, JobArgument& argument);
 
 /// What the options put into the JSON of the job, --set last.
 std::vector<JobOverride> overrides_of(const JobArgument& argument);

@@ -57,6 +57,34 @@ std::string unknown_command(const CLI::App& app, int argc, char** argv) {
   return {};
 }
 
+/// The first option that the command of these words does not have, with what is near it; empty:
+/// there is none.
+std::string unknown_option(const CLI::App& app, int argc, char** argv) {
+  const CLI::App* command = &app;
+  const auto has_command = [&](const std::string& word) {
+    const auto commands = command->get_subcommands({});
+    return std::ranges::any_of(commands, [&](const CLI::App* c) { return c->get_name() == word; });
+  };
+  for (int i = 1; i < argc; ++i) {
+    const std::string word = argv[i];
+    if (has_command(word)) {
+      command = command->get_subcommand(word);
+      continue;
+    }
+    if (word == "--") return {};
+    if (!word.starts_with("--")) continue;
+    std::vector<std::string> names;
+    for (const CLI::Option* option : command->get_options()) {
+      for (const std::string& name : option->get_lnames()) names.push_back("--" + name);
+    }
+    const std::string name = word.substr(0, word.find('='));
+    if (std::ranges::find(names, name) == names.end())
+      return fmt::format("{}: no option {}{}", command->get_name(), name,
+                         baton::suggestion(name, names));
+  }
+  return {};
+}
+
 }  // namespace
 
 int main(int argc, char** argv) {
@@ -78,9 +106,11 @@ int main(int argc, char** argv) {
   baton::add_compare_command(app, code);
   baton::add_view_command(app, code);
   baton::add_movie_command(app, code);
-  if (const std::string fault = unknown_command(app, argc, argv); !fault.empty()) {
-    fmt::print(stderr, "{}\n", fault);
-    return static_cast<int>(baton::ExitCode::usage);
+  for (const auto& look : {unknown_command, unknown_option}) {
+    if (const std::string fault = look(app, argc, argv); !fault.empty()) {
+      fmt::print(stderr, "{}\n", fault);
+      return static_cast<int>(baton::ExitCode::usage);
+    }
   }
   try {
     app.parse(argc, argv);

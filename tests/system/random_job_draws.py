@@ -136,6 +136,7 @@ class Draw(Motion, Pictures, Textures):
             "scene.meshes.*.mesh": nothing, "scene.meshes.*.primitive": nothing,
             "scene.meshes.*.shapedBy": nothing, "shapedBy.node": lambda: 8, "shapedBy.animation.startFrame": lambda: self.first_frame,
             "shapedBy.animation.fps": lambda: self.pick(4, 24), "shapedBy.places[].node": lambda: self.pick(9, 10, 11, 0),
+            "shapedBy.animation.name": lambda: self.pick(None, None, "0"), "scene.gltf.animation": lambda: self.pick(None, None, None, "0"),
             "shapedBy.places[].matrix": self.matrix,
             "scene.objects[].fitHeight": lambda: self.pick(None, None, None, 1.2),
             "scene.objects[].name": lambda: self.pick(None, None, None, "a name", "ground"),
@@ -272,7 +273,8 @@ class Draw(Motion, Pictures, Textures):
 
     def gltf(self, node):
         self.files["walk.gltf"] = {"kind": "walk", "distance": self.pick(3.0, 5.0)}
-        return {"file": "walk.gltf", "node": node, "fps": self.pick(4, 24), "startFrame": self.first_frame}
+        more = {"animation": "0"} if self.chance(0.3) else {}
+        return {"file": "walk.gltf", "node": node, "fps": self.pick(4, 24), "startFrame": self.first_frame, **more}
 
     def table(self):
         # Overwritten when there is a second one; unused when the material is drawn again.

@@ -76,6 +76,11 @@ def wrong_command_lines(programs, folder):
             (["rendr", "job.json"], USAGE, 'baton rendr: no such command; did you mean "render"?'),
             (["job", "lst"], USAGE, 'job lst: no such command; did you mean "list"?'),
             (["rendr"], USAGE, ""),
+            (["render", "job.json", "--frame", "3"], USAGE, 'render: no option --frame; did you mean "--frames"?'),
+            (["render", "job.json", "--threads=2"], USAGE, 'no option --threads; did you mean "--threads-per-worker"?'),
+            (["check", "--explian"], USAGE, 'check: no option --explian; did you mean "--explain"?'),
+            (["--verison"], USAGE, 'baton: no option --verison; did you mean "--version"?'),
+            (["farm", "slurm", "job.json", "--node", "2"], USAGE, 'slurm: no option --node; did you mean "--nodes"?'),
             (["check"], USAGE, "JOB is required"),
             (["job", "wait", "abc", "--timeout", "-1"], USAGE, "--timeout"),
             (["job", "list", "--coordinator", "nonsense"], USAGE, "nonsense"),
@@ -114,6 +119,30 @@ def what_is_typed_beats_the_environment(programs, folder):
         alone = desk.baton(*words, BATON_COORDINATOR="environment://here")
         check_says(alone.stderr, "environment://here")
     check(seen >= 13, f"only {seen} commands ask a coordinator")
+
+
+def a_sequence_of_maps_is_one_line(programs, folder):
+    desk = Desk(programs, folder)
+    for frame in range(1, 8):
+        grey_map(folder / f"night.{frame:04}.hdr", 4, 2 if frame < 6 else 4)
+    grey_map(folder / "dusk.hdr", 4, 2)
+    desk.job(frames="1-7", environment={"frames": "night.####.hdr"})
+    said = desk.expect(OK, "check", "job.json").stdout
+    maps = [line.split(" ", 1)[1].replace(f"{folder}/", "").strip() for line in said.splitlines() if line.startswith("map ")]
+    check_equal(maps, ["night.0001.hdr to night.0005.hdr, 5 maps (4x2)", "night.0006.hdr to night.0007.hdr, 2 maps (4x4)"], "maps")
+    desk.job(frames="1-7", environment={"keys": [{"frame": 1, "map": "night.0001.hdr"}, {"frame": 7, "map": "dusk.hdr"}]})
+    check_equal(desk.expect(OK, "check", "job.json").stdout.count("\nmap "), 2, "maps of two names")
+
+
+def what_keys_say_otherwise_is_told(programs, folder):
+    desk = Desk(programs, folder)
+    keys = [{"frame": f, "position": [f, 1, 4], "lookAt": [0, 0, 0]} for f in (1, 2)]
+    for camera, idle in [({"position": [9, 9, 9]}, ["position"]), ({"lookAt": [1, 1, 1]}, ["lookAt"]), ({"up": [1, 1, 0]}, []),
+                         ({"position": [1, 1, 4]}, []), ({}, [])]:
+        desk.job(frames="1-2", camera={**camera, "keys": keys})
+        said = desk.expect(OK, "check", "job.json").stdout
+        found = [line for line in said.splitlines() if "no effect, as every key of camera.keys has its own" in line]
+        check_equal(found, [f"warning    camera.{key}: no effect, as every key of camera.keys has its own" for key in idle], str(camera))
 
 
 def job_faults_come_all_at_once(programs, folder):

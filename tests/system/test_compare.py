@@ -4,7 +4,8 @@
 import json
 import re
 
-from farm import OK, check, check_equal, run_tests
+from exr_frames import read_frame
+from farm import OK, USAGE, check, check_equal, run_tests
 from jobs import make_job, write_job
 
 
@@ -25,7 +26,7 @@ def noise_of_rows(done):
 
 def both_rows_are_measured_and_shown(programs, folder):
     paths = pair(folder)
-    done = programs.run("baton", "compare", *paths, "--output", folder / "out", expect=OK)
+    done = programs.run("baton", "compare", *paths, "--noise", "--output", folder / "out", expect=OK)
     rows = noise_of_rows(done)
     check_equal(sorted(rows), ["one", "two"], "rows")
     check(all(0 < noise < 100 for noise in rows.values()), f"noise of some kind, got {rows}")
@@ -41,12 +42,28 @@ def noise_is_what_render_tells(programs, folder):
     paths = pair(folder, image=image)
     one = json.loads(paths[0].read_text())
     paths[0] = write_job(paths[0], {**one, "image": image})
-    rows = noise_of_rows(programs.run("baton", "compare", *paths, "--output", folder / "out", expect=OK))
+    rows = noise_of_rows(programs.run("baton", "compare", *paths, "--noise", "--output", folder / "out", expect=OK))
     for path, name in zip(paths, ("one", "two")):
         summary = json.loads(programs.render(path, folder / f"work{name}", extra=["--json"]).stdout)
         told = 100 * summary["judgement"]["noise"]
         print(f"  {name}: render tells {told:.2f} %, compare {rows[name]:.2f} %")
         check(abs(told / rows[name] - 1) < 0.2, f"{name}: render tells {told} %, compare {rows[name]} %")
+
+
+def no_more_is_rendered_than_is_asked_for(programs, folder):
+    paths = pair(folder)
+    done = programs.run("baton", "compare", *paths, "--frames", "2,4", "--scale", ".5", "--set", "image.sites=1", "--out",
+                        folder / "look.png", expect=OK)
+    check("noise" not in done.stdout, f"nothing of noise, got {done.stdout}")
+    check((folder / "look.png").stat().st_size > 500, "the sheet, where --out says")
+    output = folder / "one-compared-look"
+    for name in ("one", "two"):
+        check_equal(sorted(p.name for p in (output / name).glob("*.exr")), ["frame.0002.exr", "frame.0004.exr"], name)
+    check_equal(sorted(p.name for p in output.iterdir() if p.name != ".baton"), ["one", "two"], "of other seeds nothing")
+    check(not list((output / ".baton").rglob("*.exr")), "of other seeds nothing in the work folder")
+    full = json.loads(paths[0].read_text())["image"]["width"]
+    check_equal(read_frame(output / "one/frame.0002.exr").width, full // 2, "width")
+    programs.refuses("compare", *paths, "--frame", "2", says="compare: no option --frame; did you mean \"--frames\"?", expect=USAGE)
 
 
 def jobs_that_cannot_be_compared_are_told_apart(programs, folder):

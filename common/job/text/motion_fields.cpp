@@ -28,11 +28,12 @@ void check_view(JobArchive& a, const Vec3& position, const Vec3& look_at, const 
   }
 }
 
-void fields(JobArchive& a, CameraKey& key) {
+/// up: of a key that has none.
+void fields(JobArchive& a, CameraKey& key, const Vec3& up) {
   a.number(required("frame"), key.frame, kFrameRange);
   a.vector(required("position"), key.position, kCoordinateRange);
   a.vector(required("lookAt"), key.look_at, kCoordinateRange);
-  a.vector("up", key.up, kCoordinateRange);
+  if (!a.vector("up", key.up, kCoordinateRange)) key.up = up;
   a.number("verticalFovDeg", key.vertical_fov_deg, kFovRange);
   check_view(a, key.position, key.look_at, key.up);
 }
@@ -65,10 +66,11 @@ void gltf_field(JobArchive& a, std::optional<GltfMotion>& gltf) {
   if (a.object("gltf", [&] { fields(a, source); }, {.present = gltf.has_value()})) gltf = source;
 }
 
-/// Keys, where no file says how things move.
-template <class K>
-void key_fields(JobArchive& a, std::vector<K>& keys, const std::optional<GltfMotion>& gltf) {
-  a.list("keys", keys, limits::kMaxFrames, [&](K& key) { fields(a, key); });
+/// Keys, where no file says how things move. more: what a key takes from its owner.
+template <class K, class... More>
+void key_fields(JobArchive& a, std::vector<K>& keys, const std::optional<GltfMotion>& gltf,
+                const More&... more) {
+  a.list("keys", keys, limits::kMaxFrames, [&](K& key) { fields(a, key, more...); });
   check_ascending(a, "keys", keys);
   if (gltf && !keys.empty()) a.fault("gltf", "either keys or gltf", "both");
 }
@@ -117,7 +119,7 @@ void fields(JobArchive& a, CameraSpec& camera) {
     camera.shift = {static_cast<float>(shift[0]), static_cast<float>(shift[1])};
   a.number("aperture", camera.aperture, {0, kMaxLength});
   a.number("focusDistance", camera.focus_distance, {0, kMaxLength});
-  key_fields(a, camera.keys, camera.gltf);
+  key_fields(a, camera.keys, camera.gltf, camera.up);
   if (!camera.node.empty() && (camera.gltf || !camera.keys.empty()))
     a.fault("node", "either node, keys or gltf", "several");
 }

@@ -2,6 +2,7 @@
 
 #include <map>
 #include <nlohmann/json.hpp>
+#include <tuple>
 
 #include "common/job/motion.h"
 #include "common/job/plan/estimate.h"
@@ -109,17 +110,39 @@ void print_json(const JobSpec& job, const JobEstimate& e, const AssetReport& ass
   fmt::print("{}\n", result.dump(2));
 }
 
+/// Whether two maps are alike and are called alike but for digits.
+bool is_one_series(const MapReport& a, const MapReport& b) {
+  const auto without_digits = [](std::string path) {
+    std::erase_if(path, [](char c) { return c >= '0' && c <= '9'; });
+    return path;
+  };
+  const auto facts = [](const MapReport& map) {
+    return std::tie(map.width, map.height, map.file_width, map.file_height, map.colors);
+  };
+  return facts(a) == facts(b) && without_digits(a.path) == without_digits(b.path);
+}
+
+/// A line for each, or for each series of them.
+void print_maps(const std::vector<MapReport>& maps) {
+  for (std::size_t first = 0, last = 0; first < maps.size(); first = last + 1) {
+    last = first;
+    while (last + 1 < maps.size() && is_one_series(maps[first], maps[last + 1])) ++last;
+    const MapReport& map = maps[first];
+    const std::string until =
+        last > first ? fmt::format(" to {}, {} maps", maps[last].path, last - first + 1) : "";
+    fmt::print("map        {}{} ({}x{})\n", map.path, until, map.file_width, map.file_height);
+    if (map.width < map.file_width)
+      fmt::print("           reduced to {}x{}\n", map.width, map.height);
+    if (!map.colors.empty()) fmt::print("           converted: {}\n", map.colors);
+  }
+}
+
 void print_assets(const AssetReport& assets) {
   fmt::print("geometry   {} triangles in {} instances of {} meshes\n", assets.triangles,
              assets.instances, assets.meshes);
   if (assets.deforming_meshes > 0)
     fmt::print("           {} of the meshes deform\n", assets.deforming_meshes);
-  for (const MapReport& map : assets.maps) {
-    fmt::print("map        {} ({}x{})\n", map.path, map.file_width, map.file_height);
-    if (map.width < map.file_width)
-      fmt::print("           reduced to {}x{}\n", map.width, map.height);
-    if (!map.colors.empty()) fmt::print("           converted: {}\n", map.colors);
-  }
+  print_maps(assets.maps);
   if (const auto& map = assets.camera_map) {
     fmt::print("cameraMap  {} ({}x{})\n", map->path, map->file_width, map->file_height);
     if (!map->colors.empty()) fmt::print("           converted: {}\n", map->colors);

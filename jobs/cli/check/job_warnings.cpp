@@ -86,6 +86,23 @@ void output_warnings(const JobSpec& job, const std::function<double()>& share,
   }
 }
 
+/// Where the camera is and looks, if keys say it otherwise.
+void idle_camera_warnings(const CameraSpec& camera, std::vector<std::string>& warnings) {
+  if (camera.keys.empty()) return;
+  const auto look = [&](const char* key, Vec3 CameraSpec::*own, Vec3 CameraKey::*of_key) {
+    const bool is_used = camera.*own == CameraSpec().*own ||
+                         std::ranges::any_of(camera.keys, [&](const CameraKey& k) {
+                           return k.*of_key == camera.*own;
+                         });
+    if (!is_used)
+      warnings.push_back(
+          fmt::format("camera.{}: no effect, as every key of camera.keys has its own", key));
+  };
+  look("position", &CameraSpec::position, &CameraKey::position);
+  look("lookAt", &CameraSpec::look_at, &CameraKey::look_at);
+  look("up", &CameraSpec::up, &CameraKey::up);
+}
+
 /// Values of `output` that say nothing here.
 void idle_output_warnings(const JobSpec& job, std::vector<std::string>& warnings) {
   if (job.output.plate && !has_plate(job.output))
@@ -120,6 +137,7 @@ void text_warnings(const JobSpec& job, bool light_jumps, const std::function<dou
   append(limit_warnings(job, light_jumps), warnings);
   append(scene_warnings(job.scene), warnings);
   aov_warnings(job, warnings);
+  idle_camera_warnings(job.camera, warnings);
   idle_output_warnings(job, warnings);
   output_warnings(job, share, warnings);
 }

@@ -9,6 +9,7 @@
 #include "common/image/contact_sheet.h"
 #include "common/job/motion.h"
 #include "common/math/bounds.h"
+#include "common/scene/object_view.h"
 #include "common/scene/pose.h"
 #include "jobs/cli/check/preview_canvas.h"
 
@@ -110,7 +111,7 @@ void draw_scene(const JobSpec& job, const Scene& scene, const Shot& shot, Previe
     const Bounds& box = shot.objects[i];
     if (box.empty()) continue;
     const Vec3 top{box.center().x, box.high.y, box.center().z};
-    canvas.label(top, fmt::format("{} {}", i, job.scene.objects[i].mesh));
+    canvas.label(top, fmt::format("{} {}", i, label_of(job.scene.objects[i])));
   }
 }
 
@@ -175,15 +176,15 @@ std::vector<std::string> object_lines(const JobSpec& job, const Scene& scene) {
     const Bounds& box = shot.objects[i];
     const ObjectSpec& object = job.scene.objects[i];
     if (box.empty()) {
-      lines.push_back(fmt::format("{} {} ({}): empty", i, object.mesh, object.material));
+      lines.push_back(fmt::format("{} {} ({}): empty", i, label_of(object), object.material));
       continue;
     }
     const Vec3 size = box.size();
     lines.push_back(
         fmt::format("{} {} ({}): {:.3g} x {:.3g} x {:.3g}, x {:.3g} to {:.3g}, y {:.3g} to {:.3g}, "
                     "z {:.3g} to {:.3g}",
-                    i, object.mesh, object.material, size.x, size.y, size.z, box.low.x, box.high.x,
-                    box.low.y, box.high.y, box.low.z, box.high.z));
+                    i, label_of(object), object.material, size.x, size.y, size.z, box.low.x,
+                    box.high.x, box.low.y, box.high.y, box.low.z, box.high.z));
   }
   return lines;
 }

@@ -2,7 +2,6 @@
 #include <spdlog/spdlog.h>
 
 #include <algorithm>
-#include <array>
 #include <cmath>
 #include <memory>
 #include <thread>
@@ -15,6 +14,7 @@
 #include "jobs/cli/commands.h"
 #include "jobs/cli/farm_job_runner.h"
 #include "jobs/cli/frame_sheet.h"
+#include "jobs/cli/job_argument.h"
 #include "jobs/cli/settle_method.h"
 #include "jobs/cli/text.h"
 
@@ -30,16 +30,19 @@ constexpr std::size_t kSheetColumns = 6;
 
 struct CompareOptions {
   std::vector<std::string> jobs;
-  /// empty: FILE-compared beside the first job.
+  JobArgument changes;  ///< of all jobs, without a file
+  /// empty: FILE-compared beside the first job, with -look behind it where something is changed.
   std::string output;
+  std::string sheet;  ///< empty: comparison.png in the folder
+  bool noise = false;
   int workers = 1;
 };
 
 /// One of the jobs and what was seen of it.
 struct Compared {
   JobSpec job;
-  std::array<JobSpec, 2> seeds;  ///< for its noise
-  JobSummary summary;
+  std::vector<JobSpec> seeds{};  ///< two for its noise, where that is measured
+  JobSummary summary{};
   double noise = 0;  ///< FrameNoise::relative(), rms over frames
 };
 
@@ -60,13 +63,17 @@ JobSpec with_seed(JobSpec job, std::size_t number, std::uint64_t more, const fs:
 /// The job as it is, but for its folder: the frames that somebody has rendered stay.
 Result<Compared> load(const CompareOptions& options, std::size_t number, const fs::path& output,
                       const FarmOptions& farm) {
-  BATON_ASSIGN(JobSpec written, load_job(options.jobs[number]));
+  JobArgument argument = options.changes;
+  argument.file = options.jobs[number];
+  BATON_ASSIGN(JobSpec written, load_job(argument.file, overrides_of(argument)));
   Compared compared;
-  BATON_ASSIGN(compared.job, settle_motion(std::move(written)));
+  std::vector<std::string> left_out;
+  BATON_ASSIGN(compared.job, settle_motion(std::move(written), &left_out));
+  for (const std::string& line : left_out) spdlog::warn("{}", line);
   BATON_TRY(settle_method(compared.job, farm));
   compared.job.output.directory = output / compared.job.name;
-  for (std::size_t i = 0; i < compared.seeds.size(); ++i)
-    compared.seeds[i] = with_seed(compared.job, number, i + 1, farm.work_directory);
+  for (std::size_t seed = 1; options.noise && seed <= 2; ++seed)
+    compared.seeds.push_back(with_seed(compared.job, number, seed, farm.work_directory));
   return compared;
 }
 
@@ -120,28 +127,34 @@ Status write_rows(const std::vector<Compared>& jobs, const fs::path& path) {
   return write_sheet(path, std::move(thumbnails), numbers, static_cast<int>(frames.size()), {});
 }
 
-void print_table(const std::vector<Compared>& jobs, const fs::path& sheet) {
+void print_table(const std::vector<Compared>& jobs, bool with_noise, const fs::path& sheet) {
   std::size_t width = 4;
   for (const Compared& compared : jobs) width = std::max(width, compared.job.name.size());
-  fmt::print("{:<{}}  {:>9}  {:>7}  {:>11}  {}\n", "job", width, "CPU", "noise", "handed on",
-             "frames");
+  const std::string noise = with_noise ? fmt::format("  {:>7}", "noise") : "";
+  fmt::print("{:<{}}  {:>9}{}  {:>11}  {}\n", "job", width, "CPU", noise, "handed on", "frames");
   for (const Compared& compared : jobs) {
-    fmt::print("{:<{}}  {:>7.1f} s  {:>5.3g} %  {:>11}  {}/{}\n", compared.job.name, width,
-               compared.summary.stats.cpu_seconds, 100 * compared.noise,
+    fmt::print("{:<{}}  {:>7.1f} s{}  {:>11}  {}/{}\n", compared.job.name, width,
+               compared.summary.stats.cpu_seconds,
+               with_noise ? fmt::format("  {:>5.3g} %", 100 * compared.noise) : "",
                bytes_text(compared.summary.state_bytes), compared.job.output.directory,
                compared.job.output.pattern);
   }
-  fmt::print(
-      "noise: a pixel's standard deviation, rms, over the mean radiance, by two more seeds\n");
+  if (with_noise)
+    fmt::print(
+        "noise: a pixel's standard deviation, rms, over the mean radiance, by two more seeds\n");
   fmt::print("handed on: sample state, packed, from frame to frame\n");
   fmt::print("sheet, a row for each job: {}\n", sheet.string());
 }
 
-Result<ExitCode> run_compare(const CompareOptions& options) {
+fs::path output_folder(const CompareOptions& options) {
+  if (!options.output.empty()) return fs::absolute(options.output);
   const fs::path first = fs::absolute(options.jobs.front());
-  const fs::path output = options.output.empty()
-                              ? first.parent_path() / (first.stem().string() + "-compared")
-                              : fs::absolute(options.output);
+  const char* const look = overrides_of(options.changes).empty() ? "" : "-look";
+  return first.parent_path() / (first.stem().string() + "-compared" + look);
+}
+
+Result<ExitCode> run_compare(const CompareOptions& options) {
+  const fs::path output = output_folder(options);
   const int processors = std::max(1, static_cast<int>(std::thread::hardware_concurrency()));
   const FarmOptions farm{.workers = options.workers,
                          .threads_per_worker = std::max(1, processors / options.workers),
@@ -153,7 +166,7 @@ Result<ExitCode> run_compare(const CompareOptions& options) {
   }
   BATON_TRY(check_alike(jobs, options));
 
-  // Render all of them, and each with two more seeds.
+  // Render all of them, and with their other seeds.
   std::vector<JobSpec> all;
   for (const Compared& compared : jobs) all.push_back(compared.job);
   for (const Compared& compared : jobs)
@@ -172,11 +185,13 @@ Result<ExitCode> run_compare(const CompareOptions& options) {
   }
 
   for (Compared& compared : jobs) {
+    if (!options.noise) continue;
     BATON_ASSIGN(compared.noise, noise_of(compared));
   }
-  const fs::path sheet = output / "comparison.png";
+  const fs::path sheet =
+      options.sheet.empty() ? output / "comparison.png" : fs::path(options.sheet);
   BATON_TRY(write_rows(jobs, sheet));
-  print_table(jobs, sheet);
+  print_table(jobs, options.noise, sheet);
   return ExitCode::ok;
 }
 
@@ -189,13 +204,20 @@ void add_compare_command(CLI::App& app, ExitCode& code) {
   command->add_option("JOBS", options->jobs, "two to eight job files, of the same frames and size")
       ->required()
       ->expected(2, 8);
+  add_override_options(*command, options->changes);
+  command->add_flag("--noise", options->noise,
+                    "also measures noise, by two more seeds of the first twelve frames");
+  command->add_option("--out", options->sheet,
+                      "the sheet as PNG; default: comparison.png in the folder of --output");
   command->add_option("--output", options->output,
-                      "folder of frames and sheet; default: FILE-compared beside the first job");
+                      "folder of frames and sheet; default: FILE-compared beside the first job, "
+                      "with -look behind it where options change the jobs");
   command->add_option("--workers", options->workers, "worker processes; default: 1")
       ->check(CLI::Range(1, 256));
   command->footer(
       "Example:\n"
-      "  baton compare papers.json pool.json\n"
+      "  baton compare papers.json pool.json --noise\n"
+      "  baton compare papers.json pool.json --frames 12 --scale .25 --out look.png\n"
       "Ctrl-C stops; the same command goes on where it stopped.");
   command->callback([options, &code] { code = finish_with_coordinator(run_compare(*options)); });
 }

@@ -146,5 +146,23 @@ TEST(Radiance, HeadersSayWhatIsWrong) {
   }
 }
 
+TEST(Radiance, KeysMayHaveSmallLetters) {
+  const auto said = [](const std::string& line) {
+    const Bytes file = file_of("#?RADIANCE\nFORMAT=32-bit_rle_rgbe\n" + line + "\n\n-Y 1 +X 1\n",
+                               {128, 64, 32, 129});
+    const auto header = read_radiance_header(file, "a.hdr");
+    EXPECT_TRUE(header) << line;
+    return header ? header->colors : ImageColors{};
+  };
+  for (const auto& [large, small] :
+       {std::pair{"EXPOSURE=2", "exposure=2"},
+        {"COLORCORR=1 2 4", "ColorCorr=1 2 4"},
+        {"PRIMARIES=.7 .3 .2 .7 .1 .1 .3 .3", "primaries=.7 .3 .2 .7 .1 .1 .3 .3"},
+        {"FORMAT=32-bit_rle_xyze", "format=32-bit_rle_xyze"}}) {
+    EXPECT_EQ(said(small), said(large)) << small;
+    EXPECT_NE(said(small), said("exposures=2")) << small;
+  }
+}
+
 }  // namespace
 }  // namespace baton

@@ -66,6 +66,16 @@ TEST(JobJson, ReadsBackWhatItWrites) {
   EXPECT_GE(count, 3);
 }
 
+TEST(JobJson, KeysOfACameraTakeItsUpWhereTheyHaveNone) {
+  const JobSpec job = parsed(job_text(R"("camera": {"up": [1, 2, 0], "keys": [
+      {"frame": 1, "position": [0, 0, 5], "lookAt": [0, 0, 0]},
+      {"frame": 2, "position": [0, 0, 6], "lookAt": [0, 0, 0], "up": [0, 1, 1]}]})"));
+  ASSERT_EQ(job.camera.keys.size(), 2u);
+  EXPECT_EQ(job.camera.keys[0].up, (Vec3{1, 2, 0}));
+  EXPECT_EQ(job.camera.keys[1].up, (Vec3{0, 1, 1}));
+  EXPECT_EQ(parsed(to_json(job)), job);
+}
+
 TEST(JobJson, TakesAnEmptyBaseDirectoryForTheCurrentOne) {
   const Result<JobSpec> job = parse_job(job_text(""), "job.json", "");
   ASSERT_TRUE(job.ok()) << job.error().message;

@@ -368,6 +368,12 @@ TEST(GltfParts, RepetitionsWithoutVolumeAreCounted) {
       HasSubstr("2 of 3 instances of node \"grass\" have a scale of 0 in all frames: they"));
 }
 
+TEST(GltfParts, ObjectsAreCalledByTheirNodes) {
+  const std::vector<float> aside{90, 0, 0, 92, 0, 0, 94, 0, 0}, scales(9, 1.0f);
+  EXPECT_THAT(Loaded(repeated_glb(aside, scales, "far reed")).said,
+              Contains(HasSubstr("object 2 (far reed) is outside of the picture")));
+}
+
 /// Where node "a" is at frames 1, 2, 3, with keys at seconds 1, 2 and 3 (frame n is second n).
 struct Keyed {
   Keyed(const std::string& curve, const std::vector<float>& times,
