@@ -41,7 +41,8 @@ struct CompareOptions {
 /// One of the jobs and what was seen of it.
 struct Compared {
   JobSpec job;
-  std::vector<JobSpec> seeds{};  ///< two for its noise, where that is measured
+  /// Two for its noise, where that is measured.
+  std::vector<JobSpec> seeds{};
   JobSummary summary{};
   double noise = 0;  ///< FrameNoise::relative(), rms over frames
 };
