@@ -197,6 +197,9 @@ Status FarmCore::perform(const RecordJobStatus& action) {
     marked_.erase(action.job);
     BATON_TRY(journal.record_output_mark(action.job, false));
   }
+  // Workers that have its document from before do not ask for it again.
+  if (action.status == JobStatus::running && !marked_.contains(action.job))
+    BATON_TRY(mark_output(action.job));
   if (!is_open(action.status)) ended_.push_back(action.job);
   return journal.record_status(action.job, action.status);
 }

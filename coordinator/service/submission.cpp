@@ -145,10 +145,7 @@ Status Submission::begin(const PeerId& peer, const ParsedJobDocument& document,
   const std::size_t place = farm_.num_replies();
   BATON_TRY(farm_.step(event));
   if (has_all) BATON_TRY(farm_.step(FramesInspected{digest}));
-  if (lost.num_frames > 0) {
-    const Result<std::string> marked = farm_.mark_output(digest);
-    if (!marked) return marked.error();
-  }
+  BATON_TRY(farm_.mark_output(digest));
   const Scheduler::Job& job = *farm_.scheduler.find_job(digest);
   const std::string plan = plan_text(job, reasons);
   const bool already_there = known && !is_open(job.status) && event.lost.empty();

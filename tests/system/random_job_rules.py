@@ -154,8 +154,9 @@ def shadows_in_alpha_of_what_is_transparent(job, _rng):
 def one_kind_of_motion(job, _rng):
     rotation = job["environment"].get("rotation", {})
     if rotation.get("keys"):
-        rotation.pop("startDeg", None)
-        rotation.pop("degPerFrame", None)
+        for angle in ("startDeg", "degPerFrame"):
+            if rotation.get(angle):  # 0 says nothing
+                rotation.pop(angle)
     for movable in [job["camera"], *job["scene"]["objects"]]:
         if movable.get("keys"):
             movable.pop("gltf", None)
