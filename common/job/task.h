@@ -120,7 +120,7 @@ struct Grant {
   LeaseId lease;
   std::vector<BlobRef> inputs;
   /// What a render task renders. Empty: nothing; the state of step `last` is cut from the inputs.
-  /// For another task: the position of its key, twice.
+  /// A second pass: its step. An assembly: of no meaning.
   StepSpan steps{};
   bool may_hold = false;  ///< the worker may hold the task's state
   Step states_from{};     ///< no task needs states of earlier steps

@@ -109,8 +109,8 @@ std::vector<TaskIndex> JobGraph::inputs(const TaskKey& key) const {
 }
 
 StepSpan JobGraph::steps(const TaskKey& key) const {
-  if (key.kind == TaskKind::render) return timeline_.steps_of(key.run());
-  return {Step(key.position), Step(key.position)};
+  return key.kind == TaskKind::render ? timeline_.steps_of(key.run())
+                                      : StepSpan{key.step(), key.step()};
 }
 
 std::uint64_t JobGraph::num_pixels(std::int32_t tile) const {
@@ -157,9 +157,13 @@ std::optional<std::string> JobGraph::check_outputs(const TaskKey& key,
 
 std::optional<std::string> JobGraph::check_frames(const TaskKey& key,
                                                   const std::vector<FrameStats>& frames) const {
-  const StepSpan span = steps(key);
-  std::int32_t next = span.first.value(), last = span.last.value();
-  if (key.kind == TaskKind::second_pass) next = last + 1;  // none
+  // By step, or by frame; none of a second pass.
+  std::int32_t next = 0, last = -1;
+  if (key.kind == TaskKind::assemble) next = last = key.frame().value();
+  if (key.kind == TaskKind::render) {
+    next = steps(key).first.value();
+    last = steps(key).last.value();
+  }
   for (const FrameStats& stats : frames) {
     if (stats.tile != key.tile || stats.position < next || stats.position > last) {
       return fmt::format("the report has statistics of {} index {}, tile {}, out of place",

@@ -52,7 +52,7 @@ class JobGraph {
   /// The tasks that this one needs, in tile order.
   std::vector<TaskIndex> inputs(const TaskKey& key) const;
 
-  /// The steps that a render task works on; of another task the position of its key, twice.
+  /// The steps that a render task or a second pass works on.
   StepSpan steps(const TaskKey& key) const;
 
   /// Whether a render task hands its samples to the next run.

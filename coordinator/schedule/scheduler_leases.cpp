@@ -10,9 +10,11 @@
 namespace baton {
 namespace {
 
-/// None for a cut: its state is that of the last step.
+/// Grant::steps. None for a cut: its state is that of the last step.
 StepSpan steps_to_render(const JobTasks& tasks, TaskIndex task) {
-  const StepSpan steps = tasks.graph().steps(tasks.graph().key(task));
+  const TaskKey key = tasks.graph().key(task);
+  if (key.kind == TaskKind::assemble) return {};
+  const StepSpan steps = tasks.graph().steps(key);
   return tasks.ledger().is_cut(task) ? StepSpan{steps.last + 1, steps.last} : steps;
 }
 

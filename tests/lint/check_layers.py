@@ -10,6 +10,10 @@ import sys
 import tempfile
 from pathlib import Path
 
+sys.dont_write_bytecode = True
+
+import checker  # noqa: E402
+
 # Room -> rooms whose headers it may include besides its own. A room is a folder with sources. No rules go in a circle.
 COMMON_BASE = {"common/base"}
 COMMON_DATA = COMMON_BASE | {"common/math"}
@@ -241,21 +245,5 @@ def self_test():
     return missed
 
 
-def main():
-    if sys.argv[1:] == ["--self-test"]:
-        return 1 if self_test() else 0
-    root = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).resolve().parents[2]
-    if len(sys.argv) > 2 or not root.is_dir():
-        print(__doc__, file=sys.stderr)
-        return 64
-    # The checker is trusted only as long as it finds what it must.
-    if self_test():
-        return 1
-    found = violations(root)
-    for line in found:
-        print(line)
-    return 1 if found else 0
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(checker.run(__doc__, self_test, violations))

@@ -15,6 +15,7 @@ from pathlib import Path
 sys.dont_write_bytecode = True
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "jobs/lab"))
 
+import checker  # noqa: E402
 import tables  # noqa: E402
 
 USER_WORDS, ARCHITECTURE_WORDS, PAGE_WORDS = 20000, 1200, 2400
@@ -155,21 +156,5 @@ def self_test():
     return missed
 
 
-def main():
-    if sys.argv[1:] == ["--self-test"]:
-        return 1 if self_test() else 0
-    root = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).resolve().parents[2]
-    if len(sys.argv) > 2 or not root.is_dir():
-        print(__doc__, file=sys.stderr)
-        return 64
-    # The checker is trusted only as long as it finds what it must.
-    if self_test():
-        return 1
-    found = faults(root)
-    for line in found:
-        print(line)
-    return 1 if found else 0
-
-
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(checker.run(__doc__, self_test, faults))

@@ -12,6 +12,7 @@ from pathlib import Path
 sys.dont_write_bytecode = True
 sys.path.insert(0, str(Path(__file__).resolve().parents[2] / "jobs/lab"))
 
+import checker  # noqa: E402
 import rooms  # noqa: E402
 
 
@@ -83,23 +84,11 @@ def self_test():
     return missed
 
 
-def main():
-    if sys.argv[1:] == ["--self-test"]:
-        return 1 if self_test() else 0
-    root = Path(sys.argv[1]) if len(sys.argv) > 1 else Path(__file__).resolve().parents[2]
-    if len(sys.argv) > 2 or not root.is_dir():
-        print(__doc__, file=sys.stderr)
-        return 64
-    # The checker is trusted only as long as it finds what it must.
-    if self_test():
-        return 1
-    found = differences((root / rooms.FIGURE).read_text(encoding="utf-8"), rooms.sources_of_tree(root))
-    for line in found:
-        print(f"{rooms.FIGURE}: {line}")
-    if found:
-        print(f"{rooms.FIGURE}: draw it again when the sources are committed: jobs/lab/rooms.py e1e9939")
-    return 1 if found else 0
+def faults(root):
+    """Lines that say where the figure differs from the tree, and what to do then."""
+    found = [f"{rooms.FIGURE}: {line}" for line in differences((root / rooms.FIGURE).read_text(encoding="utf-8"), rooms.sources_of_tree(root))]
+    return found + [f"{rooms.FIGURE}: draw it again when the sources are committed: jobs/lab/rooms.py e1e9939"] if found else []
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    sys.exit(checker.run(__doc__, self_test, faults))

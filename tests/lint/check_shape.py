@@ -10,6 +10,10 @@ import re
 import sys
 from pathlib import Path
 
+sys.dont_write_bytecode = True
+
+import checker  # noqa: E402
+
 MAX_FUNCTION_LINES = 70  # of code, without comments and blank lines
 MAX_MEMBERS = 70  # functions, each overload counted, and values
 # Longer ones, that may only get shorter.
@@ -174,25 +178,20 @@ def self_test():
     return wrong
 
 
-def main():
-    if sys.argv[1:] == ["--self-test"]:
-        return 1 if self_test() else 0
-    wants_list = sys.argv[1:] == ["--list"]
-    root = Path(sys.argv[1]) if len(sys.argv) > 1 and not wants_list else Path(__file__).resolve().parents[2]
-    # The checker is trusted only as long as it finds what it must.
-    if self_test():
-        return 1
+def print_list(root):
+    """The longest functions and the largest classes."""
     shapes = list(all_shapes(root))
-    if wants_list:
-        for kind, measure in (("function", int), ("class", sum)):
-            largest = sorted((s for s in shapes if s[1] == kind), key=lambda s: -measure(s[4]))[:25]
-            print("\n".join(f"{path}:{line}: {kind} {name}: {size}" for path, _, name, line, size in largest))
-        return 0
-    found = [f"{path}:{line}: {fault}" for path, kind, name, line, size in shapes if (fault := fault_of(path, kind, name, size))]
-    for line in found:
-        print(line)
-    return 1 if found else 0
+    for kind, measure in (("function", int), ("class", sum)):
+        largest = sorted((s for s in shapes if s[1] == kind), key=lambda s: -measure(s[4]))[:25]
+        print("\n".join(f"{path}:{line}: {kind} {name}: {size}" for path, _, name, line, size in largest))
+
+
+def faults(root):
+    return [f"{path}:{line}: {fault}" for path, kind, name, line, size in all_shapes(root) if (fault := fault_of(path, kind, name, size))]
 
 
 if __name__ == "__main__":
-    sys.exit(main())
+    if sys.argv[1:] == ["--list"]:
+        print_list(Path(__file__).resolve().parents[2])
+        sys.exit(0)
+    sys.exit(checker.run(__doc__, self_test, faults))

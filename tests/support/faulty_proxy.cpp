@@ -100,7 +100,7 @@ std::vector<std::string> describe(const Message& message) {
     texts.push_back("ReportReceived " + describe(received->lease));
   if (const auto* done = std::get_if<TaskDone>(&message)) {
     std::string text = "TaskDone " + describe(done->lease);
-    for (const BlobRef& output : done->outputs) {
+    for (const BlobRef& output : done->made.outputs) {
       if (output.is_held()) continue;  // no bytes that anybody could compare
       text += fmt::format(" {}:{}:{}", static_cast<int>(output.kind), output.position,
                           output.digest.hex());

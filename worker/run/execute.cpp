@@ -103,9 +103,9 @@ Status keep_state(const LoadedJob& loaded, BlobStore& store, bool may_hold, Samp
   return {};
 }
 
-Result<TaskResult> execute_render(const LoadedJob& loaded, BlobStore& store, const TaskKey& task,
-                                  const TaskGrant& grant, const std::stop_token& stop,
-                                  std::vector<BlobRef>* left) {
+Result<TaskResult> execute_render(const LoadedJob& loaded, BlobStore& store, const Grant& grant,
+                                  const std::stop_token& stop, std::vector<BlobRef>* left) {
+  const TaskKey& task = grant.lease.task;
   const StepSpan& steps = grant.steps;
   // Check what came over the wire against the job.
   if (steps.first < Step(0) || steps.size() < 0 || steps.last < Step(0) ||
@@ -249,13 +249,13 @@ Result<TaskResult> execute_assemble(const LoadedJob& loaded, const BlobStore& st
 
 }  // namespace
 
-Result<TaskResult> execute_task(const LoadedJob& loaded, BlobStore& store, const TaskKey& task,
-                                const TaskGrant& grant, const std::stop_token& stop,
-                                std::vector<BlobRef>* left) {
+Result<TaskResult> execute_task(const LoadedJob& loaded, BlobStore& store, const Grant& grant,
+                                const std::stop_token& stop, std::vector<BlobRef>* left) {
+  const TaskKey& task = grant.lease.task;
   loaded.states->release_before(grant.states_from);
   switch (task.kind) {
     case TaskKind::render:
-      return execute_render(loaded, store, task, grant, stop, left);
+      return execute_render(loaded, store, grant, stop, left);
     case TaskKind::second_pass:
       return execute_second_pass(loaded, store, task, grant.inputs);
     case TaskKind::assemble:

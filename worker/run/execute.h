@@ -29,24 +29,15 @@ struct TaskEnded {
   std::vector<BlobRef> left = {};  ///< in the store, by one that has no result
 };
 
-/// What a lease says beside the task: LeaseGrant in PROTOCOL.md.
-struct TaskGrant {
-  std::vector<BlobRef> inputs;
-  StepSpan steps{};  ///< as in Grant
-  bool may_hold = false;
-  Step states_from{};
-};
-
 /// Executes one task, of the grant's frames: reads its inputs from `store`, writes its outputs
 /// there (an assembled frame goes to the job's output folder and is durable on return; blobs are
 /// after store.sync()). A state that may be held stays in loaded.held if there is room.
 /// Deterministic. With an empty span of steps a render task's state is cut and joined from its
-/// inputs. Errors: a missing or damaged input, the disk, bad input of
-/// the renderer; ErrorKind::cancelled when `stop` is requested. After one, `left` is what had been
-/// put into the store.
-Result<TaskResult> execute_task(const LoadedJob& loaded, BlobStore& store, const TaskKey& task,
-                                const TaskGrant& grant, const std::stop_token& stop,
-                                std::vector<BlobRef>* left = nullptr);
+/// inputs. Errors: a missing or damaged input, the disk, bad input of the renderer;
+/// ErrorKind::cancelled when `stop` is requested. After one, `left` is what had been put into the
+/// store.
+Result<TaskResult> execute_task(const LoadedJob& loaded, BlobStore& store, const Grant& grant,
+                                const std::stop_token& stop, std::vector<BlobRef>* left = nullptr);
 
 /// Packs held states of a job into the store. Errors: the disk.
 Result<std::vector<PublishedState>> publish_held(const JobStates::List& states, BlobStore& store);

@@ -33,7 +33,7 @@ void RenderThreads::submit(QueuedTask task) {
 void RenderThreads::stop(const LeaseId& lease) {
   const std::lock_guard lock(mutex_);
   for (Slot& slot : slots_) {
-    if (slot.task.lease == lease) slot.stop.request_stop();
+    if (slot.task.grant.lease == lease) slot.stop.request_stop();
   }
 }
 
@@ -45,7 +45,7 @@ void RenderThreads::drop_queued() {
       continue;
     }
     // A copy: GCC 12 sees unset members in a moved temporary.
-    const TaskEnded dropped{slot->task.lease,
+    const TaskEnded dropped{slot->task.grant.lease,
                             Error{ErrorKind::cancelled, "dropped before it began"}};
     ended_.push_back(dropped);
     slot = slots_.erase(slot);
@@ -77,10 +77,10 @@ void RenderThreads::work() {
     // Execute it without the lock; list nodes do not move.
     lock.unlock();
     const std::stop_token stop = slot->stop.get_token();
-    TaskEnded end{slot->task.lease, Error{ErrorKind::cancelled, "stopped before it began"}};
+    TaskEnded end{slot->task.grant.lease, Error{ErrorKind::cancelled, "stopped before it began"}};
     if (!stop.stop_requested()) end.result = execute_(slot->task, stop, end.left);
     lock.lock();
-    left_thread_.push_back(slot->task.lease);
+    left_thread_.push_back(slot->task.grant.lease);
     executed_.tasks.push_back(std::move(slot->task));
     executed_.ends.push_back(std::move(end));
     slots_.erase(slot);

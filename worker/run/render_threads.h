@@ -16,8 +16,7 @@ namespace baton {
 
 /// What a render thread needs to execute one task without asking anybody.
 struct QueuedTask {
-  LeaseId lease;
-  TaskGrant grant;
+  Grant grant;
   std::shared_ptr<JobEntry> job;
   std::shared_ptr<BlobStore> store;
 };

@@ -192,8 +192,7 @@ void Session::receive(const LeaseGrant& grant, TimePoint now, Actions& actions) 
   }
   if (draining_) return;
   in_hand_.insert(grant.lease);
-  actions.push_back(
-      StartTask{grant.lease, {grant.inputs, grant.steps, grant.may_hold, grant.states_from}});
+  actions.push_back(StartTask{grant});
   request_leases(now, actions);
 }
 

@@ -61,8 +61,7 @@ struct UseStore {
   std::string directory, token;
 };
 struct StartTask {
-  LeaseId lease;
-  TaskGrant grant;
+  Grant grant;
 };
 /// Put states that are held into the store: of one job those that are named, or all of all jobs.
 /// HeldPacked is the answer.

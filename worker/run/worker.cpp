@@ -110,7 +110,7 @@ Result<TaskResult> execute_queued(const QueuedTask& task, const std::stop_token&
   // The time that a task may take does not include the loading of its job, which has its own.
   LoadedJobPtr loaded;
   {
-    const TaskWatch::Mark loading(watch, task.lease,
+    const TaskWatch::Mark loading(watch, task.grant.lease,
                                   std::chrono::steady_clock::now() + kLoadPatience);
     BATON_ASSIGN(loaded, task.job->load(stop));
   }
@@ -119,9 +119,9 @@ Result<TaskResult> execute_queued(const QueuedTask& task, const std::stop_token&
     return TaskResult{.made = {}, .unseen = loaded->unseen};
   }
   const TaskWatch::Mark mark(
-      watch, task.lease,
+      watch, task.grant.lease,
       std::chrono::steady_clock::now() + std::chrono::seconds(loaded->job.max_seconds_per_task));
-  const TaskKey& key = task.lease.task;
+  const TaskKey& key = task.grant.lease.task;
   // Again for each frame: links may have changed.
   BATON_TRY(check_output_root(loaded->job, roots));
   if (key.kind == TaskKind::assemble) {
@@ -130,7 +130,7 @@ Result<TaskResult> execute_queued(const QueuedTask& task, const std::stop_token&
       notes.report(loaded->digest, {seen.error().message});
       return TaskResult{.made = {}, .unseen = seen.error().message};
     }
-    Result<TaskResult> frame = execute_task(*loaded, *task.store, key, task.grant, stop);
+    Result<TaskResult> frame = execute_task(*loaded, *task.store, task.grant, stop);
     if (frame) frame->notes = notes.report(loaded->digest, frame->notes);
     return frame;
   }
@@ -144,7 +144,7 @@ Result<TaskResult> execute_queued(const QueuedTask& task, const std::stop_token&
     command = replay_command(path, numbers[last.index()], key.tile);
   }
   const CrashNote note(command);
-  Result<TaskResult> output = execute_task(*loaded, *task.store, key, task.grant, stop, &left);
+  Result<TaskResult> output = execute_task(*loaded, *task.store, task.grant, stop, &left);
   if (output) output->notes = notes.report(loaded->digest, asset_notes(*loaded->context, key));
   if (output || output.error().kind == ErrorKind::cancelled ||
       output.error().kind == ErrorKind::no_space)
@@ -163,10 +163,10 @@ Status publish_queued(std::span<const QueuedTask> tasks, TaskWatch& watch) {
   std::list<TaskWatch::Mark> marks;
   std::set<std::shared_ptr<BlobStore>> stores;
   for (const QueuedTask& task : tasks) {
-    const TaskKey& key = task.lease.task;
+    const TaskKey& key = task.grant.lease.task;
     BATON_ASSIGN(const LoadedJobPtr loaded, task.job->load({}));
     if (key.kind != TaskKind::render || !ends_in_checkpoint(loaded->job, key.run())) continue;
-    marks.emplace_back(watch, task.lease, deadline);
+    marks.emplace_back(watch, task.grant.lease, deadline);
     stores.insert(task.store);
   }
   for (const auto& store : stores) BATON_TRY(store->sync());
@@ -321,10 +321,10 @@ class Worker {
     spdlog::info("the coordinator has answered, blobs are in {}", folder.string());
   }
   void perform(StartTask& action) {
-    std::shared_ptr<JobEntry> job = jobs_.entry(action.lease.job);
+    std::shared_ptr<JobEntry> job = jobs_.entry(action.grant.lease.job);
     const bool missing = !job->has_document();
-    threads_.submit({action.lease, std::move(action.grant), std::move(job), store_});
-    if (missing) step(DocumentMissing{action.lease.job});
+    threads_.submit({std::move(action.grant), std::move(job), store_});
+    if (missing) step(DocumentMissing{action.grant.lease.job});
   }
   void perform(PackHeld& action) {
     std::vector<std::pair<Digest, JobStates::List>> jobs;

@@ -100,7 +100,7 @@ TEST_F(JournalTest, WhatWasCommittedIsThereAgain) {
   for (const int i : {1, 0}) expected.add(completion(i));
   ASSERT_EQ(job.completions.tasks.size(), 2u);
   EXPECT_EQ(job.completions.tasks[0].task, completion(1).task);
-  EXPECT_EQ(job.completions.tasks[0].outputs, completion(1).outputs);
+  EXPECT_EQ(job.completions.tasks[0].outputs, completion(1).made.outputs);
   EXPECT_EQ(job.completions.stats, expected.stats);
   EXPECT_EQ(job.completions.frames, expected.frames);
   EXPECT_EQ(job.completions.steps, expected.steps);

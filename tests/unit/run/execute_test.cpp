@@ -70,9 +70,18 @@ class ExecuteTest : public testing::Test {
   }
 
   StepSpan steps_of(baton::Run run) const { return Timeline(job_).steps_of(run); }
+  Result<TaskResult> execute(const TaskKey& task, const std::vector<BlobRef>& inputs,
+                             const StepSpan& steps = {}, bool may_hold = false,
+                             Step states_from = {}, const std::stop_token& stop = {}) {
+    const Grant grant{.lease = {.job = loaded_->digest, .task = task},
+                      .inputs = inputs,
+                      .steps = steps,
+                      .may_hold = may_hold,
+                      .states_from = states_from};
+    return execute_task(*loaded_, store_.value(), grant, stop);
+  }
   Result<TaskResult> render(baton::Run run, std::int32_t tile, const std::vector<BlobRef>& inputs) {
-    return execute_task(*loaded_, store_.value(), render_task(run, tile), {inputs, steps_of(run)},
-                        {});
+    return execute(render_task(run, tile), inputs, steps_of(run));
   }
 
   /// Every render task in the order of a farm; returns the films by frame, the states in `states_`.
@@ -118,8 +127,7 @@ TEST_F(ExecuteTest, TasksThroughTheStoreMakeTheImagesOfOneProcess) {
 
   for (const auto& [step, films] : render_all()) {
     const FrameIndex frame = Timeline(job_).frame_of(step);
-    const Result<TaskResult> output =
-        execute_task(*loaded_, *store_, assemble_task(frame), {films, {step, step}}, {});
+    const Result<TaskResult> output = execute(assemble_task(frame), films);
     ASSERT_TRUE(output) << output.error().message;
     ASSERT_EQ(output->made.outputs.size(), 1u);
     EXPECT_EQ(output->made.outputs[0].kind, BlobKind::image);
@@ -175,9 +183,7 @@ TEST_F(ExecuteTest, ARunHandsOnItsStateAndCountsItsWork) {
 TEST_F(ExecuteTest, ACutRendersNothing) {
   const BlobRef state = render(baton::Run(0), 1, {}).value().made.outputs.back();
   const TaskKey task = render_task(baton::Run(0), 1);
-  const auto cut = [&](Step last) {
-    return execute_task(*loaded_, *store_, task, {{state}, {last + 1, last}}, {});
-  };
+  const auto cut = [&](Step last) { return execute(task, {state}, {last + 1, last}); };
   const Result<TaskResult> made = cut(Step(1));
   ASSERT_TRUE(made) << made.error().message;
   EXPECT_EQ(made->made.outputs, std::vector<BlobRef>{state});
@@ -195,8 +201,7 @@ TEST_F(ExecuteTest, ACutRendersNothing) {
 TEST_F(ExecuteTest, AHeldStateIsTheStateOfItsFile) {
   const TaskKey first{TaskKind::render, 0, 1}, next{TaskKind::render, 1, 1};
   const BlobRef packed = render(baton::Run(0), 1, {}).value().made.outputs.back();
-  const Result<TaskResult> made =
-      execute_task(*loaded_, *store_, first, {{}, steps_of(baton::Run(0)), /*may_hold=*/true}, {});
+  const Result<TaskResult> made = execute(first, {}, steps_of(baton::Run(0)), /*may_hold=*/true);
   ASSERT_TRUE(made) << made.error().message;
   const BlobRef held = made->made.outputs.back();
   EXPECT_TRUE(held.is_held());
@@ -210,10 +215,8 @@ TEST_F(ExecuteTest, AHeldStateIsTheStateOfItsFile) {
   EXPECT_EQ(*published, (std::vector<PublishedState>{{held, packed}}));
 
   // A grant says which states nobody needs any more; one that is not here is an error.
-  EXPECT_TRUE(
-      execute_task(*loaded_, *store_, next, {{held}, steps_of(baton::Run(1)), false, Step(1)}, {}));
-  const Result<TaskResult> late =
-      execute_task(*loaded_, *store_, next, {{held}, steps_of(baton::Run(1)), false, Step(2)}, {});
+  EXPECT_TRUE(execute(next, {held}, steps_of(baton::Run(1)), false, Step(1)));
+  const Result<TaskResult> late = execute(next, {held}, steps_of(baton::Run(1)), false, Step(2));
   ASSERT_FALSE(late);
   EXPECT_THAT(late.error().message, testing::HasSubstr("is not held here"));
   EXPECT_EQ(loaded_->states->size_bytes(), 0u);
@@ -237,8 +240,8 @@ TEST_F(ExecuteTest, TasksThatTheJobDoesNotHaveAreBadInput) {
   for (const TaskKey& task : {TaskKey{TaskKind::render, 3, 0}, TaskKey{TaskKind::render, 0, 6},
                               TaskKey{TaskKind::render, -1, 0}, TaskKey{TaskKind::assemble, 5, 0},
                               TaskKey{TaskKind::assemble, 0, 0}}) {
-    const Result<TaskResult> output = execute_task(
-        *loaded_, *store_, task, {{}, {Step(2 * task.position), Step(2 * task.position)}}, {});
+    const Result<TaskResult> output =
+        execute(task, {}, {Step(2 * task.position), Step(2 * task.position)});
     ASSERT_FALSE(output);
     EXPECT_EQ(output.error().kind, ErrorKind::bad_input);
   }
@@ -247,14 +250,14 @@ TEST_F(ExecuteTest, TasksThatTheJobDoesNotHaveAreBadInput) {
 TEST_F(ExecuteTest, AFrameNeedsEveryTileOnce) {
   auto films = render_all()[Step(0)];
   films[1] = films[0];
-  EXPECT_FALSE(execute_task(*loaded_, *store_, {TaskKind::assemble, 0, 0}, {films}, {}));
+  EXPECT_FALSE(execute({TaskKind::assemble, 0, 0}, films));
 }
 
 TEST_F(ExecuteTest, AStoppedTaskIsCancelled) {
   std::stop_source stop;
   stop.request_stop();
-  const Result<TaskResult> output = execute_task(*loaded_, *store_, {TaskKind::render, 0, 0},
-                                                 {{}, steps_of(baton::Run(0))}, stop.get_token());
+  const Result<TaskResult> output =
+      execute({TaskKind::render, 0, 0}, {}, steps_of(baton::Run(0)), false, {}, stop.get_token());
   ASSERT_FALSE(output);
   EXPECT_EQ(output.error().kind, ErrorKind::cancelled);
 }

@@ -17,7 +17,7 @@ LeaseId lease(std::int32_t tile) {
 }
 
 QueuedTask task(std::int32_t tile) {
-  return {.lease = lease(tile), .grant = {}, .job = nullptr, .store = nullptr};
+  return {.grant = {.lease = lease(tile), .inputs = {}}, .job = nullptr, .store = nullptr};
 }
 
 Status at_once(std::span<const QueuedTask> /*tasks*/) { return {}; }
@@ -39,7 +39,7 @@ TEST(RenderThreads, RunsEverythingOnceAndWakesForEachResult) {
       3,
       [](const QueuedTask& t, const std::stop_token&, std::vector<BlobRef>&) {
         TaskResult output;
-        output.made.stats.pixels = static_cast<std::uint64_t>(t.lease.task.tile);
+        output.made.stats.pixels = static_cast<std::uint64_t>(t.grant.lease.task.tile);
         return output;
       },
       at_once, [&] { woken.release(); });
@@ -82,7 +82,7 @@ TEST(RenderThreads, DroppedTasksEndAsCancelledAndNeverRun) {
   RenderThreads pool(
       1,
       [&](const QueuedTask& t, const std::stop_token&, std::vector<BlobRef>&) {
-        EXPECT_EQ(t.lease, lease(0));
+        EXPECT_EQ(t.grant.lease, lease(0));
         started.release();
         let_go.acquire();
         return TaskResult{};

@@ -29,7 +29,7 @@ TEST_F(SessionTest, AsksForOneTaskMoreThanThreads) {
   // A grant answers one of the three; the other two are still asked for.
   const auto after = grant(lease(0));
   ASSERT_NE(find<StartTask>(after), nullptr);
-  EXPECT_EQ(find<StartTask>(after)->lease, lease(0));
+  EXPECT_EQ(find<StartTask>(after)->grant.lease, lease(0));
   EXPECT_TRUE(sent<LeaseRequest>(after).empty());
 }
 

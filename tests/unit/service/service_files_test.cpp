@@ -132,37 +132,17 @@ TEST_F(ServiceTest, AFrameThatOnlyItsWorkerSeesCountsAgainstTheWorker) {
               ElementsAre(HasSubstr("frame.0001.exr: reported, but not there")));
 }
 
-TEST_F(ServiceTest, ADamagedBlobIsMadeAgainWithoutBlame) {
-  const RunningService service(options);
-  const Digest id = ask<JobAccepted>(service.endpoint(), SubmitJob{document}).job;
-  FakeWorker worker(service.endpoint(), store(), job);
-  worker.hello();
-  worker.say(LeaseRequest{1});
-  const TaskDone first = worker.work(worker.expect<LeaseGrant>().lease);
-  worker.say(first);
-  worker.say(LeaseRequest{2});
-  LeaseGrant reader = worker.expect<LeaseGrant>();
-  if (reader.inputs.empty()) reader = worker.expect<LeaseGrant>();
-  ASSERT_FALSE(reader.inputs.empty());
-  const fs::path blob = BlobStore::open(store())->path(reader.inputs[0].digest);
-  fs::resize_file(blob, fs::file_size(blob) - 1);
-  worker.say(TaskFailed{reader.lease, "cannot read", false});
-  worker.say(LeaseRequest{2});
-  EXPECT_EQ(worker.expect<LeaseGrant>().lease.task, first.lease.task) << "made again";
-  const JobDetail detail = show(service.endpoint(), id);
-  EXPECT_THAT(detail.failures, SizeIs(0));
-  EXPECT_EQ(detail.summary.status, JobStatus::running);
-}
-
-// A bad sector, or something else in its place: as if it were damaged.
-TEST_F(ServiceTest, ABlobThatCannotBeReadIsMadeAgainWithoutBlame) {
+// Cut, on a bad sector, or with a folder in its place: whatever the worker says of it.
+TEST_F(ServiceTest, ABlobThatIsDamagedOrCannotBeReadIsMadeAgainWithoutBlame) {
+  enum class Fault { cut, unreadable, other };
   std::string broken;
   options.disk.digest = [&](const fs::path& path) -> Result<Digest> {
     if (path == broken) return Error{ErrorKind::io, broken + ": cannot read: Input/output error"};
     return digest_of_file(path);
   };
-  for (const bool is_folder : {false, true}) {
-    options.work_dir = folder / (is_folder ? "work" : "other");
+  for (const Fault fault : {Fault::cut, Fault::unreadable, Fault::other}) {
+    SCOPED_TRACE(static_cast<int>(fault));
+    options.work_dir = folder / std::to_string(static_cast<int>(fault));
     const RunningService service(options);
     const Digest id = ask<JobAccepted>(service.endpoint(), SubmitJob{document}).job;
     FakeWorker worker(service.endpoint(), store(), job);
@@ -175,13 +155,13 @@ TEST_F(ServiceTest, ABlobThatCannotBeReadIsMadeAgainWithoutBlame) {
     if (reader.inputs.empty()) reader = worker.expect<LeaseGrant>();
     ASSERT_FALSE(reader.inputs.empty());
     const fs::path blob = BlobStore::open(store())->path(reader.inputs[0].digest);
-    if (is_folder) {
+    if (fault == Fault::cut) fs::resize_file(blob, fs::file_size(blob) - 1);
+    if (fault == Fault::unreadable) broken = blob;
+    if (fault == Fault::other) {
       fs::remove(blob);
       fs::create_directories(blob / "full");
-    } else {
-      broken = blob;
     }
-    worker.say(TaskFailed{reader.lease, "cannot read", true});
+    worker.say(TaskFailed{reader.lease, "cannot read", fault != Fault::cut});
     worker.say(LeaseRequest{2});
     EXPECT_EQ(worker.expect<LeaseGrant>().lease.task, first.lease.task) << "made again";
     EXPECT_FALSE(fs::exists(blob));
